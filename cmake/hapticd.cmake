@@ -1,0 +1,59 @@
+# Compiler settings, and one function for each kind of target.
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+
+find_package(Threads REQUIRED)
+find_package(Eigen3 REQUIRED NO_MODULE)
+
+add_library(hapticd_flags INTERFACE)
+target_compile_options(hapticd_flags INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual -Wcast-align
+  $<$<BOOL:${HAPTICD_WERROR}>:-Werror>
+  # The same input gives the same bytes on every x86-64-v2 machine: no contraction, no fast-math.
+  -ffp-contract=off
+  $<$<STREQUAL:${CMAKE_SYSTEM_PROCESSOR},x86_64>:-march=x86-64-v2>)
+if(HAPTICD_SANITIZE)
+  target_compile_options(hapticd_flags INTERFACE -fsanitize=${HAPTICD_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  target_link_options(hapticd_flags INTERFACE -fsanitize=${HAPTICD_SANITIZE})
+  target_compile_definitions(hapticd_flags INTERFACE HAPTICD_SANITIZED=1)
+endif()
+
+# hapticd_library(NAME SOURCES ... DEPENDS rooms ... [LIBS external ...] [PRIVATE_LIBS external ...])
+# One library per folder of src/. DEPENDS is the list of rooms it may include: scripts/check_includes.sh
+# reads it from here, so the arrow and the link line cannot differ.
+function(hapticd_library name)
+  cmake_parse_arguments(A "" "" "SOURCES;DEPENDS;LIBS;PRIVATE_LIBS" ${ARGN})
+  set(deps ${A_DEPENDS})
+  list(TRANSFORM deps PREPEND hapticd_)
+  if(A_SOURCES)
+    add_library(hapticd_${name} STATIC ${A_SOURCES})
+    target_include_directories(hapticd_${name} PUBLIC ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/include)
+    target_link_libraries(hapticd_${name} PUBLIC ${deps} ${A_LIBS} PRIVATE hapticd_flags ${A_PRIVATE_LIBS})
+    set_target_properties(hapticd_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  else()
+    add_library(hapticd_${name} INTERFACE)
+    target_include_directories(hapticd_${name} INTERFACE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/include)
+    target_link_libraries(hapticd_${name} INTERFACE ${deps} ${A_LIBS})
+  endif()
+endfunction()
+
+# hapticd_test(NAME SOURCES ... DEPENDS rooms ... [LIBS ...] [LABELS ...])
+# One test program NAME_test; every TEST() in it becomes one ctest case.
+function(hapticd_test name)
+  cmake_parse_arguments(A "" "" "SOURCES;DEPENDS;LIBS;LABELS" ${ARGN})
+  set(deps ${A_DEPENDS})
+  list(TRANSFORM deps PREPEND hapticd_)
+  add_executable(${name}_test ${A_SOURCES})
+  target_include_directories(${name}_test PRIVATE ${PROJECT_SOURCE_DIR}/tests)
+  target_link_libraries(${name}_test PRIVATE ${deps} ${A_LIBS} hapticd_flags GTest::gtest_main GTest::gmock)
+  target_compile_definitions(${name}_test PRIVATE HAPTICD_TESTDATA="${PROJECT_SOURCE_DIR}/testdata")
+  set(properties TIMEOUT 300)
+  if(A_LABELS)
+    list(APPEND properties LABELS "${A_LABELS}")
+  endif()
+  gtest_discover_tests(${name}_test TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60 PROPERTIES ${properties})
+endfunction()

@@ -1,0 +1,53 @@
+// The vocabulary of space: aliases over Eigen, units and frames.
+//
+// SI inside: metres, newtons, radians, seconds. A transform is named T_a_b and maps b to a.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <limits>
+
+namespace hapticd::geometry {
+
+using Vec3 = Eigen::Vector3d;
+using Vec3f = Eigen::Vector3f;
+using Mat3 = Eigen::Matrix3d;
+using Mat4 = Eigen::Matrix4d;
+using Quat = Eigen::Quaterniond;
+/// Affine map: rotation, scale, shear and translation (a 3x4 matrix, 16 byte aligned).
+using Affine = Eigen::Transform<double, 3, Eigen::AffineCompact>;
+
+/// Rigid placement of a frame: position in metres, unit orientation.
+struct Pose {
+  Vec3 position = Vec3::Zero();
+  Quat orientation = Quat::Identity();
+};
+
+/// Axis-aligned box; empty until extended.
+struct Box {
+  Vec3 min = Vec3::Constant(std::numeric_limits<double>::infinity());
+  Vec3 max = Vec3::Constant(-std::numeric_limits<double>::infinity());
+
+  bool empty() const noexcept { return !(min.array() <= max.array()).all(); }
+  void extend(const Vec3& p) noexcept {
+    min = min.cwiseMin(p);
+    max = max.cwiseMax(p);
+  }
+  void extend(const Box& b) noexcept {
+    min = min.cwiseMin(b.min);
+    max = max.cwiseMax(b.max);
+  }
+  Vec3 centre() const noexcept { return 0.5 * (min + max); }
+  Vec3 extents() const noexcept { return max - min; }
+};
+
+/// Time on the servo clock in nanoseconds: CLOCK_MONOTONIC when live, simulated time offline.
+using Nanos = std::int64_t;
+
+constexpr double toSeconds(Nanos t) noexcept { return static_cast<double>(t) * 1e-9; }
+constexpr Nanos toNanos(double seconds) noexcept {
+  return static_cast<Nanos>(seconds * 1e9 + (seconds < 0 ? -0.5 : 0.5));
+}
+
+}  // namespace hapticd::geometry
