@@ -45,7 +45,9 @@ struct Box {
 /// Time on the servo clock in nanoseconds: CLOCK_MONOTONIC when live, simulated time offline.
 using Nanos = std::int64_t;
 
-constexpr double toSeconds(Nanos t) noexcept { return static_cast<double>(t) * 1e-9; }
+constexpr double toSeconds(Nanos t) noexcept {
+  return static_cast<double>(t) * 1e-9;
+}
 constexpr Nanos toNanos(double seconds) noexcept {
   return static_cast<Nanos>(seconds * 1e9 + (seconds < 0 ? -0.5 : 0.5));
 }

@@ -1,0 +1,26 @@
+// Force effects of the scene, in the units of the client.
+#pragma once
+
+#include <cstdint>
+
+#include "geometry/types.h"
+
+namespace hapticd::scene {
+
+enum class EffectType { constant, spring, viscous, friction, motorVibration, contactVibration };
+
+/// A running effect. The servo starts its clock and phase when it first sees a new `start` number.
+struct Effect {
+  std::int32_t index = 0;
+  EffectType type = EffectType::constant;
+  double gain = 0;                                    ///< N/m (spring, friction) or N·s/m (viscous)
+  double magnitude_N = 0;                             ///< force, or its limit
+  geometry::Nanos duration = 0;                       ///< 0: until stopped
+  double angularFrequency_rad_per_s = 0;              ///< vibrations
+  geometry::Vec3 position = geometry::Vec3::Zero();   ///< world units
+  geometry::Vec3 direction = geometry::Vec3::Zero();  ///< world frame, not normalised
+  std::uint32_t start = 0;                            ///< counts starts of this index
+  bool releasing = false;                             ///< its owner is gone: ramp out in 250 ms
+};
+
+}  // namespace hapticd::scene

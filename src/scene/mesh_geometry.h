@@ -1,0 +1,51 @@
+// The shape of one object as the servo loop sees it: immutable triangles with their index.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "geometry/triangle_mesh.h"
+#include "scene/spatial_index.h"
+
+namespace hapticd::scene {
+
+using geometry::Nanos;
+using geometry::Triangle;
+using geometry::Vec3f;
+
+/// Three corners of a triangle in object units, in winding order.
+struct Corners {
+  Vec3 a, b, c;
+};
+
+/// Immutable shape. While it deforms, vertices travel from `vertices` to `target` between two times; the
+/// index then holds boxes around both ends. Shared by all snapshots that show it; freed on the scene thread.
+struct MeshGeometry {
+  std::uint64_t topology = 0;  ///< equal numbers mean equal triangle lists: triangle ids stay valid
+  std::shared_ptr<const std::vector<Triangle>> triangles;
+  std::shared_ptr<const std::vector<Vec3f>> vertices;
+  std::shared_ptr<const std::vector<Vec3f>> target;  ///< null unless deforming
+  Nanos morphBegin = 0;
+  Nanos morphEnd = 0;
+  SpatialIndex index;  ///< over triangle ids, in object units
+
+  bool deformingAfter(Nanos now) const noexcept { return target && now < morphEnd; }
+
+  /// Corners of a triangle at `now`, object units. noexcept, allocation-free.
+  Corners corners(std::uint32_t triangle, Nanos now) const noexcept {
+    const Triangle& t = (*triangles)[triangle];
+    return {vertex(t[0], now), vertex(t[1], now), vertex(t[2], now)};
+  }
+
+  Vec3 vertex(std::uint32_t i, Nanos now) const noexcept {
+    const Vec3 from = (*vertices)[i].cast<double>();
+    if (!target) return from;
+    const Vec3 to = (*target)[i].cast<double>();
+    if (now >= morphEnd) return to;
+    if (now <= morphBegin) return from;
+    const double s = static_cast<double>(now - morphBegin) / static_cast<double>(morphEnd - morphBegin);
+    return from + s * (to - from);
+  }
+};
+
+}  // namespace hapticd::scene

@@ -1,0 +1,50 @@
+// Where an object is at a moment: fixed, or on its way between two poses that a client sent.
+#pragma once
+
+#include "geometry/types.h"
+
+namespace hapticd::scene {
+
+using geometry::Affine;
+using geometry::Nanos;
+
+/// T_world_object as a function of servo time. Immutable; evaluation is noexcept and allocation-free.
+class Motion {
+ public:
+  /// Fixed at the identity.
+  Motion() = default;
+  /// Fixed at a placement; `jumps` tells apart placements that were not reached by moving.
+  static Motion fixed(const Affine& T_world_object, std::uint32_t jumps = 0);
+  /// From one placement to another between two times (rotation by slerp, scale and shear linearly), at rest
+  /// outside.
+  static Motion between(const Affine& from, const Affine& to, Nanos begin, Nanos end,
+                        std::uint32_t jumps = 0);
+
+  /// World from object (world units) at time `now`.
+  Affine at(Nanos now) const noexcept;
+  /// True while the placement still changes after `now`.
+  bool movingAfter(Nanos now) const noexcept { return end_ > begin_ && now < end_; }
+  /// Where it comes to rest.
+  const Affine& destination() const noexcept { return to_; }
+  /// Where it started.
+  const Affine& origin() const noexcept { return from_; }
+  /// Counts placements that are jumps: two motions of one object with the same number join without a gap.
+  std::uint32_t jumps() const noexcept { return jumps_; }
+
+ private:
+  struct Factors {  // T = translation * rotation * stretch
+    geometry::Quat rotation = geometry::Quat::Identity();
+    geometry::Mat3 stretch = geometry::Mat3::Identity();
+  };
+  static Factors factorise(const Affine& t);
+
+  Affine from_ = Affine::Identity();
+  Affine to_ = Affine::Identity();
+  Factors fromFactors_;
+  Factors toFactors_;
+  Nanos begin_ = 0;
+  Nanos end_ = 0;
+  std::uint32_t jumps_ = 0;
+};
+
+}  // namespace hapticd::scene

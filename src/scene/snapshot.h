@@ -1,0 +1,36 @@
+// What can be touched at this moment: an immutable picture of the scene for the servo loop.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "scene/effect.h"
+#include "scene/mesh_geometry.h"
+#include "scene/motion.h"
+#include "scene/surface.h"
+#include "scene/workspace.h"
+
+namespace hapticd::scene {
+
+/// One object that can be felt. Immutable and shared between snapshots: a new one is made only when it
+/// changes.
+struct ObjectState {
+  std::int32_t id = 0;
+  std::shared_ptr<const MeshGeometry> mesh;
+  Motion motion;
+  Surface surface;
+};
+
+/// Everything the servo loop needs to know of the scene. Built and freed on the scene thread, read by servos.
+struct SceneSnapshot {
+  std::uint64_t revision = 0;
+  Workspace workspace;
+  TouchableFaces faces = TouchableFaces::both;
+  /// Touchable objects with triangles and stiffness, by ascending id.
+  std::vector<std::shared_ptr<const ObjectState>> objects;
+  /// Over positions in `objects`: boxes in world units around all that an object sweeps during its motion.
+  std::shared_ptr<const SpatialIndex> objectIndex;
+  std::vector<Effect> effects;  ///< running ones, by ascending index
+};
+
+}  // namespace hapticd::scene

@@ -1,0 +1,78 @@
+// Bounding-box tree over numbered boxes (Embree), for triangles of a mesh and for objects of a scene.
+//
+// It only proposes: every box is padded by more than the float error of the tree, so each query visits a
+// superset of the boxes it touches. Whoever asks decides in double precision and breaks ties by the lowest
+// id, because the order of visits is not defined.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+
+#include "geometry/types.h"
+
+namespace hapticd::scene {
+
+using geometry::Box;
+using geometry::Vec3;
+
+/// Tree over boxes 0…n-1. Building and refitting allocate (scene thread); queries are const, noexcept,
+/// lock-free and allocation-free, and may run while other threads query the same index.
+class SpatialIndex {
+ public:
+  /// Gives the box of an id; an empty box leaves the id out of the tree. Called from several threads while
+  /// building.
+  using BoxOf = std::function<Box(std::uint32_t id)>;
+
+  SpatialIndex() noexcept;
+  ~SpatialIndex();
+  SpatialIndex(SpatialIndex&&) noexcept;
+  SpatialIndex& operator=(SpatialIndex&&) noexcept;
+
+  /// Builds over ids 0…count-1. Throws std::runtime_error with Embree's own words when it cannot.
+  static SpatialIndex build(std::uint32_t count, const BoxOf& boxOf);
+
+  /// Recomputes all boxes and refits the tree in place; nobody may query meanwhile. Same count as built.
+  void refit(const BoxOf& boxOf);
+
+  /// Union of all boxes; empty when there is none.
+  const Box& bounds() const noexcept { return bounds_; }
+  std::uint32_t size() const noexcept { return count_; }
+
+  /// Calls visit(id) for at least every box within `radius` of `centre`.
+  template <class Visit>
+  void visitNear(const Vec3& centre, double radius, Visit&& visit) const noexcept {
+    visitNearImpl(
+        centre, radius,
+        [](void* v, std::uint32_t id) noexcept { (*static_cast<std::remove_reference_t<Visit>*>(v))(id); },
+        const_cast<void*>(static_cast<const void*>(std::addressof(visit))));
+  }
+
+  /// Calls visit(id) for at least every box that the segment touches, roughly near to far. visit returns the
+  /// segment parameter in [0,1] beyond which nothing more is wanted (1 to go on, the hit parameter after a
+  /// hit).
+  template <class Visit>
+  void visitSegment(const Vec3& from, const Vec3& to, Visit&& visit) const noexcept {
+    visitSegmentImpl(
+        from, to,
+        [](void* v, std::uint32_t id) noexcept -> double {
+          return (*static_cast<std::remove_reference_t<Visit>*>(v))(id);
+        },
+        const_cast<void*>(static_cast<const void*>(std::addressof(visit))));
+  }
+
+ private:
+  using NearThunk = void (*)(void*, std::uint32_t) noexcept;
+  using SegmentThunk = double (*)(void*, std::uint32_t) noexcept;
+  void visitNearImpl(const Vec3& centre, double radius, NearThunk thunk, void* visitor) const noexcept;
+  void visitSegmentImpl(const Vec3& from, const Vec3& to, SegmentThunk thunk, void* visitor) const noexcept;
+
+  struct Tree;
+  std::unique_ptr<Tree> tree_;
+  Box bounds_;
+  double pad_ = 0;
+  std::uint32_t count_ = 0;
+};
+
+}  // namespace hapticd::scene
