@@ -1,0 +1,32 @@
+// hapticd: a haptics server that speaks VRPN, and the tools around it.
+#include <cstdio>
+#include <exception>
+
+#include "commands.h"
+
+int main(int argc, char** argv) {
+  using namespace hapticd::apps;
+  CLI::App app{
+      "hapticd: a haptics server that speaks VRPN.\n"
+      "One process owns a haptic device, takes a scene from any VRPN client, renders forces at 1 kHz\n"
+      "and tells all clients what the hand feels.\n\n"
+      "A first touch, without hardware, in two terminals:\n"
+      "  hapticd serve\n"
+      "  hapticd touch bunny.obj --server Phantom@localhost"};
+  app.name("hapticd");
+  app.set_version_flag("--version", "hapticd " HAPTICD_VERSION);
+  app.require_subcommand(1);
+  addServe(app);
+  addTouch(app);
+  addRender(app);
+  addDoctor(app);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "hapticd: %s\n", error.what());
+    return 1;
+  }
+  return exitCode;
+}
