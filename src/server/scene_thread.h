@@ -1,4 +1,5 @@
-// The scene thread: applies commands in order, builds geometry off the loop, publishes snapshots to the servo.
+// The scene thread: applies commands in order, builds geometry off the loop, publishes snapshots to the
+// servo.
 #pragma once
 
 #include <condition_variable>
@@ -23,14 +24,15 @@ struct SceneTask {
   std::variant<scene::SceneCommand, ClientGone> what;
 };
 
-/// Owns the builder of one scene and the thread that drives it. enqueue() from the net thread; the callbacks run in the
-/// scene thread and must only pass things on.
+/// Owns the builder of one scene and the thread that drives it. enqueue() from the net thread; the callbacks
+/// run in the scene thread and must only pass things on.
 class SceneThread {
  public:
   struct Callbacks {
-    std::function<void(std::vector<scene::Notice>&&)> notices;                          ///< texts for clients
-    std::function<void(const std::shared_ptr<const scene::SceneSnapshot>&)> published;  ///< after the slot has it
-    std::function<void()> drained;                                                      ///< the queue fell under half its limit
+    std::function<void(std::vector<scene::Notice>&&)> notices;  ///< texts for clients
+    std::function<void(const std::shared_ptr<const scene::SceneSnapshot>&)>
+        published;                  ///< after the slot has it
+    std::function<void()> drained;  ///< the queue fell under half its limit
   };
 
   /// Tasks above this many bytes make full() true: the net thread then stops reading from its clients.
