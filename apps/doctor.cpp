@@ -1,0 +1,175 @@
+// hapticd doctor: checks what a newcomer trips over, measures the loop, and ends in a verdict with the remedies.
+#include <dlfcn.h>
+#include <netinet/in.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstring>
+#include <ctime>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "commands.h"
+#include "loop_check.h"
+
+namespace hapticd::apps {
+namespace {
+
+enum class Verdict { good, note, bad };
+
+struct Finding {
+  Verdict verdict = Verdict::good;
+  std::string what;
+  std::string remedy;
+};
+
+void print(const Finding& finding) {
+  static constexpr const char* kMarks[] = {"ok  ", "note", "BAD "};
+  std::printf("  %s  %s\n", kMarks[static_cast<int>(finding.verdict)], finding.what.c_str());
+  if (!finding.remedy.empty()) std::printf("        -> %s\n", finding.remedy.c_str());
+}
+
+std::string firstLine(const char* path) {
+  std::ifstream in(path);
+  std::string line;
+  std::getline(in, line);
+  return line;
+}
+
+Finding realtimePriority() {
+  sched_param parameter{};
+  parameter.sched_priority = 80;
+  const int before = sched_getscheduler(0);
+  if (sched_setscheduler(0, SCHED_FIFO, &parameter) == 0) {
+    sched_param back{};
+    sched_setscheduler(0, before, &back);
+    return {Verdict::good, "SCHED_FIFO priority 80 is granted", ""};
+  }
+  return {Verdict::bad, "SCHED_FIFO is refused: " + std::string(std::strerror(errno)),
+          "put '@realtime - rtprio 95' and '@realtime - memlock unlimited' into /etc/security/limits.d/realtime.conf,\n"
+          "           add yourself to the group realtime, log in again; or: setcap cap_sys_nice,cap_ipc_lock+ep hapticd"};
+}
+
+Finding memoryLock() {
+  rlimit limit{};
+  getrlimit(RLIMIT_MEMLOCK, &limit);
+  if (geteuid() == 0 || limit.rlim_cur == RLIM_INFINITY) return {Verdict::good, "memory can be locked without limit", ""};
+  const auto kib = static_cast<unsigned long>(limit.rlim_cur / 1024);
+  return {Verdict::note, "only " + std::to_string(kib) + " KiB of memory may be locked",
+          "a page fault in the loop costs up to a millisecond: raise memlock as above ('ulimit -l' shows it)"};
+}
+
+Finding governor() {
+  const std::string name = firstLine("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor");
+  if (name.empty()) return {Verdict::note, "no CPU frequency governor to be seen (usual in virtual machines)", ""};
+  if (name == "performance") return {Verdict::good, "CPU governor is 'performance'", ""};
+  return {Verdict::note, "CPU governor is '" + name + "'",
+          "sudo cpupower frequency-set -g performance (a sleeping core wakes up late)"};
+}
+
+Finding timerResolution() {
+  timespec resolution{};
+  clock_getres(CLOCK_MONOTONIC, &resolution);
+  const long nanoseconds = resolution.tv_sec * 1000000000L + resolution.tv_nsec;
+  if (nanoseconds <= 1000) return {Verdict::good, "timer resolution is " + std::to_string(nanoseconds) + " ns", ""};
+  return {Verdict::bad, "timer resolution is " + std::to_string(nanoseconds) + " ns",
+          "the kernel lacks high-resolution timers (CONFIG_HIGH_RES_TIMERS): a 1 kHz loop cannot keep time"};
+}
+
+Finding portFree(int type, const char* protocol, std::uint16_t port) {
+  const int fd = socket(AF_INET, type, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(port);
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  const int yes = 1;
+  if (type == SOCK_STREAM) setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  const bool free = bind(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0;
+  close(fd);
+  const std::string name = std::string(protocol) + " port " + std::to_string(port);
+  if (free) return {Verdict::good, name + " is free", ""};
+  return {Verdict::note, name + " is in use", "a VRPN server runs already? Else: hapticd serve --listen 127.0.0.1:3884"};
+}
+
+Finding vendorLibrary(const char* device, const std::vector<const char*>& names) {
+  std::string why;
+  for (const char* name : names) {
+    // Lazily and locally: only to see whether it is there, nothing of it is called.
+    if (void* handle = dlopen(name, RTLD_LAZY | RTLD_LOCAL)) {
+      dlclose(handle);
+      return {Verdict::good, std::string(device) + ": " + name + " found", ""};
+    }
+    if (why.empty()) why = dlerror();
+  }
+  return {Verdict::note, std::string(device) + ": not installed (" + why + ")", ""};
+}
+
+int run(double seconds, std::uint16_t port) {
+  std::vector<Finding> findings;
+  const auto add = [&](const Finding& finding) {
+    print(finding);
+    findings.push_back(finding);
+  };
+  std::printf("realtime\n");
+  add(realtimePriority());
+  add(memoryLock());
+  add(governor());
+  add(timerResolution());
+  std::printf("network\n");
+  add(portFree(SOCK_STREAM, "TCP", port));
+  add(portFree(SOCK_DGRAM, "UDP", port));
+  std::printf("devices\n");
+  add({Verdict::good, "simulated hand: always there", ""});
+  add(vendorLibrary("3D Systems OpenHaptics", {"libHD.so", "libHD.so.3.4", "libHD.so.3.0"}));
+  add(vendorLibrary("Force Dimension", {"libdrd.so.3", "libdhd.so.3"}));
+
+  std::printf("loop, %g s at 1 kHz with the simulated hand\n", seconds);
+  std::fflush(stdout);
+  const LoopCheck loop = measureLoop(seconds);
+  for (const std::string& line : loop.setup) std::printf("        %s\n", line.c_str());
+  char text[256];
+  std::snprintf(text, sizeof text,
+                "%llu ticks, %llu overruns; wake-up error p50 %.0f us, p99 %.0f us, max %.0f us; compute p99 %.1f us",
+                static_cast<unsigned long long>(loop.ticks), static_cast<unsigned long long>(loop.overruns),
+                loop.wakeup_us.p50, loop.wakeup_us.p99, loop.wakeup_us.max, loop.compute_us.p99);
+  const bool steady = loop.wakeup_us.p99 < 100 && loop.overruns * 1000 <= loop.ticks;
+  add({steady ? Verdict::good : Verdict::bad, text,
+       steady ? "" : "close other programs, give the loop realtime rights, or use a kernel with PREEMPT_RT"});
+
+  int bad = 0;
+  int notes = 0;
+  for (const Finding& finding : findings) {
+    bad += finding.verdict == Verdict::bad ? 1 : 0;
+    notes += finding.verdict == Verdict::note ? 1 : 0;
+  }
+  if (bad == 0) {
+    std::printf("verdict: ready to render forces (%d notes above)\n", notes);
+  } else {
+    std::printf("verdict: %d thing(s) to mend first, see -> above; the simulated hand runs with --allow-no-rt\n", bad);
+  }
+  return bad == 0 ? 0 : 1;
+}
+
+}  // namespace
+
+void addDoctor(CLI::App& app) {
+  struct Options {
+    double seconds = 3;
+    std::uint16_t port = 3883;
+  };
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand(
+      "doctor", "Check this machine: realtime rights, memory lock, governor, timer, ports, vendor libraries, the loop");
+  command->add_option("--seconds", options->seconds, "How long to measure the loop")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->capture_default_str();
+  command->add_option("--port", options->port, "Port to look at")->capture_default_str();
+  command->footer("Returns 0 when nothing needs mending, 1 otherwise.");
+  command->callback([options] { exitCode = run(options->seconds, options->port); });
+}
+
+}  // namespace hapticd::apps
