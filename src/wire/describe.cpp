@@ -1,0 +1,168 @@
+#include "wire/describe.h"
+
+#include "wire/codec.h"
+#include "wire/cookie.h"
+#include "wire/frame.h"
+#include "wire/system.h"
+#include "wire/text.h"
+
+namespace hapticd::wire {
+
+namespace {
+
+template <Scalar T>
+std::string scalarName() {
+  const char letter = std::floating_point<T> ? 'f' : std::is_signed_v<T> ? 'i' : 'u';
+  return letter + std::to_string(8 * sizeof(T));
+}
+
+struct FieldLister {
+  std::vector<FieldDescription>& fields;
+  std::size_t offset = 0;
+
+  template <Scalar T>
+  void operator()(const char* name, const T&, const char* unit = "") {
+    add(name, scalarName<T>(), unit, sizeof(T));
+  }
+  template <class T, std::size_t N>
+  void operator()(const char* name, const std::array<T, N>&, const char* unit = "") {
+    add(name, scalarName<T>() + '[' + std::to_string(N) + ']', unit, sizeof(T) * N);
+  }
+  template <std::size_t N>
+  void operator()(const char* name, const NameBuffer<N>&, const char* unit = "") {
+    add(name, "char[" + std::to_string(N) + ']', unit, N);
+  }
+  template <std::size_t N>
+  void operator()(const char* name, const TextBuffer<N>&, const char* unit = "") {
+    add(name, "char[" + std::to_string(N) + ']', unit, N);
+  }
+  template <class Count, class T, std::size_t Max>
+  void operator()(const char* name, const Counted<Count, T, Max>&, const char* unit = "") {
+    add("n", scalarName<Count>(), "", sizeof(Count));
+    add(name, scalarName<T>() + "[n<=" + std::to_string(Max) + ']', unit, 0);
+  }
+
+  void add(const char* name, std::string type, const char* unit, std::size_t bytes) {
+    fields.push_back({name, std::move(type), unit, offset});
+    offset += bytes;
+  }
+};
+
+template <WireMessage M>
+MessageDescription describeMessage() {
+  MessageDescription description{kindOf<M>, M::kInfo, kPayloadSize<M>, kIsCounted<M>, {}};
+  const M message{};
+  M::fields(message, FieldLister{description.fields});
+  return description;
+}
+
+template <std::size_t... I>
+std::vector<MessageDescription> describeAll(std::index_sequence<I...>) {
+  return {describeMessage<std::variant_alternative_t<I, Message>>()...};
+}
+
+std::string_view directionText(Direction direction) {
+  switch (direction) {
+    case Direction::kToServer:
+      return "client to server";
+    case Direction::kToClient:
+      return "server to client";
+    case Direction::kBoth:
+      break;
+  }
+  return "both";
+}
+
+std::string layoutText(const MessageDescription& message) {
+  std::string text;
+  for (const FieldDescription& field : message.fields) {
+    if (!text.empty()) text += "; ";
+    text += std::to_string(field.offset) + ": " + field.type + ' ' + field.name;
+    if (!field.unit.empty()) text += " (" + field.unit + ')';
+  }
+  return text.empty() ? "empty" : text;
+}
+
+constexpr std::string_view kIntroduction = R"(# Messages on the wire
+
+Written by `wire_docs markdown` from the table in `src/wire/messages.h`; do not edit.
+
+Every message travels in a frame: a header of 24 bytes, the payload, and padding to a multiple of 8.
+
+| offset | type | field |
+|---|---|---|
+| 0 | u32 | length of header and payload, without padding; 24 to 64024 |
+| 4 | u32 | seconds since the epoch |
+| 8 | u32 | microseconds |
+| 12 | i32 | sender: the number the sending side gave a device name |
+| 16 | i32 | type: the number the sending side gave a message name; negative for system messages |
+| 20 | u32 | sequence number, ignored |
+
+Numbers are big endian, floats IEEE 754, and fields follow each other without alignment. Offsets below are from the
+start of the payload. `low latency` messages travel by UDP once both sides have described a socket, all others, and
+all before that, by TCP. A payload of another length is refused, except that bytes behind a list of n values are
+ignored. `char[20]` ends at the first NUL or after 20 bytes; `char[1024]` always ends in a NUL.
+
+A TCP connection starts with 24 bytes from either side: `vrpn: ver. 07.38`, two spaces, one digit (logging asked of
+the peer: 0 none, 1 what it receives, 2 what it sends, 3 both) and five NULs. Any `07.` version is accepted. Then each side
+describes its numbers with these system messages, and any later ones before it uses them:
+
+| type | meaning | sender field | payload |
+|---|---|---|---|
+| -1 | sender description | number, 0 to 1999 | 0: i32 length with NUL; 4: name, at most 95 characters, and NUL |
+| -2 | type description | number, 0 to 1999 | the same |
+| -3 | UDP description: send datagrams here | port | dotted address and NUL |
+| -4 | log description | mode, as in the cookie | 0: i32 length; 4: i32 length; 8: file names for received and sent messages, each with a NUL the lengths do not count |
+
+Types down to -1999 are ignored when unknown; lower ones end the connection. A datagram holds whole frames, at most
+1472 bytes. A client without `tcp://` asks to be called: it sends the datagram `host port` and a NUL to the server's
+UDP port (3883), and the server connects to it by TCP; port 1024 to 65535, host of letters, digits and dots.
+
+)";
+
+}  // namespace
+
+std::vector<MessageDescription> describeMessages() {
+  return describeAll(std::make_index_sequence<kMessageKinds>{});
+}
+
+std::string messagesAsMarkdown() {
+  std::string text(kIntroduction);
+  std::string device;
+  for (const MessageDescription& message : describeMessages()) {
+    const std::size_t space = message.info.name.find(' ');
+    const std::string prefix(message.info.name.substr(0, space));
+    if (prefix != device) {
+      text += (device.empty() ? "## " : "\n## ") + prefix + "\n\n";
+      text += "| name | direction | class | bytes | layout | meaning |\n|---|---|---|---|---|---|\n";
+      device = prefix;
+    }
+    text += "| `" + std::string(message.info.name.substr(space + 1)) + "` | ";
+    text += directionText(message.info.direction);
+    text += message.info.reliability == Reliability::kReliable ? " | reliable | " : " | low latency | ";
+    text += std::to_string(message.payload_bytes) + (message.counted ? " + list | " : " | ");
+    text += layoutText(message) + " | " + std::string(message.info.meaning) + " |\n";
+  }
+  return text;
+}
+
+std::string messagesAsFuzzDictionary() {
+  std::string text = "# Written by `wire_docs dictionary` from the table in src/wire/messages.h.\n";
+  text += "cookie=" + quoted(asText(encodeCookie(0))) + '\n';
+  const auto number = [](std::int32_t value) {
+    std::array<std::byte, sizeof(value)> bytes{};
+    storeBig(bytes.data(), value);
+    return quoted(asText(bytes)) + '\n';
+  };
+  for (const std::int32_t type : {kSenderDescription, kTypeDescription, kUdpDescription, kLogDescription}) {
+    text += "system" + std::to_string(-type) + '=' + number(type);
+  }
+  for (const MessageDescription& message : describeMessages()) {
+    const std::string index = std::to_string(static_cast<int>(message.kind));
+    text += "name" + index + '=' + quoted(message.info.name) + '\n';
+    text += "length" + index + '=' + number(static_cast<std::int32_t>(kHeaderBytes + message.payload_bytes));
+  }
+  return text;
+}
+
+}  // namespace hapticd::wire

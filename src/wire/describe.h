@@ -1,0 +1,37 @@
+// The table of messages as data, for everything that lists it: documents, fuzz dictionaries, bindings.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "wire/messages.h"
+
+namespace hapticd::wire {
+
+/// One field of a payload.
+struct FieldDescription {
+  std::string name;
+  std::string type;        ///< such as i32, f64[3], char[20], f32[n<=128]
+  std::string unit;        ///< empty when it has none
+  std::size_t offset = 0;  ///< bytes from the start of the payload
+};
+
+/// One message of the table.
+struct MessageDescription {
+  MessageKind kind;
+  MessageInfo info;
+  std::size_t payload_bytes = 0;  ///< with an empty list, when counted
+  bool counted = false;           ///< ends in a list, so longer payloads are valid
+  std::vector<FieldDescription> fields;
+};
+
+/// Every message, in the order of the table.
+std::vector<MessageDescription> describeMessages();
+
+/// docs/wire-messages.md.
+std::string messagesAsMarkdown();
+
+/// A libFuzzer dictionary: every wire name and every frame length of the table.
+std::string messagesAsFuzzDictionary();
+
+}  // namespace hapticd::wire

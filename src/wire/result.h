@@ -1,0 +1,34 @@
+// A value, or a sentence that says why there is none.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <variant>
+
+namespace hapticd::wire {
+
+/// Why something a peer sent is refused; the text names the offending value.
+struct Error {
+  std::string text;
+};
+
+/// Outcome of a decode: a T, or an Error. Reading the one that is absent throws std::bad_variant_access.
+template <class T>
+class [[nodiscard]] Result {
+ public:
+  Result(T value) : state_(std::in_place_index<0>, std::move(value)) {}
+  Result(Error error) : state_(std::in_place_index<1>, std::move(error)) {}
+
+  /// True when there is a value.
+  explicit operator bool() const noexcept { return state_.index() == 0; }
+  const T& operator*() const& { return std::get<0>(state_); }
+  T&& operator*() && { return std::get<0>(std::move(state_)); }
+  const T* operator->() const { return &std::get<0>(state_); }
+  /// The sentence, when there is no value.
+  const std::string& error() const { return std::get<1>(state_).text; }
+
+ private:
+  std::variant<T, Error> state_;
+};
+
+}  // namespace hapticd::wire
