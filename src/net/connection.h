@@ -1,0 +1,119 @@
+// One TCP connection: bytes in by callback, shared immutable buffers out, bounded in memory and in time.
+//
+// Callbacks come only from the Loop, never from inside a call to the connection, so a caller may walk a
+// container of connections and send to each. A callback may destroy its connection. Sending is in two steps:
+// send() queues, flush() hands everything queued to the system in one call (64 buffers at a time).
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "net/endpoint.h"
+#include "net/loop.h"
+#include "net/send_queue.h"
+
+namespace hapticd::net {
+
+/// The bounds of a connection; a zero timeout leaves the system's own.
+struct ConnectionOptions {
+  /// Queued bytes above which low-latency buffers are dropped.
+  std::size_t lowMarkBytes = 256 * 1024;
+  /// Queued reliable bytes above which the connection is ended: its peer does not read.
+  std::size_t hardLimitBytes = 8 * 1024 * 1024;
+  /// How long sent data may stay unacknowledged before the peer counts as lost (TCP_USER_TIMEOUT). A peer
+  /// whose program stops reading until its window is full counts as lost after the same time.
+  std::chrono::milliseconds lossTimeout{0};
+  /// Silence after which, and interval at which, an idle peer is probed (TCP keep-alive).
+  std::chrono::seconds keepAlive{0};
+  /// How long close() waits for the peer to take what is queued.
+  std::chrono::milliseconds closeTimeout{2000};
+  /// Size of the system's send buffer (SO_SNDBUF), 0: automatic.
+  int sendBufferBytes = 0;
+};
+
+/// What a connection tells its owner; any may be empty.
+struct ConnectionHandlers {
+  /// An outgoing connection is established.
+  std::function<void()> onConnected;
+  /// Bytes came (up to 256 KiB, valid during the call only). An exception ends the connection.
+  std::function<void(std::span<const std::byte>)> onBytes;
+  /// The queue is empty again after the system had refused a part of it.
+  std::function<void()> onDrained;
+  /// The connection is over: called once, whoever ended it, with the reason; then nothing more comes.
+  std::function<void(const std::string&)> onClosed;
+};
+
+/// Counts since the start of the connection, and what waits now.
+struct ConnectionStatistics {
+  std::uint64_t bytesIn = 0;
+  std::uint64_t bytesOut = 0;        ///< handed to the system
+  std::uint64_t droppedBuffers = 0;  ///< low-latency buffers that a slow peer never got
+  std::uint64_t droppedBytes = 0;
+  std::size_t queuedBytes = 0;          ///< waiting here
+  std::size_t unacknowledgedBytes = 0;  ///< with the system, not yet acknowledged by the peer (SIOCOUTQ)
+};
+
+/// Owns a TCP connection; destroying it closes it at once, without callbacks. A default-constructed or
+/// moved-from one is empty: only isOpen(), the conversion to bool, assignment and destruction are allowed.
+class Connection {
+ public:
+  class Impl;
+
+  Connection() noexcept = default;
+  explicit Connection(std::shared_ptr<Impl> impl) noexcept;
+  Connection(Connection&& other) noexcept = default;
+  Connection& operator=(Connection&& other) noexcept;
+  ~Connection();
+
+  /// Begins to connect and returns at once; onConnected or onClosed ("cannot connect to ...") follows. What
+  /// is sent meanwhile is queued.
+  [[nodiscard]] static Connection connect(Loop& loop, const Endpoint& peer, std::chrono::milliseconds timeout,
+                                          const ConnectionOptions& options = {});
+
+  /// Sets the callbacks and begins to read; nothing is read before.
+  void start(ConnectionHandlers handlers);
+
+  explicit operator bool() const noexcept { return impl_ != nullptr; }
+  /// Whether what is sent may still reach the peer (also while connecting).
+  bool isOpen() const noexcept;
+
+  /// Queues a buffer that may be shared with other connections; ignored when not open. Ends the connection
+  /// when the reliable bytes that the system does not take at once exceed the hard limit.
+  void send(std::shared_ptr<const Buffer> buffer, Delivery delivery = Delivery::reliable);
+  /// Queues a copy of the bytes.
+  void send(std::span<const std::byte> bytes, Delivery delivery = Delivery::reliable);
+  /// Writes what is queued, now; the rest follows by itself when the peer reads.
+  void flush();
+
+  /// Ends the connection after what is queued has been sent, within closeTimeout; what still comes is
+  /// ignored.
+  void close(std::string reason);
+  /// Ends the connection at once by a reset; what is queued is lost.
+  void abort(std::string reason);
+
+  /// Stops reading, so that the peer is held back by TCP. The end of the peer is noticed only after
+  /// resumeReading(), unless data sent to it is lost.
+  void pauseReading();
+  /// Goes on reading.
+  void resumeReading();
+
+  /// Changes lossTimeout and keepAlive of ConnectionOptions.
+  void setLossDetection(std::chrono::milliseconds lossTimeout, std::chrono::seconds keepAlive);
+
+  /// Both ends; still known after the end of the connection.
+  const Endpoint& local() const noexcept;
+  const Endpoint& remote() const noexcept;
+  ConnectionStatistics statistics() const;
+  /// The socket, for options that this class does not know; -1 when closed.
+  int nativeHandle() const noexcept;
+
+ private:
+  std::shared_ptr<Impl> impl_;
+};
+
+}  // namespace hapticd::net

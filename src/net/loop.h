@@ -1,0 +1,85 @@
+// The event loop under every socket of this room.
+//
+// One thread drives a Loop and everything made with it: sockets and timers have no locks of their own, and
+// their callbacks run only from inside run(), runFor() or runOnce(). Only post() and stop() may be called
+// from other threads. A Loop outlives everything made with it. An exception that leaves a callback ends the
+// connection it belongs to, or goes to the error handler; it never leaves the loop.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string_view>
+
+namespace hapticd::net {
+
+/// A timer or watch that lives as long as this handle; destroying it, even in its own callback, cancels it.
+class Subscription {
+ public:
+  class State;
+
+  Subscription() noexcept = default;
+  explicit Subscription(std::shared_ptr<State> state) noexcept;
+  Subscription(Subscription&& other) noexcept = default;
+  Subscription& operator=(Subscription&& other) noexcept;
+  ~Subscription();
+
+  /// No callback after this returns; harmless when nothing is active.
+  void cancel() noexcept;
+  /// Whether a callback may still come.
+  bool active() const noexcept;
+
+ private:
+  std::shared_ptr<State> state_;
+};
+
+class Loop {
+ public:
+  using Duration = std::chrono::steady_clock::duration;
+
+  /// Throws Error when the system has no file descriptor left.
+  Loop();
+  ~Loop();
+  Loop(const Loop&) = delete;
+  Loop& operator=(const Loop&) = delete;
+
+  /// Handles events in the calling thread until stop(); a stop() that came before makes it return at once.
+  void run();
+  /// Handles events for the whole duration (or until stop()), sleeping in between.
+  void runFor(Duration duration);
+  /// Waits up to the timeout for a first event, handles it and those ready by then (a bounded number), and
+  /// returns how many; 0 means that nothing happened. A zero timeout polls.
+  std::size_t runOnce(Duration timeout);
+  /// Makes the current or next run return; from any thread.
+  void stop();
+
+  /// Runs the function in the loop's thread, in the order of the calls; from any thread.
+  void post(std::function<void()> function);
+
+  /// Calls the function once after the delay.
+  [[nodiscard]] Subscription after(Duration delay, std::function<void()> function);
+  /// Calls the function each period without drift; periods missed by a late loop are skipped.
+  [[nodiscard]] Subscription every(Duration period, std::function<void()> function);
+  /// Calls the function whenever the descriptor is readable, again and again until the function has read what
+  /// is there (see drainEventFd). The caller keeps the descriptor; nothing is allocated per wake. Throws
+  /// Error for descriptors that cannot be polled.
+  [[nodiscard]] Subscription watchFd(int fd, std::function<void()> function);
+
+  /// Takes the text of exceptions that belong to no connection, in the loop's thread; standard error until
+  /// set.
+  void setErrorHandler(std::function<void(std::string_view)> handler);
+
+  /// For this room only.
+  struct Impl;
+  Impl& impl() noexcept { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Reads an eventfd made with EFD_NONBLOCK back to zero and returns what it held (0: nothing was posted).
+std::uint64_t drainEventFd(int fd) noexcept;
+
+}  // namespace hapticd::net

@@ -1,0 +1,152 @@
+// A peer that reads late or never: what it is sent stays bounded, in order, and harms nobody else.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <thread>
+
+#include "net/loopback.h"
+
+namespace hapticd::net {
+namespace {
+
+constexpr std::size_t kRecordBytes = 1024;
+constexpr int kSmallBuffer = 16 * 1024;
+
+ConnectionOptions tightOptions() {
+  return {.lowMarkBytes = 32 * 1024, .hardLimitBytes = 256 * 1024, .sendBufferBytes = kSmallBuffer};
+}
+
+/// A record of fixed size: 'R' or 'L', a number, filling.
+std::shared_ptr<const Buffer> record(Delivery delivery, int number) {
+  std::string text = (delivery == Delivery::reliable ? "R" : "L") + std::to_string(number) + ' ';
+  text.resize(kRecordBytes, '.');
+  return bufferOf(text);
+}
+
+/// The kind and the number of a record, ('?', 0) for a torn one.
+std::pair<char, int> parseRecord(const std::string& text) {
+  const std::size_t space = text.find(' ');
+  if (text.size() != kRecordBytes || space > 8 ||
+      text.find_first_not_of('.', space + 1) != std::string::npos) {
+    ADD_FAILURE() << "a torn record: " << text.substr(0, 40);
+    return {'?', 0};
+  }
+  return {text[0], std::stoi(text.substr(1))};
+}
+
+bool isServed(Server& server, Loop& loop) {
+  RawSocket other = server.join();
+  return other.send("hello") && pumpUntil(loop, [&] { return server.last().received == "hello"; }) &&
+         other.receive(5) == "hello";
+}
+
+TEST(SlowReader, LosesLowLatencyRecordsOnlyAndGetsTheRestInOrder) {
+  Loop loop;
+  Server server(loop, tightOptions(), true);
+  RawSocket slow = server.join(kSmallBuffer);
+  Connection& connection = server.last().connection;
+  int reliable = 0;
+  int lowLatency = 0;
+  while (connection.statistics().droppedBuffers < 100 && lowLatency < 100'000) {
+    for (int i = 0; i < 10; ++i) {
+      connection.send(record(Delivery::lowLatency, lowLatency++), Delivery::lowLatency);
+    }
+    if (reliable < 100) {
+      connection.send(record(Delivery::reliable, reliable++));
+    }
+    connection.flush();
+  }
+  const std::uint64_t dropped = connection.statistics().droppedBuffers;
+  ASSERT_GE(dropped, 100u);
+  EXPECT_EQ(connection.statistics().droppedBytes, dropped * kRecordBytes);
+  EXPECT_LE(connection.statistics().queuedBytes, (32u + 100u + 1u) * 1024);
+  EXPECT_TRUE(isServed(server, loop));
+  ASSERT_TRUE(server.sessions[0]->connection.isOpen());
+
+  std::vector<int> gotReliable;
+  std::vector<int> gotLowLatency;
+  std::thread reader([&] {
+    for (std::string text; !(text = slow.receive(kRecordBytes)).empty();) {
+      const auto [kind, number] = parseRecord(text);
+      (kind == 'R' ? gotReliable : gotLowLatency).push_back(number);
+    }
+    slow.close();
+  });
+  connection.close("done");
+  const bool closed = pumpUntil(loop, [&] { return !server.sessions[0]->closed.empty(); });
+  reader.join();
+  ASSERT_TRUE(closed);
+  EXPECT_EQ(gotLowLatency.size() + dropped, static_cast<std::size_t>(lowLatency));
+  ASSERT_EQ(gotReliable.size(), static_cast<std::size_t>(reliable));
+  for (int i = 0; i < reliable; ++i) {
+    ASSERT_EQ(gotReliable[static_cast<std::size_t>(i)], i);
+  }
+  EXPECT_TRUE(std::is_sorted(gotLowLatency.begin(), gotLowLatency.end()));
+  EXPECT_EQ(gotLowLatency.back(), lowLatency - 1) << "the newest state is the one to keep";
+}
+
+TEST(SlowReader, IsClosedWithAReasonAboveTheHardLimit) {
+  Loop loop;
+  Server server(loop, tightOptions(), true);
+  RawSocket slow = server.join(kSmallBuffer);
+  Server::Session& session = server.last();
+  std::size_t mostQueued = 0;
+  for (int i = 0; session.connection.isOpen() && i < 100'000; ++i) {
+    session.connection.send(record(Delivery::reliable, i));
+    session.connection.flush();
+    mostQueued = std::max(mostQueued, session.connection.statistics().queuedBytes);
+  }
+  EXPECT_FALSE(session.connection.isOpen());
+  EXPECT_LE(mostQueued, 256u * 1024);
+  EXPECT_EQ(session.closed, "") << "called back from inside send()";
+  ASSERT_TRUE(pumpUntil(loop, [&] { return !session.closed.empty(); }));
+  EXPECT_EQ(session.closed, "the peer does not read: 263168 bytes wait for it, the limit is 262144");
+  EXPECT_TRUE(isServed(server, loop));
+}
+
+TEST(SlowReader, ABurstAboveTheLimitIsFineWhenTheSystemTakesIt) {
+  Loop loop;
+  Server server(loop, {.hardLimitBytes = 10'000});
+  RawSocket peer = server.join();
+  for (int i = 0; i < 40; ++i) {
+    server.last().connection.send(record(Delivery::reliable, i));
+  }
+  server.last().connection.flush();
+  for (int i = 0; i < 40; ++i) {
+    EXPECT_EQ(parseRecord(peer.receive(kRecordBytes)), std::pair('R', i));
+  }
+  EXPECT_TRUE(server.last().connection.isOpen());
+}
+
+TEST(SlowReader, TellsWhenTheQueueIsEmptyAgain) {
+  Loop loop;
+  Server server(loop);
+  int drained = 0;
+  Connection sender = Connection::connect(loop, server.listener.local(), std::chrono::seconds(20));
+  sender.start({.onConnected = {}, .onBytes = {}, .onDrained = [&] { ++drained; }, .onClosed = {}});
+  sender.send(bytesOf("small"));
+  ASSERT_TRUE(pumpUntil(loop, [&] { return !server.sessions.empty() && server.last().received == "small"; }));
+  EXPECT_EQ(drained, 0);
+  sender.send(bytesOf(std::string(8'000'000, 'l')));
+  sender.flush();
+  ASSERT_TRUE(pumpUntil(loop, [&] { return drained > 0; }));
+  EXPECT_EQ(sender.statistics().queuedBytes, 0u);
+  EXPECT_EQ(drained, 1);
+}
+
+// The system counts a window that stays full like silence: whoever sets lossTimeout must know.
+TEST(SlowReader, CountsAsLostAfterTheLossTimeout) {
+  Loop loop;
+  ConnectionOptions options = tightOptions();
+  options.lossTimeout = std::chrono::milliseconds(100);
+  Server server(loop, options);
+  const RawSocket slow = server.join(kSmallBuffer);
+  Connection& connection = server.last().connection;
+  connection.send(bytesOf(std::string(200'000, 'x')));
+  connection.flush();
+  ASSERT_TRUE(pumpUntil(loop, [&] { return !server.last().closed.empty(); }));
+  EXPECT_EQ(server.last().closed, "the peer is lost: it acknowledged nothing in time");
+}
+
+}  // namespace
+}  // namespace hapticd::net
