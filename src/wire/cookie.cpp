@@ -21,11 +21,12 @@ Result<Cookie> decodeCookie(ByteView bytes) {
     return Error{"cookie of " + std::to_string(text.size()) + " bytes, expected 24"};
   const std::string_view major = kVersionText.substr(0, kVersionText.rfind('.') + 1);
   if (!text.starts_with(major)) {
-    return Error{"peer opened with " + quoted(text) + ", expected " + quoted(std::string(major) + "xx")};
+    return Error{"peer opened with " + inQuotes(text) + ", expected " + inQuotes(std::string(major) + "xx")};
   }
   const char digit = text[kLogModeOffset];
   if (digit < '0' || digit > '3') {
-    return Error{"peer opened with " + quoted(text) + ": log mode " + quoted({&digit, 1}) + " is not 0 to 3"};
+    return Error{"peer opened with " + inQuotes(text) + ": log mode " + inQuotes({&digit, 1}) +
+                 " is not 0 to 3"};
   }
   const std::size_t number = kVersionText.find("07");
   return Cookie{std::string(text.substr(number, kVersionText.size() - number)), digit - '0'};

@@ -148,18 +148,18 @@ std::string messagesAsMarkdown() {
 
 std::string messagesAsFuzzDictionary() {
   std::string text = "# Written by `wire_docs dictionary` from the table in src/wire/messages.h.\n";
-  text += "cookie=" + quoted(asText(encodeCookie(0))) + '\n';
+  text += "cookie=" + inQuotes(asText(encodeCookie(0))) + '\n';
   const auto number = [](std::int32_t value) {
     std::array<std::byte, sizeof(value)> bytes{};
     storeBig(bytes.data(), value);
-    return quoted(asText(bytes)) + '\n';
+    return inQuotes(asText(bytes)) + '\n';
   };
   for (const std::int32_t type : {kSenderDescription, kTypeDescription, kUdpDescription, kLogDescription}) {
     text += "system" + std::to_string(-type) + '=' + number(type);
   }
   for (const MessageDescription& message : describeMessages()) {
     const std::string index = std::to_string(static_cast<int>(message.kind));
-    text += "name" + index + '=' + quoted(message.info.name) + '\n';
+    text += "name" + index + '=' + inQuotes(message.info.name) + '\n';
     text += "length" + index + '=' + number(static_cast<std::int32_t>(kHeaderBytes + message.payload_bytes));
   }
   return text;

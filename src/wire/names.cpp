@@ -18,11 +18,11 @@ std::optional<std::int32_t> find(const std::vector<std::string>& names, std::str
 std::int32_t add(std::vector<std::string>& names, std::string_view name) {
   if (const auto known = find(names, name)) return *known;
   if (name.empty() || name.size() > kMaxNameBytes || name.find('\0') != std::string_view::npos) {
-    throw std::invalid_argument("name " + quoted(name) + " is not 1 to " + std::to_string(kMaxNameBytes) +
+    throw std::invalid_argument("name " + inQuotes(name) + " is not 1 to " + std::to_string(kMaxNameBytes) +
                                 " characters without NUL");
   }
   if (names.size() >= static_cast<std::size_t>(kMaxNames)) {
-    throw std::length_error("name " + quoted(name) + " is one more than " + std::to_string(kMaxNames));
+    throw std::length_error("name " + inQuotes(name) + " is one more than " + std::to_string(kMaxNames));
   }
   names.emplace_back(name);
   return static_cast<std::int32_t>(names.size() - 1);

@@ -46,7 +46,8 @@ Result<UdpAddress> decodeUdpDescription(std::int32_t port, ByteView payload) {
   std::string_view host = asText(payload);
   host = host.substr(0, host.find('\0'));
   if (!isHost(host)) {
-    return Error{"UDP description: host " + quoted(host.substr(0, 255)) + " is not letters, digits and dots"};
+    return Error{"UDP description: host " + inQuotes(host.substr(0, 255)) +
+                 " is not letters, digits and dots"};
   }
   if (port < 1 || port > 65535) {
     return Error{"UDP description: port " + std::to_string(port) + " is not 1 to 65535"};

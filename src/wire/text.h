@@ -19,7 +19,7 @@ inline ByteView asBytes(std::string_view text) noexcept {
 }
 
 /// In quotes, with everything but printable ASCII as \xNN.
-std::string quoted(std::string_view text);
+std::string inQuotes(std::string_view text);
 
 /// Whether text may be a host: letters, digits, dots; not empty, at most 255 characters. The stock server's
 /// rule.
