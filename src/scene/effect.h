@@ -20,7 +20,8 @@ struct Effect {
   geometry::Vec3 position = geometry::Vec3::Zero();   ///< world units
   geometry::Vec3 direction = geometry::Vec3::Zero();  ///< world frame, not normalised
   std::uint32_t start = 0;                            ///< counts starts of this index
-  bool releasing = false;                             ///< its owner is gone: ramp out in 250 ms
+  bool inDeviceFrame = false;  ///< motor vibration on the device's x and y instead of the stylus'
+  bool releasing = false;      ///< its owner is gone: ramp out in 250 ms
 };
 
 }  // namespace hapticd::scene

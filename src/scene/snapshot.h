@@ -2,11 +2,14 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "scene/effect.h"
+#include "scene/force_field.h"
 #include "scene/mesh_geometry.h"
 #include "scene/motion.h"
+#include "scene/plane.h"
 #include "scene/surface.h"
 #include "scene/workspace.h"
 
@@ -30,7 +33,10 @@ struct SceneSnapshot {
   std::vector<std::shared_ptr<const ObjectState>> objects;
   /// Over positions in `objects`: boxes in world units around all that an object sweeps during its motion.
   std::shared_ptr<const SpatialIndex> objectIndex;
-  std::vector<Effect> effects;  ///< running ones, by ascending index
+  std::vector<Effect> effects;     ///< running ones, by ascending index
+  std::vector<Plane> planes;       ///< at most kMaxPlanes, by ascending index
+  std::vector<ForceField> fields;  ///< their forces add up; constraints are among them
+  std::optional<Buzz> buzz;
 };
 
 }  // namespace hapticd::scene

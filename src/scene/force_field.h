@@ -1,0 +1,28 @@
+// Force fields, also what point, line and plane constraints become, and the buzz.
+#pragma once
+
+#include <cstdint>
+
+#include "geometry/types.h"
+
+namespace hapticd::scene {
+
+/// F = force + jacobian (x - origin) while |x - origin| <= radius. World frame and units, newtons.
+struct ForceField {
+  geometry::Vec3 origin = geometry::Vec3::Zero();
+  geometry::Vec3 force_N = geometry::Vec3::Zero();
+  geometry::Mat3 jacobian_N_per_unit = geometry::Mat3::Zero();  ///< newtons per world unit
+  double radius = 0;                                            ///< world units; may be infinite
+  bool releasing = false;                                       ///< its owner is gone: ramp out in 250 ms
+};
+
+/// F = force sin(ω t) for a while; the servo starts its clock when it first sees a new `start` number.
+struct Buzz {
+  geometry::Vec3 force_N = geometry::Vec3::Zero();  ///< world frame
+  double angularFrequency_rad_per_s = 0;
+  geometry::Nanos duration = 0;
+  std::uint32_t start = 0;
+  bool releasing = false;  ///< its owner is gone: ramp out in 250 ms
+};
+
+}  // namespace hapticd::scene
