@@ -22,9 +22,9 @@ namespace hapticd::net {
 /// The bounds of a connection; a zero timeout leaves the system's own.
 struct ConnectionOptions {
   /// Queued bytes above which low-latency buffers are dropped.
-  std::size_t lowMarkBytes = 256 * 1024;
+  std::size_t lowMarkBytes = std::size_t{256} * 1024;
   /// Queued reliable bytes above which the connection is ended: its peer does not read.
-  std::size_t hardLimitBytes = 8 * 1024 * 1024;
+  std::size_t hardLimitBytes = std::size_t{8} * 1024 * 1024;
   /// How long sent data may stay unacknowledged before the peer counts as lost (TCP_USER_TIMEOUT). A peer
   /// whose program stops reading until its window is full counts as lost after the same time.
   std::chrono::milliseconds lossTimeout{0};
@@ -96,8 +96,8 @@ class Connection {
   /// Ends the connection at once by a reset; what is queued is lost.
   void abort(std::string reason);
 
-  /// Stops reading, so that the peer is held back by TCP. The end of the peer is noticed only after
-  /// resumeReading(), unless data sent to it is lost.
+  /// Stops reading, so that the peer is held back by TCP. Its end is then told only after resumeReading() and
+  /// after all that it sent, though isOpen() may already be false.
   void pauseReading();
   /// Goes on reading.
   void resumeReading();

@@ -266,8 +266,4 @@ std::string bindErrorText(const char* kind, const Endpoint& local, const error_c
   return std::string("cannot listen on ") + kind + ' ' + local.text() + ": " + why;
 }
 
-void setCloseOnExec(int fd) noexcept {
-  ::fcntl(fd, F_SETFD, FD_CLOEXEC);
-}
-
 }  // namespace hapticd::net

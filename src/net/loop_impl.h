@@ -33,7 +33,7 @@ std::optional<std::string> errorOf(Function&& function) {
 }
 
 struct Loop::Impl {
-  static constexpr std::size_t kReadBufferBytes = 256 * 1024;
+  static constexpr std::size_t kReadBufferBytes = std::size_t{256} * 1024;
 
   // One buffer for all sockets: each read is consumed before the next, so memory does not grow with clients.
   std::unique_ptr<std::byte[]> readBuffer = std::make_unique_for_overwrite<std::byte[]>(kReadBufferBytes);
@@ -65,8 +65,5 @@ template <class AsioEndpoint>
 Endpoint fromAsio(const AsioEndpoint& endpoint) {
   return {endpoint.address().is_v4() ? endpoint.address().to_v4().to_uint() : 0, endpoint.port()};
 }
-
-/// Keeps a child process (an isolated device) from holding the socket open.
-void setCloseOnExec(int fd) noexcept;
 
 }  // namespace hapticd::net

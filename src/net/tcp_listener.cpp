@@ -1,6 +1,9 @@
 #include "net/tcp_listener.h"
 
+#include <cerrno>
+
 #include "net/connection_impl.h"
+#include "net/socket_options.h"
 //
 #include <boost/asio/error.hpp>
 

@@ -8,6 +8,7 @@
 #include <cerrno>
 
 #include "net/loop_impl.h"
+#include "net/socket_options.h"
 //
 #include <boost/asio/error.hpp>
 #include <boost/asio/ip/udp.hpp>

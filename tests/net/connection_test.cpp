@@ -132,8 +132,14 @@ TEST(Connection, OneBufferIsSharedByAllConnections) {
 
 TEST(Connection, AHalfClosedPeerGetsTheAnswerToItsLastBytes) {
   Loop loop;
-  Server server(loop, {}, true);
+  Server server(loop);
   RawSocket peer = server.join();
+  Server::Session& session = server.last();
+  session.connection.start(
+      {.onConnected = {},
+       .onBytes = [&](std::span<const std::byte> bytes) { session.connection.send(bytes); },  // no flush
+       .onDrained = {},
+       .onClosed = [&](const std::string& reason) { session.closed = reason; }});
   ASSERT_TRUE(peer.send("last words"));
   peer.shutdownSend();
   ASSERT_TRUE(pumpUntil(loop, [&] { return !server.last().closed.empty(); }));

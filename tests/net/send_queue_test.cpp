@@ -61,16 +61,17 @@ TEST(SendQueue, ReliableBytesAloneAboveTheMarkDropEveryLowLatencyBuffer) {
 TEST(SendQueue, NeverDropsABufferThatIsPartlySent) {
   SendQueue queue(4);
   queue.push(bufferOf("1111"), Delivery::lowLatency);
+  queue.push(bufferOf("22"), Delivery::lowLatency);
   queue.consume(1);
   queue.push(bufferOf("AAAA"), Delivery::reliable);
-  queue.push(bufferOf("22"), Delivery::lowLatency);
+  queue.push(bufferOf("33"), Delivery::lowLatency);
   EXPECT_EQ(contents(queue), "111AAAA");
   EXPECT_EQ(queue.bytes(), 7u);
-  EXPECT_EQ(queue.droppedBytes(), 2u);
+  EXPECT_EQ(queue.droppedBytes(), 4u);
   queue.consume(3);
   EXPECT_EQ(queue.reliableBytes(), 4u);
-  queue.push(bufferOf("33"), Delivery::lowLatency);
-  EXPECT_EQ(contents(queue), "AAAA33");
+  queue.push(bufferOf("44"), Delivery::lowLatency);
+  EXPECT_EQ(contents(queue), "AAAA44");
 }
 
 TEST(SendQueue, ReleasesABufferAsSoonAsItIsSent) {

@@ -1,0 +1,341 @@
+#include "net/connection_impl.h"
+
+#include <array>
+
+#include "net/socket_options.h"
+//
+#include <boost/asio/error.hpp>
+#include <boost/asio/post.hpp>
+
+namespace hapticd::net {
+
+namespace asio = boost::asio;
+using asio::ip::tcp;
+
+namespace {
+
+std::string endText(const boost::system::error_code& error) {
+  if (error == asio::error::connection_reset || error == asio::error::broken_pipe) {
+    return "connection reset by the peer";
+  }
+  if (error == asio::error::timed_out) {
+    return "the peer is lost: it acknowledged nothing in time";
+  }
+  return "connection failed: " + error.message();
+}
+
+}  // namespace
+
+Connection::Impl::Impl(Loop::Impl& loop, const ConnectionOptions& options)
+    : loop_(loop),
+      options_(options),
+      socket_(loop.context),
+      timer_(loop.context),
+      queue_(options.lowMarkBytes) {}
+
+void Connection::Impl::connect(const Endpoint& peer, std::chrono::milliseconds timeout) {
+  remote_ = peer;
+  ErrorCode error;
+  socket_.open(tcp::v4(), error);
+  if (error) {
+    finish("cannot connect to " + peer.text() + ": " + error.message());
+    return;
+  }
+  armTimer(timeout, "cannot connect to " + peer.text() + ": no answer within " +
+                        std::to_string(timeout.count()) + " ms");
+  socket_.async_connect(toAsio<tcp::endpoint>(peer), [this, self = shared_from_this()](ErrorCode result) {
+    if (state_ != State::connecting) {
+      return;
+    }
+    if (result) {
+      finish("cannot connect to " + remote_.text() + ": " + result.message());
+      return;
+    }
+    timer_.cancel();
+    becomeOpen();
+    call(&ConnectionHandlers::onConnected);
+    flush();
+    armRead();
+  });
+}
+
+void Connection::Impl::adopt(Socket socket) {
+  socket_ = std::move(socket);
+  becomeOpen();
+}
+
+void Connection::Impl::becomeOpen() {
+  state_ = State::open;
+  ErrorCode error;
+  socket_.non_blocking(true, error);
+  local_ = fromAsio(socket_.local_endpoint(error));
+  const tcp::endpoint remote = socket_.remote_endpoint(error);
+  if (!error) {  // a peer that is gone already has no address; the first read tells the rest
+    remote_ = fromAsio(remote);
+  }
+  applyOptions();
+}
+
+void Connection::Impl::applyOptions() {
+  const int fd = socket_.native_handle();
+  setCloseOnExec(fd);
+  setNoDelay(fd);
+  if (options_.sendBufferBytes > 0) {
+    setSendBuffer(fd, options_.sendBufferBytes);
+  }
+  net::setLossDetection(fd, options_.lossTimeout, options_.keepAlive);
+}
+
+void Connection::Impl::setLossDetection(std::chrono::milliseconds lossTimeout,
+                                        std::chrono::seconds keepAlive) {
+  options_.lossTimeout = lossTimeout;
+  options_.keepAlive = keepAlive;
+  if (state_ == State::open) {  // otherwise becomeOpen() applies it, or it is too late
+    net::setLossDetection(socket_.native_handle(), lossTimeout, keepAlive);
+  }
+}
+
+void Connection::Impl::start(ConnectionHandlers handlers) {
+  handlers_ = std::make_shared<ConnectionHandlers>(std::move(handlers));
+  if (state_ == State::closed) {
+    asio::post(loop_.context, [self = shared_from_this()] { self->notifyClosed(); });
+  }
+  armRead();
+}
+
+template <class Callback, class... Arguments>
+void Connection::Impl::call(Callback ConnectionHandlers::*callback, const Arguments&... arguments) {
+  const auto handlers = handlers_;
+  if (!handlers || !((*handlers).*callback)) {
+    return;
+  }
+  if (auto error = errorOf([&] { ((*handlers).*callback)(arguments...); })) {
+    finish("error while handling the connection: " + *error);
+  }
+}
+
+// --- reading
+
+void Connection::Impl::armRead() {
+  const bool wanted =
+      state_ == State::open ? handlers_ && !paused_ : state_ == State::flushing || state_ == State::draining;
+  if (readArmed_ || peerEnded_ || !wanted) {
+    return;
+  }
+  readArmed_ = true;
+  socket_.async_wait(Socket::wait_read, [this, self = shared_from_this()](const ErrorCode&) {
+    readArmed_ = false;
+    if (state_ != State::closed && !(state_ == State::open && paused_)) {
+      readable();
+    }
+  });
+}
+
+// One read per wake, so that a fast sender does not keep the loop from the others.
+void Connection::Impl::readable() {
+  ErrorCode error;
+  const std::size_t size =
+      socket_.read_some(asio::buffer(loop_.readBuffer.get(), Loop::Impl::kReadBufferBytes), error);
+  if (!error) {
+    deliver(size);
+  } else if (error == asio::error::eof) {
+    peerEnded();
+  } else if (error != asio::error::would_block && error != asio::error::interrupted) {
+    finish(failure_.empty() ? endText(error) : failure_);
+  }
+  armRead();
+}
+
+void Connection::Impl::deliver(std::size_t bytes) {
+  bytesIn_ += bytes;
+  if (state_ == State::open) {
+    call(&ConnectionHandlers::onBytes, std::span<const std::byte>(loop_.readBuffer.get(), bytes));
+  }
+}
+
+void Connection::Impl::peerEnded() {
+  peerEnded_ = true;
+  if (state_ == State::flushing) {
+    return;  // the peer may have shut only its own direction: let it have the rest
+  }
+  if (state_ == State::open) {
+    flush();  // the answers to its last bytes
+  }
+  finish(failure_.empty() ? "closed by the peer" : failure_);
+}
+
+// --- writing
+
+void Connection::Impl::send(std::shared_ptr<const Buffer> buffer, Delivery delivery) {
+  if (!sendable()) {
+    return;
+  }
+  queue_.push(std::move(buffer), delivery);
+  if (queue_.reliableBytes() <= options_.hardLimitBytes) {
+    return;
+  }
+  flush();
+  if (sendable() && queue_.reliableBytes() > options_.hardLimitBytes) {
+    abort("the peer does not read: " + std::to_string(queue_.reliableBytes()) +
+          " bytes wait for it, the limit is " + std::to_string(options_.hardLimitBytes));
+  }
+}
+
+void Connection::Impl::flush() {
+  if ((state_ == State::open || state_ == State::flushing) && !writeArmed_ && !queue_.empty()) {
+    write();
+  }
+}
+
+void Connection::Impl::write() {
+  constexpr std::size_t kMostParts = 64;  // what Asio hands to one system call
+  const bool wasBlocked = writeArmed_;
+  writeArmed_ = false;
+  while (!queue_.empty()) {
+    std::array<std::span<const std::byte>, kMostParts> parts;
+    std::array<asio::const_buffer, kMostParts> buffers;
+    const std::size_t count = queue_.gather(parts);
+    std::size_t offered = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      buffers[i] = asio::const_buffer(parts[i].data(), parts[i].size());
+      offered += parts[i].size();
+    }
+    ErrorCode error;
+    const std::size_t sent = socket_.write_some(std::span(buffers.data(), count), error);
+    if (error && error != asio::error::would_block && error != asio::error::interrupted) {
+      writeFailed(error);
+      return;
+    }
+    bytesOut_ += sent;
+    queue_.consume(sent);
+    if (sent < offered) {
+      armWrite();
+      return;
+    }
+  }
+  queueEmptied(wasBlocked);
+}
+
+void Connection::Impl::armWrite() {
+  writeArmed_ = true;
+  socket_.async_wait(Socket::wait_write, [this, self = shared_from_this()](const ErrorCode&) {
+    if (state_ == State::open || state_ == State::flushing) {
+      write();
+    }
+  });
+}
+
+void Connection::Impl::queueEmptied(bool wasBlocked) {
+  if (state_ == State::flushing) {
+    ErrorCode error;
+    socket_.shutdown(Socket::shutdown_send, error);
+    if (error || peerEnded_) {
+      finish(reason_);
+      return;
+    }
+    // Closing now could reset the connection under data that the peer has not read yet; its end is awaited.
+    state_ = State::draining;
+  } else if (wasBlocked) {
+    call(&ConnectionHandlers::onDrained);
+  }
+}
+
+// A peer that sent a lot and left without reading its reports has reset the connection, yet what it sent is
+// still there to be read; the reader comes to the end by itself.
+void Connection::Impl::writeFailed(const ErrorCode& error) {
+  if (state_ != State::open) {
+    finish(reason_);
+    return;
+  }
+  failure_ = endText(error);
+  queue_.clear();
+  ErrorCode ignored;
+  socket_.shutdown(Socket::shutdown_both, ignored);
+  armRead();
+}
+
+// --- the end
+
+void Connection::Impl::close(std::string reason) {
+  if (!sendable() || state_ == State::connecting) {  // nothing can be waited for
+    if (state_ == State::connecting || state_ == State::open) {
+      finish(std::move(reason));
+    }
+    return;
+  }
+  reason_ = std::move(reason);
+  state_ = State::flushing;
+  armTimer(options_.closeTimeout, reason_);
+  if (queue_.empty()) {
+    queueEmptied(false);
+  } else {
+    flush();
+  }
+  armRead();
+}
+
+void Connection::Impl::abort(std::string reason) {
+  if (socket_.is_open()) {
+    ErrorCode ignored;
+    socket_.set_option(Socket::linger(true, 0), ignored);
+  }
+  finish(std::move(reason));
+}
+
+// A timer that expired may be past cancelling: that of connect() must not end the connection just made.
+void Connection::Impl::armTimer(std::chrono::milliseconds timeout, std::string reason) {
+  const bool whileConnecting = state_ == State::connecting;
+  timer_.expires_after(timeout);
+  timer_.async_wait([=, this, self = shared_from_this(), text = std::move(reason)](const ErrorCode& error) {
+    if (!error && (!whileConnecting || state_ == State::connecting)) {
+      finish(text);
+    }
+  });
+}
+
+// The callback is posted, so that no owner is called back from inside its own send() or flush().
+void Connection::Impl::finish(std::string reason) {
+  if (state_ == State::closed) {
+    return;
+  }
+  reason_ = state_ == State::flushing || state_ == State::draining ? reason_ : std::move(reason);
+  state_ = State::closed;
+  queue_.clear();
+  timer_.cancel();
+  ErrorCode ignored;
+  socket_.close(ignored);
+  asio::post(loop_.context, [self = shared_from_this()] { self->notifyClosed(); });
+}
+
+void Connection::Impl::notifyClosed() {
+  if (const auto handlers = std::move(handlers_); handlers && handlers->onClosed) {
+    loop_.guard([&] { handlers->onClosed(reason_); });
+  }
+}
+
+void Connection::Impl::release() noexcept {
+  handlers_.reset();
+  loop_.guard([this] {
+    state_ = State::closed;
+    queue_.clear();
+    timer_.cancel();
+    ErrorCode ignored;
+    socket_.close(ignored);
+  });
+}
+
+void Connection::Impl::setPaused(bool paused) {
+  paused_ = paused;
+  armRead();
+}
+
+ConnectionStatistics Connection::Impl::statistics() {
+  return {bytesIn_,
+          bytesOut_,
+          queue_.droppedBuffers(),
+          queue_.droppedBytes(),
+          queue_.bytes(),
+          socket_.is_open() ? net::unacknowledgedBytes(socket_.native_handle()) : 0};
+}
+
+}  // namespace hapticd::net
