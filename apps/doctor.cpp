@@ -1,4 +1,5 @@
-// hapticd doctor: checks what a newcomer trips over, measures the loop, and ends in a verdict with the remedies.
+// hapticd doctor: checks what a newcomer trips over, measures the loop, and ends in a verdict with the
+// remedies.
 #include <dlfcn.h>
 #include <netinet/in.h>
 #include <sys/resource.h>
@@ -50,22 +51,27 @@ Finding realtimePriority() {
     return {Verdict::good, "SCHED_FIFO priority 80 is granted", ""};
   }
   return {Verdict::bad, "SCHED_FIFO is refused: " + std::string(std::strerror(errno)),
-          "put '@realtime - rtprio 95' and '@realtime - memlock unlimited' into /etc/security/limits.d/realtime.conf,\n"
-          "           add yourself to the group realtime, log in again; or: setcap cap_sys_nice,cap_ipc_lock+ep hapticd"};
+          "put '@realtime - rtprio 95' and '@realtime - memlock unlimited' into "
+          "/etc/security/limits.d/realtime.conf,\n"
+          "           add yourself to the group realtime, log in again; or: setcap "
+          "cap_sys_nice,cap_ipc_lock+ep hapticd"};
 }
 
 Finding memoryLock() {
   rlimit limit{};
   getrlimit(RLIMIT_MEMLOCK, &limit);
-  if (geteuid() == 0 || limit.rlim_cur == RLIM_INFINITY) return {Verdict::good, "memory can be locked without limit", ""};
+  if (geteuid() == 0 || limit.rlim_cur == RLIM_INFINITY)
+    return {Verdict::good, "memory can be locked without limit", ""};
   const auto kib = static_cast<unsigned long>(limit.rlim_cur / 1024);
-  return {Verdict::note, "only " + std::to_string(kib) + " KiB of memory may be locked",
-          "a page fault in the loop costs up to a millisecond: raise memlock as above ('ulimit -l' shows it)"};
+  return {
+      Verdict::note, "only " + std::to_string(kib) + " KiB of memory may be locked",
+      "a page fault in the loop costs up to a millisecond: raise memlock as above ('ulimit -l' shows it)"};
 }
 
 Finding governor() {
   const std::string name = firstLine("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor");
-  if (name.empty()) return {Verdict::note, "no CPU frequency governor to be seen (usual in virtual machines)", ""};
+  if (name.empty())
+    return {Verdict::note, "no CPU frequency governor to be seen (usual in virtual machines)", ""};
   if (name == "performance") return {Verdict::good, "CPU governor is 'performance'", ""};
   return {Verdict::note, "CPU governor is '" + name + "'",
           "sudo cpupower frequency-set -g performance (a sleeping core wakes up late)"};
@@ -75,7 +81,8 @@ Finding timerResolution() {
   timespec resolution{};
   clock_getres(CLOCK_MONOTONIC, &resolution);
   const long nanoseconds = resolution.tv_sec * 1000000000L + resolution.tv_nsec;
-  if (nanoseconds <= 1000) return {Verdict::good, "timer resolution is " + std::to_string(nanoseconds) + " ns", ""};
+  if (nanoseconds <= 1000)
+    return {Verdict::good, "timer resolution is " + std::to_string(nanoseconds) + " ns", ""};
   return {Verdict::bad, "timer resolution is " + std::to_string(nanoseconds) + " ns",
           "the kernel lacks high-resolution timers (CONFIG_HIGH_RES_TIMERS): a 1 kHz loop cannot keep time"};
 }
@@ -92,7 +99,8 @@ Finding portFree(int type, const char* protocol, std::uint16_t port) {
   close(fd);
   const std::string name = std::string(protocol) + " port " + std::to_string(port);
   if (free) return {Verdict::good, name + " is free", ""};
-  return {Verdict::note, name + " is in use", "a VRPN server runs already? Else: hapticd serve --listen 127.0.0.1:3884"};
+  return {Verdict::note, name + " is in use",
+          "a VRPN server runs already? Else: hapticd serve --listen 127.0.0.1:3884"};
 }
 
 Finding vendorLibrary(const char* device, const std::vector<const char*>& names) {
@@ -132,10 +140,11 @@ int run(double seconds, std::uint16_t port) {
   const LoopCheck loop = measureLoop(seconds);
   for (const std::string& line : loop.setup) std::printf("        %s\n", line.c_str());
   char text[256];
-  std::snprintf(text, sizeof text,
-                "%llu ticks, %llu overruns; wake-up error p50 %.0f us, p99 %.0f us, max %.0f us; compute p99 %.1f us",
-                static_cast<unsigned long long>(loop.ticks), static_cast<unsigned long long>(loop.overruns),
-                loop.wakeup_us.p50, loop.wakeup_us.p99, loop.wakeup_us.max, loop.compute_us.p99);
+  std::snprintf(
+      text, sizeof text,
+      "%llu ticks, %llu overruns; wake-up error p50 %.0f us, p99 %.0f us, max %.0f us; compute p99 %.1f us",
+      static_cast<unsigned long long>(loop.ticks), static_cast<unsigned long long>(loop.overruns),
+      loop.wakeup_us.p50, loop.wakeup_us.p99, loop.wakeup_us.max, loop.compute_us.p99);
   const bool steady = loop.wakeup_us.p99 < 100 && loop.overruns * 1000 <= loop.ticks;
   add({steady ? Verdict::good : Verdict::bad, text,
        steady ? "" : "close other programs, give the loop realtime rights, or use a kernel with PREEMPT_RT"});
@@ -149,7 +158,9 @@ int run(double seconds, std::uint16_t port) {
   if (bad == 0) {
     std::printf("verdict: ready to render forces (%d notes above)\n", notes);
   } else {
-    std::printf("verdict: %d thing(s) to mend first, see -> above; the simulated hand runs with --allow-no-rt\n", bad);
+    std::printf(
+        "verdict: %d thing(s) to mend first, see -> above; the simulated hand runs with --allow-no-rt\n",
+        bad);
   }
   return bad == 0 ? 0 : 1;
 }
@@ -163,7 +174,8 @@ void addDoctor(CLI::App& app) {
   };
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand(
-      "doctor", "Check this machine: realtime rights, memory lock, governor, timer, ports, vendor libraries, the loop");
+      "doctor",
+      "Check this machine: realtime rights, memory lock, governor, timer, ports, vendor libraries, the loop");
   command->add_option("--seconds", options->seconds, "How long to measure the loop")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();

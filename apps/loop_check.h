@@ -16,7 +16,7 @@ struct Percentiles {
 struct LoopCheck {
   std::vector<std::string> setup;  ///< what the system granted the thread, one sentence each
   std::uint64_t ticks = 0;
-  std::uint64_t overruns = 0;      ///< ticks that started more than 0.5 ms late
+  std::uint64_t overruns = 0;  ///< ticks that started more than 0.5 ms late
   Percentiles wakeup_us;
   Percentiles compute_us;
 };

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "scene/config.h"
+
 namespace hapticd::server {
 
 /// Wrong configuration; the text names file, line, key, value and remedy.
@@ -15,12 +17,12 @@ class ConfigError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-enum class MaterialScale { reference, device };
+using scene::MaterialScale;
+using scene::VibrationFrame;
+using scene::VibrationUnit;
+using scene::WorkspaceFit;
 enum class QuaternionOrder { xyzw, wxyz };
 enum class ForceReport { total, normal };
-enum class WorkspaceFit { published, enclose };
-enum class VibrationUnit { radPerSecond, hertz };
-enum class VibrationFrame { stylus, device };
 enum class SceneOnDisconnect { keep, clear };
 
 /// One haptic device and the names it answers to.

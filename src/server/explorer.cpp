@@ -77,12 +77,12 @@ std::optional<SurfacePoint> firstSurface(const scene::SceneSnapshot& scene, cons
 // Appends points to a path and gives each the time that the speed asks for.
 class Pen {
  public:
-  explicit Pen(const Vec3& start) { path_.push_back({0, start, Quat::Identity(), false}); }
+  explicit Pen(const Vec3& start) { path_.push_back({0, start, Quat::Identity(), 0}); }
 
   void moveTo(const Vec3& position, const Quat& orientation, double speed_m_per_s, bool press = false) {
     const double distance = (position - path_.back().position_m).norm();
     const double time = path_.back().time_s + std::max(distance / speed_m_per_s, 0.05);
-    path_.push_back({time, position, orientation, press});
+    path_.push_back({time, position, orientation, press ? 1U : 0U});
   }
   // Around the centre on a great circle: a straight way could lead through the objects.
   void arcTo(const Vec3& position, const Vec3& centre, const Quat& orientation) {
@@ -95,13 +95,13 @@ class Pen {
       moveTo(centre + Quat::Identity().slerp(s, turn) * from, orientation, kFreeSpeed_m_per_s);
     }
   }
-  std::vector<ExplorationPoint> take() { return std::move(path_); }
+  std::vector<device::Waypoint> take() { return std::move(path_); }
 
  private:
-  std::vector<ExplorationPoint> path_;
+  std::vector<device::Waypoint> path_;
 };
 
-std::vector<ExplorationPoint> circle(const Box& workspace) {
+std::vector<device::Waypoint> circle(const Box& workspace) {
   constexpr int kSteps = 32;
   const Vec3 centre = workspace.centre();
   const double radius = 0.25 * workspace.extents().minCoeff();
@@ -124,7 +124,7 @@ Vec3 direction(int i, int count) {
 
 }  // namespace
 
-std::vector<ExplorationPoint> explore(const scene::SceneSnapshot& scene, const Box& workspace_m, Nanos now) {
+std::vector<device::Waypoint> explore(const scene::SceneSnapshot& scene, const Box& workspace_m, Nanos now) {
   const Box bounds = boundsInDevice(scene, now);
   if (bounds.empty()) return circle(workspace_m);
   const Vec3 centre = bounds.centre();

@@ -3,23 +3,15 @@
 
 #include <vector>
 
-#include "device/device.h"
+#include "device/simulated/waypoint_path.h"
 #include "scene/snapshot.h"
 
 namespace hapticd::server {
 
-/// Where the hand means to be at a time after the start of the exploration. Device frame, metres.
-struct ExplorationPoint {
-  double time_s = 0;
-  geometry::Vec3 position_m = geometry::Vec3::Zero();
-  geometry::Quat orientation = geometry::Quat::Identity();
-  bool pressButton = false;
-};
-
 /// A round of strokes over the touchable objects of a scene: approach a point from outside, press a few
 /// millimetres in, slide along, lift, turn to the next. Deterministic. An empty scene gives a slow circle in
 /// the workspace. The path starts and ends at rest outside all objects, so it can be repeated.
-std::vector<ExplorationPoint> explore(const scene::SceneSnapshot& scene, const geometry::Box& workspace_m,
+std::vector<device::Waypoint> explore(const scene::SceneSnapshot& scene, const geometry::Box& workspace_m,
                                       geometry::Nanos now);
 
 }  // namespace hapticd::server

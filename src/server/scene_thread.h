@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <variant>
 #include <vector>
@@ -61,6 +62,7 @@ class SceneThread {
   realtime::SnapshotSlot& slot_;
   Callbacks callbacks_;
   std::vector<scene::Notice> notices_;
+  std::optional<geometry::Nanos> collectAt_;
 
   mutable std::mutex mutex_;
   std::condition_variable wake_;

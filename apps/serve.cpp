@@ -1,0 +1,122 @@
+// hapticd serve: one process that owns the device and answers VRPN clients.
+#include <pthread.h>
+#include <spdlog/spdlog.h>
+
+#include <csignal>
+#include <memory>
+#include <thread>
+
+#include "commands.h"
+#include "server/devices.h"
+#include "server/server.h"
+
+namespace hapticd::apps {
+namespace {
+
+struct Options {
+  std::string configFile;
+  std::string listen;
+  std::vector<std::string> names;
+  std::string driver;
+  std::string hand;
+  double reportRate_Hz = 0;
+  double seconds = 0;
+  bool allowNoRealtime = false;
+  bool verbose = false;
+};
+
+server::ServerConfig configOf(const Options& options) {
+  server::ServerConfig config;
+  if (!options.configFile.empty()) config = server::loadConfig(options.configFile);
+  if (!options.listen.empty()) server::parseListen(options.listen, config.listenAddress, config.port);
+  if (options.allowNoRealtime) config.allowNoRealtime = true;
+  if (options.seconds > 0) config.seconds = options.seconds;
+  server::DeviceConfig& device = config.devices.front();
+  if (!options.names.empty()) device.names = options.names;
+  if (!options.driver.empty()) device.driver = options.driver;
+  if (!options.hand.empty()) device.hand = options.hand;
+  if (options.reportRate_Hz > 0) device.reportRate_Hz = options.reportRate_Hz;
+  return config;
+}
+
+// SIGINT and SIGTERM end the server in order: zero force first. Must be made before any other thread.
+class StopOnSignal {
+ public:
+  StopOnSignal() {
+    sigemptyset(&signals_);
+    sigaddset(&signals_, SIGINT);
+    sigaddset(&signals_, SIGTERM);
+    pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
+  }
+  void watch(server::Server& server) {
+    thread_ = std::thread([this, &server] {
+      int signal = 0;
+      sigwait(&signals_, &signal);
+      server.stop();
+    });
+  }
+  ~StopOnSignal() {
+    if (!thread_.joinable()) return;
+    pthread_kill(thread_.native_handle(), SIGTERM);
+    thread_.join();
+  }
+
+ private:
+  sigset_t signals_{};
+  std::thread thread_;
+};
+
+int run(const Options& options) {
+  spdlog::set_pattern("%H:%M:%S.%e %^%l%$ %v");
+  spdlog::set_level(options.verbose ? spdlog::level::debug : spdlog::level::info);
+  spdlog::flush_on(spdlog::level::info);
+  const server::ServerConfig config = configOf(options);
+  StopOnSignal stopper;
+  server::Server server(config);
+  const std::string at = server.address().text();
+  spdlog::info("listening on {} (TCP and UDP)", at);
+  for (const server::DeviceConfig& device : config.devices) {
+    for (const std::string& name : device.names) spdlog::info("device {}@{} ({})", name, at, device.driver);
+  }
+  stopper.watch(server);
+  server.run();
+  return 0;
+}
+
+}  // namespace
+
+void addServe(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  std::string drivers;
+  for (const std::string& name : server::driverNames()) drivers += (drivers.empty() ? "" : ", ") + name;
+
+  CLI::App* command = app.add_subcommand("serve", "Own a haptic device and serve it to VRPN clients");
+  command->add_option("--config", options->configFile, "TOML file with everything below and more")
+      ->check(CLI::ExistingFile);
+  command->add_option("--listen", options->listen,
+                      "ADDR:PORT for TCP and UDP [127.0.0.1:3883]; 0.0.0.0 for all networks");
+  command->add_option("--name", options->names,
+                      "Name that clients ask for [Phantom]; repeat it for more names");
+  command->add_option("--device", options->driver, "Driver [simulated]: " + drivers);
+  command->add_option(
+      "--hand", options->hand,
+      "Simulated device: 'script' explores whatever is in the scene [script], FILE.csv follows the path\n"
+      "t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons]");
+  command->add_option("--report-rate", options->reportRate_Hz, "Reports a second [1000]")
+      ->check(CLI::Range(0.1, 4000.0));
+  command->add_option("--seconds", options->seconds, "Stop after this time [until a signal]")
+      ->check(CLI::PositiveNumber);
+  command->add_flag("--allow-no-rt", options->allowNoRealtime,
+                    "Run although the system refuses realtime rights (fine for the simulated hand)");
+  command->add_flag("-v,--verbose", options->verbose, "Log more");
+  command->footer(
+      "Clients open NAME@HOST, NAME@HOST:PORT or NAME@tcp://HOST:PORT as Tracker, Button or ForceDevice.\n"
+      "Examples:\n"
+      "  hapticd serve                                    the simulated hand, on this machine only\n"
+      "  hapticd serve --name Tracker0 --name Button0     more names for one device\n"
+      "  hapticd serve --listen 0.0.0.0:3883              for other machines, too\n"
+      "'hapticd doctor' tells how to get realtime rights.");
+  command->callback([options] { exitCode = run(*options); });
+}
+
+}  // namespace hapticd::apps

@@ -1,0 +1,228 @@
+#include "server/server.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "wire/udp_request.h"
+
+namespace hapticd::server {
+namespace {
+
+using namespace std::chrono_literals;
+using geometry::Nanos;
+
+constexpr Nanos kHandshakeLimit = 30'000'000'000;
+
+net::ConnectionOptions connectionOptions() {
+  net::ConnectionOptions options;
+  // A client is lost when data stays unacknowledged this long; silence alone is never loss.
+  options.lossTimeout = 500ms;
+  options.keepAlive = 1s;
+  return options;
+}
+
+bool isLoopback(std::uint32_t address) {
+  return (address >> 24) == 127;
+}
+
+}  // namespace
+
+// A connection on its way to a client that asked by datagram to be called back.
+struct Server::CallBack {
+  net::Endpoint client;
+  net::Connection connection;
+};
+
+Server::Server(const ServerConfig& config) : config_(config) {
+  validate(config_);
+  loop_.setErrorHandler([](std::string_view text) { spdlog::error("{}", text); });
+  names_.addSender("VRPN Control");  // the stock library's sender 0
+
+  for (const DeviceConfig& device : config_.devices) {
+    std::vector<wire::LocalSender> senders;
+    for (const std::string& name : device.names) senders.push_back(names_.addSender(name));
+    stations_.push_back(std::make_unique<Station>(device, senders, config_.allowNoRealtime));
+  }
+
+  net::Endpoint local = net::Endpoint::parse(config_.listenAddress, config_.port);
+  listener_ = std::make_unique<net::TcpListener>(
+      loop_, local, [this](net::Connection connection) { addSession(std::move(connection), nullptr); },
+      connectionOptions());
+  local.port = listener_->local().port;
+  requests_ = std::make_unique<net::UdpSocket>(loop_, local);
+  requests_->start(
+      {.onDatagram = [this](auto bytes, const auto& from) { onUdpRequest(bytes, from); }, .onRefused = {}});
+}
+
+Server::~Server() {
+  // The servo first: no force outlives the server.
+  for (const auto& station : stations_) station->stop();
+}
+
+void Server::run() {
+  for (const auto& owned : stations_) {
+    Station* station = owned.get();
+    subscriptions_.push_back(loop_.watchFd(station->wakeFd(), [this, station] { onServoWake(*station); }));
+    station->start({.notices =
+                        [this, station](std::vector<scene::Notice>&& notices) {
+                          loop_.post([this, station, notices = std::move(notices)]() mutable {
+                            deliver(*station, std::move(notices));
+                          });
+                        },
+                    .drained =
+                        [this] {
+                          loop_.post([this] {
+                            for (const auto& [id, session] : sessions_) session->resume();
+                          });
+                        }});
+  }
+  subscriptions_.push_back(loop_.every(1s, [this] {
+    clock_.refresh();
+    closeStaleHandshakes();
+  }));
+  if (config_.seconds > 0) {
+    subscriptions_.push_back(loop_.after(
+        std::chrono::duration_cast<net::Loop::Duration>(std::chrono::duration<double>(config_.seconds)),
+        [this] { loop_.stop(); }));
+  }
+  loop_.run();
+  for (const auto& station : stations_) station->stop();
+}
+
+void Server::stop() {
+  loop_.stop();
+}
+
+void Server::addSession(net::Connection connection, std::unique_ptr<net::UdpSocket> udp) {
+  const scene::ClientId id = nextClient_++;
+  auto session = std::make_unique<Session>(id, *this, names_, clock_, std::move(connection), std::move(udp));
+  spdlog::info("client {} connects from {}", id, session->description());
+  Session& added = *session;
+  sessions_.emplace(id, std::move(session));
+  handshakes_.emplace(id, monotonicNow());
+  added.start();
+}
+
+void Server::onUdpRequest(std::span<const std::byte> datagram, const net::Endpoint& from) {
+  const auto request = wire::parseUdpRequest(datagram);
+  if (!request) {
+    spdlog::warn("datagram from {} is no connection request: {}", from.text(), request.error());
+    return;
+  }
+  net::Endpoint client;
+  try {
+    client = net::Endpoint::parse(request->host, request->port);
+  } catch (const net::Error& error) {
+    spdlog::warn("connection request from {} refused: {}", from.text(), error.what());
+    return;
+  }
+  // A forged request must not make this server connect to third parties.
+  const bool itself =
+      client.address == from.address || (isLoopback(client.address) && isLoopback(from.address));
+  const auto& allowed = config_.callbackHosts;
+  if (!itself && std::find(allowed.begin(), allowed.end(), request->host) == allowed.end()) {
+    spdlog::warn("connection request from {} names another host, {}: refused; allow it with callback_hosts",
+                 from.text(), client.text());
+    return;
+  }
+  callBack(client);
+}
+
+void Server::callBack(const net::Endpoint& client) {
+  // Clients repeat their request until they are called back.
+  for (const auto& pending : callBacks_) {
+    if (pending->client == client) return;
+  }
+  auto owned = std::make_unique<CallBack>();
+  CallBack* pending = owned.get();
+  pending->client = client;
+  pending->connection = net::Connection::connect(loop_, client, 2s, connectionOptions());
+  const auto forget = [this, pending] {
+    std::erase_if(callBacks_, [pending](const auto& entry) { return entry.get() == pending; });
+  };
+  pending->connection.start({.onConnected =
+                                 [this, pending, forget] {
+                                   net::Endpoint local = pending->connection.local();
+                                   local.port = 0;
+                                   auto udp = std::make_unique<net::UdpSocket>(loop_, local);
+                                   net::Connection connection = std::move(pending->connection);
+                                   forget();
+                                   addSession(std::move(connection), std::move(udp));
+                                 },
+                             .onBytes = {},
+                             .onDrained = {},
+                             .onClosed =
+                                 [client, forget](const std::string& reason) {
+                                   spdlog::warn("calling back {}: {}", client.text(), reason);
+                                   forget();
+                                 }});
+  callBacks_.push_back(std::move(owned));
+}
+
+void Server::onClosed(Session& session, const std::string& reason) {
+  spdlog::info("client {} ({}) is gone: {}", session.id(), session.description(), reason);
+  for (const auto& station : stations_) station->clientGone(session.id());
+  handshakes_.erase(session.id());
+  sessions_.erase(session.id());
+}
+
+void Server::closeStaleHandshakes() {
+  const Nanos now = monotonicNow();
+  for (auto entry = handshakes_.begin(); entry != handshakes_.end();) {
+    const auto session = sessions_.find(entry->first);
+    if (session == sessions_.end() || session->second->connected()) {
+      entry = handshakes_.erase(entry);
+      continue;
+    }
+    if (now - entry->second > kHandshakeLimit) session->second->close("no VRPN greeting within 30 s");
+    ++entry;
+  }
+}
+
+Station* Server::stationOf(wire::LocalSender name) noexcept {
+  for (const auto& station : stations_) {
+    if (station->has(name)) return station.get();
+  }
+  return nullptr;
+}
+
+void Server::onSubscribed(Session& session, wire::LocalSender name) {
+  if (Station* station = stationOf(name)) station->sendPresentState(session, name);
+}
+
+void Server::onMessage(Session& session, const wire::MessageReceived& message) {
+  if (Station* station = stationOf(message.local_sender)) station->onMessage(session, message);
+}
+
+void Server::onBatchEnd(Session& session) {
+  for (const auto& station : stations_) {
+    if (!station->flushCommands()) session.pause();
+  }
+}
+
+void Server::onServoWake(Station& station) {
+  net::drainEventFd(station.wakeFd());
+  if (!station.collectReports(clock_)) return;
+  for (const auto& [id, session] : sessions_) {
+    station.sendReports(*session);
+    session->flush();
+  }
+}
+
+void Server::deliver(Station& station, std::vector<scene::Notice>&& notices) {
+  for (const scene::Notice& notice : notices) {
+    const auto session = sessions_.find(notice.client);
+    if (session == sessions_.end()) continue;
+    sendText(*session->second, station, notice);
+    session->second->flush();
+  }
+}
+
+void Server::sendText(Session& session, const Station& station, const scene::Notice& notice) {
+  const auto severity = static_cast<std::uint32_t>(notice.severity);
+  session.send(station.nameFor(session), wire::Text{.severity = severity, .level = 0, .text = notice.text});
+}
+
+}  // namespace hapticd::server

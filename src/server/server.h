@@ -1,0 +1,69 @@
+// The server: listens, keeps the sessions, passes scene commands to the stations and their reports to the
+// clients.
+//
+// Everything here runs in the net thread. It never waits for a scene or a servo.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "net/loop.h"
+#include "net/tcp_listener.h"
+#include "net/udp_socket.h"
+#include "server/clock.h"
+#include "server/config.h"
+#include "server/session.h"
+#include "server/station.h"
+
+namespace hapticd::server {
+
+class Server final : public SessionOwner {
+ public:
+  /// Opens the devices and the ports. Throws ConfigError, net::Error or std::runtime_error with a remedy in
+  /// the text.
+  explicit Server(const ServerConfig& config);
+  ~Server() override;
+
+  /// Serves until stop() or until the configured seconds are over.
+  void run();
+  /// From any thread, and from a signal handler's thread.
+  void stop();
+
+  /// Where it listens, with the real port.
+  const net::Endpoint& address() const noexcept { return listener_->local(); }
+  /// Stations in the order of the configuration.
+  const std::vector<std::unique_ptr<Station>>& stations() const noexcept { return stations_; }
+
+ private:
+  struct CallBack;
+
+  void onSubscribed(Session& session, wire::LocalSender name) override;
+  void onMessage(Session& session, const wire::MessageReceived& message) override;
+  void onBatchEnd(Session& session) override;
+  void onClosed(Session& session, const std::string& reason) override;
+
+  void addSession(net::Connection connection, std::unique_ptr<net::UdpSocket> udp);
+  void onUdpRequest(std::span<const std::byte> datagram, const net::Endpoint& from);
+  void callBack(const net::Endpoint& client);
+  void onServoWake(Station& station);
+  void closeStaleHandshakes();
+  Station* stationOf(wire::LocalSender name) noexcept;
+  void deliver(Station& station, std::vector<scene::Notice>&& notices);
+  void sendText(Session& session, const Station& station, const scene::Notice& notice);
+
+  ServerConfig config_;
+  net::Loop loop_;
+  WallClock clock_;
+  wire::LocalNames names_;
+  std::vector<std::unique_ptr<Station>> stations_;
+  std::map<scene::ClientId, std::unique_ptr<Session>> sessions_;
+  std::map<scene::ClientId, geometry::Nanos> handshakes_;  ///< when the unfinished ones began
+  std::vector<std::unique_ptr<CallBack>> callBacks_;
+  std::vector<net::Subscription> subscriptions_;
+  std::unique_ptr<net::TcpListener> listener_;
+  std::unique_ptr<net::UdpSocket> requests_;
+  scene::ClientId nextClient_ = 1;
+};
+
+}  // namespace hapticd::server

@@ -1,0 +1,153 @@
+#include "server/session.h"
+
+#include <spdlog/spdlog.h>
+
+namespace hapticd::server {
+namespace {
+
+template <class... Ts>
+struct Overloaded : Ts... {
+  using Ts::operator()...;
+};
+template <class... Ts>
+Overloaded(Ts...) -> Overloaded<Ts...>;
+
+wire::EndpointOptions endpointOptions(const net::UdpSocket* udp) {
+  wire::EndpointOptions options;
+  if (udp != nullptr) options.udp = wire::UdpAddress{udp->local().addressText(), udp->local().port};
+  return options;
+}
+
+}  // namespace
+
+Session::Session(scene::ClientId id, SessionOwner& owner, const wire::LocalNames& names,
+                 const WallClock& clock, net::Connection connection, std::unique_ptr<net::UdpSocket> udp)
+    : id_(id),
+      owner_(owner),
+      names_(names),
+      clock_(clock),
+      connection_(std::move(connection)),
+      udp_(std::move(udp)),
+      endpoint_(names, endpointOptions(udp_.get())),
+      description_(connection_.remote().text() + (udp_ ? ", udp" : ", tcp")) {}
+
+void Session::start() {
+  if (udp_) {
+    udp_->start(
+        {.onDatagram = [this](auto bytes, const auto& from) { onDatagram(bytes, from); }, .onRefused = {}});
+  }
+  connection_.start({.onConnected = {},
+                     .onBytes = [this](auto bytes) { onBytes(bytes); },
+                     .onDrained = {},
+                     .onClosed =
+                         [this](const std::string& reason) {
+                           owner_.onClosed(*this, failure_.empty() ? reason : failure_);
+                         }});
+  flush();
+}
+
+bool Session::wants(wire::LocalSender name) const noexcept {
+  return endpoint_.connected() && (subscriptions_.empty() || subscriptions_.count(name) != 0);
+}
+
+void Session::sendShared(const std::shared_ptr<const net::Buffer>& frames, net::Delivery delivery) {
+  if (!endpoint_.connected()) return;
+  if (delivery == net::Delivery::lowLatency && endpoint_.usesDatagrams()) {
+    wire::cutDatagrams(*frames, [this](wire::ByteView datagram) { udp_->sendTo(datagram, datagramPeer_); });
+    return;
+  }
+  drainEndpoint();  // what was queued earlier leaves earlier
+  connection_.send(frames, delivery);
+}
+
+void Session::flush() {
+  drainEndpoint();
+  connection_.flush();
+}
+
+void Session::pause() {
+  connection_.pauseReading();
+}
+void Session::resume() {
+  connection_.resumeReading();
+}
+
+void Session::close(const std::string& reason) {
+  failure_ = reason;
+  connection_.close(reason);
+}
+
+void Session::drainEndpoint() {
+  net::Buffer bytes;
+  endpoint_.takeStream(bytes);
+  if (!bytes.empty()) connection_.send(std::make_shared<const net::Buffer>(std::move(bytes)));
+  if (udp_) {
+    endpoint_.takeDatagrams([this](wire::ByteView datagram) { udp_->sendTo(datagram, datagramPeer_); });
+  }
+}
+
+void Session::onBytes(std::span<const std::byte> bytes) {
+  endpoint_.feed(clock_.now(), bytes, [this](const wire::Event& event) { onEvent(event); });
+  owner_.onBatchEnd(*this);
+  if (endpoint_.failed()) {
+    connection_.abort(failure_);
+    return;
+  }
+  flush();
+}
+
+void Session::onDatagram(std::span<const std::byte> bytes, const net::Endpoint& from) {
+  // Anybody can send datagrams to a port; only the machine at the other end of the TCP connection is the
+  // client.
+  if (from.address != connection_.remote().address) return;
+  endpoint_.feedDatagram(bytes, [this](const wire::Event& event) { onEvent(event); });
+  owner_.onBatchEnd(*this);
+  flush();
+}
+
+void Session::onEvent(const wire::Event& event) {
+  std::visit(
+      Overloaded{[this](const wire::MessageReceived& message) {
+                   if (message.local_sender.value >= 0) owner_.onMessage(*this, message);
+                 },
+                 [this](const wire::Connected& connected) {
+                   spdlog::info("client {} ({}) speaks VRPN {}", id_, description_, connected.version);
+                 },
+                 [this](const wire::SenderDescribed& described) {
+                   const auto ours = names_.findSender(described.name);
+                   if (ours && subscriptions_.insert(*ours).second) owner_.onSubscribed(*this, *ours);
+                 },
+                 [](const wire::TypeDescribed&) {},
+                 [this](const wire::UdpDescribed& described) {
+                   try {
+                     datagramPeer_ = net::Endpoint::parse(described.address.host, described.address.port);
+                   } catch (const net::Error& error) {
+                     spdlog::warn("client {}: UDP address refused: {}", id_, error.what());
+                     return;
+                   }
+                   if (datagramPeer_.address != connection_.remote().address) {
+                     spdlog::warn(
+                         "client {}: asks for datagrams to {}, which is not where it is; all goes by TCP",
+                         id_, datagramPeer_.text());
+                     return;
+                   }
+                   if (udp_) endpoint_.useDatagrams();
+                 },
+                 [this](const wire::LogRequested& requested) {
+                   // Files that a stranger names are not written.
+                   spdlog::warn("client {}: asks for log files '{}', '{}': refused", id_,
+                                requested.request.in_name, requested.request.out_name);
+                   send(wire::LocalSender{0},
+                        wire::Text{.severity = wire::kTextWarning,
+                                   .level = 0,
+                                   .text = std::string("log files on the server are refused; use "
+                                                       "'hapticd record' or log on the client")});
+                 },
+                 [this](const wire::Ignored& ignored) {
+                   spdlog::debug("client {}: {} ({})", id_, ignored.reason, ignored.value);
+                 },
+                 [this](const wire::ProtocolError& error) { failure_ = std::string(error.reason); }},
+      event);
+}
+
+}  // namespace hapticd::server

@@ -1,0 +1,90 @@
+// One client: its connection, the protocol state on it, and which of our devices it listens to.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <set>
+#include <string>
+
+#include "net/connection.h"
+#include "net/udp_socket.h"
+#include "scene/builder.h"
+#include "server/clock.h"
+#include "wire/endpoint.h"
+
+namespace hapticd::server {
+
+class Session;
+
+/// What a session tells the server. Called from the net thread.
+class SessionOwner {
+ public:
+  virtual ~SessionOwner() = default;
+  /// The client listens to one of our names from now on.
+  virtual void onSubscribed(Session& session, wire::LocalSender name) = 0;
+  /// A message for one of our devices.
+  virtual void onMessage(Session& session, const wire::MessageReceived& message) = 0;
+  /// All messages of one read have been given.
+  virtual void onBatchEnd(Session& session) = 0;
+  /// Over, with the reason; the owner destroys the session after this returns.
+  virtual void onClosed(Session& session, const std::string& reason) = 0;
+};
+
+/// A connected client. Lives in the net thread.
+class Session {
+ public:
+  /// Without `udp` the client is a tcp:// one and everything goes by TCP. The socket must be bound already.
+  Session(scene::ClientId id, SessionOwner& owner, const wire::LocalNames& names, const WallClock& clock,
+          net::Connection connection, std::unique_ptr<net::UdpSocket> udp);
+
+  /// Begins to talk: our cookie leaves, the client's is awaited.
+  void start();
+
+  scene::ClientId id() const noexcept { return id_; }
+  /// "127.0.0.1:40312, tcp" for logs.
+  const std::string& description() const noexcept { return description_; }
+  bool connected() const noexcept { return endpoint_.connected(); }
+
+  /// Whether reports under this name are wanted: those it described, or all while it has described none of
+  /// ours.
+  bool wants(wire::LocalSender name) const noexcept;
+
+  /// Queues one message; it leaves with the next flush().
+  template <wire::WireMessage M>
+  void send(wire::LocalSender from, const M& message) {
+    endpoint_.send(clock_.now(), from, message);
+  }
+  /// Queues frames that are shared with other clients; dropped first when this client reads too slowly if
+  /// lowLatency.
+  void sendShared(const std::shared_ptr<const net::Buffer>& frames, net::Delivery delivery);
+  /// Writes what is queued: one system call.
+  void flush();
+
+  /// Stops reading while the scene is behind.
+  void pause();
+  void resume();
+  /// Ends it, with a reason for the log; onClosed follows.
+  void close(const std::string& reason);
+
+  net::ConnectionStatistics statistics() const { return connection_.statistics(); }
+
+ private:
+  void onBytes(std::span<const std::byte> bytes);
+  void onDatagram(std::span<const std::byte> bytes, const net::Endpoint& from);
+  void onEvent(const wire::Event& event);
+  void drainEndpoint();
+
+  scene::ClientId id_;
+  SessionOwner& owner_;
+  const wire::LocalNames& names_;
+  const WallClock& clock_;
+  net::Connection connection_;
+  std::unique_ptr<net::UdpSocket> udp_;
+  net::Endpoint datagramPeer_;
+  wire::Endpoint endpoint_;
+  std::string description_;
+  std::set<wire::LocalSender> subscriptions_;
+  std::string failure_;
+};
+
+}  // namespace hapticd::server
