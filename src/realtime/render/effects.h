@@ -1,0 +1,39 @@
+// The six force effects of the scene, each with its own clock; see docs/haptics.md for the laws.
+#pragma once
+
+#include <array>
+
+#include "realtime/render/renderer.h"
+
+namespace hapticd::realtime {
+
+/// Clocks and anchors of the running effects. Fixed storage; noexcept, allocation-free.
+class Effects {
+ public:
+  /// Sum of the forces of all running effects at `now`, device frame, newtons. `contact` has the proxy and
+  /// the surface normal of this tick.
+  Vec3 force(const scene::SceneSnapshot& scene, const device::DeviceState& hand, const Rendering& contact,
+             Nanos now, bool motorInDeviceFrame) noexcept;
+
+  void reset() noexcept { count_ = 0; }
+
+ private:
+  static constexpr int kMaxEffects = 64;
+
+  struct Running {
+    std::int32_t index = 0;
+    std::uint32_t start = 0;
+    Nanos begin = 0;
+    Nanos releaseBegin = -1;  ///< -1: not releasing
+    Vec3 anchor = Vec3::Zero();
+    bool seen = false;
+  };
+
+  Running* running(const scene::Effect& effect, Nanos now, const Vec3& proxy) noexcept;
+  void forgetUnseen() noexcept;
+
+  std::array<Running, kMaxEffects> running_;
+  int count_ = 0;
+};
+
+}  // namespace hapticd::realtime

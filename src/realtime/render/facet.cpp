@@ -1,0 +1,169 @@
+#include "realtime/render/facet.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace hapticd::realtime {
+namespace {
+
+using scene::TouchableFaces;
+
+constexpr double kPasses = 2;            // a parameter behind the end of every path
+constexpr double kMargin = 0.25;         // in skins; see the head of facet.h
+constexpr double kCrossingSlack = 1e-6;  // error of a height, in skins, with a factor of ten to spare
+constexpr double kThinness = 1e-3;       // below this height to length, the normal is cleaned up
+
+// Not below the edge u-v by more than the margin, seen along the normal; no square root.
+bool withinEdge(const Facet& f, const Vec3& u, const Vec3& v, const Vec3& q, double margin) {
+  const Vec3 e = v - u;
+  const double inside = f.normal.cross(e).dot(q - u);
+  return inside >= 0 || inside * inside <= margin * margin * e.squaredNorm();
+}
+
+bool overFacet(const Facet& f, const Vec3& q, double margin) {
+  if (!withinEdge(f, f.a, f.b, q, margin) || !withinEdge(f, f.b, f.c, q, margin) ||
+      !withinEdge(f, f.c, f.a, q, margin)) {
+    return false;
+  }
+  // The widened sides of a needle meet far beyond its ends: cut it there.
+  const Vec3 e = f.b - f.a;
+  const double along = e.dot(q - f.a);
+  const double length2 = e.squaredNorm();
+  const double slack = margin * std::sqrt(length2);
+  return along >= -slack && along <= length2 + slack;
+}
+
+// The side of a facet that faces the path's start, and the heights of both ends over it.
+struct Heights {
+  double sign = 1;
+  double start = 0;
+  double end = 0;
+};
+
+bool touchableSide(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d, double limit,
+                   Heights& h) {
+  h.start = f.normal.dot(p - f.a);
+  h.end = h.start + limit * f.normal.dot(d);
+  const bool fromBack = faces == TouchableFaces::back || (faces == TouchableFaces::both && h.start < 0);
+  if (fromBack) h = {-1.0, -h.start, -h.end};
+  return h.start >= -0.5 * f.skin;
+}
+
+}  // namespace
+
+bool makeFacet(const scene::Corners& corners, double skin, Facet& f) noexcept {
+  const double ab = (corners.b - corners.a).squaredNorm();
+  const double bc = (corners.c - corners.b).squaredNorm();
+  const double ca = (corners.a - corners.c).squaredNorm();
+  double longest2 = ab;
+  if (bc > ab && bc >= ca) {
+    f.a = corners.b, f.b = corners.c, f.c = corners.a;
+    longest2 = bc;
+  } else if (ca > ab) {
+    f.a = corners.c, f.b = corners.a, f.c = corners.b;
+    longest2 = ca;
+  } else {
+    f.a = corners.a, f.b = corners.b, f.c = corners.c;
+  }
+  const Vec3 edge = f.b - f.a;
+  Vec3 n = edge.cross(f.c - f.a);
+  const double area2 = n.norm();
+  if (!(area2 * area2 > skin * skin * longest2) || !std::isfinite(area2)) return false;
+  n /= area2;
+  if (area2 < kThinness * longest2) {
+    // The rounding of a needle's normal must turn it about the needle, where it does no harm.
+    n -= edge * (n.dot(edge) / longest2);
+    n.normalize();
+  }
+  f.normal = n;
+  f.skin = skin;
+  return true;
+}
+
+double reach(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d, double limit) noexcept {
+  Heights h;
+  if (!touchableSide(f, faces, p, d, limit, h) || !(h.end < 0.5 * f.skin)) return kPasses;
+  // The deepest point over the face: where the path goes through it, else the end.
+  double t = limit;
+  double margin = kMargin * f.skin;
+  if (h.end < 0) {
+    const double fall = h.start - h.end;
+    t = h.start > 0 ? limit * (h.start / fall) : 0.0;
+    if (h.start > 0) margin += kCrossingSlack * f.skin * limit * d.norm() / fall;
+  }
+  return overFacet(f, p + t * d, margin) ? t : kPasses;
+}
+
+bool meet(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d, double limit,
+          Meeting& out) noexcept {
+  if (reach(f, faces, p, d, limit) > 1) return false;
+  Heights h;
+  touchableSide(f, faces, p, d, limit, h);
+  const double fall = h.start - h.end;
+  out.stop = fall > 0 ? limit * std::clamp((h.start - f.skin) / fall, 0.0, 1.0) : 0.0;
+  out.depth = f.skin - h.end;
+  out.plane = {h.sign * f.normal, f.a, f.skin};
+  return true;
+}
+
+Vec3 nearestPointOf(const Facet& f, const Vec3& x) noexcept {
+  const Vec3 ab = f.b - f.a;
+  const Vec3 ac = f.c - f.a;
+  const Vec3 ax = x - f.a;
+  const double d1 = ab.dot(ax);
+  const double d2 = ac.dot(ax);
+  if (d1 <= 0 && d2 <= 0) return f.a;
+  const Vec3 bx = x - f.b;
+  const double d3 = ab.dot(bx);
+  const double d4 = ac.dot(bx);
+  if (d3 >= 0 && d4 <= d3) return f.b;
+  const double vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) return f.a + ab * (d1 / (d1 - d3));
+  const Vec3 cx = x - f.c;
+  const double d5 = ab.dot(cx);
+  const double d6 = ac.dot(cx);
+  if (d6 >= 0 && d5 <= d6) return f.c;
+  const double vb = d5 * d2 - d1 * d6;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) return f.a + ac * (d2 / (d2 - d6));
+  const double va = d3 * d6 - d5 * d4;
+  if (va <= 0 && d4 >= d3 && d5 >= d6) {
+    return f.b + (f.c - f.b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
+  }
+  // Over the face the foot of the perpendicular is more exact than barycentric weights.
+  return x - f.normal * f.normal.dot(ax);
+}
+
+bool meetBall(const Facet& f, TouchableFaces faces, double radius, const Vec3& p, const Vec3& d, double limit,
+              Meeting& out) noexcept {
+  const double standoff = radius + f.skin;
+  Heights h;
+  if (!touchableSide(f, faces, p, d, limit, h) || !(h.end < standoff)) return false;
+  // The distance to a convex set is convex along a line: Newton's steps from the near end never pass the
+  // first root, and where the slope is not negative there is none.
+  const double contact = standoff - 0.5 * f.skin;
+  const double fine = 1e-3 * f.skin;
+  double t = 0;
+  bool stopped = false;
+  for (int i = 0; i < 32 && t <= limit; ++i) {
+    const Vec3 x = p + t * d;
+    const Vec3 foot = nearestPointOf(f, x);
+    const Vec3 away = x - foot;
+    const double distance = away.norm();
+    const Vec3 n = distance > f.skin ? Vec3(away / distance) : Vec3(h.sign * f.normal);
+    const double slope = n.dot(d);
+    if (!stopped && distance <= standoff + fine) {
+      out = {t, 0, {n, foot, standoff}};
+      out.depth = -out.plane.height(p + limit * d);
+      stopped = true;
+    }
+    if (stopped && distance <= contact + fine) {
+      const Vec3 end = p + limit * d;
+      return slope < 0 || (end - nearestPointOf(f, end)).norm() < contact;
+    }
+    if (!(slope < 0)) return false;
+    t += (distance - (stopped ? contact : standoff)) / -slope;
+  }
+  return stopped && t <= limit;
+}
+
+}  // namespace hapticd::realtime

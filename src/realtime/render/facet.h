@@ -1,0 +1,54 @@
+// One triangle in device metres, and the questions the proxy asks of it.
+//
+// The proxy is kept off a face by the facet's standoff: the tool radius plus `skin`, a length far above the
+// rounding error of all that is computed here and far below what a hand can feel. No sign is then ever
+// decided near its own rounding error. For the test itself a face is widened by a quarter of the skin, so
+// that neighbours overlap and rounding opens no gap between them; the proxy passes an edge at more than that
+// height, so that the overlap never catches it.
+#pragma once
+
+#include <cstdint>
+
+#include "realtime/render/plane_set.h"
+#include "scene/mesh_geometry.h"
+#include "scene/surface.h"
+
+namespace hapticd::realtime {
+
+/// A sound triangle; made by makeFacet.
+struct Facet {
+  Vec3 a, b, c;  ///< counter-clockwise from the front; a-b is the longest edge
+  Vec3 normal;   ///< unit, out of the front
+  double skin = 0;
+  std::uint32_t triangle = 0;
+  int object = 0;  ///< position among the near objects
+};
+
+/// Where a path meets a facet: at `stop` in [0, 1] the proxy is at its standoff; `plane` keeps it there.
+struct Meeting {
+  double stop = 0;
+  double depth = 0;  ///< how far the rest of the path would go below the plane; decides between equal stops
+  Plane plane;
+};
+
+/// False for triangles too thin to matter (thinner than the skin, hence covered by their neighbours' margin)
+/// or not finite.
+bool makeFacet(const scene::Corners& corners, double skin, Facet& facet) noexcept;
+
+/// The point tool: first parameter in [0, limit] at which the path p + t d comes to the facet itself, or ends
+/// within half a skin of it; > 1 when it passes.
+double reach(const Facet& f, scene::TouchableFaces faces, const Vec3& p, const Vec3& d,
+             double limit) noexcept;
+
+/// The point tool: where the path p + t d, t in [0, limit], has to stop for this facet. False when it passes.
+bool meet(const Facet& f, scene::TouchableFaces faces, const Vec3& p, const Vec3& d, double limit,
+          Meeting& out) noexcept;
+
+/// The ball tool: where its centre has to stop on the path p + t d, t in [0, limit]. False when it passes.
+bool meetBall(const Facet& f, scene::TouchableFaces faces, double radius, const Vec3& p, const Vec3& d,
+              double limit, Meeting& out) noexcept;
+
+/// The point of the triangle nearest to x (Ericson 2005, 5.1.5).
+Vec3 nearestPointOf(const Facet& f, const Vec3& x) noexcept;
+
+}  // namespace hapticd::realtime

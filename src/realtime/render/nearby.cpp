@@ -1,0 +1,298 @@
+#include "realtime/render/nearby.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <utility>
+
+namespace hapticd::realtime {
+namespace {
+
+using geometry::Mat3;
+using scene::ObjectState;
+
+constexpr double kRelativeSkin = 1e-9;      // of the largest coordinate of the object in the device frame
+constexpr double kPadShare = 0x1p-22;       // of the object's size: a quarter of the pad of its index
+constexpr double kRoundingFloor = 1e-12;    // of the largest coordinate: a thousand roundings
+constexpr double kSmallestObject_m = 1e-3;  // below this size the coordinates of the hand decide the rounding
+constexpr double kWiden = 1 + 1e-6;         // queries travel between frames with rounding
+
+// An upper bound of the largest singular value, exact for similarities.
+double stretchOf(const Mat3& m) {
+  return std::sqrt((m.transpose() * m).cwiseAbs().rowwise().sum().maxCoeff());
+}
+
+scene::Corners mapped(const Affine& t, const scene::Corners& c, bool mirrored) {
+  scene::Corners out{t * c.a, t * c.b, t * c.c};
+  if (mirrored) std::swap(out.b, out.c);
+  return out;
+}
+
+// Parameter at which p + t d leaves the ball, at most 1. p is inside.
+double exitOf(const Vec3& p, const Vec3& d, const Vec3& centre, double radius) {
+  const Vec3 m = p - centre;
+  if ((m + d).squaredNorm() <= radius * radius) return 1;
+  const double a = d.squaredNorm();
+  const double b = m.dot(d);
+  const double c = m.squaredNorm() - radius * radius;
+  const double root = std::sqrt(std::max(0.0, b * b - a * c));
+  return std::clamp((root - b) / a, 0.0, 1.0);
+}
+
+const ObjectState* find(const scene::SceneSnapshot& scene, std::int32_t id) {
+  const auto it =
+      std::lower_bound(scene.objects.begin(), scene.objects.end(), id,
+                       [](const auto& object, std::int32_t wanted) { return object->id < wanted; });
+  return it != scene.objects.end() && (*it)->id == id ? it->get() : nullptr;
+}
+
+}  // namespace
+
+scene::Corners PlacedObject::corners(std::uint32_t triangle, Nanos now) const noexcept {
+  return mapped(T_device_object, state->mesh->corners(triangle, now), mirrored);
+}
+
+scene::Corners PlacedObject::cornersBefore(std::uint32_t triangle, Nanos then) const noexcept {
+  return mapped(T_device_objectBefore, before->mesh->corners(triangle, then), mirrored);
+}
+
+Vec3 PlacedObject::carried(const Vec3& p) const noexcept {
+  if (!moved) return p;
+  return T_device_object * (T_device_objectBefore.inverse() * p);
+}
+
+void Nearby::begin(const Moment& now, const Moment& before) noexcept {
+  now_ = now;
+  before_ = before;
+  sameWorkspace_ = before.scene != nullptr && before.scene->workspace.T_device_world.matrix() ==
+                                                  now.scene->workspace.T_device_world.matrix();
+  objectCount_ = 0;
+  finestSkin_ = kRelativeSkin;
+  facetCount_ = 0;
+  complete_ = false;
+  overflowed_ = false;
+}
+
+void Nearby::include(const Vec3& centre, double reach) noexcept {
+  const scene::SceneSnapshot& scene = *now_.scene;
+  if (!scene.objectIndex || scene.objects.size() <= 2) {
+    for (const auto& object : scene.objects) add(*object);
+    return;
+  }
+  const Affine& T_world_device = scene.workspace.T_world_device;
+  const double worldReach = (reach + radius_) * kWiden * stretchOf(T_world_device.linear());
+  scene.objectIndex->visitNear(T_world_device * centre, worldReach,
+                               [&](std::uint32_t i) noexcept { add(*scene.objects[i]); });
+}
+
+int Nearby::includeObject(std::int32_t id) noexcept {
+  const ObjectState* state = find(*now_.scene, id);
+  if (state == nullptr) return -1;
+  add(*state);
+  for (int i = 0; i < objectCount_; ++i) {
+    if (object(i).state == state) return i;
+  }
+  return -1;
+}
+
+void Nearby::add(const ObjectState& state) noexcept {
+  for (int i = 0; i < objectCount_; ++i) {
+    if (object(i).state == &state) return;
+  }
+  if (objectCount_ == kMaxObjects) {
+    overflowed_ = true;
+    return;
+  }
+  PlacedObject& placed = objects_[static_cast<std::size_t>(objectCount_)];
+  if (!place(state, placed)) return;
+  compareWithBefore(placed);
+  ++objectCount_;
+  finestSkin_ = objectCount_ == 1 ? placed.skin : std::min(finestSkin_, placed.skin);
+}
+
+bool Nearby::place(const ObjectState& state, PlacedObject& placed) const noexcept {
+  placed = PlacedObject{};
+  placed.state = &state;
+  const geometry::Box& box = state.mesh->index.bounds();
+  if (box.empty()) return false;
+  placed.T_device_object = now_.scene->workspace.T_device_world * state.motion.at(now_.time);
+  const Mat3 linear = placed.T_device_object.linear();
+  const double determinant = linear.determinant();
+  placed.mirrored = determinant < 0;
+  placed.T_object_device = placed.T_device_object.inverse();
+  placed.stretch = stretchOf(placed.T_object_device.linear());
+  if (!std::isfinite(placed.stretch) || determinant == 0) return false;  // flattened: nothing to touch
+  const Vec3 farthest =
+      (placed.T_device_object * box.centre()).cwiseAbs() + linear.cwiseAbs() * (0.5 * box.extents());
+  const double extent = std::max(farthest.maxCoeff(), kSmallestObject_m);
+  const double size = box.min.cwiseAbs().cwiseMax(box.max.cwiseAbs()).maxCoeff() / placed.stretch;
+  placed.skin = std::max(std::min(kRelativeSkin * extent, kPadShare * size), kRoundingFloor * extent);
+  return std::isfinite(placed.skin);
+}
+
+void Nearby::compareWithBefore(PlacedObject& placed) const noexcept {
+  if (before_.scene == nullptr) return;
+  const ObjectState& state = *placed.state;
+  placed.before = find(*before_.scene, state.id);
+  if (placed.before == nullptr) return;
+  const ObjectState& before = *placed.before;
+  placed.T_device_objectBefore = placed.T_device_object;
+  if (!sameWorkspace_ || placed.before != &state || state.motion.movingAfter(before_.time)) {
+    placed.T_device_objectBefore = before_.scene->workspace.T_device_world * before.motion.at(before_.time);
+    placed.moved = placed.T_device_objectBefore.matrix() != placed.T_device_object.matrix();
+  }
+  const bool sameTriangles = before.mesh->topology == state.mesh->topology;
+  placed.deformed = sameTriangles && (before.mesh != state.mesh || state.mesh->deformingAfter(before_.time));
+  placed.jumped = !sameTriangles || before.motion.jumps() != state.motion.jumps();
+}
+
+bool Nearby::facetOf(int i, std::uint32_t triangle, Facet& facet) const noexcept {
+  const PlacedObject& placed = object(i);
+  if (!makeFacet(placed.corners(triangle, now_.time), placed.skin, facet)) return false;
+  facet.triangle = triangle;
+  facet.object = i;
+  return true;
+}
+
+void Nearby::gather(const Vec3& centre, double radius) noexcept {
+  centre_ = centre;
+  reach_ = radius;
+  facetCount_ = 0;
+  complete_ = true;
+  for (int i = 0; i < objectCount_; ++i) {
+    const PlacedObject& placed = object(i);
+    const double reach = radius + radius_ + 4 * placed.skin;
+    const auto visit = [&](std::uint32_t triangle) noexcept {
+      if (facetCount_ == kMaxFacets) {
+        complete_ = false;
+        return;
+      }
+      Facet& facet = facets_[static_cast<std::size_t>(facetCount_)];
+      if (!facetOf(i, triangle, facet)) return;
+      const bool near = std::abs(facet.normal.dot(centre - facet.a)) <= reach;
+      if (near || placed.deformed) ++facetCount_;
+    };
+    placed.state->mesh->index.visitNear(placed.T_object_device * centre, reach * kWiden * placed.stretch,
+                                        visit);
+  }
+}
+
+bool Nearby::meets(const Facet& f, const Vec3& p, const Vec3& g, Hit& hit) const noexcept {
+  const Vec3 d = g - p;
+  const bool found =
+      radius_ > 0 ? meetBall(f, faces(), radius_, p, d, 1, hit) : meet(f, faces(), p, d, 1, hit);
+  hit.object = f.object;
+  hit.triangle = f.triangle;
+  return found;
+}
+
+// A total order on obstacles, so that the first one does not depend on the order of visits.
+void Nearby::consider(const Facet& f, const Vec3& p, const Vec3& d, double limit, Hit& best,
+                      bool& found) const noexcept {
+  Hit hit;
+  if (!(radius_ > 0 ? meetBall(f, faces(), radius_, p, d, limit, hit) : meet(f, faces(), p, d, limit, hit))) {
+    return;
+  }
+  hit.object = f.object;
+  hit.triangle = f.triangle;
+  const auto rank = [this](const Hit& h) {
+    return std::tuple(h.stop, -h.depth, object(h.object).state->id, h.triangle);
+  };
+  if (found && !(rank(hit) < rank(best))) return;
+  best = hit;
+  found = true;
+}
+
+// Two passes for the point: how far the path is free of faces, then what has to stop it before, so that at
+// the stop it is a skin above all of them.
+bool Nearby::castGathered(const Vec3& p, const Vec3& d, double limit, int only, Hit& hit) const noexcept {
+  double free = limit;
+  if (radius_ == 0) {
+    bool blocked = false;
+    for (const Facet* f = facetsBegin(); f != facetsEnd(); ++f) {
+      if (only >= 0 && f->object != only) continue;
+      const double t = reach(*f, faces(), p, d, free);
+      if (t > 1) continue;
+      blocked = true;
+      free = t;
+    }
+    if (!blocked) return false;
+  }
+  bool found = false;
+  for (const Facet* f = facetsBegin(); f != facetsEnd(); ++f) {
+    if (only < 0 || f->object == only) consider(*f, p, d, free, hit, found);
+  }
+  return found;
+}
+
+bool Nearby::castTree(const Vec3& p, const Vec3& d, int only, Hit& hit) const noexcept {
+  const auto visitAll = [&](double limit, auto&& visit) noexcept {
+    for (int i = 0; i < objectCount_; ++i) {
+      if (only >= 0 && i != only) continue;
+      const PlacedObject& placed = object(i);
+      placed.state->mesh->index.visitSegment(placed.T_object_device * p,
+                                             placed.T_object_device * (p + limit * d),
+                                             [&](std::uint32_t triangle) noexcept {
+                                               Facet f;
+                                               return facetOf(i, triangle, f) ? visit(f) : 1.0;
+                                             });
+    }
+  };
+  double free = 1;
+  bool blocked = false;
+  visitAll(1, [&](const Facet& f) noexcept {
+    const double t = reach(f, faces(), p, d, free);
+    if (t <= 1) {
+      blocked = true;
+      free = t;
+    }
+    return free;
+  });
+  if (!blocked) return false;
+  bool found = false;
+  visitAll(free, [&](const Facet& f) noexcept {
+    consider(f, p, d, free, hit, found);
+    return 1.0;
+  });
+  return found;
+}
+
+// The index has no query for a swept ball: gather along the path, in steps short enough for the array.
+bool Nearby::castBall(const Vec3& p, const Vec3& d, int only, Hit& hit) noexcept {
+  constexpr int kMaxSteps = 64;
+  double begin = 0;
+  double step = 1;
+  for (int i = 0; i < kMaxSteps && begin < 1; ++i) {
+    step = std::min(step, 1 - begin);
+    const Vec3 from = p + begin * d;
+    const Vec3 way = step * d;
+    gather(from + 0.5 * way, 0.5 * way.norm() * kWiden);
+    if (!complete_ && step > 1.0 / kMaxSteps) {
+      step *= 0.25;
+      continue;
+    }
+    overflowed_ = overflowed_ || !complete_;
+    if (castGathered(from, way, 1, only, hit)) {
+      hit.stop = begin + step * hit.stop;
+      return true;
+    }
+    begin += step;
+  }
+  return false;
+}
+
+bool Nearby::cast(const Vec3& p, const Vec3& g, Hit& hit) noexcept {
+  const Vec3 d = g - p;
+  if (complete_ && (p - centre_).norm() <= reach_) {
+    const double limit = exitOf(p, d, centre_, reach_);
+    if (castGathered(p, d, limit, -1, hit)) return true;
+    if (limit == 1) return false;
+  }
+  return radius_ > 0 ? castBall(p, d, -1, hit) : castTree(p, d, -1, hit);
+}
+
+bool Nearby::castAt(int object, const Vec3& p, const Vec3& g, Hit& hit) noexcept {
+  return radius_ > 0 ? castBall(p, g - p, object, hit) : castTree(p, g - p, object, hit);
+}
+
+}  // namespace hapticd::realtime

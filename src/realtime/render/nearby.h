@@ -1,0 +1,121 @@
+// What is near the hand in this tick: placed objects, the facets around the proxy, and casts against them.
+//
+// A tick costs about one walk of the tree: the facets around the proxy are gathered once and the casts of the
+// slide run over that array; only a path that leaves the gathered ball walks the tree again. The trees
+// propose; every decision is made here in double precision, in the device frame, and does not depend on their
+// order.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "realtime/render/facet.h"
+#include "scene/snapshot.h"
+
+namespace hapticd::realtime {
+
+using geometry::Affine;
+using geometry::Nanos;
+
+/// An object at this tick and, when it was there, at the last one.
+struct PlacedObject {
+  const scene::ObjectState* state = nullptr;
+  Affine T_device_object = Affine::Identity();
+  Affine T_object_device = Affine::Identity();
+  double stretch = 1;     ///< most object units per metre, in any direction
+  double skin = 0;        ///< see facet.h
+  bool mirrored = false;  ///< the placement has a reflection: winding is seen reversed
+  // Since the last tick:
+  const scene::ObjectState* before = nullptr;  ///< null when it was not there
+  Affine T_device_objectBefore = Affine::Identity();
+  bool moved = false;     ///< the placement changed
+  bool deformed = false;  ///< vertices changed under the same triangles
+  bool jumped = false;    ///< placement or triangles changed without passing between
+
+  /// Corners in device metres.
+  scene::Corners corners(std::uint32_t triangle, Nanos now) const noexcept;
+  scene::Corners cornersBefore(std::uint32_t triangle, Nanos then) const noexcept;
+  /// Where a point fixed to the object at the last tick is now.
+  Vec3 carried(const Vec3& p) const noexcept;
+};
+
+/// The first obstacle on a path.
+struct Hit : Meeting {
+  int object = 0;  ///< position among the near objects
+  std::uint32_t triangle = 0;
+};
+
+/// The scene at a tick, kept to compare with the next one.
+struct Moment {
+  const scene::SceneSnapshot* scene = nullptr;
+  Nanos time = 0;
+};
+
+/// Fixed storage; everything noexcept and allocation-free. Object positions are valid until the next begin().
+class Nearby {
+ public:
+  explicit Nearby(double toolRadius_m) noexcept : radius_(toolRadius_m) {}
+
+  /// Starts a tick with no object near.
+  void begin(const Moment& now, const Moment& before) noexcept;
+  /// Adds the objects within `reach` of `centre`.
+  void include(const Vec3& centre, double reach) noexcept;
+  /// Adds one object by its id; -1 when it is not in the scene.
+  int includeObject(std::int32_t id) noexcept;
+
+  int objectCount() const noexcept { return objectCount_; }
+  const PlacedObject& object(int i) const noexcept { return objects_[static_cast<std::size_t>(i)]; }
+
+  /// Gathers the facets that a tool inside the ball can meet; casts inside it then walk no tree.
+  void gather(const Vec3& centre, double radius) noexcept;
+  bool gathered(const Vec3& p) const noexcept {
+    return complete_ && (p - centre_).squaredNorm() < 0.25 * reach_ * reach_;
+  }
+  const Facet* facetsBegin() const noexcept { return facets_.data(); }
+  const Facet* facetsEnd() const noexcept { return facets_.data() + facetCount_; }
+
+  /// First obstacle on the way from p to g; false when the way is free.
+  bool cast(const Vec3& p, const Vec3& g, Hit& hit) noexcept;
+  /// The same against one object only, always by its tree.
+  bool castAt(int object, const Vec3& p, const Vec3& g, Hit& hit) noexcept;
+
+  /// Obstacle of one facet on the way from p to g.
+  bool meets(const Facet& f, const Vec3& p, const Vec3& g, Hit& hit) const noexcept;
+
+  /// Smallest skin of the near objects: below a fraction of it, lengths mean nothing.
+  double finestSkin() const noexcept { return finestSkin_; }
+  double toolRadius() const noexcept { return radius_; }
+  scene::TouchableFaces faces() const noexcept { return now_.scene->faces; }
+  /// True once something near had to be left out in this tick.
+  bool overflowed() const noexcept { return overflowed_; }
+
+ private:
+  static constexpr int kMaxObjects = 64;
+  static constexpr int kMaxFacets = 512;
+
+  void add(const scene::ObjectState& state) noexcept;
+  bool place(const scene::ObjectState& state, PlacedObject& placed) const noexcept;
+  void compareWithBefore(PlacedObject& placed) const noexcept;
+  bool facetOf(int object, std::uint32_t triangle, Facet& facet) const noexcept;
+  void consider(const Facet& f, const Vec3& p, const Vec3& d, double limit, Hit& best,
+                bool& found) const noexcept;
+  bool castGathered(const Vec3& p, const Vec3& d, double limit, int only, Hit& hit) const noexcept;
+  bool castTree(const Vec3& p, const Vec3& d, int only, Hit& hit) const noexcept;
+  bool castBall(const Vec3& p, const Vec3& d, int only, Hit& hit) noexcept;
+
+  double radius_;
+  Moment now_;
+  Moment before_;
+  bool sameWorkspace_ = true;
+  std::array<PlacedObject, kMaxObjects> objects_;
+  int objectCount_ = 0;
+  double finestSkin_ = 0;
+  std::array<Facet, kMaxFacets> facets_;
+  int facetCount_ = 0;
+  Vec3 centre_ = Vec3::Zero();
+  double reach_ = 0;
+  bool complete_ = false;
+  bool overflowed_ = false;
+};
+
+}  // namespace hapticd::realtime

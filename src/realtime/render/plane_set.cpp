@@ -1,0 +1,154 @@
+#include "realtime/render/plane_set.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace hapticd::realtime {
+namespace {
+
+// Two normals closer than this (as |n1 x n2|^2), or three with a smaller determinant, cannot be told apart
+// from rounding; the solution that would need them differs from one with fewer planes by less than the
+// tolerance.
+constexpr double kMinCrossSquared = 1e-12;
+constexpr double kMinDeterminant = 1e-9;
+
+// Offsets relative to `from`: plane i asks n_i . y >= c_i of y = x - from. h is the target in the same frame.
+struct Problem {
+  const Vec3* normal[kMaxPlanes];
+  double c[kMaxPlanes];
+  Vec3 h;
+};
+
+struct Candidate {
+  Vec3 y;
+  int count = 0;
+  std::array<int, kMaxActive> active{};
+  std::array<double, kMaxActive> multiplier{};
+};
+
+bool solveOne(const Problem& p, int i, Candidate& out) {
+  const double lambda = p.c[i] - p.normal[i]->dot(p.h);
+  if (!(lambda >= 0)) return false;
+  out.y = p.h + lambda * *p.normal[i];
+  out.count = 1;
+  out.active = {i, 0, 0};
+  out.multiplier = {lambda, 0, 0};
+  return true;
+}
+
+// Intersections by cross products rather than through the Gram matrix, whose condition is the square.
+bool solveTwo(const Problem& p, int i, int j, Candidate& out) {
+  const Vec3& n1 = *p.normal[i];
+  const Vec3& n2 = *p.normal[j];
+  const Vec3 d = n1.cross(n2);
+  const double dd = d.squaredNorm();
+  if (!(dd > kMinCrossSquared)) return false;
+  const Vec3 u1 = n2.cross(d) / dd;  // u1.n1 = 1, u1.n2 = u1.d = 0
+  const Vec3 u2 = d.cross(n1) / dd;
+  out.y = p.c[i] * u1 + p.c[j] * u2 + d * (d.dot(p.h) / dd);
+  const Vec3 push = out.y - p.h;
+  out.multiplier = {u1.dot(push), u2.dot(push), 0};
+  out.count = 2;
+  out.active = {i, j, 0};
+  return out.multiplier[0] >= 0 && out.multiplier[1] >= 0;
+}
+
+bool solveThree(const Problem& p, int i, int j, int k, Candidate& out) {
+  const Vec3& n1 = *p.normal[i];
+  const Vec3& n2 = *p.normal[j];
+  const Vec3& n3 = *p.normal[k];
+  const Vec3 n23 = n2.cross(n3);
+  const double det = n1.dot(n23);
+  if (!(std::abs(det) > kMinDeterminant)) return false;
+  const Vec3 u1 = n23 / det;
+  const Vec3 u2 = n3.cross(n1) / det;
+  const Vec3 u3 = n1.cross(n2) / det;
+  out.y = p.c[i] * u1 + p.c[j] * u2 + p.c[k] * u3;
+  const Vec3 push = out.y - p.h;
+  out.multiplier = {u1.dot(push), u2.dot(push), u3.dot(push)};
+  out.count = 3;
+  out.active = {i, j, k};
+  return out.multiplier[0] >= 0 && out.multiplier[1] >= 0 && out.multiplier[2] >= 0;
+}
+
+// Feasible and optimal at once is unique, so the first one found is the answer.
+struct Search {
+  const Problem& problem;
+  int count;
+  double tolerance;
+  Candidate found;
+
+  bool feasible(const Candidate& s) const {
+    for (int i = 0; i < count; ++i) {
+      if (!(problem.normal[i]->dot(s.y) >= problem.c[i] - tolerance)) return false;
+    }
+    return true;
+  }
+  bool accept(bool solved, const Candidate& s) {
+    if (!solved || !feasible(s)) return false;
+    found = s;
+    return true;
+  }
+  bool run() {
+    Candidate s;
+    s.y = problem.h;
+    if (accept(true, s)) return true;
+    for (int i = 0; i < count; ++i) {
+      if (accept(solveOne(problem, i, s), s)) return true;
+    }
+    for (int i = 0; i < count; ++i) {
+      for (int j = i + 1; j < count; ++j) {
+        if (accept(solveTwo(problem, i, j, s), s)) return true;
+      }
+    }
+    for (int i = 0; i < count; ++i) {
+      for (int j = i + 1; j < count; ++j) {
+        for (int k = j + 1; k < count; ++k) {
+          if (accept(solveThree(problem, i, j, k, s), s)) return true;
+        }
+      }
+    }
+    return false;
+  }
+};
+
+}  // namespace
+
+NearestPoint nearestAbove(const Plane* planes, int count, const Vec3& target, const Vec3& from,
+                          double tolerance) noexcept {
+  Problem problem;
+  problem.h = target - from;
+  for (int i = 0; i < count; ++i) {
+    problem.normal[i] = &planes[i].normal;
+    problem.c[i] = -planes[i].height(from);
+  }
+  Search search{problem, count, tolerance, {}};
+  NearestPoint result;
+  if (!search.run()) {
+    result.point = from;
+    return result;
+  }
+  result.found = true;
+  result.point = from + search.found.y;
+  result.count = search.found.count;
+  result.active = search.found.active;
+  result.multiplier = search.found.multiplier;
+  return result;
+}
+
+void depthsBelow(const Plane* planes, int count, const double* standoffs, const Vec3& target,
+                 double* depths) noexcept {
+  Problem problem;
+  problem.h = Vec3::Zero();
+  for (int i = 0; i < count; ++i) {
+    problem.normal[i] = &planes[i].normal;
+    problem.c[i] = -(planes[i].normal.dot(target - planes[i].anchor) - standoffs[i]);
+  }
+  Candidate s;
+  if (count == 1) solveOne(problem, 0, s);
+  if (count == 2) solveTwo(problem, 0, 1, s);
+  if (count == 3) solveThree(problem, 0, 1, 2, s);
+  for (int i = 0; i < count; ++i) depths[i] = std::max(0.0, s.multiplier[i]);
+}
+
+}  // namespace hapticd::realtime

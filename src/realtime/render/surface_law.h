@@ -1,0 +1,13 @@
+// The law of the touched surfaces: from what holds the proxy to the force on the hand.
+#pragma once
+
+#include "realtime/render/proxy.h"
+#include "realtime/render/renderer.h"
+
+namespace hapticd::realtime {
+
+/// Fills the contact part of `out` (force, normal, depth, contacts). `hipVelocity` in the device frame.
+void applySurfaceLaw(const Grip& grip, const Vec3& proxy_m, const Vec3& hipVelocity_m_per_s,
+                     double toolRadius_m, Rendering& out) noexcept;
+
+}  // namespace hapticd::realtime
