@@ -45,7 +45,8 @@ struct MessageReceived {
   Time time;
   ByteView payload;
 };
-/// The peer listens for datagrams here. Connect a socket to it, then call useDatagrams().
+/// The peer listens for datagrams here: be ready to send to it, then call useDatagrams(). Stock peers send
+/// theirs from another port, so a socket that is connected to this address receives nothing from them.
 struct UdpDescribed {
   UdpAddress address;
 };

@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <functional>
+
 #include "wire/cookie.h"
 #include "wire/event_text.h"
 #include "wire/recording.h"
