@@ -1,0 +1,70 @@
+// What is behind hapticd::Client.
+#pragma once
+
+#include <tuple>
+#include <vector>
+
+#include "client/link.h"
+#include "hapticd/client.h"
+
+namespace hapticd {
+
+struct Client::Impl {
+  template <class Report>
+  using Callbacks = std::vector<Callback<Report>>;
+
+  Impl(const client::DeviceAddress& address, const ClientOptions& options);
+
+  /// Sends a message of the device, stamped now; reliably, so that none overtakes or misses another.
+  template <wire::WireMessage M>
+  void send(const M& message) {
+    link.send(client::wireNow(), sender, message, wire::Reliability::kReliable);
+  }
+  /// The same by datagram, for what is sent again and again and worth nothing when late.
+  template <wire::WireMessage M>
+  void sendFast(const M& message) {
+    link.send(client::wireNow(), sender, message, wire::Reliability::kLowLatency);
+  }
+
+  void waitConnected(Duration timeout);
+  std::size_t poll(Duration timeout);
+
+  void dispatch(const client::Arrival& arrival);
+  void dispatchMessage(const client::Arrival& arrival);
+  /// Decodes a payload, or counts it as damaged.
+  template <wire::WireMessage M, class Use>
+  void decode(const client::Arrival& arrival, Use&& use);
+  void handle(const client::Arrival& arrival, const wire::ButtonStates& states);
+  /// Counts a report, keeps it as the latest, and calls back.
+  template <class Report>
+  void deliver(const client::Arrival& arrival, Report report);
+  /// Calls back; callbacks added meanwhile wait for the next report.
+  template <class Report>
+  void call(const Report& report) {
+    auto& list = std::get<Callbacks<Report>>(callbacks);
+    const std::size_t count = list.size();
+    for (std::size_t i = 0; i < count; ++i) {
+      const Callback<Report> callback = list[i];  // adding one may move the others
+      callback(report);
+    }
+  }
+
+  std::string device;
+  std::string server;
+  ClientOptions options;
+  client::Link link;
+  wire::LocalSender sender;
+  LatestReports latest;
+  std::array<ReportStatistics, kReportKinds> reports{};
+  std::uint64_t damaged = 0;
+  std::string first_error;  // of the server, since the last poll
+  std::tuple<Callbacks<PoseReport>, Callbacks<VelocityReport>, Callbacks<AccelerationReport>,
+             Callbacks<ButtonReport>, Callbacks<AnalogReport>, Callbacks<ForceReport>, Callbacks<DepthReport>,
+             Callbacks<ContactPointReport>, Callbacks<TouchingReport>, Callbacks<TouchedObjectReport>,
+             Callbacks<AngleReport>, Callbacks<ForceErrorReport>, Callbacks<TextReport>,
+             Callbacks<ToRoomReport>, Callbacks<UnitToSensorReport>, Callbacks<WorkspaceReport>,
+             Callbacks<ConnectionReport>>
+      callbacks;
+};
+
+}  // namespace hapticd

@@ -1,0 +1,165 @@
+#include "client/scripted_server.h"
+
+#include <future>
+
+#include "wire/codec.h"
+#include "wire/text.h"
+#include "wire/udp_request.h"
+
+namespace hapticd::test {
+
+using namespace std::chrono_literals;
+
+ScriptedServer::ScriptedServer(ScriptedServerOptions options)
+    : options_(std::move(options)),
+      device_((names_.addSender("VRPN Control"), names_.addSender(options_.device))) {
+  openPort();
+  thread_ = std::thread([this] { loop_.run(); });
+}
+
+ScriptedServer::~ScriptedServer() {
+  loop_.stop();
+  thread_.join();
+}
+
+// One number for TCP and UDP: that of UDP may be somebody else's.
+void ScriptedServer::openPort() {
+  for (int attempt = 0;; ++attempt) {
+    try {
+      listener_ = std::make_unique<net::TcpListener>(
+          loop_, net::Endpoint{net::kLoopbackAddress, options_.port},
+          [this](net::Connection connection) { serve(std::move(connection), false); });
+      port_ = listener_->local().port;
+      requests_ = std::make_unique<net::UdpSocket>(loop_, net::Endpoint{net::kLoopbackAddress, port_});
+      break;
+    } catch (const net::Error&) {
+      if (attempt == 20) throw;
+    }
+  }
+  requests_->start(
+      {.onDatagram =
+           [this](auto bytes, const net::Endpoint&) {
+             const auto request = wire::parseUdpRequest(bytes);
+             if (!request) return;
+             serve(net::Connection::connect(loop_, net::Endpoint::parse(request->host, request->port), 2s),
+                   true);
+           },
+       .onRefused = {}});
+}
+
+void ScriptedServer::serve(net::Connection connection, bool with_datagrams) {
+  sessions_.emplace_back();
+  Session* session = &sessions_.back();
+  session->connection = std::move(connection);
+  if (options_.greeting_bytes.empty()) {
+    wire::EndpointOptions endpoint_options;
+    if (with_datagrams) {
+      session->udp = std::make_unique<net::UdpSocket>(loop_, net::Endpoint{net::kLoopbackAddress, 0});
+      session->udp->start({.onDatagram =
+                               [this, session](auto bytes, const net::Endpoint&) {
+                                 session->endpoint->feedDatagram(
+                                     bytes, [&](const wire::Event& e) { onEvent(*session, e, true); });
+                               },
+                           .onRefused = {}});
+      endpoint_options.udp = wire::UdpAddress{"127.0.0.1", session->udp->local().port};
+    }
+    session->endpoint.emplace(names_, endpoint_options);
+    push(*session);
+  } else {
+    session->connection.send(wire::asBytes(options_.greeting_bytes));
+    session->connection.flush();
+  }
+  session->connection.start(
+      {.onConnected = {},
+       .onBytes =
+           [this, session](auto bytes) {
+             if (!session->endpoint) return;
+             session->endpoint->feed({}, bytes, [&](const wire::Event& e) { onEvent(*session, e, false); });
+             push(*session);
+           },
+       .onDrained = {},
+       .onClosed = [this, session](
+                       const std::string&) { sessions_.remove_if([&](auto& s) { return &s == session; }); }});
+}
+
+void ScriptedServer::onEvent(Session& session, const wire::Event& event, bool by_datagram) {
+  if (std::holds_alternative<wire::Connected>(event)) {
+    ++connections_;
+    if (!options_.reads) session.connection.pauseReading();
+  }
+  if (const auto* udp = std::get_if<wire::UdpDescribed>(&event)) {
+    session.udp_peer = net::Endpoint::parse(udp->address.host, udp->address.port);
+    session.endpoint->useDatagrams();
+  }
+  const auto* message = std::get_if<wire::MessageReceived>(&event);
+  if (!message) return;
+  if (message->kind == wire::kindOf<wire::Ping>) {
+    ++pings_;
+    if (options_.answers_pings && message->local_sender.value >= 0) {
+      session.endpoint->send({}, message->local_sender, wire::Pong{});
+    }
+    return;
+  }
+  const auto decoded = wire::decode(message->kind, message->payload);
+  const std::lock_guard lock(mutex_);
+  if (!decoded) {
+    told_.push_back(
+        {wire::Text{2, 0, decoded.error()}, std::string(message->sender_name), message->time, by_datagram});
+  } else if (const auto* vertex = std::get_if<wire::SetVertex>(&*decoded)) {
+    vertices_.push_back(*vertex);
+  } else {
+    told_.push_back({*decoded, std::string(message->sender_name), message->time, by_datagram});
+  }
+  changed_.notify_all();
+}
+
+void ScriptedServer::push(Session& session) {
+  if (!session.endpoint) return;
+  const auto buffer = std::make_shared<net::Buffer>();
+  session.endpoint->takeStream(*buffer);
+  session.connection.send(buffer);
+  session.connection.flush();
+  session.endpoint->takeDatagrams([&](auto datagram) { session.udp->sendTo(datagram, *session.udp_peer); });
+}
+
+void ScriptedServer::run(std::function<void()> function) {
+  std::promise<void> done;
+  loop_.post([&] {
+    function();
+    done.set_value();
+  });
+  done.get_future().wait();
+}
+
+void ScriptedServer::sayRaw(const std::string& bytes) {
+  run([&] {
+    for (Session& session : sessions_) {
+      session.connection.send(wire::asBytes(bytes));
+      session.connection.flush();
+    }
+  });
+}
+
+void ScriptedServer::dropClients() {
+  run([&] { sessions_.clear(); });
+}
+
+void ScriptedServer::startReading() {
+  run([&] {
+    for (Session& session : sessions_) session.connection.resumeReading();
+  });
+}
+
+std::vector<Told> ScriptedServer::waitTold(std::size_t count) {
+  std::unique_lock lock(mutex_);
+  changed_.wait_for(lock, 20s, [&] { return told_.size() >= count; });
+  return told_;
+}
+
+std::vector<wire::SetVertex> ScriptedServer::waitVertices(std::size_t count) {
+  std::unique_lock lock(mutex_);
+  changed_.wait_for(lock, 20s, [&] { return vertices_.size() >= count; });
+  return vertices_;
+}
+
+}  // namespace hapticd::test
