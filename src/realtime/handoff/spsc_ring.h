@@ -18,7 +18,8 @@ namespace hapticd::realtime {
 /// Ring of copies of T. Memory is taken once, in the constructor.
 template <class T>
 class SpscRing {
-  static_assert(std::is_nothrow_copy_assignable_v<T>, "a push must not throw");
+  // Eigen does not declare its copies noexcept; a type without a destructor owns no memory to allocate.
+  static_assert(std::is_trivially_destructible_v<T>, "a copy must not allocate");
 
  public:
   /// Holds at least `capacity` items, rounded up to a power of two.

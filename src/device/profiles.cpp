@@ -1,0 +1,68 @@
+#include "device/profiles.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+
+namespace hapticd::device {
+namespace {
+
+struct Row {
+  const char* model;
+  const char* alias;
+  double width_mm, height_mm, depth_mm;
+  double peak_N, continuous_N;
+  double stiffness_N_per_m, damping_Ns_per_m;
+  int buttons;
+  bool startsArmed;
+};
+
+// Damping is a choice of design, device plus grip, and not measured.
+constexpr Row kRows[] = {
+    {"simulated", "", 160, 120, 70, 3.3, 3.3, 1000, 5, 2, true},
+    {"Touch", "Omni", 160, 120, 70, 3.3, 0.88, 500, 2.5, 2, false},
+    {"Touch X", "Desktop", 160, 120, 120, 7.9, 1.75, 1000, 3, 2, false},
+    {"Premium 1.5", "", 381, 267, 191, 8.5, 1.4, 1000, 3, 1, false},
+    {"omega.3", "", 160, 160, 110, 12, 12, 5000, 30, 1, false},
+    {"delta.3", "", 400, 400, 260, 20, 20, 5000, 30, 1, false},
+};
+
+std::array<DeviceProfile, std::size(kRows)> build() {
+  std::array<DeviceProfile, std::size(kRows)> all;
+  std::transform(std::begin(kRows), std::end(kRows), all.begin(), [](const Row& row) {
+    const Vec3 half = 0.0005 * Vec3(row.width_mm, row.height_mm, row.depth_mm);
+    DeviceProfile profile;
+    profile.model = row.model;
+    profile.workspace_m = {-half, half};
+    profile.peakForce_N = row.peak_N;
+    profile.continuousForce_N = row.continuous_N;
+    profile.nominalStiffness_N_per_m = row.stiffness_N_per_m;
+    profile.ownDamping_Ns_per_m = row.damping_Ns_per_m;
+    profile.buttons = row.buttons;
+    profile.startsArmed = row.startsArmed;
+    return profile;
+  });
+  return all;
+}
+
+bool sameName(std::string_view a, std::string_view b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+}
+
+}  // namespace
+
+std::span<const DeviceProfile> profiles() {
+  static const auto all = build();
+  return all;
+}
+
+const DeviceProfile* findProfile(std::string_view model) {
+  if (model.empty()) return nullptr;
+  for (std::size_t i = 0; i < std::size(kRows); ++i) {
+    if (sameName(model, kRows[i].model) || sameName(model, kRows[i].alias)) return &profiles()[i];
+  }
+  return nullptr;
+}
+
+}  // namespace hapticd::device

@@ -1,0 +1,18 @@
+// What each kind of device can do, where its driver does not say.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "device/device.h"
+
+namespace hapticd::device {
+
+/// All known profiles; the first is the simulated device.
+std::span<const DeviceProfile> profiles();
+
+/// The profile of a model, or of another name that it is sold under, whatever the case; null when unknown.
+const DeviceProfile* findProfile(std::string_view model);
+
+}  // namespace hapticd::device

@@ -1,0 +1,34 @@
+// The table of devices.
+#include "device/profiles.h"
+
+#include <gtest/gtest.h>
+
+namespace hapticd::device {
+namespace {
+
+TEST(Profiles, AreConsistent) {
+  ASSERT_EQ(profiles().size(), 6U);
+  for (const DeviceProfile& profile : profiles()) {
+    EXPECT_EQ(findProfile(profile.model), &profile);
+    EXPECT_FALSE(profile.workspace_m.empty());
+    EXPECT_LE(profile.continuousForce_N, profile.peakForce_N);
+    EXPECT_EQ(profile.startsArmed, profile.model == "simulated") << profile.model;
+    EXPECT_NEAR(profile.workspace_m.centre().norm(), 0, 1e-15);
+  }
+}
+
+TEST(Profiles, AreFoundByEitherNameInAnyCase) {
+  const DeviceProfile* touch = findProfile("omni");
+  ASSERT_NE(touch, nullptr);
+  EXPECT_EQ(touch->model, "Touch");
+  EXPECT_EQ(touch->peakForce_N, 3.3);
+  EXPECT_EQ(touch->continuousForce_N, 0.88);
+  EXPECT_EQ(touch->ownDamping_Ns_per_m, 2.5);
+  EXPECT_TRUE(touch->workspace_m.extents().isApprox(Vec3(0.160, 0.120, 0.070)));
+  EXPECT_EQ(findProfile("TOUCH X"), findProfile("Desktop"));
+  EXPECT_EQ(findProfile(""), nullptr);
+  EXPECT_EQ(findProfile("Touch Y"), nullptr);
+}
+
+}  // namespace
+}  // namespace hapticd::device

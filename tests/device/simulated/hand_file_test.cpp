@@ -1,0 +1,102 @@
+// Hand files: what is read, what lies between the rows, and what is refused with which words.
+#include "device/simulated/hand_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <fstream>
+#include <numbers>
+
+namespace hapticd::device {
+namespace {
+
+constexpr Nanos kMs = 1'000'000;
+
+std::string errorOf(const std::string& text) {
+  try {
+    HandFile::parse(text, "hand.csv");
+  } catch (const HandFileError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(HandFile, InterpolatesPositionsBetweenRows) {
+  const auto hand = HandFile::parse("t_s,x_m,y_m,z_m\n0,0,0,0\n0.010,0.01,-0.02,0\n0.020,0.01,0,0.04\n", "h");
+  EXPECT_EQ(hand->rows(), 3U);
+  EXPECT_EQ(hand->duration(), 20 * kMs);
+  const HandPose middle = hand->at(5 * kMs);
+  EXPECT_TRUE(middle.position_m.isApprox(Vec3(0.005, -0.01, 0), 1e-12));
+  EXPECT_TRUE(middle.velocity_m_per_s.isApprox(Vec3(1, -2, 0), 1e-12));
+  EXPECT_EQ(hand->at(10 * kMs).position_m, Vec3(0.01, -0.02, 0));
+  EXPECT_EQ(middle.orientation.coeffs(), Quat::Identity().coeffs());
+  EXPECT_EQ(middle.buttons, 0U);
+}
+
+TEST(HandFile, RestsBeforeTheFirstAndAfterTheLastRow) {
+  const auto hand = HandFile::parse("0.01,1,2,3\n0.02,4,5,6", "h");
+  EXPECT_EQ(hand->at(0).position_m, Vec3(1, 2, 3));
+  EXPECT_EQ(hand->at(0).velocity_m_per_s, Vec3::Zero());
+  EXPECT_EQ(hand->at(20 * kMs).position_m, Vec3(4, 5, 6));
+  EXPECT_EQ(hand->at(9000 * kMs).position_m, Vec3(4, 5, 6));
+  EXPECT_EQ(hand->at(9000 * kMs).velocity_m_per_s, Vec3::Zero());
+}
+
+TEST(HandFile, TurnsByTheShorterWay) {
+  const double half = std::numbers::pi / 4;  // half of a quarter turn about z
+  const std::string row = std::to_string(-std::sin(half)) + "," + std::to_string(-std::cos(half));
+  const auto hand = HandFile::parse("0,0,0,0,0,0,0,1\n1,0,0,0,0,0," + row + "\n", "h");
+  const Quat middle = hand->at(500 * kMs).orientation;
+  EXPECT_NEAR(middle.angularDistance(Quat::Identity()), half, 1e-6);
+}
+
+TEST(HandFile, HoldsButtonsUntilTheNextRow) {
+  const auto hand = HandFile::parse("t_s,x_m,y_m,z_m,buttons\n0,0,0,0,1\n1,0,0,0,2\n2,0,0,0,0\n", "h");
+  EXPECT_EQ(hand->at(999 * kMs).buttons, 1U);
+  EXPECT_EQ(hand->at(1000 * kMs).buttons, 2U);
+  EXPECT_EQ(hand->at(2000 * kMs).buttons, 0U);
+}
+
+TEST(HandFile, AcceptsWhatEditorsDo) {
+  const auto hand = HandFile::parse(
+      "# a hand\r\n t_s, x_m, y_m, z_m, qx, qy, qz, qw, buttons\r\n\r\n0, +1e-3, 0,0, 0,0,0,1, 3\r\n", "h");
+  EXPECT_EQ(hand->rows(), 1U);
+  EXPECT_EQ(hand->duration(), 0);
+  EXPECT_EQ(hand->at(0).position_m.x(), 1e-3);
+  EXPECT_EQ(hand->at(0).buttons, 3U);
+}
+
+TEST(HandFile, NamesFileLineAndValueOfAnError) {
+  EXPECT_EQ(errorOf("0,0,0,0\n0.001,0,zero,0\n"), "hand.csv:2: column 3 'zero' is not a finite number");
+  EXPECT_EQ(errorOf("0,0,0,0\n\n0.001,0,nan,0\n"), "hand.csv:3: column 3 'nan' is not a finite number");
+  EXPECT_EQ(errorOf("0,0,0,\n"), "hand.csv:1: column 4 '' is not a finite number");
+  EXPECT_EQ(errorOf("0,0,0,0\n0,0,0,0\n"), "hand.csv:2: time 0.000000 s is not after the row before");
+  EXPECT_EQ(errorOf("-1,0,0,0\n"), "hand.csv:1: time -1.000000 s is out of range");
+  EXPECT_EQ(errorOf("0,0,0\n"), "hand.csv:1: 3 columns where 4, 5, 8 or 9 are expected");
+  EXPECT_EQ(errorOf("0,0,0,0\n1,0,0,0,1\n"), "hand.csv:2: 5 columns where 4 are expected");
+  EXPECT_EQ(errorOf("0,0,0,0,0,0,0,1,1,1\n"), "hand.csv:1: more than 9 columns");
+  EXPECT_EQ(errorOf("t,x,y,z\n0,0,0,0\n"),
+            "hand.csv:1: header 't,x,y,z' is not t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons]");
+  EXPECT_EQ(errorOf("0,0,0,0,1,1,0,1\n"), "hand.csv:1: quaternion of length 1.732051 is not a rotation");
+  EXPECT_EQ(errorOf("0,0,0,0,1.5\n"), "hand.csv:1: buttons 1.500000 is not a set of bits");
+  EXPECT_EQ(errorOf(""), "hand.csv: no row with a hand in it");
+  EXPECT_EQ(errorOf("t_s,x_m,y_m,z_m\n"), "hand.csv: no row with a hand in it");
+}
+
+TEST(HandFile, LoadsFromDiskAndNamesWhatIsNotThere) {
+  const auto path = std::filesystem::temp_directory_path() / ("hand_" + std::to_string(getpid()) + ".csv");
+  std::ofstream(path) << "0,1,2,3\n";
+  EXPECT_EQ(HandFile::load(path)->at(0).position_m, Vec3(1, 2, 3));
+  std::filesystem::remove(path);
+  try {
+    HandFile::load(path);
+    FAIL() << "accepted";
+  } catch (const HandFileError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr(path.string()));
+  }
+}
+
+}  // namespace
+}  // namespace hapticd::device
