@@ -1,0 +1,66 @@
+#include "live_table.h"
+
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <string_view>
+
+namespace hapticd::apps {
+namespace {
+
+std::size_t terminalWidth() {
+  winsize size{};
+  return ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
+}
+
+}  // namespace
+
+bool onTerminal() {
+  const char* term = std::getenv("TERM");
+  return isatty(STDOUT_FILENO) == 1 && term && std::string_view(term) != "dumb";
+}
+
+std::string bytesText(double bytes) {
+  constexpr std::array kUnits{"B", "kB", "MB", "GB", "TB"};
+  std::size_t unit = 0;
+  for (; bytes >= 1000 && unit + 1 < kUnits.size(); ++unit) bytes /= 1000;
+  char text[32];
+  std::snprintf(text, sizeof text, unit == 0 ? "%.0f %s" : "%.1f %s", bytes, kUnits[unit]);
+  return text;
+}
+
+void ProgressBar::show(std::uint64_t done, std::uint64_t total) {
+  const int percent = total == 0 ? 100 : static_cast<int>(done * 100 / total);
+  if (percent == shown_percent_) return;
+  const std::string amount =
+      bytesText(static_cast<double>(done)) + " of " + bytesText(static_cast<double>(total));
+  if (onTerminal()) {
+    constexpr int kWidth = 40;
+    const std::string bar(static_cast<std::size_t>(percent * kWidth / 100), '#');
+    std::printf("\r%s [%-*s] %3d %% %s\x1b[K", title_.c_str(), kWidth, bar.c_str(), percent, amount.c_str());
+  } else if (shown_percent_ < 0 || percent / 10 > shown_percent_ / 10) {
+    std::printf("%s %d %% %s\n", title_.c_str(), percent, amount.c_str());
+  }
+  std::fflush(stdout);
+  shown_percent_ = percent;
+}
+
+void ProgressBar::finish() {
+  if (onTerminal()) std::printf("\n");
+}
+
+void LiveTable::show(const std::vector<std::string>& lines) {
+  if (height_ > 0) std::printf("\x1b[%zuA", height_);
+  const std::size_t width = terminalWidth();  // a line that wrapped would be two of the next redraw
+  for (const std::string& line : lines)
+    std::printf("%.*s\x1b[K\n", static_cast<int>(width - 1), line.c_str());
+  std::printf("\x1b[J");
+  std::fflush(stdout);
+  height_ = lines.size();
+}
+
+}  // namespace hapticd::apps

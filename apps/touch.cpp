@@ -1,0 +1,257 @@
+// hapticd touch: sends a mesh to a haptics server as any client would, and shows what is felt.
+//
+// The mesh is scaled by the client and no workspace is sent, so that one unit is one millimetre of the
+// device: the object has the size it is told to have on every device, where a workspace box would stretch it
+// to whatever the device can reach. Without --size-mm it fills 80 % of the smallest common device, at most
+// 100 mm.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "commands.h"
+#include "felt.h"
+#include "geometry/mesh_check.h"
+#include "geometry/triangle_mesh.h"
+#include "hapticd/client.h"
+#include "live_table.h"
+#include "mesh_io/mesh_io.h"
+
+namespace hapticd::apps {
+namespace {
+
+using namespace std::chrono_literals;
+using geometry::TriangleMesh;
+
+struct TouchOptions {
+  std::string mesh;
+  std::string server = "Phantom@localhost";
+  double seconds = 0;
+  Surface surface{.stiffness = 0.8F, .damping = 0.1F, .static_friction = 0.3F, .dynamic_friction = 0.2F};
+  int object = 0;
+  double size_mm = 0;
+  bool keep_scene = false;
+  bool json = false;
+};
+
+volatile std::sig_atomic_t stopRequested = 0;
+
+/// Turns Ctrl-C and SIGTERM into a flag as long as it lives.
+class StopSignals {
+ public:
+  StopSignals() : interrupt_(std::signal(SIGINT, request)), terminate_(std::signal(SIGTERM, request)) {}
+  ~StopSignals() {
+    std::signal(SIGINT, interrupt_);
+    std::signal(SIGTERM, terminate_);
+  }
+  StopSignals(const StopSignals&) = delete;
+  StopSignals& operator=(const StopSignals&) = delete;
+
+ private:
+  static void request(int) { stopRequested = 1; }
+  using Handler = void (*)(int);
+  Handler interrupt_;
+  Handler terminate_;
+};
+
+std::string extentsText(const TriangleMesh& mesh) {
+  const geometry::Vec3 e = geometry::boundsOf(mesh).extents();
+  char text[96];
+  std::snprintf(text, sizeof text, "%.4g x %.4g x %.4g", e.x(), e.y(), e.z());
+  return text;
+}
+
+void scaleIntoWorkspace(TriangleMesh& mesh, double size_mm) {
+  const geometry::Vec3 kTouch_mm(160, 120, 70);
+  constexpr double kFill = 0.8;
+  constexpr double kMostByItself_mm = 100;
+  const geometry::Box bounds = geometry::boundsOf(mesh);
+  const geometry::Vec3 extents = bounds.extents().cwiseMax(1e-12);
+  if (bounds.empty() || bounds.extents().maxCoeff() <= 0) {
+    throw std::runtime_error("the mesh has no extent: nothing to touch");
+  }
+  const double fitting = std::min((kFill * kTouch_mm.array() / extents.array()).minCoeff(),
+                                  kMostByItself_mm / extents.maxCoeff());
+  const double scale = size_mm > 0 ? size_mm / extents.maxCoeff() : fitting;
+  geometry::scaleAndMove(mesh, scale, -scale * bounds.centre());
+}
+
+TriangleMesh load(const TouchOptions& options) {
+  TriangleMesh mesh = mesh_io::loadMesh(options.mesh);
+  std::printf("%s: %zu vertices, %zu triangles, %s units\n", options.mesh.c_str(), mesh.vertices.size(),
+              mesh.triangles.size(), extentsText(mesh).c_str());
+  if (mesh.triangles.empty()) throw std::runtime_error(options.mesh + " has no triangles: nothing to touch");
+  std::printf("mesh check: %s\n", geometry::checkMesh(mesh).text().c_str());
+  scaleIntoWorkspace(mesh, options.size_mm);
+  std::printf("scaled to %s mm, centred in the workspace\n", extentsText(mesh).c_str());
+  return mesh;
+}
+
+void send(Client& client, const TriangleMesh& mesh, const TouchOptions& options) {
+  std::vector<std::array<float, 3>> corners;
+  corners.reserve(mesh.triangles.size() * 3);
+  for (const auto& triangle : mesh.triangles) {
+    for (const auto index : triangle) {
+      const auto& v = mesh.vertices[index];
+      corners.push_back({v.x(), v.y(), v.z()});
+    }
+  }
+  if (!options.keep_scene) client.resetScene();
+  client.setObjectCount(options.object + 1);
+  client.setSurface(options.object, options.surface);
+  ProgressBar bar("sending");
+  const auto start = std::chrono::steady_clock::now();
+  client.uploadCorners(options.object, corners,
+                       [&](const UploadProgress& p) { bar.show(p.bytes_sent, p.bytes_total); });
+  bar.finish();
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  std::printf("sent %zu vertices in %.3f s to object %d of %s@%s\n", corners.size(), seconds, options.object,
+              client.device().c_str(), client.server().c_str());
+}
+
+/// Figures of the last interval, as lines for a table.
+class View {
+ public:
+  explicit View(Client& client) : client_(client), before_(client.statistics()) {}
+
+  std::vector<std::string> table(const Felt& felt) {
+    const LatestReports& latest = client_.latest();
+    const Statistics now = client_.statistics();
+    std::vector<std::string> lines;
+    char text[256];
+    const auto add = [&](const char* format, auto... arguments) {
+      std::snprintf(text, sizeof text, format, arguments...);
+      lines.emplace_back(text);
+    };
+    const LatencyHistogram latency = felt.latency();
+    add("%s@%s  %.0f s  latency p50 %.2f ms p99 %.2f ms", client_.device().c_str(), client_.server().c_str(),
+        felt.seconds(), latency.quantile_us(0.5) / 1000, latency.quantile_us(0.99) / 1000);
+    for (const auto& [sensor, pose] : latest.pose) {
+      const Vec3& p = pose.position_m;
+      const Quaternion& q = pose.orientation;
+      add("  sensor %d   %8.2f %8.2f %8.2f mm   %6.3f %6.3f %6.3f %6.3f", sensor, p[0] * 1000, p[1] * 1000,
+          p[2] * 1000, q[0], q[1], q[2], q[3]);
+    }
+    const Vec3& f = latest.force.force_N;
+    add("  force      %8.3f %8.3f %8.3f N    |F| %.3f N   peak %.3f N", f[0], f[1], f[2],
+        std::hypot(f[0], f[1], f[2]), felt.peakForce_N());
+    add("  touching   %s   object %d   depth %.3f mm   angle %.1f deg   %.1f %% of the time",
+        latest.touching.touching ? "yes" : "no ", latest.touched_object.object, latest.depth.depth_m * 1000,
+        latest.angle.angle_deg, 100 * felt.contactFraction());
+    for (std::size_t i = 0; i < kReportKinds; ++i) {
+      const auto kind = static_cast<ReportKind>(i);
+      if (now[kind].count == 0) continue;
+      add("  %-15s %8.0f /s  %llu", std::string(nameOf(kind)).c_str(), now.ratePerSecond(kind, before_),
+          static_cast<unsigned long long>(felt.count(kind)));
+    }
+    if (!felt.texts().empty()) lines.push_back("  server: " + felt.texts().back().first);
+    before_ = now;
+    return lines;
+  }
+
+  void printLine(const Felt& felt) {
+    const LatestReports& latest = client_.latest();
+    const Statistics now = client_.statistics();
+    double rate = 0;
+    for (std::size_t i = 0; i < kReportKinds; ++i)
+      rate += now.ratePerSecond(static_cast<ReportKind>(i), before_);
+    const LatencyHistogram latency = felt.latency();
+    const Vec3& f = latest.force.force_N;
+    std::printf(
+        "%.0f s  %.0f reports/s  touching %s  object %d  force %.3f N  depth %.3f mm  angle %.1f deg  "
+        "latency p50 %.2f ms p99 %.2f ms\n",
+        felt.seconds(), rate, latest.touching.touching ? "yes" : "no", latest.touched_object.object,
+        std::hypot(f[0], f[1], f[2]), latest.depth.depth_m * 1000, latest.angle.angle_deg,
+        latency.quantile_us(0.5) / 1000, latency.quantile_us(0.99) / 1000);
+    std::fflush(stdout);
+    before_ = now;
+  }
+
+ private:
+  Client& client_;
+  Statistics before_;
+};
+
+void watch(Client& client, Felt& felt, double seconds) {
+  const bool live = onTerminal();
+  const auto interval = live ? 250ms : 1000ms;
+  View view(client);
+  LiveTable table;
+  felt.restart();
+  auto next = std::chrono::steady_clock::now() + interval;
+  while (stopRequested == 0 && (seconds <= 0 || felt.seconds() < seconds)) {
+    client.poll(20ms);  // short, so that signals and the end are noticed
+    if (!client.connected()) throw ConnectionLost("the connection to " + client.server() + " was lost");
+    if (std::chrono::steady_clock::now() < next) continue;
+    next += interval;
+    if (live) {
+      table.show(view.table(felt));
+    } else {
+      view.printLine(felt);
+    }
+  }
+}
+
+int run(const TouchOptions& options) {
+  const StopSignals signals;
+  const TriangleMesh mesh = load(options);
+  Client client(options.server, {.reconnect = false});
+  Felt felt(client);
+  send(client, mesh, options);
+  std::string failure;
+  try {
+    watch(client, felt, options.seconds);
+  } catch (const Error& error) {
+    failure = error.what();
+  }
+  std::printf("%s", felt.summary().c_str());
+  if (options.json) std::printf("%s\n", felt.json().c_str());
+  if (failure.empty() && felt.reports() == 0) failure = client.server() + " reported nothing";
+  if (failure.empty()) return 0;
+  std::fflush(stdout);
+  std::fprintf(stderr, "hapticd touch: %s\n", failure.c_str());
+  return 1;
+}
+
+}  // namespace
+
+void addTouch(CLI::App& app) {
+  auto options = std::make_shared<TouchOptions>();
+  CLI::App* command = app.add_subcommand(
+      "touch", "Send a mesh (OBJ, STL, PLY, glTF) to a haptics server and show what is felt");
+  const auto share = CLI::Range(0.0, 1.0);
+  command->add_option("mesh", options->mesh, "Mesh file")->required()->check(CLI::ExistingFile);
+  command
+      ->add_option("--server", options->server,
+                   "NAME@host[:port], or NAME@tcp://host[:port] through firewalls")
+      ->capture_default_str();
+  command->add_option("--seconds", options->seconds, "How long to watch; 0: until Ctrl-C")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--stiffness", options->surface.stiffness, "0 to 1")
+      ->check(share)
+      ->capture_default_str();
+  command->add_option("--damping", options->surface.damping, "0 to 1")->check(share)->capture_default_str();
+  command->add_option("--static-friction", options->surface.static_friction, "0 to 1")
+      ->check(share)
+      ->capture_default_str();
+  command->add_option("--dynamic-friction", options->surface.dynamic_friction, "0 to 1")
+      ->check(share)
+      ->capture_default_str();
+  command->add_option("--object", options->object, "Number of the object the mesh becomes")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--size-mm", options->size_mm, "Largest extent on the device; 0: fit into a small one")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_flag("--keep-scene", options->keep_scene, "Do not empty the server's scene first");
+  command->add_flag("--json", options->json, "Print the summary as one line of JSON too, last");
+  command->footer("Returns 0 after a watch, 1 when the server is not there, goes away or reports nothing.");
+  command->callback([options] { exitCode = run(*options); });
+}
+
+}  // namespace hapticd::apps
