@@ -9,6 +9,7 @@ namespace hapticd::realtime {
 namespace {
 
 constexpr int kMaxCasts = 128;             // in one tick; a path over 0.2 mm cells at 1 m/s needs about 20
+constexpr int kHoldCasts = 32;             // kept back for finding what holds it at the end
 constexpr double kJump_m = 0.030;          // farther in one tick is a jump, not a motion
 constexpr double kRestick_m = 0.5e-6;      // slower than this in a tick is at rest
 constexpr double kGatherMargin_m = 10e-6;  // the tremor of a hand
@@ -202,16 +203,20 @@ void Proxy::chase(const Vec3& hip) noexcept {
   grip_.sliding = moved;
 }
 
-// To the target as near as the surfaces let it, without friction.
+// To the target as near as the surfaces let it, without friction. Each approach drops the planes of the one
+// before, so that only what really stands in the way holds the proxy; it ends when that brings it no nearer.
 void Proxy::slide(const Vec3& target, ActiveSet& active) noexcept {
-  const double still = 0.1 * nearby_.finestSkin();
-  Vec3 start;
-  do {
-    start = position_;
+  const double skin = nearby_.finestSkin();
+  double nearest =
+      (position_ - target).norm() + 4 * skin;  // a proxy within the skin is first put back outside
+  while (casts_ < kMaxCasts) {
     active.count = 0;
     Vec3 goal;
     if (approach(target, false, active, goal)) return;
-  } while ((position_ - start).norm() > still && casts_ < kMaxCasts);
+    const double distance = (position_ - target).norm();
+    if (!(distance < nearest - 1e-4 * skin)) return;
+    nearest = distance;
+  }
 }
 
 // Finds what holds the proxy where it is; moves it only as long as nothing does.
@@ -226,8 +231,9 @@ void Proxy::hold(const Vec3& hip, ActiveSet& active) noexcept {
 // `hold`, the first plane stops it. True when the target was reached and nothing holds.
 bool Proxy::approach(const Vec3& target, bool hold, ActiveSet& active, Vec3& goal) noexcept {
   const double skin = nearby_.finestSkin();
+  const int limit = hold ? kMaxCasts + kHoldCasts : kMaxCasts;
   std::array<Plane, kMaxPlanes> planes;
-  while (casts_ < kMaxCasts) {
+  while (casts_ < limit) {
     for (int i = 0; i < active.count; ++i) {
       planes[static_cast<std::size_t>(i)] = active.hits[static_cast<std::size_t>(i)].plane;
     }

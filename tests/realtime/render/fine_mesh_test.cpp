@@ -1,0 +1,100 @@
+// Fine meshes must not be felt: T5c, T5d and T13 of the ground truth.
+#include "variants.h"
+
+namespace hapticd::realtime::fixture {
+namespace {
+
+#ifdef HAPTICD_SANITIZED
+constexpr int kTicks = 400;
+#else
+constexpr int kTicks = 4000;
+#endif
+
+class FineMeshTest : public VariantTest {
+ protected:
+  void clear() {
+    scene = SceneFixture();
+    scene.setWorldUnitsPerMetre(GetParam().worldUnitsPerMetre);
+  }
+  // A rosette on the sphere of the given radius about the centre, seen from the centre downwards (or
+  // upwards).
+  static Vec3 rosette(const Vec3& centre, double radius, double up, int i) {
+    const double a = 2 * M_PI * i / kTicks;
+    const double rho = 0.006 * std::sin(5 * a) / radius;
+    return centre +
+           radius * Vec3(std::sin(rho) * std::cos(a), std::sin(rho) * std::sin(a), up * std::cos(rho));
+  }
+};
+INSTANTIATE_TEST_SUITE_P(, FineMeshTest, kVariants, variantName);
+
+// T5c  \           /   bowl of R = 100 mm in jittered cells; a rosette 2 mm below the surface:
+//        '-..o..-'     |F| = 2.0 N everywhere, the proxy is never stuck
+TEST_P(FineMeshTest, bowl_does_not_hold_the_proxy) {
+  constexpr double kRadius = 0.1;
+  const auto bowl = [](double x, double y) { return kRadius - std::sqrt(kRadius * kRadius - x * x - y * y); };
+  for (const double cell : {0.001, 0.0005, 0.0002}) {
+    for (const double mu : {0.0, 0.5}) {
+      clear();
+      const int cells = static_cast<int>(0.016 / cell);
+      add(heightField(cells * cell / 2, cells, bowl, 0.3), surface(1000, mu, mu));
+      const Vec3 centre(0, 0, kRadius);
+      start(rosette(centre, kRadius - 0.001, -1, 0));
+      to(rosette(centre, kRadius + 0.002, -1, 0));
+      double least = 1e9;
+      double most = 0;
+      for (int i = 0; i < kTicks; ++i) {
+        const Rendering& r = at(rosette(centre, kRadius + 0.002, -1, i));
+        least = std::min(least, r.force_N.norm());
+        most = std::max(most, r.force_N.norm());
+        EXPECT_EQ(r.status, 0U);
+      }
+      EXPECT_GT(least, 1.9) << cell << " mu " << mu;
+      EXPECT_LT(most, mu > 0 ? 2.24 * 1.05 : 2.1) << cell << " mu " << mu;
+    }
+  }
+}
+
+// T5d    .-"o"-.     the same from outside
+//      /         \                                       .
+TEST_P(FineMeshTest, dome_does_not_hold_the_proxy) {
+  constexpr double kRadius = 0.1;
+  const auto dome = [](double x, double y) { return std::sqrt(kRadius * kRadius - x * x - y * y) - kRadius; };
+  for (const double cell : {0.001, 0.0005, 0.0002}) {
+    for (const double mu : {0.0, 0.5}) {
+      clear();
+      const int cells = static_cast<int>(0.016 / cell);
+      add(heightField(cells * cell / 2, cells, dome, 0.3), surface(1000, mu, mu));
+      const Vec3 centre(0, 0, -kRadius);
+      start(rosette(centre, kRadius + 0.001, 1, 0));
+      to(rosette(centre, kRadius - 0.002, 1, 0));
+      for (int i = 0; i < kTicks; ++i) {
+        const Rendering& r = at(rosette(centre, kRadius - 0.002, 1, i));
+        EXPECT_GT(r.force_N.norm(), 1.9) << cell << " mu " << mu;
+        EXPECT_LT(r.force_N.norm(), mu > 0 ? 2.24 * 1.05 : 2.1) << cell << " mu " << mu;
+        EXPECT_EQ(r.status, 0U);
+      }
+    }
+  }
+}
+
+// T13  a flat jittered grid at 50 mm/s: no ripple at the seams
+TEST_P(FineMeshTest, seams_of_a_flat_grid_are_not_felt) {
+  for (const double cell : {0.005, 0.0005, 0.0001}) {
+    clear();
+    const int cells = std::min(200, static_cast<int>(0.04 / cell));
+    const double half = cells * cell / 2;
+    add(heightField(
+            half, cells, [](double, double) { return 0.0; }, 0.4),
+        surface());
+    start({-0.9 * half, -0.83 * half, 0.001});
+    to({-0.9 * half, -0.83 * half, -0.001});
+    to({0.9 * half, 0.77 * half, -0.001}, 0.05, [&](const Rendering& r) {
+      EXPECT_NEAR(r.force_N.z(), 1.0, 0.001);
+      EXPECT_LT(r.force_N.head<2>().norm(), 1e-4);
+      EXPECT_EQ(r.status, 0U);
+    });
+  }
+}
+
+}  // namespace
+}  // namespace hapticd::realtime::fixture

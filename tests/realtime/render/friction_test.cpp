@@ -1,0 +1,141 @@
+// Coulomb friction: T3, T9b, T12 (without friction, for the energy) and T19 of the ground truth.
+#include "variants.h"
+
+namespace hapticd::realtime::fixture {
+namespace {
+
+class FrictionTest : public VariantTest {};
+INSTANTIATE_TEST_SUITE_P(, FrictionTest, kVariants, variantName);
+
+double lateral(const Rendering& r) {
+  return r.force_N.head<2>().norm();
+}
+
+// T3     o ->  2 mm deep, 10 mm/s: sticks until the spring is 1.00 mm long, then slides with mu_d
+//     =======
+TEST_P(FrictionTest, ramp_sticks_then_slides) {
+  add(plane(0.05, 40), surface(1000, 0.5, 0.3));
+  start({0.00013, 0.0002, 0.0005});
+  to({0.00013, 0.0002, -0.002});
+  const Vec3 held = proxy();
+  double slipAt = -1;
+  double work = 0;
+  Vec3 last = hip();
+  Vec3 lastForce = hand->now().force_N;
+  to({0.01013, 0.0002, -0.002}, 0.01, [&](const Rendering& r) {
+    const double shift = hip().x() - held.x();
+    EXPECT_NEAR(r.force_N.z(), 2.0, 1e-4);
+    EXPECT_LE(lateral(r), 0.5 * 2.0 * 1.001);
+    if (slipAt < 0 && proxy().x() - held.x() > 1e-6) slipAt = shift;
+    if (slipAt < 0) {
+      EXPECT_NEAR(r.force_N.x(), -1000 * shift, 1e-4);
+    } else {
+      EXPECT_NEAR(lateral(r) / r.force_N.z(), 0.3, 0.006);
+    }
+    work += 0.5 * (r.force_N + lastForce).dot(hip() - last);
+    last = hip();
+    lastForce = r.force_N;
+  });
+  EXPECT_NEAR(slipAt, 0.001, 0.00002);
+  EXPECT_LT(work, 0);
+}
+
+// Turning back, the proxy sticks at once and the spring swings through zero without a step.
+TEST_P(FrictionTest, reversal_sticks) {
+  add(plane(0.05, 40), surface(1000, 0.5, 0.3));
+  start({0.00013, 0.0002, 0.0005});
+  to({0.00013, 0.0002, -0.002});
+  to({0.00513, 0.0002, -0.002}, 0.01);
+  const Vec3 held = proxy();
+  double last = hand->now().force_N.x();
+  to({0.00383, 0.0002, -0.002}, 0.01, [&](const Rendering& r) {
+    EXPECT_NEAR((proxy() - held).norm(), 0, 1e-6);
+    EXPECT_NEAR(r.force_N.x() - last, 0.01, 1e-3);
+    last = r.force_N.x();
+  });
+  EXPECT_GT(last, 0);
+}
+
+// T19    mu 0.6 | mu 0.1     two abutting plates; the seam is felt in the friction and nowhere else
+//      =========|=========
+TEST_P(FrictionTest, seam_between_objects_changes_friction_without_a_kick) {
+  const auto plate = [](double from, double to) {
+    TriangleMesh mesh;
+    mesh.vertices = {Vec3(from, -0.02, 0).cast<float>(), Vec3(to, -0.02, 0).cast<float>(),
+                     Vec3(to, 0.02, 0).cast<float>(), Vec3(from, 0.02, 0).cast<float>()};
+    mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+    return mesh;
+  };
+  add(plate(-0.02, 0), surface(1000, 0.6, 0.6));
+  add(plate(0, 0.02), surface(1000, 0.1, 0.1));
+  start({-0.01, 0.0003, 0.001});
+  to({-0.01, 0.0003, -0.001});
+  double before = 0;
+  double after = 0;
+  to({0.01, 0.0003, -0.001}, 0.02, [&](const Rendering& r) {
+    EXPECT_NEAR(r.normalForce_N.z(), 1.0, 1e-3);
+    EXPECT_NEAR(r.normalForce_N.head<2>().norm(), 0, 1e-6);
+    EXPECT_EQ(r.touchedObject, proxy().x() > 1e-6 ? 1 : r.touchedObject);
+    if (proxy().x() < -1e-5) before = lateral(r);
+    if (proxy().x() > 1e-3) after = lateral(r);
+  });
+  EXPECT_NEAR(before, 0.6, 0.012);
+  EXPECT_NEAR(after, 0.1, 0.002);
+}
+
+// T9b   a plate slides under a pressed hand: it takes the proxy along until the cone, then slips
+//          o
+//     ==========  ->
+TEST_P(FrictionTest, sliding_plate_carries_the_proxy_until_it_slips) {
+  scene::ObjectState& object = add(plane(0.05, 10), surface(1000, 0.5, 0.5));
+  Affine end = object.motion.destination();
+  end.pretranslate(Vec3(0.01 * GetParam().worldUnitsPerMetre, 0, 0));
+  const Nanos begin = toNanos(0.1);
+  object.motion = scene::Motion::between(object.motion.origin(), end, begin, begin + toNanos(0.2));
+  start({0.001, 0.002, 0.001});
+  to({0.001, 0.002, -0.002});
+  bool slipped = false;
+  for (int i = 0; i < 300; ++i) {
+    const Nanos now = hand->time();
+    const Rendering& r = at({0.001, 0.002, -0.002});
+    const double moved = 0.05 * geometry::toSeconds(std::clamp<Nanos>(now - begin, 0, toNanos(0.2)));
+    EXPECT_NEAR(r.force_N.z(), 2.0, 1e-4);
+    EXPECT_NEAR(r.force_N.x(), 1000 * std::min(moved, 0.001), 0.02);
+    slipped = slipped || moved > 0.001;
+  }
+  EXPECT_TRUE(slipped);
+}
+
+// T12  press, slide, return and release on a bumpy sphere without friction: the hand gets no energy out. (It
+// may put some in: on a convex edge the proxy stays on its face until it runs over the edge.)
+TEST_P(FrictionTest, closed_loop_on_a_bumpy_sphere_gives_no_energy) {
+  TriangleMesh mesh = sphere(0.04, 100);
+  for (auto& v : mesh.vertices) {
+    const Vec3 d = v.cast<double>().normalized();
+    v = (d * (0.04 + 0.0004 * std::sin(20 * d.x()) * std::sin(17 * d.y()) * std::sin(23 * d.z())))
+            .cast<float>();
+  }
+  add(mesh, surface());
+  const auto onSphere = [](double radius, double angle) {
+    return Vec3(radius * std::cos(0.3) * std::cos(angle), radius * std::cos(0.3) * std::sin(angle),
+                radius * std::sin(0.3));
+  };
+  constexpr double kDepth = 0.002;
+  start(onSphere(0.042, 0));
+  double work = 0;
+  Vec3 last = hip();
+  Vec3 lastForce = Vec3::Zero();
+  const auto measure = [&](const Rendering& r) {
+    work += 0.5 * (r.force_N + lastForce).dot(hip() - last);
+    last = hip();
+    lastForce = r.force_N;
+  };
+  to(onSphere(0.04 - kDepth, 0), 0.02, measure);
+  for (int i = 1; i <= 500; ++i) to(onSphere(0.04 - kDepth, i * 2e-3), 0.1, measure);
+  for (int i = 499; i >= 0; --i) to(onSphere(0.04 - kDepth, i * 2e-3), 0.1, measure);
+  to(onSphere(0.042, 0), 0.02, measure);
+  EXPECT_LE(work, 0.01 * 0.5 * 1000 * kDepth * kDepth);
+}
+
+}  // namespace
+}  // namespace hapticd::realtime::fixture
