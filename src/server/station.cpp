@@ -254,7 +254,7 @@ bool Station::collectReports(const WallClock& clock) {
   Impl& my = *impl_;
   my.tick.reports().consume([&](const realtime::TickReport& report) {
     my.last = report;
-    my.droppedReports += report.dropped;
+    my.droppedReports = report.dropped;
     my.outgoing.clear();
     my.reporter.update(report, my.outgoing);
     my.encode(my.outgoing, clock.at(report.time));

@@ -29,6 +29,8 @@ class HandFile final : public HandPath {
 
   HandPose at(Nanos sinceStart) const noexcept override;
   Nanos duration() const noexcept override { return rows_.back().time; }
+  /// Time of the first row.
+  Nanos begin() const noexcept { return rows_.front().time; }
   std::size_t rows() const noexcept { return rows_.size(); }
 
  private:

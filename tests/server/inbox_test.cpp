@@ -1,0 +1,122 @@
+#include "server/inbox.h"
+
+#include <gtest/gtest.h>
+
+#include "wire/codec.h"
+
+namespace hapticd::server {
+namespace {
+
+class InboxTest : public ::testing::Test {
+ protected:
+  template <wire::WireMessage M>
+  Inbox::Outcome give(const M& message, scene::ClientId client = 1) {
+    std::vector<std::byte> payload(wire::payloadSize(message));
+    wire::encodePayload(message, payload.data());
+    return giveRaw(wire::kindOf<M>, payload, client);
+  }
+  Inbox::Outcome giveRaw(wire::MessageKind kind, const std::vector<std::byte>& payload,
+                         scene::ClientId client = 1) {
+    wire::MessageReceived received;
+    received.kind = kind;
+    received.payload = payload;
+    return inbox_.take(client, received, error_);
+  }
+  template <class Command>
+  const Command& only() {
+    tasks_ = inbox_.release();
+    EXPECT_EQ(tasks_.size(), 1U);
+    return std::get<Command>(std::get<scene::SceneCommand>(tasks_.front().what));
+  }
+
+  Inbox inbox_;
+  std::string error_;
+  std::vector<SceneTask> tasks_;
+};
+
+TEST_F(InboxTest, NeighbouringVerticesBecomeOneRun) {
+  for (int i = 0; i < 5; ++i) give(wire::SetVertex{3, i, {static_cast<float>(i), 1, 2}});
+  const auto& run = only<scene::SetVertices>();
+  EXPECT_EQ(run.object, 3);
+  EXPECT_EQ(run.first, 0);
+  ASSERT_EQ(run.positions.size(), 5U);
+  EXPECT_EQ(run.positions[4], geometry::Vec3f(4, 1, 2));
+}
+
+TEST_F(InboxTest, AnythingElseEndsTheRunAndOrderIsKept) {
+  give(wire::SetVertex{0, 0, {}});
+  give(wire::SetVertex{0, 2, {}});     // a gap
+  give(wire::SetVertex{1, 3, {}});     // another object
+  give(wire::SetVertex{1, 4, {}}, 2);  // another client
+  give(wire::SetObjectNumber{4}, 2);
+  give(wire::SetVertex{1, 5, {}}, 2);
+  give(wire::SetVertex{1, -1, {}}, 2);  // negative: the scene refuses it, alone
+  give(wire::SetVertex{1, 0, {}}, 2);
+  EXPECT_EQ(inbox_.release().size(), 8U);
+  EXPECT_TRUE(inbox_.empty());
+}
+
+TEST_F(InboxTest, TrianglesBecomeRunsAndKeepNegativeCornersRefusable) {
+  give(wire::SetTriangle{0, 0, {0, 1, 2}, {-1, -1, -1}});
+  give(wire::SetTriangle{0, 1, {2, 1, -5}, {-1, -1, -1}});
+  const auto& run = only<scene::SetTriangles>();
+  ASSERT_EQ(run.triangles.size(), 2U);
+  EXPECT_EQ(run.triangles[0], (geometry::Triangle{0, 1, 2}));
+  EXPECT_EQ(run.triangles[1][2], 0xFFFFFFFFU);
+}
+
+TEST_F(InboxTest, WrongLengthIsMalformedAndChangesNothing) {
+  EXPECT_EQ(giveRaw(wire::kindOf<wire::SetVertex>, std::vector<std::byte>(19)), Inbox::Outcome::malformed);
+  EXPECT_NE(error_.find("19 bytes, expected 20"), std::string::npos) << error_;
+  EXPECT_EQ(giveRaw(wire::kindOf<wire::SetObjectNumber>, std::vector<std::byte>(5)),
+            Inbox::Outcome::malformed);
+  EXPECT_TRUE(inbox_.empty());
+}
+
+TEST_F(InboxTest, QuestionsAndReportsAreNoCommands) {
+  EXPECT_EQ(give(wire::Ping{}), Inbox::Outcome::notACommand);
+  EXPECT_EQ(give(wire::TrackerRequestWorkspace{}), Inbox::Outcome::notACommand);
+  EXPECT_EQ(give(wire::Force{}), Inbox::Outcome::notACommand);
+  EXPECT_TRUE(inbox_.empty());
+}
+
+TEST_F(InboxTest, NamesAreCutAtTheFirstNul) {
+  wire::SetHapticProperty property;
+  property.property = wire::NameBuffer<20>("static friction");
+  property.value = 0.5F;
+  give(property);
+  EXPECT_EQ(only<scene::SetSurfaceProperty>().name, "static friction");
+}
+
+TEST_F(InboxTest, StopOfTheCustomEffectIsItsOwnCommand) {
+  give(wire::CustomEffect{wire::kStopCustomEffect, {}});
+  only<scene::StopCustomEffect>();
+  give(wire::CustomEffect{0, {{1.0F, 2.0F}}});
+  EXPECT_EQ(only<scene::StartCustomEffect>().parameters.size(), 2U);
+}
+
+// Every message that commands a scene has its way in: a new one that is forgotten here fails.
+TEST_F(InboxTest, EveryMessageToTheServerIsACommandOrAQuestion) {
+  const auto isQuestion = [](wire::MessageKind kind) {
+    return kind == wire::kindOf<wire::Text> || kind == wire::kindOf<wire::Ping> ||
+           kind == wire::kindOf<wire::ButtonAdmin> || kind == wire::kindOf<wire::TrackerRequestToRoom> ||
+           kind == wire::kindOf<wire::TrackerRequestUnitToSensor> ||
+           kind == wire::kindOf<wire::TrackerRequestWorkspace> ||
+           kind == wire::kindOf<wire::TrackerSetUpdateRate> ||
+           kind == wire::kindOf<wire::TrackerResetOrigin> ||
+           kind == wire::kindOf<wire::GetNewObjectId>;  // registered by VRPN, never sent
+  };
+  const auto check = [&]<std::size_t... I>(std::index_sequence<I...>) {
+    (
+        [&] {
+          using M = std::variant_alternative_t<I, wire::Message>;
+          if (M::kInfo.direction == wire::Direction::kToClient || isQuestion(wire::kindOf<M>)) return;
+          EXPECT_EQ(give(M{}), Inbox::Outcome::taken) << M::kInfo.name;
+        }(),
+        ...);
+  };
+  check(std::make_index_sequence<std::variant_size_v<wire::Message>>{});
+}
+
+}  // namespace
+}  // namespace hapticd::server

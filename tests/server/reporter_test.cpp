@@ -1,0 +1,214 @@
+#include "server/reporter.h"
+
+#include <gtest/gtest.h>
+
+namespace hapticd::server {
+namespace {
+
+using geometry::Affine;
+using geometry::Nanos;
+using geometry::Vec3;
+
+constexpr Nanos kMs = 1'000'000;
+
+class ReporterTest : public ::testing::Test {
+ protected:
+  ReporterTest() {
+    config_.linearTolerance_m = 0.001;
+    config_.angularTolerance_rad = 0.02;
+    tick_.T_world_device = Affine(Eigen::UniformScaling<double>(1000.0));
+  }
+  void start() { reporter_ = std::make_unique<Reporter>(config_, 2, config_.reportRate_Hz); }
+  // One tick later.
+  void step(Nanos by = kMs) {
+    if (!reporter_) start();
+    ++tick_.tick;
+    tick_.time += by;
+    out_.clear();
+    reporter_->update(tick_, out_);
+  }
+  template <class M>
+  std::vector<M> said() const {
+    std::vector<M> found;
+    for (const Outgoing& out : out_) {
+      if (const M* m = std::get_if<M>(&out.message)) found.push_back(*m);
+    }
+    return found;
+  }
+  template <class M>
+  bool reliably() const {
+    for (const Outgoing& out : out_) {
+      if (std::holds_alternative<M>(out.message)) return out.reliable;
+    }
+    return false;
+  }
+  void touch(double depth_m = 0.002) {
+    realtime::Rendering& felt = tick_.rendering;
+    felt.touching = true;
+    felt.touchedObject = 3;
+    felt.depth_m = depth_m;
+    felt.normal = Vec3::UnitZ();
+    felt.normalForce_N = Vec3(0, 0, 500 * depth_m);
+    tick_.force_N = felt.normalForce_N + Vec3(0.1, 0, 0);
+    felt.scp_m = felt.proxy_m;
+  }
+
+  DeviceConfig config_;
+  realtime::TickReport tick_;
+  std::unique_ptr<Reporter> reporter_;
+  std::vector<Outgoing> out_;
+};
+
+TEST_F(ReporterTest, FreeAndAtRestOnlyIsTouchingIsSaidEveryPeriod) {
+  step();
+  EXPECT_EQ(said<wire::TrackerPosQuat>().size(), 2U);  // proxy and device, once
+  for (int i = 0; i < 5; ++i) {
+    step();
+    ASSERT_EQ(out_.size(), 1U);
+    EXPECT_EQ(said<wire::IsTouching>().at(0).touching, 0);
+  }
+}
+
+TEST_F(ReporterTest, LengthsAreWorldOverThousandAndForcesAreNewtons) {
+  tick_.T_world_device = Eigen::Translation3d(500, 0, 0) * Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ()) *
+                         Eigen::UniformScaling<double>(2000.0);
+  tick_.rendering.proxy_m = Vec3(0.01, 0, 0);
+  tick_.device.position_m = Vec3(0.02, 0, 0);
+  touch(0.002);
+  step();
+  const auto poses = said<wire::TrackerPosQuat>();
+  ASSERT_EQ(poses.size(), 3U);
+  EXPECT_NEAR(poses[0].position[0], 0.5, 1e-12);   // (500 + 0) / 1000
+  EXPECT_NEAR(poses[0].position[1], 0.02, 1e-12);  // 0.01 m * 2000 / 1000, turned to +y
+  EXPECT_NEAR(poses[1].position[1], 0.04, 1e-12);
+  EXPECT_NEAR(said<wire::Dop>().at(0).depth, 0.004, 1e-12);
+  const auto force = said<wire::Force>().at(0).force;
+  EXPECT_NEAR(force[1], 0.1, 1e-12);
+  EXPECT_NEAR(force[2], 1.0, 1e-12);
+}
+
+TEST_F(ReporterTest, PoseIsSaidWhenItMovedOrTurnedMoreThanTheTolerance) {
+  step();
+  tick_.rendering.proxy_m = tick_.device.position_m = Vec3(0.0009, 0, 0);
+  step();
+  EXPECT_TRUE(said<wire::TrackerPosQuat>().empty());
+  tick_.rendering.proxy_m = Vec3(0.0011, 0, 0);
+  step();
+  ASSERT_EQ(said<wire::TrackerPosQuat>().size(), 1U);
+  EXPECT_EQ(said<wire::TrackerPosQuat>()[0].sensor, kSensorProxy);
+  tick_.device.orientation = Eigen::AngleAxisd(0.019, Vec3::UnitX());
+  step();
+  EXPECT_TRUE(said<wire::TrackerPosQuat>().empty());
+  tick_.device.orientation = Eigen::AngleAxisd(0.021, Vec3::UnitX());
+  step();
+  EXPECT_EQ(said<wire::TrackerPosQuat>().size(), 2U);
+}
+
+TEST_F(ReporterTest, ZeroToleranceMeansEveryPeriod) {
+  config_.linearTolerance_m = 0;
+  step();
+  step();
+  EXPECT_EQ(said<wire::TrackerPosQuat>().size(), 2U);
+}
+
+TEST_F(ReporterTest, ContactIsSaidOnChange) {
+  step();
+  touch();
+  tick_.device.orientation =
+      Eigen::AngleAxisd(M_PI / 3, Vec3::UnitX());  // +Y of the stylus 30 degrees off +Z
+  step();
+  EXPECT_EQ(said<wire::TouchedObject>().at(0).object, 3);
+  EXPECT_NEAR(said<wire::Angle>().at(0).angle, 30, 1e-9);
+  EXPECT_EQ(said<wire::Angle>().at(0).touching, 1);
+  EXPECT_EQ(said<wire::Scp>().size(), 1U);
+  EXPECT_EQ(said<wire::IsTouching>().at(0).touching, 1);
+  step();
+  EXPECT_EQ(out_.size(), 1U);  // nothing changed: isTouching alone
+  tick_.force_N.x() += 0.0009;
+  tick_.rendering.depth_m += 0.9e-5;
+  step();
+  EXPECT_TRUE(said<wire::Force>().empty());
+  EXPECT_TRUE(said<wire::Dop>().empty());
+  tick_.force_N.x() += 0.0002;
+  tick_.rendering.depth_m += 0.2e-5;
+  step();
+  EXPECT_EQ(said<wire::Force>().size(), 1U);
+  EXPECT_EQ(said<wire::Dop>().size(), 1U);
+}
+
+TEST_F(ReporterTest, TheEndOfAContactIsReliableAndComplete) {
+  config_.reportRate_Hz = 10;
+  touch();
+  step();
+  tick_.rendering = {};
+  tick_.force_N = Vec3::Zero();
+  step();  // long before the next report period
+  EXPECT_EQ(said<wire::Force>().at(0).force, (wire::F64x3{0, 0, 0}));
+  EXPECT_EQ(said<wire::Dop>().at(0).depth, 0);
+  EXPECT_EQ(said<wire::TouchedObject>().at(0).object, -1);
+  EXPECT_EQ(said<wire::Angle>().at(0).touching, 0);
+  EXPECT_TRUE(reliably<wire::Force>() && reliably<wire::Dop>() && reliably<wire::TouchedObject>() &&
+              reliably<wire::Angle>());
+  step();
+  EXPECT_TRUE(out_.empty());
+}
+
+TEST_F(ReporterTest, ReportRateIsKeptAndButtonsDoNotWait) {
+  config_.reportRate_Hz = 100;
+  step();
+  int periods = 0;
+  for (int i = 0; i < 1000; ++i) {
+    step();
+    periods += static_cast<int>(said<wire::IsTouching>().size());
+  }
+  EXPECT_NEAR(periods, 100, 1);
+  step();
+  tick_.device.buttons = 2;
+  step();
+  ASSERT_EQ(said<wire::ButtonChange>().size(), 1U);
+  EXPECT_EQ(said<wire::ButtonChange>()[0].button, 1);
+  EXPECT_EQ(said<wire::ButtonChange>()[0].state, 1);
+}
+
+TEST_F(ReporterTest, SwitchesOfThePaperChangeForceAndQuaternion) {
+  config_.forceReport = ForceReport::normal;
+  config_.quaternionOrder = QuaternionOrder::wxyz;
+  touch();
+  step();
+  EXPECT_EQ(said<wire::Force>().at(0).force, (wire::F64x3{0, 0, 1}));
+  EXPECT_EQ(said<wire::TrackerPosQuat>().at(0).orientation, (wire::F64x4{1, 0, 0, 0}));
+}
+
+TEST_F(ReporterTest, TripsAreSaidOnceAndSoIsRecovery) {
+  step();
+  tick_.guard.active = realtime::bit(realtime::Trip::speed) | realtime::bit(realtime::Trip::slew);
+  step();
+  ASSERT_EQ(said<wire::ForceError>().size(), 1U);  // a clamp is no error
+  EXPECT_EQ(said<wire::ForceError>()[0].code, 2);
+  step();
+  EXPECT_TRUE(said<wire::ForceError>().empty());
+  tick_.guard.active = 0;
+  step();
+  ASSERT_EQ(said<wire::ForceError>().size(), 1U);
+  EXPECT_EQ(said<wire::ForceError>()[0].code, 4);
+}
+
+TEST_F(ReporterTest, ALateJoinerHearsThePresentState) {
+  touch();
+  tick_.device.buttons = 1;
+  for (int i = 0; i < 3; ++i) step();
+  out_.clear();
+  reporter_->presentState(tick_, out_);
+  EXPECT_EQ(said<wire::ButtonStates>().at(0).states.values, (std::vector<std::int32_t>{1, 0}));
+  EXPECT_EQ(said<wire::TrackerPosQuat>().size(), 3U);
+  EXPECT_EQ(said<wire::TouchedObject>().at(0).object, 3);
+  EXPECT_EQ(said<wire::IsTouching>().at(0).touching, 1);
+  EXPECT_EQ(said<wire::Force>().size(), 1U);
+  EXPECT_EQ(said<wire::Dop>().size(), 1U);
+  EXPECT_EQ(said<wire::Scp>().size(), 1U);
+  EXPECT_EQ(said<wire::Angle>().size(), 1U);
+  for (const Outgoing& out : out_) EXPECT_TRUE(out.reliable);
+}
+
+}  // namespace
+}  // namespace hapticd::server

@@ -1,0 +1,35 @@
+// A whole server in its own thread, on a port of its own.
+#pragma once
+
+#include <thread>
+
+#include "server/server.h"
+
+namespace hapticd::test {
+
+class RunningServer {
+ public:
+  explicit RunningServer(const server::ServerConfig& config = anyPort()) : server_(config) {
+    thread_ = std::thread([this] { server_.run(); });
+  }
+  ~RunningServer() { stop(); }
+
+  static server::ServerConfig anyPort() {
+    server::ServerConfig config;
+    config.port = 0;
+    config.allowNoRealtime = true;
+    return config;
+  }
+  void stop() {
+    server_.stop();
+    if (thread_.joinable()) thread_.join();
+  }
+  net::Endpoint address() const { return server_.address(); }
+  server::Server& server() { return server_; }
+
+ private:
+  server::Server server_;
+  std::thread thread_;
+};
+
+}  // namespace hapticd::test

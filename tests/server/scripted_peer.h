@@ -1,0 +1,186 @@
+// A VRPN client made of the wire and net rooms alone: says what a test scripts and keeps what comes back.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "net/connection.h"
+#include "net/loop.h"
+#include "net/tcp_listener.h"
+#include "net/udp_socket.h"
+#include "wire/endpoint.h"
+#include "wire/udp_request.h"
+
+namespace hapticd::test {
+
+using namespace std::chrono_literals;
+
+/// One connection to a server under test. Every wait is bounded and ends on an event.
+class ScriptedPeer {
+ public:
+  enum class Mode { tcp, udp };
+
+  explicit ScriptedPeer(const net::Endpoint& server, const std::string& device = "Phantom",
+                        Mode mode = Mode::tcp)
+      : sender_(names_.addSender("VRPN Control")), device_(names_.addSender(device)) {
+    if (mode == Mode::tcp) {
+      endpoint_ = std::make_unique<wire::Endpoint>(names_);
+      take(net::Connection::connect(loop_, server, 2s));
+    } else {
+      callBack(server);
+    }
+  }
+
+  /// Handles events until the condition holds; false after the limit.
+  bool until(const std::function<bool()>& condition, std::chrono::seconds limit = 20s) {
+    const auto end = std::chrono::steady_clock::now() + limit;
+    while (!condition()) {
+      if (std::chrono::steady_clock::now() > end) return false;
+      loop_.runOnce(20ms);
+    }
+    return true;
+  }
+  bool untilConnected() {
+    return until([this] { return endpoint_ && endpoint_->connected(); });
+  }
+  /// Waits for another message of a kind.
+  template <wire::WireMessage M>
+  bool untilNext() {
+    const std::size_t before = count<M>();
+    return until([&] { return count<M>() > before; });
+  }
+  /// Waits for a text that holds these words.
+  bool untilText(const std::string& words) {
+    return until([&] {
+      for (const wire::Text& text : all<wire::Text>()) {
+        if (text.text.text.find(words) != std::string::npos) return true;
+      }
+      return false;
+    });
+  }
+
+  template <wire::WireMessage M>
+  void send(const M& message) {
+    endpoint_->send({1, 2}, device_, message);
+    flush();
+  }
+  /// Bytes as they are, whatever they are.
+  void sendBytes(wire::ByteView bytes) {
+    connection_.send(bytes);
+    connection_.flush();
+  }
+  void flush() {
+    std::vector<std::byte> bytes;
+    endpoint_->takeStream(bytes);
+    if (!bytes.empty()) connection_.send(std::span<const std::byte>(bytes));
+    connection_.flush();
+    if (udp_) endpoint_->takeDatagrams([this](wire::ByteView datagram) { udp_->sendTo(datagram, udpPeer_); });
+  }
+  void close() { connection_.abort("test over"); }
+
+  /// All messages of a kind so far, from our device.
+  template <wire::WireMessage M>
+  std::vector<M> all() const {
+    std::vector<M> found;
+    for (const Received& received : messages_) {
+      if (received.kind != wire::kindOf<M>) continue;
+      const auto decoded = wire::decode<M>(received.payload);
+      if (decoded) found.push_back(*decoded);
+    }
+    return found;
+  }
+  template <wire::WireMessage M>
+  std::size_t count() const {
+    const auto entry = counts_.find(wire::kindOf<M>);
+    return entry == counts_.end() ? 0 : entry->second;
+  }
+  void forget() {
+    messages_.clear();
+    counts_.clear();
+  }
+
+  bool open() const { return !closed_; }
+  const std::string& closeReason() const { return reason_; }
+  std::size_t datagrams() const { return datagrams_; }
+  net::Connection& connection() { return connection_; }
+  wire::Endpoint& endpoint() { return *endpoint_; }
+  wire::LocalSender device() const { return device_; }
+
+  struct Received {
+    wire::MessageKind kind;
+    wire::Time time;
+    std::vector<std::byte> payload;
+    bool byDatagram;
+  };
+  const std::vector<Received>& messages() const { return messages_; }
+
+ private:
+  void take(net::Connection connection) {
+    connection_ = std::move(connection);
+    connection_.start(
+        {.onConnected = {},
+         .onBytes =
+             [this](auto bytes) {
+               endpoint_->feed({1, 2}, bytes, [this](const wire::Event& e) { onEvent(e, false); });
+               flush();
+             },
+         .onDrained = {},
+         .onClosed =
+             [this](const std::string& reason) {
+               closed_ = true;
+               reason_ = reason;
+             }});
+    flush();
+  }
+
+  void callBack(const net::Endpoint& server) {
+    listener_ = std::make_unique<net::TcpListener>(
+        loop_, net::Endpoint{net::kLoopbackAddress, 0},
+        [this](net::Connection connection) { take(std::move(connection)); });
+    udp_ = std::make_unique<net::UdpSocket>(loop_, net::Endpoint{net::kLoopbackAddress, 0});
+    udp_->start({.onDatagram =
+                     [this](auto bytes, const auto&) {
+                       ++datagrams_;
+                       endpoint_->feedDatagram(bytes, [this](const wire::Event& e) { onEvent(e, true); });
+                     },
+                 .onRefused = {}});
+    wire::EndpointOptions options;
+    options.udp = wire::UdpAddress{"127.0.0.1", udp_->local().port};
+    endpoint_ = std::make_unique<wire::Endpoint>(names_, options);
+    const std::string request = wire::formatUdpRequest({"127.0.0.1", listener_->local().port});
+    udp_->sendTo(std::as_bytes(std::span(request)), server);
+  }
+
+  void onEvent(const wire::Event& event, bool byDatagram) {
+    if (const auto* message = std::get_if<wire::MessageReceived>(&event)) {
+      if (message->local_sender != device_) return;
+      messages_.push_back(
+          {message->kind, message->time, {message->payload.begin(), message->payload.end()}, byDatagram});
+      ++counts_[message->kind];
+    } else if (const auto* described = std::get_if<wire::UdpDescribed>(&event)) {
+      udpPeer_ = net::Endpoint::parse(described->address.host, described->address.port);
+      endpoint_->useDatagrams();
+    }
+  }
+
+  net::Loop loop_;
+  wire::LocalNames names_;
+  wire::LocalSender sender_;
+  wire::LocalSender device_;
+  std::unique_ptr<wire::Endpoint> endpoint_;
+  std::unique_ptr<net::TcpListener> listener_;
+  std::unique_ptr<net::UdpSocket> udp_;
+  net::Endpoint udpPeer_;
+  net::Connection connection_;
+  std::vector<Received> messages_;
+  std::map<wire::MessageKind, std::size_t> counts_;
+  std::size_t datagrams_ = 0;
+  bool closed_ = false;
+  std::string reason_;
+};
+
+}  // namespace hapticd::test

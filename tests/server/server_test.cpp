@@ -1,0 +1,273 @@
+// The whole server over real sockets, driven by scripted peers.
+#include "server/server.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "running_server.h"
+#include "scripted_peer.h"
+
+namespace hapticd::test {
+namespace {
+
+using geometry::Vec3f;
+
+// A cube of 40 mm around the origin, one setVertex for each corner of each triangle, and a stiff surface.
+void sendCube(ScriptedPeer& peer, float half_mm = 20) {
+  std::int32_t vertex = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const float side : {-half_mm, half_mm}) {
+      for (const auto& [u, v] : {std::pair{-1, -1}, {1, -1}, {1, 1}, {-1, -1}, {1, 1}, {-1, 1}}) {
+        wire::SetVertex message{0, vertex++, {}};
+        const auto at = [](int i) { return static_cast<std::size_t>(i % 3); };
+        message.position[at(axis)] = side;
+        message.position[at(axis + 1)] = half_mm * static_cast<float>(u);
+        message.position[at(axis + 2)] = half_mm * static_cast<float>(v);
+        peer.send(message);
+      }
+    }
+  }
+  peer.send(wire::SetHapticProperty{0, "stiffness", 1.0F});
+}
+
+bool untilTouched(ScriptedPeer& peer) {
+  return peer.until([&] {
+    const auto touched = peer.all<wire::TouchedObject>();
+    return !touched.empty() && touched.back().object == 0;
+  });
+}
+
+TEST(Server, TcpClientHearsTheDevice) {
+  RunningServer server;
+  ScriptedPeer peer(server.address());
+  ASSERT_TRUE(peer.untilConnected());
+  EXPECT_TRUE(peer.untilNext<wire::TrackerPosQuat>());
+  EXPECT_TRUE(peer.until([&] { return peer.count<wire::IsTouching>() >= 50; }));
+  EXPECT_GE(peer.count<wire::ButtonStates>(), 1U);
+  EXPECT_EQ(peer.datagrams(), 0U);
+}
+
+TEST(Server, UdpClientIsCalledBackAndHearsByDatagram) {
+  RunningServer server;
+  ScriptedPeer peer(server.address(), "Phantom", ScriptedPeer::Mode::udp);
+  ASSERT_TRUE(peer.untilConnected());
+  EXPECT_TRUE(peer.until([&] { return peer.datagrams() >= 20; }));
+  // Reliable messages go by TCP all the same.
+  peer.send(wire::Ping{});
+  EXPECT_TRUE(peer.untilNext<wire::Pong>());
+  for (const auto& message : peer.messages()) {
+    if (message.kind == wire::kindOf<wire::Pong>) {
+      EXPECT_FALSE(message.byDatagram);
+    }
+  }
+}
+
+TEST(Server, StampsAreWallTimesOfTicks) {
+  RunningServer server;
+  ScriptedPeer peer(server.address());
+  ASSERT_TRUE(peer.until([&] { return peer.count<wire::IsTouching>() >= 20; }));
+  std::int64_t before = 0;
+  for (const auto& message : peer.messages()) {
+    if (message.kind != wire::kindOf<wire::IsTouching>) continue;
+    const std::int64_t stamp = std::int64_t{message.time.seconds} * 1000000 + message.time.microseconds;
+    EXPECT_GE(stamp, before);
+    before = stamp;
+  }
+  EXPECT_NEAR(static_cast<double>(before) * 1e-6, static_cast<double>(time(nullptr)), 60);
+}
+
+TEST(Server, PingIsAnsweredWithPongAndButtonStates) {
+  RunningServer server;
+  ScriptedPeer peer(server.address());
+  ASSERT_TRUE(peer.untilConnected());
+  peer.forget();
+  peer.send(wire::Ping{});
+  EXPECT_TRUE(peer.untilNext<wire::Pong>());
+  EXPECT_TRUE(peer.until([&] { return peer.count<wire::ButtonStates>() >= 1; }));
+}
+
+TEST(Server, TrackerQuestionsAreAnswered) {
+  RunningServer server;
+  ScriptedPeer peer(server.address());
+  ASSERT_TRUE(peer.until([&] { return peer.count<wire::IsTouching>() >= 1; }));
+  peer.send(wire::TrackerRequestToRoom{});
+  EXPECT_TRUE(peer.until([&] { return peer.count<wire::TrackerToRoom>() == 1; }));
+  peer.send(wire::TrackerRequestUnitToSensor{});
+  EXPECT_TRUE(peer.until([&] { return peer.count<wire::TrackerUnitToSensor>() == 3; }));
+  peer.send(wire::TrackerRequestWorkspace{});
+  ASSERT_TRUE(peer.until([&] { return peer.count<wire::TrackerWorkspace>() == 1; }));
+  EXPECT_NEAR(peer.all<wire::TrackerWorkspace>()[0].max[0], 0.080,
+              1e-12);  // metres, for a world in millimetres
+}
+
+TEST(Server, AnUploadedMeshIsTouchedAndLeft) {
+  RunningServer server;
+  ScriptedPeer peer(server.address());
+  ASSERT_TRUE(peer.untilConnected());
+  sendCube(peer);
+  ASSERT_TRUE(untilTouched(peer));
+  EXPECT_TRUE(peer.until([&] {
+    const auto forces = peer.all<wire::Force>();
+    return !forces.empty() &&
+           std::hypot(forces.back().force[0], forces.back().force[1], forces.back().force[2]) > 0.1;
+  }));
+  EXPECT_GE(peer.count<wire::Dop>(), 1U);
+  EXPECT_GE(peer.count<wire::Scp>(), 1U);
+  EXPECT_GE(peer.count<wire::Angle>(), 1U);
+  // The surface lies 20 mm from the centre: world / 1000 is metres.
+  const auto scp = peer.all<wire::Scp>().back().position;
+  EXPECT_NEAR(std::max({std::abs(scp[0]), std::abs(scp[1]), std::abs(scp[2])}), 0.020, 1e-6);
+  EXPECT_TRUE(peer.until([&] { return peer.all<wire::TouchedObject>().back().object == -1; }));
+  EXPECT_EQ(peer.all<wire::Dop>().back().depth, 0);
+}
+
+TEST(Server, ALateJoinerHearsTheContactAtOnce) {
+  RunningServer server;
+  ScriptedPeer first(server.address());
+  ASSERT_TRUE(first.untilConnected());
+  sendCube(first);
+  ASSERT_TRUE(untilTouched(first));
+  ScriptedPeer late(server.address());
+  ASSERT_TRUE(late.until([&] { return late.count<wire::TouchedObject>() >= 1; }));
+  EXPECT_GE(late.count<wire::Force>() + late.count<wire::ButtonStates>(), 2U);
+}
+
+TEST(Server, BadValuesGetATextAndLeaveTheSceneAlone) {
+  RunningServer server;
+  ScriptedPeer peer(server.address());
+  ASSERT_TRUE(peer.untilConnected());
+  sendCube(peer);
+  peer.send(wire::SetHapticProperty{7, "stiffness", 1.0F});
+  EXPECT_TRUE(peer.untilText("7"));
+  peer.send(wire::SetHapticProperty{0, "squishiness", 1.0F});
+  EXPECT_TRUE(peer.untilText("squishiness"));
+  peer.send(wire::SetTransformMatrix{0, {}});  // singular
+  EXPECT_TRUE(peer.until([&] { return peer.count<wire::Text>() >= 3; }));
+  EXPECT_TRUE(peer.open());
+  EXPECT_TRUE(untilTouched(peer));
+}
+
+TEST(Server, AMalformedMessageEndsThatConnectionAlone) {
+  RunningServer server;
+  ScriptedPeer good(server.address());
+  ScriptedPeer bad(server.address());
+  ASSERT_TRUE(good.untilConnected());
+  ASSERT_TRUE(bad.untilConnected());
+  // A setVertex of 19 bytes.
+  bad.endpoint().sendRaw({1, 2}, bad.device(), wire::kLocalType<wire::SetVertex>, std::vector<std::byte>(19),
+                         wire::Reliability::kReliable);
+  bad.flush();
+  EXPECT_TRUE(bad.until([&] { return !bad.open(); }));
+  EXPECT_TRUE(good.untilNext<wire::IsTouching>());
+  EXPECT_TRUE(good.open());
+}
+
+TEST(Server, NoiseOnBothPortsDisturbsNobody) {
+  RunningServer server;
+  ScriptedPeer good(server.address());
+  ASSERT_TRUE(good.untilConnected());
+
+  std::mt19937 random(1);
+  std::vector<std::byte> noise(1 << 20);
+  for (std::byte& b : noise) b = static_cast<std::byte>(random());
+  net::Loop loop;
+  bool closed = false;
+  auto stranger = net::Connection::connect(loop, server.address(), 2s);
+  stranger.start({.onConnected = {}, .onBytes = {}, .onDrained = {}, .onClosed = [&](const std::string&) {
+                    closed = true;
+                  }});
+  stranger.send(std::span<const std::byte>(noise));
+  stranger.flush();
+  net::UdpSocket udp(loop, {net::kLoopbackAddress, 0});
+  for (std::size_t at = 0; at + 1400 < noise.size(); at += 1400) {
+    udp.sendTo(std::span<const std::byte>(noise).subspan(at, 1 + random() % 1400), server.address());
+  }
+  for (int i = 0; i < 1000 && !closed; ++i) loop.runOnce(20ms);
+  EXPECT_TRUE(closed);
+
+  const std::string halfCookie = "vrpn: ver. 0";
+  auto silent = net::Connection::connect(loop, server.address(), 2s);
+  silent.start({});
+  silent.send(std::as_bytes(std::span(halfCookie)));
+  silent.flush();
+  loop.runOnce(20ms);
+  EXPECT_TRUE(good.untilNext<wire::IsTouching>());
+  EXPECT_TRUE(good.open());
+}
+
+TEST(Server, AVanishedClientIsForgottenAndAnotherMayCome) {
+  RunningServer server;
+  for (int i = 0; i < 5; ++i) {
+    ScriptedPeer peer(server.address());
+    ASSERT_TRUE(peer.untilConnected());
+    sendCube(peer);
+    peer.close();
+  }
+  ScriptedPeer last(server.address());
+  ASSERT_TRUE(last.untilConnected());
+  EXPECT_TRUE(last.untilNext<wire::IsTouching>());
+}
+
+TEST(Server, EveryNameOfADeviceAnswers) {
+  server::ServerConfig config = RunningServer::anyPort();
+  config.devices[0].names = {"Phantom", "Tracker0"};
+  RunningServer server(config);
+  ScriptedPeer one(server.address(), "Phantom");
+  ScriptedPeer two(server.address(), "Tracker0");
+  EXPECT_TRUE(one.untilNext<wire::TrackerPosQuat>());
+  EXPECT_TRUE(two.untilNext<wire::TrackerPosQuat>());
+  two.send(wire::Ping{});
+  EXPECT_TRUE(two.untilNext<wire::Pong>());
+}
+
+TEST(Server, TwoDevicesHaveScenesOfTheirOwn) {
+  server::ServerConfig config = RunningServer::anyPort();
+  config.devices.resize(2);
+  config.devices[0].names = {"Left"};
+  config.devices[1].names = {"Right"};
+  RunningServer server(config);
+  ScriptedPeer left(server.address(), "Left");
+  ScriptedPeer right(server.address(), "Right");
+  ASSERT_TRUE(left.untilConnected());
+  ASSERT_TRUE(right.untilConnected());
+  sendCube(left);
+  ASSERT_TRUE(untilTouched(left));
+  EXPECT_TRUE(right.untilNext<wire::IsTouching>());
+  for (const auto& touching : right.all<wire::IsTouching>()) EXPECT_EQ(touching.touching, 0);
+}
+
+TEST(Server, ACallBackToAnotherHostIsRefused) {
+  RunningServer server;
+  // An innocent third party listens; a forged request names it by an address that is not the sender's.
+  net::Loop loop;
+  bool called = false;
+  net::TcpListener victim(loop, {net::kAnyAddress, 0}, [&](net::Connection) { called = true; });
+  net::UdpSocket udp(loop, {net::kLoopbackAddress, 0});
+  const std::string forged = wire::formatUdpRequest({"192.0.2.1", victim.local().port});
+  udp.sendTo(std::as_bytes(std::span(forged)), server.address());
+  const std::string lowPort("127.0.0.1 80\0", 13);
+  udp.sendTo(std::as_bytes(std::span(lowPort)), server.address());
+  // A client that asks for itself afterwards is served, so the server has read and refused the others by
+  // then.
+  ScriptedPeer peer(server.address(), "Phantom", ScriptedPeer::Mode::udp);
+  EXPECT_TRUE(peer.untilConnected());
+  loop.runOnce(0ms);
+  EXPECT_FALSE(called);
+}
+
+TEST(Server, APortInUseIsSaidPlainly) {
+  RunningServer server;
+  server::ServerConfig second = RunningServer::anyPort();
+  second.port = server.address().port;
+  try {
+    server::Server other(second);
+    FAIL() << "two servers on one port";
+  } catch (const net::Error& error) {
+    EXPECT_NE(std::string(error.what()).find(std::to_string(second.port)), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("--listen"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace hapticd::test
