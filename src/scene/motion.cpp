@@ -1,5 +1,6 @@
 #include "scene/motion.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace hapticd::scene {
@@ -20,6 +21,12 @@ Mat3 orthogonalFactor(const Mat3& m) {
     if (!(change > 1e-14)) break;
   }
   return q;
+}
+
+geometry::Box transformed(const Affine& t, const geometry::Box& box) {
+  const geometry::Vec3 centre = t * box.centre();
+  const geometry::Vec3 half = t.linear().cwiseAbs() * (0.5 * box.extents());
+  return {centre - half, centre + half};
 }
 
 }  // namespace
@@ -65,6 +72,27 @@ Affine Motion::at(Nanos now) const noexcept {
   t.linear() = fromFactors_.rotation.slerp(s, toFactors_.rotation).toRotationMatrix() * stretch;
   t.translation() = (1 - s) * from_.translation() + s * to_.translation();
   return t;
+}
+
+// A path x(s) leaves its chord by at most max|x''|/8. Here x = R(s) S(s) p + t(s) with |R'| = θ, |R''| = θ²
+// and S, t linear, so x'' = R'' S p + 2 R' S' p.
+geometry::Box Motion::sweep(const geometry::Box& box) const {
+  if (box.empty()) return {};
+  geometry::Box swept = transformed(to_, box);
+  if (end_ <= begin_) return swept;
+  swept.extend(transformed(from_, box));
+  const double angle = fromFactors_.rotation.angularDistance(toFactors_.rotation);
+  double leave = 0;
+  for (int i = 0; i < 8; ++i) {
+    const geometry::Vec3 p((i & 1) != 0 ? box.max.x() : box.min.x(), (i & 2) != 0 ? box.max.y() : box.min.y(),
+                           (i & 4) != 0 ? box.max.z() : box.min.z());
+    const geometry::Vec3 a = fromFactors_.stretch * p;
+    const geometry::Vec3 b = toFactors_.stretch * p;
+    leave = std::max(leave, angle * angle * std::max(a.norm(), b.norm()) + 2 * angle * (b - a).norm());
+  }
+  swept.min.array() -= leave / 8;
+  swept.max.array() += leave / 8;
+  return swept;
 }
 
 }  // namespace hapticd::scene

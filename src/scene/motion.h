@@ -24,6 +24,8 @@ class Motion {
   Affine at(Nanos now) const noexcept;
   /// True while the placement still changes after `now`.
   bool movingAfter(Nanos now) const noexcept { return end_ > begin_ && now < end_; }
+  /// Box in the world around all that a box of the object's frame sweeps on the way. Empty stays empty.
+  geometry::Box sweep(const geometry::Box& box) const;
   /// Where it comes to rest.
   const Affine& destination() const noexcept { return to_; }
   /// Where it started.

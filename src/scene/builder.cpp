@@ -1,0 +1,219 @@
+#include "scene/builder.h"
+
+#include <algorithm>
+#include <map>
+
+#include "scene/free_forces.h"
+#include "scene/notice_board.h"
+#include "scene/object_table.h"
+#include "scene/workspace_fit.h"
+
+namespace hapticd::scene {
+namespace {
+
+std::size_t bytesOf(const SceneCommand& command) {
+  std::size_t bytes = sizeof(SceneCommand);
+  if (const auto* run = std::get_if<SetVertices>(&command)) bytes += run->positions.size() * sizeof(Vec3f);
+  if (const auto* run = std::get_if<SetTriangles>(&command))
+    bytes += run->triangles.size() * sizeof(Triangle);
+  if (const auto* effect = std::get_if<StartCustomEffect>(&command)) bytes += effect->parameters.size() * 4;
+  return bytes;
+}
+
+}  // namespace
+
+class SceneBuilder::State {
+ public:
+  explicit State(SceneConfig config) : config_(std::move(config)), objects_(config_), forces_(config_) {
+    resetWorkspace();
+  }
+
+  void take(SceneCommand&& command, const Call& call) {
+    const auto open = batches_.find(call.client);
+    if (open == batches_.end() || std::holds_alternative<BeginBatch>(command) ||
+        std::holds_alternative<CommitBatch>(command)) {
+      dispatch(std::move(command), call);
+      return;
+    }
+    Batch& batch = open->second;
+    batch.bytes += bytesOf(command);
+    if (batch.bytes > config_.limits.batch_bytes) {
+      batch.commands = {};
+      call.refuse("batch", "refused as a whole: too long; commit more often", ", limit ",
+                  config_.limits.batch_bytes, " bytes");
+      return;
+    }
+    batch.commands.push_back(std::move(command));
+  }
+
+  void clientGone(ClientId client, Nanos now) {
+    batches_.erase(client);
+    board_.forget(client);
+    forces_.clientGone(client, now);
+  }
+
+  std::optional<Nanos> nextDeadline() const {
+    std::optional<Nanos> next;
+    for (const auto& at : {board_.nextDeadline(), objects_.nextDeadline(), forces_.nextDeadline()}) {
+      if (at) next = std::min(next.value_or(*at), *at);
+    }
+    return next;
+  }
+
+  std::shared_ptr<const SceneSnapshot> publish(Nanos now, std::vector<Notice>& out) {
+    board_.flush(now, out);
+    const bool forces = forces_.update(now, board_, out);
+    const bool objects = objects_.publish(now, board_, out);
+    if (!forces && !objects && !changed_) return nullptr;
+    changed_ = false;
+    auto snapshot = std::make_shared<SceneSnapshot>();
+    snapshot->revision = ++revision_;
+    snapshot->workspace = workspace_;
+    snapshot->faces = faces_;
+    snapshot->objects = objects_.published().objects;
+    snapshot->objectIndex = objects_.published().index;
+    PublishedForces published = forces_.publish(workspace_.worldUnitsPerMetre);
+    snapshot->effects = std::move(published.effects);
+    snapshot->planes = std::move(published.planes);
+    snapshot->fields = std::move(published.fields);
+    snapshot->buzz = published.buzz;
+    return snapshot;
+  }
+
+  NoticeBoard& board() { return board_; }
+
+ private:
+  struct Batch {
+    std::vector<SceneCommand> commands;
+    std::size_t bytes = 0;
+  };
+
+  void dispatch(SceneCommand&& command, const Call& call) {
+    std::visit([&](auto&& c) { apply(std::move(c), call); }, std::move(command));
+  }
+
+  // Whoever keeps a kind of thing takes the commands on it.
+  template <class C>
+  void apply(C&& command, const Call& call) {
+    if constexpr (requires { objects_.apply(std::move(command), call); }) {
+      objects_.apply(std::move(command), call);
+    } else {
+      forces_.apply(std::move(command), call);
+    }
+  }
+
+  void apply(SetTouchableFaces&& c, const Call&) {
+    faces_ = c.faces == 0   ? TouchableFaces::front
+             : c.faces == 1 ? TouchableFaces::back
+                            : TouchableFaces::both;
+    changed_ = true;
+  }
+
+  void apply(SetWorkspaceProjection&& c, const Call& call) {
+    use(fitProjection(c.model, c.projection, config_.deviceWorkspace_m, config_.workspaceFit),
+        "setWorkspaceProjectionMatrix", call);
+  }
+  void apply(SetWorkspaceBox&& c, const Call& call) {
+    use(fitBox(c.model, c.box, config_.deviceWorkspace_m, config_.workspaceFit), "setWorkspaceBoundingBox",
+        call);
+  }
+  void use(const FittedWorkspace& fitted, std::string_view name, const Call& call) {
+    if (!fitted.T_world_device) {
+      call.refuse(name, "refused, the old map stays: " + fitted.refusal);
+      return;
+    }
+    if (!fitted.warning.empty()) call.warn(name, fitted.warning);
+    T_world_device_ = *fitted.T_world_device;
+    T_scene_haptic_ = Affine::Identity();
+    hapticScale_ = 1;
+    updateWorkspace();
+  }
+
+  void apply(SetHapticOrigin&& c, const Call& call) {
+    const auto rotation = rotationFrom(c.axis, c.angle_rad);
+    if (!rotation || !c.position_m.allFinite()) {
+      call.refuse("setHapticOrigin", "refused: not finite, or the axis is zero", " position ",
+                  c.position_m.transpose(), ", axis ", c.axis.transpose(), ", angle ", c.angle_rad);
+      return;
+    }
+    T_scene_haptic_ = Eigen::Translation3d(1000 * c.position_m) * *rotation;
+    updateWorkspace();
+  }
+  void apply(SetHapticScale&& c, const Call& call) {
+    if (!(c.scale > 1e-9 && c.scale < 1e9)) {
+      call.refuse("setHapticScale", "refused: not a positive number", " ", c.scale);
+      return;
+    }
+    hapticScale_ = c.scale;
+    updateWorkspace();
+  }
+  void updateWorkspace() {
+    workspace_ =
+        workspaceFrom(T_scene_haptic_ * Eigen::UniformScaling<double>(hapticScale_) * T_world_device_);
+    changed_ = true;
+  }
+  void resetWorkspace() {
+    T_world_device_ = Workspace().T_world_device;
+    T_scene_haptic_ = Affine::Identity();
+    hapticScale_ = 1;
+    faces_ = TouchableFaces::both;
+    updateWorkspace();
+  }
+
+  void apply(ResetScene&&, const Call& call) {
+    resetWorkspace();
+    objects_.reset();
+    forces_.reset(call.now);
+  }
+
+  void apply(BeginBatch&&, const Call& call) {
+    if (!batches_.try_emplace(call.client).second)
+      call.warn("begin of batch", "ignored: the batch is open already");
+  }
+  void apply(CommitBatch&&, const Call& call) {
+    auto batch = batches_.extract(call.client);
+    if (!batch) {
+      call.warn("commit of batch", "ignored: no batch was begun");
+      return;
+    }
+    if (batch.mapped().bytes > config_.limits.batch_bytes) return;
+    const Call inside{call.client, call.now, true, call.board, call.out};
+    for (SceneCommand& command : batch.mapped().commands) dispatch(std::move(command), inside);
+  }
+
+  const SceneConfig config_;
+  NoticeBoard board_;
+  ObjectTable objects_;
+  FreeForces forces_;
+  Affine T_world_device_;
+  Affine T_scene_haptic_;
+  double hapticScale_ = 1;
+  Workspace workspace_;
+  TouchableFaces faces_ = TouchableFaces::both;
+  std::map<ClientId, Batch> batches_;
+  std::uint64_t revision_ = 0;
+  bool changed_ = true;
+};
+
+SceneBuilder::SceneBuilder(SceneConfig config) : state_(std::make_unique<State>(std::move(config))) {}
+SceneBuilder::~SceneBuilder() = default;
+SceneBuilder::SceneBuilder(SceneBuilder&&) noexcept = default;
+SceneBuilder& SceneBuilder::operator=(SceneBuilder&&) noexcept = default;
+
+void SceneBuilder::apply(ClientId client, SceneCommand&& command, Nanos now, std::vector<Notice>& notices) {
+  state_->take(std::move(command), Call{client, now, false, state_->board(), notices});
+}
+
+void SceneBuilder::clientGone(ClientId client, Nanos now) {
+  state_->clientGone(client, now);
+}
+
+std::optional<Nanos> SceneBuilder::nextDeadline() const {
+  return state_->nextDeadline();
+}
+
+std::shared_ptr<const SceneSnapshot> SceneBuilder::publish(Nanos now, std::vector<Notice>& notices) {
+  return state_->publish(now, notices);
+}
+
+}  // namespace hapticd::scene

@@ -1,0 +1,109 @@
+// Forces that belong to no object: effects, planes, force fields, constraints, the buzz. Each is owned by the
+// client that last set or started it and ramps out when that client leaves.
+#pragma once
+
+#include <limits>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "scene/commands.h"
+#include "scene/config.h"
+#include "scene/effect.h"
+#include "scene/force_field.h"
+#include "scene/notice_board.h"
+#include "scene/passivity.h"
+#include "scene/plane.h"
+
+namespace hapticd::scene {
+
+/// What a snapshot shows of them.
+struct PublishedForces {
+  std::vector<Effect> effects;
+  std::vector<Plane> planes;
+  std::vector<ForceField> fields;
+  std::optional<Buzz> buzz;
+};
+
+/// All of them, by index. Commands check everything before they change anything.
+class FreeForces {
+ public:
+  explicit FreeForces(const SceneConfig& config);
+
+  void apply(const DefineEffect&, const Call&);
+  void apply(const StartEffect&, const Call&);
+  void apply(const StopEffect&, const Call&);
+  void apply(const SetPlane&, const Call&);
+  void apply(const SetPlaneDetail&, const Call&);
+  void apply(const SetForceField&, const Call&);
+  void apply(const SetConstraintEnabled&, const Call&);
+  void apply(const SetConstraintMode&, const Call&);
+  void apply(const SetConstraintVector&, const Call&);
+  void apply(const SetConstraintStiffness&, const Call&);
+  void apply(const StartCustomEffect&, const Call&);
+  void apply(const StopCustomEffect&, const Call&);
+
+  /// What it owns ramps out and is forgotten.
+  void clientGone(ClientId client, Nanos now);
+  /// All of it ramps out and is forgotten.
+  void reset(Nanos now);
+
+  std::optional<Nanos> nextDeadline() const;
+  /// Removes what has ended, and tells of starts that waited in vain. True when something changed since the
+  /// last time.
+  bool update(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
+  /// Force fields depend on the workspace: a stiff one is kept passive in device metres.
+  PublishedForces publish(double worldUnitsPerMetre) const;
+
+ private:
+  template <class T>
+  struct Owned {
+    ClientId owner = 0;
+    T value;
+    Nanos goneAt = kNever;  ///< after it has ended or ramped out
+  };
+  struct RunningEffect {
+    Effect effect;
+    bool running = false;
+    Nanos startedAt = 0;
+  };
+  struct Constraint {
+    bool enabled = false;
+    std::int32_t mode = 0;
+    Vec3 point_m = Vec3::Zero();
+    Vec3 linePoint_m = Vec3::Zero();
+    Vec3 lineDirection = Vec3::UnitZ();
+    Vec3 planePoint_m = Vec3::Zero();
+    Vec3 planeNormal = Vec3::UnitY();
+    double stiffness_N_per_m = 1000;
+    bool releasing = false;
+  };
+  static constexpr Nanos kNever = std::numeric_limits<Nanos>::max();
+  static constexpr Nanos kRelease = 300'000'000;     ///< ramping out takes 250 ms in the servo
+  static constexpr Nanos kAfterEnd = 50'000'000;     ///< the servo ends a timed force by its own clock
+  static constexpr Nanos kRemember = 1'000'000'000;  ///< a start whose definition has not come yet
+
+  void start(Owned<RunningEffect>& entry, ClientId client, Nanos now);
+  template <class F>
+  void release(const F& whose, Nanos now);
+  template <class F>
+  void forEachDeadline(const F& f) const;
+  std::optional<ForceField> fieldOf(const Constraint& constraint) const;
+  ForceField passive(ForceField field, double worldUnitsPerMetre) const;
+  Constraint& constraintFor(const Call& call);
+
+  const SceneConfig& config_;
+  PassivityBound bound_;
+  std::map<std::int32_t, Owned<RunningEffect>> effects_;
+  std::map<std::int32_t, Owned<char>> waitingStarts_;
+  std::map<std::int32_t, Owned<Plane>> planes_;
+  Plane planeDetail_;  // of plane 0, whether it is there or not
+  std::optional<Owned<ForceField>> field_;
+  std::optional<Owned<Constraint>> constraint_;
+  std::optional<Owned<Buzz>> buzz_;
+  std::uint32_t starts_ = 0;      // one counter for all: a number never comes back
+  std::uint32_t placements_ = 0;  // the same for planes
+  bool changed_ = false;
+};
+
+}  // namespace hapticd::scene

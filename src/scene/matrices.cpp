@@ -1,0 +1,40 @@
+#include "scene/matrices.h"
+
+#include <cmath>
+
+namespace hapticd::scene {
+
+Mat4 fromColumns(const std::array<double, 16>& m) {
+  return Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::ColMajor>>(m.data());
+}
+
+Mat4 fromRows(const std::array<float, 16>& m) {
+  return Eigen::Map<const Eigen::Matrix<float, 4, 4, Eigen::RowMajor>>(m.data()).cast<double>();
+}
+
+bool isInvertible(const Affine& t) {
+  if (!t.matrix().allFinite()) return false;
+  const double size = t.linear().cwiseAbs().maxCoeff();
+  if (!(size > 1e-30 && size < 1e30)) return false;
+  return std::abs((t.linear() / size).determinant()) > 1e-15;
+}
+
+std::optional<Affine> affineFrom(const Mat4& m) {
+  const double w = m(3, 3);
+  if (!m.allFinite() || w == 0) return std::nullopt;
+  if (m.row(3).head<3>().cwiseAbs().maxCoeff() > 1e-9 * std::abs(w)) return std::nullopt;
+  Affine t;
+  t.matrix() = m.topRows<3>() / w;
+  if (!isInvertible(t)) return std::nullopt;
+  return t;
+}
+
+std::optional<geometry::Quat> rotationFrom(const Vec3& axis, double angle_rad) {
+  if (!axis.allFinite() || !std::isfinite(angle_rad)) return std::nullopt;
+  if (angle_rad == 0) return geometry::Quat::Identity();
+  const double length = axis.stableNorm();
+  if (!(length > 0)) return std::nullopt;
+  return geometry::Quat(Eigen::AngleAxisd(angle_rad, axis / length));
+}
+
+}  // namespace hapticd::scene

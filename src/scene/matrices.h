@@ -1,0 +1,30 @@
+// Matrices as clients send them, checked.
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "geometry/types.h"
+
+namespace hapticd::scene {
+
+using geometry::Affine;
+using geometry::Mat3;
+using geometry::Mat4;
+using geometry::Vec3;
+
+/// Column-major, as OpenGL keeps them.
+Mat4 fromColumns(const std::array<double, 16>& m);
+/// Row-major.
+Mat4 fromRows(const std::array<float, 16>& m);
+
+/// Finite, and far enough from singular to be inverted.
+bool isInvertible(const Affine& t);
+
+/// The affine map a 4x4 matrix stands for; nothing when it is projective, singular or not finite.
+std::optional<Affine> affineFrom(const Mat4& m);
+
+/// Rotation about an axis of any length; nothing when there is no axis although there is an angle.
+std::optional<geometry::Quat> rotationFrom(const Vec3& axis, double angle_rad);
+
+}  // namespace hapticd::scene

@@ -1,0 +1,94 @@
+// The mesh of one object while clients edit it, and what of it has been published.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "scene/mesh_geometry.h"
+
+namespace hapticd::scene {
+
+/// A vector that is copied only when it is written to after it was shared.
+template <class T>
+class CopyOnWrite {
+ public:
+  const std::vector<T>& read() const { return shared_ ? *shared_ : own_; }
+  /// To write to; `needed` is the size it will have.
+  std::vector<T>& write(std::size_t needed) {
+    if (shared_) {
+      own_.reserve(std::max(needed, shared_->size()));
+      own_.assign(shared_->begin(), shared_->end());
+      shared_.reset();
+    }
+    return own_;
+  }
+  /// To share: what it holds now will not change any more.
+  std::shared_ptr<const std::vector<T>> share() {
+    if (!shared_) shared_ = std::make_shared<const std::vector<T>>(std::exchange(own_, {}));
+    return shared_;
+  }
+
+ private:
+  std::vector<T> own_;
+  std::shared_ptr<const std::vector<T>> shared_;
+};
+
+/// Vertices and triangles by number. Runs may come in any order; a vertex that never came is not a number,
+/// and triangles that lack a corner are not felt.
+class MeshDraft {
+ public:
+  static constexpr Nanos kQuiet = 20'000'000;     ///< after the last edit, a mesh becomes touchable
+  static constexpr Nanos kLongest = 250'000'000;  ///< and at latest this long after the first
+  static constexpr Nanos kLongestMorph = 50'000'000;
+
+  std::size_t vertexCount() const { return vertices_.read().size(); }
+  /// Numbered triangles; triples when there are none.
+  std::size_t triangleCount() const { return indexed_ ? triangles_.read().size() : vertexCount() / 3; }
+  bool indexed() const { return indexed_; }
+
+  /// Writes a run; values that are not finite leave their vertex as it was. Returns how many those were.
+  std::size_t setVertices(std::uint32_t first, std::vector<Vec3f>&& run, Nanos now);
+  void setTriangles(std::uint32_t first, const std::vector<Triangle>& run, Nanos now);
+  /// False when there is no such triangle.
+  bool removeTriangle(std::uint32_t triangle, Nanos now);
+  void clear(Nanos now);
+  /// What has come so far is complete: publish at the next chance.
+  void finish() { finished_ = true; }
+
+  bool finished() const { return finished_; }
+  /// When edits should be published; nothing when there are none.
+  std::optional<Nanos> due() const;
+  bool hasBeenPublished() const { return current_ != nullptr; }
+
+  /// Gives the mesh with all edits, null when it has no triangles. `clock` gives the time that the work has
+  /// taken, so that a morph starts where the hand feels the surface when it is done.
+  std::shared_ptr<const MeshGeometry> commit(const std::function<Nanos()>& clock);
+
+ private:
+  void edited(Nanos now);
+  void grow(std::vector<Vec3f>& vertices, std::size_t size);
+  std::shared_ptr<const std::vector<Triangle>> shareTriangles();
+  std::shared_ptr<MeshGeometry> build();
+  std::shared_ptr<MeshGeometry> morph(const std::function<Nanos()>& clock);
+  SpatialIndex refitOrBuild(std::uint32_t count, const SpatialIndex::BoxOf& boxOf);
+
+  CopyOnWrite<Vec3f> vertices_;
+  CopyOnWrite<Triangle> triangles_;  // as sent: corners may be missing
+  bool indexed_ = false;
+  bool sparse_ = false;  // some vertex has not come yet
+  bool dirty_ = false;
+  bool shapeChanged_ = false;  // more than positions
+  bool finished_ = false;
+  Nanos firstEdit_ = 0;
+  Nanos lastEdit_ = 0;
+  Nanos lastCommit_ = 0;
+  int refits_ = 0;
+  std::shared_ptr<MeshGeometry> current_;
+  std::shared_ptr<MeshGeometry> spare_;  // the one before: its index is refitted once nobody reads it
+};
+
+}  // namespace hapticd::scene

@@ -1,0 +1,77 @@
+// Notices without a flood: what is said again and again is counted.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "geometry/types.h"
+#include "scene/notice.h"
+
+namespace hapticd::scene {
+
+using geometry::Nanos;
+
+/// Lets the first few notices of a kind through, then one in a second that counts the others.
+class NoticeBoard {
+ public:
+  /// `kind` tells what may be counted together, for example the call and the reason.
+  void post(Notice notice, std::string kind, Nanos now, std::vector<Notice>& out);
+  /// Appends the counts that are due.
+  void flush(Nanos now, std::vector<Notice>& out);
+  std::optional<Nanos> nextDeadline() const;
+  /// The client has left: nobody is there to tell.
+  void forget(ClientId client);
+
+ private:
+  struct Entry {
+    Nanos windowEnd = 0;
+    int shown = 0;
+    std::uint64_t held = 0;
+    Notice last;
+  };
+  std::map<std::pair<ClientId, std::string>, Entry> entries_;
+};
+
+/// One command on its way in: who said it, when, and how to answer.
+struct Call {
+  ClientId client = 0;
+  Nanos now = 0;
+  bool inBatch = false;
+  NoticeBoard& board;
+  std::vector<Notice>& out;
+
+  /// Says that something was ignored or done differently. `name` is the client's call.
+  template <class... Parts>
+  void warn(std::string_view name, std::string_view reason, const Parts&... parts) const {
+    say(Notice::Severity::warning, name, reason, parts...);
+  }
+  /// Says that the command was refused and the scene is as before.
+  template <class... Parts>
+  void refuse(std::string_view name, std::string_view reason, const Parts&... parts) const {
+    say(Notice::Severity::error, name, reason, parts...);
+  }
+  template <class... Parts>
+  void tell(std::string_view name, std::string_view reason, const Parts&... parts) const {
+    say(Notice::Severity::normal, name, reason, parts...);
+  }
+
+ private:
+  /// "name parts…: reason".
+  template <class... Parts>
+  void say(Notice::Severity severity, std::string_view name, std::string_view reason,
+           const Parts&... parts) const {
+    std::ostringstream text;
+    text << name;
+    static_cast<void>((text << ... << parts));
+    text << ": " << reason;
+    std::string kind;
+    kind.append(name).append(1, '/').append(reason);
+    board.post({client, severity, std::move(text).str()}, std::move(kind), now, out);
+  }
+};
+
+}  // namespace hapticd::scene

@@ -1,0 +1,175 @@
+// From edited objects to the list and the index that a snapshot shows.
+#include <algorithm>
+
+#include "scene/object_table.h"
+
+namespace hapticd::scene {
+namespace {
+
+bool contains(const Box& outer, const Box& inner) {
+  return (outer.min.array() <= inner.min.array()).all() && (inner.max.array() <= outer.max.array()).all();
+}
+
+// Objects that move get boxes with room for about a quarter of a second, so that the index over thousands of
+// them is not built anew for each of their poses.
+Box withRoom(const Object& object, const Box& swept) {
+  const Motion& motion = object.motion;
+  if (motion.origin().matrix() == motion.destination().matrix()) return swept;
+  constexpr double kRoom_s = 0.25;
+  const Vec3 centre = object.geometry->index.bounds().centre();
+  const Vec3 way = motion.destination() * centre - motion.origin() * centre;
+  const double ahead =
+      std::clamp(kRoom_s / geometry::toSeconds(std::max<Nanos>(object.travel, 1)), 1.0, 64.0);
+  Box box = swept;
+  box.extend(Box{swept.min + ahead * way, swept.max + ahead * way});
+  const Vec3 turning = 0.05 * swept.extents();
+  return {box.min - turning, box.max + turning};
+}
+
+}  // namespace
+
+Affine ObjectTable::frameOf(const Object& object) const {
+  Affine local = object.T_parent_object;
+  local.translation() *= object.worldUnits();
+  if (const Object* parent = find(object.parent)) return frameOf(*parent) * local;
+  return object.parent == Object::kScene ? Affine(T_world_scene_ * local) : local;
+}
+
+std::optional<Nanos> ObjectTable::nextDeadline() const {
+  std::optional<Nanos> next;
+  for (const std::int32_t id : edited_) {
+    const Object* object = find(id);
+    std::optional<Nanos> due = object != nullptr ? object->mesh.due() : std::nullopt;
+    if (!due) continue;
+    if (object->mesh.hasBeenPublished() && !object->mesh.finished()) due = std::max(*due, rebuildNotBefore_);
+    next = std::min(next.value_or(*due), *due);
+  }
+  return next;
+}
+
+// A first upload is never held back; rebuilding what can be touched already takes a quarter of the time.
+void ObjectTable::commitMeshes(Nanos now) {
+  if (edited_.empty()) return;
+  const Nanos started = stopwatch_();
+  const auto clock = [&] { return now + (stopwatch_() - started); };
+  std::erase_if(edited_, [&](std::int32_t id) {
+    Object* object = find(id);
+    const std::optional<Nanos> due = object != nullptr ? object->mesh.due() : std::nullopt;
+    if (!due) {
+      if (object != nullptr) object->meshQueued = false;
+      return true;
+    }
+    const bool rebuild = object->mesh.hasBeenPublished() && !object->mesh.finished();
+    if (*due > now || (rebuild && clock() < rebuildNotBefore_)) return false;
+    const Nanos begin = clock();
+    object->geometry = object->mesh.commit(clock);
+    object->meshQueued = false;
+    if (rebuild) rebuildNotBefore_ = clock() + 3 * (clock() - begin);
+    object->stateChanged = true;
+    queue(*object);
+    return true;
+  });
+}
+
+void ObjectTable::updateMotion(Object& object, Nanos now) {
+  Affine T_world_object = frameOf(object) * Eigen::UniformScaling<double>(object.worldUnits());
+  T_world_object = T_world_object * object.T_object_mesh;
+  const Affine& present = object.motion.destination();
+  const bool first = object.motion.jumps() == 0;
+  if (!isInvertible(T_world_object)) return;  // a chain of parents out of range: stay
+  if (!first && T_world_object.matrix() == present.matrix()) return;
+  const bool sameHand = T_world_object.linear().determinant() * present.linear().determinant() > 0;
+  object.motion = object.travel > 0 && sameHand && !first
+                      ? Motion::between(object.motion.at(now), T_world_object, now, now + object.travel,
+                                        object.motion.jumps())
+                      : Motion::fixed(T_world_object, ++jumps_);
+  object.stateChanged = true;
+}
+
+void ObjectTable::updateSurface(Object& object, Nanos now, NoticeBoard& board, std::vector<Notice>& out) {
+  std::string remark;
+  const Surface surface = object.settings.resolve(bound_, remark);
+  if (!remark.empty() && remark != object.surfaceRemark) {
+    const Call call{object.surfaceSetBy, now, false, board, out};
+    call.warn("surface of object", remark.substr(0, remark.size() - 2), " ", object.id);
+  }
+  object.surfaceRemark = remark;
+  object.surface = surface;
+  object.stateChanged = true;
+}
+
+bool ObjectTable::publish(Nanos now, NoticeBoard& board, std::vector<Notice>& out) {
+  commitMeshes(now);
+  return updatePublished(now, board, out);
+}
+
+bool ObjectTable::updatePublished(Nanos now, NoticeBoard& board, std::vector<Notice>& out) {
+  bool changed = false;
+  for (const std::int32_t id : changed_) {
+    Object* object = find(id);
+    if (object == nullptr || !object->queued) continue;
+    object->queued = false;
+    if (object->surfaceChanged) updateSurface(*object, now, board, out);
+    if (object->moved) updateMotion(*object, now);
+    object->surfaceChanged = false;
+    object->moved = false;
+    const bool listed = object->position >= 0;
+    if (listed != object->canBeFelt()) {
+      listChanged_ = true;
+    } else if (listed && object->stateChanged) {
+      replaceState(*object);
+      changed = true;
+    }
+  }
+  changed_.clear();
+  if (listChanged_) {
+    listAnew();
+    changed = true;
+  }
+  if (indexStale_) indexAnew();
+  return changed;
+}
+
+void ObjectTable::replaceState(Object& object) {
+  object.state = std::make_shared<const ObjectState>(
+      ObjectState{object.id, object.geometry, object.motion, object.surface});
+  object.stateChanged = false;
+  const auto position = static_cast<std::size_t>(object.position);
+  published_.objects[position] = object.state;
+  const Box swept = object.motion.sweep(object.geometry->index.bounds());
+  if (contains(boxes_[position], swept)) return;
+  boxes_[position] = withRoom(object, swept);
+  indexStale_ = true;
+}
+
+void ObjectTable::listAnew() {
+  published_.objects.clear();
+  boxes_.clear();
+  for (const auto& object : objects_) {
+    if (!object) continue;
+    if (!object->canBeFelt()) {
+      object->position = -1;
+      object->state.reset();
+      object->stateChanged = true;
+      continue;
+    }
+    object->position = static_cast<std::int64_t>(published_.objects.size());
+    published_.objects.push_back(object->state);
+    boxes_.emplace_back();
+    if (object->stateChanged) {
+      replaceState(*object);
+    } else {
+      boxes_.back() = object->motion.sweep(object->geometry->index.bounds());
+    }
+  }
+  listChanged_ = false;
+  indexStale_ = true;
+}
+
+void ObjectTable::indexAnew() {
+  published_.index = std::make_shared<const SpatialIndex>(SpatialIndex::build(
+      static_cast<std::uint32_t>(boxes_.size()), [this](std::uint32_t i) { return boxes_[i]; }));
+  indexStale_ = false;
+}
+
+}  // namespace hapticd::scene

@@ -1,0 +1,167 @@
+// The objects of a scene while clients edit them: a tree of placements with meshes and surfaces.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "scene/commands.h"
+#include "scene/config.h"
+#include "scene/matrices.h"
+#include "scene/mesh_draft.h"
+#include "scene/notice_board.h"
+#include "scene/snapshot.h"
+#include "scene/surface_settings.h"
+
+namespace hapticd::scene {
+
+/// Poses that come at intervals: near enough in time, they are one movement.
+struct PoseStream {
+  static constexpr Nanos kSameMoment = 500'000;      ///< parts of one pose
+  static constexpr Nanos kLongestGap = 100'000'000;  ///< beyond, a pose is a jump
+  static constexpr Nanos kLongestBlend = 50'000'000;
+
+  /// A pose has come: how long to travel to it; 0 is a jump.
+  Nanos next(Nanos now);
+
+ private:
+  bool any_ = false;
+  Nanos last_ = 0;
+  Nanos interval_ = 0;
+};
+
+/// One object as clients see it.
+struct Object {
+  static constexpr std::int32_t kScene = -1;    ///< parent: below the scene's origin
+  static constexpr std::int32_t kNowhere = -2;  ///< parent: a root of its own
+
+  std::int32_t id = 0;
+  bool inMetres = false;  ///< stock geometry: one object unit is 1000 world units
+  bool touchable = true;
+  std::int32_t parent = kScene;
+  std::vector<std::int32_t> children;
+
+  Affine T_parent_object = Affine::Identity();  ///< translation in object units
+  geometry::Quat rotation = geometry::Quat::Identity();
+  Vec3 scale = Vec3::Ones();
+  Affine T_object_mesh = Affine::Identity();
+  PoseStream poses;
+
+  MeshDraft mesh;
+  SurfaceSettings settings;
+  ClientId surfaceSetBy = 0;
+
+  // What is published of it, and what must be.
+  std::shared_ptr<const MeshGeometry> geometry;
+  Surface surface;
+  std::string surfaceRemark;
+  Motion motion;
+  std::shared_ptr<const ObjectState> state;
+  bool queued = false;      ///< in the table's list of changed ones
+  bool meshQueued = false;  ///< in its list of edited meshes
+  bool stateChanged = true;
+  bool surfaceChanged = false;
+  bool moved = false;
+  Nanos travel = 0;            ///< of the pending move; 0 is a jump
+  std::int64_t position = -1;  ///< in the published list
+
+  double worldUnits() const { return inMetres ? 1000 : 1; }
+  bool canBeFelt() const {
+    return touchable && geometry && geometry->index.size() > 0 && !geometry->index.bounds().empty() &&
+           surface.stiffness_N_per_m > 0;
+  }
+};
+
+/// What a snapshot shows of the objects; shared parts are those of the snapshot before.
+struct PublishedObjects {
+  std::vector<std::shared_ptr<const ObjectState>> objects;
+  std::shared_ptr<const SpatialIndex> index;
+};
+
+/// All objects by id. Commands check everything before they change anything.
+class ObjectTable {
+ public:
+  explicit ObjectTable(const SceneConfig& config);
+
+  void apply(const SetObjectNumber&, const Call&);
+  void apply(SetVertices&&, const Call&);
+  void apply(const SetTriangles&, const Call&);
+  void apply(const SetNormal&, const Call&);
+  void apply(const RemoveTriangle&, const Call&);
+  void apply(const ClearMesh&, const Call&);
+  void apply(const TransformMesh&, const Call&);
+  void apply(const SetTrimeshType&, const Call&);
+  void apply(const AddObject&, const Call&);
+  void apply(const AddObjectExScene&, const Call&);
+  void apply(const MoveToParent&, const Call&);
+  void apply(const RemoveObject&, const Call&);
+  void apply(const SetTransform&, const Call&);
+  void apply(const SetObjectPosition&, const Call&);
+  void apply(const SetObjectOrientation&, const Call&);
+  void apply(const SetObjectScale&, const Call&);
+  void apply(const SetTouchable&, const Call&);
+  void apply(const SetSurfaceProperty&, const Call&);
+  void apply(const SetSurface&, const Call&);
+  void apply(const SetSceneOrigin&, const Call&);
+
+  /// Object 0 alone, empty.
+  void reset();
+
+  std::optional<Nanos> nextDeadline() const;
+  /// Brings `published` up to date; false when nothing changed. Remarks on surfaces go to who set them.
+  bool publish(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
+  const PublishedObjects& published() const { return published_; }
+
+ private:
+  Object* find(std::int32_t id) const;
+  Object* find(std::int32_t id, std::string_view name, const Call& call) const;
+  void create(std::int32_t id, std::int32_t parent);
+  void erase(std::int32_t id);
+  void attach(Object& object, std::int32_t parent);
+  void detach(Object& object);
+  bool checkParent(std::int32_t id, std::int32_t parent, std::string_view name, const Call& call) const;
+  std::int32_t depth(std::int32_t id) const;
+  std::int32_t height(const Object& object) const;
+  template <class F>
+  void withDescendants(Object& object, const F& f);
+
+  bool hasRoom(const Object& object, std::int32_t first, std::size_t count, std::size_t present,
+               std::uint32_t perObject, std::uint64_t inAll, std::uint64_t used, std::string_view name,
+               std::string_view what, const Call& call) const;
+  void becomeStock(Object& object);
+  void place(Object& object, const Affine& T_parent_object, const Call& call);
+  void moveAll(Object& object, Nanos travel);
+  void queue(Object& object);
+  void meshEdited(Object& object, const Call& call);
+
+  /// World from the object's frame, measured in world units; the chain of parents without a mesh's own part.
+  Affine frameOf(const Object& object) const;
+  void commitMeshes(Nanos now);
+  void updateMotion(Object& object, Nanos now);
+  void updateSurface(Object& object, Nanos now, NoticeBoard& board, std::vector<Notice>& out);
+  bool updatePublished(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
+  void replaceState(Object& object);
+  void listAnew();
+  void indexAnew();
+
+  const SceneConfig& config_;
+  PassivityBound bound_;
+  std::function<Nanos()> stopwatch_;
+  std::vector<std::unique_ptr<Object>> objects_;
+  Affine T_world_scene_ = Affine::Identity();
+  std::uint64_t vertices_ = 0;
+  std::uint64_t triangles_ = 0;
+  std::uint32_t jumps_ = 0;  // one counter for all: a number never comes back, whatever is removed
+
+  std::vector<std::int32_t> changed_;
+  std::vector<std::int32_t> edited_;  // meshes with edits
+  Nanos rebuildNotBefore_ = 0;
+  bool listChanged_ = true;
+  bool indexStale_ = true;
+
+  PublishedObjects published_;
+  std::vector<Box> boxes_;  // of the index: with room to move
+};
+
+}  // namespace hapticd::scene

@@ -1,0 +1,30 @@
+// How stiff and damped a wall may be before the sampled loop feeds energy to the hand.
+#pragma once
+
+#include <limits>
+
+#include "scene/config.h"
+
+namespace hapticd::scene {
+
+/// K (T/2 + t_d) + B < b (Colgate and Schenkel 1997, with the transport delay added to half a period).
+class PassivityBound {
+ public:
+  explicit PassivityBound(const SceneConfig& config)
+      : delay_s_(config.servoPeriod_s / 2 + config.transportDelay_s),
+        damping_Ns_per_m_(config.raw ? std::numeric_limits<double>::infinity()
+                                     : kMargin * config.ownDamping_Ns_per_m) {}
+
+  double maxStiffness_N_per_m() const { return damping_Ns_per_m_ / delay_s_; }
+  /// What damping is left beside a stiffness.
+  double maxDamping_Ns_per_m(double stiffness_N_per_m) const {
+    return damping_Ns_per_m_ - stiffness_N_per_m * delay_s_;
+  }
+
+ private:
+  static constexpr double kMargin = 0.999;  // the bound itself is not passive
+  double delay_s_;
+  double damping_Ns_per_m_;
+};
+
+}  // namespace hapticd::scene

@@ -1,0 +1,137 @@
+#include "scene/surface_settings.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace hapticd::scene {
+namespace {
+
+constexpr double kReferenceStiffness_N_per_m = 500;
+constexpr double kReferenceDamping_Ns_per_m = 2;
+constexpr double kReferenceForce_N = 3.3;
+constexpr double kStockStiffness_N_per_m = 1000;
+constexpr double kStockDamping_Ns_per_m = 1000;
+constexpr double kStockMaxDamping = 0.005;
+
+std::string number(double value) {
+  std::ostringstream text;
+  text << value;
+  return std::move(text).str();
+}
+
+// Floats that a client meant as the limit are the limit.
+constexpr double kRounding = 1e-6;
+
+double clampStock(double value, double max, bool raw, std::string_view what, const Call& call,
+                  std::string_view name, std::int32_t id) {
+  const double limit = raw ? std::numeric_limits<double>::infinity() : max;
+  if (value >= 0 && value <= limit * (1 + kRounding)) return value;
+  const double clamped = std::isfinite(value) ? std::clamp(value, 0.0, limit) : 0.0;
+  call.warn(name, "out of range, clamped", " ", id, ", ", what, " ", value, " is not within 0 to ", max, ", ",
+            clamped, " is used");
+  return clamped;
+}
+
+}  // namespace
+
+bool SurfaceSettings::set(const SetSurfaceProperty& command, const SceneConfig& config, const Call& call) {
+  constexpr std::string_view kName = "setHapticProperty";
+  const bool ofDevice = config.materialScale == MaterialScale::device;
+  struct Row {
+    std::string_view name;
+    double Surface::*member;
+    double scale;
+    double max;
+  };
+  const double infinity = std::numeric_limits<double>::infinity();
+  const double one = config.raw ? infinity : 1.0;
+  const Row rows[] = {
+      {"stiffness", &Surface::stiffness_N_per_m,
+       ofDevice ? config.nominalStiffness_N_per_m : kReferenceStiffness_N_per_m, one},
+      {"damping", &Surface::damping_Ns_per_m, kReferenceDamping_Ns_per_m, one},
+      {"static friction", &Surface::static_friction, 1, one},
+      {"dynamic friction", &Surface::dynamic_friction, 1, one},
+      {"popthrough", &Surface::popthrough_N, ofDevice ? config.nominalForce_N : kReferenceForce_N, one},
+      {"mass", &Surface::mass_kg, 1, infinity},
+  };
+  const Row* row =
+      std::find_if(std::begin(rows), std::end(rows), [&](const Row& r) { return r.name == command.name; });
+  if (row == std::end(rows)) {
+    call.warn(kName,
+              "unknown property, ignored; use stiffness, damping, static friction, dynamic friction, "
+              "popthrough or mass",
+              " object ", command.object, ", '", command.name, "'");
+    return false;
+  }
+  if (!std::isfinite(command.value)) {
+    call.refuse(kName, "not finite, the old value stays", " object ", command.object, ", ", command.name, " ",
+                command.value);
+    return false;
+  }
+  const double value = std::clamp(command.value, 0.0, row->max);
+  if (value != command.value) {
+    call.warn(kName, "out of range, clamped", " object ", command.object, ", ", command.name, " ",
+              command.value, " becomes ", value);
+  }
+  if (row->member == &Surface::static_friction) staticGiven_ = true;
+  const double before = asked_.*row->member;
+  asked_.*row->member = value * row->scale;
+  return asked_.*row->member != before;
+}
+
+void SurfaceSettings::set(const SetSurface& command, const SceneConfig& config, const Call& call) {
+  const Surface stock =
+      surfaceFromStock(command.stiffness, command.damping, command.staticFriction, command.dynamicFriction,
+                       config, call, "updateTrimeshChanges object", command.object);
+  asked_.stiffness_N_per_m = stock.stiffness_N_per_m;
+  asked_.damping_Ns_per_m = stock.damping_Ns_per_m;
+  asked_.static_friction = stock.static_friction;
+  asked_.dynamic_friction = stock.dynamic_friction;
+  staticGiven_ = true;
+}
+
+Surface SurfaceSettings::resolve(const PassivityBound& bound, std::string& remark) const {
+  Surface surface = asked_;
+  if (surface.dynamic_friction > surface.static_friction) {
+    if (staticGiven_) {
+      remark += "dynamic friction " + number(surface.dynamic_friction) + " is above static friction " +
+                number(surface.static_friction) + " and is lowered to it; ";
+    }
+    surface.dynamic_friction = surface.static_friction;
+  }
+  keepPassive(surface, bound, remark);
+  return surface;
+}
+
+Surface surfaceFromStock(double stiffness, double damping, double staticFriction, double dynamicFriction,
+                         const SceneConfig& config, const Call& call, std::string_view name,
+                         std::int32_t id) {
+  const auto clamp = [&](double value, double max, std::string_view what) {
+    return clampStock(value, max, config.raw, what, call, name, id);
+  };
+  Surface surface;
+  surface.stiffness_N_per_m = kStockStiffness_N_per_m * clamp(stiffness, 1, "stiffness");
+  surface.damping_Ns_per_m = kStockDamping_Ns_per_m * clamp(damping, kStockMaxDamping, "damping");
+  surface.static_friction = clamp(staticFriction, 1, "static friction");
+  surface.dynamic_friction = clamp(dynamicFriction, 1, "dynamic friction");
+  return surface;
+}
+
+void keepPassive(Surface& surface, const PassivityBound& bound, std::string& remark) {
+  if (const double max = bound.maxStiffness_N_per_m(); surface.stiffness_N_per_m > max) {
+    remark += "stiffness " + number(surface.stiffness_N_per_m) +
+              " N/m would be unstable on this device and is "
+              "lowered to " +
+              number(max) + "; ";
+    surface.stiffness_N_per_m = max;
+  }
+  const double max = std::max(0.0, bound.maxDamping_Ns_per_m(surface.stiffness_N_per_m));
+  if (surface.damping_Ns_per_m > max) {
+    remark += "damping " + number(surface.damping_Ns_per_m) + " N s/m beside stiffness " +
+              number(surface.stiffness_N_per_m) + " N/m would be unstable on this device and is lowered to " +
+              number(max) + "; ";
+    surface.damping_Ns_per_m = max;
+  }
+}
+
+}  // namespace hapticd::scene

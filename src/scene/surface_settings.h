@@ -1,0 +1,39 @@
+// From what a client asks of a surface to what is rendered.
+#pragma once
+
+#include <limits>
+#include <string>
+#include <string_view>
+
+#include "scene/commands.h"
+#include "scene/config.h"
+#include "scene/notice_board.h"
+#include "scene/passivity.h"
+#include "scene/surface.h"
+
+namespace hapticd::scene {
+
+/// What was asked, in SI, not yet weighed against each other: properties come one by one in any order.
+class SurfaceSettings {
+ public:
+  /// One property by its name; answers by notices. False when nothing changed.
+  bool set(const SetSurfaceProperty& command, const SceneConfig& config, const Call& call);
+  /// All but popthrough and mass, in stock units.
+  void set(const SetSurface& command, const SceneConfig& config, const Call& call);
+
+  /// The surface within the passivity bound, friction in order; `remark` says what was lowered.
+  Surface resolve(const PassivityBound& bound, std::string& remark) const;
+
+ private:
+  Surface asked_;
+  bool staticGiven_ = false;  // dynamic friction alone is not yet a contradiction
+};
+
+/// Stock stiffness, damping and frictions in SI; clamped with warnings unless raw.
+Surface surfaceFromStock(double stiffness, double damping, double staticFriction, double dynamicFriction,
+                         const SceneConfig& config, const Call& call, std::string_view name, std::int32_t id);
+
+/// Lowers damping, then stiffness, to the bound; appends what was done to `remark`.
+void keepPassive(Surface& surface, const PassivityBound& bound, std::string& remark);
+
+}  // namespace hapticd::scene
