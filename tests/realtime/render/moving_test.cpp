@@ -1,0 +1,179 @@
+// Geometry that moves, bends, jumps and vanishes under the hand: T9a, T9c, T9d, T20 of the ground truth (T9b
+// stands with the friction).
+#include "variants.h"
+
+namespace hapticd::realtime::fixture {
+namespace {
+
+class MovingTest : public VariantTest {
+ protected:
+  double units() const { return GetParam().worldUnitsPerMetre; }
+  Affine shifted(const scene::ObjectState& object, const Vec3& by_m) const {
+    Affine t = object.motion.destination();
+    t.pretranslate(units() * by_m);
+    return t;
+  }
+};
+INSTANTIATE_TEST_SUITE_P(, MovingTest, kVariants, variantName);
+
+// T9a      o   a hand at rest, 1 mm above
+//       =======   a plate rising at 50 mm/s by 4 mm: F = k d(t), one step per tick of at most k v T
+TEST_P(MovingTest, rising_plate_lifts_a_resting_hand) {
+  for (const auto faces : {scene::TouchableFaces::front, scene::TouchableFaces::both}) {
+    scene = SceneFixture();
+    scene.setWorldUnitsPerMetre(units());
+    scene.faces = faces;
+    scene::ObjectState& object = add(heightField(
+                                         0.02, 40, [](double, double) { return 0.0; }, 0.3),
+                                     surface());
+    object.motion = scene::Motion::between(object.motion.origin(), shifted(object, {0, 0, 0.004}),
+                                           toNanos(0.01), toNanos(0.09));
+    start({0.0003, 0.0002, 0.001});
+    for (int i = 0; i < 120; ++i) {
+      const double risen =
+          0.05 * geometry::toSeconds(std::clamp<Nanos>(hand->time() - toNanos(0.01), 0, toNanos(0.08)));
+      const Rendering& r = at({0.0003, 0.0002, 0.001});
+      EXPECT_NEAR((r.force_N - Vec3(0, 0, 1000 * std::max(0.0, risen - 0.001))).norm(), 0, 1e-3) << i;
+      EXPECT_EQ(r.status, 0U);
+    }
+  }
+}
+
+// A fast one, 20 mm in a tick of 1 ms and no thicker than a sheet, does not pass through the hand either.
+TEST_P(MovingTest, fast_sheet_does_not_pass_through_the_hand) {
+  scene.faces = scene::TouchableFaces::both;
+  scene::ObjectState& object = add(plane(0.02, 10), surface());
+  object.motion =
+      scene::Motion::between(shifted(object, {0, 0, -0.005}), shifted(object, {0, 0, 0.015}), 0, kTick);
+  start({0.0003, 0.0002, 0.001});
+  EXPECT_NEAR(at({0.0003, 0.0002, 0.001}).force_N.z(), 14, 1e-3);
+}
+
+// T9c  poses at 60 Hz, each the goal of the motion since the one before: no 60 Hz steps
+TEST_P(MovingTest, interpolated_pose_stream_has_no_steps) {
+  scene::ObjectState& object = add(plane(0.05, 20), surface());
+  const Affine home = object.motion.destination();
+  const auto height = [](double t) { return 0.002 * std::sin(2 * M_PI * 0.5 * t); };
+  const auto pose = [&](double t) {
+    Affine p = home;
+    p.pretranslate(units() * Vec3(0, 0, height(t)));
+    return p;
+  };
+  start({0.001, 0.002, 0.001});
+  to({0.001, 0.002, -0.003});
+  const double interval = 1.0 / 60;
+  double next = geometry::toSeconds(hand->time());
+  double previousForce = hand->now().force_N.z();
+  double t0 = next;
+  for (int i = 0; i < 1000; ++i) {
+    const double t = geometry::toSeconds(hand->time());
+    if (t >= next) {
+      object.motion = scene::Motion::between(pose(std::max(0.0, next - t0 - interval)), pose(next - t0),
+                                             toNanos(next), toNanos(next + interval));
+      hand->show(scene.snapshot());
+      next += interval;
+    }
+    const Rendering& r = at({0.001, 0.002, -0.003});
+    const double delayed = height(std::max(0.0, t - t0 - interval));
+    EXPECT_NEAR(r.force_N.z(), 1000 * (0.003 + delayed), 0.05);
+    EXPECT_LE(std::abs(r.force_N.z() - previousForce), 1000 * 0.002 * M_PI * 1e-3 + 1e-3);
+    previousForce = r.force_N.z();
+  }
+}
+
+// T9d  the vertices under the hand rise by 1 mm in 100 ms, as a hump or as a whole
+TEST_P(MovingTest, deforming_surface_is_felt_like_a_moving_one) {
+  for (const double depth : {-0.0004, 0.0005}) {  // the hand is above, or already in contact
+    scene = SceneFixture();
+    scene.setWorldUnitsPerMetre(units());
+    TriangleMesh mesh = heightField(
+        0.02, 100, [](double, double) { return 0.0; }, 0.3);
+    geometry::scaleAndMove(mesh, units(), Vec3::Zero());
+    std::vector<geometry::Vec3f> risen = mesh.vertices;
+    const auto hump = [&](double x, double y) {
+      return 0.001 * std::exp(-(x * x + y * y) / (0.005 * 0.005));
+    };
+    for (auto& v : risen) {
+      v.z() += static_cast<float>(units() * hump(v.x() / units(), v.y() / units()));
+    }
+    const auto placed = scene::Motion::fixed(Affine(Eigen::Translation3d(units() * offset())));
+    scene::ObjectState& object = scene.add(geometryOf(mesh, 5), surface(), placed);
+    start({0.0003, 0.0002, 0.001});
+    to({0.0003, 0.0002, -depth});
+    const Nanos begin = hand->time();
+    object.mesh = geometryOf(mesh, 5, &risen, begin, begin + toNanos(0.1));
+    hand->show(scene.snapshot());
+    double last = hand->now().force_N.z();
+    for (int i = 0; i < 150; ++i) {
+      if (i == 120) {  // it comes to rest as an ordinary mesh
+        TriangleMesh rest = mesh;
+        rest.vertices = risen;
+        object.mesh = geometryOf(rest, 5);
+        hand->show(scene.snapshot());
+      }
+      const double s = std::min(1.0, geometry::toSeconds(hand->time() - begin) / 0.1);
+      const Rendering& r = at({0.0003, 0.0002, -depth});
+      const double d = std::max(0.0, depth + s * hump(0.0003, 0.0002));
+      EXPECT_NEAR(r.force_N.norm(), 1000 * d, 0.02) << i;
+      EXPECT_LE(std::abs(r.force_N.z() - last), 0.05);
+      EXPECT_EQ(r.status, 0U);
+      last = r.force_N.z();
+    }
+    EXPECT_NEAR(last, 1000 * (depth + 0.001), 0.02);
+  }
+}
+
+// A turning drum under a pressed finger with much friction: the proxy goes round with it.
+TEST_P(MovingTest, turning_object_carries_a_sticking_proxy) {
+  scene::ObjectState& object = add(sphere(0.03, 40), surface(1000, 5, 5));
+  Affine turned = object.motion.origin();
+  turned.rotate(Eigen::AngleAxisd(0.05, Vec3::UnitY()));
+  object.motion = scene::Motion::between(object.motion.origin(), turned, toNanos(0.1), toNanos(0.2));
+  start({0.0003, 0.0002, 0.032});
+  to({0.0003, 0.0002, 0.029});
+  while (hand->time() < toNanos(0.1)) at({0.0003, 0.0002, 0.029});
+  const Vec3 held = proxy();
+  while (hand->time() < toNanos(0.22)) at({0.0003, 0.0002, 0.029});
+  EXPECT_NEAR((proxy() - Eigen::AngleAxisd(0.05, Vec3::UnitY()) * held).norm(), 0, 1e-7);
+}
+
+// A small jump of what is touched takes the proxy along and says so; a large one ends the contact.
+TEST_P(MovingTest, jumps_are_reported) {
+  scene::ObjectState& object = add(plane(0.05, 10), surface());
+  start({0.001, 0.002, 0.001});
+  to({0.001, 0.002, -0.001});
+  object.motion = scene::Motion::fixed(shifted(object, {0, 0, 0.0005}), 1);
+  hand->show(scene.snapshot());
+  EXPECT_NEAR(at({0.001, 0.002, -0.001}).force_N.z(), 1.5, 1e-3);
+  EXPECT_NE(hand->now().status & kRenderGeometryJump, 0U);
+  EXPECT_EQ(at({0.001, 0.002, -0.001}).status, 0U);
+  object.motion = scene::Motion::fixed(shifted(object, {0, 0, 0.05}), 2);
+  hand->show(scene.snapshot());
+  EXPECT_EQ(at({0.001, 0.002, -0.001}).force_N.norm(), 0);
+  EXPECT_NE(hand->now().status & kRenderGeometryJump, 0U);
+  EXPECT_FALSE(hand->now().touching);
+}
+
+// T20  the touched object vanishes: no force, and a bit for the guard to blend by; what lies below still
+// holds
+TEST_P(MovingTest, vanishing_object_ends_its_contact_only) {
+  add(plane(0.05, 10), surface());
+  scene::ObjectState& upper = add(plane(0.05, 7), surface());
+  upper.motion = scene::Motion::fixed(shifted(upper, {0, 0, 0.001}));
+  start({0.001, 0.002, 0.002});
+  EXPECT_NEAR(to({0.001, 0.002, -0.001}).force_N.z(), 2, 1e-3);
+  SceneFixture below;
+  below.setWorldUnitsPerMetre(units());
+  scene = below;
+  add(plane(0.05, 10), surface());
+  hand->show(scene.snapshot());
+  EXPECT_NEAR(at({0.001, 0.002, -0.001}).force_N.z(), 1, 1e-3);
+  EXPECT_NE(hand->now().status & kRenderGeometryJump, 0U);
+  scene = below;
+  hand->show(scene.snapshot());
+  EXPECT_EQ(at({0.001, 0.002, -0.001}).force_N.norm(), 0);
+  EXPECT_NE(hand->now().status & kRenderGeometryJump, 0U);
+}
+
+}  // namespace
+}  // namespace hapticd::realtime::fixture

@@ -1,0 +1,139 @@
+// Placement, popthrough, damping and what is not a number: T15, T17 of the ground truth.
+#include <limits>
+
+#include "variants.h"
+
+namespace hapticd::realtime::fixture {
+namespace {
+
+class ObjectTest : public VariantTest {};
+INSTANTIATE_TEST_SUITE_P(, ObjectTest, kVariants, variantName);
+
+// T15   o |   a plate felt from both sides gives way at 1.5 N, is felt again from behind, and gives way again
+//         | o
+TEST_P(ObjectTest, popthrough_gives_way_at_its_force) {
+  scene.faces = scene::TouchableFaces::both;
+  scene::Surface s = surface();
+  s.popthrough_N = 1.5;
+  add(plane(0.05, 10), s);
+  start({0.0013, 0.0021, 0.001});
+  double most = 0;
+  for (const double side : {1.0, -1.0, 1.0}) {
+    most = 0;
+    bool popped = false;
+    to({0.0013, 0.0021, -side * 0.002}, 0.01, [&](const Rendering& r) {
+      most = std::max(most, side * r.force_N.z());
+      if ((r.status & kRenderPopthrough) != 0) {
+        EXPECT_FALSE(popped);
+        popped = true;
+        EXPECT_NEAR(hip().z(), -side * 0.0015, 0.00002);
+      }
+      if (popped) {
+        EXPECT_EQ(r.force_N.norm(), 0);
+      }
+    });
+    EXPECT_TRUE(popped);
+    EXPECT_NEAR(most, 1.5, 0.03);
+  }
+}
+
+// Two plates close together: the one behind is not popped before proxy and hand have met again.
+TEST_P(ObjectTest, popthrough_waits_until_proxy_and_hand_agree) {
+  scene::Surface s = surface();
+  s.popthrough_N = 1.0;
+  add(plane(0.05, 10), s);
+  s.popthrough_N = 0.2;
+  TriangleMesh lower = plane(0.05, 10);
+  geometry::scaleAndMove(lower, 1, Vec3(0, 0, -0.0005));
+  add(lower, s);
+  start({0.0013, 0.0021, 0.001});
+  int pops = 0;
+  to({0.0013, 0.0021, -0.003}, 0.01,
+     [&](const Rendering& r) { pops += (r.status & kRenderPopthrough) != 0 ? 1 : 0; });
+  EXPECT_EQ(pops, 1);
+  EXPECT_NEAR(hand->now().force_N.z(), 2.5, 1e-3);
+}
+
+// T17  shear and unequal scale in the transform: the forces of the same mesh sheared by hand
+TEST_P(ObjectTest, shear_in_the_transform_equals_shear_in_the_mesh) {
+  const double units = GetParam().worldUnitsPerMetre;
+  geometry::Mat3 shear;
+  shear << 1.5, 0.3, 0.2, 0, 0.6, 0.1, 0.1, 0, 0.9;
+  TriangleMesh byHand = sphere(0.03, 40);
+  for (auto& v : byHand.vertices) v = (shear * v.cast<double>()).cast<float>();
+  add(byHand, surface());
+  const auto byHandScene = scene.snapshot();
+  scene = SceneFixture();
+  scene.setWorldUnitsPerMetre(units);
+  Affine placed(Eigen::Translation3d(units * offset()));
+  placed.linear() = units * shear;
+  scene.add(sphere(0.03, 40), surface(), placed);
+  Hand first(byHandScene);
+  Hand second(scene.snapshot());
+  for (int i = 0; i < 600; ++i) {
+    const double a = 0.002 * i;
+    const double reach = 1.2 - 0.3 * std::min(1.0, i / 100.0);
+    const Vec3 p = offset() + reach * shear * (0.03 * Vec3(std::cos(a), 0.3, std::sin(a)).normalized());
+    const Vec3 f = first.at(p).force_N;
+    EXPECT_NEAR((second.at(p).force_N - f).norm(), 0, 0.01 * f.norm() + 1e-4);
+    if (i > 100) {
+      EXPECT_GT(f.norm(), 0.5);
+    }
+  }
+}
+
+// A reflection in the placement keeps the outside outside.
+TEST_P(ObjectTest, mirrored_object_keeps_its_outside) {
+  const double units = GetParam().worldUnitsPerMetre;
+  Affine mirrored(Eigen::Translation3d(units * offset()));
+  mirrored.linear() = Vec3(-units, units, units).asDiagonal();
+  scene.add(box(Vec3::Constant(-0.01), Vec3::Constant(0.01)), surface(), mirrored);
+  start({0.0003, 0.0002, 0.012});
+  EXPECT_NEAR(to({0.0003, 0.0002, 0.009}).force_N.z(), 1, 1e-3);
+}
+
+// Damping takes from the spring when the hand leaves and adds when it comes, and never pulls.
+TEST_P(ObjectTest, damping_never_pulls) {
+  scene::Surface s = surface();
+  s.damping_Ns_per_m = 2;
+  add(plane(0.05, 10), s);
+  start({0.0013, 0.0021, 0.001});
+  to({0.0013, 0.0021, -0.001}, 0.1);
+  EXPECT_NEAR(hand->now().force_N.z(), 1.0 + 0.2, 1e-3);
+  at({0.0013, 0.0021, -0.001});
+  EXPECT_NEAR(hand->now().force_N.z(), 1.0, 1e-3);
+  EXPECT_NEAR(at({0.0013, 0.0021, -0.0009}).force_N.z(), 0.9 - 0.2, 1e-3);
+  EXPECT_EQ(at({0.0013, 0.0021, -0.0002}).force_N.z(), 0);
+}
+
+// A hand that is not a number gives no force, and the next good one starts afresh.
+TEST_P(ObjectTest, hand_that_is_not_finite_gives_no_force) {
+  add(plane(0.05, 10), surface());
+  start({0.001, 0.002, 0.001});
+  to({0.001, 0.002, -0.001});
+  EXPECT_EQ(at({std::numeric_limits<double>::quiet_NaN(), 0, 0}).force_N.norm(), 0);
+  EXPECT_EQ(hand->now().status, kRenderNotFinite);
+  EXPECT_EQ(at({0.001, 0.002, std::numeric_limits<double>::infinity()}).force_N.norm(), 0);
+  EXPECT_EQ(at({0.001, 0.002, -0.001}).status & kRenderNotFinite,
+            kRenderNotFinite);  // the velocity still is not
+  EXPECT_EQ(at({0.001, 0.002, 0.001}).status, 0U);
+  EXPECT_NEAR(at({0.001, 0.002, -0.001}).force_N.z(), 1, 1e-3);
+}
+
+// Many small objects around the hand; only the touched one speaks.
+TEST_P(ObjectTest, one_of_many_objects_is_felt) {
+  const double units = GetParam().worldUnitsPerMetre;
+  for (int i = 0; i < 400; ++i) {
+    TriangleMesh cube = box(Vec3::Constant(-0.001), Vec3::Constant(0.001));
+    geometry::scaleAndMove(cube, units, Vec3::Zero());
+    const Vec3 centre(0.004 * (i % 20 - 10), 0.004 * (i / 20 - 10), 0);
+    scene.add(cube, surface(), Affine(Eigen::Translation3d(units * (offset() + centre))));
+  }
+  start({0.0003, 0.0002, 0.003});
+  EXPECT_NEAR(to({0.0003, 0.0002, 0.0005}).force_N.z(), 0.5, 1e-3);
+  EXPECT_EQ(hand->now().touchedObject, 210);
+  EXPECT_EQ(hand->now().status, 0U);
+}
+
+}  // namespace
+}  // namespace hapticd::realtime::fixture
