@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 
 #include "geometry/types.h"
@@ -66,8 +67,25 @@ class Device {
 
   /// The state at servo time `now`; false when there is none (`state` unchanged).
   virtual bool read(Nanos now, DeviceState& state) noexcept = 0;
-  /// Commands a force in the device frame, in effect until the next write.
+  /// Commands a force in the device frame, in effect until the next write. While `hold` is set, the driver
+  /// itself keeps the force at zero.
   virtual bool write(const Vec3& force_N) noexcept = 0;
+
+  /// Why forces are held and what a person can do about it; empty when all is well. Any thread but the
+  /// servo's.
+  virtual std::string faultText() const { return {}; }
+  /// A person's consent to calibrate now, where that moves the arm or needs it in a certain place; what it
+  /// takes stands in faultText(). May block for seconds; forces are held meanwhile. Throws std::runtime_error
+  /// when it does not succeed. Not in the servo thread.
+  virtual void calibrate() {}
+
+  /// True for a device that brings its own loop: instead of pacing it, call start().
+  virtual bool selfPaced() const noexcept { return false; }
+  /// Self-paced, after open(): calls `onTick` with the time of CLOCK_MONOTONIC once in each period, in a
+  /// thread of the device; read() and write() are for that call alone. Throws std::runtime_error.
+  virtual void start(std::function<void(Nanos)> /*onTick*/) {}
+  /// Self-paced: returns after the last call, with zero force. close() does it, too. May be called twice.
+  virtual void stop() noexcept {}
 };
 
 }  // namespace hapticd::device

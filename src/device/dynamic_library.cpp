@@ -1,0 +1,83 @@
+#include "device/dynamic_library.h"
+
+#include <cstdlib>
+
+#ifdef _WIN32
+#include <windows.h>
+#else
+#include <dlfcn.h>
+#endif
+
+namespace hapticd::device {
+namespace {
+
+#ifdef _WIN32
+
+void* load(const char* name) {
+  const bool isPath = std::string(name).find_first_of("\\/") != std::string::npos;
+  return LoadLibraryExA(name, nullptr, isPath ? 0 : LOAD_LIBRARY_SEARCH_DEFAULT_DIRS);
+}
+
+std::string loadersWords(const char* name) {
+  return std::string(name) + ": Windows error " + std::to_string(GetLastError());
+}
+
+#else
+
+// NOW: a missing dependency shows here and not in the middle of a session. LOCAL: two vendors may export the
+// same names.
+void* load(const char* name) {
+  return dlopen(name, RTLD_NOW | RTLD_LOCAL);
+}
+
+std::string loadersWords(const char* name) {
+  const char* words = dlerror();
+  return words != nullptr ? words : std::string(name) + ": no reason given";
+}
+
+#endif
+
+}  // namespace
+
+DynamicLibrary::DynamicLibrary(const LibraryNames& names) {
+#ifdef _WIN32
+  const auto& usual = names.windowsNames;
+#else
+  const auto& usual = names.unixNames;
+#endif
+  std::vector<std::string> candidates;
+  const char* chosen = std::getenv(names.environment);
+  if (chosen != nullptr && *chosen != '\0') {
+    candidates.emplace_back(chosen);
+  } else {
+    candidates.assign(usual.begin(), usual.end());
+  }
+
+  std::string words;
+  for (const std::string& candidate : candidates) {
+    handle_ = load(candidate.c_str());
+    if (handle_ != nullptr) {
+      name_ = candidate;
+      return;
+    }
+    words += (words.empty() ? "" : "; ") + loadersWords(candidate.c_str());
+  }
+  throw LibraryError(words + " (" + names.environment + " can name the file)");
+}
+
+void DynamicLibrary::complain() const {
+  if (missing_.empty()) return;
+  std::string list;
+  for (const std::string& symbol : missing_) list += (list.empty() ? "" : ", ") + symbol;
+  throw LibraryError(name_ + " is not the library it should be: it has no " + list);
+}
+
+void* DynamicLibrary::find(const char* symbol) const noexcept {
+#ifdef _WIN32
+  return reinterpret_cast<void*>(GetProcAddress(static_cast<HMODULE>(handle_), symbol));
+#else
+  return dlsym(handle_, symbol);
+#endif
+}
+
+}  // namespace hapticd::device
