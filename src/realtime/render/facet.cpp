@@ -100,6 +100,7 @@ bool meet(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d, do
   Heights h;
   touchableSide(f, faces, p, d, limit, h);
   const double fall = h.start - h.end;
+  if (!(fall > 0) && limit < 1) return false;  // on its way out; where it would have ended is not known
   out.stop = fall > 0 ? limit * std::clamp((h.start - f.skin) / fall, 0.0, 1.0) : 0.0;
   out.depth = f.skin - h.end;
   out.plane = {h.sign * f.normal, f.a, f.skin};

@@ -239,10 +239,7 @@ bool Proxy::approach(const Vec3& target, bool hold, ActiveSet& active, Vec3& goa
     }
     const NearestPoint nearest = nearestAbove(planes.data(), active.count, target, position_, skin / 16);
     goal = nearest.point;
-    if (!nearest.found) {  // jammed: keep what held before the newcomer
-      active.count = std::max(1, std::min(active.count - 1, kMaxActive));
-      return false;
-    }
+    if (!nearest.found) break;  // jammed
     const ActiveSet all = active;
     active.count = nearest.count;
     for (int i = 0; i < nearest.count; ++i) {
@@ -264,6 +261,8 @@ bool Proxy::approach(const Vec3& target, bool hold, ActiveSet& active, Vec3& goa
     if (!nearby_.gathered(position_)) nearby_.gather(position_, 1.5 * stride_m_ + kGatherMargin_m);
     active.hits[static_cast<std::size_t>(active.count++)] = hit;
   }
+  // Without a solution for all of them: what held before the newcomer.
+  active.count = std::clamp(active.count - 1, std::min(active.count, 1), kMaxActive);
   return false;
 }
 
