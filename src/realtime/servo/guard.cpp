@@ -1,0 +1,173 @@
+#include "realtime/servo/guard.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace hapticd::realtime {
+namespace {
+
+constexpr std::uint32_t kZeroing = (tripsOf(TripKind::hold) | tripsOf(TripKind::latch)) & ~bit(Trip::late);
+constexpr double kRounding = 1e-12;  // relative: a force on the limit is not over it
+
+double share(Nanos elapsed, Nanos whole) noexcept {
+  return elapsed >= whole ? 1.0 : static_cast<double>(elapsed) / static_cast<double>(whole);
+}
+
+}  // namespace
+
+Guard::Guard(const GuardOptions& options, const GuardControl& control, Nanos nominalPeriod) noexcept
+    : options_(options),
+      control_(control),
+      longestStep_(2 * nominalPeriod),
+      budget_(options.peakForce_N, options.continuousForce_N),
+      seen_(control.look()),
+      blended_(options.blend) {}
+
+Vec3 Guard::step(const GuardInput& in) noexcept {
+  now_ = 0;
+  const Vec3 rendered = finite(in.force_N);
+  if (!options_.enabled) {
+    count();
+    report_.gain = 1;
+    return rendered;
+  }
+  // A late tick may not raise a force or a ramp by more than two on time would.
+  const Nanos dt = std::clamp<Nanos>(in.period, 0, longestStep_);
+  budget_.add(report_.gain * shaped_.norm(), in.period);
+
+  obeyControl();
+  checkDevice(in);
+  checkTime(in);
+  note(Trip::deepContact, in.deepContact);
+
+  shaped_ = slewLimited(clamped(blended(rendered, in.geometryJump, dt)), dt);
+  report_.gain = gain(dt);
+  report_.limit_N = budget_.limit_N();
+  count();
+  return report_.gain * shaped_;
+}
+
+void Guard::obeyControl() noexcept {
+  const GuardControl::Seen seen = control_.look();
+  restart_ = seen.ramps != seen_.ramps || seen.rearms != seen_.rearms;
+  if (seen.rearms != seen_.rearms) report_.latched = 0;
+  seen_ = seen;
+  report_.stopped = seen.stopped;
+  report_.armed = seen.armed;
+  note(Trip::stopped, seen.stopped);
+  note(Trip::disarmed, !seen.armed);
+}
+
+void Guard::checkDevice(const GuardInput& in) noexcept {
+  note(Trip::noState, in.state == nullptr || in.writeFailed);
+  if (in.state == nullptr) return;
+  const std::uint32_t hold = in.state->hold;
+  note(Trip::notCalibrated, (hold & device::kHoldNotCalibrated) != 0);
+  note(Trip::deadMan, (hold & device::kHoldDeadMan) != 0);
+  note(Trip::inkwell, (hold & device::kHoldInkwell) != 0);
+  note(Trip::hot, (hold & device::kHoldHot) != 0);
+  if ((hold & device::kHoldFault) != 0) latch(Trip::deviceFault);
+  note(Trip::notFinite, !in.state->position_m.allFinite() || !in.state->velocity_m_per_s.allFinite());
+  checkSpeed(*in.state);
+}
+
+void Guard::checkSpeed(const device::DeviceState& state) noexcept {
+  const double speed = state.velocity_m_per_s.norm();
+  fastTicks_ = speed > options_.speed_m_per_s ? std::min(fastTicks_ + 1, options_.speedTicks) : 0;
+  if (fastTicks_ == options_.speedTicks) {
+    latch(Trip::speed);
+    waitForCalm_ = true;
+  }
+  if (speed < options_.calmSpeed_m_per_s && waitForCalm_) {
+    waitForCalm_ = false;
+    if (options_.selfRecover) report_.latched &= ~bit(Trip::speed);
+  }
+  note(Trip::speed, waitForCalm_);  // a re-arm does not help as long as the hand flies
+}
+
+void Guard::checkTime(const GuardInput& in) noexcept {
+  note(Trip::late, in.late > options_.late);
+  if (in.late > options_.stalled) {
+    latch(Trip::stalled);
+  } else if (options_.selfRecover && in.late <= options_.late) {
+    report_.latched &= ~bit(Trip::stalled);
+  }
+}
+
+Vec3 Guard::finite(const Vec3& force) noexcept {
+  if (force.allFinite()) return force;
+  note(Trip::notFinite);
+  return Vec3::Zero();
+}
+
+// From the force before the jump to the one after it. The first tick already moves, so that geometry which
+// jumps in every tick is still followed.
+Vec3 Guard::blended(const Vec3& force, bool jump, Nanos dt) noexcept {
+  if (jump) {
+    blendFrom_ = shaped_;
+    blended_ = 0;
+    note(Trip::geometryJump);
+  }
+  if (blended_ >= options_.blend) return force;
+  blended_ += dt;
+  return blendFrom_ + share(blended_, options_.blend) * (force - blendFrom_);
+}
+
+Vec3 Guard::clamped(const Vec3& force) noexcept {
+  const double size = force.norm();
+  const double limit = std::min(options_.peakForce_N, budget_.limit_N());
+  note(Trip::peakForce, size > options_.peakForce_N * (1 + kRounding));
+  note(Trip::thermal, limit < options_.peakForce_N && size > limit * (1 + kRounding));
+  if (size <= limit) return force;
+  // A huge finite force has an infinite norm: scale it down first.
+  const double largest = force.cwiseAbs().maxCoeff();
+  return limit * (force / largest).normalized();
+}
+
+// The direction is always the one asked for. What the last force already had along it counts as reached; the
+// rest may rise by so much. Falling, and falling through zero, is free.
+Vec3 Guard::slewLimited(const Vec3& force, Nanos dt) noexcept {
+  const double wanted = force.norm();
+  if (wanted == 0) return force;
+  const Vec3 direction = force / wanted;
+  const double reached = std::clamp(shaped_.dot(direction), 0.0, wanted);
+  const double allowed = reached + options_.slew_N_per_s * geometry::toSeconds(dt);
+  if (wanted <= allowed * (1 + kRounding)) return force;
+  note(Trip::slew);
+  return allowed * direction;
+}
+
+double Guard::gain(Nanos dt) noexcept {
+  if (((now_ | report_.latched) & kZeroing) != 0) {
+    phase_ = Phase::zero;
+    return 0;
+  }
+  if (phase_ == Phase::zero || restart_) {
+    phase_ = Phase::rampIn;
+    inPhase_ = 0;
+  } else {
+    inPhase_ += dt;
+  }
+  if ((now_ & bit(Trip::late)) != 0 && phase_ == Phase::rampIn) {
+    decayFrom_ = report_.gain;
+    phase_ = Phase::decay;
+    inPhase_ = 0;
+  }
+  if (phase_ == Phase::decay) {
+    if (inPhase_ < options_.lateDecay) return decayFrom_ * (1 - share(inPhase_, options_.lateDecay));
+    phase_ = Phase::rampIn;
+    inPhase_ = 0;
+  }
+  return share(inPhase_, options_.rampIn);
+}
+
+void Guard::count() noexcept {
+  const std::uint32_t acting = now_ | report_.latched;
+  const std::uint32_t began = acting & ~report_.active;
+  for (std::size_t i = 0; i < kTripCount; ++i) {
+    report_.counts[i] += (began >> i) & 1U;
+  }
+  report_.active = acting;
+}
+
+}  // namespace hapticd::realtime

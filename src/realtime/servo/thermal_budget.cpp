@@ -1,0 +1,63 @@
+#include "realtime/servo/thermal_budget.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace hapticd::realtime {
+namespace {
+
+constexpr double kFloorShare = 0.6;   // of the continuous force
+constexpr double kSpending_s = 0.1;   // time constant with which what is left is spent
+constexpr double kRestedShare = 0.5;  // of the budget used: the peak is allowed again below
+
+}  // namespace
+
+ThermalBudget::ThermalBudget(double peak_N, double continuous_N) noexcept
+    : peak_(peak_N),
+      continuous_(std::min(continuous_N, peak_N)),
+      floor_(kFloorShare * continuous_),
+      limit_(peak_N) {}
+
+void ThermalBudget::add(double force_N, Nanos duration) noexcept {
+  if (continuous_ >= peak_) return;
+  impulse_[static_cast<std::size_t>(newest_)] += force_N * geometry::toSeconds(duration);
+  advance(duration);
+
+  constexpr double kWindow_s = geometry::toSeconds(kBuckets * kBucket);
+  limit_ = std::clamp(floor_ + margin() / kSpending_s, 0.0, peak_);
+  if (limit_ < continuous_) derated_ = true;
+  const double used = std::accumulate(impulse_.begin(), impulse_.end(), 0.0);
+  if (used < kRestedShare * kWindow_s * continuous_) derated_ = false;
+  if (derated_) {
+    // The largest constant force whose margin keeps itself up: without it the limit would ripple.
+    constexpr double kAccount_s = geometry::toSeconds((kBuckets + 1) * kBucket);
+    const double steady = (kWindow_s * continuous_ + kSpending_s * floor_) / (kAccount_s + kSpending_s);
+    limit_ = std::min(limit_, steady);
+  }
+}
+
+void ThermalBudget::advance(Nanos duration) noexcept {
+  filled_ += duration;
+  for (int i = 0; i <= kBuckets && filled_ >= kBucket; ++i) {
+    filled_ -= kBucket;
+    newest_ = (newest_ + 1) % (kBuckets + 1);
+    impulse_[static_cast<std::size_t>(newest_)] = 0;
+  }
+  filled_ %= kBucket;
+}
+
+// What is left, in N·s, if the floor is all that is written from now on: the fullest that the window gets is
+// just before one of its buckets leaves.
+double ThermalBudget::margin() const noexcept {
+  double kept = 0;
+  double fullest = 0;
+  double ahead_s = geometry::toSeconds((kBuckets + 1) * kBucket - filled_);
+  for (int age = 0; age <= kBuckets; ++age) {  // newest first: what is kept after all older ones have left
+    kept += impulse_[static_cast<std::size_t>((newest_ + kBuckets + 1 - age) % (kBuckets + 1))];
+    fullest = std::max(fullest, kept + floor_ * ahead_s);
+    ahead_s -= geometry::toSeconds(kBucket);
+  }
+  return geometry::toSeconds(kBuckets * kBucket) * continuous_ - fullest;
+}
+
+}  // namespace hapticd::realtime

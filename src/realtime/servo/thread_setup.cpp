@@ -1,0 +1,139 @@
+#include "realtime/servo/thread_setup.h"
+
+#include <linux/capability.h>
+#include <pthread.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstddef>
+#include <cstring>
+
+#include "realtime/servo/flush_denormals.h"
+
+namespace hapticd::realtime {
+namespace {
+
+constexpr std::size_t kStack_bytes = 256 * 1024;
+
+bool hasCapability(unsigned capability) {
+  __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
+  __user_cap_data_struct data[_LINUX_CAPABILITY_U32S_3]{};
+  if (syscall(SYS_capget, &header, data) != 0) return false;
+  return (data[capability / 32].effective >> (capability % 32) & 1U) != 0;
+}
+
+void askScheduling(const ThreadRequest& request, SetupAnswer& answer) {
+  answer.asked = request.realtime;
+  if (!request.realtime) {
+    answer.text = "normal scheduling, as chosen";
+    return;
+  }
+  sched_param parameters{};
+  parameters.sched_priority = request.priority;
+  const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
+  answer.granted = error == 0;
+  if (error == 0) {
+    answer.text = "SCHED_FIFO priority " + std::to_string(request.priority);
+  } else if (error == EINVAL) {
+    answer.text = "priority " + std::to_string(request.priority) + " is not one of SCHED_FIFO's";
+    answer.remedy = "choose a priority from 1 to 99";
+  } else {
+    rlimit limit{};
+    getrlimit(RLIMIT_RTPRIO, &limit);
+    answer.text = "normal scheduling: SCHED_FIFO priority " + std::to_string(request.priority) +
+                  " was refused (" + std::strerror(error) + ", RLIMIT_RTPRIO is " +
+                  std::to_string(limit.rlim_cur) + ")";
+    answer.remedy = "add '<user> - rtprio " + std::to_string(request.priority) +
+                    "' to /etc/security/limits.d/hapticd.conf and log in again, or give the service "
+                    "LimitRTPRIO=" +
+                    std::to_string(request.priority) + ", or the program CAP_SYS_NICE";
+  }
+}
+
+void askAffinity(const ThreadRequest& request, SetupAnswer& answer) {
+  answer.asked = request.cpu >= 0;
+  if (!answer.asked) {
+    answer.text = "any CPU";
+    return;
+  }
+  const std::string cpu = "CPU " + std::to_string(request.cpu);
+  int error = EINVAL;
+  if (request.cpu < CPU_SETSIZE) {
+    cpu_set_t set;
+    CPU_ZERO(&set);
+    CPU_SET(static_cast<std::size_t>(request.cpu), &set);
+    error = pthread_setaffinity_np(pthread_self(), sizeof set, &set);
+  }
+  answer.granted = error == 0;
+  answer.text =
+      answer.granted ? cpu + " alone" : "any CPU: " + cpu + " was refused (" + std::strerror(error) + ")";
+  if (!answer.granted) {
+    answer.remedy = "choose a CPU from 0 to " + std::to_string(sysconf(_SC_NPROCESSORS_ONLN) - 1) +
+                    " that the service's CPU set allows";
+  }
+}
+
+void askMemory(const ThreadRequest& request, SetupAnswer& answer) {
+  answer.asked = request.lockMemory;
+  if (!answer.asked) {
+    answer.text = "memory may be paged out, as chosen";
+    return;
+  }
+  // Under a limit the lock may succeed now and make later allocations fail: do without it.
+  rlimit limit{};
+  getrlimit(RLIMIT_MEMLOCK, &limit);
+  if (limit.rlim_cur != RLIM_INFINITY && !hasCapability(CAP_IPC_LOCK)) {
+    answer.text =
+        "memory may be paged out: RLIMIT_MEMLOCK is " + std::to_string(limit.rlim_cur / 1024) + " kB";
+    answer.remedy =
+        "add '<user> - memlock unlimited' to /etc/security/limits.d/hapticd.conf and log in again, or "
+        "give the service LimitMEMLOCK=infinity, or the program CAP_IPC_LOCK";
+    return;
+  }
+  // Pages are locked when first touched: address space that is only reserved costs nothing.
+  answer.granted = mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0;
+  answer.text = answer.granted ? "all memory is locked"
+                               : std::string("memory may be paged out: mlockall: ") + std::strerror(errno);
+  if (!answer.granted) answer.remedy = "free some memory, or run outside the container that limits it";
+}
+
+[[gnu::noinline]] void touchStack() {
+  std::byte pages[kStack_bytes];
+  volatile std::byte* page = pages;
+  for (std::size_t i = 0; i < kStack_bytes; i += 4096) page[i] = std::byte{0};
+}
+
+}  // namespace
+
+std::string ThreadSetup::complaints() const {
+  std::string text;
+  for (const SetupAnswer* answer : all()) {
+    if (!answer->asked || answer->granted) continue;
+    if (!text.empty()) text += '\n';
+    text += std::string(answer->name) + ": " + answer->text + "; " + answer->remedy;
+  }
+  return text;
+}
+
+ThreadSetup setUpThread(const ThreadRequest& request) {
+  ThreadSetup setup;
+  askScheduling(request, setup.scheduling);
+  askAffinity(request, setup.affinity);
+  askMemory(request, setup.memory);
+  prctl(PR_SET_TIMERSLACK, 1UL);  // without SCHED_FIFO the kernel may delay a wake-up by 50 us
+  touchStack();
+  setup.stack = {"stack", true, true, std::to_string(kStack_bytes / 1024) + " kB of stack are in memory", ""};
+  setup.denormals.asked = true;
+  setup.denormals.granted = FlushDenormals::kSupported;
+  setup.denormals.text = FlushDenormals::kSupported ? "denormal numbers are flushed to zero in every tick"
+                                                    : "denormal numbers are computed in full";
+  if (!FlushDenormals::kSupported) setup.denormals.remedy = "none for this processor";
+  return setup;
+}
+
+}  // namespace hapticd::realtime

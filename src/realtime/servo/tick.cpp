@@ -1,0 +1,79 @@
+#include "realtime/servo/tick.h"
+
+#include <algorithm>
+
+#include "realtime/servo/flush_denormals.h"
+
+namespace hapticd::realtime {
+
+Tick::Tick(device::Device& device, Clock& clock, const TickOptions& options)
+    : device_(device),
+      clock_(clock),
+      period_(servoPeriod(options.rate_Hz)),
+      renderer_(options.render),
+      control_(options.guard.armed),
+      guard_(options.guard, control_, period_),
+      reports_(options.reports),
+      blackBox_(static_cast<std::size_t>(options.blackBox_s * options.rate_Hz)) {}
+
+void Tick::operator()(const Pacing& pacing) noexcept {
+  const FlushDenormals flush;
+  begin(pacing);
+  const Nanos started = clock_.now();
+  const scene::SceneSnapshot& scene = takeSnapshot();
+
+  const bool haveState = device_.read(report_.time, report_.device);
+  const Nanos period = report_.tick == 1 ? period_ : report_.timing.period;
+  renderer_.step(scene, report_.device, report_.time, period, report_.rendering);
+  report_.force_N = guard_.step(guardInput(haveState));
+  written_ = device_.write(report_.force_N);
+
+  report_.timing.compute = clock_.now() - started;
+  publish();
+}
+
+void Tick::begin(const Pacing& pacing) noexcept {
+  report_.timing.period = report_.tick == 0 ? 0 : std::max<Nanos>(pacing.now - report_.time, 0);
+  report_.timing.wakeupError = pacing.wakeupError;
+  report_.timing.overruns = pacing.overruns;
+  report_.timing.skippedPeriods = pacing.skippedPeriods;
+  report_.time = pacing.now;
+  ++report_.tick;
+}
+
+const scene::SceneSnapshot& Tick::takeSnapshot() noexcept {
+  const scene::SceneSnapshot* newest = snapshots_.take();
+  const scene::SceneSnapshot& scene = newest != nullptr ? *newest : nothing_;
+  report_.revision = scene.revision;
+  report_.T_world_device = scene.workspace.T_world_device;
+  return scene;
+}
+
+GuardInput Tick::guardInput(bool haveState) const noexcept {
+  GuardInput in;
+  in.force_N = report_.rendering.force_N;
+  in.state = haveState ? &report_.device : nullptr;
+  in.period = report_.timing.period;
+  // A callback has no deadline: what the period is too long is late, too.
+  in.late = std::max(report_.timing.wakeupError, report_.timing.period - period_);
+  in.writeFailed = !written_;
+  in.geometryJump = (report_.rendering.status & kRenderGeometryJump) != 0;
+  in.deepContact = (report_.rendering.status & kRenderReleased) != 0;
+  return in;
+}
+
+void Tick::publish() noexcept {
+  const std::uint32_t latchedBefore = report_.guard.latched;
+  report_.guard = guard_.report();
+  report_.dropped = reports_.dropped();
+  if (report_.tick > 1) histograms_.period.add(report_.timing.period);
+  histograms_.wakeupError.add(report_.timing.wakeupError);
+  histograms_.compute.add(report_.timing.compute);
+
+  blackBox_.record(report_);
+  if ((report_.guard.latched & ~latchedBefore) != 0) blackBox_.freeze();
+  reports_.push(report_);
+  wake_.notify();
+}
+
+}  // namespace hapticd::realtime
