@@ -165,7 +165,7 @@ bool Link::waitConnected(Duration timeout) {
 }
 
 bool Link::waitHeard(wire::LocalSender device, Duration timeout) {
-  return waitUntil([&] { return connected() && heard_[static_cast<std::size_t>(device.value)]; }, timeout);
+  return waitUntil([&] { return heard(device); }, timeout);
 }
 
 template <class Condition>

@@ -98,6 +98,10 @@ class Link {
   /// Sleeps until connected, or until the device is heard: false after the timeout.
   bool waitConnected(Duration timeout);
   bool waitHeard(wire::LocalSender device, Duration timeout);
+  /// Whether anything came from the device on this connection.
+  bool heard(wire::LocalSender device) const noexcept {
+    return connected() && heard_[static_cast<std::size_t>(device.value)];
+  }
 
   const ServerAddress& server() const noexcept { return server_; }
   /// Number of the connection, 0 before the first.

@@ -1,0 +1,69 @@
+// VRPN's helpers for time, and for packing messages of one's own.
+#ifndef VRPN_SHARED_H
+#define VRPN_SHARED_H
+
+#include <stdio.h>
+#include <string.h>
+#include <sys/time.h>
+
+#include <type_traits>
+
+#include "vrpn_Types.h"
+
+#define VRPN_PI (3.14159265358979323846)
+#define VRPN_DEGREES_TO_RADIANS (VRPN_PI / 180.0)
+#define VRPN_RADIANS_TO_DEGREES (180.0 / VRPN_PI)
+
+inline int vrpn_gettimeofday(struct timeval* now, void* = nullptr) {
+  return gettimeofday(now, nullptr);
+}
+
+/// With |tv_usec| below a million, and of the same sign as tv_sec.
+struct timeval vrpn_TimevalNormalize(const struct timeval& t);
+struct timeval vrpn_TimevalSum(const struct timeval& a, const struct timeval& b);
+struct timeval vrpn_TimevalDiff(const struct timeval& a, const struct timeval& b);
+struct timeval vrpn_TimevalScale(const struct timeval& t, double factor);
+/// Microseconds from start to end.
+unsigned long vrpn_TimevalDuration(struct timeval end, struct timeval start);
+double vrpn_TimevalDurationSeconds(struct timeval end, struct timeval start);
+bool vrpn_TimevalGreater(const struct timeval& a, const struct timeval& b);
+bool vrpn_TimevalEqual(const struct timeval& a, const struct timeval& b);
+double vrpn_TimevalMsecs(const struct timeval& t);
+struct timeval vrpn_MsecsTimeval(const double ms);
+void vrpn_SleepMsecs(double ms);
+
+/// Appends a scalar, big endian, and moves on; -1 when it does not fit into what is left.
+template <class T>
+int vrpn_buffer(char** insert, vrpn_int32* left, const T value) {
+  static_assert(std::is_arithmetic<T>::value, "scalars only");
+  if (*left < static_cast<vrpn_int32>(sizeof(T))) return -1;
+  unsigned char bytes[sizeof(T)];
+  memcpy(bytes, &value, sizeof(T));
+  for (size_t i = 0; i < sizeof(T); ++i) {
+    (*insert)[i] =
+        static_cast<char>(bytes[__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ ? sizeof(T) - 1 - i : i]);
+  }
+  *insert += sizeof(T);
+  *left -= static_cast<vrpn_int32>(sizeof(T));
+  return 0;
+}
+/// Takes a big-endian scalar and moves on.
+template <class T>
+int vrpn_unbuffer(const char** buffer, T* value) {
+  static_assert(std::is_arithmetic<T>::value, "scalars only");
+  unsigned char bytes[sizeof(T)];
+  for (size_t i = 0; i < sizeof(T); ++i) {
+    bytes[__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ ? sizeof(T) - 1 - i : i] =
+        static_cast<unsigned char>((*buffer)[i]);
+  }
+  memcpy(value, bytes, sizeof(T));
+  *buffer += sizeof(T);
+  return 0;
+}
+int vrpn_buffer(char** insert, vrpn_int32* left, const struct timeval t);
+int vrpn_unbuffer(const char** buffer, struct timeval* t);
+/// Text of a known length, or (-1) up to and with its NUL.
+int vrpn_buffer(char** insert, vrpn_int32* left, const char* text, vrpn_int32 length);
+int vrpn_unbuffer(const char** buffer, char* text, vrpn_int32 length);
+
+#endif

@@ -1,0 +1,142 @@
+#include "vrpn/vrpn_BaseClass.h"
+
+#include <algorithm>
+
+#include "client/vrpn/messages.h"
+#include "vrpn/vrpn_Text.h"
+
+namespace wire = hapticd::wire;
+using hapticd::client::receiveMessage;
+using hapticd::client::sendMessage;
+
+namespace {
+
+vrpn_TextPrinter& systemPrinter() {
+  static vrpn_TextPrinter printer;
+  return printer;
+}
+
+constexpr int kSilenceWarning_s = 3;
+constexpr int kSilenceInterval_s = 10;
+
+}  // namespace
+
+vrpn_TextPrinter& vrpn_System_TextPrinter = systemPrinter();
+
+void vrpn_TextPrinter::set_min_level_to_print(vrpn_TEXT_SEVERITY severity, vrpn_uint32 level) {
+  severity_ = severity;
+  level_ = level;
+}
+
+int vrpn_TextPrinter::add_object(vrpn_BaseClass* device) {
+  devices_.push_back(device);
+  return 0;
+}
+
+void vrpn_TextPrinter::remove_object(vrpn_BaseClass* device) {
+  std::erase(devices_, device);
+}
+
+// Several devices of one name hear the same text: the first of them prints it.
+void vrpn_TextPrinter::print(const vrpn_BaseClass* device, const vrpn_HANDLERPARAM& p) const {
+  const auto first = std::find_if(devices_.begin(), devices_.end(), [&](const vrpn_BaseClass* d) {
+    return d->d_connection == device->d_connection && d->d_sender_id == device->d_sender_id;
+  });
+  if (!stream_ || first == devices_.end() || *first != device) return;
+  receiveMessage<wire::Text>(p, [&](const wire::Text& m) {
+    const auto minimum = static_cast<vrpn_uint32>(severity_);
+    if (m.severity < minimum || (m.severity == minimum && m.level < level_)) return;
+    const char* kinds[] = {"message", "warning", "error"};
+    fprintf(stream_, "VRPN: %s of %s: %s\n", kinds[std::min(m.severity, 2U)], device->d_servicename,
+            m.text.text.c_str());
+  });
+}
+
+vrpn_BaseClass::vrpn_BaseClass(const char* name, vrpn_Connection* connection)
+    : d_connection(connection), d_servicename(vrpn_copy_service_name(name)) {
+  if (d_connection) {
+    d_connection->addReference();
+  } else {
+    d_connection = vrpn_get_connection_by_name(name);
+  }
+  vrpn_gettimeofday(&silent_since_, nullptr);
+  if (!d_connection) return;
+  d_sender_id = d_connection->registerDevice(d_servicename);
+  d_text_message_id = d_connection->register_message_type("vrpn_Base text_message");
+  d_ping_message_id = d_connection->register_message_type("vrpn_Base ping_message");
+  d_pong_message_id = d_connection->register_message_type("vrpn_Base pong_message");
+  systemPrinter().add_object(this);
+  listen("vrpn_Base text_message", handleText);
+}
+
+vrpn_BaseClass::~vrpn_BaseClass() {
+  systemPrinter().remove_object(this);
+  if (d_connection) {
+    for (const Registered& r : registered_)
+      d_connection->unregister_handler(r.type, r.handler, r.userdata, r.sender);
+    d_connection->removeReference();
+  }
+  delete[] d_servicename;
+}
+
+int vrpn_BaseClass::init() {
+  return register_senders() == 0 && register_types() == 0 ? 0 : -1;
+}
+
+int vrpn_BaseClass::handleText(void* self, vrpn_HANDLERPARAM p) {
+  systemPrinter().print(static_cast<vrpn_BaseClass*>(self), p);
+  return 0;
+}
+
+int vrpn_BaseClass::register_autodeleted_handler(vrpn_int32 type, vrpn_MESSAGEHANDLER handler, void* userdata,
+                                                 vrpn_int32 sender) {
+  if (!d_connection || d_connection->register_handler(type, handler, userdata, sender) != 0) return -1;
+  registered_.push_back({type, handler, userdata, sender});
+  return 0;
+}
+
+void vrpn_BaseClass::listen(const char* type, vrpn_MESSAGEHANDLER handler) {
+  if (d_connection) {
+    register_autodeleted_handler(d_connection->register_message_type(type), handler, this, d_sender_id);
+  }
+}
+
+int vrpn_BaseClass::send_text_message(const char* text, timeval, vrpn_TEXT_SEVERITY severity,
+                                      vrpn_uint32 level) {
+  sendMessage(d_connection, d_sender_id, wire::Text{static_cast<std::uint32_t>(severity), level, text});
+  return d_connection ? 0 : -1;
+}
+
+void vrpn_BaseClass::client_mainloop() {
+  if (!d_connection) return;
+  d_connection->mainloop();
+  timeval now;
+  vrpn_gettimeofday(&now, nullptr);
+  const bool heard = d_sender_id >= 0 && d_connection->link()->heard({d_sender_id});
+  if (heard) {
+    silent_since_ = now;
+    warned_s_ = 0;
+    return;
+  }
+  const auto silent_s = static_cast<int>(vrpn_TimevalDurationSeconds(now, silent_since_));
+  if (shutup || silent_s < kSilenceWarning_s || (warned_s_ > 0 && silent_s < warned_s_ + kSilenceInterval_s))
+    return;
+  warned_s_ = silent_s;
+  fprintf(stderr, "VRPN: no answer of %s for %d s\n", d_servicename, silent_s);
+}
+
+vrpn_Text_Receiver::vrpn_Text_Receiver(const char* name, vrpn_Connection* connection)
+    : vrpn_BaseClass(name, connection) {
+  listen("vrpn_Base text_message", handleMessage);
+}
+
+int vrpn_Text_Receiver::handleMessage(void* self, vrpn_HANDLERPARAM p) {
+  return receiveMessage<wire::Text>(p, [&](const wire::Text& m) {
+    vrpn_TEXTCB report{};
+    report.msg_time = p.msg_time;
+    m.text.text.copy(report.message, sizeof report.message - 1);
+    report.type = static_cast<vrpn_TEXT_SEVERITY>(std::min(m.severity, 2U));
+    report.level = m.level;
+    static_cast<vrpn_Text_Receiver*>(self)->messages_.call_handlers(report);
+  });
+}

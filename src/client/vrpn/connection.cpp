@@ -1,0 +1,253 @@
+#include "vrpn/vrpn_Connection.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <map>
+#include <string_view>
+
+#include "client/vrpn/messages.h"
+
+using hapticd::client::Arrival;
+using hapticd::client::Link;
+
+const char* vrpn_got_first_connection = "VRPN_Connection_Got_First_Connection";
+const char* vrpn_got_connection = "VRPN_Connection_Got_Connection";
+const char* vrpn_dropped_connection = "VRPN_Connection_Dropped_Connection";
+const char* vrpn_dropped_last_connection = "VRPN_Connection_Dropped_Last_Connection";
+const char* vrpn_CONTROL = "VRPN Control";
+
+namespace {
+
+// These never travel, so they have numbers of their own, behind all that do.
+constexpr vrpn_int32 kFirstControlType = 1000000;
+
+const std::array<const char*, 4>& controlTypes() {
+  static const std::array<const char*, 4> types{vrpn_got_first_connection, vrpn_got_connection,
+                                                vrpn_dropped_connection, vrpn_dropped_last_connection};
+  return types;
+}
+
+std::map<std::string, vrpn_Connection*>& knownConnections() {
+  static std::map<std::string, vrpn_Connection*> connections;
+  return connections;
+}
+
+char* copyOf(std::string_view text) {
+  char* copy = new char[text.size() + 1];
+  std::copy(text.begin(), text.end(), copy);
+  copy[text.size()] = '\0';
+  return copy;
+}
+
+}  // namespace
+
+vrpn_Connection::vrpn_Connection(const char* server) : name_(server), opened_(get_time()) {
+  try {
+    link_ = std::make_unique<Link>(hapticd::client::parseServer(server),
+                                   hapticd::client::LinkOptions{.adopt_names = true});
+    link_->addSender(vrpn_CONTROL);
+    link_->waitConnected(std::chrono::seconds(1));  // as long as stock VRPN; it goes on trying later
+  } catch (const std::exception& error) {
+    fprintf(stderr, "VRPN: %s\n", error.what());
+  }
+}
+
+vrpn_Connection::~vrpn_Connection() {
+  auto& known = knownConnections();
+  const auto self =
+      std::find_if(known.begin(), known.end(), [this](const auto& k) { return k.second == this; });
+  if (self != known.end()) known.erase(self);
+}
+
+vrpn_bool vrpn_Connection::doing_okay() const {
+  return link_ != nullptr;
+}
+vrpn_bool vrpn_Connection::connected() const {
+  return link_ && link_->connected();
+}
+
+int vrpn_Connection::mainloop(const timeval* timeout) {
+  if (!link_) return -1;
+  const auto wait = timeout
+                        ? std::chrono::seconds(timeout->tv_sec) + std::chrono::microseconds(timeout->tv_usec)
+                        : std::chrono::microseconds(0);
+  try {
+    link_->poll(wait, [this](const Arrival& arrival) { dispatch(arrival); });
+  } catch (const hapticd::Error& error) {
+    fprintf(stderr, "VRPN: %s\n", error.what());
+    return -1;
+  }
+  return 0;
+}
+
+void vrpn_Connection::dispatch(const Arrival& arrival) {
+  if (arrival.what == Arrival::What::connected) {
+    callControlHandlers(vrpn_got_first_connection);
+    callControlHandlers(vrpn_got_connection);
+  } else if (arrival.what == Arrival::What::lost) {
+    callControlHandlers(vrpn_dropped_connection);
+    callControlHandlers(vrpn_dropped_last_connection);
+  } else if (arrival.type.value >= 0 && arrival.sender.value >= 0) {
+    callHandlers(
+        {arrival.type.value,
+         arrival.sender.value,
+         {static_cast<time_t>(arrival.time.seconds), static_cast<suseconds_t>(arrival.time.microseconds)},
+         static_cast<vrpn_int32>(arrival.bytes.size()),
+         reinterpret_cast<const char*>(arrival.bytes.data())});
+  }
+}
+
+void vrpn_Connection::callControlHandlers(const char* type) {
+  callHandlers({register_message_type(type), register_sender(vrpn_CONTROL), get_time(), 0, nullptr});
+}
+
+void vrpn_Connection::callHandlers(const vrpn_HANDLERPARAM& p) {
+  ++calling_;
+  for (std::size_t i = 0; i < handlers_.size(); ++i) {
+    const Handler h = handlers_[i];  // a handler may register others
+    const bool wanted = h.function && (h.type == p.type || h.type == vrpn_ANY_TYPE) &&
+                        (h.sender == p.sender || h.sender == vrpn_ANY_SENDER);
+    if (wanted) h.function(h.userdata, p);
+  }
+  if (--calling_ == 0) std::erase_if(handlers_, [](const Handler& h) { return !h.function; });
+}
+
+vrpn_int32 vrpn_Connection::register_sender(const char* name) {
+  try {
+    return link_ ? link_->addSender(name).value : -1;
+  } catch (const std::logic_error& error) {
+    fprintf(stderr, "VRPN: %s\n", error.what());
+    return -1;
+  }
+}
+
+vrpn_int32 vrpn_Connection::registerDevice(const char* name) {
+  if (register_sender(name) < 0) return -1;
+  return link_->addDevice(name).value;
+}
+
+vrpn_int32 vrpn_Connection::register_message_type(const char* name) {
+  for (std::size_t i = 0; i < controlTypes().size(); ++i) {
+    if (std::strcmp(name, controlTypes()[i]) == 0) return kFirstControlType + static_cast<vrpn_int32>(i);
+  }
+  try {
+    return link_ ? link_->addType(name).value : -1;
+  } catch (const std::logic_error& error) {
+    fprintf(stderr, "VRPN: %s\n", error.what());
+    return -1;
+  }
+}
+
+int vrpn_Connection::register_handler(vrpn_int32 type, vrpn_MESSAGEHANDLER handler, void* userdata,
+                                      vrpn_int32 sender) {
+  if (!handler || type < vrpn_ANY_TYPE || sender < vrpn_ANY_SENDER) return -1;
+  handlers_.push_back({type, sender, handler, userdata});
+  return 0;
+}
+
+int vrpn_Connection::unregister_handler(vrpn_int32 type, vrpn_MESSAGEHANDLER handler, void* userdata,
+                                        vrpn_int32 sender) {
+  const auto found = std::find_if(handlers_.begin(), handlers_.end(), [&](const Handler& h) {
+    return h.type == type && h.sender == sender && h.function == handler && h.userdata == userdata;
+  });
+  if (found == handlers_.end()) return -1;
+  if (calling_ > 0) {
+    found->function = nullptr;
+  } else {
+    handlers_.erase(found);
+  }
+  return 0;
+}
+
+int vrpn_Connection::pack_message(vrpn_uint32 len, timeval time, vrpn_int32 type, vrpn_int32 sender,
+                                  const char* buffer, vrpn_uint32 class_of_service) {
+  if (!link_ || !message_type_name(type) || !sender_name(sender)) return -1;
+  if (type >= kFirstControlType) {
+    callHandlers({type, sender, time, static_cast<vrpn_int32>(len), buffer});
+    return 0;
+  }
+  using hapticd::wire::Reliability;
+  const bool reliable = (class_of_service & vrpn_CONNECTION_RELIABLE) != 0;
+  try {
+    link_->sendRaw({static_cast<std::uint32_t>(time.tv_sec), static_cast<std::uint32_t>(time.tv_usec)},
+                   {sender}, {type}, {reinterpret_cast<const std::byte*>(buffer), len},
+                   reliable ? Reliability::kReliable : Reliability::kLowLatency);
+  } catch (const std::exception& error) {
+    fprintf(stderr, "VRPN: %s\n", error.what());
+    return -1;
+  }
+  return 0;
+}
+
+int vrpn_Connection::send_pending_reports() {
+  if (!link_) return -1;
+  link_->flush();
+  return 0;
+}
+
+int vrpn_Connection::time_since_connection_open(timeval* elapsed) {
+  *elapsed = vrpn_TimevalDiff(get_time(), opened_);
+  return 0;
+}
+
+timeval vrpn_Connection::get_time() {
+  timeval now;
+  vrpn_gettimeofday(&now, nullptr);
+  return now;
+}
+
+const char* vrpn_Connection::sender_name(vrpn_int32 sender) {
+  if (!link_ || sender < 0 || static_cast<std::size_t>(sender) >= link_->names().senders().size())
+    return nullptr;
+  return link_->names().senders()[static_cast<std::size_t>(sender)].c_str();
+}
+
+const char* vrpn_Connection::message_type_name(vrpn_int32 type) {
+  if (type >= kFirstControlType) {
+    const auto index = static_cast<std::size_t>(type - kFirstControlType);
+    return index < controlTypes().size() ? controlTypes()[index] : nullptr;
+  }
+  if (!link_ || type < 0 || static_cast<std::size_t>(type) >= link_->names().types().size()) return nullptr;
+  return link_->names().types()[static_cast<std::size_t>(type)].c_str();
+}
+
+void vrpn_Connection::addReference() {
+  ++references_;
+}
+
+void vrpn_Connection::removeReference() {
+  // From inside a handler the connection stays, for it has to return to its loop.
+  if (--references_ <= 0 && auto_delete_ && calling_ == 0) delete this;
+}
+
+vrpn_Connection* vrpn_get_connection_by_name(const char* name, const char* local_in_logfile,
+                                             const char* local_out_logfile, const char* remote_in_logfile,
+                                             const char* remote_out_logfile, const char*, bool force_reopen) {
+  if (!name) return nullptr;
+  for (const char* log : {local_in_logfile, local_out_logfile, remote_in_logfile, remote_out_logfile}) {
+    if (log && *log) fprintf(stderr, "VRPN: log file %s is not written by this library\n", log);
+  }
+  const char* at = std::strrchr(name, '@');
+  const std::string server = at ? at + 1 : name;
+  auto& known = knownConnections();
+  const auto found = known.find(server);
+  vrpn_Connection* connection = found != known.end() && !force_reopen ? found->second : nullptr;
+  if (!connection) {
+    connection = new vrpn_Connection(server.c_str());
+    connection->setAutoDeleteStatus(true);
+    known[server] = connection;
+  }
+  connection->addReference();
+  return connection;
+}
+
+char* vrpn_copy_service_name(const char* name) {
+  return copyOf(std::string_view(name).substr(0, std::string_view(name).find('@')));
+}
+
+char* vrpn_copy_service_location(const char* name) {
+  const std::string_view text(name);
+  const std::size_t at = text.find('@');
+  return copyOf(at == std::string_view::npos ? text : text.substr(at + 1));
+}

@@ -1,0 +1,48 @@
+// Between VRPN's callbacks and our message structs.
+#pragma once
+
+#include <algorithm>
+#include <cstdio>
+
+#include "client/link.h"
+#include "hapticd/error.h"
+#include "vrpn/vrpn_Connection.h"
+#include "wire/codec.h"
+
+namespace hapticd::client {
+
+/// Sends a message of a device; what goes wrong is printed, as VRPN does.
+template <wire::WireMessage M>
+void sendMessage(vrpn_Connection* connection, vrpn_int32 sender, const M& message,
+                 wire::Reliability reliability = M::kInfo.reliability) {
+  if (!connection || !connection->link()) return;
+  try {
+    connection->link()->send(wireNow(), {sender}, message, reliability);
+  } catch (const hapticd::Error& error) {
+    std::fprintf(stderr, "VRPN: %s\n", error.what());
+  }
+}
+
+/// Calls use(message) with the decoded payload; a damaged one is ignored, where stock VRPN drops the
+/// connection.
+template <wire::WireMessage M, class Use>
+int receiveMessage(const vrpn_HANDLERPARAM& p, Use&& use) {
+  const wire::ByteView payload(reinterpret_cast<const std::byte*>(p.buffer),
+                               static_cast<std::size_t>(p.payload_len));
+  const wire::Result<M> message = wire::decode<M>(payload);
+  if (message) use(*message);
+  return 0;
+}
+
+template <class T, std::size_t N>
+void copyTo(T (&out)[N], const std::array<T, N>& in) {
+  std::copy(in.begin(), in.end(), out);
+}
+template <std::size_t N, class T>
+std::array<T, N> arrayOf(const T* in) {
+  std::array<T, N> out{};
+  std::copy(in, in + N, out.begin());
+  return out;
+}
+
+}  // namespace hapticd::client

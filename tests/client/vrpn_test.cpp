@@ -1,0 +1,403 @@
+// VRPN's own classes over this client: what a program written for VRPN sees.
+#include <gtest/gtest.h>
+#include <vrpn_Analog.h>
+#include <vrpn_Button.h>
+#include <vrpn_Connection.h>
+#include <vrpn_ForceDevice.h>
+#include <vrpn_Text.h>
+#include <vrpn_Tracker.h>
+
+#include <chrono>
+#include <string>
+#include <vector>
+
+#include "client/link.h"
+#include "client/scripted_server.h"
+#include "wire/codec.h"
+
+namespace hapticd {
+namespace {
+
+using test::ScriptedServer;
+using test::Told;
+
+constexpr auto kPatience = std::chrono::seconds(20);
+
+template <class Device, class Condition>
+bool runUntil(Device& device, Condition&& condition) {
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > end) return false;
+    device.mainloop();
+    vrpn_SleepMsecs(1);
+  }
+  return true;
+}
+
+template <class M>
+::testing::AssertionResult is(const Told& told, const M& expected) {
+  const M* message = std::get_if<M>(&told.message);
+  if (message && *message == expected) return ::testing::AssertionSuccess();
+  return ::testing::AssertionFailure() << wire::info(wire::kind(told.message)).name << ", expected "
+                                       << M::kInfo.name << " with other fields";
+}
+
+class Vrpn : public ::testing::TestWithParam<bool> {
+ protected:
+  /// Waits for something that came by TCP, behind the server's descriptions: without those, datagrams, which
+  /// may overtake them, mean nothing.
+  static bool ready(vrpn_BaseClass& device) {
+    const wire::LocalSender sender{device.connectionPtr()->register_sender("Phantom")};
+    return runUntil(device, [&] { return device.connectionPtr()->link()->heard(sender); });
+  }
+  std::string name() const { return GetParam() ? server_.tcpName() : server_.name(); }
+  ScriptedServer server_;
+};
+INSTANTIATE_TEST_SUITE_P(Connection, Vrpn, ::testing::Bool(),
+                         [](const auto& way) { return way.param ? "tcp" : "callback"; });
+
+template <class Report>
+void VRPN_CALLBACK keep(void* reports, const Report report) {
+  static_cast<std::vector<Report>*>(reports)->push_back(report);
+}
+
+TEST_P(Vrpn, ForceDeviceReportsReachTheirHandlers) {
+  vrpn_ForceDevice_Remote device(name().c_str());
+  std::vector<vrpn_FORCECB> forces;
+  std::vector<vrpn_FORCESCPCB> scps;
+  std::vector<vrpn_FORCEERRORCB> errors;
+  std::vector<vrpn_DOPCB> dops;
+  std::vector<vrpn_ISTOUCHINGCB> touchings;
+  std::vector<vrpn_TOUCHEDOBJECTCB> objects;
+  std::vector<vrpn_ANGLECB> angles;
+  device.register_force_change_handler(&forces, keep<vrpn_FORCECB>);
+  device.register_scp_change_handler(&scps, keep<vrpn_FORCESCPCB>);
+  device.register_error_handler(&errors, keep<vrpn_FORCEERRORCB>);
+  device.register_dop_change_handler(&dops, keep<vrpn_DOPCB>);
+  device.register_isTouching_handler(&touchings, keep<vrpn_ISTOUCHINGCB>);
+  device.register_touchedObject_handler(&objects, keep<vrpn_TOUCHEDOBJECTCB>);
+  device.register_angle_handler(&angles, keep<vrpn_ANGLECB>);
+  ASSERT_TRUE(ready(device));
+  server_.say(wire::Force{{1, 2, 3}});
+  server_.say(wire::Scp{{4, 5, 6}, {0.1, 0.2, 0.3, 0.9}});
+  server_.say(wire::ForceError{FD_DUTY_CYCLE_ERROR});
+  server_.say(wire::Dop{0.001});
+  server_.say(wire::IsTouching{1});
+  server_.say(wire::TouchedObject{3});
+  server_.say(wire::Angle{30, 1});
+  ASSERT_TRUE(runUntil(device, [&] {
+    return !forces.empty() && !scps.empty() && !errors.empty() && !dops.empty() && !touchings.empty() &&
+           !objects.empty() && !angles.empty();
+  }));
+  EXPECT_EQ(forces[0].msg_time.tv_sec, 1700000000);
+  EXPECT_EQ(forces[0].msg_time.tv_usec, 250000);
+  EXPECT_EQ(forces[0].force[2], 3);
+  EXPECT_EQ(scps[0].pos[1], 5);
+  EXPECT_EQ(scps[0].quat[3], 0.9);
+  EXPECT_EQ(errors[0].error_code, FD_DUTY_CYCLE_ERROR);
+  EXPECT_EQ(dops[0].dop, 0.001);
+  EXPECT_EQ(touchings[0].isTouching, 1);
+  EXPECT_EQ(objects[0].ObjectNum, 3);
+  EXPECT_EQ(angles[0].angle, 30);
+  EXPECT_EQ(device.unregister_force_change_handler(&forces, keep<vrpn_FORCECB>), 0);
+  EXPECT_EQ(device.unregister_force_change_handler(&forces, keep<vrpn_FORCECB>), -1);
+}
+
+TEST_P(Vrpn, MalagaCallsArriveWithTheirFields) {
+  vrpn_ForceDevice_Remote device(name().c_str());
+  wire::F64x16 m{};
+  for (std::size_t i = 0; i < 16; ++i) m[i] = static_cast<double>(i);
+  const vrpn_float64 box[6] = {1, 2, 3, 4, 5, 6};
+  const vrpn_float64 position[3] = {1, 2, 3};
+  const vrpn_float64 direction[3] = {4, 5, 6};
+  char spring[20] = "spring";
+  device.setObjectNumber(2);
+  device.setTransformMatrix(1, m.data());
+  device.setHapticProperty(1, "static friction", 0.5F);
+  device.setTouchableFace();
+  device.setWorkspaceBoundingBox(m.data(), box);
+  device.setWorkspaceProjectionMatrix(m.data(), m.data());
+  device.setEffect(spring, 2, 1, 2, 3, 4, position, direction);
+  device.startEffect(2);
+  device.stopEffect(2);
+  device.setObjectTouchable(1, false);
+  device.resetScene();
+  device.mainloop();
+  const auto told = server_.waitTold(11);
+  ASSERT_EQ(told.size(), 11U);
+  EXPECT_TRUE(is(told[0], wire::SetObjectNumber{2}));
+  EXPECT_TRUE(is(told[1], wire::SetTransformMatrix{1, m}));
+  EXPECT_TRUE(is(told[2], wire::SetHapticProperty{1, "static friction", 0.5F}));
+  EXPECT_TRUE(is(told[3], wire::SetTouchableFace{3}));
+  EXPECT_TRUE(is(told[4], wire::SetWorkspaceBoundingBox{m, {1, 2, 3, 4, 5, 6}}));
+  EXPECT_TRUE(is(told[5], wire::SetWorkspaceProjectionMatrix{m, m}));
+  EXPECT_TRUE(is(told[6], wire::Effect{"spring", 2, 1, 2, 3, 4, {1, 2, 3}, {4, 5, 6}}));
+  EXPECT_TRUE(is(told[7], wire::StartEffect{2}));
+  EXPECT_TRUE(is(told[8], wire::StopEffect{2}));
+  EXPECT_TRUE(is(told[9], wire::SetObjectIsTouchable{1, 0}));
+  EXPECT_TRUE(is(told[10], wire::ResetScene{}));
+  EXPECT_EQ(told[0].sender, "Phantom");
+}
+
+TEST_P(Vrpn, StockCallsArriveWithTheirFields) {
+  vrpn_ForceDevice_Remote device((name()).c_str());
+  vrpn_float32 three[3] = {1, 2, 3};
+  vrpn_float32 axis[3] = {0, 1, 0};
+  std::array<vrpn_float32, 16> m{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16};
+  vrpn_float32 parameters[2] = {7, 8};
+  device.addObject(1);
+  device.addObjectExScene(2);
+  device.moveToParent(2, 1);
+  device.setObjectPosition(1, three);
+  device.setObjectOrientation(1, axis, 0.5F);
+  device.setObjectScale(1, three);
+  device.setNormal(4, 0, 0, 1);
+  device.setTriangle(5, 0, 1, 2);
+  device.removeTriangle(5);
+  device.setSurfaceKspring(0.9F);
+  device.setSurfaceFstatic(0.4F);
+  device.setSurfaceFdynamic(0.2F);
+  device.setSurfaceKdamping(0.003F);
+  device.updateTrimeshChanges();
+  device.setTrimeshTransform(m.data());
+  device.clearTrimesh();
+  device.removeObject(2);
+  device.setHapticOrigin(three, axis, 1);
+  device.setHapticScale(2);
+  device.setSceneOrigin(three, axis, 2);
+  device.useHcollide();
+  device.set_plane(0, 1, 0, -0.5F);
+  device.startSurface();
+  device.stopSurface();
+  device.setCustomEffect(3, parameters, 2);
+  device.startEffect();
+  device.stopEffect();
+  device.mainloop();
+  const auto told = server_.waitTold(21);
+  ASSERT_EQ(told.size(), 21U);
+  EXPECT_TRUE(is(told[0], wire::AddObject{1, -1}));
+  EXPECT_TRUE(is(told[1], wire::AddObjectExScene{2}));
+  EXPECT_TRUE(is(told[2], wire::MoveToParent{2, 1}));
+  EXPECT_TRUE(is(told[3], wire::SetObjectPosition{1, {1, 2, 3}}));
+  EXPECT_TRUE(is(told[4], wire::SetObjectOrientation{1, {0, 1, 0}, 0.5F}));
+  EXPECT_TRUE(is(told[5], wire::SetObjectScale{1, {1, 2, 3}}));
+  EXPECT_TRUE(is(told[6], wire::SetNormal{0, 4, {0, 0, 1}}));
+  EXPECT_TRUE(is(told[7], wire::SetTriangle{0, 5, {0, 1, 2}, {-1, -1, -1}}));
+  EXPECT_TRUE(is(told[8], wire::RemoveTriangle{0, 5}));
+  EXPECT_TRUE(is(told[9], wire::UpdateTrimeshChanges{0, 0.9F, 0.003F, 0.4F, 0.2F}));
+  EXPECT_TRUE(is(told[10], wire::TransformTrimesh{0, m}));
+  EXPECT_TRUE(is(told[11], wire::ClearTrimesh{0}));
+  EXPECT_TRUE(is(told[12], wire::RemoveObject{2}));
+  EXPECT_TRUE(is(told[13], wire::SetHapticOrigin{{1, 2, 3}, {0, 1, 0}, 1}));
+  EXPECT_TRUE(is(told[14], wire::SetHapticScale{2}));
+  EXPECT_TRUE(is(told[15], wire::SetSceneOrigin{{1, 2, 3}, {0, 1, 0}, 2}));
+  EXPECT_TRUE(is(told[16], wire::SetTrimeshType{-1, 1}));
+  EXPECT_TRUE(is(told[17], wire::Plane{{0, 1, 0, -0.5F}, 0.9F, 0.003F, 0.2F, 0.4F, 0, 1}));
+  EXPECT_TRUE(is(told[18], wire::Plane{{0, 0, 0, 0}, 0.9F, 0.003F, 0.2F, 0.4F, 0, 1}));
+  EXPECT_TRUE(is(told[19], wire::CustomEffect{3, {{7, 8}}}));
+  EXPECT_TRUE(is(told[20], wire::CustomEffect{wire::kStopCustomEffect, {}}));
+}
+
+TEST_P(Vrpn, ConstraintsAreForceFields) {
+  vrpn_ForceDevice_Remote device(name().c_str());
+  vrpn_float32 point[3] = {1, 2, 3};
+  vrpn_float32 up[3] = {0, 2, 0};
+  device.setConstraintKSpring(100);
+  device.setConstraintLinePoint(point);
+  device.setConstraintLineDirection(up);
+  device.setConstraintPlanePoint(point);
+  device.setConstraintPlaneNormal(up);
+  device.setConstraintMode(vrpn_ForceDevice::LINE_CONSTRAINT);
+  device.enableConstraint(1);
+  device.setConstraintMode(vrpn_ForceDevice::PLANE_CONSTRAINT);
+  device.enableConstraint(0);
+  device.mainloop();
+  const auto told = server_.waitTold(3);
+  ASSERT_EQ(told.size(), 3U);
+  EXPECT_TRUE(is(told[0], wire::ForceField{{1, 2, 3}, {0, 0, 0}, {-100, 0, 0, 0, 0, 0, 0, 0, -100}, 100}));
+  EXPECT_TRUE(is(told[1], wire::ForceField{{1, 2, 3}, {0, 0, 0}, {0, 0, 0, 0, -100, 0, 0, 0, 0}, 100}));
+  EXPECT_TRUE(is(told[2], wire::ForceField{}));
+}
+
+TEST_P(Vrpn, DevicesOfOneServerShareItsConnection) {
+  {
+    vrpn_Tracker_Remote tracker(name().c_str());
+    vrpn_Button_Remote button(name().c_str());
+    vrpn_Analog_Remote analog(name().c_str());
+    vrpn_Text_Receiver text(name().c_str());
+    EXPECT_EQ(tracker.connectionPtr(), button.connectionPtr());
+    std::vector<vrpn_TRACKERCB> all;
+    std::vector<vrpn_TRACKERCB> second;
+    std::vector<vrpn_TRACKERVELCB> velocities;
+    std::vector<vrpn_TRACKERWORKSPACECB> workspaces;
+    std::vector<vrpn_BUTTONCB> buttons;
+    std::vector<vrpn_BUTTONSTATESCB> states;
+    std::vector<vrpn_ANALOGCB> analogs;
+    std::vector<vrpn_TEXTCB> texts;
+    tracker.register_change_handler(&all, keep<vrpn_TRACKERCB>);
+    tracker.register_change_handler(&second, keep<vrpn_TRACKERCB>, 1);
+    tracker.register_change_handler(&velocities, keep<vrpn_TRACKERVELCB>);
+    tracker.register_change_handler(&workspaces, keep<vrpn_TRACKERWORKSPACECB>);
+    button.register_change_handler(&buttons, keep<vrpn_BUTTONCB>);
+    button.register_states_handler(&states, keep<vrpn_BUTTONSTATESCB>);
+    analog.register_change_handler(&analogs, keep<vrpn_ANALOGCB>);
+    text.register_message_handler(&texts, keep<vrpn_TEXTCB>);
+    ASSERT_TRUE(ready(tracker));
+    tracker.request_t2r_xform();
+    tracker.request_u2s_xform();
+    tracker.request_workspace();
+    tracker.set_update_rate(250);
+    tracker.reset_origin();
+    button.set_toggle(2, VRPN_BUTTON_ON);
+    button.set_all_momentary();
+    tracker.mainloop();
+    const auto told = server_.waitTold(7);
+    ASSERT_EQ(told.size(), 7U);
+    EXPECT_TRUE(is(told[0], wire::TrackerRequestToRoom{}));
+    EXPECT_TRUE(is(told[2], wire::TrackerRequestWorkspace{}));
+    EXPECT_TRUE(is(told[3], wire::TrackerSetUpdateRate{250}));
+    EXPECT_TRUE(is(told[5], wire::ButtonAdmin{2, 21}));
+    EXPECT_TRUE(is(told[6], wire::ButtonAdmin{-99, 10}));
+
+    server_.say(wire::TrackerPosQuat{0, 0, {1, 2, 3}, {0, 0, 0, 1}});
+    server_.say(wire::TrackerPosQuat{1, 1, {4, 5, 6}, {0, 0, 0, 1}});
+    server_.say(wire::TrackerVelocity{0, 0, {1, 0, 0}, {0, 0, 0, 1}, 0.5});
+    server_.say(wire::TrackerWorkspace{{-1, -1, -1}, {1, 1, 1}});
+    server_.say(wire::ButtonChange{1, 1});
+    server_.say(wire::ButtonStates{{{0, 1}}});
+    server_.say(wire::AnalogChannels{{{0.5, 1.5}}});
+    server_.say(wire::Text{1, 2, "careful"});
+    ASSERT_TRUE(runUntil(tracker, [&] {
+      return all.size() == 2 && !velocities.empty() && !workspaces.empty() && !buttons.empty() &&
+             !states.empty() && !analogs.empty() && !texts.empty();
+    }));
+    ASSERT_EQ(second.size(), 1U);
+    EXPECT_EQ(second[0].pos[0], 4);
+    EXPECT_EQ(velocities[0].vel_quat_dt, 0.5);
+    EXPECT_EQ(workspaces[0].workspace_max[2], 1);
+    EXPECT_EQ(buttons[0].button, 1);
+    EXPECT_EQ(states[0].num_buttons, 2);
+    EXPECT_EQ(analogs[0].num_channel, 2);
+    EXPECT_EQ(analog.getNumChannels(), 2);
+    EXPECT_STREQ(texts[0].message, "careful");
+    EXPECT_EQ(texts[0].type, vrpn_TEXT_WARNING);
+    EXPECT_EQ(server_.connections(), 1U);
+  }
+  // The last device took the connection with it: the next one opens another.
+  vrpn_Tracker_Remote again(name().c_str());
+  EXPECT_TRUE(runUntil(again, [&] { return server_.connections() == 2; }));
+}
+
+int VRPN_CALLBACK countMessage(void* counter, vrpn_HANDLERPARAM) {
+  ++*static_cast<int*>(counter);
+  return 0;
+}
+
+int VRPN_CALLBACK keepNumber(void* number, vrpn_HANDLERPARAM p) {
+  const char* buffer = p.buffer;
+  return vrpn_unbuffer(&buffer, static_cast<vrpn_int32*>(number));
+}
+
+TEST_P(Vrpn, ProgramsMayHandleMessagesThemselves) {
+  vrpn_Connection* connection = vrpn_get_connection_by_name(name().c_str());
+  const vrpn_int32 sender = connection->register_sender("Phantom");
+  const vrpn_int32 type = connection->register_message_type("vrpn_ForceDevice TouchedObject");
+  EXPECT_STREQ(connection->sender_name(sender), "Phantom");
+  EXPECT_STREQ(connection->message_type_name(type), "vrpn_ForceDevice TouchedObject");
+  EXPECT_EQ(connection->sender_name(1999), nullptr);
+  int connections = 0;
+  vrpn_int32 object = 0;
+  connection->register_handler(connection->register_message_type(vrpn_got_connection), countMessage,
+                               &connections);
+  connection->register_handler(type, keepNumber, &object, sender);
+  ASSERT_TRUE(runUntil(*connection, [&] { return connections == 1; }));
+  server_.say(wire::TouchedObject{11});
+  ASSERT_TRUE(runUntil(*connection, [&] { return object == 11; }));
+
+  char buffer[64];
+  char* insert = buffer;
+  vrpn_int32 left = sizeof buffer;
+  vrpn_buffer(&insert, &left, vrpn_int32{4});
+  timeval now;
+  vrpn_gettimeofday(&now, nullptr);
+  const vrpn_int32 start = connection->register_message_type("vrpn_ForceDevice startEffect");
+  EXPECT_EQ(connection->pack_message(4, now, start, sender, buffer, vrpn_CONNECTION_RELIABLE), 0);
+  EXPECT_EQ(connection->pack_message(4, now, 1999, sender, buffer, vrpn_CONNECTION_RELIABLE), -1);
+  connection->send_pending_reports();
+  const auto told = server_.waitTold(1);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_TRUE(is(told[0], wire::StartEffect{4}));
+
+  int dropped = 0;
+  connection->register_handler(connection->register_message_type(vrpn_dropped_connection), countMessage,
+                               &dropped);
+  server_.dropClients();
+  ASSERT_TRUE(runUntil(*connection, [&] { return dropped == 1 && connections == 2; }));
+  connection->removeReference();
+}
+
+struct Leaver {
+  vrpn_ForceDevice_Remote* device;
+  int calls = 0;
+};
+void VRPN_CALLBACK leave(void* self, const vrpn_FORCECB) {
+  auto* leaver = static_cast<Leaver*>(self);
+  ++leaver->calls;
+  leaver->device->unregister_force_change_handler(self, leave);
+}
+
+TEST_P(Vrpn, HandlersMayUnregisterThemselves) {
+  vrpn_ForceDevice_Remote device(name().c_str());
+  Leaver leaver{&device};
+  std::vector<vrpn_FORCECB> forces;
+  device.register_force_change_handler(&leaver, leave);
+  device.register_force_change_handler(&forces, keep<vrpn_FORCECB>);
+  ASSERT_TRUE(ready(device));
+  server_.say(wire::Force{});
+  server_.say(wire::Force{});
+  ASSERT_TRUE(runUntil(device, [&] { return forces.size() == 2; }));
+  EXPECT_EQ(leaver.calls, 1);
+}
+
+TEST(VrpnShared, TimevalArithmetic) {
+  const timeval a{2, 900000};
+  const timeval b{1, 200000};
+  EXPECT_TRUE(vrpn_TimevalEqual(vrpn_TimevalSum(a, b), {4, 100000}));
+  EXPECT_TRUE(vrpn_TimevalEqual(vrpn_TimevalDiff(a, b), {1, 700000}));
+  EXPECT_TRUE(vrpn_TimevalGreater(a, b));
+  EXPECT_EQ(vrpn_TimevalDuration(a, b), 1700000UL);
+  EXPECT_EQ(vrpn_TimevalMsecs(a), 2900);
+  EXPECT_TRUE(vrpn_TimevalEqual(vrpn_MsecsTimeval(2900), a));
+  EXPECT_TRUE(vrpn_TimevalEqual(vrpn_TimevalScale(b, 2), {2, 400000}));
+}
+
+TEST(VrpnShared, BuffersAreBigEndianAndBounded) {
+  char buffer[12];
+  char* insert = buffer;
+  vrpn_int32 left = sizeof buffer;
+  EXPECT_EQ(vrpn_buffer(&insert, &left, vrpn_int32{0x01020304}), 0);
+  EXPECT_EQ(vrpn_buffer(&insert, &left, 1.0), 0);
+  EXPECT_EQ(vrpn_buffer(&insert, &left, vrpn_int32{0}), -1) << "full";
+  EXPECT_EQ(buffer[0], 1);
+  EXPECT_EQ(buffer[4], 0x3f);
+  const char* take = buffer;
+  vrpn_int32 number = 0;
+  vrpn_float64 real = 0;
+  vrpn_unbuffer(&take, &number);
+  vrpn_unbuffer(&take, &real);
+  EXPECT_EQ(number, 0x01020304);
+  EXPECT_EQ(real, 1.0);
+}
+
+TEST(VrpnConnection, AnUnknownHostIsNotOkay) {
+  vrpn_Connection* connection = vrpn_get_connection_by_name("Phantom@nowhere.invalid");
+  ASSERT_NE(connection, nullptr);
+  EXPECT_FALSE(connection->doing_okay());
+  EXPECT_FALSE(connection->connected());
+  EXPECT_EQ(connection->mainloop(), -1);
+  EXPECT_EQ(connection->register_sender("x"), -1);
+  connection->removeReference();
+}
+
+}  // namespace
+}  // namespace hapticd
