@@ -1,0 +1,177 @@
+#include "device/openhaptics/hd_session.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace hapticd::device::hd {
+namespace {
+
+constexpr int kMostErrors = 16;  // taken at once; the stack cannot hold up a tick
+
+Code HAPTICD_HD_CALL runFrame(void* participant) {
+  static_cast<Participant*>(participant)->onFrame();
+  return kContinue;
+}
+
+// The library asks for a key when its licence displeases it; without a terminal the answer comes at once.
+class NoKeyboard {
+ public:
+  NoKeyboard() : saved_(dup(STDIN_FILENO)) {
+    const int nothing = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+    if (nothing < 0) return;
+    dup2(nothing, STDIN_FILENO);
+    ::close(nothing);
+  }
+  ~NoKeyboard() {
+    if (saved_ < 0) return;
+    dup2(saved_, STDIN_FILENO);
+    ::close(saved_);
+  }
+  NoKeyboard(const NoKeyboard&) = delete;
+  NoKeyboard& operator=(const NoKeyboard&) = delete;
+
+ private:
+  int saved_;
+};
+
+std::string quoted(const char* name) {
+  return name == nullptr ? "the default device" : "'" + std::string(name) + "'";
+}
+
+}  // namespace
+
+// Holds the lock and the scheduler; the scheduler goes on afterwards if anybody needs it.
+class Session::Pause {
+ public:
+  explicit Pause(Session& session) : session_(session), lock_(session.mutex_) {
+    if (session_.running_) session_.api_.stopScheduler();
+    session_.running_ = false;
+  }
+  ~Pause() {
+    if (session_.members_.empty()) return;
+    session_.api_.startScheduler();
+    session_.running_ = true;
+  }
+  Pause(const Pause&) = delete;
+  Pause& operator=(const Pause&) = delete;
+
+ private:
+  Session& session_;
+  std::lock_guard<std::mutex> lock_;
+};
+
+std::shared_ptr<Session> Session::get() {
+  static std::mutex mutex;
+  static std::shared_ptr<Session> session;
+  const std::lock_guard lock(mutex);
+  if (!session) session.reset(new Session);
+  return session;
+}
+
+Session::Session() : api_(DynamicLibrary(libraryNames())) {
+  // drainErrors() walks this in the scheduler's thread.
+  members_.reserve(16);
+}
+
+Handle Session::open(const std::string& name, std::string& nameThatWorked) {
+  const Pause pause(*this);
+  const NoKeyboard noKeyboard;
+  // Some drivers know a device only by the name it was given, some only without one.
+  std::vector<const char*> names;
+  if (!name.empty()) names.push_back(name.c_str());
+  names.insert(names.end(), {nullptr, "Default Device", "Default PHANToM"});
+
+  std::string words;
+  for (const char* candidate : names) {
+    const Handle device = tryOpen(candidate, words);
+    if (device == kInvalidHandle) continue;
+    open_.push_back(device);
+    nameThatWorked = quoted(candidate);
+    return device;
+  }
+  throw std::runtime_error(
+      "no OpenHaptics device opens: " + words +
+      "; check that it is connected and powered, and that the vendor's setup tool sees it");
+}
+
+Handle Session::tryOpen(const char* name, std::string& words) {
+  const Handle device = api_.initDevice(name);
+  // The handle decides: an error that repeats an earlier one is not put on the stack again.
+  std::string reason = takeErrors();
+  if (device != kInvalidHandle && std::find(open_.begin(), open_.end(), device) != open_.end()) {
+    reason = "is open already";
+  } else if (device != kInvalidHandle) {
+    return device;
+  } else if (reason.empty()) {
+    reason = "fails as before";
+  }
+  words += (words.empty() ? "" : "; ") + quoted(name) + ": " + reason;
+  return kInvalidHandle;
+}
+
+void Session::close(Handle device) noexcept {
+  const Pause pause(*this);
+  api_.makeCurrentDevice(device);
+  api_.disableDevice(device);
+  open_.erase(std::remove(open_.begin(), open_.end(), device), open_.end());
+}
+
+void Session::whileStopped(Handle device, const std::function<void()>& work) {
+  const Pause pause(*this);
+  api_.makeCurrentDevice(device);
+  work();
+}
+
+void Session::join(Handle device, Participant& participant, double rate_Hz) {
+  {
+    const Pause pause(*this);
+    api_.makeCurrentDevice(device);
+    takeErrors();
+    if (rate_Hz != 1000) api_.setSchedulerRate(static_cast<unsigned long>(rate_Hz));
+    api_.enable(kForceOutput);
+    const std::string words = takeErrors();
+    if (!words.empty()) {
+      throw std::runtime_error("the OpenHaptics device refuses force output at " +
+                               std::to_string(static_cast<int>(rate_Hz)) + " Hz: " + words);
+    }
+    const SchedulerHandle scheduled = api_.scheduleAsynchronous(&runFrame, &participant, kFirstPriority);
+    members_.push_back({device, &participant, scheduled});
+  }
+}
+
+void Session::leave(Participant& participant) noexcept {
+  const Pause pause(*this);
+  const auto member = std::find_if(members_.begin(), members_.end(),
+                                   [&](const Member& m) { return m.participant == &participant; });
+  if (member == members_.end()) return;
+  api_.unschedule(member->scheduled);
+  members_.erase(member);
+}
+
+void Session::drainErrors() noexcept {
+  for (int i = 0; i < kMostErrors; ++i) {
+    const ErrorInfo error = api_.getError();
+    if (error.code == kSuccess) return;
+    const bool known = std::any_of(members_.begin(), members_.end(),
+                                   [&](const Member& m) { return m.device == error.device; });
+    for (const Member& member : members_) {
+      if (!known || member.device == error.device) member.participant->onError(error.code);
+    }
+  }
+}
+
+std::string Session::takeErrors() noexcept {
+  std::string words;
+  for (int i = 0; i < kMostErrors; ++i) {
+    const ErrorInfo error = api_.getError();
+    if (error.code == kSuccess) break;
+    words += (words.empty() ? "" : ", ") + std::string(errorName(error.code)) + " (internal code " +
+             std::to_string(error.internalCode) + ")";
+  }
+  return words;
+}
+
+}  // namespace hapticd::device::hd

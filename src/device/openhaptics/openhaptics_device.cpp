@@ -1,0 +1,297 @@
+#include "device/openhaptics/openhaptics_device.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+#include <thread>
+
+#include "device/profiles.h"
+
+namespace hapticd::device {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr double kMetresPerMillimetre = 1e-3;
+constexpr double kHot = 0.95;
+constexpr double kCool = 0.7;
+constexpr Nanos kForceErrorHold = 100'000'000;  // the amplifiers go off and ramp up by themselves
+constexpr Nanos kWarmHold = 1'000'000'000;
+constexpr int kSettlingFrames = 100;
+constexpr std::uint64_t kCalibrationCheck = 100;  // frames, while calibrated
+constexpr double kImpulseShare = 0.9;             // stays clear of the driver's own trip
+
+Nanos steadyNow() noexcept {
+  return std::chrono::steady_clock::now().time_since_epoch() / 1ns;
+}
+
+bool contains(const std::string& text, const char* word) {
+  return text.find(word) != std::string::npos;
+}
+
+DeviceProfile nearestProfile(const std::string& model) {
+  const char* known = "Touch";
+  if (contains(model, "Premium")) known = "Premium 1.5";
+  if (contains(model, "Touch X") || contains(model, "Desktop")) known = "Touch X";
+  DeviceProfile profile = *findProfile(known);
+  if (!model.empty()) profile.model = model;
+  return profile;
+}
+
+std::string text(const char* words) {
+  return words == nullptr ? std::string() : std::string(words);
+}
+
+}  // namespace
+
+void OpenHapticsDevice::open() {
+  if (handle_ != hd::kInvalidHandle) return;
+  session_ = hd::Session::get();
+  std::string name;
+  handle_ = session_->open(options_.name, name);
+  session_->whileStopped(handle_, [&] { readIdentity(); });
+  description_ += ", opened as " + name;
+  derating_ = ThermalDerating(profile_.peakForce_N, profile_.continuousForce_N);
+  state_ = DeviceState();
+  written_N_.setZero();
+  frames_ = 0;
+  calibrated_ = hot_ = lost_ = false;
+  settling_ = 0;
+  hotUntil_ = faultUntil_ = 0;
+  hold_ = kHoldNotCalibrated;
+  lastError_ = hd::kSuccess;
+  consent_ = options_.calibrate;
+}
+
+// What the driver says of itself wins where it is plausible.
+void OpenHapticsDevice::readIdentity() {
+  const hd::Api& api = session_->api();
+  const std::string model = text(api.getString(hd::kModel));
+  description_ = model + ", serial number " + text(api.getString(hd::kSerialNumber)) + ", driver " +
+                 text(api.getString(hd::kDriverVersion));
+  profile_ = nearestProfile(model);
+  hasSafetySwitch_ = contains(model, "Desktop");  // elsewhere there is none, and it reads as open
+  calibrationStyle_ = 0;
+  api.getIntegerv(hd::kCalibrationStyle, &calibrationStyle_);
+
+  const auto replace = [&](double& value, hd::Enum what, double scale, double least, double most) {
+    double said[6] = {};
+    api.getDoublev(what, said);
+    if (said[0] * scale >= least && said[0] * scale <= most) value = said[0] * scale;
+  };
+  replace(profile_.peakForce_N, hd::kMaxForce, 1, 0.5, 50);
+  replace(profile_.continuousForce_N, hd::kMaxContinuousForce, 1, 0.1, profile_.peakForce_N);
+  profile_.continuousForce_N = std::min(profile_.continuousForce_N, profile_.peakForce_N);
+  replace(profile_.nominalStiffness_N_per_m, hd::kMaxStiffness, 1000, 50, 10000);
+  replace(velocityLimit_m_per_s_, hd::kSoftwareVelocityLimit, kMetresPerMillimetre, 0.1, 10);
+  replace(impulseLimit_N_, hd::kSoftwareImpulseLimit, 1, 0.01, 50);
+
+  double box[6] = {};
+  api.getDoublev(hd::kUsableWorkspace, box);
+  const Vec3 min = kMetresPerMillimetre * Vec3(box[0], box[1], box[2]);
+  const Vec3 max = kMetresPerMillimetre * Vec3(box[3], box[4], box[5]);
+  if (((max - min).array() > 0.02).all() && ((max - min).array() < 2).all())
+    profile_.workspace_m = {min, max};
+  session_->takeErrors();  // an older driver does not know every value
+}
+
+void OpenHapticsDevice::close() noexcept {
+  if (handle_ == hd::kInvalidHandle) return;
+  stop();
+  session_->close(handle_);
+  handle_ = hd::kInvalidHandle;
+}
+
+void OpenHapticsDevice::start(std::function<void(Nanos)> onTick) {
+  if (handle_ == hd::kInvalidHandle) throw std::runtime_error("the OpenHaptics device is not open");
+  if (started_) return;
+  onTick_ = std::move(onTick);
+  quiet_ = Quiet::no;
+  session_->join(handle_, *this, options_.rate_Hz);
+  started_ = true;
+}
+
+void OpenHapticsDevice::stop() noexcept {
+  if (!started_) return;
+  // One frame with zero force first; the amplifiers go off with the scheduler in any case.
+  quiet_ = Quiet::wanted;
+  for (int i = 0; i < 20 && quiet_ != Quiet::reached; ++i) std::this_thread::sleep_for(1ms);
+  session_->leave(*this);
+  started_ = false;
+}
+
+bool OpenHapticsDevice::read(Nanos /*now*/, DeviceState& state) noexcept {
+  if (!inTick_) return false;
+  state = state_;
+  return true;
+}
+
+bool OpenHapticsDevice::write(const Vec3& force_N) noexcept {
+  if (!inTick_ || !force_N.allFinite()) return false;
+  command_N_ = force_N;
+  return true;
+}
+
+void OpenHapticsDevice::onFrame() noexcept {
+  const hd::Api& api = session_->api();
+  const bool quiet = quiet_ != Quiet::no;
+  now_ = steadyNow();
+  api.makeCurrentDevice(handle_);
+  api.beginFrame(handle_);
+  hd::Enum calibration = hd::kCalibrationOk;
+  if (!calibrated_ || frames_ % kCalibrationCheck == 0) {
+    calibration = api.checkCalibration();
+    calibrated_ = calibration == hd::kCalibrationOk;
+  }
+  sample(now_);
+  command_N_.setZero();
+  if (!quiet && onTick_) {
+    inTick_ = true;
+    onTick_(now_);
+    inTick_ = false;
+  }
+  written_N_ = quiet ? Vec3(Vec3::Zero()) : limited(command_N_);
+  api.setDoublev(hd::kCurrentForce, written_N_.data());
+  api.endFrame(handle_);
+
+  if (!calibrated_) updateCalibration(calibration);
+  session_->drainErrors();
+  ++frames_;
+  if (quiet) quiet_ = Quiet::reached;
+}
+
+void OpenHapticsDevice::sample(Nanos now) noexcept {
+  const hd::Api& api = session_->api();
+  Vec3 v = Vec3::Zero();
+  state_.time = now;
+  api.getDoublev(hd::kCurrentPosition, v.data());
+  state_.position_m = kMetresPerMillimetre * v;
+  api.getDoublev(hd::kCurrentVelocity, v.data());
+  state_.velocity_m_per_s = kMetresPerMillimetre * v;
+  api.getDoublev(hd::kCurrentAngularVelocity, state_.angularVelocity_rad_per_s.data());
+  geometry::Mat4 T_device_stylus = geometry::Mat4::Identity();
+  api.getDoublev(hd::kCurrentTransform, T_device_stylus.data());
+  const geometry::Mat3 rotation = T_device_stylus.topLeftCorner<3, 3>();
+  if (rotation.allFinite() && rotation.determinant() > 0.5) {
+    state_.orientation = Quat(rotation).normalized();
+  }
+  int buttons = 0;
+  api.getIntegerv(hd::kCurrentButtons, &buttons);
+  state_.buttons = static_cast<std::uint32_t>(buttons);
+  double temperatures[6] = {};
+  api.getDoublev(hd::kMotorTemperature, temperatures);
+  state_.motorTemperature = *std::max_element(std::begin(temperatures), std::end(temperatures));
+  state_.hold = holds(now);
+  hold_.store(state_.hold, std::memory_order_relaxed);
+}
+
+std::uint32_t OpenHapticsDevice::holds(Nanos now) noexcept {
+  const hd::Api& api = session_->api();
+  std::uint32_t hold = kHoldNone;
+  if (!calibrated_ || settling_ > 0) hold |= kHoldNotCalibrated;
+  if (settling_ > 0) --settling_;
+  if ((calibrationStyle_ & hd::kStyleInkwell) != 0) {
+    hd::Boolean away = 1;  // the switch reads 0 with the stylus docked
+    api.getBooleanv(hd::kCurrentInkwellSwitch, &away);
+    if (away == 0) hold |= kHoldInkwell;
+  }
+  if (hasSafetySwitch_) {
+    hd::Boolean held = 1;
+    api.getBooleanv(hd::kCurrentSafetySwitch, &held);
+    if (held == 0) hold |= kHoldDeadMan;
+  }
+  hot_ = state_.motorTemperature > (hot_ ? kCool : kHot);
+  if (hot_ || now < hotUntil_) hold |= kHoldHot;
+  const bool finite = state_.position_m.allFinite() && state_.velocity_m_per_s.allFinite();
+  if (lost_ || now < faultUntil_ || !finite) hold |= kHoldFault;
+  return hold;
+}
+
+// The position jumps with an update: only after a frame without force. Where a person has to bring the arm
+// into place, only with that person's consent.
+void OpenHapticsDevice::updateCalibration(hd::Enum status) noexcept {
+  if (!written_N_.isZero()) return;
+  const bool automatic = (calibrationStyle_ & hd::kStyleAuto) != 0 && status == hd::kCalibrationNeedsUpdate;
+  if (!automatic && !consent_) return;
+  int style = hd::kStyleAuto;
+  if (!automatic) {
+    const bool encoders = (calibrationStyle_ & hd::kStyleEncoderReset) != 0;
+    style = encoders ? hd::kStyleEncoderReset : hd::kStyleInkwell;
+    // An inkwell can be calibrated once the stylus is in it, which the driver tells by this status.
+    if (!encoders && status != hd::kCalibrationNeedsUpdate) return;
+    consent_ = false;
+  }
+  session_->api().updateCalibration(static_cast<hd::Enum>(style));
+  settling_ = kSettlingFrames;
+}
+
+Vec3 OpenHapticsDevice::limited(const Vec3& force_N) noexcept {
+  const double limit = derating_.step(state_.motorTemperature);
+  if (state_.hold != kHoldNone || state_.velocity_m_per_s.norm() > velocityLimit_m_per_s_)
+    return Vec3::Zero();
+  const double wanted = force_N.norm();
+  Vec3 force = wanted > limit ? Vec3(limit / wanted * force_N) : force_N;
+  // A rise in steps; a fall at once, since less force is always right.
+  const double step = kImpulseShare * impulseLimit_N_;
+  const Vec3 change = force - written_N_;
+  if (force.norm() > written_N_.norm() && change.norm() > step) {
+    force = written_N_ + step / change.norm() * change;
+  }
+  return force;
+}
+
+void OpenHapticsDevice::onError(hd::Enum code) noexcept {
+  if (code < hd::kForceErrors) return;  // a value that this device does not have
+  lastError_ = code;
+  if (code == hd::kWarmMotors) {
+    hotUntil_ = now_ + kWarmHold;
+  } else if (code >= hd::kDeviceErrors && code < hd::kFrameErrors) {
+    // The same error is told only once, so silence does not mean that the device is back.
+    lost_ = true;
+  } else {
+    faultUntil_ = now_ + kForceErrorHold;
+  }
+}
+
+void OpenHapticsDevice::calibrate() {
+  if (!started_)
+    throw std::runtime_error("calibration needs the servo loop of the OpenHaptics device to run");
+  consent_ = true;
+  for (int i = 0; i < 300; ++i) {
+    if ((hold_ & kHoldNotCalibrated) == 0) {
+      consent_ = false;
+      return;
+    }
+    std::this_thread::sleep_for(10ms);
+  }
+  consent_ = false;
+  throw std::runtime_error("the OpenHaptics device is not calibrated after 3 s: " + faultText());
+}
+
+std::string OpenHapticsDevice::faultText() const {
+  const std::uint32_t hold = hold_;
+  std::string words;
+  const auto say = [&](const std::string& sentence) { words += (words.empty() ? "" : "; ") + sentence; };
+  if ((hold & kHoldFault) != 0) {
+    const hd::Enum code = lastError_;
+    say(code == hd::kSuccess ? "the driver gives positions that are not numbers"
+                             : "the driver reports " + std::string(hd::errorName(code)));
+    if (code >= hd::kDeviceErrors && code < hd::kFrameErrors) say("check the cable and open the device anew");
+  }
+  if ((hold & kHoldNotCalibrated) != 0) {
+    if ((calibrationStyle_ & hd::kStyleEncoderReset) != 0) {
+      say("not calibrated: bring the arm into its reset position, then calibrate");
+    } else if ((calibrationStyle_ & hd::kStyleInkwell) != 0) {
+      say("not calibrated: put the stylus into the inkwell, then calibrate");
+    } else {
+      say("not calibrated: move the arm slowly through its workspace");
+    }
+  }
+  if ((hold & kHoldInkwell) != 0) say("the stylus is in the inkwell");
+  if ((hold & kHoldDeadMan) != 0) say("nobody holds the stylus");
+  if ((hold & kHoldHot) != 0) say("the motors are too hot; let them cool");
+  return words;
+}
+
+}  // namespace hapticd::device
