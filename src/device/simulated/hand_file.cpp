@@ -74,6 +74,28 @@ std::size_t readNumbers(std::string_view text, const Line& line, std::array<doub
   return count;
 }
 
+Nanos readTime(double time_s, Nanos before, const Line& line) {
+  if (time_s < 0 || time_s > kMostSeconds) line.fail("time " + std::to_string(time_s) + " s is out of range");
+  const Nanos time = geometry::toNanos(time_s);
+  if (time <= before) line.fail("time " + std::to_string(time_s) + " s is not after the row before");
+  return time;
+}
+
+Quat readOrientation(const Quat& quaternion, const Line& line) {
+  const double length = quaternion.norm();
+  if (std::abs(length - 1) > 0.01) {
+    line.fail("quaternion of length " + std::to_string(length) + " is not a rotation");
+  }
+  return quaternion.normalized();
+}
+
+std::uint32_t readButtons(double buttons, const Line& line) {
+  if (buttons != std::floor(buttons) || buttons < 0 || buttons > 4294967295.0) {
+    line.fail("buttons " + std::to_string(buttons) + " is not a set of bits");
+  }
+  return static_cast<std::uint32_t>(buttons);
+}
+
 }  // namespace
 
 std::shared_ptr<const HandFile> HandFile::load(const std::filesystem::path& file) {
@@ -108,25 +130,9 @@ std::shared_ptr<const HandFile> HandFile::parse(std::string_view text, const std
     }
 
     Row row{0, Vec3(v[1], v[2], v[3]), Quat::Identity(), 0};
-    if (v[0] < 0 || v[0] > kMostSeconds) line.fail("time " + std::to_string(v[0]) + " s is out of range");
-    row.time = geometry::toNanos(v[0]);
-    if (!hand->rows_.empty() && row.time <= hand->rows_.back().time) {
-      line.fail("time " + std::to_string(v[0]) + " s is not after the row before");
-    }
-    if (columns >= 8) {
-      row.orientation = Quat(v[7], v[4], v[5], v[6]);
-      if (std::abs(row.orientation.norm() - 1) > 0.01) {
-        line.fail("quaternion of length " + std::to_string(row.orientation.norm()) + " is not a rotation");
-      }
-      row.orientation.normalize();
-    }
-    if (columns == 5 || columns == 9) {
-      const double buttons = v[columns - 1];
-      if (buttons != std::floor(buttons) || buttons < 0 || buttons > 4294967295.0) {
-        line.fail("buttons " + std::to_string(buttons) + " is not a set of bits");
-      }
-      row.buttons = static_cast<std::uint32_t>(buttons);
-    }
+    row.time = readTime(v[0], hand->rows_.empty() ? -1 : hand->rows_.back().time, line);
+    if (columns >= 8) row.orientation = readOrientation(Quat(v[7], v[4], v[5], v[6]), line);
+    if (columns == 5 || columns == 9) row.buttons = readButtons(v[columns - 1], line);
     hand->rows_.push_back(row);
   }
   if (hand->rows_.empty()) throw HandFileError(source + ": no row with a hand in it");

@@ -1,6 +1,7 @@
 // How long things took, in logarithmic buckets, readable while it is being filled.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <bit>

@@ -17,7 +17,7 @@ struct ServoThreadOptions {
   bool requireRealtime = false;  ///< start() throws when scheduling or memory lock was refused
 };
 
-/// Owns one realtime thread. Started and stopped by one other thread.
+/// Owns one realtime thread. Started once and stopped by one other thread.
 class ServoThread {
  public:
   /// `tick` must not throw, allocate or lock; it and `clock` must outlive the thread. Throws

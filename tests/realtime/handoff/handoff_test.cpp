@@ -1,6 +1,7 @@
 // The hand-offs under one thread's random interleavings and under two threads' real ones.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
 #include <deque>
 #include <random>

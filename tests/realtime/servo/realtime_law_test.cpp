@@ -1,7 +1,11 @@
 // The law of the realtime folder: a tick never allocates, frees or locks, whatever the scene does meanwhile.
 #include <gtest/gtest.h>
 
+#include <array>
+#include <atomic>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <mutex>
 #include <numbers>
 #include <random>
