@@ -135,7 +135,7 @@ Vec3 nearestPointOf(const Facet& f, const Vec3& x) noexcept {
 }
 
 bool meetBall(const Facet& f, TouchableFaces faces, double radius, const Vec3& p, const Vec3& d, double limit,
-              Meeting& out) noexcept {
+              double latest, Meeting& out) noexcept {
   const double standoff = radius + f.skin;
   Heights h;
   if (!touchableSide(f, faces, p, d, limit, h) || !(h.end < standoff)) return false;
@@ -145,7 +145,7 @@ bool meetBall(const Facet& f, TouchableFaces faces, double radius, const Vec3& p
   const double fine = 1e-3 * f.skin;
   double t = 0;
   bool stopped = false;
-  for (int i = 0; i < 32 && t <= limit; ++i) {
+  for (int i = 0; i < 32 && t <= (stopped ? limit : latest); ++i) {
     const Vec3 x = p + t * d;
     const Vec3 foot = nearestPointOf(f, x);
     const Vec3 away = x - foot;
@@ -153,8 +153,7 @@ bool meetBall(const Facet& f, TouchableFaces faces, double radius, const Vec3& p
     const Vec3 n = distance > f.skin ? Vec3(away / distance) : Vec3(h.sign * f.normal);
     const double slope = n.dot(d);
     if (!stopped && distance <= standoff + fine) {
-      out = {t, 0, {n, foot, standoff}};
-      out.depth = -out.plane.height(p + limit * d);
+      out = {t, -slope, {n, foot, standoff}};
       stopped = true;
     }
     if (stopped && distance <= contact + fine) {

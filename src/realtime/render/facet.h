@@ -20,6 +20,7 @@ struct Facet {
   Vec3 a, b, c;  ///< counter-clockwise from the front; a-b is the longest edge
   Vec3 normal;   ///< unit, out of the front
   double skin = 0;
+  double distance = 0;  ///< of the triangle from the centre of the gathered ball; kept for the ball tool
   std::uint32_t triangle = 0;
   int object = 0;  ///< position among the near objects
 };
@@ -27,7 +28,7 @@ struct Facet {
 /// Where a path meets a facet: at `stop` in [0, 1] the proxy is at its standoff; `plane` keeps it there.
 struct Meeting {
   double stop = 0;
-  double depth = 0;  ///< how far the rest of the path would go below the plane; decides between equal stops
+  double depth = 0;  ///< how far the path would go on below the plane; decides between equal stops
   Plane plane;
 };
 
@@ -44,9 +45,10 @@ double reach(const Facet& f, scene::TouchableFaces faces, const Vec3& p, const V
 bool meet(const Facet& f, scene::TouchableFaces faces, const Vec3& p, const Vec3& d, double limit,
           Meeting& out) noexcept;
 
-/// The ball tool: where its centre has to stop on the path p + t d, t in [0, limit]. False when it passes.
+/// The ball tool: where its centre has to stop on the path p + t d, t in [0, limit]; a stop beyond `latest`
+/// is of no interest. False when it passes.
 bool meetBall(const Facet& f, scene::TouchableFaces faces, double radius, const Vec3& p, const Vec3& d,
-              double limit, Meeting& out) noexcept;
+              double limit, double latest, Meeting& out) noexcept;
 
 /// The point of the triangle nearest to x (Ericson 2005, 5.1.5).
 Vec3 nearestPointOf(const Facet& f, const Vec3& x) noexcept;

@@ -169,8 +169,10 @@ void Nearby::gather(const Vec3& centre, double radius) noexcept {
       }
       Facet& facet = facets_[static_cast<std::size_t>(facetCount_)];
       if (!facetOf(i, triangle, facet)) return;
-      const bool near = std::abs(facet.normal.dot(centre - facet.a)) <= reach;
-      if (near || placed.deformed) ++facetCount_;
+      // Deforming facets may have come from farther away.
+      if (std::abs(facet.normal.dot(centre - facet.a)) > reach && !placed.deformed) return;
+      if (radius_ > 0) facet.distance = (centre - nearestPointOf(facet, centre)).norm();
+      if (facet.distance <= reach || placed.deformed) ++facetCount_;
     };
     placed.state->mesh->index.visitNear(placed.T_object_device * centre, reach * kWiden * placed.stretch,
                                         visit);
@@ -180,7 +182,7 @@ void Nearby::gather(const Vec3& centre, double radius) noexcept {
 bool Nearby::meets(const Facet& f, const Vec3& p, const Vec3& g, Hit& hit) const noexcept {
   const Vec3 d = g - p;
   const bool found =
-      radius_ > 0 ? meetBall(f, faces(), radius_, p, d, 1, hit) : meet(f, faces(), p, d, 1, hit);
+      radius_ > 0 ? meetBall(f, faces(), radius_, p, d, 1, 1, hit) : meet(f, faces(), p, d, 1, hit);
   hit.object = f.object;
   hit.triangle = f.triangle;
   return found;
@@ -190,7 +192,12 @@ bool Nearby::meets(const Facet& f, const Vec3& p, const Vec3& g, Hit& hit) const
 void Nearby::consider(const Facet& f, const Vec3& p, const Vec3& d, double limit, Hit& best,
                       bool& found) const noexcept {
   Hit hit;
-  if (!(radius_ > 0 ? meetBall(f, faces(), radius_, p, d, limit, hit) : meet(f, faces(), p, d, limit, hit))) {
+  if (radius_ > 0) {
+    const double latest = found ? best.stop : limit;
+    const double nearest = f.distance - (p - centre_).norm() - latest * d.norm();
+    if (nearest > radius_ + 2 * f.skin) return;
+    if (!meetBall(f, faces(), radius_, p, d, limit, latest, hit)) return;
+  } else if (!meet(f, faces(), p, d, limit, hit)) {
     return;
   }
   hit.object = f.object;
@@ -257,42 +264,44 @@ bool Nearby::castTree(const Vec3& p, const Vec3& d, int only, Hit& hit) const no
   return found;
 }
 
-// The index has no query for a swept ball: gather along the path, in steps short enough for the array.
-bool Nearby::castBall(const Vec3& p, const Vec3& d, int only, Hit& hit) noexcept {
+// The index has no query for a swept ball: gather along the path from `begin` on, in steps that grow while
+// nothing is in the way and shrink when the array overflows.
+bool Nearby::castBall(const Vec3& p, const Vec3& d, double begin, int only, Hit& hit) noexcept {
   constexpr int kMaxSteps = 64;
-  double begin = 0;
-  double step = 1;
+  const double length = d.norm();
+  double step = std::min(1.0, std::max(0.125 * radius_ / length, 1.0 / kMaxSteps));
   for (int i = 0; i < kMaxSteps && begin < 1; ++i) {
     step = std::min(step, 1 - begin);
     const Vec3 from = p + begin * d;
-    const Vec3 way = step * d;
-    gather(from + 0.5 * way, 0.5 * way.norm() * kWiden);
+    gather(from + 0.5 * step * d, 0.5 * step * length * kWiden);
     if (!complete_ && step > 1.0 / kMaxSteps) {
       step *= 0.25;
       continue;
     }
     overflowed_ = overflowed_ || !complete_;
-    if (castGathered(from, way, 1, only, hit)) {
+    if (castGathered(from, step * d, 1, only, hit)) {
       hit.stop = begin + step * hit.stop;
       return true;
     }
     begin += step;
+    step *= 2;
   }
   return false;
 }
 
 bool Nearby::cast(const Vec3& p, const Vec3& g, Hit& hit) noexcept {
   const Vec3 d = g - p;
+  double free = 0;
   if (complete_ && (p - centre_).norm() <= reach_) {
-    const double limit = exitOf(p, d, centre_, reach_);
-    if (castGathered(p, d, limit, -1, hit)) return true;
-    if (limit == 1) return false;
+    free = exitOf(p, d, centre_, reach_);
+    if (castGathered(p, d, free, -1, hit)) return true;
+    if (free == 1) return false;
   }
-  return radius_ > 0 ? castBall(p, d, -1, hit) : castTree(p, d, -1, hit);
+  return radius_ > 0 ? castBall(p, d, free, -1, hit) : castTree(p, d, -1, hit);
 }
 
 bool Nearby::castAt(int object, const Vec3& p, const Vec3& g, Hit& hit) noexcept {
-  return radius_ > 0 ? castBall(p, g - p, object, hit) : castTree(p, g - p, object, hit);
+  return radius_ > 0 ? castBall(p, g - p, 0, object, hit) : castTree(p, g - p, object, hit);
 }
 
 }  // namespace hapticd::realtime

@@ -69,7 +69,7 @@ class Nearby {
   /// Gathers the facets that a tool inside the ball can meet; casts inside it then walk no tree.
   void gather(const Vec3& centre, double radius) noexcept;
   bool gathered(const Vec3& p) const noexcept {
-    return complete_ && (p - centre_).squaredNorm() < 0.25 * reach_ * reach_;
+    return complete_ && (p - centre_).squaredNorm() < 0.64 * reach_ * reach_;
   }
   const Facet* facetsBegin() const noexcept { return facets_.data(); }
   const Facet* facetsEnd() const noexcept { return facets_.data() + facetCount_; }
@@ -101,7 +101,7 @@ class Nearby {
                 bool& found) const noexcept;
   bool castGathered(const Vec3& p, const Vec3& d, double limit, int only, Hit& hit) const noexcept;
   bool castTree(const Vec3& p, const Vec3& d, int only, Hit& hit) const noexcept;
-  bool castBall(const Vec3& p, const Vec3& d, int only, Hit& hit) noexcept;
+  bool castBall(const Vec3& p, const Vec3& d, double begin, int only, Hit& hit) noexcept;
 
   double radius_;
   Moment now_;

@@ -13,6 +13,7 @@ constexpr int kHoldCasts = 32;             // kept back for finding what holds i
 constexpr double kJump_m = 0.030;          // farther in one tick is a jump, not a motion
 constexpr double kRestick_m = 0.5e-6;      // slower than this in a tick is at rest
 constexpr double kGatherMargin_m = 10e-6;  // the tremor of a hand
+constexpr double kBallConvergence = 1e-6;  // of the radius, in distance to the target
 constexpr int kMaxPushes = 8;
 
 // Depth below the held planes as they really are, without the skin that keeps the proxy off them.
@@ -207,14 +208,16 @@ void Proxy::chase(const Vec3& hip) noexcept {
 // before, so that only what really stands in the way holds the proxy; it ends when that brings it no nearer.
 void Proxy::slide(const Vec3& target, ActiveSet& active) noexcept {
   const double skin = nearby_.finestSkin();
-  double nearest =
-      (position_ - target).norm() + 4 * skin;  // a proxy within the skin is first put back outside
+  // A point comes to rest on planes in finitely many approaches; a ball on edges and corners only converges.
+  const double gain = std::max(1e-4 * skin, kBallConvergence * nearby_.toolRadius());
+  // A proxy within the skin is first put back outside.
+  double nearest = (position_ - target).norm() + 4 * skin;
   while (casts_ < kMaxCasts) {
     active.count = 0;
     Vec3 goal;
     if (approach(target, false, active, goal)) return;
     const double distance = (position_ - target).norm();
-    if (!(distance < nearest - 1e-4 * skin)) return;
+    if (!(distance < nearest - gain)) return;
     nearest = distance;
   }
 }
