@@ -25,6 +25,8 @@ constexpr Row kRows[] = {
     {"Premium 1.5", "", 381, 267, 191, 8.5, 1.4, 1000, 3, 1, false},
     {"omega.3", "", 160, 160, 110, 12, 12, 5000, 30, 1, false},
     {"delta.3", "", 400, 400, 260, 20, 20, 5000, 30, 1, false},
+    {"sigma.7", "", 190, 190, 130, 12, 12, 4000, 30, 2, false},
+    {"lambda.7", "", 200, 200, 150, 12, 12, 8000, 30, 2, false},
 };
 
 std::array<DeviceProfile, std::size(kRows)> build() {

@@ -7,7 +7,7 @@ namespace hapticd::device {
 namespace {
 
 TEST(Profiles, AreConsistent) {
-  ASSERT_EQ(profiles().size(), 6U);
+  ASSERT_EQ(profiles().size(), 8U);
   for (const DeviceProfile& profile : profiles()) {
     EXPECT_EQ(findProfile(profile.model), &profile);
     EXPECT_FALSE(profile.workspace_m.empty());

@@ -93,6 +93,7 @@ TEST_F(HdTest, TheBannerCannotTakeAKey) {
 TEST_F(HdTest, TheMockAbortsWhereTheVendorsLibraryCrashes) {
   using Get = void (*)(unsigned, double*);
   const auto get = reinterpret_cast<Get>(dlsym(dlopen(MOCK_HD, RTLD_NOW), "hdGetDoublev"));
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
   double v[6];
   EXPECT_DEATH(get(0x2603, v), "without a device");
 }

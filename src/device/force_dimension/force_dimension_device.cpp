@@ -1,0 +1,266 @@
+#include "device/force_dimension/force_dimension_device.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+#include <thread>
+
+#include "device/profiles.h"
+
+namespace hapticd::device {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr Nanos kStatusPeriod = 10'000'000;
+constexpr int kFailuresToFault = 3;
+constexpr double kWatchdogStep_s = 125e-6;
+constexpr double kGripClosed_rad = 0.05;
+constexpr double kGripOpen_rad = 0.10;
+
+// Theirs: x to the user, y right, z up. Ours: x right, y up, z to the user.
+Vec3 fromVendor(double x, double y, double z) noexcept {
+  return {y, z, x};
+}
+
+geometry::Mat3 fromVendor(const double (&m)[3][3]) noexcept {
+  constexpr int kOurAxis[3] = {1, 2, 0};  // the vendor's axis that is ours number i
+  geometry::Mat3 rotation;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) rotation(row, column) = m[kOurAxis[row]][kOurAxis[column]];
+  }
+  return rotation;
+}
+
+DeviceProfile nearestProfile(const std::string& name) {
+  const char* known = "omega.3";
+  for (const char* family : {"delta", "sigma", "lambda"}) {
+    if (name.find(family) == std::string::npos) continue;
+    known = *family == 'd' ? "delta.3" : *family == 's' ? "sigma.7" : "lambda.7";
+  }
+  DeviceProfile profile = *findProfile(known);
+  if (!name.empty()) profile.model = name;
+  return profile;
+}
+
+}  // namespace
+
+// The right to call the library, where a calibration and the servo meet. The servo never waits for it.
+class ForceDimensionDevice::Turn {
+ public:
+  explicit Turn(std::atomic<bool>& busy) noexcept
+      : busy_(busy), mine_(!busy.exchange(true, std::memory_order_acquire)) {}
+  ~Turn() {
+    if (mine_) busy_.store(false, std::memory_order_release);
+  }
+  Turn(const Turn&) = delete;
+  Turn& operator=(const Turn&) = delete;
+  explicit operator bool() const noexcept { return mine_; }
+
+ private:
+  std::atomic<bool>& busy_;
+  const bool mine_;
+};
+
+void ForceDimensionDevice::fail(const std::string& what) const {
+  const char* words = api_->errorGetLastStr();
+  throw std::runtime_error(what + ": " + (words != nullptr ? words : "no reason given"));
+}
+
+void ForceDimensionDevice::open() {
+  if (id_ >= 0) return;
+  api_ = std::make_unique<const dhd::Api>(DynamicLibrary(dhd::libraryNames()));
+  const int count = api_->getDeviceCount();
+  if (count <= options_.index) {
+    throw std::runtime_error("Force Dimension device " + std::to_string(options_.index) +
+                             " is not there: " + std::to_string(std::max(count, 0)) +
+                             " found; check power, cable and the udev rule for vendor 1451");
+  }
+  const auto openID = api_->canCalibrate() ? api_->openForCalibration : api_->openID;
+  id_ = openID(static_cast<char>(options_.index));
+  if (id_ < 0) fail("Force Dimension device " + std::to_string(options_.index) + " does not open");
+  try {
+    configure();
+  } catch (...) {
+    close();
+    throw;
+  }
+  state_ = DeviceState();
+  failures_ = 0;
+  nextStatus_ = 0;
+  deviceError_ = switchedOff_ = false;
+  hold_ = calibrated_ ? kHoldNone : kHoldNotCalibrated;
+}
+
+// Everything is said explicitly: a device keeps what the last program told it.
+void ForceDimensionDevice::configure() {
+  const auto id = static_cast<char>(id_);
+  const char* name = api_->getSystemName(id);
+  profile_ = nearestProfile(name != nullptr ? name : "");
+  description_ = profile_.model;
+  unsigned short serial = 0;
+  if (api_->getSerialNumber != nullptr && api_->getSerialNumber(&serial, id) >= 0) {
+    description_ += ", serial number " + std::to_string(serial);
+  }
+  hasGripper_ = api_->getGripperAngleRad != nullptr && api_->hasGripper != nullptr && api_->hasGripper(id);
+  profile_.buttons = hasGripper_ ? 2 : 1;
+
+  if (api_->enableForce(0, id) < 0) fail("the amplifiers do not switch off");
+  amplifiersOn_ = false;
+  if (api_->setTimeGuard(options_.timeGuard_us, id) < 0) fail("the time guard is refused");
+  if (api_->setGravityCompensation(options_.gravityCompensation ? 1 : 0, id) < 0) {
+    fail("gravity compensation is refused");
+  }
+  if (options_.effectorMass_kg > 0 && api_->setEffectorMass != nullptr &&
+      api_->setEffectorMass(options_.effectorMass_kg, id) < 0) {
+    fail("an effector mass of " + std::to_string(options_.effectorMass_kg) + " kg is refused");
+  }
+  if (api_->setMaxForce != nullptr) api_->setMaxForce(profile_.peakForce_N, id);
+  int status[dhd::kStatusLength] = {};
+  if (api_->getStatus(status, id) < 0) fail("the status cannot be read");
+  calibrated_ =
+      status[dhd::kStatusNeedsCalibration] == 0 && (!api_->canCalibrate() || api_->isInitialized(id));
+}
+
+void ForceDimensionDevice::close() noexcept {
+  if (id_ < 0) return;
+  const auto id = static_cast<char>(id_);
+  api_->setForceAndTorqueAndGripperForce(0, 0, 0, 0, 0, 0, 0, id);
+  api_->enableForce(0, id);
+  api_->stop(id);
+  (api_->canCalibrate() ? api_->closeForCalibration : api_->close)(id);
+  amplifiersOn_ = false;
+  id_ = -1;
+}
+
+bool ForceDimensionDevice::read(Nanos now, DeviceState& state) noexcept {
+  if (id_ < 0) return false;
+  const Turn turn(busy_);
+  if (!turn) {  // calibrating
+    state = state_;
+    state.time = now;
+    state.hold = kHoldNotCalibrated;
+    hold_ = state.hold;
+    return true;
+  }
+  const bool good = sample(now);
+  failures_ = good ? 0 : std::min(failures_ + 1, kFailuresToFault);
+  if (now >= nextStatus_) checkStatus(now);
+  state_.hold = kHoldNone;
+  if (!calibrated_) state_.hold |= kHoldNotCalibrated;
+  if (failures_ == kFailuresToFault || deviceError_) state_.hold |= kHoldFault;
+  if (switchedOff_) state_.hold |= kHoldDeadMan;
+  hold_.store(state_.hold, std::memory_order_relaxed);
+  if (!good && failures_ < kFailuresToFault) return false;
+  state = state_;
+  return true;
+}
+
+bool ForceDimensionDevice::sample(Nanos now) noexcept {
+  const auto id = static_cast<char>(id_);
+  double x = 0;
+  double y = 0;
+  double z = 0;
+  if (api_->getPosition(&x, &y, &z, id) < 0 || !std::isfinite(x + y + z)) return false;
+  const Vec3 position_m = fromVendor(x, y, z);
+  if (api_->getLinearVelocity(&x, &y, &z, id) < 0 || !std::isfinite(x + y + z)) return false;
+  state_.time = now;
+  state_.position_m = position_m;
+  state_.velocity_m_per_s = fromVendor(x, y, z);
+  double frame[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  if (api_->getOrientationFrame(frame, id) >= 0) {
+    const geometry::Mat3 rotation = fromVendor(frame);
+    if (rotation.allFinite() && rotation.determinant() > 0.5)
+      state_.orientation = Quat(rotation).normalized();
+  }
+  sampleButtons();
+  return true;
+}
+
+void ForceDimensionDevice::sampleButtons() noexcept {
+  const auto id = static_cast<char>(id_);
+  const int mask = api_->getButtonMask(id);
+  const bool wasClosed = (state_.buttons & 2U) != 0;
+  state_.buttons = mask > 0 ? static_cast<std::uint32_t>(mask) & 1U : 0U;
+  double angle = kGripOpen_rad;
+  if (hasGripper_ && api_->getGripperAngleRad(&angle, id) >= 0 &&
+      std::abs(angle) < (wasClosed ? kGripOpen_rad : kGripClosed_rad)) {
+    state_.buttons |= 2U;
+  }
+}
+
+void ForceDimensionDevice::checkStatus(Nanos now) noexcept {
+  nextStatus_ = now + kStatusPeriod;
+  const auto id = static_cast<char>(id_);
+  int status[dhd::kStatusLength] = {};
+  if (api_->getStatus(status, id) < 0) return;
+  deviceError_ = status[dhd::kStatusError] != 0;
+  switchedOff_ = amplifiersOn_ && status[dhd::kStatusForce] == 0;
+  calibrated_ =
+      status[dhd::kStatusNeedsCalibration] == 0 && (!api_->canCalibrate() || api_->isInitialized(id));
+}
+
+bool ForceDimensionDevice::write(const Vec3& force_N) noexcept {
+  if (id_ < 0 || !force_N.allFinite()) return false;
+  const Turn turn(busy_);
+  if (!turn) return true;  // the calibration has the motors
+  Vec3 f = state_.hold == kHoldNone && failures_ == 0 ? force_N : Vec3(Vec3::Zero());
+  if (f.norm() > profile_.peakForce_N) f *= profile_.peakForce_N / f.norm();
+  if (!f.isZero() && !amplifiersOn_ && !switchOn()) return false;
+  return api_->setForceAndTorqueAndGripperForce(f.z(), f.x(), f.y(), 0, 0, 0, 0, static_cast<char>(id_)) >= 0;
+}
+
+bool ForceDimensionDevice::switchOn() noexcept {
+  const auto id = static_cast<char>(id_);
+  if (api_->setWatchdog != nullptr) {
+    const double steps = std::clamp(options_.watchdog_s / kWatchdogStep_s, 0.0, 255.0);
+    if (api_->setWatchdog(static_cast<unsigned char>(steps), id) < 0) return false;
+  }
+  if (api_->enableForce(1, id) < 0) return false;
+  amplifiersOn_ = true;
+  return true;
+}
+
+void ForceDimensionDevice::calibrate() {
+  if (id_ < 0) throw std::runtime_error("the Force Dimension device is not open");
+  for (int i = 0; i < 100; ++i) {
+    const Turn turn(busy_);
+    if (!turn) {
+      std::this_thread::sleep_for(1ms);
+      continue;
+    }
+    const auto id = static_cast<char>(id_);
+    if (!calibrated_) {
+      if (!api_->canCalibrate()) {
+        throw std::runtime_error(
+            "libdhd alone cannot calibrate: install libdrd, or calibrate with the vendor's tool");
+      }
+      if (api_->autoInit(id) < 0) fail("the calibration failed");
+      if (api_->stopRegulation(true, id) < 0) fail("the calibration does not end");
+      calibrated_ = api_->isInitialized(id);
+    }
+    // On again with the next force.
+    if (api_->enableForce(0, id) < 0) fail("the amplifiers do not switch off");
+    amplifiersOn_ = false;
+    return;
+  }
+  throw std::runtime_error("the Force Dimension device is busy with another calibration");
+}
+
+std::string ForceDimensionDevice::faultText() const {
+  const std::uint32_t hold = hold_;
+  if ((hold & kHoldFault) != 0)
+    return "the device does not answer or reports an error; check power and cable";
+  if ((hold & kHoldNotCalibrated) != 0) {
+    return "not calibrated: keep hands off and calibrate, which moves the arm through its workspace";
+  }
+  if ((hold & kHoldDeadMan) != 0) {
+    return "the device switched its amplifiers off (its button, its speed limit or its watchdog); press the "
+           "force "
+           "button on its base, or calibrate";
+  }
+  return {};
+}
+
+}  // namespace hapticd::device

@@ -1,0 +1,75 @@
+// omega, delta, sigma and lambda by Force Dimension through libdrd or libdhd, which the user installs.
+//
+// Polled: read() and write() each exchange a USB frame, so the servo may run at up to 4 kHz. The amplifiers
+// stay off until the first force is asked for, and the device switches them off by itself when no command
+// comes for 20 ms.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <string>
+
+#include "device/device.h"
+#include "device/force_dimension/dhd_api.h"
+
+namespace hapticd::device {
+
+struct ForceDimensionOptions {
+  int index = 0;                    ///< among the connected ones
+  bool gravityCompensation = true;  ///< the motors carry the arm while the amplifiers are on
+  double effectorMass_kg = 0;       ///< of a tool on the end; 0: as the device ships
+  int timeGuard_us = 100;           ///< the calls of one tick share a USB frame; below the period of the loop
+  double watchdog_s = 0.020;        ///< at most 31.8 ms; 0: off
+};
+
+class ForceDimensionDevice final : public Device {
+ public:
+  explicit ForceDimensionDevice(const ForceDimensionOptions& options = {}) : options_(options) {}
+  ~ForceDimensionDevice() override { close(); }
+
+  void open() override;
+  void close() noexcept override;
+  const DeviceProfile& profile() const noexcept override { return profile_; }
+
+  /// Button 0 is the device's own; button 1 is a closed gripper.
+  bool read(Nanos now, DeviceState& state) noexcept override;
+  bool write(const Vec3& force_N) noexcept override;
+
+  std::string faultText() const override;
+  /// MOVES THE ARM through its workspace when it is not calibrated. Amplifiers that the device switched off
+  /// come back at the next force.
+  void calibrate() override;
+
+  /// Model and serial number. Valid after open().
+  const std::string& description() const noexcept { return description_; }
+
+ private:
+  class Turn;
+
+  void configure();
+  [[noreturn]] void fail(const std::string& what) const;
+  bool sample(Nanos now) noexcept;
+  void sampleButtons() noexcept;
+  void checkStatus(Nanos now) noexcept;
+  bool switchOn() noexcept;
+
+  const ForceDimensionOptions options_;
+  std::unique_ptr<const dhd::Api> api_;
+  int id_ = -1;
+  DeviceProfile profile_;
+  std::string description_;
+  bool hasGripper_ = false;
+  std::atomic<std::uint32_t> hold_{kHoldNone};
+  std::atomic<bool> busy_{false};  // one thread at a time in the library
+  std::atomic<bool> amplifiersOn_{false};
+  std::atomic<bool> calibrated_{false};
+
+  // The servo's.
+  DeviceState state_;
+  Nanos nextStatus_ = 0;
+  int failures_ = 0;  // reads in a row
+  bool deviceError_ = false;
+  bool switchedOff_ = false;  // by the device
+};
+
+}  // namespace hapticd::device

@@ -1,0 +1,260 @@
+// omega and its relatives on a mock of libdrd that aborts where a caller would do harm.
+#include "device/force_dimension/force_dimension_device.h"
+
+#include <dlfcn.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <stdexcept>
+#include <thread>
+
+#include "device/plane_scene.h"
+#include "mocks/dhd/mock_dhd_control.h"
+
+namespace hapticd::device {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+class DhdTest : public testing::Test {
+ protected:
+  void SetUp() override { use(MOCK_DRD); }
+  void use(const char* file) {
+    setenv("HAPTICD_DHD_LIB", file, 1);
+    void* library = dlopen(file, RTLD_NOW);
+    ASSERT_NE(library, nullptr) << dlerror();
+    mock = reinterpret_cast<const MockDhd* (*)()>(dlsym(library, "mockDhd"))();
+    mock->reset();
+  }
+
+  // Ours to the vendor's frame.
+  void hand(const Vec3& position_m, const Vec3& velocity_m_per_s = Vec3::Zero()) const {
+    const Vec3 p(position_m.z(), position_m.x(), position_m.y());
+    const Vec3 v(velocity_m_per_s.z(), velocity_m_per_s.x(), velocity_m_per_s.y());
+    mock->hand(p.data(), v.data());
+  }
+  Vec3 force() const {
+    double f[3];
+    mock->force(f);
+    return {f[1], f[2], f[0]};
+  }
+  DeviceState tick(const Vec3& wanted_N) {
+    now += 1'000'000;
+    DeviceState state;
+    gotState = device.read(now, state);
+    took = device.write(wanted_N);
+    return state;
+  }
+
+  const MockDhd* mock = nullptr;
+  ForceDimensionDevice device;
+  Nanos now = 0;
+  bool gotState = false;
+  bool took = false;
+};
+
+std::string refusal(Device& device) {
+  try {
+    device.open();
+    return "opened";
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+}
+
+TEST_F(DhdTest, SaysWhatIsMissing) {
+  mock->devices(0, "");
+  EXPECT_THAT(refusal(device), AllOf(HasSubstr("0 found"), HasSubstr("1451")));
+  setenv("HAPTICD_DHD_LIB", "/nowhere/libdrd.so", 1);
+  EXPECT_THAT(refusal(device), HasSubstr("/nowhere/libdrd.so"));
+}
+
+TEST_F(DhdTest, OpensWithEverythingSaidExplicitlyAndTheAmplifiersOff) {
+  device.open();
+  EXPECT_THAT(device.description(), AllOf(HasSubstr("omega.3"), HasSubstr("4711")));
+  EXPECT_EQ(mock->gravityCompensation(), 1);
+  EXPECT_EQ(mock->timeGuard(), 100);
+  EXPECT_EQ(mock->maxForce(), 12);
+  EXPECT_EQ(mock->amplifiersOn(), 0);
+  EXPECT_FALSE(device.profile().startsArmed);
+  EXPECT_FALSE(device.selfPaced());
+  tick(Vec3::Zero());
+  EXPECT_EQ(mock->amplifiersOn(), 0) << "nobody asked for a force";
+  tick(Vec3(1, 0, 0));
+  EXPECT_EQ(mock->amplifiersOn(), 1);
+  EXPECT_EQ(mock->watchdog(), 160) << "20 ms in steps of 125 µs";
+  device.close();
+  device.close();
+  EXPECT_EQ(mock->isOpen(), 0);
+  EXPECT_EQ(mock->amplifiersOn(), 0);
+}
+
+TEST_F(DhdTest, FramesAreConverted) {
+  device.open();
+  const double position[3] = {0.03, 0.01, 0.02};  // 3 cm to the user, 1 cm right, 2 cm up
+  const double velocity[3] = {0.3, 0.1, 0.2};
+  mock->hand(position, velocity);
+  // A quarter turn about the vendor's z, which is up: it takes "to the user" to "right".
+  const double turn[9] = {0, -1, 0, 1, 0, 0, 0, 0, 1};
+  mock->turn(turn);
+  mock->buttons(1);
+  const DeviceState state = tick(Vec3(1, 2, 3));
+  ASSERT_TRUE(gotState);
+  EXPECT_TRUE(state.position_m.isApprox(Vec3(0.01, 0.02, 0.03)));
+  EXPECT_TRUE(state.velocity_m_per_s.isApprox(Vec3(0.1, 0.2, 0.3)));
+  EXPECT_TRUE((state.orientation * Vec3::UnitZ()).isApprox(Vec3::UnitX()));
+  EXPECT_TRUE((state.orientation * Vec3::UnitY()).isApprox(Vec3::UnitY()));
+  EXPECT_EQ(state.buttons, 1U);
+  double f[3];
+  mock->force(f);
+  EXPECT_EQ(Vec3(f[0], f[1], f[2]), Vec3(3, 1, 2));
+}
+
+TEST_F(DhdTest, TheGripperIsAButtonWithHysteresis) {
+  mock->devices(1, "sigma.7");
+  mock->gripper(1, 0.3);
+  device.open();
+  EXPECT_EQ(device.profile().nominalStiffness_N_per_m, 4000);
+  const auto closedAt = [&](double angle) {
+    mock->gripper(1, angle);
+    return (tick(Vec3::Zero()).buttons & 2U) != 0;
+  };
+  EXPECT_FALSE(closedAt(0.08));
+  EXPECT_TRUE(closedAt(0.04));
+  EXPECT_TRUE(closedAt(0.08));
+  EXPECT_FALSE(closedAt(0.12));
+}
+
+TEST_F(DhdTest, ForceIsClampedAndNotANumberRefused) {
+  device.open();
+  tick(Vec3(0, 40, 0));
+  EXPECT_TRUE(force().isApprox(Vec3(0, 12, 0)));
+  tick(Vec3(0, std::nan(""), 0));
+  EXPECT_FALSE(took);
+}
+
+TEST_F(DhdTest, TheArmIsNotMovedWithoutConsent) {
+  mock->calibrated(0);
+  device.open();
+  EXPECT_EQ(tick(Vec3(0, 1, 0)).hold, kHoldNotCalibrated);
+  EXPECT_TRUE(force().isZero());
+  EXPECT_EQ(mock->calibrations(), 0);
+  EXPECT_THAT(device.faultText(), HasSubstr("moves the arm"));
+  device.calibrate();
+  EXPECT_EQ(mock->calibrations(), 1);
+  EXPECT_EQ(mock->amplifiersOn(), 0) << "off until a force is asked for";
+  EXPECT_EQ(tick(Vec3::Zero()).hold, kHoldNone);
+  tick(Vec3(0, 1, 0));
+  EXPECT_TRUE(force().isApprox(Vec3(0, 1, 0)));
+  device.calibrate();
+  EXPECT_EQ(mock->calibrations(), 1) << "an arm that is calibrated does not move";
+}
+
+TEST_F(DhdTest, TheLoopGoesOnDuringACalibrationAndKeepsOutOfIt) {
+  mock->calibrated(0);
+  mock->calibrationTime(0.05);
+  device.open();
+  std::atomic<bool> done{false};
+  std::thread person([&] {
+    device.calibrate();
+    done = true;
+  });
+  int held = 0;
+  while (!done) held += (tick(Vec3::Zero()).hold & kHoldNotCalibrated) != 0 ? 1 : 0;
+  person.join();
+  EXPECT_GT(held, 0);
+  now += 10'000'000;
+  EXPECT_EQ(tick(Vec3::Zero()).hold, kHoldNone);
+}
+
+TEST_F(DhdTest, WithoutDrdThereIsNoCalibration) {
+  use(MOCK_DHD);
+  mock->calibrated(0);
+  device.open();
+  EXPECT_EQ(tick(Vec3(0, 1, 0)).hold, kHoldNotCalibrated);
+  EXPECT_THROW(device.calibrate(), std::runtime_error);
+  mock->calibrated(1);  // by the vendor's tool
+  now += 10'000'000;
+  EXPECT_EQ(tick(Vec3(0, 1, 0)).hold, kHoldNone);
+  EXPECT_TRUE(force().isApprox(Vec3(0, 1, 0)));
+  device.close();
+}
+
+TEST_F(DhdTest, OneLostFrameIsAPauseAndThreeAreAFault) {
+  device.open();
+  tick(Vec3(0, 1, 0));
+  mock->failReads(1);
+  tick(Vec3(0, 1, 0));
+  EXPECT_FALSE(gotState);
+  EXPECT_TRUE(force().isZero());
+  EXPECT_EQ(tick(Vec3(0, 1, 0)).hold, kHoldNone);
+  EXPECT_TRUE(force().isApprox(Vec3(0, 1, 0)));
+
+  mock->failReads(-1);
+  tick(Vec3(0, 1, 0));
+  EXPECT_TRUE(force().isZero()) << "within one tick";
+  tick(Vec3(0, 1, 0));
+  EXPECT_EQ(tick(Vec3(0, 1, 0)).hold, kHoldFault);
+  EXPECT_THAT(device.faultText(), HasSubstr("cable"));
+  mock->failReads(0);
+  EXPECT_EQ(tick(Vec3(0, 1, 0)).hold, kHoldNone);
+}
+
+TEST_F(DhdTest, AnErrorOfTheDeviceIsSeenWithin10Ms) {
+  device.open();
+  tick(Vec3(0, 1, 0));
+  mock->status(9, 1);
+  int ticks = 0;
+  while (tick(Vec3(0, 1, 0)).hold == kHoldNone && ticks < 100) ++ticks;
+  EXPECT_LE(ticks, 10);
+  EXPECT_TRUE(force().isZero());
+}
+
+TEST_F(DhdTest, TheDevicesWatchdogCutsTheForceOfALoopThatStopped) {
+  device.open();
+  tick(Vec3(0, 1, 0));
+  mock->elapse(0.019);
+  EXPECT_TRUE(force().isApprox(Vec3(0, 1, 0)));
+  mock->elapse(0.002);
+  EXPECT_TRUE(force().isZero());
+  now += 10'000'000;
+  EXPECT_EQ(tick(Vec3(0, 1, 0)).hold, kHoldDeadMan);
+  EXPECT_THAT(device.faultText(), HasSubstr("force button"));
+  EXPECT_TRUE(force().isZero());
+  device.calibrate();
+  now += 10'000'000;
+  EXPECT_EQ(tick(Vec3(0, 1, 0)).hold, kHoldNone);
+  EXPECT_TRUE(force().isApprox(Vec3(0, 1, 0)));
+}
+
+TEST_F(DhdTest, APlaneFeelsAsOnTheSimulatedDevice) {
+  const std::vector<Vec3> places = plane_scene::places();
+  const std::vector<Vec3> expected = plane_scene::referenceForces(places);
+  device.open();
+  realtime::SimulatedClock clock;
+  realtime::Tick servo(device, clock, plane_scene::raw());
+  servo.snapshots().publish(plane_scene::snapshot());
+  double most = 0;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    hand(places[i]);
+    servo(static_cast<Nanos>(i) * plane_scene::kTick);
+    EXPECT_LE((force() - expected[i]).norm(), 0.01 * expected[i].norm() + 1e-9) << "tick " << i;
+    most = std::max(most, force().norm());
+  }
+  EXPECT_NEAR(most, 1.5, 0.05);
+  servo.finish();
+  EXPECT_TRUE(force().isZero());
+}
+
+TEST_F(DhdTest, TheMockAbortsOnACallWithoutADevice) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const auto stop = reinterpret_cast<int (*)(char)>(dlsym(dlopen(MOCK_DRD, RTLD_NOW), "dhdStop"));
+  EXPECT_DEATH(stop(0), "without a device");
+}
+
+}  // namespace
+}  // namespace hapticd::device

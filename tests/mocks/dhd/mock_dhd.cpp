@@ -1,0 +1,341 @@
+// A stand-in for libdrd.so and, without the drd functions, for libdhd.so: one simulated arm. Where a caller
+// would do harm on a real one, this one says why and aborts.
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "mocks/dhd/mock_dhd_control.h"
+
+#define EXPORT extern "C" __attribute__((visibility("default")))
+
+namespace {
+
+struct Mock {
+  std::mutex mutex;
+  int devices = 1;
+  std::string name = "omega.3";
+  bool open = false;
+  bool calibrated = true;
+  int calibrations = 0;
+  double calibrationTime = 0;
+  double position[3] = {};
+  double velocity[3] = {};
+  double rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  int buttons = 0;
+  bool hasGripper = false;
+  double gripper = 0.3;
+  int failReads = 0;
+  int status[17] = {};
+  double force[3] = {};
+  bool amplifiers = false;
+  int gravity = -1;
+  int timeGuard = -1;
+  int watchdog = 0;
+  double sinceCommand = 0;
+  double maxForce = -1;
+};
+
+Mock& mock() {
+  static Mock* one = new Mock;
+  return *one;
+}
+
+std::atomic<bool> calibrating{false};
+
+[[noreturn]] void crash(const char* why) {
+  std::fprintf(stderr, "mock DHD: %s\n", why);
+  std::abort();
+}
+
+using Lock = std::lock_guard<std::mutex>;
+
+// Every call on a device passes here.
+Mock& device(char id) {
+  if (calibrating) crash("a call in the middle of a calibration");
+  if (!mock().open || id != 0) crash("a call without a device");
+  return mock();
+}
+
+int reading(Mock& m) {
+  if (m.failReads == 0) return 0;
+  if (m.failReads > 0) --m.failReads;
+  return -1;
+}
+
+}  // namespace
+
+EXPORT int dhdGetDeviceCount() {
+  const Lock lock(mock().mutex);
+  return mock().devices;
+}
+
+EXPORT int dhdOpenID(char index) {
+  const Lock lock(mock().mutex);
+  if (mock().open) crash("opened twice");
+  if (index >= mock().devices) return -1;
+  mock().open = true;
+  return 0;
+}
+
+EXPORT int dhdClose(char id) {
+  const Lock lock(mock().mutex);
+  Mock& m = device(id);
+  if (m.amplifiers) crash("closed with the amplifiers on");
+  m.open = false;
+  return 0;
+}
+
+EXPORT const char* dhdGetSystemName(char id) {
+  const Lock lock(mock().mutex);
+  return device(id).name.c_str();
+}
+
+EXPORT int dhdGetSerialNumber(unsigned short* out, char id) {
+  const Lock lock(mock().mutex);
+  device(id);
+  *out = 4711;
+  return 0;
+}
+
+EXPORT int dhdGetStatus(int* out, char id) {
+  const Lock lock(mock().mutex);
+  Mock& m = device(id);
+  std::memcpy(out, m.status, sizeof m.status);
+  out[3] = m.calibrated ? 0 : 1;
+  out[5] = m.amplifiers ? 1 : 0;
+  return 0;
+}
+
+EXPORT int dhdGetPosition(double* x, double* y, double* z, char id) {
+  const Lock lock(mock().mutex);
+  Mock& m = device(id);
+  *x = m.position[0], *y = m.position[1], *z = m.position[2];
+  return reading(m);
+}
+
+EXPORT int dhdGetLinearVelocity(double* x, double* y, double* z, char id) {
+  const Lock lock(mock().mutex);
+  Mock& m = device(id);
+  *x = m.velocity[0], *y = m.velocity[1], *z = m.velocity[2];
+  return 1;  // within the time guard: not a failure
+}
+
+EXPORT int dhdGetOrientationFrame(double (*out)[3], char id) {
+  const Lock lock(mock().mutex);
+  std::memcpy(out, device(id).rotation, sizeof mock().rotation);
+  return 0;
+}
+
+EXPORT int dhdGetButtonMask(char id) {
+  const Lock lock(mock().mutex);
+  return device(id).buttons;
+}
+
+EXPORT bool dhdHasGripper(char id) {
+  const Lock lock(mock().mutex);
+  return device(id).hasGripper;
+}
+
+EXPORT int dhdGetGripperAngleRad(double* out, char id) {
+  const Lock lock(mock().mutex);
+  if (!device(id).hasGripper) crash("the gripper of a device without one");
+  *out = mock().gripper;
+  return 0;
+}
+
+EXPORT int dhdSetForceAndTorqueAndGripperForce(double fx, double fy, double fz, double tx, double ty,
+                                               double tz, double grip, char id) {
+  const Lock lock(mock().mutex);
+  Mock& m = device(id);
+  if (!std::isfinite(fx + fy + fz)) crash("a force that is not a number");
+  if (tx != 0 || ty != 0 || tz != 0 || grip != 0) crash("a torque that nobody asked for");
+  if (!m.calibrated && (fx != 0 || fy != 0 || fz != 0)) crash("a force without calibration");
+  m.force[0] = fx, m.force[1] = fy, m.force[2] = fz;
+  m.sinceCommand = 0;
+  return 0;
+}
+
+EXPORT int dhdEnableForce(unsigned char on, char id) {
+  const Lock lock(mock().mutex);
+  Mock& m = device(id);
+  if (on != 0 && m.gravity < 0) crash("amplifiers on before gravity compensation was chosen");
+  m.amplifiers = on != 0;
+  m.sinceCommand = 0;
+  return 0;
+}
+
+EXPORT int dhdSetGravityCompensation(int on, char id) {
+  const Lock lock(mock().mutex);
+  device(id).gravity = on;
+  return 0;
+}
+
+EXPORT int dhdSetEffectorMass(double kg, char id) {
+  const Lock lock(mock().mutex);
+  device(id);
+  return kg > 1 ? -1 : 0;
+}
+
+EXPORT int dhdSetMaxForce(double newtons, char id) {
+  const Lock lock(mock().mutex);
+  device(id).maxForce = newtons;
+  return 0;
+}
+
+EXPORT int dhdSetTimeGuard(int microseconds, char id) {
+  const Lock lock(mock().mutex);
+  device(id).timeGuard = microseconds;
+  return 0;
+}
+
+EXPORT int dhdSetWatchdog(unsigned char steps, char id) {
+  const Lock lock(mock().mutex);
+  device(id).watchdog = steps;
+  return 0;
+}
+
+EXPORT int dhdStop(char id) {
+  const Lock lock(mock().mutex);
+  device(id).amplifiers = false;
+  return 0;
+}
+
+EXPORT const char* dhdErrorGetLastStr() {
+  return "mock error";
+}
+
+#ifndef MOCK_WITHOUT_DRD
+
+EXPORT int drdOpenID(char index) {
+  return dhdOpenID(index);
+}
+
+EXPORT int drdClose(char id) {
+  return dhdClose(id);
+}
+
+EXPORT bool drdIsInitialized(char id) {
+  const Lock lock(mock().mutex);
+  return device(id).calibrated;
+}
+
+EXPORT int drdAutoInit(char id) {
+  double seconds = 0;
+  {
+    const Lock lock(mock().mutex);
+    Mock& m = device(id);
+    ++m.calibrations;
+    seconds = m.calibrationTime;
+    m.amplifiers = true;
+    calibrating = true;
+  }
+  std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+  const Lock lock(mock().mutex);
+  calibrating = false;
+  if (seconds < 0) return -1;
+  mock().calibrated = true;
+  return 0;
+}
+
+EXPORT int drdStop(bool forceOn, char id) {
+  const Lock lock(mock().mutex);
+  device(id).amplifiers = forceOn;
+  return 0;
+}
+
+#endif
+
+namespace {
+
+template <class Value>
+Value get(Value (*of)(Mock&)) {
+  const Lock lock(mock().mutex);
+  return of(mock());
+}
+
+const MockDhd kControl = {
+    [] {
+      const Lock lock(mock().mutex);
+      Mock& m = mock();
+      m.devices = 1;
+      m.name = "omega.3";
+      m.open = m.amplifiers = m.hasGripper = false;
+      m.calibrated = true;
+      m.calibrations = m.buttons = m.failReads = m.watchdog = 0;
+      m.calibrationTime = m.sinceCommand = 0;
+      m.gravity = m.timeGuard = -1;
+      m.maxForce = -1;
+      m.gripper = 0.3;
+      for (double* v : {m.position, m.velocity, m.force}) std::memset(v, 0, 3 * sizeof *v);
+      std::memset(m.status, 0, sizeof m.status);
+      for (int i = 0; i < 9; ++i) m.rotation[i] = i % 4 == 0 ? 1 : 0;
+    },
+    [](int count, const char* name) {
+      const Lock lock(mock().mutex);
+      mock().devices = count;
+      mock().name = name;
+    },
+    [](int yes) {
+      const Lock lock(mock().mutex);
+      mock().calibrated = yes != 0;
+    },
+    [](const double* position, const double* velocity) {
+      const Lock lock(mock().mutex);
+      std::memcpy(mock().position, position, sizeof mock().position);
+      std::memcpy(mock().velocity, velocity, sizeof mock().velocity);
+    },
+    [](const double* rowMajor) {
+      const Lock lock(mock().mutex);
+      std::memcpy(mock().rotation, rowMajor, sizeof mock().rotation);
+    },
+    [](int mask) {
+      const Lock lock(mock().mutex);
+      mock().buttons = mask;
+    },
+    [](int has, double angle) {
+      const Lock lock(mock().mutex);
+      mock().hasGripper = has != 0;
+      mock().gripper = angle;
+    },
+    [](int count) {
+      const Lock lock(mock().mutex);
+      mock().failReads = count;
+    },
+    [](int index, int value) {
+      const Lock lock(mock().mutex);
+      mock().status[index] = value;
+    },
+    [](double seconds) {
+      const Lock lock(mock().mutex);
+      Mock& m = mock();
+      m.sinceCommand += seconds;
+      if (m.watchdog > 0 && m.sinceCommand > m.watchdog * 125e-6) m.amplifiers = false;
+    },
+    [](double seconds) {
+      const Lock lock(mock().mutex);
+      mock().calibrationTime = seconds;
+    },
+    [](double* out) {
+      const Lock lock(mock().mutex);
+      for (int i = 0; i < 3; ++i) out[i] = mock().amplifiers ? mock().force[i] : 0;
+    },
+    [] { return get<int>([](Mock& m) { return m.amplifiers ? 1 : 0; }); },
+    [] { return get<int>([](Mock& m) { return m.open ? 1 : 0; }); },
+    [] { return get<int>([](Mock& m) { return m.calibrations; }); },
+    [] { return get<int>([](Mock& m) { return m.gravity; }); },
+    [] { return get<int>([](Mock& m) { return m.timeGuard; }); },
+    [] { return get<int>([](Mock& m) { return m.watchdog; }); },
+    [] { return get<double>([](Mock& m) { return m.maxForce; }); },
+};
+
+}  // namespace
+
+EXPORT const MockDhd* mockDhd() {
+  return &kControl;
+}
