@@ -2,6 +2,7 @@
 
 #include <embree3/rtcore.h>
 
+#include <atomic>
 #include <cmath>
 #include <cstdlib>
 #include <stdexcept>
@@ -13,6 +14,22 @@ namespace {
 // Float rounding of a coordinate is 2^-24 of its size; sixteen times that covers the box, the ray and the
 // traversal.
 constexpr double kRelativePad = 0x1p-20;
+// Largest coordinate in the tree, and a radius that reaches everything there.
+constexpr double kReach = 4;
+constexpr double kWholeTree = 16;
+// Of a point on a segment, relative to the segment's ends.
+constexpr double kDoubleRounding = 0x1p-50;
+// A segment shorter than this in the tree is a point within the pad; Embree does not take such directions.
+constexpr float kPoint = 0x1p-30F;
+
+// Beyond, differences and squares of coordinates would not be numbers.
+constexpr double kFarthest = 1e150;
+
+using geometry::Vec3f;
+
+bool isUsable(const Box& box) {
+  return !box.empty() && box.min.minCoeff() >= -kFarthest && box.max.maxCoeff() <= kFarthest;
+}
 
 RTCDevice device() {
   // One device for the process; Embree keeps its settings and error state there. HAPTICD_EMBREE passes
@@ -39,7 +56,7 @@ struct NearQuery {
   void* visitor;
 };
 
-// A segment without length asks for the boxes around its point.
+// A segment can ask for the boxes around its middle instead.
 struct AsNear {
   double (*thunk)(void*, std::uint32_t) noexcept;
   void* visitor;
@@ -77,35 +94,57 @@ void onSegment(const RTCIntersectFunctionNArguments* args) {
 
 }  // namespace
 
+// Float coordinates of the tree are (p - origin) * scale and at most kReach, so that far, huge and tiny
+// geometry is as exact as any other.
 struct SpatialIndex::Tree {
   RTCScene scene = nullptr;
   RTCGeometry geometry = nullptr;
-  const BoxOf* boxOf = nullptr;  // only during a build
-  double pad = 0;
+  Vec3 origin = Vec3::Zero();
+  double scale = 1;
+  const BoxOf* boxOf = nullptr;         // only while building
+  std::atomic<bool> unfitting = false;  // a box that came by refitting needs a new tree
+  std::uint32_t leftOut = 0;
 
+  explicit Tree(const Box& bounds) {
+    origin = bounds.centre();
+    const double size =
+        std::max(bounds.extents().maxCoeff() / 2, kRelativePad * origin.cwiseAbs().maxCoeff());
+    // Less than 2 at first: there is room to grow by refitting.
+    if (size > 0) scale = std::exp2(-std::max(std::ilogb(size), -1000));
+    scene = rtcNewScene(device());
+    geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_USER);
+    if (scene == nullptr || geometry == nullptr) fail("allocation");
+  }
+  Tree(const Tree&) = delete;
+  Tree& operator=(const Tree&) = delete;
   ~Tree() {
-    if (geometry != nullptr) rtcReleaseGeometry(geometry);
-    if (scene != nullptr) rtcReleaseScene(scene);
+    rtcReleaseGeometry(geometry);
+    rtcReleaseScene(scene);
   }
 
-  static void bounds(const RTCBoundsFunctionArguments* args) {
-    const auto* tree = static_cast<const Tree*>(args->geometryUserPtr);
-    const Box box = (*tree->boxOf)(args->primID);
-    RTCBounds& out = *args->bounds_o;
-    if (box.empty()) {
-      // Embree leaves out primitives with inverted or infinite bounds.
-      out.lower_x = out.lower_y = out.lower_z = INFINITY;
-      out.upper_x = out.upper_y = out.upper_z = -INFINITY;
-      return;
+  double pad() const noexcept { return kRelativePad * kReach / scale; }
+  Vec3f inTree(const Vec3& p) const noexcept { return ((p - origin) * scale).cast<float>(); }
+  Vec3 outOfTree(float x, float y, float z) const { return Vec3(x, y, z) / scale + origin; }
+
+  void bounds(std::uint32_t id, RTCBounds& out) {
+    const Box box = (*boxOf)(id);
+    const bool usable = isUsable(box);
+    // Embree leaves out boxes that are inverted.
+    const Vec3f lower = usable ? inTree(box.min - Vec3::Constant(pad())) : Vec3f::Constant(INFINITY);
+    const Vec3f upper = usable ? inTree(box.max + Vec3::Constant(pad())) : Vec3f::Constant(-INFINITY);
+    if (!usable || lower.minCoeff() < -kReach || upper.maxCoeff() > kReach) unfitting = true;
+    out = {lower.x(), lower.y(), lower.z(), 0, upper.x(), upper.y(), upper.z(), 0};
+  }
+
+  void commit(const BoxOf& from) {
+    boxOf = &from;
+    unfitting = false;
+    rtcCommitGeometry(geometry);
+    rtcCommitScene(scene);
+    boxOf = nullptr;
+    if (const RTCError error = rtcGetDeviceError(device()); error != RTC_ERROR_NONE) {
+      throw std::runtime_error("spatial index: Embree error " + std::to_string(error));
     }
-    const Vec3 lower = box.min.array() - tree->pad;
-    const Vec3 upper = box.max.array() + tree->pad;
-    out.lower_x = static_cast<float>(lower.x());
-    out.lower_y = static_cast<float>(lower.y());
-    out.lower_z = static_cast<float>(lower.z());
-    out.upper_x = static_cast<float>(upper.x());
-    out.upper_y = static_cast<float>(upper.y());
-    out.upper_z = static_cast<float>(upper.z());
   }
 };
 
@@ -114,49 +153,54 @@ SpatialIndex::~SpatialIndex() = default;
 SpatialIndex::SpatialIndex(SpatialIndex&&) noexcept = default;
 SpatialIndex& SpatialIndex::operator=(SpatialIndex&&) noexcept = default;
 
-namespace {
-double padFor(const Box& bounds) {
-  if (bounds.empty()) return 0;
-  return kRelativePad * std::max(bounds.min.cwiseAbs().maxCoeff(), bounds.max.cwiseAbs().maxCoeff());
-}
-}  // namespace
-
 SpatialIndex SpatialIndex::build(std::uint32_t count, const BoxOf& boxOf) {
   SpatialIndex index;
   index.count_ = count;
+  std::uint32_t leftOut = 0;
   for (std::uint32_t id = 0; id < count; ++id) {
     const Box box = boxOf(id);
-    if (!box.empty()) index.bounds_.extend(box);
+    if (isUsable(box)) {
+      index.bounds_.extend(box);
+    } else {
+      ++leftOut;
+    }
   }
   if (index.bounds_.empty()) return index;
-  index.pad_ = padFor(index.bounds_);
 
-  index.tree_ = std::make_unique<Tree>();
+  index.tree_ = std::make_unique<Tree>(index.bounds_);
   Tree& tree = *index.tree_;
-  tree.boxOf = &boxOf;
-  tree.pad = index.pad_;
-  tree.scene = rtcNewScene(device());
-  tree.geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_USER);
-  if (tree.scene == nullptr || tree.geometry == nullptr) fail("allocation");
-  rtcSetSceneFlags(tree.scene, RTC_SCENE_FLAG_ROBUST);
+  tree.leftOut = leftOut;
+  index.pad_ = tree.pad();
+  // A dynamic scene keeps one tree for each geometry, and refits it if that was its quality from the start.
+  // This is also the fastest to build and to query here.
+  rtcSetSceneFlags(tree.scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_DYNAMIC);
+  rtcSetSceneBuildQuality(tree.scene, RTC_BUILD_QUALITY_LOW);
+  rtcSetGeometryBuildQuality(tree.geometry, RTC_BUILD_QUALITY_REFIT);
   rtcSetGeometryUserPrimitiveCount(tree.geometry, count);
   rtcSetGeometryUserData(tree.geometry, &tree);
-  rtcSetGeometryBoundsFunction(tree.geometry, &Tree::bounds, nullptr);
+  const auto bounds = [](const RTCBoundsFunctionArguments* args) {
+    static_cast<Tree*>(args->geometryUserPtr)->bounds(args->primID, *args->bounds_o);
+  };
+  rtcSetGeometryBoundsFunction(tree.geometry, bounds, nullptr);
   rtcSetGeometryIntersectFunction(tree.geometry, &onSegment);
   rtcSetGeometryPointQueryFunction(tree.geometry, &onNear);
-  rtcCommitGeometry(tree.geometry);
   rtcAttachGeometry(tree.scene, tree.geometry);
-  rtcCommitScene(tree.scene);
-  tree.boxOf = nullptr;
-  if (const RTCError error = rtcGetDeviceError(device()); error != RTC_ERROR_NONE) {
-    throw std::runtime_error("spatial index over " + std::to_string(count) + " boxes: Embree error " +
-                             std::to_string(error));
-  }
+  tree.commit(boxOf);
   return index;
 }
 
 void SpatialIndex::refit(const BoxOf& boxOf) {
-  *this = build(count_, boxOf);
+  // What was left out is not in the tree, so it cannot come back by refitting.
+  const bool fits = tree_ && tree_->leftOut == 0;
+  if (fits) tree_->commit(boxOf);
+  if (!fits || tree_->unfitting) {
+    *this = build(count_, boxOf);
+    return;
+  }
+  RTCBounds b;
+  rtcGetSceneBounds(tree_->scene, &b);
+  bounds_ = {tree_->outOfTree(b.lower_x, b.lower_y, b.lower_z),
+             tree_->outOfTree(b.upper_x, b.upper_y, b.upper_z)};
 }
 
 void SpatialIndex::visitNearImpl(const Vec3& centre, double radius, NearThunk thunk,
@@ -170,10 +214,11 @@ void SpatialIndex::visitNearImpl(const Vec3& centre, double radius, NearThunk th
   RTCPointQueryContext context;
   rtcInitPointQueryContext(&context);
   RTCPointQuery point{};
-  point.x = static_cast<float>(inside.x());
-  point.y = static_cast<float>(inside.y());
-  point.z = static_cast<float>(inside.z());
-  point.radius = std::nextafter(static_cast<float>(radius), INFINITY);
+  const Vec3f at = tree_->inTree(inside);
+  point.x = at.x();
+  point.y = at.y();
+  point.z = at.z();
+  point.radius = static_cast<float>(std::min(radius * tree_->scale * (1 + kRelativePad), kWholeTree));
   rtcPointQuery(tree_->scene, &point, &context, nullptr, &query);
 }
 
@@ -181,13 +226,15 @@ void SpatialIndex::visitSegmentImpl(const Vec3& from, const Vec3& to, SegmentThu
                                     void* visitor) const noexcept {
   if (!tree_) return;
   // Clipped to the bounds in double, so that the ray starts where a float is as fine as the pad.
+  const double rounding = kDoubleRounding * std::max(from.cwiseAbs().maxCoeff(), to.cwiseAbs().maxCoeff());
+  const double margin = pad_ + rounding;
   double begin = 0;
   double end = 1;
   for (int axis = 0; axis < 3; ++axis) {
     const double origin = from[axis];
     const double direction = to[axis] - origin;
-    const double lower = bounds_.min[axis] - pad_;
-    const double upper = bounds_.max[axis] + pad_;
+    const double lower = bounds_.min[axis] - margin;
+    const double upper = bounds_.max[axis] + margin;
     if (direction == 0) {
       if (!(origin >= lower && origin <= upper)) return;
       continue;
@@ -200,9 +247,13 @@ void SpatialIndex::visitSegmentImpl(const Vec3& from, const Vec3& to, SegmentThu
   if (!(begin <= end)) return;
   const Vec3 start = from + begin * (to - from);
   const Vec3 reach = (end - begin) * (to - from);
-  if (reach.squaredNorm() == 0 || end == begin) {
+  if (!start.allFinite() || !reach.allFinite()) return;
+  const Vec3f origin = tree_->inTree(start);
+  const Vec3f direction = (reach * tree_->scale).cast<float>();
+  // So short that it is a point, or so long that a double misses the whole tree by more than the pad.
+  if (end == begin || direction.cwiseAbs().maxCoeff() < kPoint || rounding > 0.25 * pad_) {
     AsNear adapter{thunk, visitor};
-    visitNearImpl(start, pad_, &AsNear::call, &adapter);
+    visitNearImpl(start + 0.5 * reach, 0.5 * reach.norm() + margin, &AsNear::call, &adapter);
     return;
   }
   SegmentContext context{};
@@ -212,12 +263,12 @@ void SpatialIndex::visitSegmentImpl(const Vec3& from, const Vec3& to, SegmentThu
   context.begin = begin;
   context.span = end - begin;
   RTCRayHit ray{};
-  ray.ray.org_x = static_cast<float>(start.x());
-  ray.ray.org_y = static_cast<float>(start.y());
-  ray.ray.org_z = static_cast<float>(start.z());
-  ray.ray.dir_x = static_cast<float>(reach.x());
-  ray.ray.dir_y = static_cast<float>(reach.y());
-  ray.ray.dir_z = static_cast<float>(reach.z());
+  ray.ray.org_x = origin.x();
+  ray.ray.org_y = origin.y();
+  ray.ray.org_z = origin.z();
+  ray.ray.dir_x = direction.x();
+  ray.ray.dir_y = direction.y();
+  ray.ray.dir_z = direction.z();
   ray.ray.tnear = 0;
   ray.ray.tfar = 1 + 0x1p-18F;
   ray.ray.mask = 0xFFFFFFFFU;

@@ -21,8 +21,8 @@ using geometry::Vec3;
 /// lock-free and allocation-free, and may run while other threads query the same index.
 class SpatialIndex {
  public:
-  /// Gives the box of an id; an empty box leaves the id out of the tree. Called from several threads while
-  /// building.
+  /// Gives the box of an id; an empty box, or one that is not finite, leaves the id out of the tree. Called
+  /// from several threads, and more than once.
   using BoxOf = std::function<Box(std::uint32_t id)>;
 
   SpatialIndex() noexcept;
@@ -33,10 +33,11 @@ class SpatialIndex {
   /// Builds over ids 0…count-1. Throws std::runtime_error with Embree's own words when it cannot.
   static SpatialIndex build(std::uint32_t count, const BoxOf& boxOf);
 
-  /// Recomputes all boxes and refits the tree in place; nobody may query meanwhile. Same count as built.
+  /// Recomputes all boxes and refits the tree in place, many times faster than building it; nobody may query
+  /// meanwhile. Same count as built. For boxes that moved a little: a refitted tree gets slower to query.
   void refit(const BoxOf& boxOf);
 
-  /// Union of all boxes; empty when there is none.
+  /// Box around all boxes, after refitting by the pad wider than their union; empty when there is none.
   const Box& bounds() const noexcept { return bounds_; }
   std::uint32_t size() const noexcept { return count_; }
 

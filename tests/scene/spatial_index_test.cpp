@@ -1,0 +1,197 @@
+// The index visits a superset of what is there: against brute force, on boxes and queries of every size.
+#include "scene/spatial_index.h"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <set>
+
+namespace hapticd::scene {
+namespace {
+
+double distance(const Box& box, const Vec3& p) {
+  return (p - p.cwiseMax(box.min).cwiseMin(box.max)).norm();
+}
+
+bool touches(const Box& box, const Vec3& from, const Vec3& to) {
+  double begin = 0;
+  double end = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double d = to[axis] - from[axis];
+    if (d == 0) {
+      if (from[axis] < box.min[axis] || from[axis] > box.max[axis]) return false;
+      continue;
+    }
+    const double a = (box.min[axis] - from[axis]) / d;
+    const double b = (box.max[axis] - from[axis]) / d;
+    begin = std::max(begin, std::min(a, b));
+    end = std::min(end, std::max(a, b));
+  }
+  return begin <= end;
+}
+
+std::set<std::uint32_t> near(const SpatialIndex& index, const Vec3& centre, double radius) {
+  std::set<std::uint32_t> ids;
+  index.visitNear(centre, radius, [&](std::uint32_t id) { ids.insert(id); });
+  return ids;
+}
+
+std::set<std::uint32_t> along(const SpatialIndex& index, const Vec3& from, const Vec3& to) {
+  std::set<std::uint32_t> ids;
+  index.visitSegment(from, to, [&](std::uint32_t id) {
+    ids.insert(id);
+    return 1.0;
+  });
+  return ids;
+}
+
+SpatialIndex indexOver(const std::vector<Box>& boxes) {
+  return SpatialIndex::build(static_cast<std::uint32_t>(boxes.size()),
+                             [&](std::uint32_t id) { return boxes[id]; });
+}
+
+// Sizes and places over many orders of magnitude, on a grid often enough that queries graze exactly.
+struct World {
+  std::mt19937_64 random;
+  double size;
+  Vec3 offset;
+
+  explicit World(std::uint64_t seed) : random(seed) {
+    size = std::pow(10.0, std::uniform_int_distribution<int>(-12, 12)(random));
+    offset = size * std::pow(10.0, std::uniform_int_distribution<int>(-2, 5)(random)) * unit();
+  }
+  double coordinate() {
+    const double x = std::uniform_real_distribution<double>(-1, 1)(random);
+    return random() % 2 == 0 ? std::round(8 * x) / 8 : x;
+  }
+  Vec3 unit() { return {coordinate(), coordinate(), coordinate()}; }
+  Vec3 point() { return offset + size * unit(); }
+  Box box() {
+    Box b;
+    b.extend(point());
+    const int kind = static_cast<int>(random() % 8);
+    if (kind == 0) return b;                                      // a point
+    if (kind == 1) return {};                                     // left out
+    if (kind == 2) return {Vec3::Constant(std::nan("")), b.max};  // left out
+    if (kind == 3) return {b.min, Vec3::Constant(INFINITY)};      // left out
+    b.extend(Vec3(b.min + std::pow(10.0, -static_cast<int>(random() % 7)) * size * unit()));
+    return b;
+  }
+  std::vector<Box> boxes(std::size_t count) {
+    std::vector<Box> all(count);
+    for (Box& b : all) b = box();
+    return all;
+  }
+};
+
+bool leftOut(const Box& b) {
+  return b.empty() || !b.min.allFinite() || !b.max.allFinite();
+}
+
+void checkSuperset(const SpatialIndex& index, const std::vector<Box>& boxes, World& world) {
+  for (int query = 0; query < 20; ++query) {
+    const double far = query % 4 == 3 ? 1e5 : 1;
+    const Vec3 p = world.offset + far * world.size * world.unit();
+    Vec3 q = world.point();
+    if (query % 5 == 1) q = p;
+    if (query % 5 == 2) q = p + Vec3(world.size * 1e-9, 0, 0);
+    if (query % 5 == 3 && !leftOut(boxes[0])) q = boxes[0].max;  // exactly at a corner
+    const double radius = query % 5 == 0 ? 0 : (q - p).norm() * world.random() / 1.8e19;
+    const auto foundNear = near(index, p, radius);
+    const auto foundAlong = along(index, p, q);
+    for (std::uint32_t id = 0; id < boxes.size(); ++id) {
+      if (leftOut(boxes[id])) {
+        RC_ASSERT(foundNear.count(id) + foundAlong.count(id) == 0U);
+        continue;
+      }
+      if (distance(boxes[id], p) <= radius) RC_ASSERT(foundNear.count(id) == 1U);
+      if (touches(boxes[id], p, q)) RC_ASSERT(foundAlong.count(id) == 1U);
+    }
+  }
+}
+
+RC_GTEST_PROP(SpatialIndex, VisitsAtLeastWhatIsThere, (std::uint64_t seed)) {
+  World world(seed);
+  const std::vector<Box> boxes = world.boxes(1 + world.random() % 200);
+  checkSuperset(indexOver(boxes), boxes, world);
+}
+
+RC_GTEST_PROP(SpatialIndex, StillDoesAfterRefitting, (std::uint64_t seed)) {
+  World world(seed);
+  std::vector<Box> boxes = world.boxes(1 + world.random() % 200);
+  SpatialIndex index = indexOver(boxes);
+  for (int i = 0; i < 3; ++i) {
+    if (world.random() % 2 == 0) {
+      boxes = world.boxes(boxes.size());  // others are left out now
+    } else {
+      for (Box& b : boxes) {
+        if (leftOut(b)) continue;
+        const Vec3 move = world.size * world.unit();
+        b = {b.min + move, b.max + move};
+      }
+    }
+    index.refit([&](std::uint32_t id) { return boxes[id]; });
+    checkSuperset(index, boxes, world);
+  }
+}
+
+TEST(SpatialIndex, OfNothingFindsNothing) {
+  for (const SpatialIndex& index : {SpatialIndex(), indexOver({}), indexOver({Box{}, Box{}})}) {
+    EXPECT_TRUE(index.bounds().empty());
+    EXPECT_TRUE(near(index, Vec3::Zero(), 1e9).empty());
+    EXPECT_TRUE(along(index, Vec3(-1, 0, 0), Vec3(1, 0, 0)).empty());
+  }
+}
+
+TEST(SpatialIndex, QueriesThatAreNoNumbersFindNothingAndDoNotCrash) {
+  const SpatialIndex index = indexOver({Box{Vec3(0, 0, 0), Vec3(1, 1, 1)}});
+  const Vec3 nan = Vec3::Constant(std::nan(""));
+  const Vec3 inf = Vec3::Constant(INFINITY);
+  EXPECT_TRUE(near(index, nan, 1).empty());
+  EXPECT_TRUE(near(index, Vec3::Zero(), std::nan("")).empty());
+  EXPECT_EQ(near(index, Vec3::Zero(), INFINITY).size(), 1U);
+  EXPECT_TRUE(along(index, nan, Vec3::Zero()).empty());
+  EXPECT_TRUE(along(index, Vec3::Zero(), inf).empty());
+  EXPECT_TRUE(along(index, inf, Vec3::Zero()).empty());
+}
+
+// Only a proposal, but not an idle one.
+TEST(SpatialIndex, VisitsFewBoxesThatAreFarOff) {
+  std::vector<Box> boxes;
+  for (int x = 0; x < 100; ++x) {
+    for (int y = 0; y < 100; ++y) boxes.push_back({Vec3(x, y, 0), Vec3(x + 0.9, y + 0.9, 0)});
+  }
+  const SpatialIndex index = indexOver(boxes);
+  EXPECT_LE(near(index, Vec3(50.5, 50.5, 0), 0.1).size(), 16U);
+  EXPECT_LE(along(index, Vec3(50.5, 50.5, 1), Vec3(50.5, 50.5, -1)).size(), 16U);
+}
+
+TEST(SpatialIndex, SegmentIsCutAtTheAnswerAndTiesAreStillVisited) {
+  std::vector<Box> boxes;
+  for (int i = 0; i < 200; ++i) boxes.push_back({Vec3(i / 2, -1, -1), Vec3(i / 2, 1, 1)});  // in pairs
+  const SpatialIndex index = indexOver(boxes);
+  std::set<std::uint32_t> visited;
+  double nearest = 1;
+  index.visitSegment(Vec3(-10, 0, 0), Vec3(190, 0, 0), [&](std::uint32_t id) {
+    visited.insert(id);
+    nearest = std::min(nearest, (id / 2 + 10) / 200.0);
+    return nearest;
+  });
+  EXPECT_EQ(nearest, 10 / 200.0);
+  EXPECT_EQ(visited.count(0) + visited.count(1), 2U);
+  EXPECT_LT(visited.size(), 50U);
+}
+
+TEST(SpatialIndex, MovedIndexAnswersLikeBefore) {
+  SpatialIndex a = indexOver({Box{Vec3(0, 0, 0), Vec3(1, 1, 1)}});
+  SpatialIndex b = std::move(a);
+  EXPECT_EQ(near(b, Vec3(0.5, 0.5, 0.5), 0.1).size(), 1U);
+  b.refit([](std::uint32_t) { return Box{Vec3(5, 5, 5), Vec3(6, 6, 6)}; });
+  EXPECT_TRUE(near(b, Vec3(0.5, 0.5, 0.5), 0.1).empty());
+  EXPECT_EQ(near(b, Vec3(5.5, 5.5, 5.5), 0.1).size(), 1U);
+}
+
+}  // namespace
+}  // namespace hapticd::scene
