@@ -11,6 +11,11 @@ using geometry::Mat3;
 // Orthogonal factor of the polar decomposition by Newton's iteration with determinant scaling
 // (Higham 1986); a few 3x3 inverses, an order faster than a singular value decomposition.
 Mat3 orthogonalFactor(const Mat3& m) {
+  const Mat3 square = m.transpose() * m;
+  const double scale2 = square.trace() / 3;
+  // What most clients send: a rotation with one scale.
+  if ((square - scale2 * Mat3::Identity()).cwiseAbs().maxCoeff() < 1e-14 * scale2)
+    return m / std::sqrt(scale2);
   Mat3 q = m;
   for (int i = 0; i < 64; ++i) {
     const double scale = std::cbrt(1.0 / std::abs(q.determinant()));

@@ -86,9 +86,12 @@ TEST_F(Builder, ObjectsAreListedByAscendingIdAndTheIndexFindsThem) {
   EXPECT_EQ(scene_->objects[0]->id, 0);
   EXPECT_EQ(scene_->objects[1]->id, 2);
   EXPECT_EQ(scene_->objects[2]->id, 4);
-  std::vector<std::uint32_t> found;
-  scene_->objectIndex->visitNear(Vec3(200, 0, 0), 1, [&](std::uint32_t i) { found.push_back(i); });
-  EXPECT_EQ(found, std::vector<std::uint32_t>{1});
+  for (std::uint32_t position = 0; position < 3; ++position) {
+    int found = 0;
+    const Vec3 corner(100.0 * scene_->objects[position]->id, 0, 0);
+    scene_->objectIndex->visitNear(corner, 1, [&](std::uint32_t i) { found += i == position ? 1 : 0; });
+    EXPECT_EQ(found, 1) << position;
+  }
 }
 
 TEST_F(Builder, FacesFollowTheWire) {
