@@ -3,23 +3,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include "realtime/render/release.h"
+
 namespace hapticd::realtime {
 namespace {
 
 using scene::Effect;
 using scene::EffectType;
 
-constexpr Nanos kReleaseTime = geometry::toNanos(0.250);
-
 Vec3 atMost(const Vec3& force, double limit) {
   const double size = force.norm();
   return size > limit ? Vec3(force * (limit / size)) : force;
-}
-
-Vec3 constantForce(const Effect& effect, const Affine& T_device_world) {
-  const Vec3 direction = T_device_world.linear() * effect.direction;
-  const double length = direction.norm();
-  return length > 0 ? Vec3(direction * (effect.magnitude_N / length)) : Vec3(Vec3::Zero());
 }
 
 // Before it slips, the friction effect is a spring to its anchor; at its limit it drags the anchor along.
@@ -49,8 +43,30 @@ void Effects::forgetUnseen() noexcept {
   count_ = static_cast<int>(end - running_.begin());
 }
 
+Vec3 Effects::forceOf(const Effect& effect, Running& r, const Affine& T_device_world,
+                      const device::DeviceState& hand, const Rendering& contact, Nanos now) noexcept {
+  const double phase = effect.angularFrequency_rad_per_s * geometry::toSeconds(now - r.begin);
+  switch (effect.type) {
+    case EffectType::constant:
+      return effect.magnitude_N * turned(T_device_world, effect.direction).stableNormalized();
+    case EffectType::spring:
+      return atMost(effect.gain * (T_device_world * effect.position - contact.proxy_m), effect.magnitude_N);
+    case EffectType::viscous:
+      return atMost(-effect.gain * hand.velocity_m_per_s, effect.magnitude_N);
+    case EffectType::friction:
+      return frictionForce(effect, contact.proxy_m, r.anchor);
+    case EffectType::motorVibration: {
+      const Vec3 force = effect.magnitude_N * Vec3(std::cos(phase), std::sin(phase), 0);
+      return effect.inDeviceFrame ? force : Vec3(hand.orientation * force);
+    }
+    case EffectType::contactVibration:
+      return effect.magnitude_N * std::sin(phase) * contact.normal;  // zero when free
+  }
+  return Vec3::Zero();
+}
+
 Vec3 Effects::force(const scene::SceneSnapshot& scene, const device::DeviceState& hand,
-                    const Rendering& contact, Nanos now, bool motorInDeviceFrame) noexcept {
+                    const Rendering& contact, Nanos now) noexcept {
   for (int i = 0; i < count_; ++i) running_[static_cast<std::size_t>(i)].seen = false;
   const Affine& T_device_world = scene.workspace.T_device_world;
   Vec3 sum = Vec3::Zero();
@@ -59,35 +75,9 @@ Vec3 Effects::force(const scene::SceneSnapshot& scene, const device::DeviceState
     if (r == nullptr) continue;
     r->seen = true;
     if (effect.duration > 0 && now - r->begin >= effect.duration) continue;
-    const double phase = effect.angularFrequency_rad_per_s * geometry::toSeconds(now - r->begin);
-    Vec3 force = Vec3::Zero();
-    switch (effect.type) {
-      case EffectType::constant:
-        force = constantForce(effect, T_device_world);
-        break;
-      case EffectType::spring:
-        force =
-            atMost(effect.gain * (T_device_world * effect.position - contact.proxy_m), effect.magnitude_N);
-        break;
-      case EffectType::viscous:
-        force = atMost(-effect.gain * hand.velocity_m_per_s, effect.magnitude_N);
-        break;
-      case EffectType::friction:
-        force = frictionForce(effect, contact.proxy_m, r->anchor);
-        break;
-      case EffectType::motorVibration:
-        force = effect.magnitude_N * Vec3(std::cos(phase), std::sin(phase), 0);
-        if (!motorInDeviceFrame) force = hand.orientation * force;
-        break;
-      case EffectType::contactVibration:
-        if (contact.touching) force = effect.magnitude_N * std::sin(phase) * contact.normal;
-        break;
-    }
+    Vec3 force = forceOf(effect, *r, T_device_world, hand, contact, now);
     if (effect.releasing && r->releaseBegin < 0) r->releaseBegin = now;
-    if (r->releaseBegin >= 0) {
-      const double left = 1 - static_cast<double>(now - r->releaseBegin) / static_cast<double>(kReleaseTime);
-      force *= std::max(0.0, left);
-    }
+    if (r->releaseBegin >= 0) force *= shareLeft(r->releaseBegin, now);
     sum += force;
   }
   forgetUnseen();

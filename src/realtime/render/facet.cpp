@@ -21,6 +21,7 @@ bool withinEdge(const Facet& f, const Vec3& u, const Vec3& v, const Vec3& q, dou
 }
 
 bool overFacet(const Facet& f, const Vec3& q, double margin) {
+  if (f.unbounded) return true;
   if (!withinEdge(f, f.a, f.b, q, margin) || !withinEdge(f, f.b, f.c, q, margin) ||
       !withinEdge(f, f.c, f.a, q, margin)) {
     return false;
@@ -45,7 +46,7 @@ bool touchableSide(const Facet& f, TouchableFaces faces, const Vec3& p, const Ve
   h.start = f.normal.dot(p - f.a);
   h.end = h.start + limit * f.normal.dot(d);
   const bool fromBack = faces == TouchableFaces::back || (faces == TouchableFaces::both && h.start < 0);
-  if (fromBack) h = {-1.0, -h.start, -h.end};
+  if (fromBack && !f.unbounded) h = {-1.0, -h.start, -h.end};
   return h.start >= -0.5 * f.skin;
 }
 
@@ -108,6 +109,7 @@ bool meet(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d, do
 }
 
 Vec3 nearestPointOf(const Facet& f, const Vec3& x) noexcept {
+  if (f.unbounded) return x - f.normal * f.normal.dot(x - f.a);
   const Vec3 ab = f.b - f.a;
   const Vec3 ac = f.c - f.a;
   const Vec3 ax = x - f.a;

@@ -15,14 +15,17 @@
 
 namespace hapticd::realtime {
 
-/// A sound triangle; made by makeFacet.
+/// A sound triangle, made by makeFacet, or a whole plane.
 struct Facet {
-  Vec3 a, b, c;  ///< counter-clockwise from the front; a-b is the longest edge
-  Vec3 normal;   ///< unit, out of the front
+  Vec3 a = Vec3::Zero();  ///< corners counter-clockwise from the front; a-b is the longest edge
+  Vec3 b = Vec3::Zero();
+  Vec3 c = Vec3::Zero();
+  Vec3 normal = Vec3::Zero();  ///< unit, out of the front
   double skin = 0;
   double distance = 0;  ///< of the triangle from the centre of the gathered ball; kept for the ball tool
   std::uint32_t triangle = 0;
-  int object = 0;  ///< position among the near objects
+  int object = 0;          ///< position among the near objects; negative for a plane of the scene
+  bool unbounded = false;  ///< a plane: no edges, felt from the front
 };
 
 /// Where a path meets a facet: at `stop` in [0, 1] the proxy is at its standoff; `plane` keeps it there.

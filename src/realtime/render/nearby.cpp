@@ -61,8 +61,9 @@ Vec3 PlacedObject::carried(const Vec3& p) const noexcept {
   return T_device_object * (T_device_objectBefore.inverse() * p);
 }
 
-void Nearby::begin(const Moment& now, const Moment& before) noexcept {
+void Nearby::begin(const Moment& now, const Moment& before, const HalfSpaces* planes) noexcept {
   now_ = now;
+  planes_ = planes;
   before_ = before;
   sameWorkspace_ = before.scene != nullptr && before.scene->workspace.T_device_world.matrix() ==
                                                   now.scene->workspace.T_device_world.matrix();
@@ -125,7 +126,7 @@ bool Nearby::place(const ObjectState& state, PlacedObject& placed) const noexcep
   const Vec3 farthest =
       (placed.T_device_object * box.centre()).cwiseAbs() + linear.cwiseAbs() * (0.5 * box.extents());
   const double extent = std::max(farthest.maxCoeff(), kSmallestObject_m);
-  const double size = box.min.cwiseAbs().cwiseMax(box.max.cwiseAbs()).maxCoeff() / placed.stretch;
+  const double size = 0.5 * box.extents().maxCoeff() / placed.stretch;
   placed.skin = std::max(std::min(kRelativeSkin * extent, kPadShare * size), kRoundingFloor * extent);
   return std::isfinite(placed.skin);
 }
@@ -203,11 +204,39 @@ void Nearby::consider(const Facet& f, const Vec3& p, const Vec3& d, double limit
   hit.object = f.object;
   hit.triangle = f.triangle;
   const auto rank = [this](const Hit& h) {
-    return std::tuple(h.stop, -h.depth, object(h.object).state->id, h.triangle);
+    return std::tuple(h.stop, -h.depth, h.object < 0 ? h.object : object(h.object).state->id, h.triangle);
   };
   if (found && !(rank(hit) < rank(best))) return;
   best = hit;
   found = true;
+}
+
+template <class Visit>
+void Nearby::forEachGathered(int only, Visit&& visit) const noexcept {
+  for (const Facet* f = facetsBegin(); f != facetsEnd(); ++f) {
+    if (only < 0 || f->object == only) visit(*f);
+  }
+  if (only >= 0 || planes_ == nullptr) return;
+  for (const HalfSpace& plane : *planes_) visit(plane.facet);
+}
+
+// visit returns the parameter in [0, 1] beyond which nothing more is wanted.
+template <class Visit>
+void Nearby::forEachOnSegment(const Vec3& p, const Vec3& d, double limit, int only,
+                              Visit&& visit) const noexcept {
+  if (only < 0 && planes_ != nullptr) {
+    for (const HalfSpace& plane : *planes_) visit(plane.facet);
+  }
+  for (int i = 0; i < objectCount_; ++i) {
+    if (only >= 0 && i != only) continue;
+    const PlacedObject& placed = object(i);
+    placed.state->mesh->index.visitSegment(placed.T_object_device * p,
+                                           placed.T_object_device * (p + limit * d),
+                                           [&](std::uint32_t triangle) noexcept {
+                                             Facet f;
+                                             return facetOf(i, triangle, f) ? visit(f) : 1.0;
+                                           });
+  }
 }
 
 // Two passes for the point: how far the path is free of faces, then what has to stop it before, so that at
@@ -216,38 +245,23 @@ bool Nearby::castGathered(const Vec3& p, const Vec3& d, double limit, int only, 
   double free = limit;
   if (radius_ == 0) {
     bool blocked = false;
-    for (const Facet* f = facetsBegin(); f != facetsEnd(); ++f) {
-      if (only >= 0 && f->object != only) continue;
-      const double t = reach(*f, faces(), p, d, free);
-      if (t > 1) continue;
+    forEachGathered(only, [&](const Facet& f) noexcept {
+      const double t = reach(f, faces(), p, d, free);
+      if (t > 1) return;
       blocked = true;
       free = t;
-    }
+    });
     if (!blocked) return false;
   }
   bool found = false;
-  for (const Facet* f = facetsBegin(); f != facetsEnd(); ++f) {
-    if (only < 0 || f->object == only) consider(*f, p, d, free, hit, found);
-  }
+  forEachGathered(only, [&](const Facet& f) noexcept { consider(f, p, d, free, hit, found); });
   return found;
 }
 
 bool Nearby::castTree(const Vec3& p, const Vec3& d, int only, Hit& hit) const noexcept {
-  const auto visitAll = [&](double limit, auto&& visit) noexcept {
-    for (int i = 0; i < objectCount_; ++i) {
-      if (only >= 0 && i != only) continue;
-      const PlacedObject& placed = object(i);
-      placed.state->mesh->index.visitSegment(placed.T_object_device * p,
-                                             placed.T_object_device * (p + limit * d),
-                                             [&](std::uint32_t triangle) noexcept {
-                                               Facet f;
-                                               return facetOf(i, triangle, f) ? visit(f) : 1.0;
-                                             });
-    }
-  };
   double free = 1;
   bool blocked = false;
-  visitAll(1, [&](const Facet& f) noexcept {
+  forEachOnSegment(p, d, 1, only, [&](const Facet& f) noexcept {
     const double t = reach(f, faces(), p, d, free);
     if (t <= 1) {
       blocked = true;
@@ -257,7 +271,7 @@ bool Nearby::castTree(const Vec3& p, const Vec3& d, int only, Hit& hit) const no
   });
   if (!blocked) return false;
   bool found = false;
-  visitAll(free, [&](const Facet& f) noexcept {
+  forEachOnSegment(p, d, free, only, [&](const Facet& f) noexcept {
     consider(f, p, d, free, hit, found);
     return 1.0;
   });

@@ -9,7 +9,7 @@
 #include <array>
 #include <cstdint>
 
-#include "realtime/render/facet.h"
+#include "realtime/render/half_spaces.h"
 #include "scene/snapshot.h"
 
 namespace hapticd::realtime {
@@ -41,7 +41,7 @@ struct PlacedObject {
 
 /// The first obstacle on a path.
 struct Hit : Meeting {
-  int object = 0;  ///< position among the near objects
+  int object = 0;  ///< position among the near objects; -1 - position among the planes
   std::uint32_t triangle = 0;
 };
 
@@ -56,8 +56,8 @@ class Nearby {
  public:
   explicit Nearby(double toolRadius_m) noexcept : radius_(toolRadius_m) {}
 
-  /// Starts a tick with no object near.
-  void begin(const Moment& now, const Moment& before) noexcept;
+  /// Starts a tick with no object near. `planes` are there from the start, and live until the next begin().
+  void begin(const Moment& now, const Moment& before, const HalfSpaces* planes = nullptr) noexcept;
   /// Adds the objects within `reach` of `centre`.
   void include(const Vec3& centre, double reach) noexcept;
   /// Adds one object by its id; -1 when it is not in the scene.
@@ -93,6 +93,10 @@ class Nearby {
   static constexpr int kMaxObjects = 64;
   static constexpr int kMaxFacets = 512;
 
+  template <class Visit>
+  void forEachGathered(int only, Visit&& visit) const noexcept;
+  template <class Visit>
+  void forEachOnSegment(const Vec3& p, const Vec3& d, double limit, int only, Visit&& visit) const noexcept;
   void add(const scene::ObjectState& state) noexcept;
   bool place(const scene::ObjectState& state, PlacedObject& placed) const noexcept;
   void compareWithBefore(PlacedObject& placed) const noexcept;
@@ -106,6 +110,7 @@ class Nearby {
   double radius_;
   Moment now_;
   Moment before_;
+  const HalfSpaces* planes_ = nullptr;
   bool sameWorkspace_ = true;
   std::array<PlacedObject, kMaxObjects> objects_;
   int objectCount_ = 0;

@@ -136,13 +136,12 @@ NearestPoint nearestAbove(const Plane* planes, int count, const Vec3& target, co
   return result;
 }
 
-void depthsBelow(const Plane* planes, int count, const double* standoffs, const Vec3& target,
-                 double* depths) noexcept {
+void depthsBelow(const Plane* planes, int count, const Vec3& target, double* depths) noexcept {
   Problem problem;
   problem.h = Vec3::Zero();
   for (int i = 0; i < count; ++i) {
     problem.normal[i] = &planes[i].normal;
-    problem.c[i] = -(planes[i].normal.dot(target - planes[i].anchor) - standoffs[i]);
+    problem.c[i] = -planes[i].height(target);
   }
   Candidate s;
   if (count == 1) solveOne(problem, 0, s);

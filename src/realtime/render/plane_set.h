@@ -38,10 +38,8 @@ struct NearestPoint {
 NearestPoint nearestAbove(const Plane* planes, int count, const Vec3& target, const Vec3& from,
                           double tolerance) noexcept;
 
-/// Lengths l_i >= 0 with sum l_i normal_i = (point held by the same planes, standoffs replaced by
-/// `standoffs`)
-/// - target: how deep the target lies below surfaces at other standoffs.
-void depthsBelow(const Plane* planes, int count, const double* standoffs, const Vec3& target,
-                 double* depths) noexcept;
+/// How deep the target lies below planes that all hold: lengths l_i >= 0 with target + sum l_i normal_i on
+/// all of them. At most three, from nearestAbove.
+void depthsBelow(const Plane* planes, int count, const Vec3& target, double* depths) noexcept;
 
 }  // namespace hapticd::realtime

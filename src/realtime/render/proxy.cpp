@@ -10,25 +10,17 @@ namespace {
 
 constexpr int kMaxCasts = 128;             // in one tick; a path over 0.2 mm cells at 1 m/s needs about 20
 constexpr int kHoldCasts = 32;             // kept back for finding what holds it at the end
-constexpr double kJump_m = 0.030;          // farther in one tick is a jump, not a motion
 constexpr double kRestick_m = 0.5e-6;      // slower than this in a tick is at rest
-constexpr double kGatherMargin_m = 10e-6;  // the tremor of a hand
 constexpr double kBallConvergence = 1e-6;  // of the radius, in distance to the target
-constexpr int kMaxPushes = 8;
 
-// Depth below the held planes as they really are, without the skin that keeps the proxy off them.
-Vec3 depthsOf(const Hit* hits, int count, const Nearby& nearby, const Vec3& hip, double* depths) {
+// Depths below the held faces as they really are, without the skin that keeps the proxy off them.
+void depthsOf(const Hit* hits, int count, double toolRadius_m, const Vec3& hip, double* depths) {
   std::array<Plane, kMaxActive> planes;
-  std::array<double, kMaxActive> standoffs{};
   for (int i = 0; i < count; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    planes[k] = hits[i].plane;
-    standoffs[k] = nearby.toolRadius();
+    planes[static_cast<std::size_t>(i)] = hits[i].plane;
+    planes[static_cast<std::size_t>(i)].standoff = toolRadius_m;
   }
-  depthsBelow(planes.data(), count, standoffs.data(), hip, depths);
-  Vec3 normal = Vec3::Zero();
-  for (int i = 0; i < count; ++i) normal += depths[i] * hits[i].plane.normal;
-  return normal;
+  depthsBelow(planes.data(), count, hip, depths);
 }
 
 }  // namespace
@@ -39,7 +31,8 @@ const Grip& Proxy::follow(const Moment& now, const Vec3& hip, double period_s,
   period_s_ = period_s;
   casts_ = 0;
   if (!placed_) place(now, hip);
-  nearby_.begin(now, before_);
+  planes_.place(*now.scene, now.time, hip, position_, nearby_.toolRadius());
+  nearby_.begin(now, before_, &planes_);
   const bool wasFree = grip_.count == 0;
   const Vec3 from = position_;
   carry(hip, status);
@@ -49,12 +42,23 @@ const Grip& Proxy::follow(const Moment& now, const Vec3& hip, double period_s,
   chase(hip);
   popThrough(hip, status);
   releaseWhenDeep(wasFree, status);
+  unsigned touched = 0;
+  for (int i = 0; i < grip_.count; ++i) {
+    const int plane = grip_.touches[static_cast<std::size_t>(i)].scenePlane;
+    if (plane >= 0) touched |= 1U << plane;
+  }
+  planes_.remember(touched, position_);
   if (casts_ >= kMaxCasts) status |= kRenderIterationLimit;
   if (nearby_.overflowed()) status |= kRenderCandidateLimit;
   before_ = now;
   positionBefore_ = position_;
   hipBefore_ = hip;
   return grip_;
+}
+
+void Proxy::reset() noexcept {
+  placed_ = false;
+  planes_.reset();
 }
 
 void Proxy::place(const Moment& now, const Vec3& hip) noexcept {
@@ -67,95 +71,37 @@ void Proxy::place(const Moment& now, const Vec3& hip) noexcept {
   touchedObject_ = -1;
 }
 
-// The proxy stays where it touched the object, however that moved or bent.
-void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
-  if (grip_.count > 0) {
-    const int touched = nearby_.includeObject(touchedObject_);
-    if (touched < 0) {
-      status |= kRenderGeometryJump;
-    } else {
-      const PlacedObject& object = nearby_.object(touched);
-      const Vec3 carried = carriedBy(object, touchedTriangle_, position_);
-      if (object.jumped) status |= kRenderGeometryJump;
-      if ((carried - position_).norm() <= kJump_m) {
-        position_ = carried;
-      } else {
-        status |= kRenderGeometryJump;
-        position_ = hip;
-        grip_ = Grip{};
-      }
-    }
-  }
-  // All that happens in this tick is at most this far from the HIP.
-  nearby_.include(hip, std::max((position_ - hip).norm(), (positionBefore_ - hip).norm()) + kGatherMargin_m);
-}
-
-Vec3 Proxy::carriedBy(const PlacedObject& object, std::uint32_t triangle, const Vec3& p) const noexcept {
-  if (object.before == nullptr) return p;
-  Facet then;
-  Facet now;
-  if (!object.deformed || !makeFacet(object.cornersBefore(triangle, before_.time), 0, then) ||
-      !makeFacet(object.corners(triangle, now_.time), 0, now)) {
-    return object.carried(p);
-  }
-  // makeFacet turns the corners by the longest edge, which may differ: take them as they come.
-  const scene::Corners t = object.cornersBefore(triangle, before_.time);
-  const scene::Corners n = object.corners(triangle, now_.time);
-  geometry::Mat3 frame;
-  frame << t.b - t.a, t.c - t.a, then.normal;
-  const Vec3 local = frame.inverse() * (p - t.a);
-  return n.a + local.x() * (n.b - n.a) + local.y() * (n.c - n.a) + local.z() * now.normal;
-}
-
-// Geometry that passed over the proxy takes it along: cast in the frame of what moved, from where the proxy
-// was in it to where it is now.
-void Proxy::push(const Vec3& from, std::uint32_t& status) noexcept {
-  const bool carried = position_ != from;
-  bool deforming = false;
-  for (int i = 0; i < nearby_.objectCount(); ++i) {
-    const PlacedObject& object = nearby_.object(i);
-    deforming = deforming || object.deformed;
-    if (!(object.moved || carried) || object.deformed || object.jumped || object.before == nullptr) continue;
-    const Vec3 start = object.carried(from);
-    const Vec3 way = position_ - start;
-    if (way.norm() > kJump_m) {
-      status |= kRenderGeometryJump;
-      continue;
-    }
-    Hit hit;
-    if (way.squaredNorm() > 0 && nearby_.castAt(i, start, position_, hit)) {
-      position_ = start + hit.stop * way;
-      stride_m_ += way.norm();
-      touchedObject_ = object.state->id;
-    }
-  }
-  if (deforming) pushByDeforming(from);
-}
-
-void Proxy::pushByDeforming(const Vec3& from) noexcept {
-  for (int k = 0; k < kMaxPushes; ++k) {
-    nearby_.gather(position_, stride_m_ + kGatherMargin_m);
-    bool pushed = false;
-    for (const Facet* f = nearby_.facetsBegin(); f != nearby_.facetsEnd() && !pushed; ++f) {
-      const PlacedObject& object = nearby_.object(f->object);
-      if (!object.deformed) continue;
-      const Vec3 start = carriedBy(object, f->triangle, from);
-      Hit hit;
-      if ((position_ - start).norm() > kJump_m || !nearby_.meets(*f, start, position_, hit)) continue;
-      const double below = hit.plane.height(position_);
-      if (below > -0.25 * f->skin) continue;
-      position_ -= below * hit.plane.normal;
-      pushed = true;
-    }
-    if (!pushed) return;
-  }
-}
-
 bool Proxy::frictionless() const noexcept {
   for (int i = 0; i < nearby_.objectCount(); ++i) {
     if (nearby_.object(i).state->surface.static_friction > 0) return false;
   }
+  for (const HalfSpace& plane : planes_) {
+    if (plane.surface.static_friction > 0 || plane.state->adhesionLateral_N > 0) return false;
+  }
   return true;
+}
+
+// What friction at a grip can bear, as a length of the spring.
+Proxy::Cone Proxy::coneOf(const Grip& grip) noexcept {
+  Cone cone;
+  Vec3 normal = Vec3::Zero();
+  double adhesion = 0;
+  double weight = 0;
+  for (int i = 0; i < grip.count; ++i) {
+    const Touch& touch = grip.touches[static_cast<std::size_t>(i)];
+    const double force = touch.surface.stiffness_N_per_m * touch.depth_m;
+    normal += touch.depth_m * touch.plane.normal;
+    cone.sticking_m += force * touch.surface.static_friction;
+    cone.sliding_m += force * std::min(touch.surface.dynamic_friction, touch.surface.static_friction);
+    adhesion += touch.adhesion_N;
+    weight += force;
+  }
+  const double depth = normal.norm();
+  if (!(weight > 0) || !(depth > 0)) return {};
+  const double held = adhesion * depth / weight;
+  cone.sticking_m = cone.sticking_m * depth / weight + held;
+  cone.sliding_m = cone.sliding_m * depth / weight + held;
+  return cone;
 }
 
 // Sticks, or slides until friction bears the rest.
@@ -169,36 +115,14 @@ void Proxy::chase(const Vec3& hip) noexcept {
   const bool wasSliding = grip_.sliding && grip_.count > 0;
   hold(hip, active);
   if (grip_.count == 0) return;
-  const Vec3 normal = [&] {
-    std::array<double, kMaxActive> depths{};
-    return depthsOf(active.hits.data(), active.count, nearby_, hip, depths.data());
-  }();
-  double staticFriction = 0;
-  double dynamicFriction = 0;
-  double weight = 0;
-  for (int i = 0; i < grip_.count; ++i) {
-    const Touch& touch = grip_.touches[static_cast<std::size_t>(i)];
-    const scene::Surface& surface = touch.object->surface;
-    const double force = surface.stiffness_N_per_m * touch.depth_m;
-    staticFriction += force * surface.static_friction;
-    dynamicFriction += force * std::min(surface.dynamic_friction, surface.static_friction);
-    weight += force;
-  }
-  if (weight > 0) {
-    staticFriction /= weight;
-    dynamicFriction /= weight;
-  }
+  const Cone cone = coneOf(grip_);
   const double lateral = grip_.lateral_m.norm();
-  const bool reversed = wasSliding && grip_.lateral_m.dot(slipDirection_) < 0;
-  const bool sliding = wasSliding && !reversed;
-  if (lateral <= (sliding ? dynamicFriction : staticFriction) * normal.norm()) {
-    grip_.sliding = false;
-    return;
-  }
+  const bool reversed = grip_.lateral_m.dot(slipDirection_) < 0;
+  if (lateral <= (wasSliding && !reversed ? cone.sliding_m : cone.sticking_m)) return;
+
   slipDirection_ = grip_.lateral_m / lateral;
   const Vec3 start = position_;
-  ActiveSet slid;
-  slide(hip + slipDirection_ * (dynamicFriction * normal.norm()), slid);
+  slide(hip + slipDirection_ * cone.sliding_m, active);
   const bool moved = (position_ - start).norm() >= kRestick_m;
   hold(hip, active);
   grip_.sliding = moved;
@@ -273,23 +197,33 @@ void Proxy::describe(const Vec3& hip, const Vec3& goal, const ActiveSet& active)
   grip_ = Grip{};
   const int count = std::min(active.count, kMaxActive);
   std::array<double, kMaxActive> depths{};
-  depthsOf(active.hits.data(), count, nearby_, hip, depths.data());
-  double hardest = 0;
+  depthsOf(active.hits.data(), count, nearby_.toolRadius(), hip, depths.data());
+  double hardest = -1;
   for (int i = 0; i < count; ++i) {
     const Hit& hit = active.hits[static_cast<std::size_t>(i)];
-    const PlacedObject& object = nearby_.object(hit.object);
     Touch& touch = grip_.touches[static_cast<std::size_t>(grip_.count++)];
-    touch.object = object.state;
     touch.triangle = hit.triangle;
     touch.plane = hit.plane;
     touch.depth_m = depths[static_cast<std::size_t>(i)];
-    const Vec3 carried = carriedBy(object, hit.triangle, positionBefore_);
-    if (!object.jumped) touch.objectVelocity_m_per_s = (carried - positionBefore_) / period_s_;
-    const double force = object.state->surface.stiffness_N_per_m * touch.depth_m;
-    if (i == 0 || force > hardest) {
+    if (hit.object < 0) {
+      const HalfSpace& plane = planes_[-1 - hit.object];
+      touch.scenePlane = -1 - hit.object;
+      touch.surface = plane.surface;
+      touch.adhesion_N = plane.state->adhesionLateral_N;
+    } else {
+      const PlacedObject& object = nearby_.object(hit.object);
+      touch.object = object.state->id;
+      touch.surface = object.state->surface;
+      if (!object.jumped) {
+        const Vec3 carried = carriedBy(object, hit.triangle, positionBefore_);
+        touch.surfaceVelocity_m_per_s = (carried - positionBefore_) / period_s_;
+      }
+    }
+    const double force = touch.surface.stiffness_N_per_m * touch.depth_m;
+    if (force > hardest) {
       hardest = force;
-      touchedObject_ = object.state->id;
-      touchedTriangle_ = hit.triangle;
+      touchedObject_ = touch.object;
+      touchedTriangle_ = touch.triangle;
     }
   }
   grip_.lateral_m = count > 0 ? Vec3(position_ - goal) : Vec3::Zero();
@@ -303,7 +237,7 @@ void Proxy::popThrough(const Vec3& hip, std::uint32_t& status) noexcept {
   bool pressed = false;
   for (int i = 0; i < grip_.count; ++i) {
     const Touch& touch = grip_.touches[static_cast<std::size_t>(i)];
-    const scene::Surface& surface = touch.object->surface;
+    const scene::Surface& surface = touch.surface;
     out += touch.depth_m * touch.plane.normal;
     pressed = pressed ||
               (surface.popthrough_N > 0 && surface.stiffness_N_per_m * touch.depth_m > surface.popthrough_N);

@@ -11,13 +11,19 @@
 
 namespace hapticd::realtime {
 
+inline constexpr double kJump_m = 0.030;          ///< farther in one tick is a jump, not a motion
+inline constexpr double kGatherMargin_m = 10e-6;  ///< the tremor of a hand
+
 /// One face that holds the proxy against the hand.
 struct Touch {
-  const scene::ObjectState* object = nullptr;
+  std::int32_t object = -1;  ///< its id; -1 when it is a plane of the scene
+  int scenePlane = -1;       ///< position of that plane
   std::uint32_t triangle = 0;
+  scene::Surface surface;
+  double adhesion_N = 0;  ///< tangential force it bears besides friction
   Plane plane;
-  double depth_m = 0;                          ///< of the HIP below the surface, along the normal
-  Vec3 objectVelocity_m_per_s = Vec3::Zero();  ///< of the surface at the proxy
+  double depth_m = 0;                           ///< of the HIP below the surface, along the normal
+  Vec3 surfaceVelocity_m_per_s = Vec3::Zero();  ///< at the proxy
 };
 
 /// How the surfaces hold the proxy: proxy - HIP = sum depth_m normal + lateral_m.
@@ -33,7 +39,7 @@ class Proxy {
  public:
   explicit Proxy(double toolRadius_m) noexcept : nearby_(toolRadius_m) {}
 
-  void reset() noexcept { placed_ = false; }
+  void reset() noexcept;
 
   /// One tick: carries and pushes the proxy with the geometry, follows the HIP, and says what holds it. Adds
   /// RenderStatus bits to `status`.
@@ -41,6 +47,7 @@ class Proxy {
 
   const Vec3& position() const noexcept { return position_; }
   const Grip& grip() const noexcept { return grip_; }
+  HalfSpaces& planes() noexcept { return planes_; }
 
  private:
   struct ActiveSet {
@@ -48,21 +55,29 @@ class Proxy {
     int count = 0;
   };
 
+  struct Cone {
+    double sticking_m = 0;
+    double sliding_m = 0;
+  };
+
   void place(const Moment& now, const Vec3& hip) noexcept;
   void carry(const Vec3& hip, std::uint32_t& status) noexcept;
   Vec3 carriedBy(const PlacedObject& object, std::uint32_t triangle, const Vec3& p) const noexcept;
   void push(const Vec3& from, std::uint32_t& status) noexcept;
   void pushByDeforming(const Vec3& from) noexcept;
+  void pushByPlanes(std::uint32_t& status) noexcept;
   void chase(const Vec3& hip) noexcept;
   void slide(const Vec3& target, ActiveSet& active) noexcept;
   bool approach(const Vec3& target, bool hold, ActiveSet& active, Vec3& goal) noexcept;
   void hold(const Vec3& hip, ActiveSet& active) noexcept;
   bool frictionless() const noexcept;
+  static Cone coneOf(const Grip& grip) noexcept;
   void describe(const Vec3& hip, const Vec3& goal, const ActiveSet& active) noexcept;
   void popThrough(const Vec3& hip, std::uint32_t& status) noexcept;
   void releaseWhenDeep(bool wasFree, std::uint32_t& status) noexcept;
 
   Nearby nearby_;
+  HalfSpaces planes_;
   Moment now_;
   Moment before_;
   double period_s_ = 1e-3;

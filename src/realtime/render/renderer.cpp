@@ -1,6 +1,7 @@
 #include "realtime/render/renderer.h"
 
 #include "realtime/render/effects.h"
+#include "realtime/render/fields.h"
 #include "realtime/render/proxy.h"
 #include "realtime/render/surface_law.h"
 
@@ -12,6 +13,7 @@ struct Renderer::State {
   RenderOptions options;
   Proxy proxy;
   Effects effects;
+  Fields fields;
 };
 
 Renderer::Renderer(const RenderOptions& options) : state_(std::make_unique<State>(options)) {}
@@ -20,29 +22,32 @@ Renderer::~Renderer() = default;
 void Renderer::reset() noexcept {
   state_->proxy.reset();
   state_->effects.reset();
+  state_->fields.reset();
 }
 
 void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState& hand, Nanos now,
                     Nanos period, Rendering& out) noexcept {
+  State& s = *state_;
+  const Vec3& hip = hand.position_m;
   out = Rendering{};
-  if (!hand.position_m.allFinite() || !hand.velocity_m_per_s.allFinite() ||
-      !hand.orientation.coeffs().allFinite()) {
+  if (!hip.allFinite() || !hand.velocity_m_per_s.allFinite() || !hand.orientation.coeffs().allFinite()) {
     out.status = kRenderNotFinite;
-    state_->proxy.reset();
+    s.proxy.reset();
     return;
   }
-  const Grip& grip =
-      state_->proxy.follow({&scene, now}, hand.position_m, geometry::toSeconds(period), out.status);
-  out.proxy_m = state_->proxy.position();
-  out.scp_m = out.proxy_m;
+  const double radius = s.options.toolRadius_m;
+  const Grip& grip = s.proxy.follow({&scene, now}, hip, geometry::toSeconds(period), out.status);
+  out.proxy_m = out.scp_m = s.proxy.position();
   if ((out.status & kRenderReleased) == 0) {
-    applySurfaceLaw(grip, out.proxy_m, hand.velocity_m_per_s, state_->options.toolRadius_m, out);
+    applySurfaceLaw(grip, out.proxy_m, hand.velocity_m_per_s, radius, out);
+    out.contactForce_N += s.proxy.planes().adhesion(hip, radius);
   }
-  out.force_N = out.contactForce_N +
-                state_->effects.force(scene, hand, out, now, state_->options.motorVibrationInDeviceFrame);
+  out.force_N = out.contactForce_N;
+  out.force_N += s.effects.force(scene, hand, out, now);
+  out.force_N += s.fields.force(scene, hip, now);
   if (!out.force_N.allFinite()) {
     out = Rendering{};
-    out.proxy_m = out.scp_m = hand.position_m;
+    out.proxy_m = out.scp_m = hip;
     out.status = kRenderNotFinite;
     reset();
   }

@@ -55,7 +55,6 @@ enum RenderStatus : std::uint32_t {
 struct RenderOptions {
   double toolRadius_m = 0;
   bool forceShading = false;
-  bool motorVibrationInDeviceFrame = false;  ///< false: in the stylus frame
 };
 
 /// Holds the proxy from tick to tick. Constructed outside the loop; step() is realtime: noexcept, no

@@ -7,8 +7,8 @@ namespace {
 
 // Spring and damper along the normal; the damper may take from the spring but the surface never pulls.
 double normalForce(const Touch& touch, const Vec3& hipVelocity) {
-  const scene::Surface& surface = touch.object->surface;
-  const double leaving = touch.plane.normal.dot(hipVelocity - touch.objectVelocity_m_per_s);
+  const scene::Surface& surface = touch.surface;
+  const double leaving = touch.plane.normal.dot(hipVelocity - touch.surfaceVelocity_m_per_s);
   return std::max(0.0, surface.stiffness_N_per_m * touch.depth_m - surface.damping_Ns_per_m * leaving);
 }
 
@@ -20,14 +20,15 @@ void applySurfaceLaw(const Grip& grip, const Vec3& proxy_m, const Vec3& hipVeloc
   Vec3 spring = Vec3::Zero();
   Vec3 inward = Vec3::Zero();
   double friction = 0;
+  double adhesion = 0;
   double weight = 0;
   double hardest = -1;
   for (int i = 0; i < grip.count; ++i) {
     const Touch& touch = grip.touches[static_cast<std::size_t>(i)];
-    const scene::Surface& surface = touch.object->surface;
+    const scene::Surface& surface = touch.surface;
     const double force = normalForce(touch, hipVelocity_m_per_s);
     Contact& contact = out.contacts[out.contactCount++];
-    contact.object = touch.object->id;
+    contact.object = touch.object;
     contact.triangle = touch.triangle;
     contact.normal = touch.plane.normal;
     contact.point_m = proxy_m - toolRadius_m * touch.plane.normal;
@@ -38,6 +39,7 @@ void applySurfaceLaw(const Grip& grip, const Vec3& proxy_m, const Vec3& hipVeloc
     spring += springForce * touch.plane.normal;
     inward += touch.plane.normal;
     friction += springForce * (grip.sliding ? surface.dynamic_friction : surface.static_friction);
+    adhesion += touch.adhesion_N;
     weight += springForce;
     if (force > hardest) {
       hardest = force;
@@ -54,7 +56,7 @@ void applySurfaceLaw(const Grip& grip, const Vec3& proxy_m, const Vec3& hipVeloc
   const double stretch = grip.lateral_m.norm();
   if (stretch > 0 && weight > 0 && out.depth_m > 0) {
     const double stiffness = spring.norm() / out.depth_m;
-    const double limit = friction / weight * out.normalForce_N.norm();
+    const double limit = friction / weight * out.normalForce_N.norm() + adhesion;
     out.contactForce_N += grip.lateral_m * (std::min(stiffness * stretch, limit) / stretch);
   }
 }

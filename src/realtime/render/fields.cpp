@@ -1,0 +1,57 @@
+#include "realtime/render/fields.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "realtime/render/release.h"
+
+namespace hapticd::realtime {
+
+// Fields have no number: one that ramps out is known by its origin.
+double Fields::left(const scene::ForceField& field, Nanos now) noexcept {
+  if (!field.releasing) return 1;
+  for (int i = 0; i < releasingCount_; ++i) {
+    Releasing& r = releasing_[static_cast<std::size_t>(i)];
+    if (r.origin != field.origin) continue;
+    r.seen = true;
+    return shareLeft(r.begin, now);
+  }
+  if (releasingCount_ == kMaxReleasing) return 0;
+  releasing_[static_cast<std::size_t>(releasingCount_++)] = {field.origin, now, true};
+  return 1;
+}
+
+Vec3 Fields::buzz(const scene::Buzz& b, Nanos now) noexcept {
+  if (!buzzing_ || buzzStart_ != b.start) {
+    buzzing_ = true;
+    buzzStart_ = b.start;
+    buzzBegin_ = now;
+    buzzReleaseBegin_ = -1;
+  }
+  if (b.releasing && buzzReleaseBegin_ < 0) buzzReleaseBegin_ = now;
+  if (now - buzzBegin_ >= b.duration) return Vec3::Zero();
+  const double share = buzzReleaseBegin_ < 0 ? 1 : shareLeft(buzzReleaseBegin_, now);
+  return share * std::sin(b.angularFrequency_rad_per_s * geometry::toSeconds(now - buzzBegin_)) * b.force_N;
+}
+
+Vec3 Fields::force(const scene::SceneSnapshot& scene, const Vec3& hip, Nanos now) noexcept {
+  for (Releasing& r : releasing_) r.seen = false;
+  const Vec3 x = scene.workspace.T_world_device * hip;
+  Vec3 sum = Vec3::Zero();  // world frame
+  for (const scene::ForceField& field : scene.fields) {
+    const Vec3 way = x - field.origin;
+    const double share = left(field, now);
+    if (way.norm() <= field.radius) sum += share * (field.force_N + field.jacobian_N_per_unit * way);
+  }
+  const auto end = std::remove_if(releasing_.begin(), releasing_.begin() + releasingCount_,
+                                  [](const Releasing& r) { return !r.seen; });
+  releasingCount_ = static_cast<int>(end - releasing_.begin());
+  if (scene.buzz) {
+    sum += buzz(*scene.buzz, now);
+  } else {
+    buzzing_ = false;
+  }
+  return turned(scene.workspace.T_device_world, sum);
+}
+
+}  // namespace hapticd::realtime

@@ -1,0 +1,40 @@
+// Forces that depend on where the hand is and on nothing that it touches: force fields and the buzz.
+#pragma once
+
+#include <array>
+
+#include "scene/snapshot.h"
+
+namespace hapticd::realtime {
+
+using geometry::Nanos;
+using geometry::Vec3;
+
+/// Clocks of the fields that ramp out and of the buzz. Fixed storage; noexcept, allocation-free.
+class Fields {
+ public:
+  /// Their sum at the HIP, device frame, newtons.
+  Vec3 force(const scene::SceneSnapshot& scene, const Vec3& hip, Nanos now) noexcept;
+  void reset() noexcept { *this = Fields{}; }
+
+ private:
+  static constexpr int kMaxReleasing = 16;
+
+  struct Releasing {
+    Vec3 origin = Vec3::Zero();
+    Nanos begin = 0;
+    bool seen = false;
+  };
+
+  double left(const scene::ForceField& field, Nanos now) noexcept;
+  Vec3 buzz(const scene::Buzz& buzz, Nanos now) noexcept;
+
+  std::array<Releasing, kMaxReleasing> releasing_;
+  int releasingCount_ = 0;
+  bool buzzing_ = false;
+  std::uint32_t buzzStart_ = 0;
+  Nanos buzzBegin_ = 0;
+  Nanos buzzReleaseBegin_ = -1;
+};
+
+}  // namespace hapticd::realtime

@@ -1,0 +1,135 @@
+#include "realtime/render/half_spaces.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "realtime/render/release.h"
+
+namespace hapticd::realtime {
+namespace {
+
+constexpr double kRelativeSkin = 1e-9;  // of the hand's own coordinates, metres
+constexpr double kTau = 2 * M_PI;
+
+}  // namespace
+
+HalfSpaces::Memory& HalfSpaces::memoryOf(const scene::Plane& plane, Nanos now, double depth_m,
+                                         bool& fresh) noexcept {
+  const auto end = memory_.begin() + memoryCount_;
+  const auto known =
+      std::find_if(memory_.begin(), end, [&](const Memory& m) { return m.index == plane.index; });
+  if (known == end) ++memoryCount_;
+  fresh = known == end || known->placement != plane.placement;
+  if (fresh) {
+    *known = Memory{};
+    known->index = plane.index;
+    known->placement = plane.placement;
+    known->placed = now;
+    known->depth_m = std::max(0.0, depth_m);
+  }
+  return *known;
+}
+
+// How far the surface is above the plane itself, metres.
+double HalfSpaces::heightOf(const scene::Plane& plane, const Memory& memory, Nanos now, const Vec3& normal,
+                            const Vec3& proxy, double metresPerUnit) noexcept {
+  const double age = geometry::toSeconds(now - memory.placed);
+  const double recovery = geometry::toSeconds(plane.recovery);
+  double height = 0;
+  if (age < recovery) height -= memory.depth_m * (1 - age / recovery);
+  if (plane.textureWavelength > 0) {
+    // Before the contact any point could become its centre, so the crest is what the hand meets.
+    const Vec3 way = memory.touched ? Vec3(proxy - memory.firstContact) : Vec3(Vec3::Zero());
+    const double r = (way - normal * normal.dot(way)).norm() / metresPerUnit;
+    height += metresPerUnit * plane.textureAmplitude * std::cos(kTau * r / plane.textureWavelength);
+  }
+  height += metresPerUnit * plane.buzzAmplitude * std::sin(plane.buzzAngularFrequency_rad_per_s * age);
+  return height;
+}
+
+// Planes that are gone are new when they come back.
+void HalfSpaces::forgetAllBut(const scene::SceneSnapshot& scene) noexcept {
+  const auto isGone = [&](const Memory& m) {
+    return std::none_of(scene.planes.begin(), scene.planes.end(),
+                        [&](const scene::Plane& p) { return p.index == m.index; });
+  };
+  const auto end = std::remove_if(memory_.begin(), memory_.begin() + memoryCount_, isGone);
+  memoryCount_ = static_cast<int>(end - memory_.begin());
+}
+
+void HalfSpaces::place(const scene::SceneSnapshot& scene, Nanos now, const Vec3& hip, const Vec3& proxy,
+                       double toolRadius_m) noexcept {
+  const geometry::Affine& T_world_device = scene.workspace.T_world_device;
+  forgetAllBut(scene);
+  count_ = 0;
+  for (const scene::Plane& plane : scene.planes) {
+    if (count_ == scene::kMaxPlanes) return;
+    HalfSpace& placed = planes_[static_cast<std::size_t>(count_)];
+    placed = HalfSpace{};
+    placed.state = &plane;
+    placed.facet.object = -1 - count_;
+    if (placeOne(T_world_device, now, hip, proxy, toolRadius_m, placed)) ++count_;
+  }
+}
+
+bool HalfSpaces::placeOne(const geometry::Affine& T_world_device, Nanos now, const Vec3& hip,
+                          const Vec3& proxy, double toolRadius_m, HalfSpace& placed) noexcept {
+  const scene::Plane& plane = *placed.state;
+  const Vec3 slope = T_world_device.linear().transpose() * plane.normal;  // world units per metre
+  const double unitsPerMetre = slope.norm();
+  if (!(unitsPerMetre > 0) || !std::isfinite(unitsPerMetre)) return false;
+  const Vec3 normal = slope / unitsPerMetre;
+  const double hipHeight = (plane.normal.dot(T_world_device * hip) + plane.offset) / unitsPerMetre;
+  bool fresh = false;
+  Memory& memory = memoryOf(plane, now, toolRadius_m - hipHeight, fresh);
+  if (fresh) placed.wayIn_m = memory.depth_m;
+
+  placed.surface = plane.surface;
+  if (plane.releasing && memory.releaseBegin < 0) memory.releaseBegin = now;
+  if (memory.releaseBegin >= 0) {
+    const double left = shareLeft(memory.releaseBegin, now);
+    if (left == 0) return false;
+    placed.surface.stiffness_N_per_m *= left;
+    placed.surface.damping_Ns_per_m *= left;
+  }
+  const double raised = heightOf(plane, memory, now, normal, proxy, 1 / unitsPerMetre);
+  placed.facet.unbounded = true;
+  placed.facet.normal = normal;
+  placed.facet.a = hip - normal * (hipHeight - raised);
+  placed.facet.skin = kRelativeSkin * std::max(0.1, hip.cwiseAbs().maxCoeff());
+  return true;
+}
+
+void HalfSpaces::remember(unsigned touched, const Vec3& proxy) noexcept {
+  for (int i = 0; i < count_; ++i) {
+    for (int k = 0; k < memoryCount_; ++k) {
+      Memory& memory = memory_[static_cast<std::size_t>(k)];
+      if (memory.index != (*this)[i].state->index) continue;
+      const bool now = (touched >> i & 1U) != 0;
+      if (now && !memory.touched) memory.firstContact = proxy;
+      memory.adheres = now || memory.adheres;
+      memory.touched = now || memory.adheres;
+    }
+  }
+}
+
+Vec3 HalfSpaces::adhesion(const Vec3& hip, double toolRadius_m) noexcept {
+  Vec3 force = Vec3::Zero();
+  for (int i = 0; i < count_; ++i) {
+    const HalfSpace& plane = (*this)[i];
+    for (int k = 0; k < memoryCount_; ++k) {
+      Memory& memory = memory_[static_cast<std::size_t>(k)];
+      if (memory.index != plane.state->index || !memory.adheres) continue;
+      const double height = plane.facet.normal.dot(hip - plane.facet.a) - toolRadius_m;
+      const double pull = plane.surface.stiffness_N_per_m * std::max(0.0, height);
+      if (pull > plane.state->adhesionNormal_N) {
+        memory.adheres = memory.touched = false;
+      } else {
+        force -= pull * plane.facet.normal;
+      }
+    }
+  }
+  return force;
+}
+
+}  // namespace hapticd::realtime

@@ -1,0 +1,115 @@
+// How the proxy goes along with geometry that moves, bends, vanishes or comes in.
+#include <algorithm>
+
+#include "realtime/render/proxy.h"
+#include "realtime/render/renderer.h"
+
+namespace hapticd::realtime {
+namespace {
+
+constexpr int kMaxPushes = 8;
+
+}  // namespace
+
+// The proxy stays where it touched the object, however that moved or bent.
+void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
+  if (grip_.count > 0) {
+    const int touched = nearby_.includeObject(touchedObject_);
+    if (touchedObject_ < 0) {
+      // A plane stays where it is.
+    } else if (touched < 0) {
+      status |= kRenderGeometryJump;
+    } else {
+      const PlacedObject& object = nearby_.object(touched);
+      const Vec3 carried = carriedBy(object, touchedTriangle_, position_);
+      if (object.jumped) status |= kRenderGeometryJump;
+      if ((carried - position_).norm() <= kJump_m) {
+        position_ = carried;
+      } else {
+        status |= kRenderGeometryJump;
+        position_ = hip;
+        grip_ = Grip{};
+      }
+    }
+  }
+  // All that happens in this tick is at most this far from the HIP.
+  nearby_.include(hip, std::max((position_ - hip).norm(), (positionBefore_ - hip).norm()) + kGatherMargin_m);
+}
+
+Vec3 Proxy::carriedBy(const PlacedObject& object, std::uint32_t triangle, const Vec3& p) const noexcept {
+  if (object.before == nullptr) return p;
+  Facet then;
+  Facet now;
+  if (!object.deformed || !makeFacet(object.cornersBefore(triangle, before_.time), 0, then) ||
+      !makeFacet(object.corners(triangle, now_.time), 0, now)) {
+    return object.carried(p);
+  }
+  // makeFacet turns the corners by the longest edge, which may differ: take them as they come.
+  const scene::Corners t = object.cornersBefore(triangle, before_.time);
+  const scene::Corners n = object.corners(triangle, now_.time);
+  geometry::Mat3 frame;
+  frame << t.b - t.a, t.c - t.a, then.normal;
+  const Vec3 local = frame.inverse() * (p - t.a);
+  return n.a + local.x() * (n.b - n.a) + local.y() * (n.c - n.a) + local.z() * now.normal;
+}
+
+// Geometry that passed over the proxy takes it along: cast in the frame of what moved, from where the proxy
+// was in it to where it is now.
+void Proxy::push(const Vec3& from, std::uint32_t& status) noexcept {
+  const bool carried = position_ != from;
+  bool deforming = false;
+  for (int i = 0; i < nearby_.objectCount(); ++i) {
+    const PlacedObject& object = nearby_.object(i);
+    deforming = deforming || object.deformed;
+    if (!(object.moved || carried) || object.deformed || object.jumped || object.before == nullptr) continue;
+    const Vec3 start = object.carried(from);
+    const Vec3 way = position_ - start;
+    if (way.norm() > kJump_m) {
+      status |= kRenderGeometryJump;
+      continue;
+    }
+    Hit hit;
+    if (way.squaredNorm() > 0 && nearby_.castAt(i, start, position_, hit)) {
+      position_ = start + hit.stop * way;
+      stride_m_ += way.norm();
+      touchedObject_ = object.state->id;
+    }
+  }
+  if (deforming) pushByDeforming(from);
+  pushByPlanes(status);
+}
+
+// Behind a plane there is nothing to be in: it takes the proxy to its front.
+void Proxy::pushByPlanes(std::uint32_t& status) noexcept {
+  for (const HalfSpace& plane : planes_) {
+    const Plane face{plane.facet.normal, plane.facet.a, nearby_.toolRadius() + plane.facet.skin};
+    const double below = -face.height(position_);
+    if (below <= 0.5 * plane.facet.skin) continue;
+    const Vec3 way = below * face.normal;
+    Hit hit;
+    position_ += (nearby_.cast(position_, position_ + way, hit) ? hit.stop : 1.0) * way;
+    stride_m_ += below;
+    if (plane.wayIn_m > 0 && plane.state->recovery == 0) status |= kRenderGeometryJump;
+  }
+}
+
+void Proxy::pushByDeforming(const Vec3& from) noexcept {
+  for (int k = 0; k < kMaxPushes; ++k) {
+    nearby_.gather(position_, stride_m_ + kGatherMargin_m);
+    bool pushed = false;
+    for (const Facet* f = nearby_.facetsBegin(); f != nearby_.facetsEnd() && !pushed; ++f) {
+      const PlacedObject& object = nearby_.object(f->object);
+      if (!object.deformed) continue;
+      const Vec3 start = carriedBy(object, f->triangle, from);
+      Hit hit;
+      if ((position_ - start).norm() > kJump_m || !nearby_.meets(*f, start, position_, hit)) continue;
+      const double below = hit.plane.height(position_);
+      if (below > -0.25 * f->skin) continue;
+      position_ -= below * hit.plane.normal;
+      pushed = true;
+    }
+    if (!pushed) return;
+  }
+}
+
+}  // namespace hapticd::realtime
