@@ -1,0 +1,303 @@
+// Uploads, commits, deformation.
+#include <gmock/gmock.h>
+
+#include <set>
+
+#include "scene/mesh_draft.h"
+#include "scene_fixture.h"
+
+namespace hapticd::scene {
+namespace {
+
+using ::testing::HasSubstr;
+using Severity = Notice::Severity;
+
+class Meshes : public SceneTest {
+ protected:
+  Meshes() {
+    say(SetSurfaceProperty{0, "stiffness", 0.5});
+    publish();
+  }
+  std::size_t triangles() const { return object(0) == nullptr ? 0 : object(0)->mesh->triangles->size(); }
+  /// Ids that the index can propose.
+  std::size_t touchable() const {
+    std::set<std::uint32_t> ids;
+    if (object(0) == nullptr) return 0;
+    object(0)->mesh->index.visitNear(Vec3::Zero(), INFINITY, [&](std::uint32_t id) { ids.insert(id); });
+    return ids.size();
+  }
+  Vec3 vertex(std::uint32_t i) const { return object(0)->mesh->vertex(i, now_); }
+};
+
+std::vector<Vec3f> soup(int triangles, float z = 0) {
+  std::vector<Vec3f> v;
+  for (int i = 0; i < triangles; ++i) {
+    const auto x = static_cast<float>(2 * i);
+    v.insert(v.end(), {Vec3f(x, 0, z), Vec3f(x + 1, 0, z), Vec3f(x, 1, z)});
+  }
+  return v;
+}
+
+TEST_F(Meshes, AreFeltTwentyMillisecondsAfterTheLastVertex) {
+  const auto vertices = soup(2);
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    say(SetVertices{0, static_cast<std::int32_t>(i), {vertices[i]}});
+    EXPECT_FALSE(publish());
+    wait(10 * kMillisecond);
+  }
+  EXPECT_EQ(builder_.nextDeadline(), now_ + 10 * kMillisecond);
+  wait(10 * kMillisecond - 1);
+  EXPECT_FALSE(publish());
+  wait(1);
+  EXPECT_TRUE(publish());
+  EXPECT_EQ(triangles(), 2U);
+  EXPECT_EQ(builder_.nextDeadline(), std::nullopt);
+}
+
+TEST_F(Meshes, AreFeltAtLatestEveryQuarterOfASecondWhileTheyStream) {
+  const Nanos start = now_;
+  std::vector<Nanos> published;
+  for (int i = 0; i < 600; ++i) {
+    const auto x = static_cast<float>(i);
+    say(SetVertices{0, i, {Vec3f(x, i % 3 == 0 ? 1.F : 0.F, 0)}});
+    if (publish()) published.push_back(now_ - start);
+    wait(kMillisecond);
+  }
+  EXPECT_EQ(published, (std::vector<Nanos>{250 * kMillisecond, 501 * kMillisecond}));
+}
+
+TEST_F(Meshes, RebuildingTakesAtMostAQuarterOfTheThread) {
+  // The stopwatch says that every look at it takes 10 ms.
+  Nanos worked = 0;
+  SceneConfig config;
+  config.stopwatch = [&] { return worked += 10 * kMillisecond; };
+  SceneBuilder builder(config);
+  std::vector<Notice> notices;
+  builder.publish(now_, notices);
+  const Nanos start = now_;
+  builder.apply(1, SetSurfaceProperty{0, "stiffness", 1}, now_, notices);
+  constexpr Nanos kTime = 10'000 * kMillisecond;
+  int rebuilds = 0;
+  for (int i = 0; now_ < start + kTime; ++i, wait(kMillisecond)) {
+    const auto x = static_cast<float>(i);
+    builder.apply(1, SetVertices{0, i, {Vec3f(x, static_cast<float>(i % 3), 0)}}, now_, notices);
+    const Nanos before = worked;
+    if (builder.publish(now_, notices)) {
+      ++rebuilds;
+    } else {
+      worked = before;  // looking alone costs nothing
+    }
+    now_ += worked - before;
+  }
+  EXPECT_GT(worked, kTime / 10);
+  EXPECT_LE(worked, kTime / 4 + 100 * kMillisecond);
+  EXPECT_GT(rebuilds, 10);
+}
+
+TEST_F(Meshes, IncompleteTripleIsIgnoredUntilItIsComplete) {
+  auto vertices = soup(2);
+  vertices.pop_back();
+  say(SetVertices{0, 0, vertices});
+  run(20 * kMillisecond);
+  EXPECT_EQ(triangles(), 1U);
+  say(SetVertices{0, 5, {Vec3f(2, 1, 0)}});
+  run(20 * kMillisecond);
+  EXPECT_EQ(triangles(), 2U);
+}
+
+TEST_F(Meshes, VerticesAreStoredAtTheirNumberInAnyOrder) {
+  const auto vertices = soup(3);
+  for (const int i : {8, 7, 6, 0, 2, 1}) say(SetVertices{0, i, {vertices[static_cast<std::size_t>(i)]}});
+  run(20 * kMillisecond);
+  EXPECT_EQ(triangles(), 3U);
+  EXPECT_EQ(touchable(), 2U) << "the middle one has not come";
+  for (const int i : {4, 3, 5}) say(SetVertices{0, i, {vertices[static_cast<std::size_t>(i)]}});
+  run(20 * kMillisecond);
+  EXPECT_EQ(touchable(), 3U);
+  EXPECT_EQ(*object(0)->mesh->vertices, vertices);
+}
+
+TEST_F(Meshes, SendingTheSameAgainChangesNothing) {
+  say(SetVertices{0, 0, soup(100)});
+  run(20 * kMillisecond);
+  say(SetVertices{0, 0, soup(100)});
+  EXPECT_EQ(builder_.nextDeadline(), std::nullopt);
+}
+
+TEST_F(Meshes, TrianglesMakeTheMeshIndexedAndIncompleteOnesAreNotFelt) {
+  say(SetTriangles{0, 0, {Triangle{0, 1, 2}, Triangle{2, 1, 3}, Triangle{3, 2, 9}}});
+  say(SetVertices{0, 0, {Vec3f(0, 0, 0), Vec3f(1, 0, 0), Vec3f(0, 1, 0), Vec3f(1, 1, 0)}});
+  run(20 * kMillisecond);
+  EXPECT_EQ(triangles(), 3U);
+  EXPECT_EQ(touchable(), 2U);
+  for (const Triangle& t : *object(0)->mesh->triangles) {
+    for (const std::uint32_t i : t) EXPECT_LT(i, object(0)->mesh->vertices->size());
+  }
+  say(SetVertices{0, 9, {Vec3f(2, 2, 0)}});
+  run(20 * kMillisecond);
+  EXPECT_EQ(touchable(), 3U) << "its vertex came later";
+  say(RemoveTriangle{0, 1});
+  run(20 * kMillisecond);
+  EXPECT_EQ(touchable(), 2U);
+  say(RemoveTriangle{0, 1});
+  EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("no such triangle"));
+  say(ClearMesh{0});
+  EXPECT_TRUE(publish()) << "at once";
+  EXPECT_EQ(object(0), nullptr);
+  say(SetVertices{0, 0, soup(1)});
+  run(20 * kMillisecond);
+  EXPECT_EQ(triangles(), 1U) << "triples again";
+}
+
+TEST_F(Meshes, VertexThatIsNoNumberStaysAsItWas) {
+  say(SetVertices{0, 0, soup(2)});
+  run(20 * kMillisecond);
+  auto bad = soup(2, 5);
+  bad[1].x() = NAN;
+  bad[4].y() = INFINITY;
+  say(SetVertices{0, 0, bad});
+  EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("object 0, 2 of the vertices from 0 on"));
+  run(1'000 * kMillisecond);
+  EXPECT_EQ(vertex(0).z(), 5);
+  EXPECT_EQ(vertex(1), Vec3(1, 0, 0));
+  EXPECT_EQ(vertex(4), Vec3(3, 0, 0));
+  EXPECT_EQ(vertex(5).z(), 5);
+}
+
+TEST_F(Meshes, FinishedByUpdateTrimeshChanges) {
+  say(SetTriangles{0, 0, {Triangle{0, 1, 2}}});
+  say(SetVertices{0, 0, soup(1)});
+  EXPECT_FALSE(publish() && triangles() > 0);
+  say(SetSurface{0, 0.5, 0.001, 0.4, 0.3});
+  EXPECT_TRUE(publish());
+  EXPECT_EQ(triangles(), 1U);
+  EXPECT_DOUBLE_EQ(object(0)->surface.stiffness_N_per_m, 500);
+  EXPECT_DOUBLE_EQ(object(0)->surface.damping_Ns_per_m, 1);
+  EXPECT_DOUBLE_EQ(object(0)->surface.static_friction, 0.4);
+  EXPECT_DOUBLE_EQ(object(0)->surface.dynamic_friction, 0.3);
+}
+
+TEST_F(Meshes, LimitsHoldForOneObjectAndForAll) {
+  SceneConfig config = simulated({});
+  config.limits.verticesPerObject = 100;
+  config.limits.verticesInAll = 150;
+  config.limits.trianglesPerObject = 10;
+  builder_ = SceneBuilder(config);
+  say(SetObjectNumber{3});
+  say(SetVertices{0, 100, soup(1)});
+  EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("beyond the limit of one object"));
+  say(SetVertices{0, 0, std::vector<Vec3f>(100, Vec3f::Zero())});
+  say(SetVertices{1, 0, std::vector<Vec3f>(51, Vec3f::Zero())});
+  EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("the scene is full"));
+  say(SetVertices{1, 0, std::vector<Vec3f>(50, Vec3f::Zero())});
+  say(SetVertices{0, 50, std::vector<Vec3f>(50, Vec3f::Ones())});
+  EXPECT_TRUE(notices_.empty()) << "in place there is room";
+  say(ClearMesh{0});
+  say(SetVertices{1, 50, std::vector<Vec3f>(50, Vec3f::Zero())});
+  say(SetVertices{2, 0, std::vector<Vec3f>(50, Vec3f::Zero())});
+  EXPECT_TRUE(notices_.empty()) << "cleared meshes give their room back";
+  say(RemoveObject{1});
+  say(SetVertices{0, 0, std::vector<Vec3f>(100, Vec3f::Zero())});
+  EXPECT_TRUE(notices_.empty()) << "removed objects too";
+  say(SetTriangles{2, 8, std::vector<Triangle>(3, Triangle{0, 1, 2})});
+  EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("setTriangle"));
+  say(ResetScene{});
+  say(SetVertices{0, 0, std::vector<Vec3f>(100, Vec3f::Zero())});
+  EXPECT_TRUE(notices_.empty());
+}
+
+class Deforming : public Meshes {
+ protected:
+  static constexpr Nanos kFrame = 20 * kMillisecond;
+  Deforming() {
+    say(SetVertices{0, 0, soup(50)});
+    run(1'000 * kMillisecond);
+  }
+};
+
+TEST_F(Deforming, PositionsAloneKeepTrianglesAndTravelWithoutAStep) {
+  const auto first = object(0)->mesh;
+  Vec3 before = vertex(4);
+  for (int frame = 1; frame < 100; ++frame) {
+    say(SetVertices{0, 3, {Vec3f(2, 0, 0.1F * frame), Vec3f(3, 0, 0.1F * frame), Vec3f(2, 1, 0.1F * frame)}});
+    wait(kFrame);
+    before = vertex(4);
+    ASSERT_TRUE(publish());
+    const MeshGeometry& mesh = *object(0)->mesh;
+    EXPECT_EQ(mesh.topology, first->topology);
+    EXPECT_EQ(mesh.triangles, first->triangles);
+    ASSERT_TRUE(mesh.target);
+    EXPECT_TRUE(vertex(4).isApprox(before, 1e-6)) << frame;
+    EXPECT_TRUE(mesh.deformingAfter(now_));
+    EXPECT_EQ(mesh.morphEnd - mesh.morphBegin, frame == 1 ? MeshDraft::kLongestMorph : kFrame);
+    EXPECT_NEAR(mesh.vertex(4, mesh.morphEnd).z(), 0.1 * frame, 1e-6);
+    EXPECT_EQ(mesh.vertex(100, now_ + kFrame / 2), first->vertex(100, 0)) << "others rest";
+    // The index proposes the triangle all the way.
+    for (int step = 0; step <= 10; ++step) {
+      bool found = false;
+      mesh.index.visitNear(mesh.vertex(4, now_ + step * kFrame / 10), 0,
+                           [&](std::uint32_t id) { found |= id == 1; });
+      ASSERT_TRUE(found) << frame << " " << step;
+    }
+  }
+  EXPECT_TRUE(notices_.empty());
+}
+
+TEST_F(Deforming, LoneDeformationTakesFiftyMilliseconds) {
+  say(SetVertices{0, 0, soup(50, 1)});
+  run(20 * kMillisecond);
+  const MeshGeometry& mesh = *object(0)->mesh;
+  EXPECT_EQ(mesh.morphEnd - mesh.morphBegin, 50 * kMillisecond);
+  wait(25 * kMillisecond);
+  EXPECT_NEAR(vertex(0).z(), 0.5, 1e-6);
+}
+
+TEST_F(Deforming, NewVerticesAreANewShapeAtOnce) {
+  const std::uint64_t topology = object(0)->mesh->topology;
+  say(SetVertices{0, 150, soup(1)});
+  run(20 * kMillisecond);
+  EXPECT_NE(object(0)->mesh->topology, topology);
+  EXPECT_FALSE(object(0)->mesh->target);
+}
+
+TEST_F(Deforming, MovingAnObjectDoesNotTouchItsMesh) {
+  say(SetVertices{0, 0, soup(50, 1)});
+  run(20 * kMillisecond);
+  const auto mesh = object(0)->mesh;
+  say(SetTransform{0, columns(at(1, 2, 3))});
+  publish();
+  EXPECT_EQ(object(0)->mesh, mesh);
+}
+
+TEST_F(Deforming, ObjectIndexCoversTheDeformedShape) {
+  say(SetVertices{0, 0, {Vec3f(0, 0, 500)}});
+  run(20 * kMillisecond);
+  for (Nanos t = 0; t <= 60; t += 5) {
+    bool found = false;
+    scene_->objectIndex->visitNear(object(0)->mesh->vertex(0, now_ + t * kMillisecond), 1e-6,
+                                   [&](std::uint32_t) { found = true; });
+    EXPECT_TRUE(found) << t;
+  }
+}
+
+// A snapshot that is still held keeps its shape, whatever is refitted for later ones.
+TEST_F(Deforming, HeldSnapshotsStayAsTheyAre) {
+  std::vector<std::shared_ptr<const SceneSnapshot>> held;
+  for (int frame = 1; frame < 20; ++frame) {
+    say(SetVertices{0, 0, soup(50, static_cast<float>(frame))});
+    run(20 * kMillisecond);
+    if (frame % 3 == 0) held.push_back(scene_);
+  }
+  for (std::size_t i = 0; i < held.size(); ++i) {
+    const MeshGeometry& mesh = *held[i]->objects[0]->mesh;
+    const double z = 3.0 * static_cast<double>(i + 1);
+    EXPECT_NEAR(mesh.vertex(0, mesh.morphEnd).z(), z, 1e-6);
+    bool found = false;
+    mesh.index.visitNear(Vec3(0, 0, z), 0, [&](std::uint32_t id) { found |= id == 0; });
+    EXPECT_TRUE(found);
+    EXPECT_LT(mesh.index.bounds().max.z(), z + 0.1);
+  }
+}
+
+}  // namespace
+}  // namespace hapticd::scene
