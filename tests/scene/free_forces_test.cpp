@@ -1,0 +1,338 @@
+// Effects, planes, fields, constraints, the buzz, and who owns them.
+#include <gmock/gmock.h>
+
+#include "scene_fixture.h"
+
+namespace hapticd::scene {
+namespace {
+
+using geometry::Mat3;
+using ::testing::HasSubstr;
+using Severity = Notice::Severity;
+
+class Forces : public SceneTest {
+ protected:
+  static constexpr ClientId kOther = 8;
+  static DefineEffect constant(std::int32_t index, double duration_ms = 0) {
+    return {.type = "constant",
+            .index = index,
+            .magnitude_N = 1.5,
+            .duration_ms = duration_ms,
+            .direction = Vec3(0, 2, 0)};
+  }
+  using SceneTest::SceneTest;
+};
+
+TEST_F(Forces, EffectsAreInSiAndKeepOnlyWhatTheirTypeUses) {
+  const double nan = std::nan("");
+  const Vec3 nowhere = Vec3::Constant(nan);
+  say(DefineEffect{"constant", 0, nan, 1, 250, nan, nowhere, Vec3(0, 2, 0)});
+  say(DefineEffect{"spring", 1, 0.5, 2, 0, nan, Vec3(1, 2, 3), nowhere});
+  say(DefineEffect{"viscous", 2, 0.001, 2, 0, nan, nowhere, nowhere});
+  say(DefineEffect{"friction", 3, 0.25, 0.7, 0, nan, nowhere, nowhere});
+  say(DefineEffect{"vibrationMotor", 4, nan, 0.3, 0, 100, nowhere, nowhere});
+  say(DefineEffect{"vibrationContact", 5, nan, 0.4, 0, 100, nowhere, nowhere});
+  say(DefineEffect{"motorVibration", 6, nan, 0.3, 0, 50, nowhere, nowhere});
+  say(DefineEffect{"contactVibration", 7, nan, 0.4, 0, 50, nowhere, nowhere});
+  EXPECT_FALSE(publish() && !scene_->effects.empty()) << "defined is not started";
+  for (int i = 7; i >= 0; --i) say(StartEffect{i});
+  ASSERT_TRUE(publish());
+  EXPECT_TRUE(notices_.empty());
+  const auto& e = scene_->effects;
+  ASSERT_EQ(e.size(), 8U);
+  for (std::int32_t i = 0; i < 8; ++i) EXPECT_EQ(e[static_cast<std::size_t>(i)].index, i);
+  EXPECT_EQ(e[0].type, EffectType::constant);
+  EXPECT_EQ(e[0].duration, 250 * kMillisecond);
+  EXPECT_EQ(e[0].direction, Vec3(0, 2, 0));
+  EXPECT_EQ(e[0].position, Vec3::Zero());
+  EXPECT_DOUBLE_EQ(e[1].gain, 500);
+  EXPECT_EQ(e[1].position, Vec3(1, 2, 3));
+  EXPECT_DOUBLE_EQ(e[2].gain, 1);
+  EXPECT_DOUBLE_EQ(e[3].gain, 250);
+  EXPECT_DOUBLE_EQ(e[3].magnitude_N, 0.7);
+  EXPECT_EQ(e[4].type, EffectType::motorVibration);
+  EXPECT_DOUBLE_EQ(e[4].angularFrequency_rad_per_s, 200 * EIGEN_PI);
+  EXPECT_EQ(e[5].type, EffectType::contactVibration);
+  EXPECT_DOUBLE_EQ(e[5].angularFrequency_rad_per_s, 100) << "rad/s as published";
+  EXPECT_EQ(e[6].type, EffectType::motorVibration);
+  EXPECT_EQ(e[7].type, EffectType::contactVibration);
+}
+
+TEST_F(Forces, RedefiningARunningEffectUpdatesItInPlace) {
+  say(constant(3));
+  say(StartEffect{3});
+  publish();
+  const std::uint32_t start = scene_->effects[0].start;
+  auto changed = constant(3);
+  changed.magnitude_N = 0.5;
+  say(changed);
+  publish();
+  ASSERT_EQ(scene_->effects.size(), 1U);
+  EXPECT_EQ(scene_->effects[0].start, start);
+  EXPECT_DOUBLE_EQ(scene_->effects[0].magnitude_N, 0.5);
+  say(StartEffect{3});
+  publish();
+  EXPECT_NE(scene_->effects[0].start, start) << "restart resets clock and phase";
+}
+
+TEST_F(Forces, TimedEffectsLeaveAfterTheirTimeAndCanBeStoppedBefore) {
+  say(constant(1, 100));
+  say(constant(2, 100));
+  say(StartEffect{1});
+  say(StartEffect{2});
+  publish();
+  wait(50 * kMillisecond);
+  say(StopEffect{2});
+  publish();
+  ASSERT_EQ(scene_->effects.size(), 1U);
+  EXPECT_EQ(scene_->effects[0].index, 1);
+  run(60 * kMillisecond);
+  EXPECT_EQ(scene_->effects.size(), 1U) << "the servo ends it by its own clock, not the scene";
+  run(100 * kMillisecond);
+  EXPECT_TRUE(scene_->effects.empty());
+  say(StartEffect{1});
+  publish();
+  EXPECT_EQ(scene_->effects.size(), 1U) << "still defined";
+  say(StopEffect{9});
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("stopEffect 9"));
+}
+
+TEST_F(Forces, StartMayComeBeforeItsDefinition) {
+  say(StartEffect{4});
+  wait(999 * kMillisecond);
+  publish();
+  say(constant(4));
+  publish();
+  EXPECT_EQ(scene_->effects.size(), 1U);
+  EXPECT_TRUE(notices_.empty());
+  say(StartEffect{5});
+  run(1'000 * kMillisecond);
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("startEffect 5"));
+  say(constant(5));
+  publish();
+  EXPECT_EQ(scene_->effects.size(), 1U);
+  say(StartEffect{6});
+  say(StopEffect{6});
+  say(constant(6));
+  publish();
+  EXPECT_EQ(scene_->effects.size(), 1U) << "stopped before it came";
+  run(3'000 * kMillisecond);
+  EXPECT_TRUE(notices_.empty());
+}
+
+TEST_F(Forces, NegativeAndUnstableParametersAreLowered) {
+  say(DefineEffect{.type = "spring", .index = 1, .gain = -1, .magnitude_N = 1});
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("gain -1"));
+  say(DefineEffect{.type = "spring", .index = 1, .gain = 50, .magnitude_N = 1});
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("unstable"));
+  say(DefineEffect{.type = "viscous", .index = 2, .gain = 0.1, .magnitude_N = 1});
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("unstable"));
+  say(DefineEffect{.type = "constant", .index = 3, .magnitude_N = 1, .duration_ms = -5});
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("direction is zero"));
+  for (const int i : {1, 2, 3}) say(StartEffect{i});
+  publish();
+  EXPECT_NEAR(scene_->effects[0].gain, 10'000, 20) << "5 N s/m / 0.5 ms";
+  EXPECT_NEAR(scene_->effects[1].gain, 5, 0.01);
+  EXPECT_EQ(scene_->effects[2].duration, 0);
+}
+
+TEST_F(Forces, AtMostAsManyEffectsAsTheLimit) {
+  for (int i = 0; i < 64; ++i) say(constant(i));
+  EXPECT_TRUE(notices_.empty());
+  say(constant(64));
+  EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("at most 64"));
+  say(constant(63));
+  EXPECT_TRUE(notices_.empty());
+}
+
+TEST_F(Forces, WhatAClientOwnsRampsOutWhenItLeaves) {
+  say(constant(1));
+  say(StartEffect{1});
+  say(constant(2));
+  say(StartEffect{2}, kOther);  // taken over by starting it
+  say(SetPlane{.index = 1, .plane = {0, 1, 0, 0}, .stiffness = 0.5});
+  say(SetForceField{.force_N = Vec3(1, 0, 0), .radius_m = 1});
+  say(SetConstraintMode{1}, kOther);
+  say(SetConstraintEnabled{true}, kOther);
+  say(StartCustomEffect{0, {}});
+  makeTouchable(0);
+  builder_.clientGone(kClient, now_);
+  ASSERT_TRUE(publish());
+  ASSERT_EQ(scene_->effects.size(), 2U);
+  EXPECT_TRUE(scene_->effects[0].releasing);
+  EXPECT_FALSE(scene_->effects[1].releasing);
+  EXPECT_TRUE(scene_->planes.at(0).releasing);
+  ASSERT_EQ(scene_->fields.size(), 2U);
+  EXPECT_TRUE(scene_->fields[0].releasing);
+  EXPECT_FALSE(scene_->fields[1].releasing);
+  EXPECT_TRUE(scene_->buzz->releasing);
+  wait(250 * kMillisecond);
+  publish();
+  EXPECT_EQ(scene_->effects.size(), 2U) << "not before it has ramped out";
+  run(100 * kMillisecond);
+  EXPECT_EQ(scene_->effects.size(), 1U);
+  EXPECT_TRUE(scene_->planes.empty());
+  EXPECT_EQ(scene_->fields.size(), 1U);
+  EXPECT_FALSE(scene_->buzz);
+  EXPECT_NE(object(0), nullptr) << "objects belong to the scene";
+  say(StartEffect{1}, kOther);
+  run(1'000 * kMillisecond);
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("startEffect 1")) << "definitions go with their owner";
+}
+
+TEST_F(Forces, ResetRampsAllOutWhoeverOwnsIt) {
+  say(constant(1));
+  say(StartEffect{1}, kOther);
+  say(SetForceField{.force_N = Vec3(1, 0, 0), .radius_m = 1}, kOther);
+  publish();
+  const std::uint32_t start = scene_->effects[0].start;
+  say(ResetScene{});
+  publish();
+  EXPECT_TRUE(scene_->effects.at(0).releasing);
+  EXPECT_TRUE(scene_->fields.at(0).releasing);
+  // The same index may be used again at once.
+  say(constant(1));
+  say(StartEffect{1});
+  publish();
+  EXPECT_FALSE(scene_->effects.at(0).releasing);
+  EXPECT_NE(scene_->effects[0].start, start);
+  run(1'000 * kMillisecond);
+  EXPECT_EQ(scene_->effects.size(), 1U);
+  EXPECT_TRUE(scene_->fields.empty());
+}
+
+TEST_F(Forces, PlanesAreInWorldUnitsWithStockSurfaces) {
+  say(SetPlane{.index = 0,
+               .plane = {0, 2, 0, 0.02},
+               .stiffness = 0.8,
+               .damping = 0.001,
+               .staticFriction = 0.2,
+               .dynamicFriction = 0.3,
+               .recoveryCycles = 10});
+  say(SetPlaneDetail{.textureAmplitude_m = 0.001,
+                     .textureWavelength_m = 0.00001,
+                     .buzzAmplitude_m = 0.002,
+                     .buzzFrequency_Hz = 60});
+  publish();
+  ASSERT_EQ(scene_->planes.size(), 1U);
+  const Plane p = scene_->planes[0];
+  EXPECT_EQ(p.normal, Vec3::UnitY());
+  EXPECT_DOUBLE_EQ(p.offset, 10);
+  EXPECT_DOUBLE_EQ(p.surface.stiffness_N_per_m, 800);
+  EXPECT_DOUBLE_EQ(p.surface.damping_Ns_per_m, 1);
+  EXPECT_DOUBLE_EQ(p.surface.dynamic_friction, 0.2);
+  EXPECT_EQ(p.recovery, 10 * kMillisecond);
+  EXPECT_DOUBLE_EQ(p.textureAmplitude, 1);
+  EXPECT_DOUBLE_EQ(p.textureWavelength, 0.06) << "the shortest";
+  EXPECT_DOUBLE_EQ(p.buzzAmplitude, 2);
+  EXPECT_DOUBLE_EQ(p.buzzAngularFrequency_rad_per_s, 120 * EIGEN_PI);
+  say(SetPlane{.index = 0, .plane = {0, 2, 0, 0.02}, .stiffness = 0.5});
+  publish();
+  EXPECT_EQ(scene_->planes[0].placement, p.placement) << "another surface, the same place";
+  say(SetPlane{.index = 0, .plane = {0, 2, 0, 0.03}, .stiffness = 0.5});
+  publish();
+  EXPECT_NE(scene_->planes[0].placement, p.placement);
+  say(SetPlane{.index = 0, .plane = {0, 0, 0, 0.03}});
+  publish();
+  EXPECT_TRUE(scene_->planes.empty()) << "a zero normal removes it";
+  EXPECT_TRUE(notices_.empty());
+}
+
+TEST_F(Forces, FieldIsInWorldUnitsAndAllZeroStopsIt) {
+  say(SetForceField{.origin_m = Vec3(0.01, 0, 0),
+                    .force_N = Vec3(0, 1, 0),
+                    .jacobian_N_per_m = {0, -100, 0, 0, 0, 0, 0, 0, 0},
+                    .radius_m = 0.05});
+  publish();
+  ASSERT_EQ(scene_->fields.size(), 1U);
+  EXPECT_EQ(scene_->fields[0].origin, Vec3(10, 0, 0));
+  EXPECT_DOUBLE_EQ(scene_->fields[0].radius, 50);
+  EXPECT_DOUBLE_EQ(scene_->fields[0].jacobian_N_per_unit(0, 1), -0.1) << "row by row";
+  say(SetForceField{});
+  publish();
+  EXPECT_TRUE(scene_->fields.empty());
+}
+
+TEST_F(Forces, StiffFieldIsKeptPassiveInDeviceMetresWhateverTheWorkspace) {
+  const double k = 8'000;
+  say(SetForceField{.jacobian_N_per_m = {-k, 0, 0, 0, -k, 0, 0, 0, -k}, .radius_m = 1});
+  publish();
+  EXPECT_DOUBLE_EQ(scene_->fields[0].jacobian_N_per_unit(1, 1), -8);
+  say(SetHapticScale{10});
+  publish();
+  EXPECT_NEAR(scene_->fields[0].jacobian_N_per_unit(1, 1) * scene_->workspace.worldUnitsPerMetre, -10'000,
+              20);
+}
+
+TEST_F(Forces, ConstraintsAreTheSpringsThatStockClientsSend) {
+  say(SetConstraintStiffness{100});
+  say(SetConstraintVector{ConstraintVector::point, Vec3(0.001, 0, 0)});
+  say(SetConstraintVector{ConstraintVector::linePoint, Vec3(0, 0.002, 0)});
+  say(SetConstraintVector{ConstraintVector::lineDirection, Vec3(0, 0, 3)});
+  say(SetConstraintVector{ConstraintVector::planePoint, Vec3(0, 0, 0.003)});
+  say(SetConstraintVector{ConstraintVector::planeNormal, Vec3(-2, 0, 0)});
+  say(SetConstraintMode{1});
+  publish();
+  EXPECT_TRUE(scene_->fields.empty()) << "not enabled";
+  say(SetConstraintEnabled{true});
+  publish();
+  const Mat3 expected[] = {Mat3::Identity(), Vec3(1, 1, 0).asDiagonal(), Vec3(1, 0, 0).asDiagonal()};
+  const Vec3 origins[] = {Vec3(1, 0, 0), Vec3(0, 2, 0), Vec3(0, 0, 3)};
+  for (int mode = 1; mode <= 3; ++mode) {
+    say(SetConstraintMode{mode});
+    publish();
+    ASSERT_EQ(scene_->fields.size(), 1U);
+    EXPECT_TRUE(scene_->fields[0].jacobian_N_per_unit.isApprox(-0.1 * expected[mode - 1], 1e-12)) << mode;
+    EXPECT_EQ(scene_->fields[0].origin, origins[mode - 1]);
+    EXPECT_EQ(scene_->fields[0].radius, INFINITY);
+  }
+  say(SetConstraintMode{0});
+  publish();
+  EXPECT_TRUE(scene_->fields.empty());
+}
+
+TEST_F(Forces, BuzzHasDefaultsEndsByItselfAndAnyOtherEffectStopsIt) {
+  say(StartCustomEffect{0, {}});
+  publish();
+  ASSERT_TRUE(scene_->buzz);
+  EXPECT_EQ(scene_->buzz->force_N, Vec3(0, 0, 1));
+  EXPECT_DOUBLE_EQ(scene_->buzz->angularFrequency_rad_per_s, 80 * EIGEN_PI);
+  EXPECT_EQ(scene_->buzz->duration, 2'000 * kMillisecond);
+  run(2'100 * kMillisecond);
+  EXPECT_FALSE(scene_->buzz);
+  say(StartCustomEffect{0, {2, 50, 10, 1, 0, 0, 99}});
+  publish();
+  EXPECT_EQ(scene_->buzz->force_N, Vec3(2, 0, 0));
+  say(StartCustomEffect{17, {}});
+  publish();
+  EXPECT_FALSE(scene_->buzz);
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("no such custom effect"));
+  say(StartCustomEffect{0, {}});
+  say(StopCustomEffect{});
+  publish();
+  EXPECT_FALSE(scene_->buzz);
+}
+
+class ForcesOtherwise : public Forces {
+ protected:
+  static SceneConfig otherwise() {
+    SceneConfig config;
+    config.contactVibrationUnit = VibrationUnit::hertz;
+    config.motorVibrationFrame = VibrationFrame::device;
+    return config;
+  }
+  ForcesOtherwise() : Forces(otherwise()) {}
+};
+
+TEST_F(ForcesOtherwise, SwitchesReachTheSnapshot) {
+  say(DefineEffect{.type = "vibrationContact", .index = 1, .magnitude_N = 1, .frequency = 100});
+  say(DefineEffect{.type = "vibrationMotor", .index = 2, .magnitude_N = 1, .frequency = 100});
+  say(StartEffect{1});
+  say(StartEffect{2});
+  publish();
+  EXPECT_DOUBLE_EQ(scene_->effects.at(0).angularFrequency_rad_per_s, 200 * EIGEN_PI);
+  EXPECT_TRUE(scene_->effects.at(1).inDeviceFrame);
+}
+
+}  // namespace
+}  // namespace hapticd::scene
