@@ -1,8 +1,8 @@
 // What is behind hapticd::Client.
 #pragma once
 
+#include <deque>
 #include <tuple>
-#include <vector>
 
 #include "client/link.h"
 #include "hapticd/client.h"
@@ -10,8 +10,9 @@
 namespace hapticd {
 
 struct Client::Impl {
+  /// A deque, because callbacks that add callbacks must not move the one that runs.
   template <class Report>
-  using Callbacks = std::vector<Callback<Report>>;
+  using Callbacks = std::deque<Callback<Report>>;
 
   Impl(const client::DeviceAddress& address, const ClientOptions& options);
 
@@ -43,10 +44,7 @@ struct Client::Impl {
   void call(const Report& report) {
     auto& list = std::get<Callbacks<Report>>(callbacks);
     const std::size_t count = list.size();
-    for (std::size_t i = 0; i < count; ++i) {
-      const Callback<Report> callback = list[i];  // adding one may move the others
-      callback(report);
-    }
+    for (std::size_t i = 0; i < count; ++i) list[i](report);
   }
 
   std::string device;

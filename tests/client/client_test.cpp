@@ -663,6 +663,22 @@ TEST(Client, CallbacksMayCommandUploadAndPoll) {
   EXPECT_TRUE(is(server.waitTold(1).at(0), wire::StartEffect{9}));
 }
 
+TEST(Client, CallbacksKeepTheirStateAndMayAddOthers) {
+  ScriptedServer server;
+  Client client(server.tcpName());
+  std::vector<int> counts;
+  int late = 0;
+  client.onTouchedObject([&, count = 0](const TouchedObjectReport&) mutable {
+    counts.push_back(++count);
+    for (int i = 0; i < 100; ++i) client.onTouchedObject([&](const TouchedObjectReport&) { ++late; });
+  });
+  server.say(wire::TouchedObject{1});
+  server.say(wire::TouchedObject{2});
+  ASSERT_TRUE(pollUntil(client, [&] { return counts.size() == 2; }));
+  EXPECT_EQ(counts, (std::vector<int>{1, 2}));
+  EXPECT_EQ(late, 100) << "what is added during a report waits for the next";
+}
+
 TEST(Client, ErrorsOfTheServerCanBeExceptions) {
   ScriptedServer server;
   Client client(server.tcpName(), {.throw_on_error = true});
