@@ -1,0 +1,105 @@
+// Force-feedback joysticks and wheels through Linux evdev: two axes, x and z, or x alone.
+//
+// The kernel may block in an upload, so a thread of the driver exchanges with the device at 500 Hz at most;
+// the servo only leaves its newest force and takes the newest state. A force that the servo does not renew
+// for 20 ms is taken back.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "device/device.h"
+#include "device/evdev/event_device.h"
+#include "device/evdev/force_effects.h"
+#include "device/evdev/wheel_profile.h"
+#include "realtime/handoff/latest_value.h"
+
+namespace hapticd::device {
+
+struct EvdevOptions {
+  std::string path;               ///< /dev/input/event*; empty: the first one with a constant force
+  std::filesystem::path profile;  ///< a file for WheelProfile; empty: cautious guesses
+};
+
+class EvdevDevice final : public Device {
+ public:
+  explicit EvdevDevice(EvdevOptions options = {}) : options_(std::move(options)) {}
+  /// On a file opened elsewhere; without a thread of its own, exchange() does the work.
+  EvdevDevice(std::unique_ptr<EventDevice> file, const WheelProfile& profile, bool thread);
+  ~EvdevDevice() override { close(); }
+
+  void open() override;
+  void close() noexcept override;
+  const DeviceProfile& profile() const noexcept override { return profile_; }
+
+  bool read(Nanos now, DeviceState& state) noexcept override;
+  bool write(const Vec3& force_N) noexcept override;
+  std::string faultText() const override;
+
+  /// One round with the device: events in, force out. For the driver's thread.
+  void exchange(Nanos now) noexcept;
+
+  /// A device that open() would take, by name; throws std::runtime_error that says why not.
+  static std::string probe(const std::string& path);
+
+ private:
+  struct Axis {
+    int code = 0;
+    double centre = 0;
+    double scale_m = 0;  // per count
+    double value_m = 0;
+    double before_m = 0;
+    double velocity_m_per_s = 0;
+
+    void place(int count) noexcept { value_m = scale_m * (count - centre); }
+    void differentiate(double dt_s) noexcept;
+  };
+  struct Command {
+    double x_N = 0;
+    double z_N = 0;
+    std::uint64_t number = 0;
+  };
+  struct Sample {
+    DeviceState state;
+    bool valid = false;
+  };
+
+  void findFile();
+  void readCapabilities();
+  Axis readAxis(int code, double travel_m);
+  bool readEvents() noexcept;
+  void run() noexcept;
+
+  const EvdevOptions options_;
+  std::unique_ptr<EventDevice> file_;
+  const bool given_ = false;  // the file came from outside
+  const bool ownThread_ = true;
+  WheelProfile wheel_;
+  DeviceProfile profile_;
+  std::optional<ForceEffects> effects_;
+  std::thread thread_;
+  std::atomic<bool> stopping_{false};
+  std::atomic<int> error_{0};  // errno while the device does not answer
+
+  realtime::LatestValue<Command> command_;
+  realtime::LatestValue<Sample> sample_;
+  std::uint64_t commands_ = 0;  // the servo's
+
+  // The exchanging thread's.
+  std::array<Axis, 2> axes_;
+  int axisCount_ = 1;
+  std::uint32_t buttons_ = 0;
+  int firstButton_ = 0;
+  std::uint64_t lastCommand_ = 0;
+  Nanos commandTime_ = 0;
+  Nanos before_ = 0;
+  Nanos nextForce_ = 0;
+  int failures_ = 0;
+};
+
+}  // namespace hapticd::device
