@@ -50,9 +50,6 @@ class Inbox {
 
   /// Payload bytes in the half being filled.
   std::size_t waitingBytes() const noexcept { return half_[filling_].bytes.size(); }
-  bool empty() const noexcept {
-    return half_[filling_].arrivals.empty() && next_ == half_[1 - filling_].arrivals.size();
-  }
 
  private:
   struct Half {

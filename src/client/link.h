@@ -116,6 +116,8 @@ class Link {
   LinkStatistics statistics() const;
 
  private:
+  static constexpr Duration kLongestWait = std::chrono::hours(24);  // a deadline must not overflow
+
   /// Whether hands were shaken, on a connection that may have failed meanwhile.
   bool shaken() const noexcept { return endpoint_ && endpoint_->connected(); }
   void attempt();

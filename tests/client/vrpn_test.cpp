@@ -11,17 +11,15 @@
 #include <string>
 #include <vector>
 
+#include "client/client_tests.h"
 #include "client/link.h"
-#include "client/scripted_server.h"
-#include "wire/codec.h"
 
 namespace hapticd {
 namespace {
 
+using test::is;
+using test::kPatience;
 using test::ScriptedServer;
-using test::Told;
-
-constexpr auto kPatience = std::chrono::seconds(20);
 
 template <class Device, class Condition>
 bool runUntil(Device& device, Condition&& condition) {
@@ -32,14 +30,6 @@ bool runUntil(Device& device, Condition&& condition) {
     vrpn_SleepMsecs(1);
   }
   return true;
-}
-
-template <class M>
-::testing::AssertionResult is(const Told& told, const M& expected) {
-  const M* message = std::get_if<M>(&told.message);
-  if (message && *message == expected) return ::testing::AssertionSuccess();
-  return ::testing::AssertionFailure() << wire::info(wire::kind(told.message)).name << ", expected "
-                                       << M::kInfo.name << " with other fields";
 }
 
 class Vrpn : public ::testing::TestWithParam<bool> {

@@ -1,0 +1,151 @@
+// How a client comes to a connection, loses it, and says what is wrong.
+#include "client/client_tests.h"
+
+#include <time.h>
+
+namespace hapticd::test {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+
+INSTANTIATE_TEST_SUITE_P(Connection, BothWays, ::testing::Bool(),
+                         [](const auto& way) { return way.param ? "tcp" : "callback"; });
+
+TEST_P(BothWays, ConnectsAndIsAnswered) {
+  ScriptedServer server;
+  const Client client(name(server));
+  EXPECT_TRUE(client.connected());
+  EXPECT_EQ(client.device(), "Phantom");
+  EXPECT_EQ(client.server(), "127.0.0.1:" + std::to_string(server.port()));
+  EXPECT_EQ(server.connections(), 1U);
+  EXPECT_GE(server.pings(), 1U);
+  EXPECT_EQ(client.statistics().connections, 1U);
+}
+
+TEST_P(BothWays, ConnectsAgainWhenTheServerIsBack) {
+  auto server = std::make_unique<ScriptedServer>();
+  const std::uint16_t port = server->port();
+  Client client(name(*server));
+  std::vector<bool> states;
+  std::string reason;
+  client.onConnection([&](const ConnectionReport& r) {
+    states.push_back(r.connected);
+    if (!r.connected) reason = r.reason;
+  });
+  client.poll(0ms);
+  server->say(wire::TouchedObject{5});
+  ASSERT_TRUE(pollUntil(client, [&] { return client.latest().touched_object.object == 5; }));
+  server.reset();
+  ASSERT_TRUE(pollUntil(client, [&] { return !client.connected(); }));
+  ASSERT_TRUE(pollUntil(client, [&] { return !states.empty() && !states.back(); }));
+  EXPECT_EQ(client.latest().touched_object.object, -1) << "what was felt is no longer known";
+  EXPECT_FALSE(reason.empty());
+  client.startEffect(1);
+  EXPECT_EQ(client.statistics().messages_dropped, 1U);
+
+  server = std::make_unique<ScriptedServer>(ScriptedServerOptions{.port = port});
+  ASSERT_TRUE(pollUntil(client, [&] { return client.connected() && states.back(); }));
+  client.startEffect(2);
+  client.flush();
+  const auto told = server->waitTold(1);
+  ASSERT_EQ(told.size(), 1U) << "the command given without a connection is not sent later";
+  EXPECT_TRUE(is(told[0], wire::StartEffect{2}));
+  EXPECT_EQ(told[0].sender, "Phantom") << "names are described anew";
+  EXPECT_EQ(client.statistics().connections, 2U);
+}
+
+TEST(Client, DoesNotConnectAgainWhenToldSo) {
+  ScriptedServer server;
+  Client client(server.tcpName(), {.reconnect = false});
+  server.dropClients();
+  ASSERT_TRUE(pollUntil(client, [&] { return !client.connected(); }));
+  client.poll(600ms);  // more than twice the pause between attempts
+  EXPECT_FALSE(client.connected());
+  EXPECT_EQ(server.connections(), 1U);
+}
+
+TEST(Client, SleepsWhileNothingHappens) {
+  ScriptedServer server;
+  Client client(server.tcpName());
+  while (client.poll(50ms) > 0) {
+  }
+  const auto cpu = [] {
+    timespec t{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return std::chrono::seconds(t.tv_sec) + std::chrono::nanoseconds(t.tv_nsec);
+  };
+  const auto before_cpu = cpu();
+  const auto before = std::chrono::steady_clock::now();
+  EXPECT_EQ(client.poll(400ms), 0U);
+  EXPECT_GE(std::chrono::steady_clock::now() - before, 400ms);
+  EXPECT_LT(cpu() - before_cpu, 100ms);
+}
+
+TEST(Client, WrongNamesAreQuoted) {
+  EXPECT_THAT(textOf<std::invalid_argument>([] { Client("Phantom"); }), HasSubstr("expected NAME@host"));
+  EXPECT_THAT(textOf<std::invalid_argument>([] { Client("@localhost"); }), HasSubstr("expected NAME@host"));
+  EXPECT_THAT(textOf<std::invalid_argument>([] { Client("Phantom@"); }), HasSubstr("expected host"));
+  EXPECT_THAT(textOf<std::invalid_argument>([] { Client("Phantom@host:70000"); }), HasSubstr("\"70000\""));
+  EXPECT_THAT(textOf<std::invalid_argument>([] { Client("Phantom@tcp://host:0"); }), HasSubstr("1 to 65535"));
+  EXPECT_THAT(textOf<ConnectError>([] { Client("Phantom@nowhere.invalid"); }), HasSubstr("nowhere.invalid"));
+}
+
+TEST_P(BothWays, NothingListens) {
+  std::uint16_t port = 0;
+  std::string device;
+  {
+    ScriptedServer server;
+    port = server.port();
+    device = name(server);
+  }
+  const std::string text = textOf<ConnectError>([&] { Client(device, {.connect_timeout = 300ms}); });
+  EXPECT_THAT(text, HasSubstr("nothing listens on 127.0.0.1:" + std::to_string(port)));
+  EXPECT_THAT(text, HasSubstr("start `hapticd serve`"));
+}
+
+TEST(Client, NoSuchDevice) {
+  ScriptedServer server;
+  const std::string text = textOf<ConnectError>(
+      [&] { Client("Phantm@tcp://127.0.0.1:" + std::to_string(server.port()), {.connect_timeout = 300ms}); });
+  EXPECT_THAT(text, HasSubstr("no device 'Phantm' answers"));
+  EXPECT_THAT(text, HasSubstr("it has Phantom"));
+}
+
+TEST(Client, NotAVrpnServer) {
+  ScriptedServer server({.greeting_bytes = "HTTP/1.1 400 Bad Request\r\nConnection: close\r\n\r\n"});
+  const std::string text =
+      textOf<ConnectError>([&] { Client(server.tcpName(), {.connect_timeout = 300ms}); });
+  EXPECT_THAT(text, HasSubstr("broke the VRPN protocol"));
+}
+
+TEST(Client, KeepsWhatIsCommandedBeforeTheFirstConnection) {
+  std::uint16_t port = 0;
+  {
+    ScriptedServer server;
+    port = server.port();
+  }
+  Client client("Phantom@tcp://127.0.0.1:" + std::to_string(port), {.connect_timeout = 0ms});
+  client.setObjectCount(2);
+  client.startEffect(4);
+  client.poll(0ms);
+  EXPECT_FALSE(client.connected());
+  ScriptedServer server({.port = port});
+  client.waitConnected(kPatience);
+  client.flush();
+  const auto told = server.waitTold(2);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_TRUE(is(told[0], wire::SetObjectNumber{2}));
+  EXPECT_TRUE(is(told[1], wire::StartEffect{4}));
+}
+
+TEST(Client, WhatWaitsForTheFirstConnectionIsBounded) {
+  Client client("Phantom@tcp://127.0.0.1:1", {.connect_timeout = 0ms, .queue_limit = 100000});
+  const auto fill = [&] {
+    for (int i = 0; i < 10000; ++i) client.setVertex(0, i, 0, 0, 0);
+  };
+  EXPECT_THAT(textOf<ConnectError>(fill), HasSubstr("bytes wait to be sent"));
+}
+
+}  // namespace
+}  // namespace hapticd::test

@@ -1,0 +1,235 @@
+// Every report reaches its callback, and what callbacks may do.
+#include "client/client_tests.h"
+
+namespace hapticd::test {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+
+TEST_P(BothWays, ReportsReachTheirCallbacks) {
+  ScriptedServer server;
+  Client client(name(server));
+  std::size_t calls = 0;
+  const auto stamp = Time(std::chrono::seconds(1700000000) + 250000us);
+  const auto check = [&](const auto& report) {
+    EXPECT_EQ(report.time, stamp);
+    ++calls;
+  };
+  client.onPose([&](const PoseReport& r) {
+    check(r);
+    EXPECT_EQ(r.sensor, 1);
+    EXPECT_EQ(r.position_m, (Vec3{1, 2, 3}));
+    EXPECT_EQ(r.orientation, (Quaternion{0.1, 0.2, 0.3, 0.9}));
+  });
+  client.onVelocity([&](const VelocityReport& r) {
+    check(r);
+    EXPECT_EQ(r.velocity_m_per_s, (Vec3{4, 5, 6}));
+    EXPECT_EQ(r.rotation_interval_s, 0.5);
+  });
+  client.onAcceleration([&](const AccelerationReport& r) {
+    check(r);
+    EXPECT_EQ(r.acceleration_m_per_s2, (Vec3{7, 8, 9}));
+  });
+  client.onAnalog([&](const AnalogReport& r) {
+    check(r);
+    EXPECT_EQ(r.channels, (std::vector<double>{1, 2.5}));
+  });
+  client.onForce([&](const ForceReport& r) {
+    check(r);
+    EXPECT_EQ(r.force_N, (Vec3{1, -2, 3}));
+  });
+  client.onDepth([&](const DepthReport& r) {
+    check(r);
+    EXPECT_EQ(r.depth_m, 0.004);
+  });
+  client.onContactPoint([&](const ContactPointReport& r) {
+    check(r);
+    EXPECT_EQ(r.position_m, (Vec3{3, 2, 1}));
+  });
+  client.onTouching([&](const TouchingReport& r) {
+    check(r);
+    EXPECT_TRUE(r.touching);
+  });
+  client.onTouchedObject([&](const TouchedObjectReport& r) {
+    check(r);
+    EXPECT_EQ(r.object, 5);
+  });
+  client.onAngle([&](const AngleReport& r) {
+    check(r);
+    EXPECT_EQ(r.angle_deg, 45);
+    EXPECT_TRUE(r.touching);
+  });
+  client.onForceError([&](const ForceErrorReport& r) {
+    check(r);
+    EXPECT_EQ(r.error, ForceError::force);
+  });
+  client.onText([&](const TextReport& r) {
+    check(r);
+    EXPECT_EQ(r.severity, Severity::warning);
+    EXPECT_EQ(r.text, "stiffness 2 of object 0 clamped to 1");
+  });
+  client.onToRoom([&](const ToRoomReport& r) {
+    check(r);
+    EXPECT_EQ(r.position_m, (Vec3{1, 1, 1}));
+  });
+  client.onUnitToSensor([&](const UnitToSensorReport& r) {
+    check(r);
+    EXPECT_EQ(r.sensor, 2);
+  });
+  client.onWorkspace([&](const WorkspaceReport& r) {
+    check(r);
+    EXPECT_EQ(r.max_m, (Vec3{4, 5, 6}));
+  });
+  server.say(wire::TrackerPosQuat{1, 0, {1, 2, 3}, {0.1, 0.2, 0.3, 0.9}});
+  server.say(wire::TrackerVelocity{1, 0, {4, 5, 6}, {0, 0, 0, 1}, 0.5});
+  server.say(wire::TrackerAcceleration{1, 0, {7, 8, 9}, {0, 0, 0, 1}, 0.5});
+  server.say(wire::AnalogChannels{{{1, 2.5}}});
+  server.say(wire::Force{{1, -2, 3}});
+  server.say(wire::Dop{0.004});
+  server.say(wire::Scp{{3, 2, 1}, {0, 0, 0, 1}});
+  server.say(wire::IsTouching{1});
+  server.say(wire::TouchedObject{5});
+  server.say(wire::Angle{45, 1});
+  server.say(wire::ForceError{2});
+  server.say(wire::Text{1, 0, "stiffness 2 of object 0 clamped to 1"});
+  server.say(wire::TrackerToRoom{{1, 1, 1}, {0, 0, 0, 1}});
+  server.say(wire::TrackerUnitToSensor{2, 0, {}, {0, 0, 0, 1}});
+  server.say(wire::TrackerWorkspace{{1, 2, 3}, {4, 5, 6}});
+  ASSERT_TRUE(pollUntil(client, [&] { return calls == 15; })) << calls << " of 15";
+
+  const LatestReports& latest = client.latest();
+  EXPECT_EQ(latest.pose.at(1).position_m, (Vec3{1, 2, 3}));
+  EXPECT_EQ(latest.force.force_N, (Vec3{1, -2, 3}));
+  EXPECT_EQ(latest.depth.depth_m, 0.004);
+  EXPECT_TRUE(latest.touching.touching);
+  EXPECT_EQ(latest.touched_object.object, 5);
+  const Statistics statistics = client.statistics();
+  EXPECT_EQ(statistics[ReportKind::force].count, 1U);
+  EXPECT_EQ(statistics[ReportKind::force].latency.count(), 1U);
+  EXPECT_EQ(statistics.messages_damaged, 0U);
+  if (tcpOnly()) {
+    EXPECT_EQ(statistics.udp_bytes_in, 0U);
+  } else {
+    EXPECT_GE(statistics.udp_bytes_in, 8U * 24U) << "fast reports come by datagram";
+  }
+}
+
+TEST(Client, ButtonsAreNewsOnlyWhenTheyChange) {
+  ScriptedServer server;
+  Client client(server.tcpName());
+  std::vector<std::pair<int, bool>> seen;
+  client.onButton([&](const ButtonReport& r) { seen.emplace_back(r.button, r.pressed); });
+  server.say(wire::ButtonStates{{{0, 1}}});
+  server.say(wire::ButtonStates{{{0, 1}}});
+  server.say(wire::ButtonChange{1, 0});
+  server.say(wire::ButtonStates{{{1, 0}}});
+  ASSERT_TRUE(pollUntil(client, [&] { return seen.size() == 3; }));
+  EXPECT_EQ(seen, (std::vector<std::pair<int, bool>>{{1, true}, {1, false}, {0, true}}));
+}
+
+TEST(Client, ReportsOfOtherDevicesAreNotItsOwn) {
+  ScriptedServer server;
+  Client client(server.tcpName());
+  int forces = 0;
+  client.onForce([&](const ForceReport& r) { forces += r.force_N[0] == 1 ? 1 : 100; });
+  server.say(wire::Force{{9, 9, 9}}, {}, "OtherDevice");
+  server.say(wire::Force{{1, 0, 0}});
+  ASSERT_TRUE(pollUntil(client, [&] { return forces > 0; }));
+  EXPECT_EQ(forces, 1);
+}
+
+TEST(Client, ExceptionsOfCallbacksLeavePollAndLoseNothing) {
+  ScriptedServer server;
+  Client client(server.tcpName());
+  int seen = 0;
+  client.onTouchedObject([&](const TouchedObjectReport& r) {
+    ++seen;
+    if (r.object == 1) throw std::runtime_error("mine");
+  });
+  server.say(wire::TouchedObject{1});
+  server.say(wire::TouchedObject{2});
+  EXPECT_EQ(textOf<std::runtime_error>([&] { pollUntil(client, [] { return false; }); }), "mine");
+  ASSERT_TRUE(pollUntil(client, [&] { return client.latest().touched_object.object == 2; }));
+  EXPECT_EQ(seen, 2);
+  EXPECT_TRUE(client.connected());
+}
+
+TEST(Client, CallbacksMayCommandUploadAndPoll) {
+  ScriptedServer server;
+  Client client(server.tcpName());
+  std::vector<int> order;
+  const std::vector<std::array<float, 3>> corners(3000);
+  client.onTouchedObject([&](const TouchedObjectReport& r) {
+    order.push_back(r.object);
+    if (r.object != 1) return;
+    client.uploadCorners(0, corners);
+    client.startEffect(9);
+    client.poll(1ms);
+    client.flushAll();
+    order.push_back(-5);
+  });
+  server.say(wire::TouchedObject{1});
+  server.say(wire::TouchedObject{2});
+  ASSERT_TRUE(pollUntil(client, [&] { return order.size() == 3; }));
+  EXPECT_EQ(order, (std::vector<int>{1, -5, 2}));
+  EXPECT_EQ(server.waitVertices(3000).size(), 3000U);
+  EXPECT_TRUE(is(server.waitTold(1).at(0), wire::StartEffect{9}));
+}
+
+TEST(Client, CallbacksKeepTheirStateAndMayAddOthers) {
+  ScriptedServer server;
+  Client client(server.tcpName());
+  std::vector<int> counts;
+  int late = 0;
+  client.onTouchedObject([&, count = 0](const TouchedObjectReport&) mutable {
+    counts.push_back(++count);
+    for (int i = 0; i < 100; ++i) client.onTouchedObject([&](const TouchedObjectReport&) { ++late; });
+  });
+  server.say(wire::TouchedObject{1});
+  server.say(wire::TouchedObject{2});
+  ASSERT_TRUE(pollUntil(client, [&] { return counts.size() == 2; }));
+  EXPECT_EQ(counts, (std::vector<int>{1, 2}));
+  EXPECT_EQ(late, 100) << "what is added during a report waits for the next";
+}
+
+TEST(Client, ErrorsOfTheServerCanBeExceptions) {
+  ScriptedServer server;
+  Client client(server.tcpName(), {.throw_on_error = true});
+  server.say(wire::Text{0, 0, "mesh of object 0: closed"});
+  server.say(wire::Text{2, 0, "setTransformMatrix: object 0: element 3 is nan"});
+  const std::string text = textOf<ServerError>([&] { pollUntil(client, [] { return false; }); });
+  EXPECT_THAT(text, HasSubstr("element 3 is nan"));
+  EXPECT_NO_THROW(client.poll(0ms));
+}
+
+TEST(Client, DamagedReportsAreCounted) {
+  ScriptedServer server;
+  Client client(server.tcpName());
+  // A Force of 8 bytes: the type's number is that of the table.
+  std::string frame(32, '\0');
+  auto* bytes = reinterpret_cast<std::byte*>(frame.data());
+  wire::storeHeader(bytes, {32, {}, 1, wire::kLocalType<wire::Force>.value, 0});
+  server.sayRaw(frame);
+  ASSERT_TRUE(pollUntil(client, [&] { return client.statistics().messages_damaged == 1; }));
+  EXPECT_TRUE(client.connected());
+}
+
+TEST(LatencyHistogram, QuantilesAreWithinABucket) {
+  LatencyHistogram histogram;
+  EXPECT_EQ(histogram.quantile_us(0.5), 0);
+  for (int i = 0; i < 1000; ++i) histogram.add(std::chrono::microseconds(i));
+  EXPECT_EQ(histogram.count(), 1000U);
+  EXPECT_NEAR(histogram.quantile_us(0.5), 500, 500 * 0.125);
+  EXPECT_NEAR(histogram.quantile_us(0.99), 990, 990 * 0.125);
+  EXPECT_EQ(histogram.countBelow_us(8), 8U);
+  LatencyHistogram earlier = histogram;
+  histogram.add(-5us);
+  histogram.add(std::chrono::hours(1));
+  histogram -= earlier;
+  EXPECT_EQ(histogram.count(), 2U);
+  EXPECT_EQ(histogram.countBelow_us(1), 1U);
+}
+
+}  // namespace
+}  // namespace hapticd::test

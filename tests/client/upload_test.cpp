@@ -1,0 +1,120 @@
+// Meshes on their way to a server, fast, slow or gone.
+#include "client/client_tests.h"
+
+#include <thread>
+
+namespace hapticd::test {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+
+#ifdef HAPTICD_SANITIZED
+constexpr std::size_t kManyVertices = 9999;
+#else
+constexpr std::size_t kManyVertices = 99999;
+#endif
+
+TEST_P(BothWays, AHundredThousandVerticesArriveInOrder) {
+  ScriptedServer server;
+  Client client(name(server));
+  std::vector<std::array<float, 3>> corners(kManyVertices);
+  for (std::size_t i = 0; i < corners.size(); ++i) corners[i] = {static_cast<float>(i), 1, -2};
+  std::vector<std::uint64_t> progress;
+  std::uint64_t total = 0;
+  client.uploadCorners(3, corners, [&](const UploadProgress& p) {
+    progress.push_back(p.bytes_sent);
+    total = p.bytes_total;
+  });
+  ASSERT_FALSE(progress.empty());
+  EXPECT_TRUE(std::is_sorted(progress.begin(), progress.end()));
+  EXPECT_EQ(total, corners.size() * 48);
+  EXPECT_EQ(progress.back(), total);
+  EXPECT_GE(client.statistics().tcp_bytes_out, total) << "the system has all of it";
+
+  const auto vertices = server.waitVertices(corners.size());
+  ASSERT_EQ(vertices.size(), corners.size());
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    ASSERT_EQ(vertices[i].vertex, static_cast<std::int32_t>(i));
+    ASSERT_EQ(vertices[i].object, 3);
+    ASSERT_EQ(vertices[i].position, corners[i]);
+  }
+}
+
+TEST(Client, MeshesAreSentCornerByCorner) {
+  ScriptedServer server;
+  Client client(server.tcpName());
+  const std::vector<std::array<float, 3>> vertices{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  const std::vector<std::array<std::uint32_t, 3>> triangles{{0, 1, 2}, {3, 2, 1}};
+  client.uploadMesh(0, {vertices, triangles});
+  const auto told = server.waitVertices(6);
+  ASSERT_EQ(told.size(), 6U);
+  EXPECT_EQ(told[3].position, vertices[3]);
+  EXPECT_EQ(told[5].vertex, 5);
+  EXPECT_EQ(told[5].position, vertices[1]);
+
+  const std::vector<std::array<std::uint32_t, 3>> bad{{0, 1, 2}, {3, 4, 1}};
+  EXPECT_THAT(textOf<std::invalid_argument>([&] {
+                client.uploadMesh(0, {vertices, bad});
+              }),
+              HasSubstr("triangle 1 names vertex 4, the mesh has 4"));
+}
+
+TEST(Client, AServerThatDoesNotReadHoldsCommandsBackAndThenLosesThem) {
+  ScriptedServer server({.reads = false});
+  constexpr std::size_t kLimit = 256 * 1024;
+  Client client(server.tcpName(), {.connect_timeout = 0ms, .send_timeout = 300ms, .queue_limit = kLimit});
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  while (!client.connected() && std::chrono::steady_clock::now() < end) client.poll(10ms);
+  std::uint64_t most_waiting = 0;
+  int sent = 0;
+  const auto fill = [&] {
+    for (; sent < 10'000'000; ++sent) {
+      client.setVertex(0, sent, 0, 0, 0);
+      if (sent % 1000 == 0) {
+        const Statistics s = client.statistics();
+        most_waiting =
+            std::max(most_waiting, s.messages_out * 48 - std::min(s.messages_out * 48, s.tcp_bytes_out));
+      }
+    }
+  };
+  EXPECT_THAT(textOf<ConnectionLost>(fill), testing::AnyOf(HasSubstr("takes no data"), HasSubstr("lost")));
+  EXPECT_LT(sent, 10'000'000);
+  EXPECT_LE(most_waiting, kLimit + 2 * 64 * 1024) << "memory is bounded";
+  EXPECT_FALSE(client.connected());
+}
+
+TEST(Client, AServerThatReadsLaterGetsEverything) {
+  ScriptedServer server({.reads = false});
+  Client client(server.tcpName(), {.connect_timeout = 0ms, .queue_limit = 64 * 1024});
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  while (!client.connected() && std::chrono::steady_clock::now() < end) client.poll(10ms);
+  std::vector<std::array<float, 3>> corners(kManyVertices);
+  std::thread later([&] {
+    std::this_thread::sleep_for(
+        50ms);  // so that the upload usually has to wait; the result is the same if not
+    server.startReading();
+  });
+  client.uploadCorners(0, corners);
+  later.join();
+  EXPECT_EQ(server.waitVertices(corners.size()).size(), corners.size());
+}
+
+TEST(Client, AnUploadToAServerThatGoesAwayFails) {
+  ScriptedServer server;
+  Client client(server.tcpName(), {.queue_limit = 64 * 1024});
+  std::vector<std::array<float, 3>> corners(kManyVertices * 5);
+  bool dropped = false;
+  const auto upload = [&] {
+    client.uploadCorners(0, corners, [&](const UploadProgress& p) {
+      if (!dropped && p.bytes_sent > 0) {
+        server.dropClients();
+        dropped = true;
+      }
+    });
+  };
+  EXPECT_THAT(textOf<ConnectionLost>(upload), HasSubstr("lost"));
+}
+
+}  // namespace
+}  // namespace hapticd::test
