@@ -1,0 +1,45 @@
+#include "geometry/triangle_mesh.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace hapticd::geometry {
+namespace {
+
+TEST(Box, IsEmptyUntilExtended) {
+  Box box;
+  EXPECT_TRUE(box.empty());
+  box.extend(Vec3(1, 2, 3));
+  EXPECT_FALSE(box.empty());
+  EXPECT_EQ(box.extents(), Vec3::Zero());
+  box.extend(Box{Vec3(-1, 0, 0), Vec3(0, 0, 0)});
+  EXPECT_EQ(box.centre(), Vec3(0, 1, 1.5));
+  box.extend(Box());
+  EXPECT_EQ(box.min, Vec3(-1, 0, 0));
+  EXPECT_TRUE((Box{Vec3::Constant(std::nan("")), Vec3::Zero()}).empty());
+}
+
+TEST(TriangleMesh, BoundsLeaveOutWhatIsNotFinite) {
+  TriangleMesh mesh;
+  EXPECT_TRUE(boundsOf(mesh).empty());
+  mesh.vertices = {Vec3f(1, 2, 3), Vec3f(NAN, 0, 0), Vec3f(-1, 0, INFINITY), Vec3f(0, 5, 0)};
+  EXPECT_EQ(boundsOf(mesh).min, Vec3(0, 2, 0));
+  EXPECT_EQ(boundsOf(mesh).max, Vec3(1, 5, 3));
+}
+
+TEST(TriangleMesh, ScaleAndMove) {
+  TriangleMesh mesh;
+  mesh.vertices = {Vec3f(1, 2, 3)};
+  scaleAndMove(mesh, 2, Vec3(10, 0, -1));
+  EXPECT_EQ(mesh.vertices[0], Vec3f(12, 4, 5));
+}
+
+TEST(Time, ConversionRoundsToTheNearestNanosecond) {
+  EXPECT_EQ(toNanos(0.001), 1'000'000);
+  EXPECT_EQ(toNanos(-0.001), -1'000'000);
+  EXPECT_DOUBLE_EQ(toSeconds(1'500'000'000), 1.5);
+}
+
+}  // namespace
+}  // namespace hapticd::geometry
