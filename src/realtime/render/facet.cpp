@@ -158,11 +158,8 @@ bool meetBall(const Facet& f, TouchableFaces faces, double radius, const Vec3& p
       out = {t, -slope, {n, foot, standoff}};
       stopped = true;
     }
-    if (stopped && distance <= contact + fine) {
-      const Vec3 end = p + limit * d;
-      return slope < 0 || (end - nearestPointOf(f, end)).norm() < contact;
-    }
     if (!(slope < 0)) return false;
+    if (stopped && distance <= contact + fine) return true;
     t += (distance - (stopped ? contact : standoff)) / -slope;
   }
   return stopped && t <= limit;

@@ -13,14 +13,22 @@ constexpr int kHoldCasts = 32;             // kept back for finding what holds i
 constexpr double kRestick_m = 0.5e-6;      // slower than this in a tick is at rest
 constexpr double kBallConvergence = 1e-6;  // of the radius, in distance to the target
 
-// Depths below the held faces as they really are, without the skin that keeps the proxy off them.
-void depthsOf(const Hit* hits, int count, double toolRadius_m, const Vec3& hip, double* depths) {
+// Depths of the HIP below the held faces as they really are, without the skin that keeps the proxy off them.
+// False when the proxy is not on all of them, jammed where they leave it no room: then no more than the
+// spring's length.
+bool depthsOf(const Hit* hits, int count, double toolRadius_m, const Vec3& spring, const Vec3& hip,
+              double* depths) {
   std::array<Plane, kMaxActive> planes;
   for (int i = 0; i < count; ++i) {
     planes[static_cast<std::size_t>(i)] = hits[i].plane;
     planes[static_cast<std::size_t>(i)].standoff = toolRadius_m;
   }
   depthsBelow(planes.data(), count, hip, depths);
+  Vec3 normal = Vec3::Zero();
+  for (int i = 0; i < count; ++i) normal += depths[i] * hits[i].plane.normal;
+  if (normal.squaredNorm() <= spring.squaredNorm()) return true;
+  for (int i = 0; i < count; ++i) depths[i] *= spring.norm() / normal.norm();
+  return false;
 }
 
 }  // namespace
@@ -197,7 +205,8 @@ void Proxy::describe(const Vec3& hip, const Vec3& goal, const ActiveSet& active)
   grip_ = Grip{};
   const int count = std::min(active.count, kMaxActive);
   std::array<double, kMaxActive> depths{};
-  depthsOf(active.hits.data(), count, nearby_.toolRadius(), hip, depths.data());
+  const bool onAll =
+      depthsOf(active.hits.data(), count, nearby_.toolRadius(), position_ - hip, hip, depths.data());
   double hardest = -1;
   for (int i = 0; i < count; ++i) {
     const Hit& hit = active.hits[static_cast<std::size_t>(i)];
@@ -226,7 +235,7 @@ void Proxy::describe(const Vec3& hip, const Vec3& goal, const ActiveSet& active)
       touchedTriangle_ = touch.triangle;
     }
   }
-  grip_.lateral_m = count > 0 ? Vec3(position_ - goal) : Vec3::Zero();
+  if (count > 0 && onAll) grip_.lateral_m = position_ - goal;
   if (count == 0) armed_ = true;
 }
 

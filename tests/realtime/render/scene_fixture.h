@@ -86,6 +86,9 @@ class SceneFixture {
   }
 
   std::vector<scene::Effect> effects;
+  std::vector<scene::Plane> planes;
+  std::vector<scene::ForceField> fields;
+  std::optional<scene::Buzz> buzz;
 
   /// A picture of the scene as it stands; later changes of the fixture do not touch it.
   std::shared_ptr<const scene::SceneSnapshot> snapshot() const {
@@ -93,6 +96,9 @@ class SceneFixture {
     s->workspace = workspace;
     s->faces = faces;
     s->effects = effects;
+    s->planes = planes;
+    s->fields = fields;
+    s->buzz = buzz;
     for (const auto& object : objects_) s->objects.push_back(std::make_shared<scene::ObjectState>(*object));
     s->objectIndex = std::make_shared<scene::SpatialIndex>(
         scene::SpatialIndex::build(static_cast<std::uint32_t>(objects_.size()),

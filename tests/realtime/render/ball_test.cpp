@@ -1,0 +1,77 @@
+// A tool with a radius: it stays that far off faces, edges and corners, and feels them rounded.
+#include "variants.h"
+
+namespace hapticd::realtime::fixture {
+namespace {
+
+constexpr RenderOptions kBall{.toolRadius_m = 0.001};
+
+class BallTest : public VariantTest {};
+INSTANTIATE_TEST_SUITE_P(, BallTest, kVariants, variantName);
+
+TEST_P(BallTest, plane_is_felt_a_radius_early) {
+  add(heightField(
+          0.01, 40, [](double, double) { return 0.0; }, 0.3),
+      surface());
+  start({0.0013, 0.0021, 0.002}, kBall);
+  EXPECT_EQ(to({0.0013, 0.0021, 0.00101}).force_N.norm(), 0);
+  for (int i = 1; i < 40; ++i) {
+    const Rendering& r = to({0.0013 + i * 5e-5, 0.0021, 0.001 - i * 5e-5});
+    EXPECT_NEAR((r.force_N - Vec3(0, 0, i * 0.05)).norm(), 0, 1e-4);
+    EXPECT_NEAR((r.scp_m - offset()).z(), 0, 1e-7);
+    EXPECT_EQ(r.status, 0U);
+  }
+}
+
+TEST_P(BallTest, concave_edge_holds_it_off_both_walls) {
+  TriangleMesh corner = box(Vec3::Zero(), Vec3::Constant(0.05));
+  for (auto& t : corner.triangles) std::swap(t[1], t[2]);
+  add(corner, surface());
+  start({0.004, 0.02, 0.004}, kBall);
+  EXPECT_NEAR((at({0, 0.02, -0.001}).force_N - Vec3(1, 0, 2)).norm(), 0, 1e-4);
+  EXPECT_NEAR((proxy() - Vec3(0.001, 0.02, 0.001)).norm(), 0, 1e-6);
+}
+
+// A corner seen from outside is a small sphere.
+TEST_P(BallTest, convex_corner_is_rounded) {
+  add(box(Vec3::Constant(-0.02), Vec3::Zero()), surface());
+  for (const Vec3& from : {Vec3(1, 1, 1), Vec3(1, 2, 3), Vec3(0, 1, 2), Vec3(3, 0.5, 1)}) {
+    const Vec3 out = from.normalized();
+    start(0.003 * out, kBall);
+    const Rendering& r = to(0.0007 * out);
+    EXPECT_NEAR((r.force_N - 0.3 * out).norm(), 0, 2e-3) << from.transpose();
+    EXPECT_NEAR(proxy().norm(), 0.001, 1e-6);
+  }
+}
+
+// T6 with a ball: sliding over a sharp edge turns the force step by step.
+TEST_P(BallTest, convex_edge_has_no_jump) {
+  add(box(Vec3(-0.02, -0.02, -0.02), Vec3(0, 0.02, 0)), surface());
+  start({-0.005, 0.0003, 0.003}, kBall);
+  to({-0.005, 0.0003, 0.0006});
+  Vec3 last = hand->now().force_N;
+  to({0.003, 0.0003, 0.0006}, 0.02, [&](const Rendering& r) {
+    EXPECT_LE((r.force_N - last).norm(), 0.06);
+    last = r.force_N;
+  });
+  EXPECT_EQ(last.norm(), 0);
+}
+
+// T7 with a ball: a thin plate of fine cells at 5 m/s, on vertices and edges
+TEST_P(BallTest, thin_plate_stops_it) {
+  scene.faces = scene::TouchableFaces::both;
+  const TriangleMesh plate = heightField(
+      0.01, 40, [](double, double) { return 0.0; }, 0.3);
+  add(plate, surface());
+  std::mt19937 random(5);
+  for (int i = 0; i < 60; ++i) {
+    const Vec3 v = 0.7 * plate.vertices[random() % plate.vertices.size()].cast<double>();
+    const Vec3 aim = i % 2 == 0 ? v : Vec3(plate.vertices[20 * 41 + 10 + random() % 20].cast<double>());
+    start(aim + Vec3(0.0005, -0.0003, 0.004), kBall);
+    to(aim + Vec3(-0.0005, 0.0003, -0.002), 5);
+    EXPECT_NEAR(hand->now().force_N.z(), 3, 1e-3);
+  }
+}
+
+}  // namespace
+}  // namespace hapticd::realtime::fixture

@@ -1,0 +1,227 @@
+// The forces that belong to no object: effects, planes, force fields, the buzz.
+#include <limits>
+
+#include "variants.h"
+
+namespace hapticd::realtime::fixture {
+namespace {
+
+using scene::EffectType;
+
+class FreeForcesTest : public VariantTest {
+ protected:
+  double units() const { return GetParam().worldUnitsPerMetre; }
+  scene::Effect effect(EffectType type) const {
+    scene::Effect e;
+    e.type = type;
+    e.gain = 500;
+    e.magnitude_N = 1.5;
+    e.angularFrequency_rad_per_s = 200;
+    e.position = units() * offset();
+    e.start = 1;
+    return e;
+  }
+  void run(const scene::Effect& e) { scene.effects = {e}; }
+  scene::Plane floor(double z_m) const {
+    scene::Plane p;
+    p.normal = Vec3::UnitZ();
+    p.offset = -units() * (z_m + offset().z());
+    p.surface = surface();
+    p.placement = 1;
+    return p;
+  }
+};
+INSTANTIATE_TEST_SUITE_P(, FreeForcesTest, kVariants, variantName);
+
+TEST_P(FreeForcesTest, constant_has_its_magnitude_in_any_unit) {
+  scene::Effect e = effect(EffectType::constant);
+  e.direction = Vec3(0, 3, 4);
+  run(e);
+  start({0, 0, 0});
+  EXPECT_NEAR((hand->now().force_N - Vec3(0, 0.9, 1.2)).norm(), 0, 1e-12);
+  e.direction = Vec3::Zero();
+  run(e);
+  start({0, 0, 0});
+  EXPECT_EQ(hand->now().force_N.norm(), 0);
+}
+
+TEST_P(FreeForcesTest, spring_pulls_to_its_anchor_up_to_its_magnitude) {
+  run(effect(EffectType::spring));
+  start({0.001, 0, 0});
+  EXPECT_NEAR((hand->now().force_N - Vec3(-0.5, 0, 0)).norm(), 0, 1e-9);
+  EXPECT_NEAR((at({0, 0.01, 0}).force_N - Vec3(0, -1.5, 0)).norm(), 0, 1e-9);
+}
+
+TEST_P(FreeForcesTest, viscous_opposes_the_velocity) {
+  scene::Effect e = effect(EffectType::viscous);
+  e.gain = 5;
+  run(e);
+  start({0, 0, 0});
+  EXPECT_NEAR((at({0.0001, 0, 0}).force_N - Vec3(-0.5, 0, 0)).norm(), 0, 1e-6);
+  EXPECT_NEAR(at({0.0101, 0, 0}).force_N.norm(), 1.5, 1e-6);
+}
+
+TEST_P(FreeForcesTest, friction_drags_its_anchor_along) {
+  run(effect(EffectType::friction));
+  start({0, 0, 0});
+  EXPECT_NEAR(to({0.002, 0, 0}).force_N.x(), -1.0, 1e-6);
+  EXPECT_NEAR(to({0.010, 0, 0}).force_N.x(), -1.5, 1e-6);
+  EXPECT_NEAR(to({0.007, 0, 0}).force_N.x(), 0, 1e-6);  // the anchor is 3 mm behind the turn
+  EXPECT_NEAR(to({0.005, 0, 0}).force_N.x(), 1.0, 1e-6);
+}
+
+TEST_P(FreeForcesTest, motor_vibration_turns_with_the_stylus) {
+  scene::Effect e = effect(EffectType::motorVibration);
+  run(e);
+  start({0, 0, 0});
+  EXPECT_NEAR((hand->now().force_N - Vec3(1.5, 0, 0)).norm(), 0, 1e-12);
+  for (int i = 1; i < 50; ++i) {
+    const double phase = 200 * 1e-3 * i;
+    EXPECT_NEAR((at({0, 0, 0}).force_N - 1.5 * Vec3(std::cos(phase), std::sin(phase), 0)).norm(), 0, 1e-9);
+  }
+  e.start = 2;
+  for (const bool inDeviceFrame : {false, true}) {
+    e.inDeviceFrame = inDeviceFrame;
+    run(e);
+    Hand turned(scene.snapshot());
+    turned.orientation = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitY());
+    const Vec3 expected = inDeviceFrame ? Vec3(1.5, 0, 0) : Vec3(0, 0, -1.5);
+    EXPECT_NEAR((turned.at(Vec3::Zero()).force_N - expected).norm(), 0, 1e-9);
+  }
+}
+
+TEST_P(FreeForcesTest, contact_vibration_only_while_touching) {
+  run(effect(EffectType::contactVibration));
+  add(plane(0.05, 10), surface());
+  start({0.0013, 0.0021, 0.001});
+  EXPECT_EQ(to({0.0013, 0.0021, 0.0005}).force_N.norm(), 0);
+  const double phase = 200 * geometry::toSeconds(hand->time());
+  EXPECT_NEAR(at({0.0013, 0.0021, -0.001}).force_N.z(), 1 + 1.5 * std::sin(phase), 1e-4);
+}
+
+TEST_P(FreeForcesTest, effects_end_and_ramp_out) {
+  scene::Effect e = effect(EffectType::constant);
+  e.direction = Vec3::UnitX();
+  e.duration = 10 * kTick;
+  run(e);
+  start({0, 0, 0});
+  for (int i = 1; i < 20; ++i) EXPECT_NEAR(at({0, 0, 0}).force_N.x(), i < 10 ? 1.5 : 0, 1e-12);
+  e.start = 2;
+  e.duration = 0;
+  run(e);
+  start({0, 0, 0});
+  scene.effects[0].releasing = true;
+  hand->show(scene.snapshot());
+  for (int i = 0; i < 300; ++i)
+    EXPECT_NEAR(at({0, 0, 0}).force_N.x(), 1.5 * std::max(0.0, 1 - i / 250.0), 1e-9);
+}
+
+// A plane of the scene and a wall of triangles make a corner like two walls do.
+TEST_P(FreeForcesTest, plane_and_mesh_make_a_corner) {
+  scene.planes = {floor(0)};
+  TriangleMesh wall;
+  wall.vertices = {{0, -0.05F, -0.05F}, {0, 0.05F, -0.05F}, {0, 0.05F, 0.05F}, {0, -0.05F, 0.05F}};
+  wall.triangles = {{0, 1, 2}, {0, 2, 3}};
+  add(wall, surface());
+  start({0.003, 0.0107, 0.003});
+  const Rendering& r = at({-0.001, 0.0107, -0.002});
+  EXPECT_NEAR((r.force_N - Vec3(1, 0, 2)).norm(), 0, 1e-5);
+  EXPECT_EQ(r.touchedObject, -1);
+  EXPECT_EQ(r.status, 0U);
+}
+
+TEST_P(FreeForcesTest, plane_has_friction_and_lateral_adhesion) {
+  scene::Plane p = floor(0);
+  p.surface = surface(1000, 0.5, 0.5);
+  p.adhesionLateral_N = 0.4;
+  scene.planes = {p};
+  start({0, 0, 0.001});
+  to({0, 0, -0.001});
+  EXPECT_NEAR(to({0.0005, 0, -0.001}).force_N.x(), -0.5, 1e-4);
+  EXPECT_NEAR(to({0.01, 0, -0.001}).force_N.x(), -0.9, 1e-3);
+}
+
+// recovery  a plane placed with the hand 2 mm inside comes in under it within 100 ms
+TEST_P(FreeForcesTest, new_plane_comes_in_under_the_hand) {
+  start({0, 0, -0.002});
+  scene::Plane p = floor(0);
+  p.recovery = toNanos(0.1);
+  scene.planes = {p};
+  hand->show(scene.snapshot());
+  for (int i = 0; i < 150; ++i) {
+    EXPECT_NEAR(at({0, 0, -0.002}).force_N.z(), 2.0 * std::min(1.0, i / 100.0), 1e-4);
+    EXPECT_EQ(hand->now().status, 0U);
+  }
+  scene.planes[0].placement = 2;
+  scene.planes[0].recovery = 0;
+  scene.planes[0].offset -= units() * 0.001;
+  hand->show(scene.snapshot());
+  EXPECT_NEAR(at({0, 0, -0.002}).force_N.z(), 3.0, 1e-4);
+  EXPECT_NE(hand->now().status & kRenderGeometryJump, 0U);
+  EXPECT_EQ(at({0, 0, -0.002}).status, 0U);
+}
+
+TEST_P(FreeForcesTest, plane_holds_on_up_to_its_adhesion) {
+  scene::Plane p = floor(0);
+  p.adhesionNormal_N = 0.5;
+  scene.planes = {p};
+  start({0, 0, 0.0003});
+  EXPECT_EQ(hand->now().force_N.norm(), 0);
+  EXPECT_NEAR(to({0, 0, -0.001}).force_N.z(), 1, 1e-4);
+  EXPECT_NEAR(to({0, 0, 0.0004}).force_N.z(), -0.4, 1e-4);
+  EXPECT_EQ(to({0, 0, 0.0006}).force_N.norm(), 0);
+  EXPECT_EQ(to({0, 0, 0.0003}).force_N.norm(), 0);
+}
+
+TEST_P(FreeForcesTest, texture_and_buzz_move_the_plane) {
+  scene::Plane p = floor(0);
+  p.textureAmplitude = units() * 0.0002;
+  p.textureWavelength = units() * 0.002;
+  scene.planes = {p};
+  start({0, 0, 0.001});
+  EXPECT_NEAR(to({0, 0, -0.001}, 0.01).force_N.z(), 1.2, 1e-3);
+  EXPECT_NEAR(to({0.001, 0, -0.001}, 0.01).force_N.z(), 0.8, 1e-3);
+  EXPECT_NEAR(to({0.002, 0, -0.001}, 0.01).force_N.z(), 1.2, 1e-2);
+  p.textureWavelength = 0;
+  p.buzzAmplitude = units() * 0.0001;
+  p.buzzAngularFrequency_rad_per_s = 300;
+  scene.planes = {p};
+  start({0, 0, 0.001});
+  for (int i = 1; i < 40; ++i) {
+    EXPECT_NEAR(at({0, 0, -0.001}).force_N.z(), 1 + 0.1 * std::sin(0.3 * i), 1e-4);
+  }
+}
+
+TEST_P(FreeForcesTest, field_varies_from_its_origin_within_its_radius) {
+  scene::ForceField field;
+  field.origin = units() * offset();
+  field.force_N = Vec3(0, 0, 0.2);
+  field.jacobian_N_per_unit = Vec3(-100, -200, 0).asDiagonal();
+  field.jacobian_N_per_unit /= units();
+  field.radius = units() * 0.01;
+  scene.fields = {field};
+  start({0.002, 0.001, 0});
+  EXPECT_NEAR((hand->now().force_N - Vec3(-0.2, -0.2, 0.2)).norm(), 0, 1e-9);
+  EXPECT_EQ(at({0.0101, 0, 0}).force_N.norm(), 0);
+  scene.fields[0].releasing = true;
+  hand->show(scene.snapshot());
+  for (int i = 0; i < 300; ++i) {
+    EXPECT_NEAR(at({0, 0, 0}).force_N.z(), 0.2 * std::max(0.0, 1 - i / 250.0), 1e-9);
+  }
+}
+
+TEST_P(FreeForcesTest, buzz_runs_for_its_duration) {
+  scene::Buzz buzz;
+  buzz.force_N = Vec3(0, 1, 0);
+  buzz.angularFrequency_rad_per_s = 500;
+  buzz.duration = 20 * kTick;
+  buzz.start = 3;
+  scene.buzz = buzz;
+  start({0, 0, 0});
+  for (int i = 1; i < 40; ++i) {
+    EXPECT_NEAR(at({0, 0, 0}).force_N.y(), i < 20 ? std::sin(0.5 * i) : 0.0, 1e-9);
+  }
+}
+
+}  // namespace
+}  // namespace hapticd::realtime::fixture
