@@ -66,10 +66,10 @@ class Groups {
     std::vector<std::uint64_t> values(begin_.back());
     std::vector<std::uint32_t> fill(begin_.begin(), begin_.end() - 1);
     forEach([&](std::uint32_t key, std::uint64_t value) { values[fill[key]++] = value; });
-    for (std::size_t key = 0; key + 1 < begin_.size(); ++key) {
+    for (std::uint32_t key = 0; key + 1 < begin_.size(); ++key) {
       const std::span<std::uint64_t> group(values.data() + begin_[key], begin_[key + 1] - begin_[key]);
       std::sort(group.begin(), group.end());
-      visit(group);
+      visit(key, group);
     }
   }
 
@@ -99,16 +99,32 @@ std::vector<Triangle> soundTriangles(std::span<const Vec3f> vertices, std::span<
   return sound;
 }
 
-void countDuplicates(const std::vector<Triangle>& sound, std::size_t vertices, MeshReport& report) {
+// Of triangles with the same corners one stays; a triangle is kept at its lowest corner as (next, last,
+// winding).
+std::vector<Triangle> withoutDuplicates(const std::vector<Triangle>& sound, std::size_t vertices,
+                                        MeshReport& report) {
+  std::vector<Triangle> unique;
+  unique.reserve(sound.size());
   Groups(vertices).run(
       [&](const auto& add) {
         for (const Triangle& t : sound) {
-          add(t[0], std::uint64_t{std::min(t[1], t[2])} << 32U | std::max(t[1], t[2]));
+          const auto [next, last] = std::minmax(t[1], t[2]);
+          add(t[0], std::uint64_t{next} << 32U | last << 1U | (t[1] < t[2] ? 1U : 0U));
         }
       },
-      [&](std::span<const std::uint64_t> group) {
-        for (std::size_t i = 1; i < group.size(); ++i) report.duplicate += group[i] == group[i - 1] ? 1 : 0;
+      [&](std::uint32_t lowest, std::span<const std::uint64_t> group) {
+        for (std::size_t i = 0; i < group.size(); ++i) {
+          if (i > 0 && group[i] >> 1U == group[i - 1] >> 1U) {
+            ++report.duplicate;
+            continue;
+          }
+          const auto next = static_cast<std::uint32_t>(group[i] >> 32U);
+          const auto last = static_cast<std::uint32_t>(group[i]) >> 1U;
+          unique.push_back((group[i] & 1U) != 0 ? Triangle{lowest, next, last}
+                                                : Triangle{lowest, last, next});
+        }
       });
+  return unique;
 }
 
 // An edge is kept at its lower end as (higher end, direction).
@@ -123,7 +139,7 @@ void countEdges(const std::vector<Triangle>& sound, std::size_t vertices, MeshRe
           }
         }
       },
-      [&](std::span<const std::uint64_t> group) {
+      [&](std::uint32_t, std::span<const std::uint64_t> group) {
         for (std::size_t first = 0; first < group.size();) {
           std::size_t last = first + 1;
           while (last < group.size() && group[last] >> 1U == group[first] >> 1U) ++last;
@@ -163,8 +179,8 @@ MeshReport checkMesh(std::span<const Vec3f> vertices, std::span<const Triangle> 
     for (std::uint32_t i = 0; i < welded.size(); ++i)
       report.unwelded += welded[i] != kNone && welded[i] != i ? 1 : 0;
   }
-  const std::vector<Triangle> sound = soundTriangles(vertices, triangles, welded, report);
-  countDuplicates(sound, vertices.size(), report);
+  std::vector<Triangle> sound = soundTriangles(vertices, triangles, welded, report);
+  sound = withoutDuplicates(sound, vertices.size(), report);
   countEdges(sound, vertices.size(), report);
   report.insideOut = report.closed() && report.flippedEdges == 0 && signedVolume(vertices, sound) < 0;
   return report;

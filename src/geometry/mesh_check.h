@@ -26,7 +26,8 @@ struct MeshReport {
   bool clean() const;
 };
 
-/// Looks at every triangle once, in time linear in their number; a second is enough for a few million.
+/// Looks at every triangle, in time linear in their number; a second is enough for a few million. Below 2^31
+/// vertices.
 MeshReport checkMesh(std::span<const Vec3f> vertices, std::span<const Triangle> triangles);
 
 /// One plain sentence for each finding, with what it means for touching; none for a clean mesh.

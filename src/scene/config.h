@@ -45,6 +45,8 @@ struct SceneConfig {
 
   /// No passivity clamp and no limits on surfaces: for measuring.
   bool raw = false;
+  /// Tells clients what is wrong with a mesh once it has been complete for a while.
+  bool checkMeshes = true;
   SceneLimits limits;
 
   /// Measures how long building takes, so that it takes at most a quarter of the thread; empty: steady clock.

@@ -49,6 +49,8 @@ class MeshDraft {
   /// Numbered triangles; triples when there are none.
   std::size_t triangleCount() const { return indexed_ ? triangles_.read().size() : vertexCount() / 3; }
   bool indexed() const { return indexed_; }
+  /// As numbered by the client: removed ones and missing corners have vertex numbers that do not exist.
+  const std::vector<Triangle>& triangles() const { return triangles_.read(); }
 
   /// Writes a run; values that are not finite leave their vertex as it was. Returns how many those were.
   std::size_t setVertices(std::uint32_t first, std::vector<Vec3f>&& run, Nanos now);

@@ -1,10 +1,14 @@
 // From edited objects to the list and the index that a snapshot shows.
 #include <algorithm>
 
+#include "geometry/mesh_check.h"
 #include "scene/object_table.h"
 
 namespace hapticd::scene {
 namespace {
+
+constexpr Nanos kCheckAfter = 250'000'000;
+constexpr Nanos kCheckSlice = 2'000'000;
 
 bool contains(const Box& outer, const Box& inner) {
   return (outer.min.array() <= inner.min.array()).all() && (inner.max.array() <= outer.max.array()).all();
@@ -44,6 +48,10 @@ std::optional<Nanos> ObjectTable::nextDeadline() const {
     if (object->mesh.hasBeenPublished() && !object->mesh.finished()) due = std::max(*due, rebuildNotBefore_);
     next = std::min(next.value_or(*due), *due);
   }
+  if (!checks_.empty()) {
+    const Nanos at = std::max(checks_.front().at, rebuildNotBefore_);
+    next = std::min(next.value_or(at), at);
+  }
   return next;
 }
 
@@ -62,13 +70,40 @@ void ObjectTable::commitMeshes(Nanos now) {
     const bool rebuild = object->mesh.hasBeenPublished() && !object->mesh.finished();
     if (*due > now || (rebuild && clock() < rebuildNotBefore_)) return false;
     const Nanos begin = clock();
+    const std::uint64_t topology = object->geometry ? object->geometry->topology : 0;
     object->geometry = object->mesh.commit(clock);
+    if (config_.checkMeshes && object->geometry && object->geometry->topology != topology) {
+      checks_.push_back({now + kCheckAfter, id, object->geometry->topology});
+    }
     object->meshQueued = false;
     if (rebuild) rebuildNotBefore_ = clock() + 3 * (clock() - begin);
     object->stateChanged = true;
     queue(*object);
     return true;
   });
+}
+
+// After the shape has been the same for a while, so that half an upload is not called open. Shares the
+// quarter of the time with rebuilding.
+void ObjectTable::checkMeshes(Nanos now, NoticeBoard& board, std::vector<Notice>& out) {
+  const Nanos started = stopwatch_();
+  while (!checks_.empty() && checks_.front().at <= now && rebuildNotBefore_ <= now) {
+    const PendingCheck check = checks_.front();
+    checks_.pop_front();
+    const Object* object = find(check.object);
+    if (object == nullptr || !object->geometry || object->geometry->topology != check.topology) continue;
+    const std::vector<Vec3f>& vertices =
+        object->geometry->target ? *object->geometry->target : *object->geometry->vertices;
+    std::string text;
+    for (const std::string& sentence : geometry::describe(geometry::checkMesh(
+             vertices, object->mesh.indexed() ? object->mesh.triangles() : *object->geometry->triangles))) {
+      text += (text.empty() ? "" : " ") + sentence;
+    }
+    const Call call{object->meshSetBy, now, false, board, out};
+    if (!text.empty()) call.tell("mesh of object", text, " ", object->id);
+    const Nanos taken = stopwatch_() - started;
+    if (taken > kCheckSlice) rebuildNotBefore_ = now + 4 * taken;
+  }
 }
 
 void ObjectTable::updateMotion(Object& object, Nanos now) {
@@ -100,6 +135,7 @@ void ObjectTable::updateSurface(Object& object, Nanos now, NoticeBoard& board, s
 
 bool ObjectTable::publish(Nanos now, NoticeBoard& board, std::vector<Notice>& out) {
   commitMeshes(now);
+  if (!checks_.empty()) checkMeshes(now, board, out);
   return updatePublished(now, board, out);
 }
 

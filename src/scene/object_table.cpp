@@ -43,6 +43,7 @@ void ObjectTable::reset() {
   objects_.clear();
   changed_.clear();
   edited_.clear();
+  checks_.clear();
   T_world_scene_ = Affine::Identity();
   vertices_ = 0;
   triangles_ = 0;
@@ -184,6 +185,7 @@ bool ObjectTable::hasRoom(const Object& object, std::int32_t first, std::size_t 
 
 void ObjectTable::meshEdited(Object& object, const Call& call) {
   if (!object.mesh.due()) return;
+  object.meshSetBy = call.client;
   if (call.inBatch) object.mesh.finish();
   if (object.meshQueued) return;
   object.meshQueued = true;

@@ -1,6 +1,7 @@
 // The objects of a scene while clients edit them: a tree of placements with meshes and surfaces.
 #pragma once
 
+#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -49,6 +50,7 @@ struct Object {
   PoseStream poses;
 
   MeshDraft mesh;
+  ClientId meshSetBy = 0;
   SurfaceSettings settings;
   ClientId surfaceSetBy = 0;
 
@@ -138,6 +140,7 @@ class ObjectTable {
   /// World from the object's frame, measured in world units; the chain of parents without a mesh's own part.
   Affine frameOf(const Object& object) const;
   void commitMeshes(Nanos now);
+  void checkMeshes(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   void updateMotion(Object& object, Nanos now);
   void updateSurface(Object& object, Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   bool updatePublished(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
@@ -157,6 +160,12 @@ class ObjectTable {
   std::vector<std::int32_t> changed_;
   std::vector<std::int32_t> edited_;  // meshes with edits
   Nanos rebuildNotBefore_ = 0;
+  struct PendingCheck {
+    Nanos at = 0;
+    std::int32_t object = 0;
+    std::uint64_t topology = 0;
+  };
+  std::deque<PendingCheck> checks_;  // of new shapes, by time
   bool listChanged_ = true;
   bool indexStale_ = true;
 

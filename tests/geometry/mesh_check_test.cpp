@@ -75,8 +75,10 @@ TEST(MeshCheck, DuplicatesInAnyOrderAndWinding) {
   TriangleMesh mesh = tetrahedron();
   mesh.triangles.push_back({2, 1, 0});
   mesh.triangles.push_back({0, 1, 2});
-  EXPECT_EQ(check(mesh).duplicate, 2U);
-  EXPECT_EQ(check(mesh).crowdedEdges, 3U);
+  const MeshReport report = check(mesh);
+  EXPECT_EQ(report.duplicate, 2U);
+  EXPECT_TRUE(report.closed()) << "they are not counted again as edges";
+  EXPECT_EQ(report.flippedEdges, 0U);
 }
 
 TEST(MeshCheck, TrianglesWithoutArea) {

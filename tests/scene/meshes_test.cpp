@@ -206,6 +206,34 @@ TEST_F(Meshes, LimitsHoldForOneObjectAndForAll) {
   EXPECT_TRUE(notices_.empty());
 }
 
+TEST_F(Meshes, AreCheckedOnceTheyAreComplete) {
+  SceneConfig config = simulated({});
+  config.checkMeshes = true;
+  builder_ = SceneBuilder(config);
+  say(SetObjectNumber{2});
+  say(SetVertices{0, 0, soup(1)});
+  run(100 * kMillisecond);
+  say(SetVertices{0, 3, soup(1)});  // the same again, at the other end of its first quarter of a second
+  run(200 * kMillisecond);
+  EXPECT_TRUE(notices_.empty());
+  run(100 * kMillisecond);
+  EXPECT_EQ(
+      onlyNotice(Severity::normal),
+      "mesh of object 0: 1 triangle repeats an earlier one: felt once. 3 edges have a triangle on one side "
+      "only: the hand can go around or through there.");
+  EXPECT_EQ(builder_.nextDeadline(), now_ + 970 * kMillisecond) << "nothing but the notice board's window";
+  run(2'000 * kMillisecond);
+  EXPECT_EQ(builder_.nextDeadline(), std::nullopt);
+  say(SetVertices{0, 0, soup(2, 1)});
+  run(1'000 * kMillisecond);
+  EXPECT_TRUE(notices_.empty()) << "positions alone are not a new shape";
+  say(SetVertices{1, 0, oneTriangle()}, 99);
+  run(20 * kMillisecond);
+  say(RemoveObject{1});
+  run(1'000 * kMillisecond);
+  EXPECT_TRUE(notices_.empty()) << "gone before it was checked";
+}
+
 class Deforming : public Meshes {
  protected:
   static constexpr Nanos kFrame = 20 * kMillisecond;

@@ -41,6 +41,7 @@ class SceneTest : public ::testing::Test {
 
   static SceneConfig simulated(SceneConfig config) {
     config.stopwatch = [] { return Nanos{0}; };
+    config.checkMeshes = false;
     return config;
   }
 
