@@ -7,7 +7,7 @@ namespace hapticd::device {
 namespace {
 
 TEST(Profiles, AreConsistent) {
-  ASSERT_EQ(profiles().size(), 8U);
+  ASSERT_EQ(profiles().size(), 9U);
   for (const DeviceProfile& profile : profiles()) {
     EXPECT_EQ(findProfile(profile.model), &profile);
     EXPECT_FALSE(profile.workspace_m.empty());

@@ -108,6 +108,7 @@ class FakeEventDevice final : public EventDevice {
     const std::lock_guard lock(joystick_.mutex);
     if (failing()) return -1;
     const std::size_t count = std::min(joystick_.events.size(), size / sizeof(input_event));
+    if (count == 0) return 0;
     std::memcpy(data, joystick_.events.data(), count * sizeof(input_event));
     joystick_.events.erase(joystick_.events.begin(), joystick_.events.begin() + static_cast<long>(count));
     return static_cast<long>(count * sizeof(input_event));

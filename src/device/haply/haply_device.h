@@ -1,0 +1,81 @@
+// Haply Inverse3 (and Minverse) through the Inverse Service on this machine.
+//
+// The service answers every message with one state, so each write of the servo drives one exchange, in a
+// thread of the driver; the servo only leaves its newest force and takes the newest state.
+#pragma once
+
+#include <atomic>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "device/device.h"
+#include "realtime/handoff/latest_value.h"
+
+namespace hapticd::device {
+
+namespace haply {
+class ServiceConnection;
+}
+
+struct HaplyOptions {
+  std::string host = "localhost";
+  std::string port = "10001";
+  std::string deviceId;  ///< empty: the first Inverse3
+};
+
+/// One tick of delay. A reply that takes more than 20 ms is a fault; the driver connects anew by itself.
+class HaplyDevice final : public Device {
+ public:
+  explicit HaplyDevice(HaplyOptions options = {});
+  ~HaplyDevice() override;
+
+  void open() override;
+  void close() noexcept override;
+  const DeviceProfile& profile() const noexcept override { return profile_; }
+
+  bool read(Nanos now, DeviceState& state) noexcept override;
+  bool write(const Vec3& force_N) noexcept override;
+  std::string faultText() const override;
+
+ private:
+  struct Command {
+    Vec3 force_N = Vec3::Zero();
+    std::uint64_t number = 0;
+  };
+  struct Sample {
+    DeviceState state;
+    bool valid = false;
+  };
+
+  void run() noexcept;
+  void serve(haply::ServiceConnection& service);
+  void take(std::string_view text);
+  Vec3 newestForce() noexcept;
+  void waitForCommand(int most_ms) noexcept;
+  void say(const std::string& words);
+
+  const HaplyOptions options_;
+  DeviceProfile profile_;
+  int wake_ = -1;  // eventfd: a new force, or the end
+  std::thread thread_;
+  std::atomic<bool> stopping_{false};
+  std::atomic<bool> connected_{false};
+  std::atomic<bool> failed_{false};  // at least once since open()
+  mutable std::mutex wordsMutex_;
+  std::string words_;  // why there is no connection
+
+  realtime::LatestValue<Command> command_;
+  realtime::LatestValue<Sample> sample_;
+
+  // The servo's.
+  std::uint64_t commands_ = 0;
+
+  // The thread's.
+  std::string deviceId_;
+  DeviceState state_;
+  std::uint64_t lastCommand_ = 0;
+  Nanos commandTime_ = 0;
+};
+
+}  // namespace hapticd::device
