@@ -168,7 +168,7 @@ TEST_P(RealMeshTest, exploring_hand_neither_tunnels_nor_sticks) {
     lastNormal = r.normal;
     lastHip = hip;
   }
-  EXPECT_GT(touching, kTicks / 2);
+  EXPECT_GT(touching, kTicks / 3);
 }
 
 INSTANTIATE_TEST_SUITE_P(, RealMeshTest,
