@@ -1,42 +1,14 @@
 #include "geometry/mesh_check.h"
 
 #include <algorithm>
-#include <bit>
-#include <cmath>
-#include <cstring>
+
+#include "geometry/weld.h"
 
 namespace hapticd::geometry {
 namespace {
 
-constexpr std::uint32_t kNone = 0xFFFFFFFF;
-
 // A triangle lower than this part of its longest edge is a line, as far as floats can tell.
 constexpr double kFlat = 1e-7;
-
-std::uint64_t hashOf(const Vec3f& v) {
-  std::uint64_t hash = 0;
-  for (const float c : {v.x(), v.y(), v.z()}) {
-    hash = (hash ^ std::bit_cast<std::uint32_t>(c)) * 0x9E3779B97F4A7C15U;
-    hash ^= hash >> 29;
-  }
-  return hash;
-}
-
-// For each vertex the lowest one at the same position; kNone where it is not finite. Open addressing.
-std::vector<std::uint32_t> weld(std::span<const Vec3f> vertices) {
-  std::vector<std::uint32_t> welded(vertices.size(), kNone);
-  std::vector<std::uint32_t> table(std::bit_ceil(2 * vertices.size() + 1), kNone);
-  const std::size_t mask = table.size() - 1;
-  for (std::uint32_t i = 0; i < vertices.size(); ++i) {
-    if (!vertices[i].allFinite()) continue;
-    const Vec3f position = vertices[i] + Vec3f::Zero();  // -0 becomes 0
-    std::size_t slot = hashOf(position) & mask;
-    while (table[slot] != kNone && vertices[table[slot]] != position) slot = (slot + 1) & mask;
-    if (table[slot] == kNone) table[slot] = i;
-    welded[i] = table[slot];
-  }
-  return welded;
-}
 
 bool areTriples(std::span<const Vec3f> vertices, std::span<const Triangle> triangles) {
   if (vertices.size() / 3 != triangles.size()) return false;
@@ -83,9 +55,9 @@ std::vector<Triangle> soundTriangles(std::span<const Vec3f> vertices, std::span<
   std::vector<Triangle> sound;
   sound.reserve(triangles.size());
   for (const Triangle& t : triangles) {
-    const auto corner = [&](int i) { return t[i] < welded.size() ? welded[t[i]] : kNone; };
+    const auto corner = [&](int i) { return t[i] < welded.size() ? welded[t[i]] : kNoVertex; };
     Triangle w{corner(0), corner(1), corner(2)};
-    if (std::count(w.begin(), w.end(), kNone) != 0) {
+    if (std::count(w.begin(), w.end(), kNoVertex) != 0) {
       ++report.incomplete;
       continue;
     }
@@ -174,10 +146,10 @@ bool MeshReport::clean() const {
 MeshReport checkMesh(std::span<const Vec3f> vertices, std::span<const Triangle> triangles) {
   MeshReport report;
   report.triangles = triangles.size();
-  const std::vector<std::uint32_t> welded = weld(vertices);
+  const std::vector<std::uint32_t> welded = firstAtSamePosition(vertices);
   if (!areTriples(vertices, triangles)) {
     for (std::uint32_t i = 0; i < welded.size(); ++i)
-      report.unwelded += welded[i] != kNone && welded[i] != i ? 1 : 0;
+      report.unwelded += welded[i] != kNoVertex && welded[i] != i ? 1 : 0;
   }
   std::vector<Triangle> sound = soundTriangles(vertices, triangles, welded, report);
   sound = withoutDuplicates(sound, vertices.size(), report);

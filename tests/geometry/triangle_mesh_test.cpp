@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "geometry/weld.h"
+
 namespace hapticd::geometry {
 namespace {
 
@@ -33,6 +35,26 @@ TEST(TriangleMesh, ScaleAndMove) {
   mesh.vertices = {Vec3f(1, 2, 3)};
   scaleAndMove(mesh, 2, Vec3(10, 0, -1));
   EXPECT_EQ(mesh.vertices[0], Vec3f(12, 4, 5));
+}
+
+TEST(Weld, SharesVerticesAndDropsUnusedOnes) {
+  TriangleMesh mesh;
+  mesh.vertices = {Vec3f(9, 9, 9), Vec3f(0, 0, 0), Vec3f(1, 0, 0),    Vec3f(0, 1, 0),
+                   Vec3f(1, 0, 0), Vec3f(1, 1, 0), Vec3f(-0.0F, 1, 0)};
+  mesh.triangles = {{1, 2, 3}, {4, 5, 6}};
+  weld(mesh);
+  EXPECT_EQ(mesh.vertices,
+            (std::vector<Vec3f>{Vec3f(0, 0, 0), Vec3f(1, 0, 0), Vec3f(0, 1, 0), Vec3f(1, 1, 0)}));
+  EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {1, 3, 2}}));
+}
+
+TEST(Weld, LeavesVerticesThatAreNoNumbersAlone) {
+  TriangleMesh mesh;
+  mesh.vertices = {Vec3f(0, 0, 0), Vec3f(NAN, 0, 0), Vec3f(NAN, 0, 0)};
+  mesh.triangles = {{0, 1, 2}};
+  weld(mesh);
+  EXPECT_EQ(mesh.vertices.size(), 3U);
+  EXPECT_EQ(mesh.triangles[0], (Triangle{0, 1, 2}));
 }
 
 TEST(Time, ConversionRoundsToTheNearestNanosecond) {
