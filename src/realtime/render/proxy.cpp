@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "realtime/render/force_shading.h"
 #include "realtime/render/renderer.h"
 
 namespace hapticd::realtime {
@@ -50,10 +51,11 @@ const Grip& Proxy::follow(const Moment& now, const Vec3& hip, double period_s,
   chase(hip);
   popThrough(hip, status);
   releaseWhenDeep(wasFree, status);
+  if (forceShading_) shade();
   unsigned touched = 0;
   for (int i = 0; i < grip_.count; ++i) {
-    const int plane = grip_.touches[static_cast<std::size_t>(i)].scenePlane;
-    if (plane >= 0) touched |= 1U << plane;
+    const int source = grip_.touches[static_cast<std::size_t>(i)].source;
+    if (source < 0) touched |= 1U << (-1 - source);
   }
   planes_.remember(touched, position_);
   if (casts_ >= kMaxCasts) status |= kRenderIterationLimit;
@@ -211,12 +213,13 @@ void Proxy::describe(const Vec3& hip, const Vec3& goal, const ActiveSet& active)
   for (int i = 0; i < count; ++i) {
     const Hit& hit = active.hits[static_cast<std::size_t>(i)];
     Touch& touch = grip_.touches[static_cast<std::size_t>(grip_.count++)];
+    touch.source = hit.object;
     touch.triangle = hit.triangle;
     touch.plane = hit.plane;
+    touch.push = hit.plane.normal;
     touch.depth_m = depths[static_cast<std::size_t>(i)];
     if (hit.object < 0) {
       const HalfSpace& plane = planes_[-1 - hit.object];
-      touch.scenePlane = -1 - hit.object;
       touch.surface = plane.surface;
       touch.adhesion_N = plane.state->adhesionLateral_N;
     } else {
@@ -263,6 +266,16 @@ void Proxy::popThrough(const Vec3& hip, std::uint32_t& status) noexcept {
   status |= kRenderPopthrough;
   chase(hip);
   armed_ = grip_.count == 0;
+}
+
+void Proxy::shade() noexcept {
+  for (int i = 0; i < grip_.count; ++i) {
+    Touch& touch = grip_.touches[static_cast<std::size_t>(i)];
+    if (touch.source < 0) continue;
+    const Vec3 at = position_ - nearby_.toolRadius() * touch.plane.normal;
+    touch.push =
+        shadedNormal(nearby_.object(touch.source), touch.triangle, now_.time, touch.plane.normal, at);
+  }
 }
 
 // A first contact this deep did not come from a hand's motion.

@@ -17,10 +17,11 @@ inline constexpr double kGatherMargin_m = 10e-6;  ///< the tremor of a hand
 /// One face that holds the proxy against the hand.
 struct Touch {
   std::int32_t object = -1;  ///< its id; -1 when it is a plane of the scene
-  int scenePlane = -1;       ///< position of that plane
+  int source = 0;            ///< position among the near objects; -1 - position among the planes of the scene
   std::uint32_t triangle = 0;
   scene::Surface surface;
-  double adhesion_N = 0;  ///< tangential force it bears besides friction
+  Vec3 push = Vec3::Zero();  ///< unit direction of its force; the plane's normal unless shaded
+  double adhesion_N = 0;     ///< tangential force it bears besides friction
   Plane plane;
   double depth_m = 0;                           ///< of the HIP below the surface, along the normal
   Vec3 surfaceVelocity_m_per_s = Vec3::Zero();  ///< at the proxy
@@ -37,7 +38,8 @@ struct Grip {
 /// Carries the proxy from tick to tick. Fixed storage; noexcept, allocation-free.
 class Proxy {
  public:
-  explicit Proxy(double toolRadius_m) noexcept : nearby_(toolRadius_m) {}
+  Proxy(double toolRadius_m, bool forceShading) noexcept
+      : nearby_(toolRadius_m), forceShading_(forceShading) {}
 
   void reset() noexcept;
 
@@ -74,9 +76,11 @@ class Proxy {
   static Cone coneOf(const Grip& grip) noexcept;
   void describe(const Vec3& hip, const Vec3& goal, const ActiveSet& active) noexcept;
   void popThrough(const Vec3& hip, std::uint32_t& status) noexcept;
+  void shade() noexcept;
   void releaseWhenDeep(bool wasFree, std::uint32_t& status) noexcept;
 
   Nearby nearby_;
+  bool forceShading_;
   HalfSpaces planes_;
   Moment now_;
   Moment before_;

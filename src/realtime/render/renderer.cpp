@@ -8,7 +8,7 @@
 namespace hapticd::realtime {
 
 struct Renderer::State {
-  explicit State(const RenderOptions& o) : options(o), proxy(o.toolRadius_m) {}
+  explicit State(const RenderOptions& o) : options(o), proxy(o.toolRadius_m, o.forceShading) {}
 
   RenderOptions options;
   Proxy proxy;

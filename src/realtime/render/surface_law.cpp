@@ -32,7 +32,7 @@ void applySurfaceLaw(const Grip& grip, const Vec3& proxy_m, const Vec3& hipVeloc
     contact.triangle = touch.triangle;
     contact.normal = touch.plane.normal;
     contact.point_m = proxy_m - toolRadius_m * touch.plane.normal;
-    contact.force_N = force * touch.plane.normal;
+    contact.force_N = force * touch.push;
     out.normalForce_N += contact.force_N;
     const double springForce = surface.stiffness_N_per_m * touch.depth_m;
     depth += touch.depth_m * touch.plane.normal;

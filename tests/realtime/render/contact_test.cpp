@@ -138,6 +138,33 @@ TEST_P(ContactTest, convex_edge_gives_one_bounded_jump) {
   }
 }
 
+// T6 with force shading: the same depth on a coarse sphere, and the direction turns without steps.
+TEST_P(ContactTest, force_shading_turns_the_force_and_keeps_its_size) {
+  constexpr double kRadius = 0.05;
+  add(sphere(kRadius, 6), surface());
+  const auto onSphere = [](double a) -> Vec3 {
+    return (kRadius - 0.004) * Vec3(std::cos(0.3) * std::cos(a), std::cos(0.3) * std::sin(a), std::sin(0.3));
+  };
+  double steps[2] = {0, 0};
+  for (const bool shading : {false, true}) {
+    RenderOptions options;
+    options.forceShading = shading;
+    start(1.1 * onSphere(0), options);
+    to(onSphere(0));
+    Vec3 last = hand->now().force_N;
+    for (int i = 1; i < 1500; ++i) {
+      const Rendering& r = at(onSphere(1e-3 * i));
+      EXPECT_NEAR(r.force_N.norm(), 1000 * r.depth_m, 1e-3 + 0.02 * (r.contactCount - 1) * r.force_N.norm());
+      EXPECT_GT(r.force_N.normalized().dot(r.normal), std::cos(0.3));  // the dihedral is up to 0.27
+      auto& step = steps[shading ? 1 : 0];
+      step = std::max(step, (r.force_N.normalized() - last.normalized()).norm());
+      last = r.force_N;
+    }
+  }
+  EXPECT_GT(steps[0], 0.1);
+  EXPECT_LT(steps[1], 0.5 * steps[0]);
+}
+
 // T8  50 mm deep: F = 50 N before the guard
 TEST_P(ContactTest, deep_press_is_not_released) {
   add(plane(0.1, 4), surface());
