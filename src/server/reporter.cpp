@@ -100,6 +100,14 @@ void Reporter::errors(const realtime::TickReport& tick, std::vector<Outgoing>& o
   tripped_ = tripped;
 }
 
+wire::ButtonStates Reporter::buttonStates(std::uint32_t buttons) const {
+  wire::ButtonStates states;
+  for (int i = 0; i < buttonCount_; ++i) {
+    states.states.values.push_back(static_cast<std::int32_t>(buttons >> i & 1U));
+  }
+  return states;
+}
+
 void Reporter::buttons(const realtime::TickReport& tick, std::vector<Outgoing>& out) {
   const std::uint32_t changed = tick.device.buttons ^ buttons_;
   for (std::int32_t i = 0; changed >> i != 0 && i < 32; ++i) {
@@ -191,10 +199,7 @@ void Reporter::presentState(const realtime::TickReport& tick, std::vector<Outgoi
   fresh.depth_ = 1e300;
   fresh.object_ = -2;
   fresh.due_ = 0;
-  wire::ButtonStates states;
-  for (int i = 0; i < buttonCount_; ++i)
-    states.states.values.push_back(static_cast<std::int32_t>(tick.device.buttons >> i & 1U));
-  out.push_back({states, true});
+  out.push_back({buttonStates(tick.device.buttons), true});
   fresh.buttons_ = tick.device.buttons;
   fresh.update(tick, out);
   for (Outgoing& message : out) message.reliable = true;

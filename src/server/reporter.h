@@ -35,6 +35,8 @@ class Reporter {
   /// Appends the present state of everything, for a client that has just come.
   void presentState(const realtime::TickReport& tick, std::vector<Outgoing>& out) const;
 
+  wire::ButtonStates buttonStates(std::uint32_t buttons) const;
+
  private:
   // One tick in the client's units: world / 1000, world frame, newtons.
   struct View;

@@ -81,6 +81,7 @@ void Server::run() {
   subscriptions_.push_back(loop_.every(1s, [this] {
     clock_.refresh();
     closeStaleHandshakes();
+    noise_.newSecond();
   }));
   if (config_.seconds > 0) {
     subscriptions_.push_back(loop_.after(
@@ -108,14 +109,14 @@ void Server::addSession(net::Connection connection, std::unique_ptr<net::UdpSock
 void Server::onUdpRequest(std::span<const std::byte> datagram, const net::Endpoint& from) {
   const auto request = wire::parseUdpRequest(datagram);
   if (!request) {
-    spdlog::warn("datagram from {} is no connection request: {}", from.text(), request.error());
+    noise_.warn("datagram from " + from.text() + " is no connection request: " + request.error());
     return;
   }
   net::Endpoint client;
   try {
     client = net::Endpoint::parse(request->host, request->port);
   } catch (const net::Error& error) {
-    spdlog::warn("connection request from {} refused: {}", from.text(), error.what());
+    noise_.warn("connection request from " + from.text() + " refused: " + error.what());
     return;
   }
   // A forged request must not make this server connect to third parties.
@@ -123,8 +124,8 @@ void Server::onUdpRequest(std::span<const std::byte> datagram, const net::Endpoi
       client.address == from.address || (isLoopback(client.address) && isLoopback(from.address));
   const auto& allowed = config_.callbackHosts;
   if (!itself && std::find(allowed.begin(), allowed.end(), request->host) == allowed.end()) {
-    spdlog::warn("connection request from {} names another host, {}: refused; allow it with callback_hosts",
-                 from.text(), client.text());
+    noise_.warn("connection request from " + from.text() + " names another host, " + client.text() +
+                ": refused; allow it with callback_hosts");
     return;
   }
   callBack(client);

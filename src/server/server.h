@@ -13,6 +13,7 @@
 #include "net/udp_socket.h"
 #include "server/clock.h"
 #include "server/config.h"
+#include "server/noise_log.h"
 #include "server/session.h"
 #include "server/station.h"
 
@@ -55,6 +56,7 @@ class Server final : public SessionOwner {
   ServerConfig config_;
   net::Loop loop_;
   WallClock clock_;
+  NoiseLog noise_;
   wire::LocalNames names_;
   std::vector<std::unique_ptr<Station>> stations_;
   std::map<scene::ClientId, std::unique_ptr<Session>> sessions_;

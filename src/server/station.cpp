@@ -201,11 +201,7 @@ void Station::Impl::answer(Session& session, wire::LocalSender name, const wire:
   constexpr std::int32_t kSensors = 3;
   if (message.kind == wire::kindOf<wire::Ping>) {
     session.send(name, wire::Pong{});
-    wire::ButtonStates states;
-    for (int i = 0; i < device->profile().buttons; ++i) {
-      states.states.values.push_back(static_cast<std::int32_t>(last.device.buttons >> i & 1U));
-    }
-    session.send(name, states);
+    session.send(name, reporter.buttonStates(last.device.buttons));
   } else if (message.kind == wire::kindOf<wire::TrackerRequestToRoom>) {
     session.send(name, wire::TrackerToRoom{});
   } else if (message.kind == wire::kindOf<wire::TrackerRequestUnitToSensor>) {
@@ -253,9 +249,12 @@ int Station::wakeFd() const noexcept {
 bool Station::collectReports(const WallClock& clock) {
   Impl& my = *impl_;
   my.tick.reports().consume([&](const realtime::TickReport& report) {
+    const bool first = my.last.tick == 0;
     my.last = report;
     my.droppedReports = report.dropped;
     my.outgoing.clear();
+    // Who came before the first tick has heard nothing yet.
+    if (first) my.outgoing.push_back({my.reporter.buttonStates(report.device.buttons), true});
     my.reporter.update(report, my.outgoing);
     my.encode(my.outgoing, clock.at(report.time));
   });

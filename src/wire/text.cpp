@@ -4,10 +4,15 @@
 
 namespace hapticd::wire {
 
+namespace {
+// A stranger's bytes in a log must not drown what else it says.
+constexpr std::size_t kLongestQuote = 64;
+}  // namespace
+
 std::string inQuotes(std::string_view text) {
   constexpr std::string_view kHex = "0123456789abcdef";
   std::string out = "\"";
-  for (const char c : text) {
+  for (const char c : text.substr(0, kLongestQuote)) {
     const auto code = static_cast<unsigned char>(c);
     if (code >= 0x20 && code < 0x7f && c != '"' && c != '\\') {
       out += c;
@@ -15,7 +20,10 @@ std::string inQuotes(std::string_view text) {
       out += {'\\', 'x', kHex[code >> 4], kHex[code & 15]};
     }
   }
-  return out + '"';
+  out += '"';
+  if (text.size() > kLongestQuote)
+    out += " and " + std::to_string(text.size() - kLongestQuote) + " bytes more";
+  return out;
 }
 
 bool isHost(std::string_view text) noexcept {
