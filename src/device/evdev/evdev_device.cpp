@@ -48,8 +48,8 @@ std::string nameOf(EventDevice& file) {
 }
 
 void requireForce(EventDevice& file, const std::string& path) {
-  if (!Bits<FF_MAX>(file, EV_FF)[FF_CONSTANT]) throw std::runtime_error(path + ": has no constant force");
-  if (!Bits<ABS_MAX>(file, EV_ABS)[ABS_X]) throw std::runtime_error(path + ": has no x axis");
+  if (!Bits<FF_MAX>(file, EV_FF)[FF_CONSTANT]) throw NoForceFeedback(path + ": has no constant force");
+  if (!Bits<ABS_MAX>(file, EV_ABS)[ABS_X]) throw NoForceFeedback(path + ": has no x axis");
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <thread>
 
@@ -24,6 +25,12 @@ namespace hapticd::device {
 struct EvdevOptions {
   std::string path;               ///< /dev/input/event*; empty: the first one with a constant force
   std::filesystem::path profile;  ///< a file for WheelProfile; empty: cautious guesses
+};
+
+/// An input device that is no haptic one: a keyboard, a mouse, a plain gamepad.
+class NoForceFeedback : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
 };
 
 class EvdevDevice final : public Device {
@@ -44,7 +51,8 @@ class EvdevDevice final : public Device {
   /// One round with the device: events in, force out. For the driver's thread.
   void exchange(Nanos now) noexcept;
 
-  /// A device that open() would take, by name; throws std::runtime_error that says why not.
+  /// The name of a device that open() would take. Throws NoForceFeedback, or std::system_error when it cannot
+  /// be opened.
   static std::string probe(const std::string& path);
 
  private:
