@@ -1,11 +1,18 @@
 #include "realtime/render/renderer.h"
 
+#include <algorithm>
+
 #include "realtime/render/effects.h"
 #include "realtime/render/fields.h"
 #include "realtime/render/proxy.h"
 #include "realtime/render/surface_law.h"
 
 namespace hapticd::realtime {
+namespace {
+
+constexpr double kShortestPeriod_s = 1e-5;  // a repeated time stamp must not make speeds infinite
+
+}  // namespace
 
 struct Renderer::State {
   explicit State(const RenderOptions& o) : options(o), proxy(o.toolRadius_m, o.forceShading) {}
@@ -36,7 +43,8 @@ void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState
     return;
   }
   const double radius = s.options.toolRadius_m;
-  const Grip& grip = s.proxy.follow({&scene, now}, hip, geometry::toSeconds(period), out.status);
+  const Grip& grip = s.proxy.follow({&scene, now}, hip,
+                                    std::max(geometry::toSeconds(period), kShortestPeriod_s), out.status);
   out.proxy_m = out.scp_m = s.proxy.position();
   if ((out.status & kRenderReleased) == 0) {
     applySurfaceLaw(grip, out.proxy_m, hand.velocity_m_per_s, radius, out);

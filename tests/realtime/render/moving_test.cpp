@@ -175,5 +175,81 @@ TEST_P(MovingTest, vanishing_object_ends_its_contact_only) {
   EXPECT_NE(hand->now().status & kRenderGeometryJump, 0U);
 }
 
+// A rough ball tumbles, or bends, among random poses or shapes while the hand pokes at random: a proxy that
+// starts outside stays outside, whoever moves.
+class Tumble : public testing::TestWithParam<std::tuple<bool, double>> {
+ protected:
+  double uniform(double from, double to) { return std::uniform_real_distribution<double>(from, to)(random_); }
+  Vec3 anywhere(double size) { return {uniform(-size, size), uniform(-size, size), uniform(-size, size)}; }
+  std::vector<geometry::Vec3f> roughened(std::vector<geometry::Vec3f> vertices, double by) {
+    for (auto& v : vertices) v *= static_cast<float>(1 + by * uniform(-1, 1));
+    return vertices;
+  }
+  // Star-shaped about the origin: inside is below the face that the ray through p meets.
+  static bool isInside(const scene::MeshGeometry& mesh, const Vec3& p, Nanos now) {
+    for (std::uint32_t t = 0; t < mesh.triangles->size(); ++t) {
+      const scene::Corners k = mesh.corners(t, now);
+      if (k.a.cross(k.b).dot(p) < 0 || k.b.cross(k.c).dot(p) < 0 || k.c.cross(k.a).dot(p) < 0) continue;
+      if ((k.b - k.a).cross(k.c - k.a).dot(p - k.a) < 0) return true;
+    }
+    return false;
+  }
+  std::mt19937 random_{11};
+};
+INSTANTIATE_TEST_SUITE_P(, Tumble, testing::Combine(testing::Bool(), testing::Values(0.0, 0.001)),
+                         [](const auto& test) {
+                           return std::string(std::get<0>(test.param) ? "bending_" : "moving_") +
+                                  (std::get<1>(test.param) > 0 ? "ball" : "point");
+                         });
+
+TEST_P(Tumble, proxy_stays_outside) {
+  const auto [bends, radius] = GetParam();
+  RenderOptions options;
+  options.toolRadius_m = radius;
+  int touching = 0;
+  for (int round = 0; round < 12; ++round) {
+    SceneFixture scene;
+    scene.faces = round % 2 == 0 ? scene::TouchableFaces::front : scene::TouchableFaces::both;
+    TriangleMesh mesh = sphere(0.02, 1 + round);
+    mesh.vertices = roughened(mesh.vertices, 0.02 * round);
+    const std::vector<geometry::Vec3f> first = mesh.vertices;
+    std::vector<geometry::Vec3f> next = first;
+    scene::ObjectState& object =
+        scene.add(geometryOf(mesh, 3), surface(1000, round % 3 * 0.4, round % 3 * 0.3));
+    Hand hand(scene.snapshot(), options);
+    Vec3 hip(0, 0, 0.06);
+    Vec3 goal = hip;
+    hand.at(hip);
+    Nanos end = 0;
+    int left = 0;
+    for (int i = 0; i < 1000; ++i) {
+      const Nanos now = hand.time();
+      if (now >= end) {
+        const Nanos begin = std::exchange(end, now + toNanos(uniform(0.02, 0.1)));
+        if (bends) {
+          mesh.vertices = std::exchange(next, roughened(first, 0.15));
+          object.mesh = geometryOf(mesh, 3, &next, now, end);
+        } else {
+          Affine pose(Eigen::Translation3d(anywhere(0.01)));
+          pose.rotate(Eigen::AngleAxisd(uniform(-1, 1), anywhere(1).normalized())).scale(uniform(0.8, 1.2));
+          object.motion = scene::Motion::between(object.motion.at(begin), pose, now, end);
+        }
+        hand.show(scene.snapshot());
+      }
+      if (left == 0) {
+        goal = anywhere(0.03);
+        left = 1 + static_cast<int>(random_() % 100);
+      }
+      hip += (goal - hip) / left--;
+      const Rendering& r = hand.at(hip);
+      touching += r.touching ? 1 : 0;
+      ASSERT_EQ(r.status & ~kRenderIterationLimit, 0U) << "round " << round << " tick " << i;
+      ASSERT_FALSE(isInside(*object.mesh, object.motion.at(now).inverse() * r.proxy_m, now))
+          << "round " << round << " tick " << i;
+    }
+  }
+  EXPECT_GT(touching, 3000);
+}
+
 }  // namespace
 }  // namespace hapticd::realtime::fixture
