@@ -131,8 +131,8 @@ class SceneBuilder::State {
 
   void apply(SetHapticOrigin&& c, const Call& call) {
     const auto rotation = rotationFrom(c.axis, c.angle_rad);
-    if (!rotation || !c.position_m.allFinite()) {
-      call.refuse("setHapticOrigin", "refused: not finite, or the axis is zero", " position ",
+    if (!rotation || !isUsable(c.position_m)) {
+      call.refuse("setHapticOrigin", "refused: not finite or too large, or the axis is zero", " position ",
                   c.position_m.transpose(), ", axis ", c.axis.transpose(), ", angle ", c.angle_rad);
       return;
     }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "scene/matrices.h"
 #include "scene/surface_settings.h"
 
 namespace hapticd::scene {
@@ -47,13 +48,13 @@ double lowered(double value, double max, std::string_view what, const DefineEffe
   return max;
 }
 
-std::optional<std::string_view> firstNotFinite(const EffectKind& kind, const DefineEffect& c) {
-  if (!std::isfinite(c.magnitude_N)) return "magnitude";
-  if (kind.gain && !std::isfinite(c.gain)) return "gain";
-  if (kind.duration && !std::isfinite(c.duration_ms)) return "duration";
-  if (kind.frequency && !std::isfinite(c.frequency)) return "frequency";
-  if (kind.position && !c.position.allFinite()) return "position";
-  if (kind.direction && !c.direction.allFinite()) return "direction";
+std::optional<std::string_view> firstUnusable(const EffectKind& kind, const DefineEffect& c) {
+  if (!isUsable(c.magnitude_N)) return "magnitude";
+  if (kind.gain && !isUsable(c.gain)) return "gain";
+  if (kind.duration && !isUsable(c.duration_ms)) return "duration";
+  if (kind.frequency && !isUsable(c.frequency)) return "frequency";
+  if (kind.position && !isUsable(c.position)) return "position";
+  if (kind.direction && !isUsable(c.direction)) return "direction";
   return std::nullopt;
 }
 
@@ -99,8 +100,8 @@ void FreeForces::apply(const DefineEffect& c, const Call& call) {
         " ", c.index, ", '", c.type, "'");
     return;
   }
-  if (const auto what = firstNotFinite(*kind, c)) {
-    call.refuse("setEffect", "refused: not finite", " ", c.index, ", ", *what);
+  if (const auto what = firstUnusable(*kind, c)) {
+    call.refuse("setEffect", "refused: not finite or too large", " ", c.index, ", ", *what);
     return;
   }
   const auto known = effects_.find(c.index);
@@ -177,8 +178,9 @@ void FreeForces::apply(const SetPlane& c, const Call& call) {
     changed_ |= planes_.erase(c.index) != 0;
     return;
   }
-  if (!std::isfinite(length) || !std::isfinite(c.plane[3])) {
-    call.refuse(kName, "refused: not finite", " plane ", c.index, ", ", normal.transpose(), " ", c.plane[3]);
+  if (!isUsable(length) || !isUsable(c.plane[3])) {
+    call.refuse(kName, "refused: not finite or too large", " plane ", c.index, ", ", normal.transpose(), " ",
+                c.plane[3]);
     return;
   }
   Plane plane;
@@ -206,8 +208,9 @@ void FreeForces::apply(const SetPlaneDetail& c, const Call& call) {
   const double values[] = {c.adhesionNormal_N,    c.adhesionLateral_N, c.textureAmplitude_m,
                            c.textureWavelength_m, c.buzzAmplitude_m,   c.buzzFrequency_Hz};
   for (const double value : values) {
-    if (std::isfinite(value) && value >= 0) continue;
-    call.refuse(kName, "refused: adhesion, texture or buzz is negative or not finite", " plane 0, ", value);
+    if (isUsable(value) && value >= 0) continue;
+    call.refuse(kName, "refused: adhesion, texture or buzz is negative, not finite or too large",
+                " plane 0, ", value);
     return;
   }
   planeDetail_.adhesionNormal_N = c.adhesionNormal_N;
@@ -231,9 +234,9 @@ void FreeForces::apply(const SetForceField& c, const Call& call) {
       Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(c.jacobian_N_per_m.data()) /
       kWorldUnitsPerStockMetre;
   field.radius = kWorldUnitsPerStockMetre * c.radius_m;
-  if (!field.origin.allFinite() || !field.force_N.allFinite() || !field.jacobian_N_per_unit.allFinite() ||
-      !std::isfinite(field.radius)) {
-    call.refuse(kName, "refused: not finite", " origin ", c.origin_m.transpose(), ", force ",
+  if (!isUsable(field.origin) || !isUsable(field.force_N) || !isUsable(field.radius) ||
+      !(field.jacobian_N_per_unit.array().abs() <= kLargest).all()) {
+    call.refuse(kName, "refused: not finite or too large", " origin ", c.origin_m.transpose(), ", force ",
                 c.force_N.transpose(), ", radius ", c.radius_m);
     return;
   }
@@ -269,8 +272,9 @@ void FreeForces::apply(const SetConstraintMode& c, const Call& call) {
 void FreeForces::apply(const SetConstraintVector& c, const Call& call) {
   const bool direction =
       c.which == ConstraintVector::lineDirection || c.which == ConstraintVector::planeNormal;
-  if (!c.value.allFinite() || (direction && !(c.value.stableNorm() > 0))) {
-    call.refuse("constraint", "refused: not finite, or a direction without length", " ", c.value.transpose());
+  if (!isUsable(c.value) || (direction && !(c.value.stableNorm() > 0))) {
+    call.refuse("constraint", "refused: not finite or too large, or a direction without length", " ",
+                c.value.transpose());
     return;
   }
   Constraint& constraint = constraintFor(call);
@@ -294,8 +298,8 @@ void FreeForces::apply(const SetConstraintVector& c, const Call& call) {
 }
 
 void FreeForces::apply(const SetConstraintStiffness& c, const Call& call) {
-  if (!std::isfinite(c.stiffness_N_per_m) || c.stiffness_N_per_m < 0) {
-    call.refuse("constraint_KSpring", "refused: negative or not finite", " ", c.stiffness_N_per_m);
+  if (!isUsable(c.stiffness_N_per_m) || c.stiffness_N_per_m < 0) {
+    call.refuse("constraint_KSpring", "refused: negative, not finite or too large", " ", c.stiffness_N_per_m);
     return;
   }
   constraintFor(call).stiffness_N_per_m = c.stiffness_N_per_m;
@@ -310,8 +314,9 @@ void FreeForces::apply(const StartCustomEffect& c, const Call& call) {
   }
   std::array<double, 6> p{1, 40, 2, 0, 0, 1};  // N, Hz, s, direction
   std::copy_n(c.parameters.begin(), std::min(p.size(), c.parameters.size()), p.begin());
-  if (!std::all_of(p.begin(), p.end(), [](double v) { return std::isfinite(v); }) || p[1] < 0 || p[2] < 0) {
-    call.refuse(kName, "refused: a parameter is not finite, or frequency or duration is negative", " 0");
+  if (!std::all_of(p.begin(), p.end(), [](double v) { return isUsable(v); }) || p[1] < 0 || p[2] < 0) {
+    call.refuse(
+        kName, "refused: a parameter is not finite or too large, or frequency or duration is negative", " 0");
     return;
   }
   Buzz buzz;

@@ -13,9 +13,9 @@ Mat4 fromRows(const std::array<float, 16>& m) {
 }
 
 bool isInvertible(const Affine& t) {
-  if (!t.matrix().allFinite()) return false;
+  if (!(t.matrix().array().abs() <= kLargest).all()) return false;
   const double size = t.linear().cwiseAbs().maxCoeff();
-  if (!(size > 1e-30 && size < 1e30)) return false;
+  if (!(size >= 1 / kLargest)) return false;
   return std::abs((t.linear() / size).determinant()) > 1e-15;
 }
 
@@ -30,7 +30,7 @@ std::optional<Affine> affineFrom(const Mat4& m) {
 }
 
 std::optional<geometry::Quat> rotationFrom(const Vec3& axis, double angle_rad) {
-  if (!axis.allFinite() || !std::isfinite(angle_rad)) return std::nullopt;
+  if (!isUsable(axis) || !isUsable(angle_rad)) return std::nullopt;
   if (angle_rad == 0) return geometry::Quat::Identity();
   const double length = axis.stableNorm();
   if (!(length > 0)) return std::nullopt;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <optional>
 
 #include "geometry/types.h"
@@ -13,12 +14,23 @@ using geometry::Mat3;
 using geometry::Mat4;
 using geometry::Vec3;
 
+/// Larger numbers are taken for mistakes: their squares would soon not be numbers.
+inline constexpr double kLargest = 1e30;
+
+/// Finite, and not larger than kLargest.
+inline bool isUsable(double value) {
+  return std::abs(value) <= kLargest;
+}
+inline bool isUsable(const Vec3& v) {
+  return (v.array().abs() <= kLargest).all();
+}
+
 /// Column-major, as OpenGL keeps them.
 Mat4 fromColumns(const std::array<double, 16>& m);
 /// Row-major.
 Mat4 fromRows(const std::array<float, 16>& m);
 
-/// Finite, and far enough from singular to be inverted.
+/// Usable numbers, and far enough from singular to be inverted.
 bool isInvertible(const Affine& t);
 
 /// The affine map a 4x4 matrix stands for; nothing when it is projective, singular or not finite.

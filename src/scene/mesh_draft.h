@@ -61,6 +61,9 @@ class MeshDraft {
   /// What has come so far is complete: publish at the next chance.
   void finish() { finished_ = true; }
 
+  /// Edits so far will not be published by themselves; the next one tries again.
+  void giveUp() { dirty_ = false; }
+
   bool finished() const { return finished_; }
   /// When edits should be published; nothing when there are none.
   std::optional<Nanos> due() const;

@@ -56,31 +56,42 @@ std::optional<Nanos> ObjectTable::nextDeadline() const {
 }
 
 // A first upload is never held back; rebuilding what can be touched already takes a quarter of the time.
-void ObjectTable::commitMeshes(Nanos now) {
+void ObjectTable::commitMeshes(Nanos now, NoticeBoard& board, std::vector<Notice>& out) {
   if (edited_.empty()) return;
   const Nanos started = stopwatch_();
   const auto clock = [&] { return now + (stopwatch_() - started); };
-  std::erase_if(edited_, [&](std::int32_t id) {
+  std::vector<std::int32_t> later;
+  for (const std::int32_t id : edited_) {
     Object* object = find(id);
-    const std::optional<Nanos> due = object != nullptr ? object->mesh.due() : std::nullopt;
-    if (!due) {
-      if (object != nullptr) object->meshQueued = false;
-      return true;
-    }
+    if (object == nullptr) continue;
+    const std::optional<Nanos> due = object->mesh.due();
     const bool rebuild = object->mesh.hasBeenPublished() && !object->mesh.finished();
-    if (*due > now || (rebuild && clock() < rebuildNotBefore_)) return false;
-    const Nanos begin = clock();
-    const std::uint64_t topology = object->geometry ? object->geometry->topology : 0;
-    object->geometry = object->mesh.commit(clock);
-    if (config_.checkMeshes && object->geometry && object->geometry->topology != topology) {
-      checks_.push_back({now + kCheckAfter, id, object->geometry->topology});
+    if (due && (*due > now || (rebuild && clock() < rebuildNotBefore_))) {
+      later.push_back(id);
+      continue;
     }
     object->meshQueued = false;
+    if (!due) continue;
+    const Nanos begin = clock();
+    try {
+      commitMesh(*object, now, clock);
+    } catch (const std::exception& error) {
+      object->mesh.giveUp();
+      const Call call{object->meshSetBy, now, false, board, out};
+      call.refuse("mesh", "could not be built, the old one is felt", " of object ", id, ", ", error.what());
+    }
     if (rebuild) rebuildNotBefore_ = clock() + 3 * (clock() - begin);
-    object->stateChanged = true;
-    queue(*object);
-    return true;
-  });
+  }
+  edited_ = std::move(later);
+}
+
+void ObjectTable::commitMesh(Object& object, Nanos now, const std::function<Nanos()>& clock) {
+  const std::uint64_t topology = object.geometry ? object.geometry->topology : 0;
+  object.geometry = object.mesh.commit(clock);
+  object.stateChanged = true;
+  queue(object);
+  if (!config_.checkMeshes || !object.geometry || object.geometry->topology == topology) return;
+  checks_.push_back({now + kCheckAfter, object.id, object.geometry->topology});
 }
 
 // After the shape has been the same for a while, so that half an upload is not called open. Shares the
@@ -134,7 +145,7 @@ void ObjectTable::updateSurface(Object& object, Nanos now, NoticeBoard& board, s
 }
 
 bool ObjectTable::publish(Nanos now, NoticeBoard& board, std::vector<Notice>& out) {
-  commitMeshes(now);
+  commitMeshes(now, board, out);
   if (!checks_.empty()) checkMeshes(now, board, out);
   return updatePublished(now, board, out);
 }

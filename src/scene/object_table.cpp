@@ -15,7 +15,7 @@ Nanos steadyNow() {
 }
 
 constexpr std::string_view kBadMatrix =
-    "refused: the matrix is not finite, is singular, or its last row is not 0 0 0 1";
+    "refused: the matrix is not finite or too large, is singular, or its last row is not 0 0 0 1";
 
 }  // namespace
 
@@ -359,8 +359,9 @@ void ObjectTable::apply(const SetObjectPosition& c, const Call& call) {
   constexpr std::string_view kName = "setObjectPosition";
   Object* object = find(c.object, kName, call);
   if (object == nullptr) return;
-  if (!c.position_m.allFinite()) {
-    call.refuse(kName, "refused: not finite", " object ", c.object, ", position ", c.position_m.transpose());
+  if (!isUsable(c.position_m)) {
+    call.refuse(kName, "refused: not finite or too large", " object ", c.object, ", position ",
+                c.position_m.transpose());
     return;
   }
   becomeStock(*object);
@@ -430,8 +431,8 @@ void ObjectTable::apply(const SetSurface& c, const Call& call) {
 
 void ObjectTable::apply(const SetSceneOrigin& c, const Call& call) {
   const std::optional<geometry::Quat> rotation = rotationFrom(c.axis, c.angle_rad);
-  if (!rotation || !c.position_m.allFinite()) {
-    call.refuse("setSceneOrigin", "refused: not finite, or the axis is zero", " position ",
+  if (!rotation || !isUsable(c.position_m)) {
+    call.refuse("setSceneOrigin", "refused: not finite or too large, or the axis is zero", " position ",
                 c.position_m.transpose(), ", axis ", c.axis.transpose(), ", angle ", c.angle_rad);
     return;
   }

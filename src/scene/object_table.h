@@ -139,7 +139,8 @@ class ObjectTable {
 
   /// World from the object's frame, measured in world units; the chain of parents without a mesh's own part.
   Affine frameOf(const Object& object) const;
-  void commitMeshes(Nanos now);
+  void commitMeshes(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
+  void commitMesh(Object& object, Nanos now, const std::function<Nanos()>& clock);
   void checkMeshes(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   void updateMotion(Object& object, Nanos now);
   void updateSurface(Object& object, Nanos now, NoticeBoard& board, std::vector<Notice>& out);

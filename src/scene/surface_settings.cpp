@@ -1,7 +1,8 @@
 #include "scene/surface_settings.h"
 
 #include <algorithm>
-#include <cmath>
+
+#include "scene/matrices.h"
 
 namespace hapticd::scene {
 namespace {
@@ -25,8 +26,8 @@ constexpr double kRounding = 1e-6;
 double clampStock(double value, double max, bool raw, std::string_view what, const Call& call,
                   std::string_view name, std::int32_t id) {
   const double limit = raw ? std::numeric_limits<double>::infinity() : max;
-  if (value >= 0 && value <= limit * (1 + kRounding)) return value;
-  const double clamped = std::isfinite(value) ? std::clamp(value, 0.0, limit) : 0.0;
+  if (value >= 0 && value <= limit * (1 + kRounding) && isUsable(value)) return value;
+  const double clamped = isUsable(value) ? std::clamp(value, 0.0, limit) : 0.0;
   call.warn(name, "out of range, clamped", " ", id, ", ", what, " ", value, " is not within 0 to ", max, ", ",
             clamped, " is used");
   return clamped;
@@ -63,9 +64,9 @@ bool SurfaceSettings::set(const SetSurfaceProperty& command, const SceneConfig& 
               " object ", command.object, ", '", command.name, "'");
     return false;
   }
-  if (!std::isfinite(command.value)) {
-    call.refuse(kName, "not finite, the old value stays", " object ", command.object, ", ", command.name, " ",
-                command.value);
+  if (!isUsable(command.value)) {
+    call.refuse(kName, "not finite or too large, the old value stays", " object ", command.object, ", ",
+                command.name, " ", command.value);
     return false;
   }
   const double value = std::clamp(command.value, 0.0, row->max);

@@ -50,7 +50,12 @@ FittedWorkspace fitView(const Affine& T_view_world, const Box& view, const Box& 
     result.refusal = "the model matrix is singular";
     return result;
   }
-  result.T_world_device = T_view_similar.inverse() * T_view_device;
+  const Affine T_world_device = T_view_similar.inverse() * T_view_device;
+  if (isInvertible(T_world_device)) {
+    result.T_world_device = T_world_device;
+  } else {
+    result.refusal = "the map would not be a number";
+  }
   return result;
 }
 

@@ -234,6 +234,33 @@ TEST_F(Meshes, AreCheckedOnceTheyAreComplete) {
   EXPECT_TRUE(notices_.empty()) << "gone before it was checked";
 }
 
+TEST_F(Meshes, ThatCannotBeBuiltLeaveTheOldOneAndAreTriedAgainWithTheNextEdit) {
+  int looks = 0;
+  int failAt = -1;
+  SceneConfig config = simulated({});
+  config.stopwatch = [&] {
+    if (++looks == failAt) throw std::runtime_error("out of memory");
+    return Nanos{0};
+  };
+  builder_ = SceneBuilder(config);
+  say(SetSurfaceProperty{0, "stiffness", 0.5});
+  say(SetVertices{0, 0, soup(1)});
+  run(20 * kMillisecond);
+  ASSERT_EQ(triangles(), 1U);
+  say(SetVertices{0, 3, soup(2)});
+  wait(20 * kMillisecond);
+  failAt = looks + 4;  // inside the commit
+  publish();
+  EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("mesh of object 0, out of memory"));
+  EXPECT_EQ(triangles(), 1U);
+  run(2'000 * kMillisecond);
+  EXPECT_EQ(builder_.nextDeadline(), std::nullopt) << "not again and again";
+  EXPECT_EQ(triangles(), 1U);
+  say(SetVertices{0, 0, {Vec3f(0, 0, 1)}});
+  run(20 * kMillisecond);
+  EXPECT_EQ(triangles(), 3U);
+}
+
 class Deforming : public Meshes {
  protected:
   static constexpr Nanos kFrame = 20 * kMillisecond;
