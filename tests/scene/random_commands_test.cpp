@@ -30,7 +30,7 @@ class Speaker {
       case 7:
         return RemoveTriangle{id(), number()};
       case 8:
-        return pick(4) == 0 ? SceneCommand(ClearMesh{id()}) : SetNormal{id()};
+        return pick(9) == 0 ? SceneCommand(ClearMesh{id()}) : SetNormal{id()};
       case 9:
         return TransformMesh{id(), {f(), f(), f(), f(), f(), f(), f(), f(), f(), f(), f(), f(), 0, 0, 0, 1}};
       case 10:
@@ -38,7 +38,7 @@ class Speaker {
       case 11:
         return pick(3) == 0 ? SceneCommand(AddObjectExScene{id()}) : MoveToParent{id(), id()};
       case 12:
-        return RemoveObject{id()};
+        return pick(6) == 0 ? SceneCommand(RemoveObject{id()}) : SetTouchable{id(), true};
       case 13:
       case 14:
       case 15:
@@ -75,9 +75,9 @@ class Speaker {
       case 31:
         return SetForceField{vec(), vec(), {d(), d(), d(), d(), d(), d(), d(), d(), d()}, d()};
       case 32:
-        return pick(3) == 0 ? SceneCommand(ResetScene{}) : SetSceneOrigin{vec(), vec(), d()};
+        return pick(20) == 0 ? SceneCommand(ResetScene{}) : SetSceneOrigin{vec(), vec(), d()};
       default:
-        return pick(2) == 0 ? SceneCommand(BeginBatch{}) : CommitBatch{};
+        return pick(4) == 0 ? SceneCommand(BeginBatch{}) : CommitBatch{};
     }
   }
   int pick(int n) { return static_cast<int>(random_() % static_cast<std::uint64_t>(n)); }
@@ -162,8 +162,13 @@ RC_GTEST_PROP(RandomCommands, LeaveAConsistentScene, (std::uint64_t seed)) {
   std::vector<std::shared_ptr<const SceneSnapshot>> held;
   Nanos now = 0;
   std::uint64_t revision = 0;
+  builder.apply(0, SetObjectNumber{6}, now, notices);
+  for (std::int32_t id = 0; id < 6; ++id) {
+    builder.apply(0, SetSurfaceProperty{id, "stiffness", 0.5}, now, notices);
+    builder.apply(0, SetVertices{id, 0, oneTriangle()}, now, notices);
+  }
   for (int step = 0; step < 300; ++step) {
-    now += speaker.pick(3) == 0 ? speaker.pick(50) * kMillisecond : 0;
+    now += speaker.pick(3) == 0 ? speaker.pick(30) * kMillisecond : 0;
     builder.apply(static_cast<ClientId>(speaker.pick(3)), speaker.next(), now, notices);
     if (speaker.pick(40) == 0) builder.clientGone(static_cast<ClientId>(speaker.pick(3)), now);
     if (speaker.pick(3) != 0) continue;
