@@ -193,7 +193,10 @@ void FreeForces::apply(const SetPlane& c, const Call& call) {
   plane.surface.dynamic_friction = std::min(plane.surface.dynamic_friction, plane.surface.static_friction);
   std::string remark;
   keepPassive(plane.surface, bound_, remark);
-  if (!remark.empty()) call.warn(kName, remark.substr(0, remark.size() - 2), " plane ", c.index);
+  if (!remark.empty()) {
+    call.post(Notice::Severity::warning, "plane",
+              "sendSurface plane " + std::to_string(c.index) + ": " + remark.substr(0, remark.size() - 2));
+  }
   const auto known = planes_.find(c.index);
   const bool stays = known != planes_.end() && known->second.value.normal == plane.normal &&
                      known->second.value.offset == plane.offset;

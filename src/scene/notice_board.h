@@ -58,6 +58,10 @@ struct Call {
   void tell(std::string_view name, std::string_view reason, const Parts&... parts) const {
     say(Notice::Severity::normal, name, reason, parts...);
   }
+  /// A text whose wording varies, counted by `kind`.
+  void post(Notice::Severity severity, std::string kind, std::string text) const {
+    board.post({client, severity, std::move(text)}, std::move(kind), now, out);
+  }
 
  private:
   /// "name parts…: reason".
@@ -70,7 +74,7 @@ struct Call {
     text << ": " << reason;
     std::string kind;
     kind.append(name).append(1, '/').append(reason);
-    board.post({client, severity, std::move(text).str()}, std::move(kind), now, out);
+    post(severity, std::move(kind), std::move(text).str());
   }
 };
 

@@ -111,7 +111,10 @@ void ObjectTable::checkMeshes(Nanos now, NoticeBoard& board, std::vector<Notice>
       text += (text.empty() ? "" : " ") + sentence;
     }
     const Call call{object->meshSetBy, now, false, board, out};
-    if (!text.empty()) call.tell("mesh of object", text, " ", object->id);
+    if (!text.empty()) {
+      call.post(Notice::Severity::normal, "mesh",
+                "mesh of object " + std::to_string(object->id) + ": " + text);
+    }
     const Nanos taken = stopwatch_() - started;
     if (taken > kCheckSlice) rebuildNotBefore_ = now + 4 * taken;
   }
@@ -137,7 +140,8 @@ void ObjectTable::updateSurface(Object& object, Nanos now, NoticeBoard& board, s
   const Surface surface = object.settings.resolve(bound_, remark);
   if (!remark.empty() && remark != object.surfaceRemark) {
     const Call call{object.surfaceSetBy, now, false, board, out};
-    call.warn("surface of object", remark.substr(0, remark.size() - 2), " ", object.id);
+    call.post(Notice::Severity::warning, "surface",
+              "surface of object " + std::to_string(object.id) + ": " + remark.substr(0, remark.size() - 2));
   }
   object.surfaceRemark = remark;
   object.surface = surface;

@@ -247,6 +247,14 @@ TEST_F(Surfaces, DampingKeepsWithinThePassivityBound) {
   EXPECT_TRUE(notices_.empty()) << "said once";
 }
 
+TEST_F(Surfaces, ManyDifferentRemarksAreCountedToo) {
+  for (int i = 0; i < 100; ++i) {
+    say(SetSurface{0, 1, 0.0047 + i * 1e-6, 0, 0});
+    publish();
+  }
+  EXPECT_EQ(notices_.size(), 8U);
+}
+
 class SurfacesOnASlowLink : public Surfaces {
  protected:
   static SceneConfig slow() {
