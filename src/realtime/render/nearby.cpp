@@ -82,8 +82,18 @@ void Nearby::include(const Vec3& centre, double reach) noexcept {
   }
   const Affine& T_world_device = scene.workspace.T_world_device;
   const double worldReach = (reach + radius_) * kWiden * stretchOf(T_world_device.linear());
-  scene.objectIndex->visitNear(T_world_device * centre, worldReach,
-                               [&](std::uint32_t i) noexcept { add(*scene.objects[i]); });
+  std::array<std::uint32_t, kMaxObjects> found{};
+  std::size_t count = 0;
+  scene.objectIndex->visitNear(T_world_device * centre, worldReach, [&](std::uint32_t i) noexcept {
+    if (count == found.size()) {
+      overflowed_ = true;
+    } else {
+      found[count++] = i;
+    }
+  });
+  // By id, so that what happens to the proxy does not depend on the order of visits.
+  std::sort(found.begin(), found.begin() + count);
+  for (std::size_t k = 0; k < count; ++k) add(*scene.objects[found[k]]);
 }
 
 int Nearby::includeObject(std::int32_t id) noexcept {
@@ -155,7 +165,7 @@ bool Nearby::facetOf(int i, std::uint32_t triangle, Facet& facet) const noexcept
   return true;
 }
 
-void Nearby::gather(const Vec3& centre, double radius) noexcept {
+bool Nearby::gather(const Vec3& centre, double radius) noexcept {
   centre_ = centre;
   reach_ = radius;
   facetCount_ = 0;
@@ -178,6 +188,7 @@ void Nearby::gather(const Vec3& centre, double radius) noexcept {
     placed.state->mesh->index.visitNear(placed.T_object_device * centre, reach * kWiden * placed.stretch,
                                         visit);
   }
+  return complete_;
 }
 
 bool Nearby::meets(const Facet& f, const Vec3& p, const Vec3& g, Hit& hit) const noexcept {

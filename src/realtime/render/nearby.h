@@ -66,8 +66,9 @@ class Nearby {
   int objectCount() const noexcept { return objectCount_; }
   const PlacedObject& object(int i) const noexcept { return objects_[static_cast<std::size_t>(i)]; }
 
-  /// Gathers the facets that a tool inside the ball can meet; casts inside it then walk no tree.
-  void gather(const Vec3& centre, double radius) noexcept;
+  /// Gathers the facets that a tool inside the ball can meet; casts inside it then walk no tree. False when
+  /// there are too many; casts walk the tree then.
+  bool gather(const Vec3& centre, double radius) noexcept;
   bool gathered(const Vec3& p) const noexcept {
     return complete_ && (p - centre_).squaredNorm() < 0.64 * reach_ * reach_;
   }

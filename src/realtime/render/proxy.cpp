@@ -94,19 +94,17 @@ bool Proxy::frictionless() const noexcept {
 // What friction at a grip can bear, as a length of the spring.
 Proxy::Cone Proxy::coneOf(const Grip& grip) noexcept {
   Cone cone;
-  Vec3 normal = Vec3::Zero();
   double adhesion = 0;
   double weight = 0;
   for (int i = 0; i < grip.count; ++i) {
     const Touch& touch = grip.touches[static_cast<std::size_t>(i)];
     const double force = touch.surface.stiffness_N_per_m * touch.depth_m;
-    normal += touch.depth_m * touch.plane.normal;
     cone.sticking_m += force * touch.surface.static_friction;
     cone.sliding_m += force * std::min(touch.surface.dynamic_friction, touch.surface.static_friction);
     adhesion += touch.adhesion_N;
     weight += force;
   }
-  const double depth = normal.norm();
+  const double depth = grip.normal_m.norm();
   if (!(weight > 0) || !(depth > 0)) return {};
   const double held = adhesion * depth / weight;
   cone.sticking_m = cone.sticking_m * depth / weight + held;
@@ -218,6 +216,7 @@ void Proxy::describe(const Vec3& hip, const Vec3& goal, const ActiveSet& active)
     touch.plane = hit.plane;
     touch.push = hit.plane.normal;
     touch.depth_m = depths[static_cast<std::size_t>(i)];
+    grip_.normal_m += touch.depth_m * touch.plane.normal;
     if (hit.object < 0) {
       const HalfSpace& plane = planes_[-1 - hit.object];
       touch.surface = plane.surface;
@@ -245,17 +244,15 @@ void Proxy::describe(const Vec3& hip, const Vec3& goal, const ActiveSet& active)
 // Pressed too hard, the proxy steps through the faces that hold it and goes on to the hand.
 void Proxy::popThrough(const Vec3& hip, std::uint32_t& status) noexcept {
   if (!armed_) return;
-  Vec3 out = Vec3::Zero();
   bool pressed = false;
   for (int i = 0; i < grip_.count; ++i) {
     const Touch& touch = grip_.touches[static_cast<std::size_t>(i)];
     const scene::Surface& surface = touch.surface;
-    out += touch.depth_m * touch.plane.normal;
     pressed = pressed ||
               (surface.popthrough_N > 0 && surface.stiffness_N_per_m * touch.depth_m > surface.popthrough_N);
   }
   if (!pressed) return;
-  const Vec3 direction = -out.normalized();
+  const Vec3 direction = -grip_.normal_m.normalized();
   double step = 0;
   for (int i = 0; i < grip_.count; ++i) {
     const Plane& plane = grip_.touches[static_cast<std::size_t>(i)].plane;
@@ -284,12 +281,7 @@ void Proxy::releaseWhenDeep(bool wasFree, std::uint32_t& status) noexcept {
     released_ = false;
     return;
   }
-  Vec3 normal = Vec3::Zero();
-  for (int i = 0; i < grip_.count; ++i) {
-    const Touch& touch = grip_.touches[static_cast<std::size_t>(i)];
-    normal += touch.depth_m * touch.plane.normal;
-  }
-  if (wasFree && normal.norm() > kJump_m) released_ = true;
+  if (wasFree && grip_.normal_m.norm() > kJump_m) released_ = true;
   if (released_) status |= kRenderReleased;
 }
 

@@ -27,10 +27,11 @@ struct Touch {
   Vec3 surfaceVelocity_m_per_s = Vec3::Zero();  ///< at the proxy
 };
 
-/// How the surfaces hold the proxy: proxy - HIP = sum depth_m normal + lateral_m.
+/// How the surfaces hold the proxy: proxy - HIP = normal_m + lateral_m.
 struct Grip {
   int count = 0;  ///< 0: free
   std::array<Touch, kMaxActive> touches;
+  Vec3 normal_m = Vec3::Zero();   ///< sum of depth times normal over the touches
   Vec3 lateral_m = Vec3::Zero();  ///< the tangential part that friction bears
   bool sliding = false;
 };
@@ -66,7 +67,7 @@ class Proxy {
   void carry(const Vec3& hip, std::uint32_t& status) noexcept;
   Vec3 carriedBy(const PlacedObject& object, std::uint32_t triangle, const Vec3& p) const noexcept;
   void push(const Vec3& from, std::uint32_t& status) noexcept;
-  void pushByDeforming(const Vec3& from) noexcept;
+  void pushByDeforming(const Vec3& from, double reach, std::uint32_t& status) noexcept;
   void pushByPlanes(std::uint32_t& status) noexcept;
   void chase(const Vec3& hip) noexcept;
   void slide(const Vec3& target, ActiveSet& active) noexcept;

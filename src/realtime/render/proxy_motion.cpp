@@ -1,5 +1,6 @@
 // How the proxy goes along with geometry that moves, bends, vanishes or comes in.
 #include <algorithm>
+#include <tuple>
 
 #include "realtime/render/proxy.h"
 #include "realtime/render/renderer.h"
@@ -58,9 +59,13 @@ Vec3 Proxy::carriedBy(const PlacedObject& object, std::uint32_t triangle, const 
 void Proxy::push(const Vec3& from, std::uint32_t& status) noexcept {
   const bool carried = position_ != from;
   bool deforming = false;
+  double reach = 0;
   for (int i = 0; i < nearby_.objectCount(); ++i) {
     const PlacedObject& object = nearby_.object(i);
-    deforming = deforming || object.deformed;
+    if (object.deformed) {
+      deforming = true;
+      reach = std::max(reach, (object.carried(from) - position_).norm());
+    }
     if (!(object.moved || carried) || object.deformed || object.jumped || object.before == nullptr) continue;
     const Vec3 start = object.carried(from);
     const Vec3 way = position_ - start;
@@ -75,7 +80,7 @@ void Proxy::push(const Vec3& from, std::uint32_t& status) noexcept {
       touchedObject_ = object.state->id;
     }
   }
-  if (deforming) pushByDeforming(from);
+  if (deforming) pushByDeforming(from, reach, status);
   pushByPlanes(status);
 }
 
@@ -93,22 +98,29 @@ void Proxy::pushByPlanes(std::uint32_t& status) noexcept {
   }
 }
 
-void Proxy::pushByDeforming(const Vec3& from) noexcept {
+// The same for each face in its own frame; of several faces the one that passed farthest pushes first. Their
+// boxes hold all of the way that they bend, so that `reach` is what the placement and the proxy add to it.
+void Proxy::pushByDeforming(const Vec3& from, double reach, std::uint32_t& status) noexcept {
   for (int k = 0; k < kMaxPushes; ++k) {
-    nearby_.gather(position_, stride_m_ + kGatherMargin_m);
-    bool pushed = false;
-    for (const Facet* f = nearby_.facetsBegin(); f != nearby_.facetsEnd() && !pushed; ++f) {
+    if (!nearby_.gather(position_, reach + kGatherMargin_m)) status |= kRenderCandidateLimit;
+    Hit farthest;
+    double height = 0;
+    for (const Facet* f = nearby_.facetsBegin(); f != nearby_.facetsEnd(); ++f) {
       const PlacedObject& object = nearby_.object(f->object);
       if (!object.deformed) continue;
       const Vec3 start = carriedBy(object, f->triangle, from);
       Hit hit;
       if ((position_ - start).norm() > kJump_m || !nearby_.meets(*f, start, position_, hit)) continue;
-      const double below = hit.plane.height(position_);
-      if (below > -0.25 * f->skin) continue;
-      position_ -= below * hit.plane.normal;
-      pushed = true;
+      const double above = hit.plane.height(position_);
+      if (above > -0.25 * f->skin) continue;
+      if (std::tuple(above, hit.object, hit.triangle) <
+          std::tuple(height, farthest.object, farthest.triangle)) {
+        farthest = hit;
+        height = above;
+      }
     }
-    if (!pushed) return;
+    if (height == 0) return;
+    position_ -= height * farthest.plane.normal;
   }
 }
 

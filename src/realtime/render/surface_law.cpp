@@ -16,7 +16,6 @@ double normalForce(const Touch& touch, const Vec3& hipVelocity) {
 
 void applySurfaceLaw(const Grip& grip, const Vec3& proxy_m, const Vec3& hipVelocity_m_per_s,
                      double toolRadius_m, Rendering& out) noexcept {
-  Vec3 depth = Vec3::Zero();
   Vec3 spring = Vec3::Zero();
   Vec3 inward = Vec3::Zero();
   double friction = 0;
@@ -35,7 +34,6 @@ void applySurfaceLaw(const Grip& grip, const Vec3& proxy_m, const Vec3& hipVeloc
     contact.force_N = force * touch.push;
     out.normalForce_N += contact.force_N;
     const double springForce = surface.stiffness_N_per_m * touch.depth_m;
-    depth += touch.depth_m * touch.plane.normal;
     spring += springForce * touch.plane.normal;
     inward += touch.plane.normal;
     friction += springForce * (grip.sliding ? surface.dynamic_friction : surface.static_friction);
@@ -48,8 +46,8 @@ void applySurfaceLaw(const Grip& grip, const Vec3& proxy_m, const Vec3& hipVeloc
   }
   if (grip.count == 0) return;
   out.touching = true;
-  out.depth_m = depth.norm();
-  const Vec3 along = out.depth_m > 0 ? depth : inward;
+  out.depth_m = grip.normal_m.norm();
+  const Vec3 along = out.depth_m > 0 ? grip.normal_m : inward;
   out.normal = along.normalized();
   out.scp_m = proxy_m - toolRadius_m * out.normal;
   out.contactForce_N = out.normalForce_N;
