@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "device/profiles.h"
 #include "device/simulated/hand_file.h"
 #include "mesh_io/mesh_io.h"
 #include "realtime/render/renderer.h"

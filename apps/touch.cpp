@@ -85,7 +85,9 @@ TriangleMesh load(const TouchOptions& options) {
   std::printf("%s: %zu vertices, %zu triangles, %s units\n", options.mesh.c_str(), mesh.vertices.size(),
               mesh.triangles.size(), extentsText(mesh).c_str());
   if (mesh.triangles.empty()) throw std::runtime_error(options.mesh + " has no triangles: nothing to touch");
-  std::printf("mesh check: %s\n", geometry::checkMesh(mesh).text().c_str());
+  const auto findings = geometry::describe(geometry::checkMesh(mesh.vertices, mesh.triangles));
+  if (findings.empty()) std::printf("mesh check: clean\n");
+  for (const std::string& finding : findings) std::printf("mesh check: %s\n", finding.c_str());
   scaleIntoWorkspace(mesh, options.size_mm);
   std::printf("scaled to %s mm, centred in the workspace\n", extentsText(mesh).c_str());
   return mesh;

@@ -19,6 +19,8 @@ constexpr double kSlideSpeed_m_per_s = 0.06;
 constexpr double kFreeSpeed_m_per_s = 0.15;
 constexpr int kStrokes = 12;
 constexpr int kPointsInStroke = 7;
+constexpr double kLongestStep_m = 0.025;  // from above one point of a stroke to the next
+constexpr double kSteepest = 0.3;  // cosine between surface normal and the direction the hand comes from
 constexpr double kStrokeAngle_rad = 0.12;  // between neighbouring points of a stroke, seen from the centre
 
 struct SurfacePoint {
@@ -103,13 +105,15 @@ class Pen {
 
 std::vector<device::Waypoint> circle(const Box& workspace) {
   constexpr int kSteps = 32;
-  const Vec3 centre = workspace.centre();
-  const double radius = 0.25 * workspace.extents().minCoeff();
+  // At the top, out of the way of what a client may put in the middle: a hand inside a mesh that appears is
+  // caught in it.
+  const double radius = 0.1 * workspace.extents().minCoeff();
+  const Vec3 centre = workspace.centre() + Vec3(0, 0.5 * workspace.extents().y() - radius, 0);
   Pen pen(centre + Vec3(radius, 0, 0));
   for (int i = 1; i <= kSteps; ++i) {
     const double angle = 2 * std::numbers::pi * i / kSteps;
     const Quat turn(Eigen::AngleAxisd(0.3 * std::sin(angle), Vec3::UnitX()));
-    pen.moveTo(centre + radius * Vec3(std::cos(angle), std::sin(angle), 0), turn, 0.05, i == kSteps / 2);
+    pen.moveTo(centre + radius * Vec3(std::cos(angle), 0, std::sin(angle)), turn, 0.05, i == kSteps / 2);
   }
   return pen.take();
 }
@@ -142,7 +146,9 @@ std::vector<device::Waypoint> explore(const scene::SceneSnapshot& scene, const B
     for (int i = 0; i < kPointsInStroke; ++i) {
       const Vec3 ray = Eigen::AngleAxisd(kStrokeAngle_rad * i, first.cross(along)) * first;
       const auto surface = firstSurface(scene, centre + outside * ray, centre - outside * ray, now);
-      if (!surface) continue;
+      if (!surface || surface->normal.dot(ray) < kSteepest) break;
+      // Another part of the object: the straight way there may lead through this one.
+      if (down && (surface->position - lift).norm() > kLongestStep_m) break;
       if (!down) pen.moveTo(surface->position + kClearance_m * ray, stylus, kFreeSpeed_m_per_s);
       pen.moveTo(surface->position - kPressDepth_m * surface->normal, stylus, kSlideSpeed_m_per_s,
                  i == 2 && stroke % 3 == 0);
