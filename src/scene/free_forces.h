@@ -78,6 +78,7 @@ class FreeForces {
     double stiffness_N_per_m = 1000;
     bool releasing = false;
   };
+  static constexpr double kWorldUnitsPerStockMetre = 1000;
   static constexpr Nanos kNever = std::numeric_limits<Nanos>::max();
   static constexpr Nanos kRelease = 300'000'000;     ///< ramping out takes 250 ms in the servo
   static constexpr Nanos kAfterEnd = 50'000'000;     ///< the servo ends a timed force by its own clock

@@ -1,0 +1,321 @@
+// Commands on forces that belong to no object. What becomes of them is in free_forces.cpp.
+#include "scene/free_forces.h"
+
+#include <algorithm>
+#include <array>
+
+#include "scene/matrices.h"
+#include "scene/surface_settings.h"
+
+namespace hapticd::scene {
+namespace {
+
+constexpr double kTau = 2 * EIGEN_PI;
+constexpr double kLongest_ms = 1e9;
+
+// Which parameters a type uses; the others are ignored whatever they hold.
+struct EffectKind {
+  std::string_view name;
+  EffectType type;
+  bool gain, duration, frequency, position, direction;
+};
+constexpr EffectKind kEffectKinds[] = {
+    {"constant", EffectType::constant, false, true, false, false, true},
+    {"spring", EffectType::spring, true, true, false, true, false},
+    {"viscous", EffectType::viscous, true, true, false, false, false},
+    {"friction", EffectType::friction, true, true, false, false, false},
+    {"vibrationMotor", EffectType::motorVibration, false, true, true, false, false},
+    {"motorVibration", EffectType::motorVibration, false, true, true, false, false},
+    {"vibrationContact", EffectType::contactVibration, false, true, true, false, false},
+    {"contactVibration", EffectType::contactVibration, false, true, true, false, false},
+};
+
+double atLeastZero(double value, std::string_view what, const DefineEffect& c, const Call& call) {
+  if (value >= 0) return value;
+  call.warn("setEffect", "negative, 0 is used", " ", c.index, ", ", what, " ", value);
+  return 0;
+}
+
+double lowered(double value, double max, std::string_view what, const DefineEffect& c, const Call& call) {
+  if (value <= max) return value;
+  call.warn("setEffect", "would be unstable on this device and is lowered", " ", c.index, ", ", what, " ",
+            value / 1000, " to ", max / 1000);
+  return max;
+}
+
+std::optional<std::string_view> firstUnusable(const EffectKind& kind, const DefineEffect& c) {
+  if (!isUsable(c.magnitude_N)) return "magnitude";
+  if (kind.gain && !isUsable(c.gain)) return "gain";
+  if (kind.duration && !isUsable(c.duration_ms)) return "duration";
+  if (kind.frequency && !isUsable(c.frequency)) return "frequency";
+  if (kind.position && !isUsable(c.position)) return "position";
+  if (kind.direction && !isUsable(c.direction)) return "direction";
+  return std::nullopt;
+}
+
+Effect effectFrom(const EffectKind& kind, const DefineEffect& c, const SceneConfig& config,
+                  const PassivityBound& bound, const Call& call) {
+  Effect e;
+  e.index = c.index;
+  e.type = kind.type;
+  e.magnitude_N = atLeastZero(c.magnitude_N, "magnitude", c, call);
+  if (kind.gain) {
+    const double max =
+        kind.type == EffectType::viscous ? bound.maxDamping_Ns_per_m(0) : bound.maxStiffness_N_per_m();
+    e.gain = lowered(1000 * atLeastZero(c.gain, "gain", c, call), max, "gain", c, call);
+  }
+  if (kind.duration) e.duration = geometry::toNanos(std::clamp(c.duration_ms, 0.0, kLongest_ms) / 1000);
+  if (kind.frequency) {
+    const bool inRadians = kind.type == EffectType::contactVibration &&
+                           config.contactVibrationUnit == VibrationUnit::radPerSecond;
+    e.angularFrequency_rad_per_s = (inRadians ? 1 : kTau) * atLeastZero(c.frequency, "frequency", c, call);
+  }
+  if (kind.position) e.position = c.position;
+  if (kind.direction) {
+    e.direction = c.direction;
+    if (c.direction.isZero(0)) {
+      call.warn("setEffect", "the direction is zero, there will be no force", " ", c.index, ", constant");
+    }
+  }
+  e.inDeviceFrame = config.motorVibrationFrame == VibrationFrame::device;
+  return e;
+}
+
+}  // namespace
+
+void FreeForces::apply(const DefineEffect& c, const Call& call) {
+  const auto* kind = std::find_if(std::begin(kEffectKinds), std::end(kEffectKinds),
+                                  [&](const EffectKind& k) { return k.name == c.type; });
+  if (kind == std::end(kEffectKinds)) {
+    call.refuse(
+        "setEffect",
+        "refused: unknown type; use constant, spring, viscous, friction, vibrationMotor or vibrationContact",
+        " ", c.index, ", '", c.type, "'");
+    return;
+  }
+  if (const auto what = firstUnusable(*kind, c)) {
+    call.refuse("setEffect", "refused: not finite or too large", " ", c.index, ", ", *what);
+    return;
+  }
+  const auto known = effects_.find(c.index);
+  if (c.index < 0 || (known == effects_.end() && effects_.size() >= config_.limits.effects)) {
+    call.refuse("setEffect", "refused: not an index this server takes; use fewer indices, from 0 on", " ",
+                c.index, ", at most ", config_.limits.effects, " effects");
+    return;
+  }
+  const Effect effect = effectFrom(*kind, c, config_, bound_, call);
+  Owned<RunningEffect>& entry = effects_[c.index];
+  // An effect of somebody who left goes on ramping out until it is started again.
+  if (entry.value.effect.releasing) entry.value.running = false;
+  const std::uint32_t started = entry.value.effect.start;
+  entry.value.effect = effect;
+  entry.value.effect.start = started;
+  entry.owner = call.client;
+  entry.goneAt = kNever;
+  changed_ = true;
+  if (entry.value.running && effect.duration > 0)
+    entry.goneAt = entry.value.startedAt + effect.duration + kAfterEnd;
+  if (const auto waiting = waitingStarts_.find(c.index); waiting != waitingStarts_.end()) {
+    start(entry, waiting->second.owner, call.now);
+    waitingStarts_.erase(waiting);
+  }
+}
+
+// The definition may travel by UDP and come after its start.
+void FreeForces::apply(const StartEffect& c, const Call& call) {
+  const auto known = effects_.find(c.index);
+  if (known != effects_.end() && !known->second.value.effect.releasing) {
+    start(known->second, call.client, call.now);
+    return;
+  }
+  if (waitingStarts_.size() < config_.limits.effects || waitingStarts_.count(c.index) != 0) {
+    waitingStarts_[c.index] = {call.client, {}, call.now + kRemember};
+    return;
+  }
+  call.refuse("startEffect", "refused: no such effect was defined; call setEffect first", " ", c.index);
+}
+
+void FreeForces::apply(const StopEffect& c, const Call& call) {
+  if (waitingStarts_.erase(c.index) != 0) return;
+  const auto known = effects_.find(c.index);
+  if (known == effects_.end()) {
+    call.warn("stopEffect", "no such effect was defined", " ", c.index);
+    return;
+  }
+  changed_ |= known->second.value.running;
+  known->second.value.running = false;
+  known->second.goneAt = kNever;
+  if (known->second.value.effect.releasing) effects_.erase(known);
+}
+
+void FreeForces::apply(const SetPlane& c, const Call& call) {
+  constexpr std::string_view kName = "sendSurface";
+  if (c.index < 0 || c.index >= kMaxPlanes) {
+    call.refuse(kName, "refused: no such plane", " plane ", c.index, ", use 0 to ", kMaxPlanes - 1);
+    return;
+  }
+  const Vec3 normal(c.plane[0], c.plane[1], c.plane[2]);
+  const double length = normal.stableNorm();
+  if (length == 0) {
+    changed_ |= planes_.erase(c.index) != 0;
+    return;
+  }
+  if (!isUsable(length) || !isUsable(c.plane[3])) {
+    call.refuse(kName, "refused: not finite or too large", " plane ", c.index, ", ", normal.transpose(), " ",
+                c.plane[3]);
+    return;
+  }
+  Plane plane;
+  plane.index = c.index;
+  plane.normal = normal / length;
+  plane.offset = kWorldUnitsPerStockMetre * c.plane[3] / length;
+  plane.recovery = std::clamp(c.recoveryCycles, 1, 10'000) * Nanos{1'000'000};
+  plane.surface = surfaceFromStock(c.stiffness, c.damping, c.staticFriction, c.dynamicFriction, config_, call,
+                                   "sendSurface plane", c.index);
+  plane.surface.dynamic_friction = std::min(plane.surface.dynamic_friction, plane.surface.static_friction);
+  std::string remark;
+  keepPassive(plane.surface, bound_, remark);
+  if (!remark.empty()) {
+    call.post(Notice::Severity::warning, "plane",
+              "sendSurface plane " + std::to_string(c.index) + ": " + remark.substr(0, remark.size() - 2));
+  }
+  const auto known = planes_.find(c.index);
+  const bool stays = known != planes_.end() && known->second.value.normal == plane.normal &&
+                     known->second.value.offset == plane.offset;
+  plane.placement = stays ? known->second.value.placement : ++placements_;
+  planes_[c.index] = {call.client, plane, kNever};
+  changed_ = true;
+}
+
+void FreeForces::apply(const SetPlaneDetail& c, const Call& call) {
+  constexpr std::string_view kName = "sendSurface";
+  constexpr double kShortestWave_m = 0.00006;
+  const double values[] = {c.adhesionNormal_N,    c.adhesionLateral_N, c.textureAmplitude_m,
+                           c.textureWavelength_m, c.buzzAmplitude_m,   c.buzzFrequency_Hz};
+  for (const double value : values) {
+    if (isUsable(value) && value >= 0) continue;
+    call.refuse(kName, "refused: adhesion, texture or buzz is negative, not finite or too large",
+                " plane 0, ", value);
+    return;
+  }
+  planeDetail_.adhesionNormal_N = c.adhesionNormal_N;
+  planeDetail_.adhesionLateral_N = c.adhesionLateral_N;
+  planeDetail_.textureAmplitude = kWorldUnitsPerStockMetre * c.textureAmplitude_m;
+  planeDetail_.textureWavelength =
+      c.textureWavelength_m == 0
+          ? 0
+          : kWorldUnitsPerStockMetre * std::max(kShortestWave_m, c.textureWavelength_m);
+  planeDetail_.buzzAmplitude = kWorldUnitsPerStockMetre * c.buzzAmplitude_m;
+  planeDetail_.buzzAngularFrequency_rad_per_s = kTau * c.buzzFrequency_Hz;
+  changed_ = true;
+}
+
+void FreeForces::apply(const SetForceField& c, const Call& call) {
+  constexpr std::string_view kName = "sendForceField";
+  ForceField field;
+  field.origin = kWorldUnitsPerStockMetre * c.origin_m;
+  field.force_N = c.force_N;
+  field.jacobian_N_per_unit =
+      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(c.jacobian_N_per_m.data()) /
+      kWorldUnitsPerStockMetre;
+  field.radius = kWorldUnitsPerStockMetre * c.radius_m;
+  if (!isUsable(field.origin) || !isUsable(field.force_N) || !isUsable(field.radius) ||
+      !(field.jacobian_N_per_unit.array().abs() <= kLargest).all()) {
+    call.refuse(kName, "refused: not finite or too large", " origin ", c.origin_m.transpose(), ", force ",
+                c.force_N.transpose(), ", radius ", c.radius_m);
+    return;
+  }
+  changed_ = true;
+  if (field.force_N.isZero(0) && field.jacobian_N_per_unit.isZero(0)) {
+    field_.reset();
+  } else {
+    field_ = {call.client, field, kNever};
+  }
+}
+
+FreeForces::Constraint& FreeForces::constraintFor(const Call& call) {
+  if (!constraint_) constraint_.emplace();
+  constraint_->owner = call.client;
+  constraint_->goneAt = kNever;
+  constraint_->value.releasing = false;
+  changed_ = true;
+  return constraint_->value;
+}
+
+void FreeForces::apply(const SetConstraintEnabled& c, const Call& call) {
+  constraintFor(call).enabled = c.enabled;
+}
+
+void FreeForces::apply(const SetConstraintMode& c, const Call& call) {
+  if (c.mode < 0 || c.mode > 3) {
+    call.refuse("constraint_mode", "refused: use 0 none, 1 point, 2 line or 3 plane", " ", c.mode);
+    return;
+  }
+  constraintFor(call).mode = c.mode;
+}
+
+void FreeForces::apply(const SetConstraintVector& c, const Call& call) {
+  const bool direction =
+      c.which == ConstraintVector::lineDirection || c.which == ConstraintVector::planeNormal;
+  if (!isUsable(c.value) || (direction && !(c.value.stableNorm() > 0))) {
+    call.refuse("constraint", "refused: not finite or too large, or a direction without length", " ",
+                c.value.transpose());
+    return;
+  }
+  Constraint& constraint = constraintFor(call);
+  switch (c.which) {
+    case ConstraintVector::point:
+      constraint.point_m = c.value;
+      break;
+    case ConstraintVector::linePoint:
+      constraint.linePoint_m = c.value;
+      break;
+    case ConstraintVector::lineDirection:
+      constraint.lineDirection = c.value.stableNormalized();
+      break;
+    case ConstraintVector::planePoint:
+      constraint.planePoint_m = c.value;
+      break;
+    case ConstraintVector::planeNormal:
+      constraint.planeNormal = c.value.stableNormalized();
+      break;
+  }
+}
+
+void FreeForces::apply(const SetConstraintStiffness& c, const Call& call) {
+  if (!isUsable(c.stiffness_N_per_m) || c.stiffness_N_per_m < 0) {
+    call.refuse("constraint_KSpring", "refused: negative, not finite or too large", " ", c.stiffness_N_per_m);
+    return;
+  }
+  constraintFor(call).stiffness_N_per_m = c.stiffness_N_per_m;
+}
+
+void FreeForces::apply(const StartCustomEffect& c, const Call& call) {
+  constexpr std::string_view kName = "startEffect (custom)";
+  if (c.effect != 0) {
+    call.warn(kName, "there is no such custom effect, none runs now; 0 is a buzz", " ", c.effect);
+    apply(StopCustomEffect{}, call);
+    return;
+  }
+  std::array<double, 6> p{1, 40, 2, 0, 0, 1};  // N, Hz, s, direction
+  std::copy_n(c.parameters.begin(), std::min(p.size(), c.parameters.size()), p.begin());
+  if (!std::all_of(p.begin(), p.end(), [](double v) { return isUsable(v); }) || p[1] < 0 || p[2] < 0) {
+    call.refuse(
+        kName, "refused: a parameter is not finite or too large, or frequency or duration is negative", " 0");
+    return;
+  }
+  Buzz buzz;
+  buzz.force_N = p[0] * Vec3(p[3], p[4], p[5]);
+  buzz.angularFrequency_rad_per_s = kTau * p[1];
+  buzz.duration = geometry::toNanos(std::min(p[2], kLongest_ms / 1000));
+  buzz.start = ++starts_;
+  buzz_ = {call.client, buzz, call.now + buzz.duration + kAfterEnd};
+  changed_ = true;
+}
+
+void FreeForces::apply(const StopCustomEffect&, const Call&) {
+  changed_ |= buzz_.has_value();
+  buzz_.reset();
+}
+
+}  // namespace hapticd::scene

@@ -1,0 +1,294 @@
+// Commands on objects: each checks everything before it changes anything.
+#include <algorithm>
+
+#include "scene/object_table.h"
+
+namespace hapticd::scene {
+namespace {
+
+constexpr std::string_view kBadMatrix =
+    "refused: the matrix is not finite or too large, is singular, or its last row is not 0 0 0 1";
+
+}  // namespace
+
+bool ObjectTable::hasRoom(const Object& object, std::int32_t first, std::size_t count, std::size_t present,
+                          std::uint32_t perObject, std::uint64_t inAll, std::uint64_t used,
+                          std::string_view name, std::string_view what, const Call& call) const {
+  if (first < 0) {
+    call.refuse(name, "refused: numbers start at 0", " object ", object.id, ", ", what, " ", first);
+    return false;
+  }
+  const std::size_t end = static_cast<std::size_t>(first) + count;
+  if (end > perObject) {
+    call.refuse(name, "refused: beyond the limit of one object", " object ", object.id, ", ", what, " ",
+                end - 1, ", limit ", perObject);
+    return false;
+  }
+  if (end > present && used + (end - present) > inAll) {
+    call.refuse(name, "refused: the scene is full; clear or remove objects first", " object ", object.id,
+                ", ", what, " ", end - 1, ", limit ", inAll, " in all objects");
+    return false;
+  }
+  return true;
+}
+
+void ObjectTable::meshEdited(Object& object, const Call& call) {
+  if (!object.mesh.due()) return;
+  object.meshSetBy = call.client;
+  if (call.inBatch) object.mesh.finish();
+  if (object.meshQueued) return;
+  object.meshQueued = true;
+  edited_.push_back(object.id);
+}
+
+void ObjectTable::apply(const SetObjectNumber& c, const Call& call) {
+  if (c.count < 0 || c.count > config_.limits.objects) {
+    call.refuse("setObjectNumber", "refused: not a number of objects this server takes", " ", c.count,
+                ", limit ", config_.limits.objects);
+    return;
+  }
+  for (std::int32_t id = 0; id < c.count; ++id) {
+    if (find(id) == nullptr) create(id, Object::kScene);
+  }
+}
+
+void ObjectTable::apply(SetVertices&& c, const Call& call) {
+  constexpr std::string_view kName = "setObjectVertex";
+  Object* object = find(c.object, kName, call);
+  if (object == nullptr || c.positions.empty()) return;
+  const std::size_t before = object->mesh.vertexCount();
+  const std::size_t trianglesBefore = object->mesh.triangleCount();
+  if (!hasRoom(*object, c.first, c.positions.size(), before, config_.limits.verticesPerObject,
+               config_.limits.verticesInAll, vertices_, kName, "vertex", call)) {
+    return;
+  }
+  const std::size_t refused =
+      object->mesh.setVertices(static_cast<std::uint32_t>(c.first), std::move(c.positions), call.now);
+  if (refused > 0) {
+    call.refuse(kName, "refused: a coordinate is not finite; the vertex stays as it was", " object ",
+                c.object, ", ", refused, " of the vertices from ", c.first, " on");
+  }
+  vertices_ += object->mesh.vertexCount() - before;
+  triangles_ += object->mesh.triangleCount() - trianglesBefore;
+  meshEdited(*object, call);
+}
+
+void ObjectTable::apply(const SetTriangles& c, const Call& call) {
+  constexpr std::string_view kName = "setTriangle";
+  Object* object = find(c.object, kName, call);
+  if (object == nullptr || c.triangles.empty()) return;
+  const std::size_t before = object->mesh.triangleCount();
+  if (!hasRoom(*object, c.first, c.triangles.size(), before, config_.limits.trianglesPerObject,
+               config_.limits.trianglesInAll, triangles_, kName, "triangle", call)) {
+    return;
+  }
+  const auto outside = std::find_if(c.triangles.begin(), c.triangles.end(), [this](const Triangle& t) {
+    return *std::max_element(t.begin(), t.end()) >= config_.limits.verticesPerObject;
+  });
+  if (outside != c.triangles.end()) {
+    call.refuse(kName, "refused: no such vertex is possible", " object ", c.object, ", triangle ",
+                c.first + (outside - c.triangles.begin()), ", vertices ",
+                static_cast<std::int32_t>((*outside)[0]), " ", static_cast<std::int32_t>((*outside)[1]), " ",
+                static_cast<std::int32_t>((*outside)[2]));
+    return;
+  }
+  becomeStock(*object);
+  object->mesh.setTriangles(static_cast<std::uint32_t>(c.first), c.triangles, call.now);
+  triangles_ = triangles_ - before + object->mesh.triangleCount();
+  meshEdited(*object, call);
+}
+
+void ObjectTable::apply(const SetNormal& c, const Call& call) {
+  if (find(c.object, "setNormal", call) == nullptr) return;
+  call.tell("setNormal", "ignored: normals follow from the triangles", " object ", c.object);
+}
+
+void ObjectTable::apply(const RemoveTriangle& c, const Call& call) {
+  constexpr std::string_view kName = "removeTriangle";
+  Object* object = find(c.object, kName, call);
+  if (object == nullptr) return;
+  if (c.triangle < 0 || !object->mesh.removeTriangle(static_cast<std::uint32_t>(c.triangle), call.now)) {
+    call.refuse(kName, "refused: no such triangle was set by setTriangle", " object ", c.object,
+                ", triangle ", c.triangle);
+    return;
+  }
+  meshEdited(*object, call);
+}
+
+void ObjectTable::apply(const ClearMesh& c, const Call& call) {
+  Object* object = find(c.object, "clearTrimesh", call);
+  if (object == nullptr) return;
+  vertices_ -= object->mesh.vertexCount();
+  triangles_ -= object->mesh.triangleCount();
+  object->mesh.clear(call.now);
+  meshEdited(*object, call);
+}
+
+void ObjectTable::apply(const TransformMesh& c, const Call& call) {
+  constexpr std::string_view kName = "transformTrimesh";
+  Object* object = find(c.object, kName, call);
+  if (object == nullptr) return;
+  const std::optional<Affine> t = affineFrom(fromRows(c.matrix));
+  if (!t) {
+    call.refuse(kName, kBadMatrix, " object ", c.object);
+    return;
+  }
+  becomeStock(*object);
+  const Nanos travel = object->poses.next(call.now);
+  if (t->matrix() == object->T_object_mesh.matrix()) return;
+  object->T_object_mesh = *t;
+  moveAll(*object, travel);
+}
+
+void ObjectTable::apply(const SetTrimeshType& c, const Call& call) {
+  call.tell("setTrimeshType", "ignored: there is one way to collide", " object ", c.object, ", type ",
+            c.type);
+}
+
+void ObjectTable::apply(const AddObject& c, const Call& call) {
+  constexpr std::string_view kName = "addObject";
+  if (c.object < 0 || c.object >= config_.limits.objects) {
+    call.refuse(kName, "refused: not an object number this server takes", " object ", c.object, ", limit ",
+                config_.limits.objects);
+    return;
+  }
+  if (!checkParent(c.object, c.parent, kName, call)) return;
+  if (find(c.object) == nullptr) {
+    create(c.object, c.parent);
+  } else if (find(c.object)->parent != c.parent) {
+    apply(MoveToParent{c.object, c.parent}, call);
+  }
+  becomeStock(*find(c.object));
+}
+
+void ObjectTable::apply(const AddObjectExScene& c, const Call& call) {
+  constexpr std::string_view kName = "addObjectExScene";
+  if (c.object < 0 || c.object >= config_.limits.objects) {
+    call.refuse(kName, "refused: not an object number this server takes", " object ", c.object, ", limit ",
+                config_.limits.objects);
+    return;
+  }
+  if (find(c.object) == nullptr) {
+    create(c.object, Object::kNowhere);
+  } else {
+    detach(*find(c.object));
+    attach(*find(c.object), Object::kNowhere);
+    moveAll(*find(c.object), 0);
+  }
+  becomeStock(*find(c.object));
+}
+
+void ObjectTable::apply(const MoveToParent& c, const Call& call) {
+  Object* object = find(c.object, "moveToParent", call);
+  if (object == nullptr || !checkParent(c.object, c.parent, "moveToParent", call)) return;
+  detach(*object);
+  attach(*object, c.parent);
+  moveAll(*object, 0);
+}
+
+void ObjectTable::apply(const RemoveObject& c, const Call& call) {
+  if (find(c.object, "removeObject", call) != nullptr) erase(c.object);
+}
+
+void ObjectTable::apply(const SetTransform& c, const Call& call) {
+  constexpr std::string_view kName = "setTransformMatrix";
+  Object* object = find(c.object, kName, call);
+  if (object == nullptr) return;
+  const std::optional<Affine> t = affineFrom(fromColumns(c.matrix));
+  if (!t) {
+    call.refuse(kName, kBadMatrix, " object ", c.object);
+    return;
+  }
+  object->rotation = geometry::Quat::Identity();
+  object->scale = Vec3::Ones();
+  place(*object, *t, call);
+}
+
+void ObjectTable::apply(const SetObjectPosition& c, const Call& call) {
+  constexpr std::string_view kName = "setObjectPosition";
+  Object* object = find(c.object, kName, call);
+  if (object == nullptr) return;
+  if (!isUsable(c.position_m)) {
+    call.refuse(kName, "refused: not finite or too large", " object ", c.object, ", position ",
+                c.position_m.transpose());
+    return;
+  }
+  becomeStock(*object);
+  Affine t = object->T_parent_object;
+  t.translation() = c.position_m;
+  place(*object, t, call);
+}
+
+void ObjectTable::apply(const SetObjectOrientation& c, const Call& call) {
+  constexpr std::string_view kName = "setObjectOrientation";
+  Object* object = find(c.object, kName, call);
+  if (object == nullptr) return;
+  const std::optional<geometry::Quat> rotation = rotationFrom(c.axis, c.angle_rad);
+  if (!rotation) {
+    call.refuse(kName, "refused: axis or angle is not finite, or the axis is zero", " object ", c.object,
+                ", axis ", c.axis.transpose(), ", angle ", c.angle_rad);
+    return;
+  }
+  becomeStock(*object);
+  object->rotation = *rotation;
+  Affine t = object->T_parent_object;
+  t.linear() = object->rotation.toRotationMatrix() * object->scale.asDiagonal();
+  place(*object, t, call);
+}
+
+void ObjectTable::apply(const SetObjectScale& c, const Call& call) {
+  constexpr std::string_view kName = "setObjectScale";
+  Object* object = find(c.object, kName, call);
+  if (object == nullptr) return;
+  Affine t = object->T_parent_object;
+  t.linear() = object->rotation.toRotationMatrix() * c.scale.asDiagonal();
+  if (!isInvertible(t)) {
+    call.refuse(kName, "refused: a scale is zero or not finite", " object ", c.object, ", scale ",
+                c.scale.transpose());
+    return;
+  }
+  becomeStock(*object);
+  object->scale = c.scale;
+  place(*object, t, call);
+}
+
+void ObjectTable::apply(const SetTouchable& c, const Call& call) {
+  Object* object = find(c.object, "setObjectIsTouchable", call);
+  if (object == nullptr || object->touchable == c.touchable) return;
+  object->touchable = c.touchable;
+  queue(*object);
+}
+
+void ObjectTable::apply(const SetSurfaceProperty& c, const Call& call) {
+  Object* object = find(c.object, "setHapticProperty", call);
+  if (object == nullptr || !object->settings.set(c, config_, call)) return;
+  object->surfaceSetBy = call.client;
+  object->surfaceChanged = true;
+  queue(*object);
+}
+
+void ObjectTable::apply(const SetSurface& c, const Call& call) {
+  Object* object = find(c.object, "updateTrimeshChanges", call);
+  if (object == nullptr) return;
+  becomeStock(*object);
+  object->settings.set(c, config_, call);
+  object->surfaceSetBy = call.client;
+  object->surfaceChanged = true;
+  queue(*object);
+  if (object->mesh.due()) object->mesh.finish();
+}
+
+void ObjectTable::apply(const SetSceneOrigin& c, const Call& call) {
+  const std::optional<geometry::Quat> rotation = rotationFrom(c.axis, c.angle_rad);
+  if (!rotation || !isUsable(c.position_m)) {
+    call.refuse("setSceneOrigin", "refused: not finite or too large, or the axis is zero", " position ",
+                c.position_m.transpose(), ", axis ", c.axis.transpose(), ", angle ", c.angle_rad);
+    return;
+  }
+  T_world_scene_ = Eigen::Translation3d(1000 * c.position_m) * *rotation;
+  for (const auto& object : objects_) {
+    if (object && object->parent == Object::kScene) moveAll(*object, 0);
+  }
+}
+
+}  // namespace hapticd::scene
