@@ -1,0 +1,135 @@
+#include "device/isolation/device_host.h"
+
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <thread>
+
+#include "device/isolation/shared_block.h"
+
+namespace hapticd::device {
+namespace {
+
+using namespace isolation;
+
+// The loop on this side: state out, the newest force in, one tick late.
+class Exchange {
+ public:
+  Exchange(Device& device, SharedBlock& block, double rate_Hz)
+      : device_(device), block_(block), period_(geometry::toNanos(1 / rate_Hz)) {}
+  ~Exchange() { stop(); }
+
+  void start() {
+    if (device_.selfPaced()) {
+      device_.start([this](Nanos now) { tick(now); });
+    } else if (!thread_.joinable()) {
+      leave_ = false;
+      thread_ = std::thread([this] { run(); });
+    }
+  }
+
+  void stop() noexcept {
+    device_.stop();
+    leave_ = true;
+    if (!thread_.joinable()) return;
+    thread_.join();
+    device_.write(Vec3::Zero());
+  }
+
+ private:
+  void tick(Nanos now) noexcept {
+    Posted posted;
+    posted.valid = device_.read(now, posted.state);
+    posted.time = monotonicNow();
+    block_.state.write(posted);
+    countUp(block_.posts);
+
+    const Command& command = block_.command.read();
+    if (command.number != lastCommand_) {
+      lastCommand_ = command.number;
+      commandTime_ = now;
+    }
+    const bool fresh = now - commandTime_ <= kCommandLife && command.force_N.allFinite();
+    device_.write(fresh ? command.force_N : Vec3(Vec3::Zero()));
+  }
+
+  void run() noexcept {
+    for (Nanos due = monotonicNow() + period_; !leave_; due += period_) {
+      const timespec until{due / 1'000'000'000, due % 1'000'000'000};
+      clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
+      const Nanos now = monotonicNow();
+      if (now > due + period_) due = now;  // no ticks are made up for
+      tick(now);
+    }
+  }
+
+  Device& device_;
+  SharedBlock& block_;
+  const Nanos period_;
+  std::thread thread_;
+  std::atomic<bool> leave_{false};
+  std::uint64_t lastCommand_ = 0;
+  Nanos commandTime_ = 0;
+};
+
+std::string answer(const std::string& request, Device& device, Exchange& exchange) {
+  try {
+    if (request == "start") exchange.start();
+    if (request == "stop") exchange.stop();
+    if (request == "calibrate") device.calibrate();
+    return "+" + (request == "fault" ? device.faultText() : std::string());
+  } catch (const std::exception& error) {
+    return std::string("-") + error.what();
+  }
+}
+
+bool send(const std::string& text) {
+  return ::send(kSocketDescriptor, text.data(), text.size(), MSG_NOSIGNAL) >= 0;
+}
+
+// Empty when the server has gone.
+std::string receive() {
+  char text[64];
+  long size = -1;
+  do {
+    size = recv(kSocketDescriptor, text, sizeof text, 0);
+  } while (size < 0 && errno == EINTR);
+  return {text, size > 0 ? static_cast<std::size_t>(size) : 0};
+}
+
+}  // namespace
+
+int runDeviceHost(Device& device, const DeviceHostOptions& options) {
+  std::signal(SIGINT, SIG_IGN);  // a Ctrl-C is for the server, which then ends this process in order
+  try {
+    const SharedMemory memory(kMemoryDescriptor);
+    try {
+      device.open();
+    } catch (const std::exception& error) {
+      send(std::string("-") + error.what());
+      return 1;
+    }
+    memory->profile = SharedProfile::of(device.profile());
+    {
+      Exchange exchange(device, *memory, options.rate_Hz);
+      send("+");
+      for (std::string request = receive(); !request.empty(); request = receive()) {
+        send(answer(request, device, exchange));
+      }
+    }
+    device.close();
+    return 0;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "device host: %s\n", error.what());
+    return 1;
+  }
+}
+
+}  // namespace hapticd::device

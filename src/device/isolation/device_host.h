@@ -1,0 +1,16 @@
+// The whole life of a driver's own process.
+#pragma once
+
+#include "device/device.h"
+
+namespace hapticd::device {
+
+struct DeviceHostOptions {
+  double rate_Hz = 1000;  ///< of the loop of a device that does not pace itself
+};
+
+/// Serves this device, not yet open, to the IsolatedDevice that started the process, until that goes away;
+/// leaves no force behind. The result is for main() to return.
+int runDeviceHost(Device& device, const DeviceHostOptions& options = {});
+
+}  // namespace hapticd::device

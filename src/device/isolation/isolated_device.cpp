@@ -1,0 +1,206 @@
+#include "device/isolation/isolated_device.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <stdexcept>
+#include <system_error>
+
+extern char** environ;
+
+namespace hapticd::device {
+namespace {
+
+using namespace isolation;
+using namespace std::chrono_literals;
+
+constexpr int kOpen_ms = 30000;
+constexpr int kCalibrate_ms = 60000;
+constexpr int kAnswer_ms = 2000;
+constexpr Nanos kSilence = 20'000'000;
+constexpr Nanos kSilentTick = 10'000'000;
+constexpr double kOneTick_s = 0.001;
+
+}  // namespace
+
+void IsolatedDevice::open() {
+  if (process_ >= 0) return;
+  memory_ = std::make_unique<SharedMemory>();
+  int ends[2];
+  if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0) {
+    throw std::system_error(errno, std::generic_category(), "socket to a driver's process");
+  }
+  socket_ = ends[0];
+  try {
+    spawn(ends[1]);
+    ::close(ends[1]);
+    ends[1] = -1;
+    receive(kOpen_ms);
+  } catch (...) {
+    if (ends[1] >= 0) ::close(ends[1]);
+    close();
+    throw;
+  }
+  profile_ = (*memory_)->profile.toProfile();
+  profile_.transportDelay_s += kOneTick_s;
+  silent_ = false;
+}
+
+void IsolatedDevice::spawn(int socketOfChild) {
+  if (options_.command.empty()) throw std::runtime_error("no program for the driver's process is given");
+  std::vector<char*> arguments;
+  for (const std::string& word : options_.command) arguments.push_back(const_cast<char*>(word.c_str()));
+  arguments.push_back(nullptr);
+
+  // Above the numbers that they get there, so that neither replaces the other first.
+  const int memory = fcntl(memory_->descriptor(), F_DUPFD_CLOEXEC, 10);
+  const int socket = fcntl(socketOfChild, F_DUPFD_CLOEXEC, 10);
+  posix_spawn_file_actions_t files;
+  posix_spawn_file_actions_init(&files);
+  posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_adddup2(&files, STDERR_FILENO, STDOUT_FILENO);  // banners
+  posix_spawn_file_actions_adddup2(&files, memory, kMemoryDescriptor);
+  posix_spawn_file_actions_adddup2(&files, socket, kSocketDescriptor);
+  pid_t process = -1;
+  const int error = posix_spawn(&process, arguments[0], &files, nullptr, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&files);
+  ::close(memory);
+  ::close(socket);
+  if (error != 0) throw std::system_error(error, std::generic_category(), options_.command.front());
+  process_ = process;
+}
+
+// The text of an answer; throws its words when it is a refusal.
+std::string IsolatedDevice::receive(int most_ms) const {
+  pollfd wanted{socket_, POLLIN, 0};
+  if (poll(&wanted, 1, most_ms) == 0) {
+    throw std::runtime_error("the driver's process does not answer for " + std::to_string(most_ms) + " ms");
+  }
+  std::array<char, 4096> text;
+  const long size = recv(socket_, text.data(), text.size(), 0);
+  if (size <= 0)
+    throw std::runtime_error("the driver's process ended" + howItEnded() + "; open the device anew");
+  const std::string words(text.data() + 1, static_cast<std::size_t>(size) - 1);
+  if (text[0] != '+') throw std::runtime_error(words);
+  return words;
+}
+
+std::string IsolatedDevice::ask(const std::string& request, int most_ms) const {
+  const std::unique_lock lock(socketMutex_, std::try_to_lock);
+  if (!lock) throw std::runtime_error("the driver's process is busy with another request");
+  if (socket_ < 0) throw std::runtime_error("the device is not open");
+  char late[16];
+  while (recv(socket_, late, sizeof late, MSG_DONTWAIT) > 0) {
+    // An answer to a request that nobody waits for any more.
+  }
+  send(socket_, request.data(), request.size(), MSG_NOSIGNAL);
+  return receive(most_ms);
+}
+
+std::string IsolatedDevice::howItEnded() const {
+  siginfo_t info{};
+  const auto id = static_cast<id_t>(process_.load());
+  for (int i = 0; i < 100 && info.si_pid == 0; ++i) {
+    if (waitid(P_PID, id, &info, WEXITED | WNOHANG | WNOWAIT) != 0) break;
+    if (info.si_pid == 0) std::this_thread::sleep_for(1ms);
+  }
+  if (info.si_pid == 0) return {};
+  if (info.si_code == CLD_EXITED) return " with status " + std::to_string(info.si_status);
+  return " by signal " + std::to_string(info.si_status) + " (" + strsignal(info.si_status) + ")";
+}
+
+void IsolatedDevice::close() noexcept {
+  stop();
+  {
+    const std::lock_guard lock(socketMutex_);
+    if (socket_ >= 0) ::close(socket_);  // the process ends in order
+    socket_ = -1;
+  }
+  endProcess();
+  memory_.reset();
+}
+
+void IsolatedDevice::endProcess() noexcept {
+  const pid_t process = process_.exchange(-1);
+  if (process < 0) return;
+  for (int i = 0; i < 2000; ++i) {
+    if (waitpid(process, nullptr, WNOHANG) != 0) return;
+    std::this_thread::sleep_for(1ms);
+  }
+  kill(process, SIGKILL);
+  waitpid(process, nullptr, 0);
+}
+
+void IsolatedDevice::start(std::function<void(Nanos)> onTick) {
+  if (thread_.joinable()) return;
+  ask("start", kAnswer_ms);
+  onTick_ = std::move(onTick);
+  stopping_ = false;
+  lastPost_ = monotonicNow();
+  thread_ = std::thread([this] { run(); });
+}
+
+void IsolatedDevice::stop() noexcept {
+  if (!thread_.joinable()) return;
+  stopping_ = true;
+  thread_.join();
+  try {
+    ask("stop", kAnswer_ms);
+  } catch (const std::exception&) {
+    // A process that is gone has stopped.
+  }
+}
+
+void IsolatedDevice::run() noexcept {
+  std::uint32_t seen = (*memory_)->posts.load(std::memory_order_acquire);
+  while (!stopping_) {
+    waitForChange((*memory_)->posts, seen, kSilentTick);
+    const std::uint32_t posts = (*memory_)->posts.load(std::memory_order_acquire);
+    const Nanos now = monotonicNow();
+    if (posts != seen) lastPost_ = now;
+    silent_ = now - lastPost_ > kSilence;
+    if (posts == seen && !silent_) continue;
+    seen = posts;
+    onTick_(now);
+  }
+}
+
+bool IsolatedDevice::read(Nanos now, DeviceState& state) noexcept {
+  if (!memory_) return false;
+  const Posted& posted = (*memory_)->state.read();
+  if (!posted.valid && !silent_) return false;
+  postToTick_ = now - posted.time;
+  state = posted.state;
+  if (silent_) state.hold |= kHoldFault;
+  return true;
+}
+
+bool IsolatedDevice::write(const Vec3& force_N) noexcept {
+  if (!memory_ || !force_N.allFinite()) return false;
+  (*memory_)->command.write({silent_ ? Vec3(Vec3::Zero()) : force_N, ++commands_});
+  return true;
+}
+
+std::string IsolatedDevice::faultText() const {
+  try {
+    const std::string words = ask("fault", kAnswer_ms);
+    return words.empty() && silent_ ? "the driver's process does not post states" : words;
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+}
+
+void IsolatedDevice::calibrate() {
+  ask("calibrate", kCalibrate_ms);
+}
+
+}  // namespace hapticd::device

@@ -1,0 +1,80 @@
+// Any driver in a process of its own, so that a crash of a vendor's library is a fault and not the end of the
+// server.
+//
+// The driver's process posts each state and writes the newest force, one tick late; without a fresh force for
+// 3 ms it writes zero. Here, each post wakes the loop.
+#pragma once
+
+#include <sys/types.h>
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "device/device.h"
+#include "device/isolation/shared_block.h"
+
+namespace hapticd::device {
+
+struct IsolatedOptions {
+  /// A program, with arguments, that calls runDeviceHost().
+  std::vector<std::string> command;
+};
+
+/// Self-paced, in a thread of its own that the first tick may set up. A process that dies, or posts nothing
+/// for 20 ms, is a fault; the ticks go on, every 10 ms, and close() and open() start a new process.
+class IsolatedDevice final : public Device {
+ public:
+  explicit IsolatedDevice(IsolatedOptions options) : options_(std::move(options)) {}
+  ~IsolatedDevice() override { close(); }
+
+  void open() override;
+  void close() noexcept override;
+  const DeviceProfile& profile() const noexcept override { return profile_; }
+
+  bool read(Nanos now, DeviceState& state) noexcept override;
+  bool write(const Vec3& force_N) noexcept override;
+
+  std::string faultText() const override;
+  void calibrate() override;
+
+  bool selfPaced() const noexcept override { return true; }
+  void start(std::function<void(Nanos)> onTick) override;
+  void stop() noexcept override;
+
+  /// From the post of the state of this tick until the tick began. In the tick only.
+  Nanos postToTick() const noexcept { return postToTick_; }
+  /// Of the driver's process; -1 when there is none.
+  pid_t process() const noexcept { return process_; }
+
+ private:
+  void spawn(int socketOfChild);
+  std::string receive(int most_ms) const;
+  std::string ask(const std::string& request, int most_ms) const;
+  std::string howItEnded() const;
+  void run() noexcept;
+  void endProcess() noexcept;
+
+  const IsolatedOptions options_;
+  DeviceProfile profile_;
+  std::unique_ptr<isolation::SharedMemory> memory_;
+  std::atomic<pid_t> process_{-1};
+  int socket_ = -1;
+  mutable std::mutex socketMutex_;
+
+  std::function<void(Nanos)> onTick_;
+  std::thread thread_;
+  std::atomic<bool> stopping_{false};
+  std::atomic<bool> silent_{false};
+
+  // The loop's.
+  Nanos lastPost_ = 0;
+  std::uint64_t commands_ = 0;
+  Nanos postToTick_ = 0;
+};
+
+}  // namespace hapticd::device

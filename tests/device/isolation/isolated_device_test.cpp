@@ -1,0 +1,249 @@
+// A driver in a process of its own.
+#include "device/isolation/isolated_device.h"
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <mutex>
+#include <new>
+#include <stdexcept>
+#include <vector>
+
+#include "device/isolation/observed_hand.h"
+#include "device/plane_scene.h"
+
+namespace hapticd::device {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::AllOf;
+using testing::HasSubstr;
+
+bool eventually(const std::function<bool()>& condition) {
+  for (int i = 0; i < 10000; ++i) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(1ms);
+  }
+  return false;
+}
+
+std::string refusal(Device& device) {
+  try {
+    device.open();
+    return "opened";
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+}
+
+class IsolationTest : public testing::TestWithParam<const char*> {
+ protected:
+  IsolationTest() {
+    const int file = ::open(path_.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+    EXPECT_EQ(ftruncate(file, sizeof(ObservedHand)), 0);
+    void* memory = mmap(nullptr, sizeof(ObservedHand), PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
+    ::close(file);
+    hand = new (memory) ObservedHand;
+  }
+  ~IsolationTest() override {
+    munmap(hand, sizeof(ObservedHand));
+    unlink(path_.c_str());
+  }
+  IsolatedOptions host(const std::string& mode) const { return {{TEST_HOST, mode, path_}}; }
+  Vec3 force() const { return {hand->fx, hand->fy, hand->fz}; }
+  // Pushes with one force in every tick and keeps the state.
+  void push(IsolatedDevice& device, const Vec3& force_N) {
+    device.start([this, &device, force_N](Nanos now) {
+      DeviceState read;
+      const bool got = device.read(now, read);
+      device.write(force_N);
+      const std::lock_guard lock(mutex_);
+      got_ = got;
+      state_ = read;
+      ++ticks_;
+    });
+  }
+  DeviceState state() const {
+    const std::lock_guard lock(mutex_);
+    return state_;
+  }
+
+  ObservedHand* hand = nullptr;
+  std::atomic<int> ticks_{0};
+
+ private:
+  const std::string path_ = testing::TempDir() + "hapticd_hand_" + std::to_string(getpid());
+  mutable std::mutex mutex_;
+  DeviceState state_;
+  bool got_ = false;
+};
+
+TEST_P(IsolationTest, StateAndForceCrossTheBoundary) {
+  IsolatedDevice device(host(GetParam()));
+  device.open();
+  EXPECT_EQ(device.profile().model, "observed");
+  EXPECT_EQ(device.profile().peakForce_N, 5);
+  EXPECT_DOUBLE_EQ(device.profile().transportDelay_s, 0.001);
+  EXPECT_TRUE(device.selfPaced());
+  hand->x = 0.01;
+  push(device, Vec3(1, 2, 3));
+  EXPECT_TRUE(eventually([&] { return state().position_m.x() == 0.01 && force() == Vec3(1, 2, 3); }));
+  EXPECT_EQ(state().hold, kHoldNone);
+  EXPECT_FALSE(device.write(Vec3(std::nan(""), 0, 0)));
+  EXPECT_EQ(device.faultText(), "words of the driver");
+  device.calibrate();
+  EXPECT_EQ(hand->calibrations, 1);
+  EXPECT_THROW(device.calibrate(), std::runtime_error);
+  device.stop();
+  EXPECT_TRUE(force().isZero());
+  push(device, Vec3(0, 1, 0));
+  EXPECT_TRUE(eventually([&] { return force() == Vec3(0, 1, 0); })) << "start after stop";
+  device.close();
+  EXPECT_TRUE(force().isZero());
+  EXPECT_EQ(hand->closed, 1) << "closed in order";
+  EXPECT_EQ(device.process(), -1);
+  device.close();
+}
+
+TEST_P(IsolationTest, ACrashIsAFaultAndTheServerGoesOn) {
+  IsolatedDevice device(host(GetParam()));
+  device.open();
+  push(device, Vec3(0, 1, 0));
+  ASSERT_TRUE(eventually([&] { return force().y() == 1; }));
+  hand->fault = 1;
+  EXPECT_TRUE(eventually([&] { return state().hold == kHoldFault; }));
+  const int ticks = ticks_;
+  EXPECT_TRUE(eventually([&] { return ticks_ > ticks + 3; })) << "so that the fault is reported";
+  EXPECT_THAT(device.faultText(), HasSubstr("anew"));
+  device.close();
+  hand->fault = 0;
+  device.open();
+  push(device, Vec3(0, 1, 0));
+  EXPECT_TRUE(eventually([&] { return state().hold == kHoldNone && force().y() == 1; }));
+}
+
+TEST_P(IsolationTest, AHangIsAFault) {
+  IsolatedDevice device(host(GetParam()));
+  device.open();
+  push(device, Vec3(0, 1, 0));
+  ASSERT_TRUE(eventually([&] { return force().y() == 1; }));
+  hand->fault = 2;
+  EXPECT_TRUE(eventually([&] { return state().hold == kHoldFault; }));
+  hand->fault = 0;
+  EXPECT_TRUE(eventually([&] { return state().hold == kHoldNone; }));
+}
+
+TEST_P(IsolationTest, AServerThatStopsTickingLosesItsForce) {
+  IsolatedDevice device(host(GetParam()));
+  device.open();
+  std::atomic<bool> stuck{false};
+  device.start([&](Nanos now) {
+    DeviceState read;
+    device.read(now, read);
+    device.write(Vec3(0, 1, 0));
+    while (stuck) std::this_thread::sleep_for(1ms);
+  });
+  ASSERT_TRUE(eventually([&] { return force().y() == 1; }));
+  stuck = true;
+  EXPECT_TRUE(eventually([&] { return force().isZero(); }));
+  stuck = false;
+  EXPECT_TRUE(eventually([&] { return force().y() == 1; }));
+}
+
+TEST_P(IsolationTest, APlaneFeelsAsOnTheSimulatedDevice) {
+  const std::vector<Vec3> places = plane_scene::places(40);
+  const std::vector<Vec3> expected = plane_scene::referenceForces(places);
+  IsolatedDevice device(host(GetParam()));
+  device.open();
+  realtime::MonotonicClock clock;
+  realtime::Tick servo(device, clock, plane_scene::raw());
+  servo.snapshots().publish(plane_scene::snapshot());
+  const auto moveTo = [&](const Vec3& place) {
+    hand->x = place.x();
+    hand->z = place.z();
+  };
+  moveTo(places.front());
+  std::atomic<double> seenZ{1};
+  device.start([&](Nanos now) {
+    servo(now);
+    seenZ = servo.last().device.position_m.z();
+  });
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    moveTo(places[i]);
+    ASSERT_TRUE(eventually([&] {
+      return seenZ == places[i].z() && (force() - expected[i]).norm() <= 0.01 * expected[i].norm() + 1e-9;
+    })) << "place "
+        << i << ": " << force().transpose() << " instead of " << expected[i].transpose();
+  }
+  device.stop();
+}
+
+// Told, not tested: it is the machine's.
+TEST_P(IsolationTest, TellsTheTimeFromPostToTick) {
+  IsolatedDevice device(host(GetParam()));
+  device.open();
+  std::vector<Nanos> times(2000);
+  std::atomic<std::size_t> count{0};
+  device.start([&](Nanos now) {
+    DeviceState read;
+    device.read(now, read);
+    device.write(Vec3::Zero());
+    if (count < times.size()) times[count] = device.postToTick();
+    ++count;
+  });
+  ASSERT_TRUE(eventually([&] { return count >= times.size(); }));
+  device.stop();
+  std::sort(times.begin(), times.end());
+  std::printf("post to tick: median %.1f us, p99 %.1f us\n", 1e-3 * static_cast<double>(times[1000]),
+              1e-3 * static_cast<double>(times[1980]));
+  EXPECT_GE(times.front(), 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Paced, IsolationTest, testing::Values("selfpaced", "polled"),
+                         [](const auto& test) { return std::string(test.param); });
+
+TEST(Isolation, SaysWhyADriverDoesNotOpen) {
+  IsolatedDevice failing({{TEST_HOST, "failing"}});
+  EXPECT_EQ(refusal(failing), "no such arm");
+  EXPECT_EQ(failing.process(), -1);
+  IsolatedDevice missing({{"/nowhere/host"}});
+  EXPECT_THAT(refusal(missing), HasSubstr("/nowhere/host"));
+  IsolatedDevice none{IsolatedOptions()};
+  EXPECT_THAT(refusal(none), HasSubstr("no program"));
+  IsolatedDevice stranger({{"/bin/true"}});
+  EXPECT_THAT(refusal(stranger), HasSubstr("status 0"));
+#ifndef HAPTICD_SANITIZED  // which turn the signal into an exit
+  IsolatedDevice crashing({{TEST_HOST, "crash"}});
+  EXPECT_THAT(refusal(crashing), HasSubstr("signal 11"));
+#endif
+}
+
+TEST(Isolation, CarriesAVendorsLibrary) {
+  setenv("HAPTICD_HDAPI_LIB", MOCK_HD, 1);
+  IsolatedDevice device({{TEST_HOST, "openhaptics"}});
+  device.open();
+  EXPECT_EQ(device.profile().model, "Touch");
+  EXPECT_DOUBLE_EQ(device.profile().continuousForce_N, 0.88);
+  std::atomic<int> good{0};
+  device.start([&](Nanos now) {
+    DeviceState state;
+    if (device.read(now, state) && state.hold == kHoldNone) ++good;
+    device.write(Vec3(0, 1, 0));
+  });
+  EXPECT_TRUE(eventually([&] { return good > 100; }));
+  device.close();
+}
+
+}  // namespace
+}  // namespace hapticd::device
