@@ -1,7 +1,6 @@
 // Vendor libraries, found when the program runs: none of them is needed to build or to start it.
 #pragma once
 
-#include <initializer_list>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -18,8 +17,8 @@ class LibraryError : public std::runtime_error {
 /// in order.
 struct LibraryNames {
   const char* environment;
-  std::initializer_list<const char*> unixNames;
-  std::initializer_list<const char*> windowsNames;
+  std::vector<const char*> unixNames;
+  std::vector<const char*> windowsNames;
 };
 
 /// One loaded library. It stays loaded until the process ends: vendor libraries leave threads and exit

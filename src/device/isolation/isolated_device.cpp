@@ -193,7 +193,7 @@ bool IsolatedDevice::write(const Vec3& force_N) noexcept {
 std::string IsolatedDevice::faultText() const {
   try {
     const std::string words = ask("fault", kAnswer_ms);
-    return words.empty() && silent_ ? "the driver's process does not post states" : words;
+    return silent_ ? "the driver's process posts no states; open the device anew" : words;
   } catch (const std::exception& error) {
     return error.what();
   }
