@@ -31,6 +31,7 @@ constexpr Nanos kPeriod = 1'000'000;
 struct Options {
   std::string mesh;
   std::string meshUnit = "mm";
+  double size_mm = 0;
   std::string hand;
   std::string out;
   double stiffness_N_per_m = 500;
@@ -161,6 +162,16 @@ Felt follow(const Options& options, const device::HandFile& hand, const scene::S
   return felt;
 }
 
+// Centred, and as large as asked for.
+void fit(geometry::TriangleMesh& mesh, const Options& options) {
+  const geometry::Box bounds = geometry::boundsOf(mesh);
+  if (bounds.empty() || bounds.extents().maxCoeff() <= 0)
+    throw std::runtime_error("the mesh has no extent to scale");
+  const double unitsPerMm = options.meshUnit == "m" ? 1e-3 : 1.0;
+  const double scale = options.size_mm * unitsPerMm / bounds.extents().maxCoeff();
+  geometry::scaleAndMove(mesh, scale, -scale * bounds.centre());
+}
+
 double quantile(std::vector<double>& values, double share) {
   const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), values.begin() + at, values.end());
@@ -171,6 +182,7 @@ int run(const Options& options) {
   const auto hand = device::HandFile::load(options.hand);
   geometry::TriangleMesh mesh = mesh_io::loadMesh(options.mesh);
   const std::size_t triangles = mesh.triangles.size();
+  if (options.size_mm > 0) fit(mesh, options);
 
   const auto before = std::chrono::steady_clock::now();
   const auto snapshot = makeScene(options, std::move(mesh));
@@ -210,6 +222,10 @@ void addRender(CLI::App& app) {
   command->add_option("--mesh-unit", options->meshUnit, "Length unit of the file")
       ->check(CLI::IsMember({"mm", "m"}))
       ->capture_default_str();
+  command
+      ->add_option("--size-mm", options->size_mm,
+                   "Scale the mesh to this largest extent and centre it [as it is]")
+      ->check(CLI::PositiveNumber);
   command->add_option("--hand", options->hand, "CSV: t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons], device metres")
       ->required()
       ->check(CLI::ExistingFile);
