@@ -12,5 +12,6 @@ void addServe(CLI::App& app);
 void addTouch(CLI::App& app);
 void addRender(CLI::App& app);
 void addDoctor(CLI::App& app);
+void addDevices(CLI::App& app);
 
 }  // namespace hapticd::apps

@@ -1,6 +1,5 @@
 // hapticd doctor: checks what a newcomer trips over, measures the loop, and ends in a verdict with the
 // remedies.
-#include <dlfcn.h>
 #include <netinet/in.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
@@ -15,6 +14,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "device_list.h"
 #include "loop_check.h"
 
 namespace hapticd::apps {
@@ -103,19 +103,6 @@ Finding portFree(int type, const char* protocol, std::uint16_t port) {
           "a VRPN server runs already? Else: hapticd serve --listen 127.0.0.1:3884"};
 }
 
-Finding vendorLibrary(const char* device, const std::vector<const char*>& names) {
-  std::string why;
-  for (const char* name : names) {
-    // Lazily and locally: only to see whether it is there, nothing of it is called.
-    if (void* handle = dlopen(name, RTLD_LAZY | RTLD_LOCAL)) {
-      dlclose(handle);
-      return {Verdict::good, std::string(device) + ": " + name + " found", ""};
-    }
-    if (why.empty()) why = dlerror();
-  }
-  return {Verdict::note, std::string(device) + ": not installed (" + why + ")", ""};
-}
-
 int run(double seconds, std::uint16_t port) {
   std::vector<Finding> findings;
   const auto add = [&](const Finding& finding) {
@@ -131,9 +118,7 @@ int run(double seconds, std::uint16_t port) {
   add(portFree(SOCK_STREAM, "TCP", port));
   add(portFree(SOCK_DGRAM, "UDP", port));
   std::printf("devices\n");
-  add({Verdict::good, "simulated hand: always there", ""});
-  add(vendorLibrary("3D Systems OpenHaptics", {"libHD.so", "libHD.so.3.4", "libHD.so.3.0"}));
-  add(vendorLibrary("Force Dimension", {"libdrd.so.3", "libdhd.so.3"}));
+  printDevices(device::findDevices());
 
   std::printf("loop, %g s at 1 kHz with the simulated hand\n", seconds);
   std::fflush(stdout);

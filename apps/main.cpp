@@ -20,6 +20,7 @@ int main(int argc, char** argv) {
   addTouch(app);
   addRender(app);
   addDoctor(app);
+  addDevices(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

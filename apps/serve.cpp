@@ -19,6 +19,8 @@ struct Options {
   std::vector<std::string> names;
   std::string driver;
   std::string hand;
+  bool enableForces = false;
+  bool calibrate = false;
   double reportRate_Hz = 0;
   double seconds = 0;
   bool allowNoRealtime = false;
@@ -33,7 +35,13 @@ server::ServerConfig configOf(const Options& options) {
   if (options.seconds > 0) config.seconds = options.seconds;
   server::DeviceConfig& device = config.devices.front();
   if (!options.names.empty()) device.names = options.names;
-  if (!options.driver.empty()) device.driver = options.driver;
+  if (!options.driver.empty()) {
+    const std::size_t colon = options.driver.find(':');
+    device.driver = options.driver.substr(0, colon);
+    if (colon != std::string::npos) device.hardware = options.driver.substr(colon + 1);
+  }
+  if (options.enableForces) device.enableForces = true;
+  if (options.calibrate) device.calibrate = true;
   if (!options.hand.empty()) device.hand = options.hand;
   if (options.reportRate_Hz > 0) device.reportRate_Hz = options.reportRate_Hz;
   return config;
@@ -97,7 +105,13 @@ void addServe(CLI::App& app) {
                       "ADDR:PORT for TCP and UDP [127.0.0.1:3883]; 0.0.0.0 for all networks");
   command->add_option("--name", options->names,
                       "Name that clients ask for [Phantom]; repeat it for more names");
-  command->add_option("--device", options->driver, "Driver [simulated]: " + drivers);
+  command->add_option(
+      "--device", options->driver,
+      "Driver [simulated]: " + drivers + "\nDRIVER:WHICH picks one of several, e.g. evdev:/dev/input/event5");
+  command->add_flag("--enable-forces", options->enableForces,
+                    "Real devices start without force unless this is given");
+  command->add_flag("--calibrate", options->calibrate,
+                    "Consent to calibrate at the start, which may move the arm");
   command->add_option(
       "--hand", options->hand,
       "Simulated device: 'script' explores whatever is in the scene [script], FILE.csv follows the path\n"

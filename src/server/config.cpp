@@ -132,6 +132,10 @@ DeviceConfig readDevice(const toml::table& table, const std::string& source) {
   reader.take("names", device.names);
   reader.find("name");
   reader.take("driver", device.driver);
+  reader.take("hardware", device.hardware);
+  reader.take("wheel_profile", device.wheelProfile);
+  reader.take("calibrate", device.calibrate);
+  reader.take("enable_forces", device.enableForces);
   reader.take("hand", device.hand);
   reader.take("servo_rate_Hz", device.servoRate_Hz);
   reader.take("report_rate_Hz", device.reportRate_Hz);

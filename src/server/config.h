@@ -29,6 +29,10 @@ enum class SceneOnDisconnect { keep, clear };
 struct DeviceConfig {
   std::vector<std::string> names{"Phantom"};
   std::string driver = "simulated";
+  std::string hardware;      ///< which one, in the driver's words: a device name, an index, /dev/input/event5
+  std::string wheelProfile;  ///< evdev: TOML file with the newtons of a wheel or joystick
+  bool calibrate = false;    ///< consent to calibrate at the start, which may move the arm
+  bool enableForces = false;    ///< real devices start without force unless this is set
   std::string hand = "script";  ///< simulated device: "script", or a CSV file with the intended path
   double servoRate_Hz = 1000;
   double reportRate_Hz = 1000;

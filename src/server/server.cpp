@@ -82,6 +82,7 @@ void Server::run() {
     clock_.refresh();
     closeStaleHandshakes();
     noise_.newSecond();
+    for (const auto& station : stations_) station->checkHealth();
   }));
   if (config_.seconds > 0) {
     subscriptions_.push_back(loop_.after(

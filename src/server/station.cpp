@@ -21,6 +21,8 @@ using geometry::Vec3;
 std::unique_ptr<device::Device> openDevice(const DeviceConfig& config) {
   auto device = makeDevice(config);
   device->open();
+  // A self-paced one calibrates in its own loop, with the consent it was made with.
+  if (config.calibrate && !device->selfPaced()) device->calibrate();
   return device;
 }
 
@@ -111,6 +113,7 @@ struct Station::Impl {
   std::vector<wire::FrameEncoder> reliable{names.size()};
   std::vector<Frames> frames;
   std::uint64_t droppedReports = 0;
+  std::string fault;  // as last logged
 
   // The scene thread's: what the scripted hand was planned for.
   std::vector<std::pair<std::int32_t, std::uint64_t>> explored{{-1, 0}};
@@ -131,8 +134,14 @@ void Station::start(Callbacks callbacks) {
                              .published = [&my](const auto& snapshot) { my.onPublished(*snapshot); },
                              .drained = std::move(callbacks.drained)});
   my.scene->start();
-  const realtime::ThreadSetup& setup = my.servo.start();
   my.running = true;
+  if (my.config.enableForces) my.tick.control().arm();
+  if (my.device->selfPaced()) {
+    my.device->start([&my](geometry::Nanos now) { my.tick(now); });
+    spdlog::info("servo loop of '{}': paced by the device", my.config.names.front());
+    return;
+  }
+  const realtime::ThreadSetup& setup = my.servo.start();
   for (const realtime::SetupAnswer* answer : setup.all()) {
     if (!answer->asked) continue;
     if (answer->granted) {
@@ -147,7 +156,11 @@ void Station::stop() {
   Impl& my = *impl_;
   if (!std::exchange(my.running, false)) return;
   my.tick.control().stop();
-  my.servo.stop();
+  if (my.device->selfPaced()) {
+    my.device->stop();
+  } else {
+    my.servo.stop();
+  }
   my.tick.finish();
   my.device->close();
   my.scene->stop();
@@ -167,6 +180,18 @@ void Station::stop() {
     if (count > 0 && trip.trip != realtime::Trip::stopped)
       spdlog::info("  guard: {} {} times: {}", trip.name, count, trip.text);
   }
+}
+
+void Station::checkHealth() {
+  Impl& my = *impl_;
+  std::string text = my.device->faultText();
+  if (text == my.fault) return;
+  if (text.empty()) {
+    spdlog::info("device '{}': all is well again", my.config.names.front());
+  } else {
+    spdlog::warn("device '{}': {}", my.config.names.front(), text);
+  }
+  my.fault = std::move(text);
 }
 
 bool Station::has(wire::LocalSender name) const noexcept {

@@ -32,6 +32,9 @@ class Station {
   /// Zero force, then everything ends. Idempotent.
   void stop();
 
+  /// Logs what the driver complains of, when it changed. Call it about once a second.
+  void checkHealth();
+
   bool has(wire::LocalSender name) const noexcept;
   /// The name under which this client knows the device.
   wire::LocalSender nameFor(const Session& session) const noexcept;

@@ -50,7 +50,7 @@ DriverReport findOpenHaptics(const DiscoveryOptions& options) {
 }
 
 DriverReport findForceDimension(const DiscoveryOptions& options) {
-  DriverReport report{"force_dimension", {}, {}, {}};
+  DriverReport report{"forcedimension", {}, {}, {}};
   const std::vector<UsbDevice> usb = findUsbDevices(options.usbDevices, {"1451"});
   try {
     const dhd::Api api{DynamicLibrary(dhd::libraryNames())};

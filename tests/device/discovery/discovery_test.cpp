@@ -58,7 +58,7 @@ TEST_F(DiscoveryTest, UsbDevicesAreFoundByVendor) {
 
 TEST_F(DiscoveryTest, AMissingLibraryIsToldInTheLoadersWordsNextToWhatIsPluggedIn) {
   plugIn("1-1", "1451", "0402", "omega");
-  const DriverReport report = of("force_dimension");
+  const DriverReport report = of("forcedimension");
   EXPECT_THAT(report.devices, IsEmpty());
   EXPECT_THAT(report.reason, AllOf(HasSubstr("1451:0402"), HasSubstr("libhapticd_absent.so.1")));
   EXPECT_THAT(report.remedy, HasSubstr("libdrd.so.3"));
@@ -66,7 +66,7 @@ TEST_F(DiscoveryTest, AMissingLibraryIsToldInTheLoadersWordsNextToWhatIsPluggedI
 
 TEST_F(DiscoveryTest, ConnectedArmsAreCounted) {
   setenv("HAPTICD_DHD_LIB", MOCK_DRD, 1);
-  const DriverReport report = of("force_dimension");
+  const DriverReport report = of("forcedimension");
   EXPECT_THAT(report.devices, ElementsAre("device 0"));
   EXPECT_EQ(report.reason, "");
 }

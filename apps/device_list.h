@@ -1,0 +1,13 @@
+// How found devices are told, to 'devices' and 'doctor' alike.
+#pragma once
+
+#include <vector>
+
+#include "device/discovery/discovery.h"
+
+namespace hapticd::apps {
+
+/// Prints one paragraph for each driver.
+void printDevices(const std::vector<device::DriverReport>& reports);
+
+}  // namespace hapticd::apps
