@@ -45,6 +45,10 @@ function(hapticd_library name)
   endif()
 endfunction()
 
+# What the sanitizer runs of scripts/test.sh build: no more than they need.
+add_custom_target(all_tests)
+add_custom_target(threads_tests)
+
 # hapticd_test(NAME SOURCES ... DEPENDS rooms ... [LIBS ...] [LABELS ...])
 # One test program NAME_test; every TEST() in it becomes one ctest case.
 function(hapticd_test name)
@@ -55,7 +59,11 @@ function(hapticd_test name)
   target_include_directories(${name}_test PRIVATE ${PROJECT_SOURCE_DIR}/tests)
   target_link_libraries(${name}_test PRIVATE ${deps} ${A_LIBS} hapticd_flags GTest::gtest_main GTest::gmock)
   target_compile_definitions(${name}_test PRIVATE HAPTICD_TESTDATA="${PROJECT_SOURCE_DIR}/testdata")
+  add_dependencies(all_tests ${name}_test)
   set(properties TIMEOUT 300)
+  if("threads" IN_LIST A_LABELS)
+    add_dependencies(threads_tests ${name}_test)
+  endif()
   if(A_LABELS)
     list(APPEND properties LABELS "${A_LABELS}")
   endif()

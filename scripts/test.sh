@@ -24,9 +24,14 @@ total_failed=0
 for preset in "${presets[@]}"; do
   echo "== $preset"
   cmake --preset "$preset" >/dev/null
-  cmake --build "build/$preset" --parallel "$jobs"
   only=()
-  [ "$preset" = tsan ] && only=(-L threads)
+  case "$preset" in
+    release) target=all ;;
+    asan) target=all_tests ;;
+    tsan) target=threads_tests; only=(-L threads) ;;
+  esac
+  # Ninja's progress in steps of ten, so that a log stays readable.
+  cmake --build "build/$preset" --parallel "$jobs" --target "$target" | awk 'NR % 10 == 1 || !/^\[[0-9]+\/[0-9]+\] (Building|Linking)/'
   log="build/$preset/test.log"
   # One thread builds the index where threads are watched: TBB is not instrumented.
   [ "$preset" = tsan ] && export HAPTICD_EMBREE="threads=1,user_threads=1"
