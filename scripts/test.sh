@@ -27,7 +27,7 @@ for preset in "${presets[@]}"; do
   only=()
   case "$preset" in
     release) target=all ;;
-    asan) target=all_tests ;;
+    asan) target=all_tests; only=(-LE apps) ;;
     tsan) target=threads_tests; only=(-L threads) ;;
   esac
   # Ninja's progress in steps of ten, so that a log stays readable.
