@@ -9,6 +9,9 @@
 #include <set>
 #include <sstream>
 
+#include "net/endpoint.h"
+#include "wire/text.h"
+
 namespace hapticd::server {
 namespace {
 
@@ -243,14 +246,28 @@ ServerConfig parseConfig(const std::string& text, const std::string& source) {
 }
 
 void validate(const ServerConfig& config) {
+  requireRange(config.seconds, 0, 1e9, "seconds");
+  for (const std::string& host : config.callbackHosts) {
+    try {
+      net::Endpoint::parse(host, 1);
+    } catch (const net::Error&) {
+      throw ConfigError("callback_hosts: " + wire::inQuotes(host) +
+                        " is not an IPv4 address such as 10.0.0.7");
+    }
+  }
   std::map<std::string, int> uses;
   for (const DeviceConfig& device : config.devices) {
     if (device.names.empty()) throw ConfigError("a device needs a name, e.g. name = \"Phantom\"");
     for (const std::string& name : device.names) {
       // VRPN's receivers refuse longer descriptions, and its clients split NAME@HOST at the '@'.
-      if (name.empty() || name.size() > 95 || name.find('@') != std::string::npos) {
-        throw ConfigError("device name '" + name + "' must have 1 to 95 characters and no '@'");
+      const bool plain = std::none_of(name.begin(), name.end(), [](char c) {
+        return c == '@' || c == 0x7f || static_cast<unsigned char>(c) < 0x20;
+      });
+      if (name.empty() || name.size() > 95 || !plain) {
+        throw ConfigError("device name " + wire::inQuotes(name) +
+                          " must have 1 to 95 characters, no '@' and no control characters");
       }
+      if (name == "VRPN Control") throw ConfigError("VRPN keeps the name 'VRPN Control' for itself");
       if (++uses[name] > 1) throw ConfigError("the name '" + name + "' is given twice");
     }
     const std::string who = "device '" + device.names.front() + "': ";
@@ -263,6 +280,7 @@ void validate(const ServerConfig& config) {
     if (!box.empty() && (box.size() != 6 || !(box[0] < box[3] && box[1] < box[4] && box[2] < box[5]))) {
       throw ConfigError(who + "workspace needs six numbers, min x y z then max x y z, in mm");
     }
+    for (const double bound : box) requireRange(bound, -10000, 10000, who + "workspace");
   }
 }
 

@@ -144,22 +144,27 @@ void Server::callBack(const net::Endpoint& client) {
   const auto forget = [this, pending] {
     std::erase_if(callBacks_, [pending](const auto& entry) { return entry.get() == pending; });
   };
-  pending->connection.start({.onConnected =
-                                 [this, pending, forget] {
-                                   net::Endpoint local = pending->connection.local();
-                                   local.port = 0;
-                                   auto udp = std::make_unique<net::UdpSocket>(loop_, local);
-                                   net::Connection connection = std::move(pending->connection);
-                                   forget();
-                                   addSession(std::move(connection), std::move(udp));
-                                 },
-                             .onBytes = {},
-                             .onDrained = {},
-                             .onClosed =
-                                 [client, forget](const std::string& reason) {
-                                   spdlog::warn("calling back {}: {}", client.text(), reason);
-                                   forget();
-                                 }});
+  pending->connection.start(
+      {.onConnected =
+           [this, pending, forget] {
+             net::Endpoint local = pending->connection.local();
+             local.port = 0;
+             auto udp = std::make_unique<net::UdpSocket>(loop_, local);
+             net::Connection connection = std::move(pending->connection);
+             forget();
+             if (connection.remote() == net::Endpoint{connection.local().address, address().port}) {
+               noise_.warn("connection request names this server itself: refused");
+               return;
+             }
+             addSession(std::move(connection), std::move(udp));
+           },
+       .onBytes = {},
+       .onDrained = {},
+       .onClosed =
+           [client, forget](const std::string& reason) {
+             spdlog::warn("calling back {}: {}", client.text(), reason);
+             forget();
+           }});
   callBacks_.push_back(std::move(owned));
 }
 
@@ -196,6 +201,10 @@ void Server::onSubscribed(Session& session, wire::LocalSender name) {
 
 void Server::onMessage(Session& session, const wire::MessageReceived& message) {
   if (Station* station = stationOf(message.local_sender)) station->onMessage(session, message);
+}
+
+void Server::onRemark(const Session& session, const std::string& text) {
+  noise_.warn("client " + std::to_string(session.id()) + ": " + text);
 }
 
 void Server::onBatchEnd(Session& session) {

@@ -41,6 +41,7 @@ class Server final : public SessionOwner {
 
   void onSubscribed(Session& session, wire::LocalSender name) override;
   void onMessage(Session& session, const wire::MessageReceived& message) override;
+  void onRemark(const Session& session, const std::string& text) override;
   void onBatchEnd(Session& session) override;
   void onClosed(Session& session, const std::string& reason) override;
 

@@ -2,6 +2,8 @@
 
 #include <spdlog/spdlog.h>
 
+#include "wire/text.h"
+
 namespace hapticd::server {
 namespace {
 
@@ -106,48 +108,57 @@ void Session::onDatagram(std::span<const std::byte> bytes, const net::Endpoint& 
 }
 
 void Session::onEvent(const wire::Event& event) {
-  std::visit(
-      Overloaded{[this](const wire::MessageReceived& message) {
-                   if (message.local_sender.value >= 0) owner_.onMessage(*this, message);
-                 },
-                 [this](const wire::Connected& connected) {
-                   spdlog::info("client {} ({}) speaks VRPN {}", id_, description_, connected.version);
-                 },
-                 [this](const wire::SenderDescribed& described) {
-                   const auto ours = names_.findSender(described.name);
-                   if (ours && subscriptions_.insert(*ours).second) owner_.onSubscribed(*this, *ours);
-                 },
-                 [](const wire::TypeDescribed&) {},
-                 [this](const wire::UdpDescribed& described) {
-                   try {
-                     datagramPeer_ = net::Endpoint::parse(described.address.host, described.address.port);
-                   } catch (const net::Error& error) {
-                     spdlog::warn("client {}: UDP address refused: {}", id_, error.what());
-                     return;
-                   }
-                   if (datagramPeer_.address != connection_.remote().address) {
-                     spdlog::warn(
-                         "client {}: asks for datagrams to {}, which is not where it is; all goes by TCP",
-                         id_, datagramPeer_.text());
-                     return;
-                   }
-                   if (udp_) endpoint_.useDatagrams();
-                 },
-                 [this](const wire::LogRequested& requested) {
-                   // Files that a stranger names are not written.
-                   spdlog::warn("client {}: asks for log files '{}', '{}': refused", id_,
-                                requested.request.in_name, requested.request.out_name);
-                   send(wire::LocalSender{0},
-                        wire::Text{.severity = wire::kTextWarning,
-                                   .level = 0,
-                                   .text = std::string("log files on the server are refused; use "
-                                                       "'hapticd record' or log on the client")});
-                 },
-                 [this](const wire::Ignored& ignored) {
-                   spdlog::debug("client {}: {} ({})", id_, ignored.reason, ignored.value);
-                 },
-                 [this](const wire::ProtocolError& error) { failure_ = std::string(error.reason); }},
-      event);
+  std::visit(Overloaded{[this](const wire::MessageReceived& message) {
+                          if (message.local_sender.value >= 0) owner_.onMessage(*this, message);
+                        },
+                        [this](const wire::Connected& connected) {
+                          spdlog::info("client {} ({}) speaks VRPN {}", id_, description_, connected.version);
+                        },
+                        [this](const wire::SenderDescribed& described) { onSender(described.name); },
+                        [](const wire::TypeDescribed&) {},
+                        [this](const wire::UdpDescribed& described) { onUdp(described.address); },
+                        [this](const wire::LogRequested& requested) { onLogRequest(requested.request); },
+                        [this](const wire::Ignored& ignored) {
+                          spdlog::debug("client {}: {} ({})", id_, ignored.reason, ignored.value);
+                        },
+                        [this](const wire::ProtocolError& error) { failure_ = std::string(error.reason); }},
+             event);
+}
+
+void Session::onSender(std::string_view name) {
+  const auto ours = names_.findSender(name);
+  if (ours) {
+    if (subscriptions_.insert(*ours).second) owner_.onSubscribed(*this, *ours);
+    return;
+  }
+  std::string devices;
+  for (std::size_t i = 1; i < names_.senders().size(); ++i) devices += ' ' + names_.senders()[i];
+  remark("asks for " + wire::inQuotes(name) + ", which is no device here; there is" + devices);
+}
+
+void Session::onUdp(const wire::UdpAddress& address) {
+  try {
+    datagramPeer_ = net::Endpoint::parse(address.host, address.port);
+  } catch (const net::Error& error) {
+    remark(std::string("UDP address refused: ") + error.what());
+    return;
+  }
+  if (datagramPeer_.address != connection_.remote().address) {
+    remark("asks for datagrams to " + datagramPeer_.text() + ", which is not where it is; all goes by TCP");
+    return;
+  }
+  if (udp_) endpoint_.useDatagrams();
+}
+
+// Files that a stranger names are not written.
+void Session::onLogRequest(const wire::LogRequest& request) {
+  remark("asks for log files " + wire::inQuotes(request.in_name) + ", " + wire::inQuotes(request.out_name) +
+         ": refused");
+  send(wire::LocalSender{0},
+       wire::Text{.severity = wire::kTextWarning,
+                  .level = 0,
+                  .text = std::string("log files on the server are refused; use 'hapticd record' or log on "
+                                      "the client")});
 }
 
 }  // namespace hapticd::server

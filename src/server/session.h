@@ -24,6 +24,8 @@ class SessionOwner {
   virtual void onSubscribed(Session& session, wire::LocalSender name) = 0;
   /// A message for one of our devices.
   virtual void onMessage(Session& session, const wire::MessageReceived& message) = 0;
+  /// Worth a line in the log, but a client can cause it as often as it likes.
+  virtual void onRemark(const Session& session, const std::string& text) = 0;
   /// All messages of one read have been given.
   virtual void onBatchEnd(Session& session) = 0;
   /// Over, with the reason; the owner destroys the session after this returns.
@@ -60,6 +62,9 @@ class Session {
   /// Writes what is queued: one system call.
   void flush();
 
+  /// A line in the log about this client, unless there are too many. Quote what the client said.
+  void remark(const std::string& text) { owner_.onRemark(*this, text); }
+
   /// Stops reading while the scene is behind.
   void pause();
   void resume();
@@ -72,6 +77,9 @@ class Session {
   void onBytes(std::span<const std::byte> bytes);
   void onDatagram(std::span<const std::byte> bytes, const net::Endpoint& from);
   void onEvent(const wire::Event& event);
+  void onSender(std::string_view name);
+  void onUdp(const wire::UdpAddress& address);
+  void onLogRequest(const wire::LogRequest& request);
   void drainEndpoint();
 
   scene::ClientId id_;

@@ -12,6 +12,7 @@
 #include "server/explorer.h"
 #include "server/inbox.h"
 
+#include "wire/text.h"
 namespace hapticd::server {
 namespace {
 
@@ -212,7 +213,6 @@ void Station::onMessage(Session& session, const wire::MessageReceived& message) 
     case Inbox::Outcome::taken:
       return;
     case Inbox::Outcome::malformed:
-      spdlog::warn("client {}: {}", session.id(), error);
       session.close("malformed message: " + error);
       return;
     case Inbox::Outcome::notACommand:
@@ -247,7 +247,7 @@ void Station::Impl::answer(Session& session, wire::LocalSender name, const wire:
     session.send(name, wire::TrackerWorkspace{array(world.min), array(world.max)});
   } else if (message.kind == wire::kindOf<wire::Text>) {
     if (const auto text = wire::decode<wire::Text>(message.payload)) {
-      spdlog::info("client {} says: {}", session.id(), text->text.text);
+      session.remark("says " + wire::inQuotes(text->text.text));
     }
   }
 }

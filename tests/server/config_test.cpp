@@ -78,11 +78,22 @@ TEST(Config, ErrorsNameLineKeyValueAndRemedy) {
   EXPECT_EQ(errorOf("[[device]]\nreport_rate_Hz = 2000"),
             "device 'Phantom': report_rate_Hz is 2000; it must lie between 0.1 and 1000");
   EXPECT_EQ(errorOf("[[device]]\nname=\"A\"\n[[device]]\nname=\"A\""), "the name 'A' is given twice");
-  EXPECT_EQ(errorOf("[[device]]\nname=\"A@B\""), "device name 'A@B' must have 1 to 95 characters and no '@'");
+  EXPECT_EQ(errorOf("[[device]]\nname=\"A@B\""),
+            "device name \"A@B\" must have 1 to 95 characters, no '@' and no control characters");
   EXPECT_EQ(errorOf("[[device]]\nworkspace=[1,2,3]"),
             "device 'Phantom': workspace needs six numbers, min x y z then max x y z, in mm");
   EXPECT_NE(errorOf("listen = ").find("test.toml:1: "), std::string::npos);
   EXPECT_NE(errorOf("listen = \"1.2.3.4:70000\"").find("70000"), std::string::npos);
+}
+
+TEST(Config, ValuesThatNoServerCanLiveWithAreNamed) {
+  EXPECT_NE(errorOf("seconds = -5").find("seconds is -5"), std::string::npos);
+  EXPECT_NE(errorOf("seconds = nan").find("seconds is nan"), std::string::npos);
+  EXPECT_NE(errorOf("seconds = 1e300").find("1e+300"), std::string::npos);
+  EXPECT_NE(errorOf("callback_hosts = [\"foo bar\"]").find("\"foo bar\""), std::string::npos);
+  EXPECT_NE(errorOf("[[device]]\nname=\"a\\nb\"").find("\"a\\x0ab\""), std::string::npos);
+  EXPECT_NE(errorOf("[[device]]\nname=\"VRPN Control\"").find("'VRPN Control'"), std::string::npos);
+  EXPECT_NE(errorOf("[[device]]\nworkspace=[-1e300,0,0,1,1,1]").find("-1e+300"), std::string::npos);
 }
 
 TEST(Config, ListenTakesAddressPortOrBoth) {

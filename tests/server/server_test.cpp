@@ -2,9 +2,12 @@
 #include "server/server.h"
 
 #include <gtest/gtest.h>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
 
 #include <random>
 
+#include <sstream>
 #include "running_server.h"
 #include "scripted_peer.h"
 
@@ -271,3 +274,69 @@ TEST(Server, APortInUseIsSaidPlainly) {
 
 }  // namespace
 }  // namespace hapticd::test
+// Catches what the server logs while it lives.
+class Log {
+ public:
+  Log() : before_(spdlog::default_logger()) {
+    spdlog::set_default_logger(
+        std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::ostream_sink_mt>(text_)));
+  }
+  ~Log() { spdlog::set_default_logger(before_); }
+  std::string text() const { return text_.str(); }
+
+ private:
+  std::ostringstream text_;
+  std::shared_ptr<spdlog::logger> before_;
+};
+
+std::size_t countOf(const std::string& words, const std::string& text) {
+  std::size_t n = 0;
+  for (auto at = text.find(words); at != std::string::npos; at = text.find(words, at + 1)) ++n;
+  return n;
+}
+
+TEST(Server, WhatClientsSayIsQuotedAndCannotFloodTheLog) {
+  Log log;
+  {
+    RunningServer server;
+    ScriptedPeer peer(server.address());
+    ASSERT_TRUE(peer.untilConnected());
+    for (int i = 0; i < 2000; ++i)
+      peer.send(wire::Text{.severity = 0, .level = 0, .text = std::string("fine\nforged line")});
+    peer.send(wire::Ping{});
+    ASSERT_TRUE(peer.untilNext<wire::Pong>());
+  }
+  EXPECT_GE(countOf("client 1: says \"fine\\x0aforged line\"", log.text()), 1U);
+  EXPECT_LE(countOf("forged", log.text()), 200U);
+}
+
+TEST(Server, ADeviceThatDoesNotExistIsLoggedWithTheOnesThatDo) {
+  Log log;
+  {
+    RunningServer server;
+    ScriptedPeer peer(server.address(), "Fantom");
+    ASSERT_TRUE(peer.untilConnected());
+    peer.sendBytes(
+        std::vector<std::byte>(24));  // no frame: what came before it has been read when this ends it
+    ASSERT_TRUE(peer.until([&] { return !peer.open(); }));
+  }
+  EXPECT_EQ(countOf("asks for \"Fantom\", which is no device here; there is Phantom", log.text()), 1U);
+}
+
+TEST(Server, ACallBackToTheServerItselfIsRefused) {
+  Log log;
+  {
+    RunningServer server;
+    net::Loop loop;
+    net::UdpSocket udp(loop, net::Endpoint{net::kLoopbackAddress, 0});
+    const std::string request = wire::formatUdpRequest({"127.0.0.1", server.address().port});
+    udp.sendTo(std::as_bytes(std::span(request)), server.address());
+    // The one connection this can make is taken and closed again.
+    ScriptedPeer peer(server.address());
+    ASSERT_TRUE(peer.untilConnected());
+    ASSERT_TRUE(peer.until([&] { return peer.count<wire::IsTouching>() >= 200; }));
+  }
+  EXPECT_EQ(countOf("names this server itself", log.text()), 1U);
+  EXPECT_EQ(countOf("speaks VRPN", log.text()), 1U);
+}
+
