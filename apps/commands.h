@@ -2,11 +2,29 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cmath>
+#include <sstream>
+#include <string>
 
 namespace hapticd::apps {
 
 /// What the process returns; a subcommand's callback sets it.
 inline int exitCode = 0;
+
+/// A number from `least` to `most`. CLI11's own ranges let NaN pass.
+inline CLI::Validator within(double least, double most) {
+  std::ostringstream range;
+  range << least << " to " << most;
+  return CLI::Validator(
+      [least, most, range = range.str()](std::string& text) {
+        double value = std::nan("");
+        if (CLI::detail::lexical_cast(text, value) && value >= least && value <= most) return std::string();
+        return "'" + text + "' is not a number from " + range;
+      },
+      range.str());
+}
+/// Longest time an option may name, in seconds: 30 years.
+inline constexpr double kLongest_s = 1e9;
 
 void addServe(CLI::App& app);
 void addTouch(CLI::App& app);

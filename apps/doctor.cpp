@@ -162,7 +162,7 @@ void addDoctor(CLI::App& app) {
       "doctor",
       "Check this machine: realtime rights, memory lock, governor, timer, ports, vendor libraries, the loop");
   command->add_option("--seconds", options->seconds, "How long to measure the loop")
-      ->check(CLI::Range(0.1, 3600.0))
+      ->check(within(0.1, 3600))
       ->capture_default_str();
   command->add_option("--port", options->port, "Port to look at")->capture_default_str();
   command->footer("Returns 0 when nothing needs mending, 1 otherwise.");

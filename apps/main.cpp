@@ -1,6 +1,8 @@
 // hapticd: a haptics server that speaks VRPN, and the tools around it.
 #include <cstdio>
 #include <exception>
+#include <string>
+#include <vector>
 
 #include "commands.h"
 
@@ -23,6 +25,13 @@ int main(int argc, char** argv) {
   addDevices(app);
   try {
     app.parse(argc, argv);
+  } catch (const CLI::RequiredError& error) {
+    const std::vector<std::string> rest = app.remaining();
+    if (app.get_subcommands().empty() && !rest.empty()) {
+      std::fprintf(stderr, "hapticd: there is no command '%s'; hapticd --help lists them\n", rest[0].c_str());
+      return 2;
+    }
+    return app.exit(error) == 0 ? 0 : 2;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   } catch (const std::exception& error) {

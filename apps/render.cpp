@@ -225,24 +225,24 @@ void addRender(CLI::App& app) {
   command
       ->add_option("--size-mm", options->size_mm,
                    "Scale the mesh to this largest extent and centre it [as it is]")
-      ->check(CLI::PositiveNumber);
+      ->check(within(1e-6, 1e6));
   command->add_option("--hand", options->hand, "CSV: t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons], device metres")
       ->required()
       ->check(CLI::ExistingFile);
   command->add_option("--out", options->out, "CSV to write, one row for each millisecond")->required();
   command->add_option("--stiffness-N-per-m", options->stiffness_N_per_m, "Stiffness K")
-      ->check(CLI::NonNegativeNumber)
+      ->check(within(0, 1e6))
       ->capture_default_str();
   command->add_option("--damping-Ns-per-m", options->damping_Ns_per_m, "Damping B along the normal")
-      ->check(CLI::NonNegativeNumber)
+      ->check(within(0, 1e6))
       ->capture_default_str();
   command->add_option("--static-friction", options->staticFriction, "Coulomb coefficient while sticking")
-      ->check(CLI::NonNegativeNumber)
+      ->check(within(0, 1e6))
       ->capture_default_str();
   command
       ->add_option("--dynamic-friction", options->dynamicFriction,
                    "Coulomb coefficient while sliding, at most the static")
-      ->check(CLI::NonNegativeNumber)
+      ->check(within(0, 1e6))
       ->capture_default_str();
   command
       ->add_option("--faces", options->faces,
@@ -250,7 +250,7 @@ void addRender(CLI::App& app) {
       ->check(CLI::IsMember({"front", "back", "both"}))
       ->capture_default_str();
   command->add_option("--tool-radius-mm", options->toolRadius_mm, "Radius of the tip; 0 is a point")
-      ->check(CLI::Range(0.0, 50.0))
+      ->check(within(0, 50))
       ->capture_default_str();
   command->add_flag("--raw", options->raw,
                     "Leave out the guard, the passivity clamp and the limits of surfaces");

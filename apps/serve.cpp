@@ -117,9 +117,9 @@ void addServe(CLI::App& app) {
       "Simulated device: 'script' explores whatever is in the scene [script], FILE.csv follows the path\n"
       "t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons]");
   command->add_option("--report-rate", options->reportRate_Hz, "Reports a second [1000]")
-      ->check(CLI::Range(0.1, 4000.0));
+      ->check(within(0.1, 4000));
   command->add_option("--seconds", options->seconds, "Stop after this time [until a signal]")
-      ->check(CLI::PositiveNumber);
+      ->check(within(0.001, kLongest_s));
   command->add_flag("--allow-no-rt", options->allowNoRealtime,
                     "Run although the system refuses realtime rights (fine for the simulated hand)");
   command->add_flag("-v,--verbose", options->verbose, "Log more");

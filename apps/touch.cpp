@@ -225,14 +225,14 @@ void addTouch(CLI::App& app) {
   auto options = std::make_shared<TouchOptions>();
   CLI::App* command = app.add_subcommand(
       "touch", "Send a mesh (OBJ, STL, PLY, glTF) to a haptics server and show what is felt");
-  const auto share = CLI::Range(0.0, 1.0);
+  const auto share = within(0, 1);
   command->add_option("mesh", options->mesh, "Mesh file")->required()->check(CLI::ExistingFile);
   command
       ->add_option("--server", options->server,
                    "NAME@host[:port], or NAME@tcp://host[:port] through firewalls")
       ->capture_default_str();
   command->add_option("--seconds", options->seconds, "How long to watch; 0: until Ctrl-C")
-      ->check(CLI::NonNegativeNumber)
+      ->check(within(0, kLongest_s))
       ->capture_default_str();
   command->add_option("--stiffness", options->surface.stiffness, "0 to 1")
       ->check(share)
@@ -248,7 +248,7 @@ void addTouch(CLI::App& app) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_option("--size-mm", options->size_mm, "Largest extent on the device; 0: fit into a small one")
-      ->check(CLI::NonNegativeNumber)
+      ->check(within(0, 1000))
       ->capture_default_str();
   command->add_flag("--keep-scene", options->keep_scene, "Do not empty the server's scene first");
   command->add_flag("--json", options->json, "Print the summary as one line of JSON too, last");
