@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <set>
 
 #include "device/simulated/hand_file.h"
 #include "device/simulated/simulated_device.h"
@@ -11,8 +12,8 @@
 #include "server/devices.h"
 #include "server/explorer.h"
 #include "server/inbox.h"
-
 #include "wire/text.h"
+
 namespace hapticd::server {
 namespace {
 
@@ -107,6 +108,7 @@ struct Station::Impl {
 
   // The net thread's.
   Inbox inbox;
+  std::set<scene::ClientId> commanders;  // who has said something to the scene
   Reporter reporter;
   realtime::TickReport last;
   std::vector<Outgoing> outgoing;
@@ -211,6 +213,9 @@ void Station::onMessage(Session& session, const wire::MessageReceived& message) 
   std::string error;
   switch (my.inbox.take(session.id(), message, error)) {
     case Inbox::Outcome::taken:
+      my.commanders.insert(session.id());
+      // What is felt after a reset comes in gently.
+      if (message.kind == wire::kindOf<wire::ResetScene>) my.tick.control().rampIn();
       return;
     case Inbox::Outcome::malformed:
       session.close("malformed message: " + error);
@@ -263,7 +268,12 @@ bool Station::flushCommands() {
 }
 
 void Station::clientGone(scene::ClientId client) {
-  impl_->inbox.add({client, ClientGone{}});
+  Impl& my = *impl_;
+  my.inbox.add({client, ClientGone{}});
+  const bool lastToCommand = my.commanders.erase(client) == 1 && my.commanders.empty();
+  if (lastToCommand && my.config.sceneOnDisconnect == SceneOnDisconnect::clear) {
+    my.inbox.add({client, scene::SceneCommand{scene::ResetScene{}}});
+  }
   flushCommands();
 }
 

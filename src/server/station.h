@@ -43,6 +43,8 @@ class Station {
   void onMessage(Session& session, const wire::MessageReceived& message);
   /// Hands the gathered commands to the scene; false when it is so far behind that reading should pause.
   bool flushCommands();
+  /// What the client owns ramps out; with the last that had commanded it the scene goes, too, if so
+  /// configured.
   void clientGone(scene::ClientId client);
 
   /// Readable when reports wait.

@@ -5,9 +5,10 @@
 #include <spdlog/sinks/ostream_sink.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <random>
-
 #include <sstream>
+
 #include "running_server.h"
 #include "scripted_peer.h"
 
@@ -240,6 +241,28 @@ TEST(Server, TwoDevicesHaveScenesOfTheirOwn) {
   for (const auto& touching : right.all<wire::IsTouching>()) EXPECT_EQ(touching.touching, 0);
 }
 
+TEST(Server, TheSceneStaysOrGoesWithItsClientAsConfigured) {
+  for (const auto choice : {server::SceneOnDisconnect::keep, server::SceneOnDisconnect::clear}) {
+    server::ServerConfig config = RunningServer::anyPort();
+    config.devices[0].sceneOnDisconnect = choice;
+    RunningServer server(config);
+    {
+      ScriptedPeer first(server.address());
+      ASSERT_TRUE(first.untilConnected());
+      sendCube(first);
+      ASSERT_TRUE(untilTouched(first));
+    }
+    const auto touchedByNext = [&] {
+      ScriptedPeer next(server.address());
+      next.until([&] { return next.count<wire::IsTouching>() >= 100; });  // the hand has let go of what went
+      next.forget();
+      return next.until([&] { return next.count<wire::IsTouching>() >= 1000; }) &&
+             std::ranges::any_of(next.all<wire::IsTouching>(), [](const auto& m) { return m.touching != 0; });
+    };
+    EXPECT_EQ(touchedByNext(), choice == server::SceneOnDisconnect::keep);
+  }
+}
+
 TEST(Server, ACallBackToAnotherHostIsRefused) {
   RunningServer server;
   // An innocent third party listens; a forged request names it by an address that is not the sender's.
@@ -259,21 +282,6 @@ TEST(Server, ACallBackToAnotherHostIsRefused) {
   EXPECT_FALSE(called);
 }
 
-TEST(Server, APortInUseIsSaidPlainly) {
-  RunningServer server;
-  server::ServerConfig second = RunningServer::anyPort();
-  second.port = server.address().port;
-  try {
-    server::Server other(second);
-    FAIL() << "two servers on one port";
-  } catch (const net::Error& error) {
-    EXPECT_NE(std::string(error.what()).find(std::to_string(second.port)), std::string::npos) << error.what();
-    EXPECT_NE(std::string(error.what()).find("--listen"), std::string::npos) << error.what();
-  }
-}
-
-}  // namespace
-}  // namespace hapticd::test
 // Catches what the server logs while it lives.
 class Log {
  public:
@@ -340,3 +348,18 @@ TEST(Server, ACallBackToTheServerItselfIsRefused) {
   EXPECT_EQ(countOf("speaks VRPN", log.text()), 1U);
 }
 
+TEST(Server, APortInUseIsSaidPlainly) {
+  RunningServer server;
+  server::ServerConfig second = RunningServer::anyPort();
+  second.port = server.address().port;
+  try {
+    server::Server other(second);
+    FAIL() << "two servers on one port";
+  } catch (const net::Error& error) {
+    EXPECT_NE(std::string(error.what()).find(std::to_string(second.port)), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("--listen"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace hapticd::test
