@@ -18,10 +18,11 @@ std::vector<std::array<float, 3>> sphere(double radius) {
   constexpr int kColumns = 48;
   const auto at = [&](int row, int column) -> std::array<float, 3> {
     const double latitude = std::numbers::pi * row / kRows;
-    const double longitude = 2 * std::numbers::pi * column / kColumns;
-    return {static_cast<float>(radius * std::sin(latitude) * std::sin(longitude)),
-            static_cast<float>(radius * std::cos(latitude)),
-            static_cast<float>(radius * std::sin(latitude) * std::cos(longitude))};
+    // The seam and the poles to the same bits from both sides, so that the ball is closed.
+    const double longitude = 2 * std::numbers::pi * (column % kColumns) / kColumns;
+    const double around = row % kRows == 0 ? 0 : radius * std::sin(latitude);
+    return {static_cast<float>(around * std::sin(longitude)), static_cast<float>(radius * std::cos(latitude)),
+            static_cast<float>(around * std::cos(longitude))};
   };
   std::vector<std::array<float, 3>> corners;
   for (int r = 0; r < kRows; ++r) {
