@@ -161,8 +161,8 @@ void Server::callBack(const net::Endpoint& client) {
        .onBytes = {},
        .onDrained = {},
        .onClosed =
-           [client, forget](const std::string& reason) {
-             spdlog::warn("calling back {}: {}", client.text(), reason);
+           [this, client, forget](const std::string& reason) {
+             noise_.warn("calling back " + client.text() + ": " + reason);
              forget();
            }});
   callBacks_.push_back(std::move(owned));
