@@ -79,6 +79,14 @@ void Session::close(const std::string& reason) {
   connection_.close(reason);
 }
 
+void Session::refuse(const std::string& reason) {
+  if (inDatagram_) {
+    remark(reason);
+  } else {
+    close(reason);
+  }
+}
+
 void Session::drainEndpoint() {
   net::Buffer bytes;
   endpoint_.takeStream(bytes);
@@ -102,7 +110,9 @@ void Session::onDatagram(std::span<const std::byte> bytes, const net::Endpoint& 
   // Anybody can send datagrams to a port; only the machine at the other end of the TCP connection is the
   // client.
   if (from.address != connection_.remote().address) return;
+  inDatagram_ = true;
   endpoint_.feedDatagram(bytes, [this](const wire::Event& event) { onEvent(event); });
+  inDatagram_ = false;
   owner_.onBatchEnd(*this);
   flush();
 }
@@ -154,11 +164,10 @@ void Session::onUdp(const wire::UdpAddress& address) {
 void Session::onLogRequest(const wire::LogRequest& request) {
   remark("asks for log files " + wire::inQuotes(request.in_name) + ", " + wire::inQuotes(request.out_name) +
          ": refused");
-  send(wire::LocalSender{0},
-       wire::Text{.severity = wire::kTextWarning,
-                  .level = 0,
-                  .text = std::string("log files on the server are refused; use 'hapticd record' or log on "
-                                      "the client")});
+  send(wire::LocalSender{0}, wire::Text{.severity = wire::kTextWarning,
+                                        .level = 0,
+                                        .text = std::string("log files on the server are refused; log on "
+                                                            "the client")});
 }
 
 }  // namespace hapticd::server

@@ -70,6 +70,9 @@ class Session {
   void resume();
   /// Ends it, with a reason for the log; onClosed follows.
   void close(const std::string& reason);
+  /// The message now being given is no good. In the stream this ends the session; in a datagram, which
+  /// anybody at the client's address can forge, it is remarked and forgotten.
+  void refuse(const std::string& reason);
 
   net::ConnectionStatistics statistics() const { return connection_.statistics(); }
 
@@ -93,6 +96,7 @@ class Session {
   std::string description_;
   std::set<wire::LocalSender> subscriptions_;
   std::string failure_;
+  bool inDatagram_ = false;
 };
 
 }  // namespace hapticd::server

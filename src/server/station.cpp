@@ -218,7 +218,7 @@ void Station::onMessage(Session& session, const wire::MessageReceived& message) 
       if (message.kind == wire::kindOf<wire::ResetScene>) my.tick.control().rampIn();
       return;
     case Inbox::Outcome::malformed:
-      session.close("malformed message: " + error);
+      session.refuse("malformed message: " + error);
       return;
     case Inbox::Outcome::notACommand:
       my.answer(session, message.local_sender, message);

@@ -167,6 +167,20 @@ TEST(Server, AMalformedMessageEndsThatConnectionAlone) {
   EXPECT_TRUE(good.open());
 }
 
+TEST(Server, AMalformedDatagramIsForgotten) {
+  RunningServer server;
+  ScriptedPeer peer(server.address(), "Phantom", ScriptedPeer::Mode::udp);
+  ASSERT_TRUE(peer.until([&] { return peer.datagrams() >= 1; }));
+  // A setVertex of 19 bytes: in the stream it would end the connection.
+  peer.endpoint().sendRaw({1, 2}, peer.device(), wire::kLocalType<wire::SetVertex>,
+                          std::vector<std::byte>(19), wire::Reliability::kLowLatency);
+  peer.flush();
+  peer.send(wire::Ping{});
+  EXPECT_TRUE(peer.untilNext<wire::Pong>());
+  EXPECT_TRUE(peer.untilNext<wire::IsTouching>());
+  EXPECT_TRUE(peer.open());
+}
+
 TEST(Server, NoiseOnBothPortsDisturbsNobody) {
   RunningServer server;
   ScriptedPeer good(server.address());
