@@ -84,6 +84,8 @@ TEST(TcpListener, AnExceptionInTheCallbackEndsThatConnectionOnly) {
   EXPECT_TRUE(pumpUntil(loop, [&] { return accepted == 2; }));
 }
 
+// Not under sanitizers: UBSan opens a pipe to look at an object, and takes its failure for a bad object.
+#ifndef HAPTICD_SANITIZED
 TEST(TcpListener, OutOfDescriptorsItTellsAndAcceptsLater) {
   Loop loop;
   std::string error;
@@ -103,6 +105,7 @@ TEST(TcpListener, OutOfDescriptorsItTellsAndAcceptsLater) {
             "cannot accept a connection on " + server.listener.local().text() + ": Too many open files");
   EXPECT_TRUE(pumpUntil(loop, [&] { return server.sessions.size() == 1; }));
 }
+#endif
 
 }  // namespace
 }  // namespace hapticd::net
