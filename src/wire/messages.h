@@ -2,7 +2,7 @@
 // name, direction, reliability, meaning) and fields() (name, value and unit of each field, in wire order).
 // Encoder, decoder, size check, docs/wire-messages.md and the fuzz dictionary are all derived from it.
 //
-// To add a message (for example `hapticd Mesh_Chunk`): write its struct in messages/, append it to the END of
+// To add a message (for example `hapticd Mesh_Vertices`): write its struct in messages/, append it to the END of
 // Message below, and regenerate the docs with `wire_docs markdown > docs/wire-messages.md`. Nothing else
 // changes: peers learn its name in the handshake, and peers that do not know the name never mind it.
 #pragma once
@@ -17,6 +17,7 @@
 #include "wire/messages/analog.h"
 #include "wire/messages/base.h"
 #include "wire/messages/button.h"
+#include "wire/messages/extension.h"
 #include "wire/messages/force_device.h"
 #include "wire/messages/force_device_uma.h"
 #include "wire/messages/scene.h"
@@ -48,7 +49,10 @@ using Message = std::variant<
     // Button
     ButtonChange, ButtonStates, ButtonAdmin, ButtonAlert,
     // Analog
-    AnalogChannels>;
+    AnalogChannels,
+    // Our own
+    QueryCapabilities, Capabilities, MeshVertices, MeshTriangles, BatchBegin, BatchCommit, Subscribe,
+    TickReport, ContactList, StopForces, RearmForces, GuardState, Heartbeat, HoldHand>;
 
 /// Which message: a small integer for switch and table look-up, `case kindOf<SetVertex>:`.
 enum class MessageKind : std::uint8_t {};

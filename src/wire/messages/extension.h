@@ -1,0 +1,252 @@
+// Messages that VRPN does not know. Peers learn names in the handshake and ignore those they do not know, so
+// none of these disturbs a stock client or server. What they do: docs/wire-extensions.md.
+#pragma once
+
+#include "wire/types.h"
+
+namespace hapticd::wire {
+
+/// Version of the extensions, in Capabilities.
+inline constexpr std::int32_t kExtensionVersion = 1;
+
+/// Bits of Capabilities::features.
+enum Feature : std::uint32_t {
+  kFeatureBulkMesh = 1U << 0,
+  kFeatureBatch = 1U << 1,
+  kFeatureSubscribe = 1U << 2,
+  kFeatureStop = 1U << 3,
+  kFeatureHeartbeat = 1U << 4,
+  kFeatureHoldHand = 1U << 5,  ///< the device is simulated
+};
+
+/// Bits of Subscribe::kinds.
+enum ReportKinds : std::uint32_t {
+  kReportTracker = 1U << 0,   ///< Pos_Quat and Velocity
+  kReportForce = 1U << 1,     ///< Force, SCP, DOP, isTouching, TouchedObject, Angle
+  kReportButton = 1U << 2,    ///< Change
+  kReportAnalog = 1U << 3,    ///< Channel
+  kReportTick = 1U << 4,      ///< hapticd Tick
+  kReportContacts = 1U << 5,  ///< hapticd Contacts
+  kReportDefault = kReportTracker | kReportForce | kReportButton | kReportAnalog,
+  kReportAll = (1U << 6) - 1,
+};
+
+struct QueryCapabilities {
+  static constexpr MessageInfo kInfo{"hapticd Query_Capabilities", Direction::kToServer,
+                                     Reliability::kReliable,
+                                     "Asks what this server and its device can do; answered by Capabilities."};
+
+  template <class M, class V>
+  static constexpr void fields(M&, V&&) {}
+};
+
+struct Capabilities {
+  static constexpr MessageInfo kInfo{
+      "hapticd Capabilities", Direction::kToClient, Reliability::kReliable,
+      "Answers Query_Capabilities: version of the extensions, feature bits, facts of the device."};
+  std::int32_t version = kExtensionVersion;
+  std::uint32_t features = 0;
+  double servo_rate = 0;
+  double report_rate = 0;
+  double peak_force = 0;
+  std::int32_t buttons = 0;
+  std::array<double, 6> workspace{};
+
+  template <class M, class V>
+  static constexpr void fields(M& m, V&& v) {
+    v("version", m.version);
+    v("features", m.features);
+    v("servo_rate", m.servo_rate, "Hz");
+    v("report_rate", m.report_rate, "Hz");
+    v("peak_force", m.peak_force, "N");
+    v("buttons", m.buttons);
+    v("workspace", m.workspace, "m");
+  }
+};
+
+struct MeshVertices {
+  /// 5000 vertices: a message stays below the 64,000 bytes that VRPN's buffers hold.
+  static constexpr std::size_t kMost = 5000;
+  static constexpr MessageInfo kInfo{"hapticd Mesh_Vertices", Direction::kToServer, Reliability::kReliable,
+                                     "Sets a run of vertices of an object from number first on: x y z each."};
+  std::int32_t object = 0;
+  std::int32_t first = 0;
+  Counted<std::int32_t, float, 3 * kMost> positions;
+
+  template <class M, class V>
+  static constexpr void fields(M& m, V&& v) {
+    v("object", m.object);
+    v("first", m.first);
+    v("positions", m.positions, "world units");
+  }
+};
+
+struct MeshTriangles {
+  static constexpr std::size_t kMost = 5000;
+  static constexpr MessageInfo kInfo{
+      "hapticd Mesh_Triangles", Direction::kToServer, Reliability::kReliable,
+      "Sets a run of triangles of an object from number first on: three vertex numbers each."};
+  std::int32_t object = 0;
+  std::int32_t first = 0;
+  Counted<std::int32_t, std::int32_t, 3 * kMost> vertices;
+
+  template <class M, class V>
+  static constexpr void fields(M& m, V&& v) {
+    v("object", m.object);
+    v("first", m.first);
+    v("vertices", m.vertices);
+  }
+};
+
+struct BatchBegin {
+  static constexpr MessageInfo kInfo{
+      "hapticd Batch_Begin", Direction::kToServer, Reliability::kReliable,
+      "What this client commands until Batch_Commit becomes visible in one tick, or not at all."};
+
+  template <class M, class V>
+  static constexpr void fields(M&, V&&) {}
+};
+
+struct BatchCommit {
+  static constexpr MessageInfo kInfo{"hapticd Batch_Commit", Direction::kToServer, Reliability::kReliable,
+                                     "Ends a batch and makes it visible."};
+
+  template <class M, class V>
+  static constexpr void fields(M&, V&&) {}
+};
+
+struct Subscribe {
+  static constexpr MessageInfo kInfo{
+      "hapticd Subscribe", Direction::kToServer, Reliability::kReliable,
+      "Chooses which reports this client gets and how often; rate 0 keeps the rate as it is."};
+  std::uint32_t kinds = kReportDefault;
+  double rate = 0;
+
+  template <class M, class V>
+  static constexpr void fields(M& m, V&& v) {
+    v("kinds", m.kinds);
+    v("rate", m.rate, "Hz");
+  }
+};
+
+/// One tick, whole. Positions in world units / 1000 and the world's frame, as the tracker reports.
+struct TickReport {
+  static constexpr MessageInfo kInfo{
+      "hapticd Tick", Direction::kToClient, Reliability::kLowLatency,
+      "Reports one servo tick: its number, its time on the server's monotonic clock, and what it felt."};
+  std::uint64_t tick = 0;
+  std::int64_t time = 0;
+  std::uint64_t revision = 0;
+  F64x3 hand{};
+  F64x3 proxy{};
+  F64x3 velocity{};
+  F64x4 orientation{0, 0, 0, 1};
+  F64x3 force{};
+  double depth = 0;
+  std::int32_t object = -1;
+  std::uint32_t buttons = 0;
+  std::uint32_t guard_active = 0;
+  std::uint32_t guard_latched = 0;
+
+  template <class M, class V>
+  static constexpr void fields(M& m, V&& v) {
+    v("tick", m.tick);
+    v("time", m.time, "ns");
+    v("revision", m.revision);
+    v("hand", m.hand, "m");
+    v("proxy", m.proxy, "m");
+    v("velocity", m.velocity, "m/s");
+    v("orientation", m.orientation);
+    v("force", m.force, "N");
+    v("depth", m.depth, "m");
+    v("object", m.object);
+    v("buttons", m.buttons);
+    v("guard_active", m.guard_active);
+    v("guard_latched", m.guard_latched);
+  }
+};
+
+struct ContactList {
+  /// Numbers of one contact: object, point, normal, force on the hand.
+  static constexpr std::size_t kNumbers = 10;
+  static constexpr MessageInfo kInfo{
+      "hapticd Contacts", Direction::kToClient, Reliability::kLowLatency,
+      "Reports every touched object of a tick: object, point, normal, force on the hand (10 numbers each)."};
+  std::uint64_t tick = 0;
+  std::int64_t time = 0;
+  Counted<std::int32_t, double, 8 * kNumbers> contacts;
+
+  template <class M, class V>
+  static constexpr void fields(M& m, V&& v) {
+    v("tick", m.tick);
+    v("time", m.time, "ns");
+    v("contacts", m.contacts);
+  }
+};
+
+struct StopForces {
+  static constexpr MessageInfo kInfo{"hapticd Stop_Forces", Direction::kToServer, Reliability::kReliable,
+                                     "Brings the force to zero within one tick, until re-armed. Any client "
+                                     "may."};
+
+  template <class M, class V>
+  static constexpr void fields(M&, V&&) {}
+};
+
+struct RearmForces {
+  static constexpr MessageInfo kInfo{"hapticd Rearm_Forces", Direction::kToServer, Reliability::kReliable,
+                                     "Clears a stop and latched faults; forces come back over 0.5 s."};
+
+  template <class M, class V>
+  static constexpr void fields(M&, V&&) {}
+};
+
+struct GuardState {
+  static constexpr MessageInfo kInfo{
+      "hapticd Guard_State", Direction::kToClient, Reliability::kReliable,
+      "Reports, on change, which trips hold the force (bits), whether it is armed or stopped."};
+  std::uint32_t active = 0;
+  std::uint32_t latched = 0;
+  Bool16 armed = 0;
+  Bool16 stopped = 0;
+
+  template <class M, class V>
+  static constexpr void fields(M& m, V&& v) {
+    v("active", m.active);
+    v("latched", m.latched);
+    v("armed", m.armed);
+    v("stopped", m.stopped);
+  }
+};
+
+struct Heartbeat {
+  static constexpr MessageInfo kInfo{
+      "hapticd Heartbeat", Direction::kToServer, Reliability::kReliable,
+      "After the first, a client that sends none for 500 ms counts as lost; watch 0 ends that."};
+  Bool16 watch = 1;
+
+  template <class M, class V>
+  static constexpr void fields(M& m, V&& v) {
+    v("watch", m.watch);
+  }
+};
+
+struct HoldHand {
+  static constexpr MessageInfo kInfo{
+      "hapticd Hold_Hand", Direction::kToServer, Reliability::kLowLatency,
+      "Moves the simulated hand's target while hold is set; one client holds it at a time."};
+  Bool16 hold = 0;
+  F64x3 position{};
+  F64x4 orientation{0, 0, 0, 1};
+  std::uint32_t buttons = 0;
+
+  template <class M, class V>
+  static constexpr void fields(M& m, V&& v) {
+    v("hold", m.hold);
+    v("position", m.position, "world units");
+    v("orientation", m.orientation);
+    v("buttons", m.buttons);
+  }
+};
+
+}  // namespace hapticd::wire
