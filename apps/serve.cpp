@@ -3,6 +3,8 @@
 #include <spdlog/spdlog.h>
 
 #include <csignal>
+#include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <thread>
 
@@ -25,25 +27,38 @@ struct Options {
   double seconds = 0;
   bool allowNoRealtime = false;
   bool verbose = false;
+  bool checkConfig = false;
 };
 
-server::ServerConfig configOf(const Options& options) {
-  server::ServerConfig config;
-  if (!options.configFile.empty()) config = server::loadConfig(options.configFile);
-  if (!options.listen.empty()) server::parseListen(options.listen, config.listenAddress, config.port);
-  if (options.allowNoRealtime) config.allowNoRealtime = true;
-  if (options.seconds > 0) config.seconds = options.seconds;
-  server::DeviceConfig& device = config.devices.front();
-  if (!options.names.empty()) device.names = options.names;
+void applyFlags(const Options& options, server::DeviceConfig& device) {
   if (!options.driver.empty()) {
     const std::size_t colon = options.driver.find(':');
-    device.driver = options.driver.substr(0, colon);
+    const std::string driver = options.driver.substr(0, colon);
+    // What one driver calls its device says nothing to another.
+    if (driver != device.driver) device.hardware.clear();
+    device.driver = driver;
     if (colon != std::string::npos) device.hardware = options.driver.substr(colon + 1);
   }
   if (options.enableForces) device.enableForces = true;
   if (options.calibrate) device.calibrate = true;
   if (!options.hand.empty()) device.hand = options.hand;
   if (options.reportRate_Hz > 0) device.reportRate_Hz = options.reportRate_Hz;
+}
+
+server::ServerConfig configOf(const Options& options, std::vector<std::string>& remarks) {
+  server::ServerConfig config;
+  const std::filesystem::path file = options.configFile;
+  if (!file.empty()) config = server::loadConfig(file, remarks);
+  if (!options.listen.empty()) server::parseListen(options.listen, config.listenAddress, config.port);
+  if (options.allowNoRealtime) config.allowNoRealtime = true;
+  if (options.seconds > 0) config.seconds = options.seconds;
+  if (!options.names.empty()) config.devices.front().names = options.names;
+  applyFlags(options, config.devices.front());
+  // vrpn.cfg has no words for most of the flags.
+  if (file.extension() == ".cfg") {
+    for (server::DeviceConfig& device : config.devices) applyFlags(options, device);
+  }
+  server::validate(config);
   return config;
 }
 
@@ -78,7 +93,20 @@ int run(const Options& options) {
   spdlog::set_pattern("%H:%M:%S.%e %^%l%$ %v");
   spdlog::set_level(options.verbose ? spdlog::level::debug : spdlog::level::info);
   spdlog::flush_on(spdlog::level::info);
-  const server::ServerConfig config = configOf(options);
+  std::vector<std::string> remarks;
+  server::ServerConfig config;
+  try {
+    config = configOf(options, remarks);
+  } catch (const server::ConfigError& error) {
+    std::fprintf(stderr, "hapticd: %s\n", error.what());
+    return 2;
+  }
+  if (options.checkConfig) {
+    for (const std::string& remark : remarks) std::printf("# %s\n", remark.c_str());
+    std::printf("%s", server::toToml(config).c_str());
+    return 0;
+  }
+  for (const std::string& remark : remarks) spdlog::warn("{}", remark);
   StopOnSignal stopper;
   server::Server server(config);
   const std::string at = server.address().text();
@@ -99,8 +127,11 @@ void addServe(CLI::App& app) {
   for (const std::string& name : server::driverNames()) drivers += (drivers.empty() ? "" : ", ") + name;
 
   CLI::App* command = app.add_subcommand("serve", "Own a haptic device and serve it to VRPN clients");
-  command->add_option("--config", options->configFile, "TOML file with everything below and more")
+  command
+      ->add_option("--config", options->configFile, "TOML file with everything below and more, or a vrpn.cfg")
       ->check(CLI::ExistingFile);
+  command->add_flag("--check-config", options->checkConfig,
+                    "Print the configuration in effect as TOML, or what is wrong with it, and end");
   command->add_option("--listen", options->listen,
                       "ADDR:PORT for TCP and UDP [127.0.0.1:3883]; 0.0.0.0 for all networks");
   command->add_option("--name", options->names,
@@ -129,6 +160,8 @@ void addServe(CLI::App& app) {
       "  hapticd serve                                    the simulated hand, on this machine only\n"
       "  hapticd serve --name Tracker0 --name Button0     more names for one device\n"
       "  hapticd serve --listen 0.0.0.0:3883              for other machines, too\n"
+      "  hapticd serve --config vrpn.cfg --device simulated   a VRPN server's file, without its hardware\n"
+      "  hapticd serve --config my.toml --check-config    is the file right, and what does it mean?\n"
       "'hapticd doctor' tells how to get realtime rights.");
   command->callback([options] { exitCode = run(*options); });
 }

@@ -2,15 +2,13 @@
 
 #include <toml++/toml.h>
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <fstream>
-#include <map>
+#include <limits>
 #include <set>
 #include <sstream>
 
-#include "net/endpoint.h"
-#include "wire/text.h"
+#include "server/config_fields.h"
+#include "server/vrpn_cfg.h"
 
 namespace hapticd::server {
 namespace {
@@ -37,37 +35,63 @@ std::size_t editDistance(const std::string& a, const std::string& b) {
   return row[b.size()];
 }
 
-// One table of the file; take() reads a key once, finish() rejects what nobody took.
+// One table of the file; each key is read once, finish() rejects what nobody asked for.
 class Reader {
  public:
   Reader(const toml::table& table, std::string source) : table_(table), source_(std::move(source)) {}
 
-  void take(const std::string& key, double& out) {
-    if (const toml::node* node = find(key)) {
-      const auto value = node->value<double>();
-      if (!value) fail(*node, key, "a number");
-      out = *value;
+  void field(const std::string& key, double& out) { take<double>(key, out, "a number"); }
+  void field(const std::string& key, bool& out) { takeExact<bool>(key, out, "true or false"); }
+  void field(const std::string& key, std::string& out) {
+    takeExact<std::string>(key, out, "a text in quotes");
+  }
+  void field(const std::string& key, std::vector<std::string>& out) {
+    takeList(key, out, "a list of texts in quotes");
+  }
+  void field(const std::string& key, int& out) {
+    std::int64_t value = out;
+    takeExact<std::int64_t>(key, value, "a whole number");
+    if (value < std::numeric_limits<int>::min() || value > std::numeric_limits<int>::max()) {
+      fail(*find(key), key, "a smaller number");
+    }
+    out = static_cast<int>(value);
+  }
+  void milli(const std::string& key, double& out) {
+    if (find(key) == nullptr) return;
+    field(key, out);
+    out *= 1e-3;
+  }
+  void names(const std::string& key, std::vector<std::string>& out) {
+    const toml::node* single = find("name");
+    if (single != nullptr && find(key) != nullptr) fail(*single, "name", "no 'name' beside 'names'");
+    if (single != nullptr) {
+      out.resize(1);
+      field("name", out.front());
+    }
+    field(key, out);
+  }
+  void listen(const std::string& key, std::string& address, std::uint16_t& port) {
+    std::string text;
+    field(key, text);
+    if (text.empty()) return;
+    try {
+      parseListen(text, address, port);
+    } catch (const ConfigError& error) {
+      throw ConfigError(where(source_, *find(key)) + "listen: " + error.what());
     }
   }
-  void take(const std::string& key, bool& out) {
-    if (const toml::node* node = find(key)) {
-      const auto value = node->value_exact<bool>();
-      if (!value) fail(*node, key, "true or false");
-      out = *value;
-    }
+  void workspace(const std::string& key, std::vector<double>& out) {
+    const toml::node* node = find(key);
+    const char* expected = "\"device\", \"paper\" or six numbers";
+    if (node == nullptr || !node->is_string()) return takeList(key, out, expected);
+    const std::string choice = *node->value<std::string>();
+    if (choice != "paper" && choice != "device") fail(*node, key, expected);
+    out.clear();
+    if (choice == "paper") out.assign(kPaperWorkspace_mm.begin(), kPaperWorkspace_mm.end());
   }
-  void take(const std::string& key, std::string& out) {
-    if (const toml::node* node = find(key)) {
-      const auto value = node->value_exact<std::string>();
-      if (!value) fail(*node, key, "a text in quotes");
-      out = *value;
-    }
-  }
-  void take(const std::string& key, std::vector<std::string>& out) { takeList(key, out, "a list of texts"); }
-  void take(const std::string& key, std::vector<double>& out) { takeList(key, out, "a list of numbers"); }
 
   template <class Enum, std::size_t N>
-  void take(const std::string& key, Enum& out, const std::array<std::pair<const char*, Enum>, N>& choices) {
+  void choice(const std::string& key, Enum& out, const Choices<Enum, N>& choices) {
     const toml::node* node = find(key);
     if (node == nullptr) return;
     const auto value = node->value_exact<std::string>();
@@ -99,13 +123,31 @@ class Reader {
     }
   }
 
+ private:
   [[noreturn]] void fail(const toml::node& node, const std::string& key, const std::string& expected) const {
     std::ostringstream value;
     node.visit([&](const auto& n) { value << n; });
     throw ConfigError(where(source_, node) + "'" + key + "' is " + value.str() + ", expected " + expected);
   }
 
- private:
+  template <class T>
+  void take(const std::string& key, T& out, const char* expected) {
+    const toml::node* node = find(key);
+    if (node == nullptr) return;
+    const auto value = node->value<T>();
+    if (!value) fail(*node, key, expected);
+    out = *value;
+  }
+
+  template <class T>
+  void takeExact(const std::string& key, T& out, const char* expected) {
+    const toml::node* node = find(key);
+    if (node == nullptr) return;
+    const auto value = node->value_exact<T>();
+    if (!value) fail(*node, key, expected);
+    out = *value;
+  }
+
   template <class T>
   void takeList(const std::string& key, std::vector<T>& out, const char* expected) {
     const toml::node* node = find(key);
@@ -128,89 +170,39 @@ class Reader {
 DeviceConfig readDevice(const toml::table& table, const std::string& source) {
   DeviceConfig device;
   Reader reader(table, source);
-  if (std::string name; table.contains("name")) {
-    reader.take("name", name);
-    device.names = {name};
-  }
-  reader.take("names", device.names);
-  reader.find("name");
-  reader.take("driver", device.driver);
-  reader.take("hardware", device.hardware);
-  reader.take("wheel_profile", device.wheelProfile);
-  reader.take("calibrate", device.calibrate);
-  reader.take("enable_forces", device.enableForces);
-  reader.take("hand", device.hand);
-  reader.take("servo_rate_Hz", device.servoRate_Hz);
-  reader.take("report_rate_Hz", device.reportRate_Hz);
-  double linear_mm = device.linearTolerance_m * 1e3;
-  reader.take("linear_tolerance_mm", linear_mm);
-  device.linearTolerance_m = linear_mm * 1e-3;
-  reader.take("angular_tolerance_rad", device.angularTolerance_rad);
-  double radius_mm = device.toolRadius_m * 1e3;
-  reader.take("tool_radius_mm", radius_mm);
-  device.toolRadius_m = radius_mm * 1e-3;
-  const toml::node* workspace = reader.find("workspace");
-  if (workspace != nullptr && workspace->is_string()) {
-    const std::string choice = *workspace->value<std::string>();
-    if (choice == "paper") {
-      device.workspace_mm = {-80, -80, -70, 80, 80, 20};
-    } else if (choice != "device") {
-      reader.fail(*workspace, "workspace", "\"device\", \"paper\" or six numbers");
-    }
-  } else {
-    reader.take("workspace", device.workspace_mm);
-  }
-  reader.take("material_scale", device.materialScale,
-              std::array{std::pair{"reference", MaterialScale::reference},
-                         std::pair{"device", MaterialScale::device}});
-  reader.take("quaternion_order", device.quaternionOrder,
-              std::array{std::pair{"xyzw", QuaternionOrder::xyzw}, std::pair{"wxyz", QuaternionOrder::wxyz}});
-  reader.take("force_report", device.forceReport,
-              std::array{std::pair{"total", ForceReport::total}, std::pair{"normal", ForceReport::normal}});
-  reader.take("workspace_fit", device.workspaceFit,
-              std::array{std::pair{"published", WorkspaceFit::published},
-                         std::pair{"enclose", WorkspaceFit::enclose}});
-  reader.take(
-      "vibration_contact_unit", device.vibrationContactUnit,
-      std::array{std::pair{"rad/s", VibrationUnit::radPerSecond}, std::pair{"Hz", VibrationUnit::hertz}});
-  reader.take(
-      "vibration_motor_frame", device.vibrationMotorFrame,
-      std::array{std::pair{"stylus", VibrationFrame::stylus}, std::pair{"device", VibrationFrame::device}});
-  reader.take(
-      "scene_on_disconnect", device.sceneOnDisconnect,
-      std::array{std::pair{"keep", SceneOnDisconnect::keep}, std::pair{"clear", SceneOnDisconnect::clear}});
+  visitFields(reader, device);
   reader.finish();
   return device;
 }
 
-void requireRange(double value, double low, double high, const std::string& what) {
-  if (value >= low && value <= high) return;
-  std::ostringstream text;
-  text << what << " is " << value << "; it must lie between " << low << " and " << high;
-  throw ConfigError(text.str());
+std::vector<DeviceConfig> readDevices(const toml::node& node, const std::string& source) {
+  const toml::array* list = node.as_array();
+  if (list == nullptr || list->empty() || !list->is_array_of_tables()) {
+    throw ConfigError(where(source, node) + "'device' must be written as [[device]], once for each device");
+  }
+  std::vector<DeviceConfig> devices;
+  for (const toml::node& item : *list) devices.push_back(readDevice(*item.as_table(), source));
+  return devices;
+}
+
+// Where a value is set, or, when it is a default, what it belongs to.
+const toml::node& placeOf(const InvalidValue& error, const toml::table& root) {
+  const toml::table* table = &root;
+  const toml::array* devices = root.get_as<toml::array>("device");
+  if (error.device() && devices != nullptr) table = devices->get_as<toml::table>(*error.device());
+  const toml::node* node = table->get(error.key());
+  if (node == nullptr && error.key() == "names") node = table->get("name");
+  return node == nullptr ? *table : *node;
 }
 
 }  // namespace
 
-void parseListen(const std::string& text, std::string& address, std::uint16_t& port) {
-  const std::size_t colon = text.rfind(':');
-  const std::string host = text.substr(0, colon);
-  if (!host.empty()) address = host;
-  if (colon == std::string::npos) return;
-  const std::string digits = text.substr(colon + 1);
-  unsigned value = 0;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  if (error != std::errc{} || end != digits.data() + digits.size() || value > 65535) {
-    throw ConfigError("'" + text + "' is not ADDR:PORT with a port from 0 to 65535, e.g. 127.0.0.1:3883");
-  }
-  port = static_cast<std::uint16_t>(value);
-}
-
-ServerConfig loadConfig(const std::filesystem::path& file) {
+ServerConfig loadConfig(const std::filesystem::path& file, std::vector<std::string>& remarks) {
   std::ifstream in(file);
   if (!in) throw ConfigError("cannot read the configuration file '" + file.string() + "'");
   std::ostringstream text;
   text << in.rdbuf();
+  if (file.extension() == ".cfg") return parseVrpnCfg(text.str(), file.string(), remarks);
   return parseConfig(text.str(), file.string());
 }
 
@@ -225,63 +217,15 @@ ServerConfig parseConfig(const std::string& text, const std::string& source) {
   }
   ServerConfig config;
   Reader reader(root, source);
-  std::string listen;
-  reader.take("listen", listen);
-  if (!listen.empty()) parseListen(listen, config.listenAddress, config.port);
-  reader.take("allow_no_rt", config.allowNoRealtime);
-  reader.take("seconds", config.seconds);
-  reader.take("callback_hosts", config.callbackHosts);
-  if (const toml::node* node = reader.find("device")) {
-    const toml::array* list = node->as_array();
-    if (list == nullptr || list->empty() || !list->is_array_of_tables()) {
-      throw ConfigError(where(source, *node) +
-                        "'device' must be written as [[device]], once for each device");
-    }
-    config.devices.clear();
-    for (const toml::node& item : *list) config.devices.push_back(readDevice(*item.as_table(), source));
-  }
+  visitFields(reader, config);
+  if (const toml::node* node = reader.find("device")) config.devices = readDevices(*node, source);
   reader.finish();
-  validate(config);
+  try {
+    validate(config);
+  } catch (const InvalidValue& error) {
+    throw ConfigError(where(source, placeOf(error, root)) + error.what());
+  }
   return config;
-}
-
-void validate(const ServerConfig& config) {
-  requireRange(config.seconds, 0, 1e9, "seconds");
-  for (const std::string& host : config.callbackHosts) {
-    try {
-      net::Endpoint::parse(host, 1);
-    } catch (const net::Error&) {
-      throw ConfigError("callback_hosts: " + wire::inQuotes(host) +
-                        " is not an IPv4 address such as 10.0.0.7");
-    }
-  }
-  std::map<std::string, int> uses;
-  for (const DeviceConfig& device : config.devices) {
-    if (device.names.empty()) throw ConfigError("a device needs a name, e.g. name = \"Phantom\"");
-    for (const std::string& name : device.names) {
-      // VRPN's receivers refuse longer descriptions, and its clients split NAME@HOST at the '@'.
-      const bool plain = std::none_of(name.begin(), name.end(), [](char c) {
-        return c == '@' || c == 0x7f || static_cast<unsigned char>(c) < 0x20;
-      });
-      if (name.empty() || name.size() > 95 || !plain) {
-        throw ConfigError("device name " + wire::inQuotes(name) +
-                          " must have 1 to 95 characters, no '@' and no control characters");
-      }
-      if (name == "VRPN Control") throw ConfigError("VRPN keeps the name 'VRPN Control' for itself");
-      if (++uses[name] > 1) throw ConfigError("the name '" + name + "' is given twice");
-    }
-    const std::string who = "device '" + device.names.front() + "': ";
-    requireRange(device.servoRate_Hz, 250, 4000, who + "servo_rate_Hz");
-    requireRange(device.reportRate_Hz, 0.1, device.servoRate_Hz, who + "report_rate_Hz");
-    requireRange(device.linearTolerance_m, 0, 1, who + "linear_tolerance_mm / 1000");
-    requireRange(device.angularTolerance_rad, 0, 3.2, who + "angular_tolerance_rad");
-    requireRange(device.toolRadius_m, 0, 0.05, who + "tool_radius_mm / 1000");
-    const auto& box = device.workspace_mm;
-    if (!box.empty() && (box.size() != 6 || !(box[0] < box[3] && box[1] < box[4] && box[2] < box[5]))) {
-      throw ConfigError(who + "workspace needs six numbers, min x y z then max x y z, in mm");
-    }
-    for (const double bound : box) requireRange(bound, -10000, 10000, who + "workspace");
-  }
 }
 
 }  // namespace hapticd::server

@@ -1,0 +1,38 @@
+#!/usr/bin/env bash
+# hapticd serve --check-config: what is printed can be fed back; what is wrong ends with 2 and is named.
+set -euo pipefail
+hapticd=$1
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work"
+
+fails_with() {  # TEXT ARGUMENT...
+  local text=$1 status=0
+  shift
+  "$hapticd" serve --check-config "$@" >out.txt 2>error.txt || status=$?
+  if [ "$status" != 2 ] || ! grep -qF -- "$text" error.txt || [ -s out.txt ]; then
+    echo "expected status 2 and '$text', got status $status and: $(cat error.txt out.txt)"
+    exit 1
+  fi
+}
+
+printf 'listen = ":4000"\n\n[[device]]\nname = "Left"\nreport_rate_Hz = 250\n' >left.toml
+"$hapticd" serve --config left.toml --name Right --check-config >effective.toml
+grep -qx 'listen = "127.0.0.1:4000"' effective.toml
+grep -qx 'names = \["Right"\]' effective.toml
+grep -qx 'report_rate_Hz = 250' effective.toml
+"$hapticd" serve --config effective.toml --check-config >again.toml
+cmp effective.toml again.toml
+
+printf '# lab\nvrpn_OpenHaptics A 1 500 1 0.02 Default PHANToM\nvrpn_Dial D 1\nvrpn_Phantom B 0 60 Second\n' >vrpn.cfg
+"$hapticd" serve --config vrpn.cfg --device simulated --check-config >effective.toml
+grep -q '^# vrpn.cfg:3: "vrpn_Dial" is no device of this server' effective.toml
+[ "$(grep -cx 'driver = "simulated"' effective.toml)" = 2 ]
+"$hapticd" serve --config effective.toml --check-config >again.toml
+grep -v '^#' effective.toml | cmp - again.toml
+
+printf '\n[[device]]\nreport_rate_Hz = 2000\n' >bad.toml
+fails_with "bad.toml:3: device 'Phantom': report_rate_Hz is 2000; it must lie between" --config bad.toml
+printf 'vrpn_Phantom P 1 fast X\n' >bad.cfg
+fails_with 'bad.cfg:1: report_rate_Hz is "fast", expected a number' --config bad.cfg
+fails_with "no driver is called 'hal'" --device hal
