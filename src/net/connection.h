@@ -19,14 +19,15 @@
 
 namespace hapticd::net {
 
-/// The bounds of a connection; a zero timeout leaves the system's own.
+/// The bounds of a connection; with zero timeouts a lost peer is noticed when the system gives up, after a
+/// quarter of an hour.
 struct ConnectionOptions {
   /// Queued bytes above which low-latency buffers are dropped.
   std::size_t lowMarkBytes = std::size_t{256} * 1024;
   /// Queued reliable bytes above which the connection is ended: its peer does not read.
   std::size_t hardLimitBytes = std::size_t{8} * 1024 * 1024;
-  /// How long sent data may stay unacknowledged before the peer counts as lost (TCP_USER_TIMEOUT). A peer
-  /// whose program stops reading until its window is full counts as lost after the same time.
+  /// How long the peer may leave unacknowledged what should be before it counts as lost. A peer whose program
+  /// stops reading acknowledges all the same, and stays.
   std::chrono::milliseconds lossTimeout{0};
   /// Silence after which, and interval at which, an idle peer is probed (TCP keep-alive).
   std::chrono::seconds keepAlive{0};

@@ -31,6 +31,7 @@ Connection::Impl::Impl(Loop::Impl& loop, const ConnectionOptions& options)
       options_(options),
       socket_(loop.context),
       timer_(loop.context),
+      watchTimer_(loop.context),
       queue_(options.lowMarkBytes) {}
 
 void Connection::Impl::connect(const Endpoint& peer, std::chrono::milliseconds timeout) {
@@ -83,16 +84,38 @@ void Connection::Impl::applyOptions() {
   if (options_.sendBufferBytes > 0) {
     setSendBuffer(fd, options_.sendBufferBytes);
   }
-  net::setLossDetection(fd, options_.lossTimeout, options_.keepAlive);
+  setKeepAlive(fd, options_.keepAlive);
+  armWatch();
 }
 
 void Connection::Impl::setLossDetection(std::chrono::milliseconds lossTimeout,
                                         std::chrono::seconds keepAlive) {
   options_.lossTimeout = lossTimeout;
   options_.keepAlive = keepAlive;
+  watch_ = LossWatch(lossTimeout);
   if (state_ == State::open) {  // otherwise becomeOpen() applies it, or it is too late
-    net::setLossDetection(socket_.native_handle(), lossTimeout, keepAlive);
+    setKeepAlive(socket_.native_handle(), keepAlive);
+    armWatch();
   }
+}
+
+void Connection::Impl::armWatch() {
+  watchTimer_.cancel();
+  if (!watch_.active()) {
+    return;
+  }
+  watchTimer_.expires_after(watch_.interval());
+  watchTimer_.async_wait([this, self = shared_from_this()](const ErrorCode& error) {
+    if (error || state_ != State::open || !failure_.empty()) {
+      return;
+    }
+    const auto link = linkState(socket_.native_handle());
+    if (link && watch_.isLost(*link, std::chrono::steady_clock::now())) {
+      writeFailed(asio::error::timed_out);
+    } else {
+      armWatch();
+    }
+  });
 }
 
 void Connection::Impl::start(ConnectionHandlers handlers) {
@@ -302,6 +325,7 @@ void Connection::Impl::finish(std::string reason) {
   state_ = State::closed;
   queue_.clear();
   timer_.cancel();
+  watchTimer_.cancel();
   ErrorCode ignored;
   socket_.close(ignored);
   asio::post(loop_.context, [self = shared_from_this()] { self->notifyClosed(); });
@@ -319,6 +343,7 @@ void Connection::Impl::release() noexcept {
     state_ = State::closed;
     queue_.clear();
     timer_.cancel();
+    watchTimer_.cancel();
     ErrorCode ignored;
     socket_.close(ignored);
   });

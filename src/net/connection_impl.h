@@ -7,6 +7,7 @@
 #include <boost/asio/steady_timer.hpp>
 
 #include "net/connection.h"
+#include "net/loss_watch.h"
 
 namespace hapticd::net {
 
@@ -52,6 +53,7 @@ class Connection::Impl : public std::enable_shared_from_this<Connection::Impl> {
   void write();
   void writeFailed(const ErrorCode& error);
   void queueEmptied(bool wasBlocked);
+  void armWatch();
   void armTimer(std::chrono::milliseconds timeout, std::string reason);
   void finish(std::string reason);
   void notifyClosed();
@@ -62,6 +64,8 @@ class Connection::Impl : public std::enable_shared_from_this<Connection::Impl> {
   ConnectionOptions options_;
   Socket socket_;
   boost::asio::steady_timer timer_;  // of connect(), then of close()
+  boost::asio::steady_timer watchTimer_;
+  LossWatch watch_{options_.lossTimeout};
   // Shared so that a callback that destroys its connection goes on running on living captures.
   std::shared_ptr<ConnectionHandlers> handlers_;
   SendQueue queue_;

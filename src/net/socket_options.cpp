@@ -7,6 +7,8 @@
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 
+#include <algorithm>
+
 namespace hapticd::net {
 namespace {
 
@@ -28,17 +30,23 @@ void setSendBuffer(int fd, int bytes) noexcept {
   setOption(fd, SOL_SOCKET, SO_SNDBUF, bytes);
 }
 
-void setLossDetection(int fd, std::chrono::milliseconds lossTimeout,
-                      std::chrono::seconds keepAlive) noexcept {
+void setKeepAlive(int fd, std::chrono::seconds interval) noexcept {
   constexpr int kProbes = 3;
-  const int interval = static_cast<int>(keepAlive.count());
-  setOption(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, static_cast<int>(lossTimeout.count()));
-  setOption(fd, SOL_SOCKET, SO_KEEPALIVE, interval > 0 ? 1 : 0);
-  if (interval > 0) {
-    setOption(fd, IPPROTO_TCP, TCP_KEEPIDLE, interval);
-    setOption(fd, IPPROTO_TCP, TCP_KEEPINTVL, interval);
+  const int seconds = static_cast<int>(interval.count());
+  setOption(fd, SOL_SOCKET, SO_KEEPALIVE, seconds > 0 ? 1 : 0);
+  if (seconds > 0) {
+    setOption(fd, IPPROTO_TCP, TCP_KEEPIDLE, seconds);
+    setOption(fd, IPPROTO_TCP, TCP_KEEPINTVL, seconds);
     setOption(fd, IPPROTO_TCP, TCP_KEEPCNT, kProbes);
   }
+}
+
+std::optional<LinkState> linkState(int fd) noexcept {
+  tcp_info info{};
+  socklen_t size = sizeof info;
+  if (::getsockopt(fd, IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return std::nullopt;
+  return LinkState{info.tcpi_unacked > 0, info.tcpi_probes,
+                   std::chrono::milliseconds(std::min(info.tcpi_last_ack_recv, info.tcpi_last_data_recv))};
 }
 
 std::size_t unacknowledgedBytes(int fd) noexcept {

@@ -4,6 +4,9 @@
 
 #include <chrono>
 #include <cstddef>
+#include <optional>
+
+#include "net/loss_watch.h"
 
 namespace hapticd::net {
 
@@ -13,8 +16,10 @@ void setCloseOnExec(int fd) noexcept;
 void setNoDelay(int fd) noexcept;
 /// Size of the system's send buffer.
 void setSendBuffer(int fd, int bytes) noexcept;
-/// How long data may stay unacknowledged, and how often a silent peer is probed; zero: the system's own.
-void setLossDetection(int fd, std::chrono::milliseconds lossTimeout, std::chrono::seconds keepAlive) noexcept;
+/// How often a silent peer is probed; zero: never.
+void setKeepAlive(int fd, std::chrono::seconds interval) noexcept;
+/// What LossWatch wants to know; nothing when the socket is closed.
+std::optional<LinkState> linkState(int fd) noexcept;
 /// Bytes handed to the system that the peer has not acknowledged.
 std::size_t unacknowledgedBytes(int fd) noexcept;
 

@@ -134,18 +134,27 @@ TEST(SlowReader, TellsWhenTheQueueIsEmptyAgain) {
   EXPECT_EQ(drained, 1);
 }
 
-// The system counts a window that stays full like silence: whoever sets lossTimeout must know.
-TEST(SlowReader, CountsAsLostAfterTheLossTimeout) {
+// Long enough for the system to close the window, to probe it and to get no answer to the second probe.
+TEST(SlowReader, StaysConnectedHoweverLongItDoesNotRead) {
   Loop loop;
   ConnectionOptions options = tightOptions();
-  options.lossTimeout = std::chrono::milliseconds(100);
+  options.lossTimeout = std::chrono::milliseconds(500);
+  options.keepAlive = std::chrono::seconds(1);
   Server server(loop, options);
-  const RawSocket slow = server.join(kSmallBuffer);
+  RawSocket slow = server.join(kSmallBuffer);
   Connection& connection = server.last().connection;
-  connection.send(bytesOf(std::string(200'000, 'x')));
-  connection.flush();
-  ASSERT_TRUE(pumpUntil(loop, [&] { return !server.last().closed.empty(); }));
-  EXPECT_EQ(server.last().closed, "the peer is lost: it acknowledged nothing in time");
+  connection.send(record(Delivery::reliable, 0));
+  int lowLatency = 0;
+  const Subscription reports = loop.every(std::chrono::milliseconds(1), [&] {
+    connection.send(record(Delivery::lowLatency, lowLatency++), Delivery::lowLatency);
+    connection.flush();
+  });
+  loop.runFor(std::chrono::milliseconds(2500));
+  EXPECT_TRUE(connection.isOpen());
+  EXPECT_GT(connection.statistics().droppedBuffers, 0u);
+  EXPECT_EQ(server.last().closed, "");
+  EXPECT_EQ(parseRecord(slow.receive(kRecordBytes)), std::pair('R', 0));
+  EXPECT_EQ(parseRecord(slow.receive(kRecordBytes)), std::pair('L', 0));
 }
 
 }  // namespace
