@@ -48,7 +48,7 @@ void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState
   out.proxy_m = out.scp_m = s.proxy.position();
   if ((out.status & kRenderReleased) == 0) {
     applySurfaceLaw(grip, out.proxy_m, hand.velocity_m_per_s, radius, out);
-    out.contactForce_N += s.proxy.planes().adhesion(hip, radius);
+    applyAdhesion(s.proxy.planes().adhesion(hip, radius), out);
   }
   out.force_N = out.contactForce_N;
   out.force_N += s.effects.force(scene, hand, out, now);

@@ -14,14 +14,15 @@ using geometry::Affine;
 using geometry::Nanos;
 using geometry::Vec3;
 
-inline constexpr int kMaxContacts = 8;
+inline constexpr int kMaxContacts = 4;  ///< three faces hold, and a plane may pull
 
-/// One object that pushes the hand in this tick. Device frame, metres, newtons.
+/// One object that pushes the hand in this tick; planes of the scene count as one. Device frame, metres,
+/// newtons.
 struct Contact {
-  std::int32_t object = -1;
-  std::uint32_t triangle = 0;
-  Vec3 point_m = Vec3::Zero();
-  Vec3 normal = Vec3::Zero();
+  std::int32_t object = -1;     ///< its id; -1: planes of the scene
+  std::uint32_t triangle = 0;   ///< that pushes hardest
+  Vec3 point_m = Vec3::Zero();  ///< on that triangle
+  Vec3 normal = Vec3::Zero();   ///< of that triangle, unit
   Vec3 force_N = Vec3::Zero();  ///< on the hand
 };
 
@@ -37,8 +38,8 @@ struct Rendering {
   Vec3 normal = Vec3::Zero();  ///< unit, out of the surface; zero when free
   Vec3 scp_m = Vec3::Zero();   ///< surface contact point; the proxy less the tool radius
   std::uint32_t contactCount = 0;
-  std::array<Contact, kMaxContacts> contacts;
-  std::uint32_t status = 0;  ///< RenderStatus bits
+  std::array<Contact, kMaxContacts> contacts;  ///< one for each touched object; they sum to contactForce_N
+  std::uint32_t status = 0;                    ///< RenderStatus bits
 };
 
 enum RenderStatus : std::uint32_t {

@@ -10,4 +10,7 @@ namespace hapticd::realtime {
 void applySurfaceLaw(const Grip& grip, const Vec3& proxy_m, const Vec3& hipVelocity_m_per_s,
                      double toolRadius_m, Rendering& out) noexcept;
 
+/// Adds the pull of planes that hold on to the hand. After applySurfaceLaw.
+void applyAdhesion(const Vec3& force_N, Rendering& out) noexcept;
+
 }  // namespace hapticd::realtime

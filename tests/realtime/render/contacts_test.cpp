@@ -1,0 +1,100 @@
+// What is said of the touched objects: one contact for each, however many of its faces hold the proxy.
+#include "variants.h"
+
+namespace hapticd::realtime::fixture {
+namespace {
+
+class ContactsTest : public VariantTest {
+ protected:
+  // A wall in the plane x = 0, felt from +x.
+  scene::ObjectState& addWall(const scene::Surface& s) {
+    TriangleMesh wall;
+    wall.vertices = {{0, -0.05F, -0.05F}, {0, 0.05F, -0.05F}, {0, 0.05F, 0.05F}, {0, -0.05F, 0.05F}};
+    wall.triangles = {{0, 1, 2}, {0, 2, 3}};
+    return add(wall, s);
+  }
+  static void expectSum(const Rendering& r) {
+    Vec3 sum = Vec3::Zero();
+    for (std::uint32_t i = 0; i < r.contactCount; ++i) sum += r.contacts[i].force_N;
+    EXPECT_NEAR((sum - r.contactForce_N).norm(), 0, 1e-12);
+  }
+};
+INSTANTIATE_TEST_SUITE_P(, ContactsTest, kVariants, variantName);
+
+// A corner of one object has three faces, but is one contact; the floor pushes hardest.
+TEST_P(ContactsTest, faces_of_one_object_are_one_contact) {
+  TriangleMesh corner = box(Vec3::Zero(), Vec3::Constant(0.05));
+  for (auto& t : corner.triangles) std::swap(t[1], t[2]);
+  add(corner, surface());
+  start({0.004, 0.004, 0.004});
+  const Rendering& r = at({-0.001, -0.0015, -0.002});
+  ASSERT_EQ(r.contactCount, 1U);
+  EXPECT_EQ(r.contacts[0].object, 0);
+  EXPECT_NEAR((r.contacts[0].force_N - Vec3(1, 1.5, 2)).norm(), 0, 1e-4);
+  EXPECT_NEAR((r.contacts[0].normal - Vec3::UnitZ()).norm(), 0, 1e-9);
+  EXPECT_NEAR((r.contacts[0].point_m - offset()).norm(), 0, 1e-7);
+  EXPECT_LT(r.contacts[0].triangle, 2U);
+  expectSum(r);
+}
+
+// Two objects and a plane of the scene: each bears its own part, and friction by its own coefficient.
+TEST_P(ContactsTest, each_object_bears_its_own_force) {
+  for (const double mu : {0.0, 0.4}) {
+    scene = {};
+    scene.setWorldUnitsPerMetre(GetParam().worldUnitsPerMetre);
+    addWall(surface(1000, mu, mu));
+    add(plane(0.05, 7), surface(500));
+    scene::Plane back;
+    back.normal = Vec3::UnitY();
+    back.offset = -GetParam().worldUnitsPerMetre * GetParam().offset_m;
+    back.surface = surface(2000);
+    scene.planes = {back};
+    start({0.003, 0.003, 0.003});
+    at({-0.001, 0.003, -0.002});
+    const Rendering& r = at({-0.001, -0.0005, -0.002});
+    ASSERT_EQ(r.contactCount, 3U);
+    expectSum(r);
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      const Contact& c = r.contacts[i];
+      const Vec3 expected = c.object == 0 ? Vec3(1, 0, 0) : (c.object == 1 ? Vec3(0, 0, 1) : Vec3(0, 1, 0));
+      EXPECT_NEAR((c.force_N - expected).norm(), 0, 1e-4) << c.object;
+      EXPECT_NEAR((c.normal - expected).norm(), 0, 1e-9) << c.object;
+    }
+  }
+}
+
+TEST_P(ContactsTest, friction_belongs_to_the_object_that_rubs) {
+  addWall(surface(1000, 0.4, 0.4));
+  add(plane(0.05, 7), surface());
+  start({0.003, 0.003, 0.003});
+  at({-0.001, 0.003, -0.001});
+  const Rendering& r = to({-0.001, 0.006, -0.001});
+  ASSERT_EQ(r.contactCount, 2U);
+  expectSum(r);
+  EXPECT_LT(r.contactForce_N.y(), -0.1);
+  for (std::uint32_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(r.contacts[i].force_N.y(), r.contacts[i].object == 0 ? r.contactForce_N.y() : 0.0);
+  }
+}
+
+// A plane that holds on to the hand is a contact that pulls.
+TEST_P(ContactsTest, adhesion_is_a_contact) {
+  scene::Plane floor;
+  floor.normal = Vec3::UnitZ();
+  floor.offset = -GetParam().worldUnitsPerMetre * GetParam().offset_m;
+  floor.surface = surface();
+  floor.adhesionNormal_N = 0.5;
+  scene.planes = {floor};
+  start({0, 0, 0.0003});
+  to({0, 0, -0.001});
+  const Rendering& r = to({0, 0, 0.0004});
+  ASSERT_EQ(r.contactCount, 1U);
+  EXPECT_EQ(r.contacts[0].object, -1);
+  EXPECT_NEAR((r.contacts[0].force_N - Vec3(0, 0, -0.4)).norm(), 0, 1e-4);
+  EXPECT_NEAR((r.contacts[0].normal - Vec3::UnitZ()).norm(), 0, 1e-9);
+  expectSum(r);
+  EXPECT_EQ(to({0, 0, 0.001}).contactCount, 0U);
+}
+
+}  // namespace
+}  // namespace hapticd::realtime::fixture
