@@ -21,11 +21,13 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 
 #include "hapticd/error.h"
+#include "hapticd/extensions.h"
 #include "hapticd/reports.h"
 #include "hapticd/scene.h"
 #include "hapticd/statistics.h"
@@ -105,6 +107,9 @@ class Client {
   void onToRoom(Callback<ToRoomReport> callback);
   void onUnitToSensor(Callback<UnitToSensorReport> callback);
   void onWorkspace(Callback<WorkspaceReport> callback);
+  void onTick(Callback<TickReport> callback);
+  void onContacts(Callback<ContactsReport> callback);
+  void onGuard(Callback<GuardReport> callback);
   /// The first connection is reported too if it came after this call.
   void onConnection(Callback<ConnectionReport> callback);
 
@@ -112,16 +117,19 @@ class Client {
 
   /// Makes the scene have at least this many objects.
   void setObjectCount(int count);
-  /// Sends a mesh, three setVertex a triangle (the way every server knows), and returns when the system has
-  /// all of it; reports progress as it goes, the last time with all bytes. Vertices of an earlier, larger
-  /// mesh stay: resetScene() or clearMesh() first. Throws std::invalid_argument for a triangle outside the
-  /// vertices, ConnectError and ConnectionLost.
+  /// Sends a mesh and returns when the system has all of it; reports progress as it goes, the last time with
+  /// all bytes. A server that can gets it as bulk messages in a batch, so that the hand never feels half of
+  /// it; others get three setVertex() a triangle. What an earlier mesh had more stays: resetScene() or
+  /// clearMesh() first. Inside batch() it only collects, and reports no progress. Throws
+  /// std::invalid_argument for a triangle outside the vertices, ConnectError and ConnectionLost.
   void uploadMesh(int object, const MeshView& mesh, const Callback<UploadProgress>& progress = {});
   /// The same for corners: three consecutive ones are a triangle.
   void uploadCorners(int object, std::span<const std::array<float, 3>> corners,
                      const Callback<UploadProgress>& progress = {});
   /// Sets one vertex of a mesh, object units; without setTriangle(), consecutive triples are triangles.
   void setVertex(int object, int vertex, float x, float y, float z);
+  /// Sets vertices from number `first` on: for meshes that deform.
+  void setVertices(int object, int first, std::span<const std::array<float, 3>> positions);
   /// Sets all properties of an object's surface.
   void setSurface(int object, const Surface& surface);
   /// Sets one property: "stiffness", "damping", "static friction", "dynamic friction", "popthrough", "mass".
@@ -142,6 +150,38 @@ class Client {
   void stopEffect(int index);
   /// Puts workspace, objects and effects back to the beginning.
   void resetScene();
+
+  // --- What servers of this project can do beyond VRPN. Where a call says nothing else: it throws
+  // Unsupported when the connected server or its device cannot, and may wait for the server's answer to that
+  // question.
+
+  /// What the server and its device can do: asked on every connection. Nothing while there is no connection,
+  /// no answer yet, or for a server of another make. Does not wait.
+  std::optional<Capabilities> capabilities() const;
+  /// The same, when the server has answered. Throws ConnectError. Never Unsupported.
+  std::optional<Capabilities> waitCapabilities();
+  /// Calls the function and makes all that it commanded visible in one tick. It is collected here and sent
+  /// when the function returns: nothing is sent when it throws (the exception goes on to the caller) or when
+  /// the connection ends meanwhile (ConnectionLost). A batch holds at most 256 MiB (std::length_error).
+  /// Batches do not nest (std::logic_error).
+  void batch(const std::function<void()>& commands);
+  /// Chooses the reports of this client and how many a second at most; 0 keeps the rate. It replaces what was
+  /// chosen before, and is sent again on every new connection. std::invalid_argument for a rate that is none.
+  void subscribe(Reports kinds, double rate_Hz = 0);
+  /// Brings the force of the device to zero within one tick, until rearmForces(). Leaves at once, ahead of
+  /// whatever is collected, even inside batch(). ConnectionLost when there is no connection.
+  void stopForces();
+  /// Ends a stop and clears what the guard has latched; forces come back over half a second.
+  void rearmForces();
+  /// From now on the server takes this client for lost, ends its effects and its connection, when it hears no
+  /// heartbeat for 500 ms. Heartbeats leave ten times a second while the client polls or waits: a program
+  /// that hangs, or does not poll for 500 ms, is lost, which is the point. Holds for every new connection.
+  void enableHeartbeat(bool enable = true);
+  /// Takes the simulated hand, and moves it to the pose. It follows as a hand would, and surfaces push back;
+  /// call it as often as the hand should move. One client holds the hand at a time: others get a text.
+  void holdHand(const HandPose& pose);
+  /// Lets go of the simulated hand, as does leaving.
+  void releaseHand();
 
   // --- Stock VRPN scene, in metres; the first of these calls that names an object makes it one in metres.
   void addObject(int object, int parent = -1);

@@ -20,6 +20,11 @@ class ConnectionLost : public Error {
  public:
   using Error::Error;
 };
+/// The server is too old, of another make, or its device is of another kind: it cannot do what was asked.
+class Unsupported : public Error {
+ public:
+  using Error::Error;
+};
 /// The server refused a command, in its own words.
 class ServerError : public Error {
  public:

@@ -8,6 +8,7 @@
 #include <array>
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <string>
 #include <string_view>
@@ -138,6 +139,50 @@ struct WorkspaceReport {
   Vec3 max_m{};
 };
 
+/// One servo tick, whole; see Client::subscribe().
+struct TickReport {
+  Time time;
+  std::uint64_t tick = 0;                ///< from 1, without gaps in the server
+  std::chrono::nanoseconds tick_time{};  ///< on the server's monotonic clock
+  std::uint64_t revision = 0;            ///< of the scene that was felt
+  Vec3 hand_m{};
+  Vec3 proxy_m{};
+  Vec3 velocity_m_per_s{};
+  Quaternion orientation{0, 0, 0, 1};
+  Vec3 force_N{};
+  double depth_m = 0;
+  int object = -1;                 ///< the one that pushes hardest, -1 for none
+  std::uint32_t buttons = 0;       ///< bit 0: button 0
+  std::uint32_t guard_active = 0;  ///< bits as in GuardReport
+  std::uint32_t guard_latched = 0;
+};
+
+/// Where one object is touched.
+struct Contact {
+  int object = -1;  ///< -1: a plane
+  Vec3 point_m{};
+  Vec3 normal{};   ///< of length 1, away from the surface
+  Vec3 force_N{};  ///< on the hand; the object feels the opposite
+};
+
+/// Every contact of one servo tick; empty once when the last one ends. See Client::subscribe().
+struct ContactsReport {
+  Time time;
+  std::uint64_t tick = 0;
+  std::chrono::nanoseconds tick_time{};  ///< on the server's monotonic clock
+  std::vector<Contact> contacts;
+};
+
+/// What holds the force back: which trips of the guard are active or latched (bits as the server's
+/// docs/safety.md lists them), whether forces are armed, whether somebody stopped them.
+struct GuardReport {
+  Time time;
+  std::uint32_t active = 0;
+  std::uint32_t latched = 0;
+  bool armed = false;
+  bool stopped = false;
+};
+
 /// The connection came up, or was lost for the reason given.
 struct ConnectionReport {
   Time time;
@@ -162,9 +207,12 @@ enum class ReportKind {
   text,
   toRoom,
   unitToSensor,
-  workspace
+  workspace,
+  tick,
+  contacts,
+  guard
 };
-inline constexpr std::size_t kReportKinds = 16;
+inline constexpr std::size_t kReportKinds = 19;
 
 /// A short name for people, such as "contact point".
 std::string_view nameOf(ReportKind kind) noexcept;
@@ -185,6 +233,9 @@ struct LatestReports {
   TouchingReport touching;
   TouchedObjectReport touched_object;
   AngleReport angle;
+  TickReport tick;
+  ContactsReport contacts;
+  GuardReport guard;
 };
 
 }  // namespace hapticd

@@ -2,6 +2,7 @@
 #ifndef VRPN_SHARED_H
 #define VRPN_SHARED_H
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/time.h>
@@ -31,6 +32,14 @@ bool vrpn_TimevalEqual(const struct timeval& a, const struct timeval& b);
 double vrpn_TimevalMsecs(const struct timeval& t);
 struct timeval vrpn_MsecsTimeval(const double ms);
 void vrpn_SleepMsecs(double ms);
+
+/// Copies what fits, with a NUL in any case.
+template <size_t N>
+void vrpn_strcpy(char (&to)[N], const char* from) {
+  const size_t length = strnlen(from, N - 1);
+  memcpy(to, from, length);
+  to[length] = '\0';
+}
 
 /// Appends a scalar, big endian, and moves on; -1 when it does not fit into what is left.
 template <class T>

@@ -32,7 +32,10 @@ Client::Impl::Impl(const client::DeviceAddress& address, const ClientOptions& cl
       server(address.server.text()),
       options(client_options),
       link(address.server, linkOptions(client_options)),
-      sender(link.addDevice(address.device)) {}
+      sender(link.addDevice(address.device)) {
+  link.onUp = [this] { greet(); };
+  link.onArriving = [this](auto kind, auto from, auto payload) { arriving(kind, from, payload); };
+}
 
 void Client::Impl::waitConnected(Duration timeout) {
   constexpr Duration kShortestAnswer = 1s;  // for a server that was reached in the last moment

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <deque>
+#include <optional>
 #include <tuple>
 
 #include "client/link.h"
@@ -28,6 +29,23 @@ struct Client::Impl {
   }
 
   void waitConnected(Duration timeout);
+  /// On a new connection, before anything else is sent: asks what the server can do, and tells it again what
+  /// belongs to a connection.
+  void greet();
+  void arriving(wire::MessageKind kind, wire::LocalSender from, wire::ByteView payload);
+  /// Waits until the server has said what it can do; false when it does not answer.
+  bool waitAnswered();
+  /// Throws unless the device has the feature: Unsupported, or ConnectError and ConnectionLost.
+  void require(wire::Feature feature, std::string_view what);
+  bool has(wire::Feature feature) const { return offer && (offer->features & feature) != 0; }
+  void sendRuns(int object, std::size_t first, std::span<const std::array<float, 3>> vertices,
+                std::span<const std::array<std::uint32_t, 3>> triangles, const std::function<void()>& check);
+  void uploadRuns(int object, std::span<const std::array<float, 3>> vertices,
+                  std::span<const std::array<std::uint32_t, 3>> triangles,
+                  const Callback<UploadProgress>& progress);
+  template <class CornerAt>
+  void uploadTriples(int object, std::size_t count, const Callback<UploadProgress>& progress,
+                     CornerAt&& cornerAt);
   std::size_t poll(Duration timeout);
 
   void dispatch(const client::Arrival& arrival);
@@ -52,6 +70,11 @@ struct Client::Impl {
   ClientOptions options;
   client::Link link;
   wire::LocalSender sender;
+  std::optional<wire::Capabilities> offer;  // of this connection's server
+  bool answered = false;                    // whether it has told, or cannot tell
+  std::optional<wire::Subscribe> subscription;
+  bool heartbeats = false;
+  net::Subscription heartbeat_timer;
   LatestReports latest;
   std::array<ReportStatistics, kReportKinds> reports{};
   std::uint64_t damaged = 0;
@@ -61,6 +84,7 @@ struct Client::Impl {
              Callbacks<ContactPointReport>, Callbacks<TouchingReport>, Callbacks<TouchedObjectReport>,
              Callbacks<AngleReport>, Callbacks<ForceErrorReport>, Callbacks<TextReport>,
              Callbacks<ToRoomReport>, Callbacks<UnitToSensorReport>, Callbacks<WorkspaceReport>,
+             Callbacks<TickReport>, Callbacks<ContactsReport>, Callbacks<GuardReport>,
              Callbacks<ConnectionReport>>
       callbacks;
 };

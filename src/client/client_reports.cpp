@@ -40,6 +40,17 @@ template <>
 constexpr ReportKind kKindOf<UnitToSensorReport> = ReportKind::unitToSensor;
 template <>
 constexpr ReportKind kKindOf<WorkspaceReport> = ReportKind::workspace;
+template <>
+constexpr ReportKind kKindOf<TickReport> = ReportKind::tick;
+template <>
+constexpr ReportKind kKindOf<ContactsReport> = ReportKind::contacts;
+template <>
+constexpr ReportKind kKindOf<GuardReport> = ReportKind::guard;
+
+// A number of an object as a double on the wire; what is none is -1, as planes are.
+int objectNumber(double value) {
+  return value >= 0 && value <= 2147483647.0 ? static_cast<int>(value) : -1;
+}
 
 void keep(LatestReports& latest, const PoseReport& r) {
   latest.pose[r.sensor] = r;
@@ -71,8 +82,48 @@ void keep(LatestReports& latest, const TouchedObjectReport& r) {
 void keep(LatestReports& latest, const AngleReport& r) {
   latest.angle = r;
 }
+void keep(LatestReports& latest, const TickReport& r) {
+  latest.tick = r;
+}
+void keep(LatestReports& latest, const ContactsReport& r) {
+  latest.contacts = r;
+}
+void keep(LatestReports& latest, const GuardReport& r) {
+  latest.guard = r;
+}
 template <class Other>
 void keep(LatestReports&, const Other&) {}
+
+TickReport toReport(const wire::TickReport& m) {
+  return {{},
+          m.tick,
+          std::chrono::nanoseconds(m.time),
+          m.revision,
+          m.hand,
+          m.proxy,
+          m.velocity,
+          m.orientation,
+          m.force,
+          m.depth,
+          m.object,
+          m.buttons,
+          m.guard_active,
+          m.guard_latched};
+}
+
+// Numbers that are left over at the end would be of a contact that lacks some: those are not one.
+ContactsReport toReport(const wire::ContactList& m) {
+  ContactsReport report{{}, m.tick, std::chrono::nanoseconds(m.time), {}};
+  constexpr std::size_t kNumbers = wire::ContactList::kNumbers;
+  const std::vector<double>& n = m.contacts.values;
+  for (std::size_t i = 0; i + kNumbers <= n.size(); i += kNumbers) {
+    report.contacts.push_back({objectNumber(n[i]),
+                               {n[i + 1], n[i + 2], n[i + 3]},
+                               {n[i + 4], n[i + 5], n[i + 6]},
+                               {n[i + 7], n[i + 8], n[i + 9]}});
+  }
+  return report;
+}
 
 }  // namespace
 
@@ -182,6 +233,14 @@ void Client::Impl::dispatchMessage(const Arrival& a) {
       return decode<wire::TrackerWorkspace>(a, [&](const auto& m) {
         deliver(a, WorkspaceReport{{}, m.min, m.max});
       });
+    case wire::kindOf<wire::TickReport>:
+      return decode<wire::TickReport>(a, [&](const auto& m) { deliver(a, toReport(m)); });
+    case wire::kindOf<wire::ContactList>:
+      return decode<wire::ContactList>(a, [&](const auto& m) { deliver(a, toReport(m)); });
+    case wire::kindOf<wire::GuardState>:
+      return decode<wire::GuardState>(a, [&](const auto& m) {
+        deliver(a, GuardReport{{}, m.active, m.latched, m.armed != 0, m.stopped != 0});
+      });
     default:
       return;  // pongs, and what only servers listen to
   }
@@ -208,14 +267,17 @@ HAPTICD_ON(Text)
 HAPTICD_ON(ToRoom)
 HAPTICD_ON(UnitToSensor)
 HAPTICD_ON(Workspace)
+HAPTICD_ON(Tick)
+HAPTICD_ON(Contacts)
+HAPTICD_ON(Guard)
 HAPTICD_ON(Connection)
 #undef HAPTICD_ON
 
 std::string_view nameOf(ReportKind kind) noexcept {
   static constexpr std::array<std::string_view, kReportKinds> kNames{
-      "pose",  "velocity",      "acceleration",   "button",         "analog", "force",
-      "depth", "contact point", "touching",       "touched object", "angle",  "force error",
-      "text",  "to room",       "unit to sensor", "workspace"};
+      "pose",           "velocity",  "acceleration",   "button",   "analog",      "force", "depth",
+      "contact point",  "touching",  "touched object", "angle",    "force error", "text",  "to room",
+      "unit to sensor", "workspace", "tick",           "contacts", "guard"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 

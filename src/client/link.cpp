@@ -116,6 +116,7 @@ std::optional<wire::UdpAddress> Link::openDatagrams(const net::Endpoint& local) 
 void Link::onConnected() {
   handshake_timeout_.cancel();
   ++connections_;
+  if (onUp) onUp();
   endpoint_->sendFrames(wireNow(), backlog_.bytes(), wire::Reliability::kReliable);
   backlog_.clear();
   heard_.assign(names_.senders().size(), false);
@@ -164,8 +165,7 @@ bool Link::waitHeard(wire::LocalSender device, Duration timeout) {
   return waitUntil([&] { return heard(device); }, timeout);
 }
 
-template <class Condition>
-bool Link::waitUntil(Condition&& condition, Duration timeout) {
+bool Link::waitUntil(const std::function<bool()>& condition, Duration timeout) {
   flush();
   const auto deadline = SteadyClock::now() + std::min(timeout, kLongestWait);
   while (!condition()) {

@@ -70,6 +70,11 @@ class Link {
   template <wire::WireMessage M>
   void send(wire::Time time, wire::LocalSender sender, const M& message,
             wire::Reliability reliability = M::kInfo.reliability) {
+    if (holding_) {
+      held_.add(time, sender, message);
+      ++statistics_.messages_out;
+      return;
+    }
     if (connected()) {
       endpoint_->send(time, sender, message, reliability);
     } else if (connections_ == 0) {
@@ -83,6 +88,25 @@ class Link {
   /// The same for a message whose payload is bytes already.
   void sendRaw(wire::Time time, wire::LocalSender sender, wire::LocalType type, wire::ByteView payload,
                wire::Reliability reliability);
+  /// Sends a message at once and reliably, whatever is held; false, and counted, without a connection.
+  template <wire::WireMessage M>
+  bool sendNow(wire::LocalSender sender, const M& message) {
+    if (!connected()) {
+      ++statistics_.messages_dropped;
+      return false;
+    }
+    endpoint_->send(wireNow(), sender, message, wire::Reliability::kReliable);
+    ++statistics_.messages_out;
+    pushOut();
+    return true;
+  }
+  /// From now on send() keeps its messages, until they are dropped or sent as one batch of the device. A
+  /// batch of more than kMostBatchBytes is dropped, too: std::length_error.
+  void hold() { holding_ = true; }
+  bool holding() const noexcept { return holding_; }
+  void dropHeld();
+  void sendHeld(wire::LocalSender device);
+  static constexpr std::size_t kMostBatchBytes = 256 * 1024 * 1024;
   /// Hands what waits to the system as far as it takes it now.
   void flush();
   /// Waits until no more than so many bytes wait. Throws ConnectionLost when they never go.
@@ -94,10 +118,22 @@ class Link {
   /// handler and returns how many there were; from inside a handler it hands over nothing.
   std::size_t poll(Duration timeout, const Handler& handler);
 
+  // Both are called by the event loop and may not throw: on a new connection before anything is sent, and
+  // with each message as it arrives, before it waits for poll().
+  std::function<void()> onUp;
+  std::function<void(wire::MessageKind, wire::LocalSender, wire::ByteView)> onArriving;
+  /// Calls the function each period while somebody polls or waits.
+  [[nodiscard]] net::Subscription every(Duration period, std::function<void()> function) {
+    return loop_.every(period, std::move(function));
+  }
+
   bool connected() const noexcept { return shaken() && connection_.isOpen(); }
   /// Sleeps until connected, or until the device is heard: false after the timeout.
   bool waitConnected(Duration timeout);
   bool waitHeard(wire::LocalSender device, Duration timeout);
+  /// Sleeps and lets things arrive, without dispatching them, until the condition holds: false after the
+  /// timeout.
+  bool waitUntil(const std::function<bool()>& condition, Duration timeout);
   /// Whether anything came from the device on this connection.
   bool heard(wire::LocalSender device) const noexcept {
     return connected() && heard_[static_cast<std::size_t>(device.value)];
@@ -139,8 +175,6 @@ class Link {
   void pushOut();
   std::shared_ptr<net::Buffer> takeBuffer();
   std::size_t dispatch(const Handler& handler);
-  template <class Condition>
-  bool waitUntil(Condition&& condition, Duration timeout);
 
   ServerAddress server_;
   LinkOptions options_;
@@ -148,6 +182,8 @@ class Link {
   net::Loop loop_;
   wire::LocalNames names_;
   wire::FrameEncoder backlog_;  // until the first connection
+  wire::FrameEncoder held_;
+  bool holding_ = false;
   Inbox inbox_;
 
   // Of the present attempt or connection.
@@ -171,6 +207,21 @@ class Link {
   std::uint64_t connections_ = 0;
   LinkStatistics statistics_;
   bool dispatching_ = false;
+};
+
+/// Holds back what a link sends, until it is committed as one batch, or dropped if that never happens.
+class HeldBatch {
+ public:
+  explicit HeldBatch(Link& link) : link_(link) { link_.hold(); }
+  ~HeldBatch() {
+    if (link_.holding()) link_.dropHeld();
+  }
+  HeldBatch(const HeldBatch&) = delete;
+  HeldBatch& operator=(const HeldBatch&) = delete;
+  void commit(wire::LocalSender device) { link_.sendHeld(device); }
+
+ private:
+  Link& link_;
 };
 
 }  // namespace hapticd::client

@@ -78,6 +78,7 @@ void Link::onMessage(const wire::MessageReceived& message) {
     if (heard_.size() < names_.senders().size()) heard_.resize(names_.senders().size());
     heard_[static_cast<std::size_t>(sender.value)] = true;
   }
+  if (onArriving) onArriving(message.kind, sender, message.payload);
   wire::LocalType type;
   if (message.kind != wire::kUnknownKind) {
     type = wire::localType(message.kind);
@@ -159,6 +160,28 @@ void Link::sent(std::size_t bytes) {
   } else if (onDrainStep) {
     onDrainStep();
   }
+}
+
+void Link::dropHeld() {
+  holding_ = false;
+  held_ = {};  // its memory, too: a batch may be a large mesh
+}
+
+void Link::sendHeld(wire::LocalSender device) {
+  wire::FrameEncoder frames;
+  std::swap(frames, held_);
+  holding_ = false;
+  const std::size_t size = frames.bytes().size();
+  if (size > kMostBatchBytes) {
+    throw std::length_error("a batch of " + std::to_string(size) + " bytes, at most " +
+                            std::to_string(kMostBatchBytes) + ": send it in several");
+  }
+  const wire::Time now = wireNow();
+  endpoint_->send(now, device, wire::BatchBegin{});
+  endpoint_->sendFrames(now, frames.bytes(), wire::Reliability::kReliable);
+  endpoint_->send(now, device, wire::BatchCommit{});
+  ++statistics_.messages_out;
+  sent(std::max(size, kBatchBytes));
 }
 
 void Link::flush() {

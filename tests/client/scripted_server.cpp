@@ -10,6 +10,17 @@ namespace hapticd::test {
 
 using namespace std::chrono_literals;
 
+wire::Capabilities allCapabilities() {
+  return {wire::kExtensionVersion,
+          wire::kFeatureBulkMesh | wire::kFeatureBatch | wire::kFeatureSubscribe | wire::kFeatureStop |
+              wire::kFeatureHeartbeat | wire::kFeatureHoldHand,
+          1000,
+          250,
+          3.3,
+          2,
+          {-0.08, -0.06, -0.035, 0.08, 0.06, 0.035}};
+}
+
 ScriptedServer::ScriptedServer(ScriptedServerOptions options)
     : options_(std::move(options)),
       device_((names_.addSender("VRPN Control"), names_.addSender(options_.device))) {
@@ -92,14 +103,7 @@ void ScriptedServer::onEvent(Session& session, const wire::Event& event, bool by
     session.endpoint->useDatagrams();
   }
   const auto* message = std::get_if<wire::MessageReceived>(&event);
-  if (!message) return;
-  if (message->kind == wire::kindOf<wire::Ping>) {
-    ++pings_;
-    if (options_.answers_pings && message->local_sender.value >= 0) {
-      session.endpoint->send({}, message->local_sender, wire::Pong{});
-    }
-    return;
-  }
+  if (!message || answer(session, *message)) return;
   const auto decoded = wire::decode(message->kind, message->payload);
   const std::lock_guard lock(mutex_);
   if (!decoded) {
@@ -111,6 +115,27 @@ void ScriptedServer::onEvent(Session& session, const wire::Event& event, bool by
     told_.push_back({*decoded, std::string(message->sender_name), message->time, by_datagram});
   }
   changed_.notify_all();
+}
+
+// Whether the message was one of those that are not remembered.
+bool ScriptedServer::answer(Session& session, const wire::MessageReceived& message) {
+  const bool ours = message.local_sender.value >= 0;
+  if (message.kind == wire::kindOf<wire::Ping>) {
+    ++pings_;
+    if (options_.answers_pings && ours) session.endpoint->send({}, message.local_sender, wire::Pong{});
+    return true;
+  }
+  if (message.kind == wire::kindOf<wire::QueryCapabilities>) {
+    if (options_.capabilities && ours) {
+      session.endpoint->send({}, message.local_sender, *options_.capabilities);
+    }
+    return true;
+  }
+  if (message.kind != wire::kindOf<wire::Heartbeat>) return false;
+  const auto beat = wire::decode<wire::Heartbeat>(message.payload);
+  if (!beat || beat->watch == 0) return false;
+  ++heartbeats_;
+  return true;
 }
 
 void ScriptedServer::push(Session& session) {
@@ -129,6 +154,16 @@ void ScriptedServer::run(std::function<void()> function) {
     done.set_value();
   });
   done.get_future().wait();
+}
+
+void ScriptedServer::sayOther(const std::string& type, const std::string& payload) {
+  run([&] {
+    const wire::LocalType id = names_.addType(type);
+    for (Session& session : sessions_) {
+      session.endpoint->sendRaw({}, device_, id, wire::asBytes(payload), wire::Reliability::kReliable);
+      push(session);
+    }
+  });
 }
 
 void ScriptedServer::sayRaw(const std::string& bytes) {

@@ -26,9 +26,13 @@ struct ScriptedServerOptions {
   std::string device = "Phantom";
   std::uint16_t port = 0;  ///< 0: the system chooses
   bool answers_pings = true;
-  bool reads = true;             ///< false: accepts and shakes hands, then never reads
-  std::string greeting_bytes{};  ///< sent instead of everything VRPN, if not empty
+  bool reads = true;                                 ///< false: accepts and shakes hands, then never reads
+  std::optional<wire::Capabilities> capabilities{};  ///< answered, if set, to who asks for them
+  std::string greeting_bytes{};                      ///< sent instead of everything VRPN, if not empty
 };
+
+/// What a server of this project answers, of version 1.
+wire::Capabilities allCapabilities();
 
 /// A message as it arrived.
 struct Told {
@@ -59,6 +63,8 @@ class ScriptedServer {
       }
     });
   }
+  /// Sends a message of the device of a type that is not in the table.
+  void sayOther(const std::string& type, const std::string& payload);
   /// Sends bytes that need not be VRPN.
   void sayRaw(const std::string& bytes);
   /// Closes all connections, as a server does that is stopped.
@@ -66,12 +72,14 @@ class ScriptedServer {
   /// Goes on reading.
   void startReading();
 
-  /// Waits until as many messages as given came (other than pings), and returns them; fewer after 20 s.
+  /// Waits until as many messages as given came (other than pings, heartbeats and questions for
+  /// capabilities), and returns them; fewer after 20 s.
   std::vector<Told> waitTold(std::size_t count);
   /// The same for vertices, which are kept apart.
   std::vector<wire::SetVertex> waitVertices(std::size_t count);
   std::size_t connections() const { return connections_; }
   std::size_t pings() const { return pings_; }
+  std::size_t heartbeats() const { return heartbeats_; }
 
  private:
   struct Session {
@@ -84,6 +92,7 @@ class ScriptedServer {
   void run(std::function<void()> function);
   void serve(net::Connection connection, bool with_datagrams);
   void onEvent(Session& session, const wire::Event& event, bool by_datagram);
+  bool answer(Session& session, const wire::MessageReceived& message);
   void push(Session& session);
   void openPort();
 
@@ -97,6 +106,7 @@ class ScriptedServer {
   std::uint16_t port_ = 0;
   std::atomic<std::size_t> connections_{0};
   std::atomic<std::size_t> pings_{0};
+  std::atomic<std::size_t> heartbeats_{0};
 
   std::mutex mutex_;
   std::condition_variable changed_;

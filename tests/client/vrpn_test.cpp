@@ -3,6 +3,7 @@
 #include <vrpn_Analog.h>
 #include <vrpn_Button.h>
 #include <vrpn_Connection.h>
+#include <vrpn_Dial.h>
 #include <vrpn_ForceDevice.h>
 #include <vrpn_Text.h>
 #include <vrpn_Tracker.h>
@@ -278,6 +279,23 @@ TEST_P(Vrpn, DevicesOfOneServerShareItsConnection) {
   EXPECT_TRUE(runUntil(again, [&] { return server_.connections() == 2; }));
 }
 
+TEST_P(Vrpn, DialsOfOtherServersAreHeard) {
+  vrpn_Dial_Remote dial(name().c_str());
+  std::vector<vrpn_DIALCB> turns;
+  dial.register_change_handler(&turns, keep<vrpn_DIALCB>);
+  ASSERT_TRUE(ready(dial));
+  char buffer[12];
+  char* insert = buffer;
+  vrpn_int32 left = sizeof buffer;
+  vrpn_buffer(&insert, &left, -0.25);
+  vrpn_buffer(&insert, &left, vrpn_int32{3});
+  server_.sayOther("vrpn_Dial update", std::string(buffer, 8));  // too short to be one
+  server_.sayOther("vrpn_Dial update", std::string(buffer, 12));
+  ASSERT_TRUE(runUntil(dial, [&] { return !turns.empty(); }));
+  EXPECT_EQ(turns[0].dial, 3);
+  EXPECT_EQ(turns[0].change, -0.25);
+}
+
 int VRPN_CALLBACK countMessage(void* counter, vrpn_HANDLERPARAM) {
   ++*static_cast<int*>(counter);
   return 0;
@@ -377,6 +395,14 @@ TEST(VrpnShared, BuffersAreBigEndianAndBounded) {
   vrpn_unbuffer(&take, &real);
   EXPECT_EQ(number, 0x01020304);
   EXPECT_EQ(real, 1.0);
+}
+
+TEST(VrpnShared, CopiedTextEndsWithinItsRoom) {
+  char room[4] = {'x', 'x', 'x', 'x'};
+  vrpn_strcpy(room, "Phantom");
+  EXPECT_STREQ(room, "Pha");
+  vrpn_strcpy(room, "P");
+  EXPECT_STREQ(room, "P");
 }
 
 TEST(VrpnConnection, AnUnknownHostIsNotOkay) {

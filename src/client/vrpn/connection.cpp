@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "client/vrpn/messages.h"
+#include "vrpn/vrpn_FileConnection.h"
 
 using hapticd::client::Arrival;
 using hapticd::client::Link;
@@ -16,6 +17,10 @@ const char* vrpn_got_connection = "VRPN_Connection_Got_Connection";
 const char* vrpn_dropped_connection = "VRPN_Connection_Dropped_Connection";
 const char* vrpn_dropped_last_connection = "VRPN_Connection_Dropped_Last_Connection";
 const char* vrpn_CONTROL = "VRPN Control";
+
+bool vrpn_FILE_CONNECTIONS_SHOULD_PRELOAD = true;
+bool vrpn_FILE_CONNECTIONS_SHOULD_ACCUMULATE = true;
+bool vrpn_FILE_CONNECTIONS_SHOULD_SKIP_TO_USER_MESSAGES = true;
 
 namespace {
 

@@ -1,9 +1,10 @@
-// Tracker, button and analog.
+// Tracker, button, analog and dial.
 #include <algorithm>
 
 #include "client/vrpn/messages.h"
 #include "vrpn/vrpn_Analog.h"
 #include "vrpn/vrpn_Button.h"
+#include "vrpn/vrpn_Dial.h"
 #include "vrpn/vrpn_Tracker.h"
 
 namespace wire = hapticd::wire;
@@ -62,6 +63,24 @@ int vrpn_Button_Remote::handleStates(void* self, vrpn_HANDLERPARAM p) {
     std::copy(m.states.values.begin(), m.states.values.end(), report.states);
     static_cast<vrpn_Button_Remote*>(self)->states_.call_handlers(report);
   });
+}
+
+// --- dial
+
+vrpn_Dial_Remote::vrpn_Dial_Remote(const char* name, vrpn_Connection* connection)
+    : vrpn_Dial(name, connection) {
+  listen("vrpn_Dial update", handleChange);
+}
+
+// No server of ours has dials, so the message is not in the table of the wire.
+int vrpn_Dial_Remote::handleChange(void* self, vrpn_HANDLERPARAM p) {
+  vrpn_DIALCB report{p.msg_time, 0, 0};
+  if (p.payload_len < static_cast<vrpn_int32>(sizeof report.change + sizeof report.dial)) return 0;
+  const char* payload = p.buffer;
+  vrpn_unbuffer(&payload, &report.change);
+  vrpn_unbuffer(&payload, &report.dial);
+  static_cast<vrpn_Dial_Remote*>(self)->changes_.call_handlers(report);
+  return 0;
 }
 
 // --- tracker

@@ -1,0 +1,31 @@
+# What `cmake --install` puts where, and what find_package(hapticd) and pkg-config find there.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+# The client and what it is made of in one archive; its users need nothing but the standard library and threads.
+add_library(hapticd_client_archive STATIC
+  $<TARGET_OBJECTS:hapticd_client> $<TARGET_OBJECTS:hapticd_net> $<TARGET_OBJECTS:hapticd_wire>)
+set_target_properties(hapticd_client_archive PROPERTIES
+  EXPORT_NAME client OUTPUT_NAME hapticd_client LINKER_LANGUAGE CXX ARCHIVE_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib)
+target_include_directories(hapticd_client_archive INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+target_compile_features(hapticd_client_archive INTERFACE cxx_std_20)
+target_link_libraries(hapticd_client_archive PUBLIC Threads::Threads)
+
+set_target_properties(vrpn PROPERTIES VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR})
+target_include_directories(vrpn INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/vrpn>)
+target_compile_features(vrpn INTERFACE cxx_std_11)
+
+install(TARGETS hapticd_client_archive vrpn EXPORT hapticd)
+install(DIRECTORY include/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
+
+set(HAPTICD_CONFIG_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/hapticd)
+install(EXPORT hapticd NAMESPACE hapticd:: FILE hapticdTargets.cmake DESTINATION ${HAPTICD_CONFIG_DIR})
+configure_package_config_file(cmake/hapticdConfig.cmake.in hapticdConfig.cmake INSTALL_DESTINATION ${HAPTICD_CONFIG_DIR})
+write_basic_package_version_file(hapticdConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/hapticdConfig.cmake ${PROJECT_BINARY_DIR}/hapticdConfigVersion.cmake
+        DESTINATION ${HAPTICD_CONFIG_DIR})
+
+# From where the file lies up to the prefix, so that the installed tree may be moved.
+file(RELATIVE_PATH HAPTICD_PC_TO_PREFIX /prefix/${CMAKE_INSTALL_LIBDIR}/pkgconfig /prefix)
+configure_file(cmake/hapticd.pc.in hapticd.pc @ONLY)
+install(FILES ${PROJECT_BINARY_DIR}/hapticd.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)

@@ -1,0 +1,339 @@
+// What a client makes of the extensions: with a server that has them, and with one that has not.
+#include "client/client_tests.h"
+
+#include <limits>
+
+namespace hapticd::test {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+ScriptedServerOptions able() {
+  ScriptedServerOptions options;
+  options.capabilities = allCapabilities();
+  return options;
+}
+
+ScriptedServerOptions ableBut(std::uint32_t features) {
+  ScriptedServerOptions options = able();
+  options.capabilities->features &= ~features;
+  return options;
+}
+
+bool waitReconnected(Client& client, const ScriptedServer& server, std::size_t connections) {
+  return pollUntil(client, [&] { return client.connected() && server.connections() >= connections; });
+}
+
+TEST_P(BothWays, AServerSaysWhatItCanDo) {
+  ScriptedServer server(able());
+  Client client(name(server));
+  const auto c = client.waitCapabilities();
+  ASSERT_TRUE(c);
+  EXPECT_EQ(c->version, 1);
+  EXPECT_TRUE(c->bulk_mesh && c->batch && c->subscribe && c->stop && c->heartbeat && c->hold_hand);
+  EXPECT_EQ(c->servo_rate_Hz, 1000);
+  EXPECT_EQ(c->report_rate_Hz, 250);
+  EXPECT_EQ(c->peak_force_N, 3.3);
+  EXPECT_EQ(c->buttons, 2);
+  EXPECT_THAT(c->workspace_min_m, ElementsAre(-0.08, -0.06, -0.035));
+  EXPECT_THAT(c->workspace_max_m, ElementsAre(0.08, 0.06, 0.035));
+  EXPECT_TRUE(client.capabilities());
+
+  server.dropClients();
+  ASSERT_TRUE(pollUntil(client, [&] { return !client.connected(); }));
+  EXPECT_FALSE(client.capabilities()) << "of no server";
+  ASSERT_TRUE(waitReconnected(client, server, 2));
+  EXPECT_TRUE(client.waitCapabilities()) << "asked again";
+}
+
+TEST(Extensions, AServerWithoutThemIsNamedInEveryError) {
+  ScriptedServer server;
+  Client client(server.tcpName());
+  EXPECT_FALSE(client.waitCapabilities());
+  const auto refused = [&](auto&& call) {
+    EXPECT_THAT(textOf<Unsupported>(call), HasSubstr(client.server() + " is a VRPN server without"));
+  };
+  bool called = false;
+  refused([&] { client.batch([&] { called = true; }); });
+  EXPECT_FALSE(called);
+  refused([&] { client.subscribe(Reports::tick); });
+  refused([&] { client.rearmForces(); });
+  refused([&] { client.enableHeartbeat(); });
+  refused([&] { client.holdHand({}); });
+  refused([&] { client.releaseHand(); });
+  refused([&] { client.stopForces(); });
+  client.setObjectCount(1);
+  client.flushAll();
+  const auto told = server.waitTold(2);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_TRUE(is(told[0], wire::StopForces{})) << "a stop does not wait for an answer";
+  EXPECT_TRUE(is(told[1], wire::SetObjectNumber{1}));
+}
+
+TEST(Extensions, ADeviceThatLacksOneIsNamed) {
+  ScriptedServer server(ableBut(wire::kFeatureHoldHand));
+  Client client(server.tcpName());
+  EXPECT_THAT(textOf<Unsupported>([&] { client.holdHand({}); }),
+              HasSubstr("cannot hold the hand: device 'Phantom' at"));
+}
+
+TEST(Extensions, ABatchIsFramedAndComesWhole) {
+  ScriptedServer server(able());
+  Client client(server.tcpName());
+  client.batch([&] {
+    client.setObjectCount(2);
+    client.setTransform(1, translation(1, 2, 3));
+    client.flush();
+    client.poll(1ms);
+  });
+  client.setTouchable(1, false);
+  client.flushAll();
+  const auto told = server.waitTold(5);
+  ASSERT_EQ(told.size(), 5U);
+  EXPECT_TRUE(is(told[0], wire::BatchBegin{}));
+  EXPECT_TRUE(is(told[1], wire::SetObjectNumber{2}));
+  EXPECT_TRUE(is(told[2], wire::SetTransformMatrix{1, translation(1, 2, 3)}));
+  EXPECT_TRUE(is(told[3], wire::BatchCommit{}));
+  EXPECT_TRUE(is(told[4], wire::SetObjectIsTouchable{1, 0}));
+  for (const Told& t : told) EXPECT_EQ(t.sender, "Phantom");
+}
+
+TEST(Extensions, ABatchThatThrowsSendsNothing) {
+  ScriptedServer server(able());
+  Client client(server.tcpName());
+  const auto broken = [&] {
+    client.batch([&] {
+      client.setObjectCount(7);
+      throw std::domain_error("changed my mind");
+    });
+  };
+  EXPECT_THAT(textOf<std::domain_error>(broken), HasSubstr("changed my mind"));
+  EXPECT_THAT(textOf<std::logic_error>([&] { client.batch([&] { client.batch([] {}); }); }),
+              HasSubstr("do not nest"));
+  client.setObjectCount(1);
+  client.flushAll();
+  const auto told = server.waitTold(1);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_TRUE(is(told[0], wire::SetObjectNumber{1}));
+}
+
+TEST(Extensions, ABatchDoesNotOutliveItsConnection) {
+  ScriptedServer server(able());
+  Client client(server.tcpName());
+  const auto late = [&] {
+    client.batch([&] {
+      client.setObjectCount(7);
+      server.dropClients();
+      waitReconnected(client, server, 2);
+    });
+  };
+  EXPECT_THAT(textOf<ConnectionLost>(late), HasSubstr("nothing of it was sent"));
+  client.setObjectCount(1);
+  client.flushAll();
+  const auto told = server.waitTold(1);
+  ASSERT_FALSE(told.empty());
+  EXPECT_TRUE(is(told[0], wire::SetObjectNumber{1}));
+}
+
+TEST(Extensions, AMeshGoesInRunsWithinABatch) {
+  ScriptedServer server(able());
+  Client client(server.tcpName());
+  std::vector<std::array<float, 3>> vertices(5001);
+  for (std::size_t i = 0; i < vertices.size(); ++i) vertices[i] = {static_cast<float>(i), 1, 2};
+  const std::vector<std::array<std::uint32_t, 3>> triangles(5002, {5000, 1, 2});
+  UploadProgress progress;
+  client.uploadMesh(3, {vertices, triangles}, [&](const UploadProgress& p) { progress = p; });
+  EXPECT_EQ(progress.bytes_sent, progress.bytes_total);
+  EXPECT_GE(progress.bytes_total, (vertices.size() + triangles.size()) * 12);
+
+  const auto told = server.waitTold(6);
+  ASSERT_EQ(told.size(), 6U);
+  EXPECT_TRUE(is(told[0], wire::BatchBegin{}));
+  const auto* first = std::get_if<wire::MeshVertices>(&told[1].message);
+  const auto* second = std::get_if<wire::MeshVertices>(&told[2].message);
+  ASSERT_TRUE(first && second);
+  EXPECT_EQ(first->object, 3);
+  EXPECT_EQ(first->first, 0);
+  ASSERT_EQ(first->positions.values.size(), 15000U);
+  EXPECT_EQ(first->positions.values[14997], 4999);
+  EXPECT_TRUE(is(told[2], wire::MeshVertices{3, 5000, {{5000, 1, 2}}}));
+  const auto* faces = std::get_if<wire::MeshTriangles>(&told[3].message);
+  ASSERT_TRUE(faces);
+  EXPECT_EQ(faces->vertices.values.size(), 15000U);
+  EXPECT_TRUE(is(told[4], wire::MeshTriangles{3, 5000, {{5000, 1, 2, 5000, 1, 2}}}));
+  EXPECT_TRUE(is(told[5], wire::BatchCommit{}));
+}
+
+TEST(Extensions, AMeshInsideABatchBelongsToIt) {
+  ScriptedServer server(able());
+  Client client(server.tcpName());
+  const std::vector<std::array<float, 3>> corners{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  client.batch([&] {
+    client.uploadCorners(0, corners);
+    client.setVertices(0, 1, std::span(corners).first(1));
+  });
+  client.flushAll();
+  const auto told = server.waitTold(4);
+  ASSERT_EQ(told.size(), 4U);
+  EXPECT_TRUE(is(told[0], wire::BatchBegin{}));
+  EXPECT_TRUE(is(told[1], wire::MeshVertices{0, 0, {{0, 0, 0, 1, 0, 0, 0, 1, 0}}}));
+  EXPECT_TRUE(is(told[2], wire::MeshVertices{0, 1, {{0, 0, 0}}}));
+  EXPECT_TRUE(is(told[3], wire::BatchCommit{}));
+}
+
+TEST(Extensions, VerticesGoOneByOneToAServerWithoutRuns) {
+  ScriptedServer server(ableBut(wire::kFeatureBulkMesh));
+  Client client(server.tcpName());
+  const std::vector<std::array<float, 3>> corners{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  client.uploadMesh(0, {corners, std::vector<std::array<std::uint32_t, 3>>{{2, 1, 0}}});
+  client.setVertices(4, 7, corners);
+  client.flushAll();
+  const auto vertices = server.waitVertices(6);
+  ASSERT_EQ(vertices.size(), 6U);
+  EXPECT_EQ(vertices[0].position, corners[2]);
+  EXPECT_EQ(vertices[5].object, 4);
+  EXPECT_EQ(vertices[5].vertex, 9);
+}
+
+TEST(Extensions, ASubscriptionIsRememberedForTheNextConnection) {
+  ScriptedServer server(able());
+  Client client(server.tcpName());
+  client.subscribe(Reports::usual | Reports::contacts, 500);
+  ASSERT_EQ(server.waitTold(1).size(), 1U);
+  server.dropClients();
+  ASSERT_TRUE(waitReconnected(client, server, 2));
+  const auto told = server.waitTold(2);
+  ASSERT_EQ(told.size(), 2U);
+  for (const Told& t : told) EXPECT_TRUE(is(t, wire::Subscribe{47, 500}));
+
+  for (const double rate : {-1.0, std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_THAT(textOf<std::invalid_argument>([&] { client.subscribe(Reports::all, rate); }),
+                HasSubstr("report rate"));
+  }
+}
+
+TEST(Extensions, ASubscriptionMayComeBeforeTheConnection) {
+  ScriptedServer server(able());
+  Client client(server.tcpName(), {.connect_timeout = 0ms});
+  client.subscribe(Reports::tick);
+  client.setObjectCount(4);
+  client.waitConnected(kPatience);
+  client.flushAll();
+  const auto told = server.waitTold(2);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_TRUE(is(told[0], wire::Subscribe{wire::kReportTick, 0}));
+}
+
+TEST(Extensions, TicksContactsAndGuardStatesArriveAsPlainValues) {
+  ScriptedServer server(able());
+  Client client(server.tcpName());
+  std::vector<TickReport> ticks;
+  std::vector<ContactsReport> contacts;
+  std::vector<GuardReport> guards;
+  client.onTick([&](const TickReport& r) { ticks.push_back(r); });
+  client.onContacts([&](const ContactsReport& r) { contacts.push_back(r); });
+  client.onGuard([&](const GuardReport& r) { guards.push_back(r); });
+  server.say(wire::TickReport{
+      7, 7000001, 3, {1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {0, 0, 1, 0}, {10, 11, 12}, 0.5, 2, 1, 4, 8});
+  server.say(
+      wire::ContactList{7, 7000001, {{2, .1, .2, .3, 0, 1, 0, 1, 2, 3, -1, .4, .5, .6, 1, 0, 0, 4, 5, 6}}});
+  server.say(wire::ContactList{8, 8000001, {{1e300, 0, 0, 0, 0, 0, 0, 0, 0, 0, 99}}});
+  server.say(wire::ContactList{9, 9000001, {}});
+  server.say(wire::GuardState{1, 2, 1, 0});
+  ASSERT_TRUE(pollUntil(client, [&] { return !guards.empty(); }));
+
+  ASSERT_EQ(ticks.size(), 1U);
+  EXPECT_EQ(ticks[0].tick, 7U);
+  EXPECT_EQ(ticks[0].tick_time, 7000001ns);
+  EXPECT_EQ(ticks[0].revision, 3U);
+  EXPECT_THAT(ticks[0].hand_m, ElementsAre(1, 2, 3));
+  EXPECT_THAT(ticks[0].proxy_m, ElementsAre(4, 5, 6));
+  EXPECT_THAT(ticks[0].velocity_m_per_s, ElementsAre(7, 8, 9));
+  EXPECT_THAT(ticks[0].orientation, ElementsAre(0, 0, 1, 0));
+  EXPECT_THAT(ticks[0].force_N, ElementsAre(10, 11, 12));
+  EXPECT_EQ(ticks[0].depth_m, 0.5);
+  EXPECT_EQ(ticks[0].object, 2);
+  EXPECT_EQ(ticks[0].buttons, 1U);
+  EXPECT_EQ(ticks[0].guard_active, 4U);
+  EXPECT_EQ(ticks[0].guard_latched, 8U);
+
+  ASSERT_EQ(contacts.size(), 3U);
+  ASSERT_EQ(contacts[0].contacts.size(), 2U);
+  EXPECT_EQ(contacts[0].contacts[0].object, 2);
+  EXPECT_THAT(contacts[0].contacts[0].point_m, ElementsAre(.1, .2, .3));
+  EXPECT_THAT(contacts[0].contacts[0].normal, ElementsAre(0, 1, 0));
+  EXPECT_THAT(contacts[0].contacts[0].force_N, ElementsAre(1, 2, 3));
+  EXPECT_EQ(contacts[0].contacts[1].object, -1);
+  ASSERT_EQ(contacts[1].contacts.size(), 1U) << "a contact that lacks numbers is none";
+  EXPECT_EQ(contacts[1].contacts[0].object, -1) << "no number of an object";
+  EXPECT_TRUE(contacts[2].contacts.empty());
+  EXPECT_EQ(contacts[2].tick, 9U);
+
+  EXPECT_EQ(guards[0].active, 1U);
+  EXPECT_EQ(guards[0].latched, 2U);
+  EXPECT_TRUE(guards[0].armed);
+  EXPECT_FALSE(guards[0].stopped);
+  EXPECT_EQ(client.latest().tick.tick, 7U);
+  EXPECT_EQ(client.latest().contacts.tick, 9U);
+  EXPECT_TRUE(client.latest().guard.armed);
+  EXPECT_EQ(client.statistics()[ReportKind::contacts].count, 3U);
+}
+
+TEST(Extensions, AStopOvertakesABatchAndNeedsAConnection) {
+  ScriptedServer server(able());
+  Client client(server.tcpName());
+  client.batch([&] {
+    client.setObjectCount(1);
+    client.stopForces();
+    client.rearmForces();
+  });
+  client.flushAll();
+  const auto told = server.waitTold(5);
+  ASSERT_EQ(told.size(), 5U);
+  EXPECT_TRUE(is(told[0], wire::StopForces{}));
+  EXPECT_TRUE(is(told[1], wire::RearmForces{}));
+  EXPECT_TRUE(is(told[2], wire::BatchBegin{}));
+
+  Client nobody("Phantom@tcp://127.0.0.1:1", {.connect_timeout = 0ms});
+  EXPECT_THAT(textOf<ConnectionLost>([&] { nobody.stopForces(); }), HasSubstr("forces not stopped"));
+}
+
+TEST(Extensions, HeartbeatsGoOnWhilePolledAndOnTheNextConnection) {
+  ScriptedServer server(able());
+  Client client(server.tcpName());
+  EXPECT_EQ(server.heartbeats(), 0U);
+  client.enableHeartbeat();
+  ASSERT_TRUE(pollUntil(client, [&] { return server.heartbeats() >= 5; }));
+  server.dropClients();
+  ASSERT_TRUE(waitReconnected(client, server, 2));
+  const std::size_t before = server.heartbeats();
+  ASSERT_TRUE(pollUntil(client, [&] { return server.heartbeats() >= before + 3; }));
+
+  client.enableHeartbeat(false);
+  client.flushAll();
+  const auto told = server.waitTold(1);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_TRUE(is(told[0], wire::Heartbeat{0}));
+  const std::size_t after = server.heartbeats();
+  client.runFor(350ms);
+  EXPECT_EQ(server.heartbeats(), after);
+}
+
+TEST(Extensions, TheHandIsHeldAndReleasedInOrder) {
+  ScriptedServer server(able());
+  Client client(server.name());  // which also has datagrams, that could overtake
+  client.holdHand({{1, 2, 3}, {0, 0, 1, 0}, 3});
+  client.holdHand({{4, 5, 6}});
+  client.releaseHand();
+  const auto told = server.waitTold(3);
+  ASSERT_EQ(told.size(), 3U);
+  EXPECT_TRUE(is(told[0], wire::HoldHand{1, {1, 2, 3}, {0, 0, 1, 0}, 3}));
+  EXPECT_TRUE(is(told[1], wire::HoldHand{1, {4, 5, 6}, {0, 0, 0, 1}, 0}));
+  EXPECT_TRUE(is(told[2], wire::HoldHand{}));
+  for (const Told& t : told) EXPECT_FALSE(t.by_datagram);
+}
+
+}  // namespace
+}  // namespace hapticd::test

@@ -1,0 +1,45 @@
+#!/usr/bin/env bash
+# Installs, moves what was installed elsewhere, builds programs against it that know nothing of this tree, and runs them.
+#   install_test.sh CMAKE BUILD_DIR SOURCE_DIR COMPILER VERSION
+set -euo pipefail
+cmake=$1
+build_dir=$2
+source_dir=$3
+compiler=$4
+version=$5
+work=$(mktemp -d)
+server=""
+trap '[ -z "$server" ] || kill "$server" 2>/dev/null || true; rm -rf "$work"' EXIT
+
+"$cmake" --install "$build_dir" --prefix "$work/installed" >"$work/install.log" || { cat "$work/install.log"; exit 1; }
+mv "$work/installed" "$work/moved"
+prefix=$work/moved
+if grep -rlE "$source_dir|Boost|boost" "$prefix/include" "$prefix"/lib*/cmake "$prefix"/lib*/pkgconfig; then
+  echo "the files above name the source tree or a library that users need not have"
+  exit 1
+fi
+
+"$cmake" -G Ninja -S "$source_dir/tests/install/user" -B "$work/user" -DCMAKE_PREFIX_PATH="$prefix" \
+  -DCMAKE_CXX_COMPILER="$compiler" -DEXAMPLES="$source_dir/examples" >"$work/user.log" || { cat "$work/user.log"; exit 1; }
+"$cmake" --build "$work/user" --parallel 2
+
+export PKG_CONFIG_PATH=$(echo "$prefix"/lib*/pkgconfig)
+[ "$(pkg-config --modversion hapticd)" = "$version" ]
+# shellcheck disable=SC2046
+"$compiler" -std=c++20 "$source_dir/tests/install/user/reads_force.cpp" $(pkg-config --cflags --libs hapticd) -o "$work/by_pkg_config"
+
+"$prefix/bin/hapticd" serve --listen 127.0.0.1:0 --allow-no-rt >"$work/log" 2>&1 &
+server=$!
+address=""
+for _ in $(seq 300); do
+  address=$(sed -nE 's/.*listening on ([0-9.]+:[0-9]+).*/\1/p' "$work/log" | head -1)
+  [ -n "$address" ] && break
+  sleep 0.1
+done
+[ -n "$address" ] || { cat "$work/log"; exit 1; }
+for program in "$work/user/reads_force" "$work/by_pkg_config"; do
+  timeout 60 "$program" "Phantom@$address" | tee "$work/out"
+  grep -q '^felt object 0$' "$work/out"
+done
+timeout 60 "$work/user/figure8" "Phantom@$address" 2 | tee "$work/out"
+grep -qE '^[1-9][0-9]* force reports$' "$work/out"
