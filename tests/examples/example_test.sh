@@ -54,7 +54,7 @@ check() {
       awk -F, 'NR == 1 { if ($0 != "time_s,report,values") bad = 1; next }
                $2 == "pose" { poses += NF == 10 }
                $2 == "force" { forces += NF == 5 }
-               $1 !~ /^[0-9]+\.[0-9]{6}$/ { bad = 1 }
+               $1 !~ /^[0-9]+\.[0-9][0-9][0-9][0-9][0-9][0-9]$/ { bad = 1 }
                END { exit bad || !poses || !forces }' "$work/out" ;;
     example_client_dynamics)
       "$example" "$device" 6 >"$work/out"
