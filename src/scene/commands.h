@@ -32,11 +32,13 @@ struct SetVertices {
   std::vector<Vec3f> positions;  ///< object units
 };
 
-/// A run of triangles from number `first` on. From then on the mesh is indexed and in metres.
+/// A run of triangles from number `first` on. From then on the mesh is indexed and, as stock VRPN has it, in
+/// metres; not so when they come in bulk.
 struct SetTriangles {
   std::int32_t object = 0;
   std::int32_t first = 0;
   std::vector<Triangle> triangles;
+  bool makesMetres = true;
 };
 
 /// Accepted and ignored: normals follow from the triangles.

@@ -92,7 +92,7 @@ void ObjectTable::apply(const SetTriangles& c, const Call& call) {
                 static_cast<std::int32_t>((*outside)[2]));
     return;
   }
-  becomeStock(*object);
+  if (c.makesMetres) becomeStock(*object);
   object->mesh.setTriangles(static_cast<std::uint32_t>(c.first), c.triangles, call.now);
   triangles_ = triangles_ - before + object->mesh.triangleCount();
   meshEdited(*object, call);

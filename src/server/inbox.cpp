@@ -168,6 +168,60 @@ scene::SceneCommand toCommand(const wire::CustomEffect& m) {
   return scene::StartCustomEffect{m.effect, m.parameters.values};
 }
 
+// Our own.
+scene::SceneCommand toCommand(const wire::BatchBegin&) {
+  return scene::BeginBatch{};
+}
+scene::SceneCommand toCommand(const wire::BatchCommit&) {
+  return scene::CommitBatch{};
+}
+scene::SceneCommand toCommand(const wire::MeshVertices& m) {
+  scene::SetVertices run{m.object, m.first, {}};
+  const std::vector<float>& numbers = m.positions.values;
+  run.positions.reserve(numbers.size() / 3);
+  for (std::size_t i = 0; i + 2 < numbers.size(); i += 3)
+    run.positions.emplace_back(numbers[i], numbers[i + 1], numbers[i + 2]);
+  return run;
+}
+
+// A negative vertex becomes one that no mesh has, and the scene names it in its refusal.
+std::uint32_t corner(std::int32_t vertex) {
+  return vertex < 0 ? std::numeric_limits<std::uint32_t>::max() : static_cast<std::uint32_t>(vertex);
+}
+
+scene::SceneCommand toCommand(const wire::MeshTriangles& m) {
+  scene::SetTriangles run{m.object, m.first, {}, false};
+  const std::vector<std::int32_t>& numbers = m.vertices.values;
+  run.triangles.reserve(numbers.size() / 3);
+  for (std::size_t i = 0; i + 2 < numbers.size(); i += 3)
+    run.triangles.push_back({corner(numbers[i]), corner(numbers[i + 1]), corner(numbers[i + 2])});
+  return run;
+}
+
+// What a run holds besides its task.
+std::size_t bytesOf(const wire::MeshVertices& m) {
+  return m.positions.values.size() * sizeof(float);
+}
+std::size_t bytesOf(const wire::MeshTriangles& m) {
+  return m.vertices.values.size() * sizeof(std::int32_t);
+}
+template <class M>
+std::size_t bytesOf(const M&) {
+  return 0;
+}
+
+// Numbers of a bulk message come by three.
+template <class M>
+bool isWhole(const M& message, std::string& error) {
+  std::size_t numbers = 0;
+  if constexpr (std::is_same_v<M, wire::MeshVertices>) numbers = message.positions.values.size();
+  if constexpr (std::is_same_v<M, wire::MeshTriangles>) numbers = message.vertices.values.size();
+  if (numbers % 3 == 0) return true;
+  error = std::string(M::kInfo.name) + ": a list of " + std::to_string(numbers) +
+          " numbers, which is no multiple of three";
+  return false;
+}
+
 // The last task, if it is a run of this client for this object.
 template <class Run>
 Run* lastRun(std::vector<SceneTask>& tasks, scene::ClientId client, std::int32_t object) {
@@ -210,7 +264,9 @@ Inbox::Outcome Inbox::take(scene::ClientId client, const wire::MessageReceived& 
           addTriangle(client, m);
           return Outcome::taken;
         } else if constexpr (Commands<M>) {
+          if (!isWhole(m, error)) return Outcome::malformed;
           add({client, toCommand(m)});
+          bytes_ += bytesOf(m);
           return Outcome::taken;
         } else {
           return Outcome::notACommand;
@@ -236,15 +292,11 @@ void Inbox::addVertex(scene::ClientId client, const wire::SetVertex& vertex) {
 }
 
 void Inbox::addTriangle(scene::ClientId client, const wire::SetTriangle& triangle) {
-  geometry::Triangle corners{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    // A negative vertex becomes one that no mesh has, and the scene names it in its refusal.
-    const std::int32_t vertex = triangle.vertices[i];
-    corners[i] = vertex < 0 ? std::numeric_limits<std::uint32_t>::max() : static_cast<std::uint32_t>(vertex);
-  }
+  const auto& v = triangle.vertices;
+  const geometry::Triangle corners{corner(v[0]), corner(v[1]), corner(v[2])};
   bytes_ += sizeof corners;
   if (auto* run = lastRun<scene::SetTriangles>(tasks_, client, triangle.object);
-      run != nullptr && continues(run->first, run->triangles.size(), triangle.triangle)) {
+      run != nullptr && run->makesMetres && continues(run->first, run->triangles.size(), triangle.triangle)) {
     run->triangles.push_back(corners);
     return;
   }

@@ -5,8 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "realtime/servo/report.h"
-#include "server/config.h"
+#include "server/view.h"
 #include "wire/messages.h"
 
 namespace hapticd::server {
@@ -17,42 +16,60 @@ struct Outgoing {
   bool reliable = false;
 };
 
+/// What a client has chosen to hear.
+struct ReportChoice {
+  std::uint32_t kinds = wire::kReportDefault;  ///< wire::ReportKinds
+  double rate_Hz = 1000;
+  friend auto operator<=>(const ReportChoice&, const ReportChoice&) = default;
+};
+
 /// Tracker sensors of a device.
 inline constexpr std::int32_t kSensorProxy = 0;
 inline constexpr std::int32_t kSensorHip = 1;
 inline constexpr std::int32_t kSensorContact = 2;
+inline constexpr std::int32_t kSensors = 3;
 
-/// Remembers what was said last and says what changed since. One for each device and rate; net thread. Pure:
-/// no clock, no socket.
+/// Where reported poses of the tracker count from, and how the buttons stand: what clients may set.
+struct ReportFrame {
+  geometry::Vec3 origin = geometry::Vec3::Zero();  ///< reported metres
+  geometry::Quat turn = geometry::Quat::Identity();
+  std::uint32_t buttons = 0;  ///< of the device, through toggles
+};
+
+/// Remembers what was said last and says what changed since. One for each choice of reports; net thread.
+/// Pure: no clock, no socket. Contact is mirrored for clients that know no force device: the button after the
+/// device's own is "touching", and the analog channels are force x y z, depth, angle, touched object.
 class Reporter {
  public:
-  Reporter(const DeviceConfig& config, int buttonCount, double rate_Hz);
+  Reporter(const DeviceConfig& config, int buttonCount, const ReportChoice& choice);
 
   /// Appends what is to be said about this tick: buttons and errors at once, the rest when a report period is
   /// over.
-  void update(const realtime::TickReport& tick, std::vector<Outgoing>& out);
+  void update(const realtime::TickReport& tick, const ReportFrame& frame, std::vector<Outgoing>& out);
 
   /// Appends the present state of everything, for a client that has just come.
-  void presentState(const realtime::TickReport& tick, std::vector<Outgoing>& out) const;
+  void presentState(const realtime::TickReport& tick, const ReportFrame& frame,
+                    std::vector<Outgoing>& out) const;
 
-  wire::ButtonStates buttonStates(std::uint32_t buttons) const;
+  /// Every button of the device, and "touching".
+  static wire::ButtonStates buttonStates(int buttonCount, std::uint32_t buttons, bool touching);
 
  private:
-  // One tick in the client's units: world / 1000, world frame, newtons.
-  struct View;
-  View viewOf(const realtime::TickReport& tick) const;
-
-  void errors(const realtime::TickReport& tick, std::vector<Outgoing>& out);
-  void buttons(const realtime::TickReport& tick, std::vector<Outgoing>& out);
-  void tracker(const View& view, std::vector<Outgoing>& out);
+  void guard(const realtime::TickReport& tick, std::vector<Outgoing>& out);
+  void buttons(std::uint32_t buttons, std::vector<Outgoing>& out);
+  void tracker(const View& view, const ReportFrame& frame, std::vector<Outgoing>& out);
   void contact(const View& view, std::vector<Outgoing>& out);
   void contactEnd(const View& view, std::vector<Outgoing>& out);
+  void analog(const View& view, bool reliable, std::vector<Outgoing>& out);
+  void wholeTick(const realtime::TickReport& tick, const View& view, bool over, std::vector<Outgoing>& out);
 
+  bool wants(std::uint32_t kind) const noexcept { return (choice_.kinds & kind) != 0; }
   bool moved(std::int32_t sensor, const geometry::Vec3& position, const geometry::Quat& orientation);
   wire::F64x4 quaternion(const geometry::Quat& q) const;
 
   const DeviceConfig config_;
-  int buttonCount_;
+  const int buttonCount_;
+  const ReportChoice choice_;
   geometry::Nanos period_;
   geometry::Nanos due_ = 0;
 
@@ -60,7 +77,7 @@ class Reporter {
     geometry::Vec3 position = geometry::Vec3::Constant(1e300);
     geometry::Quat orientation = geometry::Quat::Identity();
   };
-  std::array<Sent, 3> sensors_;
+  std::array<Sent, kSensors> sensors_;
   std::uint32_t buttons_ = 0;
   bool touching_ = false;
   std::int32_t object_ = -1;
@@ -69,6 +86,7 @@ class Reporter {
   double angle_deg_ = 0;
   geometry::Vec3 scp_ = geometry::Vec3::Constant(1e300);
   std::uint32_t tripped_ = 0;  ///< bits of the trips that took the force away
+  wire::GuardState guard_;
 };
 
 }  // namespace hapticd::server

@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <chrono>
 
 #include "server/clock.h"
@@ -11,10 +12,25 @@ namespace {
 
 constexpr geometry::Nanos kCollectAfter = 50'000'000;
 
+// What every device's builder says is said once.
+void mergeNotices(std::vector<scene::Notice>&& from, std::vector<scene::Notice>& into) {
+  for (scene::Notice& notice : from) {
+    const auto same = [&](const scene::Notice& known) {
+      return known.client == notice.client && known.text == notice.text;
+    };
+    if (std::none_of(into.begin(), into.end(), same)) into.push_back(std::move(notice));
+  }
+}
+
 }  // namespace
 
-SceneThread::SceneThread(scene::SceneConfig config, realtime::SnapshotSlot& slot, Callbacks callbacks)
-    : builder_(std::move(config)), slot_(slot), callbacks_(std::move(callbacks)) {}
+SceneThread::SceneThread(std::vector<SceneDevice> devices, Callbacks callbacks)
+    : callbacks_(std::move(callbacks)) {
+  for (SceneDevice& device : devices) {
+    scene::SceneBuilder builder(device.config);
+    seats_.push_back({std::move(device), std::move(builder)});
+  }
+}
 
 SceneThread::~SceneThread() {
   stop();
@@ -64,8 +80,7 @@ void SceneThread::run() {
       const auto ready = [this] { return stopping_ || !queue_.empty(); };
       // After a change the servo soon gives back what it replaced, which may be a large mesh: wake once to
       // free it.
-      std::optional<geometry::Nanos> deadline = builder_.nextDeadline();
-      if (collectAt_ && (!deadline || *collectAt_ < *deadline)) deadline = collectAt_;
+      const std::optional<geometry::Nanos> deadline = nextDeadline();
       if (deadline) {
         wake_.wait_for(
             lock, std::chrono::nanoseconds(std::max<geometry::Nanos>(*deadline - monotonicNow(), 0)), ready);
@@ -84,16 +99,19 @@ void SceneThread::run() {
   }
 }
 
+std::optional<geometry::Nanos> SceneThread::nextDeadline() const {
+  std::optional<geometry::Nanos> next = collectAt_;
+  for (const Seat& seat : seats_) {
+    const auto deadline = seat.builder.nextDeadline();
+    if (deadline && (!next || *deadline < *next)) next = deadline;
+  }
+  return next;
+}
+
 void SceneThread::apply(std::vector<SceneTask>& tasks) {
   for (SceneTask& task : tasks) {
-    const geometry::Nanos now = monotonicNow();
-    auto* command = std::get_if<scene::SceneCommand>(&task.what);
-    if (command == nullptr) {
-      builder_.clientGone(task.client, now);
-      continue;
-    }
     try {
-      builder_.apply(task.client, std::move(*command), now, notices_);
+      tell(std::move(task));
     } catch (const std::exception& error) {
       notices_.push_back(
           {task.client, scene::Notice::Severity::error, std::string("not done: ") + error.what()});
@@ -101,21 +119,47 @@ void SceneThread::apply(std::vector<SceneTask>& tasks) {
   }
 }
 
-void SceneThread::publish() {
-  try {
-    collectAt_.reset();
-    if (auto snapshot = builder_.publish(monotonicNow(), notices_)) {
-      slot_.publish(snapshot);
-      collectAt_ = monotonicNow() + kCollectAfter;
-      if (callbacks_.published) callbacks_.published(snapshot);
+void SceneThread::tell(SceneTask&& task) {
+  const geometry::Nanos now = monotonicNow();
+  auto* command = std::get_if<scene::SceneCommand>(&task.what);
+  std::vector<scene::Notice> again;
+  for (std::size_t i = seats_.size(); i-- > 0;) {
+    scene::SceneBuilder& builder = seats_[i].builder;
+    if (command == nullptr) {
+      builder.clientGone(task.client, now);
+    } else if (i > 0) {
+      builder.apply(task.client, scene::SceneCommand(*command), now, again);
     } else {
-      slot_.collect();
+      builder.apply(task.client, std::move(*command), now, notices_);
     }
-  } catch (const std::exception& error) {
-    // Out of memory, or the index could not be built: the scene that is felt stays as it is.
-    spdlog::error("the scene could not be published: {}", error.what());
+  }
+  mergeNotices(std::move(again), notices_);
+}
+
+void SceneThread::publish() {
+  collectAt_.reset();
+  for (Seat& seat : seats_) {
+    try {
+      publishTo(seat);
+    } catch (const std::exception& error) {
+      // Out of memory, or the index could not be built: the scene that is felt stays as it is.
+      spdlog::error("the scene could not be published: {}", error.what());
+    }
   }
   if (!notices_.empty() && callbacks_.notices) callbacks_.notices(std::exchange(notices_, {}));
+}
+
+void SceneThread::publishTo(Seat& seat) {
+  std::vector<scene::Notice> said;
+  const auto snapshot = seat.builder.publish(monotonicNow(), said);
+  mergeNotices(std::move(said), notices_);
+  if (!snapshot) {
+    seat.device.slot->collect();
+    return;
+  }
+  seat.device.slot->publish(snapshot);
+  collectAt_ = monotonicNow() + kCollectAfter;
+  if (seat.device.published) seat.device.published(snapshot);
 }
 
 }  // namespace hapticd::server

@@ -25,26 +25,34 @@ struct SceneTask {
   std::variant<scene::SceneCommand, ClientGone> what;
 };
 
-/// Owns the builder of one scene and the thread that drives it. enqueue() from the net thread; the callbacks
-/// run in the scene thread and must only pass things on.
+/// A device that touches the scene: what the scene must know of it, and where its snapshots go.
+struct SceneDevice {
+  scene::SceneConfig config;
+  realtime::SnapshotSlot* slot = nullptr;
+  /// In the scene thread, after the slot has it.
+  std::function<void(const std::shared_ptr<const scene::SceneSnapshot>&)> published;
+};
+
+/// Owns one scene and the thread that drives it: a builder for each device, because workspace and what is
+/// passive differ, all told the same. enqueue() from the net thread; the callbacks run in the scene thread
+/// and must only pass things on.
 class SceneThread {
  public:
   struct Callbacks {
     std::function<void(std::vector<scene::Notice>&&)> notices;  ///< texts for clients
-    std::function<void(const std::shared_ptr<const scene::SceneSnapshot>&)>
-        published;                  ///< after the slot has it
-    std::function<void()> drained;  ///< the queue fell under half its limit
+    std::function<void()> drained;                              ///< the queue is no longer full
   };
 
   /// Tasks above this many bytes make full() true: the net thread then stops reading from its clients.
   static constexpr std::size_t kQueueLimit_bytes = 32U << 20;
 
-  SceneThread(scene::SceneConfig config, realtime::SnapshotSlot& slot, Callbacks callbacks);
+  /// At least one device; their slots outlive this.
+  SceneThread(std::vector<SceneDevice> devices, Callbacks callbacks);
   ~SceneThread();
   SceneThread(const SceneThread&) = delete;
   SceneThread& operator=(const SceneThread&) = delete;
 
-  /// Publishes the empty scene and starts the thread.
+  /// Publishes the empty scene to all devices and starts the thread.
   void start();
   /// Applies what is queued and ends the thread. Idempotent.
   void stop();
@@ -55,11 +63,19 @@ class SceneThread {
 
  private:
   void run();
-  void apply(std::vector<SceneTask>& tasks);
-  void publish();
+  // One device's builder.
+  struct Seat {
+    SceneDevice device;
+    scene::SceneBuilder builder;
+  };
 
-  scene::SceneBuilder builder_;
-  realtime::SnapshotSlot& slot_;
+  void apply(std::vector<SceneTask>& tasks);
+  void tell(SceneTask&& task);
+  void publish();
+  void publishTo(Seat& seat);
+  std::optional<geometry::Nanos> nextDeadline() const;
+
+  std::vector<Seat> seats_;
   Callbacks callbacks_;
   std::vector<scene::Notice> notices_;
   std::optional<geometry::Nanos> collectAt_;

@@ -40,11 +40,7 @@ Server::Server(const ServerConfig& config) : config_(config) {
   loop_.setErrorHandler([](std::string_view text) { spdlog::error("{}", text); });
   names_.addSender("VRPN Control");  // the stock library's sender 0
 
-  for (const DeviceConfig& device : config_.devices) {
-    std::vector<wire::LocalSender> senders;
-    for (const std::string& name : device.names) senders.push_back(names_.addSender(name));
-    stations_.push_back(std::make_unique<Station>(device, senders, config_.allowNoRealtime));
-  }
+  for (const DeviceConfig& device : config_.devices) openDevice(device);
 
   net::Endpoint local = net::Endpoint::parse(config_.listenAddress, config_.port);
   listener_ = std::make_unique<net::TcpListener>(
@@ -59,30 +55,52 @@ Server::Server(const ServerConfig& config) : config_(config) {
 Server::~Server() {
   // The servo first: no force outlives the server.
   for (const auto& station : stations_) station->stop();
+  for (const auto& scene : scenes_) scene->stop();
+}
+
+void Server::openDevice(const DeviceConfig& device) {
+  std::vector<wire::LocalSender> senders;
+  for (const std::string& name : device.names) senders.push_back(names_.addSender(name));
+  stations_.push_back(
+      std::make_unique<Station>(device, senders, sceneFor(device), config_.allowNoRealtime));
+}
+
+// Devices that name the same scene share it.
+SceneHost& Server::sceneFor(const DeviceConfig& device) {
+  if (!device.scene.empty()) {
+    for (const auto& scene : scenes_) {
+      if (scene->name() == device.scene) return *scene;
+    }
+  }
+  return *scenes_.emplace_back(std::make_unique<SceneHost>(device.scene, device.sceneOnDisconnect));
+}
+
+void Server::startScene(SceneHost& scene) {
+  scene.start({.notices =
+                   [this, &scene](std::vector<scene::Notice>&& notices) {
+                     loop_.post([this, &scene, notices = std::move(notices)]() mutable {
+                       deliver(scene, std::move(notices));
+                     });
+                   },
+               .drained =
+                   [this] {
+                     loop_.post([this] {
+                       for (const auto& [id, session] : sessions_) session->resume();
+                     });
+                   }});
 }
 
 void Server::run() {
+  for (const auto& scene : scenes_) startScene(*scene);
   for (const auto& owned : stations_) {
     Station* station = owned.get();
     subscriptions_.push_back(loop_.watchFd(station->wakeFd(), [this, station] { onServoWake(*station); }));
-    station->start({.notices =
-                        [this, station](std::vector<scene::Notice>&& notices) {
-                          loop_.post([this, station, notices = std::move(notices)]() mutable {
-                            deliver(*station, std::move(notices));
-                          });
-                        },
-                    .drained =
-                        [this] {
-                          loop_.post([this] {
-                            for (const auto& [id, session] : sessions_) session->resume();
-                          });
-                        }});
+    station->start();
   }
-  subscriptions_.push_back(loop_.every(1s, [this] {
-    clock_.refresh();
-    closeStaleHandshakes();
-    noise_.newSecond();
-    for (const auto& station : stations_) station->checkHealth();
+  subscriptions_.push_back(loop_.every(1s, [this] { everySecond(); }));
+  subscriptions_.push_back(loop_.every(50ms, [this] {
+    closeLost();
+    for (const auto& station : stations_) station->checkBlackBox();
   }));
   if (config_.seconds > 0) {
     subscriptions_.push_back(loop_.after(
@@ -91,6 +109,14 @@ void Server::run() {
   }
   loop_.run();
   for (const auto& station : stations_) station->stop();
+  for (const auto& scene : scenes_) scene->stop();
+}
+
+void Server::everySecond() {
+  clock_.refresh();
+  closeStaleHandshakes();
+  noise_.newSecond();
+  for (const auto& station : stations_) station->checkHealth();
 }
 
 void Server::stop() {
@@ -171,6 +197,8 @@ void Server::callBack(const net::Endpoint& client) {
 void Server::onClosed(Session& session, const std::string& reason) {
   spdlog::info("client {} ({}) is gone: {}", session.id(), session.description(), reason);
   for (const auto& station : stations_) station->clientGone(session.id());
+  for (const auto& scene : scenes_) scene->clientGone(session.id());
+  heartbeats_.forget(session.id());
   handshakes_.erase(session.id());
   sessions_.erase(session.id());
 }
@@ -188,6 +216,14 @@ void Server::closeStaleHandshakes() {
   }
 }
 
+// Who asked to be missed and is silent now. The session object goes with its onClosed.
+void Server::closeLost() {
+  for (const scene::ClientId client : heartbeats_.lost(monotonicNow())) {
+    const auto session = sessions_.find(client);
+    if (session != sessions_.end()) session->second->close("no heartbeat for 500 ms, as it had promised");
+  }
+}
+
 Station* Server::stationOf(wire::LocalSender name) noexcept {
   for (const auto& station : stations_) {
     if (station->has(name)) return station.get();
@@ -196,11 +232,55 @@ Station* Server::stationOf(wire::LocalSender name) noexcept {
 }
 
 void Server::onSubscribed(Session& session, wire::LocalSender name) {
-  if (Station* station = stationOf(name)) station->sendPresentState(session, name);
+  if (Station* station = stationOf(name)) station->onSubscribed(session, name);
 }
 
 void Server::onMessage(Session& session, const wire::MessageReceived& message) {
-  if (Station* station = stationOf(message.local_sender)) station->onMessage(session, message);
+  Station* station = stationOf(message.local_sender);
+  if (station == nullptr || !mayCommand(session, *station, message)) return;
+  if (message.kind == wire::kindOf<wire::Heartbeat>) {
+    onHeartbeat(session, message);
+    return;
+  }
+  std::string error;
+  switch (station->scene().take(session.id(), message, error)) {
+    case Inbox::Outcome::taken:
+      if (message.kind != wire::kindOf<wire::ResetScene>) return;
+      for (const auto& other : stations_) {
+        if (&other->scene() == &station->scene()) other->onReset();
+      }
+      return;
+    case Inbox::Outcome::malformed:
+      session.refuse("malformed message: " + error);
+      return;
+    case Inbox::Outcome::notACommand:
+      station->onMessage(session, message);
+      return;
+  }
+}
+
+bool Server::mayCommand(Session& session, Station& station, const wire::MessageReceived& message) {
+  std::string reason;
+  if (!isCommand(message.kind) || station.mayCommand(session, reason)) return true;
+  // One text for each read: a refused upload has thousands of messages.
+  if (std::exchange(refused_, session.id()) != session.id()) {
+    session.send(message.local_sender,
+                 wire::Text{.severity = wire::kTextError,
+                            .level = 0,
+                            .text = std::string(wire::info(message.kind).name) + " refused: " + reason});
+  }
+  return false;
+}
+
+void Server::onHeartbeat(Session& session, const wire::MessageReceived& message) {
+  const auto heartbeat = wire::decode<wire::Heartbeat>(message.payload);
+  if (!heartbeat) {
+    session.refuse("malformed message: " + heartbeat.error());
+  } else if (heartbeat->watch != 0) {
+    heartbeats_.beat(session.id(), monotonicNow());
+  } else {
+    heartbeats_.forget(session.id());
+  }
 }
 
 void Server::onRemark(const Session& session, const std::string& text) {
@@ -208,8 +288,9 @@ void Server::onRemark(const Session& session, const std::string& text) {
 }
 
 void Server::onBatchEnd(Session& session) {
-  for (const auto& station : stations_) {
-    if (!station->flushCommands()) session.pause();
+  refused_ = 0;
+  for (const auto& scene : scenes_) {
+    if (!scene->flush()) session.pause();
   }
 }
 
@@ -222,18 +303,26 @@ void Server::onServoWake(Station& station) {
   }
 }
 
-void Server::deliver(Station& station, std::vector<scene::Notice>&& notices) {
+wire::LocalSender Server::nameFor(const Session& session, const SceneHost& scene) const noexcept {
+  const Station* first = nullptr;
+  for (const auto& station : stations_) {
+    if (&station->scene() != &scene) continue;
+    if (session.wants(station->nameFor(session))) return station->nameFor(session);
+    if (first == nullptr) first = station.get();
+  }
+  return first->nameFor(session);
+}
+
+void Server::deliver(const SceneHost& scene, std::vector<scene::Notice>&& notices) {
   for (const scene::Notice& notice : notices) {
     const auto session = sessions_.find(notice.client);
     if (session == sessions_.end()) continue;
-    sendText(*session->second, station, notice);
+    session->second->send(nameFor(*session->second, scene),
+                          wire::Text{.severity = static_cast<std::uint32_t>(notice.severity),
+                                     .level = 0,
+                                     .text = notice.text});
     session->second->flush();
   }
-}
-
-void Server::sendText(Session& session, const Station& station, const scene::Notice& notice) {
-  const auto severity = static_cast<std::uint32_t>(notice.severity);
-  session.send(station.nameFor(session), wire::Text{.severity = severity, .level = 0, .text = notice.text});
 }
 
 }  // namespace hapticd::server

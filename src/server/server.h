@@ -13,7 +13,9 @@
 #include "net/udp_socket.h"
 #include "server/clock.h"
 #include "server/config.h"
+#include "server/heartbeats.h"
 #include "server/noise_log.h"
+#include "server/scene_host.h"
 #include "server/session.h"
 #include "server/station.h"
 
@@ -48,20 +50,30 @@ class Server final : public SessionOwner {
   void addSession(net::Connection connection, std::unique_ptr<net::UdpSocket> udp);
   void onUdpRequest(std::span<const std::byte> datagram, const net::Endpoint& from);
   void callBack(const net::Endpoint& client);
+  void openDevice(const DeviceConfig& device);
+  SceneHost& sceneFor(const DeviceConfig& device);
+  void startScene(SceneHost& scene);
+  void everySecond();
   void onServoWake(Station& station);
+  void onHeartbeat(Session& session, const wire::MessageReceived& message);
   void closeStaleHandshakes();
+  void closeLost();
+  bool mayCommand(Session& session, Station& station, const wire::MessageReceived& message);
   Station* stationOf(wire::LocalSender name) noexcept;
-  void deliver(Station& station, std::vector<scene::Notice>&& notices);
-  void sendText(Session& session, const Station& station, const scene::Notice& notice);
+  wire::LocalSender nameFor(const Session& session, const SceneHost& scene) const noexcept;
+  void deliver(const SceneHost& scene, std::vector<scene::Notice>&& notices);
 
   ServerConfig config_;
   net::Loop loop_;
   WallClock clock_;
   NoiseLog noise_;
   wire::LocalNames names_;
+  std::vector<std::unique_ptr<SceneHost>> scenes_;
   std::vector<std::unique_ptr<Station>> stations_;
   std::map<scene::ClientId, std::unique_ptr<Session>> sessions_;
   std::map<scene::ClientId, geometry::Nanos> handshakes_;  ///< when the unfinished ones began
+  Heartbeats heartbeats_;
+  scene::ClientId refused_ = 0;  ///< whose commands of this read were refused; 0: nobody's
   std::vector<std::unique_ptr<CallBack>> callBacks_;
   std::vector<net::Subscription> subscriptions_;
   std::unique_ptr<net::TcpListener> listener_;

@@ -119,7 +119,8 @@ void Session::onDatagram(std::span<const std::byte> bytes, const net::Endpoint& 
 
 void Session::onEvent(const wire::Event& event) {
   std::visit(Overloaded{[this](const wire::MessageReceived& message) {
-                          if (message.local_sender.value >= 0) owner_.onMessage(*this, message);
+                          if (message.local_sender.value < 0 || isOvertaken(message)) return;
+                          owner_.onMessage(*this, message);
                         },
                         [this](const wire::Connected& connected) {
                           spdlog::info("client {} ({}) speaks VRPN {}", id_, description_, connected.version);
@@ -133,6 +134,19 @@ void Session::onEvent(const wire::Event& event) {
                         },
                         [this](const wire::ProtocolError& error) { failure_ = std::string(error.reason); }},
              event);
+}
+
+// A client that ends a field or a plane says so by TCP, what it said before by UDP may come later and must not
+// bring it back.
+bool Session::isOvertaken(const wire::MessageReceived& message) {
+  if (message.kind == wire::kUnknownKind) return false;
+  wire::Time& last = lastReliable_[static_cast<std::size_t>(message.kind)];
+  const auto before = [](const wire::Time& a, const wire::Time& b) {
+    return a.seconds != b.seconds ? a.seconds < b.seconds : a.microseconds < b.microseconds;
+  };
+  if (inDatagram_) return before(message.time, last);
+  last = message.time;
+  return false;
 }
 
 void Session::onSender(std::string_view name) {

@@ -1,6 +1,7 @@
 // One client: its connection, the protocol state on it, and which of our devices it listens to.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <set>
@@ -50,6 +51,10 @@ class Session {
   /// Whether reports under this name are wanted: those it described, or all while it has described none of
   /// ours.
   bool wants(wire::LocalSender name) const noexcept;
+  /// How many of our names it has described so far.
+  std::size_t namesWanted() const noexcept { return subscriptions_.size(); }
+  /// Where the client is, without the port.
+  std::string address() const { return connection_.remote().addressText(); }
 
   /// Queues one message; it leaves with the next flush().
   template <wire::WireMessage M>
@@ -84,6 +89,7 @@ class Session {
   void onUdp(const wire::UdpAddress& address);
   void onLogRequest(const wire::LogRequest& request);
   void drainEndpoint();
+  bool isOvertaken(const wire::MessageReceived& message);
 
   scene::ClientId id_;
   SessionOwner& owner_;
@@ -97,6 +103,7 @@ class Session {
   std::set<wire::LocalSender> subscriptions_;
   std::string failure_;
   bool inDatagram_ = false;
+  std::array<wire::Time, wire::kMessageKinds> lastReliable_{};  // of each kind, by the client's clock
 };
 
 }  // namespace hapticd::server

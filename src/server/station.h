@@ -1,60 +1,60 @@
-// A station: one haptic device with its scene, its servo and its names.
+// A station: one haptic device with its servo, its names, and what clients hear of it.
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <vector>
 
-#include "net/send_queue.h"
 #include "server/config.h"
-#include "server/reporter.h"
+#include "server/outbox.h"
+#include "server/roles.h"
 #include "server/scene_thread.h"
 #include "server/session.h"
 
 namespace hapticd::server {
 
-/// Ties the threads of one device together: commands in, reports out. Lives in the net thread.
+class SceneHost;
+
+/// One device between the threads: the servo's reports out, control in. Lives in the net thread.
 class Station {
  public:
-  /// Called from the scene thread.
-  struct Callbacks {
-    std::function<void(std::vector<scene::Notice>&&)> notices;
-    std::function<void()> drained;
-  };
-
-  /// Opens the device. Throws ConfigError or std::runtime_error with a remedy.
-  Station(const DeviceConfig& config, std::vector<wire::LocalSender> names, bool allowNoRealtime);
+  /// Opens the device and joins the scene. Throws ConfigError or std::runtime_error with a remedy.
+  Station(const DeviceConfig& config, std::vector<wire::LocalSender> names, SceneHost& scene,
+          bool allowNoRealtime);
   ~Station();
 
-  /// Starts the scene and the servo. Throws std::runtime_error when the loop gets no realtime rights and must
-  /// have them.
-  void start(Callbacks callbacks);
-  /// Zero force, then everything ends. Idempotent.
+  /// Starts the servo. Throws std::runtime_error when the loop gets no realtime rights and must have them.
+  void start();
+  /// Zero force, then the loop ends and the device is closed. Idempotent.
   void stop();
 
   /// Logs what the driver complains of, when it changed. Call it about once a second.
   void checkHealth();
+  /// Writes down what the black box has kept. Call it some times a second.
+  void checkBlackBox();
 
+  SceneHost& scene() noexcept;
+  const std::vector<wire::LocalSender>& names() const noexcept;
   bool has(wire::LocalSender name) const noexcept;
   /// The name under which this client knows the device.
   wire::LocalSender nameFor(const Session& session) const noexcept;
 
-  /// A client's message: scene commands are gathered, questions answered.
+  /// Whether the client may command; when not, `reason` says who may.
+  bool mayCommand(const Session& session, std::string& reason);
+  /// A client's message that is no scene command: control, choices, questions.
   void onMessage(Session& session, const wire::MessageReceived& message);
-  /// Hands the gathered commands to the scene; false when it is so far behind that reading should pause.
-  bool flushCommands();
-  /// What the client owns ramps out; with the last that had commanded it the scene goes, too, if so
-  /// configured.
+  /// The scene of this device was put back to the beginning.
+  void onReset();
+  /// The client listens to this name from now on.
+  void onSubscribed(Session& session, wire::LocalSender name);
   void clientGone(scene::ClientId client);
 
   /// Readable when reports wait.
   int wakeFd() const noexcept;
-  /// Encodes, once for all clients, what the servo has reported; false when there was nothing to say.
+  /// Encodes, once for all clients who chose alike, what the servo has reported; false when there was nothing
+  /// to say.
   bool collectReports(const WallClock& clock);
   /// Queues what collectReports() encoded.
-  void sendReports(Session& session) const;
-  /// Queues the present state of everything, under one name.
-  void sendPresentState(Session& session, wire::LocalSender name) const;
+  void sendReports(Session& session);
 
  private:
   struct Impl;

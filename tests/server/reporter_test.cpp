@@ -18,14 +18,18 @@ class ReporterTest : public ::testing::Test {
     config_.angularTolerance_rad = 0.02;
     tick_.T_world_device = Affine(Eigen::UniformScaling<double>(1000.0));
   }
-  void start() { reporter_ = std::make_unique<Reporter>(config_, 2, config_.reportRate_Hz); }
+  void start() {
+    choice_.rate_Hz = config_.reportRate_Hz;
+    reporter_ = std::make_unique<Reporter>(config_, 2, choice_);
+  }
   // One tick later.
   void step(Nanos by = kMs) {
     if (!reporter_) start();
     ++tick_.tick;
     tick_.time += by;
     out_.clear();
-    reporter_->update(tick_, out_);
+    frame_.buttons = tick_.device.buttons;
+    reporter_->update(tick_, frame_, out_);
   }
   template <class M>
   std::vector<M> said() const {
@@ -54,6 +58,8 @@ class ReporterTest : public ::testing::Test {
   }
 
   DeviceConfig config_;
+  ReportChoice choice_;
+  ReportFrame frame_;
   realtime::TickReport tick_;
   std::unique_ptr<Reporter> reporter_;
   std::vector<Outgoing> out_;
@@ -198,8 +204,8 @@ TEST_F(ReporterTest, ALateJoinerHearsThePresentState) {
   tick_.device.buttons = 1;
   for (int i = 0; i < 3; ++i) step();
   out_.clear();
-  reporter_->presentState(tick_, out_);
-  EXPECT_EQ(said<wire::ButtonStates>().at(0).states.values, (std::vector<std::int32_t>{1, 0}));
+  reporter_->presentState(tick_, frame_, out_);
+  EXPECT_EQ(said<wire::ButtonStates>().at(0).states.values, (std::vector<std::int32_t>{1, 0, 1}));
   EXPECT_EQ(said<wire::TrackerPosQuat>().size(), 3U);
   EXPECT_EQ(said<wire::TouchedObject>().at(0).object, 3);
   EXPECT_EQ(said<wire::IsTouching>().at(0).touching, 1);
@@ -208,6 +214,116 @@ TEST_F(ReporterTest, ALateJoinerHearsThePresentState) {
   EXPECT_EQ(said<wire::Scp>().size(), 1U);
   EXPECT_EQ(said<wire::Angle>().size(), 1U);
   for (const Outgoing& out : out_) EXPECT_TRUE(out.reliable);
+}
+
+TEST_F(ReporterTest, ContactIsMirroredAsAnalogChannelsAndAButton) {
+  touch(0.002);
+  step();
+  const auto channels = said<wire::AnalogChannels>().at(0).channels.values;
+  ASSERT_EQ(channels.size(), 6U);
+  EXPECT_NEAR(channels[0], 0.1, 1e-12);
+  EXPECT_NEAR(channels[2], 1.0, 1e-12);
+  EXPECT_NEAR(channels[3], 0.002, 1e-12);
+  EXPECT_NEAR(channels[4], 90, 1e-9);
+  EXPECT_EQ(channels[5], 3);
+  ASSERT_EQ(said<wire::ButtonChange>().size(), 1U);
+  EXPECT_EQ(said<wire::ButtonChange>()[0].button, 2);  // after the device's own two
+  EXPECT_EQ(said<wire::ButtonChange>()[0].state, 1);
+  step();
+  EXPECT_TRUE(said<wire::AnalogChannels>().empty());  // nothing changed
+  tick_.rendering = {};
+  tick_.force_N = Vec3::Zero();
+  step();
+  EXPECT_EQ(said<wire::AnalogChannels>().at(0).channels.values,
+            (std::vector<double>{0, 0, 0, 0, 0, -1}));
+  EXPECT_TRUE(reliably<wire::AnalogChannels>());
+  EXPECT_EQ(said<wire::ButtonChange>().at(0).state, 0);
+}
+
+TEST_F(ReporterTest, OnlyWhatWasChosenIsSaid) {
+  choice_.kinds = wire::kReportButton;
+  touch();
+  step();
+  EXPECT_EQ(said<wire::ButtonChange>().size(), 1U);
+  EXPECT_EQ(out_.size(), 1U);
+  tick_.guard.active = realtime::bit(realtime::Trip::speed);
+  step();
+  EXPECT_EQ(said<wire::ForceError>().size(), 1U);  // errors always come
+}
+
+TEST_F(ReporterTest, AWholeTickIsInTheUnitsOfTheOtherReports) {
+  choice_.kinds = wire::kReportTick;
+  tick_.T_world_device = Eigen::Translation3d(500, 0, 0) * Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ()) *
+                         Eigen::UniformScaling<double>(2000.0);
+  tick_.rendering.proxy_m = Vec3(0.01, 0, 0);
+  tick_.device.position_m = Vec3(0.02, 0, 0);
+  tick_.device.velocity_m_per_s = Vec3(0.1, 0, 0);
+  tick_.device.buttons = 2;
+  tick_.revision = 7;
+  touch(0.002);
+  step();
+  ASSERT_EQ(out_.size(), 1U);
+  const wire::TickReport whole = said<wire::TickReport>().at(0);
+  EXPECT_EQ(whole.tick, 1U);
+  EXPECT_EQ(whole.time, kMs);
+  EXPECT_EQ(whole.revision, 7U);
+  EXPECT_NEAR(whole.proxy[1], 0.02, 1e-12);
+  EXPECT_NEAR(whole.hand[1], 0.04, 1e-12);
+  EXPECT_NEAR(whole.velocity[1], 0.2, 1e-12);
+  EXPECT_NEAR(whole.force[1], 0.1, 1e-12);
+  EXPECT_NEAR(whole.depth, 0.004, 1e-12);
+  EXPECT_EQ(whole.object, 3);
+  EXPECT_EQ(whole.buttons, 2U);
+}
+
+TEST_F(ReporterTest, EveryContactOfATickIsListedAndTheEndIsAnEmptyList) {
+  choice_.kinds = wire::kReportContacts;
+  step();
+  EXPECT_TRUE(out_.empty());
+  touch();
+  tick_.rendering.contactCount = 2;
+  tick_.rendering.contacts[0] = {4, 1, Vec3(0.01, 0, 0), Vec3::UnitX(), Vec3(2, 0, 0)};
+  tick_.rendering.contacts[1] = {5, 1, Vec3(0, 0.01, 0), Vec3::UnitY(), Vec3(0, 3, 0)};
+  step();
+  const auto numbers = said<wire::ContactList>().at(0).contacts.values;
+  EXPECT_EQ(numbers, (std::vector<double>{4, 0.01, 0, 0, 1, 0, 0, 2, 0, 0,  //
+                                          5, 0, 0.01, 0, 0, 1, 0, 0, 3, 0}));
+  tick_.rendering = {};
+  step();
+  EXPECT_TRUE(said<wire::ContactList>().at(0).contacts.values.empty());
+  EXPECT_TRUE(reliably<wire::ContactList>());
+  step();
+  EXPECT_TRUE(out_.empty());
+}
+
+TEST_F(ReporterTest, PosesCountFromTheOriginThatWasSet) {
+  config_.linearTolerance_m = 0;
+  tick_.rendering.proxy_m = Vec3(0.03, 0.01, 0);
+  tick_.device.orientation = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ());
+  frame_.origin = Vec3(0.02, 0.01, 0);
+  frame_.turn = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ());
+  step();
+  const auto pose = said<wire::TrackerPosQuat>().at(0);
+  EXPECT_NEAR(pose.position[0], 0, 1e-12);
+  EXPECT_NEAR(pose.position[1], -0.01, 1e-12);  // 10 mm along x, seen by one turned to +y
+  EXPECT_NEAR(std::abs(pose.orientation[3]), 1, 1e-12);
+}
+
+TEST_F(ReporterTest, TheGuardIsToldOnChange) {
+  const auto states = [this] { return said<wire::GuardState>(); };
+  tick_.guard.armed = true;
+  step();
+  ASSERT_EQ(states().size(), 1U);
+  EXPECT_EQ(states()[0].armed, 1);
+  tick_.guard.active = realtime::bit(realtime::Trip::slew);
+  step();
+  EXPECT_TRUE(states().empty());  // a clamp
+  tick_.guard.stopped = true;
+  tick_.guard.active = realtime::bit(realtime::Trip::stopped);
+  step();
+  ASSERT_EQ(states().size(), 1U);
+  EXPECT_EQ(states()[0].stopped, 1);
+  EXPECT_EQ(states()[0].active, realtime::bit(realtime::Trip::stopped));
 }
 
 }  // namespace

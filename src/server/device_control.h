@@ -1,0 +1,41 @@
+// Stop, re-arm and holding the simulated hand: what clients may do to the device itself.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "device/simulated/simulated_device.h"
+#include "realtime/servo/guard_control.h"
+#include "realtime/servo/report.h"
+#include "scene/notice.h"
+#include "wire/messages.h"
+
+namespace hapticd::server {
+
+/// One device. Net thread; what it does acts at the next tick.
+class DeviceControl {
+ public:
+  /// `simulated` is null for real devices. Both outlive this.
+  DeviceControl(realtime::GuardControl& guard, device::SimulatedDevice* simulated)
+      : guard_(guard), simulated_(simulated) {}
+
+  void stopForces() { guard_.stop(); }
+  void rearmForces() { guard_.rearm(); }
+  /// After a reset of the scene: what is felt then comes in gently.
+  void rampIn() { guard_.rampIn(); }
+
+  bool canBeHeld() const noexcept { return simulated_ != nullptr; }
+  /// Moves the hand's target, or lets go. False when refused; `error` then says why.
+  bool hold(scene::ClientId client, const wire::HoldHand& wanted, const realtime::TickReport& last,
+            std::string& error);
+  void clientGone(scene::ClientId client);
+
+ private:
+  void letGo();
+
+  realtime::GuardControl& guard_;
+  device::SimulatedDevice* simulated_;
+  std::optional<scene::ClientId> holder_;
+};
+
+}  // namespace hapticd::server

@@ -1,0 +1,39 @@
+#include "server/scene_host.h"
+
+namespace hapticd::server {
+
+void SceneHost::start(SceneThread::Callbacks callbacks) {
+  thread_ = std::make_unique<SceneThread>(std::move(devices_), std::move(callbacks));
+  thread_->start();
+}
+
+void SceneHost::stop() {
+  if (thread_) thread_->stop();
+}
+
+Inbox::Outcome SceneHost::take(scene::ClientId client, const wire::MessageReceived& message,
+                               std::string& error) {
+  const Inbox::Outcome outcome = inbox_.take(client, message, error);
+  if (outcome == Inbox::Outcome::taken) commanders_.insert(client);
+  return outcome;
+}
+
+bool SceneHost::flush() {
+  if (!thread_) return true;
+  if (!inbox_.empty()) {
+    const std::size_t bytes = inbox_.bytes();
+    thread_->enqueue(inbox_.release(), bytes);
+  }
+  return !thread_->full();
+}
+
+void SceneHost::clientGone(scene::ClientId client) {
+  inbox_.add({client, ClientGone{}});
+  const bool lastToCommand = commanders_.erase(client) == 1 && commanders_.empty();
+  if (lastToCommand && onDisconnect_ == SceneOnDisconnect::clear) {
+    inbox_.add({client, scene::SceneCommand{scene::ResetScene{}}});
+  }
+  flush();
+}
+
+}  // namespace hapticd::server

@@ -1,0 +1,47 @@
+// One scene and the devices that touch it: commands in, one snapshot for each device out.
+#pragma once
+
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "server/config.h"
+#include "server/inbox.h"
+#include "server/scene_thread.h"
+
+namespace hapticd::server {
+
+/// Net thread, but for the callbacks.
+class SceneHost {
+ public:
+  /// `name` is that of the configuration; empty for the scene of one device alone.
+  SceneHost(std::string name, SceneOnDisconnect onDisconnect)
+      : name_(std::move(name)), onDisconnect_(onDisconnect) {}
+
+  const std::string& name() const noexcept { return name_; }
+
+  /// Before start(): another device touches this scene.
+  void add(SceneDevice device) { devices_.push_back(std::move(device)); }
+  /// The callbacks come from the scene thread.
+  void start(SceneThread::Callbacks callbacks);
+  void stop();
+
+  /// Gathers a message if it is a scene command.
+  Inbox::Outcome take(scene::ClientId client, const wire::MessageReceived& message, std::string& error);
+  /// Hands the gathered commands to the scene; false when it is so far behind that reading should pause.
+  bool flush();
+  /// What the client owns ramps out; with the last that had commanded the scene it goes, too, if so
+  /// configured.
+  void clientGone(scene::ClientId client);
+
+ private:
+  std::string name_;
+  SceneOnDisconnect onDisconnect_;
+  std::vector<SceneDevice> devices_;
+  std::unique_ptr<SceneThread> thread_;
+  Inbox inbox_;
+  std::set<scene::ClientId> commanders_;  // who has said something to the scene
+};
+
+}  // namespace hapticd::server
