@@ -1,0 +1,251 @@
+// Control of a device by its clients, over real sockets: stop, re-arm, roles, heartbeat, holding the hand, batches,
+// shared scenes.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "running_server.h"
+#include "scripted_peer.h"
+
+namespace hapticd::test {
+namespace {
+
+using Config = server::ServerConfig;
+
+// A field that pushes up with 1 N wherever the hand is.
+const wire::ForceField kUp{.origin = {0, 0, 0}, .force = {0, 1, 0}, .jacobian = {}, .radius = 10};
+
+double lastForce(const ScriptedPeer& peer) {
+  const auto forces = peer.all<wire::Force>();
+  return forces.empty() ? 0 : std::hypot(forces.back().force[0], forces.back().force[1], forces.back().force[2]);
+}
+bool untilForce(ScriptedPeer& peer, double force_N, double tolerance_N = 0.02) {
+  return peer.until([&] { return std::abs(lastForce(peer) - force_N) < tolerance_N && peer.count<wire::Force>(); });
+}
+wire::GuardState lastGuard(const ScriptedPeer& peer) {
+  const auto states = peer.all<wire::GuardState>();
+  return states.empty() ? wire::GuardState{} : states.back();
+}
+
+// Holds the hand still at a place, so that nothing but what is commanded is felt.
+void hold(ScriptedPeer& peer, double x, double y, double z) {
+  peer.send(wire::HoldHand{.hold = 1, .position = {x, y, z}});
+}
+
+class ControlTest : public ::testing::Test {
+ protected:
+  void serve(const Config& config = RunningServer::anyPort()) {
+    server_ = std::make_unique<RunningServer>(config);
+  }
+  std::unique_ptr<ScriptedPeer> peer(const std::string& device = "Phantom") {
+    auto peer = std::make_unique<ScriptedPeer>(server_->address(), device);
+    EXPECT_TRUE(peer->until([&] { return peer->count<wire::IsTouching>() > 0; }));
+    return peer;
+  }
+  std::unique_ptr<RunningServer> server_;
+};
+
+TEST_F(ControlTest, CapabilitiesTellOfTheDevice) {
+  serve();
+  const auto client = peer();
+  client->send(wire::QueryCapabilities{});
+  ASSERT_TRUE(client->untilNext<wire::Capabilities>());
+  const auto answer = client->all<wire::Capabilities>().at(0);
+  EXPECT_EQ(answer.version, 1);
+  EXPECT_EQ(answer.features, 63U);
+  EXPECT_EQ(answer.servo_rate, 1000);
+  EXPECT_NEAR(answer.peak_force, 3.3, 1e-12);
+  EXPECT_NEAR(answer.workspace[3], 0.08, 1e-12);
+}
+
+TEST_F(ControlTest, AnyClientStopsTheForceAndReArmingBringsItBack) {
+  serve();
+  const auto owner = peer();
+  const auto other = peer();
+  hold(*owner, 0, 0, 0);
+  owner->send(kUp);
+  ASSERT_TRUE(untilForce(*owner, 1));
+  EXPECT_EQ(lastGuard(*owner).stopped, 0);
+  other->send(wire::StopForces{});
+  ASSERT_TRUE(owner->until([&] { return lastGuard(*owner).stopped == 1; }));
+  ASSERT_TRUE(untilForce(*owner, 0, 1e-9));
+  ASSERT_TRUE(owner->until([&] { return owner->count<wire::ForceError>() > 0; }));
+  other->send(wire::RearmForces{});
+  ASSERT_TRUE(owner->until([&] { return lastGuard(*owner).stopped == 0; }));
+  EXPECT_TRUE(untilForce(*owner, 1));
+}
+
+TEST_F(ControlTest, OnlyOneHoldsTheHandAndItGoesWhereItIsHeld) {
+  serve();
+  auto holder = peer();
+  const auto other = peer();
+  hold(*holder, 30, 20, 10);
+  const auto isAt = [&](double x, double y, double z) {
+    const auto poses = other->all<wire::TrackerPosQuat>();
+    for (auto pose = poses.rbegin(); pose != poses.rend(); ++pose) {
+      if (pose->sensor != server::kSensorHip) continue;
+      return std::hypot(pose->position[0] - x, pose->position[1] - y, pose->position[2] - z) < 0.0015;
+    }
+    return false;
+  };
+  ASSERT_TRUE(other->until([&] { return isAt(0.03, 0.02, 0.01); }));
+  hold(*other, 0, 0, 0);
+  EXPECT_TRUE(other->untilText("holds the hand"));
+  holder->close();
+  holder.reset();
+  ASSERT_TRUE(other->until([&] {
+    hold(*other, -20, 0, 0);
+    return isAt(-0.02, 0, 0);
+  }));
+}
+
+TEST_F(ControlTest, AClientThatPromisedHeartbeatsIsLostWithoutThem) {
+  serve();
+  const auto watcher = peer();
+  const auto client = peer();
+  hold(*watcher, 0, 0, 0);
+  client->send(kUp);
+  client->send(wire::Heartbeat{1});
+  ASSERT_TRUE(untilForce(*watcher, 1));
+  EXPECT_TRUE(client->until([&] { return !client->open(); }));
+  EXPECT_TRUE(untilForce(*watcher, 0, 1e-9));
+  EXPECT_TRUE(watcher->open());
+}
+
+TEST_F(ControlTest, APromiseOfHeartbeatsCanBeTakenBack) {
+  serve();
+  const auto client = peer();
+  client->send(wire::Heartbeat{1});
+  client->send(wire::Heartbeat{0});
+  const auto since = client->count<wire::IsTouching>();
+  // 1.5 s of reports, told by their number.
+  EXPECT_TRUE(client->until([&] { return client->count<wire::IsTouching>() > since + 1500; }, 60s));
+  EXPECT_TRUE(client->open());
+}
+
+TEST_F(ControlTest, OnlyTheFirstCommandsUntilItLeaves) {
+  Config config = RunningServer::anyPort();
+  config.devices[0].control = server::Control::first;
+  serve(config);
+  auto first = peer();
+  const auto second = peer();
+  first->send(wire::SetObjectNumber{2});
+  hold(*first, 0, 0, 0);
+  first->send(wire::Ping{});
+  ASSERT_TRUE(first->untilNext<wire::Pong>());
+  second->send(kUp);
+  ASSERT_TRUE(second->untilText("vrpn_ForceDevice Force_Field refused: client"));
+  second->send(wire::StopForces{});  // anybody may
+  ASSERT_TRUE(first->until([&] { return lastGuard(*first).stopped == 1; }));
+  second->send(wire::RearmForces{});
+  ASSERT_TRUE(second->untilText("hapticd Rearm_Forces refused"));
+  first->send(wire::RearmForces{});
+  ASSERT_TRUE(first->until([&] { return lastGuard(*first).stopped == 0; }));
+  first->close();
+  first.reset();
+  // The server hears of that when it hears of it.
+  EXPECT_TRUE(second->until([&] {
+    second->send(kUp);
+    return lastForce(*second) > 0.5;
+  }));
+}
+
+TEST_F(ControlTest, OnlyListedAddressesCommand) {
+  Config config = RunningServer::anyPort();
+  config.devices[0].control = server::Control::list;
+  config.devices[0].controlList = {"10.1.2.3"};
+  serve(config);
+  const auto stranger = peer();
+  for (int i = 0; i < 100; ++i) stranger->send(wire::SetVertex{0, i, {}});
+  ASSERT_TRUE(stranger->untilText("control_list"));
+  server_.reset();
+  config.devices[0].controlList = {"127.0.0.1"};
+  serve(config);
+  const auto known = peer();
+  known->send(kUp);
+  EXPECT_TRUE(known->until([&] { return lastForce(*known) > 0.5; }));
+}
+
+TEST_F(ControlTest, ABatchIsFeltAtOnceOrNotAtAll) {
+  serve();
+  const auto watcher = peer();
+  auto client = peer();
+  hold(*watcher, 0, 0, 0);
+  watcher->send(wire::Subscribe{.kinds = wire::kReportDefault | wire::kReportTick, .rate = 0});
+  ASSERT_TRUE(watcher->until([&] { return watcher->count<wire::TickReport>() > 0; }));
+  const auto revision = watcher->all<wire::TickReport>().back().revision;
+
+  client->send(wire::BatchBegin{});
+  client->send(kUp);
+  client->send(wire::Ping{});
+  ASSERT_TRUE(client->untilNext<wire::Pong>());
+  client->close();
+  client.reset();
+  const auto later = watcher->count<wire::TickReport>() + 100;
+  ASSERT_TRUE(watcher->until([&] { return watcher->count<wire::TickReport>() > later; }));
+  EXPECT_EQ(lastForce(*watcher), 0);
+
+  watcher->send(wire::BatchBegin{});
+  watcher->send(wire::SetObjectNumber{3});
+  watcher->send(kUp);
+  watcher->send(wire::BatchCommit{});
+  ASSERT_TRUE(untilForce(*watcher, 1));
+  EXPECT_GT(watcher->all<wire::TickReport>().back().revision, revision);
+  watcher->send(wire::BatchCommit{});
+  EXPECT_TRUE(watcher->untilText("no batch was begun"));
+}
+
+TEST_F(ControlTest, ABulkMeshIsFeltInItsOwnUnit) {
+  serve();
+  const auto client = peer();
+  // A floor at y = 0, 200 mm wide, in two triangles.
+  client->send(wire::MeshVertices{0, 0, {{-100, 0, -100, 100, 0, -100, 100, 0, 100, -100, 0, 100}}});
+  client->send(wire::MeshTriangles{0, 0, {{0, 2, 1, 0, 3, 2}}});
+  hold(*client, 0, 10, 0);
+  ASSERT_TRUE(client->until([&] {
+    const auto poses = client->all<wire::TrackerPosQuat>();
+    return !poses.empty() && poses.back().position[1] > 0.009;
+  }));
+  client->send(wire::SetHapticProperty{0, "stiffness", 1.0F});
+  hold(*client, 0, -5, 0);
+  ASSERT_TRUE(client->until([&] {
+    const auto depths = client->all<wire::Dop>();
+    return !depths.empty() && depths.back().depth > 0.0005;
+  }));
+  EXPECT_TRUE(client->until([&] {
+    const auto forces = client->all<wire::Force>();
+    return !forces.empty() && forces.back().force[1] > 0.5;
+  }));
+}
+
+TEST_F(ControlTest, DevicesThatNameOneSceneFeelTheSame) {
+  Config config = RunningServer::anyPort();
+  config.devices.resize(3);
+  config.devices[0].names = {"Left"};
+  config.devices[1].names = {"Right"};
+  config.devices[2].names = {"Apart"};
+  config.devices[0].scene = config.devices[1].scene = "table";
+  serve(config);
+  const auto left = peer("Left");
+  const auto right = peer("Right");
+  const auto apart = peer("Apart");
+  left->send(kUp);
+  EXPECT_TRUE(left->until([&] { return lastForce(*left) > 0.5; }));
+  EXPECT_TRUE(right->until([&] { return lastForce(*right) > 0.5; }));
+  EXPECT_EQ(lastForce(*apart), 0);
+  right->send(wire::StopEffect{77});
+  EXPECT_TRUE(right->untilText("77"));
+  std::size_t texts = 0;
+  for (const auto& text : right->all<wire::Text>()) texts += text.text.text.find("77") != std::string::npos ? 1 : 0;
+  EXPECT_EQ(texts, 1U);
+}
+
+TEST_F(ControlTest, ASceneThatFailsIsNotCommandedByMalformedOnes) {
+  serve();
+  const auto client = peer();
+  client->send(wire::MeshVertices{0, 0, {{1, 2}}});
+  EXPECT_TRUE(client->until([&] { return !client->open(); }));
+}
+
+}  // namespace
+}  // namespace hapticd::test

@@ -1,0 +1,176 @@
+// What each client hears, over real sockets: rates, kinds, mirrors, toggles, origins.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "running_server.h"
+#include "scripted_peer.h"
+
+namespace hapticd::test {
+namespace {
+
+class ReportsTest : public ::testing::Test {
+ protected:
+  std::unique_ptr<ScriptedPeer> peer(ScriptedPeer::Mode mode = ScriptedPeer::Mode::tcp) {
+    auto peer = std::make_unique<ScriptedPeer>(server_.address(), "Phantom", mode);
+    EXPECT_TRUE(peer->until([&] { return peer->count<wire::IsTouching>() > 0; }));
+    return peer;
+  }
+  // A floor under the hand, which is held in it.
+  static void touchFloor(ScriptedPeer& peer) {
+    peer.send(wire::HoldHand{.hold = 1, .position = {0, 10, 0}});
+    peer.send(wire::Plane{.plane = {0, 1, 0, 0}, .stiffness = 0.5F, .damping = 0, .index = 0, .recovery_cycles = 1});
+    peer.send(wire::HoldHand{.hold = 1, .position = {0, -3, 0}});
+  }
+  // Two reports of one kind, this many ticks apart in the mean.
+  static double meanTicksBetween(ScriptedPeer& peer) {
+    peer.forget();
+    EXPECT_TRUE(peer.until([&] { return peer.count<wire::TickReport>() >= 30; }, 60s));
+    const auto ticks = peer.all<wire::TickReport>();
+    return static_cast<double>(ticks.back().tick - ticks.front().tick) / static_cast<double>(ticks.size() - 1);
+  }
+
+  RunningServer server_;
+};
+
+TEST_F(ReportsTest, EachClientHasARateOfItsOwn) {
+  const auto slow = peer();
+  const auto fast = peer();
+  slow->send(wire::Subscribe{.kinds = wire::kReportTick, .rate = 100});
+  fast->send(wire::Subscribe{.kinds = wire::kReportTick, .rate = 1e6});  // as fast as the servo
+  ASSERT_TRUE(slow->until([&] { return slow->count<wire::TickReport>() > 0; }));
+  ASSERT_TRUE(fast->until([&] { return fast->count<wire::TickReport>() > 0; }));
+  // A stalled machine skips ticks, and reports then come after fewer of them.
+  const double slowTicks = meanTicksBetween(*slow);
+  EXPECT_GT(slowTicks, 5);
+  EXPECT_LT(slowTicks, 10.5);
+  EXPECT_LT(meanTicksBetween(*fast), 3);
+  slow->send(wire::TrackerSetUpdateRate{500});
+  ASSERT_TRUE(slow->until([&] { return meanTicksBetween(*slow) < 3; }));
+  slow->forget();
+  slow->send(wire::Subscribe{.kinds = wire::kReportDefault, .rate = 0});
+  ASSERT_TRUE(slow->untilNext<wire::IsTouching>());
+}
+
+TEST_F(ReportsTest, SenselessRatesAreRefusedByName) {
+  const auto client = peer();
+  client->send(wire::TrackerSetUpdateRate{std::nan("")});
+  EXPECT_TRUE(client->untilText("set_update_rate: rate nan Hz refused"));
+  client->send(wire::Subscribe{.kinds = wire::kReportDefault, .rate = -5});
+  EXPECT_TRUE(client->untilText("Subscribe: rate -5 Hz refused"));
+  EXPECT_TRUE(client->untilNext<wire::IsTouching>());
+}
+
+TEST_F(ReportsTest, TicksHaveTheirNumbersAndTimes) {
+  const auto client = peer();
+  client->send(wire::Subscribe{.kinds = wire::kReportTick, .rate = 0});
+  ASSERT_TRUE(client->until([&] { return client->count<wire::TickReport>() >= 50; }));
+  const auto ticks = client->all<wire::TickReport>();
+  for (std::size_t i = 1; i < ticks.size(); ++i) {
+    EXPECT_GT(ticks[i].tick, ticks[i - 1].tick);
+    EXPECT_GT(ticks[i].time, ticks[i - 1].time);
+  }
+}
+
+TEST_F(ReportsTest, EveryContactIsListedAndItsEndToo) {
+  const auto client = peer(ScriptedPeer::Mode::udp);
+  client->send(wire::Subscribe{.kinds = wire::kReportDefault | wire::kReportContacts, .rate = 0});
+  touchFloor(*client);
+  ASSERT_TRUE(client->until([&] {
+    const auto lists = client->all<wire::ContactList>();
+    return !lists.empty() && lists.back().contacts.values.size() == 10 && lists.back().contacts.values[8] > 0.3;
+  }));
+  const auto contact = client->all<wire::ContactList>().back().contacts.values;
+  EXPECT_EQ(contact[0], -1);  // a plane
+  EXPECT_NEAR(contact[5], 1, 1e-6);
+  client->send(wire::HoldHand{.hold = 1, .position = {0, 10, 0}});
+  EXPECT_TRUE(client->until([&] { return client->all<wire::ContactList>().back().contacts.values.empty(); }));
+}
+
+TEST_F(ReportsTest, AClientThatKnowsOnlyAnalogAndButtonFeelsContact) {
+  const auto client = peer();
+  touchFloor(*client);
+  ASSERT_TRUE(client->until([&] {
+    const auto channels = client->all<wire::AnalogChannels>();
+    return !channels.empty() && channels.back().channels.values.at(1) > 0.3 &&
+           channels.back().channels.values.at(3) > 0.0005;
+  }));
+  const auto isTouching = [&](std::int32_t state) {
+    const auto buttons = client->all<wire::ButtonChange>();
+    for (auto change = buttons.rbegin(); change != buttons.rend(); ++change) {
+      if (change->button == 2) return change->state == state;
+    }
+    return false;
+  };
+  EXPECT_TRUE(client->until([&] { return isTouching(1); }));
+  client->send(wire::HoldHand{.hold = 1, .position = {0, 10, 0}});
+  EXPECT_TRUE(client->until([&] { return isTouching(0); }));
+}
+
+TEST_F(ReportsTest, AToggleStaysOnWhenItsButtonIsReleased) {
+  const auto client = peer();
+  const auto watcher = peer();
+  const auto button = [](std::uint32_t buttons) { return wire::HoldHand{.hold = 1, .position = {}, .buttons = buttons}; };
+  const auto isOn = [](ScriptedPeer& who, std::int32_t state) {
+    const auto changes = who.all<wire::ButtonChange>();
+    for (auto change = changes.rbegin(); change != changes.rend(); ++change) {
+      if (change->button == 0) return change->state == state;
+    }
+    return false;
+  };
+  client->send(button(0));
+  client->send(wire::ButtonAdmin{0, wire::kButtonToggleOff});
+  ASSERT_TRUE(watcher->until([&] { return watcher->count<wire::ButtonAlert>() >= 1; }));
+  EXPECT_EQ(watcher->all<wire::ButtonAlert>().back().event, wire::kButtonToggleOff);
+  client->send(button(1));
+  ASSERT_TRUE(watcher->until([&] { return isOn(*watcher, 1); }));
+  ASSERT_TRUE(watcher->until([&] { return watcher->all<wire::ButtonAlert>().back().event == wire::kButtonToggleOn; }));
+  client->send(button(0));
+  client->send(wire::Ping{});
+  ASSERT_TRUE(client->untilNext<wire::Pong>());
+  const auto later = client->count<wire::IsTouching>() + 100;
+  ASSERT_TRUE(client->until([&] { return client->count<wire::IsTouching>() > later; }));
+  EXPECT_TRUE(isOn(*client, 1));
+  client->send(button(1));
+  EXPECT_TRUE(client->until([&] { return isOn(*client, 0); }));
+  client->send(wire::ButtonAdmin{9, wire::kButtonToggleOn});
+  EXPECT_TRUE(client->untilText("button 9 refused"));
+}
+
+TEST_F(ReportsTest, PosesCountFromTheOriginThatAClientResets) {
+  const auto client = peer();
+  client->send(wire::HoldHand{.hold = 1, .position = {30, 20, 10}});
+  const auto hip = [&](double x, double y, double z) {
+    return client->until([&] {
+      const auto poses = client->all<wire::TrackerPosQuat>();
+      for (auto pose = poses.rbegin(); pose != poses.rend(); ++pose) {
+        if (pose->sensor != server::kSensorHip) continue;
+        return std::hypot(pose->position[0] - x, pose->position[1] - y, pose->position[2] - z) < 0.0015;
+      }
+      return false;
+    });
+  };
+  ASSERT_TRUE(hip(0.03, 0.02, 0.01));
+  client->send(wire::TrackerResetOrigin{});
+  ASSERT_TRUE(hip(0, 0, 0));
+  client->send(wire::TrackerRequestToRoom{});
+  ASSERT_TRUE(client->untilNext<wire::TrackerToRoom>());
+  EXPECT_NEAR(client->all<wire::TrackerToRoom>().at(0).position[0], 0.03, 0.0015);
+  client->send(wire::ResetScene{});
+  EXPECT_TRUE(hip(0.03, 0.02, 0.01));
+}
+
+TEST_F(ReportsTest, ALateJoinerIsToldOfTheGuard) {
+  const auto client = peer();
+  client->send(wire::StopForces{});
+  ASSERT_TRUE(client->until([&] {
+    const auto states = client->all<wire::GuardState>();
+    return !states.empty() && states.back().stopped == 1;
+  }));
+  const auto late = peer();
+  ASSERT_TRUE(late->until([&] { return late->count<wire::GuardState>() > 0; }));
+  EXPECT_EQ(late->all<wire::GuardState>().at(0).stopped, 1);
+}
+
+}  // namespace
+}  // namespace hapticd::test
