@@ -1,0 +1,28 @@
+#!/usr/bin/env bash
+# Stop and re-arm from the command line while a scan is touched: the force goes and comes back.
+set -euo pipefail
+hapticd=$1
+source_dir=$2
+work=$(mktemp -d)
+"$hapticd" serve --listen 127.0.0.1:0 --allow-no-rt >"$work/log" 2>&1 &
+server=$!
+trap 'kill "$server" 2>/dev/null || true; rm -rf "$work"' EXIT
+address=""
+for _ in $(seq 300); do
+  address=$(sed -nE 's/.*listening on ([0-9.]+:[0-9]+).*/\1/p' "$work/log" | head -1)
+  [ -n "$address" ] && break
+  sleep 0.1
+done
+[ -n "$address" ] || { cat "$work/log"; exit 1; }
+
+"$hapticd" stop "Phantom@$address" | grep -q 'forces are off'
+"$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --server "Phantom@$address" --seconds 4 >"$work/stopped"
+awk '/peak force/ { if ($3 != 0) felt = 1 } END { exit felt }' "$work/stopped" || { cat "$work/stopped"; exit 1; }
+"$hapticd" stop --rearm "Phantom@tcp://$address" | grep -q 'may come back'
+"$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --server "Phantom@$address" --seconds 6 >"$work/felt"
+awk '/peak force/ { if ($3 > 0.1) felt = 1 } END { exit !felt }' "$work/felt" || { cat "$work/felt"; exit 1; }
+grep -q 'stops the forces' "$work/log"
+
+status=0
+"$hapticd" stop "Phantom@127.0.0.1:1" >"$work/out" 2>&1 || status=$?
+[ "$status" = 1 ]
