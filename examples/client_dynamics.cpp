@@ -3,8 +3,6 @@
 // too; with a real device, push the box yourself.
 //   client_dynamics [NAME@host] [seconds]
 #include <algorithm>
-#include <array>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
