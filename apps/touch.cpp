@@ -15,6 +15,7 @@
 
 #include "commands.h"
 #include "felt.h"
+#include "geometry/crossings.h"
 #include "geometry/mesh_check.h"
 #include "geometry/triangle_mesh.h"
 #include "hapticd/client.h"
@@ -85,7 +86,9 @@ TriangleMesh load(const TouchOptions& options) {
   std::printf("%s: %zu vertices, %zu triangles, %s units\n", options.mesh.c_str(), mesh.vertices.size(),
               mesh.triangles.size(), extentsText(mesh).c_str());
   if (mesh.triangles.empty()) throw std::runtime_error(options.mesh + " has no triangles: nothing to touch");
-  const auto findings = geometry::describe(geometry::checkMesh(mesh.vertices, mesh.triangles));
+  auto findings = geometry::describe(geometry::checkMesh(mesh.vertices, mesh.triangles));
+  for (std::string& finding : geometry::describe(geometry::findCrossings(mesh.vertices, mesh.triangles)))
+    findings.push_back(std::move(finding));
   if (findings.empty()) std::printf("mesh check: clean\n");
   for (const std::string& finding : findings) std::printf("mesh check: %s\n", finding.c_str());
   scaleIntoWorkspace(mesh, options.size_mm);

@@ -18,13 +18,6 @@ bool areTriples(std::span<const Vec3f> vertices, std::span<const Triangle> trian
   return true;
 }
 
-bool isFlat(const Vec3f& a, const Vec3f& b, const Vec3f& c) {
-  const Vec3 u = (b - a).cast<double>();
-  const Vec3 v = (c - a).cast<double>();
-  const double longest = std::max({u.squaredNorm(), v.squaredNorm(), (v - u).squaredNorm()});
-  return !(u.cross(v).norm() > kFlat * longest);
-}
-
 // Values in groups by a small key, each group sorted: counting sort by the key, then a short sort of each
 // group.
 class Groups {
@@ -61,7 +54,7 @@ std::vector<Triangle> soundTriangles(std::span<const Vec3f> vertices, std::span<
       ++report.incomplete;
       continue;
     }
-    if (isFlat(vertices[w[0]], vertices[w[1]], vertices[w[2]])) {
+    if (!hasArea(vertices[w[0]], vertices[w[1]], vertices[w[2]])) {
       ++report.degenerate;
       continue;
     }
@@ -137,6 +130,13 @@ double signedVolume(std::span<const Vec3f> vertices, const std::vector<Triangle>
 }
 
 }  // namespace
+
+bool hasArea(const Vec3f& a, const Vec3f& b, const Vec3f& c) {
+  const Vec3 u = (b - a).cast<double>();
+  const Vec3 v = (c - a).cast<double>();
+  const double longest = std::max({u.squaredNorm(), v.squaredNorm(), (v - u).squaredNorm()});
+  return u.cross(v).norm() > kFlat * longest;
+}
 
 bool MeshReport::clean() const {
   return incomplete + degenerate + duplicate + unwelded + openEdges + crowdedEdges + flippedEdges == 0 &&

@@ -26,6 +26,9 @@ struct MeshReport {
   bool clean() const;
 };
 
+/// Whether a triangle is more than a line, as far as floats can tell. False when a coordinate is not finite.
+bool hasArea(const Vec3f& a, const Vec3f& b, const Vec3f& c);
+
 /// Looks at every triangle, in time linear in their number; a second is enough for a few million. Below 2^31
 /// vertices.
 MeshReport checkMesh(std::span<const Vec3f> vertices, std::span<const Triangle> triangles);

@@ -1,13 +1,11 @@
 // From edited objects to the list and the index that a snapshot shows.
 #include <algorithm>
 
-#include "geometry/mesh_check.h"
 #include "scene/object_table.h"
 
 namespace hapticd::scene {
 namespace {
 
-constexpr Nanos kCheckAfter = 250'000'000;
 constexpr Nanos kCheckSlice = 2'000'000;
 
 bool contains(const Box& outer, const Box& inner) {
@@ -48,8 +46,8 @@ std::optional<Nanos> ObjectTable::nextDeadline() const {
     if (object->mesh.hasBeenPublished() && !object->mesh.finished()) due = std::max(*due, rebuildNotBefore_);
     next = std::min(next.value_or(*due), *due);
   }
-  if (!checks_.empty()) {
-    const Nanos at = std::max(checks_.front().at, rebuildNotBefore_);
+  if (const std::optional<Nanos> due = checks_.due()) {
+    const Nanos at = std::max(*due, rebuildNotBefore_);
     next = std::min(next.value_or(at), at);
   }
   return next;
@@ -91,33 +89,24 @@ void ObjectTable::commitMesh(Object& object, Nanos now, const std::function<Nano
   object.stateChanged = true;
   queue(object);
   if (!config_.checkMeshes || !object.geometry || object.geometry->topology == topology) return;
-  checks_.push_back({now + kCheckAfter, object.id, object.geometry->topology});
+  checks_.add(object.id, object.geometry->topology, now);
 }
 
-// After the shape has been the same for a while, so that half an upload is not called open. Shares the
-// quarter of the time with rebuilding.
+// Shares the quarter of the time with rebuilding.
 void ObjectTable::checkMeshes(Nanos now, NoticeBoard& board, std::vector<Notice>& out) {
-  const Nanos started = stopwatch_();
-  while (!checks_.empty() && checks_.front().at <= now && rebuildNotBefore_ <= now) {
-    const PendingCheck check = checks_.front();
-    checks_.pop_front();
-    const Object* object = find(check.object);
-    if (object == nullptr || !object->geometry || object->geometry->topology != check.topology) continue;
-    const std::vector<Vec3f>& vertices =
-        object->geometry->target ? *object->geometry->target : *object->geometry->vertices;
-    std::string text;
-    for (const std::string& sentence : geometry::describe(geometry::checkMesh(
-             vertices, object->mesh.indexed() ? object->mesh.triangles() : *object->geometry->triangles))) {
-      text += (text.empty() ? "" : " ") + sentence;
-    }
-    const Call call{object->meshSetBy, now, false, board, out};
-    if (!text.empty()) {
-      call.post(Notice::Severity::normal, "mesh",
-                "mesh of object " + std::to_string(object->id) + ": " + text);
-    }
-    const Nanos taken = stopwatch_() - started;
-    if (taken > kCheckSlice) rebuildNotBefore_ = now + 4 * taken;
-  }
+  const auto subject = [this](std::int32_t id, std::uint64_t topology) -> std::optional<MeshChecks::Subject> {
+    const Object* object = find(id);
+    if (object == nullptr || !object->geometry || object->geometry->topology != topology) return std::nullopt;
+    const MeshDraft& mesh = object->mesh;
+    return MeshChecks::Subject{object->geometry,
+                               mesh.indexed() ? mesh.triangles() : *object->geometry->triangles};
+  };
+  const auto tell = [&](std::int32_t id, const std::string& text) {
+    const Call call{find(id)->meshSetBy, now, false, board, out};
+    call.post(Notice::Severity::normal, "mesh", "mesh of object " + std::to_string(id) + ": " + text);
+  };
+  const Nanos taken = checks_.run(now, subject, tell);
+  if (taken > kCheckSlice) rebuildNotBefore_ = now + 4 * taken;
 }
 
 void ObjectTable::updateMotion(Object& object, Nanos now) {
@@ -150,7 +139,7 @@ void ObjectTable::updateSurface(Object& object, Nanos now, NoticeBoard& board, s
 
 bool ObjectTable::publish(Nanos now, NoticeBoard& board, std::vector<Notice>& out) {
   commitMeshes(now, board, out);
-  if (!checks_.empty()) checkMeshes(now, board, out);
+  if (checks_.due().value_or(now + 1) <= now && rebuildNotBefore_ <= now) checkMeshes(now, board, out);
   return updatePublished(now, board, out);
 }
 

@@ -1,7 +1,6 @@
 // The objects of a scene while clients edit them: a tree of placements with meshes and surfaces.
 #pragma once
 
-#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -12,6 +11,7 @@
 #include "scene/matrices.h"
 #include "scene/mesh_draft.h"
 #include "scene/notice_board.h"
+#include "scene/object_checks.h"
 #include "scene/snapshot.h"
 #include "scene/surface_settings.h"
 
@@ -161,12 +161,7 @@ class ObjectTable {
   std::vector<std::int32_t> changed_;
   std::vector<std::int32_t> edited_;  // meshes with edits
   Nanos rebuildNotBefore_ = 0;
-  struct PendingCheck {
-    Nanos at = 0;
-    std::int32_t object = 0;
-    std::uint64_t topology = 0;
-  };
-  std::deque<PendingCheck> checks_;  // of new shapes, by time
+  MeshChecks checks_;  // of new shapes
   bool listChanged_ = true;
   bool indexStale_ = true;
 

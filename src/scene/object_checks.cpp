@@ -1,0 +1,81 @@
+#include "scene/object_checks.h"
+
+#include "geometry/mesh_check.h"
+
+namespace hapticd::scene {
+namespace {
+
+constexpr Nanos kCheckAfter = 250'000'000;
+constexpr Nanos kSlice = 2'000'000;
+constexpr std::uint64_t kWorkBetweenLooks = 50'000;
+
+std::shared_ptr<const std::vector<Vec3f>> latestVertices(const MeshGeometry& geometry) {
+  return geometry.target ? geometry.target : geometry.vertices;
+}
+
+std::string joined(const std::vector<std::string>& sentences) {
+  std::string text;
+  for (const std::string& sentence : sentences) text += (text.empty() ? "" : " ") + sentence;
+  return text;
+}
+
+}  // namespace
+
+void MeshChecks::clear() {
+  pending_.clear();
+  search_.reset();
+}
+
+void MeshChecks::add(std::int32_t object, std::uint64_t topology, Nanos now) {
+  pending_.push_back({now + kCheckAfter, object, topology});
+}
+
+std::optional<Nanos> MeshChecks::due() const {
+  if (search_) return 0;
+  if (pending_.empty()) return std::nullopt;
+  return pending_.front().at;
+}
+
+Nanos MeshChecks::run(Nanos now, const Find& find, const Tell& tell) {
+  const Nanos begin = stopwatch_();
+  if (search_) {
+    if (!find(search_->object, search_->topology)) {
+      search_.reset();
+    } else if (slice(begin)) {
+      const std::string text = joined(geometry::describe(search_->crossings.report()));
+      if (!text.empty()) tell(search_->object, text);
+      search_.reset();
+    }
+  }
+  while (!search_ && !pending_.empty() && pending_.front().at <= now && stopwatch_() - begin <= kSlice) {
+    const Pending check = pending_.front();
+    pending_.pop_front();
+    if (const auto subject = find(check.object, check.topology)) start(check, *subject, begin, tell);
+  }
+  return stopwatch_() - begin;
+}
+
+// True when the search has come to its end.
+bool MeshChecks::slice(Nanos begin) {
+  while (!search_->crossings.run(kWorkBetweenLooks)) {
+    if (stopwatch_() - begin > kSlice) return false;
+  }
+  return true;
+}
+
+// All in one text, unless the search takes longer than a slice.
+void MeshChecks::start(const Pending& check, const Subject& subject, Nanos begin, const Tell& tell) {
+  const auto vertices = latestVertices(*subject.geometry);
+  const auto& triangles = subject.geometry->triangles;
+  std::vector<std::string> sentences = geometry::describe(geometry::checkMesh(*vertices, subject.asSent));
+  search_ = Search{check.object, check.topology, vertices, triangles,
+                   geometry::CrossingSearch(*vertices, *triangles)};
+  if (slice(begin)) {
+    for (std::string& sentence : geometry::describe(search_->crossings.report()))
+      sentences.push_back(std::move(sentence));
+    search_.reset();
+  }
+  if (!sentences.empty()) tell(check.object, joined(sentences));
+}
+
+}  // namespace hapticd::scene
