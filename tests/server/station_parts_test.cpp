@@ -204,5 +204,16 @@ TEST_F(BlackBoxFilesTest, OnlyTheNewestAreKept) {
   EXPECT_EQ(files().size(), 2U);
 }
 
+TEST(Trips, AreInTheDocumentByBit) {
+  std::ifstream in(HAPTICD_TESTDATA "/../docs/safety.md");
+  const std::string text((std::istreambuf_iterator<char>(in)), {});
+  ASSERT_FALSE(text.empty());
+  for (const realtime::TripInfo& trip : realtime::kTrips) {
+    const std::string row = "| " + std::to_string(static_cast<int>(trip.trip)) + " | `" +
+                            std::string(trip.name) + "` |";
+    EXPECT_NE(text.find(row), std::string::npos) << row;
+  }
+}
+
 }  // namespace
 }  // namespace hapticd::server
