@@ -58,6 +58,8 @@ function(hapticd_test name)
   add_executable(${name}_test ${A_SOURCES})
   target_include_directories(${name}_test PRIVATE ${PROJECT_SOURCE_DIR}/tests)
   target_link_libraries(${name}_test PRIVATE ${deps} ${A_LIBS} hapticd_flags GTest::gtest_main GTest::gmock)
+  # Tests are compiled once and run once: what the optimiser would win is less than what it costs.
+  target_compile_options(${name}_test PRIVATE $<$<CONFIG:Release>:-O1>)
   target_compile_definitions(${name}_test PRIVATE HAPTICD_TESTDATA="${PROJECT_SOURCE_DIR}/testdata")
   add_dependencies(all_tests ${name}_test)
   set(properties TIMEOUT 300)

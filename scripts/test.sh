@@ -21,6 +21,32 @@ scripts/check_includes.sh
 jobs=$(nproc)
 total_passed=0
 total_failed=0
+
+# failed_in LOG, all_in LOG: what ctest's last lines say.
+failed_in() { sed -nE 's/.*, ([0-9]+) tests? failed out of [0-9]+.*/\1/p' "$1" | tail -1; }
+all_in() { sed -nE 's/.*tests? failed out of ([0-9]+).*/\1/p' "$1" | tail -1; }
+
+# run_tests BUILD LOG CTEST_ARGUMENTS...: a virtual machine may stand still for longer than any deadline, so what fails gets
+# a second chance with the machine to itself, and is named. A finding of a sanitizer gets none.
+run_tests() {
+  local build=$1 log=$2 status=0
+  shift 2
+  ctest --test-dir "$build" --output-on-failure --parallel "$jobs" "$@" 2>&1 | tee "$log" || status=$?
+  failed=$(failed_in "$log")
+  all=$(all_in "$log")
+  if [ "${failed:-0}" != 0 ] && ! grep -qE 'ERROR: [A-Za-z]*Sanitizer|WARNING: ThreadSanitizer|runtime error:' "$log"; then
+    echo "== failed at first, now one at a time:"
+    grep -E '^[[:space:]]+[0-9]+ - ' "$log"
+    status=0
+    ctest --test-dir "$build" --output-on-failure --rerun-failed 2>&1 | tee "$log.again" || status=$?
+    failed=$(failed_in "$log.again")
+  fi
+  # No count is a failure, too.
+  [ "$status" = 0 ] || [ "${failed:-0}" != 0 ] || failed=1
+  total_failed=$((total_failed + ${failed:-0}))
+  total_passed=$((total_passed + ${all:-0} - ${failed:-0}))
+}
+
 for preset in "${presets[@]}"; do
   echo "== $preset"
   cmake --preset "$preset" >/dev/null
@@ -32,18 +58,11 @@ for preset in "${presets[@]}"; do
   esac
   # Ninja's progress in steps of ten, so that a log stays readable.
   cmake --build "build/$preset" --parallel "$jobs" --target "$target" | awk 'NR % 10 == 1 || !/^\[[0-9]+\/[0-9]+\] (Building|Linking)/'
-  log="build/$preset/test.log"
   # One thread builds the index where threads are watched: TBB is not instrumented.
   [ "$preset" = tsan ] && export HAPTICD_EMBREE="threads=1,user_threads=1"
   export TSAN_OPTIONS="suppressions=$PWD/scripts/tsan.supp" ASAN_OPTIONS="detect_leaks=1" LSAN_OPTIONS="suppressions=$PWD/scripts/lsan.supp:print_suppressions=0"
-  status=0
-  ctest --test-dir "build/$preset" --output-on-failure "${only[@]}" --parallel "$jobs" 2>&1 | tee "$log" || status=$?
+  run_tests "build/$preset" "build/$preset/test.log" "${only[@]}"
   unset HAPTICD_EMBREE
-  failed=$(sed -nE 's/.*, ([0-9]+) tests? failed out of ([0-9]+).*/\1/p' "$log" | tail -1)
-  total=$(sed -nE 's/.*tests? failed out of ([0-9]+).*/\1/p' "$log" | tail -1)
-  total_failed=$((total_failed + ${failed:-0}))
-  total_passed=$((total_passed + ${total:-0} - ${failed:-0}))
-  [ "$status" = 0 ] || [ "${failed:-0}" != 0 ] || total_failed=$((total_failed + 1))
 done
 
 echo "$total_passed passed, $total_failed failed"
