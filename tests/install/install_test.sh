@@ -28,6 +28,7 @@ export PKG_CONFIG_PATH=$(echo "$prefix"/lib*/pkgconfig)
 # shellcheck disable=SC2046
 "$compiler" -std=c++20 "$source_dir/tests/install/user/reads_force.cpp" $(pkg-config --cflags --libs hapticd) -o "$work/by_pkg_config"
 
+: >"$work/log"
 "$prefix/bin/hapticd" serve --listen 127.0.0.1:0 --allow-no-rt >"$work/log" 2>&1 &
 server=$!
 address=""
