@@ -9,10 +9,9 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr int kMaxCasts = 128;             // in one tick; a path over 0.2 mm cells at 1 m/s needs about 20
-constexpr int kHoldCasts = 32;             // kept back for finding what holds it at the end
+constexpr int kHoldCasts = 32;             // of a tick, kept back for finding what holds it at the end
 constexpr double kRestick_m = 0.5e-6;      // slower than this in a tick is at rest
-constexpr double kBallConvergence = 1e-6;  // of the radius, in distance to the target
+constexpr double kBallConvergence = 1e-8;  // of the radius, in distance to the target
 
 // Depths of the HIP below the held faces as they really are, without the skin that keeps the proxy off them.
 // False when the proxy is not on all of them, jammed where they leave it no room: then no more than the
@@ -144,13 +143,27 @@ void Proxy::slide(const Vec3& target, ActiveSet& active) noexcept {
   const double gain = std::max(1e-4 * skin, kBallConvergence * nearby_.toolRadius());
   // A proxy within the skin is first put back outside.
   double nearest = (position_ - target).norm() + 4 * skin;
+  Vec3 stride = Vec3::Zero();
   while (casts_ < kMaxCasts) {
+    const Vec3 from = position_;
+    const ActiveSet held = active;
+    if (!stride.isZero(0)) leap(stride, target);
     active.count = 0;
     Vec3 goal;
     if (approach(target, false, active, goal)) return;
-    const double distance = (position_ - target).norm();
-    if (!(distance < nearest - gain)) return;
+    double distance = (position_ - target).norm();
+    if (!(distance < nearest - gain)) {
+      if (!stride.isZero(0)) {
+        position_ = from;
+        active = held;
+        stride.setZero();
+        continue;
+      }
+      if (active.count < 2 || !escape(target, active)) return;
+      distance = (position_ - target).norm();
+    }
     nearest = distance;
+    if (nearby_.toolRadius() > 0) stride = position_ - from;
   }
 }
 

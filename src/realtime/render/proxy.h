@@ -11,7 +11,8 @@
 
 namespace hapticd::realtime {
 
-inline constexpr double kJump_m = 0.030;          ///< farther in one tick is a jump, not a motion
+inline constexpr int kMaxCasts = 128;     ///< in one tick; a path over 0.2 mm cells at 1 m/s needs about 20
+inline constexpr double kJump_m = 0.030;  ///< farther in one tick is a jump, not a motion
 inline constexpr double kGatherMargin_m = 10e-6;  ///< the tremor of a hand
 
 /// One face that holds the proxy against the hand.
@@ -58,6 +59,8 @@ class Proxy {
     int count = 0;
   };
 
+  struct Ways;  // down from a place among a few faces
+
   struct Cone {
     double sticking_m = 0;
     double sliding_m = 0;
@@ -72,6 +75,11 @@ class Proxy {
   void chase(const Vec3& hip) noexcept;
   void slide(const Vec3& target, ActiveSet& active) noexcept;
   bool approach(const Vec3& target, bool hold, ActiveSet& active, Vec3& goal) noexcept;
+  bool escape(const Vec3& target, const ActiveSet& active) noexcept;
+  void leap(const Vec3& stride, const Vec3& target) noexcept;
+  void findFaces(Ways& ways) const noexcept;
+  void findWays(const Vec3& pull, const ActiveSet& active, Ways& ways) const noexcept;
+  double freeAmong(const Ways& ways, const Vec3& from, const Vec3& to) const noexcept;
   void hold(const Vec3& hip, ActiveSet& active) noexcept;
   bool frictionless() const noexcept;
   static Cone coneOf(const Grip& grip) noexcept;

@@ -9,10 +9,10 @@
 namespace hapticd::realtime::fixture {
 namespace {
 
-constexpr double kTouch_m = 5e-8;      // nearer than this is on it
-constexpr double kClearance_m = 1e-9;  // kept to what stops a descent
-constexpr double kGain_m = 1e-7;       // a step of a descent that brings less is none
-constexpr double kBallSlack_m = 2e-8;
+constexpr double kTouch_m = 2e-8;       // nearer than this is on it
+constexpr double kClearance_m = 2e-10;  // kept to what stops a descent
+constexpr double kShortest_m = 2e-9;    // a way of a descent that is shorter leads nowhere
+constexpr double kBallSlack_m = 1e-9;   // that a ball may be in a face
 
 Vec3 nearestOnEdge(const Vec3& a, const Vec3& b, const Vec3& x) {
   const Vec3 e = b - a;
@@ -120,8 +120,9 @@ MeshOracle::Found MeshOracle::near(const Vec3& p, const Vec3& q, double margin) 
   return found;
 }
 
-// On which side of the line p-q the edge u-v passes. Both faces of an edge compute the same number and get
-// opposite answers, so that no line slips between them.
+// On which side of the line p-q the edge u-v passes. Both faces of an edge
+// compute the same number and get opposite answers, so that no line slips
+// between them.
 bool MeshOracle::sideOf(std::uint32_t u, std::uint32_t v, const Vec3& p, const Vec3& q) const {
   const Vec3& first = vertices_[std::min(u, v)];
   const Vec3& second = vertices_[std::max(u, v)];
@@ -174,7 +175,8 @@ double MeshOracle::sharpestEdge(const Vec3& p, const Vec3& q) const {
   return sharpest;
 }
 
-// How far, 0 … 1, the point can go along `way`, with a clearance to what stops it.
+// How far, 0 … 1, the point can go along `way`, with a clearance to what stops
+// it.
 double MeshOracle::free(const Vec3& p, const Vec3& way) const {
   const Vec3 q = p + way;
   double t = 1;
@@ -203,8 +205,9 @@ Vec3 MeshOracle::foot(const Face& f, const Vec3& x) const {
   return nearest;
 }
 
-// Where a point at x may go: the steepest way down in a space bounded by faces is the pull itself, the pull
-// laid on a face, or an edge. `out` points away from all that it touches.
+// Where a point at x may go: the steepest way down in a space bounded by faces
+// is the pull itself, the pull laid on a face, or an edge. `out` points away
+// from all that it touches.
 std::vector<Vec3> MeshOracle::directions(const Vec3& x, const Vec3& pull, Vec3& out) const {
   std::vector<Vec3> found{pull};
   out = Vec3::Zero();
@@ -224,23 +227,25 @@ std::vector<Vec3> MeshOracle::directions(const Vec3& x, const Vec3& pull, Vec3& 
   return found;
 }
 
-// All directions are projections of the pull, so that their ends are the nearest points along them.
-bool MeshOracle::stepPoint(Vec3& x, const Vec3& goal, double reach) const {
+// All directions are projections of the pull, so that their ends are the
+// nearest points along them.
+bool MeshOracle::stepPoint(Vec3& x, const Vec3& goal, double reach, double hop) const {
   Vec3 out;
   const std::vector<Vec3> ways = directions(x, goal - x, out);
-  for (const Vec3& way : ways) {
-    if (way.norm() < kGain_m) continue;
-    const Vec3 limited = way * std::min(1.0, reach / way.norm());
-    for (const double lift : {0.0, 1e-8, 2e-7}) {
-      const Vec3 start = x + lift * out;
-      if (lift > 0 && free(x, start - x) < 1) continue;
+  Vec3 best = x;
+  for (const double lift : {0.0, 0.05 * hop, 0.2 * hop, hop}) {
+    const Vec3 start = x + lift * out;
+    if (lift > 0 && free(x, start - x) < 1) continue;
+    for (const Vec3& way : ways) {
+      if (way.norm() < kShortest_m) break;
+      const Vec3 limited = way * std::min(1.0, reach / way.norm());
       const Vec3 end = start + free(start, limited) * limited;
-      if ((goal - end).norm() > (goal - x).norm() - kGain_m) continue;
-      x = end;
-      return true;
+      if ((goal - end).norm() < (goal - best).norm()) best = end;
     }
   }
-  return false;
+  const bool nearer = (goal - best).norm() < (goal - x).norm() - 1e-15;
+  x = best;
+  return nearer;
 }
 
 // Moves the ball's centre off the faces that it overlaps.
@@ -276,7 +281,8 @@ std::vector<Vec3> MeshOracle::awayFromTouched(const Vec3& x) const {
   return normals;
 }
 
-// The faces of a ball's room are curved: steps along them, each pushed out again.
+// The faces of a ball's room are curved: steps along them, each pushed out
+// again.
 bool MeshOracle::stepBall(Vec3& x, const Vec3& goal, double reach) const {
   const Vec3 pull = goal - x;
   const std::vector<Vec3> normals = awayFromTouched(x);
@@ -289,10 +295,10 @@ bool MeshOracle::stepBall(Vec3& x, const Vec3& goal, double reach) const {
     }
   }
   for (const Vec3& way : ways) {
-    for (double step = std::min(1e-4, reach); step > 1e-6 && way.norm() > 1e-6; step *= 0.4) {
+    for (double step = std::min(1e-4, reach); step > 2e-8 && way.norm() > kShortest_m; step *= 0.4) {
       Vec3 end = x + way * std::min(1.0, step / way.norm());
       if (!pushedOut(end) || free(x, end - x) < 1) continue;
-      if ((goal - end).norm() > (goal - x).norm() - 0.02 * step) continue;
+      if ((goal - end).norm() > (goal - x).norm() - 1e-13) continue;
       x = end;
       return true;
     }
@@ -300,12 +306,13 @@ bool MeshOracle::stepBall(Vec3& x, const Vec3& goal, double reach) const {
   return false;
 }
 
-Vec3 MeshOracle::descend(const Vec3& start, const Vec3& goal, double reach_m) const {
+Vec3 MeshOracle::descend(const Vec3& start, const Vec3& goal, double reach_m, double hop_m) const {
   Vec3 x = start;
-  for (int i = 0; i < 1000; ++i) {
+  for (int i = 0; i < 2000; ++i) {
     const double left = reach_m - (x - start).norm();
-    if (left < kGain_m) break;
-    if (!(radius_ > 0 ? stepBall(x, goal, left) : stepPoint(x, goal, left))) break;
+    if (left < 1e-7) break;
+    const double step = std::min(left, 1e-6 + 0.2 * (x - start).norm());
+    if (!(radius_ > 0 ? stepBall(x, goal, step) : stepPoint(x, goal, left, hop_m))) break;
   }
   return x;
 }
