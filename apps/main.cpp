@@ -24,6 +24,7 @@ int main(int argc, char** argv) {
   addRender(app);
   addDoctor(app);
   addDevices(app);
+  addDeviceHost(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::RequiredError& error) {

@@ -23,6 +23,7 @@ struct Options {
   std::string hand;
   bool enableForces = false;
   bool calibrate = false;
+  bool isolate = false;
   double reportRate_Hz = 0;
   double seconds = 0;
   bool allowNoRealtime = false;
@@ -41,6 +42,7 @@ void applyFlags(const Options& options, server::DeviceConfig& device) {
   }
   if (options.enableForces) device.enableForces = true;
   if (options.calibrate) device.calibrate = true;
+  if (options.isolate) device.isolate = true;
   if (!options.hand.empty()) device.hand = options.hand;
   if (options.reportRate_Hz > 0) device.reportRate_Hz = options.reportRate_Hz;
 }
@@ -143,6 +145,8 @@ void addServe(CLI::App& app) {
                     "Real devices start without force unless this is given");
   command->add_flag("--calibrate", options->calibrate,
                     "Consent to calibrate at the start, which may move the arm");
+  command->add_flag("--isolate", options->isolate,
+                    "Run the driver in a process of its own: its crash is then a fault, not the end");
   command->add_option(
       "--hand", options->hand,
       "Simulated device: 'script' explores whatever is in the scene [script], FILE.csv follows the path\n"

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
-#include <cstdlib>
 #include <ctime>
 #include <fstream>
 #include <system_error>
@@ -66,14 +65,6 @@ void deleteOldest(const fs::path& directory, int keep) {
 }
 
 }  // namespace
-
-fs::path defaultBlackBoxDirectory() {
-  if (const char* state = std::getenv("XDG_STATE_HOME"); state != nullptr && *state == '/')
-    return fs::path(state) / "hapticd";
-  if (const char* home = std::getenv("HOME"); home != nullptr && *home == '/')
-    return fs::path(home) / ".local/state/hapticd";
-  return fs::temp_directory_path() / "hapticd";
-}
 
 void writeBlackBox(const fs::path& file, const std::vector<TickReport>& ticks) {
   errno = 0;

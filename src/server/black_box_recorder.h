@@ -16,9 +16,6 @@ struct BlackBoxFiles {
   int keep = 10;  ///< newest files of this device; older ones are deleted. 0: none is written
 };
 
-/// The directory for black boxes when the configuration names none: the user's state directory.
-std::filesystem::path defaultBlackBoxDirectory();
-
 /// Writes ticks as CSV, oldest first, SI units in the device's frame; columns are named in the first line.
 /// Throws std::filesystem::filesystem_error or std::runtime_error naming the file.
 void writeBlackBox(const std::filesystem::path& file, const std::vector<realtime::TickReport>& ticks);

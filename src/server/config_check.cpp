@@ -88,6 +88,8 @@ void checkControl(const Checker& check, const DeviceConfig& device) {
 
 void checkDevice(const Checker& check, const DeviceConfig& device) {
   checkDriver(check, device);
+  if (device.isolate && device.driver == "simulated")
+    check.fail("isolate", "the simulated hand has no vendor's library to be isolated from; leave isolate out");
   check.range("servo_rate_Hz", device.servoRate_Hz, 250, 4000);
   check.range("report_rate_Hz", device.reportRate_Hz, 0.1, device.servoRate_Hz);
   check.range("linear_tolerance_mm", device.linearTolerance_m * 1e3, 0, 1000);

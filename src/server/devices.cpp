@@ -6,6 +6,7 @@
 #include "device/evdev/evdev_device.h"
 #include "device/force_dimension/force_dimension_device.h"
 #include "device/haply/haply_device.h"
+#include "device/isolation/isolated_device.h"
 #include "device/openhaptics/openhaptics_device.h"
 #include "device/replay/replay_device.h"
 #include "device/simulated/simulated_device.h"
@@ -57,6 +58,15 @@ DevicePtr replay(const DeviceConfig& config) {
   return std::make_unique<device::ReplayDevice>(options);
 }
 
+// This program again, for one device alone.
+DevicePtr isolated(DeviceConfig config) {
+  config.isolate = false;
+  ServerConfig all;
+  all.devices = {std::move(config)};
+  return std::make_unique<device::IsolatedDevice>(
+      device::IsolatedOptions{.command = {"/proc/self/exe", kDeviceHostCommand, toToml(all)}});
+}
+
 struct Driver {
   const char* name;
   DevicePtr (*make)(const DeviceConfig&);
@@ -80,7 +90,7 @@ std::vector<std::string> driverNames() {
 std::unique_ptr<device::Device> makeDevice(const DeviceConfig& config) {
   std::string known;
   for (const Driver& driver : kDrivers) {
-    if (config.driver == driver.name) return driver.make(config);
+    if (config.driver == driver.name) return config.isolate ? isolated(config) : driver.make(config);
     known += (known.empty() ? "" : ", ") + std::string(driver.name);
   }
   throw ConfigError("device '" + config.names.front() + "': no driver is called '" + config.driver +

@@ -14,8 +14,9 @@ namespace {
 std::unique_ptr<device::Device> openDevice(const DeviceConfig& config) {
   auto device = makeDevice(config);
   device->open();
-  // A self-paced one calibrates in its own loop, with the consent it was made with.
-  if (config.calibrate && !device->selfPaced()) device->calibrate();
+  // One with a loop of its own calibrates there, with the consent it was made with.
+  const bool hasOwnLoop = config.isolate ? config.driver == "openhaptics" : device->selfPaced();
+  if (config.calibrate && !hasOwnLoop) device->calibrate();
   return device;
 }
 
@@ -45,7 +46,7 @@ realtime::TickOptions tickOptions(const DeviceConfig& config, const device::Devi
 }
 
 BlackBoxFiles blackBoxFiles(const DeviceConfig& config) {
-  if (config.blackBoxDir.empty()) return {defaultBlackBoxDirectory(), config.blackBoxKeep};
+  if (config.blackBoxDir.empty()) return {defaultBlackBoxDir(), config.blackBoxKeep};
   return {config.blackBoxDir, config.blackBoxKeep};
 }
 

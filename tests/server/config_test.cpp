@@ -161,6 +161,7 @@ ServerConfig unusual() {
   device.wheelProfile = "wheel.toml";
   device.calibrate = true;
   device.enableForces = true;
+  device.isolate = true;
   device.hand = "hand.csv";
   device.servoRate_Hz = 4000;
   device.reportRate_Hz = 1.0 / 3;

@@ -1,0 +1,23 @@
+// hapticd device-host: a driver in a process of its own. The server starts it; people do not.
+#include <memory>
+#include <string>
+
+#include "commands.h"
+#include "device/isolation/device_host.h"
+#include "server/devices.h"
+
+namespace hapticd::apps {
+
+void addDeviceHost(CLI::App& app) {
+  auto text = std::make_shared<std::string>();
+  CLI::App* command = app.add_subcommand(server::kDeviceHostCommand, "A driver in a process of its own");
+  command->group("");  // not for people: no line in the help
+  command->add_option("config", *text, "Configuration with the one device, as TOML")->required();
+  command->callback([text] {
+    const server::DeviceConfig config = server::parseConfig(*text, "configuration").devices.front();
+    const auto device = server::makeDevice(config);
+    exitCode = device::runDeviceHost(*device, {.rate_Hz = config.servoRate_Hz});
+  });
+}
+
+}  // namespace hapticd::apps
