@@ -7,16 +7,18 @@
 namespace hapticd::realtime {
 namespace {
 
-// Mean normal of the faces that meet at a corner. Corners are known by their place, so that unwelded ones
-// count.
-Vec3 cornerNormal(const PlacedObject& object, const Vec3& corner, Nanos now) {
+constexpr double kSharp = 0.7;  // cosine: what turns by more than 45 degrees is an edge that is meant
+
+// Mean normal of the faces that meet at a corner and go on smoothly from the touched one, whose normal is
+// `face`. Corners are known by their place, so that unwelded ones count.
+Vec3 cornerNormal(const PlacedObject& object, const Vec3& face, const Vec3& corner, Nanos now) {
   const scene::MeshGeometry& mesh = *object.state->mesh;
   Vec3 sum = Vec3::Zero();
   mesh.index.visitNear(corner, 0, [&](std::uint32_t t) noexcept {
     const scene::Corners inObject = mesh.corners(t, now);
     const scene::Corners k = object.corners(t, now);
     Facet f;
-    if (!makeFacet(k, object.skin, f)) return;
+    if (!makeFacet(k, object.skin, f) || f.normal.dot(face) < kSharp) return;
     const auto add = [&](const Vec3& place, const Vec3& a, const Vec3& b, const Vec3& c) {
       if (place != corner) return;
       sum += std::acos(std::clamp((b - a).normalized().dot((c - a).normalized()), -1.0, 1.0)) * f.normal;
@@ -45,7 +47,7 @@ Vec3 shadedNormal(const PlacedObject& object, std::uint32_t triangle, Nanos now,
   const std::array<std::pair<Vec3, double>, 3> corners{{{k.a, 1 - b - c}, {k.b, b}, {k.c, c}}};
   Vec3 sum = Vec3::Zero();
   for (const auto& [corner, weight] : corners) {
-    sum += weight * cornerNormal(object, corner, now).stableNormalized();
+    sum += weight * cornerNormal(object, f.normal, corner, now).stableNormalized();
   }
   const Vec3 shaded = side * sum.stableNormalized();
   return shaded.dot(normal) > 0 ? shaded : normal;

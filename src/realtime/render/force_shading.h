@@ -7,8 +7,8 @@
 namespace hapticd::realtime {
 
 /// The direction of the force at point `at` of a touched triangle, device frame: the corner normals, each the
-/// mean of the faces around it by their angles, weighted by nearness. `normal` is the face's own, on the
-/// touched side.
+/// mean of the faces around it by their angles, weighted by nearness. Faces beyond a sharp edge do not count.
+/// `normal` is the face's own, on the touched side.
 Vec3 shadedNormal(const PlacedObject& object, std::uint32_t triangle, Nanos now, const Vec3& normal,
                   const Vec3& at) noexcept;
 

@@ -231,7 +231,7 @@ void expectRight(const Verdict& v, double radius_m) {
   EXPECT_EQ(v.tunnelled, 0);
   EXPECT_EQ(v.stuck, 0);
   EXPECT_EQ(v.tooStrong, 0);
-  EXPECT_LE(v.unfinished, radius_m > 0 ? v.touching / 500 : 0);
+  EXPECT_LE(v.unfinished, radius_m > 0 ? v.touching / 200 : 0);
   if (radius_m == 0) {
     EXPECT_EQ(v.unexplained, 0);
   }

@@ -1,0 +1,170 @@
+// T16: a hand that presses on a stiff wall, in closed loop. The hand moves between two turns as it likes; the
+// wall answers only at them, and too late: too stiff a wall gives the hand energy, and buzzes.
+//   HAPTICD_STIFFNESS_CSV=FILE bin/closed_loop_test
+// writes the stiffest wall that settles at each rate; scripts/draw_stiffness.sh draws it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <iostream>
+#include <string>
+
+#include "device/simulated/simulated_device.h"
+#include "device/simulated/waypoint_path.h"
+#include "realtime/servo/fakes.h"
+#include "realtime/servo/tick.h"
+#include "scene/passivity.h"
+#include "scene/surface_settings.h"
+
+namespace hapticd::realtime {
+namespace {
+
+constexpr double kRates_Hz[] = {250, 500, 1000, 2000, 4000};
+constexpr double kHandDamping = 5;    // N s/m
+constexpr double kSettled_m = 10e-6;  // peak to peak
+constexpr double kRounding_J = 1e-12;
+
+// Solid where y < 0.
+std::shared_ptr<const scene::SceneSnapshot> wall(const scene::Surface& surface) {
+  auto snapshot = std::make_shared<scene::SceneSnapshot>();
+  snapshot->revision = 1;
+  scene::Plane plane;
+  plane.normal = Vec3::UnitY();
+  plane.surface = surface;
+  snapshot->planes.push_back(plane);
+  return snapshot;
+}
+
+scene::Surface stiff(double stiffness_N_per_m) {
+  scene::Surface surface;
+  surface.stiffness_N_per_m = stiffness_N_per_m;
+  return surface;
+}
+
+// From 5 mm above the wall to 8 mm below it in half a second, and there it stays.
+std::shared_ptr<const device::HandPath> press() {
+  return std::make_shared<device::WaypointPath>(
+      std::vector<device::Waypoint>{{0, {0, 0.005, 0}}, {0.5, {0, -0.008, 0}}});
+}
+
+struct Pressing {
+  double peakToPeak_m = 0;  // from one second after the hand meant to be at rest
+  double gained_J = 0;      // most that the wall gave beyond what the hand's damper took
+  double force_N = 0;       // at the end
+};
+
+Pressing pressOn(const scene::Surface& surface, double rate_Hz, bool guarded) {
+  device::SimulatedOptions handOptions;
+  handOptions.handDamping_Ns_per_m = kHandDamping;
+  device::SimulatedDevice hand(handOptions);
+  hand.open();
+  hand.setPath(press());
+  FakeClock clock;
+  TickOptions options;
+  options.rate_Hz = rate_Hz;
+  options.guard = GuardOptions::of(hand.profile());
+  options.guard.enabled = guarded;
+  Tick tick(hand, clock, options);
+  tick.snapshots().publish(wall(surface));
+
+  Pressing result;
+  const auto period = static_cast<Nanos>(1e9 / rate_Hz);
+  const double period_s = geometry::toSeconds(period);
+  double energy = 0;
+  double lowest = 1;
+  double highest = -1;
+  double y = 0.005;
+  double force = 0;
+  for (Nanos now = 0; now < 2'500'000'000; now += period) {
+    tick(now);
+    const double next = tick.last().device.position_m.y();
+    // The damper takes at least what it would at a constant speed.
+    energy += force * (next - y) - kHandDamping * (next - y) * (next - y) / period_s;
+    result.gained_J = std::max(result.gained_J, energy);
+    y = next;
+    force = tick.last().force_N.y();
+    tick.reports().consume([](const TickReport&) {});
+    if (now < 1'500'000'000) continue;
+    lowest = std::min(lowest, y);
+    highest = std::max(highest, y);
+  }
+  tick.finish();
+  result.peakToPeak_m = highest - lowest;
+  result.force_N = force;
+  return result;
+}
+
+bool settles(double stiffness_N_per_m, double rate_Hz) {
+  return pressOn(stiff(stiffness_N_per_m), rate_Hz, false).peakToPeak_m < kSettled_m;
+}
+
+double passiveStiffness(double rate_Hz) {
+  return 2 * kHandDamping * rate_Hz;
+}
+
+class ClosedLoop : public testing::TestWithParam<double> {};
+INSTANTIATE_TEST_SUITE_P(, ClosedLoop, testing::ValuesIn(kRates_Hz), [](const auto& test) {
+  return std::to_string(static_cast<int>(test.param)) + "_Hz";
+});
+
+TEST_P(ClosedLoop, wall_within_the_bound_gives_no_energy_and_settles) {
+  for (const double share : {0.1, 0.5, 0.8}) {
+    const Pressing p = pressOn(stiff(share * passiveStiffness(GetParam())), GetParam(), false);
+    EXPECT_LT(p.peakToPeak_m, kSettled_m) << share;
+    EXPECT_LT(p.gained_J, kRounding_J) << share;
+    EXPECT_GT(p.force_N, 0.5) << share;
+  }
+}
+
+TEST_P(ClosedLoop, wall_far_beyond_the_bound_buzzes) {
+  const Pressing p = pressOn(stiff(3 * passiveStiffness(GetParam())), GetParam(), false);
+  EXPECT_GT(p.peakToPeak_m, 10 * kSettled_m);
+  EXPECT_GT(p.gained_J, 1e-5);
+}
+
+// What a client asks for beyond the bound is lowered to it, and the guarded loop stays quiet.
+TEST_P(ClosedLoop, clamped_material_gives_no_energy) {
+  scene::SceneConfig config;
+  config.servoPeriod_s = 1 / GetParam();
+  config.ownDamping_Ns_per_m = kHandDamping;
+  scene::Surface surface = stiff(20 * passiveStiffness(GetParam()));
+  surface.damping_Ns_per_m = 2;
+  std::string remark;
+  scene::keepPassive(surface, scene::PassivityBound(config), remark);
+  EXPECT_FALSE(remark.empty());
+  EXPECT_LT(surface.stiffness_N_per_m, passiveStiffness(GetParam()));
+  EXPECT_GT(surface.stiffness_N_per_m, 0.5 * passiveStiffness(GetParam()));
+  const Pressing p = pressOn(surface, GetParam(), true);
+  std::cout << "clamped to " << surface.stiffness_N_per_m << " N/m, " << surface.damping_Ns_per_m
+            << " N s/m: peak to peak " << p.peakToPeak_m * 1e6 << " um, gained " << p.gained_J << " J, "
+            << p.force_N << " N\n";
+  EXPECT_LT(p.gained_J, kRounding_J);
+}
+
+// The stiffest wall that settles, found by halving; never below the bound.
+TEST(ClosedLoopLimit, stiffest_wall_grows_with_the_rate) {
+  const char* path = std::getenv("HAPTICD_STIFFNESS_CSV");
+  std::ofstream csv;
+  if (path != nullptr) csv.open(path);
+  csv << "rate_Hz,bound_N_per_m,measured_N_per_m\n";
+  double last = 0;
+  for (const double rate : kRates_Hz) {
+    double quiet = 0.5 * passiveStiffness(rate);
+    double buzzing = 3 * passiveStiffness(rate);
+    ASSERT_TRUE(settles(quiet, rate));
+    ASSERT_FALSE(settles(buzzing, rate));
+    for (int i = 0; i < 7; ++i) {
+      const double middle = 0.5 * (quiet + buzzing);
+      (settles(middle, rate) ? quiet : buzzing) = middle;
+    }
+    std::cout << rate << " Hz: bound " << passiveStiffness(rate) << " N/m, measured " << quiet << " N/m\n";
+    csv << rate << ',' << passiveStiffness(rate) << ',' << quiet << '\n';
+    EXPECT_GT(quiet, 0.8 * passiveStiffness(rate));
+    EXPECT_GT(quiet, 1.5 * last);
+    last = quiet;
+  }
+}
+
+}  // namespace
+}  // namespace hapticd::realtime
