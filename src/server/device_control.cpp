@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "scene/workspace.h"
 #include "server/view.h"
 
 namespace hapticd::server {
@@ -47,7 +48,10 @@ bool DeviceControl::hold(scene::ClientId client, const wire::HoldHand& wanted,
   }
   device::HandPose pose;
   const Vec3 world(wanted.position[0], wanted.position[1], wanted.position[2]);
-  pose.position_m = last.T_world_device.inverse() * world;
+  // Until the first tick has told, the workspace is the one that scenes begin with.
+  const geometry::Affine T_world_device =
+      last.tick == 0 ? scene::Workspace{}.T_world_device : last.T_world_device;
+  pose.position_m = T_world_device.inverse() * world;
   pose.orientation = (Quat(rotationOf(last)).conjugate() * orientation).normalized();
   pose.buttons = wanted.buttons;
   holder_ = client;

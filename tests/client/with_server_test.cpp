@@ -1,0 +1,153 @@
+// The client and the server of this project together, over real sockets, with the simulated hand.
+#include "client/client_tests.h"
+
+#include <cmath>
+#include <thread>
+
+#include "server/running_server.h"
+
+namespace hapticd::test {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+
+class WithServer : public ::testing::TestWithParam<bool> {
+ protected:
+  std::string name() const {
+    return (GetParam() ? "Phantom@tcp://" : "Phantom@") +
+           ("127.0.0.1:" + std::to_string(server_.address().port));
+  }
+
+  /// A floor 10 mm below the middle, in one batch; the hand waits above it first, so that nothing appears
+  /// around it.
+  void makeFloor(Client& client) {
+    const std::vector<std::array<float, 3>> vertices{
+        {-80, -10, -40}, {-80, -10, 40}, {80, -10, 40}, {80, -10, -40}};
+    const std::vector<std::array<std::uint32_t, 3>> triangles{{0, 1, 2}, {0, 2, 3}};
+    client.subscribe(Reports::all, 1000);
+    client.holdHand({{0, 20, 0}});
+    ASSERT_TRUE(pollUntil(client, [&] { return client.latest().tick.hand_m[1] > 0.015; }));
+    const std::uint64_t revision = client.latest().tick.revision;
+    client.batch([&] {
+      client.resetScene();
+      client.setSurface(0, {.stiffness = 0.8F});
+      client.uploadMesh(0, {vertices, triangles});
+    });
+    ASSERT_TRUE(pollUntil(client, [&] { return client.latest().tick.revision > revision; }));
+  }
+  /// Presses into the floor until a force pushes up.
+  ::testing::AssertionResult press(Client& client) {
+    client.holdHand({{0, -14, 0}});
+    if (pollUntil(client, [&] { return client.latest().force.force_N[1] > 0.1; }))
+      return ::testing::AssertionSuccess();
+    return ::testing::AssertionFailure() << "force " << client.latest().force.force_N[1] << " N";
+  }
+
+  RunningServer server_;
+};
+INSTANTIATE_TEST_SUITE_P(Client, WithServer, ::testing::Bool(),
+                         [](const auto& way) { return way.param ? "tcp" : "callback"; });
+
+TEST_P(WithServer, TheServerSaysWhatItCanDo) {
+  Client client(name());
+  const auto c = client.waitCapabilities();
+  ASSERT_TRUE(c);
+  EXPECT_TRUE(c->bulk_mesh && c->batch && c->subscribe && c->stop && c->heartbeat && c->hold_hand);
+  EXPECT_EQ(c->servo_rate_Hz, 1000);
+  EXPECT_GT(c->peak_force_N, 0);
+  EXPECT_LT(c->workspace_min_m[0], c->workspace_max_m[0]);
+}
+
+TEST_P(WithServer, AnIndexedMeshIsFeltContactByContact) {
+  Client client(name());
+  std::vector<std::string> texts;
+  client.onText([&](const TextReport& r) { texts.push_back(r.text); });
+  makeFloor(client);
+  ASSERT_TRUE(press(client));
+  ASSERT_TRUE(pollUntil(client, [&] { return !client.latest().contacts.contacts.empty(); }));
+  const ContactsReport felt = client.latest().contacts;
+  ASSERT_EQ(felt.contacts.size(), 1U);
+  const Contact& c = felt.contacts[0];
+  EXPECT_EQ(c.object, 0);
+  EXPECT_NEAR(c.point_m[1], -0.010, 1e-6);
+  EXPECT_NEAR(c.normal[1], 1, 1e-9);
+  EXPECT_GT(c.force_N[1], 0);
+  EXPECT_GT(felt.tick, 0U);
+  EXPECT_EQ(client.latest().tick.object, 0);
+
+  client.holdHand({{0, 20, 0}});
+  EXPECT_TRUE(pollUntil(client, [&] { return client.latest().contacts.contacts.empty(); }))
+      << "an empty list ends the contact";
+  for (const std::string& text : texts) EXPECT_THAT(text, testing::Not(HasSubstr("refused")));
+}
+
+TEST_P(WithServer, ForcesStopAndComeBack) {
+  Client client(name());
+  makeFloor(client);
+  ASSERT_TRUE(press(client));
+  client.stopForces();
+  ASSERT_TRUE(pollUntil(client, [&] { return client.latest().guard.stopped; }));
+  ASSERT_TRUE(pollUntil(client, [&] { return client.latest().tick.force_N == Vec3{}; }));
+  client.rearmForces();
+  ASSERT_TRUE(
+      pollUntil(client, [&] { return !client.latest().guard.stopped && client.latest().guard.armed; }));
+  EXPECT_TRUE(pollUntil(client, [&] { return client.latest().tick.force_N[1] > 0.1; }));
+}
+
+TEST_P(WithServer, AClientThatDoesNotPollIsLostAndItsForceEnds) {
+  Client watcher(name());
+  Client client(name());
+  watcher.subscribe(Reports::tick, 200);
+  client.enableHeartbeat();
+  client.setEffect(0, Effect::constant({1, 0, 0}, 1.0));
+  client.startEffect(0);
+  const auto push = [&] {
+    return std::hypot(watcher.latest().tick.force_N[0], watcher.latest().tick.force_N[1]);
+  };
+  ASSERT_TRUE(pollUntil(watcher, [&] {
+    client.poll(0ms);
+    return push() > 0.5;
+  }));
+  ASSERT_TRUE(pollUntil(watcher, [&] { return push() < 1e-6; })) << "nobody polls the client";
+  std::string reason;
+  client.onConnection(
+      [&](const ConnectionReport& r) { reason += r.connected ? "again" : "lost: " + r.reason + "; "; });
+  ASSERT_TRUE(pollUntil(client, [&] { return client.connected() && reason.ends_with("again"); }));
+  EXPECT_THAT(reason, HasSubstr("lost"));
+}
+
+TEST_P(WithServer, OneClientHoldsTheHand) {
+  auto first = std::make_unique<Client>(name());
+  Client second(name());
+  std::string text;
+  second.onText([&](const TextReport& r) { text = r.text; });
+  second.subscribe(Reports::all, 1000);
+  first->holdHand({{0, 20, 0}});
+  ASSERT_TRUE(pollUntil(second, [&] { return second.latest().tick.hand_m[1] > 0.015; }));
+  second.holdHand({{0, -20, 0}});
+  ASSERT_TRUE(pollUntil(second, [&] { return !text.empty(); }));
+  EXPECT_THAT(text, HasSubstr("hand"));
+  first.reset();
+  ASSERT_TRUE(pollUntil(second,
+                        [&] {
+                          second.holdHand({{0, -20, 0}});
+                          return second.latest().tick.hand_m[1] < -0.015;
+                        }))
+      << text << " hand at " << second.latest().tick.hand_m[1] << " tick " << second.latest().tick.tick;
+}
+
+TEST_P(WithServer, WhoWantsNoReportsHearsTextsOnly) {
+  Client client(name());
+  client.subscribe(Reports::none);
+  std::string text;
+  client.onText([&](const TextReport& r) { text += r.text; });
+  client.setTouchable(12345, true);  // there is none
+  ASSERT_TRUE(pollUntil(client, [&] { return !text.empty(); }));
+  const std::uint64_t before = client.statistics()[ReportKind::pose].count;
+  client.runFor(200ms);
+  EXPECT_EQ(client.statistics()[ReportKind::pose].count, before);
+}
+
+}  // namespace
+}  // namespace hapticd::test
