@@ -220,7 +220,7 @@ void Server::closeStaleHandshakes() {
 void Server::closeLost() {
   for (const scene::ClientId client : heartbeats_.lost(monotonicNow())) {
     const auto session = sessions_.find(client);
-    if (session != sessions_.end()) session->second->close("no heartbeat for 500 ms, as it had promised");
+    if (session != sessions_.end()) session->second->abort("no heartbeat for 500 ms, as it had promised");
   }
 }
 

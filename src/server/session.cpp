@@ -79,6 +79,11 @@ void Session::close(const std::string& reason) {
   connection_.close(reason);
 }
 
+void Session::abort(const std::string& reason) {
+  failure_ = reason;
+  connection_.abort(reason);
+}
+
 void Session::refuse(const std::string& reason) {
   if (inDatagram_) {
     remark(reason);

@@ -75,6 +75,8 @@ class Session {
   void resume();
   /// Ends it, with a reason for the log; onClosed follows.
   void close(const std::string& reason);
+  /// The same at once, without waiting for a peer that may not read any more.
+  void abort(const std::string& reason);
   /// The message now being given is no good. In the stream this ends the session; in a datagram, which
   /// anybody at the client's address can forge, it is remarked and forgotten.
   void refuse(const std::string& reason);
