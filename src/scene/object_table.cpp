@@ -33,7 +33,10 @@ Nanos PoseStream::next(Nanos now) {
 }
 
 ObjectTable::ObjectTable(const SceneConfig& config)
-    : config_(config), bound_(config), stopwatch_(config.stopwatch ? config.stopwatch : steadyNow), checks_(stopwatch_) {
+    : config_(config),
+      bound_(config),
+      stopwatch_(config.stopwatch ? config.stopwatch : steadyNow),
+      checks_(stopwatch_) {
   create(0, Object::kScene);
 }
 

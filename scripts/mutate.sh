@@ -1,0 +1,119 @@
+#!/usr/bin/env bash
+# Changes the laws one at a time and demands that a test notices. scripts/mutations.txt holds the list, in entries of
+#
+#   law: what is changed
+#   path of the file
+#   -the text as it stands there, exactly once
+#   +what it becomes
+#   ?test program, and the tests that must fail
+#
+# scripts/mutate.sh [--only PATTERN] runs all entries, or those whose first line matches, in a clone of what is committed.
+# After a run of all that were all caught it writes docs/mutations.md. MUTATE_WORK=DIR keeps clone and build there, for
+# the next run. Needs about half an hour.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+source_dir=$PWD
+list=$source_dir/scripts/mutations.txt
+only=
+case "${1:-}" in
+  "") ;;
+  --only) only=${2:?"--only needs a pattern"} ;;
+  *) sed -n '2,/^set/p' "$0" | sed '$d; s/^# \{0,1\}//'; exit 2 ;;
+esac
+
+if [ -n "${MUTATE_WORK:-}" ]; then
+  work=$MUTATE_WORK
+  mkdir -p "$work"
+else
+  work=$(mktemp -d)
+  trap 'rm -rf "$work"' EXIT
+fi
+tree=$work/tree
+[ -d "$tree" ] || git clone -q "$source_dir" "$tree"
+git -C "$tree" fetch -q "$source_dir" HEAD
+git -C "$tree" reset -q --hard FETCH_HEAD
+
+names=() files=() olds=() news=() programs=() filters=()
+while IFS= read -r name; do
+  [[ -z $name || $name == \#* ]] && continue
+  read -r file
+  IFS= read -r old
+  IFS= read -r new
+  read -r test
+  [[ $old == -* && $new == +* && $test == \?*' '* ]] || { echo "$list: '$name' is not an entry of five lines"; exit 2; }
+  [[ -z $only || $name =~ $only ]] || continue
+  names+=("$name") files+=("$file") olds+=("${old:1}") news+=("${new:1}")
+  test=${test:1}
+  programs+=("${test%% *}") filters+=("${test#* }")
+done <"$list"
+[ "${#names[@]}" != 0 ] || { echo "no entry of $list matches '$only'"; exit 2; }
+
+# Prints a file with the one place where OLD stands changed to NEW; fails with the number of places otherwise.
+change_once() {
+  OLD=$1 NEW=$2 awk '
+    { text = text $0 "\n" }
+    END { old = ENVIRON["OLD"]; at = index(text, old); rest = substr(text, at + length(old))
+          if (at == 0 || index(rest, old) != 0) exit 1
+          printf "%s%s%s", substr(text, 1, at - 1), ENVIRON["NEW"], rest }' "$3"
+}
+
+build() { ninja -C "$work/build" "${MUTATE_JOBS:--j2}" "$@" >"$work/build.log" 2>&1; }
+run() { (cd "$work" && timeout 300 "build/bin/$1" --gtest_filter="$2" >run.log 2>&1); }
+
+cmake -G Ninja -S "$tree" -B "$work/build" -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" >/dev/null
+mapfile -t needed < <(printf '%s\n' "${programs[@]}" | sort -u)
+echo "building ${needed[*]} without changes ..."
+build "${needed[@]}" || { tail -20 "$work/build.log"; exit 2; }
+
+declare -A broken  # tests that say nothing
+for i in "${!names[@]}"; do
+  if ! run "${programs[i]}" "${filters[i]}" || ! grep -q '  PASSED  \] [1-9]' "$work/run.log"; then
+    broken[${programs[i]} ${filters[i]}]=1
+  fi
+done
+
+missed=()
+for i in "${!names[@]}"; do
+  target=$tree/${files[i]}
+  verdict=
+  if [ -n "${broken[${programs[i]} ${filters[i]}]:-}" ]; then
+    verdict="without the change the test does not pass, or there is none"
+  elif ! change_once "${olds[i]}" "${news[i]}" "$target" >"$work/changed"; then
+    verdict="the old text does not stand in ${files[i]} exactly once"
+  else
+    cp "$work/changed" "$target"
+    if ! build "${programs[i]}"; then
+      verdict="does not build: $(grep -m1 'error' "$work/build.log" || tail -1 "$work/build.log")"
+    elif run "${programs[i]}" "${filters[i]}"; then
+      verdict="SURVIVED"
+    fi
+    git -C "$tree" checkout -q -- "${files[i]}"
+    # Seen as changed again, whatever the resolution of file times.
+    touch "$target"
+  fi
+  if [ -z "$verdict" ]; then
+    echo "caught    ${names[i]}"
+  else
+    echo "NOT CAUGHT ${names[i]}: $verdict"
+    missed+=("$i")
+  fi
+done
+
+echo "${#names[@]} changes, $((${#names[@]} - ${#missed[@]})) caught"
+[ "${#missed[@]}" = 0 ] || exit 1
+[ -z "$only" ] || exit 0
+
+{
+  echo "# What the tests of the laws notice"
+  echo
+  echo "Written by \`scripts/mutate.sh\`, which makes each of these ${#names[@]} changes to the sources, one at a time, and demands that"
+  echo "the named test fails: each law with its sign, unit or factor changed."
+  echo
+  echo "| law | change in | before | after | caught by |"
+  echo "|---|---|---|---|---|"
+  for i in "${!names[@]}"; do
+    cell() { printf '%s' "$1" | sed 's/|/\\|/g; s/^ *//; s/ *$//'; }
+    echo "| $(cell "${names[i]}") | \`${files[i]#src/}\` | \`$(cell "${olds[i]}")\` | \`$(cell "${news[i]}")\` | \`${programs[i]}\` $(cell "${filters[i]//\*/}") |"
+  done
+} >"$source_dir/docs/mutations.md"
+echo "written: docs/mutations.md"
