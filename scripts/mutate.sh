@@ -7,7 +7,7 @@
 #   +what it becomes
 #   ?test program, and the tests that must fail
 #
-# scripts/mutate.sh [--only PATTERN] runs all entries, or those whose first line matches, in a clone of what is committed.
+# scripts/mutate.sh [--only PATTERN] runs all entries, or those whose law or test matches, in a clone of what is committed.
 # After a run of all that were all caught it writes docs/mutations.md. MUTATE_WORK=DIR keeps clone and build there, for
 # the next run. Needs about half an hour.
 set -euo pipefail
@@ -41,7 +41,7 @@ while IFS= read -r name; do
   IFS= read -r new
   read -r test
   [[ $old == -* && $new == +* && $test == \?*' '* ]] || { echo "$list: '$name' is not an entry of five lines"; exit 2; }
-  [[ -z $only || $name =~ $only ]] || continue
+  [[ -z $only || "$name $test" =~ $only ]] || continue
   names+=("$name") files+=("$file") olds+=("${old:1}") news+=("${new:1}")
   test=${test:1}
   programs+=("${test%% *}") filters+=("${test#* }")

@@ -93,6 +93,22 @@ TEST_F(ReporterTest, LengthsAreWorldOverThousandAndForcesAreNewtons) {
   EXPECT_NEAR(force[2], 1.0, 1e-12);
 }
 
+TEST_F(ReporterTest, OrientationAndTurningAreOfTheWorld) {
+  tick_.T_world_device = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ()) * Eigen::UniformScaling<double>(2000.0);
+  tick_.device.orientation = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitX());
+  tick_.device.velocity_m_per_s = Vec3(0.1, 0, 0);
+  tick_.device.angularVelocity_rad_per_s = Vec3(M_PI, 0, 0);
+  step();
+  // First about the stylus's x, then with the device about z: (1 + k)(1 + i) / 2 = (1 + i + j + k) / 2.
+  for (const double q : said<wire::TrackerPosQuat>().at(0).orientation) EXPECT_NEAR(q, 0.5, 1e-12);
+  const auto velocity = said<wire::TrackerVelocity>().at(0);
+  EXPECT_NEAR(velocity.velocity[1], 0.2, 1e-12);
+  const double half = 0.5 * M_PI * velocity.interval;
+  EXPECT_NEAR(velocity.rotation[0], 0, 1e-12);
+  EXPECT_NEAR(velocity.rotation[1], std::sin(half), 1e-12);
+  EXPECT_NEAR(velocity.rotation[3], std::cos(half), 1e-12);
+}
+
 TEST_F(ReporterTest, PoseIsSaidWhenItMovedOrTurnedMoreThanTheTolerance) {
   step();
   tick_.rendering.proxy_m = tick_.device.position_m = Vec3(0.0009, 0, 0);

@@ -116,6 +116,20 @@ TEST_P(FreeForcesTest, effects_end_and_ramp_out) {
     EXPECT_NEAR(at({0, 0, 0}).force_N.x(), 1.5 * std::max(0.0, 1 - i / 250.0), 1e-9);
 }
 
+// Started again while it runs, an effect begins anew: its phase and its time.
+TEST_P(FreeForcesTest, restart_begins_anew) {
+  scene::Effect e = effect(EffectType::motorVibration);
+  e.duration = 10 * kTick;
+  run(e);
+  start({0, 0, 0});
+  for (int i = 1; i < 6; ++i) EXPECT_NEAR(at({0, 0, 0}).force_N.x(), 1.5 * std::cos(0.2 * i), 1e-9);
+  e.start = 2;
+  run(e);
+  hand->show(scene.snapshot());
+  for (int i = 0; i < 15; ++i)
+    EXPECT_NEAR(at({0, 0, 0}).force_N.x(), i < 10 ? 1.5 * std::cos(0.2 * i) : 0, 1e-9);
+}
+
 // A plane of the scene and a wall of triangles make a corner like two walls do.
 TEST_P(FreeForcesTest, plane_and_mesh_make_a_corner) {
   scene.planes = {floor(0)};

@@ -39,6 +39,19 @@ TEST_P(MovingTest, rising_plate_lifts_a_resting_hand) {
   }
 }
 
+// Damping is against the surface as it moves: a hand at rest on a rising plate is damped as one that comes.
+TEST_P(MovingTest, rising_plate_is_damped) {
+  scene::Surface s = surface();
+  s.damping_Ns_per_m = 2;
+  scene::ObjectState& object = add(plane(0.02, 10), s);
+  object.motion =
+      scene::Motion::between(object.motion.origin(), shifted(object, {0, 0, 0.01}), 0, toNanos(0.1));
+  start({0.0003, 0.0002, 0.001});
+  for (int i = 0; i < 25; ++i) at({0.0003, 0.0002, 0.001});
+  const double depth = 0.1 * geometry::toSeconds(hand->time()) - 0.001;
+  EXPECT_NEAR(at({0.0003, 0.0002, 0.001}).force_N.z(), 1000 * depth + 2 * 0.1, 2e-3);
+}
+
 // A fast one, 20 mm in a tick of 1 ms and no thicker than a sheet, does not pass through the hand either.
 TEST_P(MovingTest, fast_sheet_does_not_pass_through_the_hand) {
   scene.faces = scene::TouchableFaces::both;
