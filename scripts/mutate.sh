@@ -8,8 +8,8 @@
 #   ?test program, and the tests that must fail
 #
 # scripts/mutate.sh [--only PATTERN] runs all entries, or those whose law or test matches, in a clone of what is committed.
-# After a run of all that were all caught it writes docs/mutations.md. MUTATE_WORK=DIR keeps clone and build there, for
-# the next run. Needs about half an hour.
+# After a run of all that were all caught it writes docs/mutations.md. MUTATE_WORK=DIR keeps clone and build there for the
+# next run, which leaves out what was caught before while the file that is changed is the same. Needs about half an hour.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 source_dir=$PWD
@@ -32,8 +32,9 @@ tree=$work/tree
 [ -d "$tree" ] || git clone -q "$source_dir" "$tree"
 git -C "$tree" fetch -q "$source_dir" HEAD
 git -C "$tree" reset -q --hard FETCH_HEAD
+touch "$work/caught"
 
-names=() files=() olds=() news=() programs=() filters=()
+names=() files=() olds=() news=() programs=() filters=() keys=() todo=()
 while IFS= read -r name; do
   [[ -z $name || $name == \#* ]] && continue
   read -r file
@@ -45,6 +46,9 @@ while IFS= read -r name; do
   names+=("$name") files+=("$file") olds+=("${old:1}") news+=("${new:1}")
   test=${test:1}
   programs+=("${test%% *}") filters+=("${test#* }")
+  key=$(printf '%s\n' "$name" "$file" "$old" "$new" "$test" "$(git -C "$tree" rev-parse "HEAD:$file")" | sha1sum)
+  keys+=("$key")
+  grep -qxF -- "$key" "$work/caught" || todo+=($((${#names[@]} - 1)))
 done <"$list"
 [ "${#names[@]}" != 0 ] || { echo "no entry of $list matches '$only'"; exit 2; }
 
@@ -61,19 +65,19 @@ build() { ninja -C "$work/build" "${MUTATE_JOBS:--j2}" "$@" >"$work/build.log" 2
 run() { (cd "$work" && timeout 300 "build/bin/$1" --gtest_filter="$2" >run.log 2>&1); }
 
 cmake -G Ninja -S "$tree" -B "$work/build" -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" >/dev/null
-mapfile -t needed < <(printf '%s\n' "${programs[@]}" | sort -u)
-echo "building ${needed[*]} without changes ..."
-build "${needed[@]}" || { tail -20 "$work/build.log"; exit 2; }
+mapfile -t needed < <(for i in "${todo[@]}"; do echo "${programs[i]}"; done | sort -u)
+echo "${#names[@]} changes, ${#todo[@]} to try; building ${needed[*]} without any ..."
+[ "${#todo[@]}" = 0 ] || build "${needed[@]}" || { tail -20 "$work/build.log"; exit 2; }
 
 declare -A broken  # tests that say nothing
-for i in "${!names[@]}"; do
+for i in "${todo[@]}"; do
   if ! run "${programs[i]}" "${filters[i]}" || ! grep -q '  PASSED  \] [1-9]' "$work/run.log"; then
     broken[${programs[i]} ${filters[i]}]=1
   fi
 done
 
 missed=()
-for i in "${!names[@]}"; do
+for i in "${todo[@]}"; do
   target=$tree/${files[i]}
   verdict=
   if [ -n "${broken[${programs[i]} ${filters[i]}]:-}" ]; then
@@ -93,6 +97,7 @@ for i in "${!names[@]}"; do
   fi
   if [ -z "$verdict" ]; then
     echo "caught    ${names[i]}"
+    echo "${keys[i]}" >>"$work/caught"
   else
     echo "NOT CAUGHT ${names[i]}: $verdict"
     missed+=("$i")
