@@ -399,6 +399,19 @@ TEST(Guard, GeometryThatJumpsInEveryTickIsStillFollowed) {
   EXPECT_NEAR(bench.steps(200 * kMs).y(), 3, 1e-3);
 }
 
+TEST(Guard, ADeepFirstContactIsToldAsLongAsItLasts) {
+  Bench bench;
+  bench.settle(Vec3(0, 1, 0));
+  EXPECT_FALSE(bench.active(Trip::deepContact));
+  bench.in.deepContact = true;
+  bench.steps(3 * kMs);
+  EXPECT_TRUE(bench.active(Trip::deepContact));
+  bench.in.deepContact = false;
+  EXPECT_NEAR(bench.step().y(), 1, kTiny) << "told, not limited";
+  EXPECT_FALSE(bench.active(Trip::deepContact));
+  EXPECT_EQ(bench.count(Trip::deepContact), 1U);
+}
+
 TEST(Guard, RawPassesEverythingFinite) {
   GuardOptions options;
   options.enabled = false;

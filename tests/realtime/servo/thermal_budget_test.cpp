@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <deque>
 #include <random>
 
@@ -54,6 +55,15 @@ TEST(ThermalBudget, AHardPressGetsThePeakThenTheFloorThenTheContinuousForce) {
     }
     EXPECT_GT(lowest, 0.59 * kContinuous);
   }
+}
+
+TEST(ThermalBudget, WhatIsLeftIsSpentWithinATenthOfASecond) {
+  constexpr double kFloor = 0.6 * kContinuous;
+  Motor motor(1'000'000);
+  while (motor.budget.limit_N() > kPeak - 0.5) motor.write(kPeak);
+  const double before = motor.budget.limit_N() - kFloor;
+  for (int i = 0; i < 100; ++i) motor.write(kPeak);
+  EXPECT_NEAR((motor.budget.limit_N() - kFloor) / before, std::exp(-1), 0.02);
 }
 
 TEST(ThermalBudget, ALightPressIsNeverTouched) {
