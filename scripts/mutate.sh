@@ -64,7 +64,7 @@ change_once() {
 build() { ninja -C "$work/build" "${MUTATE_JOBS:--j2}" "$@" >"$work/build.log" 2>&1; }
 run() { (cd "$work" && timeout 300 "build/bin/$1" --gtest_filter="$2" >run.log 2>&1); }
 
-cmake -G Ninja -S "$tree" -B "$work/build" -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" >/dev/null
+[ -e "$work/build/build.ninja" ] || cmake -G Ninja -S "$tree" -B "$work/build" -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" >/dev/null
 mapfile -t needed < <(for i in "${todo[@]}"; do echo "${programs[i]}"; done | sort -u)
 echo "${#names[@]} changes, ${#todo[@]} to try; building ${needed[*]} without any ..."
 [ "${#todo[@]}" = 0 ] || build "${needed[@]}" || { tail -20 "$work/build.log"; exit 2; }
