@@ -14,13 +14,13 @@ constexpr double kCrossingSlack = 1e-6;  // error of a height, in skins, with a 
 constexpr double kThinness = 1e-3;       // below this height to length, the normal is cleaned up
 
 // Not below the edge u-v by more than the margin, seen along the normal; no square root.
-bool withinEdge(const Facet& f, const Vec3& u, const Vec3& v, const Vec3& q, double margin) {
+inline bool withinEdge(const Facet& f, const Vec3& u, const Vec3& v, const Vec3& q, double margin) {
   const Vec3 e = v - u;
   const double inside = f.normal.cross(e).dot(q - u);
   return inside >= 0 || inside * inside <= margin * margin * e.squaredNorm();
 }
 
-bool overFacet(const Facet& f, const Vec3& q, double margin) {
+inline bool overFacet(const Facet& f, const Vec3& q, double margin) {
   if (f.unbounded) return true;
   if (!withinEdge(f, f.a, f.b, q, margin) || !withinEdge(f, f.b, f.c, q, margin) ||
       !withinEdge(f, f.c, f.a, q, margin)) {
@@ -41,8 +41,8 @@ struct Heights {
   double end = 0;
 };
 
-bool touchableSide(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d, double limit,
-                   Heights& h) {
+inline bool touchableSide(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d, double limit,
+                          Heights& h) {
   h.start = f.normal.dot(p - f.a);
   h.end = h.start + limit * f.normal.dot(d);
   const bool fromBack = faces == TouchableFaces::back || (faces == TouchableFaces::both && h.start < 0);

@@ -72,6 +72,7 @@ void Nearby::begin(const Moment& now, const Moment& before, const HalfSpaces* pl
   facetCount_ = 0;
   complete_ = false;
   overflowed_ = false;
+  if (now.scene != before.scene) forget();
 }
 
 void Nearby::include(const Vec3& centre, double reach) noexcept {
@@ -127,6 +128,7 @@ bool Nearby::place(const ObjectState& state, PlacedObject& placed) const noexcep
   const geometry::Box& box = state.mesh->index.bounds();
   if (box.empty()) return false;
   placed.T_device_object = now_.scene->workspace.T_device_world * state.motion.at(now_.time);
+  placed.atRest = !state.motion.movingAfter(now_.time) && !state.mesh->deformingAfter(now_.time);
   const Mat3 linear = placed.T_device_object.linear();
   const double determinant = linear.determinant();
   placed.mirrored = determinant < 0;
@@ -157,11 +159,21 @@ void Nearby::compareWithBefore(PlacedObject& placed) const noexcept {
   placed.jumped = !sameTriangles || before.motion.jumps() != state.motion.jumps();
 }
 
+// An object that will not move or bend any more in this scene has the same facets in each tick.
 bool Nearby::facetOf(int i, std::uint32_t triangle, Facet& facet) const noexcept {
   const PlacedObject& placed = object(i);
+  MadeFacet& made = made_[(triangle * 0x9E3779B1U) >> (32 - kMadeBits)];
+  if (made.generation == generation_ && made.state == placed.state && made.facet.triangle == triangle) {
+    facet = made.facet;
+    facet.object = i;
+    return true;
+  }
   if (!makeFacet(placed.corners(triangle, now_.time), placed.skin, facet)) return false;
   facet.triangle = triangle;
   facet.object = i;
+  facet.distance = 0;
+  facet.unbounded = false;
+  if (placed.atRest) made = {generation_, placed.state, facet};
   return true;
 }
 

@@ -24,6 +24,7 @@ struct PlacedObject {
   Affine T_object_device = Affine::Identity();
   double stretch = 1;     ///< most object units per metre, in any direction
   double skin = 0;        ///< see facet.h
+  bool atRest = false;    ///< will not move or bend any more in this scene
   bool mirrored = false;  ///< the placement has a reflection: winding is seen reversed
   // Since the last tick:
   const scene::ObjectState* before = nullptr;  ///< null when it was not there
@@ -56,6 +57,8 @@ class Nearby {
  public:
   explicit Nearby(double toolRadius_m) noexcept : radius_(toolRadius_m) {}
 
+  /// Before a tick that does not follow the one before: what was kept of its scene may be gone.
+  void forget() noexcept { ++generation_; }
   /// Starts a tick with no object near. `planes` are there from the start, and live until the next begin().
   void begin(const Moment& now, const Moment& before, const HalfSpaces* planes = nullptr) noexcept;
   /// Adds the objects within `reach` of `centre`.
@@ -93,6 +96,14 @@ class Nearby {
  private:
   static constexpr int kMaxObjects = 64;
   static constexpr int kMaxFacets = 512;
+  static constexpr int kMadeBits = 8;
+
+  // A facet that was made in an earlier tick.
+  struct MadeFacet {
+    std::uint64_t generation = 0;
+    const scene::ObjectState* state = nullptr;
+    Facet facet;
+  };
 
   template <class Visit>
   void forEachGathered(int only, Visit&& visit) const noexcept;
@@ -118,6 +129,8 @@ class Nearby {
   double finestSkin_ = 0;
   std::array<Facet, kMaxFacets> facets_;
   int facetCount_ = 0;
+  std::uint64_t generation_ = 1;  // of what may be kept from tick to tick
+  mutable std::array<MadeFacet, 1U << kMadeBits> made_;
   Vec3 centre_ = Vec3::Zero();
   double reach_ = 0;
   bool complete_ = false;

@@ -76,6 +76,7 @@ void Proxy::place(const Moment& now, const Vec3& hip) noexcept {
   released_ = false;
   position_ = positionBefore_ = hipBefore_ = hip;
   grip_ = Grip{};
+  nearby_.forget();
   before_ = now;
   touchedObject_ = -1;
 }

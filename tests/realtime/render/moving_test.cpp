@@ -136,6 +136,37 @@ TEST_P(MovingTest, deforming_surface_is_felt_like_a_moving_one) {
   }
 }
 
+// The renderer keeps facets of what rests from tick to tick, as long as the scene is the same. A hand that
+// gets a new picture of the same scene in every tick can keep nothing: it must feel the same to the last bit.
+TEST_P(MovingTest, facets_that_are_kept_change_no_byte) {
+  for (const double radius : {0.0, 0.001}) {
+    scene = SceneFixture();
+    scene.setWorldUnitsPerMetre(units());
+    TriangleMesh rough = sphere(0.02, 30);
+    for (auto& v : rough.vertices) v *= static_cast<float>(1 + 0.02 * std::sin(7e3 * v.x() * v.y() / 0.02));
+    add(rough, surface(1000, 0.3, 0.2));
+    scene::ObjectState& plate = add(plane(0.03, 30), surface());
+    plate.motion = scene::Motion::between(shifted(plate, {0, 0, 0.018}), shifted(plate, {0, 0.003, 0.0195}),
+                                          toNanos(0.2), toNanos(0.5));
+    Hand keeps(scene.snapshot(), {.toolRadius_m = radius});
+    Hand makes(scene.snapshot(), {.toolRadius_m = radius});
+    for (int i = 0; i < 800; ++i) {
+      const double turn = 0.004 * i;
+      const double distance = 0.018 + radius + 0.004 * std::max(0.0, 1 - i / 50.0);
+      const Vec3 hip =
+          offset() + distance * Vec3(0.4 * std::cos(turn), 0.4 * std::sin(3 * turn), 1).normalized();
+      const Rendering& a = keeps.at(hip);
+      makes.show(scene.snapshot());
+      const Rendering& b = makes.at(hip);
+      ASSERT_EQ(a.force_N, b.force_N) << i;
+      ASSERT_EQ(a.proxy_m, b.proxy_m) << i;
+      if (i > 60) {
+        ASSERT_TRUE(a.touching) << i;
+      }
+    }
+  }
+}
+
 // A turning drum under a pressed finger with much friction: the proxy goes round with it.
 TEST_P(MovingTest, turning_object_carries_a_sticking_proxy) {
   scene::ObjectState& object = add(sphere(0.03, 40), surface(1000, 5, 5));
