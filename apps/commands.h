@@ -29,6 +29,7 @@ inline constexpr double kLongest_s = 1e9;
 void addServe(CLI::App& app);
 void addTouch(CLI::App& app);
 void addStop(CLI::App& app);
+void addWatch(CLI::App& app);
 void addDeviceHost(CLI::App& app);
 void addRender(CLI::App& app);
 void addDoctor(CLI::App& app);

@@ -17,6 +17,16 @@ std::size_t terminalWidth() {
   return ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
 }
 
+// The first `columns` characters of UTF-8 text.
+std::string cutTo(const std::string& text, std::size_t columns) {
+  std::size_t characters = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const bool begins = (static_cast<unsigned char>(text[i]) & 0xc0U) != 0x80U;
+    if (begins && characters++ == columns) return text.substr(0, i);
+  }
+  return text;
+}
+
 }  // namespace
 
 bool onTerminal() {
@@ -56,8 +66,7 @@ void ProgressBar::finish() {
 void LiveTable::show(const std::vector<std::string>& lines) {
   if (height_ > 0) std::printf("\x1b[%zuA", height_);
   const std::size_t width = terminalWidth();  // a line that wrapped would be two of the next redraw
-  for (const std::string& line : lines)
-    std::printf("%.*s\x1b[K\n", static_cast<int>(width - 1), line.c_str());
+  for (const std::string& line : lines) std::printf("%s\x1b[K\n", cutTo(line, width - 1).c_str());
   std::printf("\x1b[J");
   std::fflush(stdout);
   height_ = lines.size();

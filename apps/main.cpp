@@ -20,6 +20,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   addServe(app);
   addTouch(app);
+  addWatch(app);
   addStop(app);
   addRender(app);
   addDoctor(app);

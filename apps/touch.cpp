@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -15,12 +14,14 @@
 
 #include "commands.h"
 #include "felt.h"
+#include "felt_view.h"
 #include "geometry/crossings.h"
 #include "geometry/mesh_check.h"
 #include "geometry/triangle_mesh.h"
 #include "hapticd/client.h"
 #include "live_table.h"
 #include "mesh_io/mesh_io.h"
+#include "stop_signals.h"
 
 namespace hapticd::apps {
 namespace {
@@ -37,26 +38,6 @@ struct TouchOptions {
   double size_mm = 0;
   bool keep_scene = false;
   bool json = false;
-};
-
-volatile std::sig_atomic_t stopRequested = 0;
-
-/// Turns Ctrl-C and SIGTERM into a flag as long as it lives.
-class StopSignals {
- public:
-  StopSignals() : interrupt_(std::signal(SIGINT, request)), terminate_(std::signal(SIGTERM, request)) {}
-  ~StopSignals() {
-    std::signal(SIGINT, interrupt_);
-    std::signal(SIGTERM, terminate_);
-  }
-  StopSignals(const StopSignals&) = delete;
-  StopSignals& operator=(const StopSignals&) = delete;
-
- private:
-  static void request(int) { stopRequested = 1; }
-  using Handler = void (*)(int);
-  Handler interrupt_;
-  Handler terminate_;
 };
 
 std::string extentsText(const TriangleMesh& mesh) {
@@ -118,77 +99,14 @@ void send(Client& client, const TriangleMesh& mesh, const TouchOptions& options)
               client.device().c_str(), client.server().c_str());
 }
 
-/// Figures of the last interval, as lines for a table.
-class View {
- public:
-  explicit View(Client& client) : client_(client), before_(client.statistics()) {}
-
-  std::vector<std::string> table(const Felt& felt) {
-    const LatestReports& latest = client_.latest();
-    const Statistics now = client_.statistics();
-    std::vector<std::string> lines;
-    char text[256];
-    const auto add = [&](const char* format, auto... arguments) {
-      std::snprintf(text, sizeof text, format, arguments...);
-      lines.emplace_back(text);
-    };
-    const LatencyHistogram latency = felt.latency();
-    add("%s@%s  %.0f s  latency p50 %.2f ms p99 %.2f ms", client_.device().c_str(), client_.server().c_str(),
-        felt.seconds(), latency.quantile_us(0.5) / 1000, latency.quantile_us(0.99) / 1000);
-    for (const auto& [sensor, pose] : latest.pose) {
-      const Vec3& p = pose.position_m;
-      const Quaternion& q = pose.orientation;
-      add("  sensor %d   %8.2f %8.2f %8.2f mm   %6.3f %6.3f %6.3f %6.3f", sensor, p[0] * 1000, p[1] * 1000,
-          p[2] * 1000, q[0], q[1], q[2], q[3]);
-    }
-    const Vec3& f = latest.force.force_N;
-    add("  force      %8.3f %8.3f %8.3f N    |F| %.3f N   peak %.3f N", f[0], f[1], f[2],
-        std::hypot(f[0], f[1], f[2]), felt.peakForce_N());
-    add("  touching   %s   object %d   depth %.3f mm   angle %.1f deg   %.1f %% of the time",
-        latest.touching.touching ? "yes" : "no ", latest.touched_object.object, latest.depth.depth_m * 1000,
-        latest.angle.angle_deg, 100 * felt.contactFraction());
-    for (std::size_t i = 0; i < kReportKinds; ++i) {
-      const auto kind = static_cast<ReportKind>(i);
-      if (now[kind].count == 0) continue;
-      add("  %-15s %8.0f /s  %llu", std::string(nameOf(kind)).c_str(), now.ratePerSecond(kind, before_),
-          static_cast<unsigned long long>(felt.count(kind)));
-    }
-    if (!felt.texts().empty()) lines.push_back("  server: " + felt.texts().back().first);
-    before_ = now;
-    return lines;
-  }
-
-  void printLine(const Felt& felt) {
-    const LatestReports& latest = client_.latest();
-    const Statistics now = client_.statistics();
-    double rate = 0;
-    for (std::size_t i = 0; i < kReportKinds; ++i)
-      rate += now.ratePerSecond(static_cast<ReportKind>(i), before_);
-    const LatencyHistogram latency = felt.latency();
-    const Vec3& f = latest.force.force_N;
-    std::printf(
-        "%.0f s  %.0f reports/s  touching %s  object %d  force %.3f N  depth %.3f mm  angle %.1f deg  "
-        "latency p50 %.2f ms p99 %.2f ms\n",
-        felt.seconds(), rate, latest.touching.touching ? "yes" : "no", latest.touched_object.object,
-        std::hypot(f[0], f[1], f[2]), latest.depth.depth_m * 1000, latest.angle.angle_deg,
-        latency.quantile_us(0.5) / 1000, latency.quantile_us(0.99) / 1000);
-    std::fflush(stdout);
-    before_ = now;
-  }
-
- private:
-  Client& client_;
-  Statistics before_;
-};
-
 void watch(Client& client, Felt& felt, double seconds) {
   const bool live = onTerminal();
   const auto interval = live ? 250ms : 1000ms;
-  View view(client);
+  FeltView view(client);
   LiveTable table;
   felt.restart();
   auto next = std::chrono::steady_clock::now() + interval;
-  while (stopRequested == 0 && (seconds <= 0 || felt.seconds() < seconds)) {
+  while (!stopRequested() && (seconds <= 0 || felt.seconds() < seconds)) {
     client.poll(20ms);  // short, so that signals and the end are noticed
     if (!client.connected()) throw ConnectionLost("the connection to " + client.server() + " was lost");
     if (std::chrono::steady_clock::now() < next) continue;

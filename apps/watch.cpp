@@ -1,0 +1,174 @@
+// hapticd watch: what a hand feels, on a terminal or for other programs; a client that only listens.
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include "commands.h"
+#include "felt.h"
+#include "felt_view.h"
+#include "hapticd/client.h"
+#include "live_table.h"
+#include "stop_signals.h"
+
+namespace hapticd::apps {
+namespace {
+
+using namespace std::chrono_literals;
+
+struct WatchOptions {
+  std::string server = "Phantom@localhost";
+  double seconds = 0;
+  double rate_Hz = 0;
+  bool json = false;
+  bool csv = false;
+};
+
+double secondsOf(Time time) {
+  return std::chrono::duration<double>(time.time_since_epoch()).count();
+}
+
+// One tick as the server told it whole.
+TickReport composed(const LatestReports& latest) {
+  TickReport tick;
+  tick.time = latest.touching.time;
+  if (const auto proxy = latest.pose.find(0); proxy != latest.pose.end()) {
+    tick.proxy_m = proxy->second.position_m;
+    tick.orientation = proxy->second.orientation;
+    tick.time = std::max(tick.time, proxy->second.time);
+  }
+  if (const auto hand = latest.pose.find(1); hand != latest.pose.end()) tick.hand_m = hand->second.position_m;
+  tick.force_N = latest.force.force_N;
+  tick.depth_m = latest.depth.depth_m;
+  tick.object = latest.touched_object.object;
+  for (const auto& [button, pressed] : latest.pressed) {
+    if (pressed && button >= 0 && button < 32) tick.buttons |= 1U << button;
+  }
+  return tick;
+}
+
+void printJson(const TickReport& t) {
+  const auto list = [](const auto& values) {
+    std::string text;
+    char number[32];
+    for (const double value : values) {
+      std::snprintf(number, sizeof number, text.empty() ? "%.9g" : ",%.9g", value);
+      text += number;
+    }
+    return "[" + text + "]";
+  };
+  std::printf(
+      "{\"time_s\":%.6f,\"tick\":%llu,\"revision\":%llu,\"hand_m\":%s,\"proxy_m\":%s,\"velocity_m_per_s\":%s,"
+      "\"orientation_xyzw\":%s,\"force_N\":%s,\"depth_m\":%.9g,\"object\":%d,\"buttons\":%u,\"guard\":%u}\n",
+      secondsOf(t.time), static_cast<unsigned long long>(t.tick), static_cast<unsigned long long>(t.revision),
+      list(t.hand_m).c_str(), list(t.proxy_m).c_str(), list(t.velocity_m_per_s).c_str(),
+      list(t.orientation).c_str(), list(t.force_N).c_str(), t.depth_m, t.object, t.buttons,
+      t.guard_active | t.guard_latched);
+}
+
+constexpr const char* kCsvHeader =
+    "time_s,tick,hand_x_m,hand_y_m,hand_z_m,proxy_x_m,proxy_y_m,proxy_z_m,qx,qy,qz,qw,force_x_N,force_y_N,force_z_N,"
+    "depth_m,object,buttons,guard\n";
+
+void printCsv(const TickReport& t) {
+  std::printf("%.6f,%llu", secondsOf(t.time), static_cast<unsigned long long>(t.tick));
+  for (const double v : t.hand_m) std::printf(",%.9g", v);
+  for (const double v : t.proxy_m) std::printf(",%.9g", v);
+  for (const double v : t.orientation) std::printf(",%.9g", v);
+  for (const double v : t.force_N) std::printf(",%.9g", v);
+  std::printf(",%.9g,%d,%u,%u\n", t.depth_m, t.object, t.buttons, t.guard_active | t.guard_latched);
+}
+
+// Until the time is over, somebody stops it, or the server goes.
+template <class OnInterval>
+void pollUntilEnd(Client& client, double seconds, std::chrono::nanoseconds interval, OnInterval onInterval) {
+  using Clock = std::chrono::steady_clock;
+  const auto start = Clock::now();
+  auto next = start + interval;
+  while (!stopRequested()) {
+    const auto now = Clock::now();
+    if (seconds > 0 && std::chrono::duration<double>(now - start).count() >= seconds) return;
+    if (now >= next) {
+      onInterval();
+      next = std::max(next + interval, now - interval);
+    }
+    const auto left = std::max(next - Clock::now(), Clock::duration::zero());
+    client.poll(std::min<std::chrono::nanoseconds>(left, 20ms));  // short, so that signals are noticed
+    if (!client.connected()) throw ConnectionLost("the connection to " + client.server() + " was lost");
+  }
+}
+
+// Every tick that the server tells, at the rate that was asked for; from other servers, what they last said.
+void stream(Client& client, const WatchOptions& options) {
+  const auto print = options.csv ? printCsv : printJson;
+  if (options.csv) std::printf("%s", kCsvHeader);
+  const double rate_Hz = options.rate_Hz > 0 ? options.rate_Hz : 10;
+  const auto capabilities = client.waitCapabilities();
+  const bool whole = capabilities && capabilities->subscribe;
+  if (whole) {
+    client.onTick([&](const TickReport& tick) { print(tick); });
+    client.subscribe(Reports::tick, rate_Hz);
+  }
+  const auto period = std::chrono::nanoseconds(std::llround(1e9 / rate_Hz));
+  pollUntilEnd(client, options.seconds, period, [&] {
+    if (!whole) print(composed(client.latest()));
+    std::fflush(stdout);
+    if (std::ferror(stdout) != 0) throw Error("what is felt can no longer be written: the reader is gone");
+  });
+}
+
+void show(Client& client, const WatchOptions& options) {
+  if (options.rate_Hz > 0) client.setUpdateRate(options.rate_Hz);
+  Felt felt(client);
+  FeltView view(client);
+  LiveTable table;
+  felt.restart();
+  const bool live = onTerminal();
+  pollUntilEnd(client, options.seconds, live ? 100ms : 1000ms, [&] {
+    if (live) {
+      table.show(view.table(felt));
+    } else {
+      view.printLine(felt);
+    }
+  });
+  std::printf("%s", felt.summary().c_str());
+}
+
+int run(const WatchOptions& options) {
+  std::signal(SIGPIPE, SIG_IGN);  // `watch --json | head` ends by an error of the output
+  const StopSignals signals;
+  Client client(options.server, {.reconnect = false});
+  if (options.json || options.csv) {
+    stream(client, options);
+  } else {
+    show(client, options);
+  }
+  return 0;
+}
+
+}  // namespace
+
+void addWatch(CLI::App& app) {
+  auto options = std::make_shared<WatchOptions>();
+  CLI::App* command = app.add_subcommand("watch", "Show what a hand feels, live, or stream it to other programs");
+  command->add_option("server", options->server, "NAME@host[:port] or NAME@tcp://host[:port]")
+      ->capture_default_str();
+  command->add_option("--seconds", options->seconds, "How long to watch; 0: until Ctrl-C")
+      ->check(within(0, kLongest_s))
+      ->capture_default_str();
+  command->add_option("--rate", options->rate_Hz, "Reports or lines a second [the server's; 10 lines]")
+      ->check(within(0.1, 4000));
+  CLI::Option* json = command->add_flag("--json", options->json, "One line of JSON for each tick that is told");
+  command->add_flag("--csv", options->csv, "The same as CSV, with a header")->excludes(json);
+  command->footer(
+      "Only listens: it changes nothing that others feel. Works with other VRPN servers, too.\n"
+      "Examples:\n"
+      "  hapticd watch                                    a live table of Phantom@localhost\n"
+      "  hapticd watch Phantom@lab7 --json | jq .depth_m\n"
+      "  hapticd watch --csv --rate 1000 --seconds 5 > stroke.csv");
+  command->callback([options] { exitCode = run(*options); });
+}
+
+}  // namespace hapticd::apps
