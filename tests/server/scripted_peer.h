@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,10 +24,12 @@ using namespace std::chrono_literals;
 class ScriptedPeer {
  public:
   enum class Mode { tcp, udp };
+  /// Whether the peer greets and describes itself as the protocol wants it, or says only what it is given.
+  enum class Speech { proper, raw };
 
   explicit ScriptedPeer(const net::Endpoint& server, const std::string& device = "Phantom",
-                        Mode mode = Mode::tcp)
-      : sender_(names_.addSender("VRPN Control")), device_(names_.addSender(device)) {
+                        Mode mode = Mode::tcp, Speech speech = Speech::proper)
+      : speech_(speech), sender_(names_.addSender("VRPN Control")), device_(names_.addSender(device)) {
     if (mode == Mode::tcp) {
       endpoint_ = std::make_unique<wire::Endpoint>(names_);
       take(net::Connection::connect(loop_, server, 2s));
@@ -56,16 +59,29 @@ class ScriptedPeer {
   /// Waits for a text that holds these words.
   bool untilText(const std::string& words) {
     return until([&] {
-      for (const wire::Text& text : all<wire::Text>()) {
+      for (const wire::Text& text : texts_) {
         if (text.text.text.find(words) != std::string::npos) return true;
       }
       return false;
     });
   }
+  bool untilClosed() {
+    return until([this] { return closed_; });
+  }
 
   template <wire::WireMessage M>
   void send(const M& message) {
+    queue(message);
+    flush();
+  }
+  /// Leaves with the next flush() or send().
+  template <wire::WireMessage M>
+  void queue(const M& message) {
     endpoint_->send({1, 2}, device_, message);
+  }
+  /// A message with any payload, however wrong.
+  void sendPayload(wire::MessageKind kind, const std::vector<std::byte>& payload) {
+    endpoint_->sendRaw({1, 2}, device_, wire::localType(kind), payload, wire::Reliability::kReliable);
     flush();
   }
   /// Bytes as they are, whatever they are.
@@ -73,9 +89,12 @@ class ScriptedPeer {
     connection_.send(bytes);
     connection_.flush();
   }
+  /// Bytes as one datagram to where the server asked for them.
+  void sendDatagram(wire::ByteView bytes) { udp_->sendTo(bytes, udpPeer_); }
   void flush() {
     std::vector<std::byte> bytes;
     endpoint_->takeStream(bytes);
+    if (speech_ == Speech::raw) return;
     if (!bytes.empty()) connection_.send(std::span<const std::byte>(bytes));
     connection_.flush();
     if (udp_) endpoint_->takeDatagrams([this](wire::ByteView datagram) { udp_->sendTo(datagram, udpPeer_); });
@@ -98,14 +117,32 @@ class ScriptedPeer {
     const auto entry = counts_.find(wire::kindOf<M>);
     return entry == counts_.end() ? 0 : entry->second;
   }
+  /// The newest message of a kind, or the newest that fits.
+  template <wire::WireMessage M>
+  std::optional<M> last() const {
+    return last<M>([](const M&) { return true; });
+  }
+  template <wire::WireMessage M, class Fits>
+  std::optional<M> last(const Fits& fits) const {
+    for (auto received = messages_.rbegin(); received != messages_.rend(); ++received) {
+      if (received->kind != wire::kindOf<M>) continue;
+      const auto decoded = wire::decode<M>(received->payload);
+      if (decoded && fits(*decoded)) return *decoded;
+    }
+    return std::nullopt;
+  }
   void forget() {
     messages_.clear();
     counts_.clear();
+    texts_.clear();
   }
 
   bool open() const { return !closed_; }
   const std::string& closeReason() const { return reason_; }
   std::size_t datagrams() const { return datagrams_; }
+  /// Our port for datagrams, and where the server wants them.
+  std::uint16_t udpPort() const { return udp_->local().port; }
+  const net::Endpoint& udpPeer() const { return udpPeer_; }
   net::Connection& connection() { return connection_; }
   wire::Endpoint& endpoint() { return *endpoint_; }
   wire::LocalSender device() const { return device_; }
@@ -157,6 +194,9 @@ class ScriptedPeer {
 
   void onEvent(const wire::Event& event, bool byDatagram) {
     if (const auto* message = std::get_if<wire::MessageReceived>(&event)) {
+      if (message->kind == wire::kindOf<wire::Text>) {
+        texts_.push_back(*wire::decode<wire::Text>(message->payload));
+      }
       if (message->local_sender != device_) return;
       messages_.push_back(
           {message->kind, message->time, {message->payload.begin(), message->payload.end()}, byDatagram});
@@ -167,6 +207,7 @@ class ScriptedPeer {
     }
   }
 
+  const Speech speech_;
   net::Loop loop_;
   wire::LocalNames names_;
   wire::LocalSender sender_;
@@ -178,6 +219,7 @@ class ScriptedPeer {
   net::Connection connection_;
   std::vector<Received> messages_;
   std::map<wire::MessageKind, std::size_t> counts_;
+  std::vector<wire::Text> texts_;
   std::size_t datagrams_ = 0;
   bool closed_ = false;
   std::string reason_;

@@ -1,0 +1,112 @@
+// What a client sends to have something to feel, and how a test waits until it is felt.
+#pragma once
+
+#include <cmath>
+#include <limits>
+
+#include "geometry/types.h"
+#include "scripted_peer.h"
+
+namespace hapticd::test {
+
+using geometry::Vec3;
+using geometry::Vec3f;
+
+/// Corners of a box, three for each of its twelve triangles, seen from outside counter-clockwise.
+inline std::vector<Vec3f> boxTriples(const Vec3f& half, const Vec3f& centre = Vec3f::Zero()) {
+  std::vector<Vec3f> corners;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const int side : {-1, 1}) {
+      for (const auto& [u, v] : {std::pair{-1, -1}, {1, -1}, {1, 1}, {-1, -1}, {1, 1}, {-1, 1}}) {
+        Vec3f corner;
+        corner[axis] = static_cast<float>(side);
+        corner[(axis + 1) % 3] = static_cast<float>(side * u);
+        corner[(axis + 2) % 3] = static_cast<float>(v);
+        corners.emplace_back(centre + half.cwiseProduct(corner));
+      }
+    }
+  }
+  return corners;
+}
+
+/// One setVertex for each corner.
+inline void sendVertices(ScriptedPeer& peer, std::int32_t object, const std::vector<Vec3f>& vertices) {
+  std::int32_t number = 0;
+  for (const Vec3f& v : vertices) peer.queue(wire::SetVertex{object, number++, {v.x(), v.y(), v.z()}});
+  peer.flush();
+}
+
+/// A stiff box of world units (or metres, for stock objects) whose top is at half.y().
+inline void sendBox(ScriptedPeer& peer, std::int32_t object, const Vec3f& half,
+                    const Vec3f& centre = Vec3f::Zero()) {
+  sendVertices(peer, object, boxTriples(half, centre));
+  peer.send(wire::SetHapticProperty{object, "stiffness", 1.0F});
+}
+
+/// A stiff cube with its top at 20 mm, within reach of Hand::stroking().
+inline void sendCube(ScriptedPeer& peer, std::int32_t object = 0) {
+  sendBox(peer, object, Vec3f::Constant(20));
+}
+inline constexpr double kCubeTop_m = 0.020;
+
+/// Waits until all that the server said so far has been read, and forgets it.
+inline bool catchUp(ScriptedPeer& peer) {
+  peer.send(wire::Ping{});
+  const bool answered = peer.untilNext<wire::Pong>();
+  peer.forget();
+  return answered;
+}
+
+/// Waits until the scene has applied all that the peer sent so far: what comes after it is refused by name.
+inline bool untilApplied(ScriptedPeer& peer) {
+  static std::int32_t effect = 1'000'000;
+  peer.send(wire::StopEffect{++effect});
+  return peer.untilText("stopEffect " + std::to_string(effect));
+}
+
+inline double norm(const wire::F64x3& v) {
+  return std::hypot(v[0], v[1], v[2]);
+}
+
+/// Waits until this object is touched, where its surface is at this height.
+inline bool untilTouchedAt(ScriptedPeer& peer, std::int32_t object, double height_m) {
+  return peer.until([&] {
+    const auto touched = peer.last<wire::TouchedObject>();
+    const auto scp = peer.last<wire::Scp>();
+    return touched && touched->object == object && scp && std::abs(scp->position[1] - height_m) < 2e-4;
+  });
+}
+/// Waits until the hand has gone all the way down, through where the cube's top would be.
+inline bool untilUntouchedStroke(ScriptedPeer& peer) {
+  return peer.until([&] {
+    const auto pose = peer.last<wire::TrackerPosQuat>([](const auto& m) { return m.sensor == 0; });
+    return pose && pose->position[1] < 0.0165;
+  });
+}
+
+/// Waits until the reported force is this one.
+inline bool untilForce(ScriptedPeer& peer, const Vec3& force_N, double tolerance_N = 0.05) {
+  return peer.until([&] {
+    const auto force = peer.last<wire::Force>();
+    return force && norm({force->force[0] - force_N.x(), force->force[1] - force_N.y(),
+                          force->force[2] - force_N.z()}) <= tolerance_N;
+  });
+}
+/// Waits until there is a force of at least this size.
+inline bool untilForceAbove(ScriptedPeer& peer, double force_N) {
+  return peer.until([&] {
+    const auto force = peer.last<wire::Force>();
+    return force && norm(force->force) > force_N;
+  });
+}
+
+/// Waits until the hand of the device (sensor 1) is reported at this place.
+inline bool untilHandAt(ScriptedPeer& peer, const Vec3& position_m, double tolerance_m = 5e-4) {
+  return peer.until([&] {
+    const auto pose = peer.last<wire::TrackerPosQuat>([](const auto& m) { return m.sensor == 1; });
+    return pose && norm({pose->position[0] - position_m.x(), pose->position[1] - position_m.y(),
+                         pose->position[2] - position_m.z()}) <= tolerance_m;
+  });
+}
+
+}  // namespace hapticd::test
