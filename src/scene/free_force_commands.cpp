@@ -170,8 +170,10 @@ void FreeForces::apply(const SetPlane& c, const Call& call) {
   plane.normal = normal / length;
   plane.offset = kWorldUnitsPerStockMetre * c.plane[3] / length;
   plane.recovery = std::clamp(c.recoveryCycles, 1, 10'000) * Nanos{1'000'000};
-  plane.surface = surfaceFromStock(c.stiffness, c.damping, c.staticFriction, c.dynamicFriction, config_, call,
-                                   "sendSurface plane", c.index);
+  const auto surface = surfaceFromStock(c.stiffness, c.damping, c.staticFriction, c.dynamicFriction, config_,
+                                        call, "sendSurface plane", c.index);
+  if (!surface) return;
+  plane.surface = *surface;
   plane.surface.dynamic_friction = std::min(plane.surface.dynamic_friction, plane.surface.static_friction);
   std::string remark;
   keepPassive(plane.surface, bound_, remark);

@@ -269,9 +269,8 @@ void ObjectTable::apply(const SetSurfaceProperty& c, const Call& call) {
 
 void ObjectTable::apply(const SetSurface& c, const Call& call) {
   Object* object = find(c.object, "updateTrimeshChanges", call);
-  if (object == nullptr) return;
+  if (object == nullptr || !object->settings.set(c, config_, call)) return;
   becomeStock(*object);
-  object->settings.set(c, config_, call);
   object->surfaceSetBy = call.client;
   object->surfaceChanged = true;
   queue(*object);

@@ -26,8 +26,8 @@ constexpr double kRounding = 1e-6;
 double clampStock(double value, double max, bool raw, std::string_view what, const Call& call,
                   std::string_view name, std::int32_t id) {
   const double limit = raw ? std::numeric_limits<double>::infinity() : max;
-  if (value >= 0 && value <= limit * (1 + kRounding) && isUsable(value)) return value;
-  const double clamped = isUsable(value) ? std::clamp(value, 0.0, limit) : 0.0;
+  if (value >= 0 && value <= limit * (1 + kRounding)) return value;
+  const double clamped = std::clamp(value, 0.0, limit);
   call.warn(name, "out of range, clamped", " ", id, ", ", what, " ", value, " is not within 0 to ", max, ", ",
             clamped, " is used");
   return clamped;
@@ -80,15 +80,17 @@ bool SurfaceSettings::set(const SetSurfaceProperty& command, const SceneConfig& 
   return asked_.*row->member != before;
 }
 
-void SurfaceSettings::set(const SetSurface& command, const SceneConfig& config, const Call& call) {
-  const Surface stock =
+bool SurfaceSettings::set(const SetSurface& command, const SceneConfig& config, const Call& call) {
+  const std::optional<Surface> stock =
       surfaceFromStock(command.stiffness, command.damping, command.staticFriction, command.dynamicFriction,
                        config, call, "updateTrimeshChanges object", command.object);
-  asked_.stiffness_N_per_m = stock.stiffness_N_per_m;
-  asked_.damping_Ns_per_m = stock.damping_Ns_per_m;
-  asked_.static_friction = stock.static_friction;
-  asked_.dynamic_friction = stock.dynamic_friction;
+  if (!stock) return false;
+  asked_.stiffness_N_per_m = stock->stiffness_N_per_m;
+  asked_.damping_Ns_per_m = stock->damping_Ns_per_m;
+  asked_.static_friction = stock->static_friction;
+  asked_.dynamic_friction = stock->dynamic_friction;
   staticGiven_ = true;
+  return true;
 }
 
 Surface SurfaceSettings::resolve(const PassivityBound& bound, std::string& remark) const {
@@ -104,9 +106,14 @@ Surface SurfaceSettings::resolve(const PassivityBound& bound, std::string& remar
   return surface;
 }
 
-Surface surfaceFromStock(double stiffness, double damping, double staticFriction, double dynamicFriction,
-                         const SceneConfig& config, const Call& call, std::string_view name,
-                         std::int32_t id) {
+std::optional<Surface> surfaceFromStock(double stiffness, double damping, double staticFriction,
+                                        double dynamicFriction, const SceneConfig& config, const Call& call,
+                                        std::string_view name, std::int32_t id) {
+  for (const double value : {stiffness, damping, staticFriction, dynamicFriction}) {
+    if (isUsable(value)) continue;
+    call.refuse(name, "refused: not finite or too large, the old surface stays", " ", id, ", ", value);
+    return std::nullopt;
+  }
   const auto clamp = [&](double value, double max, std::string_view what) {
     return clampStock(value, max, config.raw, what, call, name, id);
   };

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -18,8 +19,8 @@ class SurfaceSettings {
  public:
   /// One property by its name; answers by notices. False when nothing changed.
   bool set(const SetSurfaceProperty& command, const SceneConfig& config, const Call& call);
-  /// All but popthrough and mass, in stock units.
-  void set(const SetSurface& command, const SceneConfig& config, const Call& call);
+  /// All but popthrough and mass, in stock units. False when refused.
+  bool set(const SetSurface& command, const SceneConfig& config, const Call& call);
 
   /// The surface within the passivity bound, friction in order; `remark` says what was lowered.
   Surface resolve(const PassivityBound& bound, std::string& remark) const;
@@ -29,9 +30,11 @@ class SurfaceSettings {
   bool staticGiven_ = false;  // dynamic friction alone is not yet a contradiction
 };
 
-/// Stock stiffness, damping and frictions in SI; clamped with warnings unless raw.
-Surface surfaceFromStock(double stiffness, double damping, double staticFriction, double dynamicFriction,
-                         const SceneConfig& config, const Call& call, std::string_view name, std::int32_t id);
+/// Stock stiffness, damping and frictions in SI; clamped with warnings unless raw. Refused when one is not a
+/// number.
+std::optional<Surface> surfaceFromStock(double stiffness, double damping, double staticFriction,
+                                        double dynamicFriction, const SceneConfig& config, const Call& call,
+                                        std::string_view name, std::int32_t id);
 
 /// Lowers damping, then stiffness, to the bound; appends what was done to `remark`.
 void keepPassive(Surface& surface, const PassivityBound& bound, std::string& remark);

@@ -298,7 +298,10 @@ TEST_F(RawSurfaces, HaveNoLimitsButStayNumbers) {
   EXPECT_DOUBLE_EQ(surface().damping_Ns_per_m, 100);
   EXPECT_DOUBLE_EQ(surface().static_friction, 2);
   EXPECT_TRUE(notices_.empty());
-  say(SetSurface{0, std::nan(""), INFINITY, -1, 0});
+  say(SetSurface{0, 1, INFINITY, 0, 0});
+  publish();
+  EXPECT_DOUBLE_EQ(surface().stiffness_N_per_m, 50'000);
+  say(SetSurface{0, -1, 0, 0, 0});
   publish();
   EXPECT_EQ(object(0), nullptr) << "no stiffness";
 }
