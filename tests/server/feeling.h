@@ -57,6 +57,12 @@ inline bool catchUp(ScriptedPeer& peer) {
   return answered;
 }
 
+/// Waits for this many more report periods.
+inline bool untilTicks(ScriptedPeer& peer, std::size_t ticks) {
+  const std::size_t before = peer.count<wire::IsTouching>();
+  return peer.until([&] { return peer.count<wire::IsTouching>() >= before + ticks; });
+}
+
 /// Waits until the scene has applied all that the peer sent so far: what comes after it is refused by name.
 inline bool untilApplied(ScriptedPeer& peer) {
   static std::int32_t effect = 1'000'000;
