@@ -29,11 +29,13 @@ class LogLines {
       return line.find(words) != std::string::npos;
     }));
   }
-  /// All of it, for a failure's message.
+  /// The end of it, for a failure's message.
   std::string text() const {
-    std::string all;
-    for (const std::string& line : sink_->lines()) all += line + '\n';
-    return all;
+    const std::vector<std::string> lines = sink_->lines();
+    std::string end;
+    for (std::size_t i = lines.size() > 20 ? lines.size() - 20 : 0; i < lines.size(); ++i)
+      end += lines[i] + '\n';
+    return end;
   }
 
  private:
