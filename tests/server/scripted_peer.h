@@ -47,6 +47,9 @@ class ScriptedPeer {
     }
     return true;
   }
+  bool untilCalledBack() {
+    return until([this] { return static_cast<bool>(connection_); });
+  }
   bool untilConnected() {
     return until([this] { return endpoint_ && endpoint_->connected(); });
   }
@@ -114,9 +117,14 @@ class ScriptedPeer {
   }
   template <wire::WireMessage M>
   std::size_t count() const {
-    const auto entry = counts_.find(wire::kindOf<M>);
+    return count(wire::kindOf<M>);
+  }
+  std::size_t count(wire::MessageKind kind) const {
+    const auto entry = counts_.find(kind);
     return entry == counts_.end() ? 0 : entry->second;
   }
+  /// All texts so far, from any sender.
+  const std::vector<wire::Text>& texts() const { return texts_; }
   /// The newest message of a kind, or the newest that fits.
   template <wire::WireMessage M>
   std::optional<M> last() const {
