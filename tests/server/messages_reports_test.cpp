@@ -58,6 +58,17 @@ TEST_F(WorkspaceMessages, ResetSceneBringsTheFirstWorkspaceBack) {
   EXPECT_TRUE(untilHandAt(peer_, kPlace_m));
 }
 
+// A datagram could overtake the names that it needs, and a hand at rest is reported only once.
+TEST_F(WorkspaceMessages, ALateClientIsToldByTcpWhereTheHandRests) {
+  ScriptedPeer late(server_.address(), "Phantom", ScriptedPeer::Mode::udp);
+  ASSERT_TRUE(untilHandAt(late, kPlace_m));
+  for (const auto& message : late.messages()) {
+    if (message.kind == wire::kindOf<wire::TrackerPosQuat>) {
+      EXPECT_FALSE(message.byDatagram);
+    }
+  }
+}
+
 class Reports : public testing::Test {
  protected:
   static constexpr double kTurn_deg = 30;
