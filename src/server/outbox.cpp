@@ -80,7 +80,9 @@ void Outbox::tellPresentState(Session& session, wire::LocalSender name, const Gr
   std::vector<Outgoing> messages;
   group.reporter.presentState(last_, frame_, messages);
   for (const Outgoing& out : messages) {
-    std::visit([&](const auto& message) { session.send(name, message); }, out.message);
+    // Not by datagram, which may overtake the names that it needs.
+    std::visit([&](const auto& message) { session.send(name, message, wire::Reliability::kReliable); },
+               out.message);
   }
   session.flush();
 }

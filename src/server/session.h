@@ -58,8 +58,8 @@ class Session {
 
   /// Queues one message; it leaves with the next flush().
   template <wire::WireMessage M>
-  void send(wire::LocalSender from, const M& message) {
-    endpoint_.send(clock_.now(), from, message);
+  void send(wire::LocalSender from, const M& message, wire::Reliability reliability = M::kInfo.reliability) {
+    endpoint_.send(clock_.now(), from, message, reliability);
   }
   /// Queues frames that are shared with other clients; dropped first when this client reads too slowly if
   /// lowLatency.
