@@ -3,17 +3,7 @@
 set -euo pipefail
 hapticd=$1
 source_dir=$2
-work=$(mktemp -d)
-"$hapticd" serve --listen 127.0.0.1:0 --allow-no-rt >"$work/log" 2>&1 &
-server=$!
-trap 'kill "$server" 2>/dev/null || true; rm -rf "$work"' EXIT
-address=""
-for _ in $(seq 300); do
-  address=$(sed -nE 's/.*listening on ([0-9.]+:[0-9]+).*/\1/p' "$work/log" | head -1)
-  [ -n "$address" ] && break
-  sleep 0.1
-done
-[ -n "$address" ] || { cat "$work/log"; exit 1; }
+. "$(dirname "$0")/server.sh"
 
 for name in "Phantom@tcp://$address" "Phantom@$address"; do
   "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --server "$name" --seconds 6 >"$work/out"

@@ -7,18 +7,7 @@ hapticd=$1
 example=$2
 source_dir=$3
 name=$(basename "$example")
-work=$(mktemp -d)
-: >"$work/log"  # there from the start, however late the server is
-"$hapticd" serve --listen 127.0.0.1:0 --allow-no-rt >"$work/log" 2>&1 &
-server=$!
-trap 'kill "$server" 2>/dev/null || true; rm -rf "$work"' EXIT
-address=""
-for _ in $(seq 300); do
-  address=$(sed -nE 's/.*listening on ([0-9.]+:[0-9]+).*/\1/p' "$work/log" | head -1)
-  [ -n "$address" ] && break
-  sleep 0.1
-done
-[ -n "$address" ] || { cat "$work/log"; exit 1; }
+. "$source_dir/tests/apps/server.sh"
 device="Phantom@$address"
 
 # The force in lines such as "touching  force  0.000  0.812  0.000 N", at least so many newtons of it.
