@@ -56,6 +56,15 @@ TEST_P(FrictionTest, reversal_sticks) {
   EXPECT_GT(last, 0);
 }
 
+// Thrown back within one tick to a stretch between both limits, the proxy sticks: its slide is over.
+TEST_P(FrictionTest, reversal_within_a_tick_sticks) {
+  add(plane(0.05, 10), surface(1000, 0.5, 0.3));
+  start({0.0003, 0.0002, 0.001});
+  to({0.0003, 0.0002, -0.001});
+  EXPECT_NEAR(to({0.0053, 0.0002, -0.001}).force_N.x(), -0.3, 1e-3);
+  EXPECT_NEAR(at({0.0046, 0.0002, -0.001}).force_N.x(), 0.4, 1e-3);
+}
+
 // T19    mu 0.6 | mu 0.1     two abutting plates; the seam is felt in the friction and nowhere else
 //      =========|=========
 TEST_P(FrictionTest, seam_between_objects_changes_friction_without_a_kick) {

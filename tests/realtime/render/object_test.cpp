@@ -52,6 +52,12 @@ TEST_P(ObjectTest, popthrough_waits_until_proxy_and_hand_agree) {
      [&](const Rendering& r) { pops += (r.status & kRenderPopthrough) != 0 ? 1 : 0; });
   EXPECT_EQ(pops, 1);
   EXPECT_NEAR(hand->now().force_N.z(), 2.5, 1e-3);
+  // They meet between the plates; from then on the lower one gives way, too.
+  to({0.0013, 0.0021, -0.0002}, 0.01);
+  to({0.0013, 0.0021, -0.003}, 0.01,
+     [&](const Rendering& r) { pops += (r.status & kRenderPopthrough) != 0 ? 1 : 0; });
+  EXPECT_EQ(pops, 2);
+  EXPECT_EQ(hand->now().force_N.norm(), 0);
 }
 
 // T17  shear and unequal scale in the transform: the forces of the same mesh sheared by hand
