@@ -102,6 +102,7 @@ TEST(Heartbeats, OnlyWhoBeganAndCeasedIsLost) {
 class HoldTest : public ::testing::Test {
  protected:
   HoldTest() {
+    last_.tick = 1;
     last_.T_world_device = Eigen::Translation3d(100, 0, 0) * Eigen::UniformScaling<double>(1000.0);
   }
   // Where the hand is after a second.
