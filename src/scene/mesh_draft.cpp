@@ -56,8 +56,8 @@ void MeshDraft::edited(Nanos now) {
 std::optional<Nanos> MeshDraft::due() const {
   if (!dirty_) return std::nullopt;
   if (finished_) return lastEdit_;
-  // Positions alone are a surface that moves: there is nothing incomplete to wait for.
-  if (!shapeChanged_) return firstEdit_ + kQuiet;
+  // Positions alone are a surface that moves: there is nothing incomplete to wait for but the rest of a frame.
+  if (!shapeChanged_) return std::min(lastEdit_ + kPause, firstEdit_ + kQuiet);
   return std::min(lastEdit_ + kQuiet, firstEdit_ + kLongest);
 }
 

@@ -41,6 +41,7 @@ class CopyOnWrite {
 /// and triangles that lack a corner are not felt.
 class MeshDraft {
  public:
+  static constexpr Nanos kPause = 4'000'000;      ///< after the last, new positions alone are felt
   static constexpr Nanos kQuiet = 20'000'000;     ///< after the last edit, a mesh becomes touchable
   static constexpr Nanos kLongest = 250'000'000;  ///< and at latest this long after the first
   static constexpr Nanos kLongestMorph = 50'000'000;

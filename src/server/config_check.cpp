@@ -134,12 +134,20 @@ void validate(const ServerConfig& config) {
   server.range("seconds", config.seconds, 0, 1e9);
   for (const std::string& host : config.callbackHosts) server.address("callback_hosts", host, "10.0.0.7");
   std::map<std::string, int> uses;
+  std::map<std::string, SceneOnDisconnect> scenes;
   for (std::size_t i = 0; i < config.devices.size(); ++i) {
     const DeviceConfig& device = config.devices[i];
     if (device.names.empty())
       throw InvalidValue(i, "names", "a device needs a name, e.g. name = \"Phantom\"");
     for (const std::string& name : device.names) checkName(i, name, uses);
-    checkDevice(Checker(i, device.names.front()), device);
+    const Checker check(i, device.names.front());
+    checkDevice(check, device);
+    if (device.scene.empty()) continue;
+    const auto shared = scenes.try_emplace(device.scene, device.sceneOnDisconnect).first;
+    if (shared->second != device.sceneOnDisconnect) {
+      check.fail("scene_on_disconnect",
+                 "the devices that share the scene '" + device.scene + "' disagree; it stays or goes for all");
+    }
   }
 }
 

@@ -51,7 +51,8 @@ bool DeviceControl::hold(scene::ClientId client, const wire::HoldHand& wanted,
   // Until the first tick has told, the workspace is the one that scenes begin with.
   const geometry::Affine T_world_device =
       last.tick == 0 ? scene::Workspace{}.T_world_device : last.T_world_device;
-  pose.position_m = T_world_device.inverse() * world;
+  pose.position_m =
+      (T_world_device.inverse() * world).cwiseMax(workspace_m_.min).cwiseMin(workspace_m_.max);
   pose.orientation = (Quat(rotationOf(last)).conjugate() * orientation).normalized();
   pose.buttons = wanted.buttons;
   holder_ = client;

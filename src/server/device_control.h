@@ -15,9 +15,10 @@ namespace hapticd::server {
 /// One device. Net thread; what it does acts at the next tick.
 class DeviceControl {
  public:
-  /// `simulated` is null for real devices. Both outlive this.
-  DeviceControl(realtime::GuardControl& guard, device::SimulatedDevice* simulated)
-      : guard_(guard), simulated_(simulated) {}
+  /// `simulated` is null for real devices. Both outlive this. The hand reaches as far as the workspace.
+  DeviceControl(realtime::GuardControl& guard, device::SimulatedDevice* simulated,
+                const geometry::Box& workspace_m)
+      : guard_(guard), simulated_(simulated), workspace_m_(workspace_m) {}
 
   void stopForces() { guard_.stop(); }
   void rearmForces() { guard_.rearm(); }
@@ -35,6 +36,7 @@ class DeviceControl {
 
   realtime::GuardControl& guard_;
   device::SimulatedDevice* simulated_;
+  geometry::Box workspace_m_;
   std::optional<scene::ClientId> holder_;
 };
 

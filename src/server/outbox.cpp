@@ -80,9 +80,7 @@ void Outbox::tellPresentState(Session& session, wire::LocalSender name, const Gr
   std::vector<Outgoing> messages;
   group.reporter.presentState(last_, frame_, messages);
   for (const Outgoing& out : messages) {
-    // Not by datagram, which may overtake the names that it needs.
-    std::visit([&](const auto& message) { session.send(name, message, wire::Reliability::kReliable); },
-               out.message);
+    std::visit([&](const auto& message) { session.sendReliably(name, message, lastTime_); }, out.message);
   }
   session.flush();
 }
@@ -90,6 +88,7 @@ void Outbox::tellPresentState(Session& session, wire::LocalSender name, const Gr
 void Outbox::add(const realtime::TickReport& tick, const ReportFrame& frame, wire::Time time) {
   const bool first = last_.tick == 0;
   last_ = tick;
+  lastTime_ = time;
   frame_ = frame;
   for (const auto& [key, weak] : groups_) {
     const std::shared_ptr<Group> group = weak.lock();

@@ -68,6 +68,7 @@ class Outbox {
   // Groups live as long as somebody is in them.
   std::map<std::pair<std::int32_t, ReportChoice>, std::weak_ptr<Group>> groups_;
   realtime::TickReport last_;
+  wire::Time lastTime_;
   ReportFrame frame_;
   std::vector<Outgoing> outgoing_;
 };

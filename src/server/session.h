@@ -58,8 +58,14 @@ class Session {
 
   /// Queues one message; it leaves with the next flush().
   template <wire::WireMessage M>
-  void send(wire::LocalSender from, const M& message, wire::Reliability reliability = M::kInfo.reliability) {
-    endpoint_.send(clock_.now(), from, message, reliability);
+  void send(wire::LocalSender from, const M& message) {
+    endpoint_.send(clock_.now(), from, message);
+  }
+  /// The same with the time of what it tells, and by TCP whatever its kind: datagrams may overtake the names
+  /// that they need.
+  template <wire::WireMessage M>
+  void sendReliably(wire::LocalSender from, const M& message, wire::Time time) {
+    endpoint_.send(time, from, message, wire::Reliability::kReliable);
   }
   /// Queues frames that are shared with other clients; dropped first when this client reads too slowly if
   /// lowLatency.

@@ -62,7 +62,7 @@ Station::Impl::Impl(const DeviceConfig& config_, std::vector<wire::LocalSender> 
       tick(*device, clock, tickOptions(config, device->profile())),
       servo([this](const realtime::Pacing& pacing) { tick(pacing); }, clock,
             {.rate_Hz = config.servoRate_Hz, .request = {}, .requireRealtime = !allowNoRealtime}),
-      control(tick.control(), simulated),
+      control(tick.control(), simulated, workspaceOf(config, device->profile())),
       roles(config.control, config.controlList),
       modes(device->profile().buttons),
       outbox(config, device->profile().buttons, names),

@@ -300,11 +300,30 @@ TEST_F(Deforming, PositionsAloneKeepTrianglesAndTravelWithoutAStep) {
 
 TEST_F(Deforming, LoneDeformationTakesFiftyMilliseconds) {
   say(SetVertices{0, 0, soup(50, 1)});
-  run(20 * kMillisecond);
+  run(MeshDraft::kPause);
   const MeshGeometry& mesh = *object(0)->mesh;
   EXPECT_EQ(mesh.morphEnd - mesh.morphBegin, 50 * kMillisecond);
   wait(25 * kMillisecond);
   EXPECT_NEAR(vertex(0).z(), 0.5, 1e-6);
+}
+
+// Two halves of a frame 2 ms apart, frames at 60 Hz: each is felt whole, before the next one comes.
+TEST_F(Deforming, FramesOfAStreamAreFeltOneByOneAndWhole) {
+  for (int frame = 1; frame < 30; ++frame) {
+    const auto z = static_cast<float>(frame);
+    auto corners = soup(50, z);
+    const auto half = static_cast<std::ptrdiff_t>(corners.size() / 2);
+    say(SetVertices{0, 0, {corners.begin(), corners.begin() + half}});
+    wait(2 * kMillisecond);
+    EXPECT_FALSE(publish()) << "half a frame";
+    say(SetVertices{0, static_cast<std::int32_t>(half), {corners.begin() + half, corners.end()}});
+    wait(MeshDraft::kPause);
+    ASSERT_TRUE(publish()) << frame;
+    const MeshGeometry& mesh = *object(0)->mesh;
+    EXPECT_NEAR(mesh.vertex(0, mesh.morphEnd).z(), z, 1e-6);
+    EXPECT_NEAR(mesh.vertex(149, mesh.morphEnd).z(), z, 1e-6);
+    wait(10 * kMillisecond);
+  }
 }
 
 TEST_F(Deforming, NewVerticesAreANewShapeAtOnce) {

@@ -146,6 +146,13 @@ TEST(Config, WhoMayCommandIsSaidInFull) {
             "test.toml:2: 'control' is 'nobody', expected \"any\" or \"first\" or \"list\"");
 }
 
+TEST(Config, DevicesThatShareASceneAgreeWhenItGoes) {
+  const std::string text = errorOf(
+      "[[device]]\nname=\"A\"\nscene=\"table\"\n[[device]]\nname=\"B\"\nscene=\"table\"\nscene_on_disconnect=\"clear\"");
+  EXPECT_EQ(text,
+            "test.toml:7: device 'B': the devices that share the scene 'table' disagree; it stays or goes for all");
+}
+
 // Everything differs from its default, so that a key that is not written or not read shows.
 ServerConfig unusual() {
   ServerConfig config;

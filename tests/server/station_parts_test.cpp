@@ -117,7 +117,7 @@ class HoldTest : public ::testing::Test {
 
   device::SimulatedDevice hand_;
   realtime::GuardControl guard_{true};
-  DeviceControl control_{guard_, &hand_};
+  DeviceControl control_{guard_, &hand_, hand_.profile().workspace_m};
   realtime::TickReport last_;
   geometry::Nanos now_ = 0;
   std::string error_;
@@ -137,11 +137,17 @@ TEST_F(HoldTest, TheHandGoesWhereItsHolderWantsAndBackWhenLetGo) {
   EXPECT_NEAR((handLater() - Vec3(0, 0, 0.01)).norm(), 0, 1e-4);
 }
 
+TEST_F(HoldTest, NoHandReachesBeyondItsArm) {
+  hand_.open();
+  ASSERT_TRUE(control_.hold(1, {.hold = 1, .position = {100, 20000, 0}}, last_, error_));
+  EXPECT_NEAR((handLater() - Vec3(0, hand_.profile().workspace_m.max.y(), 0)).norm(), 0, 1e-4);
+}
+
 TEST_F(HoldTest, RefusesWhatIsNoPoseAndRealDevices) {
   EXPECT_FALSE(control_.hold(1, {.hold = 1, .position = {NAN, 0, 0}}, last_, error_));
   EXPECT_FALSE(control_.hold(1, {.hold = 1, .orientation = {0, 0, 0, 0}}, last_, error_));
   EXPECT_NE(error_.find("zero quaternion"), std::string::npos);
-  DeviceControl real(guard_, nullptr);
+  DeviceControl real(guard_, nullptr, {});
   EXPECT_FALSE(real.canBeHeld());
   EXPECT_FALSE(real.hold(1, {.hold = 1}, last_, error_));
   EXPECT_NE(error_.find("real device"), std::string::npos);

@@ -6,6 +6,22 @@
 #include "realtime/render/release.h"
 
 namespace hapticd::realtime {
+namespace {
+
+constexpr double kLargest_N = 10;  // as VRPN's own server clamps
+constexpr double kRim = 0.1;       // of the radius, over which a field fades: its edge is no step
+
+Vec3 forceOf(const scene::ForceField& field, const Vec3& x) noexcept {
+  const Vec3 way = x - field.origin;
+  const double distance = way.norm();
+  if (!(distance < field.radius)) return Vec3::Zero();
+  const Vec3 force = field.force_N + field.jacobian_N_per_unit * way;
+  const double clamp = std::min(1.0, kLargest_N / std::max(force.norm(), 1e-300));
+  const double fade = std::min(1.0, (field.radius - distance) / (kRim * field.radius));
+  return clamp * fade * force;
+}
+
+}  // namespace
 
 // Fields have no number: one that ramps out is known by its origin.
 double Fields::left(const scene::ForceField& field, Nanos now) noexcept {
@@ -39,9 +55,7 @@ Vec3 Fields::force(const scene::SceneSnapshot& scene, const Vec3& hip, Nanos now
   const Vec3 x = scene.workspace.T_world_device * hip;
   Vec3 sum = Vec3::Zero();  // world frame
   for (const scene::ForceField& field : scene.fields) {
-    const Vec3 way = x - field.origin;
-    const double share = left(field, now);
-    if (way.norm() <= field.radius) sum += share * (field.force_N + field.jacobian_N_per_unit * way);
+    sum += left(field, now) * forceOf(field, x);
   }
   const auto end = std::remove_if(releasing_.begin(), releasing_.begin() + releasingCount_,
                                   [](const Releasing& r) { return !r.seen; });

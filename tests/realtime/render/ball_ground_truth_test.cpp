@@ -89,6 +89,37 @@ TEST_P(BallGroundTruth, sliding_plate_carries_the_proxy_until_it_slips) {
   }
 }
 
+// T9c  poses at 60 Hz, each the goal of the motion since the one before: no 60 Hz steps
+TEST_P(BallGroundTruth, interpolated_pose_stream_has_no_steps) {
+  scene::ObjectState& object = add(plane(0.05, 20), surface());
+  const auto height = [](double t) { return 0.002 * std::sin(M_PI * std::max(0.0, t)); };
+  const Affine home = object.motion.destination();
+  const auto pose = [&](double t) {
+    Affine p = home;
+    p.pretranslate(units() * Vec3(0, 0, height(t)));
+    return p;
+  };
+  start({0.001, 0.002, 0.002}, kBall);
+  to({0.001, 0.002, -0.002});
+  constexpr double kInterval_s = 1.0 / 60;
+  const double begin = geometry::toSeconds(hand->time());
+  double next = begin;
+  double before_N = hand->now().force_N.z();
+  for (int i = 0; i < 1000; ++i) {
+    const double t = geometry::toSeconds(hand->time());
+    if (t >= next) {
+      object.motion = scene::Motion::between(pose(next - begin - kInterval_s), pose(next - begin),
+                                             toNanos(next), toNanos(next + kInterval_s));
+      hand->show(scene.snapshot());
+      next += kInterval_s;
+    }
+    const double felt_N = at({0.001, 0.002, -0.002}).force_N.z();
+    EXPECT_NEAR(felt_N, 1000 * (0.003 + height(t - begin - kInterval_s)), 0.05);
+    EXPECT_LE(std::abs(felt_N - before_N), 1000 * 0.002 * M_PI * 1e-3 + 1e-3);
+    before_N = felt_N;
+  }
+}
+
 // T9d  the vertices under the hand rise by 1 mm in 100 ms
 TEST_P(BallGroundTruth, deforming_surface_is_felt_like_a_moving_one) {
   TriangleMesh mesh = jittered(0.02, 60);

@@ -224,6 +224,25 @@ TEST_P(FreeForcesTest, field_varies_from_its_origin_within_its_radius) {
   }
 }
 
+//  |F| ________
+//              \        full up to 90 % of the radius, then a straight line to nothing
+//  ____________|\____ r
+TEST_P(FreeForcesTest, field_fades_at_its_rim_and_stays_below_ten_newtons) {
+  scene::ForceField field;
+  field.origin = units() * offset();
+  field.force_N = Vec3(0, 0, 2);
+  field.radius = units() * 0.01;
+  scene.fields = {field};
+  start({0.0089, 0, 0});
+  EXPECT_NEAR(hand->now().force_N.z(), 2, 1e-9);
+  EXPECT_NEAR(at({0.0095, 0, 0}).force_N.z(), 1, 1e-6);
+  EXPECT_NEAR(at({0, 0.0099, 0}).force_N.z(), 0.2, 1e-6);
+  EXPECT_NEAR(at({0, 0.00999999, 0}).force_N.z(), 0, 1e-5);
+  scene.fields[0].force_N = Vec3(0, 30, 40);
+  hand->show(scene.snapshot());
+  EXPECT_NEAR((at({0, 0, 0}).force_N - Vec3(0, 6, 8)).norm(), 0, 1e-9);
+}
+
 TEST_P(FreeForcesTest, buzz_runs_for_its_duration) {
   scene::Buzz buzz;
   buzz.force_N = Vec3(0, 1, 0);
