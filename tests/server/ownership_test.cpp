@@ -271,13 +271,14 @@ TEST_F(SceneOwnership, ClearTakesTheSceneWithTheLastThatCommanded) {
 // A client killed by the system, beside one that lives on.
 class Killed : public testing::Test {
  protected:
-  // Pushes with effect 0 and uploads a cube, and then only listens.
+  // Pushes with an effect of its own and uploads a cube, and then only listens.
   static void live(const net::Endpoint& server, ScriptedPeer::Mode mode) {
     ScriptedPeer peer(server, "Phantom", mode);
     if (!peer.untilConnected()) return;
     sendCube(peer, 0);
-    peer.send(push(0, kPush_N));
-    peer.send(wire::StartEffect{0});
+    const bool tcp = mode == ScriptedPeer::Mode::tcp;
+    peer.send(tcp ? push(0, {1, 0, 0}) : push(2, {0, 0.5, 0}));
+    peer.send(wire::StartEffect{tcp ? 0 : 2});
     peer.until([] { return false; }, std::chrono::seconds(300));
   }
   void SetUp() override {
@@ -286,7 +287,7 @@ class Killed : public testing::Test {
     survivor_.send(wire::StartEffect{1});
     ASSERT_TRUE(untilForce(survivor_, {0, 0, 0.7}));
     for (ChildClient* child : {&tcp_, &udp_}) child->connectTo(server_.address());
-    ASSERT_TRUE(untilForce(survivor_, {1, 0, 0.7}));
+    ASSERT_TRUE(untilForce(survivor_, {1, 0.5, 0.7}));
   }
   // Whether only what the killed ones owned has gone.
   bool onlyTheSurvivorsIsLeft() { return untilForce(survivor_, {0, 0, 0.7}, 2e-3) && survivor_.open(); }
@@ -324,7 +325,7 @@ TEST_F(Killed, ASuspendedOneKeepsWhatItOwnsUntilItDies) {
   udp_.suspend();
   ASSERT_TRUE(catchUp(survivor_));
   ASSERT_TRUE(untilTicks(survivor_, 1500));
-  EXPECT_TRUE(untilForce(survivor_, {1, 0, 0.7}));
+  EXPECT_TRUE(untilForce(survivor_, {0, 0.5, 0.7}, 2e-3));
   udp_.kill();
   EXPECT_TRUE(onlyTheSurvivorsIsLeft());
 }

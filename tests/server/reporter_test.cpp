@@ -100,7 +100,8 @@ TEST_F(ReporterTest, OrientationAndTurningAreOfTheWorld) {
   tick_.device.angularVelocity_rad_per_s = Vec3(M_PI, 0, 0);
   step();
   // First about the stylus's x, then with the device about z: (1 + k)(1 + i) / 2 = (1 + i + j + k) / 2.
-  for (const double q : said<wire::TrackerPosQuat>().at(0).orientation) EXPECT_NEAR(q, 0.5, 1e-12);
+  const auto pose = said<wire::TrackerPosQuat>().at(0);
+  for (const double q : pose.orientation) EXPECT_NEAR(q, 0.5, 1e-12);
   const auto velocity = said<wire::TrackerVelocity>().at(0);
   EXPECT_NEAR(velocity.velocity[1], 0.2, 1e-12);
   const double half = 0.5 * M_PI * velocity.interval;
