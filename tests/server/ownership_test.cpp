@@ -87,8 +87,8 @@ class Ownership : public testing::Test {
   bool stays(const Vec3& force_N) {
     watcher_.send(wire::Ping{});
     if (!watcher_.untilNext<wire::Pong>() || !untilTicks(watcher_, 400)) return false;
-    const wire::F64x3 last = watcher_.last<wire::Force>()->force;
-    return norm({last[0] - force_N.x(), last[1] - force_N.y(), last[2] - force_N.z()}) < 0.25;
+    // What has ramped out stays away; what a late tick took comes back.
+    return untilForce(watcher_, force_N, 0.25);
   }
   // Whether the watcher has felt the force fall little by little.
   bool rampedOut() {
