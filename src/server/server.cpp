@@ -236,6 +236,8 @@ void Server::onSubscribed(Session& session, wire::LocalSender name) {
 }
 
 void Server::onMessage(Session& session, const wire::MessageReceived& message) {
+  // What we do not know is for somebody else, as on any VRPN connection.
+  if (message.kind == wire::kUnknownKind) return;
   Station* station = stationOf(message.local_sender);
   if (station == nullptr || !mayCommand(session, *station, message)) return;
   if (message.kind == wire::kindOf<wire::Heartbeat>) {

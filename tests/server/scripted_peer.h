@@ -87,6 +87,11 @@ class ScriptedPeer {
     endpoint_->sendRaw({1, 2}, device_, wire::localType(kind), payload, wire::Reliability::kReliable);
     flush();
   }
+  /// A message of a type that is not in the table.
+  void sendForeign(const std::string& type, const std::vector<std::byte>& payload) {
+    endpoint_->sendRaw({1, 2}, device_, names_.addType(type), payload, wire::Reliability::kReliable);
+    flush();
+  }
   /// Bytes as they are, whatever they are.
   void sendBytes(wire::ByteView bytes) {
     connection_.send(bytes);

@@ -386,5 +386,19 @@ TEST(Server, APortInUseIsSaidPlainly) {
   }
 }
 
+// VRPN's own vrpn_ping says "Server, are you there?", a name from before the ping message.
+TEST(Server, MessagesOfOtherTypesAreNobodysBusiness) {
+  RunningServer server;
+  for (const auto mode : {ScriptedPeer::Mode::tcp, ScriptedPeer::Mode::udp}) {
+    ScriptedPeer peer(server.address(), "Phantom", mode);
+    ASSERT_TRUE(peer.untilConnected());
+    peer.sendForeign("Server, are you there?", {});
+    peer.sendForeign("vrpn_Dial update", std::vector<std::byte>(16));
+    peer.send(wire::Ping{});
+    EXPECT_TRUE(peer.untilNext<wire::Pong>());
+    EXPECT_TRUE(peer.open());
+  }
+}
+
 }  // namespace
 }  // namespace hapticd::test
