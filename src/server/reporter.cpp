@@ -162,7 +162,9 @@ void Reporter::tracker(const View& view, const ReportFrame& frame, std::vector<O
 
 void Reporter::contact(const View& view, std::vector<Outgoing>& out) {
   const std::size_t before = out.size();
-  if ((view.force_N - force_N_).norm() > kForceStep_N) {
+  // Nothing is said to be nothing, however small the rest before.
+  const bool ended = view.force_N.isZero(0) && !force_N_.isZero(0);
+  if (ended || (view.force_N - force_N_).norm() > kForceStep_N) {
     force_N_ = view.force_N;
     out.push_back({wire::Force{array(view.force_N)}, false});
   }

@@ -159,6 +159,21 @@ TEST_F(ReporterTest, ContactIsSaidOnChange) {
   EXPECT_EQ(said<wire::Dop>().size(), 1U);
 }
 
+TEST_F(ReporterTest, AForceThatEndsIsSaidToBeNothing) {
+  tick_.force_N = Vec3(0.0015, 0, 0);
+  step();
+  EXPECT_EQ(said<wire::Force>().size(), 1U);
+  tick_.force_N = Vec3(0.0007, 0, 0);
+  step();
+  EXPECT_TRUE(said<wire::Force>().empty());
+  tick_.force_N = Vec3::Zero();
+  step();
+  ASSERT_EQ(said<wire::Force>().size(), 1U);
+  EXPECT_EQ(said<wire::Force>()[0].force, (wire::F64x3{0, 0, 0}));
+  step();
+  EXPECT_TRUE(said<wire::Force>().empty());
+}
+
 TEST_F(ReporterTest, TheEndOfAContactIsReliableAndComplete) {
   config_.reportRate_Hz = 10;
   touch();
