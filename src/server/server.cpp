@@ -298,11 +298,11 @@ void Server::onBatchEnd(Session& session) {
 
 void Server::onServoWake(Station& station) {
   net::drainEventFd(station.wakeFd());
-  if (!station.collectReports(clock_)) return;
-  for (const auto& [id, session] : sessions_) {
-    station.sendReports(*session);
-    session->flush();
-  }
+  const bool any = station.collectReports(clock_, [this, &station] {
+    for (const auto& [id, session] : sessions_) station.sendReports(*session);
+  });
+  if (!any) return;
+  for (const auto& [id, session] : sessions_) session->flush();
 }
 
 wire::LocalSender Server::nameFor(const Session& session, const SceneHost& scene) const noexcept {

@@ -183,8 +183,9 @@ int Station::wakeFd() const noexcept {
   return impl_->tick.wake().descriptor();
 }
 
-bool Station::collectReports(const WallClock& clock) {
+bool Station::collectReports(const WallClock& clock, const std::function<void()>& onTick) {
   Impl& my = *impl_;
+  bool any = false;
   my.tick.reports().consume([&](const realtime::TickReport& report) {
     my.droppedReports = report.dropped;
     my.frame.buttons = my.modes.apply(report.device.buttons, my.alerts);
@@ -192,8 +193,11 @@ bool Station::collectReports(const WallClock& clock) {
     my.outbox.add(report, my.frame, time);
     for (const wire::ButtonAlert& alert : my.alerts) my.outbox.add(wire::Message(alert), time);
     my.alerts.clear();
+    if (!my.outbox.collect()) return;
+    any = true;
+    onTick();
   });
-  return my.outbox.collect();
+  return any;
 }
 
 void Station::sendReports(Session& session) {

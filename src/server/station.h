@@ -1,6 +1,7 @@
 // A station: one haptic device with its servo, its names, and what clients hear of it.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -50,9 +51,9 @@ class Station {
 
   /// Readable when reports wait.
   int wakeFd() const noexcept;
-  /// Encodes, once for all clients who chose alike, what the servo has reported; false when there was nothing
-  /// to say.
-  bool collectReports(const WallClock& clock);
+  /// Encodes, once for all clients who chose alike, what the servo has reported, and calls onTick() after each
+  /// tick that says something, so that ticks leave in their order. False when there was none.
+  bool collectReports(const WallClock& clock, const std::function<void()>& onTick);
   /// Queues what collectReports() encoded.
   void sendReports(Session& session);
 
