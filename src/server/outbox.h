@@ -36,7 +36,6 @@ class Outbox {
   void send(Session& session);
 
   const realtime::TickReport& last() const noexcept { return last_; }
-  const ReportFrame& frame() const noexcept { return frame_; }
 
  private:
   // All clients with one choice, under one name.

@@ -154,10 +154,6 @@ SceneHost& Station::scene() noexcept {
   return impl_->scene;
 }
 
-const std::vector<wire::LocalSender>& Station::names() const noexcept {
-  return impl_->names;
-}
-
 bool Station::has(wire::LocalSender name) const noexcept {
   return std::find(impl_->names.begin(), impl_->names.end(), name) != impl_->names.end();
 }

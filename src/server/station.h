@@ -34,7 +34,6 @@ class Station {
   void checkBlackBox();
 
   SceneHost& scene() noexcept;
-  const std::vector<wire::LocalSender>& names() const noexcept;
   bool has(wire::LocalSender name) const noexcept;
   /// The name under which this client knows the device.
   wire::LocalSender nameFor(const Session& session) const noexcept;

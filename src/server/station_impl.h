@@ -19,7 +19,6 @@ struct Station::Impl {
   void onPublished(const scene::SceneSnapshot& snapshot);
   void choose(Session& session, wire::LocalSender name, ReportChoice choice, double rate_Hz,
               std::string_view call);
-  void resetOrigin();
 
   // One message each; text for what is refused.
   void on(Session& session, wire::LocalSender name, const wire::Ping&);

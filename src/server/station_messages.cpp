@@ -36,7 +36,7 @@ void Station::onMessage(Session& session, const wire::MessageReceived& message) 
 void Station::Impl::on(Session& session, wire::LocalSender name, const wire::Ping&) {
   const realtime::TickReport& last = outbox.last();
   session.send(name, wire::Pong{});
-  session.send(name, Reporter::buttonStates(device->profile().buttons, outbox.frame().buttons,
+  session.send(name, Reporter::buttonStates(device->profile().buttons, frame.buttons,
                                             last.rendering.touching));
 }
 
@@ -82,14 +82,10 @@ void Station::Impl::choose(Session& session, wire::LocalSender name, ReportChoic
 }
 
 // From now on the tracker's poses count from where the proxy is.
-void Station::Impl::resetOrigin() {
+void Station::Impl::on(Session&, wire::LocalSender, const wire::TrackerResetOrigin&) {
   const View view = viewOf(outbox.last(), config.forceReport);
   frame.origin = view.proxy;
   frame.turn = view.orientation;
-}
-
-void Station::Impl::on(Session&, wire::LocalSender, const wire::TrackerResetOrigin&) {
-  resetOrigin();
 }
 
 void Station::Impl::on(Session& session, wire::LocalSender name, const wire::ButtonAdmin& admin) {

@@ -1,6 +1,7 @@
 # For tests in shell: a server with the simulated hand, on a port of its own, until the test ends. Source it with
-# $hapticd set. Gives $work (a directory that goes with the test), $server (the process) and $address.
-work=$(mktemp -d)
+# $hapticd set. Gives $work (a directory that goes with the test, its own if it has one), $server (the process) and
+# $address.
+work=${work:-$(mktemp -d)}
 : >"$work/log" # there from the start, however late the server is
 "$hapticd" serve --listen 127.0.0.1:0 --allow-no-rt >"$work/log" 2>&1 &
 server=$!

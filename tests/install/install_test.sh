@@ -8,8 +8,7 @@ source_dir=$3
 compiler=$4
 version=$5
 work=$(mktemp -d)
-server=""
-trap '[ -z "$server" ] || kill "$server" 2>/dev/null || true; rm -rf "$work"' EXIT
+trap 'rm -rf "$work"' EXIT
 
 "$cmake" --install "$build_dir" --prefix "$work/installed" >"$work/install.log" || { cat "$work/install.log"; exit 1; }
 mv "$work/installed" "$work/moved"
@@ -28,16 +27,8 @@ export PKG_CONFIG_PATH=$(echo "$prefix"/lib*/pkgconfig)
 # shellcheck disable=SC2046
 "$compiler" -std=c++20 "$source_dir/tests/install/user/reads_force.cpp" $(pkg-config --cflags --libs hapticd) -o "$work/by_pkg_config"
 
-: >"$work/log"
-"$prefix/bin/hapticd" serve --listen 127.0.0.1:0 --allow-no-rt >"$work/log" 2>&1 &
-server=$!
-address=""
-for _ in $(seq 300); do
-  address=$(sed -nE 's/.*listening on ([0-9.]+:[0-9]+).*/\1/p' "$work/log" | head -1)
-  [ -n "$address" ] && break
-  sleep 0.1
-done
-[ -n "$address" ] || { cat "$work/log"; exit 1; }
+hapticd=$prefix/bin/hapticd
+. "$source_dir/tests/apps/server.sh"
 for program in "$work/user/reads_force" "$work/by_pkg_config"; do
   timeout 60 "$program" "Phantom@$address" | tee "$work/out"
   grep -q '^felt object 0$' "$work/out"
