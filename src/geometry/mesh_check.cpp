@@ -167,7 +167,7 @@ std::vector<std::string> describe(const MeshReport& report) {
   };
   say(report.incomplete, "triangle lacks a corner", "triangles lack a corner", "not felt.");
   say(report.degenerate, "triangle has no area", "triangles have no area",
-      "felt only through their neighbours.");
+      "felt only through what lies around.");
   say(report.duplicate, "triangle repeats an earlier one", "triangles repeat earlier ones", "felt once.");
   say(report.unwelded, "vertex lies on an earlier one", "vertices lie on earlier ones", "felt as one point.");
   say(report.openEdges, "edge has a triangle on one side only", "edges have a triangle on one side only",
