@@ -38,8 +38,18 @@ DevicePtr forceDimension(const DeviceConfig& config) {
 }
 
 DevicePtr haply(const DeviceConfig& config) {
+  // [HOST:PORT/]ID, each part alone, too.
   device::HaplyOptions options;
-  options.deviceId = config.hardware;
+  const std::size_t slash = config.hardware.find('/');
+  const std::string place = config.hardware.substr(0, slash);
+  const std::size_t colon = place.rfind(':');
+  if (colon != std::string::npos) {
+    options.host = place.substr(0, colon);
+    options.port = place.substr(colon + 1);
+    options.deviceId = slash == std::string::npos ? "" : config.hardware.substr(slash + 1);
+  } else {
+    options.deviceId = config.hardware;
+  }
   return std::make_unique<device::HaplyDevice>(options);
 }
 

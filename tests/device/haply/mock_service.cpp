@@ -38,6 +38,7 @@ struct MockService::Impl {
   bool noDevice = false;
   std::string permutation = "XYZ";
   Json status{{"calibrated", true}, {"ready", true}, {"power_supply", true}};
+  mock::Arm shared;
   std::thread thread;
 
   static Json vector(const Vec3& v) { return {{"x", v.x()}, {"y", v.y()}, {"z", v.z()}}; }
@@ -59,12 +60,26 @@ struct MockService::Impl {
         .dump();
   }
 
+  // Right, away from the user, up.
+  void obeyShared() {
+    const std::lock_guard lock(mutex);
+    if (!shared) return;
+    const double* place = shared.begin();
+    position = Vec3(place[0], -place[2], place[1]);
+    velocity.setZero();
+    status["calibrated"] = shared.fault() != mock::kNotCalibrated;
+    status["ready"] = shared.fault() != mock::kForceExceeded;
+  }
+
   void obey(const std::string& text) {
     const Json values =
         Json::parse(text).at("inverse3").at(0).at("commands").at("set_cursor_force").at("values");
     const std::lock_guard lock(mutex);
     force = Vec3(values.at("x").get<double>(), values.at("y").get<double>(), values.at("z").get<double>());
     ++messages;
+    if (!shared) return;
+    const double ours[3] = {force.x(), force.z(), -force.y()};
+    shared.end(ours, shared.place(), shared.fault());
   }
 
   void serve(asio::ip::tcp::socket socket) {
@@ -78,11 +93,13 @@ struct MockService::Impl {
       stream.next_layer().set_option(asio::ip::tcp::no_delay(true));
       stream.accept();
       stream.text(true);
+      obeyShared();
       stream.write(asio::buffer(stateMessage(true)));
       for (;;) {
         beast::flat_buffer buffer;
         stream.read(buffer);
         obey(beast::buffers_to_string(buffer.cdata()));
+        obeyShared();
         if (!muted) stream.write(asio::buffer(stateMessage(false)));
       }
     } catch (const std::exception&) {
@@ -91,6 +108,7 @@ struct MockService::Impl {
     const std::lock_guard lock(mutex);
     open = -1;
     force.setZero();
+    shared.switchOff();
   }
 
   void run() {
@@ -167,6 +185,10 @@ void MockService::hangUp() {
 }
 void MockService::refuse(bool yes) {
   impl_->refusing = yes;
+}
+void MockService::follow(mock::ArmBlock& block) {
+  const std::lock_guard lock(impl_->mutex);
+  impl_->shared = mock::Arm(&block);
 }
 
 }  // namespace hapticd::device

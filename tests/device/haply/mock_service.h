@@ -6,6 +6,7 @@
 #include <string>
 
 #include "geometry/types.h"
+#include "mocks/arm_block.h"
 
 namespace hapticd::device {
 
@@ -39,6 +40,9 @@ class MockService {
   void hangUp();
   /// Closes every connection at once after accepting it.
   void refuse(bool yes);
+  /// From the next connection on the hand goes where the block says, one place with each message, and each
+  /// force is logged there with the place that the message before had told.
+  void follow(mock::ArmBlock& block);
 
  private:
   struct Impl;

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -10,6 +11,7 @@
 #include <string>
 #include <thread>
 
+#include "mocks/arm_block.h"
 #include "mocks/dhd/mock_dhd_control.h"
 
 #define EXPORT extern "C" __attribute__((visibility("default")))
@@ -39,6 +41,8 @@ struct Mock {
   int watchdog = 0;
   double sinceCommand = 0;
   double maxForce = -1;
+  hapticd::mock::Arm shared = hapticd::mock::Arm::ofEnvironment();
+  int fault = hapticd::mock::kHealthy;
 };
 
 Mock& mock() {
@@ -62,6 +66,45 @@ Mock& device(char id) {
   return mock();
 }
 
+constexpr double kSharedTick_s = 0.001;  // the loop of the test runs at 1 kHz
+
+// The device's own clock: its watchdog, whatever the program does.
+void elapse(Mock& m, double seconds) {
+  m.sinceCommand += seconds;
+  if (m.watchdog > 0 && m.sinceCommand > m.watchdog * 125e-6) m.amplifiers = false;
+}
+
+// A tick begins with the first reading; what the test in another process wants in it.
+void obeyShared(Mock& m) {
+  using namespace hapticd::mock;
+  if (!m.shared) return;
+  const double* place = m.shared.begin();
+  // To the user, right, up.
+  m.position[0] = place[2], m.position[1] = place[0], m.position[2] = place[1];
+  const int fault = m.shared.fault();
+  const bool begins = fault != m.fault;
+  m.fault = fault;
+  elapse(m, kSharedTick_s);
+  m.failReads = fault == kUnplugged ? -1 : 0;
+  if (begins) m.calibrated = fault != kNotCalibrated;
+  if (begins && fault == kForceExceeded) m.amplifiers = false;
+  if (fault == kLibraryCrashes) std::raise(SIGSEGV);
+  while (m.shared.fault() == kLibraryHangs) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+}
+
+void tellShared(Mock& m, bool tickEnds) {
+  if (!m.shared) return;
+  const double on = m.amplifiers ? 1 : 0;
+  const double force[3] = {on * m.force[1], on * m.force[2], on * m.force[0]};
+  m.shared->amplifiers = m.amplifiers ? 1 : 0;
+  m.shared->watchdog_us = 125 * m.watchdog;
+  if (tickEnds) {
+    m.shared.end(force, m.shared.place(), m.fault);
+  } else {
+    m.shared.leave(force);
+  }
+}
+
 int reading(Mock& m) {
   if (m.failReads == 0) return 0;
   if (m.failReads > 0) --m.failReads;
@@ -78,7 +121,8 @@ EXPORT int dhdGetDeviceCount() {
 EXPORT int dhdOpenID(char index) {
   const Lock lock(mock().mutex);
   if (mock().open) crash("opened twice");
-  if (index >= mock().devices) return -1;
+  if (index >= mock().devices || mock().shared.fault() == hapticd::mock::kDoesNotOpen) return -1;
+  if (mock().shared) ++mock().shared->opened;
   mock().open = true;
   return 0;
 }
@@ -87,6 +131,7 @@ EXPORT int dhdClose(char id) {
   const Lock lock(mock().mutex);
   Mock& m = device(id);
   if (m.amplifiers) crash("closed with the amplifiers on");
+  if (m.shared) ++m.shared->closed;
   m.open = false;
   return 0;
 }
@@ -115,6 +160,7 @@ EXPORT int dhdGetStatus(int* out, char id) {
 EXPORT int dhdGetPosition(double* x, double* y, double* z, char id) {
   const Lock lock(mock().mutex);
   Mock& m = device(id);
+  obeyShared(m);
   *x = m.position[0], *y = m.position[1], *z = m.position[2];
   return reading(m);
 }
@@ -156,9 +202,10 @@ EXPORT int dhdSetForceAndTorqueAndGripperForce(double fx, double fy, double fz, 
   if (!std::isfinite(fx + fy + fz)) crash("a force that is not a number");
   if (tx != 0 || ty != 0 || tz != 0 || grip != 0) crash("a torque that nobody asked for");
   if (!m.calibrated && (fx != 0 || fy != 0 || fz != 0)) crash("a force without calibration");
-  m.force[0] = fx, m.force[1] = fy, m.force[2] = fz;
-  m.sinceCommand = 0;
-  return 0;
+  const bool arrives = m.fault != hapticd::mock::kUnplugged;
+  if (arrives) m.force[0] = fx, m.force[1] = fy, m.force[2] = fz, m.sinceCommand = 0;
+  tellShared(m, true);
+  return arrives ? 0 : -1;
 }
 
 EXPORT int dhdEnableForce(unsigned char on, char id) {
@@ -167,6 +214,7 @@ EXPORT int dhdEnableForce(unsigned char on, char id) {
   if (on != 0 && m.gravity < 0) crash("amplifiers on before gravity compensation was chosen");
   m.amplifiers = on != 0;
   m.sinceCommand = 0;
+  tellShared(m, false);
   return 0;
 }
 
@@ -203,6 +251,7 @@ EXPORT int dhdSetWatchdog(unsigned char steps, char id) {
 EXPORT int dhdStop(char id) {
   const Lock lock(mock().mutex);
   device(id).amplifiers = false;
+  tellShared(mock(), false);
   return 0;
 }
 
@@ -313,9 +362,7 @@ const MockDhd kControl = {
     },
     [](double seconds) {
       const Lock lock(mock().mutex);
-      Mock& m = mock();
-      m.sinceCommand += seconds;
-      if (m.watchdog > 0 && m.sinceCommand > m.watchdog * 125e-6) m.amplifiers = false;
+      elapse(mock(), seconds);
     },
     [](double seconds) {
       const Lock lock(mock().mutex);

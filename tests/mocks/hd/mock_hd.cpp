@@ -2,9 +2,11 @@
 // vendor's library would crash or do something undefined, this one says why and aborts.
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -16,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "mocks/arm_block.h"
 #include "mocks/hd/mock_hd_control.h"
 
 #define EXPORT extern "C" __attribute__((visibility("default")))
@@ -76,6 +79,8 @@ struct Mock {
   std::vector<Callback> callbacks;
   unsigned long nextId = 1;
   unsigned long rate = 1000;
+  hapticd::mock::Arm shared = hapticd::mock::Arm::ofEnvironment();
+  int fault = hapticd::mock::kHealthy;  // of the tick before
 };
 
 Mock& mock() {
@@ -109,11 +114,41 @@ double norm(const double* v) {
   return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
+bool givesForce(const Arm& arm) {
+  return arm.open && arm.enabled && arm.inScheduler && mock().running;
+}
+
+// What the test in another process wants of the first arm in this tick.
+void obeyShared(Mock& m) {
+  using namespace hapticd::mock;
+  if (!m.shared) return;
+  Arm& arm = m.arms[0];
+  const double* place = m.shared.begin();
+  for (int i = 0; i < 3; ++i) arm.position[i] = 1000 * place[i];
+  const int fault = m.shared.fault();
+  const bool begins = fault != m.fault;
+  m.fault = fault;
+  arm.unplugged = fault == kUnplugged;
+  arm.temperature = fault == kHotMotors ? 0.97 : 0.2;
+  arm.calibration = fault == kNotCalibrated ? 0x5002 : 0x5000;
+  if (begins && fault == kWarmMotors) push(0x200, 0);
+  if (begins && fault == kForceExceeded) push(0x201, 0);
+  if (fault == kLibraryCrashes) std::raise(SIGSEGV);
+  while (m.shared.fault() == kLibraryHangs) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+}
+
+void tellShared(Mock& m) {
+  if (!m.shared) return;
+  constexpr double kNothing[3] = {};
+  m.shared.end(givesForce(m.arms[0]) ? m.arms[0].given : kNothing, m.shared.place(), m.fault);
+}
+
 void tick() {
   Mock& m = mock();
   const Lock lock(m.mutex);
   m.scheduler = std::this_thread::get_id();
   for (Arm& arm : m.arms) arm.framed = false;
+  obeyShared(m);
   const std::vector<Callback> now = m.callbacks;
   for (const Callback& callback : now) {
     if (callback.function(callback.data) == 0) crash("a frame callback ended itself");
@@ -121,14 +156,18 @@ void tick() {
   for (const Arm& arm : m.arms) {
     if (arm.depth != 0) crash("a frame is open at the end of a tick");
   }
+  tellShared(m);
   m.scheduler = {};
 }
 
 void run() {
+  if (mock().shared) hapticd::mock::askForRealtime();
   auto next = std::chrono::steady_clock::now();
   while (!mock().leave) {
     tick();
-    next += std::chrono::microseconds(1000000 / mock().rate);
+    // Late ticks are not made up for.
+    next =
+        std::max(next + std::chrono::microseconds(1000000 / mock().rate), std::chrono::steady_clock::now());
     std::this_thread::sleep_until(next);
   }
 }
@@ -154,12 +193,13 @@ EXPORT unsigned hdInitDevice(const char* name) {
     if (read(STDIN_FILENO, &key, 1) > 0) crash("took a key from the program's stdin");
   }
   const std::string asked = name == nullptr ? "" : name;
-  if (m.onlyName != "*" && m.onlyName != asked) {
+  if ((m.onlyName != "*" && m.onlyName != asked) || m.shared.fault() == hapticd::mock::kDoesNotOpen) {
     push(0x300, 0xFFFFFFFF);
     return 0xFFFFFFFF;
   }
   const int device = asked == "second" ? 1 : 0;
   m.arms[device].open = true;
+  if (m.shared) ++m.shared->opened;
   m.current = device;
   return static_cast<unsigned>(device);
 }
@@ -171,6 +211,7 @@ EXPORT void hdDisableDevice(unsigned device) {
   if (m.running) crash("a device is closed while the scheduler runs");
   m.arms[device].open = m.arms[device].enabled = m.arms[device].inScheduler = false;
   if (m.current == static_cast<int>(device)) m.current = -1;
+  if (m.shared) ++m.shared->closed;
 }
 
 EXPORT void hdMakeCurrentDevice(unsigned device) {
@@ -404,6 +445,7 @@ EXPORT void hdStopScheduler() {
   if (m.thread.joinable()) m.thread.join();
   const Lock lock(m.mutex);
   m.running = false;
+  m.shared.switchOff();  // the amplifiers go with the scheduler
 }
 
 // The control side.
@@ -467,7 +509,7 @@ const MockHd kControl = {
     [](int device) { with(device, [&](Arm& arm) { arm.unplugged = true; }); },
     [](int device, double* out) {
       with(device, [&](Arm& arm) {
-        const bool on = arm.open && arm.enabled && arm.inScheduler && mock().running;
+        const bool on = givesForce(arm);
         for (int i = 0; i < 3; ++i) out[i] = on ? arm.given[i] : 0;
       });
     },
