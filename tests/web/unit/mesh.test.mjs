@@ -1,0 +1,105 @@
+// Meshes: out of files, out of the server's answer, under a ray.
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { join } from "node:path";
+import { test } from "node:test";
+import { bundled, packageNamed, sourceDir } from "../bundled.mjs";
+
+const { weld } = await bundled("mesh/weld.ts");
+const { readMesh } = await bundled("mesh/read_file.ts");
+const { decodeMesh } = await bundled("state.ts");
+const { RayMesh } = await bundled("scene3d/ray_mesh.ts");
+const { Matrix4, Ray, Vector3 } = packageNamed("three");
+
+/** As the browser's File, as far as it is read. */
+const file = (name, content) => ({ name, arrayBuffer: async () => Uint8Array.from(Buffer.from(content)).buffer });
+
+const SQUARE = [0, 0, 0, 2, 0, 0, 2, 2, 0, 0, 0, 0, 2, 2, 0, 0, 2, 0];
+const sorted = ({ positions, triangles }) => {
+  const corners = [...triangles].map((v) => [...positions.subarray(3 * v, 3 * v + 3)].join());
+  return [0, 3].map((i) => corners.slice(i, i + 3).sort().join(" ")).sort();
+};
+
+test("corners at one place become one vertex, -0 and 0 are one place", () => {
+  const mesh = weld(Float32Array.from([...SQUARE.slice(0, 9), -0, ...SQUARE.slice(10)]));
+  assert.equal(mesh.positions.length, 3 * 4);
+  assert.deepEqual([...mesh.triangles], [0, 1, 2, 0, 2, 3]);
+});
+
+test("the bunny has the vertices and triangles of its file", async () => {
+  const { mesh } = await readMesh([file("bunny.obj", readFileSync(join(sourceDir, "testdata/meshes/bunny.obj")))]);
+  assert.equal(mesh.triangles.length, 3 * 3674);
+  assert.equal(mesh.positions.length, 3 * 1839);
+});
+
+const OBJ = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n";
+const STL = `solid s\n${[0, 9].map((i) => `facet normal 0 0 1\nouter loop\n${[0, 3, 6].map((c) => `vertex ${SQUARE.slice(i + c, i + c + 3).join(" ")}`).join("\n")}\nendloop\nendfacet`).join("\n")}\nendsolid s\n`;
+const PLY = `ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n2 0 0\n2 2 0\n0 2 0\n3 0 1 2\n3 0 2 3\n`;
+
+function gltf(uri) {
+  const bytes = Buffer.alloc(48 + 12);
+  [0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0].forEach((x, i) => bytes.writeFloatLE(x, 4 * i));
+  [0, 1, 2, 0, 2, 3].forEach((x, i) => bytes.writeUInt16LE(x, 48 + 2 * i));
+  const json = {
+    asset: { version: "2.0" }, scene: 0, scenes: [{ nodes: [0] }], nodes: [{ mesh: 0, scale: [2, 2, 2] }],
+    meshes: [{ primitives: [{ attributes: { POSITION: 0 }, indices: 1, material: 0 }] }],
+    materials: [{ pbrMetallicRoughness: { baseColorTexture: { index: 0 } } }], textures: [{ source: 0 }], images: [{ uri: "https://example.org/picture.png" }],
+    buffers: [{ uri: uri ?? `data:application/octet-stream;base64,${bytes.toString("base64")}`, byteLength: bytes.length }],
+    bufferViews: [{ buffer: 0, byteOffset: 0, byteLength: 48 }, { buffer: 0, byteOffset: 48, byteLength: 12 }],
+    accessors: [
+      { bufferView: 0, componentType: 5126, count: 4, type: "VEC3", min: [0, 0, 0], max: [1, 1, 0] },
+      { bufferView: 1, componentType: 5123, count: 6, type: "SCALAR" },
+    ],
+  };
+  return { text: JSON.stringify(json), bytes };
+}
+
+test("OBJ, STL, PLY and glTF give the same square; pictures of a glTF are not fetched", async () => {
+  const { text } = gltf();
+  const beside = gltf("data/square.bin");
+  const sets = [[file("a.obj", OBJ)], [file("a.STL", STL)], [file("a.ply", PLY)], [file("a.gltf", text)], [file("a.gltf", beside.text), file("square.bin", beside.bytes)]];
+  for (const files of sets) {
+    const { mesh } = await readMesh(files);
+    assert.equal(mesh.positions.length, 12, files[0].name);
+    assert.deepEqual(sorted(mesh), sorted(weld(Float32Array.from(SQUARE))), files[0].name);
+  }
+});
+
+test("what is wrong with a file is said with its name", async () => {
+  const wrong = [
+    [[file("notes.txt", "hello")], /notes\.txt is no mesh file: drop an OBJ/],
+    [[file("a.gltf", gltf("square.bin").text)], /a\.gltf: it needs square\.bin: drop both/],
+    [[file("points.ply", PLY.replace("element face 2", "element face 0").replace(/3 0 1 2\n3 0 2 3\n/, ""))], /points\.ply: it has no triangles/],
+    [[file("bad.obj", OBJ.replace("2 2 0", "2 nan 0"))], /bad\.obj: a corner of triangle 0 is not a number/],
+    [[file("cut.stl", Buffer.alloc(40))], /cut\.stl: /],
+    [[file("cut.glb", "{")], /cut\.glb: /],
+  ];
+  for (const [files, message] of wrong) await assert.rejects(readMesh(files), { message });
+});
+
+test("the server's mesh is read; a cut one is an error", () => {
+  const bytes = Buffer.alloc(16 + 36 + 12);
+  bytes.write("HDM1");
+  bytes.writeUInt32LE(3, 4);
+  bytes.writeUInt32LE(1, 8);
+  for (let i = 0; i < 9; ++i) bytes.writeFloatLE(i / 2, 16 + 4 * i);
+  for (let i = 0; i < 3; ++i) bytes.writeUInt32LE(2 - i, 52 + 4 * i);
+  const mesh = decodeMesh(Uint8Array.from(bytes).buffer);
+  assert.deepEqual([...mesh.positions], [0, 0.5, 1, 1.5, 2, 2.5, 3, 3.5, 4]);
+  assert.deepEqual([...mesh.triangles], [2, 1, 0]);
+  assert.throws(() => decodeMesh(Uint8Array.from(bytes.subarray(0, 60)).buffer), /is cut/);
+  assert.throws(() => decodeMesh(Uint8Array.from(Buffer.from("<html>".padEnd(30))).buffer), /is no mesh/);
+});
+
+test("a ray finds the nearest of many triangles, at its distance in the world", () => {
+  // Two hundred squares behind each other, in a scaled and moved object.
+  const corners = Array.from({ length: 200 }, (_, z) => SQUARE.map((x, i) => (i % 3 === 2 ? -z : x))).flat();
+  const mesh = new RayMesh(weld(Float32Array.from(corners)));
+  const T = new Matrix4().makeTranslation(10, 0, -5).multiply(new Matrix4().makeScale(3, 3, 3));
+  const down = new Vector3(0, 0, -1);
+  const distance = (x, y, z) => mesh.distance(new Ray(new Vector3(x, y, z), down), T);
+  assert.ok(Math.abs(distance(13, 2, 20) - 25) < 1e-9);
+  assert.ok(Math.abs(distance(13, 2, -5 - 3 * 57.5) - 1.5) < 1e-9); // from among them
+  assert.equal(distance(9.9, 2, 20), Infinity);
+  assert.equal(distance(13, 2, -5 - 3 * 199.5), Infinity); // behind the last
+});

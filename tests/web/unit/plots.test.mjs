@@ -1,0 +1,29 @@
+// What the plots keep and count.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { bundled } from "../bundled.mjs";
+
+const { Window } = await bundled("plots/window.ts");
+const { between, share } = await bundled("plots/counts.ts");
+
+test("a window keeps the newest samples in order, however many came", () => {
+  const window = new Window(2, 5);
+  for (let i = 0; i < 123; ++i) {
+    window.push(i, -i);
+    const [time, value] = window.data();
+    const first = Math.max(0, i - 4);
+    assert.deepEqual([...time], Array.from({ length: i - first + 1 }, (_, k) => first + k));
+    assert.deepEqual([...value], [...time].map((t) => -t));
+  }
+  window.clear();
+  assert.equal(window.size, 0);
+});
+
+test("what came between two histograms, and its quantiles", () => {
+  const before = { bins: [[990, 10], [1000, 100]] };
+  const now = { bins: [[990, 10], [1000, 190], [1010, 9], [5000, 1]] };
+  const since = between(before, now);
+  assert.deepEqual(since, [[1000, 90], [1010, 9], [5000, 1]]);
+  assert.deepEqual([0.5, 0.95, 0.99, 1].map((part) => share(since, part)), [1000, 1010, 1010, 5000]);
+  assert.equal(share([], 0.5), 0);
+});

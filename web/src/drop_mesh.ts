@@ -1,0 +1,110 @@
+// A mesh file that is dropped onto the page, or chosen: read, placed, sent, and there.
+import { byId, countText, el, setText } from "./panels/dom";
+import type { Link } from "./link";
+import { readMesh } from "./mesh/read_file";
+import { Placing } from "./mesh/placing";
+import { upload } from "./mesh/upload";
+import type { FileMesh } from "./mesh/weld";
+import type { View } from "./scene3d/view";
+import type { DeviceState, ObjectState } from "./state_types";
+
+export interface DropContext {
+  link: Link;
+  view: View;
+  device(): DeviceState | undefined;
+  objects(): ObjectState[];
+}
+
+export class DropMesh {
+  private readonly panel = byId("drop-panel");
+  private readonly message = el("p", { role: "status" });
+  private readonly bar = el("progress", { max: 1, value: 0, hidden: true });
+  private placing: Placing | undefined;
+  private awaited: { object: number; geometry: number; name: string } | undefined;
+
+  constructor(private readonly context: DropContext) {
+    this.panel.append(this.message, this.bar);
+    const chooser = byId<HTMLInputElement>("mesh-file");
+    byId("load-mesh").addEventListener("click", () => chooser.click());
+    chooser.addEventListener("change", () => {
+      void this.open([...(chooser.files ?? [])]);
+      chooser.value = "";
+    });
+    document.addEventListener("dragover", (e) => {
+      e.preventDefault();
+      document.body.classList.add("dropping");
+    });
+    document.addEventListener("dragleave", (e) => {
+      if (e.relatedTarget === null) document.body.classList.remove("dropping");
+    });
+    document.addEventListener("drop", (e) => {
+      e.preventDefault();
+      document.body.classList.remove("dropping");
+      void this.open([...(e.dataTransfer?.files ?? [])]);
+    });
+  }
+
+  /** Looks in a new state for the mesh that was sent. */
+  update(objects: ObjectState[]): void {
+    const there = this.awaited && objects.find((o) => o.id === this.awaited!.object && o.triangles > 0 && o.geometry !== this.awaited!.geometry);
+    if (!there) return;
+    this.say(`${this.awaited!.name} is object ${there.id}: ${countText(there.triangles)} triangles to touch.`, "good");
+    this.awaited = undefined;
+  }
+
+  private async open(files: File[]): Promise<void> {
+    if (files.length === 0) return;
+    const device = this.context.device();
+    this.panel.hidden = false;
+    if (!device) return this.say("There is no device yet to load a mesh for.", "bad");
+    this.placing?.end();
+    this.say(`Reading ${files[0]!.name} …`);
+    await new Promise((resolve) => setTimeout(resolve, 30)); // so that it is seen
+    try {
+      const { name, mesh } = await readMesh(files);
+      this.place(name, mesh, device);
+    } catch (error) {
+      this.say((error as Error).message, "bad");
+    }
+  }
+
+  private place(name: string, mesh: FileMesh, device: DeviceState): void {
+    const placing = new Placing(name, mesh, this.context.view, device, this.context.objects());
+    const load = el("button", { type: "submit", className: "primary" }, "Load it into the scene");
+    const cancel = el("button", { type: "button" }, "Cancel");
+    cancel.addEventListener("click", () => {
+      placing.end();
+      this.panel.hidden = true;
+    });
+    placing.root.append(el("div", { className: "row" }, load, cancel));
+    placing.root.addEventListener("submit", (e) => {
+      e.preventDefault();
+      void this.load(name, mesh, placing);
+    });
+    this.placing = placing;
+    this.say("");
+    this.panel.append(placing.root);
+    load.focus();
+  }
+
+  private async load(name: string, mesh: FileMesh, placing: Placing): Promise<void> {
+    const placement = placing.placement();
+    const before = this.context.objects().find((o) => o.id === placement.object)?.geometry ?? -1;
+    placing.end();
+    this.bar.hidden = false;
+    this.say(`Sending ${name} …`);
+    try {
+      await upload(this.context.link, mesh, placement, (share) => (this.bar.value = share));
+      this.say(`${name} is sent; the server makes it touchable …`);
+      this.awaited = { object: placement.object, geometry: before, name };
+    } catch (error) {
+      this.say(`${name}: ${(error as Error).message}`, "bad");
+    }
+    this.bar.hidden = true;
+  }
+
+  private say(text: string, level = ""): void {
+    setText(this.message, text);
+    this.message.dataset["level"] = level;
+  }
+}

@@ -1,0 +1,36 @@
+// What the view says while there is nothing to see in it, and what the server says in words.
+import { byId, el, setText } from "./panels/dom";
+
+export type Notice = "connecting" | "lost" | "no device" | "empty" | "";
+
+const TEXTS: Record<Exclude<Notice, "">, [title: string, text: string]> = {
+  connecting: ["Connecting …", "Waiting for the server's answer."],
+  lost: ["Connection lost", "Is “hapticd serve” still running? This page connects again by itself as soon as it is. Until then it cannot stop the device: use the device's own switch."],
+  "no device": ["No device", "The server runs without any device. Start it with one, for example “hapticd serve --device simulated”."],
+  empty: ["The scene is empty", "Drop a mesh here (OBJ, STL, PLY, glTF), or send one: “hapticd touch testdata/meshes/bunny.obj”."],
+};
+
+const TOAST_MS = 8000;
+const MOST_TOASTS = 4;
+
+let shown: Notice | undefined;
+export function showNotice(notice: Notice): void {
+  if (notice === shown) return;
+  shown = notice;
+  const box = byId("notice");
+  box.hidden = notice === "";
+  box.dataset["notice"] = notice;
+  if (notice === "") return;
+  setText(byId("notice-title"), TEXTS[notice][0]);
+  setText(byId("notice-text"), TEXTS[notice][1]);
+}
+
+/** Severity as in VRPN's text messages: 0 normal, 1 warning, 2 error. */
+export function toast(text: string, severity: number): void {
+  const box = byId("toasts");
+  for (const old of [...box.children]) if (old.textContent === text) old.remove();
+  const item = el("div", { data: { level: severity >= 2 ? "bad" : "warn" } }, text);
+  box.append(item);
+  while (box.children.length > MOST_TOASTS) box.firstElementChild!.remove();
+  setTimeout(() => item.remove(), TOAST_MS);
+}

@@ -1,0 +1,60 @@
+// Force effects: start and stop what is defined, define one more.
+import { type Effect, type Outgoing, setEffect, startEffect, stopEffect } from "../wire";
+import type { EffectState } from "../state_types";
+import { el, Rows, setText } from "./dom";
+
+type Send = (...messages: Outgoing[]) => void;
+
+/** What a new effect of each type begins with; gains are N/mm and N per mm/s of the device. */
+const NEW: Record<string, { label: string; effect: Partial<Effect> }> = {
+  constant: { label: "Constant, 1 N up", effect: { magnitude_N: 1, direction: [0, 1, 0] } },
+  spring: { label: "Spring to the origin", effect: { gain: 0.05, magnitude_N: 2 } },
+  viscous: { label: "Viscous", effect: { gain: 0.003, magnitude_N: 2 } },
+  friction: { label: "Friction", effect: { gain: 0.2, magnitude_N: 0.5 } },
+  vibrationMotor: { label: "Vibration, 60 Hz", effect: { magnitude_N: 0.5, frequency: 60 } },
+  vibrationContact: { label: "Vibration in contact", effect: { magnitude_N: 0.5, frequency: 400 } },
+};
+
+class EffectRow {
+  readonly root: HTMLElement;
+  private readonly facts = el("span", { className: "quiet" });
+  private readonly active = el("input", { type: "checkbox" });
+
+  constructor(e: EffectState, send: Send) {
+    this.active.ariaLabel = `Effect ${e.index} is on`;
+    this.active.addEventListener("change", () => send(this.active.checked ? startEffect(e.index) : stopEffect(e.index)));
+    this.root = el("li", { data: { effect: String(e.index) } }, el("div", { className: "row" }, el("strong", {}, `Effect ${e.index}`), this.facts, el("label", { className: "switch" }, this.active, "on")));
+  }
+
+  update(e: EffectState): void {
+    const limit = e.duration_ms > 0 ? `, ${e.duration_ms} ms` : "";
+    setText(this.facts, `${e.type}, ${e.magnitude_N} N${limit}`);
+    this.active.checked = e.active;
+  }
+}
+
+export class EffectsPanel {
+  private readonly list = el("ul", { className: "cards" });
+  private readonly rows: Rows<EffectState, EffectRow>;
+  private used: number[] = [];
+
+  constructor(parent: HTMLElement, send: Send) {
+    this.rows = new Rows(this.list, (e) => e.index, (e) => new EffectRow(e, send));
+    const type = el("select", { ariaLabel: "Type of the new effect" }, ...Object.entries(NEW).map(([value, { label }]) => el("option", { value }, label)));
+    const add = el("button", { type: "button" }, "Add");
+    add.addEventListener("click", () => send(setEffect(this.newEffect(type.value))));
+    parent.append(this.list, el("div", { className: "row adder" }, type, add));
+  }
+
+  update(effects: EffectState[]): void {
+    this.used = effects.map((e) => e.index);
+    this.rows.update(effects);
+  }
+
+  private newEffect(type: string): Effect {
+    let index = 0;
+    while (this.used.includes(index)) ++index;
+    const none: Effect = { type, index, gain: 0, magnitude_N: 0, duration_ms: 0, frequency: 0, position: [0, 0, 0], direction: [0, 0, 0] };
+    return { ...none, ...NEW[type]!.effect };
+  }
+}

@@ -1,0 +1,66 @@
+// The loop's histogram since the server started: how many ticks had which period, on a logarithmic scale.
+import uPlot from "uplot";
+import type { Histogram } from "../state_types";
+import { axis, css } from "./plot";
+
+export class LoopHistogram {
+  private plot: uPlot | undefined;
+  private last: Histogram | undefined;
+  private shown = -1;
+
+  constructor(private readonly body: HTMLElement) {
+    new ResizeObserver(() => this.resize()).observe(body);
+  }
+
+  update(histogram: Histogram): void {
+    this.last = histogram;
+  }
+
+  restyle(): void {
+    this.plot?.destroy();
+    this.plot = undefined;
+    this.shown = -1;
+    this.resize();
+  }
+
+  draw(): void {
+    const total = this.last?.bins.reduce((sum, [, count]) => sum + count, 0) ?? 0;
+    if (!this.plot || total === this.shown) return;
+    this.shown = total;
+    this.plot.setData(this.data());
+  }
+
+  private data(): uPlot.AlignedData {
+    const bins = this.last?.bins.filter(([, count]) => count > 0) ?? [];
+    return [bins.map(([from]) => from), bins.map(([, count]) => Math.log10(count) + 0.3)];
+  }
+
+  private resize(): void {
+    const { clientWidth: width, clientHeight: height } = this.body;
+    if (width < 40 || height < 30) return;
+    if (this.plot) return this.plot.setSize({ width, height });
+    const options: uPlot.Options = {
+      width,
+      height,
+      padding: [6, 10, 0, 0],
+      legend: { show: false },
+      cursor: { show: false },
+      scales: { x: { time: false, range: (_, min, max) => around(min, max) }, y: { range: (_, __, max) => [0, Math.ceil(max ?? 1)] } },
+      axes: [
+        { ...axis(), size: 18, gap: 2, space: 60, values: (_, splits) => splits.map((s) => `${s} µs`) },
+        { ...axis(), size: 38, gap: 2, space: 20, values: (_, splits) => splits.map((s) => (Number.isInteger(s) ? powerText(s) : "")) },
+      ],
+      series: [{}, { stroke: css("--force"), fill: css("--force"), paths: uPlot.paths.bars!({ size: [0.9, 12, 2], align: 1 }), points: { show: false } }],
+    };
+    this.plot = new uPlot(options, this.data(), this.body);
+  }
+}
+
+function around(min: number | null, max: number | null): [number, number] {
+  const from = min ?? 0;
+  const to = max ?? 1;
+  const margin = Math.max(0.05 * (to - from), 1);
+  return [Math.max(0, from - margin), to + margin];
+}
+
+const powerText = (power: number): string => (power < 4 ? String(10 ** power) : `10^${power}`);

@@ -1,0 +1,130 @@
+// One live plot: uPlot over a window of samples, in the colours of the page.
+import uPlot from "uplot";
+import { Window } from "./window";
+
+export interface Curve {
+  label: string;
+  /** A colour of the page: a CSS variable. */
+  colour: string;
+}
+
+export interface PlotOptions {
+  title: string;
+  unit: string;
+  curves: Curve[];
+  /** How much of the past is shown, and how many samples that may be. */
+  seconds: number;
+  most: number;
+  /** The scale reaches at least this far. */
+  least: number;
+  decimals: number;
+}
+
+export const css = (name: string): string => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+export function axis(): uPlot.Axis {
+  return {
+    stroke: css("--quiet"),
+    grid: { stroke: css("--line"), width: 1 },
+    ticks: { show: false },
+    font: "11px system-ui, sans-serif",
+  };
+}
+
+export class Plot {
+  readonly window: Window;
+  private plot: uPlot | undefined;
+  private readonly value: HTMLElement;
+  private readonly body: HTMLElement;
+  private fresh = false;
+
+  constructor(
+    parent: HTMLElement,
+    private readonly options: PlotOptions,
+  ) {
+    this.window = new Window(1 + options.curves.length, options.most);
+    const figure = document.createElement("figure");
+    figure.className = "plot";
+    figure.dataset["plot"] = options.title;
+    const caption = figure.appendChild(document.createElement("figcaption"));
+    caption.append(options.title, " ");
+    this.value = caption.appendChild(document.createElement("output"));
+    if (options.curves.length > 1) caption.append(legend(options.curves));
+    this.body = figure.appendChild(document.createElement("div"));
+    parent.append(figure);
+    new ResizeObserver(() => this.resize()).observe(this.body);
+  }
+
+  push(time_s: number, ...values: number[]): void {
+    this.window.push(time_s, ...values);
+    this.fresh = true;
+  }
+
+  clear(): void {
+    this.window.clear();
+    this.fresh = true;
+  }
+
+  /** Builds the plot anew, in other colours. */
+  restyle(): void {
+    this.plot?.destroy();
+    this.plot = undefined;
+    this.resize();
+  }
+
+  draw(): void {
+    if (!this.fresh || !this.plot || this.window.size === 0) return;
+    this.fresh = false;
+    const data = this.window.data();
+    this.plot.setData(data as unknown as uPlot.AlignedData);
+    const last = data[1]!.at(-1)!;
+    this.value.textContent = `${last.toFixed(this.options.decimals)} ${this.options.unit}`;
+  }
+
+  private resize(): void {
+    const { clientWidth: width, clientHeight: height } = this.body;
+    if (width < 40 || height < 30) return;
+    if (this.plot) return this.plot.setSize({ width, height });
+    this.plot = new uPlot(this.uplotOptions(width, height), this.window.data() as unknown as uPlot.AlignedData, this.body);
+  }
+
+  private uplotOptions(width: number, height: number): uPlot.Options {
+    const { curves, seconds, least } = this.options;
+    return {
+      width,
+      height,
+      padding: [6, 14, 0, 0],
+      legend: { show: false },
+      cursor: { show: false },
+      scales: {
+        x: { time: false, range: (_, __, max) => [(max ?? 0) - seconds, max ?? seconds] },
+        y: { range: (_, __, max) => [0, niceEnd(Math.max(max ?? 0, least))] },
+      },
+      axes: [{ ...axis(), size: 18, gap: 2, splits: (u) => ago(u, seconds), values: (u, splits) => splits.map((s) => agoText(s - u.scales["x"]!.max!)) }, { ...axis(), size: 38, gap: 2, space: 24 }],
+      series: [
+        {},
+        ...curves.map((c): uPlot.Series => ({ label: c.label, stroke: css(c.colour), width: 1.5, points: { show: false } })),
+      ],
+    };
+  }
+}
+
+const ago = (u: uPlot, seconds: number): number[] => [-0.8, -0.4, 0].map((part) => u.scales["x"]!.max! + part * seconds);
+const agoText = (seconds: number): string => (seconds > -0.05 ? "now" : `${seconds.toFixed(0)} s`);
+
+/** A number with one or two digits, not below: scales change seldom. */
+function niceEnd(value: number): number {
+  const power = 10 ** Math.floor(Math.log10(value));
+  return [1, 1.5, 2, 3, 5, 7.5, 10].find((m) => m * power >= value)! * power;
+}
+
+function legend(curves: Curve[]): HTMLElement {
+  const names = document.createElement("span");
+  names.className = "curves";
+  for (const curve of curves) {
+    const name = names.appendChild(document.createElement("span"));
+    name.textContent = curve.label;
+    name.style.setProperty("--colour", `var(${curve.colour})`);
+  }
+  return names;
+}

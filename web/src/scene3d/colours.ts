@@ -1,0 +1,28 @@
+// What a surface value looks like: one ramp, dark blue to orange, told apart in grey and by colour-blind eyes, too.
+import { Color } from "three";
+import type { ObjectState } from "../state_types";
+
+const RAMP = ["#27408b", "#2f7fb5", "#5fb4a2", "#d9c75f", "#e8743b"].map((c) => new Color(c));
+
+export type Quantity = "stiffness" | "friction";
+
+/** The colour of a share from 0 to 1. */
+export function rampColour(share: number): Color {
+  const at = Math.min(Math.max(share, 0), 1) * (RAMP.length - 1);
+  const from = Math.min(Math.floor(at), RAMP.length - 2);
+  return RAMP[from]!.clone().lerp(RAMP[from + 1]!, at - from);
+}
+
+/** The ramp as CSS, for the legend. */
+export const rampCss = (): string => `linear-gradient(to right, ${RAMP.map((c) => `#${c.getHexString()}`).join(", ")})`;
+
+export function valueOf(o: ObjectState, quantity: Quantity): number {
+  return quantity === "stiffness" ? o.stiffness_N_per_m : o.static_friction;
+}
+
+/** Upper end of the legend: a round number at or above every value. */
+export function rangeOf(objects: ObjectState[], quantity: Quantity): number {
+  if (quantity === "friction") return 1;
+  const most = Math.max(0, ...objects.map((o) => o.stiffness_N_per_m));
+  return [500, 1000, 2000, 5000].find((end) => most <= end) ?? 10000;
+}

@@ -1,0 +1,121 @@
+// What moves with every tick: hand, proxy, the normals of the contacts, the force; and the box that the device reaches.
+import {
+  BoxGeometry, BufferAttribute, BufferGeometry, ConeGeometry, CylinderGeometry, EdgesGeometry, Group, Line, LineBasicMaterial,
+  LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshStandardMaterial, Quaternion, SphereGeometry, Vector3,
+} from "three";
+import type { Contact, Tick, Vec3 } from "../wire";
+import type { DeviceState } from "../state_types";
+
+const UP = new Vector3(0, 1, 0);
+const MOST_NORMALS = 8;
+/** Parts of the workspace's largest extent. */
+const BALL = 0.016;
+const NORMAL = 0.12;
+const PEAK_FORCE = 0.8;
+
+export interface MarkerColours {
+  hand: string;
+  proxy: string;
+  force: string;
+  normal: string;
+  box: string;
+}
+
+/** A shaft and a head along +y, of length 1 and some width. */
+class Arrow extends Group {
+  private readonly shaft: Mesh;
+  private readonly head: Mesh;
+  constructor(
+    readonly material: MeshStandardMaterial,
+    private readonly width: number,
+  ) {
+    super();
+    this.shaft = new Mesh(new CylinderGeometry(1, 1, 1, 12).translate(0, 0.5, 0), material);
+    this.head = new Mesh(new ConeGeometry(2.4, 1, 16).translate(0, 0.5, 0), material);
+    this.add(this.shaft, this.head);
+  }
+  point(from: Vector3, direction: Vector3, length: number, unit: number): void {
+    const width = Math.min(this.width * unit, length / 10); // a short arrow is a small one
+    const head = Math.min(5 * width, 0.6 * length);
+    this.visible = length > 0;
+    this.position.copy(from);
+    this.quaternion.setFromUnitVectors(UP, direction);
+    this.shaft.scale.set(width, Math.max(length - head, 1e-9), width);
+    this.head.scale.set(width, head, width);
+    this.head.position.y = length - head;
+  }
+}
+
+const coloured = (): MeshStandardMaterial => new MeshStandardMaterial({ roughness: 0.6 });
+
+export class Markers {
+  readonly group = new Group();
+  private readonly hand = new Mesh(new SphereGeometry(1, 24, 16), new MeshBasicMaterial({ transparent: true, opacity: 0.65, depthTest: false }));
+  private readonly proxy = new Mesh(new SphereGeometry(1, 24, 16), coloured());
+  private readonly force = new Arrow(coloured(), 0.007);
+  private readonly normals: Arrow[] = [];
+  private readonly normalMaterial = coloured();
+  private readonly spring = new Line(new BufferGeometry().setAttribute("position", new BufferAttribute(new Float32Array(6), 3)), new LineBasicMaterial({ depthTest: false }));
+  private readonly box = new LineSegments(new EdgesGeometry(new BoxGeometry(1, 1, 1)), new LineBasicMaterial({ transparent: true, opacity: 0.8 }));
+  private scale = 1000;
+  private size = 100;
+  private peak_N = 3.3;
+
+  constructor() {
+    for (let i = 0; i < MOST_NORMALS; ++i) this.normals.push(new Arrow(this.normalMaterial, 0.003));
+    this.hand.renderOrder = 2;
+    this.spring.renderOrder = 1;
+    this.spring.frustumCulled = false;
+    this.box.matrixAutoUpdate = false;
+    this.group.add(this.box, this.spring, this.hand, this.proxy, this.force, ...this.normals);
+    for (const part of [this.spring, this.hand, this.proxy, this.force, ...this.normals]) part.visible = false;
+  }
+
+  setColours(colours: MarkerColours): void {
+    this.hand.material.color.set(colours.hand);
+    this.spring.material.color.set(colours.hand);
+    this.proxy.material.color.set(colours.proxy);
+    this.force.material.color.set(colours.force);
+    this.normalMaterial.color.set(colours.normal);
+    this.box.material.color.set(colours.box);
+  }
+
+  /** Workspace box and sizes. */
+  setDevice(device: DeviceState): void {
+    const min = new Vector3().fromArray(device.workspace_m.min);
+    const max = new Vector3().fromArray(device.workspace_m.max);
+    const T = new Matrix4().fromArray(device.T_world_device);
+    const boxOfUnit = new Matrix4().compose(min.clone().add(max).multiplyScalar(0.5), new Quaternion(), max.clone().sub(min));
+    this.box.matrix.multiplyMatrices(T, boxOfUnit);
+    this.box.matrixWorldNeedsUpdate = true;
+    this.scale = device.world_per_reported;
+    this.size = Math.max(...max.sub(min).toArray()) * T.getMaxScaleOnAxis();
+    this.peak_N = device.peak_force_N > 0 ? device.peak_force_N : 1;
+    this.hand.scale.setScalar(0.6 * BALL * this.size);
+    this.proxy.scale.setScalar(BALL * this.size);
+  }
+
+  /** A reported position in world units. */
+  world(position: Vec3): Vector3 {
+    return new Vector3(...position).multiplyScalar(this.scale);
+  }
+
+  update(tick: Tick, contacts: Contact[]): void {
+    const hand = this.world(tick.hand);
+    const proxy = this.world(tick.proxy);
+    this.hand.visible = this.proxy.visible = this.spring.visible = true;
+    this.hand.position.copy(hand);
+    this.proxy.position.copy(proxy);
+    const ends = this.spring.geometry.getAttribute("position") as BufferAttribute;
+    ends.setXYZ(0, ...hand.toArray()).setXYZ(1, ...proxy.toArray());
+    ends.needsUpdate = true;
+    const force = new Vector3(...tick.force_N);
+    const strength = force.length();
+    this.force.point(proxy, force.divideScalar(strength || 1), strength > 0.005 ? (PEAK_FORCE * this.size * strength) / this.peak_N : 0, this.size);
+    this.normals.forEach((arrow, i) => {
+      const contact = contacts[i];
+      const normal = new Vector3(...(contact?.normal ?? [0, 1, 0]));
+      arrow.point(contact ? this.world(contact.point) : proxy, normal, contact ? NORMAL * this.size : 0, this.size);
+    });
+  }
+}

@@ -1,0 +1,91 @@
+// What GET /api/state says; docs/viewer.md names the fields that the page shows.
+
+export interface Histogram {
+  p50: number;
+  p99: number;
+  p999: number;
+  max: number;
+  bins: [from_us: number, count: number][];
+}
+
+export interface DeviceState {
+  name: string;
+  names: string[];
+  driver: string;
+  simulated: boolean;
+  scene: number;
+  workspace_m: { min: number[]; max: number[] };
+  T_world_device: number[];
+  world_per_reported: number;
+  peak_force_N: number;
+  rate_Hz: number;
+  realtime: boolean;
+  hand: string;
+  held_by: number | null;
+  fault: string;
+  temperature_C: number | null;
+  guard: { armed: boolean; stopped: boolean; active: string[]; latched: string[] };
+  loop: { ticks: number; overruns: number; dropped_reports: number; period_us: Histogram; wakeup_us: Histogram; compute_us: Histogram };
+}
+
+export interface ClientState {
+  id: number;
+  address: string;
+  mode: string;
+  devices: string[];
+  connected_s: number;
+  rate_Hz: number;
+  bytes_in: number;
+  bytes_out: number;
+  dropped: number;
+  queued_bytes: number;
+  commands: boolean;
+}
+
+export interface ObjectState {
+  id: number;
+  parent: number;
+  touchable: boolean;
+  vertices: number;
+  triangles: number;
+  geometry: number;
+  display_triangles: number;
+  T_world_object: number[];
+  T_object_mesh: number[];
+  stiffness_N_per_m: number;
+  damping_Ns_per_m: number;
+  static_friction: number;
+  dynamic_friction: number;
+  popthrough: number;
+  mass_kg: number;
+}
+
+export interface EffectState {
+  index: number;
+  type: string;
+  active: boolean;
+  magnitude_N: number;
+  gain: number;
+  duration_ms: number;
+  frequency_Hz: number;
+}
+
+export interface SceneState {
+  devices: string[];
+  revision: number;
+  objects: ObjectState[];
+  effects: EffectState[];
+  planes: { index: number; plane: number[]; stiffness_N_per_m: number }[];
+  constraint: { mode: string } | null;
+  fields: number;
+}
+
+export interface ServerState {
+  server: { version: string; uptime_s: number; recording: string | null };
+  devices: DeviceState[];
+  clients: ClientState[];
+  scenes: SceneState[];
+}
+
+/** Whether an object can be felt at all. */
+export const felt = (o: ObjectState): boolean => o.touchable && o.stiffness_N_per_m > 0 && o.triangles > 0;
