@@ -26,6 +26,7 @@ struct Options {
   bool isolate = false;
   double reportRate_Hz = 0;
   double seconds = 0;
+  std::string record;
   bool allowNoRealtime = false;
   bool verbose = false;
   bool checkConfig = false;
@@ -54,6 +55,7 @@ server::ServerConfig configOf(const Options& options, std::vector<std::string>& 
   if (!options.listen.empty()) server::parseListen(options.listen, config.listenAddress, config.port);
   if (options.allowNoRealtime) config.allowNoRealtime = true;
   if (options.seconds > 0) config.seconds = options.seconds;
+  if (!options.record.empty()) config.record = options.record;
   if (!options.names.empty()) config.devices.front().names = options.names;
   applyFlags(options, config.devices.front());
   // vrpn.cfg has no words for most of the flags.
@@ -155,6 +157,10 @@ void addServe(CLI::App& app) {
       ->check(within(0.1, 4000));
   command->add_option("--seconds", options->seconds, "Stop after this time [until a signal]")
       ->check(within(0.001, kLongest_s));
+  command->add_option(
+      "--record", options->record,
+      "Write a session file of all that happens, for replay, render --session and export; %Y%m%d-%H%M%S in\n"
+      "the name becomes the time");
   command->add_flag("--allow-no-rt", options->allowNoRealtime,
                     "Run although the system refuses realtime rights (fine for the simulated hand)");
   command->add_flag("-v,--verbose", options->verbose, "Log more");

@@ -27,6 +27,35 @@ constexpr double kFarthest = 1e150;
 
 using geometry::Vec3f;
 
+// The union of boxes that come from several threads, in any order and more than once: always the same bits.
+class SharedBounds {
+ public:
+  void clear() noexcept {
+    for (int i = 0; i < 3; ++i) {
+      min_[i] = INFINITY;
+      max_[i] = -INFINITY;
+    }
+  }
+  void extend(const Box& box) noexcept {
+    for (int i = 0; i < 3; ++i) {
+      replaceIf(min_[i], box.min[i], [](double a, double b) { return a < b; });
+      replaceIf(max_[i], box.max[i], [](double a, double b) { return a > b; });
+    }
+  }
+  Box box() const noexcept { return {Vec3(min_[0], min_[1], min_[2]), Vec3(max_[0], max_[1], max_[2])}; }
+
+ private:
+  template <class Better>
+  static void replaceIf(std::atomic<double>& kept, double value, Better better) noexcept {
+    double old = kept.load(std::memory_order_relaxed);
+    while (better(value, old) && !kept.compare_exchange_weak(old, value, std::memory_order_relaxed)) {
+    }
+  }
+
+  std::atomic<double> min_[3];
+  std::atomic<double> max_[3];
+};
+
 bool isUsable(const Box& box) {
   return !box.empty() && box.min.minCoeff() >= -kFarthest && box.max.maxCoeff() <= kFarthest;
 }
@@ -102,6 +131,7 @@ struct SpatialIndex::Tree {
   Vec3 origin = Vec3::Zero();
   double scale = 1;
   const BoxOf* boxOf = nullptr;         // only while building
+  SharedBounds all;                     // of the boxes of the newest commit
   std::atomic<bool> unfitting = false;  // a box that came by refitting needs a new tree
   std::uint32_t leftOut = 0;
 
@@ -124,11 +154,11 @@ struct SpatialIndex::Tree {
 
   double pad() const noexcept { return kRelativePad * kReach / scale; }
   Vec3f inTree(const Vec3& p) const noexcept { return ((p - origin) * scale).cast<float>(); }
-  Vec3 outOfTree(float x, float y, float z) const { return Vec3(x, y, z) / scale + origin; }
 
   void bounds(std::uint32_t id, RTCBounds& out) {
     const Box box = (*boxOf)(id);
     const bool usable = isUsable(box);
+    if (usable) all.extend(box);
     // Embree leaves out boxes that are inverted.
     const Vec3f lower = usable ? inTree(box.min - Vec3::Constant(pad())) : Vec3f::Constant(INFINITY);
     const Vec3f upper = usable ? inTree(box.max + Vec3::Constant(pad())) : Vec3f::Constant(-INFINITY);
@@ -139,6 +169,7 @@ struct SpatialIndex::Tree {
   void commit(const BoxOf& from) {
     boxOf = &from;
     unfitting = false;
+    all.clear();
     rtcCommitGeometry(geometry);
     rtcCommitScene(scene);
     boxOf = nullptr;
@@ -197,10 +228,8 @@ void SpatialIndex::refit(const BoxOf& boxOf) {
     *this = build(count_, boxOf);
     return;
   }
-  RTCBounds b;
-  rtcGetSceneBounds(tree_->scene, &b);
-  bounds_ = {tree_->outOfTree(b.lower_x, b.lower_y, b.lower_z),
-             tree_->outOfTree(b.upper_x, b.upper_y, b.upper_z)};
+  // To the bit what build() would give: the renderer takes lengths from them.
+  bounds_ = tree_->all.box();
 }
 
 void SpatialIndex::visitNearImpl(const Vec3& centre, double radius, NearThunk thunk,

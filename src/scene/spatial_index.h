@@ -37,7 +37,7 @@ class SpatialIndex {
   /// meanwhile. Same count as built. For boxes that moved a little: a refitted tree gets slower to query.
   void refit(const BoxOf& boxOf);
 
-  /// Box around all boxes, after refitting by the pad wider than their union; empty when there is none.
+  /// Box around all boxes, the same whether built or refitted; empty when there is none.
   const Box& bounds() const noexcept { return bounds_; }
   std::uint32_t size() const noexcept { return count_; }
 

@@ -32,6 +32,8 @@ class WallClock {
     return {static_cast<std::uint32_t>(wall / 1000000000),
             static_cast<std::uint32_t>(wall % 1000000000 / 1000)};
   }
+  /// Wall time less servo time.
+  geometry::Nanos offset() const noexcept { return offset_; }
   wire::Time now() const noexcept { return at(monotonicNow()); }
 
  private:

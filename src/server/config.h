@@ -85,6 +85,7 @@ struct ServerConfig {
   bool allowNoRealtime = false;
   double seconds = 0;                      ///< 0: until stopped
   std::vector<std::string> callbackHosts;  ///< hosts that a UDP request may name besides the sender's own
+  std::string record;                      ///< session file to write; may hold strftime's %; empty: none
   std::vector<DeviceConfig> devices{DeviceConfig{}};
 
   bool operator==(const ServerConfig&) const = default;

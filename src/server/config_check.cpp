@@ -100,6 +100,16 @@ void checkDevice(const Checker& check, const DeviceConfig& device) {
   checkControl(check, device);
 }
 
+void checkRecord(const Checker& check, const std::string& file) {
+  const std::string extension = std::filesystem::path(file).extension();
+  for (const char* to : {"mcap", "csv", "vrpn"}) {
+    if (extension != std::string(".") + to) continue;
+    check.fail("record", "record: a server writes session files, not '" + file +
+                             "'; record to one called *.haptics, then 'hapticd export FILE.haptics --to " + to +
+                             "'");
+  }
+}
+
 }  // namespace
 
 void parseListen(const std::string& text, std::string& address, std::uint16_t& port) {
@@ -131,6 +141,7 @@ std::filesystem::path defaultBlackBoxDir() {
 void validate(const ServerConfig& config) {
   const Checker server;
   server.address("listen", config.listenAddress, "127.0.0.1");
+  checkRecord(server, config.record);
   server.range("seconds", config.seconds, 0, 1e9);
   for (const std::string& host : config.callbackHosts) server.address("callback_hosts", host, "10.0.0.7");
   std::map<std::string, int> uses;

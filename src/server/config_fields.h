@@ -70,6 +70,7 @@ void visitFields(Visitor& visitor, Server& server) requires requires {
   visitor.field("allow_no_rt", server.allowNoRealtime);
   visitor.field("seconds", server.seconds);
   visitor.field("callback_hosts", server.callbackHosts);
+  visitor.field("record", server.record);
 }
 
 }  // namespace hapticd::server

@@ -16,9 +16,11 @@ namespace hapticd::server {
 class SceneHost {
  public:
   /// `name` is that of the configuration; empty for the scene of one device alone.
-  SceneHost(std::string name, SceneOnDisconnect onDisconnect)
-      : name_(std::move(name)), onDisconnect_(onDisconnect) {}
+  SceneHost(std::uint32_t number, std::string name, SceneOnDisconnect onDisconnect)
+      : number_(number), name_(std::move(name)), onDisconnect_(onDisconnect) {}
 
+  /// From 0, in the order of the configuration.
+  std::uint32_t number() const noexcept { return number_; }
   const std::string& name() const noexcept { return name_; }
 
   /// Before start(): another device touches this scene.
@@ -36,6 +38,7 @@ class SceneHost {
   void clientGone(scene::ClientId client);
 
  private:
+  std::uint32_t number_;
   std::string name_;
   SceneOnDisconnect onDisconnect_;
   std::vector<SceneDevice> devices_;

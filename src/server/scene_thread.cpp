@@ -122,6 +122,7 @@ void SceneThread::apply(std::vector<SceneTask>& tasks) {
 void SceneThread::tell(SceneTask&& task) {
   const geometry::Nanos now = monotonicNow();
   auto* command = std::get_if<scene::SceneCommand>(&task.what);
+  if (callbacks_.telling) callbacks_.telling(task.client, now, command);
   std::vector<scene::Notice> again;
   for (std::size_t i = seats_.size(); i-- > 0;) {
     scene::SceneBuilder& builder = seats_[i].builder;
@@ -151,7 +152,15 @@ void SceneThread::publish() {
 
 void SceneThread::publishTo(Seat& seat) {
   std::vector<scene::Notice> said;
-  const auto snapshot = seat.builder.publish(monotonicNow(), said);
+  const geometry::Nanos now = monotonicNow();
+  std::shared_ptr<const scene::SceneSnapshot> snapshot;
+  try {
+    snapshot = seat.builder.publish(now, said);
+  } catch (...) {
+    if (seat.device.publishing) seat.device.publishing(now, 0);
+    throw;
+  }
+  if (seat.device.publishing) seat.device.publishing(now, snapshot ? snapshot->revision : 0);
   mergeNotices(std::move(said), notices_);
   if (!snapshot) {
     seat.device.slot->collect();

@@ -31,6 +31,9 @@ struct SceneDevice {
   realtime::SnapshotSlot* slot = nullptr;
   /// In the scene thread, after the slot has it.
   std::function<void(const std::shared_ptr<const scene::SceneSnapshot>&)> published;
+  /// In the scene thread, before the slot has it: when the builder was asked, and the revision that came; 0:
+  /// none. Empty unless somebody records.
+  std::function<void(geometry::Nanos, std::uint64_t)> publishing;
 };
 
 /// Owns one scene and the thread that drives it: a builder for each device, because workspace and what is
@@ -41,6 +44,8 @@ class SceneThread {
   struct Callbacks {
     std::function<void(std::vector<scene::Notice>&&)> notices;  ///< texts for clients
     std::function<void()> drained;                              ///< the queue is no longer full
+    /// Before the builders are told; null: the client is gone. Empty unless somebody records.
+    std::function<void(scene::ClientId, geometry::Nanos, const scene::SceneCommand*)> telling;
   };
 
   /// Tasks above this many bytes make full() true: the net thread then stops reading from its clients.

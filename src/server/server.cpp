@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <ctime>
 
 #include "wire/udp_request.h"
 
@@ -27,6 +28,18 @@ bool isLoopback(std::uint32_t address) {
   return (address >> 24) == 127;
 }
 
+// The name may hold the time, so that every start of a server has a file of its own.
+std::unique_ptr<record::Recorder> openRecording(const std::string& name) {
+  const std::time_t now = std::time(nullptr);
+  std::tm local{};
+  localtime_r(&now, &local);
+  char path[4096] = {};
+  if (std::strftime(path, sizeof path, name.c_str(), &local) == 0) {
+    throw ConfigError("record: '" + name + "' is too long for the name of a file");
+  }
+  return std::make_unique<record::Recorder>(path, [](const std::string& text) { spdlog::error("{}", text); });
+}
+
 }  // namespace
 
 // A connection on its way to a client that asked by datagram to be called back.
@@ -39,6 +52,7 @@ Server::Server(const ServerConfig& config) : config_(config) {
   validate(config_);
   loop_.setErrorHandler([](std::string_view text) { spdlog::error("{}", text); });
   names_.addSender("VRPN Control");  // the stock library's sender 0
+  if (!config_.record.empty()) recorder_ = openRecording(config_.record);
 
   for (const DeviceConfig& device : config_.devices) openDevice(device);
 
@@ -62,7 +76,7 @@ void Server::openDevice(const DeviceConfig& device) {
   std::vector<wire::LocalSender> senders;
   for (const std::string& name : device.names) senders.push_back(names_.addSender(name));
   stations_.push_back(
-      std::make_unique<Station>(device, senders, sceneFor(device), config_.allowNoRealtime));
+      std::make_unique<Station>(device, senders, sceneFor(device), config_.allowNoRealtime, recorder_.get()));
 }
 
 // Devices that name the same scene share it.
@@ -72,10 +86,32 @@ SceneHost& Server::sceneFor(const DeviceConfig& device) {
       if (scene->name() == device.scene) return *scene;
     }
   }
-  return *scenes_.emplace_back(std::make_unique<SceneHost>(device.scene, device.sceneOnDisconnect));
+  const auto number = static_cast<std::uint32_t>(scenes_.size());
+  return *scenes_.emplace_back(std::make_unique<SceneHost>(number, device.scene, device.sceneOnDisconnect));
+}
+
+void Server::startRecording() {
+  if (!recorder_) return;
+  recorder_->start(clock_.offset(), toToml(config_));
+  spdlog::info("recording to {}", recorder_->path().string());
+}
+
+void Server::finishRecording() {
+  if (!recorder_) return;
+  recorder_->finish();
+  const record::RecorderCounts& counts = recorder_->counts();
+  spdlog::info("recorded {} ticks, {:.1f} MB, in {}", counts.ticks, static_cast<double>(counts.bytes) * 1e-6,
+               recorder_->path().string());
+  recorder_.reset();
 }
 
 void Server::startScene(SceneHost& scene) {
+  std::function<void(scene::ClientId, Nanos, const scene::SceneCommand*)> telling;
+  if (recorder_) {
+    telling = [this, number = scene.number()](auto client, Nanos now, const auto* command) {
+      recorder_->told(number, client, now, command);
+    };
+  }
   scene.start({.notices =
                    [this, &scene](std::vector<scene::Notice>&& notices) {
                      loop_.post([this, &scene, notices = std::move(notices)]() mutable {
@@ -87,10 +123,12 @@ void Server::startScene(SceneHost& scene) {
                      loop_.post([this] {
                        for (const auto& [id, session] : sessions_) session->resume();
                      });
-                   }});
+                   },
+               .telling = std::move(telling)});
 }
 
 void Server::run() {
+  startRecording();
   for (const auto& scene : scenes_) startScene(*scene);
   for (const auto& owned : stations_) {
     Station* station = owned.get();
@@ -110,6 +148,7 @@ void Server::run() {
   loop_.run();
   for (const auto& station : stations_) station->stop();
   for (const auto& scene : scenes_) scene->stop();
+  finishRecording();
 }
 
 void Server::everySecond() {
@@ -319,10 +358,9 @@ void Server::deliver(const SceneHost& scene, std::vector<scene::Notice>&& notice
   for (const scene::Notice& notice : notices) {
     const auto session = sessions_.find(notice.client);
     if (session == sessions_.end()) continue;
-    session->second->send(nameFor(*session->second, scene),
-                          wire::Text{.severity = static_cast<std::uint32_t>(notice.severity),
-                                     .level = 0,
-                                     .text = notice.text});
+    session->second->send(
+        nameFor(*session->second, scene),
+        wire::Text{.severity = static_cast<std::uint32_t>(notice.severity), .level = 0, .text = notice.text});
     session->second->flush();
   }
 }

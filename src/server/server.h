@@ -11,6 +11,7 @@
 #include "net/loop.h"
 #include "net/tcp_listener.h"
 #include "net/udp_socket.h"
+#include "record/recorder.h"
 #include "server/clock.h"
 #include "server/config.h"
 #include "server/heartbeats.h"
@@ -53,6 +54,8 @@ class Server final : public SessionOwner {
   void openDevice(const DeviceConfig& device);
   SceneHost& sceneFor(const DeviceConfig& device);
   void startScene(SceneHost& scene);
+  void startRecording();
+  void finishRecording();
   void everySecond();
   void onServoWake(Station& station);
   void onHeartbeat(Session& session, const wire::MessageReceived& message);
@@ -68,6 +71,7 @@ class Server final : public SessionOwner {
   WallClock clock_;
   NoiseLog noise_;
   wire::LocalNames names_;
+  std::unique_ptr<record::Recorder> recorder_;  ///< outlives who tells it
   std::vector<std::unique_ptr<SceneHost>> scenes_;
   std::vector<std::unique_ptr<Station>> stations_;
   std::map<scene::ClientId, std::unique_ptr<Session>> sessions_;

@@ -72,12 +72,31 @@ Station::Impl::Impl(const DeviceConfig& config_, std::vector<wire::LocalSender> 
 }
 
 Station::Station(const DeviceConfig& config, std::vector<wire::LocalSender> names, SceneHost& scene,
-                 bool allowNoRealtime)
+                 bool allowNoRealtime, record::Recorder* recorder)
     : impl_(std::make_unique<Impl>(config, std::move(names), scene, allowNoRealtime)) {
   Impl& my = *impl_;
-  scene.add({.config = sceneConfig(my.config, my.device->profile()),
-             .slot = &my.tick.snapshots(),
-             .published = [&my](const auto& snapshot) { my.onPublished(*snapshot); }});
+  SceneDevice seat{.config = sceneConfig(my.config, my.device->profile()),
+                   .slot = &my.tick.snapshots(),
+                   .published = [&my](const auto& snapshot) { my.onPublished(*snapshot); },
+                   .publishing = {}};
+  if (recorder != nullptr) my.recordTo(*recorder, seat);
+  scene.add(std::move(seat));
+}
+
+void Station::Impl::recordTo(record::Recorder& session, SceneDevice& seat) {
+  const device::DeviceProfile& profile = device->profile();
+  const std::uint32_t number = session.addDevice({.names = config.names,
+                                                  .driver = config.driver,
+                                                  .model = profile.model,
+                                                  .buttons = profile.buttons,
+                                                  .scene = scene.number(),
+                                                  .sceneConfig = seat.config,
+                                                  .tick = tickOptions(config, profile)});
+  seat.config.stopwatch = session.stopwatch(number);
+  seat.publishing = [&session, number](geometry::Nanos now, std::uint64_t revision) {
+    session.published(number, now, revision);
+  };
+  tick.recordTo(&session.ring(number));
 }
 
 Station::~Station() {

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "record/recorder.h"
 #include "server/config.h"
 #include "server/outbox.h"
 #include "server/roles.h"
@@ -19,8 +20,9 @@ class SceneHost;
 class Station {
  public:
   /// Opens the device and joins the scene. Throws ConfigError or std::runtime_error with a remedy.
+  /// `recorder`, when there is one, hears of it from the first tick on and outlives it.
   Station(const DeviceConfig& config, std::vector<wire::LocalSender> names, SceneHost& scene,
-          bool allowNoRealtime);
+          bool allowNoRealtime, record::Recorder* recorder = nullptr);
   ~Station();
 
   /// Starts the servo. Throws std::runtime_error when the loop gets no realtime rights and must have them.

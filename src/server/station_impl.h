@@ -16,6 +16,7 @@ struct Station::Impl {
   Impl(const DeviceConfig& config_, std::vector<wire::LocalSender> names_, SceneHost& scene_,
        bool allowNoRealtime);
 
+  void recordTo(record::Recorder& session, SceneDevice& seat);
   void onPublished(const scene::SceneSnapshot& snapshot);
   void choose(Session& session, wire::LocalSender name, ReportChoice choice, double rate_Hz,
               std::string_view call);

@@ -133,6 +133,9 @@ RC_GTEST_PROP(SpatialIndex, StillDoesAfterRefitting, (std::uint64_t seed)) {
       }
     }
     index.refit([&](std::uint32_t id) { return boxes[id]; });
+    const SpatialIndex built = indexOver(boxes);
+    EXPECT_EQ(index.bounds().min, built.bounds().min) << "whoever takes lengths from them needs the same bits";
+    EXPECT_EQ(index.bounds().max, built.bounds().max);
     checkSuperset(index, boxes, world);
   }
 }

@@ -33,6 +33,7 @@ TEST(Config, ReadsEverySwitch) {
   const ServerConfig config = parseConfig(R"(
 listen = "0.0.0.0:4000"
 callback_hosts = ["10.0.0.7"]
+record = "session-%H%M.haptics"
 [[device]]
 names = ["Left", "Tracker0"]
 report_rate_Hz = 250
@@ -61,6 +62,7 @@ workspace = [-1, -2, -3, 4, 5, 6]
   EXPECT_EQ(config.listenAddress, "0.0.0.0");
   EXPECT_EQ(config.port, 4000);
   EXPECT_EQ(config.callbackHosts, std::vector<std::string>{"10.0.0.7"});
+  EXPECT_EQ(config.record, "session-%H%M.haptics");
   ASSERT_EQ(config.devices.size(), 2U);
   const DeviceConfig& left = config.devices[0];
   EXPECT_EQ(left.names, (std::vector<std::string>{"Left", "Tracker0"}));
@@ -124,6 +126,9 @@ TEST(Config, ValuesOutOfRangeAreNamedWithTheirLine) {
   // Nobody wrote the report rate that the servo cannot reach: its device is what can be pointed at.
   EXPECT_EQ(errorOf("\n\n[[device]]\nservo_rate_Hz=500"),
             "test.toml:3: device 'Phantom': report_rate_Hz is 1000; it must lie between 0.1 and 500");
+  EXPECT_EQ(errorOf("record=\"x.mcap\""),
+            "test.toml:1: record: a server writes session files, not 'x.mcap'; record to one called *.haptics, "
+            "then 'hapticd export FILE.haptics --to mcap'");
   EXPECT_EQ(errorOf("[[device]]\nblack_box_keep=-1"),
             "test.toml:2: device 'Phantom': black_box_keep is -1; it must lie between 0 and 1000");
   EXPECT_EQ(errorOf("[[device]]\nblack_box_keep=2.5"),
@@ -161,6 +166,7 @@ ServerConfig unusual() {
   config.allowNoRealtime = true;
   config.seconds = 0.1;
   config.callbackHosts = {"10.0.0.7", "10.0.0.8"};
+  config.record = "session.haptics";
   DeviceConfig device;
   device.names = {"Left \"hand\" \\", "Tracker0"};
   device.driver = "evdev";

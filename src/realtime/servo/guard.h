@@ -75,6 +75,8 @@ class Guard {
   /// The force to write.
   Vec3 step(const GuardInput& in) noexcept;
   const GuardReport& report() const noexcept { return report_; }
+  /// What the control said in the last step.
+  const GuardControl::Seen& seen() const noexcept { return seen_; }
 
  private:
   void obeyControl() noexcept;

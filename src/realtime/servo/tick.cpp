@@ -22,10 +22,10 @@ void Tick::operator()(const Pacing& pacing) noexcept {
   const Nanos started = clock_.now();
   const scene::SceneSnapshot& scene = takeSnapshot();
 
-  const bool haveState = device_.read(report_.time, report_.device);
+  haveState_ = device_.read(report_.time, report_.device);
   const Nanos period = report_.tick == 1 ? period_ : report_.timing.period;
   renderer_.step(scene, report_.device, report_.time, period, report_.rendering);
-  report_.force_N = guard_.step(guardInput(haveState));
+  report_.force_N = guard_.step(guardInput());
   written_ = device_.write(report_.force_N);
 
   report_.timing.compute = clock_.now() - started;
@@ -49,10 +49,10 @@ const scene::SceneSnapshot& Tick::takeSnapshot() noexcept {
   return scene;
 }
 
-GuardInput Tick::guardInput(bool haveState) const noexcept {
+GuardInput Tick::guardInput() const noexcept {
   GuardInput in;
   in.force_N = report_.rendering.force_N;
-  in.state = haveState ? &report_.device : nullptr;
+  in.state = haveState_ ? &report_.device : nullptr;
   in.period = report_.timing.period;
   // A callback has no deadline: what the period is too long is late, too.
   in.late = std::max(report_.timing.wakeupError, report_.timing.period - period_);
@@ -72,6 +72,7 @@ void Tick::publish() noexcept {
 
   blackBox_.record(report_);
   if ((report_.guard.latched & ~latchedBefore) != 0) blackBox_.freeze();
+  if (recordTo_ != nullptr) recordTo_->push({report_, guard_.seen(), haveState_, written_});
   reports_.push(report_);
   wake_.notify();
 }

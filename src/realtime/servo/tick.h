@@ -15,6 +15,7 @@
 #include "realtime/servo/histogram.h"
 #include "realtime/servo/pacer.h"
 #include "realtime/servo/report.h"
+#include "realtime/servo/tick_record.h"
 #include "realtime/servo/wake.h"
 
 namespace hapticd::realtime {
@@ -51,6 +52,9 @@ class Tick {
   /// After the last turn, in any thread: leaves no force behind.
   void finish() noexcept { device_.write(Vec3::Zero()); }
 
+  /// Before the first turn: from now on every turn goes to `ring` as well, which outlives the tick.
+  void recordTo(RecordRing* ring) noexcept { recordTo_ = ring; }
+
   /// Scene thread: publish and collect.
   SnapshotSlot& snapshots() noexcept { return snapshots_; }
   /// The one consumer of reports.
@@ -67,7 +71,7 @@ class Tick {
  private:
   void begin(const Pacing& pacing) noexcept;
   const scene::SceneSnapshot& takeSnapshot() noexcept;
-  GuardInput guardInput(bool haveState) const noexcept;
+  GuardInput guardInput() const noexcept;
   void publish() noexcept;
 
   device::Device& device_;
@@ -83,7 +87,9 @@ class Tick {
   BlackBox blackBox_;
   TickHistograms histograms_;
   TickReport report_;
-  bool written_ = true;  // the device took the last force
+  RecordRing* recordTo_ = nullptr;
+  bool haveState_ = false;  // the device gave a state in this turn
+  bool written_ = true;     // the device took the last force
 };
 
 }  // namespace hapticd::realtime

@@ -207,9 +207,12 @@ TEST_F(RealtimeLaw, HoldsInSimulatedTime) {
   device::SimulatedDevice device;
   SimulatedClock clock;
   Tick tick(device, clock, simulatedHand());
+  RecordRing recorded(64);
+  tick.recordTo(&recorded);
   Scenery scenery;
   std::uint64_t touching = 0;
   std::uint64_t forces = 0;
+  std::uint64_t kept = 0;
   for (Nanos i = 0; i < 30'000; ++i) {
     if (i % 37 == 0) tick.snapshots().publish(scenery.next(i * kMs));
     if (i % 5'000 == 0) device.setPath(strokes(static_cast<int>(i / 5'000)));
@@ -221,8 +224,12 @@ TEST_F(RealtimeLaw, HoldsInSimulatedTime) {
     touching += tick.last().rendering.touching;
     forces += tick.last().force_N.norm() > 0.1;
     tick.reports().consume([](const TickReport&) {});
+    // Now and then the recorder is late, and ticks are dropped.
+    if (i % 100 == 99) kept += recorded.consume([](const TickRecord&) {});
   }
   expectLawful();
+  EXPECT_EQ(kept, 300U * 64);
+  EXPECT_EQ(recorded.dropped(), 30'000U - kept);
   EXPECT_GT(touching, 2'000U);
   EXPECT_GT(forces, 5'000U);
 }
@@ -231,6 +238,8 @@ TEST_F(RealtimeLaw, HoldsInTheServoThreadWhileScenesAreSwapped) {
   device::SimulatedDevice device;
   MonotonicClock clock;
   Tick tick(device, clock, simulatedHand());
+  RecordRing recorded(1024);
+  tick.recordTo(&recorded);
   ServoThread thread(
       [&](const Pacing& pacing) {
         law::enter();
@@ -251,6 +260,7 @@ TEST_F(RealtimeLaw, HoldsInTheServoThreadWhileScenesAreSwapped) {
       ticks = report.tick;
       touching += report.rendering.touching;
     });
+    recorded.consume([](const TickRecord&) {});
     clock.sleepUntil(clock.now() + 3 * kMs);  // leaves the processor to the servo; decides nothing
   }
   thread.stop();

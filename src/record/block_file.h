@@ -1,0 +1,55 @@
+// A file as a sequence of blocks, each with its length and a checksum: what was written before a crash stays
+// readable, and damage is found where it is.
+#pragma once
+
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "record/archive.h"
+
+namespace hapticd::record {
+
+/// What a block holds. Numbers are never used again.
+enum class BlockKind : std::uint32_t { header = 1, scene = 2, publish = 3, ticks = 4, lost = 5, end = 6 };
+
+inline constexpr std::size_t kMagicBytes = 8;
+inline constexpr std::size_t kBlockHeadBytes = 12;
+
+/// Appends a block: kind, length of the content, checksum of all three but itself, content.
+void appendBlock(Bytes& out, BlockKind kind, ByteView content);
+/// What every file begins with.
+ByteView magic();
+
+/// Steps through the blocks of a file.
+class BlockReader {
+ public:
+  struct Block {
+    BlockKind kind{};
+    std::uint64_t offset = 0;  ///< of its head in the file
+    Bytes content;
+  };
+
+  /// Throws SessionError when the file cannot be opened or is none of ours.
+  explicit BlockReader(const std::filesystem::path& file);
+
+  /// The next whole block; false at the end and where nothing whole follows.
+  bool next(Block& block);
+  /// Where reading stands.
+  std::uint64_t offset() const noexcept { return offset_; }
+  /// Why next() was false before the end of the file, naming the byte; empty when it was the end.
+  const std::string& damage() const noexcept { return damage_; }
+
+ private:
+  struct Close {
+    void operator()(std::FILE* file) const noexcept { std::fclose(file); }
+  };
+
+  std::unique_ptr<std::FILE, Close> file_;
+  std::uint64_t size_ = 0;
+  std::uint64_t offset_ = 0;
+  std::string damage_;
+};
+
+}  // namespace hapticd::record

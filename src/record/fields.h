@@ -1,0 +1,208 @@
+// The fields of everything in a session file but the commands. The structured bindings count the members: a
+// new one does not compile until it is listed, and then kFormatVersion must go up.
+#pragma once
+
+#include "record/command_fields.h"
+#include "record/session.h"
+
+namespace hapticd::record {
+
+template <Is<geometry::Box> T, class V>
+void fields(T& box, V&& v) {
+  auto& [min, max] = box;
+  v("min", min);
+  v("max", max);
+}
+
+template <Is<scene::SceneLimits> T, class V>
+void fields(T& limits, V&& v) {
+  auto& [objects, nesting, verticesPerObject, trianglesPerObject, verticesInAll, trianglesInAll, effects,
+         batch_bytes] = limits;
+  v("objects", objects);
+  v("nesting", nesting);
+  v("vertices_per_object", verticesPerObject);
+  v("triangles_per_object", trianglesPerObject);
+  v("vertices_in_all", verticesInAll);
+  v("triangles_in_all", trianglesInAll);
+  v("effects", effects);
+  v("batch_bytes", batch_bytes);
+}
+
+template <Is<scene::SceneConfig> T, class V>
+void fields(T& config, V&& v) {
+  auto& [materialScale, workspaceFit, contactVibrationUnit, motorVibrationFrame, deviceWorkspace_m,
+         nominalStiffness_N_per_m, nominalForce_N, ownDamping_Ns_per_m, servoPeriod_s, transportDelay_s, raw,
+         checkMeshes, limits, stopwatch] = config;
+  v("material_scale", materialScale);
+  v("workspace_fit", workspaceFit);
+  v("contact_vibration_unit", contactVibrationUnit);
+  v("motor_vibration_frame", motorVibrationFrame);
+  v("device_workspace_m", deviceWorkspace_m);
+  v("nominal_stiffness_N_per_m", nominalStiffness_N_per_m);
+  v("nominal_force_N", nominalForce_N);
+  v("own_damping_Ns_per_m", ownDamping_Ns_per_m);
+  v("servo_period_s", servoPeriod_s);
+  v("transport_delay_s", transportDelay_s);
+  v("raw", raw);
+  v("check_meshes", checkMeshes);
+  v("limits", limits);
+  static_cast<void>(stopwatch);  // its readings are in the publish events
+}
+
+template <Is<realtime::RenderOptions> T, class V>
+void fields(T& options, V&& v) {
+  auto& [toolRadius_m, forceShading] = options;
+  v("tool_radius_m", toolRadius_m);
+  v("force_shading", forceShading);
+}
+
+template <Is<realtime::GuardOptions> T, class V>
+void fields(T& options, V&& v) {
+  auto& [enabled, selfRecover, armed, peakForce_N, continuousForce_N, slew_N_per_s, speed_m_per_s, speedTicks,
+         calmSpeed_m_per_s, rampIn, late, lateDecay, stalled, blend] = options;
+  v("enabled", enabled);
+  v("self_recover", selfRecover);
+  v("armed", armed);
+  v("peak_force_N", peakForce_N);
+  v("continuous_force_N", continuousForce_N);
+  v("slew_N_per_s", slew_N_per_s);
+  v("speed_m_per_s", speed_m_per_s);
+  v("speed_ticks", speedTicks);
+  v("calm_speed_m_per_s", calmSpeed_m_per_s);
+  v("ramp_in_ns", rampIn);
+  v("late_ns", late);
+  v("late_decay_ns", lateDecay);
+  v("stalled_ns", stalled);
+  v("blend_ns", blend);
+}
+
+template <Is<realtime::TickOptions> T, class V>
+void fields(T& options, V&& v) {
+  auto& [rate_Hz, render, guard, reports, blackBox_s] = options;
+  v("rate_Hz", rate_Hz);
+  v("render", render);
+  v("guard", guard);
+  static_cast<void>(reports);  // sizes of memory
+  static_cast<void>(blackBox_s);
+}
+
+template <Is<SessionDevice> T, class V>
+void fields(T& device, V&& v) {
+  auto& [names, driver, model, buttons, scene, sceneConfig, tick] = device;
+  v("names", names);
+  v("driver", driver);
+  v("model", model);
+  v("buttons", buttons);
+  v("scene", scene);
+  v("scene_config", sceneConfig);
+  v("tick", tick);
+}
+
+template <Is<SessionHeader> T, class V>
+void fields(T& header, V&& v) {
+  auto& [program, wallOffset, config, devices] = header;
+  v("program", program);
+  v("wall_offset_ns", wallOffset);
+  v("config", config);
+  v("devices", devices);
+}
+
+template <Is<PublishEvent> T, class V>
+void fields(T& event, V&& v) {
+  auto& [device, time, revision, stopwatch] = event;
+  v("device", device);
+  v("time_ns", time);
+  v("revision", revision);
+  v("stopwatch_ns", stopwatch);
+}
+
+template <Is<LostEvent> T, class V>
+void fields(T& event, V&& v) {
+  auto& [what, device, count] = event;
+  v("what", what);
+  v("device", device);
+  v("count", count);
+}
+
+template <Is<EndEvent> T, class V>
+void fields(T& event, V&& v) {
+  auto& [time] = event;
+  v("time_ns", time);
+}
+
+template <Is<device::DeviceState> T, class V>
+void fields(T& state, V&& v) {
+  auto& [time, position_m, orientation, velocity_m_per_s, angularVelocity_rad_per_s, buttons, hold,
+         motorTemperature] = state;
+  v("time_ns", time);
+  v("position_m", position_m);
+  v("orientation", orientation);
+  v("velocity_m_per_s", velocity_m_per_s);
+  v("angular_velocity_rad_per_s", angularVelocity_rad_per_s);
+  v("buttons", buttons);
+  v("hold", hold);
+  v("motor_temperature", motorTemperature);
+}
+
+template <Is<realtime::Contact> T, class V>
+void fields(T& contact, V&& v) {
+  auto& [object, triangle, point_m, normal, force_N] = contact;
+  v("object", object);
+  v("triangle", triangle);
+  v("point_m", point_m);
+  v("normal", normal);
+  v("force_N", force_N);
+}
+
+/// But for the list of contacts, which is as long as contactCount says.
+template <Is<realtime::Rendering> T, class V>
+void fields(T& felt, V&& v) {
+  auto& [proxy_m, force_N, contactForce_N, normalForce_N, touching, touchedObject, depth_m, normal, scp_m,
+         contactCount, contacts, status] = felt;
+  v("proxy_m", proxy_m);
+  v("force_N", force_N);
+  v("contact_force_N", contactForce_N);
+  v("normal_force_N", normalForce_N);
+  v("touching", touching);
+  v("touched_object", touchedObject);
+  v("depth_m", depth_m);
+  v("normal", normal);
+  v("scp_m", scp_m);
+  v("contact_count", contactCount);
+  v("status", status);
+  static_cast<void>(contacts);
+}
+
+template <Is<realtime::TickTiming> T, class V>
+void fields(T& timing, V&& v) {
+  auto& [period, wakeupError, compute, overruns, skippedPeriods] = timing;
+  v("period_ns", period);
+  v("wakeup_error_ns", wakeupError);
+  v("compute_ns", compute);
+  v("overruns", overruns);
+  v("skipped_periods", skippedPeriods);
+}
+
+/// But for the counts, which are written when they change.
+template <Is<realtime::GuardReport> T, class V>
+void fields(T& guard, V&& v) {
+  auto& [active, latched, counts, gain, limit_N, armed, stopped] = guard;
+  v("active", active);
+  v("latched", latched);
+  v("gain", gain);
+  v("limit_N", limit_N);
+  v("armed", armed);
+  v("stopped", stopped);
+  static_cast<void>(counts);
+}
+
+template <Is<realtime::GuardControl::Seen> T, class V>
+void fields(T& seen, V&& v) {
+  auto& [stopped, armed, rearms, ramps] = seen;
+  v("stopped", stopped);
+  v("armed", armed);
+  v("rearms", rearms);
+  v("ramps", ramps);
+}
+
+}  // namespace hapticd::record

@@ -1,0 +1,189 @@
+#include "record/rerender.h"
+
+#include "record/archive.h"
+#include "record/changed_surfaces.h"
+#include "record/fields.h"
+#include "scene/builder.h"
+
+namespace hapticd::record {
+namespace {
+
+using realtime::GuardControl;
+using realtime::TickReport;
+
+// It is where the record says, and takes forces as it did then.
+class RecordedDevice final : public device::Device {
+ public:
+  void use(const realtime::TickRecord& tick) noexcept { tick_ = &tick; }
+
+  void open() override {}
+  void close() noexcept override {}
+  const device::DeviceProfile& profile() const noexcept override { return profile_; }
+  bool read(Nanos /*now*/, device::DeviceState& state) noexcept override {
+    if (tick_->haveState) state = tick_->report.device;
+    return tick_->haveState;
+  }
+  bool write(const geometry::Vec3& /*force_N*/) noexcept override {
+    return tick_ == nullptr || tick_->written;
+  }
+
+ private:
+  const device::DeviceProfile profile_;
+  const realtime::TickRecord* tick_ = nullptr;
+};
+
+Bytes outcome(const TickReport& report) {
+  Bytes bytes;
+  Packer pack(bytes);
+  pack.put(report.revision);
+  pack.put(report.rendering);
+  for (std::uint32_t i = 0; i < report.rendering.contactCount; ++i) pack.put(report.rendering.contacts[i]);
+  pack.put(report.force_N);
+  pack.put(report.guard);
+  pack.put(report.guard.counts);
+  pack.put(report.T_world_device);
+  return bytes;
+}
+
+scene::SceneConfig changed(scene::SceneConfig config, const RerenderChanges& changes) {
+  config.raw = config.raw || changes.raw;
+  return config;
+}
+
+realtime::TickOptions changed(realtime::TickOptions options, const RerenderChanges& changes) {
+  options.render.toolRadius_m = changes.toolRadius_m.value_or(options.render.toolRadius_m);
+  options.render.forceShading = changes.forceShading.value_or(options.render.forceShading);
+  if (changes.raw) options.guard.enabled = false;
+  options.reports = 1;
+  options.blackBox_s = 0;
+  return options;
+}
+
+}  // namespace
+
+bool RerenderChanges::surfaces() const noexcept {
+  return stiffness_N_per_m || damping_Ns_per_m || staticFriction || dynamicFriction;
+}
+
+bool RerenderChanges::none() const noexcept {
+  return !surfaces() && !toolRadius_m && !forceShading && !raw;
+}
+
+bool sameOutcome(const TickReport& a, const TickReport& b) {
+  return outcome(a) == outcome(b);
+}
+
+// One device, with its view of the scene.
+struct Rerenderer::Seat {
+  Seat(const SessionDevice& recorded, const RerenderChanges& changes)
+      : scene(recorded.scene),
+        control{false, recorded.tick.guard.armed, 0, 0},
+        surfaces(changes, changed(recorded.sceneConfig, changes)),
+        builder(withStopwatch(changed(recorded.sceneConfig, changes))),
+        tick(device, clock, changed(recorded.tick, changes)) {}
+
+  scene::SceneConfig withStopwatch(scene::SceneConfig config) {
+    config.stopwatch = [this] {
+      if (readings.empty()) return lastReading;
+      lastReading = readings.front();
+      readings.pop_front();
+      return lastReading;
+    };
+    return config;
+  }
+
+  // As the guard saw it then; it only looks at what changed.
+  void obey(const GuardControl::Seen& wanted) {
+    if (wanted.rearms != control.rearms) tick.control().rearm();
+    if (wanted.ramps != control.ramps) tick.control().rampIn();
+    if (wanted.stopped) tick.control().stop();
+    if (wanted.armed) {
+      tick.control().arm();
+    } else {
+      tick.control().disarm();
+    }
+    control = wanted;
+  }
+
+  void show(std::uint64_t revision) {
+    if (revision == shown) return;
+    while (!unseen.empty() && unseen.front().first < revision) unseen.pop_front();
+    if (unseen.empty() || unseen.front().first != revision) return;  // lost
+    tick.snapshots().publish(unseen.front().second);
+    unseen.pop_front();
+    shown = revision;
+  }
+
+  const std::uint32_t scene;
+  GuardControl::Seen control;
+  std::deque<Nanos> readings;  // of the stopwatch, in the publish at hand
+  Nanos lastReading = 0;
+  ChangedSurfaces surfaces;
+  scene::SceneBuilder builder;
+  std::shared_ptr<const scene::SceneSnapshot> newest;
+  std::deque<std::pair<std::uint64_t, std::shared_ptr<const scene::SceneSnapshot>>> unseen;
+  std::uint64_t shown = 0;
+
+  realtime::SimulatedClock clock;
+  RecordedDevice device;
+  realtime::Tick tick;
+};
+
+Rerenderer::Rerenderer(const SessionHeader& header, const RerenderChanges& changes) {
+  for (const SessionDevice& device : header.devices) {
+    seats_.push_back(std::make_unique<Seat>(device, changes));
+  }
+}
+
+Rerenderer::~Rerenderer() = default;
+
+const TickReport* Rerenderer::feed(const SessionEvent& event) {
+  if (const auto* told = std::get_if<SceneEvent>(&event)) on(*told);
+  if (const auto* published = std::get_if<PublishEvent>(&event)) on(*published);
+  if (const auto* tick = std::get_if<TickEvent>(&event)) return on(*tick);
+  return nullptr;
+}
+
+void Rerenderer::on(const SceneEvent& event) {
+  std::vector<scene::Notice> notices;
+  for (const auto& seat : seats_) {
+    if (seat->scene != event.scene) continue;
+    try {
+      if (event.command) {
+        seat->builder.apply(event.client, scene::SceneCommand(*event.command), event.time, notices);
+      } else {
+        seat->builder.clientGone(event.client, event.time);
+      }
+    } catch (const std::exception&) {
+      // The scene thread told the client and went on, too.
+    }
+  }
+}
+
+void Rerenderer::on(const PublishEvent& event) {
+  Seat& seat = *seats_.at(event.device);
+  seat.readings.assign(event.stopwatch.begin(), event.stopwatch.end());
+  std::vector<scene::Notice> notices;
+  try {
+    if (auto snapshot = seat.builder.publish(event.time, notices)) {
+      seat.newest = seat.surfaces.of(std::move(snapshot));
+    }
+  } catch (const std::exception&) {
+    // The scene that is felt stays as it is, as it did then.
+  }
+  // Another surface may make another number of revisions: what counts is which was the newest then.
+  if (event.revision != 0) seat.unseen.emplace_back(event.revision, seat.newest);
+}
+
+const TickReport* Rerenderer::on(const TickEvent& event) {
+  Seat& seat = *seats_.at(event.device);
+  const TickReport& recorded = event.tick.report;
+  seat.show(recorded.revision);
+  seat.obey(event.tick.control);
+  seat.device.use(event.tick);
+  seat.tick(
+      {recorded.time, recorded.timing.wakeupError, recorded.timing.overruns, recorded.timing.skippedPeriods});
+  return &seat.tick.last();
+}
+
+}  // namespace hapticd::record

@@ -1,0 +1,74 @@
+#include "record/tick_codec.h"
+
+#include "record/fields.h"
+
+namespace hapticd::record {
+namespace {
+
+using realtime::TickRecord;
+
+enum Has : std::uint8_t {
+  kHaveState = 1U << 0,
+  kWritten = 1U << 1,
+  kPlacement = 1U << 2,
+  kCounts = 1U << 3,
+};
+
+// What is in every tick, in this order. `Record` may be const.
+template <class Record, class V>
+void always(Record& tick, V&& v) {
+  auto& report = tick.report;
+  v("tick", report.tick);
+  v("time_ns", report.time);
+  v("revision", report.revision);
+  v("control", tick.control);
+  v("timing", report.timing);
+  v("device", report.device);
+  v("rendering", report.rendering);
+  v("force_N", report.force_N);
+  v("guard", report.guard);
+  v("dropped", report.dropped);
+}
+
+bool samePlacement(const realtime::TickReport& a, const realtime::TickReport& b) {
+  return a.T_world_device.matrix() == b.T_world_device.matrix();
+}
+
+}  // namespace
+
+void TickPacker::add(const TickRecord& tick, Bytes& out) {
+  const realtime::TickReport& report = tick.report;
+  const bool placement = first_ || !samePlacement(report, before_);
+  const bool counts = first_ || report.guard.counts != before_.guard.counts;
+  Packer pack(out);
+  pack.put(static_cast<std::uint8_t>((tick.haveState ? kHaveState : 0) | (tick.written ? kWritten : 0) |
+                                     (placement ? kPlacement : 0) | (counts ? kCounts : 0)));
+  always(tick, pack);
+  for (std::uint32_t i = 0; i < report.rendering.contactCount; ++i) pack.put(report.rendering.contacts[i]);
+  if (placement) pack.put(report.T_world_device);
+  if (counts) pack.put(report.guard.counts);
+  first_ = false;
+  before_ = report;
+}
+
+bool TickUnpacker::next(TickRecord& tick) {
+  if (!ok_ || in_.rest().empty()) return false;
+  tick = TickRecord();
+  const auto has = in_.next<std::uint8_t>();
+  tick.haveState = (has & kHaveState) != 0;
+  tick.written = (has & kWritten) != 0;
+  always(tick, in_);
+  realtime::Rendering& felt = tick.report.rendering;
+  ok_ = in_.ok() && felt.contactCount <= felt.contacts.size();
+  if (!ok_) return false;
+  for (std::uint32_t i = 0; i < felt.contactCount; ++i) in_.take(felt.contacts[i]);
+  tick.report.T_world_device = before_.T_world_device;
+  tick.report.guard.counts = before_.guard.counts;
+  if ((has & kPlacement) != 0) in_.take(tick.report.T_world_device);
+  if ((has & kCounts) != 0) in_.take(tick.report.guard.counts);
+  before_ = tick.report;
+  ok_ = in_.ok();
+  return ok_;
+}
+
+}  // namespace hapticd::record

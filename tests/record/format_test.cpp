@@ -1,0 +1,323 @@
+// What goes into a session file comes out of it, and what is cut or damaged says so.
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <cstring>
+#include <fstream>
+#include <random>
+
+#include "record/block_file.h"
+#include "record/crc32.h"
+#include "record/fields.h"
+#include "record/pack_commands.h"
+#include "record/recorder.h"
+#include "record/session_file.h"
+#include "record/session_reader.h"
+
+namespace hapticd::record {
+namespace {
+
+using test::SessionFile;
+
+// Fills every field of anything with any bits, by the same lists that the file is written by; the structured
+// bindings there see to it that no field is missing.
+class Filler {
+ public:
+  explicit Filler(std::uint64_t seed) : random_(seed) {}
+
+  template <class T>
+  void operator()(const char*, T& value) {
+    fill(value);
+  }
+  template <Scalar T>
+  void fill(T& value) {
+    const std::uint64_t bits = random_();
+    std::memcpy(&value, &bits, sizeof value);
+  }
+  void fill(bool& value) { value = random_() % 2 == 0; }
+  template <IsEnum T>
+  void fill(T& value) {
+    value = static_cast<T>(random_() % 3);
+  }
+  void fill(std::string& text) {
+    text.resize(random_() % 40);
+    for (char& c : text) c = static_cast<char>(random_());
+  }
+  template <class T>
+  void fill(std::vector<T>& list) {
+    list.resize(random_() % 20);
+    for (T& item : list) fill(item);
+  }
+  template <class T, std::size_t N>
+  void fill(std::array<T, N>& list) {
+    for (T& item : list) fill(item);
+  }
+  template <class S, int R, int C>
+  void fill(Eigen::Matrix<S, R, C>& m) {
+    for (Eigen::Index i = 0; i < m.size(); ++i) fill(m.data()[i]);
+  }
+  void fill(geometry::Quat& q) { fill(q.coeffs()); }
+  template <class T>
+  void fill(T& value) requires(std::is_class_v<T>) {
+    fields(value, *this);
+  }
+
+ private:
+  std::mt19937_64 random_;
+};
+
+template <class T>
+Bytes packed(const T& value) {
+  Bytes bytes;
+  Packer(bytes).put(value);
+  return bytes;
+}
+
+Bytes packedEvent(const SceneEvent& event) {
+  Bytes bytes;
+  packSceneEvent(bytes, event.scene, event.client, event.time, event.command ? &*event.command : nullptr);
+  return bytes;
+}
+
+// One of each command, filled by chance.
+std::vector<SceneEvent> oneOfEach(std::uint64_t seed) {
+  Filler filler(seed);
+  std::vector<SceneEvent> events;
+  std::apply(
+      [&](const auto&... entry) {
+        const auto add = [&]<class C>(const CommandEntry<C>&) {
+          C command;
+          filler.fill(command);
+          events.push_back({3, 14, 1592, scene::SceneCommand(std::move(command))});
+        };
+        (add(entry), ...);
+      },
+      kCommands);
+  events.push_back({1, 2, 3, std::nullopt});
+  return events;
+}
+
+RC_GTEST_PROP(Commands, ComeBackAsTheyWere, (std::uint64_t seed)) {
+  for (const SceneEvent& event : oneOfEach(seed)) {
+    const Bytes bytes = packedEvent(event);
+    SceneEvent back;
+    std::string error;
+    RC_ASSERT(unpackSceneEvent(bytes, back, error));
+    RC_ASSERT(back.scene == event.scene && back.client == event.client && back.time == event.time);
+    RC_ASSERT(back.command.has_value() == event.command.has_value());
+    if (event.command) RC_ASSERT(back.command->index() == event.command->index());
+    RC_ASSERT(packedEvent(back) == bytes);
+  }
+}
+
+RC_GTEST_PROP(Commands, CutShortAreRefused, (std::uint64_t seed)) {
+  for (const SceneEvent& event : oneOfEach(seed)) {
+    const Bytes bytes = packedEvent(event);
+    SceneEvent back;
+    for (std::size_t size = 0; size < bytes.size(); ++size) {
+      std::string error;
+      RC_ASSERT(!unpackSceneEvent(ByteView(bytes).first(size), back, error));
+      RC_ASSERT(!error.empty());
+    }
+  }
+}
+
+// Files keep their meaning: a number is never given to another command.
+TEST(Commands, KeepTheirNumbers) {
+  Bytes bytes;
+  const scene::SceneCommand command = scene::SetTransform{5, {1, 2}};
+  packSceneEvent(bytes, 1, 2, 3, &command);
+  ASSERT_GT(bytes.size(), 22U);
+  EXPECT_EQ(wire::loadBig<std::uint16_t>(bytes.data() + 16), 13);
+  EXPECT_EQ(wire::loadBig<std::int32_t>(bytes.data() + 18), 5);
+  EXPECT_EQ(wire::loadBig<double>(bytes.data() + 22 + 8), 2.0);
+  EXPECT_STREQ(nameOf(command), "SetTransform");
+}
+
+realtime::TickRecord anyTick(Filler& filler, std::uint64_t number) {
+  realtime::TickRecord tick;
+  filler.fill(tick.report.device);
+  filler.fill(tick.report.rendering);
+  filler.fill(tick.report.guard);
+  filler.fill(tick.report.timing);
+  filler.fill(tick.report.force_N);
+  filler.fill(tick.control);
+  filler.fill(tick.haveState);
+  filler.fill(tick.written);
+  tick.report.tick = number;
+  tick.report.rendering.contactCount = static_cast<std::uint32_t>(number % 5);
+  for (std::uint32_t i = 0; i < number % 5; ++i) filler.fill(tick.report.rendering.contacts[i]);
+  tick.report.T_world_device.translation().x() = static_cast<double>(number / 3);
+  tick.report.guard.counts[4] = static_cast<std::uint32_t>(number / 4);
+  return tick;
+}
+
+Bytes allOf(const realtime::TickRecord& tick) {
+  Bytes bytes;
+  TickPacker().add(tick, bytes);  // a first one holds everything
+  return bytes;
+}
+
+RC_GTEST_PROP(Ticks, ComeBackAsTheyWere, (std::uint64_t seed)) {
+  Filler filler(seed);
+  std::vector<realtime::TickRecord> ticks;
+  Bytes run;
+  TickPacker packer;
+  for (std::uint64_t i = 1; i <= 20; ++i) {
+    ticks.push_back(anyTick(filler, i));
+    packer.add(ticks.back(), run);
+  }
+  TickUnpacker unpacker(run);
+  realtime::TickRecord back;
+  for (const realtime::TickRecord& tick : ticks) {
+    RC_ASSERT(unpacker.next(back));
+    RC_ASSERT(allOf(back) == allOf(tick));
+  }
+  RC_ASSERT(!unpacker.next(back));
+  RC_ASSERT(unpacker.ok());
+}
+
+RC_GTEST_PROP(Header, ComesBackAsItWas, (std::uint64_t seed)) {
+  Filler filler(seed);
+  SessionHeader header;
+  filler.fill(header);
+  const Bytes bytes = packed(header);
+  Unpacker in(bytes);
+  const auto back = in.next<SessionHeader>();
+  RC_ASSERT(in.ok() && in.rest().empty());
+  RC_ASSERT(packed(back) == bytes);
+}
+
+TEST(Unpacker, ALengthOfMoreThanIsThereIsRefusedWithoutTakingTheMemory) {
+  const Bytes bytes = packed(std::uint32_t{0xFFFFFFFF});
+  Unpacker list(bytes);
+  EXPECT_TRUE(list.next<std::vector<double>>().empty());
+  EXPECT_FALSE(list.ok());
+  Unpacker text(bytes);
+  EXPECT_TRUE(text.next<std::string>().empty());
+  EXPECT_FALSE(text.ok());
+}
+
+TEST(Crc32, IsThatOfZlib) {
+  const std::string text = "123456789";
+  const ByteView bytes = std::as_bytes(std::span(text));
+  EXPECT_EQ(crc32(bytes), 0xCBF43926U);
+  EXPECT_EQ(crc32(bytes.subspan(4), crc32(bytes.first(4))), 0xCBF43926U);
+}
+
+// A small session, of every kind of block.
+class SmallSession : public testing::Test {
+ protected:
+  void SetUp() override {
+    Recorder recorder(file_.path(), [](const std::string& text) { ADD_FAILURE() << text; });
+    SessionDevice device;
+    device.names = {"Phantom"};
+    recorder.addDevice(device);
+    recorder.start(77, "config");
+    const scene::SceneCommand command = scene::AddObject{4, -1};
+    recorder.told(0, 9, 100, &command);
+    const auto stopwatch = recorder.stopwatch(0);
+    first_ = stopwatch();
+    stopwatch();
+    recorder.published(0, 110, 1);
+    recorder.told(0, 9, 120, nullptr);
+    Filler filler(1);
+    for (std::uint64_t i = 1; i <= 3; ++i) recorder.ring(0).push(anyTick(filler, i));
+    recorder.finish();
+    std::ifstream in(file_.path(), std::ios::binary);
+    bytes_.assign(std::istreambuf_iterator<char>(in), {});
+  }
+
+  // Rewrites the file and reads what is left of it: the number of events, and the remark or error.
+  std::pair<std::size_t, std::string> read(const std::string& bytes) {
+    std::ofstream(file_.path(), std::ios::binary) << bytes;
+    std::size_t events = 0;
+    try {
+      SessionReader reader(file_.path());
+      for (SessionEvent event; reader.next(event);) ++events;
+      return {events, reader.remark()};
+    } catch (const SessionError& error) {
+      return {events, error.what()};
+    }
+  }
+
+  SessionFile file_;
+  std::string bytes_;
+  Nanos first_ = 0;
+};
+
+TEST_F(SmallSession, HoldsWhatWasRecorded) {
+  SessionReader reader(file_.path());
+  EXPECT_EQ(reader.header().config, "config");
+  EXPECT_EQ(reader.header().wallOffset, 77);
+  EXPECT_EQ(reader.header().program.rfind("hapticd ", 0), 0U);
+  SessionEvent event;
+  ASSERT_TRUE(reader.next(event));
+  EXPECT_EQ(std::get<scene::AddObject>(*std::get<SceneEvent>(event).command).object, 4);
+  ASSERT_TRUE(reader.next(event));
+  EXPECT_EQ(std::get<PublishEvent>(event).revision, 1U);
+  ASSERT_EQ(std::get<PublishEvent>(event).stopwatch.size(), 2U);
+  EXPECT_EQ(std::get<PublishEvent>(event).stopwatch[0], first_);
+  ASSERT_TRUE(reader.next(event));
+  EXPECT_FALSE(std::get<SceneEvent>(event).command);
+  for (std::uint64_t i = 1; i <= 3; ++i) {
+    ASSERT_TRUE(reader.next(event));
+    EXPECT_EQ(std::get<TickEvent>(event).tick.report.tick, i);
+  }
+  ASSERT_TRUE(reader.next(event));
+  EXPECT_TRUE(std::holds_alternative<EndEvent>(event));
+  EXPECT_FALSE(reader.next(event));
+  EXPECT_EQ(reader.remark(), "");
+}
+
+TEST_F(SmallSession, CutAtAnyByteIsReadToTheLastWholeBlock) {
+  const std::string whole = bytes_;
+  const std::size_t all = read(whole).first;
+  std::size_t before = 0;
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    const auto [events, remark] = read(whole.substr(0, size));
+    EXPECT_NE(remark, "") << size;
+    EXPECT_GE(events, before) << "more of the file, fewer events: " << size;
+    EXPECT_LE(events, all);
+    before = events;
+  }
+  EXPECT_EQ(before, all - 1);
+}
+
+TEST_F(SmallSession, ADamagedByteIsFoundWhereItIs) {
+  const std::string whole = bytes_;
+  // Where the blocks begin.
+  std::vector<std::uint64_t> starts;
+  BlockReader blocks(file_.path());
+  for (BlockReader::Block block; blocks.next(block);) starts.push_back(block.offset);
+  for (std::size_t at = kMagicBytes; at < whole.size(); ++at) {
+    std::string damaged = whole;
+    damaged[at] = static_cast<char>(damaged[at] ^ 0x10);
+    const std::string remark = read(damaged).second;
+    const std::uint64_t block = *(std::upper_bound(starts.begin(), starts.end(), at) - 1);
+    EXPECT_NE(remark.find("at byte " + std::to_string(block) + " of " + std::to_string(whole.size())),
+              std::string::npos)
+        << at << ": " << remark;
+  }
+}
+
+TEST_F(SmallSession, AnotherVersionAndOtherFilesAreRefused) {
+  Bytes file(magic().begin(), magic().end());
+  appendBlock(file, BlockKind::header, packed(std::uint32_t{2}));
+  const std::string newer(reinterpret_cast<const char*>(file.data()), file.size());
+  EXPECT_NE(read(newer).second.find("version 2 of the format, this program reads version 1"),
+            std::string::npos);
+  EXPECT_NE(read("time,x\n1,2\n").second.find("is no session file"), std::string::npos);
+  EXPECT_THROW(SessionReader("/nowhere/x.haptics"), SessionError);
+}
+
+TEST_F(SmallSession, UnknownKindsOfBlocksAreSteppedOver) {
+  Bytes extra;
+  appendBlock(extra, static_cast<BlockKind>(77), packed(std::string("of the future")));
+  const auto plain = read(bytes_);
+  const auto more = read(bytes_ + std::string(reinterpret_cast<const char*>(extra.data()), extra.size()));
+  EXPECT_EQ(more, plain);
+}
+
+}  // namespace
+}  // namespace hapticd::record

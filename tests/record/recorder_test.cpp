@@ -1,0 +1,157 @@
+// The recorder under pressure: full rings, full disks, paths that cannot be.
+#include "record/recorder.h"
+
+#include <gtest/gtest.h>
+
+#include <sys/resource.h>
+
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <fstream>
+#include <mutex>
+#include <thread>
+
+#include "record/session_file.h"
+#include "record/session_reader.h"
+
+namespace hapticd::record {
+namespace {
+
+using test::SessionFile;
+
+class Said {
+ public:
+  Recorder::OnTrouble listener() {
+    return [this](const std::string& text) {
+      const std::lock_guard lock(mutex_);
+      all_ += text + "\n";
+    };
+  }
+  std::string all() {
+    const std::lock_guard lock(mutex_);
+    return all_;
+  }
+  bool until(const std::string& words) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (all().find(words) == std::string::npos) {
+      if (std::chrono::steady_clock::now() > end) return false;
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return true;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::string all_;
+};
+
+SessionDevice phantom() {
+  SessionDevice device;
+  device.names = {"Phantom"};
+  return device;
+}
+
+std::string openError(const std::filesystem::path& path) {
+  try {
+    Recorder recorder(path, [](const std::string&) {});
+  } catch (const SessionError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Recorder, WhatCannotBeWrittenIsRefusedAtOnce) {
+  EXPECT_NE(openError("/nowhere/x.haptics").find("cannot record to '/nowhere/x.haptics': No such file"),
+            std::string::npos);
+  SessionFile file;
+  std::ofstream(file.path()) << "precious";
+  EXPECT_NE(openError(file.path()).find("File exists; name another"), std::string::npos);
+  std::ifstream in(file.path());
+  std::string kept;
+  in >> kept;
+  EXPECT_EQ(kept, "precious");
+}
+
+TEST(Recorder, TicksOfAFullRingAreCountedInTheLogAndInTheFile) {
+  SessionFile file;
+  Said said;
+  Recorder recorder(file.path(), said.listener(), {.ticks = 8, .sceneBytes = 1U << 20U});
+  recorder.addDevice(phantom());
+  realtime::TickRecord tick;
+  for (std::uint64_t i = 1; i <= 20; ++i) {  // nobody takes them yet
+    tick.report.tick = i;
+    recorder.ring(0).push(tick);
+  }
+  recorder.start(0, "");
+  EXPECT_TRUE(said.until("12 ticks and 0 scene events lost so far"));
+  recorder.finish();
+  EXPECT_EQ(recorder.counts().ticks, 8U);
+  EXPECT_EQ(recorder.counts().lostTicks, 12U);
+  std::uint64_t lost = 0;
+  SessionReader reader(file.path());
+  for (SessionEvent event; reader.next(event);) {
+    const auto* gap = std::get_if<LostEvent>(&event);
+    if (gap != nullptr && gap->what == LostEvent::What::ticks) lost += gap->count;
+  }
+  EXPECT_EQ(lost, 12U);
+}
+
+TEST(Recorder, SceneEventsBeyondTheMemoryAreCounted) {
+  SessionFile file;
+  Said said;
+  Recorder recorder(file.path(), said.listener(), {.ticks = 8, .sceneBytes = 1000});
+  recorder.addDevice(phantom());
+  recorder.start(0, "");
+  const scene::SceneCommand large = scene::SetVertices{0, 0, std::vector<geometry::Vec3f>(1000)};
+  recorder.told(0, 1, 2, &large);
+  recorder.told(0, 1, 3, nullptr);
+  recorder.finish();
+  EXPECT_EQ(recorder.counts().lostSceneEvents, 1U);
+  EXPECT_NE(said.all().find("1 scene events lost"), std::string::npos);
+}
+
+// /dev/full takes nothing: the disk that is full from the start.
+TEST(Recorder, AFullDiskEndsTheRecordingAndNothingElse) {
+  SessionFile link;
+  std::filesystem::create_symlink("/dev/full", link.path());
+  Said said;
+  EXPECT_NE(openError(link.path()), "") << "a link is no new file";
+  std::filesystem::remove(link.path());
+
+  // A file may not grow beyond what the process allows: the disk that gets full.
+  std::atomic<bool> ended{false};
+  Recorder recorder(link.path(), said.listener());
+  recorder.addDevice(phantom());
+  recorder.start(0, std::string(1U << 16U, 'x'));
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit small = before;
+  small.rlim_cur = 1U << 17U;
+  setrlimit(RLIMIT_FSIZE, &small);
+  std::thread servo([&] {
+    for (std::uint64_t i = 1; !ended; ++i) {
+      realtime::TickRecord tick;
+      tick.report.tick = i;
+      recorder.ring(0).push(tick);
+      if (i % 100 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  });
+  EXPECT_TRUE(said.until("has stopped: File too large"));
+  ended = true;
+  servo.join();
+  recorder.finish();
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  EXPECT_EQ(recorder.counts().bytes, std::filesystem::file_size(link.path()));
+
+  SessionReader reader(link.path());
+  std::uint64_t ticks = 0;
+  for (SessionEvent event; reader.next(event);) ticks += std::holds_alternative<TickEvent>(event) ? 1 : 0;
+  EXPECT_NE(reader.remark(), "");
+  EXPECT_NE(reader.remark().find("cut"), std::string::npos) << reader.remark();
+}
+
+}  // namespace
+}  // namespace hapticd::record

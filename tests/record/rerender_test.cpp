@@ -1,0 +1,124 @@
+// The proof of a record: the recorded hand through the recorded scene gives the recorded forces, bit for bit.
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+#include <sstream>
+
+#include "record/pack_commands.h"
+#include "record/recorded_session.h"
+#include "record/rerender.h"
+
+namespace hapticd::test {
+namespace {
+
+using record::RerenderChanges;
+
+struct Compared {
+  std::uint64_t ticks = 0;
+  std::uint64_t same = 0;
+  std::uint64_t touching = 0;
+  std::uint64_t stopped = 0;
+  std::set<std::uint64_t> revisions;
+  double largest_N = 0;
+  std::string firstDifference;
+};
+
+std::vector<Compared> rerender(const std::filesystem::path& file, const RerenderChanges& changes = {}) {
+  record::SessionReader reader(file);
+  record::Rerenderer again(reader.header(), changes);
+  std::vector<Compared> devices(reader.header().devices.size());
+  for (record::SessionEvent event; reader.next(event);) {
+    const realtime::TickReport* now = again.feed(event);
+    if (now == nullptr) continue;
+    const auto& [device, tick] = std::get<record::TickEvent>(event);
+    Compared& compared = devices[device];
+    ++compared.ticks;
+    compared.touching += tick.report.rendering.touching ? 1 : 0;
+    compared.stopped += tick.report.guard.stopped ? 1 : 0;
+    compared.revisions.insert(tick.report.revision);
+    compared.largest_N = std::max(compared.largest_N, (now->force_N - tick.report.force_N).norm());
+    if (record::sameOutcome(*now, tick.report)) {
+      ++compared.same;
+    } else if (compared.firstDifference.empty()) {
+      std::ostringstream text;
+      text << "tick " << tick.report.tick << " revision " << tick.report.revision << "/" << now->revision
+           << " force " << tick.report.force_N.transpose() << " / " << now->force_N.transpose();
+      compared.firstDifference = text.str();
+    }
+  }
+  EXPECT_EQ(reader.remark(), "");
+  return devices;
+}
+
+class Rerender : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    file_ = std::make_unique<SessionFile>();
+    const Hand hand = Hand::stroking();
+    RunningServer server(recordingConfig(hand, file_->path()));
+    played_ = playSession(server);
+  }
+  static void TearDownTestSuite() { file_.reset(); }
+  void SetUp() override { ASSERT_TRUE(played_) << "the session did not go as scripted"; }
+
+  static std::unique_ptr<SessionFile> file_;
+  static bool played_;
+};
+
+std::unique_ptr<SessionFile> Rerender::file_;
+bool Rerender::played_ = false;
+
+TEST_F(Rerender, GivesTheRecordedForcesBitForBit) {
+  const auto devices = rerender(file_->path());
+  ASSERT_EQ(devices.size(), 2U);
+  for (const Compared& device : devices) {
+    EXPECT_EQ(device.same, device.ticks) << device.firstDifference;
+    EXPECT_EQ(device.largest_N, 0);
+    EXPECT_GT(device.touching, 100U);
+    EXPECT_GT(device.revisions.size(), 30U);
+  }
+  EXPECT_GT(devices[0].stopped, 10U);
+}
+
+TEST_F(Rerender, IsTheSameEveryTime) {
+  const RerenderChanges softer{.stiffness_N_per_m = 200};
+  const auto once = rerender(file_->path(), softer);
+  const auto twice = rerender(file_->path(), softer);
+  for (std::size_t i = 0; i < once.size(); ++i) EXPECT_EQ(once[i].largest_N, twice[i].largest_N);
+}
+
+TEST_F(Rerender, ChangesAreFelt) {
+  for (const RerenderChanges& changes :
+       {RerenderChanges{.stiffness_N_per_m = 100}, RerenderChanges{.toolRadius_m = 0.004},
+        RerenderChanges{.staticFriction = 0, .dynamicFriction = 0}, RerenderChanges{.raw = true}}) {
+    const auto devices = rerender(file_->path(), changes);
+    EXPECT_LT(devices[0].same, devices[0].ticks);
+    EXPECT_GT(devices[0].largest_N, 0.01);
+    // Free of contact nothing changes but without the guard.
+    EXPECT_EQ(devices[0].same > 0, !changes.raw);
+  }
+}
+
+TEST_F(Rerender, EveryThingThatHappenedIsInTheFile) {
+  std::map<std::string, int> commands;
+  int gone = 0;
+  for (const record::SessionEvent& event : eventsOf(file_->path())) {
+    const auto* told = std::get_if<record::SceneEvent>(&event);
+    if (told == nullptr) continue;
+    if (told->command) {
+      ++commands[record::nameOf(*told->command)];
+    } else {
+      ++gone;
+    }
+  }
+  EXPECT_GE(gone, 1);
+  for (const char* name : {"SetVertices", "SetSurfaceProperty", "SetTransform", "DefineEffect", "StartEffect",
+                           "SetForceField", "BeginBatch", "CommitBatch", "AddObject", "SetSceneOrigin",
+                           "ResetScene"}) {
+    EXPECT_GE(commands[name], 1) << name;
+  }
+}
+
+}  // namespace
+}  // namespace hapticd::test
