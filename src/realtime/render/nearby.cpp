@@ -16,6 +16,8 @@ constexpr double kPadShare = 0x1p-22;       // of the object's size: a quarter o
 constexpr double kRoundingFloor = 1e-12;    // of the largest coordinate: a thousand roundings
 constexpr double kSmallestObject_m = 1e-3;  // below this size the coordinates of the hand decide the rounding
 constexpr double kWiden = 1 + 1e-6;         // queries travel between frames with rounding
+constexpr double kSpare = 0.3;              // of the tool's radius: gathered in reserve
+constexpr double kRecentre = 0.02;          // of the tool's radius: distances from farther away serve no more
 
 // An upper bound of the largest singular value, exact for similarities.
 double stretchOf(const Mat3& m) {
@@ -69,8 +71,6 @@ void Nearby::begin(const Moment& now, const Moment& before, const HalfSpaces* pl
                                                   now.scene->workspace.T_device_world.matrix();
   objectCount_ = 0;
   finestSkin_ = kRelativeSkin;
-  facetCount_ = 0;
-  complete_ = false;
   overflowed_ = false;
   if (now.scene != before.scene) forget();
 }
@@ -79,8 +79,13 @@ void Nearby::include(const Vec3& centre, double reach) noexcept {
   const scene::SceneSnapshot& scene = *now_.scene;
   if (!scene.objectIndex || scene.objects.size() <= 2) {
     for (const auto& object : scene.objects) add(*object);
-    return;
+  } else {
+    includeByIndex(scene, centre, reach);
   }
+  if (gatheredIn_ != generation_ || !sameObjects()) ball_.drop();
+}
+
+void Nearby::includeByIndex(const scene::SceneSnapshot& scene, const Vec3& centre, double reach) noexcept {
   const Affine& T_world_device = scene.workspace.T_world_device;
   const double worldReach = (reach + radius_) * kWiden * stretchOf(T_world_device.linear());
   std::array<std::uint32_t, kMaxObjects> found{};
@@ -116,8 +121,15 @@ void Nearby::add(const ObjectState& state) noexcept {
     return;
   }
   PlacedObject& placed = objects_[static_cast<std::size_t>(objectCount_)];
-  if (!place(state, placed)) return;
-  compareWithBefore(placed);
+  if (placed.restsSince == generation_ && placed.state == &state) {
+    placed.before = &state;
+    placed.T_device_objectBefore = placed.T_device_object;
+    placed.moved = placed.deformed = placed.jumped = false;
+  } else {
+    if (!place(state, placed)) return;
+    compareWithBefore(placed);
+    if (placed.atRest) placed.restsSince = generation_;
+  }
   ++objectCount_;
   finestSkin_ = objectCount_ == 1 ? placed.skin : std::min(finestSkin_, placed.skin);
 }
@@ -178,29 +190,39 @@ bool Nearby::facetOf(int i, std::uint32_t triangle, Facet& facet) const noexcept
 }
 
 bool Nearby::gather(const Vec3& centre, double radius) noexcept {
-  centre_ = centre;
-  reach_ = radius;
-  facetCount_ = 0;
-  complete_ = true;
+  ball_.begin(centre, radius);
+  bool lasting = true;
   for (int i = 0; i < objectCount_; ++i) {
     const PlacedObject& placed = object(i);
-    const double reach = radius + radius_ + 4 * placed.skin;
+    gatheredFrom_[static_cast<std::size_t>(i)] = placed.state;
+    lasting = lasting && placed.atRest && !placed.deformed;
     const auto visit = [&](std::uint32_t triangle) noexcept {
-      if (facetCount_ == kMaxFacets) {
-        complete_ = false;
-        return;
-      }
-      Facet& facet = facets_[static_cast<std::size_t>(facetCount_)];
-      if (!facetOf(i, triangle, facet)) return;
+      Facet* const facet = ball_.room();
       // Deforming facets may have come from farther away.
-      if (std::abs(facet.normal.dot(centre - facet.a)) > reach && !placed.deformed) return;
-      if (radius_ > 0) facet.distance = (centre - nearestPointOf(facet, centre)).norm();
-      if (facet.distance <= reach || placed.deformed) ++facetCount_;
+      if (facet != nullptr && facetOf(i, triangle, *facet)) ball_.add(placed.deformed);
     };
+    const double reach = radius + radius_ + 4 * placed.skin;
     placed.state->mesh->index.visitNear(placed.T_object_device * centre, reach * kWiden * placed.stretch,
                                         visit);
   }
-  return complete_;
+  ball_.finish();
+  gatheredCount_ = objectCount_;
+  gatheredIn_ = lasting ? generation_ : 0;
+  return ball_.complete();
+}
+
+bool Nearby::surround(const Vec3& centre, double radius) noexcept {
+  if (ball_.covers(centre, radius)) return true;
+  const double spare = kSpare * radius_;
+  return (spare > radius && gather(centre, spare)) || gather(centre, radius);
+}
+
+bool Nearby::sameObjects() const noexcept {
+  if (gatheredCount_ != objectCount_) return false;
+  for (int i = 0; i < objectCount_; ++i) {
+    if (gatheredFrom_[static_cast<std::size_t>(i)] != object(i).state) return false;
+  }
+  return true;
 }
 
 bool Nearby::meets(const Facet& f, const Vec3& p, const Vec3& g, Hit& hit) const noexcept {
@@ -213,15 +235,13 @@ bool Nearby::meets(const Facet& f, const Vec3& p, const Vec3& g, Hit& hit) const
 }
 
 // A total order on obstacles, so that the first one does not depend on the order of visits.
-void Nearby::consider(const Facet& f, const Vec3& p, const Vec3& d, double limit, Hit& best,
-                      bool& found) const noexcept {
+void Nearby::consider(const Facet& f, const Path& path, Hit& best, bool& found) const noexcept {
   Hit hit;
   if (radius_ > 0) {
-    const double latest = found ? best.stop : limit;
-    const double nearest = f.distance - (p - centre_).norm() - latest * d.norm();
-    if (nearest > radius_ + 2 * f.skin) return;
-    if (!meetBall(f, faces(), radius_, p, d, limit, latest, hit)) return;
-  } else if (!meet(f, faces(), p, d, limit, hit)) {
+    const double latest = found ? best.stop : path.limit;
+    if (f.distance - path.fromCentre - latest * path.length > radius_ + 2 * f.skin) return;
+    if (!meetBall(f, faces(), radius_, path.p, path.d, path.limit, latest, hit)) return;
+  } else if (!meet(f, faces(), path.p, path.d, path.limit, hit)) {
     return;
   }
   hit.object = f.object;
@@ -232,15 +252,6 @@ void Nearby::consider(const Facet& f, const Vec3& p, const Vec3& d, double limit
   if (found && !(rank(hit) < rank(best))) return;
   best = hit;
   found = true;
-}
-
-template <class Visit>
-void Nearby::forEachGathered(int only, Visit&& visit) const noexcept {
-  for (const Facet* f = facetsBegin(); f != facetsEnd(); ++f) {
-    if (only < 0 || f->object == only) visit(*f);
-  }
-  if (only >= 0 || planes_ == nullptr) return;
-  for (const HalfSpace& plane : *planes_) visit(plane.facet);
 }
 
 // visit returns the parameter in [0, 1] beyond which nothing more is wanted.
@@ -262,22 +273,54 @@ void Nearby::forEachOnSegment(const Vec3& p, const Vec3& d, double limit, int on
   }
 }
 
-// Two passes for the point: how far the path is free of faces, then what has to stop it before, so that at
-// the stop it is a skin above all of them.
-bool Nearby::castGathered(const Vec3& p, const Vec3& d, double limit, int only, Hit& hit) const noexcept {
-  double free = limit;
-  if (radius_ == 0) {
-    bool blocked = false;
-    forEachGathered(only, [&](const Facet& f) noexcept {
-      const double t = reach(f, faces(), p, d, free);
-      if (t > 1) return;
-      blocked = true;
-      free = t;
-    });
-    if (!blocked) return false;
+bool Nearby::castGathered(const Vec3& p, const Vec3& d, double limit, int only, Hit& hit) noexcept {
+  return radius_ > 0 ? meetBallOf({p, d, limit}, only, hit) : meetPoint({p, d, limit}, only, hit);
+}
+
+template <class Visit>
+void Nearby::forEachGathered(int only, Visit&& visit) noexcept {
+  for (const Facet& f : ball_) {
+    if (only < 0 || f.object == only) visit(f);
   }
+  if (only >= 0 || planes_ == nullptr) return;
+  for (const HalfSpace& plane : *planes_) visit(plane.facet);
+}
+
+// Two passes: how far the path is free of faces, then what has to stop it before, so that at the stop it is a
+// skin above all of them.
+bool Nearby::meetPoint(const Path& path, int only, Hit& hit) noexcept {
+  double free = path.limit;
+  bool blocked = false;
+  forEachGathered(only, [&](const Facet& f) noexcept {
+    const double t = reach(f, faces(), path.p, path.d, free);
+    if (t > 1) return;
+    blocked = true;
+    free = t;
+  });
+  if (!blocked) return false;
+  const Path way{path.p, path.d, free};
   bool found = false;
-  forEachGathered(only, [&](const Facet& f) noexcept { consider(f, p, d, free, hit, found); });
+  forEachGathered(only, [&](const Facet& f) noexcept { consider(f, way, hit, found); });
+  return found;
+}
+
+bool Nearby::meetBallOf(Path path, int only, Hit& hit) noexcept {
+  if ((path.p - ball_.centre()).norm() > kRecentre * radius_) ball_.recentre(path.p);
+  path.fromCentre = (path.p - ball_.centre()).norm();
+  path.length = path.d.norm();
+  bool found = false;
+  if (only < 0 && planes_ != nullptr) {
+    for (const HalfSpace& plane : *planes_) consider(plane.facet, path, hit, found);
+  }
+  const auto considerAll = [&](const Facet* begin, const Facet* end) {
+    for (const Facet* f = begin; f != end; ++f) {
+      if (only < 0 || f->object == only) consider(*f, path, hit, found);
+    }
+  };
+  considerAll(ball_.begin(), ball_.far());
+  const double latest = found ? hit.stop : path.limit;
+  if (ball_.farDistance() - path.fromCentre - latest * path.length <= radius_)
+    considerAll(ball_.far(), ball_.end());
   return found;
 }
 
@@ -294,8 +337,9 @@ bool Nearby::castTree(const Vec3& p, const Vec3& d, int only, Hit& hit) const no
   });
   if (!blocked) return false;
   bool found = false;
+  const Path path{p, d, free};
   forEachOnSegment(p, d, free, only, [&](const Facet& f) noexcept {
-    consider(f, p, d, free, hit, found);
+    consider(f, path, hit, found);
     return 1.0;
   });
   return found;
@@ -311,11 +355,11 @@ bool Nearby::castBall(const Vec3& p, const Vec3& d, double begin, int only, Hit&
     step = std::min(step, 1 - begin);
     const Vec3 from = p + begin * d;
     gather(from + 0.5 * step * d, 0.5 * step * length * kWiden);
-    if (!complete_ && step > 1.0 / kMaxSteps) {
+    if (!ball_.complete() && step > 1.0 / kMaxSteps) {
       step *= 0.25;
       continue;
     }
-    overflowed_ = overflowed_ || !complete_;
+    overflowed_ = overflowed_ || !ball_.complete();
     if (castGathered(from, step * d, 1, only, hit)) {
       hit.stop = begin + step * hit.stop;
       return true;
@@ -329,12 +373,18 @@ bool Nearby::castBall(const Vec3& p, const Vec3& d, double begin, int only, Hit&
 bool Nearby::cast(const Vec3& p, const Vec3& g, Hit& hit) noexcept {
   const Vec3 d = g - p;
   double free = 0;
-  if (complete_ && (p - centre_).norm() <= reach_) {
-    free = exitOf(p, d, centre_, reach_);
+  if (ball_.covers(p, 0)) {
+    free = exitOf(p, d, ball_.centre(), ball_.reach());
     if (castGathered(p, d, free, -1, hit)) return true;
     if (free == 1) return false;
   }
   return radius_ > 0 ? castBall(p, d, free, -1, hit) : castTree(p, d, -1, hit);
+}
+
+bool Nearby::castBeginning(const Vec3& p, const Vec3& g, Hit& hit) noexcept {
+  if (!gathered(p)) return cast(p, g, hit);
+  const Vec3 d = g - p;
+  return castGathered(p, d, exitOf(p, d, ball_.centre(), ball_.reach()), -1, hit);
 }
 
 bool Nearby::castAt(int object, const Vec3& p, const Vec3& g, Hit& hit) noexcept {

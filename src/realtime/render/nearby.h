@@ -9,6 +9,7 @@
 #include <array>
 #include <cstdint>
 
+#include "realtime/render/facet_ball.h"
 #include "realtime/render/half_spaces.h"
 #include "scene/snapshot.h"
 
@@ -22,10 +23,11 @@ struct PlacedObject {
   const scene::ObjectState* state = nullptr;
   Affine T_device_object = Affine::Identity();
   Affine T_object_device = Affine::Identity();
-  double stretch = 1;     ///< most object units per metre, in any direction
-  double skin = 0;        ///< see facet.h
-  bool atRest = false;    ///< will not move or bend any more in this scene
-  bool mirrored = false;  ///< the placement has a reflection: winding is seen reversed
+  double stretch = 1;            ///< most object units per metre, in any direction
+  double skin = 0;               ///< see facet.h
+  bool atRest = false;           ///< will not move or bend any more in this scene
+  std::uint64_t restsSince = 0;  ///< the generation in which it was found at rest
+  bool mirrored = false;         ///< the placement has a reflection: winding is seen reversed
   // Since the last tick:
   const scene::ObjectState* before = nullptr;  ///< null when it was not there
   Affine T_device_objectBefore = Affine::Identity();
@@ -55,13 +57,13 @@ struct Moment {
 /// Fixed storage; everything noexcept and allocation-free. Object positions are valid until the next begin().
 class Nearby {
  public:
-  explicit Nearby(double toolRadius_m) noexcept : radius_(toolRadius_m) {}
+  explicit Nearby(double toolRadius_m) noexcept : radius_(toolRadius_m), ball_(toolRadius_m) {}
 
   /// Before a tick that does not follow the one before: what was kept of its scene may be gone.
   void forget() noexcept { ++generation_; }
   /// Starts a tick with no object near. `planes` are there from the start, and live until the next begin().
   void begin(const Moment& now, const Moment& before, const HalfSpaces* planes = nullptr) noexcept;
-  /// Adds the objects within `reach` of `centre`.
+  /// Adds the objects within `reach` of `centre`, and forgets what was gathered of others.
   void include(const Vec3& centre, double reach) noexcept;
   /// Adds one object by its id; -1 when it is not in the scene.
   int includeObject(std::int32_t id) noexcept;
@@ -72,14 +74,19 @@ class Nearby {
   /// Gathers the facets that a tool inside the ball can meet; casts inside it then walk no tree. False when
   /// there are too many; casts walk the tree then.
   bool gather(const Vec3& centre, double radius) noexcept;
+  /// The same; what is gathered already will do, in an earlier tick also, if it holds all that is wanted.
+  /// More is gathered than that, so that this happens.
+  bool surround(const Vec3& centre, double radius) noexcept;
   bool gathered(const Vec3& p) const noexcept {
-    return complete_ && (p - centre_).squaredNorm() < 0.64 * reach_ * reach_;
+    return ball_.complete() && (p - ball_.centre()).squaredNorm() < 0.64 * ball_.reach() * ball_.reach();
   }
-  const Facet* facetsBegin() const noexcept { return facets_.data(); }
-  const Facet* facetsEnd() const noexcept { return facets_.data() + facetCount_; }
+  /// The gathered facets.
+  const FacetBall& ball() const noexcept { return ball_; }
 
   /// First obstacle on the way from p to g; false when the way is free.
   bool cast(const Vec3& p, const Vec3& g, Hit& hit) noexcept;
+  /// The same, when only the way's beginning matters: as far as it goes among the gathered facets.
+  bool castBeginning(const Vec3& p, const Vec3& g, Hit& hit) noexcept;
   /// The same against one object only, always by its tree.
   bool castAt(int object, const Vec3& p, const Vec3& g, Hit& hit) noexcept;
 
@@ -95,7 +102,6 @@ class Nearby {
 
  private:
   static constexpr int kMaxObjects = 64;
-  static constexpr int kMaxFacets = 512;
   static constexpr int kMadeBits = 8;
 
   // A facet that was made in an earlier tick.
@@ -105,17 +111,30 @@ class Nearby {
     Facet facet;
   };
 
+  // The way p + t d, t in [0, limit], of a cast.
+  struct Path {
+    const Vec3& p;
+    const Vec3& d;
+    double limit;
+    // For the ball:
+    double fromCentre = 0;  // of p, from the gathered ball's
+    double length = 0;      // of d
+  };
+
   template <class Visit>
-  void forEachGathered(int only, Visit&& visit) const noexcept;
+  void forEachGathered(int only, Visit&& visit) noexcept;
   template <class Visit>
   void forEachOnSegment(const Vec3& p, const Vec3& d, double limit, int only, Visit&& visit) const noexcept;
+  void includeByIndex(const scene::SceneSnapshot& scene, const Vec3& centre, double reach) noexcept;
   void add(const scene::ObjectState& state) noexcept;
   bool place(const scene::ObjectState& state, PlacedObject& placed) const noexcept;
+  bool sameObjects() const noexcept;
   void compareWithBefore(PlacedObject& placed) const noexcept;
   bool facetOf(int object, std::uint32_t triangle, Facet& facet) const noexcept;
-  void consider(const Facet& f, const Vec3& p, const Vec3& d, double limit, Hit& best,
-                bool& found) const noexcept;
-  bool castGathered(const Vec3& p, const Vec3& d, double limit, int only, Hit& hit) const noexcept;
+  void consider(const Facet& f, const Path& path, Hit& best, bool& found) const noexcept;
+  bool castGathered(const Vec3& p, const Vec3& d, double limit, int only, Hit& hit) noexcept;
+  bool meetPoint(const Path& path, int only, Hit& hit) noexcept;
+  bool meetBallOf(Path path, int only, Hit& hit) noexcept;
   bool castTree(const Vec3& p, const Vec3& d, int only, Hit& hit) const noexcept;
   bool castBall(const Vec3& p, const Vec3& d, double begin, int only, Hit& hit) noexcept;
 
@@ -127,13 +146,13 @@ class Nearby {
   std::array<PlacedObject, kMaxObjects> objects_;
   int objectCount_ = 0;
   double finestSkin_ = 0;
-  std::array<Facet, kMaxFacets> facets_;
-  int facetCount_ = 0;
+  FacetBall ball_;
+  // When and from what it was gathered; 0 when it will not do in another tick.
+  std::uint64_t gatheredIn_ = 0;
+  int gatheredCount_ = 0;
+  std::array<const scene::ObjectState*, kMaxObjects> gatheredFrom_{};
   std::uint64_t generation_ = 1;  // of what may be kept from tick to tick
   mutable std::array<MadeFacet, 1U << kMadeBits> made_;
-  Vec3 centre_ = Vec3::Zero();
-  double reach_ = 0;
-  bool complete_ = false;
   bool overflowed_ = false;
 };
 

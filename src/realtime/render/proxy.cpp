@@ -46,7 +46,7 @@ const Grip& Proxy::follow(const Moment& now, const Vec3& hip, double period_s,
   carry(hip, status);
   stride_m_ = (hip - hipBefore_).norm() + (position_ - from).norm();
   push(from, status);
-  if (grip_.count > 0) nearby_.gather(position_, 1.5 * stride_m_ + kGatherMargin_m);
+  if (grip_.count > 0) nearby_.surround(position_, 1.5 * stride_m_ + kGatherMargin_m);
   chase(hip);
   popThrough(hip, status);
   releaseWhenDeep(wasFree, status);
@@ -199,15 +199,17 @@ bool Proxy::approach(const Vec3& target, bool hold, ActiveSet& active, Vec3& goa
     if (way.norm() <= 1e-3 * skin) return active.count == 0;
     ++casts_;
     Hit hit;
-    if (!nearby_.cast(position_, goal, hit)) {
-      if (hold && active.count > 0) return false;
+    // What holds the proxy besides is where it is, not far on the way.
+    const bool held = hold && active.count > 0;
+    if (!(held ? nearby_.castBeginning(position_, goal, hit) : nearby_.cast(position_, goal, hit))) {
+      if (held) return false;
       position_ = goal;
       return active.count == 0;
     }
     const double move = hit.stop * way.norm();
-    if (hold && active.count > 0 && move > skin) return false;
+    if (held && move > skin) return false;
     if (!hold || move > skin) position_ += hit.stop * way;
-    if (!nearby_.gathered(position_)) nearby_.gather(position_, 1.5 * stride_m_ + kGatherMargin_m);
+    if (!nearby_.gathered(position_)) nearby_.surround(position_, 1.5 * stride_m_ + kGatherMargin_m);
     active.hits[static_cast<std::size_t>(active.count++)] = hit;
   }
   // Without a solution for all of them: what held before the newcomer.

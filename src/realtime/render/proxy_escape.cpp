@@ -21,7 +21,7 @@ struct Proxy::Ways {
   static constexpr int kMaxFaces = 32;
   static constexpr int kMaxWays = 4 * kMaxFaces + 9;
 
-  std::array<const Facet*, kMaxFaces> faces;
+  std::array<Facet, kMaxFaces> faces;  // copies: what is gathered changes on the way
   int faceCount = 0;
   std::array<Vec3, kMaxWays> ways;
   int count = 0;
@@ -34,14 +34,14 @@ struct Proxy::Ways {
 
 // The faces that the tool touches, by their numbers, so that nothing depends on the order of visits.
 void Proxy::findFaces(Ways& ways) const noexcept {
-  const auto before = [this](const Facet* a, const Facet* b) {
-    return std::tuple(nearby_.object(a->object).state->id, a->triangle) <
-           std::tuple(nearby_.object(b->object).state->id, b->triangle);
+  const auto before = [this](const Facet& a, const Facet& b) {
+    return std::tuple(nearby_.object(a.object).state->id, a.triangle) <
+           std::tuple(nearby_.object(b.object).state->id, b.triangle);
   };
-  for (const Facet* f = nearby_.facetsBegin(); f != nearby_.facetsEnd(); ++f) {
-    const double touching = nearby_.toolRadius() + kTouching * f->skin;
-    if (std::abs(f->normal.dot(position_ - f->a)) > touching) continue;
-    if ((position_ - nearestPointOf(*f, position_)).norm() > touching) continue;
+  for (const Facet& f : nearby_.ball()) {
+    const double touching = nearby_.toolRadius() + kTouching * f.skin;
+    if (std::abs(f.normal.dot(position_ - f.a)) > touching) continue;
+    if ((position_ - nearestPointOf(f, position_)).norm() > touching) continue;
     if (ways.faceCount == Ways::kMaxFaces && before(ways.faces.back(), f)) continue;
     int k = ways.faceCount < Ways::kMaxFaces ? ways.faceCount++ : Ways::kMaxFaces - 1;
     for (; k > 0 && before(f, ways.faces[static_cast<std::size_t>(k - 1)]); --k) {
@@ -56,7 +56,7 @@ void Proxy::findWays(const Vec3& pull, const ActiveSet& active, Ways& ways) cons
   const double shortest = kMinDescent * pull.norm();
   const Vec3 p = position_;
   for (int i = 0; i < ways.faceCount; ++i) {
-    const Facet& f = *ways.faces[static_cast<std::size_t>(i)];
+    const Facet& f = ways.faces[static_cast<std::size_t>(i)];
     const Vec3 foot = nearestPointOf(f, p);
     const Vec3 n = nearby_.toolRadius() > 0 ? Vec3((p - foot).normalized())
                                             : Vec3(f.normal.dot(p - f.a) < 0 ? -f.normal : f.normal);
@@ -89,7 +89,7 @@ double Proxy::freeAmong(const Ways& ways, const Vec3& from, const Vec3& to) cons
   double free = 1;
   Hit hit;
   for (int i = 0; i < ways.faceCount; ++i) {
-    if (nearby_.meets(*ways.faces[static_cast<std::size_t>(i)], from, to, hit))
+    if (nearby_.meets(ways.faces[static_cast<std::size_t>(i)], from, to, hit))
       free = std::min(free, hit.stop);
   }
   return free;
@@ -101,7 +101,7 @@ bool Proxy::escape(const Vec3& target, const ActiveSet& active) noexcept {
   const double skin = nearby_.finestSkin();
   const Vec3 pull = target - position_;
   const double enough = pull.norm() - 2 * kLifts[0] * skin;
-  if (!nearby_.gathered(position_)) nearby_.gather(position_, 1.5 * stride_m_ + kGatherMargin_m);
+  if (!nearby_.gathered(position_)) nearby_.surround(position_, 1.5 * stride_m_ + kGatherMargin_m);
   if (!nearby_.gathered(position_)) return false;
   Ways ways;
   findFaces(ways);

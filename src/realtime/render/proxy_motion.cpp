@@ -105,14 +105,14 @@ void Proxy::pushByDeforming(const Vec3& from, double reach, std::uint32_t& statu
     if (!nearby_.gather(position_, reach + kGatherMargin_m)) status |= kRenderCandidateLimit;
     Hit farthest;
     double height = 0;
-    for (const Facet* f = nearby_.facetsBegin(); f != nearby_.facetsEnd(); ++f) {
-      const PlacedObject& object = nearby_.object(f->object);
+    for (const Facet& f : nearby_.ball()) {
+      const PlacedObject& object = nearby_.object(f.object);
       if (!object.deformed) continue;
-      const Vec3 start = carriedBy(object, f->triangle, from);
+      const Vec3 start = carriedBy(object, f.triangle, from);
       Hit hit;
-      if ((position_ - start).norm() > kJump_m || !nearby_.meets(*f, start, position_, hit)) continue;
+      if ((position_ - start).norm() > kJump_m || !nearby_.meets(f, start, position_, hit)) continue;
       const double above = hit.plane.height(position_);
-      if (above > -0.25 * f->skin) continue;
+      if (above > -0.25 * f.skin) continue;
       if (std::tuple(above, hit.object, hit.triangle) <
           std::tuple(height, farthest.object, farthest.triangle)) {
         farthest = hit;

@@ -1,0 +1,71 @@
+#include "realtime/render/facet_ball.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace hapticd::realtime {
+
+void FacetBall::begin(const Vec3& centre, double reach) noexcept {
+  centre_ = centre;
+  reach_ = reach;
+  complete_ = true;
+  count_ = 0;
+}
+
+Facet* FacetBall::room() noexcept {
+  if (count_ < kMost) return &facets_[static_cast<std::size_t>(count_)];
+  complete_ = false;
+  return nullptr;
+}
+
+void FacetBall::add(bool asFarAsItBends) noexcept {
+  Facet& facet = facets_[static_cast<std::size_t>(count_)];
+  const double limit = reach_ + toolRadius_ + 4 * facet.skin;
+  if (asFarAsItBends) {
+    if (toolRadius_ > 0) facet.distance = (centre_ - nearestPointOf(facet, centre_)).norm();
+    ++count_;
+    return;
+  }
+  if (std::abs(facet.normal.dot(centre_ - facet.a)) > limit) return;
+  if (toolRadius_ > 0) {
+    facet.distance = (centre_ - nearestPointOf(facet, centre_)).norm();
+    if (facet.distance > limit) return;
+  }
+  ++count_;
+}
+
+void FacetBall::finish() noexcept {
+  near_ = count_;
+  farDistance_ = std::numeric_limits<double>::infinity();
+  if (toolRadius_ > 0) sortOut();
+}
+
+void FacetBall::recentre(const Vec3& p) noexcept {
+  const double moved = (p - centre_).norm();
+  centre_ = p;
+  reach_ -= moved;
+  for (int i = 0; i < count_; ++i) {
+    Facet& facet = facets_[static_cast<std::size_t>(i)];
+    facet.distance -= moved;
+    if (facet.distance <= nearLimit()) facet.distance = (p - nearestPointOf(facet, p)).norm();
+  }
+  sortOut();
+}
+
+// The nearest goes first: a ball stops early there, and then nothing farther needs a closer look.
+void FacetBall::sortOut() noexcept {
+  Facet* const first = facets_.data();
+  Facet* const last = first + count_;
+  Facet* const middle =
+      std::partition(first, last, [this](const Facet& f) { return f.distance <= nearLimit(); });
+  near_ = static_cast<int>(middle - first);
+  farDistance_ = std::numeric_limits<double>::infinity();
+  for (const Facet* f = middle; f != last; ++f)
+    farDistance_ = std::min(farDistance_, f->distance - 2 * f->skin);
+  Facet* const nearest =
+      std::min_element(first, middle, [](const Facet& a, const Facet& b) { return a.distance < b.distance; });
+  if (nearest != middle) std::swap(*first, *nearest);
+}
+
+}  // namespace hapticd::realtime
