@@ -34,5 +34,6 @@ void addDeviceHost(CLI::App& app);
 void addRender(CLI::App& app);
 void addDoctor(CLI::App& app);
 void addDevices(CLI::App& app);
+void addBench(CLI::App& app);
 
 }  // namespace hapticd::apps

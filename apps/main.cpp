@@ -25,6 +25,7 @@ int main(int argc, char** argv) {
   addRender(app);
   addDoctor(app);
   addDevices(app);
+  addBench(app);
   addDeviceHost(app);
   try {
     app.parse(argc, argv);

@@ -1,0 +1,30 @@
+#include "bench/benchmark.h"
+
+#include "bench/all.h"
+
+namespace hapticd::bench {
+
+const std::vector<Benchmark>& benchmarks() {
+  static const std::vector<Benchmark> all{
+      {"tick", "One servo step, from the hand to the force, on the path of contact, sliding and taps",
+       "the bare first-hit query of Embree on the same segments", &measureTick},
+      {"objects", "Many objects, one touched", "the same with one object, or with all at rest",
+       &measureObjects},
+      {"wakeup", "How late the loop wakes", "cyclictest with the same priority and interval", &measureWakeup},
+      {"disturbance", "What clients can do to the loop and to each other",
+       "the same server just before, undisturbed", &measureDisturbance},
+      {"latency", "From the servo's tick to the callback of a client, isTouching at 1 kHz",
+       "a raw pipeline: thread, wake, thread, TCP, blocking reader; 32 bytes at 1 kHz", &measureLatency},
+      {"upload", "Meshes into the server", "raw TCP of the same bytes into a process that drops them",
+       &measureUpload},
+      {"fanout", "Five messages a tick at 1 kHz to many clients", "a program that only sends the same bytes",
+       &measureFanOut},
+      {"deform", "100k triangles, all vertices new at 60 Hz", "refitting Embree's own triangles",
+       &measureDeform},
+      {"memory", "A server with a mesh of a million triangles that is touched",
+       "bytes of vertices, triangles and index", &measureMemory},
+  };
+  return all;
+}
+
+}  // namespace hapticd::bench
