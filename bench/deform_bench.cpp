@@ -1,5 +1,8 @@
 // A mesh of 100k triangles whose vertices are all new at 60 Hz, against refitting Embree's own triangles.
 #include <cmath>
+#include <numbers>
+#include <stdexcept>
+#include <thread>
 
 #include "bench/all.h"
 #include "bench/bare_index.h"
@@ -18,7 +21,8 @@ constexpr int kShapes = 8;
 std::vector<std::vector<Vec3f>> shapesOf(const geometry::TriangleMesh& mesh) {
   std::vector<std::vector<Vec3f>> shapes;
   for (int k = 0; k < kShapes; ++k) {
-    const auto scale = static_cast<float>(1 + 0.1 / kBallRadius_mm * std::sin(2 * M_PI * k / kShapes));
+    const auto scale =
+        static_cast<float>(1 + 0.1 / kBallRadius_mm * std::sin(2 * std::numbers::pi * k / kShapes));
     std::vector<Vec3f> shape = mesh.vertices;
     for (Vec3f& v : shape) v *= scale;
     shapes.push_back(std::move(shape));
@@ -52,11 +56,11 @@ Outcome measureDeform(const Run& run) {
 
   Frames frames;
   LoopFigures late;
-  std::thread observer([&] { late = loop.observe(seconds); });
+  std::jthread observer([&] { late = loop.observe(seconds); });
   std::int64_t due = nowNs() + 1'000'000'000;  // after the time that the first publication was told
   sleepUntilNs(due);
   const std::int64_t end = due + static_cast<std::int64_t>((seconds - 1) * 1e9);
-  for (int k = 0; nowNs() < end; ++k) {
+  for (int k = 1; nowNs() < end; ++k) {
     const auto& shape = shapes[static_cast<std::size_t>(k % kShapes)];
     scene::SetVertices vertices{0, 0, shape};
     const std::int64_t begin = nowNs();
