@@ -18,6 +18,8 @@ namespace {
 struct Options {
   std::string configFile;
   std::string listen;
+  std::string http;
+  std::vector<std::string> httpAllow;
   std::vector<std::string> names;
   std::string driver;
   std::string hand;
@@ -53,6 +55,8 @@ server::ServerConfig configOf(const Options& options, std::vector<std::string>& 
   const std::filesystem::path file = options.configFile;
   if (!file.empty()) config = server::loadConfig(file, remarks);
   if (!options.listen.empty()) server::parseListen(options.listen, config.listenAddress, config.port);
+  if (!options.http.empty()) config.http = options.http;
+  config.httpAllow.insert(config.httpAllow.end(), options.httpAllow.begin(), options.httpAllow.end());
   if (options.allowNoRealtime) config.allowNoRealtime = true;
   if (options.seconds > 0) config.seconds = options.seconds;
   if (!options.record.empty()) config.record = options.record;
@@ -118,6 +122,10 @@ int run(const Options& options) {
   for (const server::DeviceConfig& device : config.devices) {
     for (const std::string& name : device.names) spdlog::info("device {}@{} ({})", name, at, device.driver);
   }
+  if (const auto web = server.webAddress()) {
+    const bool everywhere = web->address == net::kAnyAddress;
+    spdlog::info("viewer: http://{}:{}/", everywhere ? "127.0.0.1" : web->addressText(), web->port);
+  }
   stopper.watch(server);
   server.run();
   return 0;
@@ -138,6 +146,14 @@ void addServe(CLI::App& app) {
                     "Print the configuration in effect as TOML, or what is wrong with it, and end");
   command->add_option("--listen", options->listen,
                       "ADDR:PORT for TCP and UDP [127.0.0.1:3883]; 0.0.0.0 for all networks");
+  command->add_option(
+      "--http", options->http,
+      "ADDR:PORT of the page for browsers, its data and the metrics [127.0.0.1:8080 when it is\n"
+      "free, else none]; 'off' for none; 0.0.0.0:8080 for all networks");
+  command->add_option(
+      "--http-allow", options->httpAllow,
+      "Further name, HOST or HOST:PORT, by which browsers may call this server; repeat it for\n"
+      "more. Addresses and localhost need none");
   command->add_option("--name", options->names,
                       "Name that clients ask for [Phantom]; repeat it for more names");
   command->add_option(
@@ -170,6 +186,8 @@ void addServe(CLI::App& app) {
       "  hapticd serve                                    the simulated hand, on this machine only\n"
       "  hapticd serve --name Tracker0 --name Button0     more names for one device\n"
       "  hapticd serve --listen 0.0.0.0:3883              for other machines, too\n"
+      "  hapticd serve --http 0.0.0.0:8080 --http-allow lab7  the page at http://lab7:8080/ from other "
+      "machines\n"
       "  hapticd serve --config vrpn.cfg --device simulated   a VRPN server's file, without its hardware\n"
       "  hapticd serve --config my.toml --check-config    is the file right, and what does it mean?\n"
       "'hapticd doctor' tells how to get realtime rights.");

@@ -4,7 +4,9 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 mapfile -t wanted < <(grep -vE '^[[:space:]]*(#|$)' packages.txt)
 missing=()
-for package in "${wanted[@]}"; do
+for line in "${wanted[@]}"; do
+  read -r package instead <<<"$line"
+  if [ -n "$instead" ] && command -v "$instead" >/dev/null; then continue; fi
   dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'install ok installed' || missing+=("$package")
 done
 [ "${#missing[@]}" = 0 ] && exit 0

@@ -1,6 +1,6 @@
 #include "net/connection.h"
 
-#include "net/connection_impl.h"
+#include "net/tcp_connection.h"
 
 namespace hapticd::net {
 
@@ -22,7 +22,7 @@ Connection::~Connection() {
 
 Connection Connection::connect(Loop& loop, const Endpoint& peer, std::chrono::milliseconds timeout,
                                const ConnectionOptions& options) {
-  auto impl = std::make_shared<Impl>(loop.impl(), options);
+  auto impl = std::make_shared<TcpConnection>(loop.impl(), options);
   impl->connect(peer, timeout);
   return Connection(std::move(impl));
 }

@@ -1,85 +1,30 @@
-// The state machine behind Connection, shared with the listener that makes accepted ones.
+// What every kind of connection does behind Connection: a TCP one, or a WebSocket on top of one.
 #pragma once
 
-#include "net/loop_impl.h"
-//
-#include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/steady_timer.hpp>
-
 #include "net/connection.h"
-#include "net/loss_watch.h"
 
 namespace hapticd::net {
 
-// connecting -> open -> flushing (close() was called) -> draining (our end is shut) -> closed.
-// Any state may go to closed directly. Pending operations keep the object alive after its owner is gone.
-class Connection::Impl : public std::enable_shared_from_this<Connection::Impl> {
+/// See Connection for what each call means. Lives on the heap: pending operations may outlive the owner.
+class Connection::Impl {
  public:
-  using Socket = boost::asio::ip::tcp::socket;
-  using ErrorCode = boost::system::error_code;
+  virtual ~Impl() = default;
 
-  Impl(Loop::Impl& loop, const ConnectionOptions& options);
-
-  void connect(const Endpoint& peer, std::chrono::milliseconds timeout);
-  /// Takes over an accepted socket; its reading waits for start().
-  void adopt(Socket socket);
-
-  void start(ConnectionHandlers handlers);
-  bool sendable() const { return (state_ == State::connecting || state_ == State::open) && failure_.empty(); }
-  void send(std::shared_ptr<const Buffer> buffer, Delivery delivery);
-  void flush();
-  void close(std::string reason);
-  void abort(std::string reason);
+  virtual void start(ConnectionHandlers handlers) = 0;
+  virtual bool sendable() const = 0;
+  virtual void send(std::shared_ptr<const Buffer> buffer, Delivery delivery) = 0;
+  virtual void flush() = 0;
+  virtual void close(std::string reason) = 0;
+  virtual void abort(std::string reason) = 0;
   /// The owner is gone: no callback after this.
-  void release() noexcept;
-  void setPaused(bool paused);
-  void setLossDetection(std::chrono::milliseconds lossTimeout, std::chrono::seconds keepAlive);
+  virtual void release() noexcept = 0;
+  virtual void setPaused(bool paused) = 0;
+  virtual void setLossDetection(std::chrono::milliseconds lossTimeout, std::chrono::seconds keepAlive) = 0;
 
-  const Endpoint& local() const { return local_; }
-  const Endpoint& remote() const { return remote_; }
-  ConnectionStatistics statistics();
-  int nativeHandle() { return socket_.is_open() ? socket_.native_handle() : -1; }
-
- private:
-  enum class State { connecting, open, flushing, draining, closed };
-
-  void becomeOpen();
-  void applyOptions();
-  void armRead();
-  void readable();
-  void deliver(std::size_t bytes);
-  void peerEnded();
-  void armWrite();
-  void write();
-  void writeFailed(const ErrorCode& error);
-  void queueEmptied(bool wasBlocked);
-  void armWatch();
-  void armTimer(std::chrono::milliseconds timeout, std::string reason);
-  void finish(std::string reason);
-  void notifyClosed();
-  template <class Callback, class... Arguments>
-  void call(Callback ConnectionHandlers::*callback, const Arguments&... arguments);
-
-  Loop::Impl& loop_;
-  ConnectionOptions options_;
-  Socket socket_;
-  boost::asio::steady_timer timer_;  // of connect(), then of close()
-  boost::asio::steady_timer watchTimer_;
-  LossWatch watch_{options_.lossTimeout};
-  // Shared so that a callback that destroys its connection goes on running on living captures.
-  std::shared_ptr<ConnectionHandlers> handlers_;
-  SendQueue queue_;
-  Endpoint local_;
-  Endpoint remote_;
-  State state_ = State::connecting;
-  bool readArmed_ = false;
-  bool writeArmed_ = false;
-  bool paused_ = false;
-  bool peerEnded_ = false;
-  std::string failure_;  // why nothing can be sent any more, while what came before is still being read
-  std::string reason_;   // of close(), then of the end
-  std::uint64_t bytesIn_ = 0;
-  std::uint64_t bytesOut_ = 0;
+  virtual const Endpoint& local() const = 0;
+  virtual const Endpoint& remote() const = 0;
+  virtual ConnectionStatistics statistics() = 0;
+  virtual int nativeHandle() = 0;
 };
 
 }  // namespace hapticd::net

@@ -252,16 +252,17 @@ std::uint64_t drainEventFd(int fd) noexcept {
   return ::read(fd, &value, sizeof value) == sizeof value ? value : 0;
 }
 
-std::string bindErrorText(const char* kind, const Endpoint& local, const error_code& error) {
+std::string bindErrorText(const char* kind, const Endpoint& local, const error_code& error,
+                          const std::string& option) {
   const std::string port = std::to_string(local.port);
   std::string why = error.message();
   if (error == asio::error::address_in_use) {
-    why = "port " + port + " is in use by another program: choose another with --listen";
+    why = "port " + port + " is in use by another program: choose another with " + option;
   } else if (error == boost::system::errc::address_not_available) {
-    why = local.addressText() +
-          " is not an address of this machine: choose one with --listen (0.0.0.0 for all)";
+    why = local.addressText() + " is not an address of this machine: choose one with " + option +
+          " (0.0.0.0 for all)";
   } else if (error == asio::error::access_denied) {
-    why = "port " + port + " needs privileges: choose one above 1023 with --listen";
+    why = "port " + port + " needs privileges: choose one above 1023 with " + option;
   }
   return std::string("cannot listen on ") + kind + ' ' + local.text() + ": " + why;
 }

@@ -53,8 +53,10 @@ struct Loop::Impl {
   }
 };
 
-/// Why a socket of the given kind ("TCP", "UDP") could not be bound, with the remedy.
-std::string bindErrorText(const char* kind, const Endpoint& local, const boost::system::error_code& error);
+/// Why a socket of the given kind ("TCP", "UDP") could not be bound, with the remedy: another choice for
+/// `option`.
+std::string bindErrorText(const char* kind, const Endpoint& local, const boost::system::error_code& error,
+                          const std::string& option = "--listen");
 
 template <class AsioEndpoint>
 AsioEndpoint toAsio(const Endpoint& endpoint) {

@@ -2,8 +2,8 @@
 
 #include <cerrno>
 
-#include "net/connection_impl.h"
 #include "net/socket_options.h"
+#include "net/tcp_connection.h"
 //
 #include <boost/asio/error.hpp>
 
@@ -16,7 +16,7 @@ using boost::system::error_code;
 class TcpListener::Impl : public std::enable_shared_from_this<Impl> {
  public:
   Impl(Loop::Impl& loop, const Endpoint& local, std::function<void(Connection)> onAccept,
-       const ConnectionOptions& options)
+       const ConnectionOptions& options, const char* option)
       : loop_(loop),
         acceptor_(loop.context),
         retry_(loop.context),
@@ -31,7 +31,7 @@ class TcpListener::Impl : public std::enable_shared_from_this<Impl> {
       acceptor_.non_blocking(true);
       local_ = fromAsio(acceptor_.local_endpoint());
     } catch (const boost::system::system_error& error) {
-      throw Error(bindErrorText("TCP", local, error.code()));
+      throw Error(bindErrorText("TCP", local, error.code(), option));
     }
   }
 
@@ -80,7 +80,7 @@ class TcpListener::Impl : public std::enable_shared_from_this<Impl> {
 
   void handOver(tcp::socket socket) {
     loop_.guard([&] {
-      auto impl = std::make_shared<Connection::Impl>(loop_, options_);
+      auto impl = std::make_shared<TcpConnection>(loop_, options_);
       impl->adopt(std::move(socket));
       onAccept_(Connection(std::move(impl)));
     });
@@ -106,8 +106,8 @@ class TcpListener::Impl : public std::enable_shared_from_this<Impl> {
 };
 
 TcpListener::TcpListener(Loop& loop, const Endpoint& local, std::function<void(Connection)> onAccept,
-                         const ConnectionOptions& options)
-    : impl_(std::make_shared<Impl>(loop.impl(), local, std::move(onAccept), options)) {
+                         const ConnectionOptions& options, const char* option)
+    : impl_(std::make_shared<Impl>(loop.impl(), local, std::move(onAccept), options, option)) {
   impl_->arm();
 }
 

@@ -15,9 +15,9 @@ class TcpListener {
   class Impl;
 
   /// Port 0 lets the system choose one, see local(). Throws Error, which names the address, why, and a
-  /// remedy.
+  /// remedy: another choice for `option`.
   TcpListener(Loop& loop, const Endpoint& local, std::function<void(Connection)> onAccept,
-              const ConnectionOptions& options = {});
+              const ConnectionOptions& options = {}, const char* option = "--listen");
   ~TcpListener();
   TcpListener(const TcpListener&) = delete;
   TcpListener& operator=(const TcpListener&) = delete;

@@ -80,6 +80,16 @@ class SceneBuilder::State {
     return snapshot;
   }
 
+  SceneDescription describe() const {
+    SceneDescription description;
+    description.revision = revision_;
+    description.workspace = workspace_;
+    description.faces = faces_;
+    objects_.describe(description);
+    forces_.describe(description);
+    return description;
+  }
+
   NoticeBoard& board() { return board_; }
 
  private:
@@ -214,6 +224,10 @@ std::optional<Nanos> SceneBuilder::nextDeadline() const {
 
 std::shared_ptr<const SceneSnapshot> SceneBuilder::publish(Nanos now, std::vector<Notice>& notices) {
   return state_->publish(now, notices);
+}
+
+SceneDescription SceneBuilder::describe() const {
+  return state_->describe();
 }
 
 }  // namespace hapticd::scene

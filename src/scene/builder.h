@@ -10,6 +10,7 @@
 
 #include "scene/commands.h"
 #include "scene/config.h"
+#include "scene/description.h"
 #include "scene/notice.h"
 #include "scene/snapshot.h"
 
@@ -36,6 +37,9 @@ class SceneBuilder {
   /// The scene as it is now, or null when nothing changed since the last time. The first call always gives
   /// one. Builds the meshes that are due, which may take long; appends notices that became due.
   std::shared_ptr<const SceneSnapshot> publish(Nanos now, std::vector<Notice>& notices);
+
+  /// The scene as of the last publish(), for people to look at.
+  SceneDescription describe() const;
 
  private:
   class State;

@@ -9,6 +9,7 @@
 
 #include "scene/commands.h"
 #include "scene/config.h"
+#include "scene/description.h"
 #include "scene/effect.h"
 #include "scene/force_field.h"
 #include "scene/notice_board.h"
@@ -54,6 +55,8 @@ class FreeForces {
   bool update(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   /// Force fields depend on the workspace: a stiff one is kept passive in device metres.
   PublishedForces publish(double worldUnitsPerMetre) const;
+  /// Appends all of them, whether they run or not.
+  void describe(SceneDescription& out) const;
 
  private:
   template <class T>

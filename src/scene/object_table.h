@@ -8,6 +8,7 @@
 
 #include "scene/commands.h"
 #include "scene/config.h"
+#include "scene/description.h"
 #include "scene/matrices.h"
 #include "scene/mesh_draft.h"
 #include "scene/notice_board.h"
@@ -114,6 +115,8 @@ class ObjectTable {
   /// Brings `published` up to date; false when nothing changed. Remarks on surfaces go to who set them.
   bool publish(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   const PublishedObjects& published() const { return published_; }
+  /// Appends every object as it is now, whether it can be felt or not.
+  void describe(SceneDescription& out) const;
 
  private:
   Object* find(std::int32_t id) const;

@@ -53,7 +53,7 @@ struct DeviceConfig {
   std::string hardware;      ///< which one, in the driver's words: a device name, an index, /dev/input/event5
   std::string wheelProfile;  ///< evdev: TOML file with the newtons of a wheel or joystick
   bool calibrate = false;    ///< consent to calibrate at the start, which may move the arm
-  bool isolate = false;         ///< the driver runs in a process of its own: its crash is a fault, not the end
+  bool isolate = false;      ///< the driver runs in a process of its own: its crash is a fault, not the end
   bool enableForces = false;    ///< real devices start without force unless this is set
   std::string hand = "script";  ///< simulated device: "script", or a CSV file with the intended path
   double servoRate_Hz = 1000;
@@ -79,6 +79,10 @@ struct DeviceConfig {
   bool operator==(const DeviceConfig&) const = default;
 };
 
+/// The web port: 127.0.0.1:8080, or none when that is in use.
+inline constexpr const char* kHttpAuto = "auto";
+inline constexpr const char* kHttpOff = "off";
+
 struct ServerConfig {
   std::string listenAddress = "127.0.0.1";
   std::uint16_t port = 3883;
@@ -86,6 +90,8 @@ struct ServerConfig {
   double seconds = 0;                      ///< 0: until stopped
   std::vector<std::string> callbackHosts;  ///< hosts that a UDP request may name besides the sender's own
   std::string record;                      ///< session file to write; may hold strftime's %; empty: none
+  std::string http = kHttpAuto;            ///< where the page is: ADDR:PORT, kHttpAuto or kHttpOff
+  std::vector<std::string> httpAllow;      ///< further names of the web port: HOST, or HOST:PORT
   std::vector<DeviceConfig> devices{DeviceConfig{}};
 
   bool operator==(const ServerConfig&) const = default;

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cstdlib>
 #include <map>
@@ -86,10 +87,40 @@ void checkControl(const Checker& check, const DeviceConfig& device) {
   for (const std::string& address : device.controlList) check.address("control_list", address, "10.0.0.5");
 }
 
+// ADDR:PORT, and names that a browser can have in its address bar.
+void checkHttp(const Checker& check, const ServerConfig& config) {
+  if (config.http != kHttpAuto && config.http != kHttpOff) {
+    try {
+      std::string address = "127.0.0.1";
+      std::uint16_t port = 8080;
+      parseListen(config.http, address, port);
+      net::Endpoint::parse(address, port);
+    } catch (const std::runtime_error&) {
+      check.fail("http", "http: " + wire::inQuotes(config.http) +
+                             " is not ADDR:PORT such as 127.0.0.1:8080, auto or off");
+    }
+  }
+  for (const std::string& name : config.httpAllow) {
+    const std::size_t colon = name.find(':');
+    const std::string port = colon == std::string::npos ? "1" : name.substr(colon + 1);
+    const bool digits = !port.empty() && port.size() <= 5 &&
+                        std::all_of(port.begin(), port.end(), [](char c) { return c >= '0' && c <= '9'; });
+    const std::string host = name.substr(0, colon);
+    const bool plain = !host.empty() && std::all_of(host.begin(), host.end(), [](unsigned char c) {
+      return std::isalnum(c) != 0 || c == '-' || c == '.' || c == '_';
+    });
+    if (!digits || !plain) {
+      check.fail("http_allow",
+                 "http_allow: " + wire::inQuotes(name) + " is not HOST or HOST:PORT such as haptics.local");
+    }
+  }
+}
+
 void checkDevice(const Checker& check, const DeviceConfig& device) {
   checkDriver(check, device);
   if (device.isolate && device.driver == "simulated")
-    check.fail("isolate", "the simulated hand has no vendor's library to be isolated from; leave isolate out");
+    check.fail("isolate",
+               "the simulated hand has no vendor's library to be isolated from; leave isolate out");
   check.range("servo_rate_Hz", device.servoRate_Hz, 250, 4000);
   check.range("report_rate_Hz", device.reportRate_Hz, 0.1, device.servoRate_Hz);
   check.range("linear_tolerance_mm", device.linearTolerance_m * 1e3, 0, 1000);
@@ -143,6 +174,7 @@ void validate(const ServerConfig& config) {
   server.address("listen", config.listenAddress, "127.0.0.1");
   checkRecord(server, config.record);
   server.range("seconds", config.seconds, 0, 1e9);
+  checkHttp(server, config);
   for (const std::string& host : config.callbackHosts) server.address("callback_hosts", host, "10.0.0.7");
   std::map<std::string, int> uses;
   std::map<std::string, SceneOnDisconnect> scenes;
@@ -156,8 +188,8 @@ void validate(const ServerConfig& config) {
     if (device.scene.empty()) continue;
     const auto shared = scenes.try_emplace(device.scene, device.sceneOnDisconnect).first;
     if (shared->second != device.sceneOnDisconnect) {
-      check.fail("scene_on_disconnect",
-                 "the devices that share the scene '" + device.scene + "' disagree; it stays or goes for all");
+      check.fail("scene_on_disconnect", "the devices that share the scene '" + device.scene +
+                                            "' disagree; it stays or goes for all");
     }
   }
 }

@@ -71,6 +71,8 @@ void visitFields(Visitor& visitor, Server& server) requires requires {
   visitor.field("seconds", server.seconds);
   visitor.field("callback_hosts", server.callbackHosts);
   visitor.field("record", server.record);
+  visitor.field("http", server.http);
+  visitor.field("http_allow", server.httpAllow);
 }
 
 }  // namespace hapticd::server

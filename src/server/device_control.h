@@ -26,6 +26,8 @@ class DeviceControl {
   void rampIn() { guard_.rampIn(); }
 
   bool canBeHeld() const noexcept { return simulated_ != nullptr; }
+  /// Who holds the hand.
+  const std::optional<scene::ClientId>& holder() const noexcept { return holder_; }
   /// Moves the hand's target, or lets go. False when refused; `error` then says why.
   bool hold(scene::ClientId client, const wire::HoldHand& wanted, const realtime::TickReport& last,
             std::string& error);

@@ -33,6 +33,11 @@ class Roles {
     if (!first_) first_ = client;
     return *first_ == client;
   }
+  /// The same without making anybody the first one.
+  bool couldCommand(std::uint64_t client, const std::string& address) const {
+    if (control_ != Control::first) return Roles(*this).mayCommand(client, address);
+    return !first_ || *first_ == client;
+  }
   /// When the one in control leaves, the next to command is.
   void clientGone(std::uint64_t client) {
     if (first_ == client) first_.reset();

@@ -36,4 +36,10 @@ void SceneHost::clientGone(scene::ClientId client) {
   flush();
 }
 
+void SceneHost::describe(std::function<void(std::shared_ptr<const scene::SceneDescription>)> answer) {
+  std::vector<SceneTask> question;
+  question.push_back({0, DescribeScene{std::move(answer)}});
+  if (thread_) thread_->enqueue(std::move(question), 0);
+}
+
 }  // namespace hapticd::server

@@ -1,6 +1,7 @@
 // One scene and the devices that touch it: commands in, one snapshot for each device out.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <set>
 #include <string>
@@ -36,6 +37,8 @@ class SceneHost {
   /// What the client owns ramps out; with the last that had commanded the scene it goes, too, if so
   /// configured.
   void clientGone(scene::ClientId client);
+  /// Asks for the scene as it is after all that was flushed; the answer comes in the scene thread.
+  void describe(std::function<void(std::shared_ptr<const scene::SceneDescription>)> answer);
 
  private:
   std::uint32_t number_;

@@ -96,6 +96,7 @@ void SceneThread::run() {
     if (relieved && callbacks_.drained) callbacks_.drained();
     apply(tasks);
     publish();
+    answerQuestions();
   }
 }
 
@@ -120,6 +121,10 @@ void SceneThread::apply(std::vector<SceneTask>& tasks) {
 }
 
 void SceneThread::tell(SceneTask&& task) {
+  if (auto* question = std::get_if<DescribeScene>(&task.what)) {
+    questions_.push_back(std::move(*question));
+    return;
+  }
   const geometry::Nanos now = monotonicNow();
   auto* command = std::get_if<scene::SceneCommand>(&task.what);
   if (callbacks_.telling) callbacks_.telling(task.client, now, command);
@@ -148,6 +153,19 @@ void SceneThread::publish() {
     }
   }
   if (!notices_.empty() && callbacks_.notices) callbacks_.notices(std::exchange(notices_, {}));
+}
+
+// All seats have the same scene, but for what is passive on each device.
+void SceneThread::answerQuestions() {
+  if (questions_.empty()) return;
+  try {
+    const auto description =
+        std::make_shared<const scene::SceneDescription>(seats_.front().builder.describe());
+    for (const DescribeScene& question : questions_) question.answer(description);
+  } catch (const std::exception& error) {
+    spdlog::error("the scene could not be described: {}", error.what());
+  }
+  questions_.clear();
 }
 
 void SceneThread::publishTo(Seat& seat) {

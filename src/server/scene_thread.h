@@ -19,10 +19,15 @@ namespace hapticd::server {
 /// A client left: what it owns ramps out.
 struct ClientGone {};
 
+/// Somebody wants to look at the scene, after what was said so far. The answer comes in the scene thread.
+struct DescribeScene {
+  std::function<void(std::shared_ptr<const scene::SceneDescription>)> answer;
+};
+
 /// One thing for the scene to do, from one client.
 struct SceneTask {
   scene::ClientId client = 0;
-  std::variant<scene::SceneCommand, ClientGone> what;
+  std::variant<scene::SceneCommand, ClientGone, DescribeScene> what;
 };
 
 /// A device that touches the scene: what the scene must know of it, and where its snapshots go.
@@ -77,12 +82,14 @@ class SceneThread {
   void apply(std::vector<SceneTask>& tasks);
   void tell(SceneTask&& task);
   void publish();
+  void answerQuestions();
   void publishTo(Seat& seat);
   std::optional<geometry::Nanos> nextDeadline() const;
 
   std::vector<Seat> seats_;
   Callbacks callbacks_;
   std::vector<scene::Notice> notices_;
+  std::vector<DescribeScene> questions_;
   std::optional<geometry::Nanos> collectAt_;
 
   mutable std::mutex mutex_;

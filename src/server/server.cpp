@@ -58,18 +58,42 @@ Server::Server(const ServerConfig& config) : config_(config) {
 
   net::Endpoint local = net::Endpoint::parse(config_.listenAddress, config_.port);
   listener_ = std::make_unique<net::TcpListener>(
-      loop_, local, [this](net::Connection connection) { addSession(std::move(connection), nullptr); },
+      loop_, local,
+      [this](net::Connection connection) { addSession(std::move(connection), nullptr, SessionMode::tcp); },
       connectionOptions());
   local.port = listener_->local().port;
   requests_ = std::make_unique<net::UdpSocket>(loop_, local);
   requests_->start(
       {.onDatagram = [this](auto bytes, const auto& from) { onUdpRequest(bytes, from); }, .onRefused = {}});
+  openWeb();
 }
 
 Server::~Server() {
   // The servo first: no force outlives the server.
   for (const auto& station : stations_) station->stop();
   for (const auto& scene : scenes_) scene->stop();
+}
+
+// A second server on one machine is no mistake when nobody has asked for its page.
+void Server::openWeb() {
+  if (config_.http == kHttpOff) return;
+  const bool asked = config_.http != kHttpAuto;
+  std::string address = "127.0.0.1";
+  std::uint16_t port = 8080;
+  if (asked) parseListen(config_.http, address, port);
+  std::vector<SceneHost*> scenes;
+  for (const auto& scene : scenes_) scenes.push_back(scene.get());
+  try {
+    web_ = std::make_unique<WebServer>(loop_, net::Endpoint::parse(address, port), config_.httpAllow,
+                                       connectionOptions(), *this, scenes);
+  } catch (const net::Error& error) {
+    if (asked) throw;
+    spdlog::warn("no viewer: {}, or none with --http off", error.what());
+  }
+}
+
+std::optional<net::Endpoint> Server::webAddress() const {
+  return web_ ? std::optional(web_->local()) : std::nullopt;
 }
 
 void Server::openDevice(const DeviceConfig& device) {
@@ -156,15 +180,42 @@ void Server::everySecond() {
   closeStaleHandshakes();
   noise_.newSecond();
   for (const auto& station : stations_) station->checkHealth();
+  if (web_) web_->everySecond();
+}
+
+void Server::onWebClient(net::Connection connection) {
+  addSession(std::move(connection), nullptr, SessionMode::web);
+}
+
+ServerStatus Server::status() const {
+  ServerStatus status;
+  status.uptime_s = geometry::toSeconds(monotonicNow() - started_);
+  if (recorder_) status.recording = recorder_->path().string();
+  status.scenes.resize(scenes_.size());
+  for (const auto& station : stations_) {
+    DeviceStatus& device = status.devices.emplace_back(station->status());
+    while (scenes_[device.scene].get() != &station->scene()) ++device.scene;
+    status.scenes[device.scene].push_back(device.names.front());
+  }
+  for (const auto& [id, session] : sessions_) {
+    ClientStatus& client = status.clients.emplace_back(session->status());
+    for (const auto& station : stations_) {
+      const bool listens = session->wants(station->nameFor(*session));
+      if (listens && client.rate_Hz == 0) client.rate_Hz = station->rateOf(*session);
+      client.commands = client.commands || station->couldCommand(*session);
+    }
+  }
+  return status;
 }
 
 void Server::stop() {
   loop_.stop();
 }
 
-void Server::addSession(net::Connection connection, std::unique_ptr<net::UdpSocket> udp) {
+void Server::addSession(net::Connection connection, std::unique_ptr<net::UdpSocket> udp, SessionMode mode) {
   const scene::ClientId id = nextClient_++;
-  auto session = std::make_unique<Session>(id, *this, names_, clock_, std::move(connection), std::move(udp));
+  auto session =
+      std::make_unique<Session>(id, *this, names_, clock_, std::move(connection), std::move(udp), mode);
   spdlog::info("client {} connects from {}", id, session->description());
   Session& added = *session;
   sessions_.emplace(id, std::move(session));
@@ -221,7 +272,7 @@ void Server::callBack(const net::Endpoint& client) {
                noise_.warn("connection request names this server itself: refused");
                return;
              }
-             addSession(std::move(connection), std::move(udp));
+             addSession(std::move(connection), std::move(udp), SessionMode::udp);
            },
        .onBytes = {},
        .onDrained = {},

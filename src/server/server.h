@@ -6,6 +6,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "net/loop.h"
@@ -19,10 +20,11 @@
 #include "server/scene_host.h"
 #include "server/session.h"
 #include "server/station.h"
+#include "server/web/web_server.h"
 
 namespace hapticd::server {
 
-class Server final : public SessionOwner {
+class Server final : public SessionOwner, public WebOwner {
  public:
   /// Opens the devices and the ports. Throws ConfigError, net::Error or std::runtime_error with a remedy in
   /// the text.
@@ -36,6 +38,8 @@ class Server final : public SessionOwner {
 
   /// Where it listens, with the real port.
   const net::Endpoint& address() const noexcept { return listener_->local(); }
+  /// Where the page is served, with the real port; nothing when it is not.
+  std::optional<net::Endpoint> webAddress() const;
   /// Stations in the order of the configuration.
   const std::vector<std::unique_ptr<Station>>& stations() const noexcept { return stations_; }
 
@@ -48,10 +52,14 @@ class Server final : public SessionOwner {
   void onBatchEnd(Session& session) override;
   void onClosed(Session& session, const std::string& reason) override;
 
-  void addSession(net::Connection connection, std::unique_ptr<net::UdpSocket> udp);
+  ServerStatus status() const override;
+  void onWebClient(net::Connection connection) override;
+
+  void addSession(net::Connection connection, std::unique_ptr<net::UdpSocket> udp, SessionMode mode);
   void onUdpRequest(std::span<const std::byte> datagram, const net::Endpoint& from);
   void callBack(const net::Endpoint& client);
   void openDevice(const DeviceConfig& device);
+  void openWeb();
   SceneHost& sceneFor(const DeviceConfig& device);
   void startScene(SceneHost& scene);
   void startRecording();
@@ -82,7 +90,9 @@ class Server final : public SessionOwner {
   std::vector<net::Subscription> subscriptions_;
   std::unique_ptr<net::TcpListener> listener_;
   std::unique_ptr<net::UdpSocket> requests_;
+  std::unique_ptr<WebServer> web_;
   scene::ClientId nextClient_ = 1;
+  const geometry::Nanos started_ = monotonicNow();
 };
 
 }  // namespace hapticd::server

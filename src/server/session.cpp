@@ -22,8 +22,13 @@ wire::EndpointOptions endpointOptions(const net::UdpSocket* udp) {
 
 }  // namespace
 
+std::string_view nameOf(SessionMode mode) {
+  return mode == SessionMode::tcp ? "tcp" : mode == SessionMode::udp ? "udp" : "web";
+}
+
 Session::Session(scene::ClientId id, SessionOwner& owner, const wire::LocalNames& names,
-                 const WallClock& clock, net::Connection connection, std::unique_ptr<net::UdpSocket> udp)
+                 const WallClock& clock, net::Connection connection, std::unique_ptr<net::UdpSocket> udp,
+                 SessionMode mode)
     : id_(id),
       owner_(owner),
       names_(names),
@@ -31,7 +36,32 @@ Session::Session(scene::ClientId id, SessionOwner& owner, const wire::LocalNames
       connection_(std::move(connection)),
       udp_(std::move(udp)),
       endpoint_(names, endpointOptions(udp_.get())),
-      description_(connection_.remote().text() + (udp_ ? ", udp" : ", tcp")) {}
+      mode_(mode),
+      description_(connection_.remote().text() + ", " + std::string(nameOf(mode))) {}
+
+ClientStatus Session::status() const {
+  ClientStatus status;
+  status.id = id_;
+  status.address = connection_.remote().text();
+  status.mode = nameOf(mode_);
+  for (const wire::LocalSender name : subscriptions_) {
+    status.devices.push_back(names_.senders()[static_cast<std::size_t>(name.value)]);
+  }
+  status.connected_s = geometry::toSeconds(monotonicNow() - since_);
+  const net::ConnectionStatistics stream = connection_.statistics();
+  status.bytesIn = stream.bytesIn;
+  status.bytesOut = stream.bytesOut;
+  status.dropped = stream.droppedBuffers;
+  status.queuedBytes = stream.queuedBytes;
+  status.unacknowledgedBytes = stream.unacknowledgedBytes;
+  if (udp_) {
+    const net::UdpStatistics& datagrams = udp_->statistics();
+    status.bytesIn += datagrams.bytesIn;
+    status.bytesOut += datagrams.bytesOut;
+    status.dropped += datagrams.dropped;
+  }
+  return status;
+}
 
 void Session::start() {
   if (udp_) {
@@ -141,8 +171,8 @@ void Session::onEvent(const wire::Event& event) {
              event);
 }
 
-// A client that ends a field or a plane says so by TCP, what it said before by UDP may come later and must not
-// bring it back.
+// A client that ends a field or a plane says so by TCP, what it said before by UDP may come later and must
+// not bring it back.
 bool Session::isOvertaken(const wire::MessageReceived& message) {
   if (message.kind == wire::kUnknownKind) return false;
   wire::Time& last = lastReliable_[static_cast<std::size_t>(message.kind)];

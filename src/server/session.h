@@ -6,16 +6,22 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <string_view>
 
 #include "net/connection.h"
 #include "net/udp_socket.h"
 #include "scene/builder.h"
 #include "server/clock.h"
+#include "server/status.h"
 #include "wire/endpoint.h"
 
 namespace hapticd::server {
 
 class Session;
+
+/// How a client is connected.
+enum class SessionMode { tcp, udp, web };
+std::string_view nameOf(SessionMode mode);
 
 /// What a session tells the server. Called from the net thread.
 class SessionOwner {
@@ -36,9 +42,9 @@ class SessionOwner {
 /// A connected client. Lives in the net thread.
 class Session {
  public:
-  /// Without `udp` the client is a tcp:// one and everything goes by TCP. The socket must be bound already.
+  /// Without `udp` everything goes by the connection. The socket must be bound already.
   Session(scene::ClientId id, SessionOwner& owner, const wire::LocalNames& names, const WallClock& clock,
-          net::Connection connection, std::unique_ptr<net::UdpSocket> udp);
+          net::Connection connection, std::unique_ptr<net::UdpSocket> udp, SessionMode mode);
 
   /// Begins to talk: our cookie leaves, the client's is awaited.
   void start();
@@ -87,7 +93,9 @@ class Session {
   /// anybody at the client's address can forge, it is remarked and forgotten.
   void refuse(const std::string& reason);
 
-  net::ConnectionStatistics statistics() const { return connection_.statistics(); }
+  /// What the client is, and what went to and fro. Which device it commands, and how often it hears of it, is
+  /// left to the caller.
+  ClientStatus status() const;
 
  private:
   void onBytes(std::span<const std::byte> bytes);
@@ -107,6 +115,8 @@ class Session {
   std::unique_ptr<net::UdpSocket> udp_;
   net::Endpoint datagramPeer_;
   wire::Endpoint endpoint_;
+  SessionMode mode_;
+  geometry::Nanos since_ = monotonicNow();
   std::string description_;
   std::set<wire::LocalSender> subscriptions_;
   std::string failure_;

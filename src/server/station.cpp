@@ -230,4 +230,37 @@ void Station::Impl::onPublished(const scene::SceneSnapshot& snapshot) {
       device::WaypointPath::Repeat::yes));
 }
 
+DeviceStatus Station::status() const {
+  const Impl& my = *impl_;
+  const device::DeviceProfile& profile = my.device->profile();
+  DeviceStatus status;
+  status.names = my.config.names;
+  status.driver = my.config.driver;
+  status.simulated = my.simulated != nullptr;
+  status.workspace_m = workspaceOf(my.config, profile);
+  status.peakForce_N = profile.peakForce_N;
+  status.rate_Hz = my.config.servoRate_Hz;
+  status.realtime = !my.device->selfPaced() && my.servo.setup().scheduling.granted;
+  status.heldBy = my.control.holder();
+  status.hand = !status.simulated            ? "user"
+                : status.heldBy              ? "held"
+                : my.config.hand == "script" ? "scripted"
+                                             : "file";
+  status.fault = my.fault;
+  status.droppedReports = my.droppedReports;
+  status.last = my.outbox.last();
+  status.period = my.tick.histograms().period.copy();
+  status.wakeup = my.tick.histograms().wakeupError.copy();
+  status.compute = my.tick.histograms().compute.copy();
+  return status;
+}
+
+double Station::rateOf(const Session& session) const {
+  return impl_->outbox.choiceOf(session.id()).rate_Hz;
+}
+
+bool Station::couldCommand(const Session& session) const {
+  return impl_->roles.couldCommand(session.id(), session.address());
+}
+
 }  // namespace hapticd::server

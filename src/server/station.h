@@ -11,6 +11,7 @@
 #include "server/roles.h"
 #include "server/scene_thread.h"
 #include "server/session.h"
+#include "server/status.h"
 
 namespace hapticd::server {
 
@@ -50,10 +51,16 @@ class Station {
   void onSubscribed(Session& session, wire::LocalSender name);
   void clientGone(scene::ClientId client);
 
+  /// How the device and its loop are; `scene` is left to the caller.
+  DeviceStatus status() const;
+  /// The rate that the client has chosen, and whether it may command.
+  double rateOf(const Session& session) const;
+  bool couldCommand(const Session& session) const;
+
   /// Readable when reports wait.
   int wakeFd() const noexcept;
-  /// Encodes, once for all clients who chose alike, what the servo has reported, and calls onTick() after each
-  /// tick that says something, so that ticks leave in their order. False when there was none.
+  /// Encodes, once for all clients who chose alike, what the servo has reported, and calls onTick() after
+  /// each tick that says something, so that ticks leave in their order. False when there was none.
   bool collectReports(const WallClock& clock, const std::function<void()>& onTick);
   /// Queues what collectReports() encoded.
   void sendReports(Session& session);

@@ -6,7 +6,7 @@ hapticd=$1
 export HAPTICD_HDAPI_LIB=$3
 work=$(mktemp -d)
 : >"$work/log"
-"$hapticd" serve --listen 127.0.0.1:0 --device openhaptics --isolate --enable-forces --allow-no-rt --seconds 60 >"$work/log" 2>&1 &
+"$hapticd" serve --listen 127.0.0.1:0 --http off --device openhaptics --isolate --enable-forces --allow-no-rt --seconds 60 >"$work/log" 2>&1 &
 server=$!
 trap 'kill "$server" 2>/dev/null || true; rm -rf "$work"' EXIT
 

@@ -3,7 +3,7 @@
 # $address.
 work=${work:-$(mktemp -d)}
 : >"$work/log" # there from the start, however late the server is
-"$hapticd" serve --listen 127.0.0.1:0 --allow-no-rt >"$work/log" 2>&1 &
+"$hapticd" serve --listen 127.0.0.1:0 --http off --allow-no-rt >"$work/log" 2>&1 &
 server=$!
 trap 'kill "$server" 2>/dev/null || true; rm -rf "$work"' EXIT
 address=""

@@ -34,6 +34,8 @@ TEST(Config, ReadsEverySwitch) {
 listen = "0.0.0.0:4000"
 callback_hosts = ["10.0.0.7"]
 record = "session-%H%M.haptics"
+http = "0.0.0.0:80"
+http_allow = ["lab7", "lab7.example.org:9000"]
 [[device]]
 names = ["Left", "Tracker0"]
 report_rate_Hz = 250
@@ -63,6 +65,8 @@ workspace = [-1, -2, -3, 4, 5, 6]
   EXPECT_EQ(config.port, 4000);
   EXPECT_EQ(config.callbackHosts, std::vector<std::string>{"10.0.0.7"});
   EXPECT_EQ(config.record, "session-%H%M.haptics");
+  EXPECT_EQ(config.http, "0.0.0.0:80");
+  EXPECT_EQ(config.httpAllow, (std::vector<std::string>{"lab7", "lab7.example.org:9000"}));
   ASSERT_EQ(config.devices.size(), 2U);
   const DeviceConfig& left = config.devices[0];
   EXPECT_EQ(left.names, (std::vector<std::string>{"Left", "Tracker0"}));
@@ -111,6 +115,10 @@ TEST(Config, ValuesThatNoServerCanLiveWithAreNamed) {
   EXPECT_NE(errorOf("seconds = nan").find("seconds is nan"), std::string::npos);
   EXPECT_NE(errorOf("seconds = 1e300").find("1e+300"), std::string::npos);
   EXPECT_NE(errorOf("callback_hosts = [\"foo bar\"]").find("\"foo bar\""), std::string::npos);
+  EXPECT_NE(errorOf("http = \"lab7:80\"").find("\"lab7:80\" is not ADDR:PORT"), std::string::npos);
+  EXPECT_NE(errorOf("http = \"127.0.0.1:99999\"").find("127.0.0.1:99999"), std::string::npos);
+  EXPECT_NE(errorOf("http_allow = [\"http://lab7/\"]").find("\"http://lab7/\""), std::string::npos);
+  EXPECT_NE(errorOf("http_allow = [\"lab7:\"]").find("\"lab7:\""), std::string::npos);
   EXPECT_NE(errorOf("[[device]]\nname=\"a\\nb\"").find("\"a\\x0ab\""), std::string::npos);
   EXPECT_NE(errorOf("[[device]]\nname=\"VRPN Control\"").find("'VRPN Control'"), std::string::npos);
   EXPECT_NE(errorOf("[[device]]\nworkspace=[-1e300,0,0,1,1,1]").find("-1e+300"), std::string::npos);
@@ -167,6 +175,8 @@ ServerConfig unusual() {
   config.seconds = 0.1;
   config.callbackHosts = {"10.0.0.7", "10.0.0.8"};
   config.record = "session.haptics";
+  config.http = "10.0.0.1:9000";
+  config.httpAllow = {"lab7"};
   DeviceConfig device;
   device.names = {"Left \"hand\" \\", "Tracker0"};
   device.driver = "evdev";

@@ -18,6 +18,7 @@ class RunningServer {
     server::ServerConfig config;
     config.port = 0;
     config.allowNoRealtime = true;
+    config.http = server::kHttpOff;
     // A stalled machine is no reason to write into somebody's home.
     config.devices.front().blackBoxKeep = 0;
     return config;

@@ -1,4 +1,4 @@
-#include "net/connection_impl.h"
+#include "net/tcp_connection.h"
 
 #include <array>
 
@@ -26,7 +26,7 @@ std::string endText(const boost::system::error_code& error) {
 
 }  // namespace
 
-Connection::Impl::Impl(Loop::Impl& loop, const ConnectionOptions& options)
+TcpConnection::TcpConnection(Loop::Impl& loop, const ConnectionOptions& options)
     : loop_(loop),
       options_(options),
       socket_(loop.context),
@@ -34,7 +34,7 @@ Connection::Impl::Impl(Loop::Impl& loop, const ConnectionOptions& options)
       watchTimer_(loop.context),
       queue_(options.lowMarkBytes) {}
 
-void Connection::Impl::connect(const Endpoint& peer, std::chrono::milliseconds timeout) {
+void TcpConnection::connect(const Endpoint& peer, std::chrono::milliseconds timeout) {
   remote_ = peer;
   ErrorCode error;
   socket_.open(tcp::v4(), error);
@@ -60,12 +60,12 @@ void Connection::Impl::connect(const Endpoint& peer, std::chrono::milliseconds t
   });
 }
 
-void Connection::Impl::adopt(Socket socket) {
+void TcpConnection::adopt(Socket socket) {
   socket_ = std::move(socket);
   becomeOpen();
 }
 
-void Connection::Impl::becomeOpen() {
+void TcpConnection::becomeOpen() {
   state_ = State::open;
   ErrorCode error;
   socket_.non_blocking(true, error);
@@ -77,7 +77,7 @@ void Connection::Impl::becomeOpen() {
   applyOptions();
 }
 
-void Connection::Impl::applyOptions() {
+void TcpConnection::applyOptions() {
   const int fd = socket_.native_handle();
   setCloseOnExec(fd);
   setNoDelay(fd);
@@ -88,8 +88,7 @@ void Connection::Impl::applyOptions() {
   armWatch();
 }
 
-void Connection::Impl::setLossDetection(std::chrono::milliseconds lossTimeout,
-                                        std::chrono::seconds keepAlive) {
+void TcpConnection::setLossDetection(std::chrono::milliseconds lossTimeout, std::chrono::seconds keepAlive) {
   options_.lossTimeout = lossTimeout;
   options_.keepAlive = keepAlive;
   watch_ = LossWatch(lossTimeout);
@@ -99,7 +98,7 @@ void Connection::Impl::setLossDetection(std::chrono::milliseconds lossTimeout,
   }
 }
 
-void Connection::Impl::armWatch() {
+void TcpConnection::armWatch() {
   watchTimer_.cancel();
   if (!watch_.active()) {
     return;
@@ -118,7 +117,7 @@ void Connection::Impl::armWatch() {
   });
 }
 
-void Connection::Impl::start(ConnectionHandlers handlers) {
+void TcpConnection::start(ConnectionHandlers handlers) {
   handlers_ = std::make_shared<ConnectionHandlers>(std::move(handlers));
   if (state_ == State::closed) {
     asio::post(loop_.context, [self = shared_from_this()] { self->notifyClosed(); });
@@ -127,7 +126,7 @@ void Connection::Impl::start(ConnectionHandlers handlers) {
 }
 
 template <class Callback, class... Arguments>
-void Connection::Impl::call(Callback ConnectionHandlers::*callback, const Arguments&... arguments) {
+void TcpConnection::call(Callback ConnectionHandlers::*callback, const Arguments&... arguments) {
   const auto handlers = handlers_;
   if (!handlers || !((*handlers).*callback)) {
     return;
@@ -139,7 +138,7 @@ void Connection::Impl::call(Callback ConnectionHandlers::*callback, const Argume
 
 // --- reading
 
-void Connection::Impl::armRead() {
+void TcpConnection::armRead() {
   const bool wanted =
       state_ == State::open ? handlers_ && !paused_ : state_ == State::flushing || state_ == State::draining;
   if (readArmed_ || peerEnded_ || !wanted) {
@@ -155,7 +154,7 @@ void Connection::Impl::armRead() {
 }
 
 // One read per wake, so that a fast sender does not keep the loop from the others.
-void Connection::Impl::readable() {
+void TcpConnection::readable() {
   ErrorCode error;
   const std::size_t size =
       socket_.read_some(asio::buffer(loop_.readBuffer.get(), Loop::Impl::kReadBufferBytes), error);
@@ -169,14 +168,14 @@ void Connection::Impl::readable() {
   armRead();
 }
 
-void Connection::Impl::deliver(std::size_t bytes) {
+void TcpConnection::deliver(std::size_t bytes) {
   bytesIn_ += bytes;
   if (state_ == State::open) {
     call(&ConnectionHandlers::onBytes, std::span<const std::byte>(loop_.readBuffer.get(), bytes));
   }
 }
 
-void Connection::Impl::peerEnded() {
+void TcpConnection::peerEnded() {
   peerEnded_ = true;
   if (state_ == State::flushing) {
     return;  // the peer may have shut only its own direction: let it have the rest
@@ -189,7 +188,7 @@ void Connection::Impl::peerEnded() {
 
 // --- writing
 
-void Connection::Impl::send(std::shared_ptr<const Buffer> buffer, Delivery delivery) {
+void TcpConnection::send(std::shared_ptr<const Buffer> buffer, Delivery delivery) {
   if (!sendable()) {
     return;
   }
@@ -204,13 +203,13 @@ void Connection::Impl::send(std::shared_ptr<const Buffer> buffer, Delivery deliv
   }
 }
 
-void Connection::Impl::flush() {
+void TcpConnection::flush() {
   if ((state_ == State::open || state_ == State::flushing) && !writeArmed_ && !queue_.empty()) {
     write();
   }
 }
 
-void Connection::Impl::write() {
+void TcpConnection::write() {
   constexpr std::size_t kMostParts = 64;  // what Asio hands to one system call
   const bool wasBlocked = writeArmed_;
   writeArmed_ = false;
@@ -239,7 +238,7 @@ void Connection::Impl::write() {
   queueEmptied(wasBlocked);
 }
 
-void Connection::Impl::armWrite() {
+void TcpConnection::armWrite() {
   writeArmed_ = true;
   socket_.async_wait(Socket::wait_write, [this, self = shared_from_this()](const ErrorCode&) {
     if (state_ == State::open || state_ == State::flushing) {
@@ -248,7 +247,7 @@ void Connection::Impl::armWrite() {
   });
 }
 
-void Connection::Impl::queueEmptied(bool wasBlocked) {
+void TcpConnection::queueEmptied(bool wasBlocked) {
   if (state_ == State::flushing) {
     ErrorCode error;
     socket_.shutdown(Socket::shutdown_send, error);
@@ -265,7 +264,7 @@ void Connection::Impl::queueEmptied(bool wasBlocked) {
 
 // A peer that sent a lot and left without reading its reports has reset the connection, yet what it sent is
 // still there to be read; the reader comes to the end by itself.
-void Connection::Impl::writeFailed(const ErrorCode& error) {
+void TcpConnection::writeFailed(const ErrorCode& error) {
   if (state_ != State::open) {
     finish(reason_);
     return;
@@ -279,7 +278,7 @@ void Connection::Impl::writeFailed(const ErrorCode& error) {
 
 // --- the end
 
-void Connection::Impl::close(std::string reason) {
+void TcpConnection::close(std::string reason) {
   if (!sendable() || state_ == State::connecting) {  // nothing can be waited for
     if (state_ == State::connecting || state_ == State::open) {
       finish(std::move(reason));
@@ -297,7 +296,7 @@ void Connection::Impl::close(std::string reason) {
   armRead();
 }
 
-void Connection::Impl::abort(std::string reason) {
+void TcpConnection::abort(std::string reason) {
   if (socket_.is_open()) {
     ErrorCode ignored;
     socket_.set_option(Socket::linger(true, 0), ignored);
@@ -306,7 +305,7 @@ void Connection::Impl::abort(std::string reason) {
 }
 
 // A timer that expired may be past cancelling: that of connect() must not end the connection just made.
-void Connection::Impl::armTimer(std::chrono::milliseconds timeout, std::string reason) {
+void TcpConnection::armTimer(std::chrono::milliseconds timeout, std::string reason) {
   const bool whileConnecting = state_ == State::connecting;
   timer_.expires_after(timeout);
   timer_.async_wait([=, this, self = shared_from_this(), text = std::move(reason)](const ErrorCode& error) {
@@ -317,7 +316,7 @@ void Connection::Impl::armTimer(std::chrono::milliseconds timeout, std::string r
 }
 
 // The callback is posted, so that no owner is called back from inside its own send() or flush().
-void Connection::Impl::finish(std::string reason) {
+void TcpConnection::finish(std::string reason) {
   if (state_ == State::closed) {
     return;
   }
@@ -331,13 +330,13 @@ void Connection::Impl::finish(std::string reason) {
   asio::post(loop_.context, [self = shared_from_this()] { self->notifyClosed(); });
 }
 
-void Connection::Impl::notifyClosed() {
+void TcpConnection::notifyClosed() {
   if (const auto handlers = std::move(handlers_); handlers && handlers->onClosed) {
     loop_.guard([&] { handlers->onClosed(reason_); });
   }
 }
 
-void Connection::Impl::release() noexcept {
+void TcpConnection::release() noexcept {
   handlers_.reset();
   loop_.guard([this] {
     state_ = State::closed;
@@ -349,12 +348,12 @@ void Connection::Impl::release() noexcept {
   });
 }
 
-void Connection::Impl::setPaused(bool paused) {
+void TcpConnection::setPaused(bool paused) {
   paused_ = paused;
   armRead();
 }
 
-ConnectionStatistics Connection::Impl::statistics() {
+ConnectionStatistics TcpConnection::statistics() {
   return {bytesIn_,
           bytesOut_,
           queue_.droppedBuffers(),

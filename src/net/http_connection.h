@@ -1,0 +1,59 @@
+// One client of an HttpServer.
+#pragma once
+
+#include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/string_body.hpp>
+#include <optional>
+#include <string>
+
+#include "net/connection.h"
+#include "net/http_server.h"
+#include "net/loop.h"
+
+namespace hapticd::net {
+
+// idle -> receiving (the first bytes of a request) -> answering (until the client has it) -> idle.
+class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
+ public:
+  /// `onGone` is called once, when nothing more will come of this.
+  HttpConnection(Loop& loop, Connection connection, const HttpOptions& options,
+                 const HttpServer::Handler& onRequest, std::function<void(HttpConnection*)> onGone);
+
+  void start();
+  /// Answers the request of that number, if it is the one that waits.
+  void answer(std::uint64_t request, HttpResponse response);
+
+ private:
+  using Parser = boost::beast::http::request_parser<boost::beast::http::string_body>;
+  enum class State { idle, receiving, answering, closing };
+
+  void receive(std::span<const std::byte> bytes);
+  void readOn();
+  void parse();
+  void ask();
+  void refuse(int status, std::string_view text);
+  void sendHead(const HttpResponse& response);
+  void sendBody();
+  void answered();
+  void becomeWebSocket(const std::function<void(Connection)>& taker);
+  void limit(std::chrono::milliseconds time, const char* text);
+  void gone();
+
+  Loop& loop_;
+  Connection connection_;
+  const HttpOptions& options_;
+  const HttpServer::Handler& onRequest_;
+  std::function<void(HttpConnection*)> onGone_;
+  Subscription timer_;
+  State state_ = State::idle;
+  std::string input_;
+  std::optional<Parser> parser_;
+  std::string webSocketKey_;
+  std::uint64_t request_ = 0;
+  bool headOnly_ = false;
+  bool keepAlive_ = false;
+  std::shared_ptr<const Buffer> body_;
+  std::size_t bodySent_ = 0;
+};
+
+}  // namespace hapticd::net

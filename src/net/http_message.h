@@ -1,0 +1,51 @@
+// A request and its answer, as values.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "net/connection.h"
+
+namespace hapticd::net {
+
+struct HttpRequest {
+  std::string method;                                        ///< as sent: "GET"
+  std::string target;                                        ///< as sent: "/api/mesh?scene=0"
+  std::vector<std::pair<std::string, std::string>> headers;  ///< names in lower case, in the order they came
+  std::string body;
+  Endpoint local;
+  Endpoint remote;
+  bool wantsWebSocket = false;
+
+  /// The target up to the question mark.
+  std::string_view path() const {
+    const std::string_view all = target;
+    return all.substr(0, all.find('?'));
+  }
+  /// The value of "name=value" behind the question mark, as sent.
+  std::optional<std::string_view> parameter(std::string_view name) const;
+  /// How often a header came, by its name in lower case.
+  std::size_t count(std::string_view name) const;
+  /// The first of that name; empty when there is none.
+  std::string_view header(std::string_view name) const;
+};
+
+struct HttpResponse {
+  int status = 200;
+  std::string contentType = "text/plain; charset=utf-8";
+  std::vector<std::pair<std::string, std::string>> headers;  ///< besides Content-Type and -Length
+  std::shared_ptr<const Buffer> body;                        ///< shared: never copied as a whole
+  /// Takes the connection when the request wants a WebSocket; the rest of the response is then not sent.
+  std::function<void(Connection)> onWebSocket;
+
+  /// A response with a text.
+  static HttpResponse of(int status, std::string_view text,
+                         std::string contentType = "text/plain; charset=utf-8");
+};
+
+}  // namespace hapticd::net

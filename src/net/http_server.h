@@ -1,0 +1,64 @@
+// A small HTTP/1.1 server: requests by callback, answers now or later, WebSockets as Connections.
+//
+// Bounded: in connections, in the size of a request, and in the time that a client may take to send one or to
+// read the answer. One request at a time is read from each connection.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <functional>
+#include <memory>
+
+#include "net/http_message.h"
+#include "net/loop.h"
+
+namespace hapticd::net {
+
+struct HttpOptions {
+  std::size_t connections = 64;  ///< at once; WebSockets are not counted, they belong to who took them
+  std::size_t headerBytes = 8192;
+  std::size_t bodyBytes = 4096;
+  std::chrono::milliseconds requestTimeout{10000};  ///< from the first byte of a request to its last
+  std::chrono::milliseconds idleTimeout{60000};     ///< without a request
+  std::chrono::milliseconds answerTimeout{30000};   ///< for the handler to answer and the client to read it
+  ConnectionOptions connection;
+};
+
+class HttpConnection;
+
+/// The way back to whoever asked; copies are the same one. Answers once, in the loop's thread; what comes
+/// after the connection has ended is dropped.
+class HttpReply {
+ public:
+  HttpReply(std::weak_ptr<HttpConnection> connection, std::uint64_t request)
+      : connection_(std::move(connection)), request_(request) {}
+  void operator()(HttpResponse response) const;
+
+ private:
+  std::weak_ptr<HttpConnection> connection_;
+  std::uint64_t request_;
+};
+
+/// Listens from construction to destruction. Answers what is no HTTP by itself, with a status and a sentence.
+class HttpServer {
+ public:
+  using Handler = std::function<void(const HttpRequest&, const HttpReply&)>;
+  class Impl;
+
+  /// Port 0 lets the system choose one, see local(). `option` is the option that error texts name. Throws
+  /// Error.
+  HttpServer(Loop& loop, const Endpoint& local, Handler onRequest, const HttpOptions& options = {},
+             const char* option = "--http");
+  ~HttpServer();
+  HttpServer(const HttpServer&) = delete;
+  HttpServer& operator=(const HttpServer&) = delete;
+
+  const Endpoint& local() const noexcept;
+  /// Open now, without WebSockets.
+  std::size_t connections() const noexcept;
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace hapticd::net

@@ -1,0 +1,86 @@
+// The state machine of a TCP connection, shared with the listener that makes accepted ones.
+#pragma once
+
+#include "net/loop_impl.h"
+//
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+
+#include "net/connection_impl.h"
+#include "net/loss_watch.h"
+
+namespace hapticd::net {
+
+// connecting -> open -> flushing (close() was called) -> draining (our end is shut) -> closed.
+// Any state may go to closed directly. Pending operations keep the object alive after its owner is gone.
+class TcpConnection final : public Connection::Impl, public std::enable_shared_from_this<TcpConnection> {
+ public:
+  using Socket = boost::asio::ip::tcp::socket;
+  using ErrorCode = boost::system::error_code;
+
+  TcpConnection(Loop::Impl& loop, const ConnectionOptions& options);
+
+  void connect(const Endpoint& peer, std::chrono::milliseconds timeout);
+  /// Takes over an accepted socket; its reading waits for start().
+  void adopt(Socket socket);
+
+  void start(ConnectionHandlers handlers) override;
+  bool sendable() const override {
+    return (state_ == State::connecting || state_ == State::open) && failure_.empty();
+  }
+  void send(std::shared_ptr<const Buffer> buffer, Delivery delivery) override;
+  void flush() override;
+  void close(std::string reason) override;
+  void abort(std::string reason) override;
+  void release() noexcept override;
+  void setPaused(bool paused) override;
+  void setLossDetection(std::chrono::milliseconds lossTimeout, std::chrono::seconds keepAlive) override;
+
+  const Endpoint& local() const override { return local_; }
+  const Endpoint& remote() const override { return remote_; }
+  ConnectionStatistics statistics() override;
+  int nativeHandle() override { return socket_.is_open() ? socket_.native_handle() : -1; }
+
+ private:
+  enum class State { connecting, open, flushing, draining, closed };
+
+  void becomeOpen();
+  void applyOptions();
+  void armRead();
+  void readable();
+  void deliver(std::size_t bytes);
+  void peerEnded();
+  void armWrite();
+  void write();
+  void writeFailed(const ErrorCode& error);
+  void queueEmptied(bool wasBlocked);
+  void armWatch();
+  void armTimer(std::chrono::milliseconds timeout, std::string reason);
+  void finish(std::string reason);
+  void notifyClosed();
+  template <class Callback, class... Arguments>
+  void call(Callback ConnectionHandlers::*callback, const Arguments&... arguments);
+
+  Loop::Impl& loop_;
+  ConnectionOptions options_;
+  Socket socket_;
+  boost::asio::steady_timer timer_;  // of connect(), then of close()
+  boost::asio::steady_timer watchTimer_;
+  LossWatch watch_{options_.lossTimeout};
+  // Shared so that a callback that destroys its connection goes on running on living captures.
+  std::shared_ptr<ConnectionHandlers> handlers_;
+  SendQueue queue_;
+  Endpoint local_;
+  Endpoint remote_;
+  State state_ = State::connecting;
+  bool readArmed_ = false;
+  bool writeArmed_ = false;
+  bool paused_ = false;
+  bool peerEnded_ = false;
+  std::string failure_;  // why nothing can be sent any more, while what came before is still being read
+  std::string reason_;   // of close(), then of the end
+  std::uint64_t bytesIn_ = 0;
+  std::uint64_t bytesOut_ = 0;
+};
+
+}  // namespace hapticd::net

@@ -1,0 +1,88 @@
+// The frames of a WebSocket (RFC 6455) as a server reads and writes them: pure, no socket.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "net/send_queue.h"
+
+namespace hapticd::net {
+
+enum class WebSocketOpcode : std::uint8_t {
+  continuation = 0,
+  text = 1,
+  binary = 2,
+  close = 8,
+  ping = 9,
+  pong = 10,
+};
+
+/// Status codes of a closing frame that we use or look at.
+inline constexpr std::uint16_t kWebSocketNormal = 1000;
+inline constexpr std::uint16_t kWebSocketProtocolError = 1002;
+inline constexpr std::uint16_t kWebSocketUnsupported = 1003;
+inline constexpr std::uint16_t kWebSocketNoStatus = 1005;  ///< never on the wire: a closing frame without one
+
+/// How the other side ended the talk, or what was wrong with it.
+struct WebSocketEnd {
+  std::uint16_t code = kWebSocketNormal;
+  std::string text;
+  bool isError = false;  ///< found by us; `code` is then what to tell the peer
+};
+
+/// What came in one read.
+struct WebSocketInput {
+  Buffer data;                ///< payload of binary messages, in order; where they began and ended is lost
+  std::vector<Buffer> pings;  ///< each wants a pong with the same payload
+  std::optional<WebSocketEnd> end;  ///< nothing is read after it
+};
+
+/// Takes the bytes of a client apart, in pieces of any size. Message boundaries mean nothing to a byte
+/// stream, so payload is given on as it comes and no message is too long; nothing is kept but a header and a
+/// control frame.
+class WebSocketReader {
+ public:
+  void feed(std::span<const std::byte> bytes, WebSocketInput& out);
+
+ private:
+  static constexpr std::size_t kLongestControl = 125;
+  static constexpr std::size_t kLongestHeader = 14;
+
+  std::size_t takeHeader(std::span<const std::byte> bytes, WebSocketInput& out);
+  std::size_t takePayload(std::span<const std::byte> bytes, WebSocketInput& out);
+  std::size_t headerSize() const;
+  void checkStart(WebSocketInput& out);
+  void beginFrame(WebSocketInput& out);
+  void endFrame(WebSocketInput& out);
+  void closingFrame(WebSocketInput& out);
+  void fail(WebSocketInput& out, std::uint16_t code, std::string text);
+  bool isControl() const { return static_cast<std::uint8_t>(opcode_) >= 8; }
+
+  std::array<std::uint8_t, kLongestHeader> header_{};
+  std::size_t headerHave_ = 0;
+  bool inPayload_ = false;
+  WebSocketOpcode opcode_ = WebSocketOpcode::binary;
+  bool final_ = true;
+  bool inMessage_ = false;  // a fragment came that was not the last
+  bool over_ = false;
+  std::uint64_t length_ = 0;
+  std::uint64_t taken_ = 0;
+  std::array<std::uint8_t, 4> mask_{};
+  Buffer control_;
+};
+
+/// One whole, unmasked frame with this payload.
+Buffer webSocketFrame(WebSocketOpcode opcode, std::span<const std::byte> payload);
+/// A closing frame; the reason is cut to what fits into one.
+Buffer webSocketClose(std::uint16_t code, std::string_view reason);
+
+/// Sec-WebSocket-Accept for the key of a request.
+std::string webSocketAccept(std::string_view key);
+
+}  // namespace hapticd::net

@@ -1,0 +1,59 @@
+#include "scene/description.h"
+
+#include "scene/free_forces.h"
+#include "scene/object_table.h"
+
+namespace hapticd::scene {
+
+std::string_view nameOf(EffectType type) {
+  switch (type) {
+    case EffectType::constant:
+      return "constant";
+    case EffectType::spring:
+      return "spring";
+    case EffectType::viscous:
+      return "viscous";
+    case EffectType::friction:
+      return "friction";
+    case EffectType::motorVibration:
+      return "vibrationMotor";
+    case EffectType::contactVibration:
+      return "vibrationContact";
+  }
+  return "";
+}
+
+void ObjectTable::describe(SceneDescription& out) const {
+  for (const auto& object : objects_) {
+    if (!object) continue;
+    ObjectDescription& to = out.objects.emplace_back();
+    to.id = object->id;
+    to.parent = object->parent;
+    to.touchable = object->touchable;
+    to.T_world_object = frameOf(*object) * Eigen::UniformScaling<double>(object->worldUnits());
+    to.T_object_mesh = object->T_object_mesh;
+    to.surface = object->surface;
+    if (const MeshGeometry* mesh = object->geometry.get()) {
+      to.vertices = mesh->target ? mesh->target : mesh->vertices;
+      to.triangles = mesh->triangles;
+    }
+  }
+}
+
+void FreeForces::describe(SceneDescription& out) const {
+  for (const auto& [index, entry] : effects_) {
+    out.effects.push_back({entry.value.effect, entry.value.running});
+  }
+  for (const auto& [index, entry] : planes_) out.planes.push_back(entry.value);
+  out.fields = field_ ? 1 : 0;
+  if (!constraint_ || !constraint_->value.enabled) return;
+  const Constraint& c = constraint_->value;
+  const auto tell = [&](std::string_view mode, const Vec3& point_m, const Vec3& direction) {
+    out.constraint = {mode, kWorldUnitsPerStockMetre * point_m, direction, c.stiffness_N_per_m};
+  };
+  if (c.mode == 1) tell("point", c.point_m, Vec3::Zero());
+  if (c.mode == 2) tell("line", c.linePoint_m, c.lineDirection);
+  if (c.mode == 3) tell("plane", c.planePoint_m, c.planeNormal);
+}
+
+}  // namespace hapticd::scene

@@ -1,0 +1,57 @@
+// A scene as its clients made it, for people to look at: with what cannot be felt and what is not running.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "geometry/triangle_mesh.h"
+#include "scene/effect.h"
+#include "scene/plane.h"
+#include "scene/surface.h"
+#include "scene/workspace.h"
+
+namespace hapticd::scene {
+
+struct ObjectDescription {
+  std::int32_t id = 0;
+  std::int32_t parent = -1;  ///< another object, -1 the scene, -2 nothing
+  bool touchable = true;
+  Affine T_world_object = Affine::Identity();  ///< world units; where it is, or is on its way to
+  Affine T_object_mesh = Affine::Identity();
+  Surface surface;  ///< as it is felt
+  /// What is felt, null while there is nothing; equal pointers mean an equal shape. While it deforms, where
+  /// it is on its way to.
+  std::shared_ptr<const std::vector<geometry::Vec3f>> vertices;
+  std::shared_ptr<const std::vector<geometry::Triangle>> triangles;
+};
+
+struct EffectDescription {
+  Effect effect;
+  bool active = false;
+};
+
+/// Of the constraint, which is there when a mode is chosen and it is enabled.
+struct ConstraintDescription {
+  std::string_view mode;                              ///< point, line, plane
+  geometry::Vec3 point = geometry::Vec3::Zero();      ///< world units, of any of the three
+  geometry::Vec3 direction = geometry::Vec3::Zero();  ///< of the line, or the normal of the plane
+  double stiffness_N_per_m = 0;
+};
+
+struct SceneDescription {
+  std::uint64_t revision = 0;
+  Workspace workspace;
+  TouchableFaces faces = TouchableFaces::both;
+  std::vector<ObjectDescription> objects;  ///< by ascending id
+  std::vector<EffectDescription> effects;  ///< by ascending index, also those that do not run
+  std::vector<Plane> planes;
+  std::optional<ConstraintDescription> constraint;
+  std::size_t fields = 0;  ///< force fields, without the constraint
+};
+
+/// The name of an effect's type, as clients say it.
+std::string_view nameOf(EffectType type);
+
+}  // namespace hapticd::scene

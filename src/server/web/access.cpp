@@ -1,0 +1,69 @@
+#include "server/web/access.h"
+
+#include <algorithm>
+#include <cctype>
+
+#include "wire/text.h"
+
+namespace hapticd::server {
+namespace {
+
+std::string lowerCase(std::string_view text) {
+  std::string lower(text);
+  for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return lower;
+}
+
+// HOST:PORT of a Host header or an origin; without a port it is 80, as http has it.
+std::string withPort(std::string_view authority) {
+  const std::size_t colon = authority.rfind(':');
+  const std::size_t bracket = authority.rfind(']');
+  const bool has = colon != std::string_view::npos && (bracket == std::string_view::npos || colon > bracket);
+  return lowerCase(authority) + (has ? "" : ":80");
+}
+
+std::string quoted(std::string_view text) {
+  constexpr std::size_t kMost = 80;
+  return wire::inQuotes(std::string(text.substr(0, kMost)));
+}
+
+}  // namespace
+
+WebAccess::WebAccess(const net::Endpoint& local, std::vector<std::string> allowed) : port_(local.port) {
+  const std::string port = ':' + std::to_string(port_);
+  for (const char* name : {"localhost", "127.0.0.1", "[::1]"}) hosts_.push_back(name + port);
+  if (local.address != net::kAnyAddress) hosts_.push_back(local.text());
+  for (const std::string& name : allowed) {
+    hosts_.push_back(lowerCase(name) + (name.find(':') == std::string::npos ? port : ""));
+  }
+}
+
+// An address cannot be made to lead elsewhere, as a name can.
+bool WebAccess::isOurs(std::string_view authority, const net::HttpRequest& request) const {
+  const std::string host = withPort(authority);
+  return std::find(hosts_.begin(), hosts_.end(), host) != hosts_.end() ||
+         host == net::Endpoint{request.local.address, port_}.text();
+}
+
+std::string WebAccess::refusal(const net::HttpRequest& request) const {
+  if (request.count("host") != 1) return "a request names its host once";
+  const std::string_view host = request.header("host");
+  if (!isOurs(host, request)) {
+    return "this server is not " + quoted(host) +
+           ": use its address, or allow the name with --http-allow when it is one of yours";
+  }
+  for (const auto& [name, value] : request.headers) {
+    if (name != "origin") continue;
+    const std::string_view origin = value;
+    const std::size_t scheme = origin.starts_with("http://") ? 7 : origin.starts_with("https://") ? 8 : 0;
+    if (scheme > 0 && isOurs(origin.substr(scheme), request)) continue;
+    return "pages of " + quoted(origin) + " may not use this server";
+  }
+  // Images and scripts of other pages come without an origin.
+  if (request.header("sec-fetch-site") == "cross-site" && request.header("sec-fetch-mode") != "navigate") {
+    return "pages of other sites may not use this server";
+  }
+  return "";
+}
+
+}  // namespace hapticd::server

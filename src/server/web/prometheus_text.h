@@ -1,0 +1,34 @@
+// The text format of Prometheus, version 0.0.4.
+#pragma once
+
+#include <cstdint>
+#include <initializer_list>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "realtime/servo/histogram.h"
+
+namespace hapticd::server {
+
+/// Collects families of metrics, one after the other: a family's head first, then its samples.
+class PrometheusText {
+ public:
+  using Labels = std::initializer_list<std::pair<std::string_view, std::string_view>>;
+
+  /// `type`: counter, gauge, histogram. Names of counters end in _total; names end in their unit.
+  void family(std::string_view name, std::string_view type, std::string_view help);
+  void sample(double value, Labels labels = {});
+  /// A histogram of nanoseconds, told in seconds, with a bucket for each doubling from 1 us to 0.5 s.
+  void histogram(const realtime::Histogram::Copy& histogram, std::string_view device);
+
+  const std::string& text() const noexcept { return text_; }
+
+ private:
+  void line(std::string_view ending, double value, Labels labels);
+
+  std::string name_;
+  std::string text_;
+};
+
+}  // namespace hapticd::server

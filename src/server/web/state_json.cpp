@@ -1,0 +1,213 @@
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "server/view.h"
+#include "server/web/picture.h"
+#include "wire/messages.h"
+
+namespace hapticd::server {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json json(const geometry::Vec3& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+// Column-major, as the page's matrices are.
+Json json(const geometry::Affine& t) {
+  Json numbers = Json::array();
+  const Eigen::Matrix4d m = Eigen::Affine3d(t).matrix();
+  for (int column = 0; column < 4; ++column) {
+    for (int row = 0; row < 4; ++row) numbers.push_back(m(row, column));
+  }
+  return numbers;
+}
+
+template <class T>
+Json orNull(const std::optional<T>& value) {
+  return value ? Json(*value) : Json();
+}
+
+double inMicroseconds(geometry::Nanos t) {
+  return static_cast<double>(t) * 1e-3;
+}
+
+Json json(const realtime::Histogram::Copy& h) {
+  Json bins = Json::array();
+  for (int i = 0; i < realtime::Histogram::kBuckets; ++i) {
+    const std::uint64_t count = h.counts[static_cast<std::size_t>(i)];
+    if (count == 0) continue;
+    const geometry::Nanos from = i == 0 ? 0 : realtime::Histogram::upperBound(i - 1) + 1;
+    bins.push_back({inMicroseconds(from), count});
+  }
+  return {{"p50", inMicroseconds(h.quantile(0.5))},
+          {"p99", inMicroseconds(h.quantile(0.99))},
+          {"p999", inMicroseconds(h.quantile(0.999))},
+          {"max", inMicroseconds(h.max)},
+          {"bins", std::move(bins)}};
+}
+
+Json tripNames(std::uint32_t bits) {
+  Json names = Json::array();
+  for (const realtime::TripInfo& trip : realtime::kTrips) {
+    if ((bits & realtime::bit(trip.trip)) != 0) names.push_back(trip.name);
+  }
+  return names;
+}
+
+Json json(const DeviceStatus& device) {
+  const realtime::TickReport& last = device.last;
+  const geometry::Affine T_world_device =
+      last.tick == 0 ? scene::Workspace{}.T_world_device : last.T_world_device;
+  return {{"name", device.names.front()},
+          {"names", device.names},
+          {"driver", device.driver},
+          {"simulated", device.simulated},
+          {"scene", device.scene},
+          {"workspace_m", {{"min", json(device.workspace_m.min)}, {"max", json(device.workspace_m.max)}}},
+          {"T_world_device", json(T_world_device)},
+          {"world_per_reported", kWorldPerReported},
+          {"peak_force_N", device.peakForce_N},
+          {"limit_N", last.guard.limit_N},
+          {"rate_Hz", device.rate_Hz},
+          {"realtime", device.realtime},
+          {"hand", device.hand},
+          {"held_by", orNull(device.heldBy)},
+          {"fault", device.fault},
+          {"temperature_C", nullptr},  // no driver tells degrees
+          {"temperature", last.device.motorTemperature},
+          {"guard",
+           {{"armed", last.guard.armed},
+            {"stopped", last.guard.stopped},
+            {"active", tripNames(last.guard.active)},
+            {"latched", tripNames(last.guard.latched)}}},
+          {"loop",
+           {{"ticks", last.tick},
+            {"overruns", last.timing.overruns},
+            {"skipped_periods", last.timing.skippedPeriods},
+            {"dropped_reports", device.droppedReports},
+            {"period_us", json(device.period)},
+            {"wakeup_us", json(device.wakeup)},
+            {"compute_us", json(device.compute)}}}};
+}
+
+Json json(const ClientStatus& client) {
+  return {{"id", client.id},
+          {"address", client.address},
+          {"mode", client.mode},
+          {"devices", client.devices},
+          {"connected_s", client.connected_s},
+          {"rate_Hz", client.rate_Hz},
+          {"bytes_in", client.bytesIn},
+          {"bytes_out", client.bytesOut},
+          {"dropped", client.dropped},
+          {"queued_bytes", client.queuedBytes},
+          {"unacknowledged_bytes", client.unacknowledgedBytes},
+          {"commands", client.commands}};
+}
+
+Json json(const scene::ObjectDescription& object, std::uint64_t geometry, std::size_t displayTriangles) {
+  return {{"id", object.id},
+          {"parent", object.parent},
+          {"touchable", object.touchable},
+          {"vertices", object.vertices ? object.vertices->size() : 0},
+          {"triangles", object.triangles ? object.triangles->size() : 0},
+          {"geometry", geometry},
+          {"display_triangles", displayTriangles},
+          {"T_world_object", json(object.T_world_object)},
+          {"T_object_mesh", json(object.T_object_mesh)},
+          {"stiffness_N_per_m", object.surface.stiffness_N_per_m},
+          {"damping_Ns_per_m", object.surface.damping_Ns_per_m},
+          {"static_friction", object.surface.static_friction},
+          {"dynamic_friction", object.surface.dynamic_friction},
+          {"popthrough", object.surface.popthrough_N},
+          {"mass_kg", object.surface.mass_kg}};
+}
+
+Json json(const scene::EffectDescription& described) {
+  const scene::Effect& effect = described.effect;
+  return {{"index", effect.index},
+          {"type", scene::nameOf(effect.type)},
+          {"active", described.active},
+          {"magnitude_N", effect.magnitude_N},
+          {"gain", effect.gain / 1000},  // newtons per millimetre, as clients say it
+          {"duration_ms", geometry::toSeconds(effect.duration) * 1e3},
+          {"frequency_Hz", effect.angularFrequency_rad_per_s / (2 * std::numbers::pi)},
+          {"position", json(effect.position)},
+          {"direction", json(effect.direction)}};
+}
+
+Json json(const scene::Plane& plane) {
+  return {{"index", plane.index},
+          {"plane", {plane.normal.x(), plane.normal.y(), plane.normal.z(), plane.offset}},
+          {"stiffness_N_per_m", plane.surface.stiffness_N_per_m}};
+}
+
+Json json(const std::optional<scene::ConstraintDescription>& constraint) {
+  if (!constraint) return nullptr;
+  return {{"mode", constraint->mode},
+          {"point", json(constraint->point)},
+          {"direction", json(constraint->direction)},
+          {"stiffness_N_per_m", constraint->stiffness_N_per_m}};
+}
+
+template <class List>
+Json jsonList(const List& list) {
+  Json out = Json::array();
+  for (const auto& item : list) out.push_back(json(item));
+  return out;
+}
+
+// A scene that is too busy to answer from the start has nothing to show yet.
+Json json(const ScenePicture& picture, const std::vector<std::string>& devices) {
+  static const scene::SceneDescription kNothing;
+  const scene::SceneDescription& scene = picture.view ? *picture.view->description : kNothing;
+  Json objects = Json::array();
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    objects.push_back(json(scene.objects[i], picture.view->geometry[i], picture.displayTriangles[i]));
+  }
+  return {{"devices", devices},
+          {"revision", scene.revision},
+          {"objects", std::move(objects)},
+          {"effects", jsonList(scene.effects)},
+          {"planes", jsonList(scene.planes)},
+          {"constraint", json(scene.constraint)},
+          {"fields", scene.fields}};
+}
+
+// Names may be any bytes; JSON is UTF-8.
+std::string textOf(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+}  // namespace
+
+std::string stateJson(const Picture& picture) {
+  const ServerStatus& server = picture.server;
+  Json scenes = Json::array();
+  for (std::size_t i = 0; i < picture.scenes.size(); ++i) {
+    scenes.push_back(json(picture.scenes[i], server.scenes[i]));
+  }
+  return textOf({{"server",
+                  {{"version", picture.version},
+                   {"uptime_s", server.uptime_s},
+                   {"recording", server.recording.empty() ? Json() : Json(server.recording)}}},
+                 {"devices", jsonList(server.devices)},
+                 {"clients", jsonList(server.clients)},
+                 {"scenes", std::move(scenes)}});
+}
+
+std::string messagesJson() {
+  Json messages = Json::array();
+  for (std::size_t i = 0; i < wire::kMessageKinds; ++i) {
+    const wire::MessageInfo& info = wire::info(static_cast<wire::MessageKind>(i));
+    messages.push_back({{"name", info.name},
+                        {"to_server", info.direction != wire::Direction::kToClient},
+                        {"to_client", info.direction != wire::Direction::kToServer},
+                        {"meaning", info.meaning}});
+  }
+  return textOf({{"messages", std::move(messages)}});
+}
+
+}  // namespace hapticd::server

@@ -1,0 +1,290 @@
+#include "net/http_server.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <random>
+
+#include "net/loopback.h"
+
+namespace hapticd::net {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+#ifdef HAPTICD_SANITIZED
+constexpr int kMany = 200;
+#else
+constexpr int kMany = 3000;
+#endif
+
+/// A server that says what it was asked, and a raw client of it in the same thread.
+struct Http {
+  explicit Http(const HttpOptions& options = {})
+      : server(
+            loop, kAnyPort,
+            [this](const HttpRequest& request, const HttpReply& reply) {
+              requests.push_back(request);
+              handle(request, reply);
+            },
+            options) {}
+
+  void handle(const HttpRequest& request, const HttpReply& reply) {
+    if (request.path() == "/later") {
+      later.push_back(reply);
+    } else if (request.path() == "/large") {
+      HttpResponse response;
+      response.body = large;
+      reply(response);
+    } else {
+      reply(HttpResponse::of(200, request.method + ' ' + request.target));
+    }
+  }
+
+  RawSocket join(int receiveBufferBytes = 0) {
+    return RawSocket::connected(server.local(), receiveBufferBytes);
+  }
+  /// Until the peer has so many bytes, or the connection has ended.
+  std::string receive(RawSocket& peer, std::size_t size) {
+    std::string text;
+    pumpUntil(loop, [&] {
+      std::string part(size - text.size(), '\0');
+      const ssize_t got = ::recv(peer.fd(), part.data(), part.size(), MSG_DONTWAIT);
+      if (got > 0) text.append(part, 0, static_cast<std::size_t>(got));
+      return text.size() == size || got == 0 || (got < 0 && errno != EAGAIN);
+    });
+    return text;
+  }
+  std::string receiveAll(RawSocket& peer) { return receive(peer, std::size_t{1} << 30); }
+  std::string ask(const std::string& request) {
+    RawSocket peer = join();
+    EXPECT_TRUE(peer.send(request));
+    return receiveAll(peer);
+  }
+
+  Loop loop;
+  std::vector<HttpRequest> requests;
+  std::vector<HttpReply> later;
+  std::shared_ptr<const Buffer> large = std::make_shared<const Buffer>(std::size_t{20} << 20, std::byte{'x'});
+  HttpServer server;
+};
+
+const std::string kGet = "GET / HTTP/1.1\r\nHost: here\r\n\r\n";
+const std::string kGetLast = "GET / HTTP/1.1\r\nHost: here\r\nConnection: close\r\n\r\n";
+const std::string kAnswer =
+    "HTTP/1.1 200 OK\r\nContent-Type: text/plain; charset=utf-8\r\nContent-Length: 5\r\n\r\nGET /";
+
+TEST(HttpServer, AnswersWithHeadersAndBody) {
+  Http http;
+  RawSocket peer = http.join();
+  ASSERT_TRUE(peer.send("GET /a/b?c=1&d=&e HTTP/1.1\r\nHost: here\r\nX-Thing:  two words \r\n\r\n"));
+  EXPECT_THAT(http.receive(peer, 97), HasSubstr("Content-Length: 17\r\n\r\nGET /a/b?c=1&d=&e"));
+  ASSERT_EQ(http.requests.size(), 1u);
+  const HttpRequest& request = http.requests.front();
+  EXPECT_EQ(request.path(), "/a/b");
+  EXPECT_EQ(request.header("x-thing"), "two words");
+  EXPECT_EQ(request.count("host"), 1u);
+  EXPECT_EQ(request.header("nothing"), "");
+  EXPECT_EQ(request.parameter("c"), "1");
+  EXPECT_EQ(request.parameter("d"), "");
+  EXPECT_EQ(request.parameter("e"), "");
+  EXPECT_EQ(request.parameter("f"), std::nullopt);
+  EXPECT_EQ(request.local, http.server.local());
+}
+
+TEST(HttpServer, ARequestMayComeInAnyPieces) {
+  Http http;
+  RawSocket peer = http.join();
+  for (const char c : kGet) {
+    ASSERT_TRUE(peer.send(std::string(1, c)));
+    http.loop.runOnce(1ms);
+  }
+  EXPECT_EQ(http.receive(peer, kAnswer.size()), kAnswer);
+}
+
+TEST(HttpServer, RequestsInOneGoAreAnsweredInOrder) {
+  Http http;
+  RawSocket peer = http.join();
+  std::string all;
+  std::string expected;
+  for (int i = 0; i < 300; ++i) {
+    all += kGet;
+    expected += kAnswer;
+  }
+  ASSERT_TRUE(peer.send(all));
+  EXPECT_EQ(http.receive(peer, expected.size()), expected);
+}
+
+TEST(HttpServer, HeadHasTheHeadersAlone) {
+  Http http;
+  const std::string answer = http.ask("HEAD / HTTP/1.1\r\nHost: here\r\nConnection: close\r\n\r\n");
+  EXPECT_THAT(answer, HasSubstr("Content-Length: 6\r\n"));
+  EXPECT_THAT(answer, testing::EndsWith("\r\n\r\n"));
+}
+
+TEST(HttpServer, AnOldClientIsAnsweredAndLeft) {
+  Http http;
+  EXPECT_THAT(http.ask("GET / HTTP/1.0\r\n\r\n"), HasSubstr("Connection: close\r\n\r\nGET /"));
+}
+
+TEST(HttpServer, ABodyIsGiven) {
+  Http http;
+  http.ask("POST / HTTP/1.1\r\nHost: here\r\nConnection: close\r\nContent-Length: 4\r\n\r\nbody");
+  ASSERT_EQ(http.requests.size(), 1u);
+  EXPECT_EQ(http.requests.front().body, "body");
+}
+
+TEST(HttpServer, AnswersMayComeLater) {
+  Http http;
+  RawSocket one = http.join();
+  RawSocket two = http.join();
+  ASSERT_TRUE(one.send("GET /later HTTP/1.1\r\nHost: here\r\n\r\n" + kGet));
+  ASSERT_TRUE(pumpUntil(http.loop, [&] { return http.later.size() == 1; }));
+  ASSERT_TRUE(two.send(kGet));
+  EXPECT_EQ(http.receive(two, kAnswer.size()), kAnswer);
+  EXPECT_EQ(http.requests.size(), 2u) << "the second request waits for the answer to the first";
+  http.later[0](HttpResponse::of(200, "GET /"));
+  http.later[0](HttpResponse::of(200, "twice"));
+  EXPECT_EQ(http.receive(one, 2 * kAnswer.size()), kAnswer + kAnswer);
+}
+
+TEST(HttpServer, AnAnswerToNobodyIsDropped) {
+  Http http;
+  RawSocket peer = http.join();
+  ASSERT_TRUE(peer.send("GET /later HTTP/1.1\r\nHost: here\r\n\r\n"));
+  ASSERT_TRUE(pumpUntil(http.loop, [&] { return http.later.size() == 1; }));
+  peer.reset();
+  http.later[0](HttpResponse::of(200, "hello?"));
+  EXPECT_TRUE(pumpUntil(http.loop, [&] { return http.server.connections() == 0; }));
+}
+
+TEST(HttpServer, WhatIsNoHttpIsRefused) {
+  Http http;
+  EXPECT_THAT(http.ask("vrpn: ver. 07.35  0\r\n\r\n"), StartsWith("HTTP/1.1 400 "));
+  EXPECT_THAT(http.ask("\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\r\n\r\n"), StartsWith("HTTP/1.1 400 "));
+  EXPECT_THAT(http.ask("GET / HTTP/1.1\r\nContent-Length: 1\r\nTransfer-Encoding: chunked\r\n\r\n"),
+              StartsWith("HTTP/1.1 400 "));
+  EXPECT_THAT(http.ask("GET / HTTP/1.1\r\nbad header\r\n\r\n"), StartsWith("HTTP/1.1 400 "));
+  EXPECT_TRUE(http.requests.empty());
+}
+
+TEST(HttpServer, WhatIsTooLongIsRefused) {
+  Http http;
+  const std::string lines(20000, 'x');
+  EXPECT_THAT(http.ask("GET / HTTP/1.1\r\nX: " + lines + "\r\n\r\n"), StartsWith("HTTP/1.1 431 "));
+  EXPECT_THAT(http.ask("GET /" + lines), StartsWith("HTTP/1.1 431 "));
+  EXPECT_THAT(http.ask("POST / HTTP/1.1\r\nContent-Length: 5000\r\n\r\n"), StartsWith("HTTP/1.1 413 "));
+  std::string many = "GET / HTTP/1.1\r\n";
+  for (int i = 0; i < 2000; ++i) many += "A: b\r\n";
+  EXPECT_THAT(http.ask(many + "\r\n"), StartsWith("HTTP/1.1 431 "));
+  EXPECT_TRUE(http.requests.empty());
+}
+
+TEST(HttpServer, GarbageDoesNoHarm) {
+  Http http;
+  std::mt19937 random(3);
+  for (int i = 0; i < kMany / 20; ++i) {
+    std::string bytes(1 + random() % 3000, '\0');
+    for (char& c : bytes) c = static_cast<char>(random());
+    RawSocket peer = http.join();
+    peer.send(bytes);
+    peer.shutdownSend();
+    http.receiveAll(peer);
+  }
+  EXPECT_EQ(http.ask(kGetLast).substr(0, 15), "HTTP/1.1 200 OK");
+  EXPECT_TRUE(pumpUntil(http.loop, [&] { return http.server.connections() == 0; }));
+}
+
+TEST(HttpServer, HalfARequestIsNotWaitedForLong) {
+  HttpOptions options;
+  options.requestTimeout = 50ms;
+  Http http(options);
+  RawSocket peer = http.join();
+  ASSERT_TRUE(peer.send("GET / HTTP/1.1\r\nHost"));
+  EXPECT_EQ(http.receiveAll(peer), "");
+  EXPECT_TRUE(pumpUntil(http.loop, [&] { return http.server.connections() == 0; }));
+}
+
+TEST(HttpServer, AnIdleClientIsLetGo) {
+  HttpOptions options;
+  options.idleTimeout = 50ms;
+  Http http(options);
+  RawSocket silent = http.join();
+  EXPECT_EQ(http.receiveAll(silent), "");
+  RawSocket once = http.join();
+  ASSERT_TRUE(once.send(kGet));
+  EXPECT_EQ(http.receiveAll(once), kAnswer);
+}
+
+TEST(HttpServer, ALargeAnswerIsNeverQueuedAsAWhole) {
+  Http http;
+  RawSocket peer = http.join();
+  ASSERT_TRUE(peer.send("GET /large HTTP/1.1\r\nHost: here\r\nConnection: close\r\n\r\n"));
+  const std::string answer = http.receiveAll(peer);
+  const std::size_t head = answer.find("\r\n\r\n") + 4;
+  EXPECT_EQ(answer.size() - head, http.large->size());
+  EXPECT_EQ(answer.find_first_not_of('x', head), std::string::npos);
+}
+
+TEST(HttpServer, WhoDoesNotReadIsLetGo) {
+  HttpOptions options;
+  options.answerTimeout = 200ms;
+  Http http(options);
+  RawSocket peer = http.join(4096);
+  ASSERT_TRUE(peer.send("GET /large HTTP/1.1\r\nHost: here\r\n\r\n"));
+  ASSERT_TRUE(pumpUntil(http.loop, [&] { return http.server.connections() == 1; }));
+  EXPECT_TRUE(pumpUntil(http.loop, [&] { return http.server.connections() == 0; }));
+}
+
+TEST(HttpServer, TooManyConnectionsAreRefusedAndRoomComesBack) {
+  HttpOptions options;
+  options.connections = 3;
+  Http http(options);
+  std::vector<RawSocket> peers;
+  for (int i = 0; i < 3; ++i) {
+    peers.push_back(http.join());
+    ASSERT_TRUE(peers.back().send(kGet));
+    EXPECT_EQ(http.receive(peers.back(), kAnswer.size()), kAnswer);
+  }
+  RawSocket more = http.join();
+  EXPECT_EQ(http.receiveAll(more), "");
+  peers.pop_back();
+  ASSERT_TRUE(pumpUntil(http.loop, [&] { return http.server.connections() == 2; }));
+  EXPECT_THAT(http.ask(kGetLast), StartsWith("HTTP/1.1 200 OK"));
+}
+
+TEST(HttpServer, ThousandsOfRequestsLeaveNothingBehind) {
+  Http http;
+  const auto openFiles = [] {
+    const std::filesystem::directory_iterator files("/proc/self/fd");
+    return std::distance(begin(files), end(files));
+  };
+  http.ask(kGetLast);
+  ASSERT_TRUE(pumpUntil(http.loop, [&] { return http.server.connections() == 0; }));
+  const auto before = openFiles();
+  for (int i = 0; i < kMany / 10; ++i) ASSERT_THAT(http.ask(kGetLast), StartsWith("HTTP/1.1 200 OK"));
+  RawSocket peer = http.join();
+  for (int i = 0; i < kMany; ++i) {
+    ASSERT_TRUE(peer.send(kGet));
+    ASSERT_EQ(http.receive(peer, kAnswer.size()), kAnswer);
+  }
+  peer.close();
+  ASSERT_TRUE(pumpUntil(http.loop, [&] { return http.server.connections() == 0; }));
+  EXPECT_EQ(openFiles(), before);
+}
+
+TEST(HttpServer, APortInUseIsSaidWithItsOption) {
+  Http http;
+  try {
+    const HttpServer second(http.loop, http.server.local(), {});
+    FAIL() << "two servers on one port";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("choose another with --http"));
+  }
+}
+
+}  // namespace
+}  // namespace hapticd::net
