@@ -5,6 +5,7 @@
 #include <fcntl.h>
 #include <boost/asio/connect.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/core/buffers_to_string.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/websocket.hpp>
 #include <numeric>
@@ -25,7 +26,7 @@ using testing::StartsWith;
 
 /// A server that takes every WebSocket and keeps what happens to it.
 struct Sockets {
-  explicit Sockets(bool echo = false, const ConnectionOptions& connection = {})
+  explicit Sockets(bool echo = false, const ConnectionOptions& connectionOptions = {})
       : server(
             loop, kAnyPort,
             [this, echo](const HttpRequest&, const HttpReply& reply) {
@@ -35,7 +36,7 @@ struct Sockets {
             },
             [&] {
               HttpOptions options;
-              options.connection = connection;
+              options.connection = connectionOptions;
               return options;
             }()) {}
 
