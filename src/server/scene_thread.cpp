@@ -172,6 +172,8 @@ void SceneThread::publishTo(Seat& seat) {
   std::vector<scene::Notice> said;
   const geometry::Nanos now = monotonicNow();
   std::shared_ptr<const scene::SceneSnapshot> snapshot;
+  // First, so that the builder can refit the index that the servo gave back instead of building a new one.
+  seat.device.slot->collect();
   try {
     snapshot = seat.builder.publish(now, said);
   } catch (...) {
@@ -180,10 +182,7 @@ void SceneThread::publishTo(Seat& seat) {
   }
   if (seat.device.publishing) seat.device.publishing(now, snapshot ? snapshot->revision : 0);
   mergeNotices(std::move(said), notices_);
-  if (!snapshot) {
-    seat.device.slot->collect();
-    return;
-  }
+  if (!snapshot) return;
   seat.device.slot->publish(snapshot);
   collectAt_ = monotonicNow() + kCollectAfter;
   if (seat.device.published) seat.device.published(snapshot);
