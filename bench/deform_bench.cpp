@@ -51,6 +51,7 @@ Outcome measureDeform(const Run& run) {
   tell(builder, 0, mesh, nowNs());
   ServoLoop loop;
   loop.snapshots().publish(builder.publish(nowNs() + 1'000'000'000, notices));
+  loop.begin();
   const double seconds = run.seconds(5, 10, 60);
   run.progress("60 Hz for " + std::to_string(static_cast<int>(seconds)) + " s");
 

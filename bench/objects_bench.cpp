@@ -123,6 +123,7 @@ Moved observeMoving(int objects, bool move, double seconds) {
   ServoLoop loop;
   Crowd crowd(objects);
   loop.snapshots().publish(crowd.publish(nowNs()));
+  loop.begin();
   std::atomic<bool> stop{false};
   std::thread publisher([&] {
     for (std::int64_t due = nowNs(); move && !stop; sleepUntilNs(due = std::max(due + kFrame_ns, nowNs()))) {

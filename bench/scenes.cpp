@@ -127,6 +127,8 @@ std::vector<HandTick> handOf(int rounds) {
     const int next = (k + 1) % acts;
     addWay(ticks.back().position_m, handAt(kActs[next % 3], next / 3 * kActTicks * 1e-3), ticks);
   }
+  // From the air: a hand that begins inside a closed mesh stays inside.
+  std::rotate(ticks.begin(), ticks.end() - kWayTicks / 2, ticks.end());
   return ticks;
 }
 

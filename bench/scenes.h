@@ -43,7 +43,7 @@ struct HandTick {
   Act act;
   Vec3 position_m;
 };
-/// Rounds of a second of each act, with ways between; the end leads back to the beginning.
+/// Rounds of a second of each act, with ways between; begins in the air, and the end leads back there.
 std::vector<HandTick> handOf(int rounds);
 
 }  // namespace hapticd::bench

@@ -8,7 +8,7 @@ namespace hapticd::bench {
 bool StrokingDevice::read(geometry::Nanos now, device::DeviceState& state) noexcept {
   state.time = now;
   state.position_m = hand_[next_].position_m;
-  next_ = (next_ + 1) % hand_.size();
+  if (begun_.load(std::memory_order_acquire)) next_ = (next_ + 1) % hand_.size();
   return true;
 }
 

@@ -1,6 +1,7 @@
 // The real servo loop in this process, with a hand that strokes the ball: for benchmarks that disturb it.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <vector>
 
@@ -11,7 +12,7 @@
 
 namespace hapticd::bench {
 
-/// A hand that goes one step further in each tick, whatever pushes it.
+/// A hand that goes one step further in each tick, whatever pushes it; in the air until told to begin.
 class StrokingDevice final : public device::Device {
  public:
   void open() override {}
@@ -19,8 +20,10 @@ class StrokingDevice final : public device::Device {
   const device::DeviceProfile& profile() const noexcept override { return profile_; }
   bool read(geometry::Nanos now, device::DeviceState& state) noexcept override;
   bool write(const Vec3& /*force_N*/) noexcept override { return true; }
+  void begin() noexcept { begun_.store(true, std::memory_order_release); }
 
  private:
+  std::atomic<bool> begun_{false};
   const std::vector<HandTick> hand_ = handOf(2);
   std::size_t next_ = 0;
   device::DeviceProfile profile_;
@@ -40,6 +43,8 @@ class ServoLoop {
   ~ServoLoop();
 
   realtime::SnapshotSlot& snapshots() noexcept { return tick_.snapshots(); }
+  /// The hand begins to stroke; publish what it touches before.
+  void begin() noexcept { device_.begin(); }
   bool realtimeGranted() const noexcept { return granted_; }
   /// Sleeps and tells what happened meanwhile; at most 60 s.
   LoopFigures observe(double seconds);

@@ -38,6 +38,7 @@ class FacetBall {
 
   const Facet* begin() const noexcept { return facets_.data(); }
   const Facet* end() const noexcept { return facets_.data() + count_; }
+  int size() const noexcept { return count_; }
   /// For a ball tool: those from here on are at least farDistance() from the centre, two skins aside.
   const Facet* far() const noexcept { return facets_.data() + near_; }
   double farDistance() const noexcept { return farDistance_; }

@@ -17,6 +17,7 @@ constexpr double kRoundingFloor = 1e-12;    // of the largest coordinate: a thou
 constexpr double kSmallestObject_m = 1e-3;  // below this size the coordinates of the hand decide the rounding
 constexpr double kWiden = 1 + 1e-6;         // queries travel between frames with rounding
 constexpr double kSpare = 0.3;              // of the tool's radius: gathered in reserve
+constexpr int kLean = 32;                   // gathered facets that cost less than gathering anew
 constexpr double kRecentre = 0.02;          // of the tool's radius: distances from farther away serve no more
 
 // An upper bound of the largest singular value, exact for similarities.
@@ -212,8 +213,10 @@ bool Nearby::gather(const Vec3& centre, double radius) noexcept {
 }
 
 bool Nearby::surround(const Vec3& centre, double radius) noexcept {
-  if (ball_.covers(centre, radius)) return true;
   const double spare = kSpare * radius_;
+  // What a fast tick has gathered is too much for the slow ones after it.
+  const bool lean = ball_.size() <= kLean || ball_.reach() <= 2 * std::max(radius, spare);
+  if (lean && ball_.covers(centre, radius)) return true;
   return (spare > radius && gather(centre, spare)) || gather(centre, radius);
 }
 

@@ -1,0 +1,39 @@
+#!/usr/bin/env bash
+# Measures how fast hapticd is, against yardsticks on this machine. Stop other work first.
+#   scripts/bench.sh             all benchmarks in short windows, under ten minutes
+#   scripts/bench.sh --full      longer, about 15 minutes, and writes the figures into docs/performance.md
+#   scripts/bench.sh --long      the longest, most of an hour, and writes them, too
+#   scripts/bench.sh NAME...     only these (hapticd bench --list); docs/performance.md stays as it is
+# Results as JSON, CSV and drawings: build/bench/
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+length=()
+names=()
+for argument in "$@"; do
+  case "$argument" in
+    --full | --long) length=("$argument") ;;
+    -*) sed -n '2,7s/^# *//p' "$0"; exit 2 ;;
+    *) names+=("$argument") ;;
+  esac
+done
+
+scripts/install_packages.sh
+cmake --preset release >/dev/null
+cmake --build build/release --parallel "$(nproc)" --target hapticd | awk 'NR % 10 == 1 || !/^\[[0-9]+\/[0-9]+\] (Building|Linking)/'
+out=build/bench
+rm -rf "$out"
+build/release/bin/hapticd bench --out "$out" "${length[@]}" "${names[@]}"
+echo "results: $out"
+
+# What stands between the marks is the script's; the rest of the page is written by hand.
+if [ "${#length[@]}" -gt 0 ] && [ "${#names[@]}" = 0 ]; then
+  page=docs/performance.md
+  awk -v figures="$out/results.md" '
+    /<!-- figures: begin -->/ { print; print ""; while ((getline line < figures) > 0) print line; print ""; skip = 1; next }
+    /<!-- figures: end -->/ { skip = 0 }
+    !skip { print }' "$page" >"$page.new"
+  mv "$page.new" "$page"
+  cp "$out"/*.svg docs/figures/
+  echo "written: $page"
+fi
