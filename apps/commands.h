@@ -32,6 +32,7 @@ void addStop(CLI::App& app);
 void addWatch(CLI::App& app);
 void addDeviceHost(CLI::App& app);
 void addRender(CLI::App& app);
+void addReplay(CLI::App& app);
 void addDoctor(CLI::App& app);
 void addDevices(CLI::App& app);
 void addBench(CLI::App& app);

@@ -23,6 +23,7 @@ int main(int argc, char** argv) {
   addWatch(app);
   addStop(app);
   addRender(app);
+  addReplay(app);
   addDoctor(app);
   addDevices(app);
   addBench(app);

@@ -1,16 +1,14 @@
 // hapticd serve: one process that owns the device and answers VRPN clients.
-#include <pthread.h>
 #include <spdlog/spdlog.h>
 
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <thread>
 
 #include "commands.h"
 #include "server/devices.h"
 #include "server/server.h"
+#include "stop_on_signal.h"
 
 namespace hapticd::apps {
 namespace {
@@ -69,33 +67,6 @@ server::ServerConfig configOf(const Options& options, std::vector<std::string>& 
   server::validate(config);
   return config;
 }
-
-// SIGINT and SIGTERM end the server in order: zero force first. Must be made before any other thread.
-class StopOnSignal {
- public:
-  StopOnSignal() {
-    sigemptyset(&signals_);
-    sigaddset(&signals_, SIGINT);
-    sigaddset(&signals_, SIGTERM);
-    pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
-  }
-  void watch(server::Server& server) {
-    thread_ = std::thread([this, &server] {
-      int signal = 0;
-      sigwait(&signals_, &signal);
-      server.stop();
-    });
-  }
-  ~StopOnSignal() {
-    if (!thread_.joinable()) return;
-    pthread_kill(thread_.native_handle(), SIGTERM);
-    thread_.join();
-  }
-
- private:
-  sigset_t signals_{};
-  std::thread thread_;
-};
 
 int run(const Options& options) {
   spdlog::set_pattern("%H:%M:%S.%e %^%l%$ %v");

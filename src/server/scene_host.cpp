@@ -27,6 +27,16 @@ bool SceneHost::flush() {
   return !thread_->full();
 }
 
+void SceneHost::play(scene::ClientId client, const scene::SceneCommand* command) {
+  std::vector<SceneTask> tasks;
+  if (command != nullptr) {
+    tasks.push_back({client, *command});
+  } else {
+    tasks.push_back({client, ClientGone{}});
+  }
+  thread_->enqueue(std::move(tasks), sizeof(SceneTask));
+}
+
 void SceneHost::clientGone(scene::ClientId client) {
   inbox_.add({client, ClientGone{}});
   const bool lastToCommand = commanders_.erase(client) == 1 && commanders_.empty();

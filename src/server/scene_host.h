@@ -34,6 +34,8 @@ class SceneHost {
   Inbox::Outcome take(scene::ClientId client, const wire::MessageReceived& message, std::string& error);
   /// Hands the gathered commands to the scene; false when it is so far behind that reading should pause.
   bool flush();
+  /// A command of a recorded client (null: it was gone). Any thread, between start() and stop().
+  void play(scene::ClientId client, const scene::SceneCommand* command);
   /// What the client owns ramps out; with the last that had commanded the scene it goes, too, if so
   /// configured.
   void clientGone(scene::ClientId client);

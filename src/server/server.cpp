@@ -48,7 +48,10 @@ struct Server::CallBack {
   net::Connection connection;
 };
 
-Server::Server(const ServerConfig& config) : config_(config) {
+Server::Server(const ServerConfig& config) : Server(config, nullptr) {}
+
+Server::Server(const ServerConfig& config, std::unique_ptr<Player> player)
+    : config_(config), player_(std::move(player)) {
   validate(config_);
   loop_.setErrorHandler([](std::string_view text) { spdlog::error("{}", text); });
   names_.addSender("VRPN Control");  // the stock library's sender 0
@@ -69,6 +72,7 @@ Server::Server(const ServerConfig& config) : config_(config) {
 }
 
 Server::~Server() {
+  if (player_) player_->stop();
   // The servo first: no force outlives the server.
   for (const auto& station : stations_) station->stop();
   for (const auto& scene : scenes_) scene->stop();
@@ -99,8 +103,14 @@ std::optional<net::Endpoint> Server::webAddress() const {
 void Server::openDevice(const DeviceConfig& device) {
   std::vector<wire::LocalSender> senders;
   for (const std::string& name : device.names) senders.push_back(names_.addSender(name));
-  stations_.push_back(
-      std::make_unique<Station>(device, senders, sceneFor(device), config_.allowNoRealtime, recorder_.get()));
+  SceneHost& scene = sceneFor(device);
+  if (player_) {
+    const record::SessionDevice& recorded = player_->header().devices[stations_.size()];
+    stations_.push_back(std::make_unique<Station>(device, senders, scene, recorded));
+  } else {
+    stations_.push_back(
+        std::make_unique<Station>(device, senders, scene, config_.allowNoRealtime, recorder_.get()));
+  }
 }
 
 // Devices that name the same scene share it.
@@ -112,6 +122,26 @@ SceneHost& Server::sceneFor(const DeviceConfig& device) {
   }
   const auto number = static_cast<std::uint32_t>(scenes_.size());
   return *scenes_.emplace_back(std::make_unique<SceneHost>(number, device.scene, device.sceneOnDisconnect));
+}
+
+void Server::startPlaying() {
+  if (!player_) return;
+  player_->start(
+      {.tick = [this](std::uint32_t device, const auto& report) { stations_[device]->play(report); },
+       .told =
+           [this](std::uint32_t scene, scene::ClientId client, const auto* command) {
+             if (scene < scenes_.size()) scenes_[scene]->play(client, command);
+           },
+       .restart =
+           [this] {
+             const scene::SceneCommand reset = scene::ResetScene{};
+             for (const auto& scene : scenes_) scene->play(0, &reset);
+           },
+       .over =
+           [](const std::string& remark) {
+             if (!remark.empty()) spdlog::warn("replay: {}", remark);
+             spdlog::info("the replay is over; what was last stays");
+           }});
 }
 
 void Server::startRecording() {
@@ -169,7 +199,9 @@ void Server::run() {
         std::chrono::duration_cast<net::Loop::Duration>(std::chrono::duration<double>(config_.seconds)),
         [this] { loop_.stop(); }));
   }
+  startPlaying();
   loop_.run();
+  if (player_) player_->stop();
   for (const auto& station : stations_) station->stop();
   for (const auto& scene : scenes_) scene->stop();
   finishRecording();

@@ -17,6 +17,7 @@
 #include "server/config.h"
 #include "server/heartbeats.h"
 #include "server/noise_log.h"
+#include "server/player.h"
 #include "server/scene_host.h"
 #include "server/session.h"
 #include "server/station.h"
@@ -29,6 +30,9 @@ class Server final : public SessionOwner, public WebOwner {
   /// Opens the devices and the ports. Throws ConfigError, net::Error or std::runtime_error with a remedy in
   /// the text.
   explicit Server(const ServerConfig& config);
+  /// Serves a recorded session: `config` is that of the player, perhaps with another address. No device is
+  /// opened, and what clients want to change is refused.
+  Server(const ServerConfig& config, std::unique_ptr<Player> player);
   ~Server() override;
 
   /// Serves until stop() or until the configured seconds are over.
@@ -62,6 +66,7 @@ class Server final : public SessionOwner, public WebOwner {
   void openWeb();
   SceneHost& sceneFor(const DeviceConfig& device);
   void startScene(SceneHost& scene);
+  void startPlaying();
   void startRecording();
   void finishRecording();
   void everySecond();
@@ -79,6 +84,7 @@ class Server final : public SessionOwner, public WebOwner {
   WallClock clock_;
   NoiseLog noise_;
   wire::LocalNames names_;
+  std::unique_ptr<Player> player_;              ///< null: live
   std::unique_ptr<record::Recorder> recorder_;  ///< outlives who tells it
   std::vector<std::unique_ptr<SceneHost>> scenes_;
   std::vector<std::unique_ptr<Station>> stations_;

@@ -11,6 +11,15 @@
 namespace hapticd::server {
 namespace {
 
+// Stands for one that was recorded: its profile is asked for, and nothing else.
+std::unique_ptr<device::Device> standIn(const record::SessionDevice& recorded) {
+  device::SimulatedOptions options;
+  if (const auto* profile = device::findProfile(recorded.model)) options.profile = *profile;
+  options.profile.workspace_m = recorded.sceneConfig.deviceWorkspace_m;
+  options.profile.buttons = recorded.buttons;
+  return std::make_unique<device::SimulatedDevice>(options);
+}
+
 std::unique_ptr<device::Device> openDevice(const DeviceConfig& config) {
   auto device = makeDevice(config);
   device->open();
@@ -53,11 +62,11 @@ BlackBoxFiles blackBoxFiles(const DeviceConfig& config) {
 }  // namespace
 
 Station::Impl::Impl(const DeviceConfig& config_, std::vector<wire::LocalSender> names_, SceneHost& scene_,
-                    bool allowNoRealtime)
+                    std::unique_ptr<device::Device> device_, bool allowNoRealtime)
     : config(config_),
       names(std::move(names_)),
       scene(scene_),
-      device(openDevice(config)),
+      device(std::move(device_)),
       simulated(dynamic_cast<device::SimulatedDevice*>(device.get())),
       tick(*device, clock, tickOptions(config, device->profile())),
       servo([this](const realtime::Pacing& pacing) { tick(pacing); }, clock,
@@ -73,7 +82,7 @@ Station::Impl::Impl(const DeviceConfig& config_, std::vector<wire::LocalSender> 
 
 Station::Station(const DeviceConfig& config, std::vector<wire::LocalSender> names, SceneHost& scene,
                  bool allowNoRealtime, record::Recorder* recorder)
-    : impl_(std::make_unique<Impl>(config, std::move(names), scene, allowNoRealtime)) {
+    : impl_(std::make_unique<Impl>(config, std::move(names), scene, openDevice(config), allowNoRealtime)) {
   Impl& my = *impl_;
   SceneDevice seat{.config = sceneConfig(my.config, my.device->profile()),
                    .slot = &my.tick.snapshots(),
@@ -81,6 +90,19 @@ Station::Station(const DeviceConfig& config, std::vector<wire::LocalSender> name
                    .publishing = {}};
   if (recorder != nullptr) my.recordTo(*recorder, seat);
   scene.add(std::move(seat));
+}
+
+Station::Station(const DeviceConfig& config, std::vector<wire::LocalSender> names, SceneHost& scene,
+                 const record::SessionDevice& recorded)
+    : impl_(std::make_unique<Impl>(config, std::move(names), scene, standIn(recorded), true)) {
+  impl_->played = true;
+  scene.add(
+      {.config = recorded.sceneConfig, .slot = &impl_->tick.snapshots(), .published = {}, .publishing = {}});
+}
+
+void Station::play(const realtime::TickReport& report) noexcept {
+  impl_->tick.reports().push(report);
+  impl_->tick.wake().notify();
 }
 
 void Station::Impl::recordTo(record::Recorder& session, SceneDevice& seat) {
@@ -105,6 +127,7 @@ Station::~Station() {
 
 void Station::start() {
   Impl& my = *impl_;
+  if (my.played) return;
   my.running = true;
   if (my.config.enableForces) my.tick.control().arm();
   if (my.device->selfPaced()) {
@@ -260,7 +283,7 @@ double Station::rateOf(const Session& session) const {
 }
 
 bool Station::couldCommand(const Session& session) const {
-  return impl_->roles.couldCommand(session.id(), session.address());
+  return !impl_->played && impl_->roles.couldCommand(session.id(), session.address());
 }
 
 }  // namespace hapticd::server

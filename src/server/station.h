@@ -24,6 +24,9 @@ class Station {
   /// `recorder`, when there is one, hears of it from the first tick on and outlives it.
   Station(const DeviceConfig& config, std::vector<wire::LocalSender> names, SceneHost& scene,
           bool allowNoRealtime, record::Recorder* recorder = nullptr);
+  /// One without hardware and servo, for the reports of a recorded device; nobody may command it.
+  Station(const DeviceConfig& config, std::vector<wire::LocalSender> names, SceneHost& scene,
+          const record::SessionDevice& recorded);
   ~Station();
 
   /// Starts the servo. Throws std::runtime_error when the loop gets no realtime rights and must have them.
@@ -56,6 +59,9 @@ class Station {
   /// The rate that the client has chosen, and whether it may command.
   double rateOf(const Session& session) const;
   bool couldCommand(const Session& session) const;
+
+  /// Of a recorded device: clients hear this report. One thread.
+  void play(const realtime::TickReport& report) noexcept;
 
   /// Readable when reports wait.
   int wakeFd() const noexcept;

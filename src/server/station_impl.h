@@ -14,7 +14,7 @@ namespace hapticd::server {
 
 struct Station::Impl {
   Impl(const DeviceConfig& config_, std::vector<wire::LocalSender> names_, SceneHost& scene_,
-       bool allowNoRealtime);
+       std::unique_ptr<device::Device> device_, bool allowNoRealtime);
 
   void recordTo(record::Recorder& session, SceneDevice& seat);
   void onPublished(const scene::SceneSnapshot& snapshot);
@@ -48,6 +48,7 @@ struct Station::Impl {
   realtime::Tick tick;
   realtime::ServoThread servo;
   bool running = false;
+  bool played = false;  // reports come from a recording, the servo rests
 
   // The net thread's.
   DeviceControl control;

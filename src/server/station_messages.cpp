@@ -18,6 +18,10 @@ void sendText(Session& session, wire::LocalSender name, std::uint32_t severity, 
 }  // namespace
 
 bool Station::mayCommand(const Session& session, std::string& reason) {
+  if (impl_->played) {
+    reason = "this server replays a recording, which nobody can change";
+    return false;
+  }
   Roles& roles = impl_->roles;
   if (roles.mayCommand(session.id(), session.address())) return true;
   reason = roles.reason();

@@ -27,8 +27,9 @@ inline std::vector<record::SessionEvent> eventsOf(const std::filesystem::path& f
 inline void animate(ScriptedPeer& peer, int frames) {
   for (int i = 0; i < frames; ++i) {
     const double turn = 0.1 * std::sin(0.3 * i);
-    peer.send(wire::SetTransformMatrix{
-        0, {std::cos(turn), std::sin(turn), 0, 0, -std::sin(turn), std::cos(turn), 0, 0, 0, 0, 1, 0, 0, 2 * turn, 0, 1}});
+    peer.send(wire::SetTransformMatrix{0,
+                                       {std::cos(turn), std::sin(turn), 0, 0, -std::sin(turn), std::cos(turn),
+                                        0, 0, 0, 0, 1, 0, 0, 2 * turn, 0, 1}});
     const float top = 20 + 2 * std::sin(0.5F * static_cast<float>(i));
     sendVertices(peer, 0, boxTriples({20, top, 20}));
     untilTicks(peer, 8);

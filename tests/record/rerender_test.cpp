@@ -113,9 +113,9 @@ TEST_F(Rerender, EveryThingThatHappenedIsInTheFile) {
     }
   }
   EXPECT_GE(gone, 1);
-  for (const char* name : {"SetVertices", "SetSurfaceProperty", "SetTransform", "DefineEffect", "StartEffect",
-                           "SetForceField", "BeginBatch", "CommitBatch", "AddObject", "SetSceneOrigin",
-                           "ResetScene"}) {
+  for (const char* name :
+       {"SetVertices", "SetSurfaceProperty", "SetTransform", "DefineEffect", "StartEffect", "SetForceField",
+        "BeginBatch", "CommitBatch", "AddObject", "SetSceneOrigin", "ResetScene"}) {
     EXPECT_GE(commands[name], 1) << name;
   }
 }

@@ -1,0 +1,27 @@
+// hapticd render --mesh: a recorded hand through a mesh, offline and deterministic.
+#pragma once
+
+#include <string>
+
+namespace hapticd::apps {
+
+struct MeshRenderOptions {
+  std::string mesh;
+  std::string meshUnit = "mm";
+  double size_mm = 0;
+  std::string hand;
+  std::string out;
+  double stiffness_N_per_m = 500;
+  double damping_Ns_per_m = 0;
+  double staticFriction = 0;
+  double dynamicFriction = 0;
+  std::string faces = "both";
+  double toolRadius_mm = 0;
+  bool raw = false;
+  bool timing = false;
+};
+
+/// Writes the CSV and prints what was felt; 0 when all went well. Throws with a remedy in the text.
+int renderMesh(const MeshRenderOptions& options);
+
+}  // namespace hapticd::apps

@@ -1,0 +1,78 @@
+// hapticd replay: a recorded session, served to clients as if it were live.
+#include <spdlog/spdlog.h>
+
+#include <memory>
+#include <string>
+
+#include "commands.h"
+#include "server/player.h"
+#include "server/server.h"
+#include "stop_on_signal.h"
+
+namespace hapticd::apps {
+namespace {
+
+struct Options {
+  server::ReplayOptions replay;
+  std::string listen;
+  std::string http;
+  int port = -1;
+  double seconds = 0;
+};
+
+int run(const Options& options) {
+  spdlog::set_pattern("%H:%M:%S.%e %^%l%$ %v");
+  spdlog::flush_on(spdlog::level::info);
+  auto player = std::make_unique<server::Player>(options.replay);
+  server::ServerConfig config = player->config();
+  if (!options.listen.empty()) server::parseListen(options.listen, config.listenAddress, config.port);
+  if (options.port >= 0) config.port = static_cast<std::uint16_t>(options.port);
+  if (!options.http.empty()) config.http = options.http;
+  config.seconds = options.seconds;
+  server::validate(config);
+
+  StopOnSignal stopper;
+  server::Server server(config, std::move(player));
+  const std::string at = server.address().text();
+  spdlog::info("listening on {} (TCP and UDP)", at);
+  for (const server::DeviceConfig& device : config.devices) {
+    for (const std::string& name : device.names) spdlog::info("device {}@{} (replay)", name, at);
+  }
+  if (const auto web = server.webAddress()) {
+    const bool everywhere = web->address == net::kAnyAddress;
+    spdlog::info("viewer: http://{}:{}/", everywhere ? "127.0.0.1" : web->addressText(), web->port);
+  }
+  stopper.watch(server);
+  server.run();
+  return 0;
+}
+
+}  // namespace
+
+void addReplay(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("replay", "Serve a recorded session to clients, at its own times");
+  command->add_option("file", options->replay.file, "Session file of 'hapticd serve --record'")
+      ->required()
+      ->check(CLI::ExistingFile);
+  command->add_option("--speed", options->replay.speed, "Factor: 2 is twice as fast, 0.1 ten times slower")
+      ->check(within(0.001, 1000))
+      ->capture_default_str();
+  command->add_flag("--loop", options->replay.loop, "From the beginning again, for ever");
+  command->add_option("--listen", options->listen, "ADDR:PORT for TCP and UDP [127.0.0.1:3883]");
+  command->add_option("--port", options->port, "The port alone; 0: any free one")->check(CLI::Range(0, 65535));
+  command->add_option("--http", options->http, "ADDR:PORT of the viewer's page, or 'off' [127.0.0.1:8080, if free]");
+  command->add_option("--seconds", options->seconds, "Stop after this time [until a signal]")
+      ->check(within(0.001, kLongest_s));
+  command->footer(
+      "Clients connect as to the live server, hear what was reported then, stamped with the time of now, and "
+      "see the\n"
+      "scene that was. What they want to change is refused. At the end the last state stays until a signal "
+      "comes.\n"
+      "Examples:\n"
+      "  hapticd replay my.haptics\n"
+      "  hapticd replay my.haptics --speed 0.2 --loop --port 4000");
+  command->callback([options] { exitCode = run(*options); });
+}
+
+}  // namespace hapticd::apps

@@ -1,0 +1,90 @@
+#include "record/difference.h"
+
+#include <cmath>
+#include <sstream>
+
+#include "record/session_reader.h"
+
+namespace hapticd::record {
+namespace {
+
+double depthOf(const realtime::TickReport& tick) {
+  return tick.rendering.touching ? tick.rendering.depth_m : 0;
+}
+
+}  // namespace
+
+void Difference::add(const realtime::TickReport& then, const realtime::TickReport& now) {
+  if (points_.empty()) begin_ = then.time;
+  DifferencePoint point;
+  point.time_s = geometry::toSeconds(then.time - begin_);
+  point.force_N = then.force_N.norm();
+  point.forceNow_N = now.force_N.norm();
+  point.depth_m = depthOf(then);
+  point.depthNow_m = depthOf(now);
+  points_.push_back(point);
+
+  same_ += sameOutcome(then, now) ? 1 : 0;
+  touching_ += then.rendering.touching || now.rendering.touching ? 1 : 0;
+  const double force_N = (now.force_N - then.force_N).norm();
+  sum_N_ += force_N;
+  if (force_N > largest_N_) {
+    largest_N_ = force_N;
+    largestAt_s_ = point.time_s;
+  }
+  const double depth_m = std::abs(point.depthNow_m - point.depth_m);
+  sumDepth_m_ += depth_m;
+  largestDepth_m_ = std::max(largestDepth_m_, depth_m);
+}
+
+double Difference::shareOf(double sum) const noexcept {
+  const std::uint64_t count = touching_ > 0 ? touching_ : ticks();
+  return count > 0 ? sum / static_cast<double>(count) : 0;
+}
+
+double Difference::mean_N() const noexcept {
+  return shareOf(sum_N_);
+}
+
+double Difference::meanDepth_m() const noexcept {
+  return shareOf(sumDepth_m_);
+}
+
+std::vector<Difference> compare(const std::filesystem::path& session, const RerenderChanges& changes,
+                                std::string& remark) {
+  SessionReader reader(session);
+  Rerenderer again(reader.header(), changes);
+  std::vector<Difference> devices;
+  for (const SessionDevice& device : reader.header().devices) devices.emplace_back(device.names.front());
+  for (SessionEvent event; reader.next(event);) {
+    if (const realtime::TickReport* now = again.feed(event)) {
+      const auto& [device, tick] = std::get<TickEvent>(event);
+      devices[device].add(tick.report, *now);
+    }
+    const auto* lost = std::get_if<LostEvent>(&event);
+    if (lost != nullptr && lost->what == LostEvent::What::ticks) devices[lost->device].addLost(lost->count);
+    if (lost != nullptr && lost->what == LostEvent::What::sceneEvents) {
+      remark = "the recorder lost " + std::to_string(lost->count) +
+               " scene events: from there on the scene is another. ";
+    }
+  }
+  remark += reader.remark();
+  return devices;
+}
+
+std::string inWords(const RerenderChanges& changes) {
+  std::ostringstream text;
+  const auto add = [&](const char* name, const std::optional<double>& value, double scale, const char* unit) {
+    if (value) text << (text.tellp() > 0 ? ", " : "") << name << ' ' << *value * scale << unit;
+  };
+  add("stiffness", changes.stiffness_N_per_m, 1, " N/m");
+  add("damping", changes.damping_Ns_per_m, 1, " Ns/m");
+  add("static friction", changes.staticFriction, 1, "");
+  add("dynamic friction", changes.dynamicFriction, 1, "");
+  add("tool radius", changes.toolRadius_m, 1e3, " mm");
+  if (changes.forceShading) text << (text.tellp() > 0 ? ", " : "") << "force shading";
+  if (changes.raw) text << (text.tellp() > 0 ? ", " : "") << "raw: no guard, no limits";
+  return text.tellp() > 0 ? text.str() : "nothing";
+}
+
+}  // namespace hapticd::record

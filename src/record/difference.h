@@ -1,0 +1,73 @@
+// What differs between a session as it was felt and as it is felt now, and a report of it for people.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "record/rerender.h"
+#include "record/session.h"
+
+namespace hapticd::record {
+
+/// One tick, then and now.
+struct DifferencePoint {
+  double time_s = 0;  ///< since the first tick of the device
+  double force_N = 0;
+  double forceNow_N = 0;
+  double depth_m = 0;  ///< 0 when free
+  double depthNow_m = 0;
+};
+
+/// Of one device, added up tick by tick.
+class Difference {
+ public:
+  explicit Difference(std::string device) : device_(std::move(device)) {}
+
+  void add(const realtime::TickReport& then, const realtime::TickReport& now);
+  void addLost(std::uint64_t ticks) { lost_ += ticks; }
+
+  const std::string& device() const noexcept { return device_; }
+  std::uint64_t ticks() const noexcept { return points_.size(); }
+  /// Ticks that are the same in every bit: rendering, force and guard.
+  std::uint64_t same() const noexcept { return same_; }
+  /// Ticks that the recorder had to drop; after these nothing need be the same.
+  std::uint64_t lost() const noexcept { return lost_; }
+  std::uint64_t touching() const noexcept { return touching_; }  ///< then or now
+  /// Of the difference of the two forces, as vectors.
+  double largest_N() const noexcept { return largest_N_; }
+  double largestAt_s() const noexcept { return largestAt_s_; }
+  /// Mean over the ticks that touch, then or now; of all when none does.
+  double mean_N() const noexcept;
+  double largestDepth_m() const noexcept { return largestDepth_m_; }
+  double meanDepth_m() const noexcept;
+  const std::vector<DifferencePoint>& points() const noexcept { return points_; }
+
+ private:
+  double shareOf(double sum) const noexcept;
+
+  std::string device_;
+  std::vector<DifferencePoint> points_;
+  Nanos begin_ = 0;
+  std::uint64_t same_ = 0;
+  std::uint64_t lost_ = 0;
+  std::uint64_t touching_ = 0;
+  double largest_N_ = 0;
+  double largestAt_s_ = 0;
+  double sum_N_ = 0;
+  double largestDepth_m_ = 0;
+  double sumDepth_m_ = 0;
+};
+
+/// Renders a whole session again. `remark` says why the file ends early, if it does. Throws SessionError.
+std::vector<Difference> compare(const std::filesystem::path& session, const RerenderChanges& changes,
+                                std::string& remark);
+
+/// The changes in words, for a headline: "stiffness 300 N/m, tool radius 2 mm"; "nothing".
+std::string inWords(const RerenderChanges& changes);
+
+/// A page that needs nothing but itself: figures and plots of force and depth over time, then and now.
+std::string htmlReport(const std::string& session, const RerenderChanges& changes,
+                       const std::vector<Difference>& devices, const std::string& remark);
+
+}  // namespace hapticd::record

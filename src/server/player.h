@@ -1,0 +1,78 @@
+// Plays a recorded session: what its servos reported and what its clients told the scene, at the times at
+// which it was, or faster or slower.
+#pragma once
+
+#include <condition_variable>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+#include "record/session_reader.h"
+#include "server/config.h"
+
+namespace hapticd::server {
+
+struct ReplayOptions {
+  std::filesystem::path file;
+  double speed = 1;
+  bool loop = false;  ///< from the beginning again, instead of resting at the end
+};
+
+/// A thread of its own, between start() and stop(). Reads ahead a little, because a file holds the ticks of
+/// one moment device by device.
+class Player {
+ public:
+  /// Called from the player's thread, times being those of now.
+  struct Callbacks {
+    std::function<void(std::uint32_t device, const realtime::TickReport&)> tick;
+    /// Null: the client was gone.
+    std::function<void(std::uint32_t scene, scene::ClientId, const scene::SceneCommand*)> told;
+    /// Before the session begins again.
+    std::function<void()> restart;
+    /// Once, at the end, or where the file could not be read further: why.
+    std::function<void(const std::string&)> over;
+  };
+
+  /// Reads the header. Throws record::SessionError.
+  explicit Player(ReplayOptions options);
+  ~Player() { stop(); }
+  Player(const Player&) = delete;
+  Player& operator=(const Player&) = delete;
+
+  const record::SessionHeader& header() const noexcept { return header_; }
+  /// The configuration that was recorded, for a server that replays it. Throws ConfigError when this version
+  /// cannot read it.
+  ServerConfig config() const;
+
+  void start(Callbacks callbacks);
+  /// Idempotent.
+  void stop();
+
+ private:
+  void run();
+  std::string playOnce();
+  bool readAhead(record::SessionReader& reader);
+  bool waitFor(geometry::Nanos recorded);
+  geometry::Nanos live(geometry::Nanos recorded) const;
+  void play(record::SessionEvent& event);
+
+  const ReplayOptions options_;
+  record::SessionHeader header_;
+  Callbacks callbacks_;
+
+  // The thread's.
+  std::multimap<geometry::Nanos, record::SessionEvent> ahead_;
+  bool began_ = false;
+  geometry::Nanos firstRecorded_ = 0;
+  geometry::Nanos firstLive_ = 0;
+
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  bool stopping_ = false;
+  std::thread thread_;
+};
+
+}  // namespace hapticd::server

@@ -1,0 +1,87 @@
+// A replay over the network: clients hear what was recorded, and cannot change it.
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "record/recorded_session.h"
+
+namespace hapticd::test {
+namespace {
+
+class Replay : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    file_ = std::make_unique<SessionFile>();
+    const Hand hand = Hand::stroking();
+    RunningServer server(recordingConfig(hand, file_->path()));
+    played_ = playSession(server);
+  }
+  static void TearDownTestSuite() { file_.reset(); }
+  void SetUp() override {
+    ASSERT_TRUE(played_);
+    for (const record::SessionEvent& event : eventsOf(file_->path())) {
+      const auto* tick = std::get_if<record::TickEvent>(&event);
+      if (tick != nullptr && tick->device == 0) ticks_[tick->tick.report.tick] = tick->tick.report;
+    }
+    auto player = std::make_unique<server::Player>(
+        server::ReplayOptions{.file = file_->path(), .speed = 2, .loop = true});
+    server::ServerConfig config = player->config();
+    config.port = 0;
+    server_ = std::make_unique<server::Server>(config, std::move(player));
+    thread_ = std::thread([this] { server_->run(); });
+  }
+  void TearDown() override {
+    server_->stop();
+    thread_.join();
+  }
+
+  static std::unique_ptr<SessionFile> file_;
+  static bool played_;
+  std::map<std::uint64_t, realtime::TickReport> ticks_;
+  std::unique_ptr<server::Server> server_;
+  std::thread thread_;
+};
+
+std::unique_ptr<SessionFile> Replay::file_;
+bool Replay::played_ = false;
+
+TEST_F(Replay, ClientsHearTheRecordedTicks) {
+  ScriptedPeer peer(server_->address());
+  ASSERT_TRUE(peer.untilConnected());
+  peer.send(wire::Subscribe{wire::kReportTick, 1000});
+  // All there are, through the seam of the loop.
+  ASSERT_TRUE(peer.until([&] { return peer.count<wire::TickReport>() > ticks_.size() + 100; }));
+  std::uint64_t touching = 0;
+  std::int64_t last = 0;
+  for (const wire::TickReport& heard : peer.all<wire::TickReport>()) {
+    ASSERT_EQ(ticks_.count(heard.tick), 1U) << heard.tick;
+    const realtime::TickReport& then = ticks_[heard.tick];
+    EXPECT_EQ(heard.revision, then.revision);
+    // A millimetre of the world is one of the device, turned by nothing, but where a client set another
+    // workspace.
+    EXPECT_NEAR(norm(heard.force), then.force_N.norm(), 1e-12);
+    EXPECT_EQ(heard.object, then.rendering.touching ? then.rendering.touchedObject : -1);
+    EXPECT_GT(heard.time, last) << "times are those of now, and never go back";
+    last = heard.time;
+    touching += heard.object >= 0 ? 1 : 0;
+  }
+  EXPECT_GT(touching, 50U);
+}
+
+TEST_F(Replay, NobodyCanChangeIt) {
+  ScriptedPeer peer(server_->address());
+  ASSERT_TRUE(peer.untilConnected());
+  peer.send(wire::ResetScene{});
+  EXPECT_TRUE(peer.untilText("refused: this server replays a recording"));
+}
+
+TEST_F(Replay, TheSecondDeviceIsThereToo) {
+  ScriptedPeer peer(server_->address(), "Second");
+  EXPECT_TRUE(peer.until([&] {
+    const auto touched = peer.last<wire::TouchedObject>();
+    return touched && touched->object == 0;
+  }));
+}
+
+}  // namespace
+}  // namespace hapticd::test
