@@ -46,9 +46,16 @@ export class DropMesh {
 
   /** Looks in a new state for the mesh that was sent. */
   update(objects: ObjectState[]): void {
-    const there = this.awaited && objects.find((o) => o.id === this.awaited!.object && o.triangles > 0 && o.geometry !== this.awaited!.geometry);
+    const there =
+      this.awaited &&
+      objects.find(
+        (o) => o.id === this.awaited!.object && o.triangles > 0 && o.geometry !== this.awaited!.geometry,
+      );
     if (!there) return;
-    this.say(`${this.awaited!.name} is object ${there.id}: ${countText(there.triangles)} triangles to touch.`, "good");
+    this.say(
+      `${this.awaited!.name} is object ${there.id}: ${countText(there.triangles)} triangles to touch.`,
+      "good",
+    );
     this.awaited = undefined;
   }
 

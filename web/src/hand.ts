@@ -29,6 +29,8 @@ const IDLE_MS = 60_000;
 export class Hand {
   mode: DragMode = "surface";
   held = false;
+  /** Whether the left button is the hand's. */
+  enabled = true;
   private dragging = false;
   private refusedUntilUp = false;
   private press_mm = PRESS_MM;
@@ -39,6 +41,10 @@ export class Hand {
   private sent = 0;
   private used = 0;
   private onSurface = false;
+  /** The pointer has moved, the target not yet. */
+  private aimLater = false;
+  /** The target has changed since it was sent. */
+  private fresh = false;
   private orientation: [number, number, number, number] = [0, 0, 0, 1];
 
   constructor(
@@ -55,9 +61,6 @@ export class Hand {
     canvas.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
     canvas.addEventListener("keydown", (e) => this.key(e));
   }
-
-  /** Whether the left button is the hand's. */
-  enabled = true;
 
   get pressing_mm(): number {
     return this.press_mm;
@@ -93,7 +96,6 @@ export class Hand {
     this.sent = time_ms;
     this.send(holdHand(true, (this.route[0] ?? this.target).toArray(), this.orientation));
   }
-  private fresh = false;
 
   private down(e: PointerEvent): void {
     if (e.button !== 0 || !this.enabled) return;
@@ -122,7 +124,6 @@ export class Hand {
     this.pointer = { x: e.clientX, y: e.clientY };
     this.aimLater = true;
   }
-  private aimLater = false;
 
   private up(): void {
     this.dragging = this.refusedUntilUp = false;
@@ -183,13 +184,13 @@ export class Hand {
     this.touchedNow();
   }
 
-  // A hand on the far side would get stuck behind the object: it goes up, over, and comes down in front.
+  // With an object between it and the target the hand would get stuck: it goes up and over, and down in front.
   private around(now: HandNow): Vector3[] {
-    if (!this.onSurface) return [];
     const { into } = this.view.axes();
-    const front = this.target.clone().addScaledVector(into, -(this.press_mm + 2) * now.unit);
+    const back = this.onSurface ? this.press_mm + 2 : 0;
+    const front = this.target.clone().addScaledVector(into, -back * now.unit);
     if (!this.view.objects.between(now.clear, front)) return [];
-    const before = this.target.clone().addScaledVector(into, -30 * now.unit);
+    const before = this.target.clone().addScaledVector(into, this.onSurface ? -30 * now.unit : 0);
     return [now.top(now.clear), now.top(before), before, front];
   }
 

@@ -26,13 +26,40 @@ export class LivePlots {
 
   constructor() {
     const parent = byId("plots");
-    const one = (title: string, unit: string, label: string, least: number, decimals: number, colour: string): Plot =>
-      new Plot(parent, { title, unit, least, decimals, curves: [{ label, colour }], seconds: SECONDS, most: MOST });
+    const one = (
+      title: string,
+      unit: string,
+      label: string,
+      least: number,
+      decimals: number,
+      colour: string,
+    ): Plot =>
+      new Plot(parent, {
+        title,
+        unit,
+        least,
+        decimals,
+        curves: [{ label, colour }],
+        seconds: SECONDS,
+        most: MOST,
+      });
     this.force = one("Force", "N", "force", 0.5, 2, "--force");
     this.depth = one("Depth", "mm", "depth", 1, 2, "--proxy");
     this.latency = one("Latency", "ms", "latency", 2, 1, "--second");
-    const curves = [{ label: "p50", colour: "--third" }, { label: "p99", colour: "--second" }, { label: "max", colour: "--force" }];
-    this.period = new Plot(parent, { title: "Loop period", unit: "µs", least: 1200, decimals: 0, curves, seconds: LOOP_SECONDS, most: 300 });
+    const curves = [
+      { label: "p50", colour: "--third" },
+      { label: "p99", colour: "--second" },
+      { label: "max", colour: "--force" },
+    ];
+    this.period = new Plot(parent, {
+      title: "Loop period",
+      unit: "µs",
+      least: 1200,
+      decimals: 0,
+      curves,
+      seconds: LOOP_SECONDS,
+      most: 300,
+    });
   }
 
   tick(time_s: number, force_N: number, depth_mm: number, latency_ms: number): void {
@@ -49,11 +76,15 @@ export class LivePlots {
     }
     const now = device.loop.period_us;
     const since = between(this.before, now);
-    if (since.length > 0 && this.before) this.period.push(time_s, share(since, 0.5), share(since, 0.99), share(since, 1));
+    if (since.length > 0 && this.before)
+      this.period.push(time_s, share(since, 0.5), share(since, 0.99), share(since, 1));
     this.before = now;
     const shown = device.loop[this.choice.value as LoopTime];
     this.histogram.update(shown);
-    setText(this.says, `p50 ${us(shown.p50)}, p99 ${us(shown.p99)}, p99.9 ${us(shown.p999)}, max ${us(shown.max)} of ${countText(device.loop.ticks)} ticks; ${countText(device.loop.overruns)} overruns, ${countText(device.loop.dropped_reports)} reports dropped`);
+    setText(
+      this.says,
+      `p50 ${us(shown.p50)}, p99 ${us(shown.p99)}, p99.9 ${us(shown.p999)}, max ${us(shown.max)} of ${countText(device.loop.ticks)} ticks; ${countText(device.loop.overruns)} overruns, ${countText(device.loop.dropped_reports)} reports dropped`,
+    );
   }
 
   /** One plot a frame: all are drawn many times a second, and no frame is late for them. */

@@ -33,16 +33,38 @@ class Page {
   private fresh = false;
   private readoutAt = 0;
   private answers = true;
+  /** How many were drawn. */
+  frames = 0;
 
   private readonly view = new View(byId<HTMLCanvasElement>("view"));
-  private readonly link = new Link(() => this.linkChanged(), (message, age_s) => this.received(message, age_s));
+  private readonly link = new Link(
+    () => this.linkChanged(),
+    (message, age_s) => this.received(message, age_s),
+  );
   private readonly plots = new LivePlots();
-  private readonly hand = new Hand(this.view, (m) => this.link.send(m), () => this.handNow(), () => this.showHand());
-  private readonly meshes = new Meshes((id, mesh) => this.setMesh(() => this.view.objects.setMesh(id, mesh)), (id) => this.setMesh(() => this.view.objects.remove(id)));
-  private readonly drop = new DropMesh({ link: this.link, view: this.view, device: () => this.device, objects: () => this.objects() });
+  private readonly hand = new Hand(
+    this.view,
+    (m) => this.link.send(m),
+    () => this.handNow(),
+    () => this.showHand(),
+  );
+  private readonly meshes = new Meshes(
+    (id, mesh) => this.setMesh(() => this.view.objects.setMesh(id, mesh)),
+    (id) => this.setMesh(() => this.view.objects.remove(id)),
+  );
+  private readonly drop = new DropMesh({
+    link: this.link,
+    view: this.view,
+    device: () => this.device,
+    objects: () => this.objects(),
+  });
   private readonly guard = new GuardPanel(byId("guard"));
   private readonly clients = new ClientsPanel(byId("clients"));
-  private readonly objectsPanel = new ObjectsPanel(byId("objects"), (...m) => this.send(...m), () => this.device!);
+  private readonly objectsPanel = new ObjectsPanel(
+    byId("objects"),
+    (...m) => this.send(...m),
+    () => this.device!,
+  );
   private readonly effects = new EffectsPanel(byId("effects"), (...m) => this.send(...m));
   private readonly deviceChoice = byId<HTMLSelectElement>("device");
   private readonly quantity = byId<HTMLSelectElement>("quantity");
@@ -78,7 +100,8 @@ class Page {
   }
 
   private stop(): void {
-    if (!this.link.send(wire.stopForces())) toast("Not connected: the stop did not reach the server. Use the device's own switch.", 2);
+    if (!this.link.send(wire.stopForces()))
+      toast("Not connected: the stop did not reach the server. Use the device's own switch.", 2);
   }
 
   private send(...messages: wire.Outgoing[]): void {
@@ -95,7 +118,13 @@ class Page {
 
   private restyle(): void {
     this.view.setBackground(css("--view"));
-    this.view.markers.setColours({ hand: css("--hand"), proxy: css("--proxy"), force: css("--force"), normal: css("--normal"), box: css("--box") });
+    this.view.markers.setColours({
+      hand: css("--hand"),
+      proxy: css("--proxy"),
+      force: css("--force"),
+      normal: css("--normal"),
+      box: css("--box"),
+    });
     this.plots.restyle();
   }
 
@@ -129,7 +158,10 @@ class Page {
     const { server } = state;
     byId("recording").hidden = server.recording === null;
     setText(byId("recording"), `● ${server.recording ?? ""}`);
-    setText(byId("about"), `hapticd ${server.version}, ${device.driver} at ${device.rate_Hz} Hz${device.realtime ? "" : ", not realtime"}, up for ${durationText(server.uptime_s)}`);
+    setText(
+      byId("about"),
+      `hapticd ${server.version}, ${device.driver} at ${device.rate_Hz} Hz${device.realtime ? "" : ", not realtime"}, up for ${durationText(server.uptime_s)}`,
+    );
   }
 
   private objects(): ObjectState[] {
@@ -169,7 +201,9 @@ class Page {
     if (this.link.state === "lost" || (!this.answers && this.state)) return showNotice("lost");
     if (noDevice) return showNotice("no device");
     if (!this.device || this.link.state === "connecting") return showNotice("connecting");
-    showNotice(this.objects().some((o) => o.triangles > 0) || (this.scene?.planes.length ?? 0) > 0 ? "" : "empty");
+    showNotice(
+      this.objects().some((o) => o.triangles > 0) || (this.scene?.planes.length ?? 0) > 0 ? "" : "empty",
+    );
   }
 
   // The connection.
@@ -180,7 +214,10 @@ class Page {
     setText(label, state === "open" ? "connected" : state);
     label.dataset["level"] = state === "open" ? "good" : state === "lost" ? "bad" : "";
     if (state === "open") this.subscribe();
-    if (state === "lost") this.hand.lost();
+    if (state === "lost") {
+      this.hand.lost();
+      this.meshes.clear(); // another server may come, and number its shapes alike
+    }
     this.showNotice();
   }
 
@@ -255,7 +292,10 @@ class Page {
     const { device, hand } = this;
     if (!device) return "";
     if (!device.simulated) return "A real hand holds this device.";
-    if (hand.held) return hand.strokes ? `You hold the hand, pressing ${hand.pressing_mm.toFixed(0)} mm in. Wheel: deeper.` : "You hold the hand. Wheel: depth.";
+    if (hand.held)
+      return hand.strokes
+        ? `You hold the hand, pressing ${hand.pressing_mm.toFixed(0)} mm in. Wheel: deeper.`
+        : "You hold the hand. Wheel: depth.";
     if (device.held_by !== null) return `Client ${device.held_by} holds the hand.`;
     return "Drag over an object to touch it. Right button: camera.";
   }
@@ -279,6 +319,7 @@ class Page {
     }
     this.view.draw();
     this.plots.draw();
+    ++this.frames;
   }
 
   private readout(tick: wire.Tick, time_ms: number): void {
@@ -295,4 +336,7 @@ function durationText(seconds: number): string {
   return seconds < 7200 ? `${(seconds / 60).toFixed(0)} min` : `${(seconds / 3600).toFixed(1)} h`;
 }
 
-new Page().start();
+const viewer = new Page();
+viewer.start();
+// For the tests, and for the curious at the console.
+Object.assign(window, { viewer });

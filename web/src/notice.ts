@@ -5,9 +5,18 @@ export type Notice = "connecting" | "lost" | "no device" | "empty" | "";
 
 const TEXTS: Record<Exclude<Notice, "">, [title: string, text: string]> = {
   connecting: ["Connecting …", "Waiting for the server's answer."],
-  lost: ["Connection lost", "Is “hapticd serve” still running? This page connects again by itself as soon as it is. Until then it cannot stop the device: use the device's own switch."],
-  "no device": ["No device", "The server runs without any device. Start it with one, for example “hapticd serve --device simulated”."],
-  empty: ["The scene is empty", "Drop a mesh here (OBJ, STL, PLY, glTF), or send one: “hapticd touch testdata/meshes/bunny.obj”."],
+  lost: [
+    "Connection lost",
+    "Is “hapticd serve” still running? This page connects again by itself as soon as it is. Until then it cannot stop the device: use the device's own switch.",
+  ],
+  "no device": [
+    "No device",
+    "The server runs without any device. Start it with one, for example “hapticd serve --device simulated”.",
+  ],
+  empty: [
+    "The scene is empty",
+    "Drop a mesh here (OBJ, STL, PLY, glTF), or send one: “hapticd touch testdata/meshes/bunny.obj”.",
+  ],
 };
 
 const TOAST_MS = 8000;

@@ -25,7 +25,14 @@ export interface DeviceState {
   fault: string;
   temperature_C: number | null;
   guard: { armed: boolean; stopped: boolean; active: string[]; latched: string[] };
-  loop: { ticks: number; overruns: number; dropped_reports: number; period_us: Histogram; wakeup_us: Histogram; compute_us: Histogram };
+  loop: {
+    ticks: number;
+    overruns: number;
+    dropped_reports: number;
+    period_us: Histogram;
+    wakeup_us: Histogram;
+    compute_us: Histogram;
+  };
 }
 
 export interface ClientState {

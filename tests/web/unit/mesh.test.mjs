@@ -3,21 +3,31 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import { test } from "node:test";
-import { bundled, packageNamed, sourceDir } from "../bundled.mjs";
+import { bundled, sourceDir } from "../bundled.mjs";
 
 const { weld } = await bundled("mesh/weld.ts");
 const { readMesh } = await bundled("mesh/read_file.ts");
 const { decodeMesh } = await bundled("state.ts");
 const { RayMesh } = await bundled("scene3d/ray_mesh.ts");
-const { Matrix4, Ray, Vector3 } = packageNamed("three");
+const { Matrix4, Ray, Vector3 } = await bundled("../node_modules/three/build/three.module.js");
 
 /** As the browser's File, as far as it is read. */
-const file = (name, content) => ({ name, arrayBuffer: async () => Uint8Array.from(Buffer.from(content)).buffer });
+const file = (name, content) => ({
+  name,
+  arrayBuffer: async () => Uint8Array.from(Buffer.from(content)).buffer,
+});
 
 const SQUARE = [0, 0, 0, 2, 0, 0, 2, 2, 0, 0, 0, 0, 2, 2, 0, 0, 2, 0];
 const sorted = ({ positions, triangles }) => {
   const corners = [...triangles].map((v) => [...positions.subarray(3 * v, 3 * v + 3)].join());
-  return [0, 3].map((i) => corners.slice(i, i + 3).sort().join(" ")).sort();
+  return [0, 3]
+    .map((i) =>
+      corners
+        .slice(i, i + 3)
+        .sort()
+        .join(" "),
+    )
+    .sort();
 };
 
 test("corners at one place become one vertex, -0 and 0 are one place", () => {
@@ -27,7 +37,9 @@ test("corners at one place become one vertex, -0 and 0 are one place", () => {
 });
 
 test("the bunny has the vertices and triangles of its file", async () => {
-  const { mesh } = await readMesh([file("bunny.obj", readFileSync(join(sourceDir, "testdata/meshes/bunny.obj")))]);
+  const { mesh } = await readMesh([
+    file("bunny.obj", readFileSync(join(sourceDir, "testdata/meshes/bunny.obj"))),
+  ]);
   assert.equal(mesh.triangles.length, 3 * 3674);
   assert.equal(mesh.positions.length, 3 * 1839);
 });
@@ -41,11 +53,24 @@ function gltf(uri) {
   [0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0].forEach((x, i) => bytes.writeFloatLE(x, 4 * i));
   [0, 1, 2, 0, 2, 3].forEach((x, i) => bytes.writeUInt16LE(x, 48 + 2 * i));
   const json = {
-    asset: { version: "2.0" }, scene: 0, scenes: [{ nodes: [0] }], nodes: [{ mesh: 0, scale: [2, 2, 2] }],
+    asset: { version: "2.0" },
+    scene: 0,
+    scenes: [{ nodes: [0] }],
+    nodes: [{ mesh: 0, scale: [2, 2, 2] }],
     meshes: [{ primitives: [{ attributes: { POSITION: 0 }, indices: 1, material: 0 }] }],
-    materials: [{ pbrMetallicRoughness: { baseColorTexture: { index: 0 } } }], textures: [{ source: 0 }], images: [{ uri: "https://example.org/picture.png" }],
-    buffers: [{ uri: uri ?? `data:application/octet-stream;base64,${bytes.toString("base64")}`, byteLength: bytes.length }],
-    bufferViews: [{ buffer: 0, byteOffset: 0, byteLength: 48 }, { buffer: 0, byteOffset: 48, byteLength: 12 }],
+    materials: [{ pbrMetallicRoughness: { baseColorTexture: { index: 0 } } }],
+    textures: [{ source: 0 }],
+    images: [{ uri: "https://example.org/picture.png" }],
+    buffers: [
+      {
+        uri: uri ?? `data:application/octet-stream;base64,${bytes.toString("base64")}`,
+        byteLength: bytes.length,
+      },
+    ],
+    bufferViews: [
+      { buffer: 0, byteOffset: 0, byteLength: 48 },
+      { buffer: 0, byteOffset: 48, byteLength: 12 },
+    ],
     accessors: [
       { bufferView: 0, componentType: 5126, count: 4, type: "VEC3", min: [0, 0, 0], max: [1, 1, 0] },
       { bufferView: 1, componentType: 5123, count: 6, type: "SCALAR" },
@@ -57,7 +82,13 @@ function gltf(uri) {
 test("OBJ, STL, PLY and glTF give the same square; pictures of a glTF are not fetched", async () => {
   const { text } = gltf();
   const beside = gltf("data/square.bin");
-  const sets = [[file("a.obj", OBJ)], [file("a.STL", STL)], [file("a.ply", PLY)], [file("a.gltf", text)], [file("a.gltf", beside.text), file("square.bin", beside.bytes)]];
+  const sets = [
+    [file("a.obj", OBJ)],
+    [file("a.STL", STL)],
+    [file("a.ply", PLY)],
+    [file("a.gltf", text)],
+    [file("a.gltf", beside.text), file("square.bin", beside.bytes)],
+  ];
   for (const files of sets) {
     const { mesh } = await readMesh(files);
     assert.equal(mesh.positions.length, 12, files[0].name);
@@ -69,7 +100,10 @@ test("what is wrong with a file is said with its name", async () => {
   const wrong = [
     [[file("notes.txt", "hello")], /notes\.txt is no mesh file: drop an OBJ/],
     [[file("a.gltf", gltf("square.bin").text)], /a\.gltf: it needs square\.bin: drop both/],
-    [[file("points.ply", PLY.replace("element face 2", "element face 0").replace(/3 0 1 2\n3 0 2 3\n/, ""))], /points\.ply: it has no triangles/],
+    [
+      [file("points.ply", PLY.replace("element face 2", "element face 0").replace(/3 0 1 2\n3 0 2 3\n/, ""))],
+      /points\.ply: it has no triangles/,
+    ],
     [[file("bad.obj", OBJ.replace("2 2 0", "2 nan 0"))], /bad\.obj: a corner of triangle 0 is not a number/],
     [[file("cut.stl", Buffer.alloc(40))], /cut\.stl: /],
     [[file("cut.glb", "{")], /cut\.glb: /],

@@ -12,18 +12,43 @@ test("a window keeps the newest samples in order, however many came", () => {
     window.push(i, -i);
     const [time, value] = window.data();
     const first = Math.max(0, i - 4);
-    assert.deepEqual([...time], Array.from({ length: i - first + 1 }, (_, k) => first + k));
-    assert.deepEqual([...value], [...time].map((t) => -t));
+    assert.deepEqual(
+      [...time],
+      Array.from({ length: i - first + 1 }, (_, k) => first + k),
+    );
+    assert.deepEqual(
+      [...value],
+      [...time].map((t) => -t),
+    );
   }
   window.clear();
   assert.equal(window.size, 0);
 });
 
 test("what came between two histograms, and its quantiles", () => {
-  const before = { bins: [[990, 10], [1000, 100]] };
-  const now = { bins: [[990, 10], [1000, 190], [1010, 9], [5000, 1]] };
+  const before = {
+    bins: [
+      [990, 10],
+      [1000, 100],
+    ],
+  };
+  const now = {
+    bins: [
+      [990, 10],
+      [1000, 190],
+      [1010, 9],
+      [5000, 1],
+    ],
+  };
   const since = between(before, now);
-  assert.deepEqual(since, [[1000, 90], [1010, 9], [5000, 1]]);
-  assert.deepEqual([0.5, 0.95, 0.99, 1].map((part) => share(since, part)), [1000, 1010, 1010, 5000]);
+  assert.deepEqual(since, [
+    [1000, 90],
+    [1010, 9],
+    [5000, 1],
+  ]);
+  assert.deepEqual(
+    [0.5, 0.95, 0.99, 1].map((part) => share(since, part)),
+    [1000, 1010, 1010, 5000],
+  );
   assert.equal(share([], 0.5), 0);
 });

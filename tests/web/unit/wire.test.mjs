@@ -12,7 +12,10 @@ const hex = (bytes) => Buffer.from(bytes.buffer, bytes.byteOffset, bytes.byteLen
 /** All that one side said, heard in pieces of that size. */
 function hear(bytes, piece) {
   const messages = [];
-  const endpoint = new wire.Endpoint(() => {}, (m) => messages.push({ ...m, payload: hex(m.payload) }));
+  const endpoint = new wire.Endpoint(
+    () => {},
+    (m) => messages.push({ ...m, payload: hex(m.payload) }),
+  );
   for (let i = 0; i < bytes.length; i += piece) endpoint.feed(bytes.slice(i, i + piece));
   return messages;
 }
@@ -40,10 +43,18 @@ for (const direction of ["c2s", "s2c"]) {
 }
 
 /** What the recorded client sent under this name. */
-const sent = (name) => hear(testdata("tcp.c2s.tcp.bin"), 1 << 20).filter((m) => m.name === `vrpn_ForceDevice ${name}`).map((m) => Buffer.from(m.payload, "hex"));
+const sent = (name) =>
+  hear(testdata("tcp.c2s.tcp.bin"), 1 << 20)
+    .filter((m) => m.name === `vrpn_ForceDevice ${name}`)
+    .map((m) => Buffer.from(m.payload, "hex"));
 // Names of 20 bytes are followed by whatever lay behind them.
 const text20 = (b, at) => b.toString("latin1", at, at + 20).replace(/\0.*$/s, "");
-const zeroTail = (b, at) => Buffer.concat([b.subarray(0, at), Buffer.from(text20(b, at).padEnd(20, "\0"), "latin1"), b.subarray(at + 20)]);
+const zeroTail = (b, at) =>
+  Buffer.concat([
+    b.subarray(0, at),
+    Buffer.from(text20(b, at).padEnd(20, "\0"), "latin1"),
+    b.subarray(at + 20),
+  ]);
 const doubles = (b, at, n) => Array.from({ length: n }, (_, i) => b.readDoubleBE(at + 8 * i));
 
 const REENCODED = {
@@ -57,7 +68,15 @@ const REENCODED = {
   Effect: (b) => {
     const [gain, magnitude_N, duration_ms, frequency] = doubles(b, 24, 4);
     const place = { position: doubles(b, 56, 3), direction: doubles(b, 80, 3) };
-    return wire.setEffect({ type: text20(b, 0), index: b.readInt32BE(20), gain, magnitude_N, duration_ms, frequency, ...place });
+    return wire.setEffect({
+      type: text20(b, 0),
+      index: b.readInt32BE(20),
+      gain,
+      magnitude_N,
+      duration_ms,
+      frequency,
+      ...place,
+    });
   },
 };
 const NAME_AT = { setHapticProperty: 4, Effect: 0 };
@@ -77,7 +96,11 @@ for (const [name, encode] of Object.entries(REENCODED)) {
 test("cookie, descriptions and frames are those of VRPN", () => {
   const recorded = testdata("tcp.c2s.tcp.bin");
   const written = [];
-  const endpoint = new wire.Endpoint((bytes) => written.push(hex(bytes)), () => {}, () => 1789.25);
+  const endpoint = new wire.Endpoint(
+    (bytes) => written.push(hex(bytes)),
+    () => {},
+    () => 1789.25,
+  );
   endpoint.open();
   assert.equal(written[0], hex(recorded.slice(0, 24)).replace("30372e3334", "30372e3338")); // 07.34, 07.38
   endpoint.send("Phantom", wire.startEffect(3));
@@ -85,15 +108,25 @@ test("cookie, descriptions and frames are those of VRPN", () => {
   const header = "000006fd0003d090"; // 1789.25 s
   assert.deepEqual(written.slice(1), [
     `00000024${header}00000000ffffffff00000000` + "00000008" + "5068616e746f6d00" + "00000000",
-    `00000039${header}00000000fffffffe00000001` + "0000001d" + Buffer.from("vrpn_ForceDevice startEffect\0").toString("hex") + "00".repeat(7),
+    `00000039${header}00000000fffffffe00000001` +
+      "0000001d" +
+      Buffer.from("vrpn_ForceDevice startEffect\0").toString("hex") +
+      "00".repeat(7),
     `0000001c${header}000000000000000000000002` + "00000003" + "00000000",
     `0000001c${header}000000000000000000000003` + "00000004" + "00000000",
   ]);
 });
 
 test("a peer that is no VRPN, and a length that cannot be, are errors that name it", () => {
-  const endpoint = () => new wire.Endpoint(() => {}, () => {});
-  assert.throws(() => endpoint().feed(new TextEncoder().encode("HTTP/1.1 400 Bad Request")), /opened with "HTTP/);
+  const endpoint = () =>
+    new wire.Endpoint(
+      () => {},
+      () => {},
+    );
+  assert.throws(
+    () => endpoint().feed(new TextEncoder().encode("HTTP/1.1 400 Bad Request")),
+    /opened with "HTTP/,
+  );
   const started = endpoint();
   started.feed(testdata("tcp.s2c.tcp.bin").slice(0, 24));
   assert.throws(() => started.feed(new Uint8Array([0, 0, 0, 3, 0, 0, 0, 0])), /3 bytes/);
@@ -126,23 +159,52 @@ class Bytes {
 }
 
 test("Tick is read field by field", () => {
-  const bytes = new Bytes().i64(2 ** 40 + 7, -5, 9).f64(1, 2, 3, 4, 5, 6, 7, 8, 9).f64(0.1, 0.2, 0.3, 0.4).f64(-1, -2, -3).f64(0.004).i32(-1).u32(3, 1 << 13, 2 ** 31);
+  const bytes = new Bytes()
+    .i64(2 ** 40 + 7, -5, 9)
+    .f64(1, 2, 3, 4, 5, 6, 7, 8, 9)
+    .f64(0.1, 0.2, 0.3, 0.4)
+    .f64(-1, -2, -3)
+    .f64(0.004)
+    .i32(-1)
+    .u32(3, 1 << 13, 2 ** 31);
   assert.equal(bytes.buffer.length, 176);
   assert.deepEqual(wire.decodeTick(bytes.view), {
-    tick: 2 ** 40 + 7, time_ns: -5, revision: 9, hand: [1, 2, 3], proxy: [4, 5, 6], velocity: [7, 8, 9], orientation: [0.1, 0.2, 0.3, 0.4],
-    force_N: [-1, -2, -3], depth: 0.004, object: -1, buttons: 3, guardActive: 1 << 13, guardLatched: 2 ** 31,
+    tick: 2 ** 40 + 7,
+    time_ns: -5,
+    revision: 9,
+    hand: [1, 2, 3],
+    proxy: [4, 5, 6],
+    velocity: [7, 8, 9],
+    orientation: [0.1, 0.2, 0.3, 0.4],
+    force_N: [-1, -2, -3],
+    depth: 0.004,
+    object: -1,
+    buttons: 3,
+    guardActive: 1 << 13,
+    guardLatched: 2 ** 31,
   });
 });
 
 test("Contacts, Guard_State and texts are read", () => {
-  const contacts = new Bytes().i64(1, 2).i32(20).f64(4, 1, 2, 3, 0, 1, 0, 0, 0.5, 0).f64(-1, 0, 0, 0, 0, 0, 1, 0, 0, 2);
+  const contacts = new Bytes()
+    .i64(1, 2)
+    .i32(20)
+    .f64(4, 1, 2, 3, 0, 1, 0, 0, 0.5, 0)
+    .f64(-1, 0, 0, 0, 0, 0, 1, 0, 0, 2);
   assert.deepEqual(wire.decodeContacts(contacts.view), [
     { object: 4, point: [1, 2, 3], normal: [0, 1, 0], force_N: [0, 0.5, 0] },
     { object: -1, point: [0, 0, 0], normal: [0, 0, 1], force_N: [0, 0, 2] },
   ]);
-  assert.deepEqual(wire.decodeGuardState(new Bytes().u32(1, 2).i16(1, 0).view), { active: 1, latched: 2, armed: true, stopped: false });
+  assert.deepEqual(wire.decodeGuardState(new Bytes().u32(1, 2).i16(1, 0).view), {
+    active: 1,
+    latched: 2,
+    armed: true,
+    stopped: false,
+  });
   const texts = hear(testdata("tcp.s2c.tcp.bin"), 1 << 20).filter((m) => m.name === wire.TEXT);
-  const decoded = texts.map((m) => wire.decodeText(new DataView(Uint8Array.from(Buffer.from(m.payload, "hex")).buffer)));
+  const decoded = texts.map((m) =>
+    wire.decodeText(new DataView(Uint8Array.from(Buffer.from(m.payload, "hex")).buffer)),
+  );
   assert.ok(decoded.length > 0);
   for (const { severity, text } of decoded) assert.ok(severity <= 2 && /^[ -~]+$/.test(text), text);
 });
@@ -152,7 +214,10 @@ test("hand, subscription and meshes are written to the byte", () => {
     [wire.holdHand(true, [1, -2, 3], [0, 0, 0, 1]), new Bytes().i16(1).f64(1, -2, 3).f64(0, 0, 0, 1).u32(0)],
     [wire.subscribe(wire.REPORT_TICK | wire.REPORT_CONTACTS, 125), new Bytes().u32(48).f64(125)],
     [wire.meshVertices(2, 5000, Float32Array.of(1, 2, 3)), new Bytes().i32(2, 5000, 3).f32(1, 2, 3)],
-    [wire.meshTriangles(2, 10, Uint32Array.of(0, 1, 2, 2, 1, 3)), new Bytes().i32(2, 10, 6).i32(0, 1, 2, 2, 1, 3)],
+    [
+      wire.meshTriangles(2, 10, Uint32Array.of(0, 1, 2, 2, 1, 3)),
+      new Bytes().i32(2, 10, 6).i32(0, 1, 2, 2, 1, 3),
+    ],
   ];
   for (const [ours, bytes] of expected) assert.equal(hex(ours.payload), bytes.buffer.toString("hex"));
 });

@@ -3,19 +3,33 @@
 interface Gltf {
   buffers?: { uri?: string; byteLength: number }[];
   bufferViews?: { buffer: number; byteOffset?: number }[];
-  meshes?: { primitives: { material?: number; attributes: Record<string, number>; targets?: unknown; mode?: number }[] }[];
+  meshes?: {
+    primitives: { material?: number; attributes: Record<string, number>; targets?: unknown; mode?: number }[];
+  }[];
   nodes?: { skin?: number; camera?: number }[];
   extensionsRequired?: string[];
   [key: string]: unknown;
 }
 
-const NOT_SHAPE = ["images", "textures", "samplers", "materials", "animations", "skins", "cameras", "extensions"];
+const NOT_SHAPE = [
+  "images",
+  "textures",
+  "samplers",
+  "materials",
+  "animations",
+  "skins",
+  "cameras",
+  "extensions",
+];
 const JSON_CHUNK = 0x4e4f534a;
 const BIN_CHUNK = 0x004e4942;
 const MAGIC = 0x46546c67;
 
 /** Returns a GLB with only the shape. `beside`: the bytes of a file that was dropped along with it, by its name. */
-export async function shapeOf(bytes: ArrayBuffer, beside: (name: string) => Promise<ArrayBuffer> | undefined): Promise<ArrayBuffer> {
+export async function shapeOf(
+  bytes: ArrayBuffer,
+  beside: (name: string) => Promise<ArrayBuffer> | undefined,
+): Promise<ArrayBuffer> {
   const { json, bin } = unpack(bytes);
   for (const key of NOT_SHAPE) delete json[key];
   for (const node of json.nodes ?? []) {
@@ -40,16 +54,22 @@ function unpack(bytes: ArrayBuffer): { json: Gltf; bin: ArrayBuffer | undefined 
   const jsonLength = view.getUint32(12, true);
   const json = JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 20, jsonLength))) as Gltf;
   const next = 20 + jsonLength;
-  const bin = next + 8 <= bytes.byteLength ? bytes.slice(next + 8, next + 8 + view.getUint32(next, true)) : undefined;
+  const bin =
+    next + 8 <= bytes.byteLength ? bytes.slice(next + 8, next + 8 + view.getUint32(next, true)) : undefined;
   return { json, bin };
 }
 
-async function bufferOf(uri: string | undefined, bin: ArrayBuffer | undefined, beside: (name: string) => Promise<ArrayBuffer> | undefined): Promise<Uint8Array> {
+async function bufferOf(
+  uri: string | undefined,
+  bin: ArrayBuffer | undefined,
+  beside: (name: string) => Promise<ArrayBuffer> | undefined,
+): Promise<Uint8Array> {
   if (uri === undefined) {
     if (!bin) throw new Error("it has no data of its own, and names no file for them");
     return new Uint8Array(bin);
   }
-  if (uri.startsWith("data:")) return Uint8Array.from(atob(uri.slice(uri.indexOf(",") + 1)), (c) => c.charCodeAt(0));
+  if (uri.startsWith("data:"))
+    return Uint8Array.from(atob(uri.slice(uri.indexOf(",") + 1)), (c) => c.charCodeAt(0));
   const name = decodeURIComponent(uri.split("/").at(-1)!);
   const file = beside(name);
   if (!file) throw new Error(`it needs ${name}: drop both files together`);

@@ -1,5 +1,16 @@
 // Where a mesh that was dropped shall stand, how large, and how it shall feel: a form, with a preview in the scene.
-import { BufferAttribute, BufferGeometry, DoubleSide, Euler, MathUtils, Matrix4, Mesh, MeshStandardMaterial, Quaternion, Vector3 } from "three";
+import {
+  BufferAttribute,
+  BufferGeometry,
+  DoubleSide,
+  Euler,
+  MathUtils,
+  Matrix4,
+  Mesh,
+  MeshStandardMaterial,
+  Quaternion,
+  Vector3,
+} from "three";
 import type { DeviceState, ObjectState } from "../state_types";
 import { countText, el } from "../panels/dom";
 import { materialsOf, SurfaceForm } from "../panels/surface";
@@ -8,7 +19,12 @@ import type { Placement } from "./upload";
 import type { FileMesh } from "./weld";
 
 const FILL = 0.8;
-const NEW_SURFACE = { stiffness: 0.8, damping: 0.1, "static friction": 0.3, "dynamic friction": 0.2 } as const;
+const NEW_SURFACE = {
+  stiffness: 0.8,
+  damping: 0.1,
+  "static friction": 0.3,
+  "dynamic friction": 0.2,
+} as const;
 
 export class Placing {
   readonly root = el("form", { className: "placing" });
@@ -22,7 +38,13 @@ export class Placing {
   private readonly extent: number;
   private readonly isNew = new Set<number>();
 
-  constructor(name: string, mesh: FileMesh, private readonly view: View, device: DeviceState, objects: ObjectState[]) {
+  constructor(
+    name: string,
+    mesh: FileMesh,
+    private readonly view: View,
+    device: DeviceState,
+    objects: ObjectState[],
+  ) {
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new BufferAttribute(mesh.positions, 3));
     geometry.setIndex(new BufferAttribute(mesh.triangles, 1));
@@ -30,7 +52,16 @@ export class Placing {
     geometry.boundingBox!.getCenter(this.centre);
     const extents = geometry.boundingBox!.getSize(new Vector3());
     this.extent = Math.max(...extents.toArray()) || 1;
-    this.preview = new Mesh(geometry, new MeshStandardMaterial({ color: "#9c6ade", flatShading: true, side: DoubleSide, transparent: true, opacity: 0.7 }));
+    this.preview = new Mesh(
+      geometry,
+      new MeshStandardMaterial({
+        color: "#9c6ade",
+        flatShading: true,
+        side: DoubleSide,
+        transparent: true,
+        opacity: 0.7,
+      }),
+    );
     this.preview.matrixAutoUpdate = false;
     this.preview.frustumCulled = false;
 
@@ -41,11 +72,16 @@ export class Placing {
     this.surface.set(NEW_SURFACE, materialsOf(device));
     this.fillWhere(objects);
     this.root.append(
-      el("p", {}, el("strong", {}, name), ` ${countText(mesh.positions.length / 3)} vertices, ${countText(mesh.triangles.length / 3)} triangles`),
+      el(
+        "p",
+        {},
+        el("strong", {}, name),
+        ` ${countText(mesh.positions.length / 3)} vertices, ${countText(mesh.triangles.length / 3)} triangles`,
+      ),
       field("As", this.where),
       field("Size", this.size, "world units"),
       field("Position", ...this.at),
-      field("Turn", ...this.turn, "degrees"),
+      field("Turn °", ...this.turn),
       this.surface.root,
     );
     this.root.addEventListener("input", () => this.show());
@@ -55,7 +91,12 @@ export class Placing {
 
   placement(): Placement {
     const object = Number(this.where.value);
-    return { object, isNew: this.isNew.has(object), T_world_mesh: this.matrix().toArray(), surface: this.surface.values() };
+    return {
+      object,
+      isNew: this.isNew.has(object),
+      T_world_mesh: this.matrix().toArray(),
+      surface: this.surface.values(),
+    };
   }
 
   end(): void {
@@ -72,14 +113,20 @@ export class Placing {
     const next = free[0] ?? Math.max(-1, ...objects.map((o) => o.id)) + 1;
     if (free.length === 0) this.isNew.add(next);
     this.where.append(el("option", { value: String(next) }, `new object ${next}`));
-    this.where.append(...used.map((o) => el("option", { value: String(o.id) }, `in place of object ${o.id}`)));
+    this.where.append(
+      ...used.map((o) => el("option", { value: String(o.id) }, `in place of object ${o.id}`)),
+    );
   }
 
   private matrix(): Matrix4 {
     const value = (input: HTMLInputElement): number => input.valueAsNumber || 0;
     const [x, y, z] = this.turn.map((t) => MathUtils.degToRad(value(t))) as [number, number, number];
     const scale = Math.max(value(this.size), 1e-9) / this.extent;
-    const T = new Matrix4().compose(new Vector3(...(this.at.map(value) as [number, number, number])), new Quaternion().setFromEuler(new Euler(x, y, z)), new Vector3().setScalar(scale));
+    const T = new Matrix4().compose(
+      new Vector3(...(this.at.map(value) as [number, number, number])),
+      new Quaternion().setFromEuler(new Euler(x, y, z)),
+      new Vector3().setScalar(scale),
+    );
     return T.multiply(new Matrix4().makeTranslation(this.centre.clone().negate()));
   }
 
@@ -95,8 +142,13 @@ function fit(device: DeviceState, extents: Vector3): { centre: Vector3; scale: n
   const min = new Vector3().fromArray(device.workspace_m.min);
   const max = new Vector3().fromArray(device.workspace_m.max);
   const T = new Matrix4().fromArray(device.T_world_device);
-  const room = max.clone().sub(min).multiplyScalar(FILL * T.getMaxScaleOnAxis());
-  const scale = Math.min(...([0, 1, 2] as const).map((i) => room.getComponent(i) / Math.max(extents.getComponent(i), 1e-12)));
+  const room = max
+    .clone()
+    .sub(min)
+    .multiplyScalar(FILL * T.getMaxScaleOnAxis());
+  const scale = Math.min(
+    ...([0, 1, 2] as const).map((i) => room.getComponent(i) / Math.max(extents.getComponent(i), 1e-12)),
+  );
   return { centre: min.add(max).multiplyScalar(0.5).applyMatrix4(T), scale };
 }
 

@@ -16,7 +16,8 @@ const kindOf = (name: string): string => name.split(".").at(-1)!.toLowerCase();
 /** Reads the first mesh file among these; the others may be files that it names. Throws with the file and the reason. */
 export async function readMesh(files: File[]): Promise<{ name: string; mesh: FileMesh }> {
   const file = files.find((f) => KINDS.includes(kindOf(f.name)));
-  if (!file) throw new Error(`${files[0]?.name ?? "That"} is no mesh file: drop an OBJ, STL, PLY, glTF or GLB.`);
+  if (!file)
+    throw new Error(`${files[0]?.name ?? "That"} is no mesh file: drop an OBJ, STL, PLY, glTF or GLB.`);
   try {
     const corners = await cornersOf(file, files);
     check(corners);
@@ -65,7 +66,10 @@ function cornersIn(root: Object3D): Float32Array {
     const position = mesh.geometry.getAttribute("position");
     const count = cornersOfMesh(mesh);
     for (let i = 0; i < count; ++i, at += 3) {
-      point.fromBufferAttribute(position, index ? index.getX(i) : i).applyMatrix4(mesh.matrixWorld).toArray(corners, at);
+      point
+        .fromBufferAttribute(position, index ? index.getX(i) : i)
+        .applyMatrix4(mesh.matrixWorld)
+        .toArray(corners, at);
     }
   }
   return corners;
@@ -74,7 +78,8 @@ function cornersIn(root: Object3D): Float32Array {
 function check(corners: Float32Array): void {
   const triangles = corners.length / 9;
   if (triangles === 0) throw new Error("it has no triangles: a point cloud or lines cannot be touched");
-  if (triangles > MOST_TRIANGLES) throw new Error(`${triangles} triangles, at most ${MOST_TRIANGLES} can be sent at once`);
+  if (triangles > MOST_TRIANGLES)
+    throw new Error(`${triangles} triangles, at most ${MOST_TRIANGLES} can be sent at once`);
   const bad = corners.findIndex((x) => !Number.isFinite(x));
   if (bad >= 0) throw new Error(`a corner of triangle ${Math.floor(bad / 9)} is not a number`);
 }

@@ -14,10 +14,16 @@ export interface Placement {
 }
 
 /** Sends it; calls back with the share that has left. Throws when the connection goes. */
-export async function upload(link: Link, mesh: FileMesh, to: Placement, onShare: (share: number) => void): Promise<void> {
+export async function upload(
+  link: Link,
+  mesh: FileMesh,
+  to: Placement,
+  onShare: (share: number) => void,
+): Promise<void> {
   const { object } = to;
   const send = (...messages: wire.Outgoing[]): void => {
-    if (!link.send(...messages)) throw new Error("the connection was lost; nothing of the mesh is in the server");
+    if (!link.send(...messages))
+      throw new Error("the connection was lost; nothing of the mesh is in the server");
   };
   send(wire.batchBegin(), ...(to.isNew ? [wire.setObjectNumber(object + 1)] : [wire.clearTrimesh(object)]));
   send(wire.setTransformMatrix(object, to.T_world_mesh), wire.setObjectIsTouchable(object, true));
@@ -32,9 +38,14 @@ export async function upload(link: Link, mesh: FileMesh, to: Placement, onShare:
       await new Promise((resolve) => setTimeout(resolve, 0)); // the page stays alive meanwhile
     }
   };
-  for (let i = 0; i < mesh.positions.length; i += step) await part(i, wire.meshVertices(object, i / 3, mesh.positions.subarray(i, i + step)), i);
+  for (let i = 0; i < mesh.positions.length; i += step)
+    await part(i, wire.meshVertices(object, i / 3, mesh.positions.subarray(i, i + step)), i);
   for (let i = 0; i < mesh.triangles.length; i += step) {
-    await part(i, wire.meshTriangles(object, i / 3, mesh.triangles.subarray(i, i + step)), mesh.positions.length + i);
+    await part(
+      i,
+      wire.meshTriangles(object, i / 3, mesh.triangles.subarray(i, i + step)),
+      mesh.positions.length + i,
+    );
   }
   send(wire.batchCommit());
   while (link.waiting > 0) await new Promise((resolve) => setTimeout(resolve, 20));

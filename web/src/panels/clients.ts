@@ -23,11 +23,20 @@ class ClientRow {
 
 export class ClientsPanel {
   private readonly body = el("tbody");
-  private readonly rows = new Rows<ClientState, ClientRow>(this.body, (c) => c.id, () => new ClientRow(), 30);
+  private readonly rows = new Rows<ClientState, ClientRow>(
+    this.body,
+    (c) => c.id,
+    () => new ClientRow(),
+    30,
+  );
   private readonly more = el("p", { className: "quiet" });
 
   constructor(parent: HTMLElement) {
-    const head = el("tr", {}, ...["Id", "Connection", "Rate", "Dropped", "Waiting"].map((name) => el("th", { scope: "col" }, name)));
+    const head = el(
+      "tr",
+      {},
+      ...["Id", "Connection", "Rate", "Dropped", "Waiting"].map((name) => el("th", { scope: "col" }, name)),
+    );
     parent.append(el("table", {}, el("thead", {}, head), this.body), this.more);
   }
 

@@ -1,8 +1,14 @@
 // Small helpers over the DOM: elements in one line, and text that is only written when it has changed.
 
-type Props<K extends keyof HTMLElementTagNameMap> = Partial<Omit<HTMLElementTagNameMap[K], "dataset" | "style">> & { data?: Record<string, string> };
+type Props<K extends keyof HTMLElementTagNameMap> = Partial<
+  Omit<HTMLElementTagNameMap[K], "dataset" | "style">
+> & { data?: Record<string, string> };
 
-export function el<K extends keyof HTMLElementTagNameMap>(tag: K, props: Props<K> = {}, ...children: (Node | string)[]): HTMLElementTagNameMap[K] {
+export function el<K extends keyof HTMLElementTagNameMap>(
+  tag: K,
+  props: Props<K> = {},
+  ...children: (Node | string)[]
+): HTMLElementTagNameMap[K] {
   const { data, ...rest } = props;
   const element = document.createElement(tag);
   Object.assign(element, rest);
@@ -45,7 +51,8 @@ export class Rows<Item, Row extends { root: HTMLElement; update(item: Item): voi
       const id = this.idOf(item);
       let row = this.rows.get(id);
       if (!row) this.rows.set(id, (row = this.make(item)));
-      if (this.parent.children[i] !== row.root) this.parent.insertBefore(row.root, this.parent.children[i] ?? null);
+      if (this.parent.children[i] !== row.root)
+        this.parent.insertBefore(row.root, this.parent.children[i] ?? null);
       row.update(item);
     });
   }

@@ -22,8 +22,20 @@ class EffectRow {
 
   constructor(e: EffectState, send: Send) {
     this.active.ariaLabel = `Effect ${e.index} is on`;
-    this.active.addEventListener("change", () => send(this.active.checked ? startEffect(e.index) : stopEffect(e.index)));
-    this.root = el("li", { data: { effect: String(e.index) } }, el("div", { className: "row" }, el("strong", {}, `Effect ${e.index}`), this.facts, el("label", { className: "switch" }, this.active, "on")));
+    this.active.addEventListener("change", () =>
+      send(this.active.checked ? startEffect(e.index) : stopEffect(e.index)),
+    );
+    this.root = el(
+      "li",
+      { data: { effect: String(e.index) } },
+      el(
+        "div",
+        { className: "row" },
+        el("strong", {}, `Effect ${e.index}`),
+        this.facts,
+        el("label", { className: "switch" }, this.active, "on"),
+      ),
+    );
   }
 
   update(e: EffectState): void {
@@ -39,8 +51,16 @@ export class EffectsPanel {
   private used: number[] = [];
 
   constructor(parent: HTMLElement, send: Send) {
-    this.rows = new Rows(this.list, (e) => e.index, (e) => new EffectRow(e, send));
-    const type = el("select", { ariaLabel: "Type of the new effect" }, ...Object.entries(NEW).map(([value, { label }]) => el("option", { value }, label)));
+    this.rows = new Rows(
+      this.list,
+      (e) => e.index,
+      (e) => new EffectRow(e, send),
+    );
+    const type = el(
+      "select",
+      { ariaLabel: "Type of the new effect" },
+      ...Object.entries(NEW).map(([value, { label }]) => el("option", { value }, label)),
+    );
     const add = el("button", { type: "button" }, "Add");
     add.addEventListener("click", () => send(setEffect(this.newEffect(type.value))));
     parent.append(this.list, el("div", { className: "row adder" }, type, add));
@@ -54,7 +74,16 @@ export class EffectsPanel {
   private newEffect(type: string): Effect {
     let index = 0;
     while (this.used.includes(index)) ++index;
-    const none: Effect = { type, index, gain: 0, magnitude_N: 0, duration_ms: 0, frequency: 0, position: [0, 0, 0], direction: [0, 0, 0] };
+    const none: Effect = {
+      type,
+      index,
+      gain: 0,
+      magnitude_N: 0,
+      duration_ms: 0,
+      frequency: 0,
+      position: [0, 0, 0],
+      direction: [0, 0, 0],
+    };
     return { ...none, ...NEW[type]!.effect };
   }
 }

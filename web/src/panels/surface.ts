@@ -11,7 +11,8 @@ export interface Materials {
 }
 const REFERENCE: Materials = { stiffness_N_per_m: 500, damping_Ns_per_m: 2, popthrough_N: 3.3 };
 
-export const materialsOf = (device: DeviceState & { material_one?: Materials }): Materials => device.material_one ?? REFERENCE;
+export const materialsOf = (device: DeviceState & { material_one?: Materials }): Materials =>
+  device.material_one ?? REFERENCE;
 
 interface Slider {
   property: SurfaceProperty;
@@ -22,11 +23,36 @@ interface Slider {
 }
 
 const SLIDERS: Slider[] = [
-  { property: "stiffness", label: "Stiffness", share: (o, m) => o.stiffness_N_per_m / m.stiffness_N_per_m, text: (v, m) => `${(v * m.stiffness_N_per_m).toFixed(0)} N/m` },
-  { property: "damping", label: "Damping", share: (o, m) => o.damping_Ns_per_m / m.damping_Ns_per_m, text: (v, m) => `${(v * m.damping_Ns_per_m).toFixed(2)} N s/m` },
-  { property: "static friction", label: "Static friction", share: (o) => o.static_friction, text: (v) => v.toFixed(2) },
-  { property: "dynamic friction", label: "Dynamic friction", share: (o) => o.dynamic_friction, text: (v) => v.toFixed(2) },
-  { property: "popthrough", label: "Popthrough", share: (o, m) => o.popthrough / m.popthrough_N, text: (v, m) => (v === 0 ? "never" : `${(v * m.popthrough_N).toFixed(2)} N`) },
+  {
+    property: "stiffness",
+    label: "Stiffness",
+    share: (o, m) => o.stiffness_N_per_m / m.stiffness_N_per_m,
+    text: (v, m) => `${(v * m.stiffness_N_per_m).toFixed(0)} N/m`,
+  },
+  {
+    property: "damping",
+    label: "Damping",
+    share: (o, m) => o.damping_Ns_per_m / m.damping_Ns_per_m,
+    text: (v, m) => `${(v * m.damping_Ns_per_m).toFixed(2)} N s/m`,
+  },
+  {
+    property: "static friction",
+    label: "Static friction",
+    share: (o) => o.static_friction,
+    text: (v) => v.toFixed(2),
+  },
+  {
+    property: "dynamic friction",
+    label: "Dynamic friction",
+    share: (o) => o.dynamic_friction,
+    text: (v) => v.toFixed(2),
+  },
+  {
+    property: "popthrough",
+    label: "Popthrough",
+    share: (o, m) => o.popthrough / m.popthrough_N,
+    text: (v, m) => (v === 0 ? "never" : `${(v * m.popthrough_N).toFixed(2)} N`),
+  },
 ];
 
 export class SurfaceForm {

@@ -4,7 +4,9 @@ import type { Histogram } from "../state_types";
 /** What came between two states of a growing histogram. */
 export function between(before: Histogram | undefined, now: Histogram): [from_us: number, count: number][] {
   const old = new Map(before?.bins);
-  return now.bins.map(([from, count]): [number, number] => [from, count - (old.get(from) ?? 0)]).filter(([, count]) => count > 0);
+  return now.bins
+    .map(([from, count]): [number, number] => [from, count - (old.get(from) ?? 0)])
+    .filter(([, count]) => count > 0);
 }
 
 /** The bin that holds this share of all counts: its lower end; 0 when there are none. */

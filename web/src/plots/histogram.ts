@@ -45,12 +45,29 @@ export class LoopHistogram {
       padding: [6, 10, 0, 0],
       legend: { show: false },
       cursor: { show: false },
-      scales: { x: { time: false, range: (_, min, max) => around(min, max) }, y: { range: (_, __, max) => [0, Math.ceil(max ?? 1)] } },
+      scales: {
+        x: { time: false, range: (_, min, max) => around(min, max) },
+        y: { range: (_, __, max) => [0, Math.ceil(max ?? 1)] },
+      },
       axes: [
         { ...axis(), size: 18, gap: 2, space: 60, values: (_, splits) => splits.map((s) => `${s} µs`) },
-        { ...axis(), size: 38, gap: 2, space: 20, values: (_, splits) => splits.map((s) => (Number.isInteger(s) ? powerText(s) : "")) },
+        {
+          ...axis(),
+          size: 38,
+          gap: 2,
+          space: 20,
+          values: (_, splits) => splits.map((s) => (Number.isInteger(s) ? powerText(s) : "")),
+        },
       ],
-      series: [{}, { stroke: css("--force"), fill: css("--force"), paths: uPlot.paths.bars!({ size: [0.9, 12, 2], align: 1 }), points: { show: false } }],
+      series: [
+        {},
+        {
+          stroke: css("--force"),
+          fill: css("--force"),
+          paths: uPlot.paths.bars!({ size: [0.9, 12, 2], align: 1 }),
+          points: { show: false },
+        },
+      ],
     };
     this.plot = new uPlot(options, this.data(), this.body);
   }

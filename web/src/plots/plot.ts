@@ -20,7 +20,8 @@ export interface PlotOptions {
   decimals: number;
 }
 
-export const css = (name: string): string => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+export const css = (name: string): string =>
+  getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 export function axis(): uPlot.Axis {
   return {
@@ -85,7 +86,11 @@ export class Plot {
     const { clientWidth: width, clientHeight: height } = this.body;
     if (width < 40 || height < 30) return;
     if (this.plot) return this.plot.setSize({ width, height });
-    this.plot = new uPlot(this.uplotOptions(width, height), this.window.data() as unknown as uPlot.AlignedData, this.body);
+    this.plot = new uPlot(
+      this.uplotOptions(width, height),
+      this.window.data() as unknown as uPlot.AlignedData,
+      this.body,
+    );
   }
 
   private uplotOptions(width: number, height: number): uPlot.Options {
@@ -100,16 +105,31 @@ export class Plot {
         x: { time: false, range: (_, __, max) => [(max ?? 0) - seconds, max ?? seconds] },
         y: { range: (_, __, max) => [0, niceEnd(Math.max(max ?? 0, least))] },
       },
-      axes: [{ ...axis(), size: 18, gap: 2, splits: (u) => ago(u, seconds), values: (u, splits) => splits.map((s) => agoText(s - u.scales["x"]!.max!)) }, { ...axis(), size: 38, gap: 2, space: 24 }],
+      axes: [
+        {
+          ...axis(),
+          size: 18,
+          gap: 2,
+          splits: (u) => ago(u, seconds),
+          values: (u, splits) => splits.map((s) => agoText(s - u.scales["x"]!.max!)),
+        },
+        { ...axis(), size: 38, gap: 2, space: 24 },
+      ],
       series: [
         {},
-        ...curves.map((c): uPlot.Series => ({ label: c.label, stroke: css(c.colour), width: 1.5, points: { show: false } })),
+        ...curves.map((c): uPlot.Series => ({
+          label: c.label,
+          stroke: css(c.colour),
+          width: 1.5,
+          points: { show: false },
+        })),
       ],
     };
   }
 }
 
-const ago = (u: uPlot, seconds: number): number[] => [-0.8, -0.4, 0].map((part) => u.scales["x"]!.max! + part * seconds);
+const ago = (u: uPlot, seconds: number): number[] =>
+  [-0.8, -0.4, 0].map((part) => u.scales["x"]!.max! + part * seconds);
 const agoText = (seconds: number): string => (seconds > -0.05 ? "now" : `${seconds.toFixed(0)} s`);
 
 /** A number with one or two digits, not below: scales change seldom. */

@@ -14,7 +14,8 @@ export function rampColour(share: number): Color {
 }
 
 /** The ramp as CSS, for the legend. */
-export const rampCss = (): string => `linear-gradient(to right, ${RAMP.map((c) => `#${c.getHexString()}`).join(", ")})`;
+export const rampCss = (): string =>
+  `linear-gradient(to right, ${RAMP.map((c) => `#${c.getHexString()}`).join(", ")})`;
 
 export function valueOf(o: ObjectState, quantity: Quantity): number {
   return quantity === "stiffness" ? o.stiffness_N_per_m : o.static_friction;

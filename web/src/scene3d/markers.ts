@@ -1,7 +1,22 @@
 // What moves with every tick: hand, proxy, the normals of the contacts, the force; and the box that the device reaches.
 import {
-  BoxGeometry, BufferAttribute, BufferGeometry, ConeGeometry, CylinderGeometry, EdgesGeometry, Group, Line, LineBasicMaterial,
-  LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshStandardMaterial, Quaternion, SphereGeometry, Vector3,
+  BoxGeometry,
+  BufferAttribute,
+  BufferGeometry,
+  ConeGeometry,
+  CylinderGeometry,
+  EdgesGeometry,
+  Group,
+  Line,
+  LineBasicMaterial,
+  LineSegments,
+  Matrix4,
+  Mesh,
+  MeshBasicMaterial,
+  MeshStandardMaterial,
+  Quaternion,
+  SphereGeometry,
+  Vector3,
 } from "three";
 import type { Contact, Tick, Vec3 } from "../wire";
 import type { DeviceState } from "../state_types";
@@ -50,13 +65,22 @@ const coloured = (): MeshStandardMaterial => new MeshStandardMaterial({ roughnes
 
 export class Markers {
   readonly group = new Group();
-  private readonly hand = new Mesh(new SphereGeometry(1, 24, 16), new MeshBasicMaterial({ transparent: true, opacity: 0.65, depthTest: false }));
+  private readonly hand = new Mesh(
+    new SphereGeometry(1, 24, 16),
+    new MeshBasicMaterial({ transparent: true, opacity: 0.65, depthTest: false }),
+  );
   private readonly proxy = new Mesh(new SphereGeometry(1, 24, 16), coloured());
   private readonly force = new Arrow(coloured(), 0.007);
   private readonly normals: Arrow[] = [];
   private readonly normalMaterial = coloured();
-  private readonly spring = new Line(new BufferGeometry().setAttribute("position", new BufferAttribute(new Float32Array(6), 3)), new LineBasicMaterial({ depthTest: false }));
-  private readonly box = new LineSegments(new EdgesGeometry(new BoxGeometry(1, 1, 1)), new LineBasicMaterial({ transparent: true, opacity: 0.8 }));
+  private readonly spring = new Line(
+    new BufferGeometry().setAttribute("position", new BufferAttribute(new Float32Array(6), 3)),
+    new LineBasicMaterial({ depthTest: false }),
+  );
+  private readonly box = new LineSegments(
+    new EdgesGeometry(new BoxGeometry(1, 1, 1)),
+    new LineBasicMaterial({ transparent: true, opacity: 0.8 }),
+  );
   private scale = 1000;
   private size = 100;
   private peak_N = 3.3;
@@ -68,7 +92,8 @@ export class Markers {
     this.spring.frustumCulled = false;
     this.box.matrixAutoUpdate = false;
     this.group.add(this.box, this.spring, this.hand, this.proxy, this.force, ...this.normals);
-    for (const part of [this.spring, this.hand, this.proxy, this.force, ...this.normals]) part.visible = false;
+    for (const part of [this.spring, this.hand, this.proxy, this.force, ...this.normals])
+      part.visible = false;
   }
 
   setColours(colours: MarkerColours): void {
@@ -85,7 +110,11 @@ export class Markers {
     const min = new Vector3().fromArray(device.workspace_m.min);
     const max = new Vector3().fromArray(device.workspace_m.max);
     const T = new Matrix4().fromArray(device.T_world_device);
-    const boxOfUnit = new Matrix4().compose(min.clone().add(max).multiplyScalar(0.5), new Quaternion(), max.clone().sub(min));
+    const boxOfUnit = new Matrix4().compose(
+      min.clone().add(max).multiplyScalar(0.5),
+      new Quaternion(),
+      max.clone().sub(min),
+    );
     this.box.matrix.multiplyMatrices(T, boxOfUnit);
     this.box.matrixWorldNeedsUpdate = true;
     this.scale = device.world_per_reported;
@@ -111,11 +140,21 @@ export class Markers {
     ends.needsUpdate = true;
     const force = new Vector3(...tick.force_N);
     const strength = force.length();
-    this.force.point(proxy, force.divideScalar(strength || 1), strength > 0.005 ? (PEAK_FORCE * this.size * strength) / this.peak_N : 0, this.size);
+    this.force.point(
+      proxy,
+      force.divideScalar(strength || 1),
+      strength > 0.005 ? (PEAK_FORCE * this.size * strength) / this.peak_N : 0,
+      this.size,
+    );
     this.normals.forEach((arrow, i) => {
       const contact = contacts[i];
       const normal = new Vector3(...(contact?.normal ?? [0, 1, 0]));
-      arrow.point(contact ? this.world(contact.point) : proxy, normal, contact ? NORMAL * this.size : 0, this.size);
+      arrow.point(
+        contact ? this.world(contact.point) : proxy,
+        normal,
+        contact ? NORMAL * this.size : 0,
+        this.size,
+      );
     });
   }
 }

@@ -1,5 +1,16 @@
 // The touchable objects: a mesh each, coloured by its surface.
-import { BufferAttribute, BufferGeometry, Color, DoubleSide, Group, Matrix4, Mesh, MeshStandardMaterial, Ray, type Vector3 } from "three";
+import {
+  BufferAttribute,
+  BufferGeometry,
+  Color,
+  DoubleSide,
+  Group,
+  Matrix4,
+  Mesh,
+  MeshStandardMaterial,
+  Ray,
+  type Vector3,
+} from "three";
 import type { DisplayMesh } from "../state";
 import { felt, type ObjectState } from "../state_types";
 import { type Quantity, rampColour, rangeOf, valueOf } from "./colours";
@@ -48,7 +59,12 @@ export class Objects {
     geometry.setAttribute("position", new BufferAttribute(display.positions, 3));
     geometry.setIndex(new BufferAttribute(display.triangles, 1));
     // Flat shading needs no normals, and shows the triangles that are felt.
-    const material = new MeshStandardMaterial({ flatShading: true, roughness: 0.75, metalness: 0, side: DoubleSide });
+    const material = new MeshStandardMaterial({
+      flatShading: true,
+      roughness: 0.75,
+      metalness: 0,
+      side: DoubleSide,
+    });
     const mesh = new Mesh(geometry, material);
     mesh.matrixAutoUpdate = false;
     mesh.frustumCulled = false;

@@ -17,7 +17,10 @@ export class RayMesh {
 
   private fillBox(run: number): void {
     const { positions, triangles } = this.mesh;
-    const box = this.boxes.subarray(6 * run, 6 * run + 6).fill(Infinity, 0, 3).fill(-Infinity, 3);
+    const box = this.boxes
+      .subarray(6 * run, 6 * run + 6)
+      .fill(Infinity, 0, 3)
+      .fill(-Infinity, 3);
     const end = Math.min(triangles.length, 3 * RUN * (run + 1));
     for (let i = 3 * RUN * run; i < end; ++i) {
       for (let axis = 0; axis < 3; ++axis) {
@@ -71,16 +74,28 @@ export class RayMesh {
     const a = 3 * triangles[i]!;
     const b = 3 * triangles[i + 1]!;
     const c = 3 * triangles[i + 2]!;
-    const ax = p[a]!, ay = p[a + 1]!, az = p[a + 2]!;
-    const ux = p[b]! - ax, uy = p[b + 1]! - ay, uz = p[b + 2]! - az;
-    const vx = p[c]! - ax, vy = p[c + 1]! - ay, vz = p[c + 2]! - az;
-    const nx = d.y * vz - d.z * vy, ny = d.z * vx - d.x * vz, nz = d.x * vy - d.y * vx;
+    const ax = p[a]!,
+      ay = p[a + 1]!,
+      az = p[a + 2]!;
+    const ux = p[b]! - ax,
+      uy = p[b + 1]! - ay,
+      uz = p[b + 2]! - az;
+    const vx = p[c]! - ax,
+      vy = p[c + 1]! - ay,
+      vz = p[c + 2]! - az;
+    const nx = d.y * vz - d.z * vy,
+      ny = d.z * vx - d.x * vz,
+      nz = d.x * vy - d.y * vx;
     const det = ux * nx + uy * ny + uz * nz;
     if (det === 0) return Infinity;
-    const sx = o.x - ax, sy = o.y - ay, sz = o.z - az;
+    const sx = o.x - ax,
+      sy = o.y - ay,
+      sz = o.z - az;
     const s = (sx * nx + sy * ny + sz * nz) / det;
     if (s < 0 || s > 1) return Infinity;
-    const qx = sy * uz - sz * uy, qy = sz * ux - sx * uz, qz = sx * uy - sy * ux;
+    const qx = sy * uz - sz * uy,
+      qy = sz * ux - sx * uz,
+      qz = sx * uy - sy * ux;
     const t = (d.x * qx + d.y * qy + d.z * qz) / det;
     if (t < 0 || s + t > 1) return Infinity;
     const distance = (vx * qx + vy * qy + vz * qz) / det;

@@ -1,5 +1,21 @@
 // The 3D view: scene, camera, light; draws when something has changed.
-import { Box3, Color, DirectionalLight, HemisphereLight, MOUSE, PerspectiveCamera, Plane, Ray, Raycaster, Scene, TOUCH, Vector2, Vector3, WebGLRenderer, type Object3D } from "three";
+import {
+  Box3,
+  Color,
+  DirectionalLight,
+  HemisphereLight,
+  MOUSE,
+  PerspectiveCamera,
+  Plane,
+  Ray,
+  Raycaster,
+  Scene,
+  TOUCH,
+  Vector2,
+  Vector3,
+  WebGLRenderer,
+  type Object3D,
+} from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { DeviceState } from "../state_types";
 import { Markers } from "./markers";
@@ -84,7 +100,7 @@ export class View {
     const narrow = Math.min(1, this.camera.aspect);
     const from = axis(2).add(axis(1).multiplyScalar(0.38)).add(axis(0).multiplyScalar(0.45)).normalize();
     this.camera.up.copy(axis(1));
-    this.camera.position.copy(centre).addScaledVector(from, (2.75 * radius) / narrow);
+    this.camera.position.copy(centre).addScaledVector(from, (2.5 * radius) / narrow);
     this.camera.near = radius / 50;
     this.camera.far = radius * 50;
     this.camera.updateProjectionMatrix();

@@ -47,7 +47,8 @@ export class Writer {
     return this;
   }
   bytes(): Uint8Array {
-    if (this.at !== this.view.byteLength) throw new Error(`payload of ${this.view.byteLength} bytes, wrote ${this.at}`);
+    if (this.at !== this.view.byteLength)
+      throw new Error(`payload of ${this.view.byteLength} bytes, wrote ${this.at}`);
     return new Uint8Array(this.view.buffer);
   }
 }

@@ -92,5 +92,7 @@ export class Endpoint {
 }
 
 function described(frame: Frame): string {
-  return new Reader(new DataView(frame.payload.buffer, frame.payload.byteOffset + 4)).text(frame.payload.byteLength - 4);
+  return new Reader(new DataView(frame.payload.buffer, frame.payload.byteOffset + 4)).text(
+    frame.payload.byteLength - 4,
+  );
 }

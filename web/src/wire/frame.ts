@@ -12,7 +12,13 @@ export interface Frame {
 
 const padded = (bytes: number): number => (bytes + 7) & ~7;
 
-export function encodeFrame(time_s: number, sender: number, type: number, sequence: number, payload: Uint8Array): Uint8Array {
+export function encodeFrame(
+  time_s: number,
+  sender: number,
+  type: number,
+  sequence: number,
+  payload: Uint8Array,
+): Uint8Array {
   const length = HEADER_BYTES + payload.length;
   if (length > MOST_BYTES) throw new Error(`a frame of ${length} bytes, at most ${MOST_BYTES}`);
   const bytes = new Uint8Array(padded(length));
@@ -54,7 +60,8 @@ export class FrameStream {
   next(): Frame | undefined {
     if (this.rest.length < 4) return undefined;
     const length = new DataView(this.rest.buffer, this.rest.byteOffset).getUint32(0);
-    if (length < HEADER_BYTES || length > MOST_BYTES) throw new Error(`a frame that says it has ${length} bytes`);
+    if (length < HEADER_BYTES || length > MOST_BYTES)
+      throw new Error(`a frame that says it has ${length} bytes`);
     const bytes = this.take(padded(length));
     if (!bytes) return undefined;
     const view = new DataView(bytes.buffer, bytes.byteOffset, length);

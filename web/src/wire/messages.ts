@@ -30,7 +30,12 @@ export function subscribe(kinds: number, rate_Hz: number): Outgoing {
 
 /** Position in world units; orientation x y z w. */
 export function holdHand(hold: boolean, position: Vec3, orientation: ArrayLike<number>): Outgoing {
-  const payload = new Writer(62).i16(hold ? 1 : 0).f64s(position).f64s(orientation).u32(0).bytes();
+  const payload = new Writer(62)
+    .i16(hold ? 1 : 0)
+    .f64s(position)
+    .f64s(orientation)
+    .u32(0)
+    .bytes();
   return { name: "hapticd Hold_Hand", payload };
 }
 
@@ -56,7 +61,10 @@ export const stopEffect = (index: number): Outgoing => withNumber("stopEffect", 
 
 /** A column-major matrix of 16. */
 export function setTransformMatrix(object: number, matrix: ArrayLike<number>): Outgoing {
-  return { name: "vrpn_ForceDevice setTransformMatrix", payload: new Writer(132).i32(object).f64s(matrix).bytes() };
+  return {
+    name: "vrpn_ForceDevice setTransformMatrix",
+    payload: new Writer(132).i32(object).f64s(matrix).bytes(),
+  };
 }
 
 export type SurfaceProperty = "stiffness" | "damping" | "static friction" | "dynamic friction" | "popthrough";
@@ -67,7 +75,10 @@ export function setHapticProperty(object: number, property: SurfaceProperty, val
 }
 
 export function setObjectIsTouchable(object: number, touchable: boolean): Outgoing {
-  const payload = new Writer(6).i32(object).i16(touchable ? 1 : 0).bytes();
+  const payload = new Writer(6)
+    .i32(object)
+    .i16(touchable ? 1 : 0)
+    .bytes();
   return { name: "vrpn_ForceDevice setObjectIsTouchable", payload };
 }
 
@@ -83,8 +94,16 @@ export interface Effect {
 }
 
 export function setEffect(e: Effect): Outgoing {
-  const writer = new Writer(104).text(e.type, 20).i32(e.index).f64(e.gain).f64(e.magnitude_N).f64(e.duration_ms);
-  return { name: "vrpn_ForceDevice Effect", payload: writer.f64(e.frequency).f64s(e.position).f64s(e.direction).bytes() };
+  const writer = new Writer(104)
+    .text(e.type, 20)
+    .i32(e.index)
+    .f64(e.gain)
+    .f64(e.magnitude_N)
+    .f64(e.duration_ms);
+  return {
+    name: "vrpn_ForceDevice Effect",
+    payload: writer.f64(e.frequency).f64s(e.position).f64s(e.direction).bytes(),
+  };
 }
 
 /** One servo tick. Lengths in world units / 1000. */
@@ -136,7 +155,8 @@ export function decodeContacts(payload: DataView): Contact[] {
   r.i64();
   const count = r.i32() / 10;
   const contacts: Contact[] = [];
-  for (let i = 0; i < count; ++i) contacts.push({ object: r.f64(), point: r.f64x3(), normal: r.f64x3(), force_N: r.f64x3() });
+  for (let i = 0; i < count; ++i)
+    contacts.push({ object: r.f64(), point: r.f64x3(), normal: r.f64x3(), force_N: r.f64x3() });
   return contacts;
 }
 

@@ -1,0 +1,187 @@
+// Debian's Chromium without a screen, and a viewer in it as a user drives one.
+import { mkdtemp, rm } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { packageNamed } from "./bundled.mjs";
+import { pause, until } from "./server.mjs";
+
+const FLAGS = [
+  "--headless",
+  "--no-sandbox",
+  "--use-angle=swiftshader",
+  "--enable-unsafe-swiftshader",
+  "--disable-quic",
+  "--no-first-run",
+  "--disable-background-networking",
+  "--disable-component-update",
+  "--disable-sync",
+];
+
+export async function launch({ size = { width: 1366, height: 768 }, colorScheme = "light" } = {}) {
+  const { chromium } = packageNamed("playwright-core");
+  const folder = await mkdtemp(join(tmpdir(), "hapticd-chromium-"));
+  const executablePath = process.env.HAPTICD_CHROMIUM || "/usr/bin/chromium";
+  const context = await chromium.launchPersistentContext(folder, {
+    executablePath,
+    args: FLAGS,
+    viewport: size,
+    colorScheme,
+    timeout: 120_000,
+  });
+  context.setDefaultTimeout(60_000);
+  const close = async () => {
+    await context.close();
+    await rm(folder, { recursive: true, force: true });
+  };
+  return { context, close };
+}
+
+/** A page with the viewer in it, and everything that a test wants to know of it. */
+export class Viewer {
+  complaints = [];
+  foreign = [];
+
+  static async open(context, url) {
+    const viewer = new Viewer();
+    viewer.page = await context.newPage();
+    viewer.page.on(
+      "console",
+      (m) => ["error", "warning"].includes(m.type()) && viewer.complaints.push(m.text()),
+    );
+    viewer.page.on("pageerror", (error) => viewer.complaints.push(String(error)));
+    viewer.page.on("request", (r) => new URL(r.url()).origin !== url && viewer.foreign.push(r.url()));
+    viewer.page.on(
+      "websocket",
+      (w) => new URL(w.url()).host !== new URL(url).host && viewer.foreign.push(w.url()),
+    );
+    await viewer.page.goto(url);
+    return viewer;
+  }
+
+  /** Something of the page's own object, as the console sees it. */
+  ask(expression) {
+    return this.page.evaluate(expression);
+  }
+  text(selector) {
+    return this.page.locator(selector).innerText();
+  }
+  until(what, ask) {
+    return until(what, ask);
+  }
+
+  async connected() {
+    await this.until("the page is connected and hears ticks", () =>
+      this.ask("viewer.link.state === 'open' && viewer.tick !== undefined"),
+    );
+  }
+
+  /** Until the meshes of the scene are drawn: so many triangles at least. */
+  async showsTriangles(least) {
+    await this.until(`${least} triangles in the view`, () =>
+      this.ask(`viewer.view.objects.triangles >= ${least}`),
+    );
+  }
+
+  /** What the label says. */
+  async force_N() {
+    return Number(await this.text("#force"));
+  }
+
+  /** The newest points of the force plot. */
+  async plottedForces_N(count = 10) {
+    return this.ask(`[...viewer.plots.force.window.data()[1].slice(-${count})]`);
+  }
+
+  /** Until label and plot agree that the force is as asked. */
+  async forceIs(what, ok) {
+    await this.until(
+      `force ${what}; it is ${await this.force_N()} N`,
+      async () => ok(await this.force_N()) && (await this.plottedForces_N()).every(ok),
+    );
+  }
+
+  /** A point of the page below which an object is touchable, near its middle on the screen. */
+  async pointOnObject() {
+    const points = await this.ask(`(() => {
+      const box = viewer.view.canvas.getBoundingClientRect();
+      const points = [];
+      for (let x = box.left + 20; x < box.right - 20; x += 10) for (let y = box.top + 20; y < box.bottom - 60; y += 10) {
+        if (Number.isFinite(viewer.view.objects.distance(viewer.view.rayAt(x, y)))) points.push({ x, y });
+      }
+      return points;
+    })()`);
+    if (points.length === 0) throw new Error("no object to touch in the view");
+    const middle = (key) => points.reduce((sum, p) => sum + p[key], 0) / points.length;
+    const [x, y] = [middle("x"), middle("y")];
+    return points.reduce((best, p) =>
+      Math.hypot(p.x - x, p.y - y) < Math.hypot(best.x - x, best.y - y) ? p : best,
+    );
+  }
+
+  /** A point of the view with nothing below it, and within reach of the hand. */
+  async pointBeside() {
+    const inside = await this.ask(`viewer.view.pageOf(viewer.view.markers.group.children[0].position.clone()
+      .set(0.9 * 0.08, 0.9 * 0.06, 0).multiplyScalar(1000))`);
+    return inside;
+  }
+
+  async press(point) {
+    await this.page.mouse.move(point.x, point.y);
+    await this.page.mouse.down();
+  }
+  async dragTo(point, steps = 12) {
+    await this.page.mouse.move(point.x, point.y, { steps });
+  }
+  async release() {
+    await this.page.mouse.up();
+  }
+
+  /** Holds the hand still beside the objects, in the air. */
+  async holdInAir() {
+    await this.press(await this.pointBeside());
+    await this.release();
+    await this.until("the hand is in the air", () =>
+      this.ask(
+        "viewer.hand.held && viewer.tick.object === -1 && Math.hypot(...viewer.tick.velocity) < 0.002",
+      ),
+    );
+  }
+
+  async letGo() {
+    await this.page.keyboard.press("l");
+    await this.until("the hand is free", async () => !(await this.ask("viewer.hand.held")));
+  }
+
+  /** Drops files onto the page: names and contents. */
+  async drop(files) {
+    await this.page.evaluate((list) => {
+      const data = new DataTransfer();
+      for (const [name, content] of list) data.items.add(new File([content], name));
+      document.body.dispatchEvent(
+        new DragEvent("drop", { dataTransfer: data, bubbles: true, cancelable: true }),
+      );
+    }, Object.entries(files));
+  }
+
+  /** Colours of the drawn scene at points of the page, each r, g, b. */
+  async pixels(points) {
+    return this.page.evaluate((at) => {
+      const { view } = globalThis.viewer;
+      const box = view.canvas.getBoundingClientRect();
+      const copy = document.createElement("canvas");
+      copy.width = box.width;
+      copy.height = box.height;
+      const context = copy.getContext("2d");
+      view.invalidate();
+      view.draw();
+      context.drawImage(view.canvas, 0, 0, copy.width, copy.height); // in the same task: the picture is still there
+      return at.map(({ x, y }) =>
+        [...context.getImageData(x - box.left, y - box.top, 1, 1).data].slice(0, 3),
+      );
+    }, points);
+  }
+
+  async settle(ms = 600) {
+    await pause(ms);
+  }
+}

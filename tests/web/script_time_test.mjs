@@ -1,0 +1,128 @@
+// A million triangles in the server: the page shows at most 100,000 of them, and its script takes at most 4 ms a frame.
+// Time of the processor, from the browser's own trace: neither what other programs take nor the software's painting counts.
+//   node script_time_test.mjs HAPTICD
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { launch, Viewer } from "./browser.mjs";
+import { pause, Server, until } from "./server.mjs";
+
+const RINGS = 500;
+const AROUND = 1000;
+const MOST_SHOWN = 100_000;
+const MOST_MS = 4;
+const FRAMES = 200;
+
+/** A ball of 50 mm with bumps: two triangles for each of RINGS * AROUND squares. */
+function ball() {
+  const positions = new Float32Array(3 * (RINGS + 1) * AROUND);
+  const triangles = new Uint32Array(6 * RINGS * AROUND);
+  for (let i = 0; i <= RINGS; ++i) {
+    for (let j = 0; j < AROUND; ++j) {
+      const [v, u] = [(Math.PI * i) / RINGS, (2 * Math.PI * j) / AROUND];
+      const r = 25 + 0.5 * Math.sin(12 * u) * Math.sin(9 * v);
+      positions.set(
+        [r * Math.sin(v) * Math.cos(u), r * Math.cos(v), r * Math.sin(v) * Math.sin(u)],
+        3 * (i * AROUND + j),
+      );
+      if (i === RINGS) continue;
+      const [a, b] = [i * AROUND + j, i * AROUND + ((j + 1) % AROUND)];
+      triangles.set([a, b, a + AROUND, b, b + AROUND, a + AROUND], 6 * (i * AROUND + j));
+    }
+  }
+  return { positions, triangles };
+}
+
+function send({ wire, say }, { positions, triangles }) {
+  const step = 3 * wire.MOST_IN_ONE_MESSAGE;
+  say(wire.batchBegin(), wire.setHapticProperty(0, "stiffness", 0.8));
+  for (let i = 0; i < positions.length; i += step)
+    say(wire.meshVertices(0, i / 3, positions.subarray(i, i + step)));
+  for (let i = 0; i < triangles.length; i += step)
+    say(wire.meshTriangles(0, i / 3, triangles.subarray(i, i + step)));
+  say(wire.batchCommit());
+}
+
+/** The page's script in each frame, ms of processor time: calls of its functions between one animation frame and the next. */
+function scriptPerFrame(events) {
+  const main = events
+    .filter((e) => e.ph === "X" && e.name === "FireAnimationFrame")
+    .map((e) => `${e.pid}/${e.tid}`);
+  const thread = main[Math.floor(main.length / 2)];
+  const own = events
+    .filter((e) => e.ph === "X" && `${e.pid}/${e.tid}` === thread)
+    .sort((a, b) => a.ts - b.ts || b.dur - a.dur);
+  const frames = [];
+  let outermostEnd = -Infinity;
+  for (const e of own) {
+    if (e.name === "FireAnimationFrame") frames.push(0);
+    if (
+      !["FunctionCall", "EvaluateScript", "RunMicrotasks"].includes(e.name) ||
+      e.ts < outermostEnd ||
+      frames.length === 0
+    )
+      continue;
+    outermostEnd = e.ts + e.dur;
+    frames[frames.length - 1] += e.tdur / 1000;
+  }
+  return frames.slice(0, -1);
+}
+
+test("a million triangles, 4 ms", async () => {
+  const hapticd = process.argv[2];
+  const server = await Server.start(hapticd);
+  const browser = await launch();
+  try {
+    const client = await server.client();
+    send(client, ball());
+    const triangles = 2 * RINGS * AROUND;
+    await until(
+      "the ball in the server",
+      async () => (await server.state()).scenes[0].objects[0].triangles === triangles,
+      120_000,
+    );
+    const viewer = await Viewer.open(browser.context, server.url);
+    await viewer.connected();
+    await until("the ball in the view", () => viewer.ask("viewer.view.objects.triangles > 0"), 120_000);
+    const shown = await viewer.ask("viewer.view.objects.triangles");
+    assert.ok(shown > MOST_SHOWN / 2 && shown <= MOST_SHOWN, `${shown} triangles shown`);
+
+    const on = await viewer.pointOnObject();
+    await viewer.press(on);
+    await viewer.forceIs("of the ball", (force_N) => force_N > 0.1);
+    const trace = await traced(viewer.page, async () => {
+      const begun = await viewer.ask("viewer.frames");
+      for (let i = 0; (await viewer.ask("viewer.frames")) < begun + FRAMES; ++i) {
+        await viewer.page.mouse.move(on.x + 40 * Math.cos(i / 9), on.y + 40 * Math.sin(i / 9));
+        await pause(15);
+      }
+    });
+    const frames = scriptPerFrame(trace).sort((a, b) => a - b);
+    const at = (share) => frames[Math.floor(share * (frames.length - 1))];
+    console.log(
+      `${shown} triangles shown; script in ${frames.length} frames: p50 ${at(0.5).toFixed(2)} ms, p95 ${at(0.95).toFixed(2)} ms, max ${at(1).toFixed(2)} ms`,
+    );
+    assert.ok(frames.length > FRAMES / 2, `${frames.length} frames in the trace`);
+    assert.ok(at(0.5) > 0.02, "a page that does nothing was measured");
+    assert.ok(at(0.95) <= MOST_MS, `${at(0.95)} ms`);
+    client.close();
+  } finally {
+    await browser.close();
+    await server.stop();
+  }
+});
+
+/** The browser's trace of what `run` does. */
+async function traced(page, run) {
+  const session = await page.context().newCDPSession(page);
+  const events = [];
+  session.on("Tracing.dataCollected", ({ value }) => events.push(...value));
+  const complete = new Promise((resolve) => session.once("Tracing.tracingComplete", resolve));
+  await session.send("Tracing.start", {
+    transferMode: "ReportEvents",
+    traceConfig: { includedCategories: ["devtools.timeline", "v8"], excludedCategories: ["*"] },
+  });
+  await run();
+  await session.send("Tracing.end");
+  await complete;
+  return events;
+}

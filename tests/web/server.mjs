@@ -1,0 +1,88 @@
+// A real `hapticd serve` on free ports, and what a test says to it from outside the page.
+import { execFile, spawn } from "node:child_process";
+import { createConnection } from "node:net";
+import { promisify } from "node:util";
+import { bundled } from "./bundled.mjs";
+
+const START_MS = 60_000;
+
+export const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+
+/** Waits until `ask` gives something; the machine may be slow, so the deadline is long. */
+export async function until(what, ask, deadline_ms = 30_000) {
+  const end = Date.now() + deadline_ms;
+  let last;
+  do {
+    last = await ask();
+    if (last) return last;
+    await pause(50);
+  } while (Date.now() < end);
+  throw new Error(`waited ${deadline_ms / 1000} s in vain for: ${what}`);
+}
+
+export class Server {
+  log = "";
+
+  static async start(hapticd, { http = "127.0.0.1:0", more = [] } = {}) {
+    const server = new Server();
+    server.hapticd = hapticd;
+    server.process = spawn(hapticd, [
+      "serve",
+      "--listen",
+      "127.0.0.1:0",
+      "--http",
+      http,
+      "--allow-no-rt",
+      ...more,
+    ]);
+    for (const stream of [server.process.stdout, server.process.stderr])
+      stream.on("data", (text) => (server.log += text));
+    server.ended = new Promise((resolve) => server.process.on("exit", resolve));
+    const found = (pattern) =>
+      until(`${pattern} in the server's log:\n${server.log}`, () => pattern.exec(server.log)?.[1], START_MS);
+    server.vrpn = await found(/listening on ([0-9.]+:[0-9]+)/);
+    server.url = await found(/(http:\/\/[0-9.]+:[0-9]+)/);
+    return server;
+  }
+
+  async stop() {
+    this.process.kill("SIGTERM");
+    await this.ended;
+  }
+
+  /** Sends a mesh as the program's own client does; replaces the scene. */
+  async touch(mesh) {
+    await promisify(execFile)(this.hapticd, [
+      "touch",
+      mesh,
+      "--server",
+      `Phantom@tcp://${this.vrpn}`,
+      "--seconds",
+      "0.2",
+    ]);
+  }
+
+  async state() {
+    return (await fetch(`${this.url}/api/state`)).json();
+  }
+
+  /** A VRPN client over TCP; `say` sends messages of the page's own wire. */
+  async client() {
+    const wire = await bundled("wire/index.ts");
+    const [host, port] = this.vrpn.split(":");
+    const socket = createConnection({ host, port: Number(port), noDelay: true });
+    const endpoint = new wire.Endpoint(
+      (bytes) => socket.write(bytes),
+      () => {},
+    );
+    socket.on("data", (bytes) => endpoint.feed(Uint8Array.from(bytes)));
+    await new Promise((resolve, reject) => socket.once("connect", resolve).once("error", reject));
+    endpoint.open();
+    await until("the server's cookie", () => endpoint.connected);
+    return {
+      wire,
+      say: (...messages) => messages.forEach((m) => endpoint.send("Phantom", m)),
+      close: () => socket.destroy(),
+    };
+  }
+}

@@ -1,0 +1,283 @@
+// The viewer in a real browser against a real server: what a newcomer does with it.
+//   node viewer_test.mjs HAPTICD [--screenshots DIR]      DIR gets the pictures of docs/viewer.md
+import assert from "node:assert/strict";
+import { createServer, request } from "node:http";
+import { join } from "node:path";
+import { after, test } from "node:test";
+import { launch, Viewer } from "./browser.mjs";
+import { sourceDir } from "./bundled.mjs";
+import { Server, until } from "./server.mjs";
+
+const [hapticd, option, folder] = process.argv.slice(2);
+const pictures = option === "--screenshots" ? folder : undefined;
+
+const server = await Server.start(hapticd);
+const browser = await launch();
+const viewer = await Viewer.open(browser.context, server.url);
+after(async () => {
+  await browser.close();
+  await server.stop();
+});
+
+async function picture(name, of = viewer) {
+  if (!pictures) return;
+  await of.settle(1500);
+  await of.page.screenshot({ path: join(pictures, `viewer_${name}.png`) });
+}
+
+const CUBE =
+  "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n" +
+  "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 2 3 7 6\nf 1 5 8 4\n";
+const pressed = (force_N) => force_N > 0.2;
+const zero = (force_N) => force_N < 0.005;
+
+test("an empty scene says how to load one", async () => {
+  await viewer.connected();
+  await viewer.until(
+    "the notice",
+    async () => (await viewer.ask("document.querySelector('#notice').dataset.notice")) === "empty",
+  );
+  assert.match(await viewer.text("#notice-text"), /Drop a mesh/);
+  await picture("empty");
+});
+
+test("the scene appears", async () => {
+  await server.touch(join(sourceDir, "testdata/meshes/bunny.obj"));
+  await viewer.showsTriangles(3674);
+  await viewer.until("the notice is gone", async () => !(await viewer.page.isVisible("#notice")));
+  const on = await viewer.pointOnObject();
+  const box = await viewer.page.locator("#view").boundingBox();
+  const corner = { x: box.x + 5, y: box.y + 0.6 * box.height };
+  const [stiff, ground] = await viewer.pixels([on, corner]);
+  assert.deepEqual(ground, [0xe9, 0xec, 0xf0]);
+  assert.ok(stiff[0] > stiff[2] + 40, `400 of 500 N/m is yellow, not ${stiff}`);
+  await viewer.page.selectOption("#quantity", "friction");
+  const [rough] = await viewer.pixels([on]);
+  assert.ok(rough[2] > rough[0] + 20, `a friction of 0.3 is blue, not ${rough}`);
+  await viewer.page.selectOption("#quantity", "stiffness");
+});
+
+test("dragging the hand over the bunny raises the force", async () => {
+  await viewer.holdInAir();
+  await viewer.forceIs("zero in the air", zero);
+  const on = await viewer.pointOnObject();
+  await viewer.press(on);
+  await viewer.forceIs("there where the pointer presses", pressed);
+  await viewer.dragTo({ x: on.x - 60, y: on.y - 25 }, 30);
+  await viewer.forceIs("there after a stroke", pressed);
+  assert.equal(await viewer.text("#touching"), "object 0");
+  const before = await viewer.force_N();
+  for (let i = 0; i < 6; ++i) await viewer.page.mouse.wheel(0, -100);
+  await viewer.forceIs("larger after the wheel", (force_N) => force_N > before + 0.1);
+  await viewer.until("the object is marked in the list", () =>
+    viewer.ask("document.querySelector('[data-object=\"0\"]').dataset.touched === 'true'"),
+  );
+  await picture("hand");
+});
+
+test("escape brings the force to zero, re-arm brings it back", async () => {
+  await viewer.page.keyboard.press("Escape");
+  await viewer.forceIs("zero after Escape", zero);
+  await viewer.until("the guard's words", async () =>
+    (await viewer.text("#guard")).includes("Stopped: no force until it is re-armed"),
+  );
+  assert.ok((await server.state()).devices[0].guard.stopped);
+  await picture("stopped");
+  await viewer.page.click("#rearm");
+  await viewer.forceIs("back after re-arm", pressed);
+  await viewer.page.click("#stop");
+  await viewer.forceIs("zero after the button", zero);
+  await viewer.page.click("#rearm");
+  await viewer.forceIs("back again", pressed);
+});
+
+test("an object that is switched off is not felt", async () => {
+  const touchable = viewer.page.getByLabel("Object 0 is touchable");
+  await touchable.uncheck();
+  await viewer.forceIs("zero when the object is not touchable", zero);
+  await touchable.check();
+  await viewer.release();
+  await viewer.letGo();
+});
+
+test("a slider changes the surface", async () => {
+  await viewer.page.locator("[data-object='0'] summary").click();
+  const slider = viewer.page.locator("[data-object='0'] input[name='stiffness']");
+  await slider.fill("0.4");
+  await until("200 N/m", async () => (await server.state()).scenes[0].objects[0].stiffness_N_per_m === 200);
+  await slider.fill("0.8");
+  await until("400 N/m", async () => (await server.state()).scenes[0].objects[0].stiffness_N_per_m === 400);
+  await picture("surface");
+  await viewer.page.locator("[data-object='0'] summary").click();
+});
+
+test("switching an effect changes the force", async () => {
+  await viewer.page.locator("#effects").getByRole("button", { name: "Add" }).click();
+  const active = viewer.page.getByLabel("Effect 0 is on");
+  await active.waitFor();
+  await viewer.holdInAir();
+  await viewer.forceIs("zero before the effect", zero);
+  await active.check();
+  await viewer.forceIs("1 N", (force_N) => Math.abs(force_N - 1) < 0.02);
+  const [x, y, z] = await viewer.ask("viewer.tick.force_N");
+  assert.ok(y > 0.98 && Math.hypot(x, z) < 0.05, `up, not ${[x, y, z]}`);
+  await picture("effect");
+  await active.uncheck();
+  await viewer.forceIs("zero after the effect", zero);
+  await viewer.letGo();
+});
+
+test("a mesh that is dropped can be touched", async () => {
+  await viewer.drop({ "cube.obj": CUBE });
+  await viewer.page.getByLabel("Which object it becomes").selectOption({ label: "in place of object 0" });
+  await viewer.page.getByLabel("Largest extent").fill("40");
+  await picture("drop");
+  await viewer.page.getByRole("button", { name: "Load it into the scene" }).click();
+  await until(
+    "the cube in the server",
+    async () => (await server.state()).scenes[0].objects[0].triangles === 12,
+  );
+  await viewer.until("12 triangles in the view", () => viewer.ask("viewer.view.objects.triangles === 12"));
+  await viewer.until("words", async () =>
+    /cube.obj is object 0: 12 triangles/.test(await viewer.text("#drop-panel")),
+  );
+  await viewer.holdInAir();
+  await viewer.press(await viewer.pointOnObject());
+  await viewer.forceIs("of the cube", pressed);
+  const [object, hand] = await viewer.ask("[viewer.tick.object, viewer.tick.proxy]");
+  assert.equal(object, 0);
+  assert.ok(
+    Math.abs(Math.max(...hand.map(Math.abs)) - 0.02) < 0.001,
+    `on a face of the cube of 40 mm, not at ${hand}`,
+  );
+  await viewer.release();
+  await viewer.letGo();
+});
+
+test("a file that is no mesh is refused by name", async () => {
+  await viewer.drop({ "notes.txt": "hello" });
+  await viewer.until("the refusal", async () =>
+    /notes\.txt is no mesh file: drop an OBJ, STL, PLY/.test(await viewer.text("#drop-panel")),
+  );
+  await viewer.drop({ "broken.obj": "v 0 0 0\n" });
+  await viewer.until("the refusal", async () =>
+    /broken\.obj: it has no triangles/.test(await viewer.text("#drop-panel")),
+  );
+});
+
+test("one viewer holds the hand, another one watches", async () => {
+  const other = await Viewer.open(browser.context, server.url);
+  await other.connected();
+  await other.showsTriangles(12);
+  await viewer.page.bringToFront();
+  await viewer.press(await viewer.pointOnObject());
+  await viewer.forceIs("while the first holds", pressed);
+  await viewer.release();
+  const [, holder] = [
+    await other.page.bringToFront(),
+    await until("a holder", async () => (await server.state()).devices[0].held_by),
+  ];
+  await other.until(
+    "who holds it",
+    async () => (await other.text("#hand-says")) === `Client ${holder} holds the hand.`,
+  );
+  await other.forceIs("seen by the watcher", pressed);
+  await other.press(await other.pointOnObject());
+  await other.until("the refusal", async () => (await other.text("#toasts")).includes("Hold_Hand refused"));
+  await other.release();
+  assert.equal(await other.ask("viewer.hand.held"), false);
+  assert.equal((await server.state()).devices[0].held_by, holder);
+  await viewer.page.bringToFront();
+  await viewer.letGo();
+  await other.page.bringToFront();
+  await other.press(await other.pointOnObject());
+  await until(
+    "the other one holds it",
+    async () => ![null, holder].includes((await server.state()).devices[0].held_by),
+  );
+  await other.release();
+  assert.deepEqual(other.complaints, []);
+  await other.page.close();
+  await until(
+    "a page that is closed lets go",
+    async () => (await server.state()).devices[0].held_by === null,
+  );
+  await viewer.page.bringToFront();
+});
+
+test("light, dark, and by keyboard alone", async () => {
+  await viewer.page.click("#theme");
+  assert.equal(await viewer.ask("document.documentElement.dataset.theme"), "dark");
+  await server.touch(join(sourceDir, "testdata/meshes/bunny.obj"));
+  await viewer.showsTriangles(3674);
+  await viewer.page.focus("#view");
+  await viewer.page.keyboard.press("ArrowUp");
+  await viewer.until("the hand is held", () => viewer.ask("viewer.hand.held"));
+  await viewer.letGo();
+  await viewer.press(await viewer.pointOnObject());
+  await viewer.forceIs("of the bunny", pressed);
+  await picture("dark");
+  await viewer.release();
+  await viewer.letGo();
+  await viewer.page.click("#theme");
+});
+
+/** The status of a request, and its text; fetch would not send these headers. */
+const statusOf = (path, headers) =>
+  new Promise((resolve, reject) =>
+    request(`${server.url}${path}`, { headers }, (r) => resolve(r.resume().statusCode))
+      .on("error", reject)
+      .end(),
+  );
+
+test("a foreign web page does not reach the server", async () => {
+  for (const path of ["/", "/api/state", "/vrpn"]) {
+    assert.equal(await statusOf(path, { Origin: "http://evil.example" }), 403, path);
+    assert.equal(await statusOf(path, { Host: "evil.example" }), 403, path);
+  }
+  assert.equal(await statusOf("/api/state", { Origin: server.url }), 200);
+  const foreign = createServer((_, response) => response.end("<!doctype html><title>foreign</title>")).listen(
+    0,
+    "127.0.0.1",
+  );
+  await new Promise((resolve) => foreign.once("listening", resolve));
+  const page = await browser.context.newPage();
+  await page.goto(`http://127.0.0.1:${foreign.address().port}/`);
+  const outcome = await page.evaluate(async (url) => {
+    const read = await fetch(`${url}/api/state`).then(
+      () => "read",
+      () => "refused",
+    );
+    const opened = await new Promise((resolve) => {
+      const socket = new WebSocket(`${url.replace("http", "ws")}/vrpn`);
+      socket.onopen = () => resolve("opened");
+      socket.onerror = () => resolve("refused");
+    });
+    return [read, opened];
+  }, server.url);
+  assert.deepEqual(outcome, ["refused", "refused"]);
+  await page.close();
+  foreign.close();
+});
+
+test("no word in the console, no request elsewhere", () => {
+  assert.deepEqual(viewer.complaints, []);
+  assert.deepEqual(viewer.foreign, []);
+});
+
+test("a server that goes and comes back", async () => {
+  await server.stop();
+  await viewer.until(
+    "the notice",
+    async () => (await viewer.ask("document.querySelector('#notice').dataset.notice")) === "lost",
+  );
+  assert.match(await viewer.text("#notice-text"), /connects again by itself/);
+  await picture("lost");
+  const again = await Server.start(hapticd, { http: new URL(server.url).host });
+  await viewer.until("connected again", () => viewer.ask("viewer.link.state === 'open'"));
+  await viewer.until(
+    "an empty scene",
+    async () => (await viewer.ask("document.querySelector('#notice').dataset.notice")) === "empty",
+  );
+  await again.stop();
+});
