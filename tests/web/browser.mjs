@@ -100,22 +100,22 @@ export class Viewer {
     );
   }
 
-  /** A point of the page below which an object is touchable, near its middle on the screen. */
-  async pointOnObject() {
+  /** A point of the page well inside an object, nearest to its middle on the screen or to so far from there. */
+  async pointOnObject(right = 0, down = 0) {
     const points = await this.ask(`(() => {
       const box = viewer.view.canvas.getBoundingClientRect();
+      const on = (x, y) => Number.isFinite(viewer.view.objects.distance(viewer.view.rayAt(x, y)));
       const points = [];
       for (let x = box.left + 20; x < box.right - 20; x += 10) for (let y = box.top + 20; y < box.bottom - 60; y += 10) {
-        if (Number.isFinite(viewer.view.objects.distance(viewer.view.rayAt(x, y)))) points.push({ x, y });
+        if (on(x, y) && on(x - 12, y) && on(x + 12, y) && on(x, y - 12) && on(x, y + 12)) points.push({ x, y });
       }
       return points;
     })()`);
     if (points.length === 0) throw new Error("no object to touch in the view");
     const middle = (key) => points.reduce((sum, p) => sum + p[key], 0) / points.length;
-    const [x, y] = [middle("x"), middle("y")];
-    return points.reduce((best, p) =>
-      Math.hypot(p.x - x, p.y - y) < Math.hypot(best.x - x, best.y - y) ? p : best,
-    );
+    const [x, y] = [middle("x") + right, middle("y") + down];
+    const away = (p) => Math.hypot(p.x - x, p.y - y);
+    return points.reduce((best, p) => (away(p) < away(best) ? p : best));
   }
 
   /** A point of the view with nothing below it, and within reach of the hand. */
@@ -171,7 +171,7 @@ export class Viewer {
       const copy = document.createElement("canvas");
       copy.width = box.width;
       copy.height = box.height;
-      const context = copy.getContext("2d");
+      const context = copy.getContext("2d", { willReadFrequently: true });
       view.invalidate();
       view.draw();
       context.drawImage(view.canvas, 0, 0, copy.width, copy.height); // in the same task: the picture is still there

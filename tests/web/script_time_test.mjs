@@ -10,7 +10,9 @@ const RINGS = 500;
 const AROUND = 1000;
 const MOST_SHOWN = 100_000;
 const MOST_MS = 4;
-const FRAMES = 200;
+const FRAMES = 120;
+const FRAME_US = 16_667;
+const SCRIPT = ["FunctionCall", "EvaluateScript", "RunMicrotasks"];
 
 /** A ball of 50 mm with bumps: two triangles for each of RINGS * AROUND squares. */
 function ball() {
@@ -42,30 +44,30 @@ function send({ wire, say }, { positions, triangles }) {
   say(wire.batchCommit());
 }
 
-/** The page's script in each frame, ms of processor time: calls of its functions between one animation frame and the next. */
-function scriptPerFrame(events) {
-  const main = events
-    .filter((e) => e.ph === "X" && e.name === "FireAnimationFrame")
-    .map((e) => `${e.pid}/${e.tid}`);
-  const thread = main[Math.floor(main.length / 2)];
-  const own = events
-    .filter((e) => e.ph === "X" && `${e.pid}/${e.tid}` === thread)
-    .sort((a, b) => a.ts - b.ts || b.dur - a.dur);
-  const frames = [];
-  let outermostEnd = -Infinity;
+/**
+ * The page's script, in ms of processor time: in the callback of each frame, and in all that comes between, for each time
+ * of a frame. Software draws so few frames that more ticks come between two of them than on any screen.
+ */
+function scriptTimes(events) {
+  const calls = events.filter((e) => e.ph === "X" && e.tdur !== undefined);
+  const drawn = calls.filter((e) => e.name === "FireAnimationFrame");
+  const thread = threadOf(drawn[Math.floor(drawn.length / 2)]);
+  const own = calls.filter((e) => threadOf(e) === thread).sort((a, b) => a.ts - b.ts || b.dur - a.dur);
+  const frames = drawn.filter((e) => threadOf(e) === thread).map((e) => e.tdur / 1000);
+  const between = new Array(Math.ceil((own.at(-1).ts - own[0].ts) / FRAME_US) + 1).fill(0);
+  let end = -Infinity; // of the outermost call
   for (const e of own) {
-    if (e.name === "FireAnimationFrame") frames.push(0);
-    if (
-      !["FunctionCall", "EvaluateScript", "RunMicrotasks"].includes(e.name) ||
-      e.ts < outermostEnd ||
-      frames.length === 0
-    )
-      continue;
-    outermostEnd = e.ts + e.dur;
-    frames[frames.length - 1] += e.tdur / 1000;
+    if (![...SCRIPT, "FireAnimationFrame"].includes(e.name) || e.ts < end) continue;
+    end = e.ts + e.dur;
+    if (e.name !== "FireAnimationFrame") between[Math.floor((e.ts - own[0].ts) / FRAME_US)] += e.tdur / 1000;
   }
-  return frames.slice(0, -1);
+  return { frames, between };
 }
+
+const threadOf = (e) => `${e.pid}/${e.tid}`;
+const quantile = (values, share) =>
+  [...values].sort((a, b) => a - b)[Math.floor(share * (values.length - 1))];
+const inWords = (values) => [0.5, 0.95, 1].map((share) => quantile(values, share).toFixed(2)).join(", ");
 
 test("a million triangles, 4 ms", async () => {
   const hapticd = process.argv[2];
@@ -96,14 +98,15 @@ test("a million triangles, 4 ms", async () => {
         await pause(15);
       }
     });
-    const frames = scriptPerFrame(trace).sort((a, b) => a - b);
-    const at = (share) => frames[Math.floor(share * (frames.length - 1))];
+    const { frames, between } = scriptTimes(trace);
     console.log(
-      `${shown} triangles shown; script in ${frames.length} frames: p50 ${at(0.5).toFixed(2)} ms, p95 ${at(0.95).toFixed(2)} ms, max ${at(1).toFixed(2)} ms`,
+      `${shown} triangles shown; p50, p95 and max of the script, ms: in ${frames.length} frames ${inWords(frames)}`,
     );
+    console.log(`between them, in each ${FRAME_US / 1000} ms: ${inWords(between)}`);
     assert.ok(frames.length > FRAMES / 2, `${frames.length} frames in the trace`);
-    assert.ok(at(0.5) > 0.02, "a page that does nothing was measured");
-    assert.ok(at(0.95) <= MOST_MS, `${at(0.95)} ms`);
+    assert.ok(quantile(frames, 0.5) > 0.02, "a page that does nothing was measured");
+    const sum = quantile(frames, 0.95) + quantile(between, 0.95);
+    assert.ok(sum <= MOST_MS, `${sum} ms`);
     client.close();
   } finally {
     await browser.close();

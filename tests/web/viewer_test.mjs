@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { createServer, request } from "node:http";
 import { join } from "node:path";
-import { after, test } from "node:test";
+import { after, beforeEach, test } from "node:test";
 import { launch, Viewer } from "./browser.mjs";
 import { sourceDir } from "./bundled.mjs";
 import { Server, until } from "./server.mjs";
@@ -18,6 +18,8 @@ after(async () => {
   await browser.close();
   await server.stop();
 });
+
+beforeEach(() => viewer.release());
 
 async function picture(name, of = viewer) {
   if (!pictures) return;
@@ -63,7 +65,7 @@ test("dragging the hand over the bunny raises the force", async () => {
   const on = await viewer.pointOnObject();
   await viewer.press(on);
   await viewer.forceIs("there where the pointer presses", pressed);
-  await viewer.dragTo({ x: on.x - 60, y: on.y - 25 }, 30);
+  await viewer.dragTo(await viewer.pointOnObject(60, -40), 30);
   await viewer.forceIs("there after a stroke", pressed);
   assert.equal(await viewer.text("#touching"), "object 0");
   const before = await viewer.force_N();
@@ -73,6 +75,8 @@ test("dragging the hand over the bunny raises the force", async () => {
     viewer.ask("document.querySelector('[data-object=\"0\"]').dataset.touched === 'true'"),
   );
   await picture("hand");
+  await viewer.release();
+  await viewer.forceIs("still there: the hand stays where the drag ends", pressed);
 });
 
 test("escape brings the force to zero, re-arm brings it back", async () => {
@@ -96,17 +100,17 @@ test("an object that is switched off is not felt", async () => {
   await touchable.uncheck();
   await viewer.forceIs("zero when the object is not touchable", zero);
   await touchable.check();
-  await viewer.release();
   await viewer.letGo();
 });
 
 test("a slider changes the surface", async () => {
   await viewer.page.locator("[data-object='0'] summary").click();
   const slider = viewer.page.locator("[data-object='0'] input[name='stiffness']");
+  const stiffness = async () => Math.round((await server.state()).scenes[0].objects[0].stiffness_N_per_m);
   await slider.fill("0.4");
-  await until("200 N/m", async () => (await server.state()).scenes[0].objects[0].stiffness_N_per_m === 200);
+  await until("200 N/m", async () => (await stiffness()) === 200);
   await slider.fill("0.8");
-  await until("400 N/m", async () => (await server.state()).scenes[0].objects[0].stiffness_N_per_m === 400);
+  await until("400 N/m", async () => (await stiffness()) === 400);
   await picture("surface");
   await viewer.page.locator("[data-object='0'] summary").click();
 });

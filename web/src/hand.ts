@@ -1,6 +1,7 @@
 // The simulated hand, held by the pointer: a drag over an object strokes it, pressed in a little; a drag beside it, or with the
 // "plane" setting, moves in the plane through the hand that faces the camera. The wheel changes the depth, arrow keys do the same.
 import { Vector3 } from "three";
+import { type Room, wayAround } from "./route";
 import { holdHand, type Outgoing } from "./wire";
 import type { View } from "./scene3d/view";
 
@@ -14,8 +15,7 @@ export interface HandNow {
   orientation: [number, number, number, number];
   /** World units in a millimetre of the device. */
   unit: number;
-  /** Device box: from, to, as a function of a point, the nearest point at its top. */
-  top(point: Vector3): Vector3;
+  room: Room;
 }
 
 const PRESS_MM = 4;
@@ -184,14 +184,11 @@ export class Hand {
     this.touchedNow();
   }
 
-  // With an object between it and the target the hand would get stuck: it goes up and over, and down in front.
   private around(now: HandNow): Vector3[] {
     const { into } = this.view.axes();
-    const back = this.onSurface ? this.press_mm + 2 : 0;
-    const front = this.target.clone().addScaledVector(into, -back * now.unit);
-    if (!this.view.objects.between(now.clear, front)) return [];
-    const before = this.target.clone().addScaledVector(into, this.onSurface ? -30 * now.unit : 0);
-    return [now.top(now.clear), now.top(before), before, front];
+    const back_mm = this.onSurface ? this.press_mm + 2 : 0;
+    const open = this.target.clone().addScaledVector(into, -back_mm * now.unit);
+    return wayAround(now.clear, open, into.negate(), now.room);
   }
 
   private advance(time_ms: number): void {

@@ -1,5 +1,5 @@
 // The page: everything that it shows, and what connects the parts.
-import { Matrix4, Vector3 } from "three";
+import { Box3, Matrix4, Vector3 } from "three";
 import "uplot/dist/uPlot.min.css";
 import "./viewer.css";
 import { DropMesh } from "./drop_mesh";
@@ -270,13 +270,13 @@ class Page {
     const unit = this.unit();
     const clear = this.view.markers.world(tick.proxy);
     for (const contact of this.contacts) clear.addScaledVector(new Vector3(...contact.normal), 2 * unit);
-    const T = new Matrix4().fromArray(device.T_world_device);
-    const top = (point: Vector3): Vector3 => {
-      const local = point.clone().applyMatrix4(T.clone().invert());
-      local.y = device.workspace_m.max[1]!;
-      return local.applyMatrix4(T);
+    const { min, max } = device.workspace_m;
+    const room = {
+      reach: new Box3(new Vector3().fromArray(min), new Vector3().fromArray(max)),
+      T_world_device: new Matrix4().fromArray(device.T_world_device),
+      blocked: (from: Vector3, to: Vector3) => this.view.objects.between(from, to),
     };
-    return { hand: this.view.markers.world(tick.hand), clear, orientation: tick.orientation, unit, top };
+    return { hand: this.view.markers.world(tick.hand), clear, orientation: tick.orientation, unit, room };
   }
 
   private showHand(): void {

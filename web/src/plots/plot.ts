@@ -113,7 +113,7 @@ export class Plot {
           splits: (u) => ago(u, seconds),
           values: (u, splits) => splits.map((s) => agoText(s - u.scales["x"]!.max!)),
         },
-        { ...axis(), size: 38, gap: 2, space: 24 },
+        { ...axis(), size: 38, gap: 2, space: 24, values: (_, splits) => splits.map(shortText) },
       ],
       series: [
         {},
@@ -131,6 +131,9 @@ export class Plot {
 const ago = (u: uPlot, seconds: number): number[] =>
   [-0.8, -0.4, 0].map((part) => u.scales["x"]!.max! + part * seconds);
 const agoText = (seconds: number): string => (seconds > -0.05 ? "now" : `${seconds.toFixed(0)} s`);
+
+const shortText = (value: number): string =>
+  value < 10_000 ? String(Number(value.toPrecision(6))) : `${value / 1000}k`;
 
 /** A number with one or two digits, not below: scales change seldom. */
 function niceEnd(value: number): number {

@@ -33,6 +33,8 @@ export class View {
   private readonly raycaster = new Raycaster();
   private dirty = true;
   private framed = "";
+  /** Where the canvas is on the page: asking for it in each frame would have the page laid out anew. */
+  private at = new DOMRect();
   private device: DeviceState | undefined;
 
   constructor(readonly canvas: HTMLCanvasElement) {
@@ -48,6 +50,10 @@ export class View {
     this.controls.addEventListener("change", () => this.invalidate());
     this.handOnLeft(true);
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement!);
+    document.addEventListener("scroll", () => (this.at = canvas.getBoundingClientRect()), {
+      capture: true,
+      passive: true,
+    });
     this.resize();
   }
 
@@ -111,7 +117,7 @@ export class View {
 
   /** The ray through a point of the page. */
   rayAt(x: number, y: number): Ray {
-    const at = this.canvas.getBoundingClientRect();
+    const { at } = this;
     const share = new Vector2((2 * (x - at.left)) / at.width - 1, 1 - (2 * (y - at.top)) / at.height);
     this.raycaster.setFromCamera(share, this.camera);
     return this.raycaster.ray.clone();
@@ -119,7 +125,7 @@ export class View {
 
   /** Where a point of the world is on the page. */
   pageOf(point: Vector3): { x: number; y: number } {
-    const at = this.canvas.getBoundingClientRect();
+    const { at } = this;
     const p = point.clone().project(this.camera);
     return { x: at.left + ((p.x + 1) / 2) * at.width, y: at.top + ((1 - p.y) / 2) * at.height };
   }
@@ -146,6 +152,7 @@ export class View {
     const { clientWidth: width, clientHeight: height } = this.canvas.parentElement!;
     if (width === 0 || height === 0) return;
     this.renderer.setSize(width, height, false);
+    this.at = this.canvas.getBoundingClientRect();
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
     this.invalidate();
