@@ -102,7 +102,7 @@ export class Viewer {
 
   /** A point of the page well inside an object, nearest to its middle on the screen or to so far from there. */
   async pointOnObject(right = 0, down = 0) {
-    const points = await this.ask(`(() => {
+    const ask = `(() => {
       const box = viewer.view.canvas.getBoundingClientRect();
       const on = (x, y) => Number.isFinite(viewer.view.objects.distance(viewer.view.rayAt(x, y)));
       const points = [];
@@ -110,8 +110,11 @@ export class Viewer {
         if (on(x, y) && on(x - 12, y) && on(x + 12, y) && on(x, y - 12) && on(x, y + 12)) points.push({ x, y });
       }
       return points;
-    })()`);
-    if (points.length === 0) throw new Error("no object to touch in the view");
+    })()`;
+    const points = await this.until("an object to touch in the view", async () => {
+      const found = await this.ask(ask);
+      return found.length > 0 && found;
+    });
     const middle = (key) => points.reduce((sum, p) => sum + p[key], 0) / points.length;
     const [x, y] = [middle("x") + right, middle("y") + down];
     const away = (p) => Math.hypot(p.x - x, p.y - y);

@@ -99,7 +99,11 @@ test("an object that is switched off is not felt", async () => {
   const touchable = viewer.page.getByLabel("Object 0 is touchable");
   await touchable.uncheck();
   await viewer.forceIs("zero when the object is not touchable", zero);
+  await viewer.holdInAir(); // a hand that is inside when the object comes back is held in from inside
   await touchable.check();
+  await viewer.press(await viewer.pointOnObject());
+  await viewer.forceIs("there again", pressed);
+  await viewer.release();
   await viewer.letGo();
 });
 
