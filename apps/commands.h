@@ -31,6 +31,8 @@ void addTouch(CLI::App& app);
 void addStop(CLI::App& app);
 void addWatch(CLI::App& app);
 void addDeviceHost(CLI::App& app);
+void addExport(CLI::App& app);
+void addRecord(CLI::App& app);
 void addRender(CLI::App& app);
 void addReplay(CLI::App& app);
 void addDoctor(CLI::App& app);

@@ -22,6 +22,8 @@ int main(int argc, char** argv) {
   addTouch(app);
   addWatch(app);
   addStop(app);
+  addRecord(app);
+  addExport(app);
   addRender(app);
   addReplay(app);
   addDoctor(app);

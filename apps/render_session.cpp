@@ -15,7 +15,8 @@ void writeFile(const std::string& name, const std::string& text) {
   std::ofstream out(name);
   out << text;
   out.close();
-  if (!out) throw std::runtime_error("cannot write '" + name + "': name a file in a directory that can be written");
+  if (!out)
+    throw std::runtime_error("cannot write '" + name + "': name a file in a directory that can be written");
 }
 
 std::string csv(const std::vector<Difference>& devices) {
@@ -23,8 +24,8 @@ std::string csv(const std::vector<Difference>& devices) {
   char row[200];
   for (const Difference& device : devices) {
     for (const record::DifferencePoint& p : device.points()) {
-      std::snprintf(row, sizeof row, ",%.9f,%.17g,%.17g,%.17g,%.17g\n", p.time_s, p.force_N, p.forceNow_N, p.depth_m,
-                    p.depthNow_m);
+      std::snprintf(row, sizeof row, ",%.9f,%.17g,%.17g,%.17g,%.17g\n", p.time_s, p.force_N, p.forceNow_N,
+                    p.depth_m, p.depthNow_m);
       text += device.device() + row;
     }
   }
@@ -50,7 +51,8 @@ void print(const Difference& d) {
 int renderSession(const SessionRenderOptions& options) {
   std::string remark;
   const std::vector<Difference> devices = record::compare(options.session, options.changes, remark);
-  std::printf("session     %s\nchanged     %s\n", options.session.c_str(), record::inWords(options.changes).c_str());
+  std::printf("session     %s\nchanged     %s\n", options.session.c_str(),
+              record::inWords(options.changes).c_str());
   bool same = true;
   for (const Difference& device : devices) {
     print(device);
@@ -63,9 +65,10 @@ int renderSession(const SessionRenderOptions& options) {
   }
   if (!remark.empty()) std::fprintf(stderr, "hapticd: %s\n", remark.c_str());
   if (same || !options.changes.none()) return 0;
-  std::fprintf(stderr,
-               "hapticd: nothing was changed, and yet the forces differ: the session is of another version or another "
-               "machine, or ticks were lost\n");
+  std::fprintf(
+      stderr,
+      "hapticd: nothing was changed, and yet the forces differ: the session is of another version or another "
+      "machine, or ticks were lost\n");
   return 1;
 }
 

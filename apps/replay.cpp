@@ -60,8 +60,10 @@ void addReplay(CLI::App& app) {
       ->capture_default_str();
   command->add_flag("--loop", options->replay.loop, "From the beginning again, for ever");
   command->add_option("--listen", options->listen, "ADDR:PORT for TCP and UDP [127.0.0.1:3883]");
-  command->add_option("--port", options->port, "The port alone; 0: any free one")->check(CLI::Range(0, 65535));
-  command->add_option("--http", options->http, "ADDR:PORT of the viewer's page, or 'off' [127.0.0.1:8080, if free]");
+  command->add_option("--port", options->port, "The port alone; 0: any free one")
+      ->check(CLI::Range(0, 65535));
+  command->add_option("--http", options->http,
+                      "ADDR:PORT of the viewer's page, or 'off' [127.0.0.1:8080, if free]");
   command->add_option("--seconds", options->seconds, "Stop after this time [until a signal]")
       ->check(within(0.001, kLongest_s));
   command->footer(

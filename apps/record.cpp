@@ -1,0 +1,183 @@
+// hapticd record: what a client can hear of a server, into a file; a client that only listens.
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include "commands.h"
+#include "hapticd/client.h"
+#include "record/export.h"
+#include "record/vrpn_log.h"
+#include "stop_signals.h"
+
+namespace hapticd::apps {
+namespace {
+
+using namespace std::chrono_literals;
+
+struct Options {
+  std::string server;
+  std::string file;
+  double seconds = 0;
+  double rate_Hz = 1000;
+};
+
+geometry::Nanos nanosOf(Time time) {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(time.time_since_epoch()).count();
+}
+
+wire::Time stamp(Time time) {
+  const geometry::Nanos ns = nanosOf(time);
+  return {static_cast<std::uint32_t>(ns / 1'000'000'000),
+          static_cast<std::uint32_t>(ns % 1'000'000'000 / 1000)};
+}
+
+record::Sample sampleOf(const std::string& device, const TickReport& tick) {
+  const auto vec = [](const Vec3& v) { return geometry::Vec3(v[0], v[1], v[2]); };
+  record::Sample sample;
+  sample.device = device;
+  sample.time_ns = nanosOf(tick.time);
+  sample.tick = tick.tick;
+  sample.revision = tick.revision;
+  sample.hand_m = vec(tick.hand_m);
+  sample.proxy_m = vec(tick.proxy_m);
+  sample.velocity_m_per_s = vec(tick.velocity_m_per_s);
+  const Quaternion& q = tick.orientation;
+  sample.orientation = geometry::Quat(q[3], q[0], q[1], q[2]);
+  sample.force_N = vec(tick.force_N);
+  sample.depth_m = tick.depth_m;
+  sample.touching = tick.object >= 0 || tick.depth_m > 0;
+  sample.object = tick.object;
+  sample.buttons = tick.buttons;
+  sample.guardActive = tick.guard_active;
+  sample.guardLatched = tick.guard_latched;
+  return sample;
+}
+
+std::unique_ptr<record::SampleFile> sampleFile(const std::string& file) {
+  const std::string extension = std::filesystem::path(file).extension();
+  if (extension == ".csv") return std::make_unique<record::CsvFile>(file);
+  if (extension == ".mcap") return std::make_unique<record::McapFile>(file);
+  return nullptr;
+}
+
+// Every report as the message that it came as.
+void logReports(Client& client, record::VrpnLog& log, wire::LocalSender sender) {
+  const auto add = [&log, sender](Time time, const wire::Message& message) {
+    log.add(stamp(time), sender, message);
+  };
+  const auto flag = [](bool value) -> wire::Bool16 { return value ? 1 : 0; };
+  client.onPose([add](const PoseReport& r) {
+    add(r.time, wire::TrackerPosQuat{r.sensor, r.sensor, r.position_m, r.orientation});
+  });
+  client.onVelocity([add](const VelocityReport& r) {
+    add(r.time,
+        wire::TrackerVelocity{r.sensor, r.sensor, r.velocity_m_per_s, r.rotation, r.rotation_interval_s});
+  });
+  client.onButton([add](const ButtonReport& r) {
+    add(r.time, wire::ButtonChange{r.button, r.pressed ? 1 : 0});
+  });
+  client.onAnalog([add](const AnalogReport& r) {
+    wire::AnalogChannels channels;
+    channels.channels.values = r.channels;
+    add(r.time, channels);
+  });
+  client.onForce([add](const ForceReport& r) { add(r.time, wire::Force{r.force_N}); });
+  client.onDepth([add](const DepthReport& r) { add(r.time, wire::Dop{r.depth_m}); });
+  client.onContactPoint([add](const ContactPointReport& r) {
+    add(r.time, wire::Scp{r.position_m, r.orientation});
+  });
+  client.onTouching(
+      [add, flag](const TouchingReport& r) { add(r.time, wire::IsTouching{flag(r.touching)}); });
+  client.onTouchedObject([add](const TouchedObjectReport& r) { add(r.time, wire::TouchedObject{r.object}); });
+  client.onAngle([add, flag](const AngleReport& r) {
+    add(r.time, wire::Angle{r.angle_deg, flag(r.touching)});
+  });
+  client.onForceError([add](const ForceErrorReport& r) {
+    add(r.time, wire::ForceError{static_cast<std::int32_t>(r.error)});
+  });
+  client.onText([add](const TextReport& r) {
+    add(r.time, wire::Text{.severity = static_cast<std::uint32_t>(r.severity), .level = 0, .text = r.text});
+  });
+}
+
+void listen(Client& client, double seconds) {
+  const auto start = std::chrono::steady_clock::now();
+  const auto over = [&] {
+    return seconds > 0 && std::chrono::steady_clock::now() - start >= std::chrono::duration<double>(seconds);
+  };
+  while (!stopRequested() && !over()) {
+    client.poll(20ms);  // short, so that signals are noticed
+    if (!client.connected())
+      throw ConnectionLost("the connection to " + client.server() +
+                           " was lost; what came before it is in the file");
+  }
+}
+
+void recordTicks(Client& client, record::SampleFile& file, const Options& options) {
+  const auto capabilities = client.waitCapabilities();
+  if (!capabilities || !capabilities->subscribe) {
+    throw std::runtime_error(client.server() +
+                             " is no hapticd and tells no whole ticks; record to a file called *.vrpn");
+  }
+  client.onTick([&](const TickReport& tick) { file.add(sampleOf(client.device(), tick)); });
+  client.subscribe(Reports::tick, options.rate_Hz);
+  try {
+    listen(client, options.seconds);
+  } catch (const ConnectionLost&) {
+    file.close();
+    throw;
+  }
+  file.close();
+}
+
+int run(const Options& options) {
+  const auto samples = sampleFile(options.file);
+  if (!samples && std::filesystem::path(options.file).extension() != ".vrpn") {
+    throw std::runtime_error(
+        "'" + options.file +
+        "': record from outside to a file called *.vrpn, *.csv or *.mcap; whole sessions are "
+        "written by the server: hapticd serve --record FILE.haptics");
+  }
+  const StopSignals signals;
+  Client client(options.server, {.reconnect = false});
+  if (samples) {
+    recordTicks(client, *samples, options);
+  } else {
+    record::VrpnLog log(options.file);
+    logReports(client, log, log.addSender(client.device()));
+    listen(client, options.seconds);
+    log.close();
+  }
+  std::printf("recorded %s to %s\n", options.server.c_str(), options.file.c_str());
+  return 0;
+}
+
+}  // namespace
+
+void addRecord(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("record", "Write down what a client hears of a server");
+  command->add_option("server", options->server, "NAME@host[:port] or NAME@tcp://host[:port]")->required();
+  command->add_option("file", options->file, "*.vrpn, *.csv or *.mcap")->required();
+  command->add_option("--seconds", options->seconds, "How long; 0: until Ctrl-C")
+      ->check(within(0, kLongest_s))
+      ->capture_default_str();
+  command->add_option("--rate", options->rate_Hz, "Ticks a second at most, for csv and mcap")
+      ->check(within(0.1, 4000))
+      ->capture_default_str();
+  command->footer(
+      "Only listens, from outside: reports in the frame that the server reports, and no scene. A whole "
+      "session, that can be\n"
+      "replayed and rendered again, is written by the server itself: hapticd serve --record FILE.haptics\n"
+      "Works with other VRPN servers, too, but for csv and mcap, which need whole ticks.\n"
+      "Examples:\n"
+      "  hapticd record Phantom@localhost stroke.mcap --seconds 10\n"
+      "  hapticd record Tracker0@lab7 stroke.vrpn");
+  command->callback([options] { exitCode = run(*options); });
+}
+
+}  // namespace hapticd::apps

@@ -1,0 +1,191 @@
+#include "record/export.h"
+
+#include "record/pack_commands.h"
+#include "record/session_reader.h"
+#include "record/text_fields.h"
+
+namespace hapticd::record {
+namespace {
+
+using geometry::Vec3;
+
+// Sums of bits as words, for JSON.
+std::string tripNames(std::uint32_t bits) {
+  std::string names;
+  for (const realtime::TripInfo& trip : realtime::kTrips) {
+    if ((bits & realtime::bit(trip.trip)) == 0) continue;
+    names += names.empty() ? "" : ",";
+    appendQuoted(names, trip.name);
+  }
+  return "[" + names + "]";
+}
+
+template <class T>
+std::string schemaOf() {
+  std::string properties;
+  const T any;
+  fields(any, JsonSchema(properties));
+  return R"({"type":"object","properties":{)" + properties + "}}";
+}
+
+constexpr const char* kGuardSchema =
+    R"({"type":"object","properties":{"tick":{"type":"integer"},"active":{"type":"array","items":{"type":"string"}},)"
+    R"("latched":{"type":"array","items":{"type":"string"}}}})";
+constexpr const char* kCommandSchema =
+    R"({"type":"object","properties":{"scene":{"type":"integer"},"client":{"type":"integer"},)"
+    R"("command":{"type":"string"},"fields":{"type":"object"}}})";
+// What Foxglove knows by this name and draws.
+constexpr const char* kPoseSchema =
+    R"({"title":"foxglove.PoseInFrame","type":"object","properties":{)"
+    R"("timestamp":{"type":"object","title":"time","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},)"
+    R"("frame_id":{"type":"string"},"pose":{"type":"object","title":"foxglove.Pose","properties":{)"
+    R"("position":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"}}},)"
+    R"("orientation":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},)"
+    R"("z":{"type":"number"},"w":{"type":"number"}}}}}}})";
+
+void appendCoordinates(std::string& out, const double* values, const char* names) {
+  JsonObject object(out);
+  for (int i = 0; names[i] != 0; ++i) object(std::string(1, names[i]).c_str(), values[i]);
+}
+
+}  // namespace
+
+Sample sampleOf(const std::string& device, const realtime::TickReport& tick, Nanos wallOffset) {
+  Sample sample;
+  sample.device = device;
+  sample.time_ns = tick.time + wallOffset;
+  sample.tick = tick.tick;
+  sample.revision = tick.revision;
+  sample.hand_m = tick.device.position_m;
+  sample.proxy_m = tick.rendering.proxy_m;
+  sample.velocity_m_per_s = tick.device.velocity_m_per_s;
+  sample.orientation = tick.device.orientation;
+  sample.force_N = tick.force_N;
+  sample.touching = tick.rendering.touching;
+  sample.depth_m = sample.touching ? tick.rendering.depth_m : 0;
+  sample.object = sample.touching ? tick.rendering.touchedObject : -1;
+  sample.buttons = tick.device.buttons;
+  sample.guardActive = tick.guard.active;
+  sample.guardLatched = tick.guard.latched;
+  return sample;
+}
+
+CsvFile::CsvFile(const std::filesystem::path& file) : path_(file), out_(file) {
+  std::string header;
+  const Sample any;
+  fields(any, CsvHeader(header));
+  out_ << header << '\n';
+  if (!out_)
+    throw SessionError("cannot write '" + path_.string() +
+                       "'; name a file in a directory that can be written");
+}
+
+void CsvFile::add(const Sample& sample) {
+  row_.clear();
+  fields(sample, CsvRow(row_));
+  row_ += '\n';
+  out_ << row_;
+}
+
+void CsvFile::close() {
+  out_.close();
+  if (!out_) throw SessionError("writing '" + path_.string() + "' failed: disk full?");
+}
+
+McapFile::McapFile(const std::filesystem::path& file)
+    : writer_(file),
+      tickSchema_(writer_.addSchema("hapticd.Tick", schemaOf<Sample>())),
+      poseSchema_(writer_.addSchema("foxglove.PoseInFrame", kPoseSchema)),
+      guardSchema_(writer_.addSchema("hapticd.Guard", kGuardSchema)),
+      commandSchema_(writer_.addSchema("hapticd.SceneCommand", kCommandSchema)),
+      commands_(writer_.addChannel(commandSchema_, "/scene/commands")) {}
+
+McapFile::Channels& McapFile::channelsOf(const std::string& device) {
+  const auto known = devices_.find(device);
+  if (known != devices_.end()) return known->second;
+  const std::string topic = "/" + device;
+  Channels channels{};
+  channels.tick = writer_.addChannel(tickSchema_, topic + "/tick");
+  channels.hand = writer_.addChannel(poseSchema_, topic + "/hand");
+  channels.proxy = writer_.addChannel(poseSchema_, topic + "/proxy");
+  channels.guard = writer_.addChannel(guardSchema_, topic + "/guard");
+  channels.first = true;
+  return devices_.emplace(device, channels).first->second;
+}
+
+void McapFile::add(const Sample& sample) {
+  Channels& channels = channelsOf(sample.device);
+  text_.clear();
+  {
+    JsonObject object(text_);
+    fields(sample, object);
+  }
+  writer_.add(channels.tick, sample.time_ns, text_);
+  addPose(channels.hand, sample, sample.hand_m);
+  addPose(channels.proxy, sample, sample.proxy_m);
+  addGuard(channels, sample);
+}
+
+void McapFile::addPose(std::uint16_t channel, const Sample& sample, const Vec3& position) {
+  constexpr Nanos kSecond = 1'000'000'000;
+  text_.clear();
+  {
+    JsonObject object(text_);
+    object.key("timestamp");
+    {
+      JsonObject time(text_);
+      time("sec", sample.time_ns / kSecond);
+      time("nsec", sample.time_ns % kSecond);
+    }
+    object("frame_id", sample.device);
+    object.key("pose");
+    JsonObject pose(text_);
+    pose.key("position");
+    appendCoordinates(text_, position.data(), "xyz");
+    pose.key("orientation");
+    appendCoordinates(text_, sample.orientation.coeffs().data(), "xyzw");
+  }
+  writer_.add(channel, sample.time_ns, text_);
+}
+
+// On change, and once in the beginning.
+void McapFile::addGuard(Channels& channels, const Sample& sample) {
+  const bool same = sample.guardActive == channels.active && sample.guardLatched == channels.latched;
+  if (same && !channels.first) return;
+  channels.first = false;
+  channels.active = sample.guardActive;
+  channels.latched = sample.guardLatched;
+  text_ = "{\"tick\":" + std::to_string(sample.tick) + ",\"active\":" + tripNames(sample.guardActive) +
+          ",\"latched\":" + tripNames(sample.guardLatched) + "}";
+  writer_.add(channels.guard, sample.time_ns, text_);
+}
+
+void McapFile::addTold(const SceneEvent& event, Nanos wall_ns) {
+  text_.clear();
+  {
+    JsonObject object(text_);
+    object("scene", event.scene);
+    object("client", event.client);
+    object("command", std::string(event.command ? nameOf(*event.command) : "ClientGone"));
+    object.key("fields");
+    JsonObject values(text_);
+    if (event.command) std::visit([&](const auto& command) { fields(command, values); }, *event.command);
+  }
+  writer_.add(commands_, wall_ns, text_);
+}
+
+void exportSession(const std::filesystem::path& session, SampleFile& to, std::string& remark) {
+  SessionReader reader(session);
+  const SessionHeader& header = reader.header();
+  for (SessionEvent event; reader.next(event);) {
+    if (const auto* tick = std::get_if<TickEvent>(&event)) {
+      to.add(sampleOf(header.devices[tick->device].names.front(), tick->tick.report, header.wallOffset));
+    } else if (const auto* told = std::get_if<SceneEvent>(&event)) {
+      to.addTold(*told, told->time + header.wallOffset);
+    }
+  }
+  remark = reader.remark();
+  to.close();
+}
+
+}  // namespace hapticd::record

@@ -1,0 +1,109 @@
+// Files for other programs, byte by byte where these programs would stumble.
+#include "record/export.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "record/session_file.h"
+#include "record/text_fields.h"
+#include "record/vrpn_log.h"
+#include "wire/system.h"
+
+namespace hapticd::record {
+namespace {
+
+using test::SessionFile;
+
+std::string textOf(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+TEST(Csv, HasAColumnForEachNumberAndQuotesNames) {
+  SessionFile file;
+  CsvFile csv(file.path());
+  Sample sample;
+  sample.device = "Left, \"my\" hand";
+  sample.time_ns = 1'700'000'000'123'456'789;
+  sample.force_N = {0.1, -2, 1e-300};
+  csv.add(sample);
+  csv.close();
+  EXPECT_EQ(textOf(file.path()),
+            "device,time_ns,tick,revision,hand_x_m,hand_y_m,hand_z_m,proxy_x_m,proxy_y_m,proxy_z_m,velocity_"
+            "x_m_per_s,"
+            "velocity_y_m_per_s,velocity_z_m_per_s,qx,qy,qz,qw,force_x_N,force_y_N,force_z_N,depth_m,"
+            "touching,object,"
+            "buttons,guard_active,guard_latched\n"
+            "\"Left, \"\"my\"\" "
+            "hand\",1700000000123456789,0,0,0,0,0,0,0,0,0,0,0,0,0,0,1,0.1,-2,1e-300,0,0,-1,0,0,0\n");
+}
+
+TEST(Csv, AFileThatCannotBeSaysSo) {
+  EXPECT_THROW(CsvFile("/nowhere/x.csv"), SessionError);
+  EXPECT_THROW(McapFile("/nowhere/x.mcap"), SessionError);
+  EXPECT_THROW(VrpnLog("/nowhere/x.vrpn"), SessionError);
+}
+
+TEST(Json, HasNoWordsForWhatIsNoNumberAndTellsLongListsByTheirLength) {
+  std::string text;
+  {
+    JsonObject object(text);
+    object("a\"b", std::string("tab\there"));
+    object("nan", std::nan(""));
+    object("on", true);
+    object("list", std::vector<int>{1, 2});
+    object("long", std::vector<int>(100));
+    object("vector", geometry::Vec3(1, 2, 0.5));
+  }
+  EXPECT_EQ(text,
+            R"({"a\"b":"tab\u0009here","nan":null,"on":true,"list":[1,2],"long":100,"vector":[1,2,0.5]})");
+}
+
+struct Entry {
+  std::int32_t type, sender;
+  std::uint32_t seconds, microseconds;
+  Bytes payload;
+};
+
+TEST(VrpnLog, DescribesNamesBeforeTheyAreUsed) {
+  SessionFile file;
+  VrpnLog log(file.path());
+  const wire::LocalSender phantom = log.addSender("Phantom");
+  log.add({10, 20}, phantom, wire::Dop{0.25});
+  log.add({11, 21}, phantom, wire::Dop{0.5});
+  log.close();
+
+  const std::string bytes = textOf(file.path());
+  ASSERT_GT(bytes.size(), 24U);
+  EXPECT_EQ(bytes.substr(0, 14), "vrpn: ver. 07.");
+  std::vector<Entry> entries;
+  Unpacker in(std::as_bytes(std::span(bytes)).subspan(24));
+  while (!in.rest().empty()) {
+    Entry entry;
+    in.take(entry.type);
+    in.take(entry.sender);
+    in.take(entry.seconds);
+    in.take(entry.microseconds);
+    entry.payload.resize(static_cast<std::size_t>(in.next<std::int32_t>()));
+    EXPECT_EQ(in.next<std::int32_t>(), 0);
+    for (std::byte& b : entry.payload) b = static_cast<std::byte>(in.next<std::uint8_t>());
+    ASSERT_TRUE(in.ok());
+    entries.push_back(std::move(entry));
+  }
+  ASSERT_EQ(entries.size(), 4U);
+  EXPECT_EQ(entries[0].type, wire::kSenderDescription);
+  EXPECT_EQ(*wire::decodeDescription(entries[0].payload), "Phantom");
+  EXPECT_EQ(entries[1].type, wire::kTypeDescription);
+  EXPECT_EQ(*wire::decodeDescription(entries[1].payload), wire::info(wire::kindOf<wire::Dop>).name);
+  for (const std::size_t i : {2U, 3U}) {
+    EXPECT_EQ(entries[i].sender, entries[0].sender) << "a description holds its number as the sender";
+    EXPECT_EQ(entries[i].type, entries[1].sender);
+    EXPECT_EQ(entries[i].seconds, 8 + i);
+  }
+  EXPECT_EQ(wire::decode<wire::Dop>(entries[3].payload)->depth, 0.5);
+}
+
+}  // namespace
+}  // namespace hapticd::record

@@ -1,0 +1,72 @@
+#!/usr/bin/env bash
+# A session as a user has it: recorded, killed, felt again, changed, exported, replayed.
+set -euo pipefail
+hapticd=$1
+source_dir=$2
+work=$(mktemp -d)
+stock=${VRPN_CLIENTS:-} # where VRPN's own client programs are
+serve_options=(--http off --record "$work/my.haptics")
+source "$source_dir/tests/record/server.sh"
+
+"$hapticd" record "Phantom@tcp://$address" "$work/heard.vrpn" --seconds 3 >/dev/null &
+heard=$!
+"$hapticd" record "Phantom@tcp://$address" "$work/heard.csv" --seconds 3 >/dev/null &
+rows=$!
+"$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --server "Phantom@tcp://$address" --seconds 4 >"$work/touch.txt"
+wait "$heard"
+wait "$rows"
+[ "$(wc -l <"$work/heard.csv")" -gt 500 ]
+cp "$work/my.haptics" "$work/live.haptics" # while it is written
+kill -INT "$server"
+wait "$server" || true
+grep -q 'recorded [0-9]* ticks' "$work/log"
+
+# The same forces.
+"$hapticd" render --session "$work/my.haptics" --report "$work/same.html" --out "$work/same.csv" >"$work/same.txt"
+grep -q 'ticks in every bit: all of them' "$work/same.txt"
+awk -F, 'NR > 1 { if ($3 != $4 || $5 != $6) { print "line " NR ": " $0; exit 1 } touching += $5 > 0 } END { exit !(touching > 100) }' "$work/same.csv"
+# Of a copy of a file that is still written, what is whole; it says that there is no end.
+"$hapticd" render --session "$work/live.haptics" >"$work/live.txt" 2>"$work/live.err"
+grep -q 'in every bit: all of them' "$work/live.txt"
+grep -qE 'cut|no end' "$work/live.err"
+# Other surfaces are felt, and shown.
+"$hapticd" render --session "$work/my.haptics" --stiffness 100 --report "$work/soft.html" >"$work/soft.txt"
+grep -q 'changed     stiffness 100 N/m' "$work/soft.txt"
+awk '/^force/ { exit !($4 > 0.05) }' "$work/soft.txt"
+grep -q '<polyline class="now"' "$work/soft.html"
+
+# For other programs.
+"$hapticd" export "$work/my.haptics" --to csv -o "$work/my.csv"
+[ "$(wc -l <"$work/my.csv")" -gt 1000 ]
+[ "$(head -1 "$work/my.csv" | tr ',' '\n' | wc -l)" = "$(tail -1 "$work/my.csv" | tr ',' '\n' | wc -l)" ]
+"$hapticd" export "$work/my.haptics" --to vrpn -o "$work/my.vrpn"
+"$hapticd" export "$work/my.haptics" --to mcap -o "$work/my.mcap"
+[ "$(head -c 5 "$work/my.mcap" | tail -c 4)" = MCAP ]
+if [ -n "$stock" ]; then
+  for log in heard my; do
+    timeout 10 stdbuf -oL "$stock/vrpn_print_devices" "Phantom@file://$work/$log.vrpn" >"$work/$log.txt" 2>&1 || true
+    [ "$(grep -c 'Tracker.*sensor' "$work/$log.txt")" -gt 20 ] || { head "$work/$log.txt"; exit 1; }
+  done
+else
+  echo "VRPN_CLIENTS is not set: no stock client opened the logs"
+fi
+
+# Once more, to clients.
+"$hapticd" replay "$work/my.haptics" --port 0 --http off --loop >"$work/replay.log" 2>&1 &
+replay=$!
+trap 'kill "$replay" 2>/dev/null || true; rm -rf "$work"' EXIT
+for _ in $(seq 300); do
+  address=$(sed -nE 's/.*listening on ([0-9.]+:[0-9]+).*/\1/p' "$work/replay.log" | head -1)
+  [ -n "$address" ] && break
+  sleep 0.1
+done
+"$hapticd" watch "Phantom@tcp://$address" --csv --rate 1000 --seconds 4 >"$work/again.csv"
+awk -F, 'NR > 1 && $16 > 0 { touching++ } END { exit !(touching > 50) }' "$work/again.csv"
+
+# Errors are plain.
+if "$hapticd" serve --listen 127.0.0.1:0 --record "$work/my.haptics" 2>"$work/error.txt" >/dev/null; then exit 1; fi
+grep -q 'File exists; name another' "$work/error.txt"
+if "$hapticd" render --session "$source_dir/README.md" 2>"$work/error.txt"; then exit 1; fi
+grep -q 'is no session file' "$work/error.txt"
+if "$hapticd" record "Phantom@tcp://$address" "$work/x.haptics" 2>"$work/error.txt"; then exit 1; fi
+grep -q 'hapticd serve --record' "$work/error.txt"
