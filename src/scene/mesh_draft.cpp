@@ -30,18 +30,16 @@ bool sameBytes(const Vec3f* a, const std::vector<Vec3f>& b) {
   return std::memcmp(a, b.data(), b.size() * sizeof(Vec3f)) == 0;
 }
 
-void addCorner(Box& box, const Vec3f& v) {
-  box.extend(Vec3(v.cast<double>()));
-}
-
-// A corner that is not a number leaves the triangle out.
+// A corner that is not a number leaves the triangle out. In floats as far as that is exact: it is asked for
+// each triangle of a mesh, again and again.
 Box boxOfTriangle(const Triangle& t, const std::vector<Vec3f>& vertices) {
-  Box box;
-  for (const std::uint32_t i : t) {
-    if (i >= vertices.size() || !vertices[i].allFinite()) return {};
-    addCorner(box, vertices[i]);
-  }
-  return box;
+  if (t[0] >= vertices.size() || t[1] >= vertices.size() || t[2] >= vertices.size()) return {};
+  const Vec3f& a = vertices[t[0]];
+  const Vec3f& b = vertices[t[1]];
+  const Vec3f& c = vertices[t[2]];
+  // What is not a number or infinite stays so when it is taken times 0.
+  if ((a * 0 + b * 0 + c * 0).sum() != 0) return {};
+  return {a.cwiseMin(b).cwiseMin(c).cast<double>(), a.cwiseMax(b).cwiseMax(c).cast<double>()};
 }
 
 }  // namespace
@@ -56,7 +54,8 @@ void MeshDraft::edited(Nanos now) {
 std::optional<Nanos> MeshDraft::due() const {
   if (!dirty_) return std::nullopt;
   if (finished_) return lastEdit_;
-  // Positions alone are a surface that moves: there is nothing incomplete to wait for but the rest of a frame.
+  // Positions alone are a surface that moves: there is nothing incomplete to wait for but the rest of a
+  // frame.
   if (!shapeChanged_) return std::min(lastEdit_ + kPause, firstEdit_ + kQuiet);
   return std::min(lastEdit_ + kQuiet, firstEdit_ + kLongest);
 }
@@ -194,12 +193,17 @@ std::shared_ptr<MeshGeometry> MeshDraft::morph(const std::function<Nanos()>& clo
   mesh->target = vertices_.share();
   const std::vector<Vec3f>& target = *mesh->target;
   const std::vector<Triangle>& triangles = indexed_ ? triangles_.read() : *mesh->triangles;
+  // Where each vertex is now, once and not for each of its triangles.
+  const bool deforming = old.deformingAfter(now);
+  std::vector<Vec3> places(deforming ? target.size() : 0);
+  for (std::uint32_t i = 0; i < places.size(); ++i) places[i] = old.vertex(i, now);
+  const std::vector<Vec3f>& before = old.target ? *old.target : *old.vertices;
   mesh->index = refitOrBuild(static_cast<std::uint32_t>(triangles.size()), [&](std::uint32_t id) {
     Box box = boxOfTriangle(triangles[id], target);
     if (box.empty()) return box;
-    const Corners corners = old.corners(id, now);
-    for (const Vec3& corner : {corners.a, corners.b, corners.c}) box.extend(corner);
-    if (old.deformingAfter(now)) box.extend(boxOfTriangle(triangles[id], *old.target));
+    box.extend(boxOfTriangle(triangles[id], before));
+    if (!deforming) return box;
+    for (const std::uint32_t corner : triangles[id]) box.extend(places[corner]);
     return box;
   });
 
