@@ -33,7 +33,7 @@ std::optional<std::string> errorOf(Function&& function) {
 }
 
 struct Loop::Impl {
-  static constexpr std::size_t kReadBufferBytes = std::size_t{256} * 1024;
+  static constexpr std::size_t kReadBufferBytes = std::size_t{64} * 1024;
 
   // One buffer for all sockets: each read is consumed before the next, so memory does not grow with clients.
   std::unique_ptr<std::byte[]> readBuffer = std::make_unique_for_overwrite<std::byte[]>(kReadBufferBytes);
