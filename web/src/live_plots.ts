@@ -3,6 +3,7 @@ import { between, share } from "./plots/counts";
 import { LoopHistogram } from "./plots/histogram";
 import { Plot } from "./plots/plot";
 import type { DeviceState, Histogram } from "./state_types";
+import type { Tick } from "./wire";
 import { byId, countText, setText } from "./panels/dom";
 
 const SECONDS = 10;
@@ -21,6 +22,8 @@ export class LivePlots {
   private readonly choice = byId<HTMLSelectElement>("loop-of");
   private readonly says = byId("loop-says");
   private before: Histogram | undefined;
+  private newest: Tick | undefined;
+  private meanSince: Tick | undefined;
   private device = "";
   private turn = 0;
 
@@ -47,7 +50,7 @@ export class LivePlots {
     this.depth = one("Depth", "mm", "depth", 1, 2, "--proxy");
     this.latency = one("Latency", "ms", "latency", 2, 1, "--second");
     const curves = [
-      { label: "p50", colour: "--third" },
+      { label: "mean", colour: "--third" },
       { label: "p99", colour: "--second" },
       { label: "max", colour: "--force" },
     ];
@@ -62,7 +65,9 @@ export class LivePlots {
     });
   }
 
-  tick(time_s: number, force_N: number, depth_mm: number, latency_ms: number): void {
+  tick(tick: Tick, force_N: number, depth_mm: number, latency_ms: number): void {
+    this.newest = tick;
+    const time_s = tick.time_ns / 1e9;
     this.force.push(time_s, force_N);
     this.depth.push(time_s, depth_mm);
     this.latency.push(time_s, latency_ms);
@@ -76,8 +81,10 @@ export class LivePlots {
     }
     const now = device.loop.period_us;
     const since = between(this.before, now);
-    if (since.length > 0 && this.before)
-      this.period.push(time_s, share(since, 0.5), share(since, 0.99), share(since, 1));
+    const mean_us = this.mean_us();
+    if (since.length > 0 && this.before && mean_us > 0) {
+      this.period.push(time_s, mean_us, share(since, 0.99, now.bins), share(since, 1, now.bins));
+    }
     this.before = now;
     const shown = device.loop[this.choice.value as LoopTime];
     this.histogram.update(shown);
@@ -85,6 +92,13 @@ export class LivePlots {
       this.says,
       `p50 ${us(shown.p50)}, p99 ${us(shown.p99)}, p99.9 ${us(shown.p999)}, max ${us(shown.max)} of ${countText(device.loop.ticks)} ticks; ${countText(device.loop.overruns)} overruns, ${countText(device.loop.dropped_reports)} reports dropped`,
     );
+  }
+
+  /** Of the ticks since it was asked last. */
+  private mean_us(): number {
+    const [from, to] = [this.meanSince, this.newest];
+    this.meanSince = to;
+    return from && to && to.tick > from.tick ? (to.time_ns - from.time_ns) / 1000 / (to.tick - from.tick) : 0;
   }
 
   /** One plot a frame: all are drawn many times a second, and no frame is late for them. */

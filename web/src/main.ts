@@ -210,12 +210,14 @@ class Page {
 
   private linkChanged(): void {
     const label = byId("link");
+    document.body.classList.toggle("lost", this.link.state === "lost");
     const { state } = this.link;
     setText(label, state === "open" ? "connected" : state);
     label.dataset["level"] = state === "open" ? "good" : state === "lost" ? "bad" : "";
     if (state === "open") this.subscribe();
     if (state === "lost") {
       this.hand.lost();
+      for (const id of ["force", "depth", "touching"]) setText(byId(id), "–");
       this.meshes.clear(); // another server may come, and number its shapes alike
     }
     this.showNotice();
@@ -245,7 +247,7 @@ class Page {
   private tickCame(tick: wire.Tick, age_s: number): void {
     this.tick = tick;
     this.fresh = true;
-    this.plots.tick(tick.time_ns / 1e9, Math.hypot(...tick.force_N), this.depth_mm(tick), age_s * 1000);
+    this.plots.tick(tick, Math.hypot(...tick.force_N), this.depth_mm(tick), age_s * 1000);
   }
 
   private textCame({ severity, text }: wire.ServerText): void {

@@ -46,9 +46,11 @@ test("what came between two histograms, and its quantiles", () => {
     [1010, 9],
     [5000, 1],
   ]);
+  // Upper ends: of a neighbour, also one that had no counts now, or an eighth further.
   assert.deepEqual(
-    [0.5, 0.95, 0.99, 1].map((part) => share(since, part)),
-    [1000, 1010, 1010, 5000],
+    [0.5, 0.95, 1].map((part) => share(since, part, now.bins)),
+    [1010, 1136.25, 5625],
   );
+  assert.equal(share([[990, 4]], 0.5, now.bins), 1000);
   assert.equal(share([], 0.5), 0);
 });

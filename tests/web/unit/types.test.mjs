@@ -7,7 +7,9 @@ import { webDir } from "../bundled.mjs";
 
 test("tsc has nothing to say", () => {
   const tsc = join(webDir, "node_modules", "typescript", "bin", "tsc");
-  const { status, stdout, stderr } = spawnSync(process.execPath, [tsc, "--noEmit", "-p", webDir], { encoding: "utf8" });
+  const { status, stdout, stderr } = spawnSync(process.execPath, [tsc, "--noEmit", "-p", webDir], {
+    encoding: "utf8",
+  });
   assert.equal(stdout + stderr, "");
   assert.equal(status, 0);
 });

@@ -50,7 +50,7 @@ export class LoopHistogram {
         y: { range: (_, __, max) => [0, Math.ceil(max ?? 1)] },
       },
       axes: [
-        { ...axis(), size: 18, gap: 2, space: 60, values: (_, splits) => splits.map((s) => `${s} µs`) },
+        { ...axis(), size: 21, gap: 5, space: 60, values: (_, splits) => splits.map((s) => `${s} µs`) },
         {
           ...axis(),
           size: 38,
