@@ -18,12 +18,14 @@ export interface DropContext {
 export class DropMesh {
   private readonly panel = byId("drop-panel");
   private readonly message = el("p", { role: "status" });
+  private readonly close = el("button", { type: "button", className: "small" }, "Close");
   private readonly bar = el("progress", { max: 1, value: 0, hidden: true });
   private placing: Placing | undefined;
   private awaited: { object: number; geometry: number; name: string } | undefined;
 
   constructor(private readonly context: DropContext) {
-    this.panel.append(this.message, this.bar);
+    this.close.addEventListener("click", () => (this.panel.hidden = true));
+    this.panel.append(this.message, this.bar, this.close);
     const chooser = byId<HTMLInputElement>("mesh-file");
     byId("load-mesh").addEventListener("click", () => chooser.click());
     chooser.addEventListener("change", () => {
@@ -113,5 +115,6 @@ export class DropMesh {
   private say(text: string, level = ""): void {
     setText(this.message, text);
     this.message.dataset["level"] = level;
+    this.close.hidden = level === "";
   }
 }

@@ -55,7 +55,7 @@ export class LivePlots {
       { label: "max", colour: "--force" },
     ];
     this.period = new Plot(parent, {
-      title: "Loop period",
+      title: "Period",
       unit: "µs",
       least: 1200,
       decimals: 0,

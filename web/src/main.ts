@@ -60,11 +60,7 @@ class Page {
   });
   private readonly guard = new GuardPanel(byId("guard"));
   private readonly clients = new ClientsPanel(byId("clients"));
-  private readonly objectsPanel = new ObjectsPanel(
-    byId("objects"),
-    (...m) => this.send(...m),
-    () => this.device!,
-  );
+  private readonly objectsPanel = new ObjectsPanel(byId("objects"), (...m) => this.send(...m));
   private readonly effects = new EffectsPanel(byId("effects"), (...m) => this.send(...m));
   private readonly deviceChoice = byId<HTMLSelectElement>("device");
   private readonly quantity = byId<HTMLSelectElement>("quantity");

@@ -13,7 +13,7 @@ import {
 } from "three";
 import type { DeviceState, ObjectState } from "../state_types";
 import { countText, el } from "../panels/dom";
-import { materialsOf, SurfaceForm } from "../panels/surface";
+import { SurfaceForm } from "../panels/surface";
 import type { View } from "../scene3d/view";
 import type { Placement } from "./upload";
 import type { FileMesh } from "./weld";
@@ -69,7 +69,7 @@ export class Placing {
     this.size = numberInput("Largest extent", tidy(scale * this.extent), "0.001");
     this.at = centre.toArray().map((x, i) => numberInput(`Position ${"xyz"[i]!}`, tidy(x)));
     this.turn = [0, 1, 2].map((i) => numberInput(`Turn about ${"xyz"[i]!}, degrees`, 0));
-    this.surface.set(NEW_SURFACE, materialsOf(device));
+    this.surface.set(NEW_SURFACE);
     this.fillWhere(objects);
     this.root.append(
       el(

@@ -2,6 +2,7 @@
 import { type Effect, type Outgoing, setEffect, startEffect, stopEffect } from "../wire";
 import type { EffectState } from "../state_types";
 import { el, Rows, setText } from "./dom";
+import { Switch } from "./switch";
 
 type Send = (...messages: Outgoing[]) => void;
 
@@ -18,30 +19,26 @@ const NEW: Record<string, { label: string; effect: Partial<Effect> }> = {
 class EffectRow {
   readonly root: HTMLElement;
   private readonly facts = el("span", { className: "quiet" });
-  private readonly active = el("input", { type: "checkbox" });
+  private readonly active: Switch;
 
-  constructor(e: EffectState, send: Send) {
-    this.active.ariaLabel = `Effect ${e.index} is on`;
-    this.active.addEventListener("change", () =>
-      send(this.active.checked ? startEffect(e.index) : stopEffect(e.index)),
+  constructor({ index }: EffectState, send: Send) {
+    this.active = new Switch("on", `Effect ${index} is on`, (on) =>
+      send(on ? startEffect(index) : stopEffect(index)),
     );
-    this.root = el(
-      "li",
-      { data: { effect: String(e.index) } },
-      el(
-        "div",
-        { className: "row" },
-        el("strong", {}, `Effect ${e.index}`),
-        this.facts,
-        el("label", { className: "switch" }, this.active, "on"),
-      ),
+    const row = el(
+      "div",
+      { className: "row" },
+      el("strong", {}, `Effect ${index}`),
+      this.facts,
+      this.active.root,
     );
+    this.root = el("li", { data: { effect: String(index) } }, row);
   }
 
   update(e: EffectState): void {
     const limit = e.duration_ms > 0 ? `, ${e.duration_ms} ms` : "";
     setText(this.facts, `${e.type}, ${e.magnitude_N} N${limit}`);
-    this.active.checked = e.active;
+    this.active.update(e.active);
   }
 }
 

@@ -1,25 +1,23 @@
 // The objects of the scene: touchable or not, their surface, removal.
 import { clearTrimesh, type Outgoing, setHapticProperty, setObjectIsTouchable } from "../wire";
-import type { DeviceState, ObjectState } from "../state_types";
+import type { ObjectState } from "../state_types";
 import { countText, el, Rows, setText } from "./dom";
-import { materialsOf, SurfaceForm } from "./surface";
+import { SurfaceForm } from "./surface";
+import { Switch } from "./switch";
 
 type Send = (...messages: Outgoing[]) => void;
 
 class ObjectRow {
   readonly root: HTMLElement;
   private readonly facts = el("span", { className: "quiet" });
-  private readonly touchable = el("input", { type: "checkbox" });
+  private readonly touchable: Switch;
   private readonly surface: SurfaceForm;
   private readonly details = el("details");
 
-  constructor(
-    id: number,
-    send: Send,
-    private readonly device: () => DeviceState,
-  ) {
-    this.touchable.ariaLabel = `Object ${id} is touchable`;
-    this.touchable.addEventListener("change", () => send(setObjectIsTouchable(id, this.touchable.checked)));
+  constructor(id: number, send: Send) {
+    this.touchable = new Switch("touchable", `Object ${id} is touchable`, (on) =>
+      send(setObjectIsTouchable(id, on)),
+    );
     this.surface = new SurfaceForm((property, share) => send(setHapticProperty(id, property, share)));
     const remove = el("button", { type: "button", className: "small" }, "Remove the mesh");
     remove.addEventListener("click", () => send(clearTrimesh(id)));
@@ -29,22 +27,16 @@ class ObjectRow {
       { className: "row" },
       el("strong", {}, `Object ${id}`),
       this.facts,
-      el("label", { className: "switch" }, this.touchable, "touchable"),
+      this.touchable.root,
     );
     this.root = el("li", { data: { object: String(id) } }, head, this.details);
   }
 
   update(o: ObjectState): void {
-    const empty = o.triangles === 0;
-    setText(
-      this.facts,
-      empty
-        ? "no mesh"
-        : `${countText(o.triangles)} triangles${o.stiffness_N_per_m > 0 ? "" : ", no stiffness: not felt"}`,
-    );
-    if (document.activeElement !== this.touchable || this.touchable.checked === o.touchable)
-      this.touchable.checked = o.touchable;
-    if (this.details.open) this.surface.update(o, materialsOf(this.device()));
+    const feel = o.stiffness_N_per_m > 0 ? "" : ", no stiffness: not felt";
+    setText(this.facts, o.triangles === 0 ? "no mesh" : `${countText(o.triangles)} triangles${feel}`);
+    this.touchable.update(o.touchable);
+    if (this.details.open) this.surface.update(o);
   }
 }
 
@@ -52,11 +44,11 @@ export class ObjectsPanel {
   private readonly list = el("ul", { className: "cards" });
   private readonly rows: Rows<ObjectState, ObjectRow>;
 
-  constructor(parent: HTMLElement, send: Send, device: () => DeviceState) {
+  constructor(parent: HTMLElement, send: Send) {
     this.rows = new Rows(
       this.list,
       (o) => o.id,
-      (o) => new ObjectRow(o.id, send, device),
+      (o) => new ObjectRow(o.id, send),
     );
     parent.append(this.list);
   }

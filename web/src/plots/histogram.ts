@@ -3,6 +3,9 @@ import uPlot from "uplot";
 import type { Histogram } from "../state_types";
 import { axis, css } from "./plot";
 
+/** What is shorter is drawn there. */
+const LEAST_US = 0.1;
+
 export class LoopHistogram {
   private plot: uPlot | undefined;
   private last: Histogram | undefined;
@@ -32,7 +35,10 @@ export class LoopHistogram {
 
   private data(): uPlot.AlignedData {
     const bins = this.last?.bins.filter(([, count]) => count > 0) ?? [];
-    return [bins.map(([from]) => from), bins.map(([, count]) => Math.log10(count) + 0.3)];
+    return [
+      bins.map(([from]) => Math.log10(Math.max(from, LEAST_US))),
+      bins.map(([, count]) => Math.log10(count) + 0.3),
+    ];
   }
 
   private resize(): void {
@@ -50,7 +56,13 @@ export class LoopHistogram {
         y: { range: (_, __, max) => [0, Math.ceil(max ?? 1)] },
       },
       axes: [
-        { ...axis(), size: 21, gap: 5, space: 60, values: (_, splits) => splits.map((s) => `${s} µs`) },
+        {
+          ...axis(),
+          size: 21,
+          gap: 5,
+          splits: (_, __, min, max) => roundTimes(min, max),
+          values: (_, splits) => splits.map((s) => timeText(10 ** s)),
+        },
         {
           ...axis(),
           size: 38,
@@ -73,11 +85,24 @@ export class LoopHistogram {
   }
 }
 
+/** Logarithms, as the bins are: one late tick among millions leaves the others their room. */
 function around(min: number | null, max: number | null): [number, number] {
-  const from = min ?? 0;
-  const to = max ?? 1;
-  const margin = Math.max(0.05 * (to - from), 1);
-  return [Math.max(0, from - margin), to + margin];
+  return [(min ?? 0) - 0.03, (max ?? 1) + 0.07];
 }
 
+/** Round times between two logarithms, no more than there is room for. */
+function roundTimes(min: number, max: number): number[] {
+  const times = (steps: number[]): number[] => {
+    const found: number[] = [];
+    for (let power = Math.floor(min); power <= max; ++power) {
+      found.push(...steps.map((step) => power + Math.log10(step)).filter((t) => t >= min && t <= max));
+    }
+    return found;
+  };
+  const choices = [[1, 1.5, 2, 3, 5, 7], [1, 2, 5], [1, 3], [1]].map(times);
+  return choices.find((choice) => choice.length <= 6) ?? choices.at(-1)!;
+}
+
+const timeText = (us: number): string =>
+  us < 999 ? `${Number(us.toPrecision(2))} µs` : `${Number((us / 1000).toPrecision(2))} ms`;
 const powerText = (power: number): string => (power < 4 ? String(10 ** power) : `10^${power}`);
