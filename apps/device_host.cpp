@@ -4,6 +4,7 @@
 
 #include "commands.h"
 #include "device/isolation/device_host.h"
+#include "realtime/servo/thread_setup.h"
 #include "server/devices.h"
 
 namespace hapticd::apps {
@@ -16,7 +17,11 @@ void addDeviceHost(CLI::App& app) {
   command->callback([text] {
     const server::DeviceConfig config = server::parseConfig(*text, "configuration").devices.front();
     const auto device = server::makeDevice(config);
-    exitCode = device::runDeviceHost(*device, {.rate_Hz = config.servoRate_Hz});
+    realtime::setUpThread({.realtime = false});  // locks the memory of the process
+    exitCode = device::runDeviceHost(
+        *device, {.rate_Hz = config.servoRate_Hz, .beforeFirstTick = [vendors = device->selfPaced()] {
+                    realtime::setUpThread({.keepScheduling = vendors, .lockMemory = false});
+                  }});
   });
 }
 

@@ -74,6 +74,8 @@ class Device {
   /// Why forces are held and what a person can do about it; empty when all is well. Any thread but the
   /// servo's.
   virtual std::string faultText() const { return {}; }
+  /// True while nothing but close() and open() can bring the device back. Any thread but the servo's.
+  virtual bool lost() const noexcept { return false; }
   /// A person's consent to calibrate now, where that moves the arm or needs it in a certain place; what it
   /// takes stands in faultText(). May block for seconds; forces are held meanwhile. Throws std::runtime_error
   /// when it does not succeed. Not in the servo thread.

@@ -192,7 +192,10 @@ void Server::run() {
   subscriptions_.push_back(loop_.every(1s, [this] { everySecond(); }));
   subscriptions_.push_back(loop_.every(50ms, [this] {
     closeLost();
-    for (const auto& station : stations_) station->checkBlackBox();
+    for (const auto& station : stations_) {
+      station->checkBlackBox();
+      if (const auto text = station->checkHealth()) tell(*station, *text);
+    }
   }));
   if (config_.seconds > 0) {
     subscriptions_.push_back(loop_.after(
@@ -211,7 +214,6 @@ void Server::everySecond() {
   clock_.refresh();
   closeStaleHandshakes();
   noise_.newSecond();
-  for (const auto& station : stations_) station->checkHealth();
   if (web_) web_->everySecond();
 }
 
@@ -238,6 +240,16 @@ ServerStatus Server::status() const {
     }
   }
   return status;
+}
+
+// To everybody who listens to this device.
+void Server::tell(const Station& station, const wire::Text& text) {
+  for (const auto& [id, session] : sessions_) {
+    const wire::LocalSender name = station.nameFor(*session);
+    if (!session->wants(name)) continue;
+    session->send(name, text);
+    session->flush();
+  }
 }
 
 void Server::stop() {

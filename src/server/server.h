@@ -71,6 +71,7 @@ class Server final : public SessionOwner, public WebOwner {
   void finishRecording();
   void everySecond();
   void onServoWake(Station& station);
+  void tell(const Station& station, const wire::Text& text);
   void onHeartbeat(Session& session, const wire::MessageReceived& message);
   void closeStaleHandshakes();
   void closeLost();

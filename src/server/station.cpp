@@ -59,6 +59,10 @@ BlackBoxFiles blackBoxFiles(const DeviceConfig& config) {
   return {config.blackBoxDir, config.blackBoxKeep};
 }
 
+wire::Text healthText(const std::string& fault) {
+  return {.severity = wire::kTextError, .level = 0, .text = "the device gives no force: " + fault};
+}
+
 }  // namespace
 
 Station::Impl::Impl(const DeviceConfig& config_, std::vector<wire::LocalSender> names_, SceneHost& scene_,
@@ -68,13 +72,17 @@ Station::Impl::Impl(const DeviceConfig& config_, std::vector<wire::LocalSender> 
       scene(scene_),
       device(std::move(device_)),
       simulated(dynamic_cast<device::SimulatedDevice*>(device.get())),
-      tick(*device, clock, tickOptions(config, device->profile())),
-      servo([this](const realtime::Pacing& pacing) { tick(pacing); }, clock,
-            {.rate_Hz = config.servoRate_Hz, .request = {}, .requireRealtime = !allowNoRealtime}),
-      control(tick.control(), simulated, workspaceOf(config, device->profile())),
+      profile(device->profile()),
+      tick(*device, clock, tickOptions(config, profile)),
+      keeper(*device, tick, clock,
+             {.name = config.names.front(),
+              .rate_Hz = config.servoRate_Hz,
+              .requireRealtime = !allowNoRealtime,
+              .vendorsThread = !config.isolate}),
+      control(tick.control(), simulated, workspaceOf(config, profile)),
       roles(config.control, config.controlList),
-      modes(device->profile().buttons),
-      outbox(config, device->profile().buttons, names),
+      modes(profile.buttons),
+      outbox(config, profile.buttons, names),
       recorder(config.names.front(), blackBoxFiles(config), tick.blackBox()) {
   if (simulated != nullptr && config.hand != "script")
     simulated->setPath(device::HandFile::load(config.hand));
@@ -84,7 +92,7 @@ Station::Station(const DeviceConfig& config, std::vector<wire::LocalSender> name
                  bool allowNoRealtime, record::Recorder* recorder)
     : impl_(std::make_unique<Impl>(config, std::move(names), scene, openDevice(config), allowNoRealtime)) {
   Impl& my = *impl_;
-  SceneDevice seat{.config = sceneConfig(my.config, my.device->profile()),
+  SceneDevice seat{.config = sceneConfig(my.config, my.profile),
                    .slot = &my.tick.snapshots(),
                    .published = [&my](const auto& snapshot) { my.onPublished(*snapshot); },
                    .publishing = {}};
@@ -106,7 +114,6 @@ void Station::play(const realtime::TickReport& report) noexcept {
 }
 
 void Station::Impl::recordTo(record::Recorder& session, SceneDevice& seat) {
-  const device::DeviceProfile& profile = device->profile();
   const std::uint32_t number = session.addDevice({.names = config.names,
                                                   .driver = config.driver,
                                                   .model = profile.model,
@@ -130,31 +137,14 @@ void Station::start() {
   if (my.played) return;
   my.running = true;
   if (my.config.enableForces) my.tick.control().arm();
-  if (my.device->selfPaced()) {
-    my.device->start([&my](geometry::Nanos now) { my.tick(now); });
-    spdlog::info("servo loop of '{}': paced by the device", my.config.names.front());
-    return;
-  }
-  const realtime::ThreadSetup& setup = my.servo.start();
-  for (const realtime::SetupAnswer* answer : setup.all()) {
-    if (!answer->asked) continue;
-    if (answer->granted) {
-      spdlog::info("servo loop of '{}': {}", my.config.names.front(), answer->text);
-    } else {
-      spdlog::warn("servo loop of '{}': {}; {}", my.config.names.front(), answer->text, answer->remedy);
-    }
-  }
+  my.keeper.start();
 }
 
 void Station::stop() {
   Impl& my = *impl_;
   if (!std::exchange(my.running, false)) return;
   my.tick.control().stop();
-  if (my.device->selfPaced()) {
-    my.device->stop();
-  } else {
-    my.servo.stop();
-  }
+  my.keeper.stop();
   my.tick.finish();
   my.device->close();
   my.recorder.finish();
@@ -176,16 +166,21 @@ void Station::stop() {
   }
 }
 
-void Station::checkHealth() {
+std::optional<wire::Text> Station::checkHealth() {
   Impl& my = *impl_;
-  std::string text = my.device->faultText();
-  if (text == my.fault) return;
-  if (text.empty()) {
-    spdlog::info("device '{}': all is well again", my.config.names.front());
-  } else {
-    spdlog::warn("device '{}': {}", my.config.names.front(), text);
-  }
+  std::string text = my.keeper.look(monotonicNow());
+  if (text == my.fault) return std::nullopt;
   my.fault = std::move(text);
+  if (!my.fault.empty()) {
+    spdlog::warn("device '{}': {}", my.config.names.front(), my.fault);
+    return healthText(my.fault);
+  }
+  spdlog::info("device '{}': all is well again", my.config.names.front());
+  const bool latched = my.outbox.last().guard.latched != 0;
+  return wire::Text{
+      .severity = wire::kTextNormal,
+      .level = 0,
+      .text = std::string("the device is well again") + (latched ? "; re-arm to feel forces" : "")};
 }
 
 void Station::checkBlackBox() {
@@ -209,6 +204,7 @@ wire::LocalSender Station::nameFor(const Session& session) const noexcept {
 
 void Station::onSubscribed(Session& session, wire::LocalSender name) {
   impl_->outbox.subscribe(session, name);
+  if (!impl_->fault.empty()) session.send(name, healthText(impl_->fault));
 }
 
 void Station::clientGone(scene::ClientId client) {
@@ -249,13 +245,12 @@ void Station::Impl::onPublished(const scene::SceneSnapshot& snapshot) {
   if (now == explored) return;
   explored = std::move(now);
   simulated->setPath(std::make_shared<const device::WaypointPath>(
-      explore(snapshot, workspaceOf(config, device->profile()), monotonicNow()),
-      device::WaypointPath::Repeat::yes));
+      explore(snapshot, workspaceOf(config, profile), monotonicNow()), device::WaypointPath::Repeat::yes));
 }
 
 DeviceStatus Station::status() const {
   const Impl& my = *impl_;
-  const device::DeviceProfile& profile = my.device->profile();
+  const device::DeviceProfile& profile = my.profile;
   DeviceStatus status;
   status.names = my.config.names;
   status.driver = my.config.driver;

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "record/recorder.h"
@@ -34,8 +35,9 @@ class Station {
   /// Zero force, then the loop ends and the device is closed. Idempotent.
   void stop();
 
-  /// Logs what the driver complains of, when it changed. Call it about once a second.
-  void checkHealth();
+  /// Brings a lost device back. Logs what the driver complains of, when it changed, and gives the words for
+  /// the clients. Call it some times a second.
+  std::optional<wire::Text> checkHealth();
   /// Writes down what the black box has kept. Call it some times a second.
   void checkBlackBox();
 

@@ -2,11 +2,11 @@
 #pragma once
 
 #include "device/simulated/simulated_device.h"
-#include "realtime/servo/servo_thread.h"
 #include "realtime/servo/tick.h"
 #include "server/black_box_recorder.h"
 #include "server/button_modes.h"
 #include "server/device_control.h"
+#include "server/device_keeper.h"
 #include "server/scene_host.h"
 #include "server/station.h"
 
@@ -45,8 +45,9 @@ struct Station::Impl {
   realtime::MonotonicClock clock;
   std::unique_ptr<device::Device> device;
   device::SimulatedDevice* simulated;  // null for other drivers
+  const device::DeviceProfile profile;  // as when it was first opened
   realtime::Tick tick;
-  realtime::ServoThread servo;
+  DeviceKeeper keeper;
   bool running = false;
   bool played = false;  // reports come from a recording, the servo rests
 
@@ -59,7 +60,7 @@ struct Station::Impl {
   Outbox outbox;
   BlackBoxRecorder recorder;
   std::uint64_t droppedReports = 0;
-  std::string fault;  // as last logged
+  std::string fault;  // as last told
 
   // The scene thread's: what the scripted hand was planned for.
   std::vector<std::pair<std::int32_t, std::uint64_t>> explored{{-1, 0}};

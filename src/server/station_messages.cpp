@@ -40,7 +40,7 @@ void Station::onMessage(Session& session, const wire::MessageReceived& message) 
 void Station::Impl::on(Session& session, wire::LocalSender name, const wire::Ping&) {
   const realtime::TickReport& last = outbox.last();
   session.send(name, wire::Pong{});
-  session.send(name, Reporter::buttonStates(device->profile().buttons, frame.buttons,
+  session.send(name, Reporter::buttonStates(profile.buttons, frame.buttons,
                                             last.rendering.touching));
 }
 
@@ -60,7 +60,7 @@ void Station::Impl::on(Session& session, wire::LocalSender name, const wire::Tra
 }
 
 void Station::Impl::on(Session& session, wire::LocalSender name, const wire::TrackerRequestWorkspace&) {
-  session.send(name, trackerWorkspace(workspaceOf(config, device->profile()), outbox.last()));
+  session.send(name, trackerWorkspace(workspaceOf(config, profile), outbox.last()));
 }
 
 void Station::Impl::on(Session& session, wire::LocalSender name, const wire::TrackerSetUpdateRate& wanted) {
@@ -98,7 +98,7 @@ void Station::Impl::on(Session& session, wire::LocalSender name, const wire::But
 }
 
 void Station::Impl::on(Session& session, wire::LocalSender name, const wire::QueryCapabilities&) {
-  session.send(name, capabilities(config, device->profile(), control.canBeHeld()));
+  session.send(name, capabilities(config, profile, control.canBeHeld()));
 }
 
 void Station::Impl::on(Session& session, wire::LocalSender, const wire::StopForces&) {

@@ -73,6 +73,7 @@ class Arm {
   ArmBlock* operator->() const { return block_; }
   explicit operator bool() const { return block_ != nullptr; }
   int fault() const { return block_ != nullptr ? block_->fault.load() : kHealthy; }
+  bool canOpen() const { return fault() != kDoesNotOpen && fault() != kUnplugged; }
 
   /// A tick begins; where the hand is in it.
   const double* begin() {

@@ -47,6 +47,7 @@ class EvdevDevice final : public Device {
   bool read(Nanos now, DeviceState& state) noexcept override;
   bool write(const Vec3& force_N) noexcept override;
   std::string faultText() const override;
+  bool lost() const noexcept override { return error_ != 0; }
 
   /// One round with the device: events in, force out. For the driver's thread.
   void exchange(Nanos now) noexcept;

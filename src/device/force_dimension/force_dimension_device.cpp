@@ -88,6 +88,7 @@ void ForceDimensionDevice::open() {
   }
   state_ = DeviceState();
   failures_ = 0;
+  unreadable_ = false;
   nextStatus_ = 0;
   deviceError_ = switchedOff_ = false;
   hold_ = calibrated_ ? kHoldNone : kHoldNotCalibrated;
@@ -146,6 +147,7 @@ bool ForceDimensionDevice::read(Nanos now, DeviceState& state) noexcept {
   }
   const bool good = sample(now);
   failures_ = good ? 0 : std::min(failures_ + 1, kFailuresToFault);
+  unreadable_.store(failures_ == kFailuresToFault, std::memory_order_relaxed);
   if (now >= nextStatus_) checkStatus(now);
   state_.hold = kHoldNone;
   if (!calibrated_) state_.hold |= kHoldNotCalibrated;

@@ -36,6 +36,7 @@ class ForceDimensionDevice final : public Device {
   bool write(const Vec3& force_N) noexcept override;
 
   std::string faultText() const override;
+  bool lost() const noexcept override { return unreadable_; }
   /// MOVES THE ARM through its workspace when it is not calibrated. Amplifiers that the device switched off
   /// come back at the next force.
   void calibrate() override;
@@ -63,6 +64,7 @@ class ForceDimensionDevice final : public Device {
   std::atomic<bool> busy_{false};  // one thread at a time in the library
   std::atomic<bool> amplifiersOn_{false};
   std::atomic<bool> calibrated_{false};
+  std::atomic<bool> unreadable_{false};
 
   // The servo's.
   DeviceState state_;

@@ -104,6 +104,7 @@ void HaplyDevice::take(std::string_view text) {
   deviceId_ = message->deviceId;
   state_ = message->state;
   state_.time = steadyNow();
+  hold_ = state_.hold;
   sample_.write({state_, true});
 }
 
@@ -144,8 +145,16 @@ bool HaplyDevice::write(const Vec3& force_N) noexcept {
 }
 
 std::string HaplyDevice::faultText() const {
-  const std::lock_guard lock(wordsMutex_);
-  return words_;
+  {
+    const std::lock_guard lock(wordsMutex_);
+    if (!words_.empty()) return words_;
+  }
+  const std::uint32_t hold = hold_;
+  if ((hold & kHoldNotCalibrated) != 0)
+    return "not calibrated: follow the Haply software's steps for the arm";
+  if ((hold & kHoldDeadMan) != 0)
+    return "the service says that the device is not ready; check its power supply";
+  return {};
 }
 
 void HaplyDevice::say(const std::string& words) {

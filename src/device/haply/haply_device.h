@@ -61,6 +61,7 @@ class HaplyDevice final : public Device {
   std::thread thread_;
   std::atomic<bool> stopping_{false};
   std::atomic<bool> connected_{false};
+  std::atomic<std::uint32_t> hold_{kHoldNone};
   std::atomic<bool> failed_{false};  // at least once since open()
   mutable std::mutex wordsMutex_;
   std::string words_;  // why there is no connection

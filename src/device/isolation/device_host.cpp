@@ -11,6 +11,7 @@
 #include <exception>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "device/isolation/shared_block.h"
 
@@ -22,13 +23,19 @@ using namespace isolation;
 // The loop on this side: state out, the newest force in, one tick late.
 class Exchange {
  public:
-  Exchange(Device& device, SharedBlock& block, double rate_Hz)
-      : device_(device), block_(block), period_(geometry::toNanos(1 / rate_Hz)) {}
+  Exchange(Device& device, SharedBlock& block, const DeviceHostOptions& options)
+      : device_(device),
+        block_(block),
+        period_(geometry::toNanos(1 / options.rate_Hz)),
+        beforeFirstTick_(options.beforeFirstTick) {}
   ~Exchange() { stop(); }
 
   void start() {
     if (device_.selfPaced()) {
-      device_.start([this](Nanos now) { tick(now); });
+      device_.start([this, first = true](Nanos now) mutable {
+        if (std::exchange(first, false) && beforeFirstTick_) beforeFirstTick_();
+        tick(now);
+      });
     } else if (!thread_.joinable()) {
       leave_ = false;
       thread_ = std::thread([this] { run(); });
@@ -47,6 +54,7 @@ class Exchange {
   void tick(Nanos now) noexcept {
     Posted posted;
     posted.valid = device_.read(now, posted.state);
+    posted.lost = device_.lost();
     posted.time = monotonicNow();
     block_.state.write(posted);
     countUp(block_.posts);
@@ -61,6 +69,7 @@ class Exchange {
   }
 
   void run() noexcept {
+    if (beforeFirstTick_) beforeFirstTick_();
     for (Nanos due = monotonicNow() + period_; !leave_; due += period_) {
       const timespec until{due / 1'000'000'000, due % 1'000'000'000};
       clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
@@ -73,6 +82,7 @@ class Exchange {
   Device& device_;
   SharedBlock& block_;
   const Nanos period_;
+  const std::function<void()> beforeFirstTick_;
   std::thread thread_;
   std::atomic<bool> leave_{false};
   std::uint64_t lastCommand_ = 0;
@@ -118,7 +128,7 @@ int runDeviceHost(Device& device, const DeviceHostOptions& options) {
     }
     memory->profile = SharedProfile::of(device.profile());
     {
-      Exchange exchange(device, *memory, options.rate_Hz);
+      Exchange exchange(device, *memory, options);
       send("+");
       for (std::string request = receive(); !request.empty(); request = receive()) {
         send(answer(request, device, exchange));

@@ -1,12 +1,15 @@
 // The whole life of a driver's own process.
 #pragma once
 
+#include <functional>
+
 #include "device/device.h"
 
 namespace hapticd::device {
 
 struct DeviceHostOptions {
-  double rate_Hz = 1000;  ///< of the loop of a device that does not pace itself
+  double rate_Hz = 1000;                       ///< of the loop of a device that does not pace itself
+  std::function<void()> beforeFirstTick = {};  ///< in the thread of the loop, whoever owns it
 };
 
 /// Serves this device, not yet open, to the IsolatedDevice that started the process, until that goes away;

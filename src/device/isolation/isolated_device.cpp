@@ -26,6 +26,8 @@ using namespace std::chrono_literals;
 constexpr int kOpen_ms = 30000;
 constexpr int kCalibrate_ms = 60000;
 constexpr int kAnswer_ms = 2000;
+constexpr int kWords_ms = 200;
+constexpr int kEnding_ms = 100;
 constexpr Nanos kSilence = 20'000'000;
 constexpr Nanos kSilentTick = 10'000'000;
 constexpr double kOneTick_s = 0.001;
@@ -52,7 +54,7 @@ void IsolatedDevice::open() {
   }
   profile_ = (*memory_)->profile.toProfile();
   profile_.transportDelay_s += kOneTick_s;
-  silent_ = false;
+  silent_ = lostThere_ = false;
 }
 
 void IsolatedDevice::spawn(int socketOfChild) {
@@ -88,7 +90,8 @@ std::string IsolatedDevice::receive(int most_ms) const {
   std::array<char, 4096> text;
   const long size = recv(socket_, text.data(), text.size(), 0);
   if (size <= 0)
-    throw std::runtime_error("the driver's process ended" + howItEnded() + "; open the device anew");
+    throw std::runtime_error("the driver's process ended" + howItEnded(kEnding_ms) +
+                             "; open the device anew");
   const std::string words(text.data() + 1, static_cast<std::size_t>(size) - 1);
   if (text[0] != '+') throw std::runtime_error(words);
   return words;
@@ -106,12 +109,12 @@ std::string IsolatedDevice::ask(const std::string& request, int most_ms) const {
   return receive(most_ms);
 }
 
-std::string IsolatedDevice::howItEnded() const {
+std::string IsolatedDevice::howItEnded(int most_ms) const {
   siginfo_t info{};
   const auto id = static_cast<id_t>(process_.load());
-  for (int i = 0; i < 100 && info.si_pid == 0; ++i) {
+  for (int i = 0; i <= most_ms && info.si_pid == 0; ++i) {
     if (waitid(P_PID, id, &info, WEXITED | WNOHANG | WNOWAIT) != 0) break;
-    if (info.si_pid == 0) std::this_thread::sleep_for(1ms);
+    if (info.si_pid == 0 && i < most_ms) std::this_thread::sleep_for(1ms);
   }
   if (info.si_pid == 0) return {};
   if (info.si_code == CLD_EXITED) return " with status " + std::to_string(info.si_status);
@@ -179,6 +182,7 @@ bool IsolatedDevice::read(Nanos now, DeviceState& state) noexcept {
   const Posted& posted = (*memory_)->state.read();
   if (!posted.valid && !silent_) return false;
   postToTick_ = now - posted.time;
+  lostThere_.store(posted.lost, std::memory_order_relaxed);
   state = posted.state;
   if (silent_) state.hold |= kHoldFault;
   return true;
@@ -191,9 +195,13 @@ bool IsolatedDevice::write(const Vec3& force_N) noexcept {
 }
 
 std::string IsolatedDevice::faultText() const {
+  if (silent_) {  // who says nothing is not asked
+    const std::string ended = howItEnded(0);
+    if (!ended.empty()) return "the driver's process ended" + ended + "; open the device anew";
+    return "the driver's process posts no states; open the device anew";
+  }
   try {
-    const std::string words = ask("fault", kAnswer_ms);
-    return silent_ ? "the driver's process posts no states; open the device anew" : words;
+    return ask("fault", kWords_ms);
   } catch (const std::exception& error) {
     return error.what();
   }

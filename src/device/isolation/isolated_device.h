@@ -40,6 +40,7 @@ class IsolatedDevice final : public Device {
   bool write(const Vec3& force_N) noexcept override;
 
   std::string faultText() const override;
+  bool lost() const noexcept override { return silent_ || lostThere_; }
   void calibrate() override;
 
   bool selfPaced() const noexcept override { return true; }
@@ -55,7 +56,7 @@ class IsolatedDevice final : public Device {
   void spawn(int socketOfChild);
   std::string receive(int most_ms) const;
   std::string ask(const std::string& request, int most_ms) const;
-  std::string howItEnded() const;
+  std::string howItEnded(int most_ms) const;
   void run() noexcept;
   void endProcess() noexcept;
 
@@ -70,6 +71,7 @@ class IsolatedDevice final : public Device {
   std::thread thread_;
   std::atomic<bool> stopping_{false};
   std::atomic<bool> silent_{false};
+  std::atomic<bool> lostThere_{false};
 
   // The loop's.
   Nanos lastPost_ = 0;

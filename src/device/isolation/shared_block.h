@@ -22,6 +22,7 @@ inline constexpr Nanos kCommandLife = 3'000'000;
 struct Posted {
   DeviceState state;
   bool valid = false;
+  bool lost = false;
   Nanos time = 0;  ///< of the post, CLOCK_MONOTONIC
 };
 

@@ -56,7 +56,8 @@ void OpenHapticsDevice::open() {
   state_ = DeviceState();
   written_N_.setZero();
   frames_ = 0;
-  calibrated_ = hot_ = lost_ = false;
+  calibrated_ = hot_ = false;
+  lost_ = false;
   settling_ = 0;
   hotUntil_ = faultUntil_ = 0;
   hold_ = kHoldNotCalibrated;

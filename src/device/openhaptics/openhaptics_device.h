@@ -35,6 +35,7 @@ class OpenHapticsDevice final : public Device, private hd::Participant {
   bool write(const Vec3& force_N) noexcept override;
 
   std::string faultText() const override;
+  bool lost() const noexcept override { return lost_; }
   /// Encoder reset: the arm in its reset position; inkwell: the stylus docked. Needs the loop to run.
   void calibrate() override;
 
@@ -72,6 +73,7 @@ class OpenHapticsDevice final : public Device, private hd::Participant {
   std::atomic<bool> consent_{false};
   std::atomic<std::uint32_t> hold_{kHoldNone};
   std::atomic<hd::Enum> lastError_{hd::kSuccess};
+  std::atomic<bool> lost_{false};  // until opened anew
 
   // The scheduler thread's from here on.
   ThermalDerating derating_{0, 0};
@@ -84,7 +86,6 @@ class OpenHapticsDevice final : public Device, private hd::Participant {
   bool calibrated_ = false;
   int settling_ = 0;  // frames until the position after a calibration counts
   bool hot_ = false;
-  bool lost_ = false;  // until opened anew
   Nanos hotUntil_ = 0;
   Nanos faultUntil_ = 0;
 };

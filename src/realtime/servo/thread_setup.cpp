@@ -27,7 +27,30 @@ bool hasCapability(unsigned capability) {
   return (data[capability / 32].effective >> (capability % 32) & 1U) != 0;
 }
 
+// A thread of a vendor's library: what it was given there.
+void lookAtScheduling(SetupAnswer& answer) {
+  answer.asked = true;
+  int policy = SCHED_OTHER;
+  sched_param parameters{};
+  pthread_getschedparam(pthread_self(), &policy, &parameters);
+  policy &= ~SCHED_RESET_ON_FORK;
+  answer.granted = policy == SCHED_FIFO || policy == SCHED_RR;
+  const std::string priority = std::to_string(parameters.sched_priority);
+  answer.text = answer.granted ? "the thread of the device's library has realtime priority " + priority
+                               : "the thread of the device's library has normal scheduling";
+  if (!answer.granted) {
+    answer.remedy =
+        "give the program realtime rights (rtprio, or CAP_SYS_NICE), which most libraries then use; or run "
+        "the driver "
+        "in a process of its own (--isolate)";
+  }
+}
+
 void askScheduling(const ThreadRequest& request, SetupAnswer& answer) {
+  if (request.keepScheduling) {
+    lookAtScheduling(answer);
+    return;
+  }
   answer.asked = request.realtime;
   if (!request.realtime) {
     answer.text = "normal scheduling, as chosen";
@@ -126,8 +149,13 @@ ThreadSetup setUpThread(const ThreadRequest& request) {
   askAffinity(request, setup.affinity);
   askMemory(request, setup.memory);
   prctl(PR_SET_TIMERSLACK, 1UL);  // without SCHED_FIFO the kernel may delay a wake-up by 50 us
-  touchStack();
-  setup.stack = {"stack", true, true, std::to_string(kStack_bytes / 1024) + " kB of stack are in memory", ""};
+  if (request.keepScheduling) {
+    setup.stack.text = "the stack of the device's library";
+  } else {
+    touchStack();
+    setup.stack = {"stack", true, true, std::to_string(kStack_bytes / 1024) + " kB of stack are in memory",
+                   ""};
+  }
   setup.denormals.asked = true;
   setup.denormals.granted = FlushDenormals::kSupported;
   setup.denormals.text = FlushDenormals::kSupported ? "denormal numbers are flushed to zero in every tick"

@@ -109,6 +109,14 @@ EXPORT ssize_t read(int fd, void* data, size_t size) {
   return -1;
 }
 
+EXPORT ssize_t write(int fd, const void* data, size_t size) {
+  static const auto real = next<ssize_t (*)(int, const void*, size_t)>("write");
+  if (fd < 0 || fd != device) return real(fd, data, size);
+  const ssize_t sent = send(fd, data, size, MSG_NOSIGNAL);
+  if (sent < 0 && errno == EPIPE) errno = ENODEV;
+  return sent;
+}
+
 EXPORT int close(int fd) {
   static const auto real = next<int (*)(int)>("close");
   int ours = fd;

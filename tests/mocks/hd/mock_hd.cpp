@@ -193,7 +193,7 @@ EXPORT unsigned hdInitDevice(const char* name) {
     if (read(STDIN_FILENO, &key, 1) > 0) crash("took a key from the program's stdin");
   }
   const std::string asked = name == nullptr ? "" : name;
-  if ((m.onlyName != "*" && m.onlyName != asked) || m.shared.fault() == hapticd::mock::kDoesNotOpen) {
+  if ((m.onlyName != "*" && m.onlyName != asked) || !m.shared.canOpen()) {
     push(0x300, 0xFFFFFFFF);
     return 0xFFFFFFFF;
   }

@@ -1,0 +1,118 @@
+#include "server/device_keeper.h"
+
+#include <spdlog/spdlog.h>
+
+#include <exception>
+
+namespace hapticd::server {
+namespace {
+
+using geometry::Nanos;
+
+constexpr Nanos kLostFor = 500'000'000;  // shorter pauses end by themselves
+constexpr Nanos kBetweenAttempts = 2'000'000'000;
+
+}  // namespace
+
+DeviceKeeper::DeviceKeeper(device::Device& device, realtime::Tick& tick, realtime::Clock& clock,
+                           const DeviceKeeperOptions& options)
+    : device_(device), tick_(tick), clock_(clock), options_(options) {}
+
+void DeviceKeeper::start() {
+  startLoop();
+}
+
+void DeviceKeeper::stop() noexcept {
+  if (attempt_.joinable()) attempt_.join();
+  stopLoop();
+}
+
+void DeviceKeeper::startLoop() {
+  if (!device_.selfPaced()) {
+    const realtime::ServoThreadOptions options{
+        .rate_Hz = options_.rate_Hz, .request = {}, .requireRealtime = options_.requireRealtime};
+    servo_.emplace([this](const realtime::Pacing& pacing) { tick_(pacing); }, clock_, options);
+    for (const realtime::SetupAnswer* answer : servo_->start().all()) say(*answer);
+    return;
+  }
+  say(realtime::setUpThread({.realtime = false}).memory);  // of the process, before the first tick
+  isPacedSetUp_ = false;
+  device_.start([this, first = true](Nanos now) mutable {
+    if (first) {
+      pacedSetup_ = realtime::setUpThread({.keepScheduling = options_.vendorsThread, .lockMemory = false});
+      isPacedSetUp_.store(true, std::memory_order_release);
+      first = false;
+    }
+    tick_(now);
+  });
+  spdlog::info("servo loop of '{}': paced by the device", options_.name);
+}
+
+void DeviceKeeper::stopLoop() noexcept {
+  if (device_.selfPaced()) {
+    device_.stop();
+  } else {
+    servo_.reset();
+  }
+}
+
+std::string DeviceKeeper::look(Nanos now) {
+  sayPacedSetup();
+  if (attempt_.joinable()) {
+    if (!attempted_.load(std::memory_order_acquire)) return "the device is being opened anew";
+    attempt_.join();
+    nextAttempt_ = now + kBetweenAttempts;
+    lostSince_ = 0;
+  }
+  if (!refusal_.empty()) {
+    if (now >= nextAttempt_) beginAttempt();
+    return "the device does not open: " + refusal_ + "; it is tried again every 2 s";
+  }
+  std::string words = device_.faultText();
+  if (!device_.lost()) {
+    lostSince_ = 0;
+  } else if (lostSince_ == 0) {
+    lostSince_ = now;
+  } else if (now - lostSince_ > kLostFor) {
+    beginAttempt();
+  }
+  return words;
+}
+
+void DeviceKeeper::beginAttempt() {
+  attempted_ = false;
+  attempt_ = std::thread([this] { attempt(); });
+}
+
+// The guard has latched the fault: whatever comes back, no force does before a re-arm.
+void DeviceKeeper::attempt() noexcept {
+  std::string refusal;
+  try {
+    stopLoop();
+    device_.close();
+    device_.open();
+    startLoop();
+  } catch (const std::exception& error) {
+    refusal = error.what();
+    device_.close();
+  }
+  refusal_ = refusal;
+  attempted_.store(true, std::memory_order_release);
+}
+
+void DeviceKeeper::say(const realtime::SetupAnswer& answer) const {
+  if (!answer.asked) return;
+  if (answer.granted) {
+    spdlog::info("servo loop of '{}': {}", options_.name, answer.text);
+  } else {
+    spdlog::warn("servo loop of '{}': {}; {}", options_.name, answer.text, answer.remedy);
+  }
+}
+
+void DeviceKeeper::sayPacedSetup() {
+  if (!isPacedSetUp_.load(std::memory_order_acquire)) return;
+  for (const realtime::SetupAnswer* answer : pacedSetup_.all()) say(*answer);
+  isPacedSetUp_ = false;
+}
+
+}  // namespace hapticd::server

@@ -1,0 +1,180 @@
+// What goes wrong with a device in contact, in the whole server: the force is gone within the ticks that
+// docs/safety.md promises, clients are told in words, and it comes back without a restart.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <string>
+
+#include "device/haply/mock_service.h"
+#include "device/whole_server/event_kernel.h"
+#include "device/whole_server/in_contact.h"
+
+namespace hapticd::whole_server {
+namespace {
+
+using testing::HasSubstr;
+
+struct Case {
+  const char* name;
+  mock::Fault fault;
+  int ticksWithForce;
+  const char* words;
+  bool reopens = false;
+};
+void PrintTo(const Case& fault, std::ostream* out) {
+  *out << fault.name;
+}
+constexpr auto kName = [](const auto& instance) { return std::string(instance.param.name); };
+
+class OpenHapticsFault : public InContact, public testing::WithParamInterface<Case> {};
+
+TEST_P(OpenHapticsFault, EndsInNoForceAndHeals) {
+  serve({"--device", "openhaptics"}, {"HAPTICD_HDAPI_LIB=" MOCK_HD});
+  strike(GetParam().fault, GetParam().ticksWithForce);
+  expectWords(GetParam().words);
+  if (GetParam().reopens) expectWords("the device does not open");
+  heal(GetParam().reopens);
+  endInOrder();
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Fault, OpenHapticsFault,
+    testing::Values(Case{"Unplugged", mock::kUnplugged, 1, "HD_COMM_ERROR", true},
+                    Case{"WarmMotors", mock::kWarmMotors, 1, "too hot"},
+                    Case{"HotMotors", mock::kHotMotors, 0, "too hot"},
+                    Case{"ForceExceeded", mock::kForceExceeded, 1, "HD_EXCEEDED_MAX_FORCE"},
+                    Case{"NotCalibrated", mock::kNotCalibrated, 100, "not calibrated: put the stylus"}),
+    kName);
+
+class ForceDimensionFault : public InContact, public testing::WithParamInterface<Case> {};
+
+TEST_P(ForceDimensionFault, EndsInNoForceAndHeals) {
+  serve({"--device", "forcedimension"}, {"HAPTICD_DHD_LIB=" MOCK_DRD});
+  strike(GetParam().fault, GetParam().ticksWithForce);
+  expectWords(GetParam().words);
+  if (GetParam().reopens) expectWords("the device does not open");
+  heal(GetParam().reopens);
+  endInOrder();
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Fault, ForceDimensionFault,
+    testing::Values(Case{"Unplugged", mock::kUnplugged, 20, "check power and cable", true},
+                    Case{"ForceExceeded", mock::kForceExceeded, 0, "switched its amplifiers off"},
+                    Case{"NotCalibrated", mock::kNotCalibrated, 10, "not calibrated: keep hands off"}),
+    kName);
+
+class HaplyFault : public InContact {
+ protected:
+  HaplyFault() { service.follow(*arm); }
+  void serve() { InContact::serve({"--device", "haply:127.0.0.1:" + service.port()}, {}); }
+
+  device::MockService service;
+};
+
+TEST_F(HaplyFault, TheServicesStatusEndsTheForce) {
+  serve();
+  strike(mock::kNotCalibrated, 2);
+  expectWords("not calibrated");
+  heal(false);
+}
+
+TEST_F(HaplyFault, AServiceThatIsGoneFreesTheDeviceAndIsFoundAgain) {
+  serve();
+  service.refuse(true);
+  service.hangUp();
+  EXPECT_TRUE(eventually([&] { return arm.left().isZero(); }));
+  expectWords("the device gives no force");
+  service.refuse(false);
+  heal(false);
+}
+
+TEST_F(HaplyFault, ASilentServiceGetsNoMoreForces) {
+  serve();
+  service.mute(true);
+  const int messages = service.messages();
+  EXPECT_TRUE(eventually([&] { return arm.left().isZero(); })) << "hung up, which frees the device";
+  EXPECT_LE(service.messages() - messages, 2);
+  expectWords("no answer within 20 ms");
+  service.mute(false);
+  heal(false);
+}
+
+class OpenHapticsIsolatedFault : public InContact {
+ protected:
+  void serve() { InContact::serve({"--device", "openhaptics", "--isolate"}, {"HAPTICD_HDAPI_LIB=" MOCK_HD}); }
+};
+
+TEST_F(OpenHapticsIsolatedFault, ACrashOfTheLibraryIsAFaultAndANewProcessBringsTheDeviceBack) {
+  serve();
+  const std::int64_t before = arm->ticks;
+  arm->fault = mock::kLibraryCrashes;
+  expectWords("the driver's process ended");
+  EXPECT_TRUE(visitor->until([&] { return visitor->latched(); }));
+  EXPECT_LE(arm->ticks, before + 2) << "nothing is written any more";
+  heal(true);
+  endInOrder();
+}
+
+TEST_F(OpenHapticsIsolatedFault, AHangOfTheLibraryIsAFaultAndANewProcessBringsTheDeviceBack) {
+  serve();
+  arm->fault = mock::kLibraryHangs;
+  expectWords("posts no states");
+  EXPECT_TRUE(visitor->until([&] { return visitor->latched(); }));
+  expectWords("being opened anew");
+  heal(false);
+  endInOrder();
+}
+
+TEST_F(OpenHapticsIsolatedFault, AnUnpluggedDeviceIsReopenedInItsProcess) {
+  serve();
+  strike(mock::kUnplugged, 1);
+  expectWords("HD_COMM_ERROR");
+  heal(true);
+  endInOrder();
+}
+
+TEST_F(OpenHapticsIsolatedFault, ADeviceThatDoesNotOpenIsTriedUntilItDoes) {
+  serve();
+  arm->fault = mock::kUnplugged;
+  expectWords("HD_COMM_ERROR");
+  arm->fault = mock::kDoesNotOpen;
+  expectWords("the device does not open: no OpenHaptics device opens");
+  heal(true);
+  endInOrder();
+}
+
+TEST(InitFailure, EndsTheServerWithWords) {
+  for (const std::string driver : {"openhaptics", "forcedimension"}) {
+    const WorkDirectory work;
+    const SharedArm arm(work.file("arm"));
+    arm->fault = mock::kDoesNotOpen;
+    ServerProcess server(
+        work, {"--device", driver},
+        {"HAPTICD_HDAPI_LIB=" MOCK_HD, "HAPTICD_DHD_LIB=" MOCK_DRD, "HAPTICD_MOCK_ARM=" + work.file("arm")});
+    EXPECT_EQ(server.address(), "");
+    EXPECT_THAT(server.log(), HasSubstr("open")) << driver;
+    EXPECT_TRUE(arm.left().isZero());
+  }
+}
+
+TEST_F(InContact, AnUnpluggedJoystickIsFoundAgain) {
+  scene.stiffness = 0.15F;
+  device::FakeJoystick joystick;
+  EventKernel kernel(work.file("event0"), joystick);
+  serveJoystick();
+  ASSERT_TRUE(pressJoystick(kernel, joystick)) << server->log();
+  kernel.unplug();
+  EXPECT_TRUE(joystick.effects.empty()) << "the kernel ends them";
+  expectWords("plug it in again");
+  EXPECT_TRUE(visitor->until([&] { return visitor->latched(); }));
+  expectWords("the device does not open");
+  kernel.plugIn();
+  expectWords("the device is well again");
+  EXPECT_TRUE(pressJoystick(kernel, joystick)) << server->log();
+  EXPECT_GE(kernel.opened(), 2);
+}
+
+}  // namespace
+}  // namespace hapticd::whole_server

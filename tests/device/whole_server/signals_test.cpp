@@ -1,0 +1,100 @@
+// The server is ended, crashes, or is killed in contact: what force each device is left with, as
+// docs/safety.md tells.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+
+#include <string>
+
+#include "device/haply/mock_service.h"
+#include "device/whole_server/event_kernel.h"
+#include "device/whole_server/in_contact.h"
+
+namespace hapticd::whole_server {
+namespace {
+
+struct End {
+  const char* name;
+  int signal;
+  bool inOrder;
+};
+void PrintTo(const End& end, std::ostream* out) {
+  *out << end.name;
+}
+
+class AfterTheServer : public InContact, public testing::WithParamInterface<End> {
+ protected:
+  // The mock's tick at which the server was gone for certain.
+  std::int64_t endServer() {
+    server->signal(GetParam().signal);
+    const int status = server->end();
+    if (GetParam().inOrder) {
+      EXPECT_EQ(status, 0) << server->log();
+    } else {
+      EXPECT_NE(status, 0);
+      EXPECT_NE(status, -1) << "it did not end";
+    }
+    return arm->ticks;
+  }
+};
+
+TEST_P(AfterTheServer, OpenHaptics) {
+  serve({"--device", "openhaptics"}, {"HAPTICD_HDAPI_LIB=" MOCK_HD});
+  endServer();
+  EXPECT_EQ(arm->closed, GetParam().inOrder ? 1 : 0);
+  // Nobody is left to take the last force back: that is the vendor's driver's then.
+  EXPECT_EQ(arm.left().isZero(), GetParam().inOrder);
+}
+
+TEST_P(AfterTheServer, OpenHapticsInAProcessOfItsOwn) {
+  serve({"--device", "openhaptics", "--isolate"}, {"HAPTICD_HDAPI_LIB=" MOCK_HD});
+  const std::int64_t gone = endServer();
+  EXPECT_TRUE(eventually([&] { return arm->closed == 1; })) << "closed in order";
+  EXPECT_TRUE(arm.left().isZero());
+  // A force lives for 3 ms: three ticks, and the one that had begun.
+  for (std::int64_t tick = gone + 4; tick < arm->ticks; ++tick) EXPECT_TRUE(arm.force(tick).isZero());
+}
+
+TEST_P(AfterTheServer, ForceDimension) {
+  serve({"--device", "forcedimension"}, {"HAPTICD_DHD_LIB=" MOCK_DRD});
+  endServer();
+  if (GetParam().inOrder) {
+    EXPECT_TRUE(arm.left().isZero());
+    EXPECT_EQ(arm->amplifiers, 0);
+    EXPECT_EQ(arm->closed, 1);
+  } else {
+    // The last force, until the watchdog in the device cuts it.
+    EXPECT_EQ(arm->amplifiers, 1);
+    EXPECT_EQ(arm->watchdog_us, 20000);
+  }
+}
+
+TEST_P(AfterTheServer, Haply) {
+  device::MockService service;
+  service.follow(*arm);
+  serve({"--device", "haply:127.0.0.1:" + service.port()}, {});
+  endServer();
+  EXPECT_TRUE(eventually([&] { return arm.left().isZero(); }))
+      << "the service frees the device with its socket";
+}
+
+TEST_P(AfterTheServer, Evdev) {
+  scene.stiffness = 0.15F;
+  device::FakeJoystick joystick;
+  EventKernel kernel(work.file("event0"), joystick);
+  serveJoystick();
+  ASSERT_TRUE(pressJoystick(kernel, joystick)) << server->log();
+  endServer();
+  EXPECT_TRUE(eventually([&] {
+    const std::lock_guard lock(joystick.mutex);
+    return joystick.effects.empty() && joystick.playing.empty();
+  })) << "the kernel ends the effects with their file";
+}
+
+INSTANTIATE_TEST_SUITE_P(By, AfterTheServer,
+                         testing::Values(End{"SIGTERM", SIGTERM, true}, End{"SIGSEGV", SIGSEGV, false},
+                                         End{"SIGKILL", SIGKILL, false}),
+                         [](const auto& instance) { return std::string(instance.param.name); });
+
+}  // namespace
+}  // namespace hapticd::whole_server
