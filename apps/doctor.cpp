@@ -15,6 +15,7 @@
 
 #include "commands.h"
 #include "device_list.h"
+#include "isolation_check.h"
 #include "loop_check.h"
 
 namespace hapticd::apps {
@@ -103,6 +104,24 @@ Finding portFree(int type, const char* protocol, std::uint16_t port) {
           "a VRPN server runs already? Else: hapticd serve --listen 127.0.0.1:3884"};
 }
 
+Finding isolation(double seconds) {
+  constexpr double kCheap_us = 20;
+  try {
+    const IsolationCheck check = measureIsolation(seconds);
+    char text[256];
+    std::snprintf(text, sizeof text,
+                  "from its post to the tick p50 %.1f us, p99 %.1f us, max %.1f us (medians of %d rounds); "
+                  "and one tick of "
+                  "delay",
+                  check.postToTick_us.p50, check.postToTick_us.p99, check.postToTick_us.max, check.rounds);
+    if (check.postToTick_us.p99 < kCheap_us) return {Verdict::good, text, ""};
+    return {Verdict::note, text,
+            "more than 20 us at the 99th percentile: realtime rights and a quiet machine help"};
+  } catch (const std::exception& error) {
+    return {Verdict::note, std::string("cannot be measured: ") + error.what(), ""};
+  }
+}
+
 int run(double seconds, std::uint16_t port) {
   std::vector<Finding> findings;
   const auto add = [&](const Finding& finding) {
@@ -133,6 +152,10 @@ int run(double seconds, std::uint16_t port) {
   const bool steady = loop.wakeup_us.p99 < 100 && loop.overruns * 1000 <= loop.ticks;
   add({steady ? Verdict::good : Verdict::bad, text,
        steady ? "" : "close other programs, give the loop realtime rights, or use a kernel with PREEMPT_RT"});
+
+  std::printf("a driver in a process of its own (--isolate), %g s\n", seconds);
+  std::fflush(stdout);
+  add(isolation(seconds));
 
   int bad = 0;
   int notes = 0;

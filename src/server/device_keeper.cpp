@@ -32,7 +32,9 @@ void DeviceKeeper::startLoop() {
     const realtime::ServoThreadOptions options{
         .rate_Hz = options_.rate_Hz, .request = {}, .requireRealtime = options_.requireRealtime};
     servo_.emplace([this](const realtime::Pacing& pacing) { tick_(pacing); }, clock_, options);
-    for (const realtime::SetupAnswer* answer : servo_->start().all()) say(*answer);
+    const realtime::ThreadSetup& setup = servo_->start();
+    realtime_ = setup.scheduling.granted;
+    for (const realtime::SetupAnswer* answer : setup.all()) say(*answer);
     return;
   }
   say(realtime::setUpThread({.realtime = false}).memory);  // of the process, before the first tick
@@ -40,6 +42,7 @@ void DeviceKeeper::startLoop() {
   device_.start([this, first = true](Nanos now) mutable {
     if (first) {
       pacedSetup_ = realtime::setUpThread({.keepScheduling = options_.vendorsThread, .lockMemory = false});
+      realtime_ = pacedSetup_.scheduling.granted;
       isPacedSetUp_.store(true, std::memory_order_release);
       first = false;
     }

@@ -37,6 +37,9 @@ class DeviceKeeper {
   /// for half a second is closed and opened anew, every two seconds until it opens.
   std::string look(geometry::Nanos now);
 
+  /// The thread of the loop has realtime scheduling.
+  bool realtime() const noexcept { return realtime_; }
+
  private:
   void startLoop();
   void stopLoop() noexcept;
@@ -53,6 +56,7 @@ class DeviceKeeper {
 
   realtime::ThreadSetup pacedSetup_;  // the callback's, then the net thread's
   std::atomic<bool> isPacedSetUp_{false};
+  std::atomic<bool> realtime_{false};
 
   geometry::Nanos lostSince_ = 0;  // 0: not lost
   geometry::Nanos nextAttempt_ = 0;

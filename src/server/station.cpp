@@ -258,7 +258,7 @@ DeviceStatus Station::status() const {
   status.workspace_m = workspaceOf(my.config, profile);
   status.peakForce_N = profile.peakForce_N;
   status.rate_Hz = my.config.servoRate_Hz;
-  status.realtime = !my.device->selfPaced() && my.servo.setup().scheduling.granted;
+  status.realtime = my.keeper.realtime();
   status.heldBy = my.control.holder();
   status.hand = !status.simulated            ? "user"
                 : status.heldBy              ? "held"

@@ -216,21 +216,29 @@ TEST_F(SameForce, ReplayIsItsRecording) {
   std::vector<TickReport> ticks;
   visitor->client().onTick([&](const TickReport& report) { ticks.push_back(report); });
   visitor->client().subscribe(Reports::tick, 1000);
-  // A while without anything that holds the force; the first 0.6 s of it are the ramp after the last hold.
+  // Whole strokes, until the guard took nothing from one of them: a late tick costs half a second of ramp.
+  const auto inAir = [](const TickReport& tick) { return tick.hand_m[2] > 0.0015; };
+  std::vector<Vec3> places;
+  bool whole = false;
   ASSERT_TRUE(visitor->until([&] {
     if (visitor->latched()) visitor->client().rearmForces();
-    const bool held = !ticks.empty() && (ticks.back().guard_active != 0 || ticks.back().guard_latched != 0);
-    if (held) ticks.clear();
-    return ticks.size() >= 1600;
+    if (ticks.size() < 800) return false;
+    ticks.erase(ticks.begin(), std::find_if(ticks.begin(), ticks.end(), inAir));
+    places.clear();
+    for (const TickReport& tick : ticks) places.emplace_back(tick.hand_m[0], tick.hand_m[1], tick.hand_m[2]);
+    const std::vector<Vec3> expected = scene.forces(places);
+    whole = true;
+    for (std::size_t i = 1; i < ticks.size(); ++i) {
+      const Vec3 force(ticks[i].force_N[0], ticks[i].force_N[1], ticks[i].force_N[2]);
+      if (same(force, expected[i])) continue;
+      whole = false;
+      EXPECT_TRUE(partOf(force, expected[i])) << "tick " << ticks[i].tick << ": " << force.transpose()
+                                              << " instead of " << expected[i].transpose();
+    }
+    if (!whole) ticks.clear();
+    return whole || HasFailure();
   })) << server->log();
-  // And the comparison begins in the air.
-  const auto inAir = [](const TickReport& tick) { return tick.hand_m[2] > 0.0015; };
-  ticks.erase(ticks.begin(), std::find_if(ticks.begin() + 600, ticks.end(), inAir));
-  ASSERT_GT(ticks.size(), 50U);
-
-  std::vector<Vec3> places;
-  for (const TickReport& tick : ticks) places.emplace_back(tick.hand_m[0], tick.hand_m[1], tick.hand_m[2]);
-  const std::vector<Vec3> expected = scene.forces(places);
+  ASSERT_TRUE(whole);
   // When the recording began stands in no report: it is found from the first place.
   const geometry::Nanos round = recording->duration() + 1;
   geometry::Nanos begin = 0;
@@ -244,11 +252,7 @@ TEST_F(SameForce, ReplayIsItsRecording) {
   for (std::size_t i = 0; i < ticks.size(); ++i) {
     const Vec3 recorded = recording->at((ticks[i].tick_time.count() - begin) % round).position_m;
     far_m = std::max(far_m, (recorded - places[i]).norm());
-    const Vec3 force(ticks[i].force_N[0], ticks[i].force_N[1], ticks[i].force_N[2]);
-    ASSERT_TRUE(i == 0 || same(force, expected[i]))
-        << "tick " << ticks[i].tick << ", number " << i << ": " << force.transpose() << " instead of "
-        << expected[i].transpose() << "; scene " << ticks[i].revision;
-    most_N = std::max(most_N, force.norm());
+    most_N = std::max(most_N, Vec3(ticks[i].force_N[0], ticks[i].force_N[1], ticks[i].force_N[2]).norm());
   }
   EXPECT_LT(far_m, 1e-6) << "a microsecond of the hand is less than a micrometre";
   EXPECT_GT(most_N, 0.5);
