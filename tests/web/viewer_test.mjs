@@ -46,11 +46,10 @@ test("the scene appears", async () => {
   await server.touch(join(sourceDir, "testdata/meshes/bunny.obj"));
   await viewer.showsTriangles(3674);
   await viewer.until("the notice is gone", async () => !(await viewer.page.isVisible("#notice")));
-  const on = await viewer.pointOnObject();
   const box = await viewer.page.locator("#view").boundingBox();
   const corner = { x: box.x + 5, y: box.y + 0.6 * box.height };
   const differs = async (more, less, least) => {
-    const [rgb] = await viewer.pixels([on]);
+    const [rgb] = await viewer.pixels([await viewer.pointOnObject()]);
     return rgb[more] > rgb[less] + least;
   };
   await viewer.until("400 of 500 N/m are yellow", () => differs(0, 2, 40));
