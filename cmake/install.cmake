@@ -29,3 +29,5 @@ install(FILES ${PROJECT_BINARY_DIR}/hapticdConfig.cmake ${PROJECT_BINARY_DIR}/ha
 file(RELATIVE_PATH HAPTICD_PC_TO_PREFIX /prefix/${CMAKE_INSTALL_LIBDIR}/pkgconfig /prefix)
 configure_file(cmake/hapticd.pc.in hapticd.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/hapticd.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+
+install(FILES packaging/grafana/hapticd.json DESTINATION ${CMAKE_INSTALL_DATADIR}/hapticd/grafana)

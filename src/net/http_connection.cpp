@@ -67,19 +67,16 @@ void HttpConnection::receive(std::span<const std::byte> bytes) {
 }
 
 void HttpConnection::readOn() {
-  while (!input_.empty() && (state_ == State::idle || state_ == State::receiving)) {
-    if (state_ == State::idle) {
-      state_ = State::receiving;
-      parser_.emplace();
-      parser_->header_limit(static_cast<std::uint32_t>(options_.headerBytes));
-      parser_->body_limit(options_.bodyBytes);
-      parser_->eager(true);
-      limit(options_.requestTimeout, "the request did not end in time");
-    }
-    const std::size_t before = input_.size();
-    parse();
-    if (state_ == State::receiving && input_.size() == before) return;  // it takes more bytes
+  if (input_.empty() || (state_ != State::idle && state_ != State::receiving)) return;
+  if (state_ == State::idle) {
+    state_ = State::receiving;
+    parser_.emplace();
+    parser_->header_limit(static_cast<std::uint32_t>(options_.headerBytes));
+    parser_->body_limit(options_.bodyBytes);
+    parser_->eager(true);
+    limit(options_.requestTimeout, "the request did not end in time");
   }
+  parse();
 }
 
 void HttpConnection::parse() {
@@ -160,7 +157,10 @@ void HttpConnection::sendBody() {
     if (size > 0) connection_.send(std::span(*body_).subspan(bodySent_, size));
     bodySent_ += size;
     connection_.flush();
-    if (!connection_.isOpen() || connection_.statistics().queuedBytes > 0) return;
+    // Reading is paused, so that nothing else would tell of a client that is gone.
+    if (!connection_.isOpen()) return connection_.abort("the client is gone");
+    if (connection_.statistics().queuedBytes > 0)
+      return limit(options_.answerTimeout, "the answer is not read");
     if (bodySent_ == body_->size()) answered();
   }
 }
@@ -176,7 +176,7 @@ void HttpConnection::answered() {
   state_ = State::idle;
   limit(options_.idleTimeout, "no request in time");
   connection_.resumeReading();
-  // Not from here, or a client that sends thousands of requests at once would make a deep stack.
+  // Not from here: a client that sends thousands of requests at once waits in line with everybody else.
   if (input_.empty()) return;
   loop_.post([weak = weak_from_this()] {
     if (const auto self = weak.lock()) self->readOn();

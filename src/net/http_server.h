@@ -20,7 +20,7 @@ struct HttpOptions {
   std::size_t bodyBytes = 4096;
   std::chrono::milliseconds requestTimeout{10000};  ///< from the first byte of a request to its last
   std::chrono::milliseconds idleTimeout{60000};     ///< without a request
-  std::chrono::milliseconds answerTimeout{30000};   ///< for the handler to answer and the client to read it
+  std::chrono::milliseconds answerTimeout{30000};   ///< for the handler, then for the client to read a piece
   ConnectionOptions connection;
 };
 

@@ -45,6 +45,7 @@ ClientStatus Session::status() const {
   status.address = connection_.remote().text();
   status.mode = nameOf(mode_);
   for (const wire::LocalSender name : subscriptions_) {
+    if (name.value == 0) continue;  // VRPN's own
     status.devices.push_back(names_.senders()[static_cast<std::size_t>(name.value)]);
   }
   status.connected_s = geometry::toSeconds(monotonicNow() - since_);

@@ -50,12 +50,17 @@ struct Http {
   /// Until the peer has so many bytes, or the connection has ended.
   std::string receive(RawSocket& peer, std::size_t size) {
     std::string text;
-    pumpUntil(loop, [&] {
-      std::string part(size - text.size(), '\0');
+    const auto end = std::chrono::steady_clock::now() + 60s;
+    while (text.size() < size && std::chrono::steady_clock::now() < end) {
+      std::string part(std::min<std::size_t>(size - text.size(), 65536), '\0');
       const ssize_t got = ::recv(peer.fd(), part.data(), part.size(), MSG_DONTWAIT);
-      if (got > 0) text.append(part, 0, static_cast<std::size_t>(got));
-      return text.size() == size || got == 0 || (got < 0 && errno != EAGAIN);
-    });
+      if (got == 0 || (got < 0 && errno != EAGAIN)) break;
+      if (got > 0) {
+        text.append(part, 0, static_cast<std::size_t>(got));
+      } else {
+        loop.runOnce(1ms);
+      }
+    }
     return text;
   }
   std::string receiveAll(RawSocket& peer) { return receive(peer, std::size_t{1} << 30); }

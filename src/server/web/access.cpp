@@ -14,12 +14,12 @@ std::string lowerCase(std::string_view text) {
   return lower;
 }
 
-// HOST:PORT of a Host header or an origin; without a port it is 80, as http has it.
-std::string withPort(std::string_view authority) {
+// HOST:PORT of a Host header or an origin; without a port it is the one of the scheme.
+std::string withPort(std::string_view authority, std::string_view portOfScheme) {
   const std::size_t colon = authority.rfind(':');
   const std::size_t bracket = authority.rfind(']');
   const bool has = colon != std::string_view::npos && (bracket == std::string_view::npos || colon > bracket);
-  return lowerCase(authority) + (has ? "" : ":80");
+  return lowerCase(authority) + (has ? "" : std::string(portOfScheme));
 }
 
 std::string quoted(std::string_view text) {
@@ -39,8 +39,9 @@ WebAccess::WebAccess(const net::Endpoint& local, std::vector<std::string> allowe
 }
 
 // An address cannot be made to lead elsewhere, as a name can.
-bool WebAccess::isOurs(std::string_view authority, const net::HttpRequest& request) const {
-  const std::string host = withPort(authority);
+bool WebAccess::isOurs(std::string_view authority, std::string_view portOfScheme,
+                       const net::HttpRequest& request) const {
+  const std::string host = withPort(authority, portOfScheme);
   return std::find(hosts_.begin(), hosts_.end(), host) != hosts_.end() ||
          host == net::Endpoint{request.local.address, port_}.text();
 }
@@ -48,15 +49,15 @@ bool WebAccess::isOurs(std::string_view authority, const net::HttpRequest& reque
 std::string WebAccess::refusal(const net::HttpRequest& request) const {
   if (request.count("host") != 1) return "a request names its host once";
   const std::string_view host = request.header("host");
-  if (!isOurs(host, request)) {
+  if (!isOurs(host, ":80", request)) {
     return "this server is not " + quoted(host) +
            ": use its address, or allow the name with --http-allow when it is one of yours";
   }
   for (const auto& [name, value] : request.headers) {
     if (name != "origin") continue;
     const std::string_view origin = value;
-    const std::size_t scheme = origin.starts_with("http://") ? 7 : origin.starts_with("https://") ? 8 : 0;
-    if (scheme > 0 && isOurs(origin.substr(scheme), request)) continue;
+    if (origin.starts_with("http://") && isOurs(origin.substr(7), ":80", request)) continue;
+    if (origin.starts_with("https://") && isOurs(origin.substr(8), ":443", request)) continue;
     return "pages of " + quoted(origin) + " may not use this server";
   }
   // Images and scripts of other pages come without an origin.

@@ -22,7 +22,8 @@ class WebAccess {
   std::string refusal(const net::HttpRequest& request) const;
 
  private:
-  bool isOurs(std::string_view authority, const net::HttpRequest& request) const;
+  bool isOurs(std::string_view authority, std::string_view portOfScheme,
+              const net::HttpRequest& request) const;
 
   std::uint16_t port_;
   std::vector<std::string> hosts_;  // lower case, with port

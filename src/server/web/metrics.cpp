@@ -127,8 +127,8 @@ void ofScenes(Text& out, const Picture& picture, std::string_view name, std::str
 
 void scenes(Text& out, const Picture& picture) {
   using Scene = scene::SceneDescription;
-  ofScenes(out, picture, "hapticd_scene_revision", "counter", "Changes of the scene that were published.",
-           [](const Scene& s) { return s.revision; });
+  ofScenes(out, picture, "hapticd_scene_changes_total", "counter",
+           "Changes of the scene that were published.", [](const Scene& s) { return s.revision; });
   ofScenes(out, picture, "hapticd_scene_objects", "gauge", "Objects in the scene.",
            [](const Scene& s) { return s.objects.size(); });
   ofScenes(out, picture, "hapticd_scene_vertices", "gauge", "Vertices of all objects.", [](const Scene& s) {

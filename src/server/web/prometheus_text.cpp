@@ -67,7 +67,7 @@ void PrometheusText::histogram(const Histogram::Copy& histogram, std::string_vie
       count += histogram.counts[static_cast<std::size_t>(bucket)];
     }
     // Whole nanoseconds below the bound: no value lies between this and the bound.
-    const double upTo_s = static_cast<double>(bound - 1) * 1e-9;
+    const double upTo_s = static_cast<double>(bound - 1) / 1e9;
     line("_bucket", static_cast<double>(count), {{"device", device}, {"le", textOf(upTo_s)}});
   }
   line("_bucket", static_cast<double>(histogram.total), {{"device", device}, {"le", "+Inf"}});

@@ -1,0 +1,162 @@
+#include "server/web/display_mesh.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <numbers>
+#include <random>
+
+namespace hapticd::server {
+namespace {
+
+using geometry::Triangle;
+using geometry::Vec3f;
+
+struct Shape {
+  std::vector<Vec3f> vertices;
+  std::vector<Triangle> triangles;
+};
+
+/// What the page makes of the bytes; fails when they are not one whole mesh.
+Shape decode(const net::Buffer& bytes) {
+  std::uint32_t head[4];
+  EXPECT_GE(bytes.size(), sizeof head);
+  std::memcpy(head, bytes.data(), sizeof head);
+  EXPECT_EQ(std::memcmp(bytes.data(), "HDM1", 4), 0);
+  EXPECT_EQ(head[3], 0u);
+  Shape shape;
+  shape.vertices.resize(head[1]);
+  shape.triangles.resize(head[2]);
+  EXPECT_EQ(bytes.size(), sizeof head + head[1] * 12u + head[2] * 12u);
+  if (bytes.size() == sizeof head) return shape;
+  std::memcpy(static_cast<void*>(shape.vertices.data()), bytes.data() + 16, head[1] * 12u);
+  std::memcpy(shape.triangles.data(), bytes.data() + 16 + head[1] * 12u, head[2] * 12u);
+  for (const Triangle& t : shape.triangles) {
+    for (const std::uint32_t corner : t) EXPECT_LT(corner, shape.vertices.size());
+  }
+  return shape;
+}
+
+Shape displayed(const Shape& shape, std::size_t most) {
+  return decode(displayMesh(shape.vertices, shape.triangles, most, false));
+}
+
+/// A sphere with 2 n n faces.
+Shape sphere(std::uint32_t n, float radius = 50) {
+  Shape shape;
+  for (std::uint32_t i = 0; i <= n; ++i) {
+    for (std::uint32_t j = 0; j < n; ++j) {
+      const double polar = std::numbers::pi * i / n;
+      const double round = 2 * std::numbers::pi * j / n;
+      shape.vertices.emplace_back(radius * static_cast<float>(std::sin(polar) * std::cos(round)),
+                                  radius * static_cast<float>(std::cos(polar)),
+                                  radius * static_cast<float>(-std::sin(polar) * std::sin(round)));
+    }
+  }
+  for (std::uint32_t i = 0; i < n; ++i) {
+    for (std::uint32_t j = 0; j < n; ++j) {
+      const std::uint32_t a = i * n + j, b = i * n + (j + 1) % n, c = a + n, d = b + n;
+      shape.triangles.push_back({a, c, b});
+      shape.triangles.push_back({b, c, d});
+    }
+  }
+  return shape;
+}
+
+TEST(DisplayMesh, WhatFitsComesAsItIs) {
+  const Shape shape = sphere(20);
+  const Shape shown = displayed(shape, 800);
+  EXPECT_EQ(shown.triangles.size(), 800u);
+  for (std::size_t i = 0; i < shape.triangles.size(); ++i) {
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      EXPECT_EQ(shown.vertices[shown.triangles[i][corner]], shape.vertices[shape.triangles[i][corner]]);
+    }
+  }
+}
+
+TEST(DisplayMesh, WhatDoesNotFitIsSimplifiedAndKeepsItsShape) {
+  const Shape shape = sphere(250);  // 125000 faces
+  for (const std::size_t most : {50'000UL, 5'000UL, 500UL}) {
+    const Shape shown = displayed(shape, most);
+    EXPECT_LE(shown.triangles.size(), most);
+    EXPECT_GE(shown.triangles.size(), most / 3) << most;
+    double volume = 0;
+    for (const Triangle& t : shown.triangles) {
+      const Vec3f &a = shown.vertices[t[0]], &b = shown.vertices[t[1]], &c = shown.vertices[t[2]];
+      volume += a.cast<double>().dot(b.cast<double>().cross(c.cast<double>())) / 6;
+    }
+    const double whole = 4.0 / 3 * std::numbers::pi * std::pow(50, 3);
+    EXPECT_NEAR(volume / whole, 1, 0.12) << most << ": the faces look outwards, as before";
+    for (const Vec3f& v : shown.vertices) EXPECT_NEAR(v.norm(), 50, 8);
+  }
+}
+
+TEST(DisplayMesh, TheSameShapeGivesTheSameBytes) {
+  const Shape shape = sphere(60);
+  EXPECT_EQ(displayMesh(shape.vertices, shape.triangles, 1000, false),
+            displayMesh(shape.vertices, shape.triangles, 1000, false));
+}
+
+TEST(DisplayMesh, WhatIsNoTriangleIsLeftOut) {
+  constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+  constexpr float kInf = std::numeric_limits<float>::infinity();
+  const Shape shape{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {kNaN, 0, 0}, {0, kInf, 0}},
+                    {{0, 1, 2}, {0, 0, 0}, {0, 1, 3}, {0, 4, 2}, {0, 1, 5}, {0xffffffffU, 1, 2}, {1, 1, 2}}};
+  const Shape shown = displayed(shape, 10);
+  EXPECT_EQ(shown.triangles.size(), 1u);
+  EXPECT_EQ(shown.vertices.size(), 3u);
+}
+
+TEST(DisplayMesh, NothingIsAMeshToo) {
+  EXPECT_TRUE(displayed({}, 10).triangles.empty());
+  EXPECT_TRUE(displayed(sphere(10), 0).triangles.empty());
+  const std::vector<Vec3f> many(100000, Vec3f::Zero());
+  EXPECT_TRUE(decode(displayMesh(many, {}, 10, false)).vertices.empty());
+}
+
+TEST(DisplayMesh, FlatFarAndTinyShapesAreSimplified) {
+  Shape flat = sphere(100);
+  for (Vec3f& v : flat.vertices) v.y() = 7;
+  EXPECT_GT(displayed(flat, 2000).triangles.size(), 100u);
+  for (const float radius : {1e-30F, 1e-6F, 1e30F}) {
+    EXPECT_GT(displayed(sphere(100, radius), 2000).triangles.size(), 500u) << radius;
+  }
+  Shape point = sphere(100);
+  for (Vec3f& v : point.vertices) v = Vec3f::Ones();
+  EXPECT_LE(displayed(point, 2000).triangles.size(), 2000u);
+}
+
+TEST(DisplayMesh, SoupsAreBounded) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<float> at(-1, 1);
+  Shape soup;
+  for (std::uint32_t i = 0; i < 20000; ++i) {
+    for (int corner = 0; corner < 3; ++corner) soup.vertices.emplace_back(at(random), at(random), at(random));
+    soup.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+  }
+  EXPECT_LE(displayed(soup, 3000).triangles.size(), 3000u);
+}
+
+TEST(DisplayMesh, ACancelledOneIsEmpty) {
+  const Shape shape = sphere(100);
+  EXPECT_TRUE(decode(displayMesh(shape.vertices, shape.triangles, 100, true)).triangles.empty());
+}
+
+TEST(DisplayShare, AllTogetherStayWithinTheLimit) {
+  EXPECT_EQ(displayShare(100'000, 100'000, 1), 100'000u);
+  EXPECT_EQ(displayShare(12, 1'000'012, 2), 12u) << "a cube beside a scan stays a cube";
+  std::mt19937 random(5);
+  for (int round = 0; round < 200; ++round) {
+    std::vector<std::size_t> sizes(1 + random() % 300);
+    std::size_t all = 0;
+    for (std::size_t& size : sizes) all += size = random() % (1U << (random() % 22));
+    std::size_t shown = 0;
+    for (const std::size_t size : sizes) shown += displayShare(size, all, sizes.size());
+    EXPECT_LE(shown, kDisplayTriangles);
+  }
+}
+
+}  // namespace
+}  // namespace hapticd::server
