@@ -7,6 +7,7 @@ function(hapticd_embed_web target)
   set(web ${PROJECT_SOURCE_DIR}/web)
   set(out ${CMAKE_BINARY_DIR}/web)
   set(bundle "")
+  set(dist ${out}/none)
   find_program(NODE_EXECUTABLE node)
   find_program(NPM_EXECUTABLE npm)
   if(HAPTICD_WEB AND EXISTS ${web}/package.json AND NOT (NODE_EXECUTABLE AND NPM_EXECUTABLE))
@@ -16,16 +17,15 @@ function(hapticd_embed_web target)
     file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${web}/src/* ${web}/static/*)
     file(GLOB files CONFIGURE_DEPENDS ${web}/*.json ${web}/*.mjs)
     set(bundle ${out}/bundle.stamp)
+    set(dist ${out}/dist)
     add_custom_command(OUTPUT ${bundle}
       COMMAND ${CMAKE_COMMAND} -DWEB=${web} -DOUT=${out} -DNPM=${NPM_EXECUTABLE} -P ${PROJECT_SOURCE_DIR}/cmake/build_web.cmake
       DEPENDS ${sources} ${files} ${PROJECT_SOURCE_DIR}/cmake/build_web.cmake
       COMMENT "Building the viewer"
       VERBATIM)
-  else()
-    file(REMOVE_RECURSE ${out}/dist)
   endif()
   add_custom_command(OUTPUT ${out}/web_bundle.cpp
-    COMMAND ${CMAKE_COMMAND} -DDIST=${out}/dist -DOUT=${out}/web_bundle.cpp -P ${PROJECT_SOURCE_DIR}/cmake/embed_web.cmake
+    COMMAND ${CMAKE_COMMAND} -DDIST=${dist} -DOUT=${out}/web_bundle.cpp -P ${PROJECT_SOURCE_DIR}/cmake/embed_web.cmake
     DEPENDS ${bundle} ${PROJECT_SOURCE_DIR}/cmake/embed_web.cmake
     VERBATIM)
   target_sources(${target} PRIVATE ${out}/web_bundle.cpp)
