@@ -270,6 +270,7 @@ void sendGrid(ScriptedPeer& peer) {
   send(wire::MeshTriangles{}, corners, &wire::MeshTriangles::vertices);
   peer.queue(wire::SetHapticProperty{0, "stiffness", 1.0F});
   peer.send(wire::BatchCommit{});
+  peer.until([&] { return peer.connection().statistics().queuedBytes == 0; });
 }
 
 TEST_F(Web, AMillionTrianglesAreShownAsAHundredThousandAndHoldNobodyUp) {
