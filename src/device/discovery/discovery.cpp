@@ -13,6 +13,10 @@
 namespace hapticd::device {
 namespace {
 
+constexpr const char* kUdev =
+    "sudo cp packaging/udev/70-hapticd.rules /etc/udev/rules.d/ && sudo udevadm control --reload && "
+    "sudo udevadm trigger";
+
 std::string pluggedIn(const std::vector<UsbDevice>& devices) {
   std::string words;
   for (const UsbDevice& device : devices) words += device.text() + " is plugged in; ";
@@ -43,8 +47,8 @@ DriverReport findOpenHaptics(const DiscoveryOptions& options) {
     report.devices.push_back(device.description());
   } catch (const std::exception& error) {
     report.reason = pluggedIn(usb) + error.what();
-    report.remedy =
-        "run the vendor's setup tool once; for a USB device install packaging/udev/70-hapticd.rules";
+    report.remedy = "run the vendor's setup tool once, as it names the device; for a USB device also: " +
+                    std::string(kUdev);
   }
   return report;
 }
@@ -58,8 +62,8 @@ DriverReport findForceDimension(const DiscoveryOptions& options) {
     for (int i = 0; i < count; ++i) report.devices.push_back("device " + std::to_string(i));
     if (count > 0) return report;
     report.reason = pluggedIn(usb) + "the library finds no device";
-    report.remedy = usb.empty() ? "connect the device and switch it on"
-                                : "install packaging/udev/70-hapticd.rules and plug it in again";
+    report.remedy =
+        usb.empty() ? "connect the device and switch it on" : kUdev + std::string("; then plug it in again");
   } catch (const LibraryError& error) {
     report.reason = pluggedIn(usb) + error.what();
     report.remedy = "install the SDK of Force Dimension (libdrd.so.3), and libusb-1.0";
@@ -81,7 +85,8 @@ DriverReport findHaply(const DiscoveryOptions& options) {
     report.remedy = "connect the device and switch it on";
   } catch (const std::exception& error) {
     report.reason = error.what();
-    report.remedy = "install the Haply Inverse Service and start haply-inverse-service";
+    report.remedy =
+        "install the Haply Inverse Service, then: sudo systemctl enable --now haply-inverse-service";
   }
   return report;
 }
@@ -96,7 +101,7 @@ DriverReport findEvdev() {
       // A keyboard.
     } catch (const std::exception& error) {
       report.reason += (report.reason.empty() ? "" : "; ") + std::string(error.what());
-      report.remedy = "install packaging/udev/70-hapticd.rules";
+      report.remedy = kUdev;
     }
   }
   if (report.devices.empty() && report.reason.empty()) {

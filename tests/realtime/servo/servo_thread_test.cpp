@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sched.h>
 
 #include <atomic>
 #include <stdexcept>
@@ -191,6 +192,18 @@ TEST(ServoThread, ALoopAmongItsNeighbours) {
   EXPECT_EQ(received + dropped, newest);
   tick.finish();
   EXPECT_EQ(device.written_N, Vec3::Zero());
+}
+
+TEST(ThreadSetup, SomebodyElsesThreadKeepsWhatItHas) {
+  std::thread([] {
+    const int before = sched_getscheduler(0);
+    const ThreadSetup setup = setUpThread({.keepScheduling = true, .lockMemory = false});
+    EXPECT_EQ(sched_getscheduler(0), before);
+    EXPECT_TRUE(setup.scheduling.asked);
+    EXPECT_EQ(setup.scheduling.granted, before == SCHED_FIFO || before == SCHED_RR);
+    EXPECT_EQ(setup.scheduling.remedy.empty(), setup.scheduling.granted);
+    EXPECT_FALSE(setup.stack.asked);
+  }).join();
 }
 
 }  // namespace
