@@ -7,7 +7,7 @@ struct IoctlMessage {
   unsigned long request = 0;
   long number = 0;  ///< for a request whose argument is no pointer
   int error = 0;    ///< errno in the answer
-  unsigned char data[512] = {};
+  alignas(16) unsigned char data[512] = {};
 };
 
 }  // namespace hapticd::mock
