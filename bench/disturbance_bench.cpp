@@ -90,7 +90,6 @@ bool canRecord() {
 struct Phase {
   std::string what;
   Disturber disturb;
-  std::vector<std::string> arguments{};
 };
 
 class Disturbance {
@@ -100,7 +99,7 @@ class Disturbance {
 
   void measure(const Phase& phase) {
     run_.progress(phase.what);
-    ServerProcess server(handFile(20, static_cast<int>(Act::slide)), phase.arguments);
+    ServerProcess server(handFile(20, static_cast<int>(Act::slide)));
     TickWatcher watcher(server.device());
     prepare(server);
     // The same server undisturbed, just before.
@@ -109,7 +108,7 @@ class Disturbance {
     std::string failure;
     std::thread disturber([&] {
       try {
-        if (phase.disturb) phase.disturb(server, stop);
+        phase.disturb(server, stop);
       } catch (const std::exception& error) {
         if (!stop) failure = error.what();
       }
@@ -119,6 +118,12 @@ class Disturbance {
     stop = true;
     disturber.join();
     add(phase.what, quiet, disturbed, failure);
+  }
+  /// A server with these arguments beside one without, both undisturbed.
+  void compare(const std::string& what, const std::vector<std::string>& arguments) {
+    run_.progress(what);
+    const Watched without = alone({});
+    add(what, without, alone(arguments), {});
   }
   Outcome take() { return std::move(outcome_); }
   void remark(const std::string& text) { outcome_.remarks.push_back(text); }
@@ -134,6 +139,13 @@ class Disturbance {
     client.setSurfaceProperty(2, "stiffness", 0.5F);
     client.uploadMesh(2, {vertices, mesh.triangles});
     client.runFor(500ms);
+  }
+
+  Watched alone(const std::vector<std::string>& arguments) const {
+    const ServerProcess server(handFile(20, static_cast<int>(Act::slide)), arguments);
+    TickWatcher watcher(server.device());
+    prepare(server);
+    return watch(watcher, seconds_);
   }
 
   static Watched watch(TickWatcher& watcher, double seconds) {
@@ -181,8 +193,8 @@ Outcome measureDisturbance(const Run& run) {
   for (const Phase& phase : phases) disturbance.measure(phase);
   if (canRecord()) {
     const WorkDirectory work;
-    disturbance.measure(
-        {"(f) recording on (both columns)", nullptr, {"--record", (work / "record").string()}});
+    disturbance.compare("(f) recording on, against a server that does not",
+                        {"--record", (work / "record").string()});
   } else {
     disturbance.remark("(f) recording: this build of serve has no --record.");
   }

@@ -158,11 +158,9 @@ class Measurement {
   }
 
   void spaced(Stepper& ours, Regime regime, double seconds, Pair& pair) {
+    const std::size_t stride = regime == Regime::cold ? strideFor(seconds) : 1;
     std::int64_t due = nowNs();
     const std::int64_t end = due + static_cast<std::int64_t>(seconds * 1e9);
-    // In strides, so that a few seconds see all that the hand does; the way between is gone without
-    // measuring.
-    const std::size_t stride = regime == Regime::cold ? 7 : 1;
     for (std::size_t i = 0; nowNs() < end; i = (i + 1) % hand_.size()) {
       if (i % stride != 0 || hand_[i].act == Act::way) {
         ours.step(i), ours.after();
@@ -173,6 +171,14 @@ class Measurement {
       prepare(regime, due);
       measure(bare_, i, pair.bare);
     }
+  }
+
+  // A few seconds must see all that the hand does: the way between is gone without measuring.
+  std::size_t strideFor(double seconds) {
+    const std::int64_t begin = nowNs();
+    for (int i = 0; i < 4; ++i) evictor_.evict();
+    const double pair_s = static_cast<double>(nowNs() - begin) * 1e-9 / 2;
+    return static_cast<std::size_t>(static_cast<double>(hand_.size()) * pair_s / seconds) + 7;
   }
 
   void prepare(Regime regime, std::int64_t& due) {
@@ -249,6 +255,7 @@ class TickBench {
     outcome_.rows.push_back(row);
     if (!million_ || kind != What::point) return;
     for (const Act act : kActs) {
+      if (pair.ours.count(act) == 0) continue;
       outcome_.rows.push_back({"- " + what + nameOf(regime) + ", " + bench::nameOf(act),
                                "us",
                                pair.ours.at(act).summary(),
