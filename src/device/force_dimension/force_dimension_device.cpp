@@ -226,7 +226,7 @@ bool ForceDimensionDevice::switchOn() noexcept {
 
 void ForceDimensionDevice::calibrate() {
   if (id_ < 0) throw std::runtime_error("the Force Dimension device is not open");
-  for (int i = 0; i < 100; ++i) {
+  for (int i = 0; i < 1000; ++i) {
     const Turn turn(busy_);
     if (!turn) {
       std::this_thread::sleep_for(1ms);
