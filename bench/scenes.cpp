@@ -26,8 +26,9 @@ Vec3 slideDirection(double t) {
   return onSphere(1.5 + 0.5 * std::sin(1.3 * t), 1.9 * t);
 }
 
-// Up, round the ball and down again.
-void addWay(const Vec3& from, const Vec3& to, std::vector<HandTick>& ticks) {
+// From where the hand is: up, round the ball and down again.
+void addWay(const Vec3& to, std::vector<HandTick>& ticks) {
+  const Vec3 from = ticks.back().position_m;
   const geometry::Quat turn = geometry::Quat::FromTwoVectors(from, to);
   for (int i = 1; i <= kWayTicks; ++i) {
     const double s = static_cast<double>(i) / (kWayTicks + 1);
@@ -125,7 +126,7 @@ std::vector<HandTick> handOf(int rounds) {
     const Act act = kActs[k % 3];
     for (int i = 0; i < kActTicks; ++i) ticks.push_back({act, handAt(act, (k / 3 * kActTicks + i) * 1e-3)});
     const int next = (k + 1) % acts;
-    addWay(ticks.back().position_m, handAt(kActs[next % 3], next / 3 * kActTicks * 1e-3), ticks);
+    addWay(handAt(kActs[next % 3], next / 3 * kActTicks * 1e-3), ticks);
   }
   // From the air: a hand that begins inside a closed mesh stays inside.
   std::rotate(ticks.begin(), ticks.end() - kWayTicks / 2, ticks.end());
