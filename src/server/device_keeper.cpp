@@ -68,8 +68,9 @@ std::string DeviceKeeper::look(Nanos now) {
     lostSince_ = 0;
   }
   if (!refusal_.empty()) {
-    if (now >= nextAttempt_) beginAttempt();
-    return "the device does not open: " + refusal_ + "; it is tried again every 2 s";
+    std::string refused = "the device does not open: " + refusal_ + "; it is tried again every 2 s";
+    if (now >= nextAttempt_) beginAttempt();  // refusal_ is the attempt's from here on
+    return refused;
   }
   std::string words = device_.faultText();
   if (!device_.lost()) {

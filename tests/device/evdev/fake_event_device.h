@@ -33,6 +33,11 @@ struct FakeJoystick {
   std::map<int, int> settings;  // FF_GAIN, FF_AUTOCENTER
   int uploads = 0;
 
+  /// No effect is stored, and none plays.
+  bool isIdle() {
+    const std::lock_guard lock(mutex);
+    return effects.empty() && playing.empty();
+  }
   void send(int type, int code, int value) {
     const std::lock_guard lock(mutex);
     input_event event{};

@@ -197,7 +197,7 @@ TEST_F(SameForce, EvdevInItsPlane) {
   EXPECT_GT(most, 0.5);
   server->signal(SIGTERM);
   EXPECT_EQ(server->end(), 0) << server->log();
-  EXPECT_TRUE(joystick.effects.empty());
+  EXPECT_TRUE(eventually([&] { return joystick.isIdle(); }));
 }
 
 // What is reported is the recording, tick by tick, and the force that of the simulated device at the same

@@ -85,10 +85,7 @@ TEST_P(AfterTheServer, Evdev) {
   serveJoystick();
   ASSERT_TRUE(pressJoystick(kernel, joystick)) << server->log();
   endServer();
-  EXPECT_TRUE(eventually([&] {
-    const std::lock_guard lock(joystick.mutex);
-    return joystick.effects.empty() && joystick.playing.empty();
-  })) << "the kernel ends the effects with their file";
+  EXPECT_TRUE(eventually([&] { return joystick.isIdle(); })) << "the kernel ends the effects with their file";
 }
 
 INSTANTIATE_TEST_SUITE_P(By, AfterTheServer,
