@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "announce.h"
 #include "commands.h"
 #include "server/player.h"
 #include "server/server.h"
@@ -33,15 +34,7 @@ int run(const Options& options) {
 
   StopOnSignal stopper;
   server::Server server(config, std::move(player));
-  const std::string at = server.address().text();
-  spdlog::info("listening on {} (TCP and UDP)", at);
-  for (const server::DeviceConfig& device : config.devices) {
-    for (const std::string& name : device.names) spdlog::info("device {}@{} (replay)", name, at);
-  }
-  if (const auto web = server.webAddress()) {
-    const bool everywhere = web->address == net::kAnyAddress;
-    spdlog::info("viewer: http://{}:{}/", everywhere ? "127.0.0.1" : web->addressText(), web->port);
-  }
+  announce(server, config, "replay");
   stopper.watch(server);
   server.run();
   return 0;

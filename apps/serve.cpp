@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "announce.h"
 #include "commands.h"
 #include "server/devices.h"
 #include "server/server.h"
@@ -88,15 +89,7 @@ int run(const Options& options) {
   for (const std::string& remark : remarks) spdlog::warn("{}", remark);
   StopOnSignal stopper;
   server::Server server(config);
-  const std::string at = server.address().text();
-  spdlog::info("listening on {} (TCP and UDP)", at);
-  for (const server::DeviceConfig& device : config.devices) {
-    for (const std::string& name : device.names) spdlog::info("device {}@{} ({})", name, at, device.driver);
-  }
-  if (const auto web = server.webAddress()) {
-    const bool everywhere = web->address == net::kAnyAddress;
-    spdlog::info("viewer: http://{}:{}/", everywhere ? "127.0.0.1" : web->addressText(), web->port);
-  }
+  announce(server, config);
   stopper.watch(server);
   server.run();
   return 0;

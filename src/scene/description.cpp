@@ -5,24 +5,6 @@
 
 namespace hapticd::scene {
 
-std::string_view nameOf(EffectType type) {
-  switch (type) {
-    case EffectType::constant:
-      return "constant";
-    case EffectType::spring:
-      return "spring";
-    case EffectType::viscous:
-      return "viscous";
-    case EffectType::friction:
-      return "friction";
-    case EffectType::motorVibration:
-      return "vibrationMotor";
-    case EffectType::contactVibration:
-      return "vibrationContact";
-  }
-  return "";
-}
-
 void ObjectTable::describe(SceneDescription& out) const {
   for (const auto& object : objects_) {
     if (!object) continue;

@@ -83,6 +83,12 @@ Effect effectFrom(const EffectKind& kind, const DefineEffect& c, const SceneConf
 
 }  // namespace
 
+std::string_view nameOf(EffectType type) {
+  const auto* kind = std::find_if(std::begin(kEffectKinds), std::end(kEffectKinds),
+                                  [&](const EffectKind& k) { return k.type == type; });
+  return kind != std::end(kEffectKinds) ? kind->name : "";
+}
+
 void FreeForces::apply(const DefineEffect& c, const Call& call) {
   const auto* kind = std::find_if(std::begin(kEffectKinds), std::end(kEffectKinds),
                                   [&](const EffectKind& k) { return k.name == c.type; });

@@ -22,7 +22,7 @@ struct Facet {
   Vec3 c = Vec3::Zero();
   Vec3 normal = Vec3::Zero();  ///< unit, out of the front
   double skin = 0;
-  double distance = 0;  ///< of the triangle from the centre of the gathered ball; kept for the ball tool
+  double distance = 0;  ///< from the centre of the gathered ball, or a lower bound of it; for the ball tool
   std::uint32_t triangle = 0;
   int object = 0;          ///< position among the near objects; negative for a plane of the scene
   bool unbounded = false;  ///< a plane: no edges, felt from the front

@@ -22,17 +22,9 @@ Facet* FacetBall::room() noexcept {
 void FacetBall::add(bool asFarAsItBends) noexcept {
   Facet& facet = facets_[static_cast<std::size_t>(count_)];
   const double limit = reach_ + toolRadius_ + 4 * facet.skin;
-  if (asFarAsItBends) {
-    if (toolRadius_ > 0) facet.distance = (centre_ - nearestPointOf(facet, centre_)).norm();
-    ++count_;
-    return;
-  }
-  if (std::abs(facet.normal.dot(centre_ - facet.a)) > limit) return;
-  if (toolRadius_ > 0) {
-    facet.distance = (centre_ - nearestPointOf(facet, centre_)).norm();
-    if (facet.distance > limit) return;
-  }
-  ++count_;
+  if (std::abs(facet.normal.dot(centre_ - facet.a)) > limit && !asFarAsItBends) return;
+  if (toolRadius_ > 0) facet.distance = (centre_ - nearestPointOf(facet, centre_)).norm();
+  if (facet.distance <= limit || asFarAsItBends) ++count_;
 }
 
 void FacetBall::finish() noexcept {

@@ -9,8 +9,8 @@ namespace hapticd::realtime {
 /// What to ask for.
 struct ThreadRequest {
   bool realtime = true;  ///< SCHED_FIFO
-  bool keepScheduling =
-      false;               ///< somebody else's thread: says what it has, changes neither that nor the stack
+  /// Somebody else's thread: says what it has, changes neither that nor the stack.
+  bool keepScheduling = false;
   int priority = 80;       ///< 1…99
   int cpu = -1;            ///< -1: any
   bool lockMemory = true;  ///< the whole process

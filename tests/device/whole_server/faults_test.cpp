@@ -27,15 +27,22 @@ void PrintTo(const Case& fault, std::ostream* out) {
 }
 constexpr auto kName = [](const auto& instance) { return std::string(instance.param.name); };
 
-class OpenHapticsFault : public InContact, public testing::WithParamInterface<Case> {};
+class DeviceFault : public InContact, public testing::WithParamInterface<Case> {
+ protected:
+  void endsInNoForceAndHeals() {
+    strike(GetParam().fault, GetParam().ticksWithForce);
+    expectWords(GetParam().words);
+    if (GetParam().reopens) expectWords("the device does not open");
+    heal(GetParam().reopens);
+    endInOrder();
+  }
+};
+
+class OpenHapticsFault : public DeviceFault {};
 
 TEST_P(OpenHapticsFault, EndsInNoForceAndHeals) {
   serve({"--device", "openhaptics"}, {"HAPTICD_HDAPI_LIB=" MOCK_HD});
-  strike(GetParam().fault, GetParam().ticksWithForce);
-  expectWords(GetParam().words);
-  if (GetParam().reopens) expectWords("the device does not open");
-  heal(GetParam().reopens);
-  endInOrder();
+  endsInNoForceAndHeals();
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -47,15 +54,11 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"NotCalibrated", mock::kNotCalibrated, 100, "not calibrated: put the stylus"}),
     kName);
 
-class ForceDimensionFault : public InContact, public testing::WithParamInterface<Case> {};
+class ForceDimensionFault : public DeviceFault {};
 
 TEST_P(ForceDimensionFault, EndsInNoForceAndHeals) {
   serve({"--device", "forcedimension"}, {"HAPTICD_DHD_LIB=" MOCK_DRD});
-  strike(GetParam().fault, GetParam().ticksWithForce);
-  expectWords(GetParam().words);
-  if (GetParam().reopens) expectWords("the device does not open");
-  heal(GetParam().reopens);
-  endInOrder();
+  endsInNoForceAndHeals();
 }
 
 INSTANTIATE_TEST_SUITE_P(
