@@ -58,6 +58,9 @@ std::vector<std::string> FeltView::table(const Felt& felt) {
       std::hypot(f[0], f[1], f[2]), felt.peakForce_N());
   add("  |F|        %s %.2f N", sparkline(forces_N_, felt.peakForce_N()).c_str(), felt.peakForce_N());
   add("  depth      %s %.2f mm", sparkline(depths_m_, felt.deepest_m()).c_str(), felt.deepest_m() * 1000);
+  // Only our server is known to mean a gripper by the channel after the contact's six.
+  const std::vector<double>& channels = latest.analog.channels;
+  if (client_.capabilities() && channels.size() == 7) add("  gripper    %8.3f rad", channels[6]);
   add("  touching   %s   object %d   depth %.3f mm   angle %.1f deg   %.1f %% of the time",
       latest.touching.touching ? "yes" : "no ", latest.touched_object.object, latest.depth.depth_m * 1000,
       latest.angle.angle_deg, 100 * felt.contactFraction());

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "geometry/types.h"
@@ -32,7 +33,8 @@ struct DeviceState {
   Vec3 angularVelocity_rad_per_s = Vec3::Zero();
   std::uint32_t buttons = 0;  ///< bit i is button i
   std::uint32_t hold = kHoldNone;
-  double motorTemperature = 0;  ///< 0 cold … 1 hot, worst motor
+  double motorTemperature = 0;             ///< 0 cold … 1 hot, worst motor
+  std::optional<double> gripper_rad = {};  ///< how far the gripper is open; nothing without one
 };
 
 /// What the device can do, from the driver or, failing that, from a table.
@@ -45,6 +47,10 @@ struct DeviceProfile {
   double ownDamping_Ns_per_m = 5;  ///< device plus grip, for the passivity bound
   double transportDelay_s = 0;     ///< between read and write, for a child process or a network device
   int buttons = 2;
+  std::uint32_t switches = kHoldNone;  ///< what it has a switch for: kHoldDeadMan, kHoldInkwell
+  int inputDof = 6;                    ///< measured: 3 of the position, 3 of the orientation, 1 of a gripper
+  int outputDof = 3;                   ///< with a motor, in the same order; only the force is rendered
+  bool hasGripper = false;
   bool startsArmed = false;  ///< real devices wait for --enable-forces
 };
 

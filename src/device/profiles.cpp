@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cstdio>
 
 namespace hapticd::device {
 namespace {
@@ -14,20 +15,21 @@ struct Row {
   double peak_N, continuous_N;
   double stiffness_N_per_m, damping_Ns_per_m;
   int buttons;
-  bool startsArmed;
+  std::uint32_t switches;
+  int inputDof, outputDof;
 };
 
 // Damping is a choice of design, device plus grip, and not measured.
 constexpr Row kRows[] = {
-    {"simulated", "", 160, 120, 70, 3.3, 3.3, 1000, 5, 2, true},
-    {"Touch", "Omni", 160, 120, 70, 3.3, 0.88, 500, 2.5, 2, false},
-    {"Touch X", "Desktop", 160, 120, 120, 7.9, 1.75, 1000, 3, 2, false},
-    {"Premium 1.5", "", 381, 267, 191, 8.5, 1.4, 1000, 3, 1, false},
-    {"omega.3", "", 160, 160, 110, 12, 12, 5000, 30, 1, false},
-    {"delta.3", "", 400, 400, 260, 20, 20, 5000, 30, 1, false},
-    {"sigma.7", "", 190, 190, 130, 12, 12, 4000, 30, 2, false},
-    {"Inverse3", "", 240, 160, 160, 7, 4, 1000, 3, 3, false},
-    {"lambda.7", "", 200, 200, 150, 12, 12, 8000, 30, 2, false},
+    {"simulated", "", 160, 120, 70, 3.3, 3.3, 1000, 5, 2, kHoldNone, 6, 3},
+    {"Touch", "Omni", 160, 120, 70, 3.3, 0.88, 500, 2.5, 2, kHoldInkwell, 6, 3},
+    {"Touch X", "Desktop", 160, 120, 120, 7.9, 1.75, 1000, 3, 2, kHoldNone, 6, 3},
+    {"Premium 1.5", "", 381, 267, 191, 8.5, 1.4, 1000, 3, 1, kHoldNone, 6, 3},
+    {"omega.3", "", 160, 160, 110, 12, 12, 5000, 30, 1, kHoldNone, 3, 3},
+    {"delta.3", "", 400, 400, 260, 20, 20, 5000, 30, 1, kHoldNone, 3, 3},
+    {"sigma.7", "", 190, 190, 130, 12, 12, 4000, 30, 2, kHoldNone, 7, 7},
+    {"Inverse3", "", 240, 160, 160, 7, 4, 1000, 3, 3, kHoldNone, 3, 3},
+    {"lambda.7", "", 200, 200, 150, 12, 12, 8000, 30, 2, kHoldNone, 7, 7},
 };
 
 std::array<DeviceProfile, std::size(kRows)> build() {
@@ -42,7 +44,11 @@ std::array<DeviceProfile, std::size(kRows)> build() {
     profile.nominalStiffness_N_per_m = row.stiffness_N_per_m;
     profile.ownDamping_Ns_per_m = row.damping_Ns_per_m;
     profile.buttons = row.buttons;
-    profile.startsArmed = row.startsArmed;
+    profile.switches = row.switches;
+    profile.inputDof = row.inputDof;
+    profile.outputDof = row.outputDof;
+    profile.hasGripper = row.inputDof == 7;
+    profile.startsArmed = &row == std::begin(kRows);
     return profile;
   });
   return all;
@@ -66,6 +72,23 @@ const DeviceProfile* findProfile(std::string_view model) {
     if (sameName(model, kRows[i].model) || sameName(model, kRows[i].alias)) return &profiles()[i];
   }
   return nullptr;
+}
+
+std::string inWords(const DeviceProfile& profile) {
+  const Vec3 mm = 1000 * profile.workspace_m.extents();
+  char figures[256];
+  std::snprintf(
+      figures, sizeof figures,
+      ": %.0f x %.0f x %.0f mm, %.3g N (%.3g N for long), %.4g N/m, %.3g Ns/m, %d degrees of freedom "
+      "in and %d out, %d button%s",
+      mm.x(), mm.y(), mm.z(), profile.peakForce_N, profile.continuousForce_N,
+      profile.nominalStiffness_N_per_m, profile.ownDamping_Ns_per_m, profile.inputDof, profile.outputDof,
+      profile.buttons, profile.buttons == 1 ? "" : "s");
+  std::string words = profile.model + figures;
+  if ((profile.switches & kHoldInkwell) != 0) words += ", inkwell switch";
+  if ((profile.switches & kHoldDeadMan) != 0) words += ", presence switch";
+  if (profile.hasGripper) words += ", gripper";
+  return words;
 }
 
 }  // namespace hapticd::device

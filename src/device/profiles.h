@@ -15,4 +15,7 @@ std::span<const DeviceProfile> profiles();
 /// The profile of a model, or of another name that it is sold under, whatever the case; null when unknown.
 const DeviceProfile* findProfile(std::string_view model);
 
+/// What a person should know of it, on one line.
+std::string inWords(const DeviceProfile& profile);
+
 }  // namespace hapticd::device

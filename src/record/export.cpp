@@ -67,6 +67,7 @@ Sample sampleOf(const std::string& device, const realtime::TickReport& tick, Nan
   sample.buttons = tick.device.buttons;
   sample.guardActive = tick.guard.active;
   sample.guardLatched = tick.guard.latched;
+  sample.gripper_rad = tick.device.gripper_rad;
   return sample;
 }
 

@@ -130,10 +130,11 @@ void fields(T& event, V&& v) {
   v("time_ns", time);
 }
 
+/// But for the opening of a gripper, which few devices have.
 template <Is<device::DeviceState> T, class V>
 void fields(T& state, V&& v) {
   auto& [time, position_m, orientation, velocity_m_per_s, angularVelocity_rad_per_s, buttons, hold,
-         motorTemperature] = state;
+         motorTemperature, gripper_rad] = state;
   v("time_ns", time);
   v("position_m", position_m);
   v("orientation", orientation);
@@ -142,6 +143,7 @@ void fields(T& state, V&& v) {
   v("buttons", buttons);
   v("hold", hold);
   v("motor_temperature", motorTemperature);
+  static_cast<void>(gripper_rad);  // in the ticks that have one
 }
 
 template <Is<realtime::Contact> T, class V>

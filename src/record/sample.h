@@ -22,12 +22,13 @@ struct Sample {
   std::uint32_t buttons = 0;
   std::uint32_t guardActive = 0;
   std::uint32_t guardLatched = 0;
+  std::optional<double> gripper_rad{};
 };
 
 template <Is<Sample> T, class V>
 void fields(T& sample, V&& v) {
   auto& [device, time_ns, tick, revision, hand_m, proxy_m, velocity_m_per_s, orientation, force_N, depth_m,
-         touching, object, buttons, guardActive, guardLatched] = sample;
+         touching, object, buttons, guardActive, guardLatched, gripper_rad] = sample;
   v("device", device);
   v("time_ns", time_ns);
   v("tick", tick);
@@ -43,6 +44,7 @@ void fields(T& sample, V&& v) {
   v("buttons", buttons);
   v("guard_active", guardActive);
   v("guard_latched", guardLatched);
+  v("gripper_rad", gripper_rad);
 }
 
 /// Of a tick, with times since the epoch.

@@ -18,7 +18,7 @@ namespace hapticd::record {
 using geometry::Nanos;
 
 /// Changes when old readers would misread a file; new kinds of blocks alone do not change it.
-inline constexpr std::uint32_t kFormatVersion = 1;
+inline constexpr std::uint32_t kFormatVersion = 2;  // 1 had no grippers
 
 /// Why a file cannot be read or written; the text names it and the remedy.
 class SessionError : public std::runtime_error {

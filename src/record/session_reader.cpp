@@ -23,9 +23,10 @@ void SessionReader::readHeader() {
   if (block_.kind != BlockKind::header) fail("the first block is no header");
   Unpacker in(block_.content);
   const auto version = in.next<std::uint32_t>();
-  if (in.ok() && version != kFormatVersion) {
-    fail("the file has version " + std::to_string(version) + " of the format, this program reads version " +
-         std::to_string(kFormatVersion) + "; use the hapticd that wrote it");
+  if (in.ok() && (version < 1 || version > kFormatVersion)) {
+    fail("the file has version " + std::to_string(version) +
+         " of the format, this program reads versions 1 to " + std::to_string(kFormatVersion) +
+         "; use the hapticd that wrote it");
   }
   in.take(header_);
   if (!in.ok() || !in.rest().empty()) fail("a header of another length than its content");

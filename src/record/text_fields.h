@@ -35,7 +35,7 @@ inline void appendQuoted(std::string& out, std::string_view text) {
   out += '"';
 }
 
-/// One row of CSV; vectors take a column for each coordinate.
+/// One row of CSV; vectors take a column for each coordinate, and what is not there leaves its column empty.
 class CsvRow {
  public:
   explicit CsvRow(std::string& out) : out_(out) {}
@@ -67,6 +67,11 @@ class CsvRow {
     for (int i = 0; i < R; ++i) put(v[i]);
   }
   void put(const geometry::Quat& q) { put(q.coeffs()); }
+  template <class T>
+  void put(const std::optional<T>& value) {
+    separate();
+    if (value) appendNumber(out_, *value);
+  }
   void separate() { out_ += out_.empty() || out_.back() == '\n' ? "" : ","; }
 
   std::string& out_;
@@ -102,7 +107,7 @@ class CsvHeader {
 };
 
 /// An object of JSON. Numbers that JSON has no words for are null; lists of more than 64 items are told by
-/// their length.
+/// their length; what is not there is left out.
 class JsonObject {
  public:
   explicit JsonObject(std::string& out) : out_(out) { out_ += '{'; }
@@ -114,6 +119,10 @@ class JsonObject {
   void operator()(const char* name, const T& value) {
     key(name);
     put(value);
+  }
+  template <class T>
+  void operator()(const char* name, const std::optional<T>& value) {
+    if (value) (*this)(name, *value);
   }
   /// What comes next is the value.
   void key(const char* name) {
@@ -185,7 +194,17 @@ class JsonSchema {
 
  private:
   template <class T>
+  struct Plain {
+    using Type = T;
+  };
+  template <class T>
+  struct Plain<std::optional<T>> {
+    using Type = T;
+  };
+
+  template <class Field>
   static constexpr const char* typeOf() {
+    using T = typename Plain<Field>::Type;
     if constexpr (std::same_as<T, bool>)
       return "boolean";
     else if constexpr (std::same_as<T, std::string>)

@@ -12,6 +12,7 @@ enum Has : std::uint8_t {
   kWritten = 1U << 1,
   kPlacement = 1U << 2,
   kCounts = 1U << 3,
+  kGripper = 1U << 4,
 };
 
 // What is in every tick, in this order. `Record` may be const.
@@ -42,11 +43,13 @@ void TickPacker::add(const TickRecord& tick, Bytes& out) {
   const bool counts = first_ || report.guard.counts != before_.guard.counts;
   Packer pack(out);
   pack.put(static_cast<std::uint8_t>((tick.haveState ? kHaveState : 0) | (tick.written ? kWritten : 0) |
-                                     (placement ? kPlacement : 0) | (counts ? kCounts : 0)));
+                                     (placement ? kPlacement : 0) | (counts ? kCounts : 0) |
+                                     (report.device.gripper_rad ? kGripper : 0)));
   always(tick, pack);
   for (std::uint32_t i = 0; i < report.rendering.contactCount; ++i) pack.put(report.rendering.contacts[i]);
   if (placement) pack.put(report.T_world_device);
   if (counts) pack.put(report.guard.counts);
+  if (report.device.gripper_rad) pack.put(*report.device.gripper_rad);
   first_ = false;
   before_ = report;
 }
@@ -66,6 +69,7 @@ bool TickUnpacker::next(TickRecord& tick) {
   tick.report.guard.counts = before_.guard.counts;
   if ((has & kPlacement) != 0) in_.take(tick.report.T_world_device);
   if ((has & kCounts) != 0) in_.take(tick.report.guard.counts);
+  if ((has & kGripper) != 0) tick.report.device.gripper_rad = in_.next<double>();
   before_ = tick.report;
   ok_ = in_.ok();
   return ok_;

@@ -14,6 +14,7 @@ using realtime::TickReport;
 
 constexpr double kForceStep_N = 1e-3;
 constexpr double kDepthStep_m = 1e-5;
+constexpr double kGripperStep_rad = 1e-3;
 
 wire::F64x3 array(const Vec3& v) {
   return {v.x(), v.y(), v.z()};
@@ -78,8 +79,8 @@ void Reporter::update(const TickReport& tick, const ReportFrame& frame, std::vec
   tracker(view, frame, out);
   if (over) {
     contactEnd(view, out);
-  } else {
-    contact(view, out);
+  } else if (const bool changed = contact(view, out); gripped(view) || changed) {
+    analog(view, false, out);
   }
   touching_ = view.touching;
   if (wants(wire::kReportForce)) out.push_back({wire::IsTouching{flag(view.touching)}, false});
@@ -160,7 +161,13 @@ void Reporter::tracker(const View& view, const ReportFrame& frame, std::vector<O
   if (view.touching) report(kSensorContact, view.scp);
 }
 
-void Reporter::contact(const View& view, std::vector<Outgoing>& out) {
+bool Reporter::gripped(const View& view) const {
+  if (!view.gripper_rad) return false;
+  return !gripper_rad_ || std::abs(*view.gripper_rad - *gripper_rad_) > kGripperStep_rad;
+}
+
+// True when something of it has changed.
+bool Reporter::contact(const View& view, std::vector<Outgoing>& out) {
   const std::size_t before = out.size();
   // Nothing is said to be nothing, however small the rest before.
   const bool ended = view.force_N.isZero(0) && !force_N_.isZero(0);
@@ -186,7 +193,7 @@ void Reporter::contact(const View& view, std::vector<Outgoing>& out) {
     out.push_back({wire::Scp{array(view.scp), quaternion(view.orientation)}, false});
   }
   if (!wants(wire::kReportForce)) out.resize(before);
-  if (changed) analog(view, false, out);
+  return changed;
 }
 
 // The last words of a contact must arrive, or a client would believe in it for ever.
@@ -205,11 +212,13 @@ void Reporter::contactEnd(const View& view, std::vector<Outgoing>& out) {
 }
 
 void Reporter::analog(const View& view, bool reliable, std::vector<Outgoing>& out) {
+  gripper_rad_ = view.gripper_rad;
   if (!wants(wire::kReportAnalog)) return;
   const Vec3& f = view.force_N;
   wire::AnalogChannels channels;
   channels.channels.values = {f.x(),          f.y(), f.z(), view.depth, view.angle_deg,
                               double(view.object)};
+  if (view.gripper_rad) channels.channels.values.push_back(*view.gripper_rad);
   out.push_back({std::move(channels), reliable});
 }
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "server/view.h"
@@ -38,7 +39,8 @@ struct ReportFrame {
 
 /// Remembers what was said last and says what changed since. One for each choice of reports; net thread.
 /// Pure: no clock, no socket. Contact is mirrored for clients that know no force device: the button after the
-/// device's own is "touching", and the analog channels are force x y z, depth, angle, touched object.
+/// device's own is "touching", and the analog channels are force x y z, depth, angle, touched object and,
+/// where the device has one, the opening of its gripper in radians.
 class Reporter {
  public:
   Reporter(const DeviceConfig& config, int buttonCount, const ReportChoice& choice);
@@ -58,7 +60,8 @@ class Reporter {
   void guard(const realtime::TickReport& tick, std::vector<Outgoing>& out);
   void buttons(std::uint32_t buttons, std::vector<Outgoing>& out);
   void tracker(const View& view, const ReportFrame& frame, std::vector<Outgoing>& out);
-  void contact(const View& view, std::vector<Outgoing>& out);
+  bool contact(const View& view, std::vector<Outgoing>& out);
+  bool gripped(const View& view) const;
   void contactEnd(const View& view, std::vector<Outgoing>& out);
   void analog(const View& view, bool reliable, std::vector<Outgoing>& out);
   void wholeTick(const realtime::TickReport& tick, const View& view, bool over, std::vector<Outgoing>& out);
@@ -84,6 +87,7 @@ class Reporter {
   geometry::Vec3 force_N_ = geometry::Vec3::Zero();
   double depth_ = 0;
   double angle_deg_ = 0;
+  std::optional<double> gripper_rad_;
   geometry::Vec3 scp_ = geometry::Vec3::Constant(1e300);
   std::uint32_t tripped_ = 0;  ///< bits of the trips that took the force away
   wire::GuardState guard_;

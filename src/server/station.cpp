@@ -136,6 +136,7 @@ void Station::start() {
   Impl& my = *impl_;
   if (my.played) return;
   my.running = true;
+  spdlog::info("device '{}': {}", my.config.names.front(), device::inWords(my.profile));
   if (my.config.enableForces) my.tick.control().arm();
   my.keeper.start();
 }

@@ -34,6 +34,7 @@ View viewOf(const realtime::TickReport& tick, ForceReport forceReport) {
   view.velocity = linear * tick.device.velocity_m_per_s / kWorldPerReported;
   view.angularVelocity = rotation * tick.device.angularVelocity_rad_per_s;
   view.orientation = (Quat(rotation) * tick.device.orientation).normalized();
+  view.gripper_rad = tick.device.gripper_rad;
   view.force_N = rotation * (forceReport == ForceReport::normal ? felt.normalForce_N : tick.force_N);
   view.touching = felt.touching;
   view.object = felt.touching ? felt.touchedObject : -1;

@@ -1,6 +1,8 @@
 // A tick in the client's terms.
 #pragma once
 
+#include <optional>
+
 #include "realtime/servo/report.h"
 #include "server/config.h"
 
@@ -18,6 +20,7 @@ struct View {
   std::int32_t object = -1;
   double depth = 0;
   double angle_deg = 0;  ///< between the stylus and the surface normal
+  std::optional<double> gripper_rad;
 };
 
 View viewOf(const realtime::TickReport& tick, ForceReport forceReport);

@@ -14,6 +14,8 @@ TEST(Profiles, AreConsistent) {
     EXPECT_LE(profile.continuousForce_N, profile.peakForce_N);
     EXPECT_EQ(profile.startsArmed, profile.model == "simulated") << profile.model;
     EXPECT_NEAR(profile.workspace_m.centre().norm(), 0, 1e-15);
+    EXPECT_GE(profile.inputDof, profile.outputDof) << profile.model;
+    EXPECT_EQ(profile.hasGripper, profile.inputDof == 7) << profile.model;
   }
 }
 
@@ -28,6 +30,19 @@ TEST(Profiles, AreFoundByEitherNameInAnyCase) {
   EXPECT_EQ(findProfile("TOUCH X"), findProfile("Desktop"));
   EXPECT_EQ(findProfile(""), nullptr);
   EXPECT_EQ(findProfile("Touch Y"), nullptr);
+}
+
+TEST(Profiles, AreToldOnOneLine) {
+  EXPECT_EQ(
+      inWords(*findProfile("Touch")),
+      "Touch: 160 x 120 x 70 mm, 3.3 N (0.88 N for long), 500 N/m, 2.5 Ns/m, 6 degrees of freedom in and "
+      "3 out, 2 buttons, inkwell switch");
+  DeviceProfile profile = *findProfile("sigma.7");
+  profile.switches = kHoldDeadMan;
+  EXPECT_EQ(
+      inWords(profile),
+      "sigma.7: 190 x 190 x 130 mm, 12 N (12 N for long), 4000 N/m, 30 Ns/m, 7 degrees of freedom in and "
+      "7 out, 2 buttons, presence switch, gripper");
 }
 
 }  // namespace

@@ -35,9 +35,20 @@ TEST(Csv, HasAColumnForEachNumberAndQuotesNames) {
             "x_m_per_s,"
             "velocity_y_m_per_s,velocity_z_m_per_s,qx,qy,qz,qw,force_x_N,force_y_N,force_z_N,depth_m,"
             "touching,object,"
-            "buttons,guard_active,guard_latched\n"
+            "buttons,guard_active,guard_latched,gripper_rad\n"
             "\"Left, \"\"my\"\" "
-            "hand\",1700000000123456789,0,0,0,0,0,0,0,0,0,0,0,0,0,0,1,0.1,-2,1e-300,0,0,-1,0,0,0\n");
+            "hand\",1700000000123456789,0,0,0,0,0,0,0,0,0,0,0,0,0,0,1,0.1,-2,1e-300,0,0,-1,0,0,0,\n");
+}
+
+TEST(Csv, AGripperFillsItsColumn) {
+  SessionFile file;
+  CsvFile csv(file.path());
+  Sample sample;
+  sample.gripper_rad = 0.25;
+  csv.add(sample);
+  csv.close();
+  const std::string text = textOf(file.path());
+  EXPECT_EQ(text.substr(text.rfind(',')), ",0.25\n");
 }
 
 TEST(Csv, AFileThatCannotBeSaysSo) {
@@ -56,9 +67,12 @@ TEST(Json, HasNoWordsForWhatIsNoNumberAndTellsLongListsByTheirLength) {
     object("list", std::vector<int>{1, 2});
     object("long", std::vector<int>(100));
     object("vector", geometry::Vec3(1, 2, 0.5));
+    object("absent", std::optional<double>());
+    object("there", std::optional<double>(0.5));
   }
-  EXPECT_EQ(text,
-            R"({"a\"b":"tab\u0009here","nan":null,"on":true,"list":[1,2],"long":100,"vector":[1,2,0.5]})");
+  EXPECT_EQ(
+      text,
+      R"({"a\"b":"tab\u0009here","nan":null,"on":true,"list":[1,2],"long":100,"vector":[1,2,0.5],"there":0.5})");
 }
 
 struct Entry {

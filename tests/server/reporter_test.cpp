@@ -272,6 +272,40 @@ TEST_F(ReporterTest, ContactIsMirroredAsAnalogChannelsAndAButton) {
   EXPECT_EQ(said<wire::ButtonChange>().at(0).state, 0);
 }
 
+TEST_F(ReporterTest, AGripperIsTheChannelAfterTheContacts) {
+  const auto gripper = [&]() -> std::optional<double> {
+    const auto channels = said<wire::AnalogChannels>();
+    if (channels.size() != 1 || channels[0].channels.values.size() != 7) return std::nullopt;
+    return channels[0].channels.values[6];
+  };
+  tick_.device.gripper_rad = 0.3;
+  step();
+  EXPECT_EQ(gripper(), 0.3) << "without any contact";
+  tick_.device.gripper_rad = 0.3005;
+  step();
+  EXPECT_TRUE(said<wire::AnalogChannels>().empty()) << "less than a milliradian";
+  tick_.device.gripper_rad = 0.2985;
+  step();
+  EXPECT_EQ(gripper(), 0.2985);
+  touch();
+  step();
+  EXPECT_EQ(gripper(), 0.2985) << "with the contact's channels";
+  tick_.rendering = {};
+  tick_.device.gripper_rad = 0.1;
+  step();
+  EXPECT_EQ(gripper(), 0.1) << "at the end of the contact";
+  step();
+  EXPECT_TRUE(said<wire::AnalogChannels>().empty());
+  std::vector<Outgoing> late;
+  reporter_->presentState(tick_, frame_, late);
+  out_ = late;
+  EXPECT_EQ(gripper(), 0.1) << "to a client that comes late";
+  choice_.kinds = wire::kReportForce;
+  start();
+  step();
+  EXPECT_TRUE(said<wire::AnalogChannels>().empty()) << "it was not chosen";
+}
+
 TEST_F(ReporterTest, OnlyWhatWasChosenIsSaid) {
   choice_.kinds = wire::kReportButton;
   touch();

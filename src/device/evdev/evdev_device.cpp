@@ -128,6 +128,7 @@ void EvdevDevice::readCapabilities() {
   profile_.ownDamping_Ns_per_m = 1;
   profile_.transportDelay_s = 0.004;  // one period of the exchange and a USB poll
   profile_.buttons = buttons;
+  profile_.inputDof = profile_.outputDof = axisCount_;
   effects_.emplace(*file_, wheel_, axisCount_ == 2, Bits<FF_MAX>(*file_, EV_FF)[FF_DAMPER]);
 }
 

@@ -41,6 +41,13 @@ DeviceProfile nearestProfile(const std::string& name) {
   }
   DeviceProfile profile = *findProfile(known);
   if (!name.empty()) profile.model = name;
+  // The digit counts what is measured: omega.6 has a wrist, omega.7 also a gripper.
+  const char digit = name.empty() ? '0' : name.back();
+  if (digit == '3' || digit == '6' || digit == '7') {
+    profile.inputDof = digit - '0';
+    const bool omega = name.find("omega") != std::string::npos;
+    profile.outputDof = digit != '7' ? 3 : omega ? 4 : 7;  // an omega.7 moves no wrist
+  }
   return profile;
 }
 
@@ -104,8 +111,9 @@ void ForceDimensionDevice::configure() {
   if (api_->getSerialNumber != nullptr && api_->getSerialNumber(&serial, id) >= 0) {
     description_ += ", serial number " + std::to_string(serial);
   }
-  hasGripper_ = api_->getGripperAngleRad != nullptr && api_->hasGripper != nullptr && api_->hasGripper(id);
-  profile_.buttons = hasGripper_ ? 2 : 1;
+  profile_.hasGripper =
+      api_->getGripperAngleRad != nullptr && api_->hasGripper != nullptr && api_->hasGripper(id);
+  profile_.buttons = profile_.hasGripper ? 2 : 1;
 
   if (api_->enableForce(0, id) < 0) fail("the amplifiers do not switch off");
   amplifiersOn_ = false;
@@ -177,19 +185,25 @@ bool ForceDimensionDevice::sample(Nanos now) noexcept {
       state_.orientation = Quat(rotation).normalized();
   }
   sampleButtons();
+  if (profile_.hasGripper) sampleGripper();
   return true;
 }
 
 void ForceDimensionDevice::sampleButtons() noexcept {
   const auto id = static_cast<char>(id_);
   const int mask = api_->getButtonMask(id);
+  state_.buttons = (state_.buttons & 2U) | (mask > 0 ? static_cast<std::uint32_t>(mask) & 1U : 0U);
+}
+
+// Without an answer it stays as it was.
+void ForceDimensionDevice::sampleGripper() noexcept {
+  double angle_rad = 0;
+  if (api_->getGripperAngleRad(&angle_rad, static_cast<char>(id_)) < 0 || !std::isfinite(angle_rad)) return;
+  angle_rad = std::abs(angle_rad);  // that of a left-handed device may count down
   const bool wasClosed = (state_.buttons & 2U) != 0;
-  state_.buttons = mask > 0 ? static_cast<std::uint32_t>(mask) & 1U : 0U;
-  double angle = kGripOpen_rad;
-  if (hasGripper_ && api_->getGripperAngleRad(&angle, id) >= 0 &&
-      std::abs(angle) < (wasClosed ? kGripOpen_rad : kGripClosed_rad)) {
-    state_.buttons |= 2U;
-  }
+  const bool closed = angle_rad < (wasClosed ? kGripOpen_rad : kGripClosed_rad);
+  state_.buttons = (state_.buttons & 1U) | (closed ? 2U : 0U);
+  state_.gripper_rad = angle_rad;
 }
 
 void ForceDimensionDevice::checkStatus(Nanos now) noexcept {

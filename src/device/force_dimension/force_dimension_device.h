@@ -31,7 +31,7 @@ class ForceDimensionDevice final : public Device {
   void close() noexcept override;
   const DeviceProfile& profile() const noexcept override { return profile_; }
 
-  /// Button 0 is the device's own; button 1 is a closed gripper.
+  /// Button 0 is the device's own; button 1 is a closed gripper, whose opening is in the state, too.
   bool read(Nanos now, DeviceState& state) noexcept override;
   bool write(const Vec3& force_N) noexcept override;
 
@@ -51,6 +51,7 @@ class ForceDimensionDevice final : public Device {
   [[noreturn]] void fail(const std::string& what) const;
   bool sample(Nanos now) noexcept;
   void sampleButtons() noexcept;
+  void sampleGripper() noexcept;
   void checkStatus(Nanos now) noexcept;
   bool switchOn() noexcept;
 
@@ -59,7 +60,6 @@ class ForceDimensionDevice final : public Device {
   int id_ = -1;
   DeviceProfile profile_;
   std::string description_;
-  bool hasGripper_ = false;
   std::atomic<std::uint32_t> hold_{kHoldNone};
   std::atomic<bool> busy_{false};  // one thread at a time in the library
   std::atomic<bool> amplifiersOn_{false};

@@ -25,6 +25,10 @@ SharedProfile SharedProfile::of(const DeviceProfile& profile) {
   shared.ownDamping_Ns_per_m = profile.ownDamping_Ns_per_m;
   shared.transportDelay_s = profile.transportDelay_s;
   shared.buttons = profile.buttons;
+  shared.switches = profile.switches;
+  shared.inputDof = profile.inputDof;
+  shared.outputDof = profile.outputDof;
+  shared.hasGripper = profile.hasGripper;
   shared.startsArmed = profile.startsArmed;
   return shared;
 }
@@ -39,6 +43,10 @@ DeviceProfile SharedProfile::toProfile() const {
   profile.ownDamping_Ns_per_m = ownDamping_Ns_per_m;
   profile.transportDelay_s = transportDelay_s;
   profile.buttons = buttons;
+  profile.switches = switches;
+  profile.inputDof = inputDof;
+  profile.outputDof = outputDof;
+  profile.hasGripper = hasGripper;
   profile.startsArmed = startsArmed;
   return profile;
 }

@@ -41,6 +41,10 @@ struct SharedProfile {
   double ownDamping_Ns_per_m = 0;
   double transportDelay_s = 0;
   int buttons = 0;
+  std::uint32_t switches = 0;
+  int inputDof = 0;
+  int outputDof = 0;
+  bool hasGripper = false;
   bool startsArmed = false;
 
   static SharedProfile of(const DeviceProfile& profile);

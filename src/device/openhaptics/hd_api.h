@@ -41,6 +41,8 @@ inline constexpr Enum kModel = 0x2501;
 inline constexpr Enum kDriverVersion = 0x2502;
 inline constexpr Enum kSerialNumber = 0x2504;
 inline constexpr Enum kUsableWorkspace = 0x2551;  // mm
+inline constexpr Enum kInputDof = 0x2553;
+inline constexpr Enum kOutputDof = 0x2554;
 inline constexpr Enum kCalibrationStyle = 0x2555;
 inline constexpr Enum kMaxStiffness = 0x2602;  // N/mm
 inline constexpr Enum kMaxForce = 0x2603;
@@ -49,6 +51,7 @@ inline constexpr Enum kMotorTemperature = 0x2605;       // 0 … 1 for each of u
 inline constexpr Enum kSoftwareVelocityLimit = 0x2606;  // mm/s
 inline constexpr Enum kSoftwareImpulseLimit = 0x2607;   // N in one tick
 inline constexpr Enum kCurrentForce = 0x2700;
+inline constexpr Enum kCurrentGimbalTorque = 0x2704;  // mNm
 inline constexpr Enum kForceOutput = 0x4000;
 
 inline constexpr Enum kCalibrationOk = 0x5000;

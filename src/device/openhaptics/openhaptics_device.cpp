@@ -94,7 +94,20 @@ void OpenHapticsDevice::readIdentity() {
   const Vec3 max = kMetresPerMillimetre * Vec3(box[3], box[4], box[5]);
   if (((max - min).array() > 0.02).all() && ((max - min).array() < 2).all())
     profile_.workspace_m = {min, max};
+  readAxes();
   session_->takeErrors();  // an older driver does not know every value
+}
+
+void OpenHapticsDevice::readAxes() {
+  const auto replace = [&](int& value, hd::Enum what) {
+    int said = 0;
+    session_->api().getIntegerv(what, &said);
+    if (said == 3 || said == 6 || said == 7) value = said;
+  };
+  replace(profile_.inputDof, hd::kInputDof);
+  replace(profile_.outputDof, hd::kOutputDof);
+  profile_.switches = hasSafetySwitch_ ? kHoldDeadMan : kHoldNone;
+  if ((calibrationStyle_ & hd::kStyleInkwell) != 0) profile_.switches |= kHoldInkwell;
 }
 
 void OpenHapticsDevice::close() noexcept {
@@ -154,6 +167,10 @@ void OpenHapticsDevice::onFrame() noexcept {
   }
   written_N_ = quiet ? Vec3(Vec3::Zero()) : limited(command_N_);
   api.setDoublev(hd::kCurrentForce, written_N_.data());
+  if (profile_.outputDof > 3) {
+    constexpr double kNoTorque[3] = {};
+    api.setDoublev(hd::kCurrentGimbalTorque, kNoTorque);
+  }
   api.endFrame(handle_);
 
   if (!calibrated_) updateCalibration(calibration);

@@ -52,6 +52,7 @@ class OpenHapticsDevice final : public Device, private hd::Participant {
   void onFrame() noexcept override;
   void onError(hd::Enum code) noexcept override;
   void readIdentity();
+  void readAxes();
   void sample(Nanos now) noexcept;
   std::uint32_t holds(Nanos now) noexcept;
   void updateCalibration(hd::Enum status) noexcept;

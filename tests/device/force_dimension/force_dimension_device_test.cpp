@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "device/plane_scene.h"
 #include "mocks/dhd/mock_dhd_control.h"
@@ -128,6 +129,62 @@ TEST_F(DhdTest, TheGripperIsAButtonWithHysteresis) {
   EXPECT_TRUE(closedAt(0.04));
   EXPECT_TRUE(closedAt(0.08));
   EXPECT_FALSE(closedAt(0.12));
+}
+
+TEST_F(DhdTest, TheOpeningOfTheGripperIsInTheState) {
+  device.open();
+  EXPECT_FALSE(device.profile().hasGripper);
+  EXPECT_FALSE(tick(Vec3::Zero()).gripper_rad) << "an omega.3 has none";
+  device.close();
+
+  mock->devices(1, "omega.7");
+  mock->gripper(1, 0.25);
+  device.open();
+  EXPECT_TRUE(device.profile().hasGripper);
+  EXPECT_EQ(device.profile().inputDof, 7);
+  EXPECT_EQ(device.profile().outputDof, 4);
+  EXPECT_EQ(tick(Vec3::Zero()).gripper_rad, 0.25);
+  mock->gripper(1, -0.2);  // the other hand's
+  EXPECT_EQ(tick(Vec3::Zero()).gripper_rad, 0.2);
+  mock->gripperFails(1);
+  EXPECT_EQ(tick(Vec3::Zero()).gripper_rad, 0.2) << "without an answer it stays";
+  EXPECT_TRUE(gotState);
+  mock->gripperFails(0);
+  mock->gripper(1, std::nan(""));
+  EXPECT_EQ(tick(Vec3::Zero()).gripper_rad, 0.2);
+}
+
+TEST_F(DhdTest, AxesAreCountedByTheDigitOfTheName) {
+  const auto axesOf = [&](const char* name) {
+    mock->devices(1, name);
+    device.open();
+    const auto axes = std::pair(device.profile().inputDof, device.profile().outputDof);
+    device.close();
+    return axes;
+  };
+  EXPECT_EQ(axesOf("omega.6"), std::pair(6, 3));
+  EXPECT_EQ(axesOf("delta.3"), std::pair(3, 3));
+  EXPECT_EQ(axesOf("sigma.7"), std::pair(7, 7));
+  EXPECT_EQ(axesOf("lambda.6"), std::pair(6, 3));
+  EXPECT_EQ(axesOf("lambda.7"), std::pair(7, 7));
+  EXPECT_EQ(axesOf("a prototype"), std::pair(3, 3));
+}
+
+// Nothing renders a torque or a force of the gripper: what another program left there goes with the first
+// write.
+TEST_F(DhdTest, TorqueAndTheForceOfTheGripperAreZero) {
+  mock->devices(1, "sigma.7");
+  mock->gripper(1, 0.3);
+  device.open();
+  double torque_Nm[3];
+  double grip_N = 0;
+  mock->torque(torque_Nm, &grip_N);
+  ASSERT_NE(torque_Nm[0], 0);
+  tick(Vec3(0, 1, 0));
+  mock->torque(torque_Nm, &grip_N);
+  EXPECT_EQ(Vec3(torque_Nm[0], torque_Nm[1], torque_Nm[2]), Vec3(0, 0, 0));
+  EXPECT_EQ(grip_N, 0);
+  EXPECT_TRUE(force().isApprox(Vec3(0, 1, 0)));
 }
 
 TEST_F(DhdTest, ForceIsClampedAndNotANumberRefused) {

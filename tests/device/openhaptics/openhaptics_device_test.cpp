@@ -152,6 +152,34 @@ TEST_F(SteppedHdTest, ForceThatIsNotANumberIsRefused) {
   EXPECT_TRUE(force().isZero());
 }
 
+// Nothing renders a torque: what another program left there goes with the first frame.
+TEST_F(SteppedHdTest, AGimbalWithMotorsGetsZeroTorque) {
+  mock->model("Premium 1.5/6DOF", 1);
+  mock->outputDof(6);
+  start();
+  EXPECT_EQ(device.profile().outputDof, 6);
+  EXPECT_EQ(device.profile().switches, 0U);
+  Vec3 torque;
+  mock->torque(0, torque.data());
+  ASSERT_FALSE(torque.isZero());
+  wanted_N = Vec3(0, 1, 0);
+  step();
+  mock->torque(0, torque.data());
+  EXPECT_EQ(torque, Vec3(0, 0, 0));
+  EXPECT_TRUE(force().isApprox(wanted_N));
+}
+
+TEST_F(SteppedHdTest, AGimbalWithoutMotorsGetsNoTorqueAtAll) {
+  start();  // the mock would abort
+  EXPECT_EQ(device.profile().inputDof, 6);
+  EXPECT_EQ(device.profile().outputDof, 3);
+  EXPECT_EQ(device.profile().switches, kHoldInkwell);
+  step();
+  Vec3 torque;
+  mock->torque(0, torque.data());
+  EXPECT_EQ(torque, Vec3(10, 10, 10));
+}
+
 TEST_F(SteppedHdTest, ADockedStylusHoldsTheForceAtOnce) {
   start();
   wanted_N = Vec3(0, 1, 0);

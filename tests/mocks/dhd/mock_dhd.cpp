@@ -32,9 +32,12 @@ struct Mock {
   int buttons = 0;
   bool hasGripper = false;
   double gripper = 0.3;
+  bool gripperFails = false;
   int failReads = 0;
   int status[17] = {};
   double force[3] = {};
+  double torque[3] = {0.1, 0.1, 0.1};  // of the program before
+  double grip = 1;
   bool amplifiers = false;
   int gravity = -1;
   int timeGuard = -1;
@@ -79,6 +82,7 @@ void obeyShared(Mock& m) {
   using namespace hapticd::mock;
   if (!m.shared) return;
   const double* place = m.shared.begin();
+  if (m.hasGripper) m.gripper = m.shared->gripper_rad;
   // To the user, right, up.
   m.position[0] = place[2], m.position[1] = place[0], m.position[2] = place[1];
   const int fault = m.shared.fault();
@@ -124,6 +128,7 @@ EXPORT int dhdOpenID(char index) {
   if (mock().open) crash("opened twice");
   if (index >= mock().devices || !mock().shared.canOpen()) return -1;
   if (mock().shared) ++mock().shared->opened;
+  if (mock().shared && mock().shared->gripper_rad >= 0) mock().name = "sigma.7", mock().hasGripper = true;
   mock().open = true;
   return 0;
 }
@@ -192,6 +197,7 @@ EXPORT bool dhdHasGripper(char id) {
 EXPORT int dhdGetGripperAngleRad(double* out, char id) {
   const Lock lock(mock().mutex);
   if (!device(id).hasGripper) crash("the gripper of a device without one");
+  if (mock().gripperFails) return -1;
   *out = mock().gripper;
   return 0;
 }
@@ -204,7 +210,12 @@ EXPORT int dhdSetForceAndTorqueAndGripperForce(double fx, double fy, double fz, 
   if (tx != 0 || ty != 0 || tz != 0 || grip != 0) crash("a torque that nobody asked for");
   if (!m.calibrated && !m.shared && (fx != 0 || fy != 0 || fz != 0)) crash("a force without calibration");
   const bool arrives = m.fault != hapticd::mock::kUnplugged;
-  if (arrives) m.force[0] = fx, m.force[1] = fy, m.force[2] = fz, m.sinceCommand = 0;
+  if (arrives) {
+    m.force[0] = fx, m.force[1] = fy, m.force[2] = fz;
+    m.torque[0] = tx, m.torque[1] = ty, m.torque[2] = tz;
+    m.grip = grip;
+    m.sinceCommand = 0;
+  }
   tellShared(m, true);
   return arrives ? 0 : -1;
 }
@@ -322,6 +333,9 @@ const MockDhd kControl = {
       m.gravity = m.timeGuard = -1;
       m.maxForce = -1;
       m.gripper = 0.3;
+      m.gripperFails = false;
+      for (double& t : m.torque) t = 0.1;
+      m.grip = 1;
       for (double* v : {m.position, m.velocity, m.force}) std::memset(v, 0, 3 * sizeof *v);
       std::memset(m.status, 0, sizeof m.status);
       for (int i = 0; i < 9; ++i) m.rotation[i] = i % 4 == 0 ? 1 : 0;
@@ -353,6 +367,10 @@ const MockDhd kControl = {
       mock().hasGripper = has != 0;
       mock().gripper = angle;
     },
+    [](int yes) {
+      const Lock lock(mock().mutex);
+      mock().gripperFails = yes != 0;
+    },
     [](int count) {
       const Lock lock(mock().mutex);
       mock().failReads = count;
@@ -372,6 +390,11 @@ const MockDhd kControl = {
     [](double* out) {
       const Lock lock(mock().mutex);
       for (int i = 0; i < 3; ++i) out[i] = mock().amplifiers ? mock().force[i] : 0;
+    },
+    [](double* torque, double* grip) {
+      const Lock lock(mock().mutex);
+      for (int i = 0; i < 3; ++i) torque[i] = mock().torque[i];
+      *grip = mock().grip;
     },
     [] { return get<int>([](Mock& m) { return m.amplifiers ? 1 : 0; }); },
     [] { return get<int>([](Mock& m) { return m.open ? 1 : 0; }); },

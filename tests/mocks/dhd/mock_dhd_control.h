@@ -12,6 +12,7 @@ struct MockDhd {
   void (*turn)(const double rowMajor[9]);
   void (*buttons)(int mask);
   void (*gripper)(int has, double angle);
+  void (*gripperFails)(int yes);
   /// So many reads from now on fail; -1: all.
   void (*failReads)(int count);
   void (*status)(int index, int value);
@@ -22,6 +23,8 @@ struct MockDhd {
 
   /// What the motors give: zero with the amplifiers off.
   void (*force)(double force_N[3]);
+  /// Torque xyz and the gripper's force; what a program before this one left there until they are set.
+  void (*torque)(double torque_Nm[3], double* grip_N);
   int (*amplifiersOn)();
   int (*isOpen)();
   int (*calibrations)();

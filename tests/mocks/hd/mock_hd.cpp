@@ -48,6 +48,7 @@ struct Arm {
   int depth = 0;
   bool framed = false;  // one frame in each tick
   bool forceSet = false;
+  double torque[3] = {10, 10, 10};  // of the program before
   double wanted[3] = {};
   double given[3] = {};
   int frames = 0;
@@ -67,6 +68,7 @@ struct Mock {
   std::string onlyName = "*";
   std::string model = "Touch";
   int style = 4;
+  int outputDof = 3;
   bool banner = false;
   bool stepped = false;
   bool running = false;
@@ -287,6 +289,8 @@ EXPORT void hdGetIntegerv(unsigned what, int* out) {
   const Arm& arm = currentArm("hdGetIntegerv without a device");
   needFrame(arm, what);
   if (what == 0x2000) *out = arm.buttons;
+  if (what == 0x2553) *out = 6;
+  if (what == 0x2554) *out = mock().outputDof;
   if (what == 0x2555) *out = mock().style;
 }
 
@@ -348,8 +352,13 @@ EXPORT void hdGetDoublev(unsigned what, double* out) {
 EXPORT void hdSetDoublev(unsigned what, const double* in) {
   const Lock lock(mock().mutex);
   Arm& arm = currentArm("hdSetDoublev without a device");
-  if (what != 0x2700) return;
+  if (what != 0x2700 && what != 0x2704) return;
   if (arm.depth == 0) crash("a force outside of a frame");
+  if (what == 0x2704) {
+    if (mock().outputDof < 6) crash("a torque for a device without motors for it");
+    std::memcpy(arm.torque, in, sizeof arm.torque);
+    return;
+  }
   if (arm.forceSet) crash("the force is set twice in a frame");
   if (!std::isfinite(in[0] + in[1] + in[2])) crash("a force that is not a number");
   arm.forceSet = true;
@@ -459,6 +468,7 @@ void controlReset() {
   m.onlyName = "*";
   m.model = "Touch";
   m.style = 4;
+  m.outputDof = 3;
   m.banner = m.stepped = false;
   m.current = -1;
   m.errors.clear();
@@ -486,6 +496,7 @@ const MockHd kControl = {
       mock().model = name;
       mock().style = style;
     },
+    [](int axes) { mock().outputDof = axes; },
     [](int on) { mock().banner = on != 0; },
     [](int device, const double* position, const double* velocity) {
       with(device, [&](Arm& arm) {
@@ -512,6 +523,9 @@ const MockHd kControl = {
         const bool on = givesForce(arm);
         for (int i = 0; i < 3; ++i) out[i] = on ? arm.given[i] : 0;
       });
+    },
+    [](int device, double* out) {
+      with(device, [&](Arm& arm) { std::memcpy(out, arm.torque, sizeof arm.torque); });
     },
     [](int device) {
       int value = 0;

@@ -14,6 +14,8 @@ struct MockHd {
   /// The only name that opens a device from now on; null: the default; "*": every name.
   void (*onlyName)(const char* name);
   void (*model)(const char* name, int calibrationStyle);
+  /// Axes with motors: 3, or 6 with those of the gimbal.
+  void (*outputDof)(int axes);
   /// Prints a banner and reads a key from stdin in every init.
   void (*banner)(int on);
 
@@ -34,6 +36,8 @@ struct MockHd {
 
   /// What the motors give now: zero without scheduler or force output.
   void (*force)(int device, double force_N[3]);
+  /// mNm; what a program before this one left there until it is set.
+  void (*torque)(int device, double torque_mNm[3]);
   int (*frames)(int device);
   int (*calibrationUpdates)(int device);
   int (*isOpen)(int device);
