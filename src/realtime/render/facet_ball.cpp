@@ -5,12 +5,19 @@
 #include <limits>
 
 namespace hapticd::realtime {
+namespace {
+
+// In skins: at half a skin over a face a way is free of it; the rest is for rounding.
+constexpr double kClear = 0.625;
+
+}  // namespace
 
 void FacetBall::begin(const Vec3& centre, double reach) noexcept {
   centre_ = centre;
   reach_ = reach;
   complete_ = true;
   count_ = 0;
+  thickest_ = 0;
 }
 
 Facet* FacetBall::room() noexcept {
@@ -24,7 +31,23 @@ void FacetBall::add(bool asFarAsItBends) noexcept {
   const double limit = reach_ + toolRadius_ + 4 * facet.skin;
   if (std::abs(facet.normal.dot(centre_ - facet.a)) > limit && !asFarAsItBends) return;
   if (toolRadius_ > 0) facet.distance = (centre_ - nearestPointOf(facet, centre_)).norm();
-  if (facet.distance <= limit || asFarAsItBends) ++count_;
+  if (facet.distance > limit && !asFarAsItBends) return;
+  sides_[static_cast<std::size_t>(count_++)] = {facet.normal, facet.normal.dot(facet.a)};
+  thickest_ = std::max(thickest_, facet.skin);
+}
+
+int FacetBall::crossing(const Vec3& p, const Vec3& d, double limit, const Facet** found) const noexcept {
+  const Vec3 way = limit * d;
+  const double height = kClear * thickest_;
+  int n = 0;
+  for (int i = 0; i < count_; ++i) {
+    const Side& side = sides_[static_cast<std::size_t>(i)];
+    const double start = side.normal.dot(p) - side.offset;
+    const double end = start + side.normal.dot(way);
+    found[n] = &facets_[static_cast<std::size_t>(i)];
+    n += std::min(start, end) < height && std::max(start, end) > -height ? 1 : 0;
+  }
+  return n;
 }
 
 void FacetBall::finish() noexcept {

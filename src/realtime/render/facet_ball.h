@@ -1,5 +1,6 @@
 // The facets around the proxy: all that a tool inside a ball can meet, in fixed storage.
 //
+// A point asks first which faces have both ends of its way on one side: few have not.
 // A ball tool has many faces within its radius and touches few. So it keeps for each the distance from the
 // centre, or a lower bound of it, and those that it may touch soon in front; when the tool has moved, only
 // these are measured again.
@@ -43,16 +44,27 @@ class FacetBall {
   const Facet* far() const noexcept { return facets_.data() + near_; }
   double farDistance() const noexcept { return farDistance_; }
 
+  /// For a point: all facets whose faces the way p + t d, t in [0, limit], or a part of
+  /// it from p on, may come to; `found` has room for kMost. Returns how many.
+  int crossing(const Vec3& p, const Vec3& d, double limit, const Facet** found) const noexcept;
+
   /// Moves the centre to p, which is inside, so that distances are those from there; the ball shrinks.
   void recentre(const Vec3& p) noexcept;
 
- private:
   static constexpr int kMost = 512;
+
+ private:
   // What a ball may touch soon, in radii from its surface.
   static constexpr double kNear = 0.1;
 
   void sortOut() noexcept;
   double nearLimit() const noexcept { return (1 + kNear) * toolRadius_; }
+
+  // The plane of a face, normal . x = offset.
+  struct Side {
+    Vec3 normal;
+    double offset;
+  };
 
   double toolRadius_;
   Vec3 centre_ = Vec3::Zero();
@@ -61,6 +73,8 @@ class FacetBall {
   int count_ = 0;
   int near_ = 0;
   double farDistance_ = 0;
+  double thickest_ = 0;  // of the skins
+  std::array<Side, kMost> sides_;
   std::array<Facet, kMost> facets_;
 };
 

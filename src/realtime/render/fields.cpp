@@ -51,6 +51,11 @@ Vec3 Fields::buzz(const scene::Buzz& b, Nanos now) noexcept {
 }
 
 Vec3 Fields::force(const scene::SceneSnapshot& scene, const Vec3& hip, Nanos now) noexcept {
+  if (scene.fields.empty() && !scene.buzz) {
+    releasingCount_ = 0;
+    buzzing_ = false;
+    return Vec3::Zero();
+  }
   for (Releasing& r : releasing_) r.seen = false;
   const Vec3 x = scene.workspace.T_world_device * hip;
   Vec3 sum = Vec3::Zero();  // world frame

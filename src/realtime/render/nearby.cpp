@@ -280,21 +280,23 @@ bool Nearby::castGathered(const Vec3& p, const Vec3& d, double limit, int only, 
   return radius_ > 0 ? meetBallOf({p, d, limit}, only, hit) : meetPoint({p, d, limit}, only, hit);
 }
 
-template <class Visit>
-void Nearby::forEachGathered(int only, Visit&& visit) noexcept {
-  for (const Facet& f : ball_) {
-    if (only < 0 || f.object == only) visit(f);
-  }
-  if (only >= 0 || planes_ == nullptr) return;
-  for (const HalfSpace& plane : *planes_) visit(plane.facet);
-}
-
 // Two passes: how far the path is free of faces, then what has to stop it before, so that at the stop it is a
 // skin above all of them.
 bool Nearby::meetPoint(const Path& path, int only, Hit& hit) noexcept {
+  std::array<const Facet*, FacetBall::kMost + scene::kMaxPlanes> inTheWay;
+  int count = ball_.crossing(path.p, path.d, path.limit, inTheWay.data());
+  if (only < 0 && planes_ != nullptr) {
+    for (const HalfSpace& plane : *planes_) inTheWay[static_cast<std::size_t>(count++)] = &plane.facet;
+  }
   double free = path.limit;
   bool blocked = false;
-  forEachGathered(only, [&](const Facet& f) noexcept {
+  const auto forEach = [&](auto&& visit) {
+    for (int i = 0; i < count; ++i) {
+      const Facet& f = *inTheWay[static_cast<std::size_t>(i)];
+      if (only < 0 || f.object == only) visit(f);
+    }
+  };
+  forEach([&](const Facet& f) {
     const double t = reach(f, faces(), path.p, path.d, free);
     if (t > 1) return;
     blocked = true;
@@ -303,7 +305,7 @@ bool Nearby::meetPoint(const Path& path, int only, Hit& hit) noexcept {
   if (!blocked) return false;
   const Path way{path.p, path.d, free};
   bool found = false;
-  forEachGathered(only, [&](const Facet& f) noexcept { consider(f, way, hit, found); });
+  forEach([&](const Facet& f) { consider(f, way, hit, found); });
   return found;
 }
 

@@ -122,8 +122,6 @@ class Nearby {
   };
 
   template <class Visit>
-  void forEachGathered(int only, Visit&& visit) noexcept;
-  template <class Visit>
   void forEachOnSegment(const Vec3& p, const Vec3& d, double limit, int only, Visit&& visit) const noexcept;
   void includeByIndex(const scene::SceneSnapshot& scene, const Vec3& centre, double reach) noexcept;
   void add(const scene::ObjectState& state) noexcept;
