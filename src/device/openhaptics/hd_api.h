@@ -67,6 +67,10 @@ inline constexpr Enum kDeviceErrors = 0x300;     // … 0x3FF
 inline constexpr Enum kFrameErrors = 0x400;      // … 0x4FF
 inline constexpr Enum kSchedulerErrors = 0x500;  // … 0x5FF
 
+/// Of the device or its link: only opening it anew helps.
+inline bool isDeviceError(Enum code) noexcept {
+  return code >= kDeviceErrors && code < kFrameErrors;
+}
 /// The name of an error as the vendor's manual has it.
 const char* errorName(Enum code) noexcept;
 

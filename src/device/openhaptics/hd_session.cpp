@@ -155,6 +155,7 @@ void Session::drainErrors() noexcept {
   for (int i = 0; i < kMostErrors; ++i) {
     const ErrorInfo error = api_.getError();
     if (error.code == kSuccess) return;
+    if (isDeviceError(error.code)) deviceErrorTold_.store(true, std::memory_order_relaxed);
     const bool known = std::any_of(members_.begin(), members_.end(),
                                    [&](const Member& m) { return m.device == error.device; });
     for (const Member& member : members_) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -43,6 +44,10 @@ class Session {
   void join(Handle device, Participant& participant, double rate_Hz);
   void leave(Participant& participant) noexcept;
 
+  /// Any thread: an error of a device was told before. The library tells an identical one only once, so from
+  /// then on silence may hide the next.
+  bool deviceErrorTold() const noexcept { return deviceErrorTold_.load(std::memory_order_relaxed); }
+
   /// Scheduler's thread: hands the errors on the stack to the devices that they name.
   void drainErrors() noexcept;
   /// Empties the error stack into words; empty when there was none. Only while the scheduler is stopped.
@@ -64,6 +69,7 @@ class Session {
   bool running_ = false;
   std::vector<Handle> open_;
   std::vector<Member> members_;  // changes only while the scheduler is stopped
+  std::atomic<bool> deviceErrorTold_{false};
 };
 
 }  // namespace hapticd::device::hd

@@ -20,6 +20,7 @@ constexpr Nanos kForceErrorHold = 100'000'000;  // the amplifiers go off and ram
 constexpr Nanos kWarmHold = 1'000'000'000;
 constexpr int kSettlingFrames = 100;
 constexpr std::uint64_t kCalibrationCheck = 100;  // frames, while calibrated
+constexpr double kSilence_s = 0.5;                // that no hand holds an arm still to the last bit
 constexpr double kImpulseShare = 0.9;             // stays clear of the driver's own trip
 
 Nanos steadyNow() noexcept {
@@ -57,7 +58,8 @@ void OpenHapticsDevice::open() {
   written_N_.setZero();
   frames_ = 0;
   calibrated_ = hot_ = false;
-  lost_ = false;
+  lost_ = silent_ = false;
+  sameFrames_ = 0;
   settling_ = 0;
   hotUntil_ = faultUntil_ = 0;
   hold_ = kHoldNotCalibrated;
@@ -200,8 +202,22 @@ void OpenHapticsDevice::sample(Nanos now) noexcept {
   double temperatures[6] = {};
   api.getDoublev(hd::kMotorTemperature, temperatures);
   state_.motorTemperature = *std::max_element(std::begin(temperatures), std::end(temperatures));
+  noticeSilence();
   state_.hold = holds(now);
   hold_.store(state_.hold, std::memory_order_relaxed);
+}
+
+// The library tells an error only once, and a cable may be pulled twice: then what is left to see is an arm
+// that stays where it was under a force.
+void OpenHapticsDevice::noticeSilence() noexcept {
+  const bool same = state_.position_m == before_.position_m &&
+                    state_.velocity_m_per_s == before_.velocity_m_per_s &&
+                    state_.orientation.coeffs() == before_.orientation.coeffs();
+  before_ = state_;
+  sameFrames_ = same && !written_N_.isZero() ? sameFrames_ + 1 : 0;
+  if (sameFrames_ < kSilence_s * options_.rate_Hz || !session_->deviceErrorTold()) return;
+  silent_ = true;
+  lost_ = true;
 }
 
 std::uint32_t OpenHapticsDevice::holds(Nanos now) noexcept {
@@ -264,7 +280,7 @@ void OpenHapticsDevice::onError(hd::Enum code) noexcept {
   lastError_ = code;
   if (code == hd::kWarmMotors) {
     hotUntil_ = now_ + kWarmHold;
-  } else if (code >= hd::kDeviceErrors && code < hd::kFrameErrors) {
+  } else if (hd::isDeviceError(code)) {
     // The same error is told only once, so silence does not mean that the device is back.
     lost_ = true;
   } else {
@@ -293,9 +309,14 @@ std::string OpenHapticsDevice::faultText() const {
   const auto say = [&](const std::string& sentence) { words += (words.empty() ? "" : "; ") + sentence; };
   if ((hold & kHoldFault) != 0) {
     const hd::Enum code = lastError_;
-    say(code == hd::kSuccess ? "the driver gives positions that are not numbers"
-                             : "the driver reports " + std::string(hd::errorName(code)));
-    if (code >= hd::kDeviceErrors && code < hd::kFrameErrors) say("check the cable and open the device anew");
+    if (silent_) {
+      say("the driver gave one and the same position for half a second under a force, and it tells a lost "
+          "device only once");
+    } else {
+      say(code == hd::kSuccess ? "the driver gives positions that are not numbers"
+                               : "the driver reports " + std::string(hd::errorName(code)));
+    }
+    if (silent_ || hd::isDeviceError(code)) say("check the cable and open the device anew");
   }
   if ((hold & kHoldNotCalibrated) != 0) {
     if ((calibrationStyle_ & hd::kStyleEncoderReset) != 0) {

@@ -54,6 +54,7 @@ class OpenHapticsDevice final : public Device, private hd::Participant {
   void readIdentity();
   void readAxes();
   void sample(Nanos now) noexcept;
+  void noticeSilence() noexcept;
   std::uint32_t holds(Nanos now) noexcept;
   void updateCalibration(hd::Enum status) noexcept;
   Vec3 limited(const Vec3& force_N) noexcept;
@@ -75,10 +76,13 @@ class OpenHapticsDevice final : public Device, private hd::Participant {
   std::atomic<std::uint32_t> hold_{kHoldNone};
   std::atomic<hd::Enum> lastError_{hd::kSuccess};
   std::atomic<bool> lost_{false};  // until opened anew
+  std::atomic<bool> silent_{false};  // lost without an error
 
   // The scheduler thread's from here on.
   ThermalDerating derating_{0, 0};
   DeviceState state_;
+  DeviceState before_;  // of the frame before
+  int sameFrames_ = 0;
   bool inTick_ = false;
   Vec3 command_N_ = Vec3::Zero();
   Vec3 written_N_ = Vec3::Zero();

@@ -266,6 +266,49 @@ TEST_F(SteppedHdTest, AForceErrorHoldsForAMomentAndADeviceFaultUntilReopened) {
   EXPECT_TRUE(force().isApprox(wanted_N));
 }
 
+// The library is silent about an error that it has told before.
+TEST_F(SteppedHdTest, ACableThatIsPulledAgainIsNoticedByAnArmThatStandsStill) {
+  start();
+  wanted_N = Vec3(0, 1, 0);
+  step(2000);
+  EXPECT_EQ(state.hold, kHoldNone) << "a hand that rests moves a little";
+  mock->unplug(0);
+  step(2);
+  EXPECT_EQ(state.hold, kHoldFault);
+  device.close();
+  mock->plugIn(0);
+  start();
+  step(2000);
+  EXPECT_EQ(state.hold, kHoldNone);
+
+  mock->unplug(0);
+  step(400);
+  EXPECT_EQ(state.hold, kHoldNone) << "nothing has told it yet";
+  step(102);
+  EXPECT_EQ(state.hold, kHoldFault);
+  EXPECT_TRUE(force().isZero());
+  EXPECT_TRUE(device.lost());
+  EXPECT_THAT(device.faultText(), AllOf(HasSubstr("only once"), HasSubstr("cable")));
+  device.close();
+  mock->plugIn(0);
+  start();
+  step(2);
+  EXPECT_EQ(state.hold, kHoldNone);
+  EXPECT_EQ(device.faultText(), "");
+}
+
+TEST_F(SteppedHdTest, AnArmWithoutForceMayStandStillForEver) {
+  start();
+  mock->unplug(0);
+  step(2);
+  device.close();  // from here on an error has been told
+  mock->plugIn(0);
+  start();
+  mock->unplug(0);
+  step(5000);
+  EXPECT_EQ(state.hold, kHoldNone);
+}
+
 TEST_F(SteppedHdTest, WarmMotorsErrorIsHeat) {
   start();
   mock->fail(0, 0x200);

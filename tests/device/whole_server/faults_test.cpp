@@ -54,6 +54,19 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"NotCalibrated", mock::kNotCalibrated, 100, "not calibrated: put the stylus"}),
     kName);
 
+// The library tells an identical error only once in its process.
+TEST_F(InContact, ASecondPullOfTheCableIsNoticedWithoutAnError) {
+  serve({"--device", "openhaptics"}, {"HAPTICD_HDAPI_LIB=" MOCK_HD});
+  strike(mock::kUnplugged, 1);
+  expectWords("HD_COMM_ERROR");
+  heal(true);
+  visitor->forget();
+  strike(mock::kUnplugged, 502);
+  expectWords("one and the same position");
+  heal(true);
+  endInOrder();
+}
+
 class ForceDimensionFault : public DeviceFault {};
 
 TEST_P(ForceDimensionFault, EndsInNoForceAndHeals) {
@@ -130,8 +143,13 @@ TEST_F(OpenHapticsIsolatedFault, AHangOfTheLibraryIsAFaultAndANewProcessBringsTh
   endInOrder();
 }
 
-TEST_F(OpenHapticsIsolatedFault, AnUnpluggedDeviceIsReopenedInItsProcess) {
+TEST_F(OpenHapticsIsolatedFault, AnUnpluggedDeviceIsReopenedInANewProcessEachTime) {
   serve();
+  strike(mock::kUnplugged, 1);
+  expectWords("HD_COMM_ERROR");
+  heal(true);
+  // In a new process the library has told nothing yet.
+  visitor->forget();
   strike(mock::kUnplugged, 1);
   expectWords("HD_COMM_ERROR");
   heal(true);

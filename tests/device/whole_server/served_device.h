@@ -84,6 +84,8 @@ class Visitor {
   /// Whether a text with these words came.
   bool heard(const std::string& words) const;
   std::string texts() const;
+  /// What was heard until now.
+  void forget() { texts_.clear(); }
   bool latched() const { return client_.latest().guard.latched != 0; }
   /// Forces are armed, and nothing is latched; re-arms what a stalled machine has latched.
   bool untilReady();

@@ -38,6 +38,7 @@ struct Arm {
   bool unplugged = false;
   double position[3] = {};
   double velocity[3] = {};
+  double noise = 0;  // mm; nothing that lives holds still
   double rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   int buttons = 0;
   unsigned char inkwell = 1;
@@ -126,8 +127,8 @@ void obeyShared(Mock& m) {
   if (!m.shared) return;
   Arm& arm = m.arms[0];
   const double* place = m.shared.begin();
-  for (int i = 0; i < 3; ++i) arm.position[i] = 1000 * place[i];
   const int fault = m.shared.fault();
+  for (int i = 0; i < 3 && fault != kUnplugged; ++i) arm.position[i] = 1000 * place[i];
   const bool begins = fault != m.fault;
   m.fault = fault;
   arm.unplugged = fault == kUnplugged;
@@ -151,6 +152,9 @@ void tick() {
   m.scheduler = std::this_thread::get_id();
   for (Arm& arm : m.arms) arm.framed = false;
   obeyShared(m);
+  for (Arm& arm : m.arms) {
+    if (!arm.unplugged) arm.noise = 1e-12 - arm.noise;
+  }
   const std::vector<Callback> now = m.callbacks;
   for (const Callback& callback : now) {
     if (callback.function(callback.data) == 0) crash("a frame callback ended itself");
@@ -302,6 +306,7 @@ EXPORT void hdGetDoublev(unsigned what, double* out) {
   switch (what) {
     case 0x2050:
       std::memcpy(out, arm.position, sizeof arm.position);
+      out[2] += arm.noise;
       break;
     case 0x2051:
       std::memcpy(out, arm.velocity, sizeof arm.velocity);
@@ -518,6 +523,7 @@ const MockHd kControl = {
     [](int device, unsigned status) { with(device, [&](Arm& arm) { arm.calibration = status; }); },
     [](int device, unsigned code) { with(device, [&](Arm&) { push(code, static_cast<unsigned>(device)); }); },
     [](int device) { with(device, [&](Arm& arm) { arm.unplugged = true; }); },
+    [](int device) { with(device, [&](Arm& arm) { arm.unplugged = false; }); },
     [](int device, double* out) {
       with(device, [&](Arm& arm) {
         const bool on = givesForce(arm);

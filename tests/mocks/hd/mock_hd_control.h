@@ -31,8 +31,10 @@ struct MockHd {
   void (*calibration)(int device, unsigned status);
   /// Puts this error on the stack in the next tick.
   void (*fail)(int device, unsigned code);
-  /// Every frame fails from now on, as with the cable pulled.
+  /// Every frame fails from now on and the arm is where it was, as with the cable pulled; the library tells
+  /// it only the first time.
   void (*unplug)(int device);
+  void (*plugIn)(int device);
 
   /// What the motors give now: zero without scheduler or force output.
   void (*force)(int device, double force_N[3]);
