@@ -2,7 +2,9 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
+#include <system_error>
 #include <vector>
 
 namespace hapticd::device {
@@ -16,12 +18,19 @@ struct DriverReport {
   std::string remedy;  ///< what to install, connect or allow
 };
 
+/// No error, or the system's.
+std::error_code mayReadAndWrite(const std::filesystem::path& node);
+
 struct DiscoveryOptions {
   bool openThem =
       false;  ///< also opens, without force, where nothing else tells: takes the device for a moment
   std::string haplyHost = "localhost";
   std::string haplyPort = "10001";
   std::filesystem::path usbDevices = "/sys/bus/usb/devices";
+  std::filesystem::path inputDevices = "/sys/class/input";
+  std::filesystem::path nodes = "/dev";
+  /// Whether this user may read and write a node.
+  std::function<std::error_code(const std::filesystem::path&)> mayUse = mayReadAndWrite;
 };
 
 /// Asks every driver for real devices. Blocks for a second or two; never throws for what it does not find.

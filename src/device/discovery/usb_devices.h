@@ -2,25 +2,34 @@
 #pragma once
 
 #include <filesystem>
-#include <initializer_list>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace hapticd::device {
 
+/// What a driver recognises its devices by; packaging/udev has a rule for each.
+struct UsbKind {
+  std::string_view driver;
+  std::string_view vendor;   ///< four hexadecimal digits
+  std::string_view product;  ///< four hexadecimal digits; empty: any
+};
+inline constexpr UsbKind kUsbKinds[] = {
+    {"openhaptics", "2988", ""}, {"openhaptics", "0301", "2988"}, {"forcedimension", "1451", ""}};
+
 struct UsbDevice {
   std::string vendor;   ///< four hexadecimal digits
   std::string product;  ///< four hexadecimal digits
   std::string name;     ///< as it calls itself; may be empty
+  /// Below /dev, what a library opens to reach it: a serial line or HID device, else the USB device itself.
+  std::vector<std::string> nodes;
 
   std::string text() const {
     return (name.empty() ? "a device" : name) + " (USB " + vendor + ":" + product + ")";
   }
 };
 
-/// Devices of these vendors below a folder that looks like /sys/bus/usb/devices, by vendor and product.
-std::vector<UsbDevice> findUsbDevices(const std::filesystem::path& folder,
-                                      std::initializer_list<std::string_view> vendors);
+/// Devices of this driver below a folder that looks like /sys/bus/usb/devices, by vendor and product.
+std::vector<UsbDevice> findUsbDevices(const std::filesystem::path& folder, std::string_view driver);
 
 }  // namespace hapticd::device

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <filesystem>
 #include <system_error>
 
 namespace hapticd::device {
@@ -43,17 +42,19 @@ class EventFile final : public EventDevice {
 std::unique_ptr<EventDevice> openEventDevice(const std::string& path) {
   const int descriptor = ::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
   if (descriptor < 0) {
+    const int error = errno;
     const std::string remedy =
-        errno == EACCES ? " (install the udev rules, or add yourself to the group 'input')" : "";
-    throw std::system_error(errno, std::generic_category(), path + remedy);
+        error == EACCES ? " (install packaging/udev/70-hapticd.rules, or add yourself to the group 'input')"
+                        : "";
+    throw std::system_error(error, std::generic_category(), path + remedy);
   }
   return std::make_unique<EventFile>(descriptor);
 }
 
-std::vector<std::string> eventDevicePaths() {
+std::vector<std::string> eventDevicePaths(const std::filesystem::path& folder) {
   std::vector<std::string> paths;
   std::error_code ignored;
-  for (const auto& entry : std::filesystem::directory_iterator("/dev/input", ignored)) {
+  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
     if (entry.path().filename().string().rfind("event", 0) == 0) paths.push_back(entry.path().string());
   }
   std::sort(paths.begin(), paths.end(), [](const std::string& a, const std::string& b) {

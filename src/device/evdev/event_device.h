@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -33,7 +34,7 @@ class EventDevice {
 /// Opens /dev/input/event*. Throws std::system_error with the remedy where permission is missing.
 std::unique_ptr<EventDevice> openEventDevice(const std::string& path);
 
-/// All /dev/input/event* files, by number.
-std::vector<std::string> eventDevicePaths();
+/// All event* files in a folder, by number.
+std::vector<std::string> eventDevicePaths(const std::filesystem::path& folder = "/dev/input");
 
 }  // namespace hapticd::device

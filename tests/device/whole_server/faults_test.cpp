@@ -45,6 +45,12 @@ TEST_P(OpenHapticsFault, EndsInNoForceAndHeals) {
   endsInNoForceAndHeals();
 }
 
+// The driver there holds the force by itself: no tick is lost on the way to the server.
+TEST_P(OpenHapticsFault, EndsInNoForceAndHealsInAProcessOfItsOwn) {
+  serve({"--device", "openhaptics", "--isolate"}, {"HAPTICD_HDAPI_LIB=" MOCK_HD});
+  endsInNoForceAndHeals();
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Fault, OpenHapticsFault,
     testing::Values(Case{"Unplugged", mock::kUnplugged, 1, "HD_COMM_ERROR", true},
@@ -93,6 +99,13 @@ TEST_F(HaplyFault, TheServicesStatusEndsTheForce) {
   serve();
   strike(mock::kNotCalibrated, 2);
   expectWords("not calibrated");
+  heal(false);
+}
+
+TEST_F(HaplyFault, ADeviceThatIsNotReadyGetsNoForce) {
+  serve();
+  strike(mock::kForceExceeded, 2);
+  expectWords("the service says that the device is not ready");
   heal(false);
 }
 
@@ -167,15 +180,30 @@ TEST_F(OpenHapticsIsolatedFault, ADeviceThatDoesNotOpenIsTriedUntilItDoes) {
 }
 
 TEST(InitFailure, EndsTheServerWithWords) {
-  for (const std::string driver : {"openhaptics", "forcedimension"}) {
+  device::MockService service;
+  service.withoutDevice(true);
+  struct Start {
+    std::vector<std::string> arguments;
+    std::string words;
+  };
+  const std::vector<Start> starts{
+      {{"--device", "openhaptics"}, "no OpenHaptics device opens: the default device: HD_DEVICE_FAULT"},
+      {{"--device", "openhaptics", "--isolate"},
+       "no OpenHaptics device opens: the default device: HD_DEVICE"},
+      {{"--device", "forcedimension"}, "Force Dimension device 0 does not open: mock error"},
+      {{"--device", "haply:127.0.0.1:" + service.port()}, "the service knows no Inverse3"},
+      {{"--device", "haply:127.0.0.1:1"}, "connecting to 127.0.0.1:1: Connection refused"},
+      {{"--device", "evdev:/nowhere/event0"}, "/nowhere/event0: No such file or directory"},
+      {{"--device", "replay", "--hand", "/nowhere/hand.csv"}, "/nowhere/hand.csv"}};
+  for (const Start& start : starts) {
     const WorkDirectory work;
     const SharedArm arm(work.file("arm"));
     arm->fault = mock::kDoesNotOpen;
     ServerProcess server(
-        work, {"--device", driver},
+        work, start.arguments,
         {"HAPTICD_HDAPI_LIB=" MOCK_HD, "HAPTICD_DHD_LIB=" MOCK_DRD, "HAPTICD_MOCK_ARM=" + work.file("arm")});
     EXPECT_EQ(server.address(), "");
-    EXPECT_THAT(server.log(), HasSubstr("open")) << driver;
+    EXPECT_THAT(server.log(), HasSubstr(start.words));
     EXPECT_TRUE(arm.left().isZero());
   }
 }
