@@ -108,6 +108,20 @@ bool meet(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d, do
   return true;
 }
 
+double distanceBound(const scene::Corners& k, const Vec3& x) noexcept {
+  const Vec3 centre = (k.a + k.b + k.c) / 3;
+  const double radius2 =
+      std::max({(k.a - centre).squaredNorm(), (k.b - centre).squaredNorm(), (k.c - centre).squaredNorm()});
+  const Vec3 normal = (k.b - k.a).cross(k.c - k.a);
+  const double normal2 = normal.squaredNorm();
+  const Vec3 way = x - centre;
+  const double up = normal.dot(way);
+  // The normal of a needle says little.
+  const double up2 = normal2 > kThinness * kThinness * radius2 * radius2 ? up * up / normal2 : 0.0;
+  const double aside = std::sqrt(std::max(0.0, way.squaredNorm() - up2)) - std::sqrt(radius2);
+  return aside > 0 ? std::sqrt(up2 + aside * aside) : std::sqrt(up2);
+}
+
 Vec3 nearestPointOf(const Facet& f, const Vec3& x) noexcept {
   if (f.unbounded) return x - f.normal * f.normal.dot(x - f.a);
   const Vec3 ab = f.b - f.a;

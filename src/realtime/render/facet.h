@@ -22,7 +22,6 @@ struct Facet {
   Vec3 c = Vec3::Zero();
   Vec3 normal = Vec3::Zero();  ///< unit, out of the front
   double skin = 0;
-  double distance = 0;  ///< from the centre of the gathered ball, or a lower bound of it; for the ball tool
   std::uint32_t triangle = 0;
   int object = 0;          ///< position among the near objects; negative for a plane of the scene
   bool unbounded = false;  ///< a plane: no edges, felt from the front
@@ -52,6 +51,9 @@ bool meet(const Facet& f, scene::TouchableFaces faces, const Vec3& p, const Vec3
 /// is of no interest. False when it passes.
 bool meetBall(const Facet& f, scene::TouchableFaces faces, double radius, const Vec3& p, const Vec3& d,
               double limit, double latest, Meeting& out) noexcept;
+
+/// A lower bound of the distance of x from a triangle: that from the disc around it.
+double distanceBound(const scene::Corners& corners, const Vec3& x) noexcept;
 
 /// The point of the triangle nearest to x (Ericson 2005, 5.1.5).
 Vec3 nearestPointOf(const Facet& f, const Vec3& x) noexcept;

@@ -13,27 +13,32 @@ constexpr double kClear = 0.625;
 }  // namespace
 
 void FacetBall::begin(const Vec3& centre, double reach) noexcept {
-  centre_ = centre;
+  centre_ = place_ = centre;
   reach_ = reach;
   complete_ = true;
   count_ = 0;
   thickest_ = 0;
+  gone_ = 0;
 }
 
-Facet* FacetBall::room() noexcept {
-  if (count_ < kMost) return &facets_[static_cast<std::size_t>(count_)];
-  complete_ = false;
-  return nullptr;
-}
-
-void FacetBall::add(bool asFarAsItBends) noexcept {
-  Facet& facet = facets_[static_cast<std::size_t>(count_)];
-  const double limit = reach_ + toolRadius_ + 4 * facet.skin;
+void FacetBall::add(const Facet& facet, bool asFarAsItBends) noexcept {
+  const double limit = reach_ + 4 * facet.skin;
   if (std::abs(facet.normal.dot(centre_ - facet.a)) > limit && !asFarAsItBends) return;
-  if (toolRadius_ > 0) facet.distance = (centre_ - nearestPointOf(facet, centre_)).norm();
-  if (facet.distance > limit && !asFarAsItBends) return;
-  sides_[static_cast<std::size_t>(count_++)] = {facet.normal, facet.normal.dot(facet.a)};
+  if (count_ == kMost) return drop();
+  const auto i = static_cast<std::size_t>(count_++);
+  facets_[i] = facet;
+  sides_[i] = {facet.normal, facet.normal.dot(facet.a)};
   thickest_ = std::max(thickest_, facet.skin);
+}
+
+void FacetBall::add(const Name& name, double distance, double skin, bool asFarAsItBends) noexcept {
+  if (distance > reach_ + toolRadius_ + 4 * skin && !asFarAsItBends) return;
+  if (count_ == kMostNames) return drop();
+  const auto i = static_cast<std::size_t>(count_++);
+  names_[i] = name;
+  distances_[i] = distance;
+  sides_[i] = {Vec3::Zero(), 0};
+  thickest_ = std::max(thickest_, skin);
 }
 
 int FacetBall::crossing(const Vec3& p, const Vec3& d, double limit, const Facet** found) const noexcept {
@@ -50,37 +55,37 @@ int FacetBall::crossing(const Vec3& p, const Vec3& d, double limit, const Facet*
   return n;
 }
 
-void FacetBall::finish() noexcept {
-  near_ = count_;
-  farDistance_ = std::numeric_limits<double>::infinity();
-  if (toolRadius_ > 0) sortOut();
+void FacetBall::moveTo(const Vec3& p) noexcept {
+  gone_ += (p - place_).norm();
+  place_ = p;
 }
 
-void FacetBall::recentre(const Vec3& p) noexcept {
-  const double moved = (p - centre_).norm();
-  centre_ = p;
-  reach_ -= moved;
-  for (int i = 0; i < count_; ++i) {
-    Facet& facet = facets_[static_cast<std::size_t>(i)];
-    facet.distance -= moved;
-    if (facet.distance <= nearLimit()) facet.distance = (p - nearestPointOf(facet, p)).norm();
-  }
-  sortOut();
+int FacetBall::nextWithin(double distance, int i) const noexcept {
+  const double limit = distance + gone_;
+  while (i < count_ && distances_[static_cast<std::size_t>(i)] > limit) ++i;
+  return i;
 }
 
-// The nearest goes first: a ball stops early there, and then nothing farther needs a closer look.
-void FacetBall::sortOut() noexcept {
-  Facet* const first = facets_.data();
-  Facet* const last = first + count_;
-  Facet* const middle =
-      std::partition(first, last, [this](const Facet& f) { return f.distance <= nearLimit(); });
-  near_ = static_cast<int>(middle - first);
-  farDistance_ = std::numeric_limits<double>::infinity();
-  for (const Facet* f = middle; f != last; ++f)
-    farDistance_ = std::min(farDistance_, f->distance - 2 * f->skin);
-  Facet* const nearest =
-      std::min_element(first, middle, [](const Facet& a, const Facet& b) { return a.distance < b.distance; });
-  if (nearest != middle) std::swap(*first, *nearest);
+// The distance from a face is convex: nowhere less than its tangent.
+double FacetBall::nearest(int k, const Vec3& d) noexcept {
+  const auto i = static_cast<std::size_t>(k);
+  const double here = sides_[i].normal.dot(place_) - sides_[i].offset;
+  distances_[i] = std::max(distances_[i], here + gone_);
+  return here + std::min(0.0, sides_[i].normal.dot(d));
+}
+
+double FacetBall::measured(int k, const Vec3& foot, const Vec3& d) noexcept {
+  const auto i = static_cast<std::size_t>(k);
+  const Vec3 away = place_ - foot;
+  const double distance = away.norm();
+  distances_[i] = distance + gone_;
+  const Vec3 normal = distance > 0 ? Vec3(away / distance) : Vec3(Vec3::Zero());
+  sides_[i] = {normal, normal.dot(place_) - distance};
+  return distance + std::min(0.0, normal.dot(d));
+}
+
+void FacetBall::leaveOut(int i) noexcept {
+  distances_[static_cast<std::size_t>(i)] = std::numeric_limits<double>::infinity();
 }
 
 }  // namespace hapticd::realtime

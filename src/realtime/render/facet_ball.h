@@ -1,9 +1,9 @@
 // The facets around the proxy: all that a tool inside a ball can meet, in fixed storage.
 //
 // A point asks first which faces have both ends of its way on one side: few have not.
-// A ball tool has many faces within its radius and touches few. So it keeps for each the distance from the
-// centre, or a lower bound of it, and those that it may touch soon in front; when the tool has moved, only
-// these are measured again.
+// A ball tool has many faces within its radius and touches few. So it keeps their numbers and, for each, a
+// lower bound of its distance, and a plane with the face behind it: only what these let pass is made and
+// measured.
 #pragma once
 
 #include <array>
@@ -15,17 +15,24 @@ namespace hapticd::realtime {
 /// Everything noexcept and allocation-free.
 class FacetBall {
  public:
+  static constexpr int kMost = 512;        ///< facets for a point
+  static constexpr int kMostNames = 1024;  ///< triangles for a ball tool
+
+  /// A triangle of an object, by their numbers.
+  struct Name {
+    std::uint32_t triangle = 0;
+    int object = 0;
+  };
+
   /// For a point the tool's radius is 0.
   explicit FacetBall(double toolRadius_m) noexcept : toolRadius_(toolRadius_m) {}
 
   /// Empties it for the facets that a tool within `reach` of `centre` can meet.
   void begin(const Vec3& centre, double reach) noexcept;
-  /// Room for one more, to be filled; add() takes it in. Null when full: the ball is then not complete.
-  Facet* room() noexcept;
-  /// `asFarAsItBends`: the facet counts whatever its distance.
-  void add(bool asFarAsItBends) noexcept;
-  /// After the last: ready to be asked.
-  void finish() noexcept;
+  /// For a point: takes in a facet. `asFarAsItBends`: it counts whatever its distance.
+  void add(const Facet& facet, bool asFarAsItBends) noexcept;
+  /// For a ball tool: the same for a triangle that is `distance` or more from the centre.
+  void add(const Name& name, double distance, double skin, bool asFarAsItBends) noexcept;
   /// Nothing is gathered.
   void drop() noexcept { complete_ = false; }
 
@@ -36,31 +43,32 @@ class FacetBall {
   bool complete() const noexcept { return complete_; }
   const Vec3& centre() const noexcept { return centre_; }
   double reach() const noexcept { return reach_; }
+  int size() const noexcept { return count_; }
+  double thickestSkin() const noexcept { return thickest_; }
 
+  /// For a point.
   const Facet* begin() const noexcept { return facets_.data(); }
   const Facet* end() const noexcept { return facets_.data() + count_; }
-  int size() const noexcept { return count_; }
-  /// For a ball tool: those from here on are at least farDistance() from the centre, two skins aside.
-  const Facet* far() const noexcept { return facets_.data() + near_; }
-  double farDistance() const noexcept { return farDistance_; }
 
+  /// For a ball tool: it is at p now.
+  void moveTo(const Vec3& p) noexcept;
+  const Name& name(int i) const noexcept { return names_[static_cast<std::size_t>(i)]; }
+  /// The next triangle from i on that may be within `distance` of where the tool is; size() when there is
+  /// none.
+  int nextWithin(double distance, int i) const noexcept;
+  /// How near it may come on the way d from where the tool is. That there is no more than a guess to improve
+  /// on.
+  double nearest(int i, const Vec3& d) noexcept;
+  /// It is there, with `foot` the nearest point of it. Returns the same as nearest() now.
+  double measured(int i, const Vec3& foot, const Vec3& d) noexcept;
+  /// It is nowhere.
+  void leaveOut(int i) noexcept;
   /// For a point: all facets whose faces the way p + t d, t in [0, limit], or a part of
   /// it from p on, may come to; `found` has room for kMost. Returns how many.
   int crossing(const Vec3& p, const Vec3& d, double limit, const Facet** found) const noexcept;
 
-  /// Moves the centre to p, which is inside, so that distances are those from there; the ball shrinks.
-  void recentre(const Vec3& p) noexcept;
-
-  static constexpr int kMost = 512;
-
  private:
-  // What a ball may touch soon, in radii from its surface.
-  static constexpr double kNear = 0.1;
-
-  void sortOut() noexcept;
-  double nearLimit() const noexcept { return (1 + kNear) * toolRadius_; }
-
-  // The plane of a face, normal . x = offset.
+  // A plane, normal . x = offset: for a point that of the face, else one with the face behind it.
   struct Side {
     Vec3 normal;
     double offset;
@@ -71,11 +79,13 @@ class FacetBall {
   double reach_ = 0;
   bool complete_ = false;
   int count_ = 0;
-  int near_ = 0;
-  double farDistance_ = 0;
   double thickest_ = 0;  // of the skins
-  std::array<Side, kMost> sides_;
+  std::array<Side, kMostNames> sides_;
   std::array<Facet, kMost> facets_;
+  Vec3 place_ = Vec3::Zero();                 // of the tool
+  double gone_ = 0;                           // since it was gathered
+  std::array<double, kMostNames> distances_;  // and that way: a lower bound
+  std::array<Name, kMostNames> names_;
 };
 
 }  // namespace hapticd::realtime

@@ -16,9 +16,8 @@ constexpr double kPadShare = 0x1p-22;       // of the object's size: a quarter o
 constexpr double kRoundingFloor = 1e-12;    // of the largest coordinate: a thousand roundings
 constexpr double kSmallestObject_m = 1e-3;  // below this size the coordinates of the hand decide the rounding
 constexpr double kWiden = 1 + 1e-6;         // queries travel between frames with rounding
-constexpr double kSpare = 0.3;              // of the tool's radius: gathered in reserve
+constexpr double kSpare = 0.2;              // of the tool's radius: gathered in reserve
 constexpr int kLean = 32;                   // gathered facets that cost less than gathering anew
-constexpr double kRecentre = 0.02;          // of the tool's radius: distances from farther away serve no more
 
 // An upper bound of the largest singular value, exact for similarities.
 double stretchOf(const Mat3& m) {
@@ -172,22 +171,20 @@ void Nearby::compareWithBefore(PlacedObject& placed) const noexcept {
   placed.jumped = !sameTriangles || before.motion.jumps() != state.motion.jumps();
 }
 
-// An object that will not move or bend any more in this scene has the same facets in each tick.
-bool Nearby::facetOf(int i, std::uint32_t triangle, Facet& facet) const noexcept {
+// An object that will not move or bend any more in this scene has the same facets in each tick. Null for a
+// triangle that is none; valid until the next call.
+const Facet* Nearby::facetOf(int i, std::uint32_t triangle) const noexcept {
   const PlacedObject& placed = object(i);
   MadeFacet& made = made_[(triangle * 0x9E3779B1U) >> (32 - kMadeBits)];
-  if (made.generation == generation_ && made.state == placed.state && made.facet.triangle == triangle) {
-    facet = made.facet;
-    facet.object = i;
-    return true;
+  if (made.generation != generation_ || made.state != placed.state || made.facet.triangle != triangle) {
+    made.generation = 0;
+    if (!makeFacet(placed.corners(triangle, now_.time), placed.skin, made.facet)) return nullptr;
+    made.facet.triangle = triangle;
+    made.state = placed.state;
+    if (placed.atRest) made.generation = generation_;
   }
-  if (!makeFacet(placed.corners(triangle, now_.time), placed.skin, facet)) return false;
-  facet.triangle = triangle;
-  facet.object = i;
-  facet.distance = 0;
-  facet.unbounded = false;
-  if (placed.atRest) made = {generation_, placed.state, facet};
-  return true;
+  made.facet.object = i;
+  return &made.facet;
 }
 
 bool Nearby::gather(const Vec3& centre, double radius) noexcept {
@@ -197,16 +194,20 @@ bool Nearby::gather(const Vec3& centre, double radius) noexcept {
     const PlacedObject& placed = object(i);
     gatheredFrom_[static_cast<std::size_t>(i)] = placed.state;
     lasting = lasting && placed.atRest && !placed.deformed;
+    const Vec3 inObject = placed.T_object_device * centre;
+    // Deforming facets may have come from farther away.
     const auto visit = [&](std::uint32_t triangle) noexcept {
-      Facet* const facet = ball_.room();
-      // Deforming facets may have come from farther away.
-      if (facet != nullptr && facetOf(i, triangle, *facet)) ball_.add(placed.deformed);
+      if (!ball_.complete()) return;
+      if (radius_ > 0) {
+        const double distance = distanceBound(placed.state->mesh->corners(triangle, now_.time), inObject);
+        ball_.add({triangle, i}, distance / (kWiden * placed.stretch), placed.skin, placed.deformed);
+      } else if (const Facet* const facet = facetOf(i, triangle)) {
+        ball_.add(*facet, placed.deformed);
+      }
     };
     const double reach = radius + radius_ + 4 * placed.skin;
-    placed.state->mesh->index.visitNear(placed.T_object_device * centre, reach * kWiden * placed.stretch,
-                                        visit);
+    placed.state->mesh->index.visitNear(inObject, reach * kWiden * placed.stretch, visit);
   }
-  ball_.finish();
   gatheredCount_ = objectCount_;
   gatheredIn_ = lasting ? generation_ : 0;
   return ball_.complete();
@@ -240,13 +241,10 @@ bool Nearby::meets(const Facet& f, const Vec3& p, const Vec3& g, Hit& hit) const
 // A total order on obstacles, so that the first one does not depend on the order of visits.
 void Nearby::consider(const Facet& f, const Path& path, Hit& best, bool& found) const noexcept {
   Hit hit;
-  if (radius_ > 0) {
-    const double latest = found ? best.stop : path.limit;
-    if (f.distance - path.fromCentre - latest * path.length > radius_ + 2 * f.skin) return;
-    if (!meetBall(f, faces(), radius_, path.p, path.d, path.limit, latest, hit)) return;
-  } else if (!meet(f, faces(), path.p, path.d, path.limit, hit)) {
-    return;
-  }
+  const bool met = radius_ > 0 ? meetBall(f, faces(), radius_, path.p, path.d, path.limit,
+                                          found ? best.stop : path.limit, hit)
+                               : meet(f, faces(), path.p, path.d, path.limit, hit);
+  if (!met) return;
   hit.object = f.object;
   hit.triangle = f.triangle;
   const auto rank = [this](const Hit& h) {
@@ -270,8 +268,8 @@ void Nearby::forEachOnSegment(const Vec3& p, const Vec3& d, double limit, int on
     placed.state->mesh->index.visitSegment(placed.T_object_device * p,
                                            placed.T_object_device * (p + limit * d),
                                            [&](std::uint32_t triangle) noexcept {
-                                             Facet f;
-                                             return facetOf(i, triangle, f) ? visit(f) : 1.0;
+                                             const Facet* const f = facetOf(i, triangle);
+                                             return f != nullptr ? visit(*f) : 1.0;
                                            });
   }
 }
@@ -309,24 +307,35 @@ bool Nearby::meetPoint(const Path& path, int only, Hit& hit) noexcept {
   return found;
 }
 
-bool Nearby::meetBallOf(Path path, int only, Hit& hit) noexcept {
-  if ((path.p - ball_.centre()).norm() > kRecentre * radius_) ball_.recentre(path.p);
-  path.fromCentre = (path.p - ball_.centre()).norm();
-  path.length = path.d.norm();
+bool Nearby::meetBallOf(const Path& path, int only, Hit& hit) noexcept {
+  ball_.moveTo(path.p);
   bool found = false;
   if (only < 0 && planes_ != nullptr) {
     for (const HalfSpace& plane : *planes_) consider(plane.facet, path, hit, found);
   }
-  const auto considerAll = [&](const Facet* begin, const Facet* end) {
-    for (const Facet* f = begin; f != end; ++f) {
-      if (only < 0 || f->object == only) consider(*f, path, hit, found);
-    }
-  };
-  considerAll(ball_.begin(), ball_.far());
-  const double latest = found ? hit.stop : path.limit;
-  if (ball_.farDistance() - path.fromCentre - latest * path.length <= radius_)
-    considerAll(ball_.far(), ball_.end());
-  return found;
+  // What stopped it before will do so again: then nothing farther needs a closer look.
+  const int first = stopper_;
+  if (first < ball_.size()) considerGathered(first, path, only, hit, found);
+  const double length = path.d.norm();
+  const double touching = radius_ + 2 * ball_.thickestSkin();
+  for (int i = 0;; ++i) {
+    i = ball_.nextWithin(touching + (found ? hit.stop : path.limit) * length, i);
+    if (i == ball_.size()) return found;
+    if (i != first) considerGathered(i, path, only, hit, found);
+  }
+}
+
+void Nearby::considerGathered(int i, const Path& path, int only, Hit& best, bool& found) noexcept {
+  const FacetBall::Name& name = ball_.name(i);
+  if (only >= 0 && name.object != only) return;
+  const double touching = radius_ + 2 * ball_.thickestSkin();
+  const double latest = found ? best.stop : path.limit;
+  if (ball_.nearest(i, latest * path.d) > touching) return;
+  const Facet* const f = facetOf(name.object, name.triangle);
+  if (f == nullptr) return ball_.leaveOut(i);
+  if (ball_.measured(i, nearestPointOf(*f, path.p), latest * path.d) > touching) return;
+  consider(*f, path, best, found);
+  if (found && best.stop < latest) stopper_ = i;
 }
 
 bool Nearby::castTree(const Vec3& p, const Vec3& d, int only, Hit& hit) const noexcept {
@@ -359,7 +368,7 @@ bool Nearby::castBall(const Vec3& p, const Vec3& d, double begin, int only, Hit&
   for (int i = 0; i < kMaxSteps && begin < 1; ++i) {
     step = std::min(step, 1 - begin);
     const Vec3 from = p + begin * d;
-    gather(from + 0.5 * step * d, 0.5 * step * length * kWiden);
+    surround(from + 0.5 * step * d, 0.5 * step * length * kWiden);
     if (!ball_.complete() && step > 1.0 / kMaxSteps) {
       step *= 0.25;
       continue;

@@ -80,8 +80,10 @@ class Nearby {
   bool gathered(const Vec3& p) const noexcept {
     return ball_.complete() && (p - ball_.centre()).squaredNorm() < 0.64 * ball_.reach() * ball_.reach();
   }
-  /// The gathered facets.
-  const FacetBall& ball() const noexcept { return ball_; }
+  /// Calls visit(facet) for at least every gathered facet within `distance` of p. The facet lives until the
+  /// next one.
+  template <class Visit>
+  void forEachGathered(const Vec3& p, double distance, Visit&& visit) noexcept;
 
   /// First obstacle on the way from p to g; false when the way is free.
   bool cast(const Vec3& p, const Vec3& g, Hit& hit) noexcept;
@@ -95,6 +97,8 @@ class Nearby {
 
   /// Smallest skin of the near objects: below a fraction of it, lengths mean nothing.
   double finestSkin() const noexcept { return finestSkin_; }
+  /// Largest of the gathered facets.
+  double thickestSkin() const noexcept { return ball_.thickestSkin(); }
   double toolRadius() const noexcept { return radius_; }
   scene::TouchableFaces faces() const noexcept { return now_.scene->faces; }
   /// True once something near had to be left out in this tick.
@@ -104,7 +108,7 @@ class Nearby {
   static constexpr int kMaxObjects = 64;
   static constexpr int kMadeBits = 8;
 
-  // A facet that was made in an earlier tick.
+  // A facet that was made; generation 0 when it is none in the next tick.
   struct MadeFacet {
     std::uint64_t generation = 0;
     const scene::ObjectState* state = nullptr;
@@ -116,9 +120,6 @@ class Nearby {
     const Vec3& p;
     const Vec3& d;
     double limit;
-    // For the ball:
-    double fromCentre = 0;  // of p, from the gathered ball's
-    double length = 0;      // of d
   };
 
   template <class Visit>
@@ -128,11 +129,12 @@ class Nearby {
   bool place(const scene::ObjectState& state, PlacedObject& placed) const noexcept;
   bool sameObjects() const noexcept;
   void compareWithBefore(PlacedObject& placed) const noexcept;
-  bool facetOf(int object, std::uint32_t triangle, Facet& facet) const noexcept;
+  const Facet* facetOf(int object, std::uint32_t triangle) const noexcept;
   void consider(const Facet& f, const Path& path, Hit& best, bool& found) const noexcept;
   bool castGathered(const Vec3& p, const Vec3& d, double limit, int only, Hit& hit) noexcept;
   bool meetPoint(const Path& path, int only, Hit& hit) noexcept;
-  bool meetBallOf(Path path, int only, Hit& hit) noexcept;
+  bool meetBallOf(const Path& path, int only, Hit& hit) noexcept;
+  void considerGathered(int i, const Path& path, int only, Hit& best, bool& found) noexcept;
   bool castTree(const Vec3& p, const Vec3& d, int only, Hit& hit) const noexcept;
   bool castBall(const Vec3& p, const Vec3& d, double begin, int only, Hit& hit) noexcept;
 
@@ -145,6 +147,7 @@ class Nearby {
   int objectCount_ = 0;
   double finestSkin_ = 0;
   FacetBall ball_;
+  int stopper_ = 0;  // the gathered facet that stopped a ball's last way
   // When and from what it was gathered; 0 when it will not do in another tick.
   std::uint64_t gatheredIn_ = 0;
   int gatheredCount_ = 0;
@@ -153,5 +156,18 @@ class Nearby {
   mutable std::array<MadeFacet, 1U << kMadeBits> made_;
   bool overflowed_ = false;
 };
+
+template <class Visit>
+void Nearby::forEachGathered(const Vec3& p, double distance, Visit&& visit) noexcept {
+  if (radius_ == 0) {
+    for (const Facet& f : ball_) visit(f);
+    return;
+  }
+  ball_.moveTo(p);
+  for (int i = 0; (i = ball_.nextWithin(distance, i)) < ball_.size(); ++i) {
+    const Facet* const f = facetOf(ball_.name(i).object, ball_.name(i).triangle);
+    if (f != nullptr) visit(*f);
+  }
+}
 
 }  // namespace hapticd::realtime

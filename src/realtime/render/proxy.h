@@ -77,7 +77,7 @@ class Proxy {
   bool approach(const Vec3& target, bool hold, ActiveSet& active, Vec3& goal) noexcept;
   bool escape(const Vec3& target, const ActiveSet& active) noexcept;
   void leap(const Vec3& stride, const Vec3& target) noexcept;
-  void findFaces(Ways& ways) const noexcept;
+  void findFaces(Ways& ways) noexcept;
   void findWays(const Vec3& pull, const ActiveSet& active, Ways& ways) const noexcept;
   double freeAmong(const Ways& ways, const Vec3& from, const Vec3& to) const noexcept;
   void hold(const Vec3& hip, ActiveSet& active) noexcept;

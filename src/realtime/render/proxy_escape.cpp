@@ -33,22 +33,23 @@ struct Proxy::Ways {
 };
 
 // The faces that the tool touches, by their numbers, so that nothing depends on the order of visits.
-void Proxy::findFaces(Ways& ways) const noexcept {
+void Proxy::findFaces(Ways& ways) noexcept {
   const auto before = [this](const Facet& a, const Facet& b) {
     return std::tuple(nearby_.object(a.object).state->id, a.triangle) <
            std::tuple(nearby_.object(b.object).state->id, b.triangle);
   };
-  for (const Facet& f : nearby_.ball()) {
+  const double farthest = nearby_.toolRadius() + kTouching * nearby_.thickestSkin();
+  nearby_.forEachGathered(position_, farthest, [&](const Facet& f) {
     const double touching = nearby_.toolRadius() + kTouching * f.skin;
-    if (std::abs(f.normal.dot(position_ - f.a)) > touching) continue;
-    if ((position_ - nearestPointOf(f, position_)).norm() > touching) continue;
-    if (ways.faceCount == Ways::kMaxFaces && before(ways.faces.back(), f)) continue;
+    if (std::abs(f.normal.dot(position_ - f.a)) > touching) return;
+    if ((position_ - nearestPointOf(f, position_)).norm() > touching) return;
+    if (ways.faceCount == Ways::kMaxFaces && before(ways.faces.back(), f)) return;
     int k = ways.faceCount < Ways::kMaxFaces ? ways.faceCount++ : Ways::kMaxFaces - 1;
     for (; k > 0 && before(f, ways.faces[static_cast<std::size_t>(k - 1)]); --k) {
       ways.faces[static_cast<std::size_t>(k)] = ways.faces[static_cast<std::size_t>(k - 1)];
     }
     ways.faces[static_cast<std::size_t>(k)] = f;
-  }
+  });
 }
 
 // The steepest way down in a room bounded by faces is the pull laid on a face, or an edge between two.

@@ -1,5 +1,6 @@
 // How the proxy goes along with geometry that moves, bends, vanishes or comes in.
 #include <algorithm>
+#include <limits>
 #include <tuple>
 
 #include "realtime/render/proxy.h"
@@ -105,20 +106,20 @@ void Proxy::pushByDeforming(const Vec3& from, double reach, std::uint32_t& statu
     if (!nearby_.gather(position_, reach + kGatherMargin_m)) status |= kRenderCandidateLimit;
     Hit farthest;
     double height = 0;
-    for (const Facet& f : nearby_.ball()) {
+    nearby_.forEachGathered(position_, std::numeric_limits<double>::infinity(), [&](const Facet& f) {
       const PlacedObject& object = nearby_.object(f.object);
-      if (!object.deformed) continue;
+      if (!object.deformed) return;
       const Vec3 start = carriedBy(object, f.triangle, from);
       Hit hit;
-      if ((position_ - start).norm() > kJump_m || !nearby_.meets(f, start, position_, hit)) continue;
+      if ((position_ - start).norm() > kJump_m || !nearby_.meets(f, start, position_, hit)) return;
       const double above = hit.plane.height(position_);
-      if (above > -0.25 * f.skin) continue;
+      if (above > -0.25 * f.skin) return;
       if (std::tuple(above, hit.object, hit.triangle) <
           std::tuple(height, farthest.object, farthest.triangle)) {
         farthest = hit;
         height = above;
       }
-    }
+    });
     if (height == 0) return;
     position_ -= height * farthest.plane.normal;
   }
