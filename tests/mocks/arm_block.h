@@ -45,6 +45,7 @@ struct ArmBlock {
   std::atomic<int> fault{kHealthy};
   int places = 1;  ///< with the places: before the mock starts
   double place_m[kMostPlaces][3] = {};
+  std::atomic<bool> docked{false};      ///< the stylus is in its inkwell
   std::atomic<double> gripper_rad{-1};  ///< of a device with one; below 0 before the mock starts: none
 
   // The mock's.

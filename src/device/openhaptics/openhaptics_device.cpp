@@ -214,7 +214,8 @@ void OpenHapticsDevice::noticeSilence() noexcept {
                     state_.velocity_m_per_s == before_.velocity_m_per_s &&
                     state_.orientation.coeffs() == before_.orientation.coeffs();
   before_ = state_;
-  sameFrames_ = same && !written_N_.isZero() ? sameFrames_ + 1 : 0;
+  if (!same) sameFrames_ = 0;
+  if (!written_N_.isZero()) ++sameFrames_;
   if (sameFrames_ < kSilence_s * options_.rate_Hz || !session_->deviceErrorTold()) return;
   silent_ = true;
   lost_ = true;
@@ -242,20 +243,24 @@ std::uint32_t OpenHapticsDevice::holds(Nanos now) noexcept {
   return hold;
 }
 
-// The position jumps with an update: only after a frame without force. Where a person has to bring the arm
-// into place, only with that person's consent.
+// The position jumps with an update: only after a frame without force. A stylus in the inkwell was put there
+// by a person, and is where it has to be; where only that person knows whether the arm is, it takes consent.
 void OpenHapticsDevice::updateCalibration(hd::Enum status) noexcept {
   if (!written_N_.isZero()) return;
-  const bool automatic = (calibrationStyle_ & hd::kStyleAuto) != 0 && status == hd::kCalibrationNeedsUpdate;
-  if (!automatic && !consent_) return;
-  int style = hd::kStyleAuto;
-  if (!automatic) {
-    const bool encoders = (calibrationStyle_ & hd::kStyleEncoderReset) != 0;
-    style = encoders ? hd::kStyleEncoderReset : hd::kStyleInkwell;
-    // An inkwell can be calibrated once the stylus is in it, which the driver tells by this status.
-    if (!encoders && status != hd::kCalibrationNeedsUpdate) return;
-    consent_ = false;
+  const bool encoders = (calibrationStyle_ & hd::kStyleEncoderReset) != 0;
+  const bool ready = status == hd::kCalibrationNeedsUpdate;  // moved enough, or docked
+  const bool docked = (state_.hold & kHoldInkwell) != 0;
+  int style = 0;
+  if ((calibrationStyle_ & hd::kStyleAuto) != 0 && ready) {
+    style = hd::kStyleAuto;
+  } else if (encoders && consent_) {
+    style = hd::kStyleEncoderReset;
+  } else if (!encoders && ready && (docked || consent_)) {
+    style = hd::kStyleInkwell;
+  } else {
+    return;
   }
+  if (style != hd::kStyleAuto) consent_ = false;
   session_->api().updateCalibration(static_cast<hd::Enum>(style));
   settling_ = kSettlingFrames;
 }
@@ -320,9 +325,9 @@ std::string OpenHapticsDevice::faultText() const {
   }
   if ((hold & kHoldNotCalibrated) != 0) {
     if ((calibrationStyle_ & hd::kStyleEncoderReset) != 0) {
-      say("not calibrated: bring the arm into its reset position, then calibrate");
+      say("not calibrated: bring the arm into its reset position and start hapticd with --calibrate");
     } else if ((calibrationStyle_ & hd::kStyleInkwell) != 0) {
-      say("not calibrated: put the stylus into the inkwell, then calibrate");
+      say("not calibrated: put the stylus into the inkwell");
     } else {
       say("not calibrated: move the arm slowly through its workspace");
     }

@@ -36,7 +36,8 @@ class OpenHapticsDevice final : public Device, private hd::Participant {
 
   std::string faultText() const override;
   bool lost() const noexcept override { return lost_; }
-  /// Encoder reset: the arm in its reset position; inkwell: the stylus docked. Needs the loop to run.
+  /// Encoder reset: the arm in its reset position; inkwell: the stylus docked, which is consent by itself
+  /// where the switch tells of it. Needs the loop to run.
   void calibrate() override;
 
   bool selfPaced() const noexcept override { return true; }
@@ -82,7 +83,7 @@ class OpenHapticsDevice final : public Device, private hd::Participant {
   ThermalDerating derating_{0, 0};
   DeviceState state_;
   DeviceState before_;  // of the frame before
-  int sameFrames_ = 0;
+  int sameFrames_ = 0;  // with a force, since the state last changed
   bool inTick_ = false;
   Vec3 command_N_ = Vec3::Zero();
   Vec3 written_N_ = Vec3::Zero();

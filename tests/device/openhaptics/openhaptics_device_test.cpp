@@ -332,7 +332,7 @@ TEST_F(SteppedHdTest, AutomaticCalibrationHappensUnderZeroForce) {
   EXPECT_TRUE(force().isApprox(wanted_N));
 }
 
-TEST_F(HdTest, AnInkwellCalibrationWaitsForConsentAndForTheStylus) {
+TEST_F(HdTest, AnInkwellCalibrationWaitsForTheStylusAndForNothingElse) {
   mock->calibration(0, 0x5002);
   OpenHapticsDevice device;
   EXPECT_THROW(device.calibrate(), std::runtime_error);
@@ -350,17 +350,30 @@ TEST_F(HdTest, AnInkwellCalibrationWaitsForConsentAndForTheStylus) {
   EXPECT_EQ(hold, kHoldNotCalibrated);
   EXPECT_TRUE(force().isZero());
   EXPECT_THAT(device.faultText(), HasSubstr("inkwell"));
-  mock->inkwellSwitch(0, 0);
   mock->calibration(0, 0x5001);
   const int before = ticks;
   ASSERT_TRUE(eventually([&] { return ticks > before + 5; }));
-  EXPECT_EQ(mock->calibrationUpdates(0), 0) << "nobody agreed";
-  device.calibrate();
+  EXPECT_EQ(mock->calibrationUpdates(0), 0) << "the switch does not tell of a stylus";
+  mock->inkwellSwitch(0, 0);
+  EXPECT_TRUE(eventually([&] { return mock->calibrationUpdates(0) == 1; }));
+  device.calibrate();  // nothing is left to do
   EXPECT_EQ(mock->calibrationUpdates(0), 1);
   EXPECT_TRUE(eventually([&] { return hold == kHoldInkwell; }));
   EXPECT_TRUE(force().isZero());
   mock->inkwellSwitch(0, 1);
   EXPECT_TRUE(eventually([&] { return force().isApprox(Vec3(0, 1, 0)); }));
+}
+
+TEST_F(SteppedHdTest, EncodersAreNotResetWithoutConsent) {
+  mock->model("Premium 1.5", 1);
+  mock->calibration(0, 0x5002);
+  start();
+  wanted_N = Vec3(0, 1, 0);
+  step(300);
+  EXPECT_EQ(mock->calibrationUpdates(0), 0);
+  EXPECT_EQ(state.hold, kHoldNotCalibrated);
+  EXPECT_TRUE(force().isZero());
+  EXPECT_THAT(device.faultText(), AllOf(HasSubstr("reset position"), HasSubstr("--calibrate")));
 }
 
 TEST_F(HdTest, EncodersAreResetWithConsentGivenBefore) {

@@ -60,6 +60,20 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"NotCalibrated", mock::kNotCalibrated, 100, "not calibrated: put the stylus"}),
     kName);
 
+TEST_F(InContact, AStylusThatIsPutIntoItsInkwellIsCalibratedThere) {
+  serve({"--device", "openhaptics"}, {"HAPTICD_HDAPI_LIB=" MOCK_HD});
+  strike(mock::kNotCalibrated, 100);
+  expectWords("not calibrated: put the stylus into the inkwell");
+  visitor->forget();
+  arm->docked = true;
+  expectWords("gives no force: the stylus is in the inkwell");
+  EXPECT_TRUE(arm.left().isZero());
+  arm->docked = false;
+  expectWords("the device is well again");
+  touch();
+  endInOrder();
+}
+
 // The library tells an identical error only once in its process.
 TEST_F(InContact, ASecondPullOfTheCableIsNoticedWithoutAnError) {
   serve({"--device", "openhaptics"}, {"HAPTICD_HDAPI_LIB=" MOCK_HD});
@@ -68,7 +82,11 @@ TEST_F(InContact, ASecondPullOfTheCableIsNoticedWithoutAnError) {
   heal(true);
   visitor->forget();
   strike(mock::kUnplugged, 502);
-  expectWords("one and the same position");
+  EXPECT_TRUE(visitor->until([&] {
+    // After a stall there is no force, and nothing to notice.
+    if (visitor->latched()) visitor->client().rearmForces();
+    return visitor->heard("one and the same position");
+  })) << visitor->texts();
   heal(true);
   endInOrder();
 }

@@ -130,10 +130,13 @@ void obeyShared(Mock& m) {
   const int fault = m.shared.fault();
   for (int i = 0; i < 3 && fault != kUnplugged; ++i) arm.position[i] = 1000 * place[i];
   const bool begins = fault != m.fault;
+  if (begins && fault == kNotCalibrated) arm.calibration = 0x5002;
+  if (begins && m.fault == kNotCalibrated) arm.calibration = 0x5000;  // by the vendor's tool
+  arm.inkwell = m.shared->docked ? 0 : 1;
+  if (m.shared->docked && arm.calibration == 0x5002) arm.calibration = 0x5001;
   m.fault = fault;
   arm.unplugged = fault == kUnplugged;
   arm.temperature = fault == kHotMotors ? 0.97 : 0.2;
-  arm.calibration = fault == kNotCalibrated ? 0x5002 : 0x5000;
   if (begins && fault == kWarmMotors) push(0x200, 0);
   if (begins && fault == kForceExceeded) push(0x201, 0);
   if (fault == kLibraryCrashes) std::raise(SIGSEGV);
