@@ -104,6 +104,8 @@ TEST_F(EvdevTest, AWheelHasOneAxis) {
   wheel.invertForce = true;
   const auto device = make();
   device->open();
+  EXPECT_EQ(device->profile().inputDof, 1);
+  EXPECT_EQ(device->profile().outputDof, 1);
   joystick.move(0, 1);
   EXPECT_EQ(tick(*device, Vec3::Zero()).position_m.z(), 0) << "its y axis is a pedal";
   for (int i = 0; i < 4; ++i) tick(*device, Vec3(1, 0, 1));
