@@ -12,7 +12,6 @@ namespace {
 constexpr float kNotYet = std::numeric_limits<float>::quiet_NaN();
 constexpr std::uint32_t kNoVertex = 0xFFFFFFFF;
 constexpr Triangle kNoTriangle{kNoVertex, kNoVertex, kNoVertex};
-constexpr int kRefitsBeforeRebuild = 64;
 
 // Numbers are never used again, by whichever mesh.
 std::uint64_t newTopology() {
@@ -75,15 +74,16 @@ std::size_t MeshDraft::setVertices(std::uint32_t first, std::vector<Vec3f>&& run
   if (!finite && std::none_of(run.begin(), run.end(), [](const Vec3f& v) { return v.allFinite(); })) {
     return run.size();
   }
-  std::vector<Vec3f>& vertices = vertices_.write(end);
-  if (finite && before == 0 && first == 0) {
-    vertices = std::move(run);
+  if (finite && first == 0 && end >= before) {
+    vertices_.replace(std::move(run));
   } else if (finite) {
+    std::vector<Vec3f>& vertices = vertices_.write(end);
     if (first > before) grow(vertices, first);
     const std::size_t overlap = std::min<std::size_t>(run.size(), vertices.size() - first);
     std::copy_n(run.begin(), overlap, vertices.begin() + first);
     vertices.insert(vertices.end(), run.begin() + static_cast<std::ptrdiff_t>(overlap), run.end());
   } else {
+    std::vector<Vec3f>& vertices = vertices_.write(end);
     if (end > before) grow(vertices, end);
     for (std::size_t i = 0; i < run.size(); ++i) {
       if (run[i].allFinite()) {
@@ -163,68 +163,18 @@ std::shared_ptr<MeshGeometry> MeshDraft::build() {
   const std::vector<Triangle>& triangles = indexed_ ? triangles_.read() : *mesh->triangles;
   mesh->index = SpatialIndex::build(static_cast<std::uint32_t>(triangles.size()),
                                     [&](std::uint32_t id) { return boxOfTriangle(triangles[id], vertices); });
-  refits_ = 0;
-  return mesh;
-}
-
-SpatialIndex MeshDraft::refitOrBuild(std::uint32_t count, const SpatialIndex::BoxOf& boxOf) {
-  // Nobody can get hold of a geometry again that only the draft knows.
-  const bool free =
-      spare_ && spare_.use_count() == 1 && spare_->index.size() == count && refits_ < kRefitsBeforeRebuild;
-  if (!free) {
-    if (spare_) refits_ = 0;
-    return SpatialIndex::build(count, boxOf);
-  }
-  std::atomic_thread_fence(std::memory_order_acquire);
-  ++refits_;
-  SpatialIndex index = std::move(spare_->index);
-  index.refit(boxOf);
-  return index;
-}
-
-// The surface travels from where it is felt now to where the client wants it. Boxes hold all of the way: what
-// is left of the old one and the new end.
-std::shared_ptr<MeshGeometry> MeshDraft::morph(const std::function<Nanos()>& clock) {
-  const MeshGeometry& old = *current_;
-  const Nanos now = clock();
-  auto mesh = std::make_shared<MeshGeometry>();
-  mesh->topology = old.topology;
-  mesh->triangles = old.triangles;
-  mesh->target = vertices_.share();
-  const std::vector<Vec3f>& target = *mesh->target;
-  const std::vector<Triangle>& triangles = indexed_ ? triangles_.read() : *mesh->triangles;
-  // Where each vertex is now, once and not for each of its triangles.
-  const bool deforming = old.deformingAfter(now);
-  std::vector<Vec3> places(deforming ? target.size() : 0);
-  for (std::uint32_t i = 0; i < places.size(); ++i) places[i] = old.vertex(i, now);
-  const std::vector<Vec3f>& before = old.target ? *old.target : *old.vertices;
-  mesh->index = refitOrBuild(static_cast<std::uint32_t>(triangles.size()), [&](std::uint32_t id) {
-    Box box = boxOfTriangle(triangles[id], target);
-    if (box.empty()) return box;
-    box.extend(boxOfTriangle(triangles[id], before));
-    if (!deforming) return box;
-    for (const std::uint32_t corner : triangles[id]) box.extend(places[corner]);
-    return box;
-  });
-
-  const Nanos begin = clock();
-  if (old.deformingAfter(begin)) {
-    auto from = std::make_shared<std::vector<Vec3f>>(target.size());
-    for (std::uint32_t i = 0; i < from->size(); ++i) (*from)[i] = old.vertex(i, begin).cast<float>();
-    mesh->vertices = from;
-  } else {
-    mesh->vertices = old.target ? old.target : old.vertices;
-  }
-  mesh->morphBegin = begin;
-  mesh->morphEnd = begin + std::clamp<Nanos>(begin - lastCommit_, 1'000'000, kLongestMorph);
   return mesh;
 }
 
 std::shared_ptr<const MeshGeometry> MeshDraft::commit(const std::function<Nanos()>& clock) {
-  std::shared_ptr<MeshGeometry> mesh;
-  if (triangleCount() > 0) mesh = current_ && !shapeChanged_ ? morph(clock) : build();
-  spare_ = std::exchange(current_, std::move(mesh));
-  if (!current_ || !spare_ || spare_->topology != current_->topology) spare_.reset();
+  if (triangleCount() == 0 || !current_ || shapeChanged_) {
+    deformation_.restart();
+    current_ = triangleCount() > 0 ? build() : nullptr;
+  } else {
+    auto asSent = indexed_ ? triangles_.share() : current_->triangles;
+    current_ =
+        deformation_.next(current_, std::move(asSent), vertices_.share(), clock, lastCommit_, kLongestMorph);
+  }
   dirty_ = false;
   shapeChanged_ = false;
   finished_ = false;

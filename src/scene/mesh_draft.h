@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "scene/mesh_geometry.h"
+#include "scene/deformation.h"
 
 namespace hapticd::scene {
 
@@ -25,6 +25,11 @@ class CopyOnWrite {
       shared_.reset();
     }
     return own_;
+  }
+  /// To have another content.
+  void replace(std::vector<T>&& content) {
+    own_ = std::move(content);
+    shared_.reset();
   }
   /// To share: what it holds now will not change any more.
   std::shared_ptr<const std::vector<T>> share() {
@@ -79,8 +84,6 @@ class MeshDraft {
   void grow(std::vector<Vec3f>& vertices, std::size_t size);
   std::shared_ptr<const std::vector<Triangle>> shareTriangles();
   std::shared_ptr<MeshGeometry> build();
-  std::shared_ptr<MeshGeometry> morph(const std::function<Nanos()>& clock);
-  SpatialIndex refitOrBuild(std::uint32_t count, const SpatialIndex::BoxOf& boxOf);
 
   CopyOnWrite<Vec3f> vertices_;
   CopyOnWrite<Triangle> triangles_;  // as sent: corners may be missing
@@ -92,9 +95,8 @@ class MeshDraft {
   Nanos firstEdit_ = 0;
   Nanos lastEdit_ = 0;
   Nanos lastCommit_ = 0;
-  int refits_ = 0;
   std::shared_ptr<MeshGeometry> current_;
-  std::shared_ptr<MeshGeometry> spare_;  // the one before: its index is refitted once nobody reads it
+  Deformation deformation_;  // to the shapes after it
 };
 
 }  // namespace hapticd::scene

@@ -42,9 +42,14 @@ struct MeshGeometry {
     if (!target) return from;
     const Vec3 to = (*target)[i].cast<double>();
     if (now >= morphEnd) return to;
-    if (now <= morphBegin) return from;
-    const double s = static_cast<double>(now - morphBegin) / static_cast<double>(morphEnd - morphBegin);
-    return from + s * (to - from);
+    return from + progress(now) * (to - from);
+  }
+
+  /// Part of the way that is done at `now`, while deforming: 0 to 1.
+  double progress(Nanos now) const noexcept {
+    if (now >= morphEnd) return 1;
+    if (now <= morphBegin) return 0;
+    return static_cast<double>(now - morphBegin) / static_cast<double>(morphEnd - morphBegin);
   }
 };
 

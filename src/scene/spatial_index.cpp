@@ -2,11 +2,11 @@
 
 #include <embree3/rtcore.h>
 
-#include <atomic>
 #include <cmath>
 #include <cstdlib>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 
 namespace hapticd::scene {
 namespace {
@@ -22,42 +22,32 @@ constexpr double kDoubleRounding = 0x1p-50;
 // A segment shorter than this in the tree is a point within the pad; Embree does not take such directions.
 constexpr float kPoint = 0x1p-30F;
 
+// Of a tree that is refitted in floats: none of them is so small that a processor takes it for zero.
+constexpr double kSmallestScale = 0x1p-100;
+
 // Beyond, differences and squares of coordinates would not be numbers.
 constexpr double kFarthest = 1e150;
 
 using geometry::Vec3f;
 
-// The union of boxes that come from several threads, in any order and more than once: always the same bits.
-class SharedBounds {
- public:
-  void clear() noexcept {
-    for (int i = 0; i < 3; ++i) {
-      min_[i] = INFINITY;
-      max_[i] = -INFINITY;
-    }
-  }
-  void extend(const Box& box) noexcept {
-    for (int i = 0; i < 3; ++i) {
-      replaceIf(min_[i], box.min[i], [](double a, double b) { return a < b; });
-      replaceIf(max_[i], box.max[i], [](double a, double b) { return a > b; });
-    }
-  }
-  Box box() const noexcept { return {Vec3(min_[0], min_[1], min_[2]), Vec3(max_[0], max_[1], max_[2])}; }
+using Lanes = Eigen::Array4f;  // x, y, z and one that does not matter
 
- private:
-  template <class Better>
-  static void replaceIf(std::atomic<double>& kept, double value, Better better) noexcept {
-    double old = kept.load(std::memory_order_relaxed);
-    while (better(value, old) && !kept.compare_exchange_weak(old, value, std::memory_order_relaxed)) {
-    }
-  }
-
-  std::atomic<double> min_[3];
-  std::atomic<double> max_[3];
-};
+Lanes lanesOf(const Vec3f& v) {
+  return {v.x(), v.y(), v.z(), 0};
+}
 
 bool isUsable(const Box& box) {
   return !box.empty() && box.min.minCoeff() >= -kFarthest && box.max.maxCoeff() <= kFarthest;
+}
+
+Box boundsOf(const BoxedTriangles& all) {
+  Lanes low = Lanes::Constant(INFINITY);
+  Lanes high = -low;
+  for (std::size_t i = 0; i < 3 * all.cornerCount(); i += 3) {
+    low = low.min(Eigen::Map<const Lanes>(&all.lower[i]));
+    high = high.max(Eigen::Map<const Lanes>(&all.upper[i]));
+  }
+  return {low.head<3>().matrix().cast<double>(), high.head<3>().matrix().cast<double>()};
 }
 
 RTCDevice device() {
@@ -130,10 +120,11 @@ struct SpatialIndex::Tree {
   RTCGeometry geometry = nullptr;
   Vec3 origin = Vec3::Zero();
   double scale = 1;
-  const BoxOf* boxOf = nullptr;         // only while building
-  SharedBounds all;                     // of the boxes of the newest commit
-  std::atomic<bool> unfitting = false;  // a box that came by refitting needs a new tree
-  std::uint32_t leftOut = 0;
+  // Of the commit at hand: one of them is there.
+  const BoxOf* boxOf = nullptr;
+  const BoxedTriangles* boxed = nullptr;
+  // For boxes that come in floats: tree coordinates are (p - near) * times + below or above.
+  Lanes near, times, below, above;
 
   explicit Tree(const Box& bounds) {
     origin = bounds.centre();
@@ -141,6 +132,14 @@ struct SpatialIndex::Tree {
         std::max(bounds.extents().maxCoeff() / 2, kRelativePad * origin.cwiseAbs().maxCoeff());
     // Less than 2 at first: there is room to grow by refitting.
     if (size > 0) scale = std::exp2(-std::max(std::ilogb(size), -1000));
+    // What is too large or small for a float here is not refitted.
+    const Vec3f rounded = origin.cast<float>();
+    const Vec3 rest = (rounded.cast<double>() - origin) * scale;
+    const Vec3 padding = Vec3::Constant(pad() * scale);
+    near = lanesOf(rounded);
+    times = lanesOf(Vec3f::Constant(static_cast<float>(scale)));
+    below = lanesOf((rest - padding).cast<float>());
+    above = lanesOf((rest + padding).cast<float>());
     scene = rtcNewScene(device());
     geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_USER);
     if (scene == nullptr || geometry == nullptr) fail("allocation");
@@ -155,24 +154,47 @@ struct SpatialIndex::Tree {
   double pad() const noexcept { return kRelativePad * kReach / scale; }
   Vec3f inTree(const Vec3& p) const noexcept { return ((p - origin) * scale).cast<float>(); }
 
-  void bounds(std::uint32_t id, RTCBounds& out) {
-    const Box box = (*boxOf)(id);
-    const bool usable = isUsable(box);
-    if (usable) all.extend(box);
-    // Embree leaves out boxes that are inverted.
-    const Vec3f lower = usable ? inTree(box.min - Vec3::Constant(pad())) : Vec3f::Constant(INFINITY);
-    const Vec3f upper = usable ? inTree(box.max + Vec3::Constant(pad())) : Vec3f::Constant(-INFINITY);
-    if (!usable || lower.minCoeff() < -kReach || upper.maxCoeff() > kReach) unfitting = true;
-    out = {lower.x(), lower.y(), lower.z(), 0, upper.x(), upper.y(), upper.z(), 0};
+  Lanes lower(const Lanes& p) const noexcept { return (p - near) * times + below; }
+  Lanes upper(const Lanes& p) const noexcept { return (p - near) * times + above; }
+
+  // Without what the float path takes for granted; rounding is monotonic, so that every box within fits, too.
+  bool hasRoomFor(const Box& box) const noexcept {
+    if (!(scale >= kSmallestScale && scale <= 1 / kSmallestScale)) return false;
+    const Lanes low = lower(lanesOf(box.min.cast<float>()));
+    const Lanes high = upper(lanesOf(box.max.cast<float>()));
+    return (low.head<3>() >= -kReach).all() && (high.head<3>() <= kReach).all();
   }
 
-  void commit(const BoxOf& from) {
-    boxOf = &from;
-    unfitting = false;
-    all.clear();
+  void bounds(std::uint32_t id, RTCBounds& out) const {
+    if (boxed != nullptr) return boundsOfTriangle(boxed->triangles[id], out);
+    const Box box = (*boxOf)(id);
+    const bool usable = isUsable(box);
+    // Embree leaves out boxes that are inverted.
+    const Vec3f low = usable ? inTree(box.min - Vec3::Constant(pad())) : Vec3f::Constant(INFINITY);
+    const Vec3f high = usable ? inTree(box.max + Vec3::Constant(pad())) : Vec3f::Constant(-INFINITY);
+    out = {low.x(), low.y(), low.z(), 0, high.x(), high.y(), high.z(), 0};
+  }
+
+  // Asked for each triangle of a mesh, again and again.
+  void boundsOfTriangle(const Triangle& t, RTCBounds& out) const noexcept {
+    if (std::max({t[0], t[1], t[2]}) >= boxed->cornerCount()) {
+      out = {INFINITY, INFINITY, INFINITY, 0, -INFINITY, -INFINITY, -INFINITY, 0};
+      return;
+    }
+    const auto corner = [](std::span<const float> of, std::uint32_t i) noexcept -> Lanes {
+      return Eigen::Map<const Lanes>(of.data() + std::size_t{3} * i);
+    };
+    const auto& [low, high] = std::tie(boxed->lower, boxed->upper);
+    Eigen::Map<Lanes>(&out.lower_x) = lower(corner(low, t[0]).min(corner(low, t[1])).min(corner(low, t[2])));
+    Eigen::Map<Lanes>(&out.upper_x) =
+        upper(corner(high, t[0]).max(corner(high, t[1])).max(corner(high, t[2])));
+  }
+
+  void commit() {
     rtcCommitGeometry(geometry);
     rtcCommitScene(scene);
     boxOf = nullptr;
+    boxed = nullptr;
     if (const RTCError error = rtcGetDeviceError(device()); error != RTC_ERROR_NONE) {
       throw std::runtime_error("spatial index: Embree error " + std::to_string(error));
     }
@@ -187,20 +209,14 @@ SpatialIndex& SpatialIndex::operator=(SpatialIndex&&) noexcept = default;
 SpatialIndex SpatialIndex::build(std::uint32_t count, const BoxOf& boxOf) {
   SpatialIndex index;
   index.count_ = count;
-  std::uint32_t leftOut = 0;
   for (std::uint32_t id = 0; id < count; ++id) {
     const Box box = boxOf(id);
-    if (isUsable(box)) {
-      index.bounds_.extend(box);
-    } else {
-      ++leftOut;
-    }
+    if (isUsable(box)) index.bounds_.extend(box);
   }
   if (index.bounds_.empty()) return index;
 
   index.tree_ = std::make_unique<Tree>(index.bounds_);
   Tree& tree = *index.tree_;
-  tree.leftOut = leftOut;
   index.pad_ = tree.pad();
   // A dynamic scene keeps one tree for each geometry, and refits it if that was its quality from the start.
   // This is also the fastest to build and to query here.
@@ -216,20 +232,40 @@ SpatialIndex SpatialIndex::build(std::uint32_t count, const BoxOf& boxOf) {
   rtcSetGeometryIntersectFunction(tree.geometry, &onSegment);
   rtcSetGeometryPointQueryFunction(tree.geometry, &onNear);
   rtcAttachGeometry(tree.scene, tree.geometry);
-  tree.commit(boxOf);
+  tree.boxOf = &boxOf;
+  tree.commit();
   return index;
 }
 
-void SpatialIndex::refit(const BoxOf& boxOf) {
-  // What was left out is not in the tree, so it cannot come back by refitting.
-  const bool fits = tree_ && tree_->leftOut == 0;
-  if (fits) tree_->commit(boxOf);
-  if (!fits || tree_->unfitting) {
-    *this = build(count_, boxOf);
+Box BoxedTriangles::boxOf(std::uint32_t triangle) const noexcept {
+  Box box;
+  for (const std::uint32_t corner : triangles[triangle]) {
+    if (corner >= cornerCount()) return {};
+    const std::size_t at = std::size_t{3} * corner;
+    box.extend(Box{Eigen::Map<const Vec3f>(&lower[at]).cast<double>(),
+                   Eigen::Map<const Vec3f>(&upper[at]).cast<double>()});
+  }
+  return box;
+}
+
+SpatialIndex SpatialIndex::build(const BoxedTriangles& all) {
+  SpatialIndex index = build(static_cast<std::uint32_t>(all.triangles.size()),
+                             [&](std::uint32_t id) { return all.boxOf(id); });
+  if (index.tree_) index.bounds_ = boundsOf(all);
+  return index;
+}
+
+void SpatialIndex::refit(const BoxedTriangles& all) {
+  const Box bounds = boundsOf(all);
+  if (!tree_ || !tree_->hasRoomFor(bounds)) {
+    *this = build(all);
     return;
   }
+  tree_->boxed = &all;
+  tree_->commit();
   // To the bit what build() would give: the renderer takes lengths from them.
-  bounds_ = tree_->all.box();
+  bounds_ = bounds;
+  ++refits_;
 }
 
 void SpatialIndex::visitNearImpl(const Vec3& centre, double radius, NearThunk thunk,

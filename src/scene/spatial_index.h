@@ -9,13 +9,29 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
+#include <vector>
 
+#include "geometry/triangle_mesh.h"
 #include "geometry/types.h"
 
 namespace hapticd::scene {
 
 using geometry::Box;
+using geometry::Triangle;
 using geometry::Vec3;
+
+/// Triangles with a box for each corner, which a triangle's box is around. A triangle with a number beyond
+/// the corners is left out; corners of no triangle count for the bounds.
+struct BoxedTriangles {
+  std::span<const Triangle> triangles;
+  /// Three coordinates for each corner and one more, because they are read four at a time. Finite.
+  std::span<const float> lower, upper;
+
+  std::size_t cornerCount() const noexcept { return lower.size() / 3; }
+  /// Empty when the triangle is left out.
+  Box boxOf(std::uint32_t triangle) const noexcept;
+};
 
 /// Tree over boxes 0…n-1. Building and refitting allocate (scene thread); queries are const, noexcept,
 /// lock-free and allocation-free, and may run while other threads query the same index.
@@ -32,10 +48,14 @@ class SpatialIndex {
 
   /// Builds over ids 0…count-1. Throws std::runtime_error with Embree's own words when it cannot.
   static SpatialIndex build(std::uint32_t count, const BoxOf& boxOf);
+  static SpatialIndex build(const BoxedTriangles& all);
 
   /// Recomputes all boxes and refits the tree in place, many times faster than building it; nobody may query
-  /// meanwhile. Same count as built. For boxes that moved a little: a refitted tree gets slower to query.
-  void refit(const BoxOf& boxOf);
+  /// meanwhile. Over the same triangles as built. For boxes that moved a little: a refitted tree gets slower
+  /// to query.
+  void refit(const BoxedTriangles& all);
+  /// How often it was refitted since it was built.
+  int refits() const noexcept { return refits_; }
 
   /// Box around all boxes, the same whether built or refitted; empty when there is none.
   const Box& bounds() const noexcept { return bounds_; }
@@ -74,6 +94,7 @@ class SpatialIndex {
   Box bounds_;
   double pad_ = 0;
   std::uint32_t count_ = 0;
+  int refits_ = 0;
 };
 
 }  // namespace hapticd::scene

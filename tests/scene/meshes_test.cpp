@@ -354,6 +354,32 @@ TEST_F(Deforming, ObjectIndexCoversTheDeformedShape) {
   }
 }
 
+// Neither what was removed nor a vertex of no triangle has a place in the index, and they are no reason to
+// build it anew.
+TEST_F(Deforming, IncompleteTrianglesAndLoneVerticesAreLeftOut) {
+  std::vector<Vec3f> corners = soup(10);
+  corners.emplace_back(0, 0, 1000);
+  say(SetObjectNumber{2});
+  say(SetSurfaceProperty{1, "stiffness", 0.5});
+  say(SetVertices{1, 0, corners});
+  say(SetTriangles{1, 0, {{0, 1, 2}, {3, 4, 5}, {6, 7, 8}, {9, 10, 11}, {12, 13, 14}, {15, 16, 99}}, false});
+  say(RemoveTriangle{1, 2});
+  run(1'000 * kMillisecond);
+  for (int frame = 1; frame < 5; ++frame) {
+    previous_.reset();
+    corners[30].z() += 1;
+    for (std::size_t i = 0; i < 30; ++i) corners[i].z() = 0.1F * static_cast<float>(frame);
+    say(SetVertices{1, 0, corners});
+    run(20 * kMillisecond);
+    const SpatialIndex& index = object(1)->mesh->index;
+    EXPECT_NEAR(index.bounds().max.z(), 0.1 * frame, 1e-6);
+    std::set<std::uint32_t> found;
+    index.visitNear(Vec3::Zero(), INFINITY, [&](std::uint32_t id) { found.insert(id); });
+    EXPECT_EQ(found, (std::set<std::uint32_t>{0, 1, 3, 4}));
+    EXPECT_EQ(index.refits() > 0, frame > 1) << frame;
+  }
+}
+
 // A snapshot that is still held keeps its shape, whatever is refitted for later ones.
 TEST_F(Deforming, HeldSnapshotsStayAsTheyAre) {
   std::vector<std::shared_ptr<const SceneSnapshot>> held;

@@ -5,6 +5,7 @@
 #include <rapidcheck/gtest.h>
 
 #include <algorithm>
+#include <limits>
 #include <random>
 #include <set>
 
@@ -118,26 +119,109 @@ RC_GTEST_PROP(SpatialIndex, VisitsAtLeastWhatIsThere, (std::uint64_t seed)) {
   checkSuperset(indexOver(boxes), boxes, world);
 }
 
-RC_GTEST_PROP(SpatialIndex, StillDoesAfterRefitting, (std::uint64_t seed)) {
-  World world(seed);
-  std::vector<Box> boxes = world.boxes(1 + world.random() % 200);
-  SpatialIndex index = indexOver(boxes);
-  for (int i = 0; i < 3; ++i) {
-    if (world.random() % 2 == 0) {
-      boxes = world.boxes(boxes.size());  // others are left out now
-    } else {
-      for (Box& b : boxes) {
-        if (leftOut(b)) continue;
-        const Vec3 move = world.size * world.unit();
-        b = {b.min + move, b.max + move};
+// Triangles over corners that have boxes; some triangles lack a corner, some corners a triangle.
+class Sheet {
+ public:
+  explicit Sheet(World& world) {
+    const auto corners = static_cast<std::uint32_t>(1 + world.random() % 100);
+    lower_.resize(3 * corners + 1, std::numeric_limits<float>::max());
+    upper_.resize(3 * corners + 1, std::numeric_limits<float>::lowest());
+    for (std::size_t count = 1 + world.random() % 200; count > 0; --count) {
+      Triangle t;
+      for (std::uint32_t& corner : t) corner = static_cast<std::uint32_t>(world.random() % corners);
+      if (world.random() % 8 == 0) t[world.random() % 3] = world.random() % 2 == 0 ? corners : 0xFFFFFFFF;
+      triangles_.push_back(t);
+    }
+    place(world);
+  }
+
+  void place(World& world) {
+    for (const Triangle& t : triangles_) {
+      if (std::max({t[0], t[1], t[2]}) >= lower_.size() / 3) continue;
+      for (const std::uint32_t corner : t) set(corner, world.box(), world.point());
+    }
+  }
+  void move(const Vec3& by) {
+    for (std::size_t i = 0; i + 1 < lower_.size(); ++i) {
+      if (lower_[i] > upper_[i]) continue;
+      lower_[i] += static_cast<float>(by[static_cast<Eigen::Index>(i % 3)]);
+      upper_[i] += static_cast<float>(by[static_cast<Eigen::Index>(i % 3)]);
+    }
+  }
+
+  BoxedTriangles boxed() const { return {triangles_, lower_, upper_}; }
+  std::vector<Box> boxes() const {
+    std::vector<Box> all(triangles_.size());
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const Triangle& t = triangles_[i];
+      if (std::max({t[0], t[1], t[2]}) >= lower_.size() / 3) continue;
+      for (const std::size_t corner : t) {
+        all[i].extend(Box{{lower_[3 * corner], lower_[3 * corner + 1], lower_[3 * corner + 2]},
+                          {upper_[3 * corner], upper_[3 * corner + 1], upper_[3 * corner + 2]}});
       }
     }
-    index.refit([&](std::uint32_t id) { return boxes[id]; });
-    const SpatialIndex built = indexOver(boxes);
-    EXPECT_EQ(index.bounds().min, built.bounds().min) << "whoever takes lengths from them needs the same bits";
-    EXPECT_EQ(index.bounds().max, built.bounds().max);
+    return all;
+  }
+
+ private:
+  void set(std::size_t corner, const Box& box, const Vec3& otherwise) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::size_t at = 3 * corner + static_cast<std::size_t>(axis);
+      lower_[at] = static_cast<float>(leftOut(box) ? otherwise[axis] : box.min[axis]);
+      upper_[at] = static_cast<float>(leftOut(box) ? otherwise[axis] : box.max[axis]);
+    }
+  }
+  std::vector<Triangle> triangles_;
+  std::vector<float> lower_, upper_;
+};
+
+RC_GTEST_PROP(SpatialIndex, StillDoesAfterRefitting, (std::uint64_t seed)) {
+  World world(seed);
+  Sheet sheet(world);
+  SpatialIndex index = SpatialIndex::build(sheet.boxed());
+  for (int i = 0; i < 3; ++i) {
+    if (world.random() % 2 == 0) {
+      sheet.place(world);
+    } else {
+      sheet.move(world.size * world.unit());
+    }
+    index.refit(sheet.boxed());
+    const std::vector<Box> boxes = sheet.boxes();
+    const SpatialIndex built = SpatialIndex::build(sheet.boxed());
+    const Box around = indexOver(boxes).bounds();
+    for (const Box& bounds : {built.bounds(), around}) {
+      RC_ASSERT(index.bounds().empty() == bounds.empty());
+      if (bounds.empty()) continue;
+      RC_ASSERT(index.bounds().min == bounds.min);  // who takes lengths from them needs the same bits
+      RC_ASSERT(index.bounds().max == bounds.max);
+    }
     checkSuperset(index, boxes, world);
   }
+}
+
+// Floats are not enough for them, so a new tree is built in doubles.
+TEST(SpatialIndex, RefitsOfHugeAndTinyBoxesAreRight) {
+  const std::vector<Triangle> triangles{{0, 0, 0}, {1, 1, 1}, {2, 2, 2}, {3, 3, 3}, {4, 4, 4}, {5, 5, 5}};
+  for (const float size : {3e38F, 1e32F, 1e-32F, 1e-38F, 1e-45F}) {
+    std::vector<float> all(19);
+    SpatialIndex index = SpatialIndex::build(BoxedTriangles{triangles, all, all});
+    for (const float sign : {1.0F, -1.0F}) {
+      for (std::size_t i = 0; i < 18; ++i) all[i] = i / 3 % 2 == 0 ? sign * size : -sign * size;
+      index.refit({triangles, all, all});
+      const auto found = near(index, Vec3::Constant(sign * size), 0);
+      for (const std::uint32_t id : {0U, 2U, 4U}) EXPECT_EQ(found.count(id), 1U) << size << " " << id;
+    }
+  }
+}
+
+TEST(SpatialIndex, RefitsAreCountedFromTheBuildOn) {
+  World world(7);
+  const Sheet sheet(world);
+  SpatialIndex index = SpatialIndex::build(sheet.boxed());
+  EXPECT_EQ(index.refits(), 0);
+  index.refit(sheet.boxed());
+  index.refit(sheet.boxed());
+  EXPECT_EQ(index.refits(), 2);
 }
 
 TEST(SpatialIndex, OfNothingFindsNothing) {
@@ -191,7 +275,8 @@ TEST(SpatialIndex, MovedIndexAnswersLikeBefore) {
   SpatialIndex a = indexOver({Box{Vec3(0, 0, 0), Vec3(1, 1, 1)}});
   SpatialIndex b = std::move(a);
   EXPECT_EQ(near(b, Vec3(0.5, 0.5, 0.5), 0.1).size(), 1U);
-  b.refit([](std::uint32_t) { return Box{Vec3(5, 5, 5), Vec3(6, 6, 6)}; });
+  const std::vector<Triangle> triangle{{0, 0, 0}};
+  b.refit({triangle, std::vector<float>(4, 5), std::vector<float>(4, 6)});
   EXPECT_TRUE(near(b, Vec3(0.5, 0.5, 0.5), 0.1).empty());
   EXPECT_EQ(near(b, Vec3(5.5, 5.5, 5.5), 0.1).size(), 1U);
 }
