@@ -3,6 +3,7 @@
 #include <netinet/in.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
+#include <sys/utsname.h>
 #include <unistd.h>
 
 #include <cstdio>
@@ -88,6 +89,23 @@ Finding timerResolution() {
           "the kernel lacks high-resolution timers (CONFIG_HIGH_RES_TIMERS): a 1 kHz loop cannot keep time"};
 }
 
+// Where system calls of other programs are not interrupted, even SCHED_FIFO waits for their end.
+Finding preemption() {
+  utsname kernel{};
+  uname(&kernel);
+  const std::string build = kernel.version;
+  const std::string asked = firstLine("/proc/cmdline");
+  if (build.find("PREEMPT_RT") != std::string::npos)
+    return {Verdict::good, "the kernel is a realtime one (PREEMPT_RT)", ""};
+  const bool canBe = build.find("PREEMPT") != std::string::npos;
+  const bool chosen =
+      build.find("PREEMPT_DYNAMIC") == std::string::npos || asked.find("preempt=full") != std::string::npos;
+  if (canBe && chosen) return {Verdict::good, "system calls of others are interrupted for the loop", ""};
+  return {Verdict::note,
+          "long system calls of other programs may delay the loop by milliseconds (kernel: " + build + ")",
+          canBe ? "boot with preempt=full, or use a kernel with PREEMPT_RT" : "use a kernel with PREEMPT_RT"};
+}
+
 Finding portFree(int type, const char* protocol, std::uint16_t port) {
   const int fd = socket(AF_INET, type, 0);
   sockaddr_in address{};
@@ -133,6 +151,7 @@ int run(double seconds, std::uint16_t port) {
   add(memoryLock());
   add(governor());
   add(timerResolution());
+  add(preemption());
   std::printf("network\n");
   add(portFree(SOCK_STREAM, "TCP", port));
   add(portFree(SOCK_DGRAM, "UDP", port));

@@ -44,24 +44,29 @@ template <class Tick>
   }
 }
 
-// Thread, wake, thread, TCP: what is between a servo and its client, and nothing else.
+// Thread, wake, thread, TCP: what is between a servo and its client, and nothing else. As there, every tick
+// is sent, however late the thread between was.
 int pipeline(std::uint16_t port) {
   Socket socket = Socket::connect(port);
   const int wake = eventfd(0, EFD_NONBLOCK);
-  std::atomic<std::int64_t> newest{0};
+  std::array<std::int64_t, 4096> stamps{};
+  std::atomic<std::uint64_t> written{0};
   std::thread producer([&] {
     pace([&](std::int64_t time) {
-      newest.store(time, std::memory_order_release);
+      const std::uint64_t n = written.load(std::memory_order_relaxed);
+      stamps[n % stamps.size()] = time;
+      written.store(n + 1, std::memory_order_release);
       eventfd_write(wake, 1);
     });
   });
   producer.detach();
-  for (;;) {
+  for (std::uint64_t sent = 0;;) {
     pollfd waiting{wake, POLLIN, 0};
     poll(&waiting, 1, -1);
     eventfd_t count = 0;
     eventfd_read(wake, &count);
-    socket.sendAll(stamped(newest.load(std::memory_order_acquire)));
+    for (; sent < written.load(std::memory_order_acquire); ++sent)
+      socket.sendAll(stamped(stamps[sent % stamps.size()]));
   }
 }
 

@@ -223,7 +223,9 @@ void TcpConnection::write() {
       offered += parts[i].size();
     }
     ErrorCode error;
-    const std::size_t sent = socket_.write_some(std::span(buffers.data(), count), error);
+    // One part is a shorter way into the kernel than a list of one.
+    const std::size_t sent = count == 1 ? socket_.write_some(buffers[0], error)
+                                        : socket_.write_some(std::span(buffers.data(), count), error);
     if (error && error != asio::error::would_block && error != asio::error::interrupted) {
       writeFailed(error);
       return;

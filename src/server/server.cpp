@@ -6,6 +6,7 @@
 #include <chrono>
 #include <ctime>
 
+#include "realtime/servo/thread_setup.h"
 #include "wire/udp_request.h"
 
 namespace hapticd::server {
@@ -186,7 +187,10 @@ void Server::run() {
   for (const auto& scene : scenes_) startScene(*scene);
   for (const auto& owned : stations_) {
     Station* station = owned.get();
-    subscriptions_.push_back(loop_.watchFd(station->wakeFd(), [this, station] { onServoWake(*station); }));
+    subscriptions_.push_back(loop_.watchFd(station->wakeFd(), [this, station] {
+      net::drainEventFd(station->wakeFd());
+      report(*station);
+    }));
     station->start();
   }
   subscriptions_.push_back(loop_.every(1s, [this] { everySecond(); }));
@@ -203,6 +207,7 @@ void Server::run() {
         [this] { loop_.stop(); }));
   }
   startPlaying();
+  realtime::askShortTurns();  // reports are to leave at once, whatever else the machine does
   loop_.run();
   if (player_) player_->stop();
   for (const auto& station : stations_) station->stop();
@@ -423,6 +428,11 @@ void Server::onRemark(const Session& session, const std::string& text) {
   noise_.warn("client " + std::to_string(session.id()) + ": " + text);
 }
 
+// Who sends a lot must not make others wait for their reports.
+void Server::onBreath() {
+  for (const auto& station : stations_) report(*station);
+}
+
 void Server::onBatchEnd(Session& session) {
   refused_ = 0;
   for (const auto& scene : scenes_) {
@@ -430,8 +440,7 @@ void Server::onBatchEnd(Session& session) {
   }
 }
 
-void Server::onServoWake(Station& station) {
-  net::drainEventFd(station.wakeFd());
+void Server::report(Station& station) {
   const bool any = station.collectReports(clock_, [this, &station] {
     for (const auto& [id, session] : sessions_) station.sendReports(*session);
   });

@@ -53,6 +53,7 @@ class Server final : public SessionOwner, public WebOwner {
   void onSubscribed(Session& session, wire::LocalSender name) override;
   void onMessage(Session& session, const wire::MessageReceived& message) override;
   void onRemark(const Session& session, const std::string& text) override;
+  void onBreath() override;
   void onBatchEnd(Session& session) override;
   void onClosed(Session& session, const std::string& reason) override;
 
@@ -70,7 +71,7 @@ class Server final : public SessionOwner, public WebOwner {
   void startRecording();
   void finishRecording();
   void everySecond();
-  void onServoWake(Station& station);
+  void report(Station& station);
   void tell(const Station& station, const wire::Text& text);
   void onHeartbeat(Session& session, const wire::MessageReceived& message);
   void closeStaleHandshakes();

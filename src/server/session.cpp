@@ -2,6 +2,8 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+
 #include "wire/text.h"
 
 namespace hapticd::server {
@@ -133,7 +135,13 @@ void Session::drainEndpoint() {
 }
 
 void Session::onBytes(std::span<const std::byte> bytes) {
-  endpoint_.feed(clock_.now(), bytes, [this](const wire::Event& event) { onEvent(event); });
+  constexpr std::size_t kPieceBytes = 8 * 1024;  // some tens of microseconds
+  while (!bytes.empty() && !endpoint_.failed()) {
+    const auto piece = bytes.first(std::min(kPieceBytes, bytes.size()));
+    bytes = bytes.subspan(piece.size());
+    endpoint_.feed(clock_.now(), piece, [this](const wire::Event& event) { onEvent(event); });
+    if (!bytes.empty()) owner_.onBreath();
+  }
   owner_.onBatchEnd(*this);
   if (endpoint_.failed()) {
     connection_.abort(failure_);

@@ -33,6 +33,8 @@ class SessionOwner {
   virtual void onMessage(Session& session, const wire::MessageReceived& message) = 0;
   /// Worth a line in the log, but a client can cause it as often as it likes.
   virtual void onRemark(const Session& session, const std::string& text) = 0;
+  /// Some messages of a long read have been given: a chance for what must not wait for the rest.
+  virtual void onBreath() = 0;
   /// All messages of one read have been given.
   virtual void onBatchEnd(Session& session) = 0;
   /// Over, with the reason; the owner destroys the session after this returns.

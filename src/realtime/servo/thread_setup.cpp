@@ -11,6 +11,7 @@
 
 #include <cerrno>
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 
 #include "realtime/servo/flush_denormals.h"
@@ -141,6 +142,23 @@ std::string ThreadSetup::complaints() const {
     text += std::string(answer->name) + ": " + answer->text + "; " + answer->remedy;
   }
   return text;
+}
+
+void askShortTurns() noexcept {
+  // As the kernel has it; older C libraries know neither the call nor this.
+  struct Attributes {
+    std::uint32_t size = sizeof(Attributes);
+    std::uint32_t policy = SCHED_OTHER;
+    std::uint64_t flags = 1;  // SCHED_FLAG_RESET_ON_FORK
+    std::int32_t nice = 0;
+    std::uint32_t priority = 0;
+    std::uint64_t turn_ns = 100'000;
+    std::uint64_t deadline_ns = 0;
+    std::uint64_t period_ns = 0;
+  } attributes;
+  if (sched_getscheduler(0) != SCHED_OTHER) return;  // the operator knows better
+  attributes.nice = getpriority(PRIO_PROCESS, 0);
+  syscall(SYS_sched_setattr, 0, &attributes, 0U);  // where it is refused, all is as before
 }
 
 ThreadSetup setUpThread(const ThreadRequest& request) {

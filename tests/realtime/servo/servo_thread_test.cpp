@@ -4,7 +4,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sched.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <stdexcept>
 #include <thread>
@@ -203,6 +207,20 @@ TEST(ThreadSetup, SomebodyElsesThreadKeepsWhatItHas) {
     EXPECT_EQ(setup.scheduling.granted, before == SCHED_FIFO || before == SCHED_RR);
     EXPECT_EQ(setup.scheduling.remedy.empty(), setup.scheduling.granted);
     EXPECT_FALSE(setup.stack.asked);
+  }).join();
+}
+
+TEST(ThreadSetup, ShortTurnsChangeNeitherPolicyNorNiceness) {
+  std::thread([] {
+    setpriority(PRIO_PROCESS, 0, 3);
+    askShortTurns();
+    EXPECT_EQ(sched_getscheduler(0) & ~SCHED_RESET_ON_FORK, SCHED_OTHER);
+    EXPECT_EQ(getpriority(PRIO_PROCESS, 0), 3);
+    // What Linux 6.12 and later tell of a turn; older ones say 0.
+    std::array<std::uint64_t, 6> attributes{};
+    ASSERT_EQ(syscall(SYS_sched_getattr, 0, attributes.data(), sizeof attributes, 0U), 0);
+    EXPECT_TRUE(attributes[3] == 100'000 || attributes[3] == 0) << attributes[3];
+    std::thread([] { EXPECT_EQ(sched_getscheduler(0), SCHED_OTHER); }).join();
   }).join();
 }
 
