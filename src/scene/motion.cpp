@@ -28,6 +28,11 @@ Mat3 orthogonalFactor(const Mat3& m) {
   return q;
 }
 
+// What is only carried needs no factors: most objects, most of the time.
+bool sameLinear(const Affine& a, const Affine& b) {
+  return a.linear() == b.linear();
+}
+
 geometry::Box transformed(const Affine& t, const geometry::Box& box) {
   const geometry::Vec3 centre = t * box.centre();
   const geometry::Vec3 half = t.linear().cwiseAbs() * (0.5 * box.extents());
@@ -60,8 +65,10 @@ Motion Motion::between(const Affine& from, const Affine& to, Nanos begin, Nanos 
   Motion motion;
   motion.from_ = from;
   motion.to_ = to;
-  motion.fromFactors_ = factorise(from);
-  motion.toFactors_ = factorise(to);
+  if (!sameLinear(from, to)) {
+    motion.fromFactors_ = factorise(from);
+    motion.toFactors_ = factorise(to);
+  }
   motion.begin_ = begin;
   motion.end_ = end;
   motion.jumps_ = jumps;
@@ -72,9 +79,13 @@ Affine Motion::at(Nanos now) const noexcept {
   if (now >= end_) return to_;
   if (now <= begin_) return from_;
   const double s = static_cast<double>(now - begin_) / static_cast<double>(end_ - begin_);
-  const geometry::Mat3 stretch = (1 - s) * fromFactors_.stretch + s * toFactors_.stretch;
   Affine t;
-  t.linear() = fromFactors_.rotation.slerp(s, toFactors_.rotation).toRotationMatrix() * stretch;
+  if (sameLinear(from_, to_)) {
+    t.linear() = from_.linear();
+  } else {
+    const geometry::Mat3 stretch = (1 - s) * fromFactors_.stretch + s * toFactors_.stretch;
+    t.linear() = fromFactors_.rotation.slerp(s, toFactors_.rotation).toRotationMatrix() * stretch;
+  }
   t.translation() = (1 - s) * from_.translation() + s * to_.translation();
   return t;
 }
@@ -86,6 +97,7 @@ geometry::Box Motion::sweep(const geometry::Box& box) const {
   geometry::Box swept = transformed(to_, box);
   if (end_ <= begin_) return swept;
   swept.extend(transformed(from_, box));
+  if (sameLinear(from_, to_)) return swept;
   const double angle = fromFactors_.rotation.angularDistance(toFactors_.rotation);
   double leave = 0;
   for (int i = 0; i < 8; ++i) {

@@ -60,6 +60,20 @@ TEST(Motion, HalfwayIsHalfTheAngleHalfTheScaleHalfTheWay) {
   EXPECT_TRUE(mid.translation().isApprox(Vec3(1, 0, 0), 1e-12));
 }
 
+TEST(Motion, WhatIsOnlyCarriedKeepsItsLinearPartAndSweepsNoMoreThanTheWay) {
+  const Mat3 linear = 1.7 * turn(0.3, Vec3(1, 2, 3));
+  const Affine from = placement(linear, Vec3(1, 2, 3));
+  const Affine to = placement(linear, Vec3(4, -5, 6));
+  const Motion motion = Motion::between(from, to, 0, 1000);
+  EXPECT_EQ(motion.at(300).linear(), linear);
+  EXPECT_TRUE(motion.at(300).translation().isApprox(Vec3(1.9, -0.1, 3.9), 1e-15));
+  const geometry::Box box{Vec3(-1, -1, -1), Vec3(1, 2, 3)};
+  geometry::Box ends = Motion::fixed(from).sweep(box);
+  ends.extend(Motion::fixed(to).sweep(box));
+  EXPECT_EQ(motion.sweep(box).min, ends.min);
+  EXPECT_EQ(motion.sweep(box).max, ends.max);
+}
+
 TEST(Motion, RotatesTheShortWay) {
   const Affine from = placement(turn(3.0, Vec3::UnitX()), Vec3::Zero());
   const Affine to = placement(turn(-3.0, Vec3::UnitX()), Vec3::Zero());
