@@ -21,4 +21,15 @@ void Witness::watch() noexcept {
   }
 }
 
+Row witnessRow(std::uint64_t late, std::optional<std::uint64_t> undisturbed) {
+  Row row{"- a bare thread beside it: wakes over 0.5 ms late",
+          "",
+          Summary::of(static_cast<double>(late)),
+          {},
+          {},
+          {}};
+  if (undisturbed) row.yardstick = Summary::of(static_cast<double>(*undisturbed));
+  return row;
+}
+
 }  // namespace hapticd::bench

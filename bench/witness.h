@@ -4,7 +4,10 @@
 
 #include <atomic>
 #include <cstdint>
+#include <optional>
 #include <thread>
+
+#include "bench/benchmark.h"
 
 namespace hapticd::bench {
 
@@ -26,5 +29,8 @@ class Witness {
   std::atomic<std::uint64_t> late_{0};
   std::thread thread_;
 };
+
+/// What the table says of a witness, against one while nothing disturbed.
+Row witnessRow(std::uint64_t late, std::optional<std::uint64_t> undisturbed = {});
 
 }  // namespace hapticd::bench
