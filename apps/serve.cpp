@@ -125,8 +125,9 @@ void addServe(CLI::App& app) {
       "Driver [simulated]: " + drivers + "\nDRIVER:WHICH picks one of several, e.g. evdev:/dev/input/event5");
   command->add_flag("--enable-forces", options->enableForces,
                     "Real devices start without force unless this is given");
-  command->add_flag("--calibrate", options->calibrate,
-                    "Consent to calibrate at the start, which may move the arm");
+  command->add_flag(
+      "--calibrate", options->calibrate,
+      "Consent to calibrate at the start, and when re-armed after that was lost; may move the arm");
   command->add_flag("--isolate", options->isolate,
                     "Run the driver in a process of its own: its crash is then a fault, not the end");
   command->add_option(

@@ -52,7 +52,7 @@ struct DeviceConfig {
   std::string driver = "simulated";
   std::string hardware;      ///< which one, in the driver's words: a device name, an index, /dev/input/event5
   std::string wheelProfile;  ///< evdev: TOML file with the newtons of a wheel or joystick
-  bool calibrate = false;    ///< consent to calibrate at the start, which may move the arm
+  bool calibrate = false;    ///< consent to calibrate at the start and at a re-arm; may move the arm
   bool isolate = false;      ///< the driver runs in a process of its own: its crash is a fault, not the end
   bool enableForces = false;    ///< real devices start without force unless this is set
   std::string hand = "script";  ///< simulated device: "script", or a CSV file with the intended path

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <exception>
+#include <utility>
 
 namespace hapticd::server {
 namespace {
@@ -62,14 +63,15 @@ void DeviceKeeper::stopLoop() noexcept {
 std::string DeviceKeeper::look(Nanos now) {
   sayPacedSetup();
   if (attempt_.joinable()) {
-    if (!attempted_.load(std::memory_order_acquire)) return "the device is being opened anew";
+    if (!attempted_.load(std::memory_order_acquire)) return doing_;
     attempt_.join();
     nextAttempt_ = now + kBetweenAttempts;
     lostSince_ = 0;
   }
   if (!refusal_.empty()) {
     std::string refused = "the device does not open: " + refusal_ + "; it is tried again every 2 s";
-    if (now >= nextAttempt_) beginAttempt();  // refusal_ is the attempt's from here on
+    // refusal_ is the attempt's from here on.
+    if (now >= nextAttempt_) begin("the device is being opened anew", [this] { openAnew(); });
     return refused;
   }
   std::string words = device_.faultText();
@@ -78,18 +80,39 @@ std::string DeviceKeeper::look(Nanos now) {
   } else if (lostSince_ == 0) {
     lostSince_ = now;
   } else if (now - lostSince_ > kLostFor) {
-    beginAttempt();
+    begin("the device is being opened anew", [this] { openAnew(); });
+    return words;
   }
+  if (words.empty()) notCalibrated_.clear();
+  if (!notCalibrated_.empty()) words += "; the last calibration: " + notCalibrated_;
   return words;
 }
 
-void DeviceKeeper::beginAttempt() {
+void DeviceKeeper::calibrate() {
+  if (attempt_.joinable() || !refusal_.empty()) return;
+  begin("the device is being calibrated: keep hands off", [this] { tryToCalibrate(); });
+}
+
+void DeviceKeeper::begin(std::string doing, std::function<void()> attempt) {
+  doing_ = std::move(doing);
   attempted_ = false;
-  attempt_ = std::thread([this] { attempt(); });
+  attempt_ = std::thread([this, attempt = std::move(attempt)] {
+    attempt();
+    attempted_.store(true, std::memory_order_release);
+  });
+}
+
+void DeviceKeeper::tryToCalibrate() noexcept {
+  notCalibrated_.clear();
+  try {
+    device_.calibrate();
+  } catch (const std::exception& error) {
+    notCalibrated_ = error.what();
+  }
 }
 
 // The guard has latched the fault: whatever comes back, no force does before a re-arm.
-void DeviceKeeper::attempt() noexcept {
+void DeviceKeeper::openAnew() noexcept {
   std::string refusal;
   try {
     stopLoop();
@@ -101,7 +124,6 @@ void DeviceKeeper::attempt() noexcept {
     device_.close();
   }
   refusal_ = refusal;
-  attempted_.store(true, std::memory_order_release);
 }
 
 void DeviceKeeper::say(const realtime::SetupAnswer& answer) const {

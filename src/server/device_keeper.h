@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <optional>
 #include <string>
 #include <thread>
@@ -36,6 +37,9 @@ class DeviceKeeper {
   /// Some times a second: why forces are held, in words; empty when all is well. A device that has been lost
   /// for half a second is closed and opened anew, every two seconds until it opens.
   std::string look(geometry::Nanos now);
+  /// A person consents to a calibration now, which may move the arm. The loop goes on meanwhile; look() tells
+  /// how it ended. Nothing while the device is opened anew or calibrated already.
+  void calibrate();
 
   /// The thread of the loop has realtime scheduling.
   bool realtime() const noexcept { return realtime_; }
@@ -43,8 +47,9 @@ class DeviceKeeper {
  private:
   void startLoop();
   void stopLoop() noexcept;
-  void beginAttempt();
-  void attempt() noexcept;
+  void begin(std::string doing, std::function<void()> attempt);
+  void openAnew() noexcept;
+  void tryToCalibrate() noexcept;
   void say(const realtime::SetupAnswer& answer) const;
   void sayPacedSetup();
 
@@ -60,9 +65,12 @@ class DeviceKeeper {
 
   geometry::Nanos lostSince_ = 0;  // 0: not lost
   geometry::Nanos nextAttempt_ = 0;
+  std::string doing_;  // of the attempt
   std::thread attempt_;
   std::atomic<bool> attempted_{false};
-  std::string refusal_;  // of the last attempt; empty when it succeeded. The attempt's until attempted_
+  // Of the last attempt to open and to calibrate; empty when it succeeded. The attempt's until attempted_.
+  std::string refusal_;
+  std::string notCalibrated_;
 };
 
 }  // namespace hapticd::server

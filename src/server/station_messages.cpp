@@ -40,8 +40,7 @@ void Station::onMessage(Session& session, const wire::MessageReceived& message) 
 void Station::Impl::on(Session& session, wire::LocalSender name, const wire::Ping&) {
   const realtime::TickReport& last = outbox.last();
   session.send(name, wire::Pong{});
-  session.send(name, Reporter::buttonStates(profile.buttons, frame.buttons,
-                                            last.rendering.touching));
+  session.send(name, Reporter::buttonStates(profile.buttons, frame.buttons, last.rendering.touching));
 }
 
 void Station::Impl::on(Session& session, wire::LocalSender, const wire::Text& text) {
@@ -111,6 +110,8 @@ void Station::Impl::on(Session& session, wire::LocalSender, const wire::RearmFor
   spdlog::warn("client {} ({}) re-arms the forces of '{}'", session.id(), session.description(),
                config.names.front());
   control.rearmForces();
+  // The operator consented to motion at the start; this is the moment that a person chose.
+  if (config.calibrate && (outbox.last().device.hold & device::kHoldNotCalibrated) != 0) keeper.calibrate();
 }
 
 void Station::Impl::on(Session& session, wire::LocalSender name, const wire::HoldHand& wanted) {

@@ -58,7 +58,15 @@ class ScriptedDevice final : public device::Device {
     return true;
   }
   bool write(const Vec3& /*force_N*/) noexcept override { return true; }
-  std::string faultText() const override { return isLost ? "the cable is out" : ""; }
+  void calibrate() override {
+    ++calibrations;
+    while (calibrationBlocks) std::this_thread::sleep_for(1ms);
+    if (calibrationFails) throw std::runtime_error("a hand was in the way");
+    isCalibrated = true;
+  }
+  std::string faultText() const override {
+    return isLost ? "the cable is out" : isCalibrated ? "" : "not calibrated";
+  }
   bool lost() const noexcept override { return isLost; }
 
   bool selfPaced() const noexcept override { return selfPaced_; }
@@ -84,6 +92,8 @@ class ScriptedDevice final : public device::Device {
 
   std::atomic<int> opens{0}, closes{0}, reads{0}, readsWhileClosed{0};
   std::atomic<bool> isOpen{false}, isLost{false}, openBlocks{false}, startFails{false};
+  std::atomic<int> calibrations{0};
+  std::atomic<bool> isCalibrated{true}, calibrationBlocks{false}, calibrationFails{false};
 
  private:
   const bool selfPaced_;
@@ -142,6 +152,37 @@ TEST_P(KeeperTest, TheLoopRunsUntilStopped) {
   expectNoLoop();
   keeper_.stop();
   EXPECT_EQ(device_.opens + device_.closes, 0) << "it was opened by somebody else, who closes it";
+}
+
+TEST_P(KeeperTest, ACalibrationIsDoneBesideTheLoop) {
+  keeper_.start();
+  device_.isCalibrated = false;
+  EXPECT_EQ(keeper_.look(1000 * kMs), "not calibrated");
+  EXPECT_EQ(device_.calibrations, 0) << "nobody asked";
+  device_.calibrationBlocks = true;
+  keeper_.calibrate();
+  keeper_.calibrate();
+  EXPECT_EQ(keeper_.look(1050 * kMs), "the device is being calibrated: keep hands off");
+  EXPECT_TRUE(loopRuns());
+  device_.calibrationBlocks = false;
+  EXPECT_TRUE(eventually([&] { return keeper_.look(1100 * kMs).empty(); }));
+  EXPECT_EQ(device_.calibrations, 1);
+  EXPECT_EQ(device_.opens + device_.closes, 0);
+}
+
+TEST_P(KeeperTest, ACalibrationThatFailsSaysWhyUntilOneSucceeds) {
+  keeper_.start();
+  device_.isCalibrated = false;
+  device_.calibrationFails = true;
+  keeper_.calibrate();
+  EXPECT_TRUE(eventually([&] {
+    return keeper_.look(1000 * kMs) == "not calibrated; the last calibration: a hand was in the way";
+  }));
+  device_.calibrationFails = false;
+  keeper_.calibrate();
+  EXPECT_TRUE(eventually([&] { return keeper_.look(1100 * kMs).empty(); }));
+  device_.isCalibrated = false;
+  EXPECT_EQ(keeper_.look(1200 * kMs), "not calibrated");
 }
 
 TEST_P(KeeperTest, AShortLossIsToldAndNothingElse) {

@@ -105,6 +105,29 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"NotCalibrated", mock::kNotCalibrated, 10, "not calibrated: keep hands off"}),
     kName);
 
+TEST_F(InContact, ReArmingCalibratesAnArmWhereTheServerHasConsent) {
+  serve({"--device", "forcedimension", "--calibrate"}, {"HAPTICD_DHD_LIB=" MOCK_DRD});
+  strike(mock::kNotCalibrated, 10);
+  expectWords("not calibrated: keep hands off");
+  visitor->forget();
+  visitor->client().rearmForces();
+  expectWords("the device is well again");
+  touch();
+  endInOrder();
+}
+
+TEST_F(InContact, ReArmingMovesNoArmWithoutConsent) {
+  serve({"--device", "forcedimension"}, {"HAPTICD_DHD_LIB=" MOCK_DRD});
+  strike(mock::kNotCalibrated, 10);
+  expectWords("not calibrated: keep hands off");
+  visitor->client().rearmForces();
+  const std::int64_t before = arm->ticks;
+  EXPECT_TRUE(visitor->until([&] { return arm->ticks > before + 500; }));
+  EXPECT_FALSE(visitor->heard("the device is well again")) << visitor->texts();
+  EXPECT_TRUE(arm.left().isZero());
+  endInOrder();
+}
+
 class HaplyFault : public InContact {
  protected:
   HaplyFault() { service.follow(*arm); }
