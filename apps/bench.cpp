@@ -90,7 +90,7 @@ void addBench(CLI::App& app) {
   command->add_option("names", options->names, "Benchmarks to run [all of them]");
   command->add_flag("--list", options->list, "Name the benchmarks and end");
   command->add_flag("--full", options->full,
-                    "Longer measurements, about 13 minutes in all [windows of some seconds]");
+                    "Longer measurements, about 25 minutes in all [windows of some seconds]");
   command->add_flag("--long", options->longest, "The longest measurements, about an hour");
   command->add_option("--out", options->out,
                       "Directory for results.json, results.csv, results.md and drawings");

@@ -105,7 +105,7 @@ struct Phase {
 class Disturbance {
  public:
   explicit Disturbance(const Run& run)
-      : run_(run), seconds_(run.seconds(4, 15, 60)), reason_(realtimeGranted() ? "" : "no SCHED_FIFO") {}
+      : run_(run), seconds_(run.seconds(4, 60, 60)), reason_(realtimeGranted() ? "" : "no SCHED_FIFO") {}
 
   void measure(const Phase& phase) {
     run_.progress(phase.what);

@@ -44,7 +44,7 @@ bool hasCyclictest() {
 Outcome measureWakeup(const Run& run) {
   Outcome outcome;
   const bool yardstick = hasCyclictest();
-  const int rounds = static_cast<int>(run.seconds(2, 6, 12));
+  const int rounds = static_cast<int>(run.seconds(2, 12, 12));
   Samples ours;
   Samples theirs;
   bool granted = true;

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Measures how fast hapticd is, against yardsticks on this machine. Stop other work first.
 #   scripts/bench.sh             all benchmarks in short windows, under ten minutes
-#   scripts/bench.sh --full      longer, about 13 minutes, and writes the figures into docs/performance.md
+#   scripts/bench.sh --full      longer, about 25 minutes, and writes the figures into docs/performance.md
 #   scripts/bench.sh --long      the longest, most of an hour, and writes them, too
 #   scripts/bench.sh NAME...     only these (hapticd bench --list); docs/performance.md stays as it is
 # Results as JSON, CSV and drawings: build/bench/
