@@ -6,7 +6,6 @@
 #include <unistd.h>
 
 #include <array>
-#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <cstdio>
@@ -17,6 +16,7 @@
 
 #include "bench/sockets.h"
 #include "bench/timing.h"
+#include "realtime/handoff/spsc_ring.h"
 #include "wire/frame_encoder.h"
 
 namespace hapticd::bench {
@@ -49,24 +49,20 @@ template <class Tick>
 int pipeline(std::uint16_t port) {
   Socket socket = Socket::connect(port);
   const int wake = eventfd(0, EFD_NONBLOCK);
-  std::array<std::int64_t, 4096> stamps{};
-  std::atomic<std::uint64_t> written{0};
+  realtime::SpscRing<std::int64_t> stamps(4096);
   std::thread producer([&] {
     pace([&](std::int64_t time) {
-      const std::uint64_t n = written.load(std::memory_order_relaxed);
-      stamps[n % stamps.size()] = time;
-      written.store(n + 1, std::memory_order_release);
+      stamps.push(time);
       eventfd_write(wake, 1);
     });
   });
   producer.detach();
-  for (std::uint64_t sent = 0;;) {
+  for (;;) {
     pollfd waiting{wake, POLLIN, 0};
     poll(&waiting, 1, -1);
     eventfd_t count = 0;
     eventfd_read(wake, &count);
-    for (; sent < written.load(std::memory_order_acquire); ++sent)
-      socket.sendAll(stamped(stamps[sent % stamps.size()]));
+    stamps.consume([&](std::int64_t stamp) { socket.sendAll(stamped(stamp)); });
   }
 }
 

@@ -29,15 +29,6 @@ class Meshes : public SceneTest {
   Vec3 vertex(std::uint32_t i) const { return object(0)->mesh->vertex(i, now_); }
 };
 
-std::vector<Vec3f> soup(int triangles, float z = 0) {
-  std::vector<Vec3f> v;
-  for (int i = 0; i < triangles; ++i) {
-    const auto x = static_cast<float>(2 * i);
-    v.insert(v.end(), {Vec3f(x, 0, z), Vec3f(x + 1, 0, z), Vec3f(x, 1, z)});
-  }
-  return v;
-}
-
 TEST_F(Meshes, AreFeltTwentyMillisecondsAfterTheLastVertex) {
   const auto vertices = soup(2);
   for (std::size_t i = 0; i < vertices.size(); ++i) {

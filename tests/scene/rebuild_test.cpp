@@ -9,25 +9,16 @@ namespace {
 
 using Rebuild = SceneTest;
 
-std::vector<Vec3f> row(int triangles, float z) {
-  std::vector<Vec3f> corners;
-  for (int i = 0; i < triangles; ++i) {
-    const auto x = static_cast<float>(2 * i);
-    corners.insert(corners.end(), {Vec3f(x, 0, z), Vec3f(x + 1, 0, z), Vec3f(x, 1, z)});
-  }
-  return corners;
-}
-
 // What nobody reads any more is refitted; from time to time another tree is built beside it.
 TEST_F(Rebuild, OldTreesServeUntilNewOnesAreBuilt) {
-  makeTouchable(0, row(50, 0));
+  makeTouchable(0, soup(50, 0));
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
   int most = 0;
   for (int frame = 1, now = 0; most <= 64 || now != 1; ++frame) {
     ASSERT_LT(std::chrono::steady_clock::now(), deadline) << "refitted " << most << " times";
     const float z = 0.1F * static_cast<float>(frame % 10);
     previous_.reset();
-    say(SetVertices{0, 0, row(50, z)});
+    say(SetVertices{0, 0, soup(50, z)});
     run(20 * kMillisecond);
     const SpatialIndex& index = object(0)->mesh->index;
     now = index.refits();
@@ -41,15 +32,15 @@ TEST_F(Rebuild, OldTreesServeUntilNewOnesAreBuilt) {
 
 // The mesh goes while its new tree is built.
 TEST_F(Rebuild, ShapesMayChangeMeanwhile) {
-  makeTouchable(0, row(20'000, 0));
+  makeTouchable(0, soup(20'000, 0));
   for (int frame = 1; object(0)->mesh->index.refits() < 64; ++frame) {
     previous_.reset();
-    say(SetVertices{0, 0, row(20'000, static_cast<float>(frame % 2))});
+    say(SetVertices{0, 0, soup(20'000, static_cast<float>(frame % 2))});
     run(20 * kMillisecond);
   }
   for (int frame = 0; frame < 3; ++frame) {
     previous_.reset();
-    say(SetVertices{0, 0, row(20'000, static_cast<float>(frame))});
+    say(SetVertices{0, 0, soup(20'000, static_cast<float>(frame))});
     run(20 * kMillisecond);
   }
   say(ClearMesh{0});

@@ -33,6 +33,16 @@ inline std::vector<Vec3f> oneTriangle() {
   return {Vec3f(0, 0, 0), Vec3f(1, 0, 0), Vec3f(0, 1, 0)};
 }
 
+/// So many of them in a row, two apart, at this height.
+inline std::vector<Vec3f> soup(int triangles, float z = 0) {
+  std::vector<Vec3f> v;
+  for (int i = 0; i < triangles; ++i) {
+    const auto x = static_cast<float>(2 * i);
+    v.insert(v.end(), {Vec3f(x, 0, z), Vec3f(x + 1, 0, z), Vec3f(x, 1, z)});
+  }
+  return v;
+}
+
 class SceneTest : public ::testing::Test {
  protected:
   static constexpr ClientId kClient = 7;

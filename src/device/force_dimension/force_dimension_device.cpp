@@ -270,8 +270,7 @@ std::string ForceDimensionDevice::faultText() const {
     return "the device does not answer or reports an error; check power and cable";
   if ((hold & kHoldNotCalibrated) != 0) {
     return "not calibrated: keep hands off and start hapticd with --calibrate, or re-arm one that was "
-           "started "
-           "so; it moves the arm through its workspace";
+           "started so; it moves the arm through its workspace";
   }
   if ((hold & kHoldDeadMan) != 0) {
     return "the device switched its amplifiers off (its button, its speed limit or its watchdog); press the "

@@ -326,8 +326,7 @@ std::string OpenHapticsDevice::faultText() const {
   if ((hold & kHoldNotCalibrated) != 0) {
     if ((calibrationStyle_ & hd::kStyleEncoderReset) != 0) {
       say("not calibrated: bring the arm into its reset position and start hapticd with --calibrate, or "
-          "re-arm one "
-          "that was started so");
+          "re-arm one that was started so");
     } else if ((calibrationStyle_ & hd::kStyleInkwell) != 0) {
       say("not calibrated: put the stylus into the inkwell");
     } else {
