@@ -5,7 +5,7 @@
 #include "commands.h"
 #include "device/isolation/device_host.h"
 #include "realtime/servo/thread_setup.h"
-#include "server/devices.h"
+#include "server/station/devices.h"
 
 namespace hapticd::apps {
 

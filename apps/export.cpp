@@ -4,11 +4,12 @@
 #include <stdexcept>
 #include <string>
 
+#include "base/time.h"
 #include "commands.h"
 #include "record/export.h"
-#include "record/session_reader.h"
+#include "record/recording_reader.h"
 #include "record/vrpn_log.h"
-#include "server/reporter.h"
+#include "server/reports/reporter.h"
 
 namespace hapticd::apps {
 namespace {
@@ -26,7 +27,7 @@ struct Voice {
   bool first = true;
 };
 
-wire::Time stamp(geometry::Nanos wall_ns) {
+wire::Time stamp(base::Nanos wall_ns) {
   return {static_cast<std::uint32_t>(wall_ns / 1'000'000'000),
           static_cast<std::uint32_t>(wall_ns % 1'000'000'000 / 1000)};
 }
@@ -46,8 +47,8 @@ void say(Voice& voice, const realtime::TickReport& tick, wire::Time time, record
 }
 
 void exportVrpn(const Options& options, std::string& remark) {
-  record::SessionReader reader(options.session);
-  const record::SessionHeader& header = reader.header();
+  record::RecordingReader reader(options.session);
+  const record::RecordingHeader& header = reader.header();
   const server::ServerConfig config = server::parseConfig(header.config, options.session);
   record::VrpnLog log(options.out);
   std::vector<Voice> voices;
@@ -59,7 +60,7 @@ void exportVrpn(const Options& options, std::string& remark) {
          .names = {}});
     for (const std::string& name : device.names) voices.back().names.push_back(log.addSender(name));
   }
-  for (record::SessionEvent event; reader.next(event);) {
+  for (record::RecordingEvent event; reader.next(event);) {
     const auto* tick = std::get_if<record::TickEvent>(&event);
     if (tick == nullptr) continue;
     const realtime::TickReport& report = tick->tick.report;

@@ -1,3 +1,4 @@
+#include "base/time.h"
 #include "isolation_check.h"
 
 #include <algorithm>
@@ -9,12 +10,12 @@
 
 #include "device/isolation/isolated_device.h"
 #include "realtime/servo/thread_setup.h"
-#include "server/devices.h"
+#include "server/station/devices.h"
 
 namespace hapticd::apps {
 namespace {
 
-using geometry::Nanos;
+using base::Nanos;
 using namespace std::chrono_literals;
 
 constexpr int kRounds = 5;

@@ -1,3 +1,4 @@
+#include "base/clock.h"
 #include "loop_check.h"
 
 #include <chrono>
@@ -12,7 +13,7 @@ namespace {
 
 Percentiles percentiles(const realtime::Histogram& histogram) {
   const auto copy = histogram.copy();
-  const auto us = [](geometry::Nanos t) { return static_cast<double>(t) * 1e-3; };
+  const auto us = [](base::Nanos t) { return static_cast<double>(t) * 1e-3; };
   return {us(copy.quantile(0.5)), us(copy.quantile(0.99)), us(copy.max)};
 }
 
@@ -21,7 +22,7 @@ Percentiles percentiles(const realtime::Histogram& histogram) {
 LoopCheck measureLoop(double seconds) {
   device::SimulatedDevice device;
   device.open();
-  realtime::MonotonicClock clock;
+  base::MonotonicClock clock;
   realtime::Tick tick(device, clock);
   realtime::ServoThread servo([&](const realtime::Pacing& pacing) { tick(pacing); }, clock);
 

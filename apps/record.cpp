@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "base/time.h"
 #include "commands.h"
 #include "hapticd/client.h"
 #include "record/export.h"
@@ -25,12 +26,12 @@ struct Options {
   double rate_Hz = 1000;
 };
 
-geometry::Nanos nanosOf(Time time) {
+base::Nanos nanosOf(Time time) {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(time.time_since_epoch()).count();
 }
 
 wire::Time stamp(Time time) {
-  const geometry::Nanos ns = nanosOf(time);
+  const base::Nanos ns = nanosOf(time);
   return {static_cast<std::uint32_t>(ns / 1'000'000'000),
           static_cast<std::uint32_t>(ns % 1'000'000'000 / 1000)};
 }

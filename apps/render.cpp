@@ -6,7 +6,7 @@
 
 #include "commands.h"
 #include "render_mesh.h"
-#include "render_session.h"
+#include "render_recording.h"
 
 namespace hapticd::apps {
 namespace {

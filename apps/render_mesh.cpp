@@ -1,4 +1,5 @@
 // A recorded hand through a mesh: one row of CSV for each tick, and figures for people.
+#include "base/time.h"
 #include "render_mesh.h"
 
 #include <sys/resource.h>
@@ -22,7 +23,7 @@
 namespace hapticd::apps {
 namespace {
 
-using geometry::Nanos;
+using base::Nanos;
 using geometry::Vec3;
 
 constexpr Nanos kPeriod = 1'000'000;
@@ -126,7 +127,7 @@ Felt follow(const MeshRenderOptions& options, const device::HandFile& hand, cons
                                      .geometryJump = (rendering.status & realtime::kRenderGeometryJump) != 0,
                                      .deepContact = (rendering.status & realtime::kRenderReleased) != 0});
 
-    row.add(geometry::toSeconds(t));
+    row.add(base::toSeconds(t));
     row.add(pose.position_m);
     row.add(rendering.proxy_m);
     row.add(force_N);

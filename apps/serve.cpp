@@ -7,7 +7,7 @@
 
 #include "announce.h"
 #include "commands.h"
-#include "server/devices.h"
+#include "server/station/devices.h"
 #include "server/server.h"
 #include "stop_on_signal.h"
 

@@ -5,11 +5,12 @@
 #include <stdexcept>
 #include <string>
 
+#include "base/time.h"
 #include "bench/scenes.h"
 #include "realtime/render/renderer.h"
 #include "wire/codec.h"
 #include "wire/cookie.h"
-#include "wire/endpoint.h"
+#include "wire/peer.h"
 
 namespace {
 
@@ -19,7 +20,7 @@ using namespace hapticd;
 double sum = 0;
 
 void ticks(bench::Act act, int rounds) {
-  constexpr geometry::Nanos kPeriod = 1'000'000;
+  constexpr base::Nanos kPeriod = 1'000'000;
   const auto scene = bench::sceneOf(bench::bumpyBall(10'000));
   realtime::Renderer renderer;
   device::DeviceState hand;
@@ -56,8 +57,8 @@ void encode(int rounds) {
 void decode(int rounds) {
   wire::LocalNames names;
   const wire::LocalSender sender = names.addSender("Phantom");
-  wire::Endpoint from(names);
-  wire::Endpoint to(names);
+  wire::Peer from(names);
+  wire::Peer to(names);
   const auto add = [](const wire::Event& event) {
     const auto* message = std::get_if<wire::MessageReceived>(&event);
     if (message == nullptr || message->kind != wire::kindOf<wire::SetVertex>) return;

@@ -16,7 +16,7 @@
 
 #include "bench/sockets.h"
 #include "bench/timing.h"
-#include "realtime/handoff/spsc_ring.h"
+#include "handoff/spsc_ring.h"
 #include "wire/frame_encoder.h"
 
 namespace hapticd::bench {
@@ -49,7 +49,7 @@ template <class Tick>
 int pipeline(std::uint16_t port) {
   Socket socket = Socket::connect(port);
   const int wake = eventfd(0, EFD_NONBLOCK);
-  realtime::SpscRing<std::int64_t> stamps(4096);
+  handoff::SpscRing<std::int64_t> stamps(4096);
   std::thread producer([&] {
     pace([&](std::int64_t time) {
       stamps.push(time);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <thread>
 
+#include "base/time.h"
 #include "bench/all.h"
 #include "bench/scenes.h"
 #include "bench/servo_loop.h"
@@ -14,7 +15,7 @@
 namespace hapticd::bench {
 namespace {
 
-constexpr geometry::Nanos kPeriod = 1'000'000;
+constexpr base::Nanos kPeriod = 1'000'000;
 constexpr std::int64_t kFrame_ns = 16'666'667;
 constexpr double kSpacing_mm = 9;
 constexpr double kClear_mm = 44;  // of the touched ball in the middle
@@ -51,8 +52,8 @@ class Crowd {
   }
 
   /// All objects a little to and fro, the touched one, too.
-  void move(geometry::Nanos now) {
-    const double way_mm = 0.5 * std::sin(3 * geometry::toSeconds(now));
+  void move(base::Nanos now) {
+    const double way_mm = 0.5 * std::sin(3 * base::toSeconds(now));
     builder_.apply(1, scene::SetTransform{0, placedAt({0.1 * way_mm, 0, 0})}, now, notices_);
     for (std::size_t i = 0; i < places_.size(); ++i) {
       builder_.apply(
@@ -61,7 +62,7 @@ class Crowd {
     }
     notices_.clear();
   }
-  std::shared_ptr<const scene::SceneSnapshot> publish(geometry::Nanos now) {
+  std::shared_ptr<const scene::SceneSnapshot> publish(base::Nanos now) {
     return builder_.publish(now, notices_);
   }
 
@@ -77,7 +78,7 @@ class Crowd {
 };
 
 void replay(realtime::Renderer& renderer, const scene::SceneSnapshot& scene,
-            const std::vector<HandTick>& hand, std::size_t from, std::size_t to, geometry::Nanos& now,
+            const std::vector<HandTick>& hand, std::size_t from, std::size_t to, base::Nanos& now,
             const FineClock& clock, Samples* into) {
   device::DeviceState state;
   realtime::Rendering rendering;
@@ -97,8 +98,8 @@ Row resting(int objects, double seconds) {
   const auto one = Crowd(1).publish(1'000'000'000);
   realtime::Renderer inMany;
   realtime::Renderer inOne;
-  geometry::Nanos nowMany = 2'000'000'000;
-  geometry::Nanos nowOne = nowMany;
+  base::Nanos nowMany = 2'000'000'000;
+  base::Nanos nowOne = nowMany;
   replay(inMany, *many, hand, 0, hand.size(), nowMany, clock, nullptr);
   replay(inOne, *one, hand, 0, hand.size(), nowOne, clock, nullptr);
   Samples ours;

@@ -5,6 +5,8 @@
 #include <map>
 #include <numbers>
 
+#include "base/time.h"
+
 namespace hapticd::bench {
 namespace {
 
@@ -84,7 +86,7 @@ const TriangleMesh& bumpyBall(std::size_t triangles) {
   return it->second;
 }
 
-void tell(scene::SceneBuilder& builder, std::int32_t object, const TriangleMesh& mesh, geometry::Nanos now) {
+void tell(scene::SceneBuilder& builder, std::int32_t object, const TriangleMesh& mesh, base::Nanos now) {
   std::vector<scene::Notice> notices;
   const auto say = [&](scene::SceneCommand&& command) { builder.apply(1, std::move(command), now, notices); };
   say(scene::SetObjectNumber{object + 1});

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "base/time.h"
 #include "geometry/triangle_mesh.h"
 #include "scene/builder.h"
 #include "scene/snapshot.h"
@@ -26,7 +27,7 @@ double ballSurface_mm(const Vec3& direction, double radius_mm = kBallRadius_mm);
 
 /// What a client would say to put a mesh into an object, with a surface of half the reference stiffness.
 void tell(scene::SceneBuilder& builder, std::int32_t object, const geometry::TriangleMesh& mesh,
-          geometry::Nanos now);
+          base::Nanos now);
 /// A scene of this one mesh, as the server would show it.
 std::shared_ptr<const scene::SceneSnapshot> sceneOf(const geometry::TriangleMesh& mesh);
 

@@ -3,9 +3,11 @@
 #include <chrono>
 #include <thread>
 
+#include "base/time.h"
+
 namespace hapticd::bench {
 
-bool StrokingDevice::read(geometry::Nanos now, device::DeviceState& state) noexcept {
+bool StrokingDevice::read(base::Nanos now, device::DeviceState& state) noexcept {
   state.time = now;
   state.position_m = hand_[next_].position_m;
   if (begun_.load(std::memory_order_acquire)) next_ = (next_ + 1) % hand_.size();

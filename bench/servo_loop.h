@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "base/clock.h"
 #include "bench/samples.h"
 #include "bench/scenes.h"
 #include "realtime/servo/servo_thread.h"
@@ -18,7 +19,7 @@ class StrokingDevice final : public device::Device {
   void open() override {}
   void close() noexcept override {}
   const device::DeviceProfile& profile() const noexcept override { return profile_; }
-  bool read(geometry::Nanos now, device::DeviceState& state) noexcept override;
+  bool read(base::Nanos now, device::DeviceState& state) noexcept override;
   bool write(const Vec3& /*force_N*/) noexcept override { return true; }
   void begin() noexcept { begun_.store(true, std::memory_order_release); }
 
@@ -42,7 +43,7 @@ class ServoLoop {
   ServoLoop();
   ~ServoLoop();
 
-  realtime::SnapshotSlot& snapshots() noexcept { return tick_.snapshots(); }
+  scene::SnapshotSlot& snapshots() noexcept { return tick_.snapshots(); }
   /// The hand begins to stroke; publish what it touches before.
   void begin() noexcept { device_.begin(); }
   bool realtimeGranted() const noexcept { return granted_; }
@@ -59,7 +60,7 @@ class ServoLoop {
   void turn(const realtime::Pacing& pacing) noexcept;
 
   StrokingDevice device_;
-  realtime::MonotonicClock clock_;
+  base::MonotonicClock clock_;
   realtime::Tick tick_;
   realtime::ServoThread servo_;
   bool granted_ = false;

@@ -12,7 +12,7 @@
 
 #include "bench/scenes.h"
 #include "wire/cookie.h"
-#include "wire/endpoint.h"
+#include "wire/peer.h"
 
 namespace hapticd::bench {
 namespace {
@@ -53,7 +53,7 @@ class Speaker {
  private:
   wire::LocalNames names_;
   wire::LocalSender sender_;
-  wire::Endpoint endpoint_;
+  wire::Peer endpoint_;
 };
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <optional>
 #include <thread>
 
+#include "base/clock.h"
 #include "bench/all.h"
 #include "bench/bare_index.h"
 #include "bench/scenes.h"
@@ -13,7 +14,7 @@
 namespace hapticd::bench {
 namespace {
 
-constexpr geometry::Nanos kPeriod = 1'000'000;
+constexpr base::Nanos kPeriod = 1'000'000;
 constexpr std::size_t kBlock = 250;  // ticks of one before the other has its turn
 
 // A hand that is where it is told, for a whole turn of the servo.
@@ -22,7 +23,7 @@ class ToldDevice final : public device::Device {
   void open() override {}
   void close() noexcept override {}
   const device::DeviceProfile& profile() const noexcept override { return profile_; }
-  bool read(geometry::Nanos now, device::DeviceState& state) noexcept override {
+  bool read(base::Nanos now, device::DeviceState& state) noexcept override {
     state.time = now;
     state.position_m = position_m;
     return true;
@@ -61,7 +62,7 @@ class Rendered final : public Stepper {
   const std::vector<HandTick>& hand_;
   realtime::Renderer renderer_;
   device::DeviceState state_;
-  geometry::Nanos now_ = 0;
+  base::Nanos now_ = 0;
   realtime::Rendering rendering_;
 };
 
@@ -84,9 +85,9 @@ class WholeTurn final : public Stepper {
  private:
   const std::vector<HandTick>& hand_;
   ToldDevice device_;
-  realtime::MonotonicClock clock_;
+  base::MonotonicClock clock_;
   realtime::Tick tick_;
-  geometry::Nanos now_ = 0;
+  base::Nanos now_ = 0;
 };
 
 class Bare final : public Stepper {

@@ -10,7 +10,7 @@
 #include "bench/timing.h"
 #include "hapticd/client.h"
 #include "wire/cookie.h"
-#include "wire/endpoint.h"
+#include "wire/peer.h"
 
 namespace hapticd::bench {
 namespace {

@@ -57,9 +57,9 @@ struct Seen {
   std::vector<std::byte> sent;
 };
 
-Seen converse(const LocalNames& names, const EndpointOptions& options, ByteView bytes, std::size_t piece) {
+Seen converse(const LocalNames& names, const PeerOptions& options, ByteView bytes, std::size_t piece) {
   Seen seen;
-  Endpoint endpoint(names, options);
+  Peer endpoint(names, options);
   const auto sink = [&](const Event& event) {
     seen.events += eventText(event) + '\n';
     if (std::holds_alternative<UdpDescribed>(event)) endpoint.useDatagrams();
@@ -96,7 +96,7 @@ void checkCodec(ByteView bytes) {
 void checkEndpoint(ByteView bytes) {
   LocalNames names;
   names.addSender("Phantom");
-  EndpointOptions options;
+  PeerOptions options;
   if (bytes.size() % 2 == 0) options.udp = UdpAddress{"127.0.0.1", 4000};
   const std::size_t piece = 1 + (bytes.empty() ? 0 : static_cast<std::size_t>(bytes.back()) % 61);
 

@@ -86,7 +86,7 @@ void Link::retryLater() {
 }
 
 void Link::adopt(net::Connection connection) {
-  wire::EndpointOptions options;
+  wire::PeerOptions options;
   if (!server_.tcp_only) options.udp = openDatagrams({connection.local().address, 0});
   endpoint_.emplace(names_, options);
   connection_ = std::move(connection);

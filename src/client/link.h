@@ -11,12 +11,12 @@
 #include <string>
 #include <vector>
 
-#include "client/call_back.h"
+#include "client/reverse_connection.h"
 #include "client/inbox.h"
 #include "client/server_address.h"
 #include "net/connection.h"
 #include "net/loop.h"
-#include "wire/endpoint.h"
+#include "wire/peer.h"
 
 namespace hapticd::client {
 
@@ -187,11 +187,11 @@ class Link {
   Inbox inbox_;
 
   // Of the present attempt or connection.
-  std::optional<CallBack> call_back_;
+  std::optional<ReverseConnection> call_back_;
   net::Connection connection_;
   std::optional<net::UdpSocket> udp_;
   std::optional<net::Endpoint> udp_peer_;
-  std::optional<wire::Endpoint> endpoint_;
+  std::optional<wire::Peer> endpoint_;
   net::Subscription handshake_timeout_;
   net::Subscription retry_;
   net::Subscription ping_;

@@ -6,11 +6,12 @@
 #include <optional>
 #include <string>
 
+#include "base/time.h"
 #include "geometry/types.h"
 
 namespace hapticd::device {
 
-using geometry::Nanos;
+using base::Nanos;
 using geometry::Quat;
 using geometry::Vec3;
 

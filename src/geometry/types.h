@@ -5,7 +5,6 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <cstdint>
 #include <limits>
 
 namespace hapticd::geometry {
@@ -17,12 +16,6 @@ using Mat4 = Eigen::Matrix4d;
 using Quat = Eigen::Quaterniond;
 /// Affine map: rotation, scale, shear and translation (a 3x4 matrix, 16 byte aligned).
 using Affine = Eigen::Transform<double, 3, Eigen::AffineCompact>;
-
-/// Rigid placement of a frame: position in metres, unit orientation.
-struct Pose {
-  Vec3 position = Vec3::Zero();
-  Quat orientation = Quat::Identity();
-};
 
 /// Axis-aligned box; empty until extended.
 struct Box {
@@ -41,15 +34,5 @@ struct Box {
   Vec3 centre() const noexcept { return 0.5 * (min + max); }
   Vec3 extents() const noexcept { return max - min; }
 };
-
-/// Time on the servo clock in nanoseconds: CLOCK_MONOTONIC when live, simulated time offline.
-using Nanos = std::int64_t;
-
-constexpr double toSeconds(Nanos t) noexcept {
-  return static_cast<double>(t) * 1e-9;
-}
-constexpr Nanos toNanos(double seconds) noexcept {
-  return static_cast<Nanos>(seconds * 1e9 + (seconds < 0 ? -0.5 : 0.5));
-}
 
 }  // namespace hapticd::geometry

@@ -4,7 +4,7 @@
 #include <cstring>
 
 #include "record/crc32.h"
-#include "record/session.h"
+#include "record/recording.h"
 
 namespace hapticd::record {
 namespace {
@@ -34,14 +34,14 @@ void appendBlock(Bytes& out, BlockKind kind, ByteView content) {
 
 BlockReader::BlockReader(const std::filesystem::path& file) : file_(std::fopen(file.c_str(), "rb")) {
   const std::string name = "'" + file.string() + "'";
-  if (!file_) throw SessionError("cannot read " + name + ": " + std::strerror(errno));
+  if (!file_) throw RecordingError("cannot read " + name + ": " + std::strerror(errno));
   std::error_code error;
   size_ = std::filesystem::file_size(file, error);
-  if (error) throw SessionError("cannot read " + name + ": " + error.message());
+  if (error) throw RecordingError("cannot read " + name + ": " + error.message());
   char begin[kMagicBytes] = {};
   if (std::fread(begin, 1, kMagicBytes, file_.get()) != kMagicBytes ||
       std::memcmp(begin, kMagic, kMagicBytes) != 0) {
-    throw SessionError(name +
+    throw RecordingError(name +
                        " is no session file: it does not begin with 'HAPTICS'; 'hapticd serve "
                        "--record FILE' writes one");
   }

@@ -31,7 +31,7 @@ class BlockReader {
     Bytes content;
   };
 
-  /// Throws SessionError when the file cannot be opened or is none of ours.
+  /// Throws RecordingError when the file cannot be opened or is none of ours.
   explicit BlockReader(const std::filesystem::path& file);
 
   /// The next whole block; false at the end and where nothing whole follows.

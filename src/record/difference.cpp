@@ -3,7 +3,8 @@
 #include <cmath>
 #include <sstream>
 
-#include "record/session_reader.h"
+#include "base/time.h"
+#include "record/recording_reader.h"
 
 namespace hapticd::record {
 namespace {
@@ -17,7 +18,7 @@ double depthOf(const realtime::TickReport& tick) {
 void Difference::add(const realtime::TickReport& then, const realtime::TickReport& now) {
   if (points_.empty()) begin_ = then.time;
   DifferencePoint point;
-  point.time_s = geometry::toSeconds(then.time - begin_);
+  point.time_s = base::toSeconds(then.time - begin_);
   point.force_N = then.force_N.norm();
   point.forceNow_N = now.force_N.norm();
   point.depth_m = depthOf(then);
@@ -52,11 +53,11 @@ double Difference::meanDepth_m() const noexcept {
 
 std::vector<Difference> compare(const std::filesystem::path& session, const RerenderChanges& changes,
                                 std::string& remark) {
-  SessionReader reader(session);
+  RecordingReader reader(session);
   Rerenderer again(reader.header(), changes);
   std::vector<Difference> devices;
-  for (const SessionDevice& device : reader.header().devices) devices.emplace_back(device.names.front());
-  for (SessionEvent event; reader.next(event);) {
+  for (const RecordedDevice& device : reader.header().devices) devices.emplace_back(device.names.front());
+  for (RecordingEvent event; reader.next(event);) {
     if (const realtime::TickReport* now = again.feed(event)) {
       const auto& [device, tick] = std::get<TickEvent>(event);
       devices[device].add(tick.report, *now);

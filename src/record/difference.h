@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "record/rerender.h"
-#include "record/session.h"
+#include "record/recording.h"
 
 namespace hapticd::record {
 
@@ -59,7 +59,7 @@ class Difference {
   double sumDepth_m_ = 0;
 };
 
-/// Renders a whole session again. `remark` says why the file ends early, if it does. Throws SessionError.
+/// Renders a whole session again. `remark` says why the file ends early, if it does. Throws RecordingError.
 std::vector<Difference> compare(const std::filesystem::path& session, const RerenderChanges& changes,
                                 std::string& remark);
 

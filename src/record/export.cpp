@@ -1,7 +1,7 @@
 #include "record/export.h"
 
 #include "record/pack_commands.h"
-#include "record/session_reader.h"
+#include "record/recording_reader.h"
 #include "record/text_fields.h"
 
 namespace hapticd::record {
@@ -77,7 +77,7 @@ CsvFile::CsvFile(const std::filesystem::path& file) : path_(file), out_(file) {
   fields(any, CsvHeader(header));
   out_ << header << '\n';
   if (!out_)
-    throw SessionError("cannot write '" + path_.string() +
+    throw RecordingError("cannot write '" + path_.string() +
                        "'; name a file in a directory that can be written");
 }
 
@@ -90,7 +90,7 @@ void CsvFile::add(const Sample& sample) {
 
 void CsvFile::close() {
   out_.close();
-  if (!out_) throw SessionError("writing '" + path_.string() + "' failed: disk full?");
+  if (!out_) throw RecordingError("writing '" + path_.string() + "' failed: disk full?");
 }
 
 McapFile::McapFile(const std::filesystem::path& file)
@@ -176,9 +176,9 @@ void McapFile::addTold(const SceneEvent& event, Nanos wall_ns) {
 }
 
 void exportSession(const std::filesystem::path& session, SampleFile& to, std::string& remark) {
-  SessionReader reader(session);
-  const SessionHeader& header = reader.header();
-  for (SessionEvent event; reader.next(event);) {
+  RecordingReader reader(session);
+  const RecordingHeader& header = reader.header();
+  for (RecordingEvent event; reader.next(event);) {
     if (const auto* tick = std::get_if<TickEvent>(&event)) {
       to.add(sampleOf(header.devices[tick->device].names.front(), tick->tick.report, header.wallOffset));
     } else if (const auto* told = std::get_if<SceneEvent>(&event)) {

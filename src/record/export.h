@@ -12,7 +12,7 @@
 
 namespace hapticd::record {
 
-/// One kind of file. Errors of writing are SessionError.
+/// One kind of file. Errors of writing are RecordingError.
 class SampleFile {
  public:
   SampleFile() = default;

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "record/command_fields.h"
-#include "record/session.h"
+#include "record/recording.h"
 
 namespace hapticd::record {
 
@@ -86,7 +86,7 @@ void fields(T& options, V&& v) {
   static_cast<void>(blackBox_s);
 }
 
-template <Is<SessionDevice> T, class V>
+template <Is<RecordedDevice> T, class V>
 void fields(T& device, V&& v) {
   auto& [names, driver, model, buttons, scene, sceneConfig, tick] = device;
   v("names", names);
@@ -98,7 +98,7 @@ void fields(T& device, V&& v) {
   v("tick", tick);
 }
 
-template <Is<SessionHeader> T, class V>
+template <Is<RecordingHeader> T, class V>
 void fields(T& header, V&& v) {
   auto& [program, wallOffset, config, devices] = header;
   v("program", program);

@@ -5,7 +5,7 @@
 #include <cstring>
 
 #include "record/crc32.h"
-#include "record/session.h"
+#include "record/recording.h"
 
 namespace hapticd::record {
 namespace {
@@ -61,7 +61,7 @@ ByteView magicBytes() {
 McapWriter::McapWriter(const std::filesystem::path& file)
     : path_(file), file_(std::fopen(file.c_str(), "wb")) {
   if (file_ == nullptr) {
-    throw SessionError("cannot write '" + path_.string() + "': " + std::strerror(errno) +
+    throw RecordingError("cannot write '" + path_.string() + "': " + std::strerror(errno) +
                        "; name a file in a directory that can be written");
   }
   write(Out().raw(magicBytes()).record(kHeader, Out().text("").text("hapticd " HAPTICD_VERSION)).bytes);
@@ -74,7 +74,7 @@ McapWriter::~McapWriter() {
 void McapWriter::write(const Bytes& bytes) {
   written_ += bytes.size();
   if (std::fwrite(bytes.data(), 1, bytes.size(), file_) == bytes.size()) return;
-  throw SessionError("writing '" + path_.string() + "' failed: " + std::strerror(errno) +
+  throw RecordingError("writing '" + path_.string() + "' failed: " + std::strerror(errno) +
                      "; make room on the disk");
 }
 
@@ -204,7 +204,7 @@ void McapWriter::close() {
   write(Out().number(sum).raw(magicBytes()).bytes);
   const int failed = std::fclose(file_);
   file_ = nullptr;
-  if (failed != 0) throw SessionError("writing '" + path_.string() + "' failed: " + std::strerror(errno));
+  if (failed != 0) throw RecordingError("writing '" + path_.string() + "' failed: " + std::strerror(errno));
 }
 
 }  // namespace hapticd::record

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/time.h"
 #include "record/archive.h"
 
 namespace hapticd::record {
@@ -16,9 +17,9 @@ namespace hapticd::record {
 /// Writes one file. A file that was not closed is readable by what can do without an index.
 class McapWriter {
  public:
-  using Nanos = geometry::Nanos;
+  using Nanos = base::Nanos;
 
-  /// Throws SessionError when the file cannot be written.
+  /// Throws RecordingError when the file cannot be written.
   explicit McapWriter(const std::filesystem::path& file);
   ~McapWriter();
   McapWriter(const McapWriter&) = delete;
@@ -29,7 +30,7 @@ class McapWriter {
   std::uint16_t addChannel(std::uint16_t schema, std::string_view topic);
   /// `time` since the epoch, in nanoseconds.
   void add(std::uint16_t channel, Nanos time, std::string_view json);
-  /// Writes what is left and the index. Throws SessionError when the file could not be written whole.
+  /// Writes what is left and the index. Throws RecordingError when the file could not be written whole.
   void close();
 
  private:

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "record/archive.h"
-#include "record/session.h"
+#include "record/recording.h"
 
 namespace hapticd::record {
 

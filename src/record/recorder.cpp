@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstring>
 
+#include "base/world.h"
 #include "record/block_file.h"
 #include "record/fields.h"
 #include "record/pack_commands.h"
@@ -18,26 +19,20 @@ using namespace std::chrono_literals;
 
 constexpr auto kPause = 20ms;  // a crash costs no more than this
 
-Nanos steadyNow() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
-
 }  // namespace
 
 Recorder::Recorder(std::filesystem::path file, OnTrouble onTrouble, const RecorderOptions& options)
     : path_(std::move(file)), onTrouble_(std::move(onTrouble)), options_(options) {
   file_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
   if (file_ < 0) {
-    throw SessionError("cannot record to '" + path_.string() + "': " + std::strerror(errno) +
+    throw RecordingError("cannot record to '" + path_.string() + "': " + std::strerror(errno) +
                        (errno == EEXIST ? "; name another, or let the name hold the time: "
                                           "session-%Y%m%d-%H%M%S.haptics"
                                         : "; name a file in a directory that can be written"));
   }
 }
 
-std::uint32_t Recorder::addDevice(SessionDevice device) {
+std::uint32_t Recorder::addDevice(RecordedDevice device) {
   header_.push_back(std::move(device));
   devices_.push_back(std::make_unique<Device>(options_.ticks));
   return static_cast<std::uint32_t>(devices_.size() - 1);
@@ -45,7 +40,7 @@ std::uint32_t Recorder::addDevice(SessionDevice device) {
 
 std::function<Nanos()> Recorder::stopwatch(std::uint32_t device) {
   return [readings = &devices_[device]->readings] {
-    readings->push_back(steadyNow());
+    readings->push_back(base::now());
     return readings->back();
   };
 }
@@ -54,7 +49,7 @@ void Recorder::start(Nanos wallOffset, std::string config) {
   Bytes content;
   Packer pack(content);
   pack.put(kFormatVersion);
-  pack.put(SessionHeader{"hapticd " HAPTICD_VERSION, wallOffset, std::move(config), header_});
+  pack.put(RecordingHeader{"hapticd " HAPTICD_VERSION, wallOffset, std::move(config), header_});
   out_.assign(magic().begin(), magic().end());
   appendBlock(out_, BlockKind::header, content);
   write();
@@ -124,9 +119,9 @@ void Recorder::drain() {
 
 void Recorder::tellLosses() {
   const std::uint64_t losses = counts_.lostTicks + counts_.lostSceneEvents;
-  if (losses == toldLosses_ || steadyNow() < tellAfter_ || file_ < 0) return;
+  if (losses == toldLosses_ || base::now() < tellAfter_ || file_ < 0) return;
   toldLosses_ = losses;
-  tellAfter_ = steadyNow() + 1'000'000'000;
+  tellAfter_ = base::now() + 1'000'000'000;
   onTrouble_("recording to '" + path_.string() + "': " + std::to_string(counts_.lostTicks) + " ticks and " +
              std::to_string(counts_.lostSceneEvents) +
              " scene events lost so far, the disk does not keep up; record to a faster one");

@@ -12,7 +12,7 @@
 
 #include "record/archive.h"
 #include "record/block_file.h"
-#include "record/session.h"
+#include "record/recording.h"
 #include "record/tick_codec.h"
 
 namespace hapticd::record {
@@ -36,7 +36,7 @@ class Recorder {
   /// something was lost: what, why, and what helps.
   using OnTrouble = std::function<void(const std::string&)>;
 
-  /// Creates the file. Throws SessionError when it cannot, and when there is one already.
+  /// Creates the file. Throws RecordingError when it cannot, and when there is one already.
   Recorder(std::filesystem::path file, OnTrouble onTrouble, const RecorderOptions& options = {});
   ~Recorder() { finish(); }
   Recorder(const Recorder&) = delete;
@@ -47,7 +47,7 @@ class Recorder {
   // Before start():
 
   /// Adds a device; its number counts from 0.
-  std::uint32_t addDevice(SessionDevice device);
+  std::uint32_t addDevice(RecordedDevice device);
   /// For Tick::recordTo(); lives as long as the recorder.
   realtime::RecordRing& ring(std::uint32_t device) { return devices_[device]->ring; }
   /// For SceneConfig::stopwatch of a device: remembers what it said for the next published() of it. Its scene
@@ -93,7 +93,7 @@ class Recorder {
   const OnTrouble onTrouble_;
   const RecorderOptions options_;
   int file_ = -1;
-  std::vector<SessionDevice> header_;
+  std::vector<RecordedDevice> header_;
   std::vector<std::unique_ptr<Device>> devices_;
   RecorderCounts counts_;
   Bytes out_;  // whole blocks on their way to the file

@@ -1,5 +1,6 @@
 #include "record/rerender.h"
 
+#include "base/clock.h"
 #include "record/archive.h"
 #include "record/changed_surfaces.h"
 #include "record/fields.h"
@@ -12,7 +13,7 @@ using realtime::GuardControl;
 using realtime::TickReport;
 
 // It is where the record says, and takes forces as it did then.
-class RecordedDevice final : public device::Device {
+class RecordedHand final : public device::Device {
  public:
   void use(const realtime::TickRecord& tick) noexcept { tick_ = &tick; }
 
@@ -75,7 +76,7 @@ bool sameOutcome(const TickReport& a, const TickReport& b) {
 
 // One device, with its view of the scene.
 struct Rerenderer::Seat {
-  Seat(const SessionDevice& recorded, const RerenderChanges& changes)
+  Seat(const RecordedDevice& recorded, const RerenderChanges& changes)
       : scene(recorded.scene),
         control{false, recorded.tick.guard.armed, 0, 0},
         surfaces(changes, changed(recorded.sceneConfig, changes)),
@@ -124,20 +125,20 @@ struct Rerenderer::Seat {
   std::deque<std::pair<std::uint64_t, std::shared_ptr<const scene::SceneSnapshot>>> unseen;
   std::uint64_t shown = 0;
 
-  realtime::SimulatedClock clock;
-  RecordedDevice device;
+  base::SimulatedClock clock;
+  RecordedHand device;
   realtime::Tick tick;
 };
 
-Rerenderer::Rerenderer(const SessionHeader& header, const RerenderChanges& changes) {
-  for (const SessionDevice& device : header.devices) {
+Rerenderer::Rerenderer(const RecordingHeader& header, const RerenderChanges& changes) {
+  for (const RecordedDevice& device : header.devices) {
     seats_.push_back(std::make_unique<Seat>(device, changes));
   }
 }
 
 Rerenderer::~Rerenderer() = default;
 
-const TickReport* Rerenderer::feed(const SessionEvent& event) {
+const TickReport* Rerenderer::feed(const RecordingEvent& event) {
   if (const auto* told = std::get_if<SceneEvent>(&event)) on(*told);
   if (const auto* published = std::get_if<PublishEvent>(&event)) on(*published);
   if (const auto* tick = std::get_if<TickEvent>(&event)) return on(*tick);

@@ -11,7 +11,7 @@
 #include <optional>
 #include <vector>
 
-#include "record/session.h"
+#include "record/recording.h"
 
 namespace hapticd::record {
 
@@ -36,11 +36,11 @@ bool sameOutcome(const realtime::TickReport& a, const realtime::TickReport& b);
 /// Feed it the events of a session, in order.
 class Rerenderer {
  public:
-  explicit Rerenderer(const SessionHeader& header, const RerenderChanges& changes = {});
+  explicit Rerenderer(const RecordingHeader& header, const RerenderChanges& changes = {});
   ~Rerenderer();
 
   /// For a tick, what it is now; valid until the next call. Null for everything else.
-  const realtime::TickReport* feed(const SessionEvent& event);
+  const realtime::TickReport* feed(const RecordingEvent& event);
 
  private:
   struct Seat;

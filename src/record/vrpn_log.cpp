@@ -3,7 +3,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "record/session.h"
+#include "record/recording.h"
 #include "wire/cookie.h"
 #include "wire/frame_encoder.h"
 #include "wire/system.h"
@@ -12,7 +12,7 @@ namespace hapticd::record {
 
 VrpnLog::VrpnLog(const std::filesystem::path& file) : path_(file), file_(std::fopen(file.c_str(), "wb")) {
   if (file_ == nullptr) {
-    throw SessionError("cannot write '" + path_.string() + "': " + std::strerror(errno) +
+    throw RecordingError("cannot write '" + path_.string() + "': " + std::strerror(errno) +
                        "; name a file in a directory that can be written");
   }
   names_.addSender("VRPN Control");  // the stock library's sender 0
@@ -65,14 +65,14 @@ void VrpnLog::entry(wire::Time time, std::int32_t sender, std::int32_t type, wir
 
 void VrpnLog::write(wire::ByteView bytes) {
   if (std::fwrite(bytes.data(), 1, bytes.size(), file_) == bytes.size()) return;
-  throw SessionError("writing '" + path_.string() + "' failed: " + std::strerror(errno) +
+  throw RecordingError("writing '" + path_.string() + "' failed: " + std::strerror(errno) +
                      "; make room on the disk");
 }
 
 void VrpnLog::close() {
   const int failed = std::fclose(file_);
   file_ = nullptr;
-  if (failed != 0) throw SessionError("writing '" + path_.string() + "' failed: " + std::strerror(errno));
+  if (failed != 0) throw RecordingError("writing '" + path_.string() + "' failed: " + std::strerror(errno));
 }
 
 }  // namespace hapticd::record

@@ -16,7 +16,7 @@ namespace hapticd::record {
 /// Writes one file; names of senders and types are described before they are first used.
 class VrpnLog {
  public:
-  /// Throws SessionError when the file cannot be written.
+  /// Throws RecordingError when the file cannot be written.
   explicit VrpnLog(const std::filesystem::path& file);
   ~VrpnLog();
   VrpnLog(const VrpnLog&) = delete;
@@ -24,7 +24,7 @@ class VrpnLog {
 
   wire::LocalSender addSender(std::string_view name);
   void add(wire::Time time, wire::LocalSender sender, const wire::Message& message);
-  /// Throws SessionError when the file could not be written whole.
+  /// Throws RecordingError when the file could not be written whole.
   void close();
 
  private:

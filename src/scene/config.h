@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 
+#include "base/time.h"
 #include "geometry/types.h"
 
 namespace hapticd::scene {
@@ -50,7 +51,7 @@ struct SceneConfig {
   SceneLimits limits;
 
   /// Measures how long building takes, so that it takes at most a quarter of the thread; empty: steady clock.
-  std::function<geometry::Nanos()> stopwatch;
+  std::function<base::Nanos()> stopwatch;
 };
 
 }  // namespace hapticd::scene

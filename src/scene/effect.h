@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "base/time.h"
 #include "geometry/types.h"
 
 namespace hapticd::scene {
@@ -15,7 +16,7 @@ struct Effect {
   EffectType type = EffectType::constant;
   double gain = 0;                                    ///< N/m (spring, friction) or N·s/m (viscous)
   double magnitude_N = 0;                             ///< force, or its limit
-  geometry::Nanos duration = 0;                       ///< 0: until stopped
+  base::Nanos duration = 0;                       ///< 0: until stopped
   double angularFrequency_rad_per_s = 0;              ///< vibrations
   geometry::Vec3 position = geometry::Vec3::Zero();   ///< world units
   geometry::Vec3 direction = geometry::Vec3::Zero();  ///< world frame, not normalised

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "base/time.h"
 #include "geometry/types.h"
 
 namespace hapticd::scene {
@@ -20,7 +21,7 @@ struct ForceField {
 struct Buzz {
   geometry::Vec3 force_N = geometry::Vec3::Zero();  ///< world frame
   double angularFrequency_rad_per_s = 0;
-  geometry::Nanos duration = 0;
+  base::Nanos duration = 0;
   std::uint32_t start = 0;
   bool releasing = false;  ///< its owner is gone: ramp out in 250 ms
 };

@@ -1,4 +1,5 @@
 // Commands on forces that belong to no object. What becomes of them is in free_forces.cpp.
+#include "base/time.h"
 #include "scene/free_forces.h"
 
 #include <algorithm>
@@ -64,7 +65,7 @@ Effect effectFrom(const EffectKind& kind, const DefineEffect& c, const SceneConf
         kind.type == EffectType::viscous ? bound.maxDamping_Ns_per_m(0) : bound.maxStiffness_N_per_m();
     e.gain = lowered(1000 * atLeastZero(c.gain, "gain", c, call), max, "gain", c, call);
   }
-  if (kind.duration) e.duration = geometry::toNanos(std::clamp(c.duration_ms, 0.0, kLongest_ms) / 1000);
+  if (kind.duration) e.duration = base::toNanos(std::clamp(c.duration_ms, 0.0, kLongest_ms) / 1000);
   if (kind.frequency) {
     const bool inRadians = kind.type == EffectType::contactVibration &&
                            config.contactVibrationUnit == VibrationUnit::radPerSecond;
@@ -315,7 +316,7 @@ void FreeForces::apply(const StartCustomEffect& c, const Call& call) {
   Buzz buzz;
   buzz.force_N = p[0] * Vec3(p[3], p[4], p[5]);
   buzz.angularFrequency_rad_per_s = kTau * p[1];
-  buzz.duration = geometry::toNanos(std::min(p[2], kLongest_ms / 1000));
+  buzz.duration = base::toNanos(std::min(p[2], kLongest_ms / 1000));
   buzz.start = ++starts_;
   buzz_ = {call.client, buzz, call.now + buzz.duration + kAfterEnd};
   changed_ = true;

@@ -4,12 +4,13 @@
 #include <memory>
 #include <vector>
 
+#include "base/time.h"
 #include "geometry/triangle_mesh.h"
 #include "scene/spatial_index.h"
 
 namespace hapticd::scene {
 
-using geometry::Nanos;
+using base::Nanos;
 using geometry::Triangle;
 using geometry::Vec3f;
 

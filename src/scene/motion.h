@@ -1,12 +1,13 @@
 // Where an object is at a moment: fixed, or on its way between two poses that a client sent.
 #pragma once
 
+#include "base/time.h"
 #include "geometry/types.h"
 
 namespace hapticd::scene {
 
 using geometry::Affine;
-using geometry::Nanos;
+using base::Nanos;
 
 /// T_world_object as a function of servo time. Immutable; evaluation is noexcept and allocation-free.
 class Motion {

@@ -8,12 +8,13 @@
 #include <string_view>
 #include <vector>
 
+#include "base/time.h"
 #include "geometry/types.h"
 #include "scene/notice.h"
 
 namespace hapticd::scene {
 
-using geometry::Nanos;
+using base::Nanos;
 
 /// Lets the first few notices of a kind through, then one in a second that counts the others.
 class NoticeBoard {

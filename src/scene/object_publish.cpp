@@ -1,6 +1,7 @@
 // From edited objects to the list and the index that a snapshot shows.
 #include <algorithm>
 
+#include "base/time.h"
 #include "scene/object_table.h"
 
 namespace hapticd::scene {
@@ -21,7 +22,7 @@ Box withRoom(const Object& object, const Box& swept) {
   const Vec3 centre = object.geometry->index.bounds().centre();
   const Vec3 way = motion.destination() * centre - motion.origin() * centre;
   const double ahead =
-      std::clamp(kRoom_s / geometry::toSeconds(std::max<Nanos>(object.travel, 1)), 1.0, 64.0);
+      std::clamp(kRoom_s / base::toSeconds(std::max<Nanos>(object.travel, 1)), 1.0, 64.0);
   Box box = swept;
   box.extend(Box{swept.min + ahead * way, swept.max + ahead * way});
   const Vec3 turning = 0.05 * swept.extents();

@@ -6,14 +6,10 @@
 #include <chrono>
 #include <cmath>
 
+#include "base/world.h"
+
 namespace hapticd::scene {
 namespace {
-
-Nanos steadyNow() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
 
 }  // namespace
 
@@ -35,7 +31,7 @@ Nanos PoseStream::next(Nanos now) {
 ObjectTable::ObjectTable(const SceneConfig& config)
     : config_(config),
       bound_(config),
-      stopwatch_(config.stopwatch ? config.stopwatch : steadyNow),
+      stopwatch_(config.stopwatch ? config.stopwatch : base::now),
       checks_(stopwatch_) {
   create(0, Object::kScene);
 }

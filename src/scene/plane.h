@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "base/time.h"
 #include "geometry/types.h"
 #include "scene/surface.h"
 
@@ -16,7 +17,7 @@ struct Plane {
   geometry::Vec3 normal = geometry::Vec3::UnitY();  ///< unit
   double offset = 0;                                ///< world units
   Surface surface;
-  geometry::Nanos recovery = 0;  ///< time over which a new placement comes in under the hand
+  base::Nanos recovery = 0;  ///< time over which a new placement comes in under the hand
   double adhesionNormal_N = 0;
   double adhesionLateral_N = 0;
   double textureAmplitude = 0;   ///< world units; height A cos(2 π r / wavelength) around the first contact

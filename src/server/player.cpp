@@ -3,14 +3,15 @@
 #include <chrono>
 #include <optional>
 
-#include "server/clock.h"
+#include "base/world.h"
+#include "server/session/wall_clock.h"
 
 namespace hapticd::server {
 namespace {
 
-using geometry::Nanos;
+using base::Nanos;
 using record::SceneEvent;
-using record::SessionEvent;
+using record::RecordingEvent;
 using record::TickEvent;
 
 constexpr Nanos kAhead = 200'000'000;
@@ -18,7 +19,7 @@ constexpr Nanos kAhead = 200'000'000;
 constexpr scene::ClientId kRecordedClients = 1U << 30U;
 
 // When it was; nothing for what is not played.
-std::optional<Nanos> timeOf(const SessionEvent& event) {
+std::optional<Nanos> timeOf(const RecordingEvent& event) {
   if (const auto* tick = std::get_if<TickEvent>(&event)) return tick->tick.report.time;
   if (const auto* told = std::get_if<SceneEvent>(&event)) return told->time;
   return std::nullopt;
@@ -27,7 +28,7 @@ std::optional<Nanos> timeOf(const SessionEvent& event) {
 }  // namespace
 
 Player::Player(ReplayOptions options)
-    : options_(std::move(options)), header_(record::SessionReader(options_.file).header()) {}
+    : options_(std::move(options)), header_(record::RecordingReader(options_.file).header()) {}
 
 ServerConfig Player::config() const {
   ServerConfig config = parseConfig(header_.config, options_.file.string());
@@ -76,7 +77,7 @@ std::string Player::playOnce() {
   began_ = false;
   ahead_.clear();
   try {
-    record::SessionReader reader(options_.file);
+    record::RecordingReader reader(options_.file);
     for (bool more = true; more || !ahead_.empty();) {
       more = more && readAhead(reader);
       if (ahead_.empty()) continue;
@@ -86,15 +87,15 @@ std::string Player::playOnce() {
       ahead_.erase(next);
     }
     return reader.remark();
-  } catch (const record::SessionError& error) {
+  } catch (const record::RecordingError& error) {
     return error.what();
   }
 }
 
 // False at the end of the file.
-bool Player::readAhead(record::SessionReader& reader) {
+bool Player::readAhead(record::RecordingReader& reader) {
   while (ahead_.empty() || ahead_.rbegin()->first - ahead_.begin()->first < kAhead) {
-    SessionEvent event;
+    RecordingEvent event;
     if (!reader.next(event)) return false;
     if (const auto time = timeOf(event)) ahead_.emplace(*time, std::move(event));
   }
@@ -109,14 +110,14 @@ Nanos Player::live(Nanos recorded) const {
 bool Player::waitFor(Nanos recorded) {
   if (!std::exchange(began_, true)) {
     firstRecorded_ = recorded;
-    firstLive_ = monotonicNow();
+    firstLive_ = base::now();
   }
   std::unique_lock lock(mutex_);
-  const auto wait = std::chrono::nanoseconds(std::max<Nanos>(live(recorded) - monotonicNow(), 0));
+  const auto wait = std::chrono::nanoseconds(std::max<Nanos>(live(recorded) - base::now(), 0));
   return !wake_.wait_for(lock, wait, [this] { return stopping_; });
 }
 
-void Player::play(SessionEvent& event) {
+void Player::play(RecordingEvent& event) {
   if (auto* tick = std::get_if<TickEvent>(&event)) {
     tick->tick.report.time = live(tick->tick.report.time);
     tick->tick.report.device.time = tick->tick.report.time;

@@ -10,8 +10,9 @@
 #include <mutex>
 #include <thread>
 
-#include "record/session_reader.h"
-#include "server/config.h"
+#include "base/time.h"
+#include "record/recording_reader.h"
+#include "server/config/config.h"
 
 namespace hapticd::server {
 
@@ -36,13 +37,13 @@ class Player {
     std::function<void(const std::string&)> over;
   };
 
-  /// Reads the header. Throws record::SessionError.
+  /// Reads the header. Throws record::RecordingError.
   explicit Player(ReplayOptions options);
   ~Player() { stop(); }
   Player(const Player&) = delete;
   Player& operator=(const Player&) = delete;
 
-  const record::SessionHeader& header() const noexcept { return header_; }
+  const record::RecordingHeader& header() const noexcept { return header_; }
   /// The configuration that was recorded, for a server that replays it. Throws ConfigError when this version
   /// cannot read it.
   ServerConfig config() const;
@@ -54,20 +55,20 @@ class Player {
  private:
   void run();
   std::string playOnce();
-  bool readAhead(record::SessionReader& reader);
-  bool waitFor(geometry::Nanos recorded);
-  geometry::Nanos live(geometry::Nanos recorded) const;
-  void play(record::SessionEvent& event);
+  bool readAhead(record::RecordingReader& reader);
+  bool waitFor(base::Nanos recorded);
+  base::Nanos live(base::Nanos recorded) const;
+  void play(record::RecordingEvent& event);
 
   const ReplayOptions options_;
-  record::SessionHeader header_;
+  record::RecordingHeader header_;
   Callbacks callbacks_;
 
   // The thread's.
-  std::multimap<geometry::Nanos, record::SessionEvent> ahead_;
+  std::multimap<base::Nanos, record::RecordingEvent> ahead_;
   bool began_ = false;
-  geometry::Nanos firstRecorded_ = 0;
-  geometry::Nanos firstLive_ = 0;
+  base::Nanos firstRecorded_ = 0;
+  base::Nanos firstLive_ = 0;
 
   std::mutex mutex_;
   std::condition_variable wake_;

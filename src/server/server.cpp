@@ -6,6 +6,7 @@
 #include <chrono>
 #include <ctime>
 
+#include "base/world.h"
 #include "realtime/servo/thread_setup.h"
 #include "wire/udp_request.h"
 
@@ -13,7 +14,7 @@ namespace hapticd::server {
 namespace {
 
 using namespace std::chrono_literals;
-using geometry::Nanos;
+using base::Nanos;
 
 constexpr Nanos kHandshakeLimit = 30'000'000'000;
 
@@ -44,7 +45,7 @@ std::unique_ptr<record::Recorder> openRecording(const std::string& name) {
 }  // namespace
 
 // A connection on its way to a client that asked by datagram to be called back.
-struct Server::CallBack {
+struct Server::ReverseConnection {
   net::Endpoint client;
   net::Connection connection;
 };
@@ -106,7 +107,7 @@ void Server::openDevice(const DeviceConfig& device) {
   for (const std::string& name : device.names) senders.push_back(names_.addSender(name));
   SceneHost& scene = sceneFor(device);
   if (player_) {
-    const record::SessionDevice& recorded = player_->header().devices[stations_.size()];
+    const record::RecordedDevice& recorded = player_->header().devices[stations_.size()];
     stations_.push_back(std::make_unique<Station>(device, senders, scene, recorded));
   } else {
     stations_.push_back(
@@ -228,7 +229,7 @@ void Server::onWebClient(net::Connection connection) {
 
 ServerStatus Server::status() const {
   ServerStatus status;
-  status.uptime_s = geometry::toSeconds(monotonicNow() - started_);
+  status.uptime_s = base::toSeconds(base::now() - started_);
   if (recorder_) status.recording = recorder_->path().string();
   status.scenes.resize(scenes_.size());
   for (const auto& station : stations_) {
@@ -268,7 +269,7 @@ void Server::addSession(net::Connection connection, std::unique_ptr<net::UdpSock
   spdlog::info("client {} connects from {}", id, session->description());
   Session& added = *session;
   sessions_.emplace(id, std::move(session));
-  handshakes_.emplace(id, monotonicNow());
+  handshakes_.emplace(id, base::now());
   added.start();
 }
 
@@ -294,20 +295,20 @@ void Server::onUdpRequest(std::span<const std::byte> datagram, const net::Endpoi
                 ": refused; allow it with callback_hosts");
     return;
   }
-  callBack(client);
+  connectBack(client);
 }
 
-void Server::callBack(const net::Endpoint& client) {
+void Server::connectBack(const net::Endpoint& client) {
   // Clients repeat their request until they are called back.
-  for (const auto& pending : callBacks_) {
+  for (const auto& pending : reverseConnections_) {
     if (pending->client == client) return;
   }
-  auto owned = std::make_unique<CallBack>();
-  CallBack* pending = owned.get();
+  auto owned = std::make_unique<ReverseConnection>();
+  ReverseConnection* pending = owned.get();
   pending->client = client;
   pending->connection = net::Connection::connect(loop_, client, 2s, connectionOptions());
   const auto forget = [this, pending] {
-    std::erase_if(callBacks_, [pending](const auto& entry) { return entry.get() == pending; });
+    std::erase_if(reverseConnections_, [pending](const auto& entry) { return entry.get() == pending; });
   };
   pending->connection.start(
       {.onConnected =
@@ -330,7 +331,7 @@ void Server::callBack(const net::Endpoint& client) {
              noise_.warn("calling back " + client.text() + ": " + reason);
              forget();
            }});
-  callBacks_.push_back(std::move(owned));
+  reverseConnections_.push_back(std::move(owned));
 }
 
 void Server::onClosed(Session& session, const std::string& reason) {
@@ -343,7 +344,7 @@ void Server::onClosed(Session& session, const std::string& reason) {
 }
 
 void Server::closeStaleHandshakes() {
-  const Nanos now = monotonicNow();
+  const Nanos now = base::now();
   for (auto entry = handshakes_.begin(); entry != handshakes_.end();) {
     const auto session = sessions_.find(entry->first);
     if (session == sessions_.end() || session->second->connected()) {
@@ -357,7 +358,7 @@ void Server::closeStaleHandshakes() {
 
 // Who asked to be missed and is silent now. The session object goes with its onClosed.
 void Server::closeLost() {
-  for (const scene::ClientId client : heartbeats_.lost(monotonicNow())) {
+  for (const scene::ClientId client : heartbeats_.lost(base::now())) {
     const auto session = sessions_.find(client);
     if (session != sessions_.end()) session->second->abort("no heartbeat for 500 ms, as it had promised");
   }
@@ -385,16 +386,16 @@ void Server::onMessage(Session& session, const wire::MessageReceived& message) {
   }
   std::string error;
   switch (station->scene().take(session.id(), message, error)) {
-    case Inbox::Outcome::taken:
+    case CommandDecoder::Outcome::taken:
       if (message.kind != wire::kindOf<wire::ResetScene>) return;
       for (const auto& other : stations_) {
         if (&other->scene() == &station->scene()) other->onReset();
       }
       return;
-    case Inbox::Outcome::malformed:
+    case CommandDecoder::Outcome::malformed:
       session.refuse("malformed message: " + error);
       return;
-    case Inbox::Outcome::notACommand:
+    case CommandDecoder::Outcome::notACommand:
       station->onMessage(session, message);
       return;
   }
@@ -418,7 +419,7 @@ void Server::onHeartbeat(Session& session, const wire::MessageReceived& message)
   if (!heartbeat) {
     session.refuse("malformed message: " + heartbeat.error());
   } else if (heartbeat->watch != 0) {
-    heartbeats_.beat(session.id(), monotonicNow());
+    heartbeats_.beat(session.id(), base::now());
   } else {
     heartbeats_.forget(session.id());
   }

@@ -9,18 +9,19 @@
 #include <optional>
 #include <vector>
 
+#include "base/world.h"
 #include "net/loop.h"
 #include "net/tcp_listener.h"
 #include "net/udp_socket.h"
 #include "record/recorder.h"
-#include "server/clock.h"
-#include "server/config.h"
-#include "server/heartbeats.h"
-#include "server/noise_log.h"
+#include "server/session/wall_clock.h"
+#include "server/config/config.h"
+#include "server/session/heartbeats.h"
+#include "server/session/noise_log.h"
 #include "server/player.h"
-#include "server/scene_host.h"
-#include "server/session.h"
-#include "server/station.h"
+#include "server/scene/scene_host.h"
+#include "server/session/session.h"
+#include "server/station/station.h"
 #include "server/web/web_server.h"
 
 namespace hapticd::server {
@@ -48,7 +49,7 @@ class Server final : public SessionOwner, public WebOwner {
   const std::vector<std::unique_ptr<Station>>& stations() const noexcept { return stations_; }
 
  private:
-  struct CallBack;
+  struct ReverseConnection;
 
   void onSubscribed(Session& session, wire::LocalSender name) override;
   void onMessage(Session& session, const wire::MessageReceived& message) override;
@@ -62,7 +63,7 @@ class Server final : public SessionOwner, public WebOwner {
 
   void addSession(net::Connection connection, std::unique_ptr<net::UdpSocket> udp, SessionMode mode);
   void onUdpRequest(std::span<const std::byte> datagram, const net::Endpoint& from);
-  void callBack(const net::Endpoint& client);
+  void connectBack(const net::Endpoint& client);
   void openDevice(const DeviceConfig& device);
   void openWeb();
   SceneHost& sceneFor(const DeviceConfig& device);
@@ -91,16 +92,16 @@ class Server final : public SessionOwner, public WebOwner {
   std::vector<std::unique_ptr<SceneHost>> scenes_;
   std::vector<std::unique_ptr<Station>> stations_;
   std::map<scene::ClientId, std::unique_ptr<Session>> sessions_;
-  std::map<scene::ClientId, geometry::Nanos> handshakes_;  ///< when the unfinished ones began
+  std::map<scene::ClientId, base::Nanos> handshakes_;  ///< when the unfinished ones began
   Heartbeats heartbeats_;
   scene::ClientId refused_ = 0;  ///< whose commands of this read were refused; 0: nobody's
-  std::vector<std::unique_ptr<CallBack>> callBacks_;
+  std::vector<std::unique_ptr<ReverseConnection>> reverseConnections_;
   std::vector<net::Subscription> subscriptions_;
   std::unique_ptr<net::TcpListener> listener_;
   std::unique_ptr<net::UdpSocket> requests_;
   std::unique_ptr<WebServer> web_;
   scene::ClientId nextClient_ = 1;
-  const geometry::Nanos started_ = monotonicNow();
+  const base::Nanos started_ = base::now();
 };
 
 }  // namespace hapticd::server

@@ -1,5 +1,5 @@
 // Messages into frames. Our ids are the same on every connection and receivers ignore sequence numbers, so a
-// server encodes a batch of reports once and hands the same bytes to every endpoint (Endpoint::sendFrames).
+// server encodes a batch of reports once and hands the same bytes to every endpoint (Peer::sendFrames).
 #pragma once
 
 #include <stdexcept>

@@ -1,3 +1,4 @@
+#include "base/time.h"
 #include "bench/scenes.h"
 
 #include <gtest/gtest.h>
@@ -39,7 +40,7 @@ TEST(Hand, touchesInEachActAndNotOnItsWays) {
   device::DeviceState state;
   realtime::Rendering out;
   std::map<Act, std::pair<int, int>> touched;
-  geometry::Nanos now = 0;
+  base::Nanos now = 0;
   Vec3 before = Vec3::Zero();
   double farthest_m = 0;
   for (const HandTick& tick : handOf(1)) {

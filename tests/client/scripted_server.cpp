@@ -63,7 +63,7 @@ void ScriptedServer::serve(net::Connection connection, bool with_datagrams) {
   Session* session = &sessions_.back();
   session->connection = std::move(connection);
   if (options_.greeting_bytes.empty()) {
-    wire::EndpointOptions endpoint_options;
+    wire::PeerOptions endpoint_options;
     if (with_datagrams) {
       session->udp = std::make_unique<net::UdpSocket>(loop_, net::Endpoint{net::kLoopbackAddress, 0});
       session->udp->start({.onDatagram =

@@ -18,7 +18,7 @@
 #include "net/loop.h"
 #include "net/tcp_listener.h"
 #include "net/udp_socket.h"
-#include "wire/endpoint.h"
+#include "wire/peer.h"
 
 namespace hapticd::test {
 
@@ -84,7 +84,7 @@ class ScriptedServer {
  private:
   struct Session {
     net::Connection connection;
-    std::optional<wire::Endpoint> endpoint;
+    std::optional<wire::Peer> endpoint;
     std::unique_ptr<net::UdpSocket> udp;
     std::optional<net::Endpoint> udp_peer;
   };

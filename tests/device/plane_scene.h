@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "base/clock.h"
 #include "device/simulated/hand_file.h"
 #include "device/simulated/simulated_device.h"
 #include "realtime/render/meshes.h"
@@ -54,7 +55,7 @@ inline std::vector<Vec3> referenceForces(const std::vector<Vec3>& at) {
   SimulatedDevice device(options);
   device.setPath(HandFile::parse(rows, "places"));
   device.open();
-  realtime::SimulatedClock clock;
+  base::SimulatedClock clock;
   realtime::Tick tick(device, clock, raw());
   tick.snapshots().publish(snapshot());
   std::vector<Vec3> forces;

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "record/session_file.h"
+#include "record/recording_file.h"
 #include "record/text_fields.h"
 #include "record/vrpn_log.h"
 #include "wire/system.h"
@@ -14,7 +14,7 @@
 namespace hapticd::record {
 namespace {
 
-using test::SessionFile;
+using test::RecordingFile;
 
 std::string textOf(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -22,7 +22,7 @@ std::string textOf(const std::filesystem::path& file) {
 }
 
 TEST(Csv, HasAColumnForEachNumberAndQuotesNames) {
-  SessionFile file;
+  RecordingFile file;
   CsvFile csv(file.path());
   Sample sample;
   sample.device = "Left, \"my\" hand";
@@ -41,7 +41,7 @@ TEST(Csv, HasAColumnForEachNumberAndQuotesNames) {
 }
 
 TEST(Csv, AGripperFillsItsColumn) {
-  SessionFile file;
+  RecordingFile file;
   CsvFile csv(file.path());
   Sample sample;
   sample.gripper_rad = 0.25;
@@ -52,9 +52,9 @@ TEST(Csv, AGripperFillsItsColumn) {
 }
 
 TEST(Csv, AFileThatCannotBeSaysSo) {
-  EXPECT_THROW(CsvFile("/nowhere/x.csv"), SessionError);
-  EXPECT_THROW(McapFile("/nowhere/x.mcap"), SessionError);
-  EXPECT_THROW(VrpnLog("/nowhere/x.vrpn"), SessionError);
+  EXPECT_THROW(CsvFile("/nowhere/x.csv"), RecordingError);
+  EXPECT_THROW(McapFile("/nowhere/x.mcap"), RecordingError);
+  EXPECT_THROW(VrpnLog("/nowhere/x.vrpn"), RecordingError);
 }
 
 TEST(Json, HasNoWordsForWhatIsNoNumberAndTellsLongListsByTheirLength) {
@@ -82,7 +82,7 @@ struct Entry {
 };
 
 TEST(VrpnLog, DescribesNamesBeforeTheyAreUsed) {
-  SessionFile file;
+  RecordingFile file;
   VrpnLog log(file.path());
   const wire::LocalSender phantom = log.addSender("Phantom");
   log.add({10, 20}, phantom, wire::Dop{0.25});

@@ -11,13 +11,13 @@
 #include "record/fields.h"
 #include "record/pack_commands.h"
 #include "record/recorder.h"
-#include "record/session_file.h"
-#include "record/session_reader.h"
+#include "record/recording_file.h"
+#include "record/recording_reader.h"
 
 namespace hapticd::record {
 namespace {
 
-using test::SessionFile;
+using test::RecordingFile;
 
 // Fills every field of anything with any bits, by the same lists that the file is written by; the structured
 // bindings there see to it that no field is missing.
@@ -181,11 +181,11 @@ RC_GTEST_PROP(Ticks, ComeBackAsTheyWere, (std::uint64_t seed)) {
 
 RC_GTEST_PROP(Header, ComesBackAsItWas, (std::uint64_t seed)) {
   Filler filler(seed);
-  SessionHeader header;
+  RecordingHeader header;
   filler.fill(header);
   const Bytes bytes = packed(header);
   Unpacker in(bytes);
-  const auto back = in.next<SessionHeader>();
+  const auto back = in.next<RecordingHeader>();
   RC_ASSERT(in.ok() && in.rest().empty());
   RC_ASSERT(packed(back) == bytes);
 }
@@ -212,7 +212,7 @@ class SmallSession : public testing::Test {
  protected:
   void SetUp() override {
     Recorder recorder(file_.path(), [](const std::string& text) { ADD_FAILURE() << text; });
-    SessionDevice device;
+    RecordedDevice device;
     device.names = {"Phantom"};
     recorder.addDevice(device);
     recorder.start(77, "config");
@@ -235,25 +235,25 @@ class SmallSession : public testing::Test {
     std::ofstream(file_.path(), std::ios::binary) << bytes;
     std::size_t events = 0;
     try {
-      SessionReader reader(file_.path());
-      for (SessionEvent event; reader.next(event);) ++events;
+      RecordingReader reader(file_.path());
+      for (RecordingEvent event; reader.next(event);) ++events;
       return {events, reader.remark()};
-    } catch (const SessionError& error) {
+    } catch (const RecordingError& error) {
       return {events, error.what()};
     }
   }
 
-  SessionFile file_;
+  RecordingFile file_;
   std::string bytes_;
   Nanos first_ = 0;
 };
 
 TEST_F(SmallSession, HoldsWhatWasRecorded) {
-  SessionReader reader(file_.path());
+  RecordingReader reader(file_.path());
   EXPECT_EQ(reader.header().config, "config");
   EXPECT_EQ(reader.header().wallOffset, 77);
   EXPECT_EQ(reader.header().program.rfind("hapticd ", 0), 0U);
-  SessionEvent event;
+  RecordingEvent event;
   ASSERT_TRUE(reader.next(event));
   EXPECT_EQ(std::get<scene::AddObject>(*std::get<SceneEvent>(event).command).object, 4);
   ASSERT_TRUE(reader.next(event));
@@ -310,7 +310,7 @@ TEST_F(SmallSession, AnotherVersionAndOtherFilesAreRefused) {
   EXPECT_NE(read(newer).second.find("version 3 of the format, this program reads versions 1 to 2"),
             std::string::npos);
   EXPECT_NE(read("time,x\n1,2\n").second.find("is no session file"), std::string::npos);
-  EXPECT_THROW(SessionReader("/nowhere/x.haptics"), SessionError);
+  EXPECT_THROW(RecordingReader("/nowhere/x.haptics"), RecordingError);
 }
 
 // Version 2 differs by what stands in ticks with a gripper, and these have none.

@@ -12,13 +12,13 @@
 #include <mutex>
 #include <thread>
 
-#include "record/session_file.h"
-#include "record/session_reader.h"
+#include "record/recording_file.h"
+#include "record/recording_reader.h"
 
 namespace hapticd::record {
 namespace {
 
-using test::SessionFile;
+using test::RecordingFile;
 
 class Said {
  public:
@@ -46,8 +46,8 @@ class Said {
   std::string all_;
 };
 
-SessionDevice phantom() {
-  SessionDevice device;
+RecordedDevice phantom() {
+  RecordedDevice device;
   device.names = {"Phantom"};
   return device;
 }
@@ -55,7 +55,7 @@ SessionDevice phantom() {
 std::string openError(const std::filesystem::path& path) {
   try {
     Recorder recorder(path, [](const std::string&) {});
-  } catch (const SessionError& error) {
+  } catch (const RecordingError& error) {
     return error.what();
   }
   return "";
@@ -64,7 +64,7 @@ std::string openError(const std::filesystem::path& path) {
 TEST(Recorder, WhatCannotBeWrittenIsRefusedAtOnce) {
   EXPECT_NE(openError("/nowhere/x.haptics").find("cannot record to '/nowhere/x.haptics': No such file"),
             std::string::npos);
-  SessionFile file;
+  RecordingFile file;
   std::ofstream(file.path()) << "precious";
   EXPECT_NE(openError(file.path()).find("File exists; name another"), std::string::npos);
   std::ifstream in(file.path());
@@ -74,7 +74,7 @@ TEST(Recorder, WhatCannotBeWrittenIsRefusedAtOnce) {
 }
 
 TEST(Recorder, TicksOfAFullRingAreCountedInTheLogAndInTheFile) {
-  SessionFile file;
+  RecordingFile file;
   Said said;
   Recorder recorder(file.path(), said.listener(), {.ticks = 8, .sceneBytes = 1U << 20U});
   recorder.addDevice(phantom());
@@ -89,8 +89,8 @@ TEST(Recorder, TicksOfAFullRingAreCountedInTheLogAndInTheFile) {
   EXPECT_EQ(recorder.counts().ticks, 8U);
   EXPECT_EQ(recorder.counts().lostTicks, 12U);
   std::uint64_t lost = 0;
-  SessionReader reader(file.path());
-  for (SessionEvent event; reader.next(event);) {
+  RecordingReader reader(file.path());
+  for (RecordingEvent event; reader.next(event);) {
     const auto* gap = std::get_if<LostEvent>(&event);
     if (gap != nullptr && gap->what == LostEvent::What::ticks) lost += gap->count;
   }
@@ -98,7 +98,7 @@ TEST(Recorder, TicksOfAFullRingAreCountedInTheLogAndInTheFile) {
 }
 
 TEST(Recorder, SceneEventsBeyondTheMemoryAreCounted) {
-  SessionFile file;
+  RecordingFile file;
   Said said;
   Recorder recorder(file.path(), said.listener(), {.ticks = 8, .sceneBytes = 1000});
   recorder.addDevice(phantom());
@@ -113,7 +113,7 @@ TEST(Recorder, SceneEventsBeyondTheMemoryAreCounted) {
 
 // /dev/full takes nothing: the disk that is full from the start.
 TEST(Recorder, AFullDiskEndsTheRecordingAndNothingElse) {
-  SessionFile link;
+  RecordingFile link;
   std::filesystem::create_symlink("/dev/full", link.path());
   Said said;
   EXPECT_NE(openError(link.path()), "") << "a link is no new file";
@@ -146,9 +146,9 @@ TEST(Recorder, AFullDiskEndsTheRecordingAndNothingElse) {
   std::signal(SIGXFSZ, handler);
   EXPECT_EQ(recorder.counts().bytes, std::filesystem::file_size(link.path()));
 
-  SessionReader reader(link.path());
+  RecordingReader reader(link.path());
   std::uint64_t ticks = 0;
-  for (SessionEvent event; reader.next(event);) ticks += std::holds_alternative<TickEvent>(event) ? 1 : 0;
+  for (RecordingEvent event; reader.next(event);) ticks += std::holds_alternative<TickEvent>(event) ? 1 : 0;
   EXPECT_NE(reader.remark(), "");
   EXPECT_NE(reader.remark().find("cut"), std::string::npos) << reader.remark();
 }

@@ -3,7 +3,7 @@
 
 #include <map>
 
-#include "record/recorded_session.h"
+#include "record/recorded_file.h"
 
 namespace hapticd::test {
 namespace {
@@ -11,7 +11,7 @@ namespace {
 class Replay : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    file_ = std::make_unique<SessionFile>();
+    file_ = std::make_unique<RecordingFile>();
     const Hand hand = Hand::stroking();
     RunningServer server(recordingConfig(hand, file_->path()));
     played_ = playSession(server);
@@ -19,7 +19,7 @@ class Replay : public testing::Test {
   static void TearDownTestSuite() { file_.reset(); }
   void SetUp() override {
     ASSERT_TRUE(played_);
-    for (const record::SessionEvent& event : eventsOf(file_->path())) {
+    for (const record::RecordingEvent& event : eventsOf(file_->path())) {
       const auto* tick = std::get_if<record::TickEvent>(&event);
       if (tick != nullptr && tick->device == 0) ticks_[tick->tick.report.tick] = tick->tick.report;
     }
@@ -35,14 +35,14 @@ class Replay : public testing::Test {
     thread_.join();
   }
 
-  static std::unique_ptr<SessionFile> file_;
+  static std::unique_ptr<RecordingFile> file_;
   static bool played_;
   std::map<std::uint64_t, realtime::TickReport> ticks_;
   std::unique_ptr<server::Server> server_;
   std::thread thread_;
 };
 
-std::unique_ptr<SessionFile> Replay::file_;
+std::unique_ptr<RecordingFile> Replay::file_;
 bool Replay::played_ = false;
 
 TEST_F(Replay, ClientsHearTheRecordedTicks) {

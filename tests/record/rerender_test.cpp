@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "record/pack_commands.h"
-#include "record/recorded_session.h"
+#include "record/recorded_file.h"
 #include "record/rerender.h"
 
 namespace hapticd::test {
@@ -26,10 +26,10 @@ struct Compared {
 };
 
 std::vector<Compared> rerender(const std::filesystem::path& file, const RerenderChanges& changes = {}) {
-  record::SessionReader reader(file);
+  record::RecordingReader reader(file);
   record::Rerenderer again(reader.header(), changes);
   std::vector<Compared> devices(reader.header().devices.size());
-  for (record::SessionEvent event; reader.next(event);) {
+  for (record::RecordingEvent event; reader.next(event);) {
     const realtime::TickReport* now = again.feed(event);
     if (now == nullptr) continue;
     const auto& [device, tick] = std::get<record::TickEvent>(event);
@@ -57,7 +57,7 @@ std::vector<Compared> rerender(const std::filesystem::path& file, const Rerender
 class Rerender : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    file_ = std::make_unique<SessionFile>();
+    file_ = std::make_unique<RecordingFile>();
     const Hand hand = Hand::stroking();
     RunningServer server(recordingConfig(hand, file_->path()));
     played_ = playSession(server);
@@ -65,11 +65,11 @@ class Rerender : public testing::Test {
   static void TearDownTestSuite() { file_.reset(); }
   void SetUp() override { ASSERT_TRUE(played_) << "the session did not go as scripted"; }
 
-  static std::unique_ptr<SessionFile> file_;
+  static std::unique_ptr<RecordingFile> file_;
   static bool played_;
 };
 
-std::unique_ptr<SessionFile> Rerender::file_;
+std::unique_ptr<RecordingFile> Rerender::file_;
 bool Rerender::played_ = false;
 
 TEST_F(Rerender, GivesTheRecordedForcesBitForBit) {
@@ -108,7 +108,7 @@ TEST_F(Rerender, ChangesAreFelt) {
 TEST_F(Rerender, EveryThingThatHappenedIsInTheFile) {
   std::map<std::string, int> commands;
   int gone = 0;
-  for (const record::SessionEvent& event : eventsOf(file_->path())) {
+  for (const record::RecordingEvent& event : eventsOf(file_->path())) {
     const auto* told = std::get_if<record::SceneEvent>(&event);
     if (told == nullptr) continue;
     if (told->command) {

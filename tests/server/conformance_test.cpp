@@ -40,7 +40,7 @@ class Recording {
   explicit Recording(const std::string& file) : bytes_(wire::recorded(file)) {
     const wire::ByteView stream(bytes_);
     wire::LocalNames names;
-    wire::Endpoint endpoint(names, {wire::UdpAddress{"127.0.0.1", 4000}, {}});
+    wire::Peer endpoint(names, {wire::UdpAddress{"127.0.0.1", 4000}, {}});
     endpoint.feed({}, stream.first(wire::kCookieBytes), [](const wire::Event&) {});
     for (std::size_t at = wire::kCookieBytes; at < stream.size();) {
       wire::FrameView frame;

@@ -13,7 +13,7 @@
 #include "net/loop.h"
 #include "net/tcp_listener.h"
 #include "net/udp_socket.h"
-#include "wire/endpoint.h"
+#include "wire/peer.h"
 #include "wire/udp_request.h"
 
 namespace hapticd::test {
@@ -31,10 +31,10 @@ class ScriptedPeer {
                         Mode mode = Mode::tcp, Speech speech = Speech::proper)
       : speech_(speech), sender_(names_.addSender("VRPN Control")), device_(names_.addSender(device)) {
     if (mode == Mode::tcp) {
-      endpoint_ = std::make_unique<wire::Endpoint>(names_);
+      endpoint_ = std::make_unique<wire::Peer>(names_);
       take(net::Connection::connect(loop_, server, 2s));
     } else {
-      callBack(server);
+      connectBack(server);
     }
   }
 
@@ -157,7 +157,7 @@ class ScriptedPeer {
   std::uint16_t udpPort() const { return udp_->local().port; }
   const net::Endpoint& udpPeer() const { return udpPeer_; }
   net::Connection& connection() { return connection_; }
-  wire::Endpoint& endpoint() { return *endpoint_; }
+  wire::Peer& endpoint() { return *endpoint_; }
   wire::LocalSender device() const { return device_; }
 
   struct Received {
@@ -187,7 +187,7 @@ class ScriptedPeer {
     flush();
   }
 
-  void callBack(const net::Endpoint& server) {
+  void connectBack(const net::Endpoint& server) {
     listener_ = std::make_unique<net::TcpListener>(
         loop_, net::Endpoint{net::kLoopbackAddress, 0},
         [this](net::Connection connection) { take(std::move(connection)); });
@@ -198,9 +198,9 @@ class ScriptedPeer {
                        endpoint_->feedDatagram(bytes, [this](const wire::Event& e) { onEvent(e, true); });
                      },
                  .onRefused = {}});
-    wire::EndpointOptions options;
+    wire::PeerOptions options;
     options.udp = wire::UdpAddress{"127.0.0.1", udp_->local().port};
-    endpoint_ = std::make_unique<wire::Endpoint>(names_, options);
+    endpoint_ = std::make_unique<wire::Peer>(names_, options);
     const std::string request = wire::formatUdpRequest({"127.0.0.1", listener_->local().port});
     udp_->sendTo(std::as_bytes(std::span(request)), server);
   }
@@ -225,7 +225,7 @@ class ScriptedPeer {
   wire::LocalNames names_;
   wire::LocalSender sender_;
   wire::LocalSender device_;
-  std::unique_ptr<wire::Endpoint> endpoint_;
+  std::unique_ptr<wire::Peer> endpoint_;
   std::unique_ptr<net::TcpListener> listener_;
   std::unique_ptr<net::UdpSocket> udp_;
   net::Endpoint udpPeer_;

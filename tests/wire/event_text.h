@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "wire/endpoint.h"
+#include "wire/peer.h"
 #include "wire/text.h"
 
 namespace hapticd::wire {

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "wire/cookie.h"
-#include "wire/endpoint.h"
+#include "wire/peer.h"
 #include "wire/event_text.h"
 #include "wire/recording.h"
 #include "wire/udp_request.h"
@@ -30,7 +30,7 @@ class Listener {
     }
   }
   const std::map<std::string, int>& counts() const { return counts_; }
-  const Endpoint& endpoint() const { return endpoint_; }
+  const Peer& endpoint() const { return endpoint_; }
 
  private:
   void note(const Event& event) {
@@ -85,7 +85,7 @@ class Listener {
   }
 
   LocalNames names_;
-  Endpoint endpoint_;
+  Peer endpoint_;
   std::map<std::string, int> counts_;
   std::map<std::int32_t, MessageKind> types_;
 };
@@ -130,7 +130,7 @@ TEST(Golden, CutAnywhereAStreamIsNeverAnError) {
   const Bytes stream = recorded("tcp.c2s.tcp.bin");
   const auto see = [&](std::initializer_list<ByteView> pieces) {
     LocalNames names;
-    Endpoint endpoint(names);
+    Peer endpoint(names);
     std::size_t hash = 0;
     const auto sink = [&](const Event& event) {
       hash = hash * 1000003 + std::hash<std::string>{}(eventText(event));
@@ -154,8 +154,8 @@ TEST(Golden, CutAnywhereAStreamIsNeverAnError) {
 TEST(Golden, ByteByByteAStreamIsTheSame) {
   const Bytes stream = recorded("tcp.s2c.tcp.bin");
   LocalNames names;
-  Endpoint whole(names);
-  Endpoint drops(names);
+  Peer whole(names);
+  Peer drops(names);
   std::vector<std::string> expected;
   std::vector<std::string> seen;
   whole.feed(Time{}, stream, [&](const Event& event) { expected.push_back(eventText(event)); });

@@ -11,6 +11,8 @@
 #include <system_error>
 #include <vector>
 
+#include "base/world.h"
+
 namespace hapticd::device {
 namespace {
 
@@ -22,10 +24,6 @@ constexpr Nanos kStateLife = 100'000'000;
 constexpr double kVelocityFilter_s = 0.005;
 constexpr int kFailuresToFault = 5;
 constexpr double kHeight_m = 0.02;  // of the workspace; the hand does not move there
-
-Nanos steadyNow() noexcept {
-  return std::chrono::steady_clock::now().time_since_epoch() / 1ns;
-}
 
 // A set of bits as EVIOCGBIT fills it.
 template <int kBits>
@@ -157,7 +155,7 @@ void EvdevDevice::close() noexcept {
 
 void EvdevDevice::run() noexcept {
   while (!stopping_) {
-    exchange(steadyNow());
+    exchange(base::now());
     if (error_ != 0) {
       std::this_thread::sleep_for(10ms);  // a device that is gone is always readable
     } else {
@@ -186,7 +184,7 @@ void EvdevDevice::exchange(Nanos now) noexcept {
   }
 
   if (before_ != 0 && now > before_) {
-    for (Axis& axis : axes_) axis.differentiate(geometry::toSeconds(now - before_));
+    for (Axis& axis : axes_) axis.differentiate(base::toSeconds(now - before_));
   }
   before_ = now;
   Sample sample;

@@ -18,7 +18,7 @@
 #include "device/evdev/event_device.h"
 #include "device/evdev/force_effects.h"
 #include "device/evdev/wheel_profile.h"
-#include "realtime/handoff/latest_value.h"
+#include "handoff/latest_value.h"
 
 namespace hapticd::device {
 
@@ -95,8 +95,8 @@ class EvdevDevice final : public Device {
   std::atomic<bool> stopping_{false};
   std::atomic<int> error_{0};  // errno while the device does not answer
 
-  realtime::LatestValue<Command> command_;
-  realtime::LatestValue<Sample> sample_;
+  handoff::LatestValue<Command> command_;
+  handoff::LatestValue<Sample> sample_;
   std::uint64_t commands_ = 0;  // the servo's
 
   // The exchanging thread's.

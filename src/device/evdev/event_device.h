@@ -7,11 +7,12 @@
 #include <string>
 #include <vector>
 
+#include "base/time.h"
 #include "geometry/types.h"
 
 namespace hapticd::device {
 
-using geometry::Nanos;
+using base::Nanos;
 
 /// For the thread that exchanges with the device; none of the calls throws.
 class EventDevice {

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "base/world.h"
 #include "device/haply/haply_messages.h"
 #include "device/haply/service_connection.h"
 #include "device/profiles.h"
@@ -24,10 +25,6 @@ constexpr int kReconnect_ms = 200;
 constexpr int kIdle_ms = 3;  // between messages that nobody asked for, which keep the state fresh
 constexpr Nanos kCommandLife = 20'000'000;
 constexpr Nanos kStateLife = 20'000'000;
-
-Nanos steadyNow() noexcept {
-  return std::chrono::steady_clock::now().time_since_epoch() / 1ns;
-}
 
 }  // namespace
 
@@ -103,14 +100,14 @@ void HaplyDevice::take(std::string_view text) {
   }
   deviceId_ = message->deviceId;
   state_ = message->state;
-  state_.time = steadyNow();
+  state_.time = base::now();
   hold_ = state_.hold;
   sample_.write({state_, true});
 }
 
 Vec3 HaplyDevice::newestForce() noexcept {
   const Command& command = command_.read();
-  const Nanos now = steadyNow();
+  const Nanos now = base::now();
   if (command.number != lastCommand_) {
     lastCommand_ = command.number;
     commandTime_ = now;

@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "device/device.h"
-#include "realtime/handoff/latest_value.h"
+#include "handoff/latest_value.h"
 
 namespace hapticd::device {
 
@@ -66,8 +66,8 @@ class HaplyDevice final : public Device {
   mutable std::mutex wordsMutex_;
   std::string words_;  // why there is no connection
 
-  realtime::LatestValue<Command> command_;
-  realtime::LatestValue<Sample> sample_;
+  handoff::LatestValue<Command> command_;
+  handoff::LatestValue<Sample> sample_;
 
   // The servo's.
   std::uint64_t commands_ = 0;

@@ -13,6 +13,7 @@
 #include <thread>
 #include <utility>
 
+#include "base/world.h"
 #include "device/isolation/shared_block.h"
 
 namespace hapticd::device {
@@ -26,7 +27,7 @@ class Exchange {
   Exchange(Device& device, SharedBlock& block, const DeviceHostOptions& options)
       : device_(device),
         block_(block),
-        period_(geometry::toNanos(1 / options.rate_Hz)),
+        period_(base::toNanos(1 / options.rate_Hz)),
         beforeFirstTick_(options.beforeFirstTick) {}
   ~Exchange() { stop(); }
 
@@ -55,7 +56,7 @@ class Exchange {
     Posted posted;
     posted.valid = device_.read(now, posted.state);
     posted.lost = device_.lost();
-    posted.time = monotonicNow();
+    posted.time = base::now();
     block_.state.write(posted);
     countUp(block_.posts);
 
@@ -70,10 +71,10 @@ class Exchange {
 
   void run() noexcept {
     if (beforeFirstTick_) beforeFirstTick_();
-    for (Nanos due = monotonicNow() + period_; !leave_; due += period_) {
+    for (Nanos due = base::now() + period_; !leave_; due += period_) {
       const timespec until{due / 1'000'000'000, due % 1'000'000'000};
       clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
-      const Nanos now = monotonicNow();
+      const Nanos now = base::now();
       if (now > due + period_) due = now;  // no ticks are made up for
       tick(now);
     }

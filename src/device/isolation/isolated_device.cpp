@@ -15,6 +15,8 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "base/world.h"
+
 extern char** environ;
 
 namespace hapticd::device {
@@ -148,7 +150,7 @@ void IsolatedDevice::start(std::function<void(Nanos)> onTick) {
   ask("start", kAnswer_ms);
   onTick_ = std::move(onTick);
   stopping_ = false;
-  lastPost_ = monotonicNow();
+  lastPost_ = base::now();
   thread_ = std::thread([this] { run(); });
 }
 
@@ -168,7 +170,7 @@ void IsolatedDevice::run() noexcept {
   while (!stopping_) {
     waitForChange((*memory_)->posts, seen, kSilentTick);
     const std::uint32_t posts = (*memory_)->posts.load(std::memory_order_acquire);
-    const Nanos now = monotonicNow();
+    const Nanos now = base::now();
     if (posts != seen) lastPost_ = now;
     silent_ = now - lastPost_ > kSilence;
     if (posts == seen && !silent_) continue;

@@ -13,6 +13,8 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "base/world.h"
+
 namespace hapticd::device::isolation {
 
 SharedProfile SharedProfile::of(const DeviceProfile& profile) {
@@ -85,10 +87,6 @@ void waitForChange(const std::atomic<std::uint32_t>& word, std::uint32_t seen, N
 void countUp(std::atomic<std::uint32_t>& word) noexcept {
   word.fetch_add(1, std::memory_order_release);
   syscall(SYS_futex, &word, FUTEX_WAKE, INT_MAX, nullptr, nullptr, 0);
-}
-
-Nanos monotonicNow() noexcept {
-  return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
 }
 
 }  // namespace hapticd::device::isolation

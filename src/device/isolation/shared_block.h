@@ -8,8 +8,9 @@
 #include <atomic>
 #include <cstdint>
 
+#include "base/world.h"
 #include "device/device.h"
-#include "realtime/handoff/latest_value.h"
+#include "handoff/latest_value.h"
 
 namespace hapticd::device::isolation {
 
@@ -56,8 +57,8 @@ struct SharedBlock {
   std::uint64_t size = sizeof(SharedBlock);
   SharedProfile profile;  ///< before the first answer on the socket
   std::atomic<std::uint32_t> posts{0};
-  realtime::LatestValue<Posted> state;
-  realtime::LatestValue<Command> command;
+  handoff::LatestValue<Posted> state;
+  handoff::LatestValue<Command> command;
 };
 static_assert(std::atomic<std::uint32_t>::is_always_lock_free &&
               std::atomic<std::uint8_t>::is_always_lock_free);
@@ -90,8 +91,5 @@ class SharedMemory {
 void waitForChange(const std::atomic<std::uint32_t>& word, std::uint32_t seen, Nanos most) noexcept;
 /// Counts up and wakes whoever waits: one call into the system that does not block.
 void countUp(std::atomic<std::uint32_t>& word) noexcept;
-
-/// CLOCK_MONOTONIC, the same in both processes.
-Nanos monotonicNow() noexcept;
 
 }  // namespace hapticd::device::isolation

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "base/world.h"
 #include "device/profiles.h"
 
 namespace hapticd::device {
@@ -22,10 +23,6 @@ constexpr int kSettlingFrames = 100;
 constexpr std::uint64_t kCalibrationCheck = 100;  // frames, while calibrated
 constexpr double kSilence_s = 0.5;                // that no hand holds an arm still to the last bit
 constexpr double kImpulseShare = 0.9;             // stays clear of the driver's own trip
-
-Nanos steadyNow() noexcept {
-  return std::chrono::steady_clock::now().time_since_epoch() / 1ns;
-}
 
 bool contains(const std::string& text, const char* word) {
   return text.find(word) != std::string::npos;
@@ -152,7 +149,7 @@ bool OpenHapticsDevice::write(const Vec3& force_N) noexcept {
 void OpenHapticsDevice::onFrame() noexcept {
   const hd::Api& api = session_->api();
   const bool quiet = quiet_ != Quiet::no;
-  now_ = steadyNow();
+  now_ = base::now();
   api.makeCurrentDevice(handle_);
   api.beginFrame(handle_);
   hd::Enum calibration = hd::kCalibrationOk;

@@ -1,5 +1,7 @@
 #include "device/replay/replay_device.h"
 
+#include "base/time.h"
+
 namespace hapticd::device {
 
 void ReplayDevice::open() {
@@ -26,7 +28,7 @@ bool ReplayDevice::read(Nanos now, DeviceState& state) noexcept {
   state.buttons = pose.buttons;
   if (started_ && now > last_) {
     const Eigen::AngleAxisd turn(pose.orientation * orientation_.conjugate());
-    state.angularVelocity_rad_per_s = turn.angle() / geometry::toSeconds(now - last_) * turn.axis();
+    state.angularVelocity_rad_per_s = turn.angle() / base::toSeconds(now - last_) * turn.axis();
   }
   started_ = true;
   last_ = now;

@@ -7,6 +7,8 @@
 #include <fstream>
 #include <iterator>
 
+#include "base/time.h"
+
 namespace hapticd::device {
 namespace {
 
@@ -76,7 +78,7 @@ std::size_t readNumbers(std::string_view text, const Line& line, std::array<doub
 
 Nanos readTime(double time_s, Nanos before, const Line& line) {
   if (time_s < 0 || time_s > kMostSeconds) line.fail("time " + std::to_string(time_s) + " s is out of range");
-  const Nanos time = geometry::toNanos(time_s);
+  const Nanos time = base::toNanos(time_s);
   if (time <= before) line.fail("time " + std::to_string(time_s) + " s is not after the row before");
   return time;
 }
@@ -150,7 +152,7 @@ HandPose HandFile::at(Nanos sinceStart) const noexcept {
   const Row& b = *next;
   const double s = static_cast<double>(sinceStart - a.time) / static_cast<double>(b.time - a.time);
   const Vec3 way = b.position_m - a.position_m;
-  return {a.position_m + s * way, way / geometry::toSeconds(b.time - a.time),
+  return {a.position_m + s * way, way / base::toSeconds(b.time - a.time),
           a.orientation.slerp(s, b.orientation), a.buttons};
 }
 

@@ -3,11 +3,12 @@
 
 #include <cstdint>
 
+#include "base/time.h"
 #include "geometry/types.h"
 
 namespace hapticd::device {
 
-using geometry::Nanos;
+using base::Nanos;
 using geometry::Quat;
 using geometry::Vec3;
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "base/time.h"
+
 namespace hapticd::device {
 namespace {
 
@@ -45,7 +47,7 @@ bool SimulatedDevice::read(Nanos now, DeviceState& state) noexcept {
   }
   for (Nanos done = 0; done < elapsed;) {
     const Nanos step = std::min(kSubStep, elapsed - done);
-    move(geometry::toSeconds(step));
+    move(base::toSeconds(step));
     intend(step);
     done += step;
   }
@@ -80,7 +82,7 @@ HandPose SimulatedDevice::wanted() const noexcept {
 
 void SimulatedDevice::intend(Nanos step) noexcept {
   if (external_.active || (reaching_ && !options_.openLoop)) {
-    reach(wanted(), geometry::toSeconds(step));
+    reach(wanted(), base::toSeconds(step));
   } else {
     onPath_ += step;
     intended_ = wanted();
@@ -126,7 +128,7 @@ void SimulatedDevice::fill(DeviceState& state, Nanos elapsed) noexcept {
   state.angularVelocity_rad_per_s.setZero();
   if (elapsed > 0) {
     const Eigen::AngleAxisd turn(intended_.orientation * orientation_.conjugate());
-    state.angularVelocity_rad_per_s = turn.angle() / geometry::toSeconds(elapsed) * turn.axis();
+    state.angularVelocity_rad_per_s = turn.angle() / base::toSeconds(elapsed) * turn.axis();
   }
   orientation_ = intended_.orientation;
 }

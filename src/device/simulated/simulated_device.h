@@ -9,8 +9,8 @@
 #include "device/device.h"
 #include "device/profiles.h"
 #include "device/simulated/hand_path.h"
-#include "realtime/handoff/exchange_slot.h"
-#include "realtime/handoff/latest_value.h"
+#include "handoff/exchange_slot.h"
+#include "handoff/latest_value.h"
 
 namespace hapticd::device {
 
@@ -65,8 +65,8 @@ class SimulatedDevice final : public Device {
   void fill(DeviceState& state, Nanos elapsed) noexcept;
 
   const SimulatedOptions options_;
-  realtime::ExchangeSlot<Script> scripts_;
-  realtime::LatestValue<Target> target_;
+  handoff::ExchangeSlot<Script> scripts_;
+  handoff::LatestValue<Target> target_;
 
   // The servo's from here on.
   bool started_ = false;

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "base/time.h"
+
 namespace hapticd::device {
 namespace {
 
@@ -29,7 +31,7 @@ WaypointPath::WaypointPath(std::vector<Waypoint> points, Repeat repeat)
       throw std::invalid_argument(where + "a value is not a finite number, or the orientation is zero");
     }
     point.orientation.normalize();
-    times_.push_back(geometry::toNanos(point.time_s));
+    times_.push_back(base::toNanos(point.time_s));
     if (i > 0 && times_[i] <= times_[i - 1]) {
       throw std::invalid_argument(where + "time " + std::to_string(point.time_s) +
                                   " s is not after the time before it");
@@ -41,8 +43,8 @@ WaypointPath::WaypointPath(std::vector<Waypoint> points, Repeat repeat)
 void WaypointPath::findVelocities() {
   velocities_.assign(points_.size(), Vec3::Zero());
   for (std::size_t i = 1; i + 1 < points_.size(); ++i) {
-    const double before_s = geometry::toSeconds(times_[i] - times_[i - 1]);
-    const double after_s = geometry::toSeconds(times_[i + 1] - times_[i]);
+    const double before_s = base::toSeconds(times_[i] - times_[i - 1]);
+    const double after_s = base::toSeconds(times_[i + 1] - times_[i]);
     const Vec3 before = (points_[i].position_m - points_[i - 1].position_m) / before_s;
     const Vec3 after = (points_[i + 1].position_m - points_[i].position_m) / after_s;
     for (int axis = 0; axis < 3; ++axis) {
@@ -63,8 +65,8 @@ HandPose WaypointPath::at(Nanos sinceStart) const noexcept {
   const auto i = static_cast<std::size_t>(next - times_.begin()) - 1;
   const Waypoint& a = points_[i];
   const Waypoint& b = points_[i + 1];
-  const double h = geometry::toSeconds(times_[i + 1] - times_[i]);
-  const double s = geometry::toSeconds(t - times_[i]) / h;
+  const double h = base::toSeconds(times_[i + 1] - times_[i]);
+  const double s = base::toSeconds(t - times_[i]) / h;
   const double eased = s * s * (3 - 2 * s);
   const Vec3 way = b.position_m - a.position_m;
   const Vec3 va = h * velocities_[i];

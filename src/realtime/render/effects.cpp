@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/time.h"
 #include "realtime/render/release.h"
 
 namespace hapticd::realtime {
@@ -45,7 +46,7 @@ void Effects::forgetUnseen() noexcept {
 
 Vec3 Effects::forceOf(const Effect& effect, Running& r, const Affine& T_device_world,
                       const device::DeviceState& hand, const Rendering& contact, Nanos now) noexcept {
-  const double phase = effect.angularFrequency_rad_per_s * geometry::toSeconds(now - r.begin);
+  const double phase = effect.angularFrequency_rad_per_s * base::toSeconds(now - r.begin);
   switch (effect.type) {
     case EffectType::constant:
       return effect.magnitude_N * turned(T_device_world, effect.direction).stableNormalized();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/time.h"
 #include "realtime/render/release.h"
 
 namespace hapticd::realtime {
@@ -47,7 +48,7 @@ Vec3 Fields::buzz(const scene::Buzz& b, Nanos now) noexcept {
   if (b.releasing && buzzReleaseBegin_ < 0) buzzReleaseBegin_ = now;
   if (now - buzzBegin_ >= b.duration) return Vec3::Zero();
   const double share = buzzReleaseBegin_ < 0 ? 1 : shareLeft(buzzReleaseBegin_, now);
-  return share * std::sin(b.angularFrequency_rad_per_s * geometry::toSeconds(now - buzzBegin_)) * b.force_N;
+  return share * std::sin(b.angularFrequency_rad_per_s * base::toSeconds(now - buzzBegin_)) * b.force_N;
 }
 
 Vec3 Fields::force(const scene::SceneSnapshot& scene, const Vec3& hip, Nanos now) noexcept {

@@ -3,11 +3,12 @@
 
 #include <array>
 
+#include "base/time.h"
 #include "scene/snapshot.h"
 
 namespace hapticd::realtime {
 
-using geometry::Nanos;
+using base::Nanos;
 using geometry::Vec3;
 
 /// Clocks of the fields that ramp out and of the buzz. Fixed storage; noexcept, allocation-free.

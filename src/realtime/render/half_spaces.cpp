@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/time.h"
 #include "realtime/render/release.h"
 
 namespace hapticd::realtime {
@@ -33,8 +34,8 @@ HalfSpaces::Memory& HalfSpaces::memoryOf(const scene::Plane& plane, Nanos now, d
 // How far the surface is above the plane itself, metres.
 double HalfSpaces::heightOf(const scene::Plane& plane, const Memory& memory, Nanos now, const Vec3& normal,
                             const Vec3& proxy, double metresPerUnit) noexcept {
-  const double age = geometry::toSeconds(now - memory.placed);
-  const double recovery = geometry::toSeconds(plane.recovery);
+  const double age = base::toSeconds(now - memory.placed);
+  const double recovery = base::toSeconds(plane.recovery);
   double height = 0;
   if (age < recovery) height -= memory.depth_m * (1 - age / recovery);
   if (plane.textureWavelength > 0) {

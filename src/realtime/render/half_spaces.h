@@ -6,12 +6,13 @@
 
 #include <array>
 
+#include "base/time.h"
 #include "realtime/render/facet.h"
 #include "scene/snapshot.h"
 
 namespace hapticd::realtime {
 
-using geometry::Nanos;
+using base::Nanos;
 
 /// One plane at this tick.
 struct HalfSpace {

@@ -9,6 +9,7 @@
 #include <array>
 #include <cstdint>
 
+#include "base/time.h"
 #include "realtime/render/facet_ball.h"
 #include "realtime/render/half_spaces.h"
 #include "scene/snapshot.h"
@@ -16,7 +17,7 @@
 namespace hapticd::realtime {
 
 using geometry::Affine;
-using geometry::Nanos;
+using base::Nanos;
 
 /// An object at this tick and, when it was there, at the last one.
 struct PlacedObject {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/time.h"
 #include "geometry/types.h"
 
 namespace hapticd::realtime {
@@ -11,8 +12,8 @@ namespace hapticd::realtime {
 inline constexpr double kReleaseTime_s = 0.250;
 
 /// What is left, 1 … 0, of a force that began to ramp out at `begin`.
-inline double shareLeft(geometry::Nanos begin, geometry::Nanos now) noexcept {
-  return std::max(0.0, 1 - geometry::toSeconds(now - begin) / kReleaseTime_s);
+inline double shareLeft(base::Nanos begin, base::Nanos now) noexcept {
+  return std::max(0.0, 1 - base::toSeconds(now - begin) / kReleaseTime_s);
 }
 
 /// A force seen in another frame: turned, never scaled. `t` is a similarity.

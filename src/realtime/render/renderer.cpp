@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "base/time.h"
 #include "realtime/render/effects.h"
 #include "realtime/render/fields.h"
 #include "realtime/render/proxy.h"
@@ -44,7 +45,7 @@ void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState
   }
   const double radius = s.options.toolRadius_m;
   const Grip& grip = s.proxy.follow({&scene, now}, hip,
-                                    std::max(geometry::toSeconds(period), kShortestPeriod_s), out.status);
+                                    std::max(base::toSeconds(period), kShortestPeriod_s), out.status);
   out.proxy_m = out.scp_m = s.proxy.position();
   if ((out.status & kRenderReleased) == 0) {
     applySurfaceLaw(grip, out.proxy_m, hand.velocity_m_per_s, radius, out);

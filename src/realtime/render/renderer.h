@@ -5,13 +5,14 @@
 #include <cstdint>
 #include <memory>
 
+#include "base/time.h"
 #include "device/device.h"
 #include "scene/snapshot.h"
 
 namespace hapticd::realtime {
 
 using geometry::Affine;
-using geometry::Nanos;
+using base::Nanos;
 using geometry::Vec3;
 
 inline constexpr int kMaxContacts = 4;  ///< three faces hold, and a plane may pull

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/time.h"
+
 namespace hapticd::realtime {
 namespace {
 
@@ -131,7 +133,7 @@ Vec3 Guard::slewLimited(const Vec3& force, Nanos dt) noexcept {
   if (wanted == 0) return force;
   const Vec3 direction = force / wanted;
   const double reached = std::clamp(shaped_.dot(direction), 0.0, wanted);
-  const double allowed = reached + options_.slew_N_per_s * geometry::toSeconds(dt);
+  const double allowed = reached + options_.slew_N_per_s * base::toSeconds(dt);
   if (wanted <= allowed * (1 + kRounding)) return force;
   note(Trip::slew);
   return allowed * direction;

@@ -8,11 +8,12 @@
 #include <cmath>
 #include <cstdint>
 
+#include "base/time.h"
 #include "geometry/types.h"
 
 namespace hapticd::realtime {
 
-using geometry::Nanos;
+using base::Nanos;
 
 /// Durations from 0 ns to 17 s in buckets at most 1/8 wide of their lower bound. One thread adds (wait-free),
 /// any thread reads; a reader may miss the newest few.

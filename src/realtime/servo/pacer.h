@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "base/time.h"
 #include "geometry/types.h"
 
 namespace hapticd::realtime {
 
-using geometry::Nanos;
+using base::Nanos;
 
 inline constexpr double kMinServoRate_Hz = 250;
 inline constexpr double kMaxServoRate_Hz = 4000;

@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "device/device.h"
-#include "realtime/handoff/spsc_ring.h"
+#include "handoff/spsc_ring.h"
 #include "realtime/render/renderer.h"
 #include "realtime/servo/guard.h"
 
@@ -35,6 +35,6 @@ struct TickReport {
 };
 
 /// Servo to the edge. Every report that was not dropped arrives, in order.
-using ReportRing = SpscRing<TickReport>;
+using ReportRing = handoff::SpscRing<TickReport>;
 
 }  // namespace hapticd::realtime

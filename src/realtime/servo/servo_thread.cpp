@@ -3,9 +3,11 @@
 #include <stdexcept>
 #include <utility>
 
+#include "base/clock.h"
+
 namespace hapticd::realtime {
 
-ServoThread::ServoThread(std::function<void(const Pacing&)> tick, Clock& clock,
+ServoThread::ServoThread(std::function<void(const Pacing&)> tick, base::Clock& clock,
                          const ServoThreadOptions& options)
     : tick_(std::move(tick)), clock_(clock), options_(options), period_(servoPeriod(options.rate_Hz)) {}
 

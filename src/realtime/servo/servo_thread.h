@@ -5,7 +5,7 @@
 #include <functional>
 #include <thread>
 
-#include "realtime/servo/clock.h"
+#include "base/clock.h"
 #include "realtime/servo/pacer.h"
 #include "realtime/servo/thread_setup.h"
 
@@ -22,7 +22,7 @@ class ServoThread {
  public:
   /// `tick` must not throw, allocate or lock; it and `clock` must outlive the thread. Throws
   /// std::invalid_argument for a rate outside 250 Hz … 4 kHz.
-  ServoThread(std::function<void(const Pacing&)> tick, Clock& clock, const ServoThreadOptions& options = {});
+  ServoThread(std::function<void(const Pacing&)> tick, base::Clock& clock, const ServoThreadOptions& options = {});
   ~ServoThread();
   ServoThread(const ServoThread&) = delete;
   ServoThread& operator=(const ServoThread&) = delete;
@@ -45,7 +45,7 @@ class ServoThread {
   void loop() noexcept;
 
   const std::function<void(const Pacing&)> tick_;
-  Clock& clock_;
+  base::Clock& clock_;
   const ServoThreadOptions options_;
   const Nanos period_;
   ThreadSetup setup_;

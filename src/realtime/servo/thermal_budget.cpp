@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "base/time.h"
+
 namespace hapticd::realtime {
 namespace {
 
@@ -20,17 +22,17 @@ ThermalBudget::ThermalBudget(double peak_N, double continuous_N) noexcept
 
 void ThermalBudget::add(double force_N, Nanos duration) noexcept {
   if (continuous_ >= peak_) return;
-  impulse_[static_cast<std::size_t>(newest_)] += force_N * geometry::toSeconds(duration);
+  impulse_[static_cast<std::size_t>(newest_)] += force_N * base::toSeconds(duration);
   advance(duration);
 
-  constexpr double kWindow_s = geometry::toSeconds(kBuckets * kBucket);
+  constexpr double kWindow_s = base::toSeconds(kBuckets * kBucket);
   limit_ = std::clamp(floor_ + margin() / kSpending_s, 0.0, peak_);
   if (limit_ < continuous_) derated_ = true;
   const double used = std::accumulate(impulse_.begin(), impulse_.end(), 0.0);
   if (used < kRestedShare * kWindow_s * continuous_) derated_ = false;
   if (derated_) {
     // The largest constant force whose margin keeps itself up: without it the limit would ripple.
-    constexpr double kAccount_s = geometry::toSeconds((kBuckets + 1) * kBucket);
+    constexpr double kAccount_s = base::toSeconds((kBuckets + 1) * kBucket);
     const double steady = (kWindow_s * continuous_ + kSpending_s * floor_) / (kAccount_s + kSpending_s);
     limit_ = std::min(limit_, steady);
   }
@@ -51,13 +53,13 @@ void ThermalBudget::advance(Nanos duration) noexcept {
 double ThermalBudget::margin() const noexcept {
   double kept = 0;
   double fullest = 0;
-  double ahead_s = geometry::toSeconds((kBuckets + 1) * kBucket - filled_);
+  double ahead_s = base::toSeconds((kBuckets + 1) * kBucket - filled_);
   for (int age = 0; age <= kBuckets; ++age) {  // newest first: what is kept after all older ones have left
     kept += impulse_[static_cast<std::size_t>((newest_ + kBuckets + 1 - age) % (kBuckets + 1))];
     fullest = std::max(fullest, kept + floor_ * ahead_s);
-    ahead_s -= geometry::toSeconds(kBucket);
+    ahead_s -= base::toSeconds(kBucket);
   }
-  return geometry::toSeconds(kBuckets * kBucket) * continuous_ - fullest;
+  return base::toSeconds(kBuckets * kBucket) * continuous_ - fullest;
 }
 
 }  // namespace hapticd::realtime

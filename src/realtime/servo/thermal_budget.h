@@ -8,11 +8,12 @@
 
 #include <array>
 
+#include "base/time.h"
 #include "geometry/types.h"
 
 namespace hapticd::realtime {
 
-using geometry::Nanos;
+using base::Nanos;
 
 /// Running account of |force| over the last 5 s. One thread; noexcept, allocation-free.
 class ThermalBudget {

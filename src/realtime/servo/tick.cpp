@@ -2,11 +2,12 @@
 
 #include <algorithm>
 
+#include "base/clock.h"
 #include "realtime/servo/flush_denormals.h"
 
 namespace hapticd::realtime {
 
-Tick::Tick(device::Device& device, Clock& clock, const TickOptions& options)
+Tick::Tick(device::Device& device, base::Clock& clock, const TickOptions& options)
     : device_(device),
       clock_(clock),
       period_(servoPeriod(options.rate_Hz)),

@@ -7,10 +7,10 @@
 #include <cstddef>
 
 #include "device/device.h"
-#include "realtime/handoff/snapshot_slot.h"
+#include "scene/snapshot_slot.h"
 #include "realtime/render/renderer.h"
 #include "realtime/servo/black_box.h"
-#include "realtime/servo/clock.h"
+#include "base/clock.h"
 #include "realtime/servo/guard.h"
 #include "realtime/servo/histogram.h"
 #include "realtime/servo/pacer.h"
@@ -40,7 +40,7 @@ class Tick {
  public:
   /// `device` is open; it and `clock` outlive the tick. Throws std::invalid_argument for a rate outside
   /// 250 Hz … 4 kHz and std::system_error when there is no descriptor for the wake.
-  Tick(device::Device& device, Clock& clock, const TickOptions& options = {});
+  Tick(device::Device& device, base::Clock& clock, const TickOptions& options = {});
   Tick(const Tick&) = delete;
   Tick& operator=(const Tick&) = delete;
 
@@ -56,7 +56,7 @@ class Tick {
   void recordTo(RecordRing* ring) noexcept { recordTo_ = ring; }
 
   /// Scene thread: publish and collect.
-  SnapshotSlot& snapshots() noexcept { return snapshots_; }
+  scene::SnapshotSlot& snapshots() noexcept { return snapshots_; }
   /// The one consumer of reports.
   ReportRing& reports() noexcept { return reports_; }
   /// Notified once in each tick.
@@ -75,10 +75,10 @@ class Tick {
   void publish() noexcept;
 
   device::Device& device_;
-  Clock& clock_;
+  base::Clock& clock_;
   const Nanos period_;
   const scene::SceneSnapshot nothing_;  // before the first snapshot
-  SnapshotSlot snapshots_;
+  scene::SnapshotSlot snapshots_;
   Renderer renderer_;
   GuardControl control_;
   Guard guard_;

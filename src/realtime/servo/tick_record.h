@@ -1,7 +1,7 @@
 // All that one tick was made of and what came of it: enough to do it again.
 #pragma once
 
-#include "realtime/handoff/spsc_ring.h"
+#include "handoff/spsc_ring.h"
 #include "realtime/servo/guard_control.h"
 #include "realtime/servo/report.h"
 
@@ -17,6 +17,6 @@ struct TickRecord {
 };
 
 /// Servo to a recorder. A full ring counts what it refused.
-using RecordRing = SpscRing<TickRecord>;
+using RecordRing = handoff::SpscRing<TickRecord>;
 
 }  // namespace hapticd::realtime

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "server/status.h"
+#include "server/web/server_status.h"
 #include "server/web/scene_watch.h"
 
 namespace hapticd::server {

@@ -4,6 +4,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "base/time.h"
+
 namespace hapticd::server {
 namespace {
 
@@ -57,12 +59,12 @@ void PrometheusText::sample(double value, Labels labels) {
 }
 
 void PrometheusText::histogram(const Histogram::Copy& histogram, std::string_view device) {
-  constexpr geometry::Nanos kFirst = 1 << 10;
-  constexpr geometry::Nanos kLast = 1 << 29;
+  constexpr base::Nanos kFirst = 1 << 10;
+  constexpr base::Nanos kLast = 1 << 29;
   const int last = Histogram::bucketOf(kLast);
   std::uint64_t count = 0;
   int bucket = 0;
-  for (geometry::Nanos bound = kFirst; bound <= kLast; bound *= 2) {
+  for (base::Nanos bound = kFirst; bound <= kLast; bound *= 2) {
     for (; bucket < Histogram::bucketOf(bound) && bucket <= last; ++bucket) {
       count += histogram.counts[static_cast<std::size_t>(bucket)];
     }

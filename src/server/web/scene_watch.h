@@ -8,7 +8,7 @@
 
 #include "net/loop.h"
 #include "scene/description.h"
-#include "server/scene_host.h"
+#include "server/scene/scene_host.h"
 
 namespace hapticd::server {
 

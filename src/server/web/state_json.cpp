@@ -1,7 +1,8 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "server/view.h"
+#include "base/time.h"
+#include "server/reports/view.h"
 #include "server/web/picture.h"
 #include "wire/messages.h"
 
@@ -29,7 +30,7 @@ Json orNull(const std::optional<T>& value) {
   return value ? Json(*value) : Json();
 }
 
-double inMicroseconds(geometry::Nanos t) {
+double inMicroseconds(base::Nanos t) {
   return static_cast<double>(t) * 1e-3;
 }
 
@@ -38,7 +39,7 @@ Json json(const realtime::Histogram::Copy& h) {
   for (int i = 0; i < realtime::Histogram::kBuckets; ++i) {
     const std::uint64_t count = h.counts[static_cast<std::size_t>(i)];
     if (count == 0) continue;
-    const geometry::Nanos from = i == 0 ? 0 : realtime::Histogram::upperBound(i - 1) + 1;
+    const base::Nanos from = i == 0 ? 0 : realtime::Histogram::upperBound(i - 1) + 1;
     bins.push_back({inMicroseconds(from), count});
   }
   return {{"p50", inMicroseconds(h.quantile(0.5))},
@@ -132,7 +133,7 @@ Json json(const scene::EffectDescription& described) {
           {"active", described.active},
           {"magnitude_N", effect.magnitude_N},
           {"gain", effect.gain / 1000},  // newtons per millimetre, as clients say it
-          {"duration_ms", geometry::toSeconds(effect.duration) * 1e3},
+          {"duration_ms", base::toSeconds(effect.duration) * 1e3},
           {"frequency_Hz", effect.angularFrequency_rad_per_s / (2 * std::numbers::pi)},
           {"position", json(effect.position)},
           {"direction", json(effect.direction)}};

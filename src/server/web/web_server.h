@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "net/http_server.h"
-#include "server/status.h"
+#include "server/web/server_status.h"
 #include "server/web/access.h"
 #include "server/web/mesh_store.h"
 #include "server/web/picture.h"

@@ -1,4 +1,5 @@
 // A force-feedback joystick on a fake of its file.
+#include "base/clock.h"
 #include "device/evdev/evdev_device.h"
 
 #include <gmock/gmock.h>
@@ -198,7 +199,7 @@ TEST_F(EvdevTest, APlaneFeelsAsOnTheSimulatedDevice) {
   const std::vector<Vec3> expected = plane_scene::referenceForces(places);
   const auto device = make();
   device->open();
-  realtime::SimulatedClock clock;
+  base::SimulatedClock clock;
   realtime::Tick servo(*device, clock, plane_scene::raw());
   servo.snapshots().publish(plane_scene::snapshot());
   double most = 0;

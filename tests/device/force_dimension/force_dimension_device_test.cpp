@@ -1,4 +1,5 @@
 // omega and its relatives on a mock of libdrd that aborts where a caller would do harm.
+#include "base/clock.h"
 #include "device/force_dimension/force_dimension_device.h"
 
 #include <dlfcn.h>
@@ -296,7 +297,7 @@ TEST_F(DhdTest, APlaneFeelsAsOnTheSimulatedDevice) {
   const std::vector<Vec3> places = plane_scene::places();
   const std::vector<Vec3> expected = plane_scene::referenceForces(places);
   device.open();
-  realtime::SimulatedClock clock;
+  base::SimulatedClock clock;
   realtime::Tick servo(device, clock, plane_scene::raw());
   servo.snapshots().publish(plane_scene::snapshot());
   double most = 0;

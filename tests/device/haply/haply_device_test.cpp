@@ -1,4 +1,5 @@
 // Inverse3 on a mock of its service.
+#include "base/clock.h"
 #include "device/haply/haply_device.h"
 
 #include <gmock/gmock.h>
@@ -38,7 +39,7 @@ class HaplyTest : public testing::Test {
 
   MockService service;
   HaplyDevice device{{"127.0.0.1", service.port(), ""}};
-  realtime::MonotonicClock clock;
+  base::MonotonicClock clock;
   DeviceState state;
   bool gotState = false;
 };

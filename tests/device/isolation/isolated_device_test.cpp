@@ -1,4 +1,5 @@
 // A driver in a process of its own.
+#include "base/clock.h"
 #include "device/isolation/isolated_device.h"
 
 #include <fcntl.h>
@@ -166,7 +167,7 @@ TEST_P(IsolationTest, APlaneFeelsAsOnTheSimulatedDevice) {
   const std::vector<Vec3> expected = plane_scene::referenceForces(places);
   IsolatedDevice device(host(GetParam()));
   device.open();
-  realtime::MonotonicClock clock;
+  base::MonotonicClock clock;
   realtime::Tick servo(device, clock, plane_scene::raw());
   servo.snapshots().publish(plane_scene::snapshot());
   const auto moveTo = [&](const Vec3& place) {

@@ -1,4 +1,5 @@
 // The server's tick in the vendor's scheduler.
+#include "base/clock.h"
 #include "device/openhaptics/hd_fixture.h"
 #include "device/plane_scene.h"
 
@@ -9,7 +10,7 @@ TEST_F(SteppedHdTest, APlaneFeelsAsOnTheSimulatedDevice) {
   const std::vector<Vec3> places = plane_scene::places();
   const std::vector<Vec3> expected = plane_scene::referenceForces(places);
   device.open();
-  realtime::MonotonicClock clock;
+  base::MonotonicClock clock;
   realtime::Tick tick(device, clock, plane_scene::raw());
   tick.snapshots().publish(plane_scene::snapshot());
   device.start([&](Nanos now) { tick(now); });
@@ -26,7 +27,7 @@ TEST_F(SteppedHdTest, APlaneFeelsAsOnTheSimulatedDevice) {
 TEST_F(HdTest, TheGuardOfTheTickHoldsUntilArmedAndLatchesADisconnectInContact) {
   OpenHapticsDevice device;
   device.open();
-  realtime::MonotonicClock clock;
+  base::MonotonicClock clock;
   realtime::TickOptions options;
   options.guard = realtime::GuardOptions::of(device.profile());
   options.guard.late = 1'000'000'000;  // a loaded machine is not what is tested here

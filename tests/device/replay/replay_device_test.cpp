@@ -1,4 +1,5 @@
 // A recorded hand as a device.
+#include "base/clock.h"
 #include "device/replay/replay_device.h"
 
 #include <gtest/gtest.h>
@@ -85,7 +86,7 @@ TEST_F(ReplayTest, APlaneFeelsAsOnTheSimulatedDevice) {
   record(rows);
   ReplayDevice device(options);
   device.open();
-  realtime::SimulatedClock clock;
+  base::SimulatedClock clock;
   realtime::Tick servo(device, clock, plane_scene::raw());
   servo.snapshots().publish(plane_scene::snapshot());
   for (std::size_t i = 0; i < places.size(); ++i) {

@@ -1,6 +1,7 @@
 // The hand of arithmetic against walls of arithmetic.
 //
 //      intended point  o~~300 N/m, 5 N·s/m~~[0.1 kg]     | wall: F = K depth for y < 0
+#include "base/time.h"
 #include "device/simulated/simulated_device.h"
 
 #include <gtest/gtest.h>
@@ -101,7 +102,7 @@ TEST(SimulatedDevice, SettlesAgainstEveryPassiveWall) {
       double most = -1;
       double low = 1;
       double high = -1;
-      const Nanos step = geometry::toNanos(period);
+      const Nanos step = base::toNanos(period);
       for (Nanos t = 0; t < 2300 * kMs; t += step) {
         device.read(t, state);
         work += force.dot(state.position_m - before);

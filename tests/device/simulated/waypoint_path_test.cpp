@@ -1,4 +1,5 @@
 // Smooth paths through points.
+#include "base/time.h"
 #include "device/simulated/waypoint_path.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +24,7 @@ TEST(WaypointPath, PassesEveryPointAtItsTime) {
   const WaypointPath path(points);
   EXPECT_EQ(path.duration(), 1200 * kMs);
   for (const Waypoint& point : points) {
-    const HandPose pose = path.at(geometry::toNanos(point.time_s));
+    const HandPose pose = path.at(base::toNanos(point.time_s));
     EXPECT_NEAR((pose.position_m - point.position_m).norm(), 0, 1e-15);
     EXPECT_NEAR(pose.orientation.angularDistance(point.orientation), 0, 1e-7);
     EXPECT_EQ(pose.buttons, point.buttons);

@@ -1,3 +1,4 @@
+#include "base/clock.h"
 #include "device/whole_server/demo_scene.h"
 
 #include <cmath>
@@ -11,7 +12,7 @@
 namespace hapticd::whole_server {
 namespace {
 
-constexpr geometry::Nanos kTick = 1'000'000;
+constexpr base::Nanos kTick = 1'000'000;
 constexpr double kHalf_mm = 60;
 constexpr double kSpring_N_per_mm = 0.01;
 constexpr double kSpring_N = 0.2;
@@ -23,15 +24,15 @@ constexpr double kDynamicFriction = 0.3;
 class Placed final : public device::HandPath {
  public:
   explicit Placed(std::vector<Vec3> places_m) : places_m_(std::move(places_m)) {}
-  device::HandPose at(geometry::Nanos sinceStart) const noexcept override {
+  device::HandPose at(base::Nanos sinceStart) const noexcept override {
     device::HandPose pose;
-    const auto last = static_cast<geometry::Nanos>(places_m_.size()) - 1;
+    const auto last = static_cast<base::Nanos>(places_m_.size()) - 1;
     pose.position_m =
-        places_m_[static_cast<std::size_t>(std::clamp<geometry::Nanos>(sinceStart / kTick, 0, last))];
+        places_m_[static_cast<std::size_t>(std::clamp<base::Nanos>(sinceStart / kTick, 0, last))];
     return pose;
   }
-  geometry::Nanos duration() const noexcept override {
-    return static_cast<geometry::Nanos>(places_m_.size()) * kTick;
+  base::Nanos duration() const noexcept override {
+    return static_cast<base::Nanos>(places_m_.size()) * kTick;
   }
 
  private:
@@ -118,7 +119,7 @@ std::vector<Vec3> DemoScene::forces(const std::vector<Vec3>& places_m) const {
   device::SimulatedDevice device(options);
   device.setPath(std::make_shared<Placed>(places_m));
   device.open();
-  realtime::SimulatedClock clock;
+  base::SimulatedClock clock;
   realtime::TickOptions tickOptions;
   tickOptions.guard.enabled = false;
   realtime::Tick tick(device, clock, tickOptions);
@@ -126,7 +127,7 @@ std::vector<Vec3> DemoScene::forces(const std::vector<Vec3>& places_m) const {
   for (const scene::Notice& notice : notices) throw std::runtime_error(notice.text);
   std::vector<Vec3> forces;
   for (std::size_t i = 0; i < places_m.size(); ++i) {
-    tick(static_cast<geometry::Nanos>(i) * kTick);
+    tick(static_cast<base::Nanos>(i) * kTick);
     forces.push_back(tick.last().force_N);
   }
   return forces;

@@ -10,6 +10,7 @@
 #include <sstream>
 #include <string>
 
+#include "base/time.h"
 #include "device/haply/mock_service.h"
 #include "device/simulated/hand_file.h"
 #include "device/whole_server/event_kernel.h"
@@ -241,10 +242,10 @@ TEST_F(SameForce, ReplayIsItsRecording) {
   })) << server->log();
   ASSERT_TRUE(whole);
   // When the recording began stands in no report: it is found from the first place.
-  const geometry::Nanos round = recording->duration() + 1;
-  geometry::Nanos begin = 0;
+  const base::Nanos round = recording->duration() + 1;
+  base::Nanos begin = 0;
   double nearest = 1;
-  for (geometry::Nanos at = 0; at < round; at += 1000) {
+  for (base::Nanos at = 0; at < round; at += 1000) {
     const double distance = (recording->at(at).position_m - places[0]).norm();
     if (distance < nearest) nearest = distance, begin = ticks[0].tick_time.count() - at;
   }

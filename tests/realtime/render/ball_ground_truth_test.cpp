@@ -2,6 +2,7 @@
 // them in contact_test, moving_test, object_test, friction_test and watertight_test.
 #include <limits>
 
+#include "base/time.h"
 #include "variants.h"
 
 namespace hapticd::realtime::fixture {
@@ -65,7 +66,7 @@ TEST_P(BallGroundTruth, rising_plate_lifts_a_resting_hand) {
   start({0.0003, 0.0002, 0.002}, kBall);
   for (int i = 0; i < 120; ++i) {
     const double risen =
-        0.05 * geometry::toSeconds(std::clamp<Nanos>(hand->time() - toNanos(0.01), 0, toNanos(0.08)));
+        0.05 * base::toSeconds(std::clamp<Nanos>(hand->time() - toNanos(0.01), 0, toNanos(0.08)));
     const Rendering& r = at({0.0003, 0.0002, 0.002});
     EXPECT_NEAR((r.force_N - Vec3(0, 0, 1000 * std::max(0.0, risen - 0.001))).norm(), 0, 1e-3) << i;
     EXPECT_EQ(r.status, 0U);
@@ -82,7 +83,7 @@ TEST_P(BallGroundTruth, sliding_plate_carries_the_proxy_until_it_slips) {
                                          begin + toNanos(0.25));
   hand->show(scene.snapshot());
   for (int i = 0; i < 240; ++i) {
-    const double went = 0.02 * geometry::toSeconds(hand->time() - begin);
+    const double went = 0.02 * base::toSeconds(hand->time() - begin);
     const Rendering& r = at({0.0003, 0.0002, -0.001});
     EXPECT_NEAR(r.force_N.x(), std::min(1000 * went, 1.0), 0.02) << i;
     EXPECT_NEAR(r.force_N.z(), 2, 1e-3);
@@ -102,11 +103,11 @@ TEST_P(BallGroundTruth, interpolated_pose_stream_has_no_steps) {
   start({0.001, 0.002, 0.002}, kBall);
   to({0.001, 0.002, -0.002});
   constexpr double kInterval_s = 1.0 / 60;
-  const double begin = geometry::toSeconds(hand->time());
+  const double begin = base::toSeconds(hand->time());
   double next = begin;
   double before_N = hand->now().force_N.z();
   for (int i = 0; i < 1000; ++i) {
-    const double t = geometry::toSeconds(hand->time());
+    const double t = base::toSeconds(hand->time());
     if (t >= next) {
       object.motion = scene::Motion::between(pose(next - begin - kInterval_s), pose(next - begin),
                                              toNanos(next), toNanos(next + kInterval_s));
@@ -134,7 +135,7 @@ TEST_P(BallGroundTruth, deforming_surface_is_felt_like_a_moving_one) {
   object.mesh = geometryOf(mesh, 5, &risen, begin, begin + toNanos(0.1));
   hand->show(scene.snapshot());
   for (int i = 0; i < 150; ++i) {
-    const double s = std::min(1.0, geometry::toSeconds(hand->time() - begin) / 0.1);
+    const double s = std::min(1.0, base::toSeconds(hand->time() - begin) / 0.1);
     const Rendering& r = at({0.0003, 0.0002, 0.0005});
     EXPECT_NEAR((r.force_N - Vec3(0, 0, 0.5 + s)).norm(), 0, 0.02) << i;
   }

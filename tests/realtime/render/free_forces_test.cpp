@@ -1,6 +1,7 @@
 // The forces that belong to no object: effects, planes, force fields, the buzz.
 #include <limits>
 
+#include "base/time.h"
 #include "variants.h"
 
 namespace hapticd::realtime::fixture {
@@ -95,7 +96,7 @@ TEST_P(FreeForcesTest, contact_vibration_only_while_touching) {
   add(plane(0.05, 10), surface());
   start({0.0013, 0.0021, 0.001});
   EXPECT_EQ(to({0.0013, 0.0021, 0.0005}).force_N.norm(), 0);
-  const double phase = 200 * geometry::toSeconds(hand->time());
+  const double phase = 200 * base::toSeconds(hand->time());
   EXPECT_NEAR(at({0.0013, 0.0021, -0.001}).force_N.z(), 1 + 1.5 * std::sin(phase), 1e-4);
 }
 

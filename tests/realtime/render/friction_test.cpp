@@ -1,4 +1,5 @@
 // Coulomb friction: T3, T9b, T12 (without friction, for the energy) and T19 of the ground truth.
+#include "base/time.h"
 #include "variants.h"
 
 namespace hapticd::realtime::fixture {
@@ -107,7 +108,7 @@ TEST_P(FrictionTest, sliding_plate_carries_the_proxy_until_it_slips) {
   for (int i = 0; i < 300; ++i) {
     const Nanos now = hand->time();
     const Rendering& r = at({0.001, 0.002, -0.002});
-    const double moved = 0.05 * geometry::toSeconds(std::clamp<Nanos>(now - begin, 0, toNanos(0.2)));
+    const double moved = 0.05 * base::toSeconds(std::clamp<Nanos>(now - begin, 0, toNanos(0.2)));
     EXPECT_NEAR(r.force_N.z(), 2.0, 1e-4);
     EXPECT_NEAR(r.force_N.x(), 1000 * std::min(moved, 0.001), 0.02);
     slipped = slipped || moved > 0.001;

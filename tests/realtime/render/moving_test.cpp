@@ -1,5 +1,6 @@
 // Geometry that moves, bends, jumps and vanishes under the hand: T9a, T9c, T9d, T20 of the ground truth (T9b
 // stands with the friction).
+#include "base/time.h"
 #include "variants.h"
 
 namespace hapticd::realtime::fixture {
@@ -31,7 +32,7 @@ TEST_P(MovingTest, rising_plate_lifts_a_resting_hand) {
     start({0.0003, 0.0002, 0.001});
     for (int i = 0; i < 120; ++i) {
       const double risen =
-          0.05 * geometry::toSeconds(std::clamp<Nanos>(hand->time() - toNanos(0.01), 0, toNanos(0.08)));
+          0.05 * base::toSeconds(std::clamp<Nanos>(hand->time() - toNanos(0.01), 0, toNanos(0.08)));
       const Rendering& r = at({0.0003, 0.0002, 0.001});
       EXPECT_NEAR((r.force_N - Vec3(0, 0, 1000 * std::max(0.0, risen - 0.001))).norm(), 0, 1e-3) << i;
       EXPECT_EQ(r.status, 0U);
@@ -48,7 +49,7 @@ TEST_P(MovingTest, rising_plate_is_damped) {
       scene::Motion::between(object.motion.origin(), shifted(object, {0, 0, 0.01}), 0, toNanos(0.1));
   start({0.0003, 0.0002, 0.001});
   for (int i = 0; i < 25; ++i) at({0.0003, 0.0002, 0.001});
-  const double depth = 0.1 * geometry::toSeconds(hand->time()) - 0.001;
+  const double depth = 0.1 * base::toSeconds(hand->time()) - 0.001;
   EXPECT_NEAR(at({0.0003, 0.0002, 0.001}).force_N.z(), 1000 * depth + 2 * 0.1, 2e-3);
 }
 
@@ -75,11 +76,11 @@ TEST_P(MovingTest, interpolated_pose_stream_has_no_steps) {
   start({0.001, 0.002, 0.001});
   to({0.001, 0.002, -0.003});
   const double interval = 1.0 / 60;
-  double next = geometry::toSeconds(hand->time());
+  double next = base::toSeconds(hand->time());
   double previousForce = hand->now().force_N.z();
   double t0 = next;
   for (int i = 0; i < 1000; ++i) {
-    const double t = geometry::toSeconds(hand->time());
+    const double t = base::toSeconds(hand->time());
     if (t >= next) {
       object.motion = scene::Motion::between(pose(std::max(0.0, next - t0 - interval)), pose(next - t0),
                                              toNanos(next), toNanos(next + interval));
@@ -124,7 +125,7 @@ TEST_P(MovingTest, deforming_surface_is_felt_like_a_moving_one) {
         object.mesh = geometryOf(rest, 5);
         hand->show(scene.snapshot());
       }
-      const double s = std::min(1.0, geometry::toSeconds(hand->time() - begin) / 0.1);
+      const double s = std::min(1.0, base::toSeconds(hand->time() - begin) / 0.1);
       const Rendering& r = at({0.0003, 0.0002, -depth});
       const double d = std::max(0.0, depth + s * hump(0.0003, 0.0002));
       EXPECT_NEAR(r.force_N.norm(), 1000 * d, 0.02) << i;

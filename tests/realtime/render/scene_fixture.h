@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/time.h"
 #include "realtime/render/renderer.h"
 #include "scene/snapshot.h"
 
@@ -13,8 +14,8 @@ namespace hapticd::realtime::fixture {
 
 using geometry::Affine;
 using geometry::Box;
-using geometry::Nanos;
-using geometry::toNanos;
+using base::Nanos;
+using base::toNanos;
 using geometry::TriangleMesh;
 using geometry::Vec3;
 using geometry::Vec3f;
@@ -139,7 +140,7 @@ class Hand {
     device::DeviceState state;
     state.time = now_;
     state.position_m = p;
-    state.velocity_m_per_s = started_ ? Vec3((p - last_) / geometry::toSeconds(kTick)) : Vec3(Vec3::Zero());
+    state.velocity_m_per_s = started_ ? Vec3((p - last_) / base::toSeconds(kTick)) : Vec3(Vec3::Zero());
     state.orientation = orientation;
     renderer_.step(*scene_, state, now_, kTick, rendering_);
     started_ = true;

@@ -10,6 +10,7 @@
 #include <iostream>
 #include <string>
 
+#include "base/time.h"
 #include "device/simulated/simulated_device.h"
 #include "device/simulated/waypoint_path.h"
 #include "realtime/servo/fakes.h"
@@ -70,7 +71,7 @@ Pressing pressOn(const scene::Surface& surface, double rate_Hz, bool guarded) {
 
   Pressing result;
   const auto period = static_cast<Nanos>(1e9 / rate_Hz);
-  const double period_s = geometry::toSeconds(period);
+  const double period_s = base::toSeconds(period);
   double energy = 0;
   double lowest = 1;
   double highest = -1;

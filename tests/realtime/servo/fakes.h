@@ -4,8 +4,9 @@
 #include <cstddef>
 #include <vector>
 
+#include "base/time.h"
 #include "device/device.h"
-#include "realtime/servo/clock.h"
+#include "base/clock.h"
 #include "scene/snapshot.h"
 
 namespace hapticd::realtime {
@@ -19,7 +20,7 @@ class FakeDevice final : public device::Device {
   void open() override {}
   void close() noexcept override {}
   const device::DeviceProfile& profile() const noexcept override { return profile_; }
-  bool read(geometry::Nanos now, device::DeviceState& out) noexcept override {
+  bool read(base::Nanos now, device::DeviceState& out) noexcept override {
     ++reads;
     if (!gives) return false;
     out = state;

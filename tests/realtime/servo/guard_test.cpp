@@ -1,4 +1,5 @@
 // Every rule of the guard, sample by sample.
+#include "base/time.h"
 #include "realtime/servo/guard.h"
 
 #include <gtest/gtest.h>
@@ -64,7 +65,7 @@ class Bench {
 
 class AtRate : public testing::TestWithParam<double> {
  protected:
-  Nanos period() const { return geometry::toNanos(1 / GetParam()); }
+  Nanos period() const { return base::toNanos(1 / GetParam()); }
 };
 INSTANTIATE_TEST_SUITE_P(Guard, AtRate, testing::Values(250.0, 1000.0, 4000.0));
 
@@ -151,7 +152,7 @@ TEST_P(AtRate, TheForceRisesByOneNewtonInAMillisecond) {
   Bench bench(armedOptions(), period());
   bench.settle(Vec3::Zero());
   bench.in.force_N = Vec3(0, 0, 3);
-  const double perTick = 1000 * geometry::toSeconds(period());
+  const double perTick = 1000 * base::toSeconds(period());
   for (int i = 1; i <= 20; ++i) ASSERT_NEAR(bench.step().z(), std::min(3.0, i * perTick), kTiny);
 }
 

@@ -1,4 +1,5 @@
 // No 5 s hold more than the continuous force on average, and the force never has to vanish for it.
+#include "base/time.h"
 #include "realtime/servo/thermal_budget.h"
 
 #include <gtest/gtest.h>
@@ -28,7 +29,7 @@ class Motor {
     }
     return force;
   }
-  double mean() const { return sum_ * geometry::toSeconds(period_) / 5; }
+  double mean() const { return sum_ * base::toSeconds(period_) / 5; }
 
   ThermalBudget budget{kPeak, kContinuous};
 

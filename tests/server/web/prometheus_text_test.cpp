@@ -1,3 +1,4 @@
+#include "base/time.h"
 #include "server/web/prometheus_text.h"
 
 #include <gtest/gtest.h>
@@ -41,9 +42,9 @@ TEST(PrometheusText, NumbersThatAreNone) {
 
 TEST(PrometheusText, AHistogramCountsUpToEachBound) {
   realtime::Histogram histogram;
-  for (const geometry::Nanos value : {0, 1023, 1024, 2047, 5000, 1'000'000}) histogram.add(value);
-  histogram.add(geometry::Nanos{1} << 29);
-  histogram.add(geometry::Nanos{1} << 34);
+  for (const base::Nanos value : {0, 1023, 1024, 2047, 5000, 1'000'000}) histogram.add(value);
+  histogram.add(base::Nanos{1} << 29);
+  histogram.add(base::Nanos{1} << 34);
   PrometheusText out;
   out.family("t_seconds", "histogram", "Times.");
   out.histogram(histogram.copy(), "P");

@@ -1,0 +1,51 @@
+// Clocks: the machine's own, or one that moves only when told.
+#pragma once
+
+#include "base/time.h"
+
+namespace hapticd::base {
+
+/// A monotonic clock and a wall clock. All calls are realtime: noexcept, no allocation, no lock.
+class Clock {
+ public:
+  Clock() = default;
+  virtual ~Clock() = default;
+  Clock(const Clock&) = delete;
+  Clock& operator=(const Clock&) = delete;
+
+  /// Time on the servo clock.
+  virtual Nanos now() noexcept = 0;
+  /// Returns at `deadline` on the servo clock or later; at once when it has passed.
+  virtual void sleepUntil(Nanos deadline) noexcept = 0;
+  /// Time since 1970, UTC. It may jump when somebody sets the machine's clock.
+  virtual Nanos wallNow() noexcept = 0;
+};
+
+/// CLOCK_MONOTONIC and CLOCK_REALTIME. Deadlines are absolute: a late wake-up does not shift the ones after it.
+class MonotonicClock final : public Clock {
+ public:
+  Nanos now() noexcept override;
+  void sleepUntil(Nanos deadline) noexcept override;
+  Nanos wallNow() noexcept override;
+};
+
+/// Moves only when told: sleeping sets the time. For offline rendering and simulated worlds. One thread.
+class SimulatedClock final : public Clock {
+ public:
+  /// `wallAtZero`: wall time when now() is 0.
+  explicit SimulatedClock(Nanos wallAtZero = 0) noexcept : wallOffset_(wallAtZero) {}
+
+  Nanos now() noexcept override { return now_; }
+  void sleepUntil(Nanos deadline) noexcept override {
+    if (deadline > now_) now_ = deadline;
+  }
+  Nanos wallNow() noexcept override { return now_ + wallOffset_; }
+  /// As if somebody set the machine's clock.
+  void setWall(Nanos wall) noexcept { wallOffset_ = wall - now_; }
+
+ private:
+  Nanos now_ = 0;
+  Nanos wallOffset_;
+};
+
+}  // namespace hapticd::base

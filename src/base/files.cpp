@@ -1,0 +1,97 @@
+#include "base/files.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <system_error>
+
+namespace hapticd::base {
+namespace {
+
+[[noreturn]] void fail(int error, const std::string& what, const std::filesystem::path& path) {
+  throw std::system_error(error, std::generic_category(), what + " " + path.string());
+}
+
+class Descriptor {
+ public:
+  Descriptor(const std::filesystem::path& path, int flags) : path_(path), fd_(::open(path.c_str(), flags | O_CLOEXEC, 0644)) {
+    if (fd_ < 0) fail(errno, "cannot open", path_);
+  }
+  ~Descriptor() { ::close(fd_); }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  const std::filesystem::path& path() const noexcept { return path_; }
+  int fd() const noexcept { return fd_; }
+
+ private:
+  const std::filesystem::path path_;
+  const int fd_;
+};
+
+class SystemOutputFile final : public OutputFile {
+ public:
+  SystemOutputFile(const std::filesystem::path& path, int flags) : file_(path, O_WRONLY | O_CREAT | flags) {}
+
+  void write(std::span<const std::byte> bytes) override {
+    while (!bytes.empty()) {
+      const ssize_t written = ::write(file_.fd(), bytes.data(), bytes.size());
+      if (written < 0 && errno == EINTR) continue;
+      if (written < 0) fail(errno, "cannot write", file_.path());
+      bytes = bytes.subspan(static_cast<std::size_t>(written));
+    }
+  }
+
+  void sync() override {
+    if (::fdatasync(file_.fd()) != 0) fail(errno, "cannot sync", file_.path());
+  }
+
+ private:
+  Descriptor file_;
+};
+
+}  // namespace
+
+std::unique_ptr<OutputFile> SystemFiles::create(const std::filesystem::path& path, Existing existing) {
+  return std::make_unique<SystemOutputFile>(path, existing == Existing::refuse ? O_EXCL : O_TRUNC);
+}
+
+std::vector<std::byte> SystemFiles::read(const std::filesystem::path& path) {
+  const Descriptor file(path, O_RDONLY);
+  std::vector<std::byte> content;
+  std::array<std::byte, 64 * 1024> piece;
+  for (;;) {
+    const ssize_t got = ::read(file.fd(), piece.data(), piece.size());
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) fail(errno, "cannot read", path);
+    if (got == 0) return content;
+    content.insert(content.end(), piece.begin(), piece.begin() + got);
+  }
+}
+
+void SystemFiles::rename(const std::filesystem::path& from, const std::filesystem::path& to) {
+  std::filesystem::rename(from, to);
+}
+
+void SystemFiles::remove(const std::filesystem::path& path) {
+  std::filesystem::remove(path);
+}
+
+void SystemFiles::createFolder(const std::filesystem::path& path) {
+  std::filesystem::create_directories(path);
+}
+
+std::vector<std::string> SystemFiles::list(const std::filesystem::path& folder) {
+  std::vector<std::string> names;
+  if (!std::filesystem::is_directory(folder)) return names;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.is_regular_file()) names.push_back(entry.path().filename().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+}  // namespace hapticd::base

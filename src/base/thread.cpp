@@ -1,0 +1,119 @@
+#include "base/thread.h"
+
+#include <pthread.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include "base/world.h"
+
+namespace hapticd::base {
+namespace {
+
+void introduce(const ThreadOptions& options) noexcept {
+  if (!options.name.empty()) pthread_setname_np(pthread_self(), options.name.substr(0, 15).c_str());
+  // Linux gives each thread a niceness of its own. A refusal changes nothing but the pace of others.
+  if (options.niceness != 0) setpriority(PRIO_PROCESS, 0, options.niceness);
+}
+
+class SystemThread final : public Thread::Impl {
+ public:
+  SystemThread(ThreadOptions options, Step step)
+      : options_(std::move(options)), step_(std::move(step)), thread_([this] { run(); }) {}
+  ~SystemThread() override { stop(); }
+
+  void wake() noexcept override {
+    {
+      const std::lock_guard lock(mutex_);
+      woken_ = true;
+    }
+    wake_.notify_one();
+  }
+
+  void stop() override {
+    {
+      const std::lock_guard lock(mutex_);
+      stopping_ = true;
+    }
+    wake_.notify_one();
+    if (thread_.joinable()) thread_.join();
+  }
+
+ private:
+  void run() {
+    introduce(options_);
+    for (bool last = false; !last;) {
+      const std::optional<Nanos> deadline = step_();
+      last = await(deadline);
+    }
+    step_();
+  }
+
+  // True when the thread should end.
+  bool await(std::optional<Nanos> deadline) {
+    std::unique_lock lock(mutex_);
+    const auto ready = [this] { return woken_ || stopping_; };
+    if (deadline) {
+      // wait_until() on steady_clock is CLOCK_MONOTONIC, the servo clock.
+      wake_.wait_until(lock, std::chrono::steady_clock::time_point(std::chrono::nanoseconds(*deadline)), ready);
+    } else {
+      wake_.wait(lock, ready);
+    }
+    woken_ = false;
+    return stopping_;
+  }
+
+  const ThreadOptions options_;
+  const Step step_;
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  bool woken_ = false;
+  bool stopping_ = false;
+  std::thread thread_;  // last: it uses the others
+};
+
+class SystemBlockingThread final : public BlockingThread::Impl {
+ public:
+  SystemBlockingThread(ThreadOptions options, std::function<void()> body)
+      : thread_([options = std::move(options), body = std::move(body)] {
+          introduce(options);
+          body();
+        }) {}
+  ~SystemBlockingThread() override { thread_.join(); }
+
+ private:
+  std::thread thread_;
+};
+
+}  // namespace
+
+Thread::Thread(ThreadOptions options, Step step)
+    : impl_(world().threads.start(std::move(options), std::move(step))) {}
+
+Thread& Thread::operator=(Thread&& other) noexcept {
+  stop();
+  impl_ = std::move(other.impl_);
+  return *this;
+}
+
+void Thread::stop() {
+  if (impl_) impl_->stop();
+  impl_.reset();
+}
+
+BlockingThread::BlockingThread(ThreadOptions options, std::function<void()> body)
+    : impl_(world().threads.startBlocking(std::move(options), std::move(body))) {}
+
+std::unique_ptr<Thread::Impl> SystemThreads::start(ThreadOptions options, Step step) {
+  return std::make_unique<SystemThread>(std::move(options), std::move(step));
+}
+
+std::unique_ptr<BlockingThread::Impl> SystemThreads::startBlocking(ThreadOptions options, std::function<void()> body) {
+  return std::make_unique<SystemBlockingThread>(std::move(options), std::move(body));
+}
+
+}  // namespace hapticd::base

@@ -1,0 +1,86 @@
+// What a session file says, as values. docs/session-format.md describes the bytes.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "base/time.h"
+#include "realtime/servo/tick.h"
+#include "realtime/servo/tick_record.h"
+#include "scene/commands.h"
+#include "scene/config.h"
+#include "scene/notice.h"
+
+namespace hapticd::record {
+
+using base::Nanos;
+
+/// Changes when old readers would misread a file; new kinds of blocks alone do not change it.
+inline constexpr std::uint32_t kFormatVersion = 2;  // 1 had no grippers
+
+/// Why a file cannot be read or written; the text names it and the remedy.
+class RecordingError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// One haptic device of the session, with everything its servo and its scene were made with.
+struct RecordedDevice {
+  std::vector<std::string> names;
+  std::string driver;
+  std::string model;
+  std::int32_t buttons = 0;
+  std::uint32_t scene = 0;  ///< number of the scene that it touches
+  scene::SceneConfig sceneConfig;
+  realtime::TickOptions tick;
+};
+
+/// The first block.
+struct RecordingHeader {
+  std::string program;
+  Nanos wallOffset = 0;  ///< wall time less servo time, at the start
+  std::string config;    ///< of the server, as TOML
+  std::vector<RecordedDevice> devices;
+};
+
+/// A command as the scene applied it, before it had effect; without one, the client was gone.
+struct SceneEvent {
+  std::uint32_t scene = 0;
+  scene::ClientId client = 0;
+  Nanos time = 0;
+  std::optional<scene::SceneCommand> command;
+};
+
+/// The scene of a device was looked at for publishing; what came of it, if anything.
+struct PublishEvent {
+  std::uint32_t device = 0;
+  Nanos time = 0;
+  std::uint64_t revision = 0;    ///< 0: nothing had changed
+  std::vector<Nanos> stopwatch;  ///< what the builder read from it meanwhile
+};
+
+/// One tick of a device.
+struct TickEvent {
+  std::uint32_t device = 0;
+  realtime::TickRecord tick;
+};
+
+/// Something is missing here, because the recorder could not follow.
+struct LostEvent {
+  enum class What : std::int32_t { ticks, sceneEvents };
+  What what = What::ticks;
+  std::uint32_t device = 0;  ///< for ticks
+  std::uint64_t count = 0;   ///< since the last of these
+};
+
+/// The recording ended in order.
+struct EndEvent {
+  Nanos time = 0;
+};
+
+using RecordingEvent = std::variant<SceneEvent, PublishEvent, TickEvent, LostEvent, EndEvent>;
+
+}  // namespace hapticd::record

@@ -1,0 +1,99 @@
+#include "record/recording_reader.h"
+
+#include "record/fields.h"
+#include "record/pack_commands.h"
+
+namespace hapticd::record {
+
+RecordingReader::RecordingReader(const std::filesystem::path& file) : path_(file), blocks_(file) {
+  readHeader();
+}
+
+void RecordingReader::fail(const std::string& what) const {
+  throw RecordingError("'" + path_.string() + "', block at byte " + std::to_string(block_.offset) + ": " +
+                     what);
+}
+
+void RecordingReader::readHeader() {
+  if (!blocks_.next(block_)) {
+    const std::string& damage = blocks_.damage();
+    throw RecordingError("'" + path_.string() +
+                       "' has no whole header: " + (damage.empty() ? "it is empty" : damage));
+  }
+  if (block_.kind != BlockKind::header) fail("the first block is no header");
+  Unpacker in(block_.content);
+  const auto version = in.next<std::uint32_t>();
+  if (in.ok() && (version < 1 || version > kFormatVersion)) {
+    fail("the file has version " + std::to_string(version) +
+         " of the format, this program reads versions 1 to " + std::to_string(kFormatVersion) +
+         "; use the hapticd that wrote it");
+  }
+  in.take(header_);
+  if (!in.ok() || !in.rest().empty()) fail("a header of another length than its content");
+  for (const RecordedDevice& device : header_.devices) {
+    if (device.names.empty()) fail("a device without a name");
+  }
+}
+
+bool RecordingReader::next(RecordingEvent& event) {
+  for (;;) {
+    if (ticks_) {
+      TickEvent& tick = event.emplace<TickEvent>();
+      tick.device = ticksOf_;
+      if (ticks_->next(tick.tick)) return true;
+      if (!ticks_->ok()) fail("a damaged tick");
+      ticks_.reset();
+    }
+    if (!blocks_.next(block_)) return false;
+    if (readBlock(event)) return true;
+  }
+}
+
+template <class Event>
+void RecordingReader::takeWhole(RecordingEvent& event) {
+  Unpacker in(block_.content);
+  in.take(event.emplace<Event>());
+  if (!in.ok() || !in.rest().empty()) fail("an event of another length than its content");
+}
+
+// False when the block is not an event by itself.
+bool RecordingReader::readBlock(RecordingEvent& event) {
+  std::uint32_t device = 0;
+  switch (block_.kind) {
+    case BlockKind::scene: {
+      std::string error;
+      if (!unpackSceneEvent(block_.content, event.emplace<SceneEvent>(), error)) fail(error);
+      return true;
+    }
+    case BlockKind::publish:
+      takeWhole<PublishEvent>(event);
+      device = std::get<PublishEvent>(event).device;
+      break;
+    case BlockKind::ticks: {
+      Unpacker in(block_.content);
+      device = ticksOf_ = in.next<std::uint32_t>();
+      ticks_.emplace(in.rest());
+      break;
+    }
+    case BlockKind::lost:
+      takeWhole<LostEvent>(event);
+      device = std::get<LostEvent>(event).device;
+      break;
+    case BlockKind::end:
+      takeWhole<EndEvent>(event);
+      ended_ = true;
+      return true;
+    default:  // of a newer version that added something
+      return false;
+  }
+  if (device >= header_.devices.size()) fail("there is no device " + std::to_string(device));
+  return !ticks_;
+}
+
+std::string RecordingReader::remark() const {
+  if (!blocks_.damage().empty()) return blocks_.damage() + "; what came before it was read";
+  if (!ended_) return "the recording has no end: the server was killed, or it still records";
+  return {};
+}
+
+}  // namespace hapticd::record

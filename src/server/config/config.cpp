@@ -1,0 +1,231 @@
+#include "server/config/config.h"
+
+#include <toml++/toml.h>
+#include <algorithm>
+#include <fstream>
+#include <limits>
+#include <set>
+#include <sstream>
+
+#include "server/config/config_fields.h"
+#include "server/config/vrpn_cfg.h"
+
+namespace hapticd::server {
+namespace {
+
+// Where a key stands in its file, for the error's first words.
+std::string where(const std::string& source, const toml::node& node) {
+  std::ostringstream text;
+  text << source << ":" << node.source().begin.line << ": ";
+  return text.str();
+}
+
+std::size_t editDistance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t cost = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, cost});
+    }
+  }
+  return row[b.size()];
+}
+
+// One table of the file; each key is read once, finish() rejects what nobody asked for.
+class Reader {
+ public:
+  Reader(const toml::table& table, std::string source) : table_(table), source_(std::move(source)) {}
+
+  void field(const std::string& key, double& out) { take<double>(key, out, "a number"); }
+  void field(const std::string& key, bool& out) { takeExact<bool>(key, out, "true or false"); }
+  void field(const std::string& key, std::string& out) {
+    takeExact<std::string>(key, out, "a text in quotes");
+  }
+  void field(const std::string& key, std::vector<std::string>& out) {
+    takeList(key, out, "a list of texts in quotes");
+  }
+  void field(const std::string& key, int& out) {
+    std::int64_t value = out;
+    takeExact<std::int64_t>(key, value, "a whole number");
+    if (value < std::numeric_limits<int>::min() || value > std::numeric_limits<int>::max()) {
+      fail(*find(key), key, "a smaller number");
+    }
+    out = static_cast<int>(value);
+  }
+  void milli(const std::string& key, double& out) {
+    if (find(key) == nullptr) return;
+    field(key, out);
+    out *= 1e-3;
+  }
+  void names(const std::string& key, std::vector<std::string>& out) {
+    const toml::node* single = find("name");
+    if (single != nullptr && find(key) != nullptr) fail(*single, "name", "no 'name' beside 'names'");
+    if (single != nullptr) {
+      out.resize(1);
+      field("name", out.front());
+    }
+    field(key, out);
+  }
+  void listen(const std::string& key, std::string& address, std::uint16_t& port) {
+    std::string text;
+    field(key, text);
+    if (text.empty()) return;
+    try {
+      parseListen(text, address, port);
+    } catch (const ConfigError& error) {
+      throw ConfigError(where(source_, *find(key)) + "listen: " + error.what());
+    }
+  }
+  void workspace(const std::string& key, std::vector<double>& out) {
+    const toml::node* node = find(key);
+    const char* expected = "\"device\", \"paper\" or six numbers";
+    if (node == nullptr || !node->is_string()) return takeList(key, out, expected);
+    const std::string choice = *node->value<std::string>();
+    if (choice != "paper" && choice != "device") fail(*node, key, expected);
+    out.clear();
+    if (choice == "paper") out.assign(kPaperWorkspace_mm.begin(), kPaperWorkspace_mm.end());
+  }
+
+  template <class Enum, std::size_t N>
+  void choice(const std::string& key, Enum& out, const Choices<Enum, N>& choices) {
+    const toml::node* node = find(key);
+    if (node == nullptr) return;
+    const auto value = node->value_exact<std::string>();
+    std::string expected;
+    for (const auto& [name, choice] : choices) {
+      if (value && *value == name) {
+        out = choice;
+        return;
+      }
+      expected += (expected.empty() ? "\"" : " or \"") + std::string(name) + "\"";
+    }
+    fail(*node, key, expected);
+  }
+
+  const toml::node* find(const std::string& key) {
+    known_.insert(key);
+    return table_.get(key);
+  }
+
+  void finish() const {
+    for (const auto& [key, node] : table_) {
+      const std::string name(key.str());
+      if (known_.count(name) != 0) continue;
+      const auto nearest = std::min_element(known_.begin(), known_.end(), [&](const auto& a, const auto& b) {
+        return editDistance(name, a) < editDistance(name, b);
+      });
+      throw ConfigError(where(source_, node) + "unknown key '" + name + "'; did you mean '" + *nearest +
+                        "'?");
+    }
+  }
+
+ private:
+  [[noreturn]] void fail(const toml::node& node, const std::string& key, const std::string& expected) const {
+    std::ostringstream value;
+    node.visit([&](const auto& n) { value << n; });
+    throw ConfigError(where(source_, node) + "'" + key + "' is " + value.str() + ", expected " + expected);
+  }
+
+  template <class T>
+  void take(const std::string& key, T& out, const char* expected) {
+    const toml::node* node = find(key);
+    if (node == nullptr) return;
+    const auto value = node->value<T>();
+    if (!value) fail(*node, key, expected);
+    out = *value;
+  }
+
+  template <class T>
+  void takeExact(const std::string& key, T& out, const char* expected) {
+    const toml::node* node = find(key);
+    if (node == nullptr) return;
+    const auto value = node->value_exact<T>();
+    if (!value) fail(*node, key, expected);
+    out = *value;
+  }
+
+  template <class T>
+  void takeList(const std::string& key, std::vector<T>& out, const char* expected) {
+    const toml::node* node = find(key);
+    if (node == nullptr) return;
+    const toml::array* list = node->as_array();
+    if (list == nullptr) fail(*node, key, expected);
+    out.clear();
+    for (const toml::node& item : *list) {
+      const auto value = item.value<T>();
+      if (!value) fail(*node, key, expected);
+      out.push_back(*value);
+    }
+  }
+
+  const toml::table& table_;
+  std::string source_;
+  std::set<std::string> known_;
+};
+
+DeviceConfig readDevice(const toml::table& table, const std::string& source) {
+  DeviceConfig device;
+  Reader reader(table, source);
+  visitFields(reader, device);
+  reader.finish();
+  return device;
+}
+
+std::vector<DeviceConfig> readDevices(const toml::node& node, const std::string& source) {
+  const toml::array* list = node.as_array();
+  if (list == nullptr || list->empty() || !list->is_array_of_tables()) {
+    throw ConfigError(where(source, node) + "'device' must be written as [[device]], once for each device");
+  }
+  std::vector<DeviceConfig> devices;
+  for (const toml::node& item : *list) devices.push_back(readDevice(*item.as_table(), source));
+  return devices;
+}
+
+// Where a value is set, or, when it is a default, what it belongs to.
+const toml::node& placeOf(const InvalidValue& error, const toml::table& root) {
+  const toml::table* table = &root;
+  const toml::array* devices = root.get_as<toml::array>("device");
+  if (error.device() && devices != nullptr) table = devices->get_as<toml::table>(*error.device());
+  const toml::node* node = table->get(error.key());
+  if (node == nullptr && error.key() == "names") node = table->get("name");
+  return node == nullptr ? *table : *node;
+}
+
+}  // namespace
+
+ServerConfig loadConfig(const std::filesystem::path& file, std::vector<std::string>& remarks) {
+  std::ifstream in(file);
+  if (!in) throw ConfigError("cannot read the configuration file '" + file.string() + "'");
+  std::ostringstream text;
+  text << in.rdbuf();
+  if (file.extension() == ".cfg") return parseVrpnCfg(text.str(), file.string(), remarks);
+  return parseConfig(text.str(), file.string());
+}
+
+ServerConfig parseConfig(const std::string& text, const std::string& source) {
+  toml::table root;
+  try {
+    root = toml::parse(text, source);
+  } catch (const toml::parse_error& error) {
+    std::ostringstream message;
+    message << source << ":" << error.source().begin.line << ": " << error.description();
+    throw ConfigError(message.str());
+  }
+  ServerConfig config;
+  Reader reader(root, source);
+  visitFields(reader, config);
+  if (const toml::node* node = reader.find("device")) config.devices = readDevices(*node, source);
+  reader.finish();
+  try {
+    validate(config);
+  } catch (const InvalidValue& error) {
+    throw ConfigError(where(source, placeOf(error, root)) + error.what());
+  }
+  return config;
+}
+
+}  // namespace hapticd::server

@@ -1,0 +1,78 @@
+// Every key of the configuration, named once: what reads a file and what writes one both walk through here.
+#pragma once
+
+#include <array>
+#include <utility>
+
+#include "server/config/config.h"
+
+namespace hapticd::server {
+
+template <class Enum, std::size_t N>
+using Choices = std::array<std::pair<const char*, Enum>, N>;
+
+inline constexpr Choices<MaterialScale, 2> kMaterialScales{
+    {{"reference", MaterialScale::reference}, {"device", MaterialScale::device}}};
+inline constexpr Choices<QuaternionOrder, 2> kQuaternionOrders{
+    {{"xyzw", QuaternionOrder::xyzw}, {"wxyz", QuaternionOrder::wxyz}}};
+inline constexpr Choices<ForceReport, 2> kForceReports{
+    {{"total", ForceReport::total}, {"normal", ForceReport::normal}}};
+inline constexpr Choices<WorkspaceFit, 2> kWorkspaceFits{
+    {{"published", WorkspaceFit::published}, {"enclose", WorkspaceFit::enclose}}};
+inline constexpr Choices<VibrationUnit, 2> kVibrationUnits{
+    {{"rad/s", VibrationUnit::radPerSecond}, {"Hz", VibrationUnit::hertz}}};
+inline constexpr Choices<VibrationFrame, 2> kVibrationFrames{
+    {{"stylus", VibrationFrame::stylus}, {"device", VibrationFrame::device}}};
+inline constexpr Choices<SceneOnDisconnect, 2> kSceneOnDisconnects{
+    {{"keep", SceneOnDisconnect::keep}, {"clear", SceneOnDisconnect::clear}}};
+inline constexpr Choices<Control, 3> kControls{
+    {{"any", Control::any}, {"first", Control::first}, {"list", Control::list}}};
+
+/// Calls `visitor` for each key of a [[device]] with the field that it stands for. `Device` may be const.
+template <class Visitor, class Device>
+void visitFields(Visitor& visitor, Device& device) {
+  visitor.names("names", device.names);
+  visitor.field("driver", device.driver);
+  visitor.field("hardware", device.hardware);
+  visitor.field("wheel_profile", device.wheelProfile);
+  visitor.field("calibrate", device.calibrate);
+  visitor.field("enable_forces", device.enableForces);
+  visitor.field("isolate", device.isolate);
+  visitor.field("hand", device.hand);
+  visitor.field("servo_rate_Hz", device.servoRate_Hz);
+  visitor.field("report_rate_Hz", device.reportRate_Hz);
+  visitor.milli("linear_tolerance_mm", device.linearTolerance_m);
+  visitor.field("angular_tolerance_rad", device.angularTolerance_rad);
+  visitor.milli("tool_radius_mm", device.toolRadius_m);
+  visitor.workspace("workspace", device.workspace_mm);
+  visitor.field("force_shading", device.forceShading);
+  visitor.choice("material_scale", device.materialScale, kMaterialScales);
+  visitor.choice("quaternion_order", device.quaternionOrder, kQuaternionOrders);
+  visitor.choice("force_report", device.forceReport, kForceReports);
+  visitor.choice("workspace_fit", device.workspaceFit, kWorkspaceFits);
+  visitor.choice("vibration_contact_unit", device.vibrationContactUnit, kVibrationUnits);
+  visitor.choice("vibration_motor_frame", device.vibrationMotorFrame, kVibrationFrames);
+  visitor.field("scene", device.scene);
+  visitor.choice("scene_on_disconnect", device.sceneOnDisconnect, kSceneOnDisconnects);
+  visitor.choice("control", device.control, kControls);
+  visitor.field("control_list", device.controlList);
+  visitor.field("black_box_dir", device.blackBoxDir);
+  visitor.field("black_box_keep", device.blackBoxKeep);
+}
+
+/// The same for the keys of the server itself, but for its devices.
+template <class Visitor, class Server>
+void visitFields(Visitor& visitor, Server& server) requires requires {
+  server.devices;
+}
+{
+  visitor.listen("listen", server.listenAddress, server.port);
+  visitor.field("allow_no_rt", server.allowNoRealtime);
+  visitor.field("seconds", server.seconds);
+  visitor.field("callback_hosts", server.callbackHosts);
+  visitor.field("record", server.record);
+  visitor.field("http", server.http);
+  visitor.field("http_allow", server.httpAllow);
+}
+
+}  // namespace hapticd::server

@@ -1,0 +1,98 @@
+#include <algorithm>
+#include <charconv>
+#include <cstdio>
+#include <sstream>
+
+#include "server/config/config_fields.h"
+
+namespace hapticd::server {
+namespace {
+
+std::string text(double value) {
+  char digits[32];
+  const auto end = std::to_chars(digits, digits + sizeof digits, value).ptr;
+  return {digits, end};
+}
+
+// The shortest number of thousandths that reads back as the same value.
+std::string thousandths(double value) {
+  char digits[32];
+  for (int precision = 15; precision < 17; ++precision) {
+    std::snprintf(digits, sizeof digits, "%.*g", precision, value * 1e3);
+    double back = 0;
+    std::from_chars(digits, digits + sizeof digits, back);
+    if (back * 1e-3 == value) return digits;
+  }
+  return text(value * 1e3);
+}
+
+std::string quoted(const std::string& value) {
+  std::string out = "\"";
+  for (const char c : value) {
+    if (c == '"' || c == '\\') {
+      out += {'\\', c};
+    } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
+      char escape[8];
+      std::snprintf(escape, sizeof escape, "\\u%04X", static_cast<unsigned>(c));
+      out += escape;
+    } else {
+      out += c;
+    }
+  }
+  return out + "\"";
+}
+
+class Writer {
+ public:
+  void field(const char* key, const std::string& value) { line(key, quoted(value)); }
+  void field(const char* key, bool value) { line(key, value ? "true" : "false"); }
+  void field(const char* key, int value) { line(key, std::to_string(value)); }
+  void field(const char* key, double value) { line(key, text(value)); }
+  void field(const char* key, const std::vector<std::string>& values) { list(key, values, quoted); }
+  void names(const char* key, const std::vector<std::string>& values) { field(key, values); }
+  void milli(const char* key, double value) { line(key, thousandths(value)); }
+  void listen(const char* key, const std::string& address, std::uint16_t port) {
+    field(key, address + ":" + std::to_string(port));
+  }
+  void workspace(const char* key, const std::vector<double>& box) {
+    if (box.empty()) {
+      field(key, std::string("device"));
+    } else if (std::ranges::equal(box, kPaperWorkspace_mm)) {
+      field(key, std::string("paper"));
+    } else {
+      list(key, box, text);
+    }
+  }
+  template <class Enum, std::size_t N>
+  void choice(const char* key, Enum value, const Choices<Enum, N>& choices) {
+    for (const auto& [name, choice] : choices) {
+      if (choice == value) field(key, std::string(name));
+    }
+  }
+
+  std::ostringstream out;
+
+ private:
+  void line(const char* key, const std::string& value) { out << key << " = " << value << "\n"; }
+
+  template <class T, class F>
+  void list(const char* key, const std::vector<T>& values, const F& toText) {
+    std::string all;
+    for (const T& value : values) all += (all.empty() ? "" : ", ") + toText(value);
+    line(key, "[" + all + "]");
+  }
+};
+
+}  // namespace
+
+std::string toToml(const ServerConfig& config) {
+  Writer writer;
+  visitFields(writer, config);
+  for (const DeviceConfig& device : config.devices) {
+    writer.out << "\n[[device]]\n";
+    visitFields(writer, device);
+  }
+  return writer.out.str();
+}
+
+}  // namespace hapticd::server

@@ -1,0 +1,134 @@
+#include "server/reports/outbox.h"
+
+#include <algorithm>
+
+namespace hapticd::server {
+namespace {
+
+std::shared_ptr<const net::Buffer> takeBuffer(wire::FrameEncoder& encoder) {
+  if (encoder.empty()) return nullptr;
+  net::Buffer bytes;
+  encoder.swapOut(bytes);
+  return std::make_shared<const net::Buffer>(std::move(bytes));
+}
+
+}  // namespace
+
+void Outbox::Group::add(const Outgoing& out, wire::Time time) {
+  std::visit(
+      [&]<class M>(const M& message) {
+        const bool mayBeLost = !out.reliable && M::kInfo.reliability == wire::Reliability::kLowLatency;
+        (mayBeLost ? lowLatency : reliable).add(time, name, message);
+      },
+      out.message);
+}
+
+Outbox::Outbox(const DeviceConfig& config, int buttonCount, std::vector<wire::LocalSender> names)
+    : config_(config),
+      buttonCount_(buttonCount),
+      names_(std::move(names)),
+      defaultChoice_{.kinds = wire::kReportDefault, .rate_Hz = config.reportRate_Hz} {}
+
+void Outbox::subscribe(Session& session, wire::LocalSender name) {
+  Listener& who = listener(session);
+  regroup(session, who);
+  for (const auto& group : who.groups) {
+    if (group->name == name) tellPresentState(session, name, *group);
+  }
+}
+
+ReportChoice Outbox::choiceOf(scene::ClientId client) const {
+  const auto entry = listeners_.find(client);
+  return entry == listeners_.end() ? defaultChoice_ : entry->second.choice;
+}
+
+void Outbox::choose(Session& session, const ReportChoice& choice) {
+  Listener& who = listener(session);
+  who.choice = choice;
+  regroup(session, who);
+  for (const auto& group : who.groups) tellPresentState(session, group->name, *group);
+}
+
+void Outbox::clientGone(scene::ClientId client) {
+  listeners_.erase(client);
+}
+
+Outbox::Listener& Outbox::listener(const Session& session) {
+  return listeners_.try_emplace(session.id(), Listener{.choice = defaultChoice_, .names = 0, .groups = {}})
+      .first->second;
+}
+
+void Outbox::regroup(const Session& session, Listener& listener) {
+  std::vector<std::shared_ptr<Group>> groups;
+  for (const wire::LocalSender name : names_) {
+    if (session.wants(name)) groups.push_back(group(name, listener.choice));
+  }
+  listener.groups = std::move(groups);
+  listener.names = session.namesWanted();
+}
+
+std::shared_ptr<Outbox::Group> Outbox::group(wire::LocalSender name, const ReportChoice& choice) {
+  std::erase_if(groups_, [](const auto& entry) { return entry.second.expired(); });
+  std::weak_ptr<Group>& known = groups_[{name.value, choice}];
+  std::shared_ptr<Group> group = known.lock();
+  if (!group) known = group = std::make_shared<Group>(name, Reporter(config_, buttonCount_, choice));
+  return group;
+}
+
+void Outbox::tellPresentState(Session& session, wire::LocalSender name, const Group& group) {
+  if (last_.tick == 0) return;  // the first tick will tell
+  std::vector<Outgoing> messages;
+  group.reporter.presentState(last_, frame_, messages);
+  for (const Outgoing& out : messages) {
+    std::visit([&](const auto& message) { session.sendReliably(name, message, lastTime_); }, out.message);
+  }
+  session.flush();
+}
+
+void Outbox::add(const realtime::TickReport& tick, const ReportFrame& frame, wire::Time time) {
+  const bool first = last_.tick == 0;
+  last_ = tick;
+  lastTime_ = time;
+  frame_ = frame;
+  for (const auto& [key, weak] : groups_) {
+    const std::shared_ptr<Group> group = weak.lock();
+    if (!group) continue;
+    outgoing_.clear();
+    // Who came before the first tick has heard nothing yet.
+    if (first) {
+      group->reporter.presentState(tick, frame, outgoing_);
+    } else {
+      group->reporter.update(tick, frame, outgoing_);
+    }
+    for (const Outgoing& out : outgoing_) group->add(out, time);
+  }
+}
+
+void Outbox::add(const wire::Message& message, wire::Time time) {
+  for (const auto& [key, weak] : groups_) {
+    if (const std::shared_ptr<Group> group = weak.lock()) group->add({message, true}, time);
+  }
+}
+
+bool Outbox::collect() {
+  bool any = false;
+  for (const auto& [key, weak] : groups_) {
+    const std::shared_ptr<Group> group = weak.lock();
+    if (!group) continue;
+    group->lowLatencyFrames = takeBuffer(group->lowLatency);
+    group->reliableFrames = takeBuffer(group->reliable);
+    any = any || group->lowLatencyFrames || group->reliableFrames;
+  }
+  return any;
+}
+
+void Outbox::send(Session& session) {
+  Listener& who = listener(session);
+  if (who.groups.empty() || who.names != session.namesWanted()) regroup(session, who);
+  for (const auto& group : who.groups) {
+    if (group->lowLatencyFrames) session.sendShared(group->lowLatencyFrames, net::Delivery::lowLatency);
+    if (group->reliableFrames) session.sendShared(group->reliableFrames, net::Delivery::reliable);
+  }
+}
+
+}  // namespace hapticd::server

@@ -1,0 +1,232 @@
+#include "server/session/session.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+
+#include "base/world.h"
+#include "wire/text.h"
+
+namespace hapticd::server {
+namespace {
+
+template <class... Ts>
+struct Overloaded : Ts... {
+  using Ts::operator()...;
+};
+template <class... Ts>
+Overloaded(Ts...) -> Overloaded<Ts...>;
+
+wire::PeerOptions peerOptions(const net::UdpSocket* udp) {
+  wire::PeerOptions options;
+  if (udp != nullptr) options.udp = wire::UdpAddress{udp->local().addressText(), udp->local().port};
+  return options;
+}
+
+}  // namespace
+
+std::string_view nameOf(SessionMode mode) {
+  return mode == SessionMode::tcp ? "tcp" : mode == SessionMode::udp ? "udp" : "web";
+}
+
+Session::Session(scene::ClientId id, SessionOwner& owner, const wire::LocalNames& names,
+                 const WallClock& clock, net::Connection connection, std::unique_ptr<net::UdpSocket> udp,
+                 SessionMode mode)
+    : id_(id),
+      owner_(owner),
+      names_(names),
+      clock_(clock),
+      connection_(std::move(connection)),
+      udp_(std::move(udp)),
+      peer_(names, peerOptions(udp_.get())),
+      mode_(mode),
+      description_(connection_.remote().text() + ", " + std::string(nameOf(mode))) {}
+
+ClientStatus Session::status() const {
+  ClientStatus status;
+  status.id = id_;
+  status.address = connection_.remote().text();
+  status.mode = nameOf(mode_);
+  for (const wire::LocalSender name : subscriptions_) {
+    if (name.value == 0) continue;  // VRPN's own
+    status.devices.push_back(names_.senders()[static_cast<std::size_t>(name.value)]);
+  }
+  status.connected_s = base::toSeconds(base::now() - since_);
+  const net::ConnectionStatistics stream = connection_.statistics();
+  status.bytesIn = stream.bytesIn;
+  status.bytesOut = stream.bytesOut;
+  status.dropped = stream.droppedBuffers;
+  status.queuedBytes = stream.queuedBytes;
+  status.unacknowledgedBytes = stream.unacknowledgedBytes;
+  if (udp_) {
+    const net::UdpStatistics& datagrams = udp_->statistics();
+    status.bytesIn += datagrams.bytesIn;
+    status.bytesOut += datagrams.bytesOut;
+    status.dropped += datagrams.dropped;
+  }
+  return status;
+}
+
+void Session::start() {
+  if (udp_) {
+    udp_->start(
+        {.onDatagram = [this](auto bytes, const auto& from) { onDatagram(bytes, from); }, .onRefused = {}});
+  }
+  connection_.start({.onConnected = {},
+                     .onBytes = [this](auto bytes) { onBytes(bytes); },
+                     .onDrained = {},
+                     .onClosed =
+                         [this](const std::string& reason) {
+                           owner_.onClosed(*this, failure_.empty() ? reason : failure_);
+                         }});
+  flush();
+}
+
+bool Session::wants(wire::LocalSender name) const noexcept {
+  return peer_.connected() && (subscriptions_.empty() || subscriptions_.count(name) != 0);
+}
+
+void Session::sendShared(const std::shared_ptr<const net::Buffer>& frames, net::Delivery delivery) {
+  if (!peer_.connected()) return;
+  if (delivery == net::Delivery::lowLatency && peer_.usesDatagrams()) {
+    wire::cutDatagrams(*frames, [this](wire::ByteView datagram) { udp_->sendTo(datagram, datagramPeer_); });
+    return;
+  }
+  drainPeer();  // what was queued earlier leaves earlier
+  connection_.send(frames, delivery);
+}
+
+void Session::flush() {
+  drainPeer();
+  connection_.flush();
+}
+
+void Session::pause() {
+  connection_.pauseReading();
+}
+void Session::resume() {
+  connection_.resumeReading();
+}
+
+void Session::close(const std::string& reason) {
+  failure_ = reason;
+  connection_.close(reason);
+}
+
+void Session::abort(const std::string& reason) {
+  failure_ = reason;
+  connection_.abort(reason);
+}
+
+void Session::refuse(const std::string& reason) {
+  if (inDatagram_) {
+    remark(reason);
+  } else {
+    close(reason);
+  }
+}
+
+void Session::drainPeer() {
+  net::Buffer bytes;
+  peer_.takeStream(bytes);
+  if (!bytes.empty()) connection_.send(std::make_shared<const net::Buffer>(std::move(bytes)));
+  if (udp_) {
+    peer_.takeDatagrams([this](wire::ByteView datagram) { udp_->sendTo(datagram, datagramPeer_); });
+  }
+}
+
+void Session::onBytes(std::span<const std::byte> bytes) {
+  constexpr std::size_t kPieceBytes = 8 * 1024;  // some tens of microseconds
+  while (!bytes.empty() && !peer_.failed()) {
+    const auto piece = bytes.first(std::min(kPieceBytes, bytes.size()));
+    bytes = bytes.subspan(piece.size());
+    peer_.feed(clock_.now(), piece, [this](const wire::Event& event) { onEvent(event); });
+    if (!bytes.empty()) owner_.onBreath();
+  }
+  owner_.onBatchEnd(*this);
+  if (peer_.failed()) {
+    connection_.abort(failure_);
+    return;
+  }
+  flush();
+}
+
+void Session::onDatagram(std::span<const std::byte> bytes, const net::Endpoint& from) {
+  // Anybody can send datagrams to a port; only the machine at the other end of the TCP connection is the
+  // client.
+  if (from.address != connection_.remote().address) return;
+  inDatagram_ = true;
+  peer_.feedDatagram(bytes, [this](const wire::Event& event) { onEvent(event); });
+  inDatagram_ = false;
+  owner_.onBatchEnd(*this);
+  flush();
+}
+
+void Session::onEvent(const wire::Event& event) {
+  std::visit(Overloaded{[this](const wire::MessageReceived& message) {
+                          if (message.local_sender.value < 0 || isOvertaken(message)) return;
+                          owner_.onMessage(*this, message);
+                        },
+                        [this](const wire::Connected& connected) {
+                          spdlog::info("client {} ({}) speaks VRPN {}", id_, description_, connected.version);
+                        },
+                        [this](const wire::SenderDescribed& described) { onSender(described.name); },
+                        [](const wire::TypeDescribed&) {},
+                        [this](const wire::UdpDescribed& described) { onUdp(described.address); },
+                        [this](const wire::LogRequested& requested) { onLogRequest(requested.request); },
+                        [this](const wire::Ignored& ignored) {
+                          spdlog::debug("client {}: {} ({})", id_, ignored.reason, ignored.value);
+                        },
+                        [this](const wire::ProtocolError& error) { failure_ = std::string(error.reason); }},
+             event);
+}
+
+// A client that ends a field or a plane says so by TCP, what it said before by UDP may come later and must
+// not bring it back.
+bool Session::isOvertaken(const wire::MessageReceived& message) {
+  if (message.kind == wire::kUnknownKind) return false;
+  wire::Time& last = lastReliable_[static_cast<std::size_t>(message.kind)];
+  const auto before = [](const wire::Time& a, const wire::Time& b) {
+    return a.seconds != b.seconds ? a.seconds < b.seconds : a.microseconds < b.microseconds;
+  };
+  if (inDatagram_) return before(message.time, last);
+  last = message.time;
+  return false;
+}
+
+void Session::onSender(std::string_view name) {
+  const auto ours = names_.findSender(name);
+  if (ours) {
+    if (subscriptions_.insert(*ours).second) owner_.onSubscribed(*this, *ours);
+    return;
+  }
+  std::string devices;
+  for (std::size_t i = 1; i < names_.senders().size(); ++i) devices += ' ' + names_.senders()[i];
+  remark("asks for " + wire::inQuotes(name) + ", which is no device here; there is" + devices);
+}
+
+void Session::onUdp(const wire::UdpAddress& address) {
+  try {
+    datagramPeer_ = net::Endpoint::parse(address.host, address.port);
+  } catch (const net::Error& error) {
+    remark(std::string("UDP address refused: ") + error.what());
+    return;
+  }
+  if (datagramPeer_.address != connection_.remote().address) {
+    remark("asks for datagrams to " + datagramPeer_.text() + ", which is not where it is; all goes by TCP");
+    return;
+  }
+  if (udp_) peer_.useDatagrams();
+}
+
+// Files that a stranger names are not written.
+void Session::onLogRequest(const wire::LogRequest& request) {
+  remark("asks for log files " + wire::inQuotes(request.in_name) + ", " + wire::inQuotes(request.out_name) +
+         ": refused");
+  send(wire::LocalSender{0}, wire::Text{.severity = wire::kTextWarning,
+                                        .level = 0,
+                                        .text = std::string("log files on the server are refused; log on "
+                                                            "the client")});
+}
+
+}  // namespace hapticd::server

@@ -1,0 +1,130 @@
+// One client: its connection, the protocol state on it, and which of our devices it listens to.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "base/world.h"
+#include "net/connection.h"
+#include "net/udp_socket.h"
+#include "scene/builder.h"
+#include "server/session/wall_clock.h"
+#include "server/session/client_status.h"
+#include "wire/peer.h"
+
+namespace hapticd::server {
+
+class Session;
+
+/// How a client is connected.
+enum class SessionMode { tcp, udp, web };
+std::string_view nameOf(SessionMode mode);
+
+/// What a session tells the server. Called from the net thread.
+class SessionOwner {
+ public:
+  virtual ~SessionOwner() = default;
+  /// The client listens to one of our names from now on.
+  virtual void onSubscribed(Session& session, wire::LocalSender name) = 0;
+  /// A message for one of our devices.
+  virtual void onMessage(Session& session, const wire::MessageReceived& message) = 0;
+  /// Worth a line in the log, but a client can cause it as often as it likes.
+  virtual void onRemark(const Session& session, const std::string& text) = 0;
+  /// Some messages of a long read have been given: a chance for what must not wait for the rest.
+  virtual void onBreath() = 0;
+  /// All messages of one read have been given.
+  virtual void onBatchEnd(Session& session) = 0;
+  /// Over, with the reason; the owner destroys the session after this returns.
+  virtual void onClosed(Session& session, const std::string& reason) = 0;
+};
+
+/// A connected client. Lives in the net thread.
+class Session {
+ public:
+  /// Without `udp` everything goes by the connection. The socket must be bound already.
+  Session(scene::ClientId id, SessionOwner& owner, const wire::LocalNames& names, const WallClock& clock,
+          net::Connection connection, std::unique_ptr<net::UdpSocket> udp, SessionMode mode);
+
+  /// Begins to talk: our cookie leaves, the client's is awaited.
+  void start();
+
+  scene::ClientId id() const noexcept { return id_; }
+  /// "127.0.0.1:40312, tcp" for logs.
+  const std::string& description() const noexcept { return description_; }
+  bool connected() const noexcept { return peer_.connected(); }
+
+  /// Whether reports under this name are wanted: those it described, or all while it has described none of
+  /// ours.
+  bool wants(wire::LocalSender name) const noexcept;
+  /// How many of our names it has described so far.
+  std::size_t namesWanted() const noexcept { return subscriptions_.size(); }
+  /// Where the client is, without the port.
+  std::string address() const { return connection_.remote().addressText(); }
+
+  /// Queues one message; it leaves with the next flush().
+  template <wire::WireMessage M>
+  void send(wire::LocalSender from, const M& message) {
+    peer_.send(clock_.now(), from, message);
+  }
+  /// The same with the time of what it tells, and by TCP whatever its kind: datagrams may overtake the names
+  /// that they need.
+  template <wire::WireMessage M>
+  void sendReliably(wire::LocalSender from, const M& message, wire::Time time) {
+    peer_.send(time, from, message, wire::Reliability::kReliable);
+  }
+  /// Queues frames that are shared with other clients; dropped first when this client reads too slowly if
+  /// lowLatency.
+  void sendShared(const std::shared_ptr<const net::Buffer>& frames, net::Delivery delivery);
+  /// Writes what is queued: one system call.
+  void flush();
+
+  /// A line in the log about this client, unless there are too many. Quote what the client said.
+  void remark(const std::string& text) { owner_.onRemark(*this, text); }
+
+  /// Stops reading while the scene is behind.
+  void pause();
+  void resume();
+  /// Ends it, with a reason for the log; onClosed follows.
+  void close(const std::string& reason);
+  /// The same at once, without waiting for a peer that may not read any more.
+  void abort(const std::string& reason);
+  /// The message now being given is no good. In the stream this ends the session; in a datagram, which
+  /// anybody at the client's address can forge, it is remarked and forgotten.
+  void refuse(const std::string& reason);
+
+  /// What the client is, and what went to and fro. Which device it commands, and how often it hears of it, is
+  /// left to the caller.
+  ClientStatus status() const;
+
+ private:
+  void onBytes(std::span<const std::byte> bytes);
+  void onDatagram(std::span<const std::byte> bytes, const net::Endpoint& from);
+  void onEvent(const wire::Event& event);
+  void onSender(std::string_view name);
+  void onUdp(const wire::UdpAddress& address);
+  void onLogRequest(const wire::LogRequest& request);
+  void drainPeer();
+  bool isOvertaken(const wire::MessageReceived& message);
+
+  scene::ClientId id_;
+  SessionOwner& owner_;
+  const wire::LocalNames& names_;
+  const WallClock& clock_;
+  net::Connection connection_;
+  std::unique_ptr<net::UdpSocket> udp_;
+  net::Endpoint datagramPeer_;
+  wire::Peer peer_;
+  SessionMode mode_;
+  base::Nanos since_ = base::now();
+  std::string description_;
+  std::set<wire::LocalSender> subscriptions_;
+  std::string failure_;
+  bool inDatagram_ = false;
+  std::array<wire::Time, wire::kMessageKinds> lastReliable_{};  // of each kind, by the client's clock
+};
+
+}  // namespace hapticd::server

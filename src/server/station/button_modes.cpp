@@ -1,0 +1,42 @@
+#include "server/station/button_modes.h"
+
+#include <string>
+
+namespace hapticd::server {
+
+bool ButtonModes::obey(const wire::ButtonAdmin& admin, std::vector<wire::ButtonAlert>& alerts,
+                       std::string& error) {
+  const bool momentary = admin.event == wire::kButtonMomentary;
+  const bool on = admin.event == wire::kButtonToggleOn;
+  if (!momentary && !on && admin.event != wire::kButtonToggleOff) {
+    error = "Button Admin: mode " + std::to_string(admin.event) +
+            " refused: 10 is momentary, 20 a toggle that starts off, 21 one that starts on";
+    return false;
+  }
+  const bool all = admin.button == wire::kAllButtons;
+  if (!all && (admin.button < 0 || admin.button >= count_)) {
+    error = "Button Admin: button " + std::to_string(admin.button) + " refused: there are " +
+            std::to_string(count_) + ", from 0; -99 means all";
+    return false;
+  }
+  for (std::int32_t i = all ? 0 : admin.button; i < (all ? count_ : admin.button + 1); ++i) {
+    const std::uint32_t bit = 1U << i;
+    toggles_ = momentary ? toggles_ & ~bit : toggles_ | bit;
+    on_ = on ? on_ | bit : on_ & ~bit;
+    alerts.push_back({i, on ? wire::kButtonToggleOn : wire::kButtonToggleOff});
+  }
+  return true;
+}
+
+std::uint32_t ButtonModes::apply(std::uint32_t pressed, std::vector<wire::ButtonAlert>& alerts) {
+  const std::uint32_t turned = pressed & ~before_ & toggles_;
+  before_ = pressed;
+  on_ ^= turned;
+  for (std::int32_t i = 0; i < count_; ++i) {
+    if ((turned >> i & 1U) == 0) continue;
+    alerts.push_back({i, (on_ >> i & 1U) != 0 ? wire::kButtonToggleOn : wire::kButtonToggleOff});
+  }
+  return (pressed & ~toggles_) | (on_ & toggles_);
+}
+
+}  // namespace hapticd::server

@@ -1,0 +1,72 @@
+#include "server/station/device_control.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "scene/workspace.h"
+#include "server/reports/view.h"
+
+namespace hapticd::server {
+namespace {
+
+using geometry::Quat;
+using geometry::Vec3;
+
+bool finite(const wire::HoldHand& m) {
+  const auto ok = [](double x) { return std::isfinite(x); };
+  return std::all_of(m.position.begin(), m.position.end(), ok) &&
+         std::all_of(m.orientation.begin(), m.orientation.end(), ok);
+}
+
+}  // namespace
+
+bool DeviceControl::hold(scene::ClientId client, const wire::HoldHand& wanted,
+                         const realtime::TickReport& last, std::string& error) {
+  if (simulated_ == nullptr) {
+    error = "Hold_Hand refused: this is a real device, only a simulated hand can be held";
+    return false;
+  }
+  if (holder_ && *holder_ != client) {
+    // Letting go of what one does not hold is no mistake worth a word.
+    if (wanted.hold == 0) return true;
+    error = "Hold_Hand refused: client " + std::to_string(*holder_) + " holds the hand";
+    return false;
+  }
+  if (wanted.hold == 0) {
+    letGo();
+    return true;
+  }
+  if (!finite(wanted)) {
+    error = "Hold_Hand refused: position or orientation is not finite";
+    return false;
+  }
+  const Quat orientation(wanted.orientation[3], wanted.orientation[0], wanted.orientation[1],
+                         wanted.orientation[2]);
+  if (orientation.norm() < 1e-6) {
+    error = "Hold_Hand refused: the orientation is a zero quaternion; 0 0 0 1 is no turn";
+    return false;
+  }
+  device::HandPose pose;
+  const Vec3 world(wanted.position[0], wanted.position[1], wanted.position[2]);
+  // Until the first tick has told, the workspace is the one that scenes begin with.
+  const geometry::Affine T_world_device =
+      last.tick == 0 ? scene::Workspace{}.T_world_device : last.T_world_device;
+  pose.position_m =
+      (T_world_device.inverse() * world).cwiseMax(workspace_m_.min).cwiseMin(workspace_m_.max);
+  pose.orientation = (Quat(rotationOf(last)).conjugate() * orientation).normalized();
+  pose.buttons = wanted.buttons;
+  holder_ = client;
+  simulated_->setTarget(pose);
+  return true;
+}
+
+void DeviceControl::clientGone(scene::ClientId client) {
+  if (holder_ == client) letGo();
+}
+
+void DeviceControl::letGo() {
+  if (!std::exchange(holder_, std::nullopt)) return;
+  simulated_->releaseTarget();
+}
+
+}  // namespace hapticd::server

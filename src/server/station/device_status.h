@@ -1,0 +1,31 @@
+// A device and its loop at one moment, as plain values: for the page and for metrics.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "realtime/servo/histogram.h"
+#include "realtime/servo/report.h"
+
+namespace hapticd::server {
+
+struct DeviceStatus {
+  std::vector<std::string> names;
+  std::string driver;
+  bool simulated = false;
+  std::size_t scene = 0;  ///< which of the server's
+  geometry::Box workspace_m;
+  double peakForce_N = 0;
+  double rate_Hz = 0;
+  bool realtime = false;  ///< the loop has its scheduling class
+  std::string hand;       ///< who moves it: scripted, file, held, user
+  std::optional<std::uint32_t> heldBy;
+  std::string fault;
+  std::uint64_t droppedReports = 0;
+  realtime::TickReport last;
+  realtime::Histogram::Copy period, wakeup, compute;
+};
+
+}  // namespace hapticd::server

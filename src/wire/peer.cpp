@@ -1,0 +1,217 @@
+#include "wire/peer.h"
+
+#include <algorithm>
+
+#include "wire/cookie.h"
+#include "wire/text.h"
+
+namespace hapticd::wire {
+
+namespace {
+
+template <class Entry>
+const Entry* described(const std::vector<Entry>& table, std::int32_t id) noexcept {
+  if (id < 0 || id >= std::ssize(table) || !table[static_cast<std::size_t>(id)].described) return nullptr;
+  return &table[static_cast<std::size_t>(id)];
+}
+
+template <class Entry>
+Entry& entryFor(std::vector<Entry>& table, std::int32_t id) {
+  const auto index = static_cast<std::size_t>(id);
+  if (index >= table.size()) table.resize(index + 1);
+  return table[index];
+}
+
+}  // namespace
+
+Peer::Peer(const LocalNames& names, PeerOptions options)
+    : names_(&names), options_(std::move(options)) {
+  stream_.append(encodeCookie(options_.log ? options_.log->mode : 0));
+}
+
+void Peer::feedStream(Time now, ByteView bytes, EventSink sink) {
+  announce(now);
+  // Whole units are handled where they lie; only one that was cut is put together in partial_.
+  while (!failed()) {
+    if (partial_.empty()) {
+      const std::size_t need = unitBytes(bytes);
+      if (bytes.size() < need) {
+        partial_.assign(bytes.begin(), bytes.end());
+        return;
+      }
+      handleUnit(now, bytes.first(need), sink);
+      bytes = bytes.subspan(need);
+    } else if (const std::size_t need = unitBytes(partial_); partial_.size() < need) {
+      const ByteView more = bytes.first(std::min(bytes.size(), need - partial_.size()));
+      if (more.empty()) return;
+      partial_.insert(partial_.end(), more.begin(), more.end());
+      bytes = bytes.subspan(more.size());
+    } else {
+      handleUnit(now, partial_, sink);
+      partial_.clear();
+    }
+  }
+}
+
+// How many bytes the cookie or frame that starts so has, as far as its start can tell; an invalid length
+// claims just the bytes that show it.
+std::size_t Peer::unitBytes(ByteView start) const noexcept {
+  if (state_ == State::kAwaitingCookie) return kCookieBytes;
+  constexpr std::size_t kLengthBytes = sizeof(std::uint32_t);
+  if (start.size() < kLengthBytes) return kLengthBytes;
+  FrameView frame;
+  if (readFrame(start, frame) == FrameStatus::kInvalid) return kLengthBytes;
+  return padded(loadBig<std::uint32_t>(start.data()));
+}
+
+void Peer::handleUnit(Time now, ByteView bytes, EventSink sink) {
+  if (state_ == State::kAwaitingCookie) return handleCookie(now, bytes, sink);
+  FrameView frame;
+  if (readFrame(bytes, frame) != FrameStatus::kComplete) return fail(invalidFrame(bytes), sink);
+  if (frame.header.type >= 0) return handleMessage(frame, sink);
+  handleSystem(frame, sink);
+}
+
+void Peer::handleCookie(Time now, ByteView bytes, EventSink sink) {
+  const Result<Cookie> cookie = decodeCookie(bytes);
+  if (!cookie) return fail(cookie.error(), sink);
+  state_ = State::kConnected;
+  if (options_.log)
+    stream_.addRaw(now, options_.log->mode, kLogDescription, encodeLogDescription(*options_.log));
+  if (options_.udp)
+    stream_.addRaw(now, options_.udp->port, kUdpDescription, encodeUdpDescription(*options_.udp));
+  announce(now);
+  sink(Connected{cookie->version, cookie->log_mode});
+}
+
+void Peer::handleSystem(const FrameView& frame, EventSink sink) {
+  const FrameHeader& header = frame.header;
+  if (header.type <= kFirstForbiddenType) {
+    return fail("message of type " + std::to_string(header.type) + ", the lowest is " +
+                    std::to_string(kFirstForbiddenType + 1),
+                sink);
+  }
+  switch (header.type) {
+    case kSenderDescription:
+    case kTypeDescription:
+      return handleDescription(frame, sink);
+    case kUdpDescription: {
+      if (!options_.udp) return sink(Ignored{"UDP description on a TCP-only connection", header.sender});
+      const Result<UdpAddress> address = decodeUdpDescription(header.sender, frame.payload);
+      if (!address) return fail(address.error(), sink);
+      return sink(UdpDescribed{*address});
+    }
+    case kLogDescription: {
+      const Result<LogRequest> request = decodeLogDescription(header.sender, frame.payload);
+      if (!request) return fail(request.error(), sink);
+      return sink(LogRequested{*request});
+    }
+    default:
+      return sink(Ignored{"unknown system message", header.type});
+  }
+}
+
+void Peer::handleDescription(const FrameView& frame, EventSink sink) {
+  const std::int32_t id = frame.header.sender;
+  if (id < 0 || id >= kMaxNames) {
+    return fail(
+        "description of number " + std::to_string(id) + ", expected 0 to " + std::to_string(kMaxNames - 1),
+        sink);
+  }
+  const Result<std::string_view> name = decodeDescription(frame.payload);
+  if (!name) return fail(name.error(), sink);
+  if (frame.header.type == kSenderDescription) {
+    SenderEntry& entry = entryFor(senders_, id);
+    entry = {std::string(*name), names_->findSender(*name).value_or(LocalSender{}), true};
+    sink(SenderDescribed{{id}, entry.name});
+  } else {
+    TypeEntry& entry = entryFor(types_, id);
+    entry = {std::string(*name), kindNamed(*name), true};
+    sink(TypeDescribed{{id}, entry.name, entry.kind});
+  }
+}
+
+void Peer::handleMessage(const FrameView& frame, EventSink sink) const {
+  const FrameHeader& header = frame.header;
+  const TypeEntry* type = described(types_, header.type);
+  if (!type) return sink(Ignored{"message of a type that was not described", header.type});
+  const SenderEntry* sender = described(senders_, header.sender);
+  if (!sender) return sink(Ignored{"message of a sender that was not described", header.sender});
+  sink(MessageReceived{type->kind,
+                       {header.type},
+                       {header.sender},
+                       sender->local,
+                       type->name,
+                       sender->name,
+                       header.time,
+                       frame.payload});
+}
+
+void Peer::feedPacket(ByteView datagram, EventSink sink) {
+  if (!connected())
+    return sink(Ignored{"datagram outside a connection", static_cast<std::int32_t>(datagram.size())});
+  FrameReader reader(datagram);
+  for (FrameView frame; reader.next(frame);) {
+    if (frame.header.type < 0) {
+      sink(Ignored{"system message in a datagram", frame.header.type});
+    } else {
+      handleMessage(frame, sink);
+    }
+  }
+  if (!reader.rest().empty()) {
+    sink(Ignored{"damaged datagram, bytes left", static_cast<std::int32_t>(reader.rest().size())});
+  }
+}
+
+void Peer::fail(const std::string& reason, EventSink sink) {
+  state_ = State::kFailed;
+  sink(ProtocolError{reason});
+}
+
+bool Peer::announce(Time now) {
+  if (!connected()) return false;
+  const auto& senders = names_->senders();
+  if (announced_senders_ < senders.size()) {
+    for (; announced_senders_ < senders.size(); ++announced_senders_) {
+      stream_.addRaw(now, static_cast<std::int32_t>(announced_senders_), kSenderDescription,
+                     encodeDescription(senders[announced_senders_]));
+    }
+    for (SenderEntry& entry : senders_) {
+      if (entry.described) entry.local = names_->findSender(entry.name).value_or(LocalSender{});
+    }
+  }
+  const auto& types = names_->types();
+  for (; announced_types_ < types.size(); ++announced_types_) {
+    stream_.addRaw(now, static_cast<std::int32_t>(announced_types_), kTypeDescription,
+                   encodeDescription(types[announced_types_]));
+  }
+  return true;
+}
+
+FrameEncoder& Peer::route(Reliability reliability, std::size_t frame_bytes) noexcept {
+  const bool fits = padded(frame_bytes) <= kMaxDatagramBytes;
+  return use_datagrams_ && fits && reliability == Reliability::kLowLatency ? datagrams_ : stream_;
+}
+
+bool Peer::sendRaw(Time time, LocalSender sender, LocalType type, ByteView payload,
+                       Reliability reliability) {
+  if (!announce(time)) return false;
+  route(reliability, kHeaderBytes + payload.size()).addRaw(time, sender.value, type.value, payload);
+  return true;
+}
+
+bool Peer::sendFrames(Time now, ByteView frames, Reliability reliability) {
+  if (!announce(now)) return false;
+  if (!use_datagrams_ || reliability == Reliability::kReliable) {
+    stream_.append(frames);
+    return true;
+  }
+  FrameReader reader(frames);
+  std::size_t start = 0;
+  for (FrameView frame; reader.next(frame); start += frame.size) {
+    route(reliability, frame.size).append(frames.subspan(start, frame.size));
+  }
+  return true;
+}
+
+}  // namespace hapticd::wire

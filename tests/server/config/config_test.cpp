@@ -1,0 +1,269 @@
+#include "server/config/config.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <sstream>
+
+namespace hapticd::server {
+namespace {
+
+std::string errorOf(const std::string& text) {
+  try {
+    parseConfig(text, "test.toml");
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Config, DefaultsAreOneSimulatedPhantomOnLoopback) {
+  const ServerConfig config = parseConfig("", "test.toml");
+  EXPECT_EQ(config.listenAddress, "127.0.0.1");
+  EXPECT_EQ(config.port, 3883);
+  ASSERT_EQ(config.devices.size(), 1U);
+  EXPECT_EQ(config.devices[0].names, std::vector<std::string>{"Phantom"});
+  EXPECT_EQ(config.devices[0].driver, "simulated");
+  EXPECT_EQ(config.devices[0].reportRate_Hz, 1000);
+  EXPECT_EQ(config.devices[0].linearTolerance_m, 0.001);
+}
+
+TEST(Config, ReadsEverySwitch) {
+  const ServerConfig config = parseConfig(R"(
+listen = "0.0.0.0:4000"
+callback_hosts = ["10.0.0.7"]
+record = "session-%H%M.haptics"
+http = "0.0.0.0:80"
+http_allow = ["lab7", "lab7.example.org:9000"]
+[[device]]
+names = ["Left", "Tracker0"]
+report_rate_Hz = 250
+linear_tolerance_mm = 0.5
+angular_tolerance_rad = 0.1
+tool_radius_mm = 2
+workspace = "paper"
+force_shading = true
+scene = "shared"
+control = "list"
+control_list = ["10.0.0.5", "10.0.0.6"]
+black_box_dir = "/var/lib/hapticd"
+black_box_keep = 3
+material_scale = "device"
+quaternion_order = "wxyz"
+force_report = "normal"
+workspace_fit = "enclose"
+vibration_contact_unit = "Hz"
+vibration_motor_frame = "device"
+scene_on_disconnect = "clear"
+[[device]]
+name = "Right"
+workspace = [-1, -2, -3, 4, 5, 6]
+)",
+                                          "test.toml");
+  EXPECT_EQ(config.listenAddress, "0.0.0.0");
+  EXPECT_EQ(config.port, 4000);
+  EXPECT_EQ(config.callbackHosts, std::vector<std::string>{"10.0.0.7"});
+  EXPECT_EQ(config.record, "session-%H%M.haptics");
+  EXPECT_EQ(config.http, "0.0.0.0:80");
+  EXPECT_EQ(config.httpAllow, (std::vector<std::string>{"lab7", "lab7.example.org:9000"}));
+  ASSERT_EQ(config.devices.size(), 2U);
+  const DeviceConfig& left = config.devices[0];
+  EXPECT_EQ(left.names, (std::vector<std::string>{"Left", "Tracker0"}));
+  EXPECT_EQ(left.reportRate_Hz, 250);
+  EXPECT_DOUBLE_EQ(left.linearTolerance_m, 0.0005);
+  EXPECT_DOUBLE_EQ(left.toolRadius_m, 0.002);
+  EXPECT_EQ(left.workspace_mm, (std::vector<double>{-80, -80, -70, 80, 80, 20}));
+  EXPECT_TRUE(left.forceShading);
+  EXPECT_EQ(left.scene, "shared");
+  EXPECT_EQ(left.control, Control::list);
+  EXPECT_EQ(left.controlList, (std::vector<std::string>{"10.0.0.5", "10.0.0.6"}));
+  EXPECT_EQ(left.blackBoxDir, "/var/lib/hapticd");
+  EXPECT_EQ(left.blackBoxKeep, 3);
+  EXPECT_EQ(left.materialScale, MaterialScale::device);
+  EXPECT_EQ(left.quaternionOrder, QuaternionOrder::wxyz);
+  EXPECT_EQ(left.forceReport, ForceReport::normal);
+  EXPECT_EQ(left.workspaceFit, WorkspaceFit::enclose);
+  EXPECT_EQ(left.vibrationContactUnit, VibrationUnit::hertz);
+  EXPECT_EQ(left.vibrationMotorFrame, VibrationFrame::device);
+  EXPECT_EQ(left.sceneOnDisconnect, SceneOnDisconnect::clear);
+  EXPECT_EQ(config.devices[1].names, std::vector<std::string>{"Right"});
+  EXPECT_EQ(config.devices[1].workspace_mm.front(), -1);
+}
+
+TEST(Config, ErrorsNameLineKeyValueAndRemedy) {
+  EXPECT_EQ(errorOf("listn = \"x\""), "test.toml:1: unknown key 'listn'; did you mean 'listen'?");
+  EXPECT_EQ(errorOf("\n[[device]]\nreport_rate_Hz = \"fast\""),
+            "test.toml:3: 'report_rate_Hz' is 'fast', expected a number");
+  EXPECT_EQ(errorOf("[[device]]\nmaterial_scale = \"big\""),
+            "test.toml:2: 'material_scale' is 'big', expected \"reference\" or \"device\"");
+  EXPECT_EQ(errorOf("[[device]]\nreport_rate_Hz = 2000"),
+            "test.toml:2: device 'Phantom': report_rate_Hz is 2000; it must lie between 0.1 and 1000");
+  EXPECT_EQ(errorOf("[[device]]\nname=\"A\"\n[[device]]\nname=\"A\""),
+            "test.toml:4: the name 'A' is given twice; each must be unique");
+  EXPECT_EQ(
+      errorOf("[[device]]\nname=\"A@B\""),
+      "test.toml:2: device name \"A@B\" must have 1 to 95 characters, no '@' and no control characters");
+  EXPECT_EQ(errorOf("[[device]]\nworkspace=[1,2,3]"),
+            "test.toml:2: device 'Phantom': workspace needs six numbers, min x y z then max x y z, in mm");
+  EXPECT_NE(errorOf("listen = ").find("test.toml:1: "), std::string::npos);
+  EXPECT_NE(errorOf("listen = \"1.2.3.4:70000\"").find("70000"), std::string::npos);
+}
+
+TEST(Config, ValuesThatNoServerCanLiveWithAreNamed) {
+  EXPECT_NE(errorOf("seconds = -5").find("seconds is -5"), std::string::npos);
+  EXPECT_NE(errorOf("seconds = nan").find("seconds is nan"), std::string::npos);
+  EXPECT_NE(errorOf("seconds = 1e300").find("1e+300"), std::string::npos);
+  EXPECT_NE(errorOf("callback_hosts = [\"foo bar\"]").find("\"foo bar\""), std::string::npos);
+  EXPECT_NE(errorOf("http = \"lab7:80\"").find("\"lab7:80\" is not ADDR:PORT"), std::string::npos);
+  EXPECT_NE(errorOf("http = \"127.0.0.1:99999\"").find("127.0.0.1:99999"), std::string::npos);
+  EXPECT_NE(errorOf("http_allow = [\"http://lab7/\"]").find("\"http://lab7/\""), std::string::npos);
+  EXPECT_NE(errorOf("http_allow = [\"lab7:\"]").find("\"lab7:\""), std::string::npos);
+  EXPECT_NE(errorOf("[[device]]\nname=\"a\\nb\"").find("\"a\\x0ab\""), std::string::npos);
+  EXPECT_NE(errorOf("[[device]]\nname=\"VRPN Control\"").find("'VRPN Control'"), std::string::npos);
+  EXPECT_NE(errorOf("[[device]]\nworkspace=[-1e300,0,0,1,1,1]").find("-1e+300"), std::string::npos);
+}
+
+TEST(Config, ValuesOutOfRangeAreNamedWithTheirLine) {
+  EXPECT_EQ(errorOf("\nseconds = -5"), "test.toml:2: seconds is -5; it must lie between 0 and 1e+09");
+  EXPECT_EQ(errorOf("listen = \"localhost:1\""),
+            "test.toml:1: listen: \"localhost\" is not an IPv4 address such as 127.0.0.1");
+  EXPECT_EQ(errorOf("[[device]]\nname=\"A\"\n[[device]]\nname=\"B\"\n\ndriver=\"hal\""),
+            "test.toml:6: device 'B': no driver is called 'hal'; there is simulated, openhaptics, "
+            "forcedimension, haply, evdev, replay");
+  // Nobody wrote the report rate that the servo cannot reach: its device is what can be pointed at.
+  EXPECT_EQ(errorOf("\n\n[[device]]\nservo_rate_Hz=500"),
+            "test.toml:3: device 'Phantom': report_rate_Hz is 1000; it must lie between 0.1 and 500");
+  EXPECT_EQ(errorOf("record=\"x.mcap\""),
+            "test.toml:1: record: a server writes session files, not 'x.mcap'; record to one called *.haptics, "
+            "then 'hapticd export FILE.haptics --to mcap'");
+  EXPECT_EQ(errorOf("[[device]]\nblack_box_keep=-1"),
+            "test.toml:2: device 'Phantom': black_box_keep is -1; it must lie between 0 and 1000");
+  EXPECT_EQ(errorOf("[[device]]\nblack_box_keep=2.5"),
+            "test.toml:2: 'black_box_keep' is 2.5, expected a whole number");
+  EXPECT_NE(errorOf("[[device]]\nblack_box_keep=99999999999").find("99999999999"), std::string::npos);
+  EXPECT_EQ(errorOf("[[device]]\nname=\"A\"\nnames=[\"B\"]"),
+            "test.toml:2: 'name' is 'A', expected no 'name' beside 'names'");
+}
+
+TEST(Config, WhoMayCommandIsSaidInFull) {
+  EXPECT_EQ(errorOf("[[device]]\ncontrol=\"list\""),
+            "test.toml:2: device 'Phantom': control is \"list\": name who may command, e.g. control_list = "
+            "[\"10.0.0.5\"]");
+  EXPECT_EQ(errorOf("[[device]]\ncontrol=\"first\"\ncontrol_list=[\"10.0.0.5\"]"),
+            "test.toml:3: device 'Phantom': control_list has no effect without control = \"list\"");
+  EXPECT_EQ(
+      errorOf("[[device]]\ncontrol=\"list\"\ncontrol_list=[\"10.0.0.5:80\"]"),
+      "test.toml:3: device 'Phantom': control_list: \"10.0.0.5:80\" is not an IPv4 address such as 10.0.0.5");
+  EXPECT_EQ(errorOf("[[device]]\ncontrol=\"nobody\""),
+            "test.toml:2: 'control' is 'nobody', expected \"any\" or \"first\" or \"list\"");
+}
+
+TEST(Config, DevicesThatShareASceneAgreeWhenItGoes) {
+  const std::string text = errorOf(
+      "[[device]]\nname=\"A\"\nscene=\"table\"\n[[device]]\nname=\"B\"\nscene=\"table\"\nscene_on_disconnect=\"clear\"");
+  EXPECT_EQ(text,
+            "test.toml:7: device 'B': the devices that share the scene 'table' disagree; it stays or goes for all");
+}
+
+// Everything differs from its default, so that a key that is not written or not read shows.
+ServerConfig unusual() {
+  ServerConfig config;
+  config.listenAddress = "0.0.0.0";
+  config.port = 4000;
+  config.allowNoRealtime = true;
+  config.seconds = 0.1;
+  config.callbackHosts = {"10.0.0.7", "10.0.0.8"};
+  config.record = "session.haptics";
+  config.http = "10.0.0.1:9000";
+  config.httpAllow = {"lab7"};
+  DeviceConfig device;
+  device.names = {"Left \"hand\" \\", "Tracker0"};
+  device.driver = "evdev";
+  device.hardware = "/dev/input/event5\t\n\x7f";
+  device.wheelProfile = "wheel.toml";
+  device.calibrate = true;
+  device.enableForces = true;
+  device.isolate = true;
+  device.hand = "hand.csv";
+  device.servoRate_Hz = 4000;
+  device.reportRate_Hz = 1.0 / 3;
+  device.linearTolerance_m = 0.3e-3;
+  device.angularTolerance_rad = 0.1;
+  device.toolRadius_m = 1e-3 / 3;
+  device.workspace_mm = {-1.5, -2, -3, 4, 5, 6};
+  device.materialScale = MaterialScale::device;
+  device.quaternionOrder = QuaternionOrder::wxyz;
+  device.forceReport = ForceReport::normal;
+  device.workspaceFit = WorkspaceFit::enclose;
+  device.vibrationContactUnit = VibrationUnit::hertz;
+  device.vibrationMotorFrame = VibrationFrame::device;
+  device.forceShading = true;
+  device.scene = "shared";
+  device.sceneOnDisconnect = SceneOnDisconnect::clear;
+  device.control = Control::list;
+  device.controlList = {"10.0.0.5"};
+  device.blackBoxDir = "/tmp/boxes";
+  device.blackBoxKeep = 3;
+  config.devices = {device, DeviceConfig{}};
+  config.devices[1].names = {"Right"};
+  config.devices[1].workspace_mm.assign(kPaperWorkspace_mm.begin(), kPaperWorkspace_mm.end());
+  config.devices[1].control = Control::first;
+  return config;
+}
+
+TEST(Config, WhatIsWrittenReadsBackTheSame) {
+  EXPECT_EQ(parseConfig(toToml(ServerConfig{}), "written"), ServerConfig{});
+  const ServerConfig config = unusual();
+  const std::string text = toToml(config);
+  EXPECT_EQ(parseConfig(text, "written"), config) << text;
+  EXPECT_EQ(toToml(parseConfig(text, "written")), text);
+  EXPECT_NE(text.find("linear_tolerance_mm = 0.3\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("workspace = \"paper\"\n"), std::string::npos) << text;
+}
+
+// So the test above notices any key that is not written, not read, or mixed up with another.
+TEST(Config, TheUnusualConfigurationDiffersFromTheUsualOneInEveryKey) {
+  std::istringstream usual(toToml(ServerConfig{}));
+  std::string unusualText = toToml(unusual());
+  unusualText.resize(unusualText.rfind("[[device]]"));
+  int keys = 0;
+  for (std::string line; std::getline(usual, line);) {
+    if (line.find(" = ") == std::string::npos) continue;
+    ++keys;
+    EXPECT_EQ(unusualText.find(line + "\n"), std::string::npos) << line;
+  }
+  EXPECT_GE(keys, 30);
+}
+
+TEST(Config, BlackBoxesGoToTheStateDirectoryOfTheUser) {
+  const auto with = [](const char* state, const char* home) {
+    state != nullptr ? setenv("XDG_STATE_HOME", state, 1) : unsetenv("XDG_STATE_HOME");
+    home != nullptr ? setenv("HOME", home, 1) : unsetenv("HOME");
+    return defaultBlackBoxDir().string();
+  };
+  const char* before = std::getenv("HOME");
+  const std::string home = before != nullptr ? before : "/";
+  EXPECT_EQ(with("/state", "/home/ana"), "/state/hapticd");
+  EXPECT_EQ(with("relative", "/home/ana"), "/home/ana/.local/state/hapticd");
+  EXPECT_EQ(with(nullptr, "/home/ana"), "/home/ana/.local/state/hapticd");
+  EXPECT_EQ(with("", "/home/ana"), "/home/ana/.local/state/hapticd");
+  EXPECT_EQ(std::filesystem::path(with(nullptr, nullptr)).filename(), "hapticd");
+  setenv("HOME", home.c_str(), 1);
+}
+
+TEST(Config, ListenTakesAddressPortOrBoth) {
+  std::string address = "127.0.0.1";
+  std::uint16_t port = 3883;
+  parseListen(":4000", address, port);
+  EXPECT_EQ(address, "127.0.0.1");
+  EXPECT_EQ(port, 4000);
+  parseListen("0.0.0.0", address, port);
+  EXPECT_EQ(address, "0.0.0.0");
+  EXPECT_EQ(port, 4000);
+  EXPECT_THROW(parseListen("host:", address, port), ConfigError);
+  EXPECT_THROW(parseListen("host:12x", address, port), ConfigError);
+}
+
+}  // namespace
+}  // namespace hapticd::server

@@ -1,0 +1,148 @@
+#include "server/config/vrpn_cfg.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+namespace hapticd::server {
+namespace {
+
+struct Parsed {
+  ServerConfig config;
+  std::vector<std::string> remarks;
+};
+
+Parsed parse(const std::string& text) {
+  Parsed parsed;
+  parsed.config = parseVrpnCfg(text, "vrpn.cfg", parsed.remarks);
+  return parsed;
+}
+
+std::string errorOf(const std::string& text) {
+  try {
+    parse(text);
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+const std::vector<double> kPaper{-80, -80, -70, 80, 80, 20};
+
+TEST(VrpnCfg, ALineOfThePapersServer) {
+  const auto [config, remarks] = parse("vrpn_OpenHaptics Phantom0 1 500 0.5 0.05 Default PHANToM\n");
+  EXPECT_TRUE(remarks.empty());
+  ASSERT_EQ(config.devices.size(), 1U);
+  const DeviceConfig& device = config.devices[0];
+  EXPECT_EQ(device.names, std::vector<std::string>{"Phantom0"});
+  EXPECT_EQ(device.driver, "openhaptics");
+  EXPECT_TRUE(device.calibrate);
+  EXPECT_FALSE(device.enableForces);
+  EXPECT_EQ(device.reportRate_Hz, 500);
+  EXPECT_DOUBLE_EQ(device.linearTolerance_m, 0.0005);
+  EXPECT_EQ(device.angularTolerance_rad, 0.05);
+  EXPECT_EQ(device.hardware, "Default PHANToM");
+  EXPECT_EQ(device.workspace_mm, kPaper);
+}
+
+TEST(VrpnCfg, ALineOfStockVrpn) {
+  const DeviceConfig device = parse("vrpn_Phantom\tPhantom0\t0\t60.0\tDefault PHANToM").config.devices.at(0);
+  EXPECT_EQ(device.names, std::vector<std::string>{"Phantom0"});
+  EXPECT_EQ(device.driver, "openhaptics");
+  EXPECT_FALSE(device.calibrate);
+  EXPECT_EQ(device.reportRate_Hz, 60);
+  EXPECT_EQ(device.linearTolerance_m, 0.001);
+  EXPECT_EQ(device.hardware, "Default PHANToM");
+  EXPECT_TRUE(device.workspace_mm.empty());
+}
+
+TEST(VrpnCfg, CommentsBlanksAndOtherDevicesAreLeftOut) {
+  const auto [config, remarks] = parse(
+      "\xEF\xBB\xBF# our laboratory\r\n"
+      "\r\n"
+      "   \t \r\n"
+      "  #vrpn_Phantom Old 1 60 Default PHANToM\r\n"
+      "vrpn_Tracker_NULL Tracker0 2 60.0\r\n"
+      "  vrpn_OpenHaptics Left 0 1000 1.0 0.02 Left Device  #2 \r\n"
+      "vrpn_Phantom Right 1 1000 Right Device\r\n");
+  ASSERT_EQ(config.devices.size(), 2U);
+  EXPECT_EQ(config.devices[0].names.front(), "Left");
+  EXPECT_EQ(config.devices[0].hardware, "Left Device  #2");
+  EXPECT_EQ(config.devices[1].names.front(), "Right");
+  EXPECT_EQ(config.devices[1].hardware, "Right Device");
+  ASSERT_EQ(remarks.size(), 1U);
+  EXPECT_EQ(remarks[0],
+            "vrpn.cfg:5: \"vrpn_Tracker_NULL\" is no device of this server (vrpn_OpenHaptics, vrpn_Phantom): "
+            "skipped");
+}
+
+TEST(VrpnCfg, WhatIsMissingAtTheEndHasDefaults) {
+  const DeviceConfig bare = parse("vrpn_OpenHaptics Phantom").config.devices.at(0);
+  EXPECT_FALSE(bare.calibrate);
+  EXPECT_EQ(bare.reportRate_Hz, 1000);
+  EXPECT_DOUBLE_EQ(bare.linearTolerance_m, 0.001);
+  EXPECT_EQ(bare.angularTolerance_rad, 0.02);
+  EXPECT_EQ(bare.hardware, "");
+  EXPECT_EQ(parse("vrpn_Phantom Phantom 1 60 # no name: the first").config.devices.at(0).hardware, "");
+}
+
+TEST(VrpnCfg, MoreReportsThanTicksAreRemarked) {
+  const auto [config, remarks] = parse("\nvrpn_Phantom Phantom 1 5000 X");
+  EXPECT_EQ(config.devices.at(0).reportRate_Hz, 1000);
+  ASSERT_EQ(remarks.size(), 1U);
+  EXPECT_EQ(remarks[0],
+            "vrpn.cfg:2: report_rate_Hz is 5000: reports come with each of the 1000 servo ticks a second");
+}
+
+TEST(VrpnCfg, ErrorsNameTheLine) {
+  const std::string form = "; the line reads vrpn_Phantom NAME calibrate(0|1) report_rate_Hz DEVICE";
+  EXPECT_EQ(errorOf("#\nvrpn_Phantom"), "vrpn.cfg:2: the name is missing" + form);
+  EXPECT_EQ(errorOf("vrpn_Phantom P yes 60 X"), "vrpn.cfg:1: calibrate is \"yes\", expected 0 or 1" + form);
+  EXPECT_EQ(errorOf("vrpn_Phantom P 1 60,0 X"),
+            "vrpn.cfg:1: report_rate_Hz is \"60,0\", expected a number" + form);
+  EXPECT_EQ(
+      errorOf("\n\nvrpn_OpenHaptics P 1 60 Default PHANToM"),
+      "vrpn.cfg:3: linear_tolerance_mm is \"Default\", expected a number; the line reads vrpn_OpenHaptics "
+      "NAME reset_position(0|1) report_rate_Hz linear_tolerance_mm angular_tolerance_rad DEVICE");
+  EXPECT_EQ(errorOf("vrpn_Phantom P 1 0 X"),
+            "vrpn.cfg:1: device 'P': report_rate_Hz is 0; it must lie between 0.1 and 1000");
+  EXPECT_EQ(errorOf("vrpn_OpenHaptics P 1 60 -1 0 X"),
+            "vrpn.cfg:1: device 'P': linear_tolerance_mm is -1; it must lie between 0 and 1000");
+  EXPECT_EQ(errorOf("vrpn_OpenHaptics P 1 nan 1 0 X"),
+            "vrpn.cfg:1: device 'P': report_rate_Hz is nan; it must lie between 0.1 and 1000");
+  EXPECT_EQ(errorOf("vrpn_Phantom P 1 60 X\nvrpn_Phantom P 1 60 Y"),
+            "vrpn.cfg:2: the name 'P' is given twice; each must be unique");
+  EXPECT_EQ(errorOf("vrpn_Phantom P@Q 1 60 X"),
+            "vrpn.cfg:1: device name \"P@Q\" must have 1 to 95 characters, no '@' and no control characters");
+}
+
+TEST(VrpnCfg, AFileWithoutDevicesOfOursIsAnError) {
+  EXPECT_NE(
+      errorOf("# nothing\n").find("vrpn.cfg: no line names a device of this server; one reads vrpn_Open"),
+      std::string::npos);
+}
+
+TEST(VrpnCfg, WrittenAsTomlItReadsBackTheSame) {
+  const ServerConfig config =
+      parse("vrpn_OpenHaptics Left 0 333 0.3 0.02 Left Device\nvrpn_Phantom Right 1 60 \"Right\" \\Device")
+          .config;
+  EXPECT_EQ(parseConfig(toToml(config), "written"), config);
+}
+
+TEST(VrpnCfg, TheNameOfTheFileTellsItsForm) {
+  const std::filesystem::path directory = std::filesystem::path(testing::TempDir()) / "vrpn_cfg_test";
+  std::filesystem::create_directories(directory);
+  std::ofstream(directory / "vrpn.cfg") << "vrpn_Dial Dial0 1 2 3\nvrpn_Phantom P 1 60 X\n";
+  std::ofstream(directory / "hapticd.toml") << "listen = \":4000\"\n";
+  std::vector<std::string> remarks;
+  EXPECT_EQ(loadConfig(directory / "vrpn.cfg", remarks).devices.at(0).names.front(), "P");
+  ASSERT_EQ(remarks.size(), 1U);
+  EXPECT_NE(remarks[0].find("vrpn.cfg:1: \"vrpn_Dial\""), std::string::npos) << remarks[0];
+  EXPECT_EQ(loadConfig(directory / "hapticd.toml", remarks).port, 4000);
+  EXPECT_THROW(loadConfig(directory / "none.toml", remarks), ConfigError);
+  std::filesystem::remove_all(directory);
+}
+
+}  // namespace
+}  // namespace hapticd::server

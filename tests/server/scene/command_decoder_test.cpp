@@ -1,0 +1,146 @@
+#include "server/scene/command_decoder.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "server/session/roles.h"
+
+#include "wire/codec.h"
+
+namespace hapticd::server {
+namespace {
+
+class CommandDecoderTest : public ::testing::Test {
+ protected:
+  template <wire::WireMessage M>
+  CommandDecoder::Outcome give(const M& message, scene::ClientId client = 1) {
+    std::vector<std::byte> payload(wire::payloadSize(message));
+    wire::encodePayload(message, payload.data());
+    return giveRaw(wire::kindOf<M>, payload, client);
+  }
+  CommandDecoder::Outcome giveRaw(wire::MessageKind kind, const std::vector<std::byte>& payload,
+                         scene::ClientId client = 1) {
+    wire::MessageReceived received;
+    received.kind = kind;
+    received.payload = payload;
+    return decoder_.take(client, received, error_);
+  }
+  template <class Command>
+  const Command& only() {
+    tasks_ = decoder_.release();
+    EXPECT_EQ(tasks_.size(), 1U);
+    return std::get<Command>(std::get<scene::SceneCommand>(tasks_.front().what));
+  }
+
+  CommandDecoder decoder_;
+  std::string error_;
+  std::vector<SceneTask> tasks_;
+};
+
+TEST_F(CommandDecoderTest, NeighbouringVerticesBecomeOneRun) {
+  for (int i = 0; i < 5; ++i) give(wire::SetVertex{3, i, {static_cast<float>(i), 1, 2}});
+  const auto& run = only<scene::SetVertices>();
+  EXPECT_EQ(run.object, 3);
+  EXPECT_EQ(run.first, 0);
+  ASSERT_EQ(run.positions.size(), 5U);
+  EXPECT_EQ(run.positions[4], geometry::Vec3f(4, 1, 2));
+}
+
+TEST_F(CommandDecoderTest, AnythingElseEndsTheRunAndOrderIsKept) {
+  give(wire::SetVertex{0, 0, {}});
+  give(wire::SetVertex{0, 2, {}});     // a gap
+  give(wire::SetVertex{1, 3, {}});     // another object
+  give(wire::SetVertex{1, 4, {}}, 2);  // another client
+  give(wire::SetObjectNumber{4}, 2);
+  give(wire::SetVertex{1, 5, {}}, 2);
+  give(wire::SetVertex{1, -1, {}}, 2);  // negative: the scene refuses it, alone
+  give(wire::SetVertex{1, 0, {}}, 2);
+  EXPECT_EQ(decoder_.release().size(), 8U);
+  EXPECT_TRUE(decoder_.empty());
+}
+
+TEST_F(CommandDecoderTest, TrianglesBecomeRunsAndKeepNegativeCornersRefusable) {
+  give(wire::SetTriangle{0, 0, {0, 1, 2}, {-1, -1, -1}});
+  give(wire::SetTriangle{0, 1, {2, 1, -5}, {-1, -1, -1}});
+  const auto& run = only<scene::SetTriangles>();
+  ASSERT_EQ(run.triangles.size(), 2U);
+  EXPECT_EQ(run.triangles[0], (geometry::Triangle{0, 1, 2}));
+  EXPECT_EQ(run.triangles[1][2], 0xFFFFFFFFU);
+}
+
+TEST_F(CommandDecoderTest, WrongLengthIsMalformedAndChangesNothing) {
+  EXPECT_EQ(giveRaw(wire::kindOf<wire::SetVertex>, std::vector<std::byte>(19)), CommandDecoder::Outcome::malformed);
+  EXPECT_NE(error_.find("19 bytes, expected 20"), std::string::npos) << error_;
+  EXPECT_EQ(giveRaw(wire::kindOf<wire::SetObjectNumber>, std::vector<std::byte>(5)),
+            CommandDecoder::Outcome::malformed);
+  EXPECT_TRUE(decoder_.empty());
+}
+
+TEST_F(CommandDecoderTest, QuestionsAndReportsAreNoCommands) {
+  EXPECT_EQ(give(wire::Ping{}), CommandDecoder::Outcome::notACommand);
+  EXPECT_EQ(give(wire::TrackerRequestWorkspace{}), CommandDecoder::Outcome::notACommand);
+  EXPECT_EQ(give(wire::Force{}), CommandDecoder::Outcome::notACommand);
+  EXPECT_TRUE(decoder_.empty());
+}
+
+TEST_F(CommandDecoderTest, NamesAreCutAtTheFirstNul) {
+  wire::SetHapticProperty property;
+  property.property = wire::NameBuffer<20>("static friction");
+  property.value = 0.5F;
+  give(property);
+  EXPECT_EQ(only<scene::SetSurfaceProperty>().name, "static friction");
+}
+
+TEST_F(CommandDecoderTest, StopOfTheCustomEffectIsItsOwnCommand) {
+  give(wire::CustomEffect{wire::kStopCustomEffect, {}});
+  only<scene::StopCustomEffect>();
+  give(wire::CustomEffect{0, {{1.0F, 2.0F}}});
+  EXPECT_EQ(only<scene::StartCustomEffect>().parameters.size(), 2U);
+}
+
+// Every message that commands a scene has its way in: a new one that is forgotten here fails.
+TEST_F(CommandDecoderTest, EveryCommandIsTheScenesOrTheDevices) {
+  const auto isTheDevices = [](wire::MessageKind kind) {
+    return kind == wire::kindOf<wire::ButtonAdmin> || kind == wire::kindOf<wire::TrackerResetOrigin> ||
+           kind == wire::kindOf<wire::RearmForces> || kind == wire::kindOf<wire::HoldHand> ||
+           kind == wire::kindOf<wire::GetNewObjectId>;  // registered by VRPN, never sent
+  };
+  const auto check = [&]<std::size_t... I>(std::index_sequence<I...>) {
+    (
+        [&] {
+          using M = std::variant_alternative_t<I, wire::Message>;
+          const bool isTheScenes = isCommand(wire::kindOf<M>) && !isTheDevices(wire::kindOf<M>);
+          EXPECT_EQ(give(M{}) == CommandDecoder::Outcome::taken, isTheScenes) << M::kInfo.name;
+        }(),
+        ...);
+  };
+  check(std::make_index_sequence<std::variant_size_v<wire::Message>>{});
+}
+
+TEST_F(CommandDecoderTest, BulkMeshesAreRunsInTheMeshesOwnUnit) {
+  EXPECT_EQ(give(wire::MeshVertices{3, 10, {{0, 1, 2, 3, 4, 5}}}), CommandDecoder::Outcome::taken);
+  EXPECT_EQ(give(wire::MeshTriangles{3, 7, {{0, 1, 2, 2, 1, -1}}}), CommandDecoder::Outcome::taken);
+  const auto tasks = decoder_.release();
+  ASSERT_EQ(tasks.size(), 2U);
+  const auto& vertices = std::get<scene::SetVertices>(std::get<scene::SceneCommand>(tasks[0].what));
+  EXPECT_EQ(vertices.object, 3);
+  EXPECT_EQ(vertices.first, 10);
+  ASSERT_EQ(vertices.positions.size(), 2U);
+  EXPECT_EQ(vertices.positions[1], geometry::Vec3f(3, 4, 5));
+  const auto& triangles = std::get<scene::SetTriangles>(std::get<scene::SceneCommand>(tasks[1].what));
+  EXPECT_EQ(triangles.first, 7);
+  EXPECT_FALSE(triangles.makesMetres);
+  ASSERT_EQ(triangles.triangles.size(), 2U);
+  EXPECT_EQ(triangles.triangles[0], (geometry::Triangle{0, 1, 2}));
+  EXPECT_EQ(triangles.triangles[1][2], std::numeric_limits<std::uint32_t>::max());
+}
+
+TEST_F(CommandDecoderTest, BulkListsOfBrokenTriplesAreMalformed) {
+  EXPECT_EQ(give(wire::MeshVertices{0, 0, {{0, 1}}}), CommandDecoder::Outcome::malformed);
+  EXPECT_EQ(give(wire::MeshTriangles{0, 0, {{0, 1, 2, 3}}}), CommandDecoder::Outcome::malformed);
+  EXPECT_TRUE(decoder_.empty());
+}
+
+}  // namespace
+}  // namespace hapticd::server

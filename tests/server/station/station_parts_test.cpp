@@ -1,0 +1,227 @@
+// Small parts between clients and a device: buttons, roles, heartbeats, holding the hand, black boxes.
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "base/time.h"
+#include "server/station/black_box_recorder.h"
+#include "server/station/button_modes.h"
+#include "server/station/device_control.h"
+#include "server/session/heartbeats.h"
+#include "server/session/roles.h"
+
+namespace hapticd::server {
+namespace {
+
+namespace fs = std::filesystem;
+using geometry::Vec3;
+
+TEST(ButtonModes, AToggleChangesWhenItsButtonGoesDown) {
+  ButtonModes modes(2);
+  std::vector<wire::ButtonAlert> alerts;
+  std::string error;
+  EXPECT_EQ(modes.apply(1, alerts), 1U);  // momentary at first
+  EXPECT_EQ(modes.apply(0, alerts), 0U);
+  EXPECT_TRUE(alerts.empty());
+
+  ASSERT_TRUE(modes.obey({0, wire::kButtonToggleOff}, alerts, error));
+  EXPECT_EQ(alerts.size(), 1U);
+  alerts.clear();
+  EXPECT_EQ(modes.apply(1, alerts), 1U);
+  EXPECT_EQ(modes.apply(1, alerts), 1U);  // held
+  EXPECT_EQ(modes.apply(0, alerts), 1U);  // released, still on
+  ASSERT_EQ(alerts.size(), 1U);
+  EXPECT_EQ(alerts[0].event, wire::kButtonToggleOn);
+  EXPECT_EQ(modes.apply(3, alerts), 2U);  // off again; the other is momentary
+  ASSERT_EQ(alerts.size(), 2U);
+  EXPECT_EQ(alerts[1].event, wire::kButtonToggleOff);
+}
+
+TEST(ButtonModes, AllButtonsAndStartingOn) {
+  ButtonModes modes(2);
+  std::vector<wire::ButtonAlert> alerts;
+  std::string error;
+  ASSERT_TRUE(modes.obey({wire::kAllButtons, wire::kButtonToggleOn}, alerts, error));
+  EXPECT_EQ(modes.apply(0, alerts), 3U);
+  ASSERT_TRUE(modes.obey({1, wire::kButtonMomentary}, alerts, error));
+  EXPECT_EQ(modes.apply(0, alerts), 1U);
+}
+
+TEST(ButtonModes, RefusesWhatDoesNotExist) {
+  ButtonModes modes(2);
+  std::vector<wire::ButtonAlert> alerts;
+  std::string error;
+  EXPECT_FALSE(modes.obey({2, wire::kButtonToggleOn}, alerts, error));
+  EXPECT_NE(error.find("button 2 refused"), std::string::npos);
+  EXPECT_FALSE(modes.obey({0, 11}, alerts, error));
+  EXPECT_NE(error.find("mode 11 refused"), std::string::npos);
+  EXPECT_TRUE(alerts.empty());
+}
+
+TEST(Roles, AnyFirstAndList) {
+  Roles any(Control::any, {});
+  EXPECT_TRUE(any.mayCommand(1, "10.0.0.1") && any.mayCommand(2, "10.0.0.2"));
+
+  Roles first(Control::first, {});
+  EXPECT_TRUE(first.mayCommand(1, "10.0.0.1"));
+  EXPECT_FALSE(first.mayCommand(2, "10.0.0.1"));
+  EXPECT_NE(first.reason().find("client 1"), std::string::npos);
+  first.clientGone(2);
+  EXPECT_FALSE(first.mayCommand(2, "10.0.0.1"));
+  first.clientGone(1);
+  EXPECT_TRUE(first.mayCommand(2, "10.0.0.1"));
+
+  Roles list(Control::list, {"10.0.0.5"});
+  EXPECT_TRUE(list.mayCommand(1, "10.0.0.5"));
+  EXPECT_FALSE(list.mayCommand(1, "10.0.0.6"));
+}
+
+TEST(Roles, WatchingAskingAndStoppingAreNoCommands) {
+  EXPECT_FALSE(isCommand(wire::kindOf<wire::Ping>));
+  EXPECT_FALSE(isCommand(wire::kindOf<wire::Text>));
+  EXPECT_FALSE(isCommand(wire::kindOf<wire::StopForces>));
+  EXPECT_FALSE(isCommand(wire::kindOf<wire::Subscribe>));
+  EXPECT_FALSE(isCommand(wire::kUnknownKind));
+  EXPECT_TRUE(isCommand(wire::kindOf<wire::RearmForces>));
+  EXPECT_TRUE(isCommand(wire::kindOf<wire::SetVertex>));
+  EXPECT_TRUE(isCommand(wire::kindOf<wire::BatchBegin>));
+  EXPECT_TRUE(isCommand(wire::kindOf<wire::ButtonAdmin>));
+}
+
+TEST(Heartbeats, OnlyWhoBeganAndCeasedIsLost) {
+  Heartbeats beats;
+  beats.beat(1, 0);
+  beats.beat(2, 0);
+  beats.beat(2, 300'000'000);
+  EXPECT_TRUE(beats.lost(500'000'000).empty());
+  EXPECT_EQ(beats.lost(500'000'001), (std::vector<scene::ClientId>{1}));
+  EXPECT_TRUE(beats.lost(600'000'000).empty());  // said once
+  beats.forget(2);
+  EXPECT_TRUE(beats.lost(9'000'000'000).empty());
+}
+
+class HoldTest : public ::testing::Test {
+ protected:
+  HoldTest() {
+    last_.tick = 1;
+    last_.T_world_device = Eigen::Translation3d(100, 0, 0) * Eigen::UniformScaling<double>(1000.0);
+  }
+  // Where the hand is after a second.
+  Vec3 handLater() {
+    device::DeviceState state;
+    for (int i = 0; i < 2000; ++i) {
+      EXPECT_TRUE(hand_.read(now_ += 1'000'000, state));
+      hand_.write(Vec3::Zero());
+    }
+    return state.position_m;
+  }
+
+  device::SimulatedDevice hand_;
+  realtime::GuardControl guard_{true};
+  DeviceControl control_{guard_, &hand_, hand_.profile().workspace_m};
+  realtime::TickReport last_;
+  base::Nanos now_ = 0;
+  std::string error_;
+};
+
+TEST_F(HoldTest, TheHandGoesWhereItsHolderWantsAndBackWhenLetGo) {
+  hand_.open();
+  ASSERT_TRUE(control_.hold(1, {.hold = 1, .position = {110, 20, 0}}, last_, error_)) << error_;
+  EXPECT_NEAR((handLater() - Vec3(0.01, 0.02, 0)).norm(), 0, 1e-4);
+  EXPECT_FALSE(control_.hold(2, {.hold = 1, .position = {0, 0, 0}}, last_, error_));
+  EXPECT_NE(error_.find("client 1 holds the hand"), std::string::npos);
+  EXPECT_TRUE(control_.hold(2, {.hold = 0}, last_, error_));  // no effect
+  EXPECT_NEAR((handLater() - Vec3(0.01, 0.02, 0)).norm(), 0, 1e-4);
+  control_.clientGone(1);
+  EXPECT_NEAR(handLater().norm(), 0, 1e-4);  // rests at the centre
+  EXPECT_TRUE(control_.hold(2, {.hold = 1, .position = {100, 0, 10}}, last_, error_));
+  EXPECT_NEAR((handLater() - Vec3(0, 0, 0.01)).norm(), 0, 1e-4);
+}
+
+TEST_F(HoldTest, NoHandReachesBeyondItsArm) {
+  hand_.open();
+  ASSERT_TRUE(control_.hold(1, {.hold = 1, .position = {100, 20000, 0}}, last_, error_));
+  EXPECT_NEAR((handLater() - Vec3(0, hand_.profile().workspace_m.max.y(), 0)).norm(), 0, 1e-4);
+}
+
+TEST_F(HoldTest, RefusesWhatIsNoPoseAndRealDevices) {
+  EXPECT_FALSE(control_.hold(1, {.hold = 1, .position = {NAN, 0, 0}}, last_, error_));
+  EXPECT_FALSE(control_.hold(1, {.hold = 1, .orientation = {0, 0, 0, 0}}, last_, error_));
+  EXPECT_NE(error_.find("zero quaternion"), std::string::npos);
+  DeviceControl real(guard_, nullptr, {});
+  EXPECT_FALSE(real.canBeHeld());
+  EXPECT_FALSE(real.hold(1, {.hold = 1}, last_, error_));
+  EXPECT_NE(error_.find("real device"), std::string::npos);
+}
+
+class BlackBoxFilesTest : public ::testing::Test {
+ protected:
+  BlackBoxFilesTest()
+      : directory_(fs::path(::testing::TempDir()) / ("black_box_" + std::to_string(::getpid()))) {}
+  ~BlackBoxFilesTest() override { fs::remove_all(directory_); }
+
+  void fail(realtime::BlackBox& box, int ticks) {
+    realtime::TickReport tick;
+    for (int i = 1; i <= ticks; ++i) {
+      tick.tick = static_cast<std::uint64_t>(i);
+      tick.force_N = Vec3(0, 0, i);
+      if (i == ticks) tick.guard.latched = realtime::bit(realtime::Trip::speed);
+      box.record(tick);
+    }
+    box.freeze();
+  }
+  std::vector<fs::path> files() const {
+    std::vector<fs::path> found;
+    for (const auto& entry : fs::directory_iterator(directory_ / "Phantom_1")) found.push_back(entry.path());
+    return found;
+  }
+
+  fs::path directory_;
+};
+
+TEST_F(BlackBoxFilesTest, AFaultIsWrittenWithTheTicksBeforeIt) {
+  realtime::BlackBox box(5);
+  BlackBoxRecorder recorder("Phantom/1", {directory_, 3}, box);
+  recorder.look();
+  EXPECT_FALSE(fs::exists(directory_));
+  fail(box, 8);
+  recorder.look();
+  recorder.finish();
+  ASSERT_EQ(files().size(), 1U);
+  EXPECT_NE(files()[0].filename().string().find("-speed.csv"), std::string::npos);
+  std::ifstream in(files()[0]);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(in, line);) lines.push_back(line);
+  ASSERT_EQ(lines.size(), 6U);
+  const auto columns = [](const std::string& line) { return std::count(line.begin(), line.end(), ','); };
+  for (const std::string& line : lines) EXPECT_EQ(columns(line), columns(lines[0]));
+  EXPECT_TRUE(lines[1].starts_with("4,"));
+  EXPECT_TRUE(lines[5].starts_with("8,"));
+  EXPECT_TRUE(lines[5].ends_with(",speed"));
+}
+
+TEST_F(BlackBoxFilesTest, OnlyTheNewestAreKept) {
+  realtime::BlackBox box(5);
+  BlackBoxRecorder recorder("Phantom/1", {directory_, 2}, box);
+  for (int i = 0; i < 4; ++i) {
+    fail(box, 2);
+    recorder.look();
+    recorder.finish();
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));  // the names hold milliseconds
+  }
+  EXPECT_EQ(files().size(), 2U);
+}
+
+TEST(Trips, AreInTheDocumentByBit) {
+  std::ifstream in(HAPTICD_TESTDATA "/../docs/safety.md");
+  const std::string text((std::istreambuf_iterator<char>(in)), {});
+  ASSERT_FALSE(text.empty());
+  for (const realtime::TripInfo& trip : realtime::kTrips) {
+    const std::string row = "| " + std::to_string(static_cast<int>(trip.trip)) + " | `" +
+                            std::string(trip.name) + "` |";
+    EXPECT_NE(text.find(row), std::string::npos) << row;
+  }
+}
+
+}  // namespace
+}  // namespace hapticd::server
