@@ -6,7 +6,6 @@
 #include <chrono>
 
 #include "base/world.h"
-#include "server/session/wall_clock.h"
 
 namespace hapticd::server {
 namespace {
