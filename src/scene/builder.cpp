@@ -60,6 +60,8 @@ class SceneBuilder::State {
     return next;
   }
 
+  std::optional<Nanos> oldestEdit() const { return objects_.oldestEdit(); }
+
   std::shared_ptr<const SceneSnapshot> publish(Nanos now, std::vector<Notice>& out) {
     board_.flush(now, out);
     const bool forces = forces_.update(now, board_, out);
@@ -220,6 +222,10 @@ void SceneBuilder::clientGone(ClientId client, Nanos now) {
 
 std::optional<Nanos> SceneBuilder::nextDeadline() const {
   return state_->nextDeadline();
+}
+
+std::optional<Nanos> SceneBuilder::oldestEdit() const {
+  return state_->oldestEdit();
 }
 
 std::shared_ptr<const SceneSnapshot> SceneBuilder::publish(Nanos now, std::vector<Notice>& notices) {

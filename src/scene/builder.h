@@ -34,6 +34,10 @@ class SceneBuilder {
   /// When publish() has something to do although no command came; nothing to wait for when empty.
   std::optional<Nanos> nextDeadline() const;
 
+  /// The oldest edit that is applied but not yet published: meshes wait for a pause between edits. Empty when all is
+  /// published.
+  std::optional<Nanos> oldestEdit() const;
+
   /// The scene as it is now, or null when nothing changed since the last time. The first call always gives
   /// one. Builds the meshes that are due, which may take long; appends notices that became due.
   std::shared_ptr<const SceneSnapshot> publish(Nanos now, std::vector<Notice>& notices);

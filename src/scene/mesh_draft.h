@@ -73,6 +73,8 @@ class MeshDraft {
   bool finished() const { return finished_; }
   /// When edits should be published; nothing when there are none.
   std::optional<Nanos> due() const;
+  /// The oldest edit that is not published yet; nothing when there is none.
+  std::optional<Nanos> oldestEdit() const { return dirty_ ? std::optional(firstEdit_) : std::nullopt; }
   bool hasBeenPublished() const { return current_ != nullptr; }
 
   /// Gives the mesh with all edits, null when it has no triangles. `clock` gives the time that the work has

@@ -38,6 +38,16 @@ Affine ObjectTable::frameOf(const Object& object) const {
   return object.parent == Object::kScene ? Affine(T_world_scene_ * local) : local;
 }
 
+std::optional<Nanos> ObjectTable::oldestEdit() const {
+  std::optional<Nanos> oldest;
+  for (const std::int32_t id : edited_) {
+    const Object* object = find(id);
+    if (object == nullptr) continue;
+    if (const auto edit = object->mesh.oldestEdit()) oldest = std::min(oldest.value_or(*edit), *edit);
+  }
+  return oldest;
+}
+
 std::optional<Nanos> ObjectTable::nextDeadline() const {
   std::optional<Nanos> next;
   for (const std::int32_t id : edited_) {

@@ -112,6 +112,8 @@ class ObjectTable {
   void reset();
 
   std::optional<Nanos> nextDeadline() const;
+  /// The oldest edit of a mesh that is not published yet.
+  std::optional<Nanos> oldestEdit() const;
   /// Brings `published` up to date; false when nothing changed. Remarks on surfaces go to who set them.
   bool publish(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   const PublishedObjects& published() const { return published_; }

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "server/scene/scene_thread.h"
+#include "server/scene/scene_task.h"
 #include "wire/peer.h"
 
 namespace hapticd::server {

@@ -2,7 +2,8 @@
 
 namespace hapticd::server {
 
-void SceneHost::start(SceneThread::Callbacks callbacks) {
+void SceneHost::start(SceneThread::Callbacks callbacks, Post post) {
+  post_ = std::move(post);
   thread_ = std::make_unique<SceneThread>(std::move(devices_), std::move(callbacks));
   thread_->start();
 }
@@ -11,45 +12,51 @@ void SceneHost::stop() {
   if (thread_) thread_->stop();
 }
 
-CommandDecoder::Outcome SceneHost::take(scene::ClientId client, const wire::MessageReceived& message,
-                               std::string& error) {
-  const CommandDecoder::Outcome outcome = decoder_.take(client, message, error);
-  if (outcome == CommandDecoder::Outcome::taken) commanders_.insert(client);
-  return outcome;
+bool SceneHost::take(scene::ClientId client, const wire::MessageReceived& message, std::string& error) {
+  return decoder_.take(client, message, error) == CommandDecoder::Outcome::taken;
 }
 
-bool SceneHost::flush() {
-  if (!thread_) return true;
-  if (!decoder_.empty()) {
-    const std::size_t bytes = decoder_.bytes();
-    thread_->enqueue(decoder_.release(), bytes);
+void SceneHost::flush(scene::ClientId client) {
+  if (decoder_.empty() || !thread_) return;
+  commanders_.insert(client);
+  const std::size_t bytes = decoder_.bytes();
+  thread_->push({client, decoder_.release(), bytes});
+}
+
+void SceneHost::whenPublished(scene::ClientId client, std::function<void()> reached) {
+  flush(client);
+  if (!thread_ || !thread_->queue().pending(client)) {
+    reached();
+    return;
   }
-  return !thread_->full();
+  push({client, WhenPublished{[post = post_, reached = std::move(reached)] { post(reached); }}});
 }
 
 void SceneHost::play(scene::ClientId client, const scene::SceneCommand* command) {
-  std::vector<SceneTask> tasks;
   if (command != nullptr) {
-    tasks.push_back({client, *command});
+    push({client, *command});
   } else {
-    tasks.push_back({client, ClientGone{}});
+    push({client, ClientGone{}});
   }
-  thread_->enqueue(std::move(tasks), sizeof(SceneTask));
 }
 
 void SceneHost::clientGone(scene::ClientId client) {
-  decoder_.add({client, ClientGone{}});
+  if (!thread_) return;
+  flush(client);
+  push({client, ClientGone{}});
   const bool lastToCommand = commanders_.erase(client) == 1 && commanders_.empty();
-  if (lastToCommand && onDisconnect_ == SceneOnDisconnect::clear) {
-    decoder_.add({client, scene::SceneCommand{scene::ResetScene{}}});
-  }
-  flush();
+  if (lastToCommand && onDisconnect_ == SceneOnDisconnect::clear)
+    push({client, scene::SceneCommand{scene::ResetScene{}}});
 }
 
 void SceneHost::describe(std::function<void(std::shared_ptr<const scene::SceneDescription>)> answer) {
-  std::vector<SceneTask> question;
-  question.push_back({0, DescribeScene{std::move(answer)}});
-  if (thread_) thread_->enqueue(std::move(question), 0);
+  if (thread_) push({0, DescribeScene{std::move(answer)}}, 0);
+}
+
+void SceneHost::push(SceneTask&& task, std::size_t bytes) {
+  SceneParcel parcel{.client = task.client, .tasks = {}, .bytes = bytes};
+  parcel.tasks.push_back(std::move(task));
+  thread_->push(std::move(parcel));
 }
 
 }  // namespace hapticd::server

@@ -3,7 +3,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <chrono>
 
 #include "base/world.h"
 
@@ -12,7 +11,7 @@ namespace {
 
 constexpr base::Nanos kCollectAfter = 50'000'000;
 
-// What every device's builder says is said once.
+// Deduplicate notices: every device's builder emits the same ones.
 void mergeNotices(std::vector<scene::Notice>&& from, std::vector<scene::Notice>& into) {
   for (scene::Notice& notice : from) {
     const auto same = [&](const scene::Notice& known) {
@@ -20,6 +19,10 @@ void mergeNotices(std::vector<scene::Notice>&& from, std::vector<scene::Notice>&
     };
     if (std::none_of(into.begin(), into.end(), same)) into.push_back(std::move(notice));
   }
+}
+
+void keepEarlier(std::optional<base::Nanos>& next, std::optional<base::Nanos> at) {
+  if (at) next = std::min(next.value_or(*at), *at);
 }
 
 }  // namespace
@@ -38,81 +41,52 @@ SceneThread::~SceneThread() {
 
 void SceneThread::start() {
   publish();
-  thread_ = std::thread([this] { run(); });
+  thread_ = base::Thread({.name = "scene"}, [this] { return step(); });
 }
 
 void SceneThread::stop() {
-  {
-    const std::lock_guard lock(mutex_);
-    stopping_ = true;
-  }
-  wake_.notify_one();
-  if (thread_.joinable()) thread_.join();
+  if (!thread_.running()) return;
+  thread_.stop();
+  while (!queue_.empty()) step();
 }
 
-void SceneThread::enqueue(std::vector<SceneTask>&& tasks, std::size_t bytes) {
-  if (tasks.empty()) return;
-  {
-    const std::lock_guard lock(mutex_);
-    if (queue_.empty()) {
-      queue_ = std::move(tasks);
-    } else {
-      queue_.insert(queue_.end(), std::make_move_iterator(tasks.begin()),
-                    std::make_move_iterator(tasks.end()));
-    }
-    queuedBytes_ += bytes;
-    wasFull_ = wasFull_ || queuedBytes_ > kQueueLimit_bytes;
-  }
-  wake_.notify_one();
+void SceneThread::push(SceneParcel&& parcel) {
+  queue_.push(std::move(parcel));
+  thread_.wake();
 }
 
-bool SceneThread::full() const {
-  const std::lock_guard lock(mutex_);
-  return wasFull_;
+std::optional<base::Nanos> SceneThread::step() {
+  applySlice();
+  publish();
+  answerQuestions();
+  const std::optional<base::Nanos> oldestEdit = this->oldestEdit();
+  queue_.published(oldestEdit);
+  callWaiting(oldestEdit);
+  return queue_.empty() ? nextDeadline() : base::now();
 }
 
-void SceneThread::run() {
-  std::vector<SceneTask> tasks;
-  for (;;) {
-    bool relieved = false;
-    {
-      std::unique_lock lock(mutex_);
-      const auto ready = [this] { return stopping_ || !queue_.empty(); };
-      // After a change the servo soon gives back what it replaced, which may be a large mesh: wake once to
-      // free it.
-      const std::optional<base::Nanos> deadline = nextDeadline();
-      if (deadline) {
-        wake_.wait_for(
-            lock, std::chrono::nanoseconds(std::max<base::Nanos>(*deadline - base::now(), 0)), ready);
-      } else {
-        wake_.wait(lock, ready);
-      }
-      if (stopping_ && queue_.empty()) return;
-      tasks.clear();
-      tasks.swap(queue_);
-      queuedBytes_ = 0;
-      relieved = std::exchange(wasFull_, false);
-    }
-    if (relieved && callbacks_.drained) callbacks_.drained();
-    apply(tasks);
-    publish();
-    answerQuestions();
-  }
-}
-
+// After a change the servo soon returns the snapshot that it replaced, which may hold a large mesh: wake once to free it.
 std::optional<base::Nanos> SceneThread::nextDeadline() const {
   std::optional<base::Nanos> next = collectAt_;
-  for (const Seat& seat : seats_) {
-    const auto deadline = seat.builder.nextDeadline();
-    if (deadline && (!next || *deadline < *next)) next = deadline;
-  }
+  for (const Seat& seat : seats_) keepEarlier(next, seat.builder.nextDeadline());
   return next;
 }
 
-void SceneThread::apply(std::vector<SceneTask>& tasks) {
-  for (SceneTask& task : tasks) {
+void SceneThread::applySlice() {
+  for (std::size_t bytes = 0; bytes < kSlice_bytes;) {
+    std::optional<SceneParcel> parcel = queue_.take();
+    if (!parcel) return;
+    apply(*parcel);
+    bytes += parcel->bytes;
+    const bool relieved = queue_.done(parcel->client, parcel->bytes, base::now());
+    if (relieved && callbacks_.relieved) callbacks_.relieved(parcel->client);
+  }
+}
+
+void SceneThread::apply(SceneParcel& parcel) {
+  for (SceneTask& task : parcel.tasks) {
     try {
-      tell(std::move(task));
+      apply(std::move(task));
     } catch (const std::exception& error) {
       notices_.push_back(
           {task.client, scene::Notice::Severity::error, std::string("not done: ") + error.what()});
@@ -120,26 +94,45 @@ void SceneThread::apply(std::vector<SceneTask>& tasks) {
   }
 }
 
-void SceneThread::tell(SceneTask&& task) {
+void SceneThread::apply(SceneTask&& task) {
   if (auto* question = std::get_if<DescribeScene>(&task.what)) {
     questions_.push_back(std::move(*question));
     return;
   }
+  if (auto* wanted = std::get_if<WhenPublished>(&task.what)) {
+    waiting_.push_back({base::now(), std::move(wanted->reached)});
+    return;
+  }
   const base::Nanos now = base::now();
   auto* command = std::get_if<scene::SceneCommand>(&task.what);
-  if (callbacks_.telling) callbacks_.telling(task.client, now, command);
-  std::vector<scene::Notice> again;
+  if (callbacks_.applying) callbacks_.applying(task.client, now, command);
+  std::vector<scene::Notice> repeated;
   for (std::size_t i = seats_.size(); i-- > 0;) {
     scene::SceneBuilder& builder = seats_[i].builder;
     if (command == nullptr) {
       builder.clientGone(task.client, now);
     } else if (i > 0) {
-      builder.apply(task.client, scene::SceneCommand(*command), now, again);
+      builder.apply(task.client, scene::SceneCommand(*command), now, repeated);
     } else {
       builder.apply(task.client, std::move(*command), now, notices_);
     }
   }
-  mergeNotices(std::move(again), notices_);
+  mergeNotices(std::move(repeated), notices_);
+}
+
+// Builders delay the publication of a mesh until its edits have paused.
+std::optional<base::Nanos> SceneThread::oldestEdit() const {
+  std::optional<base::Nanos> oldest;
+  for (const Seat& seat : seats_) keepEarlier(oldest, seat.builder.oldestEdit());
+  return oldest;
+}
+
+void SceneThread::callWaiting(std::optional<base::Nanos> oldestEdit) {
+  const auto published = [&](const Waiting& waiting) { return !oldestEdit || *oldestEdit > waiting.since; };
+  for (const Waiting& waiting : waiting_) {
+    if (published(waiting)) waiting.reached();
+  }
+  std::erase_if(waiting_, published);
 }
 
 void SceneThread::publish() {
@@ -169,19 +162,19 @@ void SceneThread::answerQuestions() {
 }
 
 void SceneThread::publishTo(Seat& seat) {
-  std::vector<scene::Notice> said;
+  std::vector<scene::Notice> notices;
   const base::Nanos now = base::now();
   std::shared_ptr<const scene::SceneSnapshot> snapshot;
-  // First, so that the builder can refit the index that the servo gave back instead of building a new one.
+  // First, so that the builder can refit the index that the servo returned instead of building a new one.
   seat.device.slot->collect();
   try {
-    snapshot = seat.builder.publish(now, said);
+    snapshot = seat.builder.publish(now, notices);
   } catch (...) {
     if (seat.device.publishing) seat.device.publishing(now, 0);
     throw;
   }
   if (seat.device.publishing) seat.device.publishing(now, snapshot ? snapshot->revision : 0);
-  mergeNotices(std::move(said), notices_);
+  mergeNotices(std::move(notices), notices_);
   if (!snapshot) return;
   seat.device.slot->publish(snapshot);
   collectAt_ = base::now() + kCollectAfter;
