@@ -40,13 +40,18 @@ struct ConnectionOptions {
 /// What a connection tells its owner; any may be empty.
 struct ConnectionHandlers {
   /// An outgoing connection is established.
-  std::function<void()> onConnected;
+  std::function<void()> onConnected = {};
   /// Bytes came (up to 256 KiB, valid during the call only). An exception ends the connection.
-  std::function<void(std::span<const std::byte>)> onBytes;
+  std::function<void(std::span<const std::byte>)> onBytes = {};
   /// The queue is empty again after the system had refused a part of it.
-  std::function<void()> onDrained;
+  std::function<void()> onDrained = {};
+  /// While reading is paused: the peer has ended, reset or lost the connection, perhaps behind bytes that wait to be
+  /// read. Called at most once, within 50 ms of the event's arrival. The connection stays: abort() it, or
+  /// resumeReading() to read the rest up to onClosed. An end that the peer sent behind more bytes than the system
+  /// takes while nobody reads (about 3 MiB) arrives only after reading.
+  std::function<void(const std::string& reason)> onPeerGone = {};
   /// The connection is over: called once, whoever ended it, with the reason; then nothing more comes.
-  std::function<void(const std::string&)> onClosed;
+  std::function<void(const std::string&)> onClosed = {};
 };
 
 /// Counts since the start of the connection, and what waits now.
@@ -97,8 +102,8 @@ class Connection {
   /// Ends the connection at once by a reset; what is queued is lost.
   void abort(std::string reason);
 
-  /// Stops reading, so that the peer is held back by TCP. Its end is then told only after resumeReading() and
-  /// after all that it sent, though isOpen() may already be false.
+  /// Stops reading, so that TCP holds the peer back. The end of the peer is reported by onPeerGone; onClosed follows
+  /// only after resumeReading() and after all that the peer sent, although isOpen() may be false before.
   void pauseReading();
   /// Goes on reading.
   void resumeReading();

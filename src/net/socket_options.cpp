@@ -4,10 +4,12 @@
 #include <linux/sockios.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
+#include <poll.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <limits>
 
 namespace hapticd::net {
 namespace {
@@ -47,6 +49,20 @@ std::optional<LinkState> linkState(int fd) noexcept {
   if (::getsockopt(fd, IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return std::nullopt;
   return LinkState{info.tcpi_unacked > 0, info.tcpi_probes,
                    std::chrono::milliseconds(std::min(info.tcpi_last_ack_recv, info.tcpi_last_data_recv))};
+}
+
+PeerEnd peerEnd(int fd) noexcept {
+  pollfd request{fd, POLLRDHUP, 0};
+  if (::poll(&request, 1, 0) <= 0) return PeerEnd::none;
+  if ((request.revents & (POLLERR | POLLHUP)) != 0) return PeerEnd::reset;
+  return (request.revents & POLLRDHUP) != 0 ? PeerEnd::closed : PeerEnd::none;
+}
+
+// SO_RCVBUF is limited to net.core.rmem_max (208 KiB) and ends the automatic growth. The low-water mark enlarges the
+// buffer as a side effect, up to tcp_rmem's maximum, and can be set back.
+void widenReceiveBuffer(int fd) noexcept {
+  setOption(fd, SOL_SOCKET, SO_RCVLOWAT, std::numeric_limits<int>::max());
+  setOption(fd, SOL_SOCKET, SO_RCVLOWAT, 1);
 }
 
 std::size_t unacknowledgedBytes(int fd) noexcept {

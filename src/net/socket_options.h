@@ -20,6 +20,13 @@ void setSendBuffer(int fd, int bytes) noexcept;
 void setKeepAlive(int fd, std::chrono::seconds interval) noexcept;
 /// What LossWatch wants to know; nothing when the socket is closed.
 std::optional<LinkState> linkState(int fd) noexcept;
+/// What a socket knows of its peer's end without reading.
+enum class PeerEnd { none, closed, reset };
+/// Sees an end also behind unread bytes; consumes neither bytes nor the pending error.
+PeerEnd peerEnd(int fd) noexcept;
+/// Lets the system take in as much as its limits allow (half of tcp_rmem's maximum) while nobody reads, so that the
+/// end of the peer can arrive. Otherwise the receive buffer grows only with reading.
+void widenReceiveBuffer(int fd) noexcept;
 /// Bytes handed to the system that the peer has not acknowledged.
 std::size_t unacknowledgedBytes(int fd) noexcept;
 

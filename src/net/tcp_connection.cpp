@@ -14,9 +14,12 @@ using asio::ip::tcp;
 
 namespace {
 
+constexpr char kClosed[] = "closed by the peer";
+constexpr char kReset[] = "connection reset by the peer";
+
 std::string endText(const boost::system::error_code& error) {
   if (error == asio::error::connection_reset || error == asio::error::broken_pipe) {
-    return "connection reset by the peer";
+    return kReset;
   }
   if (error == asio::error::timed_out) {
     return "the peer is lost: it acknowledged nothing in time";
@@ -32,6 +35,7 @@ TcpConnection::TcpConnection(Loop::Impl& loop, const ConnectionOptions& options)
       socket_(loop.context),
       timer_(loop.context),
       watchTimer_(loop.context),
+      peerCheckTimer_(loop.context),
       queue_(options.lowMarkBytes) {}
 
 void TcpConnection::connect(const Endpoint& peer, std::chrono::milliseconds timeout) {
@@ -141,6 +145,9 @@ void TcpConnection::call(Callback ConnectionHandlers::*callback, const Arguments
 void TcpConnection::armRead() {
   const bool wanted =
       state_ == State::open ? handlers_ && !paused_ : state_ == State::flushing || state_ == State::draining;
+  if (state_ == State::open && paused_) {
+    armPeerCheck();
+  }
   if (readArmed_ || peerEnded_ || !wanted) {
     return;
   }
@@ -183,7 +190,7 @@ void TcpConnection::peerEnded() {
   if (state_ == State::open) {
     flush();  // the answers to its last bytes
   }
-  finish(failure_.empty() ? "closed by the peer" : failure_);
+  finish(failure_.empty() ? kClosed : failure_);
 }
 
 // --- writing
@@ -327,6 +334,7 @@ void TcpConnection::finish(std::string reason) {
   queue_.clear();
   timer_.cancel();
   watchTimer_.cancel();
+  peerCheckTimer_.cancel();
   ErrorCode ignored;
   socket_.close(ignored);
   asio::post(loop_.context, [self = shared_from_this()] { self->notifyClosed(); });
@@ -345,6 +353,7 @@ void TcpConnection::release() noexcept {
     queue_.clear();
     timer_.cancel();
     watchTimer_.cancel();
+    peerCheckTimer_.cancel();
     ErrorCode ignored;
     socket_.close(ignored);
   });
@@ -353,6 +362,47 @@ void TcpConnection::release() noexcept {
 void TcpConnection::setPaused(bool paused) {
   paused_ = paused;
   armRead();
+}
+
+// A wait for readability would end at once because of the unread bytes, and Asio does not ask for EPOLLRDHUP.
+void TcpConnection::armPeerCheck() {
+  constexpr std::chrono::milliseconds kInterval{20};
+  if (peerCheckArmed_ || peerGoneReported_ || !handlers_ || !handlers_->onPeerGone) {
+    return;
+  }
+  if (!failure_.empty()) {
+    reportPeerGone(failure_);
+    return;
+  }
+  if (!std::exchange(receiveBufferWide_, true)) {
+    widenReceiveBuffer(socket_.native_handle());
+  }
+  peerCheckArmed_ = true;
+  peerCheckTimer_.expires_after(kInterval);
+  peerCheckTimer_.async_wait([this, self = shared_from_this()](const ErrorCode&) {
+    peerCheckArmed_ = false;
+    if (!paused_ || state_ != State::open) {
+      return;
+    }
+    const PeerEnd end = peerEnd(socket_.native_handle());
+    if (end == PeerEnd::none || !failure_.empty()) {
+      armPeerCheck();
+    } else {
+      reportPeerGone(end == PeerEnd::reset ? kReset : kClosed);
+    }
+  });
+}
+
+// Posted for the same reason as finish().
+void TcpConnection::reportPeerGone(std::string reason) {
+  if (std::exchange(peerGoneReported_, true)) {
+    return;
+  }
+  asio::post(loop_.context, [this, self = shared_from_this(), reason = std::move(reason)] {
+    if (state_ != State::closed) {
+      call(&ConnectionHandlers::onPeerGone, reason);
+    }
+  });
 }
 
 ConnectionStatistics TcpConnection::statistics() {

@@ -55,6 +55,8 @@ class TcpConnection final : public Connection::Impl, public std::enable_shared_f
   void writeFailed(const ErrorCode& error);
   void queueEmptied(bool wasBlocked);
   void armWatch();
+  void armPeerCheck();
+  void reportPeerGone(std::string reason);
   void armTimer(std::chrono::milliseconds timeout, std::string reason);
   void finish(std::string reason);
   void notifyClosed();
@@ -66,6 +68,7 @@ class TcpConnection final : public Connection::Impl, public std::enable_shared_f
   Socket socket_;
   boost::asio::steady_timer timer_;  // of connect(), then of close()
   boost::asio::steady_timer watchTimer_;
+  boost::asio::steady_timer peerCheckTimer_;
   LossWatch watch_{options_.lossTimeout};
   // Shared so that a callback that destroys its connection goes on running on living captures.
   std::shared_ptr<ConnectionHandlers> handlers_;
@@ -77,6 +80,9 @@ class TcpConnection final : public Connection::Impl, public std::enable_shared_f
   bool writeArmed_ = false;
   bool paused_ = false;
   bool peerEnded_ = false;
+  bool peerCheckArmed_ = false;
+  bool peerGoneReported_ = false;
+  bool receiveBufferWide_ = false;
   std::string failure_;  // why nothing can be sent any more, while what came before is still being read
   std::string reason_;   // of close(), then of the end
   std::uint64_t bytesIn_ = 0;

@@ -19,6 +19,10 @@ void WebSocket::start(ConnectionHandlers callbacks) {
                      [handlers = handlers_] {
                        if (handlers->onDrained) handlers->onDrained();
                      },
+                 .onPeerGone =
+                     [handlers = handlers_](const std::string& reason) {
+                       if (handlers->onPeerGone) handlers->onPeerGone(reason);
+                     },
                  .onClosed =
                      [handlers = handlers_](const std::string& reason) {
                        if (handlers->onClosed) handlers->onClosed(reason);
