@@ -14,6 +14,8 @@
 #include <string_view>
 #include <vector>
 
+#include "hapticd/trips.h"
+
 namespace hapticd {
 
 /// Wall-clock time as the server stamped it: that of the servo tick that made the value, in microseconds.
@@ -97,9 +99,6 @@ struct AngleReport {
   double angle_deg = 0;
   bool touching = false;
 };
-
-/// What a force error report says; the numbers are VRPN's.
-enum class ForceError { valueOutOfRange = 0, dutyCycle = 1, force = 2, other = 3, recovered = 4 };
 
 /// A limit of the device tripped, or it recovered.
 struct ForceErrorReport {

@@ -8,7 +8,7 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr std::uint32_t kZeroing = (tripsOf(TripKind::hold) | tripsOf(TripKind::latch)) & ~bit(Trip::late);
+constexpr std::uint32_t kZeroing = (tripsOf(TripAction::hold) | tripsOf(TripAction::latch)) & ~bit(Trip::late);
 constexpr double kRounding = 1e-12;  // relative: a force on the limit is not over it
 
 double share(Nanos elapsed, Nanos whole) noexcept {

@@ -31,11 +31,11 @@ std::int16_t flag(bool value) {
 
 // What clamps the force is part of normal rendering; what takes it away is told.
 std::uint32_t tripped(const realtime::GuardReport& guard) {
-  return (guard.active | guard.latched) & ~realtime::tripsOf(realtime::TripKind::clamp);
+  return (guard.active | guard.latched) & ~realtime::tripsOf(realtime::TripAction::clamp);
 }
 
 wire::GuardState guardState(const realtime::GuardReport& guard) {
-  return {.active = guard.active & ~realtime::tripsOf(realtime::TripKind::clamp),
+  return {.active = guard.active & ~realtime::tripsOf(realtime::TripAction::clamp),
           .latched = guard.latched,
           .armed = flag(guard.armed),
           .stopped = flag(guard.stopped)};
@@ -95,10 +95,10 @@ void Reporter::guard(const TickReport& tick, std::vector<Outgoing>& out) {
   if (now == tripped_) return;
   for (const realtime::TripInfo& trip : realtime::kTrips) {
     if ((now & ~tripped_ & realtime::bit(trip.trip)) != 0) {
-      out.push_back({wire::ForceError{static_cast<std::int32_t>(trip.error)}, true});
+      out.push_back({wire::ForceError{static_cast<std::int32_t>(trip.forceError)}, true});
     }
   }
-  if (now == 0) out.push_back({wire::ForceError{static_cast<std::int32_t>(realtime::ForceError::ok)}, true});
+  if (now == 0) out.push_back({wire::ForceError{static_cast<std::int32_t>(realtime::ForceError::recovered)}, true});
   tripped_ = now;
 }
 

@@ -164,7 +164,7 @@ void Station::stop() {
   for (const realtime::TripInfo& trip : realtime::kTrips) {
     const std::uint32_t count = end.guard.counts[static_cast<std::size_t>(trip.trip)];
     if (count > 0 && trip.trip != realtime::Trip::stopped)
-      spdlog::info("  guard: {} {} times: {}", trip.name, count, trip.text);
+      spdlog::info("  guard: {} {} times: {}", trip.name, count, trip.what);
   }
 }
 

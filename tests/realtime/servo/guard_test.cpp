@@ -73,7 +73,7 @@ TEST(Guard, TheTableOfTripsIsInOrder) {
   for (std::size_t i = 0; i < kTripCount; ++i) {
     EXPECT_EQ(static_cast<std::size_t>(kTrips[i].trip), i);
     EXPECT_FALSE(kTrips[i].name.empty());
-    EXPECT_NE(kTrips[i].error, ForceError::ok);
+    EXPECT_NE(kTrips[i].forceError, ForceError::recovered);
   }
 }
 
