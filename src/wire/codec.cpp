@@ -18,32 +18,61 @@ std::string wrongCount(std::string_view field, double count, std::size_t room, s
          ", at most " + std::to_string(most);
 }
 
+std::string tooLong(std::string_view field, std::size_t count, std::size_t most) {
+  return std::string(field) + ": " + std::to_string(count) + " values, at most " + std::to_string(most);
+}
+
 }  // namespace detail
 
 namespace {
 
-using Decoder = Result<Message> (*)(ByteView);
+using Decoder = Result<void> (*)(ByteView, void*);
 
 template <class M>
-Result<Message> decodeAs(ByteView payload) {
+Result<void> decodeAs(ByteView payload, void* message) {
+  Result<M> decoded = decode<M>(payload);
+  if (!decoded) return Error{decoded.error()};
+  *static_cast<M*>(message) = *std::move(decoded);
+  return {};
+}
+
+template <class... M>
+constexpr std::array<Decoder, kMessageKinds> decodersOf(MessageList<M...>) {
+  return {&decodeAs<M>...};
+}
+constexpr auto kDecoders = decodersOf(AllMessages{});
+
+using AnyDecoder = Result<Message> (*)(ByteView);
+
+template <class M>
+Result<Message> decodeAny(ByteView payload) {
   Result<M> decoded = decode<M>(payload);
   if (!decoded) return Error{decoded.error()};
   return Message(*std::move(decoded));
 }
 
-template <std::size_t... I>
-constexpr std::array<Decoder, kMessageKinds> makeDecoders(std::index_sequence<I...>) {
-  return {&decodeAs<std::variant_alternative_t<I, Message>>...};
+template <class... M>
+constexpr std::array<AnyDecoder, kMessageKinds> anyDecodersOf(MessageList<M...>) {
+  return {&decodeAny<M>...};
 }
+constexpr auto kAnyDecoders = anyDecodersOf(AllMessages{});
 
-constexpr auto kDecoders = makeDecoders(std::make_index_sequence<kMessageKinds>{});
+Error notInTable(std::size_t index) {
+  return {"message kind " + std::to_string(index) + " is not in the table"};
+}
 
 }  // namespace
 
+Result<void> decodeInto(MessageKind kind, ByteView payload, void* message) {
+  const auto index = static_cast<std::size_t>(kind);
+  if (index >= kMessageKinds) return notInTable(index);
+  return kDecoders[index](payload, message);
+}
+
 Result<Message> decode(MessageKind kind, ByteView payload) {
   const auto index = static_cast<std::size_t>(kind);
-  if (index >= kMessageKinds) return Error{"message kind " + std::to_string(index) + " is not in the table"};
-  return kDecoders[index](payload);
+  if (index >= kMessageKinds) return notInTable(index);
+  return kAnyDecoders[index](payload);
 }
 
 }  // namespace hapticd::wire

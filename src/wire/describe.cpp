@@ -56,9 +56,9 @@ MessageDescription describeMessage() {
   return description;
 }
 
-template <std::size_t... I>
-std::vector<MessageDescription> describeAll(std::index_sequence<I...>) {
-  return {describeMessage<std::variant_alternative_t<I, Message>>()...};
+template <class... M>
+std::vector<MessageDescription> describeAll(MessageList<M...>) {
+  return {describeMessage<M>()...};
 }
 
 std::string_view directionText(Direction direction) {
@@ -71,6 +71,25 @@ std::string_view directionText(Direction direction) {
       break;
   }
   return "both";
+}
+
+std::string roleText(const MessageInfo& info) {
+  switch (info.role) {
+    case Role::control:
+      return info.order == Order::overtaking ? "control, overtakes" : "control";
+    case Role::scene:
+      return "scene";
+    case Role::report:
+      return "report";
+    case Role::unknown:
+      break;
+  }
+  return "";
+}
+
+std::string_view accessText(const MessageInfo& info) {
+  if (info.role == Role::report) return "";
+  return info.access == Access::command ? "in control" : "all";
 }
 
 std::string layoutText(const MessageDescription& message) {
@@ -103,6 +122,11 @@ start of the payload. `low latency` messages travel by UDP once both sides have 
 all before that, by TCP. A payload of another length is refused, except that bytes behind a list of n values are
 ignored. `char[20]` ends at the first NUL or after 20 bytes; `char[1024]` always ends in a NUL.
 
+A client sends *control* messages and *scene* commands; the server sends *reports*. The server handles what a client sends
+in order. Control messages that *overtake* are the exception: the server handles them on arrival, before scene
+commands that the same client sent earlier and that still wait. Messages for clients *in control* change what others feel; the
+server refuses them from clients that may not command the device.
+
 A TCP connection starts with 24 bytes from either side: `vrpn: ver. 07.38`, two spaces, one digit (logging asked of
 the peer: 0 none, 1 what it receives, 2 what it sends, 3 both) and five NULs. Any `07.` version is accepted. Then each side
 describes its numbers with these system messages, and any later ones before it uses them:
@@ -123,7 +147,7 @@ UDP port (3883), and the server connects to it by TCP; port 1024 to 65535, host 
 }  // namespace
 
 std::vector<MessageDescription> describeMessages() {
-  return describeAll(std::make_index_sequence<kMessageKinds>{});
+  return describeAll(AllMessages{});
 }
 
 std::string messagesAsMarkdown() {
@@ -134,12 +158,16 @@ std::string messagesAsMarkdown() {
     const std::string prefix(message.info.name.substr(0, space));
     if (prefix != device) {
       text += (device.empty() ? "## " : "\n## ") + prefix + "\n\n";
-      text += "| name | direction | class | bytes | layout | meaning |\n|---|---|---|---|---|---|\n";
+      text += "| name | direction | class | role | who | bytes | layout | meaning |\n";
+      text += "|---|---|---|---|---|---|---|---|\n";
       device = prefix;
     }
     text += "| `" + std::string(message.info.name.substr(space + 1)) + "` | ";
     text += directionText(message.info.direction);
     text += message.info.reliability == Reliability::kReliable ? " | reliable | " : " | low latency | ";
+    text += roleText(message.info) + " | ";
+    text += accessText(message.info);
+    text += " | ";
     text += std::to_string(message.payload_bytes) + (message.counted ? " + list | " : " | ");
     text += layoutText(message) + " | " + std::string(message.info.meaning) + " |\n";
   }

@@ -1,16 +1,20 @@
 // The one table of all messages. A message is a plain struct with its description beside it: kInfo (wire
-// name, direction, reliability, meaning) and fields() (name, value and unit of each field, in wire order).
-// Encoder, decoder, size check, docs/wire-messages.md and the fuzz dictionary are all derived from it.
+// name, direction, reliability, role, meaning) and fields() (name, value and unit of each field, in wire
+// order). Encoder, decoder, size check, dispatch, docs/wire-messages.md and the fuzz dictionary are all
+// derived from it.
 //
-// To add a message (for example `hapticd Mesh_Vertices`): write its struct in messages/, append it to the END of
-// Message below, and regenerate the docs with `wire_docs markdown > docs/wire-messages.md`. Nothing else
-// changes: peers learn its name in the handshake, and peers that do not know the name never mind it.
+// To add a message (for example `hapticd Mesh_Vertices`): write its struct in messages/, append it to the END
+// of AllMessages below, and regenerate the docs with `wire_docs markdown > docs/wire-messages.md`. The server
+// does not compile until it handles a new control message or scene command. Peers learn the name in the
+// handshake, and peers that do not know the name ignore it.
 #pragma once
 
+#include <array>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <variant>
 
@@ -25,8 +29,15 @@
 
 namespace hapticd::wire {
 
-/// Any message; its index in this list is its MessageKind.
-using Message = std::variant<
+/// Message structs as a list of types.
+template <class... M>
+struct MessageList {
+  static constexpr std::size_t kSize = sizeof...(M);
+  using Variant = std::variant<M...>;
+};
+
+/// Every message; the index in this list is its MessageKind.
+using AllMessages = MessageList<
     // Every device
     Text, Ping, Pong,
     // Force device: reports and what its driver renders
@@ -54,56 +65,96 @@ using Message = std::variant<
     QueryCapabilities, Capabilities, MeshVertices, MeshTriangles, BatchBegin, BatchCommit, Subscribe,
     TickReport, ContactList, StopForces, RearmForces, GuardState, Heartbeat, HoldHand>;
 
+/// Any message.
+using Message = AllMessages::Variant;
+
 /// Which message: a small integer for switch and table look-up, `case kindOf<SetVertex>:`.
 enum class MessageKind : std::uint8_t {};
 
-inline constexpr std::size_t kMessageKinds = std::variant_size_v<Message>;
+inline constexpr std::size_t kMessageKinds = AllMessages::kSize;
 /// A name of a peer's that is not in the table.
 inline constexpr MessageKind kUnknownKind{255};
 static_assert(kMessageKinds < 255);
 
-/// The struct of a kind.
-template <MessageKind K>
-using MessageOf = std::variant_alternative_t<static_cast<std::size_t>(K), Message>;
-
 namespace detail {
 
-template <class M, std::size_t... I>
-constexpr std::size_t indexOf(std::index_sequence<I...>) {
-  std::size_t index = kMessageKinds;
-  ((std::same_as<M, std::variant_alternative_t<I, Message>> ? void(index = I) : void()), ...);
+/// Position of M in the list; the list's size when it is not there.
+template <class M, class... All>
+consteval std::size_t indexIn(MessageList<All...>) {
+  std::size_t index = 0;
+  (void)((std::same_as<M, All> || (++index, false)) || ...);
   return index;
 }
 
-template <std::size_t... I>
-constexpr std::array<MessageInfo, kMessageKinds> collectInfos(std::index_sequence<I...>) {
-  return {std::variant_alternative_t<I, Message>::kInfo...};
+template <class... All>
+consteval std::array<MessageInfo, sizeof...(All)> infosOf(MessageList<All...>) {
+  return {All::kInfo...};
 }
+
+template <Role R, class Result, class... All>
+struct WithRole {
+  using Type = Result;
+};
+template <Role R, class... Kept, class First, class... Rest>
+struct WithRole<R, MessageList<Kept...>, First, Rest...>
+    : WithRole<R,
+               std::conditional_t<First::kInfo.role == R, MessageList<Kept..., First>, MessageList<Kept...>>,
+               Rest...> {};
+
+template <Role R, class... All>
+typename WithRole<R, MessageList<>, All...>::Type withRole(MessageList<All...>);
 
 }  // namespace detail
 
+/// The messages that have this role, in the order of the table.
+template <Role R>
+using MessagesWithRole = decltype(detail::withRole<R>(AllMessages{}));
+using ControlMessages = MessagesWithRole<Role::control>;
+using SceneMessages = MessagesWithRole<Role::scene>;
+using ReportMessages = MessagesWithRole<Role::report>;
+static_assert(ControlMessages::kSize + SceneMessages::kSize + ReportMessages::kSize == kMessageKinds);
+
+/// Calls `visit.operator()<M>()` for each struct of the list, in order.
+template <class... M, class Visit>
+constexpr void forEachMessage(MessageList<M...>, Visit&& visit) {
+  (visit.template operator()<M>(), ...);
+}
+
 /// One of the structs in the table.
 template <class M>
-concept WireMessage = detail::indexOf<M>(std::make_index_sequence<kMessageKinds>{})
+concept WireMessage = detail::indexIn<M>(AllMessages{})
 < kMessageKinds;
 
 /// The kind of a struct.
 template <WireMessage M>
-inline constexpr MessageKind kindOf{
-    static_cast<std::uint8_t>(detail::indexOf<M>(std::make_index_sequence<kMessageKinds>{}))};
+inline constexpr MessageKind kindOf{static_cast<std::uint8_t>(detail::indexIn<M>(AllMessages{}))};
 
 /// The kind of a message.
 inline MessageKind kind(const Message& message) noexcept {
   return MessageKind{static_cast<std::uint8_t>(message.index())};
 }
 
-/// Name, direction, reliability and meaning of every kind, by kind.
-inline constexpr std::array<MessageInfo, kMessageKinds> kMessageInfos =
-    detail::collectInfos(std::make_index_sequence<kMessageKinds>{});
+/// The descriptions of all kinds, by kind.
+inline constexpr std::array<MessageInfo, kMessageKinds> kMessageInfos = detail::infosOf(AllMessages{});
 
-/// Name, direction, reliability and meaning; the kind must not be kUnknownKind.
+/// The description of a kind, which must not be kUnknownKind.
 constexpr const MessageInfo& info(MessageKind kind) noexcept {
   return kMessageInfos[static_cast<std::size_t>(kind)];
+}
+
+/// What the message is to the server; Role::unknown for kUnknownKind.
+constexpr Role role(MessageKind kind) noexcept {
+  return kind == kUnknownKind ? Role::unknown : info(kind).role;
+}
+
+/// Whether only clients that may command the device may send it: it changes what others feel.
+constexpr bool needsControl(MessageKind kind) noexcept {
+  return kind != kUnknownKind && info(kind).access == Access::command;
+}
+
+/// Whether the server handles it before scene commands that the same client sent earlier.
+constexpr bool overtakes(MessageKind kind) noexcept {
+  return kind != kUnknownKind && info(kind).order == Order::overtaking;
 }
 
 /// The kind with this wire name, or kUnknownKind.

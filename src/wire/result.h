@@ -1,6 +1,7 @@
 // A value, or a sentence that says why there is none.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <variant>
@@ -29,6 +30,22 @@ class [[nodiscard]] Result {
 
  private:
   std::variant<T, Error> state_;
+};
+
+/// Success, or an Error.
+template <>
+class [[nodiscard]] Result<void> {
+ public:
+  Result() = default;
+  Result(Error error) : error_(std::move(error)) {}
+
+  /// True on success.
+  explicit operator bool() const noexcept { return !error_; }
+  /// The sentence, after a failure; throws std::bad_optional_access on success.
+  const std::string& error() const { return error_.value().text; }
+
+ private:
+  std::optional<Error> error_;
 };
 
 }  // namespace hapticd::wire

@@ -24,12 +24,35 @@ enum class Direction : std::uint8_t { kToServer, kToClient, kBoth };
 /// How a message travels: reliable ones by TCP, low-latency ones by UDP once there is a UDP link.
 enum class Reliability : std::uint8_t { kReliable, kLowLatency };
 
+/// What a message is to the server.
+enum class Role : std::uint8_t {
+  unknown,  ///< not in the table: only of kUnknownKind
+  control,  ///< addresses the server, the device or the connection: stop, heartbeat, subscription, question
+  scene,    ///< changes the scene, in the order in which the client sent it
+  report    ///< from server to client
+};
+
+/// Who may send a message to the server.
+enum class Access : std::uint8_t {
+  free,    ///< every client: it changes nothing that others feel
+  command  ///< clients that may command the device: it changes what others feel
+};
+
+/// When the server handles a control message.
+enum class Order : std::uint8_t {
+  sequential,  ///< after everything that the same client sent before it
+  overtaking   ///< as soon as it arrived, before scene commands of the same client that still wait
+};
+
 /// The fixed part of a message's description; the fields describe themselves through its fields().
 struct MessageInfo {
   std::string_view name;  ///< exact name on the wire
   Direction direction;
   Reliability reliability;
+  Role role;
   std::string_view meaning;  ///< one sentence
+  Access access = role == Role::scene ? Access::command : Access::free;
+  Order order = Order::sequential;
 };
 
 using F32x3 = std::array<float, 3>;

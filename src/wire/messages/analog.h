@@ -7,7 +7,7 @@ namespace hapticd::wire {
 
 struct AnalogChannels {
   static constexpr MessageInfo kInfo{
-      "vrpn_Analog Channel", Direction::kToClient, Reliability::kLowLatency,
+      "vrpn_Analog Channel", Direction::kToClient, Reliability::kLowLatency, Role::report,
       "Reports the value of every channel; even their number travels as a float."};
   Counted<double, double, 128> channels;
 

@@ -11,22 +11,27 @@ inline constexpr std::uint32_t kTextWarning = 1;
 inline constexpr std::uint32_t kTextError = 2;
 
 struct Ping {
-  static constexpr MessageInfo kInfo{"vrpn_Base ping_message", Direction::kToServer, Reliability::kReliable,
-                                     "Asks whether the device is alive."};
+  static constexpr MessageInfo kInfo{"vrpn_Base ping_message",
+                                     Direction::kToServer,
+                                     Reliability::kReliable,
+                                     Role::control,
+                                     "Asks whether the device is alive.",
+                                     Access::free,
+                                     Order::overtaking};
   template <class M, class V>
   static constexpr void fields(M&, V&&) {}
 };
 
 struct Pong {
   static constexpr MessageInfo kInfo{"vrpn_Base pong_message", Direction::kToClient, Reliability::kReliable,
-                                     "Answers a ping: the device is alive."};
+                                     Role::report, "Answers a ping: the device is alive."};
   template <class M, class V>
   static constexpr void fields(M&, V&&) {}
 };
 
 struct Text {
   static constexpr MessageInfo kInfo{
-      "vrpn_Base text_message", Direction::kBoth, Reliability::kReliable,
+      "vrpn_Base text_message", Direction::kBoth, Reliability::kReliable, Role::control,
       "Says something to a human: severity 0 is normal, 1 a warning, 2 an error."};
   std::uint32_t severity = kTextNormal;
   std::uint32_t level = 0;

@@ -14,7 +14,7 @@ inline constexpr std::int32_t kButtonToggleOn = 21;
 
 struct ButtonChange {
   static constexpr MessageInfo kInfo{"vrpn_Button Change", Direction::kToClient, Reliability::kReliable,
-                                     "Reports that a button went down (1) or up (0)."};
+                                     Role::report, "Reports that a button went down (1) or up (0)."};
   std::int32_t button = 0;
   std::int32_t state = 0;
 
@@ -27,7 +27,7 @@ struct ButtonChange {
 
 struct ButtonStates {
   static constexpr MessageInfo kInfo{
-      "vrpn_Button States", Direction::kToClient, Reliability::kReliable,
+      "vrpn_Button States", Direction::kToClient, Reliability::kReliable, Role::report,
       "Reports the state of every button, on each new connection and for each ping."};
   Counted<std::int32_t, std::int32_t, 256> states;
 
@@ -39,9 +39,13 @@ struct ButtonStates {
 
 struct ButtonAdmin {
   static constexpr MessageInfo kInfo{
-      "vrpn_Button Admin", Direction::kToServer, Reliability::kReliable,
+      "vrpn_Button Admin",
+      Direction::kToServer,
+      Reliability::kReliable,
+      Role::control,
       "Makes a button (-99: all) momentary (10), a toggle that starts off (20) or one that starts on (21); "
-      "the time stamp is that of the client's start."};
+      "the time stamp is that of the client's start.",
+      Access::command};
   std::int32_t button = 0;
   std::int32_t event = kButtonMomentary;
 
@@ -54,7 +58,7 @@ struct ButtonAdmin {
 
 struct ButtonAlert {
   static constexpr MessageInfo kInfo{
-      "vrpn_Button Alert", Direction::kToClient, Reliability::kReliable,
+      "vrpn_Button Alert", Direction::kToClient, Reliability::kReliable, Role::report,
       "Reports that a button's toggle was switched off (20, also for momentary) or on (21)."};
   std::int32_t button = 0;
   std::int32_t event = kButtonToggleOff;

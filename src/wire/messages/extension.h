@@ -32,9 +32,9 @@ enum ReportKinds : std::uint32_t {
 };
 
 struct QueryCapabilities {
-  static constexpr MessageInfo kInfo{"hapticd Query_Capabilities", Direction::kToServer,
-                                     Reliability::kReliable,
-                                     "Asks what this server and its device can do; answered by Capabilities."};
+  static constexpr MessageInfo kInfo{
+      "hapticd Query_Capabilities", Direction::kToServer, Reliability::kReliable, Role::control,
+      "Asks what this server and its device can do; answered by Capabilities."};
 
   template <class M, class V>
   static constexpr void fields(M&, V&&) {}
@@ -42,7 +42,7 @@ struct QueryCapabilities {
 
 struct Capabilities {
   static constexpr MessageInfo kInfo{
-      "hapticd Capabilities", Direction::kToClient, Reliability::kReliable,
+      "hapticd Capabilities", Direction::kToClient, Reliability::kReliable, Role::report,
       "Answers Query_Capabilities: version of the extensions, feature bits, facts of the device."};
   std::int32_t version = kExtensionVersion;
   std::uint32_t features = 0;
@@ -68,6 +68,7 @@ struct MeshVertices {
   /// 5000 vertices: a message stays below the 64,000 bytes that VRPN's buffers hold.
   static constexpr std::size_t kMost = 5000;
   static constexpr MessageInfo kInfo{"hapticd Mesh_Vertices", Direction::kToServer, Reliability::kReliable,
+                                     Role::scene,
                                      "Sets a run of vertices of an object from number first on: x y z each."};
   std::int32_t object = 0;
   std::int32_t first = 0;
@@ -84,7 +85,7 @@ struct MeshVertices {
 struct MeshTriangles {
   static constexpr std::size_t kMost = 5000;
   static constexpr MessageInfo kInfo{
-      "hapticd Mesh_Triangles", Direction::kToServer, Reliability::kReliable,
+      "hapticd Mesh_Triangles", Direction::kToServer, Reliability::kReliable, Role::scene,
       "Sets a run of triangles of an object from number first on: three vertex numbers each."};
   std::int32_t object = 0;
   std::int32_t first = 0;
@@ -100,7 +101,7 @@ struct MeshTriangles {
 
 struct BatchBegin {
   static constexpr MessageInfo kInfo{
-      "hapticd Batch_Begin", Direction::kToServer, Reliability::kReliable,
+      "hapticd Batch_Begin", Direction::kToServer, Reliability::kReliable, Role::scene,
       "What this client commands until Batch_Commit becomes visible in one tick, or not at all."};
 
   template <class M, class V>
@@ -109,7 +110,7 @@ struct BatchBegin {
 
 struct BatchCommit {
   static constexpr MessageInfo kInfo{"hapticd Batch_Commit", Direction::kToServer, Reliability::kReliable,
-                                     "Ends a batch and makes it visible."};
+                                     Role::scene, "Ends a batch and makes it visible."};
 
   template <class M, class V>
   static constexpr void fields(M&, V&&) {}
@@ -117,7 +118,7 @@ struct BatchCommit {
 
 struct Subscribe {
   static constexpr MessageInfo kInfo{
-      "hapticd Subscribe", Direction::kToServer, Reliability::kReliable,
+      "hapticd Subscribe", Direction::kToServer, Reliability::kReliable, Role::control,
       "Chooses which reports this client gets and how often; rate 0 keeps the rate as it is."};
   std::uint32_t kinds = kReportDefault;
   double rate = 0;
@@ -132,7 +133,7 @@ struct Subscribe {
 /// One tick, whole. Positions in world units / 1000 and the world's frame, as the tracker reports.
 struct TickReport {
   static constexpr MessageInfo kInfo{
-      "hapticd Tick", Direction::kToClient, Reliability::kLowLatency,
+      "hapticd Tick", Direction::kToClient, Reliability::kLowLatency, Role::report,
       "Reports one servo tick: its number, its time on the server's monotonic clock, and what it felt."};
   std::uint64_t tick = 0;
   std::int64_t time = 0;
@@ -170,7 +171,7 @@ struct ContactList {
   /// Numbers of one contact: object, point, normal, force on the hand.
   static constexpr std::size_t kNumbers = 10;
   static constexpr MessageInfo kInfo{
-      "hapticd Contacts", Direction::kToClient, Reliability::kLowLatency,
+      "hapticd Contacts", Direction::kToClient, Reliability::kLowLatency, Role::report,
       "Reports every touched object of a tick: object, point, normal, force on the hand (10 numbers each)."};
   std::uint64_t tick = 0;
   std::int64_t time = 0;
@@ -185,17 +186,26 @@ struct ContactList {
 };
 
 struct StopForces {
-  static constexpr MessageInfo kInfo{"hapticd Stop_Forces", Direction::kToServer, Reliability::kReliable,
+  static constexpr MessageInfo kInfo{"hapticd Stop_Forces",
+                                     Direction::kToServer,
+                                     Reliability::kReliable,
+                                     Role::control,
                                      "Brings the force to zero within one tick, until re-armed. Any client "
-                                     "may."};
+                                     "may.",
+                                     Access::free,
+                                     Order::overtaking};
 
   template <class M, class V>
   static constexpr void fields(M&, V&&) {}
 };
 
 struct RearmForces {
-  static constexpr MessageInfo kInfo{"hapticd Rearm_Forces", Direction::kToServer, Reliability::kReliable,
-                                     "Clears a stop and latched faults; forces come back over 0.5 s."};
+  static constexpr MessageInfo kInfo{"hapticd Rearm_Forces",
+                                     Direction::kToServer,
+                                     Reliability::kReliable,
+                                     Role::control,
+                                     "Clears a stop and latched faults; forces come back over 0.5 s.",
+                                     Access::command};
 
   template <class M, class V>
   static constexpr void fields(M&, V&&) {}
@@ -203,7 +213,7 @@ struct RearmForces {
 
 struct GuardState {
   static constexpr MessageInfo kInfo{
-      "hapticd Guard_State", Direction::kToClient, Reliability::kReliable,
+      "hapticd Guard_State", Direction::kToClient, Reliability::kReliable, Role::report,
       "Reports, on change, which trips hold the force (bits), whether it is armed or stopped."};
   std::uint32_t active = 0;
   std::uint32_t latched = 0;
@@ -221,8 +231,13 @@ struct GuardState {
 
 struct Heartbeat {
   static constexpr MessageInfo kInfo{
-      "hapticd Heartbeat", Direction::kToServer, Reliability::kReliable,
-      "After the first, a client that sends none for 500 ms counts as lost; watch 0 ends that."};
+      "hapticd Heartbeat",
+      Direction::kToServer,
+      Reliability::kReliable,
+      Role::control,
+      "After the first, a client that sends none for 500 ms counts as lost; watch 0 ends that.",
+      Access::free,
+      Order::overtaking};
   Bool16 watch = 1;
 
   template <class M, class V>
@@ -233,8 +248,12 @@ struct Heartbeat {
 
 struct HoldHand {
   static constexpr MessageInfo kInfo{
-      "hapticd Hold_Hand", Direction::kToServer, Reliability::kLowLatency,
-      "Moves the simulated hand's target while hold is set; one client holds it at a time."};
+      "hapticd Hold_Hand",
+      Direction::kToServer,
+      Reliability::kLowLatency,
+      Role::control,
+      "Moves the simulated hand's target while hold is set; one client holds it at a time.",
+      Access::command};
   Bool16 hold = 0;
   F64x3 position{};
   F64x4 orientation{0, 0, 0, 1};

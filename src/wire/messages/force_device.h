@@ -12,7 +12,7 @@ inline constexpr std::uint32_t kStopCustomEffect = 0xFFFFFFFF;
 
 struct Force {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice Force", Direction::kToClient, Reliability::kLowLatency,
-                                     "Reports the force at the device."};
+                                     Role::report, "Reports the force at the device."};
   F64x3 force{};
 
   template <class M, class V>
@@ -23,7 +23,7 @@ struct Force {
 
 struct Scp {
   static constexpr MessageInfo kInfo{
-      "vrpn_ForceDevice SCP", Direction::kToClient, Reliability::kLowLatency,
+      "vrpn_ForceDevice SCP", Direction::kToClient, Reliability::kLowLatency, Role::report,
       "Reports the surface contact point: where the proxy rests, and the stylus orientation."};
   F64x3 position{};
   F64x4 orientation{0, 0, 0, 1};
@@ -37,7 +37,7 @@ struct Scp {
 
 struct ForceError {
   static constexpr MessageInfo kInfo{
-      "vrpn_ForceDevice Force_Error", Direction::kToClient, Reliability::kReliable,
+      "vrpn_ForceDevice Force_Error", Direction::kToClient, Reliability::kReliable, Role::report,
       "Reports a fault: 0 value out of range, 1 duty cycle, 2 force or motor, 3 other, 4 recovered."};
   std::int32_t code = 0;
 
@@ -49,7 +49,7 @@ struct ForceError {
 
 struct ForceField {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice Force_Field", Direction::kToServer,
-                                     Reliability::kLowLatency,
+                                     Reliability::kLowLatency, Role::scene,
                                      "Sets a force that varies linearly with the distance from an origin "
                                      "inside a sphere; all zero (sent reliably) stops it."};
   F32x3 origin{};
@@ -68,7 +68,7 @@ struct ForceField {
 
 struct Plane {
   static constexpr MessageInfo kInfo{
-      "vrpn_ForceDevice Plane", Direction::kToServer, Reliability::kLowLatency,
+      "vrpn_ForceDevice Plane", Direction::kToServer, Reliability::kLowLatency, Role::scene,
       "Sets a plane a x + b y + c z + d = 0 to touch; starting and stopping it is sent reliably."};
   std::array<float, 4> plane{};
   float stiffness = 0;
@@ -92,7 +92,7 @@ struct Plane {
 
 struct Plane2 {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice Plane2", Direction::kToServer,
-                                     Reliability::kLowLatency,
+                                     Reliability::kLowLatency, Role::scene,
                                      "Sets the texture, the buzz and the adhesion of the plane."};
   float normal_adhesion = 0;
   float lateral_adhesion = 0;
@@ -114,7 +114,7 @@ struct Plane2 {
 
 struct CustomEffect {
   static constexpr MessageInfo kInfo{
-      "vrpn_ForceDevice Custom Effect", Direction::kToServer, Reliability::kReliable,
+      "vrpn_ForceDevice Custom Effect", Direction::kToServer, Reliability::kReliable, Role::scene,
       "Starts an effect the device driver knows by number; 0xFFFFFFFF stops it."};
   std::uint32_t effect = 0;
   Counted<std::uint32_t, float, 15998> parameters;
@@ -130,7 +130,8 @@ struct CustomEffect {
 
 struct ConstraintEnable {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice constraint_enable", Direction::kToServer,
-                                     Reliability::kReliable, "Switches the constraint on (1) or off (0)."};
+                                     Reliability::kReliable, Role::scene,
+                                     "Switches the constraint on (1) or off (0)."};
   std::int32_t enable = 0;
 
   template <class M, class V>
@@ -141,7 +142,7 @@ struct ConstraintEnable {
 
 struct ConstraintMode {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice constraint_mode", Direction::kToServer,
-                                     Reliability::kReliable,
+                                     Reliability::kReliable, Role::scene,
                                      "Chooses the constraint: 0 none, 1 point, 2 line, 3 plane."};
   std::int32_t mode = 0;
 
@@ -153,7 +154,8 @@ struct ConstraintMode {
 
 struct ConstraintPoint {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice constraint_point", Direction::kToServer,
-                                     Reliability::kReliable, "Sets the point of a point constraint."};
+                                     Reliability::kReliable, Role::scene,
+                                     "Sets the point of a point constraint."};
   F32x3 point{};
 
   template <class M, class V>
@@ -164,7 +166,7 @@ struct ConstraintPoint {
 
 struct ConstraintLinePoint {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice constraint_linept", Direction::kToServer,
-                                     Reliability::kReliable,
+                                     Reliability::kReliable, Role::scene,
                                      "Sets a point of the line of a line constraint."};
   F32x3 point{};
 
@@ -176,7 +178,7 @@ struct ConstraintLinePoint {
 
 struct ConstraintLineDirection {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice constraint_linedir", Direction::kToServer,
-                                     Reliability::kReliable,
+                                     Reliability::kReliable, Role::scene,
                                      "Sets the direction of the line of a line constraint."};
   F32x3 direction{};
 
@@ -188,7 +190,7 @@ struct ConstraintLineDirection {
 
 struct ConstraintPlanePoint {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice constraint_plpt", Direction::kToServer,
-                                     Reliability::kReliable,
+                                     Reliability::kReliable, Role::scene,
                                      "Sets a point of the plane of a plane constraint."};
   F32x3 point{};
 
@@ -200,7 +202,7 @@ struct ConstraintPlanePoint {
 
 struct ConstraintPlaneNormal {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice constraint_plnorm", Direction::kToServer,
-                                     Reliability::kReliable,
+                                     Reliability::kReliable, Role::scene,
                                      "Sets the normal of the plane of a plane constraint."};
   F32x3 normal{};
 
@@ -212,7 +214,8 @@ struct ConstraintPlaneNormal {
 
 struct ConstraintStiffness {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice constraint_KSpring", Direction::kToServer,
-                                     Reliability::kReliable, "Sets the spring that holds the constraint."};
+                                     Reliability::kReliable, Role::scene,
+                                     "Sets the spring that holds the constraint."};
   float stiffness = 0;
 
   template <class M, class V>

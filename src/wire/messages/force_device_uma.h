@@ -8,7 +8,7 @@ namespace hapticd::wire {
 
 struct SetWorkspaceBoundingBox {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice setWorkspaceBoundingBox", Direction::kToServer,
-                                     Reliability::kReliable,
+                                     Reliability::kReliable, Role::scene,
                                      "Fits the device workspace to a box (min x y z, max x y z) seen through "
                                      "a model matrix (column-major)."};
   F64x16 model{};
@@ -24,6 +24,7 @@ struct SetWorkspaceBoundingBox {
 struct SetWorkspaceProjectionMatrix {
   static constexpr MessageInfo kInfo{
       "vrpn_ForceDevice setWorkspaceProjectionMatrix", Direction::kToServer, Reliability::kReliable,
+      Role::scene,
       "Fits the device workspace to a view volume, by a model and a projection matrix (column-major)."};
   F64x16 model{};
   F64x16 projection{};
@@ -37,7 +38,7 @@ struct SetWorkspaceProjectionMatrix {
 
 struct SetObjectNumber {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice setObjectNumber", Direction::kToServer,
-                                     Reliability::kReliable,
+                                     Reliability::kReliable, Role::scene,
                                      "Makes the scene have at least this many objects, numbered from 0."};
   std::int32_t count = 0;
 
@@ -49,7 +50,7 @@ struct SetObjectNumber {
 
 struct SetTransformMatrix {
   static constexpr MessageInfo kInfo{
-      "vrpn_ForceDevice setTransformMatrix", Direction::kToServer, Reliability::kReliable,
+      "vrpn_ForceDevice setTransformMatrix", Direction::kToServer, Reliability::kReliable, Role::scene,
       "Sets the pose and scale of an object: a column-major matrix, translation in elements 12 to 14."};
   std::int32_t object = 0;
   F64x16 matrix{};
@@ -63,7 +64,7 @@ struct SetTransformMatrix {
 
 struct SetHapticProperty {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice setHapticProperty", Direction::kToServer,
-                                     Reliability::kReliable,
+                                     Reliability::kReliable, Role::scene,
                                      "Sets one property of an object's surface: stiffness, damping, static "
                                      "friction, dynamic friction, popthrough or mass."};
   std::int32_t object = 0;
@@ -80,7 +81,7 @@ struct SetHapticProperty {
 
 struct SetTouchableFace {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice setTouchableFace", Direction::kToServer,
-                                     Reliability::kReliable,
+                                     Reliability::kReliable, Role::scene,
                                      "Chooses which faces are felt: 0 front, 1 back, anything else both."};
   std::int32_t face = 2;
 
@@ -92,7 +93,7 @@ struct SetTouchableFace {
 
 struct Effect {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice Effect", Direction::kToServer,
-                                     Reliability::kLowLatency,
+                                     Reliability::kLowLatency, Role::scene,
                                      "Defines an effect by index: constant, spring, viscous, friction, "
                                      "vibrationMotor or vibrationContact; duration 0 lasts until stopped."};
   NameBuffer<20> type;
@@ -119,7 +120,7 @@ struct Effect {
 
 struct StartEffect {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice startEffect", Direction::kToServer,
-                                     Reliability::kReliable, "Starts an effect."};
+                                     Reliability::kReliable, Role::scene, "Starts an effect."};
   std::int32_t index = 0;
 
   template <class M, class V>
@@ -130,7 +131,7 @@ struct StartEffect {
 
 struct StopEffect {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice stopEffect", Direction::kToServer,
-                                     Reliability::kReliable, "Stops an effect."};
+                                     Reliability::kReliable, Role::scene, "Stops an effect."};
   std::int32_t index = 0;
 
   template <class M, class V>
@@ -141,7 +142,7 @@ struct StopEffect {
 
 struct ResetScene {
   static constexpr MessageInfo kInfo{
-      "vrpn_ForceDevice resetScene", Direction::kToServer, Reliability::kReliable,
+      "vrpn_ForceDevice resetScene", Direction::kToServer, Reliability::kReliable, Role::scene,
       "Puts workspace, objects and effects back to the beginning; the byte means nothing."};
   std::uint8_t ignored = 0;
 
@@ -153,7 +154,7 @@ struct ResetScene {
 
 struct Dop {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice DOP", Direction::kToClient, Reliability::kLowLatency,
-                                     "Reports the depth of penetration."};
+                                     Role::report, "Reports the depth of penetration."};
   double depth = 0;
 
   template <class M, class V>
@@ -164,7 +165,8 @@ struct Dop {
 
 struct IsTouching {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice isTouching", Direction::kToClient,
-                                     Reliability::kLowLatency, "Reports whether anything is touched."};
+                                     Reliability::kLowLatency, Role::report,
+                                     "Reports whether anything is touched."};
   Bool16 touching = 0;
 
   template <class M, class V>
@@ -175,7 +177,7 @@ struct IsTouching {
 
 struct TouchedObject {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice TouchedObject", Direction::kToClient,
-                                     Reliability::kLowLatency,
+                                     Reliability::kLowLatency, Role::report,
                                      "Reports which object is touched, -1 for none."};
   std::int32_t object = -1;
 
@@ -187,7 +189,7 @@ struct TouchedObject {
 
 struct Angle {
   static constexpr MessageInfo kInfo{
-      "vrpn_ForceDevice Angle", Direction::kToClient, Reliability::kLowLatency,
+      "vrpn_ForceDevice Angle", Direction::kToClient, Reliability::kLowLatency, Role::report,
       "Reports the angle between stylus and surface normal, 0 without contact."};
   double angle = 0;
   Bool16 touching = 0;

@@ -8,7 +8,7 @@ namespace hapticd::wire {
 
 struct AddObject {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice addObject", Direction::kToServer,
-                                     Reliability::kReliable,
+                                     Reliability::kReliable, Role::scene,
                                      "Adds an object below a parent (-1: the scene)."};
   std::int32_t object = 0;
   std::int32_t parent = -1;
@@ -22,7 +22,7 @@ struct AddObject {
 
 struct AddObjectExScene {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice addObjectExScene", Direction::kToServer,
-                                     Reliability::kReliable,
+                                     Reliability::kReliable, Role::scene,
                                      "Adds an object next to the scene, as a root of its own."};
   std::int32_t object = 0;
 
@@ -34,7 +34,8 @@ struct AddObjectExScene {
 
 struct MoveToParent {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice moveToParent", Direction::kToServer,
-                                     Reliability::kReliable, "Moves an object below another parent."};
+                                     Reliability::kReliable, Role::scene,
+                                     "Moves an object below another parent."};
   std::int32_t object = 0;
   std::int32_t parent = -1;
 
@@ -47,7 +48,8 @@ struct MoveToParent {
 
 struct SetObjectPosition {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice setObjectPosition", Direction::kToServer,
-                                     Reliability::kReliable, "Places an object relative to its parent."};
+                                     Reliability::kReliable, Role::scene,
+                                     "Places an object relative to its parent."};
   std::int32_t object = 0;
   F32x3 position{};
 
@@ -60,7 +62,7 @@ struct SetObjectPosition {
 
 struct SetObjectOrientation {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice setObjectOrientation", Direction::kToServer,
-                                     Reliability::kReliable,
+                                     Reliability::kReliable, Role::scene,
                                      "Turns an object relative to its parent, about an axis."};
   std::int32_t object = 0;
   F32x3 axis{};
@@ -76,7 +78,8 @@ struct SetObjectOrientation {
 
 struct SetObjectScale {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice setObjectScale", Direction::kToServer,
-                                     Reliability::kReliable, "Scales an object along its own axes."};
+                                     Reliability::kReliable, Role::scene,
+                                     "Scales an object along its own axes."};
   std::int32_t object = 0;
   F32x3 scale{1, 1, 1};
 
@@ -89,7 +92,7 @@ struct SetObjectScale {
 
 struct RemoveObject {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice removeObject", Direction::kToServer,
-                                     Reliability::kReliable, "Removes an object."};
+                                     Reliability::kReliable, Role::scene, "Removes an object."};
   std::int32_t object = 0;
 
   template <class M, class V>
@@ -100,7 +103,7 @@ struct RemoveObject {
 
 struct SetVertex {
   static constexpr MessageInfo kInfo{
-      "vrpn_ForceDevice setVertex", Direction::kToServer, Reliability::kReliable,
+      "vrpn_ForceDevice setVertex", Direction::kToServer, Reliability::kReliable, Role::scene,
       "Sets a vertex of an object's mesh; without triangles, consecutive triples are faces."};
   std::int32_t object = 0;
   std::int32_t vertex = 0;
@@ -116,7 +119,8 @@ struct SetVertex {
 
 struct SetNormal {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice setNormal", Direction::kToServer,
-                                     Reliability::kReliable, "Sets a vertex normal of an object's mesh."};
+                                     Reliability::kReliable, Role::scene,
+                                     "Sets a vertex normal of an object's mesh."};
   std::int32_t object = 0;
   std::int32_t normal = 0;
   F32x3 direction{};
@@ -131,7 +135,7 @@ struct SetNormal {
 
 struct SetTriangle {
   static constexpr MessageInfo kInfo{
-      "vrpn_ForceDevice setTriangle", Direction::kToServer, Reliability::kReliable,
+      "vrpn_ForceDevice setTriangle", Direction::kToServer, Reliability::kReliable, Role::scene,
       "Sets a triangle of an object's mesh by vertex and normal numbers (normals -1: none)."};
   std::int32_t object = 0;
   std::int32_t triangle = 0;
@@ -149,7 +153,8 @@ struct SetTriangle {
 
 struct RemoveTriangle {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice removeTriangle", Direction::kToServer,
-                                     Reliability::kReliable, "Removes a triangle of an object's mesh."};
+                                     Reliability::kReliable, Role::scene,
+                                     "Removes a triangle of an object's mesh."};
   std::int32_t object = 0;
   std::int32_t triangle = 0;
 
@@ -162,7 +167,8 @@ struct RemoveTriangle {
 
 struct UpdateTrimeshChanges {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice updateTrimeshChanges", Direction::kToServer,
-                                     Reliability::kReliable, "Makes mesh edits felt, with this surface."};
+                                     Reliability::kReliable, Role::scene,
+                                     "Makes mesh edits felt, with this surface."};
   std::int32_t object = 0;
   float stiffness = 0;
   float damping = 0;
@@ -181,7 +187,7 @@ struct UpdateTrimeshChanges {
 
 struct TransformTrimesh {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice transformTrimesh", Direction::kToServer,
-                                     Reliability::kReliable,
+                                     Reliability::kReliable, Role::scene,
                                      "Moves the vertices of an object's mesh by a row-major 4x4 matrix."};
   std::int32_t object = 0;
   std::array<float, 16> matrix{};
@@ -195,7 +201,7 @@ struct TransformTrimesh {
 
 struct SetTrimeshType {
   static constexpr MessageInfo kInfo{
-      "vrpn_ForceDevice setTrimeshType", Direction::kToServer, Reliability::kReliable,
+      "vrpn_ForceDevice setTrimeshType", Direction::kToServer, Reliability::kReliable, Role::scene,
       "Chooses a rendering library: 0 Ghost, 1 Hcollide; object -1 means all."};
   std::int32_t object = 0;
   std::int32_t type = 0;
@@ -209,7 +215,7 @@ struct SetTrimeshType {
 
 struct ClearTrimesh {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice clearTrimesh", Direction::kToServer,
-                                     Reliability::kReliable, "Removes an object's mesh."};
+                                     Reliability::kReliable, Role::scene, "Removes an object's mesh."};
   std::int32_t object = 0;
 
   template <class M, class V>
@@ -220,7 +226,7 @@ struct ClearTrimesh {
 
 struct SetHapticOrigin {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice setHapticOrigin", Direction::kToServer,
-                                     Reliability::kReliable, "Places the device in the scene."};
+                                     Reliability::kReliable, Role::scene, "Places the device in the scene."};
   F32x3 position{};
   F32x3 axis{};
   float angle = 0;
@@ -235,7 +241,8 @@ struct SetHapticOrigin {
 
 struct SetHapticScale {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice setHapticScale", Direction::kToServer,
-                                     Reliability::kReliable, "Scales the device's motion in the scene."};
+                                     Reliability::kReliable, Role::scene,
+                                     "Scales the device's motion in the scene."};
   float scale = 1;
 
   template <class M, class V>
@@ -246,7 +253,7 @@ struct SetHapticScale {
 
 struct SetSceneOrigin {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice setSceneOrigin", Direction::kToServer,
-                                     Reliability::kReliable, "Places the scene."};
+                                     Reliability::kReliable, Role::scene, "Places the scene."};
   F32x3 position{};
   F32x3 axis{};
   float angle = 0;
@@ -260,16 +267,20 @@ struct SetSceneOrigin {
 };
 
 struct GetNewObjectId {
-  static constexpr MessageInfo kInfo{"vrpn_ForceDevice getNewObjectID", Direction::kToServer,
+  static constexpr MessageInfo kInfo{"vrpn_ForceDevice getNewObjectID",
+                                     Direction::kToServer,
                                      Reliability::kReliable,
-                                     "Is reserved: registered by stock libraries, never sent."};
+                                     Role::control,
+                                     "Is reserved: registered by stock libraries, never sent.",
+                                     Access::command};
   template <class M, class V>
   static constexpr void fields(M&, V&&) {}
 };
 
 struct SetObjectIsTouchable {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice setObjectIsTouchable", Direction::kToServer,
-                                     Reliability::kReliable, "Starts (1) or stops (0) rendering an object."};
+                                     Reliability::kReliable, Role::scene,
+                                     "Starts (1) or stops (0) rendering an object."};
   std::int32_t object = 0;
   Bool16 touchable = 1;
 

@@ -7,7 +7,7 @@ namespace hapticd::wire {
 
 struct TrackerPosQuat {
   static constexpr MessageInfo kInfo{"vrpn_Tracker Pos_Quat", Direction::kToClient, Reliability::kLowLatency,
-                                     "Reports where a sensor is; the filler is ignored."};
+                                     Role::report, "Reports where a sensor is; the filler is ignored."};
   std::int32_t sensor = 0;
   std::int32_t filler = 0;
   F64x3 position{};
@@ -24,7 +24,7 @@ struct TrackerPosQuat {
 
 struct TrackerVelocity {
   static constexpr MessageInfo kInfo{
-      "vrpn_Tracker Velocity", Direction::kToClient, Reliability::kLowLatency,
+      "vrpn_Tracker Velocity", Direction::kToClient, Reliability::kLowLatency, Role::report,
       "Reports how fast a sensor moves and by which rotation it turns within an interval."};
   std::int32_t sensor = 0;
   std::int32_t filler = 0;
@@ -44,7 +44,7 @@ struct TrackerVelocity {
 
 struct TrackerAcceleration {
   static constexpr MessageInfo kInfo{"vrpn_Tracker Acceleration", Direction::kToClient,
-                                     Reliability::kLowLatency,
+                                     Reliability::kLowLatency, Role::report,
                                      "Reports how a sensor's velocity changes and by which rotation its "
                                      "turning changes within an interval."};
   std::int32_t sensor = 0;
@@ -65,7 +65,7 @@ struct TrackerAcceleration {
 
 struct TrackerToRoom {
   static constexpr MessageInfo kInfo{"vrpn_Tracker To_Room", Direction::kToClient, Reliability::kReliable,
-                                     "Says where the tracker's base stands in the room."};
+                                     Role::report, "Says where the tracker's base stands in the room."};
   F64x3 position{};
   F64x4 orientation{0, 0, 0, 1};
 
@@ -78,7 +78,7 @@ struct TrackerToRoom {
 
 struct TrackerUnitToSensor {
   static constexpr MessageInfo kInfo{"vrpn_Tracker Unit_To_Sensor", Direction::kToClient,
-                                     Reliability::kReliable,
+                                     Reliability::kReliable, Role::report,
                                      "Says how a tracked unit is mounted on its sensor, one message for each "
                                      "sensor; the filler is ignored."};
   std::int32_t sensor = 0;
@@ -97,7 +97,7 @@ struct TrackerUnitToSensor {
 
 struct TrackerWorkspace {
   static constexpr MessageInfo kInfo{"vrpn_Tracker Workspace", Direction::kToClient, Reliability::kReliable,
-                                     "Says in which box the tracker works."};
+                                     Role::report, "Says in which box the tracker works."};
   F64x3 min{};
   F64x3 max{};
 
@@ -110,28 +110,29 @@ struct TrackerWorkspace {
 
 struct TrackerRequestToRoom {
   static constexpr MessageInfo kInfo{"vrpn_Tracker Request_Tracker_To_Room", Direction::kToServer,
-                                     Reliability::kReliable, "Asks for To_Room."};
+                                     Reliability::kReliable, Role::control, "Asks for To_Room."};
   template <class M, class V>
   static constexpr void fields(M&, V&&) {}
 };
 
 struct TrackerRequestUnitToSensor {
   static constexpr MessageInfo kInfo{"vrpn_Tracker Request_Unit_To_Sensor", Direction::kToServer,
-                                     Reliability::kReliable, "Asks for one Unit_To_Sensor per sensor."};
+                                     Reliability::kReliable, Role::control,
+                                     "Asks for one Unit_To_Sensor per sensor."};
   template <class M, class V>
   static constexpr void fields(M&, V&&) {}
 };
 
 struct TrackerRequestWorkspace {
   static constexpr MessageInfo kInfo{"vrpn_Tracker Request_Tracker_Workspace", Direction::kToServer,
-                                     Reliability::kReliable, "Asks for Workspace."};
+                                     Reliability::kReliable, Role::control, "Asks for Workspace."};
   template <class M, class V>
   static constexpr void fields(M&, V&&) {}
 };
 
 struct TrackerSetUpdateRate {
   static constexpr MessageInfo kInfo{"vrpn_Tracker set_update_rate", Direction::kToServer,
-                                     Reliability::kReliable, "Asks for a report rate."};
+                                     Reliability::kReliable, Role::control, "Asks for a report rate."};
   double rate = 0;
 
   template <class M, class V>
@@ -141,8 +142,9 @@ struct TrackerSetUpdateRate {
 };
 
 struct TrackerResetOrigin {
-  static constexpr MessageInfo kInfo{"vrpn_Tracker Reset_Origin", Direction::kToServer,
-                                     Reliability::kReliable, "Makes the present pose the origin."};
+  static constexpr MessageInfo kInfo{
+      "vrpn_Tracker Reset_Origin",          Direction::kToServer, Reliability::kReliable, Role::control,
+      "Makes the present pose the origin.", Access::command};
   template <class M, class V>
   static constexpr void fields(M&, V&&) {}
 };

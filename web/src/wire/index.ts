@@ -1,3 +1,3 @@
-export * from "./endpoint";
+export * from "./peer";
 export * from "./frame";
 export * from "./messages";

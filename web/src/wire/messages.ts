@@ -1,6 +1,6 @@
 // The messages that the page sends and reads; docs/wire-messages.md has every byte of them.
 import { Reader, Writer } from "./bytes";
-import type { Outgoing } from "./endpoint";
+import type { Outgoing } from "./peer";
 
 export type Vec3 = [number, number, number];
 
