@@ -52,6 +52,8 @@ class SceneBuilder::State {
     forces_.clientGone(client, now);
   }
 
+  void releaseForces(ClientId client, Nanos now) { forces_.clientGone(client, now); }
+
   std::optional<Nanos> nextDeadline() const {
     std::optional<Nanos> next;
     for (const auto& at : {board_.nextDeadline(), objects_.nextDeadline(), forces_.nextDeadline()}) {
@@ -218,6 +220,10 @@ void SceneBuilder::apply(ClientId client, SceneCommand&& command, Nanos now, std
 
 void SceneBuilder::clientGone(ClientId client, Nanos now) {
   state_->clientGone(client, now);
+}
+
+void SceneBuilder::releaseForces(ClientId client, Nanos now) {
+  state_->releaseForces(client, now);
 }
 
 std::optional<Nanos> SceneBuilder::nextDeadline() const {

@@ -31,6 +31,9 @@ class SceneBuilder {
   /// The client has left: its open batch is dropped, the forces it owns ramp out.
   void clientGone(ClientId client, Nanos now);
 
+  /// The forces that the client owns ramp out, although it stays.
+  void releaseForces(ClientId client, Nanos now);
+
   /// When publish() has something to do although no command came; nothing to wait for when empty.
   std::optional<Nanos> nextDeadline() const;
 

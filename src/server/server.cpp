@@ -162,9 +162,9 @@ void Server::finishRecording() {
 }
 
 void Server::startScene(SceneHost& scene) {
-  std::function<void(scene::ClientId, Nanos, const scene::SceneCommand*)> telling;
+  std::function<void(scene::ClientId, Nanos, const scene::SceneCommand*)> applying;
   if (recorder_) {
-    telling = [this, number = scene.number()](auto client, Nanos now, const auto* command) {
+    applying = [this, number = scene.number()](auto client, Nanos now, const auto* command) {
       recorder_->told(number, client, now, command);
     };
   }
@@ -174,13 +174,10 @@ void Server::startScene(SceneHost& scene) {
                        deliver(scene, std::move(notices));
                      });
                    },
-               .drained =
-                   [this] {
-                     loop_.post([this] {
-                       for (const auto& [id, session] : sessions_) session->resume();
-                     });
-                   },
-               .telling = std::move(telling)});
+               .relieved =
+                   [this](scene::ClientId client) { loop_.post([this, client] { onRelieved(client); }); },
+               .applying = std::move(applying)},
+              [this](std::function<void()> function) { loop_.post(std::move(function)); });
 }
 
 void Server::run() {
@@ -196,7 +193,7 @@ void Server::run() {
   }
   subscriptions_.push_back(loop_.every(1s, [this] { everySecond(); }));
   subscriptions_.push_back(loop_.every(50ms, [this] {
-    closeLost();
+    checkHeartbeats();
     for (const auto& station : stations_) {
       station->checkBlackBox();
       if (const auto text = station->checkHealth()) tell(*station, *text);
@@ -338,7 +335,6 @@ void Server::onClosed(Session& session, const std::string& reason) {
   spdlog::info("client {} ({}) is gone: {}", session.id(), session.description(), reason);
   for (const auto& station : stations_) station->clientGone(session.id());
   for (const auto& scene : scenes_) scene->clientGone(session.id());
-  heartbeats_.forget(session.id());
   handshakes_.erase(session.id());
   sessions_.erase(session.id());
 }
@@ -356,12 +352,33 @@ void Server::closeStaleHandshakes() {
   }
 }
 
-// Who asked to be missed and is silent now. The session object goes with its onClosed.
-void Server::closeLost() {
-  for (const scene::ClientId client : heartbeats_.lost(base::now())) {
-    const auto session = sessions_.find(client);
-    if (session != sessions_.end()) session->second->abort("no heartbeat for 500 ms, as it had promised");
+// Disconnect clients whose heartbeat expired. onClosed() destroys the session, later.
+void Server::checkHeartbeats() {
+  const Nanos now = base::now();
+  for (const auto& [id, session] : sessions_) {
+    switch (session->checkHeartbeat(now)) {
+      case HeartbeatWatch::Verdict::alive:
+        break;
+      case HeartbeatWatch::Verdict::lost:
+        session->abort("no heartbeat for 500 ms, as it had promised");
+        break;
+      case HeartbeatWatch::Verdict::excused:
+        spdlog::warn("client {}: no heartbeat could be read for 5 s because the scene is behind; its forces ramp out", id);
+        releaseForces(id);
+        break;
+    }
   }
+}
+
+// The scene is behind, and the client left meanwhile. Its last commands are still applied.
+void Server::onDeparted(Session& session, const std::string& reason) {
+  spdlog::info("client {} ({}) left while its commands wait for the scene: {}", session.id(), session.description(),
+               reason);
+  releaseForces(session.id());
+}
+
+void Server::releaseForces(scene::ClientId client) {
+  for (const auto& scene : scenes_) scene->releaseForces(client);
 }
 
 Station* Server::stationOf(wire::LocalSender name) noexcept {
@@ -375,35 +392,38 @@ void Server::onSubscribed(Session& session, wire::LocalSender name) {
   if (Station* station = stationOf(name)) station->onSubscribed(session, name);
 }
 
-void Server::onMessage(Session& session, const wire::MessageReceived& message) {
-  // What we do not know is for somebody else, as on any VRPN connection.
-  if (message.kind == wire::kUnknownKind) return;
+// The one place where control and scene part.
+void Server::onMessage(Session& session, const wire::MessageReceived& message, Nanos received) {
   Station* station = stationOf(message.local_sender);
   if (station == nullptr || !mayCommand(session, *station, message)) return;
-  if (message.kind == wire::kindOf<wire::Heartbeat>) {
-    onHeartbeat(session, message);
+  switch (wire::role(message.kind)) {
+    case wire::Role::control:
+      station->onControl(session, message, received);
+      return;
+    case wire::Role::scene:
+      onSceneMessage(session, *station, message);
+      return;
+    case wire::Role::report:
+    case wire::Role::unknown:
+      return;  // meant for clients
+  }
+}
+
+void Server::onSceneMessage(Session& session, Station& station, const wire::MessageReceived& message) {
+  std::string error;
+  if (!station.scene().take(session.id(), message, error)) {
+    session.refuse("malformed message: " + error);
     return;
   }
-  std::string error;
-  switch (station->scene().take(session.id(), message, error)) {
-    case CommandDecoder::Outcome::taken:
-      if (message.kind != wire::kindOf<wire::ResetScene>) return;
-      for (const auto& other : stations_) {
-        if (&other->scene() == &station->scene()) other->onReset();
-      }
-      return;
-    case CommandDecoder::Outcome::malformed:
-      session.refuse("malformed message: " + error);
-      return;
-    case CommandDecoder::Outcome::notACommand:
-      station->onMessage(session, message);
-      return;
+  if (message.kind != wire::kindOf<wire::ResetScene>) return;
+  for (const auto& other : stations_) {
+    if (&other->scene() == &station.scene()) other->onReset();
   }
 }
 
 bool Server::mayCommand(Session& session, Station& station, const wire::MessageReceived& message) {
   std::string reason;
-  if (!isCommand(message.kind) || station.mayCommand(session, reason)) return true;
+  if (!wire::needsControl(message.kind) || station.mayCommand(session, reason)) return true;
   // One text for each read: a refused upload has thousands of messages.
   if (std::exchange(refused_, session.id()) != session.id()) {
     session.send(message.local_sender,
@@ -414,31 +434,30 @@ bool Server::mayCommand(Session& session, Station& station, const wire::MessageR
   return false;
 }
 
-void Server::onHeartbeat(Session& session, const wire::MessageReceived& message) {
-  const auto heartbeat = wire::decode<wire::Heartbeat>(message.payload);
-  if (!heartbeat) {
-    session.refuse("malformed message: " + heartbeat.error());
-  } else if (heartbeat->watch != 0) {
-    heartbeats_.beat(session.id(), base::now());
-  } else {
-    heartbeats_.forget(session.id());
-  }
-}
-
 void Server::onRemark(const Session& session, const std::string& text) {
   noise_.warn("client " + std::to_string(session.id()) + ": " + text);
 }
 
-// Who sends a lot must not make others wait for their reports.
-void Server::onBreath() {
+// A client that sends a lot must not delay the reports to others.
+void Server::onReadSlice() {
   for (const auto& station : stations_) report(*station);
 }
 
-void Server::onBatchEnd(Session& session) {
+void Server::onReadEnd(Session& session) {
   refused_ = 0;
   for (const auto& scene : scenes_) {
-    if (!scene->flush()) session.pause();
+    scene->flush(session.id());
+    if (scene->full(session.id())) session.hold();
   }
+}
+
+// The scene has caught up with the client.
+void Server::onRelieved(scene::ClientId client) {
+  const auto session = sessions_.find(client);
+  if (session == sessions_.end()) return;
+  const auto full = [&](const auto& scene) { return scene->full(client); };
+  if (std::any_of(scenes_.begin(), scenes_.end(), full)) return;
+  if (session->second->release()) loop_.post([this, client] { onRelieved(client); });
 }
 
 void Server::report(Station& station) {

@@ -16,7 +16,6 @@
 #include "record/recorder.h"
 #include "server/session/wall_clock.h"
 #include "server/config/config.h"
-#include "server/session/heartbeats.h"
 #include "server/session/noise_log.h"
 #include "server/player.h"
 #include "server/scene/scene_host.h"
@@ -52,10 +51,11 @@ class Server final : public SessionOwner, public WebOwner {
   struct ReverseConnection;
 
   void onSubscribed(Session& session, wire::LocalSender name) override;
-  void onMessage(Session& session, const wire::MessageReceived& message) override;
+  void onMessage(Session& session, const wire::MessageReceived& message, base::Nanos received) override;
   void onRemark(const Session& session, const std::string& text) override;
-  void onBreath() override;
-  void onBatchEnd(Session& session) override;
+  void onReadSlice() override;
+  void onReadEnd(Session& session) override;
+  void onDeparted(Session& session, const std::string& reason) override;
   void onClosed(Session& session, const std::string& reason) override;
 
   ServerStatus status() const override;
@@ -74,9 +74,11 @@ class Server final : public SessionOwner, public WebOwner {
   void everySecond();
   void report(Station& station);
   void tell(const Station& station, const wire::Text& text);
-  void onHeartbeat(Session& session, const wire::MessageReceived& message);
+  void onSceneMessage(Session& session, Station& station, const wire::MessageReceived& message);
+  void onRelieved(scene::ClientId client);
+  void releaseForces(scene::ClientId client);
   void closeStaleHandshakes();
-  void closeLost();
+  void checkHeartbeats();
   bool mayCommand(Session& session, Station& station, const wire::MessageReceived& message);
   Station* stationOf(wire::LocalSender name) noexcept;
   wire::LocalSender nameFor(const Session& session, const SceneHost& scene) const noexcept;
@@ -93,7 +95,6 @@ class Server final : public SessionOwner, public WebOwner {
   std::vector<std::unique_ptr<Station>> stations_;
   std::map<scene::ClientId, std::unique_ptr<Session>> sessions_;
   std::map<scene::ClientId, base::Nanos> handshakes_;  ///< when the unfinished ones began
-  Heartbeats heartbeats_;
   scene::ClientId refused_ = 0;  ///< whose commands of this read were refused; 0: nobody's
   std::vector<std::unique_ptr<ReverseConnection>> reverseConnections_;
   std::vector<net::Subscription> subscriptions_;

@@ -32,7 +32,10 @@ class ScriptedPeer {
       : speech_(speech), sender_(names_.addSender("VRPN Control")), device_(names_.addSender(device)) {
     if (mode == Mode::tcp) {
       endpoint_ = std::make_unique<wire::Peer>(names_);
-      take(net::Connection::connect(loop_, server, 2s));
+      // Floods wait here, so that a test can send more than the server reads.
+      net::ConnectionOptions options;
+      options.hardLimitBytes = std::size_t{256} << 20;
+      take(net::Connection::connect(loop_, server, 2s, options));
     } else {
       connectBack(server);
     }
@@ -108,6 +111,13 @@ class ScriptedPeer {
     if (udp_) endpoint_->takeDatagrams([this](wire::ByteView datagram) { udp_->sendTo(datagram, udpPeer_); });
   }
   void close() { connection_.abort("test over"); }
+  /// Sends what is queued, then ends the connection in order.
+  void end() { connection_.close("test over"); }
+  /// Handles what is ready, without waiting.
+  void poll() {
+    while (loop_.runOnce(std::chrono::milliseconds(0)) > 0) {
+    }
+  }
 
   /// All messages of a kind so far, from our device.
   template <wire::WireMessage M>

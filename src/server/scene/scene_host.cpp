@@ -40,6 +40,10 @@ void SceneHost::play(scene::ClientId client, const scene::SceneCommand* command)
   }
 }
 
+void SceneHost::releaseForces(scene::ClientId client) {
+  if (thread_ && commanders_.count(client) != 0) thread_->pushUrgent({client, ReleaseForces{}});
+}
+
 void SceneHost::clientGone(scene::ClientId client) {
   if (!thread_) return;
   flush(client);

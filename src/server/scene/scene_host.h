@@ -44,6 +44,8 @@ class SceneHost {
   void whenPublished(scene::ClientId client, std::function<void()> reached);
   /// A command of a recorded client (null: it was gone). Any thread, between start() and stop().
   void play(scene::ClientId client, const scene::SceneCommand* command);
+  /// The forces that the client owns ramp out before anything that is queued is applied; the client may stay.
+  void releaseForces(scene::ClientId client);
   /// What the client owns ramps out; the last client that had commanded the scene clears it, if so configured.
   void clientGone(scene::ClientId client);
   /// Asks for the scene as it is after everything that was flushed; the answer comes in the scene thread.

@@ -4,11 +4,21 @@ namespace hapticd::server {
 
 void SceneQueue::push(SceneParcel&& parcel) {
   const std::lock_guard lock(mutex_);
+  charge(parcel);
+  parcels_.push_back(std::move(parcel));
+}
+
+void SceneQueue::pushFront(SceneParcel&& parcel) {
+  const std::lock_guard lock(mutex_);
+  charge(parcel);
+  parcels_.push_front(std::move(parcel));
+}
+
+void SceneQueue::charge(const SceneParcel& parcel) {
   Account& account = accounts_[parcel.client];
   account.bytes += parcel.bytes;
   ++account.parcels;
   account.full = account.full || account.bytes > kClientLimit_bytes;
-  parcels_.push_back(std::move(parcel));
 }
 
 bool SceneQueue::full(scene::ClientId client) const {

@@ -31,6 +31,8 @@ class SceneQueue {
 
   /// Appends a parcel and charges its client.
   void push(SceneParcel&& parcel);
+  /// The same, but the parcel is the next to be taken.
+  void pushFront(SceneParcel&& parcel);
 
   /// Whether the client is full: above the limit, and since then not yet relieved.
   bool full(scene::ClientId client) const;
@@ -52,6 +54,8 @@ class SceneQueue {
     base::Nanos appliedAt = 0;
     bool full = false;
   };
+
+  void charge(const SceneParcel& parcel);
 
   mutable std::mutex mutex_;
   std::deque<SceneParcel> parcels_;

@@ -55,6 +55,13 @@ void SceneThread::push(SceneParcel&& parcel) {
   thread_.wake();
 }
 
+void SceneThread::pushUrgent(SceneTask&& task) {
+  SceneParcel parcel{.client = task.client, .tasks = {}, .bytes = 0};
+  parcel.tasks.push_back(std::move(task));
+  queue_.pushFront(std::move(parcel));
+  thread_.wake();
+}
+
 std::optional<base::Nanos> SceneThread::step() {
   applySlice();
   publish();
@@ -109,7 +116,9 @@ void SceneThread::apply(SceneTask&& task) {
   std::vector<scene::Notice> repeated;
   for (std::size_t i = seats_.size(); i-- > 0;) {
     scene::SceneBuilder& builder = seats_[i].builder;
-    if (command == nullptr) {
+    if (std::holds_alternative<ReleaseForces>(task.what)) {
+      builder.releaseForces(task.client, now);
+    } else if (command == nullptr) {
       builder.clientGone(task.client, now);
     } else if (i > 0) {
       builder.apply(task.client, scene::SceneCommand(*command), now, repeated);

@@ -53,6 +53,8 @@ class SceneThread {
 
   /// Appends a parcel; never waits for the scene. From any thread.
   void push(SceneParcel&& parcel);
+  /// The same for a task that goes before all that are queued.
+  void pushUrgent(SceneTask&& task);
   const SceneQueue& queue() const noexcept { return queue_; }
 
  private:

@@ -16,7 +16,7 @@ struct Header {
 }  // namespace
 
 void MessageBacklog::push(const wire::MessageReceived& message, base::Nanos received) {
-  const Header header{message.kind, message.localSender, message.time, received, message.payload.size()};
+  const Header header{message.kind, message.local_sender, message.time, received, message.payload.size()};
   // Moving what is left costs less than what was read since.
   if (begin_ > bytes_.size() / 2) {
     bytes_.erase(bytes_.begin(), bytes_.begin() + static_cast<std::ptrdiff_t>(begin_));
@@ -34,7 +34,7 @@ MessageBacklog::Entry MessageBacklog::pop() {
   std::memcpy(&header, bytes_.data() + begin_, sizeof header);
   Entry entry;
   entry.message.kind = header.kind;
-  entry.message.localSender = header.sender;
+  entry.message.local_sender = header.sender;
   entry.message.time = header.time;
   entry.message.payload = wire::ByteView(bytes_).subspan(begin_ + sizeof header, header.payload);
   entry.received = header.received;

@@ -1,4 +1,4 @@
-// Who may command a device, and which messages are commands.
+// Who may command a device.
 #pragma once
 
 #include <algorithm>
@@ -6,20 +6,8 @@
 #include <string>
 
 #include "server/config/config.h"
-#include "wire/messages.h"
 
 namespace hapticd::server {
-
-/// Whether a message changes what others feel or see. Watching, asking and stopping are free to all.
-constexpr bool isCommand(wire::MessageKind kind) noexcept {
-  if (kind == wire::kUnknownKind || wire::info(kind).direction != wire::Direction::kToServer) return false;
-  return kind != wire::kindOf<wire::Ping> && kind != wire::kindOf<wire::TrackerRequestToRoom> &&
-         kind != wire::kindOf<wire::TrackerRequestUnitToSensor> &&
-         kind != wire::kindOf<wire::TrackerRequestWorkspace> &&
-         kind != wire::kindOf<wire::TrackerSetUpdateRate> && kind != wire::kindOf<wire::Subscribe> &&
-         kind != wire::kindOf<wire::QueryCapabilities> && kind != wire::kindOf<wire::Heartbeat> &&
-         kind != wire::kindOf<wire::StopForces>;
-}
 
 /// `control` of one device. Net thread.
 class Roles {

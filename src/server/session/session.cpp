@@ -75,10 +75,8 @@ void Session::start() {
   connection_.start({.onConnected = {},
                      .onBytes = [this](auto bytes) { onBytes(bytes); },
                      .onDrained = {},
-                     .onClosed =
-                         [this](const std::string& reason) {
-                           owner_.onClosed(*this, failure_.empty() ? reason : failure_);
-                         }});
+                     .onPeerGone = [this](const auto& reason) { owner_.onDeparted(*this, reason); },
+                     .onClosed = [this](const auto& reason) { onEnd(reason); }});
   flush();
 }
 
@@ -101,11 +99,41 @@ void Session::flush() {
   connection_.flush();
 }
 
-void Session::pause() {
-  connection_.pauseReading();
+bool Session::release() {
+  constexpr std::size_t kSlice_bytes = 64 * 1024;
+  held_ = false;
+  const std::size_t before = backlog_.size();
+  while (!backlog_.empty() && !held_ && before - backlog_.size() < kSlice_bytes && peer_.connected()) {
+    const MessageBacklog::Entry entry = backlog_.pop();
+    deliver(entry.message, entry.received);
+  }
+  owner_.onReadEnd(*this);
+  flush();
+  if (!backlog_.empty()) return !held_;
+  pauseReading(false);
+  if (ended_) owner_.onClosed(*this, *ended_);
+  return false;
 }
-void Session::resume() {
-  connection_.resumeReading();
+
+// What the client sent before it left still counts.
+void Session::onEnd(const std::string& reason) {
+  if (!failure_.empty() || backlog_.empty()) {
+    owner_.onClosed(*this, failure_.empty() ? reason : failure_);
+    return;
+  }
+  ended_ = reason;
+  owner_.onDeparted(*this, reason);
+}
+
+void Session::pauseReading(bool pause) {
+  if (std::exchange(reading_, !pause) == !pause) return;
+  if (pause) {
+    heartbeats_.pause(base::now());
+    connection_.pauseReading();
+  } else {
+    heartbeats_.resume(base::now());
+    connection_.resumeReading();
+  }
 }
 
 void Session::close(const std::string& reason) {
@@ -141,9 +169,9 @@ void Session::onBytes(std::span<const std::byte> bytes) {
     const auto piece = bytes.first(std::min(kPieceBytes, bytes.size()));
     bytes = bytes.subspan(piece.size());
     peer_.feed(clock_.now(), piece, [this](const wire::Event& event) { onEvent(event); });
-    if (!bytes.empty()) owner_.onBreath();
+    if (!bytes.empty()) owner_.onReadSlice();
   }
-  owner_.onBatchEnd(*this);
+  owner_.onReadEnd(*this);
   if (peer_.failed()) {
     connection_.abort(failure_);
     return;
@@ -158,15 +186,12 @@ void Session::onDatagram(std::span<const std::byte> bytes, const net::Endpoint& 
   inDatagram_ = true;
   peer_.feedDatagram(bytes, [this](const wire::Event& event) { onEvent(event); });
   inDatagram_ = false;
-  owner_.onBatchEnd(*this);
+  owner_.onReadEnd(*this);
   flush();
 }
 
 void Session::onEvent(const wire::Event& event) {
-  std::visit(Overloaded{[this](const wire::MessageReceived& message) {
-                          if (message.local_sender.value < 0 || isOvertaken(message)) return;
-                          owner_.onMessage(*this, message);
-                        },
+  std::visit(Overloaded{[this](const wire::MessageReceived& message) { onReceived(message); },
                         [this](const wire::Connected& connected) {
                           spdlog::info("client {} ({}) speaks VRPN {}", id_, description_, connected.version);
                         },
@@ -181,10 +206,42 @@ void Session::onEvent(const wire::Event& event) {
              event);
 }
 
+void Session::onReceived(const wire::MessageReceived& message) {
+  // As on any VRPN connection, senders and types that are unknown here are meant for others.
+  if (message.local_sender.value < 0 || message.kind == wire::kUnknownKind || isOvertaken(message)) return;
+  const base::Nanos received = base::now();
+  if (!holding() || wire::overtakes(message.kind)) {
+    deliver(message, received);
+    return;
+  }
+  const bool full = backlog_.size() >= kReadAhead_bytes;
+  if (full && inDatagram_) return;  // lost, as any datagram may be: nothing else bounds them
+  backlog_.push(message, received);
+  if (backlog_.size() >= kReadAhead_bytes) pauseReading(true);
+}
+
+void Session::deliver(const wire::MessageReceived& message, base::Nanos received) {
+  if (message.kind == wire::kindOf<wire::Heartbeat>) {
+    onHeartbeat(message, received);
+  } else {
+    owner_.onMessage(*this, message, received);
+  }
+}
+
+void Session::onHeartbeat(const wire::MessageReceived& message, base::Nanos received) {
+  const auto heartbeat = wire::decode<wire::Heartbeat>(message.payload);
+  if (!heartbeat) {
+    refuse("malformed message: " + heartbeat.error());
+  } else if (heartbeat->watch != 0) {
+    heartbeats_.beat(received);
+  } else {
+    heartbeats_.forget();
+  }
+}
+
 // A client that ends a field or a plane says so by TCP, what it said before by UDP may come later and must
 // not bring it back.
 bool Session::isOvertaken(const wire::MessageReceived& message) {
-  if (message.kind == wire::kUnknownKind) return false;
   wire::Time& last = lastReliable_[static_cast<std::size_t>(message.kind)];
   const auto before = [](const wire::Time& a, const wire::Time& b) {
     return a.seconds != b.seconds ? a.seconds < b.seconds : a.microseconds < b.microseconds;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -11,7 +12,9 @@
 #include "base/world.h"
 #include "net/connection.h"
 #include "net/udp_socket.h"
-#include "scene/builder.h"
+#include "scene/notice.h"
+#include "server/session/heartbeat_watch.h"
+#include "server/session/message_backlog.h"
 #include "server/session/wall_clock.h"
 #include "server/session/client_status.h"
 #include "wire/peer.h"
@@ -24,20 +27,23 @@ class Session;
 enum class SessionMode { tcp, udp, web };
 std::string_view nameOf(SessionMode mode);
 
-/// What a session tells the server. Called from the net thread.
+/// What a session reports to the server. Called in the net thread.
 class SessionOwner {
  public:
   virtual ~SessionOwner() = default;
   /// The client listens to one of our names from now on.
   virtual void onSubscribed(Session& session, wire::LocalSender name) = 0;
-  /// A message for one of our devices.
-  virtual void onMessage(Session& session, const wire::MessageReceived& message) = 0;
+  /// A message for one of our devices that the server read at `received` on the servo clock.
+  virtual void onMessage(Session& session, const wire::MessageReceived& message, base::Nanos received) = 0;
   /// Worth a line in the log, but a client can cause it as often as it likes.
   virtual void onRemark(const Session& session, const std::string& text) = 0;
-  /// Some messages of a long read have been given: a chance for what must not wait for the rest.
-  virtual void onBreath() = 0;
-  /// All messages of one read have been given.
-  virtual void onBatchEnd(Session& session) = 0;
+  /// Called between slices of a long read, so that pending reports can be flushed.
+  virtual void onReadSlice() = 0;
+  /// All messages of one read were passed on.
+  virtual void onReadEnd(Session& session) = 0;
+  /// The client is gone while the server does not read from it: its forces must end now. What it sent before is still
+  /// read, up to onClosed().
+  virtual void onDeparted(Session& session, const std::string& reason) = 0;
   /// Over, with the reason; the owner destroys the session after this returns.
   virtual void onClosed(Session& session, const std::string& reason) = 0;
 };
@@ -85,9 +91,20 @@ class Session {
   /// A line in the log about this client, unless there are too many. Quote what the client said.
   void remark(const std::string& text) { owner_.onRemark(*this, text); }
 
-  /// Stops reading while the scene is behind.
-  void pause();
-  void resume();
+  /// Stops reading ahead of a held-back scene here: what stop, heartbeat and ping overtake at most.
+  static constexpr std::size_t kReadAhead_bytes = 4U << 20;
+
+  /// Holds back what the client sends from now on, because the scene is behind; only messages that overtake are still
+  /// passed on. Beyond kReadAhead_bytes the session stops reading, and TCP makes the client wait.
+  void hold() { held_ = true; }
+  /// Ends hold() and passes on what was held back, in order: a slice of about 64 KiB, or less when the owner calls
+  /// hold() again. True when more is left: call again, after giving others their turn. When it was the last of a client
+  /// that has left, onClosed() follows and the session is destroyed.
+  bool release();
+  /// Whether messages are held back.
+  bool holding() const noexcept { return held_ || !backlog_.empty(); }
+  /// Judges the client's heartbeats.
+  HeartbeatWatch::Verdict checkHeartbeat(base::Nanos now) noexcept { return heartbeats_.check(now); }
   /// Ends it, with a reason for the log; onClosed follows.
   void close(const std::string& reason);
   /// The same at once, without waiting for a peer that may not read any more.
@@ -104,6 +121,11 @@ class Session {
   void onBytes(std::span<const std::byte> bytes);
   void onDatagram(std::span<const std::byte> bytes, const net::Endpoint& from);
   void onEvent(const wire::Event& event);
+  void onReceived(const wire::MessageReceived& message);
+  void onHeartbeat(const wire::MessageReceived& message, base::Nanos received);
+  void deliver(const wire::MessageReceived& message, base::Nanos received);
+  void pauseReading(bool pause);
+  void onEnd(const std::string& reason);
   void onSender(std::string_view name);
   void onUdp(const wire::UdpAddress& address);
   void onLogRequest(const wire::LogRequest& request);
@@ -124,6 +146,11 @@ class Session {
   std::set<wire::LocalSender> subscriptions_;
   std::string failure_;
   bool inDatagram_ = false;
+  bool held_ = false;
+  bool reading_ = true;
+  std::optional<std::string> ended_;  // the connection is over, the backlog is not
+  MessageBacklog backlog_;
+  HeartbeatWatch heartbeats_;
   std::array<wire::Time, wire::kMessageKinds> lastReliable_{};  // of each kind, by the client's clock
 };
 

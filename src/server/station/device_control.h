@@ -1,6 +1,7 @@
 // Stop, re-arm and holding the simulated hand: what clients may do to the device itself.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <string>
 
@@ -20,8 +21,18 @@ class DeviceControl {
                 const geometry::Box& workspace_m)
       : guard_(guard), simulated_(simulated), workspace_m_(workspace_m) {}
 
-  void stopForces() { guard_.stop(); }
-  void rearmForces() { guard_.rearm(); }
+  /// Zero force until a re-arm that was received later than this.
+  void stopForces(base::Nanos received) {
+    stopped_ = std::max(stopped_, received);
+    guard_.stop();
+  }
+  /// False, and nothing happens, when a stop was received at the same time or later: the re-arm was sent without
+  /// knowing of it.
+  bool rearmForces(base::Nanos received) {
+    if (received <= stopped_) return false;
+    guard_.rearm();
+    return true;
+  }
   /// After a reset of the scene: what is felt then comes in gently.
   void rampIn() { guard_.rampIn(); }
 
@@ -40,6 +51,7 @@ class DeviceControl {
   device::SimulatedDevice* simulated_;
   geometry::Box workspace_m_;
   std::optional<scene::ClientId> holder_;
+  base::Nanos stopped_ = 0;  // when the last stop was received
 };
 
 }  // namespace hapticd::server

@@ -212,6 +212,7 @@ void Station::onSubscribed(Session& session, wire::LocalSender name) {
 void Station::clientGone(scene::ClientId client) {
   impl_->control.clientGone(client);
   impl_->roles.clientGone(client);
+  std::erase_if(impl_->rearming, [client](const Session* session) { return session->id() == client; });
   impl_->outbox.clientGone(client);
 }
 

@@ -48,8 +48,8 @@ class Station {
 
   /// Whether the client may command; when not, `reason` says who may.
   bool mayCommand(const Session& session, std::string& reason);
-  /// A client's message that is no scene command: control, choices, questions.
-  void onMessage(Session& session, const wire::MessageReceived& message);
+  /// A client's control message: stop and re-arm, choices, questions. `received`: when the server read it.
+  void onControl(Session& session, const wire::MessageReceived& message, base::Nanos received);
   /// The scene of this device was put back to the beginning.
   void onReset();
   /// The client listens to this name from now on.

@@ -1,6 +1,8 @@
 // The parts of a station, for station.cpp (lifetime and reports) and station_messages.cpp (what clients say).
 #pragma once
 
+#include <set>
+
 #include "base/clock.h"
 #include "device/simulated/simulated_device.h"
 #include "realtime/servo/tick.h"
@@ -13,6 +15,13 @@
 
 namespace hapticd::server {
 
+/// Where a control message comes from.
+struct Request {
+  Session& session;
+  wire::LocalSender name;  ///< the name under which the client addresses the device
+  base::Nanos received;    ///< when the server read it, on the servo clock
+};
+
 struct Station::Impl {
   Impl(const DeviceConfig& config_, std::vector<wire::LocalSender> names_, SceneHost& scene_,
        std::unique_ptr<device::Device> device_, bool allowNoRealtime);
@@ -22,23 +31,23 @@ struct Station::Impl {
   void choose(Session& session, wire::LocalSender name, ReportChoice choice, double rate_Hz,
               std::string_view call);
 
-  // One message each; text for what is refused.
-  void on(Session& session, wire::LocalSender name, const wire::Ping&);
-  void on(Session& session, wire::LocalSender name, const wire::Text& text);
-  void on(Session& session, wire::LocalSender name, const wire::TrackerRequestToRoom&);
-  void on(Session& session, wire::LocalSender name, const wire::TrackerRequestUnitToSensor&);
-  void on(Session& session, wire::LocalSender name, const wire::TrackerRequestWorkspace&);
-  void on(Session& session, wire::LocalSender name, const wire::TrackerSetUpdateRate& wanted);
-  void on(Session& session, wire::LocalSender name, const wire::TrackerResetOrigin&);
-  void on(Session& session, wire::LocalSender name, const wire::ButtonAdmin& admin);
-  void on(Session& session, wire::LocalSender name, const wire::QueryCapabilities&);
-  void on(Session& session, wire::LocalSender name, const wire::Subscribe& wanted);
-  void on(Session& session, wire::LocalSender name, const wire::StopForces&);
-  void on(Session& session, wire::LocalSender name, const wire::RearmForces&);
-  void on(Session& session, wire::LocalSender name, const wire::HoldHand& wanted);
-  // What else is in the table goes to clients, or is none of a station's business.
-  template <class M>
-  void on(Session&, wire::LocalSender, const M&) {}
+  // One for each control message; a refusal is a text to the client.
+  void on(const Request& request, const wire::Ping&);
+  void on(const Request& request, const wire::Text& text);
+  void on(const Request& request, const wire::TrackerRequestToRoom&);
+  void on(const Request& request, const wire::TrackerRequestUnitToSensor&);
+  void on(const Request& request, const wire::TrackerRequestWorkspace&);
+  void on(const Request& request, const wire::TrackerSetUpdateRate& wanted);
+  void on(const Request& request, const wire::TrackerResetOrigin&);
+  void on(const Request& request, const wire::ButtonAdmin& admin);
+  void on(const Request& request, const wire::QueryCapabilities&);
+  void on(const Request& request, const wire::Subscribe& wanted);
+  void on(const Request& request, const wire::StopForces&);
+  void on(const Request& request, const wire::RearmForces&);
+  void on(const Request& request, const wire::HoldHand& wanted);
+  void on(const Request&, const wire::GetNewObjectId&) {}  // stock servers do not answer it either
+  void on(const Request&, const wire::Heartbeat&) {}  // the session's business
+  void rearm(Session& session, wire::LocalSender name, base::Nanos received);
 
   const DeviceConfig config;
   const std::vector<wire::LocalSender> names;
@@ -62,6 +71,7 @@ struct Station::Impl {
   BlackBoxRecorder recorder;
   std::uint64_t droppedReports = 0;
   std::string fault;  // as last told
+  std::set<Session*> rearming;  // sent a re-arm that may wait for the scene
 
   // The scene thread's: what the scripted hand was planned for.
   std::vector<std::pair<std::int32_t, std::uint64_t>> explored{{-1, 0}};

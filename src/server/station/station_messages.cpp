@@ -6,6 +6,7 @@
 
 #include "server/station/answers.h"
 #include "server/station/station_impl.h"
+#include "wire/dispatch.h"
 #include "wire/text.h"
 
 namespace hapticd::server {
@@ -28,48 +29,46 @@ bool Station::mayCommand(const Session& session, std::string& reason) {
   return false;
 }
 
-void Station::onMessage(Session& session, const wire::MessageReceived& message) {
-  const auto decoded = wire::decode(message.kind, message.payload);
-  if (!decoded) {
-    session.refuse("malformed message: " + decoded.error());
-    return;
-  }
-  std::visit([&](const auto& m) { impl_->on(session, message.local_sender, m); }, *decoded);
+void Station::onControl(Session& session, const wire::MessageReceived& message, base::Nanos received) {
+  const Request request{session, message.local_sender, received};
+  const auto handled = wire::dispatchControl(message.kind, message.payload,
+                                             [&](const auto& control) { impl_->on(request, control); });
+  if (!handled) session.refuse("malformed message: " + handled.error());
 }
 
-void Station::Impl::on(Session& session, wire::LocalSender name, const wire::Ping&) {
+void Station::Impl::on(const Request& request, const wire::Ping&) {
   const realtime::TickReport& last = outbox.last();
-  session.send(name, wire::Pong{});
-  session.send(name, Reporter::buttonStates(profile.buttons, frame.buttons, last.rendering.touching));
+  request.session.send(request.name, wire::Pong{});
+  request.session.send(request.name, Reporter::buttonStates(profile.buttons, frame.buttons, last.rendering.touching));
 }
 
-void Station::Impl::on(Session& session, wire::LocalSender, const wire::Text& text) {
-  session.remark("says " + wire::inQuotes(text.text.text));
+void Station::Impl::on(const Request& request, const wire::Text& text) {
+  request.session.remark("says " + wire::inQuotes(text.text.text));
 }
 
-void Station::Impl::on(Session& session, wire::LocalSender name, const wire::TrackerRequestToRoom&) {
-  session.send(name, trackerToRoom(frame));
+void Station::Impl::on(const Request& request, const wire::TrackerRequestToRoom&) {
+  request.session.send(request.name, trackerToRoom(frame));
 }
 
-void Station::Impl::on(Session& session, wire::LocalSender name, const wire::TrackerRequestUnitToSensor&) {
+void Station::Impl::on(const Request& request, const wire::TrackerRequestUnitToSensor&) {
   for (std::int32_t sensor = 0; sensor < kSensors; ++sensor) {
-    session.send(name, wire::TrackerUnitToSensor{
+    request.session.send(request.name, wire::TrackerUnitToSensor{
                            .sensor = sensor, .filler = 0, .position = {}, .orientation = {0, 0, 0, 1}});
   }
 }
 
-void Station::Impl::on(Session& session, wire::LocalSender name, const wire::TrackerRequestWorkspace&) {
-  session.send(name, trackerWorkspace(workspaceOf(config, profile), outbox.last()));
+void Station::Impl::on(const Request& request, const wire::TrackerRequestWorkspace&) {
+  request.session.send(request.name, trackerWorkspace(workspaceOf(config, profile), outbox.last()));
 }
 
-void Station::Impl::on(Session& session, wire::LocalSender name, const wire::TrackerSetUpdateRate& wanted) {
-  choose(session, name, outbox.choiceOf(session.id()), wanted.rate, "set_update_rate");
+void Station::Impl::on(const Request& request, const wire::TrackerSetUpdateRate& wanted) {
+  choose(request.session, request.name, outbox.choiceOf(request.session.id()), wanted.rate, "set_update_rate");
 }
 
-void Station::Impl::on(Session& session, wire::LocalSender name, const wire::Subscribe& wanted) {
-  ReportChoice choice = outbox.choiceOf(session.id());
+void Station::Impl::on(const Request& request, const wire::Subscribe& wanted) {
+  ReportChoice choice = outbox.choiceOf(request.session.id());
   choice.kinds = wanted.kinds & wire::kReportAll;
-  choose(session, name, choice, wanted.rate, "Subscribe");
+  choose(request.session, request.name, choice, wanted.rate, "Subscribe");
 }
 
 void Station::Impl::choose(Session& session, wire::LocalSender name, ReportChoice choice, double rate_Hz,
@@ -85,39 +84,51 @@ void Station::Impl::choose(Session& session, wire::LocalSender name, ReportChoic
 }
 
 // From now on the tracker's poses count from where the proxy is.
-void Station::Impl::on(Session&, wire::LocalSender, const wire::TrackerResetOrigin&) {
+void Station::Impl::on(const Request&, const wire::TrackerResetOrigin&) {
   const View view = viewOf(outbox.last(), config.forceReport);
   frame.origin = view.proxy;
   frame.turn = view.orientation;
 }
 
-void Station::Impl::on(Session& session, wire::LocalSender name, const wire::ButtonAdmin& admin) {
+void Station::Impl::on(const Request& request, const wire::ButtonAdmin& admin) {
   std::string error;
-  if (!modes.obey(admin, alerts, error)) sendText(session, name, wire::kTextError, error);
+  if (!modes.obey(admin, alerts, error)) sendText(request.session, request.name, wire::kTextError, error);
 }
 
-void Station::Impl::on(Session& session, wire::LocalSender name, const wire::QueryCapabilities&) {
-  session.send(name, capabilities(config, profile, control.canBeHeld()));
+void Station::Impl::on(const Request& request, const wire::QueryCapabilities&) {
+  request.session.send(request.name, capabilities(config, profile, control.canBeHeld()));
 }
 
-void Station::Impl::on(Session& session, wire::LocalSender, const wire::StopForces&) {
-  spdlog::warn("client {} ({}) stops the forces of '{}'", session.id(), session.description(),
+void Station::Impl::on(const Request& request, const wire::StopForces&) {
+  spdlog::warn("client {} ({}) stops the forces of '{}'", request.session.id(), request.session.description(),
                config.names.front());
-  control.stopForces();
+  control.stopForces(request.received);
 }
 
-void Station::Impl::on(Session& session, wire::LocalSender, const wire::RearmForces&) {
-  spdlog::warn("client {} ({}) re-arms the forces of '{}'", session.id(), session.description(),
+void Station::Impl::on(const Request& request, const wire::RearmForces&) {
+  spdlog::warn("client {} ({}) re-arms the forces of '{}'", request.session.id(), request.session.description(),
                config.names.front());
-  control.rearmForces();
+  rearming.insert(&request.session);
+  scene.whenPublished(request.session.id(), [this, session = &request.session, name = request.name, received = request.received] {
+    if (rearming.count(session) != 0) rearm(*session, name, received);
+  });
+}
+
+// What the client sent before is felt from the first tick with force.
+void Station::Impl::rearm(Session& session, wire::LocalSender name, base::Nanos received) {
+  if (!control.rearmForces(received)) {
+    sendText(session, name, wire::kTextWarning, "Rearm_Forces ignored: the forces were stopped after it was sent");
+    session.flush();
+    return;
+  }
   // The operator consented to motion at the start; this is the moment that a person chose.
   if (config.calibrate && (outbox.last().device.hold & device::kHoldNotCalibrated) != 0) keeper.calibrate();
 }
 
-void Station::Impl::on(Session& session, wire::LocalSender name, const wire::HoldHand& wanted) {
+void Station::Impl::on(const Request& request, const wire::HoldHand& wanted) {
   std::string error;
-  if (!control.hold(session.id(), wanted, outbox.last(), error))
-    sendText(session, name, wire::kTextError, error);
+  if (!control.hold(request.session.id(), wanted, outbox.last(), error))
+    sendText(request.session, request.name, wire::kTextError, error);
 }
 
 void Station::onReset() {

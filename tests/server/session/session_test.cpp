@@ -19,22 +19,23 @@ using namespace std::chrono_literals;
 class CountingOwner final : public SessionOwner {
  public:
   void onSubscribed(Session& /*session*/, wire::LocalSender /*name*/) override {}
-  void onMessage(Session& /*session*/, const wire::MessageReceived& /*message*/) override { ++messages; }
+  void onMessage(Session& /*session*/, const wire::MessageReceived& /*message*/, base::Nanos) override { ++messages; }
   void onRemark(const Session& /*session*/, const std::string& /*text*/) override {}
-  void onBreath() override {
+  void onReadSlice() override {
     mostBetween = std::max(mostBetween, messages - last);
     last = messages;
-    ++breaths;
+    ++slices;
   }
-  void onBatchEnd(Session& /*session*/) override {
+  void onReadEnd(Session& /*session*/) override {
     mostBetween = std::max(mostBetween, messages - last);
     last = messages;
   }
+  void onDeparted(Session& /*session*/, const std::string& /*reason*/) override {}
   void onClosed(Session& /*session*/, const std::string& reason) override { closed = reason; }
 
   std::size_t messages = 0;
   std::size_t last = 0;
-  std::size_t breaths = 0;
+  std::size_t slices = 0;
   std::size_t mostBetween = 0;
   std::string closed;
 };
@@ -57,7 +58,7 @@ std::vector<std::byte> pings(std::size_t count) {
   return bytes;
 }
 
-TEST(Session, BreathesWhileALongReadIsGiven) {
+TEST(Session, ReportsSlicesOfALongRead) {
   constexpr std::size_t kPings = 2000;
   net::Loop loop;
   wire::LocalNames names;
@@ -75,7 +76,7 @@ TEST(Session, BreathesWhileALongReadIsGiven) {
   for (int i = 0; i < 2000 && owner.messages < kPings; ++i) loop.runOnce(10ms);
   EXPECT_EQ(owner.messages, kPings);
   EXPECT_EQ(owner.closed, "");
-  EXPECT_GE(owner.breaths, 1U);
+  EXPECT_GE(owner.slices, 1U);
   EXPECT_LE(owner.mostBetween, 8 * 1024 / wire::kHeaderBytes + 1);  // one was cut
 }
 

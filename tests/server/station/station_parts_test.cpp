@@ -1,4 +1,4 @@
-// Small parts between clients and a device: buttons, roles, heartbeats, holding the hand, black boxes.
+// Small parts between clients and a device: buttons, roles, holding the hand, black boxes.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -7,7 +7,6 @@
 #include "server/station/black_box_recorder.h"
 #include "server/station/button_modes.h"
 #include "server/station/device_control.h"
-#include "server/session/heartbeats.h"
 #include "server/session/roles.h"
 
 namespace hapticd::server {
@@ -74,30 +73,6 @@ TEST(Roles, AnyFirstAndList) {
   Roles list(Control::list, {"10.0.0.5"});
   EXPECT_TRUE(list.mayCommand(1, "10.0.0.5"));
   EXPECT_FALSE(list.mayCommand(1, "10.0.0.6"));
-}
-
-TEST(Roles, WatchingAskingAndStoppingAreNoCommands) {
-  EXPECT_FALSE(isCommand(wire::kindOf<wire::Ping>));
-  EXPECT_FALSE(isCommand(wire::kindOf<wire::Text>));
-  EXPECT_FALSE(isCommand(wire::kindOf<wire::StopForces>));
-  EXPECT_FALSE(isCommand(wire::kindOf<wire::Subscribe>));
-  EXPECT_FALSE(isCommand(wire::kUnknownKind));
-  EXPECT_TRUE(isCommand(wire::kindOf<wire::RearmForces>));
-  EXPECT_TRUE(isCommand(wire::kindOf<wire::SetVertex>));
-  EXPECT_TRUE(isCommand(wire::kindOf<wire::BatchBegin>));
-  EXPECT_TRUE(isCommand(wire::kindOf<wire::ButtonAdmin>));
-}
-
-TEST(Heartbeats, OnlyWhoBeganAndCeasedIsLost) {
-  Heartbeats beats;
-  beats.beat(1, 0);
-  beats.beat(2, 0);
-  beats.beat(2, 300'000'000);
-  EXPECT_TRUE(beats.lost(500'000'000).empty());
-  EXPECT_EQ(beats.lost(500'000'001), (std::vector<scene::ClientId>{1}));
-  EXPECT_TRUE(beats.lost(600'000'000).empty());  // said once
-  beats.forget(2);
-  EXPECT_TRUE(beats.lost(9'000'000'000).empty());
 }
 
 class HoldTest : public ::testing::Test {

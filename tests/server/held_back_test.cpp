@@ -1,0 +1,232 @@
+// A scene that is behind: who is held back, what overtakes, and what becomes of re-arms, heartbeats and clients that leave.
+// A question that is not answered at once holds the scene thread up for as long as a test needs.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <latch>
+
+#include "running_server.h"
+#include "scripted_peer.h"
+
+namespace hapticd::test {
+namespace {
+
+constexpr std::size_t kMiB = 1U << 20;
+const wire::ForceField kUp{.origin = {0, 0, 0}, .force = {0, 1, 0}, .jacobian = {}, .radius = 10};
+
+class HeldBackTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    server_ = std::make_unique<RunningServer>();
+    watcher_ = peer();
+  }
+  void TearDown() override { openScene(); }
+
+  std::unique_ptr<ScriptedPeer> peer() {
+    auto peer = std::make_unique<ScriptedPeer>(server_->address());
+    EXPECT_TRUE(peer->until([&] { return peer->count<wire::IsTouching>() > 0; }));
+    return peer;
+  }
+  // The scene thread stands still until openScene().
+  void closeScene() {
+    auto entered = std::make_shared<std::latch>(1);
+    server_->server().stations().front()->scene().describe([entered, gate = gate_](const auto&) {
+      entered->count_down();
+      gate->wait();
+    });
+    entered->wait();
+  }
+  void openScene() {
+    if (!gate_->try_wait()) gate_->count_down();
+  }
+  // Scene commands of about this many bytes on the wire.
+  void flood(ScriptedPeer& client, std::size_t bytes) {
+    constexpr std::size_t kFloats = 15'000;
+    const wire::MeshVertices run{0, 0, {std::vector<float>(kFloats)}};
+    for (std::size_t sent = 0; sent < bytes; sent += kFloats * sizeof(float)) client.queue(run);
+    client.flush();
+  }
+  bool stopped() {
+    const auto state = watcher_->last<wire::GuardState>();
+    return state && state->stopped != 0;
+  }
+  bool untilStopped() {
+    return watcher_->until([&] { return stopped(); });
+  }
+  // Lets `ticks` milliseconds of the servo pass, as the watcher sees them, while `client` is served, too.
+  bool pass(ScriptedPeer& client, std::size_t ticks) {
+    const std::size_t end = watcher_->count<wire::IsTouching>() + ticks;
+    return watcher_->until([&] {
+      client.poll();
+      return watcher_->count<wire::IsTouching>() > end;
+    }, 60s);
+  }
+
+  std::shared_ptr<std::latch> gate_ = std::make_shared<std::latch>(1);
+  std::unique_ptr<RunningServer> server_;
+  std::unique_ptr<ScriptedPeer> watcher_;
+};
+
+TEST_F(HeldBackTest, AnothersStopPingAndReportsDoNotWait) {
+  const auto uploader = peer();
+  closeScene();
+  flood(*uploader, 40 * kMiB);
+  uploader->send(wire::QueryCapabilities{});
+  ASSERT_TRUE(pass(*uploader, 100));
+  watcher_->send(wire::Ping{});
+  ASSERT_TRUE(watcher_->until([&] {
+    uploader->poll();
+    return watcher_->count<wire::Pong>() > 0;
+  }));
+  watcher_->send(wire::StopForces{});
+  EXPECT_TRUE(untilStopped());
+  EXPECT_EQ(uploader->count<wire::Capabilities>(), 0U) << "the upload was over before the stop";
+  openScene();
+  EXPECT_TRUE(uploader->until([&] { return uploader->count<wire::Capabilities>() > 0; }, 60s));
+}
+
+TEST_F(HeldBackTest, AClientsOwnStopHeartbeatAndPingOvertakeItsSceneCommands) {
+  const auto client = peer();
+  closeScene();
+  flood(*client, 10 * kMiB);  // the queue takes 8, the rest is read ahead
+  client->queue(wire::QueryCapabilities{});
+  client->queue(wire::Ping{});
+  client->send(wire::StopForces{});
+  EXPECT_TRUE(watcher_->until([&] {
+    client->poll();
+    return stopped();
+  }));
+  EXPECT_TRUE(client->until([&] { return client->count<wire::Pong>() > 0; }));
+  EXPECT_EQ(client->count<wire::Capabilities>(), 0U) << "a query keeps its place";
+  openScene();
+  EXPECT_TRUE(client->until([&] { return client->count<wire::Capabilities>() > 0; }));
+}
+
+TEST_F(HeldBackTest, ARearmThatWasSentBeforeAStopDoesNotUndoIt) {
+  const auto client = peer();
+  closeScene();
+  flood(*client, 10 * kMiB);
+  client->queue(wire::RearmForces{});
+  client->send(wire::StopForces{});
+  ASSERT_TRUE(watcher_->until([&] {
+    client->poll();
+    return stopped();
+  }));
+  openScene();
+  EXPECT_TRUE(client->untilText("Rearm_Forces ignored"));
+  ASSERT_TRUE(pass(*client, 50));
+  EXPECT_TRUE(stopped());
+}
+
+TEST_F(HeldBackTest, ARearmDoesNotUndoAnothersLaterStop) {
+  const auto client = peer();
+  watcher_->send(wire::StopForces{});
+  ASSERT_TRUE(untilStopped());
+  closeScene();
+  client->queue(wire::SetObjectNumber{2});
+  client->queue(wire::RearmForces{});
+  client->send(wire::Ping{});
+  ASSERT_TRUE(client->until([&] { return client->count<wire::Pong>() > 0; }));
+  watcher_->send(wire::StopForces{});
+  watcher_->send(wire::Ping{});
+  ASSERT_TRUE(watcher_->until([&] { return watcher_->count<wire::Pong>() > 0; }));
+  openScene();
+  EXPECT_TRUE(client->untilText("Rearm_Forces ignored"));
+  EXPECT_TRUE(stopped());
+}
+
+TEST_F(HeldBackTest, ARearmActsWhenTheCommandsBeforeItArePublished) {
+  const auto client = peer();
+  client->send(wire::StopForces{});
+  ASSERT_TRUE(untilStopped());
+  closeScene();
+  client->queue(wire::SetObjectNumber{2});
+  client->send(wire::RearmForces{});
+  ASSERT_TRUE(pass(*client, 50));
+  EXPECT_TRUE(stopped());
+  openScene();
+  EXPECT_TRUE(watcher_->until([&] { return !stopped(); }));
+}
+
+TEST_F(HeldBackTest, ARearmOfAClientWithoutCommandsActsAtOnce) {
+  const auto uploader = peer();
+  watcher_->send(wire::StopForces{});
+  ASSERT_TRUE(untilStopped());
+  closeScene();
+  flood(*uploader, 10 * kMiB);
+  watcher_->send(wire::RearmForces{});
+  EXPECT_TRUE(watcher_->until([&] {
+    uploader->poll();
+    return !stopped();
+  }));
+}
+
+TEST_F(HeldBackTest, TheServersPauseIsNoSilenceOfTheClient) {
+  const auto client = peer();
+  closeScene();
+  client->send(wire::Heartbeat{1});
+  flood(*client, 40 * kMiB);
+  ASSERT_TRUE(pass(*client, 1500));  // three times the limit
+  EXPECT_TRUE(client->open());
+  openScene();
+  EXPECT_TRUE(client->until([&] { return !client->open(); }, 60s)) << "silent once the server reads again";
+}
+
+TEST_F(HeldBackTest, HeartbeatsThatAreReadAheadCount) {
+  const auto client = peer();
+  closeScene();
+  client->send(wire::Heartbeat{1});
+  flood(*client, 10 * kMiB);
+  for (int i = 0; i < 20; ++i) {
+    client->send(wire::Heartbeat{1});
+    ASSERT_TRUE(pass(*client, 50));
+  }
+  EXPECT_TRUE(client->open());
+}
+
+TEST_F(HeldBackTest, NothingThatAClientSentBeforeItLeftIsLost) {
+  auto client = peer();
+  closeScene();
+  client->queue(wire::SetObjectNumber{1});
+  flood(*client, 11 * kMiB);
+  client->queue(wire::MeshVertices{0, 0, {{0, 0, 0, 9, 0, 0, 0, 9, 0}}});
+  client->queue(wire::MeshTriangles{0, 0, {{0, 1, 2}}});
+  client->queue(wire::SetHapticProperty{0, "stiffness", 1.0F});
+  client->send(wire::SetTouchableFace{0});
+  ASSERT_TRUE(pass(*client, 200));
+  client->end();
+  ASSERT_TRUE(pass(*client, 100));
+  client.reset();
+  openScene();
+  EXPECT_TRUE(watcher_->until([&] {
+    std::latch answered(1);
+    bool has = false;
+    server_->server().stations().front()->scene().describe([&](const auto& description) {
+      has = !description->objects.empty() && description->objects[0].triangles && description->objects[0].triangles->size() == 1;
+      answered.count_down();
+    });
+    answered.wait();
+    return has;
+  }));
+}
+
+TEST_F(HeldBackTest, TheForcesOfAClientThatLeavesEndAsSoonAsTheSceneGoesOn) {
+  auto client = peer();
+  watcher_->send(wire::HoldHand{.hold = 1, .position = {0, 0, 0}});
+  client->send(kUp);
+  const auto force = [&] {
+    const auto last = watcher_->last<wire::Force>();
+    return last ? std::hypot(last->force[0], last->force[1], last->force[2]) : 0.0;
+  };
+  ASSERT_TRUE(watcher_->until([&] { return force() > 0.9; }));
+  closeScene();
+  flood(*client, 40 * kMiB);
+  ASSERT_TRUE(pass(*client, 100));
+  client->close();
+  client.reset();
+  openScene();
+  EXPECT_TRUE(watcher_->until([&] { return force() < 1e-9; }));
+}
+
+}  // namespace
+}  // namespace hapticd::test

@@ -1,0 +1,187 @@
+// One scene host alone: a real scene thread, a net thread made of the test, and a gate that holds the scene up.
+#include "server/scene/scene_host.h"
+
+#include <gtest/gtest.h>
+
+#include <condition_variable>
+#include <deque>
+#include <latch>
+#include <mutex>
+
+#include "wire/codec.h"
+
+namespace hapticd::server {
+namespace {
+
+// Runs what the scene thread posts to the net thread.
+class NetThread {
+ public:
+  void post(std::function<void()> function) {
+    const std::lock_guard lock(mutex_);
+    posted_.push_back(std::move(function));
+    wake_.notify_one();
+  }
+  // Runs posted functions until the condition holds.
+  void until(const std::function<bool()>& condition) {
+    while (!condition()) {
+      std::function<void()> next;
+      {
+        std::unique_lock lock(mutex_);
+        wake_.wait(lock, [&] { return !posted_.empty(); });
+        next = std::move(posted_.front());
+        posted_.pop_front();
+      }
+      next();
+    }
+  }
+  bool idle() {
+    const std::lock_guard lock(mutex_);
+    return posted_.empty();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  std::deque<std::function<void()>> posted_;
+};
+
+class SceneHostTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    host_.add({.config = {}, .slot = &slot_, .published = {}, .publishing = {}});
+    host_.start({.notices = [this](auto&& notices) { net_.post([this, notices] {
+                                                for (const auto& notice : notices) texts_.push_back(notice.text);
+                                              }); },
+                 .relieved = [this](scene::ClientId client) { net_.post([this, client] { relieved_.push_back(client); }); },
+                 .applying = {}},
+                [this](std::function<void()> function) { net_.post(std::move(function)); });
+  }
+  void TearDown() override {
+    open();
+    host_.stop();
+  }
+
+  // The scene thread stands still from here until open().
+  void close() {
+    auto entered = std::make_shared<std::latch>(1);
+    host_.describe([entered, gate = gate_](const auto&) {
+      entered->count_down();
+      gate->wait();
+    });
+    entered->wait();
+  }
+  void open() {
+    if (!gate_->try_wait()) gate_->count_down();
+  }
+
+  template <wire::WireMessage M>
+  bool give(scene::ClientId client, const M& message) {
+    std::vector<std::byte> payload(wire::payloadSize(message));
+    wire::encodePayload(message, payload.data());
+    wire::MessageReceived received;
+    received.kind = wire::kindOf<M>;
+    received.payload = payload;
+    return host_.take(client, received, error_);
+  }
+  // As many vertices as one read of the server holds, until the client is full.
+  void flood(scene::ClientId client) {
+    for (std::int32_t next = 0; !host_.full(client);) {
+      for (int i = 0; i < 5000; ++i) ASSERT_TRUE(give(client, wire::SetVertex{static_cast<std::int32_t>(client), next++, {}}));
+      host_.flush(client);
+    }
+  }
+
+  std::shared_ptr<std::latch> gate_ = std::make_shared<std::latch>(1);
+  NetThread net_;
+  scene::SnapshotSlot slot_;
+  SceneHost host_{0, "", SceneOnDisconnect::keep};
+  std::vector<scene::ClientId> relieved_;
+  std::vector<std::string> texts_;
+  std::string error_;
+};
+
+TEST_F(SceneHostTest, OnlyTheClientThatFloodsIsFullAndItIsRelievedWhenTheSceneGoesOn) {
+  close();
+  flood(1);
+  EXPECT_FALSE(host_.full(2));
+  ASSERT_TRUE(give(2, wire::SetObjectNumber{1}));
+  host_.flush(2);
+  EXPECT_FALSE(host_.full(2));
+  EXPECT_TRUE(relieved_.empty());
+  open();
+  net_.until([&] { return !relieved_.empty(); });
+  EXPECT_EQ(relieved_, std::vector<scene::ClientId>{1});
+  EXPECT_FALSE(host_.full(1));
+}
+
+TEST_F(SceneHostTest, AClientWithNothingInTheQueueWaitsForNobody) {
+  close();
+  flood(1);
+  bool reached = false;
+  host_.whenPublished(2, [&] { reached = true; });
+  EXPECT_TRUE(reached);
+}
+
+TEST_F(SceneHostTest, AClientWaitsUntilItsOwnCommandsArePublished) {
+  close();
+  ASSERT_TRUE(give(1, wire::SetObjectNumber{1}));
+  bool reached = false;
+  host_.whenPublished(1, [&] { reached = true; });
+  EXPECT_FALSE(reached);
+  EXPECT_TRUE(net_.idle());
+  open();
+  net_.until([&] { return reached; });
+}
+
+// The builder waits for a pause between edits before it makes a mesh.
+TEST_F(SceneHostTest, AMeshCountsAsPublishedWhenTheServoCanFeelIt) {
+  ASSERT_TRUE(give(1, wire::SetObjectNumber{1}));
+  ASSERT_TRUE(give(1, wire::MeshVertices{0, 0, {{0, 0, 0, 9, 0, 0, 0, 9, 0}}}));
+  ASSERT_TRUE(give(1, wire::MeshTriangles{0, 0, {{0, 1, 2}}}));
+  ASSERT_TRUE(give(1, wire::SetHapticProperty{0, "stiffness", 1.0F}));
+  bool felt = false;
+  bool reached = false;
+  host_.whenPublished(1, [&] {
+    reached = true;
+    const scene::SceneSnapshot* snapshot = slot_.take();
+    felt = snapshot != nullptr && snapshot->objects.size() == 1;
+  });
+  EXPECT_FALSE(reached);
+  net_.until([&] { return reached; });
+  EXPECT_TRUE(felt);
+}
+
+TEST_F(SceneHostTest, TheForcesOfALostClientEndBeforeWhatItSentLast) {
+  const wire::ForceField field{.origin = {0, 0, 0}, .force = {0, 1, 0}, .jacobian = {}, .radius = 10};
+  ASSERT_TRUE(give(1, field));
+  bool reached = false;
+  host_.whenPublished(1, [&] { reached = true; });
+  net_.until([&] { return reached; });
+  const scene::SceneSnapshot* before = slot_.take();
+  ASSERT_NE(before, nullptr);
+  ASSERT_EQ(before->fields.size(), 1U);
+  EXPECT_FALSE(before->fields[0].releasing);
+
+  close();
+  flood(1);
+  host_.releaseForces(1);
+  open();
+  // The first snapshot after the gate opens has the release, long before the last vertex.
+  const scene::SceneSnapshot* after = before;
+  net_.until([&] { return !relieved_.empty(); });
+  after = slot_.take();
+  ASSERT_NE(after, nullptr);
+  EXPECT_TRUE(after->fields.empty() || after->fields[0].releasing);
+}
+
+TEST_F(SceneHostTest, AMalformedMessageIsNamedAndChangesNothing) {
+  wire::MessageReceived received;
+  received.kind = wire::kindOf<wire::SetVertex>;
+  const std::vector<std::byte> payload(3);
+  received.payload = payload;
+  EXPECT_FALSE(host_.take(1, received, error_));
+  EXPECT_NE(error_.find("3 bytes"), std::string::npos) << error_;
+}
+
+}  // namespace
+}  // namespace hapticd::server

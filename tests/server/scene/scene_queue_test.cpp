@@ -1,0 +1,88 @@
+// Who fills the scene queue, and who has to wait for it.
+#include "server/scene/scene_queue.h"
+
+#include <gtest/gtest.h>
+
+namespace hapticd::server {
+namespace {
+
+constexpr std::size_t kMiB = 1U << 20;
+
+SceneParcel parcel(scene::ClientId client, std::size_t bytes) {
+  SceneParcel parcel{.client = client, .tasks = {}, .bytes = bytes};
+  parcel.tasks.push_back({client, scene::SceneCommand{scene::StartEffect{static_cast<std::int32_t>(bytes)}}});
+  return parcel;
+}
+
+TEST(SceneQueueTest, ParcelsLeaveInTheOrderOfArrivalWhoeverSentThem) {
+  SceneQueue queue;
+  queue.push(parcel(1, 10));
+  queue.push(parcel(2, 20));
+  queue.push(parcel(1, 30));
+  EXPECT_EQ(queue.take()->bytes, 10U);
+  EXPECT_EQ(queue.take()->bytes, 20U);
+  EXPECT_EQ(queue.take()->bytes, 30U);
+  EXPECT_FALSE(queue.take());
+  EXPECT_TRUE(queue.empty());
+}
+
+TEST(SceneQueueTest, AnUrgentParcelGoesBeforeAllOthers) {
+  SceneQueue queue;
+  queue.push(parcel(1, 10));
+  queue.pushFront(parcel(2, 0));
+  EXPECT_EQ(queue.take()->client, 2U);
+}
+
+TEST(SceneQueueTest, OnlyTheClientThatFillsTheQueueIsFull) {
+  SceneQueue queue;
+  queue.push(parcel(1, 5 * kMiB));
+  queue.push(parcel(2, 100));
+  EXPECT_FALSE(queue.full(1));
+  queue.push(parcel(1, 4 * kMiB));
+  EXPECT_TRUE(queue.full(1));
+  EXPECT_FALSE(queue.full(2));
+  EXPECT_FALSE(queue.full(3));
+}
+
+TEST(SceneQueueTest, TakenBytesStayChargedUntilTheyAreApplied) {
+  SceneQueue queue;
+  queue.push(parcel(1, 9 * kMiB));
+  ASSERT_TRUE(queue.take());
+  EXPECT_TRUE(queue.full(1));
+  EXPECT_TRUE(queue.done(1, 9 * kMiB, 5));
+  EXPECT_FALSE(queue.full(1));
+}
+
+TEST(SceneQueueTest, AFullClientIsRelievedOnceWhenHalfOfTheLimitIsFree) {
+  SceneQueue queue;
+  for (int i = 0; i < 5; ++i) queue.push(parcel(1, 2 * kMiB));
+  ASSERT_TRUE(queue.full(1));
+  EXPECT_FALSE(queue.done(1, 2 * kMiB, 1));
+  EXPECT_FALSE(queue.done(1, 2 * kMiB, 2));
+  EXPECT_TRUE(queue.full(1)) << "below the limit, but not yet relieved";
+  EXPECT_TRUE(queue.done(1, 2 * kMiB, 3));
+  EXPECT_FALSE(queue.full(1));
+  EXPECT_FALSE(queue.done(1, 2 * kMiB, 4)) << "relieved once";
+}
+
+TEST(SceneQueueTest, AClientIsPendingUntilItsLastEditIsPublished) {
+  SceneQueue queue;
+  EXPECT_FALSE(queue.pending(1));
+  queue.push(parcel(1, 10));
+  queue.push(parcel(2, 10));
+  EXPECT_TRUE(queue.pending(1));
+  queue.take();
+  queue.done(1, 10, 100);
+  queue.published(100);  // an edit of that moment still waits
+  EXPECT_TRUE(queue.pending(1));
+  queue.published(101);
+  EXPECT_FALSE(queue.pending(1));
+  EXPECT_TRUE(queue.pending(2)) << "not even applied";
+  queue.take();
+  queue.done(2, 10, 200);
+  queue.published(std::nullopt);
+  EXPECT_FALSE(queue.pending(2));
+}
+
+}  // namespace
+}  // namespace hapticd::server
