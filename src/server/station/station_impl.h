@@ -36,9 +36,8 @@ struct Station::Impl {
   void on(Session& session, wire::LocalSender name, const wire::StopForces&);
   void on(Session& session, wire::LocalSender name, const wire::RearmForces&);
   void on(Session& session, wire::LocalSender name, const wire::HoldHand& wanted);
-  // What else is in the table goes to clients, or is none of a station's business.
-  template <class M>
-  void on(Session&, wire::LocalSender, const M&) {}
+  void on(Session&, wire::LocalSender, const wire::Heartbeat&) {}       // the server's
+  void on(Session&, wire::LocalSender, const wire::GetNewObjectId&) {}  // registered by VRPN, never sent
 
   const DeviceConfig config;
   const std::vector<wire::LocalSender> names;

@@ -6,6 +6,7 @@
 
 #include "server/station/answers.h"
 #include "server/station/station_impl.h"
+#include "wire/dispatch.h"
 #include "wire/text.h"
 
 namespace hapticd::server {
@@ -29,12 +30,16 @@ bool Station::mayCommand(const Session& session, std::string& reason) {
 }
 
 void Station::onMessage(Session& session, const wire::MessageReceived& message) {
-  const auto decoded = wire::decode(message.kind, message.payload);
-  if (!decoded) {
-    session.refuse("malformed message: " + decoded.error());
-    return;
+  // A report that a client sends does nothing; a malformed one is refused like every other message.
+  std::string error;
+  if (wire::role(message.kind) == wire::Role::control) {
+    const auto handle = [&](const auto& m) { impl_->on(session, message.local_sender, m); };
+    const auto handled = wire::dispatchControl(message.kind, message.payload, handle);
+    if (!handled) error = handled.error();
+  } else if (const auto decoded = wire::decode(message.kind, message.payload); !decoded) {
+    error = decoded.error();
   }
-  std::visit([&](const auto& m) { impl_->on(session, message.local_sender, m); }, *decoded);
+  if (!error.empty()) session.refuse("malformed message: " + error);
 }
 
 void Station::Impl::on(Session& session, wire::LocalSender name, const wire::Ping&) {
