@@ -19,13 +19,9 @@ void require(bool holds, const char* what) {
 }
 
 std::vector<std::byte> encoded(const Message& message) {
-  return std::visit(
-      [](const auto& m) {
-        std::vector<std::byte> bytes(payloadSize(m));
-        encodePayload(m, bytes.data());
-        return bytes;
-      },
-      message);
+  std::vector<std::byte> bytes(payloadSize(message));
+  encodePayload(message, bytes.data());
+  return bytes;
 }
 
 void checkPayload(ByteView payload) {

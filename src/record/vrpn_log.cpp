@@ -28,21 +28,17 @@ wire::LocalSender VrpnLog::addSender(std::string_view name) {
 }
 
 void VrpnLog::add(wire::Time time, wire::LocalSender sender, const wire::Message& message) {
-  std::visit(
-      [&]<class M>(const M& m) {
-        const std::int32_t type = wire::kLocalType<M>.value;
-        if (senders_.insert(sender.value).second) {
-          describe(time, wire::kSenderDescription, sender.value,
-                   names_.senders()[static_cast<std::size_t>(sender.value)]);
-        }
-        if (types_.insert(type).second) {
-          describe(time, wire::kTypeDescription, type, names_.types()[static_cast<std::size_t>(type)]);
-        }
-        Bytes payload(wire::payloadSize(m));
-        wire::encodePayload(m, payload.data());
-        entry(time, sender.value, type, payload);
-      },
-      message);
+  const std::int32_t type = wire::localType(message.kind()).value;
+  if (senders_.insert(sender.value).second) {
+    describe(time, wire::kSenderDescription, sender.value,
+             names_.senders()[static_cast<std::size_t>(sender.value)]);
+  }
+  if (types_.insert(type).second) {
+    describe(time, wire::kTypeDescription, type, names_.types()[static_cast<std::size_t>(type)]);
+  }
+  Bytes payload(wire::payloadSize(message));
+  wire::encodePayload(message, payload.data());
+  entry(time, sender.value, type, payload);
 }
 
 void VrpnLog::describe(wire::Time time, std::int32_t kind, std::int32_t id, const std::string& name) {

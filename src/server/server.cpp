@@ -403,9 +403,12 @@ void Server::onMessage(Session& session, const wire::MessageReceived& message, N
     case wire::Role::scene:
       onSceneMessage(session, *station, message);
       return;
-    case wire::Role::report:
+    case wire::Role::report:  // does nothing here; a malformed one is refused like every other message
+      if (const auto decoded = wire::decode(message.kind, message.payload); !decoded)
+        session.refuse("malformed message: " + decoded.error());
+      return;
     case wire::Role::unknown:
-      return;  // meant for clients
+      return;
   }
 }
 

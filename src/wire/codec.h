@@ -8,7 +8,7 @@
 #include <string>
 
 #include "wire/bytes.h"
-#include "wire/messages.h"
+#include "wire/message.h"
 #include "wire/result.h"
 
 namespace hapticd::wire {
@@ -197,13 +197,6 @@ Result<M> decode(ByteView payload) {
   if (kIsCounted<M> && !error.empty()) return Error{std::string(M::kInfo.name) + ": " + error};
   return message;
 }
-
-/// Reads one payload into `message`, which must point to a struct of this kind; on an error the struct stays
-/// as it is. Compiled once for all kinds: cheaper to build than decode<M>(), and a little slower to run.
-Result<void> decodeInto(MessageKind kind, ByteView payload, void* message);
-
-/// Reads one payload of a kind known at run time; kUnknownKind is an error.
-Result<Message> decode(MessageKind kind, ByteView payload);
 
 /// Same on the wire, which also holds for NaNs of the same bits.
 template <WireMessage M>

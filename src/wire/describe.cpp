@@ -1,7 +1,7 @@
 #include "wire/describe.h"
 
-#include "wire/codec.h"
 #include "wire/cookie.h"
+#include "wire/fields.h"
 #include "wire/frame.h"
 #include "wire/system.h"
 #include "wire/text.h"
@@ -10,56 +10,38 @@ namespace hapticd::wire {
 
 namespace {
 
-template <Scalar T>
-std::string scalarName() {
-  const char letter = std::floating_point<T> ? 'f' : std::is_signed_v<T> ? 'i' : 'u';
-  return letter + std::to_string(8 * sizeof(T));
-}
+// Notes the fields of a message with their offsets.
+class FieldLister final : public FieldVisitor {
+ public:
+  explicit FieldLister(MessageDescription& message) : message_(message) {}
 
-struct FieldLister {
-  std::vector<FieldDescription>& fields;
-  std::size_t offset = 0;
-
-  template <Scalar T>
-  void operator()(const char* name, const T&, const char* unit = "") {
-    add(name, scalarName<T>(), unit, sizeof(T));
+  void number(const Field& field, const Numbers& one) override {
+    add(field, std::string(nameOf(one.type)), bytesOf(one.type));
   }
-  template <class T, std::size_t N>
-  void operator()(const char* name, const std::array<T, N>&, const char* unit = "") {
-    add(name, scalarName<T>() + '[' + std::to_string(N) + ']', unit, sizeof(T) * N);
+  void array(const Field& field, const Numbers& values) override {
+    add(field, std::string(nameOf(values.type)) + '[' + std::to_string(values.count) + ']',
+        bytesOf(values.type) * values.count);
   }
-  template <std::size_t N>
-  void operator()(const char* name, const NameBuffer<N>&, const char* unit = "") {
-    add(name, "char[" + std::to_string(N) + ']', unit, N);
-  }
-  template <std::size_t N>
-  void operator()(const char* name, const TextBuffer<N>&, const char* unit = "") {
-    add(name, "char[" + std::to_string(N) + ']', unit, N);
-  }
-  template <class Count, class T, std::size_t Max>
-  void operator()(const char* name, const Counted<Count, T, Max>&, const char* unit = "") {
-    add("n", scalarName<Count>(), "", sizeof(Count));
-    add(name, scalarName<T>() + "[n<=" + std::to_string(Max) + ']', unit, 0);
+  void name(const Field& field, std::span<char> bytes) override { addText(field, bytes.size()); }
+  void text(const Field& field, std::size_t bytes, std::string&) override { addText(field, bytes); }
+  void list(const Field& field, const NumberList& list) override {
+    message_.counted = true;
+    add({"n", ""}, std::string(nameOf(list.countType)), bytesOf(list.countType));
+    add(field, std::string(nameOf(list.type)) + "[n<=" + std::to_string(list.most) + ']', 0);
   }
 
-  void add(const char* name, std::string type, const char* unit, std::size_t bytes) {
-    fields.push_back({name, std::move(type), unit, offset});
-    offset += bytes;
+ private:
+  void addText(const Field& field, std::size_t bytes) {
+    add(field, "char[" + std::to_string(bytes) + ']', bytes);
   }
+  void add(const Field& field, std::string type, std::size_t bytes) {
+    message_.fields.push_back(
+        {std::string(field.name), std::move(type), std::string(field.unit), message_.payload_bytes});
+    message_.payload_bytes += bytes;
+  }
+
+  MessageDescription& message_;
 };
-
-template <WireMessage M>
-MessageDescription describeMessage() {
-  MessageDescription description{kindOf<M>, M::kInfo, kPayloadSize<M>, kIsCounted<M>, {}};
-  const M message{};
-  M::fields(message, FieldLister{description.fields});
-  return description;
-}
-
-template <class... M>
-std::vector<MessageDescription> describeAll(MessageList<M...>) {
-  return {describeMessage<M>()...};
-}
 
 std::string_view directionText(Direction direction) {
   switch (direction) {
@@ -147,7 +129,15 @@ UDP port (3883), and the server connects to it by TCP; port 1024 to 65535, host 
 }  // namespace
 
 std::vector<MessageDescription> describeMessages() {
-  return describeAll(AllMessages{});
+  std::vector<MessageDescription> all;
+  for (std::size_t i = 0; i < kMessageKinds; ++i) {
+    const MessageKind kind{static_cast<std::uint8_t>(i)};
+    Message message(kind);
+    MessageDescription& description = all.emplace_back(MessageDescription{kind, info(kind), 0, false, {}});
+    FieldLister lister(description);
+    visitFields(message, lister);
+  }
+  return all;
 }
 
 std::string messagesAsMarkdown() {

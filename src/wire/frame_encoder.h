@@ -21,7 +21,7 @@ class FrameEncoder {
     encodePayload(message, grow(time, sender.value, kLocalType<M>.value, payloadSize(message)));
   }
   void add(Time time, LocalSender sender, const Message& message) {
-    std::visit([&](const auto& m) { add(time, sender, m); }, message);
+    encodePayload(message, grow(time, sender.value, localType(message.kind()).value, payloadSize(message)));
   }
   /// Appends a message of any type, negative system types included, whose payload is already bytes.
   void addRaw(Time time, std::int32_t sender, std::int32_t type, ByteView payload) {

@@ -16,7 +16,6 @@
 #include <string_view>
 #include <type_traits>
 #include <utility>
-#include <variant>
 
 #include "wire/messages/analog.h"
 #include "wire/messages/base.h"
@@ -33,7 +32,6 @@ namespace hapticd::wire {
 template <class... M>
 struct MessageList {
   static constexpr std::size_t kSize = sizeof...(M);
-  using Variant = std::variant<M...>;
 };
 
 /// Every message; the index in this list is its MessageKind.
@@ -64,9 +62,6 @@ using AllMessages = MessageList<
     // Our own
     QueryCapabilities, Capabilities, MeshVertices, MeshTriangles, BatchBegin, BatchCommit, Subscribe,
     TickReport, ContactList, StopForces, RearmForces, GuardState, Heartbeat, HoldHand>;
-
-/// Any message.
-using Message = AllMessages::Variant;
 
 /// Which message: a small integer for switch and table look-up, `case kindOf<SetVertex>:`.
 enum class MessageKind : std::uint8_t {};
@@ -128,11 +123,6 @@ concept WireMessage = detail::indexIn<M>(AllMessages{})
 /// The kind of a struct.
 template <WireMessage M>
 inline constexpr MessageKind kindOf{static_cast<std::uint8_t>(detail::indexIn<M>(AllMessages{}))};
-
-/// The kind of a message.
-inline MessageKind kind(const Message& message) noexcept {
-  return MessageKind{static_cast<std::uint8_t>(message.index())};
-}
 
 /// The descriptions of all kinds, by kind.
 inline constexpr std::array<MessageInfo, kMessageKinds> kMessageInfos = detail::infosOf(AllMessages{});

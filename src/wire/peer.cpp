@@ -193,6 +193,12 @@ FrameEncoder& Peer::route(Reliability reliability, std::size_t frame_bytes) noex
   return use_datagrams_ && fits && reliability == Reliability::kLowLatency ? datagrams_ : stream_;
 }
 
+bool Peer::send(Time time, LocalSender sender, const Message& message, Reliability reliability) {
+  if (!announce(time)) return false;
+  route(reliability, kHeaderBytes + payloadSize(message)).add(time, sender, message);
+  return true;
+}
+
 bool Peer::sendRaw(Time time, LocalSender sender, LocalType type, ByteView payload,
                        Reliability reliability) {
   if (!announce(time)) return false;

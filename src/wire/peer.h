@@ -114,8 +114,9 @@ class Peer {
     return true;
   }
   bool send(Time time, LocalSender sender, const Message& message) {
-    return std::visit([&](const auto& m) { return send(time, sender, m); }, message);
+    return send(time, sender, message, info(message.kind()).reliability);
   }
+  bool send(Time time, LocalSender sender, const Message& message, Reliability reliability);
   /// Sends a message of a type that is not in the table, see LocalNames::addType.
   bool sendRaw(Time time, LocalSender sender, LocalType type, ByteView payload, Reliability reliability);
   /// Sends whole frames that a FrameEncoder made, shared with other endpoints; false when not connected.

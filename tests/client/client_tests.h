@@ -29,9 +29,9 @@ bool pollUntil(Client& client, Condition&& condition) {
 /// Whether this is the message, field by field.
 template <class M>
 ::testing::AssertionResult is(const Told& told, const M& expected) {
-  const M* message = std::get_if<M>(&told.message);
+  const M* message = told.message.as<M>();
   if (message && *message == expected) return ::testing::AssertionSuccess();
-  return ::testing::AssertionFailure() << wire::info(wire::kind(told.message)).name << ", expected "
+  return ::testing::AssertionFailure() << wire::info(told.message.kind()).name << ", expected "
                                        << M::kInfo.name << (message ? " with other fields" : "");
 }
 

@@ -151,15 +151,15 @@ TEST(Extensions, AMeshGoesInRunsWithinABatch) {
   const auto told = server.waitTold(6);
   ASSERT_EQ(told.size(), 6U);
   EXPECT_TRUE(is(told[0], wire::BatchBegin{}));
-  const auto* first = std::get_if<wire::MeshVertices>(&told[1].message);
-  const auto* second = std::get_if<wire::MeshVertices>(&told[2].message);
+  const auto* first = told[1].message.as<wire::MeshVertices>();
+  const auto* second = told[2].message.as<wire::MeshVertices>();
   ASSERT_TRUE(first && second);
   EXPECT_EQ(first->object, 3);
   EXPECT_EQ(first->first, 0);
   ASSERT_EQ(first->positions.values.size(), 15000U);
   EXPECT_EQ(first->positions.values[14997], 4999);
   EXPECT_TRUE(is(told[2], wire::MeshVertices{3, 5000, {{5000, 1, 2}}}));
-  const auto* faces = std::get_if<wire::MeshTriangles>(&told[3].message);
+  const auto* faces = told[3].message.as<wire::MeshTriangles>();
   ASSERT_TRUE(faces);
   EXPECT_EQ(faces->vertices.values.size(), 15000U);
   EXPECT_TRUE(is(told[4], wire::MeshTriangles{3, 5000, {{5000, 1, 2, 5000, 1, 2}}}));

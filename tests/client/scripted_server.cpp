@@ -109,7 +109,7 @@ void ScriptedServer::onEvent(Session& session, const wire::Event& event, bool by
   if (!decoded) {
     told_.push_back(
         {wire::Text{2, 0, decoded.error()}, std::string(message->sender_name), message->time, by_datagram});
-  } else if (const auto* vertex = std::get_if<wire::SetVertex>(&*decoded)) {
+  } else if (const auto* vertex = decoded->as<wire::SetVertex>()) {
     vertices_.push_back(*vertex);
   } else {
     told_.push_back({*decoded, std::string(message->sender_name), message->time, by_datagram});

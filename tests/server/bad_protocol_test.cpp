@@ -54,19 +54,18 @@ std::string cookie(std::string_view version, char log = '0') {
 template <class M>
 void wrongLengths(std::vector<std::pair<wire::MessageKind, std::size_t>>& cases) {
   if (M::kInfo.direction == wire::Direction::kToClient) return;
-  if (wire::kPayloadSize < M >> 0) cases.emplace_back(wire::kindOf<M>, wire::kPayloadSize<M> - 1);
+  if (wire::kPayloadSize<M> > 0) cases.emplace_back(wire::kindOf<M>, wire::kPayloadSize<M> - 1);
   if (!wire::kIsCounted<M>) cases.emplace_back(wire::kindOf<M>, wire::kPayloadSize<M> + 1);
 }
 
-template <std::size_t... I>
-auto allWrongLengths(std::index_sequence<I...>) {
+auto allWrongLengths() {
   std::vector<std::pair<wire::MessageKind, std::size_t>> cases;
-  (wrongLengths<std::variant_alternative_t<I, wire::Message>>(cases), ...);
+  wire::forEachMessage(wire::AllMessages{}, [&]<class M>() { wrongLengths<M>(cases); });
   return cases;
 }
 
 TEST_F(BadProtocol, AWrongLengthEndsTheConnectionAndIsLogged) {
-  const auto cases = allWrongLengths(std::make_index_sequence<wire::kMessageKinds>());
+  const auto cases = allWrongLengths();
   ASSERT_GT(cases.size(), 100U);
   for (const auto& [kind, size] : cases) {
     const std::string name(wire::info(kind).name);

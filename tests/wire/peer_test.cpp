@@ -141,7 +141,7 @@ TEST(Messages, ArriveWithTheirNamesAndTime) {
   EXPECT_THAT(server.seen, ElementsAre("message vrpn_ForceDevice setVertex from Phantom kind " +
                                            std::to_string(static_cast<int>(kindOf<SetVertex>)) + " local 1",
                                        HasSubstr("stopEffect")));
-  EXPECT_EQ(std::get<StopEffect>(*server.last).index, 7);
+  EXPECT_EQ(server.last->as<StopEffect>()->index, 7);
 }
 
 TEST(Messages, OfLaterNamesFollowTheirDescription) {
@@ -182,7 +182,7 @@ TEST(Messages, LowLatencyOnesGoByDatagramOnceThereIsALink) {
   EXPECT_TRUE(server.takeDatagrams().empty());
 
   client.feedDatagram(datagrams[0]);
-  EXPECT_EQ(std::get<Dop>(*client.last).depth, 2);
+  EXPECT_EQ(client.last->as<Dop>()->depth, 2);
 }
 
 TEST(Messages, TooBigForADatagramGoByTcp) {
@@ -229,7 +229,7 @@ TEST(Messages, EncodedOnceServeEveryClient) {
   by_udp.takeDatagrams([&](ByteView datagram) { second.feedDatagram(datagram); });
   for (const Side* client : {&first, &second}) {
     EXPECT_THAT(client->seen, Contains(HasSubstr("Force from Phantom")));
-    EXPECT_EQ(std::get<IsTouching>(*client->last).touching, 1);
+    EXPECT_EQ(client->last->as<IsTouching>()->touching, 1);
   }
 }
 

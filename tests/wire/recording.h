@@ -1,6 +1,7 @@
 // The recorded conversations in testdata/wire, and how to compare bytes that VRPN defines.
 #pragma once
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "wire/codec.h"
+#include "wire/fields.h"
 #include "wire/frame.h"
 
 namespace hapticd::wire {
@@ -50,49 +52,37 @@ inline std::map<std::string, int> recordedCounts(const std::string& file, const 
   return counts;
 }
 
-// Zeroes what lies behind the NUL of a text field: stray memory of the sender.
-struct StrayMemoryEraser {
-  std::byte* at;
-
-  template <Scalar T>
-  void operator()(const char*, const T&, const char* = "") {
-    at += sizeof(T);
-  }
-  template <class T, std::size_t N>
-  void operator()(const char*, const std::array<T, N>&, const char* = "") {
-    at += sizeof(T) * N;
-  }
-  template <std::size_t N>
-  void operator()(const char*, const NameBuffer<N>&, const char* = "") {
-    erase(N);
-  }
-  template <std::size_t N>
-  void operator()(const char*, const TextBuffer<N>&, const char* = "") {
-    erase(N);
-  }
-  template <class Count, class T, std::size_t Max>
-  void operator()(const char*, const Counted<Count, T, Max>&, const char* = "") {}
-
-  void erase(std::size_t size) {
-    std::fill(std::find(at, at + size, std::byte{0}), at + size, std::byte{0});
-    at += size;
-  }
-};
-
-inline Bytes withoutStrayMemory(const Message& message, ByteView payload) {
-  Bytes bytes(payload.begin(), payload.end());
-  std::visit([&]<class M>(const M& m) { M::fields(m, StrayMemoryEraser{bytes.data()}); }, message);
+inline Bytes encoded(const Message& message) {
+  Bytes bytes(payloadSize(message));
+  encodePayload(message, bytes.data());
   return bytes;
 }
 
-inline Bytes encoded(const Message& message) {
-  return std::visit(
-      [](const auto& m) {
-        Bytes bytes(payloadSize(m));
-        encodePayload(m, bytes.data());
-        return bytes;
-      },
-      message);
+// Zeroes what lies behind the NUL of a text field: stray memory of the sender.
+class StrayMemoryEraser final : public FieldVisitor {
+ public:
+  explicit StrayMemoryEraser(std::byte* payload) : at_(payload) {}
+
+  void number(const Field&, const Numbers& one) override { at_ += bytesOf(one.type); }
+  void array(const Field&, const Numbers& values) override { at_ += bytesOf(values.type) * values.count; }
+  void name(const Field&, std::span<char> bytes) override { erase(bytes.size()); }
+  void text(const Field&, std::size_t bytes, std::string&) override { erase(bytes); }
+  void list(const Field&, const NumberList&) override {}
+
+ private:
+  void erase(std::size_t size) {
+    std::fill(std::find(at_, at_ + size, std::byte{0}), at_ + size, std::byte{0});
+    at_ += size;
+  }
+
+  std::byte* at_;
+};
+
+inline Bytes withoutStrayMemory(Message message, ByteView payload) {
+  Bytes bytes(payload.begin(), payload.end());
+  StrayMemoryEraser eraser(bytes.data());
+  visitFields(message, eraser);
+  return bytes;
 }
 
 }  // namespace hapticd::wire

@@ -15,12 +15,9 @@ std::shared_ptr<const net::Buffer> takeBuffer(wire::FrameEncoder& encoder) {
 }  // namespace
 
 void Outbox::Group::add(const Outgoing& out, wire::Time time) {
-  std::visit(
-      [&]<class M>(const M& message) {
-        const bool mayBeLost = !out.reliable && M::kInfo.reliability == wire::Reliability::kLowLatency;
-        (mayBeLost ? lowLatency : reliable).add(time, name, message);
-      },
-      out.message);
+  const wire::Reliability usual = wire::info(out.message.kind()).reliability;
+  const bool mayBeLost = !out.reliable && usual == wire::Reliability::kLowLatency;
+  (mayBeLost ? lowLatency : reliable).add(time, name, out.message);
 }
 
 Outbox::Outbox(const DeviceConfig& config, int buttonCount, std::vector<wire::LocalSender> names)
@@ -79,9 +76,7 @@ void Outbox::tellPresentState(Session& session, wire::LocalSender name, const Gr
   if (last_.tick == 0) return;  // the first tick will tell
   std::vector<Outgoing> messages;
   group.reporter.presentState(last_, frame_, messages);
-  for (const Outgoing& out : messages) {
-    std::visit([&](const auto& message) { session.sendReliably(name, message, lastTime_); }, out.message);
-  }
+  for (const Outgoing& out : messages) session.sendReliably(name, out.message, lastTime_);
   session.flush();
 }
 

@@ -193,7 +193,7 @@ bool Reporter::contact(const View& view, std::vector<Outgoing>& out) {
     scp_ = view.scp;
     out.push_back({wire::Scp{array(view.scp), quaternion(view.orientation)}, false});
   }
-  if (!wants(wire::kReportForce)) out.resize(before);
+  if (!wants(wire::kReportForce)) out.erase(out.begin() + static_cast<std::ptrdiff_t>(before), out.end());
   return changed;
 }
 

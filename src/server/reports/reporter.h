@@ -8,7 +8,7 @@
 
 #include "base/time.h"
 #include "server/reports/view.h"
-#include "wire/messages.h"
+#include "wire/message.h"
 
 namespace hapticd::server {
 

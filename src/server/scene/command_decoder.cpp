@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "wire/dispatch.h"
+
 namespace hapticd::server {
 namespace {
 
@@ -235,44 +237,26 @@ bool continues(std::int32_t first, std::size_t count, std::int32_t next) {
   return first >= 0 && static_cast<std::int64_t>(first) + static_cast<std::int64_t>(count) == next;
 }
 
-template <class M>
-concept Commands = requires(const M& m) {
-  toCommand(m);
-};
-
 }  // namespace
 
-CommandDecoder::Outcome CommandDecoder::take(scene::ClientId client, const wire::MessageReceived& message, std::string& error) {
-  // The one message that comes by the million first, without a variant in between.
-  if (message.kind == wire::kindOf<wire::SetVertex>) {
-    const auto vertex = wire::decode<wire::SetVertex>(message.payload);
-    if (!vertex) {
-      error = vertex.error();
-      return Outcome::malformed;
+CommandDecoder::Outcome CommandDecoder::take(scene::ClientId client, const wire::MessageReceived& message,
+                                             std::string& error) {
+  if (wire::role(message.kind) != wire::Role::scene) return Outcome::notACommand;
+  std::string broken;
+  const auto handle = [&]<class M>(const M& m) {
+    if constexpr (std::is_same_v<M, wire::SetVertex>) {
+      addVertex(client, m);
+    } else if constexpr (std::is_same_v<M, wire::SetTriangle>) {
+      addTriangle(client, m);
+    } else if (isWhole(m, broken)) {
+      add({client, toCommand(m)});
+      bytes_ += bytesOf(m);
     }
-    addVertex(client, *vertex);
-    return Outcome::taken;
-  }
-  auto decoded = wire::decode(message.kind, message.payload);
-  if (!decoded) {
-    error = decoded.error();
-    return Outcome::malformed;
-  }
-  return std::visit(
-      [&]<class M>(const M& m) {
-        if constexpr (std::is_same_v<M, wire::SetTriangle>) {
-          addTriangle(client, m);
-          return Outcome::taken;
-        } else if constexpr (Commands<M>) {
-          if (!isWhole(m, error)) return Outcome::malformed;
-          add({client, toCommand(m)});
-          bytes_ += bytesOf(m);
-          return Outcome::taken;
-        } else {
-          return Outcome::notACommand;
-        }
-      },
-      *decoded);
+  };
+  const auto decoded = wire::dispatchScene(message.kind, message.payload, handle);
+  if (decoded && broken.empty()) return Outcome::taken;
+  error = decoded ? broken : decoded.error();
+  return Outcome::malformed;
 }
 
 void CommandDecoder::add(SceneTask&& task) {

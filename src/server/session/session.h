@@ -78,8 +78,7 @@ class Session {
   }
   /// The same with the time of what it tells, and by TCP whatever its kind: datagrams may overtake the names
   /// that they need.
-  template <wire::WireMessage M>
-  void sendReliably(wire::LocalSender from, const M& message, wire::Time time) {
+  void sendReliably(wire::LocalSender from, const wire::Message& message, wire::Time time) {
     peer_.send(time, from, message, wire::Reliability::kReliable);
   }
   /// Queues frames that are shared with other clients; dropped first when this client reads too slowly if

@@ -45,8 +45,8 @@ struct Station::Impl {
   void on(const Request& request, const wire::StopForces&);
   void on(const Request& request, const wire::RearmForces&);
   void on(const Request& request, const wire::HoldHand& wanted);
-  void on(const Request&, const wire::GetNewObjectId&) {}  // stock servers do not answer it either
-  void on(const Request&, const wire::Heartbeat&) {}  // the session's business
+  void on(const Request&, const wire::GetNewObjectId&) {}  // registered by VRPN, never sent
+  void on(const Request&, const wire::Heartbeat&) {}           // the session handles it
   void rearm(Session& session, wire::LocalSender name, base::Nanos received);
 
   const DeviceConfig config;
