@@ -86,7 +86,7 @@ void halfACookie(const ServerProcess& server, const std::atomic<bool>& stop) {
 
 bool canRecord() {
   const WorkDirectory work;
-  ChildProcess help({"serve", "--help"}, work / "log");
+  ChildProcess help(hapticdProgram(), {"serve", "--help"}, work / "log");
   help.wait();
   return help.output().find("--record") != std::string::npos;
 }

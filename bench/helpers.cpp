@@ -135,7 +135,7 @@ int runHelper(const std::vector<std::string>& arguments) {
 Helper::Helper(std::vector<std::string> arguments)
     : process_(
           [&] {
-            arguments.insert(arguments.begin(), {"bench", "--helper"});
+            arguments.insert(arguments.begin(), "--helper");
             return arguments;
           }(),
           work_ / "log") {}
@@ -148,7 +148,7 @@ std::uint16_t Helper::port() const {
     if (std::regex_search(log, found, listening)) return static_cast<std::uint16_t>(std::stoi(found[1]));
     std::this_thread::sleep_for(25ms);
   }
-  throw std::runtime_error("a helper did not come up: " + process_.output());
+  throw std::runtime_error("a helper did not start: " + process_.output());
 }
 
 }  // namespace hapticd::bench

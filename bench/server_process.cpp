@@ -37,6 +37,10 @@ int codeOf(int status) {
 
 }  // namespace
 
+std::string hapticdProgram() {
+  return std::filesystem::read_symlink("/proc/self/exe").replace_filename("hapticd").string();
+}
+
 ChildProcess::ChildProcess(const std::vector<std::string>& arguments, std::filesystem::path log)
     : log_(std::move(log)) {
   start("/proc/self/exe", arguments);
@@ -115,7 +119,7 @@ WorkDirectory::~WorkDirectory() {
 std::vector<std::string> ServerProcess::arguments(const WorkDirectory& work, const std::string& hand,
                                                   const std::vector<std::string>& more) {
   const std::filesystem::path file = work / "hand.csv";
-  // By default it rests where no scene of ours is.
+  // By default the hand rests outside of every benchmark's scene.
   std::ofstream(file) << (hand.empty() ? "t_s,x_m,y_m,z_m\n0,0,0.055,0\n" : hand);
   std::vector<std::string> all{"serve", "--listen", "127.0.0.1:0", "--allow-no-rt", "--hand", file.string()};
   all.insert(all.end(), more.begin(), more.end());
@@ -123,7 +127,7 @@ std::vector<std::string> ServerProcess::arguments(const WorkDirectory& work, con
 }
 
 ServerProcess::ServerProcess(const std::string& hand, const std::vector<std::string>& more)
-    : process_(arguments(work_, hand, more), work_ / "log") {
+    : process_(hapticdProgram(), arguments(work_, hand, more), work_ / "log") {
   static const std::regex listening(R"(listening on [0-9.]+:([0-9]+))");
   for (int i = 0; i < 400; ++i) {
     const std::string log = process_.output();
@@ -134,7 +138,7 @@ ServerProcess::ServerProcess(const std::string& hand, const std::vector<std::str
     }
     std::this_thread::sleep_for(25ms);
   }
-  throw std::runtime_error("the server did not come up: " + process_.output());
+  throw std::runtime_error("the server did not start: " + process_.output());
 }
 
 std::string ServerProcess::device() const {
@@ -146,7 +150,7 @@ double ServerProcess::residentBytes() const {
   for (std::string line; std::getline(status, line);) {
     if (line.rfind("VmRSS:", 0) == 0) return 1024 * std::stod(line.substr(6));
   }
-  throw std::runtime_error("the server is gone: " + process_.output());
+  throw std::runtime_error("the server has ended: " + process_.output());
 }
 
 std::string handFile(double seconds, int act) {

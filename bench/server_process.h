@@ -1,4 +1,4 @@
-// A real server in a process of its own: this same binary, on a port of its own, with the simulated hand.
+// A real server in its own process, on a free port, with the simulated hand.
 #pragma once
 
 #include <sys/types.h>
@@ -9,12 +9,15 @@
 
 namespace hapticd::bench {
 
-/// A child process; killed when this goes.
+/// The program `hapticd`, which lies beside this one.
+std::string hapticdProgram();
+
+/// A child process; its destructor kills it.
 class ChildProcess {
  public:
-  /// Runs this same program with these arguments, its output into `log`. Throws std::runtime_error.
+  /// Runs this same program with these arguments and writes its output to `log`. Throws std::system_error.
   ChildProcess(const std::vector<std::string>& arguments, std::filesystem::path log);
-  /// Runs another program, found in PATH.
+  /// Runs another program: a path, or a name that is looked up in PATH.
   ChildProcess(const std::string& program, const std::vector<std::string>& arguments,
                std::filesystem::path log);
   ~ChildProcess();
@@ -23,9 +26,9 @@ class ChildProcess {
 
   pid_t id() const noexcept { return pid_; }
   void signal(int number) const noexcept;
-  /// Asks it to end and waits; what it returned, or -1.
+  /// Sends SIGTERM and waits for the end; returns the exit code, or -1.
   int stop();
-  /// Waits until it ends by itself.
+  /// Waits for the end; returns the exit code, or -1.
   int wait();
   std::string output() const;
 
@@ -36,7 +39,7 @@ class ChildProcess {
   std::filesystem::path log_;
 };
 
-/// A directory for the files of a benchmark, gone with it.
+/// A temporary directory for the files of a benchmark; its destructor deletes it.
 class WorkDirectory {
  public:
   WorkDirectory();
@@ -52,8 +55,8 @@ class WorkDirectory {
 /// `hapticd serve` with the simulated hand, ready for clients.
 class ServerProcess {
  public:
-  /// `hand` is a CSV file as serve takes it, empty for a resting hand. More arguments go to serve as they
-  /// are. Throws std::runtime_error with the server's own words when it does not come up.
+  /// `hand` is the text of a CSV file as serve reads it, empty for a resting hand. Appends `more` to the arguments of
+  /// serve. Throws std::runtime_error with the server's output when it does not start.
   explicit ServerProcess(const std::string& hand = "", const std::vector<std::string>& more = {});
 
   std::uint16_t port() const noexcept { return port_; }
@@ -61,7 +64,7 @@ class ServerProcess {
   std::string device() const;
   const ChildProcess& process() const noexcept { return process_; }
   ChildProcess& process() noexcept { return process_; }
-  /// Bytes of memory that are in use by the process, from /proc.
+  /// Resident memory of the process, from /proc.
   double residentBytes() const;
 
  private:
@@ -73,10 +76,10 @@ class ServerProcess {
   std::uint16_t port_ = 0;
 };
 
-/// A hand file: one row for each millisecond of bench::handAt(), for ServerProcess.
+/// The text of a hand file for ServerProcess: one row for each millisecond of bench::handAt().
 std::string handFile(double seconds, int act);
 
-/// This program may open this many sockets, and so may its children.
+/// Raises the limit of open files of this process and its children as far as the system allows.
 void raiseDescriptorLimit();
 
 }  // namespace hapticd::bench

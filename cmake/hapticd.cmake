@@ -3,11 +3,15 @@
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
-set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
-set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
+if(PROJECT_IS_TOP_LEVEL)
+  set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+endif()
 
 find_package(Threads REQUIRED)
 find_package(Eigen3 REQUIRED NO_MODULE)
+include(CheckLinkerFlag)
+check_linker_flag(CXX -fuse-ld=lld HAPTICD_LLD)  # links the larger programs in a fraction of the time
 
 add_library(hapticd_flags INTERFACE)
 target_compile_options(hapticd_flags INTERFACE
@@ -16,6 +20,9 @@ target_compile_options(hapticd_flags INTERFACE
   # The same input gives the same bytes on every x86-64-v2 machine: no contraction, no fast-math.
   -ffp-contract=off
   $<$<STREQUAL:${CMAKE_SYSTEM_PROCESSOR},x86_64>:-march=x86-64-v2>)
+if(HAPTICD_LLD)
+  target_link_options(hapticd_flags INTERFACE -fuse-ld=lld)
+endif()
 if(HAPTICD_SANITIZE)
   target_compile_options(hapticd_flags INTERFACE -fsanitize=${HAPTICD_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   target_link_options(hapticd_flags INTERFACE -fsanitize=${HAPTICD_SANITIZE})
@@ -29,6 +36,43 @@ if(HAPTICD_SANITIZE)
   endif()
 endif()
 
+# hapticd_precompile(TARGET HEADERS): with HAPTICD_PCH, TARGET includes the precompiled headers of HEADERS.
+function(hapticd_precompile target headers)
+  if(HAPTICD_PCH)
+    target_precompile_headers(${target} REUSE_FROM ${headers})
+  endif()
+endfunction()
+
+# hapticd_speed_up(TARGET HEADERS KIND): the same; where HAPTICD_UNITY is KIND or ALL, all sources of TARGET are one file.
+function(hapticd_speed_up target headers kind)
+  if(HAPTICD_UNITY STREQUAL kind OR HAPTICD_UNITY STREQUAL ALL)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 0)
+  else()
+    hapticd_precompile(${target} ${headers})
+  endif()
+endfunction()
+
+# hapticd_headers(NAME [PIC] LIBS external ... HEADERS ...): precompiles HEADERS for the functions above. The compiler
+# accepts them only in targets with the same position independence.
+function(hapticd_headers name)
+  cmake_parse_arguments(A "PIC" "" "LIBS;HEADERS" ${ARGN})
+  if(NOT HAPTICD_PCH)
+    return()
+  endif()
+  set(source ${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp)
+  file(CONFIGURE OUTPUT ${source} CONTENT "// CMake precompiles headers for targets with sources only.\n")
+  add_library(${name} OBJECT ${source})
+  target_link_libraries(${name} PRIVATE hapticd_flags ${A_LIBS})
+  target_precompile_headers(${name} PRIVATE ${A_HEADERS})
+  set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE ${A_PIC})
+endfunction()
+
+set(HAPTICD_STD_HEADERS <algorithm> <array> <atomic> <chrono> <cmath> <cstdint> <cstring> <deque> <functional> <map> <memory>
+  <mutex> <optional> <span> <sstream> <stdexcept> <string> <string_view> <thread> <tuple> <unordered_map> <utility> <variant>
+  <vector>)
+hapticd_headers(hapticd_room_headers PIC
+  LIBS Eigen3::Eigen HEADERS ${HAPTICD_STD_HEADERS} <Eigen/Core> <Eigen/Geometry>)
+
 # hapticd_library(NAME SOURCES ... DEPENDS rooms ... [LIBS external ...] [PRIVATE_LIBS external ...])
 # One library per folder of src/. DEPENDS is the list of rooms it may include: scripts/check_includes.sh
 # reads it from here, so the arrow and the link line cannot differ.
@@ -41,6 +85,7 @@ function(hapticd_library name)
     target_include_directories(hapticd_${name} PUBLIC ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/include)
     target_link_libraries(hapticd_${name} PUBLIC ${deps} ${A_LIBS} PRIVATE hapticd_flags ${A_PRIVATE_LIBS})
     set_target_properties(hapticd_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+    hapticd_speed_up(hapticd_${name} hapticd_room_headers ALL)
   else()
     add_library(hapticd_${name} INTERFACE)
     target_include_directories(hapticd_${name} INTERFACE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/include)
@@ -59,18 +104,36 @@ if(HAPTICD_SANITIZE MATCHES "undefined")
   target_compile_options(hapticd_test_flags INTERFACE -fno-sanitize=null,alignment,vptr)
 endif()
 
-# hapticd_test(NAME SOURCES ... DEPENDS rooms ... [LIBS ...] [LABELS ...])
+# hapticd_test_support(NAME SOURCES ... [DEPENDS rooms ...] [LIBS ...]): sources that several test programs share, compiled
+# once; the programs name it in SUPPORT.
+function(hapticd_test_support name)
+  cmake_parse_arguments(A "" "" "SOURCES;DEPENDS;LIBS" ${ARGN})
+  set(deps ${A_DEPENDS})
+  list(TRANSFORM deps PREPEND hapticd_)
+  add_library(${name} OBJECT ${A_SOURCES})
+  hapticd_compile_as_test(${name})
+  target_link_libraries(${name} PUBLIC ${deps} ${A_LIBS})
+endfunction()
+
+# What support and programs have in common.
+function(hapticd_compile_as_test target)
+  target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
+  target_link_libraries(${target} PRIVATE hapticd_flags hapticd_test_flags)
+  # Each test runs once: optimising it more would take longer than it saves.
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+  target_compile_definitions(${target} PRIVATE HAPTICD_TESTDATA="${PROJECT_SOURCE_DIR}/testdata")
+  hapticd_speed_up(${target} hapticd_test_headers TESTS)
+endfunction()
+
+# hapticd_test(NAME SOURCES ... DEPENDS rooms ... [SUPPORT ...] [LIBS ...] [LABELS ...])
 # One test program NAME_test; every TEST() in it becomes one ctest case.
 function(hapticd_test name)
-  cmake_parse_arguments(A "" "" "SOURCES;DEPENDS;LIBS;LABELS" ${ARGN})
+  cmake_parse_arguments(A "" "" "SOURCES;DEPENDS;SUPPORT;LIBS;LABELS" ${ARGN})
   set(deps ${A_DEPENDS})
   list(TRANSFORM deps PREPEND hapticd_)
   add_executable(${name}_test ${A_SOURCES})
-  target_include_directories(${name}_test PRIVATE ${PROJECT_SOURCE_DIR}/tests)
-  target_link_libraries(${name}_test PRIVATE ${deps} ${A_LIBS} hapticd_flags hapticd_test_flags GTest::gtest_main GTest::gmock)
-  # Tests are compiled once and run once: what the optimiser would win is less than what it costs.
-  target_compile_options(${name}_test PRIVATE $<$<CONFIG:Release>:-O1>)
-  target_compile_definitions(${name}_test PRIVATE HAPTICD_TESTDATA="${PROJECT_SOURCE_DIR}/testdata")
+  hapticd_compile_as_test(${name}_test)
+  target_link_libraries(${name}_test PRIVATE ${A_SUPPORT} ${deps} ${A_LIBS} GTest::gtest_main GTest::gmock)
   add_dependencies(all_tests ${name}_test)
   set(properties TIMEOUT 300)
   if("threads" IN_LIST A_LABELS)

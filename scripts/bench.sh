@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Measures how fast hapticd is, against yardsticks on this machine. Stop other work first.
+# Measures how fast hapticd is, against yardsticks on this machine. Stop other programs first.
 #   scripts/bench.sh             all benchmarks in short windows, under ten minutes
-#   scripts/bench.sh --full      longer, about 25 minutes, and writes the figures into docs/performance.md
-#   scripts/bench.sh --long      the longest, most of an hour, and writes them, too
+#   scripts/bench.sh --full      longer, about 25 minutes; writes the figures into docs/performance.md
+#   scripts/bench.sh --long      the longest, most of an hour; writes them as well
 #   scripts/bench.sh NAME...     only these (hapticd bench --list); docs/performance.md stays as it is
 # Results as JSON, CSV and drawings: build/bench/
 set -euo pipefail
@@ -18,15 +18,15 @@ for argument in "$@"; do
   esac
 done
 
-scripts/install_packages.sh
+scripts/install_packages.sh build viewer bench
 cmake --preset release >/dev/null
-cmake --build build/release --parallel "$(nproc)" --target hapticd | awk 'NR % 10 == 1 || !/^\[[0-9]+\/[0-9]+\] (Building|Linking)/'
+cmake --build build/release --parallel "$(nproc)" --target hapticd hapticd-bench | awk 'NR % 10 == 1 || !/^\[[0-9]+\/[0-9]+\] (Building|Linking)/'
 out=build/bench
 rm -rf "$out"
 build/release/bin/hapticd bench --out "$out" "${length[@]}" "${names[@]}"
 echo "results: $out"
 
-# What stands between the marks is the script's; the rest of the page is written by hand.
+# The script replaces the text between the two marks; the rest of the page is written by hand.
 if [ "${#length[@]}" -gt 0 ] && [ "${#names[@]}" = 0 ]; then
   page=docs/performance.md
   awk -v figures="$out/results.md" '

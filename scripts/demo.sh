@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# The main job from two parts: a server with a simulated hand, and a client that sends it a real scan over TCP and watches
-# what the hand feels. Installs what is missing, builds, runs for about ten seconds, prints what was felt, cleans up.
+# A first touch: starts a server with a simulated hand and a client that sends it a scanned mesh over TCP, and prints the
+# forces and contacts that the client received. Installs missing packages, builds hapticd, and runs for about ten seconds.
 #   scripts/demo.sh [MESH]           another mesh (OBJ, STL, PLY, glTF) instead of the bunny
-#   scripts/demo.sh --keep [MESH]    leaves the server running with the mesh in it, and says where to see it in a browser
+#   scripts/demo.sh --keep [MESH]    keeps the server running with the mesh in it, and prints the address of its page
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -16,16 +16,22 @@ for argument in "$@"; do
   esac
 done
 
-scripts/install_packages.sh
-cmake --preset release >/dev/null
+# The page needs Node.js and packages from the npm registry; only --keep shows it.
+web=OFF
+[ ! -e build/release/CMakeCache.txt ] || web=$(sed -n 's/^HAPTICD_WEB:.*=//p' build/release/CMakeCache.txt)
+[ -z "$keep" ] || web=ON
+scripts/install_packages.sh build $([ "$web" = OFF ] || echo viewer)
+SECONDS=0
+cmake --preset release -DHAPTICD_WEB="$web" >/dev/null
 cmake --build build/release --parallel "$(nproc)" --target hapticd
+echo "the build took $SECONDS s"
 
 program=build/release/bin/hapticd
 log=build/demo.log
 if [ -n "$keep" ]; then
   http=127.0.0.1:8080
-  (exec 3<>/dev/tcp/127.0.0.1/8080) 2>/dev/null && http=127.0.0.1:0  # somebody has it: any free port
-  # setsid: it outlives this script and its terminal.
+  (exec 3<>/dev/tcp/127.0.0.1/8080) 2>/dev/null && http=127.0.0.1:0  # taken: any free port
+  # setsid: the server outlives this script and its terminal.
   setsid "$program" serve --http "$http" --allow-no-rt </dev/null >"$log" 2>&1 &
 else
   "$program" serve --listen 127.0.0.1:0 --http off --allow-no-rt --seconds 60 >"$log" 2>&1 &
@@ -53,7 +59,7 @@ status=0
 if [ -n "$keep" ] && [ "$status" = 0 ]; then
   trap - EXIT
   echo
-  echo "The server goes on; it writes to $log."
+  echo "The server is still running; its log is $log."
   echo "  see it:   open $(sed -nE 's/.*viewer: (http[^ ]+).*/\1/p' "$log" | head -1) in a browser, and drag the hand over the mesh"
   echo "  touch:    $program touch FILE --server Phantom@$address"
   echo "  watch:    $program watch Phantom@$address"
@@ -65,6 +71,6 @@ kill -TERM "$server"
 wait "$server" || true
 trap - EXIT
 echo
-echo "the server says:"
+echo "log of the server:"
 sed 's/^/  /' "$log"
 exit "$status"

@@ -1,14 +1,20 @@
 #!/usr/bin/env bash
-# Installs what packages.txt lists, and nothing when all of it is there.
+# Installs the packages of packages.txt that are missing, of the named sections only, and prints how long that took.
+#   scripts/install_packages.sh SECTION...
 set -euo pipefail
 cd "$(dirname "$0")/.."
-mapfile -t wanted < <(grep -vE '^[[:space:]]*(#|$)' packages.txt)
+[ $# -gt 0 ] || { sed -n '2,3s/^# *//p' "$0"; exit 2; }
 missing=()
-for line in "${wanted[@]}"; do
-  read -r package instead <<<"$line"
+section=""
+while read -r package instead; do
+  case "$package" in
+    "" | \#*) continue ;;
+    \[*\]) section=${package//[\[\]]/}; continue ;;
+  esac
+  [[ " $* " == *" $section "* ]] || continue
   if [ -n "$instead" ] && command -v "$instead" >/dev/null; then continue; fi
   dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'install ok installed' || missing+=("$package")
-done
+done <packages.txt
 [ "${#missing[@]}" = 0 ] && exit 0
 sudo=""
 if [ "$(id -u)" != 0 ]; then
@@ -16,5 +22,7 @@ if [ "$(id -u)" != 0 ]; then
   sudo=sudo
 fi
 echo "installing: ${missing[*]}"
+SECONDS=0
 $sudo apt-get update -q
 DEBIAN_FRONTEND=noninteractive $sudo apt-get install -y -q --no-install-recommends "${missing[@]}"
+echo "downloads and installation took $SECONDS s"

@@ -1,69 +1,198 @@
 #!/usr/bin/env bash
-# Installs what is missing, builds, and passes the tests: optimised, under ASan+UBSan, and under TSan what has threads.
-#   scripts/test.sh            the whole of it
-#   scripts/test.sh --quick    the optimised build alone
-#   scripts/test.sh --long     with full sizes (12 million segments and the like)
+# Installs missing packages, builds, and runs the tests: optimised, under ASan+UBSan, and those with threads under TSan.
+#   scripts/test.sh                 all tests
+#   scripts/test.sh --quick         the optimised build only
+#   scripts/test.sh --quick ROOM    the optimised tests of one folder below tests/, e.g. scene or realtime/render
+#   scripts/test.sh --long          all tests at full size (12 million segments and the like), clang-tidy, a build by clang
+# The last line is 'N passed, N failed', followed by ', N skipped' where tests were skipped. Logs: build/PRESET/test.log
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
+usage() { sed -n '3,6s/^# *//p' "$0"; exit 2; }
 presets=(release asan tsan)
-for argument in "$@"; do
-  case "$argument" in
-    --quick) presets=(release) ;;
-    --long) export HAPTICD_LONG=1 ;;
-    *) sed -n '2,5s/^# *//p' "$0"; exit 2 ;;
+room=""
+long=""
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --quick)
+      presets=(release)
+      if [[ $# -gt 1 && $2 != -* ]]; then room=$2; shift; fi ;;
+    --long) long=yes; export HAPTICD_LONG=1 ;;
+    *) usage ;;
   esac
+  shift
+done
+if [ -n "$room" ] && [ ! -d "tests/$room" ] && [ ! -d "src/$room" ]; then
+  echo "there is no room '$room'; the rooms are the folders below tests/" >&2
+  exit 2
+fi
+# The nearest folder that has tests of its own.
+while [ -n "$room" ] && [ ! -e "tests/$room/CMakeLists.txt" ]; do
+  [[ $room == */* ]] || { echo "tests/ has no folder for '$room'" >&2; exit 2; }
+  room=${room%/*}
 done
 
-scripts/install_packages.sh
-scripts/check_includes.sh
-
+kAllowedFlaky=2
 jobs=$(nproc)
 total_passed=0
 total_failed=0
+total_skipped=0
+flaky=()
+summary=()
+testing=""  # process that runs the tests in the background
+trap '[ -z "$testing" ] || kill "$testing" 2>/dev/null || true' EXIT
 
-# failed_in LOG, all_in LOG: what ctest's last lines say.
-failed_in() { sed -nE 's/.*, ([0-9]+) tests? failed out of [0-9]+.*/\1/p' "$1" | tail -1; }
-all_in() { sed -nE 's/.*tests? failed out of ([0-9]+).*/\1/p' "$1" | tail -1; }
-
-# run_tests BUILD LOG CTEST_ARGUMENTS...: a virtual machine may stand still for longer than any deadline, so what fails gets
-# a second chance with the machine to itself, and is named. A finding of a sanitizer gets none.
-run_tests() {
-  local build=$1 log=$2 status=0
-  shift 2
-  ctest --test-dir "$build" --output-on-failure --parallel "$jobs" "$@" 2>&1 | tee "$log" || status=$?
-  failed=$(failed_in "$log")
-  all=$(all_in "$log")
-  if [ "${failed:-0}" != 0 ] && ! grep -qE 'ERROR: [A-Za-z]*Sanitizer|WARNING: ThreadSanitizer|runtime error:' "$log"; then
-    echo "== failed at first, now one at a time:"
-    grep -E '^[[:space:]]+[0-9]+ - ' "$log"
-    status=0
-    ctest --test-dir "$build" --output-on-failure --rerun-failed 2>&1 | tee "$log.again" || status=$?
-    failed=$(failed_in "$log.again")
-  fi
-  # No count is a failure, too.
-  [ "$status" = 0 ] || [ "${failed:-0}" != 0 ] || failed=1
-  total_failed=$((total_failed + ${failed:-0}))
-  total_passed=$((total_passed + ${all:-0} - ${failed:-0}))
+# Arguments for ctest, by preset.
+filter_of() {
+  case "$1" in
+    release) ;;
+    asan) echo -LE apps ;;
+    tsan) echo -L threads ;;
+  esac
 }
 
-for preset in "${presets[@]}"; do
-  echo "== $preset"
-  cmake --preset "$preset" >/dev/null
-  only=()
-  case "$preset" in
-    release) target=all ;;
-    asan) target=all_tests; only=(-LE apps) ;;
-    tsan) target=threads_tests; only=(-L threads) ;;
+targets_of() {
+  case "$1" in
+    asan) echo all_tests ;;
+    tsan) echo threads_tests ;;
+    release)
+      case "$room" in
+        "" | apps | examples | install | web) echo all ;;
+        *)
+          echo "tests/$room/all"
+          # Tests of the whole program, run by scripts, are no dependency that the build knows.
+          if grep -rqs 'bin/hapticd"' "build/release/tests/$room" --include=CTestTestfile.cmake; then echo hapticd; fi ;;
+      esac ;;
   esac
-  # Ninja's progress in steps of ten, so that a log stays readable.
-  cmake --build "build/$preset" --parallel "$jobs" --target "$target" | awk 'NR % 10 == 1 || !/^\[[0-9]+\/[0-9]+\] (Building|Linking)/'
-  # One thread builds the index where threads are watched: TBB is not instrumented.
-  [ "$preset" = tsan ] && export HAPTICD_EMBREE="threads=1,user_threads=1"
-  export TSAN_OPTIONS="suppressions=$PWD/scripts/tsan.supp" ASAN_OPTIONS="detect_leaks=1" LSAN_OPTIONS="suppressions=$PWD/scripts/lsan.supp:print_suppressions=0"
-  run_tests "build/$preset" "build/$preset/test.log" "${only[@]}"
-  unset HAPTICD_EMBREE
+}
+
+# build PRESET: prints every tenth step, so that a log stays readable. Takes only the time that tests leave.
+build() {
+  cmake --preset "$1" >"build/$1.configure.log" 2>&1 || { cat "build/$1.configure.log"; return 1; }
+  # shellcheck disable=SC2046
+  nice -n 19 cmake --build "build/$1" --parallel "$jobs" --target $(targets_of "$1") |
+    awk 'NR % 10 == 1 || !/^\[[0-9]+\/[0-9]+\] (Building|Linking)/'
+}
+
+# run_ctest PRESET LOG ARGUMENTS...
+run_ctest() {
+  local preset=$1 log=$2
+  shift 2
+  export TSAN_OPTIONS="suppressions=$PWD/scripts/tsan.supp" ASAN_OPTIONS="detect_leaks=1"
+  export LSAN_OPTIONS="suppressions=$PWD/scripts/lsan.supp:print_suppressions=0"
+  # TSan does not know the threads of TBB, which is not instrumented: one thread builds the index.
+  [ "$preset" != tsan ] || export HAPTICD_EMBREE="threads=1,user_threads=1"
+  # shellcheck disable=SC2046
+  ctest --test-dir "build/$preset${room:+/tests/$room}" --output-on-failure "$@" $(filter_of "$preset") >"$log" 2>&1
+}
+
+# The lists at the end of a log of ctest: 'NUMBER - NAME (STATUS)'.
+failed_in() { grep -E '^[[:space:]]+[0-9]+ - .* \([^()]*\)$' "$1" | grep -vE ' \((Skipped|Disabled)\)$' || true; }
+skipped_in() { grep -E '^[[:space:]]+[0-9]+ - .* \((Skipped|Disabled)\)$' "$1" || true; }
+count() { grep -c . <<<"$1" || true; }
+all_in() { sed -nE 's/.*tests? failed out of ([0-9]+).*/\1/p' "$1" | tail -1; }
+
+# judge PRESET STATUS BUILD_S TEST_S: counts what the first run left. A virtual machine can stall for longer than any
+# deadline, so a failed test runs again, alone; if it passes then, it is flaky. Findings of a sanitizer always count.
+judge() {
+  local preset=$1 status=$2 build_s=$3 test_s=$4 log="build/$1/test.log"
+  local failed skipped all again still unstable=0
+  failed=$(failed_in "$log")
+  skipped=$(skipped_in "$log")
+  all=$(all_in "$log")
+  still=$failed
+  if [ -n "$failed" ]; then
+    sed -n '/The following tests FAILED/q; p' "$log" | grep -vE ' (Passed|\*\*\*Skipped) +[0-9.]+ sec$' | grep -vE '^ *Start +[0-9]+:' || true
+    if grep -qE 'ERROR: [A-Za-z]*Sanitizer|WARNING: ThreadSanitizer|runtime error:' "$log"; then
+      echo "== $preset: a sanitizer found an error, so no failed test runs again"
+    else
+      echo "== $preset: these tests failed and run again, one at a time:"
+      echo "$failed"
+      again=0
+      run_ctest "$preset" "$log.again" --rerun-failed || again=$?
+      cat "$log.again"
+      still=$(failed_in "$log.again")
+      [ "$again" = 0 ] || [ -n "$still" ] || still="  0 - ctest (Failed)"
+      while IFS= read -r line; do
+        if [ -z "$line" ] || grep -qF -- "$(sed -E 's/ \([^()]*\)$//' <<<"$line") (" <<<"$still"; then continue; fi
+        unstable=$((unstable + 1))
+        flaky+=("$preset: $(sed -E 's/^[[:space:]]*[0-9]+ - (.*) \([^()]*\)$/\1/' <<<"$line")")
+      done <<<"$failed"
+    fi
+  elif [ "$status" != 0 ]; then
+    cat "$log"
+    still="  0 - ctest (Failed)"
+  fi
+  local n_failed n_skipped n_passed
+  n_failed=$(count "$still")
+  n_skipped=$(count "$skipped")
+  n_passed=$((${all:-0} - n_failed - n_skipped))
+  [ "$n_passed" -ge 0 ] || n_passed=0
+  total_failed=$((total_failed + n_failed))
+  total_skipped=$((total_skipped + n_skipped))
+  total_passed=$((total_passed + n_passed))
+  summary+=("$preset: ${all:-0} tests: $n_passed passed, $n_failed failed, $unstable flaky, $n_skipped skipped; build $build_s s, tests $test_s s")
+  [ -z "$still" ] || summary+=("failed:" "$still")
+  [ -z "$skipped" ] || summary+=("skipped:" "$skipped")
+}
+
+mkdir -p build
+if [ -z "$room" ]; then
+  scripts/install_packages.sh build viewer test lint
+  scripts/check_includes.sh
+else
+  scripts/install_packages.sh build test
+fi
+
+echo "== release: building"
+SECONDS=0
+build release
+build_s=$SECONDS
+for i in "${!presets[@]}"; do
+  preset=${presets[i]}
+  next=${presets[i + 1]:-}
+  # The tests mostly wait: the next build uses that time, at the lowest priority.
+  echo "== $preset: testing${next:+; $next: building}"
+  (
+    SECONDS=0
+    status=0
+    run_ctest "$preset" "build/$preset/test.log" --parallel "$jobs" || status=$?
+    echo "$status $SECONDS" >"build/$preset/test.result"
+  ) &
+  testing=$!
+  next_build_s=0
+  if [ -n "$next" ]; then
+    SECONDS=0
+    build "$next"
+    next_build_s=$SECONDS
+  fi
+  wait "$testing"
+  testing=""
+  read -r status test_s <"build/$preset/test.result"
+  judge "$preset" "$status" "$build_s" "$test_s"
+  build_s=$next_build_s
 done
 
-echo "$total_passed passed, $total_failed failed"
+if [ -n "$long" ]; then
+  for check in tidy clang; do
+    if scripts/lint.sh "--$check"; then
+      total_passed=$((total_passed + 1))
+    else
+      total_failed=$((total_failed + 1))
+      summary+=("failed: scripts/lint.sh --$check")
+    fi
+  done
+fi
+
+echo
+printf '%s\n' "${summary[@]}"
+if [ "${#flaky[@]}" -gt 0 ]; then
+  printf 'flaky: %s\n' "${flaky[@]}"
+  if [ "${#flaky[@]}" -gt "$kAllowedFlaky" ]; then
+    echo "more than $kAllowedFlaky flaky tests: they count as failed"
+    total_failed=$((total_failed + ${#flaky[@]}))
+    total_passed=$((total_passed - ${#flaky[@]}))
+  fi
+fi
+echo "$total_passed passed, $total_failed failed$([ "$total_skipped" = 0 ] || echo ", $total_skipped skipped")"
 [ "$total_failed" = 0 ] && [ "$total_passed" -gt 0 ]

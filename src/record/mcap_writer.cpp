@@ -11,7 +11,7 @@ namespace hapticd::record {
 namespace {
 
 constexpr std::size_t kChunkBytes = 1U << 20U;
-constexpr unsigned char kMagic[] = {0x89, 'M', 'C', 'A', 'P', '0', '\r', '\n'};
+constexpr unsigned char kMcapMagic[] = {0x89, 'M', 'C', 'A', 'P', '0', '\r', '\n'};
 
 enum Opcode : std::uint8_t {
   kHeader = 0x01,
@@ -53,7 +53,7 @@ class Out {
 };
 
 ByteView magicBytes() {
-  return std::as_bytes(std::span(kMagic));
+  return std::as_bytes(std::span(kMcapMagic));
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr double kRelativeSkin = 1e-9;  // of the hand's own coordinates, metres
+constexpr double kPlaneSkin = 1e-9;  // of the hand's own coordinates, metres
 constexpr double kTau = 2 * M_PI;
 
 }  // namespace
@@ -97,7 +97,7 @@ bool HalfSpaces::placeOne(const geometry::Affine& T_world_device, Nanos now, con
   placed.facet.unbounded = true;
   placed.facet.normal = normal;
   placed.facet.a = hip - normal * (hipHeight - raised);
-  placed.facet.skin = kRelativeSkin * std::max(0.1, hip.cwiseAbs().maxCoeff());
+  placed.facet.skin = kPlaneSkin * std::max(0.1, hip.cwiseAbs().maxCoeff());
   return true;
 }
 

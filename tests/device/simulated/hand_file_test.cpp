@@ -9,10 +9,10 @@
 #include <fstream>
 #include <numbers>
 
+#include "support/milliseconds.h"
+
 namespace hapticd::device {
 namespace {
-
-constexpr Nanos kMs = 1'000'000;
 
 std::string errorOf(const std::string& text) {
   try {

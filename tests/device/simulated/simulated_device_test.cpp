@@ -11,11 +11,11 @@
 
 #include "device/simulated/hand_file.h"
 #include "device/simulated/waypoint_path.h"
+#include "support/milliseconds.h"
 
 namespace hapticd::device {
 namespace {
 
-constexpr Nanos kMs = 1'000'000;
 constexpr double kHand_N_per_m = 300;
 
 std::shared_ptr<const HandPath> resting(const Vec3& at) {

@@ -1,6 +1,7 @@
 // Smooth paths through points.
 #include "base/time.h"
 #include "device/simulated/waypoint_path.h"
+#include "support/milliseconds.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +9,6 @@
 
 namespace hapticd::device {
 namespace {
-
-constexpr Nanos kMs = 1'000'000;
 
 std::vector<Waypoint> someStroke() {
   return {{0.0, Vec3(0, 0.02, 0), Quat::Identity(), 0},

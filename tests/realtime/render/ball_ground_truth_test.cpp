@@ -9,7 +9,7 @@ namespace hapticd::realtime::fixture {
 namespace {
 
 constexpr double kRadius = 0.001;
-constexpr RenderOptions kBall{.toolRadius_m = kRadius};
+constexpr RenderOptions kBallOfRadius{.toolRadius_m = kRadius};
 
 TriangleMesh jittered(double half, int cells) {
   return heightField(
@@ -37,7 +37,7 @@ TEST_P(BallGroundTruth, shallow_concave_seam_does_not_hold_the_proxy_back) {
     clear();
     add(heightField(0.05, 100, [&](double x, double) { return std::tan(angle / 2) * std::abs(x); }),
         surface());
-    start({-0.01, 0.00023, 0.004}, kBall);
+    start({-0.01, 0.00023, 0.004}, kBallOfRadius);
     to({-0.01, 0.00023, -0.001});
     to({0.01, 0.00023, -0.001}, 0.05, [&](const Rendering& r) {
       const Vec3 h = hip();
@@ -54,7 +54,7 @@ TEST_P(BallGroundTruth, shallow_concave_seam_does_not_hold_the_proxy_back) {
 // T8  50 mm deep: F = 51 N, for the ball touches a radius early
 TEST_P(BallGroundTruth, deep_press_is_not_released) {
   add(plane(0.1, 4), surface());
-  start({0.001, 0.002, 0.005}, kBall);
+  start({0.001, 0.002, 0.005}, kBallOfRadius);
   EXPECT_NEAR(to({0.001, 0.002, -0.05}, 0.5).force_N.z(), 51, 1e-4);
 }
 
@@ -63,7 +63,7 @@ TEST_P(BallGroundTruth, rising_plate_lifts_a_resting_hand) {
   scene::ObjectState& object = add(jittered(0.02, 40), surface());
   object.motion = scene::Motion::between(object.motion.origin(), shifted(object, {0, 0, 0.004}),
                                          toNanos(0.01), toNanos(0.09));
-  start({0.0003, 0.0002, 0.002}, kBall);
+  start({0.0003, 0.0002, 0.002}, kBallOfRadius);
   for (int i = 0; i < 120; ++i) {
     const double risen =
         0.05 * base::toSeconds(std::clamp<Nanos>(hand->time() - toNanos(0.01), 0, toNanos(0.08)));
@@ -76,7 +76,7 @@ TEST_P(BallGroundTruth, rising_plate_lifts_a_resting_hand) {
 // T9b  a plate slides under a pressed hand: carried until |Ft| = mu Fn, then it slips
 TEST_P(BallGroundTruth, sliding_plate_carries_the_proxy_until_it_slips) {
   scene::ObjectState& object = add(plane(0.05, 10), surface(1000, 0.5, 0.5));
-  start({0.0003, 0.0002, 0.002}, kBall);
+  start({0.0003, 0.0002, 0.002}, kBallOfRadius);
   to({0.0003, 0.0002, -0.001});
   const Nanos begin = hand->time();
   object.motion = scene::Motion::between(object.motion.origin(), shifted(object, {0.005, 0, 0}), begin,
@@ -100,7 +100,7 @@ TEST_P(BallGroundTruth, interpolated_pose_stream_has_no_steps) {
     p.pretranslate(units() * Vec3(0, 0, height(t)));
     return p;
   };
-  start({0.001, 0.002, 0.002}, kBall);
+  start({0.001, 0.002, 0.002}, kBallOfRadius);
   to({0.001, 0.002, -0.002});
   constexpr double kInterval_s = 1.0 / 60;
   const double begin = base::toSeconds(hand->time());
@@ -129,7 +129,7 @@ TEST_P(BallGroundTruth, deforming_surface_is_felt_like_a_moving_one) {
   for (auto& v : risen) v.z() += static_cast<float>(units() * 0.001);
   const auto placed = scene::Motion::fixed(Affine(Eigen::Translation3d(units() * offset())));
   scene::ObjectState& object = scene.add(geometryOf(mesh, 5), surface(), placed);
-  start({0.0003, 0.0002, 0.003}, kBall);
+  start({0.0003, 0.0002, 0.003}, kBallOfRadius);
   to({0.0003, 0.0002, 0.0005});
   const Nanos begin = hand->time();
   object.mesh = geometryOf(mesh, 5, &risen, begin, begin + toNanos(0.1));
@@ -152,7 +152,7 @@ TEST_P(BallGroundTruth, cell_size_is_not_felt) {
         surface());
     const Vec3 n = Vec3(-0.3, -0.1, 1).normalized();
     const Vec3 from(-0.003, 0.0006, 0.3 * -0.003 + 0.1 * 0.0006);
-    start(from + 0.003 * n, kBall);
+    start(from + 0.003 * n, kBallOfRadius);
     to(from);
     to(from + Vec3(0.006, 0.0012, 0.3 * 0.006 + 0.1 * 0.0012), 0.05, [&](const Rendering& r) {
       EXPECT_NEAR(r.force_N.norm(), 1, 0.01) << cell;
@@ -169,12 +169,12 @@ TEST_P(BallGroundTruth, shear_in_the_transform_equals_shear_in_the_mesh) {
   TriangleMesh byHand = sphere(0.03, 24);
   for (auto& v : byHand.vertices) v = (shear * v.cast<double>()).cast<float>();
   add(byHand, surface());
-  Hand first(scene.snapshot(), kBall);
+  Hand first(scene.snapshot(), kBallOfRadius);
   clear();
   Affine placed(Eigen::Translation3d(units() * offset()));
   placed.linear() = units() * shear;
   scene.add(sphere(0.03, 24), surface(), placed);
-  Hand second(scene.snapshot(), kBall);
+  Hand second(scene.snapshot(), kBallOfRadius);
   for (int i = 0; i < 400; ++i) {
     const double a = 0.002 * i;
     const double reach = 1.2 - 0.3 * std::min(1.0, i / 100.0);
@@ -210,7 +210,7 @@ TEST_P(BallGroundTruth, soup_neither_tunnels_nor_breaks) {
     clear();
     scene.faces = faces;
     add(soup, surface(1000, 0.3, 0.3));
-    start({0.001, 0.002, 0.004}, kBall);
+    start({0.001, 0.002, 0.004}, kBallOfRadius);
     to({0.001, 0.002, 0});
     for (int k = 0; k < 40; ++k) {
       to({across(random), across(random), 0}, 0.2, [&](const Rendering& r) {
@@ -232,7 +232,7 @@ TEST_P(BallGroundTruth, seam_between_objects_changes_friction_without_a_kick) {
   };
   add(plate(-0.02F, 0), surface(1000, 0.6, 0.6));
   add(plate(0, 0.02F), surface(1000, 0.1, 0.1));
-  start({-0.01, 0.0003, 0.003}, kBall);
+  start({-0.01, 0.0003, 0.003}, kBallOfRadius);
   to({-0.01, 0.0003, 0});
   double before = 0;
   double after = 0;
@@ -252,7 +252,7 @@ TEST_P(BallGroundTruth, vanishing_object_ends_its_contact_only) {
   const SceneFixture below = scene;
   scene::ObjectState& upper = add(plane(0.05, 7), surface());
   upper.motion = scene::Motion::fixed(shifted(upper, {0, 0, 0.001}));
-  start({0.001, 0.002, 0.004}, kBall);
+  start({0.001, 0.002, 0.004}, kBallOfRadius);
   EXPECT_NEAR(to({0.001, 0.002, 0}).force_N.z(), 2, 1e-3);
   scene = below;
   hand->show(scene.snapshot());

@@ -5,9 +5,9 @@ namespace hapticd::realtime::fixture {
 namespace {
 
 #ifdef HAPTICD_SANITIZED
-constexpr int kTicks = 400;
+constexpr int kFineMeshTicks = 400;
 #else
-constexpr int kTicks = 4000;
+constexpr int kFineMeshTicks = 4000;
 #endif
 
 class FineMeshTest : public VariantTest {
@@ -19,7 +19,7 @@ class FineMeshTest : public VariantTest {
   // A rosette on the sphere of the given radius about the centre, seen from the centre downwards (or
   // upwards).
   static Vec3 rosette(const Vec3& centre, double radius, double up, int i) {
-    const double a = 2 * M_PI * i / kTicks;
+    const double a = 2 * M_PI * i / kFineMeshTicks;
     const double rho = 0.006 * std::sin(5 * a) / radius;
     return centre +
            radius * Vec3(std::sin(rho) * std::cos(a), std::sin(rho) * std::sin(a), up * std::cos(rho));
@@ -42,7 +42,7 @@ TEST_P(FineMeshTest, bowl_does_not_hold_the_proxy) {
       to(rosette(centre, kRadius + 0.002, -1, 0));
       double least = 1e9;
       double most = 0;
-      for (int i = 0; i < kTicks; ++i) {
+      for (int i = 0; i < kFineMeshTicks; ++i) {
         const Rendering& r = at(rosette(centre, kRadius + 0.002, -1, i));
         least = std::min(least, r.force_N.norm());
         most = std::max(most, r.force_N.norm());
@@ -67,7 +67,7 @@ TEST_P(FineMeshTest, dome_does_not_hold_the_proxy) {
       const Vec3 centre(0, 0, -kRadius);
       start(rosette(centre, kRadius + 0.001, 1, 0));
       to(rosette(centre, kRadius - 0.002, 1, 0));
-      for (int i = 0; i < kTicks; ++i) {
+      for (int i = 0; i < kFineMeshTicks; ++i) {
         const Rendering& r = at(rosette(centre, kRadius - 0.002, 1, i));
         EXPECT_GT(r.force_N.norm(), 1.9) << cell << " mu " << mu;
         EXPECT_LT(r.force_N.norm(), mu > 0 ? 2.24 * 1.05 : 2.1) << cell << " mu " << mu;

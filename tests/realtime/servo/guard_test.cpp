@@ -1,6 +1,7 @@
 // Every rule of the guard, sample by sample.
 #include "base/time.h"
 #include "realtime/servo/guard.h"
+#include "support/milliseconds.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +12,6 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr Nanos kMs = 1'000'000;
 constexpr double kTiny = 1e-9;
 
 GuardOptions armedOptions() {

@@ -4,11 +4,12 @@
 
 #include <stdexcept>
 
+#include "support/milliseconds.h"
+
 namespace hapticd::realtime {
 namespace {
 
 constexpr Nanos kUs = 1000;
-constexpr Nanos kMs = 1'000'000;
 
 TEST(Pacer, KeepsTheGridWhenTicksAreALittleLate) {
   Pacer pacer(0, kMs);

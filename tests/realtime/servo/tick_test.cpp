@@ -8,11 +8,10 @@
 #include <vector>
 
 #include "realtime/servo/fakes.h"
+#include "support/milliseconds.h"
 
 namespace hapticd::realtime {
 namespace {
-
-constexpr Nanos kMs = 1'000'000;
 
 TickOptions armed() {
   TickOptions options;

@@ -19,7 +19,7 @@ Parsed parse(const std::string& text) {
   return parsed;
 }
 
-std::string errorOf(const std::string& text) {
+std::string vrpnCfgError(const std::string& text) {
   try {
     parse(text);
   } catch (const ConfigError& error) {
@@ -97,29 +97,29 @@ TEST(VrpnCfg, MoreReportsThanTicksAreRemarked) {
 
 TEST(VrpnCfg, ErrorsNameTheLine) {
   const std::string form = "; the line reads vrpn_Phantom NAME calibrate(0|1) report_rate_Hz DEVICE";
-  EXPECT_EQ(errorOf("#\nvrpn_Phantom"), "vrpn.cfg:2: the name is missing" + form);
-  EXPECT_EQ(errorOf("vrpn_Phantom P yes 60 X"), "vrpn.cfg:1: calibrate is \"yes\", expected 0 or 1" + form);
-  EXPECT_EQ(errorOf("vrpn_Phantom P 1 60,0 X"),
+  EXPECT_EQ(vrpnCfgError("#\nvrpn_Phantom"), "vrpn.cfg:2: the name is missing" + form);
+  EXPECT_EQ(vrpnCfgError("vrpn_Phantom P yes 60 X"), "vrpn.cfg:1: calibrate is \"yes\", expected 0 or 1" + form);
+  EXPECT_EQ(vrpnCfgError("vrpn_Phantom P 1 60,0 X"),
             "vrpn.cfg:1: report_rate_Hz is \"60,0\", expected a number" + form);
   EXPECT_EQ(
-      errorOf("\n\nvrpn_OpenHaptics P 1 60 Default PHANToM"),
+      vrpnCfgError("\n\nvrpn_OpenHaptics P 1 60 Default PHANToM"),
       "vrpn.cfg:3: linear_tolerance_mm is \"Default\", expected a number; the line reads vrpn_OpenHaptics "
       "NAME reset_position(0|1) report_rate_Hz linear_tolerance_mm angular_tolerance_rad DEVICE");
-  EXPECT_EQ(errorOf("vrpn_Phantom P 1 0 X"),
+  EXPECT_EQ(vrpnCfgError("vrpn_Phantom P 1 0 X"),
             "vrpn.cfg:1: device 'P': report_rate_Hz is 0; it must lie between 0.1 and 1000");
-  EXPECT_EQ(errorOf("vrpn_OpenHaptics P 1 60 -1 0 X"),
+  EXPECT_EQ(vrpnCfgError("vrpn_OpenHaptics P 1 60 -1 0 X"),
             "vrpn.cfg:1: device 'P': linear_tolerance_mm is -1; it must lie between 0 and 1000");
-  EXPECT_EQ(errorOf("vrpn_OpenHaptics P 1 nan 1 0 X"),
+  EXPECT_EQ(vrpnCfgError("vrpn_OpenHaptics P 1 nan 1 0 X"),
             "vrpn.cfg:1: device 'P': report_rate_Hz is nan; it must lie between 0.1 and 1000");
-  EXPECT_EQ(errorOf("vrpn_Phantom P 1 60 X\nvrpn_Phantom P 1 60 Y"),
+  EXPECT_EQ(vrpnCfgError("vrpn_Phantom P 1 60 X\nvrpn_Phantom P 1 60 Y"),
             "vrpn.cfg:2: the name 'P' is given twice; each must be unique");
-  EXPECT_EQ(errorOf("vrpn_Phantom P@Q 1 60 X"),
+  EXPECT_EQ(vrpnCfgError("vrpn_Phantom P@Q 1 60 X"),
             "vrpn.cfg:1: device name \"P@Q\" must have 1 to 95 characters, no '@' and no control characters");
 }
 
 TEST(VrpnCfg, AFileWithoutDevicesOfOursIsAnError) {
   EXPECT_NE(
-      errorOf("# nothing\n").find("vrpn.cfg: no line names a device of this server; one reads vrpn_Open"),
+      vrpnCfgError("# nothing\n").find("vrpn.cfg: no line names a device of this server; one reads vrpn_Open"),
       std::string::npos);
 }
 

@@ -1,0 +1,117 @@
+// hapticd-bench: measures hapticd against yardsticks in the same minutes. `hapticd bench` runs it.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "bench/helpers.h"
+#include "bench/report.h"
+
+namespace hapticd::bench {
+namespace {
+
+struct Options {
+  std::vector<std::string> names;
+  bool full = false;
+  bool longest = false;
+  bool list = false;
+  std::string out;
+  std::vector<std::string> helper;
+};
+
+std::vector<const Benchmark*> chosen(const std::vector<std::string>& names) {
+  std::vector<const Benchmark*> result;
+  for (const Benchmark& benchmark : benchmarks()) {
+    const bool named = std::find(names.begin(), names.end(), benchmark.name) != names.end();
+    if (names.empty() || named) result.push_back(&benchmark);
+  }
+  for (const std::string& name : names) {
+    const auto same = [&](const Benchmark* b) { return b->name == name; };
+    if (std::none_of(result.begin(), result.end(), same))
+      throw std::runtime_error("there is no benchmark '" + name + "'; hapticd bench --list names them");
+  }
+  return result;
+}
+
+void write(const std::filesystem::path& directory, const std::vector<Measured>& all, Length length) {
+  std::filesystem::create_directories(directory);
+  const auto machine = describeMachine(length);
+  writeJson(directory / "results.json", all, machine);
+  writeCsv(directory / "results.csv", all);
+  writePictures(directory, all);
+  writeFile(directory / "results.md", asMarkdown(all, machine));
+}
+
+int run(const Options& options) {
+  if (!options.helper.empty()) return runHelper(options.helper);
+  if (options.list) {
+    for (const Benchmark& b : benchmarks()) std::printf("%-12s %s\n", b.name.c_str(), b.what.c_str());
+    return 0;
+  }
+  Run run;
+  run.length = options.longest ? Length::longest
+               : options.full  ? Length::full
+                               : Length::windows;
+  for (const std::string& line : describeMachine(run.length)) std::printf("%s\n", line.c_str());
+  std::vector<Measured> all;
+  for (const Benchmark* benchmark : chosen(options.names)) {
+    run.progress = [&](const std::string& text) {
+      std::fprintf(stderr, "[%s] %s\n", benchmark->name.c_str(), text.c_str());
+    };
+    const auto begin = std::chrono::steady_clock::now();
+    Measured measured{benchmark, {}, 0};
+    try {
+      measured.outcome = benchmark->measure(run);
+    } catch (const std::exception& error) {
+      // One failed benchmark does not stop the others.
+      measured.outcome.remarks.push_back(std::string("NOT MEASURED: ") + error.what());
+    }
+    measured.took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    std::printf("\n%s  (took %.0f s)\n", asText(measured).c_str(), measured.took_s);
+    std::fflush(stdout);
+    all.push_back(std::move(measured));
+    // After each, so that an interrupted run leaves what it has.
+    if (!options.out.empty()) write(options.out, all, run.length);
+  }
+  return 0;
+}
+
+void declare(CLI::App& app, Options& options) {
+  app.name("hapticd bench");
+  app.add_option("names", options.names, "Benchmarks to run [all of them]");
+  app.add_flag("--list", options.list, "List the benchmarks and exit");
+  app.add_flag("--full", options.full, "Longer measurements, about 25 minutes in all [windows of some seconds]");
+  app.add_flag("--long", options.longest, "The longest measurements, about an hour");
+  app.add_option("--out", options.out, "Directory for results.json, results.csv, results.md and drawings");
+  app.add_option("--helper", options.helper, "A process that the suite starts for itself")->group("");
+  app.footer(
+      "Ratios decide; microseconds are for reference, because they differ between machines.\n"
+      "Stop other work first; 'hapticd doctor' explains how to get realtime rights.\n"
+      "Examples:\n"
+      "  hapticd bench                     all of them, in under ten minutes\n"
+      "  hapticd bench tick deform         two of them\n"
+      "  hapticd bench --full --out out/   results to keep");
+}
+
+}  // namespace
+}  // namespace hapticd::bench
+
+int main(int argc, char** argv) {
+  using namespace hapticd::bench;
+  CLI::App app{"Measures how fast hapticd is, against yardsticks on this machine."};
+  Options options;
+  declare(app, options);
+  try {
+    app.parse(argc, argv);
+    return run(options);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "hapticd bench: %s\n", error.what());
+    return 1;
+  }
+}
