@@ -151,7 +151,7 @@ TEST(ServoThread, StopsWithoutHavingStarted) {
 // All threads of a server at once on the real clock: the scene publishes, an operator stops and re-arms, the
 // edge sleeps on the wake and reads reports.
 TEST(ServoThread, ALoopAmongItsNeighbours) {
-  MonotonicClock clock;
+  base::MonotonicClock clock;
   FakeDevice device;
   TickOptions tickOptions;
   tickOptions.guard.armed = true;
