@@ -81,7 +81,7 @@ bool makeFacet(const scene::Corners& corners, double skin, Facet& f) noexcept {
   return true;
 }
 
-double reach(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d, double limit) noexcept {
+double crossingParameter(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d, double limit) noexcept {
   Heights h;
   if (!touchableSide(f, faces, p, d, limit, h) || !(h.end < 0.5 * f.skin)) return kPasses;
   // The deepest point over the face: where the path goes through it, else the end.
@@ -95,16 +95,16 @@ double reach(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d,
   return overFacet(f, p + t * d, margin) ? t : kPasses;
 }
 
-bool meet(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d, double limit,
-          Meeting& out) noexcept {
-  if (reach(f, faces, p, d, limit) > 1) return false;
+bool castPoint(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d, double limit,
+          CastHit& out) noexcept {
+  if (crossingParameter(f, faces, p, d, limit) > 1) return false;
   Heights h;
   touchableSide(f, faces, p, d, limit, h);
   const double fall = h.start - h.end;
   if (!(fall > 0) && limit < 1) return false;  // on its way out; where it would have ended is not known
   out.stop = fall > 0 ? limit * std::clamp((h.start - f.skin) / fall, 0.0, 1.0) : 0.0;
   out.depth = f.skin - h.end;
-  out.plane = {h.sign * f.normal, f.a, f.skin};
+  out.halfSpace = {h.sign * f.normal, f.a, f.skin};
   return true;
 }
 
@@ -114,11 +114,11 @@ double distanceBound(const scene::Corners& k, const Vec3& x) noexcept {
       std::max({(k.a - centre).squaredNorm(), (k.b - centre).squaredNorm(), (k.c - centre).squaredNorm()});
   const Vec3 normal = (k.b - k.a).cross(k.c - k.a);
   const double normal2 = normal.squaredNorm();
-  const Vec3 way = x - centre;
-  const double up = normal.dot(way);
+  const Vec3 offset = x - centre;
+  const double up = normal.dot(offset);
   // The normal of a needle says little.
   const double up2 = normal2 > kThinness * kThinness * radius2 * radius2 ? up * up / normal2 : 0.0;
-  const double aside = std::sqrt(std::max(0.0, way.squaredNorm() - up2)) - std::sqrt(radius2);
+  const double aside = std::sqrt(std::max(0.0, offset.squaredNorm() - up2)) - std::sqrt(radius2);
   return aside > 0 ? std::sqrt(up2 + aside * aside) : std::sqrt(up2);
 }
 
@@ -150,8 +150,8 @@ Vec3 nearestPointOf(const Facet& f, const Vec3& x) noexcept {
   return x - f.normal * f.normal.dot(ax);
 }
 
-bool meetBall(const Facet& f, TouchableFaces faces, double radius, const Vec3& p, const Vec3& d, double limit,
-              double latest, Meeting& out) noexcept {
+bool castBall(const Facet& f, TouchableFaces faces, double radius, const Vec3& p, const Vec3& d, double limit,
+              double latest, CastHit& out) noexcept {
   const double standoff = radius + f.skin;
   Heights h;
   if (!touchableSide(f, faces, p, d, limit, h) || !(h.end < standoff)) return false;

@@ -9,7 +9,7 @@
 
 #include <cstdint>
 
-#include "realtime/render/plane_set.h"
+#include "realtime/render/active_set.h"
 #include "scene/mesh_geometry.h"
 #include "scene/surface.h"
 
@@ -28,10 +28,10 @@ struct Facet {
 };
 
 /// Where a path meets a facet: at `stop` in [0, 1] the proxy is at its standoff; `plane` keeps it there.
-struct Meeting {
+struct CastHit {
   double stop = 0;
   double depth = 0;  ///< how far the path would go on below the plane; decides between equal stops
-  Plane plane;
+  HalfSpace halfSpace;
 };
 
 /// False for triangles too thin to matter (thinner than the skin, hence covered by their neighbours' margin)
@@ -40,17 +40,17 @@ bool makeFacet(const scene::Corners& corners, double skin, Facet& facet) noexcep
 
 /// The point tool: first parameter in [0, limit] at which the path p + t d comes to the facet itself, or ends
 /// within half a skin of it; > 1 when it passes.
-double reach(const Facet& f, scene::TouchableFaces faces, const Vec3& p, const Vec3& d,
+double crossingParameter(const Facet& f, scene::TouchableFaces faces, const Vec3& p, const Vec3& d,
              double limit) noexcept;
 
 /// The point tool: where the path p + t d, t in [0, limit], has to stop for this facet. False when it passes.
-bool meet(const Facet& f, scene::TouchableFaces faces, const Vec3& p, const Vec3& d, double limit,
-          Meeting& out) noexcept;
+bool castPoint(const Facet& f, scene::TouchableFaces faces, const Vec3& p, const Vec3& d, double limit,
+          CastHit& out) noexcept;
 
 /// The ball tool: where its centre has to stop on the path p + t d, t in [0, limit]; a stop beyond `latest`
 /// is of no interest. False when it passes.
-bool meetBall(const Facet& f, scene::TouchableFaces faces, double radius, const Vec3& p, const Vec3& d,
-              double limit, double latest, Meeting& out) noexcept;
+bool castBall(const Facet& f, scene::TouchableFaces faces, double radius, const Vec3& p, const Vec3& d,
+              double limit, double latest, CastHit& out) noexcept;
 
 /// A lower bound of the distance of x from a triangle: that from the disc around it.
 double distanceBound(const scene::Corners& corners, const Vec3& x) noexcept;

@@ -2,7 +2,7 @@
 // (Morgenbesser & Srinivasan 1996). Its size and the proxy stay as they are.
 #pragma once
 
-#include "realtime/render/nearby.h"
+#include "realtime/render/contact_query.h"
 
 namespace hapticd::realtime {
 

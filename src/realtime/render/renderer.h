@@ -70,7 +70,7 @@ class Renderer {
 
   /// One tick at time `now`, `period` after the one before. `scene` must stay alive until the next step's
   /// end.
-  void step(const scene::SceneSnapshot& scene, const device::DeviceState& hand, Nanos now, Nanos period,
+  void step(const scene::SceneSnapshot& scene, const device::DeviceState& device, Nanos now, Nanos period,
             Rendering& out) noexcept;
 
   /// Forgets the proxy: the next step starts free at the hand.

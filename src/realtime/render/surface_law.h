@@ -7,7 +7,7 @@
 namespace hapticd::realtime {
 
 /// Fills the contact part of `out` (force, normal, depth, contacts). `hipVelocity` in the device frame.
-void applySurfaceLaw(const Grip& grip, const Vec3& proxy_m, const Vec3& hipVelocity_m_per_s,
+void applySurfaceLaw(const ContactSet& contactSet, const Vec3& proxy_m, const Vec3& hipVelocity_m_per_s,
                      double toolRadius_m, Rendering& out) noexcept;
 
 /// Adds the pull of planes that hold on to the hand. After applySurfaceLaw.

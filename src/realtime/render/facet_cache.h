@@ -13,28 +13,28 @@
 namespace hapticd::realtime {
 
 /// Everything noexcept and allocation-free.
-class FacetBall {
+class FacetCache {
  public:
-  static constexpr int kMost = 512;        ///< facets for a point
-  static constexpr int kMostNames = 1024;  ///< triangles for a ball tool
+  static constexpr int kMaxFacets = 512;        ///< facets for a point
+  static constexpr int kMaxTriangles = 1024;  ///< triangles for a ball tool
 
   /// A triangle of an object, by their numbers.
-  struct Name {
+  struct TriangleId {
     std::uint32_t triangle = 0;
     int object = 0;
   };
 
   /// For a point the tool's radius is 0.
-  explicit FacetBall(double toolRadius_m) noexcept : toolRadius_(toolRadius_m) {}
+  explicit FacetCache(double toolRadius_m) noexcept : toolRadius_(toolRadius_m) {}
 
   /// Empties it for the facets that a tool within `reach` of `centre` can meet.
-  void begin(const Vec3& centre, double reach) noexcept;
-  /// For a point: takes in a facet. `asFarAsItBends`: it counts whatever its distance.
-  void add(const Facet& facet, bool asFarAsItBends) noexcept;
+  void restart(const Vec3& centre, double reach) noexcept;
+  /// For a point: takes in a facet. `deforming`: it counts whatever its distance.
+  void add(const Facet& facet, bool deforming) noexcept;
   /// For a ball tool: the same for a triangle that is `distance` or more from the centre.
-  void add(const Name& name, double distance, double skin, bool asFarAsItBends) noexcept;
+  void add(const TriangleId& id, double distance, double skin, bool deforming) noexcept;
   /// Nothing is gathered.
-  void drop() noexcept { complete_ = false; }
+  void invalidate() noexcept { complete_ = false; }
 
   /// Whether every facet is here that a tool within `radius` of p can meet.
   bool covers(const Vec3& p, double radius) const noexcept {
@@ -44,7 +44,7 @@ class FacetBall {
   const Vec3& centre() const noexcept { return centre_; }
   double reach() const noexcept { return reach_; }
   int size() const noexcept { return count_; }
-  double thickestSkin() const noexcept { return thickest_; }
+  double maxSkin() const noexcept { return maxSkin_; }
 
   /// For a point.
   const Facet* begin() const noexcept { return facets_.data(); }
@@ -52,24 +52,24 @@ class FacetBall {
 
   /// For a ball tool: it is at p now.
   void moveTo(const Vec3& p) noexcept;
-  const Name& name(int i) const noexcept { return names_[static_cast<std::size_t>(i)]; }
+  const TriangleId& triangle(int i) const noexcept { return triangles_[static_cast<std::size_t>(i)]; }
   /// The next triangle from i on that may be within `distance` of where the tool is; size() when there is
   /// none.
   int nextWithin(double distance, int i) const noexcept;
   /// How near it may come on the way d from where the tool is. That there is no more than a guess to improve
   /// on.
-  double nearest(int i, const Vec3& d) noexcept;
+  double lowerBound(int i, const Vec3& d) noexcept;
   /// It is there, with `foot` the nearest point of it. Returns the same as nearest() now.
-  double measured(int i, const Vec3& foot, const Vec3& d) noexcept;
+  double refine(int i, const Vec3& foot, const Vec3& d) noexcept;
   /// It is nowhere.
-  void leaveOut(int i) noexcept;
+  void exclude(int i) noexcept;
   /// For a point: all facets whose faces the way p + t d, t in [0, limit], or a part of
-  /// it from p on, may come to; `found` has room for kMost. Returns how many.
-  int crossing(const Vec3& p, const Vec3& d, double limit, const Facet** found) const noexcept;
+  /// it from p on, may come to; `found` has room for kMaxFacets. Returns how many.
+  int facetsNearPath(const Vec3& p, const Vec3& d, double limit, const Facet** found) const noexcept;
 
  private:
   // A plane, normal . x = offset: for a point that of the face, else one with the face behind it.
-  struct Side {
+  struct SupportPlane {
     Vec3 normal;
     double offset;
   };
@@ -79,13 +79,13 @@ class FacetBall {
   double reach_ = 0;
   bool complete_ = false;
   int count_ = 0;
-  double thickest_ = 0;  // of the skins
-  std::array<Side, kMostNames> sides_;
-  std::array<Facet, kMost> facets_;
-  Vec3 place_ = Vec3::Zero();                 // of the tool
-  double gone_ = 0;                           // since it was gathered
-  std::array<double, kMostNames> distances_;  // and that way: a lower bound
-  std::array<Name, kMostNames> names_;
+  double maxSkin_ = 0;  // of the skins
+  std::array<SupportPlane, kMaxTriangles> supportPlanes_;
+  std::array<Facet, kMaxFacets> facets_;
+  Vec3 toolPosition_ = Vec3::Zero();                 // of the tool
+  double travel_ = 0;                           // since it was gathered
+  std::array<double, kMaxTriangles> distances_;  // and that way: a lower bound
+  std::array<TriangleId, kMaxTriangles> triangles_;
 };
 
 }  // namespace hapticd::realtime

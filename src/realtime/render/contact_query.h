@@ -10,8 +10,8 @@
 #include <cstdint>
 
 #include "base/time.h"
-#include "realtime/render/facet_ball.h"
-#include "realtime/render/half_spaces.h"
+#include "realtime/render/facet_cache.h"
+#include "realtime/render/placed_planes.h"
 #include "scene/snapshot.h"
 
 namespace hapticd::realtime {
@@ -27,7 +27,7 @@ struct PlacedObject {
   double stretch = 1;            ///< most object units per metre, in any direction
   double skin = 0;               ///< see facet.h
   bool atRest = false;           ///< will not move or bend any more in this scene
-  std::uint64_t restsSince = 0;  ///< the generation in which it was found at rest
+  std::uint64_t restGeneration = 0;  ///< the generation in which it was found at rest
   bool mirrored = false;         ///< the placement has a reflection: winding is seen reversed
   // Since the last tick:
   const scene::ObjectState* before = nullptr;  ///< null when it was not there
@@ -44,30 +44,30 @@ struct PlacedObject {
 };
 
 /// The first obstacle on a path.
-struct Hit : Meeting {
+struct ObjectHit : CastHit {
   int object = 0;  ///< position among the near objects; -1 - position among the planes
   std::uint32_t triangle = 0;
 };
 
 /// The scene at a tick, kept to compare with the next one.
-struct Moment {
+struct SceneAtTime {
   const scene::SceneSnapshot* scene = nullptr;
   Nanos time = 0;
 };
 
 /// Fixed storage; everything noexcept and allocation-free. Object positions are valid until the next begin().
-class Nearby {
+class ContactQuery {
  public:
-  explicit Nearby(double toolRadius_m) noexcept : radius_(toolRadius_m), ball_(toolRadius_m) {}
+  explicit ContactQuery(double toolRadius_m) noexcept : radius_(toolRadius_m), cache_(toolRadius_m) {}
 
   /// Before a tick that does not follow the one before: what was kept of its scene may be gone.
-  void forget() noexcept { ++generation_; }
+  void invalidate() noexcept { ++generation_; }
   /// Starts a tick with no object near. `planes` are there from the start, and live until the next begin().
-  void begin(const Moment& now, const Moment& before, const HalfSpaces* planes = nullptr) noexcept;
+  void beginTick(const SceneAtTime& now, const SceneAtTime& before, const PlacedPlanes* planes = nullptr) noexcept;
   /// Adds the objects within `reach` of `centre`, and forgets what was gathered of others.
-  void include(const Vec3& centre, double reach) noexcept;
+  void addObjectsNear(const Vec3& centre, double reach) noexcept;
   /// Adds one object by its id; -1 when it is not in the scene.
-  int includeObject(std::int32_t id) noexcept;
+  int addObject(std::int32_t id) noexcept;
 
   int objectCount() const noexcept { return objectCount_; }
   const PlacedObject& object(int i) const noexcept { return objects_[static_cast<std::size_t>(i)]; }
@@ -77,9 +77,9 @@ class Nearby {
   bool gather(const Vec3& centre, double radius) noexcept;
   /// The same; what is gathered already will do, in an earlier tick also, if it holds all that is wanted.
   /// More is gathered than that, so that this happens.
-  bool surround(const Vec3& centre, double radius) noexcept;
-  bool gathered(const Vec3& p) const noexcept {
-    return ball_.complete() && (p - ball_.centre()).squaredNorm() < 0.64 * ball_.reach() * ball_.reach();
+  bool ensureGathered(const Vec3& centre, double radius) noexcept;
+  bool isGathered(const Vec3& p) const noexcept {
+    return cache_.complete() && (p - cache_.centre()).squaredNorm() < 0.64 * cache_.reach() * cache_.reach();
   }
   /// Calls visit(facet) for at least every gathered facet within `distance` of p. The facet lives until the
   /// next one.
@@ -87,19 +87,19 @@ class Nearby {
   void forEachGathered(const Vec3& p, double distance, Visit&& visit) noexcept;
 
   /// First obstacle on the way from p to g; false when the way is free.
-  bool cast(const Vec3& p, const Vec3& g, Hit& hit) noexcept;
+  bool cast(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept;
   /// The same, when only the way's beginning matters: as far as it goes among the gathered facets.
-  bool castBeginning(const Vec3& p, const Vec3& g, Hit& hit) noexcept;
+  bool castWithinGathered(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept;
   /// The same against one object only, always by its tree.
-  bool castAt(int object, const Vec3& p, const Vec3& g, Hit& hit) noexcept;
+  bool castAtObject(int object, const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept;
 
   /// Obstacle of one facet on the way from p to g.
-  bool meets(const Facet& f, const Vec3& p, const Vec3& g, Hit& hit) const noexcept;
+  bool castAtFacet(const Facet& f, const Vec3& p, const Vec3& g, ObjectHit& hit) const noexcept;
 
   /// Smallest skin of the near objects: below a fraction of it, lengths mean nothing.
-  double finestSkin() const noexcept { return finestSkin_; }
+  double minSkin() const noexcept { return minSkin_; }
   /// Largest of the gathered facets.
-  double thickestSkin() const noexcept { return ball_.thickestSkin(); }
+  double maxSkin() const noexcept { return cache_.maxSkin(); }
   double toolRadius() const noexcept { return radius_; }
   scene::TouchableFaces faces() const noexcept { return now_.scene->faces; }
   /// True once something near had to be left out in this tick.
@@ -107,10 +107,10 @@ class Nearby {
 
  private:
   static constexpr int kMaxObjects = 64;
-  static constexpr int kMadeBits = 8;
+  static constexpr int kMemoBits = 8;
 
   // A facet that was made; generation 0 when it is none in the next tick.
-  struct MadeFacet {
+  struct MemoFacet {
     std::uint64_t generation = 0;
     const scene::ObjectState* state = nullptr;
     Facet facet;
@@ -125,48 +125,48 @@ class Nearby {
 
   template <class Visit>
   void forEachOnSegment(const Vec3& p, const Vec3& d, double limit, int only, Visit&& visit) const noexcept;
-  void includeByIndex(const scene::SceneSnapshot& scene, const Vec3& centre, double reach) noexcept;
+  void addObjectsByIndex(const scene::SceneSnapshot& scene, const Vec3& centre, double reach) noexcept;
   void add(const scene::ObjectState& state) noexcept;
   bool place(const scene::ObjectState& state, PlacedObject& placed) const noexcept;
   bool sameObjects() const noexcept;
   void compareWithBefore(PlacedObject& placed) const noexcept;
   const Facet* facetOf(int object, std::uint32_t triangle) const noexcept;
-  void consider(const Facet& f, const Path& path, Hit& best, bool& found) const noexcept;
-  bool castGathered(const Vec3& p, const Vec3& d, double limit, int only, Hit& hit) noexcept;
-  bool meetPoint(const Path& path, int only, Hit& hit) noexcept;
-  bool meetBallOf(const Path& path, int only, Hit& hit) noexcept;
-  void considerGathered(int i, const Path& path, int only, Hit& best, bool& found) noexcept;
-  bool castTree(const Vec3& p, const Vec3& d, int only, Hit& hit) const noexcept;
-  bool castBall(const Vec3& p, const Vec3& d, double begin, int only, Hit& hit) noexcept;
+  void considerFacet(const Facet& f, const Path& path, ObjectHit& best, bool& found) const noexcept;
+  bool castGathered(const Vec3& p, const Vec3& d, double limit, int only, ObjectHit& hit) noexcept;
+  bool castPointGathered(const Path& path, int only, ObjectHit& hit) noexcept;
+  bool castBallGathered(const Path& path, int only, ObjectHit& hit) noexcept;
+  void considerGathered(int i, const Path& path, int only, ObjectHit& best, bool& found) noexcept;
+  bool castTree(const Vec3& p, const Vec3& d, int only, ObjectHit& hit) const noexcept;
+  bool castBallInSteps(const Vec3& p, const Vec3& d, double begin, int only, ObjectHit& hit) noexcept;
 
   double radius_;
-  Moment now_;
-  Moment before_;
-  const HalfSpaces* planes_ = nullptr;
+  SceneAtTime now_;
+  SceneAtTime before_;
+  const PlacedPlanes* planes_ = nullptr;
   bool sameWorkspace_ = true;
   std::array<PlacedObject, kMaxObjects> objects_;
   int objectCount_ = 0;
-  double finestSkin_ = 0;
-  FacetBall ball_;
-  int stopper_ = 0;  // the gathered facet that stopped a ball's last way
+  double minSkin_ = 0;
+  FacetCache cache_;
+  int lastBlocker_ = 0;  // the gathered facet that stopped a ball's last way
   // When and from what it was gathered; 0 when it will not do in another tick.
-  std::uint64_t gatheredIn_ = 0;
+  std::uint64_t gatheredGeneration_ = 0;
   int gatheredCount_ = 0;
   std::array<const scene::ObjectState*, kMaxObjects> gatheredFrom_{};
   std::uint64_t generation_ = 1;  // of what may be kept from tick to tick
-  mutable std::array<MadeFacet, 1U << kMadeBits> made_;
+  mutable std::array<MemoFacet, 1U << kMemoBits> facetMemo_;
   bool overflowed_ = false;
 };
 
 template <class Visit>
-void Nearby::forEachGathered(const Vec3& p, double distance, Visit&& visit) noexcept {
+void ContactQuery::forEachGathered(const Vec3& p, double distance, Visit&& visit) noexcept {
   if (radius_ == 0) {
-    for (const Facet& f : ball_) visit(f);
+    for (const Facet& f : cache_) visit(f);
     return;
   }
-  ball_.moveTo(p);
-  for (int i = 0; (i = ball_.nextWithin(distance, i)) < ball_.size(); ++i) {
-    const Facet* const f = facetOf(ball_.name(i).object, ball_.name(i).triangle);
+  cache_.moveTo(p);
+  for (int i = 0; (i = cache_.nextWithin(distance, i)) < cache_.size(); ++i) {
+    const Facet* const f = facetOf(cache_.triangle(i).object, cache_.triangle(i).triangle);
     if (f != nullptr) visit(*f);
   }
 }

@@ -1,4 +1,4 @@
-#include "realtime/render/plane_set.h"
+#include "realtime/render/active_set.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,8 +14,8 @@ constexpr double kMinDeterminant = 1e-9;
 
 // Offsets relative to `from`: plane i asks n_i . y >= c_i of y = x - from. h is the target in the same frame.
 struct Problem {
-  const Vec3* normal[kMaxPlanes];
-  double c[kMaxPlanes];
+  const Vec3* normal[kMaxHalfSpaces];
+  double c[kMaxHalfSpaces];
   Vec3 h;
 };
 
@@ -114,16 +114,16 @@ struct Search {
 
 }  // namespace
 
-NearestPoint nearestAbove(const Plane* planes, int count, const Vec3& target, const Vec3& from,
+Projection projectOntoActiveSet(const HalfSpace* halfSpaces, int count, const Vec3& target, const Vec3& from,
                           double tolerance) noexcept {
   Problem problem;
   problem.h = target - from;
   for (int i = 0; i < count; ++i) {
-    problem.normal[i] = &planes[i].normal;
-    problem.c[i] = -planes[i].height(from);
+    problem.normal[i] = &halfSpaces[i].normal;
+    problem.c[i] = -halfSpaces[i].height(from);
   }
   Search search{problem, count, tolerance, {}};
-  NearestPoint result;
+  Projection result;
   if (!search.run()) {
     result.point = from;
     return result;
@@ -136,12 +136,12 @@ NearestPoint nearestAbove(const Plane* planes, int count, const Vec3& target, co
   return result;
 }
 
-void depthsBelow(const Plane* planes, int count, const Vec3& target, double* depths) noexcept {
+void depthsBelow(const HalfSpace* halfSpaces, int count, const Vec3& target, double* depths) noexcept {
   Problem problem;
   problem.h = Vec3::Zero();
   for (int i = 0; i < count; ++i) {
-    problem.normal[i] = &planes[i].normal;
-    problem.c[i] = -planes[i].height(target);
+    problem.normal[i] = &halfSpaces[i].normal;
+    problem.c[i] = -halfSpaces[i].height(target);
   }
   Candidate s;
   if (count == 1) solveOne(problem, 0, s);

@@ -15,15 +15,15 @@ namespace hapticd::realtime {
 using base::Nanos;
 
 /// One plane at this tick.
-struct HalfSpace {
+struct PlacedPlane {
   const scene::Plane* state = nullptr;
   Facet facet;             ///< unbounded, device metres; its object is -1 - its position
   scene::Surface surface;  ///< weaker while its owner's plane ramps out
-  double wayIn_m = 0;      ///< how deep the hand was inside when it was placed in this tick
+  double insertionDepth_m = 0;      ///< how deep the hand was inside when it was placed in this tick
 };
 
 /// All of them, with what is remembered from tick to tick. Fixed storage; noexcept, allocation-free.
-class HalfSpaces {
+class PlacedPlanes {
  public:
   /// Starts a tick: places the planes of `scene` under the hand.
   void place(const scene::SceneSnapshot& scene, Nanos now, const Vec3& hip, const Vec3& proxy,
@@ -32,9 +32,9 @@ class HalfSpaces {
   void remember(unsigned touched, const Vec3& proxy) noexcept;
   void reset() noexcept { memoryCount_ = 0; }
 
-  const HalfSpace* begin() const noexcept { return planes_.data(); }
-  const HalfSpace* end() const noexcept { return planes_.data() + count_; }
-  const HalfSpace& operator[](int i) const noexcept { return planes_[static_cast<std::size_t>(i)]; }
+  const PlacedPlane* begin() const noexcept { return planes_.data(); }
+  const PlacedPlane* end() const noexcept { return planes_.data() + count_; }
+  const PlacedPlane& operator[](int i) const noexcept { return planes_[static_cast<std::size_t>(i)]; }
 
   /// Force of the planes that hold on to a hand that leaves them; releases it where it pulls too hard.
   Vec3 adhesion(const Vec3& hip, double toolRadius_m) noexcept;
@@ -52,13 +52,13 @@ class HalfSpaces {
   };
 
   Memory& memoryOf(const scene::Plane& plane, Nanos now, double depth_m, bool& fresh) noexcept;
-  void forgetAllBut(const scene::SceneSnapshot& scene) noexcept;
+  void forgetAllExcept(const scene::SceneSnapshot& scene) noexcept;
   bool placeOne(const geometry::Affine& T_world_device, Nanos now, const Vec3& hip, const Vec3& proxy,
-                double toolRadius_m, HalfSpace& placed) noexcept;
+                double toolRadius_m, PlacedPlane& placed) noexcept;
   static double heightOf(const scene::Plane& plane, const Memory& memory, Nanos now, const Vec3& normal,
                          const Vec3& proxy, double metresPerUnit) noexcept;
 
-  std::array<HalfSpace, scene::kMaxPlanes> planes_;
+  std::array<PlacedPlane, scene::kMaxPlanes> planes_;
   int count_ = 0;
   std::array<Memory, scene::kMaxPlanes> memory_;
   int memoryCount_ = 0;
