@@ -6,13 +6,14 @@
 namespace hapticd::realtime {
 namespace {
 
-// Two normals closer than this (as |n1 x n2|^2), or three with a smaller determinant, cannot be told apart
-// from rounding; the solution that would need them differs from one with fewer planes by less than the
-// tolerance.
+// Two normals closer than this (as |n1 x n2|^2), or three with a smaller determinant, are dependent within
+// rounding; the solution that would need them differs by less than the tolerance from one with fewer
+// half-spaces.
 constexpr double kMinCrossSquared = 1e-12;
 constexpr double kMinDeterminant = 1e-9;
 
-// Offsets relative to `from`: plane i asks n_i . y >= c_i of y = x - from. h is the target in the same frame.
+// Relative to `from`: half-space i demands n_i . y >= c_i for y = x - from. h is the target in the same
+// frame.
 struct Problem {
   const Vec3* normal[kMaxHalfSpaces];
   double c[kMaxHalfSpaces];
@@ -36,7 +37,7 @@ bool solveOne(const Problem& p, int i, Candidate& out) {
   return true;
 }
 
-// Intersections by cross products rather than through the Gram matrix, whose condition is the square.
+// By cross products: the Gram matrix would square the condition number.
 bool solveTwo(const Problem& p, int i, int j, Candidate& out) {
   const Vec3& n1 = *p.normal[i];
   const Vec3& n2 = *p.normal[j];
@@ -71,7 +72,7 @@ bool solveThree(const Problem& p, int i, int j, int k, Candidate& out) {
   return out.multiplier[0] >= 0 && out.multiplier[1] >= 0 && out.multiplier[2] >= 0;
 }
 
-// Feasible and optimal at once is unique, so the first one found is the answer.
+// A candidate that is feasible and optimal is unique, so the first one is the answer.
 struct Search {
   const Problem& problem;
   int count;
@@ -115,7 +116,7 @@ struct Search {
 }  // namespace
 
 Projection projectOntoActiveSet(const HalfSpace* halfSpaces, int count, const Vec3& target, const Vec3& from,
-                          double tolerance) noexcept {
+                                double tolerance) noexcept {
   Problem problem;
   problem.h = target - from;
   for (int i = 0; i < count; ++i) {

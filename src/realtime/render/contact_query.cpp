@@ -12,12 +12,12 @@ using geometry::Mat3;
 using scene::ObjectState;
 
 constexpr double kRelativeSkin = 1e-9;      // of the largest coordinate of the object in the device frame
-constexpr double kPadShare = 0x1p-22;       // of the object's size: a quarter of the pad of its index
-constexpr double kRoundingFloor = 1e-12;    // of the largest coordinate: a thousand roundings
-constexpr double kSmallestObject_m = 1e-3;  // below this size the coordinates of the hand decide the rounding
-constexpr double kWiden = 1 + 1e-6;         // queries travel between frames with rounding
-constexpr double kReserveShare = 0.2;              // of the tool's radius: gathered in reserve
-constexpr int kReuseLimit = 32;                   // gathered facets that cost less than gathering anew
+constexpr double kPadShare = 0x1p-22;       // of the object's size: a quarter of the padding of its index
+constexpr double kRoundingFloor = 1e-12;    // of the largest coordinate: a thousand times its rounding error
+constexpr double kSmallestObject_m = 1e-3;  // below this size the HIP's coordinates dominate the rounding
+constexpr double kWiden = 1 + 1e-6;         // covers the rounding of queries that change frames
+constexpr double kReserveShare = 0.2;       // share of the tool radius that is gathered in reserve
+constexpr int kReuseLimit = 32;  // reuse the cached facets up to this count instead of querying again
 
 // An upper bound of the largest singular value, exact for similarities.
 double stretchOf(const Mat3& m) {
@@ -30,7 +30,7 @@ scene::Corners mapped(const Affine& t, const scene::Corners& c, bool mirrored) {
   return out;
 }
 
-// Parameter at which p + t d leaves the ball, at most 1. p is inside.
+// Parameter, at most 1, at which p + t d leaves the ball. p is inside.
 double exitOf(const Vec3& p, const Vec3& d, const Vec3& centre, double radius) {
   const Vec3 m = p - centre;
   if ((m + d).squaredNorm() <= radius * radius) return 1;
@@ -63,7 +63,8 @@ Vec3 PlacedObject::carried(const Vec3& p) const noexcept {
   return T_device_object * (T_device_objectBefore.inverse() * p);
 }
 
-void ContactQuery::beginTick(const SceneAtTime& now, const SceneAtTime& before, const PlacedPlanes* planes) noexcept {
+void ContactQuery::beginTick(const SceneAtTime& now, const SceneAtTime& before,
+                             const PlacedPlanes* planes) noexcept {
   now_ = now;
   planes_ = planes;
   before_ = before;
@@ -85,7 +86,8 @@ void ContactQuery::addObjectsNear(const Vec3& centre, double reach) noexcept {
   if (gatheredGeneration_ != generation_ || !sameObjects()) cache_.invalidate();
 }
 
-void ContactQuery::addObjectsByIndex(const scene::SceneSnapshot& scene, const Vec3& centre, double reach) noexcept {
+void ContactQuery::addObjectsByIndex(const scene::SceneSnapshot& scene, const Vec3& centre,
+                                     double reach) noexcept {
   const Affine& T_world_device = scene.workspace.T_world_device;
   const double worldReach = (reach + radius_) * kWiden * stretchOf(T_world_device.linear());
   std::array<std::uint32_t, kMaxObjects> found{};
@@ -97,7 +99,7 @@ void ContactQuery::addObjectsByIndex(const scene::SceneSnapshot& scene, const Ve
       found[count++] = i;
     }
   });
-  // By id, so that what happens to the proxy does not depend on the order of visits.
+  // By id, so that the proxy does not depend on the order of visits.
   std::sort(found.begin(), found.begin() + count);
   for (std::size_t k = 0; k < count; ++k) add(*scene.objects[found[k]]);
 }
@@ -146,7 +148,7 @@ bool ContactQuery::place(const ObjectState& state, PlacedObject& placed) const n
   placed.mirrored = determinant < 0;
   placed.T_object_device = placed.T_device_object.inverse();
   placed.stretch = stretchOf(placed.T_object_device.linear());
-  if (!std::isfinite(placed.stretch) || determinant == 0) return false;  // flattened: nothing to touch
+  if (!std::isfinite(placed.stretch) || determinant == 0) return false;  // flattened by its placement
   const Vec3 farthest =
       (placed.T_device_object * box.centre()).cwiseAbs() + linear.cwiseAbs() * (0.5 * box.extents());
   const double extent = std::max(farthest.maxCoeff(), kSmallestObject_m);
@@ -171,8 +173,8 @@ void ContactQuery::compareWithBefore(PlacedObject& placed) const noexcept {
   placed.jumped = !sameTriangles || before.motion.jumps() != state.motion.jumps();
 }
 
-// An object that will not move or bend any more in this scene has the same facets in each tick. Null for a
-// triangle that is none; valid until the next call.
+// Facets of objects at rest stay the same from tick to tick. Null for a degenerate triangle; valid until the
+// next call.
 const Facet* ContactQuery::facetOf(int i, std::uint32_t triangle) const noexcept {
   const PlacedObject& placed = object(i);
   MemoFacet& memo = facetMemo_[(triangle * 0x9E3779B1U) >> (32 - kMemoBits)];
@@ -195,7 +197,7 @@ bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
     gatheredFrom_[static_cast<std::size_t>(i)] = placed.state;
     reusable = reusable && placed.atRest && !placed.deformed;
     const Vec3 inObject = placed.T_object_device * centre;
-    // Deforming facets may have come from farther away.
+    // Deforming facets count at any distance: they may have come from farther away.
     const auto visit = [&](std::uint32_t triangle) noexcept {
       if (!cache_.complete()) return;
       if (radius_ > 0) {
@@ -215,7 +217,7 @@ bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
 
 bool ContactQuery::ensureGathered(const Vec3& centre, double radius) noexcept {
   const double reserve = kReserveShare * radius_;
-  // What a fast tick has gathered is too much for the slow ones after it.
+  // A fast tick gathers too many for the slow ticks after it.
   const bool smallEnough = cache_.size() <= kReuseLimit || cache_.reach() <= 2 * std::max(radius, reserve);
   if (smallEnough && cache_.covers(centre, radius)) return true;
   return (reserve > radius && gather(centre, reserve)) || gather(centre, radius);
@@ -238,8 +240,9 @@ bool ContactQuery::castAtFacet(const Facet& f, const Vec3& p, const Vec3& g, Obj
   return found;
 }
 
-// A total order on obstacles, so that the first one does not depend on the order of visits.
-void ContactQuery::considerFacet(const Facet& f, const Path& path, ObjectHit& best, bool& found) const noexcept {
+// A total order on hits, so that the first one does not depend on the order of visits.
+void ContactQuery::considerFacet(const Facet& f, const Path& path, ObjectHit& best,
+                                 bool& found) const noexcept {
   ObjectHit hit;
   const bool met = radius_ > 0 ? castBall(f, faces(), radius_, path.p, path.d, path.limit,
                                           found ? best.stop : path.limit, hit)
@@ -255,10 +258,10 @@ void ContactQuery::considerFacet(const Facet& f, const Path& path, ObjectHit& be
   found = true;
 }
 
-// visit returns the parameter in [0, 1] beyond which nothing more is wanted.
+// visit() returns the parameter in [0, 1] beyond which facets do not matter.
 template <class Visit>
 void ContactQuery::forEachOnSegment(const Vec3& p, const Vec3& d, double limit, int only,
-                              Visit&& visit) const noexcept {
+                                    Visit&& visit) const noexcept {
   if (only < 0 && planes_ != nullptr) {
     for (const PlacedPlane& plane : *planes_) visit(plane.facet);
   }
@@ -274,11 +277,13 @@ void ContactQuery::forEachOnSegment(const Vec3& p, const Vec3& d, double limit, 
   }
 }
 
-bool ContactQuery::castGathered(const Vec3& p, const Vec3& d, double limit, int only, ObjectHit& hit) noexcept {
-  return radius_ > 0 ? castBallGathered({p, d, limit}, only, hit) : castPointGathered({p, d, limit}, only, hit);
+bool ContactQuery::castGathered(const Vec3& p, const Vec3& d, double limit, int only,
+                                ObjectHit& hit) noexcept {
+  return radius_ > 0 ? castBallGathered({p, d, limit}, only, hit)
+                     : castPointGathered({p, d, limit}, only, hit);
 }
 
-// Two passes: how far the path is free of faces, then what has to stop it before, so that at the stop it is a
+// Two passes: the first finds how far the path is free of faces, the second stops it earlier, where it is a
 // skin above all of them.
 bool ContactQuery::castPointGathered(const Path& path, int only, ObjectHit& hit) noexcept {
   std::array<const Facet*, FacetCache::kMaxFacets + scene::kMaxPlanes> candidates;
@@ -313,7 +318,7 @@ bool ContactQuery::castBallGathered(const Path& path, int only, ObjectHit& hit) 
   if (only < 0 && planes_ != nullptr) {
     for (const PlacedPlane& plane : *planes_) considerFacet(plane.facet, path, hit, found);
   }
-  // What stopped it before will do so again: then nothing farther needs a closer look.
+  // The facet that blocked the last cast often blocks this one: then farther ones need no exact test.
   const int first = lastBlocker_;
   if (first < cache_.size()) considerGathered(first, path, only, hit, found);
   const double length = path.d.norm();
@@ -325,7 +330,8 @@ bool ContactQuery::castBallGathered(const Path& path, int only, ObjectHit& hit) 
   }
 }
 
-void ContactQuery::considerGathered(int i, const Path& path, int only, ObjectHit& best, bool& found) noexcept {
+void ContactQuery::considerGathered(int i, const Path& path, int only, ObjectHit& best,
+                                    bool& found) noexcept {
   const FacetCache::TriangleId& id = cache_.triangle(i);
   if (only >= 0 && id.object != only) return;
   const double touching = radius_ + 2 * cache_.maxSkin();
@@ -359,9 +365,10 @@ bool ContactQuery::castTree(const Vec3& p, const Vec3& d, int only, ObjectHit& h
   return found;
 }
 
-// The index has no query for a swept ball: gather along the path from `begin` on, in steps that grow while
-// nothing is in the way and shrink when the array overflows.
-bool ContactQuery::castBallInSteps(const Vec3& p, const Vec3& d, double begin, int only, ObjectHit& hit) noexcept {
+// The index has no query for a swept ball: gathers along the path from `begin` on, in steps that grow while
+// the path is free and shrink when the storage overflows.
+bool ContactQuery::castBallInSteps(const Vec3& p, const Vec3& d, double begin, int only,
+                                   ObjectHit& hit) noexcept {
   constexpr int kMaxSteps = 64;
   const double length = d.norm();
   double step = std::min(1.0, std::max(0.125 * radius_ / length, 1.0 / kMaxSteps));

@@ -17,7 +17,7 @@ Vec3 atMost(const Vec3& force, double limit) {
   return size > limit ? Vec3(force * (limit / size)) : force;
 }
 
-// Before it slips, the friction effect is a spring to its anchor; at its limit it drags the anchor along.
+// The friction effect is a spring to its anchor; at the force limit it drags the anchor along.
 Vec3 frictionForce(const Effect& effect, const Vec3& proxy, Vec3& anchor) {
   const Vec3 pull = effect.gain * (anchor - proxy);
   const Vec3 force = atMost(pull, effect.magnitude_N);
@@ -61,7 +61,7 @@ Vec3 Effects::forceOf(const Effect& effect, Running& r, const Affine& T_device_w
       return effect.inDeviceFrame ? force : Vec3(device.orientation * force);
     }
     case EffectType::contactVibration:
-      return effect.magnitude_N * std::sin(phase) * contact.normal;  // zero when free
+      return effect.magnitude_N * std::sin(phase) * contact.normal;  // zero without contact
   }
   return Vec3::Zero();
 }

@@ -1,4 +1,4 @@
-// The six force effects of the scene, each with its own clock; see docs/haptics.md for the laws.
+// The six force effects of the scene, each with its own start time. docs/haptics.md states the laws.
 #pragma once
 
 #include <array>
@@ -7,10 +7,10 @@
 
 namespace hapticd::realtime {
 
-/// Clocks and anchors of the running effects. Fixed storage; noexcept, allocation-free.
+/// Start times and anchors of the running effects. Servo thread: noexcept, no allocation.
 class Effects {
  public:
-  /// Sum of the forces of all running effects at `now`, device frame, newtons. `contact` has the proxy and
+  /// Sum of the forces of all running effects at `now`, device frame, newtons. `contact` holds the proxy and
   /// the surface normal of this tick.
   Vec3 force(const scene::SceneSnapshot& scene, const device::DeviceState& device, const Rendering& contact,
              Nanos now) noexcept;

@@ -7,7 +7,7 @@
 namespace hapticd::realtime {
 namespace {
 
-// In skins: at half a skin over a face a way is free of it; the rest is for rounding.
+// In skins: a path at half a skin above a face is free of it; the rest covers rounding.
 constexpr double kClear = 0.625;
 
 }  // namespace
@@ -41,7 +41,8 @@ void FacetCache::add(const TriangleId& id, double distance, double skin, bool de
   maxSkin_ = std::max(maxSkin_, skin);
 }
 
-int FacetCache::facetsNearPath(const Vec3& p, const Vec3& d, double limit, const Facet** found) const noexcept {
+int FacetCache::facetsNearPath(const Vec3& p, const Vec3& d, double limit,
+                               const Facet** found) const noexcept {
   const Vec3 displacement = limit * d;
   const double height = kClear * maxSkin_;
   int n = 0;
@@ -66,7 +67,7 @@ int FacetCache::nextWithin(double distance, int i) const noexcept {
   return i;
 }
 
-// The distance from a face is convex: nowhere less than its tangent.
+// The distance from a face is convex: its tangent is a lower bound.
 double FacetCache::lowerBound(int k, const Vec3& d) noexcept {
   const auto i = static_cast<std::size_t>(k);
   const double here = supportPlanes_[i].normal.dot(toolPosition_) - supportPlanes_[i].offset;

@@ -9,8 +9,8 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr double kLargest_N = 10;  // as VRPN's own server clamps
-constexpr double kRim = 0.1;       // of the radius, over which a field fades: its edge is no step
+constexpr double kLargest_N = 10;  // the limit of VRPN's own server
+constexpr double kRim = 0.1;  // share of the radius over which a field fades, so that its edge is no step
 
 Vec3 forceOf(const scene::ForceField& field, const Vec3& hip) noexcept {
   const Vec3 offset = hip - field.origin;
@@ -24,7 +24,7 @@ Vec3 forceOf(const scene::ForceField& field, const Vec3& hip) noexcept {
 
 }  // namespace
 
-// Fields have no number: one that ramps out is known by its origin.
+// Fields have no id: one that ramps out is identified by its origin.
 double Fields::left(const scene::ForceField& field, Nanos now) noexcept {
   if (!field.releasing) return 1;
   for (int i = 0; i < releasingCount_; ++i) {

@@ -9,13 +9,13 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr double kRelativeSkin = 1e-9;  // of the hand's own coordinates, metres
+constexpr double kRelativeSkin = 1e-9;  // of the largest coordinate of the HIP
 constexpr double kTau = 2 * M_PI;
 
 }  // namespace
 
 PlacedPlanes::Memory& PlacedPlanes::memoryOf(const scene::Plane& plane, Nanos now, double depth_m,
-                                         bool& fresh) noexcept {
+                                             bool& fresh) noexcept {
   const auto end = memory_.begin() + memoryCount_;
   const auto known =
       std::find_if(memory_.begin(), end, [&](const Memory& m) { return m.index == plane.index; });
@@ -31,15 +31,15 @@ PlacedPlanes::Memory& PlacedPlanes::memoryOf(const scene::Plane& plane, Nanos no
   return *known;
 }
 
-// How far the surface is above the plane itself, metres.
+// Height of the surface above the plane itself, metres.
 double PlacedPlanes::heightOf(const scene::Plane& plane, const Memory& memory, Nanos now, const Vec3& normal,
-                            const Vec3& proxy, double metresPerUnit) noexcept {
+                              const Vec3& proxy, double metresPerUnit) noexcept {
   const double age = base::toSeconds(now - memory.placed);
   const double recovery = base::toSeconds(plane.recovery);
   double height = 0;
   if (age < recovery) height -= memory.depth_m * (1 - age / recovery);
   if (plane.textureWavelength > 0) {
-    // Before the contact any point could become its centre, so the crest is what the hand meets.
+    // The first contact becomes the centre of the texture, so the HIP always meets a crest.
     const Vec3 offset = memory.touched ? Vec3(proxy - memory.firstContact) : Vec3(Vec3::Zero());
     const double r = (offset - normal * normal.dot(offset)).norm() / metresPerUnit;
     height += metresPerUnit * plane.textureAmplitude * std::cos(kTau * r / plane.textureWavelength);
@@ -48,7 +48,7 @@ double PlacedPlanes::heightOf(const scene::Plane& plane, const Memory& memory, N
   return height;
 }
 
-// Planes that are gone are new when they come back.
+// A plane that returns after it was removed counts as new.
 void PlacedPlanes::forgetAllExcept(const scene::SceneSnapshot& scene) noexcept {
   const auto isGone = [&](const Memory& m) {
     return std::none_of(scene.planes.begin(), scene.planes.end(),
@@ -59,7 +59,7 @@ void PlacedPlanes::forgetAllExcept(const scene::SceneSnapshot& scene) noexcept {
 }
 
 void PlacedPlanes::place(const scene::SceneSnapshot& scene, Nanos now, const Vec3& hip, const Vec3& proxy,
-                       double toolRadius_m) noexcept {
+                         double toolRadius_m) noexcept {
   const geometry::Affine& T_world_device = scene.workspace.T_world_device;
   forgetAllExcept(scene);
   count_ = 0;
@@ -74,7 +74,7 @@ void PlacedPlanes::place(const scene::SceneSnapshot& scene, Nanos now, const Vec
 }
 
 bool PlacedPlanes::placeOne(const geometry::Affine& T_world_device, Nanos now, const Vec3& hip,
-                          const Vec3& proxy, double toolRadius_m, PlacedPlane& placed) noexcept {
+                            const Vec3& proxy, double toolRadius_m, PlacedPlane& placed) noexcept {
   const scene::Plane& plane = *placed.state;
   const Vec3 slope = T_world_device.linear().transpose() * plane.normal;  // world units per metre
   const double unitsPerMetre = slope.norm();

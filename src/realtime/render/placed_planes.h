@@ -1,7 +1,7 @@
-// The planes of the scene that belong to no object: where each of them is at this tick.
+// The planes of the scene that belong to no object, as they are placed in this tick.
 //
-// A plane is a face without edges, always among the facets. What makes it more than that is kept here: a new
-// placement comes in under the hand, texture and buzz move it up and down, and adhesion holds on to the hand.
+// A plane is a facet without edges that every cast tests. This file adds the rest: a new placement rises
+// under the HIP, texture and buzz change its height, and adhesion pulls on a HIP that leaves.
 #pragma once
 
 #include <array>
@@ -14,21 +14,21 @@ namespace hapticd::realtime {
 
 using base::Nanos;
 
-/// One plane at this tick.
+/// One plane of the scene in this tick.
 struct PlacedPlane {
   const scene::Plane* state = nullptr;
-  Facet facet;             ///< unbounded, device metres; its object is -1 - its position
-  scene::Surface surface;  ///< weaker while its owner's plane ramps out
-  double insertionDepth_m = 0;      ///< how deep the hand was inside when it was placed in this tick
+  Facet facet;                  ///< unbounded, device metres; facet.object is -1 - index
+  scene::Surface surface;       ///< weaker while the plane ramps out
+  double insertionDepth_m = 0;  ///< depth of the HIP at the placement; 0 unless placed in this tick
 };
 
-/// All of them, with what is remembered from tick to tick. Fixed storage; noexcept, allocation-free.
+/// All planes, with their state from tick to tick. Servo thread: noexcept, no allocation.
 class PlacedPlanes {
  public:
-  /// Starts a tick: places the planes of `scene` under the hand.
+  /// Starts a tick: places the planes of `scene`. `hip` and `proxy` in device metres.
   void place(const scene::SceneSnapshot& scene, Nanos now, const Vec3& hip, const Vec3& proxy,
              double toolRadius_m) noexcept;
-  /// Ends it: `touched` has bit i set when plane i holds the proxy.
+  /// Ends a tick: bit i of `touched` is set when plane i holds the proxy.
   void remember(unsigned touched, const Vec3& proxy) noexcept;
   void reset() noexcept { memoryCount_ = 0; }
 
@@ -36,7 +36,7 @@ class PlacedPlanes {
   const PlacedPlane* end() const noexcept { return planes_.data() + count_; }
   const PlacedPlane& operator[](int i) const noexcept { return planes_[static_cast<std::size_t>(i)]; }
 
-  /// Force of the planes that hold on to a hand that leaves them; releases it where it pulls too hard.
+  /// Adhesive force on a HIP that leaves, device frame, newtons. A plane whose limit is exceeded lets go.
   Vec3 adhesion(const Vec3& hip, double toolRadius_m) noexcept;
 
  private:
@@ -45,7 +45,7 @@ class PlacedPlanes {
     std::uint32_t placement = 0;
     Nanos placed = 0;
     Nanos releaseBegin = -1;
-    double depth_m = 0;  ///< of the hand when it was placed
+    double depth_m = 0;  ///< of the HIP at the placement
     bool touched = false;
     bool adheres = false;
     Vec3 firstContact = Vec3::Zero();

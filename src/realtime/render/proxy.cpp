@@ -9,13 +9,13 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr int kReservedCasts = 32;             // of a tick, kept back for finding what holds it at the end
-constexpr double kRestick_m = 0.5e-6;      // slower than this in a tick is at rest
-constexpr double kBallConvergence = 1e-8;  // of the radius, in distance to the target
+constexpr int kReservedCasts = 32;         // per tick, reserved for finding the constraints at the end
+constexpr double kRestick_m = 0.5e-6;      // a shorter move in one tick counts as rest
+constexpr double kBallConvergence = 1e-8;  // share of the tool radius, in distance to the target
 
-// Depths of the HIP below the held faces as they really are, without the skin that keeps the proxy off them.
-// False when the proxy is not on all of them, jammed where they leave it no room: then no more than the
-// spring's length.
+// Depths of the HIP below the faces themselves, without the skin that keeps the proxy off them. False when
+// the proxy is jammed between faces that leave it no room and so does not lie on all of them; the depths are
+// then scaled to the length of the spring at most.
 bool depthsOf(const ObjectHit* hits, int count, double toolRadius_m, const Vec3& spring, const Vec3& hip,
               double* depths) {
   std::array<HalfSpace, kMaxActive> halfSpaces;
@@ -34,7 +34,7 @@ bool depthsOf(const ObjectHit* hits, int count, double toolRadius_m, const Vec3&
 }  // namespace
 
 const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double period_s,
-                          std::uint32_t& status) noexcept {
+                                std::uint32_t& status) noexcept {
   now_ = now;
   period_s_ = period_s;
   casts_ = 0;
@@ -91,7 +91,7 @@ bool Proxy::frictionless() const noexcept {
   return true;
 }
 
-// What friction at a contactSet can bear, as a length of the spring.
+// The friction bound of a contact set, as a length of the spring.
 Proxy::FrictionCone Proxy::frictionConeOf(const ContactSet& contactSet) noexcept {
   FrictionCone cone;
   double adhesion = 0;
@@ -100,7 +100,8 @@ Proxy::FrictionCone Proxy::frictionConeOf(const ContactSet& contactSet) noexcept
     const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
     const double force = constraint.surface.stiffness_N_per_m * constraint.depth_m;
     cone.sticking_m += force * constraint.surface.static_friction;
-    cone.sliding_m += force * std::min(constraint.surface.dynamic_friction, constraint.surface.static_friction);
+    cone.sliding_m +=
+        force * std::min(constraint.surface.dynamic_friction, constraint.surface.static_friction);
     adhesion += constraint.adhesion_N;
     weight += force;
   }
@@ -112,7 +113,8 @@ Proxy::FrictionCone Proxy::frictionConeOf(const ContactSet& contactSet) noexcept
   return cone;
 }
 
-// Sticks, or slides until friction bears the rest.
+// The proxy sticks while friction bears the lateral part; otherwise it slides until friction bears what is
+// left.
 void Proxy::updateProxy(const Vec3& hip) noexcept {
   ActiveSet active;
   if (frictionless()) {
@@ -136,13 +138,14 @@ void Proxy::updateProxy(const Vec3& hip) noexcept {
   contactSet_.sliding = moved;
 }
 
-// To the target as near as the surfaces let it, without friction. Each approach drops the planes of the one
-// before, so that only what really stands in the way holds the proxy; it ends when that brings it no nearer.
+// Moves as near to the target as the surfaces allow. Each approach starts with an empty active set, so that
+// only faces that block the path hold the proxy; the move ends when an approach brings it no nearer.
 void Proxy::moveFrictionless(const Vec3& target, ActiveSet& active) noexcept {
   const double skin = query_.minSkin();
-  // A point comes to rest on planes in finitely many approaches; a ball on edges and corners only converges.
+  // A point comes to rest on planes after finitely many approaches; a ball on edges and corners only
+  // converges.
   const double gain = std::max(1e-4 * skin, kBallConvergence * query_.toolRadius());
-  // A proxy within the skin is first put back outside.
+  // Allows for a proxy within the skin, which the first approach moves outwards.
   double nearest = (position_ - target).norm() + 4 * skin;
   Vec3 step = Vec3::Zero();
   while (casts_ < kMaxCasts) {
@@ -168,7 +171,7 @@ void Proxy::moveFrictionless(const Vec3& target, ActiveSet& active) noexcept {
   }
 }
 
-// Finds what holds the proxy where it is; moves it only as long as nothing does.
+// Finds the constraints at the proxy; moves it only while there is none.
 void Proxy::findConstraints(const Vec3& hip, ActiveSet& active) noexcept {
   active.count = 0;
   Vec3 goal = hip;
@@ -176,8 +179,9 @@ void Proxy::findConstraints(const Vec3& hip, ActiveSet& active) noexcept {
   updateContactSet(hip, goal, active);
 }
 
-// One approach with planes gathered on the way. `goal` is the point nearest to the target above them. With
-// `hold`, the first plane stops it. True when the target was reached and nothing holds.
+// One approach: collects half-spaces on the path. `goal` becomes the point nearest to the target above them.
+// With `stopAtFirst` the proxy stays at the first one. True when the proxy reached the target and the set is
+// empty.
 bool Proxy::approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Vec3& goal) noexcept {
   const double skin = query_.minSkin();
   const int limit = stopAtFirst ? kMaxCasts + kReservedCasts : kMaxCasts;
@@ -186,7 +190,8 @@ bool Proxy::approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Ve
     for (int i = 0; i < active.count; ++i) {
       halfSpaces[static_cast<std::size_t>(i)] = active.hits[static_cast<std::size_t>(i)].halfSpace;
     }
-    const Projection nearest = projectOntoActiveSet(halfSpaces.data(), active.count, target, position_, skin / 16);
+    const Projection nearest =
+        projectOntoActiveSet(halfSpaces.data(), active.count, target, position_, skin / 16);
     goal = nearest.point;
     if (!nearest.found) break;  // jammed
     const ActiveSet all = active;
@@ -199,7 +204,7 @@ bool Proxy::approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Ve
     if (displacement.norm() <= 1e-3 * skin) return active.count == 0;
     ++casts_;
     ObjectHit hit;
-    // What holds the proxy besides is where it is, not far on the way.
+    // Further constraints are at the proxy: the start of the path is enough.
     const bool held = stopAtFirst && active.count > 0;
     if (!(held ? query_.castWithinGathered(position_, goal, hit) : query_.cast(position_, goal, hit))) {
       if (held) return false;
@@ -209,10 +214,12 @@ bool Proxy::approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Ve
     const double move = hit.stop * displacement.norm();
     if (held && move > skin) return false;
     if (!stopAtFirst || move > skin) position_ += hit.stop * displacement;
-    if (!query_.isGathered(position_)) query_.ensureGathered(position_, 1.5 * expectedTravel_m_ + kGatherMargin_m);
+    if (!query_.isGathered(position_)) {
+      query_.ensureGathered(position_, 1.5 * expectedTravel_m_ + kGatherMargin_m);
+    }
     active.hits[static_cast<std::size_t>(active.count++)] = hit;
   }
-  // Without a solution for all of them: what held before the newcomer.
+  // No solution for all of them: keep the set before the newest one.
   active.count = std::clamp(active.count - 1, std::min(active.count, 1), kMaxActive);
   return false;
 }
@@ -257,15 +264,15 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
   if (count == 0) popthroughArmed_ = true;
 }
 
-// Pressed too hard, the proxy steps through the faces that hold it and goes on to the hand.
+// Above the popthrough force, the proxy steps through the faces that hold it and moves on to the HIP.
 void Proxy::popThrough(const Vec3& hip, std::uint32_t& status) noexcept {
   if (!popthroughArmed_) return;
   bool pressed = false;
   for (int i = 0; i < contactSet_.count; ++i) {
     const ContactConstraint& constraint = contactSet_.constraints[static_cast<std::size_t>(i)];
     const scene::Surface& surface = constraint.surface;
-    pressed = pressed ||
-              (surface.popthrough_N > 0 && surface.stiffness_N_per_m * constraint.depth_m > surface.popthrough_N);
+    pressed = pressed || (surface.popthrough_N > 0 &&
+                          surface.stiffness_N_per_m * constraint.depth_m > surface.popthrough_N);
   }
   if (!pressed) return;
   const Vec3 direction = -contactSet_.normal_m.normalized();
@@ -286,12 +293,12 @@ void Proxy::applyForceShading() noexcept {
     ContactConstraint& constraint = contactSet_.constraints[static_cast<std::size_t>(i)];
     if (constraint.source < 0) continue;
     const Vec3 at = position_ - query_.toolRadius() * constraint.halfSpace.normal;
-    constraint.forceDirection =
-        shadedNormal(query_.object(constraint.source), constraint.triangle, now_.time, constraint.halfSpace.normal, at);
+    constraint.forceDirection = shadedNormal(query_.object(constraint.source), constraint.triangle, now_.time,
+                                             constraint.halfSpace.normal, at);
   }
 }
 
-// A first contact this deep did not come from a hand's motion.
+// A first contact this deep does not come from motion of the HIP.
 void Proxy::releaseWhenDeep(bool wasFree, std::uint32_t& status) noexcept {
   if (contactSet_.count == 0) {
     released_ = false;

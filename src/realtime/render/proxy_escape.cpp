@@ -1,5 +1,5 @@
-// How the proxy goes on where the method of planes does not see the way: off a corner whose faces end there,
-// and along what is round.
+// Moves that half-spaces cannot show: past a corner where the faces end but their planes do not, and along
+// round surfaces.
 #include <algorithm>
 #include <cmath>
 #include <tuple>
@@ -11,28 +11,29 @@ namespace {
 
 constexpr double kTouching = 256;  // in skins: planes at their skins meet that far from a sharp corner
 constexpr double kLifts[] = {4, 4 * kTouching};
-constexpr double kMinDescent = 1e-3;  // of the pull; flatter ways end where they begin
-constexpr double kClimb = 1e-3;       // of the radius
+constexpr double kMinDescent = 1e-3;  // share of the pull; flatter directions lead nowhere
+constexpr double kClimb = 1e-3;       // share of the tool radius
 
 }  // namespace
 
-// DescentDirections down from a place among a few faces.
+// The faces that the proxy touches, and the directions in which it could come nearer to its target.
 struct Proxy::DescentDirections {
   static constexpr int kMaxFaces = 32;
   static constexpr int kMaxDirections = 4 * kMaxFaces + 9;
 
-  std::array<Facet, kMaxFaces> faces;  // copies: what is gathered changes on the way
+  std::array<Facet, kMaxFaces> faces;  // copies: later casts may gather others
   int faceCount = 0;
   std::array<Vec3, kMaxDirections> directions;
   int count = 0;
-  Vec3 outward = Vec3::Zero();  // away from the faces
+  Vec3 outward = Vec3::Zero();  // sum of the normals
 
   void add(const Vec3& direction, double shortest) {
-    if (count < kMaxDirections && direction.norm() > shortest) directions[static_cast<std::size_t>(count++)] = direction;
+    if (count == kMaxDirections || !(direction.norm() > shortest)) return;
+    directions[static_cast<std::size_t>(count++)] = direction;
   }
 };
 
-// The faces that the tool touches, by their numbers, so that nothing depends on the order of visits.
+// Sorted by id, so that the result does not depend on the order of visits.
 void Proxy::collectTouchedFaces(DescentDirections& descent) noexcept {
   const auto before = [this](const Facet& a, const Facet& b) {
     return std::tuple(query_.object(a.object).state->id, a.triangle) <
@@ -44,7 +45,8 @@ void Proxy::collectTouchedFaces(DescentDirections& descent) noexcept {
     if (std::abs(f.normal.dot(position_ - f.a)) > touching) return;
     if ((position_ - nearestPointOf(f, position_)).norm() > touching) return;
     if (descent.faceCount == DescentDirections::kMaxFaces && before(descent.faces.back(), f)) return;
-    int k = descent.faceCount < DescentDirections::kMaxFaces ? descent.faceCount++ : DescentDirections::kMaxFaces - 1;
+    int k = descent.faceCount < DescentDirections::kMaxFaces ? descent.faceCount++
+                                                             : DescentDirections::kMaxFaces - 1;
     for (; k > 0 && before(f, descent.faces[static_cast<std::size_t>(k - 1)]); --k) {
       descent.faces[static_cast<std::size_t>(k)] = descent.faces[static_cast<std::size_t>(k - 1)];
     }
@@ -52,15 +54,17 @@ void Proxy::collectTouchedFaces(DescentDirections& descent) noexcept {
   });
 }
 
-// The steepest way down in a room bounded by faces is the pull laid on a face, or an edge between two.
-void Proxy::findDescentDirections(const Vec3& pull, const ActiveSet& active, DescentDirections& descent) const noexcept {
+// The direction of steepest descent among faces is the pull projected onto one face, or onto the edge between
+// two.
+void Proxy::findDescentDirections(const Vec3& pull, const ActiveSet& active,
+                                  DescentDirections& descent) const noexcept {
   const double shortest = kMinDescent * pull.norm();
   const Vec3 p = position_;
   for (int i = 0; i < descent.faceCount; ++i) {
     const Facet& f = descent.faces[static_cast<std::size_t>(i)];
     const Vec3 foot = nearestPointOf(f, p);
     const Vec3 n = query_.toolRadius() > 0 ? Vec3((p - foot).normalized())
-                                            : Vec3(f.normal.dot(p - f.a) < 0 ? -f.normal : f.normal);
+                                           : Vec3(f.normal.dot(p - f.a) < 0 ? -f.normal : f.normal);
     descent.outward += n;
     descent.add(pull - n * n.dot(pull), shortest);
     const std::array<Vec3, 3> corners{f.a, f.b, f.c};
@@ -79,13 +83,14 @@ void Proxy::findDescentDirections(const Vec3& pull, const ActiveSet& active, Des
       if (along.norm() > 0) descent.add(along * (along.dot(pull) / along.squaredNorm()), shortest);
     }
   }
-  std::sort(descent.directions.begin(), descent.directions.begin() + descent.count, [](const Vec3& a, const Vec3& b) {
-    return std::tuple(-a.squaredNorm(), a.x(), a.y(), a.z()) <
-           std::tuple(-b.squaredNorm(), b.x(), b.y(), b.z());
-  });
+  std::sort(descent.directions.begin(), descent.directions.begin() + descent.count,
+            [](const Vec3& a, const Vec3& b) {
+              return std::tuple(-a.squaredNorm(), a.x(), a.y(), a.z()) <
+                     std::tuple(-b.squaredNorm(), b.x(), b.y(), b.z());
+            });
 }
 
-// How far, 0 … 1, the faces at hand leave the way free.
+// The share, 0 … 1, of the path that the touched faces leave free.
 double Proxy::freeShare(const DescentDirections& descent, const Vec3& from, const Vec3& to) const noexcept {
   double free = 1;
   ObjectHit hit;
@@ -96,13 +101,16 @@ double Proxy::freeShare(const DescentDirections& descent, const Vec3& from, cons
   return free;
 }
 
-// Planes hold the proxy, but the faces of some of them may end where it is, and beyond there is room that no
-// plane shows. Looks among the faces that really are there for a way that brings it nearer, and goes it.
+// The half-spaces hold the proxy, but some of their faces may end at this corner, with free space beyond.
+// Searches the touched faces for a free direction that brings the proxy nearer to the target, and moves along
+// it.
 bool Proxy::escapeCorner(const Vec3& target, const ActiveSet& active) noexcept {
   const double skin = query_.minSkin();
   const Vec3 pull = target - position_;
   const double enough = pull.norm() - 2 * kLifts[0] * skin;
-  if (!query_.isGathered(position_)) query_.ensureGathered(position_, 1.5 * expectedTravel_m_ + kGatherMargin_m);
+  if (!query_.isGathered(position_)) {
+    query_.ensureGathered(position_, 1.5 * expectedTravel_m_ + kGatherMargin_m);
+  }
   if (!query_.isGathered(position_)) return false;
   DescentDirections descent;
   collectTouchedFaces(descent);
@@ -128,9 +136,8 @@ bool Proxy::escapeCorner(const Vec3& target, const ActiveSet& active) noexcept {
   return false;
 }
 
-// A ball nears its rest on edges and corners in many small steps that point the same way: takes the last one
-// again before the next approach, so that they double. The way is straight and the room is round: it may
-// climb a little.
+// A ball converges on edges and corners in many small steps of one direction. Repeating the last step before
+// the next approach doubles them. The step is straight and the free space is round, so it may climb a little.
 void Proxy::extrapolateStep(const Vec3& step, const Vec3& target) noexcept {
   const Vec3 pull = target - position_;
   const double farthest = pull.norm() + kClimb * query_.toolRadius();

@@ -1,4 +1,4 @@
-// How the proxy goes along with geometry that moves, bends, vanishes or comes in.
+// How the proxy follows geometry that moves, deforms, disappears or appears.
 #include <algorithm>
 #include <limits>
 #include <tuple>
@@ -13,12 +13,12 @@ constexpr int kMaxPushes = 8;
 
 }  // namespace
 
-// The proxy stays where it touched the object, however that moved or bent.
+// The proxy stays at its place on the touched object, however that moved or deformed.
 void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
   if (contactSet_.count > 0) {
     const int touched = query_.addObject(touchedObject_);
     if (touchedObject_ < 0) {
-      // A plane stays where it is.
+      // Planes do not move along themselves.
     } else if (touched < 0) {
       status |= kRenderGeometryJump;
     } else {
@@ -34,8 +34,9 @@ void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
       }
     }
   }
-  // All that happens in this tick is at most this far from the HIP.
-  query_.addObjectsNear(hip, std::max((position_ - hip).norm(), (positionBefore_ - hip).norm()) + kGatherMargin_m);
+  // The proxy stays within this distance of the HIP during the tick.
+  query_.addObjectsNear(hip,
+                        std::max((position_ - hip).norm(), (positionBefore_ - hip).norm()) + kGatherMargin_m);
 }
 
 Vec3 Proxy::carriedBy(const PlacedObject& object, std::uint32_t triangle, const Vec3& p) const noexcept {
@@ -46,7 +47,8 @@ Vec3 Proxy::carriedBy(const PlacedObject& object, std::uint32_t triangle, const 
       !makeFacet(object.corners(triangle, now_.time), 0, now)) {
     return object.carried(p);
   }
-  // makeFacet turns the corners by the longest edge, which may differ: take them as they come.
+  // makeFacet() reorders the corners by the longest edge, which may differ between ticks: use the original
+  // order.
   const scene::Corners t = object.cornersBefore(triangle, before_.time);
   const scene::Corners n = object.corners(triangle, now_.time);
   geometry::Mat3 frame;
@@ -55,8 +57,8 @@ Vec3 Proxy::carriedBy(const PlacedObject& object, std::uint32_t triangle, const 
   return n.a + local.x() * (n.b - n.a) + local.y() * (n.c - n.a) + local.z() * now.normal;
 }
 
-// Geometry that passed over the proxy takes it along: cast in the frame of what moved, from where the proxy
-// was in it to where it is now.
+// Geometry that passed over the proxy takes it along: a cast in the frame of the moving object, from the
+// previous place of the proxy in that frame to the present one.
 void Proxy::push(const Vec3& from, std::uint32_t& status) noexcept {
   const bool carried = position_ != from;
   bool deforming = false;
@@ -85,7 +87,7 @@ void Proxy::push(const Vec3& from, std::uint32_t& status) noexcept {
   pushByPlanes(status);
 }
 
-// Behind a plane there is nothing to be in: it takes the proxy to its front.
+// The back of a plane is solid without end: move the proxy to the front.
 void Proxy::pushByPlanes(std::uint32_t& status) noexcept {
   for (const PlacedPlane& plane : planes_) {
     const HalfSpace face{plane.facet.normal, plane.facet.a, query_.toolRadius() + plane.facet.skin};
@@ -99,8 +101,8 @@ void Proxy::pushByPlanes(std::uint32_t& status) noexcept {
   }
 }
 
-// The same for each face in its own frame; of several faces the one that passed farthest pushes first. Their
-// boxes hold all of the way that they bend, so that `reach` is what the placement and the proxy add to it.
+// As push(), for each face in its own frame; the face that passed farthest pushes first. The boxes of the
+// index cover the whole deformation, so `reach` need only add the motion of the placement and of the proxy.
 void Proxy::pushByDeformingFaces(const Vec3& from, double reach, std::uint32_t& status) noexcept {
   for (int k = 0; k < kMaxPushes; ++k) {
     if (!query_.gather(position_, reach + kGatherMargin_m)) status |= kRenderCandidateLimit;

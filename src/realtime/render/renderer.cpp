@@ -11,7 +11,7 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr double kShortestPeriod_s = 1e-5;  // a repeated time stamp must not make speeds infinite
+constexpr double kShortestPeriod_s = 1e-5;  // keeps speeds finite when a time stamp repeats
 
 }  // namespace
 
@@ -44,8 +44,8 @@ void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState
     return;
   }
   const double radius = s.options.toolRadius_m;
-  const ContactSet& contactSet = s.proxy.follow({&scene, now}, hip,
-                                    std::max(base::toSeconds(period), kShortestPeriod_s), out.status);
+  const ContactSet& contactSet =
+      s.proxy.follow({&scene, now}, hip, std::max(base::toSeconds(period), kShortestPeriod_s), out.status);
   out.proxy_m = out.scp_m = s.proxy.position();
   if ((out.status & kRenderReleased) == 0) {
     applySurfaceLaw(contactSet, out.proxy_m, device.velocity_m_per_s, radius, out);

@@ -5,22 +5,22 @@
 namespace hapticd::realtime {
 namespace {
 
-// What one touched face adds.
+// The part of one face.
 struct ContactShare {
   Contact* contact = nullptr;
-  double normal_N = 0;    // with damping
-  double spring_N = 0;    // without
-  double friction_N = 0;  // bound by the spring's force
+  double normal_N = 0;    // spring and damper
+  double spring_N = 0;    // spring alone
+  double friction_N = 0;  // bound that follows from the spring's force
 };
 
-// Spring and damper along the normal; the damper may take from the spring but the surface never pulls.
+// Spring and damper along the normal. The damper may reduce the force, but the surface never pulls.
 double normalForce(const ContactConstraint& constraint, const Vec3& hipVelocity) {
   const scene::Surface& surface = constraint.surface;
   const double leaving = constraint.halfSpace.normal.dot(hipVelocity - constraint.surfaceVelocity_m_per_s);
   return std::max(0.0, surface.stiffness_N_per_m * constraint.depth_m - surface.damping_Ns_per_m * leaving);
 }
 
-// The faces of one object are one contact.
+// All faces of one object make one contact.
 Contact& contactWith(std::int32_t object, Rendering& out) {
   Contact* const end = out.contacts.data() + out.contactCount;
   Contact* const known =
@@ -35,9 +35,9 @@ Contact& contactWith(std::int32_t object, Rendering& out) {
 
 using ContactShares = std::array<ContactShare, kMaxActive>;
 
-// Of the faces of an object, the one that pushes hardest says where it is touched.
-void addNormalForces(const ContactSet& contactSet, const Vec3& proxy_m, const Vec3& hipVelocity, double toolRadius_m,
-             ContactShares& shares, Rendering& out) {
+// The face with the largest force gives point and normal of its object's contact.
+void addNormalForces(const ContactSet& contactSet, const Vec3& proxy_m, const Vec3& hipVelocity,
+                     double toolRadius_m, ContactShares& shares, Rendering& out) {
   Vec3 unshaded = Vec3::Zero();
   for (int i = 0; i < contactSet.count; ++i) {
     const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
@@ -45,8 +45,8 @@ void addNormalForces(const ContactSet& contactSet, const Vec3& proxy_m, const Ve
     share.contact = &contactWith(constraint.object, out);
     share.normal_N = normalForce(constraint, hipVelocity);
     share.spring_N = constraint.surface.stiffness_N_per_m * constraint.depth_m;
-    share.friction_N =
-        share.spring_N * (contactSet.sliding ? constraint.surface.dynamic_friction : constraint.surface.static_friction);
+    share.friction_N = share.spring_N * (contactSet.sliding ? constraint.surface.dynamic_friction
+                                                            : constraint.surface.static_friction);
     share.contact->force_N += share.normal_N * constraint.forceDirection;
     out.normalForce_N += share.normal_N * constraint.forceDirection;
     unshaded += share.normal_N * constraint.halfSpace.normal;
@@ -61,7 +61,7 @@ void addNormalForces(const ContactSet& contactSet, const Vec3& proxy_m, const Ve
     }
     if (std::none_of(shares.data(), &share, harder)) out.touchedObject = constraint.object;
   }
-  // Shading turns the force and keeps its size.
+  // Force shading turns the force and keeps its magnitude.
   const double shaded = out.normalForce_N.norm();
   if (!(shaded > 0)) return;
   const double kept = unshaded.norm() / shaded;
@@ -69,7 +69,7 @@ void addNormalForces(const ContactSet& contactSet, const Vec3& proxy_m, const Ve
   for (std::uint32_t i = 0; i < out.contactCount; ++i) out.contacts[i].force_N *= kept;
 }
 
-// Friction and adhesion hold the proxy back; each face bears its part of their bound.
+// Friction and adhesion act along the lateral part; each face bears its share of their bound.
 void addTangentialForces(const ContactSet& contactSet, const ContactShares& shares, Rendering& out) {
   Vec3 spring = Vec3::Zero();
   double friction = 0;
@@ -92,7 +92,8 @@ void addTangentialForces(const ContactSet& contactSet, const ContactShares& shar
   const Vec3 force = contactSet.lateral_m * (std::min(stiffness * stretch, limit) / stretch);
   for (int i = 0; i < contactSet.count; ++i) {
     const ContactShare& share = shares[static_cast<std::size_t>(i)];
-    const double held = share.friction_N * perFriction + contactSet.constraints[static_cast<std::size_t>(i)].adhesion_N;
+    const double held =
+        share.friction_N * perFriction + contactSet.constraints[static_cast<std::size_t>(i)].adhesion_N;
     share.contact->force_N += held / limit * force;
   }
   out.contactForce_N += force;
@@ -106,7 +107,8 @@ void applySurfaceLaw(const ContactSet& contactSet, const Vec3& proxy_m, const Ve
   ContactShares shares;
   addNormalForces(contactSet, proxy_m, hipVelocity_m_per_s, toolRadius_m, shares, out);
   Vec3 inward = Vec3::Zero();
-  for (int i = 0; i < contactSet.count; ++i) inward += contactSet.constraints[static_cast<std::size_t>(i)].halfSpace.normal;
+  for (int i = 0; i < contactSet.count; ++i)
+    inward += contactSet.constraints[static_cast<std::size_t>(i)].halfSpace.normal;
   out.touching = true;
   out.depth_m = contactSet.normal_m.norm();
   out.normal = (out.depth_m > 0 ? contactSet.normal_m : inward).normalized();

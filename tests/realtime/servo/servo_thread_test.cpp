@@ -231,7 +231,7 @@ TEST(ThreadSetup, ShortTurnsChangeNeitherPolicyNorNiceness) {
   std::thread([] {
     setpriority(PRIO_PROCESS, 0, 3);
     const bool canBeChosen = turnsCanBeChosen();
-    askShortTurns();
+    requestShortTimeSlice();
     EXPECT_EQ(sched_getscheduler(0) & ~SCHED_RESET_ON_FORK, SCHED_OTHER);
     EXPECT_EQ(getpriority(PRIO_PROCESS, 0), 3);
     if (canBeChosen) {
