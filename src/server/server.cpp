@@ -205,7 +205,7 @@ void Server::run() {
         [this] { loop_.stop(); }));
   }
   startPlaying();
-  realtime::askShortTurns();  // reports are to leave at once, whatever else the machine does
+  realtime::requestShortTimeSlice();  // reports are to leave at once, whatever else the machine does
   loop_.run();
   if (player_) player_->stop();
   for (const auto& station : stations_) station->stop();

@@ -57,11 +57,5 @@ TEST(Weld, LeavesVerticesThatAreNoNumbersAlone) {
   EXPECT_EQ(mesh.triangles[0], (Triangle{0, 1, 2}));
 }
 
-TEST(Time, ConversionRoundsToTheNearestNanosecond) {
-  EXPECT_EQ(toNanos(0.001), 1'000'000);
-  EXPECT_EQ(toNanos(-0.001), -1'000'000);
-  EXPECT_DOUBLE_EQ(toSeconds(1'500'000'000), 1.5);
-}
-
 }  // namespace
 }  // namespace hapticd::geometry

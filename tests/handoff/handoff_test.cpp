@@ -14,6 +14,8 @@
 namespace hapticd::handoff {
 namespace {
 
+using scene::SnapshotSlot;
+
 #ifdef HAPTICD_SANITIZED
 constexpr int kRounds = 20'000;
 #else

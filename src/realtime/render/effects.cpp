@@ -17,7 +17,7 @@ Vec3 atMost(const Vec3& force, double limit) {
   return size > limit ? Vec3(force * (limit / size)) : force;
 }
 
-// Before it slips, the friction effect is a spring to its anchor; at its limit it drags the anchor along.
+// The friction effect is a spring to its anchor; at the force limit it drags the anchor along.
 Vec3 frictionForce(const Effect& effect, const Vec3& proxy, Vec3& anchor) {
   const Vec3 pull = effect.gain * (anchor - proxy);
   const Vec3 force = atMost(pull, effect.magnitude_N);
@@ -45,28 +45,28 @@ void Effects::forgetUnseen() noexcept {
 }
 
 Vec3 Effects::forceOf(const Effect& effect, Running& r, const Affine& T_device_world,
-                      const device::DeviceState& hand, const Rendering& contact, Nanos now) noexcept {
+                      const device::DeviceState& device, const Rendering& contact, Nanos now) noexcept {
   const double phase = effect.angularFrequency_rad_per_s * base::toSeconds(now - r.begin);
   switch (effect.type) {
     case EffectType::constant:
-      return effect.magnitude_N * turned(T_device_world, effect.direction).stableNormalized();
+      return effect.magnitude_N * rotated(T_device_world, effect.direction).stableNormalized();
     case EffectType::spring:
       return atMost(effect.gain * (T_device_world * effect.position - contact.proxy_m), effect.magnitude_N);
     case EffectType::viscous:
-      return atMost(-effect.gain * hand.velocity_m_per_s, effect.magnitude_N);
+      return atMost(-effect.gain * device.velocity_m_per_s, effect.magnitude_N);
     case EffectType::friction:
       return frictionForce(effect, contact.proxy_m, r.anchor);
     case EffectType::motorVibration: {
       const Vec3 force = effect.magnitude_N * Vec3(std::cos(phase), std::sin(phase), 0);
-      return effect.inDeviceFrame ? force : Vec3(hand.orientation * force);
+      return effect.inDeviceFrame ? force : Vec3(device.orientation * force);
     }
     case EffectType::contactVibration:
-      return effect.magnitude_N * std::sin(phase) * contact.normal;  // zero when free
+      return effect.magnitude_N * std::sin(phase) * contact.normal;  // zero without contact
   }
   return Vec3::Zero();
 }
 
-Vec3 Effects::force(const scene::SceneSnapshot& scene, const device::DeviceState& hand,
+Vec3 Effects::force(const scene::SceneSnapshot& scene, const device::DeviceState& device,
                     const Rendering& contact, Nanos now) noexcept {
   for (int i = 0; i < count_; ++i) running_[static_cast<std::size_t>(i)].seen = false;
   const Affine& T_device_world = scene.workspace.T_device_world;
@@ -76,9 +76,9 @@ Vec3 Effects::force(const scene::SceneSnapshot& scene, const device::DeviceState
     if (r == nullptr) continue;
     r->seen = true;
     if (effect.duration > 0 && now - r->begin >= effect.duration) continue;
-    Vec3 force = forceOf(effect, *r, T_device_world, hand, contact, now);
+    Vec3 force = forceOf(effect, *r, T_device_world, device, contact, now);
     if (effect.releasing && r->releaseBegin < 0) r->releaseBegin = now;
-    if (r->releaseBegin >= 0) force *= shareLeft(r->releaseBegin, now);
+    if (r->releaseBegin >= 0) force *= remainingShare(r->releaseBegin, now);
     sum += force;
   }
   forgetUnseen();

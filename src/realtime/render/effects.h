@@ -1,4 +1,4 @@
-// The six force effects of the scene, each with its own clock; see docs/haptics.md for the laws.
+// The six force effects of the scene, each with its own start time. docs/haptics.md states the laws.
 #pragma once
 
 #include <array>
@@ -7,12 +7,12 @@
 
 namespace hapticd::realtime {
 
-/// Clocks and anchors of the running effects. Fixed storage; noexcept, allocation-free.
+/// Start times and anchors of the running effects. Servo thread: noexcept, no allocation.
 class Effects {
  public:
-  /// Sum of the forces of all running effects at `now`, device frame, newtons. `contact` has the proxy and
+  /// Sum of the forces of all running effects at `now`, device frame, newtons. `contact` holds the proxy and
   /// the surface normal of this tick.
-  Vec3 force(const scene::SceneSnapshot& scene, const device::DeviceState& hand, const Rendering& contact,
+  Vec3 force(const scene::SceneSnapshot& scene, const device::DeviceState& device, const Rendering& contact,
              Nanos now) noexcept;
 
   void reset() noexcept { count_ = 0; }
@@ -30,7 +30,7 @@ class Effects {
   };
 
   static Vec3 forceOf(const scene::Effect& effect, Running& r, const Affine& T_device_world,
-                      const device::DeviceState& hand, const Rendering& contact, Nanos now) noexcept;
+                      const device::DeviceState& device, const Rendering& contact, Nanos now) noexcept;
   Running* running(const scene::Effect& effect, Nanos now, const Vec3& proxy) noexcept;
   void forgetUnseen() noexcept;
 

@@ -8,12 +8,12 @@ namespace {
 
 using scene::TouchableFaces;
 
-constexpr double kPasses = 2;            // a parameter behind the end of every path
-constexpr double kMargin = 0.25;         // in skins; see the head of facet.h
-constexpr double kCrossingSlack = 1e-6;  // error of a height, in skins, with a factor of ten to spare
-constexpr double kThinness = 1e-3;       // below this height to length, the normal is cleaned up
+constexpr double kPasses = 2;            // a parameter beyond the end of every path
+constexpr double kMargin = 0.25;         // in skins; see facet.h
+constexpr double kCrossingSlack = 1e-6;  // ten times the error of a height, in skins
+constexpr double kThinness = 1e-3;       // ratio of height to length below which the normal is corrected
 
-// Not below the edge u-v by more than the margin, seen along the normal; no square root.
+// Inside the edge u-v or at most `margin` outside, seen along the normal; without a square root.
 inline bool withinEdge(const Facet& f, const Vec3& u, const Vec3& v, const Vec3& q, double margin) {
   const Vec3 e = v - u;
   const double inside = f.normal.cross(e).dot(q - u);
@@ -26,7 +26,7 @@ inline bool overFacet(const Facet& f, const Vec3& q, double margin) {
       !withinEdge(f, f.c, f.a, q, margin)) {
     return false;
   }
-  // The widened sides of a needle meet far beyond its ends: cut it there.
+  // The widened sides of a needle meet far beyond its ends: cut them off there.
   const Vec3 e = f.b - f.a;
   const double along = e.dot(q - f.a);
   const double length2 = e.squaredNorm();
@@ -34,7 +34,7 @@ inline bool overFacet(const Facet& f, const Vec3& q, double margin) {
   return along >= -slack && along <= length2 + slack;
 }
 
-// The side of a facet that faces the path's start, and the heights of both ends over it.
+// The side of a facet that faces the start of the path, and the heights of both ends above it.
 struct Heights {
   double sign = 1;
   double start = 0;
@@ -72,7 +72,7 @@ bool makeFacet(const scene::Corners& corners, double skin, Facet& f) noexcept {
   if (!(area2 * area2 > skin * skin * longest2) || !std::isfinite(area2)) return false;
   n /= area2;
   if (area2 < kThinness * longest2) {
-    // The rounding of a needle's normal must turn it about the needle, where it does no harm.
+    // Let rounding turn the normal of a needle only about its long axis, where it does no harm.
     n -= edge * (n.dot(edge) / longest2);
     n.normalize();
   }
@@ -81,10 +81,11 @@ bool makeFacet(const scene::Corners& corners, double skin, Facet& f) noexcept {
   return true;
 }
 
-double reach(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d, double limit) noexcept {
+double crossingParameter(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d,
+                         double limit) noexcept {
   Heights h;
   if (!touchableSide(f, faces, p, d, limit, h) || !(h.end < 0.5 * f.skin)) return kPasses;
-  // The deepest point over the face: where the path goes through it, else the end.
+  // The deepest point above the face: the crossing, or else the end of the path.
   double t = limit;
   double margin = kMargin * f.skin;
   if (h.end < 0) {
@@ -95,16 +96,16 @@ double reach(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d,
   return overFacet(f, p + t * d, margin) ? t : kPasses;
 }
 
-bool meet(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d, double limit,
-          Meeting& out) noexcept {
-  if (reach(f, faces, p, d, limit) > 1) return false;
+bool castPoint(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d, double limit,
+               CastHit& out) noexcept {
+  if (crossingParameter(f, faces, p, d, limit) > 1) return false;
   Heights h;
   touchableSide(f, faces, p, d, limit, h);
   const double fall = h.start - h.end;
-  if (!(fall > 0) && limit < 1) return false;  // on its way out; where it would have ended is not known
+  if (!(fall > 0) && limit < 1) return false;  // it moves away, and the end of the full path is not known
   out.stop = fall > 0 ? limit * std::clamp((h.start - f.skin) / fall, 0.0, 1.0) : 0.0;
   out.depth = f.skin - h.end;
-  out.plane = {h.sign * f.normal, f.a, f.skin};
+  out.halfSpace = {h.sign * f.normal, f.a, f.skin};
   return true;
 }
 
@@ -114,11 +115,11 @@ double distanceBound(const scene::Corners& k, const Vec3& x) noexcept {
       std::max({(k.a - centre).squaredNorm(), (k.b - centre).squaredNorm(), (k.c - centre).squaredNorm()});
   const Vec3 normal = (k.b - k.a).cross(k.c - k.a);
   const double normal2 = normal.squaredNorm();
-  const Vec3 way = x - centre;
-  const double up = normal.dot(way);
-  // The normal of a needle says little.
+  const Vec3 offset = x - centre;
+  const double up = normal.dot(offset);
+  // The normal of a needle is not reliable.
   const double up2 = normal2 > kThinness * kThinness * radius2 * radius2 ? up * up / normal2 : 0.0;
-  const double aside = std::sqrt(std::max(0.0, way.squaredNorm() - up2)) - std::sqrt(radius2);
+  const double aside = std::sqrt(std::max(0.0, offset.squaredNorm() - up2)) - std::sqrt(radius2);
   return aside > 0 ? std::sqrt(up2 + aside * aside) : std::sqrt(up2);
 }
 
@@ -146,17 +147,17 @@ Vec3 nearestPointOf(const Facet& f, const Vec3& x) noexcept {
   if (va <= 0 && d4 >= d3 && d5 >= d6) {
     return f.b + (f.c - f.b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
   }
-  // Over the face the foot of the perpendicular is more exact than barycentric weights.
+  // Above the face, the foot of the perpendicular is more precise than barycentric weights.
   return x - f.normal * f.normal.dot(ax);
 }
 
-bool meetBall(const Facet& f, TouchableFaces faces, double radius, const Vec3& p, const Vec3& d, double limit,
-              double latest, Meeting& out) noexcept {
+bool castBall(const Facet& f, TouchableFaces faces, double radius, const Vec3& p, const Vec3& d, double limit,
+              double latest, CastHit& out) noexcept {
   const double standoff = radius + f.skin;
   Heights h;
   if (!touchableSide(f, faces, p, d, limit, h) || !(h.end < standoff)) return false;
-  // The distance to a convex set is convex along a line: Newton's steps from the near end never pass the
-  // first root, and where the slope is not negative there is none.
+  // The distance to a convex set is convex along a line: Newton's steps from the start never pass the first
+  // root, and without a negative slope there is none.
   const double contact = standoff - 0.5 * f.skin;
   const double fine = 1e-3 * f.skin;
   double t = 0;

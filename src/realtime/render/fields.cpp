@@ -9,14 +9,14 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr double kLargest_N = 10;  // as VRPN's own server clamps
-constexpr double kRim = 0.1;       // of the radius, over which a field fades: its edge is no step
+constexpr double kLargest_N = 10;  // the limit of VRPN's own server
+constexpr double kRim = 0.1;  // share of the radius over which a field fades, so that its edge is no step
 
-Vec3 forceOf(const scene::ForceField& field, const Vec3& x) noexcept {
-  const Vec3 way = x - field.origin;
-  const double distance = way.norm();
+Vec3 forceOf(const scene::ForceField& field, const Vec3& hip) noexcept {
+  const Vec3 offset = hip - field.origin;
+  const double distance = offset.norm();
   if (!(distance < field.radius)) return Vec3::Zero();
-  const Vec3 force = field.force_N + field.jacobian_N_per_unit * way;
+  const Vec3 force = field.force_N + field.jacobian_N_per_unit * offset;
   const double clamp = std::min(1.0, kLargest_N / std::max(force.norm(), 1e-300));
   const double fade = std::min(1.0, (field.radius - distance) / (kRim * field.radius));
   return clamp * fade * force;
@@ -24,14 +24,14 @@ Vec3 forceOf(const scene::ForceField& field, const Vec3& x) noexcept {
 
 }  // namespace
 
-// Fields have no number: one that ramps out is known by its origin.
+// Fields have no id: one that ramps out is identified by its origin.
 double Fields::left(const scene::ForceField& field, Nanos now) noexcept {
   if (!field.releasing) return 1;
   for (int i = 0; i < releasingCount_; ++i) {
     Releasing& r = releasing_[static_cast<std::size_t>(i)];
     if (r.origin != field.origin) continue;
     r.seen = true;
-    return shareLeft(r.begin, now);
+    return remainingShare(r.begin, now);
   }
   if (releasingCount_ == kMaxReleasing) return 0;
   releasing_[static_cast<std::size_t>(releasingCount_++)] = {field.origin, now, true};
@@ -47,7 +47,7 @@ Vec3 Fields::buzz(const scene::Buzz& b, Nanos now) noexcept {
   }
   if (b.releasing && buzzReleaseBegin_ < 0) buzzReleaseBegin_ = now;
   if (now - buzzBegin_ >= b.duration) return Vec3::Zero();
-  const double share = buzzReleaseBegin_ < 0 ? 1 : shareLeft(buzzReleaseBegin_, now);
+  const double share = buzzReleaseBegin_ < 0 ? 1 : remainingShare(buzzReleaseBegin_, now);
   return share * std::sin(b.angularFrequency_rad_per_s * base::toSeconds(now - buzzBegin_)) * b.force_N;
 }
 
@@ -58,10 +58,10 @@ Vec3 Fields::force(const scene::SceneSnapshot& scene, const Vec3& hip, Nanos now
     return Vec3::Zero();
   }
   for (Releasing& r : releasing_) r.seen = false;
-  const Vec3 x = scene.workspace.T_world_device * hip;
+  const Vec3 hipInWorld = scene.workspace.T_world_device * hip;
   Vec3 sum = Vec3::Zero();  // world frame
   for (const scene::ForceField& field : scene.fields) {
-    sum += left(field, now) * forceOf(field, x);
+    sum += left(field, now) * forceOf(field, hipInWorld);
   }
   const auto end = std::remove_if(releasing_.begin(), releasing_.begin() + releasingCount_,
                                   [](const Releasing& r) { return !r.seen; });
@@ -71,7 +71,7 @@ Vec3 Fields::force(const scene::SceneSnapshot& scene, const Vec3& hip, Nanos now
   } else {
     buzzing_ = false;
   }
-  return turned(scene.workspace.T_device_world, sum);
+  return rotated(scene.workspace.T_device_world, sum);
 }
 
 }  // namespace hapticd::realtime

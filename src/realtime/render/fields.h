@@ -1,4 +1,4 @@
-// Forces that depend on where the hand is and on nothing that it touches: force fields and the buzz.
+// Forces that depend on the HIP and not on contact: force fields and the buzz (custom effect 0).
 #pragma once
 
 #include <array>
@@ -11,10 +11,10 @@ namespace hapticd::realtime {
 using base::Nanos;
 using geometry::Vec3;
 
-/// Clocks of the fields that ramp out and of the buzz. Fixed storage; noexcept, allocation-free.
+/// Start times of the buzz and of fields that ramp out. Servo thread: noexcept, no allocation.
 class Fields {
  public:
-  /// Their sum at the HIP, device frame, newtons.
+  /// Sum of all forces at the HIP (device metres), device frame, newtons.
   Vec3 force(const scene::SceneSnapshot& scene, const Vec3& hip, Nanos now) noexcept;
   void reset() noexcept { *this = Fields{}; }
 

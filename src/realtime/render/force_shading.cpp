@@ -7,10 +7,10 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr double kSharp = 0.7;  // cosine: what turns by more than 45 degrees is an edge that is meant
+constexpr double kSharp = 0.7;  // cosine of 45 degrees: sharper edges stay edges
 
-// Mean normal of the faces that meet at a corner and go on smoothly from the touched one, whose normal is
-// `face`. Corners are known by their place, so that unwelded ones count.
+// Mean normal of the faces that meet at a corner and continue smoothly from the touched one, whose normal is
+// `face`. Corners are identified by position, so that unwelded meshes work.
 Vec3 cornerNormal(const PlacedObject& object, const Vec3& face, const Vec3& corner, Nanos now) {
   const scene::MeshGeometry& mesh = *object.state->mesh;
   Vec3 sum = Vec3::Zero();
@@ -24,7 +24,7 @@ Vec3 cornerNormal(const PlacedObject& object, const Vec3& face, const Vec3& corn
       sum += std::acos(std::clamp((b - a).normalized().dot((c - a).normalized()), -1.0, 1.0)) * f.normal;
     };
     add(inObject.a, k.a, k.b, k.c);
-    // A mirrored placement swaps the other two.
+    // A mirrored placement swaps the other two corners.
     add(object.mirrored ? inObject.c : inObject.b, k.b, k.c, k.a);
     add(object.mirrored ? inObject.b : inObject.c, k.c, k.a, k.b);
   });

@@ -1,14 +1,14 @@
-// Force shading: the force of a face turns smoothly from corner to corner, as light does on a shaded one
-// (Morgenbesser & Srinivasan 1996). Its size and the proxy stay as they are.
+// Force shading: the direction of a face's force varies smoothly from corner to corner, as in Phong shading
+// (Morgenbesser & Srinivasan 1996). The magnitude and the proxy do not change.
 #pragma once
 
-#include "realtime/render/nearby.h"
+#include "realtime/render/contact_query.h"
 
 namespace hapticd::realtime {
 
-/// The direction of the force at point `at` of a touched triangle, device frame: the corner normals, each the
-/// mean of the faces around it by their angles, weighted by nearness. Faces beyond a sharp edge do not count.
-/// `normal` is the face's own, on the touched side.
+/// Unit direction of the force at point `at` of a touched triangle, device frame: the corner normals with
+/// barycentric weights. A corner normal is the mean of the faces around it, weighted by their angles, without
+/// faces beyond a sharp edge. `normal` is the face's own, on the touched side. noexcept, no allocation.
 Vec3 shadedNormal(const PlacedObject& object, std::uint32_t triangle, Nanos now, const Vec3& normal,
                   const Vec3& at) noexcept;
 

@@ -1,5 +1,5 @@
-// How the proxy goes on where the method of planes does not see the way: off a corner whose faces end there,
-// and along what is round.
+// Moves that half-spaces cannot show: past a corner where the faces end but their planes do not, and along
+// round surfaces.
 #include <algorithm>
 #include <cmath>
 #include <tuple>
@@ -11,115 +11,123 @@ namespace {
 
 constexpr double kTouching = 256;  // in skins: planes at their skins meet that far from a sharp corner
 constexpr double kLifts[] = {4, 4 * kTouching};
-constexpr double kMinDescent = 1e-3;  // of the pull; flatter ways end where they begin
-constexpr double kClimb = 1e-3;       // of the radius
+constexpr double kMinDescent = 1e-3;  // share of the pull; flatter directions lead nowhere
+constexpr double kClimb = 1e-3;       // share of the tool radius
 
 }  // namespace
 
-// Ways down from a place among a few faces.
-struct Proxy::Ways {
+// The faces that the proxy touches, and the directions in which it could come nearer to its target.
+struct Proxy::DescentDirections {
   static constexpr int kMaxFaces = 32;
-  static constexpr int kMaxWays = 4 * kMaxFaces + 9;
+  static constexpr int kMaxDirections = 4 * kMaxFaces + 9;
 
-  std::array<Facet, kMaxFaces> faces;  // copies: what is gathered changes on the way
+  std::array<Facet, kMaxFaces> faces;  // copies: later casts may gather others
   int faceCount = 0;
-  std::array<Vec3, kMaxWays> ways;
+  std::array<Vec3, kMaxDirections> directions;
   int count = 0;
-  Vec3 out = Vec3::Zero();  // away from the faces
+  Vec3 outward = Vec3::Zero();  // sum of the normals
 
-  void add(const Vec3& way, double shortest) {
-    if (count < kMaxWays && way.norm() > shortest) ways[static_cast<std::size_t>(count++)] = way;
+  void add(const Vec3& direction, double shortest) {
+    if (count == kMaxDirections || !(direction.norm() > shortest)) return;
+    directions[static_cast<std::size_t>(count++)] = direction;
   }
 };
 
-// The faces that the tool touches, by their numbers, so that nothing depends on the order of visits.
-void Proxy::findFaces(Ways& ways) noexcept {
+// Sorted by id, so that the result does not depend on the order of visits.
+void Proxy::collectTouchedFaces(DescentDirections& descent) noexcept {
   const auto before = [this](const Facet& a, const Facet& b) {
-    return std::tuple(nearby_.object(a.object).state->id, a.triangle) <
-           std::tuple(nearby_.object(b.object).state->id, b.triangle);
+    return std::tuple(query_.object(a.object).state->id, a.triangle) <
+           std::tuple(query_.object(b.object).state->id, b.triangle);
   };
-  const double farthest = nearby_.toolRadius() + kTouching * nearby_.thickestSkin();
-  nearby_.forEachGathered(position_, farthest, [&](const Facet& f) {
-    const double touching = nearby_.toolRadius() + kTouching * f.skin;
+  const double farthest = query_.toolRadius() + kTouching * query_.maxSkin();
+  query_.forEachGathered(position_, farthest, [&](const Facet& f) {
+    const double touching = query_.toolRadius() + kTouching * f.skin;
     if (std::abs(f.normal.dot(position_ - f.a)) > touching) return;
     if ((position_ - nearestPointOf(f, position_)).norm() > touching) return;
-    if (ways.faceCount == Ways::kMaxFaces && before(ways.faces.back(), f)) return;
-    int k = ways.faceCount < Ways::kMaxFaces ? ways.faceCount++ : Ways::kMaxFaces - 1;
-    for (; k > 0 && before(f, ways.faces[static_cast<std::size_t>(k - 1)]); --k) {
-      ways.faces[static_cast<std::size_t>(k)] = ways.faces[static_cast<std::size_t>(k - 1)];
+    if (descent.faceCount == DescentDirections::kMaxFaces && before(descent.faces.back(), f)) return;
+    int k = descent.faceCount < DescentDirections::kMaxFaces ? descent.faceCount++
+                                                             : DescentDirections::kMaxFaces - 1;
+    for (; k > 0 && before(f, descent.faces[static_cast<std::size_t>(k - 1)]); --k) {
+      descent.faces[static_cast<std::size_t>(k)] = descent.faces[static_cast<std::size_t>(k - 1)];
     }
-    ways.faces[static_cast<std::size_t>(k)] = f;
+    descent.faces[static_cast<std::size_t>(k)] = f;
   });
 }
 
-// The steepest way down in a room bounded by faces is the pull laid on a face, or an edge between two.
-void Proxy::findWays(const Vec3& pull, const ActiveSet& active, Ways& ways) const noexcept {
+// The direction of steepest descent among faces is the pull projected onto one face, or onto the edge between
+// two.
+void Proxy::findDescentDirections(const Vec3& pull, const ActiveSet& active,
+                                  DescentDirections& descent) const noexcept {
   const double shortest = kMinDescent * pull.norm();
   const Vec3 p = position_;
-  for (int i = 0; i < ways.faceCount; ++i) {
-    const Facet& f = ways.faces[static_cast<std::size_t>(i)];
+  for (int i = 0; i < descent.faceCount; ++i) {
+    const Facet& f = descent.faces[static_cast<std::size_t>(i)];
     const Vec3 foot = nearestPointOf(f, p);
-    const Vec3 n = nearby_.toolRadius() > 0 ? Vec3((p - foot).normalized())
-                                            : Vec3(f.normal.dot(p - f.a) < 0 ? -f.normal : f.normal);
-    ways.out += n;
-    ways.add(pull - n * n.dot(pull), shortest);
+    const Vec3 n = query_.toolRadius() > 0 ? Vec3((p - foot).normalized())
+                                           : Vec3(f.normal.dot(p - f.a) < 0 ? -f.normal : f.normal);
+    descent.outward += n;
+    descent.add(pull - n * n.dot(pull), shortest);
     const std::array<Vec3, 3> corners{f.a, f.b, f.c};
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec3 edge = (corners[(k + 1) % 3] - corners[k]).normalized();
       const bool onEdge = edge.cross(foot - corners[k]).norm() <= kTouching * f.skin;
-      if (onEdge) ways.add(edge * edge.dot(pull), shortest);
+      if (onEdge) descent.add(edge * edge.dot(pull), shortest);
     }
   }
   for (int i = 0; i < active.count; ++i) {
-    const Vec3& n = active.hits[static_cast<std::size_t>(i)].plane.normal;
-    ways.out += n;
-    ways.add(pull - n * n.dot(pull), shortest);
+    const Vec3& n = active.hits[static_cast<std::size_t>(i)].halfSpace.normal;
+    descent.outward += n;
+    descent.add(pull - n * n.dot(pull), shortest);
     for (int k = 0; k < i; ++k) {
-      const Vec3 along = n.cross(active.hits[static_cast<std::size_t>(k)].plane.normal);
-      if (along.norm() > 0) ways.add(along * (along.dot(pull) / along.squaredNorm()), shortest);
+      const Vec3 along = n.cross(active.hits[static_cast<std::size_t>(k)].halfSpace.normal);
+      if (along.norm() > 0) descent.add(along * (along.dot(pull) / along.squaredNorm()), shortest);
     }
   }
-  std::sort(ways.ways.begin(), ways.ways.begin() + ways.count, [](const Vec3& a, const Vec3& b) {
-    return std::tuple(-a.squaredNorm(), a.x(), a.y(), a.z()) <
-           std::tuple(-b.squaredNorm(), b.x(), b.y(), b.z());
-  });
+  std::sort(descent.directions.begin(), descent.directions.begin() + descent.count,
+            [](const Vec3& a, const Vec3& b) {
+              return std::tuple(-a.squaredNorm(), a.x(), a.y(), a.z()) <
+                     std::tuple(-b.squaredNorm(), b.x(), b.y(), b.z());
+            });
 }
 
-// How far, 0 … 1, the faces at hand leave the way free.
-double Proxy::freeAmong(const Ways& ways, const Vec3& from, const Vec3& to) const noexcept {
+// The share, 0 … 1, of the path that the touched faces leave free.
+double Proxy::freeShare(const DescentDirections& descent, const Vec3& from, const Vec3& to) const noexcept {
   double free = 1;
-  Hit hit;
-  for (int i = 0; i < ways.faceCount; ++i) {
-    if (nearby_.meets(ways.faces[static_cast<std::size_t>(i)], from, to, hit))
+  ObjectHit hit;
+  for (int i = 0; i < descent.faceCount; ++i) {
+    if (query_.castAtFacet(descent.faces[static_cast<std::size_t>(i)], from, to, hit))
       free = std::min(free, hit.stop);
   }
   return free;
 }
 
-// Planes hold the proxy, but the faces of some of them may end where it is, and beyond there is room that no
-// plane shows. Looks among the faces that really are there for a way that brings it nearer, and goes it.
-bool Proxy::escape(const Vec3& target, const ActiveSet& active) noexcept {
-  const double skin = nearby_.finestSkin();
+// The half-spaces hold the proxy, but some of their faces may end at this corner, with free space beyond.
+// Searches the touched faces for a free direction that brings the proxy nearer to the target, and moves along
+// it.
+bool Proxy::escapeCorner(const Vec3& target, const ActiveSet& active) noexcept {
+  const double skin = query_.minSkin();
   const Vec3 pull = target - position_;
   const double enough = pull.norm() - 2 * kLifts[0] * skin;
-  if (!nearby_.gathered(position_)) nearby_.surround(position_, 1.5 * stride_m_ + kGatherMargin_m);
-  if (!nearby_.gathered(position_)) return false;
-  Ways ways;
-  findFaces(ways);
-  findWays(pull, active, ways);
-  if (!(ways.out.norm() > 0)) return false;
+  if (!query_.isGathered(position_)) {
+    query_.ensureGathered(position_, 1.5 * expectedTravel_m_ + kGatherMargin_m);
+  }
+  if (!query_.isGathered(position_)) return false;
+  DescentDirections descent;
+  collectTouchedFaces(descent);
+  findDescentDirections(pull, active, descent);
+  if (!(descent.outward.norm() > 0)) return false;
   for (const double lift : kLifts) {
-    const Vec3 start = position_ + lift * skin * ways.out.normalized();
-    if (freeAmong(ways, position_, start) < 1) continue;
-    for (int i = 0; i < ways.count && casts_ < kMaxCasts; ++i) {
-      const Vec3& way = ways.ways[static_cast<std::size_t>(i)];
-      const double free = freeAmong(ways, start, start + way);
-      if (!((target - start - free * way).norm() < enough)) continue;
-      Hit hit;
+    const Vec3 start = position_ + lift * skin * descent.outward.normalized();
+    if (freeShare(descent, position_, start) < 1) continue;
+    for (int i = 0; i < descent.count && casts_ < kMaxCasts; ++i) {
+      const Vec3& direction = descent.directions[static_cast<std::size_t>(i)];
+      const double free = freeShare(descent, start, start + direction);
+      if (!((target - start - free * direction).norm() < enough)) continue;
+      ObjectHit hit;
       ++casts_;
-      if (nearby_.cast(position_, start, hit)) break;
+      if (query_.cast(position_, start, hit)) break;
       ++casts_;
-      const Vec3 end = start + (nearby_.cast(start, start + way, hit) ? hit.stop : 1.0) * way;
+      const Vec3 end = start + (query_.cast(start, start + direction, hit) ? hit.stop : 1.0) * direction;
       if (!((target - end).norm() < enough)) continue;
       position_ = end;
       return true;
@@ -128,19 +136,18 @@ bool Proxy::escape(const Vec3& target, const ActiveSet& active) noexcept {
   return false;
 }
 
-// A ball nears its rest on edges and corners in many small steps that point the same way: takes the last one
-// again before the next approach, so that they double. The way is straight and the room is round: it may
-// climb a little.
-void Proxy::leap(const Vec3& stride, const Vec3& target) noexcept {
+// A ball converges on edges and corners in many small steps of one direction. Repeating the last step before
+// the next approach doubles them. The step is straight and the free space is round, so it may climb a little.
+void Proxy::extrapolateStep(const Vec3& step, const Vec3& target) noexcept {
   const Vec3 pull = target - position_;
-  const double farthest = pull.norm() + kClimb * nearby_.toolRadius();
-  const double a = stride.squaredNorm();
-  const double b = stride.dot(pull);
+  const double farthest = pull.norm() + kClimb * query_.toolRadius();
+  const double a = step.squaredNorm();
+  const double b = step.dot(pull);
   const double c = pull.squaredNorm() - farthest * farthest;
-  const Vec3 way = std::min((b + std::sqrt(b * b - a * c)) / a, 1.0) * stride;
-  Hit hit;
+  const Vec3 displacement = std::min((b + std::sqrt(b * b - a * c)) / a, 1.0) * step;
+  ObjectHit hit;
   ++casts_;
-  position_ += (nearby_.cast(position_, position_ + way, hit) ? hit.stop : 1.0) * way;
+  position_ += (query_.cast(position_, position_ + displacement, hit) ? hit.stop : 1.0) * displacement;
 }
 
 }  // namespace hapticd::realtime

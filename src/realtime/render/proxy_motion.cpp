@@ -1,4 +1,4 @@
-// How the proxy goes along with geometry that moves, bends, vanishes or comes in.
+// How the proxy follows geometry that moves, deforms, disappears or appears.
 #include <algorithm>
 #include <limits>
 #include <tuple>
@@ -13,16 +13,16 @@ constexpr int kMaxPushes = 8;
 
 }  // namespace
 
-// The proxy stays where it touched the object, however that moved or bent.
+// The proxy stays at its place on the touched object, however that moved or deformed.
 void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
-  if (grip_.count > 0) {
-    const int touched = nearby_.includeObject(touchedObject_);
+  if (contactSet_.count > 0) {
+    const int touched = query_.addObject(touchedObject_);
     if (touchedObject_ < 0) {
-      // A plane stays where it is.
+      // Planes do not move along themselves.
     } else if (touched < 0) {
       status |= kRenderGeometryJump;
     } else {
-      const PlacedObject& object = nearby_.object(touched);
+      const PlacedObject& object = query_.object(touched);
       const Vec3 carried = carriedBy(object, touchedTriangle_, position_);
       if (object.jumped) status |= kRenderGeometryJump;
       if ((carried - position_).norm() <= kJump_m) {
@@ -30,12 +30,13 @@ void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
       } else {
         status |= kRenderGeometryJump;
         position_ = hip;
-        grip_ = Grip{};
+        contactSet_ = ContactSet{};
       }
     }
   }
-  // All that happens in this tick is at most this far from the HIP.
-  nearby_.include(hip, std::max((position_ - hip).norm(), (positionBefore_ - hip).norm()) + kGatherMargin_m);
+  // The proxy stays within this distance of the HIP during the tick.
+  query_.addObjectsNear(hip,
+                        std::max((position_ - hip).norm(), (positionBefore_ - hip).norm()) + kGatherMargin_m);
 }
 
 Vec3 Proxy::carriedBy(const PlacedObject& object, std::uint32_t triangle, const Vec3& p) const noexcept {
@@ -46,7 +47,8 @@ Vec3 Proxy::carriedBy(const PlacedObject& object, std::uint32_t triangle, const 
       !makeFacet(object.corners(triangle, now_.time), 0, now)) {
     return object.carried(p);
   }
-  // makeFacet turns the corners by the longest edge, which may differ: take them as they come.
+  // makeFacet() reorders the corners by the longest edge, which may differ between ticks: use the original
+  // order.
   const scene::Corners t = object.cornersBefore(triangle, before_.time);
   const scene::Corners n = object.corners(triangle, now_.time);
   geometry::Mat3 frame;
@@ -55,64 +57,64 @@ Vec3 Proxy::carriedBy(const PlacedObject& object, std::uint32_t triangle, const 
   return n.a + local.x() * (n.b - n.a) + local.y() * (n.c - n.a) + local.z() * now.normal;
 }
 
-// Geometry that passed over the proxy takes it along: cast in the frame of what moved, from where the proxy
-// was in it to where it is now.
+// Geometry that passed over the proxy takes it along: a cast in the frame of the moving object, from the
+// previous place of the proxy in that frame to the present one.
 void Proxy::push(const Vec3& from, std::uint32_t& status) noexcept {
   const bool carried = position_ != from;
   bool deforming = false;
   double reach = 0;
-  for (int i = 0; i < nearby_.objectCount(); ++i) {
-    const PlacedObject& object = nearby_.object(i);
+  for (int i = 0; i < query_.objectCount(); ++i) {
+    const PlacedObject& object = query_.object(i);
     if (object.deformed) {
       deforming = true;
       reach = std::max(reach, (object.carried(from) - position_).norm());
     }
     if (!(object.moved || carried) || object.deformed || object.jumped || object.before == nullptr) continue;
     const Vec3 start = object.carried(from);
-    const Vec3 way = position_ - start;
-    if (way.norm() > kJump_m) {
+    const Vec3 displacement = position_ - start;
+    if (displacement.norm() > kJump_m) {
       status |= kRenderGeometryJump;
       continue;
     }
-    Hit hit;
-    if (way.squaredNorm() > 0 && nearby_.castAt(i, start, position_, hit)) {
-      position_ = start + hit.stop * way;
-      stride_m_ += way.norm();
+    ObjectHit hit;
+    if (displacement.squaredNorm() > 0 && query_.castAtObject(i, start, position_, hit)) {
+      position_ = start + hit.stop * displacement;
+      expectedTravel_m_ += displacement.norm();
       touchedObject_ = object.state->id;
     }
   }
-  if (deforming) pushByDeforming(from, reach, status);
+  if (deforming) pushByDeformingFaces(from, reach, status);
   pushByPlanes(status);
 }
 
-// Behind a plane there is nothing to be in: it takes the proxy to its front.
+// The back of a plane is solid without end: move the proxy to the front.
 void Proxy::pushByPlanes(std::uint32_t& status) noexcept {
-  for (const HalfSpace& plane : planes_) {
-    const Plane face{plane.facet.normal, plane.facet.a, nearby_.toolRadius() + plane.facet.skin};
+  for (const PlacedPlane& plane : planes_) {
+    const HalfSpace face{plane.facet.normal, plane.facet.a, query_.toolRadius() + plane.facet.skin};
     const double below = -face.height(position_);
     if (below <= 0.5 * plane.facet.skin) continue;
-    const Vec3 way = below * face.normal;
-    Hit hit;
-    position_ += (nearby_.cast(position_, position_ + way, hit) ? hit.stop : 1.0) * way;
-    stride_m_ += below;
-    if (plane.wayIn_m > 0 && plane.state->recovery == 0) status |= kRenderGeometryJump;
+    const Vec3 displacement = below * face.normal;
+    ObjectHit hit;
+    position_ += (query_.cast(position_, position_ + displacement, hit) ? hit.stop : 1.0) * displacement;
+    expectedTravel_m_ += below;
+    if (plane.insertionDepth_m > 0 && plane.state->recovery == 0) status |= kRenderGeometryJump;
   }
 }
 
-// The same for each face in its own frame; of several faces the one that passed farthest pushes first. Their
-// boxes hold all of the way that they bend, so that `reach` is what the placement and the proxy add to it.
-void Proxy::pushByDeforming(const Vec3& from, double reach, std::uint32_t& status) noexcept {
+// As push(), for each face in its own frame; the face that passed farthest pushes first. The boxes of the
+// index cover the whole deformation, so `reach` need only add the motion of the placement and of the proxy.
+void Proxy::pushByDeformingFaces(const Vec3& from, double reach, std::uint32_t& status) noexcept {
   for (int k = 0; k < kMaxPushes; ++k) {
-    if (!nearby_.gather(position_, reach + kGatherMargin_m)) status |= kRenderCandidateLimit;
-    Hit farthest;
+    if (!query_.gather(position_, reach + kGatherMargin_m)) status |= kRenderCandidateLimit;
+    ObjectHit farthest;
     double height = 0;
-    nearby_.forEachGathered(position_, std::numeric_limits<double>::infinity(), [&](const Facet& f) {
-      const PlacedObject& object = nearby_.object(f.object);
+    query_.forEachGathered(position_, std::numeric_limits<double>::infinity(), [&](const Facet& f) {
+      const PlacedObject& object = query_.object(f.object);
       if (!object.deformed) return;
       const Vec3 start = carriedBy(object, f.triangle, from);
-      Hit hit;
-      if ((position_ - start).norm() > kJump_m || !nearby_.meets(f, start, position_, hit)) return;
-      const double above = hit.plane.height(position_);
+      ObjectHit hit;
+      if ((position_ - start).norm() > kJump_m || !query_.castAtFacet(f, start, position_, hit)) return;
+      const double above = hit.halfSpace.height(position_);
       if (above > -0.25 * f.skin) return;
       if (std::tuple(above, hit.object, hit.triangle) <
           std::tuple(height, farthest.object, farthest.triangle)) {
@@ -121,7 +123,7 @@ void Proxy::pushByDeforming(const Vec3& from, double reach, std::uint32_t& statu
       }
     });
     if (height == 0) return;
-    position_ -= height * farthest.plane.normal;
+    position_ -= height * farthest.halfSpace.normal;
   }
 }
 

@@ -1,4 +1,4 @@
-// How forces end whose owner is gone, and how forces change frames.
+// Ramp-out of forces whose owner left, and rotation of forces between frames.
 #pragma once
 
 #include <algorithm>
@@ -11,13 +11,13 @@ namespace hapticd::realtime {
 
 inline constexpr double kReleaseTime_s = 0.250;
 
-/// What is left, 1 … 0, of a force that began to ramp out at `begin`.
-inline double shareLeft(base::Nanos begin, base::Nanos now) noexcept {
+/// The share, 1 … 0, of a force that began to ramp out at `begin`.
+inline double remainingShare(base::Nanos begin, base::Nanos now) noexcept {
   return std::max(0.0, 1 - base::toSeconds(now - begin) / kReleaseTime_s);
 }
 
-/// A force seen in another frame: turned, never scaled. `t` is a similarity.
-inline geometry::Vec3 turned(const geometry::Affine& t, const geometry::Vec3& force) noexcept {
+/// A force in another frame: rotated, never scaled. `t` is a similarity.
+inline geometry::Vec3 rotated(const geometry::Affine& t, const geometry::Vec3& force) noexcept {
   const double scale = std::cbrt(std::abs(t.linear().determinant()));
   return scale > 0 ? geometry::Vec3(t.linear() * force / scale) : geometry::Vec3(geometry::Vec3::Zero());
 }

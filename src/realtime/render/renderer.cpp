@@ -11,7 +11,7 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr double kShortestPeriod_s = 1e-5;  // a repeated time stamp must not make speeds infinite
+constexpr double kShortestPeriod_s = 1e-5;  // keeps speeds finite when a time stamp repeats
 
 }  // namespace
 
@@ -33,26 +33,26 @@ void Renderer::reset() noexcept {
   state_->fields.reset();
 }
 
-void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState& hand, Nanos now,
+void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState& device, Nanos now,
                     Nanos period, Rendering& out) noexcept {
   State& s = *state_;
-  const Vec3& hip = hand.position_m;
+  const Vec3& hip = device.position_m;
   out = Rendering{};
-  if (!hip.allFinite() || !hand.velocity_m_per_s.allFinite() || !hand.orientation.coeffs().allFinite()) {
+  if (!hip.allFinite() || !device.velocity_m_per_s.allFinite() || !device.orientation.coeffs().allFinite()) {
     out.status = kRenderNotFinite;
     s.proxy.reset();
     return;
   }
   const double radius = s.options.toolRadius_m;
-  const Grip& grip = s.proxy.follow({&scene, now}, hip,
-                                    std::max(base::toSeconds(period), kShortestPeriod_s), out.status);
+  const ContactSet& contactSet =
+      s.proxy.follow({&scene, now}, hip, std::max(base::toSeconds(period), kShortestPeriod_s), out.status);
   out.proxy_m = out.scp_m = s.proxy.position();
   if ((out.status & kRenderReleased) == 0) {
-    applySurfaceLaw(grip, out.proxy_m, hand.velocity_m_per_s, radius, out);
+    applySurfaceLaw(contactSet, out.proxy_m, device.velocity_m_per_s, radius, out);
     applyAdhesion(s.proxy.planes().adhesion(hip, radius), out);
   }
   out.force_N = out.contactForce_N;
-  out.force_N += s.effects.force(scene, hand, out, now);
+  out.force_N += s.effects.force(scene, device, out, now);
   out.force_N += s.fields.force(scene, hip, now);
   if (!out.force_N.allFinite()) {
     out = Rendering{};

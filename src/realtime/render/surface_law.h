@@ -1,4 +1,4 @@
-// The law of the touched surfaces: from what holds the proxy to the force on the hand.
+// The contact law: from the contact set of the proxy to the force on the HIP.
 #pragma once
 
 #include "realtime/render/proxy.h"
@@ -6,11 +6,12 @@
 
 namespace hapticd::realtime {
 
-/// Fills the contact part of `out` (force, normal, depth, contacts). `hipVelocity` in the device frame.
-void applySurfaceLaw(const Grip& grip, const Vec3& proxy_m, const Vec3& hipVelocity_m_per_s,
+/// Fills the contact part of `out` (force, normal, depth, contacts). Device frame, SI. noexcept, no
+/// allocation.
+void applySurfaceLaw(const ContactSet& contactSet, const Vec3& proxy_m, const Vec3& hipVelocity_m_per_s,
                      double toolRadius_m, Rendering& out) noexcept;
 
-/// Adds the pull of planes that hold on to the hand. After applySurfaceLaw.
+/// Adds the adhesive force of planes. Call it after applySurfaceLaw().
 void applyAdhesion(const Vec3& force_N, Rendering& out) noexcept;
 
 }  // namespace hapticd::realtime

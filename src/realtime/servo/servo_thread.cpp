@@ -16,7 +16,7 @@ ServoThread::~ServoThread() {
 }
 
 const ThreadSetup& ServoThread::start() {
-  thread_ = std::thread([this] { run(); });
+  thread_ = base::BlockingThread({"servo"}, [this] { run(); });
   isSetUp_.wait(false, std::memory_order_acquire);
   const auto refused = [](const SetupAnswer& answer) { return !answer.granted; };
   const bool leave = options_.requireRealtime && (refused(setup_.scheduling) || refused(setup_.memory));
@@ -24,14 +24,14 @@ const ThreadSetup& ServoThread::start() {
   go_.notify_one();
   if (leave) {
     thread_.join();
-    throw std::runtime_error("the servo thread did not get what it needs\n" + setup_.complaints());
+    throw std::runtime_error("the system refused what the servo thread requires\n" + setup_.complaints());
   }
   return setup_;
 }
 
 void ServoThread::stop() noexcept {
   requestStop();
-  if (thread_.joinable()) thread_.join();
+  thread_.join();
 }
 
 void ServoThread::run() {

@@ -1,11 +1,11 @@
-// The thread that paces a tick, for devices that do not call back by themselves.
+// The thread that paces a tick, for devices whose library does not call back at 1 kHz.
 #pragma once
 
 #include <atomic>
 #include <functional>
-#include <thread>
 
 #include "base/clock.h"
+#include "base/thread.h"
 #include "realtime/servo/pacer.h"
 #include "realtime/servo/thread_setup.h"
 
@@ -17,7 +17,7 @@ struct ServoThreadOptions {
   bool requireRealtime = false;  ///< start() throws when scheduling or memory lock was refused
 };
 
-/// Owns one realtime thread. Started once and stopped by one other thread.
+/// Owns one realtime thread. One other thread starts it, once, and stops it.
 class ServoThread {
  public:
   /// `tick` must not throw, allocate or lock; it and `clock` must outlive the thread. Throws
@@ -27,12 +27,13 @@ class ServoThread {
   ServoThread(const ServoThread&) = delete;
   ServoThread& operator=(const ServoThread&) = delete;
 
-  /// Starts the thread and returns what it got. Throws std::runtime_error with the remedies when realtime is
-  /// required and refused; no tick has run then.
+  /// Starts the thread and returns what the system granted. Throws std::runtime_error with the remedies when
+  /// realtime is required and was refused (no tick has run then), std::system_error when the system gives no
+  /// thread.
   const ThreadSetup& start();
-  /// Returns after the last tick. Idempotent.
+  /// Ends the loop and returns after the last tick. Idempotent.
   void stop() noexcept;
-  /// Asks the loop to end after the present tick, without waiting; also from within a tick.
+  /// Ends the loop after the present tick, without waiting. From any thread, also from within a tick.
   void requestStop() noexcept { stopping_.store(true, std::memory_order_release); }
   /// Valid after start().
   const ThreadSetup& setup() const noexcept { return setup_; }
@@ -52,7 +53,7 @@ class ServoThread {
   std::atomic<bool> isSetUp_{false};
   std::atomic<Go> go_{Go::wait};
   std::atomic<bool> stopping_{false};
-  std::thread thread_;
+  base::BlockingThread thread_;  // last: its body uses the others
 };
 
 }  // namespace hapticd::realtime

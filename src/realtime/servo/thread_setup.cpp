@@ -144,7 +144,7 @@ std::string ThreadSetup::complaints() const {
   return text;
 }
 
-void askShortTurns() noexcept {
+void requestShortTimeSlice() noexcept {
   // As the kernel has it; older C libraries know neither the call nor this.
   struct Attributes {
     std::uint32_t size = sizeof(Attributes);

@@ -50,7 +50,7 @@ struct ThreadSetup {
 /// Asks for short turns of the calling thread, so that the scheduler lets it run soon after it is woken:
 /// needs no rights, and takes from others nothing but the order. Threads that it starts have turns as
 /// everybody. Without effect before Linux 6.12.
-void askShortTurns() noexcept;
+void requestShortTimeSlice() noexcept;
 
 /// Asks for the calling thread. Allocates and enters the system: before the loop. Never throws for a refusal.
 ThreadSetup setUpThread(const ThreadRequest& request);

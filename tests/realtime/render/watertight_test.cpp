@@ -2,7 +2,7 @@
 #include <cstdlib>
 #include <limits>
 
-#include "realtime/render/nearby.h"
+#include "realtime/render/contact_query.h"
 #include "variants.h"
 
 namespace hapticd::realtime::fixture {
@@ -72,14 +72,14 @@ TEST_P(SegmentsTest, every_segment_into_a_closed_mesh_hits) {
   for (const auto faces : {scene::TouchableFaces::front, scene::TouchableFaces::both}) {
     scene.faces = faces;
     const auto snapshot = scene.snapshot();
-    Nearby nearby(0);
-    nearby.begin({snapshot.get(), 0}, {});
-    nearby.include(offset(), 1);
+    ContactQuery query(0);
+    query.beginTick({snapshot.get(), 0}, {});
+    query.addObjectsNear(offset(), 1);
     while (shots < segmentCount() * (faces == scene::TouchableFaces::front ? 1 : 2) / 2) {
       // Where the corners are once they went through floats in the scene's unit.
       const auto& t = mesh.triangles[random() % mesh.triangles.size()];
       const auto corner = [&](int k) {
-        return Vec3(nearby.object(0).T_device_object *
+        return Vec3(query.object(0).T_device_object *
                     (*snapshot->objects[0]->mesh->vertices)[t[static_cast<std::size_t>(k)]].cast<double>());
       };
       const double u = uniform(0, 1);
@@ -91,9 +91,9 @@ TEST_P(SegmentsTest, every_segment_into_a_closed_mesh_hits) {
       const Vec3 from = aim + uniform(0.1, 2) * (aim - inside);
       if ((from - offset()).norm() < 0.052) continue;
       ++shots;
-      Hit hit;
+      ObjectHit hit;
       const bool endsOnTheFace = shots % 8 == 0;
-      if (!nearby.cast(from, endsOnTheFace ? aim : inside, hit)) ++misses;
+      if (!query.cast(from, endsOnTheFace ? aim : inside, hit)) ++misses;
     }
   }
   EXPECT_EQ(misses, 0) << "of " << shots;

@@ -2,15 +2,16 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <vector>
 
-#include "base/time.h"
-#include "device/device.h"
 #include "base/clock.h"
+#include "device/device.h"
 #include "scene/snapshot.h"
 
 namespace hapticd::realtime {
 
+using base::Nanos;
 using geometry::Vec3;
 
 /// Gives the state that the test sets and keeps what was written.
@@ -48,7 +49,7 @@ class FakeDevice final : public device::Device {
 };
 
 /// Oversleeps by a script, then not at all.
-class FakeClock final : public Clock {
+class FakeClock final : public base::Clock {
  public:
   Nanos now() noexcept override { return now_; }
   void sleepUntil(Nanos deadline) noexcept override {
@@ -57,6 +58,7 @@ class FakeClock final : public Clock {
     if (deadline > now_) now_ = deadline;
     now_ += late;
   }
+  Nanos wallNow() noexcept override { return now_; }
   void advance(Nanos by) noexcept { now_ += by; }
 
   std::vector<Nanos> oversleeps;

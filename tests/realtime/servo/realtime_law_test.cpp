@@ -205,7 +205,7 @@ void expectLawful() {
 
 TEST_F(RealtimeLaw, HoldsInSimulatedTime) {
   device::SimulatedDevice device;
-  SimulatedClock clock;
+  base::SimulatedClock clock;
   Tick tick(device, clock, simulatedHand());
   RecordRing recorded(64);
   tick.recordTo(&recorded);
@@ -236,7 +236,7 @@ TEST_F(RealtimeLaw, HoldsInSimulatedTime) {
 
 TEST_F(RealtimeLaw, HoldsInTheServoThreadWhileScenesAreSwapped) {
   device::SimulatedDevice device;
-  MonotonicClock clock;
+  base::MonotonicClock clock;
   Tick tick(device, clock, simulatedHand());
   RecordRing recorded(1024);
   tick.recordTo(&recorded);

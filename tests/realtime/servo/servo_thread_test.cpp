@@ -151,7 +151,7 @@ TEST(ServoThread, StopsWithoutHavingStarted) {
 // All threads of a server at once on the real clock: the scene publishes, an operator stops and re-arms, the
 // edge sleeps on the wake and reads reports.
 TEST(ServoThread, ALoopAmongItsNeighbours) {
-  MonotonicClock clock;
+  base::MonotonicClock clock;
   FakeDevice device;
   TickOptions tickOptions;
   tickOptions.guard.armed = true;
@@ -231,7 +231,7 @@ TEST(ThreadSetup, ShortTurnsChangeNeitherPolicyNorNiceness) {
   std::thread([] {
     setpriority(PRIO_PROCESS, 0, 3);
     const bool canBeChosen = turnsCanBeChosen();
-    askShortTurns();
+    requestShortTimeSlice();
     EXPECT_EQ(sched_getscheduler(0) & ~SCHED_RESET_ON_FORK, SCHED_OTHER);
     EXPECT_EQ(getpriority(PRIO_PROCESS, 0), 3);
     if (canBeChosen) {

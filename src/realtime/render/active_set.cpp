@@ -1,4 +1,4 @@
-#include "realtime/render/plane_set.h"
+#include "realtime/render/active_set.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,16 +6,17 @@
 namespace hapticd::realtime {
 namespace {
 
-// Two normals closer than this (as |n1 x n2|^2), or three with a smaller determinant, cannot be told apart
-// from rounding; the solution that would need them differs from one with fewer planes by less than the
-// tolerance.
+// Two normals closer than this (as |n1 x n2|^2), or three with a smaller determinant, are dependent within
+// rounding; the solution that would need them differs by less than the tolerance from one with fewer
+// half-spaces.
 constexpr double kMinCrossSquared = 1e-12;
 constexpr double kMinDeterminant = 1e-9;
 
-// Offsets relative to `from`: plane i asks n_i . y >= c_i of y = x - from. h is the target in the same frame.
+// Relative to `from`: half-space i demands n_i . y >= c_i for y = x - from. h is the target in the same
+// frame.
 struct Problem {
-  const Vec3* normal[kMaxPlanes];
-  double c[kMaxPlanes];
+  const Vec3* normal[kMaxHalfSpaces];
+  double c[kMaxHalfSpaces];
   Vec3 h;
 };
 
@@ -36,7 +37,7 @@ bool solveOne(const Problem& p, int i, Candidate& out) {
   return true;
 }
 
-// Intersections by cross products rather than through the Gram matrix, whose condition is the square.
+// By cross products: the Gram matrix would square the condition number.
 bool solveTwo(const Problem& p, int i, int j, Candidate& out) {
   const Vec3& n1 = *p.normal[i];
   const Vec3& n2 = *p.normal[j];
@@ -71,7 +72,7 @@ bool solveThree(const Problem& p, int i, int j, int k, Candidate& out) {
   return out.multiplier[0] >= 0 && out.multiplier[1] >= 0 && out.multiplier[2] >= 0;
 }
 
-// Feasible and optimal at once is unique, so the first one found is the answer.
+// A candidate that is feasible and optimal is unique, so the first one is the answer.
 struct Search {
   const Problem& problem;
   int count;
@@ -114,16 +115,16 @@ struct Search {
 
 }  // namespace
 
-NearestPoint nearestAbove(const Plane* planes, int count, const Vec3& target, const Vec3& from,
-                          double tolerance) noexcept {
+Projection projectOntoActiveSet(const HalfSpace* halfSpaces, int count, const Vec3& target, const Vec3& from,
+                                double tolerance) noexcept {
   Problem problem;
   problem.h = target - from;
   for (int i = 0; i < count; ++i) {
-    problem.normal[i] = &planes[i].normal;
-    problem.c[i] = -planes[i].height(from);
+    problem.normal[i] = &halfSpaces[i].normal;
+    problem.c[i] = -halfSpaces[i].height(from);
   }
   Search search{problem, count, tolerance, {}};
-  NearestPoint result;
+  Projection result;
   if (!search.run()) {
     result.point = from;
     return result;
@@ -136,12 +137,12 @@ NearestPoint nearestAbove(const Plane* planes, int count, const Vec3& target, co
   return result;
 }
 
-void depthsBelow(const Plane* planes, int count, const Vec3& target, double* depths) noexcept {
+void depthsBelow(const HalfSpace* halfSpaces, int count, const Vec3& target, double* depths) noexcept {
   Problem problem;
   problem.h = Vec3::Zero();
   for (int i = 0; i < count; ++i) {
-    problem.normal[i] = &planes[i].normal;
-    problem.c[i] = -planes[i].height(target);
+    problem.normal[i] = &halfSpaces[i].normal;
+    problem.c[i] = -halfSpaces[i].height(target);
   }
   Candidate s;
   if (count == 1) solveOne(problem, 0, s);

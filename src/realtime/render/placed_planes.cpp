@@ -1,4 +1,4 @@
-#include "realtime/render/half_spaces.h"
+#include "realtime/render/placed_planes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,13 +9,13 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr double kPlaneSkin = 1e-9;  // of the hand's own coordinates, metres
+constexpr double kRelativeSkin = 1e-9;  // of the largest coordinate of the HIP
 constexpr double kTau = 2 * M_PI;
 
 }  // namespace
 
-HalfSpaces::Memory& HalfSpaces::memoryOf(const scene::Plane& plane, Nanos now, double depth_m,
-                                         bool& fresh) noexcept {
+PlacedPlanes::Memory& PlacedPlanes::memoryOf(const scene::Plane& plane, Nanos now, double depth_m,
+                                             bool& fresh) noexcept {
   const auto end = memory_.begin() + memoryCount_;
   const auto known =
       std::find_if(memory_.begin(), end, [&](const Memory& m) { return m.index == plane.index; });
@@ -31,25 +31,25 @@ HalfSpaces::Memory& HalfSpaces::memoryOf(const scene::Plane& plane, Nanos now, d
   return *known;
 }
 
-// How far the surface is above the plane itself, metres.
-double HalfSpaces::heightOf(const scene::Plane& plane, const Memory& memory, Nanos now, const Vec3& normal,
-                            const Vec3& proxy, double metresPerUnit) noexcept {
+// Height of the surface above the plane itself, metres.
+double PlacedPlanes::heightOf(const scene::Plane& plane, const Memory& memory, Nanos now, const Vec3& normal,
+                              const Vec3& proxy, double metresPerUnit) noexcept {
   const double age = base::toSeconds(now - memory.placed);
   const double recovery = base::toSeconds(plane.recovery);
   double height = 0;
   if (age < recovery) height -= memory.depth_m * (1 - age / recovery);
   if (plane.textureWavelength > 0) {
-    // Before the contact any point could become its centre, so the crest is what the hand meets.
-    const Vec3 way = memory.touched ? Vec3(proxy - memory.firstContact) : Vec3(Vec3::Zero());
-    const double r = (way - normal * normal.dot(way)).norm() / metresPerUnit;
+    // The first contact becomes the centre of the texture, so the HIP always meets a crest.
+    const Vec3 offset = memory.touched ? Vec3(proxy - memory.firstContact) : Vec3(Vec3::Zero());
+    const double r = (offset - normal * normal.dot(offset)).norm() / metresPerUnit;
     height += metresPerUnit * plane.textureAmplitude * std::cos(kTau * r / plane.textureWavelength);
   }
   height += metresPerUnit * plane.buzzAmplitude * std::sin(plane.buzzAngularFrequency_rad_per_s * age);
   return height;
 }
 
-// Planes that are gone are new when they come back.
-void HalfSpaces::forgetAllBut(const scene::SceneSnapshot& scene) noexcept {
+// A plane that returns after it was removed counts as new.
+void PlacedPlanes::forgetAllExcept(const scene::SceneSnapshot& scene) noexcept {
   const auto isGone = [&](const Memory& m) {
     return std::none_of(scene.planes.begin(), scene.planes.end(),
                         [&](const scene::Plane& p) { return p.index == m.index; });
@@ -58,23 +58,23 @@ void HalfSpaces::forgetAllBut(const scene::SceneSnapshot& scene) noexcept {
   memoryCount_ = static_cast<int>(end - memory_.begin());
 }
 
-void HalfSpaces::place(const scene::SceneSnapshot& scene, Nanos now, const Vec3& hip, const Vec3& proxy,
-                       double toolRadius_m) noexcept {
+void PlacedPlanes::place(const scene::SceneSnapshot& scene, Nanos now, const Vec3& hip, const Vec3& proxy,
+                         double toolRadius_m) noexcept {
   const geometry::Affine& T_world_device = scene.workspace.T_world_device;
-  forgetAllBut(scene);
+  forgetAllExcept(scene);
   count_ = 0;
   for (const scene::Plane& plane : scene.planes) {
     if (count_ == scene::kMaxPlanes) return;
-    HalfSpace& placed = planes_[static_cast<std::size_t>(count_)];
-    placed = HalfSpace{};
+    PlacedPlane& placed = planes_[static_cast<std::size_t>(count_)];
+    placed = PlacedPlane{};
     placed.state = &plane;
     placed.facet.object = -1 - count_;
     if (placeOne(T_world_device, now, hip, proxy, toolRadius_m, placed)) ++count_;
   }
 }
 
-bool HalfSpaces::placeOne(const geometry::Affine& T_world_device, Nanos now, const Vec3& hip,
-                          const Vec3& proxy, double toolRadius_m, HalfSpace& placed) noexcept {
+bool PlacedPlanes::placeOne(const geometry::Affine& T_world_device, Nanos now, const Vec3& hip,
+                            const Vec3& proxy, double toolRadius_m, PlacedPlane& placed) noexcept {
   const scene::Plane& plane = *placed.state;
   const Vec3 slope = T_world_device.linear().transpose() * plane.normal;  // world units per metre
   const double unitsPerMetre = slope.norm();
@@ -83,12 +83,12 @@ bool HalfSpaces::placeOne(const geometry::Affine& T_world_device, Nanos now, con
   const double hipHeight = (plane.normal.dot(T_world_device * hip) + plane.offset) / unitsPerMetre;
   bool fresh = false;
   Memory& memory = memoryOf(plane, now, toolRadius_m - hipHeight, fresh);
-  if (fresh) placed.wayIn_m = memory.depth_m;
+  if (fresh) placed.insertionDepth_m = memory.depth_m;
 
   placed.surface = plane.surface;
   if (plane.releasing && memory.releaseBegin < 0) memory.releaseBegin = now;
   if (memory.releaseBegin >= 0) {
-    const double left = shareLeft(memory.releaseBegin, now);
+    const double left = remainingShare(memory.releaseBegin, now);
     if (left == 0) return false;
     placed.surface.stiffness_N_per_m *= left;
     placed.surface.damping_Ns_per_m *= left;
@@ -101,7 +101,7 @@ bool HalfSpaces::placeOne(const geometry::Affine& T_world_device, Nanos now, con
   return true;
 }
 
-void HalfSpaces::remember(unsigned touched, const Vec3& proxy) noexcept {
+void PlacedPlanes::remember(unsigned touched, const Vec3& proxy) noexcept {
   for (int i = 0; i < count_; ++i) {
     for (int k = 0; k < memoryCount_; ++k) {
       Memory& memory = memory_[static_cast<std::size_t>(k)];
@@ -114,10 +114,10 @@ void HalfSpaces::remember(unsigned touched, const Vec3& proxy) noexcept {
   }
 }
 
-Vec3 HalfSpaces::adhesion(const Vec3& hip, double toolRadius_m) noexcept {
+Vec3 PlacedPlanes::adhesion(const Vec3& hip, double toolRadius_m) noexcept {
   Vec3 force = Vec3::Zero();
   for (int i = 0; i < count_; ++i) {
-    const HalfSpace& plane = (*this)[i];
+    const PlacedPlane& plane = (*this)[i];
     for (int k = 0; k < memoryCount_; ++k) {
       Memory& memory = memory_[static_cast<std::size_t>(k)];
       if (memory.index != plane.state->index || !memory.adheres) continue;

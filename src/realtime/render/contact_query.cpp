@@ -1,4 +1,4 @@
-#include "realtime/render/nearby.h"
+#include "realtime/render/contact_query.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,12 +12,12 @@ using geometry::Mat3;
 using scene::ObjectState;
 
 constexpr double kRelativeSkin = 1e-9;      // of the largest coordinate of the object in the device frame
-constexpr double kPadShare = 0x1p-22;       // of the object's size: a quarter of the pad of its index
-constexpr double kRoundingFloor = 1e-12;    // of the largest coordinate: a thousand roundings
-constexpr double kSmallestObject_m = 1e-3;  // below this size the coordinates of the hand decide the rounding
-constexpr double kWiden = 1 + 1e-6;         // queries travel between frames with rounding
-constexpr double kSpare = 0.2;              // of the tool's radius: gathered in reserve
-constexpr int kLean = 32;                   // gathered facets that cost less than gathering anew
+constexpr double kPadShare = 0x1p-22;       // of the object's size: a quarter of the padding of its index
+constexpr double kRoundingFloor = 1e-12;    // of the largest coordinate: a thousand times its rounding error
+constexpr double kSmallestObject_m = 1e-3;  // below this size the HIP's coordinates dominate the rounding
+constexpr double kWiden = 1 + 1e-6;         // covers the rounding of queries that change frames
+constexpr double kReserveShare = 0.2;       // share of the tool radius that is gathered in reserve
+constexpr int kReuseLimit = 32;  // reuse the cached facets up to this count instead of querying again
 
 // An upper bound of the largest singular value, exact for similarities.
 double stretchOf(const Mat3& m) {
@@ -30,7 +30,7 @@ scene::Corners mapped(const Affine& t, const scene::Corners& c, bool mirrored) {
   return out;
 }
 
-// Parameter at which p + t d leaves the ball, at most 1. p is inside.
+// Parameter, at most 1, at which p + t d leaves the ball. p is inside.
 double exitOf(const Vec3& p, const Vec3& d, const Vec3& centre, double radius) {
   const Vec3 m = p - centre;
   if ((m + d).squaredNorm() <= radius * radius) return 1;
@@ -63,29 +63,31 @@ Vec3 PlacedObject::carried(const Vec3& p) const noexcept {
   return T_device_object * (T_device_objectBefore.inverse() * p);
 }
 
-void Nearby::begin(const Moment& now, const Moment& before, const HalfSpaces* planes) noexcept {
+void ContactQuery::beginTick(const SceneAtTime& now, const SceneAtTime& before,
+                             const PlacedPlanes* planes) noexcept {
   now_ = now;
   planes_ = planes;
   before_ = before;
   sameWorkspace_ = before.scene != nullptr && before.scene->workspace.T_device_world.matrix() ==
                                                   now.scene->workspace.T_device_world.matrix();
   objectCount_ = 0;
-  finestSkin_ = kRelativeSkin;
+  minSkin_ = kRelativeSkin;
   overflowed_ = false;
-  if (now.scene != before.scene) forget();
+  if (now.scene != before.scene) invalidate();
 }
 
-void Nearby::include(const Vec3& centre, double reach) noexcept {
+void ContactQuery::addObjectsNear(const Vec3& centre, double reach) noexcept {
   const scene::SceneSnapshot& scene = *now_.scene;
   if (!scene.objectIndex || scene.objects.size() <= 2) {
     for (const auto& object : scene.objects) add(*object);
   } else {
-    includeByIndex(scene, centre, reach);
+    addObjectsByIndex(scene, centre, reach);
   }
-  if (gatheredIn_ != generation_ || !sameObjects()) ball_.drop();
+  if (gatheredGeneration_ != generation_ || !sameObjects()) cache_.invalidate();
 }
 
-void Nearby::includeByIndex(const scene::SceneSnapshot& scene, const Vec3& centre, double reach) noexcept {
+void ContactQuery::addObjectsByIndex(const scene::SceneSnapshot& scene, const Vec3& centre,
+                                     double reach) noexcept {
   const Affine& T_world_device = scene.workspace.T_world_device;
   const double worldReach = (reach + radius_) * kWiden * stretchOf(T_world_device.linear());
   std::array<std::uint32_t, kMaxObjects> found{};
@@ -97,12 +99,12 @@ void Nearby::includeByIndex(const scene::SceneSnapshot& scene, const Vec3& centr
       found[count++] = i;
     }
   });
-  // By id, so that what happens to the proxy does not depend on the order of visits.
+  // By id, so that the proxy does not depend on the order of visits.
   std::sort(found.begin(), found.begin() + count);
   for (std::size_t k = 0; k < count; ++k) add(*scene.objects[found[k]]);
 }
 
-int Nearby::includeObject(std::int32_t id) noexcept {
+int ContactQuery::addObject(std::int32_t id) noexcept {
   const ObjectState* state = find(*now_.scene, id);
   if (state == nullptr) return -1;
   add(*state);
@@ -112,7 +114,7 @@ int Nearby::includeObject(std::int32_t id) noexcept {
   return -1;
 }
 
-void Nearby::add(const ObjectState& state) noexcept {
+void ContactQuery::add(const ObjectState& state) noexcept {
   for (int i = 0; i < objectCount_; ++i) {
     if (object(i).state == &state) return;
   }
@@ -121,20 +123,20 @@ void Nearby::add(const ObjectState& state) noexcept {
     return;
   }
   PlacedObject& placed = objects_[static_cast<std::size_t>(objectCount_)];
-  if (placed.restsSince == generation_ && placed.state == &state) {
+  if (placed.restGeneration == generation_ && placed.state == &state) {
     placed.before = &state;
     placed.T_device_objectBefore = placed.T_device_object;
     placed.moved = placed.deformed = placed.jumped = false;
   } else {
     if (!place(state, placed)) return;
     compareWithBefore(placed);
-    if (placed.atRest) placed.restsSince = generation_;
+    if (placed.atRest) placed.restGeneration = generation_;
   }
   ++objectCount_;
-  finestSkin_ = objectCount_ == 1 ? placed.skin : std::min(finestSkin_, placed.skin);
+  minSkin_ = objectCount_ == 1 ? placed.skin : std::min(minSkin_, placed.skin);
 }
 
-bool Nearby::place(const ObjectState& state, PlacedObject& placed) const noexcept {
+bool ContactQuery::place(const ObjectState& state, PlacedObject& placed) const noexcept {
   placed = PlacedObject{};
   placed.state = &state;
   const geometry::Box& box = state.mesh->index.bounds();
@@ -146,7 +148,7 @@ bool Nearby::place(const ObjectState& state, PlacedObject& placed) const noexcep
   placed.mirrored = determinant < 0;
   placed.T_object_device = placed.T_device_object.inverse();
   placed.stretch = stretchOf(placed.T_object_device.linear());
-  if (!std::isfinite(placed.stretch) || determinant == 0) return false;  // flattened: nothing to touch
+  if (!std::isfinite(placed.stretch) || determinant == 0) return false;  // flattened by its placement
   const Vec3 farthest =
       (placed.T_device_object * box.centre()).cwiseAbs() + linear.cwiseAbs() * (0.5 * box.extents());
   const double extent = std::max(farthest.maxCoeff(), kSmallestObject_m);
@@ -155,7 +157,7 @@ bool Nearby::place(const ObjectState& state, PlacedObject& placed) const noexcep
   return std::isfinite(placed.skin);
 }
 
-void Nearby::compareWithBefore(PlacedObject& placed) const noexcept {
+void ContactQuery::compareWithBefore(PlacedObject& placed) const noexcept {
   if (before_.scene == nullptr) return;
   const ObjectState& state = *placed.state;
   placed.before = find(*before_.scene, state.id);
@@ -171,57 +173,57 @@ void Nearby::compareWithBefore(PlacedObject& placed) const noexcept {
   placed.jumped = !sameTriangles || before.motion.jumps() != state.motion.jumps();
 }
 
-// An object that will not move or bend any more in this scene has the same facets in each tick. Null for a
-// triangle that is none; valid until the next call.
-const Facet* Nearby::facetOf(int i, std::uint32_t triangle) const noexcept {
+// Facets of objects at rest stay the same from tick to tick. Null for a degenerate triangle; valid until the
+// next call.
+const Facet* ContactQuery::facetOf(int i, std::uint32_t triangle) const noexcept {
   const PlacedObject& placed = object(i);
-  MadeFacet& made = made_[(triangle * 0x9E3779B1U) >> (32 - kMadeBits)];
-  if (made.generation != generation_ || made.state != placed.state || made.facet.triangle != triangle) {
-    made.generation = 0;
-    if (!makeFacet(placed.corners(triangle, now_.time), placed.skin, made.facet)) return nullptr;
-    made.facet.triangle = triangle;
-    made.state = placed.state;
-    if (placed.atRest) made.generation = generation_;
+  MemoFacet& memo = facetMemo_[(triangle * 0x9E3779B1U) >> (32 - kMemoBits)];
+  if (memo.generation != generation_ || memo.state != placed.state || memo.facet.triangle != triangle) {
+    memo.generation = 0;
+    if (!makeFacet(placed.corners(triangle, now_.time), placed.skin, memo.facet)) return nullptr;
+    memo.facet.triangle = triangle;
+    memo.state = placed.state;
+    if (placed.atRest) memo.generation = generation_;
   }
-  made.facet.object = i;
-  return &made.facet;
+  memo.facet.object = i;
+  return &memo.facet;
 }
 
-bool Nearby::gather(const Vec3& centre, double radius) noexcept {
-  ball_.begin(centre, radius);
-  bool lasting = true;
+bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
+  cache_.restart(centre, radius);
+  bool reusable = true;
   for (int i = 0; i < objectCount_; ++i) {
     const PlacedObject& placed = object(i);
     gatheredFrom_[static_cast<std::size_t>(i)] = placed.state;
-    lasting = lasting && placed.atRest && !placed.deformed;
+    reusable = reusable && placed.atRest && !placed.deformed;
     const Vec3 inObject = placed.T_object_device * centre;
-    // Deforming facets may have come from farther away.
+    // Deforming facets count at any distance: they may have come from farther away.
     const auto visit = [&](std::uint32_t triangle) noexcept {
-      if (!ball_.complete()) return;
+      if (!cache_.complete()) return;
       if (radius_ > 0) {
         const double distance = distanceBound(placed.state->mesh->corners(triangle, now_.time), inObject);
-        ball_.add({triangle, i}, distance / (kWiden * placed.stretch), placed.skin, placed.deformed);
+        cache_.add({triangle, i}, distance / (kWiden * placed.stretch), placed.skin, placed.deformed);
       } else if (const Facet* const facet = facetOf(i, triangle)) {
-        ball_.add(*facet, placed.deformed);
+        cache_.add(*facet, placed.deformed);
       }
     };
     const double reach = radius + radius_ + 4 * placed.skin;
     placed.state->mesh->index.visitNear(inObject, reach * kWiden * placed.stretch, visit);
   }
   gatheredCount_ = objectCount_;
-  gatheredIn_ = lasting ? generation_ : 0;
-  return ball_.complete();
+  gatheredGeneration_ = reusable ? generation_ : 0;
+  return cache_.complete();
 }
 
-bool Nearby::surround(const Vec3& centre, double radius) noexcept {
-  const double spare = kSpare * radius_;
-  // What a fast tick has gathered is too much for the slow ones after it.
-  const bool lean = ball_.size() <= kLean || ball_.reach() <= 2 * std::max(radius, spare);
-  if (lean && ball_.covers(centre, radius)) return true;
-  return (spare > radius && gather(centre, spare)) || gather(centre, radius);
+bool ContactQuery::ensureGathered(const Vec3& centre, double radius) noexcept {
+  const double reserve = kReserveShare * radius_;
+  // A fast tick gathers too many for the slow ticks after it.
+  const bool smallEnough = cache_.size() <= kReuseLimit || cache_.reach() <= 2 * std::max(radius, reserve);
+  if (smallEnough && cache_.covers(centre, radius)) return true;
+  return (reserve > radius && gather(centre, reserve)) || gather(centre, radius);
 }
 
-bool Nearby::sameObjects() const noexcept {
+bool ContactQuery::sameObjects() const noexcept {
   if (gatheredCount_ != objectCount_) return false;
   for (int i = 0; i < objectCount_; ++i) {
     if (gatheredFrom_[static_cast<std::size_t>(i)] != object(i).state) return false;
@@ -229,25 +231,26 @@ bool Nearby::sameObjects() const noexcept {
   return true;
 }
 
-bool Nearby::meets(const Facet& f, const Vec3& p, const Vec3& g, Hit& hit) const noexcept {
+bool ContactQuery::castAtFacet(const Facet& f, const Vec3& p, const Vec3& g, ObjectHit& hit) const noexcept {
   const Vec3 d = g - p;
   const bool found =
-      radius_ > 0 ? meetBall(f, faces(), radius_, p, d, 1, 1, hit) : meet(f, faces(), p, d, 1, hit);
+      radius_ > 0 ? castBall(f, faces(), radius_, p, d, 1, 1, hit) : castPoint(f, faces(), p, d, 1, hit);
   hit.object = f.object;
   hit.triangle = f.triangle;
   return found;
 }
 
-// A total order on obstacles, so that the first one does not depend on the order of visits.
-void Nearby::consider(const Facet& f, const Path& path, Hit& best, bool& found) const noexcept {
-  Hit hit;
-  const bool met = radius_ > 0 ? meetBall(f, faces(), radius_, path.p, path.d, path.limit,
+// A total order on hits, so that the first one does not depend on the order of visits.
+void ContactQuery::considerFacet(const Facet& f, const Path& path, ObjectHit& best,
+                                 bool& found) const noexcept {
+  ObjectHit hit;
+  const bool met = radius_ > 0 ? castBall(f, faces(), radius_, path.p, path.d, path.limit,
                                           found ? best.stop : path.limit, hit)
-                               : meet(f, faces(), path.p, path.d, path.limit, hit);
+                               : castPoint(f, faces(), path.p, path.d, path.limit, hit);
   if (!met) return;
   hit.object = f.object;
   hit.triangle = f.triangle;
-  const auto rank = [this](const Hit& h) {
+  const auto rank = [this](const ObjectHit& h) {
     return std::tuple(h.stop, -h.depth, h.object < 0 ? h.object : object(h.object).state->id, h.triangle);
   };
   if (found && !(rank(hit) < rank(best))) return;
@@ -255,12 +258,12 @@ void Nearby::consider(const Facet& f, const Path& path, Hit& best, bool& found) 
   found = true;
 }
 
-// visit returns the parameter in [0, 1] beyond which nothing more is wanted.
+// visit() returns the parameter in [0, 1] beyond which facets do not matter.
 template <class Visit>
-void Nearby::forEachOnSegment(const Vec3& p, const Vec3& d, double limit, int only,
-                              Visit&& visit) const noexcept {
+void ContactQuery::forEachOnSegment(const Vec3& p, const Vec3& d, double limit, int only,
+                                    Visit&& visit) const noexcept {
   if (only < 0 && planes_ != nullptr) {
-    for (const HalfSpace& plane : *planes_) visit(plane.facet);
+    for (const PlacedPlane& plane : *planes_) visit(plane.facet);
   }
   for (int i = 0; i < objectCount_; ++i) {
     if (only >= 0 && i != only) continue;
@@ -274,75 +277,78 @@ void Nearby::forEachOnSegment(const Vec3& p, const Vec3& d, double limit, int on
   }
 }
 
-bool Nearby::castGathered(const Vec3& p, const Vec3& d, double limit, int only, Hit& hit) noexcept {
-  return radius_ > 0 ? meetBallOf({p, d, limit}, only, hit) : meetPoint({p, d, limit}, only, hit);
+bool ContactQuery::castGathered(const Vec3& p, const Vec3& d, double limit, int only,
+                                ObjectHit& hit) noexcept {
+  return radius_ > 0 ? castBallGathered({p, d, limit}, only, hit)
+                     : castPointGathered({p, d, limit}, only, hit);
 }
 
-// Two passes: how far the path is free of faces, then what has to stop it before, so that at the stop it is a
+// Two passes: the first finds how far the path is free of faces, the second stops it earlier, where it is a
 // skin above all of them.
-bool Nearby::meetPoint(const Path& path, int only, Hit& hit) noexcept {
-  std::array<const Facet*, FacetBall::kMost + scene::kMaxPlanes> inTheWay;
-  int count = ball_.crossing(path.p, path.d, path.limit, inTheWay.data());
+bool ContactQuery::castPointGathered(const Path& path, int only, ObjectHit& hit) noexcept {
+  std::array<const Facet*, FacetCache::kMaxFacets + scene::kMaxPlanes> candidates;
+  int count = cache_.facetsNearPath(path.p, path.d, path.limit, candidates.data());
   if (only < 0 && planes_ != nullptr) {
-    for (const HalfSpace& plane : *planes_) inTheWay[static_cast<std::size_t>(count++)] = &plane.facet;
+    for (const PlacedPlane& plane : *planes_) candidates[static_cast<std::size_t>(count++)] = &plane.facet;
   }
   double free = path.limit;
   bool blocked = false;
   const auto forEach = [&](auto&& visit) {
     for (int i = 0; i < count; ++i) {
-      const Facet& f = *inTheWay[static_cast<std::size_t>(i)];
+      const Facet& f = *candidates[static_cast<std::size_t>(i)];
       if (only < 0 || f.object == only) visit(f);
     }
   };
   forEach([&](const Facet& f) {
-    const double t = reach(f, faces(), path.p, path.d, free);
+    const double t = crossingParameter(f, faces(), path.p, path.d, free);
     if (t > 1) return;
     blocked = true;
     free = t;
   });
   if (!blocked) return false;
-  const Path way{path.p, path.d, free};
+  const Path freePath{path.p, path.d, free};
   bool found = false;
-  forEach([&](const Facet& f) { consider(f, way, hit, found); });
+  forEach([&](const Facet& f) { considerFacet(f, freePath, hit, found); });
   return found;
 }
 
-bool Nearby::meetBallOf(const Path& path, int only, Hit& hit) noexcept {
-  ball_.moveTo(path.p);
+bool ContactQuery::castBallGathered(const Path& path, int only, ObjectHit& hit) noexcept {
+  cache_.moveTo(path.p);
   bool found = false;
   if (only < 0 && planes_ != nullptr) {
-    for (const HalfSpace& plane : *planes_) consider(plane.facet, path, hit, found);
+    for (const PlacedPlane& plane : *planes_) considerFacet(plane.facet, path, hit, found);
   }
-  // What stopped it before will do so again: then nothing farther needs a closer look.
-  const int first = stopper_;
-  if (first < ball_.size()) considerGathered(first, path, only, hit, found);
+  // The facet that blocked the last cast often blocks this one: then farther ones need no exact test.
+  const int first = lastBlocker_;
+  if (first < cache_.size()) considerGathered(first, path, only, hit, found);
   const double length = path.d.norm();
-  const double touching = radius_ + 2 * ball_.thickestSkin();
+  const double touching = radius_ + 2 * cache_.maxSkin();
   for (int i = 0;; ++i) {
-    i = ball_.nextWithin(touching + (found ? hit.stop : path.limit) * length, i);
-    if (i == ball_.size()) return found;
+    i = cache_.nextWithin(touching + (found ? hit.stop : path.limit) * length, i);
+    if (i == cache_.size()) return found;
     if (i != first) considerGathered(i, path, only, hit, found);
   }
 }
 
-void Nearby::considerGathered(int i, const Path& path, int only, Hit& best, bool& found) noexcept {
-  const FacetBall::Name& name = ball_.name(i);
-  if (only >= 0 && name.object != only) return;
-  const double touching = radius_ + 2 * ball_.thickestSkin();
+void ContactQuery::considerGathered(int i, const Path& path, int only, ObjectHit& best,
+                                    bool& found) noexcept {
+  const FacetCache::TriangleId& id = cache_.triangle(i);
+  if (only >= 0 && id.object != only) return;
+  const double touching = radius_ + 2 * cache_.maxSkin();
   const double latest = found ? best.stop : path.limit;
-  if (ball_.nearest(i, latest * path.d) > touching) return;
-  const Facet* const f = facetOf(name.object, name.triangle);
-  if (f == nullptr) return ball_.leaveOut(i);
-  if (ball_.measured(i, nearestPointOf(*f, path.p), latest * path.d) > touching) return;
-  consider(*f, path, best, found);
-  if (found && best.stop < latest) stopper_ = i;
+  if (cache_.lowerBound(i, latest * path.d) > touching) return;
+  const Facet* const f = facetOf(id.object, id.triangle);
+  if (f == nullptr) return cache_.exclude(i);
+  if (cache_.refine(i, nearestPointOf(*f, path.p), latest * path.d) > touching) return;
+  considerFacet(*f, path, best, found);
+  if (found && best.stop < latest) lastBlocker_ = i;
 }
 
-bool Nearby::castTree(const Vec3& p, const Vec3& d, int only, Hit& hit) const noexcept {
+bool ContactQuery::castTree(const Vec3& p, const Vec3& d, int only, ObjectHit& hit) const noexcept {
   double free = 1;
   bool blocked = false;
   forEachOnSegment(p, d, 1, only, [&](const Facet& f) noexcept {
-    const double t = reach(f, faces(), p, d, free);
+    const double t = crossingParameter(f, faces(), p, d, free);
     if (t <= 1) {
       blocked = true;
       free = t;
@@ -353,27 +359,28 @@ bool Nearby::castTree(const Vec3& p, const Vec3& d, int only, Hit& hit) const no
   bool found = false;
   const Path path{p, d, free};
   forEachOnSegment(p, d, free, only, [&](const Facet& f) noexcept {
-    consider(f, path, hit, found);
+    considerFacet(f, path, hit, found);
     return 1.0;
   });
   return found;
 }
 
-// The index has no query for a swept ball: gather along the path from `begin` on, in steps that grow while
-// nothing is in the way and shrink when the array overflows.
-bool Nearby::castBall(const Vec3& p, const Vec3& d, double begin, int only, Hit& hit) noexcept {
+// The index has no query for a swept ball: gathers along the path from `begin` on, in steps that grow while
+// the path is free and shrink when the storage overflows.
+bool ContactQuery::castBallInSteps(const Vec3& p, const Vec3& d, double begin, int only,
+                                   ObjectHit& hit) noexcept {
   constexpr int kMaxSteps = 64;
   const double length = d.norm();
   double step = std::min(1.0, std::max(0.125 * radius_ / length, 1.0 / kMaxSteps));
   for (int i = 0; i < kMaxSteps && begin < 1; ++i) {
     step = std::min(step, 1 - begin);
     const Vec3 from = p + begin * d;
-    surround(from + 0.5 * step * d, 0.5 * step * length * kWiden);
-    if (!ball_.complete() && step > 1.0 / kMaxSteps) {
+    ensureGathered(from + 0.5 * step * d, 0.5 * step * length * kWiden);
+    if (!cache_.complete() && step > 1.0 / kMaxSteps) {
       step *= 0.25;
       continue;
     }
-    overflowed_ = overflowed_ || !ball_.complete();
+    overflowed_ = overflowed_ || !cache_.complete();
     if (castGathered(from, step * d, 1, only, hit)) {
       hit.stop = begin + step * hit.stop;
       return true;
@@ -384,25 +391,25 @@ bool Nearby::castBall(const Vec3& p, const Vec3& d, double begin, int only, Hit&
   return false;
 }
 
-bool Nearby::cast(const Vec3& p, const Vec3& g, Hit& hit) noexcept {
+bool ContactQuery::cast(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept {
   const Vec3 d = g - p;
   double free = 0;
-  if (ball_.covers(p, 0)) {
-    free = exitOf(p, d, ball_.centre(), ball_.reach());
+  if (cache_.covers(p, 0)) {
+    free = exitOf(p, d, cache_.centre(), cache_.reach());
     if (castGathered(p, d, free, -1, hit)) return true;
     if (free == 1) return false;
   }
-  return radius_ > 0 ? castBall(p, d, free, -1, hit) : castTree(p, d, -1, hit);
+  return radius_ > 0 ? castBallInSteps(p, d, free, -1, hit) : castTree(p, d, -1, hit);
 }
 
-bool Nearby::castBeginning(const Vec3& p, const Vec3& g, Hit& hit) noexcept {
-  if (!gathered(p)) return cast(p, g, hit);
+bool ContactQuery::castWithinGathered(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept {
+  if (!isGathered(p)) return cast(p, g, hit);
   const Vec3 d = g - p;
-  return castGathered(p, d, exitOf(p, d, ball_.centre(), ball_.reach()), -1, hit);
+  return castGathered(p, d, exitOf(p, d, cache_.centre(), cache_.reach()), -1, hit);
 }
 
-bool Nearby::castAt(int object, const Vec3& p, const Vec3& g, Hit& hit) noexcept {
-  return radius_ > 0 ? castBall(p, g - p, 0, object, hit) : castTree(p, g - p, object, hit);
+bool ContactQuery::castAtObject(int object, const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept {
+  return radius_ > 0 ? castBallInSteps(p, g - p, 0, object, hit) : castTree(p, g - p, object, hit);
 }
 
 }  // namespace hapticd::realtime

@@ -1,0 +1,176 @@
+// Broad and narrow phase of one tick: objects near the HIP, facets around the proxy, and casts against them.
+//
+// A tick costs about one traversal of the index: the facets around the proxy are gathered once, and the casts
+// of the move run over that array; only a path that leaves the gathered ball traverses the index again. The
+// indices propose candidates. Every decision is made here, in double precision and in the device frame, and
+// does not depend on the order of candidates.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "base/time.h"
+#include "realtime/render/facet_cache.h"
+#include "realtime/render/placed_planes.h"
+#include "scene/snapshot.h"
+
+namespace hapticd::realtime {
+
+using base::Nanos;
+using geometry::Affine;
+
+/// An object in this tick and, if it existed, in the previous one.
+struct PlacedObject {
+  const scene::ObjectState* state = nullptr;
+  Affine T_device_object = Affine::Identity();
+  Affine T_object_device = Affine::Identity();
+  double stretch = 1;                ///< largest number of object units per metre, over all directions
+  double skin = 0;                   ///< see facet.h
+  bool atRest = false;               ///< neither moves nor deforms any more in this scene
+  std::uint64_t restGeneration = 0;  ///< generation in which it was found at rest
+  bool mirrored = false;             ///< the placement contains a reflection, which reverses the winding
+  // Compared with the previous tick:
+  const scene::ObjectState* before = nullptr;  ///< null when it did not exist
+  Affine T_device_objectBefore = Affine::Identity();
+  bool moved = false;     ///< the placement changed
+  bool deformed = false;  ///< vertices changed under the same triangles
+  bool jumped = false;    ///< placement or triangles changed without interpolation
+
+  /// Corners in device metres.
+  scene::Corners corners(std::uint32_t triangle, Nanos now) const noexcept;
+  scene::Corners cornersBefore(std::uint32_t triangle, Nanos then) const noexcept;
+  /// The present position of a point that was fixed to the object in the previous tick.
+  Vec3 carried(const Vec3& p) const noexcept;
+};
+
+/// The first facet that blocks a path.
+struct ObjectHit : CastHit {
+  int object = 0;  ///< index of the near object; -1 - index for a plane of the scene
+  std::uint32_t triangle = 0;
+};
+
+/// A scene at the time of one tick. The snapshot must outlive the next tick, which compares with it.
+struct SceneAtTime {
+  const scene::SceneSnapshot* scene = nullptr;
+  Nanos time = 0;
+};
+
+/// Servo thread: noexcept, fixed storage, no allocation. Object indices are valid until the next beginTick().
+class ContactQuery {
+ public:
+  explicit ContactQuery(double toolRadius_m) noexcept : radius_(toolRadius_m), cache_(toolRadius_m) {}
+
+  /// Before a tick that does not follow the previous one: drops all that was kept from its scene.
+  void invalidate() noexcept { ++generation_; }
+  /// Starts a tick without objects. `planes` take part in every cast and must live until the next
+  /// beginTick().
+  void beginTick(const SceneAtTime& now, const SceneAtTime& before,
+                 const PlacedPlanes* planes = nullptr) noexcept;
+  /// Adds the objects within `reach` of `centre`; drops gathered facets that are out of date.
+  void addObjectsNear(const Vec3& centre, double reach) noexcept;
+  /// Adds one object by its id and returns its index; -1 when the scene does not contain it.
+  int addObject(std::int32_t id) noexcept;
+
+  int objectCount() const noexcept { return objectCount_; }
+  const PlacedObject& object(int i) const noexcept { return objects_[static_cast<std::size_t>(i)]; }
+
+  /// Gathers the facets that a tool inside the ball can touch, so that casts inside it need no index. False
+  /// when they exceed the storage; casts then use the index.
+  bool gather(const Vec3& centre, double radius) noexcept;
+  /// As gather(), but reuses facets gathered before, also in an earlier tick, if they cover the ball. A ball
+  /// tool gathers a reserve for that.
+  bool ensureGathered(const Vec3& centre, double radius) noexcept;
+  bool isGathered(const Vec3& p) const noexcept {
+    return cache_.complete() && (p - cache_.centre()).squaredNorm() < 0.64 * cache_.reach() * cache_.reach();
+  }
+  /// Calls visit(facet) for every gathered facet within `distance` of p and possibly for others. The
+  /// reference is valid until the next visit.
+  template <class Visit>
+  void forEachGathered(const Vec3& p, double distance, Visit&& visit) noexcept;
+
+  /// The first obstacle on the path from p to g; false when the path is free.
+  bool cast(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept;
+  /// The same for the start of the path only: as far as the gathered facets reach.
+  bool castWithinGathered(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept;
+  /// The same against one object only.
+  bool castAtObject(int object, const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept;
+
+  /// The same against one facet.
+  bool castAtFacet(const Facet& f, const Vec3& p, const Vec3& g, ObjectHit& hit) const noexcept;
+
+  /// Smallest skin of the near objects. Lengths below a fraction of it are rounding.
+  double minSkin() const noexcept { return minSkin_; }
+  /// Largest skin of the gathered facets.
+  double maxSkin() const noexcept { return cache_.maxSkin(); }
+  double toolRadius() const noexcept { return radius_; }
+  scene::TouchableFaces faces() const noexcept { return now_.scene->faces; }
+  /// True when objects or facets had to be left out in this tick.
+  bool overflowed() const noexcept { return overflowed_; }
+
+ private:
+  static constexpr int kMaxObjects = 64;
+  static constexpr int kMemoBits = 8;
+
+  // The result of makeFacet(); generation 0: not valid in the next tick.
+  struct MemoFacet {
+    std::uint64_t generation = 0;
+    const scene::ObjectState* state = nullptr;
+    Facet facet;
+  };
+
+  // p + t d, t in [0, limit].
+  struct Path {
+    const Vec3& p;
+    const Vec3& d;
+    double limit;
+  };
+
+  template <class Visit>
+  void forEachOnSegment(const Vec3& p, const Vec3& d, double limit, int only, Visit&& visit) const noexcept;
+  void addObjectsByIndex(const scene::SceneSnapshot& scene, const Vec3& centre, double reach) noexcept;
+  void add(const scene::ObjectState& state) noexcept;
+  bool place(const scene::ObjectState& state, PlacedObject& placed) const noexcept;
+  bool sameObjects() const noexcept;
+  void compareWithBefore(PlacedObject& placed) const noexcept;
+  const Facet* facetOf(int object, std::uint32_t triangle) const noexcept;
+  void considerFacet(const Facet& f, const Path& path, ObjectHit& best, bool& found) const noexcept;
+  bool castGathered(const Vec3& p, const Vec3& d, double limit, int only, ObjectHit& hit) noexcept;
+  bool castPointGathered(const Path& path, int only, ObjectHit& hit) noexcept;
+  bool castBallGathered(const Path& path, int only, ObjectHit& hit) noexcept;
+  void considerGathered(int i, const Path& path, int only, ObjectHit& best, bool& found) noexcept;
+  bool castTree(const Vec3& p, const Vec3& d, int only, ObjectHit& hit) const noexcept;
+  bool castBallInSteps(const Vec3& p, const Vec3& d, double begin, int only, ObjectHit& hit) noexcept;
+
+  double radius_;
+  SceneAtTime now_;
+  SceneAtTime before_;
+  const PlacedPlanes* planes_ = nullptr;
+  bool sameWorkspace_ = true;
+  std::array<PlacedObject, kMaxObjects> objects_;
+  int objectCount_ = 0;
+  double minSkin_ = 0;
+  FacetCache cache_;
+  int lastBlocker_ = 0;  // the gathered facet that blocked the last cast of a ball
+  // Generation and objects of the last gather(); 0: not reusable in another tick.
+  std::uint64_t gatheredGeneration_ = 0;
+  int gatheredCount_ = 0;
+  std::array<const scene::ObjectState*, kMaxObjects> gatheredFrom_{};
+  std::uint64_t generation_ = 1;  // of all that is kept from tick to tick
+  mutable std::array<MemoFacet, 1U << kMemoBits> facetMemo_;
+  bool overflowed_ = false;
+};
+
+template <class Visit>
+void ContactQuery::forEachGathered(const Vec3& p, double distance, Visit&& visit) noexcept {
+  if (radius_ == 0) {
+    for (const Facet& f : cache_) visit(f);
+    return;
+  }
+  cache_.moveTo(p);
+  for (int i = 0; (i = cache_.nextWithin(distance, i)) < cache_.size(); ++i) {
+    const Facet* const f = facetOf(cache_.triangle(i).object, cache_.triangle(i).triangle);
+    if (f != nullptr) visit(*f);
+  }
+}
+
+}  // namespace hapticd::realtime

@@ -1,0 +1,91 @@
+// The facets that a tool inside a ball around the proxy can touch, in fixed storage.
+//
+// Point tool: keeps the facets themselves. A path first discards the faces that have both of its ends on one
+// side, which leaves few. Ball tool: many triangles lie within its radius and few touch it. It keeps their
+// ids, with a lower bound of the distance and a supporting plane for each; exact facets are made only for
+// those that pass both tests.
+#pragma once
+
+#include <array>
+
+#include "realtime/render/facet.h"
+
+namespace hapticd::realtime {
+
+/// Servo thread: noexcept, no allocation.
+class FacetCache {
+ public:
+  static constexpr int kMaxFacets = 512;      ///< for a point tool
+  static constexpr int kMaxTriangles = 1024;  ///< for a ball tool
+
+  /// A triangle of a near object, both by index.
+  struct TriangleId {
+    std::uint32_t triangle = 0;
+    int object = 0;
+  };
+
+  /// Radius 0: a point tool.
+  explicit FacetCache(double toolRadius_m) noexcept : toolRadius_(toolRadius_m) {}
+
+  /// Clears the cache; from now on it collects the facets that a tool within `reach` of `centre` can touch.
+  void restart(const Vec3& centre, double reach) noexcept;
+  /// Point tool: adds a facet. A `deforming` one is kept at any distance.
+  void add(const Facet& facet, bool deforming) noexcept;
+  /// Ball tool: the same for a triangle. `distance`: lower bound of its distance from the centre.
+  void add(const TriangleId& id, double distance, double skin, bool deforming) noexcept;
+  /// Marks the cache as incomplete.
+  void invalidate() noexcept { complete_ = false; }
+
+  /// Whether the cache holds every facet that a tool within `radius` of p can touch.
+  bool covers(const Vec3& p, double radius) const noexcept {
+    return complete_ && (p - centre_).norm() + radius <= reach_;
+  }
+  bool complete() const noexcept { return complete_; }
+  const Vec3& centre() const noexcept { return centre_; }
+  double reach() const noexcept { return reach_; }
+  int size() const noexcept { return count_; }
+  double maxSkin() const noexcept { return maxSkin_; }
+
+  /// Point tool: the facets.
+  const Facet* begin() const noexcept { return facets_.data(); }
+  const Facet* end() const noexcept { return facets_.data() + count_; }
+
+  /// Ball tool: its present position.
+  void moveTo(const Vec3& p) noexcept;
+  const TriangleId& triangle(int i) const noexcept { return triangles_[static_cast<std::size_t>(i)]; }
+  /// The next triangle from i on whose lower bound is within `distance` of the tool; size() when there is
+  /// none.
+  int nextWithin(double distance, int i) const noexcept;
+  /// Lower bound of the distance while the tool moves by d; refine() makes it exact for the present position.
+  double lowerBound(int i, const Vec3& d) noexcept;
+  /// Replaces the bound by the exact distance: `foot` is the nearest point. Returns the new lowerBound().
+  double refine(int i, const Vec3& foot, const Vec3& d) noexcept;
+  /// Marks entry i as unreachable.
+  void exclude(int i) noexcept;
+  /// Point tool: all facets that the path p + t d, t in [0, limit], or a part of it from p on, may reach.
+  /// `found` has room for kMaxFacets. Returns how many.
+  int facetsNearPath(const Vec3& p, const Vec3& d, double limit, const Facet** found) const noexcept;
+
+ private:
+  // normal . x = offset: the plane of the face (point tool), or a plane with the face on its back (ball
+  // tool).
+  struct SupportPlane {
+    Vec3 normal;
+    double offset;
+  };
+
+  double toolRadius_;
+  Vec3 centre_ = Vec3::Zero();
+  double reach_ = 0;
+  bool complete_ = false;
+  int count_ = 0;
+  double maxSkin_ = 0;  // over all entries
+  std::array<SupportPlane, kMaxTriangles> supportPlanes_;
+  std::array<Facet, kMaxFacets> facets_;
+  Vec3 toolPosition_ = Vec3::Zero();
+  double travel_ = 0;                            // of the tool since restart()
+  std::array<double, kMaxTriangles> distances_;  // lower bounds, plus the travel at that time
+  std::array<TriangleId, kMaxTriangles> triangles_;
+};
+
+}  // namespace hapticd::realtime

@@ -1,0 +1,67 @@
+// The planes of the scene that belong to no object, as they are placed in this tick.
+//
+// A plane is a facet without edges that every cast tests. This file adds the rest: a new placement rises
+// under the HIP, texture and buzz change its height, and adhesion pulls on a HIP that leaves.
+#pragma once
+
+#include <array>
+
+#include "base/time.h"
+#include "realtime/render/facet.h"
+#include "scene/snapshot.h"
+
+namespace hapticd::realtime {
+
+using base::Nanos;
+
+/// One plane of the scene in this tick.
+struct PlacedPlane {
+  const scene::Plane* state = nullptr;
+  Facet facet;                  ///< unbounded, device metres; facet.object is -1 - index
+  scene::Surface surface;       ///< weaker while the plane ramps out
+  double insertionDepth_m = 0;  ///< depth of the HIP at the placement; 0 unless placed in this tick
+};
+
+/// All planes, with their state from tick to tick. Servo thread: noexcept, no allocation.
+class PlacedPlanes {
+ public:
+  /// Starts a tick: places the planes of `scene`. `hip` and `proxy` in device metres.
+  void place(const scene::SceneSnapshot& scene, Nanos now, const Vec3& hip, const Vec3& proxy,
+             double toolRadius_m) noexcept;
+  /// Ends a tick: bit i of `touched` is set when plane i holds the proxy.
+  void remember(unsigned touched, const Vec3& proxy) noexcept;
+  void reset() noexcept { memoryCount_ = 0; }
+
+  const PlacedPlane* begin() const noexcept { return planes_.data(); }
+  const PlacedPlane* end() const noexcept { return planes_.data() + count_; }
+  const PlacedPlane& operator[](int i) const noexcept { return planes_[static_cast<std::size_t>(i)]; }
+
+  /// Adhesive force on a HIP that leaves, device frame, newtons. A plane whose limit is exceeded lets go.
+  Vec3 adhesion(const Vec3& hip, double toolRadius_m) noexcept;
+
+ private:
+  struct Memory {
+    std::int32_t index = 0;
+    std::uint32_t placement = 0;
+    Nanos placed = 0;
+    Nanos releaseBegin = -1;
+    double depth_m = 0;  ///< of the HIP at the placement
+    bool touched = false;
+    bool adheres = false;
+    Vec3 firstContact = Vec3::Zero();
+  };
+
+  Memory& memoryOf(const scene::Plane& plane, Nanos now, double depth_m, bool& fresh) noexcept;
+  void forgetAllExcept(const scene::SceneSnapshot& scene) noexcept;
+  bool placeOne(const geometry::Affine& T_world_device, Nanos now, const Vec3& hip, const Vec3& proxy,
+                double toolRadius_m, PlacedPlane& placed) noexcept;
+  static double heightOf(const scene::Plane& plane, const Memory& memory, Nanos now, const Vec3& normal,
+                         const Vec3& proxy, double metresPerUnit) noexcept;
+
+  std::array<PlacedPlane, scene::kMaxPlanes> planes_;
+  int count_ = 0;
+  std::array<Memory, scene::kMaxPlanes> memory_;
+  int memoryCount_ = 0;
+};
+
+}  // namespace hapticd::realtime
