@@ -8,7 +8,7 @@ source_dir=$2
 "$hapticd" stop "Phantom@$address" | grep -q 'forces are off'
 "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --server "Phantom@$address" --seconds 4 >"$work/stopped"
 awk '/peak force/ { if ($3 != 0) felt = 1 } END { exit felt }' "$work/stopped" || { cat "$work/stopped"; exit 1; }
-"$hapticd" stop --rearm "Phantom@tcp://$address" | grep -q 'may come back'
+"$hapticd" stop --rearm "Phantom@tcp://$address" | grep -q 'forces ramp in'
 "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --server "Phantom@$address" --seconds 6 >"$work/felt"
 awk '/peak force/ { if ($3 > 0.1) felt = 1 } END { exit !felt }' "$work/felt" || { cat "$work/felt"; exit 1; }
 grep -q 'stops the forces' "$work/log"
