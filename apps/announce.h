@@ -1,4 +1,4 @@
-// What a server says at its start: where it listens, under which names, and where its page is.
+// Logs the addresses, device names and viewer URL of a server at its start.
 #pragma once
 
 #include <string_view>
@@ -7,7 +7,7 @@
 
 namespace hapticd::apps {
 
-/// Logs it; `driver` in place of those of the configuration, if given.
+/// `driver` replaces the drivers of the configuration in the log, if not empty.
 void announce(const server::Server& server, const server::ServerConfig& config, std::string_view driver = {});
 
 }  // namespace hapticd::apps

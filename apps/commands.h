@@ -1,4 +1,4 @@
-// The subcommands of hapticd: one file each, registered here.
+// The subcommands of hapticd, one file each.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -8,10 +8,10 @@
 
 namespace hapticd::apps {
 
-/// What the process returns; a subcommand's callback sets it.
+/// Exit status of the process, set by the subcommand's callback.
 inline int exitCode = 0;
 
-/// A number from `least` to `most`. CLI11's own ranges let NaN pass.
+/// Accepts a number from `least` to `most`. CLI11's own ranges accept NaN.
 inline CLI::Validator within(double least, double most) {
   std::ostringstream range;
   range << least << " to " << most;
@@ -19,11 +19,11 @@ inline CLI::Validator within(double least, double most) {
       [least, most, range = range.str()](std::string& text) {
         double value = std::nan("");
         if (CLI::detail::lexical_cast(text, value) && value >= least && value <= most) return std::string();
-        return "'" + text + "' is not a number from " + range;
+        return "must be a number from " + range + ", got '" + text + "'";
       },
       range.str());
 }
-/// Longest time an option may name, in seconds: 30 years.
+/// Largest duration that an option accepts, in seconds: 30 years.
 inline constexpr double kLongest_s = 1e9;
 
 void addServe(CLI::App& app);

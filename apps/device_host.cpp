@@ -1,4 +1,4 @@
-// hapticd device-host: a driver in a process of its own. The server starts it; people do not.
+// hapticd device-host: runs one driver in its own process (the isolation host). Started by the server, not by people.
 #include <memory>
 #include <string>
 
@@ -11,9 +11,9 @@ namespace hapticd::apps {
 
 void addDeviceHost(CLI::App& app) {
   auto text = std::make_shared<std::string>();
-  CLI::App* command = app.add_subcommand(server::kDeviceHostCommand, "A driver in a process of its own");
-  command->group("");  // not for people: no line in the help
-  command->add_option("config", *text, "Configuration with the one device, as TOML")->required();
+  CLI::App* command = app.add_subcommand(server::kDeviceHostCommand, "Run one driver in its own process; started by the server");
+  command->group("");  // hidden from the help
+  command->add_option("config", *text, "Configuration with exactly one device, as TOML")->required();
   command->callback([text] {
     const server::DeviceConfig config = server::parseConfig(*text, "configuration").devices.front();
     const auto device = server::makeDevice(config);

@@ -1,4 +1,4 @@
-// How found devices are told, to 'devices' and 'doctor' alike.
+// Prints found devices, for 'devices' and 'doctor'.
 #pragma once
 
 #include <vector>

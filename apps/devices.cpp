@@ -1,4 +1,4 @@
-// hapticd devices: what can be touched with on this machine, and why the rest cannot.
+// hapticd devices: lists the haptic devices of this machine, and the reason and remedy for drivers without one.
 #include <cstdio>
 #include <memory>
 
@@ -14,7 +14,7 @@ void printDevices(const std::vector<device::DriverReport>& reports) {
     if (!report.reason.empty()) std::printf("  missing  %s\n", report.reason.c_str());
     if (!report.remedy.empty()) std::printf("  remedy   %s\n", report.remedy.c_str());
   }
-  std::printf("simulated\n  found    a hand made of arithmetic, always there\n");
+  std::printf("simulated\n  found    a simulated hand, always available\n");
 }
 
 void addDevices(CLI::App& app) {
@@ -23,11 +23,11 @@ void addDevices(CLI::App& app) {
       app.add_subcommand("devices", "List the haptic devices found, and why others cannot be used");
   command->add_flag(
       "--open", options->openThem,
-      "Also open, without force, what shows itself in no other way (takes the device for a moment)");
-  command->add_option("--haply-host", options->haplyHost, "Where the Haply service runs")
+      "Also open devices that can be detected in no other way, without force (occupies the device briefly)");
+  command->add_option("--haply-host", options->haplyHost, "Host of the Haply service")
       ->capture_default_str();
-  command->add_option("--haply-port", options->haplyPort, "Its port")->capture_default_str();
-  command->footer("'hapticd serve --device DRIVER' uses one; udev rules are in packaging/udev.");
+  command->add_option("--haply-port", options->haplyPort, "Port of the Haply service")->capture_default_str();
+  command->footer("'hapticd serve --device DRIVER' uses a device; udev rules are in packaging/udev.");
   command->callback([options] { printDevices(device::findDevices(*options)); });
 }
 

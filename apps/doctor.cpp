@@ -1,4 +1,4 @@
-// hapticd doctor: checks what a newcomer trips over, measures the loop, and ends in a verdict with the
+// hapticd doctor: checks the usual causes of trouble on a machine, measures the servo loop, and prints a verdict with
 // remedies.
 #include <netinet/in.h>
 #include <sys/resource.h>
@@ -66,17 +66,17 @@ Finding memoryLock() {
     return {Verdict::good, "memory can be locked without limit", ""};
   const auto kib = static_cast<unsigned long>(limit.rlim_cur / 1024);
   return {
-      Verdict::note, "only " + std::to_string(kib) + " KiB of memory may be locked",
+      Verdict::note, "only " + std::to_string(kib) + " KiB of memory can be locked",
       "a page fault in the loop costs up to a millisecond: raise memlock as above ('ulimit -l' shows it)"};
 }
 
 Finding governor() {
   const std::string name = firstLine("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor");
   if (name.empty())
-    return {Verdict::note, "no CPU frequency governor to be seen (usual in virtual machines)", ""};
+    return {Verdict::note, "no CPU frequency governor found (usual in virtual machines)", ""};
   if (name == "performance") return {Verdict::good, "CPU governor is 'performance'", ""};
   return {Verdict::note, "CPU governor is '" + name + "'",
-          "sudo cpupower frequency-set -g performance (a sleeping core wakes up late)"};
+          "sudo cpupower frequency-set -g performance (idle cores wake up late)"};
 }
 
 Finding timerResolution() {
@@ -86,24 +86,24 @@ Finding timerResolution() {
   if (nanoseconds <= 1000)
     return {Verdict::good, "timer resolution is " + std::to_string(nanoseconds) + " ns", ""};
   return {Verdict::bad, "timer resolution is " + std::to_string(nanoseconds) + " ns",
-          "the kernel lacks high-resolution timers (CONFIG_HIGH_RES_TIMERS): a 1 kHz loop cannot keep time"};
+          "use a kernel with high-resolution timers (CONFIG_HIGH_RES_TIMERS): a 1 kHz loop needs them"};
 }
 
-// Where system calls of other programs are not interrupted, even SCHED_FIFO waits for their end.
+// Without preemption of system calls, even a SCHED_FIFO thread waits for other programs' calls to finish.
 Finding preemption() {
   utsname kernel{};
   uname(&kernel);
   const std::string build = kernel.version;
-  const std::string asked = firstLine("/proc/cmdline");
+  const std::string bootOptions = firstLine("/proc/cmdline");
   if (build.find("PREEMPT_RT") != std::string::npos)
-    return {Verdict::good, "the kernel is a realtime one (PREEMPT_RT)", ""};
-  const bool canBe = build.find("PREEMPT") != std::string::npos;
-  const bool chosen =
-      build.find("PREEMPT_DYNAMIC") == std::string::npos || asked.find("preempt=full") != std::string::npos;
-  if (canBe && chosen) return {Verdict::good, "system calls of others are interrupted for the loop", ""};
+    return {Verdict::good, "the kernel is a realtime kernel (PREEMPT_RT)", ""};
+  const bool preemptible = build.find("PREEMPT") != std::string::npos;
+  const bool enabled =
+      build.find("PREEMPT_DYNAMIC") == std::string::npos || bootOptions.find("preempt=full") != std::string::npos;
+  if (preemptible && enabled) return {Verdict::good, "the kernel preempts system calls of other programs", ""};
   return {Verdict::note,
           "long system calls of other programs may delay the loop by milliseconds (kernel: " + build + ")",
-          canBe ? "boot with preempt=full, or use a kernel with PREEMPT_RT" : "use a kernel with PREEMPT_RT"};
+          preemptible ? "boot with preempt=full, or use a kernel with PREEMPT_RT" : "use a kernel with PREEMPT_RT"};
 }
 
 Finding portFree(int type, const char* protocol, std::uint16_t port) {
@@ -119,7 +119,7 @@ Finding portFree(int type, const char* protocol, std::uint16_t port) {
   const std::string name = std::string(protocol) + " port " + std::to_string(port);
   if (free) return {Verdict::good, name + " is free", ""};
   return {Verdict::note, name + " is in use",
-          "a VRPN server runs already? Else: hapticd serve --listen 127.0.0.1:3884"};
+          "if that is not the server you want, use another port: hapticd serve --listen 127.0.0.1:3884"};
 }
 
 Finding isolation(double seconds) {
@@ -128,15 +128,14 @@ Finding isolation(double seconds) {
     const IsolationCheck check = measureIsolation(seconds);
     char text[256];
     std::snprintf(text, sizeof text,
-                  "from its post to the tick p50 %.1f us, p99 %.1f us, max %.1f us (medians of %d rounds); "
-                  "and one tick of "
-                  "delay",
+                  "from the driver's post to the tick p50 %.1f us, p99 %.1f us, max %.1f us (medians of %d rounds), "
+                  "plus one tick of delay",
                   check.postToTick_us.p50, check.postToTick_us.p99, check.postToTick_us.max, check.rounds);
     if (check.postToTick_us.p99 < kCheap_us) return {Verdict::good, text, ""};
     return {Verdict::note, text,
             "more than 20 us at the 99th percentile: realtime rights and a quiet machine help"};
   } catch (const std::exception& error) {
-    return {Verdict::note, std::string("cannot be measured: ") + error.what(), ""};
+    return {Verdict::note, std::string("the measurement failed: ") + error.what(), ""};
   }
 }
 
@@ -170,9 +169,9 @@ int run(double seconds, std::uint16_t port) {
       loop.wakeup_us.p50, loop.wakeup_us.p99, loop.wakeup_us.max, loop.compute_us.p99);
   const bool steady = loop.wakeup_us.p99 < 100 && loop.overruns * 1000 <= loop.ticks;
   add({steady ? Verdict::good : Verdict::bad, text,
-       steady ? "" : "close other programs, give the loop realtime rights, or use a kernel with PREEMPT_RT"});
+       steady ? "" : "close other programs, get realtime rights for the loop, or use a kernel with PREEMPT_RT"});
 
-  std::printf("a driver in a process of its own (--isolate), %g s\n", seconds);
+  std::printf("a driver in its own process (--isolate), %g s\n", seconds);
   std::fflush(stdout);
   add(isolation(seconds));
 
@@ -185,9 +184,9 @@ int run(double seconds, std::uint16_t port) {
   if (bad == 0) {
     std::printf("verdict: ready to render forces (%d notes above)\n", notes);
   } else {
-    std::printf(
-        "verdict: %d thing(s) to mend first, see -> above; the simulated hand runs with --allow-no-rt\n",
-        bad);
+    const std::string problems = bad == 1 ? "problem" : std::to_string(bad) + " problems";
+    std::printf("verdict: fix the %s marked -> above first; the simulated hand runs with --allow-no-rt\n",
+                problems.c_str());
   }
   return bad == 0 ? 0 : 1;
 }
@@ -203,11 +202,11 @@ void addDoctor(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "doctor",
       "Check this machine: realtime rights, memory lock, governor, timer, ports, vendor libraries, the loop");
-  command->add_option("--seconds", options->seconds, "How long to measure the loop")
+  command->add_option("--seconds", options->seconds, "Duration of the loop measurement")
       ->check(within(0.1, 3600))
       ->capture_default_str();
-  command->add_option("--port", options->port, "Port to look at")->capture_default_str();
-  command->footer("Returns 0 when nothing needs mending, 1 otherwise.");
+  command->add_option("--port", options->port, "TCP and UDP port to check")->capture_default_str();
+  command->footer("Exit status: 0 when ready, 1 when a problem must be fixed first.");
   command->callback([options] { exitCode = run(options->seconds, options->port); });
 }
 

@@ -20,7 +20,7 @@ using namespace std::chrono_literals;
 
 constexpr int kRounds = 5;
 
-// Sorted, of one process and one loop.
+// Times of one process and one loop, sorted.
 std::vector<Nanos> measureRound(std::size_t ticks) {
   server::ServerConfig config;
   device::IsolatedDevice device(

@@ -1,4 +1,4 @@
-// What a driver in a process of its own costs on this machine.
+// Measures the delay of a driver in its own process on this machine.
 #pragma once
 
 #include "loop_check.h"
@@ -7,11 +7,11 @@ namespace hapticd::apps {
 
 struct IsolationCheck {
   int rounds = 0;
-  Percentiles postToTick_us;  ///< each the median over the rounds; in one process there is no such way
+  Percentiles postToTick_us;  ///< from the driver process to the servo tick; each figure is the median over the rounds
 };
 
-/// Runs the simulated hand in a process of its own, in several rounds, for `seconds` in all. Throws
-/// std::runtime_error when there can be no process.
+/// Runs the simulated device in its own process, in several rounds, for `seconds` in total. Throws
+/// std::runtime_error when the process cannot be started.
 IsolationCheck measureIsolation(double seconds);
 
 }  // namespace hapticd::apps

@@ -45,18 +45,18 @@ std::string bytesText(double bytes) {
 
 void ProgressBar::show(std::uint64_t done, std::uint64_t total) {
   const int percent = total == 0 ? 100 : static_cast<int>(done * 100 / total);
-  if (percent == shown_percent_) return;
+  if (percent == shownPercent_) return;
   const std::string amount =
       bytesText(static_cast<double>(done)) + " of " + bytesText(static_cast<double>(total));
   if (onTerminal()) {
     constexpr int kWidth = 40;
     const std::string bar(static_cast<std::size_t>(percent * kWidth / 100), '#');
     std::printf("\r%s [%-*s] %3d %% %s\x1b[K", title_.c_str(), kWidth, bar.c_str(), percent, amount.c_str());
-  } else if (shown_percent_ < 0 || percent / 10 > shown_percent_ / 10) {
+  } else if (shownPercent_ < 0 || percent / 10 > shownPercent_ / 10) {
     std::printf("%s %d %% %s\n", title_.c_str(), percent, amount.c_str());
   }
   std::fflush(stdout);
-  shown_percent_ = percent;
+  shownPercent_ = percent;
 }
 
 void ProgressBar::finish() {
@@ -65,7 +65,7 @@ void ProgressBar::finish() {
 
 void LiveTable::show(const std::vector<std::string>& lines) {
   if (height_ > 0) std::printf("\x1b[%zuA", height_);
-  const std::size_t width = terminalWidth();  // a line that wrapped would be two of the next redraw
+  const std::size_t width = terminalWidth();  // a wrapped line would count as two in the next redraw
   for (const std::string& line : lines) std::printf("%s\x1b[K\n", cutTo(line, width - 1).c_str());
   std::printf("\x1b[J");
   std::fflush(stdout);

@@ -1,5 +1,4 @@
-// What changes while one looks at it: a progress bar and a table that are redrawn in place on a terminal, and
-// are plain lines now and then everywhere else.
+// A progress bar and a table that are redrawn in place on a terminal; elsewhere the progress bar prints plain lines.
 #pragma once
 
 #include <cstdint>
@@ -8,10 +7,10 @@
 
 namespace hapticd::apps {
 
-/// Whether standard output is a terminal that understands cursor movements.
+/// Whether standard output is a terminal that supports cursor movement.
 bool onTerminal();
 
-/// "1.8 MB" and the like.
+/// A size for people, e.g. "1.8 MB".
 std::string bytesText(double bytes);
 
 /// A bar on a terminal, a line for each 10 % elsewhere.
@@ -19,15 +18,15 @@ class ProgressBar {
  public:
   explicit ProgressBar(std::string title) : title_(std::move(title)) {}
   void show(std::uint64_t done, std::uint64_t total);
-  /// Ends the line of the bar.
+  /// Ends the line of the bar on a terminal.
   void finish();
 
  private:
   std::string title_;
-  int shown_percent_ = -1;
+  int shownPercent_ = -1;
 };
 
-/// Lines that replace each other in place; for terminals only.
+/// Lines that are redrawn in place; for terminals only.
 class LiveTable {
  public:
   void show(const std::vector<std::string>& lines);

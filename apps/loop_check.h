@@ -1,4 +1,4 @@
-// Runs the real servo loop with the simulated hand for a while and tells how it kept time.
+// Measures the timing of the real servo loop with the simulated hand.
 #pragma once
 
 #include <cstdint>
@@ -14,14 +14,14 @@ struct Percentiles {
 };
 
 struct LoopCheck {
-  std::vector<std::string> setup;  ///< what the system granted the thread, one sentence each
+  std::vector<std::string> setup;  ///< scheduling and memory lock as granted or refused, one sentence each
   std::uint64_t ticks = 0;
   std::uint64_t overruns = 0;  ///< ticks that started more than 0.5 ms late
   Percentiles wakeup_us;
   Percentiles compute_us;
 };
 
-/// Blocks for `seconds`. Throws std::runtime_error when no thread can be had.
+/// Blocks for `seconds`. Throws std::runtime_error when the system refuses a thread.
 LoopCheck measureLoop(double seconds);
 
 }  // namespace hapticd::apps

@@ -11,7 +11,7 @@ int main(int argc, char** argv) {
   CLI::App app{
       "hapticd: a haptics server that speaks VRPN.\n"
       "One process owns a haptic device, takes a scene from any VRPN client, renders forces at 1 kHz\n"
-      "and tells all clients what the hand feels.\n\n"
+      "and reports pose, contact and force to all clients.\n\n"
       "A first touch, without hardware, in two terminals:\n"
       "  hapticd serve\n"
       "  hapticd touch bunny.obj --server Phantom@localhost"};
@@ -35,7 +35,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::RequiredError& error) {
     const std::vector<std::string> rest = app.remaining();
     if (app.get_subcommands().empty() && !rest.empty()) {
-      std::fprintf(stderr, "hapticd: there is no command '%s'; hapticd --help lists them\n", rest[0].c_str());
+      std::fprintf(stderr, "hapticd: unknown command '%s'; 'hapticd --help' lists the commands\n", rest[0].c_str());
       return 2;
     }
     return app.exit(error) == 0 ? 0 : 2;

@@ -1,4 +1,4 @@
-// hapticd serve: one process that owns the device and answers VRPN clients.
+// hapticd serve: owns the devices and serves them to VRPN clients.
 #include <spdlog/spdlog.h>
 
 #include <cstdio>
@@ -37,7 +37,7 @@ void applyFlags(const Options& options, server::DeviceConfig& device) {
   if (!options.driver.empty()) {
     const std::size_t colon = options.driver.find(':');
     const std::string driver = options.driver.substr(0, colon);
-    // What one driver calls its device says nothing to another.
+    // The hardware name of one driver means nothing to another.
     if (driver != device.driver) device.hardware.clear();
     device.driver = driver;
     if (colon != std::string::npos) device.hardware = options.driver.substr(colon + 1);
@@ -61,7 +61,7 @@ server::ServerConfig configOf(const Options& options, std::vector<std::string>& 
   if (!options.record.empty()) config.record = options.record;
   if (!options.names.empty()) config.devices.front().names = options.names;
   applyFlags(options, config.devices.front());
-  // vrpn.cfg has no words for most of the flags.
+  // vrpn.cfg has no fields for most flags, so they apply to all of its devices.
   if (file.extension() == ".cfg") {
     for (server::DeviceConfig& device : config.devices) applyFlags(options, device);
   }
@@ -104,58 +104,58 @@ void addServe(CLI::App& app) {
 
   CLI::App* command = app.add_subcommand("serve", "Own a haptic device and serve it to VRPN clients");
   command
-      ->add_option("--config", options->configFile, "TOML file with everything below and more, or a vrpn.cfg")
+      ->add_option("--config", options->configFile, "TOML file with all settings, or a vrpn.cfg; flags override it")
       ->check(CLI::ExistingFile);
   command->add_flag("--check-config", options->checkConfig,
-                    "Print the configuration in effect as TOML, or what is wrong with it, and end");
+                    "Print the configuration in effect as TOML, or the error in it, and exit");
   command->add_option("--listen", options->listen,
                       "ADDR:PORT for TCP and UDP [127.0.0.1:3883]; 0.0.0.0 for all networks");
   command->add_option(
       "--http", options->http,
-      "ADDR:PORT of the page for browsers, its data and the metrics [127.0.0.1:8080 when it is\n"
-      "free, else none]; 'off' for none; 0.0.0.0:8080 for all networks");
+      "ADDR:PORT of the viewer, its data and the metrics [127.0.0.1:8080 if free, otherwise\n"
+      "none]; 'off' for none; 0.0.0.0:8080 for all networks");
   command->add_option(
       "--http-allow", options->httpAllow,
-      "Further name, HOST or HOST:PORT, by which browsers may call this server; repeat it for\n"
-      "more. Addresses and localhost need none");
+      "HOST or HOST:PORT by which browsers may open the viewer; repeat it for more.\n"
+      "IP addresses and localhost are always allowed");
   command->add_option("--name", options->names,
-                      "Name that clients ask for [Phantom]; repeat it for more names");
+                      "Device name that clients open [Phantom]; repeat it for more names");
   command->add_option(
       "--device", options->driver,
-      "Driver [simulated]: " + drivers + "\nDRIVER:WHICH picks one of several, e.g. evdev:/dev/input/event5");
+      "Driver [simulated]: " + drivers + "\nDRIVER:WHICH selects one of several devices, e.g. evdev:/dev/input/event5");
   command->add_flag("--enable-forces", options->enableForces,
-                    "Real devices start without force unless this is given");
+                    "Enable forces on a real device; without this flag it starts disarmed");
   command->add_flag(
       "--calibrate", options->calibrate,
-      "Consent to calibrate at the start, and when re-armed after that was lost; may move the arm");
+      "Consent to calibration at the start and at a re-arm after it was lost; MAY MOVE THE ARM");
   command->add_flag("--isolate", options->isolate,
-                    "Run the driver in a process of its own: its crash is then a fault, not the end");
+                    "Run the driver in its own process: a crash is then a fault, not the end of the server");
   command->add_option(
       "--hand", options->hand,
-      "Simulated device: 'script' explores whatever is in the scene [script], FILE.csv follows the path\n"
+      "Simulated device: 'script' strokes the objects of the scene [script], FILE.csv follows the path\n"
       "t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons]");
-  command->add_option("--report-rate", options->reportRate_Hz, "Reports a second [1000]")
+  command->add_option("--report-rate", options->reportRate_Hz, "Reports per second [1000]")
       ->check(within(0.1, 4000));
   command->add_option("--seconds", options->seconds, "Stop after this time [until a signal]")
       ->check(within(0.001, kLongest_s));
   command->add_option(
       "--record", options->record,
-      "Write a session file of all that happens, for replay, render --session and export; %Y%m%d-%H%M%S in\n"
-      "the name becomes the time");
+      "Write a recording (all scene commands and ticks) for replay, render and export; %Y%m%d-%H%M%S\n"
+      "in the name becomes the time");
   command->add_flag("--allow-no-rt", options->allowNoRealtime,
-                    "Run although the system refuses realtime rights (fine for the simulated hand)");
+                    "Run even if the system refuses realtime rights (fine for the simulated hand)");
   command->add_flag("-v,--verbose", options->verbose, "Log more");
   command->footer(
       "Clients open NAME@HOST, NAME@HOST:PORT or NAME@tcp://HOST:PORT as Tracker, Button or ForceDevice.\n"
       "Examples:\n"
       "  hapticd serve                                    the simulated hand, on this machine only\n"
       "  hapticd serve --name Tracker0 --name Button0     more names for one device\n"
-      "  hapticd serve --listen 0.0.0.0:3883              for other machines, too\n"
+      "  hapticd serve --listen 0.0.0.0:3883              for other machines as well\n"
       "  hapticd serve --http 0.0.0.0:8080 --http-allow lab7  the page at http://lab7:8080/ from other "
       "machines\n"
       "  hapticd serve --config vrpn.cfg --device simulated   a VRPN server's file, without its hardware\n"
-      "  hapticd serve --config my.toml --check-config    is the file right, and what does it mean?\n"
-      "'hapticd doctor' tells how to get realtime rights.");
+      "  hapticd serve --config my.toml --check-config    check a file and print its settings\n"
+      "'hapticd doctor' explains how to get realtime rights.");
   command->callback([options] { exitCode = run(*options); });
 }
 

@@ -1,4 +1,4 @@
-// SIGINT and SIGTERM end a server in order.
+// SIGINT and SIGTERM shut a server down in order: zero force first.
 #pragma once
 
 #include <pthread.h>
@@ -10,7 +10,7 @@
 
 namespace hapticd::apps {
 
-/// Zero force first. Must be made before any other thread.
+/// Blocks both signals in the calling thread, so construct it before any other thread starts.
 class StopOnSignal {
  public:
   StopOnSignal() {
@@ -19,6 +19,7 @@ class StopOnSignal {
     sigaddset(&signals_, SIGTERM);
     pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
   }
+  /// Calls server.stop() at the first signal, from a separate thread; `server` outlives this.
   void watch(server::Server& server) {
     thread_ = std::thread([this, &server] {
       int signal = 0;

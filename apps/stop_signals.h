@@ -1,9 +1,9 @@
-// Ctrl-C and SIGTERM as a flag.
+// SIGINT (Ctrl-C) and SIGTERM as a flag.
 #pragma once
 
 namespace hapticd::apps {
 
-/// Turns SIGINT and SIGTERM into a flag as long as it lives. One at a time.
+/// While it lives, SIGINT and SIGTERM set a flag instead of ending the process. One instance at a time.
 class StopSignals {
  public:
   StopSignals();
@@ -17,7 +17,7 @@ class StopSignals {
   Handler terminate_;
 };
 
-/// Whether one of them has come.
+/// Whether one of the two signals arrived.
 bool stopRequested();
 
 }  // namespace hapticd::apps

@@ -1,9 +1,8 @@
-// hapticd touch: sends a mesh to a haptics server as any client would, and shows what is felt.
+// hapticd touch: sends a mesh to a haptics server as any client would, and shows contact and force.
 //
-// The mesh is scaled by the client and no workspace is sent, so that one unit is one millimetre of the
-// device: the object has the size it is told to have on every device, where a workspace box would stretch it
-// to whatever the device can reach. Without --size-mm it fills 80 % of the smallest common device, at most
-// 100 mm.
+// The client scales the mesh and sends no workspace, so that one unit is one millimetre of the device and the
+// object has the requested size on every device; a workspace box would stretch it to the reach of the device.
+// Without --size-mm the mesh fills 80 % of the smallest common device, at most 100 mm.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -13,8 +12,8 @@
 #include <vector>
 
 #include "commands.h"
-#include "felt.h"
-#include "felt_view.h"
+#include "report_summary.h"
+#include "report_view.h"
 #include "geometry/crossings.h"
 #include "geometry/mesh_check.h"
 #include "geometry/triangle_mesh.h"
@@ -36,7 +35,7 @@ struct TouchOptions {
   Surface surface{.stiffness = 0.8F, .damping = 0.1F, .static_friction = 0.3F, .dynamic_friction = 0.2F};
   int object = 0;
   double size_mm = 0;
-  bool keep_scene = false;
+  bool keepScene = false;
   bool json = false;
 };
 
@@ -50,14 +49,14 @@ std::string extentsText(const TriangleMesh& mesh) {
 void scaleIntoWorkspace(TriangleMesh& mesh, double size_mm) {
   const geometry::Vec3 kTouch_mm(160, 120, 70);
   constexpr double kFill = 0.8;
-  constexpr double kMostByItself_mm = 100;
+  constexpr double kLargestDefault_mm = 100;
   const geometry::Box bounds = geometry::boundsOf(mesh);
   const geometry::Vec3 extents = bounds.extents().cwiseMax(1e-12);
   if (bounds.empty() || bounds.extents().maxCoeff() <= 0) {
-    throw std::runtime_error("the mesh has no extent: nothing to touch");
+    throw std::runtime_error("the mesh has no extent, so there is nothing to touch");
   }
   const double fitting = std::min((kFill * kTouch_mm.array() / extents.array()).minCoeff(),
-                                  kMostByItself_mm / extents.maxCoeff());
+                                  kLargestDefault_mm / extents.maxCoeff());
   const double scale = size_mm > 0 ? size_mm / extents.maxCoeff() : fitting;
   geometry::scaleAndMove(mesh, scale, -scale * bounds.centre());
 }
@@ -66,7 +65,7 @@ TriangleMesh load(const TouchOptions& options) {
   TriangleMesh mesh = mesh_io::loadMesh(options.mesh);
   std::printf("%s: %zu vertices, %zu triangles, %s units\n", options.mesh.c_str(), mesh.vertices.size(),
               mesh.triangles.size(), extentsText(mesh).c_str());
-  if (mesh.triangles.empty()) throw std::runtime_error(options.mesh + " has no triangles: nothing to touch");
+  if (mesh.triangles.empty()) throw std::runtime_error(options.mesh + " has no triangles, so there is nothing to touch");
   auto findings = geometry::describe(geometry::checkMesh(mesh.vertices, mesh.triangles));
   for (std::string& finding : geometry::describe(geometry::findCrossings(mesh.vertices, mesh.triangles)))
     findings.push_back(std::move(finding));
@@ -86,7 +85,7 @@ void send(Client& client, const TriangleMesh& mesh, const TouchOptions& options)
       corners.push_back({v.x(), v.y(), v.z()});
     }
   }
-  if (!options.keep_scene) client.resetScene();
+  if (!options.keepScene) client.resetScene();
   client.setObjectCount(options.object + 1);
   client.setSurface(options.object, options.surface);
   ProgressBar bar("sending");
@@ -99,22 +98,22 @@ void send(Client& client, const TriangleMesh& mesh, const TouchOptions& options)
               client.device().c_str(), client.server().c_str());
 }
 
-void watch(Client& client, Felt& felt, double seconds) {
+void watch(Client& client, ReportSummary& summary, double seconds) {
   const bool live = onTerminal();
   const auto interval = live ? 250ms : 1000ms;
-  FeltView view(client);
+  ReportView view(client);
   LiveTable table;
-  felt.restart();
+  summary.restart();
   auto next = std::chrono::steady_clock::now() + interval;
-  while (!stopRequested() && (seconds <= 0 || felt.seconds() < seconds)) {
-    client.poll(20ms);  // short, so that signals and the end are noticed
+  while (!stopRequested() && (seconds <= 0 || summary.seconds() < seconds)) {
+    client.poll(20ms);  // short, so that signals and the end of --seconds take effect
     if (!client.connected()) throw ConnectionLost("the connection to " + client.server() + " was lost");
     if (std::chrono::steady_clock::now() < next) continue;
     next += interval;
     if (live) {
-      table.show(view.table(felt));
+      table.show(view.table(summary));
     } else {
-      view.printLine(felt);
+      view.printLine(summary);
     }
   }
 }
@@ -123,17 +122,17 @@ int run(const TouchOptions& options) {
   const StopSignals signals;
   const TriangleMesh mesh = load(options);
   Client client(options.server, {.reconnect = false});
-  Felt felt(client);
+  ReportSummary summary(client);
   send(client, mesh, options);
   std::string failure;
   try {
-    watch(client, felt, options.seconds);
+    watch(client, summary, options.seconds);
   } catch (const Error& error) {
     failure = error.what();
   }
-  std::printf("%s", felt.summary().c_str());
-  if (options.json) std::printf("%s\n", felt.json().c_str());
-  if (failure.empty() && felt.reports() == 0) failure = client.server() + " reported nothing";
+  std::printf("%s", summary.text().c_str());
+  if (options.json) std::printf("%s\n", summary.json().c_str());
+  if (failure.empty() && summary.reports() == 0) failure = client.server() + " sent no reports";
   if (failure.empty()) return 0;
   std::fflush(stdout);
   std::fprintf(stderr, "hapticd touch: %s\n", failure.c_str());
@@ -145,12 +144,12 @@ int run(const TouchOptions& options) {
 void addTouch(CLI::App& app) {
   auto options = std::make_shared<TouchOptions>();
   CLI::App* command = app.add_subcommand(
-      "touch", "Send a mesh (OBJ, STL, PLY, glTF) to a haptics server and show what is felt");
+      "touch", "Send a mesh (OBJ, STL, PLY, glTF) to a haptics server and show contact and force");
   const auto share = within(0, 1);
   command->add_option("mesh", options->mesh, "Mesh file")->required()->check(CLI::ExistingFile);
   command
       ->add_option("--server", options->server,
-                   "NAME@host[:port], or NAME@tcp://host[:port] through firewalls")
+                   "NAME@host[:port], or NAME@tcp://host[:port] for a single TCP connection (firewalls)")
       ->capture_default_str();
   command->add_option("--seconds", options->seconds, "How long to watch; 0: until Ctrl-C")
       ->check(within(0, kLongest_s))
@@ -165,15 +164,15 @@ void addTouch(CLI::App& app) {
   command->add_option("--dynamic-friction", options->surface.dynamic_friction, "0 to 1")
       ->check(share)
       ->capture_default_str();
-  command->add_option("--object", options->object, "Number of the object the mesh becomes")
+  command->add_option("--object", options->object, "Number of the object that gets the mesh")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  command->add_option("--size-mm", options->size_mm, "Largest extent on the device; 0: fit into a small one")
+  command->add_option("--size-mm", options->size_mm, "Largest extent on the device in mm; 0: fit a small device")
       ->check(within(0, 1000))
       ->capture_default_str();
-  command->add_flag("--keep-scene", options->keep_scene, "Do not empty the server's scene first");
-  command->add_flag("--json", options->json, "Print the summary as one line of JSON too, last");
-  command->footer("Returns 0 after a watch, 1 when the server is not there, goes away or reports nothing.");
+  command->add_flag("--keep-scene", options->keepScene, "Do not clear the server's scene first");
+  command->add_flag("--json", options->json, "Also print the summary as one line of JSON, at the end");
+  command->footer("Exit status: 0 when done, 1 when the server cannot be reached, disconnects or sends no reports.");
   command->callback([options] { exitCode = run(*options); });
 }
 

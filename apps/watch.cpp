@@ -1,4 +1,4 @@
-// hapticd watch: what a hand feels, on a terminal or for other programs; a client that only listens.
+// hapticd watch: shows reports on a terminal or streams them to other programs; a client that sends no commands.
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -7,8 +7,8 @@
 #include <string>
 
 #include "commands.h"
-#include "felt.h"
-#include "felt_view.h"
+#include "report_summary.h"
+#include "report_view.h"
 #include "hapticd/client.h"
 #include "live_table.h"
 #include "stop_signals.h"
@@ -30,7 +30,7 @@ double secondsOf(Time time) {
   return std::chrono::duration<double>(time.time_since_epoch()).count();
 }
 
-// One tick as the server told it whole.
+// A tick composed of separate reports, for servers without `hapticd Tick`.
 TickReport composed(const LatestReports& latest) {
   TickReport tick;
   tick.time = latest.touching.time;
@@ -81,7 +81,7 @@ void printCsv(const TickReport& t) {
   std::printf(",%.9g,%d,%u,%u\n", t.depth_m, t.object, t.buttons, t.guard_active | t.guard_latched);
 }
 
-// Until the time is over, somebody stops it, or the server goes.
+// Returns after `seconds` or at a stop signal; throws ConnectionLost when the server disconnects.
 template <class OnInterval>
 void pollUntilEnd(Client& client, double seconds, std::chrono::nanoseconds interval, OnInterval onInterval) {
   using Clock = std::chrono::steady_clock;
@@ -95,12 +95,12 @@ void pollUntilEnd(Client& client, double seconds, std::chrono::nanoseconds inter
       next = std::max(next + interval, now - interval);
     }
     const auto left = std::max(next - Clock::now(), Clock::duration::zero());
-    client.poll(std::min<std::chrono::nanoseconds>(left, 20ms));  // short, so that signals are noticed
+    client.poll(std::min<std::chrono::nanoseconds>(left, 20ms));  // short, so that signals take effect
     if (!client.connected()) throw ConnectionLost("the connection to " + client.server() + " was lost");
   }
 }
 
-// Every tick that the server tells, at the rate that was asked for; from other servers, what they last said.
+// Prints each tick at the chosen rate; with servers that send no ticks, the latest reports.
 void stream(Client& client, const WatchOptions& options) {
   const auto print = options.csv ? printCsv : printJson;
   if (options.csv) std::printf("%s", kCsvHeader);
@@ -115,29 +115,29 @@ void stream(Client& client, const WatchOptions& options) {
   pollUntilEnd(client, options.seconds, period, [&] {
     if (!whole) print(composed(client.latest()));
     std::fflush(stdout);
-    if (std::ferror(stdout) != 0) throw Error("what is felt can no longer be written: the reader is gone");
+    if (std::ferror(stdout) != 0) throw Error("cannot write to standard output: the reader has closed it");
   });
 }
 
 void show(Client& client, const WatchOptions& options) {
   if (options.rate_Hz > 0) client.setUpdateRate(options.rate_Hz);
-  Felt felt(client);
-  FeltView view(client);
+  ReportSummary summary(client);
+  ReportView view(client);
   LiveTable table;
-  felt.restart();
+  summary.restart();
   const bool live = onTerminal();
   pollUntilEnd(client, options.seconds, live ? 100ms : 1000ms, [&] {
     if (live) {
-      table.show(view.table(felt));
+      table.show(view.table(summary));
     } else {
-      view.printLine(felt);
+      view.printLine(summary);
     }
   });
-  std::printf("%s", felt.summary().c_str());
+  std::printf("%s", summary.text().c_str());
 }
 
 int run(const WatchOptions& options) {
-  std::signal(SIGPIPE, SIG_IGN);  // `watch --json | head` ends by an error of the output
+  std::signal(SIGPIPE, SIG_IGN);  // so that `watch --json | head` ends with a write error
   const StopSignals signals;
   Client client(options.server, {.reconnect = false});
   if (options.json || options.csv) {
@@ -152,18 +152,18 @@ int run(const WatchOptions& options) {
 
 void addWatch(CLI::App& app) {
   auto options = std::make_shared<WatchOptions>();
-  CLI::App* command = app.add_subcommand("watch", "Show what a hand feels, live, or stream it to other programs");
+  CLI::App* command = app.add_subcommand("watch", "Show pose, contact and force live, or stream them to other programs");
   command->add_option("server", options->server, "NAME@host[:port] or NAME@tcp://host[:port]")
       ->capture_default_str();
   command->add_option("--seconds", options->seconds, "How long to watch; 0: until Ctrl-C")
       ->check(within(0, kLongest_s))
       ->capture_default_str();
-  command->add_option("--rate", options->rate_Hz, "Reports or lines a second [the server's; 10 lines]")
+  command->add_option("--rate", options->rate_Hz, "Reports or lines per second [the server's rate; 10 lines]")
       ->check(within(0.1, 4000));
-  CLI::Option* json = command->add_flag("--json", options->json, "One line of JSON for each tick that is told");
-  command->add_flag("--csv", options->csv, "The same as CSV, with a header")->excludes(json);
+  CLI::Option* json = command->add_flag("--json", options->json, "Print one line of JSON for each tick");
+  command->add_flag("--csv", options->csv, "Print one line of CSV for each tick, after a header line")->excludes(json);
   command->footer(
-      "Only listens: it changes nothing that others feel. Works with other VRPN servers, too.\n"
+      "Sends no commands, so it does not affect other clients. Also works with other VRPN servers.\n"
       "Examples:\n"
       "  hapticd watch                                    a live table of Phantom@localhost\n"
       "  hapticd watch Phantom@lab7 --json | jq .depth_m\n"

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Changes the laws one at a time and demands that a test notices. scripts/mutations.txt holds the list, in entries of
+# Changes the laws one at a time and requires a test to fail for each. scripts/mutations.txt holds the list, in entries of
 #
 #   law: what is changed
 #   path of the file
@@ -7,9 +7,9 @@
 #   +what it becomes
 #   ?test program, and the tests that must fail
 #
-# scripts/mutate.sh [--only PATTERN] runs all entries, or those whose law or test matches, in a clone of what is committed.
-# After a run of all that were all caught it writes docs/mutations.md. MUTATE_WORK=DIR keeps clone and build there for the
-# next run, which leaves out what was caught before while the file that is changed is the same. Needs about half an hour.
+# scripts/mutate.sh [--only PATTERN] runs all entries, or those whose law or test matches, in a clone of the last commit.
+# After a run of all entries in which each was caught it writes docs/mutations.md. MUTATE_WORK=DIR keeps clone and build
+# there for the next run, which skips entries that were caught before and whose file is unchanged. Takes about half an hour.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 source_dir=$PWD
@@ -109,10 +109,10 @@ echo "${#names[@]} changes, $((${#names[@]} - ${#missed[@]})) caught"
 [ -z "$only" ] || exit 0
 
 {
-  echo "# What the tests of the laws notice"
+  echo "# Mutations"
   echo
-  echo "Written by \`scripts/mutate.sh\`, which makes each of these ${#names[@]} changes to the sources, one at a time, and demands that"
-  echo "the named test fails: each law with its sign, unit or factor changed."
+  echo "Written by \`scripts/mutate.sh\`. It makes each of these ${#names[@]} changes to the sources, one at a time, and requires"
+  echo "the named test to fail: each law with its sign, unit or factor changed."
   echo
   echo "| law | change in | before | after | caught by |"
   echo "|---|---|---|---|---|"

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# hapticd serve --check-config: what is printed can be fed back; what is wrong ends with 2 and is named.
+# hapticd serve --check-config: the output is valid input; an error is named and ends with status 2.
 set -euo pipefail
 hapticd=$1
 work=$(mktemp -d)

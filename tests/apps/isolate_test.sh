@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# A driver in a process of its own, with a stand-in for the vendor's library: when that process is killed, the server
-# goes on and says what happened.
+# A driver in its own process, with a mock of the vendor's library: when that process is killed, the server continues
+# and logs the reason.
 set -euo pipefail
 hapticd=$1
 export HAPTICD_HDAPI_LIB=$3

@@ -1,8 +1,8 @@
-# For tests in shell: a server with the simulated hand, on a port of its own, until the test ends. Source it with
-# $hapticd set. Gives $work (a directory that goes with the test, its own if it has one), $server (the process) and
-# $address.
+# For shell tests: starts a server with the simulated hand on a free port and ends it with the test. Source it with
+# $hapticd set. Sets $work (a directory that is removed at the end; an existing $work is used), $server (the process id)
+# and $address.
 work=${work:-$(mktemp -d)}
-: >"$work/log" # there from the start, however late the server is
+: >"$work/log" # so that it exists before the server writes to it
 "$hapticd" serve --listen 127.0.0.1:0 --http off --allow-no-rt >"$work/log" 2>&1 &
 server=$!
 trap 'kill "$server" 2>/dev/null || true; rm -rf "$work"' EXIT

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The main job: a server with the scripted hand, a client that sends a scan over TCP and one over UDP, contact is felt.
+# End to end: a server with the scripted hand gets a scan from a client over TCP and from one over UDP; both report contact.
 set -euo pipefail
 hapticd=$1
 source_dir=$2
@@ -8,7 +8,7 @@ source_dir=$2
 for name in "Phantom@tcp://$address" "Phantom@$address"; do
   "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --server "$name" --seconds 6 >"$work/out"
   cat "$work/out"
-  awk '/peak force/ { if ($3 > 0.1) felt = 1 } END { exit !felt }' "$work/out"
+  awk '/peak force/ { if ($3 > 0.1) force = 1 } END { exit !force }' "$work/out"
 done
 kill -TERM "$server"
 wait "$server"

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What another client feels, as lines for programs and as a summary for people.
+# hapticd watch beside another client: lines for programs, and a summary for people.
 set -euo pipefail
 hapticd=$1
 source_dir=$2
@@ -9,11 +9,11 @@ source_dir=$2
 touch=$!
 "$hapticd" watch "Phantom@$address" --csv --rate 200 --seconds 6 >"$work/csv"
 wait "$touch"
-# Every row has every column, ticks only grow, and something was felt.
+# Every row has every column, tick numbers increase, and there is a force.
 awk -F, 'NR == 1 { columns = NF; next }
          NF != columns || $2 <= tick { print "row " NR ": " $0; bad = 1; exit }
-         { tick = $2 } $13 * $13 + $14 * $14 + $15 * $15 > 0.01 { felt = 1 }
-         END { exit bad || !felt || NR < 100 }' "$work/csv" || { tail -3 "$work/csv"; exit 1; }
+         { tick = $2 } $13 * $13 + $14 * $14 + $15 * $15 > 0.01 { force = 1 }
+         END { exit bad || !force || NR < 100 }' "$work/csv" || { tail -3 "$work/csv"; exit 1; }
 
 "$hapticd" watch "Phantom@tcp://$address" --json --seconds 1 >"$work/json"
 grep -qE '^\{"time_s":[0-9.]+,"tick":[0-9]+,.*"force_N":\[[^]]*\],.*\}$' "$work/json"

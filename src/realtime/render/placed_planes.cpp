@@ -9,7 +9,7 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr double kRelativeSkin = 1e-9;  // of the largest coordinate of the HIP
+constexpr double kPlaneSkin = 1e-9;  // of the largest coordinate of the HIP
 constexpr double kTau = 2 * M_PI;
 
 }  // namespace

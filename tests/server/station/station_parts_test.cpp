@@ -2,8 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <sstream>
+#include <string_view>
 
 #include "base/time.h"
+#include "hapticd/trips.h"
 #include "server/station/black_box_recorder.h"
 #include "server/station/button_modes.h"
 #include "server/station/device_control.h"
@@ -187,14 +190,24 @@ TEST_F(BlackBoxFilesTest, OnlyTheNewestAreKept) {
   EXPECT_EQ(files().size(), 2U);
 }
 
-TEST(Trips, AreInTheDocumentByBit) {
+std::string_view effectOn(TripAction action) {
+  switch (action) {
+    case TripAction::clamp: return "shaped";
+    case TripAction::hold: return "zero while it lasts";
+    case TripAction::latch: return "zero until re-armed";
+  }
+  return {};
+}
+
+TEST(Trips, AreInTheDocumentWithTheirSentences) {
   std::ifstream in(HAPTICD_TESTDATA "/../docs/safety.md");
   const std::string text((std::istreambuf_iterator<char>(in)), {});
   ASSERT_FALSE(text.empty());
-  for (const realtime::TripInfo& trip : realtime::kTrips) {
-    const std::string row = "| " + std::to_string(static_cast<int>(trip.trip)) + " | `" +
-                            std::string(trip.name) + "` |";
-    EXPECT_NE(text.find(row), std::string::npos) << row;
+  for (const TripInfo& trip : kTrips) {
+    std::ostringstream row;
+    row << "| " << static_cast<int>(trip.trip) << " | `" << trip.name << "` | " << effectOn(trip.action) << " | "
+        << trip.what << " | " << trip.remedy << " |\n";
+    EXPECT_NE(text.find(row.str()), std::string::npos) << row.str();
   }
 }
 

@@ -1,4 +1,4 @@
-#include "felt.h"
+#include "report_summary.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 namespace hapticd::apps {
 namespace {
 
-// Those that are stamped with a servo tick and sent at once; the others may tell of something older.
+// Reports stamped with a servo tick and sent at once; the others may describe something older.
 constexpr std::array kTimely{ReportKind::pose,    ReportKind::velocity, ReportKind::force,
                              ReportKind::depth,   ReportKind::angle,    ReportKind::contactPoint,
                              ReportKind::touching};
@@ -33,7 +33,7 @@ std::string line(const char* format, Arguments... arguments) {
 
 }  // namespace
 
-Felt::Felt(Client& client) : client_(client) {
+ReportSummary::ReportSummary(Client& client) : client_(client) {
   client_.onTouching([this](const TouchingReport& r) { onTouching(r); });
   client_.onForce([this](const ForceReport& r) { onForce(r); });
   client_.onDepth([this](const DepthReport& r) { deepest_m_ = std::max(deepest_m_, r.depth_m); });
@@ -41,34 +41,34 @@ Felt::Felt(Client& client) : client_(client) {
   restart();
 }
 
-void Felt::restart() {
+void ReportSummary::restart() {
   start_ = client_.statistics();
   started_ = std::chrono::steady_clock::now();
-  touching_known_ = false;
-  contact_s_ = observed_s_ = peak_force_N_ = force_sum_N_ = deepest_m_ = 0;
-  force_count_ = 0;
+  touchingKnown_ = false;
+  contact_s_ = observed_s_ = peakForce_N_ = forceSum_N_ = deepest_m_ = 0;
+  forceCount_ = 0;
 }
 
-void Felt::onTouching(const TouchingReport& report) {
-  if (touching_known_) {
-    const double elapsed = std::max(0.0, apps::seconds(report.time - last_touching_.time));
+void ReportSummary::onTouching(const TouchingReport& report) {
+  if (touchingKnown_) {
+    const double elapsed = std::max(0.0, apps::seconds(report.time - lastTouching_.time));
     observed_s_ += elapsed;
-    if (last_touching_.touching) contact_s_ += elapsed;
+    if (lastTouching_.touching) contact_s_ += elapsed;
   }
-  last_touching_ = report;
-  touching_known_ = true;
+  lastTouching_ = report;
+  touchingKnown_ = true;
 }
 
-void Felt::onForce(const ForceReport& report) {
+void ReportSummary::onForce(const ForceReport& report) {
   const double force_N = norm(report.force_N);
-  peak_force_N_ = std::max(peak_force_N_, force_N);
-  if (touching_known_ && last_touching_.touching) {
-    force_sum_N_ += force_N;
-    ++force_count_;
+  peakForce_N_ = std::max(peakForce_N_, force_N);
+  if (touchingKnown_ && lastTouching_.touching) {
+    forceSum_N_ += force_N;
+    ++forceCount_;
   }
 }
 
-void Felt::onText(const TextReport& report) {
+void ReportSummary::onText(const TextReport& report) {
   const std::string text = std::string(nameOf(report.severity)) + ": " + report.text;
   const auto known =
       std::find_if(texts_.begin(), texts_.end(), [&](const auto& t) { return t.first == text; });
@@ -79,30 +79,30 @@ void Felt::onText(const TextReport& report) {
   }
 }
 
-double Felt::seconds() const {
+double ReportSummary::seconds() const {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
 }
 
-double Felt::contactFraction() const {
+double ReportSummary::contactFraction() const {
   return observed_s_ > 0 ? contact_s_ / observed_s_ : 0;
 }
 
-double Felt::meanForceTouching_N() const {
-  return force_count_ > 0 ? force_sum_N_ / static_cast<double>(force_count_) : 0;
+double ReportSummary::meanForceTouching_N() const {
+  return forceCount_ > 0 ? forceSum_N_ / static_cast<double>(forceCount_) : 0;
 }
 
-std::uint64_t Felt::count(ReportKind kind) const {
+std::uint64_t ReportSummary::count(ReportKind kind) const {
   return client_.statistics()[kind].count - start_[kind].count;
 }
 
-std::uint64_t Felt::reports() const {
+std::uint64_t ReportSummary::reports() const {
   const Statistics now = client_.statistics();
   std::uint64_t sum = 0;
   for (std::size_t i = 0; i < kReportKinds; ++i) sum += now.reports[i].count - start_.reports[i].count;
   return sum;
 }
 
-LatencyHistogram Felt::latency() const {
+LatencyHistogram ReportSummary::latency() const {
   const Statistics now = client_.statistics();
   LatencyHistogram sum;
   for (const ReportKind kind : kTimely) {
@@ -113,7 +113,7 @@ LatencyHistogram Felt::latency() const {
   return sum;
 }
 
-std::string Felt::summary() const {
+std::string ReportSummary::text() const {
   const double s = seconds();
   std::string text = line("summary of %.1f s", s);
   for (std::size_t i = 0; i < kReportKinds; ++i) {
@@ -147,7 +147,7 @@ std::string Felt::summary() const {
   return text;
 }
 
-std::string Felt::json() const {
+std::string ReportSummary::json() const {
   const LatencyHistogram l = latency();
   nlohmann::json result;
   result["seconds"] = seconds();

@@ -1,4 +1,4 @@
-#include "felt_view.h"
+#include "report_view.h"
 
 #include <algorithm>
 #include <array>
@@ -27,14 +27,14 @@ std::string sparkline(const std::deque<double>& values, double most) {
   return bars;
 }
 
-void FeltView::remember() {
+void ReportView::remember() {
   const LatestReports& latest = client_.latest();
   const Vec3& f = latest.force.force_N;
   keep(forces_N_, std::hypot(f[0], f[1], f[2]));
   keep(depths_m_, latest.depth.depth_m);
 }
 
-std::vector<std::string> FeltView::table(const Felt& felt) {
+std::vector<std::string> ReportView::table(const ReportSummary& summary) {
   remember();
   const LatestReports& latest = client_.latest();
   const Statistics now = client_.statistics();
@@ -44,9 +44,9 @@ std::vector<std::string> FeltView::table(const Felt& felt) {
     std::snprintf(text, sizeof text, format, arguments...);
     lines.emplace_back(text);
   };
-  const LatencyHistogram latency = felt.latency();
+  const LatencyHistogram latency = summary.latency();
   add("%s@%s  %.0f s  latency p50 %.2f ms p99 %.2f ms", client_.device().c_str(), client_.server().c_str(),
-      felt.seconds(), latency.quantile_us(0.5) / 1000, latency.quantile_us(0.99) / 1000);
+      summary.seconds(), latency.quantile_us(0.5) / 1000, latency.quantile_us(0.99) / 1000);
   for (const auto& [sensor, pose] : latest.pose) {
     const Vec3& p = pose.position_m;
     const Quaternion& q = pose.orientation;
@@ -55,38 +55,38 @@ std::vector<std::string> FeltView::table(const Felt& felt) {
   }
   const Vec3& f = latest.force.force_N;
   add("  force      %8.3f %8.3f %8.3f N    |F| %.3f N   peak %.3f N", f[0], f[1], f[2],
-      std::hypot(f[0], f[1], f[2]), felt.peakForce_N());
-  add("  |F|        %s %.2f N", sparkline(forces_N_, felt.peakForce_N()).c_str(), felt.peakForce_N());
-  add("  depth      %s %.2f mm", sparkline(depths_m_, felt.deepest_m()).c_str(), felt.deepest_m() * 1000);
-  // Only our server is known to mean a gripper by the channel after the contact's six.
+      std::hypot(f[0], f[1], f[2]), summary.peakForce_N());
+  add("  |F|        %s %.2f N", sparkline(forces_N_, summary.peakForce_N()).c_str(), summary.peakForce_N());
+  add("  depth      %s %.2f mm", sparkline(depths_m_, summary.deepest_m()).c_str(), summary.deepest_m() * 1000);
+  // Channel 6 is the gripper on this server only; other servers may use it for anything.
   const std::vector<double>& channels = latest.analog.channels;
   if (client_.capabilities() && channels.size() == 7) add("  gripper    %8.3f rad", channels[6]);
   add("  touching   %s   object %d   depth %.3f mm   angle %.1f deg   %.1f %% of the time",
       latest.touching.touching ? "yes" : "no ", latest.touched_object.object, latest.depth.depth_m * 1000,
-      latest.angle.angle_deg, 100 * felt.contactFraction());
+      latest.angle.angle_deg, 100 * summary.contactFraction());
   for (std::size_t i = 0; i < kReportKinds; ++i) {
     const auto kind = static_cast<ReportKind>(i);
     if (now[kind].count == 0) continue;
     add("  %-15s %8.0f /s  %llu", std::string(nameOf(kind)).c_str(), now.ratePerSecond(kind, before_),
-        static_cast<unsigned long long>(felt.count(kind)));
+        static_cast<unsigned long long>(summary.count(kind)));
   }
-  if (!felt.texts().empty()) lines.push_back("  server: " + felt.texts().back().first);
+  if (!summary.texts().empty()) lines.push_back("  server: " + summary.texts().back().first);
   before_ = now;
   return lines;
 }
 
-void FeltView::printLine(const Felt& felt) {
+void ReportView::printLine(const ReportSummary& summary) {
   const LatestReports& latest = client_.latest();
   const Statistics now = client_.statistics();
   double rate = 0;
   for (std::size_t i = 0; i < kReportKinds; ++i)
     rate += now.ratePerSecond(static_cast<ReportKind>(i), before_);
-  const LatencyHistogram latency = felt.latency();
+  const LatencyHistogram latency = summary.latency();
   const Vec3& f = latest.force.force_N;
   std::printf(
       "%.0f s  %.0f reports/s  touching %s  object %d  force %.3f N  depth %.3f mm  angle %.1f deg  "
       "latency p50 %.2f ms p99 %.2f ms\n",
-      felt.seconds(), rate, latest.touching.touching ? "yes" : "no", latest.touched_object.object,
+      summary.seconds(), rate, latest.touching.touching ? "yes" : "no", latest.touched_object.object,
       std::hypot(f[0], f[1], f[2]), latest.depth.depth_m * 1000, latest.angle.angle_deg,
       latency.quantile_us(0.5) / 1000, latency.quantile_us(0.99) / 1000);
   std::fflush(stdout);
