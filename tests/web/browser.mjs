@@ -1,4 +1,4 @@
-// Debian's Chromium without a screen, and a viewer in it as a user drives one.
+// Headless Chromium, and a viewer in it that a test drives as a user would.
 import { mkdtemp, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -36,7 +36,7 @@ export async function launch({ size = { width: 1366, height: 768 }, colorScheme 
   return { context, close };
 }
 
-/** A page with the viewer in it, and everything that a test wants to know of it. */
+/** A page with the viewer, and access to its state. */
 export class Viewer {
   complaints = [];
   foreign = [];
@@ -58,7 +58,7 @@ export class Viewer {
     return viewer;
   }
 
-  /** Something of the page's own object, as the console sees it. */
+  /** Evaluates an expression in the page. */
   ask(expression) {
     return this.page.evaluate(expression);
   }
@@ -70,19 +70,19 @@ export class Viewer {
   }
 
   async connected() {
-    await this.until("the page is connected and hears ticks", () =>
+    await this.until("the page is connected and receives ticks", () =>
       this.ask("viewer.link.state === 'open' && viewer.tick !== undefined"),
     );
   }
 
-  /** Until the meshes of the scene are drawn: so many triangles at least. */
+  /** Waits until the page draws at least this many triangles. */
   async showsTriangles(least) {
     await this.until(`${least} triangles in the view`, () =>
       this.ask(`viewer.view.objects.triangles >= ${least}`),
     );
   }
 
-  /** What the label says. */
+  /** The displayed force. */
   async force_N() {
     return Number(await this.text("#force"));
   }
@@ -92,7 +92,7 @@ export class Viewer {
     return this.ask(`[...viewer.plots.force.window.data()[1].slice(-${count})]`);
   }
 
-  /** Until label and plot agree that the force is as asked. */
+  /** Waits until both the label and the plot show a force that satisfies `ok`. */
   async forceIs(what, ok) {
     await this.until(
       `force ${what}; it is ${await this.force_N()} N`,
@@ -100,7 +100,7 @@ export class Viewer {
     );
   }
 
-  /** A point of the page well inside an object, nearest to its middle on the screen or to so far from there. */
+  /** A point on the page well inside an object, nearest to its centre on the screen plus an offset. */
   async pointOnObject(right = 0, down = 0) {
     const ask = `(() => {
       const box = viewer.view.canvas.getBoundingClientRect();
@@ -121,7 +121,7 @@ export class Viewer {
     return points.reduce((best, p) => (away(p) < away(best) ? p : best));
   }
 
-  /** A point of the view with nothing below it, and within reach of the hand. */
+  /** A point in the view inside the workspace with no object behind it. */
   async pointBeside() {
     const inside = await this.ask(`viewer.view.pageOf(viewer.view.markers.group.children[0].position.clone()
       .set(0.9 * 0.08, 0.9 * 0.06, 0).multiplyScalar(1000))`);
@@ -139,7 +139,7 @@ export class Viewer {
     await this.page.mouse.up();
   }
 
-  /** Holds the hand still beside the objects, in the air. */
+  /** Holds the hand still in free space beside the objects. */
   async holdInAir() {
     await this.press(await this.pointBeside());
     await this.release();
@@ -155,7 +155,7 @@ export class Viewer {
     await this.until("the hand is free", async () => !(await this.ask("viewer.hand.held")));
   }
 
-  /** Drops files onto the page: names and contents. */
+  /** Drops files, given by name and content, onto the page. */
   async drop(files) {
     await this.page.evaluate((list) => {
       const data = new DataTransfer();
@@ -166,7 +166,7 @@ export class Viewer {
     }, Object.entries(files));
   }
 
-  /** Colours of the drawn scene at points of the page, each r, g, b. */
+  /** Colours [r, g, b] of the drawn scene at points on the page. */
   async pixels(points) {
     return this.page.evaluate((at) => {
       const { view } = globalThis.viewer;
@@ -177,7 +177,7 @@ export class Viewer {
       const context = copy.getContext("2d", { willReadFrequently: true });
       view.invalidate();
       view.draw();
-      context.drawImage(view.canvas, 0, 0, copy.width, copy.height); // in the same task: the picture is still there
+      context.drawImage(view.canvas, 0, 0, copy.width, copy.height); // in the same task, before the browser clears the canvas
       return at.map(({ x, y }) =>
         [...context.getImageData(x - box.left, y - box.top, 1, 1).data].slice(0, 3),
       );

@@ -1,5 +1,5 @@
-// A million triangles in the server: the page shows at most 100,000 of them, and its script takes at most 4 ms a frame.
-// Time of the processor, from the browser's own trace: neither what other programs take nor the software's painting counts.
+// With a million triangles in the server, the page shows at most 100,000 and its script takes at most 4 ms per frame.
+// The browser's trace gives processor time, without other programs and without software rendering.
 //   node script_time_test.mjs HAPTICD
 import assert from "node:assert/strict";
 import { test } from "node:test";
@@ -34,19 +34,19 @@ function ball() {
   return { positions, triangles };
 }
 
-function send({ wire, say }, { positions, triangles }) {
+function sendMesh({ wire, send }, { positions, triangles }) {
   const step = 3 * wire.MOST_IN_ONE_MESSAGE;
-  say(wire.batchBegin(), wire.setHapticProperty(0, "stiffness", 0.8));
+  send(wire.batchBegin(), wire.setHapticProperty(0, "stiffness", 0.8));
   for (let i = 0; i < positions.length; i += step)
-    say(wire.meshVertices(0, i / 3, positions.subarray(i, i + step)));
+    send(wire.meshVertices(0, i / 3, positions.subarray(i, i + step)));
   for (let i = 0; i < triangles.length; i += step)
-    say(wire.meshTriangles(0, i / 3, triangles.subarray(i, i + step)));
-  say(wire.batchCommit());
+    send(wire.meshTriangles(0, i / 3, triangles.subarray(i, i + step)));
+  send(wire.batchCommit());
 }
 
 /**
- * The page's script, in ms of processor time: in the callback of each frame, and in all that comes between, for each time
- * of a frame. Software draws so few frames that more ticks come between two of them than on any screen.
+ * Processor time of the page's script in ms: in each animation frame's callback, and between them per frame time of 60 Hz.
+ * The software renderer draws few frames, so more ticks arrive between two of them than on a real screen.
  */
 function scriptTimes(events) {
   const calls = events.filter((e) => e.ph === "X" && e.tdur !== undefined);
@@ -67,7 +67,7 @@ function scriptTimes(events) {
 const threadOf = (e) => `${e.pid}/${e.tid}`;
 const quantile = (values, share) =>
   [...values].sort((a, b) => a - b)[Math.floor(share * (values.length - 1))];
-const inWords = (values) => [0.5, 0.95, 1].map((share) => quantile(values, share).toFixed(2)).join(", ");
+const summary = (values) => [0.5, 0.95, 1].map((share) => quantile(values, share).toFixed(2)).join(", ");
 
 test("a million triangles, 4 ms", async () => {
   const hapticd = process.argv[2];
@@ -75,7 +75,7 @@ test("a million triangles, 4 ms", async () => {
   const browser = await launch();
   try {
     const client = await server.client();
-    send(client, ball());
+    sendMesh(client, ball());
     const triangles = 2 * RINGS * AROUND;
     await until(
       "the ball in the server",
@@ -100,11 +100,11 @@ test("a million triangles, 4 ms", async () => {
     });
     const { frames, between } = scriptTimes(trace);
     console.log(
-      `${shown} triangles shown; p50, p95 and max of the script, ms: in ${frames.length} frames ${inWords(frames)}`,
+      `${shown} triangles shown; p50, p95 and max of the script, ms: in ${frames.length} frames ${summary(frames)}`,
     );
-    console.log(`between them, in each ${FRAME_US / 1000} ms: ${inWords(between)}`);
+    console.log(`between them, in each ${FRAME_US / 1000} ms: ${summary(between)}`);
     assert.ok(frames.length > FRAMES / 2, `${frames.length} frames in the trace`);
-    assert.ok(quantile(frames, 0.5) > 0.02, "a page that does nothing was measured");
+    assert.ok(quantile(frames, 0.5) > 0.02, "the page did nothing during the measurement");
     const sum = quantile(frames, 0.95) + quantile(between, 0.95);
     assert.ok(sum <= MOST_MS, `${sum} ms`);
     client.close();
@@ -114,7 +114,7 @@ test("a million triangles, 4 ms", async () => {
   }
 });
 
-/** The browser's trace of what `run` does. */
+/** The browser's trace while `run` runs. */
 async function traced(page, run) {
   const session = await page.context().newCDPSession(page);
   const events = [];

@@ -1,4 +1,4 @@
-// A real `hapticd serve` on free ports, and what a test says to it from outside the page.
+// A real `hapticd serve` on free ports, and a test's access to it from outside the page.
 import { execFile, spawn } from "node:child_process";
 import { createConnection } from "node:net";
 import { promisify } from "node:util";
@@ -8,7 +8,7 @@ const START_MS = 60_000;
 
 export const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
-/** Waits until `ask` gives something; the machine may be slow, so the deadline is long. */
+/** Waits until `ask` returns a truthy value. The deadline is long, since the machine may be slow. */
 export async function until(what, ask, deadline_ms = 30_000) {
   const end = Date.now() + deadline_ms;
   let last;
@@ -17,7 +17,7 @@ export async function until(what, ask, deadline_ms = 30_000) {
     if (last) return last;
     await pause(50);
   } while (Date.now() < end);
-  throw new Error(`waited ${deadline_ms / 1000} s in vain for: ${what}`);
+  throw new Error(`timed out after ${deadline_ms / 1000} s: ${what}`);
 }
 
 export class Server {
@@ -50,7 +50,7 @@ export class Server {
     await this.ended;
   }
 
-  /** Sends a mesh as the program's own client does; replaces the scene. */
+  /** Sends a mesh with `hapticd touch`; replaces the scene. */
   async touch(mesh) {
     await promisify(execFile)(this.hapticd, [
       "touch",
@@ -66,7 +66,7 @@ export class Server {
     return (await fetch(`${this.url}/api/state`)).json();
   }
 
-  /** A VRPN client over TCP; `say` sends messages of the page's own wire. */
+  /** A VRPN client over TCP; `send` sends messages made by the page's wire modules. */
   async client() {
     const wire = await bundled("wire/index.ts");
     const [host, port] = this.vrpn.split(":");
@@ -81,7 +81,7 @@ export class Server {
     await until("the server's cookie", () => endpoint.connected);
     return {
       wire,
-      say: (...messages) => messages.forEach((m) => endpoint.send("Phantom", m)),
+      send: (...messages) => messages.forEach((m) => endpoint.send("Phantom", m)),
       close: () => socket.destroy(),
     };
   }

@@ -1,4 +1,4 @@
-// A mesh file that is dropped onto the page, or chosen: read, placed, sent, and there.
+// Loads a mesh file that the user drops onto the page or chooses: reads, places and sends it, then waits for the server.
 import { byId, countText, el, setText } from "./panels/dom";
 import type { Link } from "./link";
 import { readMesh } from "./mesh/read_file";
@@ -46,16 +46,16 @@ export class DropMesh {
     });
   }
 
-  /** Looks in a new state for the mesh that was sent. */
+  /** Looks for the sent mesh in a new state. */
   update(objects: ObjectState[]): void {
-    const there =
+    const loaded =
       this.awaited &&
       objects.find(
         (o) => o.id === this.awaited!.object && o.triangles > 0 && o.geometry !== this.awaited!.geometry,
       );
-    if (!there) return;
-    this.say(
-      `${this.awaited!.name} is object ${there.id}: ${countText(there.triangles)} triangles to touch.`,
+    if (!loaded) return;
+    this.show(
+      `${this.awaited!.name} is now object ${loaded.id} with ${countText(loaded.triangles)} triangles.`,
       "good",
     );
     this.awaited = undefined;
@@ -65,21 +65,21 @@ export class DropMesh {
     if (files.length === 0) return;
     const device = this.context.device();
     this.panel.hidden = false;
-    if (!device) return this.say("There is no device yet to load a mesh for.", "bad");
+    if (!device) return this.show("No device is connected yet: try again in a moment.", "bad");
     this.placing?.end();
-    this.say(`Reading ${files[0]!.name} …`);
-    await new Promise((resolve) => setTimeout(resolve, 30)); // so that it is seen
+    this.show(`Reading ${files[0]!.name} …`);
+    await new Promise((resolve) => setTimeout(resolve, 30)); // lets the browser show the text first
     try {
       const { name, mesh } = await readMesh(files);
       this.place(name, mesh, device);
     } catch (error) {
-      this.say((error as Error).message, "bad");
+      this.show((error as Error).message, "bad");
     }
   }
 
   private place(name: string, mesh: FileMesh, device: DeviceState): void {
     const placing = new Placing(name, mesh, this.context.view, device, this.context.objects());
-    const load = el("button", { type: "submit", className: "primary" }, "Load it into the scene");
+    const load = el("button", { type: "submit", className: "primary" }, "Load into the scene");
     const cancel = el("button", { type: "button" }, "Cancel");
     cancel.addEventListener("click", () => {
       placing.end();
@@ -91,7 +91,7 @@ export class DropMesh {
       void this.load(name, mesh, placing);
     });
     this.placing = placing;
-    this.say("");
+    this.show("");
     this.panel.append(placing.root);
     load.focus();
   }
@@ -101,18 +101,18 @@ export class DropMesh {
     const before = this.context.objects().find((o) => o.id === placement.object)?.geometry ?? -1;
     placing.end();
     this.bar.hidden = false;
-    this.say(`Sending ${name} …`);
+    this.show(`Sending ${name} …`);
     try {
       await upload(this.context.link, mesh, placement, (share) => (this.bar.value = share));
-      this.say(`${name} is sent; the server makes it touchable …`);
+      this.show(`${name} is sent; the server is processing it …`);
       this.awaited = { object: placement.object, geometry: before, name };
     } catch (error) {
-      this.say(`${name}: ${(error as Error).message}`, "bad");
+      this.show(`${name}: ${(error as Error).message}`, "bad");
     }
     this.bar.hidden = true;
   }
 
-  private say(text: string, level = ""): void {
+  private show(text: string, level = ""): void {
     setText(this.message, text);
     this.message.dataset["level"] = level;
     this.close.hidden = level === "";

@@ -1,56 +1,57 @@
-// The simulated hand, held by the pointer: a drag over an object strokes it, pressed in a little; a drag beside it, or with the
-// "plane" setting, moves in the plane through the hand that faces the camera. The wheel changes the depth, arrow keys do the same.
+// The simulated hand, moved with the pointer. A drag over an object strokes it, with the HIP a little below the surface. A drag
+// beside objects, or in "plane" mode, moves the HIP in the plane through it that faces the camera. The wheel changes the depth;
+// the keyboard moves the HIP, too.
 import { Vector3 } from "three";
-import { type Room, wayAround } from "./route";
+import { routeAround, type Surroundings } from "./route";
 import { holdHand, type Outgoing } from "./wire";
 import type { View } from "./scene3d/view";
 
 export type DragMode = "surface" | "plane";
 
-/** What the hand needs to know of the present moment; lengths in world units. */
-export interface HandNow {
-  hand: Vector3;
-  /** Where the tip rests: the proxy, a little off the surface that it touches. */
-  clear: Vector3;
+/** The current state that decides where the hand may move; positions in world units. */
+export interface HandContext {
+  hip: Vector3;
+  /** A point near the proxy, 2 mm outside the touched surfaces, where a route can start. */
+  freePoint: Vector3;
   orientation: [number, number, number, number];
-  /** World units in a millimetre of the device. */
-  unit: number;
-  room: Room;
+  /** World units per millimetre of the device. */
+  worldPerMm: number;
+  surroundings: Surroundings;
 }
 
 const PRESS_MM = 4;
-const MOST_PRESS_MM = 25;
+const MAX_PRESS_MM = 25;
 const WHEEL_MM = 1;
 const KEY_MM = 2;
 const REFRESH_MS = 200;
-const LEG_MS = 900;
+const LEG_TIMEOUT_MS = 900;
 const IDLE_MS = 60_000;
 
 export class Hand {
   mode: DragMode = "surface";
   held = false;
-  /** Whether the left button is the hand's. */
+  /** Whether the left mouse button moves the hand. */
   enabled = true;
   private dragging = false;
-  private refusedUntilUp = false;
+  private ignoredUntilUp = false;
   private press_mm = PRESS_MM;
   private pointer = { x: 0, y: 0 };
   private target = new Vector3();
   private route: Vector3[] = [];
-  private legSince = 0;
-  private sent = 0;
-  private used = 0;
+  private legSince_ms = 0;
+  private sentAt_ms = 0;
+  private usedAt_ms = 0;
   private onSurface = false;
   /** The pointer has moved, the target not yet. */
-  private aimLater = false;
+  private aimPending = false;
   /** The target has changed since it was sent. */
-  private fresh = false;
+  private targetChanged = false;
   private orientation: [number, number, number, number] = [0, 0, 0, 1];
 
   constructor(
     private readonly view: View,
     private readonly send: (message: Outgoing) => boolean,
-    private readonly now: () => HandNow | undefined,
+    private readonly context: () => HandContext | undefined,
     private readonly onChange: () => void,
   ) {
     const { canvas } = view;
@@ -78,128 +79,128 @@ export class Hand {
     this.onChange();
   }
 
-  /** The server said that somebody else holds it, or the connection is gone. */
-  lost(): void {
+  /** The server refused the hand to this page, or the connection was lost. */
+  onLost(): void {
     this.held = false;
-    this.refusedUntilUp = this.dragging;
+    this.ignoredUntilUp = this.dragging;
     this.route = [];
     this.onChange();
   }
 
-  /** Once a frame: sends where the hand shall be. */
+  /** Call once per frame: sends the target of the hand. */
   frame(time_ms: number): void {
     if (!this.held) return;
-    if (time_ms - this.used > IDLE_MS && !this.dragging) return this.letGo();
+    if (time_ms - this.usedAt_ms > IDLE_MS && !this.dragging) return this.letGo();
     this.advance(time_ms);
-    if (time_ms - this.sent < REFRESH_MS && !this.fresh) return;
-    this.fresh = false;
-    this.sent = time_ms;
+    if (time_ms - this.sentAt_ms < REFRESH_MS && !this.targetChanged) return;
+    this.targetChanged = false;
+    this.sentAt_ms = time_ms;
     this.send(holdHand(true, (this.route[0] ?? this.target).toArray(), this.orientation));
   }
 
   private down(e: PointerEvent): void {
     if (e.button !== 0 || !this.enabled) return;
-    const now = this.now();
-    if (!now) return;
+    const context = this.context();
+    if (!context) return;
     this.view.canvas.setPointerCapture(e.pointerId);
     this.dragging = true;
     this.view.zooming = false;
     this.pointer = { x: e.clientX, y: e.clientY };
-    if (!this.held) this.take(now);
+    if (!this.held) this.take(context);
     this.aim();
-    this.route = this.around(now);
-    this.legSince = performance.now();
+    this.route = this.routeToTarget(context);
+    this.legSince_ms = performance.now();
   }
 
-  private take(now: HandNow): void {
+  private take(context: HandContext): void {
     this.held = true;
     this.press_mm = PRESS_MM;
-    this.orientation = now.orientation;
-    this.target.copy(now.hand);
+    this.orientation = context.orientation;
+    this.target.copy(context.hip);
     this.onChange();
   }
 
   private move(e: PointerEvent): void {
     if (!this.dragging || !this.held) return;
     this.pointer = { x: e.clientX, y: e.clientY };
-    this.aimLater = true;
+    this.aimPending = true;
   }
 
   private up(): void {
-    this.dragging = this.refusedUntilUp = false;
+    this.dragging = this.ignoredUntilUp = false;
     this.view.zooming = true;
   }
 
   private wheel(e: WheelEvent): void {
-    if (!this.dragging || this.refusedUntilUp) return;
+    if (!this.dragging || this.ignoredUntilUp) return;
     e.preventDefault();
-    this.deeper(e.deltaY < 0 ? WHEEL_MM : -WHEEL_MM);
+    this.changeDepth(e.deltaY < 0 ? WHEEL_MM : -WHEEL_MM);
   }
 
   private key(e: KeyboardEvent): void {
-    const now = this.now();
-    const way = KEYS[e.key];
-    if (!way || !now || !this.enabled) return;
+    const context = this.context();
+    const direction = KEYS[e.key];
+    if (!direction || !context || !this.enabled) return;
     e.preventDefault();
-    if (!this.held) this.take(now);
+    if (!this.held) this.take(context);
     const { right, up } = this.view.axes();
-    const step = KEY_MM * now.unit * (e.shiftKey ? 5 : 1);
-    this.target.addScaledVector(right, way[0] * step).addScaledVector(up, way[1] * step);
-    if (way[2] !== 0) this.target.addScaledVector(this.view.axes().into, way[2] * step);
-    this.touchedNow();
+    const step = KEY_MM * context.worldPerMm * (e.shiftKey ? 5 : 1);
+    this.target.addScaledVector(right, direction[0] * step).addScaledVector(up, direction[1] * step);
+    if (direction[2] !== 0) this.target.addScaledVector(this.view.axes().into, direction[2] * step);
+    this.noteUse();
   }
 
-  private touchedNow(): void {
-    this.used = performance.now();
-    this.fresh = true;
+  private noteUse(): void {
+    this.usedAt_ms = performance.now();
+    this.targetChanged = true;
   }
 
   /** Positive: away from the viewer, into the object. */
-  private deeper(mm: number): void {
-    const now = this.now();
-    if (!now) return;
+  private changeDepth(mm: number): void {
+    const context = this.context();
+    if (!context) return;
     if (this.onSurface) {
-      this.press_mm = Math.min(Math.max(this.press_mm + mm, -5), MOST_PRESS_MM);
+      this.press_mm = Math.min(Math.max(this.press_mm + mm, -5), MAX_PRESS_MM);
       this.aim();
     } else {
-      this.target.addScaledVector(this.view.axes().into, mm * now.unit);
+      this.target.addScaledVector(this.view.axes().into, mm * context.worldPerMm);
     }
-    this.touchedNow();
+    this.noteUse();
     this.onChange();
   }
 
-  // Where the pointer means: on the surface below it, else in the plane through the target that faces the camera.
+  // Sets the target to the surface below the pointer, or to the plane through the target that faces the camera.
   private aim(): void {
-    const now = this.now();
-    if (!now) return;
-    this.aimLater = false;
+    const context = this.context();
+    if (!context) return;
+    this.aimPending = false;
     const ray = this.view.rayAt(this.pointer.x, this.pointer.y);
     const distance = this.mode === "surface" ? this.view.objects.distance(ray) : Infinity;
     this.onSurface = Number.isFinite(distance);
     if (this.onSurface) {
-      ray.at(distance + this.press_mm * now.unit, this.target);
+      ray.at(distance + this.press_mm * context.worldPerMm, this.target);
     } else {
       ray.intersectPlane(this.view.planeFacing(this.target.clone()), this.target);
     }
-    this.touchedNow();
+    this.noteUse();
   }
 
-  private around(now: HandNow): Vector3[] {
+  private routeToTarget(context: HandContext): Vector3[] {
     const { into } = this.view.axes();
     const back_mm = this.onSurface ? this.press_mm + 2 : 0;
-    const open = this.target.clone().addScaledVector(into, -back_mm * now.unit);
-    return wayAround(now.clear, open, into.negate(), now.room);
+    const open = this.target.clone().addScaledVector(into, -back_mm * context.worldPerMm);
+    return routeAround(context.freePoint, open, into.negate(), context.surroundings);
   }
 
   private advance(time_ms: number): void {
-    if (this.aimLater) this.aim();
-    const now = this.now();
+    if (this.aimPending) this.aim();
+    const context = this.context();
     const next = this.route[0];
-    if (!next || !now) return;
-    if (now.hand.distanceTo(next) > 4 * now.unit && time_ms - this.legSince < LEG_MS) return;
+    if (!next || !context) return;
+    if (context.hip.distanceTo(next) > 4 * context.worldPerMm && time_ms - this.legSince_ms < LEG_TIMEOUT_MS) return;
     this.route.shift();
-    this.legSince = time_ms;
-    this.fresh = true;
+    this.legSince_ms = time_ms;
+    this.targetChanged = true;
   }
 }
 

@@ -1,4 +1,4 @@
-// The plots of the page, and what goes into them.
+// The plots of the page and their data.
 import { between, share } from "./plots/counts";
 import { LoopHistogram } from "./plots/histogram";
 import { Plot } from "./plots/plot";
@@ -8,8 +8,8 @@ import { byId, countText, setText } from "./panels/dom";
 
 const SECONDS = 10;
 const LOOP_SECONDS = 60;
-/** Ticks at 125 Hz, with some to spare. */
-const MOST = 1400;
+/** 10 s of ticks at 125 Hz, with a margin. */
+const MAX_SAMPLES = 1400;
 
 type LoopTime = "period_us" | "wakeup_us" | "compute_us";
 
@@ -20,7 +20,7 @@ export class LivePlots {
   private readonly period: Plot;
   private readonly histogram = new LoopHistogram(byId("histogram"));
   private readonly choice = byId<HTMLSelectElement>("loop-of");
-  private readonly says = byId("loop-says");
+  private readonly summary = byId("loop-summary");
   private before: Histogram | undefined;
   private newest: Tick | undefined;
   private meanSince: Tick | undefined;
@@ -44,7 +44,7 @@ export class LivePlots {
         decimals,
         curves: [{ label, colour }],
         seconds: SECONDS,
-        most: MOST,
+        most: MAX_SAMPLES,
       });
     this.force = one("Force", "N", "force", 0.5, 2, "--force");
     this.depth = one("Depth", "mm", "depth", 1, 2, "--proxy");
@@ -89,19 +89,19 @@ export class LivePlots {
     const shown = device.loop[this.choice.value as LoopTime];
     this.histogram.update(shown);
     setText(
-      this.says,
+      this.summary,
       `p50 ${us(shown.p50)}, p99 ${us(shown.p99)}, p99.9 ${us(shown.p999)}, max ${us(shown.max)} of ${countText(device.loop.ticks)} ticks; ${countText(device.loop.overruns)} overruns, ${countText(device.loop.dropped_reports)} reports dropped`,
     );
   }
 
-  /** Of the ticks since it was asked last. */
+  /** Mean period of the ticks since the last call; 0 when unknown. */
   private mean_us(): number {
     const [from, to] = [this.meanSince, this.newest];
     this.meanSince = to;
     return from && to && to.tick > from.tick ? (to.time_ns - from.time_ns) / 1000 / (to.tick - from.tick) : 0;
   }
 
-  /** One plot a frame: all are drawn many times a second, and no frame is late for them. */
+  /** Draws one plot per frame, in turn, so that no frame takes long. */
   draw(): void {
     const plots = [this.force, this.depth, this.latency, this.period, this.histogram];
     this.turn = (this.turn + 1) % plots.length;

@@ -1,9 +1,9 @@
-// The page: everything that it shows, and what connects the parts.
+// The page: creates all parts and connects them.
 import { Box3, Matrix4, Vector3 } from "three";
 import "uplot/dist/uPlot.min.css";
 import "./viewer.css";
 import { DropMesh } from "./drop_mesh";
-import { type DragMode, Hand, type HandNow } from "./hand";
+import { type DragMode, Hand, type HandContext } from "./hand";
 import { Link } from "./link";
 import { LivePlots } from "./live_plots";
 import { showNotice, toast } from "./notice";
@@ -15,13 +15,20 @@ import { ObjectsPanel } from "./panels/objects";
 import { css } from "./plots/plot";
 import { type Quantity, rampCss, rangeOf } from "./scene3d/colours";
 import { View } from "./scene3d/view";
+import { REFUSAL, TRIPS } from "./server_tables";
 import { Meshes, pollState } from "./state";
 import type { DeviceState, ObjectState, SceneState, ServerState } from "./state_types";
 import { startTheme } from "./theme";
 import * as wire from "./wire";
 
 const REPORTS_HZ = 125;
-const STOPPED = 1 << 13;
+/** Refusals after which this page does not hold the simulated hand. */
+const HAND_REFUSALS: readonly number[] = [
+  REFUSAL.notPermitted,
+  REFUSAL.handNotSimulated,
+  REFUSAL.handHeldByOther,
+  REFUSAL.handPoseInvalid,
+];
 const READOUT_MS = 80;
 
 class Page {
@@ -30,22 +37,22 @@ class Page {
   private scene: SceneState | undefined;
   private tick: wire.Tick | undefined;
   private contacts: wire.Contact[] = [];
-  private fresh = false;
-  private readoutAt = 0;
-  private answers = true;
-  /** How many were drawn. */
+  private tickIsNew = false;
+  private readoutAt_ms = 0;
+  private serverResponds = true;
+  /** Number of drawn frames. */
   frames = 0;
 
   private readonly view = new View(byId<HTMLCanvasElement>("view"));
   private readonly link = new Link(
-    () => this.linkChanged(),
-    (message, age_s) => this.received(message, age_s),
+    () => this.onLinkState(),
+    (message, age_s) => this.onMessage(message, age_s),
   );
   private readonly plots = new LivePlots();
   private readonly hand = new Hand(
     this.view,
     (m) => this.link.send(m),
-    () => this.handNow(),
+    () => this.handContext(),
     () => this.showHand(),
   );
   private readonly meshes = new Meshes(
@@ -70,7 +77,7 @@ class Page {
     byId("ramp").style.background = rampCss();
     this.bindControls();
     this.showNotice();
-    pollState((state) => this.stateCame(state));
+    pollState((state) => this.onState(state));
     const frame = (time_ms: number): void => {
       this.frame(time_ms);
       requestAnimationFrame(frame);
@@ -97,11 +104,11 @@ class Page {
 
   private stop(): void {
     if (!this.link.send(wire.stopForces()))
-      toast("Not connected: the stop did not reach the server. Use the device's own switch.", 2);
+      toast("Not connected: the stop did not reach the server. Use the switch on the device.", 2);
   }
 
   private send(...messages: wire.Outgoing[]): void {
-    if (!this.link.send(...messages)) toast("Not connected: nothing was sent.", 2);
+    if (!this.link.send(...messages)) toast("Not connected: the command was not sent.", 2);
   }
 
   private chooseDrag(value: string): void {
@@ -115,7 +122,7 @@ class Page {
   private restyle(): void {
     this.view.setBackground(css("--view"));
     this.view.markers.setColours({
-      hand: css("--hand"),
+      hip: css("--hand"),
       proxy: css("--proxy"),
       force: css("--force"),
       normal: css("--normal"),
@@ -124,10 +131,10 @@ class Page {
     this.plots.restyle();
   }
 
-  // What the server says four times a second.
+  // The state of the server, four times per second.
 
-  private stateCame(state: ServerState | undefined): void {
-    this.answers = state !== undefined;
+  private onState(state: ServerState | undefined): void {
+    this.serverResponds = state !== undefined;
     if (state) {
       this.state = state;
       this.showDevices(state.devices);
@@ -156,7 +163,7 @@ class Page {
     setText(byId("recording"), `● ${server.recording ?? ""}`);
     setText(
       byId("about"),
-      `hapticd ${server.version}, ${device.driver} at ${device.rate_Hz} Hz${device.realtime ? "" : ", not realtime"}, up for ${durationText(server.uptime_s)}`,
+      `hapticd ${server.version}, ${device.driver} at ${device.rate_Hz} Hz${device.realtime ? "" : ", not realtime"}, running for ${durationText(server.uptime_s)}`,
     );
   }
 
@@ -194,7 +201,7 @@ class Page {
 
   private showNotice(): void {
     const noDevice = this.state?.devices.length === 0;
-    if (this.link.state === "lost" || (!this.answers && this.state)) return showNotice("lost");
+    if (this.link.state === "lost" || (!this.serverResponds && this.state)) return showNotice("lost");
     if (noDevice) return showNotice("no device");
     if (!this.device || this.link.state === "connecting") return showNotice("connecting");
     showNotice(
@@ -204,7 +211,7 @@ class Page {
 
   // The connection.
 
-  private linkChanged(): void {
+  private onLinkState(): void {
     const label = byId("link");
     document.body.classList.toggle("lost", this.link.state === "lost");
     const { state } = this.link;
@@ -212,9 +219,9 @@ class Page {
     label.dataset["level"] = state === "open" ? "good" : state === "lost" ? "bad" : "";
     if (state === "open") this.subscribe();
     if (state === "lost") {
-      this.hand.lost();
+      this.hand.onLost();
       for (const id of ["force", "depth", "touching"]) setText(byId(id), "–");
-      this.meshes.clear(); // another server may come, and number its shapes alike
+      this.meshes.clear(); // another server numbers its shapes from 1, too
     }
     this.showNotice();
   }
@@ -223,11 +230,11 @@ class Page {
     this.link.send(wire.subscribe(wire.REPORT_TICK | wire.REPORT_CONTACTS | wire.REPORT_BUTTON, REPORTS_HZ));
   }
 
-  private received(message: wire.Incoming, age_s: number): void {
+  private onMessage(message: wire.Incoming, age_s: number): void {
     if (this.device && !this.device.names.includes(message.device)) return;
     switch (message.name) {
       case wire.TICK:
-        return this.tickCame(wire.decodeTick(message.payload), age_s);
+        return this.onTick(wire.decodeTick(message.payload), age_s);
       case wire.CONTACTS:
         this.contacts = wire.decodeContacts(message.payload);
         return;
@@ -236,45 +243,52 @@ class Page {
         return this.showArmed(guard.stopped || guard.latched !== 0);
       }
       case wire.TEXT:
-        return this.textCame(wire.decodeText(message.payload));
+        return this.onText(wire.decodeText(message.payload));
     }
   }
 
-  private tickCame(tick: wire.Tick, age_s: number): void {
+  private onTick(tick: wire.Tick, age_s: number): void {
     this.tick = tick;
-    this.fresh = true;
+    this.tickIsNew = true;
     this.plots.tick(tick, Math.hypot(...tick.force_N), this.depth_mm(tick), age_s * 1000);
   }
 
-  private textCame({ severity, text }: wire.ServerText): void {
-    if (text.startsWith("Hold_Hand refused")) this.hand.lost();
+  private onText({ severity, level, text }: wire.ServerText): void {
+    if (HAND_REFUSALS.includes(level)) this.hand.onLost();
     toast(text, severity);
   }
 
-  // The hand.
+  // The simulated hand.
 
-  /** World units in a millimetre of the device. */
-  private unit(): number {
+  /** World units per millimetre of the device. */
+  private worldPerMm(): number {
     return this.device ? new Matrix4().fromArray(this.device.T_world_device).getMaxScaleOnAxis() / 1000 : 1;
   }
 
   private depth_mm(tick: wire.Tick): number {
-    return (tick.depth * (this.device?.world_per_reported ?? 1000)) / this.unit();
+    return (tick.depth * (this.device?.world_per_reported ?? 1000)) / this.worldPerMm();
   }
 
-  private handNow(): HandNow | undefined {
+  private handContext(): HandContext | undefined {
     const { tick, device } = this;
     if (!tick || !device?.simulated || this.link.state !== "open") return undefined;
-    const unit = this.unit();
-    const clear = this.view.markers.world(tick.proxy);
-    for (const contact of this.contacts) clear.addScaledVector(new Vector3(...contact.normal), 2 * unit);
+    const worldPerMm = this.worldPerMm();
+    const freePoint = this.view.markers.world(tick.proxy);
+    for (const contact of this.contacts)
+      freePoint.addScaledVector(new Vector3(...contact.normal), 2 * worldPerMm);
     const { min, max } = device.workspace_m;
-    const room = {
-      reach: new Box3(new Vector3().fromArray(min), new Vector3().fromArray(max)),
+    const surroundings = {
+      workspace: new Box3(new Vector3().fromArray(min), new Vector3().fromArray(max)),
       T_world_device: new Matrix4().fromArray(device.T_world_device),
       blocked: (from: Vector3, to: Vector3) => this.view.objects.between(from, to),
     };
-    return { hand: this.view.markers.world(tick.hand), clear, orientation: tick.orientation, unit, room };
+    return {
+      hip: this.view.markers.world(tick.hand),
+      freePoint,
+      orientation: tick.orientation,
+      worldPerMm,
+      surroundings,
+    };
   }
 
   private showHand(): void {
@@ -283,19 +297,19 @@ class Page {
     this.view.canvas.dataset["hand"] = String(usable);
     byId("let-go").hidden = !hand.held;
     byId("hand-bar").hidden = !device || !hand.enabled;
-    setText(byId("hand-says"), this.handText());
+    setText(byId("hand-status"), this.handText());
   }
 
   private handText(): string {
     const { device, hand } = this;
     if (!device) return "";
-    if (!device.simulated) return "A real hand holds this device.";
+    if (!device.simulated) return "A user holds this device; the page cannot move it.";
     if (hand.held)
       return hand.strokes
-        ? `You hold the hand, pressing ${hand.pressing_mm.toFixed(0)} mm in. Wheel: deeper.`
-        : "You hold the hand. Wheel: depth.";
-    if (device.held_by !== null) return `Client ${device.held_by} holds the hand.`;
-    return "Drag over an object to touch it. Right button: camera.";
+        ? `You hold the simulated hand, pressing ${hand.pressing_mm.toFixed(0)} mm deep. Wheel: depth.`
+        : "You hold the simulated hand. Wheel: depth.";
+    if (device.held_by !== null) return `Client ${device.held_by} holds the simulated hand.`;
+    return "Drag over an object to touch it. Right mouse button: camera.";
   }
 
   private showArmed(stopped: boolean): void {
@@ -303,17 +317,17 @@ class Page {
     document.body.classList.toggle("stopped", stopped);
   }
 
-  // Each frame.
+  // Every frame.
 
   private frame(time_ms: number): void {
     this.hand.frame(time_ms);
-    if (this.tick && this.fresh) {
-      this.fresh = false;
+    if (this.tick && this.tickIsNew) {
+      this.tickIsNew = false;
       const contacts = this.tick.object < 0 && this.tick.depth === 0 ? [] : this.contacts;
       this.view.markers.update(this.tick, contacts);
       this.view.objects.touch(this.tick.object);
       this.view.invalidate();
-      if (time_ms - this.readoutAt > READOUT_MS) this.readout(this.tick, time_ms);
+      if (time_ms - this.readoutAt_ms > READOUT_MS) this.readout(this.tick, time_ms);
     }
     this.view.draw();
     this.plots.draw();
@@ -321,10 +335,10 @@ class Page {
   }
 
   private readout(tick: wire.Tick, time_ms: number): void {
-    this.readoutAt = time_ms;
+    this.readoutAt_ms = time_ms;
     setText(byId("force"), Math.hypot(...tick.force_N).toFixed(2));
     setText(byId("depth"), `${this.depth_mm(tick).toFixed(2)} mm`);
-    const stopped = (tick.guardActive & STOPPED) !== 0 ? " (stopped)" : "";
+    const stopped = (tick.guardActive & (1 << TRIPS.stopped.bit)) !== 0 ? " (stopped)" : "";
     setText(byId("touching"), (tick.object >= 0 ? `object ${tick.object}` : "nothing") + stopped);
   }
 }
@@ -336,5 +350,5 @@ function durationText(seconds: number): string {
 
 const viewer = new Page();
 viewer.start();
-// For the tests, and for the curious at the console.
+// For the tests and for the browser's console.
 Object.assign(window, { viewer });

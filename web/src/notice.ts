@@ -1,26 +1,26 @@
-// What the view says while there is nothing to see in it, and what the server says in words.
+// Notices over the view while there is nothing to see, and the texts of the server as toasts.
 import { byId, el, setText } from "./panels/dom";
 
 export type Notice = "connecting" | "lost" | "no device" | "empty" | "";
 
 const TEXTS: Record<Exclude<Notice, "">, [title: string, text: string]> = {
-  connecting: ["Connecting …", "Waiting for the server's answer."],
+  connecting: ["Connecting …", "Waiting for the server."],
   lost: [
     "Connection lost",
-    "Is “hapticd serve” still running? This page connects again by itself as soon as it is. Until then it cannot stop the device: use the device's own switch.",
+    "Is “hapticd serve” still running? This page reconnects automatically. Until then it cannot stop the device: use the switch on the device.",
   ],
   "no device": [
     "No device",
-    "The server runs without any device. Start it with one, for example “hapticd serve --device simulated”.",
+    "The server has no device. Start it with one, for example “hapticd serve --device simulated”.",
   ],
   empty: [
     "The scene is empty",
-    "Drop a mesh here (OBJ, STL, PLY, glTF), or send one: “hapticd touch testdata/meshes/bunny.obj”.",
+    "Drop a mesh here (OBJ, STL, PLY or glTF), or run “hapticd touch testdata/meshes/bunny.obj”.",
   ],
 };
 
 const TOAST_MS = 8000;
-const MOST_TOASTS = 4;
+const MAX_TOASTS = 4;
 
 let shown: Notice | undefined;
 export function showNotice(notice: Notice): void {
@@ -40,6 +40,6 @@ export function toast(text: string, severity: number): void {
   for (const old of [...box.children]) if (old.textContent === text) old.remove();
   const item = el("div", { data: { level: severity >= 2 ? "bad" : "warn" } }, text);
   box.append(item);
-  while (box.children.length > MOST_TOASTS) box.firstElementChild!.remove();
+  while (box.children.length > MAX_TOASTS) box.firstElementChild!.remove();
   setTimeout(() => item.remove(), TOAST_MS);
 }

@@ -1,4 +1,4 @@
-// What GET /api/state says; docs/viewer.md names the fields that the page shows.
+// The response of GET /api/state.
 
 export interface Histogram {
   p50: number;
@@ -23,7 +23,6 @@ export interface DeviceState {
   hand: string;
   held_by: number | null;
   fault: string;
-  temperature_C: number | null;
   guard: { armed: boolean; stopped: boolean; active: string[]; latched: string[] };
   loop: {
     ticks: number;
@@ -94,5 +93,5 @@ export interface ServerState {
   scenes: SceneState[];
 }
 
-/** Whether an object can be felt at all. */
-export const felt = (o: ObjectState): boolean => o.touchable && o.stiffness_N_per_m > 0 && o.triangles > 0;
+/** Whether the object can exert a force: it is touchable, has a stiffness and a mesh. */
+export const isFelt = (o: ObjectState): boolean => o.touchable && o.stiffness_N_per_m > 0 && o.triangles > 0;

@@ -1,4 +1,4 @@
-// Light or dark: what the system prefers, until somebody chooses.
+// Light or dark theme: the preference of the system until the user chooses.
 import { byId, setText } from "./panels/dom";
 
 type Theme = "light" | "dark";

@@ -14,7 +14,7 @@ std::string lowerCase(std::string_view text) {
   return lower;
 }
 
-// HOST:PORT of a Host header or an origin; without a port it is the one of the scheme.
+// HOST:PORT of a Host header or an Origin; a missing port is the default of the scheme.
 std::string withPort(std::string_view authority, std::string_view portOfScheme) {
   const std::size_t colon = authority.rfind(':');
   const std::size_t bracket = authority.rfind(']');
@@ -38,7 +38,7 @@ WebAccess::WebAccess(const net::Endpoint& local, std::vector<std::string> allowe
   }
 }
 
-// An address cannot be made to lead elsewhere, as a name can.
+// The address that the client connected to is always ours: unlike a name, an address cannot be rebound.
 bool WebAccess::isOurs(std::string_view authority, std::string_view portOfScheme,
                        const net::HttpRequest& request) const {
   const std::string host = withPort(authority, portOfScheme);
@@ -47,22 +47,22 @@ bool WebAccess::isOurs(std::string_view authority, std::string_view portOfScheme
 }
 
 std::string WebAccess::refusal(const net::HttpRequest& request) const {
-  if (request.count("host") != 1) return "a request names its host once";
+  if (request.count("host") != 1) return "a request must have exactly one Host header";
   const std::string_view host = request.header("host");
   if (!isOurs(host, ":80", request)) {
-    return "this server is not " + quoted(host) +
-           ": use its address, or allow the name with --http-allow when it is one of yours";
+    return "this server does not answer to the name " + quoted(host) +
+           ": use its address, or allow the name with --http-allow if it is yours";
   }
   for (const auto& [name, value] : request.headers) {
     if (name != "origin") continue;
     const std::string_view origin = value;
     if (origin.starts_with("http://") && isOurs(origin.substr(7), ":80", request)) continue;
     if (origin.starts_with("https://") && isOurs(origin.substr(8), ":443", request)) continue;
-    return "pages of " + quoted(origin) + " may not use this server";
+    return "pages from " + quoted(origin) + " may not use this server";
   }
-  // Images and scripts of other pages come without an origin.
+  // Browsers load images and scripts for other sites' pages without an Origin header.
   if (request.header("sec-fetch-site") == "cross-site" && request.header("sec-fetch-mode") != "navigate") {
-    return "pages of other sites may not use this server";
+    return "pages from other sites may not use this server";
   }
   return "";
 }

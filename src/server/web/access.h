@@ -1,8 +1,8 @@
-// Who may talk to the web port: pages of our own and programs, no page of somebody else's.
+// Access control of the HTTP port: our own pages and programs may use it, pages of other sites may not.
 //
-// A browser lets any page in the world send requests to this machine. It tells by Origin where the page is
-// from, and by Host which name it believes to talk to: a name of somebody else's that was made to lead here
-// (DNS rebinding) shows there.
+// A browser lets any web page send requests to this machine. The Origin header names the site that the page comes from.
+// The Host header names the server that the browser believes it talks to, which reveals DNS rebinding: a foreign name
+// that resolves to this machine.
 #pragma once
 
 #include <string>
@@ -13,12 +13,12 @@
 
 namespace hapticd::server {
 
-/// Pure. `local` is where the port listens; `allowed` are further names, HOST for our own port or HOST:PORT.
+/// No side effects. `local` is the listening address; `allowed` are further names, HOST (with our port) or HOST:PORT.
 class WebAccess {
  public:
   WebAccess(const net::Endpoint& local, std::vector<std::string> allowed);
 
-  /// Empty when the request may pass, else why not, in a plain sentence.
+  /// Why the request is refused, as a sentence; empty when it is allowed.
   std::string refusal(const net::HttpRequest& request) const;
 
  private:
@@ -26,7 +26,7 @@ class WebAccess {
               const net::HttpRequest& request) const;
 
   std::uint16_t port_;
-  std::vector<std::string> hosts_;  // lower case, with port
+  std::vector<std::string> hosts_;  // lower case, with the port
 };
 
 }  // namespace hapticd::server

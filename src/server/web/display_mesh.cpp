@@ -1,8 +1,9 @@
 #include "server/web/display_mesh.h"
 
+#include <meshoptimizer.h>
+
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <cstring>
 #include <limits>
 #include <vector>
@@ -12,15 +13,16 @@ namespace {
 
 using geometry::Triangle;
 using geometry::Vec3f;
+using Corners = std::vector<unsigned int>;  // vertex numbers, three per triangle
 
-static_assert(std::endian::native == std::endian::little, "the mesh is copied as it lies in memory");
+static_assert(std::endian::native == std::endian::little, "encode() copies memory as it is");
+static_assert(sizeof(Vec3f) == 3 * sizeof(float));
 
-constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 constexpr std::size_t kHead_bytes = 16;
 
 struct Mesh {
   std::vector<Vec3f> vertices;
-  std::vector<Triangle> triangles;
+  Corners corners;
 };
 
 bool isUsable(std::span<const Vec3f> vertices, const Triangle& t) {
@@ -29,106 +31,99 @@ bool isUsable(std::span<const Vec3f> vertices, const Triangle& t) {
          t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
 }
 
-// Only the vertices that are used, however many there are.
-Mesh compact(std::span<const Vec3f> vertices, const std::vector<Triangle>& triangles) {
-  Mesh mesh;
-  std::vector<std::uint32_t> renamed(vertices.size(), kNone);
-  mesh.triangles.reserve(triangles.size());
-  for (Triangle t : triangles) {
-    for (std::uint32_t& corner : t) {
-      std::uint32_t& name = renamed[corner];
-      if (name == kNone) {
-        name = static_cast<std::uint32_t>(mesh.vertices.size());
-        mesh.vertices.push_back(vertices[corner]);
-      }
-      corner = name;
-    }
-    mesh.triangles.push_back(t);
-  }
+// Only the vertices that triangles use, in the order of their use.
+Mesh compact(std::span<const Vec3f> vertices, Corners corners) {
+  Mesh mesh{std::vector<Vec3f>(vertices.size()), std::move(corners)};
+  mesh.vertices.resize(meshopt_optimizeVertexFetch(mesh.vertices.data(), mesh.corners.data(), mesh.corners.size(),
+                                                   vertices.data(), vertices.size(), sizeof(Vec3f)));
   return mesh;
 }
 
-// The cell of each vertex in a grid of so many cells along the longest side, as a number from 0.
-std::vector<std::uint32_t> cellsOf(const std::vector<Vec3f>& vertices, double cells, std::uint32_t& count) {
+// Scaled into the unit cube, since the simplifier squares coordinates in single precision. Adding 0 makes -0 and 0 the
+// same bits, which is how it finds equal positions.
+std::vector<Vec3f> inUnitCube(const std::vector<Vec3f>& vertices) {
   Vec3f low = vertices.front();
   Vec3f high = low;
   for (const Vec3f& v : vertices) {
     low = low.cwiseMin(v);
     high = high.cwiseMax(v);
   }
-  const Eigen::Vector3d origin = low.cast<double>();
-  const double side = std::max((high.cast<double>() - origin).maxCoeff() / cells, 1e-300);
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> keys(vertices.size());
-  for (std::size_t i = 0; i < vertices.size(); ++i) {
-    const Eigen::Vector3d at = (vertices[i].cast<double>() - origin) / side;
-    std::uint64_t key = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      key = key << 21 | static_cast<std::uint64_t>(std::clamp(at[axis], 0.0, 2097151.0));
-    }
-    keys[i] = {key, static_cast<std::uint32_t>(i)};
+  const Eigen::Array3d origin = low.cast<double>();
+  const double side = std::max((high.cast<double>().array() - origin).maxCoeff(), std::numeric_limits<double>::min());
+  std::vector<Vec3f> scaled;
+  scaled.reserve(vertices.size());
+  for (const Vec3f& v : vertices) {
+    scaled.emplace_back(((v.cast<double>().array() - origin) / side + 0.0).cast<float>().matrix());
   }
-  std::sort(keys.begin(), keys.end());
-  std::vector<std::uint32_t> cell(vertices.size());
-  count = 0;
-  for (std::size_t i = 0; i < keys.size(); ++i) {
-    if (i > 0 && keys[i].first != keys[i - 1].first) ++count;
-    cell[keys[i].second] = count;
-  }
-  ++count;
-  return cell;
+  return scaled;
 }
 
-// Each cell becomes the mean of its vertices; faces that fall into two cells or one vanish, equal ones merge.
-Mesh cluster(const Mesh& mesh, double cells) {
-  std::uint32_t count = 0;
-  const std::vector<std::uint32_t> cell = cellsOf(mesh.vertices, cells, count);
-  std::vector<Triangle> triangles;
-  for (const Triangle& t : mesh.triangles) {
-    Triangle c{cell[t[0]], cell[t[1]], cell[t[2]]};
-    if (c[0] == c[1] || c[1] == c[2] || c[2] == c[0]) continue;
-    std::rotate(c.begin(), std::min_element(c.begin(), c.end()), c.end());
-    triangles.push_back(c);
+// Clients often send three vertices per triangle: gives vertices at one position one number, and drops triangles that
+// have two corners at one position.
+Corners weld(const Corners& corners, const std::vector<Vec3f>& positions) {
+  Corners all(corners.size());
+  meshopt_generateShadowIndexBuffer(all.data(), corners.data(), corners.size(), positions.data(), positions.size(),
+                                    sizeof(Vec3f), sizeof(Vec3f));
+  Corners welded;
+  welded.reserve(all.size());
+  for (std::size_t i = 0; i < all.size(); i += 3) {
+    if (all[i] == all[i + 1] || all[i + 1] == all[i + 2] || all[i + 2] == all[i]) continue;
+    welded.insert(welded.end(), {all[i], all[i + 1], all[i + 2]});
   }
-  std::sort(triangles.begin(), triangles.end());
-  triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
-  std::vector<Eigen::Vector3d> sum(count, Eigen::Vector3d::Zero());
-  std::vector<std::uint32_t> members(count, 0);
-  for (std::size_t i = 0; i < cell.size(); ++i) {
-    sum[cell[i]] += mesh.vertices[i].cast<double>();
-    ++members[cell[i]];
-  }
-  std::vector<Vec3f> means(count);
-  for (std::uint32_t i = 0; i < count; ++i) means[i] = (sum[i] / members[i]).cast<float>();
-  return compact(means, triangles);
+  return welded;
 }
 
-// The faces of a surface grow with the square of the cells along a side, so a few tries come close.
-Mesh simplify(const Mesh& mesh, std::size_t most, const std::atomic<bool>& cancelled) {
-  constexpr int kTries = 6;
-  Mesh best;
-  double cells = std::clamp(std::sqrt(static_cast<double>(most) / 6), 1.0, 2e6);
-  for (int i = 0; i < kTries && !cancelled; ++i) {
-    Mesh coarse = cluster(mesh, cells);
-    const std::size_t have = coarse.triangles.size();
-    if (have <= most && have >= best.triangles.size()) best = std::move(coarse);
-    if (best.triangles.size() * 10 >= most * 8) break;
-    const double ratio = static_cast<double>(most) / static_cast<double>(std::max<std::size_t>(have, 1));
-    cells = std::clamp(cells * std::clamp(0.95 * std::sqrt(ratio), 0.1, 10.0), 1.0, 2e6);
+// Evenly spaced triangles: for a soup of separate triangles smaller than any cell, where clustering leaves nothing.
+Corners sample(const Corners& corners, std::size_t most) {
+  const std::size_t count = corners.size() / 3;
+  Corners some;
+  for (std::size_t i = 0; i < most; ++i) {
+    const std::size_t at = 3 * (i * count / most);
+    some.insert(some.end(), {corners[at], corners[at + 1], corners[at + 2]});
   }
-  return best;
+  return some;
+}
+
+// Edge collapses give the better picture, but take about a second per million triangles and keep the topology, so that
+// they cannot reduce a soup. Clustering in a grid comes before them in huge meshes and after them where they got stuck.
+Corners simplify(const Mesh& mesh, std::size_t most, const std::atomic<bool>& cancelled) {
+  constexpr std::size_t kMostCollapsed = 1'000'000;
+  constexpr float kAnyError = 1e6F;
+  const std::vector<Vec3f> positions = inUnitCube(mesh.vertices);
+  Corners corners = weld(mesh.corners, positions);
+  Corners result;
+  const auto cluster = [&](std::size_t target) {
+    if (corners.size() <= 3 * target || cancelled) return;
+    result.resize(corners.size());
+    result.resize(meshopt_simplifySloppy(result.data(), corners.data(), corners.size(), positions[0].data(),
+                                         positions.size(), sizeof(Vec3f), 3 * target, kAnyError));
+    if (result.empty()) result = sample(corners, target);
+    corners.swap(result);
+  };
+  const auto collapse = [&](std::size_t target) {
+    if (corners.size() <= 3 * target || cancelled) return;
+    result.resize(corners.size());
+    result.resize(meshopt_simplify(result.data(), corners.data(), corners.size(), positions[0].data(),
+                                   positions.size(), sizeof(Vec3f), 3 * target, kAnyError));
+    corners.swap(result);
+  };
+  cluster(std::max(most, kMostCollapsed));
+  collapse(most);
+  cluster(most);
+  return corners;
 }
 
 net::Buffer encode(const Mesh& mesh) {
   const std::uint32_t head[3] = {static_cast<std::uint32_t>(mesh.vertices.size()),
-                                 static_cast<std::uint32_t>(mesh.triangles.size()), 0};
+                                 static_cast<std::uint32_t>(mesh.corners.size() / 3), 0};
   const std::size_t vertices = mesh.vertices.size() * sizeof(Vec3f);
-  const std::size_t triangles = mesh.triangles.size() * sizeof(Triangle);
-  net::Buffer bytes(kHead_bytes + vertices + triangles);
+  const std::size_t corners = mesh.corners.size() * sizeof(std::uint32_t);
+  net::Buffer bytes(kHead_bytes + vertices + corners);
   std::memcpy(bytes.data(), "HDM1", 4);
   std::memcpy(bytes.data() + 4, head, sizeof head);
-  if (triangles == 0) return bytes;
+  if (corners == 0) return bytes;
   std::memcpy(bytes.data() + kHead_bytes, mesh.vertices.data(), vertices);
-  std::memcpy(bytes.data() + kHead_bytes + vertices, mesh.triangles.data(), triangles);
+  std::memcpy(bytes.data() + kHead_bytes + vertices, mesh.corners.data(), corners);
   return bytes;
 }
 
@@ -142,12 +137,14 @@ std::size_t displayShare(std::size_t triangles, std::size_t trianglesInAll, std:
 
 net::Buffer displayMesh(std::span<const Vec3f> vertices, std::span<const Triangle> triangles,
                         std::size_t most, const std::atomic<bool>& cancelled) {
-  std::vector<Triangle> usable;
-  std::copy_if(triangles.begin(), triangles.end(), std::back_inserter(usable),
-               [&](const Triangle& t) { return isUsable(vertices, t); });
-  const Mesh mesh = compact(vertices, usable);
-  if (mesh.triangles.size() <= most || cancelled) return encode(cancelled ? Mesh() : mesh);
-  return encode(simplify(mesh, most, cancelled));
+  Corners corners;
+  for (const Triangle& t : triangles) {
+    if (isUsable(vertices, t)) corners.insert(corners.end(), t.begin(), t.end());
+  }
+  if (corners.empty() || most == 0 || cancelled) return encode({});
+  Mesh mesh = compact(vertices, std::move(corners));
+  if (mesh.corners.size() > 3 * most) mesh = compact(mesh.vertices, simplify(mesh, most, cancelled));
+  return encode(cancelled ? Mesh() : mesh);
 }
 
 std::size_t displayTriangles(const net::Buffer& mesh) {

@@ -1,4 +1,4 @@
-// A mesh for the eye: few enough triangles, in the form that the page takes.
+// Display meshes: few enough triangles for the page to draw, in the binary format that the page reads.
 #pragma once
 
 #include <atomic>
@@ -10,22 +10,22 @@
 
 namespace hapticd::server {
 
-/// Triangles of all objects of a scene together that the page gets to draw.
+/// Limit for the triangles of all display meshes of a scene together.
 inline constexpr std::size_t kDisplayTriangles = 100'000;
 
-/// What one object may have of them: half of all is shared evenly, so that a cube beside a scan stays a cube,
-/// the other half by size. The shares of all objects add up to kDisplayTriangles at most.
+/// Triangles that one of `objects` objects may use of kDisplayTriangles. Half is shared evenly, so that a cube beside a
+/// scan stays a cube; half is shared by size. The shares of all objects add up to at most kDisplayTriangles.
 std::size_t displayShare(std::size_t triangles, std::size_t trianglesInAll, std::size_t objects);
 
-/// With at most `most` triangles: as it is when it has no more, else by clustering of vertices in a grid. In
-/// little endian: "HDM1", the numbers of vertices and triangles and 0 as u32; 3 f32 for each vertex; 3 u32
-/// for each triangle. Faces without area and with numbers that are none are left out. Takes up to seconds; an
-/// empty mesh when `cancelled` meanwhile.
+/// Encodes the mesh with at most `most` triangles, simplified if it has more. Triangles with equal, missing or
+/// non-finite vertices are dropped. Little endian: "HDM1"; number of vertices, number of triangles and 0 as u32; 3 f32
+/// for each vertex; 3 u32 for each triangle. Takes seconds for millions of triangles; polls `cancelled` between steps of
+/// at most about one second per million triangles and then returns an empty mesh. Any thread.
 net::Buffer displayMesh(std::span<const geometry::Vec3f> vertices,
                         std::span<const geometry::Triangle> triangles, std::size_t most,
                         const std::atomic<bool>& cancelled);
 
-/// The number of triangles in what displayMesh() gave.
+/// The number of triangles in a result of displayMesh().
 std::size_t displayTriangles(const net::Buffer& mesh);
 
 }  // namespace hapticd::server

@@ -1,4 +1,4 @@
-// Display meshes of the scenes: made by a worker when somebody asks, kept while the shape is the same.
+// Display meshes of the scenes: built by a worker on the first request, cached until the shape changes.
 #pragma once
 
 #include <atomic>
@@ -19,34 +19,34 @@ namespace hapticd::server {
 /// Net thread.
 class MeshStore {
  public:
-  using Answer = std::function<void(net::HttpResponse)>;
+  using Respond = std::function<void(net::HttpResponse)>;
 
   MeshStore(net::Loop& loop, Worker& worker) : loop_(loop), worker_(worker) {}
   ~MeshStore();
 
-  /// Answers with the mesh of the object at `position` in the view, or with 503 when that takes longer than a
-  /// moment.
-  void get(std::size_t scene, const SceneView& view, std::size_t position, const Answer& answer);
+  /// Responds with the mesh of the object at `position` in `observed`, or with 503 when building it takes longer than
+  /// 500 ms; the result is kept for the client's retry.
+  void get(std::size_t scene, const ObservedScene& observed, std::size_t position, const Respond& respond);
 
-  /// How many triangles the page gets of each object.
-  std::vector<std::size_t> displayTriangles(std::size_t scene, const SceneView& view) const;
+  /// Triangles of each object's display mesh; for one that is not built yet, its upper bound.
+  std::vector<std::size_t> displayTriangles(std::size_t scene, const ObservedScene& observed) const;
 
-  /// Forgets what is not in the view any more.
-  void prune(std::size_t scene, const SceneView& view);
+  /// Frees the meshes of shapes that `observed` no longer has, and cancels building them.
+  void prune(std::size_t scene, const ObservedScene& observed);
 
  private:
   using Key = std::pair<std::size_t, std::int32_t>;  // scene, object
   struct Entry {
     std::uint64_t geometry = 0;
     std::size_t share = 0;
-    std::shared_ptr<const net::Buffer> bytes;  // null while it is being made
+    std::shared_ptr<const net::Buffer> bytes;  // null while the worker builds it
     std::shared_ptr<std::atomic<bool>> cancelled = std::make_shared<std::atomic<bool>>(false);
-    std::vector<Answer> waiting;
-    net::Subscription patience;
+    std::vector<Respond> waiting;
+    net::Subscription timeout;
   };
 
-  void make(const Key& key, Entry& entry, const scene::ObjectDescription& object);
-  void onMade(const Key& key, std::uint64_t geometry, std::size_t share, net::Buffer&& bytes);
+  void build(const Key& key, Entry& entry, const scene::ObjectDescription& object);
+  void onBuilt(const Key& key, std::uint64_t geometry, std::size_t share, net::Buffer&& bytes);
 
   net::Loop& loop_;
   Worker& worker_;

@@ -1,4 +1,4 @@
-// What the system says of this process.
+// Resource usage of this process, for /metrics.
 #pragma once
 
 #include <cstdint>
@@ -9,10 +9,10 @@ struct ProcessUsage {
   std::uint64_t residentBytes = 0;
   std::uint64_t virtualBytes = 0;
   std::uint64_t openFiles = 0;
-  double cpu_s = 0;  ///< of all threads, in user and system
+  double cpu_s = 0;  ///< user and system time of all threads
 };
 
-/// Reads /proc and asks the system; what cannot be had is 0.
+/// Reads /proc/self and getrusage(2). A value that is not available is 0. Any thread.
 ProcessUsage processUsage();
 
 }  // namespace hapticd::server

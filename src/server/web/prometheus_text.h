@@ -11,15 +11,15 @@
 
 namespace hapticd::server {
 
-/// Collects families of metrics, one after the other: a family's head first, then its samples.
+/// Writes metric families one after the other: call family() first, then add its samples.
 class PrometheusText {
  public:
   using Labels = std::initializer_list<std::pair<std::string_view, std::string_view>>;
 
-  /// `type`: counter, gauge, histogram. Names of counters end in _total; names end in their unit.
+  /// `type`: counter, gauge or histogram. By convention a counter's name ends in _total, other names end in their unit.
   void family(std::string_view name, std::string_view type, std::string_view help);
   void sample(double value, Labels labels = {});
-  /// A histogram of nanoseconds, told in seconds, with a bucket for each doubling from 1 us to 0.5 s.
+  /// Converts a histogram of nanoseconds to seconds, with a bucket for each power of two from 1 us to 0.5 s.
   void histogram(const realtime::Histogram::Copy& histogram, std::string_view device);
 
   const std::string& text() const noexcept { return text_; }

@@ -11,8 +11,8 @@ SceneWatch::SceneWatch(net::Loop& loop, std::vector<SceneHost*> scenes, Dispose 
     : loop_(loop),
       scenes_(std::move(scenes)),
       dispose_(std::move(dispose)),
-      views_(scenes_.size()),
-      asked_(scenes_.size(), 0) {}
+      latest_(scenes_.size()),
+      pending_(scenes_.size(), 0) {}
 
 void SceneWatch::refresh(std::function<void()> then) {
   waiting_.push_back(std::move(then));
@@ -22,28 +22,28 @@ void SceneWatch::refresh(std::function<void()> then) {
 void SceneWatch::beginRound() {
   inRound_ = std::exchange(waiting_, {});
   for (std::size_t i = 0; i < scenes_.size(); ++i) {
-    if (std::exchange(asked_[i], 1) != 0) continue;
+    if (std::exchange(pending_[i], 1) != 0) continue;
     scenes_[i]->describe([this, i](std::shared_ptr<const scene::SceneDescription> description) {
-      loop_.post([this, i, description = std::move(description)] { onAnswer(i, description); });
+      loop_.post([this, i, description = std::move(description)] { onReply(i, description); });
     });
   }
-  // A large mesh is being built: better what was the case than nothing.
-  const bool allKnown = std::all_of(views_.begin(), views_.end(), [](const auto& v) { return v != nullptr; });
-  patience_ = loop_.after(allKnown ? 250ms : 3000ms, [this] { endRound(); });
+  // A scene that builds a large mesh replies late: an old description is better than a late response.
+  const bool allKnown = std::all_of(latest_.begin(), latest_.end(), [](const auto& v) { return v != nullptr; });
+  timeout_ = loop_.after(allKnown ? 250ms : 3000ms, [this] { endRound(); });
 }
 
-void SceneWatch::onAnswer(std::size_t scene, std::shared_ptr<const scene::SceneDescription> description) {
-  asked_[scene] = 0;
-  auto view = std::make_shared<SceneView>();
-  view->geometry = numbersFor(*description, views_[scene].get());
-  view->description = std::move(description);
-  dispose_(std::exchange(views_[scene], std::move(view)));
-  if (std::none_of(asked_.begin(), asked_.end(), [](char asked) { return asked != 0; })) endRound();
+void SceneWatch::onReply(std::size_t scene, std::shared_ptr<const scene::SceneDescription> description) {
+  pending_[scene] = 0;
+  auto observed = std::make_shared<ObservedScene>();
+  observed->geometry = shapeNumbers(*description, latest_[scene].get());
+  observed->description = std::move(description);
+  dispose_(std::exchange(latest_[scene], std::move(observed)));
+  if (std::none_of(pending_.begin(), pending_.end(), [](char pending) { return pending != 0; })) endRound();
 }
 
-// Both lists are sorted by id. The shapes of before still exist, so an equal address is the same shape.
-std::vector<std::uint64_t> SceneWatch::numbersFor(const scene::SceneDescription& now,
-                                                  const SceneView* before) {
+// Both lists are sorted by id. The previous description keeps its shapes alive, so pointer equality means the same shape.
+std::vector<std::uint64_t> SceneWatch::shapeNumbers(const scene::SceneDescription& now,
+                                                    const ObservedScene* before) {
   static const std::vector<scene::ObjectDescription> kNone;
   const auto& known = before != nullptr ? before->description->objects : kNone;
   std::vector<std::uint64_t> numbers;
@@ -59,14 +59,14 @@ std::vector<std::uint64_t> SceneWatch::numbersFor(const scene::SceneDescription&
 }
 
 void SceneWatch::endRound() {
-  patience_.cancel();
+  timeout_.cancel();
   for (const auto& then : std::exchange(inRound_, {})) then();
   if (inRound_.empty() && !waiting_.empty()) beginRound();
 }
 
 void SceneWatch::forget() {
-  for (auto& view : views_) {
-    if (view) dispose_(std::exchange(view, nullptr));
+  for (auto& observed : latest_) {
+    if (observed) dispose_(std::exchange(observed, nullptr));
   }
 }
 

@@ -1,4 +1,4 @@
-// The scenes as the web sees them: asked for when somebody looks, so that an unwatched server does no work.
+// Descriptions of the scenes for HTTP responses, requested on demand: an unwatched server does no work for them.
 #pragma once
 
 #include <cstdint>
@@ -12,41 +12,41 @@
 
 namespace hapticd::server {
 
-/// One scene at one moment, and what was counted of it. Immutable; any thread reads.
-struct SceneView {
+/// One scene at one moment. Immutable; any thread reads it.
+struct ObservedScene {
   std::shared_ptr<const scene::SceneDescription> description;
-  std::vector<std::uint64_t> geometry;  ///< of each object: another number is another shape; 0 is none
+  std::vector<std::uint64_t> geometry;  ///< shape number of each object; it changes with the shape; 0: no shape
 };
 
-/// Net thread. Asks each scene at most one question at a time, however many want to know.
+/// Net thread. Keeps at most one request to each scene under way, however many clients ask.
 class SceneWatch {
  public:
   using Dispose = std::function<void(std::shared_ptr<const void>)>;
 
-  /// `dispose` frees elsewhere what may be large.
+  /// `dispose` takes old descriptions, which may be large, and frees them on another thread.
   SceneWatch(net::Loop& loop, std::vector<SceneHost*> scenes, Dispose dispose);
 
-  /// Calls `then` when all scenes have told how they are, or after a while if one is busy.
+  /// Calls `then` when all scenes have replied. A busy scene delays it by 250 ms at most, by 3 s before its first reply.
   void refresh(std::function<void()> then);
-  /// What the scenes told last; null before their first word.
-  const std::vector<std::shared_ptr<const SceneView>>& views() const noexcept { return views_; }
-  /// Nobody has looked for a while.
+  /// Latest description of each scene; null until the first reply.
+  const std::vector<std::shared_ptr<const ObservedScene>>& latest() const noexcept { return latest_; }
+  /// Frees the descriptions; the next refresh() requests them again.
   void forget();
 
  private:
   void beginRound();
-  void onAnswer(std::size_t scene, std::shared_ptr<const scene::SceneDescription> description);
+  void onReply(std::size_t scene, std::shared_ptr<const scene::SceneDescription> description);
   void endRound();
-  std::vector<std::uint64_t> numbersFor(const scene::SceneDescription& now, const SceneView* before);
+  std::vector<std::uint64_t> shapeNumbers(const scene::SceneDescription& now, const ObservedScene* before);
 
   net::Loop& loop_;
   const std::vector<SceneHost*> scenes_;
   const Dispose dispose_;
-  std::vector<std::shared_ptr<const SceneView>> views_;
-  std::vector<char> asked_;                     // whose answer has not come yet
+  std::vector<std::shared_ptr<const ObservedScene>> latest_;
+  std::vector<char> pending_;                   // 1: the scene has not replied yet
   std::vector<std::function<void()>> waiting_;  // for the next round
   std::vector<std::function<void()>> inRound_;
-  net::Subscription patience_;
+  net::Subscription timeout_;
   std::uint64_t lastNumber_ = 0;
 };
 

@@ -1,4 +1,4 @@
-// The server at one moment, as plain values: for the page and for metrics.
+// Status of the server as plain values, for the page and for metrics.
 #pragma once
 
 #include <string>
@@ -11,10 +11,10 @@ namespace hapticd::server {
 
 struct ServerStatus {
   double uptime_s = 0;
-  std::string recording;  ///< file name; empty when nothing is being recorded
+  std::string recording;  ///< file name; empty: not recording
   std::vector<DeviceStatus> devices;
   std::vector<ClientStatus> clients;
-  std::vector<std::vector<std::string>> scenes;  ///< first names of the devices that touch each
+  std::vector<std::vector<std::string>> scenes;  ///< per scene: first name of each of its devices
 };
 
 }  // namespace hapticd::server

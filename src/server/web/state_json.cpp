@@ -3,7 +3,7 @@
 
 #include "base/time.h"
 #include "server/reports/view.h"
-#include "server/web/picture.h"
+#include "server/web/state_report.h"
 #include "wire/messages.h"
 
 namespace hapticd::server {
@@ -15,7 +15,7 @@ Json json(const geometry::Vec3& v) {
   return {v.x(), v.y(), v.z()};
 }
 
-// Column-major, as the page's matrices are.
+// Column-major, as three.js stores matrices.
 Json json(const geometry::Affine& t) {
   Json numbers = Json::array();
   const Eigen::Matrix4d m = Eigen::Affine3d(t).matrix();
@@ -76,7 +76,6 @@ Json json(const DeviceStatus& device) {
           {"hand", device.hand},
           {"held_by", orNull(device.heldBy)},
           {"fault", device.fault},
-          {"temperature_C", nullptr},  // no driver tells degrees
           {"temperature", last.device.motorTemperature},
           {"guard",
            {{"armed", last.guard.armed},
@@ -132,7 +131,7 @@ Json json(const scene::EffectDescription& described) {
           {"type", scene::nameOf(effect.type)},
           {"active", described.active},
           {"magnitude_N", effect.magnitude_N},
-          {"gain", effect.gain / 1000},  // newtons per millimetre, as clients say it
+          {"gain", effect.gain / 1000},  // N/mm, the unit on the wire
           {"duration_ms", base::toSeconds(effect.duration) * 1e3},
           {"frequency_Hz", effect.angularFrequency_rad_per_s / (2 * std::numbers::pi)},
           {"position", json(effect.position)},
@@ -160,13 +159,13 @@ Json jsonList(const List& list) {
   return out;
 }
 
-// A scene that is too busy to answer from the start has nothing to show yet.
-Json json(const ScenePicture& picture, const std::vector<std::string>& devices) {
+// Empty until the scene has replied for the first time.
+Json json(const SceneReport& report, const std::vector<std::string>& devices) {
   static const scene::SceneDescription kNothing;
-  const scene::SceneDescription& scene = picture.view ? *picture.view->description : kNothing;
+  const scene::SceneDescription& scene = report.observed ? *report.observed->description : kNothing;
   Json objects = Json::array();
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-    objects.push_back(json(scene.objects[i], picture.view->geometry[i], picture.displayTriangles[i]));
+    objects.push_back(json(scene.objects[i], report.observed->geometry[i], report.displayTriangles[i]));
   }
   return {{"devices", devices},
           {"revision", scene.revision},
@@ -177,21 +176,21 @@ Json json(const ScenePicture& picture, const std::vector<std::string>& devices) 
           {"fields", scene.fields}};
 }
 
-// Names may be any bytes; JSON is UTF-8.
+// Names may contain any bytes, JSON is UTF-8: replace what is not.
 std::string textOf(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace
 
-std::string stateJson(const Picture& picture) {
-  const ServerStatus& server = picture.server;
+std::string stateJson(const StateReport& report) {
+  const ServerStatus& server = report.server;
   Json scenes = Json::array();
-  for (std::size_t i = 0; i < picture.scenes.size(); ++i) {
-    scenes.push_back(json(picture.scenes[i], server.scenes[i]));
+  for (std::size_t i = 0; i < report.scenes.size(); ++i) {
+    scenes.push_back(json(report.scenes[i], server.scenes[i]));
   }
   return textOf({{"server",
-                  {{"version", picture.version},
+                  {{"version", report.version},
                    {"uptime_s", server.uptime_s},
                    {"recording", server.recording.empty() ? Json() : Json(server.recording)}}},
                  {"devices", jsonList(server.devices)},
@@ -209,6 +208,10 @@ std::string messagesJson() {
                         {"meaning", info.meaning}});
   }
   return textOf({{"messages", std::move(messages)}});
+}
+
+std::string errorJson(std::string_view text) {
+  return textOf({{"error", text}}) + '\n';
 }
 
 }  // namespace hapticd::server

@@ -13,11 +13,11 @@ constexpr std::string_view kNoViewer = R"(<!doctype html>
 <meta charset="utf-8">
 <title>hapticd</title>
 <h1>hapticd is running</h1>
-<p>This program was built without its viewer. To build it in, have Node.js 18 or later with npm and a network,
-then in the source folder:</p>
+<p>This program was built without its viewer. To include it, install Node.js 18 or later with npm, then run in the
+source folder:</p>
 <pre>cmake --preset release -DHAPTICD_WEB=ON
 cmake --build --preset release</pre>
-<p>What the viewer shows is here all the same: <a href="/api/state">/api/state</a> (JSON),
+<p>The data that the viewer shows is available without it: <a href="/api/state">/api/state</a> (JSON),
 <a href="/metrics">/metrics</a> (Prometheus).</p>
 </html>
 )";
@@ -64,7 +64,7 @@ net::HttpResponse assetResponse(std::string_view path) {
   const auto found = buffers().find(name);
   if (found == buffers().end()) {
     if (name == "index.html") return net::HttpResponse::of(200, kNoViewer, mediaTypeOf(name));
-    return net::HttpResponse::of(404, "there is nothing at this address\n");
+    return net::HttpResponse::of(404, "not found\n");
   }
   net::HttpResponse response;
   response.contentType = mediaTypeOf(name);

@@ -1,4 +1,4 @@
-// The page: files that are part of the program.
+// The files of the viewer, embedded into the program.
 #pragma once
 
 #include <span>
@@ -15,14 +15,14 @@ struct WebAsset {
   std::span<const std::byte> bytes;
 };
 
-/// What the build has embedded; empty when it was built without the viewer.
+/// All embedded files; none in a build without the viewer.
 std::span<const WebAsset> webAssets();
 
-/// The media type that goes with a file name.
+/// The media type for a file name, by its extension.
 std::string mediaTypeOf(std::string_view path);
 
-/// The file at a path of a URL, "/" being index.html, or a page that says how to build the viewer. 404 when
-/// there is none.
+/// The response to a URL path; "/" is index.html. Without the viewer it is a page with build instructions; 404 for an
+/// unknown path.
 net::HttpResponse assetResponse(std::string_view path);
 
 }  // namespace hapticd::server

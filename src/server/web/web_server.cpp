@@ -4,28 +4,32 @@
 
 #include <algorithm>
 #include <charconv>
-#include <optional>
 
 #include "server/web/web_assets.h"
-#include "wire/text.h"
 
 namespace hapticd::server {
 namespace {
 
 constexpr int kForgetAfter_s = 10;
 
-net::HttpResponse errorJson(int status, const std::string& text) {
-  return net::HttpResponse::of(status, R"({"error": ")" + text + "\"}\n", "application/json");
+net::HttpResponse errorResponse(int status, std::string_view text) {
+  return net::HttpResponse::of(status, errorJson(text), "application/json");
 }
 
+// A whole number from the query string. Sets `error` when it is missing, malformed or out of range.
 template <class Number>
-std::optional<Number> numberIn(const net::HttpRequest& request, std::string_view name) {
+Number numberIn(const net::HttpRequest& request, std::string_view name, std::string& error) {
   const auto text = request.parameter(name);
-  if (!text) return std::nullopt;
   Number number = 0;
-  const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), number);
-  if (error != std::errc{} || end != text->data() + text->size()) return std::nullopt;
-  return number;
+  if (text) {
+    const auto [end, code] = std::from_chars(text->data(), text->data() + text->size(), number);
+    if (code == std::errc{} && end == text->data() + text->size()) return number;
+  }
+  constexpr std::size_t kShown = 80;
+  error = std::string(name) + (text ? " must be a whole number, got '" + std::string(text->substr(0, kShown)) + "'"
+                                    : std::string(" is missing")) +
+          ": expected /api/mesh?scene=0&object=0&geometry=1";
+  return 0;
 }
 
 net::HttpOptions httpOptions(const net::ConnectionOptions& connection) {
@@ -34,7 +38,7 @@ net::HttpOptions httpOptions(const net::ConnectionOptions& connection) {
   return options;
 }
 
-// For every answer: nothing of others in our page, our page in no other.
+// On every response: our page loads nothing from other sites, and other sites cannot embed it.
 void addHeaders(net::HttpResponse& response) {
   for (const auto& [name, value] : {
            std::pair{"Cache-Control", "no-cache"},
@@ -84,11 +88,11 @@ void WebServer::onRequest(const net::HttpRequest& request, const net::HttpReply&
   if (!refusal.empty()) {
     respond(reply, net::HttpResponse::of(403, refusal + '\n'));
   } else if (request.method != "GET" && request.method != "HEAD") {
-    net::HttpResponse response = net::HttpResponse::of(405, "this address can only be read\n");
+    net::HttpResponse response = net::HttpResponse::of(405, "only GET and HEAD are allowed\n");
     response.headers = {{"Allow", "GET, HEAD"}};
     respond(reply, std::move(response));
   } else if (!request.target.starts_with('/')) {
-    respond(reply, net::HttpResponse::of(400, "the target of a request begins with '/'\n"));
+    respond(reply, net::HttpResponse::of(400, "the request target must begin with '/'\n"));
   } else {
     route(request, reply);
   }
@@ -97,14 +101,14 @@ void WebServer::onRequest(const net::HttpRequest& request, const net::HttpReply&
 void WebServer::route(const net::HttpRequest& request, const net::HttpReply& reply) {
   const std::string_view path = request.path();
   if (path == "/vrpn") {
-    net::HttpResponse response = net::HttpResponse::of(426, "this is a WebSocket with a VRPN stream in it\n");
+    net::HttpResponse response = net::HttpResponse::of(426, "/vrpn is a WebSocket that carries a VRPN stream\n");
     response.headers = {{"Upgrade", "websocket"}, {"Connection", "Upgrade"}};
     response.onWebSocket = [this](net::Connection connection) { owner_.onWebClient(std::move(connection)); };
     respond(reply, std::move(response));
   } else if (path == "/api/state") {
-    sendPicture(reply, &stateJson, "application/json");
+    sendState(reply, &stateJson, "application/json");
   } else if (path == "/metrics") {
-    sendPicture(reply, &metricsText, "text/plain; version=0.0.4; charset=utf-8");
+    sendState(reply, &metricsText, "text/plain; version=0.0.4; charset=utf-8");
   } else if (path == "/api/mesh") {
     sendMesh(request, reply);
   } else if (path == "/api/messages") {
@@ -114,22 +118,23 @@ void WebServer::route(const net::HttpRequest& request, const net::HttpReply& rep
   }
 }
 
-Picture WebServer::picture() {
-  Picture picture;
-  picture.version = HAPTICD_VERSION;
-  picture.server = owner_.status();
-  for (std::size_t i = 0; i < watch_.views().size(); ++i) {
-    const auto& view = watch_.views()[i];
-    if (view) meshes_.prune(i, *view);
-    picture.scenes.push_back({view, view ? meshes_.displayTriangles(i, *view) : std::vector<std::size_t>()});
+StateReport WebServer::report() {
+  StateReport report;
+  report.version = HAPTICD_VERSION;
+  report.server = owner_.status();
+  for (std::size_t i = 0; i < watch_.latest().size(); ++i) {
+    const auto& observed = watch_.latest()[i];
+    if (observed) meshes_.prune(i, *observed);
+    report.scenes.push_back(
+        {observed, observed ? meshes_.displayTriangles(i, *observed) : std::vector<std::size_t>()});
   }
-  return picture;
+  return report;
 }
 
-void WebServer::sendPicture(const net::HttpReply& reply, TextOf text, const char* contentType) {
-  watch_.refresh([this, reply, text, contentType] {
-    textWorker_.post([this, reply, text, contentType, picture = picture()] {
-      auto response = net::HttpResponse::of(200, text(picture), contentType);
+void WebServer::sendState(const net::HttpReply& reply, Format format, const char* contentType) {
+  watch_.refresh([this, reply, format, contentType] {
+    textWorker_.post([this, reply, format, contentType, report = report()] {
+      auto response = net::HttpResponse::of(200, format(report), contentType);
       loop_.post(
           [this, reply, response = std::move(response)]() mutable { respond(reply, std::move(response)); });
     });
@@ -137,43 +142,45 @@ void WebServer::sendPicture(const net::HttpReply& reply, TextOf text, const char
 }
 
 void WebServer::sendMesh(const net::HttpRequest& request, const net::HttpReply& reply) {
-  const auto scene = numberIn<std::size_t>(request, "scene");
-  const auto object = numberIn<std::int64_t>(request, "object");
-  const auto geometry = numberIn<std::uint64_t>(request, "geometry");
-  if (!scene || !object || !geometry) {
-    return respond(reply, errorJson(400, "say which: /api/mesh?scene=0&object=0&geometry=1"));
-  }
-  std::string why;
-  if (findMesh(*scene, *object, *geometry, reply, why)) return;
-  // It may have changed since anybody looked.
+  std::string error;
+  const auto scene = numberIn<std::size_t>(request, "scene", error);
+  const auto object = numberIn<std::int64_t>(request, "object", error);
+  const auto geometry = numberIn<std::uint64_t>(request, "geometry", error);
+  if (!error.empty()) return respond(reply, errorResponse(400, error));
+  if (findMesh(scene, object, geometry, reply, error)) return;
+  // The latest description may be old: look again in a new one.
   watch_.refresh([=, this] {
     std::string reason;
-    if (!findMesh(*scene, *object, *geometry, reply, reason)) respond(reply, errorJson(404, reason));
+    if (!findMesh(scene, object, geometry, reply, reason)) respond(reply, errorResponse(404, reason));
   });
 }
 
 bool WebServer::findMesh(std::size_t scene, std::int64_t object, std::uint64_t geometry,
-                         const net::HttpReply& reply, std::string& why) {
+                         const net::HttpReply& reply, std::string& error) {
   const std::string which = "object " + std::to_string(object) + " of scene " + std::to_string(scene);
-  if (scene >= watch_.views().size() || !watch_.views()[scene]) {
-    why = "there is no scene " + std::to_string(scene);
+  if (scene >= watch_.latest().size() || !watch_.latest()[scene]) {
+    error = "there is no scene " + std::to_string(scene);
     return false;
   }
-  const SceneView& view = *watch_.views()[scene];
-  const auto& objects = view.description->objects;
+  const ObservedScene& observed = *watch_.latest()[scene];
+  const auto& objects = observed.description->objects;
   const auto found = std::lower_bound(objects.begin(), objects.end(), object,
                                       [](const auto& known, std::int64_t id) { return known.id < id; });
-  if (found == objects.end() || found->id != object || !found->triangles) {
-    why = "there is no " + which + (found == objects.end() || found->id != object ? "" : " with triangles");
+  if (found == objects.end() || found->id != object) {
+    error = "there is no " + which;
+    return false;
+  }
+  if (!found->triangles) {
+    error = which + " has no triangles";
     return false;
   }
   const auto position = static_cast<std::size_t>(found - objects.begin());
-  if (view.geometry[position] != geometry) {
-    why = which + " has geometry " + std::to_string(view.geometry[position]) + " now, not " +
-          std::to_string(geometry);
+  if (observed.geometry[position] != geometry) {
+    error = which + " has geometry " + std::to_string(observed.geometry[position]) + " now, not " +
+            std::to_string(geometry);
     return false;
   }
-  meshes_.get(scene, view, position,
+  meshes_.get(scene, observed, position,
               [this, reply](net::HttpResponse response) { respond(reply, std::move(response)); });
   return true;
 }

@@ -1,4 +1,4 @@
-// The web port: the page, the VRPN stream for it as a WebSocket, the state of everything, metrics.
+// The HTTP port: the viewer, its VRPN stream over a WebSocket, the server's state as JSON, metrics.
 #pragma once
 
 #include <memory>
@@ -6,55 +6,55 @@
 #include <vector>
 
 #include "net/http_server.h"
-#include "server/web/server_status.h"
 #include "server/web/access.h"
 #include "server/web/mesh_store.h"
-#include "server/web/picture.h"
 #include "server/web/scene_watch.h"
+#include "server/web/server_status.h"
+#include "server/web/state_report.h"
 #include "server/web/worker.h"
 
 namespace hapticd::server {
 
-/// What the web port needs of the server. Called from the net thread.
+/// What WebServer needs from the server. Called on the net thread.
 class WebOwner {
  public:
   virtual ~WebOwner() = default;
   virtual ServerStatus status() const = 0;
-  /// A page has opened a VRPN stream.
+  /// A page opened a WebSocket for a VRPN stream.
   virtual void onWebClient(net::Connection connection) = 0;
 };
 
-/// Net thread; texts and meshes are made in workers of its own. Destroy it after the scenes have stopped and
+/// Net thread; it builds response texts and display meshes on two workers. Destroy it after the scenes have stopped and
 /// before the loop.
 class WebServer {
  public:
-  /// `allowed` are further names that the port may be called by. Throws net::Error.
+  /// `allowed` are further host names that requests may use. Throws net::Error when it cannot listen.
   WebServer(net::Loop& loop, const net::Endpoint& local, const std::vector<std::string>& allowed,
             const net::ConnectionOptions& connection, WebOwner& owner, std::vector<SceneHost*> scenes);
   ~WebServer();
 
-  /// Where it listens, with the real port.
+  /// The listening address, with the port that the system chose for port 0.
   const net::Endpoint& local() const noexcept { return http_.local(); }
-  /// Frees what nobody has looked at for a while. Call it about once a second.
+  /// Frees scene descriptions after 10 s without a request. Call it about once a second.
   void everySecond();
 
  private:
-  using TextOf = std::string (*)(const Picture&);
+  using Format = std::string (*)(const StateReport&);
 
   void onRequest(const net::HttpRequest& request, const net::HttpReply& reply);
   void route(const net::HttpRequest& request, const net::HttpReply& reply);
-  void sendPicture(const net::HttpReply& reply, TextOf text, const char* contentType);
+  void sendState(const net::HttpReply& reply, Format format, const char* contentType);
   void sendMesh(const net::HttpRequest& request, const net::HttpReply& reply);
   bool findMesh(std::size_t scene, std::int64_t object, std::uint64_t geometry, const net::HttpReply& reply,
-                std::string& why);
-  Picture picture();
+                std::string& error);
+  StateReport report();
   void respond(const net::HttpReply& reply, net::HttpResponse response) const;
 
   net::Loop& loop_;
   WebOwner& owner_;
   int idleSeconds_ = 0;
-  Worker textWorker_;
-  Worker meshWorker_;
+  Worker textWorker_{"web-text"};
+  Worker meshWorker_{"web-mesh"};
   SceneWatch watch_;
   MeshStore meshes_;
   net::HttpServer http_;

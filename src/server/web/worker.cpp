@@ -1,7 +1,6 @@
 #include "server/web/worker.h"
 
 #include <spdlog/spdlog.h>
-#include <sys/resource.h>
 
 #include <exception>
 
@@ -12,8 +11,7 @@ Worker::~Worker() {
     const std::lock_guard lock(mutex_);
     stopping_ = true;
   }
-  wake_.notify_one();
-  if (thread_.joinable()) thread_.join();
+  thread_.stop();
 }
 
 void Worker::post(std::function<void()> job) {
@@ -21,19 +19,19 @@ void Worker::post(std::function<void()> job) {
     const std::lock_guard lock(mutex_);
     jobs_.push_back(std::move(job));
   }
-  wake_.notify_one();
-  if (!thread_.joinable()) thread_ = std::thread([this] { run(); });
+  if (thread_.running()) {
+    thread_.wake();
+  } else {
+    thread_ = base::Thread({.name = name_, .niceness = 10}, [this] { return step(); });
+  }
 }
 
-void Worker::run() {
-  // Linux gives each thread a niceness of its own. A refusal changes nothing but the pace of others.
-  ::setpriority(PRIO_PROCESS, 0, 10);
+std::optional<base::Nanos> Worker::step() {
   for (;;) {
     std::function<void()> job;
     {
-      std::unique_lock lock(mutex_);
-      wake_.wait(lock, [this] { return stopping_ || !jobs_.empty(); });
-      if (stopping_) return;
+      const std::lock_guard lock(mutex_);
+      if (stopping_ || jobs_.empty()) return std::nullopt;
       job = std::move(jobs_.front());
       jobs_.pop_front();
     }

@@ -1,33 +1,35 @@
-// A thread for work that nobody should wait for.
+// A low-priority thread for work that the net thread must not wait for.
 #pragma once
 
-#include <condition_variable>
 #include <deque>
 #include <functional>
 #include <mutex>
-#include <thread>
+#include <string>
+
+#include "base/thread.h"
 
 namespace hapticd::server {
 
-/// Does one job after the other at low priority. What is still queued at the end is not done.
+/// Runs jobs in order, one at a time, at niceness 10. The destructor waits for the running job and discards queued ones.
 class Worker {
  public:
-  Worker() = default;
+  /// `name`: of the thread, at most 15 bytes.
+  explicit Worker(std::string name) : name_(std::move(name)) {}
   ~Worker();
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  /// From one thread; starts the worker with the first job. An exception that leaves the job is logged.
+  /// Always from the same thread; the first call starts the worker. An exception that leaves the job is logged.
   void post(std::function<void()> job);
 
  private:
-  void run();
+  std::optional<base::Nanos> step();
 
+  const std::string name_;
   std::mutex mutex_;
-  std::condition_variable wake_;
   std::deque<std::function<void()>> jobs_;
   bool stopping_ = false;
-  std::thread thread_;
+  base::Thread thread_;  // last: its step uses the others
 };
 
 }  // namespace hapticd::server

@@ -21,27 +21,27 @@ std::string refusal(const Headers& headers, const WebAccess& access = {kLocal, {
   return access.refusal(request);
 }
 
-TEST(WebAccess, OurOwnNamesPass) {
+TEST(WebAccess, AllowsLocalNames) {
   for (const char* host : {"localhost:8080", "LocalHost:8080", "127.0.0.1:8080", "[::1]:8080"}) {
     EXPECT_EQ(refusal({{"host", host}}), "") << host;
     EXPECT_EQ(refusal({{"host", host}, {"origin", std::string("http://") + host}}), "") << host;
   }
 }
 
-TEST(WebAccess, OtherNamesAreRefusedWhereverTheyLead) {
+TEST(WebAccess, RefusesForeignHostNames) {
   for (const char* host : {"evil.example:8080", "localhost", "localhost:80", "localhost:8081", "127.0.0.1",
                            "localhost.evil.example:8080", "evil.example", "", "127.0.0.2:8080",
                            "localhost:8080@evil.example", "localhost:8080.evil.example", "0.0.0.0:8080"}) {
-    EXPECT_THAT(refusal({{"host", host}}), HasSubstr("this server is not")) << host;
+    EXPECT_THAT(refusal({{"host", host}}), HasSubstr("does not answer to the name")) << host;
   }
 }
 
-TEST(WebAccess, OneHostMustBeNamedOnce) {
+TEST(WebAccess, RequiresExactlyOneHostHeader) {
   EXPECT_NE(refusal({}), "");
   EXPECT_NE(refusal({{"host", "localhost:8080"}, {"host", "evil.example"}}), "");
 }
 
-TEST(WebAccess, PagesOfOthersAreRefused) {
+TEST(WebAccess, RefusesForeignOrigins) {
   for (const char* origin :
        {"http://evil.example", "https://evil.example", "null", "http://localhost", "http://localhost:3000",
         "http://localhost:8080.evil.example", "", "file://", "chrome-extension://abc", "localhost:8080"}) {
@@ -55,7 +55,7 @@ TEST(WebAccess, PagesOfOthersAreRefused) {
             "");
 }
 
-TEST(WebAccess, WhatOtherPagesEmbedIsRefusedAndTheirLinksLeadHere) {
+TEST(WebAccess, RefusesCrossSiteEmbeddingButNotNavigation) {
   EXPECT_NE(
       refusal({{"host", "localhost:8080"}, {"sec-fetch-site", "cross-site"}, {"sec-fetch-mode", "no-cors"}}),
       "");
@@ -67,7 +67,7 @@ TEST(WebAccess, WhatOtherPagesEmbedIsRefusedAndTheirLinksLeadHere) {
       "");
 }
 
-TEST(WebAccess, TheAddressThatWasReachedPasses) {
+TEST(WebAccess, AllowsTheAddressThatTheClientConnectedTo) {
   const WebAccess everywhere({net::kAnyAddress, 8080}, {});
   const net::Endpoint reached = net::Endpoint::parse("192.168.1.7:8080");
   EXPECT_EQ(refusal({{"host", "192.168.1.7:8080"}}, everywhere, reached), "");
@@ -79,23 +79,23 @@ TEST(WebAccess, TheAddressThatWasReachedPasses) {
   EXPECT_EQ(refusal({{"host", "192.168.1.7:8080"}}, {reached, {}}, reached), "");
 }
 
-TEST(WebAccess, AllowedNamesPass) {
+TEST(WebAccess, AllowsConfiguredNames) {
   const WebAccess access(kLocal, {"Lab7", "proxy.example:443"});
   EXPECT_EQ(refusal({{"host", "lab7:8080"}, {"origin", "http://lab7:8080"}}, access), "");
   EXPECT_NE(refusal({{"host", "lab7:8081"}}, access), "");
   EXPECT_EQ(refusal({{"host", "proxy.example:443"}}, access), "");
   EXPECT_EQ(refusal({{"host", "proxy.example:443"}, {"origin", "https://proxy.example"}}, access), "")
-      << "443 is what https means";
+      << "443 is the default port of https";
   EXPECT_NE(refusal({{"host", "proxy.example"}, {"origin", "http://proxy.example"}}, access), "");
 }
 
-TEST(WebAccess, OnPort80NamesNeedNoPort) {
+TEST(WebAccess, NamesNeedNoPortOnPort80) {
   const WebAccess access({net::kLoopbackAddress, 80}, {});
   EXPECT_EQ(refusal({{"host", "localhost"}, {"origin", "http://localhost"}}, access), "");
   EXPECT_NE(refusal({{"host", "localhost"}, {"origin", "https://localhost"}}, access), "");
 }
 
-TEST(WebAccess, ARefusalQuotesNoMoreThanALine) {
+TEST(WebAccess, QuotesAndTruncatesUntrustedText) {
   EXPECT_LT(refusal({{"host", std::string(5000, 'x')}}).size(), 300u);
   EXPECT_THAT(refusal({{"host", "a\x1b[31m"}}), HasSubstr("\\x1b"));
 }

@@ -1,4 +1,4 @@
-// The dashboard that comes with the server must ask for what the server tells.
+// The Grafana dashboard in packaging/ may only query metrics that the server exports.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -6,28 +6,28 @@
 #include <regex>
 
 #include "exposition.h"
-#include "server/web/picture.h"
+#include "server/web/state_report.h"
 
 namespace hapticd::server {
 namespace {
 
-Picture everything() {
-  Picture picture;
+StateReport everything() {
+  StateReport report;
   DeviceStatus device;
   device.names = {"Phantom"};
-  picture.server.devices = {device};
-  picture.server.clients.resize(1);
-  auto view = std::make_shared<SceneView>();
-  view->description = std::make_shared<const scene::SceneDescription>();
-  picture.scenes = {{view, {}}};
-  picture.server.scenes = {{"Phantom"}};
-  return picture;
+  report.server.devices = {device};
+  report.server.clients.resize(1);
+  auto observed = std::make_shared<ObservedScene>();
+  observed->description = std::make_shared<const scene::SceneDescription>();
+  report.scenes = {{observed, {}}};
+  report.server.scenes = {{"Phantom"}};
+  return report;
 }
 
-TEST(Dashboard, EveryMetricItNamesExistsAndEveryPanelHasOne) {
+TEST(Dashboard, EveryPanelQueriesMetricsThatTheServerExports) {
   std::ifstream file(HAPTICD_DASHBOARD);
   const nlohmann::json dashboard = nlohmann::json::parse(file);
-  const test::Exposition told(metricsText(everything()));
+  const test::Exposition exported(metricsText(everything()));
   const std::regex kName("\\b(?:hapticd|process)_[a-z0-9_]+");
   std::set<std::string> used;
   for (const auto& panel : dashboard.at("panels")) {
@@ -41,7 +41,7 @@ TEST(Dashboard, EveryMetricItNamesExistsAndEveryPanelHasOne) {
       EXPECT_TRUE(used.size() > before || std::regex_search(query, kName)) << query;
     }
   }
-  for (const std::string& name : used) EXPECT_EQ(told.names().count(name), 1u) << name;
+  for (const std::string& name : used) EXPECT_EQ(exported.names().count(name), 1u) << name;
   EXPECT_GE(used.size(), 15u);
 }
 

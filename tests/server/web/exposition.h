@@ -1,4 +1,4 @@
-// A reader of the Prometheus text format that finds what a server would reject.
+// A strict reader of the Prometheus text format.
 #pragma once
 
 #include <cstdlib>
@@ -25,7 +25,7 @@ class Exposition {
     }
   }
 
-  /// Of one sample, written as in the text; NaN when it is not there.
+  /// Value of one sample, by its name and labels as in the text; NaN when it is missing.
   double value(const std::string& sample) const {
     const auto found = values_.find(sample);
     return found == values_.end() ? std::numeric_limits<double>::quiet_NaN() : found->second;
@@ -52,7 +52,7 @@ class Exposition {
     } else if (std::regex_match(line, match, kSample)) {
       sample(match[1], match[2], match[3]);
     } else {
-      problem("no line of the format: " + line);
+      problem("malformed line: " + line);
     }
   }
 
@@ -64,8 +64,8 @@ class Exposition {
     if (!fits) problem("a sample outside its family: " + whole);
     char* end = nullptr;
     const double value = std::strtod(number.c_str(), &end);
-    if (*end != '\0') problem("no number: " + whole + ' ' + number);
-    if (!values_.emplace(whole, value).second) problem("twice: " + whole);
+    if (*end != '\0') problem("malformed number: " + whole + ' ' + number);
+    if (!values_.emplace(whole, value).second) problem("duplicate sample: " + whole);
     names_.insert(name);
     if (name.ends_with("_bucket")) {
       if (whole.find("le=\"") == std::string::npos) problem("a bucket without bound: " + whole);

@@ -1,4 +1,4 @@
-// A small HTTP client: one blocking request on a connection of its own.
+// A small HTTP client: one blocking request per connection.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -25,7 +25,7 @@ struct Answer {
   }
 };
 
-/// Sends the request as it is and reads until the server ends the connection.
+/// Sends the request unchanged and reads until the server closes the connection.
 inline Answer ask(const net::Endpoint& server, const std::string& request) {
   net::RawSocket socket = net::RawSocket::connected(server);
   socket.send(request);
@@ -45,14 +45,14 @@ inline Answer ask(const net::Endpoint& server, const std::string& request) {
   return answer;
 }
 
-/// A GET as a program sends it, or with further headers ("Origin: http://evil\r\n").
+/// A GET without browser headers, or with additional ones ("Origin: http://evil\r\n").
 inline Answer get(const net::Endpoint& server, const std::string& target, const std::string& headers = "") {
   const std::string host =
       headers.find("Host: ") == std::string::npos ? "Host: " + server.text() + "\r\n" : "";
   return ask(server, "GET " + target + " HTTP/1.1\r\n" + host + headers + "Connection: close\r\n\r\n");
 }
 
-/// Asks for the state until the condition holds; an empty one when it never does.
+/// Polls the state until the condition holds; null after 60 s.
 template <class Condition>
 nlohmann::json stateWhen(const net::Endpoint& server, const Condition& condition) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
@@ -64,7 +64,7 @@ nlohmann::json stateWhen(const net::Endpoint& server, const Condition& condition
   return {};
 }
 
-/// A server with a web port of its own.
+/// The configuration with an HTTP port chosen by the system.
 inline server::ServerConfig withWeb(server::ServerConfig config = RunningServer::anyPort()) {
   config.http = "127.0.0.1:0";
   return config;

@@ -1,4 +1,4 @@
-// The web port of a whole server, over real sockets.
+// The HTTP port of a whole server, over real sockets.
 #include "server/web/web_server.h"
 
 #include <gmock/gmock.h>
@@ -112,7 +112,7 @@ TEST_F(Web, TheStateHasEveryFieldThePageReads) {
   EXPECT_EQ(device["hand"], "scripted");
   EXPECT_TRUE(device["held_by"].is_null());
   EXPECT_EQ(device["fault"], "");
-  EXPECT_TRUE(device["temperature_C"].is_null());
+  EXPECT_FALSE(device.contains("temperature_C"));
   EXPECT_EQ(device["guard"]["armed"], true);
   EXPECT_EQ(device["guard"]["stopped"], false);
   EXPECT_TRUE(device["guard"]["active"].is_array());
@@ -169,7 +169,7 @@ TEST_F(Web, TheStateHasEveryFieldThePageReads) {
   EXPECT_EQ(scene["fields"], 0);
 }
 
-TEST_F(Web, AnUntouchableChildIsThereWithItsPlace) {
+TEST_F(Web, ListsAnUntouchableChildWithItsPose) {
   ScriptedPeer peer(server_.address());
   ASSERT_TRUE(peer.untilConnected());
   sendCube(peer);
@@ -187,7 +187,7 @@ TEST_F(Web, AnUntouchableChildIsThereWithItsPlace) {
       << "an added object is a stock one, in metres";
 }
 
-TEST_F(Web, TheMeshIsTheOneThatWasSentAndItsNumberChangesWithIt) {
+TEST_F(Web, ServesTheMeshAndNumbersItsShapes) {
   ScriptedPeer peer(server_.address());
   ASSERT_TRUE(peer.untilConnected());
   sendCube(peer);
@@ -207,7 +207,7 @@ TEST_F(Web, TheMeshIsTheOneThatWasSentAndItsNumberChangesWithIt) {
     std::memcpy(at.data(), answer.body.data() + 16 + 12 * vertex, 12);
     EXPECT_EQ(at, corners[i]);
   }
-  // Another place is no other shape.
+  // Moving an object does not change its shape.
   peer.send(wire::SetObjectPosition{0, {0.01F, 0, 0}});
   ASSERT_TRUE(untilApplied(peer));
   const json moved = stateWhenTriangles(0, 12);
@@ -223,7 +223,7 @@ TEST_F(Web, TheMeshIsTheOneThatWasSentAndItsNumberChangesWithIt) {
   EXPECT_EQ(mesh(after["scenes"][0]["objects"][0]).status, 200);
 }
 
-TEST_F(Web, WhatIsNoMeshIsSaid) {
+TEST_F(Web, ExplainsWhyThereIsNoMesh) {
   const auto error = [&](const std::string& query, int status) {
     const Answer answer = get(web(), "/api/mesh" + query);
     EXPECT_EQ(answer.status, status) << query;
@@ -231,13 +231,16 @@ TEST_F(Web, WhatIsNoMeshIsSaid) {
     return answer.json()["error"].get<std::string>();
   };
   EXPECT_THAT(error("?scene=0&object=7&geometry=1", 404), HasSubstr("there is no object 7 of scene 0"));
-  EXPECT_THAT(error("?scene=0&object=0&geometry=1", 404), HasSubstr("with triangles"));
+  EXPECT_THAT(error("?scene=0&object=0&geometry=1", 404), HasSubstr("has no triangles"));
   EXPECT_THAT(error("?scene=3&object=0&geometry=1", 404), HasSubstr("there is no scene 3"));
   for (const char* query :
        {"", "?scene=0", "?scene=0&object=x&geometry=1", "?scene=-1&object=0&geometry=1",
         "?scene=0&object=0&geometry=99999999999999999999", "?scene=0&object=0&geometry=1%00"}) {
     EXPECT_THAT(error(query, 400), HasSubstr("/api/mesh?scene=0&object=0&geometry=1")) << query;
   }
+  EXPECT_THAT(error("?scene=0&geometry=1", 400), HasSubstr("object is missing"));
+  EXPECT_THAT(error("?scene=0&object=\"x\\&geometry=1", 400), HasSubstr("object must be a whole number, got '\"x\\'"));
+  EXPECT_THAT(error("?scene=0&object=0&geometry=" + std::string(3000, '9'), 400), testing::SizeIs(testing::Lt(250)));
 }
 
 // One large grid in bulk messages.
@@ -273,7 +276,7 @@ void sendGrid(ScriptedPeer& peer) {
   peer.until([&] { return peer.connection().statistics().queuedBytes == 0; });
 }
 
-TEST_F(Web, AMillionTrianglesAreShownAsAHundredThousandAndHoldNobodyUp) {
+TEST_F(Web, SimplifiesAMillionTrianglesToAHundredThousandWithoutDelayingOtherRequests) {
   ScriptedPeer peer(server_.address());
   ASSERT_TRUE(peer.untilConnected());
   sendGrid(peer);
@@ -281,7 +284,7 @@ TEST_F(Web, AMillionTrianglesAreShownAsAHundredThousandAndHoldNobodyUp) {
   ASSERT_FALSE(state.is_null());
   const json& object = state["scenes"][0]["objects"][0];
   EXPECT_LE(object["display_triangles"], 100'000);
-  // While the mesh is made, everything else is answered: many times before it is done.
+  // While the worker simplifies the mesh, the server responds to other requests.
   std::atomic<bool> done{false};
   Answer answer;
   std::thread asker([&] {
@@ -302,7 +305,7 @@ TEST_F(Web, AMillionTrianglesAreShownAsAHundredThousandAndHoldNobodyUp) {
   EXPECT_EQ(get(web(), "/api/state").json()["scenes"][0]["objects"][0]["display_triangles"], shown);
 }
 
-TEST_F(Web, StrangersAreRefusedEverywhere) {
+TEST_F(Web, RefusesForeignNamesAndOriginsOnEveryPath) {
   for (const char* target : {"/", "/viewer.js", "/api/state", "/api/mesh?scene=0&object=0&geometry=1",
                              "/metrics", "/api/messages", "/vrpn", "/nothing"}) {
     EXPECT_EQ(get(web(), target, "Host: evil.example\r\n").status, 403) << target;
@@ -317,12 +320,12 @@ TEST_F(Web, StrangersAreRefusedEverywhere) {
             403);
   EXPECT_EQ(ask(web(), upgrade + "Host: evil.example\r\n\r\n").status, 403);
   const Answer refused = get(web(), "/api/state", "Origin: http://evil.example\r\n");
-  EXPECT_EQ(refused.body, "pages of \"http://evil.example\" may not use this server\n");
+  EXPECT_EQ(refused.body, "pages from \"http://evil.example\" may not use this server\n");
   EXPECT_EQ(refused.header("Access-Control-Allow-Origin"), "");
   EXPECT_EQ(get(web(), "/api/state", "Origin: http://" + web().text() + "\r\n").status, 200);
 }
 
-TEST_F(Web, OnlyReadingIsAllowed) {
+TEST_F(Web, AllowsOnlyGetAndHead) {
   const std::string rest = " HTTP/1.1\r\nHost: " + web().text() + "\r\nConnection: close\r\n\r\n";
   for (const char* method : {"POST", "PUT", "DELETE", "OPTIONS"}) {
     const Answer answer = ask(web(), std::string(method) + " /api/state" + rest);
@@ -335,7 +338,7 @@ TEST_F(Web, OnlyReadingIsAllowed) {
   EXPECT_EQ(head.body, "");
 }
 
-TEST_F(Web, ThePageComesWithItsHeaders) {
+TEST_F(Web, ServesThePageWithSecurityHeaders) {
   const Answer page = get(web(), "/");
   EXPECT_EQ(page.status, 200);
   EXPECT_EQ(page.header("Content-Type"), "text/html; charset=utf-8");
@@ -351,7 +354,7 @@ TEST_F(Web, ThePageComesWithItsHeaders) {
   EXPECT_EQ(get(web(), "/vrpn").status, 426);
 }
 
-TEST_F(Web, MessagesAreThoseOfTheWire) {
+TEST_F(Web, ListsTheMessagesOfTheWire) {
   const json messages = get(web(), "/api/messages").json()["messages"];
   ASSERT_EQ(messages.size(), wire::kMessageKinds);
   const auto& info = wire::info(wire::kindOf<wire::HoldHand>);
@@ -361,7 +364,7 @@ TEST_F(Web, MessagesAreThoseOfTheWire) {
   EXPECT_EQ(hold["to_client"], false);
 }
 
-TEST_F(Web, MetricsAreWellFormedAndTellWhatIsThere) {
+TEST_F(Web, MetricsAreWellFormedAndCurrent) {
   ScriptedPeer peer(server_.address());
   ASSERT_TRUE(peer.untilConnected());
   sendCube(peer);
@@ -382,7 +385,7 @@ TEST_F(Web, MetricsAreWellFormedAndTellWhatIsThere) {
             metrics.value("hapticd_ticks_total{device=\"Phantom\"}"));
 }
 
-TEST_F(Web, ThousandsOfRequestsLeaveNothingBehind) {
+TEST_F(Web, ThousandsOfRequestsLeakNoDescriptors) {
   const auto openFiles = [] {
     const std::filesystem::directory_iterator files("/proc/self/fd");
     return std::distance(begin(files), end(files));
@@ -399,7 +402,7 @@ TEST_F(Web, ThousandsOfRequestsLeaveNothingBehind) {
   EXPECT_LE(openFiles(), before);
 }
 
-TEST_F(Web, SeveralDevicesAndScenes) {
+TEST_F(Web, ReportsSeveralDevicesAndScenes) {
   server::ServerConfig config = withWeb();
   config.devices.resize(3, config.devices.front());
   config.devices[0].names = {"Left", "Tracker0"};
@@ -415,7 +418,7 @@ TEST_F(Web, SeveralDevicesAndScenes) {
   EXPECT_EQ(state["scenes"][1]["devices"], json::array({"Other"}));
 }
 
-TEST(WebPort, OneThatIsInUseIsAnErrorWhenAskedFor) {
+TEST(WebPort, AConfiguredPortThatIsInUseIsAnError) {
   RunningServer first(withWeb());
   server::ServerConfig config = RunningServer::anyPort();
   config.http = first.server().webAddress()->text();
@@ -427,13 +430,13 @@ TEST(WebPort, OneThatIsInUseIsAnErrorWhenAskedFor) {
   }
 }
 
-TEST(WebPort, TheUsualOneThatIsInUseIsNoError) {
+TEST(WebPort, ADefaultPortThatIsInUseIsNotAnError) {
   net::Loop loop;
   std::unique_ptr<net::TcpListener> other;
   try {
     other = std::make_unique<net::TcpListener>(loop, net::Endpoint{net::kLoopbackAddress, 8080}, nullptr);
   } catch (const net::Error&) {
-    GTEST_SKIP() << "somebody else has the port, and may give it back any time";
+    GTEST_SKIP() << "another process has port 8080 and may release it at any time";
   }
   server::ServerConfig config = RunningServer::anyPort();
   config.http = server::kHttpAuto;
@@ -441,7 +444,7 @@ TEST(WebPort, TheUsualOneThatIsInUseIsNoError) {
   EXPECT_EQ(server.server().webAddress(), std::nullopt);
 }
 
-TEST(WebPort, MayBeOff) {
+TEST(WebPort, CanBeDisabled) {
   RunningServer server;
   EXPECT_EQ(server.server().webAddress(), std::nullopt);
 }

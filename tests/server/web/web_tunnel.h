@@ -1,5 +1,5 @@
-// Carries TCP connections through the WebSocket of a server, by another implementation of the protocol: what
-// any peer says and hears over TCP can then be tried as a page does it.
+// Forwards TCP connections to a server's WebSocket, with an independent WebSocket implementation: any test peer that
+// speaks VRPN over TCP can then connect as a page does.
 #pragma once
 
 #include <array>
@@ -24,7 +24,7 @@ class WebTunnel {
     context_.stop();
     thread_.join();
   }
-  /// Where to connect instead of to the server.
+  /// The address to connect to instead of the server's.
   net::Endpoint address() const { return {net::kLoopbackAddress, acceptor_.local_endpoint().port()}; }
 
  private:
@@ -76,7 +76,7 @@ class WebTunnel {
       try {
         std::make_shared<Link>(std::move(socket))->start(server_);
       } catch (const std::exception&) {
-        // The peer sees its connection end.
+        // The peer sees its connection close.
       }
       accept();
     });

@@ -1,4 +1,4 @@
-// A VRPN session through the WebSocket of the web port: the same as over TCP.
+// A VRPN session over the HTTP port's WebSocket behaves like one over TCP.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -21,7 +21,7 @@ class WebVrpn : public testing::Test {
   WebTunnel tunnel_{web()};
 };
 
-// What the server says first, before anything that depends on the time of the ticks.
+// The first bytes from the server, before any message that depends on the timing of ticks.
 std::string opening(const net::Endpoint& server, std::size_t size) {
   net::RawSocket socket = net::RawSocket::connected(server);
   const std::string cookie = "vrpn: ver. 07.35  0";
@@ -29,13 +29,13 @@ std::string opening(const net::Endpoint& server, std::size_t size) {
   return socket.receive(size);
 }
 
-TEST_F(WebVrpn, TheServerSaysTheSameBytes) {
+TEST_F(WebVrpn, ReceivesTheSameBytesAsOverTcp) {
   std::string direct = opening(server_.address(), 2000);
   std::string tunnelled = opening(tunnel_.address(), 2000);
   ASSERT_EQ(direct.size(), 2000u);
   ASSERT_EQ(tunnelled.size(), 2000u);
   EXPECT_EQ(tunnelled.substr(0, 24), direct.substr(0, 24));
-  // Then messages, all alike but for their time stamps.
+  // The messages after it are equal except for their time stamps.
   for (std::size_t at = 24; at + 24 < direct.size();) {
     std::uint32_t length = 0;
     std::memcpy(&length, direct.data() + at, sizeof length);
@@ -48,7 +48,7 @@ TEST_F(WebVrpn, TheServerSaysTheSameBytes) {
   EXPECT_EQ(tunnelled, direct);
 }
 
-TEST_F(WebVrpn, TwoClientsHearTheSameTicks) {
+TEST_F(WebVrpn, ReceivesTheSameTicksAsATcpClient) {
   ScriptedPeer direct(server_.address());
   ScriptedPeer tunnelled(tunnel_.address());
   ASSERT_TRUE(direct.untilConnected());
@@ -80,10 +80,10 @@ TEST_F(WebVrpn, TwoClientsHearTheSameTicks) {
     }
     return same >= 30;
   })) << same
-      << " ticks were heard by both";
+      << " ticks were received by both";
 }
 
-TEST_F(WebVrpn, APageHoldsTheHandAndLetsGo) {
+TEST_F(WebVrpn, APageHoldsAndReleasesTheSimulatedHand) {
   ScriptedPeer page(tunnel_.address());
   ASSERT_TRUE(page.untilConnected());
   page.send(wire::HoldHand{.hold = 1, .position = {10, 20, 5}});
@@ -112,7 +112,7 @@ TEST_F(WebVrpn, APageStopsAndReArms) {
   EXPECT_FALSE(state.is_null());
 }
 
-TEST_F(WebVrpn, AnEffectIsSeenRunning) {
+TEST_F(WebVrpn, TheStateShowsActiveEffects) {
   ScriptedPeer page(tunnel_.address());
   ASSERT_TRUE(page.untilConnected());
   wire::Effect push{.type = "constant",
@@ -136,7 +136,7 @@ TEST_F(WebVrpn, AnEffectIsSeenRunning) {
   EXPECT_FALSE(stateWhen(web(), active(false)).is_null());
 }
 
-TEST_F(WebVrpn, APageThatIsNoVrpnClientIsToldWhy) {
+TEST_F(WebVrpn, DisconnectsAWebSocketThatDoesNotSpeakVrpn) {
   namespace asio = boost::asio;
   asio::io_context context;
   boost::beast::websocket::stream<asio::ip::tcp::socket> page(context);
@@ -151,11 +151,11 @@ TEST_F(WebVrpn, APageThatIsNoVrpnClientIsToldWhy) {
   EXPECT_FALSE(gone.is_null());
 }
 
-// The page that never reads holds up nobody else, and costs no more memory than its limits.
-TEST(WebVrpnLoad, APageThatNeverReadsIsNobodysTrouble) {
+// A page that never reads delays no other client, and its queue stays within its limit.
+TEST(WebVrpnLoad, APageThatNeverReadsDoesNotDelayOthers) {
   namespace asio = boost::asio;
   server::ServerConfig config = withWeb();
-  config.devices.front().linearTolerance_m = 0;  // every tick is told
+  config.devices.front().linearTolerance_m = 0;  // report every tick
   RunningServer busy(config);
   const net::Endpoint port = *busy.server().webAddress();
   asio::io_context context;
@@ -175,7 +175,7 @@ TEST(WebVrpnLoad, APageThatNeverReadsIsNobodysTrouble) {
     }
     return false;
   });
-  ASSERT_FALSE(dropping.is_null()) << "what it does not read is dropped";
+  ASSERT_FALSE(dropping.is_null()) << "reports that it does not read are dropped";
   for (const json& client : dropping["clients"]) EXPECT_LE(client["queued_bytes"], 400 * 1024);
   EXPECT_TRUE(untilTicks(other, 50));
 }

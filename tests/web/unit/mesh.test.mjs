@@ -1,4 +1,4 @@
-// Meshes: out of files, out of the server's answer, under a ray.
+// Meshes: from files, from the server's response, and hit by a ray.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
@@ -8,8 +8,8 @@ import { bundled, sourceDir } from "../bundled.mjs";
 const { weld } = await bundled("mesh/weld.ts");
 const { readMesh } = await bundled("mesh/read_file.ts");
 const { decodeMesh } = await bundled("state.ts");
-const { RayMesh } = await bundled("scene3d/ray_mesh.ts");
-const { Matrix4, Ray, Vector3 } = await bundled("../node_modules/three/build/three.module.js");
+const { Objects } = await bundled("scene3d/objects.ts");
+const { Color, Matrix4, Ray, Vector3 } = await bundled("../node_modules/three/build/three.module.js");
 
 /** As the browser's File, as far as it is read. */
 const file = (name, content) => ({
@@ -30,7 +30,7 @@ const sorted = ({ positions, triangles }) => {
     .sort();
 };
 
-test("corners at one place become one vertex, -0 and 0 are one place", () => {
+test("corners at one position become one vertex; -0 and 0 are the same position", () => {
   const mesh = weld(Float32Array.from([...SQUARE.slice(0, 9), -0, ...SQUARE.slice(10)]));
   assert.equal(mesh.positions.length, 3 * 4);
   assert.deepEqual([...mesh.triangles], [0, 1, 2, 0, 2, 3]);
@@ -79,7 +79,7 @@ function gltf(uri) {
   return { text: JSON.stringify(json), bytes };
 }
 
-test("OBJ, STL, PLY and glTF give the same square; pictures of a glTF are not fetched", async () => {
+test("OBJ, STL, PLY and glTF give the same square; images of a glTF are not fetched", async () => {
   const { text } = gltf();
   const beside = gltf("data/square.bin");
   const sets = [
@@ -96,22 +96,22 @@ test("OBJ, STL, PLY and glTF give the same square; pictures of a glTF are not fe
   }
 });
 
-test("what is wrong with a file is said with its name", async () => {
+test("errors name the file and the reason", async () => {
   const wrong = [
-    [[file("notes.txt", "hello")], /notes\.txt is no mesh file: drop an OBJ/],
-    [[file("a.gltf", gltf("square.bin").text)], /a\.gltf: it needs square\.bin: drop both/],
+    [[file("notes.txt", "hello")], /notes\.txt is not a mesh file: drop an OBJ/],
+    [[file("a.gltf", gltf("square.bin").text)], /a\.gltf: needs square\.bin: drop both/],
     [
       [file("points.ply", PLY.replace("element face 2", "element face 0").replace(/3 0 1 2\n3 0 2 3\n/, ""))],
-      /points\.ply: it has no triangles/,
+      /points\.ply: no triangles/,
     ],
-    [[file("bad.obj", OBJ.replace("2 2 0", "2 nan 0"))], /bad\.obj: a corner of triangle 0 is not a number/],
+    [[file("bad.obj", OBJ.replace("2 2 0", "2 nan 0"))], /bad\.obj: a corner of triangle 0 is not finite/],
     [[file("cut.stl", Buffer.alloc(40))], /cut\.stl: /],
     [[file("cut.glb", "{")], /cut\.glb: /],
   ];
   for (const [files, message] of wrong) await assert.rejects(readMesh(files), { message });
 });
 
-test("the server's mesh is read; a cut one is an error", () => {
+test("decodes the server's mesh; a truncated one is an error", () => {
   const bytes = Buffer.alloc(16 + 36 + 12);
   bytes.write("HDM1");
   bytes.writeUInt32LE(3, 4);
@@ -121,19 +121,45 @@ test("the server's mesh is read; a cut one is an error", () => {
   const mesh = decodeMesh(Uint8Array.from(bytes).buffer);
   assert.deepEqual([...mesh.positions], [0, 0.5, 1, 1.5, 2, 2.5, 3, 3.5, 4]);
   assert.deepEqual([...mesh.triangles], [2, 1, 0]);
-  assert.throws(() => decodeMesh(Uint8Array.from(bytes.subarray(0, 60)).buffer), /is cut/);
-  assert.throws(() => decodeMesh(Uint8Array.from(Buffer.from("<html>".padEnd(30))).buffer), /is no mesh/);
+  assert.throws(() => decodeMesh(Uint8Array.from(bytes.subarray(0, 60)).buffer), /is truncated/);
+  assert.throws(() => decodeMesh(Uint8Array.from(Buffer.from("<html>".padEnd(30))).buffer), /is not a mesh/);
 });
 
-test("a ray finds the nearest of many triangles, at its distance in the world", () => {
+/** The state of an object that can be felt. */
+const stateOf = (id, T_world_object) => ({
+  id,
+  touchable: true,
+  triangles: 1,
+  stiffness_N_per_m: 500,
+  static_friction: 0,
+  T_world_object: T_world_object.toArray(),
+  T_object_mesh: new Matrix4().toArray(),
+});
+
+test("a ray hits the nearest of many triangles, on either side, at its distance in the world", () => {
   // Two hundred squares behind each other, in a scaled and moved object.
   const corners = Array.from({ length: 200 }, (_, z) => SQUARE.map((x, i) => (i % 3 === 2 ? -z : x))).flat();
-  const mesh = new RayMesh(weld(Float32Array.from(corners)));
+  const objects = new Objects(new Color());
+  objects.setMesh(3, weld(Float32Array.from(corners)));
   const T = new Matrix4().makeTranslation(10, 0, -5).multiply(new Matrix4().makeScale(3, 3, 3));
-  const down = new Vector3(0, 0, -1);
-  const distance = (x, y, z) => mesh.distance(new Ray(new Vector3(x, y, z), down), T);
-  assert.ok(Math.abs(distance(13, 2, 20) - 25) < 1e-9);
-  assert.ok(Math.abs(distance(13, 2, -5 - 3 * 57.5) - 1.5) < 1e-9); // from among them
+  objects.update([stateOf(3, T)], "stiffness");
+  const distance = (x, y, z, towards = -1) =>
+    objects.distance(new Ray(new Vector3(x, y, z), new Vector3(0, 0, towards)));
+  const near = (a, b) => assert.ok(Math.abs(a - b) < 1e-9, `${a} instead of ${b}`);
+  near(distance(13, 2, 20), 25);
+  near(distance(13, 2, -5 - 3 * 57.5), 1.5); // from between two squares
+  near(distance(13, 2, -5 - 3 * 250, 1), 3 * 51); // from behind
   assert.equal(distance(9.9, 2, 20), Infinity);
   assert.equal(distance(13, 2, -5 - 3 * 199.5), Infinity); // behind the last
+  assert.ok(objects.between(new Vector3(13, 2, 20), new Vector3(13, 2, -6)));
+  assert.ok(!objects.between(new Vector3(13, 2, 20), new Vector3(13, 2, -4)));
+  objects.update([{ ...stateOf(3, T), touchable: false }], "stiffness");
+  assert.equal(distance(13, 2, 20), Infinity);
+});
+
+test("an object whose display mesh has no triangles is never hit", () => {
+  const objects = new Objects(new Color());
+  objects.setMesh(0, { positions: new Float32Array(0), triangles: new Uint32Array(0) });
+  objects.update([stateOf(0, new Matrix4())], "stiffness");
+  assert.equal(objects.distance(new Ray(new Vector3(0, 0, 5), new Vector3(0, 0, -1))), Infinity);
 });

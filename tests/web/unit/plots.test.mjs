@@ -1,4 +1,4 @@
-// What the plots keep and count.
+// Samples and counts of the plots.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { bundled } from "../bundled.mjs";
@@ -6,7 +6,7 @@ import { bundled } from "../bundled.mjs";
 const { Window } = await bundled("plots/window.ts");
 const { between, share } = await bundled("plots/counts.ts");
 
-test("a window keeps the newest samples in order, however many came", () => {
+test("a window keeps the newest samples in order", () => {
   const window = new Window(2, 5);
   for (let i = 0; i < 123; ++i) {
     window.push(i, -i);
@@ -25,7 +25,7 @@ test("a window keeps the newest samples in order, however many came", () => {
   assert.equal(window.size, 0);
 });
 
-test("what came between two histograms, and its quantiles", () => {
+test("the difference of two histograms, and its quantiles", () => {
   const before = {
     bins: [
       [990, 10],
@@ -46,7 +46,7 @@ test("what came between two histograms, and its quantiles", () => {
     [1010, 9],
     [5000, 1],
   ]);
-  // Upper ends: of a neighbour, also one that had no counts now, or an eighth further.
+  // Upper ends: the start of the next bin, even one without new counts, or an eighth further.
   assert.deepEqual(
     [0.5, 0.95, 1].map((part) => share(since, part, now.bins)),
     [1010, 1136.25, 5625],

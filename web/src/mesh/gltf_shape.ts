@@ -1,4 +1,4 @@
-// glTF, reduced to its shape: pictures, materials and animations go, and all buffers become one, so that nothing is fetched.
+// Reduces glTF to its shape: drops images, materials and animations, and merges all buffers, so that nothing is fetched.
 
 interface Gltf {
   buffers?: { uri?: string; byteLength: number }[];
@@ -25,7 +25,7 @@ const JSON_CHUNK = 0x4e4f534a;
 const BIN_CHUNK = 0x004e4942;
 const MAGIC = 0x46546c67;
 
-/** Returns a GLB with only the shape. `beside`: the bytes of a file that was dropped along with it, by its name. */
+/** Returns a GLB with only the shape. `beside` returns the bytes of a file that was dropped together with it, by name. */
 export async function shapeOf(
   bytes: ArrayBuffer,
   beside: (name: string) => Promise<ArrayBuffer> | undefined,
@@ -65,14 +65,14 @@ async function bufferOf(
   beside: (name: string) => Promise<ArrayBuffer> | undefined,
 ): Promise<Uint8Array> {
   if (uri === undefined) {
-    if (!bin) throw new Error("it has no data of its own, and names no file for them");
+    if (!bin) throw new Error("a buffer has neither data nor a file name");
     return new Uint8Array(bin);
   }
   if (uri.startsWith("data:"))
     return Uint8Array.from(atob(uri.slice(uri.indexOf(",") + 1)), (c) => c.charCodeAt(0));
   const name = decodeURIComponent(uri.split("/").at(-1)!);
   const file = beside(name);
-  if (!file) throw new Error(`it needs ${name}: drop both files together`);
+  if (!file) throw new Error(`needs ${name}: drop both files together`);
   return new Uint8Array(await file);
 }
 

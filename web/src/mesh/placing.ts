@@ -1,4 +1,4 @@
-// Where a mesh that was dropped shall stand, how large, and how it shall feel: a form, with a preview in the scene.
+// A form for the pose, size and surface of a dropped mesh, with a preview in the scene.
 import {
   BufferAttribute,
   BufferGeometry,
@@ -29,10 +29,10 @@ const NEW_SURFACE = {
 export class Placing {
   readonly root = el("form", { className: "placing" });
   private readonly size: HTMLInputElement;
-  private readonly at: HTMLInputElement[];
-  private readonly turn: HTMLInputElement[];
+  private readonly position: HTMLInputElement[];
+  private readonly rotation: HTMLInputElement[];
   private readonly surface = new SurfaceForm(() => undefined);
-  private readonly where = el("select", { ariaLabel: "Which object it becomes" });
+  private readonly target = el("select", { ariaLabel: "Target object" });
   private readonly preview: Mesh;
   private readonly centre = new Vector3();
   private readonly extent: number;
@@ -67,10 +67,10 @@ export class Placing {
 
     const { centre, scale } = fit(device, extents);
     this.size = numberInput("Largest extent", tidy(scale * this.extent), "0.001");
-    this.at = centre.toArray().map((x, i) => numberInput(`Position ${"xyz"[i]!}`, tidy(x)));
-    this.turn = [0, 1, 2].map((i) => numberInput(`Turn about ${"xyz"[i]!}, degrees`, 0));
+    this.position = centre.toArray().map((x, i) => numberInput(`Position ${"xyz"[i]!}`, tidy(x)));
+    this.rotation = [0, 1, 2].map((i) => numberInput(`Rotation about ${"xyz"[i]!}, degrees`, 0));
     this.surface.set(NEW_SURFACE);
-    this.fillWhere(objects);
+    this.fillTargets(objects);
     this.root.append(
       el(
         "p",
@@ -78,10 +78,10 @@ export class Placing {
         el("strong", {}, name),
         ` ${countText(mesh.positions.length / 3)} vertices, ${countText(mesh.triangles.length / 3)} triangles`,
       ),
-      field("As", this.where),
+      field("Target", this.target),
       field("Size", this.size, "world units"),
-      field("Position", ...this.at),
-      field("Turn °", ...this.turn),
+      field("Position", ...this.position),
+      field("Rotation °", ...this.rotation),
       this.surface.root,
     );
     this.root.addEventListener("input", () => this.show());
@@ -90,7 +90,7 @@ export class Placing {
   }
 
   placement(): Placement {
-    const object = Number(this.where.value);
+    const object = Number(this.target.value);
     return {
       object,
       isNew: this.isNew.has(object),
@@ -106,24 +106,24 @@ export class Placing {
     this.root.remove();
   }
 
-  // Empty objects first: the one every scene begins with is the natural place for a first mesh.
-  private fillWhere(objects: ObjectState[]): void {
+  // Empty objects first: every scene starts with one, which the first mesh should use.
+  private fillTargets(objects: ObjectState[]): void {
     const used = objects.filter((o) => o.triangles > 0);
     const free = objects.filter((o) => o.triangles === 0).map((o) => o.id);
     const next = free[0] ?? Math.max(-1, ...objects.map((o) => o.id)) + 1;
     if (free.length === 0) this.isNew.add(next);
-    this.where.append(el("option", { value: String(next) }, `new object ${next}`));
-    this.where.append(
-      ...used.map((o) => el("option", { value: String(o.id) }, `in place of object ${o.id}`)),
+    this.target.append(el("option", { value: String(next) }, `new object ${next}`));
+    this.target.append(
+      ...used.map((o) => el("option", { value: String(o.id) }, `replace object ${o.id}`)),
     );
   }
 
   private matrix(): Matrix4 {
     const value = (input: HTMLInputElement): number => input.valueAsNumber || 0;
-    const [x, y, z] = this.turn.map((t) => MathUtils.degToRad(value(t))) as [number, number, number];
+    const [x, y, z] = this.rotation.map((t) => MathUtils.degToRad(value(t))) as [number, number, number];
     const scale = Math.max(value(this.size), 1e-9) / this.extent;
     const T = new Matrix4().compose(
-      new Vector3(...(this.at.map(value) as [number, number, number])),
+      new Vector3(...(this.position.map(value) as [number, number, number])),
       new Quaternion().setFromEuler(new Euler(x, y, z)),
       new Vector3().setScalar(scale),
     );
@@ -137,17 +137,17 @@ export class Placing {
   }
 }
 
-/** The middle of the device's box, and the scale at which extents fill most of it. */
+/** The centre of the workspace, and the scale at which the extents fill most of it. */
 function fit(device: DeviceState, extents: Vector3): { centre: Vector3; scale: number } {
   const min = new Vector3().fromArray(device.workspace_m.min);
   const max = new Vector3().fromArray(device.workspace_m.max);
   const T = new Matrix4().fromArray(device.T_world_device);
-  const room = max
+  const available = max
     .clone()
     .sub(min)
     .multiplyScalar(FILL * T.getMaxScaleOnAxis());
   const scale = Math.min(
-    ...([0, 1, 2] as const).map((i) => room.getComponent(i) / Math.max(extents.getComponent(i), 1e-12)),
+    ...([0, 1, 2] as const).map((i) => available.getComponent(i) / Math.max(extents.getComponent(i), 1e-12)),
   );
   return { centre: min.add(max).multiplyScalar(0.5).applyMatrix4(T), scale };
 }

@@ -1,4 +1,4 @@
-// A mesh out of a file: OBJ, STL, PLY or glTF, by three's loaders, in the browser.
+// Reads a mesh from an OBJ, STL, PLY or glTF file with three's loaders, in the browser.
 import { type BufferGeometry, Mesh, type Object3D, Vector3 } from "three";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { OBJLoader } from "three/examples/jsm/loaders/OBJLoader.js";
@@ -8,16 +8,16 @@ import { shapeOf } from "./gltf_shape";
 import { type FileMesh, weld } from "./weld";
 
 export const KINDS = ["obj", "stl", "ply", "gltf", "glb"];
-/** More does not fit into one batch of the server. */
-const MOST_TRIANGLES = 12_000_000;
+/** The limit of one batch in the server. */
+const MAX_TRIANGLES = 12_000_000;
 
 const kindOf = (name: string): string => name.split(".").at(-1)!.toLowerCase();
 
-/** Reads the first mesh file among these; the others may be files that it names. Throws with the file and the reason. */
+/** Reads the first mesh file of the list; the others may be files that it refers to. The error names the file and the reason. */
 export async function readMesh(files: File[]): Promise<{ name: string; mesh: FileMesh }> {
   const file = files.find((f) => KINDS.includes(kindOf(f.name)));
   if (!file)
-    throw new Error(`${files[0]?.name ?? "That"} is no mesh file: drop an OBJ, STL, PLY, glTF or GLB.`);
+    throw new Error(`${files[0]?.name ?? "The file"} is not a mesh file: drop an OBJ, STL, PLY, glTF or GLB file.`);
   try {
     const corners = await cornersOf(file, files);
     check(corners);
@@ -36,7 +36,7 @@ async function cornersOf(file: File, files: File[]): Promise<Float32Array> {
       return cornersIn(new Mesh(new STLLoader().parse(bytes)));
     case "ply": {
       const geometry = new PLYLoader().parse(bytes);
-      // Without faces it is a point cloud, and not a list of corners.
+      // Without faces it is a point cloud, not a list of corners.
       return geometry.index ? cornersIn(new Mesh(geometry)) : new Float32Array(0);
     }
     default: {
@@ -46,7 +46,7 @@ async function cornersOf(file: File, files: File[]): Promise<Float32Array> {
   }
 }
 
-/** All triangles below a node, as corners where the node puts them. */
+/** The corners of all triangles below a node, in the frame of the root. */
 function cornersIn(root: Object3D): Float32Array {
   root.updateMatrixWorld(true);
   const meshes: Mesh<BufferGeometry>[] = [];
@@ -77,9 +77,9 @@ function cornersIn(root: Object3D): Float32Array {
 
 function check(corners: Float32Array): void {
   const triangles = corners.length / 9;
-  if (triangles === 0) throw new Error("it has no triangles: a point cloud or lines cannot be touched");
-  if (triangles > MOST_TRIANGLES)
-    throw new Error(`${triangles} triangles, at most ${MOST_TRIANGLES} can be sent at once`);
+  if (triangles === 0) throw new Error("no triangles; point clouds and lines cannot be touched");
+  if (triangles > MAX_TRIANGLES)
+    throw new Error(`the mesh has ${triangles} triangles, the limit is ${MAX_TRIANGLES}: simplify it first`);
   const bad = corners.findIndex((x) => !Number.isFinite(x));
-  if (bad >= 0) throw new Error(`a corner of triangle ${Math.floor(bad / 9)} is not a number`);
+  if (bad >= 0) throw new Error(`a corner of triangle ${Math.floor(bad / 9)} is not finite`);
 }

@@ -1,19 +1,19 @@
-// A mesh to the server, as any client sends one: in a batch, so that it is there in one tick or not at all.
+// Sends a mesh to the server in a batch, so that it appears in one tick or not at all.
 import * as wire from "../wire";
 import type { Link } from "../link";
 import type { FileMesh } from "./weld";
 
-const MOST_WAITING_BYTES = 1_000_000;
+const MAX_QUEUED_BYTES = 1_000_000;
 
 export interface Placement {
   object: number;
-  /** The object is new: the scene must have at least so many. */
+  /** The object does not exist yet: the scene must first grow to hold it. */
   isNew: boolean;
   T_world_mesh: number[];
   surface: [wire.SurfaceProperty, number][];
 }
 
-/** Sends it; calls back with the share that has left. Throws when the connection goes. */
+/** Sends the mesh; calls back with the sent share from 0 to 1. Throws when the connection is lost. */
 export async function upload(
   link: Link,
   mesh: FileMesh,
@@ -23,7 +23,7 @@ export async function upload(
   const { object } = to;
   const send = (...messages: wire.Outgoing[]): void => {
     if (!link.send(...messages))
-      throw new Error("the connection was lost; nothing of the mesh is in the server");
+      throw new Error("the connection was lost; the server discarded the mesh");
   };
   send(wire.batchBegin(), ...(to.isNew ? [wire.setObjectNumber(object + 1)] : [wire.clearTrimesh(object)]));
   send(wire.setTransformMatrix(object, to.T_world_mesh), wire.setObjectIsTouchable(object, true));
@@ -32,10 +32,10 @@ export async function upload(
   const all = mesh.positions.length + mesh.triangles.length;
   const part = async (first: number, message: wire.Outgoing, sent: number): Promise<void> => {
     send(message);
-    while (link.waiting > MOST_WAITING_BYTES) await new Promise((resolve) => setTimeout(resolve, 5));
+    while (link.waiting > MAX_QUEUED_BYTES) await new Promise((resolve) => setTimeout(resolve, 5));
     if (first % (8 * step) === 0) {
       onShare(sent / all);
-      await new Promise((resolve) => setTimeout(resolve, 0)); // the page stays alive meanwhile
+      await new Promise((resolve) => setTimeout(resolve, 0)); // lets the page respond to the user
     }
   };
   for (let i = 0; i < mesh.positions.length; i += step)

@@ -1,14 +1,14 @@
-// Corners at exactly the same place become one vertex: STL and OBJ loaders give each triangle corners of its own.
+// Merges corners at the same position into one vertex: the STL and OBJ loaders return separate corners for each triangle.
 
 export interface FileMesh {
   positions: Float32Array<ArrayBuffer>;
   triangles: Uint32Array<ArrayBuffer>;
 }
 
-/** Welds a list of corners, nine numbers a triangle. */
+/** Welds a list of corners: nine numbers per triangle. */
 export function weld(corners: Float32Array): FileMesh {
   const count = corners.length / 3;
-  // -0 and 0 are the same place.
+  // -0 and 0 are the same position but have different bits.
   const exact = new Float32Array(corners.length);
   for (let i = 0; i < corners.length; ++i) exact[i] = corners[i]! + 0;
   const bits = new Int32Array(exact.buffer);

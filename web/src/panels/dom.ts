@@ -1,4 +1,4 @@
-// Small helpers over the DOM: elements in one line, and text that is only written when it has changed.
+// Small DOM helpers: elements in one expression, and text that is written only when it changes.
 
 type Props<K extends keyof HTMLElementTagNameMap> = Partial<
   Omit<HTMLElementTagNameMap[K], "dataset" | "style">
@@ -17,7 +17,7 @@ export function el<K extends keyof HTMLElementTagNameMap>(
   return element;
 }
 
-/** The element of the page with this id. */
+/** The element with this id; throws when there is none. */
 export function byId<T extends HTMLElement = HTMLElement>(id: string): T {
   const element = document.getElementById(id);
   if (!element) throw new Error(`the page has no #${id}`);
@@ -28,29 +28,29 @@ export function setText(element: HTMLElement, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }
 
-/** One row for each item, made once, updated in place, gone with its item. */
+/** One row per item: created once, updated in place, removed with its item. */
 export class Rows<Item, Row extends { root: HTMLElement; update(item: Item): void }> {
-  private readonly rows = new Map<number, Row>();
+  private readonly rows = new Map<string, Row>();
 
   constructor(
     private readonly parent: HTMLElement,
-    private readonly idOf: (item: Item) => number,
+    private readonly keyOf: (item: Item) => string,
     private readonly make: (item: Item) => Row,
     private readonly most = 200,
   ) {}
 
   update(items: Item[]): void {
     const shown = items.slice(0, this.most);
-    const ids = new Set(shown.map(this.idOf));
-    for (const [id, row] of this.rows) {
-      if (ids.has(id)) continue;
+    const keys = new Set(shown.map(this.keyOf));
+    for (const [key, row] of this.rows) {
+      if (keys.has(key)) continue;
       row.root.remove();
-      this.rows.delete(id);
+      this.rows.delete(key);
     }
     shown.forEach((item, i) => {
-      const id = this.idOf(item);
-      let row = this.rows.get(id);
-      if (!row) this.rows.set(id, (row = this.make(item)));
+      const key = this.keyOf(item);
+      let row = this.rows.get(key);
+      if (!row) this.rows.set(key, (row = this.make(item)));
       if (this.parent.children[i] !== row.root)
         this.parent.insertBefore(row.root, this.parent.children[i] ?? null);
       row.update(item);

@@ -1,4 +1,4 @@
-// Force effects: start and stop what is defined, define one more.
+// Force effects: starts and stops defined ones, defines new ones.
 import { type Effect, type Outgoing, setEffect, startEffect, stopEffect } from "../wire";
 import type { EffectState } from "../state_types";
 import { el, Rows, setText } from "./dom";
@@ -6,7 +6,7 @@ import { Switch } from "./switch";
 
 type Send = (...messages: Outgoing[]) => void;
 
-/** What a new effect of each type begins with; gains are N/mm and N per mm/s of the device. */
+/** Parameters of a new effect of each type; gains in N/mm and N per mm/s of the device. */
 const NEW: Record<string, { label: string; effect: Partial<Effect> }> = {
   constant: { label: "Constant, 1 N up", effect: { magnitude_N: 1, direction: [0, 1, 0] } },
   spring: { label: "Spring to the origin", effect: { gain: 0.05, magnitude_N: 2 } },
@@ -50,7 +50,7 @@ export class EffectsPanel {
   constructor(parent: HTMLElement, send: Send) {
     this.rows = new Rows(
       this.list,
-      (e) => e.index,
+      (e) => String(e.index),
       (e) => new EffectRow(e, send),
     );
     const type = el(

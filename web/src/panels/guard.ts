@@ -1,7 +1,7 @@
-// What holds the force back, in words.
+// The state of the guard: whether it lets the force through, and its trips with their remedies.
+import { type Trip, TRIPS } from "../server_tables";
 import type { DeviceState } from "../state_types";
 import { el, Rows, setText } from "./dom";
-import { tripOf } from "./trips";
 
 interface Line {
   name: string;
@@ -13,7 +13,7 @@ export class GuardPanel {
   private readonly list = el("ul", { className: "trips" });
   private readonly rows = new Rows<Line, { root: HTMLElement; update(line: Line): void }>(
     this.list,
-    (line) => numberOf(line),
+    ({ name, latched }) => `${name} ${latched}`,
     makeRow,
   );
 
@@ -27,7 +27,7 @@ export class GuardPanel {
       guard.stopped ||
       !guard.armed ||
       guard.latched.length > 0 ||
-      guard.active.some((n) => tripOf(n).force !== "shaped");
+      guard.active.some((name) => tripOf(name)?.action !== "clamp");
     this.summary.dataset["level"] = zero || device.fault ? "bad" : guard.active.length > 0 ? "warn" : "good";
     setText(this.summary, device.fault ? `Device fault: ${device.fault}` : summaryOf(device, zero));
     const lines = guard.latched.map((name): Line => ({ name, latched: true }));
@@ -42,27 +42,30 @@ export class GuardPanel {
 
 function summaryOf(device: DeviceState, zero: boolean): string {
   const { guard } = device;
-  if (guard.stopped) return "Stopped: no force until it is re-armed.";
-  if (guard.latched.length > 0) return "Tripped: no force until it is re-armed.";
+  if (guard.stopped) return "Stopped: no force until re-armed.";
+  if (guard.latched.length > 0) return "Tripped: no force until re-armed.";
   if (!guard.armed) return "Not armed: no force.";
-  if (zero) return "The force is held at zero for now.";
+  if (zero) return "The guard holds the force at zero.";
   return guard.active.length > 0
-    ? "Armed; the guard shapes the force."
-    : "Armed. Nothing holds the force back.";
+    ? "Armed. The guard limits the force."
+    : "Armed. The guard does not change the force.";
 }
-
-// Names are few: their letters make a number.
-const numberOf = (line: Line): number =>
-  [...line.name].reduce((sum, c) => (sum * 31 + c.charCodeAt(0)) % 1e9, line.latched ? 1 : 0);
 
 function makeRow(line: Line): { root: HTMLElement; update(): void } {
   const trip = tripOf(line.name);
   const root = el(
     "li",
-    { data: { level: trip.force === "shaped" ? "warn" : "bad" } },
+    { data: { level: trip?.action === "clamp" ? "warn" : "bad" } },
     el("code", {}, line.name),
     line.latched ? " (latched) " : " ",
-    trip.words,
+    ...(trip ? withCode(`${trip.what} ${trip.remedy}`) : ["This page is older than the server: see docs/safety.md."]),
   );
   return { root, update: () => undefined };
 }
+
+/** The trip of a name; none for a name of a newer server. */
+const tripOf = (name: string): Trip | undefined => (TRIPS as Record<string, Trip>)[name];
+
+/** Text in backticks becomes code. */
+const withCode = (text: string): (Node | string)[] =>
+  text.split("`").map((part, i) => (i % 2 === 1 ? el("code", {}, part) : part));

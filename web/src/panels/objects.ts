@@ -1,4 +1,4 @@
-// The objects of the scene: touchable or not, their surface, removal.
+// The objects of the scene: makes them touchable or not, edits their surface, removes their mesh.
 import { clearTrimesh, type Outgoing, setHapticProperty, setObjectIsTouchable } from "../wire";
 import type { ObjectState } from "../state_types";
 import { countText, el, Rows, setText } from "./dom";
@@ -19,7 +19,7 @@ class ObjectRow {
       send(setObjectIsTouchable(id, on)),
     );
     this.surface = new SurfaceForm((property, share) => send(setHapticProperty(id, property, share)));
-    const remove = el("button", { type: "button", className: "small" }, "Remove the mesh");
+    const remove = el("button", { type: "button", className: "small" }, "Remove mesh");
     remove.addEventListener("click", () => send(clearTrimesh(id)));
     this.details.append(el("summary", {}, "Surface"), this.surface.root, remove);
     const head = el(
@@ -33,8 +33,8 @@ class ObjectRow {
   }
 
   update(o: ObjectState): void {
-    const feel = o.stiffness_N_per_m > 0 ? "" : ", no stiffness: not felt";
-    setText(this.facts, o.triangles === 0 ? "no mesh" : `${countText(o.triangles)} triangles${feel}`);
+    const note = o.stiffness_N_per_m > 0 ? "" : ", no stiffness: cannot be felt";
+    setText(this.facts, o.triangles === 0 ? "no mesh" : `${countText(o.triangles)} triangles${note}`);
     this.touchable.update(o.touchable);
     if (this.details.open) this.surface.update(o);
   }
@@ -47,7 +47,7 @@ export class ObjectsPanel {
   constructor(parent: HTMLElement, send: Send) {
     this.rows = new Rows(
       this.list,
-      (o) => o.id,
+      (o) => String(o.id),
       (o) => new ObjectRow(o.id, send),
     );
     parent.append(this.list);

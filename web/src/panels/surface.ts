@@ -1,4 +1,4 @@
-// Sliders for the surface of one object: each from 0 to 1, as setHapticProperty takes them.
+// Sliders for the surface of one object, each from 0 to 1, the range of setHapticProperty.
 import type { ObjectState } from "../state_types";
 import type { SurfaceProperty } from "../wire";
 import { el, setText } from "./dom";
@@ -6,7 +6,7 @@ import { el, setText } from "./dom";
 interface Slider {
   property: SurfaceProperty;
   label: string;
-  /** What 1 means with material_scale = "reference" (docs/haptics.md). */
+  /** The value at 1 with material_scale = "reference" (docs/haptics.md). */
   one: number;
   of(o: ObjectState): number;
   text(value: number): string;
@@ -76,7 +76,7 @@ export class SurfaceForm {
     }
   }
 
-  /** The values as 0 to 1 each. */
+  /** The values, each from 0 to 1. */
   values(): [SurfaceProperty, number][] {
     return this.rows.map(({ slider, input }) => [slider.property, input.valueAsNumber]);
   }
@@ -88,7 +88,7 @@ export class SurfaceForm {
     }
   }
 
-  /** Shows what the server has; a slider in use stays where it is held. */
+  /** Shows the values of the server; a slider in use keeps its position. */
   update(o: ObjectState): void {
     for (const { slider, input, output } of this.rows) {
       if (document.activeElement !== input) input.value = String(slider.of(o) / slider.one);

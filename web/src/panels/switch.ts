@@ -1,24 +1,24 @@
-// A check box that shows what the server has, and after a click what was asked for, until the server has had time to say so.
+// A check box for a value of the server. After a click it shows the requested value until the server confirms it or 2 s pass.
 import { el } from "./dom";
 
-const PATIENCE_MS = 2000;
+const CONFIRM_MS = 2000;
 
 export class Switch {
   readonly root: HTMLElement;
   private readonly input = el("input", { type: "checkbox" });
-  private askedUntil_ms = 0;
+  private requestedUntil_ms = 0;
 
   constructor(label: string, name: string, onChange: (on: boolean) => void) {
     this.input.ariaLabel = name;
     this.input.addEventListener("change", () => {
-      this.askedUntil_ms = performance.now() + PATIENCE_MS;
+      this.requestedUntil_ms = performance.now() + CONFIRM_MS;
       onChange(this.input.checked);
     });
     this.root = el("label", { className: "switch" }, this.input, label);
   }
 
   update(on: boolean): void {
-    if (on === this.input.checked) this.askedUntil_ms = 0;
-    else if (performance.now() > this.askedUntil_ms) this.input.checked = on;
+    if (on === this.input.checked) this.requestedUntil_ms = 0;
+    else if (performance.now() > this.requestedUntil_ms) this.input.checked = on;
   }
 }

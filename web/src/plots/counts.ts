@@ -1,7 +1,7 @@
-// Counting in histograms that only grow.
+// Differences and quantiles of histograms whose counts only grow.
 import type { Histogram } from "../state_types";
 
-/** What came between two states of a growing histogram. */
+/** The counts added between two states of a histogram. */
 export function between(before: Histogram | undefined, now: Histogram): [from_us: number, count: number][] {
   const old = new Map(before?.bins);
   return now.bins
@@ -10,8 +10,8 @@ export function between(before: Histogram | undefined, now: Histogram): [from_us
 }
 
 /**
- * What this share of all counts is at most: the upper end of its bin, 0 when there are none. `all` names the bins that there
- * are; one without a known neighbour is taken as an eighth wide.
+ * An upper bound of the quantile `part`: the upper end of its bin; 0 without counts. `all` lists the existing bins; a bin
+ * without a known neighbour counts as an eighth of its start wide.
  */
 export function share(bins: [from_us: number, count: number][], part: number, all = bins): number {
   const total = bins.reduce((sum, [, count]) => sum + count, 0);

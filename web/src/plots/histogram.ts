@@ -1,9 +1,9 @@
-// The loop's histogram since the server started: how many ticks had which period, on a logarithmic scale.
+// The histogram of the servo loop since the server started, on logarithmic scales.
 import uPlot from "uplot";
 import type { Histogram } from "../state_types";
 import { axis, css } from "./plot";
 
-/** What is shorter is drawn there. */
+/** Shorter times are drawn here. */
 const LEAST_US = 0.1;
 
 export class LoopHistogram {
@@ -85,12 +85,12 @@ export class LoopHistogram {
   }
 }
 
-/** Logarithms, as the bins are: one late tick among millions leaves the others their room. */
+/** The range of the logarithmic axis, with a margin. */
 function around(min: number | null, max: number | null): [number, number] {
   return [(min ?? 0) - 0.03, (max ?? 1) + 0.07];
 }
 
-/** Round times between two logarithms, no more than there is room for. */
+/** At most six round times between two logarithms. */
 function roundTimes(min: number, max: number): number[] {
   const times = (steps: number[]): number[] => {
     const found: number[] = [];

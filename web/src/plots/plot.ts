@@ -1,10 +1,10 @@
-// One live plot: uPlot over a window of samples, in the colours of the page.
+// One live plot: uPlot over a sliding window of samples, in the colours of the page.
 import uPlot from "uplot";
 import { Window } from "./window";
 
 export interface Curve {
   label: string;
-  /** A colour of the page: a CSS variable. */
+  /** Name of a CSS variable. */
   colour: string;
 }
 
@@ -12,10 +12,10 @@ export interface PlotOptions {
   title: string;
   unit: string;
   curves: Curve[];
-  /** How much of the past is shown, and how many samples that may be. */
+  /** Length of the window, and the maximum number of samples in it. */
   seconds: number;
   most: number;
-  /** The scale reaches at least this far. */
+  /** Smallest upper end of the y axis. */
   least: number;
   decimals: number;
 }
@@ -37,7 +37,7 @@ export class Plot {
   private plot: uPlot | undefined;
   private readonly value: HTMLElement;
   private readonly body: HTMLElement;
-  private fresh = false;
+  private changed = false;
 
   constructor(
     parent: HTMLElement,
@@ -58,15 +58,15 @@ export class Plot {
 
   push(time_s: number, ...values: number[]): void {
     this.window.push(time_s, ...values);
-    this.fresh = true;
+    this.changed = true;
   }
 
   clear(): void {
     this.window.clear();
-    this.fresh = true;
+    this.changed = true;
   }
 
-  /** Builds the plot anew, in other colours. */
+  /** Rebuilds the plot after a change of colours. */
   restyle(): void {
     this.plot?.destroy();
     this.plot = undefined;
@@ -74,8 +74,8 @@ export class Plot {
   }
 
   draw(): void {
-    if (!this.fresh || !this.plot || this.window.size === 0) return;
-    this.fresh = false;
+    if (!this.changed || !this.plot || this.window.size === 0) return;
+    this.changed = false;
     const data = this.window.data();
     this.plot.setData(data as unknown as uPlot.AlignedData);
     const last = data[1]!.at(-1)!;
@@ -135,7 +135,7 @@ const agoText = (seconds: number): string => (seconds > -0.05 ? "now" : `${secon
 const shortText = (value: number): string =>
   value < 10_000 ? String(Number(value.toPrecision(6))) : `${value / 1000}k`;
 
-/** A number with one or two digits, not below: scales change seldom. */
+/** A round number at or above the value, so that the axis changes seldom. */
 function niceEnd(value: number): number {
   const power = 10 ** Math.floor(Math.log10(value));
   return [1, 1.5, 2, 3, 5, 7.5, 10].find((m) => m * power >= value)! * power;

@@ -1,11 +1,11 @@
-// The last seconds of several values over one time axis, without moving them at each new one.
+// A sliding window of samples: time and several values. Appending moves the old samples only once per window length.
 
 export class Window {
   private readonly columns: Float64Array[];
   private start = 0;
   private end = 0;
 
-  /** `columns`: the time and the values; `most`: samples that are kept. */
+  /** `columns`: 1 for the time plus the number of values; `most`: number of samples kept. */
   constructor(
     columns: number,
     private readonly most: number,
@@ -28,7 +28,7 @@ export class Window {
     this.start = this.end = 0;
   }
 
-  /** Views of what is kept, oldest first: valid until the next push. */
+  /** Views of the kept samples, oldest first; valid until the next push. */
   data(): Float64Array[] {
     return this.columns.map((column) => column.subarray(this.start, this.end));
   }

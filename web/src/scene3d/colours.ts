@@ -1,4 +1,4 @@
-// What a surface value looks like: one ramp, dark blue to orange, told apart in grey and by colour-blind eyes, too.
+// Colours of surface values: a ramp from dark blue to orange that is readable in grey and for colour-blind users.
 import { Color } from "three";
 import type { ObjectState } from "../state_types";
 
@@ -6,7 +6,7 @@ const RAMP = ["#27408b", "#2f7fb5", "#5fb4a2", "#d9c75f", "#e8743b"].map((c) => 
 
 export type Quantity = "stiffness" | "friction";
 
-/** The colour of a share from 0 to 1. */
+/** The colour of a value from 0 to 1. */
 export function rampColour(share: number): Color {
   const at = Math.min(Math.max(share, 0), 1) * (RAMP.length - 1);
   const from = Math.min(Math.floor(at), RAMP.length - 2);

@@ -1,4 +1,4 @@
-// What moves with every tick: hand, proxy, the normals of the contacts, the force; and the box that the device reaches.
+// Markers that move with every tick: HIP, proxy, contact normals, force; and the workspace of the device.
 import {
   BoxGeometry,
   BufferAttribute,
@@ -23,20 +23,20 @@ import type { DeviceState } from "../state_types";
 
 const UP = new Vector3(0, 1, 0);
 const MOST_NORMALS = 8;
-/** Parts of the workspace's largest extent. */
+/** Relative to the largest extent of the workspace. */
 const BALL = 0.016;
 const NORMAL = 0.12;
 const PEAK_FORCE = 0.8;
 
 export interface MarkerColours {
-  hand: string;
+  hip: string;
   proxy: string;
   force: string;
   normal: string;
   box: string;
 }
 
-/** A shaft and a head along +y, of length 1 and some width. */
+/** An arrow along +y. */
 class Arrow extends Group {
   private readonly shaft: Mesh;
   private readonly head: Mesh;
@@ -50,7 +50,7 @@ class Arrow extends Group {
     this.add(this.shaft, this.head);
   }
   point(from: Vector3, direction: Vector3, length: number, unit: number): void {
-    const width = Math.min(this.width * unit, length / 10); // a short arrow is a small one
+    const width = Math.min(this.width * unit, length / 10); // a short arrow is thin
     const head = Math.min(5 * width, 0.6 * length);
     this.visible = length > 0;
     this.position.copy(from);
@@ -65,7 +65,7 @@ const coloured = (): MeshStandardMaterial => new MeshStandardMaterial({ roughnes
 
 export class Markers {
   readonly group = new Group();
-  private readonly hand = new Mesh(
+  private readonly hip = new Mesh(
     new SphereGeometry(1, 24, 16),
     new MeshBasicMaterial({ transparent: true, opacity: 0.65, depthTest: false }),
   );
@@ -87,25 +87,25 @@ export class Markers {
 
   constructor() {
     for (let i = 0; i < MOST_NORMALS; ++i) this.normals.push(new Arrow(this.normalMaterial, 0.003));
-    this.hand.renderOrder = 2;
+    this.hip.renderOrder = 2;
     this.spring.renderOrder = 1;
     this.spring.frustumCulled = false;
     this.box.matrixAutoUpdate = false;
-    this.group.add(this.box, this.spring, this.hand, this.proxy, this.force, ...this.normals);
-    for (const part of [this.spring, this.hand, this.proxy, this.force, ...this.normals])
+    this.group.add(this.box, this.spring, this.hip, this.proxy, this.force, ...this.normals);
+    for (const part of [this.spring, this.hip, this.proxy, this.force, ...this.normals])
       part.visible = false;
   }
 
   setColours(colours: MarkerColours): void {
-    this.hand.material.color.set(colours.hand);
-    this.spring.material.color.set(colours.hand);
+    this.hip.material.color.set(colours.hip);
+    this.spring.material.color.set(colours.hip);
     this.proxy.material.color.set(colours.proxy);
     this.force.material.color.set(colours.force);
     this.normalMaterial.color.set(colours.normal);
     this.box.material.color.set(colours.box);
   }
 
-  /** Workspace box and sizes. */
+  /** Sets the workspace box and the sizes of the markers. */
   setDevice(device: DeviceState): void {
     const min = new Vector3().fromArray(device.workspace_m.min);
     const max = new Vector3().fromArray(device.workspace_m.max);
@@ -120,23 +120,23 @@ export class Markers {
     this.scale = device.world_per_reported;
     this.size = Math.max(...max.sub(min).toArray()) * T.getMaxScaleOnAxis();
     this.peak_N = device.peak_force_N > 0 ? device.peak_force_N : 1;
-    this.hand.scale.setScalar(0.6 * BALL * this.size);
+    this.hip.scale.setScalar(0.6 * BALL * this.size);
     this.proxy.scale.setScalar(BALL * this.size);
   }
 
-  /** A reported position in world units. */
+  /** Converts a reported position to world units. */
   world(position: Vec3): Vector3 {
     return new Vector3(...position).multiplyScalar(this.scale);
   }
 
   update(tick: Tick, contacts: Contact[]): void {
-    const hand = this.world(tick.hand);
+    const hip = this.world(tick.hand);
     const proxy = this.world(tick.proxy);
-    this.hand.visible = this.proxy.visible = this.spring.visible = true;
-    this.hand.position.copy(hand);
+    this.hip.visible = this.proxy.visible = this.spring.visible = true;
+    this.hip.position.copy(hip);
     this.proxy.position.copy(proxy);
     const ends = this.spring.geometry.getAttribute("position") as BufferAttribute;
-    ends.setXYZ(0, ...hand.toArray()).setXYZ(1, ...proxy.toArray());
+    ends.setXYZ(0, ...hip.toArray()).setXYZ(1, ...proxy.toArray());
     ends.needsUpdate = true;
     const force = new Vector3(...tick.force_N);
     const strength = force.length();

@@ -9,23 +9,24 @@ import {
   Mesh,
   MeshStandardMaterial,
   Ray,
-  type Vector3,
+  Vector3,
 } from "three";
+import { MeshBVH } from "three-mesh-bvh";
 import type { DisplayMesh } from "../state";
-import { felt, type ObjectState } from "../state_types";
+import { isFelt, type ObjectState } from "../state_types";
 import { type Quantity, rampColour, rangeOf, valueOf } from "./colours";
-import { RayMesh } from "./ray_mesh";
 
 interface Shown {
   mesh: Mesh<BufferGeometry, MeshStandardMaterial>;
-  rays: RayMesh;
+  /** None for a mesh without triangles. */
+  bvh: MeshBVH | undefined;
   rim: { value: number };
   triangles: number;
 }
 
 const NOT_FELT = new Color("#8a9099");
 
-/** A light along the rim of a mesh, 0 or 1: for the object that is touched. */
+/** Adds a light along the rim of a mesh, 0 or 1, which marks the touched object. */
 function withRim(material: MeshStandardMaterial, colour: Color): { value: number } {
   const rim = { value: 0 };
   material.onBeforeCompile = (shader) => {
@@ -58,7 +59,7 @@ export class Objects {
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new BufferAttribute(display.positions, 3));
     geometry.setIndex(new BufferAttribute(display.triangles, 1));
-    // Flat shading needs no normals, and shows the triangles that are felt.
+    // Flat shading needs no normals and shows the triangles.
     const material = new MeshStandardMaterial({
       flatShading: true,
       roughness: 0.75,
@@ -69,9 +70,11 @@ export class Objects {
     mesh.matrixAutoUpdate = false;
     mesh.frustumCulled = false;
     this.group.add(mesh);
+    // Reorders the index of the geometry; the picture stays the same.
+    const bvh = display.triangles.length > 0 ? new MeshBVH(geometry) : undefined;
     const rim = withRim(material, this.rimColour);
     rim.value = id === this.touched ? 1 : 0;
-    this.shown.set(id, { mesh, rim, rays: new RayMesh(display), triangles: display.triangles.length / 3 });
+    this.shown.set(id, { mesh, rim, bvh, triangles: display.triangles.length / 3 });
   }
 
   remove(id: number): void {
@@ -93,35 +96,41 @@ export class Objects {
       const { mesh } = shown;
       mesh.matrix.fromArray(state.T_world_object).multiply(new Matrix4().fromArray(state.T_object_mesh));
       mesh.matrixWorldNeedsUpdate = true;
-      const isFelt = felt(state);
-      mesh.material.color.copy(isFelt ? rampColour(valueOf(state, quantity) / end) : NOT_FELT);
-      mesh.material.transparent = !isFelt;
-      mesh.material.opacity = isFelt ? 1 : 0.35;
-      mesh.material.depthWrite = isFelt;
+      const opaque = isFelt(state);
+      mesh.material.color.copy(opaque ? rampColour(valueOf(state, quantity) / end) : NOT_FELT);
+      mesh.material.transparent = !opaque;
+      mesh.material.opacity = opaque ? 1 : 0.35;
+      mesh.material.depthWrite = opaque;
     }
   }
 
-  /** Highlights the object that is touched; -1: none. */
+  /** Highlights the touched object; -1: none. */
   touch(id: number): void {
     if (id === this.touched) return;
     this.touched = id;
     for (const [each, { rim }] of this.shown) rim.value = each === id ? 1 : 0;
   }
 
-  /** Distance along the ray to what can be felt, or Infinity. */
+  /** Distance along the ray (unit direction, world units) to the first object that can be felt, or Infinity. */
   distance(ray: Ray): number {
     let best = Infinity;
     for (const state of this.states) {
       const shown = this.shown.get(state.id);
-      if (shown && felt(state)) best = Math.min(best, shown.rays.distance(ray, shown.mesh.matrix));
+      if (shown?.bvh && isFelt(state)) best = Math.min(best, distanceTo(shown.bvh, ray, shown.mesh.matrix));
     }
     return best;
   }
 
-  /** Whether something that can be felt lies between two points. */
+  /** Whether an object that can be felt lies between two points. */
   between(from: Vector3, to: Vector3): boolean {
-    const way = to.clone().sub(from);
-    const length = way.length();
-    return length > 0 && this.distance(new Ray(from, way.divideScalar(length))) < length;
+    const segment = to.clone().sub(from);
+    const length = segment.length();
+    return length > 0 && this.distance(new Ray(from, segment.divideScalar(length))) < length;
   }
+}
+
+function distanceTo(bvh: MeshBVH, ray: Ray, T_world_mesh: Matrix4): number {
+  const local = new Ray().copy(ray).applyMatrix4(T_world_mesh.clone().invert());
+  const hit = bvh.raycastFirst(local, DoubleSide) as { point: Vector3 } | null;
+  return hit ? hit.point.clone().applyMatrix4(T_world_mesh).distanceTo(ray.origin) : Infinity;
 }

@@ -1,4 +1,4 @@
-// The 3D view: scene, camera, light; draws when something has changed.
+// The 3D view: scene, camera and lights. It draws only after a change.
 import {
   Box3,
   Color,
@@ -33,7 +33,7 @@ export class View {
   private readonly raycaster = new Raycaster();
   private dirty = true;
   private framed = "";
-  /** Where the canvas is on the page: asking for it in each frame would have the page laid out anew. */
+  /** Position of the canvas on the page, cached: querying it in every frame would force a layout. */
   private at = new DOMRect();
   private device: DeviceState | undefined;
 
@@ -61,13 +61,13 @@ export class View {
     this.dirty = true;
   }
 
-  /** Whether the left button (and one finger) is for the hand, or turns the camera. */
+  /** Whether the left mouse button (and one finger) moves the simulated hand or turns the camera. */
   handOnLeft(hand: boolean): void {
     this.controls.mouseButtons = { LEFT: hand ? null : MOUSE.ROTATE, MIDDLE: MOUSE.PAN, RIGHT: MOUSE.ROTATE };
     this.controls.touches = { ONE: hand ? null : TOUCH.ROTATE, TWO: TOUCH.DOLLY_ROTATE };
   }
 
-  /** While the wheel means depth, it does not zoom. */
+  /** Off while the wheel changes the depth of the hand. */
   set zooming(on: boolean) {
     this.controls.enableZoom = on;
   }
@@ -95,7 +95,7 @@ export class View {
     this.invalidate();
   }
 
-  /** Puts the camera in front of the device, as its user sits. */
+  /** Moves the camera to where the user of the device sits. */
   home(): void {
     if (!this.device) return;
     const box = new Box3().setFromObject(this.markers.group.children[0]!);
@@ -115,7 +115,7 @@ export class View {
     this.invalidate();
   }
 
-  /** The ray through a point of the page. */
+  /** The ray through a point on the page, in world units. */
   rayAt(x: number, y: number): Ray {
     const { at } = this;
     const share = new Vector2((2 * (x - at.left)) / at.width - 1, 1 - (2 * (y - at.top)) / at.height);
@@ -123,7 +123,7 @@ export class View {
     return this.raycaster.ray.clone();
   }
 
-  /** Where a point of the world is on the page. */
+  /** The page coordinates of a point in the world. */
   pageOf(point: Vector3): { x: number; y: number } {
     const { at } = this;
     const p = point.clone().project(this.camera);

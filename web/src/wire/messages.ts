@@ -174,12 +174,12 @@ export function decodeGuardState(payload: DataView): GuardState {
 
 export interface ServerText {
   severity: number;
+  /** A refusal code of the server, 0 in other texts. */
+  level: number;
   text: string;
 }
 
 export function decodeText(payload: DataView): ServerText {
   const r = new Reader(payload);
-  const severity = r.u32();
-  r.u32();
-  return { severity, text: r.text(1024) };
+  return { severity: r.u32(), level: r.u32(), text: r.text(1024) };
 }

@@ -1,0 +1,34 @@
+// Why the server refused a command, as a stable number beside the text.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+namespace hapticd::server {
+
+/// Travels in the `level` field of a text_message, so that a client need not parse the text. Stock VRPN servers and all
+/// other texts have level 0. Numbers never change their meaning; new ones are appended. docs/wire-extensions.md lists them.
+enum class RefusalCode : std::uint32_t {
+  none = 0,              ///< not a refusal, or one without a code
+  notPermitted = 1,      ///< the client's role, or a replayed recording, permits no commands
+  handNotSimulated = 2,  ///< Hold_Hand: the device is real
+  handHeldByOther = 3,   ///< Hold_Hand: another client holds the simulated hand
+  handPoseInvalid = 4,   ///< Hold_Hand: position or orientation is not finite, or the quaternion is zero
+};
+
+struct RefusalInfo {
+  RefusalCode code;
+  std::string_view name;
+};
+
+/// All codes, in order.
+inline constexpr std::array<RefusalInfo, 5> kRefusals{{
+    {RefusalCode::none, "none"},
+    {RefusalCode::notPermitted, "notPermitted"},
+    {RefusalCode::handNotSimulated, "handNotSimulated"},
+    {RefusalCode::handHeldByOther, "handHeldByOther"},
+    {RefusalCode::handPoseInvalid, "handPoseInvalid"},
+}};
+
+}  // namespace hapticd::server
