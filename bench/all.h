@@ -9,6 +9,7 @@ Outcome measureTick(const Run& run);
 Outcome measureObjects(const Run& run);
 Outcome measureWakeup(const Run& run);
 Outcome measureDisturbance(const Run& run);
+Outcome measureStop(const Run& run);
 Outcome measureLatency(const Run& run);
 Outcome measureUpload(const Run& run);
 Outcome measureFanOut(const Run& run);

@@ -13,6 +13,8 @@ const std::vector<Benchmark>& benchmarks() {
       {"wakeup", "How late the loop wakes", "cyclictest with the same priority and interval", &measureWakeup},
       {"disturbance", "What clients can do to the loop and to each other",
        "the same server just before, undisturbed", &measureDisturbance},
+      {"stop", "From a client's stop to the first tick that writes zero, while others upload", "the same server, undisturbed",
+       &measureStop},
       {"latency", "From the servo's tick to the callback of a client, isTouching at 1 kHz",
        "a raw pipeline: thread, wake, thread, TCP, blocking reader; 32 bytes at 1 kHz", &measureLatency},
       {"upload", "Meshes into the server", "raw TCP of the same bytes into a process that drops them",

@@ -18,7 +18,7 @@ void require(bool holds, const char* what) {
   std::abort();
 }
 
-std::vector<std::byte> encoded(const Message& message) {
+std::vector<std::byte> payloadOf(const Message& message) {
   std::vector<std::byte> bytes(payloadSize(message));
   encodePayload(message, bytes.data());
   return bytes;
@@ -32,11 +32,11 @@ void checkPayload(ByteView payload) {
       require(!message.error().empty(), "a refusal has a reason");
       continue;
     }
-    const std::vector<std::byte> once = encoded(*message);
+    const std::vector<std::byte> once = payloadOf(*message);
     require(once.size() <= payload.size(), "nothing is read behind the payload");
     const Result<Message> again = decode(as, once);
     require(static_cast<bool>(again), "what we encode decodes");
-    require(encoded(*again) == once, "encoding is stable");
+    require(payloadOf(*again) == once, "encoding is stable");
   }
 }
 

@@ -1,3 +1,4 @@
+#include <toml++/toml.h>
 #include <algorithm>
 #include <charconv>
 #include <cstdio>
@@ -8,6 +9,7 @@
 namespace hapticd::server {
 namespace {
 
+// Shortest digits that read back as the same value; toml++ writes 0.1 as 0.10000000000000001.
 std::string text(double value) {
   char digits[32];
   const auto end = std::to_chars(digits, digits + sizeof digits, value).ptr;
@@ -27,19 +29,9 @@ std::string thousandths(double value) {
 }
 
 std::string quoted(const std::string& value) {
-  std::string out = "\"";
-  for (const char c : value) {
-    if (c == '"' || c == '\\') {
-      out += {'\\', c};
-    } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
-      char escape[8];
-      std::snprintf(escape, sizeof escape, "\\u%04X", static_cast<unsigned>(c));
-      out += escape;
-    } else {
-      out += c;
-    }
-  }
-  return out + "\"";
+  std::ostringstream out;
+  out << toml::value<std::string>(value);
+  return out.str();
 }
 
 class Writer {

@@ -8,8 +8,8 @@
 namespace hapticd::realtime::fixture {
 namespace {
 
-constexpr double kRadius = 0.001;
-constexpr RenderOptions kBallOfRadius{.toolRadius_m = kRadius};
+constexpr double kToolRadius = 0.001;
+constexpr RenderOptions kBallOfRadius{.toolRadius_m = kToolRadius};
 
 TriangleMesh jittered(double half, int cells) {
   return heightField(
@@ -43,8 +43,8 @@ TEST_P(BallGroundTruth, shallow_concave_seam_does_not_hold_the_proxy_back) {
       const Vec3 h = hip();
       const double side = h.x() < 0 ? -1 : 1;
       const Vec3 n = Vec3(-side * std::sin(angle / 2), 0, std::cos(angle / 2));
-      Vec3 nearest = h - n * (n.dot(h) - kRadius);
-      if (nearest.x() * side < 0) nearest = Vec3(0, h.y(), kRadius / std::cos(angle / 2));
+      Vec3 nearest = h - n * (n.dot(h) - kToolRadius);
+      if (nearest.x() * side < 0) nearest = Vec3(0, h.y(), kToolRadius / std::cos(angle / 2));
       EXPECT_LT((proxy() - nearest).norm(), 5e-6) << angle << " at " << h.x();
       EXPECT_EQ(r.status, 0U);
     });
@@ -215,7 +215,7 @@ TEST_P(BallGroundTruth, soup_neither_tunnels_nor_breaks) {
     for (int k = 0; k < 40; ++k) {
       to({across(random), across(random), 0}, 0.2, [&](const Rendering& r) {
         EXPECT_TRUE(r.force_N.allFinite());
-        EXPECT_GT(proxy().z(), kRadius - 1e-8);
+        EXPECT_GT(proxy().z(), kToolRadius - 1e-8);
         EXPECT_NEAR(r.normalForce_N.z(), 1.0, 1e-3);
       });
     }
@@ -266,7 +266,7 @@ TEST_P(BallGroundTruth, vanishing_object_ends_its_contact_only) {
 
 // Force shading rounds off what a coarse mesh was meant to be, but no edge that is meant.
 TEST_P(BallGroundTruth, shading_is_off_at_sharp_edges) {
-  for (const double radius : {0.0, kRadius}) {
+  for (const double radius : {0.0, kToolRadius}) {
     clear();
     add(box(Vec3(-0.02, -0.02, -0.02), Vec3(0.02, 0.02, 0)), surface());
     const RenderOptions options{.toolRadius_m = radius, .forceShading = true};
