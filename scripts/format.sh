@@ -5,6 +5,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 find src include apps bench tests fuzz examples \( -name '*.h' -o -name '*.cpp' \) -print0 >build/format.files
+command -v clang-format-14 >/dev/null || { echo "format: clang-format-14 is missing (packages.txt, section lint)"; exit 77; }
 case "${1:-}" in
   "") xargs -0 clang-format-14 -i <build/format.files ;;
   --check)

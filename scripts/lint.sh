@@ -55,6 +55,7 @@ tidy() {
 }
 
 changed() {
+  command -v clang-tidy-19 >/dev/null || { echo "lint: clang-tidy-19 is missing (packages.txt, section lint)"; exit 77; }
   write_database
   local files
   mapfile -t files < <(changed_sources)
