@@ -17,7 +17,7 @@ add_library(hapticd_flags INTERFACE)
 target_compile_options(hapticd_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual -Wcast-align
   $<$<BOOL:${HAPTICD_WERROR}>:-Werror>
-  # The same input gives the same bytes on every x86-64-v2 machine: no contraction, no fast-math.
+  # No contraction and no fast-math, so that the same input gives the same bytes on every x86-64-v2 machine.
   -ffp-contract=off
   $<$<STREQUAL:${CMAKE_SYSTEM_PROCESSOR},x86_64>:-march=x86-64-v2>)
 if(HAPTICD_LLD)
@@ -27,11 +27,11 @@ if(HAPTICD_SANITIZE)
   target_compile_options(hapticd_flags INTERFACE -fsanitize=${HAPTICD_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   target_link_options(hapticd_flags INTERFACE -fsanitize=${HAPTICD_SANITIZE})
   target_compile_definitions(hapticd_flags INTERFACE HAPTICD_SANITIZED=1)
-  # With a sanitizer's code in between, GCC 12 sees unset variables where there are none, in <regex> for one; the release
-  # build warns of the real ones.
-  target_compile_options(hapticd_flags INTERFACE -Wno-maybe-uninitialized)
+  # With the code of a sanitizer in between, GCC 12 reports uninitialized variables where there are none, for example in
+  # <regex>; the release build reports the real ones.
+  target_compile_options(hapticd_flags INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
   if(HAPTICD_SANITIZE MATCHES "thread" AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-    # It warns of every fence, which it does not model; the fences here order what reference counts guard.
+    # GCC warns about every fence, because TSan does not model them; the fences here order what reference counts guard.
     target_compile_options(hapticd_flags INTERFACE -Wno-tsan)
   endif()
 endif()
@@ -47,6 +47,8 @@ endfunction()
 function(hapticd_speed_up target headers kind)
   if(HAPTICD_UNITY STREQUAL kind OR HAPTICD_UNITY STREQUAL ALL)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 0)
+    # GCC takes the sources for headers, and warns of their anonymous namespaces.
+    target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
   else()
     hapticd_precompile(${target} ${headers})
   endif()
@@ -74,8 +76,7 @@ hapticd_headers(hapticd_room_headers PIC
   LIBS Eigen3::Eigen HEADERS ${HAPTICD_STD_HEADERS} <Eigen/Core> <Eigen/Geometry>)
 
 # hapticd_library(NAME SOURCES ... DEPENDS rooms ... [LIBS external ...] [PRIVATE_LIBS external ...])
-# One library per folder of src/. DEPENDS is the list of rooms it may include: scripts/check_includes.sh
-# reads it from here, so the arrow and the link line cannot differ.
+# One library for each folder of src/. DEPENDS lists the rooms that it may include; scripts/check_includes.sh reads it.
 function(hapticd_library name)
   cmake_parse_arguments(A "" "" "SOURCES;DEPENDS;LIBS;PRIVATE_LIBS" ${ARGN})
   set(deps ${A_DEPENDS})
@@ -93,12 +94,11 @@ function(hapticd_library name)
   endif()
 endfunction()
 
-# What the sanitizer runs of scripts/test.sh build: no more than they need.
+# The targets of scripts/test.sh in the asan and the tsan preset.
 add_custom_target(all_tests)
 add_custom_target(threads_tests)
 
-# For sources of tests, after the flags of all. The libraries are watched for everything; in what a test itself says
-# three of UBSan's checks take half of the time to compile.
+# Further flags for sources of tests. Three of UBSan's checks take half of their compile time; the libraries keep all checks.
 add_library(hapticd_test_flags INTERFACE)
 if(HAPTICD_SANITIZE MATCHES "undefined")
   target_compile_options(hapticd_test_flags INTERFACE -fno-sanitize=null,alignment,vptr)

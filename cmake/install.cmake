@@ -6,7 +6,7 @@ include(CMakePackageConfigHelpers)
 add_library(hapticd_client_archive STATIC
   $<TARGET_OBJECTS:hapticd_client> $<TARGET_OBJECTS:hapticd_net> $<TARGET_OBJECTS:hapticd_wire>)
 set_target_properties(hapticd_client_archive PROPERTIES
-  EXPORT_NAME client OUTPUT_NAME hapticd_client LINKER_LANGUAGE CXX ARCHIVE_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib)
+  EXPORT_NAME client OUTPUT_NAME hapticd_client LINKER_LANGUAGE CXX ARCHIVE_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib)
 target_include_directories(hapticd_client_archive INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 target_compile_features(hapticd_client_archive INTERFACE cxx_std_20)
 target_link_libraries(hapticd_client_archive PUBLIC Threads::Threads)
@@ -15,6 +15,10 @@ set_target_properties(vrpn PROPERTIES VERSION ${PROJECT_VERSION} SOVERSION ${PRO
 target_include_directories(vrpn INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/vrpn>)
 target_compile_features(vrpn INTERFACE cxx_std_11)
 
+if(NOT HAPTICD_INSTALL)
+  return()
+endif()
+install(TARGETS hapticd hapticd-bench)
 install(TARGETS hapticd_client_archive vrpn EXPORT hapticd)
 install(DIRECTORY include/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
 
@@ -31,3 +35,25 @@ configure_file(cmake/hapticd.pc.in hapticd.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/hapticd.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 
 install(FILES packaging/grafana/hapticd.json DESTINATION ${CMAKE_INSTALL_DATADIR}/hapticd/grafana)
+
+# Programs and shared libraries are installed without symbols. The symbols are in .debug/NAME.debug beside each file, where
+# debuggers look.
+function(hapticd_split_symbols target directory)
+  install(CODE "
+    set(file \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${directory}/$<TARGET_FILE_NAME:${target}>\")
+    cmake_path(GET file PARENT_PATH folder)
+    cmake_path(GET file FILENAME name)
+    file(MAKE_DIRECTORY \${folder}/.debug)
+    execute_process(COMMAND ${CMAKE_OBJCOPY} --only-keep-debug \${file} \${folder}/.debug/\${name}.debug COMMAND_ERROR_IS_FATAL ANY)
+    execute_process(COMMAND ${CMAKE_STRIP} \${file} COMMAND_ERROR_IS_FATAL ANY)
+    execute_process(COMMAND ${CMAKE_OBJCOPY} --add-gnu-debuglink=.debug/\${name}.debug \${file}
+      WORKING_DIRECTORY \${folder} COMMAND_ERROR_IS_FATAL ANY)
+    ")
+endfunction()
+hapticd_split_symbols(hapticd ${CMAKE_INSTALL_BINDIR})
+hapticd_split_symbols(hapticd-bench ${CMAKE_INSTALL_BINDIR})
+foreach(library vrpn hapticd_vrpn hapticd_client_shared)
+  if(TARGET ${library})
+    hapticd_split_symbols(${library} ${CMAKE_INSTALL_LIBDIR})
+  endif()
+endforeach()

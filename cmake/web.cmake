@@ -5,7 +5,7 @@ option(HAPTICD_WEB "Build the viewer in web/ and make it part of the server (nee
 # when npm fails, the bundle is empty and the server shows how to build it.
 function(hapticd_embed_web target)
   set(web ${PROJECT_SOURCE_DIR}/web)
-  set(out ${CMAKE_BINARY_DIR}/web)
+  set(out ${PROJECT_BINARY_DIR}/web)
   set(bundle "")
   set(dist ${out}/none)
   find_program(NODE_EXECUTABLE node)
