@@ -198,7 +198,7 @@ TEST(ServoThread, ALoopAmongItsNeighbours) {
   EXPECT_EQ(device.written_N, Vec3::Zero());
 }
 
-TEST(ThreadSetup, SomebodyElsesThreadKeepsWhatItHas) {
+TEST(ThreadSetup, AThreadOfAVendorLibraryKeepsItsScheduling) {
   std::thread([] {
     const int before = sched_getscheduler(0);
     const ThreadSetup setup = setUpThread({.keepScheduling = true, .lockMemory = false});
@@ -210,7 +210,7 @@ TEST(ThreadSetup, SomebodyElsesThreadKeepsWhatItHas) {
   }).join();
 }
 
-// As the kernel tells them: size and policy, flags, niceness and priority, turn, and what deadlines need.
+// struct sched_attr: size and policy, flags, niceness and priority, slice, deadline, period.
 using SchedulingAttributes = std::array<std::uint64_t, 6>;
 
 SchedulingAttributes attributesOfThisThread() {
@@ -219,18 +219,18 @@ SchedulingAttributes attributesOfThisThread() {
   return attributes;
 }
 
-// Linux before 6.12, and some containers, do not let a thread choose.
-bool turnsCanBeChosen() {
-  constexpr std::uint64_t kTurn_ns = 200'000;
+// Linux before 6.12 and some containers refuse the request.
+bool sliceCanBeChosen() {
+  constexpr std::uint64_t kSlice_ns = 200'000;
   SchedulingAttributes wanted = attributesOfThisThread();
-  wanted[3] = kTurn_ns;
-  return syscall(SYS_sched_setattr, 0, wanted.data(), 0U) == 0 && attributesOfThisThread()[3] == kTurn_ns;
+  wanted[3] = kSlice_ns;
+  return syscall(SYS_sched_setattr, 0, wanted.data(), 0U) == 0 && attributesOfThisThread()[3] == kSlice_ns;
 }
 
-TEST(ThreadSetup, ShortTurnsChangeNeitherPolicyNorNiceness) {
+TEST(ThreadSetup, AShortSliceChangesNeitherPolicyNorNiceness) {
   std::thread([] {
     setpriority(PRIO_PROCESS, 0, 3);
-    const bool canBeChosen = turnsCanBeChosen();
+    const bool canBeChosen = sliceCanBeChosen();
     requestShortTimeSlice();
     EXPECT_EQ(sched_getscheduler(0) & ~SCHED_RESET_ON_FORK, SCHED_OTHER);
     EXPECT_EQ(getpriority(PRIO_PROCESS, 0), 3);
