@@ -7,11 +7,11 @@
 #include <cstddef>
 
 #include "base/clock.h"
+#include "base/histogram.h"
 #include "device/device.h"
 #include "realtime/render/renderer.h"
 #include "realtime/servo/black_box.h"
 #include "realtime/servo/guard.h"
-#include "realtime/servo/histogram.h"
 #include "realtime/servo/pacer.h"
 #include "realtime/servo/report.h"
 #include "realtime/servo/tick_record.h"
@@ -30,9 +30,9 @@ struct TickOptions {
 
 /// Periods, wake-up errors and compute times of all ticks. Any thread may read.
 struct TickHistograms {
-  Histogram period;
-  Histogram wakeupError;
-  Histogram compute;
+  base::Histogram period;
+  base::Histogram wakeupError;
+  base::Histogram compute;
 };
 
 /// The servo loop of one device. Construct it outside the loop: the constructor makes all allocations.
