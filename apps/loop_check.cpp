@@ -11,7 +11,7 @@
 namespace hapticd::apps {
 namespace {
 
-Percentiles percentiles(const realtime::Histogram& histogram) {
+Percentiles percentiles(const base::Histogram& histogram) {
   const auto copy = histogram.copy();
   const auto us = [](base::Nanos t) { return static_cast<double>(t) * 1e-3; };
   return {us(copy.quantile(0.5)), us(copy.quantile(0.99)), us(copy.max)};

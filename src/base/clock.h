@@ -1,11 +1,12 @@
-// Clocks: the machine's own, or one that moves only when told.
+// Clocks: of the machine, or simulated.
 #pragma once
 
 #include "base/time.h"
 
 namespace hapticd::base {
 
-/// A monotonic clock and a wall clock. All calls are realtime: noexcept, no allocation, no lock.
+/// A monotonic clock (the servo clock) and a wall clock. All calls are realtime: noexcept, no allocation, no
+/// lock.
 class Clock {
  public:
   Clock() = default;
@@ -15,13 +16,14 @@ class Clock {
 
   /// Time on the servo clock.
   virtual Nanos now() noexcept = 0;
-  /// Returns at `deadline` on the servo clock or later; at once when it has passed.
+  /// Returns at `deadline` on the servo clock or later; immediately when it has passed.
   virtual void sleepUntil(Nanos deadline) noexcept = 0;
-  /// Time since 1970, UTC. It may jump when somebody sets the machine's clock.
+  /// Nanoseconds since 1970, UTC. Jumps when the clock of the machine is set.
   virtual Nanos wallNow() noexcept = 0;
 };
 
-/// CLOCK_MONOTONIC and CLOCK_REALTIME. Deadlines are absolute: a late wake-up does not shift the ones after it.
+/// CLOCK_MONOTONIC and CLOCK_REALTIME. Deadlines are absolute: a late wake-up does not shift the ones after
+/// it.
 class MonotonicClock final : public Clock {
  public:
   Nanos now() noexcept override;
@@ -29,7 +31,8 @@ class MonotonicClock final : public Clock {
   Nanos wallNow() noexcept override;
 };
 
-/// Moves only when told: sleeping sets the time. For offline rendering and simulated worlds. One thread.
+/// Advances only by sleepUntil(), which returns at once. For offline rendering and simulated worlds. One
+/// thread.
 class SimulatedClock final : public Clock {
  public:
   /// `wallAtZero`: wall time when now() is 0.
@@ -40,7 +43,7 @@ class SimulatedClock final : public Clock {
     if (deadline > now_) now_ = deadline;
   }
   Nanos wallNow() noexcept override { return now_ + wallOffset_; }
-  /// As if somebody set the machine's clock.
+  /// Sets the wall clock; now() does not change.
   void setWall(Nanos wall) noexcept { wallOffset_ = wall - now_; }
 
  private:

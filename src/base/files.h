@@ -1,4 +1,4 @@
-// Files, behind an interface: a simulated world can fill the disk and fail an fsync.
+// Files behind an interface, so that a test can fill the disk or fail an fsync.
 #pragma once
 
 #include <cstddef>
@@ -10,41 +10,41 @@
 
 namespace hapticd::base {
 
-/// A file open for writing, closed by its destructor. One thread at a time. Every call throws std::system_error with the
-/// path and the system's reason.
+/// A file open for writing; the destructor closes it. One thread at a time. On failure every call throws
+/// std::system_error with the path and the reason.
 class OutputFile {
  public:
   virtual ~OutputFile() = default;
-  /// Appends all bytes.
+  /// Appends all bytes. After an error, some of them may have been written.
   virtual void write(std::span<const std::byte> bytes) = 0;
-  /// Returns when what was written is on the disk.
+  /// Returns when all written bytes are on the disk.
   virtual void sync() = 0;
 
   void write(std::string_view text) { write(std::as_bytes(std::span(text))); }
 };
 
-/// What may be there already when a file is created.
+/// What create() does with an existing file.
 enum class Existing { refuse, replace };
 
-/// Every call throws std::system_error with the path and the system's reason.
+/// On failure every call throws std::system_error with the path and the reason. From any thread.
 class Files {
  public:
   virtual ~Files() = default;
-  /// Creates a file (mode 0644) for writing.
+  /// Creates a file (mode 0644) for writing. Its folder must exist.
   virtual std::unique_ptr<OutputFile> create(const std::filesystem::path& path, Existing existing) = 0;
   /// The whole content.
   virtual std::vector<std::byte> read(const std::filesystem::path& path) = 0;
-  /// Atomic where both are in one file system; replaces `to`.
+  /// Replaces `to`; atomic. Both must be in one file system.
   virtual void rename(const std::filesystem::path& from, const std::filesystem::path& to) = 0;
   /// Not an error when the file is absent.
   virtual void remove(const std::filesystem::path& path) = 0;
   /// Creates a folder and its parents; not an error when it exists.
   virtual void createFolder(const std::filesystem::path& path) = 0;
-  /// Names of the regular files in a folder, sorted; none when the folder is absent.
+  /// Sorted names of the regular files in a folder; empty when the folder does not exist.
   virtual std::vector<std::string> list(const std::filesystem::path& folder) = 0;
 };
 
-/// The file systems of the machine.
+/// The files of the machine.
 class SystemFiles final : public Files {
  public:
   std::unique_ptr<OutputFile> create(const std::filesystem::path& path, Existing existing) override;

@@ -14,9 +14,9 @@
 namespace hapticd::base {
 namespace {
 
-void introduce(const ThreadOptions& options) noexcept {
+void applyOptions(const ThreadOptions& options) noexcept {
   if (!options.name.empty()) pthread_setname_np(pthread_self(), options.name.substr(0, 15).c_str());
-  // Linux gives each thread a niceness of its own. A refusal changes nothing but the pace of others.
+  // On Linux each thread has its own niceness. A refusal is harmless.
   if (options.niceness != 0) setpriority(PRIO_PROCESS, 0, options.niceness);
 }
 
@@ -45,7 +45,7 @@ class SystemThread final : public Thread::Impl {
 
  private:
   void run() {
-    introduce(options_);
+    applyOptions(options_);
     for (bool last = false; !last;) {
       const std::optional<Nanos> deadline = step_();
       last = await(deadline);
@@ -59,7 +59,8 @@ class SystemThread final : public Thread::Impl {
     const auto ready = [this] { return woken_ || stopping_; };
     if (deadline) {
       // wait_until() on steady_clock is CLOCK_MONOTONIC, the servo clock.
-      wake_.wait_until(lock, std::chrono::steady_clock::time_point(std::chrono::nanoseconds(*deadline)), ready);
+      wake_.wait_until(lock, std::chrono::steady_clock::time_point(std::chrono::nanoseconds(*deadline)),
+                       ready);
     } else {
       wake_.wait(lock, ready);
     }
@@ -73,14 +74,14 @@ class SystemThread final : public Thread::Impl {
   std::condition_variable wake_;
   bool woken_ = false;
   bool stopping_ = false;
-  std::thread thread_;  // last: it uses the others
+  std::thread thread_;  // last: its body uses the others
 };
 
 class SystemBlockingThread final : public BlockingThread::Impl {
  public:
   SystemBlockingThread(ThreadOptions options, std::function<void()> body)
       : thread_([options = std::move(options), body = std::move(body)] {
-          introduce(options);
+          applyOptions(options);
           body();
         }) {}
   ~SystemBlockingThread() override { thread_.join(); }
@@ -112,7 +113,8 @@ std::unique_ptr<Thread::Impl> SystemThreads::start(ThreadOptions options, Step s
   return std::make_unique<SystemThread>(std::move(options), std::move(step));
 }
 
-std::unique_ptr<BlockingThread::Impl> SystemThreads::startBlocking(ThreadOptions options, std::function<void()> body) {
+std::unique_ptr<BlockingThread::Impl> SystemThreads::startBlocking(ThreadOptions options,
+                                                                   std::function<void()> body) {
   return std::make_unique<SystemBlockingThread>(std::move(options), std::move(body));
 }
 

@@ -1,4 +1,5 @@
-// Threads as step functions, so that a simulated world can run the same code in one thread and choose the order.
+// Threads as step functions, so that a simulated world can run the same code in one thread and in a chosen
+// order.
 #pragma once
 
 #include <functional>
@@ -10,21 +11,22 @@
 
 namespace hapticd::base {
 
-/// How a thread presents itself to the operating system.
+/// What the operating system sees of a thread.
 struct ThreadOptions {
-  std::string name;  ///< as `top -H` shows it; the first 15 bytes count
-  int niceness = 0;  ///< 0 to 19; a higher one leaves the processor to others
+  std::string name;  ///< as in `top -H`; cut to 15 bytes
+  int niceness = 0;  ///< 0 to 19; higher values yield the processor to other threads
 };
 
-/// One pass of a thread: does what is due and returns when it wants to run again on the servo clock, at the latest;
-/// nothing: not before the next wake(). Must not wait for other threads. An exception that leaves it ends the process.
+/// One pass of a thread: does the work that is due and returns the deadline of the next pass on the servo
+/// clock, or nothing to run only after the next wake(). Must not wait for other threads. An exception that
+/// leaves it ends the process.
 using Step = std::function<std::optional<Nanos>()>;
 
-/// A thread that runs its step once at the start, after every wake() and at the time that the last step returned.
-/// Several wake() calls between two steps make one step.
+/// A thread that runs its step once at the start, after every wake() and at the deadline that the last step
+/// returned. Several wake() calls between two steps cause one step.
 class Thread {
  public:
-  /// What a world implements.
+  /// Implemented by each world.
   class Impl {
    public:
     virtual ~Impl() = default;
@@ -36,7 +38,7 @@ class Thread {
 
   /// No thread yet.
   Thread() noexcept = default;
-  /// Starts a thread of world(). Throws std::system_error when the system gives none.
+  /// Starts a thread of world(). Throws std::system_error when the system refuses.
   Thread(ThreadOptions options, Step step);
   Thread(Thread&&) noexcept = default;
   Thread& operator=(Thread&& other) noexcept;
@@ -44,19 +46,20 @@ class Thread {
   ~Thread() { stop(); }
 
   bool running() const noexcept { return impl_ != nullptr; }
-  /// Asks for a step, from any thread; harmless where there is no thread.
+  /// Requests a step. From any thread; no effect on an empty Thread.
   void wake() noexcept {
     if (impl_) impl_->wake();
   }
-  /// Runs one last step and ends the thread; not from its own step. Idempotent.
+  /// Runs one last step and ends the thread. Not from the step itself. Idempotent.
   void stop();
 
  private:
   std::unique_ptr<Impl> impl_;
 };
 
-/// A thread that blocks in calls of its own, such as those of a vendor's library; simulated worlds have none. The body
-/// must return soon after its owner asked for it; destruction waits for that.
+/// A thread that blocks in calls that no world replaces, such as those of a vendor library; simulated worlds
+/// have none. Its owner must make the body return before join(), destruction or assignment, all of which wait
+/// for it.
 class BlockingThread {
  public:
   class Impl {
@@ -65,7 +68,7 @@ class BlockingThread {
   };
 
   BlockingThread() noexcept = default;
-  /// Throws std::system_error when the system gives none.
+  /// Starts a thread of world(). Throws std::system_error when the system refuses.
   BlockingThread(ThreadOptions options, std::function<void()> body);
 
   bool running() const noexcept { return impl_ != nullptr; }
@@ -76,19 +79,21 @@ class BlockingThread {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Makes threads.
+/// Creates threads.
 class Threads {
  public:
   virtual ~Threads() = default;
   virtual std::unique_ptr<Thread::Impl> start(ThreadOptions options, Step step) = 0;
-  virtual std::unique_ptr<BlockingThread::Impl> startBlocking(ThreadOptions options, std::function<void()> body) = 0;
+  virtual std::unique_ptr<BlockingThread::Impl> startBlocking(ThreadOptions options,
+                                                              std::function<void()> body) = 0;
 };
 
 /// Threads of the operating system.
 class SystemThreads final : public Threads {
  public:
   std::unique_ptr<Thread::Impl> start(ThreadOptions options, Step step) override;
-  std::unique_ptr<BlockingThread::Impl> startBlocking(ThreadOptions options, std::function<void()> body) override;
+  std::unique_ptr<BlockingThread::Impl> startBlocking(ThreadOptions options,
+                                                      std::function<void()> body) override;
 };
 
 }  // namespace hapticd::base

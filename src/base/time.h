@@ -1,12 +1,12 @@
-// Time as every room counts it.
+// The unit of time of all rooms.
 #pragma once
 
 #include <cstdint>
 
 namespace hapticd::base {
 
-/// Nanoseconds of a clock: of the servo clock (CLOCK_MONOTONIC when live, simulated time offline) where nothing else is
-/// said, of the wall clock (since 1970, UTC) where the name says so.
+/// Nanoseconds: on the servo clock (CLOCK_MONOTONIC when live, simulated time offline), or on the wall clock
+/// (since 1970, UTC) where the name says so.
 using Nanos = std::int64_t;
 
 constexpr double toSeconds(Nanos t) noexcept {

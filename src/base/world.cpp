@@ -7,8 +7,8 @@
 namespace hapticd::base {
 namespace {
 
-const World& machine() noexcept {
-  // Never destroyed: threads may still ask for the time while static objects go.
+const World& machineWorld() noexcept {
+  // Never destroyed: threads may still read the time during static destruction.
   static auto& clock = *new MonotonicClock;
   static auto& threads = *new SystemThreads;
   static auto& files = *new SystemFiles;
@@ -17,7 +17,7 @@ const World& machine() noexcept {
   return world;
 }
 
-std::atomic<const World*> replaced{nullptr};
+std::atomic<const World*> replacement{nullptr};
 
 }  // namespace
 
@@ -29,16 +29,16 @@ std::uint64_t SystemRandom::next() {
 }
 
 const World& world() noexcept {
-  const World* const other = replaced.load(std::memory_order_acquire);
-  return other != nullptr ? *other : machine();
+  const World* const other = replacement.load(std::memory_order_acquire);
+  return other != nullptr ? *other : machineWorld();
 }
 
 ScopedWorld::ScopedWorld(const World& world) noexcept : world_(world) {
-  replaced.store(&world_, std::memory_order_release);
+  replacement.store(&world_, std::memory_order_release);
 }
 
 ScopedWorld::~ScopedWorld() {
-  replaced.store(nullptr, std::memory_order_release);
+  replacement.store(nullptr, std::memory_order_release);
 }
 
 }  // namespace hapticd::base

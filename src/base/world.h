@@ -1,6 +1,6 @@
-// Everything a room asks of the world outside its process: time, threads, files, random numbers. Sockets have their own
-// seam in net/. The script check_includes.sh fails where a room calls the system itself; docs/decisions/0007 says why
-// this is one process-wide value and not a constructor's argument.
+// The seam between the rooms and the system: time, threads, files, random numbers. net/ has the seam for
+// sockets. scripts/check_includes.sh fails where a room calls the system itself; docs/decisions/0007 gives
+// the reason for one process-wide value instead of a constructor argument.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace hapticd::base {
 
-/// Random numbers for what needs no secrecy (identities, jitter).
+/// Random numbers that need not be secret (ids, jitter).
 class Random {
  public:
   virtual ~Random() = default;
@@ -32,10 +32,11 @@ struct World {
   Random& random;
 };
 
-/// The machine's world, or the one that a ScopedWorld put in its place. From any thread.
+/// The world of the machine, or of the ScopedWorld that replaces it. From any thread.
 const World& world() noexcept;
 
-/// Replaces the world while it lives. Make it before, and destroy it after, everything that uses the world; one at a time.
+/// Replaces the world while it lives. Construct it before, and destroy it after, everything that uses the
+/// world; only one at a time.
 class ScopedWorld {
  public:
   explicit ScopedWorld(const World& world) noexcept;

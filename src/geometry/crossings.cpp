@@ -9,7 +9,7 @@ namespace hapticd::geometry {
 namespace {
 
 constexpr std::uint32_t kLeaf = 4;
-// What steps take, measured, in units of about two nanoseconds.
+// Measured cost of the steps, in units of about two nanoseconds.
 constexpr std::uint64_t kVisitWork = 8;
 constexpr std::uint64_t kBoxWork = 4;
 constexpr std::uint64_t kCrossWork = 60;
@@ -23,7 +23,7 @@ Vec3f highest(const Corners3f& t) {
   return t[0].cwiseMax(t[1]).cwiseMax(t[2]);
 }
 
-// Every third bit of the result is one of the lower 21 bits.
+// Spreads the lower 21 bits over every third bit of the result.
 std::uint64_t spread(std::uint64_t bits) {
   bits &= 0x1FFFFF;
   bits = (bits | bits << 32U) & 0x1F00000000FFFFU;
@@ -33,7 +33,7 @@ std::uint64_t spread(std::uint64_t bits) {
   return (bits | bits << 2U) & 0x1249249249249249U;
 }
 
-// The place on a curve that fills the box, so that what is near on it is near in space (Morton 1966).
+// Position on a space-filling curve (Morton 1966): close positions are close in space.
 std::uint64_t placeOnCurve(const Vec3& point, const Box& box) {
   std::uint64_t place = 0;
   for (int i = 0; i < 3; ++i) {

@@ -1,4 +1,4 @@
-// Triangles of a mesh that run through each other, found in bounded time.
+// Search for triangles of a mesh that cross each other, in bounded time.
 #pragma once
 
 #include <cstdint>
@@ -12,25 +12,25 @@
 namespace hapticd::geometry {
 
 struct CrossingReport {
-  std::uint64_t pairs = 0;  ///< found so far
-  bool complete = false;    ///< all of the mesh was searched
+  std::uint64_t pairs = 0;  ///< crossing pairs found so far
+  bool complete = false;    ///< the whole mesh was searched
 };
 
-/// Searches a tree of boxes over the triangles, a slice at a time. Triangles that lack a corner or have no
-/// area are left out, and so are pairs with the same three corners: checkMesh() counts those.
+/// Searches a tree of boxes over the triangles in slices. Ignores triangles that lack a corner or have no
+/// area, and pairs with the same three corners: checkMesh() counts those.
 ///
-/// Work is counted in units of about two nanoseconds, so that slices and results are the same on every
-/// machine and in every run.
+/// Counts work in units of about two nanoseconds, so that slices and results are the same on every machine
+/// and in every run.
 class CrossingSearch {
  public:
-  /// Sorts the triangles: time n log n, about 0.2 s for a million, and 20 bytes for each meanwhile. Vertices
-  /// and triangles must outlive the search, unchanged.
+  /// Sorts the triangles: O(n log n), about 0.2 s for a million, with 20 bytes of temporary memory per
+  /// triangle. Vertices and triangles must outlive the search and stay unchanged.
   CrossingSearch(std::span<const Vec3f> vertices, std::span<const Triangle> triangles);
 
-  /// What a usual mesh needs, four times over; a search ends there, complete or not.
+  /// Work after which a search ends, complete or not: four times what a typical mesh needs.
   static constexpr std::uint64_t budgetFor(std::size_t triangles) { return 10'000'000 + 2'500 * triangles; }
 
-  /// Goes on for about as much work; true when there is nothing left to do.
+  /// Continues for about `work` units; true when the search has ended.
   bool run(std::uint64_t work);
 
   bool done() const { return pending_.empty() || work_ >= budget_; }
@@ -41,7 +41,7 @@ class CrossingSearch {
     Vec3f min;
     Vec3f max;
   };
-  // Two nodes of one level, 0 being the leaves.
+  // Two nodes of one level; level 0 holds the leaves.
   struct NodePair {
     std::uint32_t level;
     std::uint32_t a;
@@ -58,18 +58,18 @@ class CrossingSearch {
 
   std::span<const Vec3f> vertices_;
   std::span<const Triangle> triangles_;
-  std::vector<std::uint32_t> order_;         // triangles with area, near ones near each other
-  std::vector<std::vector<Bounds>> levels_;  // from leaves to the one root
+  std::vector<std::uint32_t> order_;         // triangles with area, along a space-filling curve
+  std::vector<std::vector<Bounds>> levels_;  // from the leaves to the root
   std::vector<NodePair> pending_;
   std::uint64_t budget_ = 0;
   std::uint64_t work_ = 0;
   std::uint64_t pairs_ = 0;
 };
 
-/// The whole search at once.
+/// The whole search in one call.
 CrossingReport findCrossings(std::span<const Vec3f> vertices, std::span<const Triangle> triangles);
 
-/// A plain sentence with what the finding means for touching; none when nothing was found and all searched.
+/// A sentence on the finding and its consequence for touch; none when a complete search found nothing.
 std::vector<std::string> describe(const CrossingReport& report);
 
 }  // namespace hapticd::geometry

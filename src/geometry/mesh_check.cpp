@@ -18,8 +18,7 @@ bool areTriples(std::span<const Vec3f> vertices, std::span<const Triangle> trian
   return true;
 }
 
-// Values in groups by a small key, each group sorted: counting sort by the key, then a short sort of each
-// group.
+// Groups values by a small key and sorts each group: a counting sort by key, then a short sort per group.
 class Groups {
  public:
   explicit Groups(std::size_t keys) : begin_(keys + 1, 0) {}
@@ -42,7 +41,7 @@ class Groups {
   std::vector<std::uint32_t> begin_;
 };
 
-// Triangles by their welded corners, lowest first but in winding order.
+// Valid triangles by welded corners, rotated so that the lowest index comes first.
 std::vector<Triangle> soundTriangles(std::span<const Vec3f> vertices, std::span<const Triangle> triangles,
                                      const std::vector<std::uint32_t>& welded, MeshReport& report) {
   std::vector<Triangle> sound;
@@ -64,7 +63,7 @@ std::vector<Triangle> soundTriangles(std::span<const Vec3f> vertices, std::span<
   return sound;
 }
 
-// Of triangles with the same corners one stays; a triangle is kept at its lowest corner as (next, last,
+// Keeps one of all triangles with the same corners. The key is the lowest corner, the value (next, last,
 // winding).
 std::vector<Triangle> withoutDuplicates(const std::vector<Triangle>& sound, std::size_t vertices,
                                         MeshReport& report) {
@@ -92,7 +91,7 @@ std::vector<Triangle> withoutDuplicates(const std::vector<Triangle>& sound, std:
   return unique;
 }
 
-// An edge is kept at its lower end as (higher end, direction).
+// The key of an edge is its lower end, the value (higher end, direction).
 void countEdges(const std::vector<Triangle>& sound, std::size_t vertices, MeshReport& report) {
   Groups(vertices).run(
       [&](const auto& add) {

@@ -13,8 +13,8 @@ int signOf(double value) noexcept {
   return (value > 0 ? 1 : 0) - (value < 0 ? 1 : 0);
 }
 
-// The exact sum of doubles, as parts that do not overlap, small ones first (Shewchuk 1997). The error of each
-// addition is kept as a part of its own, so nothing is lost.
+// The exact sum of doubles as a non-overlapping expansion, smallest component first (Shewchuk 1997). The
+// rounding error of each addition becomes a component, so the sum stays exact.
 template <std::size_t N>
 class ExactSum {
  public:
@@ -39,7 +39,7 @@ class ExactSum {
 
 using Sum3 = ExactSum<48>;
 
-// Two floats multiply exactly into a double; its upper and lower half times a third float are exact again.
+// The product of two floats is exact in a double; so is each half of that double times a third float.
 void addProduct(Sum3& sum, double sign, float x, float y, float z) noexcept {
   const double xy = double{x} * double{y};
   constexpr double kSplit = 134217729;  // 2^27 + 1
@@ -69,8 +69,8 @@ int exactOrientation(const Vec3f& a, const Vec3f& b, const Vec3f& c, const Vec3f
 
 }  // namespace
 
-// The rounding errors of the determinant are at most this part of the sum of its terms' magnitudes; when that
-// sum is 0, so are all terms.
+// kError bounds the rounding error of the determinant, relative to the sum of the magnitudes of its terms;
+// when that sum is 0, so are all terms.
 int orientation(const Vec3f& a, const Vec3f& b, const Vec3f& c, const Vec3f& d, ExactCount& exact) noexcept {
   constexpr double kError = (7 + 56 * kHalfUlp) * kHalfUlp;
   const Vec3 base = d.cast<double>();

@@ -1,4 +1,4 @@
-// On which side a point lies, decided exactly: no rounding, whatever floats come in.
+// Exact orientation predicates for floats.
 #pragma once
 
 #include <cstdint>
@@ -7,14 +7,15 @@
 
 namespace hapticd::geometry {
 
-/// How many answers needed exact arithmetic, which costs some hundred times as much as the usual way.
+/// Number of answers that needed exact arithmetic, which costs about a hundred times as much as the filter.
 using ExactCount = std::uint64_t;
 
-/// The sign of det(a - d, b - d, c - d): +1 or -1 for the two sides of the plane abc, 0 for points in one
-/// plane. Finite coordinates. noexcept, allocation-free.
+/// The sign of det(a - d, b - d, c - d): +1 or -1 for the two sides of the plane abc, 0 for coplanar points.
+/// Coordinates must be finite. noexcept, no allocation.
 int orientation(const Vec3f& a, const Vec3f& b, const Vec3f& c, const Vec3f& d, ExactCount& exact) noexcept;
 
-/// The sign of the area of abc seen along an axis (0, 1, 2 for x, y, z): +1 counter-clockwise, 0 on a line.
+/// The sign of the area of abc seen along an axis (0, 1, 2 for x, y, z): +1 counter-clockwise, 0 when
+/// collinear.
 int orientationAlong(int axis, const Vec3f& a, const Vec3f& b, const Vec3f& c, ExactCount& exact) noexcept;
 
 }  // namespace hapticd::geometry

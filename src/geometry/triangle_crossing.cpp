@@ -11,14 +11,14 @@ bool onBothSides(const Signs& signs) noexcept {
   return std::min({signs[0], signs[1], signs[2]}) < 0 && std::max({signs[0], signs[1], signs[2]}) > 0;
 }
 
-// Sides of a's corners of the plane of b.
+// On which side of the plane of b each corner of a lies.
 Signs sides(const Corners3f& a, const Corners3f& b, ExactCount& exact) noexcept {
   Signs signs;
   for (std::size_t i = 0; i < 3; ++i) signs[i] = orientation(b[0], b[1], b[2], a[i], exact);
   return signs;
 }
 
-// The corner that no other is on the same side with.
+// The corner that is alone on its side.
 std::size_t loneCorner(const Signs& signs) noexcept {
   for (std::size_t i = 0; i < 2; ++i) {
     if (signs[i] != 0 && signs[i] != signs[(i + 1) % 3] && signs[i] != signs[(i + 2) % 3]) return i;
@@ -26,7 +26,7 @@ std::size_t loneCorner(const Signs& signs) noexcept {
   return 2;
 }
 
-// Whether the line of some edge of a keeps the inside of b outside of a, seen along an axis.
+// Whether the line through an edge of a separates both interiors, seen along an axis.
 bool separates(int axis, int turn, const Corners3f& a, const Corners3f& b, ExactCount& exact) noexcept {
   for (std::size_t i = 0; i < 3; ++i) {
     const Vec3f& from = a[i];
@@ -52,10 +52,9 @@ bool crossInPlane(const Corners3f& a, const Corners3f& b, ExactCount& exact) noe
 
 }  // namespace
 
-// Each triangle meets the other's plane in a piece of the line that both planes share: from where one edge of
-// its lone corner passes to where the other does. The sign of the tetrahedron over two such edges, one of
-// each triangle, tells which of the two passes first, always in the same direction of the line; the pieces
-// overlap unless one lies wholly before the other.
+// Each triangle intersects the line common to both planes in a segment between the two edges at its lone
+// corner. The orientation of two such edges, one of each triangle, orders their intersections along the line,
+// always in the same direction; the segments overlap unless one lies entirely before the other.
 bool cross(const Corners3f& a, const Corners3f& b, ExactCount& exact) noexcept {
   const Signs sidesOfA = sides(a, b, exact);
   if (sidesOfA == Signs{0, 0, 0}) return crossInPlane(a, b, exact);

@@ -1,4 +1,4 @@
-// Indexed triangle mesh, as it arrives from a client or a file.
+// Indexed triangle mesh, as a client or a file delivers it.
 #pragma once
 
 #include <array>
@@ -11,16 +11,16 @@ namespace hapticd::geometry {
 
 using Triangle = std::array<std::uint32_t, 3>;
 
-/// Vertices in the object's own unit and triangles as vertex indices, counter-clockwise seen from the front.
+/// Vertices in the unit of the object; triangles as vertex indices, counter-clockwise seen from the front.
 struct TriangleMesh {
   std::vector<Vec3f> vertices;
   std::vector<Triangle> triangles;
 };
 
-/// Bounds of all finite vertices; empty when there is none.
+/// Bounds of all finite vertices; empty without any.
 Box boundsOf(const TriangleMesh& mesh);
 
-/// Makes every vertex = scale * vertex + offset.
+/// Replaces every vertex by scale * vertex + offset.
 void scaleAndMove(TriangleMesh& mesh, double scale, const Vec3& offset);
 
 }  // namespace hapticd::geometry

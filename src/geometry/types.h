@@ -1,6 +1,6 @@
-// The vocabulary of space: aliases over Eigen, units and frames.
+// Vectors, transforms and boxes: aliases over Eigen.
 //
-// SI inside: metres, newtons, radians, seconds. A transform is named T_a_b and maps b to a.
+// SI units: metres, newtons, radians, seconds. A transform T_a_b maps frame b to frame a.
 #pragma once
 
 #include <Eigen/Core>

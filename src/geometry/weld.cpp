@@ -16,7 +16,7 @@ std::uint64_t hashOf(const Vec3f& v) {
 
 }  // namespace
 
-// Open addressing: one table, no allocation for each vertex.
+// Open addressing: one table instead of an allocation per vertex.
 std::vector<std::uint32_t> firstAtSamePosition(std::span<const Vec3f> vertices) {
   std::vector<std::uint32_t> first(vertices.size(), kNoVertex);
   std::vector<std::uint32_t> table(std::bit_ceil(2 * vertices.size() + 1), kNoVertex);

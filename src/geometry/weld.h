@@ -1,4 +1,4 @@
-// Vertices at equal positions are one vertex.
+// Welding: vertices at equal positions become one.
 #pragma once
 
 #include <cstdint>
@@ -12,11 +12,11 @@ namespace hapticd::geometry {
 /// No vertex.
 inline constexpr std::uint32_t kNoVertex = 0xFFFFFFFF;
 
-/// For each vertex the lowest one at exactly the same position (0 and -0 are the same); kNoVertex where a
+/// For each vertex the lowest index at exactly the same position (0 and -0 are equal); kNoVertex where a
 /// coordinate is not finite. Linear time.
 std::vector<std::uint32_t> firstAtSamePosition(std::span<const Vec3f> vertices);
 
-/// Makes triangles share vertices and drops vertices that no triangle uses; order stays.
+/// Makes triangles share vertices and removes unused vertices; keeps the order of both.
 void weld(TriangleMesh& mesh);
 
 }  // namespace hapticd::geometry

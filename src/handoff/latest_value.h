@@ -1,8 +1,8 @@
-// The newest small value from one thread to another, where older ones do not matter.
+// The newest small value from one thread to another; older values are dropped.
 //
 // Protocol (triple buffer): three cells, one owned by the writer, one by the reader, one in the middle. A
-// write fills the writer's cell and exchanges it with the middle one, marked fresh; a read exchanges the
-// reader's cell with the middle one if that is marked. Nobody ever touches a cell that the other owns.
+// write fills the writer's cell and exchanges it with the middle one, marked as fresh; a read exchanges the
+// reader's cell with the middle one if that is fresh. No thread touches a cell of the other.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@ namespace hapticd::handoff {
 /// One writer, one reader; both wait-free.
 template <class T>
 class LatestValue {
-  // Eigen does not declare its copies noexcept; a type without a destructor owns no memory to allocate.
+  // Eigen does not declare its copies noexcept; a type with a trivial destructor owns no memory.
   static_assert(std::is_trivially_destructible_v<T>, "a copy must not allocate");
 
  public:

@@ -1,8 +1,8 @@
-// A queue between one producing and one consuming thread that neither can hold up.
+// A wait-free queue between one producing and one consuming thread.
 //
-// Protocol: `head_` counts what was pushed and is written by the producer only; `tail_` counts what was
-// consumed and is written by the consumer only. A cell belongs to the producer from the moment `tail_` passes
-// it until `head_` does, and to the consumer otherwise. Both calls finish in a bounded number of steps.
+// Protocol: only the producer writes `head_`, the number of pushed items; only the consumer writes `tail_`,
+// the number of consumed items. A cell belongs to the producer from the moment `tail_` passes it until
+// `head_` does, and to the consumer otherwise. Both calls finish in a bounded number of steps.
 #pragma once
 
 #include <algorithm>
@@ -15,10 +15,10 @@
 
 namespace hapticd::handoff {
 
-/// Ring of copies of T. Memory is taken once, in the constructor.
+/// Ring of copies of T. Allocates in the constructor only.
 template <class T>
 class SpscRing {
-  // Eigen does not declare its copies noexcept; a type without a destructor owns no memory to allocate.
+  // Eigen does not declare its copies noexcept; a type with a trivial destructor owns no memory.
   static_assert(std::is_trivially_destructible_v<T>, "a copy must not allocate");
 
  public:
@@ -28,7 +28,7 @@ class SpscRing {
   SpscRing(const SpscRing&) = delete;
   SpscRing& operator=(const SpscRing&) = delete;
 
-  /// Producer: appends a copy; false, and one more dropped, when the ring is full.
+  /// Producer: appends a copy. When the ring is full, returns false and counts a drop.
   bool push(const T& item) noexcept {
     const std::uint64_t head = head_.load(std::memory_order_relaxed);
     if (head - tail_.load(std::memory_order_acquire) > mask_) {
@@ -40,7 +40,7 @@ class SpscRing {
     return true;
   }
 
-  /// Consumer: shows every item that is there now to visit(const T&), oldest first, and returns how many. A
+  /// Consumer: passes all items present at the call to visit(const T&), oldest first, and returns how many. A
   /// cell is free again as soon as its visit ends.
   template <class Visit>
   std::size_t consume(Visit&& visit) {
@@ -54,7 +54,7 @@ class SpscRing {
     return count;
   }
 
-  /// Items refused because the ring was full. Any thread.
+  /// Number of items that a full ring refused. Any thread.
   std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
   std::size_t capacity() const noexcept { return cells_.size(); }
 

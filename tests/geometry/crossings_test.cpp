@@ -127,7 +127,7 @@ TEST(Crossings, SlicesGiveTheSameAsOneRun) {
   EXPECT_EQ(search.report().pairs, find(mesh).pairs);
 }
 
-// Every triangle crosses nearly all others: 200 million pairs, of which the budget allows a part.
+// Every triangle crosses nearly all others: 200 million pairs, more than the budget allows.
 TEST(Crossings, AHopelessMeshEndsWithWhatWasFound) {
   std::mt19937 random(7);
   const TriangleMesh mesh = randomSoup(random, 20'000, 100);

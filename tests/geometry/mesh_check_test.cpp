@@ -123,7 +123,7 @@ TEST(MeshCheck, FinOnAnEdgeIsCrowded) {
   EXPECT_EQ(report.openEdges, 2U);
 }
 
-// A vertex shared by all triangles must not make it slow: groups are sorted, not searched.
+// A vertex that all triangles share must not make the check slow: groups are sorted, not searched.
 TEST(MeshCheck, FanOfManyTriangles) {
   constexpr std::uint32_t kCount = 200'000;
   TriangleMesh mesh;

@@ -14,7 +14,7 @@ using Int = boost::multiprecision::int512_t;
 using IntVec = std::array<Int, 3>;
 using IntTriangle = std::array<IntVec, 3>;
 
-// Coordinates as whole numbers of 2^-exponent.
+// Coordinates as integer multiples of 2^-exponent.
 IntVec whole(const Vec3f& v, int exponent) {
   IntVec out;
   for (int i = 0; i < 3; ++i) out[i] = Int(std::ldexp(static_cast<double>(v[i]), exponent));
@@ -42,7 +42,8 @@ int orientationOf(const IntVec& a, const IntVec& b, const IntVec& c, const IntVe
   return dot(crossed(minus(a, d), minus(b, d)), minus(c, d)).sign();
 }
 
-// Keeps the insides apart: nothing of one is beyond anything of the other, and not all lie in one plane.
+// A plane separates the interiors: no corner of one lies beyond a corner of the other, and not all are
+// coplanar.
 bool separates(const IntVec& normal, const IntTriangle& a, const IntTriangle& b) {
   if (isZero(normal)) return false;
   std::array<Int, 3> along;
@@ -57,8 +58,9 @@ bool separates(const IntVec& normal, const IntTriangle& a, const IntTriangle& b)
   return *highA <= *lowB || *highB <= *lowA;
 }
 
-// Another way to the same answer, in whole numbers: two convex sets share no inner point exactly if a plane
-// separates them; for two triangles, one that contains a face, an edge of each, or stands on a common plane.
+// An independent answer in integers: two convex sets share no inner point if and only if a plane separates
+// them. For two triangles it suffices to try planes of a face, planes along an edge of each, and planes
+// normal to a common plane.
 bool crossByPlanes(const IntTriangle& a, const IntTriangle& b) {
   const auto edges = [](const IntTriangle& t) {
     return std::array{minus(t[1], t[0]), minus(t[2], t[1]), minus(t[0], t[2])};
@@ -112,7 +114,7 @@ TEST(Orientation, TellsHowEveryFloatLies) {
   EXPECT_LT(exact, 10U) << "the slow way is the exception";
 }
 
-// Points in one plane, and a hair off it that doubles lose beside the other numbers.
+// Coplanar points, and an offset from their plane that double arithmetic loses beside the other terms.
 TEST(Orientation, IsExactWhereRoundingWouldDecide) {
   std::mt19937 random(1);
   std::uniform_int_distribution<int> coordinate(-1'000, 1'000);
@@ -159,7 +161,7 @@ TEST(Orientation, HoldsForTheLargestAndTheSmallestFloats) {
 
 TEST(TriangleCrossing, AgreesWithSeparatingPlanesInWholeNumbers) {
   std::mt19937 random(2);
-  // Small lattices make every special position: common corners, edges in faces, one plane, no area.
+  // Small lattices produce every special case: common corners, edges in faces, coplanar triangles, no area.
   int crossing = 0;
   int apart = 0;
   for (const int size : {1, 2, 3, 8, 1'000'000}) {

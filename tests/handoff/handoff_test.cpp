@@ -1,4 +1,4 @@
-// The hand-offs under one thread's random interleavings and under two threads' real ones.
+// The hand-offs under random interleavings in one thread and real ones in two.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -22,7 +22,7 @@ constexpr int kRounds = 20'000;
 constexpr int kRounds = 200'000;
 #endif
 
-// Counts what lives and where it was freed.
+// Counts live snapshots and where they are freed.
 struct Census {
   std::atomic<int> alive{0};
   std::atomic<int> freed{0};
@@ -35,7 +35,7 @@ struct Census {
     ++alive;
     return {snapshot, [this](const scene::SceneSnapshot* s) {
               if (std::this_thread::get_id() != home) ++freedElsewhere;
-              const_cast<scene::SceneSnapshot*>(s)->revision = 0;  // a reader that still looks sees this
+              const_cast<scene::SceneSnapshot*>(s)->revision = 0;  // visible to a reader that still uses it
               delete s;
               --alive;
               ++freed;

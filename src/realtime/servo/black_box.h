@@ -1,7 +1,8 @@
-// The last seconds before a fault, kept until somebody has looked.
+// The last seconds before a fault, kept until another thread takes them.
 //
-// Protocol: the servo records while `frozen_` is false and only it sets the flag; the other thread reads the
-// cells while the flag is true and only it clears it. So nobody reads a cell that is being written.
+// Protocol: the servo records while `frozen_` is false, and only the servo sets the flag; the other thread
+// reads the cells while the flag is true, and only that thread clears it. So no cell is read while it is
+// written.
 #pragma once
 
 #include <algorithm>
@@ -13,24 +14,24 @@
 
 namespace hapticd::realtime {
 
-/// Ring of the newest reports. Memory is taken once, in the constructor.
+/// Ring of the newest reports. Allocates in the constructor only.
 class BlackBox {
  public:
   explicit BlackBox(std::size_t ticks) : cells_(std::max<std::size_t>(ticks, 1)) {}
 
-  /// Servo: keeps the report, in place of the oldest. Ignored while frozen.
+  /// Servo: stores the report in place of the oldest. Ignored while frozen.
   void record(const TickReport& report) noexcept {
     if (frozen_.load(std::memory_order_acquire)) return;
     cells_[next_] = report;
     next_ = next_ + 1 == cells_.size() ? 0 : next_ + 1;
     count_ = std::min(count_ + 1, cells_.size());
   }
-  /// Servo: keeps what is there until take().
+  /// Servo: stops recording until take().
   void freeze() noexcept { frozen_.store(true, std::memory_order_release); }
 
-  /// Any other thread: true when a fault has been recorded and not yet taken.
+  /// Any other thread: true between freeze() and take().
   bool frozen() const noexcept { return frozen_.load(std::memory_order_acquire); }
-  /// One other thread: the reports up to the fault, oldest first, and recording starts anew. Empty when
+  /// One other thread: returns the reports up to the fault, oldest first, and restarts recording. Empty when
   /// not frozen. Allocates.
   std::vector<TickReport> take() {
     std::vector<TickReport> reports;

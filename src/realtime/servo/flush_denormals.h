@@ -1,4 +1,4 @@
-// Denormal numbers cost hundreds of cycles each and mean nothing to a hand.
+// Arithmetic on denormal numbers costs hundreds of cycles, and forces that small cannot be felt.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace hapticd::realtime {
 
-/// While it lives, denormal results and inputs are zero in this thread. Two register writes.
+/// While it lives, this thread flushes denormal results and inputs to zero. Two register writes.
 class FlushDenormals {
  public:
 #if defined(__SSE2__)

@@ -8,8 +8,9 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr std::uint32_t kZeroing = (tripsOf(TripAction::hold) | tripsOf(TripAction::latch)) & ~bit(Trip::late);
-constexpr double kRounding = 1e-12;  // relative: a force on the limit is not over it
+constexpr std::uint32_t kZeroing =
+    (tripsOf(TripAction::hold) | tripsOf(TripAction::latch)) & ~bit(Trip::late);
+constexpr double kRounding = 1e-12;  // relative: a force on the limit does not exceed it
 
 double share(Nanos elapsed, Nanos whole) noexcept {
   return elapsed >= whole ? 1.0 : static_cast<double>(elapsed) / static_cast<double>(whole);
@@ -22,7 +23,7 @@ Guard::Guard(const GuardOptions& options, const GuardControl& control, Nanos nom
       control_(control),
       longestStep_(2 * nominalPeriod),
       budget_(options.peakForce_N, options.continuousForce_N),
-      seen_(control.look()),
+      seen_(control.read()),
       blended_(options.blend) {}
 
 Vec3 Guard::step(const GuardInput& in) noexcept {
@@ -33,7 +34,7 @@ Vec3 Guard::step(const GuardInput& in) noexcept {
     report_.gain = 1;
     return rendered;
   }
-  // A late tick may not raise a force or a ramp by more than two on time would.
+  // A late tick may raise a force or a ramp by no more than two ticks on time.
   const Nanos dt = std::clamp<Nanos>(in.period, 0, longestStep_);
   budget_.add(report_.gain * shaped_.norm(), in.period);
 
@@ -50,7 +51,7 @@ Vec3 Guard::step(const GuardInput& in) noexcept {
 }
 
 void Guard::obeyControl() noexcept {
-  const GuardControl::Seen seen = control_.look();
+  const GuardControl::Seen seen = control_.read();
   restart_ = seen.ramps != seen_.ramps || seen.rearms != seen_.rearms;
   if (seen.rearms != seen_.rearms) report_.latched = 0;
   seen_ = seen;
@@ -84,7 +85,7 @@ void Guard::checkSpeed(const device::DeviceState& state) noexcept {
     waitForCalm_ = false;
     if (options_.selfRecover) report_.latched &= ~bit(Trip::speed);
   }
-  note(Trip::speed, waitForCalm_);  // a re-arm does not help as long as the hand flies
+  note(Trip::speed, waitForCalm_);  // a re-arm has no effect until the device is slow again
 }
 
 void Guard::checkTime(const GuardInput& in) noexcept {
@@ -102,8 +103,8 @@ Vec3 Guard::finite(const Vec3& force) noexcept {
   return Vec3::Zero();
 }
 
-// From the force before the jump to the one after it. The first tick already moves, so that geometry which
-// jumps in every tick is still followed.
+// From the force before the jump to the one after it. The blend advances in its first tick, so that the force
+// still follows geometry that jumps in every tick.
 Vec3 Guard::blended(const Vec3& force, bool jump, Nanos dt) noexcept {
   if (jump) {
     blendFrom_ = shaped_;
@@ -121,13 +122,13 @@ Vec3 Guard::clamped(const Vec3& force) noexcept {
   note(Trip::peakForce, size > options_.peakForce_N * (1 + kRounding));
   note(Trip::thermal, limit < options_.peakForce_N && size > limit * (1 + kRounding));
   if (size <= limit) return force;
-  // A huge finite force has an infinite norm: scale it down first.
+  // A huge finite force may have an infinite norm: scale it down first.
   const double largest = force.cwiseAbs().maxCoeff();
   return limit * (force / largest).normalized();
 }
 
-// The direction is always the one asked for. What the last force already had along it counts as reached; the
-// rest may rise by so much. Falling, and falling through zero, is free.
+// The direction is always that of `force`. The component of the last force along it counts as reached, and
+// the rest may rise by the slew rate. Falling, also through zero, is not limited.
 Vec3 Guard::slewLimited(const Vec3& force, Nanos dt) noexcept {
   const double wanted = force.norm();
   if (wanted == 0) return force;

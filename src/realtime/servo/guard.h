@@ -1,9 +1,9 @@
-// The last thing before the device: no rendered force reaches a hand without passing here.
+// The last stage before the device: every rendered force passes the guard.
 //
-// In this order: finite check, blend after a jump of geometry, clamp to the peak force (direction kept)
-// within the thermal budget, slew limit, gain. The gain is zero while anything holds the force, falls over 20
-// ms after a late tick, and rises over 0.5 s after every pause. All laws are in seconds, so they are the same
-// at 250 Hz and 4 kHz; only the speed trip counts ticks.
+// In this order: finite check, blend after a jump of geometry, clamp to the peak force (direction kept) and
+// to the thermal budget, slew limit, gain. The gain is zero while a trip holds the force, falls over 20 ms
+// after a late tick, and rises over 0.5 s after every pause. All laws are in seconds, hence the same at 250
+// Hz and 4 kHz; only the speed trip counts ticks.
 #pragma once
 
 #include <array>
@@ -17,24 +17,24 @@ namespace hapticd::realtime {
 
 using geometry::Vec3;
 
-/// Limits of one device and choices of the operator.
+/// Limits of one device and options of the operator.
 struct GuardOptions {
-  bool enabled = true;       ///< false passes finite forces as they are (`render --raw`)
-  bool selfRecover = false;  ///< latched speed and stall trips end by themselves: for simulated hands alone
-  bool armed = false;        ///< forces allowed from the start
+  bool enabled = true;       ///< false: finite forces pass unchanged (`render --raw`)
+  bool selfRecover = false;  ///< latched speed and stall trips end by themselves; simulated hands only
+  bool armed = false;        ///< forces are allowed from the start
   double peakForce_N = 3.3;
   double continuousForce_N = 3.3;
   double slew_N_per_s = 1000;
   double speed_m_per_s = 1.2;
   int speedTicks = 3;
-  double calmSpeed_m_per_s = 0.3;  ///< a speed trip ends below
+  double calmSpeed_m_per_s = 0.3;  ///< a speed trip ends below this speed
   Nanos rampIn = 500'000'000;
   Nanos late = 3'000'000;
   Nanos lateDecay = 20'000'000;
   Nanos stalled = 50'000'000;
   Nanos blend = 20'000'000;
 
-  /// The limits of a device, armed as its profile says.
+  /// The limits and the arming of a device profile.
   static GuardOptions of(const device::DeviceProfile& profile) {
     GuardOptions options;
     options.armed = profile.startsArmed;
@@ -44,38 +44,38 @@ struct GuardOptions {
   }
 };
 
-/// What the guard did in a tick, and what it has done so far.
+/// What the guard did in a tick, and totals.
 struct GuardReport {
-  std::uint32_t active = 0;                        ///< bit(Trip): acting in this tick
-  std::uint32_t latched = 0;                       ///< faults that wait for a re-arm
-  std::array<std::uint32_t, kTripCount> counts{};  ///< how often each began
+  std::uint32_t active = 0;                        ///< bit(Trip): trips that act in this tick
+  std::uint32_t latched = 0;                       ///< latched trips that wait for a re-arm
+  std::array<std::uint32_t, kTripCount> counts{};  ///< how often each trip began
   double gain = 0;                                 ///< 0…1
-  double limit_N = 0;                              ///< peak force less what the thermal budget takes
+  double limit_N = 0;                              ///< peak force, or less by the thermal budget
   bool armed = false;
   bool stopped = false;
 };
 
-/// One tick as the guard sees it.
+/// The input of one tick.
 struct GuardInput {
-  Vec3 force_N = Vec3::Zero();                 ///< as rendered
-  const device::DeviceState* state = nullptr;  ///< null when the device gave none
-  Nanos period = 0;                            ///< since the tick before; 0 in the first
-  Nanos late = 0;                              ///< start of this tick less when it was due
-  bool writeFailed = false;                    ///< the device refused the force of the tick before
+  Vec3 force_N = Vec3::Zero();                 ///< rendered force
+  const device::DeviceState* state = nullptr;  ///< null when the device delivered none
+  Nanos period = 0;                            ///< since the previous tick; 0 in the first
+  Nanos late = 0;                              ///< start of this tick minus its deadline
+  bool writeFailed = false;                    ///< the device refused the previous force
   bool geometryJump = false;
   bool deepContact = false;
 };
 
-/// step() belongs to the servo thread: noexcept, no allocation, no lock.
+/// One per servo, called by its thread: noexcept, no allocation, no lock.
 class Guard {
  public:
-  /// `control` must outlive the guard. `nominalPeriod` bounds what one late tick may add to a ramp.
+  /// `control` must outlive the guard. `nominalPeriod` limits what one late tick may add to a ramp.
   Guard(const GuardOptions& options, const GuardControl& control, Nanos nominalPeriod) noexcept;
 
-  /// The force to write.
+  /// The force to write, device frame, newtons.
   Vec3 step(const GuardInput& in) noexcept;
   const GuardReport& report() const noexcept { return report_; }
-  /// What the control said in the last step.
+  /// The state of the control in the last step.
   const GuardControl::Seen& seen() const noexcept { return seen_; }
 
  private:
@@ -99,14 +99,14 @@ class Guard {
   Nanos longestStep_;
   ThermalBudget budget_;
   GuardReport report_;
-  std::uint32_t now_ = 0;  // bits of this tick
+  std::uint32_t now_ = 0;  // trips of this tick
   GuardControl::Seen seen_;
-  bool restart_ = false;  // ramp in anew
+  bool restart_ = false;  // the ramp starts again
 
   int fastTicks_ = 0;
   bool waitForCalm_ = false;
 
-  Vec3 shaped_ = Vec3::Zero();  // after the slew limit, before the gain
+  Vec3 shaped_ = Vec3::Zero();  // force after the slew limit, before the gain
   Vec3 blendFrom_ = Vec3::Zero();
   Nanos blended_;  // since the last jump
   Phase phase_ = Phase::zero;

@@ -6,8 +6,8 @@
 
 namespace hapticd::realtime {
 
-/// One word of state, so that the last call always wins and the guard sees calls in order. Every call is
-/// wait-free enough for a signal handler and acts at the next tick.
+/// One atomic word of state: the last call wins, and the guard sees calls in order. Every call is lock-free,
+/// safe in a signal handler, and acts at the next tick.
 class GuardControl {
  public:
   explicit GuardControl(bool armed) noexcept : word_(armed ? 0 : kDisarmed) {}
@@ -16,29 +16,29 @@ class GuardControl {
 
   /// Zero force until rearm().
   void stop() noexcept { word_.fetch_or(kStopped, std::memory_order_acq_rel); }
-  /// Ends a stop and clears latched faults; the force ramps in. Does not enable a disarmed device.
+  /// Ends a stop and clears latched trips; the force ramps in. Does not arm a disarmed device.
   void rearm() noexcept {
     std::uint64_t old = word_.load(std::memory_order_relaxed);
     while (!word_.compare_exchange_weak(old, (old + kRearm) & ~kStopped, std::memory_order_acq_rel)) {
     }
   }
-  /// Allows forces at all; the operator's choice for a real device.
+  /// Allows forces; for a real device the operator decides.
   void arm() noexcept { word_.fetch_and(~kDisarmed, std::memory_order_acq_rel); }
   void disarm() noexcept { word_.fetch_or(kDisarmed, std::memory_order_acq_rel); }
-  /// Lets the force ramp in anew from zero, as after a reset of the scene.
+  /// Lets the force ramp in from zero again, as after a reset of the scene.
   void rampIn() noexcept { ramps_.fetch_add(1, std::memory_order_acq_rel); }
 
   bool stopped() const noexcept { return (word_.load(std::memory_order_acquire) & kStopped) != 0; }
   bool armed() const noexcept { return (word_.load(std::memory_order_acquire) & kDisarmed) == 0; }
 
-  /// What the guard reads, once in a tick.
+  /// What the guard reads once per tick.
   struct Seen {
     bool stopped;
     bool armed;
     std::uint64_t rearms;  ///< counts calls of rearm()
     std::uint32_t ramps;   ///< counts calls of rampIn()
   };
-  Seen look() const noexcept {
+  Seen read() const noexcept {
     const std::uint64_t word = word_.load(std::memory_order_acquire);
     return {(word & kStopped) != 0, (word & kDisarmed) == 0, word / kRearm,
             ramps_.load(std::memory_order_acquire)};

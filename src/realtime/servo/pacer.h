@@ -1,4 +1,4 @@
-// When the next tick is due: a grid of deadlines that a late tick neither shifts nor crowds.
+// Fixed-grid deadlines: a late tick causes neither drift nor catch-up ticks.
 #pragma once
 
 #include <algorithm>
@@ -14,22 +14,22 @@ using base::Nanos;
 inline constexpr double kMinServoRate_Hz = 250;
 inline constexpr double kMaxServoRate_Hz = 4000;
 
-/// The time between ticks. Throws std::invalid_argument outside 250 Hz … 4 kHz.
+/// The period of a rate. Throws std::invalid_argument outside 250 Hz … 4 kHz.
 Nanos servoPeriod(double rate_Hz);
 
 /// A tick that starts later than this counts as an overrun.
 inline constexpr Nanos kOverrunLateness = 500'000;
 
-/// When a tick was due and when it began.
+/// The pacing of one tick, and totals.
 struct Pacing {
   Nanos now = 0;                     ///< start of the tick on the servo clock
-  Nanos wakeupError = 0;             ///< start less deadline
-  std::uint64_t overruns = 0;        ///< ticks that were more than 0.5 ms late, or lost to the one before
-  std::uint64_t skippedPeriods = 0;  ///< points of the grid without a tick
+  Nanos wakeupError = 0;             ///< start minus deadline, >= 0
+  std::uint64_t overruns = 0;        ///< ticks more than 0.5 ms late, or lost to a long tick before
+  std::uint64_t skippedPeriods = 0;  ///< grid points without a tick
 };
 
-/// Deadlines at start + n * period. Deadlines that have passed are skipped: there are never two ticks for one
-/// moment, and a tick that takes too long leaves time for others.
+/// Deadlines at start + n * period. Passed deadlines are skipped: late ticks never pile up, and a tick that
+/// takes too long still leaves processor time to other threads.
 class Pacer {
  public:
   Pacer(Nanos start, Nanos period) noexcept
@@ -38,7 +38,7 @@ class Pacer {
   /// When the next tick is due.
   Nanos deadline() const noexcept { return deadline_; }
 
-  /// Tells that a tick starts at `now`; the next one is due at the next point of the grid.
+  /// A tick starts at `now`; the next one is due at the next grid point.
   Pacing begin(Nanos now) noexcept {
     pacing_.now = now;
     pacing_.wakeupError = std::max<Nanos>(now - deadline_, 0);
@@ -48,7 +48,8 @@ class Pacer {
     return pacing_;
   }
 
-  /// Tells that the tick ended at `now`: a little late for the next one is tolerated, else that one is lost.
+  /// The tick ended at `now`. If that is past the next deadline by more than the tolerance, the next tick is
+  /// lost.
   void end(Nanos now) noexcept {
     if (now - deadline_ <= tolerated_) return;
     ++pacing_.overruns;
@@ -58,7 +59,7 @@ class Pacer {
   }
 
  private:
-  // To the last point of the grid that is not after `now`.
+  // To the last grid point that is not after `now`.
   void skipTo(Nanos now) noexcept {
     const Nanos skipped = std::max<Nanos>(now - deadline_, 0) / period_;
     pacing_.skippedPeriods += static_cast<std::uint64_t>(skipped);

@@ -22,7 +22,8 @@ class ServoThread {
  public:
   /// `tick` must not throw, allocate or lock; it and `clock` must outlive the thread. Throws
   /// std::invalid_argument for a rate outside 250 Hz … 4 kHz.
-  ServoThread(std::function<void(const Pacing&)> tick, base::Clock& clock, const ServoThreadOptions& options = {});
+  ServoThread(std::function<void(const Pacing&)> tick, base::Clock& clock,
+              const ServoThreadOptions& options = {});
   ~ServoThread();
   ServoThread(const ServoThread&) = delete;
   ServoThread& operator=(const ServoThread&) = delete;

@@ -9,8 +9,8 @@ namespace hapticd::realtime {
 namespace {
 
 constexpr double kFloorShare = 0.6;   // of the continuous force
-constexpr double kSpending_s = 0.1;   // time constant with which what is left is spent
-constexpr double kRestedShare = 0.5;  // of the budget used: the peak is allowed again below
+constexpr double kSpending_s = 0.1;   // time constant with which the rest is spent
+constexpr double kRestedShare = 0.5;  // share of the budget in use below which the peak is allowed again
 
 }  // namespace
 
@@ -31,7 +31,7 @@ void ThermalBudget::add(double force_N, Nanos duration) noexcept {
   const double used = std::accumulate(impulse_.begin(), impulse_.end(), 0.0);
   if (used < kRestedShare * kWindow_s * continuous_) derated_ = false;
   if (derated_) {
-    // The largest constant force whose margin keeps itself up: without it the limit would ripple.
+    // The largest constant force that the margin sustains; without it the limit would ripple.
     constexpr double kAccount_s = base::toSeconds((kBuckets + 1) * kBucket);
     const double steady = (kWindow_s * continuous_ + kSpending_s * floor_) / (kAccount_s + kSpending_s);
     limit_ = std::min(limit_, steady);
@@ -48,13 +48,13 @@ void ThermalBudget::advance(Nanos duration) noexcept {
   filled_ %= kBucket;
 }
 
-// What is left, in N·s, if the floor is all that is written from now on: the fullest that the window gets is
-// just before one of its buckets leaves.
+// The rest of the budget, N·s, if only the floor is written from now on. The window is fullest just before
+// one of its buckets leaves.
 double ThermalBudget::margin() const noexcept {
   double kept = 0;
   double fullest = 0;
   double ahead_s = base::toSeconds((kBuckets + 1) * kBucket - filled_);
-  for (int age = 0; age <= kBuckets; ++age) {  // newest first: what is kept after all older ones have left
+  for (int age = 0; age <= kBuckets; ++age) {  // newest first: the sum without all older ones
     kept += impulse_[static_cast<std::size_t>((newest_ + kBuckets + 1 - age) % (kBuckets + 1))];
     fullest = std::max(fullest, kept + floor_ * ahead_s);
     ahead_s -= base::toSeconds(kBucket);

@@ -1,9 +1,8 @@
-// How much force the motors can still take: no 5 s may hold more than the continuous force on average.
+// Thermal limit of the motors: the mean force over any 5 s stays at or below the continuous force.
 //
-// The budget is spent so that it never has to be cut to zero: at every moment there is enough left to go on
-// with the floor (a part of the continuous force) for as long as the window remembers. A hard press from rest
-// gets the peak for about half a second, then the floor until the window has forgotten the burst, then just
-// under the continuous force for as long as it lasts.
+// The limit never falls to zero: at every moment the budget that is left suffices for a floor (a share of the
+// continuous force) until the window has passed. A hard press from rest gets the peak force for about half a
+// second, then the floor until the burst has left the window, then just under the continuous force.
 #pragma once
 
 #include <array>
@@ -20,9 +19,9 @@ class ThermalBudget {
  public:
   ThermalBudget(double peak_N, double continuous_N) noexcept;
 
-  /// Largest force for the next tick, in newtons.
+  /// Largest force for the next tick, newtons.
   double limit_N() const noexcept { return limit_; }
-  /// Tells that `force_N` was in effect for `duration`, and renews the limit.
+  /// Accounts for `force_N` during `duration` and updates the limit.
   void add(double force_N, Nanos duration) noexcept;
 
  private:
@@ -37,9 +36,9 @@ class ThermalBudget {
   double floor_;
   double limit_;
   bool derated_ = false;
-  std::array<double, kBuckets + 1> impulse_{};  // N·s; a ring, one bucket more than the window
+  std::array<double, kBuckets + 1> impulse_{};  // N·s; a ring with one bucket more than the window
   int newest_ = 0;
-  Nanos filled_ = 0;  // of the newest bucket
+  Nanos filled_ = 0;  // time in the newest bucket
 };
 
 }  // namespace hapticd::realtime

@@ -28,8 +28,8 @@ bool hasCapability(unsigned capability) {
   return (data[capability / 32].effective >> (capability % 32) & 1U) != 0;
 }
 
-// A thread of a vendor's library: what it was given there.
-void lookAtScheduling(SetupAnswer& answer) {
+// For a thread of a vendor library: what the library gave it.
+void readScheduling(SetupAnswer& answer) {
   answer.asked = true;
   int policy = SCHED_OTHER;
   sched_param parameters{};
@@ -37,24 +37,24 @@ void lookAtScheduling(SetupAnswer& answer) {
   policy &= ~SCHED_RESET_ON_FORK;
   answer.granted = policy == SCHED_FIFO || policy == SCHED_RR;
   const std::string priority = std::to_string(parameters.sched_priority);
-  answer.text = answer.granted ? "the thread of the device's library has realtime priority " + priority
-                               : "the thread of the device's library has normal scheduling";
+  answer.text = answer.granted ? "the thread of the vendor library has realtime priority " + priority
+                               : "the thread of the vendor library has normal scheduling";
   if (!answer.granted) {
     answer.remedy =
-        "give the program realtime rights (rtprio, or CAP_SYS_NICE), which most libraries then use; or run "
-        "the driver "
-        "in a process of its own (--isolate)";
+        "give the program realtime rights (rtprio, or CAP_SYS_NICE), which most vendor libraries then use; "
+        "or "
+        "run the driver in a separate process (--isolate)";
   }
 }
 
-void askScheduling(const ThreadRequest& request, SetupAnswer& answer) {
+void requestScheduling(const ThreadRequest& request, SetupAnswer& answer) {
   if (request.keepScheduling) {
-    lookAtScheduling(answer);
+    readScheduling(answer);
     return;
   }
   answer.asked = request.realtime;
   if (!request.realtime) {
-    answer.text = "normal scheduling, as chosen";
+    answer.text = "normal scheduling, as configured";
     return;
   }
   sched_param parameters{};
@@ -64,7 +64,7 @@ void askScheduling(const ThreadRequest& request, SetupAnswer& answer) {
   if (error == 0) {
     answer.text = "SCHED_FIFO priority " + std::to_string(request.priority);
   } else if (error == EINVAL) {
-    answer.text = "priority " + std::to_string(request.priority) + " is not one of SCHED_FIFO's";
+    answer.text = "priority " + std::to_string(request.priority) + " is not a SCHED_FIFO priority";
     answer.remedy = "choose a priority from 1 to 99";
   } else {
     rlimit limit{};
@@ -79,7 +79,7 @@ void askScheduling(const ThreadRequest& request, SetupAnswer& answer) {
   }
 }
 
-void askAffinity(const ThreadRequest& request, SetupAnswer& answer) {
+void requestAffinity(const ThreadRequest& request, SetupAnswer& answer) {
   answer.asked = request.cpu >= 0;
   if (!answer.asked) {
     answer.text = "any CPU";
@@ -102,13 +102,13 @@ void askAffinity(const ThreadRequest& request, SetupAnswer& answer) {
   }
 }
 
-void askMemory(const ThreadRequest& request, SetupAnswer& answer) {
+void requestMemory(const ThreadRequest& request, SetupAnswer& answer) {
   answer.asked = request.lockMemory;
   if (!answer.asked) {
-    answer.text = "memory may be paged out, as chosen";
+    answer.text = "memory may be paged out, as configured";
     return;
   }
-  // Under a limit the lock may succeed now and make later allocations fail: do without it.
+  // Under a limit, mlockall() may succeed now and make later allocations fail: do not call it.
   rlimit limit{};
   getrlimit(RLIMIT_MEMLOCK, &limit);
   if (limit.rlim_cur != RLIM_INFINITY && !hasCapability(CAP_IPC_LOCK)) {
@@ -119,7 +119,7 @@ void askMemory(const ThreadRequest& request, SetupAnswer& answer) {
         "give the service LimitMEMLOCK=infinity, or the program CAP_IPC_LOCK";
     return;
   }
-  // Pages are locked when first touched: address space that is only reserved costs nothing.
+  // MCL_ONFAULT locks pages when they are first touched: reserved address space costs nothing.
   answer.granted = mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0;
   answer.text = answer.granted ? "all memory is locked"
                                : std::string("memory may be paged out: mlockall: ") + std::strerror(errno);
@@ -145,30 +145,30 @@ std::string ThreadSetup::complaints() const {
 }
 
 void requestShortTimeSlice() noexcept {
-  // As the kernel has it; older C libraries know neither the call nor this.
+  // struct sched_attr of the kernel; older C libraries declare neither it nor the call.
   struct Attributes {
     std::uint32_t size = sizeof(Attributes);
     std::uint32_t policy = SCHED_OTHER;
     std::uint64_t flags = 1;  // SCHED_FLAG_RESET_ON_FORK
     std::int32_t nice = 0;
     std::uint32_t priority = 0;
-    std::uint64_t turn_ns = 100'000;
+    std::uint64_t slice_ns = 100'000;
     std::uint64_t deadline_ns = 0;
     std::uint64_t period_ns = 0;
   } attributes;
-  if (sched_getscheduler(0) != SCHED_OTHER) return;  // the operator knows better
+  if (sched_getscheduler(0) != SCHED_OTHER) return;  // the operator chose another policy
   attributes.nice = getpriority(PRIO_PROCESS, 0);
-  syscall(SYS_sched_setattr, 0, &attributes, 0U);  // where it is refused, all is as before
+  syscall(SYS_sched_setattr, 0, &attributes, 0U);  // a refusal changes nothing
 }
 
 ThreadSetup setUpThread(const ThreadRequest& request) {
   ThreadSetup setup;
-  askScheduling(request, setup.scheduling);
-  askAffinity(request, setup.affinity);
-  askMemory(request, setup.memory);
-  prctl(PR_SET_TIMERSLACK, 1UL);  // without SCHED_FIFO the kernel may delay a wake-up by 50 us
+  requestScheduling(request, setup.scheduling);
+  requestAffinity(request, setup.affinity);
+  requestMemory(request, setup.memory);
+  prctl(PR_SET_TIMERSLACK, 1UL);  // without SCHED_FIFO the kernel may delay a wake-up by 50 µs
   if (request.keepScheduling) {
-    setup.stack.text = "the stack of the device's library";
+    setup.stack.text = "the stack of the vendor library";
   } else {
     touchStack();
     setup.stack = {"stack", true, true, std::to_string(kStack_bytes / 1024) + " kB of stack are in memory",
@@ -178,7 +178,7 @@ ThreadSetup setUpThread(const ThreadRequest& request) {
   setup.denormals.granted = FlushDenormals::kSupported;
   setup.denormals.text = FlushDenormals::kSupported ? "denormal numbers are flushed to zero in every tick"
                                                     : "denormal numbers are computed in full";
-  if (!FlushDenormals::kSupported) setup.denormals.remedy = "none for this processor";
+  if (!FlushDenormals::kSupported) setup.denormals.remedy = "not available on this processor";
   return setup;
 }
 

@@ -1,4 +1,4 @@
-// What a thread needs from the system to keep 1 kHz, what it got, and what to do about the rest.
+// Requests to the system that a 1 kHz thread depends on, the answers, and the remedies for refusals.
 #pragma once
 
 #include <array>
@@ -6,10 +6,10 @@
 
 namespace hapticd::realtime {
 
-/// What to ask for.
+/// What to request.
 struct ThreadRequest {
   bool realtime = true;  ///< SCHED_FIFO
-  /// Somebody else's thread: says what it has, changes neither that nor the stack.
+  /// A thread of a vendor library: reports its scheduling and changes neither that nor its stack.
   bool keepScheduling = false;
   int priority = 80;       ///< 1…99
   int cpu = -1;            ///< -1: any
@@ -21,8 +21,8 @@ struct SetupAnswer {
   const char* name = "";  ///< scheduling, affinity, memory, stack, denormals
   bool asked = false;
   bool granted = false;
-  std::string text{};    ///< what is the case now
-  std::string remedy{};  ///< how to get it; empty when granted or not asked
+  std::string text{};    ///< the present state
+  std::string remedy{};  ///< how to get it granted; empty when granted or not requested
 };
 
 /// All answers for one thread.
@@ -36,23 +36,24 @@ struct ThreadSetup {
   std::array<const SetupAnswer*, 5> all() const noexcept {
     return {&scheduling, &affinity, &memory, &stack, &denormals};
   }
-  /// Everything that was asked for was granted.
+  /// Whether every request was granted.
   bool granted() const noexcept {
     for (const SetupAnswer* answer : all()) {
       if (answer->asked && !answer->granted) return false;
     }
     return true;
   }
-  /// One line for each thing that was asked for and not granted, with its remedy.
+  /// One line per refused request, with its remedy.
   std::string complaints() const;
 };
 
-/// Asks for short turns of the calling thread, so that the scheduler lets it run soon after it is woken:
-/// needs no rights, and takes from others nothing but the order. Threads that it starts have turns as
-/// everybody. Without effect before Linux 6.12.
+/// Requests a 0.1 ms scheduler slice for the calling thread (sched_setattr), so that it runs soon after a
+/// wake-up. Needs no rights and takes no processor time from other threads. Threads that it starts get the
+/// default slice. No effect before Linux 6.12.
 void requestShortTimeSlice() noexcept;
 
-/// Asks for the calling thread. Allocates and enters the system: before the loop. Never throws for a refusal.
+/// Makes all requests for the calling thread. Allocates and makes system calls: call it before the loop. A
+/// refusal is an answer, not an exception.
 ThreadSetup setUpThread(const ThreadRequest& request);
 
 }  // namespace hapticd::realtime

@@ -55,7 +55,7 @@ GuardInput Tick::guardInput() const noexcept {
   in.force_N = report_.rendering.force_N;
   in.state = haveState_ ? &report_.device : nullptr;
   in.period = report_.timing.period;
-  // A callback has no deadline: what the period is too long is late, too.
+  // A callback has no deadline: there, the excess of the period counts as lateness.
   in.late = std::max(report_.timing.wakeupError, report_.timing.period - period_);
   in.writeFailed = !written_;
   in.geometryJump = (report_.rendering.status & kRenderGeometryJump) != 0;

@@ -1,4 +1,4 @@
-// All that one tick was made of and what came of it: enough to do it again.
+// Inputs and result of one tick: enough to render it again.
 #pragma once
 
 #include "handoff/spsc_ring.h"
@@ -7,16 +7,16 @@
 
 namespace hapticd::realtime {
 
-/// A plain value without pointers. The pacing is in the report: time, wake-up error, overruns, skipped
+/// A plain value without pointers. The report holds the pacing: time, wake-up error, overruns, skipped
 /// periods.
 struct TickRecord {
   TickReport report;
-  GuardControl::Seen control{};  ///< as the guard saw it in this tick
-  bool haveState = false;        ///< the device gave a state
-  bool written = false;          ///< the device took the force
+  GuardControl::Seen control{};  ///< as the guard read it in this tick
+  bool haveState = false;        ///< the device delivered a state
+  bool written = false;          ///< the device accepted the force
 };
 
-/// Servo to a recorder. A full ring counts what it refused.
+/// From the servo to a recorder. A full ring counts the records that it refuses.
 using RecordRing = handoff::SpscRing<TickRecord>;
 
 }  // namespace hapticd::realtime

@@ -19,7 +19,7 @@ Wake::~Wake() {
 
 void Wake::notify() noexcept {
   const std::uint64_t one = 1;
-  // A counter at its limit refuses the write, and is readable anyway.
+  // A counter at its limit refuses the write but stays readable.
   [[maybe_unused]] const auto written = write(descriptor_, &one, sizeof one);
 }
 

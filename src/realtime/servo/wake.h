@@ -1,22 +1,22 @@
-// Tells a sleeping thread that there are reports (an eventfd, so that a poll loop can wait for it).
+// Notifies a poll loop of new reports, through an eventfd.
 #pragma once
 
 namespace hapticd::realtime {
 
-/// notify() from the servo thread, the rest from the thread that waits.
+/// notify() from the servo thread, everything else from the thread that waits.
 class Wake {
  public:
-  /// Throws std::system_error when the system has no descriptor left.
+  /// Throws std::system_error when the system has no free descriptor.
   Wake();
   ~Wake();
   Wake(const Wake&) = delete;
   Wake& operator=(const Wake&) = delete;
 
-  /// One write that never blocks. noexcept, no allocation, no lock.
+  /// One non-blocking write. No allocation, no lock.
   void notify() noexcept;
-  /// Readable when notified since the last drain().
+  /// Readable after a notify() until the next drain().
   int descriptor() const noexcept { return descriptor_; }
-  /// True when notified since the last drain().
+  /// Clears the notification. True when there was a notify() since the last drain().
   bool drain() noexcept;
 
  private:

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "realtime/servo/histogram.h"
+#include "base/histogram.h"
 #include "realtime/servo/report.h"
 
 namespace hapticd::server {
@@ -25,7 +25,7 @@ struct DeviceStatus {
   std::string fault;
   std::uint64_t droppedReports = 0;
   realtime::TickReport last;
-  realtime::Histogram::Copy period, wakeup, compute;
+  base::Histogram::Copy period, wakeup, compute;
 };
 
 }  // namespace hapticd::server

@@ -19,7 +19,7 @@ void ofDevices(Text& out, const StateReport& report, std::string_view name, std:
 
 void loops(Text& out, const StateReport& report) {
   const auto histograms = [&](std::string_view name, std::string_view help,
-                              const realtime::Histogram::Copy DeviceStatus::*which) {
+                              const base::Histogram::Copy DeviceStatus::*which) {
     out.family(name, "histogram", help);
     for (const DeviceStatus& device : report.server.devices) {
       out.histogram(device.*which, device.names.front());

@@ -9,7 +9,7 @@
 namespace hapticd::server {
 namespace {
 
-using realtime::Histogram;
+using base::Histogram;
 
 std::string textOf(double value) {
   if (std::isnan(value)) return "NaN";

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <utility>
 
-#include "realtime/servo/histogram.h"
+#include "base/histogram.h"
 
 namespace hapticd::server {
 
@@ -20,7 +20,7 @@ class PrometheusText {
   void family(std::string_view name, std::string_view type, std::string_view help);
   void sample(double value, Labels labels = {});
   /// Converts a histogram of nanoseconds to seconds, with a bucket for each power of two from 1 us to 0.5 s.
-  void histogram(const realtime::Histogram::Copy& histogram, std::string_view device);
+  void histogram(const base::Histogram::Copy& histogram, std::string_view device);
 
   const std::string& text() const noexcept { return text_; }
 

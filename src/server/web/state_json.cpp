@@ -34,12 +34,12 @@ double inMicroseconds(base::Nanos t) {
   return static_cast<double>(t) * 1e-3;
 }
 
-Json json(const realtime::Histogram::Copy& h) {
+Json json(const base::Histogram::Copy& h) {
   Json bins = Json::array();
-  for (int i = 0; i < realtime::Histogram::kBuckets; ++i) {
+  for (int i = 0; i < base::Histogram::kBuckets; ++i) {
     const std::uint64_t count = h.counts[static_cast<std::size_t>(i)];
     if (count == 0) continue;
-    const base::Nanos from = i == 0 ? 0 : realtime::Histogram::upperBound(i - 1) + 1;
+    const base::Nanos from = i == 0 ? 0 : base::Histogram::upperBound(i - 1) + 1;
     bins.push_back({inMicroseconds(from), count});
   }
   return {{"p50", inMicroseconds(h.quantile(0.5))},

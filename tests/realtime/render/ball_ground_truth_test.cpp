@@ -58,7 +58,7 @@ TEST_P(BallGroundTruth, deep_press_is_not_released) {
   EXPECT_NEAR(to({0.001, 0.002, -0.05}, 0.5).force_N.z(), 51, 1e-4);
 }
 
-// T9a  a plate rising at 50 mm/s into a resting hand
+// T9a  a plate rises at 50 mm/s into a HIP at rest
 TEST_P(BallGroundTruth, rising_plate_lifts_a_resting_hand) {
   scene::ObjectState& object = add(jittered(0.02, 40), surface());
   object.motion = scene::Motion::between(object.motion.origin(), shifted(object, {0, 0, 0.004}),
@@ -73,7 +73,7 @@ TEST_P(BallGroundTruth, rising_plate_lifts_a_resting_hand) {
   }
 }
 
-// T9b  a plate slides under a pressed hand: carried until |Ft| = mu Fn, then it slips
+// T9b  a plate slides under a pressed HIP: the proxy is carried until |Ft| = mu Fn, then slips
 TEST_P(BallGroundTruth, sliding_plate_carries_the_proxy_until_it_slips) {
   scene::ObjectState& object = add(plane(0.05, 10), surface(1000, 0.5, 0.5));
   start({0.0003, 0.0002, 0.002}, kBallOfRadius);
@@ -90,7 +90,7 @@ TEST_P(BallGroundTruth, sliding_plate_carries_the_proxy_until_it_slips) {
   }
 }
 
-// T9c  poses at 60 Hz, each the goal of the motion since the one before: no 60 Hz steps
+// T9c  poses at 60 Hz, each is the goal of an interpolated motion: no steps at 60 Hz
 TEST_P(BallGroundTruth, interpolated_pose_stream_has_no_steps) {
   scene::ObjectState& object = add(plane(0.05, 20), surface());
   const auto height = [](double t) { return 0.002 * std::sin(M_PI * std::max(0.0, t)); };
@@ -121,7 +121,7 @@ TEST_P(BallGroundTruth, interpolated_pose_stream_has_no_steps) {
   }
 }
 
-// T9d  the vertices under the hand rise by 1 mm in 100 ms
+// T9d  the vertices under the HIP rise by 1 mm in 100 ms
 TEST_P(BallGroundTruth, deforming_surface_is_felt_like_a_moving_one) {
   TriangleMesh mesh = jittered(0.02, 60);
   geometry::scaleAndMove(mesh, units(), Vec3::Zero());
@@ -162,7 +162,7 @@ TEST_P(BallGroundTruth, cell_size_is_not_felt) {
   }
 }
 
-// T17  shear in the transform: the forces of the same mesh sheared by hand; the ball stays a ball
+// T17  shear in the transform: the same forces as from a mesh with sheared vertices; the ball stays a ball
 TEST_P(BallGroundTruth, shear_in_the_transform_equals_shear_in_the_mesh) {
   geometry::Mat3 shear;
   shear << 1.5, 0.3, 0.2, 0, 0.6, 0.1, 0.1, 0, 0.9;
@@ -187,7 +187,7 @@ TEST_P(BallGroundTruth, shear_in_the_transform_equals_shear_in_the_mesh) {
   }
 }
 
-// T18  a sound plate among duplicate, flipped, degenerate and infinite triangles
+// T18  a valid plate among duplicate, flipped, degenerate and infinite triangles
 TEST_P(BallGroundTruth, soup_neither_tunnels_nor_breaks) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> across(-0.018, 0.018);
@@ -246,7 +246,7 @@ TEST_P(BallGroundTruth, seam_between_objects_changes_friction_without_a_kick) {
   EXPECT_NEAR(after, 0.1, 0.002);
 }
 
-// T20  the touched object vanishes: its contact ends, and the jump is reported to the guard
+// T20  the touched object vanishes: its contact ends, and the status reports the jump to the guard
 TEST_P(BallGroundTruth, vanishing_object_ends_its_contact_only) {
   add(plane(0.05, 10), surface());
   const SceneFixture below = scene;
@@ -264,7 +264,7 @@ TEST_P(BallGroundTruth, vanishing_object_ends_its_contact_only) {
   EXPECT_NE(hand->now().status & kRenderGeometryJump, 0U);
 }
 
-// Force shading rounds off what a coarse mesh was meant to be, but no edge that is meant.
+// Force shading smooths a coarse mesh but keeps sharp edges.
 TEST_P(BallGroundTruth, shading_is_off_at_sharp_edges) {
   for (const double radius : {0.0, kToolRadius}) {
     clear();

@@ -1,4 +1,4 @@
-// A tool with a radius: it stays that far off faces, edges and corners, and feels them rounded.
+// A tool with a radius: it stays that far off faces, edges and corners, and rounds them.
 #include "variants.h"
 
 namespace hapticd::realtime::fixture {

@@ -172,7 +172,7 @@ TEST_P(ContactTest, deep_press_is_not_released) {
   EXPECT_NEAR(to({0.001, 0.002, -0.05}, 0.5).force_N.z(), 50, 1e-4);
 }
 
-// A first contact of more than 30 mm is not a hand: no force until it leaves.
+// A first contact deeper than 30 mm gives no force until the HIP leaves.
 TEST_P(ContactTest, deep_first_contact_is_released_until_the_hand_leaves) {
   add(plane(0.1, 4), surface());
   start({0.001, 0.002, 0.005});

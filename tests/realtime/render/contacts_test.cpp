@@ -1,4 +1,4 @@
-// What is said of the touched objects: one contact for each, however many of its faces hold the proxy.
+// The reported contacts: one per touched object, however many of its faces hold the proxy.
 #include "variants.h"
 
 namespace hapticd::realtime::fixture {
@@ -77,7 +77,7 @@ TEST_P(ContactsTest, friction_belongs_to_the_object_that_rubs) {
   }
 }
 
-// A plane that holds on to the hand is a contact that pulls.
+// An adhesive plane is a contact that pulls.
 TEST_P(ContactsTest, adhesion_is_a_contact) {
   scene::Plane floor;
   floor.normal = Vec3::UnitZ();

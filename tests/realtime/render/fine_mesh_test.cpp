@@ -1,4 +1,4 @@
-// Fine meshes must not be felt: T5c, T5d and T13 of the ground truth.
+// The cells of fine meshes must not be felt: T5c, T5d and T13 of the ground truth.
 #include "variants.h"
 
 namespace hapticd::realtime::fixture {

@@ -1,4 +1,4 @@
-// The forces that belong to no object: effects, planes, force fields, the buzz.
+// Forces without an object: effects, planes, force fields, the buzz.
 #include <limits>
 
 #include "base/time.h"
@@ -117,7 +117,7 @@ TEST_P(FreeForcesTest, effects_end_and_ramp_out) {
     EXPECT_NEAR(at({0, 0, 0}).force_N.x(), 1.5 * std::max(0.0, 1 - i / 250.0), 1e-9);
 }
 
-// Started again while it runs, an effect begins anew: its phase and its time.
+// A start of a running effect restarts its phase and its duration.
 TEST_P(FreeForcesTest, restart_begins_anew) {
   scene::Effect e = effect(EffectType::motorVibration);
   e.duration = 10 * kTick;
@@ -131,7 +131,7 @@ TEST_P(FreeForcesTest, restart_begins_anew) {
     EXPECT_NEAR(at({0, 0, 0}).force_N.x(), i < 10 ? 1.5 * std::cos(0.2 * i) : 0, 1e-9);
 }
 
-// A plane of the scene and a wall of triangles make a corner like two walls do.
+// A plane of the scene and a wall of triangles form a corner as two walls do.
 TEST_P(FreeForcesTest, plane_and_mesh_make_a_corner) {
   scene.planes = {floor(0)};
   TriangleMesh wall;
@@ -156,7 +156,7 @@ TEST_P(FreeForcesTest, plane_has_friction_and_lateral_adhesion) {
   EXPECT_NEAR(to({0.01, 0, -0.001}).force_N.x(), -0.9, 1e-3);
 }
 
-// recovery  a plane placed with the hand 2 mm inside comes in under it within 100 ms
+// recovery  a plane placed 2 mm above the HIP rises under it within 100 ms
 TEST_P(FreeForcesTest, new_plane_comes_in_under_the_hand) {
   start({0, 0, -0.002});
   scene::Plane p = floor(0);
@@ -226,7 +226,7 @@ TEST_P(FreeForcesTest, field_varies_from_its_origin_within_its_radius) {
 }
 
 //  |F| ________
-//              \        full up to 90 % of the radius, then a straight line to nothing
+//              \        full up to 90 % of the radius, then linear to zero
 //  ____________|\____ r
 TEST_P(FreeForcesTest, field_fades_at_its_rim_and_stays_below_ten_newtons) {
   scene::ForceField field;

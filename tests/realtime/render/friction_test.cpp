@@ -41,7 +41,7 @@ TEST_P(FrictionTest, ramp_sticks_then_slides) {
   EXPECT_LT(work, 0);
 }
 
-// Turning back, the proxy sticks at once and the spring swings through zero without a step.
+// After a reversal the proxy sticks at once, and the spring passes through zero without a step.
 TEST_P(FrictionTest, reversal_sticks) {
   add(plane(0.05, 40), surface(1000, 0.5, 0.3));
   start({0.00013, 0.0002, 0.0005});
@@ -57,7 +57,7 @@ TEST_P(FrictionTest, reversal_sticks) {
   EXPECT_GT(last, 0);
 }
 
-// Thrown back within one tick to a stretch between both limits, the proxy sticks: its slide is over.
+// A reversal within one tick to a length between both limits ends the slide: the proxy sticks.
 TEST_P(FrictionTest, reversal_within_a_tick_sticks) {
   add(plane(0.05, 10), surface(1000, 0.5, 0.3));
   start({0.0003, 0.0002, 0.001});
@@ -66,7 +66,7 @@ TEST_P(FrictionTest, reversal_within_a_tick_sticks) {
   EXPECT_NEAR(at({0.0046, 0.0002, -0.001}).force_N.x(), 0.4, 1e-3);
 }
 
-// T19    mu 0.6 | mu 0.1     two abutting plates; the seam is felt in the friction and nowhere else
+// T19    mu 0.6 | mu 0.1     two abutting plates; only the friction changes at the seam
 //      =========|=========
 TEST_P(FrictionTest, seam_between_objects_changes_friction_without_a_kick) {
   const auto plate = [](double from, double to) {
@@ -93,7 +93,7 @@ TEST_P(FrictionTest, seam_between_objects_changes_friction_without_a_kick) {
   EXPECT_NEAR(after, 0.1, 0.002);
 }
 
-// T9b   a plate slides under a pressed hand: it takes the proxy along until the cone, then slips
+// T9b   a plate slides under a pressed HIP: it takes the proxy along up to the cone, then the proxy slips
 //          o
 //     ==========  ->
 TEST_P(FrictionTest, sliding_plate_carries_the_proxy_until_it_slips) {
@@ -116,8 +116,8 @@ TEST_P(FrictionTest, sliding_plate_carries_the_proxy_until_it_slips) {
   EXPECT_TRUE(slipped);
 }
 
-// T12  press, slide, return and release on a bumpy sphere without friction: the hand gets no energy out. (It
-// may put some in: on a convex edge the proxy stays on its face until it runs over the edge.)
+// T12  press, slide, return and release on a bumpy sphere without friction: no energy is gained. (Some may be
+// lost: on a convex edge the proxy stays on its face until it runs over the edge.)
 TEST_P(FrictionTest, closed_loop_on_a_bumpy_sphere_gives_no_energy) {
   TriangleMesh mesh = sphere(0.04, 100);
   for (auto& v : mesh.vertices) {

@@ -175,8 +175,7 @@ double MeshOracle::sharpestEdge(const Vec3& p, const Vec3& q) const {
   return sharpest;
 }
 
-// How far, 0 … 1, the point can go along `way`, with a clearance to what stops
-// it.
+// The share, 0 … 1, of `way` that is free, with a clearance to the obstacle.
 double MeshOracle::free(const Vec3& p, const Vec3& way) const {
   const Vec3 q = p + way;
   double t = 1;
@@ -205,9 +204,8 @@ Vec3 MeshOracle::foot(const Face& f, const Vec3& x) const {
   return nearest;
 }
 
-// Where a point at x may go: the steepest way down in a space bounded by faces
-// is the pull itself, the pull laid on a face, or an edge. `out` points away
-// from all that it touches.
+// Descent directions of a point at x: the steepest one among faces is the pull itself,
+// its projection onto a face, or an edge. `out` points away from all touched faces.
 std::vector<Vec3> MeshOracle::directions(const Vec3& x, const Vec3& pull, Vec3& out) const {
   std::vector<Vec3> found{pull};
   out = Vec3::Zero();
@@ -281,8 +279,8 @@ std::vector<Vec3> MeshOracle::awayFromTouched(const Vec3& x) const {
   return normals;
 }
 
-// The faces of a ball's room are curved: steps along them, each pushed out
-// again.
+// The free space of a ball has curved faces: steps along them, each followed by a push
+// outwards.
 bool MeshOracle::stepBall(Vec3& x, const Vec3& goal, double reach) const {
   const Vec3 pull = goal - x;
   const std::vector<Vec3> normals = awayFromTouched(x);

@@ -1,6 +1,5 @@
-// A judge of single ticks on a mesh, that shares nothing with the renderer: its
-// own grid, its own crossing test, its own descent over the faces. Slow and
-// simple.
+// An oracle for single ticks on a mesh. It shares no code with the renderer: it has its own grid, crossing
+// test and descent over the faces. Slow and simple.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// The judge is judged: it must see what is wrong.
+// Tests of the oracle itself: it must detect errors.
 #include "mesh_oracle.h"
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ TEST(MeshOracle, knows_edges_and_borders) {
   EXPECT_TRUE(sheet.borderNear({0.0099, 0.001, 0.0001}, {0.0101, 0.001, -0.0001}));
 }
 
-// A proxy at rest on a face is at rest; one that was left at the wrong place is not.
+// The oracle accepts a proxy at rest on a face and rejects one at a wrong place.
 TEST(MeshOracle, descends_to_where_the_tool_rests) {
   const double radius = 0.001;
   for (const double r : {0.0, radius}) {
@@ -42,7 +42,7 @@ TEST(MeshOracle, descends_to_where_the_tool_rests) {
   }
 }
 
-// Off a ridge it goes, up a slope it does not.
+// The oracle leaves a ridge but does not climb a slope.
 TEST(MeshOracle, goes_over_an_edge_but_never_uphill) {
   const MeshOracle oracle(heightField(0.01, 2, [](double x, double) { return 0.002 - 0.2 * std::abs(x); }));
   const Vec3 onRidge(0, 0.001, 0.002 + 1e-10);

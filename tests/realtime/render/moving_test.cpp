@@ -1,5 +1,5 @@
-// Geometry that moves, bends, jumps and vanishes under the hand: T9a, T9c, T9d, T20 of the ground truth (T9b
-// stands with the friction).
+// Geometry that moves, deforms, jumps and disappears under the HIP: T9a, T9c, T9d, T20 of the ground truth
+// (T9b is in friction_test).
 #include "base/time.h"
 #include "variants.h"
 
@@ -17,7 +17,7 @@ class MovingTest : public VariantTest {
 };
 INSTANTIATE_TEST_SUITE_P(, MovingTest, kVariants, variantName);
 
-// T9a      o   a hand at rest, 1 mm above
+// T9a      o   a HIP at rest, 1 mm above
 //       =======   a plate rising at 50 mm/s by 4 mm: F = k d(t), one step per tick of at most k v T
 TEST_P(MovingTest, rising_plate_lifts_a_resting_hand) {
   for (const auto faces : {scene::TouchableFaces::front, scene::TouchableFaces::both}) {
@@ -40,7 +40,8 @@ TEST_P(MovingTest, rising_plate_lifts_a_resting_hand) {
   }
 }
 
-// Damping is against the surface as it moves: a hand at rest on a rising plate is damped as one that comes.
+// Damping is relative to the moving surface: a HIP at rest above a rising plate is damped as an approaching
+// one.
 TEST_P(MovingTest, rising_plate_is_damped) {
   scene::Surface s = surface();
   s.damping_Ns_per_m = 2;
@@ -53,7 +54,7 @@ TEST_P(MovingTest, rising_plate_is_damped) {
   EXPECT_NEAR(at({0.0003, 0.0002, 0.001}).force_N.z(), 1000 * depth + 2 * 0.1, 2e-3);
 }
 
-// A fast one, 20 mm in a tick of 1 ms and no thicker than a sheet, does not pass through the hand either.
+// A thin sheet that moves 20 mm in one tick does not pass through the HIP.
 TEST_P(MovingTest, fast_sheet_does_not_pass_through_the_hand) {
   scene.faces = scene::TouchableFaces::both;
   scene::ObjectState& object = add(plane(0.02, 10), surface());
@@ -63,7 +64,7 @@ TEST_P(MovingTest, fast_sheet_does_not_pass_through_the_hand) {
   EXPECT_NEAR(at({0.0003, 0.0002, 0.001}).force_N.z(), 14, 1e-3);
 }
 
-// T9c  poses at 60 Hz, each the goal of the motion since the one before: no 60 Hz steps
+// T9c  poses at 60 Hz, each is the goal of an interpolated motion: no steps at 60 Hz
 TEST_P(MovingTest, interpolated_pose_stream_has_no_steps) {
   scene::ObjectState& object = add(plane(0.05, 20), surface());
   const Affine home = object.motion.destination();
@@ -95,7 +96,7 @@ TEST_P(MovingTest, interpolated_pose_stream_has_no_steps) {
   }
 }
 
-// T9d  the vertices under the hand rise by 1 mm in 100 ms, as a hump or as a whole
+// T9d  the vertices under the HIP rise by 1 mm in 100 ms, as a hump or as a whole
 TEST_P(MovingTest, deforming_surface_is_felt_like_a_moving_one) {
   for (const double depth : {-0.0004, 0.0005}) {  // the hand is above, or already in contact
     scene = SceneFixture();
@@ -137,8 +138,8 @@ TEST_P(MovingTest, deforming_surface_is_felt_like_a_moving_one) {
   }
 }
 
-// The renderer keeps facets of what rests from tick to tick, as long as the scene is the same. A hand that
-// gets a new picture of the same scene in every tick can keep nothing: it must feel the same to the last bit.
+// The renderer reuses facets of objects at rest while the scene is the same. With a new snapshot of the same
+// scene in every tick it can reuse nothing: the forces must be equal to the last bit.
 TEST_P(MovingTest, facets_that_are_kept_change_no_byte) {
   for (const double radius : {0.0, 0.001}) {
     scene = SceneFixture();
@@ -168,7 +169,7 @@ TEST_P(MovingTest, facets_that_are_kept_change_no_byte) {
   }
 }
 
-// A turning drum under a pressed finger with much friction: the proxy goes round with it.
+// A drum rotates under a pressed HIP with high friction: the proxy rotates with it.
 TEST_P(MovingTest, turning_object_carries_a_sticking_proxy) {
   scene::ObjectState& object = add(sphere(0.03, 40), surface(1000, 5, 5));
   Affine turned = object.motion.origin();
@@ -182,7 +183,8 @@ TEST_P(MovingTest, turning_object_carries_a_sticking_proxy) {
   EXPECT_NEAR((proxy() - Eigen::AngleAxisd(0.05, Vec3::UnitY()) * held).norm(), 0, 1e-7);
 }
 
-// A small jump of what is touched takes the proxy along and says so; a large one ends the contact.
+// A small jump of the touched object takes the proxy along and sets the status bit; a large one ends the
+// contact.
 TEST_P(MovingTest, jumps_are_reported) {
   scene::ObjectState& object = add(plane(0.05, 10), surface());
   start({0.001, 0.002, 0.001});
@@ -199,7 +201,7 @@ TEST_P(MovingTest, jumps_are_reported) {
   EXPECT_FALSE(hand->now().touching);
 }
 
-// T20  the touched object vanishes: no force, and a bit for the guard to blend by; what lies below still
+// T20  the touched object disappears: no force, and a status bit for the guard; the object below still
 // holds
 TEST_P(MovingTest, vanishing_object_ends_its_contact_only) {
   add(plane(0.05, 10), surface());
@@ -220,8 +222,8 @@ TEST_P(MovingTest, vanishing_object_ends_its_contact_only) {
   EXPECT_NE(hand->now().status & kRenderGeometryJump, 0U);
 }
 
-// A rough ball tumbles, or bends, among random poses or shapes while the hand pokes at random: a proxy that
-// starts outside stays outside, whoever moves.
+// A rough ball tumbles or deforms at random while the HIP pokes at random: a proxy that starts outside stays
+// outside.
 class Tumble : public testing::TestWithParam<std::tuple<bool, double>> {
  protected:
   double uniform(double from, double to) { return std::uniform_real_distribution<double>(from, to)(random_); }

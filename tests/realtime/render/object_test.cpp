@@ -1,4 +1,4 @@
-// Placement, popthrough, damping and what is not a number: T15, T17 of the ground truth.
+// Placement, popthrough, damping and non-finite input: T15, T17 of the ground truth.
 #include <limits>
 
 #include "variants.h"
@@ -9,7 +9,7 @@ namespace {
 class ObjectTest : public VariantTest {};
 INSTANTIATE_TEST_SUITE_P(, ObjectTest, kVariants, variantName);
 
-// T15   o |   a plate felt from both sides gives way at 1.5 N, is felt again from behind, and gives way again
+// T15   o |   a two-sided plate gives way at 1.5 N, resists from behind, and gives way again
 //         | o
 TEST_P(ObjectTest, popthrough_gives_way_at_its_force) {
   scene.faces = scene::TouchableFaces::both;
@@ -37,7 +37,7 @@ TEST_P(ObjectTest, popthrough_gives_way_at_its_force) {
   }
 }
 
-// Two plates close together: the one behind is not popped before proxy and hand have met again.
+// Two plates close together: the second does not give way before proxy and HIP have coincided again.
 TEST_P(ObjectTest, popthrough_waits_until_proxy_and_hand_agree) {
   scene::Surface s = surface();
   s.popthrough_N = 1.0;
@@ -52,7 +52,7 @@ TEST_P(ObjectTest, popthrough_waits_until_proxy_and_hand_agree) {
      [&](const Rendering& r) { pops += (r.status & kRenderPopthrough) != 0 ? 1 : 0; });
   EXPECT_EQ(pops, 1);
   EXPECT_NEAR(hand->now().force_N.z(), 2.5, 1e-3);
-  // They meet between the plates; from then on the lower one gives way, too.
+  // They coincide between the plates; from then on the lower plate gives way, too.
   to({0.0013, 0.0021, -0.0002}, 0.01);
   to({0.0013, 0.0021, -0.003}, 0.01,
      [&](const Rendering& r) { pops += (r.status & kRenderPopthrough) != 0 ? 1 : 0; });
@@ -60,7 +60,7 @@ TEST_P(ObjectTest, popthrough_waits_until_proxy_and_hand_agree) {
   EXPECT_EQ(hand->now().force_N.norm(), 0);
 }
 
-// T17  shear and unequal scale in the transform: the forces of the same mesh sheared by hand
+// T17  shear and unequal scale in the transform: the same forces as from a mesh with sheared vertices
 TEST_P(ObjectTest, shear_in_the_transform_equals_shear_in_the_mesh) {
   const double units = GetParam().worldUnitsPerMetre;
   geometry::Mat3 shear;
@@ -98,7 +98,7 @@ TEST_P(ObjectTest, mirrored_object_keeps_its_outside) {
   EXPECT_NEAR(to({0.0003, 0.0002, 0.009}).force_N.z(), 1, 1e-3);
 }
 
-// Damping takes from the spring when the hand leaves and adds when it comes, and never pulls.
+// Damping lowers the force of a leaving HIP, raises that of an approaching one, and never pulls.
 TEST_P(ObjectTest, damping_never_pulls) {
   scene::Surface s = surface();
   s.damping_Ns_per_m = 2;
@@ -112,7 +112,7 @@ TEST_P(ObjectTest, damping_never_pulls) {
   EXPECT_EQ(at({0.0013, 0.0021, -0.0002}).force_N.z(), 0);
 }
 
-// A hand that is not a number gives no force, and the next good one starts afresh.
+// A HIP that is not finite gives no force; the next finite one restarts the proxy.
 TEST_P(ObjectTest, hand_that_is_not_finite_gives_no_force) {
   add(plane(0.05, 10), surface());
   start({0.001, 0.002, 0.001});
@@ -126,7 +126,7 @@ TEST_P(ObjectTest, hand_that_is_not_finite_gives_no_force) {
   EXPECT_NEAR(at({0.001, 0.002, -0.001}).force_N.z(), 1, 1e-3);
 }
 
-// Many small objects around the hand; only the touched one speaks.
+// Many small objects around the HIP; only the touched one exerts a force.
 TEST_P(ObjectTest, one_of_many_objects_is_felt) {
   const double units = GetParam().worldUnitsPerMetre;
   for (int i = 0; i < 400; ++i) {

@@ -1,4 +1,4 @@
-// What must hold for any scene and any hand.
+// Invariants for any scene and any motion of the HIP.
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -36,7 +36,7 @@ scene::Surface randomSurface() {
   return s;
 }
 
-// The spring between proxy and hand, and the damper by its speed, bound the force; nothing is ever NaN.
+// The force is finite and at most that of spring and damper.
 void expectSane(const Rendering& r, const Vec3& hip, const Vec3& velocity, const scene::Surface& s) {
   RC_ASSERT(r.force_N.allFinite());
   RC_ASSERT(r.proxy_m.allFinite());
@@ -70,12 +70,12 @@ RC_GTEST_PROP(RendererProperty, force_is_finite_and_bounded_by_spring_and_damper
       unfinished += (r.status & kRenderIterationLimit) != 0U ? 1 : 0;
     }
   }
-  // A ball balanced on a corner may creep on for some ticks. A point arrives, but where dozens of triangles run
-  // through each other at random it may once in a while need the next tick.
+  // A ball balanced on a corner may creep on for some ticks. A point arrives, but where dozens of triangles
+  // run through each other at random it may once in a while need the next tick.
   RC_ASSERT(options.toolRadius_m > 0 || unfinished <= 1 + all / 20);
 }
 
-// A closed star-shaped mesh: whatever the hand does, a proxy that starts outside stays outside.
+// A closed star-shaped mesh: a proxy that starts outside stays outside.
 RC_GTEST_PROP(RendererProperty, proxy_never_gets_into_a_closed_mesh, ()) {
   TriangleMesh mesh = sphere(0.02, *rc::gen::inRange(1, 12));
   const double roughness = random(0, 0.3);
@@ -105,7 +105,7 @@ RC_GTEST_PROP(RendererProperty, proxy_never_gets_into_a_closed_mesh, ()) {
   }
 }
 
-// Turned, moved and in another unit, the same scene gives the same force, turned.
+// A rotated, translated and scaled scene gives the same force, rotated.
 RC_GTEST_PROP(RendererProperty, force_does_not_depend_on_the_frame_or_the_unit, ()) {
   const TriangleMesh mesh = sphere(0.02, 9);
   const double mu = random(0, 1);

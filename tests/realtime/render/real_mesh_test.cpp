@@ -1,5 +1,5 @@
-// Scanned meshes, as they are and subdivided to a million triangles: a hand that slides over them 2 mm deep
-// and taps. Each tick is judged by an oracle that shares nothing with the renderer.
+// Scanned meshes, original and subdivided to a million triangles: a HIP slides over them 2 mm deep and taps.
+// An oracle that shares no code with the renderer judges each tick.
 //   HAPTICD_SCANS=DIRECTORY HAPTICD_TICKS=N bin/render_test --gtest_filter='RealMesh.*'
 // judges all .obj files of a directory.
 #include <gtest/gtest.h>
@@ -75,7 +75,7 @@ TriangleMesh scan(const std::filesystem::path& path, int splits) {
   return mesh;
 }
 
-// A hand that explores: it seeks the surface, slides over it 2 mm deep with a wandering direction, and taps.
+// A HIP that explores: it seeks the surface, slides over it 2 mm deep with a wandering direction, and taps.
 class Explorer {
  public:
   Vec3 next(const Rendering& r) {
@@ -102,7 +102,7 @@ class Explorer {
   std::normal_distribution<double> gauss_;
 };
 
-// A hand that knows no surface: from one place near the mesh to another, straight through, up to 8 mm deep.
+// A HIP that ignores the surface: straight between places near the mesh, up to 8 mm deep.
 class Wanderer {
  public:
   explicit Wanderer(const TriangleMesh& mesh) : mesh_(mesh) {}
@@ -273,7 +273,7 @@ INSTANTIATE_TEST_SUITE_P(, RealMeshTest,
                                   (c.radius_m > 0 ? "_ball" : "_point");
                          });
 
-// What was not tuned for.
+// Meshes for which nothing was tuned.
 TEST(RealMesh, scans_of_a_directory) {
   const char* directory = std::getenv("HAPTICD_SCANS");
   if (directory == nullptr) GTEST_SKIP() << "no HAPTICD_SCANS";

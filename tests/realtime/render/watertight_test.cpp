@@ -99,7 +99,7 @@ TEST_P(SegmentsTest, every_segment_into_a_closed_mesh_hits) {
   EXPECT_EQ(misses, 0) << "of " << shots;
 }
 
-// T18  a sound plate among duplicates, degenerates, flipped and crossing triangles, a T-junction, NaN and
+// T18  a valid plate among duplicates, degenerates, flipped and crossing triangles, a T-junction, NaN and
 // infinity
 TEST_P(WatertightTest, soup_neither_tunnels_nor_breaks) {
   constexpr double kHalf = 0.02;

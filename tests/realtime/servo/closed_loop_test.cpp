@@ -1,5 +1,5 @@
-// T16: a hand that presses on a stiff wall, in closed loop. The hand moves between two turns as it likes; the
-// wall answers only at them, and too late: too stiff a wall gives the hand energy, and buzzes.
+// T16: a simulated hand presses on a stiff wall in closed loop. The hand moves between ticks, and the wall
+// responds one tick late: a wall that is too stiff adds energy and buzzes.
 //   HAPTICD_STIFFNESS_CSV=FILE bin/closed_loop_test
 // writes the stiffest wall that settles at each rate; scripts/draw_stiffness.sh draws it.
 #include <gtest/gtest.h>
@@ -43,7 +43,7 @@ scene::Surface stiff(double stiffness_N_per_m) {
   return surface;
 }
 
-// From 5 mm above the wall to 8 mm below it in half a second, and there it stays.
+// From 5 mm above the wall to 8 mm below it in half a second, then at rest.
 std::shared_ptr<const device::HandPath> press() {
   return std::make_shared<device::WaypointPath>(
       std::vector<device::Waypoint>{{0, {0, 0.005, 0}}, {0.5, {0, -0.008, 0}}});
@@ -80,7 +80,7 @@ Pressing pressOn(const scene::Surface& surface, double rate_Hz, bool guarded) {
   for (Nanos now = 0; now < 2'500'000'000; now += period) {
     tick(now);
     const double next = tick.last().device.position_m.y();
-    // The damper takes at least what it would at a constant speed.
+    // The damper dissipates at least as much as at constant speed.
     energy += force * (next - y) - kHandDamping * (next - y) * (next - y) / period_s;
     result.gained_J = std::max(result.gained_J, energy);
     y = next;
@@ -124,7 +124,7 @@ TEST_P(ClosedLoop, wall_far_beyond_the_bound_buzzes) {
   EXPECT_GT(p.gained_J, 1e-5);
 }
 
-// What a client asks for beyond the bound is lowered to it, and the guarded loop stays quiet.
+// Stiffness beyond the bound is lowered to it, and the guarded loop stays quiet.
 TEST_P(ClosedLoop, clamped_material_gives_no_energy) {
   scene::SceneConfig config;
   config.servoPeriod_s = 1 / GetParam();
@@ -143,7 +143,7 @@ TEST_P(ClosedLoop, clamped_material_gives_no_energy) {
   EXPECT_LT(p.gained_J, kRounding_J);
 }
 
-// The stiffest wall that settles, found by halving; never below the bound.
+// The stiffest wall that settles, by bisection; never below the bound.
 TEST(ClosedLoopLimit, stiffest_wall_grows_with_the_rate) {
   const char* path = std::getenv("HAPTICD_STIFFNESS_CSV");
   std::ofstream csv;

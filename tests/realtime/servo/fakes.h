@@ -1,4 +1,4 @@
-// The neighbours of the servo, scripted: a device and a clock that do what a test says.
+// Scripted device and clock for tests of the servo.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@ namespace hapticd::realtime {
 using base::Nanos;
 using geometry::Vec3;
 
-/// Gives the state that the test sets and keeps what was written.
+/// Delivers the state that the test sets and keeps the last force written.
 class FakeDevice final : public device::Device {
  public:
   FakeDevice() { profile_.startsArmed = true; }
@@ -48,7 +48,7 @@ class FakeDevice final : public device::Device {
   device::DeviceProfile profile_;
 };
 
-/// Oversleeps by a script, then not at all.
+/// Oversleeps as scripted, then not at all.
 class FakeClock final : public base::Clock {
  public:
   Nanos now() noexcept override { return now_; }

@@ -148,7 +148,7 @@ int pthread_cond_broadcast(pthread_cond_t* condition) {
   return real(condition);
 }
 
-// The standard library waits for atomics and semaphores by a bare futex.
+// The standard library waits on atomics and semaphores by a direct futex call.
 long syscall(long number, ...) {
   if (number == SYS_futex) law::note("futex");
   va_list list;

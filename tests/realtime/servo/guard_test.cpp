@@ -1,6 +1,6 @@
-// Every rule of the guard, sample by sample.
-#include "base/time.h"
+// Every rule of the guard, tick by tick.
 #include "realtime/servo/guard.h"
+#include "base/time.h"
 #include "support/milliseconds.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// The law of the realtime folder: a tick never allocates, frees or locks, whatever the scene does meanwhile.
+// The law of the realtime folder: a tick never allocates, frees or locks, even while the scene changes.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -30,7 +30,7 @@ class RealtimeLaw : public testing::Test {
   ~RealtimeLaw() override { law::leave(); }
 };
 
-// First the proof that the net has no holes.
+// First: the interposer catches every forbidden call.
 TEST_F(RealtimeLaw, EveryForbiddenCallIsCaught) {
   std::mutex mutex;
   std::shared_mutex shared;
@@ -122,7 +122,7 @@ std::shared_ptr<const scene::MeshGeometry> ball(int rings, double bump) {
   return mesh;
 }
 
-// Makes scenes that differ in everything that can change: number, shape, place, motion, surface, effects.
+// Makes scenes that differ in number, shape, place, motion and surface of objects, and in effects.
 class Scenery {
  public:
   Scenery() : meshes_{ball(40, 0), ball(60, 0.02), ball(80, 0.005)} {}
@@ -224,7 +224,7 @@ TEST_F(RealtimeLaw, HoldsInSimulatedTime) {
     touching += tick.last().rendering.touching;
     forces += tick.last().force_N.norm() > 0.1;
     tick.reports().consume([](const TickReport&) {});
-    // Now and then the recorder is late, and ticks are dropped.
+    // The recorder is late from time to time, and ticks are dropped.
     if (i % 100 == 99) kept += recorded.consume([](const TickRecord&) {});
   }
   expectLawful();

@@ -1,4 +1,4 @@
-// The paced thread: with a scripted clock for what it must do, with the real one for what it must survive.
+// The paced thread: exact behaviour with a scripted clock, robustness with the real one.
 #include "realtime/servo/servo_thread.h"
 
 #include <gmock/gmock.h>
@@ -66,7 +66,7 @@ TEST(ServoThread, TicksOnTheGridAtEveryRate) {
   }
 }
 
-TEST(ServoThread, ALateWakeUpSkipsWhatIsLost) {
+TEST(ServoThread, ALateWakeUpSkipsLostPeriods) {
   FakeClock clock;
   clock.oversleeps = {0, 0, 5'300'000, 100'000};
   const Nanos start = clock.now();
@@ -81,7 +81,8 @@ TEST(ServoThread, ALateWakeUpSkipsWhatIsLost) {
 TEST(ServoThread, TicksThatTakeTooLongLosePeriodsAndNeverPileUp) {
   FakeClock clock;
   const auto seen = runTicks(clock, 20, 1000, 1'700'000);
-  for (std::size_t i = 1; i < seen.size(); ++i) {  // every second period is lost, the processor breathes
+  for (std::size_t i = 1; i < seen.size();
+       ++i) {  // every second period is lost, and leaves time to other threads
     EXPECT_EQ(seen[i].now - seen[i - 1].now, 2 * kMs);
     EXPECT_EQ(seen[i].wakeupError, 0);
     EXPECT_EQ(seen[i].overruns, i);
@@ -89,7 +90,7 @@ TEST(ServoThread, TicksThatTakeTooLongLosePeriodsAndNeverPileUp) {
   }
 }
 
-TEST(ServoThread, SaysWhatItGot) {
+TEST(ServoThread, ReportsWhatTheSystemGranted) {
   FakeClock clock;
   ServoThreadOptions options;
   options.request.cpu = 0;
@@ -104,7 +105,7 @@ TEST(ServoThread, SaysWhatItGot) {
   EXPECT_EQ(setup.granted(), setup.complaints().empty());
 }
 
-TEST(ServoThread, SaysWhatWasNotAskedFor) {
+TEST(ServoThread, ReportsWhatWasNotRequested) {
   FakeClock clock;
   ServoThread thread([](const Pacing&) {}, clock, modest());
   const ThreadSetup& setup = thread.start();
@@ -114,12 +115,12 @@ TEST(ServoThread, SaysWhatWasNotAskedFor) {
   EXPECT_TRUE(setup.granted());
 }
 
-TEST(ServoThread, RefusesToRunWithoutWhatItNeeds) {
+TEST(ServoThread, DoesNotStartWithoutRequiredRealtime) {
   FakeClock clock;
   ServoThreadOptions options = modest();
   options.requireRealtime = true;
   options.request.realtime = true;
-  options.request.priority = 1000;  // refused to everybody
+  options.request.priority = 1000;  // always refused
   options.request.cpu = 100'000;
   std::atomic<int> ticks{0};
   ServoThread thread([&](const Pacing&) { ++ticks; }, clock, options);
@@ -198,7 +199,7 @@ TEST(ServoThread, ALoopAmongItsNeighbours) {
   EXPECT_EQ(device.written_N, Vec3::Zero());
 }
 
-TEST(ThreadSetup, SomebodyElsesThreadKeepsWhatItHas) {
+TEST(ThreadSetup, AThreadOfAVendorLibraryKeepsItsScheduling) {
   std::thread([] {
     const int before = sched_getscheduler(0);
     const ThreadSetup setup = setUpThread({.keepScheduling = true, .lockMemory = false});
@@ -210,7 +211,7 @@ TEST(ThreadSetup, SomebodyElsesThreadKeepsWhatItHas) {
   }).join();
 }
 
-// As the kernel tells them: size and policy, flags, niceness and priority, turn, and what deadlines need.
+// struct sched_attr: size and policy, flags, niceness and priority, slice, deadline, period.
 using SchedulingAttributes = std::array<std::uint64_t, 6>;
 
 SchedulingAttributes attributesOfThisThread() {
@@ -219,18 +220,18 @@ SchedulingAttributes attributesOfThisThread() {
   return attributes;
 }
 
-// Linux before 6.12, and some containers, do not let a thread choose.
-bool turnsCanBeChosen() {
-  constexpr std::uint64_t kTurn_ns = 200'000;
+// Linux before 6.12 and some containers refuse the request.
+bool sliceCanBeChosen() {
+  constexpr std::uint64_t kSlice_ns = 200'000;
   SchedulingAttributes wanted = attributesOfThisThread();
-  wanted[3] = kTurn_ns;
-  return syscall(SYS_sched_setattr, 0, wanted.data(), 0U) == 0 && attributesOfThisThread()[3] == kTurn_ns;
+  wanted[3] = kSlice_ns;
+  return syscall(SYS_sched_setattr, 0, wanted.data(), 0U) == 0 && attributesOfThisThread()[3] == kSlice_ns;
 }
 
-TEST(ThreadSetup, ShortTurnsChangeNeitherPolicyNorNiceness) {
+TEST(ThreadSetup, AShortSliceChangesNeitherPolicyNorNiceness) {
   std::thread([] {
     setpriority(PRIO_PROCESS, 0, 3);
-    const bool canBeChosen = turnsCanBeChosen();
+    const bool canBeChosen = sliceCanBeChosen();
     requestShortTimeSlice();
     EXPECT_EQ(sched_getscheduler(0) & ~SCHED_RESET_ON_FORK, SCHED_OTHER);
     EXPECT_EQ(getpriority(PRIO_PROCESS, 0), 3);

@@ -1,6 +1,6 @@
-// No 5 s hold more than the continuous force on average, and the force never has to vanish for it.
-#include "base/time.h"
+// The mean over any 5 s is at most the continuous force, and the limit never falls to zero.
 #include "realtime/servo/thermal_budget.h"
+#include "base/time.h"
 
 #include <gtest/gtest.h>
 

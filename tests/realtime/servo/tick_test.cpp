@@ -1,4 +1,4 @@
-// One turn of the loop with a scripted device: what it does, in which order, and what it reports.
+// One tick with a scripted device: its calls, their order, and its report.
 #include "realtime/servo/tick.h"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ TickOptions armed() {
 
 class TickTest : public testing::Test {
  protected:
-  // Ticks on time, and gives the last report.
+  // Runs ticks on time and returns the last report.
   const TickReport& run(Nanos duration) {
     for (Nanos t = 0; t < duration; t += kMs) tick(now_ += kMs);
     return tick.last();

@@ -41,7 +41,7 @@ TEST(PrometheusText, WritesNonFiniteNumbers) {
 }
 
 TEST(PrometheusText, HistogramBucketsAreCumulative) {
-  realtime::Histogram histogram;
+  base::Histogram histogram;
   for (const base::Nanos value : {0, 1023, 1024, 2047, 5000, 1'000'000}) histogram.add(value);
   histogram.add(base::Nanos{1} << 29);
   histogram.add(base::Nanos{1} << 34);
