@@ -54,7 +54,7 @@ DriverReport findOpenHaptics(const DiscoveryOptions& options) {
   const Usb usb = lookAtUsb(options, "openhaptics");
   const std::string rights = usb.refused ? kUdev : "";
   try {
-    hd::Session::get();
+    hd::Scheduler::get();
   } catch (const LibraryError& error) {
     report.reason = usb.words + error.what();
     report.remedy =

@@ -32,7 +32,7 @@ class Exchange {
   ~Exchange() { stop(); }
 
   void start() {
-    if (device_.selfPaced()) {
+    if (device_.traits().selfPaced) {
       device_.start([this, first = true](Nanos now) mutable {
         if (std::exchange(first, false) && beforeFirstTick_) beforeFirstTick_();
         tick(now);
@@ -128,6 +128,7 @@ int runDeviceHost(Device& device, const DeviceHostOptions& options) {
       return 1;
     }
     memory->profile = SharedProfile::of(device.profile());
+    memory->traits = device.traits();
     {
       Exchange exchange(device, *memory, options);
       send("+");

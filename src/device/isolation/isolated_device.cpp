@@ -56,6 +56,9 @@ void IsolatedDevice::open() {
   }
   profile_ = (*memory_)->profile.toProfile();
   profile_.transportDelay_s += kOneTick_s;
+  traits_ = (*memory_)->traits;
+  traits_.selfPaced = true;
+  traits_.ticksInVendorThread = false;
   silent_ = lostThere_ = false;
 }
 
