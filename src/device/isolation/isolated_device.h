@@ -12,9 +12,9 @@
 #include <memory>
 #include <mutex>
 #include <string>
-#include <thread>
 #include <vector>
 
+#include "base/thread.h"
 #include "device/device.h"
 #include "device/isolation/shared_block.h"
 
@@ -70,7 +70,7 @@ class IsolatedDevice final : public Device {
   mutable std::mutex socketMutex_;
 
   std::function<void(Nanos)> onTick_;
-  std::thread thread_;
+  base::BlockingThread thread_;
   std::atomic<bool> stopping_{false};
   std::atomic<bool> silent_{false};
   std::atomic<bool> lostThere_{false};

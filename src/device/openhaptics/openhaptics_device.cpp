@@ -1,10 +1,8 @@
 #include "device/openhaptics/openhaptics_device.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <stdexcept>
-#include <thread>
 
 #include "base/world.h"
 #include "device/profiles.h"
@@ -12,8 +10,7 @@
 namespace hapticd::device {
 namespace {
 
-using namespace std::chrono_literals;
-
+constexpr Nanos kMillisecond = 1'000'000;
 constexpr double kMetresPerMillimetre = 1e-3;
 constexpr double kHot = 0.95;
 constexpr double kCool = 0.7;
@@ -129,7 +126,7 @@ void OpenHapticsDevice::stop() noexcept {
   if (!started_) return;
   // One frame with zero force first; the amplifiers go off with the scheduler in any case.
   quiet_ = Quiet::wanted;
-  for (int i = 0; i < 20 && quiet_ != Quiet::reached; ++i) std::this_thread::sleep_for(1ms);
+  for (int i = 0; i < 20 && quiet_ != Quiet::reached; ++i) base::sleepFor(kMillisecond);
   scheduler_->leave(*this);
   started_ = false;
 }
@@ -299,7 +296,7 @@ void OpenHapticsDevice::calibrate() {
       consent_ = false;
       return;
     }
-    std::this_thread::sleep_for(10ms);
+    base::sleepFor(10 * kMillisecond);
   }
   consent_ = false;
   throw std::runtime_error("the OpenHaptics device is not calibrated after 3 s: " + faultText());
