@@ -19,7 +19,7 @@ void addDeviceHost(CLI::App& app) {
     const auto device = server::makeDevice(config);
     realtime::setUpThread({.realtime = false});  // locks the memory of the process
     exitCode = device::runDeviceHost(
-        *device, {.rate_Hz = config.servoRate_Hz, .beforeFirstTick = [vendors = device->selfPaced()] {
+        *device, {.rate_Hz = config.servoRate_Hz, .beforeFirstTick = [vendors = device->traits().ticksInVendorThread] {
                     realtime::setUpThread({.keepScheduling = vendors, .lockMemory = false});
                   }});
   });

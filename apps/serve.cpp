@@ -7,7 +7,7 @@
 
 #include "announce.h"
 #include "commands.h"
-#include "server/station/devices.h"
+#include "device/drivers/drivers.h"
 #include "server/server.h"
 #include "stop_on_signal.h"
 
@@ -37,8 +37,11 @@ void applyFlags(const Options& options, server::DeviceConfig& device) {
   if (!options.driver.empty()) {
     const std::size_t colon = options.driver.find(':');
     const std::string driver = options.driver.substr(0, colon);
-    // The hardware name of one driver means nothing to another.
-    if (driver != device.driver) device.hardware.clear();
+    // The hardware name and the keys of one driver mean nothing to another.
+    if (driver != device.driver) {
+      device.hardware.clear();
+      device.driverKeys.clear();
+    }
     device.driver = driver;
     if (colon != std::string::npos) device.hardware = options.driver.substr(colon + 1);
   }
@@ -99,9 +102,6 @@ int run(const Options& options) {
 
 void addServe(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  std::string drivers;
-  for (const std::string& name : server::driverNames()) drivers += (drivers.empty() ? "" : ", ") + name;
-
   CLI::App* command = app.add_subcommand("serve", "Own a haptic device and serve it to VRPN clients");
   command
       ->add_option("--config", options->configFile, "TOML file with all settings, or a vrpn.cfg; flags override it")
@@ -122,7 +122,8 @@ void addServe(CLI::App& app) {
                       "Device name that clients open [Phantom]; repeat it for more names");
   command->add_option(
       "--device", options->driver,
-      "Driver [simulated]: " + drivers + "\nDRIVER:WHICH selects one of several devices, e.g. evdev:/dev/input/event5");
+      "Driver [simulated]: " + device::driverNames() +
+          "\nDRIVER:WHICH selects one of several devices, e.g. evdev:/dev/input/event5");
   command->add_flag("--enable-forces", options->enableForces,
                     "Enable forces on a real device; without this flag it starts disarmed");
   command->add_flag(

@@ -1,4 +1,4 @@
-// The hand of the user, as every driver shows it. To write a driver, copy simulated/.
+// A haptic device, as every driver presents it. docs/writing-a-driver.md explains how to write one.
 #pragma once
 
 #include <cstdint>
@@ -22,10 +22,10 @@ enum Hold : std::uint32_t {
   kHoldDeadMan = 1U << 1,  ///< presence or dead-man switch open
   kHoldInkwell = 1U << 2,  ///< stylus docked
   kHoldHot = 1U << 3,      ///< motor temperature over its limit
-  kHoldFault = 1U << 4,    ///< the driver reports an error; faultText() has the words
+  kHoldFault = 1U << 4,    ///< the driver reports an error; faultText() explains it
 };
 
-/// What the device felt at one moment. Device frame: +x right, +y up, +z to the user.
+/// The measured state at one moment. Device frame: +x right, +y up, +z to the user.
 struct DeviceState {
   Nanos time = 0;
   Vec3 position_m = Vec3::Zero();  ///< haptic interaction point (HIP)
@@ -35,10 +35,10 @@ struct DeviceState {
   std::uint32_t buttons = 0;  ///< bit i is button i
   std::uint32_t hold = kHoldNone;
   double motorTemperature = 0;             ///< 0 cold … 1 hot, worst motor
-  std::optional<double> gripper_rad = {};  ///< how far the gripper is open; nothing without one
+  std::optional<double> gripper_rad = {};  ///< opening of the gripper; nothing without a gripper
 };
 
-/// What the device can do, from the driver or, failing that, from a table.
+/// What the device can do; the driver's own values win over the table in profiles.cpp.
 struct DeviceProfile {
   std::string model = "simulated";
   geometry::Box workspace_m{Vec3(-0.080, -0.060, -0.035), Vec3(0.080, 0.060, 0.035)};
@@ -48,12 +48,26 @@ struct DeviceProfile {
   double ownDamping_Ns_per_m = 5;  ///< device plus grip, for the passivity bound
   double transportDelay_s = 0;     ///< between read and write, for a child process or a network device
   int buttons = 2;
-  std::uint32_t switches = kHoldNone;  ///< what it has a switch for: kHoldDeadMan, kHoldInkwell
-  int inputDof = 6;                    ///< measured: 3 of the position, 3 of the orientation, 1 of a gripper
-  int outputDof = 3;                   ///< with a motor, in the same order; only the force is rendered
+  std::uint32_t switches = kHoldNone;  ///< which of kHoldDeadMan, kHoldInkwell have a switch
+  int inputDof = 6;                    ///< measured degrees of freedom: 3 position, 3 orientation, 1 gripper
+  int outputDof = 3;                   ///< degrees of freedom with a motor, in the same order; only the force is rendered
   bool hasGripper = false;
   bool startsArmed = false;  ///< real devices wait for --enable-forces
 };
+
+/// How a device has to be run.
+struct DeviceTraits {
+  /// The device brings its own loop: call start() instead of pacing it.
+  bool selfPaced = false;
+  /// Self-paced, in a thread that belongs to a vendor's library and keeps its scheduling.
+  bool ticksInVendorThread = false;
+  /// It calibrates itself in its loop, with the consent it was made with: no calibrate() after open().
+  bool calibratesInLoop = false;
+  /// A person must re-arm forces after a trip. False where there is no person to protect: the guard recovers by itself.
+  bool needsRearm = true;
+};
+
+class SteeredHand;
 
 /// One haptic device. open/close block and may throw; read/write run in the servo thread: noexcept,
 /// non-blocking.
@@ -64,13 +78,17 @@ class Device {
   Device(const Device&) = delete;
   Device& operator=(const Device&) = delete;
 
-  /// Connects to the hardware. Throws std::runtime_error that says what is missing and how to get it.
+  /// Connects to the hardware. Throws std::runtime_error: what is missing and how to get it.
   virtual void open() = 0;
   /// Leaves no force behind. May be called twice.
   virtual void close() noexcept = 0;
 
   /// Valid after open().
   virtual const DeviceProfile& profile() const noexcept = 0;
+  /// Valid after open(); selfPaced before, too.
+  virtual DeviceTraits traits() const noexcept { return {}; }
+  /// The controls of a hand that no person moves; null for all other devices.
+  virtual SteeredHand* steered() noexcept { return nullptr; }
 
   /// The state at servo time `now`; false when there is none (`state` unchanged).
   virtual bool read(Nanos now, DeviceState& state) noexcept = 0;
@@ -83,17 +101,15 @@ class Device {
   virtual std::string faultText() const { return {}; }
   /// True while nothing but close() and open() can bring the device back. Any thread but the servo's.
   virtual bool lost() const noexcept { return false; }
-  /// A person's consent to calibrate now, where that moves the arm or needs it in a certain place; what it
-  /// takes stands in faultText(). May block for seconds; forces are held meanwhile. Throws std::runtime_error
-  /// when it does not succeed. Not in the servo thread.
+  /// A person consents to calibrate now, which may move the arm or require a certain pose; faultText() explains what is
+  /// needed. May block for seconds; forces are held meanwhile. Throws std::runtime_error on failure. Not in the servo
+  /// thread.
   virtual void calibrate() {}
 
-  /// True for a device that brings its own loop: instead of pacing it, call start().
-  virtual bool selfPaced() const noexcept { return false; }
-  /// Self-paced, after open(): calls `onTick` with the time of CLOCK_MONOTONIC once in each period, in a
-  /// thread of the device; read() and write() are for that call alone. Throws std::runtime_error.
+  /// Self-paced, after open(): calls `onTick` with the time of CLOCK_MONOTONIC once per period, in a thread
+  /// of the device; only that call may use read() and write(). Throws std::runtime_error.
   virtual void start(std::function<void(Nanos)> /*onTick*/) {}
-  /// Self-paced: returns after the last call, with zero force. close() does it, too. May be called twice.
+  /// Self-paced: returns after the last call, with zero force. close() calls it, too. May be called twice.
   virtual void stop() noexcept {}
 };
 

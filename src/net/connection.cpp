@@ -1,6 +1,6 @@
 #include "net/connection.h"
 
-#include "net/tcp_connection.h"
+#include "net/loop_impl.h"
 
 namespace hapticd::net {
 
@@ -22,9 +22,7 @@ Connection::~Connection() {
 
 Connection Connection::connect(Loop& loop, const Endpoint& peer, std::chrono::milliseconds timeout,
                                const ConnectionOptions& options) {
-  auto impl = std::make_shared<TcpConnection>(loop.impl(), options);
-  impl->connect(peer, timeout);
-  return Connection(std::move(impl));
+  return Connection(loop.impl().connect(peer, timeout, options));
 }
 
 void Connection::start(ConnectionHandlers handlers) {

@@ -91,7 +91,7 @@ void HttpConnection::parse() {
   } else if (error == http::error::body_limit) {
     refuse(413, "the body of the request is too long");
   } else if (error) {
-    refuse(400, "this is no HTTP request: " + error.message());
+    refuse(400, "malformed HTTP request: " + error.message());
   } else if (parser_->is_done()) {
     ask();
   }

@@ -37,9 +37,9 @@ class Subscription {
 
 class Loop {
  public:
-  using Duration = std::chrono::steady_clock::duration;
+  using Duration = std::chrono::nanoseconds;
 
-  /// Throws Error when the system has no file descriptor left.
+  /// A loop of network(). Throws Error when the system has no file descriptor left.
   Loop();
   ~Loop();
   Loop(const Loop&) = delete;
@@ -71,8 +71,8 @@ class Loop {
   /// set.
   void setErrorHandler(std::function<void(std::string_view)> handler);
 
-  /// For this room only.
-  struct Impl;
+  /// What a Network implements; for this room only.
+  class Impl;
   Impl& impl() noexcept { return *impl_; }
 
  private:

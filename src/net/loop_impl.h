@@ -1,21 +1,19 @@
-// What the sockets of this room share behind Loop; the only way Asio is seen, and by src/net alone.
+// What an event loop does behind Loop, and the sockets that live in it: AsioLoop in production, a simulated one in tests.
 #pragma once
 
-#include <utility>  // before Asio: Boost 1.74 uses std::exchange without including it
-//
-#include <boost/asio/executor_work_guard.hpp>
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/address_v4.hpp>
-#include <cstddef>
 #include <exception>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
+#include "net/connection_impl.h"
 #include "net/endpoint.h"
 #include "net/loop.h"
+#include "net/tcp_listener.h"
+#include "net/udp_socket.h"
 
 namespace hapticd::net {
 
@@ -32,18 +30,29 @@ std::optional<std::string> errorOf(Function&& function) {
   }
 }
 
-struct Loop::Impl {
-  static constexpr std::size_t kReadBufferBytes = std::size_t{64} * 1024;
+/// See Loop for what each call means.
+class Loop::Impl {
+ public:
+  virtual ~Impl() = default;
 
-  // One buffer for all sockets: each read is consumed before the next, so memory does not grow with clients.
-  std::unique_ptr<std::byte[]> readBuffer = std::make_unique_for_overwrite<std::byte[]>(kReadBufferBytes);
-  std::function<void(std::string_view)> onError;
-  bool running = false;
-  boost::asio::io_context context{1};  // one thread runs it; posting from others stays safe
-  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work{context.get_executor()};
+  virtual void run() = 0;
+  virtual void runFor(Duration duration) = 0;
+  virtual std::size_t runOnce(Duration timeout) = 0;
+  virtual void stop() = 0;
+  virtual void post(std::function<void()> function) = 0;
+  virtual std::shared_ptr<Subscription::State> after(Duration delay, std::function<void()> function) = 0;
+  /// The period is positive.
+  virtual std::shared_ptr<Subscription::State> every(Duration period, std::function<void()> function) = 0;
+  virtual std::shared_ptr<Subscription::State> watchFd(int fd, std::function<void()> function) = 0;
 
+  virtual std::shared_ptr<Connection::Impl> connect(const Endpoint& peer, std::chrono::milliseconds timeout,
+                                                    const ConnectionOptions& options) = 0;
+  virtual std::shared_ptr<TcpListener::Impl> listen(const Endpoint& local, std::function<void(Connection)> onAccept,
+                                                    const ConnectionOptions& options, const char* option) = 0;
+  virtual std::shared_ptr<UdpSocket::Impl> bind(const Endpoint& local) = 0;
+
+  /// Hands a text to the error handler.
   void report(std::string_view text) noexcept;
-
   /// Runs a callback that belongs to no connection.
   template <class Function>
   void guard(Function&& function) {
@@ -51,21 +60,67 @@ struct Loop::Impl {
       report(*error);
     }
   }
+
+  std::function<void(std::string_view)> onError;
+  bool running = false;
 };
 
-/// Why a socket of the given kind ("TCP", "UDP") could not be bound, with the remedy: another choice for
+/// Marks the loop as running for as long as it lives; throws std::logic_error when it is running already.
+class RunScope {
+ public:
+  explicit RunScope(Loop::Impl& loop);
+  ~RunScope() { loop_.running = false; }
+  RunScope(const RunScope&) = delete;
+  RunScope& operator=(const RunScope&) = delete;
+
+ private:
+  Loop::Impl& loop_;
+};
+
+class Subscription::State : public std::enable_shared_from_this<State> {
+ public:
+  State(Loop::Impl& loop, std::function<void()> function) : loop_(loop), function_(std::move(function)) {}
+  virtual ~State() = default;
+
+  virtual void cancel() noexcept { active_ = false; }
+  bool active() const noexcept { return active_; }
+
+ protected:
+  void call() { loop_.guard(function_); }
+
+  Loop::Impl& loop_;
+  bool active_ = true;
+
+ private:
+  std::function<void()> function_;
+};
+
+/// What every kind of listener does behind TcpListener.
+class TcpListener::Impl {
+ public:
+  virtual ~Impl() = default;
+  /// No callback after this.
+  virtual void close() noexcept = 0;
+  virtual const Endpoint& local() const = 0;
+};
+
+/// What every kind of datagram socket does behind UdpSocket.
+class UdpSocket::Impl {
+ public:
+  virtual ~Impl() = default;
+  virtual void start(UdpHandlers handlers) = 0;
+  virtual void connect(const Endpoint& peer) = 0;
+  virtual bool send(std::span<const std::byte> bytes) = 0;
+  virtual bool sendTo(std::span<const std::byte> bytes, const Endpoint& to) = 0;
+  virtual std::size_t sendBatch(std::span<const Datagram> datagrams) = 0;
+  /// No callback after this.
+  virtual void close() noexcept = 0;
+  virtual const Endpoint& local() const = 0;
+  virtual const UdpStatistics& statistics() const = 0;
+};
+
+/// Why a socket of the given kind ("TCP", "UDP") could not be bound (an errno), with the remedy: another choice for
 /// `option`.
-std::string bindErrorText(const char* kind, const Endpoint& local, const boost::system::error_code& error,
-                          const std::string& option = "--listen");
-
-template <class AsioEndpoint>
-AsioEndpoint toAsio(const Endpoint& endpoint) {
-  return AsioEndpoint(boost::asio::ip::address_v4(endpoint.address), endpoint.port);
-}
-
-template <class AsioEndpoint>
-Endpoint fromAsio(const AsioEndpoint& endpoint) {
-  return {endpoint.address().is_v4() ? endpoint.address().to_v4().to_uint() : 0, endpoint.port()};
-}
+std::string bindErrorText(const char* kind, const Endpoint& local, int error, const std::string& option = "--listen");
 
 }  // namespace hapticd::net

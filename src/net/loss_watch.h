@@ -5,6 +5,8 @@
 #include <chrono>
 #include <optional>
 
+#include "base/time.h"
+
 namespace hapticd::net {
 
 /// What the system tells of a connection at one moment (TCP_INFO).
@@ -23,7 +25,6 @@ struct LinkState {
 class LossWatch {
  public:
   using Milliseconds = std::chrono::milliseconds;
-  using TimePoint = std::chrono::steady_clock::time_point;
 
   /// A timeout of zero never finds anything lost.
   explicit LossWatch(Milliseconds timeout) : timeout_(timeout) {}
@@ -32,9 +33,9 @@ class LossWatch {
   /// How often isLost() wants to be asked.
   Milliseconds interval() const { return std::max(timeout_ / 5, Milliseconds(1)); }
 
-  bool isLost(const LinkState& link, TimePoint now) {
-    const auto gap = std::chrono::duration_cast<Milliseconds>(now - looked_);
-    looked_ = now;
+  bool isLost(const LinkState& link, base::Nanos now) {
+    const auto gap = std::chrono::duration_cast<Milliseconds>(std::chrono::nanoseconds(now - lastCheck_));
+    lastCheck_ = now;
     const bool silent = awaitsAnswer(link);
     if (!silent) {
       waited_.reset();
@@ -60,7 +61,7 @@ class LossWatch {
   }
 
   Milliseconds timeout_;
-  TimePoint looked_{};
+  base::Nanos lastCheck_ = 0;
   std::optional<bool> probeCounts_;     // whether the first probe must have an answer
   std::optional<Milliseconds> waited_;  // how long an answer is due
 };

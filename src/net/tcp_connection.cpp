@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "base/world.h"
 #include "net/socket_options.h"
 //
 #include <boost/asio/error.hpp>
@@ -29,7 +30,7 @@ std::string endText(const boost::system::error_code& error) {
 
 }  // namespace
 
-TcpConnection::TcpConnection(Loop::Impl& loop, const ConnectionOptions& options)
+TcpConnection::TcpConnection(AsioLoop& loop, const ConnectionOptions& options)
     : loop_(loop),
       options_(options),
       socket_(loop.context),
@@ -113,7 +114,7 @@ void TcpConnection::armWatch() {
       return;
     }
     const auto link = linkState(socket_.native_handle());
-    if (link && watch_.isLost(*link, std::chrono::steady_clock::now())) {
+    if (link && watch_.isLost(*link, base::now())) {
       writeFailed(asio::error::timed_out);
     } else {
       armWatch();
@@ -164,7 +165,7 @@ void TcpConnection::armRead() {
 void TcpConnection::readable() {
   ErrorCode error;
   const std::size_t size =
-      socket_.read_some(asio::buffer(loop_.readBuffer.get(), Loop::Impl::kReadBufferBytes), error);
+      socket_.read_some(asio::buffer(loop_.readBuffer.get(), AsioLoop::kReadBufferBytes), error);
   if (!error) {
     deliver(size);
   } else if (error == asio::error::eof) {

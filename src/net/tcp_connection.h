@@ -1,7 +1,7 @@
 // The state machine of a TCP connection, shared with the listener that makes accepted ones.
 #pragma once
 
-#include "net/loop_impl.h"
+#include "net/asio_loop.h"
 //
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -18,7 +18,7 @@ class TcpConnection final : public Connection::Impl, public std::enable_shared_f
   using Socket = boost::asio::ip::tcp::socket;
   using ErrorCode = boost::system::error_code;
 
-  TcpConnection(Loop::Impl& loop, const ConnectionOptions& options);
+  TcpConnection(AsioLoop& loop, const ConnectionOptions& options);
 
   void connect(const Endpoint& peer, std::chrono::milliseconds timeout);
   /// Takes over an accepted socket; its reading waits for start().
@@ -63,7 +63,7 @@ class TcpConnection final : public Connection::Impl, public std::enable_shared_f
   template <class Callback, class... Arguments>
   void call(Callback ConnectionHandlers::*callback, const Arguments&... arguments);
 
-  Loop::Impl& loop_;
+  AsioLoop& loop_;
   ConnectionOptions options_;
   Socket socket_;
   boost::asio::steady_timer timer_;  // of connect(), then of close()

@@ -1,7 +1,5 @@
 #include "net/web_socket.h"
 
-#include <boost/asio/post.hpp>
-
 namespace hapticd::net {
 
 WebSocket::WebSocket(Loop::Impl& loop, Connection stream, Buffer ahead)
@@ -28,9 +26,9 @@ void WebSocket::start(ConnectionHandlers callbacks) {
                        if (handlers->onClosed) handlers->onClosed(reason);
                      }});
   if (ahead_.empty()) return;
-  boost::asio::post(loop_.context, [weak] {
+  loop_.post([weak] {
     const auto self = weak.lock();
-    if (self && self->handlers_) self->loop_.guard([&] { self->receive({}); });
+    if (self && self->handlers_) self->receive({});
   });
 }
 

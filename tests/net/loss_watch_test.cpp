@@ -11,12 +11,12 @@ using std::chrono::milliseconds;
 class LossWatchTest : public testing::Test {
  protected:
   bool look(bool inFlight, int probes, int sinceHeard_ms, int gap_ms = 100) {
-    now_ += milliseconds(gap_ms);
+    now_ += base::Nanos{1'000'000} * gap_ms;
     return watch_.isLost({inFlight, probes, milliseconds(sinceHeard_ms)}, now_);
   }
 
   LossWatch watch_{milliseconds(500)};
-  LossWatch::TimePoint now_{std::chrono::hours(1)};
+  base::Nanos now_ = base::toNanos(3600);
 };
 
 TEST_F(LossWatchTest, SilenceWithDataUnderWayIsALossAfterTheTimeout) {

@@ -7,7 +7,7 @@
 #include <chrono>
 #include <climits>
 #include <exception>
-#include <fstream>
+#include <sstream>
 
 #include "device/discovery/usb_devices.h"
 #include "device/evdev/evdev_device.h"
@@ -23,11 +23,11 @@ constexpr const char* kUdev =
     "sudo cp packaging/udev/70-hapticd.rules /etc/udev/rules.d/ && sudo udevadm control --reload && "
     "sudo udevadm trigger";
 
-// What one driver sees of its devices without its library.
+// The devices of one driver as the kernel lists them, without the driver's library.
 struct Usb {
   std::vector<UsbDevice> devices;
-  std::string words;     // what is plugged in, and which node this user may not open; with "; " behind
-  bool refused = false;  // by missing rights
+  std::string words;     // devices that are plugged in and nodes that this user may not open, each followed by "; "
+  bool refused = false;  // for lack of permission
 };
 
 Usb lookAtUsb(const DiscoveryOptions& options, const char* driver) {
@@ -54,7 +54,7 @@ DriverReport findOpenHaptics(const DiscoveryOptions& options) {
   const Usb usb = lookAtUsb(options, "openhaptics");
   const std::string rights = usb.refused ? kUdev : "";
   try {
-    hd::Session::get();
+    hd::Scheduler::get();
   } catch (const LibraryError& error) {
     report.reason = usb.words + error.what();
     report.remedy =
@@ -130,12 +130,12 @@ DriverReport findHaply(const DiscoveryOptions& options) {
   return report;
 }
 
-// Whether an input device has a constant force, from what the kernel shows to everybody: words of a bit set
-// in hexadecimal, the highest first.
+// Whether an input device has a constant force. The kernel shows a bit set to every user: hexadecimal words, the
+// highest first.
 bool hasForce(const std::filesystem::path& inputDevice) {
   constexpr std::size_t kConstantForce = 0x52;
   constexpr std::size_t kWord = CHAR_BIT * sizeof(unsigned long);
-  std::ifstream file(inputDevice / "device/capabilities/ff");
+  std::istringstream file(textOf(inputDevice / "device/capabilities/ff"));
   std::vector<unsigned long> words;
   for (unsigned long word = 0; file >> std::hex >> word;) words.push_back(word);
   const std::size_t index = kConstantForce / kWord;
@@ -144,9 +144,7 @@ bool hasForce(const std::filesystem::path& inputDevice) {
 }
 
 std::string nameOf(const std::filesystem::path& inputDevice) {
-  std::string name;
-  std::ifstream file(inputDevice / "device/name");
-  std::getline(file, name);
+  const std::string name = firstLine(inputDevice / "device/name");
   return name.empty() ? "an input device" : name;
 }
 

@@ -1,9 +1,10 @@
 #include "device/discovery/usb_devices.h"
 
 #include <algorithm>
-#include <fstream>
 #include <system_error>
 #include <tuple>
+
+#include "base/world.h"
 
 namespace hapticd::device {
 namespace {
@@ -11,13 +12,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kDeepest = 6;  // below a device: interface, HID device, kind, node
-
-std::string firstLine(const fs::path& file) {
-  std::string line;
-  std::ifstream in(file);
-  std::getline(in, line);
-  return line;
-}
 
 // The kernel lists the nodes of an interface in a folder of their kind.
 std::vector<std::string> nodesOf(const fs::path& device) {
@@ -51,6 +45,20 @@ bool belongsTo(const UsbDevice& device, std::string_view driver) {
 }
 
 }  // namespace
+
+std::string textOf(const fs::path& file) {
+  try {
+    const std::vector<std::byte> bytes = base::world().files.read(file);
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+  } catch (const std::system_error&) {
+    return {};
+  }
+}
+
+std::string firstLine(const fs::path& file) {
+  const std::string text = textOf(file);
+  return text.substr(0, text.find('\n'));
+}
 
 std::vector<UsbDevice> findUsbDevices(const fs::path& folder, std::string_view driver) {
   std::vector<UsbDevice> found;

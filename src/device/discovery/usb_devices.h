@@ -1,4 +1,4 @@
-// What is plugged in, whether or not a driver can use it.
+// USB devices that are plugged in, whether or not a driver can use them.
 #pragma once
 
 #include <filesystem>
@@ -8,7 +8,12 @@
 
 namespace hapticd::device {
 
-/// What a driver recognises its devices by; packaging/udev has a rule for each.
+/// The content of a small file of the kernel, such as those in /sys; empty when it cannot be read.
+std::string textOf(const std::filesystem::path& file);
+/// Its first line.
+std::string firstLine(const std::filesystem::path& file);
+
+/// USB identity by which a driver recognises its devices; packaging/udev has a rule for each.
 struct UsbKind {
   std::string_view driver;
   std::string_view vendor;   ///< four hexadecimal digits
@@ -20,8 +25,8 @@ inline constexpr UsbKind kUsbKinds[] = {
 struct UsbDevice {
   std::string vendor;   ///< four hexadecimal digits
   std::string product;  ///< four hexadecimal digits
-  std::string name;     ///< as it calls itself; may be empty
-  /// Below /dev, what a library opens to reach it: a serial line or HID device, else the USB device itself.
+  std::string name;     ///< product string; may be empty
+  /// Nodes below /dev that a library opens to reach it: a serial line or HID device, else the USB device itself.
   std::vector<std::string> nodes;
 
   std::string text() const {

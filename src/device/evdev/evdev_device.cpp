@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
@@ -16,8 +15,7 @@
 namespace hapticd::device {
 namespace {
 
-using namespace std::chrono_literals;
-
+constexpr Nanos kMillisecond = 1'000'000;
 constexpr Nanos kForcePeriod = 2'000'000;  // 500 Hz: more than a USB poll can use
 constexpr Nanos kCommandLife = 20'000'000;
 constexpr Nanos kStateLife = 100'000'000;
@@ -78,7 +76,7 @@ void EvdevDevice::open() {
   }
   if (!ownThread_) return;
   stopping_ = false;
-  thread_ = std::thread([this] { run(); });
+  thread_ = base::BlockingThread({.name = "evdev"}, [this] { run(); });
 }
 
 void EvdevDevice::findFile() {
@@ -147,7 +145,7 @@ EvdevDevice::Axis EvdevDevice::readAxis(int code, double travel_m) {
 
 void EvdevDevice::close() noexcept {
   stopping_ = true;
-  if (thread_.joinable()) thread_.join();
+  thread_.join();
   if (effects_) effects_->end();
   effects_.reset();
   if (!given_) file_.reset();
@@ -157,7 +155,7 @@ void EvdevDevice::run() noexcept {
   while (!stopping_) {
     exchange(base::now());
     if (error_ != 0) {
-      std::this_thread::sleep_for(10ms);  // a device that is gone is always readable
+      base::sleepFor(10 * kMillisecond);  // a device that is gone is always readable
     } else {
       file_->wait(kForcePeriod / 2);
     }

@@ -12,8 +12,8 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
-#include <thread>
 
+#include "base/thread.h"
 #include "device/device.h"
 #include "device/evdev/event_device.h"
 #include "device/evdev/force_effects.h"
@@ -91,7 +91,7 @@ class EvdevDevice final : public Device {
   WheelProfile wheel_;
   DeviceProfile profile_;
   std::optional<ForceEffects> effects_;
-  std::thread thread_;
+  base::BlockingThread thread_;
   std::atomic<bool> stopping_{false};
   std::atomic<int> error_{0};  // errno while the device does not answer
 

@@ -2,6 +2,11 @@
 
 #include <toml++/toml.h>
 #include <string>
+#include <string_view>
+#include <system_error>
+#include <vector>
+
+#include "base/world.h"
 
 namespace hapticd::device {
 namespace {
@@ -27,7 +32,7 @@ class Reader {
   }
   void finish() const {
     if (taken_ == table_.size()) return;
-    throw WheelProfileError(file_ + ": holds a name that no profile has");
+    throw WheelProfileError(file_ + ": unknown key");
   }
 
  private:
@@ -50,7 +55,9 @@ class Reader {
 WheelProfile WheelProfile::load(const std::filesystem::path& file) {
   WheelProfile profile;
   try {
-    const toml::table table = toml::parse_file(file.string());
+    const std::vector<std::byte> bytes = base::world().files.read(file);
+    const toml::table table =
+        toml::parse(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()), file.string());
     Reader reader(table, file.string());
     reader.number("force_N", profile.force_N, 0.05, 100);
     profile.continuousForce_N = 0.5 * profile.force_N;
@@ -66,6 +73,8 @@ WheelProfile WheelProfile::load(const std::filesystem::path& file) {
     reader.finish();
   } catch (const toml::parse_error& error) {
     throw WheelProfileError(file.string() + ": " + std::string(error.description()));
+  } catch (const std::system_error& error) {
+    throw WheelProfileError(error.what());
   }
   profile.measured = true;
   return profile;

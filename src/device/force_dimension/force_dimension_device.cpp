@@ -1,18 +1,16 @@
 #include "device/force_dimension/force_dimension_device.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <stdexcept>
-#include <thread>
 
+#include "base/world.h"
 #include "device/profiles.h"
 
 namespace hapticd::device {
 namespace {
 
-using namespace std::chrono_literals;
-
+constexpr Nanos kMillisecond = 1'000'000;
 constexpr Nanos kStatusPeriod = 10'000'000;
 constexpr int kFailuresToFault = 3;
 constexpr double kWatchdogStep_s = 125e-6;
@@ -243,7 +241,7 @@ void ForceDimensionDevice::calibrate() {
   for (int i = 0; i < 1000; ++i) {
     const Turn turn(busy_);
     if (!turn) {
-      std::this_thread::sleep_for(1ms);
+      base::sleepFor(kMillisecond);
       continue;
     }
     const auto id = static_cast<char>(id_);

@@ -19,6 +19,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
+constexpr Nanos kMillisecond = 1'000'000;
 constexpr auto kConnectTime = 1000ms;
 constexpr auto kReplyTime = 20ms;
 constexpr int kReconnect_ms = 200;
@@ -41,12 +42,12 @@ HaplyDevice::~HaplyDevice() {
 }
 
 void HaplyDevice::open() {
-  if (thread_.joinable()) return;
+  if (thread_.running()) return;
   stopping_ = false;
   connected_ = failed_ = false;
   sample_.write({});
-  thread_ = std::thread([this] { run(); });
-  while (!connected_ && !failed_) std::this_thread::sleep_for(1ms);
+  thread_ = base::BlockingThread({.name = "haply"}, [this] { run(); });
+  while (!connected_ && !failed_) base::sleepFor(kMillisecond);
   if (!failed_) return;
   const std::string words = faultText();
   close();
@@ -58,7 +59,7 @@ void HaplyDevice::close() noexcept {
   stopping_ = true;
   const std::uint64_t one = 1;
   [[maybe_unused]] const auto written = ::write(wake_, &one, sizeof one);
-  if (thread_.joinable()) thread_.join();
+  thread_.join();
 }
 
 void HaplyDevice::run() noexcept {
@@ -76,7 +77,7 @@ void HaplyDevice::run() noexcept {
     state_.hold |= kHoldFault;
     sample_.write({state_, state_.time != 0});
     for (int waited = 0; waited < kReconnect_ms && !stopping_; waited += 10)
-      std::this_thread::sleep_for(10ms);
+      base::sleepFor(10 * kMillisecond);
   }
 }
 

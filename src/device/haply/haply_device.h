@@ -7,8 +7,8 @@
 #include <atomic>
 #include <mutex>
 #include <string>
-#include <thread>
 
+#include "base/thread.h"
 #include "device/device.h"
 #include "handoff/latest_value.h"
 
@@ -58,7 +58,7 @@ class HaplyDevice final : public Device {
   const HaplyOptions options_;
   DeviceProfile profile_;
   int wake_ = -1;  // eventfd: a new force, or the end
-  std::thread thread_;
+  base::BlockingThread thread_;
   std::atomic<bool> stopping_{false};
   std::atomic<bool> connected_{false};
   std::atomic<std::uint32_t> hold_{kHoldNone};

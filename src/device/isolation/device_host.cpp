@@ -1,7 +1,6 @@
 #include "device/isolation/device_host.h"
 
 #include <sys/socket.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -10,7 +9,6 @@
 #include <cstdio>
 #include <exception>
 #include <string>
-#include <thread>
 #include <utility>
 
 #include "base/world.h"
@@ -32,21 +30,21 @@ class Exchange {
   ~Exchange() { stop(); }
 
   void start() {
-    if (device_.selfPaced()) {
+    if (device_.traits().selfPaced) {
       device_.start([this, first = true](Nanos now) mutable {
         if (std::exchange(first, false) && beforeFirstTick_) beforeFirstTick_();
         tick(now);
       });
-    } else if (!thread_.joinable()) {
+    } else if (!thread_.running()) {
       leave_ = false;
-      thread_ = std::thread([this] { run(); });
+      thread_ = base::BlockingThread({.name = "device host"}, [this] { run(); });
     }
   }
 
   void stop() noexcept {
     device_.stop();
     leave_ = true;
-    if (!thread_.joinable()) return;
+    if (!thread_.running()) return;
     thread_.join();
     device_.write(Vec3::Zero());
   }
@@ -72,8 +70,7 @@ class Exchange {
   void run() noexcept {
     if (beforeFirstTick_) beforeFirstTick_();
     for (Nanos due = base::now() + period_; !leave_; due += period_) {
-      const timespec until{due / 1'000'000'000, due % 1'000'000'000};
-      clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
+      base::world().clock.sleepUntil(due);
       const Nanos now = base::now();
       if (now > due + period_) due = now;  // no ticks are made up for
       tick(now);
@@ -84,7 +81,7 @@ class Exchange {
   SharedBlock& block_;
   const Nanos period_;
   const std::function<void()> beforeFirstTick_;
-  std::thread thread_;
+  base::BlockingThread thread_;
   std::atomic<bool> leave_{false};
   std::uint64_t lastCommand_ = 0;
   Nanos commandTime_ = 0;
@@ -128,6 +125,7 @@ int runDeviceHost(Device& device, const DeviceHostOptions& options) {
       return 1;
     }
     memory->profile = SharedProfile::of(device.profile());
+    memory->traits = device.traits();
     {
       Exchange exchange(device, *memory, options);
       send("+");

@@ -9,7 +9,6 @@
 
 #include <array>
 #include <cerrno>
-#include <chrono>
 #include <csignal>
 #include <cstring>
 #include <stdexcept>
@@ -23,8 +22,7 @@ namespace hapticd::device {
 namespace {
 
 using namespace isolation;
-using namespace std::chrono_literals;
-
+constexpr Nanos kMillisecond = 1'000'000;
 constexpr int kOpen_ms = 30000;
 constexpr int kCalibrate_ms = 60000;
 constexpr int kAnswer_ms = 2000;
@@ -56,6 +54,9 @@ void IsolatedDevice::open() {
   }
   profile_ = (*memory_)->profile.toProfile();
   profile_.transportDelay_s += kOneTick_s;
+  traits_ = (*memory_)->traits;
+  traits_.selfPaced = true;
+  traits_.ticksInVendorThread = false;
   silent_ = lostThere_ = false;
 }
 
@@ -116,7 +117,7 @@ std::string IsolatedDevice::howItEnded(int most_ms) const {
   const auto id = static_cast<id_t>(process_.load());
   for (int i = 0; i <= most_ms && info.si_pid == 0; ++i) {
     if (waitid(P_PID, id, &info, WEXITED | WNOHANG | WNOWAIT) != 0) break;
-    if (info.si_pid == 0 && i < most_ms) std::this_thread::sleep_for(1ms);
+    if (info.si_pid == 0 && i < most_ms) base::sleepFor(kMillisecond);
   }
   if (info.si_pid == 0) return {};
   if (info.si_code == CLD_EXITED) return " with status " + std::to_string(info.si_status);
@@ -139,23 +140,23 @@ void IsolatedDevice::endProcess() noexcept {
   if (process < 0) return;
   for (int i = 0; i < 2000; ++i) {
     if (waitpid(process, nullptr, WNOHANG) != 0) return;
-    std::this_thread::sleep_for(1ms);
+    base::sleepFor(kMillisecond);
   }
   kill(process, SIGKILL);
   waitpid(process, nullptr, 0);
 }
 
 void IsolatedDevice::start(std::function<void(Nanos)> onTick) {
-  if (thread_.joinable()) return;
+  if (thread_.running()) return;
   ask("start", kAnswer_ms);
   onTick_ = std::move(onTick);
   stopping_ = false;
   lastPost_ = base::now();
-  thread_ = std::thread([this] { run(); });
+  thread_ = base::BlockingThread({.name = "isolated device"}, [this] { run(); });
 }
 
 void IsolatedDevice::stop() noexcept {
-  if (!thread_.joinable()) return;
+  if (!thread_.running()) return;
   stopping_ = true;
   thread_.join();
   try {

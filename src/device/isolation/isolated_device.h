@@ -12,9 +12,9 @@
 #include <memory>
 #include <mutex>
 #include <string>
-#include <thread>
 #include <vector>
 
+#include "base/thread.h"
 #include "device/device.h"
 #include "device/isolation/shared_block.h"
 
@@ -35,6 +35,8 @@ class IsolatedDevice final : public Device {
   void open() override;
   void close() noexcept override;
   const DeviceProfile& profile() const noexcept override { return profile_; }
+  /// Those of the driver, but self-paced in a thread of ours.
+  DeviceTraits traits() const noexcept override { return traits_; }
 
   bool read(Nanos now, DeviceState& state) noexcept override;
   bool write(const Vec3& force_N) noexcept override;
@@ -43,7 +45,6 @@ class IsolatedDevice final : public Device {
   bool lost() const noexcept override { return silent_ || lostThere_; }
   void calibrate() override;
 
-  bool selfPaced() const noexcept override { return true; }
   void start(std::function<void(Nanos)> onTick) override;
   void stop() noexcept override;
 
@@ -62,13 +63,14 @@ class IsolatedDevice final : public Device {
 
   const IsolatedOptions options_;
   DeviceProfile profile_;
+  DeviceTraits traits_{.selfPaced = true};
   std::unique_ptr<isolation::SharedMemory> memory_;
   std::atomic<pid_t> process_{-1};
   int socket_ = -1;
   mutable std::mutex socketMutex_;
 
   std::function<void(Nanos)> onTick_;
-  std::thread thread_;
+  base::BlockingThread thread_;
   std::atomic<bool> stopping_{false};
   std::atomic<bool> silent_{false};
   std::atomic<bool> lostThere_{false};

@@ -55,7 +55,8 @@ struct SharedProfile {
 /// Made by the server; both processes are the same build.
 struct SharedBlock {
   std::uint64_t size = sizeof(SharedBlock);
-  SharedProfile profile;  ///< before the first answer on the socket
+  SharedProfile profile;  ///< set before the first answer on the socket
+  DeviceTraits traits;    ///< likewise
   std::atomic<std::uint32_t> posts{0};
   handoff::LatestValue<Posted> state;
   handoff::LatestValue<Command> command;

@@ -1,10 +1,8 @@
 #include "device/openhaptics/openhaptics_device.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <stdexcept>
-#include <thread>
 
 #include "base/world.h"
 #include "device/profiles.h"
@@ -12,8 +10,7 @@
 namespace hapticd::device {
 namespace {
 
-using namespace std::chrono_literals;
-
+constexpr Nanos kMillisecond = 1'000'000;
 constexpr double kMetresPerMillimetre = 1e-3;
 constexpr double kHot = 0.95;
 constexpr double kCool = 0.7;
@@ -45,10 +42,10 @@ std::string text(const char* words) {
 
 void OpenHapticsDevice::open() {
   if (handle_ != hd::kInvalidHandle) return;
-  session_ = hd::Session::get();
+  scheduler_ = hd::Scheduler::get();
   std::string name;
-  handle_ = session_->open(options_.name, name);
-  session_->whileStopped(handle_, [&] { readIdentity(); });
+  handle_ = scheduler_->open(options_.name, name);
+  scheduler_->whileStopped(handle_, [&] { readIdentity(); });
   description_ += ", opened as " + name;
   derating_ = ThermalDerating(profile_.peakForce_N, profile_.continuousForce_N);
   state_ = DeviceState();
@@ -66,7 +63,7 @@ void OpenHapticsDevice::open() {
 
 // What the driver says of itself wins where it is plausible.
 void OpenHapticsDevice::readIdentity() {
-  const hd::Api& api = session_->api();
+  const hd::Api& api = scheduler_->api();
   const std::string model = text(api.getString(hd::kModel));
   description_ = model + ", serial number " + text(api.getString(hd::kSerialNumber)) + ", driver " +
                  text(api.getString(hd::kDriverVersion));
@@ -94,13 +91,13 @@ void OpenHapticsDevice::readIdentity() {
   if (((max - min).array() > 0.02).all() && ((max - min).array() < 2).all())
     profile_.workspace_m = {min, max};
   readAxes();
-  session_->takeErrors();  // an older driver does not know every value
+  scheduler_->takeErrors();  // an older driver does not know every value
 }
 
 void OpenHapticsDevice::readAxes() {
   const auto replace = [&](int& value, hd::Enum what) {
     int said = 0;
-    session_->api().getIntegerv(what, &said);
+    scheduler_->api().getIntegerv(what, &said);
     if (said == 3 || said == 6 || said == 7) value = said;
   };
   replace(profile_.inputDof, hd::kInputDof);
@@ -112,7 +109,7 @@ void OpenHapticsDevice::readAxes() {
 void OpenHapticsDevice::close() noexcept {
   if (handle_ == hd::kInvalidHandle) return;
   stop();
-  session_->close(handle_);
+  scheduler_->close(handle_);
   handle_ = hd::kInvalidHandle;
 }
 
@@ -121,7 +118,7 @@ void OpenHapticsDevice::start(std::function<void(Nanos)> onTick) {
   if (started_) return;
   onTick_ = std::move(onTick);
   quiet_ = Quiet::no;
-  session_->join(handle_, *this, options_.rate_Hz);
+  scheduler_->join(handle_, *this, options_.rate_Hz);
   started_ = true;
 }
 
@@ -129,8 +126,8 @@ void OpenHapticsDevice::stop() noexcept {
   if (!started_) return;
   // One frame with zero force first; the amplifiers go off with the scheduler in any case.
   quiet_ = Quiet::wanted;
-  for (int i = 0; i < 20 && quiet_ != Quiet::reached; ++i) std::this_thread::sleep_for(1ms);
-  session_->leave(*this);
+  for (int i = 0; i < 20 && quiet_ != Quiet::reached; ++i) base::sleepFor(kMillisecond);
+  scheduler_->leave(*this);
   started_ = false;
 }
 
@@ -147,7 +144,7 @@ bool OpenHapticsDevice::write(const Vec3& force_N) noexcept {
 }
 
 void OpenHapticsDevice::onFrame() noexcept {
-  const hd::Api& api = session_->api();
+  const hd::Api& api = scheduler_->api();
   const bool quiet = quiet_ != Quiet::no;
   now_ = base::now();
   api.makeCurrentDevice(handle_);
@@ -173,13 +170,13 @@ void OpenHapticsDevice::onFrame() noexcept {
   api.endFrame(handle_);
 
   if (!calibrated_) updateCalibration(calibration);
-  session_->drainErrors();
+  scheduler_->drainErrors();
   ++frames_;
   if (quiet) quiet_ = Quiet::reached;
 }
 
 void OpenHapticsDevice::sample(Nanos now) noexcept {
-  const hd::Api& api = session_->api();
+  const hd::Api& api = scheduler_->api();
   Vec3 v = Vec3::Zero();
   state_.time = now;
   api.getDoublev(hd::kCurrentPosition, v.data());
@@ -213,13 +210,13 @@ void OpenHapticsDevice::noticeSilence() noexcept {
   before_ = state_;
   if (!same) sameFrames_ = 0;
   if (!written_N_.isZero()) ++sameFrames_;
-  if (sameFrames_ < kSilence_s * options_.rate_Hz || !session_->deviceErrorTold()) return;
+  if (sameFrames_ < kSilence_s * options_.rate_Hz || !scheduler_->deviceErrorTold()) return;
   silent_ = true;
   lost_ = true;
 }
 
 std::uint32_t OpenHapticsDevice::holds(Nanos now) noexcept {
-  const hd::Api& api = session_->api();
+  const hd::Api& api = scheduler_->api();
   std::uint32_t hold = kHoldNone;
   if (!calibrated_ || settling_ > 0) hold |= kHoldNotCalibrated;
   if (settling_ > 0) --settling_;
@@ -258,7 +255,7 @@ void OpenHapticsDevice::updateCalibration(hd::Enum status) noexcept {
     return;
   }
   if (style != hd::kStyleAuto) consent_ = false;
-  session_->api().updateCalibration(static_cast<hd::Enum>(style));
+  scheduler_->api().updateCalibration(static_cast<hd::Enum>(style));
   settling_ = kSettlingFrames;
 }
 
@@ -299,7 +296,7 @@ void OpenHapticsDevice::calibrate() {
       consent_ = false;
       return;
     }
-    std::this_thread::sleep_for(10ms);
+    base::sleepFor(10 * kMillisecond);
   }
   consent_ = false;
   throw std::runtime_error("the OpenHaptics device is not calibrated after 3 s: " + faultText());

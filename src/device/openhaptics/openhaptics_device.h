@@ -10,7 +10,7 @@
 #include <string>
 
 #include "device/device.h"
-#include "device/openhaptics/hd_session.h"
+#include "device/openhaptics/hd_scheduler.h"
 #include "device/openhaptics/thermal_derating.h"
 
 namespace hapticd::device {
@@ -40,7 +40,9 @@ class OpenHapticsDevice final : public Device, private hd::Participant {
   /// where the switch tells of it. Needs the loop to run.
   void calibrate() override;
 
-  bool selfPaced() const noexcept override { return true; }
+  DeviceTraits traits() const noexcept override {
+    return {.selfPaced = true, .ticksInVendorThread = true, .calibratesInLoop = true};
+  }
   void start(std::function<void(Nanos)> onTick) override;
   void stop() noexcept override;
 
@@ -61,7 +63,7 @@ class OpenHapticsDevice final : public Device, private hd::Participant {
   Vec3 limited(const Vec3& force_N) noexcept;
 
   const OpenHapticsOptions options_;
-  std::shared_ptr<hd::Session> session_;
+  std::shared_ptr<hd::Scheduler> scheduler_;
   hd::Handle handle_ = hd::kInvalidHandle;
   DeviceProfile profile_;
   std::string description_;

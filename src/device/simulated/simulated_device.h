@@ -1,14 +1,14 @@
-// A device made of arithmetic: a point mass held by a spring-damper hand that follows an intended path.
+// A simulated device: a point mass held by a spring-damper hand that follows an intended path.
 //
-// Contact pushes the mass back, so forces are closed-loop and an unstable wall shows. Time is what read() is
-// told: the same calls give the same bytes, in real time or as fast as the machine can.
+// Contact pushes the mass back, so forces are closed-loop and an unstable wall shows. Time is the argument of read():
+// the same calls give the same bytes, in real time or as fast as the machine can.
 #pragma once
 
 #include <memory>
 
 #include "device/device.h"
 #include "device/profiles.h"
-#include "device/simulated/hand_path.h"
+#include "device/simulated/steered_hand.h"
 #include "handoff/exchange_slot.h"
 #include "handoff/latest_value.h"
 
@@ -21,38 +21,35 @@ struct SimulatedOptions {
   double handDamping_Ns_per_m = 5;
   /// The device is where the path is, whatever the force: for offline rendering.
   bool openLoop = false;
-  /// How fast the intention moves when it changes its source, and always towards an external target.
+  /// Speed of the intended position after a change of its source, and always towards a target.
   double reachSpeed_m_per_s = 0.5;
 };
 
 /// Without a path and a target the hand rests at the centre of the workspace.
-class SimulatedDevice final : public Device {
+class SimulatedDevice final : public Device, public SteeredHand {
  public:
   explicit SimulatedDevice(const SimulatedOptions& options = {});
 
-  /// Back to the beginning: the next read() starts the path and puts the mass on it.
+  /// Rewinds: the next read() starts the path and puts the mass on it.
   void open() override;
   void close() noexcept override {}
   const DeviceProfile& profile() const noexcept override { return options_.profile; }
+  DeviceTraits traits() const noexcept override { return {.needsRearm = false}; }
+  SteeredHand* steered() noexcept override { return this; }
 
   bool read(Nanos now, DeviceState& state) noexcept override;
   bool write(const Vec3& force_N) noexcept override;
 
-  /// The hand reaches for the start of the path at the next read() and then follows it. Null: it rests. One
-  /// thread at a time, not the servo's; paths are freed there.
-  void setPath(std::shared_ptr<const HandPath> path);
-  /// The hand reaches for this pose until the next call; the path waits. One thread at a time, not the
-  /// servo's; wait-free.
-  void setTarget(const HandPose& pose) noexcept { target_.write({true, pose}); }
-  /// The hand goes back to its path. Same thread as setTarget.
-  void releaseTarget() noexcept { target_.write({}); }
+  void setPath(std::shared_ptr<const HandPath> path) override;
+  void setTarget(const HandPose& pose) noexcept override { target_.write({true, pose}); }
+  void releaseTarget() noexcept override { target_.write({}); }
 
  private:
   struct Target {
     bool active = false;
     HandPose pose;
   };
-  // A fixed box around the path, so that "no path" can go through the slot, too.
+  // Wraps the path so that the slot can also carry "no path".
   struct Script {
     std::shared_ptr<const HandPath> path;
   };
@@ -68,7 +65,7 @@ class SimulatedDevice final : public Device {
   handoff::ExchangeSlot<Script> scripts_;
   handoff::LatestValue<Target> target_;
 
-  // The servo's from here on.
+  // Servo thread only, from here on.
   bool started_ = false;
   Nanos time_ = 0;
   const Script* script_ = nullptr;

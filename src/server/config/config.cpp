@@ -56,6 +56,11 @@ class Reader {
     }
     out = static_cast<int>(value);
   }
+  void driverKey(const std::string& key, std::map<std::string, std::string>& out) {
+    std::string value;
+    field(key, value);
+    if (!value.empty()) out[key] = value;
+  }
   void milli(const std::string& key, double& out) {
     if (find(key) == nullptr) return;
     field(key, out);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -50,10 +51,10 @@ inline constexpr std::array<double, 6> kPaperWorkspace_mm{-80, -80, -70, 80, 80,
 struct DeviceConfig {
   std::vector<std::string> names{"Phantom"};
   std::string driver = "simulated";
-  std::string hardware;      ///< which one, in the driver's words: a device name, an index, /dev/input/event5
-  std::string wheelProfile;  ///< evdev: TOML file with the newtons of a wheel or joystick
-  bool calibrate = false;    ///< consent to calibrate at the start and at a re-arm; may move the arm
-  bool isolate = false;      ///< the driver runs in a process of its own: its crash is a fault, not the end
+  std::string hardware;  ///< which one, in the driver's words: a device name, an index, /dev/input/event5
+  std::map<std::string, std::string> driverKeys;  ///< keys that only some drivers read, as Driver::keys names them
+  bool calibrate = false;                         ///< consent to calibrate at the start and at a re-arm; may move the arm
+  bool isolate = false;  ///< the driver runs in a process of its own: its crash is a fault, not the end
   bool enableForces = false;    ///< real devices start without force unless this is set
   std::string hand = "script";  ///< simulated device: "script", or a CSV file with the intended path
   double servoRate_Hz = 1000;

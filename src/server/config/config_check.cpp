@@ -5,9 +5,9 @@
 #include <map>
 #include <sstream>
 
+#include "device/drivers/drivers.h"
 #include "net/endpoint.h"
 #include "server/config/config.h"
-#include "server/station/devices.h"
 #include "wire/text.h"
 
 namespace hapticd::server {
@@ -61,12 +61,17 @@ void checkName(std::size_t device, const std::string& name, std::map<std::string
 }
 
 void checkDriver(const Checker& check, const DeviceConfig& device) {
-  std::string known;
-  for (const std::string& driver : driverNames()) {
-    if (device.driver == driver) return;
-    known += (known.empty() ? "" : ", ") + driver;
+  const device::Driver* const driver = device::findDriver(device.driver);
+  if (driver == nullptr) {
+    check.fail("driver", "no driver is called '" + device.driver + "'; there is " + device::driverNames());
   }
-  check.fail("driver", "no driver is called '" + device.driver + "'; there is " + known);
+  if (device.isolate && !driver->canBeIsolated) {
+    check.fail("isolate", "the driver '" + device.driver + "' loads no vendor's library, so it cannot be isolated; leave isolate out");
+  }
+  for (const auto& [key, value] : device.driverKeys) {
+    if (std::find(driver->keys.begin(), driver->keys.end(), key) != driver->keys.end()) continue;
+    check.fail(key, "the driver '" + device.driver + "' has no key " + key + "; leave it out");
+  }
 }
 
 void checkWorkspace(const Checker& check, const std::vector<double>& box) {
@@ -118,9 +123,6 @@ void checkHttp(const Checker& check, const ServerConfig& config) {
 
 void checkDevice(const Checker& check, const DeviceConfig& device) {
   checkDriver(check, device);
-  if (device.isolate && device.driver == "simulated")
-    check.fail("isolate",
-               "the simulated hand has no vendor's library to be isolated from; leave isolate out");
   check.range("servo_rate_Hz", device.servoRate_Hz, 250, 4000);
   check.range("report_rate_Hz", device.reportRate_Hz, 0.1, device.servoRate_Hz);
   check.range("linear_tolerance_mm", device.linearTolerance_m * 1e3, 0, 1000);

@@ -4,6 +4,7 @@
 #include <array>
 #include <utility>
 
+#include "device/drivers/drivers.h"
 #include "server/config/config.h"
 
 namespace hapticd::server {
@@ -34,7 +35,7 @@ void visitFields(Visitor& visitor, Device& device) {
   visitor.names("names", device.names);
   visitor.field("driver", device.driver);
   visitor.field("hardware", device.hardware);
-  visitor.field("wheel_profile", device.wheelProfile);
+  for (const std::string& key : device::driverKeys()) visitor.driverKey(key, device.driverKeys);
   visitor.field("calibrate", device.calibrate);
   visitor.field("enable_forces", device.enableForces);
   visitor.field("isolate", device.isolate);

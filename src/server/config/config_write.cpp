@@ -42,6 +42,10 @@ class Writer {
   void field(const char* key, double value) { line(key, text(value)); }
   void field(const char* key, const std::vector<std::string>& values) { list(key, values, quoted); }
   void names(const char* key, const std::vector<std::string>& values) { field(key, values); }
+  void driverKey(const std::string& key, const std::map<std::string, std::string>& values) {
+    const auto value = values.find(key);
+    field(key.c_str(), value == values.end() ? std::string() : value->second);
+  }
   void milli(const char* key, double value) { line(key, thousandths(value)); }
   void listen(const char* key, const std::string& address, std::uint16_t port) {
     field(key, address + ":" + std::to_string(port));

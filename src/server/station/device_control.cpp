@@ -22,7 +22,7 @@ bool finite(const wire::HoldHand& m) {
 
 bool DeviceControl::hold(scene::ClientId client, const wire::HoldHand& wanted,
                          const realtime::TickReport& last, std::string& error) {
-  if (simulated_ == nullptr) {
+  if (hand_ == nullptr) {
     error = "Hold_Hand refused: this is a real device, only a simulated hand can be held";
     return false;
   }
@@ -56,7 +56,7 @@ bool DeviceControl::hold(scene::ClientId client, const wire::HoldHand& wanted,
   pose.orientation = (Quat(rotationOf(last)).conjugate() * orientation).normalized();
   pose.buttons = wanted.buttons;
   holder_ = client;
-  simulated_->setTarget(pose);
+  hand_->setTarget(pose);
   return true;
 }
 
@@ -66,7 +66,7 @@ void DeviceControl::clientGone(scene::ClientId client) {
 
 void DeviceControl::letGo() {
   if (!std::exchange(holder_, std::nullopt)) return;
-  simulated_->releaseTarget();
+  hand_->releaseTarget();
 }
 
 }  // namespace hapticd::server

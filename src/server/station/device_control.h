@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "device/simulated/simulated_device.h"
+#include "device/simulated/steered_hand.h"
 #include "realtime/servo/guard_control.h"
 #include "realtime/servo/report.h"
 #include "scene/notice.h"
@@ -16,10 +16,9 @@ namespace hapticd::server {
 /// One device. Net thread; what it does acts at the next tick.
 class DeviceControl {
  public:
-  /// `simulated` is null for real devices. Both outlive this. The hand reaches as far as the workspace.
-  DeviceControl(realtime::GuardControl& guard, device::SimulatedDevice* simulated,
-                const geometry::Box& workspace_m)
-      : guard_(guard), simulated_(simulated), workspace_m_(workspace_m) {}
+  /// `hand` is null for devices that a person moves. Both outlive this. Targets are clamped to the workspace.
+  DeviceControl(realtime::GuardControl& guard, device::SteeredHand* hand, const geometry::Box& workspace_m)
+      : guard_(guard), hand_(hand), workspace_m_(workspace_m) {}
 
   /// Zero force until a re-arm that was received later than this.
   void stopForces(base::Nanos received) {
@@ -36,7 +35,7 @@ class DeviceControl {
   /// After a reset of the scene: what is felt then comes in gently.
   void rampIn() { guard_.rampIn(); }
 
-  bool canBeHeld() const noexcept { return simulated_ != nullptr; }
+  bool canBeHeld() const noexcept { return hand_ != nullptr; }
   /// Who holds the hand.
   const std::optional<scene::ClientId>& holder() const noexcept { return holder_; }
   /// Moves the hand's target, or lets go. False when refused; `error` then says why.
@@ -48,7 +47,7 @@ class DeviceControl {
   void letGo();
 
   realtime::GuardControl& guard_;
-  device::SimulatedDevice* simulated_;
+  device::SteeredHand* hand_;
   geometry::Box workspace_m_;
   std::optional<scene::ClientId> holder_;
   base::Nanos stopped_ = 0;  // when the last stop was received

@@ -31,7 +31,7 @@ void DeviceKeeper::stop() noexcept {
 }
 
 void DeviceKeeper::startLoop() {
-  if (!device_.selfPaced()) {
+  if (!device_.traits().selfPaced) {
     const realtime::ServoThreadOptions options{
         .rate_Hz = options_.rate_Hz, .request = {}, .requireRealtime = options_.requireRealtime};
     servo_.emplace([this](const realtime::Pacing& pacing) { tick_(pacing); }, clock_, options);
@@ -55,7 +55,7 @@ void DeviceKeeper::startLoop() {
 }
 
 void DeviceKeeper::stopLoop() noexcept {
-  if (device_.selfPaced()) {
+  if (device_.traits().selfPaced) {
     device_.stop();
   } else {
     servo_.reset();

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "base/world.h"
-#include "device/simulated/hand_file.h"
+#include "device/simulated/simulated_device.h"
 #include "server/station/answers.h"
 #include "server/station/devices.h"
 #include "server/station/explorer.h"
@@ -24,9 +24,7 @@ std::unique_ptr<device::Device> standIn(const record::RecordedDevice& recorded) 
 std::unique_ptr<device::Device> openDevice(const DeviceConfig& config) {
   auto device = makeDevice(config);
   device->open();
-  // One with a loop of its own calibrates there, with the consent it was made with.
-  const bool hasOwnLoop = config.isolate ? config.driver == "openhaptics" : device->selfPaced();
-  if (config.calibrate && !hasOwnLoop) device->calibrate();
+  if (config.calibrate && !device->traits().calibratesInLoop) device->calibrate();
   return device;
 }
 
@@ -45,13 +43,13 @@ scene::SceneConfig sceneConfig(const DeviceConfig& config, const device::DeviceP
   return scene;
 }
 
-realtime::TickOptions tickOptions(const DeviceConfig& config, const device::DeviceProfile& profile) {
+realtime::TickOptions tickOptions(const DeviceConfig& config, const device::Device& device) {
   realtime::TickOptions options;
   options.rate_Hz = config.servoRate_Hz;
   options.render.toolRadius_m = config.toolRadius_m;
   options.render.forceShading = config.forceShading;
-  options.guard = realtime::GuardOptions::of(profile);
-  options.guard.selfRecover = config.driver == "simulated";  // nobody there to be hurt, or to re-arm
+  options.guard = realtime::GuardOptions::of(device.profile());
+  options.guard.selfRecover = !device.traits().needsRearm;
   return options;
 }
 
@@ -72,22 +70,19 @@ Station::Impl::Impl(const DeviceConfig& config_, std::vector<wire::LocalSender> 
       names(std::move(names_)),
       scene(scene_),
       device(std::move(device_)),
-      simulated(dynamic_cast<device::SimulatedDevice*>(device.get())),
+      hand(device->steered()),
       profile(device->profile()),
-      tick(*device, clock, tickOptions(config, profile)),
+      tick(*device, clock, tickOptions(config, *device)),
       keeper(*device, tick, clock,
              {.name = config.names.front(),
               .rate_Hz = config.servoRate_Hz,
               .requireRealtime = !allowNoRealtime,
-              .vendorsThread = !config.isolate}),
-      control(tick.control(), simulated, workspaceOf(config, profile)),
+              .vendorsThread = device->traits().ticksInVendorThread}),
+      control(tick.control(), hand, workspaceOf(config, profile)),
       roles(config.control, config.controlList),
       modes(profile.buttons),
       outbox(config, profile.buttons, names),
-      recorder(config.names.front(), blackBoxFiles(config), tick.blackBox()) {
-  if (simulated != nullptr && config.hand != "script")
-    simulated->setPath(device::HandFile::load(config.hand));
-}
+      recorder(config.names.front(), blackBoxFiles(config), tick.blackBox()) {}
 
 Station::Station(const DeviceConfig& config, std::vector<wire::LocalSender> names, SceneHost& scene,
                  bool allowNoRealtime, record::Recorder* recorder)
@@ -121,7 +116,7 @@ void Station::Impl::recordTo(record::Recorder& session, SceneDevice& seat) {
                                                   .buttons = profile.buttons,
                                                   .scene = scene.number(),
                                                   .sceneConfig = seat.config,
-                                                  .tick = tickOptions(config, profile)});
+                                                  .tick = tickOptions(config, *device)});
   seat.config.stopwatch = session.stopwatch(number);
   seat.publishing = [&session, number](base::Nanos now, std::uint64_t revision) {
     session.published(number, now, revision);
@@ -242,12 +237,12 @@ void Station::sendReports(Session& session) {
 }
 
 void Station::Impl::onPublished(const scene::SceneSnapshot& snapshot) {
-  if (simulated == nullptr || config.hand != "script") return;
+  if (hand == nullptr || config.hand != "script") return;
   std::vector<std::pair<std::int32_t, std::uint64_t>> now;
   for (const auto& object : snapshot.objects) now.emplace_back(object->id, object->mesh->topology);
   if (now == explored) return;
   explored = std::move(now);
-  simulated->setPath(std::make_shared<const device::WaypointPath>(
+  hand->setPath(std::make_shared<const device::WaypointPath>(
       explore(snapshot, workspaceOf(config, profile), base::now()), device::WaypointPath::Repeat::yes));
 }
 
@@ -257,7 +252,7 @@ DeviceStatus Station::status() const {
   DeviceStatus status;
   status.names = my.config.names;
   status.driver = my.config.driver;
-  status.simulated = my.simulated != nullptr;
+  status.simulated = my.hand != nullptr;
   status.workspace_m = workspaceOf(my.config, profile);
   status.peakForce_N = profile.peakForce_N;
   status.rate_Hz = my.config.servoRate_Hz;

@@ -4,7 +4,7 @@
 #include <set>
 
 #include "base/clock.h"
-#include "device/simulated/simulated_device.h"
+#include "device/simulated/steered_hand.h"
 #include "realtime/servo/tick.h"
 #include "server/station/black_box_recorder.h"
 #include "server/station/button_modes.h"
@@ -54,7 +54,7 @@ struct Station::Impl {
   SceneHost& scene;
   base::MonotonicClock clock;
   std::unique_ptr<device::Device> device;
-  device::SimulatedDevice* simulated;  // null for other drivers
+  device::SteeredHand* const hand;      // null for devices that a person moves
   const device::DeviceProfile profile;  // as when it was first opened
   realtime::Tick tick;
   DeviceKeeper keeper;

@@ -45,7 +45,7 @@ TEST(WheelProfile, ABadValueIsNamed) {
   EXPECT_THAT(refusal("force_N = -1"), AllOf(HasSubstr("force_N"), HasSubstr("0.05")));
   EXPECT_THAT(refusal("force_N = \"much\""), HasSubstr("force_N"));
   EXPECT_THAT(refusal("invert_force = 1"), HasSubstr("true or false"));
-  EXPECT_THAT(refusal("strength = 1"), HasSubstr("a name that no profile has"));
+  EXPECT_THAT(refusal("strength = 1"), HasSubstr("unknown key"));
   EXPECT_THAT(refusal("force_N = = 1"), HasSubstr(".toml"));
   EXPECT_THROW(WheelProfile::load("/nowhere/wheel.toml"), WheelProfileError);
 }

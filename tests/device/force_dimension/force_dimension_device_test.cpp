@@ -84,7 +84,7 @@ TEST_F(DhdTest, OpensWithEverythingSaidExplicitlyAndTheAmplifiersOff) {
   EXPECT_EQ(mock->maxForce(), 12);
   EXPECT_EQ(mock->amplifiersOn(), 0);
   EXPECT_FALSE(device.profile().startsArmed);
-  EXPECT_FALSE(device.selfPaced());
+  EXPECT_FALSE(device.traits().selfPaced);
   tick(Vec3::Zero());
   EXPECT_EQ(mock->amplifiersOn(), 0) << "nobody asked for a force";
   tick(Vec3(1, 0, 0));

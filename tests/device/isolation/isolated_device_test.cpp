@@ -96,7 +96,10 @@ TEST_P(IsolationTest, StateAndForceCrossTheBoundary) {
   EXPECT_EQ(device.profile().model, "observed");
   EXPECT_EQ(device.profile().peakForce_N, 5);
   EXPECT_DOUBLE_EQ(device.profile().transportDelay_s, 0.001);
-  EXPECT_TRUE(device.selfPaced());
+  EXPECT_TRUE(device.traits().selfPaced);
+  EXPECT_FALSE(device.traits().ticksInVendorThread);
+  EXPECT_TRUE(device.traits().calibratesInLoop) << "as the driver says";
+  EXPECT_FALSE(device.traits().needsRearm) << "as the driver says";
   hand->x = 0.01;
   push(device, Vec3(1, 2, 3));
   EXPECT_TRUE(eventually([&] { return state().position_m.x() == 0.01 && force() == Vec3(1, 2, 3); }));

@@ -50,7 +50,9 @@ class ObservedDevice final : public Device {
     if (++hand_.calibrations > 1) throw std::runtime_error("once is enough");
   }
 
-  bool selfPaced() const noexcept override { return selfPaced_; }
+  DeviceTraits traits() const noexcept override {
+    return {.selfPaced = selfPaced_, .calibratesInLoop = true, .needsRearm = false};
+  }
   void start(std::function<void(Nanos)> onTick) override {
     leave_ = false;
     thread_ = std::thread([this, onTick = std::move(onTick)] {

@@ -33,7 +33,7 @@ TEST_F(HdTest, HandleZeroIsADeviceAndTheDriversNumbersWin) {
   EXPECT_DOUBLE_EQ(profile.nominalStiffness_N_per_m, 500);
   EXPECT_TRUE(profile.workspace_m.max.isApprox(Vec3(0.080, 0.060, 0.035)));
   EXPECT_FALSE(profile.startsArmed);
-  EXPECT_TRUE(device.selfPaced());
+  EXPECT_TRUE(device.traits().selfPaced);
   EXPECT_EQ(mock->schedulerRuns(), 0) << "amplifiers on before start()";
   device.close();
   device.close();

@@ -181,7 +181,7 @@ ServerConfig unusual() {
   device.names = {"Left \"hand\" \\", "Tracker0"};
   device.driver = "evdev";
   device.hardware = "/dev/input/event5\t\n\x7f";
-  device.wheelProfile = "wheel.toml";
+  device.driverKeys = {{"wheel_profile", "wheel.toml"}};
   device.calibrate = true;
   device.enableForces = true;
   device.isolate = true;
@@ -210,6 +210,19 @@ ServerConfig unusual() {
   config.devices[1].workspace_mm.assign(kPaperWorkspace_mm.begin(), kPaperWorkspace_mm.end());
   config.devices[1].control = Control::first;
   return config;
+}
+
+TEST(Config, KeysOfOtherDriversAreRefused) {
+  EXPECT_EQ(errorOf("[[device]]\ndriver = \"evdev\"\nwheel_profile = \"wheel.toml\"\n"), "");
+  EXPECT_EQ(errorOf("[[device]]\nwheel_profile = \"wheel.toml\"\n"),
+            "test.toml:2: device 'Phantom': the driver 'simulated' has no key wheel_profile; leave it out");
+  EXPECT_EQ(errorOf("[[device]]\nwheel_profile = \"\"\n"), "") << "as a written configuration has it";
+}
+
+TEST(Config, ADriverWithoutAVendorsLibraryCannotBeIsolated) {
+  EXPECT_EQ(errorOf("[[device]]\nisolate = true\n"),
+            "test.toml:2: device 'Phantom': the driver 'simulated' loads no vendor's library, so it cannot be isolated; "
+            "leave isolate out");
 }
 
 TEST(Config, WhatIsWrittenReadsBackTheSame) {

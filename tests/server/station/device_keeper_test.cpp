@@ -70,7 +70,7 @@ class ScriptedDevice final : public device::Device {
   }
   bool lost() const noexcept override { return isLost; }
 
-  bool selfPaced() const noexcept override { return selfPaced_; }
+  device::DeviceTraits traits() const noexcept override { return {.selfPaced = selfPaced_}; }
   void start(std::function<void(Nanos)> onTick) override {
     if (startFails) throw std::runtime_error("the scheduler is refused");
     leave_ = false;

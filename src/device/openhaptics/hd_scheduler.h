@@ -13,7 +13,7 @@
 
 namespace hapticd::device::hd {
 
-/// A device as the session needs it. Both calls come in the scheduler's thread.
+/// A device as the scheduler needs it. Both calls come in the scheduler's thread.
 class Participant {
  public:
   virtual ~Participant() = default;
@@ -25,10 +25,10 @@ class Participant {
 
 /// All calls but drainErrors() are for other threads than the scheduler's; they stop the scheduler for a
 /// moment, because the library allows most things only then.
-class Session {
+class Scheduler {
  public:
-  /// The session of this process; loads the library at first use. Throws LibraryError.
-  static std::shared_ptr<Session> get();
+  /// The scheduler of this process; loads the library at first use. Throws LibraryError.
+  static std::shared_ptr<Scheduler> get();
 
   const Api& api() const noexcept { return api_; }
 
@@ -61,7 +61,7 @@ class Session {
   };
   class Pause;
 
-  Session();
+  Scheduler();
   Handle tryOpen(const char* name, std::string& words);
 
   const Api api_;

@@ -1,4 +1,4 @@
-#include "device/openhaptics/hd_session.h"
+#include "device/openhaptics/hd_scheduler.h"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -44,39 +44,39 @@ std::string quoted(const char* name) {
 }  // namespace
 
 // Holds the lock and the scheduler; the scheduler goes on afterwards if anybody needs it.
-class Session::Pause {
+class Scheduler::Pause {
  public:
-  explicit Pause(Session& session) : session_(session), lock_(session.mutex_) {
-    if (session_.running_) session_.api_.stopScheduler();
-    session_.running_ = false;
+  explicit Pause(Scheduler& scheduler) : scheduler_(scheduler), lock_(scheduler.mutex_) {
+    if (scheduler_.running_) scheduler_.api_.stopScheduler();
+    scheduler_.running_ = false;
   }
   ~Pause() {
-    if (session_.members_.empty()) return;
-    session_.api_.startScheduler();
-    session_.running_ = true;
+    if (scheduler_.members_.empty()) return;
+    scheduler_.api_.startScheduler();
+    scheduler_.running_ = true;
   }
   Pause(const Pause&) = delete;
   Pause& operator=(const Pause&) = delete;
 
  private:
-  Session& session_;
+  Scheduler& scheduler_;
   std::lock_guard<std::mutex> lock_;
 };
 
-std::shared_ptr<Session> Session::get() {
+std::shared_ptr<Scheduler> Scheduler::get() {
   static std::mutex mutex;
-  static std::shared_ptr<Session> session;
+  static std::shared_ptr<Scheduler> scheduler;
   const std::lock_guard lock(mutex);
-  if (!session) session.reset(new Session);
-  return session;
+  if (!scheduler) scheduler.reset(new Scheduler);
+  return scheduler;
 }
 
-Session::Session() : api_(DynamicLibrary(libraryNames())) {
+Scheduler::Scheduler() : api_(DynamicLibrary(libraryNames())) {
   // drainErrors() walks this in the scheduler's thread.
   members_.reserve(16);
 }
 
-Handle Session::open(const std::string& name, std::string& nameThatWorked) {
+Handle Scheduler::open(const std::string& name, std::string& nameThatWorked) {
   const Pause pause(*this);
   const NoKeyboard noKeyboard;
   // Some drivers know a device only by the name it was given, some only without one.
@@ -97,7 +97,7 @@ Handle Session::open(const std::string& name, std::string& nameThatWorked) {
       "; check that it is connected and powered, and that the vendor's setup tool sees it");
 }
 
-Handle Session::tryOpen(const char* name, std::string& words) {
+Handle Scheduler::tryOpen(const char* name, std::string& words) {
   const Handle device = api_.initDevice(name);
   // The handle decides: an error that repeats an earlier one is not put on the stack again.
   std::string reason = takeErrors();
@@ -112,20 +112,20 @@ Handle Session::tryOpen(const char* name, std::string& words) {
   return kInvalidHandle;
 }
 
-void Session::close(Handle device) noexcept {
+void Scheduler::close(Handle device) noexcept {
   const Pause pause(*this);
   api_.makeCurrentDevice(device);
   api_.disableDevice(device);
   open_.erase(std::remove(open_.begin(), open_.end(), device), open_.end());
 }
 
-void Session::whileStopped(Handle device, const std::function<void()>& work) {
+void Scheduler::whileStopped(Handle device, const std::function<void()>& work) {
   const Pause pause(*this);
   api_.makeCurrentDevice(device);
   work();
 }
 
-void Session::join(Handle device, Participant& participant, double rate_Hz) {
+void Scheduler::join(Handle device, Participant& participant, double rate_Hz) {
   {
     const Pause pause(*this);
     api_.makeCurrentDevice(device);
@@ -142,7 +142,7 @@ void Session::join(Handle device, Participant& participant, double rate_Hz) {
   }
 }
 
-void Session::leave(Participant& participant) noexcept {
+void Scheduler::leave(Participant& participant) noexcept {
   const Pause pause(*this);
   const auto member = std::find_if(members_.begin(), members_.end(),
                                    [&](const Member& m) { return m.participant == &participant; });
@@ -151,7 +151,7 @@ void Session::leave(Participant& participant) noexcept {
   members_.erase(member);
 }
 
-void Session::drainErrors() noexcept {
+void Scheduler::drainErrors() noexcept {
   for (int i = 0; i < kMostErrors; ++i) {
     const ErrorInfo error = api_.getError();
     if (error.code == kSuccess) return;
@@ -164,7 +164,7 @@ void Session::drainErrors() noexcept {
   }
 }
 
-std::string Session::takeErrors() noexcept {
+std::string Scheduler::takeErrors() noexcept {
   std::string words;
   for (int i = 0; i < kMostErrors; ++i) {
     const ErrorInfo error = api_.getError();

@@ -1,0 +1,39 @@
+// What a driver tells about itself before a device of it exists.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <string>
+
+#include "device/device.h"
+
+namespace hapticd::device {
+
+/// The configuration of one device, as its driver sees it.
+struct DriverOptions {
+  std::string hardware;         ///< which device, in the words of the driver; empty: the first one
+  std::string hand = "script";  ///< of devices without a person: "script", or a CSV file with the path
+  double servoRate_Hz = 1000;
+  bool calibrate = false;                   ///< consent to calibrate; may move the arm
+  std::map<std::string, std::string> keys;  ///< values of Driver::keys
+};
+
+/// A value that the driver does not accept; what() names the key, the value and the remedy.
+class InvalidDriverOption : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// A driver: one constant of this type in the folder of each, listed in src/device/CMakeLists.txt.
+struct Driver {
+  const char* name;                   ///< for --device and the key `driver`
+  const char* help;                   ///< one line: which devices it runs
+  std::span<const char* const> keys;  ///< keys of a [[device]] that only this driver reads; their values are texts
+  bool canBeIsolated = true;          ///< may run in a process of its own
+  /// Makes a device, not yet open. Throws InvalidDriverOption, or std::runtime_error for a file that it cannot read.
+  std::unique_ptr<Device> (*make)(const DriverOptions& options);
+};
+
+}  // namespace hapticd::device

@@ -1,0 +1,20 @@
+#include "device/driver.h"
+#include "device/replay/replay_device.h"
+
+namespace hapticd::device::drivers_in_this_build {
+namespace {
+
+std::unique_ptr<Device> make(const DriverOptions& options) {
+  if (options.hand == "script") throw InvalidDriverOption("replay needs a recorded hand: --hand FILE.csv");
+  ReplayOptions own;
+  own.file = options.hand;
+  own.repeat = true;
+  return std::make_unique<ReplayDevice>(own);
+}
+
+}  // namespace
+
+extern const Driver replay;
+const Driver replay{.name = "replay", .help = "a recorded hand, again and again", .keys = {}, .make = make};
+
+}  // namespace hapticd::device::drivers_in_this_build

@@ -1,0 +1,18 @@
+#include "device/driver.h"
+#include "device/simulated/hand_file.h"
+#include "device/simulated/simulated_device.h"
+
+namespace hapticd::device::drivers_in_this_build {
+
+extern const Driver simulated;
+const Driver simulated{.name = "simulated",
+                       .help = "a simulated hand: no hardware needed",
+                       .keys = {},
+                       .canBeIsolated = false,
+                       .make = [](const DriverOptions& options) -> std::unique_ptr<Device> {
+                         auto device = std::make_unique<SimulatedDevice>();
+                         if (options.hand != "script") device->setPath(HandFile::load(options.hand));
+                         return device;
+                       }};
+
+}  // namespace hapticd::device::drivers_in_this_build
