@@ -12,7 +12,7 @@ int main(int argc, char** argv) try {
   const std::vector<std::array<float, 3>> floor{{-80, -10, -40}, {-80, -10, 40}, {80, -10, 40},
                                                 {-80, -10, -40}, {80, -10, 40},  {80, -10, -40}};
   client.resetScene();
-  client.setSurface(0, {.stiffness = 0.6F, .static_friction = 0.4F, .dynamic_friction = 0.3F});
+  client.setSurface(0, {.stiffness = 0.6F, .staticFriction = 0.4F, .dynamicFriction = 0.3F});
   client.uploadCorners(0, floor);
 
   client.onContactPoint([&](const hapticd::ContactPointReport& r) {

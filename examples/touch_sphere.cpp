@@ -40,7 +40,7 @@ int main(int argc, char** argv) try {
   hapticd::Client client(argc > 1 ? argv[1] : "Phantom@localhost");
   client.onText([](const hapticd::TextReport& r) { std::printf("server: %s\n", r.text.c_str()); });
   client.resetScene();
-  client.setSurface(0, {.stiffness = 0.8F, .static_friction = 0.3F, .dynamic_friction = 0.2F});
+  client.setSurface(0, {.stiffness = 0.8F, .staticFriction = 0.3F, .dynamicFriction = 0.2F});
   client.uploadCorners(0, sphere(30));
 
   const double seconds = argc > 2 ? std::atof(argv[2]) : 10;

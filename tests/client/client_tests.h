@@ -28,10 +28,10 @@ bool pollUntil(Client& client, Condition&& condition) {
 
 /// Whether this is the message, field by field.
 template <class M>
-::testing::AssertionResult is(const Told& told, const M& expected) {
-  const M* message = told.message.as<M>();
+::testing::AssertionResult is(const Received& received, const M& expected) {
+  const M* message = std::get_if<M>(&received.message);
   if (message && *message == expected) return ::testing::AssertionSuccess();
-  return ::testing::AssertionFailure() << wire::info(told.message.kind()).name << ", expected "
+  return ::testing::AssertionFailure() << wire::info(received.message.kind()).name << ", expected "
                                        << M::kInfo.name << (message ? " with other fields" : "");
 }
 

@@ -53,10 +53,10 @@ TEST_P(WithServer, TheServerSaysWhatItCanDo) {
   Client client(name());
   const auto c = client.waitCapabilities();
   ASSERT_TRUE(c);
-  EXPECT_TRUE(c->bulk_mesh && c->batch && c->subscribe && c->stop && c->heartbeat && c->hold_hand);
-  EXPECT_EQ(c->servo_rate_Hz, 1000);
-  EXPECT_GT(c->peak_force_N, 0);
-  EXPECT_LT(c->workspace_min_m[0], c->workspace_max_m[0]);
+  EXPECT_TRUE(c->bulkMesh && c->batch && c->subscribe && c->stop && c->heartbeat && c->holdHand);
+  EXPECT_EQ(c->servoRate_Hz, 1000);
+  EXPECT_GT(c->peakForce_N, 0);
+  EXPECT_LT(c->workspaceMin_m[0], c->workspaceMax_m[0]);
 }
 
 TEST_P(WithServer, AnIndexedMeshIsFeltContactByContact) {
