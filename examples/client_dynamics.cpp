@@ -1,6 +1,6 @@
-// Dynamics in the client: a box in thick oil that the hand pushes along. The client integrates its motion
-// from the contacts of every servo tick, and streams its pose back. A simulated hand is led by the client,
-// too; with a real device, push the box yourself.
+// Dynamics in the client: the hand pushes a box in thick oil. The client integrates the motion of the box from the
+// contacts of every servo tick and streams its pose back. The client also moves a simulated hand; with a real device,
+// push the box yourself.
 //   client_dynamics [NAME@host] [seconds]
 #include <algorithm>
 #include <cmath>
@@ -60,7 +60,7 @@ int main(int argc, char** argv) try {
   unsigned long ticks = 0;
   std::chrono::nanoseconds last{};
   client.onContacts([&](const hapticd::ContactsReport& r) {
-    // What a lost report would have said is taken to be as this one says, for as long as a few ticks.
+    // The contacts of this report also stand for those of lost reports, for at most a few ticks.
     const double dt_s =
         std::clamp(std::chrono::duration<double>(r.tickTime - last).count(), 0.0, 5 * tick_s);
     last = r.tickTime;
@@ -76,7 +76,7 @@ int main(int argc, char** argv) try {
     if (lead) client.holdHand({{x_mm, 0, 0}});
   };
   lead_to(-50);
-  client.runFor(500ms);  // so that the box does not appear around the hand
+  client.runFor(500ms);  // otherwise the box could appear around the hand
   uploadBox(client);
 
   constexpr auto kFrame = 4ms;

@@ -1,5 +1,5 @@
-// Where the surface is touched, beside where the device really is: what a renderer draws, and why it does not
-// draw the device inside the object.
+// The surface contact point beside the position of the device. A renderer draws the former: the device itself is inside
+// the object.
 //   follow_contact_point [NAME@host] [seconds]
 #include <cstdio>
 #include <cstdlib>

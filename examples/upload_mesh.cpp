@@ -1,4 +1,4 @@
-// Reads a Wavefront OBJ, fits it into the workspace, sends it, and says what the server says about it.
+// Reads a Wavefront OBJ file, fits it into the workspace, uploads it, and prints what the server reports about it.
 //   upload_mesh FILE.obj [NAME@host]
 #include <algorithm>
 #include <cstdio>

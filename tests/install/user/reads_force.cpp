@@ -1,4 +1,4 @@
-// Connects, makes a floor, says what is felt first.
+// Connects, makes a floor, prints the first object that is touched.
 #include <hapticd/client.h>
 
 #include <cstdio>
