@@ -61,11 +61,11 @@ TEST(Trips, SetsAreCombined) {
   EXPECT_TRUE((Trips::thatAct(TripAction::clamp) & Trips::thatAct(TripAction::hold)).empty());
 }
 
-// --- generated parts of the tree
+// --- the table in docs/safety.md; server/web/page_tables generates the one of the page
 
 std::string markdown() {
   const auto force = [](TripAction action) {
-    return action == TripAction::clamp  ? "shapes the force"
+    return action == TripAction::clamp  ? "shaped"
            : action == TripAction::hold ? "zero while it lasts"
                                         : "zero until re-armed";
   };
@@ -77,24 +77,6 @@ std::string markdown() {
             std::string(trip.what) + " | " + std::string(trip.remedy) + " |\n";
   }
   return text;
-}
-
-std::string typescript() {
-  const auto action = [](TripAction a) {
-    return a == TripAction::clamp ? "clamp" : a == TripAction::hold ? "hold" : "latch";
-  };
-  std::string text =
-      "// Generated from include/hapticd/trips.h; see tests/client/trips_test.cpp.\n\n"
-      "export type TripAction = \"clamp\" | \"hold\" | \"latch\";\n\n"
-      "export interface TripInfo {\n"
-      "  name: string;\n  action: TripAction;\n  what: string;\n  remedy: string;\n}\n\n"
-      "/** By bit. */\nexport const TRIP_TABLE: readonly TripInfo[] = [\n";
-  for (const TripInfo& trip : kTrips) {
-    text += "  {\n    name: \"" + std::string(trip.name) + "\",\n    action: \"" + action(trip.action) +
-            "\",\n    what: \"" + std::string(trip.what) + "\",\n    remedy: \"" + std::string(trip.remedy) +
-            "\",\n  },\n";
-  }
-  return text + "];\n";
 }
 
 std::string read(const std::filesystem::path& file) {
@@ -116,12 +98,6 @@ TEST(Trips, TheSafetyDocumentHasTheTable) {
   const std::size_t end = text.find("\n\n", begin) + 1;
   if (updates()) std::ofstream(file) << text.replace(begin, end - begin, markdown());
   EXPECT_NE(read(file).find(markdown()), std::string::npos) << "the table in " << file << ' ' << kRemedy;
-}
-
-TEST(Trips, ThePageHasTheTable) {
-  const std::filesystem::path file = kTree / "web/src/panels/trip_table.ts";
-  if (updates()) std::ofstream(file) << typescript();
-  EXPECT_EQ(read(file), typescript()) << file << ' ' << kRemedy;
 }
 
 }  // namespace
