@@ -1,4 +1,4 @@
-// What the tests of the client share.
+// Helpers of the client's tests.
 #pragma once
 
 #include <gmock/gmock.h>
@@ -15,7 +15,7 @@ namespace hapticd::test {
 
 constexpr auto kPatience = std::chrono::seconds(20);
 
-/// Polls until the condition holds; false when patience ends.
+/// Polls until the condition holds; false after kPatience.
 template <class Condition>
 bool pollUntil(Client& client, Condition&& condition) {
   const auto end = std::chrono::steady_clock::now() + kPatience;

@@ -1,4 +1,4 @@
-// Every call arrives as the message it stands for.
+// Every call of the client arrives as its message.
 #include "client/client_tests.h"
 
 namespace hapticd::test {

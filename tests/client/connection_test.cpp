@@ -1,4 +1,4 @@
-// How a client comes to a connection, loses it, and says what is wrong.
+// Connecting, losing a connection, and the texts of errors.
 #include "client/client_tests.h"
 
 #include <time.h>
@@ -23,7 +23,7 @@ TEST_P(BothWays, ConnectsAndIsAnswered) {
   EXPECT_EQ(client.statistics().connections, 1U);
 }
 
-TEST_P(BothWays, ConnectsAgainWhenTheServerIsBack) {
+TEST_P(BothWays, ReconnectsWhenTheServerIsBack) {
   auto server = std::make_unique<ScriptedServer>();
   const std::uint16_t port = server->port();
   Client client(name(*server));
@@ -39,7 +39,7 @@ TEST_P(BothWays, ConnectsAgainWhenTheServerIsBack) {
   server.reset();
   ASSERT_TRUE(pollUntil(client, [&] { return !client.connected(); }));
   ASSERT_TRUE(pollUntil(client, [&] { return !states.empty() && !states.back(); }));
-  EXPECT_EQ(client.latest().touchedObject.object, -1) << "what was felt is no longer known";
+  EXPECT_EQ(client.latest().touchedObject.object, -1) << "reset with the connection";
   EXPECT_FALSE(reason.empty());
   client.startEffect(1);
   EXPECT_EQ(client.statistics().messagesDropped, 1U);
@@ -49,13 +49,13 @@ TEST_P(BothWays, ConnectsAgainWhenTheServerIsBack) {
   client.startEffect(2);
   client.flush();
   const auto received = server->waitReceived(1);
-  ASSERT_EQ(received.size(), 1U) << "the command given without a connection is not sent later";
+  ASSERT_EQ(received.size(), 1U) << "a command without a connection is dropped";
   EXPECT_TRUE(is(received[0], wire::StartEffect{2}));
-  EXPECT_EQ(received[0].sender, "Phantom") << "names are described anew";
+  EXPECT_EQ(received[0].sender, "Phantom") << "names are described again";
   EXPECT_EQ(client.statistics().connections, 2U);
 }
 
-TEST(Client, DoesNotConnectAgainWhenToldSo) {
+TEST(Client, DoesNotReconnectWhenDisabled) {
   ScriptedServer server;
   Client client(server.tcpName(), {.reconnect = false});
   server.dropClients();
@@ -118,7 +118,7 @@ TEST(Client, NotAVrpnServer) {
   EXPECT_THAT(text, HasSubstr("broke the VRPN protocol"));
 }
 
-TEST(Client, KeepsWhatIsCommandedBeforeTheFirstConnection) {
+TEST(Client, KeepsCommandsBeforeTheFirstConnection) {
   std::uint16_t port = 0;
   {
     ScriptedServer server;
@@ -138,7 +138,7 @@ TEST(Client, KeepsWhatIsCommandedBeforeTheFirstConnection) {
   EXPECT_TRUE(is(received[1], wire::StartEffect{4}));
 }
 
-TEST(Client, WhatWaitsForTheFirstConnectionIsBounded) {
+TEST(Client, CommandsBeforeTheFirstConnectionAreBounded) {
   Client client("Phantom@tcp://127.0.0.1:1", {.connectTimeout = 0ms, .queueLimit_bytes = 100000});
   const auto fill = [&] {
     for (int i = 0; i < 10000; ++i) client.setVertex(0, i, 0, 0, 0);

@@ -1,4 +1,4 @@
-// What a client makes of the extensions: with a server that has them, and with one that has not.
+// The extensions, with servers that support them and servers that do not.
 #include "client/client_tests.h"
 
 #include <limits>
@@ -26,7 +26,7 @@ bool waitReconnected(Client& client, const ScriptedServer& server, std::size_t c
   return pollUntil(client, [&] { return client.connected() && server.connections() >= connections; });
 }
 
-TEST_P(BothWays, AServerSaysWhatItCanDo) {
+TEST_P(BothWays, ReceivesTheCapabilities) {
   ScriptedServer server(able());
   Client client(name(server));
   const auto c = client.waitCapabilities();
@@ -43,12 +43,12 @@ TEST_P(BothWays, AServerSaysWhatItCanDo) {
 
   server.dropClients();
   ASSERT_TRUE(pollUntil(client, [&] { return !client.connected(); }));
-  EXPECT_FALSE(client.capabilities()) << "of no server";
+  EXPECT_FALSE(client.capabilities()) << "without a server";
   ASSERT_TRUE(waitReconnected(client, server, 2));
   EXPECT_TRUE(client.waitCapabilities()) << "asked again";
 }
 
-TEST(Extensions, AServerWithoutThemIsNamedInEveryError) {
+TEST(Extensions, ErrorsNameAServerWithoutExtensions) {
   ScriptedServer server;
   Client client(server.tcpName());
   EXPECT_FALSE(client.waitCapabilities());
@@ -72,14 +72,14 @@ TEST(Extensions, AServerWithoutThemIsNamedInEveryError) {
   EXPECT_TRUE(is(received[1], wire::SetObjectNumber{1}));
 }
 
-TEST(Extensions, ADeviceThatLacksOneIsNamed) {
+TEST(Extensions, ErrorsNameADeviceWithoutTheFeature) {
   ScriptedServer server(ableBut(wire::kFeatureHoldHand));
   Client client(server.tcpName());
   EXPECT_THAT(textOf<Unsupported>([&] { client.holdHand({}); }),
               HasSubstr("cannot hold the hand: device 'Phantom' at"));
 }
 
-TEST(Extensions, ABatchIsFramedAndComesWhole) {
+TEST(Extensions, ABatchIsFramedAndSentAsOne) {
   ScriptedServer server(able());
   Client client(server.tcpName());
   client.batch([&] {
@@ -137,7 +137,7 @@ TEST(Extensions, ABatchDoesNotOutliveItsConnection) {
   EXPECT_TRUE(is(received[0], wire::SetObjectNumber{1}));
 }
 
-TEST(Extensions, AMeshGoesInRunsWithinABatch) {
+TEST(Extensions, AMeshIsSentInBulkMessagesWithinABatch) {
   ScriptedServer server(able());
   Client client(server.tcpName());
   std::vector<std::array<float, 3>> vertices(5001);
@@ -183,7 +183,7 @@ TEST(Extensions, AMeshInsideABatchBelongsToIt) {
   EXPECT_TRUE(is(received[3], wire::BatchCommit{}));
 }
 
-TEST(Extensions, VerticesGoOneByOneToAServerWithoutRuns) {
+TEST(Extensions, VerticesAreSentOneByOneWithoutBulkMessages) {
   ScriptedServer server(ableBut(wire::kFeatureBulkMesh));
   Client client(server.tcpName());
   const std::vector<std::array<float, 3>> corners{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
@@ -197,7 +197,7 @@ TEST(Extensions, VerticesGoOneByOneToAServerWithoutRuns) {
   EXPECT_EQ(vertices[5].vertex, 9);
 }
 
-TEST(Extensions, ASubscriptionIsRememberedForTheNextConnection) {
+TEST(Extensions, ASubscriptionIsRepeatedOnTheNextConnection) {
   ScriptedServer server(able());
   Client client(server.tcpName());
   client.subscribe(Reports::usual | Reports::contacts, 500);
@@ -214,7 +214,7 @@ TEST(Extensions, ASubscriptionIsRememberedForTheNextConnection) {
   }
 }
 
-TEST(Extensions, ASubscriptionMayComeBeforeTheConnection) {
+TEST(Extensions, ASubscriptionMayPrecedeTheConnection) {
   ScriptedServer server(able());
   Client client(server.tcpName(), {.connectTimeout = 0ms});
   client.subscribe(Reports::tick);
@@ -266,8 +266,8 @@ TEST(Extensions, TicksContactsAndGuardStatesArriveAsPlainValues) {
   EXPECT_THAT(contacts[0].contacts[0].normal, ElementsAre(0, 1, 0));
   EXPECT_THAT(contacts[0].contacts[0].force_N, ElementsAre(1, 2, 3));
   EXPECT_EQ(contacts[0].contacts[1].object, -1);
-  ASSERT_EQ(contacts[1].contacts.size(), 1U) << "a contact that lacks numbers is none";
-  EXPECT_EQ(contacts[1].contacts[0].object, -1) << "no number of an object";
+  ASSERT_EQ(contacts[1].contacts.size(), 1U) << "an incomplete contact is ignored";
+  EXPECT_EQ(contacts[1].contacts[0].object, -1) << "not an object number";
   EXPECT_TRUE(contacts[2].contacts.empty());
   EXPECT_EQ(contacts[2].tick, 9U);
 
@@ -300,7 +300,7 @@ TEST(Extensions, AStopOvertakesABatchAndNeedsAConnection) {
   EXPECT_THAT(textOf<ConnectionLost>([&] { nobody.stopForces(); }), HasSubstr("forces not stopped"));
 }
 
-TEST(Extensions, HeartbeatsGoOnWhilePolledAndOnTheNextConnection) {
+TEST(Extensions, HeartbeatsContinueWhilePolledAndOnTheNextConnection) {
   ScriptedServer server(able());
   Client client(server.tcpName());
   EXPECT_EQ(server.heartbeats(), 0U);
@@ -323,7 +323,7 @@ TEST(Extensions, HeartbeatsGoOnWhilePolledAndOnTheNextConnection) {
 
 TEST(Extensions, TheHandIsHeldAndReleasedInOrder) {
   ScriptedServer server(able());
-  Client client(server.name());  // which also has datagrams, that could overtake
+  Client client(server.name());  // this connection also has datagrams, which could overtake
   client.holdHand({{1, 2, 3}, {0, 0, 1, 0}, 3});
   client.holdHand({{4, 5, 6}});
   client.releaseHand();

@@ -1,4 +1,4 @@
-// Every report reaches its callback, and what callbacks may do.
+// Every report reaches its callback; what callbacks may do.
 #include "client/client_tests.h"
 
 namespace hapticd::test {
@@ -115,7 +115,7 @@ TEST_P(BothWays, ReportsReachTheirCallbacks) {
   }
 }
 
-TEST(Client, ButtonsAreNewsOnlyWhenTheyChange) {
+TEST(Client, ButtonsAreReportedOnChangeOnly) {
   ScriptedServer server;
   Client client(server.tcpName());
   std::vector<std::pair<int, bool>> seen;
@@ -128,7 +128,7 @@ TEST(Client, ButtonsAreNewsOnlyWhenTheyChange) {
   EXPECT_EQ(seen, (std::vector<std::pair<int, bool>>{{1, true}, {1, false}, {0, true}}));
 }
 
-TEST(Client, ReportsOfOtherDevicesAreNotItsOwn) {
+TEST(Client, ReportsOfOtherDevicesAreIgnored) {
   ScriptedServer server;
   Client client(server.tcpName());
   int forces = 0;
@@ -190,7 +190,7 @@ TEST(Client, CallbacksKeepTheirStateAndMayAddOthers) {
   server.send(wire::TouchedObject{2});
   ASSERT_TRUE(pollUntil(client, [&] { return counts.size() == 2; }));
   EXPECT_EQ(counts, (std::vector<int>{1, 2}));
-  EXPECT_EQ(late, 100) << "what is added during a report waits for the next";
+  EXPECT_EQ(late, 100) << "callbacks added during a report wait for the next";
 }
 
 TEST(Client, ErrorsOfTheServerCanBeExceptions) {

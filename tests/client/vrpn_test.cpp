@@ -1,4 +1,4 @@
-// VRPN's own classes over this client: what a program written for VRPN sees.
+// VRPN's classes over this client, as a program written for VRPN uses them.
 #include <gtest/gtest.h>
 #include <vrpn_Analog.h>
 #include <vrpn_Button.h>
@@ -34,8 +34,8 @@ bool runUntil(Device& device, Condition&& condition) {
 
 class Vrpn : public ::testing::TestWithParam<bool> {
  protected:
-  /// Waits for something that came by TCP, behind the server's descriptions: without those, datagrams, which
-  /// may overtake them, mean nothing.
+  /// Waits for a message by TCP, which follows the server's descriptions of its names. Datagrams may overtake those, and
+  /// without them have no meaning.
   static bool ready(vrpn_BaseClass& device) {
     const vrpn_int32 sender = device.connectionPtr()->register_sender("Phantom");
     return runUntil(device, [&] { return device.connectionPtr()->heard(sender); });
@@ -274,12 +274,12 @@ TEST_P(Vrpn, DevicesOfOneServerShareItsConnection) {
     EXPECT_EQ(texts[0].type, vrpn_TEXT_WARNING);
     EXPECT_EQ(server_.connections(), 1U);
   }
-  // The last device took the connection with it: the next one opens another.
+  // The connection was deleted with its last device: the next device opens another.
   vrpn_Tracker_Remote again(name().c_str());
   EXPECT_TRUE(runUntil(again, [&] { return server_.connections() == 2; }));
 }
 
-TEST_P(Vrpn, DialsOfOtherServersAreHeard) {
+TEST_P(Vrpn, DialsOfOtherServersAreReported) {
   vrpn_Dial_Remote dial(name().c_str());
   std::vector<vrpn_DIALCB> turns;
   dial.register_change_handler(&turns, keep<vrpn_DIALCB>);
@@ -289,7 +289,7 @@ TEST_P(Vrpn, DialsOfOtherServersAreHeard) {
   vrpn_int32 left = sizeof buffer;
   vrpn_buffer(&insert, &left, -0.25);
   vrpn_buffer(&insert, &left, vrpn_int32{3});
-  server_.sendOther("vrpn_Dial update", std::string(buffer, 8));  // too short to be one
+  server_.sendOther("vrpn_Dial update", std::string(buffer, 8));  // too short
   server_.sendOther("vrpn_Dial update", std::string(buffer, 12));
   ASSERT_TRUE(runUntil(dial, [&] { return !turns.empty(); }));
   EXPECT_EQ(turns[0].dial, 3);
@@ -319,7 +319,7 @@ TEST_P(Vrpn, ProgramsMayHandleMessagesThemselves) {
                                &connections);
   connection->register_handler(type, keepNumber, &object, sender);
   ASSERT_TRUE(runUntil(*connection, [&] { return connections == 1; }));
-  // Said again and again: the server may know of the connection later than the client.
+  // Send repeatedly: the server may learn of the connection after the client.
   ASSERT_TRUE(runUntil(*connection, [&] {
     server_.send(wire::TouchedObject{11});
     return object == 11;
@@ -400,7 +400,7 @@ TEST(VrpnShared, BuffersAreBigEndianAndBounded) {
   EXPECT_EQ(real, 1.0);
 }
 
-TEST(VrpnShared, CopiedTextEndsWithinItsRoom) {
+TEST(VrpnShared, CopiedTextEndsWithinItsBuffer) {
   char room[4] = {'x', 'x', 'x', 'x'};
   vrpn_strcpy(room, "Phantom");
   EXPECT_STREQ(room, "Pha");
