@@ -15,7 +15,7 @@ ScriptedServerOptions able() {
 
 std::size_t stops(const std::vector<Received>& received) {
   return static_cast<std::size_t>(std::count_if(received.begin(), received.end(), [](const Received& r) {
-    return std::holds_alternative<wire::StopForces>(r.message);
+    return r.message.as<wire::StopForces>() != nullptr;
   }));
 }
 
