@@ -53,8 +53,8 @@ record::Sample sampleOf(const std::string& device, const TickReport& tick) {
   sample.touching = tick.object >= 0 || tick.depth_m > 0;
   sample.object = tick.object;
   sample.buttons = tick.buttons;
-  sample.guardActive = tick.guard_active;
-  sample.guardLatched = tick.guard_latched;
+  sample.guardActive = tick.guardActive.bits();
+  sample.guardLatched = tick.guardLatched.bits();
   return sample;
 }
 
@@ -76,7 +76,7 @@ void logReports(Client& client, record::VrpnLog& log, wire::LocalSender sender) 
   });
   client.onVelocity([add](const VelocityReport& r) {
     add(r.time,
-        wire::TrackerVelocity{r.sensor, r.sensor, r.velocity_m_per_s, r.rotation, r.rotation_interval_s});
+        wire::TrackerVelocity{r.sensor, r.sensor, r.velocity_m_per_s, r.rotation, r.rotationInterval_s});
   });
   client.onButton([add](const ButtonReport& r) {
     add(r.time, wire::ButtonChange{r.button, r.pressed ? 1 : 0});

@@ -62,7 +62,7 @@ std::vector<std::string> ReportView::table(const ReportSummary& summary) {
   const std::vector<double>& channels = latest.analog.channels;
   if (client_.capabilities() && channels.size() == 7) add("  gripper    %8.3f rad", channels[6]);
   add("  touching   %s   object %d   depth %.3f mm   angle %.1f deg   %.1f %% of the time",
-      latest.touching.touching ? "yes" : "no ", latest.touched_object.object, latest.depth.depth_m * 1000,
+      latest.touching.touching ? "yes" : "no ", latest.touchedObject.object, latest.depth.depth_m * 1000,
       latest.angle.angle_deg, 100 * summary.contactFraction());
   for (std::size_t i = 0; i < kReportKinds; ++i) {
     const auto kind = static_cast<ReportKind>(i);
@@ -86,7 +86,7 @@ void ReportView::printLine(const ReportSummary& summary) {
   std::printf(
       "%.0f s  %.0f reports/s  touching %s  object %d  force %.3f N  depth %.3f mm  angle %.1f deg  "
       "latency p50 %.2f ms p99 %.2f ms\n",
-      summary.seconds(), rate, latest.touching.touching ? "yes" : "no", latest.touched_object.object,
+      summary.seconds(), rate, latest.touching.touching ? "yes" : "no", latest.touchedObject.object,
       std::hypot(f[0], f[1], f[2]), latest.depth.depth_m * 1000, latest.angle.angle_deg,
       latency.quantile_us(0.5) / 1000, latency.quantile_us(0.99) / 1000);
   std::fflush(stdout);

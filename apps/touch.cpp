@@ -32,7 +32,7 @@ struct TouchOptions {
   std::string mesh;
   std::string server = "Phantom@localhost";
   double seconds = 0;
-  Surface surface{.stiffness = 0.8F, .damping = 0.1F, .static_friction = 0.3F, .dynamic_friction = 0.2F};
+  Surface surface{.stiffness = 0.8F, .damping = 0.1F, .staticFriction = 0.3F, .dynamicFriction = 0.2F};
   int object = 0;
   double size_mm = 0;
   bool keepScene = false;
@@ -91,7 +91,7 @@ void send(Client& client, const TriangleMesh& mesh, const TouchOptions& options)
   ProgressBar bar("sending");
   const auto start = std::chrono::steady_clock::now();
   client.uploadCorners(options.object, corners,
-                       [&](const UploadProgress& p) { bar.show(p.bytes_sent, p.bytes_total); });
+                       [&](const UploadProgress& p) { bar.show(p.bytesSent, p.bytesTotal); });
   bar.finish();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   std::printf("sent %zu vertices in %.3f s to object %d of %s@%s\n", corners.size(), seconds, options.object,
@@ -158,10 +158,10 @@ void addTouch(CLI::App& app) {
       ->check(share)
       ->capture_default_str();
   command->add_option("--damping", options->surface.damping, "0 to 1")->check(share)->capture_default_str();
-  command->add_option("--static-friction", options->surface.static_friction, "0 to 1")
+  command->add_option("--static-friction", options->surface.staticFriction, "0 to 1")
       ->check(share)
       ->capture_default_str();
-  command->add_option("--dynamic-friction", options->surface.dynamic_friction, "0 to 1")
+  command->add_option("--dynamic-friction", options->surface.dynamicFriction, "0 to 1")
       ->check(share)
       ->capture_default_str();
   command->add_option("--object", options->object, "Number of the object that gets the mesh")

@@ -42,7 +42,7 @@ TickReport composed(const LatestReports& latest) {
   if (const auto hand = latest.pose.find(1); hand != latest.pose.end()) tick.hand_m = hand->second.position_m;
   tick.force_N = latest.force.force_N;
   tick.depth_m = latest.depth.depth_m;
-  tick.object = latest.touched_object.object;
+  tick.object = latest.touchedObject.object;
   for (const auto& [button, pressed] : latest.pressed) {
     if (pressed && button >= 0 && button < 32) tick.buttons |= 1U << button;
   }
@@ -65,7 +65,7 @@ void printJson(const TickReport& t) {
       secondsOf(t.time), static_cast<unsigned long long>(t.tick), static_cast<unsigned long long>(t.revision),
       list(t.hand_m).c_str(), list(t.proxy_m).c_str(), list(t.velocity_m_per_s).c_str(),
       list(t.orientation).c_str(), list(t.force_N).c_str(), t.depth_m, t.object, t.buttons,
-      t.guard_active | t.guard_latched);
+      (t.guardActive | t.guardLatched).bits());
 }
 
 constexpr const char* kCsvHeader =
@@ -78,7 +78,7 @@ void printCsv(const TickReport& t) {
   for (const double v : t.proxy_m) std::printf(",%.9g", v);
   for (const double v : t.orientation) std::printf(",%.9g", v);
   for (const double v : t.force_N) std::printf(",%.9g", v);
-  std::printf(",%.9g,%d,%u,%u\n", t.depth_m, t.object, t.buttons, t.guard_active | t.guard_latched);
+  std::printf(",%.9g,%d,%u,%u\n", t.depth_m, t.object, t.buttons, (t.guardActive | t.guardLatched).bits());
 }
 
 // Returns after `seconds` or at a stop signal; throws ConnectionLost when the server disconnects.

@@ -49,11 +49,11 @@ void TickWatcher::watch(const std::string& device) try {
     const std::int64_t now = nowNs();
     const std::lock_guard lock(mutex_);
     ++seen_.ticks;
-    seen_.latency_us.add(static_cast<double>(now - tick.tick_time.count()) * 1e-3);
+    seen_.latency_us.add(static_cast<double>(now - tick.tickTime.count()) * 1e-3);
     seen_.touching = tick.object >= 0;
     if (before.tick > 0 && tick.tick > before.tick) {
       const auto steps = static_cast<std::int64_t>(tick.tick - before.tick);
-      const std::int64_t gap = (tick.tick_time - before.tick_time).count();
+      const std::int64_t gap = (tick.tickTime - before.tickTime).count();
       seen_.lost += static_cast<std::uint64_t>(steps - 1);
       if (gap - steps * kPeriod_ns > kLate_ns) ++seen_.overruns;
       if (steps == 1) seen_.longestGap_ms = std::max(seen_.longestGap_ms, static_cast<double>(gap) * 1e-6);

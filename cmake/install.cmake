@@ -1,25 +1,26 @@
-# What `cmake --install` puts where, and what find_package(hapticd) and pkg-config find there.
+# What `cmake --install` installs, and what find_package(hapticd) and pkg-config find there.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-# The client and what it is made of in one archive; its users need nothing but the standard library and threads.
+# hapticd::client: the client and the rooms below it in one archive. It needs the standard library and threads only.
 add_library(hapticd_client_archive STATIC
-  $<TARGET_OBJECTS:hapticd_client> $<TARGET_OBJECTS:hapticd_net> $<TARGET_OBJECTS:hapticd_wire>)
+  $<TARGET_OBJECTS:hapticd_client> $<TARGET_OBJECTS:hapticd_base> $<TARGET_OBJECTS:hapticd_net> $<TARGET_OBJECTS:hapticd_wire>)
 set_target_properties(hapticd_client_archive PROPERTIES
   EXPORT_NAME client OUTPUT_NAME hapticd_client LINKER_LANGUAGE CXX ARCHIVE_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib)
-target_include_directories(hapticd_client_archive INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-target_compile_features(hapticd_client_archive INTERFACE cxx_std_20)
 target_link_libraries(hapticd_client_archive PUBLIC Threads::Threads)
 
-set_target_properties(vrpn PROPERTIES VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR})
-target_include_directories(vrpn INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/vrpn>)
-target_compile_features(vrpn INTERFACE cxx_std_11)
+foreach(library hapticd_client_archive hapticd_client_shared)
+  target_include_directories(${library} INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_compile_features(${library} INTERFACE cxx_std_20)
+endforeach()
+target_include_directories(hapticd_vrpn INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/hapticd/vrpn>)
+target_compile_features(hapticd_vrpn INTERFACE cxx_std_11)
 
 if(NOT HAPTICD_INSTALL)
   return()
 endif()
 install(TARGETS hapticd hapticd-bench)
-install(TARGETS hapticd_client_archive vrpn EXPORT hapticd)
+install(TARGETS hapticd_client_archive hapticd_client_shared hapticd_vrpn EXPORT hapticd)
 install(DIRECTORY include/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
 
 set(HAPTICD_CONFIG_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/hapticd)
@@ -29,10 +30,12 @@ write_basic_package_version_file(hapticdConfigVersion.cmake COMPATIBILITY SameMi
 install(FILES ${PROJECT_BINARY_DIR}/hapticdConfig.cmake ${PROJECT_BINARY_DIR}/hapticdConfigVersion.cmake
         DESTINATION ${HAPTICD_CONFIG_DIR})
 
-# From where the file lies up to the prefix, so that the installed tree may be moved.
+# From the file's folder up to the prefix, so that the installed tree may be moved.
 file(RELATIVE_PATH HAPTICD_PC_TO_PREFIX /prefix/${CMAKE_INSTALL_LIBDIR}/pkgconfig /prefix)
-configure_file(cmake/hapticd.pc.in hapticd.pc @ONLY)
-install(FILES ${PROJECT_BINARY_DIR}/hapticd.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+foreach(package hapticd hapticd-vrpn)
+  configure_file(cmake/${package}.pc.in ${package}.pc @ONLY)
+  install(FILES ${PROJECT_BINARY_DIR}/${package}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+endforeach()
 
 install(FILES packaging/grafana/hapticd.json DESTINATION ${CMAKE_INSTALL_DATADIR}/hapticd/grafana)
 
@@ -52,8 +55,6 @@ function(hapticd_split_symbols target directory)
 endfunction()
 hapticd_split_symbols(hapticd ${CMAKE_INSTALL_BINDIR})
 hapticd_split_symbols(hapticd-bench ${CMAKE_INSTALL_BINDIR})
-foreach(library vrpn hapticd_vrpn hapticd_client_shared)
-  if(TARGET ${library})
-    hapticd_split_symbols(${library} ${CMAKE_INSTALL_LIBDIR})
-  endif()
+foreach(library hapticd_vrpn hapticd_client_shared)
+  hapticd_split_symbols(${library} ${CMAKE_INSTALL_LIBDIR})
 endforeach()

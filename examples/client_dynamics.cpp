@@ -1,6 +1,6 @@
-// Dynamics in the client: a box in thick oil that the hand pushes along. The client integrates its motion
-// from the contacts of every servo tick, and streams its pose back. A simulated hand is led by the client,
-// too; with a real device, push the box yourself.
+// Dynamics in the client: the hand pushes a box in thick oil. The client integrates the motion of the box from the
+// contacts of every servo tick and streams its pose back. The client also moves a simulated hand; with a real device,
+// push the box yourself.
 //   client_dynamics [NAME@host] [seconds]
 #include <algorithm>
 #include <cmath>
@@ -41,7 +41,7 @@ void uploadBox(hapticd::Client& client) {
                                                         {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
   client.batch([&] {
     client.resetScene();
-    client.setSurface(0, {.stiffness = 0.6F, .static_friction = 0.3F, .dynamic_friction = 0.2F});
+    client.setSurface(0, {.stiffness = 0.6F, .staticFriction = 0.3F, .dynamicFriction = 0.2F});
     client.uploadMesh(0, {corners, faces});
   });
 }
@@ -52,31 +52,31 @@ int main(int argc, char** argv) try {
   hapticd::Client client(argc > 1 ? argv[1] : "Phantom@localhost");
   const double seconds = argc > 2 ? std::atof(argv[2]) : 10;
   const auto can = client.waitCapabilities();
-  const double tick_s = can ? 1 / can->servo_rate_Hz : 0.001;
-  const bool lead = can && can->hold_hand;
+  const double tick_s = can ? 1 / can->servoRate_Hz : 0.001;
+  const bool lead = can && can->holdHand;
 
   Box box;
   double strongest_N = 0;
   unsigned long ticks = 0;
   std::chrono::nanoseconds last{};
   client.onContacts([&](const hapticd::ContactsReport& r) {
-    // What a lost report would have said is taken to be as this one says, for as long as a few ticks.
+    // The contacts of this report also stand for those of lost reports, for at most a few ticks.
     const double dt_s =
-        std::clamp(std::chrono::duration<double>(r.tick_time - last).count(), 0.0, 5 * tick_s);
-    last = r.tick_time;
+        std::clamp(std::chrono::duration<double>(r.tickTime - last).count(), 0.0, 5 * tick_s);
+    last = r.tickTime;
     for (const hapticd::Contact& c : r.contacts) {
       for (std::size_t i = 0; i < 3; ++i) box.impulse_N_s[i] -= c.force_N[i] * dt_s;
       strongest_N = std::max(strongest_N, std::hypot(c.force_N[0], c.force_N[1], c.force_N[2]));
     }
     ticks += r.contacts.empty() ? 0 : 1;
   });
-  client.subscribe(hapticd::Reports::contacts, can ? can->servo_rate_Hz : 0);
+  client.subscribe(hapticd::Reports::contacts, can ? can->servoRate_Hz : 0);
 
   const auto lead_to = [&](double x_mm) {
     if (lead) client.holdHand({{x_mm, 0, 0}});
   };
   lead_to(-50);
-  client.runFor(500ms);  // so that the box does not appear around the hand
+  client.runFor(500ms);  // otherwise the box could appear around the hand
   uploadBox(client);
 
   constexpr auto kFrame = 4ms;

@@ -1,5 +1,5 @@
-// Where the surface is touched, beside where the device really is: what a renderer draws, and why it does not
-// draw the device inside the object.
+// The surface contact point beside the position of the device. A renderer draws the former: the device itself is inside
+// the object.
 //   follow_contact_point [NAME@host] [seconds]
 #include <cstdio>
 #include <cstdlib>
@@ -12,7 +12,7 @@ int main(int argc, char** argv) try {
   const std::vector<std::array<float, 3>> floor{{-80, -10, -40}, {-80, -10, 40}, {80, -10, 40},
                                                 {-80, -10, -40}, {80, -10, 40},  {80, -10, -40}};
   client.resetScene();
-  client.setSurface(0, {.stiffness = 0.6F, .static_friction = 0.4F, .dynamic_friction = 0.3F});
+  client.setSurface(0, {.stiffness = 0.6F, .staticFriction = 0.4F, .dynamicFriction = 0.3F});
   client.uploadCorners(0, floor);
 
   client.onContactPoint([&](const hapticd::ContactPointReport& r) {

@@ -1,4 +1,4 @@
-// An object that moves while it is touched: a plate that goes up and down, 100 poses a second.
+// An object that moves while it is touched: a plate that oscillates vertically, 100 poses per second.
 //   moving_object [NAME@host] [seconds]
 #include <chrono>
 #include <cmath>

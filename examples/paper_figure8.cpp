@@ -1,5 +1,5 @@
-// A program in VRPN's own words, as published with the University of Malaga's server for haptic devices
-// (figure 8): it compiles against VRPN with that extension, or against include/vrpn and libvrpn of hapticd.
+// A program of VRPN's classes, as published with the University of Malaga's server for haptic devices
+// (figure 8): it compiles against VRPN with that extension, or against hapticd (pkg-config hapticd-vrpn).
 //   paper_figure8 [NAME@host] [seconds]
 #include <vrpn_Connection.h>
 #include <vrpn_ForceDevice.h>

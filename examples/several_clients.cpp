@@ -1,5 +1,5 @@
-// One client builds the scene, two watch it, all in one thread. Objects stay when their client leaves,
-// effects end with it.
+// One client builds the scene and two watch it, all in one thread. Objects stay when their client disconnects; its
+// effects end.
 //   several_clients [NAME@host] [seconds]
 #include <cstdio>
 #include <cstdlib>
@@ -29,7 +29,7 @@ int main(int argc, char** argv) try {
   builder->startEffect(0);
   builder->flushAll();
 
-  // Each client sleeps for its share of a turn; what arrives meanwhile for the other waits in its socket.
+  // The clients poll in turn; reports for the other one wait in its socket.
   const auto watch = [&](double s) {
     for (int turn = 0; turn < 50 * s; ++turn) {
       first.runFor(10ms);

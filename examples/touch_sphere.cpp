@@ -1,4 +1,4 @@
-// The first touch: a ball of 30 mm radius in the middle of the workspace, and the force it answers with.
+// The first touch: a sphere of 30 mm radius in the middle of the workspace, and its force.
 //   touch_sphere [NAME@host] [seconds]
 #include <cmath>
 #include <cstdio>
@@ -18,7 +18,7 @@ std::vector<std::array<float, 3>> sphere(double radius) {
   constexpr int kColumns = 48;
   const auto at = [&](int row, int column) -> std::array<float, 3> {
     const double latitude = std::numbers::pi * row / kRows;
-    // The seam and the poles to the same bits from both sides, so that the ball is closed.
+    // Seam and poles are equal bit by bit from both sides, so that the mesh is closed.
     const double longitude = 2 * std::numbers::pi * (column % kColumns) / kColumns;
     const double around = row % kRows == 0 ? 0 : radius * std::sin(latitude);
     return {static_cast<float>(around * std::sin(longitude)), static_cast<float>(radius * std::cos(latitude)),
@@ -40,7 +40,7 @@ int main(int argc, char** argv) try {
   hapticd::Client client(argc > 1 ? argv[1] : "Phantom@localhost");
   client.onText([](const hapticd::TextReport& r) { std::printf("server: %s\n", r.text.c_str()); });
   client.resetScene();
-  client.setSurface(0, {.stiffness = 0.8F, .static_friction = 0.3F, .dynamic_friction = 0.2F});
+  client.setSurface(0, {.stiffness = 0.8F, .staticFriction = 0.3F, .dynamicFriction = 0.2F});
   client.uploadCorners(0, sphere(30));
 
   const double seconds = argc > 2 ? std::atof(argv[2]) : 10;

@@ -1,4 +1,4 @@
-// Reads a Wavefront OBJ, fits it into the workspace, sends it, and says what the server says about it.
+// Reads a Wavefront OBJ file, fits it into the workspace, uploads it, and prints what the server reports about it.
 //   upload_mesh FILE.obj [NAME@host]
 #include <algorithm>
 #include <cstdio>
@@ -71,7 +71,7 @@ int main(int argc, char** argv) try {
   client.resetScene();
   client.setSurface(0, {.stiffness = 0.8F});
   client.uploadMesh(0, {mesh.vertices, mesh.triangles}, [](const hapticd::UploadProgress& p) {
-    std::printf("\r%3.0f %%", 100.0 * static_cast<double>(p.bytes_sent) / static_cast<double>(p.bytes_total));
+    std::printf("\r%3.0f %%", 100.0 * static_cast<double>(p.bytesSent) / static_cast<double>(p.bytesTotal));
     std::fflush(stdout);
   });
   std::printf("\n%zu triangles sent\n", mesh.triangles.size());

@@ -83,7 +83,7 @@ LIST
     if ((folder target) in file) return folder target
     if (("src/" target) in file) return "src/" target
     if (("include/" target) in file) return "include/" target
-    if (("include/vrpn/" target) in file) return "include/vrpn/" target
+    if (("include/hapticd/vrpn/" target) in file) return "include/hapticd/vrpn/" target
     if (("tests/" target) in file) return "tests/" target
     if (target in file) return target
     return ""

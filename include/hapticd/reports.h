@@ -1,8 +1,10 @@
 // What a haptics server reports, as plain values.
 //
-// Lengths, depths and velocities are in metres when the client's world is in millimetres: servers send world
-// units divided by 1000. Forces are newtons. Positions and forces share the frame of the client's world: +x
-// right, +y up, +z to the user, until a workspace message says otherwise. Quaternions are x y z w.
+// Frame: positions, velocities and forces are in the frame of the client's world: +x right, +y up, +z towards
+// the user, until a workspace command changes it. Quaternions are x y z w. Units: servers send world units
+// divided by 1000, so `_m` means metres when the client's world is in millimetres. Forces are newtons,
+// whatever the world unit. Time: every `time` is the wall clock of the server at the servo tick that produced
+// the value, to a microsecond.
 #pragma once
 
 #include <array>
@@ -14,61 +16,64 @@
 #include <string_view>
 #include <vector>
 
+#include "hapticd/export.h"
+#include "hapticd/report_list.h"
 #include "hapticd/trips.h"
 
 namespace hapticd {
 
-/// Wall-clock time as the server stamped it: that of the servo tick that made the value, in microseconds.
 using Time = std::chrono::system_clock::time_point;
 using Vec3 = std::array<double, 3>;
-using Quaternion = std::array<double, 4>;  ///< x y z w
+using Quaternion = std::array<double, 4>;  ///< x y z w, of length 1
 
-/// Where a sensor is; sensor 0 is the proxy, 1 the device itself, 2 the surface contact point.
+/// Pose of a sensor: 0 is the proxy, 1 the device itself, 2 the surface contact point.
 struct PoseReport {
   Time time;
   int sensor = 0;
   Vec3 position_m{};
-  Quaternion orientation{0, 0, 0, 1};
+  Quaternion orientation{0, 0, 0, 1};  ///< from sensor to world
 };
 
-/// How fast a sensor moves, and by which rotation it turns within rotation_interval_s.
+/// Velocity of a sensor, and the rotation that it performs within rotationInterval_s.
 struct VelocityReport {
   Time time;
   int sensor = 0;
   Vec3 velocity_m_per_s{};
   Quaternion rotation{0, 0, 0, 1};
-  double rotation_interval_s = 1;
+  double rotationInterval_s = 1;
 };
 
-/// How a sensor's velocity changes, and how its turning changes within rotation_interval_s.
+/// Acceleration of a sensor, and the change of its rotation within rotationInterval_s. Servers of this
+/// project send none.
 struct AccelerationReport {
   Time time;
   int sensor = 0;
   Vec3 acceleration_m_per_s2{};
   Quaternion rotation{0, 0, 0, 1};
-  double rotation_interval_s = 1;
+  double rotationInterval_s = 1;
 };
 
-/// A button went down or up.
+/// A button was pressed or released. Buttons are counted from 0.
 struct ButtonReport {
   Time time;
   int button = 0;
   bool pressed = false;
 };
 
-/// The value of every analog channel.
+/// The value of every analog channel. Channels of servers of this project: force x y z (N), depth (m), angle
+/// (degrees), touched object (-1: none), and the opening of the gripper (rad) where there is one.
 struct AnalogReport {
   Time time;
   std::vector<double> channels;
 };
 
-/// The force written to the device.
+/// The force written to the device, after the guard.
 struct ForceReport {
   Time time;
-  Vec3 force_N{};
+  Vec3 force_N{};  ///< on the hand
 };
 
-/// Depth of penetration: how far the device is inside what the proxy cannot enter.
+/// Penetration depth: the distance from the device to the proxy while an object is touched, else 0.
 struct DepthReport {
   Time time;
   double depth_m = 0;
@@ -78,7 +83,7 @@ struct DepthReport {
 struct ContactPointReport {
   Time time;
   Vec3 position_m{};
-  Quaternion orientation{0, 0, 0, 1};
+  Quaternion orientation{0, 0, 0, 1};  ///< from stylus to world
 };
 
 /// Whether anything is touched.
@@ -87,43 +92,44 @@ struct TouchingReport {
   bool touching = false;
 };
 
-/// Which object is touched, -1 for none.
+/// The object that is touched, -1 for none and for planes.
 struct TouchedObjectReport {
   Time time;
   int object = -1;
 };
 
-/// Angle between the stylus axis and the surface normal, 0 without contact.
+/// Angle between the stylus axis and the surface normal; 0 without contact.
 struct AngleReport {
   Time time;
   double angle_deg = 0;
   bool touching = false;
 };
 
-/// A limit of the device tripped, or it recovered.
+/// A trip acts on the force, or none does any more (ForceError::recovered). GuardReport says which.
 struct ForceErrorReport {
   Time time;
   ForceError error = ForceError::recovered;
 };
 
-/// How much a text message matters; the numbers are VRPN's.
+/// Severity of a text message; the numbers are VRPN's.
 enum class Severity { normal = 0, warning = 1, error = 2 };
 
-/// The server says something to a human.
+/// A text message of the server for a person; refusals of commands arrive as Severity::error.
 struct TextReport {
   Time time;
   Severity severity = Severity::normal;
   std::string text;
 };
 
-/// Where the base of the tracker stands in the room; answers Client::requestToRoom().
+/// Pose of the tracker's base in the room; the answer to Client::requestToRoom().
 struct ToRoomReport {
   Time time;
   Vec3 position_m{};
   Quaternion orientation{0, 0, 0, 1};
 };
 
-/// How the tracked unit is mounted on a sensor; answers Client::requestUnitToSensor().
+/// Mounting of the tracked unit on a sensor; the answer to Client::requestUnitToSensor(), once for each
+/// sensor.
 struct UnitToSensorReport {
   Time time;
   int sensor = 0;
@@ -131,96 +137,82 @@ struct UnitToSensorReport {
   Quaternion orientation{0, 0, 0, 1};
 };
 
-/// The box the tracker works in; answers Client::requestWorkspace().
+/// Reach of the device in the world; the answer to Client::requestWorkspace().
 struct WorkspaceReport {
   Time time;
   Vec3 min_m{};
   Vec3 max_m{};
 };
 
-/// One servo tick, whole; see Client::subscribe().
+/// One complete servo tick; see Client::subscribe().
 struct TickReport {
   Time time;
-  std::uint64_t tick = 0;                ///< from 1, without gaps in the server
-  std::chrono::nanoseconds tick_time{};  ///< on the server's monotonic clock
-  std::uint64_t revision = 0;            ///< of the scene that was felt
-  Vec3 hand_m{};
+  std::uint64_t tick = 0;               ///< counted by the server from 1 without gaps
+  std::chrono::nanoseconds tickTime{};  ///< on the monotonic clock of the server
+  std::uint64_t revision = 0;           ///< of the scene that was rendered
+  Vec3 hand_m{};                        ///< haptic interface point: where the device is
   Vec3 proxy_m{};
-  Vec3 velocity_m_per_s{};
-  Quaternion orientation{0, 0, 0, 1};
-  Vec3 force_N{};
+  Vec3 velocity_m_per_s{};             ///< of the device
+  Quaternion orientation{0, 0, 0, 1};  ///< from stylus to world
+  Vec3 force_N{};                      ///< on the hand, as written to the device
   double depth_m = 0;
-  int object = -1;                 ///< the one that pushes hardest, -1 for none
-  std::uint32_t buttons = 0;       ///< bit 0: button 0
-  std::uint32_t guard_active = 0;  ///< bits as in GuardReport
-  std::uint32_t guard_latched = 0;
+  int object = -1;            ///< the object with the largest force, -1 for none
+  std::uint32_t buttons = 0;  ///< bit 0: button 0 is down
+  Trips guardActive;          ///< trips that act in this tick
+  Trips guardLatched;         ///< trips that hold the force at zero until Client::rearmForces()
 };
 
-/// Where one object is touched.
+/// Contact with one object.
 struct Contact {
   int object = -1;  ///< -1: a plane
   Vec3 point_m{};
-  Vec3 normal{};   ///< of length 1, away from the surface
-  Vec3 force_N{};  ///< on the hand; the object feels the opposite
+  Vec3 normal{};   ///< of length 1, out of the surface
+  Vec3 force_N{};  ///< on the hand; the object receives the opposite
 };
 
-/// Every contact of one servo tick; empty once when the last one ends. See Client::subscribe().
+/// All contacts of one servo tick; empty once when the last contact ends. See Client::subscribe().
 struct ContactsReport {
   Time time;
-  std::uint64_t tick = 0;
-  std::chrono::nanoseconds tick_time{};  ///< on the server's monotonic clock
+  std::uint64_t tick = 0;               ///< as in TickReport
+  std::chrono::nanoseconds tickTime{};  ///< on the monotonic clock of the server
   std::vector<Contact> contacts;
 };
 
-/// What holds the force back: which trips of the guard are active or latched (bits as the server's
-/// docs/safety.md lists them), whether forces are armed, whether somebody stopped them.
+/// State of the guard: why the force may differ from the rendered one. Sent on change and to each new client.
 struct GuardReport {
   Time time;
-  std::uint32_t active = 0;
-  std::uint32_t latched = 0;
-  bool armed = false;
-  bool stopped = false;
+  Trips active;          ///< holds and latches that act now; clamps are not reported here
+  Trips latched;         ///< trips that hold the force at zero until Client::rearmForces()
+  bool armed = false;    ///< forces are enabled for the device
+  bool stopped = false;  ///< a client stopped the forces
 };
 
-/// The connection came up, or was lost for the reason given.
+/// The connection was established, or lost for the given reason.
 struct ConnectionReport {
-  Time time;
+  Time time;  ///< on the clock of the client
   bool connected = false;
-  std::string reason;
+  std::string reason;  ///< empty when connected
 };
 
-/// Kinds of reports, for counting them.
+/// Kinds of reports, for statistics.
 enum class ReportKind {
-  pose,
-  velocity,
-  acceleration,
-  button,
-  analog,
-  force,
-  depth,
-  contactPoint,
-  touching,
-  touchedObject,
-  angle,
-  forceError,
-  text,
-  toRoom,
-  unitToSensor,
-  workspace,
-  tick,
-  contacts,
-  guard
+#define HAPTICD_ENUMERATOR(name, Type, text) name,
+  HAPTICD_REPORTS(HAPTICD_ENUMERATOR)
+#undef HAPTICD_ENUMERATOR
 };
-inline constexpr std::size_t kReportKinds = 19;
+#define HAPTICD_ONE(name, Type, text) +1
+inline constexpr std::size_t kReportKinds = 0 HAPTICD_REPORTS(HAPTICD_ONE);
+#undef HAPTICD_ONE
 
-/// A short name for people, such as "contact point".
-std::string_view nameOf(ReportKind kind) noexcept;
-/// "value out of range", "duty cycle", ...
-std::string_view nameOf(ForceError error) noexcept;
+/// A name for people, such as "contact point".
+HAPTICD_EXPORT std::string_view nameOf(ReportKind kind) noexcept;
+/// "value out of range", "duty cycle", "force", "recovered" or "other".
+HAPTICD_EXPORT std::string_view nameOf(ForceError error) noexcept;
 /// "normal", "warning" or "error".
-std::string_view nameOf(Severity severity) noexcept;
+HAPTICD_EXPORT std::string_view nameOf(Severity severity) noexcept;
 
-/// The newest report of each kind; zero and at time zero until one came, as after the loss of the connection.
+/// The newest report of each kind. Each is default-constructed, with the time 0, until the first one arrives;
+/// all are reset when the connection is lost.
 struct LatestReports {
   std::map<int, PoseReport> pose;          ///< by sensor
   std::map<int, VelocityReport> velocity;  ///< by sensor
@@ -228,9 +220,9 @@ struct LatestReports {
   AnalogReport analog;
   ForceReport force;
   DepthReport depth;
-  ContactPointReport contact_point;
+  ContactPointReport contactPoint;
   TouchingReport touching;
-  TouchedObjectReport touched_object;
+  TouchedObjectReport touchedObject;
   AngleReport angle;
   TickReport tick;
   ContactsReport contacts;

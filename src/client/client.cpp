@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "base/world.h"
 #include "client/client_impl.h"
 
 namespace hapticd {
@@ -12,8 +13,8 @@ namespace {
 
 client::LinkOptions linkOptions(const ClientOptions& options) {
   return {.reconnect = options.reconnect,
-          .send_timeout = options.send_timeout,
-          .queue_limit = std::max<std::size_t>(options.queue_limit, 1)};
+          .sendTimeout = options.sendTimeout,
+          .queueLimit_bytes = std::max<std::size_t>(options.queueLimit_bytes, 1)};
 }
 
 std::string joined(const std::vector<std::string>& names) {
@@ -27,21 +28,21 @@ std::string joined(const std::vector<std::string>& names) {
 
 }  // namespace
 
-Client::Impl::Impl(const client::DeviceAddress& address, const ClientOptions& client_options)
+Client::Impl::Impl(const client::DeviceAddress& address, const ClientOptions& clientOptions)
     : device(address.device),
       server(address.server.text()),
-      options(client_options),
-      link(address.server, linkOptions(client_options)),
+      options(clientOptions),
+      link(address.server, linkOptions(clientOptions)),
       sender(link.addDevice(address.device)) {
   link.onUp = [this] { greet(); };
-  link.onArriving = [this](auto kind, auto from, auto payload) { arriving(kind, from, payload); };
+  link.onArrival = [this](auto kind, auto from, auto payload) { onArrival(kind, from, payload); };
 }
 
 void Client::Impl::waitConnected(Duration timeout) {
-  constexpr Duration kShortestAnswer = 1s;  // for a server that was reached in the last moment
-  const auto start = std::chrono::steady_clock::now();
+  constexpr Duration kShortestAnswer = 1s;  // also when the connection took nearly all of the timeout
+  const base::Nanos start = base::now();
   if (!link.waitConnected(timeout)) throw ConnectError(device + ": " + link.whyNotConnected());
-  const Duration left = timeout - (std::chrono::steady_clock::now() - start);
+  const Duration left = timeout - Duration(base::now() - start);
   if (!link.waitHeard(sender, std::max(left, kShortestAnswer))) {
     throw ConnectError("no device '" + device + "' answers at " + server + "; it has " +
                        joined(link.serverDevices()));
@@ -50,9 +51,9 @@ void Client::Impl::waitConnected(Duration timeout) {
 
 std::size_t Client::Impl::poll(Duration timeout) {
   const std::size_t count = link.poll(timeout, [this](const client::Arrival& arrival) { dispatch(arrival); });
-  if (options.throw_on_error && !first_error.empty()) {
+  if (options.throwOnError && !firstError.empty()) {
     std::string text;
-    text.swap(first_error);
+    text.swap(firstError);
     throw ServerError(device + '@' + server + ": " + text);
   }
   return count;
@@ -60,7 +61,7 @@ std::size_t Client::Impl::poll(Duration timeout) {
 
 Client::Client(std::string_view device, const ClientOptions& options)
     : impl_(std::make_unique<Impl>(client::parseDevice(device), options)) {
-  if (options.connect_timeout > 0ms) impl_->waitConnected(options.connect_timeout);
+  if (options.connectTimeout > 0ms) impl_->waitConnected(options.connectTimeout);
 }
 Client::~Client() = default;
 Client::Client(Client&&) noexcept = default;
@@ -71,8 +72,9 @@ std::size_t Client::poll(Duration timeout) {
 }
 
 void Client::runFor(Duration duration) {
-  const auto end = std::chrono::steady_clock::now() + duration;
-  for (Duration left = duration; left > 0ns; left = end - std::chrono::steady_clock::now()) impl_->poll(left);
+  const base::Nanos start = base::now();
+  for (Duration left = duration; left > 0ns; left = duration - Duration(base::now() - start))
+    impl_->poll(left);
 }
 
 void Client::flush() {
@@ -100,16 +102,16 @@ const LatestReports& Client::latest() const noexcept {
 Statistics Client::statistics() const {
   const client::LinkStatistics link = impl_->link.statistics();
   Statistics result;
-  result.taken = std::chrono::steady_clock::now();
+  result.taken = std::chrono::steady_clock::time_point(Duration(base::now()));
   result.connections = link.connections;
-  result.messages_out = link.messages_out;
-  result.messages_in = link.messages_in;
-  result.messages_dropped = link.messages_dropped;
-  result.messages_damaged = impl_->damaged;
-  result.tcp_bytes_out = link.tcp_bytes_out;
-  result.tcp_bytes_in = link.tcp_bytes_in;
-  result.udp_bytes_out = link.udp_bytes_out;
-  result.udp_bytes_in = link.udp_bytes_in;
+  result.messagesOut = link.messagesOut;
+  result.messagesIn = link.messagesIn;
+  result.messagesDropped = link.messagesDropped;
+  result.messagesDamaged = impl_->damaged;
+  result.tcpBytesOut = link.tcpBytesOut;
+  result.tcpBytesIn = link.tcpBytesIn;
+  result.udpBytesOut = link.udpBytesOut;
+  result.udpBytesIn = link.udpBytesIn;
   result.reports = impl_->reports;
   return result;
 }

@@ -1,7 +1,13 @@
-// From calls to messages.
+// From calls to messages of the wire.
 #include "client/client_impl.h"
 
 namespace hapticd {
+
+std::string_view nameOf(EffectType type) noexcept {
+  static constexpr std::string_view kNames[] = {"constant", "spring",         "viscous",
+                                                "friction", "vibrationMotor", "vibrationContact"};
+  return kNames[static_cast<std::size_t>(type)];
+}
 
 // --- scene, world units
 
@@ -14,8 +20,8 @@ void Client::setVertex(int object, int vertex, float x, float y, float z) {
 void Client::setSurface(int object, const Surface& s) {
   setSurfaceProperty(object, "stiffness", s.stiffness);
   setSurfaceProperty(object, "damping", s.damping);
-  setSurfaceProperty(object, "static friction", s.static_friction);
-  setSurfaceProperty(object, "dynamic friction", s.dynamic_friction);
+  setSurfaceProperty(object, "static friction", s.staticFriction);
+  setSurfaceProperty(object, "dynamic friction", s.dynamicFriction);
   setSurfaceProperty(object, "popthrough", s.popthrough);
   setSurfaceProperty(object, "mass", s.mass_kg);
 }
@@ -39,8 +45,8 @@ void Client::setWorkspaceProjection(const Matrix4& model, const Matrix4& project
   impl_->send(wire::SetWorkspaceProjectionMatrix{model, projection});
 }
 void Client::setEffect(int index, const Effect& e) {
-  impl_->send(wire::Effect{e.type, index, e.gain, e.magnitude_N, e.duration_ms, e.frequency, e.position,
-                           e.direction});
+  impl_->send(wire::Effect{nameOf(e.type), index, e.gain, e.magnitude_N, e.duration_ms, e.frequency,
+                           e.position, e.direction});
 }
 void Client::startEffect(int index) {
   impl_->send(wire::StartEffect{index});
@@ -78,8 +84,8 @@ void Client::setObjectScale(int object, const std::array<float, 3>& scale) {
 void Client::setNormal(int object, int normal, float x, float y, float z) {
   impl_->send(wire::SetNormal{object, normal, {x, y, z}});
 }
-void Client::setTriangle(int object, int triangle, const std::array<std::int32_t, 3>& vertices,
-                         const std::array<std::int32_t, 3>& normals) {
+void Client::setTriangle(int object, int triangle, const std::array<int, 3>& vertices,
+                         const std::array<int, 3>& normals) {
   impl_->send(wire::SetTriangle{object, triangle, vertices, normals});
 }
 void Client::removeTriangle(int object, int triangle) {
@@ -87,10 +93,10 @@ void Client::removeTriangle(int object, int triangle) {
 }
 void Client::updateMesh(int object, const Surface& s) {
   impl_->send(
-      wire::UpdateTrimeshChanges{object, s.stiffness, s.damping, s.static_friction, s.dynamic_friction});
+      wire::UpdateTrimeshChanges{object, s.stiffness, s.damping, s.staticFriction, s.dynamicFriction});
 }
-void Client::transformMesh(int object, const std::array<float, 16>& row_major) {
-  impl_->send(wire::TransformTrimesh{object, row_major});
+void Client::transformMesh(int object, const std::array<float, 16>& rowMajor) {
+  impl_->send(wire::TransformTrimesh{object, rowMajor});
 }
 void Client::setMeshType(int object, int type) {
   impl_->send(wire::SetTrimeshType{object, type});
@@ -113,15 +119,15 @@ void Client::setSceneOrigin(const std::array<float, 3>& position_m, const std::a
 // --- stock forces, metres
 
 void Client::setPlane(const Plane& p) {
-  impl_->send(wire::Plane{p.plane, p.stiffness, p.damping, p.dynamic_friction, p.static_friction, p.index,
-                          p.recovery_cycles});
+  impl_->send(wire::Plane{p.plane, p.stiffness, p.damping, p.dynamicFriction, p.staticFriction, p.index,
+                          p.recovery_ms});
 }
 void Client::setPlaneTexture(const PlaneTexture& t) {
-  impl_->send(wire::Plane2{t.normal_adhesion, t.lateral_adhesion, t.texture_amplitude, t.texture_wavelength,
-                           t.buzz_amplitude, t.buzz_frequency_Hz});
+  impl_->send(wire::Plane2{t.normalAdhesion_N, t.lateralAdhesion_N, t.textureAmplitude_m,
+                           t.textureWavelength_m, t.buzzAmplitude_m, t.buzzFrequency_Hz});
 }
-// A plane without a normal is none: how stock VRPN takes one away.
-void Client::stopPlane(std::int32_t index) {
+// Stock VRPN removes a plane by a zero normal.
+void Client::stopPlane(int index) {
   wire::Plane none;
   none.index = index;
   impl_->send(none);

@@ -1,7 +1,8 @@
-// What servers of this project can do beyond VRPN; see docs/wire-extensions.md.
+// The extensions of VRPN by servers of this project; see docs/wire-extensions.md.
 #include <cmath>
 #include <stdexcept>
 
+#include "base/world.h"
 #include "client/client_impl.h"
 #include "wire/codec.h"
 
@@ -12,10 +13,13 @@ using namespace std::chrono_literals;
 namespace {
 
 constexpr auto kHeartbeatInterval = 100ms;
+// A stop on the first connection waits behind no more than this; beyond it, it also takes a second
+// connection.
+constexpr std::size_t kStopBacklogBytes = 64 * 1024;
 
 }  // namespace
 
-// --- what the server can do
+// --- capabilities
 
 void Client::Impl::greet() {
   offer.reset();
@@ -25,10 +29,9 @@ void Client::Impl::greet() {
   if (heartbeats) link.sendNow(sender, wire::Heartbeat{1});
 }
 
-// A server answers in the order of the questions. The link asks whether the device is there after greet()
-// asked what it can do: an answer to the second without one to the first means that it does not know the
-// first.
-void Client::Impl::arriving(wire::MessageKind kind, wire::LocalSender from, wire::ByteView payload) {
+// Servers answer in order. greet() asks for the capabilities before the link pings the device, so a pong
+// without capabilities before it means that the server does not know the question.
+void Client::Impl::onArrival(wire::MessageKind kind, wire::LocalSender from, wire::ByteView payload) {
   if (from != sender) return;
   if (kind == wire::kindOf<wire::Pong>) answered = true;
   if (kind != wire::kindOf<wire::Capabilities>) return;
@@ -42,16 +45,17 @@ bool Client::Impl::waitAnswered() {
   if (answered && link.connected()) return true;
   const std::uint64_t number = link.connectionNumber();
   const auto over = [&] { return answered || !link.connected() || link.connectionNumber() != number; };
-  link.waitUntil(over, std::max<Duration>(options.connect_timeout, 1s));
+  link.waitUntil(over, std::max<Duration>(options.connectTimeout, 1s));
   return answered && link.connected();
 }
 
 void Client::Impl::require(wire::Feature feature, std::string_view what) {
-  if (!link.connected()) waitConnected(options.connect_timeout);
+  if (!link.connected()) waitConnected(options.connectTimeout);
   if (!waitAnswered()) {
     if (!link.connected())
       throw ConnectionLost("connection to " + server + " lost: " + link.whyNotConnected());
-    throw ConnectError("device '" + device + "' at " + server + " does not say what it can do");
+    throw ConnectError("device '" + device + "' at " + server +
+                       " did not answer the question for its capabilities");
   }
   if (has(feature)) return;
   throw Unsupported("cannot " + std::string(what) + ": " +
@@ -79,7 +83,7 @@ std::optional<Capabilities> Client::capabilities() const {
 }
 
 std::optional<Capabilities> Client::waitCapabilities() {
-  if (!connected()) waitConnected(impl_->options.connect_timeout);
+  if (!connected()) waitConnected(impl_->options.connectTimeout);
   impl_->waitAnswered();
   return capabilities();
 }
@@ -100,7 +104,7 @@ void Client::batch(const std::function<void()>& commands) {
   held.commit(impl_->sender);
 }
 
-// --- reports of one's own choice
+// --- choice of reports
 
 void Client::subscribe(Reports kinds, double rate_Hz) {
   if (!std::isfinite(rate_Hz) || rate_Hz < 0) {
@@ -114,12 +118,41 @@ void Client::subscribe(Reports kinds, double rate_Hz) {
 
 // --- safety
 
-// A stop must not wait for an answer: it is sent first, and a server that does not know it ignores it.
+// Send the stop before asking whether the server knows it: a server that does not ignores it.
 void Client::stopForces() {
+  const bool behind = impl_->link.backlogBytes() > kStopBacklogBytes;
   if (!impl_->link.sendNow(impl_->sender, wire::StopForces{})) {
     throw ConnectionLost("forces not stopped: " + impl_->link.whyNotConnected());
   }
+  if (behind && (!impl_->answered || impl_->has(wire::kFeatureStop))) impl_->stopBesideBacklog();
   impl_->require(wire::kFeatureStop, "stop the forces");
+}
+
+// The stop on the first connection stays where it is: a re-arm, which follows it there, then ends both.
+void Client::Impl::stopBesideBacklog() {
+  constexpr Duration kSlice = 5ms;
+  client::Link beside(link.resolvedServer(), {.reconnect = false});
+  const wire::LocalSender target = beside.addSender(device);
+  bool confirmed = false;
+  bool sent = false;
+  beside.onArrival = [&](wire::MessageKind kind, wire::LocalSender from, wire::ByteView) {
+    confirmed = confirmed || (sent && from == target && kind == wire::kindOf<wire::Pong>);
+  };
+  const base::Nanos start = base::now();
+  const Duration timeout = std::max<Duration>(options.connectTimeout, 1s);
+  while (!confirmed && Duration(base::now() - start) < timeout) {
+    if (!sent && beside.connected()) {
+      // The server handles the messages of a connection in order, so the pong confirms the stop.
+      sent = beside.sendNow(target, wire::StopForces{}) && beside.sendNow(target, wire::Ping{});
+    }
+    beside.waitUntil([&] { return confirmed || (!sent && beside.connected()); }, kSlice);
+    link.runOnce();  // heartbeats
+  }
+  if (!confirmed) {
+    throw ConnectError("stop not confirmed: it waits behind " + std::to_string(link.backlogBytes()) +
+                       " bytes, and a second connection to " + server + " got no answer" +
+                       (beside.connected() ? "" : ": " + beside.whyNotConnected()));
+  }
 }
 
 void Client::rearmForces() {
@@ -128,26 +161,26 @@ void Client::rearmForces() {
 }
 
 void Client::enableHeartbeat(bool enable) {
-  if (connected()) impl_->require(wire::kFeatureHeartbeat, "be watched by heartbeats");
+  if (connected()) impl_->require(wire::kFeatureHeartbeat, "watch the heartbeat");
   impl_->heartbeats = enable;
-  impl_->heartbeat_timer.cancel();
+  impl_->heartbeatTimer.cancel();
   if (connected()) impl_->link.sendNow(impl_->sender, wire::Heartbeat{static_cast<wire::Bool16>(enable)});
   if (!enable) return;
-  impl_->heartbeat_timer = impl_->link.every(kHeartbeatInterval, [impl = impl_.get()] {
+  impl_->heartbeatTimer = impl_->link.every(kHeartbeatInterval, [impl = impl_.get()] {
     if (impl->link.connected()) impl->link.sendNow(impl->sender, wire::Heartbeat{1});
   });
 }
 
 // --- the simulated hand
 
-// Reliably, so that no pose comes after the release and takes the hand again.
+// Sent reliably: a datagram that arrives after the release would take the hand again.
 void Client::holdHand(const HandPose& pose) {
   if (connected()) impl_->require(wire::kFeatureHoldHand, "hold the hand");
   impl_->link.sendNow(impl_->sender, wire::HoldHand{1, pose.position, pose.orientation, pose.buttons});
 }
 
 void Client::releaseHand() {
-  if (connected()) impl_->require(wire::kFeatureHoldHand, "let go of the hand");
+  if (connected()) impl_->require(wire::kFeatureHoldHand, "release the hand");
   impl_->link.sendNow(impl_->sender, wire::HoldHand{});
 }
 

@@ -1,4 +1,4 @@
-// From arrivals to reports: decode, count, keep, call back.
+// From arrivals to reports: decodes, counts, stores and delivers them.
 #include "client/client_impl.h"
 #include "wire/codec.h"
 #include "wire/text.h"
@@ -10,44 +10,13 @@ using client::Arrival;
 
 template <class Report>
 constexpr ReportKind kKindOf = ReportKind::pose;
-template <>
-constexpr ReportKind kKindOf<VelocityReport> = ReportKind::velocity;
-template <>
-constexpr ReportKind kKindOf<AccelerationReport> = ReportKind::acceleration;
-template <>
-constexpr ReportKind kKindOf<ButtonReport> = ReportKind::button;
-template <>
-constexpr ReportKind kKindOf<AnalogReport> = ReportKind::analog;
-template <>
-constexpr ReportKind kKindOf<ForceReport> = ReportKind::force;
-template <>
-constexpr ReportKind kKindOf<DepthReport> = ReportKind::depth;
-template <>
-constexpr ReportKind kKindOf<ContactPointReport> = ReportKind::contactPoint;
-template <>
-constexpr ReportKind kKindOf<TouchingReport> = ReportKind::touching;
-template <>
-constexpr ReportKind kKindOf<TouchedObjectReport> = ReportKind::touchedObject;
-template <>
-constexpr ReportKind kKindOf<AngleReport> = ReportKind::angle;
-template <>
-constexpr ReportKind kKindOf<ForceErrorReport> = ReportKind::forceError;
-template <>
-constexpr ReportKind kKindOf<TextReport> = ReportKind::text;
-template <>
-constexpr ReportKind kKindOf<ToRoomReport> = ReportKind::toRoom;
-template <>
-constexpr ReportKind kKindOf<UnitToSensorReport> = ReportKind::unitToSensor;
-template <>
-constexpr ReportKind kKindOf<WorkspaceReport> = ReportKind::workspace;
-template <>
-constexpr ReportKind kKindOf<TickReport> = ReportKind::tick;
-template <>
-constexpr ReportKind kKindOf<ContactsReport> = ReportKind::contacts;
-template <>
-constexpr ReportKind kKindOf<GuardReport> = ReportKind::guard;
+#define HAPTICD_KIND(name, Type, text) \
+  template <>                          \
+  constexpr ReportKind kKindOf<Type##Report> = ReportKind::name;
+HAPTICD_REPORTS(HAPTICD_KIND)
+#undef HAPTICD_KIND
 
-// A number of an object as a double on the wire; what is none is -1, as planes are.
+// The wire has object numbers as doubles; -1 stands for everything that is no object number.
 int objectNumber(double value) {
   return value >= 0 && value <= 2147483647.0 ? static_cast<int>(value) : -1;
 }
@@ -71,13 +40,13 @@ void keep(LatestReports& latest, const DepthReport& r) {
   latest.depth = r;
 }
 void keep(LatestReports& latest, const ContactPointReport& r) {
-  latest.contact_point = r;
+  latest.contactPoint = r;
 }
 void keep(LatestReports& latest, const TouchingReport& r) {
   latest.touching = r;
 }
 void keep(LatestReports& latest, const TouchedObjectReport& r) {
-  latest.touched_object = r;
+  latest.touchedObject = r;
 }
 void keep(LatestReports& latest, const AngleReport& r) {
   latest.angle = r;
@@ -107,11 +76,11 @@ TickReport toReport(const wire::TickReport& m) {
           m.depth,
           m.object,
           m.buttons,
-          m.guard_active,
-          m.guard_latched};
+          Trips(m.guard_active),
+          Trips(m.guard_latched)};
 }
 
-// Numbers that are left over at the end would be of a contact that lacks some: those are not one.
+// Ignores numbers at the end that do not make a complete contact.
 ContactsReport toReport(const wire::ContactList& m) {
   ContactsReport report{{}, m.tick, std::chrono::nanoseconds(m.time), {}};
   constexpr std::size_t kNumbers = wire::ContactList::kNumbers;
@@ -135,7 +104,7 @@ void Client::Impl::deliver(const Arrival& arrival, Report report) {
   statistics.latency.add(
       std::chrono::duration_cast<std::chrono::microseconds>(arrival.arrived - report.time));
   keep(latest, report);
-  call(report);
+  callbacksFor<Report>().call(report);
 }
 
 template <wire::WireMessage M, class Use>
@@ -155,10 +124,10 @@ void Client::Impl::dispatch(const Arrival& arrival) {
   }
   const bool up = arrival.what == Arrival::What::connected;
   if (!up) latest = {};
-  call(ConnectionReport{arrival.arrived, up, std::string(wire::asText(arrival.bytes))});
+  callbacksFor<ConnectionReport>().call({arrival.arrived, up, std::string(wire::asText(arrival.bytes))});
 }
 
-// Servers tell all states now and then; only what differs is news.
+// Servers resend all button states periodically; report changes only.
 void Client::Impl::handle(const Arrival& arrival, const wire::ButtonStates& states) {
   for (std::size_t i = 0; i < states.states.values.size(); ++i) {
     const int button = static_cast<int>(i);
@@ -217,7 +186,7 @@ void Client::Impl::dispatchMessage(const Arrival& a) {
       });
     case wire::kindOf<wire::Text>:
       return decode<wire::Text>(a, [&](const auto& m) {
-        if (m.severity >= wire::kTextError && first_error.empty()) first_error = m.text.text;
+        if (m.severity >= wire::kTextError && firstError.empty()) firstError = m.text.text;
         deliver(a,
                 TextReport{{}, static_cast<Severity>(std::min(m.severity, wire::kTextError)), m.text.text});
       });
@@ -239,45 +208,33 @@ void Client::Impl::dispatchMessage(const Arrival& a) {
       return decode<wire::ContactList>(a, [&](const auto& m) { deliver(a, toReport(m)); });
     case wire::kindOf<wire::GuardState>:
       return decode<wire::GuardState>(a, [&](const auto& m) {
-        deliver(a, GuardReport{{}, m.active, m.latched, m.armed != 0, m.stopped != 0});
+        deliver(a, GuardReport{{}, Trips(m.active), Trips(m.latched), m.armed != 0, m.stopped != 0});
       });
     default:
-      return;  // pongs, and what only servers listen to
+      return;  // pongs, and commands, which only servers handle
   }
 }
 
-// Each adds to its list of the tuple.
-#define HAPTICD_ON(Name)                                                                      \
-  void Client::on##Name(Callback<Name##Report> callback) {                                    \
-    std::get<Impl::Callbacks<Name##Report>>(impl_->callbacks).push_back(std::move(callback)); \
+#define HAPTICD_ON(name, Type, text)                                     \
+  Subscription Client::on##Type(Callback<Type##Report> callback) {       \
+    return impl_->callbacksFor<Type##Report>().add(std::move(callback)); \
   }
-HAPTICD_ON(Pose)
-HAPTICD_ON(Velocity)
-HAPTICD_ON(Acceleration)
-HAPTICD_ON(Button)
-HAPTICD_ON(Analog)
-HAPTICD_ON(Force)
-HAPTICD_ON(Depth)
-HAPTICD_ON(ContactPoint)
-HAPTICD_ON(Touching)
-HAPTICD_ON(TouchedObject)
-HAPTICD_ON(Angle)
-HAPTICD_ON(ForceError)
-HAPTICD_ON(Text)
-HAPTICD_ON(ToRoom)
-HAPTICD_ON(UnitToSensor)
-HAPTICD_ON(Workspace)
-HAPTICD_ON(Tick)
-HAPTICD_ON(Contacts)
-HAPTICD_ON(Guard)
-HAPTICD_ON(Connection)
+HAPTICD_REPORTS(HAPTICD_ON)
+HAPTICD_ON(connection, Connection, "connection")
 #undef HAPTICD_ON
 
+void Subscription::end() noexcept {
+  if (const auto entry = entry_.lock()) entry->end();
+}
+bool Subscription::active() const noexcept {
+  const auto entry = entry_.lock();
+  return entry && entry->active();
+}
+
 std::string_view nameOf(ReportKind kind) noexcept {
-  static constexpr std::array<std::string_view, kReportKinds> kNames{
-      "pose",           "velocity",  "acceleration",   "button",   "analog",      "force", "depth",
-      "contact point",  "touching",  "touched object", "angle",    "force error", "text",  "to room",
-      "unit to sensor", "workspace", "tick",           "contacts", "guard"};
+#define HAPTICD_NAME(name, Type, text) text,
+  static constexpr std::array<std::string_view, kReportKinds> kNames{HAPTICD_REPORTS(HAPTICD_NAME)};
+#undef HAPTICD_NAME
   return kNames[static_cast<std::size_t>(kind)];
 }
 

@@ -1,4 +1,4 @@
-// Meshes on their way to a server: in runs of thousands where it knows them, else vertex by vertex.
+// Uploads of meshes: thousands of vertices per message where the server supports it, else one by one.
 #include <algorithm>
 #include <stdexcept>
 
@@ -10,19 +10,19 @@ namespace {
 using Vertices = std::span<const std::array<float, 3>>;
 using Triangles = std::span<const std::array<std::uint32_t, 3>>;
 
-// Vertices share the time stamp of their block: asking the clock for each would cost more than encoding it.
+// Vertices of a block share a time stamp: reading the clock costs more than encoding a vertex.
 constexpr std::size_t kBlock = 1024;
 constexpr std::uint64_t kVertexFrameBytes =
     wire::kHeaderBytes + wire::padded(wire::kPayloadSize<wire::SetVertex>);
 
-/// Bytes of as many vertices or triangles in runs of messages.
+/// Bytes of this many vertices or triangles, in messages of at most Run::kMost.
 template <class Run>
 std::uint64_t runBytes(std::size_t count) {
   const std::size_t runs = (count + Run::kMost - 1) / Run::kMost;
   return runs * (wire::kHeaderBytes + wire::padded(wire::payloadSize(Run{}))) + count * 12;
 }
 
-/// Follows the bytes of one upload on their way into the system.
+/// Counts the bytes of one upload that the system has accepted, and reports progress.
 class Upload {
  public:
   Upload(client::Link& link, std::uint64_t bytes, const Client::Callback<UploadProgress>& progress)
@@ -30,7 +30,7 @@ class Upload {
         progress_(progress),
         start_((link.flush(), link.streamBytes())),
         connection_(link.connectionNumber()) {
-    state_.bytes_total = bytes;
+    state_.bytesTotal = bytes;
     link_.onDrainStep = [this] { report(); };
   }
   ~Upload() { link_.onDrainStep = nullptr; }
@@ -40,25 +40,25 @@ class Upload {
   void check() const {
     if (!link_.connected() || link_.connectionNumber() != connection_) {
       throw ConnectionLost("connection to " + link_.server().text() + " lost after " +
-                           std::to_string(state_.bytes_sent) + " of " + std::to_string(state_.bytes_total) +
+                           std::to_string(state_.bytesSent) + " of " + std::to_string(state_.bytesTotal) +
                            " bytes of a mesh: " + link_.whyNotConnected());
     }
   }
 
   void finish() {
     link_.drainTo(0);
-    reported_ = reported_ && state_.bytes_sent == state_.bytes_total;
-    tell(state_.bytes_total);
+    reported_ = reported_ && state_.bytesSent == state_.bytesTotal;
+    update(state_.bytesTotal);
   }
 
  private:
   void report() {
     const std::uint64_t taken = link_.streamBytesTaken();
-    tell(taken > start_ ? std::min(taken - start_, state_.bytes_total) : 0);
+    update(taken > start_ ? std::min(taken - start_, state_.bytesTotal) : 0);
   }
-  void tell(std::uint64_t sent) {
-    if (sent == state_.bytes_sent && reported_) return;
-    state_.bytes_sent = sent;
+  void update(std::uint64_t sent) {
+    if (sent == state_.bytesSent && reported_) return;
+    state_.bytesSent = sent;
     reported_ = true;
     if (progress_) progress_(state_);
   }
@@ -121,14 +121,14 @@ void Client::Impl::sendRuns(int object, std::size_t first, Vertices vertices, Tr
   }
 }
 
-// In a batch, if it fits: the hand never feels half a mesh.
+// In a batch if it fits, so that no tick renders half a mesh.
 void Client::Impl::uploadRuns(int object, Vertices vertices, Triangles triangles,
                               const Callback<UploadProgress>& progress) {
   if (link.holding()) return sendRuns(object, 0, vertices, triangles, {});
   const std::uint64_t bytes =
       runBytes<wire::MeshVertices>(vertices.size()) + runBytes<wire::MeshTriangles>(triangles.size());
   Upload upload(link, bytes, progress);
-  if (has(wire::kFeatureBatch) && bytes <= client::Link::kMostBatchBytes) {
+  if (has(wire::kFeatureBatch) && bytes <= client::Link::kMaxBatchBytes) {
     client::HeldBatch batch(link);
     sendRuns(object, 0, vertices, triangles, {});
     upload.check();
@@ -155,7 +155,7 @@ void Client::Impl::uploadTriples(int object, std::size_t count, const Callback<U
 
 void Client::uploadMesh(int object, const MeshView& mesh, const Callback<UploadProgress>& progress) {
   checkTriangles(mesh.vertices, mesh.triangles);
-  if (!connected()) waitConnected(impl_->options.connect_timeout);
+  if (!connected()) waitConnected(impl_->options.connectTimeout);
   impl_->waitAnswered();
   if (impl_->has(wire::kFeatureBulkMesh)) {
     impl_->uploadRuns(object, mesh.vertices, mesh.triangles, progress);
@@ -167,7 +167,7 @@ void Client::uploadMesh(int object, const MeshView& mesh, const Callback<UploadP
 
 void Client::uploadCorners(int object, std::span<const std::array<float, 3>> corners,
                            const Callback<UploadProgress>& progress) {
-  if (!connected()) waitConnected(impl_->options.connect_timeout);
+  if (!connected()) waitConnected(impl_->options.connectTimeout);
   impl_->waitAnswered();
   if (impl_->has(wire::kFeatureBulkMesh)) {
     impl_->uploadRuns(object, corners, {}, progress);

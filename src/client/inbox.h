@@ -1,5 +1,5 @@
-// What arrived and waits to be dispatched. Arrivals are taken from the sockets by the event loop, whose
-// callbacks may not throw or run it again; the user's callbacks, which may do both, are made later from here.
+// Arrivals that wait for dispatch. Callbacks of the event loop must neither throw nor run the loop; callbacks
+// of the user may do both, so they run later, from this queue.
 #pragma once
 
 #include <chrono>
@@ -12,20 +12,20 @@
 
 namespace hapticd::client {
 
-/// One arrival; what it points to lives until the next pop().
+/// One arrival; its bytes are valid until the next pop().
 struct Arrival {
   enum class What : std::uint8_t { message, connected, lost };
 
   What what = What::message;
   wire::MessageKind kind = wire::kUnknownKind;  ///< of a message
-  wire::LocalSender sender{};                   ///< of a message; -1 when it is nobody we know
-  wire::LocalType type{};                       ///< of a message; -1 when it is nothing we know
+  wire::LocalSender sender{};                   ///< of a message; -1 when unknown
+  wire::LocalType type{};                       ///< of a message; -1 when unknown
   wire::Time time{};                            ///< stamp of a message
   std::chrono::system_clock::time_point arrived{};
   wire::ByteView bytes{};  ///< payload of a message, or the reason of a loss
 };
 
-/// A queue of arrivals in two halves, one being filled and one being read, that keep their memory.
+/// A queue of arrivals in two halves, one being filled and one being read. Both keep their memory.
 class Inbox {
  public:
   void push(Arrival arrival) {
@@ -34,7 +34,7 @@ class Inbox {
     half_[filling_].arrivals.push_back(arrival);
   }
 
-  /// Takes the oldest arrival; false when there is none.
+  /// Removes and returns the oldest arrival; false when there is none.
   bool pop(Arrival& arrival) {
     if (next_ == reading().arrivals.size()) {
       reading().clear();
@@ -53,7 +53,7 @@ class Inbox {
 
  private:
   struct Half {
-    std::vector<Arrival> arrivals;  // their bytes: only the size counts
+    std::vector<Arrival> arrivals;  // of their bytes, only the size counts
     std::vector<std::size_t> offsets;
     std::vector<std::byte> bytes;
     void clear() {

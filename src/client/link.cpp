@@ -1,10 +1,11 @@
-// How a link comes up and goes down.
+// Connecting, and losing a connection.
 #include "client/link.h"
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
 
+#include "base/world.h"
 #include "hapticd/error.h"
 #include "wire/text.h"
 
@@ -12,14 +13,13 @@ namespace hapticd::client {
 namespace {
 
 using namespace std::chrono_literals;
-using SteadyClock = std::chrono::steady_clock;
 
 constexpr auto kHandshakeTimeout = 3s;
 
 net::ConnectionOptions connectionOptions(const LinkOptions& options) {
   net::ConnectionOptions result;
-  result.hardLimitBytes = SIZE_MAX;  // the link keeps the queue short itself, by waiting
-  result.lossTimeout = options.send_timeout;
+  result.hardLimitBytes = SIZE_MAX;  // the link bounds the queue itself, by waiting
+  result.lossTimeout = options.sendTimeout;
   result.keepAlive = 5s;
   return result;
 }
@@ -27,8 +27,7 @@ net::ConnectionOptions connectionOptions(const LinkOptions& options) {
 }  // namespace
 
 wire::Time wireNow() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  const auto us = std::chrono::duration_cast<std::chrono::microseconds>(now).count();
+  const base::Nanos us = base::wallNow() / 1000;
   return {static_cast<std::uint32_t>(us / 1000000), static_cast<std::uint32_t>(us % 1000000)};
 }
 
@@ -37,13 +36,17 @@ std::chrono::system_clock::time_point toTimePoint(wire::Time time) {
                                                std::chrono::microseconds(time.microseconds));
 }
 
+std::chrono::system_clock::time_point wallTimePoint() {
+  return std::chrono::system_clock::time_point(std::chrono::nanoseconds(base::wallNow()));
+}
+
 Link::Link(const ServerAddress& server, const LinkOptions& options) : server_(server), options_(options) {
   try {
     address_ = {net::resolve(server_.host), server_.port};
   } catch (const net::Error& error) {
     throw ConnectError("no server at " + server_.text() + ": " + error.what());
   }
-  loop_.setErrorHandler([this](std::string_view text) { last_failure_ = text; });
+  loop_.setErrorHandler([this](std::string_view text) { lastFailure_ = text; });
   attempt();
 }
 
@@ -52,7 +55,7 @@ wire::LocalSender Link::addDevice(std::string_view name) {
   if (std::find(devices_.begin(), devices_.end(), sender) == devices_.end()) {
     devices_.push_back(sender);
     heard_.resize(names_.senders().size());
-    if (connected()) endpoint_->send(wireNow(), sender, wire::Ping{});
+    if (connected()) peer_->send(wireNow(), sender, wire::Ping{});
   }
   return sender;
 }
@@ -60,48 +63,48 @@ wire::LocalSender Link::addDevice(std::string_view name) {
 // --- connecting
 
 void Link::attempt() {
-  retry_.cancel();
+  retryTimer_.cancel();
   try {
-    if (server_.tcp_only) {
+    if (server_.tcpOnly) {
       adopt(net::Connection::connect(loop_, address_, kHandshakeTimeout, connectionOptions(options_)));
     } else {
-      call_back_.emplace(
+      reverseConnection_.emplace(
           loop_, address_, connectionOptions(options_),
           [this](net::Connection connection) {
-            call_back_.reset();
+            reverseConnection_.reset();
             adopt(std::move(connection));
           },
-          [this] { last_failure_ = "UDP request: " + std::string(std::strerror(ECONNREFUSED)); });
+          [this] { lastFailure_ = "UDP request: " + std::string(std::strerror(ECONNREFUSED)); });
     }
   } catch (const net::Error& error) {
-    last_failure_ = error.what();
+    lastFailure_ = error.what();
     retryLater();
   }
 }
 
 void Link::retryLater() {
   if (connections_ == 0 || options_.reconnect) {
-    retry_ = loop_.after(options_.retry_interval, [this] { attempt(); });
+    retryTimer_ = loop_.after(options_.retryInterval, [this] { attempt(); });
   }
 }
 
 void Link::adopt(net::Connection connection) {
   wire::PeerOptions options;
-  if (!server_.tcp_only) options.udp = openDatagrams({connection.local().address, 0});
-  endpoint_.emplace(names_, options);
+  if (!server_.tcpOnly) options.udp = openDatagrams({connection.local().address, 0});
+  peer_.emplace(names_, options);
   connection_ = std::move(connection);
   connection_.start({.onConnected = {},
                      .onBytes = [this](auto bytes) { received(bytes); },
                      .onDrained = {},
                      .onClosed = [this](const std::string& reason) { onClosed(reason); }});
-  handshake_timeout_ = loop_.after(kHandshakeTimeout, [this] {
-    connection_.abort("it accepts connections, but does not answer as a VRPN server does");
+  handshakeTimer_ = loop_.after(kHandshakeTimeout, [this] {
+    connection_.abort("it accepts connections, but does not answer as a VRPN server");
   });
-  stream_bytes_ = 0;
+  streamBytes_ = 0;
   pushOut();
 }
 
-// Without a socket for datagrams everything goes by TCP.
+// Without a datagram socket, everything is sent by TCP.
 std::optional<wire::UdpAddress> Link::openDatagrams(const net::Endpoint& local) {
   try {
     udp_.emplace(loop_, local);
@@ -114,15 +117,15 @@ std::optional<wire::UdpAddress> Link::openDatagrams(const net::Endpoint& local) 
 }
 
 void Link::onConnected() {
-  handshake_timeout_.cancel();
+  handshakeTimer_.cancel();
   ++connections_;
   if (onUp) onUp();
-  endpoint_->sendFrames(wireNow(), backlog_.bytes(), wire::Reliability::kReliable);
+  peer_->sendFrames(wireNow(), backlog_.bytes(), wire::Reliability::kReliable);
   backlog_.clear();
   heard_.assign(names_.senders().size(), false);
-  inbox_.push({.what = Arrival::What::connected, .arrived = std::chrono::system_clock::now()});
+  inbox_.push({.what = Arrival::What::connected, .arrived = wallTimePoint()});
   pingUnheard();
-  ping_ = loop_.every(1s, [this] { pingUnheard(); });
+  pingTimer_ = loop_.every(1s, [this] { pingUnheard(); });
 }
 
 void Link::pingUnheard() {
@@ -130,27 +133,25 @@ void Link::pingUnheard() {
   for (const wire::LocalSender device : devices_) {
     if (heard_[static_cast<std::size_t>(device.value)]) continue;
     all = false;
-    endpoint_->send(wireNow(), device, wire::Ping{});
+    peer_->send(wireNow(), device, wire::Ping{});
   }
-  if (all) ping_.cancel();
+  if (all) pingTimer_.cancel();
   pushOut();
 }
 
 void Link::onClosed(const std::string& reason) {
-  const bool was_connected = shaken();
-  last_failure_ = reason;
+  const bool wasConnected = handshakeDone();
+  lastFailure_ = reason;
   addTraffic(statistics_);
-  if (was_connected) {
-    inbox_.push({.what = Arrival::What::lost,
-                 .arrived = std::chrono::system_clock::now(),
-                 .bytes = wire::asBytes(reason)});
+  if (wasConnected) {
+    inbox_.push({.what = Arrival::What::lost, .arrived = wallTimePoint(), .bytes = wire::asBytes(reason)});
   }
-  ping_.cancel();
-  handshake_timeout_.cancel();
-  endpoint_.reset();
+  pingTimer_.cancel();
+  handshakeTimer_.cancel();
+  peer_.reset();
   udp_.reset();
-  udp_peer_.reset();
-  server_devices_.clear();
+  udpPeer_.reset();
+  serverDevices_.clear();
   connection_ = {};
   uncounted_ = 0;
   paused_ = false;
@@ -167,32 +168,36 @@ bool Link::waitHeard(wire::LocalSender device, Duration timeout) {
 
 bool Link::waitUntil(const std::function<bool()>& condition, Duration timeout) {
   flush();
-  const auto deadline = SteadyClock::now() + std::min(timeout, kLongestWait);
+  const base::Nanos deadline = base::now() + std::min(timeout, kLongestWait).count();
   while (!condition()) {
-    const Duration left = deadline - SteadyClock::now();
+    const Duration left(deadline - base::now());
     if (left <= Duration::zero()) return false;
     loop_.runOnce(left);
   }
   return true;
 }
 
+void Link::runOnce() {
+  flush();
+  loop_.runOnce(Duration::zero());
+}
+
 std::string Link::whyNotConnected() const {
-  if (last_failure_.find(std::strerror(ECONNREFUSED)) != std::string::npos) {
-    return "nothing listens on " + server_.text() + " (" + last_failure_ +
+  if (lastFailure_.find(std::strerror(ECONNREFUSED)) != std::string::npos) {
+    return "nothing listens on " + server_.text() + " (" + lastFailure_ +
            "): start `hapticd serve` there, or correct host and port";
   }
-  if (last_failure_.empty() && !server_.tcp_only) {
+  if (lastFailure_.empty() && !server_.tcpOnly) {
     return "no server at " + server_.text() +
            " answers the UDP request: start `hapticd serve` there, correct host and port, or, if a firewall "
-           "blocks "
-           "the server's call back, connect to NAME@tcp://" +
+           "blocks the connection from the server, connect to NAME@tcp://" +
            server_.text();
   }
-  return "no VRPN server at " + server_.text() + ": " + (last_failure_.empty() ? "no answer" : last_failure_);
+  return "no VRPN server at " + server_.text() + ": " + (lastFailure_.empty() ? "no answer" : lastFailure_);
 }
 
 std::vector<std::string> Link::serverDevices() const {
-  return server_devices_;
+  return serverDevices_;
 }
 
 }  // namespace hapticd::client

@@ -1,6 +1,5 @@
-// One connection to one server that heals itself: dials, shakes hands, collects what is sent into big
-// buffers, and queues what arrives for dispatch. Everything happens in the thread that calls it, none of it
-// in a hidden one.
+// A connection to one server that reconnects by itself: connects, performs the handshake, collects messages
+// into large buffers, and queues arrivals for dispatch. Everything happens in the calling thread.
 #pragma once
 
 #include <chrono>
@@ -11,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "client/reverse_connection.h"
 #include "client/inbox.h"
+#include "client/reverse_connection.h"
 #include "client/server_address.h"
 #include "net/connection.h"
 #include "net/loop.h"
@@ -22,140 +21,152 @@ namespace hapticd::client {
 
 using Duration = std::chrono::nanoseconds;
 
-/// Now, as messages are stamped.
+/// Wall-clock time as messages carry it.
 wire::Time wireNow();
 /// The stamp of a message as a point in time.
 std::chrono::system_clock::time_point toTimePoint(wire::Time time);
+/// Wall-clock time as reports carry it.
+std::chrono::system_clock::time_point wallTimePoint();
 
 struct LinkOptions {
   bool reconnect = true;
-  std::chrono::milliseconds retry_interval{250};
-  std::chrono::milliseconds send_timeout{10000};
-  std::size_t queue_limit = 4 * 1024 * 1024;
-  /// Take over names that the server describes and we did not know, as stock VRPN does.
-  bool adopt_names = false;
+  std::chrono::milliseconds retryInterval{250};
+  std::chrono::milliseconds sendTimeout{10000};
+  std::size_t queueLimit_bytes = 4 * 1024 * 1024;
+  /// Adopt unknown names that the server describes, as stock VRPN does.
+  bool adoptNames = false;
 };
 
 /// Counts over all connections of a link.
 struct LinkStatistics {
   std::uint64_t connections = 0;
-  std::uint64_t messages_out = 0;
-  std::uint64_t messages_in = 0;
-  std::uint64_t messages_dropped = 0;
-  std::uint64_t tcp_bytes_out = 0;
-  std::uint64_t tcp_bytes_in = 0;
-  std::uint64_t udp_bytes_out = 0;
-  std::uint64_t udp_bytes_in = 0;
+  std::uint64_t messagesOut = 0;
+  std::uint64_t messagesIn = 0;
+  std::uint64_t messagesDropped = 0;
+  std::uint64_t tcpBytesOut = 0;
+  std::uint64_t tcpBytesIn = 0;
+  std::uint64_t udpBytesOut = 0;
+  std::uint64_t udpBytesIn = 0;
 };
 
+/// Thread: that of the caller, always the same one.
 class Link {
  public:
   using Handler = std::function<void(const Arrival&)>;
 
-  /// Resolves the host, which may block, and begins to connect. Throws ConnectError for an unknown host.
+  /// Resolves the host, which may block, and starts to connect. Throws ConnectError for an unknown host.
   Link(const ServerAddress& server, const LinkOptions& options);
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
 
-  /// A device name of ours; it is pinged each second until it is heard.
+  /// Names a device to use; the link pings it every second until it answers.
   wire::LocalSender addDevice(std::string_view name);
-  /// Other names, known or new; std::invalid_argument and std::length_error as wire::LocalNames.
+  /// Other names, known or new. Throws std::invalid_argument and std::length_error as wire::LocalNames.
   wire::LocalSender addSender(std::string_view name) { return names_.addSender(name); }
   wire::LocalType addType(std::string_view name) { return names_.addType(name); }
   const wire::LocalNames& names() const noexcept { return names_; }
 
-  /// Sends a message: collected, kept before the first connection, dropped while a later one is lost. Waits
-  /// while the server is behind by more than the queue limit; throws ConnectionLost when it takes nothing for
-  /// the send timeout, and ConnectError when too much waits for the first connection.
+  /// Sends a message: it is collected, kept before the first connection, dropped while a later one is lost.
+  /// Sleeps while more than the queue limit waits. Throws ConnectionLost when the server accepts no data for
+  /// the send timeout, and ConnectError when more than the queue limit waits for the first connection.
   template <wire::WireMessage M>
   void send(wire::Time time, wire::LocalSender sender, const M& message,
             wire::Reliability reliability = M::kInfo.reliability) {
     if (holding_) {
       held_.add(time, sender, message);
-      ++statistics_.messages_out;
+      ++statistics_.messagesOut;
       return;
     }
     if (connected()) {
-      endpoint_->send(time, sender, message, reliability);
+      peer_->send(time, sender, message, reliability);
     } else if (connections_ == 0) {
       backlog_.add(time, sender, message);
     } else {
-      ++statistics_.messages_dropped;
+      ++statistics_.messagesDropped;
       return;
     }
     sent(wire::kHeaderBytes + wire::padded(wire::payloadSize(message)));
   }
-  /// The same for a message whose payload is bytes already.
+  /// The same for an encoded payload.
   void sendRaw(wire::Time time, wire::LocalSender sender, wire::LocalType type, wire::ByteView payload,
                wire::Reliability reliability);
-  /// Sends a message at once and reliably, whatever is held; false, and counted, without a connection.
+  /// Sends a message now and reliably, ahead of what is held. Without a connection: counts it as dropped,
+  /// returns false.
   template <wire::WireMessage M>
   bool sendNow(wire::LocalSender sender, const M& message) {
     if (!connected()) {
-      ++statistics_.messages_dropped;
+      ++statistics_.messagesDropped;
       return false;
     }
-    endpoint_->send(wireNow(), sender, message, wire::Reliability::kReliable);
-    ++statistics_.messages_out;
+    peer_->send(wireNow(), sender, message, wire::Reliability::kReliable);
+    ++statistics_.messagesOut;
     pushOut();
     return true;
   }
-  /// From now on send() keeps its messages, until they are dropped or sent as one batch of the device. A
-  /// batch of more than kMostBatchBytes is dropped, too: std::length_error.
+  /// From now on send() keeps its messages until dropHeld() or sendHeld().
   void hold() { holding_ = true; }
   bool holding() const noexcept { return holding_; }
   void dropHeld();
+  /// Sends what is held as one batch of the device. Drops it and throws std::length_error above
+  /// kMaxBatchBytes.
   void sendHeld(wire::LocalSender device);
-  static constexpr std::size_t kMostBatchBytes = 256 * 1024 * 1024;
-  /// Hands what waits to the system as far as it takes it now.
+  static constexpr std::size_t kMaxBatchBytes = 256 * 1024 * 1024;
+  /// Gives collected bytes to the system, as far as it accepts them without waiting.
   void flush();
-  /// Waits until no more than so many bytes wait. Throws ConnectionLost when they never go.
+  /// Sleeps until at most this many bytes wait. Throws ConnectionLost when the connection ends or accepts no
+  /// data for the send timeout.
   void drainTo(std::size_t bytes);
-  /// Called whenever a wait for the server has got bytes out; the caller resets it.
+  /// Bytes sent on this connection's stream that the server has not acknowledged: waiting here or in the
+  /// system.
+  std::size_t backlogBytes() const;
+  /// Called whenever the system accepted bytes during a wait; the caller resets it.
   std::function<void()> onDrainStep;
 
-  /// Sends what waits, sleeps until something arrives or the timeout is over, hands all arrivals to the
-  /// handler and returns how many there were; from inside a handler it hands over nothing.
+  /// Sends what is collected, sleeps until something arrives or the timeout is over, passes all arrivals to
+  /// the handler and returns their number. Called from a handler, it passes nothing.
   std::size_t poll(Duration timeout, const Handler& handler);
 
-  // Both are called by the event loop and may not throw: on a new connection before anything is sent, and
-  // with each message as it arrives, before it waits for poll().
-  std::function<void()> onUp;
-  std::function<void(wire::MessageKind, wire::LocalSender, wire::ByteView)> onArriving;
-  /// Calls the function each period while somebody polls or waits.
+  // Called by the event loop; they must not throw.
+  std::function<void()> onUp;  ///< on a new connection, before anything is sent
+  /// With each message as it arrives, before it waits for poll(): kind, device and payload.
+  std::function<void(wire::MessageKind, wire::LocalSender, wire::ByteView)> onArrival;
+  /// Calls the function every period while the link polls or waits.
   [[nodiscard]] net::Subscription every(Duration period, std::function<void()> function) {
     return loop_.every(period, std::move(function));
   }
 
-  bool connected() const noexcept { return shaken() && connection_.isOpen(); }
-  /// Sleeps until connected, or until the device is heard: false after the timeout.
+  bool connected() const noexcept { return handshakeDone() && connection_.isOpen(); }
+  /// Sleeps until connected, or until something arrived from the device; false after the timeout.
   bool waitConnected(Duration timeout);
   bool waitHeard(wire::LocalSender device, Duration timeout);
-  /// Sleeps and lets things arrive, without dispatching them, until the condition holds: false after the
-  /// timeout.
+  /// Sends and receives, without dispatching, until the condition holds; false after the timeout.
   bool waitUntil(const std::function<bool()>& condition, Duration timeout);
-  /// Whether anything came from the device on this connection.
+  /// Sends and receives once, without dispatching and without sleeping.
+  void runOnce();
+  /// Whether anything arrived from the device on this connection.
   bool heard(wire::LocalSender device) const noexcept {
     return connected() && heard_[static_cast<std::size_t>(device.value)];
   }
 
   const ServerAddress& server() const noexcept { return server_; }
+  /// The same server by its resolved address, reached by one TCP connection.
+  ServerAddress resolvedServer() const { return {address_.addressText(), server_.port, true}; }
   /// Number of the connection, 0 before the first.
   std::uint64_t connectionNumber() const noexcept { return connections_; }
-  /// Bytes given to this connection's TCP stream, and how many of them the system has taken.
-  std::uint64_t streamBytes() const noexcept { return stream_bytes_; }
+  /// Bytes given to this connection's TCP stream, and those of them that the system has accepted.
+  std::uint64_t streamBytes() const noexcept { return streamBytes_; }
   std::uint64_t streamBytesTaken() const;
-  /// Why there is no connection, with the remedy.
+  /// The reason for which there is no connection, with the remedy.
   std::string whyNotConnected() const;
-  /// Device names that the server described by itself.
+  /// Device names that the server described first.
   std::vector<std::string> serverDevices() const;
   LinkStatistics statistics() const;
 
  private:
   static constexpr Duration kLongestWait = std::chrono::hours(24);  // a deadline must not overflow
 
-  /// Whether hands were shaken, on a connection that may have failed meanwhile.
-  bool shaken() const noexcept { return endpoint_ && endpoint_->connected(); }
+  /// Whether the handshake is complete, on a connection that may have failed since.
+  bool handshakeDone() const noexcept { return peer_ && peer_->connected(); }
   void attempt();
   void retryLater();
   void adopt(net::Connection connection);
@@ -181,35 +192,35 @@ class Link {
   net::Endpoint address_;
   net::Loop loop_;
   wire::LocalNames names_;
-  wire::FrameEncoder backlog_;  // until the first connection
+  wire::FrameEncoder backlog_;  // commands before the first connection
   wire::FrameEncoder held_;
   bool holding_ = false;
   Inbox inbox_;
 
-  // Of the present attempt or connection.
-  std::optional<ReverseConnection> call_back_;
+  // State of the present attempt or connection.
+  std::optional<ReverseConnection> reverseConnection_;
   net::Connection connection_;
   std::optional<net::UdpSocket> udp_;
-  std::optional<net::Endpoint> udp_peer_;
-  std::optional<wire::Peer> endpoint_;
-  net::Subscription handshake_timeout_;
-  net::Subscription retry_;
-  net::Subscription ping_;
-  std::vector<std::string> server_devices_;
-  std::uint64_t stream_bytes_ = 0;
+  std::optional<net::Endpoint> udpPeer_;
+  std::optional<wire::Peer> peer_;
+  net::Subscription handshakeTimer_;
+  net::Subscription retryTimer_;
+  net::Subscription pingTimer_;
+  std::vector<std::string> serverDevices_;
+  std::uint64_t streamBytes_ = 0;
   std::size_t uncounted_ = 0;  // bytes collected since the last pushOut()
   bool paused_ = false;
 
   std::vector<wire::LocalSender> devices_;
   std::vector<bool> heard_;  // by sender
   std::vector<std::shared_ptr<net::Buffer>> buffers_;
-  std::string last_failure_;
+  std::string lastFailure_;
   std::uint64_t connections_ = 0;
   LinkStatistics statistics_;
   bool dispatching_ = false;
 };
 
-/// Holds back what a link sends, until it is committed as one batch, or dropped if that never happens.
+/// Holds back what a link sends until commit() sends it as one batch; the destructor drops it otherwise.
 class HeldBatch {
  public:
   explicit HeldBatch(Link& link) : link_(link) { link_.hold(); }

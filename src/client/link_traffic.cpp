@@ -1,6 +1,7 @@
-// What goes over a link: receiving, dispatching, sending.
+// Receiving, dispatching, sending.
 #include <algorithm>
 
+#include "base/world.h"
 #include "client/link.h"
 #include "hapticd/error.h"
 #include "wire/text.h"
@@ -9,28 +10,27 @@ namespace hapticd::client {
 namespace {
 
 using namespace std::chrono_literals;
-using SteadyClock = std::chrono::steady_clock;
 
-// Big enough that one system call carries over a thousand vertices, small enough to stay in the cache.
+// Large enough for over a thousand vertices per system call, small enough to stay in the cache.
 constexpr std::size_t kBatchBytes = 64 * 1024;
-// Reports that may wait while a command waits for the server; then the server has to wait too.
-constexpr std::size_t kMostWaitingBytes = 64 * 1024 * 1024;
+// Reports that may wait for dispatch, for example while a command sleeps; beyond it the link stops reading.
+constexpr std::size_t kMaxWaitingBytes = 64 * 1024 * 1024;
 
 }  // namespace
 
 // --- receiving
 
 void Link::received(wire::ByteView bytes) {
-  endpoint_->feed(wireNow(), bytes, [this](const wire::Event& event) { onEvent(event); });
+  peer_->feed(wireNow(), bytes, [this](const wire::Event& event) { onEvent(event); });
   pushOut();
 }
 
-// The peer of the TCP connection is the only one whose datagrams count.
+// Only datagrams from the peer of the TCP connection count.
 void Link::receivedDatagram(wire::ByteView bytes, const net::Endpoint& from) {
   const bool known =
-      from.address == connection_.remote().address || (udp_peer_ && from.address == udp_peer_->address);
-  if (!known || inbox_.waitingBytes() > kMostWaitingBytes) return;
-  endpoint_->feedDatagram(bytes, [this](const wire::Event& event) { onEvent(event); });
+      from.address == connection_.remote().address || (udpPeer_ && from.address == udpPeer_->address);
+  if (!known || inbox_.waitingBytes() > kMaxWaitingBytes) return;
+  peer_->feedDatagram(bytes, [this](const wire::Event& event) { onEvent(event); });
 }
 
 void Link::onEvent(const wire::Event& event) {
@@ -39,8 +39,8 @@ void Link::onEvent(const wire::Event& event) {
   } else if (std::holds_alternative<wire::Connected>(event)) {
     onConnected();
   } else if (const auto* sender = std::get_if<wire::SenderDescribed>(&event)) {
-    // Stock servers describe our own names back to us; those say nothing about what the server has.
-    if (!names_.findSender(sender->name)) server_devices_.emplace_back(sender->name);
+    // Stock servers describe our own names back to us; those are not evidence of a device.
+    if (!names_.findSender(sender->name)) serverDevices_.emplace_back(sender->name);
     adoptName(sender->name, &wire::LocalNames::addSender);
   } else if (const auto* type = std::get_if<wire::TypeDescribed>(&event)) {
     adoptName(type->name, &wire::LocalNames::addType);
@@ -53,32 +53,32 @@ void Link::onEvent(const wire::Event& event) {
 
 template <class Id>
 void Link::adoptName(std::string_view name, Id (wire::LocalNames::*add)(std::string_view)) {
-  if (!options_.adopt_names) return;
+  if (!options_.adoptNames) return;
   try {
     (names_.*add)(name);
   } catch (const std::logic_error&) {
-    // A name that we could not describe ourselves, or one too many: its messages stay strangers.
+    // An invalid name, or one too many: its messages stay unmapped.
   }
 }
 
 void Link::onUdpDescribed(const wire::UdpAddress& address) {
   try {
-    udp_peer_ = net::Endpoint::parse(address.host, address.port);
-    endpoint_->useDatagrams();
+    udpPeer_ = net::Endpoint::parse(address.host, address.port);
+    peer_->useDatagrams();
   } catch (const net::Error&) {
-    // Not a number: everything goes on by TCP.
+    // Not a numeric address: everything is sent by TCP.
   }
 }
 
 void Link::onMessage(const wire::MessageReceived& message) {
-  ++statistics_.messages_in;
+  ++statistics_.messagesIn;
   wire::LocalSender sender = message.local_sender;
   if (sender.value < 0) sender = names_.findSender(message.sender_name).value_or(wire::LocalSender{});
   if (sender.value >= 0) {
     if (heard_.size() < names_.senders().size()) heard_.resize(names_.senders().size());
     heard_[static_cast<std::size_t>(sender.value)] = true;
   }
-  if (onArriving) onArriving(message.kind, sender, message.payload);
+  if (onArrival) onArrival(message.kind, sender, message.payload);
   wire::LocalType type;
   if (message.kind != wire::kUnknownKind) {
     type = wire::localType(message.kind);
@@ -92,9 +92,9 @@ void Link::onMessage(const wire::MessageReceived& message) {
                .sender = sender,
                .type = type,
                .time = message.time,
-               .arrived = std::chrono::system_clock::now(),
+               .arrived = wallTimePoint(),
                .bytes = message.payload});
-  if (inbox_.waitingBytes() > kMostWaitingBytes && !paused_) {
+  if (inbox_.waitingBytes() > kMaxWaitingBytes && !paused_) {
     paused_ = true;
     connection_.pauseReading();
   }
@@ -119,12 +119,12 @@ std::size_t Link::dispatch(const Handler& handler) {
 std::size_t Link::poll(Duration timeout, const Handler& handler) {
   flush();
   std::size_t count = dispatch(handler);
-  const auto deadline = SteadyClock::now() + std::min(timeout, kLongestWait);
+  const base::Nanos deadline = base::now() + std::min(timeout, kLongestWait).count();
   do {
-    const Duration left = count > 0 ? Duration::zero() : Duration(deadline - SteadyClock::now());
+    const Duration left(count > 0 ? 0 : deadline - base::now());
     loop_.runOnce(std::max(left, Duration::zero()));
     count += dispatch(handler);
-  } while (count == 0 && SteadyClock::now() < deadline);
+  } while (count == 0 && base::now() < deadline);
   flush();
   return count;
 }
@@ -134,29 +134,29 @@ std::size_t Link::poll(Duration timeout, const Handler& handler) {
 void Link::sendRaw(wire::Time time, wire::LocalSender sender, wire::LocalType type, wire::ByteView payload,
                    wire::Reliability reliability) {
   if (connected()) {
-    endpoint_->sendRaw(time, sender, type, payload, reliability);
+    peer_->sendRaw(time, sender, type, payload, reliability);
   } else if (connections_ == 0) {
     backlog_.addRaw(time, sender.value, type.value, payload);
   } else {
-    ++statistics_.messages_dropped;
+    ++statistics_.messagesDropped;
     return;
   }
   sent(wire::kHeaderBytes + wire::padded(payload.size()));
 }
 
 void Link::sent(std::size_t bytes) {
-  ++statistics_.messages_out;
+  ++statistics_.messagesOut;
   uncounted_ += bytes;
   if (uncounted_ < kBatchBytes) return;
   flush();
   if (!connected()) {
-    if (backlog_.bytes().size() > options_.queue_limit) {
+    if (backlog_.bytes().size() > options_.queueLimit_bytes) {
       throw ConnectError(whyNotConnected() + "; " + std::to_string(backlog_.bytes().size()) +
                          " bytes wait to be sent");
     }
     uncounted_ = 0;
-  } else if (connection_.statistics().queuedBytes > options_.queue_limit) {
-    drainTo(options_.queue_limit / 2);
+  } else if (connection_.statistics().queuedBytes > options_.queueLimit_bytes) {
+    drainTo(options_.queueLimit_bytes / 2);
   } else if (onDrainStep) {
     onDrainStep();
   }
@@ -164,7 +164,7 @@ void Link::sent(std::size_t bytes) {
 
 void Link::dropHeld() {
   holding_ = false;
-  held_ = {};  // its memory, too: a batch may be a large mesh
+  held_ = {};  // also frees the memory: a batch may be a large mesh
 }
 
 void Link::sendHeld(wire::LocalSender device) {
@@ -172,45 +172,51 @@ void Link::sendHeld(wire::LocalSender device) {
   std::swap(frames, held_);
   holding_ = false;
   const std::size_t size = frames.bytes().size();
-  if (size > kMostBatchBytes) {
+  if (size > kMaxBatchBytes) {
     throw std::length_error("a batch of " + std::to_string(size) + " bytes, at most " +
-                            std::to_string(kMostBatchBytes) + ": send it in several");
+                            std::to_string(kMaxBatchBytes) + ": send it in several");
   }
   const wire::Time now = wireNow();
-  endpoint_->send(now, device, wire::BatchBegin{});
-  endpoint_->sendFrames(now, frames.bytes(), wire::Reliability::kReliable);
-  endpoint_->send(now, device, wire::BatchCommit{});
-  ++statistics_.messages_out;
+  peer_->send(now, device, wire::BatchBegin{});
+  peer_->sendFrames(now, frames.bytes(), wire::Reliability::kReliable);
+  peer_->send(now, device, wire::BatchCommit{});
+  ++statistics_.messagesOut;
   sent(std::max(size, kBatchBytes));
 }
 
 void Link::flush() {
   if (connected()) {
-    endpoint_->announce(wireNow());
+    peer_->announce(wireNow());
     pushOut();
   }
 }
 
 void Link::pushOut() {
-  if (!endpoint_) return;
+  if (!peer_) return;
   const auto buffer = takeBuffer();
-  endpoint_->takeStream(*buffer);
+  peer_->takeStream(*buffer);
   if (!buffer->empty()) {
-    stream_bytes_ += buffer->size();
+    streamBytes_ += buffer->size();
     connection_.send(buffer);
     connection_.flush();
   }
-  endpoint_->takeDatagrams([this](wire::ByteView datagram) { udp_->sendTo(datagram, *udp_peer_); });
+  peer_->takeDatagrams([this](wire::ByteView datagram) { udp_->sendTo(datagram, *udpPeer_); });
   uncounted_ = 0;
 }
 
-// A buffer that nobody sends any more keeps its memory for the next batch.
+// use_count() == 1: no connection sends the buffer any more, so reuse its memory.
 std::shared_ptr<net::Buffer> Link::takeBuffer() {
   const auto unused =
       std::find_if(buffers_.begin(), buffers_.end(), [](const auto& b) { return b.use_count() == 1; });
   if (unused != buffers_.end()) return *unused;
   buffers_.push_back(std::make_shared<net::Buffer>());
   return buffers_.back();
+}
+
+std::size_t Link::backlogBytes() const {
+  if (!connection_) return 0;
+  const net::ConnectionStatistics tcp = connection_.statistics();
+  return tcp.queuedBytes + tcp.unacknowledgedBytes;
 }
 
 std::uint64_t Link::streamBytesTaken() const {
@@ -221,24 +227,24 @@ void Link::drainTo(std::size_t bytes) {
   flush();
   const std::uint64_t number = connections_;
   std::uint64_t taken = streamBytesTaken();
-  auto progress_at = SteadyClock::now();
+  base::Nanos lastProgress = base::now();
   while (connected() && connections_ == number && connection_.statistics().queuedBytes > bytes) {
     loop_.runOnce(100ms);
     if (!connected() || connections_ != number) break;
     if (streamBytesTaken() != taken) {
       taken = streamBytesTaken();
-      progress_at = SteadyClock::now();
+      lastProgress = base::now();
       if (onDrainStep) onDrainStep();
-    } else if (SteadyClock::now() - progress_at > options_.send_timeout) {
-      const std::string why = server_.text() +
-                              " takes no data: " + std::to_string(connection_.statistics().queuedBytes) +
-                              " bytes wait since " + std::to_string(options_.send_timeout.count()) + " ms";
+    } else if (Duration(base::now() - lastProgress) > options_.sendTimeout) {
+      const std::string why = server_.text() + " accepted no data for " +
+                              std::to_string(options_.sendTimeout.count()) + " ms; " +
+                              std::to_string(connection_.statistics().queuedBytes) + " bytes wait to be sent";
       connection_.abort(why);
       throw ConnectionLost(why);
     }
   }
   if (!connected() || connections_ != number) {
-    throw ConnectionLost("connection to " + server_.text() + " lost while sending: " + last_failure_);
+    throw ConnectionLost("connection to " + server_.text() + " lost while sending: " + lastFailure_);
   }
 }
 
@@ -247,12 +253,12 @@ void Link::drainTo(std::size_t bytes) {
 void Link::addTraffic(LinkStatistics& statistics) const {
   if (connection_) {
     const net::ConnectionStatistics tcp = connection_.statistics();
-    statistics.tcp_bytes_in += tcp.bytesIn;
-    statistics.tcp_bytes_out += tcp.bytesOut;
+    statistics.tcpBytesIn += tcp.bytesIn;
+    statistics.tcpBytesOut += tcp.bytesOut;
   }
   if (udp_) {
-    statistics.udp_bytes_in += udp_->statistics().bytesIn;
-    statistics.udp_bytes_out += udp_->statistics().bytesOut;
+    statistics.udpBytesIn += udp_->statistics().bytesIn;
+    statistics.udpBytesOut += udp_->statistics().bytesOut;
   }
 }
 

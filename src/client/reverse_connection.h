@@ -1,4 +1,4 @@
-// VRPN's default way to connect: we ask by a datagram, the server calls back by TCP.
+// VRPN's default way to connect: the client asks by a datagram, the server opens the TCP connection.
 #pragma once
 
 #include <functional>
@@ -10,22 +10,22 @@
 
 namespace hapticd::client {
 
-/// Asks a server to call back, again every second, as long as it lives. Made and destroyed in the loop's
-/// thread; its callbacks may destroy it.
+/// Asks a server for a connection every second until it is destroyed. Thread: that of the loop. Its callbacks
+/// may destroy it.
 class ReverseConnection {
  public:
-  /// Throws net::Error when no route leads to the server or no socket is left.
+  /// Throws net::Error when there is no route to the server or no socket.
   ReverseConnection(net::Loop& loop, const net::Endpoint& server, const net::ConnectionOptions& options,
-           std::function<void(net::Connection)> onConnection, std::function<void()> onRefused);
+                    std::function<void(net::Connection)> onConnection, std::function<void()> onRefused);
 
  private:
-  void ask();
+  void request();
 
   net::Endpoint local_;
   net::TcpListener listener_;
   net::UdpSocket socket_;
-  std::string request_;
-  net::Subscription again_;
+  std::string message_;
+  net::Subscription timer_;
 };
 
 }  // namespace hapticd::client

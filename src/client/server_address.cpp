@@ -31,8 +31,8 @@ std::uint16_t parsePort(std::string_view digits, std::string_view whole) {
 ServerAddress parseServer(std::string_view text) {
   ServerAddress server;
   std::string_view rest = text;
-  server.tcp_only = dropPrefix(rest, "tcp:");
-  if (!server.tcp_only) dropPrefix(rest, "x-vrpn:");
+  server.tcpOnly = dropPrefix(rest, "tcp:");
+  if (!server.tcpOnly) dropPrefix(rest, "x-vrpn:");
   dropPrefix(rest, "//");
   if (const std::size_t colon = rest.find(':'); colon != std::string_view::npos) {
     server.port = parsePort(rest.substr(colon + 1), text);

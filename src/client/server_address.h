@@ -9,12 +9,12 @@ namespace hapticd::client {
 
 inline constexpr std::uint16_t kDefaultPort = 3883;
 
-/// Where a server is and which of VRPN's two ways leads there.
+/// Address of a server, and which of VRPN's two ways to connect.
 struct ServerAddress {
   std::string host;
   std::uint16_t port = kDefaultPort;
-  bool tcp_only =
-      false;  ///< one TCP connection from us; otherwise the server calls back and datagrams are used
+  /// One TCP connection from the client; otherwise a reverse connection with datagrams.
+  bool tcpOnly = false;
 
   /// "host:port".
   std::string text() const { return host + ':' + std::to_string(port); }
@@ -25,9 +25,9 @@ struct DeviceAddress {
   ServerAddress server;
 };
 
-/// Reads what follows the @; throws std::invalid_argument that quotes anything else.
+/// Reads the part behind the @. Throws std::invalid_argument that quotes the text.
 ServerAddress parseServer(std::string_view text);
-/// Reads a whole name; throws std::invalid_argument that quotes anything else.
+/// Reads a whole name. Throws std::invalid_argument that quotes the text.
 DeviceAddress parseDevice(std::string_view text);
 
 }  // namespace hapticd::client

@@ -7,7 +7,7 @@
 namespace hapticd {
 namespace {
 
-// Eight buckets to an octave; below 8 us each microsecond has its own.
+// Eight buckets per octave; below 8 us, one per microsecond.
 constexpr std::uint64_t kSteps = 8;
 
 std::size_t bucketOf(std::uint64_t us) noexcept {
@@ -17,7 +17,7 @@ std::size_t bucketOf(std::uint64_t us) noexcept {
   return static_cast<std::size_t>(std::min<std::uint64_t>(index, LatencyHistogram::kBuckets - 1));
 }
 
-/// The first value that is above the bucket.
+/// The first value above the bucket.
 double upperEnd_us(std::size_t bucket) noexcept {
   if (bucket < kSteps) return static_cast<double>(bucket + 1);
   const std::size_t octave = (bucket - kSteps) / kSteps;
@@ -59,9 +59,9 @@ double LatencyHistogram::quantile_us(double q) const noexcept {
   return upperEnd_us(kBuckets - 1);
 }
 
-std::uint64_t LatencyHistogram::countBelow_us(double limit) const noexcept {
+std::uint64_t LatencyHistogram::countBelow_us(double limit_us) const noexcept {
   std::uint64_t sum = 0;
-  for (std::size_t i = 0; i < kBuckets && upperEnd_us(i) <= limit; ++i) sum += buckets_[i];
+  for (std::size_t i = 0; i < kBuckets && upperEnd_us(i) <= limit_us; ++i) sum += buckets_[i];
   return sum;
 }
 

@@ -1,4 +1,4 @@
-// What the tests of the client share.
+// Helpers of the client's tests.
 #pragma once
 
 #include <gmock/gmock.h>
@@ -15,7 +15,7 @@ namespace hapticd::test {
 
 constexpr auto kPatience = std::chrono::seconds(20);
 
-/// Polls until the condition holds; false when patience ends.
+/// Polls until the condition holds; false after kPatience.
 template <class Condition>
 bool pollUntil(Client& client, Condition&& condition) {
   const auto end = std::chrono::steady_clock::now() + kPatience;
@@ -28,10 +28,10 @@ bool pollUntil(Client& client, Condition&& condition) {
 
 /// Whether this is the message, field by field.
 template <class M>
-::testing::AssertionResult is(const Told& told, const M& expected) {
-  const M* message = told.message.as<M>();
+::testing::AssertionResult is(const Received& received, const M& expected) {
+  const M* message = std::get_if<M>(&received.message);
   if (message && *message == expected) return ::testing::AssertionSuccess();
-  return ::testing::AssertionFailure() << wire::info(told.message.kind()).name << ", expected "
+  return ::testing::AssertionFailure() << wire::info(received.message.kind()).name << ", expected "
                                        << M::kInfo.name << (message ? " with other fields" : "");
 }
 

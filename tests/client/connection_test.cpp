@@ -1,4 +1,4 @@
-// How a client comes to a connection, loses it, and says what is wrong.
+// Connecting, losing a connection, and the texts of errors.
 #include "client/client_tests.h"
 
 #include <time.h>
@@ -23,7 +23,7 @@ TEST_P(BothWays, ConnectsAndIsAnswered) {
   EXPECT_EQ(client.statistics().connections, 1U);
 }
 
-TEST_P(BothWays, ConnectsAgainWhenTheServerIsBack) {
+TEST_P(BothWays, ReconnectsWhenTheServerIsBack) {
   auto server = std::make_unique<ScriptedServer>();
   const std::uint16_t port = server->port();
   Client client(name(*server));
@@ -34,28 +34,28 @@ TEST_P(BothWays, ConnectsAgainWhenTheServerIsBack) {
     if (!r.connected) reason = r.reason;
   });
   client.poll(0ms);
-  server->say(wire::TouchedObject{5});
-  ASSERT_TRUE(pollUntil(client, [&] { return client.latest().touched_object.object == 5; }));
+  server->send(wire::TouchedObject{5});
+  ASSERT_TRUE(pollUntil(client, [&] { return client.latest().touchedObject.object == 5; }));
   server.reset();
   ASSERT_TRUE(pollUntil(client, [&] { return !client.connected(); }));
   ASSERT_TRUE(pollUntil(client, [&] { return !states.empty() && !states.back(); }));
-  EXPECT_EQ(client.latest().touched_object.object, -1) << "what was felt is no longer known";
+  EXPECT_EQ(client.latest().touchedObject.object, -1) << "reset with the connection";
   EXPECT_FALSE(reason.empty());
   client.startEffect(1);
-  EXPECT_EQ(client.statistics().messages_dropped, 1U);
+  EXPECT_EQ(client.statistics().messagesDropped, 1U);
 
   server = std::make_unique<ScriptedServer>(ScriptedServerOptions{.port = port});
   ASSERT_TRUE(pollUntil(client, [&] { return client.connected() && states.back(); }));
   client.startEffect(2);
   client.flush();
-  const auto told = server->waitTold(1);
-  ASSERT_EQ(told.size(), 1U) << "the command given without a connection is not sent later";
-  EXPECT_TRUE(is(told[0], wire::StartEffect{2}));
-  EXPECT_EQ(told[0].sender, "Phantom") << "names are described anew";
+  const auto received = server->waitReceived(1);
+  ASSERT_EQ(received.size(), 1U) << "a command without a connection is dropped";
+  EXPECT_TRUE(is(received[0], wire::StartEffect{2}));
+  EXPECT_EQ(received[0].sender, "Phantom") << "names are described again";
   EXPECT_EQ(client.statistics().connections, 2U);
 }
 
-TEST(Client, DoesNotConnectAgainWhenToldSo) {
+TEST(Client, DoesNotReconnectWhenDisabled) {
   ScriptedServer server;
   Client client(server.tcpName(), {.reconnect = false});
   server.dropClients();
@@ -99,7 +99,7 @@ TEST_P(BothWays, NothingListens) {
     port = server.port();
     device = name(server);
   }
-  const std::string text = textOf<ConnectError>([&] { Client(device, {.connect_timeout = 300ms}); });
+  const std::string text = textOf<ConnectError>([&] { Client(device, {.connectTimeout = 300ms}); });
   EXPECT_THAT(text, HasSubstr("nothing listens on 127.0.0.1:" + std::to_string(port)));
   EXPECT_THAT(text, HasSubstr("start `hapticd serve`"));
 }
@@ -107,25 +107,24 @@ TEST_P(BothWays, NothingListens) {
 TEST(Client, NoSuchDevice) {
   ScriptedServer server;
   const std::string text = textOf<ConnectError>(
-      [&] { Client("Phantm@tcp://127.0.0.1:" + std::to_string(server.port()), {.connect_timeout = 300ms}); });
+      [&] { Client("Phantm@tcp://127.0.0.1:" + std::to_string(server.port()), {.connectTimeout = 300ms}); });
   EXPECT_THAT(text, HasSubstr("no device 'Phantm' answers"));
   EXPECT_THAT(text, HasSubstr("it has Phantom"));
 }
 
 TEST(Client, NotAVrpnServer) {
-  ScriptedServer server({.greeting_bytes = "HTTP/1.1 400 Bad Request\r\nConnection: close\r\n\r\n"});
-  const std::string text =
-      textOf<ConnectError>([&] { Client(server.tcpName(), {.connect_timeout = 300ms}); });
+  ScriptedServer server({.greetingBytes = "HTTP/1.1 400 Bad Request\r\nConnection: close\r\n\r\n"});
+  const std::string text = textOf<ConnectError>([&] { Client(server.tcpName(), {.connectTimeout = 300ms}); });
   EXPECT_THAT(text, HasSubstr("broke the VRPN protocol"));
 }
 
-TEST(Client, KeepsWhatIsCommandedBeforeTheFirstConnection) {
+TEST(Client, KeepsCommandsBeforeTheFirstConnection) {
   std::uint16_t port = 0;
   {
     ScriptedServer server;
     port = server.port();
   }
-  Client client("Phantom@tcp://127.0.0.1:" + std::to_string(port), {.connect_timeout = 0ms});
+  Client client("Phantom@tcp://127.0.0.1:" + std::to_string(port), {.connectTimeout = 0ms});
   client.setObjectCount(2);
   client.startEffect(4);
   client.poll(0ms);
@@ -133,14 +132,14 @@ TEST(Client, KeepsWhatIsCommandedBeforeTheFirstConnection) {
   ScriptedServer server({.port = port});
   client.waitConnected(kPatience);
   client.flush();
-  const auto told = server.waitTold(2);
-  ASSERT_EQ(told.size(), 2U);
-  EXPECT_TRUE(is(told[0], wire::SetObjectNumber{2}));
-  EXPECT_TRUE(is(told[1], wire::StartEffect{4}));
+  const auto received = server.waitReceived(2);
+  ASSERT_EQ(received.size(), 2U);
+  EXPECT_TRUE(is(received[0], wire::SetObjectNumber{2}));
+  EXPECT_TRUE(is(received[1], wire::StartEffect{4}));
 }
 
-TEST(Client, WhatWaitsForTheFirstConnectionIsBounded) {
-  Client client("Phantom@tcp://127.0.0.1:1", {.connect_timeout = 0ms, .queue_limit = 100000});
+TEST(Client, CommandsBeforeTheFirstConnectionAreBounded) {
+  Client client("Phantom@tcp://127.0.0.1:1", {.connectTimeout = 0ms, .queueLimit_bytes = 100000});
   const auto fill = [&] {
     for (int i = 0; i < 10000; ++i) client.setVertex(0, i, 0, 0, 0);
   };

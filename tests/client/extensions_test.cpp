@@ -1,4 +1,4 @@
-// What a client makes of the extensions: with a server that has them, and with one that has not.
+// The extensions, with servers that support them and servers that do not.
 #include "client/client_tests.h"
 
 #include <limits>
@@ -26,29 +26,29 @@ bool waitReconnected(Client& client, const ScriptedServer& server, std::size_t c
   return pollUntil(client, [&] { return client.connected() && server.connections() >= connections; });
 }
 
-TEST_P(BothWays, AServerSaysWhatItCanDo) {
+TEST_P(BothWays, ReceivesTheCapabilities) {
   ScriptedServer server(able());
   Client client(name(server));
   const auto c = client.waitCapabilities();
   ASSERT_TRUE(c);
   EXPECT_EQ(c->version, 1);
-  EXPECT_TRUE(c->bulk_mesh && c->batch && c->subscribe && c->stop && c->heartbeat && c->hold_hand);
-  EXPECT_EQ(c->servo_rate_Hz, 1000);
-  EXPECT_EQ(c->report_rate_Hz, 250);
-  EXPECT_EQ(c->peak_force_N, 3.3);
+  EXPECT_TRUE(c->bulkMesh && c->batch && c->subscribe && c->stop && c->heartbeat && c->holdHand);
+  EXPECT_EQ(c->servoRate_Hz, 1000);
+  EXPECT_EQ(c->reportRate_Hz, 250);
+  EXPECT_EQ(c->peakForce_N, 3.3);
   EXPECT_EQ(c->buttons, 2);
-  EXPECT_THAT(c->workspace_min_m, ElementsAre(-0.08, -0.06, -0.035));
-  EXPECT_THAT(c->workspace_max_m, ElementsAre(0.08, 0.06, 0.035));
+  EXPECT_THAT(c->workspaceMin_m, ElementsAre(-0.08, -0.06, -0.035));
+  EXPECT_THAT(c->workspaceMax_m, ElementsAre(0.08, 0.06, 0.035));
   EXPECT_TRUE(client.capabilities());
 
   server.dropClients();
   ASSERT_TRUE(pollUntil(client, [&] { return !client.connected(); }));
-  EXPECT_FALSE(client.capabilities()) << "of no server";
+  EXPECT_FALSE(client.capabilities()) << "without a server";
   ASSERT_TRUE(waitReconnected(client, server, 2));
   EXPECT_TRUE(client.waitCapabilities()) << "asked again";
 }
 
-TEST(Extensions, AServerWithoutThemIsNamedInEveryError) {
+TEST(Extensions, ErrorsNameAServerWithoutExtensions) {
   ScriptedServer server;
   Client client(server.tcpName());
   EXPECT_FALSE(client.waitCapabilities());
@@ -66,20 +66,20 @@ TEST(Extensions, AServerWithoutThemIsNamedInEveryError) {
   refused([&] { client.stopForces(); });
   client.setObjectCount(1);
   client.flushAll();
-  const auto told = server.waitTold(2);
-  ASSERT_EQ(told.size(), 2U);
-  EXPECT_TRUE(is(told[0], wire::StopForces{})) << "a stop does not wait for an answer";
-  EXPECT_TRUE(is(told[1], wire::SetObjectNumber{1}));
+  const auto received = server.waitReceived(2);
+  ASSERT_EQ(received.size(), 2U);
+  EXPECT_TRUE(is(received[0], wire::StopForces{})) << "a stop does not wait for an answer";
+  EXPECT_TRUE(is(received[1], wire::SetObjectNumber{1}));
 }
 
-TEST(Extensions, ADeviceThatLacksOneIsNamed) {
+TEST(Extensions, ErrorsNameADeviceWithoutTheFeature) {
   ScriptedServer server(ableBut(wire::kFeatureHoldHand));
   Client client(server.tcpName());
   EXPECT_THAT(textOf<Unsupported>([&] { client.holdHand({}); }),
               HasSubstr("cannot hold the hand: device 'Phantom' at"));
 }
 
-TEST(Extensions, ABatchIsFramedAndComesWhole) {
+TEST(Extensions, ABatchIsFramedAndSentAsOne) {
   ScriptedServer server(able());
   Client client(server.tcpName());
   client.batch([&] {
@@ -90,14 +90,14 @@ TEST(Extensions, ABatchIsFramedAndComesWhole) {
   });
   client.setTouchable(1, false);
   client.flushAll();
-  const auto told = server.waitTold(5);
-  ASSERT_EQ(told.size(), 5U);
-  EXPECT_TRUE(is(told[0], wire::BatchBegin{}));
-  EXPECT_TRUE(is(told[1], wire::SetObjectNumber{2}));
-  EXPECT_TRUE(is(told[2], wire::SetTransformMatrix{1, translation(1, 2, 3)}));
-  EXPECT_TRUE(is(told[3], wire::BatchCommit{}));
-  EXPECT_TRUE(is(told[4], wire::SetObjectIsTouchable{1, 0}));
-  for (const Told& t : told) EXPECT_EQ(t.sender, "Phantom");
+  const auto received = server.waitReceived(5);
+  ASSERT_EQ(received.size(), 5U);
+  EXPECT_TRUE(is(received[0], wire::BatchBegin{}));
+  EXPECT_TRUE(is(received[1], wire::SetObjectNumber{2}));
+  EXPECT_TRUE(is(received[2], wire::SetTransformMatrix{1, translation(1, 2, 3)}));
+  EXPECT_TRUE(is(received[3], wire::BatchCommit{}));
+  EXPECT_TRUE(is(received[4], wire::SetObjectIsTouchable{1, 0}));
+  for (const Received& t : received) EXPECT_EQ(t.sender, "Phantom");
 }
 
 TEST(Extensions, ABatchThatThrowsSendsNothing) {
@@ -114,9 +114,9 @@ TEST(Extensions, ABatchThatThrowsSendsNothing) {
               HasSubstr("do not nest"));
   client.setObjectCount(1);
   client.flushAll();
-  const auto told = server.waitTold(1);
-  ASSERT_EQ(told.size(), 1U);
-  EXPECT_TRUE(is(told[0], wire::SetObjectNumber{1}));
+  const auto received = server.waitReceived(1);
+  ASSERT_EQ(received.size(), 1U);
+  EXPECT_TRUE(is(received[0], wire::SetObjectNumber{1}));
 }
 
 TEST(Extensions, ABatchDoesNotOutliveItsConnection) {
@@ -132,12 +132,12 @@ TEST(Extensions, ABatchDoesNotOutliveItsConnection) {
   EXPECT_THAT(textOf<ConnectionLost>(late), HasSubstr("nothing of it was sent"));
   client.setObjectCount(1);
   client.flushAll();
-  const auto told = server.waitTold(1);
-  ASSERT_FALSE(told.empty());
-  EXPECT_TRUE(is(told[0], wire::SetObjectNumber{1}));
+  const auto received = server.waitReceived(1);
+  ASSERT_FALSE(received.empty());
+  EXPECT_TRUE(is(received[0], wire::SetObjectNumber{1}));
 }
 
-TEST(Extensions, AMeshGoesInRunsWithinABatch) {
+TEST(Extensions, AMeshIsSentInBulkMessagesWithinABatch) {
   ScriptedServer server(able());
   Client client(server.tcpName());
   std::vector<std::array<float, 3>> vertices(5001);
@@ -145,25 +145,25 @@ TEST(Extensions, AMeshGoesInRunsWithinABatch) {
   const std::vector<std::array<std::uint32_t, 3>> triangles(5002, {5000, 1, 2});
   UploadProgress progress;
   client.uploadMesh(3, {vertices, triangles}, [&](const UploadProgress& p) { progress = p; });
-  EXPECT_EQ(progress.bytes_sent, progress.bytes_total);
-  EXPECT_GE(progress.bytes_total, (vertices.size() + triangles.size()) * 12);
+  EXPECT_EQ(progress.bytesSent, progress.bytesTotal);
+  EXPECT_GE(progress.bytesTotal, (vertices.size() + triangles.size()) * 12);
 
-  const auto told = server.waitTold(6);
-  ASSERT_EQ(told.size(), 6U);
-  EXPECT_TRUE(is(told[0], wire::BatchBegin{}));
-  const auto* first = told[1].message.as<wire::MeshVertices>();
-  const auto* second = told[2].message.as<wire::MeshVertices>();
+  const auto received = server.waitReceived(6);
+  ASSERT_EQ(received.size(), 6U);
+  EXPECT_TRUE(is(received[0], wire::BatchBegin{}));
+  const auto* first = received[1].message.as<wire::MeshVertices>();
+  const auto* second = received[2].message.as<wire::MeshVertices>();
   ASSERT_TRUE(first && second);
   EXPECT_EQ(first->object, 3);
   EXPECT_EQ(first->first, 0);
   ASSERT_EQ(first->positions.values.size(), 15000U);
   EXPECT_EQ(first->positions.values[14997], 4999);
-  EXPECT_TRUE(is(told[2], wire::MeshVertices{3, 5000, {{5000, 1, 2}}}));
-  const auto* faces = told[3].message.as<wire::MeshTriangles>();
+  EXPECT_TRUE(is(received[2], wire::MeshVertices{3, 5000, {{5000, 1, 2}}}));
+  const auto* faces = received[3].message.as<wire::MeshTriangles>();
   ASSERT_TRUE(faces);
   EXPECT_EQ(faces->vertices.values.size(), 15000U);
-  EXPECT_TRUE(is(told[4], wire::MeshTriangles{3, 5000, {{5000, 1, 2, 5000, 1, 2}}}));
-  EXPECT_TRUE(is(told[5], wire::BatchCommit{}));
+  EXPECT_TRUE(is(received[4], wire::MeshTriangles{3, 5000, {{5000, 1, 2, 5000, 1, 2}}}));
+  EXPECT_TRUE(is(received[5], wire::BatchCommit{}));
 }
 
 TEST(Extensions, AMeshInsideABatchBelongsToIt) {
@@ -175,15 +175,15 @@ TEST(Extensions, AMeshInsideABatchBelongsToIt) {
     client.setVertices(0, 1, std::span(corners).first(1));
   });
   client.flushAll();
-  const auto told = server.waitTold(4);
-  ASSERT_EQ(told.size(), 4U);
-  EXPECT_TRUE(is(told[0], wire::BatchBegin{}));
-  EXPECT_TRUE(is(told[1], wire::MeshVertices{0, 0, {{0, 0, 0, 1, 0, 0, 0, 1, 0}}}));
-  EXPECT_TRUE(is(told[2], wire::MeshVertices{0, 1, {{0, 0, 0}}}));
-  EXPECT_TRUE(is(told[3], wire::BatchCommit{}));
+  const auto received = server.waitReceived(4);
+  ASSERT_EQ(received.size(), 4U);
+  EXPECT_TRUE(is(received[0], wire::BatchBegin{}));
+  EXPECT_TRUE(is(received[1], wire::MeshVertices{0, 0, {{0, 0, 0, 1, 0, 0, 0, 1, 0}}}));
+  EXPECT_TRUE(is(received[2], wire::MeshVertices{0, 1, {{0, 0, 0}}}));
+  EXPECT_TRUE(is(received[3], wire::BatchCommit{}));
 }
 
-TEST(Extensions, VerticesGoOneByOneToAServerWithoutRuns) {
+TEST(Extensions, VerticesAreSentOneByOneWithoutBulkMessages) {
   ScriptedServer server(ableBut(wire::kFeatureBulkMesh));
   Client client(server.tcpName());
   const std::vector<std::array<float, 3>> corners{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
@@ -197,16 +197,16 @@ TEST(Extensions, VerticesGoOneByOneToAServerWithoutRuns) {
   EXPECT_EQ(vertices[5].vertex, 9);
 }
 
-TEST(Extensions, ASubscriptionIsRememberedForTheNextConnection) {
+TEST(Extensions, ASubscriptionIsRepeatedOnTheNextConnection) {
   ScriptedServer server(able());
   Client client(server.tcpName());
   client.subscribe(Reports::usual | Reports::contacts, 500);
-  ASSERT_EQ(server.waitTold(1).size(), 1U);
+  ASSERT_EQ(server.waitReceived(1).size(), 1U);
   server.dropClients();
   ASSERT_TRUE(waitReconnected(client, server, 2));
-  const auto told = server.waitTold(2);
-  ASSERT_EQ(told.size(), 2U);
-  for (const Told& t : told) EXPECT_TRUE(is(t, wire::Subscribe{47, 500}));
+  const auto received = server.waitReceived(2);
+  ASSERT_EQ(received.size(), 2U);
+  for (const Received& t : received) EXPECT_TRUE(is(t, wire::Subscribe{47, 500}));
 
   for (const double rate : {-1.0, std::numeric_limits<double>::quiet_NaN()}) {
     EXPECT_THAT(textOf<std::invalid_argument>([&] { client.subscribe(Reports::all, rate); }),
@@ -214,16 +214,16 @@ TEST(Extensions, ASubscriptionIsRememberedForTheNextConnection) {
   }
 }
 
-TEST(Extensions, ASubscriptionMayComeBeforeTheConnection) {
+TEST(Extensions, ASubscriptionMayPrecedeTheConnection) {
   ScriptedServer server(able());
-  Client client(server.tcpName(), {.connect_timeout = 0ms});
+  Client client(server.tcpName(), {.connectTimeout = 0ms});
   client.subscribe(Reports::tick);
   client.setObjectCount(4);
   client.waitConnected(kPatience);
   client.flushAll();
-  const auto told = server.waitTold(2);
-  ASSERT_EQ(told.size(), 2U);
-  EXPECT_TRUE(is(told[0], wire::Subscribe{wire::kReportTick, 0}));
+  const auto received = server.waitReceived(2);
+  ASSERT_EQ(received.size(), 2U);
+  EXPECT_TRUE(is(received[0], wire::Subscribe{wire::kReportTick, 0}));
 }
 
 TEST(Extensions, TicksContactsAndGuardStatesArriveAsPlainValues) {
@@ -235,18 +235,18 @@ TEST(Extensions, TicksContactsAndGuardStatesArriveAsPlainValues) {
   client.onTick([&](const TickReport& r) { ticks.push_back(r); });
   client.onContacts([&](const ContactsReport& r) { contacts.push_back(r); });
   client.onGuard([&](const GuardReport& r) { guards.push_back(r); });
-  server.say(wire::TickReport{
+  server.send(wire::TickReport{
       7, 7000001, 3, {1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {0, 0, 1, 0}, {10, 11, 12}, 0.5, 2, 1, 4, 8});
-  server.say(
+  server.send(
       wire::ContactList{7, 7000001, {{2, .1, .2, .3, 0, 1, 0, 1, 2, 3, -1, .4, .5, .6, 1, 0, 0, 4, 5, 6}}});
-  server.say(wire::ContactList{8, 8000001, {{1e300, 0, 0, 0, 0, 0, 0, 0, 0, 0, 99}}});
-  server.say(wire::ContactList{9, 9000001, {}});
-  server.say(wire::GuardState{1, 2, 1, 0});
+  server.send(wire::ContactList{8, 8000001, {{1e300, 0, 0, 0, 0, 0, 0, 0, 0, 0, 99}}});
+  server.send(wire::ContactList{9, 9000001, {}});
+  server.send(wire::GuardState{1, 2, 1, 0});
   ASSERT_TRUE(pollUntil(client, [&] { return !guards.empty(); }));
 
   ASSERT_EQ(ticks.size(), 1U);
   EXPECT_EQ(ticks[0].tick, 7U);
-  EXPECT_EQ(ticks[0].tick_time, 7000001ns);
+  EXPECT_EQ(ticks[0].tickTime, 7000001ns);
   EXPECT_EQ(ticks[0].revision, 3U);
   EXPECT_THAT(ticks[0].hand_m, ElementsAre(1, 2, 3));
   EXPECT_THAT(ticks[0].proxy_m, ElementsAre(4, 5, 6));
@@ -256,8 +256,8 @@ TEST(Extensions, TicksContactsAndGuardStatesArriveAsPlainValues) {
   EXPECT_EQ(ticks[0].depth_m, 0.5);
   EXPECT_EQ(ticks[0].object, 2);
   EXPECT_EQ(ticks[0].buttons, 1U);
-  EXPECT_EQ(ticks[0].guard_active, 4U);
-  EXPECT_EQ(ticks[0].guard_latched, 8U);
+  EXPECT_EQ(ticks[0].guardActive, Trips(Trip::thermal));
+  EXPECT_EQ(ticks[0].guardLatched, Trips(Trip::slew));
 
   ASSERT_EQ(contacts.size(), 3U);
   ASSERT_EQ(contacts[0].contacts.size(), 2U);
@@ -266,13 +266,13 @@ TEST(Extensions, TicksContactsAndGuardStatesArriveAsPlainValues) {
   EXPECT_THAT(contacts[0].contacts[0].normal, ElementsAre(0, 1, 0));
   EXPECT_THAT(contacts[0].contacts[0].force_N, ElementsAre(1, 2, 3));
   EXPECT_EQ(contacts[0].contacts[1].object, -1);
-  ASSERT_EQ(contacts[1].contacts.size(), 1U) << "a contact that lacks numbers is none";
-  EXPECT_EQ(contacts[1].contacts[0].object, -1) << "no number of an object";
+  ASSERT_EQ(contacts[1].contacts.size(), 1U) << "an incomplete contact is ignored";
+  EXPECT_EQ(contacts[1].contacts[0].object, -1) << "not an object number";
   EXPECT_TRUE(contacts[2].contacts.empty());
   EXPECT_EQ(contacts[2].tick, 9U);
 
-  EXPECT_EQ(guards[0].active, 1U);
-  EXPECT_EQ(guards[0].latched, 2U);
+  EXPECT_EQ(guards[0].active, Trips(Trip::notFinite));
+  EXPECT_EQ(guards[0].latched, Trips(Trip::peakForce));
   EXPECT_TRUE(guards[0].armed);
   EXPECT_FALSE(guards[0].stopped);
   EXPECT_EQ(client.latest().tick.tick, 7U);
@@ -290,17 +290,17 @@ TEST(Extensions, AStopOvertakesABatchAndNeedsAConnection) {
     client.rearmForces();
   });
   client.flushAll();
-  const auto told = server.waitTold(5);
-  ASSERT_EQ(told.size(), 5U);
-  EXPECT_TRUE(is(told[0], wire::StopForces{}));
-  EXPECT_TRUE(is(told[1], wire::RearmForces{}));
-  EXPECT_TRUE(is(told[2], wire::BatchBegin{}));
+  const auto received = server.waitReceived(5);
+  ASSERT_EQ(received.size(), 5U);
+  EXPECT_TRUE(is(received[0], wire::StopForces{}));
+  EXPECT_TRUE(is(received[1], wire::RearmForces{}));
+  EXPECT_TRUE(is(received[2], wire::BatchBegin{}));
 
-  Client nobody("Phantom@tcp://127.0.0.1:1", {.connect_timeout = 0ms});
+  Client nobody("Phantom@tcp://127.0.0.1:1", {.connectTimeout = 0ms});
   EXPECT_THAT(textOf<ConnectionLost>([&] { nobody.stopForces(); }), HasSubstr("forces not stopped"));
 }
 
-TEST(Extensions, HeartbeatsGoOnWhilePolledAndOnTheNextConnection) {
+TEST(Extensions, HeartbeatsContinueWhilePolledAndOnTheNextConnection) {
   ScriptedServer server(able());
   Client client(server.tcpName());
   EXPECT_EQ(server.heartbeats(), 0U);
@@ -313,9 +313,9 @@ TEST(Extensions, HeartbeatsGoOnWhilePolledAndOnTheNextConnection) {
 
   client.enableHeartbeat(false);
   client.flushAll();
-  const auto told = server.waitTold(1);
-  ASSERT_EQ(told.size(), 1U);
-  EXPECT_TRUE(is(told[0], wire::Heartbeat{0}));
+  const auto received = server.waitReceived(1);
+  ASSERT_EQ(received.size(), 1U);
+  EXPECT_TRUE(is(received[0], wire::Heartbeat{0}));
   const std::size_t after = server.heartbeats();
   client.runFor(350ms);
   EXPECT_EQ(server.heartbeats(), after);
@@ -323,16 +323,16 @@ TEST(Extensions, HeartbeatsGoOnWhilePolledAndOnTheNextConnection) {
 
 TEST(Extensions, TheHandIsHeldAndReleasedInOrder) {
   ScriptedServer server(able());
-  Client client(server.name());  // which also has datagrams, that could overtake
+  Client client(server.name());  // this connection also has datagrams, which could overtake
   client.holdHand({{1, 2, 3}, {0, 0, 1, 0}, 3});
   client.holdHand({{4, 5, 6}});
   client.releaseHand();
-  const auto told = server.waitTold(3);
-  ASSERT_EQ(told.size(), 3U);
-  EXPECT_TRUE(is(told[0], wire::HoldHand{1, {1, 2, 3}, {0, 0, 1, 0}, 3}));
-  EXPECT_TRUE(is(told[1], wire::HoldHand{1, {4, 5, 6}, {0, 0, 0, 1}, 0}));
-  EXPECT_TRUE(is(told[2], wire::HoldHand{}));
-  for (const Told& t : told) EXPECT_FALSE(t.by_datagram);
+  const auto received = server.waitReceived(3);
+  ASSERT_EQ(received.size(), 3U);
+  EXPECT_TRUE(is(received[0], wire::HoldHand{1, {1, 2, 3}, {0, 0, 1, 0}, 3}));
+  EXPECT_TRUE(is(received[1], wire::HoldHand{1, {4, 5, 6}, {0, 0, 0, 1}, 0}));
+  EXPECT_TRUE(is(received[2], wire::HoldHand{}));
+  for (const Received& t : received) EXPECT_FALSE(t.byDatagram);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Every report reaches its callback, and what callbacks may do.
+// Every report reaches its callback; what callbacks may do.
 #include "client/client_tests.h"
 
 namespace hapticd::test {
@@ -25,7 +25,7 @@ TEST_P(BothWays, ReportsReachTheirCallbacks) {
   client.onVelocity([&](const VelocityReport& r) {
     check(r);
     EXPECT_EQ(r.velocity_m_per_s, (Vec3{4, 5, 6}));
-    EXPECT_EQ(r.rotation_interval_s, 0.5);
+    EXPECT_EQ(r.rotationInterval_s, 0.5);
   });
   client.onAcceleration([&](const AccelerationReport& r) {
     check(r);
@@ -81,21 +81,21 @@ TEST_P(BothWays, ReportsReachTheirCallbacks) {
     check(r);
     EXPECT_EQ(r.max_m, (Vec3{4, 5, 6}));
   });
-  server.say(wire::TrackerPosQuat{1, 0, {1, 2, 3}, {0.1, 0.2, 0.3, 0.9}});
-  server.say(wire::TrackerVelocity{1, 0, {4, 5, 6}, {0, 0, 0, 1}, 0.5});
-  server.say(wire::TrackerAcceleration{1, 0, {7, 8, 9}, {0, 0, 0, 1}, 0.5});
-  server.say(wire::AnalogChannels{{{1, 2.5}}});
-  server.say(wire::Force{{1, -2, 3}});
-  server.say(wire::Dop{0.004});
-  server.say(wire::Scp{{3, 2, 1}, {0, 0, 0, 1}});
-  server.say(wire::IsTouching{1});
-  server.say(wire::TouchedObject{5});
-  server.say(wire::Angle{45, 1});
-  server.say(wire::ForceError{2});
-  server.say(wire::Text{1, 0, "stiffness 2 of object 0 clamped to 1"});
-  server.say(wire::TrackerToRoom{{1, 1, 1}, {0, 0, 0, 1}});
-  server.say(wire::TrackerUnitToSensor{2, 0, {}, {0, 0, 0, 1}});
-  server.say(wire::TrackerWorkspace{{1, 2, 3}, {4, 5, 6}});
+  server.send(wire::TrackerPosQuat{1, 0, {1, 2, 3}, {0.1, 0.2, 0.3, 0.9}});
+  server.send(wire::TrackerVelocity{1, 0, {4, 5, 6}, {0, 0, 0, 1}, 0.5});
+  server.send(wire::TrackerAcceleration{1, 0, {7, 8, 9}, {0, 0, 0, 1}, 0.5});
+  server.send(wire::AnalogChannels{{{1, 2.5}}});
+  server.send(wire::Force{{1, -2, 3}});
+  server.send(wire::Dop{0.004});
+  server.send(wire::Scp{{3, 2, 1}, {0, 0, 0, 1}});
+  server.send(wire::IsTouching{1});
+  server.send(wire::TouchedObject{5});
+  server.send(wire::Angle{45, 1});
+  server.send(wire::ForceError{2});
+  server.send(wire::Text{1, 0, "stiffness 2 of object 0 clamped to 1"});
+  server.send(wire::TrackerToRoom{{1, 1, 1}, {0, 0, 0, 1}});
+  server.send(wire::TrackerUnitToSensor{2, 0, {}, {0, 0, 0, 1}});
+  server.send(wire::TrackerWorkspace{{1, 2, 3}, {4, 5, 6}});
   ASSERT_TRUE(pollUntil(client, [&] { return calls == 15; })) << calls << " of 15";
 
   const LatestReports& latest = client.latest();
@@ -103,38 +103,38 @@ TEST_P(BothWays, ReportsReachTheirCallbacks) {
   EXPECT_EQ(latest.force.force_N, (Vec3{1, -2, 3}));
   EXPECT_EQ(latest.depth.depth_m, 0.004);
   EXPECT_TRUE(latest.touching.touching);
-  EXPECT_EQ(latest.touched_object.object, 5);
+  EXPECT_EQ(latest.touchedObject.object, 5);
   const Statistics statistics = client.statistics();
   EXPECT_EQ(statistics[ReportKind::force].count, 1U);
   EXPECT_EQ(statistics[ReportKind::force].latency.count(), 1U);
-  EXPECT_EQ(statistics.messages_damaged, 0U);
+  EXPECT_EQ(statistics.messagesDamaged, 0U);
   if (tcpOnly()) {
-    EXPECT_EQ(statistics.udp_bytes_in, 0U);
+    EXPECT_EQ(statistics.udpBytesIn, 0U);
   } else {
-    EXPECT_GE(statistics.udp_bytes_in, 8U * 24U) << "fast reports come by datagram";
+    EXPECT_GE(statistics.udpBytesIn, 8U * 24U) << "fast reports come by datagram";
   }
 }
 
-TEST(Client, ButtonsAreNewsOnlyWhenTheyChange) {
+TEST(Client, ButtonsAreReportedOnChangeOnly) {
   ScriptedServer server;
   Client client(server.tcpName());
   std::vector<std::pair<int, bool>> seen;
   client.onButton([&](const ButtonReport& r) { seen.emplace_back(r.button, r.pressed); });
-  server.say(wire::ButtonStates{{{0, 1}}});
-  server.say(wire::ButtonStates{{{0, 1}}});
-  server.say(wire::ButtonChange{1, 0});
-  server.say(wire::ButtonStates{{{1, 0}}});
+  server.send(wire::ButtonStates{{{0, 1}}});
+  server.send(wire::ButtonStates{{{0, 1}}});
+  server.send(wire::ButtonChange{1, 0});
+  server.send(wire::ButtonStates{{{1, 0}}});
   ASSERT_TRUE(pollUntil(client, [&] { return seen.size() == 3; }));
   EXPECT_EQ(seen, (std::vector<std::pair<int, bool>>{{1, true}, {1, false}, {0, true}}));
 }
 
-TEST(Client, ReportsOfOtherDevicesAreNotItsOwn) {
+TEST(Client, ReportsOfOtherDevicesAreIgnored) {
   ScriptedServer server;
   Client client(server.tcpName());
   int forces = 0;
   client.onForce([&](const ForceReport& r) { forces += r.force_N[0] == 1 ? 1 : 100; });
-  server.say(wire::Force{{9, 9, 9}}, {}, "OtherDevice");
-  server.say(wire::Force{{1, 0, 0}});
+  server.send(wire::Force{{9, 9, 9}}, {}, "OtherDevice");
+  server.send(wire::Force{{1, 0, 0}});
   ASSERT_TRUE(pollUntil(client, [&] { return forces > 0; }));
   EXPECT_EQ(forces, 1);
 }
@@ -147,10 +147,10 @@ TEST(Client, ExceptionsOfCallbacksLeavePollAndLoseNothing) {
     ++seen;
     if (r.object == 1) throw std::runtime_error("mine");
   });
-  server.say(wire::TouchedObject{1});
-  server.say(wire::TouchedObject{2});
+  server.send(wire::TouchedObject{1});
+  server.send(wire::TouchedObject{2});
   EXPECT_EQ(textOf<std::runtime_error>([&] { pollUntil(client, [] { return false; }); }), "mine");
-  ASSERT_TRUE(pollUntil(client, [&] { return client.latest().touched_object.object == 2; }));
+  ASSERT_TRUE(pollUntil(client, [&] { return client.latest().touchedObject.object == 2; }));
   EXPECT_EQ(seen, 2);
   EXPECT_TRUE(client.connected());
 }
@@ -169,12 +169,12 @@ TEST(Client, CallbacksMayCommandUploadAndPoll) {
     client.flushAll();
     order.push_back(-5);
   });
-  server.say(wire::TouchedObject{1});
-  server.say(wire::TouchedObject{2});
+  server.send(wire::TouchedObject{1});
+  server.send(wire::TouchedObject{2});
   ASSERT_TRUE(pollUntil(client, [&] { return order.size() == 3; }));
   EXPECT_EQ(order, (std::vector<int>{1, -5, 2}));
   EXPECT_EQ(server.waitVertices(3000).size(), 3000U);
-  EXPECT_TRUE(is(server.waitTold(1).at(0), wire::StartEffect{9}));
+  EXPECT_TRUE(is(server.waitReceived(1).at(0), wire::StartEffect{9}));
 }
 
 TEST(Client, CallbacksKeepTheirStateAndMayAddOthers) {
@@ -186,18 +186,18 @@ TEST(Client, CallbacksKeepTheirStateAndMayAddOthers) {
     counts.push_back(++count);
     for (int i = 0; i < 100; ++i) client.onTouchedObject([&](const TouchedObjectReport&) { ++late; });
   });
-  server.say(wire::TouchedObject{1});
-  server.say(wire::TouchedObject{2});
+  server.send(wire::TouchedObject{1});
+  server.send(wire::TouchedObject{2});
   ASSERT_TRUE(pollUntil(client, [&] { return counts.size() == 2; }));
   EXPECT_EQ(counts, (std::vector<int>{1, 2}));
-  EXPECT_EQ(late, 100) << "what is added during a report waits for the next";
+  EXPECT_EQ(late, 100) << "callbacks added during a report wait for the next";
 }
 
 TEST(Client, ErrorsOfTheServerCanBeExceptions) {
   ScriptedServer server;
-  Client client(server.tcpName(), {.throw_on_error = true});
-  server.say(wire::Text{0, 0, "mesh of object 0: closed"});
-  server.say(wire::Text{2, 0, "setTransformMatrix: object 0: element 3 is nan"});
+  Client client(server.tcpName(), {.throwOnError = true});
+  server.send(wire::Text{0, 0, "mesh of object 0: closed"});
+  server.send(wire::Text{2, 0, "setTransformMatrix: object 0: element 3 is nan"});
   const std::string text = textOf<ServerError>([&] { pollUntil(client, [] { return false; }); });
   EXPECT_THAT(text, HasSubstr("element 3 is nan"));
   EXPECT_NO_THROW(client.poll(0ms));
@@ -210,8 +210,8 @@ TEST(Client, DamagedReportsAreCounted) {
   std::string frame(32, '\0');
   auto* bytes = reinterpret_cast<std::byte*>(frame.data());
   wire::storeHeader(bytes, {32, {}, 1, wire::kLocalType<wire::Force>.value, 0});
-  server.sayRaw(frame);
-  ASSERT_TRUE(pollUntil(client, [&] { return client.statistics().messages_damaged == 1; }));
+  server.sendRawBytes(frame);
+  ASSERT_TRUE(pollUntil(client, [&] { return client.statistics().messagesDamaged == 1; }));
   EXPECT_TRUE(client.connected());
 }
 

@@ -33,7 +33,7 @@ ScriptedServer::~ScriptedServer() {
   thread_.join();
 }
 
-// One number for TCP and UDP: that of UDP may be somebody else's.
+// TCP and UDP share one port number; another process may have the UDP port.
 void ScriptedServer::openPort() {
   for (int attempt = 0;; ++attempt) {
     try {
@@ -58,34 +58,34 @@ void ScriptedServer::openPort() {
        .onRefused = {}});
 }
 
-void ScriptedServer::serve(net::Connection connection, bool with_datagrams) {
+void ScriptedServer::serve(net::Connection connection, bool withDatagrams) {
   sessions_.emplace_back();
   Session* session = &sessions_.back();
   session->connection = std::move(connection);
-  if (options_.greeting_bytes.empty()) {
-    wire::PeerOptions endpoint_options;
-    if (with_datagrams) {
+  if (options_.greetingBytes.empty()) {
+    wire::PeerOptions peerOptions;
+    if (withDatagrams) {
       session->udp = std::make_unique<net::UdpSocket>(loop_, net::Endpoint{net::kLoopbackAddress, 0});
       session->udp->start({.onDatagram =
                                [this, session](auto bytes, const net::Endpoint&) {
-                                 session->endpoint->feedDatagram(
+                                 session->peer->feedDatagram(
                                      bytes, [&](const wire::Event& e) { onEvent(*session, e, true); });
                                },
                            .onRefused = {}});
-      endpoint_options.udp = wire::UdpAddress{"127.0.0.1", session->udp->local().port};
+      peerOptions.udp = wire::UdpAddress{"127.0.0.1", session->udp->local().port};
     }
-    session->endpoint.emplace(names_, endpoint_options);
+    session->peer.emplace(names_, peerOptions);
     push(*session);
   } else {
-    session->connection.send(wire::asBytes(options_.greeting_bytes));
+    session->connection.send(wire::asBytes(options_.greetingBytes));
     session->connection.flush();
   }
   session->connection.start(
       {.onConnected = {},
        .onBytes =
            [this, session](auto bytes) {
-             if (!session->endpoint) return;
-             session->endpoint->feed({}, bytes, [&](const wire::Event& e) { onEvent(*session, e, false); });
+             if (!session->peer) return;
+             session->peer->feed({}, bytes, [&](const wire::Event& e) { onEvent(*session, e, false); });
              push(*session);
            },
        .onDrained = {},
@@ -93,41 +93,42 @@ void ScriptedServer::serve(net::Connection connection, bool with_datagrams) {
                        const std::string&) { sessions_.remove_if([&](auto& s) { return &s == session; }); }});
 }
 
-void ScriptedServer::onEvent(Session& session, const wire::Event& event, bool by_datagram) {
+void ScriptedServer::onEvent(Session& session, const wire::Event& event, bool byDatagram) {
   if (std::holds_alternative<wire::Connected>(event)) {
     ++connections_;
     if (!options_.reads) session.connection.pauseReading();
   }
   if (const auto* udp = std::get_if<wire::UdpDescribed>(&event)) {
-    session.udp_peer = net::Endpoint::parse(udp->address.host, udp->address.port);
-    session.endpoint->useDatagrams();
+    session.udpPeer = net::Endpoint::parse(udp->address.host, udp->address.port);
+    session.peer->useDatagrams();
   }
   const auto* message = std::get_if<wire::MessageReceived>(&event);
   if (!message || answer(session, *message)) return;
   const auto decoded = wire::decode(message->kind, message->payload);
   const std::lock_guard lock(mutex_);
   if (!decoded) {
-    told_.push_back(
-        {wire::Text{2, 0, decoded.error()}, std::string(message->sender_name), message->time, by_datagram});
+    received_.push_back(
+        {wire::Text{2, 0, decoded.error()}, std::string(message->sender_name), message->time, byDatagram});
   } else if (const auto* vertex = decoded->as<wire::SetVertex>()) {
     vertices_.push_back(*vertex);
   } else {
-    told_.push_back({*decoded, std::string(message->sender_name), message->time, by_datagram});
+    received_.push_back({*decoded, std::string(message->sender_name), message->time, byDatagram});
   }
   changed_.notify_all();
 }
 
-// Whether the message was one of those that are not remembered.
+// Returns whether the message is of a kind that is answered and not stored.
 bool ScriptedServer::answer(Session& session, const wire::MessageReceived& message) {
   const bool ours = message.local_sender.value >= 0;
   if (message.kind == wire::kindOf<wire::Ping>) {
     ++pings_;
-    if (options_.answers_pings && ours) session.endpoint->send({}, message.local_sender, wire::Pong{});
+    if (options_.answersPings && !ignorePings_ && ours)
+      session.peer->send({}, message.local_sender, wire::Pong{});
     return true;
   }
   if (message.kind == wire::kindOf<wire::QueryCapabilities>) {
     if (options_.capabilities && ours) {
-      session.endpoint->send({}, message.local_sender, *options_.capabilities);
+      session.peer->send({}, message.local_sender, *options_.capabilities);
     }
     return true;
   }
@@ -139,12 +140,12 @@ bool ScriptedServer::answer(Session& session, const wire::MessageReceived& messa
 }
 
 void ScriptedServer::push(Session& session) {
-  if (!session.endpoint) return;
+  if (!session.peer) return;
   const auto buffer = std::make_shared<net::Buffer>();
-  session.endpoint->takeStream(*buffer);
+  session.peer->takeStream(*buffer);
   session.connection.send(buffer);
   session.connection.flush();
-  session.endpoint->takeDatagrams([&](auto datagram) { session.udp->sendTo(datagram, *session.udp_peer); });
+  session.peer->takeDatagrams([&](auto datagram) { session.udp->sendTo(datagram, *session.udpPeer); });
 }
 
 void ScriptedServer::run(std::function<void()> function) {
@@ -156,17 +157,17 @@ void ScriptedServer::run(std::function<void()> function) {
   done.get_future().wait();
 }
 
-void ScriptedServer::sayOther(const std::string& type, const std::string& payload) {
+void ScriptedServer::sendOther(const std::string& type, const std::string& payload) {
   run([&] {
     const wire::LocalType id = names_.addType(type);
     for (Session& session : sessions_) {
-      session.endpoint->sendRaw({}, device_, id, wire::asBytes(payload), wire::Reliability::kReliable);
+      session.peer->sendRaw({}, device_, id, wire::asBytes(payload), wire::Reliability::kReliable);
       push(session);
     }
   });
 }
 
-void ScriptedServer::sayRaw(const std::string& bytes) {
+void ScriptedServer::sendRawBytes(const std::string& bytes) {
   run([&] {
     for (Session& session : sessions_) {
       session.connection.send(wire::asBytes(bytes));
@@ -179,16 +180,28 @@ void ScriptedServer::dropClients() {
   run([&] { sessions_.clear(); });
 }
 
+void ScriptedServer::stopReading() {
+  run([&] {
+    for (Session& session : sessions_) session.connection.pauseReading();
+  });
+}
+
+std::size_t ScriptedServer::openConnections() {
+  std::size_t count = 0;
+  run([&] { count = sessions_.size(); });
+  return count;
+}
+
 void ScriptedServer::startReading() {
   run([&] {
     for (Session& session : sessions_) session.connection.resumeReading();
   });
 }
 
-std::vector<Told> ScriptedServer::waitTold(std::size_t count) {
+std::vector<Received> ScriptedServer::waitReceived(std::size_t count) {
   std::unique_lock lock(mutex_);
-  changed_.wait_for(lock, 20s, [&] { return told_.size() >= count; });
-  return told_;
+  changed_.wait_for(lock, 20s, [&] { return received_.size() >= count; });
+  return received_;
 }
 
 std::vector<wire::SetVertex> ScriptedServer::waitVertices(std::size_t count) {

@@ -1,5 +1,5 @@
-// A small VRPN server for tests of clients: real sockets on 127.0.0.1, a thread of its own, and a memory of
-// everything it was told. It answers pings of its device and says what a test makes it say.
+// A small VRPN server for tests of clients: real sockets on 127.0.0.1 and its own thread. It stores every
+// message that it receives, answers pings of its device, and sends what a test asks it to send.
 #pragma once
 
 #include <atomic>
@@ -25,21 +25,21 @@ namespace hapticd::test {
 struct ScriptedServerOptions {
   std::string device = "Phantom";
   std::uint16_t port = 0;  ///< 0: the system chooses
-  bool answers_pings = true;
-  bool reads = true;                                 ///< false: accepts and shakes hands, then never reads
-  std::optional<wire::Capabilities> capabilities{};  ///< answered, if set, to who asks for them
-  std::string greeting_bytes{};                      ///< sent instead of everything VRPN, if not empty
+  bool answersPings = true;
+  bool reads = true;                                 ///< false: completes the handshake, then does not read
+  std::optional<wire::Capabilities> capabilities{};  ///< the answer to QueryCapabilities, if set
+  std::string greetingBytes{};                       ///< sent in place of the VRPN protocol, if not empty
 };
 
-/// What a server of this project answers, of version 1.
+/// The answer of a server of this project with all features of version 1.
 wire::Capabilities allCapabilities();
 
 /// A message as it arrived.
-struct Told {
+struct Received {
   wire::Message message;
   std::string sender;
   wire::Time time;
-  bool by_datagram = false;
+  bool byDatagram = false;
 };
 
 class ScriptedServer {
@@ -52,30 +52,37 @@ class ScriptedServer {
   std::string name() const { return options_.device + "@127.0.0.1:" + std::to_string(port_); }
   std::string tcpName() const { return options_.device + "@tcp://127.0.0.1:" + std::to_string(port_); }
 
-  /// Sends a message of the device (or of another one) to all clients; by datagram where that is agreed.
+  /// Sends a message of the device (or of another one) to all clients; by datagram where the connection has
+  /// them.
   template <class M>
-  void say(const M& message, wire::Time time = {1700000000, 250000}, const std::string& sender = {}) {
+  void send(const M& message, wire::Time time = {1700000000, 250000}, const std::string& sender = {}) {
     run([this, message, time, sender] {
       const wire::LocalSender id = sender.empty() ? device_ : names_.addSender(sender);
       for (Session& session : sessions_) {
-        if (session.endpoint) session.endpoint->send(time, id, message);
+        if (session.peer) session.peer->send(time, id, message);
         push(session);
       }
     });
   }
   /// Sends a message of the device of a type that is not in the table.
-  void sayOther(const std::string& type, const std::string& payload);
+  void sendOther(const std::string& type, const std::string& payload);
   /// Sends bytes that need not be VRPN.
-  void sayRaw(const std::string& bytes);
-  /// Closes all connections, as a server does that is stopped.
+  void sendRawBytes(const std::string& bytes);
+  /// Closes all connections, as a stopped server does.
   void dropClients();
-  /// Goes on reading.
+  /// Stops reading all open connections; later ones are read.
+  void stopReading();
+  /// Resumes reading all open connections.
   void startReading();
+  /// From now on, pings are not answered.
+  void ignorePings() { ignorePings_ = true; }
+  /// Connections that are open now.
+  std::size_t openConnections();
 
-  /// Waits until as many messages as given came (other than pings, heartbeats and questions for
+  /// Waits until this many messages have arrived (other than pings, heartbeats and questions for
   /// capabilities), and returns them; fewer after 20 s.
-  std::vector<Told> waitTold(std::size_t count);
-  /// The same for vertices, which are kept apart.
+  std::vector<Received> waitReceived(std::size_t count);
+  /// The same for vertices, which are stored separately.
   std::vector<wire::SetVertex> waitVertices(std::size_t count);
   std::size_t connections() const { return connections_; }
   std::size_t pings() const { return pings_; }
@@ -84,14 +91,14 @@ class ScriptedServer {
  private:
   struct Session {
     net::Connection connection;
-    std::optional<wire::Peer> endpoint;
+    std::optional<wire::Peer> peer;
     std::unique_ptr<net::UdpSocket> udp;
-    std::optional<net::Endpoint> udp_peer;
+    std::optional<net::Endpoint> udpPeer;
   };
 
   void run(std::function<void()> function);
-  void serve(net::Connection connection, bool with_datagrams);
-  void onEvent(Session& session, const wire::Event& event, bool by_datagram);
+  void serve(net::Connection connection, bool withDatagrams);
+  void onEvent(Session& session, const wire::Event& event, bool byDatagram);
   bool answer(Session& session, const wire::MessageReceived& message);
   void push(Session& session);
   void openPort();
@@ -107,10 +114,11 @@ class ScriptedServer {
   std::atomic<std::size_t> connections_{0};
   std::atomic<std::size_t> pings_{0};
   std::atomic<std::size_t> heartbeats_{0};
+  std::atomic<bool> ignorePings_{false};
 
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::vector<Told> told_;
+  std::vector<Received> received_;
   std::vector<wire::SetVertex> vertices_;
   std::thread thread_;
 };

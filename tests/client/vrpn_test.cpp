@@ -1,4 +1,4 @@
-// VRPN's own classes over this client: what a program written for VRPN sees.
+// VRPN's classes over this client, as a program written for VRPN uses them.
 #include <gtest/gtest.h>
 #include <vrpn_Analog.h>
 #include <vrpn_Button.h>
@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "client/client_tests.h"
-#include "client/link.h"
 
 namespace hapticd {
 namespace {
@@ -35,11 +34,11 @@ bool runUntil(Device& device, Condition&& condition) {
 
 class Vrpn : public ::testing::TestWithParam<bool> {
  protected:
-  /// Waits for something that came by TCP, behind the server's descriptions: without those, datagrams, which
-  /// may overtake them, mean nothing.
+  /// Waits for a message by TCP, which follows the server's descriptions of its names. Datagrams may overtake those, and
+  /// without them have no meaning.
   static bool ready(vrpn_BaseClass& device) {
-    const wire::LocalSender sender{device.connectionPtr()->register_sender("Phantom")};
-    return runUntil(device, [&] { return device.connectionPtr()->link()->heard(sender); });
+    const vrpn_int32 sender = device.connectionPtr()->register_sender("Phantom");
+    return runUntil(device, [&] { return device.connectionPtr()->heard(sender); });
   }
   std::string name() const { return GetParam() ? server_.tcpName() : server_.name(); }
   ScriptedServer server_;
@@ -69,13 +68,13 @@ TEST_P(Vrpn, ForceDeviceReportsReachTheirHandlers) {
   device.register_touchedObject_handler(&objects, keep<vrpn_TOUCHEDOBJECTCB>);
   device.register_angle_handler(&angles, keep<vrpn_ANGLECB>);
   ASSERT_TRUE(ready(device));
-  server_.say(wire::Force{{1, 2, 3}});
-  server_.say(wire::Scp{{4, 5, 6}, {0.1, 0.2, 0.3, 0.9}});
-  server_.say(wire::ForceError{FD_DUTY_CYCLE_ERROR});
-  server_.say(wire::Dop{0.001});
-  server_.say(wire::IsTouching{1});
-  server_.say(wire::TouchedObject{3});
-  server_.say(wire::Angle{30, 1});
+  server_.send(wire::Force{{1, 2, 3}});
+  server_.send(wire::Scp{{4, 5, 6}, {0.1, 0.2, 0.3, 0.9}});
+  server_.send(wire::ForceError{FD_DUTY_CYCLE_ERROR});
+  server_.send(wire::Dop{0.001});
+  server_.send(wire::IsTouching{1});
+  server_.send(wire::TouchedObject{3});
+  server_.send(wire::Angle{30, 1});
   ASSERT_TRUE(runUntil(device, [&] {
     return !forces.empty() && !scps.empty() && !errors.empty() && !dops.empty() && !touchings.empty() &&
            !objects.empty() && !angles.empty();
@@ -114,20 +113,20 @@ TEST_P(Vrpn, MalagaCallsArriveWithTheirFields) {
   device.setObjectTouchable(1, false);
   device.resetScene();
   device.mainloop();
-  const auto told = server_.waitTold(11);
-  ASSERT_EQ(told.size(), 11U);
-  EXPECT_TRUE(is(told[0], wire::SetObjectNumber{2}));
-  EXPECT_TRUE(is(told[1], wire::SetTransformMatrix{1, m}));
-  EXPECT_TRUE(is(told[2], wire::SetHapticProperty{1, "static friction", 0.5F}));
-  EXPECT_TRUE(is(told[3], wire::SetTouchableFace{3}));
-  EXPECT_TRUE(is(told[4], wire::SetWorkspaceBoundingBox{m, {1, 2, 3, 4, 5, 6}}));
-  EXPECT_TRUE(is(told[5], wire::SetWorkspaceProjectionMatrix{m, m}));
-  EXPECT_TRUE(is(told[6], wire::Effect{"spring", 2, 1, 2, 3, 4, {1, 2, 3}, {4, 5, 6}}));
-  EXPECT_TRUE(is(told[7], wire::StartEffect{2}));
-  EXPECT_TRUE(is(told[8], wire::StopEffect{2}));
-  EXPECT_TRUE(is(told[9], wire::SetObjectIsTouchable{1, 0}));
-  EXPECT_TRUE(is(told[10], wire::ResetScene{}));
-  EXPECT_EQ(told[0].sender, "Phantom");
+  const auto received = server_.waitReceived(11);
+  ASSERT_EQ(received.size(), 11U);
+  EXPECT_TRUE(is(received[0], wire::SetObjectNumber{2}));
+  EXPECT_TRUE(is(received[1], wire::SetTransformMatrix{1, m}));
+  EXPECT_TRUE(is(received[2], wire::SetHapticProperty{1, "static friction", 0.5F}));
+  EXPECT_TRUE(is(received[3], wire::SetTouchableFace{3}));
+  EXPECT_TRUE(is(received[4], wire::SetWorkspaceBoundingBox{m, {1, 2, 3, 4, 5, 6}}));
+  EXPECT_TRUE(is(received[5], wire::SetWorkspaceProjectionMatrix{m, m}));
+  EXPECT_TRUE(is(received[6], wire::Effect{"spring", 2, 1, 2, 3, 4, {1, 2, 3}, {4, 5, 6}}));
+  EXPECT_TRUE(is(received[7], wire::StartEffect{2}));
+  EXPECT_TRUE(is(received[8], wire::StopEffect{2}));
+  EXPECT_TRUE(is(received[9], wire::SetObjectIsTouchable{1, 0}));
+  EXPECT_TRUE(is(received[10], wire::ResetScene{}));
+  EXPECT_EQ(received[0].sender, "Phantom");
 }
 
 TEST_P(Vrpn, StockCallsArriveWithTheirFields) {
@@ -164,29 +163,29 @@ TEST_P(Vrpn, StockCallsArriveWithTheirFields) {
   device.startEffect();
   device.stopEffect();
   device.mainloop();
-  const auto told = server_.waitTold(21);
-  ASSERT_EQ(told.size(), 21U);
-  EXPECT_TRUE(is(told[0], wire::AddObject{1, -1}));
-  EXPECT_TRUE(is(told[1], wire::AddObjectExScene{2}));
-  EXPECT_TRUE(is(told[2], wire::MoveToParent{2, 1}));
-  EXPECT_TRUE(is(told[3], wire::SetObjectPosition{1, {1, 2, 3}}));
-  EXPECT_TRUE(is(told[4], wire::SetObjectOrientation{1, {0, 1, 0}, 0.5F}));
-  EXPECT_TRUE(is(told[5], wire::SetObjectScale{1, {1, 2, 3}}));
-  EXPECT_TRUE(is(told[6], wire::SetNormal{0, 4, {0, 0, 1}}));
-  EXPECT_TRUE(is(told[7], wire::SetTriangle{0, 5, {0, 1, 2}, {-1, -1, -1}}));
-  EXPECT_TRUE(is(told[8], wire::RemoveTriangle{0, 5}));
-  EXPECT_TRUE(is(told[9], wire::UpdateTrimeshChanges{0, 0.9F, 0.003F, 0.4F, 0.2F}));
-  EXPECT_TRUE(is(told[10], wire::TransformTrimesh{0, m}));
-  EXPECT_TRUE(is(told[11], wire::ClearTrimesh{0}));
-  EXPECT_TRUE(is(told[12], wire::RemoveObject{2}));
-  EXPECT_TRUE(is(told[13], wire::SetHapticOrigin{{1, 2, 3}, {0, 1, 0}, 1}));
-  EXPECT_TRUE(is(told[14], wire::SetHapticScale{2}));
-  EXPECT_TRUE(is(told[15], wire::SetSceneOrigin{{1, 2, 3}, {0, 1, 0}, 2}));
-  EXPECT_TRUE(is(told[16], wire::SetTrimeshType{-1, 1}));
-  EXPECT_TRUE(is(told[17], wire::Plane{{0, 1, 0, -0.5F}, 0.9F, 0.003F, 0.2F, 0.4F, 0, 1}));
-  EXPECT_TRUE(is(told[18], wire::Plane{{0, 0, 0, 0}, 0.9F, 0.003F, 0.2F, 0.4F, 0, 1}));
-  EXPECT_TRUE(is(told[19], wire::CustomEffect{3, {{7, 8}}}));
-  EXPECT_TRUE(is(told[20], wire::CustomEffect{wire::kStopCustomEffect, {}}));
+  const auto received = server_.waitReceived(21);
+  ASSERT_EQ(received.size(), 21U);
+  EXPECT_TRUE(is(received[0], wire::AddObject{1, -1}));
+  EXPECT_TRUE(is(received[1], wire::AddObjectExScene{2}));
+  EXPECT_TRUE(is(received[2], wire::MoveToParent{2, 1}));
+  EXPECT_TRUE(is(received[3], wire::SetObjectPosition{1, {1, 2, 3}}));
+  EXPECT_TRUE(is(received[4], wire::SetObjectOrientation{1, {0, 1, 0}, 0.5F}));
+  EXPECT_TRUE(is(received[5], wire::SetObjectScale{1, {1, 2, 3}}));
+  EXPECT_TRUE(is(received[6], wire::SetNormal{0, 4, {0, 0, 1}}));
+  EXPECT_TRUE(is(received[7], wire::SetTriangle{0, 5, {0, 1, 2}, {-1, -1, -1}}));
+  EXPECT_TRUE(is(received[8], wire::RemoveTriangle{0, 5}));
+  EXPECT_TRUE(is(received[9], wire::UpdateTrimeshChanges{0, 0.9F, 0.003F, 0.4F, 0.2F}));
+  EXPECT_TRUE(is(received[10], wire::TransformTrimesh{0, m}));
+  EXPECT_TRUE(is(received[11], wire::ClearTrimesh{0}));
+  EXPECT_TRUE(is(received[12], wire::RemoveObject{2}));
+  EXPECT_TRUE(is(received[13], wire::SetHapticOrigin{{1, 2, 3}, {0, 1, 0}, 1}));
+  EXPECT_TRUE(is(received[14], wire::SetHapticScale{2}));
+  EXPECT_TRUE(is(received[15], wire::SetSceneOrigin{{1, 2, 3}, {0, 1, 0}, 2}));
+  EXPECT_TRUE(is(received[16], wire::SetTrimeshType{-1, 1}));
+  EXPECT_TRUE(is(received[17], wire::Plane{{0, 1, 0, -0.5F}, 0.9F, 0.003F, 0.2F, 0.4F, 0, 1}));
+  EXPECT_TRUE(is(received[18], wire::Plane{{0, 0, 0, 0}, 0.9F, 0.003F, 0.2F, 0.4F, 0, 1}));
+  EXPECT_TRUE(is(received[19], wire::CustomEffect{3, {{7, 8}}}));
+  EXPECT_TRUE(is(received[20], wire::CustomEffect{wire::kStopCustomEffect, {}}));
 }
 
 TEST_P(Vrpn, ConstraintsAreForceFields) {
@@ -203,11 +202,12 @@ TEST_P(Vrpn, ConstraintsAreForceFields) {
   device.setConstraintMode(vrpn_ForceDevice::PLANE_CONSTRAINT);
   device.enableConstraint(0);
   device.mainloop();
-  const auto told = server_.waitTold(3);
-  ASSERT_EQ(told.size(), 3U);
-  EXPECT_TRUE(is(told[0], wire::ForceField{{1, 2, 3}, {0, 0, 0}, {-100, 0, 0, 0, 0, 0, 0, 0, -100}, 100}));
-  EXPECT_TRUE(is(told[1], wire::ForceField{{1, 2, 3}, {0, 0, 0}, {0, 0, 0, 0, -100, 0, 0, 0, 0}, 100}));
-  EXPECT_TRUE(is(told[2], wire::ForceField{}));
+  const auto received = server_.waitReceived(3);
+  ASSERT_EQ(received.size(), 3U);
+  EXPECT_TRUE(
+      is(received[0], wire::ForceField{{1, 2, 3}, {0, 0, 0}, {-100, 0, 0, 0, 0, 0, 0, 0, -100}, 100}));
+  EXPECT_TRUE(is(received[1], wire::ForceField{{1, 2, 3}, {0, 0, 0}, {0, 0, 0, 0, -100, 0, 0, 0, 0}, 100}));
+  EXPECT_TRUE(is(received[2], wire::ForceField{}));
 }
 
 TEST_P(Vrpn, DevicesOfOneServerShareItsConnection) {
@@ -242,22 +242,22 @@ TEST_P(Vrpn, DevicesOfOneServerShareItsConnection) {
     button.set_toggle(2, VRPN_BUTTON_ON);
     button.set_all_momentary();
     tracker.mainloop();
-    const auto told = server_.waitTold(7);
-    ASSERT_EQ(told.size(), 7U);
-    EXPECT_TRUE(is(told[0], wire::TrackerRequestToRoom{}));
-    EXPECT_TRUE(is(told[2], wire::TrackerRequestWorkspace{}));
-    EXPECT_TRUE(is(told[3], wire::TrackerSetUpdateRate{250}));
-    EXPECT_TRUE(is(told[5], wire::ButtonAdmin{2, 21}));
-    EXPECT_TRUE(is(told[6], wire::ButtonAdmin{-99, 10}));
+    const auto received = server_.waitReceived(7);
+    ASSERT_EQ(received.size(), 7U);
+    EXPECT_TRUE(is(received[0], wire::TrackerRequestToRoom{}));
+    EXPECT_TRUE(is(received[2], wire::TrackerRequestWorkspace{}));
+    EXPECT_TRUE(is(received[3], wire::TrackerSetUpdateRate{250}));
+    EXPECT_TRUE(is(received[5], wire::ButtonAdmin{2, 21}));
+    EXPECT_TRUE(is(received[6], wire::ButtonAdmin{-99, 10}));
 
-    server_.say(wire::TrackerPosQuat{0, 0, {1, 2, 3}, {0, 0, 0, 1}});
-    server_.say(wire::TrackerPosQuat{1, 1, {4, 5, 6}, {0, 0, 0, 1}});
-    server_.say(wire::TrackerVelocity{0, 0, {1, 0, 0}, {0, 0, 0, 1}, 0.5});
-    server_.say(wire::TrackerWorkspace{{-1, -1, -1}, {1, 1, 1}});
-    server_.say(wire::ButtonChange{1, 1});
-    server_.say(wire::ButtonStates{{{0, 1}}});
-    server_.say(wire::AnalogChannels{{{0.5, 1.5}}});
-    server_.say(wire::Text{1, 2, "careful"});
+    server_.send(wire::TrackerPosQuat{0, 0, {1, 2, 3}, {0, 0, 0, 1}});
+    server_.send(wire::TrackerPosQuat{1, 1, {4, 5, 6}, {0, 0, 0, 1}});
+    server_.send(wire::TrackerVelocity{0, 0, {1, 0, 0}, {0, 0, 0, 1}, 0.5});
+    server_.send(wire::TrackerWorkspace{{-1, -1, -1}, {1, 1, 1}});
+    server_.send(wire::ButtonChange{1, 1});
+    server_.send(wire::ButtonStates{{{0, 1}}});
+    server_.send(wire::AnalogChannels{{{0.5, 1.5}}});
+    server_.send(wire::Text{1, 2, "careful"});
     ASSERT_TRUE(runUntil(tracker, [&] {
       return all.size() == 2 && !velocities.empty() && !workspaces.empty() && !buttons.empty() &&
              !states.empty() && !analogs.empty() && !texts.empty();
@@ -274,12 +274,12 @@ TEST_P(Vrpn, DevicesOfOneServerShareItsConnection) {
     EXPECT_EQ(texts[0].type, vrpn_TEXT_WARNING);
     EXPECT_EQ(server_.connections(), 1U);
   }
-  // The last device took the connection with it: the next one opens another.
+  // The connection was deleted with its last device: the next device opens another.
   vrpn_Tracker_Remote again(name().c_str());
   EXPECT_TRUE(runUntil(again, [&] { return server_.connections() == 2; }));
 }
 
-TEST_P(Vrpn, DialsOfOtherServersAreHeard) {
+TEST_P(Vrpn, DialsOfOtherServersAreReported) {
   vrpn_Dial_Remote dial(name().c_str());
   std::vector<vrpn_DIALCB> turns;
   dial.register_change_handler(&turns, keep<vrpn_DIALCB>);
@@ -289,8 +289,8 @@ TEST_P(Vrpn, DialsOfOtherServersAreHeard) {
   vrpn_int32 left = sizeof buffer;
   vrpn_buffer(&insert, &left, -0.25);
   vrpn_buffer(&insert, &left, vrpn_int32{3});
-  server_.sayOther("vrpn_Dial update", std::string(buffer, 8));  // too short to be one
-  server_.sayOther("vrpn_Dial update", std::string(buffer, 12));
+  server_.sendOther("vrpn_Dial update", std::string(buffer, 8));  // too short
+  server_.sendOther("vrpn_Dial update", std::string(buffer, 12));
   ASSERT_TRUE(runUntil(dial, [&] { return !turns.empty(); }));
   EXPECT_EQ(turns[0].dial, 3);
   EXPECT_EQ(turns[0].change, -0.25);
@@ -319,9 +319,9 @@ TEST_P(Vrpn, ProgramsMayHandleMessagesThemselves) {
                                &connections);
   connection->register_handler(type, keepNumber, &object, sender);
   ASSERT_TRUE(runUntil(*connection, [&] { return connections == 1; }));
-  // Said again and again: the server may know of the connection later than the client.
+  // Send repeatedly: the server may learn of the connection after the client.
   ASSERT_TRUE(runUntil(*connection, [&] {
-    server_.say(wire::TouchedObject{11});
+    server_.send(wire::TouchedObject{11});
     return object == 11;
   }));
 
@@ -335,9 +335,9 @@ TEST_P(Vrpn, ProgramsMayHandleMessagesThemselves) {
   EXPECT_EQ(connection->pack_message(4, now, start, sender, buffer, vrpn_CONNECTION_RELIABLE), 0);
   EXPECT_EQ(connection->pack_message(4, now, 1999, sender, buffer, vrpn_CONNECTION_RELIABLE), -1);
   connection->send_pending_reports();
-  const auto told = server_.waitTold(1);
-  ASSERT_EQ(told.size(), 1U);
-  EXPECT_TRUE(is(told[0], wire::StartEffect{4}));
+  const auto received = server_.waitReceived(1);
+  ASSERT_EQ(received.size(), 1U);
+  EXPECT_TRUE(is(received[0], wire::StartEffect{4}));
 
   int dropped = 0;
   connection->register_handler(connection->register_message_type(vrpn_dropped_connection), countMessage,
@@ -364,8 +364,8 @@ TEST_P(Vrpn, HandlersMayUnregisterThemselves) {
   device.register_force_change_handler(&leaver, leave);
   device.register_force_change_handler(&forces, keep<vrpn_FORCECB>);
   ASSERT_TRUE(ready(device));
-  server_.say(wire::Force{});
-  server_.say(wire::Force{});
+  server_.send(wire::Force{});
+  server_.send(wire::Force{});
   ASSERT_TRUE(runUntil(device, [&] { return forces.size() == 2; }));
   EXPECT_EQ(leaver.calls, 1);
 }
@@ -400,7 +400,7 @@ TEST(VrpnShared, BuffersAreBigEndianAndBounded) {
   EXPECT_EQ(real, 1.0);
 }
 
-TEST(VrpnShared, CopiedTextEndsWithinItsRoom) {
+TEST(VrpnShared, CopiedTextEndsWithinItsBuffer) {
   char room[4] = {'x', 'x', 'x', 'x'};
   vrpn_strcpy(room, "Phantom");
   EXPECT_STREQ(room, "Pha");

@@ -49,17 +49,17 @@ class WithServer : public ::testing::TestWithParam<bool> {
 INSTANTIATE_TEST_SUITE_P(Client, WithServer, ::testing::Bool(),
                          [](const auto& way) { return way.param ? "tcp" : "callback"; });
 
-TEST_P(WithServer, TheServerSaysWhatItCanDo) {
+TEST_P(WithServer, ReceivesTheCapabilities) {
   Client client(name());
   const auto c = client.waitCapabilities();
   ASSERT_TRUE(c);
-  EXPECT_TRUE(c->bulk_mesh && c->batch && c->subscribe && c->stop && c->heartbeat && c->hold_hand);
-  EXPECT_EQ(c->servo_rate_Hz, 1000);
-  EXPECT_GT(c->peak_force_N, 0);
-  EXPECT_LT(c->workspace_min_m[0], c->workspace_max_m[0]);
+  EXPECT_TRUE(c->bulkMesh && c->batch && c->subscribe && c->stop && c->heartbeat && c->holdHand);
+  EXPECT_EQ(c->servoRate_Hz, 1000);
+  EXPECT_GT(c->peakForce_N, 0);
+  EXPECT_LT(c->workspaceMin_m[0], c->workspaceMax_m[0]);
 }
 
-TEST_P(WithServer, AnIndexedMeshIsFeltContactByContact) {
+TEST_P(WithServer, AnIndexedMeshReportsItsContacts) {
   Client client(name());
   std::vector<std::string> texts;
   client.onText([&](const TextReport& r) { texts.push_back(r.text); });
@@ -95,7 +95,7 @@ TEST_P(WithServer, ForcesStopAndComeBack) {
   EXPECT_TRUE(pollUntil(client, [&] { return client.latest().tick.force_N[1] > 0.1; }));
 }
 
-TEST_P(WithServer, AClientThatDoesNotPollIsLostAndItsForceEnds) {
+TEST_P(WithServer, AClientThatDoesNotPollIsDisconnectedAndItsForceEnds) {
   Client watcher(name());
   Client client(name());
   watcher.subscribe(Reports::tick, 200);
@@ -109,7 +109,7 @@ TEST_P(WithServer, AClientThatDoesNotPollIsLostAndItsForceEnds) {
     client.poll(0ms);
     return push() > 0.5;
   }));
-  ASSERT_TRUE(pollUntil(watcher, [&] { return push() < 1e-6; })) << "nobody polls the client";
+  ASSERT_TRUE(pollUntil(watcher, [&] { return push() < 1e-6; })) << "the client is not polled";
   std::string reason;
   client.onConnection(
       [&](const ConnectionReport& r) { reason += r.connected ? "again" : "lost: " + r.reason + "; "; });
@@ -137,12 +137,12 @@ TEST_P(WithServer, OneClientHoldsTheHand) {
       << text << " hand at " << second.latest().tick.hand_m[1] << " tick " << second.latest().tick.tick;
 }
 
-TEST_P(WithServer, WhoWantsNoReportsHearsTextsOnly) {
+TEST_P(WithServer, ASubscriptionToNothingLeavesTexts) {
   Client client(name());
   client.subscribe(Reports::none);
   std::string text;
   client.onText([&](const TextReport& r) { text += r.text; });
-  client.setTouchable(12345, true);  // there is none
+  client.setTouchable(12345, true);  // no such object
   ASSERT_TRUE(pollUntil(client, [&] { return !text.empty(); }));
   const std::uint64_t before = client.statistics()[ReportKind::pose].count;
   client.runFor(200ms);

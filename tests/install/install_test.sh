@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs, moves what was installed elsewhere, builds programs against it that know nothing of this tree, and runs them.
+# Installs, moves the installed tree, builds programs against it outside of the source tree, and runs them.
 #   install_test.sh CMAKE BUILD_DIR SOURCE_DIR COMPILER VERSION
 set -euo pipefail
 cmake=$1
@@ -14,7 +14,7 @@ trap 'rm -rf "$work"' EXIT
 mv "$work/installed" "$work/moved"
 prefix=$work/moved
 if grep -rlE "$source_dir|Boost|boost" "$prefix/include" "$prefix"/lib*/cmake "$prefix"/lib*/pkgconfig; then
-  echo "the files above name the source tree or a library that users need not have"
+  echo "the files above name the source tree or a library that users do not need"
   exit 1
 fi
 
@@ -24,14 +24,24 @@ fi
 
 export PKG_CONFIG_PATH=$(echo "$prefix"/lib*/pkgconfig)
 [ "$(pkg-config --modversion hapticd)" = "$version" ]
+[ "$(pkg-config --modversion hapticd-vrpn)" = "$version" ]
+if compgen -G "$prefix/lib*/libvrpn*" || [ -e "$prefix/include/vrpn" ]; then
+  echo "the files above would overwrite those of an installed VRPN"
+  exit 1
+fi
 # shellcheck disable=SC2046
 "$compiler" -std=c++20 "$source_dir/tests/install/user/reads_force.cpp" $(pkg-config --cflags --libs hapticd) -o "$work/by_pkg_config"
+# shellcheck disable=SC2046
+"$compiler" -std=c++11 "$source_dir/examples/paper_figure8.cpp" $(pkg-config --cflags --libs hapticd-vrpn) \
+  -Wl,-rpath,"$(pkg-config --variable=libdir hapticd-vrpn)" -o "$work/figure8_by_pkg_config"
 
 hapticd=$prefix/bin/hapticd
 . "$source_dir/tests/apps/server.sh"
-for program in "$work/user/reads_force" "$work/by_pkg_config"; do
+for program in "$work/user/reads_force" "$work/user/reads_force_shared" "$work/by_pkg_config"; do
   timeout 60 "$program" "Phantom@$address" | tee "$work/out"
   grep -q '^felt object 0$' "$work/out"
 done
-timeout 60 "$work/user/figure8" "Phantom@$address" 2 | tee "$work/out"
-grep -qE '^[1-9][0-9]* force reports$' "$work/out"
+for program in "$work/user/figure8" "$work/figure8_by_pkg_config"; do
+  timeout 60 "$program" "Phantom@$address" 2 | tee "$work/out"
+  grep -qE '^[1-9][0-9]* force reports$' "$work/out"
+done

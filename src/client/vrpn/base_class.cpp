@@ -1,9 +1,9 @@
-#include "vrpn/vrpn_BaseClass.h"
+#include "hapticd/vrpn/vrpn_BaseClass.h"
 
 #include <algorithm>
 
 #include "client/vrpn/messages.h"
-#include "vrpn/vrpn_Text.h"
+#include "hapticd/vrpn/vrpn_Text.h"
 
 namespace wire = hapticd::wire;
 using hapticd::client::receiveMessage;
@@ -37,7 +37,7 @@ void vrpn_TextPrinter::remove_object(vrpn_BaseClass* device) {
   std::erase(devices_, device);
 }
 
-// Several devices of one name hear the same text: the first of them prints it.
+// Several devices of one name receive the same text: the first of them prints it.
 void vrpn_TextPrinter::print(const vrpn_BaseClass* device, const vrpn_HANDLERPARAM& p) const {
   const auto first = std::find_if(devices_.begin(), devices_.end(), [&](const vrpn_BaseClass* d) {
     return d->d_connection == device->d_connection && d->d_sender_id == device->d_sender_id;
@@ -59,7 +59,7 @@ vrpn_BaseClass::vrpn_BaseClass(const char* name, vrpn_Connection* connection)
   } else {
     d_connection = vrpn_get_connection_by_name(name);
   }
-  vrpn_gettimeofday(&silent_since_, nullptr);
+  vrpn_gettimeofday(&silentSince_, nullptr);
   if (!d_connection) return;
   d_sender_id = d_connection->registerDevice(d_servicename);
   d_text_message_id = d_connection->register_message_type("vrpn_Base text_message");
@@ -112,13 +112,13 @@ void vrpn_BaseClass::client_mainloop() {
   d_connection->mainloop();
   timeval now;
   vrpn_gettimeofday(&now, nullptr);
-  const bool heard = d_sender_id >= 0 && d_connection->link()->heard({d_sender_id});
+  const bool heard = d_connection->heard(d_sender_id);
   if (heard) {
-    silent_since_ = now;
+    silentSince_ = now;
     warned_s_ = 0;
     return;
   }
-  const auto silent_s = static_cast<int>(vrpn_TimevalDurationSeconds(now, silent_since_));
+  const auto silent_s = static_cast<int>(vrpn_TimevalDurationSeconds(now, silentSince_));
   if (shutup || silent_s < kSilenceWarning_s || (warned_s_ > 0 && silent_s < warned_s_ + kSilenceInterval_s))
     return;
   warned_s_ = silent_s;

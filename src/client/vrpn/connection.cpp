@@ -1,4 +1,4 @@
-#include "vrpn/vrpn_Connection.h"
+#include "hapticd/vrpn/vrpn_Connection.h"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "client/vrpn/messages.h"
-#include "vrpn/vrpn_FileConnection.h"
+#include "hapticd/vrpn/vrpn_FileConnection.h"
 
 using hapticd::client::Arrival;
 using hapticd::client::Link;
@@ -24,7 +24,7 @@ bool vrpn_FILE_CONNECTIONS_SHOULD_SKIP_TO_USER_MESSAGES = true;
 
 namespace {
 
-// These never travel, so they have numbers of their own, behind all that do.
+// These types are never sent, so their numbers start above all that are.
 constexpr vrpn_int32 kFirstControlType = 1000000;
 
 const std::array<const char*, 4>& controlTypes() {
@@ -50,9 +50,9 @@ char* copyOf(std::string_view text) {
 vrpn_Connection::vrpn_Connection(const char* server) : name_(server), opened_(get_time()) {
   try {
     link_ = std::make_unique<Link>(hapticd::client::parseServer(server),
-                                   hapticd::client::LinkOptions{.adopt_names = true});
+                                   hapticd::client::LinkOptions{.adoptNames = true});
     link_->addSender(vrpn_CONTROL);
-    link_->waitConnected(std::chrono::seconds(1));  // as long as stock VRPN; it goes on trying later
+    link_->waitConnected(std::chrono::seconds(1));  // as stock VRPN; the link keeps trying afterwards
   } catch (const std::exception& error) {
     fprintf(stderr, "VRPN: %s\n", error.what());
   }
@@ -70,6 +70,9 @@ vrpn_bool vrpn_Connection::doing_okay() const {
 }
 vrpn_bool vrpn_Connection::connected() const {
   return link_ && link_->connected();
+}
+bool vrpn_Connection::heard(vrpn_int32 sender) const {
+  return sender >= 0 && link_ && link_->heard({sender});
 }
 
 int vrpn_Connection::mainloop(const timeval* timeout) {
@@ -110,7 +113,7 @@ void vrpn_Connection::callControlHandlers(const char* type) {
 void vrpn_Connection::callHandlers(const vrpn_HANDLERPARAM& p) {
   ++calling_;
   for (std::size_t i = 0; i < handlers_.size(); ++i) {
-    const Handler h = handlers_[i];  // a handler may register others
+    const Handler h = handlers_[i];  // a copy: handlers may register others
     const bool wanted = h.function && (h.type == p.type || h.type == vrpn_ANY_TYPE) &&
                         (h.sender == p.sender || h.sender == vrpn_ANY_SENDER);
     if (wanted) h.function(h.userdata, p);
@@ -222,8 +225,8 @@ void vrpn_Connection::addReference() {
 }
 
 void vrpn_Connection::removeReference() {
-  // From inside a handler the connection stays, for it has to return to its loop.
-  if (--references_ <= 0 && auto_delete_ && calling_ == 0) delete this;
+  // A running handler returns into the connection, so it must not be deleted then.
+  if (--references_ <= 0 && autoDelete_ && calling_ == 0) delete this;
 }
 
 vrpn_Connection* vrpn_get_connection_by_name(const char* name, const char* local_in_logfile,

@@ -2,10 +2,10 @@
 #include <algorithm>
 
 #include "client/vrpn/messages.h"
-#include "vrpn/vrpn_Analog.h"
-#include "vrpn/vrpn_Button.h"
-#include "vrpn/vrpn_Dial.h"
-#include "vrpn/vrpn_Tracker.h"
+#include "hapticd/vrpn/vrpn_Analog.h"
+#include "hapticd/vrpn/vrpn_Button.h"
+#include "hapticd/vrpn/vrpn_Dial.h"
+#include "hapticd/vrpn/vrpn_Tracker.h"
 
 namespace wire = hapticd::wire;
 using hapticd::client::copyTo;
@@ -72,7 +72,7 @@ vrpn_Dial_Remote::vrpn_Dial_Remote(const char* name, vrpn_Connection* connection
   listen("vrpn_Dial update", handleChange);
 }
 
-// No server of ours has dials, so the message is not in the table of the wire.
+// Servers of this project have no dials, so the message is not in the wire table.
 int vrpn_Dial_Remote::handleChange(void* self, vrpn_HANDLERPARAM p) {
   vrpn_DIALCB report{p.msg_time, 0, 0};
   if (p.payload_len < static_cast<vrpn_int32>(sizeof report.change + sizeof report.dial)) return 0;

@@ -1,4 +1,4 @@
-#include "vrpn/vrpn_ForceDevice.h"
+#include "hapticd/vrpn/vrpn_ForceDevice.h"
 
 #include <cmath>
 
@@ -10,7 +10,7 @@ using hapticd::client::copyTo;
 using hapticd::client::receiveMessage;
 using hapticd::client::sendMessage;
 
-// --- what is set before it is sent
+// --- settings that are sent later
 
 void vrpn_ForceDevice::setCustomEffect(vrpn_int32 effect, vrpn_float32* parameters, vrpn_uint32 count) {
   customEffectId = effect;
@@ -93,7 +93,7 @@ int vrpn_ForceDevice_Remote::handleAngle(void* self, vrpn_HANDLERPARAM p) {
   });
 }
 
-// --- commands: all reliable, so that none overtakes or misses another, but for what stock VRPN streams
+// --- commands: reliable and in order, except for those that stock VRPN streams
 
 template <class Message>
 void vrpn_ForceDevice_Remote::send(const Message& message) {
@@ -221,19 +221,19 @@ void vrpn_ForceDevice_Remote::enableConstraint(vrpn_int32 enable) {
 // A spring to a point is -k I; one that leaves a direction d free is -k (I - d d^T); one that acts along a
 // normal n only is -k n n^T.
 void vrpn_ForceDevice_Remote::updateConstraint() {
-  if (!constrained_ || constraint_mode_ == NO_CONSTRAINT) return;
-  const bool line = constraint_mode_ == LINE_CONSTRAINT;
-  const bool onto_plane = constraint_mode_ == PLANE_CONSTRAINT;
-  const vrpn_float32* origin = line         ? constraint_line_point_
-                               : onto_plane ? constraint_plane_point_
-                                            : constraint_point_;
-  const vrpn_float32* direction = line ? constraint_line_direction_ : constraint_plane_normal_;
+  if (!constrained_ || constraintMode_ == NO_CONSTRAINT) return;
+  const bool line = constraintMode_ == LINE_CONSTRAINT;
+  const bool ontoPlane = constraintMode_ == PLANE_CONSTRAINT;
+  const vrpn_float32* origin = line        ? constraintLinePoint_
+                               : ontoPlane ? constraintPlanePoint_
+                                           : constraintPoint_;
+  const vrpn_float32* direction = line ? constraintLineDirection_ : constraintPlaneNormal_;
   const float length = std::hypot(direction[0], direction[1], direction[2]);
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
       const float along = length > 0 ? direction[i] * direction[j] / (length * length) : 0.0F;
       const float free = (i == j ? 1.0F : 0.0F) - (line ? along : 0.0F);
-      ff_jacobian[i][j] = 0.0F - constraint_stiffness_ * (onto_plane ? along : free);
+      ff_jacobian[i][j] = 0.0F - constraintStiffness_ * (ontoPlane ? along : free);
     }
   }
   setFF_Origin(origin[0], origin[1], origin[2]);
@@ -243,31 +243,31 @@ void vrpn_ForceDevice_Remote::updateConstraint() {
 }
 
 void vrpn_ForceDevice_Remote::setConstraintMode(ConstraintGeometry mode) {
-  constraint_mode_ = mode;
+  constraintMode_ = mode;
   updateConstraint();
 }
 void vrpn_ForceDevice_Remote::setConstraintPoint(vrpn_float32 point[3]) {
-  std::copy(point, point + 3, constraint_point_);
+  std::copy(point, point + 3, constraintPoint_);
   updateConstraint();
 }
 void vrpn_ForceDevice_Remote::setConstraintLinePoint(vrpn_float32 point[3]) {
-  std::copy(point, point + 3, constraint_line_point_);
+  std::copy(point, point + 3, constraintLinePoint_);
   updateConstraint();
 }
 void vrpn_ForceDevice_Remote::setConstraintLineDirection(vrpn_float32 direction[3]) {
-  std::copy(direction, direction + 3, constraint_line_direction_);
+  std::copy(direction, direction + 3, constraintLineDirection_);
   updateConstraint();
 }
 void vrpn_ForceDevice_Remote::setConstraintPlanePoint(vrpn_float32 point[3]) {
-  std::copy(point, point + 3, constraint_plane_point_);
+  std::copy(point, point + 3, constraintPlanePoint_);
   updateConstraint();
 }
 void vrpn_ForceDevice_Remote::setConstraintPlaneNormal(vrpn_float32 normal[3]) {
-  std::copy(normal, normal + 3, constraint_plane_normal_);
+  std::copy(normal, normal + 3, constraintPlaneNormal_);
   updateConstraint();
 }
 void vrpn_ForceDevice_Remote::setConstraintKSpring(vrpn_float32 k) {
-  constraint_stiffness_ = k;
+  constraintStiffness_ = k;
   updateConstraint();
 }
 

@@ -6,12 +6,12 @@
 
 #include "client/link.h"
 #include "hapticd/error.h"
-#include "vrpn/vrpn_Connection.h"
+#include "hapticd/vrpn/vrpn_Connection.h"
 #include "wire/codec.h"
 
 namespace hapticd::client {
 
-/// Sends a message of a device; what goes wrong is printed, as VRPN does.
+/// Sends a message of a device; prints errors, as VRPN does.
 template <wire::WireMessage M>
 void sendMessage(vrpn_Connection* connection, vrpn_int32 sender, const M& message,
                  wire::Reliability reliability = M::kInfo.reliability) {
@@ -23,8 +23,7 @@ void sendMessage(vrpn_Connection* connection, vrpn_int32 sender, const M& messag
   }
 }
 
-/// Calls use(message) with the decoded payload; a damaged one is ignored, where stock VRPN drops the
-/// connection.
+/// Calls use(message) with the decoded payload. Ignores a damaged one, where stock VRPN drops the connection.
 template <wire::WireMessage M, class Use>
 int receiveMessage(const vrpn_HANDLERPARAM& p, Use&& use) {
   const wire::ByteView payload(reinterpret_cast<const std::byte*>(p.buffer),

@@ -1,10 +1,10 @@
-#include "vrpn/vrpn_Shared.h"
+#include "hapticd/vrpn/vrpn_Shared.h"
 
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <thread>
+
+#include "base/world.h"
 
 namespace {
 
@@ -50,7 +50,7 @@ timeval vrpn_MsecsTimeval(const double ms) {
   return fromMicroseconds(std::llround(ms * 1000));
 }
 void vrpn_SleepMsecs(double ms) {
-  std::this_thread::sleep_for(std::chrono::duration<double, std::milli>(ms));
+  hapticd::base::sleepFor(hapticd::base::toNanos(ms * 1e-3));
 }
 
 int vrpn_buffer(char** insert, vrpn_int32* left, const timeval t) {
@@ -78,7 +78,7 @@ int vrpn_buffer(char** insert, vrpn_int32* left, const char* text, vrpn_int32 le
 }
 
 int vrpn_unbuffer(const char** buffer, char* text, vrpn_int32 length) {
-  // As in VRPN, a negative length is the size of the room for text that ends with a NUL.
+  // As in VRPN, a negative length is the size of the buffer for text that ends with a NUL.
   const auto room = static_cast<std::size_t>(length < 0 ? -length : length);
   std::size_t size = room;
   if (length < 0) {

@@ -60,8 +60,8 @@ void DemoScene::upload(Client& client) const {
       std::vector<std::array<std::uint32_t, 3>> triangles(sheet.triangles.begin(), sheet.triangles.end());
       client.uploadMesh(object, {vertices, triangles});
       Surface surface{.stiffness = stiffness};
-      if (friction) surface.static_friction = static_cast<float>(kStaticFriction);
-      if (friction) surface.dynamic_friction = static_cast<float>(kDynamicFriction);
+      if (friction) surface.staticFriction = static_cast<float>(kStaticFriction);
+      if (friction) surface.dynamicFriction = static_cast<float>(kDynamicFriction);
       client.setSurface(object, surface);
     }
     client.setEffect(0, Effect::spring(kSpringTo_mm, kSpring_N_per_mm, kSpring_N));

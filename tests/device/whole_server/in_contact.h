@@ -47,7 +47,7 @@ class InContact : public testing::Test {
       if (right(tick)) return true;
       // What was first met in the depth is felt only when the hand has left.
       const bool released =
-          arm.force(tick).norm() < kNothing_N || visitor->client().latest().guard.latched != 0;
+          arm.force(tick).norm() < kNothing_N || !visitor->client().latest().guard.latched.empty();
       if (released || ++waited_ % 1000 == 0) arm->rest = -1;
       return false;
     })) << arm.left().transpose()

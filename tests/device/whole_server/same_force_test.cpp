@@ -247,12 +247,12 @@ TEST_F(SameForce, ReplayIsItsRecording) {
   double nearest = 1;
   for (base::Nanos at = 0; at < round; at += 1000) {
     const double distance = (recording->at(at).position_m - places[0]).norm();
-    if (distance < nearest) nearest = distance, begin = ticks[0].tick_time.count() - at;
+    if (distance < nearest) nearest = distance, begin = ticks[0].tickTime.count() - at;
   }
   double far_m = 0;
   double most_N = 0;
   for (std::size_t i = 0; i < ticks.size(); ++i) {
-    const Vec3 recorded = recording->at((ticks[i].tick_time.count() - begin) % round).position_m;
+    const Vec3 recorded = recording->at((ticks[i].tickTime.count() - begin) % round).position_m;
     far_m = std::max(far_m, (recorded - places[i]).norm());
     most_N = std::max(most_N, Vec3(ticks[i].force_N[0], ticks[i].force_N[1], ticks[i].force_N[2]).norm());
   }

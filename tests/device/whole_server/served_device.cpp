@@ -131,7 +131,7 @@ int ServerProcess::end() {
 }
 
 Visitor::Visitor(const std::string& address)
-    : client_("Phantom@tcp://" + address, {.connect_timeout = 60s, .reconnect = false}) {
+    : client_("Phantom@tcp://" + address, {.connectTimeout = 60s, .reconnect = false}) {
   client_.onText([this](const TextReport& report) { texts_.push_back(report.text); });
 }
 

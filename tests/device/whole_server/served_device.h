@@ -86,7 +86,7 @@ class Visitor {
   std::string texts() const;
   /// What was heard until now.
   void forget() { texts_.clear(); }
-  bool latched() const { return client_.latest().guard.latched != 0; }
+  bool latched() const { return !client_.latest().guard.latched.empty(); }
   /// Forces are armed, and nothing is latched; re-arms what a stalled machine has latched.
   bool untilReady();
 

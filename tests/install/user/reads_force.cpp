@@ -1,4 +1,4 @@
-// Connects, makes a floor, says what is felt first.
+// Connects, makes a floor, prints the first object that is touched.
 #include <hapticd/client.h>
 
 #include <cstdio>
@@ -9,8 +9,8 @@ int main(int, char** argv) try {
   hapticd::Client client(argv[1]);
   client.setSurface(0, {.stiffness = 0.8F});
   client.uploadMesh(0, {floor, triangles});
-  while (client.latest().touched_object.object < 0) client.poll(std::chrono::seconds(1));
-  std::printf("felt object %d\n", client.latest().touched_object.object);
+  while (client.latest().touchedObject.object < 0) client.poll(std::chrono::seconds(1));
+  std::printf("felt object %d\n", client.latest().touchedObject.object);
 } catch (const hapticd::Error& error) {
   std::printf("%s\n", error.what());
   return 1;

@@ -12,7 +12,7 @@ typedef struct _vrpn_TEXTCB {
 } vrpn_TEXTCB;
 typedef void(VRPN_CALLBACK* vrpn_TEXTHANDLER)(void* userdata, const vrpn_TEXTCB info);
 
-class vrpn_Text_Receiver : public vrpn_BaseClass {
+class VRPN_API vrpn_Text_Receiver : public vrpn_BaseClass {
  public:
   vrpn_Text_Receiver(const char* name, vrpn_Connection* connection = NULL);
 

@@ -1,4 +1,4 @@
-// VRPN's helpers for time, and for packing messages of one's own.
+// VRPN's functions for time, and for packing messages.
 #ifndef VRPN_SHARED_H
 #define VRPN_SHARED_H
 
@@ -19,21 +19,21 @@ inline int vrpn_gettimeofday(struct timeval* now, void* = nullptr) {
   return gettimeofday(now, nullptr);
 }
 
-/// With |tv_usec| below a million, and of the same sign as tv_sec.
-struct timeval vrpn_TimevalNormalize(const struct timeval& t);
-struct timeval vrpn_TimevalSum(const struct timeval& a, const struct timeval& b);
-struct timeval vrpn_TimevalDiff(const struct timeval& a, const struct timeval& b);
-struct timeval vrpn_TimevalScale(const struct timeval& t, double factor);
+/// With |tv_usec| below a million and of the sign of tv_sec.
+VRPN_API struct timeval vrpn_TimevalNormalize(const struct timeval& t);
+VRPN_API struct timeval vrpn_TimevalSum(const struct timeval& a, const struct timeval& b);
+VRPN_API struct timeval vrpn_TimevalDiff(const struct timeval& a, const struct timeval& b);
+VRPN_API struct timeval vrpn_TimevalScale(const struct timeval& t, double factor);
 /// Microseconds from start to end.
-unsigned long vrpn_TimevalDuration(struct timeval end, struct timeval start);
-double vrpn_TimevalDurationSeconds(struct timeval end, struct timeval start);
-bool vrpn_TimevalGreater(const struct timeval& a, const struct timeval& b);
-bool vrpn_TimevalEqual(const struct timeval& a, const struct timeval& b);
-double vrpn_TimevalMsecs(const struct timeval& t);
-struct timeval vrpn_MsecsTimeval(const double ms);
-void vrpn_SleepMsecs(double ms);
+VRPN_API unsigned long vrpn_TimevalDuration(struct timeval end, struct timeval start);
+VRPN_API double vrpn_TimevalDurationSeconds(struct timeval end, struct timeval start);
+VRPN_API bool vrpn_TimevalGreater(const struct timeval& a, const struct timeval& b);
+VRPN_API bool vrpn_TimevalEqual(const struct timeval& a, const struct timeval& b);
+VRPN_API double vrpn_TimevalMsecs(const struct timeval& t);
+VRPN_API struct timeval vrpn_MsecsTimeval(const double ms);
+VRPN_API void vrpn_SleepMsecs(double ms);
 
-/// Copies what fits, with a NUL in any case.
+/// Copies as much as fits; always terminated by a NUL.
 template <size_t N>
 void vrpn_strcpy(char (&to)[N], const char* from) {
   const size_t length = strnlen(from, N - 1);
@@ -41,7 +41,7 @@ void vrpn_strcpy(char (&to)[N], const char* from) {
   to[length] = '\0';
 }
 
-/// Appends a scalar, big endian, and moves on; -1 when it does not fit into what is left.
+/// Appends a scalar, big endian, and advances; -1 when fewer bytes are left.
 template <class T>
 int vrpn_buffer(char** insert, vrpn_int32* left, const T value) {
   static_assert(std::is_arithmetic<T>::value, "scalars only");
@@ -56,7 +56,7 @@ int vrpn_buffer(char** insert, vrpn_int32* left, const T value) {
   *left -= static_cast<vrpn_int32>(sizeof(T));
   return 0;
 }
-/// Takes a big-endian scalar and moves on.
+/// Reads a big-endian scalar and advances.
 template <class T>
 int vrpn_unbuffer(const char** buffer, T* value) {
   static_assert(std::is_arithmetic<T>::value, "scalars only");
@@ -69,10 +69,10 @@ int vrpn_unbuffer(const char** buffer, T* value) {
   *buffer += sizeof(T);
   return 0;
 }
-int vrpn_buffer(char** insert, vrpn_int32* left, const struct timeval t);
-int vrpn_unbuffer(const char** buffer, struct timeval* t);
-/// Text of a known length, or (-1) up to and with its NUL.
-int vrpn_buffer(char** insert, vrpn_int32* left, const char* text, vrpn_int32 length);
-int vrpn_unbuffer(const char** buffer, char* text, vrpn_int32 length);
+VRPN_API int vrpn_buffer(char** insert, vrpn_int32* left, const struct timeval t);
+VRPN_API int vrpn_unbuffer(const char** buffer, struct timeval* t);
+/// Text of the given length, or (-1) up to and including its NUL.
+VRPN_API int vrpn_buffer(char** insert, vrpn_int32* left, const char* text, vrpn_int32 length);
+VRPN_API int vrpn_unbuffer(const char** buffer, char* text, vrpn_int32 length);
 
 #endif

@@ -1,4 +1,4 @@
-// Dials that turn without end.
+// Dials without an end stop.
 #ifndef VRPN_DIAL_H
 #define VRPN_DIAL_H
 
@@ -13,12 +13,12 @@ typedef struct _vrpn_DIALCB {
 } vrpn_DIALCB;
 typedef void(VRPN_CALLBACK* vrpn_DIALCHANGEHANDLER)(void* userdata, const vrpn_DIALCB info);
 
-class vrpn_Dial : public vrpn_BaseClass {
+class VRPN_API vrpn_Dial : public vrpn_BaseClass {
  public:
   vrpn_Dial(const char* name, vrpn_Connection* connection = NULL) : vrpn_BaseClass(name, connection) {}
 };
 
-class vrpn_Dial_Remote : public vrpn_Dial {
+class VRPN_API vrpn_Dial_Remote : public vrpn_Dial {
  public:
   vrpn_Dial_Remote(const char* name, vrpn_Connection* connection = NULL);
 

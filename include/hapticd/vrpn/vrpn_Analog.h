@@ -13,7 +13,7 @@ typedef struct _vrpn_ANALOGCB {
 } vrpn_ANALOGCB;
 typedef void(VRPN_CALLBACK* vrpn_ANALOGCHANGEHANDLER)(void* userdata, const vrpn_ANALOGCB info);
 
-class vrpn_Analog : public vrpn_BaseClass {
+class VRPN_API vrpn_Analog : public vrpn_BaseClass {
  public:
   vrpn_Analog(const char* name, vrpn_Connection* connection = NULL) : vrpn_BaseClass(name, connection) {}
   vrpn_int32 getNumChannels() const { return num_channel; }
@@ -23,7 +23,7 @@ class vrpn_Analog : public vrpn_BaseClass {
   vrpn_int32 num_channel = 0;
 };
 
-class vrpn_Analog_Remote : public vrpn_Analog {
+class VRPN_API vrpn_Analog_Remote : public vrpn_Analog {
  public:
   vrpn_Analog_Remote(const char* name, vrpn_Connection* connection = NULL);
 

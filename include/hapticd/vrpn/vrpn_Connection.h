@@ -39,24 +39,25 @@ const vrpn_uint32 vrpn_CONNECTION_LOW_LATENCY = 1 << 2;
 const vrpn_uint32 vrpn_CONNECTION_FIXED_THROUGHPUT = 1 << 3;
 const vrpn_uint32 vrpn_CONNECTION_HIGH_THROUGHPUT = 1 << 4;
 
-extern const char* vrpn_got_first_connection;
-extern const char* vrpn_got_connection;
-extern const char* vrpn_dropped_connection;
-extern const char* vrpn_dropped_last_connection;
-extern const char* vrpn_CONTROL;
+extern VRPN_API const char* vrpn_got_first_connection;
+extern VRPN_API const char* vrpn_got_connection;
+extern VRPN_API const char* vrpn_dropped_connection;
+extern VRPN_API const char* vrpn_dropped_last_connection;
+extern VRPN_API const char* vrpn_CONTROL;
 
-class vrpn_Connection {
+class VRPN_API vrpn_Connection {
  public:
-  /// Opens a server: host, host:port, tcp://host:port. Prints what is wrong with it and stays unconnected.
+  /// Opens a server: host, host:port or tcp://host:port. Prints an error and stays unconnected when that
+  /// fails.
   explicit vrpn_Connection(const char* server);
   virtual ~vrpn_Connection();
   vrpn_Connection(const vrpn_Connection&) = delete;
   vrpn_Connection& operator=(const vrpn_Connection&) = delete;
 
-  /// Whether there is a connection, or one may still come.
+  /// Whether there is a connection, or attempts to connect continue.
   virtual vrpn_bool doing_okay() const;
   virtual vrpn_bool connected() const;
-  /// Sends, receives and calls handlers back; waits up to the timeout for something to arrive, or not at all.
+  /// Sends, receives and calls handlers; sleeps up to the timeout until something arrives, or not at all.
   virtual int mainloop(const struct timeval* timeout = NULL);
 
   virtual vrpn_int32 register_sender(const char* name);
@@ -70,18 +71,20 @@ class vrpn_Connection {
   virtual int send_pending_reports();
   virtual int time_since_connection_open(struct timeval* elapsed);
   virtual struct timeval get_time();
-  /// NULL for a number that stands for nothing.
+  /// NULL for an unknown number.
   virtual const char* sender_name(vrpn_int32 sender);
   virtual const char* message_type_name(vrpn_int32 type);
 
   void addReference();
   void removeReference();
-  /// Whether the connection goes with its last reference.
-  void setAutoDeleteStatus(bool value) { auto_delete_ = value; }
+  /// Whether the connection is deleted with its last reference.
+  void setAutoDeleteStatus(bool value) { autoDelete_ = value; }
 
-  // For the remote devices of this library.
+  // Not in VRPN: for the remote devices of this library.
   hapticd::client::Link* link() { return link_.get(); }
   vrpn_int32 registerDevice(const char* name);
+  /// Whether anything arrived from this sender on the present connection.
+  bool heard(vrpn_int32 sender) const;
 
  private:
   struct Handler {
@@ -100,19 +103,20 @@ class vrpn_Connection {
   struct timeval opened_;
   int references_ = 0;
   int calling_ = 0;
-  bool auto_delete_ = false;
+  bool autoDelete_ = false;
 };
 
-/// The connection to a server (what follows the last @ of the name), opened when it is not open yet. Log
-/// files are not written by this library.
-vrpn_Connection* vrpn_get_connection_by_name(const char* name, const char* local_in_logfile = NULL,
-                                             const char* local_out_logfile = NULL,
-                                             const char* remote_in_logfile = NULL,
-                                             const char* remote_out_logfile = NULL,
-                                             const char* NIC_address = NULL, bool force_reopen = false);
+/// The connection to a server (the part of the name behind the last @), opened unless it is open. This
+/// library writes no log files.
+VRPN_API vrpn_Connection* vrpn_get_connection_by_name(const char* name, const char* local_in_logfile = NULL,
+                                                      const char* local_out_logfile = NULL,
+                                                      const char* remote_in_logfile = NULL,
+                                                      const char* remote_out_logfile = NULL,
+                                                      const char* NIC_address = NULL,
+                                                      bool force_reopen = false);
 
-/// What precedes and what follows the @; the caller deletes[] it.
-char* vrpn_copy_service_name(const char* name);
-char* vrpn_copy_service_location(const char* name);
+/// The part before, or behind, the @; the caller releases it by delete[].
+VRPN_API char* vrpn_copy_service_name(const char* name);
+VRPN_API char* vrpn_copy_service_location(const char* name);
 
 #endif

@@ -59,12 +59,12 @@ typedef struct _vrpn_TRACKERWORKSPACECB {
 typedef void(VRPN_CALLBACK* vrpn_TRACKERWORKSPACECHANGEHANDLER)(void* userdata,
                                                                 const vrpn_TRACKERWORKSPACECB info);
 
-class vrpn_Tracker : public vrpn_BaseClass {
+class VRPN_API vrpn_Tracker : public vrpn_BaseClass {
  public:
   vrpn_Tracker(const char* name, vrpn_Connection* connection = NULL) : vrpn_BaseClass(name, connection) {}
 };
 
-class vrpn_Tracker_Remote : public vrpn_Tracker {
+class VRPN_API vrpn_Tracker_Remote : public vrpn_Tracker {
  public:
   vrpn_Tracker_Remote(const char* name, vrpn_Connection* connection = NULL);
 

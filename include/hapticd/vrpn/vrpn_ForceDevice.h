@@ -58,8 +58,8 @@ typedef struct _vrpn_ANGLECB {
 } vrpn_ANGLECB;
 typedef void(VRPN_CALLBACK* vrpn_ANGLEHANDLER)(void* userdata, const vrpn_ANGLECB info);
 
-/// What the device's own surface, force field and custom effect are set to before they are sent.
-class vrpn_ForceDevice : public vrpn_BaseClass {
+/// Surface, force field and custom effect of the device, as set before they are sent.
+class VRPN_API vrpn_ForceDevice : public vrpn_BaseClass {
  public:
   vrpn_ForceDevice(const char* name, vrpn_Connection* connection = NULL) : vrpn_BaseClass(name, connection) {}
 
@@ -112,7 +112,7 @@ class vrpn_ForceDevice : public vrpn_BaseClass {
   std::vector<vrpn_float32> customEffectParams;
 };
 
-class vrpn_ForceDevice_Remote : public vrpn_ForceDevice {
+class VRPN_API vrpn_ForceDevice_Remote : public vrpn_ForceDevice {
  public:
   vrpn_ForceDevice_Remote(const char* name, vrpn_Connection* connection = NULL);
 
@@ -160,7 +160,7 @@ class vrpn_ForceDevice_Remote : public vrpn_ForceDevice {
   void setHapticOrigin(vrpn_float32 position[3], vrpn_float32 axis[3], vrpn_float32 angle);
   void setHapticScale(vrpn_float32 scale);
   void setSceneOrigin(vrpn_float32 position[3], vrpn_float32 axis[3], vrpn_float32 angle);
-  vrpn_int32 getNewObjectID() { return next_object_id_++; }
+  vrpn_int32 getNewObjectID() { return nextObjectId_++; }
   void setObjectIsTouchable(vrpn_int32 object, vrpn_bool touchable = true);
   void setObjectTouchable(vrpn_int32 object, vrpn_bool touchable = true) {
     setObjectIsTouchable(object, touchable);
@@ -168,7 +168,7 @@ class vrpn_ForceDevice_Remote : public vrpn_ForceDevice {
   void useHcollide();
   void useGhost();
 
-  // Constraints are sent as force fields, so only one of the two can be active.
+  // Constraints are sent as force fields, so that only one of the two can be active.
   void enableConstraint(vrpn_int32 enable);
   void setConstraintMode(ConstraintGeometry mode);
   void setConstraintPoint(vrpn_float32 point[3]);
@@ -237,15 +237,15 @@ class vrpn_ForceDevice_Remote : public vrpn_ForceDevice {
   vrpn_Callback_List<vrpn_ISTOUCHINGCB> touchings_;
   vrpn_Callback_List<vrpn_TOUCHEDOBJECTCB> objects_;
   vrpn_Callback_List<vrpn_ANGLECB> angles_;
-  vrpn_int32 next_object_id_ = 1;
+  vrpn_int32 nextObjectId_ = 1;
   bool constrained_ = false;
-  ConstraintGeometry constraint_mode_ = POINT_CONSTRAINT;
-  vrpn_float32 constraint_point_[3] = {};
-  vrpn_float32 constraint_line_point_[3] = {};
-  vrpn_float32 constraint_line_direction_[3] = {};
-  vrpn_float32 constraint_plane_point_[3] = {};
-  vrpn_float32 constraint_plane_normal_[3] = {};
-  vrpn_float32 constraint_stiffness_ = 0;
+  ConstraintGeometry constraintMode_ = POINT_CONSTRAINT;
+  vrpn_float32 constraintPoint_[3] = {};
+  vrpn_float32 constraintLinePoint_[3] = {};
+  vrpn_float32 constraintLineDirection_[3] = {};
+  vrpn_float32 constraintPlanePoint_[3] = {};
+  vrpn_float32 constraintPlaneNormal_[3] = {};
+  vrpn_float32 constraintStiffness_ = 0;
 };
 
 #endif

@@ -1,4 +1,4 @@
-// What all devices have in common: a name on a connection, and text messages.
+// The base of all devices: a name on a connection, and text messages.
 #ifndef VRPN_BASECLASS
 #define VRPN_BASECLASS
 
@@ -16,8 +16,8 @@ const unsigned vrpn_MAX_TEXT_LEN = 1024;
 
 class vrpn_BaseClass;
 
-/// Prints the text messages of all devices, unless told not to.
-class vrpn_TextPrinter {
+/// Prints the text messages of all devices to standard output.
+class VRPN_API vrpn_TextPrinter {
  public:
   void set_min_level_to_print(vrpn_TEXT_SEVERITY severity, vrpn_uint32 level = 0);
   /// NULL prints nothing.
@@ -34,11 +34,11 @@ class vrpn_TextPrinter {
   vrpn_TEXT_SEVERITY severity_ = vrpn_TEXT_WARNING;
   vrpn_uint32 level_ = 0;
 };
-extern vrpn_TextPrinter& vrpn_System_TextPrinter;
+extern VRPN_API vrpn_TextPrinter& vrpn_System_TextPrinter;
 
-class vrpn_BaseClass {
+class VRPN_API vrpn_BaseClass {
  public:
-  /// Opens NAME@server, or the device NAME of the connection.
+  /// Opens NAME@server, or the device NAME of the given connection.
   vrpn_BaseClass(const char* name, vrpn_Connection* connection = NULL);
   virtual ~vrpn_BaseClass();
   vrpn_BaseClass(const vrpn_BaseClass&) = delete;
@@ -47,24 +47,24 @@ class vrpn_BaseClass {
   vrpn_Connection* connectionPtr() { return d_connection; }
   virtual void mainloop() = 0;
 
-  /// Whether to keep quiet about a server that does not answer.
+  /// Suppresses the warning about a server that does not answer.
   bool shutup = false;
 
  protected:
   friend class vrpn_TextPrinter;
 
-  // For device classes of one's own: init() calls both.
+  // For derived device classes: init() calls both.
   virtual int init();
   virtual int register_senders() { return 0; }
   virtual int register_types() { return 0; }
 
   int register_autodeleted_handler(vrpn_int32 type, vrpn_MESSAGEHANDLER handler, void* userdata,
                                    vrpn_int32 sender = vrpn_ANY_SENDER);
-  /// The same for a message of this device by name.
+  /// The same for a message of this device, by the name of the message.
   void listen(const char* type, vrpn_MESSAGEHANDLER handler);
   int send_text_message(const char* text, struct timeval time, vrpn_TEXT_SEVERITY severity = vrpn_TEXT_NORMAL,
                         vrpn_uint32 level = 0);
-  /// Runs the connection, and complains when the device is not heard.
+  /// Runs the connection, and prints a warning while the device does not answer.
   void client_mainloop();
 
   vrpn_Connection* d_connection;
@@ -84,14 +84,14 @@ class vrpn_BaseClass {
   static int VRPN_CALLBACK handleText(void* self, vrpn_HANDLERPARAM p);
 
   std::vector<Registered> registered_;
-  struct timeval silent_since_;
+  struct timeval silentSince_;
   int warned_s_ = 0;
 };
 typedef vrpn_BaseClass vrpn_BaseClassUnique;
 
-/// Handlers of one kind of report. They may unregister themselves and each other while being called.
+/// Handlers of one kind of report. A running handler may unregister itself and others.
 template <class Report>
-class vrpn_Callback_List {
+class VRPN_API vrpn_Callback_List {
  public:
   typedef void(VRPN_CALLBACK* HANDLER_TYPE)(void* userdata, const Report info);
 

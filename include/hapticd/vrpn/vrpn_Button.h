@@ -26,7 +26,7 @@ typedef struct _vrpn_BUTTONSTATECB {
 } vrpn_BUTTONSTATESCB;
 typedef void(VRPN_CALLBACK* vrpn_BUTTONSTATESHANDLER)(void* userdata, const vrpn_BUTTONSTATESCB info);
 
-class vrpn_Button : public vrpn_BaseClass {
+class VRPN_API vrpn_Button : public vrpn_BaseClass {
  public:
   vrpn_Button(const char* name, vrpn_Connection* connection = NULL) : vrpn_BaseClass(name, connection) {}
   virtual void set_momentary(vrpn_int32 button);
@@ -35,7 +35,7 @@ class vrpn_Button : public vrpn_BaseClass {
   virtual void set_all_toggle(vrpn_int32 state) { set_toggle(vrpn_ALL_ID, state); }
 };
 
-class vrpn_Button_Remote : public vrpn_Button {
+class VRPN_API vrpn_Button_Remote : public vrpn_Button {
  public:
   vrpn_Button_Remote(const char* name, vrpn_Connection* connection = NULL);
 

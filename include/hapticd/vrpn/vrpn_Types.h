@@ -1,4 +1,4 @@
-// VRPN's names for scalars that travel.
+// VRPN's names for the scalars of its messages.
 #ifndef VRPN_TYPES_H
 #define VRPN_TYPES_H
 

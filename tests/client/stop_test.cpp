@@ -1,0 +1,85 @@
+// A stop that must not wait behind what the same client has sent.
+#include "client/client_tests.h"
+
+namespace hapticd::test {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+
+ScriptedServerOptions able() {
+  ScriptedServerOptions options;
+  options.capabilities = allCapabilities();
+  return options;
+}
+
+std::size_t stops(const std::vector<Received>& received) {
+  return static_cast<std::size_t>(std::count_if(received.begin(), received.end(), [](const Received& r) {
+    return r.message.as<wire::StopForces>() != nullptr;
+  }));
+}
+
+constexpr int kVertices = 400'000;  // 19 MB: more than the socket buffers of both sides hold
+
+/// Makes the server stop reading, and fills the stream of the client until its own queue holds bytes.
+void backUp(ScriptedServer& server, Client& client) {
+  ASSERT_TRUE(client.waitCapabilities());
+  server.stopReading();
+  for (int i = 0; i < kVertices; ++i) client.setVertex(0, i, 0, 0, 0);
+  client.flush();
+  ASSERT_LT(client.statistics().tcpBytesOut, static_cast<std::uint64_t>(kVertices) * 48) << "nothing waits";
+}
+
+TEST(Stop, ItOvertakesABackedUpStreamByASecondConnection) {
+  ScriptedServer server(able());
+  Client client(server.tcpName(), {.queueLimit_bytes = 64 * 1024 * 1024});
+  backUp(server, client);
+  client.stopForces();
+  const auto received = server.waitReceived(1);
+  ASSERT_EQ(received.size(), 1U) << "the first connection is not read";
+  EXPECT_TRUE(is(received[0], wire::StopForces{}));
+  EXPECT_EQ(received[0].sender, "Phantom");
+  EXPECT_EQ(server.connections(), 2U);
+  EXPECT_EQ(client.statistics().connections, 1U) << "of the client's own stream";
+
+  client.rearmForces();
+  server.startReading();
+  client.flushAll();
+  const auto all = server.waitReceived(3);
+  ASSERT_EQ(all.size(), 3U);
+  EXPECT_EQ(stops(all), 2U);
+  EXPECT_TRUE(is(all[2], wire::RearmForces{})) << "behind both stops";
+  EXPECT_EQ(server.openConnections(), 1U) << "the second one is closed";
+}
+
+TEST(Stop, TheSecondConnectionIsNotNeededWhileNothingWaits) {
+  ScriptedServer server(able());
+  Client client(server.tcpName());
+  client.stopForces();
+  EXPECT_EQ(server.waitReceived(1).size(), 1U);
+  EXPECT_EQ(server.connections(), 1U);
+}
+
+TEST(Stop, AReverseConnectionIsOvertakenToo) {
+  ScriptedServer server(able());
+  Client client(server.name(), {.queueLimit_bytes = 64 * 1024 * 1024});
+  backUp(server, client);
+  client.stopForces();
+  EXPECT_EQ(stops(server.waitReceived(1)), 1U);
+  EXPECT_EQ(server.connections(), 2U);
+}
+
+TEST(Stop, WithoutAConfirmationItThrowsAndKeepsTheFirstStop) {
+  ScriptedServer server(able());
+  Client client(server.tcpName(), {.connectTimeout = 1s, .queueLimit_bytes = 64 * 1024 * 1024});
+  server.ignorePings();
+  backUp(server, client);
+  EXPECT_THAT(textOf<ConnectError>([&] { client.stopForces(); }),
+              HasSubstr("stop not confirmed: it waits behind"));
+  server.startReading();
+  client.flushAll();
+  EXPECT_EQ(stops(server.waitReceived(2)), 2U);
+}
+
+}  // namespace
+}  // namespace hapticd::test
