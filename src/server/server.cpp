@@ -8,6 +8,7 @@
 
 #include "base/world.h"
 #include "realtime/servo/thread_setup.h"
+#include "server/session/refusal_codes.h"
 #include "wire/udp_request.h"
 
 namespace hapticd::server {
@@ -431,7 +432,7 @@ bool Server::mayCommand(Session& session, Station& station, const wire::MessageR
   if (std::exchange(refused_, session.id()) != session.id()) {
     session.send(message.local_sender,
                  wire::Text{.severity = wire::kTextError,
-                            .level = 0,
+                            .level = static_cast<std::uint32_t>(RefusalCode::notPermitted),
                             .text = std::string(wire::info(message.kind).name) + " refused: " + reason});
   }
   return false;

@@ -6,6 +6,7 @@
 
 #include "running_server.h"
 #include "scripted_peer.h"
+#include "server/session/refusal_codes.h"
 
 namespace hapticd::test {
 namespace {
@@ -91,6 +92,7 @@ TEST_F(ControlTest, OnlyOneHoldsTheHandAndItGoesWhereItIsHeld) {
   ASSERT_TRUE(other->until([&] { return isAt(0.03, 0.02, 0.01); }));
   hold(*other, 0, 0, 0);
   EXPECT_TRUE(other->untilText("holds the hand"));
+  EXPECT_EQ(other->texts().back().level, static_cast<std::uint32_t>(server::RefusalCode::handHeldByOther));
   holder->close();
   holder.reset();
   ASSERT_TRUE(other->until([&] {
@@ -135,6 +137,7 @@ TEST_F(ControlTest, OnlyTheFirstCommandsUntilItLeaves) {
   ASSERT_TRUE(first->untilNext<wire::Pong>());
   second->send(kUp);
   ASSERT_TRUE(second->untilText("vrpn_ForceDevice Force_Field refused: client"));
+  EXPECT_EQ(second->texts().back().level, static_cast<std::uint32_t>(server::RefusalCode::notPermitted));
   second->send(wire::StopForces{});  // anybody may
   ASSERT_TRUE(first->until([&] { return lastGuard(*first).stopped == 1; }));
   second->send(wire::RearmForces{});

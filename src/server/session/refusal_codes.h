@@ -3,18 +3,26 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
 #include <string_view>
 
 namespace hapticd::server {
 
-/// Travels in the `level` field of a text_message, so that a client need not parse the text. Stock VRPN servers and all
-/// other texts have level 0. Numbers never change their meaning; new ones are appended. docs/wire-extensions.md lists them.
+/// Travels in the `level` field of a text_message, so that a client need not parse the text. All other texts of this server
+/// have level 0; a stock VRPN server may send any level. Numbers never change their meaning; new ones are appended.
+/// docs/wire-extensions.md lists them.
 enum class RefusalCode : std::uint32_t {
   none = 0,              ///< not a refusal, or one without a code
   notPermitted = 1,      ///< the client's role, or a replayed recording, permits no commands
   handNotSimulated = 2,  ///< Hold_Hand: the device is real
   handHeldByOther = 3,   ///< Hold_Hand: another client holds the simulated hand
   handPoseInvalid = 4,   ///< Hold_Hand: position or orientation is not finite, or the quaternion is zero
+};
+
+/// Why one command was refused.
+struct Refusal {
+  RefusalCode code = RefusalCode::none;
+  std::string text;
 };
 
 struct RefusalInfo {

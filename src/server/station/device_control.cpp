@@ -21,15 +21,17 @@ bool finite(const wire::HoldHand& m) {
 }  // namespace
 
 bool DeviceControl::hold(scene::ClientId client, const wire::HoldHand& wanted,
-                         const realtime::TickReport& last, std::string& error) {
+                         const realtime::TickReport& last, Refusal& refusal) {
   if (hand_ == nullptr) {
-    error = "Hold_Hand refused: this is a real device, only a simulated hand can be held";
+    refusal = {RefusalCode::handNotSimulated,
+               "Hold_Hand refused: this is a real device, only a simulated hand can be held"};
     return false;
   }
   if (holder_ && *holder_ != client) {
     // Letting go of what one does not hold is no mistake worth a word.
     if (wanted.hold == 0) return true;
-    error = "Hold_Hand refused: client " + std::to_string(*holder_) + " holds the hand";
+    refusal = {RefusalCode::handHeldByOther,
+               "Hold_Hand refused: client " + std::to_string(*holder_) + " holds the hand"};
     return false;
   }
   if (wanted.hold == 0) {
@@ -37,13 +39,14 @@ bool DeviceControl::hold(scene::ClientId client, const wire::HoldHand& wanted,
     return true;
   }
   if (!finite(wanted)) {
-    error = "Hold_Hand refused: position or orientation is not finite";
+    refusal = {RefusalCode::handPoseInvalid, "Hold_Hand refused: position or orientation is not finite"};
     return false;
   }
   const Quat orientation(wanted.orientation[3], wanted.orientation[0], wanted.orientation[1],
                          wanted.orientation[2]);
   if (orientation.norm() < 1e-6) {
-    error = "Hold_Hand refused: the orientation is a zero quaternion; 0 0 0 1 is no turn";
+    refusal = {RefusalCode::handPoseInvalid,
+               "Hold_Hand refused: the orientation is a zero quaternion; 0 0 0 1 is no rotation"};
     return false;
   }
   device::HandPose pose;

@@ -9,6 +9,7 @@
 #include "realtime/servo/guard_control.h"
 #include "realtime/servo/report.h"
 #include "scene/notice.h"
+#include "server/session/refusal_codes.h"
 #include "wire/messages.h"
 
 namespace hapticd::server {
@@ -38,9 +39,9 @@ class DeviceControl {
   bool canBeHeld() const noexcept { return hand_ != nullptr; }
   /// Who holds the hand.
   const std::optional<scene::ClientId>& holder() const noexcept { return holder_; }
-  /// Moves the hand's target, or lets go. False when refused; `error` then says why.
+  /// Moves the hand's target, or lets go. False when refused; `refusal` then has code and text.
   bool hold(scene::ClientId client, const wire::HoldHand& wanted, const realtime::TickReport& last,
-            std::string& error);
+            Refusal& refusal);
   void clientGone(scene::ClientId client);
 
  private:

@@ -126,9 +126,11 @@ void Station::Impl::rearm(Session& session, wire::LocalSender name, base::Nanos 
 }
 
 void Station::Impl::on(const Request& request, const wire::HoldHand& wanted) {
-  std::string error;
-  if (!control.hold(request.session.id(), wanted, outbox.last(), error))
-    sendText(request.session, request.name, wire::kTextError, error);
+  Refusal refusal;
+  if (control.hold(request.session.id(), wanted, outbox.last(), refusal)) return;
+  request.session.send(request.name, wire::Text{.severity = wire::kTextError,
+                                                .level = static_cast<std::uint32_t>(refusal.code),
+                                                .text = refusal.text});
 }
 
 void Station::onReset() {

@@ -99,37 +99,40 @@ class HoldTest : public ::testing::Test {
   DeviceControl control_{guard_, &hand_, hand_.profile().workspace_m};
   realtime::TickReport last_;
   base::Nanos now_ = 0;
-  std::string error_;
+  Refusal refusal_;
 };
 
 TEST_F(HoldTest, TheHandGoesWhereItsHolderWantsAndBackWhenLetGo) {
   hand_.open();
-  ASSERT_TRUE(control_.hold(1, {.hold = 1, .position = {110, 20, 0}}, last_, error_)) << error_;
+  ASSERT_TRUE(control_.hold(1, {.hold = 1, .position = {110, 20, 0}}, last_, refusal_)) << refusal_.text;
   EXPECT_NEAR((handLater() - Vec3(0.01, 0.02, 0)).norm(), 0, 1e-4);
-  EXPECT_FALSE(control_.hold(2, {.hold = 1, .position = {0, 0, 0}}, last_, error_));
-  EXPECT_NE(error_.find("client 1 holds the hand"), std::string::npos);
-  EXPECT_TRUE(control_.hold(2, {.hold = 0}, last_, error_));  // no effect
+  EXPECT_FALSE(control_.hold(2, {.hold = 1, .position = {0, 0, 0}}, last_, refusal_));
+  EXPECT_EQ(refusal_.code, RefusalCode::handHeldByOther);
+  EXPECT_NE(refusal_.text.find("client 1 holds the hand"), std::string::npos);
+  EXPECT_TRUE(control_.hold(2, {.hold = 0}, last_, refusal_));  // no effect
   EXPECT_NEAR((handLater() - Vec3(0.01, 0.02, 0)).norm(), 0, 1e-4);
   control_.clientGone(1);
   EXPECT_NEAR(handLater().norm(), 0, 1e-4);  // rests at the centre
-  EXPECT_TRUE(control_.hold(2, {.hold = 1, .position = {100, 0, 10}}, last_, error_));
+  EXPECT_TRUE(control_.hold(2, {.hold = 1, .position = {100, 0, 10}}, last_, refusal_));
   EXPECT_NEAR((handLater() - Vec3(0, 0, 0.01)).norm(), 0, 1e-4);
 }
 
 TEST_F(HoldTest, NoHandReachesBeyondItsArm) {
   hand_.open();
-  ASSERT_TRUE(control_.hold(1, {.hold = 1, .position = {100, 20000, 0}}, last_, error_));
+  ASSERT_TRUE(control_.hold(1, {.hold = 1, .position = {100, 20000, 0}}, last_, refusal_));
   EXPECT_NEAR((handLater() - Vec3(0, hand_.profile().workspace_m.max.y(), 0)).norm(), 0, 1e-4);
 }
 
 TEST_F(HoldTest, RefusesWhatIsNoPoseAndRealDevices) {
-  EXPECT_FALSE(control_.hold(1, {.hold = 1, .position = {NAN, 0, 0}}, last_, error_));
-  EXPECT_FALSE(control_.hold(1, {.hold = 1, .orientation = {0, 0, 0, 0}}, last_, error_));
-  EXPECT_NE(error_.find("zero quaternion"), std::string::npos);
+  EXPECT_FALSE(control_.hold(1, {.hold = 1, .position = {NAN, 0, 0}}, last_, refusal_));
+  EXPECT_EQ(refusal_.code, RefusalCode::handPoseInvalid);
+  EXPECT_FALSE(control_.hold(1, {.hold = 1, .orientation = {0, 0, 0, 0}}, last_, refusal_));
+  EXPECT_NE(refusal_.text.find("zero quaternion"), std::string::npos);
   DeviceControl real(guard_, nullptr, {});
   EXPECT_FALSE(real.canBeHeld());
-  EXPECT_FALSE(real.hold(1, {.hold = 1}, last_, error_));
-  EXPECT_NE(error_.find("real device"), std::string::npos);
+  EXPECT_FALSE(real.hold(1, {.hold = 1}, last_, refusal_));
+  EXPECT_EQ(refusal_.code, RefusalCode::handNotSimulated);
+  EXPECT_NE(refusal_.text.find("real device"), std::string::npos);
 }
 
 class BlackBoxFilesTest : public ::testing::Test {

@@ -207,6 +207,11 @@ test("Contacts, Guard_State and texts are read", () => {
   );
   assert.ok(decoded.length > 0);
   for (const { severity, text } of decoded) assert.ok(severity <= 2 && /^[ -~]+$/.test(text), text);
+  const refusal = new DataView(new ArrayBuffer(8 + 1024));
+  refusal.setUint32(0, 2);
+  refusal.setUint32(4, 3);
+  "no".split("").forEach((c, i) => refusal.setUint8(8 + i, c.charCodeAt(0)));
+  assert.deepEqual(wire.decodeText(refusal), { severity: 2, level: 3, text: "no" });
 });
 
 test("hand, subscription and meshes are written to the byte", () => {
