@@ -36,14 +36,14 @@ class ReporterTest : public ::testing::Test {
   std::vector<M> said() const {
     std::vector<M> found;
     for (const Outgoing& out : out_) {
-      if (const M* m = std::get_if<M>(&out.message)) found.push_back(*m);
+      if (const M* m = out.message.as<M>()) found.push_back(*m);
     }
     return found;
   }
   template <class M>
   bool reliably() const {
     for (const Outgoing& out : out_) {
-      if (std::holds_alternative<M>(out.message)) return out.reliable;
+      if (out.message.as<M>() != nullptr) return out.reliable;
     }
     return false;
   }
