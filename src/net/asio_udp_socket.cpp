@@ -183,7 +183,7 @@ class AsioUdpSocket final : public UdpSocket::Impl, public std::enable_shared_fr
 
   AsioLoop& loop_;
   udp::socket socket_;
-  // Shared so that a callback that destroys its socket goes on running on living captures.
+  // Shared, so that the captures of a callback outlive a socket that it destroys.
   std::shared_ptr<UdpHandlers> handlers_;
   Endpoint local_;
   UdpStatistics statistics_;

@@ -19,15 +19,15 @@
 
 namespace hapticd::net {
 
-/// The bounds of a connection; with zero timeouts a lost peer is noticed when the system gives up, after a
-/// quarter of an hour.
+/// The bounds of a connection. With zero timeouts a lost peer is noticed only when the system gives up, after about 15
+/// minutes.
 struct ConnectionOptions {
   /// Queued bytes above which low-latency buffers are dropped.
   std::size_t lowMarkBytes = std::size_t{256} * 1024;
-  /// Queued reliable bytes above which the connection is ended: its peer does not read.
+  /// Queued reliable bytes above which the connection ends: its peer does not read.
   std::size_t hardLimitBytes = std::size_t{8} * 1024 * 1024;
-  /// How long the peer may leave unacknowledged what should be before it counts as lost. A peer whose program
-  /// stops reading acknowledges all the same, and stays.
+  /// Time without an acknowledgement that is due, after which the peer counts as lost. A peer whose program stops reading
+  /// still acknowledges, so it is not lost.
   std::chrono::milliseconds lossTimeout{0};
   /// Silence after which, and interval at which, an idle peer is probed (TCP keep-alive).
   std::chrono::seconds keepAlive{0};
@@ -37,28 +37,28 @@ struct ConnectionOptions {
   int sendBufferBytes = 0;
 };
 
-/// What a connection tells its owner; any may be empty.
+/// Callbacks of a connection; any may be empty.
 struct ConnectionHandlers {
   /// An outgoing connection is established.
   std::function<void()> onConnected = {};
-  /// Bytes came (up to 256 KiB, valid during the call only). An exception ends the connection.
+  /// Bytes received (up to 256 KiB, valid during the call only). An exception ends the connection.
   std::function<void(std::span<const std::byte>)> onBytes = {};
-  /// The queue is empty again after the system had refused a part of it.
+  /// The queue is empty again after the system had not accepted all of it.
   std::function<void()> onDrained = {};
   /// While reading is paused: the peer has ended, reset or lost the connection, perhaps behind bytes that wait to be
   /// read. Called at most once, within 50 ms of the event's arrival. The connection stays: abort() it, or
   /// resumeReading() to read the rest up to onClosed. An end that the peer sent behind more bytes than the system
   /// takes while nobody reads (about 3 MiB) arrives only after reading.
   std::function<void(const std::string& reason)> onPeerGone = {};
-  /// The connection is over: called once, whoever ended it, with the reason; then nothing more comes.
+  /// The connection has ended: called once, whichever side ended it, with the reason. No callback follows.
   std::function<void(const std::string&)> onClosed = {};
 };
 
-/// Counts since the start of the connection, and what waits now.
+/// Counts since the start of the connection, and the current queues.
 struct ConnectionStatistics {
   std::uint64_t bytesIn = 0;
   std::uint64_t bytesOut = 0;        ///< handed to the system
-  std::uint64_t droppedBuffers = 0;  ///< low-latency buffers that a slow peer never got
+  std::uint64_t droppedBuffers = 0;  ///< low-latency buffers dropped because the peer is slow
   std::uint64_t droppedBytes = 0;
   std::size_t queuedBytes = 0;          ///< waiting here
   std::size_t unacknowledgedBytes = 0;  ///< with the system, not yet acknowledged by the peer (SIOCOUTQ)
@@ -76,16 +76,16 @@ class Connection {
   Connection& operator=(Connection&& other) noexcept;
   ~Connection();
 
-  /// Begins to connect and returns at once; onConnected or onClosed ("cannot connect to ...") follows. What
-  /// is sent meanwhile is queued.
+  /// Starts to connect and returns at once; onConnected or onClosed ("cannot connect to ...") follows. Sends are queued
+  /// until then.
   [[nodiscard]] static Connection connect(Loop& loop, const Endpoint& peer, std::chrono::milliseconds timeout,
                                           const ConnectionOptions& options = {});
 
-  /// Sets the callbacks and begins to read; nothing is read before.
+  /// Sets the callbacks and starts reading.
   void start(ConnectionHandlers handlers);
 
   explicit operator bool() const noexcept { return impl_ != nullptr; }
-  /// Whether what is sent may still reach the peer (also while connecting).
+  /// Whether sent bytes may still reach the peer (also while connecting).
   bool isOpen() const noexcept;
 
   /// Queues a buffer that may be shared with other connections; ignored when not open. Ends the connection
@@ -93,29 +93,28 @@ class Connection {
   void send(std::shared_ptr<const Buffer> buffer, Delivery delivery = Delivery::reliable);
   /// Queues a copy of the bytes.
   void send(std::span<const std::byte> bytes, Delivery delivery = Delivery::reliable);
-  /// Writes what is queued, now; the rest follows by itself when the peer reads.
+  /// Writes the queue now; the rest follows by itself when the peer reads.
   void flush();
 
-  /// Ends the connection after what is queued has been sent, within closeTimeout; what still comes is
-  /// ignored.
+  /// Ends the connection after the queue has been sent, within closeTimeout; received bytes are ignored.
   void close(std::string reason);
-  /// Ends the connection at once by a reset; what is queued is lost.
+  /// Ends the connection at once by a reset; the queue is lost.
   void abort(std::string reason);
 
   /// Stops reading, so that TCP holds the peer back. The end of the peer is reported by onPeerGone; onClosed follows
   /// only after resumeReading() and after all that the peer sent, although isOpen() may be false before.
   void pauseReading();
-  /// Goes on reading.
+  /// Resumes reading.
   void resumeReading();
 
   /// Changes lossTimeout and keepAlive of ConnectionOptions.
   void setLossDetection(std::chrono::milliseconds lossTimeout, std::chrono::seconds keepAlive);
 
-  /// Both ends; still known after the end of the connection.
+  /// Both addresses; valid after the end of the connection, too.
   const Endpoint& local() const noexcept;
   const Endpoint& remote() const noexcept;
   ConnectionStatistics statistics() const;
-  /// The socket, for options that this class does not know; -1 when closed.
+  /// The socket, for options that this class does not cover; -1 when closed or simulated.
   int nativeHandle() const noexcept;
 
  private:

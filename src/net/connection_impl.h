@@ -1,11 +1,11 @@
-// What every kind of connection does behind Connection: a TCP one, or a WebSocket on top of one.
+// The interface behind Connection: implemented by TCP, by a WebSocket on top of it, and by simulated networks.
 #pragma once
 
 #include "net/connection.h"
 
 namespace hapticd::net {
 
-/// See Connection for what each call means. Lives on the heap: pending operations may outlive the owner.
+/// Connection documents each call. Lives on the heap: pending operations may outlive the owner.
 class Connection::Impl {
  public:
   virtual ~Impl() = default;

@@ -1,4 +1,4 @@
-// Names of places on an IPv4 network, and the one error type of this room.
+// IPv4 addresses, and the error type of this room.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace hapticd::net {
 
-/// A socket or a name could not be had; what() names the address and, where there is one, the remedy.
+/// A socket could not be opened or a name not resolved; what() names the address and, where there is one, the remedy.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -74,7 +74,7 @@ void HttpConnection::readOn() {
     parser_->header_limit(static_cast<std::uint32_t>(options_.headerBytes));
     parser_->body_limit(options_.bodyBytes);
     parser_->eager(true);
-    limit(options_.requestTimeout, "the request did not end in time");
+    limit(options_.requestTimeout, "the request was not complete in time");
   }
   parse();
 }
@@ -84,7 +84,7 @@ void HttpConnection::parse() {
   const std::size_t used = parser_->put(boost::asio::buffer(input_), error);
   input_.erase(0, used);
   if (error == http::error::need_more) {
-    // The parser counts only what it has consumed, and that is nothing until a header is whole.
+    // The parser counts only consumed bytes, and consumes nothing until a header line is complete.
     if (input_.size() > options_.headerBytes) refuse(431, "the header of the request is too long");
   } else if (error == http::error::header_limit) {
     refuse(431, "the header of the request is too long");
@@ -120,7 +120,7 @@ void HttpConnection::ask() {
   onRequest_(request, HttpReply(weak_from_this(), request_));
 }
 
-// What follows a request that was not understood has no beginning.
+// After a malformed request the start of the next one is unknown.
 void HttpConnection::refuse(int status, std::string_view text) {
   state_ = State::answering;
   keepAlive_ = false;
@@ -149,7 +149,7 @@ void HttpConnection::sendHead(const HttpResponse& response) {
   connection_.send(std::as_bytes(std::span(head)));
 }
 
-// In pieces, each once the one before is with the system: a slow client costs no more memory than one.
+// In pieces, each after the system has accepted the previous one: a slow client costs the memory of one piece.
 void HttpConnection::sendBody() {
   constexpr std::size_t kPiece = std::size_t{256} * 1024;
   while (state_ == State::answering && body_) {
@@ -157,7 +157,7 @@ void HttpConnection::sendBody() {
     if (size > 0) connection_.send(std::span(*body_).subspan(bodySent_, size));
     bodySent_ += size;
     connection_.flush();
-    // Reading is paused, so that nothing else would tell of a client that is gone.
+    // Reading is paused, so this is the only place that notices a client that is gone.
     if (!connection_.isOpen()) return connection_.abort("the client is gone");
     if (connection_.statistics().queuedBytes > 0)
       return limit(options_.answerTimeout, "the answer is not read");
@@ -176,7 +176,7 @@ void HttpConnection::answered() {
   state_ = State::idle;
   limit(options_.idleTimeout, "no request in time");
   connection_.resumeReading();
-  // Not from here: a client that sends thousands of requests at once waits in line with everybody else.
+  // Posted: a client that pipelines thousands of requests must not starve the others.
   if (input_.empty()) return;
   loop_.post([weak = weak_from_this()] {
     if (const auto self = weak.lock()) self->readOn();

@@ -15,12 +15,12 @@ namespace hapticd::net {
 // idle -> receiving (the first bytes of a request) -> answering (until the client has it) -> idle.
 class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
  public:
-  /// `onGone` is called once, when nothing more will come of this.
+  /// `onGone` is called once, when this object is finished.
   HttpConnection(Loop& loop, Connection connection, const HttpOptions& options,
                  const HttpServer::Handler& onRequest, std::function<void(HttpConnection*)> onGone);
 
   void start();
-  /// Answers the request of that number, if it is the one that waits.
+  /// Answers the request with that number if it is the pending one.
   void answer(std::uint64_t request, HttpResponse response);
 
  private:

@@ -1,4 +1,4 @@
-// A request and its answer, as values.
+// A request and its response, as values.
 #pragma once
 
 #include <functional>
@@ -16,7 +16,7 @@ namespace hapticd::net {
 struct HttpRequest {
   std::string method;                                        ///< as sent: "GET"
   std::string target;                                        ///< as sent: "/api/mesh?scene=0"
-  std::vector<std::pair<std::string, std::string>> headers;  ///< names in lower case, in the order they came
+  std::vector<std::pair<std::string, std::string>> headers;  ///< names in lower case, in order of arrival
   std::string body;
   Endpoint local;
   Endpoint remote;
@@ -27,11 +27,11 @@ struct HttpRequest {
     const std::string_view all = target;
     return all.substr(0, all.find('?'));
   }
-  /// The value of "name=value" behind the question mark, as sent.
+  /// The value of "name=value" after the question mark, as sent.
   std::optional<std::string_view> parameter(std::string_view name) const;
-  /// How often a header came, by its name in lower case.
+  /// Number of headers with this name (lower case).
   std::size_t count(std::string_view name) const;
-  /// The first of that name; empty when there is none.
+  /// The first header with this name; empty when there is none.
   std::string_view header(std::string_view name) const;
 };
 
@@ -40,7 +40,7 @@ struct HttpResponse {
   std::string contentType = "text/plain; charset=utf-8";
   std::vector<std::pair<std::string, std::string>> headers;  ///< besides Content-Type and -Length
   std::shared_ptr<const Buffer> body;                        ///< shared: never copied as a whole
-  /// Takes the connection when the request wants a WebSocket; the rest of the response is then not sent.
+  /// Takes the connection when the request wants a WebSocket; the rest of the response is then ignored.
   std::function<void(Connection)> onWebSocket;
 
   /// A response with a text.

@@ -1,7 +1,7 @@
 // A small HTTP/1.1 server: requests by callback, answers now or later, WebSockets as Connections.
 //
 // Bounded: in connections, in the size of a request, and in the time that a client may take to send one or to
-// read the answer. One request at a time is read from each connection.
+// read the answer. Each connection is read one request at a time.
 #pragma once
 
 #include <chrono>
@@ -15,7 +15,7 @@
 namespace hapticd::net {
 
 struct HttpOptions {
-  std::size_t connections = 64;  ///< at once; WebSockets are not counted, they belong to who took them
+  std::size_t connections = 64;  ///< at once; WebSockets are not counted, they belong to their owners
   std::size_t headerBytes = 8192;
   std::size_t bodyBytes = 4096;
   std::chrono::milliseconds requestTimeout{10000};  ///< from the first byte of a request to its last
@@ -26,8 +26,8 @@ struct HttpOptions {
 
 class HttpConnection;
 
-/// The way back to whoever asked; copies are the same one. Answers once, in the loop's thread; what comes
-/// after the connection has ended is dropped.
+/// Answers one request, once, in the loop's thread; copies refer to the same request. An answer after the end of the
+/// connection is dropped.
 class HttpReply {
  public:
   HttpReply(std::weak_ptr<HttpConnection> connection, std::uint64_t request)
@@ -39,7 +39,7 @@ class HttpReply {
   std::uint64_t request_;
 };
 
-/// Listens from construction to destruction. Answers what is no HTTP by itself, with a status and a sentence.
+/// Listens from construction to destruction. Answers malformed requests itself, with a status and a text.
 class HttpServer {
  public:
   using Handler = std::function<void(const HttpRequest&, const HttpReply&)>;
@@ -54,7 +54,7 @@ class HttpServer {
   HttpServer& operator=(const HttpServer&) = delete;
 
   const Endpoint& local() const noexcept;
-  /// Open now, without WebSockets.
+  /// Open connections, without WebSockets.
   std::size_t connections() const noexcept;
 
  private:

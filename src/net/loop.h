@@ -15,7 +15,7 @@
 
 namespace hapticd::net {
 
-/// A timer or watch that lives as long as this handle; destroying it, even in its own callback, cancels it.
+/// Owns a timer or watch; destroying the handle, even in its own callback, cancels it.
 class Subscription {
  public:
   class State;
@@ -45,30 +45,30 @@ class Loop {
   Loop(const Loop&) = delete;
   Loop& operator=(const Loop&) = delete;
 
-  /// Handles events in the calling thread until stop(); a stop() that came before makes it return at once.
+  /// Handles events in the calling thread until stop(); returns at once after an earlier stop().
   void run();
   /// Handles events for the whole duration (or until stop()), sleeping in between.
   void runFor(Duration duration);
   /// Waits up to the timeout for a first event, handles it and those ready by then (a bounded number), and
-  /// returns how many; 0 means that nothing happened. A zero timeout polls.
+  /// returns their number. A zero timeout polls.
   std::size_t runOnce(Duration timeout);
-  /// Makes the current or next run return; from any thread.
+  /// Makes the current or next run return. From any thread.
   void stop();
 
-  /// Runs the function in the loop's thread, in the order of the calls; from any thread.
+  /// Runs the function in the loop's thread, in the order of the calls. From any thread.
   void post(std::function<void()> function);
 
   /// Calls the function once after the delay.
   [[nodiscard]] Subscription after(Duration delay, std::function<void()> function);
   /// Calls the function each period without drift; periods missed by a late loop are skipped.
   [[nodiscard]] Subscription every(Duration period, std::function<void()> function);
-  /// Calls the function whenever the descriptor is readable, again and again until the function has read what
-  /// is there (see drainEventFd). The caller keeps the descriptor; nothing is allocated per wake. Throws
+  /// Calls the function repeatedly while the descriptor is readable; the function reads what is there (see
+  /// drainEventFd). The caller keeps the descriptor; nothing is allocated per wake. Throws
   /// Error for descriptors that cannot be polled.
   [[nodiscard]] Subscription watchFd(int fd, std::function<void()> function);
 
-  /// Takes the text of exceptions that belong to no connection, in the loop's thread; standard error until
-  /// set.
+  /// Receives the text of exceptions that belong to no connection, in the loop's thread; until it is set, they go to
+  /// standard error.
   void setErrorHandler(std::function<void(std::string_view)> handler);
 
   /// What a Network implements; for this room only.
@@ -79,7 +79,7 @@ class Loop {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Reads an eventfd made with EFD_NONBLOCK back to zero and returns what it held (0: nothing was posted).
+/// Reads an eventfd made with EFD_NONBLOCK back to zero and returns its value (0: nothing was posted).
 std::uint64_t drainEventFd(int fd) noexcept;
 
 }  // namespace hapticd::net

@@ -1,4 +1,4 @@
-// Whether a peer is gone, told from what the system knows of its acknowledgements.
+// Detects a lost peer from the system's record of its acknowledgements.
 #pragma once
 
 #include <algorithm>
@@ -9,28 +9,28 @@
 
 namespace hapticd::net {
 
-/// What the system tells of a connection at one moment (TCP_INFO).
+/// The state of a connection as the system reports it (TCP_INFO).
 struct LinkState {
-  bool inFlight = false;                    ///< something was sent that the peer has not acknowledged
+  bool inFlight = false;                    ///< sent bytes that the peer has not acknowledged
   int probes = 0;                           ///< window or keep-alive probes without an answer so far
   std::chrono::milliseconds sinceHeard{0};  ///< since the last acknowledgement or data
 };
 
-/// Counts the time in which a peer should acknowledge and is silent. A peer whose program does not read
-/// acknowledges all the same, so it is never lost. Time in which nobody looked counts for two intervals at
-/// most: after a stall of this machine the answers are still on their way. Pure; one for each connection.
+/// Measures how long an acknowledgement has been due. A peer whose program does not read still acknowledges, so it is
+/// never lost. Time between two checks counts for two intervals at most: after a stall of this machine the answers are
+/// still in its queues. Pure; one for each connection.
 ///
-/// While the peer's window is closed the system probes it ever more rarely: a peer that stood still for some
-/// time and then vanishes is noticed only after as long again.
+/// While the peer's window is closed the system probes it at growing intervals, so a peer that does not read for some time
+/// and then vanishes is noticed only after about the same time.
 class LossWatch {
  public:
   using Milliseconds = std::chrono::milliseconds;
 
-  /// A timeout of zero never finds anything lost.
+  /// With a timeout of zero no peer is ever lost.
   explicit LossWatch(Milliseconds timeout) : timeout_(timeout) {}
 
   bool active() const { return timeout_ > Milliseconds::zero(); }
-  /// How often isLost() wants to be asked.
+  /// Interval at which to call isLost().
   Milliseconds interval() const { return std::max(timeout_ / 5, Milliseconds(1)); }
 
   bool isLost(const LinkState& link, base::Nanos now) {
@@ -48,7 +48,7 @@ class LossWatch {
   }
 
  private:
-  // Peers answer probes at most twice a second: one that comes sooner after an answer tells nothing.
+  // Peers answer probes at most twice per second, so silence after an earlier probe means nothing.
   static constexpr Milliseconds kAnswerPause{600};
 
   bool awaitsAnswer(const LinkState& link) {
@@ -62,8 +62,8 @@ class LossWatch {
 
   Milliseconds timeout_;
   base::Nanos lastCheck_ = 0;
-  std::optional<bool> probeCounts_;     // whether the first probe must have an answer
-  std::optional<Milliseconds> waited_;  // how long an answer is due
+  std::optional<bool> probeCounts_;     // whether the first probe requires an answer
+  std::optional<Milliseconds> waited_;  // time since an answer became due
 };
 
 }  // namespace hapticd::net

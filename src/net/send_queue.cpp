@@ -24,7 +24,7 @@ void SendQueue::push(std::shared_ptr<const Buffer> buffer, Delivery delivery) {
   items_.push_back({std::move(buffer), delivery});
 }
 
-// The scan is paid for by the bytes it frees: it runs again only after as many have been queued anew.
+// Amortised: after a scan that freed n bytes, the next one runs only when n more have been queued.
 void SendQueue::dropWaitingLowLatency() {
   const bool headStarted = headSent_ > 0;
   const std::size_t unsentOfHead = headStarted && items_[head_].delivery == Delivery::lowLatency

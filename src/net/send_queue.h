@@ -1,4 +1,4 @@
-// What waits to be sent on one connection: immutable buffers in order, and the rule for a slow reader.
+// The send queue of one connection: immutable buffers in order, and the policy for a slow reader.
 #pragma once
 
 #include <cstddef>
@@ -12,15 +12,15 @@ namespace hapticd::net {
 /// Bytes that many connections may share; never changed once handed to a send.
 using Buffer = std::vector<std::byte>;
 
-/// What may happen to a buffer when the peer reads too slowly.
+/// What happens to a buffer when the peer reads too slowly.
 enum class Delivery : std::uint8_t {
-  reliable,    ///< Kept, in order, until sent.
-  lowLatency,  ///< Worth nothing when late: dropped whole while the peer is behind.
+  reliable,    ///< Kept until sent, in order.
+  lowLatency,  ///< Worthless when late: dropped as a whole while the peer is behind.
 };
 
-/// A FIFO that forgets low-latency buffers when it is long. Above the low mark, those waiting are dropped in
-/// favour of the one that comes, and that one too if the reliable ones alone exceed the mark. A buffer of
-/// which a part was sent is never dropped. Not thread-safe.
+/// A FIFO that drops low-latency buffers when it is long. Above the low mark, a new low-latency buffer replaces those that
+/// wait; if the reliable buffers alone exceed the mark, the new one is dropped, too. A partly sent buffer is never
+/// dropped. Not thread-safe.
 class SendQueue {
  public:
   explicit SendQueue(std::size_t lowMarkBytes) : lowMarkBytes_(lowMarkBytes) {}
@@ -29,7 +29,7 @@ class SendQueue {
 
   /// Fills `parts` with the next bytes to send, in order, and returns how many parts there are.
   std::size_t gather(std::span<std::span<const std::byte>> parts) const;
-  /// Forgets the first `bytes` bytes: they were sent.
+  /// Removes the first `bytes` bytes, which were sent.
   void consume(std::size_t bytes);
   void clear();
 

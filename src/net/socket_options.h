@@ -1,5 +1,5 @@
-// What only the operating system's own calls can set and tell about a socket; a port to another system
-// rewrites this file, and sendmmsg, eventfd and the resolver beside it.
+// Socket options and queries that need the operating system's own calls. A port to another system rewrites this file, and
+// also sendmmsg, eventfd and the resolver.
 #pragma once
 
 #include <chrono>
@@ -18,7 +18,7 @@ void setNoDelay(int fd) noexcept;
 void setSendBuffer(int fd, int bytes) noexcept;
 /// How often a silent peer is probed; zero: never.
 void setKeepAlive(int fd, std::chrono::seconds interval) noexcept;
-/// What LossWatch wants to know; nothing when the socket is closed.
+/// Input of LossWatch; nothing when the socket is closed.
 std::optional<LinkState> linkState(int fd) noexcept;
 /// What a socket knows of its peer's end without reading.
 enum class PeerEnd { none, closed, reset };

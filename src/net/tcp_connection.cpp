@@ -76,7 +76,7 @@ void TcpConnection::becomeOpen() {
   socket_.non_blocking(true, error);
   local_ = fromAsio(socket_.local_endpoint(error));
   const tcp::endpoint remote = socket_.remote_endpoint(error);
-  if (!error) {  // a peer that is gone already has no address; the first read tells the rest
+  if (!error) {  // a peer that is gone already has no address; the first read reports its end
     remote_ = fromAsio(remote);
   }
   applyOptions();
@@ -161,7 +161,7 @@ void TcpConnection::armRead() {
   });
 }
 
-// One read per wake, so that a fast sender does not keep the loop from the others.
+// One read per wake-up, so that a fast sender does not starve the others.
 void TcpConnection::readable() {
   ErrorCode error;
   const std::size_t size =
@@ -186,7 +186,7 @@ void TcpConnection::deliver(std::size_t bytes) {
 void TcpConnection::peerEnded() {
   peerEnded_ = true;
   if (state_ == State::flushing) {
-    return;  // the peer may have shut only its own direction: let it have the rest
+    return;  // the peer may have closed only its own direction: send it the rest
   }
   if (state_ == State::open) {
     flush();  // the answers to its last bytes
@@ -265,15 +265,15 @@ void TcpConnection::queueEmptied(bool wasBlocked) {
       finish(reason_);
       return;
     }
-    // Closing now could reset the connection under data that the peer has not read yet; its end is awaited.
+    // Closing now could reset the connection before the peer has read everything: wait for its end.
     state_ = State::draining;
   } else if (wasBlocked) {
     call(&ConnectionHandlers::onDrained);
   }
 }
 
-// A peer that sent a lot and left without reading its reports has reset the connection, yet what it sent is
-// still there to be read; the reader comes to the end by itself.
+// A peer that sent a lot and left without reading its reports resets the connection, but its bytes can still be read. The
+// reader reaches the end by itself.
 void TcpConnection::writeFailed(const ErrorCode& error) {
   if (state_ != State::open) {
     finish(reason_);
@@ -314,7 +314,7 @@ void TcpConnection::abort(std::string reason) {
   finish(std::move(reason));
 }
 
-// A timer that expired may be past cancelling: that of connect() must not end the connection just made.
+// An expired timer can no longer be cancelled: the one of connect() must not end the new connection.
 void TcpConnection::armTimer(std::chrono::milliseconds timeout, std::string reason) {
   const bool whileConnecting = state_ == State::connecting;
   timer_.expires_after(timeout);
@@ -325,7 +325,7 @@ void TcpConnection::armTimer(std::chrono::milliseconds timeout, std::string reas
   });
 }
 
-// The callback is posted, so that no owner is called back from inside its own send() or flush().
+// Posts the callback, so that no owner is called back from inside its own send() or flush().
 void TcpConnection::finish(std::string reason) {
   if (state_ == State::closed) {
     return;

@@ -1,4 +1,4 @@
-// The state machine of a TCP connection, shared with the listener that makes accepted ones.
+// The state machine of a TCP connection, outgoing or accepted.
 #pragma once
 
 #include "net/asio_loop.h"
@@ -70,7 +70,7 @@ class TcpConnection final : public Connection::Impl, public std::enable_shared_f
   boost::asio::steady_timer watchTimer_;
   boost::asio::steady_timer peerCheckTimer_;
   LossWatch watch_{options_.lossTimeout};
-  // Shared so that a callback that destroys its connection goes on running on living captures.
+  // Shared, so that the captures of a callback outlive a connection that it destroys.
   std::shared_ptr<ConnectionHandlers> handlers_;
   SendQueue queue_;
   Endpoint local_;
@@ -83,7 +83,7 @@ class TcpConnection final : public Connection::Impl, public std::enable_shared_f
   bool peerCheckArmed_ = false;
   bool peerGoneReported_ = false;
   bool receiveBufferWide_ = false;
-  std::string failure_;  // why nothing can be sent any more, while what came before is still being read
+  std::string failure_;  // why nothing can be sent, while received bytes are still being read
   std::string reason_;   // of close(), then of the end
   std::uint64_t bytesIn_ = 0;
   std::uint64_t bytesOut_ = 0;

@@ -1,4 +1,4 @@
-// Datagrams: received by callback, sent at once or not at all.
+// Datagrams: received by callback, sent immediately or dropped.
 #pragma once
 
 #include <cstddef>
@@ -12,11 +12,11 @@
 
 namespace hapticd::net {
 
-/// What a socket tells its owner; any may be empty.
+/// Callbacks of a socket; any may be empty.
 struct UdpHandlers {
-  /// A datagram came (valid during the call only).
+  /// A datagram was received (valid during the call only).
   std::function<void(std::span<const std::byte>, const Endpoint& from)> onDatagram;
-  /// The connected peer's machine answered that nobody listens there; the socket stays usable.
+  /// The connected peer's machine answered that no socket is bound there; this socket stays usable.
   std::function<void()> onRefused;
 };
 
@@ -27,7 +27,7 @@ struct UdpStatistics {
   std::uint64_t datagramsOut = 0;
   std::uint64_t bytesOut = 0;
   std::uint64_t dropped = 0;  ///< not sent: the system's buffer was full, or it refused the datagram
-  std::uint64_t refused = 0;  ///< answers that nobody listens at the connected peer
+  std::uint64_t refused = 0;  ///< answers that no socket is bound at the connected peer
 };
 
 /// A datagram to send with sendBatch().
@@ -48,10 +48,9 @@ class UdpSocket {
   UdpSocket(const UdpSocket&) = delete;
   UdpSocket& operator=(const UdpSocket&) = delete;
 
-  /// Sets the callbacks and begins to receive.
+  /// Sets the callbacks and starts receiving.
   void start(UdpHandlers handlers);
-  /// Fixes the peer: send() goes there and only its datagrams are received; throws Error when no route leads
-  /// there.
+  /// Fixes the peer: send() sends there, and only its datagrams are received. Throws Error when there is no route.
   void connect(const Endpoint& peer);
 
   /// Sends one datagram to the connected peer; false when it was dropped. Never blocks.

@@ -43,14 +43,14 @@ void WebSocket::receive(std::span<const std::byte> bytes) {
   if (in.end && handlers_) end(*in.end);
 }
 
-// The peer's end is answered with the same code; ours tells what was wrong.
+// Answers the peer's close frame with the same code; a close of ours names the error.
 void WebSocket::end(const WebSocketEnd& end) {
   if (!sendable()) return;
   closing_ = true;
   const bool coded = end.code != kWebSocketNoStatus;
   sendFrame(coded ? webSocketClose(end.code, end.isError ? end.text : "")
                   : webSocketFrame(WebSocketOpcode::close, {}));
-  stream_.close(end.isError ? "no WebSocket any more: " + end.text : "closed by the peer");
+  stream_.close(end.isError ? "WebSocket error: " + end.text : "closed by the peer");
 }
 
 void WebSocket::send(std::shared_ptr<const Buffer> buffer, Delivery delivery) {

@@ -1,4 +1,4 @@
-// A byte stream inside a WebSocket, with everything that a Connection promises.
+// A byte stream inside a WebSocket, with the contract of Connection.
 #pragma once
 
 #include "net/connection_impl.h"
@@ -7,12 +7,11 @@
 
 namespace hapticd::net {
 
-// Each buffer leaves as one binary message, so that a low-latency one can still be dropped whole: the queue,
-// its limits, the loss of a peer and the pauses are those of the TCP connection underneath.
+// Each buffer is sent as one binary message, so that a low-latency one can still be dropped as a whole. The queue, its
+// limits, loss detection and pauses are those of the TCP connection underneath.
 class WebSocket final : public Connection::Impl, public std::enable_shared_from_this<WebSocket> {
  public:
-  /// Takes over a connection on which the greeting is over. `ahead` is what the client sent right behind its
-  /// request.
+  /// Takes over a connection after the handshake. `ahead` holds the bytes that the client sent directly after its request.
   WebSocket(Loop::Impl& loop, Connection stream, Buffer ahead);
 
   void start(ConnectionHandlers handlers) override;
@@ -41,7 +40,7 @@ class WebSocket final : public Connection::Impl, public std::enable_shared_from_
   Connection stream_;
   Buffer ahead_;
   WebSocketReader reader_;
-  // Shared so that a callback that destroys its connection goes on running on living captures.
+  // Shared, so that the captures of a callback outlive a connection that it destroys.
   std::shared_ptr<ConnectionHandlers> handlers_;
   bool closing_ = false;
 };

@@ -23,29 +23,28 @@ enum class WebSocketOpcode : std::uint8_t {
   pong = 10,
 };
 
-/// Status codes of a closing frame that we use or look at.
+/// Status codes of a close frame that are used here.
 inline constexpr std::uint16_t kWebSocketNormal = 1000;
 inline constexpr std::uint16_t kWebSocketProtocolError = 1002;
 inline constexpr std::uint16_t kWebSocketUnsupported = 1003;
-inline constexpr std::uint16_t kWebSocketNoStatus = 1005;  ///< never on the wire: a closing frame without one
+inline constexpr std::uint16_t kWebSocketNoStatus = 1005;  ///< never on the wire: a close frame without a code
 
-/// How the other side ended the talk, or what was wrong with it.
+/// How the peer ended the connection, or the protocol error found.
 struct WebSocketEnd {
   std::uint16_t code = kWebSocketNormal;
   std::string text;
-  bool isError = false;  ///< found by us; `code` is then what to tell the peer
+  bool isError = false;  ///< found by us; `code` is then the one to send
 };
 
-/// What came in one read.
+/// The content of one read.
 struct WebSocketInput {
-  Buffer data;                ///< payload of binary messages, in order; where they began and ended is lost
-  std::vector<Buffer> pings;  ///< each wants a pong with the same payload
-  std::optional<WebSocketEnd> end;  ///< nothing is read after it
+  Buffer data;                ///< payload of binary messages, in order, without their boundaries
+  std::vector<Buffer> pings;  ///< each requires a pong with the same payload
+  std::optional<WebSocketEnd> end;  ///< nothing after it is read
 };
 
-/// Takes the bytes of a client apart, in pieces of any size. Message boundaries mean nothing to a byte
-/// stream, so payload is given on as it comes and no message is too long; nothing is kept but a header and a
-/// control frame.
+/// Parses the bytes of a client, in pieces of any size. A byte stream has no message boundaries, so payload is passed on as
+/// it arrives and no message is too long; the reader buffers only a header and a control frame.
 class WebSocketReader {
  public:
   void feed(std::span<const std::byte> bytes, WebSocketInput& out);
@@ -69,7 +68,7 @@ class WebSocketReader {
   bool inPayload_ = false;
   WebSocketOpcode opcode_ = WebSocketOpcode::binary;
   bool final_ = true;
-  bool inMessage_ = false;  // a fragment came that was not the last
+  bool inMessage_ = false;  // inside a fragmented message
   bool over_ = false;
   std::uint64_t length_ = 0;
   std::uint64_t taken_ = 0;
@@ -79,7 +78,7 @@ class WebSocketReader {
 
 /// One whole, unmasked frame with this payload.
 Buffer webSocketFrame(WebSocketOpcode opcode, std::span<const std::byte> payload);
-/// A closing frame; the reason is cut to what fits into one.
+/// A close frame; the reason is truncated to what fits.
 Buffer webSocketClose(std::uint16_t code, std::string_view reason);
 
 /// Sec-WebSocket-Accept for the key of a request.

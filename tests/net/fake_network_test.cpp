@@ -86,7 +86,8 @@ TEST_F(FakeNetworkTest, ChosenDatagramsAreLost) {
   UdpSocket to(loop_, kAnyPort);
   UdpSocket from(loop_, kAnyPort);
   std::string received;
-  to.start({.onDatagram = [&](std::span<const std::byte> bytes, const Endpoint&) { received += textOf(bytes); }});
+  to.start({.onDatagram = [&](std::span<const std::byte> bytes, const Endpoint&) { received += textOf(bytes); },
+            .onRefused = {}});
   network_.options.losesDatagram = [](std::uint64_t number) { return number % 3 == 1; };
   for (const char* text : {"a", "b", "c", "d", "e"}) EXPECT_TRUE(from.sendTo(bytesOf(text), to.local()));
   loop_.runFor(milliseconds(1));
@@ -156,8 +157,11 @@ std::vector<std::uint64_t> trace(std::uint64_t seed) {
   FakeNetwork network(clock);
   const ScopedNetwork scope(network);
   std::vector<std::uint64_t> events;
-  const auto random = [state = seed]() mutable { return state = state * 6364136223846793005U + 1442695040888963407U; };
-  network.options.readSize = [&](std::size_t available) { return 1 + (random() >> 33) % available; };
+  std::uint64_t state = seed;
+  network.options.readSize = [&](std::size_t available) {
+    state = state * 6364136223846793005U + 1442695040888963407U;
+    return 1 + (state >> 33) % available;
+  };
   network.options.windowBytes = 5000;
   Loop loop;
   Server server(loop, {}, true);

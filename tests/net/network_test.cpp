@@ -108,7 +108,8 @@ TYPED_TEST(NetworkTest, ACookieThenCommandsByTcpAndReportsByUdp) {
   here.start({.onDatagram = [&](std::span<const std::byte> bytes, const Endpoint& from) {
     EXPECT_EQ(from, reports.local());
     reported.push_back(textOf(bytes));
-  }});
+  },
+              .onRefused = {}});
   Frames commands;
   std::string cookie;
   Connection session;

@@ -156,7 +156,7 @@ TEST(WebSocket, AMistakeIsToldAndEndsIt) {
                                 "a frame is not masked"));
   peer.close();
   ASSERT_TRUE(sockets.untilClosed());
-  EXPECT_EQ(sockets.closed, "no WebSocket any more: a frame is not masked");
+  EXPECT_EQ(sockets.closed, "WebSocket error: a frame is not masked");
 }
 
 TEST(WebSocket, APeerThatVanishesIsTold) {
