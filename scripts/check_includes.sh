@@ -18,10 +18,6 @@ LIST
 # Files that still reach past src/base.
 seam_exceptions() {
   cat <<'LIST'
-src/client/client.cpp
-src/client/link.cpp
-src/client/link_traffic.cpp
-src/client/vrpn/shared.cpp
 src/device/discovery/discovery.cpp
 src/device/discovery/usb_devices.cpp
 src/device/evdev/evdev_device.cpp
