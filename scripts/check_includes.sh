@@ -25,10 +25,6 @@ LIST
 # Files that still reach past src/base.
 seam_exceptions() {
   cat <<'LIST'
-src/client/client.cpp
-src/client/link.cpp
-src/client/link_traffic.cpp
-src/client/vrpn/shared.cpp
 src/device/simulated/hand_file.cpp
 src/realtime/servo/servo_thread.cpp
 src/realtime/servo/servo_thread.h
