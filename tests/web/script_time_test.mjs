@@ -79,7 +79,7 @@ test("a million triangles, 4 ms", async () => {
     const triangles = 2 * RINGS * AROUND;
     await until(
       "the ball in the server",
-      async () => (await server.state()).scenes[0].objects[0].triangles === triangles,
+      async () => (await server.state()).scenes[0].objects[0]?.triangles === triangles,
       120_000,
     );
     const viewer = await Viewer.open(browser.context, server.url);

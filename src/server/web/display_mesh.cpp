@@ -87,7 +87,7 @@ Corners sample(const Corners& corners, std::size_t most) {
 // Edge collapses give the better picture, but take about a second per million triangles and keep the topology, so that
 // they cannot reduce a soup. Clustering in a grid comes before them in huge meshes and after them where they got stuck.
 Corners simplify(const Mesh& mesh, std::size_t most, const std::atomic<bool>& cancelled) {
-  constexpr std::size_t kMostCollapsed = 1'000'000;
+  constexpr std::size_t kMostCollapsed = 4 * kDisplayTriangles;
   constexpr float kAnyError = 1e6F;
   const std::vector<Vec3f> positions = inUnitCube(mesh.vertices);
   Corners corners = weld(mesh.corners, positions);

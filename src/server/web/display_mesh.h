@@ -19,8 +19,8 @@ std::size_t displayShare(std::size_t triangles, std::size_t trianglesInAll, std:
 
 /// Encodes the mesh with at most `most` triangles, simplified if it has more. Triangles with equal, missing or
 /// non-finite vertices are dropped. Little endian: "HDM1"; number of vertices, number of triangles and 0 as u32; 3 f32
-/// for each vertex; 3 u32 for each triangle. Takes seconds for millions of triangles; polls `cancelled` between steps of
-/// at most about one second per million triangles and then returns an empty mesh. Any thread.
+/// for each vertex; 3 u32 for each triangle. Takes about half a second per million
+/// triangles; polls `cancelled` between its three steps and then returns an empty mesh. Any thread.
 net::Buffer displayMesh(std::span<const geometry::Vec3f> vertices,
                         std::span<const geometry::Triangle> triangles, std::size_t most,
                         const std::atomic<bool>& cancelled);

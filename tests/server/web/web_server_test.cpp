@@ -40,7 +40,7 @@ class Web : public testing::Test {
   Answer mesh(const json& object, int scene = 0) {
     const std::string target = "/api/mesh?scene=" + std::to_string(scene) + "&object=" + object["id"].dump() +
                                "&geometry=" + object["geometry"].dump();
-    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(200);
     for (;;) {
       Answer answer = get(web(), target);
       if (answer.status != 503 || std::chrono::steady_clock::now() > end) return answer;
