@@ -7,7 +7,7 @@
 namespace hapticd::geometry {
 namespace {
 
-// A triangle lower than this part of its longest edge is a line, as far as floats can tell.
+// A triangle whose height is below this share of its longest edge is a line within float rounding.
 constexpr double kFlat = 1e-7;
 
 bool areTriples(std::span<const Vec3f> vertices, std::span<const Triangle> triangles) {

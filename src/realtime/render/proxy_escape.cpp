@@ -28,8 +28,9 @@ struct Proxy::DescentDirections {
   Vec3 outward = Vec3::Zero();  // sum of the normals
 
   void add(const Vec3& direction, double shortest) {
-    if (count == kMaxDirections || !(direction.norm() > shortest)) return;
-    directions[static_cast<std::size_t>(count++)] = direction;
+    if (count < kMaxDirections && direction.norm() > shortest) {
+      directions[static_cast<std::size_t>(count++)] = direction;
+    }
   }
 };
 
