@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Checks the sources without running them. Needs a configured build/release.
 #   scripts/lint.sh            the format of all files, and --changed
-#   scripts/lint.sh --changed  clang 19 and clang-tidy (.clang-tidy) on the sources changed since the last tag, without
+#   scripts/lint.sh --changed  clang 19 and clang-tidy (.clang-tidy) on the sources changed since the last tag (or 20 commits), without
 #                              precompiled headers; only the last 12 changed, so that it ends in a minute
 #   scripts/lint.sh --tidy     clang-tidy on all sources; takes most of an hour
 #   scripts/lint.sh --clang    compiles everything with clang 19, one source at a time
@@ -42,7 +42,7 @@ all_sources() { sed -nE "s|^  \"file\": \"$PWD/((src\|include\|apps\|bench\|test
 
 changed_sources() {
   local since
-  since=$(git describe --tags --abbrev=0 2>/dev/null || git rev-parse --verify -q HEAD~1 || git rev-parse HEAD)
+  since=$(git describe --tags --abbrev=0 2>/dev/null || git rev-parse --verify -q HEAD~20 || git rev-parse HEAD)
   { git diff --name-only HEAD -- '*.cpp'; git log --pretty= --name-only --diff-filter=d "$since..HEAD" -- '*.cpp'; } |
     awk '!seen[$0]++' | grep -Fx -f <(all_sources) | head -n "$kMostChanged" || true
 }

@@ -26,11 +26,17 @@ if [ -n "$room" ] && [ ! -d "tests/$room" ] && [ ! -d "src/$room" ]; then
   echo "there is no room '$room'; the rooms are the folders below tests/" >&2
   exit 2
 fi
-# The nearest folder that has tests of its own.
-while [ -n "$room" ] && [ ! -e "tests/$room/CMakeLists.txt" ]; do
-  [[ $room == */* ]] || { echo "tests/ has no folder for '$room'" >&2; exit 2; }
+# A room whose folder below tests/ has no CMakeLists.txt has its tests in programs of the folder above: those that list
+# sources of it.
+programs=()
+if [ -n "$room" ] && [ ! -e "tests/$room/CMakeLists.txt" ]; then
+  inner=${room##*/}
   room=${room%/*}
-done
+  [ -e "tests/$room/CMakeLists.txt" ] || { echo "tests/ has no folder for '$room'" >&2; exit 2; }
+  mapfile -t programs < <(tr '\n' ' ' <"tests/$room/CMakeLists.txt" | grep -oE 'hapticd_test\([^)]*\)' | grep -F " $inner/" |
+                          sed -E 's/hapticd_test\(([^ ]+) .*/\1/')
+  [ "${#programs[@]}" -gt 0 ] || { echo "no test program of tests/$room has sources of '$inner'" >&2; exit 2; }
+fi
 
 kAllowedFlaky=2
 jobs=$(nproc)
@@ -45,7 +51,7 @@ trap '[ -z "$testing" ] || kill "$testing" 2>/dev/null || true' EXIT
 # Arguments for ctest, by preset.
 filter_of() {
   case "$1" in
-    release) ;;
+    release) [ "${#programs[@]}" = 0 ] || (IFS='|'; echo "-R ^(${programs[*]})[.]") ;;
     asan) echo -LE apps ;;
     tsan) echo -L threads ;;
   esac
@@ -59,6 +65,7 @@ targets_of() {
       case "$room" in
         "" | apps | examples | install | web) echo all ;;
         *)
+          if [ "${#programs[@]}" -gt 0 ]; then printf '%s_test\n' "${programs[@]}"; return; fi
           echo "tests/$room/all"
           # Tests of the whole program, run by scripts, are no dependency that the build knows.
           if grep -rqs 'bin/hapticd"' "build/release/tests/$room" --include=CTestTestfile.cmake; then echo hapticd; fi ;;

@@ -243,7 +243,7 @@ void FreeForces::apply(const SetForceField& c, const Call& call) {
 }
 
 FreeForces::Constraint& FreeForces::constraintFor(const Call& call) {
-  if (!constraint_) constraint_.emplace();
+  if (!constraint_) constraint_ = Owned<Constraint>{};
   constraint_->owner = call.client;
   constraint_->goneAt = kNever;
   constraint_->value.releasing = false;
