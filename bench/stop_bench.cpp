@@ -53,7 +53,7 @@ class Uploader {
 class Operator {
  public:
   explicit Operator(const std::string& device) : owner_(device), client_(device) {
-    client_.subscribe(Reports::tick | Reports::guard, 1000);
+    client_.subscribe(Reports::tick, 1000);
     client_.onTick([this](const TickReport& tick) {
       force_N_ = std::hypot(tick.force_N[0], tick.force_N[1], tick.force_N[2]);
       if (force_N_ == 0 && !zeroAt_ && tick.tickTime > stoppedAt_) zeroAt_ = tick.tickTime;

@@ -7,7 +7,7 @@ namespace {
 using namespace std::chrono_literals;
 using testing::HasSubstr;
 
-ScriptedServerOptions able() {
+ScriptedServerOptions ableServer() {
   ScriptedServerOptions options;
   options.capabilities = allCapabilities();
   return options;
@@ -31,7 +31,7 @@ void backUp(ScriptedServer& server, Client& client) {
 }
 
 TEST(Stop, ItOvertakesABackedUpStreamByASecondConnection) {
-  ScriptedServer server(able());
+  ScriptedServer server(ableServer());
   Client client(server.tcpName(), {.queueLimit_bytes = 64 * 1024 * 1024});
   backUp(server, client);
   client.stopForces();
@@ -53,7 +53,7 @@ TEST(Stop, ItOvertakesABackedUpStreamByASecondConnection) {
 }
 
 TEST(Stop, TheSecondConnectionIsNotNeededWhileNothingWaits) {
-  ScriptedServer server(able());
+  ScriptedServer server(ableServer());
   Client client(server.tcpName());
   client.stopForces();
   EXPECT_EQ(server.waitReceived(1).size(), 1U);
@@ -61,7 +61,7 @@ TEST(Stop, TheSecondConnectionIsNotNeededWhileNothingWaits) {
 }
 
 TEST(Stop, AReverseConnectionIsOvertakenToo) {
-  ScriptedServer server(able());
+  ScriptedServer server(ableServer());
   Client client(server.name(), {.queueLimit_bytes = 64 * 1024 * 1024});
   backUp(server, client);
   client.stopForces();
@@ -70,7 +70,7 @@ TEST(Stop, AReverseConnectionIsOvertakenToo) {
 }
 
 TEST(Stop, WithoutAConfirmationItThrowsAndKeepsTheFirstStop) {
-  ScriptedServer server(able());
+  ScriptedServer server(ableServer());
   Client client(server.tcpName(), {.connectTimeout = 1s, .queueLimit_bytes = 64 * 1024 * 1024});
   server.ignorePings();
   backUp(server, client);

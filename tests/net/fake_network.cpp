@@ -20,7 +20,7 @@ namespace {
 
 constexpr char kClosed[] = "closed by the peer";
 constexpr char kReset[] = "connection reset by the peer";
-constexpr char kLost[] = "the peer is lost: it acknowledged nothing in time";
+constexpr char kLostPeer[] = "the peer is lost: it acknowledged nothing in time";
 
 Nanos nanos(std::chrono::nanoseconds duration) {
   return duration.count();
@@ -377,7 +377,7 @@ class FakeConnection final : public Connection::Impl, public std::enable_shared_
       silence += nanos(options_.keepAlive);
     }
     loop_.at(network_.time() + silence, [self = shared_from_this()] {
-      if (self->state_ == State::open) self->fail(kLost);
+      if (self->state_ == State::open) self->fail(kLostPeer);
     });
   }
 

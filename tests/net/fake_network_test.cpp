@@ -158,7 +158,7 @@ std::vector<std::uint64_t> trace(std::uint64_t seed) {
   const ScopedNetwork scope(network);
   std::vector<std::uint64_t> events;
   std::uint64_t state = seed;
-  network.options.readSize = [&](std::size_t available) {
+  network.options.readSize = [&](std::size_t available) -> std::size_t {
     state = state * 6364136223846793005U + 1442695040888963407U;
     return 1 + (state >> 33) % available;
   };

@@ -157,11 +157,11 @@ std::string Visitor::texts() const {
 bool Visitor::untilReady() {
   return until([this] {
     const GuardReport& guard = client_.latest().guard;
-    if (guard.latched != 0) {
+    if (!guard.latched.empty()) {
       client_.rearmForces();
       client_.runFor(50ms);
     }
-    return guard.armed && !guard.stopped && guard.latched == 0;
+    return guard.armed && !guard.stopped && guard.latched.empty();
   });
 }
 

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "base/time.h"
+#include "device/simulated/simulated_device.h"
 #include "hapticd/trips.h"
 #include "server/station/black_box_recorder.h"
 #include "server/station/button_modes.h"
