@@ -232,7 +232,7 @@ TEST(Config, WhatIsWrittenReadsBackTheSame) {
   EXPECT_EQ(parseConfig(text, "written"), config) << text;
   EXPECT_EQ(toToml(parseConfig(text, "written")), text);
   EXPECT_NE(text.find("linear_tolerance_mm = 0.3\n"), std::string::npos) << text;
-  EXPECT_NE(text.find("workspace = \"paper\"\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("workspace = 'paper'\n"), std::string::npos) << text;
 }
 
 // So the test above notices any key that is not written, not read, or mixed up with another.

@@ -210,7 +210,7 @@ TEST(Trips, AreInTheDocumentWithTheirSentences) {
   for (const TripInfo& trip : kTrips) {
     std::ostringstream row;
     row << "| " << static_cast<int>(trip.trip) << " | `" << trip.name << "` | " << effectOn(trip.action) << " | "
-        << trip.what << " | " << trip.remedy << " |\n";
+        << static_cast<int>(trip.forceError) << " | " << trip.what << " | " << trip.remedy << " |\n";
     EXPECT_NE(text.find(row.str()), std::string::npos) << row.str();
   }
 }
