@@ -1,4 +1,4 @@
-// Payloads, frames, cookies, descriptions and connection requests from a stranger.
+// Untrusted payloads, frames, cookies, descriptions and connection requests.
 #include <cstdint>
 
 #include "fuzz/wire_properties.h"

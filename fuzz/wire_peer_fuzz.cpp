@@ -1,4 +1,4 @@
-// A whole connection with a stranger: TCP stream and datagrams.
+// A whole connection with an untrusted peer: TCP stream and datagrams.
 #include <cstdint>
 
 #include "fuzz/wire_properties.h"

@@ -1,17 +1,15 @@
-// What must hold for any bytes at all; the fuzzers search for bytes that break it, the tests check the
-// recorded ones.
+// Properties of any input: the fuzzers search for bytes that violate them, the tests check the recorded bytes.
 #pragma once
 
 #include "wire/bytes.h"
 
 namespace hapticd::wire {
 
-/// Decodes bytes as everything they could be; what decodes must survive being encoded and decoded again.
-/// Aborts otherwise.
+/// Decodes bytes as every kind of message; a decoded message must survive encoding and decoding. Aborts otherwise.
 void checkCodec(ByteView bytes);
 
-/// Feeds bytes to endpoints, whole and in pieces; both must see the same and answer the same, and what they
-/// send must be acceptable to another endpoint. Aborts otherwise.
+/// Feeds bytes to peers, whole and in pieces: the events and the answers must be equal, and another peer must accept
+/// the answers. Aborts otherwise.
 void checkEndpoint(ByteView bytes);
 
 }  // namespace hapticd::wire

@@ -12,7 +12,7 @@
 
 namespace hapticd::wire {
 
-/// Bytes of somebody else, valid as long as their owner says.
+/// Bytes that the caller owns; valid while the owner keeps them.
 using ByteView = std::span<const std::byte>;
 
 /// A number that travels as sizeof(T) big-endian bytes: integers two's complement, floats IEEE 754.

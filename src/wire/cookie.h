@@ -10,10 +10,10 @@
 namespace hapticd::wire {
 
 inline constexpr std::size_t kCookieBytes = 24;
-/// What we announce. Peers compare up to the last dot: any 07.xx talks to any other.
+/// The version we announce. Peers compare up to the last dot: any 07.xx accepts any other.
 inline constexpr std::string_view kVersionText = "vrpn: ver. 07.38";
 
-/// What a peer said of itself.
+/// The contents of a peer's cookie.
 struct Cookie {
   std::string version;  ///< such as "07.34"
   int log_mode = 0;     ///< logging asked of the receiver: bit 0 its incoming, bit 1 its outgoing messages

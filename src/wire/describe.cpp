@@ -43,6 +43,22 @@ class FieldLister final : public FieldVisitor {
   MessageDescription& message_;
 };
 
+// The name is between "M = " and the next separator, as GCC and clang write it.
+template <class M>
+constexpr std::string_view structNameOf() {
+  std::string_view text = __PRETTY_FUNCTION__;
+  text.remove_prefix(text.find("M = ") + 4);
+  text = text.substr(0, text.find_first_of(";]"));
+  return text.substr(text.rfind(':') + 1);
+}
+
+template <class... M>
+constexpr std::array<std::string_view, kMessageKinds> structNamesOf(MessageList<M...>) {
+  return {structNameOf<M>()...};
+}
+constexpr std::array<std::string_view, kMessageKinds> kStructNames = structNamesOf(AllMessages{});
+static_assert(kStructNames[static_cast<std::size_t>(kindOf<SetVertex>)] == "SetVertex");
+
 std::string_view directionText(Direction direction) {
   switch (direction) {
     case Direction::kToServer:
@@ -121,7 +137,7 @@ describes its numbers with these system messages, and any later ones before it u
 | -4 | log description | mode, as in the cookie | 0: i32 length; 4: i32 length; 8: file names for received and sent messages, each with a NUL the lengths do not count |
 
 Types down to -1999 are ignored when unknown; lower ones end the connection. A datagram holds whole frames, at most
-1472 bytes. A client without `tcp://` asks to be called: it sends the datagram `host port` and a NUL to the server's
+1472 bytes. A client without `tcp://` asks for a reverse connection: it sends the datagram `host port` and a NUL to the server's
 UDP port (3883), and the server connects to it by TCP; port 1024 to 65535, host of letters, digits and dots.
 
 )";
@@ -138,6 +154,10 @@ std::vector<MessageDescription> describeMessages() {
     visitFields(message, lister);
   }
   return all;
+}
+
+std::string_view structName(MessageKind kind) noexcept {
+  return kStructNames[static_cast<std::size_t>(kind)];
 }
 
 std::string messagesAsMarkdown() {

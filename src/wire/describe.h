@@ -1,4 +1,5 @@
-// The table of messages as data, for everything that lists it: documents, fuzz dictionaries, bindings.
+// The table of messages as data, for everything that is derived from it: documents, fuzz dictionaries, other
+// languages.
 #pragma once
 
 #include <string>
@@ -28,8 +29,15 @@ struct MessageDescription {
 /// Every message, in the order of the table.
 std::vector<MessageDescription> describeMessages();
 
+/// The name of the struct in C++, which is the name of the message in every language; the kind must not be
+/// kUnknownKind.
+std::string_view structName(MessageKind kind) noexcept;
+
 /// docs/wire-messages.md.
 std::string messagesAsMarkdown();
+
+/// web/src/wire/messages.ts.
+std::string messagesAsTypeScript();
 
 /// A libFuzzer dictionary: every wire name and every frame length of the table.
 std::string messagesAsFuzzDictionary();

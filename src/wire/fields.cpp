@@ -56,8 +56,7 @@ struct Adapter {
   }
   template <class Count, class T, std::size_t Max>
   void operator()(const char* name, Counted<Count, T, Max>& list, const char* unit = "") {
-    visitor.list({name, unit},
-                 {kTypeOf<Count>, kTypeOf<T>, Max, &list.values, &valuesOf<T>, &resizeList<T>});
+    visitor.list({name, unit}, {kTypeOf<Count>, kTypeOf<T>, Max, &list.values, &valuesOf<T>, &resizeList<T>});
   }
 };
 

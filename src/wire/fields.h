@@ -1,5 +1,5 @@
-// The fields of a message whose struct is known only at run time: what describes, prints, compares and fills any
-// message walks them here, and does not instantiate itself for every struct of the table.
+// The fields of a message whose struct is known only at run time: what describes, prints, compares and fills
+// any message walks them here, and does not instantiate itself for every struct of the table.
 #pragma once
 
 #include <cstddef>

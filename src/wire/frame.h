@@ -1,5 +1,5 @@
-// Frames: the 24-byte header that precedes every payload, and the padding behind it. The layer for callers
-// that loop over raw bytes; it allocates nothing and copies nothing.
+// Frames: the 24-byte header that precedes every payload, and the padding behind it. For callers that loop over
+// raw bytes: nothing here allocates or copies.
 #pragma once
 
 #include <string>
@@ -10,8 +10,8 @@
 namespace hapticd::wire {
 
 inline constexpr std::size_t kHeaderBytes = 24;
-/// Longest payload accepted or sent: what the stock library's buffer takes. A peer that claims more is
-/// dropped, so a stranger can make a connection hold this much and no more.
+/// Longest payload accepted or sent: the size of the stock library's buffer. A peer that announces more is
+/// disconnected, which bounds the memory that a client can make a connection hold.
 inline constexpr std::size_t kMaxPayloadBytes = 64000;
 /// Longest datagram sent; it holds whole frames.
 inline constexpr std::size_t kMaxDatagramBytes = 1472;
@@ -27,10 +27,10 @@ struct FrameHeader {
   Time time;
   std::int32_t sender = 0;
   std::int32_t type = 0;
-  std::uint32_t sequence = 0;  ///< for people who watch the network; receivers ignore it
+  std::uint32_t sequence = 0;  ///< for network analysis; receivers ignore it
 };
 
-/// One frame inside somebody else's bytes.
+/// One frame inside bytes that the caller owns.
 struct FrameView {
   FrameHeader header;
   ByteView payload;
@@ -39,8 +39,8 @@ struct FrameView {
 
 enum class FrameStatus : std::uint8_t {
   kComplete,    ///< a frame, padding included
-  kIncomplete,  ///< a good beginning: more bytes are needed
-  kInvalid      ///< no frame starts like this: see invalidFrame()
+  kIncomplete,  ///< valid so far: more bytes are needed
+  kInvalid      ///< not the start of a frame: see invalidFrame()
 };
 
 /// Reads the header at p, which must have kHeaderBytes bytes.
@@ -73,10 +73,10 @@ inline FrameStatus readFrame(ByteView bytes, FrameView& frame) noexcept {
   return FrameStatus::kComplete;
 }
 
-/// Says why readFrame() found bytes (at least 4) invalid.
+/// The reason why readFrame() refused the bytes (at least 4), as an error text.
 std::string invalidFrame(ByteView bytes);
 
-/// Iterates over the frames in bytes: `while (reader.next(frame)) ...`, then status() says why it stopped.
+/// Iterates over the frames in bytes: `while (reader.next(frame)) ...`, then status() gives the reason for the end.
 class FrameReader {
  public:
   explicit FrameReader(ByteView bytes) noexcept : rest_(bytes) {}

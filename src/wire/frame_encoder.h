@@ -1,5 +1,5 @@
 // Messages into frames. Our ids are the same on every connection and receivers ignore sequence numbers, so a
-// server encodes a batch of reports once and hands the same bytes to every endpoint (Peer::sendFrames).
+// server encodes a batch of reports once and gives the same bytes to every peer (Peer::sendFrames).
 #pragma once
 
 #include <stdexcept>
@@ -31,12 +31,12 @@ class FrameEncoder {
   /// Appends bytes that are whole frames (or a cookie) already.
   void append(ByteView bytes) { bytes_.insert(bytes_.end(), bytes.begin(), bytes.end()); }
 
-  /// What was added since the last clear(), valid until the next change.
+  /// The frames added since the last clear(), valid until the next change.
   ByteView bytes() const noexcept { return bytes_; }
   bool empty() const noexcept { return bytes_.empty(); }
-  /// Forgets the bytes; sequence numbers go on.
+  /// Drops the bytes; sequence numbers continue.
   void clear() noexcept { bytes_.clear(); }
-  /// Swaps the bytes out against an empty or used-up buffer.
+  /// Moves the bytes to `out`, whose old content is dropped and whose memory is reused.
   void swapOut(std::vector<std::byte>& out) noexcept {
     out.clear();
     bytes_.swap(out);
@@ -59,8 +59,8 @@ class FrameEncoder {
   std::uint32_t sequence_ = 0;
 };
 
-/// Cuts whole frames into datagrams of at most kMaxDatagramBytes and calls sink(ByteView) with each. A frame
-/// longer than that goes alone in a datagram of its own, which peers may refuse: send such messages by TCP.
+/// Cuts whole frames into datagrams of at most kMaxDatagramBytes and calls sink(ByteView) with each. A
+/// longer frame gets its own datagram, which peers may refuse: send such messages by TCP.
 template <class Sink>
 void cutDatagrams(ByteView frames, Sink&& sink) {
   std::size_t start = 0;

@@ -96,7 +96,8 @@ Result<void> decodeInto(MessageKind kind, ByteView payload, void* message) {
 }
 
 Result<Message> decode(MessageKind kind, ByteView payload) {
-  if (static_cast<std::size_t>(kind) >= kMessageKinds) return Error{decodeInto(kind, payload, nullptr).error()};
+  if (static_cast<std::size_t>(kind) >= kMessageKinds)
+    return Error{decodeInto(kind, payload, nullptr).error()};
   Message message(kind);
   const Result<void> decoded = decodeInto(kind, payload, message.data());
   if (!decoded) return Error{decoded.error()};

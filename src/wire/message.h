@@ -1,5 +1,5 @@
-// Any message of the table as one value. Copying, destroying and encoding are compiled once, in message.cpp: a
-// std::variant of so many structs costs every file that holds one several seconds of compile time.
+// Any message of the table as one value. Copying, destroying and encoding are compiled once, in message.cpp:
+// a std::variant of so many structs costs every file that holds one several seconds of compile time.
 #pragma once
 
 #include <array>
@@ -33,7 +33,8 @@ inline constexpr Layout kLargestMessage = largestOf(AllMessages{});
 
 }  // namespace detail
 
-/// Holds one struct of the table, in place: about 260 bytes, and no allocation besides that of the struct itself.
+/// Holds one struct of the table, in place: about 260 bytes, and no allocation besides that of the struct
+/// itself.
 class Message {
  public:
   template <class M>
@@ -68,7 +69,8 @@ class Message {
   MessageKind kind_;
 };
 
-/// Payload bytes of this message without padding; std::length_error when a list is longer than its type allows.
+/// Payload bytes of this message without padding; std::length_error when a list is longer than its type
+/// allows.
 std::size_t payloadSize(const Message& message);
 
 /// Writes payloadSize(message) bytes to out.
@@ -77,8 +79,8 @@ void encodePayload(const Message& message, std::byte* out);
 /// Reads one payload of a kind known at run time; kUnknownKind is an error.
 Result<Message> decode(MessageKind kind, ByteView payload);
 
-/// Reads one payload into `message`, which must point to a struct of this kind; on an error the struct stays as it
-/// is. Cheaper to build than decode<M>(), and a little slower to run.
+/// Reads one payload into `message`, which must point to a struct of this kind; on an error the struct stays
+/// as it is. Cheaper to build than decode<M>(), and a little slower to run.
 Result<void> decodeInto(MessageKind kind, ByteView payload, void* message);
 
 }  // namespace hapticd::wire

@@ -1,5 +1,5 @@
-// Sender and type names and the numbers that stand for them. Each side of a connection numbers its own names;
-// our numbers and a peer's are different types, so that they cannot be mixed up.
+// Names of senders and message types, and their numbers. Each side of a connection numbers its own names; our
+// numbers and those of a peer are different C++ types, so that code cannot confuse them.
 #pragma once
 
 #include <compare>
@@ -13,7 +13,7 @@
 
 namespace hapticd::wire {
 
-/// A number for a name; which numbering it belongs to is the Tag.
+/// The number of a name in the numbering that Tag stands for.
 template <class Tag>
 struct Id {
   std::int32_t value = -1;
@@ -37,15 +37,15 @@ constexpr LocalType localType(MessageKind kind) noexcept {
 template <WireMessage M>
 inline constexpr LocalType kLocalType = localType(kindOf<M>);
 
-/// The names we use, shared by all endpoints of a process. Starts with every message of the table and no
-/// sender. Names are never removed. Endpoints announce new ones when they next feed or send. Not thread safe:
-/// one thread owns it and its endpoints.
+/// The names we use, shared by all peers of a process. Starts with every message of the table and no sender. Names
+/// are never removed. A peer announces new ones when it next feeds or sends. Not thread safe: one thread owns the
+/// names and their peers.
 class LocalNames {
  public:
   LocalNames();
 
   /// The number of this name, new or known. Throws std::invalid_argument for a name that is empty, longer
-  /// than kMaxNameBytes or holds a NUL, and std::length_error behind kMaxNames.
+  /// than kMaxNameBytes or holds a NUL, and std::length_error beyond kMaxNames names.
   LocalSender addSender(std::string_view name);
   /// The same for a message name, which may be one that is not in the table.
   LocalType addType(std::string_view name);

@@ -31,7 +31,7 @@ Peer::Peer(const LocalNames& names, PeerOptions options)
 
 void Peer::feedStream(Time now, ByteView bytes, EventSink sink) {
   announce(now);
-  // Whole units are handled where they lie; only one that was cut is put together in partial_.
+  // Complete units are handled in place; only one that was cut is assembled in partial_.
   while (!failed()) {
     if (partial_.empty()) {
       const std::size_t need = unitBytes(bytes);
@@ -53,8 +53,8 @@ void Peer::feedStream(Time now, ByteView bytes, EventSink sink) {
   }
 }
 
-// How many bytes the cookie or frame that starts so has, as far as its start can tell; an invalid length
-// claims just the bytes that show it.
+// Size of the cookie or frame that starts with these bytes, as far as they show it; for an invalid length only the
+// bytes of the length.
 std::size_t Peer::unitBytes(ByteView start) const noexcept {
   if (state_ == State::kAwaitingCookie) return kCookieBytes;
   constexpr std::size_t kLengthBytes = sizeof(std::uint32_t);

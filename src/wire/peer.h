@@ -18,9 +18,9 @@
 
 namespace hapticd::wire {
 
-// Events. What they point to lives until the sink returns.
+// Events. Views in them are valid until the sink returns.
 
-/// The peer's cookie was accepted; messages can be sent from now on.
+/// The peer's cookie is valid; messages can be sent from now on.
 struct Connected {
   std::string_view version;  ///< the peer's, such as "07.34"
   int log_mode = 0;          ///< logging the peer asks of us, see Cookie
@@ -50,17 +50,17 @@ struct MessageReceived {
 struct UdpDescribed {
   UdpAddress address;
 };
-/// The peer asks for log files. Opening files a stranger names is the caller's decision; the stock server
-/// does it.
+/// The peer asks for log files. Whether to open files that a peer names is the caller's decision; the stock server
+/// does.
 struct LogRequested {
   LogRequest request;
 };
-/// Something was skipped and the connection goes on.
+/// Something was ignored; the connection continues.
 struct Ignored {
   std::string_view reason;  ///< a string literal
   std::int32_t value = 0;   ///< the offending number
 };
-/// The peer broke the protocol: close the connection. No event follows, and nothing is sent any more.
+/// The peer violated the protocol: close the connection. No event follows, and nothing more is sent.
 struct ProtocolError {
   std::string_view reason;
 };
@@ -68,7 +68,7 @@ struct ProtocolError {
 using Event = std::variant<MessageReceived, Connected, SenderDescribed, TypeDescribed, UdpDescribed,
                            LogRequested, Ignored, ProtocolError>;
 
-/// What distinguishes one endpoint from another.
+/// What differs between peers of one process.
 struct PeerOptions {
   /// Our own datagram socket, described to the peer. Without one the connection is TCP only, as a `tcp://`
   /// connection is on both sides, and a peer's UDP description is ignored.
@@ -78,26 +78,26 @@ struct PeerOptions {
 };
 
 /// The state machine. Pure: no clock, no socket, no thread; one thread at a time. The sink of a feed may
-/// send, and must neither feed nor destroy the endpoint.
+/// send, and must neither feed nor destroy the peer.
 class Peer {
  public:
-  /// The names must outlive the endpoint; it notices names added later.
+  /// The names must outlive the peer, which also announces names added later.
   explicit Peer(const LocalNames& names, PeerOptions options = {});
 
-  /// Takes bytes of the TCP stream, cut anywhere, and calls sink(const Event&) for what is in them. `now`
+  /// Takes bytes of the TCP stream, cut anywhere, and calls sink(const Event&) for each event in them. `now`
   /// stamps the descriptions this may send. Keeps at most one unfinished frame.
   template <class Sink>
   void feed(Time now, ByteView bytes, Sink&& sink) {
     feedStream(now, bytes, EventSink(sink));
   }
-  /// Takes one datagram. Anything wrong with it is Ignored, never a ProtocolError, since anybody can forge
-  /// one; for the same reason system messages in it do not count.
+  /// Takes one datagram. Errors in it are Ignored, never a ProtocolError, because datagrams can be
+  /// forged; for the same reason system messages in it are ignored.
   template <class Sink>
   void feedDatagram(ByteView datagram, Sink&& sink) {
     feedPacket(datagram, EventSink(sink));
   }
 
-  /// Whether the handshake is done and nothing has failed since.
+  /// Whether the handshake is complete and no ProtocolError followed.
   bool connected() const noexcept { return state_ == State::kConnected; }
   /// Whether a ProtocolError was reported.
   bool failed() const noexcept { return state_ == State::kFailed; }
@@ -119,7 +119,7 @@ class Peer {
   bool send(Time time, LocalSender sender, const Message& message, Reliability reliability);
   /// Sends a message of a type that is not in the table, see LocalNames::addType.
   bool sendRaw(Time time, LocalSender sender, LocalType type, ByteView payload, Reliability reliability);
-  /// Sends whole frames that a FrameEncoder made, shared with other endpoints; false when not connected.
+  /// Sends whole frames of a FrameEncoder, shared with other peers; false when not connected.
   bool sendFrames(Time now, ByteView frames, Reliability reliability);
   /// Describes names added since the last feed or send; false when not connected.
   bool announce(Time now);
@@ -136,7 +136,7 @@ class Peer {
  private:
   enum class State : std::uint8_t { kAwaitingCookie, kConnected, kFailed };
 
-  // A reference to the caller's sink: one indirect call an event, no allocation.
+  // A reference to the caller's sink: one indirect call per event, no allocation.
   class EventSink {
    public:
     template <class Sink>
@@ -178,7 +178,7 @@ class Peer {
   bool use_datagrams_ = false;
   std::size_t announced_senders_ = 0;
   std::size_t announced_types_ = 0;
-  std::vector<std::byte> partial_;    // the beginning of a cookie or frame that is not all there yet
+  std::vector<std::byte> partial_;    // the start of a cookie or frame that is still incomplete
   std::vector<SenderEntry> senders_;  // by the peer's number
   std::vector<TypeEntry> types_;
   FrameEncoder stream_;

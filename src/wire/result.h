@@ -1,4 +1,4 @@
-// A value, or a sentence that says why there is none.
+// A value, or an error text.
 #pragma once
 
 #include <optional>
@@ -8,7 +8,7 @@
 
 namespace hapticd::wire {
 
-/// Why something a peer sent is refused; the text names the offending value.
+/// Why something that a peer sent is refused; the text names the offending value.
 struct Error {
   std::string text;
 };
@@ -25,7 +25,7 @@ class [[nodiscard]] Result {
   const T& operator*() const& { return std::get<0>(state_); }
   T&& operator*() && { return std::get<0>(std::move(state_)); }
   const T* operator->() const { return &std::get<0>(state_); }
-  /// The sentence, when there is no value.
+  /// The error text, when there is no value; throws std::bad_variant_access otherwise.
   const std::string& error() const { return std::get<1>(state_).text; }
 
  private:
@@ -41,7 +41,7 @@ class [[nodiscard]] Result<void> {
 
   /// True on success.
   explicit operator bool() const noexcept { return !error_; }
-  /// The sentence, after a failure; throws std::bad_optional_access on success.
+  /// The error text, after a failure; throws std::bad_optional_access on success.
   const std::string& error() const { return error_.value().text; }
 
  private:

@@ -1,4 +1,4 @@
-// System messages: negative types by which two endpoints describe themselves. The sender field carries an
+// System messages: negative types with which two peers describe themselves. The sender field carries an
 // argument.
 #pragma once
 
@@ -16,12 +16,12 @@ inline constexpr std::int32_t kSenderDescription = -1;  ///< sender field: the n
 inline constexpr std::int32_t kTypeDescription = -2;    ///< sender field: the number described
 inline constexpr std::int32_t kUdpDescription = -3;     ///< sender field: UDP port
 inline constexpr std::int32_t kLogDescription = -4;     ///< sender field: log mode
-/// Types from here down end the connection; other unknown system messages are ignored.
+/// This type and lower ones end the connection; other unknown system messages are ignored.
 inline constexpr std::int32_t kFirstForbiddenType = -2000;
 /// Longest payload of a sender or type description.
 inline constexpr std::size_t kMaxDescriptionBytes = 100;
 
-/// Where datagrams go.
+/// The destination of datagrams.
 struct UdpAddress {
   std::string host;  ///< letters, digits and dots only
   std::uint16_t port = 0;

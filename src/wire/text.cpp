@@ -5,7 +5,7 @@
 namespace hapticd::wire {
 
 namespace {
-// A stranger's bytes in a log must not drown what else it says.
+// Truncate untrusted text so that one client cannot flood the log.
 constexpr std::size_t kLongestQuote = 64;
 }  // namespace
 

@@ -1,4 +1,4 @@
-// Text of strangers, made fit for logs and errors.
+// Untrusted text, made safe for logs and error texts.
 #pragma once
 
 #include <string>
@@ -18,11 +18,10 @@ inline ByteView asBytes(std::string_view text) noexcept {
   return std::as_bytes(std::span(text));
 }
 
-/// In quotes, with everything but printable ASCII as \xNN.
+/// The text in quotes, at most 64 bytes of it, with everything but printable ASCII as \xNN.
 std::string inQuotes(std::string_view text);
 
-/// Whether text may be a host: letters, digits, dots; not empty, at most 255 characters. The stock server's
-/// rule.
+/// Whether text is a valid host by the stock server's rule: 1 to 255 letters, digits and dots.
 bool isHost(std::string_view text) noexcept;
 
 }  // namespace hapticd::wire

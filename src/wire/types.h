@@ -18,10 +18,10 @@ struct Time {
   friend bool operator==(const Time&, const Time&) = default;
 };
 
-/// Who sends a message.
+/// Which side sends a message.
 enum class Direction : std::uint8_t { kToServer, kToClient, kBoth };
 
-/// How a message travels: reliable ones by TCP, low-latency ones by UDP once there is a UDP link.
+/// How a message travels: reliable ones by TCP, low-latency ones by UDP once the connection has a UDP link.
 enum class Reliability : std::uint8_t { kReliable, kLowLatency };
 
 /// What a message is to the server.

@@ -1,4 +1,4 @@
-// The datagram with which a client asks a server to call it back by TCP: "host port" and a NUL.
+// The datagram with which a client asks the server for a reverse connection by TCP: "host port" and a NUL.
 #pragma once
 
 #include <cstdint>

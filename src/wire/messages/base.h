@@ -1,4 +1,4 @@
-// Messages every device speaks (vrpn_BaseClass).
+// Messages of every device (vrpn_BaseClass).
 #pragma once
 
 #include "wire/types.h"
@@ -32,7 +32,7 @@ struct Pong {
 struct Text {
   static constexpr MessageInfo kInfo{
       "vrpn_Base text_message", Direction::kBoth, Reliability::kReliable, Role::control,
-      "Says something to a human: severity 0 is normal, 1 a warning, 2 an error."};
+      "Carries a text for a person: severity 0 is normal, 1 a warning, 2 an error."};
   std::uint32_t severity = kTextNormal;
   std::uint32_t level = 0;
   TextBuffer<1024> text;

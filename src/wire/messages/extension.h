@@ -1,5 +1,5 @@
-// Messages that VRPN does not know. Peers learn names in the handshake and ignore those they do not know, so
-// none of these disturbs a stock client or server. What they do: docs/wire-extensions.md.
+// Messages that VRPN does not know. Peers learn names in the handshake and ignore unknown ones, so none of these
+// disturbs a stock client or server. Their meaning: docs/wire-extensions.md.
 #pragma once
 
 #include "wire/types.h"
@@ -34,7 +34,7 @@ enum ReportKinds : std::uint32_t {
 struct QueryCapabilities {
   static constexpr MessageInfo kInfo{
       "hapticd Query_Capabilities", Direction::kToServer, Reliability::kReliable, Role::control,
-      "Asks what this server and its device can do; answered by Capabilities."};
+      "Asks for the abilities of the server and its device; answered by Capabilities."};
 
   template <class M, class V>
   static constexpr void fields(M&, V&&) {}
@@ -102,7 +102,7 @@ struct MeshTriangles {
 struct BatchBegin {
   static constexpr MessageInfo kInfo{
       "hapticd Batch_Begin", Direction::kToServer, Reliability::kReliable, Role::scene,
-      "What this client commands until Batch_Commit becomes visible in one tick, or not at all."};
+      "Starts a batch: the client's commands until Batch_Commit become visible in one tick, or not at all."};
 
   template <class M, class V>
   static constexpr void fields(M&, V&&) {}
@@ -130,11 +130,11 @@ struct Subscribe {
   }
 };
 
-/// One tick, whole. Positions in world units / 1000 and the world's frame, as the tracker reports.
+/// All values of one tick. Positions in world units / 1000 in the world frame, as in the tracker reports.
 struct TickReport {
   static constexpr MessageInfo kInfo{
       "hapticd Tick", Direction::kToClient, Reliability::kLowLatency, Role::report,
-      "Reports one servo tick: its number, its time on the server's monotonic clock, and what it felt."};
+      "Reports one servo tick: its number, its time on the server's monotonic clock, and its values."};
   std::uint64_t tick = 0;
   std::int64_t time = 0;
   std::uint64_t revision = 0;
@@ -204,7 +204,7 @@ struct RearmForces {
                                      Direction::kToServer,
                                      Reliability::kReliable,
                                      Role::control,
-                                     "Clears a stop and latched faults; forces come back over 0.5 s.",
+                                     "Clears a stop and latched faults; forces return over 0.5 s.",
                                      Access::command};
 
   template <class M, class V>
@@ -214,7 +214,7 @@ struct RearmForces {
 struct GuardState {
   static constexpr MessageInfo kInfo{
       "hapticd Guard_State", Direction::kToClient, Reliability::kReliable, Role::report,
-      "Reports, on change, which trips hold the force (bits), whether it is armed or stopped."};
+      "Reports, on change, which trips hold the force (bits) and whether it is armed or stopped."};
   std::uint32_t active = 0;
   std::uint32_t latched = 0;
   Bool16 armed = 0;
@@ -235,7 +235,7 @@ struct Heartbeat {
       Direction::kToServer,
       Reliability::kReliable,
       Role::control,
-      "After the first, a client that sends none for 500 ms counts as lost; watch 0 ends that.",
+      "Starts a watchdog: a client that then sends none for 500 ms is lost; watch 0 ends it.",
       Access::free,
       Order::overtaking};
   Bool16 watch = 1;

@@ -1,5 +1,5 @@
-// Messages of vrpn_ForceDevice that every VRPN has, first part: what a device reports, and what the driver of
-// a device renders by itself (planes, force fields, constraints, custom effects). No alignment: a double may
+// Messages of vrpn_ForceDevice that every VRPN has, first part: what a device reports, and what the driver
+// of a device renders itself (planes, force fields, constraints, custom effects). No alignment: a double may
 // sit at any offset.
 #pragma once
 
@@ -115,7 +115,7 @@ struct Plane2 {
 struct CustomEffect {
   static constexpr MessageInfo kInfo{
       "vrpn_ForceDevice Custom Effect", Direction::kToServer, Reliability::kReliable, Role::scene,
-      "Starts an effect the device driver knows by number; 0xFFFFFFFF stops it."};
+      "Starts an effect that the device driver defines by number; 0xFFFFFFFF stops it."};
   std::uint32_t effect = 0;
   Counted<std::uint32_t, float, 15998> parameters;
 

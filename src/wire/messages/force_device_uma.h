@@ -82,7 +82,7 @@ struct SetHapticProperty {
 struct SetTouchableFace {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice setTouchableFace", Direction::kToServer,
                                      Reliability::kReliable, Role::scene,
-                                     "Chooses which faces are felt: 0 front, 1 back, anything else both."};
+                                     "Chooses the faces that are rendered: 0 front, 1 back, any other value both."};
   std::int32_t face = 2;
 
   template <class M, class V>
@@ -143,7 +143,7 @@ struct StopEffect {
 struct ResetScene {
   static constexpr MessageInfo kInfo{
       "vrpn_ForceDevice resetScene", Direction::kToServer, Reliability::kReliable, Role::scene,
-      "Puts workspace, objects and effects back to the beginning; the byte means nothing."};
+      "Resets workspace, objects and effects to their initial state; the byte has no meaning."};
   std::uint8_t ignored = 0;
 
   template <class M, class V>

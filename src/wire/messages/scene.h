@@ -1,5 +1,5 @@
-// Messages of vrpn_ForceDevice that every VRPN has, second part: the scene a client builds. Where a call of
-// the C++ client names no object, object 0 is meant.
+// Messages of vrpn_ForceDevice that every VRPN has, second part: the scene that a client builds. A call of the C++
+// client that names no object addresses object 0.
 #pragma once
 
 #include "wire/types.h"
@@ -23,7 +23,7 @@ struct AddObject {
 struct AddObjectExScene {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice addObjectExScene", Direction::kToServer,
                                      Reliability::kReliable, Role::scene,
-                                     "Adds an object next to the scene, as a root of its own."};
+                                     "Adds an object beside the scene, as another root."};
   std::int32_t object = 0;
 
   template <class M, class V>
@@ -168,7 +168,7 @@ struct RemoveTriangle {
 struct UpdateTrimeshChanges {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice updateTrimeshChanges", Direction::kToServer,
                                      Reliability::kReliable, Role::scene,
-                                     "Makes mesh edits felt, with this surface."};
+                                     "Makes mesh edits effective, with this surface."};
   std::int32_t object = 0;
   float stiffness = 0;
   float damping = 0;

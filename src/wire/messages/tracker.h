@@ -1,4 +1,4 @@
-// Messages of vrpn_Tracker: poses of sensors and the rooms they live in. Metres, quaternions x y z w.
+// Messages of vrpn_Tracker: poses of sensors and of the tracker in its room. Metres, quaternions x y z w.
 #pragma once
 
 #include "wire/types.h"
@@ -7,7 +7,7 @@ namespace hapticd::wire {
 
 struct TrackerPosQuat {
   static constexpr MessageInfo kInfo{"vrpn_Tracker Pos_Quat", Direction::kToClient, Reliability::kLowLatency,
-                                     Role::report, "Reports where a sensor is; the filler is ignored."};
+                                     Role::report, "Reports the pose of a sensor; the filler is ignored."};
   std::int32_t sensor = 0;
   std::int32_t filler = 0;
   F64x3 position{};
@@ -65,7 +65,7 @@ struct TrackerAcceleration {
 
 struct TrackerToRoom {
   static constexpr MessageInfo kInfo{"vrpn_Tracker To_Room", Direction::kToClient, Reliability::kReliable,
-                                     Role::report, "Says where the tracker's base stands in the room."};
+                                     Role::report, "Reports the pose of the tracker's base in the room."};
   F64x3 position{};
   F64x4 orientation{0, 0, 0, 1};
 
@@ -97,7 +97,7 @@ struct TrackerUnitToSensor {
 
 struct TrackerWorkspace {
   static constexpr MessageInfo kInfo{"vrpn_Tracker Workspace", Direction::kToClient, Reliability::kReliable,
-                                     Role::report, "Says in which box the tracker works."};
+                                     Role::report, "Reports the box in which the tracker works."};
   F64x3 min{};
   F64x3 max{};
 

@@ -226,3 +226,107 @@ test("hand, subscription and meshes are written to the byte", () => {
   ];
   for (const [ours, bytes] of expected) assert.equal(hex(ours.payload), bytes.buffer.toString("hex"));
 });
+
+// testdata/wire/vectors.json: every message several times, also encoded and decoded by the C++ tests.
+const vectors = JSON.parse(new TextDecoder().decode(testdata("vectors.json")));
+const byStruct = Object.fromEntries(
+  vectors.map(({ struct }) => [struct, wire.messages[struct]]),
+);
+const camelCase = (name) => name.replace(/_(\w)/g, (_, letter) => letter.toUpperCase());
+/** Fields as TypeScript has them; 64-bit integers are text in the file and numbers here. */
+const fieldsOf = ({ struct, fields }) => {
+  const isText = { Text: ["text"], SetHapticProperty: ["property"], Effect: ["type"] }[struct] ?? [];
+  return Object.fromEntries(
+    Object.entries(fields).map(([name, value]) => [
+      camelCase(name),
+      typeof value === "string" && !isText.includes(name) ? Number(BigInt(value)) : value,
+    ]),
+  );
+};
+const isExact = (fields) =>
+  Object.values(fields).every((v) => !Number.isInteger(v) || Number.isSafeInteger(v));
+const viewOf = (text) => {
+  const bytes = Uint8Array.from(Buffer.from(text, "hex"));
+  return new DataView(bytes.buffer);
+};
+
+test("every message of the table has vectors, and the same name on the wire", () => {
+  assert.deepEqual(
+    new Set(vectors.map((v) => v.name)),
+    new Set(wire.messages.ALL_MESSAGES.map((m) => m.name)),
+  );
+  for (const { struct, name } of vectors) assert.equal(byStruct[struct].name, name);
+});
+
+test("the vectors are decoded field by field", () => {
+  for (const vector of vectors)
+    assert.deepEqual(byStruct[vector.struct].decode(viewOf(vector.payload)), fieldsOf(vector), vector.name);
+});
+
+test("the vectors are encoded to the byte", () => {
+  let inexact = 0;
+  for (const vector of vectors) {
+    const fields = fieldsOf(vector);
+    // Only reports have 64-bit integers beyond 2^53, which the page never sends.
+    const exact = isExact(fields) || !["TickReport", "ContactList"].includes(vector.struct);
+    if (!exact) {
+      ++inexact;
+      continue;
+    }
+    const { name, payload } = byStruct[vector.struct].encode(fields);
+    assert.equal(name, vector.name);
+    assert.equal(hex(payload), vector.payload, vector.name);
+    const { seconds, microseconds, sender, type, sequence } = vector.header;
+    // The page's clock is a double in seconds, which does not hold every microsecond of the far future.
+    if (microseconds % 250000 !== 0) continue;
+    const frame = wire.encodeFrame(seconds + microseconds / 1e6, sender, type, sequence, payload);
+    assert.equal(hex(frame), vector.frame, vector.name);
+  }
+  assert.equal(inexact, 3);
+});
+
+test("the frames of the vectors are read from one stream", () => {
+  const stream = new wire.FrameStream();
+  stream.push(Uint8Array.from(Buffer.from(vectors.map((v) => v.frame).join(""), "hex")));
+  for (const { payload, header, name } of vectors) {
+    const frame = stream.next();
+    assert.equal(hex(frame.payload), payload, name);
+    assert.equal(frame.sender, header.sender);
+    assert.equal(frame.type, header.type);
+    assert.ok(Math.abs(frame.time_s - header.seconds - header.microseconds / 1e6) < 1e-6);
+  }
+  assert.equal(stream.next(), undefined);
+});
+
+test("payloads and lists of a wrong length are errors that name the message", () => {
+  const { SetVertex, ButtonStates, AnalogChannels, SetHapticProperty, Effect } = wire.messages;
+  assert.throws(
+    () => SetVertex.decode(viewOf("00".repeat(19))),
+    /setVertex: payload of 19 bytes, expected 20/,
+  );
+  assert.throws(
+    () => ButtonStates.decode(viewOf("00".repeat(3))),
+    /States: payload of 3 bytes, expected at least 4/,
+  );
+  assert.throws(() => ButtonStates.decode(viewOf("ffffffff")), /states counts -1 values, room for 0/);
+  assert.throws(() => ButtonStates.decode(viewOf("0000000200000001")), /counts 2 values, room for 1/);
+  assert.throws(
+    () => AnalogChannels.decode(viewOf("4004000000000000" + "00".repeat(24))),
+    /counts 2.5 values/,
+  );
+  assert.deepEqual(
+    ButtonStates.decode(viewOf("0000000100000005ffff")).states,
+    [5],
+    "bytes behind a list are ignored",
+  );
+  assert.throws(() => ButtonStates.encode({ states: new Array(257).fill(0) }), /257 values, at most 256/);
+  assert.throws(
+    () => SetVertex.encode({ object: 0, vertex: 0, position: [1, 2] }),
+    /position has 2 values, expected 3/,
+  );
+  assert.throws(
+    () => SetHapticProperty.encode({ object: 0, property: "x".repeat(21), value: 0 }),
+    /longer than 20 bytes/,
+  );
+  assert.equal(Effect.decode(viewOf("61".repeat(20) + "00".repeat(84))).type, "a".repeat(20));
+});

@@ -1,3 +1,4 @@
-export * from "./peer";
 export * from "./frame";
-export * from "./messages";
+export * as messages from "./messages";
+export * from "./page";
+export * from "./peer";

@@ -1,7 +1,7 @@
 // One side of a VRPN connection: cookie, the names of senders and types of either side, messages by name.
 import { COOKIE_BYTES, decodeCookie, encodeCookie } from "./cookie";
 import { encodeFrame, FrameStream, type Frame } from "./frame";
-import { Reader, Writer } from "./bytes";
+import { getText, putText } from "./codec";
 
 const SENDER_DESCRIPTION = -1;
 const TYPE_DESCRIPTION = -2;
@@ -22,7 +22,10 @@ export interface Incoming {
 /** What describes a number: the length of the name with its NUL, the name, the NUL. */
 export function encodeDescription(name: string): Uint8Array {
   const size = new TextEncoder().encode(name).length + 1;
-  return new Writer(4 + size).i32(size).text(name, size).bytes();
+  const view = new DataView(new ArrayBuffer(4 + size));
+  view.setInt32(0, size);
+  putText(view, 4, name, size);
+  return new Uint8Array(view.buffer);
 }
 
 export class Endpoint {
@@ -92,7 +95,5 @@ export class Endpoint {
 }
 
 function described(frame: Frame): string {
-  return new Reader(new DataView(frame.payload.buffer, frame.payload.byteOffset + 4)).text(
-    frame.payload.byteLength - 4,
-  );
+  return getText(frame.payload, 4, frame.payload.byteLength - 4);
 }

@@ -1,0 +1,104 @@
+// The messages that the page sends and reads, in the page's own terms.
+import * as m from "./messages";
+import type { Vec3, Vec4 } from "./messages";
+import type { Outgoing } from "./peer";
+
+export { MOST_IN_ONE_MESSAGE, REPORT_BUTTON, REPORT_CONTACTS, REPORT_TICK } from "./messages";
+export type { Vec3 } from "./messages";
+
+export const PONG = m.Pong.name;
+export const TEXT = m.Text.name;
+export const TICK = m.TickReport.name;
+export const CONTACTS = m.ContactList.name;
+export const GUARD_STATE = m.GuardState.name;
+
+const flag = (value: boolean): number => (value ? 1 : 0);
+
+export const ping = (): Outgoing => m.Ping.encode({});
+export const stopForces = (): Outgoing => m.StopForces.encode({});
+export const rearmForces = (): Outgoing => m.RearmForces.encode({});
+export const batchBegin = (): Outgoing => m.BatchBegin.encode({});
+export const batchCommit = (): Outgoing => m.BatchCommit.encode({});
+export const subscribe = (kinds: number, rate_Hz: number): Outgoing =>
+  m.Subscribe.encode({ kinds, rate: rate_Hz });
+
+/** Position in world units; orientation x y z w. */
+export const holdHand = (hold: boolean, position: Vec3, orientation: ArrayLike<number>): Outgoing =>
+  m.HoldHand.encode({ hold: flag(hold), position, orientation: Array.from(orientation) as Vec4, buttons: 0 });
+
+export const meshVertices = (object: number, first: number, positions: Float32Array): Outgoing =>
+  m.MeshVertices.encode({ object, first, positions });
+export const meshTriangles = (object: number, first: number, vertices: Uint32Array): Outgoing =>
+  m.MeshTriangles.encode({ object, first, vertices });
+
+export const setObjectNumber = (count: number): Outgoing => m.SetObjectNumber.encode({ count });
+export const clearTrimesh = (object: number): Outgoing => m.ClearTrimesh.encode({ object });
+export const startEffect = (index: number): Outgoing => m.StartEffect.encode({ index });
+export const stopEffect = (index: number): Outgoing => m.StopEffect.encode({ index });
+
+/** A column-major matrix of 16. */
+export const setTransformMatrix = (object: number, matrix: ArrayLike<number>): Outgoing =>
+  m.SetTransformMatrix.encode({ object, matrix });
+
+export type SurfaceProperty = "stiffness" | "damping" | "static friction" | "dynamic friction" | "popthrough";
+/** The value from 0 to 1. */
+export const setHapticProperty = (object: number, property: SurfaceProperty, value: number): Outgoing =>
+  m.SetHapticProperty.encode({ object, property, value });
+
+export const setObjectIsTouchable = (object: number, touchable: boolean): Outgoing =>
+  m.SetObjectIsTouchable.encode({ object, touchable: flag(touchable) });
+
+export interface Effect {
+  type: string;
+  index: number;
+  gain: number;
+  magnitude_N: number;
+  duration_ms: number;
+  frequency: number;
+  position: Vec3;
+  direction: Vec3;
+}
+export const setEffect = ({ magnitude_N: magnitude, duration_ms: duration, ...rest }: Effect): Outgoing =>
+  m.Effect.encode({ ...rest, magnitude, duration });
+
+/** One servo tick. Lengths in world units / 1000. */
+export interface Tick extends Omit<m.TickReport, "time" | "force"> {
+  time_ns: number;
+  force_N: Vec3;
+}
+export function decodeTick(payload: DataView): Tick {
+  const { time: time_ns, force: force_N, ...rest } = m.TickReport.decode(payload);
+  return { ...rest, time_ns, force_N };
+}
+
+export interface Contact {
+  object: number;
+  point: Vec3;
+  normal: Vec3;
+  force_N: Vec3;
+}
+const NUMBERS_OF_A_CONTACT = 10;
+export function decodeContacts(payload: DataView): Contact[] {
+  const numbers = Array.from(m.ContactList.decode(payload).contacts);
+  const contacts: Contact[] = [];
+  for (let i = 0; i + NUMBERS_OF_A_CONTACT <= numbers.length; i += NUMBERS_OF_A_CONTACT) {
+    const vec3 = (at: number): Vec3 => numbers.slice(i + at, i + at + 3) as Vec3;
+    contacts.push({ object: numbers[i]!, point: vec3(1), normal: vec3(4), force_N: vec3(7) });
+  }
+  return contacts;
+}
+
+export interface GuardState {
+  active: number;
+  latched: number;
+  armed: boolean;
+  stopped: boolean;
+}
+export function decodeGuardState(payload: DataView): GuardState {
+  const { active, latched, armed, stopped } = m.GuardState.decode(payload);
+  return { active, latched, armed: armed !== 0, stopped: stopped !== 0 };
+}
+
+/** Severity: 0 normal, 1 warning, 2 error. Level: a refusal code of the server, 0 in other texts. */
+export type ServerText = m.Text;
+export const decodeText = (payload: DataView): ServerText => m.Text.decode(payload);
