@@ -29,7 +29,7 @@ bool pollUntil(Client& client, Condition&& condition) {
 /// Whether this is the message, field by field.
 template <class M>
 ::testing::AssertionResult is(const Received& received, const M& expected) {
-  const M* message = std::get_if<M>(&received.message);
+  const M* message = received.message.as<M>();
   if (message && *message == expected) return ::testing::AssertionSuccess();
   return ::testing::AssertionFailure() << wire::info(received.message.kind()).name << ", expected "
                                        << M::kInfo.name << (message ? " with other fields" : "");
