@@ -30,7 +30,7 @@ void backUp(ScriptedServer& server, Client& client) {
   ASSERT_LT(client.statistics().tcpBytesOut, static_cast<std::uint64_t>(kVertices) * 48) << "nothing waits";
 }
 
-TEST(Stop, ItOvertakesABackedUpStreamByASecondConnection) {
+TEST(Stop, OvertakesABackedUpStreamByASecondConnection) {
   ScriptedServer server(ableServer());
   Client client(server.tcpName(), {.queueLimit_bytes = 64 * 1024 * 1024});
   backUp(server, client);
@@ -52,7 +52,7 @@ TEST(Stop, ItOvertakesABackedUpStreamByASecondConnection) {
   EXPECT_EQ(server.openConnections(), 1U) << "the second one is closed";
 }
 
-TEST(Stop, TheSecondConnectionIsNotNeededWhileNothingWaits) {
+TEST(Stop, NeedsNoSecondConnectionWhileNothingWaits) {
   ScriptedServer server(ableServer());
   Client client(server.tcpName());
   client.stopForces();
@@ -60,7 +60,7 @@ TEST(Stop, TheSecondConnectionIsNotNeededWhileNothingWaits) {
   EXPECT_EQ(server.connections(), 1U);
 }
 
-TEST(Stop, AReverseConnectionIsOvertakenToo) {
+TEST(Stop, OvertakesAReverseConnectionToo) {
   ScriptedServer server(ableServer());
   Client client(server.name(), {.queueLimit_bytes = 64 * 1024 * 1024});
   backUp(server, client);

@@ -10,7 +10,7 @@ void sendReport(ScriptedServer& server, Client& client, int object) {
   ASSERT_TRUE(pollUntil(client, [&] { return client.latest().touchedObject.object == object; }));
 }
 
-TEST(Subscription, DiscardedItLeavesTheCallbackInPlace) {
+TEST(Subscription, DiscardingItKeepsTheCallback) {
   ScriptedServer server;
   Client client(server.tcpName());
   int calls = 0;
@@ -35,13 +35,13 @@ TEST(Subscription, EndStopsTheCallsAndDestroysTheFunction) {
   const Subscription copy = subscription;
   subscription.end();
   EXPECT_FALSE(copy.active());
-  EXPECT_EQ(captured.use_count(), 1) << "the captures live on";
+  EXPECT_EQ(captured.use_count(), 1) << "the captures are still alive";
   sendReport(server, client, 2);
   EXPECT_EQ(calls, 1);
   subscription.end();
 }
 
-TEST(Subscription, ScopedItEndsWithItsScope) {
+TEST(Subscription, AScopedOneEndsWithItsScope) {
   ScriptedServer server;
   Client client(server.tcpName());
   int calls = 0;
@@ -53,7 +53,7 @@ TEST(Subscription, ScopedItEndsWithItsScope) {
   EXPECT_EQ(calls, 1);
 }
 
-TEST(Subscription, ScopedOnesMoveAndRelease) {
+TEST(Subscription, AScopedOneIsMovedAndReleased) {
   ScriptedServer server;
   Client client(server.tcpName());
   int first = 0;

@@ -84,7 +84,7 @@ class VRPN_API vrpn_BaseClass {
   static int VRPN_CALLBACK handleText(void* self, vrpn_HANDLERPARAM p);
 
   std::vector<Registered> registered_;
-  struct timeval silentSince_;
+  struct timeval silentSince_ = {};
   int warned_s_ = 0;
 };
 typedef vrpn_BaseClass vrpn_BaseClassUnique;

@@ -59,8 +59,8 @@ vrpn_BaseClass::vrpn_BaseClass(const char* name, vrpn_Connection* connection)
   } else {
     d_connection = vrpn_get_connection_by_name(name);
   }
-  vrpn_gettimeofday(&silentSince_, nullptr);
   if (!d_connection) return;
+  silentSince_ = d_connection->get_time();
   d_sender_id = d_connection->registerDevice(d_servicename);
   d_text_message_id = d_connection->register_message_type("vrpn_Base text_message");
   d_ping_message_id = d_connection->register_message_type("vrpn_Base ping_message");
@@ -110,8 +110,7 @@ int vrpn_BaseClass::send_text_message(const char* text, timeval, vrpn_TEXT_SEVER
 void vrpn_BaseClass::client_mainloop() {
   if (!d_connection) return;
   d_connection->mainloop();
-  timeval now;
-  vrpn_gettimeofday(&now, nullptr);
+  const timeval now = d_connection->get_time();
   const bool heard = d_connection->heard(d_sender_id);
   if (heard) {
     silentSince_ = now;

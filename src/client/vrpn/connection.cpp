@@ -6,6 +6,7 @@
 #include <map>
 #include <string_view>
 
+#include "base/world.h"
 #include "client/vrpn/messages.h"
 #include "hapticd/vrpn/vrpn_FileConnection.h"
 
@@ -200,9 +201,8 @@ int vrpn_Connection::time_since_connection_open(timeval* elapsed) {
 }
 
 timeval vrpn_Connection::get_time() {
-  timeval now;
-  vrpn_gettimeofday(&now, nullptr);
-  return now;
+  const hapticd::base::Nanos us = hapticd::base::wallNow() / 1000;
+  return {static_cast<time_t>(us / 1'000'000), static_cast<suseconds_t>(us % 1'000'000)};
 }
 
 const char* vrpn_Connection::sender_name(vrpn_int32 sender) {
