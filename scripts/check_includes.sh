@@ -26,8 +26,6 @@ LIST
 seam_exceptions() {
   cat <<'LIST'
 src/device/simulated/hand_file.cpp
-src/realtime/servo/servo_thread.cpp
-src/realtime/servo/servo_thread.h
 src/record/block_file.cpp
 src/record/export.h
 src/record/mcap_writer.cpp

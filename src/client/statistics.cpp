@@ -1,34 +1,28 @@
 #include "hapticd/statistics.h"
 
 #include <algorithm>
-#include <bit>
-#include <cmath>
+
+#include "base/histogram.h"
 
 namespace hapticd {
 namespace {
 
-// Eight buckets per octave; below 8 us, one per microsecond.
-constexpr std::uint64_t kSteps = 8;
+namespace buckets = base::log_buckets;
 
-std::size_t bucketOf(std::uint64_t us) noexcept {
-  if (us < kSteps) return static_cast<std::size_t>(us);
-  const auto octave = static_cast<std::uint64_t>(std::bit_width(us)) - 4;  // 0 for 8 to 15
-  const std::uint64_t index = kSteps + octave * kSteps + ((us >> octave) - kSteps);
-  return static_cast<std::size_t>(std::min<std::uint64_t>(index, LatencyHistogram::kBuckets - 1));
+int bucketOf(std::uint64_t us) noexcept {
+  return buckets::bucketOf(us, static_cast<int>(LatencyHistogram::kBuckets));
 }
 
 /// The first value above the bucket.
 double upperEnd_us(std::size_t bucket) noexcept {
-  if (bucket < kSteps) return static_cast<double>(bucket + 1);
-  const std::size_t octave = (bucket - kSteps) / kSteps;
-  const std::size_t step = (bucket - kSteps) % kSteps + kSteps;
-  return std::ldexp(static_cast<double>(step + 1), static_cast<int>(octave));
+  return static_cast<double>(buckets::upperBound(static_cast<int>(bucket)) + 1);
 }
 
 }  // namespace
 
 void LatencyHistogram::add(std::chrono::microseconds latency) noexcept {
-  ++buckets_[bucketOf(static_cast<std::uint64_t>(std::max<std::int64_t>(latency.count(), 0)))];
+  const auto us = static_cast<std::uint64_t>(std::max<std::int64_t>(latency.count(), 0));
+  ++buckets_[static_cast<std::size_t>(bucketOf(us))];
 }
 
 LatencyHistogram& LatencyHistogram::operator+=(const LatencyHistogram& other) noexcept {
@@ -42,21 +36,12 @@ LatencyHistogram& LatencyHistogram::operator-=(const LatencyHistogram& earlier) 
 }
 
 std::uint64_t LatencyHistogram::count() const noexcept {
-  std::uint64_t sum = 0;
-  for (const std::uint64_t n : buckets_) sum += n;
-  return sum;
+  return buckets::total(buckets_);
 }
 
 double LatencyHistogram::quantile_us(double q) const noexcept {
-  const auto rank =
-      static_cast<std::uint64_t>(std::ceil(std::clamp(q, 0.0, 1.0) * static_cast<double>(count())));
-  if (count() == 0) return 0;
-  std::uint64_t sum = 0;
-  for (std::size_t i = 0; i < kBuckets; ++i) {
-    sum += buckets_[i];
-    if (sum >= std::max<std::uint64_t>(rank, 1)) return upperEnd_us(i);
-  }
-  return upperEnd_us(kBuckets - 1);
+  const int bucket = buckets::quantileBucket(buckets_, q);
+  return bucket < 0 ? 0 : upperEnd_us(static_cast<std::size_t>(bucket));
 }
 
 std::uint64_t LatencyHistogram::countBelow_us(double limit_us) const noexcept {
