@@ -1,4 +1,4 @@
-// What a driver tells about itself before a device of it exists.
+// A driver as the configuration and the server see it, before it makes a device.
 #pragma once
 
 #include <map>
@@ -13,11 +13,11 @@ namespace hapticd::device {
 
 /// The configuration of one device, as its driver sees it.
 struct DriverOptions {
-  std::string hardware;         ///< which device, in the words of the driver; empty: the first one
+  std::string hardware = {};    ///< which device, in the words of the driver; empty: the first one
   std::string hand = "script";  ///< of devices without a person: "script", or a CSV file with the path
   double servoRate_Hz = 1000;
-  bool calibrate = false;                   ///< consent to calibrate; may move the arm
-  std::map<std::string, std::string> keys;  ///< values of Driver::keys
+  bool calibrate = false;                        ///< consent to calibrate; may move the arm
+  std::map<std::string, std::string> keys = {};  ///< values of Driver::keys
 };
 
 /// A value that the driver does not accept; what() names the key, the value and the remedy.
