@@ -1,4 +1,4 @@
-// What a driver tells about itself before a device of it exists.
+// A driver as the configuration and the server see it, before it makes a device.
 #pragma once
 
 #include <map>
@@ -16,7 +16,7 @@ struct DriverOptions {
   std::string hardware = {};    ///< which device, in the words of the driver; empty: the first one
   std::string hand = "script";  ///< of devices without a person: "script", or a CSV file with the path
   double servoRate_Hz = 1000;
-  bool calibrate = false;                   ///< consent to calibrate; may move the arm
+  bool calibrate = false;                        ///< consent to calibrate; may move the arm
   std::map<std::string, std::string> keys = {};  ///< values of Driver::keys
 };
 

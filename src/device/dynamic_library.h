@@ -1,4 +1,4 @@
-// Vendor libraries, found when the program runs: none of them is needed to build or to start it.
+// Vendor libraries, loaded at run time: neither the build nor the start of the program needs them.
 #pragma once
 
 #include <stdexcept>
@@ -7,14 +7,14 @@
 
 namespace hapticd::device {
 
-/// A library that cannot be used; the text holds the system loader's own words for every name tried.
+/// A library that cannot be used; the text holds the system loader's message for every name tried.
 class LibraryError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// Where a library may be: the file in an environment variable alone, if that is set, otherwise these names
-/// in order.
+/// Where to look for a library: only the file that an environment variable names, if it is set, otherwise these names in
+/// order.
 struct LibraryNames {
   const char* environment;
   std::vector<const char*> unixNames;
@@ -31,12 +31,12 @@ class DynamicLibrary {
   /// The name or file that was loaded.
   const std::string& name() const noexcept { return name_; }
 
-  /// Binds a function that may be missing: null then.
+  /// Binds an optional function; null when it is missing.
   template <class Function>
   void bindOptional(Function*& function, const char* symbol) const noexcept {
     function = reinterpret_cast<Function*>(find(symbol));
   }
-  /// Binds a function that must be there; complain() tells of those that are not.
+  /// Binds a required function; complain() reports the missing ones.
   template <class Function>
   void bind(Function*& function, const char* symbol) {
     bindOptional(function, symbol);

@@ -19,7 +19,7 @@ struct Row {
   int inputDof, outputDof;
 };
 
-// Damping is a choice of design, device plus grip, and not measured.
+// The damping (device plus grip) is a design choice, not measured.
 constexpr Row kRows[] = {
     {"simulated", "", 160, 120, 70, 3.3, 3.3, 1000, 5, 2, kHoldNone, 6, 3},
     {"Touch", "Omni", 160, 120, 70, 3.3, 0.88, 500, 2.5, 2, kHoldInkwell, 6, 3},

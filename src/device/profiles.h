@@ -1,4 +1,4 @@
-// What each kind of device can do, where its driver does not say.
+// Profiles of known models, for values that the driver does not report.
 #pragma once
 
 #include <span>
@@ -12,10 +12,10 @@ namespace hapticd::device {
 /// All known profiles; the first is the simulated device.
 std::span<const DeviceProfile> profiles();
 
-/// The profile of a model, or of another name that it is sold under, whatever the case; null when unknown.
+/// The profile of a model by its name or one of its other trade names, case-insensitive; null when unknown.
 const DeviceProfile* findProfile(std::string_view model);
 
-/// What a person should know of it, on one line.
+/// Summary for the log, on one line.
 std::string inWords(const DeviceProfile& profile);
 
 }  // namespace hapticd::device

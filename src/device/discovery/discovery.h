@@ -1,4 +1,4 @@
-// What is connected to this machine, and why the rest cannot be used: for `hapticd devices`.
+// Devices connected to this machine, and why others cannot be used: for `hapticd devices`.
 #pragma once
 
 #include <filesystem>
@@ -9,12 +9,12 @@
 
 namespace hapticd::device {
 
-/// What one driver finds. Either devices, or a reason and a remedy; both when some can be used and some not.
+/// The findings of one driver: devices, or a reason and a remedy, or both when only some devices can be used.
 struct DriverReport {
   std::string driver;  ///< its name in the configuration
   std::vector<std::string>
-      devices;         ///< in words; what openhaptics can see only by opening is said to be unknown
-  std::string reason;  ///< why there is none, in the words of the loader, the system or the service
+      devices;         ///< descriptions; openhaptics reports as unknown what only opening could show
+  std::string reason;  ///< why there is none: the message of the loader, the system or the service
   std::string remedy;  ///< what to install, connect or allow
 };
 
@@ -23,7 +23,7 @@ std::error_code mayReadAndWrite(const std::filesystem::path& node);
 
 struct DiscoveryOptions {
   bool openThem =
-      false;  ///< also opens, without force, where nothing else tells: takes the device for a moment
+      false;  ///< also opens devices, without force, where nothing else identifies them; occupies each briefly
   std::string haplyHost = "localhost";
   std::string haplyPort = "10001";
   std::filesystem::path usbDevices = "/sys/bus/usb/devices";
@@ -33,7 +33,7 @@ struct DiscoveryOptions {
   std::function<std::error_code(const std::filesystem::path&)> mayUse = mayReadAndWrite;
 };
 
-/// Asks every driver for real devices. Blocks for a second or two; never throws for what it does not find.
+/// Searches for the devices of every driver. Blocks for a second or two; missing devices never throw.
 std::vector<DriverReport> findDevices(const DiscoveryOptions& options = {});
 
 }  // namespace hapticd::device

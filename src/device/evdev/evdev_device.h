@@ -1,8 +1,7 @@
 // Force-feedback joysticks and wheels through Linux evdev: two axes, x and z, or x alone.
 //
-// The kernel may block in an upload, so a thread of the driver exchanges with the device at 500 Hz at most;
-// the servo only leaves its newest force and takes the newest state. A force that the servo does not renew
-// for 20 ms is taken back.
+// The kernel may block in an upload, so a thread of the driver exchanges with the device at up to 500 Hz. The servo only
+// stores its newest force and takes the newest state. The driver zeroes a force that the servo has not renewed for 20 ms.
 #pragma once
 
 #include <array>
@@ -27,7 +26,7 @@ struct EvdevOptions {
   std::filesystem::path profile;  ///< a file for WheelProfile; empty: cautious guesses
 };
 
-/// An input device that is no haptic one: a keyboard, a mouse, a plain gamepad.
+/// An input device without force feedback: a keyboard, a mouse, a plain gamepad.
 class NoForceFeedback : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -36,7 +35,7 @@ class NoForceFeedback : public std::runtime_error {
 class EvdevDevice final : public Device {
  public:
   explicit EvdevDevice(EvdevOptions options = {}) : options_(std::move(options)) {}
-  /// On a file opened elsewhere; without a thread of its own, exchange() does the work.
+  /// For an open file; without a thread, the caller calls exchange().
   EvdevDevice(std::unique_ptr<EventDevice> file, const WheelProfile& profile, bool thread);
   ~EvdevDevice() override { close(); }
 
@@ -86,7 +85,7 @@ class EvdevDevice final : public Device {
 
   const EvdevOptions options_;
   std::unique_ptr<EventDevice> file_;
-  const bool given_ = false;  // the file came from outside
+  const bool given_ = false;  // the file was passed in
   const bool ownThread_ = true;
   WheelProfile wheel_;
   DeviceProfile profile_;
@@ -97,9 +96,9 @@ class EvdevDevice final : public Device {
 
   handoff::LatestValue<Command> command_;
   handoff::LatestValue<Sample> sample_;
-  std::uint64_t commands_ = 0;  // the servo's
+  std::uint64_t commands_ = 0;  // servo thread only
 
-  // The exchanging thread's.
+  // Exchanging thread only.
   std::array<Axis, 2> axes_;
   int axisCount_ = 1;
   std::uint32_t buttons_ = 0;

@@ -1,4 +1,4 @@
-// A Linux input device as a file: everything the driver asks of the kernel passes here.
+// A Linux input device as a file: all calls of the driver into the kernel.
 #pragma once
 
 #include <cstddef>

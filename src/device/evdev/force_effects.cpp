@@ -9,7 +9,7 @@ namespace {
 constexpr double kFullLevel = 0x7fff;
 constexpr __u16 kRight = 0xC000;
 
-// A turn from "down", which is to the user, over "left".
+// Angle from "down" (towards the user) through "left".
 __u16 directionOf(double x, double z) noexcept {
   const double turns = std::atan2(-x, z) / (2 * M_PI);
   return static_cast<__u16>(static_cast<int>(std::lround(turns * 65536)) & 0xffff);
@@ -32,7 +32,7 @@ ForceEffects::ForceEffects(EventDevice& file, const WheelProfile& profile, bool 
 }
 
 bool ForceEffects::begin() noexcept {
-  // A device without an adjustable gain or centring refuses these; nothing is lost then.
+  // A device without adjustable gain or centring refuses these calls, which is harmless.
   send(FF_GAIN, 0xffff);
   send(FF_AUTOCENTER, 0);
   if (hasDamper_ && !upload(damper_)) return false;

@@ -16,9 +16,9 @@ class ForceEffects {
 
   /// Uploads both effects, at rest, and switches the device's own centring off. False with errno set.
   bool begin() noexcept;
-  /// Changes the force if it differs from the one before; false with errno set.
+  /// Changes the force if it differs from the previous one; false with errno set.
   bool set(double x_N, double z_N) noexcept;
-  /// No force is left, also when the device is gone.
+  /// Removes the force; harmless when the device is gone.
   void end() noexcept;
 
  private:

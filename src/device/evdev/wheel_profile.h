@@ -1,4 +1,4 @@
-// What a joystick or a wheel does not say of itself: newtons and metres.
+// Forces and travel of a joystick or wheel, which the device does not report.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +12,7 @@ class WheelProfileError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Measured once per device, with a spring balance and a ruler at the place of the hand.
+/// Measured once per device, with a spring balance and a ruler where the hand holds it.
 struct WheelProfile {
   bool measured = false;  ///< false: the cautious values below
   double force_N = 2;     ///< at full level
@@ -21,8 +21,8 @@ struct WheelProfile {
   double travelZ_m = 0.10;
   double stiffness_N_per_m = 100;  ///< the stiffest wall that does not buzz
   double damper = 0.2;             ///< 0 … 1: the device's own damper while it pushes
-  bool invertForce = false;        ///< for drivers that push the other way
-  int axes = 0;                    ///< 1: x alone; 2: x and z; 0: as the device looks
+  bool invertForce = false;        ///< for kernel drivers with the opposite sign
+  int axes = 0;                    ///< 1: x alone; 2: x and z; 0: from the device's capabilities
 
   /// Reads a TOML file with these names: force_N, continuous_force_N, travel_x_m, travel_z_m,
   /// stiffness_N_per_m, damper, invert_force, axes. Throws WheelProfileError, also for an unknown name.

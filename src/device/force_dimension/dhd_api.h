@@ -1,5 +1,4 @@
-// The part of Force Dimension's DHD and DRD that this driver calls, as its binary interface is: own
-// declarations, bound at run time.
+// Our own declarations of the DHD and DRD functions of Force Dimension that this driver calls, bound at run time.
 #pragma once
 
 #include "device/dynamic_library.h"
@@ -50,16 +49,16 @@ struct Api {
   int(HAPTICD_DHD_CALL* autoInit)(char) = nullptr;  // moves the arm
   int(HAPTICD_DHD_CALL* stopRegulation)(bool forceOn, char) = nullptr;
 
-  /// Binds everything. Throws LibraryError with all names that are missing.
+  /// Binds all functions. Throws LibraryError with all missing names.
   explicit Api(DynamicLibrary library);
-  /// The library can calibrate.
+  /// Whether the library can calibrate.
   bool canCalibrate() const noexcept {
     return openForCalibration != nullptr && closeForCalibration != nullptr && isInitialized != nullptr &&
            autoInit != nullptr && stopRegulation != nullptr;
   }
 };
 
-/// Where the library may be; HAPTICD_DHD_LIB names another file.
+/// Names of the library; HAPTICD_DHD_LIB overrides them.
 LibraryNames libraryNames();
 
 }  // namespace hapticd::device::dhd

@@ -17,13 +17,13 @@ constexpr double kWatchdogStep_s = 125e-6;
 constexpr double kGripClosed_rad = 0.05;
 constexpr double kGripOpen_rad = 0.10;
 
-// Theirs: x to the user, y right, z up. Ours: x right, y up, z to the user.
+// Vendor's frame: x to the user, y right, z up. Ours: x right, y up, z to the user.
 Vec3 fromVendor(double x, double y, double z) noexcept {
   return {y, z, x};
 }
 
 geometry::Mat3 fromVendor(const double (&m)[3][3]) noexcept {
-  constexpr int kOurAxis[3] = {1, 2, 0};  // the vendor's axis that is ours number i
+  constexpr int kOurAxis[3] = {1, 2, 0};  // vendor's axis for our axis i
   geometry::Mat3 rotation;
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) rotation(row, column) = m[kOurAxis[row]][kOurAxis[column]];
@@ -39,19 +39,19 @@ DeviceProfile nearestProfile(const std::string& name) {
   }
   DeviceProfile profile = *findProfile(known);
   if (!name.empty()) profile.model = name;
-  // The digit counts what is measured: omega.6 has a wrist, omega.7 also a gripper.
+  // The digit is the number of measured axes: omega.6 has a wrist, omega.7 also a gripper.
   const char digit = name.empty() ? '0' : name.back();
   if (digit == '3' || digit == '6' || digit == '7') {
     profile.inputDof = digit - '0';
     const bool omega = name.find("omega") != std::string::npos;
-    profile.outputDof = digit != '7' ? 3 : omega ? 4 : 7;  // an omega.7 moves no wrist
+    profile.outputDof = digit != '7' ? 3 : omega ? 4 : 7;  // an omega.7 has no wrist motors
   }
   return profile;
 }
 
 }  // namespace
 
-// The right to call the library, where a calibration and the servo meet. The servo never waits for it.
+// Grants access to the library to either a calibration or the servo. The servo never waits for it.
 class ForceDimensionDevice::Turn {
  public:
   explicit Turn(std::atomic<bool>& busy) noexcept
@@ -99,7 +99,7 @@ void ForceDimensionDevice::open() {
   hold_ = calibrated_ ? kHoldNone : kHoldNotCalibrated;
 }
 
-// Everything is said explicitly: a device keeps what the last program told it.
+// Set everything explicitly: a device keeps the settings of the last program.
 void ForceDimensionDevice::configure() {
   const auto id = static_cast<char>(id_);
   const char* name = api_->getSystemName(id);
@@ -193,11 +193,11 @@ void ForceDimensionDevice::sampleButtons() noexcept {
   state_.buttons = (state_.buttons & 2U) | (mask > 0 ? static_cast<std::uint32_t>(mask) & 1U : 0U);
 }
 
-// Without an answer it stays as it was.
+// Without an answer the value stays unchanged.
 void ForceDimensionDevice::sampleGripper() noexcept {
   double angle_rad = 0;
   if (api_->getGripperAngleRad(&angle_rad, static_cast<char>(id_)) < 0 || !std::isfinite(angle_rad)) return;
-  angle_rad = std::abs(angle_rad);  // that of a left-handed device may count down
+  angle_rad = std::abs(angle_rad);  // may be negative on a left-handed device
   const bool wasClosed = (state_.buttons & 2U) != 0;
   const bool closed = angle_rad < (wasClosed ? kGripOpen_rad : kGripClosed_rad);
   state_.buttons = (state_.buttons & 1U) | (closed ? 2U : 0U);
@@ -218,7 +218,7 @@ void ForceDimensionDevice::checkStatus(Nanos now) noexcept {
 bool ForceDimensionDevice::write(const Vec3& force_N) noexcept {
   if (id_ < 0 || !force_N.allFinite()) return false;
   const Turn turn(busy_);
-  if (!turn) return true;  // the calibration has the motors
+  if (!turn) return true;  // the calibration drives the motors
   Vec3 f = state_.hold == kHoldNone && failures_ == 0 ? force_N : Vec3(Vec3::Zero());
   if (f.norm() > profile_.peakForce_N) f *= profile_.peakForce_N / f.norm();
   if (!f.isZero() && !amplifiersOn_ && !switchOn()) return false;
@@ -254,7 +254,7 @@ void ForceDimensionDevice::calibrate() {
       if (api_->stopRegulation(true, id) < 0) fail("the calibration does not end");
       calibrated_ = api_->isInitialized(id);
     }
-    // On again with the next force.
+    // The next force switches them on again.
     if (api_->enableForce(0, id) < 0) fail("the amplifiers do not switch off");
     amplifiersOn_ = false;
     return;

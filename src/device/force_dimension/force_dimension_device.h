@@ -1,8 +1,7 @@
 // omega, delta, sigma and lambda by Force Dimension through libdrd or libdhd, which the user installs.
 //
 // Polled: read() and write() each exchange a USB frame, so the servo may run at up to 4 kHz. The amplifiers
-// stay off until the first force is asked for, and the device switches them off by itself when no command
-// comes for 20 ms.
+// stay off until the first force, and the device switches them off by itself when it receives no command for 20 ms.
 #pragma once
 
 #include <atomic>
@@ -17,7 +16,7 @@ namespace hapticd::device {
 struct ForceDimensionOptions {
   int index = 0;                    ///< among the connected ones
   bool gravityCompensation = true;  ///< the motors carry the arm while the amplifiers are on
-  double effectorMass_kg = 0;       ///< of a tool on the end; 0: as the device ships
+  double effectorMass_kg = 0;       ///< of a tool on the end; 0: the default of the device
   int timeGuard_us = 100;           ///< the calls of one tick share a USB frame; below the period of the loop
   double watchdog_s = 0.020;        ///< at most 31.8 ms; 0: off
 };
@@ -37,8 +36,8 @@ class ForceDimensionDevice final : public Device {
 
   std::string faultText() const override;
   bool lost() const noexcept override { return unreadable_; }
-  /// MOVES THE ARM through its workspace when it is not calibrated. Amplifiers that the device switched off
-  /// come back at the next force.
+  /// MOVES THE ARM through its workspace when it is not calibrated. The next force switches on the amplifiers
+  /// that the device switched off.
   void calibrate() override;
 
   /// Model and serial number. Valid after open().
@@ -66,7 +65,7 @@ class ForceDimensionDevice final : public Device {
   std::atomic<bool> calibrated_{false};
   std::atomic<bool> unreadable_{false};
 
-  // The servo's.
+  // Servo thread only.
   DeviceState state_;
   Nanos nextStatus_ = 0;
   int failures_ = 0;  // reads in a row

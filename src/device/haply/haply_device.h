@@ -1,7 +1,7 @@
 // Haply Inverse3 (and Minverse) through the Inverse Service on this machine.
 //
-// The service answers every message with one state, so each write of the servo drives one exchange, in a
-// thread of the driver; the servo only leaves its newest force and takes the newest state.
+// The service answers every message with one state, so each write of the servo triggers one exchange in a thread of the
+// driver. The servo only stores its newest force and takes the newest state.
 #pragma once
 
 #include <atomic>
@@ -24,7 +24,7 @@ struct HaplyOptions {
   std::string deviceId;  ///< empty: the first Inverse3
 };
 
-/// One tick of delay. A reply that takes more than 20 ms is a fault; the driver connects anew by itself.
+/// One tick of delay. A reply that takes more than 20 ms is a fault; the driver reconnects by itself.
 class HaplyDevice final : public Device {
  public:
   explicit HaplyDevice(HaplyOptions options = {});
@@ -57,7 +57,7 @@ class HaplyDevice final : public Device {
 
   const HaplyOptions options_;
   DeviceProfile profile_;
-  int wake_ = -1;  // eventfd: a new force, or the end
+  int wake_ = -1;  // eventfd: a new force, or stop
   base::BlockingThread thread_;
   std::atomic<bool> stopping_{false};
   std::atomic<bool> connected_{false};
@@ -69,10 +69,10 @@ class HaplyDevice final : public Device {
   handoff::LatestValue<Command> command_;
   handoff::LatestValue<Sample> sample_;
 
-  // The servo's.
+  // Servo thread only.
   std::uint64_t commands_ = 0;
 
-  // The thread's.
+  // Driver's thread only.
   std::string deviceId_;
   DeviceState state_;
   std::uint64_t lastCommand_ = 0;

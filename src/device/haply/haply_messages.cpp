@@ -7,7 +7,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-// Theirs: x right, y away from the user, z up.
+// Service's frame: x right, y away from the user, z up.
 Vec3 fromService(const Vec3& v) noexcept {
   return {v.x(), v.z(), -v.y()};
 }
@@ -41,7 +41,7 @@ void readGrip(const Json& message, DeviceState& state) {
   }
 }
 
-// Some services leave a field out; only what is said to be missing holds the force.
+// Some versions omit a field; only an explicit "false" holds the force.
 std::uint32_t holdsOf(const Json& device) {
   std::uint32_t hold = kHoldNone;
   const auto status = device.find("status");

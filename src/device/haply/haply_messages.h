@@ -1,4 +1,4 @@
-// What the Inverse Service says and hears, as JSON text; frames and units become ours here.
+// Messages of the Inverse Service, as JSON text; converts frames and units to ours.
 #pragma once
 
 #include <cstdint>
@@ -11,13 +11,13 @@
 
 namespace hapticd::device::haply {
 
-/// A message that is not what the service should send; the text quotes the matter.
+/// An invalid message of the service; the text quotes it.
 class MessageError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// One Inverse3 and the grip on it, from one message.
+/// One Inverse3 and its grip, from one message.
 struct Message {
   std::string deviceId;
   DeviceState state;  ///< without its time

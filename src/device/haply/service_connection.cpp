@@ -18,7 +18,7 @@ struct ServiceConnection::Impl {
   beast::websocket::stream<asio::ip::tcp::socket> stream{context};
   beast::flat_buffer buffer;
 
-  // Runs one operation; `begin` gets the handler that its end must call.
+  // Runs one operation; `begin` receives the completion handler.
   template <class Begin>
   void await(const char* what, std::chrono::milliseconds most, Begin&& begin) {
     bool done = false;
@@ -30,7 +30,7 @@ struct ServiceConnection::Impl {
     context.restart();
     context.run_for(most);
     if (!done) {
-      // The operation holds references to this frame: it has to end before the frame does.
+      // The operation holds references to this stack frame, so it must end first.
       ErrorCode ignored;
       stream.next_layer().close(ignored);
       context.restart();

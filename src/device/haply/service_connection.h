@@ -1,4 +1,4 @@
-// One WebSocket connection to the service, with an answer or an exception within a time.
+// One WebSocket connection to the service. Each call returns or throws within a time limit.
 #pragma once
 
 #include <chrono>
@@ -15,7 +15,7 @@ class ConnectionError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// For one thread; every call may block, for its time at most, and throws ConnectionError.
+/// For one thread. Every call may block up to its time limit and throws ConnectionError.
 class ServiceConnection {
  public:
   ServiceConnection(const std::string& host, const std::string& port, std::chrono::milliseconds most);

@@ -72,7 +72,7 @@ class Exchange {
     for (Nanos due = base::now() + period_; !leave_; due += period_) {
       base::world().clock.sleepUntil(due);
       const Nanos now = base::now();
-      if (now > due + period_) due = now;  // no ticks are made up for
+      if (now > due + period_) due = now;  // no catch-up ticks
       tick(now);
     }
   }
@@ -102,7 +102,7 @@ bool send(const std::string& text) {
   return ::send(kSocketDescriptor, text.data(), text.size(), MSG_NOSIGNAL) >= 0;
 }
 
-// Empty when the server has gone.
+// Empty when the server is gone.
 std::string receive() {
   char text[64];
   long size = -1;
@@ -115,7 +115,7 @@ std::string receive() {
 }  // namespace
 
 int runDeviceHost(Device& device, const DeviceHostOptions& options) {
-  std::signal(SIGINT, SIG_IGN);  // a Ctrl-C is for the server, which then ends this process in order
+  std::signal(SIGINT, SIG_IGN);  // Ctrl-C concerns the server, which then ends this process in order
   try {
     const SharedMemory memory(kMemoryDescriptor);
     try {

@@ -66,7 +66,7 @@ void IsolatedDevice::spawn(int socketOfChild) {
   for (const std::string& word : options_.command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
 
-  // Above the numbers that they get there, so that neither replaces the other first.
+  // Above the target numbers, so that neither dup2 overwrites the other's source.
   const int memory = fcntl(memory_->descriptor(), F_DUPFD_CLOEXEC, 10);
   const int socket = fcntl(socketOfChild, F_DUPFD_CLOEXEC, 10);
   posix_spawn_file_actions_t files;
@@ -84,7 +84,7 @@ void IsolatedDevice::spawn(int socketOfChild) {
   process_ = process;
 }
 
-// The text of an answer; throws its words when it is a refusal.
+// The text of an answer; throws it when it is a refusal.
 std::string IsolatedDevice::receive(int most_ms) const {
   pollfd wanted{socket_, POLLIN, 0};
   if (poll(&wanted, 1, most_ms) == 0) {
@@ -106,7 +106,7 @@ std::string IsolatedDevice::ask(const std::string& request, int most_ms) const {
   if (socket_ < 0) throw std::runtime_error("the device is not open");
   char late[16];
   while (recv(socket_, late, sizeof late, MSG_DONTWAIT) > 0) {
-    // An answer to a request that nobody waits for any more.
+    // A late answer to a request that timed out.
   }
   send(socket_, request.data(), request.size(), MSG_NOSIGNAL);
   return receive(most_ms);
@@ -198,7 +198,7 @@ bool IsolatedDevice::write(const Vec3& force_N) noexcept {
 }
 
 std::string IsolatedDevice::faultText() const {
-  if (silent_) {  // who says nothing is not asked
+  if (silent_) {  // do not query a silent process
     const std::string ended = howItEnded(0);
     if (!ended.empty()) return "the driver's process ended" + ended + "; open the device anew";
     return "the driver's process posts no states; open the device anew";

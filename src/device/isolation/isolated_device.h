@@ -1,5 +1,4 @@
-// Any driver in a process of its own, so that a crash of a vendor's library is a fault and not the end of the
-// server.
+// Runs a driver in a process of its own, so that a crash of a vendor's library is a fault and does not end the server.
 //
 // The driver's process posts each state and writes the newest force, one tick late; without a fresh force for
 // 3 ms it writes zero. Here, each post wakes the loop.
@@ -75,7 +74,7 @@ class IsolatedDevice final : public Device {
   std::atomic<bool> silent_{false};
   std::atomic<bool> lostThere_{false};
 
-  // The loop's.
+  // Loop's thread only.
   Nanos lastPost_ = 0;
   std::uint64_t commands_ = 0;
   Nanos postToTick_ = 0;

@@ -1,4 +1,4 @@
-// What a driver's process and the server share: the newest state one way, the newest force the other.
+// Memory shared by a driver's process and the server: the newest state one way, the newest force the other.
 //
 // Both directions are LatestValue, which needs no lock and survives the death of either side in the middle of
 // a write. Each post of a state counts up a futex word that the server's loop sleeps on.
@@ -17,7 +17,7 @@ namespace hapticd::device::isolation {
 inline constexpr int kMemoryDescriptor = 3;  // in the driver's process
 inline constexpr int kSocketDescriptor = 4;
 
-/// A force without a fresh one for this long becomes zero in the driver's process.
+/// The driver's process zeroes a force that is older than this.
 inline constexpr Nanos kCommandLife = 3'000'000;
 
 struct Posted {

@@ -1,4 +1,4 @@
-// The part of HDAPI that this driver calls, as its binary interface is: own declarations, bound at run time.
+// Our own declarations of the HDAPI functions that this driver calls, bound at run time.
 #pragma once
 
 #include <cstdint>
@@ -67,11 +67,11 @@ inline constexpr Enum kDeviceErrors = 0x300;     // … 0x3FF
 inline constexpr Enum kFrameErrors = 0x400;      // … 0x4FF
 inline constexpr Enum kSchedulerErrors = 0x500;  // … 0x5FF
 
-/// Of the device or its link: only opening it anew helps.
+/// An error of the device or its link: only reopening helps.
 inline bool isDeviceError(Enum code) noexcept {
   return code >= kDeviceErrors && code < kFrameErrors;
 }
-/// The name of an error as the vendor's manual has it.
+/// The name of an error in the vendor's manual.
 const char* errorName(Enum code) noexcept;
 
 /// All functions that the driver calls. Most of them crash inside the library when no device is open.
@@ -96,11 +96,11 @@ struct Api {
   SchedulerHandle(HAPTICD_HD_CALL* scheduleAsynchronous)(Callback, void*, unsigned short) = nullptr;
   void(HAPTICD_HD_CALL* unschedule)(SchedulerHandle) = nullptr;
 
-  /// Binds everything. Throws LibraryError with all names that are missing.
+  /// Binds all functions. Throws LibraryError with all missing names.
   explicit Api(DynamicLibrary library);
 };
 
-/// Where the library may be; HAPTICD_HDAPI_LIB names another file.
+/// Names of the library; HAPTICD_HDAPI_LIB overrides them.
 LibraryNames libraryNames();
 
 }  // namespace hapticd::device::hd

@@ -9,14 +9,14 @@
 namespace hapticd::device::hd {
 namespace {
 
-constexpr int kMostErrors = 16;  // taken at once; the stack cannot hold up a tick
+constexpr int kMostErrors = 16;  // per call, so that a full stack cannot delay a tick
 
 Code HAPTICD_HD_CALL runFrame(void* participant) {
   static_cast<Participant*>(participant)->onFrame();
   return kContinue;
 }
 
-// The library asks for a key when its licence displeases it; without a terminal the answer comes at once.
+// The library waits for a key when it rejects its licence; without a terminal it continues at once.
 class NoKeyboard {
  public:
   NoKeyboard() : saved_(dup(STDIN_FILENO)) {
@@ -43,7 +43,7 @@ std::string quoted(const char* name) {
 
 }  // namespace
 
-// Holds the lock and the scheduler; the scheduler goes on afterwards if anybody needs it.
+// Holds the lock and stops the scheduler; restarts it afterwards if there are members.
 class Scheduler::Pause {
  public:
   explicit Pause(Scheduler& scheduler) : scheduler_(scheduler), lock_(scheduler.mutex_) {
@@ -72,14 +72,14 @@ std::shared_ptr<Scheduler> Scheduler::get() {
 }
 
 Scheduler::Scheduler() : api_(DynamicLibrary(libraryNames())) {
-  // drainErrors() walks this in the scheduler's thread.
+  // drainErrors() iterates over it in the scheduler's thread.
   members_.reserve(16);
 }
 
 Handle Scheduler::open(const std::string& name, std::string& nameThatWorked) {
   const Pause pause(*this);
   const NoKeyboard noKeyboard;
-  // Some drivers know a device only by the name it was given, some only without one.
+  // Some vendor drivers know a device only by its configured name, some only without a name.
   std::vector<const char*> names;
   if (!name.empty()) names.push_back(name.c_str());
   names.insert(names.end(), {nullptr, "Default Device", "Default PHANToM"});
@@ -99,7 +99,7 @@ Handle Scheduler::open(const std::string& name, std::string& nameThatWorked) {
 
 Handle Scheduler::tryOpen(const char* name, std::string& words) {
   const Handle device = api_.initDevice(name);
-  // The handle decides: an error that repeats an earlier one is not put on the stack again.
+  // The handle decides: the library does not push an error that repeats an earlier one.
   std::string reason = takeErrors();
   if (device != kInvalidHandle && std::find(open_.begin(), open_.end(), device) != open_.end()) {
     reason = "is open already";

@@ -1,4 +1,4 @@
-// The one HDAPI of a process: its library, its scheduler thread, its error stack, shared by all its devices.
+// The HDAPI of this process: library, scheduler thread and error stack, shared by all devices.
 #pragma once
 
 #include <array>
@@ -13,18 +13,18 @@
 
 namespace hapticd::device::hd {
 
-/// A device as the scheduler needs it. Both calls come in the scheduler's thread.
+/// A device that takes part in the scheduler. Both calls come in the scheduler's thread.
 class Participant {
  public:
   virtual ~Participant() = default;
   /// Once in each tick.
   virtual void onFrame() noexcept = 0;
-  /// An error of this device, or of nobody known.
+  /// An error of this device, or one that names no known device.
   virtual void onError(Enum code) noexcept = 0;
 };
 
-/// All calls but drainErrors() are for other threads than the scheduler's; they stop the scheduler for a
-/// moment, because the library allows most things only then.
+/// All calls except drainErrors() must come from other threads than the scheduler's. They stop the scheduler briefly,
+/// because the library allows most calls only then.
 class Scheduler {
  public:
   /// The scheduler of this process; loads the library at first use. Throws LibraryError.
@@ -32,25 +32,24 @@ class Scheduler {
 
   const Api& api() const noexcept { return api_; }
 
-  /// Opens a device: first by `name` unless empty, then by each default name. Throws std::runtime_error with
-  /// every error.
+  /// Opens a device: first by `name` unless empty, then by each default name. Throws std::runtime_error with all errors.
   Handle open(const std::string& name, std::string& nameThatWorked);
   void close(Handle device) noexcept;
 
   /// Runs `work` with this device current and the scheduler stopped.
   void whileStopped(Handle device, const std::function<void()>& work);
 
-  /// From here on the participant gets frames. Throws std::runtime_error when the scheduler refuses.
+  /// The participant receives frames from now on. Throws std::runtime_error when the scheduler refuses.
   void join(Handle device, Participant& participant, double rate_Hz);
   void leave(Participant& participant) noexcept;
 
-  /// Any thread: an error of a device was told before. The library tells an identical one only once, so from
-  /// then on silence may hide the next.
+  /// Whether the library has reported a device error. It reports an identical error only once, so the next one may go
+  /// unreported. Any thread.
   bool deviceErrorTold() const noexcept { return deviceErrorTold_.load(std::memory_order_relaxed); }
 
-  /// Scheduler's thread: hands the errors on the stack to the devices that they name.
+  /// Passes the errors on the stack to the devices that they name. Scheduler's thread.
   void drainErrors() noexcept;
-  /// Empties the error stack into words; empty when there was none. Only while the scheduler is stopped.
+  /// Empties the error stack and returns its text; empty when there was no error. Only while the scheduler is stopped.
   std::string takeErrors() noexcept;
 
  private:

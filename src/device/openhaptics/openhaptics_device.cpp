@@ -14,12 +14,12 @@ constexpr Nanos kMillisecond = 1'000'000;
 constexpr double kMetresPerMillimetre = 1e-3;
 constexpr double kHot = 0.95;
 constexpr double kCool = 0.7;
-constexpr Nanos kForceErrorHold = 100'000'000;  // the amplifiers go off and ramp up by themselves
+constexpr Nanos kForceErrorHold = 100'000'000;  // the amplifiers switch off and ramp up by themselves
 constexpr Nanos kWarmHold = 1'000'000'000;
 constexpr int kSettlingFrames = 100;
 constexpr std::uint64_t kCalibrationCheck = 100;  // frames, while calibrated
-constexpr double kSilence_s = 0.5;                // that no hand holds an arm still to the last bit
-constexpr double kImpulseShare = 0.9;             // stays clear of the driver's own trip
+constexpr double kSilence_s = 0.5;                // no hand holds an arm bit-identical for this long
+constexpr double kImpulseShare = 0.9;             // margin below the vendor driver's own limit
 
 bool contains(const std::string& text, const char* word) {
   return text.find(word) != std::string::npos;
@@ -61,14 +61,14 @@ void OpenHapticsDevice::open() {
   consent_ = options_.calibrate;
 }
 
-// What the driver says of itself wins where it is plausible.
+// Plausible values of the vendor's driver win over the table.
 void OpenHapticsDevice::readIdentity() {
   const hd::Api& api = scheduler_->api();
   const std::string model = text(api.getString(hd::kModel));
   description_ = model + ", serial number " + text(api.getString(hd::kSerialNumber)) + ", driver " +
                  text(api.getString(hd::kDriverVersion));
   profile_ = nearestProfile(model);
-  hasSafetySwitch_ = contains(model, "Desktop");  // elsewhere there is none, and it reads as open
+  hasSafetySwitch_ = contains(model, "Desktop");  // other models have none, and it reads as open
   calibrationStyle_ = 0;
   api.getIntegerv(hd::kCalibrationStyle, &calibrationStyle_);
 
@@ -124,7 +124,7 @@ void OpenHapticsDevice::start(std::function<void(Nanos)> onTick) {
 
 void OpenHapticsDevice::stop() noexcept {
   if (!started_) return;
-  // One frame with zero force first; the amplifiers go off with the scheduler in any case.
+  // Send one frame with zero force first; the amplifiers switch off with the scheduler in any case.
   quiet_ = Quiet::wanted;
   for (int i = 0; i < 20 && quiet_ != Quiet::reached; ++i) base::sleepFor(kMillisecond);
   scheduler_->leave(*this);
@@ -201,8 +201,8 @@ void OpenHapticsDevice::sample(Nanos now) noexcept {
   hold_.store(state_.hold, std::memory_order_relaxed);
 }
 
-// The library tells an error only once, and a cable may be pulled twice: then what is left to see is an arm
-// that stays where it was under a force.
+// The library reports an identical error only once, and a cable may be pulled twice. The second loss shows only as an arm
+// that does not move under a force.
 void OpenHapticsDevice::noticeSilence() noexcept {
   const bool same = state_.position_m == before_.position_m &&
                     state_.velocity_m_per_s == before_.velocity_m_per_s &&
@@ -237,8 +237,8 @@ std::uint32_t OpenHapticsDevice::holds(Nanos now) noexcept {
   return hold;
 }
 
-// The position jumps with an update: only after a frame without force. A stylus in the inkwell was put there
-// by a person, and is where it has to be; where only that person knows whether the arm is, it takes consent.
+// The position jumps with an update, so update only after a frame without force. A stylus in the inkwell is in the right
+// place, and a person put it there. Where no switch shows the place of the arm, a person must consent.
 void OpenHapticsDevice::updateCalibration(hd::Enum status) noexcept {
   if (!written_N_.isZero()) return;
   const bool encoders = (calibrationStyle_ & hd::kStyleEncoderReset) != 0;
@@ -265,7 +265,7 @@ Vec3 OpenHapticsDevice::limited(const Vec3& force_N) noexcept {
     return Vec3::Zero();
   const double wanted = force_N.norm();
   Vec3 force = wanted > limit ? Vec3(limit / wanted * force_N) : force_N;
-  // A rise in steps; a fall at once, since less force is always right.
+  // The force rises in steps and falls at once: less force is always safe.
   const double step = kImpulseShare * impulseLimit_N_;
   const Vec3 change = force - written_N_;
   if (force.norm() > written_N_.norm() && change.norm() > step) {
@@ -275,12 +275,12 @@ Vec3 OpenHapticsDevice::limited(const Vec3& force_N) noexcept {
 }
 
 void OpenHapticsDevice::onError(hd::Enum code) noexcept {
-  if (code < hd::kForceErrors) return;  // a value that this device does not have
+  if (code < hd::kForceErrors) return;  // this device does not have that value
   lastError_ = code;
   if (code == hd::kWarmMotors) {
     hotUntil_ = now_ + kWarmHold;
   } else if (hd::isDeviceError(code)) {
-    // The same error is told only once, so silence does not mean that the device is back.
+    // The library reports the same error only once, so silence does not mean that the device is back.
     lost_ = true;
   } else {
     faultUntil_ = now_ + kForceErrorHold;

@@ -16,8 +16,8 @@
 namespace hapticd::device {
 
 struct OpenHapticsOptions {
-  std::string name;        ///< as the vendor's setup tool shows it; empty: the default device
-  double rate_Hz = 1000;   ///< of the scheduler; what is allowed depends on the connection
+  std::string name;        ///< name in the vendor's setup tool; empty: the default device
+  double rate_Hz = 1000;   ///< of the scheduler; the connection limits the choice
   bool calibrate = false;  ///< consent to calibrate at start, as calibrate() gives it
 };
 
@@ -36,8 +36,8 @@ class OpenHapticsDevice final : public Device, private hd::Participant {
 
   std::string faultText() const override;
   bool lost() const noexcept override { return lost_; }
-  /// Encoder reset: the arm in its reset position; inkwell: the stylus docked, which is consent by itself
-  /// where the switch tells of it. Needs the loop to run.
+  /// Encoder reset: the arm must be in its reset position. Inkwell: the stylus must be docked, which counts as consent where
+  /// the device has the switch. The loop must run.
   void calibrate() override;
 
   DeviceTraits traits() const noexcept override {
@@ -78,10 +78,10 @@ class OpenHapticsDevice final : public Device, private hd::Participant {
   std::atomic<bool> consent_{false};
   std::atomic<std::uint32_t> hold_{kHoldNone};
   std::atomic<hd::Enum> lastError_{hd::kSuccess};
-  std::atomic<bool> lost_{false};  // until opened anew
+  std::atomic<bool> lost_{false};  // until reopened
   std::atomic<bool> silent_{false};  // lost without an error
 
-  // The scheduler thread's from here on.
+  // Scheduler thread only, from here on.
   ThermalDerating derating_{0, 0};
   DeviceState state_;
   DeviceState before_;  // of the frame before

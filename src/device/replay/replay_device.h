@@ -1,4 +1,4 @@
-// A recorded hand as a device: it is where the recording says, whatever the force.
+// A recorded hand as a device: its position follows the recording, whatever the force.
 #pragma once
 
 #include <filesystem>
@@ -12,11 +12,11 @@ namespace hapticd::device {
 
 struct ReplayOptions {
   std::filesystem::path file;  ///< t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons]
-  bool repeat = false;         ///< from the beginning again, instead of resting at the end
+  bool repeat = false;         ///< repeat from the beginning instead of resting at the end
   DeviceProfile profile = profiles().front();
 };
 
-/// The recording starts with the first read() after open(). It presses nobody's hand, so it starts armed.
+/// The recording starts with the first read() after open().
 class ReplayDevice final : public Device {
  public:
   explicit ReplayDevice(ReplayOptions options) : options_(std::move(options)) {}
@@ -33,7 +33,7 @@ class ReplayDevice final : public Device {
   const ReplayOptions options_;
   std::shared_ptr<const HandFile> hand_;
 
-  // The servo's.
+  // Servo thread only.
   bool started_ = false;
   Nanos start_ = 0;
   Nanos last_ = 0;
