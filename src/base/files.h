@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace hapticd::base {
@@ -24,6 +26,18 @@ class OutputFile {
 };
 
 /// What create() does with an existing file.
+/// A file open for reading, closed by its destructor. One thread at a time.
+class InputFile {
+ public:
+  virtual ~InputFile() = default;
+  /// Bytes from the start to the end when it was opened.
+  virtual std::uint64_t size() const = 0;
+  /// Fills `into` from the current position on and returns how many bytes it got: fewer only at the end. Throws
+  /// std::system_error with the path and the system's reason.
+  virtual std::size_t read(std::span<std::byte> into) = 0;
+};
+
+/// What may be there already when a file is created.
 enum class Existing { refuse, replace };
 
 /// On failure every call throws std::system_error with the path and the reason. From any thread.
@@ -32,6 +46,8 @@ class Files {
   virtual ~Files() = default;
   /// Creates a file (mode 0644) for writing. Its folder must exist.
   virtual std::unique_ptr<OutputFile> create(const std::filesystem::path& path, Existing existing) = 0;
+  /// Opens a file for reading from its start.
+  virtual std::unique_ptr<InputFile> open(const std::filesystem::path& path) = 0;
   /// The whole content.
   virtual std::vector<std::byte> read(const std::filesystem::path& path) = 0;
   /// Replaces `to`; atomic. Both must be in one file system.
@@ -48,6 +64,7 @@ class Files {
 class SystemFiles final : public Files {
  public:
   std::unique_ptr<OutputFile> create(const std::filesystem::path& path, Existing existing) override;
+  std::unique_ptr<InputFile> open(const std::filesystem::path& path) override;
   std::vector<std::byte> read(const std::filesystem::path& path) override;
   void rename(const std::filesystem::path& from, const std::filesystem::path& to) override;
   void remove(const std::filesystem::path& path) override;

@@ -1,6 +1,6 @@
 #include "record/export.h"
 
-#include "record/pack_commands.h"
+#include "record/scene_event_codec.h"
 #include "record/recording_reader.h"
 #include "record/text_fields.h"
 

@@ -1,11 +1,16 @@
-// The fields of everything in a session file but the commands. The structured bindings count the members: a
-// new one does not compile until it is listed, and then kFormatVersion must go up.
+// The fields of everything in a recording except scene commands, which describe themselves (scene/command_info.h).
+// Structured bindings count the members: a new one does not compile until it is listed, and then kFormatVersion
+// must increase.
 #pragma once
 
-#include "record/command_fields.h"
+#include <concepts>
+
 #include "record/recording.h"
 
 namespace hapticd::record {
+
+template <class C, class T>
+concept Is = std::same_as<std::remove_const_t<C>, T>;
 
 template <Is<geometry::Box> T, class V>
 void fields(T& box, V&& v) {

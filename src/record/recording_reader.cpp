@@ -1,7 +1,7 @@
 #include "record/recording_reader.h"
 
 #include "record/fields.h"
-#include "record/pack_commands.h"
+#include "record/scene_event_codec.h"
 
 namespace hapticd::record {
 

@@ -31,18 +31,8 @@ class FreeForces {
  public:
   explicit FreeForces(const SceneConfig& config);
 
-  void apply(const DefineEffect&, const Call&);
-  void apply(const StartEffect&, const Call&);
-  void apply(const StopEffect&, const Call&);
-  void apply(const SetPlane&, const Call&);
-  void apply(const SetPlaneDetail&, const Call&);
-  void apply(const SetForceField&, const Call&);
-  void apply(const SetConstraintEnabled&, const Call&);
-  void apply(const SetConstraintMode&, const Call&);
-  void apply(const SetConstraintVector&, const Call&);
-  void apply(const SetConstraintStiffness&, const Call&);
-  void apply(const StartCustomEffect&, const Call&);
-  void apply(const StopCustomEffect&, const Call&);
+  /// Executes a command whose target is Target::forces.
+  void apply(SceneCommand& command, const Call& call);
 
   /// What it owns ramps out and is forgotten.
   void clientGone(ClientId client, Nanos now);
@@ -59,6 +49,10 @@ class FreeForces {
   void describe(SceneDescription& out) const;
 
  private:
+  // One specialisation for each command, in free_force_commands.cpp; a missing one does not link.
+  template <class Command>
+  void handle(Command& command, const Call& call);
+
   template <class T>
   struct Owned {
     ClientId owner = 0;

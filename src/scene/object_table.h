@@ -87,26 +87,8 @@ class ObjectTable {
  public:
   explicit ObjectTable(const SceneConfig& config);
 
-  void apply(const SetObjectNumber&, const Call&);
-  void apply(SetVertices&&, const Call&);
-  void apply(const SetTriangles&, const Call&);
-  void apply(const SetNormal&, const Call&);
-  void apply(const RemoveTriangle&, const Call&);
-  void apply(const ClearMesh&, const Call&);
-  void apply(const TransformMesh&, const Call&);
-  void apply(const SetTrimeshType&, const Call&);
-  void apply(const AddObject&, const Call&);
-  void apply(const AddObjectExScene&, const Call&);
-  void apply(const MoveToParent&, const Call&);
-  void apply(const RemoveObject&, const Call&);
-  void apply(const SetTransform&, const Call&);
-  void apply(const SetObjectPosition&, const Call&);
-  void apply(const SetObjectOrientation&, const Call&);
-  void apply(const SetObjectScale&, const Call&);
-  void apply(const SetTouchable&, const Call&);
-  void apply(const SetSurfaceProperty&, const Call&);
-  void apply(const SetSurface&, const Call&);
-  void apply(const SetSceneOrigin&, const Call&);
+  /// Executes a command whose target is Target::objects.
+  void apply(SceneCommand& command, const Call& call);
 
   /// Object 0 alone, empty.
   void reset();
@@ -121,6 +103,10 @@ class ObjectTable {
   void describe(SceneDescription& out) const;
 
  private:
+  // One specialisation for each command, in object_commands.cpp; a missing one does not link.
+  template <class Command>
+  void handle(Command& command, const Call& call);
+
   Object* find(std::int32_t id) const;
   Object* find(std::int32_t id, std::string_view name, const Call& call) const;
   void create(std::int32_t id, std::int32_t parent);

@@ -9,7 +9,7 @@
 #include "record/block_file.h"
 #include "record/crc32.h"
 #include "record/fields.h"
-#include "record/pack_commands.h"
+#include "record/scene_event_codec.h"
 #include "record/recorder.h"
 #include "record/recording_file.h"
 #include "record/recording_reader.h"
@@ -83,16 +83,11 @@ Bytes packedEvent(const SceneEvent& event) {
 std::vector<SceneEvent> oneOfEach(std::uint64_t seed) {
   Filler filler(seed);
   std::vector<SceneEvent> events;
-  std::apply(
-      [&](const auto&... entry) {
-        const auto add = [&]<class C>(const CommandEntry<C>&) {
-          C command;
-          filler.fill(command);
-          events.push_back({3, 14, 1592, scene::SceneCommand(std::move(command))});
-        };
-        (add(entry), ...);
-      },
-      kCommands);
+  scene::forEachCommand([&]<class C>() {
+    C command;
+    filler.fill(command);
+    events.push_back({3, 14, 1592, scene::SceneCommand(std::move(command))});
+  });
   events.push_back({1, 2, 3, std::nullopt});
   return events;
 }
@@ -204,7 +199,7 @@ TEST(Crc32, IsThatOfZlib) {
   const std::string text = "123456789";
   const ByteView bytes = std::as_bytes(std::span(text));
   EXPECT_EQ(crc32(bytes), 0xCBF43926U);
-  EXPECT_EQ(crc32(bytes.subspan(4), crc32(bytes.first(4))), 0xCBF43926U);
+  EXPECT_EQ(crc32(bytes.first(4), bytes.subspan(4)), 0xCBF43926U);
 }
 
 // A small session, of every kind of block.
@@ -217,12 +212,12 @@ class SmallSession : public testing::Test {
     recorder.addDevice(device);
     recorder.start(77, "config");
     const scene::SceneCommand command = scene::AddObject{4, -1};
-    recorder.told(0, 9, 100, &command);
+    recorder.recordCommand(0, 9, 100, &command);
     const auto stopwatch = recorder.stopwatch(0);
     first_ = stopwatch();
     stopwatch();
-    recorder.published(0, 110, 1);
-    recorder.told(0, 9, 120, nullptr);
+    recorder.recordPublish(0, 110, 1);
+    recorder.recordCommand(0, 9, 120, nullptr);
     Filler filler(1);
     for (std::uint64_t i = 1; i <= 3; ++i) recorder.ring(0).push(anyTick(filler, i));
     recorder.finish();

@@ -12,7 +12,7 @@
 #include "base/clock.h"
 #include "record/block_file.h"
 #include "record/fields.h"
-#include "record/pack_commands.h"
+#include "record/scene_event_codec.h"
 #include "record/recorder.h"
 #include "record/recording_file.h"
 #include "record/recording_reader.h"
@@ -154,7 +154,7 @@ void writeRecording(const std::filesystem::path& file, bool gripper, int ticks) 
     const Nanos now = 1'000'000'000 + i * kPeriod;
     const auto commands = commandsAt(i);
     for (const auto& [client, command] : commands) {
-      recorder.told(0, client, now, command ? &*command : nullptr);
+      recorder.recordCommand(0, client, now, command ? &*command : nullptr);
       if (command) {
         builder.apply(client, scene::SceneCommand(*command), now, notices);
       } else {
@@ -164,7 +164,7 @@ void writeRecording(const std::filesystem::path& file, bool gripper, int ticks) 
     const auto due = builder.nextDeadline();
     if (i == 0 || !commands.empty() || (due && *due <= now)) {
       const auto snapshot = builder.publish(now, notices);
-      recorder.published(0, now, snapshot ? snapshot->revision : 0);
+      recorder.recordPublish(0, now, snapshot ? snapshot->revision : 0);
       if (snapshot) tick.snapshots().publish(snapshot);
     }
     if (i == 110) tick.control().stop();

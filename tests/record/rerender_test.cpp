@@ -5,7 +5,7 @@
 #include <set>
 #include <sstream>
 
-#include "record/pack_commands.h"
+#include "record/scene_event_codec.h"
 #include "record/recorded_file.h"
 #include "record/rerender.h"
 
