@@ -25,7 +25,6 @@ class OutputFile {
   void write(std::string_view text) { write(std::as_bytes(std::span(text))); }
 };
 
-/// What create() does with an existing file.
 /// A file open for reading, closed by its destructor. One thread at a time.
 class InputFile {
  public:
@@ -37,7 +36,7 @@ class InputFile {
   virtual std::size_t read(std::span<std::byte> into) = 0;
 };
 
-/// What may be there already when a file is created.
+/// What create() does with an existing file.
 enum class Existing { refuse, replace };
 
 /// On failure every call throws std::system_error with the path and the reason. From any thread.
@@ -46,8 +45,8 @@ class Files {
   virtual ~Files() = default;
   /// Creates a file (mode 0644) for writing. Its folder must exist.
   virtual std::unique_ptr<OutputFile> create(const std::filesystem::path& path, Existing existing) = 0;
-  /// Opens a file for reading from its start.
-  virtual std::unique_ptr<InputFile> open(const std::filesystem::path& path) = 0;
+  /// Opens a file for reading from its start. Unless overridden, holds the whole content in memory.
+  virtual std::unique_ptr<InputFile> open(const std::filesystem::path& path);
   /// The whole content.
   virtual std::vector<std::byte> read(const std::filesystem::path& path) = 0;
   /// Replaces `to`; atomic. Both must be in one file system.

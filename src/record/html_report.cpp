@@ -149,7 +149,7 @@ std::string htmlReport(const std::string& session, const RerenderChanges& change
   std::ostringstream out;
   const std::string title = "Session " + escaped(session) + ", felt again";
   out << "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<title>" << title << "</title>\n"
-      << kStyle << "\n<h1>" << title << "</h1>\n<p>Changed: " << escaped(inWords(changes))
+      << kStyle << "\n<h1>" << title << "</h1>\n<p>Changed: " << escaped(describe(changes))
       << ". <b class=\"then\">Blue</b> is as it was recorded, <b class=\"now\">red</b> as it is felt "
          "now.</p>\n";
   if (!remark.empty()) out << "<p>" << escaped(remark) << "</p>\n";

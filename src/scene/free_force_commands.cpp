@@ -1,10 +1,9 @@
-// Commands on forces that belong to no object. What becomes of them is in free_forces.cpp.
-#include "base/time.h"
-#include "scene/free_forces.h"
-
+// The commands on forces that belong to no object.
 #include <algorithm>
 #include <array>
 
+#include "base/time.h"
+#include "scene/free_forces.h"
 #include "scene/matrices.h"
 #include "scene/surface_settings.h"
 
@@ -13,23 +12,6 @@ namespace {
 
 constexpr double kTau = 2 * EIGEN_PI;
 constexpr double kLongest_ms = 1e9;
-
-// Which parameters a type uses; the others are ignored whatever they hold.
-struct EffectKind {
-  std::string_view name;
-  EffectType type;
-  bool gain, duration, frequency, position, direction;
-};
-constexpr EffectKind kEffectKinds[] = {
-    {"constant", EffectType::constant, false, true, false, false, true},
-    {"spring", EffectType::spring, true, true, false, true, false},
-    {"viscous", EffectType::viscous, true, true, false, false, false},
-    {"friction", EffectType::friction, true, true, false, false, false},
-    {"vibrationMotor", EffectType::motorVibration, false, true, true, false, false},
-    {"motorVibration", EffectType::motorVibration, false, true, true, false, false},
-    {"vibrationContact", EffectType::contactVibration, false, true, true, false, false},
-    {"contactVibration", EffectType::contactVibration, false, true, true, false, false},
-};
 
 double atLeastZero(double value, std::string_view what, const DefineEffect& c, const Call& call) {
   if (value >= 0) return value;
@@ -90,6 +72,17 @@ std::string_view nameOf(EffectType type) {
   return kind != std::end(kEffectKinds) ? kind->name : "";
 }
 
+// The types by the first of their names.
+std::string kindNames() {
+  std::string names;
+  for (const EffectKind& kind : kEffectKinds) {
+    if (kind.name != nameOf(kind.type)) continue;
+    names += names.empty() ? "" : ", ";
+    names += kind.name;
+  }
+  return names;
+}
+
 template <>
 void FreeForces::handle(DefineEffect& c, const Call& call) {
   const auto* kind = std::find_if(std::begin(kEffectKinds), std::end(kEffectKinds),
@@ -97,7 +90,7 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
   if (kind == std::end(kEffectKinds)) {
     call.refuse(
         "setEffect",
-        "refused: unknown type; use constant, spring, viscous, friction, vibrationMotor or vibrationContact",
+        "refused: unknown type; use " + kindNames(),
         " ", c.index, ", '", c.type, "'");
     return;
   }

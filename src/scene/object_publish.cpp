@@ -96,7 +96,7 @@ void ObjectTable::commitMeshes(Nanos now, NoticeBoard& board, std::vector<Notice
 
 void ObjectTable::commitMesh(Object& object, Nanos now, const std::function<Nanos()>& clock) {
   const std::uint64_t topology = object.geometry ? object.geometry->topology : 0;
-  object.geometry = object.mesh.commit(clock);
+  object.geometry = object.mesh.commit(clock, ++lastTopology_);
   object.stateChanged = true;
   queue(object);
   if (!config_.checkMeshes || !object.geometry || object.geometry->topology == topology) return;

@@ -147,6 +147,7 @@ class ObjectTable {
   Affine T_world_scene_ = Affine::Identity();
   std::uint64_t vertices_ = 0;
   std::uint64_t triangles_ = 0;
+  std::uint64_t lastTopology_ = 0;  // one counter for all meshes: no number is used twice
   std::uint32_t jumps_ = 0;  // one counter for all: a number never comes back, whatever is removed
 
   std::vector<std::int32_t> changed_;

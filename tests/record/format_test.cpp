@@ -304,7 +304,7 @@ TEST_F(SmallSession, AnotherVersionAndOtherFilesAreRefused) {
   const std::string newer(reinterpret_cast<const char*>(file.data()), file.size());
   EXPECT_NE(read(newer).second.find("version 3 of the format, this program reads versions 1 to 2"),
             std::string::npos);
-  EXPECT_NE(read("time,x\n1,2\n").second.find("is no session file"), std::string::npos);
+  EXPECT_NE(read("time,x\n1,2\n").second.find("is not a recording"), std::string::npos);
   EXPECT_THROW(RecordingReader("/nowhere/x.haptics"), RecordingError);
 }
 
