@@ -31,7 +31,7 @@ class SceneBuilder::State {
   void take(SceneCommand&& command, const Call& call) {
     const auto open = batches_.find(call.client);
     if (open == batches_.end() || std::holds_alternative<BeginBatch>(command) ||
-        std::holds_alternative<CommitBatch>(command)) {
+        std::holds_alternative<CommitBatch>(command) || std::holds_alternative<ReleaseForces>(command)) {
       dispatch(command, call);
       return;
     }
@@ -52,7 +52,6 @@ class SceneBuilder::State {
     forces_.clientGone(client, now);
   }
 
-  void releaseForces(ClientId client, Nanos now) { forces_.clientGone(client, now); }
 
   std::optional<Nanos> nextDeadline() const {
     std::optional<Nanos> next;
@@ -220,10 +219,6 @@ void SceneBuilder::apply(ClientId client, SceneCommand&& command, Nanos now, std
 
 void SceneBuilder::clientGone(ClientId client, Nanos now) {
   state_->clientGone(client, now);
-}
-
-void SceneBuilder::releaseForces(ClientId client, Nanos now) {
-  state_->releaseForces(client, now);
 }
 
 std::optional<Nanos> SceneBuilder::nextDeadline() const {

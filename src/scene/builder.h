@@ -33,9 +33,6 @@ class SceneBuilder {
   /// The client left: drops its open batch; the forces that it owns ramp out.
   void clientGone(ClientId client, Nanos now);
 
-  /// The forces that the client owns ramp out, although it stays.
-  void releaseForces(ClientId client, Nanos now);
-
   /// When publish() is due even without a command; nothing when it is not.
   std::optional<Nanos> nextDeadline() const;
 

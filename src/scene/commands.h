@@ -328,6 +328,12 @@ struct StopCustomEffect {
   static constexpr CommandInfo kInfo{"StopCustomEffect", kNoMessage, Target::forces};
 };
 
+/// The forces that the client owns ramp out, although it stays connected. Takes effect in an open batch, too. The server
+/// issues it for a client that it does not hear.
+struct ReleaseForces {
+  static constexpr CommandInfo kInfo{"ReleaseForces", kNoMessage, Target::forces};
+};
+
 // The scene as a whole.
 
 /// Resets workspace, objects and forces to the initial state.
@@ -352,7 +358,7 @@ using SceneCommand =
                  SetHapticOrigin, SetHapticScale, SetSceneOrigin, DefineEffect, StartEffect, StopEffect,
                  SetPlane, SetPlaneDetail, SetForceField, SetConstraintEnabled, SetConstraintMode,
                  SetConstraintVector, SetConstraintStiffness, StartCustomEffect, StopCustomEffect, ResetScene,
-                 BeginBatch, CommitBatch>;
+                 BeginBatch, CommitBatch, ReleaseForces>;
 
 /// Calls `visit.operator()<C>()` for each type of command, in the order of SceneCommand.
 template <class Visit>

@@ -333,6 +333,11 @@ void FreeForces::handle(StartCustomEffect& c, const Call& call) {
   changed_ = true;
 }
 
+template <>
+void FreeForces::handle(ReleaseForces&, const Call& call) {
+  clientGone(call.client, call.now);
+}
+
 void FreeForces::apply(SceneCommand& command, const Call& call) {
   std::visit(
       [&]<class C>(C& c) {

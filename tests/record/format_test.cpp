@@ -19,8 +19,8 @@ namespace {
 
 using test::RecordingFile;
 
-// Fills every field of anything with any bits, by the same lists that the file is written by; the structured
-// bindings there see to it that no field is missing.
+// Fills every field with random bits, by the lists of fields that the file is written by: their structured bindings
+// guarantee that no field is missing.
 class Filler {
  public:
   explicit Filler(std::uint64_t seed) : random_(seed) {}
@@ -127,6 +127,55 @@ TEST(Commands, KeepTheirNumbers) {
   EXPECT_EQ(wire::loadBig<std::int32_t>(bytes.data() + 18), 5);
   EXPECT_EQ(wire::loadBig<double>(bytes.data() + 22 + 8), 2.0);
   EXPECT_STREQ(nameOf(command), "SetTransform");
+}
+
+// The types of the members of a command, as docs/recording-format.md names them.
+class TypeLister {
+ public:
+  template <class T>
+  void operator()(const char* name, const T& value) {
+    text_ += (text_.empty() ? "" : ", ") + typeOf(value) + " `" + name + "`";
+  }
+  std::string text() const { return text_.empty() ? "-" : text_; }
+
+ private:
+  static std::string typeOf(bool) { return "truth"; }
+  static std::string typeOf(float) { return "f32"; }
+  static std::string typeOf(double) { return "f64"; }
+  static std::string typeOf(std::int32_t) { return "i32"; }
+  static std::string typeOf(std::uint32_t) { return "u32"; }
+  static std::string typeOf(const std::string&) { return "text"; }
+  template <IsEnum T>
+  static std::string typeOf(T) {
+    return "i32";
+  }
+  template <class T>
+  static std::string typeOf(const std::vector<T>&) {
+    return "list of " + typeOf(T());
+  }
+  template <class T, std::size_t N>
+  static std::string typeOf(const std::array<T, N>&) {
+    return typeOf(T()) + "[" + std::to_string(N) + "]";
+  }
+  template <class S, int R>
+  static std::string typeOf(const Eigen::Matrix<S, R, 1>&) {
+    return typeOf(S()) + "[" + std::to_string(R) + "]";
+  }
+
+  std::string text_;
+};
+
+TEST(Commands, AreInTheDocument) {
+  std::string table;
+  scene::forEachCommand([&]<class C>() {
+    TypeLister types;
+    const C command{};
+    fields(command, types);
+    table += "| " + std::to_string(commandNumber<C>()) + " | `" + C::kInfo.name + "` | " + types.text() + " |\n";
+  });
+  std::ifstream in(HAPTICD_TESTDATA "/../docs/recording-format.md");
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  EXPECT_NE(text.find(table), std::string::npos) << "put this table into docs/recording-format.md:\n" << table;
 }
 
 realtime::TickRecord anyTick(Filler& filler, std::uint64_t number) {
