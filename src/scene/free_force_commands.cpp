@@ -106,7 +106,7 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
   }
   const Effect effect = effectFrom(*kind, c, config_, bound_, call);
   Owned<RunningEffect>& entry = effects_[c.index];
-  // An effect of somebody who left goes on ramping out until it is started again.
+  // An effect whose owner left ramps out until it is started again.
   if (entry.value.effect.releasing) entry.value.running = false;
   const std::uint32_t started = entry.value.effect.start;
   entry.value.effect = effect;
@@ -122,7 +122,7 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
   }
 }
 
-// The definition may travel by UDP and come after its start.
+// The definition may travel by UDP and arrive after the start.
 template <>
 void FreeForces::handle(StartEffect& c, const Call& call) {
   const auto known = effects_.find(c.index);

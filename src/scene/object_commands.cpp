@@ -104,7 +104,7 @@ void ObjectTable::handle(SetTriangles& c, const Call& call) {
 template <>
 void ObjectTable::handle(SetNormal& c, const Call& call) {
   if (find(c.object, "setNormal", call) == nullptr) return;
-  call.tell("setNormal", "ignored: normals follow from the triangles", " object ", c.object);
+  call.note("setNormal", "ignored: normals follow from the triangles", " object ", c.object);
 }
 
 template <>
@@ -149,7 +149,7 @@ void ObjectTable::handle(TransformMesh& c, const Call& call) {
 
 template <>
 void ObjectTable::handle(SetTrimeshType& c, const Call& call) {
-  call.tell("setTrimeshType", "ignored: there is one way to collide", " object ", c.object, ", type ",
+  call.note("setTrimeshType", "ignored: there is one way to collide", " object ", c.object, ", type ",
             c.type);
 }
 
@@ -189,10 +189,10 @@ void ObjectTable::handle(AddObjectExScene& c, const Call& call) {
     return;
   }
   if (find(c.object) == nullptr) {
-    create(c.object, Object::kNowhere);
+    create(c.object, Object::kNoParent);
   } else {
     detach(*find(c.object));
-    attach(*find(c.object), Object::kNowhere);
+    attach(*find(c.object), Object::kNoParent);
     moveAll(*find(c.object), 0);
   }
   becomeStock(*find(c.object));
