@@ -25,16 +25,8 @@ LIST
 # Files that still reach past src/base.
 seam_exceptions() {
   cat <<'LIST'
-src/device/simulated/hand_file.cpp
 src/realtime/servo/servo_thread.cpp
 src/realtime/servo/servo_thread.h
-src/record/block_file.cpp
-src/record/export.h
-src/record/mcap_writer.cpp
-src/record/recorder.cpp
-src/record/recorder.h
-src/record/vrpn_log.cpp
-src/scene/deformation.cpp
 src/server/config/config.cpp
 src/server/player.cpp
 src/server/player.h

@@ -1,4 +1,4 @@
-// Files for other programs, byte by byte where these programs would stumble.
+// Files for other programs, byte by byte where those programs are strict.
 #include "record/export.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// What goes into a session file comes out of it, and what is cut or damaged says so.
+// Recordings are read as they were written; cut and damaged ones are reported.
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -79,7 +79,7 @@ Bytes packedEvent(const SceneEvent& event) {
   return bytes;
 }
 
-// One of each command, filled by chance.
+// One of each command, with random values.
 std::vector<SceneEvent> oneOfEach(std::uint64_t seed) {
   Filler filler(seed);
   std::vector<SceneEvent> events;
@@ -92,7 +92,7 @@ std::vector<SceneEvent> oneOfEach(std::uint64_t seed) {
   return events;
 }
 
-RC_GTEST_PROP(Commands, ComeBackAsTheyWere, (std::uint64_t seed)) {
+RC_GTEST_PROP(Commands, AreReadAsTheyWereWritten, (std::uint64_t seed)) {
   for (const SceneEvent& event : oneOfEach(seed)) {
     const Bytes bytes = packedEvent(event);
     SceneEvent back;
@@ -105,7 +105,7 @@ RC_GTEST_PROP(Commands, ComeBackAsTheyWere, (std::uint64_t seed)) {
   }
 }
 
-RC_GTEST_PROP(Commands, CutShortAreRefused, (std::uint64_t seed)) {
+RC_GTEST_PROP(Commands, TruncatedOnesAreRefused, (std::uint64_t seed)) {
   for (const SceneEvent& event : oneOfEach(seed)) {
     const Bytes bytes = packedEvent(event);
     SceneEvent back;
@@ -117,7 +117,7 @@ RC_GTEST_PROP(Commands, CutShortAreRefused, (std::uint64_t seed)) {
   }
 }
 
-// Files keep their meaning: a number is never given to another command.
+// Files keep their meaning: no other command gets the number.
 TEST(Commands, KeepTheirNumbers) {
   Bytes bytes;
   const scene::SceneCommand command = scene::SetTransform{5, {1, 2}};
@@ -203,7 +203,7 @@ Bytes allOf(const realtime::TickRecord& tick) {
   return bytes;
 }
 
-RC_GTEST_PROP(Ticks, ComeBackAsTheyWere, (std::uint64_t seed)) {
+RC_GTEST_PROP(Ticks, AreReadAsTheyWereWritten, (std::uint64_t seed)) {
   Filler filler(seed);
   std::vector<realtime::TickRecord> ticks;
   Bytes run;
@@ -223,7 +223,7 @@ RC_GTEST_PROP(Ticks, ComeBackAsTheyWere, (std::uint64_t seed)) {
   RC_ASSERT(unpacker.ok());
 }
 
-RC_GTEST_PROP(Header, ComesBackAsItWas, (std::uint64_t seed)) {
+RC_GTEST_PROP(Header, IsReadAsItWasWritten, (std::uint64_t seed)) {
   Filler filler(seed);
   RecordingHeader header;
   filler.fill(header);
@@ -234,7 +234,7 @@ RC_GTEST_PROP(Header, ComesBackAsItWas, (std::uint64_t seed)) {
   RC_ASSERT(packed(back) == bytes);
 }
 
-TEST(Unpacker, ALengthOfMoreThanIsThereIsRefusedWithoutTakingTheMemory) {
+TEST(Unpacker, ALengthBeyondTheBytesIsRefusedWithoutAllocatingIt) {
   const Bytes bytes = packed(std::uint32_t{0xFFFFFFFF});
   Unpacker list(bytes);
   EXPECT_TRUE(list.next<std::vector<double>>().empty());
@@ -251,7 +251,7 @@ TEST(Crc32, IsThatOfZlib) {
   EXPECT_EQ(crc32(bytes.first(4), bytes.subspan(4)), 0xCBF43926U);
 }
 
-// A small session, of every kind of block.
+// A small recording with every kind of block.
 class SmallSession : public testing::Test {
  protected:
   void SetUp() override {
@@ -274,7 +274,7 @@ class SmallSession : public testing::Test {
     bytes_.assign(std::istreambuf_iterator<char>(in), {});
   }
 
-  // Rewrites the file and reads what is left of it: the number of events, and the remark or error.
+  // Rewrites the file and reads it: the number of events, and the remark or error.
   std::pair<std::size_t, std::string> read(const std::string& bytes) {
     std::ofstream(file_.path(), std::ios::binary) << bytes;
     std::size_t events = 0;
@@ -292,7 +292,7 @@ class SmallSession : public testing::Test {
   Nanos first_ = 0;
 };
 
-TEST_F(SmallSession, HoldsWhatWasRecorded) {
+TEST_F(SmallSession, HasWhatWasRecorded) {
   RecordingReader reader(file_.path());
   EXPECT_EQ(reader.header().config, "config");
   EXPECT_EQ(reader.header().wallOffset, 77);
@@ -323,16 +323,16 @@ TEST_F(SmallSession, CutAtAnyByteIsReadToTheLastWholeBlock) {
   for (std::size_t size = 0; size < whole.size(); ++size) {
     const auto [events, remark] = read(whole.substr(0, size));
     EXPECT_NE(remark, "") << size;
-    EXPECT_GE(events, before) << "more of the file, fewer events: " << size;
+    EXPECT_GE(events, before) << "a longer part of the file gave fewer events: " << size;
     EXPECT_LE(events, all);
     before = events;
   }
   EXPECT_EQ(before, all - 1);
 }
 
-TEST_F(SmallSession, ADamagedByteIsFoundWhereItIs) {
+TEST_F(SmallSession, ADamagedByteIsReportedAtItsBlock) {
   const std::string whole = bytes_;
-  // Where the blocks begin.
+  // The positions of the blocks.
   std::vector<std::uint64_t> starts;
   BlockReader blocks(file_.path());
   for (BlockReader::Block block; blocks.next(block);) starts.push_back(block.offset);
@@ -347,7 +347,7 @@ TEST_F(SmallSession, ADamagedByteIsFoundWhereItIs) {
   }
 }
 
-TEST_F(SmallSession, AnotherVersionAndOtherFilesAreRefused) {
+TEST_F(SmallSession, NewerVersionsAndOtherFilesAreRefused) {
   Bytes file(magic().begin(), magic().end());
   appendBlock(file, BlockKind::header, packed(kFormatVersion + 1));
   const std::string newer(reinterpret_cast<const char*>(file.data()), file.size());
@@ -357,8 +357,8 @@ TEST_F(SmallSession, AnotherVersionAndOtherFilesAreRefused) {
   EXPECT_THROW(RecordingReader("/nowhere/x.haptics"), RecordingError);
 }
 
-// Version 2 differs by what stands in ticks with a gripper, and these have none.
-TEST_F(SmallSession, AFileOfVersion1IsReadAsItWas) {
+// Version 2 differs only in ticks with a gripper, and these have none.
+TEST_F(SmallSession, AFileOfVersion1IsReadAsBefore) {
   const auto now = read(bytes_);
   Bytes old(magic().begin(), magic().end());
   std::ofstream(file_.path(), std::ios::binary) << bytes_;
@@ -373,7 +373,7 @@ TEST_F(SmallSession, AFileOfVersion1IsReadAsItWas) {
   EXPECT_EQ(now.second, "");
 }
 
-TEST_F(SmallSession, UnknownKindsOfBlocksAreSteppedOver) {
+TEST_F(SmallSession, UnknownKindsOfBlocksAreSkipped) {
   Bytes extra;
   appendBlock(extra, static_cast<BlockKind>(77), packed(std::string("of the future")));
   const auto plain = read(bytes_);

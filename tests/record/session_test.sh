@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# A session as a user has it: recorded, killed, felt again, changed, exported, replayed.
+# A recording as users make it: recorded, cut, re-rendered, changed, exported, replayed.
 set -euo pipefail
 hapticd=$1
 source_dir=$2
@@ -25,11 +25,11 @@ grep -q 'recorded [0-9]* ticks' "$work/log"
 "$hapticd" render --session "$work/my.haptics" --report "$work/same.html" --out "$work/same.csv" >"$work/same.txt"
 grep -q 'ticks in every bit: all of them' "$work/same.txt"
 awk -F, 'NR > 1 { if ($3 != $4 || $5 != $6) { print "line " NR ": " $0; exit 1 } touching += $5 > 0 } END { exit !(touching > 100) }' "$work/same.csv"
-# Of a copy of a file that is still written, what is whole; it says that there is no end.
+# A copy of a file that is still being written is read up to its last whole block, with a remark.
 "$hapticd" render --session "$work/live.haptics" >"$work/live.txt" 2>"$work/live.err"
 grep -q 'in every bit: all of them' "$work/live.txt"
 grep -qE 'cut|no end' "$work/live.err"
-# Other surfaces are felt, and shown.
+# Other surfaces change forces, and the report shows it.
 "$hapticd" render --session "$work/my.haptics" --stiffness 100 --report "$work/soft.html" >"$work/soft.txt"
 grep -q 'changed     stiffness 100 N/m' "$work/soft.txt"
 awk '/^force/ { exit !($4 > 0) }' "$work/soft.txt"
@@ -56,7 +56,7 @@ else
   echo "VRPN_CLIENTS is not set: no stock client opened the logs"
 fi
 
-# Once more, to clients.
+# Replayed to clients.
 "$hapticd" replay "$work/my.haptics" --port 0 --http off --loop >"$work/replay.log" 2>&1 &
 replay=$!
 trap 'kill "$replay" 2>/dev/null || true; rm -rf "$work"' EXIT
