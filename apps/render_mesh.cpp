@@ -55,14 +55,14 @@ std::shared_ptr<const scene::SceneSnapshot> makeScene(const MeshRenderOptions& o
   return snapshot;
 }
 
-struct Felt {
+struct Summary {
   std::vector<double> step_us;
   double peakForce_N = 0;
   double deepest_m = 0;
   std::size_t touching = 0;
 };
 
-Felt follow(const MeshRenderOptions& options, const device::HandFile& hand, const scene::SceneSnapshot& snapshot,
+Summary follow(const MeshRenderOptions& options, const device::HandFile& hand, const scene::SceneSnapshot& snapshot,
             record::CsvFile& out) {
   realtime::Renderer renderer({.toolRadius_m = options.toolRadius_mm * 1e-3, .forceShading = false});
   realtime::GuardOptions guardOptions = realtime::GuardOptions::of(device::profiles().front());
@@ -71,7 +71,7 @@ Felt follow(const MeshRenderOptions& options, const device::HandFile& hand, cons
   const realtime::GuardControl control(guardOptions.armed);
   realtime::Guard guard(guardOptions, control, kPeriod);
 
-  Felt felt;
+  Summary summary;
   realtime::Rendering rendering;
   const Nanos last = hand.duration();
   for (Nanos t = hand.begin(); t <= last; t += kPeriod) {
@@ -95,7 +95,7 @@ Felt follow(const MeshRenderOptions& options, const device::HandFile& hand, cons
                                      .deepContact = (rendering.status & realtime::kRenderReleased) != 0});
 
     realtime::TickReport tick;
-    tick.tick = felt.step_us.size() + 1;
+    tick.tick = summary.step_us.size() + 1;
     tick.time = t;
     tick.revision = snapshot.revision;
     tick.device = state;
@@ -108,12 +108,12 @@ Felt follow(const MeshRenderOptions& options, const device::HandFile& hand, cons
     if (options.timing) sample.compute_ns = step_ns;
     out.add(sample);
 
-    felt.step_us.push_back(static_cast<double>(step_ns) * 1e-3);
-    felt.peakForce_N = std::max(felt.peakForce_N, force_N.norm());
-    felt.deepest_m = std::max(felt.deepest_m, rendering.touching ? rendering.depth_m : 0.0);
-    felt.touching += rendering.touching ? 1 : 0;
+    summary.step_us.push_back(static_cast<double>(step_ns) * 1e-3);
+    summary.peakForce_N = std::max(summary.peakForce_N, force_N.norm());
+    summary.deepest_m = std::max(summary.deepest_m, rendering.touching ? rendering.depth_m : 0.0);
+    summary.touching += rendering.touching ? 1 : 0;
   }
-  return felt;
+  return summary;
 }
 
 // Centres the mesh and scales it to --size-mm.
@@ -146,17 +146,17 @@ int renderMesh(const MeshRenderOptions& options) {
   const double build_s = base::toSeconds(base::now() - before);
 
   record::CsvFile out(options.out);
-  Felt felt = follow(options, *hand, *snapshot, out);
+  Summary summary = follow(options, *hand, *snapshot, out);
   out.close();
 
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   std::printf("mesh        %zu triangles, scene and index built in %.3f s\n", triangles, build_s);
-  std::printf("hand        %zu ticks of 1 ms, %zu touching\n", felt.step_us.size(), felt.touching);
-  std::printf("felt        peak force %.3f N, deepest %.3f mm%s\n", felt.peakForce_N, felt.deepest_m * 1e3,
+  std::printf("hand        %zu ticks of 1 ms, %zu touching\n", summary.step_us.size(), summary.touching);
+  std::printf("felt        peak force %.3f N, deepest %.3f mm%s\n", summary.peakForce_N, summary.deepest_m * 1e3,
               options.raw ? " (raw: without the guard)" : "");
-  std::printf("step time   p50 %.2f us, p99 %.2f us, max %.2f us\n", quantile(felt.step_us, 0.5),
-              quantile(felt.step_us, 0.99), quantile(felt.step_us, 1.0));
+  std::printf("step time   p50 %.2f us, p99 %.2f us, max %.2f us\n", quantile(summary.step_us, 0.5),
+              quantile(summary.step_us, 0.99), quantile(summary.step_us, 1.0));
   std::printf("peak memory %.1f MiB\n", static_cast<double>(usage.ru_maxrss) / 1024);
   return 0;
 }

@@ -2,8 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "record/scene_event_codec.h"
 #include "record/recording_reader.h"
+#include "record/scene_event_codec.h"
 #include "record/text_fields.h"
 
 namespace hapticd::record {

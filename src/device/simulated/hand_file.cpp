@@ -202,6 +202,8 @@ class HandFile::Parser {
     Nanos time = readTime(cells_[columns_.time], columns_, line);
     if (hand_.rows_.empty() && columns_.fromFirstRow) begin_ = time;
     time -= begin_;
+    // A client that samples reports may write one of them twice.
+    if (columns_.fromFirstRow && !hand_.rows_.empty() && time == hand_.rows_.back().time) return;
     if (!hand_.rows_.empty() && time <= hand_.rows_.back().time)
       line.fail("time " + std::to_string(base::toSeconds(time)) + " s is not after the row before");
     const std::size_t x = columns_.position;
