@@ -1,4 +1,4 @@
-// hapticd export: a session file in formats of other programs.
+// hapticd export: converts a recording for other programs.
 #include <cstdio>
 #include <memory>
 #include <stdexcept>
@@ -15,13 +15,13 @@ namespace hapticd::apps {
 namespace {
 
 struct Options {
-  std::string session;
+  std::string recording;
   std::string to;
   std::string out;
 };
 
-// What a client with the usual choice of reports would have heard of one device.
-struct Voice {
+// Reports of one device, as a client with the default subscription receives them.
+struct ReportedDevice {
   server::Reporter reporter;
   std::vector<wire::LocalSender> names;
   bool first = true;
@@ -32,39 +32,39 @@ wire::Time stamp(base::Nanos wall_ns) {
           static_cast<std::uint32_t>(wall_ns % 1'000'000'000 / 1000)};
 }
 
-void say(Voice& voice, const realtime::TickReport& tick, wire::Time time, record::VrpnLog& log) {
+void addReports(ReportedDevice& device, const realtime::TickReport& tick, wire::Time time, record::VrpnLog& log) {
   server::ReportFrame frame;
   frame.buttons = tick.device.buttons;
   std::vector<server::Outgoing> messages;
-  if (std::exchange(voice.first, false)) {
-    voice.reporter.presentState(tick, frame, messages);
+  if (std::exchange(device.first, false)) {
+    device.reporter.presentState(tick, frame, messages);
   } else {
-    voice.reporter.update(tick, frame, messages);
+    device.reporter.update(tick, frame, messages);
   }
   for (const server::Outgoing& out : messages) {
-    for (const wire::LocalSender name : voice.names) log.add(time, name, out.message);
+    for (const wire::LocalSender name : device.names) log.add(time, name, out.message);
   }
 }
 
 void exportVrpn(const Options& options, std::string& remark) {
-  record::RecordingReader reader(options.session);
+  record::RecordingReader reader(options.recording);
   const record::RecordingHeader& header = reader.header();
-  const server::ServerConfig config = server::parseConfig(header.config, options.session);
+  const server::ServerConfig config = server::parseConfig(header.config, options.recording);
   record::VrpnLog log(options.out);
-  std::vector<Voice> voices;
+  std::vector<ReportedDevice> devices;
   for (std::size_t i = 0; i < header.devices.size(); ++i) {
     const server::DeviceConfig& device = config.devices.at(i);
-    voices.push_back(
+    devices.push_back(
         {.reporter = server::Reporter(device, header.devices[i].buttons,
                                       {.kinds = wire::kReportDefault, .rate_Hz = device.reportRate_Hz}),
          .names = {}});
-    for (const std::string& name : device.names) voices.back().names.push_back(log.addSender(name));
+    for (const std::string& name : device.names) devices.back().names.push_back(log.addSender(name));
   }
   for (record::RecordingEvent event; reader.next(event);) {
     const auto* tick = std::get_if<record::TickEvent>(&event);
     if (tick == nullptr) continue;
     const realtime::TickReport& report = tick->tick.report;
-    say(voices[tick->device], report, stamp(report.time + header.wallOffset), log);
+    addReports(devices[tick->device], report, stamp(report.time + header.wallOffset), log);
   }
   log.close();
   remark = reader.remark();
@@ -76,10 +76,10 @@ int run(const Options& options) {
     exportVrpn(options, remark);
   } else if (options.to == "csv") {
     record::CsvFile file(options.out);
-    record::exportSession(options.session, file, remark);
+    record::exportRecording(options.recording, file, remark);
   } else {
     record::McapFile file(options.out);
-    record::exportSession(options.session, file, remark);
+    record::exportRecording(options.recording, file, remark);
   }
   if (!remark.empty()) std::fprintf(stderr, "hapticd: %s\n", remark.c_str());
   return 0;
@@ -89,8 +89,8 @@ int run(const Options& options) {
 
 void addExport(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("export", "Turn a session file into MCAP, CSV or a log of VRPN");
-  command->add_option("file", options->session, "Session file of 'hapticd serve --record'")
+  CLI::App* command = app.add_subcommand("export", "Convert a recording to MCAP, CSV or a VRPN log");
+  command->add_option("file", options->recording, "Recording of 'hapticd serve --record'")
       ->required()
       ->check(CLI::ExistingFile);
   command->add_option("--to", options->to, "mcap, csv or vrpn")
@@ -99,8 +99,8 @@ void addExport(CLI::App& app) {
   command->add_option("-o,--out", options->out, "File to write")->required();
   command->footer(
       "mcap  ticks, poses, guard and scene commands, for Foxglove and other readers of MCAP\n"
-      "csv   one row for each tick of each device\n"
-      "vrpn  what a client would have heard; VRPN's clients open it as Phantom@file:///path/to/the.vrpn\n"
+      "csv   one row for each tick of each device; --hand of 'hapticd serve' and 'hapticd render' reads it\n"
+      "vrpn  the reports that a client would have received; VRPN clients open it as Phantom@file:///path/to/the.vrpn\n"
       "Example: hapticd export my.haptics --to mcap -o my.mcap");
   command->callback([options] { exitCode = run(*options); });
 }

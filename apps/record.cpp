@@ -1,4 +1,4 @@
-// hapticd record: what a client can hear of a server, into a file; a client that only listens.
+// hapticd record: writes the reports that a client receives to a file; sends no commands.
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -12,6 +12,7 @@
 #include "hapticd/client.h"
 #include "record/export.h"
 #include "record/vrpn_log.h"
+#include "sample_of.h"
 #include "stop_signals.h"
 
 namespace hapticd::apps {
@@ -26,36 +27,10 @@ struct Options {
   double rate_Hz = 1000;
 };
 
-base::Nanos nanosOf(Time time) {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(time.time_since_epoch()).count();
-}
-
 wire::Time stamp(Time time) {
   const base::Nanos ns = nanosOf(time);
   return {static_cast<std::uint32_t>(ns / 1'000'000'000),
           static_cast<std::uint32_t>(ns % 1'000'000'000 / 1000)};
-}
-
-record::Sample sampleOf(const std::string& device, const TickReport& tick) {
-  const auto vec = [](const Vec3& v) { return geometry::Vec3(v[0], v[1], v[2]); };
-  record::Sample sample;
-  sample.device = device;
-  sample.time_ns = nanosOf(tick.time);
-  sample.tick = tick.tick;
-  sample.revision = tick.revision;
-  sample.hand_m = vec(tick.hand_m);
-  sample.proxy_m = vec(tick.proxy_m);
-  sample.velocity_m_per_s = vec(tick.velocity_m_per_s);
-  const Quaternion& q = tick.orientation;
-  sample.orientation = geometry::Quat(q[3], q[0], q[1], q[2]);
-  sample.force_N = vec(tick.force_N);
-  sample.depth_m = tick.depth_m;
-  sample.touching = tick.object >= 0 || tick.depth_m > 0;
-  sample.object = tick.object;
-  sample.buttons = tick.buttons;
-  sample.guardActive = tick.guardActive.bits();
-  sample.guardLatched = tick.guardLatched.bits();
-  return sample;
 }
 
 std::unique_ptr<record::SampleFile> sampleFile(const std::string& file) {
@@ -65,7 +40,7 @@ std::unique_ptr<record::SampleFile> sampleFile(const std::string& file) {
   return nullptr;
 }
 
-// Every report as the message that it came as.
+// Every report as the message that carried it.
 void logReports(Client& client, record::VrpnLog& log, wire::LocalSender sender) {
   const auto add = [&log, sender](Time time, const wire::Message& message) {
     log.add(stamp(time), sender, message);
@@ -105,16 +80,16 @@ void logReports(Client& client, record::VrpnLog& log, wire::LocalSender sender) 
   });
 }
 
-void listen(Client& client, double seconds) {
+void pollUntilEnd(Client& client, double seconds) {
   const auto start = std::chrono::steady_clock::now();
-  const auto over = [&] {
+  const auto isOver = [&] {
     return seconds > 0 && std::chrono::steady_clock::now() - start >= std::chrono::duration<double>(seconds);
   };
-  while (!stopRequested() && !over()) {
-    client.poll(20ms);  // short, so that signals are noticed
+  while (!stopRequested() && !isOver()) {
+    client.poll(20ms);  // short, so that signals take effect
     if (!client.connected())
       throw ConnectionLost("the connection to " + client.server() +
-                           " was lost; what came before it is in the file");
+                           " was lost; the file holds everything before");
   }
 }
 
@@ -122,12 +97,12 @@ void recordTicks(Client& client, record::SampleFile& file, const Options& option
   const auto capabilities = client.waitCapabilities();
   if (!capabilities || !capabilities->subscribe) {
     throw std::runtime_error(client.server() +
-                             " is no hapticd and tells no whole ticks; record to a file called *.vrpn");
+                             " is not a hapticd and reports no ticks; record to a file called *.vrpn");
   }
   client.onTick([&](const TickReport& tick) { file.add(sampleOf(client.device(), tick)); });
   client.subscribe(Reports::tick, options.rate_Hz);
   try {
-    listen(client, options.seconds);
+    pollUntilEnd(client, options.seconds);
   } catch (const ConnectionLost&) {
     file.close();
     throw;
@@ -140,8 +115,8 @@ int run(const Options& options) {
   if (!samples && std::filesystem::path(options.file).extension() != ".vrpn") {
     throw std::runtime_error(
         "'" + options.file +
-        "': record from outside to a file called *.vrpn, *.csv or *.mcap; whole sessions are "
-        "written by the server: hapticd serve --record FILE.haptics");
+        "': a client records to a file called *.vrpn, *.csv or *.mcap; the server itself writes recordings that can be "
+        "replayed: hapticd serve --record FILE.haptics");
   }
   const StopSignals signals;
   Client client(options.server, {.reconnect = false});
@@ -150,7 +125,7 @@ int run(const Options& options) {
   } else {
     record::VrpnLog log(options.file);
     logReports(client, log, log.addSender(client.device()));
-    listen(client, options.seconds);
+    pollUntilEnd(client, options.seconds);
     log.close();
   }
   std::printf("recorded %s to %s\n", options.server.c_str(), options.file.c_str());
@@ -161,20 +136,20 @@ int run(const Options& options) {
 
 void addRecord(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("record", "Write down what a client hears of a server");
+  CLI::App* command = app.add_subcommand("record", "Record the reports of a server as a client");
   command->add_option("server", options->server, "NAME@host[:port] or NAME@tcp://host[:port]")->required();
   command->add_option("file", options->file, "*.vrpn, *.csv or *.mcap")->required();
-  command->add_option("--seconds", options->seconds, "How long; 0: until Ctrl-C")
+  command->add_option("--seconds", options->seconds, "Duration; 0: until Ctrl-C")
       ->check(within(0, kLongest_s))
       ->capture_default_str();
-  command->add_option("--rate", options->rate_Hz, "Ticks a second at most, for csv and mcap")
+  command->add_option("--rate", options->rate_Hz, "At most this many ticks per second, for csv and mcap")
       ->check(within(0.1, 4000))
       ->capture_default_str();
   command->footer(
-      "Only listens, from outside: reports in the frame that the server reports, and no scene. A whole "
-      "session, that can be\n"
-      "replayed and rendered again, is written by the server itself: hapticd serve --record FILE.haptics\n"
-      "Works with other VRPN servers, too, but for csv and mcap, which need whole ticks.\n"
+      "Records what a client receives: reports, in the frame that the server reports, without the scene. The server\n"
+      "itself writes recordings that can be replayed and re-rendered: hapticd serve --record FILE.haptics\n"
+      "*.vrpn works with any VRPN server; csv and mcap need the ticks of a hapticd.\n"
+      "A csv can be given to --hand of 'hapticd serve' and 'hapticd render'.\n"
       "Examples:\n"
       "  hapticd record Phantom@localhost stroke.mcap --seconds 10\n"
       "  hapticd record Tracker0@lab7 stroke.vrpn");

@@ -1,4 +1,4 @@
-// hapticd render: a recorded hand through a mesh, or a recorded session once more; offline and deterministic.
+// hapticd render: renders a mesh along a recorded hand, or re-renders a recording; offline and deterministic.
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -24,17 +24,17 @@ void addMeshOptions(CLI::App& command, MeshRenderOptions& options) {
       ->capture_default_str();
   command
       .add_option("--size-mm", options.size_mm,
-                  "Scale the mesh to this largest extent and centre it [as it is]")
+                  "Scale the mesh to this largest extent and centre it [unchanged]")
       ->check(within(1e-6, 1e6));
-  command.add_option("--hand", options.hand, "CSV: t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons], device metres")
+  command.add_option("--hand", options.hand, "CSV: t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons] in device metres, or any CSV that hapticd wrote")
       ->check(CLI::ExistingFile);
   command
       .add_option("--faces", options.faces,
-                  "Sides that can be touched; the front sees corners counter-clockwise")
+                  "Sides that can be touched; seen from the front, corners run counter-clockwise")
       ->check(CLI::IsMember({"front", "back", "both"}))
       ->capture_default_str();
   command.add_flag("--timing", options.timing,
-                   "Add the column step_us (the only one that differs from run to run)");
+                   "Fill the column compute_ns (the only one that differs from run to run)");
 }
 
 void addSurfaceOptions(CLI::App& command, MeshRenderOptions& options) {
@@ -51,7 +51,7 @@ void addSurfaceOptions(CLI::App& command, MeshRenderOptions& options) {
                    "Leave out the guard, the passivity clamp and the limits of surfaces");
 }
 
-// What was given on the command line is a change; what was not stays as it was recorded.
+// Options on the command line are changes; all else stays as recorded.
 record::RerenderChanges changesOf(const CLI::App& command, const MeshRenderOptions& options) {
   const auto given = [&](const char* name, double value) {
     return command.count(name) > 0 ? std::optional<double>(value) : std::nullopt;
@@ -70,8 +70,8 @@ int run(const CLI::App& command, const Options& options) {
   if (!options.session.empty()) {
     for (const char* name : {"--mesh", "--hand", "--mesh-unit", "--size-mm", "--faces", "--timing"}) {
       if (command.count(name) == 0) continue;
-      throw std::runtime_error(std::string(name) + " goes with a mesh, --session has its own scene and hand; "
-                                                   "leave one of them out");
+      throw std::runtime_error(std::string(name) + " belongs to --mesh; --session has its own scene and "
+                                                   "hand, leave one of them out");
     }
     return renderSession({.session = options.session,
                           .out = options.mesh.out,
@@ -79,9 +79,9 @@ int run(const CLI::App& command, const Options& options) {
                           .changes = changesOf(command, options.mesh)});
   }
   if (options.mesh.mesh.empty() || options.mesh.hand.empty() || options.mesh.out.empty()) {
-    throw std::runtime_error("name a mesh, a hand and where to write (--mesh, --hand, --out), or a --session");
+    throw std::runtime_error("nothing to render: give --mesh, --hand and --out, or --session");
   }
-  if (!options.report.empty()) throw std::runtime_error("--report compares with a --session; name one");
+  if (!options.report.empty()) throw std::runtime_error("--report needs a --session to compare with");
   return renderMesh(options.mesh);
 }
 
@@ -90,21 +90,21 @@ int run(const CLI::App& command, const Options& options) {
 void addRender(CLI::App& app) {
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand(
-      "render", "Feel a mesh, or a recorded session again, offline along a recorded hand; deterministic");
+      "render", "Render a mesh along a recorded hand, or re-render a recording; offline and deterministic");
   addMeshOptions(*command, options->mesh);
   command
       ->add_option("--session", options->session,
-                   "Session file of 'hapticd serve --record': its hand through its scene, once more")
+                   "Recording of 'hapticd serve --record' to re-render")
       ->check(CLI::ExistingFile);
   command->add_option("--out", options->mesh.out, "CSV to write, one row for each tick");
   command->add_option("--report", options->report,
-                      "With --session: HTML page with plots of force and depth, then and now");
+                      "With --session: HTML page with plots of force and depth, recorded and re-rendered");
   addSurfaceOptions(*command, options->mesh);
   command->footer(
-      "With --mesh, the columns written are t_s, hip_[xyz]_m, proxy_[xyz]_m, force_[xyz]_N (on the hand), depth_m,\n"
-      "touching, object (-1 when free), normal_[xyz] (0 when free). Device frame: +x right, +y up, +z to the user.\n"
-      "With --session nothing changes but what is named: surfaces (of all objects and planes), tool radius, --raw.\n"
-      "With nothing changed the forces are the recorded ones bit for bit, or the exit status is 1.\n"
+      "With --mesh, --out has the columns of 'hapticd export --to csv' (docs/recording.md): hip_[xyz]_m, proxy_[xyz]_m,\n"
+      "force_[xyz]_N (on the hand), depth_m, ... Device frame: +x right, +y up, +z to the user.\n"
+      "With --session, options change surfaces (of all objects and planes), tool radius and guard; all else stays as\n"
+      "recorded. Without changes the forces equal the recorded ones bit for bit, or the exit status is 1.\n"
       "Examples:\n"
       "  hapticd render --mesh bunny.obj --hand stroke.csv --out felt.csv --raw\n"
       "  hapticd render --session my.haptics\n"

@@ -1,4 +1,4 @@
-// hapticd render --mesh: a recorded hand through a mesh, offline and deterministic.
+// hapticd render --mesh: renders a mesh along a recorded hand, offline and deterministic.
 #pragma once
 
 #include <string>
@@ -21,7 +21,7 @@ struct MeshRenderOptions {
   bool timing = false;
 };
 
-/// Writes the CSV and prints what was felt; 0 when all went well. Throws with a remedy in the text.
+/// Writes the CSV and prints a summary; returns 0. Throws with a remedy in the text.
 int renderMesh(const MeshRenderOptions& options);
 
 }  // namespace hapticd::apps

@@ -1,10 +1,10 @@
 #include "render_recording.h"
 
 #include <cstdio>
-#include <fstream>
-#include <stdexcept>
 
 #include "record/difference.h"
+#include "record/export_file.h"
+#include "record/text_fields.h"
 
 namespace hapticd::apps {
 namespace {
@@ -12,37 +12,47 @@ namespace {
 using record::Difference;
 
 void writeFile(const std::string& name, const std::string& text) {
-  std::ofstream out(name);
-  out << text;
-  out.close();
-  if (!out)
-    throw std::runtime_error("cannot write '" + name + "': name a file in a directory that can be written");
+  record::ExportFile file(name);
+  file.write(text);
+  file.close();
+}
+
+// One row of the CSV.
+struct DifferenceRow {
+  std::string device;
+  record::DifferencePoint point;
+};
+
+template <class V>
+void fields(const DifferenceRow& row, V&& v) {
+  v("device", row.device);
+  v("t_s", row.point.time_s);
+  v("force_N", row.point.force_N);
+  v("force_now_N", row.point.forceNow_N);
+  v("depth_m", row.point.depth_m);
+  v("depth_now_m", row.point.depthNow_m);
 }
 
 std::string csv(const std::vector<Difference>& devices) {
-  std::string text = "device,t_s,force_N,force_now_N,depth_m,depth_now_m\n";
-  char row[200];
+  std::string text = record::csvHeader<DifferenceRow>();
   for (const Difference& device : devices) {
-    for (const record::DifferencePoint& p : device.points()) {
-      std::snprintf(row, sizeof row, ",%.9f,%.17g,%.17g,%.17g,%.17g\n", p.time_s, p.force_N, p.forceNow_N,
-                    p.depth_m, p.depthNow_m);
-      text += device.device() + row;
-    }
+    for (const record::DifferencePoint& point : device.points())
+      record::appendCsvRow(text, DifferenceRow{device.device(), point});
   }
   return text;
 }
 
 void print(const Difference& d) {
-  std::printf("device      %s: %llu ticks, %llu touching then or now\n", d.device().c_str(),
+  std::printf("device      %s: %llu ticks, %llu touching in either\n", d.device().c_str(),
               static_cast<unsigned long long>(d.ticks()), static_cast<unsigned long long>(d.touching()));
   if (d.lost() > 0)
-    std::printf("not recorded %llu ticks: from there on the forces need not be the same\n",
+    std::printf("not recorded %llu ticks: the ticks after them may differ\n",
                 static_cast<unsigned long long>(d.lost()));
   std::printf("same        %llu ticks in every bit%s\n", static_cast<unsigned long long>(d.same()),
               d.same() == d.ticks() ? ": all of them" : "");
-  std::printf("force       differs by %.4g N at most (at %.3f s), by %.4g N on the mean while touching\n",
+  std::printf("force       differs by at most %.4g N (at %.3f s), on average by %.4g N while touching\n",
               d.largest_N(), d.largestAt_s(), d.mean_N());
-  std::printf("depth       differs by %.4g mm at most, by %.4g mm on the mean while touching\n",
+  std::printf("depth       differs by at most %.4g mm, on average by %.4g mm while touching\n",
               d.largestDepth_m() * 1e3, d.meanDepth_m() * 1e3);
 }
 
@@ -52,7 +62,7 @@ int renderSession(const RecordingRenderOptions& options) {
   std::string remark;
   const std::vector<Difference> devices = record::compare(options.session, options.changes, remark);
   std::printf("session     %s\nchanged     %s\n", options.session.c_str(),
-              record::inWords(options.changes).c_str());
+              record::describe(options.changes).c_str());
   bool same = true;
   for (const Difference& device : devices) {
     print(device);
@@ -67,8 +77,8 @@ int renderSession(const RecordingRenderOptions& options) {
   if (same || !options.changes.none()) return 0;
   std::fprintf(
       stderr,
-      "hapticd: nothing was changed, and yet the forces differ: the session is of another version or another "
-      "machine, or ticks were lost\n");
+      "hapticd: nothing was changed, but the forces differ: another version or another kind of machine wrote the "
+      "recording, or ticks were lost\n");
   return 1;
 }
 

@@ -1,4 +1,4 @@
-// hapticd render --session: a recorded session once more, as it was or with something changed.
+// hapticd render --session: re-renders a recording, as it was or with changes.
 #pragma once
 
 #include <string>
@@ -9,12 +9,12 @@ namespace hapticd::apps {
 
 struct RecordingRenderOptions {
   std::string session;
-  std::string out;     ///< CSV with both forces of each tick; empty: none
-  std::string report;  ///< HTML; empty: none
+  std::string out;     ///< CSV with both forces of each tick; empty: no file
+  std::string report;  ///< HTML; empty: no file
   record::RerenderChanges changes;
 };
 
-/// Prints what differs. 1 when nothing was changed and yet something differs, else 0.
+/// Prints the difference. Returns 1 when nothing was changed but something differs, else 0.
 int renderSession(const RecordingRenderOptions& options);
 
 }  // namespace hapticd::apps

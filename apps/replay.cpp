@@ -1,4 +1,4 @@
-// hapticd replay: a recorded session, served to clients as if it were live.
+// hapticd replay: serves a recording to clients as if it were live.
 #include <spdlog/spdlog.h>
 
 #include <memory>
@@ -44,26 +44,24 @@ int run(const Options& options) {
 
 void addReplay(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("replay", "Serve a recorded session to clients, at its own times");
-  command->add_option("file", options->replay.file, "Session file of 'hapticd serve --record'")
+  CLI::App* command = app.add_subcommand("replay", "Serve a recording to clients");
+  command->add_option("file", options->replay.file, "Recording of 'hapticd serve --record'")
       ->required()
       ->check(CLI::ExistingFile);
   command->add_option("--speed", options->replay.speed, "Factor: 2 is twice as fast, 0.1 ten times slower")
       ->check(within(0.001, 1000))
       ->capture_default_str();
-  command->add_flag("--loop", options->replay.loop, "From the beginning again, for ever");
+  command->add_flag("--loop", options->replay.loop, "Start again at the end, until a signal");
   command->add_option("--listen", options->listen, "ADDR:PORT for TCP and UDP [127.0.0.1:3883]");
-  command->add_option("--port", options->port, "The port alone; 0: any free one")
+  command->add_option("--port", options->port, "Only the port; 0: any free one")
       ->check(CLI::Range(0, 65535));
   command->add_option("--http", options->http,
                       "ADDR:PORT of the viewer's page, or 'off' [127.0.0.1:8080, if free]");
   command->add_option("--seconds", options->seconds, "Stop after this time [until a signal]")
       ->check(within(0.001, kLongest_s));
   command->footer(
-      "Clients connect as to the live server, hear what was reported then, stamped with the time of now, and "
-      "see the\n"
-      "scene that was. What they want to change is refused. At the end the last state stays until a signal "
-      "comes.\n"
+      "Clients connect as to the live server and receive the recorded reports, stamped with the present time, and the\n"
+      "recorded scene. Their commands are refused. After the end the last state stays until a signal.\n"
       "Examples:\n"
       "  hapticd replay my.haptics\n"
       "  hapticd replay my.haptics --speed 0.2 --loop --port 4000");

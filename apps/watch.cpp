@@ -11,6 +11,8 @@
 #include "report_view.h"
 #include "hapticd/client.h"
 #include "live_table.h"
+#include "record/text_fields.h"
+#include "sample_of.h"
 #include "stop_signals.h"
 
 namespace hapticd::apps {
@@ -25,10 +27,6 @@ struct WatchOptions {
   bool json = false;
   bool csv = false;
 };
-
-double secondsOf(Time time) {
-  return std::chrono::duration<double>(time.time_since_epoch()).count();
-}
 
 // A tick composed of separate reports, for servers without `hapticd Tick`.
 TickReport composed(const LatestReports& latest) {
@@ -49,36 +47,19 @@ TickReport composed(const LatestReports& latest) {
   return tick;
 }
 
-void printJson(const TickReport& t) {
-  const auto list = [](const auto& values) {
-    std::string text;
-    char number[32];
-    for (const double value : values) {
-      std::snprintf(number, sizeof number, text.empty() ? "%.9g" : ",%.9g", value);
-      text += number;
-    }
-    return "[" + text + "]";
-  };
-  std::printf(
-      "{\"time_s\":%.6f,\"tick\":%llu,\"revision\":%llu,\"hand_m\":%s,\"proxy_m\":%s,\"velocity_m_per_s\":%s,"
-      "\"orientation_xyzw\":%s,\"force_N\":%s,\"depth_m\":%.9g,\"object\":%d,\"buttons\":%u,\"guard\":%u}\n",
-      secondsOf(t.time), static_cast<unsigned long long>(t.tick), static_cast<unsigned long long>(t.revision),
-      list(t.hand_m).c_str(), list(t.proxy_m).c_str(), list(t.velocity_m_per_s).c_str(),
-      list(t.orientation).c_str(), list(t.force_N).c_str(), t.depth_m, t.object, t.buttons,
-      (t.guardActive | t.guardLatched).bits());
+void printJson(const record::Sample& sample) {
+  std::string text;
+  {
+    record::JsonObject object(text);
+    fields(sample, object);
+  }
+  std::printf("%s\n", text.c_str());
 }
 
-constexpr const char* kCsvHeader =
-    "time_s,tick,hand_x_m,hand_y_m,hand_z_m,proxy_x_m,proxy_y_m,proxy_z_m,qx,qy,qz,qw,force_x_N,force_y_N,force_z_N,"
-    "depth_m,object,buttons,guard\n";
-
-void printCsv(const TickReport& t) {
-  std::printf("%.6f,%llu", secondsOf(t.time), static_cast<unsigned long long>(t.tick));
-  for (const double v : t.hand_m) std::printf(",%.9g", v);
-  for (const double v : t.proxy_m) std::printf(",%.9g", v);
-  for (const double v : t.orientation) std::printf(",%.9g", v);
-  for (const double v : t.force_N) std::printf(",%.9g", v);
-  std::printf(",%.9g,%d,%u,%u\n", t.depth_m, t.object, t.buttons, (t.guardActive | t.guardLatched).bits());
+void printCsv(const record::Sample& sample) {
+  std::string row;
+  record::appendCsvRow(row, sample);
+  std::fputs(row.c_str(), stdout);
 }
 
 // Returns after `seconds` or at a stop signal; throws ConnectionLost when the server disconnects.
@@ -103,17 +84,17 @@ void pollUntilEnd(Client& client, double seconds, std::chrono::nanoseconds inter
 // Prints each tick at the chosen rate; with servers that send no ticks, the latest reports.
 void stream(Client& client, const WatchOptions& options) {
   const auto print = options.csv ? printCsv : printJson;
-  if (options.csv) std::printf("%s", kCsvHeader);
+  if (options.csv) std::fputs(record::csvHeader<record::Sample>().c_str(), stdout);
   const double rate_Hz = options.rate_Hz > 0 ? options.rate_Hz : 10;
   const auto capabilities = client.waitCapabilities();
   const bool whole = capabilities && capabilities->subscribe;
   if (whole) {
-    client.onTick([&](const TickReport& tick) { print(tick); });
+    client.onTick([&](const TickReport& tick) { print(sampleOf(client.device(), tick)); });
     client.subscribe(Reports::tick, rate_Hz);
   }
   const auto period = std::chrono::nanoseconds(std::llround(1e9 / rate_Hz));
   pollUntilEnd(client, options.seconds, period, [&] {
-    if (!whole) print(composed(client.latest()));
+    if (!whole) print(sampleOf(client.device(), composed(client.latest())));
     std::fflush(stdout);
     if (std::ferror(stdout) != 0) throw Error("cannot write to standard output: the reader has closed it");
   });

@@ -1,5 +1,4 @@
-// Session files of a stranger, read to the end: as they come, and with blocks whose checksums are right,
-// because no fuzzer guesses those.
+// Untrusted recordings, read to the end: as they are, and as blocks with valid checksums, which no fuzzer guesses.
 #include <unistd.h>
 
 #include <cstdint>

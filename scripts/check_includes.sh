@@ -25,14 +25,6 @@ LIST
 # Files that still reach past src/base.
 seam_exceptions() {
   cat <<'LIST'
-src/device/simulated/hand_file.cpp
-src/record/block_file.cpp
-src/record/export.h
-src/record/mcap_writer.cpp
-src/record/recorder.cpp
-src/record/recorder.h
-src/record/vrpn_log.cpp
-src/scene/deformation.cpp
 src/server/config/config.cpp
 src/server/player.cpp
 src/server/player.h
@@ -41,9 +33,6 @@ src/server/station/black_box_recorder.cpp
 src/server/station/black_box_recorder.h
 src/server/station/device_keeper.cpp
 src/server/station/device_keeper.h
-src/server/web/process.cpp
-src/server/web/worker.cpp
-src/server/web/worker.h
 LIST
 }
 

@@ -17,8 +17,8 @@ awk -F, -v width=820 -v height=170 '
     for (i = 1; i <= n; i += 4) printf "%s,%s ", x(t[i]), y(value[i], top, row)
     printf "\"/>\n<text x=\"60\" y=\"%.1f\" fill=\"%s\">%s</text>\n", y(top, top, row) - 10, colour, title
   }
-  FNR == 1 { next }
-  { n++; t[n] = $1; force[n] = sqrt($8 * $8 + $9 * $9 + $10 * $10); depth[n] = $11 * 1000
+  FNR == 1 { for (i = 1; i <= NF; i++) at[$i] = i; next }
+  { n++; t[n] = $at["time_ns"] * 1e-9; force[n] = sqrt($at["force_x_N"]^2 + $at["force_y_N"]^2 + $at["force_z_N"]^2); depth[n] = $at["depth_m"] * 1000
     if (force[n] > most) most = force[n]; if (depth[n] > deepest) deepest = depth[n] }
   END {
     if (n < 2 || t[n] == t[1]) { print "draw_force.sh: no ticks in the file" > "/dev/stderr"; exit 1 }

@@ -22,10 +22,10 @@ awk -v scale=9 -v size="$2" '
   FNR == NR && $1 == "f" { m++; for (i = 2; i <= 4; i++) { split($i, part, "/"); corner[m, i] = part[1] }; next }
   FNR == NR { next }
   FNR == 1 { fit() }
-  FNR == 1 { FS = ","; next }
+  FNR == 1 { count = split($0, name, ","); for (i = 1; i <= count; i++) at[name[i]] = i; FS = ","; next }
   { k++; split($0, c, ",")
-    hx[k] = c[2] * 1000; hy[k] = c[3] * 1000; px[k] = c[5] * 1000; py[k] = c[6] * 1000
-    fx[k] = c[8]; fy[k] = c[9]; touching[k] = c[12] }
+    hx[k] = c[at["hip_x_m"]] * 1000; hy[k] = c[at["hip_y_m"]] * 1000; px[k] = c[at["proxy_x_m"]] * 1000; py[k] = c[at["proxy_y_m"]] * 1000
+    fx[k] = c[at["force_x_N"]]; fy[k] = c[at["force_y_N"]]; touching[k] = c[at["touching"]] }
   END {
     min_x -= 4; max_x += 4; min_y -= 2; max_y += 4
     printf "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" font-family=\"sans-serif\" font-size=\"15\">\n", (max_x - min_x) * scale + 60, (max_y - min_y) * scale + 60

@@ -54,7 +54,58 @@ class SystemOutputFile final : public OutputFile {
   Descriptor file_;
 };
 
+// Reads until the span is full or the file ends.
+std::size_t readFully(const Descriptor& file, std::span<std::byte> into) {
+  std::size_t done = 0;
+  while (done < into.size()) {
+    const ssize_t got = ::read(file.fd(), into.data() + done, into.size() - done);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) fail(errno, "cannot read", file.path());
+    if (got == 0) break;
+    done += static_cast<std::size_t>(got);
+  }
+  return done;
+}
+
+class ContentInMemory final : public InputFile {
+ public:
+  explicit ContentInMemory(std::vector<std::byte> content) : content_(std::move(content)) {}
+
+  std::uint64_t size() const override { return content_.size(); }
+  std::size_t read(std::span<std::byte> into) override {
+    const std::size_t count = std::min(into.size(), content_.size() - at_);
+    std::copy_n(content_.begin() + static_cast<std::ptrdiff_t>(at_), count, into.begin());
+    at_ += count;
+    return count;
+  }
+
+ private:
+  const std::vector<std::byte> content_;
+  std::size_t at_ = 0;
+};
+
+class SystemInputFile final : public InputFile {
+ public:
+  explicit SystemInputFile(const std::filesystem::path& path)
+      : file_(path, O_RDONLY), size_(std::filesystem::file_size(path)) {}
+
+  std::uint64_t size() const override { return size_; }
+  std::size_t read(std::span<std::byte> into) override { return readFully(file_, into); }
+
+ private:
+  Descriptor file_;
+  std::uint64_t size_;
+};
+
 }  // namespace
+
+std::unique_ptr<InputFile> Files::open(const std::filesystem::path& path) {
+  return std::make_unique<ContentInMemory>(read(path));
+}
+
+std::unique_ptr<InputFile> SystemFiles::open(const std::filesystem::path& path) {
+  return std::make_unique<SystemInputFile>(path);
+}
 
 std::unique_ptr<OutputFile> SystemFiles::create(const std::filesystem::path& path, Existing existing) {
   return std::make_unique<SystemOutputFile>(path, existing == Existing::refuse ? O_EXCL : O_TRUNC);
@@ -65,11 +116,9 @@ std::vector<std::byte> SystemFiles::read(const std::filesystem::path& path) {
   std::vector<std::byte> content;
   std::array<std::byte, 64 * 1024> piece;
   for (;;) {
-    const ssize_t got = ::read(file.fd(), piece.data(), piece.size());
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) fail(errno, "cannot read", path);
-    if (got == 0) return content;
-    content.insert(content.end(), piece.begin(), piece.begin() + got);
+    const std::size_t got = readFully(file, piece);
+    content.insert(content.end(), piece.begin(), piece.begin() + static_cast<std::ptrdiff_t>(got));
+    if (got < piece.size()) return content;
   }
 }
 

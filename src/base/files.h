@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace hapticd::base {
@@ -23,6 +25,17 @@ class OutputFile {
   void write(std::string_view text) { write(std::as_bytes(std::span(text))); }
 };
 
+/// A file open for reading, closed by its destructor. One thread at a time.
+class InputFile {
+ public:
+  virtual ~InputFile() = default;
+  /// Bytes from the start to the end when it was opened.
+  virtual std::uint64_t size() const = 0;
+  /// Fills `into` from the current position on and returns how many bytes it got: fewer only at the end. Throws
+  /// std::system_error with the path and the system's reason.
+  virtual std::size_t read(std::span<std::byte> into) = 0;
+};
+
 /// What create() does with an existing file.
 enum class Existing { refuse, replace };
 
@@ -32,6 +45,8 @@ class Files {
   virtual ~Files() = default;
   /// Creates a file (mode 0644) for writing. Its folder must exist.
   virtual std::unique_ptr<OutputFile> create(const std::filesystem::path& path, Existing existing) = 0;
+  /// Opens a file for reading from its start. Unless overridden, holds the whole content in memory.
+  virtual std::unique_ptr<InputFile> open(const std::filesystem::path& path);
   /// The whole content.
   virtual std::vector<std::byte> read(const std::filesystem::path& path) = 0;
   /// Replaces `to`; atomic. Both must be in one file system.
@@ -48,6 +63,7 @@ class Files {
 class SystemFiles final : public Files {
  public:
   std::unique_ptr<OutputFile> create(const std::filesystem::path& path, Existing existing) override;
+  std::unique_ptr<InputFile> open(const std::filesystem::path& path) override;
   std::vector<std::byte> read(const std::filesystem::path& path) override;
   void rename(const std::filesystem::path& from, const std::filesystem::path& to) override;
   void remove(const std::filesystem::path& path) override;

@@ -1,7 +1,7 @@
-// Values to bytes and back, by the one list of fields that each type has (fields.h, command_fields.h).
+// Values as bytes, by the one list of fields that each type has (fields.h, scene/command_info.h).
 //
-// Big-endian as on the wire; a list has its length in front. Reading never trusts a length: what is not there
-// is a failure, and memory grows only with the bytes that are.
+// Big-endian as on the wire; a list starts with its length. Reading trusts no length: missing bytes are an error, and memory
+// grows only with the bytes that exist.
 #pragma once
 
 #include <array>
@@ -77,7 +77,7 @@ class Packer {
   Bytes& out_;
 };
 
-/// Takes values from bytes. After the first that is not there whole, ok() is false and the rest is zero.
+/// Takes values from bytes. After the first incomplete value, ok() is false and all further values are zero.
 class Unpacker {
  public:
   explicit Unpacker(ByteView bytes) : rest_(bytes) {}

@@ -1,8 +1,10 @@
 #include "record/block_file.h"
 
-#include <cerrno>
+#include <array>
 #include <cstring>
+#include <system_error>
 
+#include "base/world.h"
 #include "record/crc32.h"
 #include "record/recording.h"
 
@@ -13,7 +15,7 @@ constexpr char kMagic[kMagicBytes + 1] = "HAPTICS\n";
 
 // Of kind, length and content.
 std::uint32_t checksum(const std::byte* head, ByteView content) {
-  return crc32(content, crc32(ByteView(head, 8)));
+  return crc32(ByteView(head, 8), content);
 }
 
 }  // namespace
@@ -32,18 +34,21 @@ void appendBlock(Bytes& out, BlockKind kind, ByteView content) {
   out.insert(out.end(), content.begin(), content.end());
 }
 
-BlockReader::BlockReader(const std::filesystem::path& file) : file_(std::fopen(file.c_str(), "rb")) {
+BlockReader::BlockReader(const std::filesystem::path& file) {
   const std::string name = "'" + file.string() + "'";
-  if (!file_) throw RecordingError("cannot read " + name + ": " + std::strerror(errno));
-  std::error_code error;
-  size_ = std::filesystem::file_size(file, error);
-  if (error) throw RecordingError("cannot read " + name + ": " + error.message());
-  char begin[kMagicBytes] = {};
-  if (std::fread(begin, 1, kMagicBytes, file_.get()) != kMagicBytes ||
-      std::memcmp(begin, kMagic, kMagicBytes) != 0) {
+  std::array<std::byte, kMagicBytes> begin{};
+  std::size_t got = 0;
+  try {
+    file_ = base::world().files.open(file);
+    size_ = file_->size();
+    got = file_->read(begin);
+  } catch (const std::system_error& error) {
+    throw RecordingError("cannot read " + name + ": " + error.code().message());
+  }
+  if (got != kMagicBytes || std::memcmp(begin.data(), kMagic, kMagicBytes) != 0) {
     throw RecordingError(name +
-                       " is no session file: it does not begin with 'HAPTICS'; 'hapticd serve "
-                       "--record FILE' writes one");
+                         " is not a recording: it does not begin with 'HAPTICS'; 'hapticd serve --record FILE' "
+                         "writes recordings");
   }
   offset_ = kMagicBytes;
 }
@@ -51,30 +56,30 @@ BlockReader::BlockReader(const std::filesystem::path& file) : file_(std::fopen(f
 bool BlockReader::next(Block& block) {
   if (offset_ == size_ || !damage_.empty()) return false;
   const std::string where = " at byte " + std::to_string(offset_) + " of " + std::to_string(size_);
+  try {
+    damage_ = read(block, where);
+  } catch (const std::system_error& error) {
+    damage_ = "the block" + where + " cannot be read: " + error.code().message();
+  }
+  return damage_.empty();
+}
+
+// The damage; empty when the block is whole.
+std::string BlockReader::read(Block& block, const std::string& where) {
   const std::uint64_t rest = size_ - offset_;
-  std::byte head[kBlockHeadBytes];
-  if (rest < kBlockHeadBytes || std::fread(head, 1, kBlockHeadBytes, file_.get()) != kBlockHeadBytes) {
-    damage_ = "the file is cut within a block" + where;
-    return false;
-  }
-  const auto length = wire::loadBig<std::uint32_t>(head + 4);
-  if (length > rest - kBlockHeadBytes) {
-    damage_ = "the file is cut within a block" + where + ", or the length of the block is damaged";
-    return false;
-  }
+  std::array<std::byte, kBlockHeadBytes> head{};
+  if (rest < kBlockHeadBytes || file_->read(head) != kBlockHeadBytes) return "the file is cut within a block" + where;
+  const auto length = wire::loadBig<std::uint32_t>(head.data() + 4);
+  if (length > rest - kBlockHeadBytes)
+    return "the file is cut within a block" + where + ", or the length of the block is damaged";
   block.content.resize(length);
-  if (std::fread(block.content.data(), 1, length, file_.get()) != length) {
-    damage_ = "the block" + where + " cannot be read: " + std::strerror(errno);
-    return false;
-  }
-  if (wire::loadBig<std::uint32_t>(head + 8) != checksum(head, block.content)) {
-    damage_ = "the block" + where + " is damaged: its checksum is another";
-    return false;
-  }
-  block.kind = static_cast<BlockKind>(wire::loadBig<std::uint32_t>(head));
+  if (file_->read(block.content) != length) return "the file is cut within a block" + where;
+  if (wire::loadBig<std::uint32_t>(head.data() + 8) != checksum(head.data(), block.content))
+    return "the block" + where + " is damaged: its checksum does not match";
+  block.kind = static_cast<BlockKind>(wire::loadBig<std::uint32_t>(head.data()));
   block.offset = offset_;
   offset_ += kBlockHeadBytes + length;
-  return true;
+  return {};
 }
 
 }  // namespace hapticd::record

@@ -1,12 +1,12 @@
 // A file as a sequence of blocks, each with its length and a checksum: what was written before a crash stays
-// readable, and damage is found where it is.
+// readable, and a reader can name the damaged block.
 #pragma once
 
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <string>
 
+#include "base/files.h"
 #include "record/archive.h"
 
 namespace hapticd::record {
@@ -17,9 +17,9 @@ enum class BlockKind : std::uint32_t { header = 1, scene = 2, publish = 3, ticks
 inline constexpr std::size_t kMagicBytes = 8;
 inline constexpr std::size_t kBlockHeadBytes = 12;
 
-/// Appends a block: kind, length of the content, checksum of all three but itself, content.
+/// Appends a block: kind, length of the content, checksum of kind, length and content, content.
 void appendBlock(Bytes& out, BlockKind kind, ByteView content);
-/// What every file begins with.
+/// The first bytes of every file.
 ByteView magic();
 
 /// Steps through the blocks of a file.
@@ -31,22 +31,20 @@ class BlockReader {
     Bytes content;
   };
 
-  /// Throws RecordingError when the file cannot be opened or is none of ours.
+  /// Throws RecordingError when the file cannot be opened or is not a recording.
   explicit BlockReader(const std::filesystem::path& file);
 
   /// The next whole block; false at the end and where nothing whole follows.
   bool next(Block& block);
-  /// Where reading stands.
+  /// The position of the next block in the file.
   std::uint64_t offset() const noexcept { return offset_; }
   /// Why next() was false before the end of the file, naming the byte; empty when it was the end.
   const std::string& damage() const noexcept { return damage_; }
 
  private:
-  struct Close {
-    void operator()(std::FILE* file) const noexcept { std::fclose(file); }
-  };
+  std::string read(Block& block, const std::string& where);
 
-  std::unique_ptr<std::FILE, Close> file_;
+  std::unique_ptr<base::InputFile> file_;
   std::uint64_t size_ = 0;
   std::uint64_t offset_ = 0;
   std::string damage_;

@@ -1,4 +1,4 @@
-// The same scene with other surfaces.
+// Snapshots with other surfaces.
 #pragma once
 
 #include <memory>
@@ -10,7 +10,7 @@
 
 namespace hapticd::record {
 
-/// Of one device. What two snapshots share, their changed ones share, too.
+/// For one device. Objects that two snapshots share are shared by the changed ones, too.
 class ChangedSurfaces {
  public:
   ChangedSurfaces(const RerenderChanges& changes, const scene::SceneConfig& config)

@@ -1,13 +1,19 @@
-// The checksum of blocks, here and in MCAP: CRC-32 as of zlib and IEEE 802.3.
+// The checksum of zlib, PNG and MCAP.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
-#include <span>
+#include <boost/crc.hpp>
+
+#include "wire/bytes.h"
 
 namespace hapticd::record {
 
-/// Of these bytes; pass the sum of what came before to go on with it.
-std::uint32_t crc32(std::span<const std::byte> bytes, std::uint32_t before = 0) noexcept;
+/// CRC-32 (IEEE 802.3) of all parts, one behind the other.
+template <class... Parts>
+std::uint32_t crc32(const Parts&... parts) {
+  boost::crc_32_type crc;
+  const auto add = [&crc](wire::ByteView part) { crc.process_bytes(part.data(), part.size()); };
+  (add(parts), ...);
+  return crc.checksum();
+}
 
 }  // namespace hapticd::record

@@ -73,7 +73,7 @@ std::vector<Difference> compare(const std::filesystem::path& session, const Rere
   return devices;
 }
 
-std::string inWords(const RerenderChanges& changes) {
+std::string describe(const RerenderChanges& changes) {
   std::ostringstream text;
   const auto add = [&](const char* name, const std::optional<double>& value, double scale, const char* unit) {
     if (value) text << (text.tellp() > 0 ? ", " : "") << name << ' ' << *value * scale << unit;

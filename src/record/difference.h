@@ -1,4 +1,4 @@
-// What differs between a session as it was felt and as it is felt now, and a report of it for people.
+// The difference between a recording and its re-rendering, and a report of it for people.
 #pragma once
 
 #include <filesystem>
@@ -10,7 +10,7 @@
 
 namespace hapticd::record {
 
-/// One tick, then and now.
+/// One tick as recorded and as re-rendered.
 struct DifferencePoint {
   double time_s = 0;  ///< since the first tick of the device
   double force_N = 0;
@@ -19,7 +19,7 @@ struct DifferencePoint {
   double depthNow_m = 0;
 };
 
-/// Of one device, added up tick by tick.
+/// The difference of one device over all ticks.
 class Difference {
  public:
   explicit Difference(std::string device) : device_(std::move(device)) {}
@@ -29,15 +29,15 @@ class Difference {
 
   const std::string& device() const noexcept { return device_; }
   std::uint64_t ticks() const noexcept { return points_.size(); }
-  /// Ticks that are the same in every bit: rendering, force and guard.
+  /// Ticks that agree in every bit of rendering, force and guard.
   std::uint64_t same() const noexcept { return same_; }
-  /// Ticks that the recorder had to drop; after these nothing need be the same.
+  /// Ticks that the recorder dropped; the ticks after them may differ.
   std::uint64_t lost() const noexcept { return lost_; }
-  std::uint64_t touching() const noexcept { return touching_; }  ///< then or now
-  /// Of the difference of the two forces, as vectors.
+  std::uint64_t touching() const noexcept { return touching_; }  ///< in either of the two
+  /// The norm of the largest difference of the two forces.
   double largest_N() const noexcept { return largest_N_; }
   double largestAt_s() const noexcept { return largestAt_s_; }
-  /// Mean over the ticks that touch, then or now; of all when none does.
+  /// Mean over the ticks that touch in either; over all ticks when none does.
   double mean_N() const noexcept;
   double largestDepth_m() const noexcept { return largestDepth_m_; }
   double meanDepth_m() const noexcept;
@@ -59,14 +59,14 @@ class Difference {
   double sumDepth_m_ = 0;
 };
 
-/// Renders a whole session again. `remark` says why the file ends early, if it does. Throws RecordingError.
+/// Re-renders a whole recording. `remark` says why the file ends early, if it does. Throws RecordingError.
 std::vector<Difference> compare(const std::filesystem::path& session, const RerenderChanges& changes,
                                 std::string& remark);
 
-/// The changes in words, for a headline: "stiffness 300 N/m, tool radius 2 mm"; "nothing".
-std::string inWords(const RerenderChanges& changes);
+/// The changes for a headline: "stiffness 300 N/m, tool radius 2 mm"; "nothing".
+std::string describe(const RerenderChanges& changes);
 
-/// A page that needs nothing but itself: figures and plots of force and depth over time, then and now.
+/// A self-contained page with the figures and with plots of force and depth over time, recorded and re-rendered.
 std::string htmlReport(const std::string& session, const RerenderChanges& changes,
                        const std::vector<Difference>& devices, const std::string& remark);
 

@@ -1,7 +1,9 @@
 #include "record/export.h"
 
-#include "record/pack_commands.h"
+#include <nlohmann/json.hpp>
+
 #include "record/recording_reader.h"
+#include "record/scene_event_codec.h"
 #include "record/text_fields.h"
 
 namespace hapticd::record {
@@ -9,21 +11,16 @@ namespace {
 
 using geometry::Vec3;
 
-// Sums of bits as words, for JSON.
-std::string tripNames(std::uint32_t bits) {
-  std::string names;
-  for (const realtime::TripInfo& trip : realtime::kTrips) {
-    if ((bits & realtime::bit(trip.trip)) == 0) continue;
-    names += names.empty() ? "" : ",";
-    appendQuoted(names, trip.name);
-  }
-  return "[" + names + "]";
+nlohmann::json namesIn(Trips trips) {
+  nlohmann::json names = nlohmann::json::array();
+  for (const Trip trip : trips) names.push_back(nameOf(trip));
+  return names;
 }
 
 template <class T>
 std::string schemaOf() {
   std::string properties;
-  const T any;
+  const T any{};
   fields(any, JsonSchema(properties));
   return R"({"type":"object","properties":{)" + properties + "}}";
 }
@@ -34,7 +31,7 @@ constexpr const char* kGuardSchema =
 constexpr const char* kCommandSchema =
     R"({"type":"object","properties":{"scene":{"type":"integer"},"client":{"type":"integer"},)"
     R"("command":{"type":"string"},"fields":{"type":"object"}}})";
-// What Foxglove knows by this name and draws.
+// Foxglove draws messages of this name.
 constexpr const char* kPoseSchema =
     R"({"title":"foxglove.PoseInFrame","type":"object","properties":{)"
     R"("timestamp":{"type":"object","title":"time","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},)"
@@ -50,47 +47,14 @@ void appendCoordinates(std::string& out, const double* values, const char* names
 
 }  // namespace
 
-Sample sampleOf(const std::string& device, const realtime::TickReport& tick, Nanos wallOffset) {
-  Sample sample;
-  sample.device = device;
-  sample.time_ns = tick.time + wallOffset;
-  sample.tick = tick.tick;
-  sample.revision = tick.revision;
-  sample.hand_m = tick.device.position_m;
-  sample.proxy_m = tick.rendering.proxy_m;
-  sample.velocity_m_per_s = tick.device.velocity_m_per_s;
-  sample.orientation = tick.device.orientation;
-  sample.force_N = tick.force_N;
-  sample.touching = tick.rendering.touching;
-  sample.depth_m = sample.touching ? tick.rendering.depth_m : 0;
-  sample.object = sample.touching ? tick.rendering.touchedObject : -1;
-  sample.buttons = tick.device.buttons;
-  sample.guardActive = tick.guard.active;
-  sample.guardLatched = tick.guard.latched;
-  sample.gripper_rad = tick.device.gripper_rad;
-  return sample;
-}
-
-CsvFile::CsvFile(const std::filesystem::path& file) : path_(file), out_(file) {
-  std::string header;
-  const Sample any;
-  fields(any, CsvHeader(header));
-  out_ << header << '\n';
-  if (!out_)
-    throw RecordingError("cannot write '" + path_.string() +
-                       "'; name a file in a directory that can be written");
+CsvFile::CsvFile(const std::filesystem::path& file) : file_(file) {
+  file_.write(csvHeader<Sample>());
 }
 
 void CsvFile::add(const Sample& sample) {
   row_.clear();
-  fields(sample, CsvRow(row_));
-  row_ += '\n';
-  out_ << row_;
-}
-
-void CsvFile::close() {
-  out_.close();
-  if (!out_) throw RecordingError("writing '" + path_.string() + "' failed: disk full?");
+  appendCsvRow(row_, sample);
+  file_.write(row_);
 }
 
 McapFile::McapFile(const std::filesystem::path& file)
@@ -107,7 +71,7 @@ McapFile::Channels& McapFile::channelsOf(const std::string& device) {
   const std::string topic = "/" + device;
   Channels channels{};
   channels.tick = writer_.addChannel(tickSchema_, topic + "/tick");
-  channels.hand = writer_.addChannel(poseSchema_, topic + "/hand");
+  channels.hip = writer_.addChannel(poseSchema_, topic + "/hip");
   channels.proxy = writer_.addChannel(poseSchema_, topic + "/proxy");
   channels.guard = writer_.addChannel(guardSchema_, topic + "/guard");
   channels.first = true;
@@ -122,7 +86,7 @@ void McapFile::add(const Sample& sample) {
     fields(sample, object);
   }
   writer_.add(channels.tick, sample.time_ns, text_);
-  addPose(channels.hand, sample, sample.hand_m);
+  addPose(channels.hip, sample, sample.hip_m);
   addPose(channels.proxy, sample, sample.proxy_m);
   addGuard(channels, sample);
 }
@@ -149,19 +113,19 @@ void McapFile::addPose(std::uint16_t channel, const Sample& sample, const Vec3& 
   writer_.add(channel, sample.time_ns, text_);
 }
 
-// On change, and once in the beginning.
+// With the first sample and on each change.
 void McapFile::addGuard(Channels& channels, const Sample& sample) {
   const bool same = sample.guardActive == channels.active && sample.guardLatched == channels.latched;
   if (same && !channels.first) return;
   channels.first = false;
   channels.active = sample.guardActive;
   channels.latched = sample.guardLatched;
-  text_ = "{\"tick\":" + std::to_string(sample.tick) + ",\"active\":" + tripNames(sample.guardActive) +
-          ",\"latched\":" + tripNames(sample.guardLatched) + "}";
-  writer_.add(channels.guard, sample.time_ns, text_);
+  const nlohmann::json guard{
+      {"tick", sample.tick}, {"active", namesIn(sample.guardActive)}, {"latched", namesIn(sample.guardLatched)}};
+  writer_.add(channels.guard, sample.time_ns, guard.dump());
 }
 
-void McapFile::addTold(const SceneEvent& event, Nanos wall_ns) {
+void McapFile::addCommand(const SceneEvent& event, Nanos wall_ns) {
   text_.clear();
   {
     JsonObject object(text_);
@@ -175,14 +139,14 @@ void McapFile::addTold(const SceneEvent& event, Nanos wall_ns) {
   writer_.add(commands_, wall_ns, text_);
 }
 
-void exportSession(const std::filesystem::path& session, SampleFile& to, std::string& remark) {
-  RecordingReader reader(session);
+void exportRecording(const std::filesystem::path& file, SampleFile& to, std::string& remark) {
+  RecordingReader reader(file);
   const RecordingHeader& header = reader.header();
   for (RecordingEvent event; reader.next(event);) {
     if (const auto* tick = std::get_if<TickEvent>(&event)) {
       to.add(sampleOf(header.devices[tick->device].names.front(), tick->tick.report, header.wallOffset));
-    } else if (const auto* told = std::get_if<SceneEvent>(&event)) {
-      to.addTold(*told, told->time + header.wallOffset);
+    } else if (const auto* command = std::get_if<SceneEvent>(&event)) {
+      to.addCommand(*command, command->time + header.wallOffset);
     }
   }
   remark = reader.remark();

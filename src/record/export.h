@@ -1,12 +1,13 @@
-// Samples and what happened around them into files for other programs.
+// Recordings as files for other programs.
 #pragma once
 
 #include <filesystem>
-#include <fstream>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "record/export_file.h"
 #include "record/mcap_writer.h"
 #include "record/sample.h"
 
@@ -21,37 +22,36 @@ class SampleFile {
   SampleFile& operator=(const SampleFile&) = delete;
 
   virtual void add(const Sample& sample) = 0;
-  /// What a client told the scene; `wall_ns` since the epoch. Not every kind of file has a place for it.
-  virtual void addTold(const SceneEvent& /*event*/, Nanos /*wall_ns*/) {}
+  /// A scene command of a client, or its end; `wall_ns` since 1970. Some kinds of file leave it out.
+  virtual void addCommand(const SceneEvent& /*event*/, Nanos /*wall_ns*/) {}
   virtual void close() = 0;
 };
 
-/// One row for each tick of each device; the columns are named in the first.
+/// One row for each tick of each device, below a row with the names of the columns.
 class CsvFile final : public SampleFile {
  public:
   explicit CsvFile(const std::filesystem::path& file);
   void add(const Sample& sample) override;
-  void close() override;
+  void close() override { file_.close(); }
 
  private:
-  std::filesystem::path path_;
-  std::ofstream out_;
+  ExportFile file_;
   std::string row_;
 };
 
-/// For each device the ticks, the hand and the proxy as poses that Foxglove draws, and what the guard did;
-/// for the scenes, what they were told.
+/// For each device the ticks, HIP and proxy as poses that Foxglove draws, and the trips of the guard; for the scenes, their
+/// commands.
 class McapFile final : public SampleFile {
  public:
   explicit McapFile(const std::filesystem::path& file);
   void add(const Sample& sample) override;
-  void addTold(const SceneEvent& event, Nanos wall_ns) override;
+  void addCommand(const SceneEvent& event, Nanos wall_ns) override;
   void close() override { writer_.close(); }
 
  private:
   struct Channels {
-    std::uint16_t tick, hand, proxy, guard;
-    std::uint32_t active = 0, latched = 0;
+    std::uint16_t tick, hip, proxy, guard;
+    Trips active, latched;
     bool first = true;
   };
   Channels& channelsOf(const std::string& device);
@@ -65,7 +65,7 @@ class McapFile final : public SampleFile {
   std::string text_;
 };
 
-/// Writes all of a session. `remark` says why the session ends early, if it does.
-void exportSession(const std::filesystem::path& session, SampleFile& to, std::string& remark);
+/// Writes a whole recording and closes `to`. `remark` says why the recording ends early, if it does.
+void exportRecording(const std::filesystem::path& file, SampleFile& to, std::string& remark);
 
 }  // namespace hapticd::record

@@ -1,11 +1,16 @@
-// The fields of everything in a session file but the commands. The structured bindings count the members: a
-// new one does not compile until it is listed, and then kFormatVersion must go up.
+// The fields of everything in a recording except scene commands, which describe themselves (scene/command_info.h).
+// Structured bindings count the members: a new one does not compile until it is listed, and then kFormatVersion
+// must increase.
 #pragma once
 
-#include "record/command_fields.h"
+#include <concepts>
+
 #include "record/recording.h"
 
 namespace hapticd::record {
+
+template <class C, class T>
+concept Is = std::same_as<std::remove_const_t<C>, T>;
 
 template <Is<geometry::Box> T, class V>
 void fields(T& box, V&& v) {
@@ -130,7 +135,7 @@ void fields(T& event, V&& v) {
   v("time_ns", time);
 }
 
-/// But for the opening of a gripper, which few devices have.
+/// Without the opening of the gripper, which few devices have.
 template <Is<device::DeviceState> T, class V>
 void fields(T& state, V&& v) {
   auto& [time, position_m, orientation, velocity_m_per_s, angularVelocity_rad_per_s, buttons, hold,
@@ -143,7 +148,7 @@ void fields(T& state, V&& v) {
   v("buttons", buttons);
   v("hold", hold);
   v("motor_temperature", motorTemperature);
-  static_cast<void>(gripper_rad);  // in the ticks that have one
+  static_cast<void>(gripper_rad);  // only in ticks that have one
 }
 
 template <Is<realtime::Contact> T, class V>
@@ -156,11 +161,11 @@ void fields(T& contact, V&& v) {
   v("force_N", force_N);
 }
 
-/// But for the list of contacts, which is as long as contactCount says.
+/// Without the contacts, of which there are contactCount.
 template <Is<realtime::Rendering> T, class V>
-void fields(T& felt, V&& v) {
+void fields(T& rendering, V&& v) {
   auto& [proxy_m, force_N, contactForce_N, normalForce_N, touching, touchedObject, depth_m, normal, scp_m,
-         contactCount, contacts, status] = felt;
+         contactCount, contacts, status] = rendering;
   v("proxy_m", proxy_m);
   v("force_N", force_N);
   v("contact_force_N", contactForce_N);
@@ -185,7 +190,7 @@ void fields(T& timing, V&& v) {
   v("skipped_periods", skippedPeriods);
 }
 
-/// But for the counts, which are written when they change.
+/// Without the counts, which are written when they change.
 template <Is<realtime::GuardReport> T, class V>
 void fields(T& guard, V&& v) {
   auto& [active, latched, counts, gain, limit_N, armed, stopped] = guard;

@@ -147,11 +147,11 @@ void figures(std::ostream& out, const Difference& d) {
 std::string htmlReport(const std::string& session, const RerenderChanges& changes,
                        const std::vector<Difference>& devices, const std::string& remark) {
   std::ostringstream out;
-  const std::string title = "Session " + escaped(session) + ", felt again";
+  const std::string title = "Re-rendered recording " + escaped(session);
   out << "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<title>" << title << "</title>\n"
-      << kStyle << "\n<h1>" << title << "</h1>\n<p>Changed: " << escaped(inWords(changes))
-      << ". <b class=\"then\">Blue</b> is as it was recorded, <b class=\"now\">red</b> as it is felt "
-         "now.</p>\n";
+      << kStyle << "\n<h1>" << title << "</h1>\n<p>Changed: " << escaped(describe(changes))
+      << ". <b class=\"then\">Blue</b> is recorded, <b class=\"now\">red</b> re-rendered."
+         "</p>\n";
   if (!remark.empty()) out << "<p>" << escaped(remark) << "</p>\n";
   for (const Difference& device : devices) {
     out << "<h2>" << escaped(device.device()) << "</h2>\n";

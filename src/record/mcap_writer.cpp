@@ -1,11 +1,8 @@
 #include "record/mcap_writer.h"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 
 #include "record/crc32.h"
-#include "record/recording.h"
 
 namespace hapticd::record {
 namespace {
@@ -58,24 +55,13 @@ ByteView magicBytes() {
 
 }  // namespace
 
-McapWriter::McapWriter(const std::filesystem::path& file)
-    : path_(file), file_(std::fopen(file.c_str(), "wb")) {
-  if (file_ == nullptr) {
-    throw RecordingError("cannot write '" + path_.string() + "': " + std::strerror(errno) +
-                       "; name a file in a directory that can be written");
-  }
+McapWriter::McapWriter(const std::filesystem::path& file) : file_(file) {
   write(Out().raw(magicBytes()).record(kHeader, Out().text("").text("hapticd " HAPTICD_VERSION)).bytes);
-}
-
-McapWriter::~McapWriter() {
-  if (file_ != nullptr) std::fclose(file_);
 }
 
 void McapWriter::write(const Bytes& bytes) {
   written_ += bytes.size();
-  if (std::fwrite(bytes.data(), 1, bytes.size(), file_) == bytes.size()) return;
-  throw RecordingError("writing '" + path_.string() + "' failed: " + std::strerror(errno) +
-                     "; make room on the disk");
+  file_.write(bytes);
 }
 
 std::uint16_t McapWriter::addSchema(std::string_view name, std::string_view jsonSchema) {
@@ -202,9 +188,7 @@ void McapWriter::close() {
   const std::uint32_t sum = crc32(end);
   write(end);
   write(Out().number(sum).raw(magicBytes()).bytes);
-  const int failed = std::fclose(file_);
-  file_ = nullptr;
-  if (failed != 0) throw RecordingError("writing '" + path_.string() + "' failed: " + std::strerror(errno));
+  file_.close();
 }
 
 }  // namespace hapticd::record

@@ -1,7 +1,6 @@
 // MCAP files (https://mcap.dev/spec): channels of JSON messages in chunks with an index, without compression.
 #pragma once
 
-#include <cstdio>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -11,22 +10,21 @@
 
 #include "base/time.h"
 #include "record/archive.h"
+#include "record/export_file.h"
 
 namespace hapticd::record {
 
-/// Writes one file. A file that was not closed is readable by what can do without an index.
+/// Writes one file. Readers that need no index can read a file that was not closed.
 class McapWriter {
  public:
   using Nanos = base::Nanos;
 
   /// Throws RecordingError when the file cannot be written.
   explicit McapWriter(const std::filesystem::path& file);
-  ~McapWriter();
-  McapWriter(const McapWriter&) = delete;
-  McapWriter& operator=(const McapWriter&) = delete;
 
-  /// A kind of message: its name, and a JSON schema. Returns its number.
+  /// Adds a kind of message with its JSON schema; returns its number.
   std::uint16_t addSchema(std::string_view name, std::string_view jsonSchema);
+  /// Adds a channel of such messages; returns its number.
   std::uint16_t addChannel(std::uint16_t schema, std::string_view topic);
   /// `time` since the epoch, in nanoseconds.
   void add(std::uint16_t channel, Nanos time, std::string_view json);
@@ -45,8 +43,7 @@ class McapWriter {
   void write(const Bytes& bytes);
   Bytes summary() const;
 
-  std::filesystem::path path_;
-  std::FILE* file_;
+  ExportFile file_;
   std::uint64_t written_ = 0;
   Bytes definitions_;  // schemas and channels, as records
   std::map<std::uint16_t, std::uint64_t> counts_;

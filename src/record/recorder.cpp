@@ -1,34 +1,30 @@
 #include "record/recorder.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
-#include <cerrno>
-#include <chrono>
-#include <cstring>
+#include <algorithm>
+#include <system_error>
 
 #include "base/world.h"
 #include "record/block_file.h"
 #include "record/fields.h"
-#include "record/pack_commands.h"
+#include "record/scene_event_codec.h"
 
 namespace hapticd::record {
 namespace {
 
-using namespace std::chrono_literals;
-
-constexpr auto kPause = 20ms;  // a crash costs no more than this
+constexpr Nanos kPeriod = 20'000'000;  // a crash loses no more than this
+constexpr Nanos kBetweenLossReports = 1'000'000'000;
 
 }  // namespace
 
-Recorder::Recorder(std::filesystem::path file, OnTrouble onTrouble, const RecorderOptions& options)
-    : path_(std::move(file)), onTrouble_(std::move(onTrouble)), options_(options) {
-  file_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
-  if (file_ < 0) {
-    throw RecordingError("cannot record to '" + path_.string() + "': " + std::strerror(errno) +
-                       (errno == EEXIST ? "; name another, or let the name hold the time: "
-                                          "session-%Y%m%d-%H%M%S.haptics"
-                                        : "; name a file in a directory that can be written"));
+Recorder::Recorder(std::filesystem::path file, OnProblem onProblem, const RecorderOptions& options)
+    : path_(std::move(file)), onProblem_(std::move(onProblem)), options_(options) {
+  try {
+    file_ = base::world().files.create(path_, base::Existing::refuse);
+  } catch (const std::system_error& error) {
+    throw RecordingError("cannot record to '" + path_.string() + "': " + error.code().message() +
+                         (error.code() == std::errc::file_exists
+                              ? "; name another, or put the time into the name: session-%Y%m%d-%H%M%S.haptics"
+                              : "; name a file in a directory that can be written"));
   }
 }
 
@@ -53,17 +49,20 @@ void Recorder::start(Nanos wallOffset, std::string config) {
   out_.assign(magic().begin(), magic().end());
   appendBlock(out_, BlockKind::header, content);
   write();
-  thread_ = std::thread([this] { run(); });
+  thread_ = base::Thread({.name = "recorder"}, [this] {
+    drain();
+    return base::now() + kPeriod;
+  });
 }
 
-void Recorder::told(std::uint32_t scene, scene::ClientId client, Nanos time,
-                    const scene::SceneCommand* command) {
+void Recorder::recordCommand(std::uint32_t scene, scene::ClientId client, Nanos time,
+                             const scene::SceneCommand* command) {
   Bytes content;
   packSceneEvent(content, scene, client, time, command);
   appendEvent(BlockKind::scene, std::move(content));
 }
 
-void Recorder::published(std::uint32_t device, Nanos time, std::uint64_t revision) {
+void Recorder::recordPublish(std::uint32_t device, Nanos time, std::uint64_t revision) {
   PublishEvent event{device, time, revision, {}};
   event.stopwatch.swap(devices_[device]->readings);
   Bytes content;
@@ -81,20 +80,7 @@ void Recorder::appendEvent(BlockKind kind, Bytes&& content) {
   appendBlock(events_, kind, content);
 }
 
-void Recorder::run() {
-  for (;;) {
-    bool last = false;
-    {
-      std::unique_lock lock(mutex_);
-      wake_.wait_for(lock, kPause, [this] { return stopping_; });
-      last = stopping_;
-    }
-    drain();
-    if (last) return;
-  }
-}
-
-// The rings first: what a tick has seen was told before it, so that it is in what is taken now.
+// The rings before the events: the commands that a tick saw were recorded before it, so they are in this batch, too.
 void Recorder::drain() {
   for (const auto& device : devices_) {
     device->packer.restart();
@@ -114,17 +100,17 @@ void Recorder::drain() {
   appendLost(LostEvent::What::sceneEvents, 0, lostEvents, counts_.lostSceneEvents);
   for (std::uint32_t i = 0; i < devices_.size(); ++i) appendTicks(i, *devices_[i]);
   write();
-  tellLosses();
+  reportLosses();
 }
 
-void Recorder::tellLosses() {
+void Recorder::reportLosses() {
   const std::uint64_t losses = counts_.lostTicks + counts_.lostSceneEvents;
-  if (losses == toldLosses_ || base::now() < tellAfter_ || file_ < 0) return;
-  toldLosses_ = losses;
-  tellAfter_ = base::now() + 1'000'000'000;
-  onTrouble_("recording to '" + path_.string() + "': " + std::to_string(counts_.lostTicks) + " ticks and " +
+  if (losses == reportedLosses_ || base::now() < nextLossReport_ || !file_) return;
+  reportedLosses_ = losses;
+  nextLossReport_ = base::now() + kBetweenLossReports;
+  onProblem_("recording to '" + path_.string() + "': " + std::to_string(counts_.lostTicks) + " ticks and " +
              std::to_string(counts_.lostSceneEvents) +
-             " scene events lost so far, the disk does not keep up; record to a faster one");
+             " scene events lost so far because the disk is too slow; record to a faster one");
 }
 
 void Recorder::appendTicks(std::uint32_t number, Device& device) {
@@ -149,41 +135,31 @@ void Recorder::appendLost(LostEvent::What what, std::uint32_t device, std::uint6
 }
 
 void Recorder::write() {
-  std::size_t done = 0;
-  while (file_ >= 0 && done < out_.size()) {
-    const ::ssize_t wrote = ::write(file_, out_.data() + done, out_.size() - done);
-    if (wrote < 0 && errno == EINTR) continue;
-    if (wrote < 0) {
-      fail(errno);
-      break;
-    }
-    done += static_cast<std::size_t>(wrote);
+  const Bytes bytes = std::exchange(out_, {});
+  if (!file_ || bytes.empty()) return;
+  try {
+    file_->write(bytes);
+    counts_.bytes += bytes.size();
+  } catch (const std::system_error& error) {
+    fail(error.code());
   }
-  counts_.bytes += done;
-  out_.clear();
 }
 
-void Recorder::fail(int error) {
-  ::close(file_);
-  file_ = -1;
+void Recorder::fail(const std::error_code& error) {
+  file_.reset();
   {
     const std::lock_guard lock(mutex_);
     failed_ = true;
     events_ = {};
   }
-  onTrouble_("recording to '" + path_.string() + "' has stopped: " + std::strerror(error) +
+  onProblem_("recording to '" + path_.string() + "' has stopped: " + error.message() +
              "; what was written before stays readable" +
-             (error == ENOSPC ? ", make room on the disk and record anew" : ""));
+             (error == std::errc::no_space_on_device ? "; make room on the disk and start a new recording" : ""));
 }
 
 void Recorder::finish() {
-  if (thread_.joinable()) {
-    {
-      const std::lock_guard lock(mutex_);
-      stopping_ = true;
-    }
-    wake_.notify_one();
-    thread_.join();
+  if (thread_.running()) {
+    thread_.stop();  // its last step drains
     EndEvent end;
     for (const auto& device : devices_) end.time = std::max(end.time, device->newest);
     Bytes content;
@@ -191,8 +167,7 @@ void Recorder::finish() {
     appendBlock(out_, BlockKind::end, content);
     write();
   }
-  if (file_ >= 0) ::close(file_);
-  file_ = -1;
+  file_.reset();
 }
 
 }  // namespace hapticd::record

@@ -1,4 +1,4 @@
-// What a session file says, as values. docs/session-format.md describes the bytes.
+// The content of a recording as values. docs/recording-format.md describes the bytes.
 #pragma once
 
 #include <cstdint>
@@ -27,13 +27,13 @@ class RecordingError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// One haptic device of the session, with everything its servo and its scene were made with.
+/// One haptic device, with all options of its servo and its scene.
 struct RecordedDevice {
   std::vector<std::string> names;
   std::string driver;
   std::string model;
   std::int32_t buttons = 0;
-  std::uint32_t scene = 0;  ///< number of the scene that it touches
+  std::uint32_t scene = 0;  ///< number of its scene
   scene::SceneConfig sceneConfig;
   realtime::TickOptions tick;
 };
@@ -41,12 +41,12 @@ struct RecordedDevice {
 /// The first block.
 struct RecordingHeader {
   std::string program;
-  Nanos wallOffset = 0;  ///< wall time less servo time, at the start
+  Nanos wallOffset = 0;  ///< wall time minus servo time at the start
   std::string config;    ///< of the server, as TOML
   std::vector<RecordedDevice> devices;
 };
 
-/// A command as the scene applied it, before it had effect; without one, the client was gone.
+/// A command as the scene applied it; without one, the client left.
 struct SceneEvent {
   std::uint32_t scene = 0;
   scene::ClientId client = 0;
@@ -54,12 +54,12 @@ struct SceneEvent {
   std::optional<scene::SceneCommand> command;
 };
 
-/// The scene of a device was looked at for publishing; what came of it, if anything.
+/// The builder of a device was asked for a snapshot.
 struct PublishEvent {
   std::uint32_t device = 0;
   Nanos time = 0;
   std::uint64_t revision = 0;    ///< 0: nothing had changed
-  std::vector<Nanos> stopwatch;  ///< what the builder read from it meanwhile
+  std::vector<Nanos> stopwatch;  ///< its readings since the previous event
 };
 
 /// One tick of a device.
@@ -68,15 +68,15 @@ struct TickEvent {
   realtime::TickRecord tick;
 };
 
-/// Something is missing here, because the recorder could not follow.
+/// Data is missing here because the disk was too slow.
 struct LostEvent {
   enum class What : std::int32_t { ticks, sceneEvents };
   What what = What::ticks;
   std::uint32_t device = 0;  ///< for ticks
-  std::uint64_t count = 0;   ///< since the last of these
+  std::uint64_t count = 0;   ///< since the previous such event
 };
 
-/// The recording ended in order.
+/// The recording is complete.
 struct EndEvent {
   Nanos time = 0;
 };

@@ -1,7 +1,7 @@
 #include "record/recording_reader.h"
 
 #include "record/fields.h"
-#include "record/pack_commands.h"
+#include "record/scene_event_codec.h"
 
 namespace hapticd::record {
 
@@ -20,7 +20,7 @@ void RecordingReader::readHeader() {
     throw RecordingError("'" + path_.string() +
                        "' has no whole header: " + (damage.empty() ? "it is empty" : damage));
   }
-  if (block_.kind != BlockKind::header) fail("the first block is no header");
+  if (block_.kind != BlockKind::header) fail("the first block is not a header");
   Unpacker in(block_.content);
   const auto version = in.next<std::uint32_t>();
   if (in.ok() && (version < 1 || version > kFormatVersion)) {
@@ -29,7 +29,7 @@ void RecordingReader::readHeader() {
          "; use the hapticd that wrote it");
   }
   in.take(header_);
-  if (!in.ok() || !in.rest().empty()) fail("a header of another length than its content");
+  if (!in.ok() || !in.rest().empty()) fail("the length of the header does not match its content");
   for (const RecordedDevice& device : header_.devices) {
     if (device.names.empty()) fail("a device without a name");
   }
@@ -53,7 +53,7 @@ template <class Event>
 void RecordingReader::takeWhole(RecordingEvent& event) {
   Unpacker in(block_.content);
   in.take(event.emplace<Event>());
-  if (!in.ok() || !in.rest().empty()) fail("an event of another length than its content");
+  if (!in.ok() || !in.rest().empty()) fail("the length of an event does not match its content");
 }
 
 // False when the block is not an event by itself.
@@ -91,8 +91,8 @@ bool RecordingReader::readBlock(RecordingEvent& event) {
 }
 
 std::string RecordingReader::remark() const {
-  if (!blocks_.damage().empty()) return blocks_.damage() + "; what came before it was read";
-  if (!ended_) return "the recording has no end: the server was killed, or it still records";
+  if (!blocks_.damage().empty()) return blocks_.damage() + "; everything before it was read";
+  if (!ended_) return "the recording has no end: the server was killed or is still recording";
   return {};
 }
 

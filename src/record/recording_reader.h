@@ -1,5 +1,4 @@
-// A session file as its events, in the order in which they were written: a scene is always told of before the
-// first tick that felt it.
+// A recording as its events, in the order of writing: the commands of a scene precede the first tick that saw them.
 #pragma once
 
 #include <filesystem>
@@ -14,16 +13,15 @@ namespace hapticd::record {
 
 class RecordingReader {
  public:
-  /// Reads the header. Throws RecordingError when there is none that this version can read.
+  /// Reads the header. Throws RecordingError when this version cannot read it.
   explicit RecordingReader(const std::filesystem::path& file);
 
   const RecordingHeader& header() const noexcept { return header_; }
 
-  /// The next event; false when there is no other. Throws RecordingError for a block that is whole but holds
-  /// what no session can, naming the byte.
+  /// The next event; false at the end. Throws RecordingError, naming the byte, for a whole block with impossible content.
   bool next(RecordingEvent& event);
 
-  /// After the last event: why the session ends there, when it was not ended in order. Empty when it was.
+  /// After the last event: why the recording is incomplete; empty when it is complete.
   std::string remark() const;
 
  private:

@@ -12,7 +12,7 @@ namespace {
 using realtime::GuardControl;
 using realtime::TickReport;
 
-// It is where the record says, and takes forces as it did then.
+// Its states and the results of its writes are the recorded ones.
 class RecordedHand final : public device::Device {
  public:
   void use(const realtime::TickRecord& tick) noexcept { tick_ = &tick; }
@@ -74,7 +74,7 @@ bool sameOutcome(const TickReport& a, const TickReport& b) {
   return outcome(a) == outcome(b);
 }
 
-// One device, with its view of the scene.
+// One device with its builder.
 struct Rerenderer::Seat {
   Seat(const RecordedDevice& recorded, const RerenderChanges& changes)
       : scene(recorded.scene),
@@ -93,8 +93,8 @@ struct Rerenderer::Seat {
     return config;
   }
 
-  // As the guard saw it then; it only looks at what changed.
-  void obey(const GuardControl::Seen& wanted) {
+  // Gives the guard the control that it saw; it reacts to changes only.
+  void apply(const GuardControl::Seen& wanted) {
     if (wanted.rearms != control.rearms) tick.control().rearm();
     if (wanted.ramps != control.ramps) tick.control().rampIn();
     if (wanted.stopped) tick.control().stop();
@@ -106,7 +106,7 @@ struct Rerenderer::Seat {
     control = wanted;
   }
 
-  void show(std::uint64_t revision) {
+  void publish(std::uint64_t revision) {
     if (revision == shown) return;
     while (!unseen.empty() && unseen.front().first < revision) unseen.pop_front();
     if (unseen.empty() || unseen.front().first != revision) return;  // lost
@@ -139,7 +139,7 @@ Rerenderer::Rerenderer(const RecordingHeader& header, const RerenderChanges& cha
 Rerenderer::~Rerenderer() = default;
 
 const TickReport* Rerenderer::feed(const RecordingEvent& event) {
-  if (const auto* told = std::get_if<SceneEvent>(&event)) on(*told);
+  if (const auto* command = std::get_if<SceneEvent>(&event)) on(*command);
   if (const auto* published = std::get_if<PublishEvent>(&event)) on(*published);
   if (const auto* tick = std::get_if<TickEvent>(&event)) return on(*tick);
   return nullptr;
@@ -156,7 +156,7 @@ void Rerenderer::on(const SceneEvent& event) {
         seat->builder.clientGone(event.client, event.time);
       }
     } catch (const std::exception&) {
-      // The scene thread told the client and went on, too.
+      // The scene thread, too, reported it and continued.
     }
   }
 }
@@ -170,17 +170,17 @@ void Rerenderer::on(const PublishEvent& event) {
       seat.newest = seat.surfaces.of(std::move(snapshot));
     }
   } catch (const std::exception&) {
-    // The scene that is felt stays as it is, as it did then.
+    // The published scene stays as it is, as in the recording.
   }
-  // Another surface may make another number of revisions: what counts is which was the newest then.
+  // Other surfaces may make another number of revisions: pair the recorded one with the newest snapshot.
   if (event.revision != 0) seat.unseen.emplace_back(event.revision, seat.newest);
 }
 
 const TickReport* Rerenderer::on(const TickEvent& event) {
   Seat& seat = *seats_.at(event.device);
   const TickReport& recorded = event.tick.report;
-  seat.show(recorded.revision);
-  seat.obey(event.tick.control);
+  seat.publish(recorded.revision);
+  seat.apply(event.tick.control);
   seat.device.use(event.tick);
   seat.tick(
       {recorded.time, recorded.timing.wakeupError, recorded.timing.overruns, recorded.timing.skippedPeriods});

@@ -1,8 +1,8 @@
-// A recorded session once more: the recorded hand through the recorded scene, by the same renderer and guard.
+// Re-rendering: the recorded device states in the recorded scene, by the same renderer and guard.
 //
-// The scene gets every command and every look of its builder at the recorded times, with what the stopwatch
-// said; the servo gets every tick's state, pacing and control, and each revision in the tick that saw it. So
-// with nothing changed the forces are the recorded ones bit for bit, by the same program on the same machine.
+// The builder gets every command and every call of publish() at the recorded times, with the readings of the stopwatch;
+// the servo gets the state, pacing and control of every tick, and each revision in the tick that saw it. So, without
+// changes, the same program on the same kind of machine gives the recorded forces bit for bit.
 #pragma once
 
 #include <deque>
@@ -15,8 +15,8 @@
 
 namespace hapticd::record {
 
-/// What to feel otherwise than it was recorded; everything else stays. Surfaces are those of all objects and
-/// planes, and are kept passive as always unless raw.
+/// Differences from the recording; all else stays. Surface values apply to all objects and planes, within the passivity
+/// bound unless raw.
 struct RerenderChanges {
   std::optional<double> stiffness_N_per_m{};
   std::optional<double> damping_Ns_per_m{};
@@ -30,16 +30,16 @@ struct RerenderChanges {
   bool surfaces() const noexcept;
 };
 
-/// True when the two ticks felt and did the same, in every bit: rendering, force and guard.
+/// True when the two ticks agree in every bit of rendering, force and guard.
 bool sameOutcome(const realtime::TickReport& a, const realtime::TickReport& b);
 
-/// Feed it the events of a session, in order.
+/// Feed it the events of a recording, in order.
 class Rerenderer {
  public:
   explicit Rerenderer(const RecordingHeader& header, const RerenderChanges& changes = {});
   ~Rerenderer();
 
-  /// For a tick, what it is now; valid until the next call. Null for everything else.
+  /// For a tick, the re-rendered one, valid until the next call; null for all other events.
   const realtime::TickReport* feed(const RecordingEvent& event);
 
  private:

@@ -1,11 +1,12 @@
-// Values as text by their lists of fields: columns of CSV, objects of JSON, and the schema that says what
-// these are.
+// Values as text by their lists of fields: columns of CSV, and objects of JSON with their schema. JSON that is not
+// written per tick uses nlohmann::json instead.
 #pragma once
 
 #include <charconv>
 #include <cmath>
 #include <string>
 
+#include "hapticd/trips.h"
 #include "record/archive.h"
 
 namespace hapticd::record {
@@ -17,7 +18,7 @@ void appendNumber(std::string& out, T value) {
   out.append(text, std::to_chars(text, text + sizeof text, value).ptr);
 }
 
-/// Appends in quotes, for JSON; bytes that are no UTF-8 stay as they are.
+/// Appends in quotes, for JSON; bytes that are not UTF-8 stay as they are.
 inline void appendQuoted(std::string& out, std::string_view text) {
   out += '"';
   for (const char c : text) {
@@ -35,7 +36,8 @@ inline void appendQuoted(std::string& out, std::string_view text) {
   out += '"';
 }
 
-/// One row of CSV; vectors take a column for each coordinate, and what is not there leaves its column empty.
+/// One row of CSV: vectors take a column per coordinate, trips are names joined by "+", and absent values leave their
+/// columns empty. The one writer of CSV.
 class CsvRow {
  public:
   explicit CsvRow(std::string& out) : out_(out) {}
@@ -52,6 +54,7 @@ class CsvRow {
     appendNumber(out_, value);
   }
   void put(bool value) { put(std::uint8_t{value}); }
+  void put(Trips trips) { put(namesOf(trips)); }
   void put(const std::string& text) {
     separate();
     if (text.find_first_of(",\"\r\n") == std::string::npos) {
@@ -69,15 +72,23 @@ class CsvRow {
   void put(const geometry::Quat& q) { put(q.coeffs()); }
   template <class T>
   void put(const std::optional<T>& value) {
-    separate();
-    if (value) appendNumber(out_, *value);
+    if (value) return put(*value);
+    for (int i = 0; i < columns(static_cast<const T*>(nullptr)); ++i) separate();
   }
-  void separate() { out_ += out_.empty() || out_.back() == '\n' ? "" : ","; }
+  static constexpr int columns(const void*) { return 1; }
+  template <class S, int R>
+  static constexpr int columns(const Eigen::Matrix<S, R, 1>*) {
+    return R;
+  }
+  void separate() {
+    if (!std::exchange(first_, false)) out_ += ',';
+  }
 
   std::string& out_;
+  bool first_ = true;
 };
 
-/// The names of those columns: x_m of position_m is position_x_m.
+/// The names of those columns: the x coordinate of position_m is position_x_m.
 class CsvHeader {
  public:
   explicit CsvHeader(std::string& out) : out_(out) {}
@@ -93,6 +104,10 @@ class CsvHeader {
     add(name);
   }
   template <class S>
+  void put(const std::string& name, const std::optional<Eigen::Matrix<S, 3, 1>>&) {
+    put(name, Eigen::Matrix<S, 3, 1>());
+  }
+  template <class S>
   void put(const std::string& name, const Eigen::Matrix<S, 3, 1>&) {
     const std::size_t unit = name.find("_m");  // _m, _m_per_s
     const std::size_t at = unit != std::string::npos ? unit : std::min(name.find("_N"), name.size());
@@ -106,8 +121,8 @@ class CsvHeader {
   std::string& out_;
 };
 
-/// An object of JSON. Numbers that JSON has no words for are null; lists of more than 64 items are told by
-/// their length; what is not there is left out.
+/// An object of JSON. Numbers that are not finite are null, trips are their bit field, a list of more than 64 items is
+/// its length, and absent values are left out.
 class JsonObject {
  public:
   explicit JsonObject(std::string& out) : out_(out) { out_ += '{'; }
@@ -124,7 +139,7 @@ class JsonObject {
   void operator()(const char* name, const std::optional<T>& value) {
     if (value) (*this)(name, *value);
   }
-  /// What comes next is the value.
+  /// The value must follow.
   void key(const char* name) {
     if (!std::exchange(first_, false)) out_ += ',';
     appendQuoted(out_, name);
@@ -143,6 +158,7 @@ class JsonObject {
     }
   }
   void put(bool value) { out_ += value ? "true" : "false"; }
+  void put(Trips trips) { put(trips.bits()); }
   void put(const std::string& text) { appendQuoted(out_, text); }
   template <IsEnum T>
   void put(T value) {
@@ -178,7 +194,7 @@ class JsonObject {
   bool first_ = true;
 };
 
-/// The JSON schema of such an object, property by property.
+/// The properties of the JSON schema of such an object.
 class JsonSchema {
  public:
   explicit JsonSchema(std::string& out) : out_(out) {}
@@ -209,7 +225,7 @@ class JsonSchema {
       return "boolean";
     else if constexpr (std::same_as<T, std::string>)
       return "string";
-    else if constexpr (std::integral<T>)
+    else if constexpr (std::integral<T> || std::same_as<T, Trips>)
       return "integer";
     else if constexpr (std::floating_point<T>)
       return "number";
@@ -219,5 +235,21 @@ class JsonSchema {
 
   std::string& out_;
 };
+
+/// The header of the CSV of a type, with the end of the line.
+template <class T>
+std::string csvHeader() {
+  std::string text;
+  const T any{};
+  fields(any, CsvHeader(text));
+  return text + '\n';
+}
+
+/// Appends one row with the end of the line.
+template <class T>
+void appendCsvRow(std::string& out, const T& value) {
+  fields(value, CsvRow(out));
+  out += '\n';
+}
 
 }  // namespace hapticd::record

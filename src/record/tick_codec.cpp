@@ -15,7 +15,7 @@ enum Has : std::uint8_t {
   kGripper = 1U << 4,
 };
 
-// What is in every tick, in this order. `Record` may be const.
+// The fields of every tick, in this order. `Record` may be const.
 template <class Record, class V>
 void always(Record& tick, V&& v) {
   auto& report = tick.report;
@@ -61,10 +61,10 @@ bool TickUnpacker::next(TickRecord& tick) {
   tick.haveState = (has & kHaveState) != 0;
   tick.written = (has & kWritten) != 0;
   always(tick, in_);
-  realtime::Rendering& felt = tick.report.rendering;
-  ok_ = in_.ok() && felt.contactCount <= felt.contacts.size();
+  realtime::Rendering& rendering = tick.report.rendering;
+  ok_ = in_.ok() && rendering.contactCount <= rendering.contacts.size();
   if (!ok_) return false;
-  for (std::uint32_t i = 0; i < felt.contactCount; ++i) in_.take(felt.contacts[i]);
+  for (std::uint32_t i = 0; i < rendering.contactCount; ++i) in_.take(rendering.contacts[i]);
   tick.report.T_world_device = before_.T_world_device;
   tick.report.guard.counts = before_.guard.counts;
   if ((has & kPlacement) != 0) in_.take(tick.report.T_world_device);

@@ -1,4 +1,4 @@
-// Ticks to bytes: a run of them in one block, each as little longer than its numbers as is simple.
+// Ticks as bytes: one block holds a run of ticks.
 #pragma once
 
 #include "realtime/servo/tick_record.h"
@@ -6,8 +6,8 @@
 
 namespace hapticd::record {
 
-/// Appends ticks of one run. What seldom changes (the placement of the device, the guard's counts) is written
-/// when it does, and with the first.
+/// Appends the ticks of one run. The placement of the device and the counts of the guard are written with the first tick
+/// and when they change.
 class TickPacker {
  public:
   void add(const realtime::TickRecord& tick, Bytes& out);
@@ -26,7 +26,7 @@ class TickUnpacker {
 
   /// The next one; false at the end of the run, or when it is damaged.
   bool next(realtime::TickRecord& tick);
-  /// False when the run ended within a tick or holds what no tick can.
+  /// False when the run ended within a tick or has an impossible value.
   bool ok() const noexcept { return ok_; }
 
  private:

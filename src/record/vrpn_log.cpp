@@ -1,26 +1,14 @@
 #include "record/vrpn_log.h"
 
-#include <cerrno>
-#include <cstring>
-
-#include "record/recording.h"
 #include "wire/cookie.h"
 #include "wire/frame_encoder.h"
 #include "wire/system.h"
 
 namespace hapticd::record {
 
-VrpnLog::VrpnLog(const std::filesystem::path& file) : path_(file), file_(std::fopen(file.c_str(), "wb")) {
-  if (file_ == nullptr) {
-    throw RecordingError("cannot write '" + path_.string() + "': " + std::strerror(errno) +
-                       "; name a file in a directory that can be written");
-  }
+VrpnLog::VrpnLog(const std::filesystem::path& file) : file_(file) {
   names_.addSender("VRPN Control");  // the stock library's sender 0
-  write(wire::encodeCookie(0));
-}
-
-VrpnLog::~VrpnLog() {
-  if (file_ != nullptr) std::fclose(file_);
+  file_.write(wire::encodeCookie(0));
 }
 
 wire::LocalSender VrpnLog::addSender(std::string_view name) {
@@ -45,7 +33,7 @@ void VrpnLog::describe(wire::Time time, std::int32_t kind, std::int32_t id, cons
   entry(time, id, kind, wire::encodeDescription(name));
 }
 
-// The head of an entry is what the stock library once wrote as a struct; the last number was a pointer.
+// The head of an entry is a struct that the stock library once wrote as it was in memory; the last number was a pointer.
 void VrpnLog::entry(wire::Time time, std::int32_t sender, std::int32_t type, wire::ByteView payload) {
   Bytes head;
   Packer pack(head);
@@ -55,20 +43,8 @@ void VrpnLog::entry(wire::Time time, std::int32_t sender, std::int32_t type, wir
   pack.put(time.microseconds);
   pack.put(static_cast<std::int32_t>(payload.size()));
   pack.put(std::int32_t{0});
-  write(head);
-  write(payload);
-}
-
-void VrpnLog::write(wire::ByteView bytes) {
-  if (std::fwrite(bytes.data(), 1, bytes.size(), file_) == bytes.size()) return;
-  throw RecordingError("writing '" + path_.string() + "' failed: " + std::strerror(errno) +
-                     "; make room on the disk");
-}
-
-void VrpnLog::close() {
-  const int failed = std::fclose(file_);
-  file_ = nullptr;
-  if (failed != 0) throw RecordingError("writing '" + path_.string() + "' failed: " + std::strerror(errno));
+  file_.write(head);
+  file_.write(payload);
 }
 
 }  // namespace hapticd::record

@@ -1,42 +1,36 @@
-// VRPN's own log files, which its clients open as NAME@file:///path: a cookie, then messages as they were
-// sent.
+// VRPN's log files, which its clients open as NAME@file:///path: a cookie, then messages as sent.
 #pragma once
 
-#include <cstdio>
 #include <filesystem>
 #include <map>
 #include <set>
 
 #include "record/archive.h"
+#include "record/export_file.h"
 #include "wire/codec.h"
 #include "wire/names.h"
 
 namespace hapticd::record {
 
-/// Writes one file; names of senders and types are described before they are first used.
+/// Writes one file. Names of senders and types are described before their first use.
 class VrpnLog {
  public:
   /// Throws RecordingError when the file cannot be written.
   explicit VrpnLog(const std::filesystem::path& file);
-  ~VrpnLog();
-  VrpnLog(const VrpnLog&) = delete;
-  VrpnLog& operator=(const VrpnLog&) = delete;
 
   wire::LocalSender addSender(std::string_view name);
   void add(wire::Time time, wire::LocalSender sender, const wire::Message& message);
   /// Throws RecordingError when the file could not be written whole.
-  void close();
+  void close() { file_.close(); }
 
  private:
   void entry(wire::Time time, std::int32_t sender, std::int32_t type, wire::ByteView payload);
   void describe(wire::Time time, std::int32_t kind, std::int32_t id, const std::string& name);
-  void write(wire::ByteView bytes);
 
-  std::filesystem::path path_;
-  std::FILE* file_;
+  ExportFile file_;
   wire::LocalNames names_;
-  std::set<std::int32_t> senders_;  // that were described
-  std::set<std::int32_t> types_;
+  std::set<std::int32_t> senders_;  // already described
+  std::set<std::int32_t> types_;    // already described
 };
 
 }  // namespace hapticd::record

@@ -31,8 +31,8 @@ class SceneBuilder::State {
   void take(SceneCommand&& command, const Call& call) {
     const auto open = batches_.find(call.client);
     if (open == batches_.end() || std::holds_alternative<BeginBatch>(command) ||
-        std::holds_alternative<CommitBatch>(command)) {
-      dispatch(std::move(command), call);
+        std::holds_alternative<CommitBatch>(command) || std::holds_alternative<ReleaseForces>(command)) {
+      dispatch(command, call);
       return;
     }
     Batch& batch = open->second;
@@ -52,7 +52,6 @@ class SceneBuilder::State {
     forces_.clientGone(client, now);
   }
 
-  void releaseForces(ClientId client, Nanos now) { forces_.clientGone(client, now); }
 
   std::optional<Nanos> nextDeadline() const {
     std::optional<Nanos> next;
@@ -102,32 +101,32 @@ class SceneBuilder::State {
     std::size_t bytes = 0;
   };
 
-  void dispatch(SceneCommand&& command, const Call& call) {
-    std::visit([&](auto&& c) { apply(std::move(c), call); }, std::move(command));
+  void dispatch(SceneCommand& command, const Call& call) {
+    std::visit(
+        [&]<class C>(C& c) {
+          if constexpr (C::kInfo.target == Target::objects) {
+            objects_.apply(command, call);
+          } else if constexpr (C::kInfo.target == Target::forces) {
+            forces_.apply(command, call);
+          } else {
+            apply(c, call);
+          }
+        },
+        command);
   }
 
-  // Whoever keeps a kind of thing takes the commands on it.
-  template <class C>
-  void apply(C&& command, const Call& call) {
-    if constexpr (requires { objects_.apply(std::move(command), call); }) {
-      objects_.apply(std::move(command), call);
-    } else {
-      forces_.apply(std::move(command), call);
-    }
-  }
-
-  void apply(SetTouchableFaces&& c, const Call&) {
+  void apply(SetTouchableFaces& c, const Call&) {
     faces_ = c.faces == 0   ? TouchableFaces::front
              : c.faces == 1 ? TouchableFaces::back
                             : TouchableFaces::both;
     changed_ = true;
   }
 
-  void apply(SetWorkspaceProjection&& c, const Call& call) {
+  void apply(SetWorkspaceProjection& c, const Call& call) {
     use(fitProjection(c.model, c.projection, config_.deviceWorkspace_m, config_.workspaceFit),
         "setWorkspaceProjectionMatrix", call);
   }
-  void apply(SetWorkspaceBox&& c, const Call& call) {
+  void apply(SetWorkspaceBox& c, const Call& call) {
     use(fitBox(c.model, c.box, config_.deviceWorkspace_m, config_.workspaceFit), "setWorkspaceBoundingBox",
         call);
   }
@@ -143,7 +142,7 @@ class SceneBuilder::State {
     updateWorkspace();
   }
 
-  void apply(SetHapticOrigin&& c, const Call& call) {
+  void apply(SetHapticOrigin& c, const Call& call) {
     const auto rotation = rotationFrom(c.axis, c.angle_rad);
     if (!rotation || !isUsable(c.position_m)) {
       call.refuse("setHapticOrigin", "refused: not finite or too large, or the axis is zero", " position ",
@@ -153,7 +152,7 @@ class SceneBuilder::State {
     T_scene_haptic_ = Eigen::Translation3d(1000 * c.position_m) * *rotation;
     updateWorkspace();
   }
-  void apply(SetHapticScale&& c, const Call& call) {
+  void apply(SetHapticScale& c, const Call& call) {
     if (!(c.scale > 1e-9 && c.scale < 1e9)) {
       call.refuse("setHapticScale", "refused: not a positive number", " ", c.scale);
       return;
@@ -174,17 +173,17 @@ class SceneBuilder::State {
     updateWorkspace();
   }
 
-  void apply(ResetScene&&, const Call& call) {
+  void apply(ResetScene&, const Call& call) {
     resetWorkspace();
     objects_.reset();
     forces_.reset(call.now);
   }
 
-  void apply(BeginBatch&&, const Call& call) {
+  void apply(BeginBatch&, const Call& call) {
     if (!batches_.try_emplace(call.client).second)
       call.warn("begin of batch", "ignored: the batch is open already");
   }
-  void apply(CommitBatch&&, const Call& call) {
+  void apply(CommitBatch&, const Call& call) {
     auto batch = batches_.extract(call.client);
     if (!batch) {
       call.warn("commit of batch", "ignored: no batch was begun");
@@ -192,7 +191,7 @@ class SceneBuilder::State {
     }
     if (batch.mapped().bytes > config_.limits.batch_bytes) return;
     const Call inside{call.client, call.now, true, call.board, call.out};
-    for (SceneCommand& command : batch.mapped().commands) dispatch(std::move(command), inside);
+    for (SceneCommand& command : batch.mapped().commands) dispatch(command, inside);
   }
 
   const SceneConfig config_;
@@ -220,10 +219,6 @@ void SceneBuilder::apply(ClientId client, SceneCommand&& command, Nanos now, std
 
 void SceneBuilder::clientGone(ClientId client, Nanos now) {
   state_->clientGone(client, now);
-}
-
-void SceneBuilder::releaseForces(ClientId client, Nanos now) {
-  state_->releaseForces(client, now);
 }
 
 std::optional<Nanos> SceneBuilder::nextDeadline() const {

@@ -1,7 +1,9 @@
-// From what clients say to what can be touched: applies commands, publishes snapshots.
+// From scene commands to snapshots.
 //
-// Pure and single-threaded: no thread, no socket, no clock but `now`. The server's scene thread drives it:
-// apply what has come, publish, sleep until nextDeadline() or the next command.
+// For one thread: the server's scene thread applies the commands that arrived, publishes, and sleeps until
+// nextDeadline() or the next command. What it publishes depends on the commands, on `now` and on the readings of
+// SceneConfig::stopwatch. It starts threads that rebuild aged trees of the spatial index; they change which triangles are
+// proposed as candidates, never the forces.
 #pragma once
 
 #include <memory>
@@ -24,25 +26,22 @@ class SceneBuilder {
   SceneBuilder(SceneBuilder&&) noexcept;
   SceneBuilder& operator=(SceneBuilder&&) noexcept;
 
-  /// Applies one command of a client, or queues it in the client's open batch. What is wrong with it is
-  /// appended to `notices`, and the scene stays as it was.
+  /// Applies one command of a client, or queues it in the client's open batch. A command that is refused leaves the scene
+  /// unchanged and appends the reason to `notices`.
   void apply(ClientId client, SceneCommand&& command, Nanos now, std::vector<Notice>& notices);
 
-  /// The client has left: its open batch is dropped, the forces it owns ramp out.
+  /// The client left: drops its open batch; the forces that it owns ramp out.
   void clientGone(ClientId client, Nanos now);
 
-  /// The forces that the client owns ramp out, although it stays.
-  void releaseForces(ClientId client, Nanos now);
-
-  /// When publish() has something to do although no command came; nothing to wait for when empty.
+  /// When publish() is due even without a command; nothing when it is not.
   std::optional<Nanos> nextDeadline() const;
 
   /// The oldest edit that is applied but not yet published: meshes wait for a pause between edits. Empty when all is
   /// published.
   std::optional<Nanos> oldestEdit() const;
 
-  /// The scene as it is now, or null when nothing changed since the last time. The first call always gives
-  /// one. Builds the meshes that are due, which may take long; appends notices that became due.
+  /// A snapshot of the scene; null when nothing changed since the last call. The first call never returns null. Builds
+  /// the meshes that are due, which may take long; appends notices that became due.
   std::shared_ptr<const SceneSnapshot> publish(Nanos now, std::vector<Notice>& notices);
 
   /// The scene as of the last publish(), for people to look at.

@@ -1,7 +1,11 @@
-// Every verb a client can say to the scene, as plain values in the client's own units.
+// Every command of the scene, as plain values in the client's own units.
 //
-// "World units" are the client's; "metres" here are the stock VRPN calls' unit, which is world / 1000
-// whatever the workspace. Values are as they came: the builder checks them and answers with notices.
+// "World units" are the client's; "metres" are the unit of stock VRPN calls, world / 1000 whatever the workspace.
+// Values are unchecked: the builder checks them and answers with notices.
+//
+// To add a command: its struct with kInfo here, at the END of SceneCommand, and its handler: handle() in
+// object_commands.cpp or free_force_commands.cpp, apply() in builder.cpp, by its Target. The decoder converts the
+// message that kInfo names; recordings store the members as they are, so a command in use never changes them.
 #pragma once
 
 #include <array>
@@ -11,6 +15,7 @@
 #include <vector>
 
 #include "geometry/triangle_mesh.h"
+#include "scene/command_info.h"
 
 namespace hapticd::scene {
 
@@ -20,98 +25,130 @@ using geometry::Vec3f;
 
 // Objects and their meshes.
 
-/// The scene has at least this many objects, ids 0…count-1. Never removes any.
+/// Creates the missing ones of the objects 0…count-1. Never removes any.
 struct SetObjectNumber {
+  static constexpr CommandInfo kInfo{"SetObjectNumber", "vrpn_ForceDevice setObjectNumber", Target::objects,
+                                     "count"};
   std::int32_t count = 0;
 };
 
-/// A run of vertices from number `first` on. Without triangles, consecutive triples are faces.
+/// Sets a run of vertices from number `first` on. Without triangles, consecutive triples are faces.
 struct SetVertices {
+  static constexpr CommandInfo kInfo{"SetVertices", kNoMessage, Target::objects, "object", "first",
+                                     "positions"};
   std::int32_t object = 0;
   std::int32_t first = 0;
   std::vector<Vec3f> positions;  ///< object units
 };
 
-/// A run of triangles from number `first` on. From then on the mesh is indexed and, as stock VRPN has it, in
-/// metres; not so when they come in bulk.
+/// Sets a run of triangles from number `first` on. The mesh is indexed from then on and, unless the triangles came in
+/// bulk, in metres as in stock VRPN.
 struct SetTriangles {
+  static constexpr CommandInfo kInfo{"SetTriangles", kNoMessage, Target::objects, "object", "first",
+                                     "triangles", "makesMetres"};
   std::int32_t object = 0;
   std::int32_t first = 0;
   std::vector<Triangle> triangles;
   bool makesMetres = true;
 };
 
-/// Accepted and ignored: normals follow from the triangles.
+/// Accepted and ignored with a notice: normals follow from the triangles.
 struct SetNormal {
+  static constexpr CommandInfo kInfo{"SetNormal", kNoMessage, Target::objects, "object"};
   std::int32_t object = 0;
 };
 
 struct RemoveTriangle {
+  static constexpr CommandInfo kInfo{"RemoveTriangle", "vrpn_ForceDevice removeTriangle", Target::objects,
+                                     "object", "triangle"};
   std::int32_t object = 0;
   std::int32_t triangle = 0;
 };
 
-/// All vertices and triangles go; the next vertices make triples again.
+/// Removes all vertices and triangles; the next vertices form triples again.
 struct ClearMesh {
+  static constexpr CommandInfo kInfo{"ClearMesh", "vrpn_ForceDevice clearTrimesh", Target::objects, "object"};
   std::int32_t object = 0;
 };
 
-/// Places the mesh in its object; replaces the one before. Row-major, translation in 3, 7, 11, metres.
+/// Places the mesh in its object; replaces the previous placement. Row-major, translation in 3, 7, 11, metres.
 struct TransformMesh {
+  static constexpr CommandInfo kInfo{"TransformMesh", "vrpn_ForceDevice transformTrimesh", Target::objects,
+                                     "object", "matrix"};
   std::int32_t object = 0;
   std::array<float, 16> matrix{};
 };
 
-/// Accepted and ignored: there is one way to collide.
+/// Accepted and ignored with a notice: there is one collision algorithm.
 struct SetTrimeshType {
+  static constexpr CommandInfo kInfo{"SetTrimeshType", "vrpn_ForceDevice setTrimeshType", Target::objects,
+                                     "object", "type"};
   std::int32_t object = 0;
   std::int32_t type = 0;
 };
 
-/// Parent -1 is the scene.
+/// Creates an object in metres, or moves an existing one below another parent; -1 is the scene.
 struct AddObject {
+  static constexpr CommandInfo kInfo{"AddObject", "vrpn_ForceDevice addObject", Target::objects, "object",
+                                     "parent"};
   std::int32_t object = 0;
   std::int32_t parent = -1;
 };
 
-/// A root of its own: the scene's origin does not move it.
+/// Creates an object that the origin of the scene does not move.
 struct AddObjectExScene {
+  static constexpr CommandInfo kInfo{"AddObjectExScene", "vrpn_ForceDevice addObjectExScene", Target::objects,
+                                     "object"};
   std::int32_t object = 0;
 };
 
 struct MoveToParent {
+  static constexpr CommandInfo kInfo{"MoveToParent", "vrpn_ForceDevice moveToParent", Target::objects,
+                                     "object", "parent"};
   std::int32_t object = 0;
   std::int32_t parent = -1;
 };
 
-/// With all that hangs below it. Object 0 becomes empty instead.
+/// Removes an object and its descendants. Object 0 becomes empty instead.
 struct RemoveObject {
+  static constexpr CommandInfo kInfo{"RemoveObject", "vrpn_ForceDevice removeObject", Target::objects,
+                                     "object"};
   std::int32_t object = 0;
 };
 
 /// Pose and scale below the parent: 16 doubles, column-major, translation in 12, 13, 14, object units.
 struct SetTransform {
+  static constexpr CommandInfo kInfo{"SetTransform", "vrpn_ForceDevice setTransformMatrix", Target::objects,
+                                     "object", "matrix"};
   std::int32_t object = 0;
   std::array<double, 16> matrix{};
 };
 
 struct SetObjectPosition {
+  static constexpr CommandInfo kInfo{"SetObjectPosition", "vrpn_ForceDevice setObjectPosition", Target::objects,
+                                     "object", "position_m"};
   std::int32_t object = 0;
   Vec3 position_m = Vec3::Zero();
 };
 
 struct SetObjectOrientation {
+  static constexpr CommandInfo kInfo{"SetObjectOrientation", "vrpn_ForceDevice setObjectOrientation", Target::objects,
+                                     "object", "axis", "angle_rad"};
   std::int32_t object = 0;
   Vec3 axis = Vec3::UnitZ();
   double angle_rad = 0;
 };
 
 struct SetObjectScale {
+  static constexpr CommandInfo kInfo{"SetObjectScale", "vrpn_ForceDevice setObjectScale", Target::objects,
+                                     "object", "scale"};
   std::int32_t object = 0;
   Vec3 scale = Vec3::Ones();
 };
 
 struct SetTouchable {
+  static constexpr CommandInfo kInfo{"SetTouchable", "vrpn_ForceDevice setObjectIsTouchable", Target::objects,
+                                     "object", "touchable"};
   std::int32_t object = 0;
   bool touchable = true;
 };
@@ -121,13 +158,17 @@ struct SetTouchable {
 /// One property by name: "stiffness", "damping", "static friction", "dynamic friction", "popthrough" in 0…1,
 /// "mass" in kg.
 struct SetSurfaceProperty {
+  static constexpr CommandInfo kInfo{"SetSurfaceProperty", "vrpn_ForceDevice setHapticProperty", Target::objects,
+                                     "object", "name", "value"};
   std::int32_t object = 0;
   std::string name;
   double value = 0;
 };
 
-/// Stock units: stiffness 1 is 1000 N/m, damping 0.005 is 5 N·s/m. Also makes mesh edits felt at once.
+/// Stock units: stiffness 1 is 1000 N/m, damping 0.005 is 5 N·s/m. Also publishes mesh edits at once.
 struct SetSurface {
+  static constexpr CommandInfo kInfo{"SetSurface", "vrpn_ForceDevice updateTrimeshChanges", Target::objects,
+                                     "object", "stiffness", "damping", "staticFriction", "dynamicFriction"};
   std::int32_t object = 0;
   double stiffness = 0;
   double damping = 0;
@@ -137,45 +178,61 @@ struct SetSurface {
 
 /// 0 front, 1 back, anything else both; for all objects.
 struct SetTouchableFaces {
+  static constexpr CommandInfo kInfo{"SetTouchableFaces", "vrpn_ForceDevice setTouchableFace", Target::scene,
+                                     "faces"};
   std::int32_t faces = 2;
 };
 
-// Between the device and the world.
+// The map between the device and the world.
 
-/// Matrices are column-major; the clip cube of the projection is fitted to the device workspace.
+/// Fits the clip cube of the projection to the device workspace. Matrices are column-major.
 struct SetWorkspaceProjection {
+  static constexpr CommandInfo kInfo{"SetWorkspaceProjection",
+                                     "vrpn_ForceDevice setWorkspaceProjectionMatrix", Target::scene,
+                                     "model", "projection"};
   std::array<double, 16> model{};
   std::array<double, 16> projection{};
 };
 
-/// The box (min xyz, max xyz, world units), seen through `model`, is fitted to the device workspace.
+/// Fits the box (min xyz, max xyz, world units), transformed by `model`, to the device workspace.
 struct SetWorkspaceBox {
+  static constexpr CommandInfo kInfo{"SetWorkspaceBox", "vrpn_ForceDevice setWorkspaceBoundingBox", Target::scene,
+                                     "model", "box"};
   std::array<double, 16> model{};
   std::array<double, 6> box{};
 };
 
-/// Where the device stands in the world.
+/// Places the device in the world.
 struct SetHapticOrigin {
+  static constexpr CommandInfo kInfo{"SetHapticOrigin", "vrpn_ForceDevice setHapticOrigin", Target::scene,
+                                     "position_m", "axis", "angle_rad"};
   Vec3 position_m = Vec3::Zero();
   Vec3 axis = Vec3::UnitZ();
   double angle_rad = 0;
 };
 
 struct SetHapticScale {
+  static constexpr CommandInfo kInfo{"SetHapticScale", "vrpn_ForceDevice setHapticScale", Target::scene,
+                                     "scale"};
   double scale = 1;
 };
 
-/// Where the scene stands in the world.
+/// Places the scene in the world.
 struct SetSceneOrigin {
+  static constexpr CommandInfo kInfo{"SetSceneOrigin", "vrpn_ForceDevice setSceneOrigin", Target::objects,
+                                     "position_m", "axis", "angle_rad"};
   Vec3 position_m = Vec3::Zero();
   Vec3 axis = Vec3::UnitZ();
   double angle_rad = 0;
 };
 
-// Forces that belong to no object. They are owned by the client that last set or started them.
+// Forces that belong to no object. The client that last set or started one owns it.
 
-/// Defines or redefines an effect: constant, spring, viscous, friction, vibrationMotor, vibrationContact.
+/// Defines or redefines an effect; kEffectKinds in effect.h has the types.
 struct DefineEffect {
+  static constexpr CommandInfo kInfo{"DefineEffect", "vrpn_ForceDevice Effect", Target::forces, "type",
+                                     "index", "gain", "magnitude_N", "duration_ms", "frequency",
+                                     "position", "direction"};
   std::string type;
   std::int32_t index = 0;
   double gain = 0;  ///< N/mm, viscous N/(mm/s)
@@ -187,26 +244,33 @@ struct DefineEffect {
 };
 
 struct StartEffect {
+  static constexpr CommandInfo kInfo{"StartEffect", "vrpn_ForceDevice startEffect", Target::forces, "index"};
   std::int32_t index = 0;
 };
 
 struct StopEffect {
+  static constexpr CommandInfo kInfo{"StopEffect", "vrpn_ForceDevice stopEffect", Target::forces, "index"};
   std::int32_t index = 0;
 };
 
 /// a x + b y + c z + d = 0 with d in metres; a zero normal removes it. Stock units as in SetSurface.
 struct SetPlane {
+  static constexpr CommandInfo kInfo{"SetPlane", kNoMessage, Target::forces, "index", "plane", "stiffness",
+                                     "damping", "staticFriction", "dynamicFriction", "recoveryCycles"};
   std::int32_t index = 0;
   std::array<double, 4> plane{};
   double stiffness = 0;
   double damping = 0;
   double staticFriction = 0;
   double dynamicFriction = 0;
-  std::int32_t recoveryCycles = 1;  ///< milliseconds over which a new plane comes in
+  std::int32_t recoveryCycles = 1;  ///< milliseconds over which a new plane fades in
 };
 
 /// Adhesion, texture and buzz of plane 0.
 struct SetPlaneDetail {
+  static constexpr CommandInfo kInfo{"SetPlaneDetail", "vrpn_ForceDevice Plane2", Target::forces,
+                                     "adhesionNormal_N", "adhesionLateral_N", "textureAmplitude_m",
+                                     "textureWavelength_m", "buzzAmplitude_m", "buzzFrequency_Hz"};
   double adhesionNormal_N = 0;
   double adhesionLateral_N = 0;
   double textureAmplitude_m = 0;
@@ -217,6 +281,8 @@ struct SetPlaneDetail {
 
 /// F = force + jacobian (x - origin) within the radius; all zero stops it.
 struct SetForceField {
+  static constexpr CommandInfo kInfo{"SetForceField", "vrpn_ForceDevice Force_Field", Target::forces,
+                                     "origin_m", "force_N", "jacobian_N_per_m", "radius_m"};
   Vec3 origin_m = Vec3::Zero();
   Vec3 force_N = Vec3::Zero();
   std::array<double, 9> jacobian_N_per_m{};  ///< row by row
@@ -224,11 +290,15 @@ struct SetForceField {
 };
 
 struct SetConstraintEnabled {
+  static constexpr CommandInfo kInfo{"SetConstraintEnabled", "vrpn_ForceDevice constraint_enable", Target::forces,
+                                     "enabled"};
   bool enabled = false;
 };
 
 /// 0 none, 1 point, 2 line, 3 plane.
 struct SetConstraintMode {
+  static constexpr CommandInfo kInfo{"SetConstraintMode", "vrpn_ForceDevice constraint_mode", Target::forces,
+                                     "mode"};
   std::int32_t mode = 0;
 };
 
@@ -236,31 +306,50 @@ enum class ConstraintVector { point, linePoint, lineDirection, planePoint, plane
 
 /// One of the vectors of the constraint: points in metres, directions of any length.
 struct SetConstraintVector {
+  static constexpr CommandInfo kInfo{"SetConstraintVector", kNoMessage, Target::forces, "which", "value"};
   ConstraintVector which = ConstraintVector::point;
   Vec3 value = Vec3::Zero();
 };
 
 struct SetConstraintStiffness {
+  static constexpr CommandInfo kInfo{"SetConstraintStiffness", "vrpn_ForceDevice constraint_KSpring", Target::forces,
+                                     "stiffness_N_per_m"};
   double stiffness_N_per_m = 0;
 };
 
-/// Effect 0 is a buzz: amplitude (N), frequency (Hz), duration (s), direction xyz; missing ones by default.
+/// Effect 0 is a buzz: amplitude (N), frequency (Hz), duration (s), direction xyz; missing ones have defaults.
 struct StartCustomEffect {
+  static constexpr CommandInfo kInfo{"StartCustomEffect", kNoMessage, Target::forces, "effect", "parameters"};
   std::uint32_t effect = 0;
   std::vector<float> parameters;
 };
 
-struct StopCustomEffect {};
+struct StopCustomEffect {
+  static constexpr CommandInfo kInfo{"StopCustomEffect", kNoMessage, Target::forces};
+};
+
+/// The forces that the client owns ramp out, although it stays connected. Takes effect in an open batch, too. The server
+/// issues it for a client that it does not hear.
+struct ReleaseForces {
+  static constexpr CommandInfo kInfo{"ReleaseForces", kNoMessage, Target::forces};
+};
 
 // The scene as a whole.
 
-/// Workspace, objects and effects back to the initial state.
-struct ResetScene {};
+/// Resets workspace, objects and forces to the initial state.
+struct ResetScene {
+  static constexpr CommandInfo kInfo{"ResetScene", kNoMessage, Target::scene};
+};
 
-/// What this client says until CommitBatch takes effect at once, in one snapshot, or not at all.
-struct BeginBatch {};
-struct CommitBatch {};
+/// The commands of this client until CommitBatch take effect together, in one snapshot, or not at all.
+struct BeginBatch {
+  static constexpr CommandInfo kInfo{"BeginBatch", "hapticd Batch_Begin", Target::scene};
+};
+struct CommitBatch {
+  static constexpr CommandInfo kInfo{"CommitBatch", "hapticd Batch_Commit", Target::scene};
+};
 
+/// Recordings store the position in this list as the number of a command: append, never reorder or remove.
 using SceneCommand =
     std::variant<SetObjectNumber, SetVertices, SetTriangles, SetNormal, RemoveTriangle, ClearMesh,
                  TransformMesh, SetTrimeshType, AddObject, AddObjectExScene, MoveToParent, RemoveObject,
@@ -269,6 +358,14 @@ using SceneCommand =
                  SetHapticOrigin, SetHapticScale, SetSceneOrigin, DefineEffect, StartEffect, StopEffect,
                  SetPlane, SetPlaneDetail, SetForceField, SetConstraintEnabled, SetConstraintMode,
                  SetConstraintVector, SetConstraintStiffness, StartCustomEffect, StopCustomEffect, ResetScene,
-                 BeginBatch, CommitBatch>;
+                 BeginBatch, CommitBatch, ReleaseForces>;
+
+/// Calls `visit.operator()<C>()` for each type of command, in the order of SceneCommand.
+template <class Visit>
+constexpr void forEachCommand(Visit&& visit) {
+  [&]<class... C>(const std::variant<C...>*) {
+    (visit.template operator()<C>(), ...);
+  }(static_cast<const SceneCommand*>(nullptr));
+}
 
 }  // namespace hapticd::scene

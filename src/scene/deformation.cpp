@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <limits>
 #include <utility>
 
 namespace hapticd::scene {
 namespace {
 
-// A refitted tree gets worse from shape to shape.
+// The bounds of a refitted tree get looser from shape to shape.
 constexpr int kRefitsBeforeRebuild = 64;
 
 std::vector<std::uint32_t> loneOf(const std::vector<Triangle>& triangles, std::size_t vertices) {
@@ -25,12 +24,12 @@ std::vector<std::uint32_t> loneOf(const std::vector<Triangle>& triangles, std::s
   return lone;
 }
 
-// Coordinates of vertices in a row.
+// The coordinates of all vertices.
 const float* flat(const std::vector<Vec3f>& vertices) {
   return vertices.data()->data();
 }
 
-// As MeshGeometry::vertex() on the way, for all of them.
+// MeshGeometry::vertex() at `now`, for all vertices.
 void placesOf(const MeshGeometry& mesh, Nanos now, float* out) {
   const float* const from = flat(*mesh.vertices);
   const float* const to = flat(*mesh.target);
@@ -43,11 +42,34 @@ void placesOf(const MeshGeometry& mesh, Nanos now, float* out) {
 
 }  // namespace
 
+void IndexBuilder::start(std::function<SpatialIndex()> build) {
+  job_ = std::make_shared<Job>();
+  job_->build = std::move(build);
+  thread_ = base::Thread({.name = "index builder"}, [job = job_]() -> std::optional<Nanos> {
+    if (job->done) return std::nullopt;  // the last step of a thread that has built it
+    try {
+      job->index = job->build();
+    } catch (...) {
+      job->error = std::current_exception();
+    }
+    job->done = true;
+    return std::nullopt;
+  });
+}
+
+std::optional<SpatialIndex> IndexBuilder::takeIfBuilt() {
+  if (!job_ || !job_->done) return std::nullopt;
+  thread_.stop();
+  const auto job = std::exchange(job_, nullptr);
+  if (job->error) std::rethrow_exception(job->error);
+  return std::move(job->index);
+}
+
 void Deformation::restart() {
   *this = {};
 }
 
-// Boxes hold what is left of the old way and all of the new one.
+// Boxes cover the rest of the old trajectory and all of the new one.
 void Deformation::sweep(const MeshGeometry& old, const std::vector<Vec3f>& target, Nanos now) {
   const auto count = static_cast<Eigen::Index>(3 * target.size());
   sweep_.lower.resize(3 * target.size() + 1);
@@ -71,13 +93,14 @@ void Deformation::sweep(const MeshGeometry& old, const std::vector<Vec3f>& targe
 }
 
 bool Deformation::spareIsFree() const {
-  // Nobody can get hold of a geometry again that only this knows.
+  // use_count() == 1: this is the only reference, so nobody else can acquire one.
   if (!spare_ || spare_.use_count() != 1) return false;
   std::atomic_thread_fence(std::memory_order_acquire);
   return true;
 }
 
-// A tree that has become old serves on while another is built beside it.
+// A tree with many refits stays in use while a new one is built. The moment of the exchange changes no force: an index
+// only proposes candidates.
 SpatialIndex Deformation::indexOver(const std::shared_ptr<const std::vector<Triangle>>& triangles) {
   const auto boxed = [](const std::vector<Triangle>& all, const Sweep& sweep) {
     return BoxedTriangles{all, sweep.lower, sweep.upper};
@@ -85,10 +108,10 @@ SpatialIndex Deformation::indexOver(const std::shared_ptr<const std::vector<Tria
   if (!spareIsFree()) return SpatialIndex::build(boxed(*triangles, sweep_));
   SpatialIndex index = std::move(spare_->index);
   if (index.refits() >= kRefitsBeforeRebuild) {
-    if (!rebuilt_.valid()) {
-      rebuilt_ = std::async([=, sweep = sweep_] { return SpatialIndex::build(boxed(*triangles, sweep)); });
-    } else if (rebuilt_.wait_for(std::chrono::seconds(0)) != std::future_status::timeout) {
-      index = rebuilt_.get();
+    if (!rebuild_.running()) {
+      rebuild_.start([=, sweep = sweep_] { return SpatialIndex::build(boxed(*triangles, sweep)); });
+    } else if (auto rebuilt = rebuild_.takeIfBuilt()) {
+      index = std::move(*rebuilt);
     }
   }
   index.refit(boxed(*triangles, sweep_));

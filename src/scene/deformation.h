@@ -1,24 +1,48 @@
-// The shapes of a mesh whose vertices move, one after the other.
+// The successive shapes of a mesh whose vertices move.
 #pragma once
 
+#include <atomic>
+#include <exception>
 #include <functional>
-#include <future>
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include "base/thread.h"
 #include "scene/mesh_geometry.h"
 
 namespace hapticd::scene {
 
-/// Keeps from shape to shape what need not be made anew: the index of the one before the last, and memory.
+/// Builds one index in a thread "index builder". The destructor waits for the build.
+class IndexBuilder {
+ public:
+  void start(std::function<SpatialIndex()> build);
+  /// From start() until takeIfBuilt() returned an index.
+  bool running() const noexcept { return job_ != nullptr; }
+  /// The index, once it is built; never waits for the build. Throws what the build threw.
+  std::optional<SpatialIndex> takeIfBuilt();
+
+ private:
+  struct Job {
+    std::function<SpatialIndex()> build;
+    std::optional<SpatialIndex> index;
+    std::exception_ptr error;
+    std::atomic<bool> done{false};
+  };
+
+  std::shared_ptr<Job> job_;
+  base::Thread thread_;  // last: it uses the job
+};
+
+/// Reuses from shape to shape the index of the shape before the last, and memory.
 class Deformation {
  public:
-  /// The triangles are others now, or there are none.
+  /// Forgets the shapes so far: the triangles changed, or there are none.
   void restart();
 
-  /// The surface travels from where `old` is felt to where the client wants it, in at most `longest`.
-  /// `triangles` are those of `old`, of which some may lack corners; `clock` gives the time, and `before` is
-  /// when `old` was made.
+  /// The next shape: its surface travels from where the servo renders `old` to `target`, in at most `longest`.
+  /// `triangles` are those of `old`, of which some may lack corners; `clock` is the time, `before` that of the previous
+  /// shape.
   std::shared_ptr<MeshGeometry> next(std::shared_ptr<MeshGeometry> old,
                                      std::shared_ptr<const std::vector<Triangle>> triangles,
                                      std::shared_ptr<const std::vector<Vec3f>> target,
@@ -37,8 +61,8 @@ class Deformation {
   bool begun_ = false;
   std::vector<std::uint32_t> lone_;  // vertices of no triangle
   Sweep sweep_;
-  std::shared_ptr<MeshGeometry> spare_;  // the one before the last: used again once nobody reads it
-  std::future<SpatialIndex> rebuilt_;    // built meanwhile; its end is waited for
+  std::shared_ptr<MeshGeometry> spare_;  // the shape before the last; its index is reused once no snapshot holds it
+  IndexBuilder rebuild_;
 };
 
 }  // namespace hapticd::scene

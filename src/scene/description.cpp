@@ -30,12 +30,12 @@ void FreeForces::describe(SceneDescription& out) const {
   out.fields = field_ ? 1 : 0;
   if (!constraint_ || !constraint_->value.enabled) return;
   const Constraint& c = constraint_->value;
-  const auto tell = [&](std::string_view mode, const Vec3& point_m, const Vec3& direction) {
+  const auto add = [&](std::string_view mode, const Vec3& point_m, const Vec3& direction) {
     out.constraint = {mode, kWorldUnitsPerStockMetre * point_m, direction, c.stiffness_N_per_m};
   };
-  if (c.mode == 1) tell("point", c.point_m, Vec3::Zero());
-  if (c.mode == 2) tell("line", c.linePoint_m, c.lineDirection);
-  if (c.mode == 3) tell("plane", c.planePoint_m, c.planeNormal);
+  if (c.mode == 1) add("point", c.point_m, Vec3::Zero());
+  if (c.mode == 2) add("line", c.linePoint_m, c.lineDirection);
+  if (c.mode == 3) add("plane", c.planePoint_m, c.planeNormal);
 }
 
 }  // namespace hapticd::scene

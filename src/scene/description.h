@@ -1,4 +1,4 @@
-// A scene as its clients made it, for people to look at: with what cannot be felt and what is not running.
+// A scene for people to look at, including objects without force and effects that do not run.
 #pragma once
 
 #include <memory>
@@ -20,8 +20,8 @@ struct ObjectDescription {
   bool touchable = true;
   Affine T_world_object = Affine::Identity();  ///< world units; where it is, or is on its way to
   Affine T_object_mesh = Affine::Identity();
-  Surface surface;  ///< as it is felt
-  /// What is felt, null while there is nothing; equal pointers mean an equal shape. While it deforms, where
+  Surface surface;  ///< as rendered
+  /// The mesh that is rendered, null when there is none; equal pointers mean an equal shape. While it deforms, where
   /// it is on its way to.
   std::shared_ptr<const std::vector<geometry::Vec3f>> vertices;
   std::shared_ptr<const std::vector<geometry::Triangle>> triangles;
@@ -51,7 +51,7 @@ struct SceneDescription {
   std::size_t fields = 0;  ///< force fields, without the constraint
 };
 
-/// The name of an effect's type, as clients say it.
+/// The name of an effect's type, as clients send it.
 std::string_view nameOf(EffectType type);
 
 }  // namespace hapticd::scene

@@ -1,7 +1,11 @@
 // Force effects of the scene, in the units of the client.
+//
+// To add one: its type and its line in kEffectKinds here, its force in realtime/render/effects.cpp, and its function in
+// include/hapticd/scene.h.
 #pragma once
 
 #include <cstdint>
+#include <string_view>
 
 #include "base/time.h"
 #include "geometry/types.h"
@@ -9,6 +13,23 @@
 namespace hapticd::scene {
 
 enum class EffectType { constant, spring, viscous, friction, motorVibration, contactVibration };
+
+/// A name that clients give an effect, and which parameters this type uses: the others are ignored.
+struct EffectKind {
+  std::string_view name;
+  EffectType type;
+  bool gain, duration, frequency, position, direction;
+};
+inline constexpr EffectKind kEffectKinds[] = {
+    {"constant", EffectType::constant, false, true, false, false, true},
+    {"spring", EffectType::spring, true, true, false, true, false},
+    {"viscous", EffectType::viscous, true, true, false, false, false},
+    {"friction", EffectType::friction, true, true, false, false, false},
+    {"vibrationMotor", EffectType::motorVibration, false, true, true, false, false},
+    {"motorVibration", EffectType::motorVibration, false, true, true, false, false},
+    {"vibrationContact", EffectType::contactVibration, false, true, true, false, false},
+    {"contactVibration", EffectType::contactVibration, false, true, true, false, false},
+};
 
 /// A running effect. The servo starts its clock and phase when it first sees a new `start` number.
 struct Effect {

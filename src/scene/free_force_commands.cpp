@@ -1,10 +1,9 @@
-// Commands on forces that belong to no object. What becomes of them is in free_forces.cpp.
-#include "base/time.h"
-#include "scene/free_forces.h"
-
+// The commands on forces that belong to no object.
 #include <algorithm>
 #include <array>
 
+#include "base/time.h"
+#include "scene/free_forces.h"
 #include "scene/matrices.h"
 #include "scene/surface_settings.h"
 
@@ -13,23 +12,6 @@ namespace {
 
 constexpr double kTau = 2 * EIGEN_PI;
 constexpr double kLongest_ms = 1e9;
-
-// Which parameters a type uses; the others are ignored whatever they hold.
-struct EffectKind {
-  std::string_view name;
-  EffectType type;
-  bool gain, duration, frequency, position, direction;
-};
-constexpr EffectKind kEffectKinds[] = {
-    {"constant", EffectType::constant, false, true, false, false, true},
-    {"spring", EffectType::spring, true, true, false, true, false},
-    {"viscous", EffectType::viscous, true, true, false, false, false},
-    {"friction", EffectType::friction, true, true, false, false, false},
-    {"vibrationMotor", EffectType::motorVibration, false, true, true, false, false},
-    {"motorVibration", EffectType::motorVibration, false, true, true, false, false},
-    {"vibrationContact", EffectType::contactVibration, false, true, true, false, false},
-    {"contactVibration", EffectType::contactVibration, false, true, true, false, false},
-};
 
 double atLeastZero(double value, std::string_view what, const DefineEffect& c, const Call& call) {
   if (value >= 0) return value;
@@ -90,13 +72,25 @@ std::string_view nameOf(EffectType type) {
   return kind != std::end(kEffectKinds) ? kind->name : "";
 }
 
-void FreeForces::apply(const DefineEffect& c, const Call& call) {
+// The types by the first of their names.
+std::string kindNames() {
+  std::string names;
+  for (const EffectKind& kind : kEffectKinds) {
+    if (kind.name != nameOf(kind.type)) continue;
+    names += names.empty() ? "" : ", ";
+    names += kind.name;
+  }
+  return names;
+}
+
+template <>
+void FreeForces::handle(DefineEffect& c, const Call& call) {
   const auto* kind = std::find_if(std::begin(kEffectKinds), std::end(kEffectKinds),
                                   [&](const EffectKind& k) { return k.name == c.type; });
   if (kind == std::end(kEffectKinds)) {
     call.refuse(
         "setEffect",
-        "refused: unknown type; use constant, spring, viscous, friction, vibrationMotor or vibrationContact",
+        "refused: unknown type; use " + kindNames(),
         " ", c.index, ", '", c.type, "'");
     return;
   }
@@ -112,7 +106,7 @@ void FreeForces::apply(const DefineEffect& c, const Call& call) {
   }
   const Effect effect = effectFrom(*kind, c, config_, bound_, call);
   Owned<RunningEffect>& entry = effects_[c.index];
-  // An effect of somebody who left goes on ramping out until it is started again.
+  // An effect whose owner left ramps out until it is started again.
   if (entry.value.effect.releasing) entry.value.running = false;
   const std::uint32_t started = entry.value.effect.start;
   entry.value.effect = effect;
@@ -128,8 +122,9 @@ void FreeForces::apply(const DefineEffect& c, const Call& call) {
   }
 }
 
-// The definition may travel by UDP and come after its start.
-void FreeForces::apply(const StartEffect& c, const Call& call) {
+// The definition may travel by UDP and arrive after the start.
+template <>
+void FreeForces::handle(StartEffect& c, const Call& call) {
   const auto known = effects_.find(c.index);
   if (known != effects_.end() && !known->second.value.effect.releasing) {
     start(known->second, call.client, call.now);
@@ -142,7 +137,8 @@ void FreeForces::apply(const StartEffect& c, const Call& call) {
   call.refuse("startEffect", "refused: no such effect was defined; call setEffect first", " ", c.index);
 }
 
-void FreeForces::apply(const StopEffect& c, const Call& call) {
+template <>
+void FreeForces::handle(StopEffect& c, const Call& call) {
   if (waitingStarts_.erase(c.index) != 0) return;
   const auto known = effects_.find(c.index);
   if (known == effects_.end()) {
@@ -155,7 +151,8 @@ void FreeForces::apply(const StopEffect& c, const Call& call) {
   if (known->second.value.effect.releasing) effects_.erase(known);
 }
 
-void FreeForces::apply(const SetPlane& c, const Call& call) {
+template <>
+void FreeForces::handle(SetPlane& c, const Call& call) {
   constexpr std::string_view kName = "sendSurface";
   if (c.index < 0 || c.index >= kMaxPlanes) {
     call.refuse(kName, "refused: no such plane", " plane ", c.index, ", use 0 to ", kMaxPlanes - 1);
@@ -196,7 +193,8 @@ void FreeForces::apply(const SetPlane& c, const Call& call) {
   changed_ = true;
 }
 
-void FreeForces::apply(const SetPlaneDetail& c, const Call& call) {
+template <>
+void FreeForces::handle(SetPlaneDetail& c, const Call& call) {
   constexpr std::string_view kName = "sendSurface";
   constexpr double kShortestWave_m = 0.00006;
   const double values[] = {c.adhesionNormal_N,    c.adhesionLateral_N, c.textureAmplitude_m,
@@ -219,7 +217,8 @@ void FreeForces::apply(const SetPlaneDetail& c, const Call& call) {
   changed_ = true;
 }
 
-void FreeForces::apply(const SetForceField& c, const Call& call) {
+template <>
+void FreeForces::handle(SetForceField& c, const Call& call) {
   constexpr std::string_view kName = "sendForceField";
   ForceField field;
   field.origin = kWorldUnitsPerStockMetre * c.origin_m;
@@ -251,11 +250,13 @@ FreeForces::Constraint& FreeForces::constraintFor(const Call& call) {
   return constraint_->value;
 }
 
-void FreeForces::apply(const SetConstraintEnabled& c, const Call& call) {
+template <>
+void FreeForces::handle(SetConstraintEnabled& c, const Call& call) {
   constraintFor(call).enabled = c.enabled;
 }
 
-void FreeForces::apply(const SetConstraintMode& c, const Call& call) {
+template <>
+void FreeForces::handle(SetConstraintMode& c, const Call& call) {
   if (c.mode < 0 || c.mode > 3) {
     call.refuse("constraint_mode", "refused: use 0 none, 1 point, 2 line or 3 plane", " ", c.mode);
     return;
@@ -263,7 +264,8 @@ void FreeForces::apply(const SetConstraintMode& c, const Call& call) {
   constraintFor(call).mode = c.mode;
 }
 
-void FreeForces::apply(const SetConstraintVector& c, const Call& call) {
+template <>
+void FreeForces::handle(SetConstraintVector& c, const Call& call) {
   const bool direction =
       c.which == ConstraintVector::lineDirection || c.which == ConstraintVector::planeNormal;
   if (!isUsable(c.value) || (direction && !(c.value.stableNorm() > 0))) {
@@ -291,7 +293,8 @@ void FreeForces::apply(const SetConstraintVector& c, const Call& call) {
   }
 }
 
-void FreeForces::apply(const SetConstraintStiffness& c, const Call& call) {
+template <>
+void FreeForces::handle(SetConstraintStiffness& c, const Call& call) {
   if (!isUsable(c.stiffness_N_per_m) || c.stiffness_N_per_m < 0) {
     call.refuse("constraint_KSpring", "refused: negative, not finite or too large", " ", c.stiffness_N_per_m);
     return;
@@ -299,11 +302,19 @@ void FreeForces::apply(const SetConstraintStiffness& c, const Call& call) {
   constraintFor(call).stiffness_N_per_m = c.stiffness_N_per_m;
 }
 
-void FreeForces::apply(const StartCustomEffect& c, const Call& call) {
+template <>
+void FreeForces::handle(StopCustomEffect&, const Call&) {
+  changed_ |= buzz_.has_value();
+  buzz_.reset();
+}
+
+template <>
+void FreeForces::handle(StartCustomEffect& c, const Call& call) {
   constexpr std::string_view kName = "startEffect (custom)";
   if (c.effect != 0) {
     call.warn(kName, "there is no such custom effect, none runs now; 0 is a buzz", " ", c.effect);
-    apply(StopCustomEffect{}, call);
+    StopCustomEffect stop;
+    handle(stop, call);
     return;
   }
   std::array<double, 6> p{1, 40, 2, 0, 0, 1};  // N, Hz, s, direction
@@ -322,9 +333,17 @@ void FreeForces::apply(const StartCustomEffect& c, const Call& call) {
   changed_ = true;
 }
 
-void FreeForces::apply(const StopCustomEffect&, const Call&) {
-  changed_ |= buzz_.has_value();
-  buzz_.reset();
+template <>
+void FreeForces::handle(ReleaseForces&, const Call& call) {
+  clientGone(call.client, call.now);
+}
+
+void FreeForces::apply(SceneCommand& command, const Call& call) {
+  std::visit(
+      [&]<class C>(C& c) {
+        if constexpr (C::kInfo.target == Target::forces) handle(c, call);
+      },
+      command);
 }
 
 }  // namespace hapticd::scene

@@ -18,7 +18,7 @@
 
 namespace hapticd::scene {
 
-/// What a snapshot shows of them.
+/// The part of a snapshot that they make up.
 struct PublishedForces {
   std::vector<Effect> effects;
   std::vector<Plane> planes;
@@ -26,44 +26,38 @@ struct PublishedForces {
   std::optional<Buzz> buzz;
 };
 
-/// All of them, by index. Commands check everything before they change anything.
+/// All of them, by index. A command checks all of its values before it changes anything.
 class FreeForces {
  public:
   explicit FreeForces(const SceneConfig& config);
 
-  void apply(const DefineEffect&, const Call&);
-  void apply(const StartEffect&, const Call&);
-  void apply(const StopEffect&, const Call&);
-  void apply(const SetPlane&, const Call&);
-  void apply(const SetPlaneDetail&, const Call&);
-  void apply(const SetForceField&, const Call&);
-  void apply(const SetConstraintEnabled&, const Call&);
-  void apply(const SetConstraintMode&, const Call&);
-  void apply(const SetConstraintVector&, const Call&);
-  void apply(const SetConstraintStiffness&, const Call&);
-  void apply(const StartCustomEffect&, const Call&);
-  void apply(const StopCustomEffect&, const Call&);
+  /// Executes a command whose target is Target::forces.
+  void apply(SceneCommand& command, const Call& call);
 
-  /// What it owns ramps out and is forgotten.
+  /// The forces that the client owns ramp out and are removed.
   void clientGone(ClientId client, Nanos now);
-  /// All of it ramps out and is forgotten.
+  /// All forces ramp out and are removed.
   void reset(Nanos now);
 
   std::optional<Nanos> nextDeadline() const;
-  /// Removes what has ended, and tells of starts that waited in vain. True when something changed since the
-  /// last time.
+  /// Removes ended forces and reports startEffect calls whose definition never arrived. True when something changed
+  /// since the last call.
   bool update(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   /// Force fields depend on the workspace: a stiff one is kept passive in device metres.
   PublishedForces publish(double worldUnitsPerMetre) const;
-  /// Appends all of them, whether they run or not.
+  /// Appends all of them, running or not.
   void describe(SceneDescription& out) const;
 
  private:
+  // One specialisation for each command, in free_force_commands.cpp; a missing one does not link.
+  template <class Command>
+  void handle(Command& command, const Call& call);
+
   template <class T>
   struct Owned {
     ClientId owner = 0;
     T value;
-    Nanos goneAt = kNever;  ///< after it has ended or ramped out
+    Nanos goneAt = kNever;  ///< when it has ended or ramped out
   };
   struct RunningEffect {
     Effect effect;
@@ -85,7 +79,7 @@ class FreeForces {
   static constexpr Nanos kNever = std::numeric_limits<Nanos>::max();
   static constexpr Nanos kRelease = 300'000'000;     ///< ramping out takes 250 ms in the servo
   static constexpr Nanos kAfterEnd = 50'000'000;     ///< the servo ends a timed force by its own clock
-  static constexpr Nanos kRemember = 1'000'000'000;  ///< a start whose definition has not come yet
+  static constexpr Nanos kRemember = 1'000'000'000;  ///< a start whose definition has not arrived yet
 
   void start(Owned<RunningEffect>& entry, ClientId client, Nanos now);
   template <class F>
@@ -101,11 +95,11 @@ class FreeForces {
   std::map<std::int32_t, Owned<RunningEffect>> effects_;
   std::map<std::int32_t, Owned<char>> waitingStarts_;
   std::map<std::int32_t, Owned<Plane>> planes_;
-  Plane planeDetail_;  // of plane 0, whether it is there or not
+  Plane planeDetail_;  // of plane 0, even while that does not exist
   std::optional<Owned<ForceField>> field_;
   std::optional<Owned<Constraint>> constraint_;
   std::optional<Owned<Buzz>> buzz_;
-  std::uint32_t starts_ = 0;      // one counter for all: a number never comes back
+  std::uint32_t starts_ = 0;      // one counter for all: no number is used twice
   std::uint32_t placements_ = 0;  // the same for planes
   bool changed_ = false;
 };

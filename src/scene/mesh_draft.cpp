@@ -1,7 +1,6 @@
 #include "scene/mesh_draft.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -13,12 +12,6 @@ constexpr float kNotYet = std::numeric_limits<float>::quiet_NaN();
 constexpr std::uint32_t kNoVertex = 0xFFFFFFFF;
 constexpr Triangle kNoTriangle{kNoVertex, kNoVertex, kNoVertex};
 
-// Numbers are never used again, by whichever mesh.
-std::uint64_t newTopology() {
-  static std::atomic<std::uint64_t> last{0};
-  return ++last;
-}
-
 bool allFinite(const std::vector<Vec3f>& run) {
   bool finite = true;
   for (const Vec3f& v : run) finite &= std::isfinite(v.x()) && std::isfinite(v.y()) && std::isfinite(v.z());
@@ -29,14 +22,14 @@ bool sameBytes(const Vec3f* a, const std::vector<Vec3f>& b) {
   return std::memcmp(a, b.data(), b.size() * sizeof(Vec3f)) == 0;
 }
 
-// A corner that is not a number leaves the triangle out. In floats as far as that is exact: it is asked for
-// each triangle of a mesh, again and again.
+// Empty for a triangle with a corner that is not a number. Uses floats as far as they are exact because it is called for
+// each triangle of a mesh at every build.
 Box boxOfTriangle(const Triangle& t, const std::vector<Vec3f>& vertices) {
   if (t[0] >= vertices.size() || t[1] >= vertices.size() || t[2] >= vertices.size()) return {};
   const Vec3f& a = vertices[t[0]];
   const Vec3f& b = vertices[t[1]];
   const Vec3f& c = vertices[t[2]];
-  // What is not a number or infinite stays so when it is taken times 0.
+  // NaN and infinity times 0 are NaN.
   if ((a * 0 + b * 0 + c * 0).sum() != 0) return {};
   return {a.cwiseMin(b).cwiseMin(c).cast<double>(), a.cwiseMax(b).cwiseMax(c).cast<double>()};
 }
@@ -53,8 +46,7 @@ void MeshDraft::edited(Nanos now) {
 std::optional<Nanos> MeshDraft::due() const {
   if (!dirty_) return std::nullopt;
   if (finished_) return lastEdit_;
-  // Positions alone are a surface that moves: there is nothing incomplete to wait for but the rest of a
-  // frame.
+  // New positions alone are a moving surface: only the rest of the frame may be missing.
   if (!shapeChanged_) return std::min(lastEdit_ + kPause, firstEdit_ + kQuiet);
   return std::min(lastEdit_ + kQuiet, firstEdit_ + kLongest);
 }
@@ -153,23 +145,23 @@ std::shared_ptr<const std::vector<Triangle>> MeshDraft::shareTriangles() {
   return triples;
 }
 
-std::shared_ptr<MeshGeometry> MeshDraft::build() {
+std::shared_ptr<MeshGeometry> MeshDraft::build(std::uint64_t topology) {
   auto mesh = std::make_shared<MeshGeometry>();
-  mesh->topology = newTopology();
+  mesh->topology = topology;
   mesh->vertices = vertices_.share();
   mesh->triangles = shareTriangles();
   const std::vector<Vec3f>& vertices = *mesh->vertices;
-  // The list as sent tells which triangles lack a corner; the published one has others in their place.
+  // Only the list as sent shows which triangles lack a corner; the published one has others in their place.
   const std::vector<Triangle>& triangles = indexed_ ? triangles_.read() : *mesh->triangles;
   mesh->index = SpatialIndex::build(static_cast<std::uint32_t>(triangles.size()),
                                     [&](std::uint32_t id) { return boxOfTriangle(triangles[id], vertices); });
   return mesh;
 }
 
-std::shared_ptr<const MeshGeometry> MeshDraft::commit(const std::function<Nanos()>& clock) {
+std::shared_ptr<const MeshGeometry> MeshDraft::commit(const std::function<Nanos()>& clock, std::uint64_t topology) {
   if (triangleCount() == 0 || !current_ || shapeChanged_) {
     deformation_.restart();
-    current_ = triangleCount() > 0 ? build() : nullptr;
+    current_ = triangleCount() > 0 ? build(topology) : nullptr;
   } else {
     auto asSent = indexed_ ? triangles_.share() : current_->triangles;
     current_ =

@@ -42,13 +42,13 @@ class CopyOnWrite {
   std::shared_ptr<const std::vector<T>> shared_;
 };
 
-/// Vertices and triangles by number. Runs may come in any order; a vertex that never came is not a number,
-/// and triangles that lack a corner are not felt.
+/// Vertices and triangles by number. Runs arrive in any order. A vertex that was never set is NaN, and a triangle with such
+/// a corner exerts no force.
 class MeshDraft {
  public:
-  static constexpr Nanos kPause = 4'000'000;      ///< after the last, new positions alone are felt
-  static constexpr Nanos kQuiet = 20'000'000;     ///< after the last edit, a mesh becomes touchable
-  static constexpr Nanos kLongest = 250'000'000;  ///< and at latest this long after the first
+  static constexpr Nanos kPause = 4'000'000;      ///< from the last edit, of positions alone, to its publication
+  static constexpr Nanos kQuiet = 20'000'000;     ///< from the last edit of a mesh to its publication
+  static constexpr Nanos kLongest = 250'000'000;  ///< from the first edit to the publication, at most
   static constexpr Nanos kLongestMorph = 50'000'000;
 
   std::size_t vertexCount() const { return vertices_.read().size(); }
@@ -64,10 +64,10 @@ class MeshDraft {
   /// False when there is no such triangle.
   bool removeTriangle(std::uint32_t triangle, Nanos now);
   void clear(Nanos now);
-  /// What has come so far is complete: publish at the next chance.
+  /// The mesh is complete: publish it at the next call.
   void finish() { finished_ = true; }
 
-  /// Edits so far will not be published by themselves; the next one tries again.
+  /// Does not publish the edits so far until the next edit.
   void giveUp() { dirty_ = false; }
 
   bool finished() const { return finished_; }
@@ -77,15 +77,15 @@ class MeshDraft {
   std::optional<Nanos> oldestEdit() const { return dirty_ ? std::optional(firstEdit_) : std::nullopt; }
   bool hasBeenPublished() const { return current_ != nullptr; }
 
-  /// Gives the mesh with all edits, null when it has no triangles. `clock` gives the time that the work has
-  /// taken, so that a morph starts where the hand feels the surface when it is done.
-  std::shared_ptr<const MeshGeometry> commit(const std::function<Nanos()>& clock);
+  /// Builds the mesh with all edits; null when it has no triangles. `clock` is read again after the work, so that a morph
+  /// starts from the surface that is rendered then. `topology` numbers a new list of triangles; no other mesh has it.
+  std::shared_ptr<const MeshGeometry> commit(const std::function<Nanos()>& clock, std::uint64_t topology);
 
  private:
   void edited(Nanos now);
   void grow(std::vector<Vec3f>& vertices, std::size_t size);
   std::shared_ptr<const std::vector<Triangle>> shareTriangles();
-  std::shared_ptr<MeshGeometry> build();
+  std::shared_ptr<MeshGeometry> build(std::uint64_t topology);
 
   CopyOnWrite<Vec3f> vertices_;
   CopyOnWrite<Triangle> triangles_;  // as sent: corners may be missing

@@ -41,7 +41,7 @@ geometry::Box transformed(const Affine& t, const geometry::Box& box) {
 
 }  // namespace
 
-// A reflection has no rotation of its own: its sign goes into the stretch, which then stays negative definite
+// A reflection is no rotation: its sign moves into the stretch, which then stays negative definite
 // all the way between two reflected placements, so that neither kind passes through a singular one.
 Motion::Factors Motion::factorise(const Affine& t) {
   Mat3 rotation = orthogonalFactor(t.linear());

@@ -14,7 +14,7 @@ class Motion {
  public:
   /// Fixed at the identity.
   Motion() = default;
-  /// Fixed at a placement; `jumps` tells apart placements that were not reached by moving.
+  /// Fixed at a placement; `jumps` distinguishes placements that were not reached by moving.
   static Motion fixed(const Affine& T_world_object, std::uint32_t jumps = 0);
   /// From one placement to another between two times (rotation by slerp, scale and shear linearly), at rest
   /// outside.
@@ -27,7 +27,7 @@ class Motion {
   bool movingAfter(Nanos now) const noexcept { return end_ > begin_ && now < end_; }
   /// Box in the world around all that a box of the object's frame sweeps on the way. Empty stays empty.
   geometry::Box sweep(const geometry::Box& box) const;
-  /// Where it comes to rest.
+  /// The final placement.
   const Affine& destination() const noexcept { return to_; }
   /// Where it started.
   const Affine& origin() const noexcept { return from_; }

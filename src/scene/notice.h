@@ -1,4 +1,4 @@
-// What the scene has to say to a client about something it sent.
+// Texts of the scene to a client about a command that it sent.
 #pragma once
 
 #include <cstdint>

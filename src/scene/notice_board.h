@@ -1,4 +1,4 @@
-// Notices without a flood: what is said again and again is counted.
+// Limits the rate of notices: repeated ones are counted.
 #pragma once
 
 #include <map>
@@ -19,12 +19,12 @@ using base::Nanos;
 /// Lets the first few notices of a kind through, then one in a second that counts the others.
 class NoticeBoard {
  public:
-  /// `kind` tells what may be counted together, for example the call and the reason.
+  /// Notices of one `kind` are counted together, for example the call and the reason.
   void post(Notice notice, std::string kind, Nanos now, std::vector<Notice>& out);
   /// Appends the counts that are due.
   void flush(Nanos now, std::vector<Notice>& out);
   std::optional<Nanos> nextDeadline() const;
-  /// The client has left: nobody is there to tell.
+  /// The client left: drops its notices.
   void forget(ClientId client);
 
  private:
@@ -37,7 +37,7 @@ class NoticeBoard {
   std::map<std::pair<ClientId, std::string>, Entry> entries_;
 };
 
-/// One command on its way in: who said it, when, and how to answer.
+/// The context of one command: its client, its time, and where notices go.
 struct Call {
   ClientId client = 0;
   Nanos now = 0;
@@ -48,16 +48,16 @@ struct Call {
   /// Says that something was ignored or done differently. `name` is the client's call.
   template <class... Parts>
   void warn(std::string_view name, std::string_view reason, const Parts&... parts) const {
-    say(Notice::Severity::warning, name, reason, parts...);
+    send(Notice::Severity::warning, name, reason, parts...);
   }
   /// Says that the command was refused and the scene is as before.
   template <class... Parts>
   void refuse(std::string_view name, std::string_view reason, const Parts&... parts) const {
-    say(Notice::Severity::error, name, reason, parts...);
+    send(Notice::Severity::error, name, reason, parts...);
   }
   template <class... Parts>
-  void tell(std::string_view name, std::string_view reason, const Parts&... parts) const {
-    say(Notice::Severity::normal, name, reason, parts...);
+  void note(std::string_view name, std::string_view reason, const Parts&... parts) const {
+    send(Notice::Severity::normal, name, reason, parts...);
   }
   /// A text whose wording varies, counted by `kind`.
   void post(Notice::Severity severity, std::string kind, std::string text) const {
@@ -67,7 +67,7 @@ struct Call {
  private:
   /// "name parts…: reason".
   template <class... Parts>
-  void say(Notice::Severity severity, std::string_view name, std::string_view reason,
+  void send(Notice::Severity severity, std::string_view name, std::string_view reason,
            const Parts&... parts) const {
     std::ostringstream text;
     text << name;

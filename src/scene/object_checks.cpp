@@ -36,26 +36,26 @@ std::optional<Nanos> MeshChecks::due() const {
   return pending_.front().at;
 }
 
-Nanos MeshChecks::run(Nanos now, const Find& find, const Tell& tell) {
+Nanos MeshChecks::run(Nanos now, const Find& find, const Report& report) {
   const Nanos begin = stopwatch_();
   if (search_) {
     if (!find(search_->object, search_->topology)) {
       search_.reset();
     } else if (slice(begin)) {
       const std::string text = joined(geometry::describe(search_->crossings.report()));
-      if (!text.empty()) tell(search_->object, text);
+      if (!text.empty()) report(search_->object, text);
       search_.reset();
     }
   }
   while (!search_ && !pending_.empty() && pending_.front().at <= now && stopwatch_() - begin <= kSlice) {
     const Pending check = pending_.front();
     pending_.pop_front();
-    if (const auto subject = find(check.object, check.topology)) start(check, *subject, begin, tell);
+    if (const auto subject = find(check.object, check.topology)) start(check, *subject, begin, report);
   }
   return stopwatch_() - begin;
 }
 
-// True when the search has come to its end.
+// True when the search is complete.
 bool MeshChecks::slice(Nanos begin) {
   while (!search_->crossings.run(kWorkBetweenLooks)) {
     if (stopwatch_() - begin > kSlice) return false;
@@ -64,7 +64,7 @@ bool MeshChecks::slice(Nanos begin) {
 }
 
 // All in one text, unless the search takes longer than a slice.
-void MeshChecks::start(const Pending& check, const Subject& subject, Nanos begin, const Tell& tell) {
+void MeshChecks::start(const Pending& check, const Subject& subject, Nanos begin, const Report& report) {
   const auto vertices = latestVertices(*subject.geometry);
   const auto& triangles = subject.geometry->triangles;
   std::vector<std::string> sentences = geometry::describe(geometry::checkMesh(*vertices, subject.asSent));
@@ -75,7 +75,7 @@ void MeshChecks::start(const Pending& check, const Subject& subject, Nanos begin
       sentences.push_back(std::move(sentence));
     search_.reset();
   }
-  if (!sentences.empty()) tell(check.object, joined(sentences));
+  if (!sentences.empty()) report(check.object, joined(sentences));
 }
 
 }  // namespace hapticd::scene

@@ -29,7 +29,7 @@ class MeshChecks {
   /// The mesh of an object while its shape is that topology; nothing when it has changed or gone.
   using Find = std::function<std::optional<Subject>(std::int32_t object, std::uint64_t topology)>;
   /// Takes the sentences about an object's mesh.
-  using Tell = std::function<void(std::int32_t object, const std::string& text)>;
+  using Report = std::function<void(std::int32_t object, const std::string& text)>;
 
   explicit MeshChecks(Stopwatch stopwatch) : stopwatch_(std::move(stopwatch)) {}
 
@@ -40,7 +40,7 @@ class MeshChecks {
   /// When there is something to do; nothing when not.
   std::optional<Nanos> due() const;
   /// Goes on with what is due at `now`; returns the time it took.
-  Nanos run(Nanos now, const Find& find, const Tell& tell);
+  Nanos run(Nanos now, const Find& find, const Report& report);
 
  private:
   struct Pending {
@@ -57,7 +57,7 @@ class MeshChecks {
   };
 
   bool slice(Nanos begin);
-  void start(const Pending& check, const Subject& subject, Nanos begin, const Tell& tell);
+  void start(const Pending& check, const Subject& subject, Nanos begin, const Report& report);
 
   Stopwatch stopwatch_;
   std::deque<Pending> pending_;  // by time

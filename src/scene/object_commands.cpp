@@ -1,4 +1,4 @@
-// Commands on objects: each checks everything before it changes anything.
+// The commands on objects. Each checks all of its values before it changes anything.
 #include <algorithm>
 
 #include "scene/object_table.h"
@@ -41,7 +41,8 @@ void ObjectTable::meshEdited(Object& object, const Call& call) {
   edited_.push_back(object.id);
 }
 
-void ObjectTable::apply(const SetObjectNumber& c, const Call& call) {
+template <>
+void ObjectTable::handle(SetObjectNumber& c, const Call& call) {
   if (c.count < 0 || c.count > config_.limits.objects) {
     call.refuse("setObjectNumber", "refused: not a number of objects this server takes", " ", c.count,
                 ", limit ", config_.limits.objects);
@@ -52,7 +53,8 @@ void ObjectTable::apply(const SetObjectNumber& c, const Call& call) {
   }
 }
 
-void ObjectTable::apply(SetVertices&& c, const Call& call) {
+template <>
+void ObjectTable::handle(SetVertices& c, const Call& call) {
   constexpr std::string_view kName = "setObjectVertex";
   Object* object = find(c.object, kName, call);
   if (object == nullptr || c.positions.empty()) return;
@@ -73,7 +75,8 @@ void ObjectTable::apply(SetVertices&& c, const Call& call) {
   meshEdited(*object, call);
 }
 
-void ObjectTable::apply(const SetTriangles& c, const Call& call) {
+template <>
+void ObjectTable::handle(SetTriangles& c, const Call& call) {
   constexpr std::string_view kName = "setTriangle";
   Object* object = find(c.object, kName, call);
   if (object == nullptr || c.triangles.empty()) return;
@@ -98,12 +101,14 @@ void ObjectTable::apply(const SetTriangles& c, const Call& call) {
   meshEdited(*object, call);
 }
 
-void ObjectTable::apply(const SetNormal& c, const Call& call) {
+template <>
+void ObjectTable::handle(SetNormal& c, const Call& call) {
   if (find(c.object, "setNormal", call) == nullptr) return;
-  call.tell("setNormal", "ignored: normals follow from the triangles", " object ", c.object);
+  call.note("setNormal", "ignored: normals follow from the triangles", " object ", c.object);
 }
 
-void ObjectTable::apply(const RemoveTriangle& c, const Call& call) {
+template <>
+void ObjectTable::handle(RemoveTriangle& c, const Call& call) {
   constexpr std::string_view kName = "removeTriangle";
   Object* object = find(c.object, kName, call);
   if (object == nullptr) return;
@@ -115,7 +120,8 @@ void ObjectTable::apply(const RemoveTriangle& c, const Call& call) {
   meshEdited(*object, call);
 }
 
-void ObjectTable::apply(const ClearMesh& c, const Call& call) {
+template <>
+void ObjectTable::handle(ClearMesh& c, const Call& call) {
   Object* object = find(c.object, "clearTrimesh", call);
   if (object == nullptr) return;
   vertices_ -= object->mesh.vertexCount();
@@ -124,7 +130,8 @@ void ObjectTable::apply(const ClearMesh& c, const Call& call) {
   meshEdited(*object, call);
 }
 
-void ObjectTable::apply(const TransformMesh& c, const Call& call) {
+template <>
+void ObjectTable::handle(TransformMesh& c, const Call& call) {
   constexpr std::string_view kName = "transformTrimesh";
   Object* object = find(c.object, kName, call);
   if (object == nullptr) return;
@@ -140,12 +147,23 @@ void ObjectTable::apply(const TransformMesh& c, const Call& call) {
   moveAll(*object, travel);
 }
 
-void ObjectTable::apply(const SetTrimeshType& c, const Call& call) {
-  call.tell("setTrimeshType", "ignored: there is one way to collide", " object ", c.object, ", type ",
+template <>
+void ObjectTable::handle(SetTrimeshType& c, const Call& call) {
+  call.note("setTrimeshType", "ignored: there is one way to collide", " object ", c.object, ", type ",
             c.type);
 }
 
-void ObjectTable::apply(const AddObject& c, const Call& call) {
+template <>
+void ObjectTable::handle(MoveToParent& c, const Call& call) {
+  Object* object = find(c.object, "moveToParent", call);
+  if (object == nullptr || !checkParent(c.object, c.parent, "moveToParent", call)) return;
+  detach(*object);
+  attach(*object, c.parent);
+  moveAll(*object, 0);
+}
+
+template <>
+void ObjectTable::handle(AddObject& c, const Call& call) {
   constexpr std::string_view kName = "addObject";
   if (c.object < 0 || c.object >= config_.limits.objects) {
     call.refuse(kName, "refused: not an object number this server takes", " object ", c.object, ", limit ",
@@ -156,12 +174,14 @@ void ObjectTable::apply(const AddObject& c, const Call& call) {
   if (find(c.object) == nullptr) {
     create(c.object, c.parent);
   } else if (find(c.object)->parent != c.parent) {
-    apply(MoveToParent{c.object, c.parent}, call);
+    MoveToParent move{c.object, c.parent};
+    handle(move, call);
   }
   becomeStock(*find(c.object));
 }
 
-void ObjectTable::apply(const AddObjectExScene& c, const Call& call) {
+template <>
+void ObjectTable::handle(AddObjectExScene& c, const Call& call) {
   constexpr std::string_view kName = "addObjectExScene";
   if (c.object < 0 || c.object >= config_.limits.objects) {
     call.refuse(kName, "refused: not an object number this server takes", " object ", c.object, ", limit ",
@@ -169,28 +189,22 @@ void ObjectTable::apply(const AddObjectExScene& c, const Call& call) {
     return;
   }
   if (find(c.object) == nullptr) {
-    create(c.object, Object::kNowhere);
+    create(c.object, Object::kNoParent);
   } else {
     detach(*find(c.object));
-    attach(*find(c.object), Object::kNowhere);
+    attach(*find(c.object), Object::kNoParent);
     moveAll(*find(c.object), 0);
   }
   becomeStock(*find(c.object));
 }
 
-void ObjectTable::apply(const MoveToParent& c, const Call& call) {
-  Object* object = find(c.object, "moveToParent", call);
-  if (object == nullptr || !checkParent(c.object, c.parent, "moveToParent", call)) return;
-  detach(*object);
-  attach(*object, c.parent);
-  moveAll(*object, 0);
-}
-
-void ObjectTable::apply(const RemoveObject& c, const Call& call) {
+template <>
+void ObjectTable::handle(RemoveObject& c, const Call& call) {
   if (find(c.object, "removeObject", call) != nullptr) erase(c.object);
 }
 
-void ObjectTable::apply(const SetTransform& c, const Call& call) {
+template <>
+void ObjectTable::handle(SetTransform& c, const Call& call) {
   constexpr std::string_view kName = "setTransformMatrix";
   Object* object = find(c.object, kName, call);
   if (object == nullptr) return;
@@ -204,7 +218,8 @@ void ObjectTable::apply(const SetTransform& c, const Call& call) {
   place(*object, *t, call);
 }
 
-void ObjectTable::apply(const SetObjectPosition& c, const Call& call) {
+template <>
+void ObjectTable::handle(SetObjectPosition& c, const Call& call) {
   constexpr std::string_view kName = "setObjectPosition";
   Object* object = find(c.object, kName, call);
   if (object == nullptr) return;
@@ -219,7 +234,8 @@ void ObjectTable::apply(const SetObjectPosition& c, const Call& call) {
   place(*object, t, call);
 }
 
-void ObjectTable::apply(const SetObjectOrientation& c, const Call& call) {
+template <>
+void ObjectTable::handle(SetObjectOrientation& c, const Call& call) {
   constexpr std::string_view kName = "setObjectOrientation";
   Object* object = find(c.object, kName, call);
   if (object == nullptr) return;
@@ -236,7 +252,8 @@ void ObjectTable::apply(const SetObjectOrientation& c, const Call& call) {
   place(*object, t, call);
 }
 
-void ObjectTable::apply(const SetObjectScale& c, const Call& call) {
+template <>
+void ObjectTable::handle(SetObjectScale& c, const Call& call) {
   constexpr std::string_view kName = "setObjectScale";
   Object* object = find(c.object, kName, call);
   if (object == nullptr) return;
@@ -252,14 +269,16 @@ void ObjectTable::apply(const SetObjectScale& c, const Call& call) {
   place(*object, t, call);
 }
 
-void ObjectTable::apply(const SetTouchable& c, const Call& call) {
+template <>
+void ObjectTable::handle(SetTouchable& c, const Call& call) {
   Object* object = find(c.object, "setObjectIsTouchable", call);
   if (object == nullptr || object->touchable == c.touchable) return;
   object->touchable = c.touchable;
   queue(*object);
 }
 
-void ObjectTable::apply(const SetSurfaceProperty& c, const Call& call) {
+template <>
+void ObjectTable::handle(SetSurfaceProperty& c, const Call& call) {
   Object* object = find(c.object, "setHapticProperty", call);
   if (object == nullptr || !object->settings.set(c, config_, call)) return;
   object->surfaceSetBy = call.client;
@@ -267,7 +286,8 @@ void ObjectTable::apply(const SetSurfaceProperty& c, const Call& call) {
   queue(*object);
 }
 
-void ObjectTable::apply(const SetSurface& c, const Call& call) {
+template <>
+void ObjectTable::handle(SetSurface& c, const Call& call) {
   Object* object = find(c.object, "updateTrimeshChanges", call);
   if (object == nullptr || !object->settings.set(c, config_, call)) return;
   becomeStock(*object);
@@ -277,7 +297,8 @@ void ObjectTable::apply(const SetSurface& c, const Call& call) {
   if (object->mesh.due()) object->mesh.finish();
 }
 
-void ObjectTable::apply(const SetSceneOrigin& c, const Call& call) {
+template <>
+void ObjectTable::handle(SetSceneOrigin& c, const Call& call) {
   const std::optional<geometry::Quat> rotation = rotationFrom(c.axis, c.angle_rad);
   if (!rotation || !isUsable(c.position_m)) {
     call.refuse("setSceneOrigin", "refused: not finite or too large, or the axis is zero", " position ",
@@ -288,6 +309,14 @@ void ObjectTable::apply(const SetSceneOrigin& c, const Call& call) {
   for (const auto& object : objects_) {
     if (object && object->parent == Object::kScene) moveAll(*object, 0);
   }
+}
+
+void ObjectTable::apply(SceneCommand& command, const Call& call) {
+  std::visit(
+      [&]<class C>(C& c) {
+        if constexpr (C::kInfo.target == Target::objects) handle(c, call);
+      },
+      command);
 }
 
 }  // namespace hapticd::scene

@@ -14,7 +14,7 @@ bool contains(const Box& outer, const Box& inner) {
 }
 
 // Objects that move get boxes with room for about a quarter of a second, so that the index over thousands of
-// them is not built anew for each of their poses.
+// them is not rebuilt for each of their poses.
 Box withRoom(const Object& object, const Box& swept) {
   const Motion& motion = object.motion;
   if (motion.origin().matrix() == motion.destination().matrix()) return swept;
@@ -64,7 +64,7 @@ std::optional<Nanos> ObjectTable::nextDeadline() const {
   return next;
 }
 
-// A first upload is never held back; rebuilding what can be touched already takes a quarter of the time.
+// A first upload is never delayed; rebuilding touchable meshes takes at most a quarter of the thread's time.
 void ObjectTable::commitMeshes(Nanos now, NoticeBoard& board, std::vector<Notice>& out) {
   if (edited_.empty()) return;
   const Nanos started = stopwatch_();
@@ -87,7 +87,7 @@ void ObjectTable::commitMeshes(Nanos now, NoticeBoard& board, std::vector<Notice
     } catch (const std::exception& error) {
       object->mesh.giveUp();
       const Call call{object->meshSetBy, now, false, board, out};
-      call.refuse("mesh", "could not be built, the old one is felt", " of object ", id, ", ", error.what());
+      call.refuse("mesh", "could not be built, the previous one stays", " of object ", id, ", ", error.what());
     }
     if (rebuild) rebuildNotBefore_ = clock() + 3 * (clock() - begin);
   }
@@ -96,7 +96,7 @@ void ObjectTable::commitMeshes(Nanos now, NoticeBoard& board, std::vector<Notice
 
 void ObjectTable::commitMesh(Object& object, Nanos now, const std::function<Nanos()>& clock) {
   const std::uint64_t topology = object.geometry ? object.geometry->topology : 0;
-  object.geometry = object.mesh.commit(clock);
+  object.geometry = object.mesh.commit(clock, ++lastTopology_);
   object.stateChanged = true;
   queue(object);
   if (!config_.checkMeshes || !object.geometry || object.geometry->topology == topology) return;
@@ -112,11 +112,11 @@ void ObjectTable::checkMeshes(Nanos now, NoticeBoard& board, std::vector<Notice>
     return MeshChecks::Subject{object->geometry,
                                mesh.indexed() ? mesh.triangles() : *object->geometry->triangles};
   };
-  const auto tell = [&](std::int32_t id, const std::string& text) {
+  const auto report = [&](std::int32_t id, const std::string& text) {
     const Call call{find(id)->meshSetBy, now, false, board, out};
     call.post(Notice::Severity::normal, "mesh", "mesh of object " + std::to_string(id) + ": " + text);
   };
-  const Nanos taken = checks_.run(now, subject, tell);
+  const Nanos taken = checks_.run(now, subject, report);
   if (taken > kCheckSlice) rebuildNotBefore_ = now + 4 * taken;
 }
 
@@ -165,7 +165,7 @@ bool ObjectTable::updatePublished(Nanos now, NoticeBoard& board, std::vector<Not
     object->surfaceChanged = false;
     object->moved = false;
     const bool listed = object->position >= 0;
-    if (listed != object->canBeFelt()) {
+    if (listed != object->isTouchable()) {
       listChanged_ = true;
     } else if (listed && object->stateChanged) {
       replaceState(*object);
@@ -174,10 +174,10 @@ bool ObjectTable::updatePublished(Nanos now, NoticeBoard& board, std::vector<Not
   }
   changed_.clear();
   if (listChanged_) {
-    listAnew();
+    rebuildList();
     changed = true;
   }
-  if (indexStale_) indexAnew();
+  if (indexStale_) rebuildIndex();
   return changed;
 }
 
@@ -193,12 +193,12 @@ void ObjectTable::replaceState(Object& object) {
   indexStale_ = true;
 }
 
-void ObjectTable::listAnew() {
+void ObjectTable::rebuildList() {
   published_.objects.clear();
   boxes_.clear();
   for (const auto& object : objects_) {
     if (!object) continue;
-    if (!object->canBeFelt()) {
+    if (!object->isTouchable()) {
       object->position = -1;
       object->state.reset();
       object->stateChanged = true;
@@ -217,7 +217,7 @@ void ObjectTable::listAnew() {
   indexStale_ = true;
 }
 
-void ObjectTable::indexAnew() {
+void ObjectTable::rebuildIndex() {
   published_.index = std::make_shared<const SpatialIndex>(SpatialIndex::build(
       static_cast<std::uint32_t>(boxes_.size()), [this](std::uint32_t i) { return boxes_[i]; }));
   indexStale_ = false;

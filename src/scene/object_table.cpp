@@ -1,18 +1,12 @@
-// The tree of objects. Commands on it are in object_commands.cpp, what is published of it in
-// object_publish.cpp.
+// The tree of objects. object_commands.cpp has the commands, object_publish.cpp the publication.
 #include "scene/object_table.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "base/world.h"
 
 namespace hapticd::scene {
-namespace {
-
-}  // namespace
-
 Nanos PoseStream::next(Nanos now) {
   const Nanos gap = now - last_;
   if (!any_ || gap > kLongestGap) {

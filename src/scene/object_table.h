@@ -1,4 +1,4 @@
-// The objects of a scene while clients edit them: a tree of placements with meshes and surfaces.
+// The editable objects of a scene: a tree of placements with meshes and surfaces.
 #pragma once
 
 #include <functional>
@@ -18,13 +18,13 @@
 
 namespace hapticd::scene {
 
-/// Poses that come at intervals: near enough in time, they are one movement.
+/// Joins poses that follow each other closely into one movement.
 struct PoseStream {
   static constexpr Nanos kSameMoment = 500'000;      ///< parts of one pose
   static constexpr Nanos kLongestGap = 100'000'000;  ///< beyond, a pose is a jump
   static constexpr Nanos kLongestBlend = 50'000'000;
 
-  /// A pose has come: how long to travel to it; 0 is a jump.
+  /// Call with each pose. Returns the duration of the movement to it; 0 is a jump.
   Nanos next(Nanos now);
 
  private:
@@ -36,7 +36,7 @@ struct PoseStream {
 /// One object as clients see it.
 struct Object {
   static constexpr std::int32_t kScene = -1;    ///< parent: below the scene's origin
-  static constexpr std::int32_t kNowhere = -2;  ///< parent: a root of its own
+  static constexpr std::int32_t kNoParent = -2;  ///< parent: a root of its own
 
   std::int32_t id = 0;
   bool inMetres = false;  ///< stock geometry: one object unit is 1000 world units
@@ -55,7 +55,7 @@ struct Object {
   SurfaceSettings settings;
   ClientId surfaceSetBy = 0;
 
-  // What is published of it, and what must be.
+  // The published part, and what of it is out of date.
   std::shared_ptr<const MeshGeometry> geometry;
   Surface surface;
   std::string surfaceRemark;
@@ -70,43 +70,25 @@ struct Object {
   std::int64_t position = -1;  ///< in the published list
 
   double worldUnits() const { return inMetres ? 1000 : 1; }
-  bool canBeFelt() const {
+  bool isTouchable() const {
     return touchable && geometry && geometry->index.size() > 0 && !geometry->index.bounds().empty() &&
            surface.stiffness_N_per_m > 0;
   }
 };
 
-/// What a snapshot shows of the objects; shared parts are those of the snapshot before.
+/// The part of a snapshot that objects make up; unchanged parts are shared with the previous snapshot.
 struct PublishedObjects {
   std::vector<std::shared_ptr<const ObjectState>> objects;
   std::shared_ptr<const SpatialIndex> index;
 };
 
-/// All objects by id. Commands check everything before they change anything.
+/// All objects by id. A command checks all of its values before it changes anything.
 class ObjectTable {
  public:
   explicit ObjectTable(const SceneConfig& config);
 
-  void apply(const SetObjectNumber&, const Call&);
-  void apply(SetVertices&&, const Call&);
-  void apply(const SetTriangles&, const Call&);
-  void apply(const SetNormal&, const Call&);
-  void apply(const RemoveTriangle&, const Call&);
-  void apply(const ClearMesh&, const Call&);
-  void apply(const TransformMesh&, const Call&);
-  void apply(const SetTrimeshType&, const Call&);
-  void apply(const AddObject&, const Call&);
-  void apply(const AddObjectExScene&, const Call&);
-  void apply(const MoveToParent&, const Call&);
-  void apply(const RemoveObject&, const Call&);
-  void apply(const SetTransform&, const Call&);
-  void apply(const SetObjectPosition&, const Call&);
-  void apply(const SetObjectOrientation&, const Call&);
-  void apply(const SetObjectScale&, const Call&);
-  void apply(const SetTouchable&, const Call&);
-  void apply(const SetSurfaceProperty&, const Call&);
-  void apply(const SetSurface&, const Call&);
-  void apply(const SetSceneOrigin&, const Call&);
+  /// Executes a command whose target is Target::objects.
+  void apply(SceneCommand& command, const Call& call);
 
   /// Object 0 alone, empty.
   void reset();
@@ -114,13 +96,17 @@ class ObjectTable {
   std::optional<Nanos> nextDeadline() const;
   /// The oldest edit of a mesh that is not published yet.
   std::optional<Nanos> oldestEdit() const;
-  /// Brings `published` up to date; false when nothing changed. Remarks on surfaces go to who set them.
+  /// Brings `published` up to date; false when nothing changed. Remarks on a surface go to the client that set it.
   bool publish(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   const PublishedObjects& published() const { return published_; }
-  /// Appends every object as it is now, whether it can be felt or not.
+  /// Appends every object, whether it exerts force or not.
   void describe(SceneDescription& out) const;
 
  private:
+  // One specialisation for each command, in object_commands.cpp; a missing one does not link.
+  template <class Command>
+  void handle(Command& command, const Call& call);
+
   Object* find(std::int32_t id) const;
   Object* find(std::int32_t id, std::string_view name, const Call& call) const;
   void create(std::int32_t id, std::int32_t parent);
@@ -151,8 +137,8 @@ class ObjectTable {
   void updateSurface(Object& object, Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   bool updatePublished(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   void replaceState(Object& object);
-  void listAnew();
-  void indexAnew();
+  void rebuildList();
+  void rebuildIndex();
 
   const SceneConfig& config_;
   PassivityBound bound_;
@@ -161,7 +147,8 @@ class ObjectTable {
   Affine T_world_scene_ = Affine::Identity();
   std::uint64_t vertices_ = 0;
   std::uint64_t triangles_ = 0;
-  std::uint32_t jumps_ = 0;  // one counter for all: a number never comes back, whatever is removed
+  std::uint64_t lastTopology_ = 0;  // one counter for all meshes: no number is used twice
+  std::uint32_t jumps_ = 0;  // one counter for all: no number is used twice
 
   std::vector<std::int32_t> changed_;
   std::vector<std::int32_t> edited_;  // meshes with edits

@@ -11,13 +11,13 @@ namespace hapticd::scene {
 
 inline constexpr std::int32_t kMaxPlanes = 8;
 
-/// A half space: solid where normal · x + offset < 0. World frame and units; only the front is felt.
+/// A half space: solid where normal · x + offset < 0. World frame and units; only the front exerts force.
 struct Plane {
   std::int32_t index = 0;
   geometry::Vec3 normal = geometry::Vec3::UnitY();  ///< unit
   double offset = 0;                                ///< world units
   Surface surface;
-  base::Nanos recovery = 0;  ///< time over which a new placement comes in under the hand
+  base::Nanos recovery = 0;  ///< time over which a new placement fades in below the HIP
   double adhesionNormal_N = 0;
   double adhesionLateral_N = 0;
   double textureAmplitude = 0;   ///< world units; height A cos(2 π r / wavelength) around the first contact

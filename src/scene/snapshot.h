@@ -1,4 +1,4 @@
-// What can be touched at this moment: an immutable picture of the scene for the servo loop.
+// The scene at one moment, immutable, for the servo loop.
 #pragma once
 
 #include <memory>
@@ -15,7 +15,7 @@
 
 namespace hapticd::scene {
 
-/// One object that can be felt. Immutable and shared between snapshots: a new one is made only when it
+/// One object that exerts force. Immutable and shared between snapshots: a new one is made only when it
 /// changes.
 struct ObjectState {
   std::int32_t id = 0;

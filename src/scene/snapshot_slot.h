@@ -1,4 +1,4 @@
-// Scene thread to servo: the newest picture of the scene.
+// Scene thread to servo: the newest snapshot of the scene.
 #pragma once
 
 #include "handoff/exchange_slot.h"

@@ -123,7 +123,7 @@ struct SpatialIndex::Tree {
   // Of the commit at hand: one of them is there.
   const BoxOf* boxOf = nullptr;
   const BoxedTriangles* boxed = nullptr;
-  // For boxes that come in floats: tree coordinates are (p - near) * times + below or above.
+  // For boxes in floats: tree coordinates are (p - near) * times + below or above.
   Lanes near, times, below, above;
 
   explicit Tree(const Box& bounds) {

@@ -46,7 +46,7 @@ class SpatialIndex {
   SpatialIndex(SpatialIndex&&) noexcept;
   SpatialIndex& operator=(SpatialIndex&&) noexcept;
 
-  /// Builds over ids 0…count-1. Throws std::runtime_error with Embree's own words when it cannot.
+  /// Builds over ids 0…count-1. Throws std::runtime_error with Embree's error text.
   static SpatialIndex build(std::uint32_t count, const BoxOf& boxOf);
   static SpatialIndex build(const BoxedTriangles& all);
 

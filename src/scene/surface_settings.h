@@ -14,7 +14,7 @@
 
 namespace hapticd::scene {
 
-/// What was asked, in SI, not yet weighed against each other: properties come one by one in any order.
+/// The requested values in SI, not yet limited against each other: properties arrive one by one in any order.
 class SurfaceSettings {
  public:
   /// One property by its name; answers by notices. False when nothing changed.
@@ -22,7 +22,7 @@ class SurfaceSettings {
   /// All but popthrough and mass, in stock units. False when refused.
   bool set(const SetSurface& command, const SceneConfig& config, const Call& call);
 
-  /// The surface within the passivity bound, friction in order; `remark` says what was lowered.
+  /// The surface within the passivity bound, friction in order; `remark` names the values that were lowered.
   Surface resolve(const PassivityBound& bound, std::string& remark) const;
 
  private:

@@ -166,7 +166,7 @@ void Server::startScene(SceneHost& scene) {
   std::function<void(scene::ClientId, Nanos, const scene::SceneCommand*)> applying;
   if (recorder_) {
     applying = [this, number = scene.number()](auto client, Nanos now, const auto* command) {
-      recorder_->told(number, client, now, command);
+      recorder_->recordCommand(number, client, now, command);
     };
   }
   scene.start({.notices =

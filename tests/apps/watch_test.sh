@@ -10,11 +10,11 @@ touch=$!
 "$hapticd" watch "Phantom@$address" --csv --rate 200 --seconds 6 >"$work/csv"
 wait "$touch"
 # Every row has every column, tick numbers increase, and there is a force.
-awk -F, 'NR == 1 { columns = NF; next }
-         NF != columns || $2 <= tick { print "row " NR ": " $0; bad = 1; exit }
-         { tick = $2 } $13 * $13 + $14 * $14 + $15 * $15 > 0.01 { force = 1 }
+awk -F, 'NR == 1 { columns = NF; for (i = 1; i <= NF; i++) c[$i] = i; next }
+         NF != columns || $c["tick"] <= tick { print "row " NR ": " $0; bad = 1; exit }
+         { tick = $c["tick"] } $c["force_x_N"]^2 + $c["force_y_N"]^2 + $c["force_z_N"]^2 > 0.01 { force = 1 }
          END { exit bad || !force || NR < 100 }' "$work/csv" || { tail -3 "$work/csv"; exit 1; }
 
 "$hapticd" watch "Phantom@tcp://$address" --json --seconds 1 >"$work/json"
-grep -qE '^\{"time_s":[0-9.]+,"tick":[0-9]+,.*"force_N":\[[^]]*\],.*\}$' "$work/json"
+grep -qE '^\{"device":"Phantom","time_ns":[0-9]+,"tick":[0-9]+,.*"force_N":\[[^]]*\],.*\}$' "$work/json"
 "$hapticd" watch "Phantom@tcp://$address" --seconds 2 | grep -q 'reports total'

@@ -1,4 +1,4 @@
-// Files for other programs, byte by byte where these programs would stumble.
+// Files for other programs, byte by byte where those programs are strict.
 #include "record/export.h"
 
 #include <gtest/gtest.h>
@@ -28,36 +28,40 @@ TEST(Csv, HasAColumnForEachNumberAndQuotesNames) {
   sample.device = "Left, \"my\" hand";
   sample.time_ns = 1'700'000'000'123'456'789;
   sample.force_N = {0.1, -2, 1e-300};
+  sample.guardActive = Trip::late | Trip::stopped;
   csv.add(sample);
   csv.close();
   EXPECT_EQ(textOf(file.path()),
-            "device,time_ns,tick,revision,hand_x_m,hand_y_m,hand_z_m,proxy_x_m,proxy_y_m,proxy_z_m,velocity_"
+            "device,time_ns,tick,revision,hip_x_m,hip_y_m,hip_z_m,proxy_x_m,proxy_y_m,proxy_z_m,velocity_"
             "x_m_per_s,"
             "velocity_y_m_per_s,velocity_z_m_per_s,qx,qy,qz,qw,force_x_N,force_y_N,force_z_N,depth_m,"
             "touching,object,"
-            "buttons,guard_active,guard_latched,gripper_rad\n"
+            "buttons,guard_active,guard_latched,gripper_rad,rendered_force_x_N,rendered_force_y_N,rendered_force_z_N,"
+            "normal_x,normal_y,normal_z,render_status,wakeup_error_ns,compute_ns\n"
             "\"Left, \"\"my\"\" "
-            "hand\",1700000000123456789,0,0,0,0,0,0,0,0,0,0,0,0,0,0,1,0.1,-2,1e-300,0,0,-1,0,0,0,\n");
+            "hand\",1700000000123456789,0,0,0,0,0,0,0,0,0,0,0,0,0,0,1,0.1,-2,1e-300,0,0,-1,0,late+stopped,,,,,,,,,,,\n");
 }
 
-TEST(Csv, AGripperFillsItsColumn) {
+TEST(Csv, OptionalValuesFillTheirColumns) {
   RecordingFile file;
   CsvFile csv(file.path());
   Sample sample;
   sample.gripper_rad = 0.25;
+  sample.renderedForce_N = {1, 2, 3};
+  sample.compute_ns = 7;
   csv.add(sample);
   csv.close();
   const std::string text = textOf(file.path());
-  EXPECT_EQ(text.substr(text.rfind(',')), ",0.25\n");
+  EXPECT_EQ(text.substr(text.find(",0.25,")), ",0.25,1,2,3,,,,,,7\n");
 }
 
-TEST(Csv, AFileThatCannotBeSaysSo) {
+TEST(Csv, AFileThatCannotBeCreatedIsRefused) {
   EXPECT_THROW(CsvFile("/nowhere/x.csv"), RecordingError);
   EXPECT_THROW(McapFile("/nowhere/x.mcap"), RecordingError);
   EXPECT_THROW(VrpnLog("/nowhere/x.vrpn"), RecordingError);
 }
 
-TEST(Json, HasNoWordsForWhatIsNoNumberAndTellsLongListsByTheirLength) {
+TEST(Json, NumbersThatAreNotFiniteAreNullAndLongListsAreTheirLength) {
   std::string text;
   {
     JsonObject object(text);

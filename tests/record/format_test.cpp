@@ -1,4 +1,4 @@
-// What goes into a session file comes out of it, and what is cut or damaged says so.
+// Recordings are read as they were written; cut and damaged ones are reported.
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -9,7 +9,7 @@
 #include "record/block_file.h"
 #include "record/crc32.h"
 #include "record/fields.h"
-#include "record/pack_commands.h"
+#include "record/scene_event_codec.h"
 #include "record/recorder.h"
 #include "record/recording_file.h"
 #include "record/recording_reader.h"
@@ -19,8 +19,8 @@ namespace {
 
 using test::RecordingFile;
 
-// Fills every field of anything with any bits, by the same lists that the file is written by; the structured
-// bindings there see to it that no field is missing.
+// Fills every field with random bits, by the lists of fields that the file is written by: their structured bindings
+// guarantee that no field is missing.
 class Filler {
  public:
   explicit Filler(std::uint64_t seed) : random_(seed) {}
@@ -79,25 +79,20 @@ Bytes packedEvent(const SceneEvent& event) {
   return bytes;
 }
 
-// One of each command, filled by chance.
+// One of each command, with random values.
 std::vector<SceneEvent> oneOfEach(std::uint64_t seed) {
   Filler filler(seed);
   std::vector<SceneEvent> events;
-  std::apply(
-      [&](const auto&... entry) {
-        const auto add = [&]<class C>(const CommandEntry<C>&) {
-          C command;
-          filler.fill(command);
-          events.push_back({3, 14, 1592, scene::SceneCommand(std::move(command))});
-        };
-        (add(entry), ...);
-      },
-      kCommands);
+  scene::forEachCommand([&]<class C>() {
+    C command;
+    filler.fill(command);
+    events.push_back({3, 14, 1592, scene::SceneCommand(std::move(command))});
+  });
   events.push_back({1, 2, 3, std::nullopt});
   return events;
 }
 
-RC_GTEST_PROP(Commands, ComeBackAsTheyWere, (std::uint64_t seed)) {
+RC_GTEST_PROP(Commands, AreReadAsTheyWereWritten, (std::uint64_t seed)) {
   for (const SceneEvent& event : oneOfEach(seed)) {
     const Bytes bytes = packedEvent(event);
     SceneEvent back;
@@ -110,7 +105,7 @@ RC_GTEST_PROP(Commands, ComeBackAsTheyWere, (std::uint64_t seed)) {
   }
 }
 
-RC_GTEST_PROP(Commands, CutShortAreRefused, (std::uint64_t seed)) {
+RC_GTEST_PROP(Commands, TruncatedOnesAreRefused, (std::uint64_t seed)) {
   for (const SceneEvent& event : oneOfEach(seed)) {
     const Bytes bytes = packedEvent(event);
     SceneEvent back;
@@ -122,7 +117,7 @@ RC_GTEST_PROP(Commands, CutShortAreRefused, (std::uint64_t seed)) {
   }
 }
 
-// Files keep their meaning: a number is never given to another command.
+// Files keep their meaning: no other command gets the number.
 TEST(Commands, KeepTheirNumbers) {
   Bytes bytes;
   const scene::SceneCommand command = scene::SetTransform{5, {1, 2}};
@@ -132,6 +127,55 @@ TEST(Commands, KeepTheirNumbers) {
   EXPECT_EQ(wire::loadBig<std::int32_t>(bytes.data() + 18), 5);
   EXPECT_EQ(wire::loadBig<double>(bytes.data() + 22 + 8), 2.0);
   EXPECT_STREQ(nameOf(command), "SetTransform");
+}
+
+// The types of the members of a command, as docs/recording-format.md names them.
+class TypeLister {
+ public:
+  template <class T>
+  void operator()(const char* name, const T& value) {
+    text_ += (text_.empty() ? "" : ", ") + typeOf(value) + " `" + name + "`";
+  }
+  std::string text() const { return text_.empty() ? "-" : text_; }
+
+ private:
+  static std::string typeOf(bool) { return "truth"; }
+  static std::string typeOf(float) { return "f32"; }
+  static std::string typeOf(double) { return "f64"; }
+  static std::string typeOf(std::int32_t) { return "i32"; }
+  static std::string typeOf(std::uint32_t) { return "u32"; }
+  static std::string typeOf(const std::string&) { return "text"; }
+  template <IsEnum T>
+  static std::string typeOf(T) {
+    return "i32";
+  }
+  template <class T>
+  static std::string typeOf(const std::vector<T>&) {
+    return "list of " + typeOf(T());
+  }
+  template <class T, std::size_t N>
+  static std::string typeOf(const std::array<T, N>&) {
+    return typeOf(T()) + "[" + std::to_string(N) + "]";
+  }
+  template <class S, int R>
+  static std::string typeOf(const Eigen::Matrix<S, R, 1>&) {
+    return typeOf(S()) + "[" + std::to_string(R) + "]";
+  }
+
+  std::string text_;
+};
+
+TEST(Commands, AreInTheDocument) {
+  std::string table;
+  scene::forEachCommand([&]<class C>() {
+    TypeLister types;
+    const C command{};
+    fields(command, types);
+    table += "| " + std::to_string(commandNumber<C>()) + " | `" + C::kInfo.name + "` | " + types.text() + " |\n";
+  });
+  std::ifstream in(HAPTICD_TESTDATA "/../docs/recording-format.md");
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  EXPECT_NE(text.find(table), std::string::npos) << "put this table into docs/recording-format.md:\n" << table;
 }
 
 realtime::TickRecord anyTick(Filler& filler, std::uint64_t number) {
@@ -159,7 +203,7 @@ Bytes allOf(const realtime::TickRecord& tick) {
   return bytes;
 }
 
-RC_GTEST_PROP(Ticks, ComeBackAsTheyWere, (std::uint64_t seed)) {
+RC_GTEST_PROP(Ticks, AreReadAsTheyWereWritten, (std::uint64_t seed)) {
   Filler filler(seed);
   std::vector<realtime::TickRecord> ticks;
   Bytes run;
@@ -179,7 +223,7 @@ RC_GTEST_PROP(Ticks, ComeBackAsTheyWere, (std::uint64_t seed)) {
   RC_ASSERT(unpacker.ok());
 }
 
-RC_GTEST_PROP(Header, ComesBackAsItWas, (std::uint64_t seed)) {
+RC_GTEST_PROP(Header, IsReadAsItWasWritten, (std::uint64_t seed)) {
   Filler filler(seed);
   RecordingHeader header;
   filler.fill(header);
@@ -190,7 +234,7 @@ RC_GTEST_PROP(Header, ComesBackAsItWas, (std::uint64_t seed)) {
   RC_ASSERT(packed(back) == bytes);
 }
 
-TEST(Unpacker, ALengthOfMoreThanIsThereIsRefusedWithoutTakingTheMemory) {
+TEST(Unpacker, ALengthBeyondTheBytesIsRefusedWithoutAllocatingIt) {
   const Bytes bytes = packed(std::uint32_t{0xFFFFFFFF});
   Unpacker list(bytes);
   EXPECT_TRUE(list.next<std::vector<double>>().empty());
@@ -204,10 +248,10 @@ TEST(Crc32, IsThatOfZlib) {
   const std::string text = "123456789";
   const ByteView bytes = std::as_bytes(std::span(text));
   EXPECT_EQ(crc32(bytes), 0xCBF43926U);
-  EXPECT_EQ(crc32(bytes.subspan(4), crc32(bytes.first(4))), 0xCBF43926U);
+  EXPECT_EQ(crc32(bytes.first(4), bytes.subspan(4)), 0xCBF43926U);
 }
 
-// A small session, of every kind of block.
+// A small recording with every kind of block.
 class SmallSession : public testing::Test {
  protected:
   void SetUp() override {
@@ -217,12 +261,12 @@ class SmallSession : public testing::Test {
     recorder.addDevice(device);
     recorder.start(77, "config");
     const scene::SceneCommand command = scene::AddObject{4, -1};
-    recorder.told(0, 9, 100, &command);
+    recorder.recordCommand(0, 9, 100, &command);
     const auto stopwatch = recorder.stopwatch(0);
     first_ = stopwatch();
     stopwatch();
-    recorder.published(0, 110, 1);
-    recorder.told(0, 9, 120, nullptr);
+    recorder.recordPublish(0, 110, 1);
+    recorder.recordCommand(0, 9, 120, nullptr);
     Filler filler(1);
     for (std::uint64_t i = 1; i <= 3; ++i) recorder.ring(0).push(anyTick(filler, i));
     recorder.finish();
@@ -230,7 +274,7 @@ class SmallSession : public testing::Test {
     bytes_.assign(std::istreambuf_iterator<char>(in), {});
   }
 
-  // Rewrites the file and reads what is left of it: the number of events, and the remark or error.
+  // Rewrites the file and reads it: the number of events, and the remark or error.
   std::pair<std::size_t, std::string> read(const std::string& bytes) {
     std::ofstream(file_.path(), std::ios::binary) << bytes;
     std::size_t events = 0;
@@ -248,7 +292,7 @@ class SmallSession : public testing::Test {
   Nanos first_ = 0;
 };
 
-TEST_F(SmallSession, HoldsWhatWasRecorded) {
+TEST_F(SmallSession, HasWhatWasRecorded) {
   RecordingReader reader(file_.path());
   EXPECT_EQ(reader.header().config, "config");
   EXPECT_EQ(reader.header().wallOffset, 77);
@@ -279,16 +323,16 @@ TEST_F(SmallSession, CutAtAnyByteIsReadToTheLastWholeBlock) {
   for (std::size_t size = 0; size < whole.size(); ++size) {
     const auto [events, remark] = read(whole.substr(0, size));
     EXPECT_NE(remark, "") << size;
-    EXPECT_GE(events, before) << "more of the file, fewer events: " << size;
+    EXPECT_GE(events, before) << "a longer part of the file gave fewer events: " << size;
     EXPECT_LE(events, all);
     before = events;
   }
   EXPECT_EQ(before, all - 1);
 }
 
-TEST_F(SmallSession, ADamagedByteIsFoundWhereItIs) {
+TEST_F(SmallSession, ADamagedByteIsReportedAtItsBlock) {
   const std::string whole = bytes_;
-  // Where the blocks begin.
+  // The positions of the blocks.
   std::vector<std::uint64_t> starts;
   BlockReader blocks(file_.path());
   for (BlockReader::Block block; blocks.next(block);) starts.push_back(block.offset);
@@ -303,18 +347,18 @@ TEST_F(SmallSession, ADamagedByteIsFoundWhereItIs) {
   }
 }
 
-TEST_F(SmallSession, AnotherVersionAndOtherFilesAreRefused) {
+TEST_F(SmallSession, NewerVersionsAndOtherFilesAreRefused) {
   Bytes file(magic().begin(), magic().end());
   appendBlock(file, BlockKind::header, packed(kFormatVersion + 1));
   const std::string newer(reinterpret_cast<const char*>(file.data()), file.size());
   EXPECT_NE(read(newer).second.find("version 3 of the format, this program reads versions 1 to 2"),
             std::string::npos);
-  EXPECT_NE(read("time,x\n1,2\n").second.find("is no session file"), std::string::npos);
+  EXPECT_NE(read("time,x\n1,2\n").second.find("is not a recording"), std::string::npos);
   EXPECT_THROW(RecordingReader("/nowhere/x.haptics"), RecordingError);
 }
 
-// Version 2 differs by what stands in ticks with a gripper, and these have none.
-TEST_F(SmallSession, AFileOfVersion1IsReadAsItWas) {
+// Version 2 differs only in ticks with a gripper, and these have none.
+TEST_F(SmallSession, AFileOfVersion1IsReadAsBefore) {
   const auto now = read(bytes_);
   Bytes old(magic().begin(), magic().end());
   std::ofstream(file_.path(), std::ios::binary) << bytes_;
@@ -329,7 +373,7 @@ TEST_F(SmallSession, AFileOfVersion1IsReadAsItWas) {
   EXPECT_EQ(now.second, "");
 }
 
-TEST_F(SmallSession, UnknownKindsOfBlocksAreSteppedOver) {
+TEST_F(SmallSession, UnknownKindsOfBlocksAreSkipped) {
   Bytes extra;
   appendBlock(extra, static_cast<BlockKind>(77), packed(std::string("of the future")));
   const auto plain = read(bytes_);

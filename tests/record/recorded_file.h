@@ -1,5 +1,5 @@
-// A session recorded from a real server by real clients: all kinds of hands, moving and bending objects,
-// effects, a stop, a batch, and clients that leave.
+// A recording of a real server with real clients: two hands, moving and deforming objects, effects, a stop, a batch, and
+// clients that leave.
 #pragma once
 
 #include <filesystem>
@@ -23,7 +23,7 @@ inline std::vector<record::RecordingEvent> eventsOf(const std::filesystem::path&
   return events;
 }
 
-/// Moves and bends the cube under the stroking hand, frame by frame as a client does.
+/// Moves and deforms the cube below the stroking hand, frame by frame as a client does.
 inline void animate(ScriptedPeer& peer, int frames) {
   for (int i = 0; i < frames; ++i) {
     const double turn = 0.1 * std::sin(0.3 * i);
@@ -36,7 +36,7 @@ inline void animate(ScriptedPeer& peer, int frames) {
   }
 }
 
-/// Two devices that share a scene, one of them with a ball for a tip; the first strokes by itself.
+/// Two devices that share a scene; the second has a spherical tool, the first strokes by itself.
 inline server::ServerConfig recordingConfig(const Hand& hand, const std::filesystem::path& file) {
   server::ServerConfig config = hand.config();
   config.record = file.string();
@@ -49,7 +49,7 @@ inline server::ServerConfig recordingConfig(const Hand& hand, const std::filesys
   return config;
 }
 
-/// Plays everything; false when something that should have been felt was not.
+/// Plays everything; false when an expected contact or report did not occur.
 inline bool playSession(RunningServer& server) {
   ScriptedPeer peer(server.address());
   ScriptedPeer second(server.address(), "Second");
@@ -66,7 +66,7 @@ inline bool playSession(RunningServer& server) {
   owner->send(wire::StartEffect{3});
   owner->send(wire::ForceField{.origin = {0, 0, 0}, .force = {0.3F, 0.2F, 0}, .jacobian = {}, .radius = 10});
   if (!untilTicks(peer, 100)) return false;
-  owner->close();  // what it owned ramps out
+  owner->close();  // its forces ramp out
 
   peer.send(wire::StopForces{});
   if (!peer.untilNext<wire::GuardState>() || !untilTicks(peer, 50)) return false;

@@ -1,4 +1,4 @@
-// A place for a session file, for as long as a test needs it.
+// A temporary recording.
 #pragma once
 
 #include <unistd.h>
@@ -8,7 +8,7 @@
 
 namespace hapticd::test {
 
-/// A file that does not exist yet and is gone with this.
+/// A path without a file; the destructor removes the file.
 class RecordingFile {
  public:
   RecordingFile() {

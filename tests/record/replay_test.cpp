@@ -1,4 +1,4 @@
-// A replay over the network: clients hear what was recorded, and cannot change it.
+// A replay over the network: clients receive the recorded reports and cannot change the scene.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -45,11 +45,11 @@ class Replay : public testing::Test {
 std::unique_ptr<RecordingFile> Replay::file_;
 bool Replay::played_ = false;
 
-TEST_F(Replay, ClientsHearTheRecordedTicks) {
+TEST_F(Replay, ClientsReceiveTheRecordedTicks) {
   ScriptedPeer peer(server_->address());
   ASSERT_TRUE(peer.untilConnected());
   peer.send(wire::Subscribe{wire::kReportTick, 1000});
-  // All there are, through the seam of the loop.
+  // All ticks, and some of the second round.
   ASSERT_TRUE(peer.until([&] { return peer.count<wire::TickReport>() > ticks_.size() + 100; }));
   std::uint64_t touching = 0;
   std::int64_t last = 0;
@@ -61,21 +61,21 @@ TEST_F(Replay, ClientsHearTheRecordedTicks) {
     // workspace.
     EXPECT_NEAR(norm(heard.force), then.force_N.norm(), 1e-12);
     EXPECT_EQ(heard.object, then.rendering.touching ? then.rendering.touchedObject : -1);
-    EXPECT_GT(heard.time, last) << "times are those of now, and never go back";
+    EXPECT_GT(heard.time, last) << "time stamps are present and increase";
     last = heard.time;
     touching += heard.object >= 0 ? 1 : 0;
   }
   EXPECT_GT(touching, 50U);
 }
 
-TEST_F(Replay, NobodyCanChangeIt) {
+TEST_F(Replay, CommandsAreRefused) {
   ScriptedPeer peer(server_->address());
   ASSERT_TRUE(peer.untilConnected());
   peer.send(wire::ResetScene{});
   EXPECT_TRUE(peer.untilText("refused: this server replays a recording"));
 }
 
-TEST_F(Replay, TheSecondDeviceIsThereToo) {
+TEST_F(Replay, TheSecondDeviceIsReplayed) {
   ScriptedPeer peer(server_->address(), "Second");
   EXPECT_TRUE(peer.until([&] {
     const auto touched = peer.last<wire::TouchedObject>();

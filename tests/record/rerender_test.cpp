@@ -1,11 +1,11 @@
-// The proof of a record: the recorded hand through the recorded scene gives the recorded forces, bit for bit.
+// Re-rendering a recording gives the recorded forces bit for bit.
 #include <gtest/gtest.h>
 
 #include <map>
 #include <set>
 #include <sstream>
 
-#include "record/pack_commands.h"
+#include "record/scene_event_codec.h"
 #include "record/recorded_file.h"
 #include "record/rerender.h"
 
@@ -91,7 +91,7 @@ TEST_F(Rerender, IsTheSameEveryTime) {
   for (std::size_t i = 0; i < once.size(); ++i) EXPECT_EQ(once[i].largest_N, twice[i].largest_N);
 }
 
-TEST_F(Rerender, ChangesAreFelt) {
+TEST_F(Rerender, ChangesChangeForces) {
   for (const RerenderChanges& changes :
        {RerenderChanges{.stiffness_N_per_m = 100}, RerenderChanges{.toolRadius_m = 0.004},
         RerenderChanges{.staticFriction = 0, .dynamicFriction = 0}, RerenderChanges{.raw = true}}) {
@@ -105,14 +105,14 @@ TEST_F(Rerender, ChangesAreFelt) {
   }
 }
 
-TEST_F(Rerender, EveryThingThatHappenedIsInTheFile) {
+TEST_F(Rerender, AllCommandsAreInTheFile) {
   std::map<std::string, int> commands;
   int gone = 0;
   for (const record::RecordingEvent& event : eventsOf(file_->path())) {
-    const auto* told = std::get_if<record::SceneEvent>(&event);
-    if (told == nullptr) continue;
-    if (told->command) {
-      ++commands[record::nameOf(*told->command)];
+    const auto* command = std::get_if<record::SceneEvent>(&event);
+    if (command == nullptr) continue;
+    if (command->command) {
+      ++commands[record::nameOf(*command->command)];
     } else {
       ++gone;
     }

@@ -145,6 +145,20 @@ TEST_F(Forces, AtMostAsManyEffectsAsTheLimit) {
   EXPECT_TRUE(notices_.empty());
 }
 
+TEST_F(Forces, ReleasedForcesRampOutAndAnOpenBatchStays) {
+  say(SetPlane{.index = 1, .plane = {0, 1, 0, 0}, .stiffness = 0.5});
+  say(BeginBatch{});
+  say(SetPlane{.index = 0, .plane = {0, 1, 0, 0.01}, .stiffness = 0.5});
+  say(ReleaseForces{});
+  ASSERT_TRUE(publish());
+  ASSERT_EQ(scene_->planes.size(), 1U);
+  EXPECT_TRUE(scene_->planes[0].releasing);
+  say(CommitBatch{});
+  ASSERT_TRUE(publish());
+  ASSERT_EQ(scene_->planes.size(), 2U);
+  EXPECT_FALSE(scene_->planes[0].releasing) << "set after the release";
+}
+
 TEST_F(Forces, WhatAClientOwnsRampsOutWhenItLeaves) {
   say(constant(1));
   say(StartEffect{1});

@@ -1,3 +1,5 @@
+#include <cstdio>
+
 #include "device/driver.h"
 #include "device/simulated/hand_file.h"
 #include "device/simulated/simulated_device.h"
@@ -11,7 +13,11 @@ const Driver simulated{.name = "simulated",
                        .canBeIsolated = false,
                        .make = [](const DriverOptions& options) -> std::unique_ptr<Device> {
                          auto device = std::make_unique<SimulatedDevice>();
-                         if (options.hand != "script") device->setPath(HandFile::load(options.hand));
+                         if (options.hand == "script") return device;
+                         const auto hand = HandFile::load(options.hand);
+                         if (!hand->remark().empty())
+                           std::fprintf(stderr, "%s: %s\n", options.hand.c_str(), hand->remark().c_str());
+                         device->setPath(hand);
                          return device;
                        }};
 

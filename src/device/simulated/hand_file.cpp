@@ -4,22 +4,17 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <fstream>
-#include <iterator>
+#include <optional>
+#include <system_error>
 
 #include "base/time.h"
+#include "base/world.h"
 
 namespace hapticd::device {
 namespace {
 
-constexpr std::array<std::string_view, 4> kHeaders = {
-    "t_s,x_m,y_m,z_m",
-    "t_s,x_m,y_m,z_m,buttons",
-    "t_s,x_m,y_m,z_m,qx,qy,qz,qw",
-    "t_s,x_m,y_m,z_m,qx,qy,qz,qw,buttons",
-};
-constexpr std::size_t kMostColumns = 9;
-constexpr double kMostSeconds = 1e8;
+constexpr double kLongest_s = 1e8;
+constexpr std::size_t kAbsent = static_cast<std::size_t>(-1);
 
 struct Line {
   const std::string& source;
@@ -41,103 +36,216 @@ bool startsLikeANumber(std::string_view text) {
   return !text.empty() && std::string_view("+-.0123456789").find(text.front()) != std::string_view::npos;
 }
 
-// The number of columns that a header announces.
-std::size_t readHeader(std::string_view text, const Line& line) {
-  std::string compact;
-  std::copy_if(text.begin(), text.end(), std::back_inserter(compact),
-               [](char c) { return c != ' ' && c != '\t'; });
-  if (std::find(kHeaders.begin(), kHeaders.end(), compact) == kHeaders.end()) {
-    line.fail("header '" + std::string(text) + "' is not t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons]");
+// The cells of a row, trimmed. Commas in quotes do not separate; quotes stay.
+void split(std::string_view text, std::vector<std::string_view>& cells) {
+  cells.clear();
+  bool quoted = false;
+  std::size_t begin = 0;
+  for (std::size_t i = 0; i <= text.size(); ++i) {
+    if (i < text.size() && text[i] == '"') quoted = !quoted;
+    if (i < text.size() && (text[i] != ',' || quoted)) continue;
+    cells.push_back(trimmed(text.substr(begin, i - begin)));
+    begin = i + 1;
   }
-  return static_cast<std::size_t>(std::count(compact.begin(), compact.end(), ',')) + 1;
+}
+
+// Where a file has what.
+struct Columns {
+  std::size_t count = 0;
+  std::size_t time = kAbsent;
+  std::size_t position = kAbsent;     ///< x, y, z
+  std::size_t orientation = kAbsent;  ///< qx, qy, qz, qw
+  std::size_t buttons = kAbsent;
+  std::size_t device = kAbsent;
+  bool nanoseconds = false;  ///< the time; seconds otherwise
+  bool fromFirstRow = false; ///< times are absolute: the hand begins at the first row
+  std::string remark;
+};
+
+// t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons] without a header.
+Columns unnamed(std::size_t count, const Line& line) {
+  if (count > 9) line.fail("more than 9 columns");
+  if (count != 4 && count != 5 && count != 8 && count != 9)
+    line.fail(std::to_string(count) + " columns where 4, 5, 8 or 9 are expected");
+  Columns columns;
+  columns.count = count;
+  columns.time = 0;
+  columns.position = 1;
+  if (count >= 8) columns.orientation = 4;
+  if (count == 5 || count == 9) columns.buttons = count - 1;
+  return columns;
+}
+
+std::size_t find(const std::vector<std::string_view>& names, std::string_view name) {
+  const auto at = std::find(names.begin(), names.end(), name);
+  return at == names.end() ? kAbsent : static_cast<std::size_t>(at - names.begin());
+}
+
+// The first of several columns in a row.
+template <std::size_t N>
+std::size_t findAll(const std::vector<std::string_view>& names, const std::array<std::string, N>& wanted) {
+  const auto at = std::search(names.begin(), names.end(), wanted.begin(), wanted.end());
+  return at == names.end() ? kAbsent : static_cast<std::size_t>(at - names.begin());
+}
+
+Columns named(const std::vector<std::string_view>& names, std::string_view text, const Line& line) {
+  Columns columns;
+  columns.count = names.size();
+  std::string time;
+  for (const char* name : {"time_ns", "t_s", "time_s"}) {
+    columns.time = find(names, time = name);
+    if (columns.time != kAbsent) break;
+  }
+  std::string prefix;
+  for (const char* name : {"hip_", "hand_", ""}) {
+    prefix = name;
+    columns.position = findAll<3>(names, {prefix + "x_m", prefix + "y_m", prefix + "z_m"});
+    if (columns.position != kAbsent) break;
+  }
+  if (columns.time == kAbsent || columns.position == kAbsent) {
+    line.fail("header '" + std::string(text) +
+              "' is not t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons] and has no columns time_ns,hip_x_m,hip_y_m,hip_z_m");
+  }
+  columns.orientation = findAll<4>(names, {"qx", "qy", "qz", "qw"});
+  columns.buttons = find(names, "buttons");
+  columns.device = find(names, "device");
+  columns.nanoseconds = time == "time_ns";
+  columns.fromFirstRow = time != "t_s";
+  // What hapticd writes has time_ns and hip_x_m, what people write t_s and x_m.
+  if ((time == "time_ns") != (prefix == "hip_") || (time == "t_s") != prefix.empty())
+    columns.remark = "reads '" + time + "' and '" + prefix + "x_m', columns of an older version of hapticd";
+  return columns;
 }
 
 double readNumber(std::string_view text, std::size_t column, const Line& line) {
-  std::string_view digits = trimmed(text);
+  std::string_view digits = text;
   if (!digits.empty() && digits.front() == '+') digits.remove_prefix(1);
   double value = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  if (error != std::errc{} || end != digits.data() + digits.size() || !std::isfinite(value)) {
-    line.fail("column " + std::to_string(column + 1) + " '" + std::string(trimmed(text)) +
-              "' is not a finite number");
-  }
+  if (error != std::errc{} || end != digits.data() + digits.size() || !std::isfinite(value))
+    line.fail("column " + std::to_string(column + 1) + " '" + std::string(text) + "' is not a finite number");
   return value;
 }
 
-std::size_t readNumbers(std::string_view text, const Line& line, std::array<double, kMostColumns>& values) {
-  std::size_t count = 0;
-  for (bool more = true; more; ++count) {
-    const std::size_t comma = text.find(',');
-    more = comma != std::string_view::npos;
-    if (count == kMostColumns) line.fail("more than 9 columns");
-    values[count] = readNumber(text.substr(0, comma), count, line);
-    if (more) text.remove_prefix(comma + 1);
-  }
-  return count;
+Nanos readNanos(std::string_view text, std::size_t column, const Line& line) {
+  Nanos value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size())
+    line.fail("column " + std::to_string(column + 1) + " '" + std::string(text) + "' is not a whole number");
+  return value;
 }
 
-Nanos readTime(double time_s, Nanos before, const Line& line) {
-  if (time_s < 0 || time_s > kMostSeconds) line.fail("time " + std::to_string(time_s) + " s is out of range");
-  const Nanos time = base::toNanos(time_s);
-  if (time <= before) line.fail("time " + std::to_string(time_s) + " s is not after the row before");
-  return time;
+Nanos readTime(std::string_view text, const Columns& columns, const Line& line) {
+  if (columns.nanoseconds) return readNanos(text, columns.time, line);
+  const double time_s = readNumber(text, columns.time, line);
+  if (!columns.fromFirstRow && (time_s < 0 || time_s > kLongest_s))
+    line.fail("time " + std::to_string(time_s) + " s is out of range");
+  if (std::abs(time_s) > 9e9) line.fail("time " + std::to_string(time_s) + " s is out of range");
+  return base::toNanos(time_s);
 }
 
 Quat readOrientation(const Quat& quaternion, const Line& line) {
   const double length = quaternion.norm();
-  if (std::abs(length - 1) > 0.01) {
+  if (std::abs(length - 1) > 0.01)
     line.fail("quaternion of length " + std::to_string(length) + " is not a rotation");
-  }
   return quaternion.normalized();
 }
 
 std::uint32_t readButtons(double buttons, const Line& line) {
-  if (buttons != std::floor(buttons) || buttons < 0 || buttons > 4294967295.0) {
+  if (buttons != std::floor(buttons) || buttons < 0 || buttons > 4294967295.0)
     line.fail("buttons " + std::to_string(buttons) + " is not a set of bits");
-  }
   return static_cast<std::uint32_t>(buttons);
 }
 
 }  // namespace
 
-std::shared_ptr<const HandFile> HandFile::load(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in || std::filesystem::is_directory(file)) {
-    throw HandFileError(file.string() + ": cannot be opened as a hand file");
+// Row by row into a HandFile.
+class HandFile::Parser {
+ public:
+  Parser(HandFile& hand, const std::string& source) : hand_(hand), source_(source) {}
+
+  void add(std::string_view content, std::size_t number) {
+    const Line line{source_, number};
+    split(content, cells_);
+    if (columns_.count == 0 && !startsLikeANumber(content)) {
+      columns_ = named(cells_, content, line);
+      return;
+    }
+    if (columns_.count == 0) columns_ = unnamed(cells_.size(), line);
+    if (cells_.size() != columns_.count) {
+      line.fail(std::to_string(cells_.size()) + " columns where " + std::to_string(columns_.count) + " are expected");
+    }
+    if (isOfThisDevice()) addRow(line);
   }
-  const std::string text{std::istreambuf_iterator<char>(in), {}};
-  return parse(text, file.string());
+
+  std::string remark() const {
+    std::string text = columns_.remark;
+    if (otherDevices_) {
+      text += (text.empty() ? "" : "; ");
+      text += "holds several devices, only the first is used: " + device_;
+    }
+    return text;
+  }
+
+ private:
+  bool isOfThisDevice() {
+    if (columns_.device == kAbsent) return true;
+    const std::string_view device = cells_[columns_.device];
+    if (hand_.rows_.empty()) device_ = device;
+    otherDevices_ = otherDevices_ || device != device_;
+    return device == device_;
+  }
+
+  double number(std::size_t column, const Line& line) const { return readNumber(cells_[column], column, line); }
+
+  void addRow(const Line& line) {
+    Nanos time = readTime(cells_[columns_.time], columns_, line);
+    if (hand_.rows_.empty() && columns_.fromFirstRow) begin_ = time;
+    time -= begin_;
+    // A client that samples reports may write one of them twice.
+    if (columns_.fromFirstRow && !hand_.rows_.empty() && time == hand_.rows_.back().time) return;
+    if (!hand_.rows_.empty() && time <= hand_.rows_.back().time)
+      line.fail("time " + std::to_string(base::toSeconds(time)) + " s is not after the row before");
+    const std::size_t x = columns_.position;
+    Row row{time, Vec3(number(x, line), number(x + 1, line), number(x + 2, line)), Quat::Identity(), 0};
+    if (const std::size_t q = columns_.orientation; q != kAbsent) {
+      row.orientation =
+          readOrientation(Quat(number(q + 3, line), number(q, line), number(q + 1, line), number(q + 2, line)), line);
+    }
+    if (columns_.buttons != kAbsent) row.buttons = readButtons(number(columns_.buttons, line), line);
+    hand_.rows_.push_back(row);
+  }
+
+  HandFile& hand_;
+  const std::string& source_;
+  Columns columns_;
+  std::vector<std::string_view> cells_;
+  std::string device_;
+  bool otherDevices_ = false;
+  Nanos begin_ = 0;
+};
+
+std::shared_ptr<const HandFile> HandFile::load(const std::filesystem::path& file) {
+  try {
+    const std::vector<std::byte> content = base::world().files.read(file);
+    return parse({reinterpret_cast<const char*>(content.data()), content.size()}, file.string());
+  } catch (const std::system_error& error) {
+    throw HandFileError(file.string() + ": cannot be read as a hand file: " + error.code().message());
+  }
 }
 
 std::shared_ptr<const HandFile> HandFile::parse(std::string_view text, const std::string& source) {
   std::shared_ptr<HandFile> hand(new HandFile);
-  std::size_t columns = 0;
+  Parser parser(*hand, source);
   for (std::size_t number = 1; !text.empty(); ++number) {
     const std::size_t end = text.find('\n');
     const std::string_view content = trimmed(text.substr(0, end));
     text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
     if (content.empty() || content.front() == '#') continue;
-
-    const Line line{source, number};
-    if (columns == 0 && !startsLikeANumber(content)) {
-      columns = readHeader(content, line);
-      continue;
-    }
-    std::array<double, kMostColumns> v{};
-    const std::size_t count = readNumbers(content, line, v);
-    if (columns == 0 && (count == 4 || count == 5 || count == 8 || count == 9)) columns = count;
-    if (count != columns) {
-      line.fail(std::to_string(count) + " columns where " +
-                (columns == 0 ? "4, 5, 8 or 9" : std::to_string(columns)) + " are expected");
-    }
-
-    Row row{0, Vec3(v[1], v[2], v[3]), Quat::Identity(), 0};
-    row.time = readTime(v[0], hand->rows_.empty() ? -1 : hand->rows_.back().time, line);
-    if (columns >= 8) row.orientation = readOrientation(Quat(v[7], v[4], v[5], v[6]), line);
-    if (columns == 5 || columns == 9) row.buttons = readButtons(v[columns - 1], line);
-    hand->rows_.push_back(row);
+    parser.add(content, number);
   }
   if (hand->rows_.empty()) throw HandFileError(source + ": no row with a hand in it");
+  hand->remark_ = parser.remark();
   return hand;
 }
 
@@ -151,8 +259,8 @@ HandPose HandFile::at(Nanos sinceStart) const noexcept {
   const Row& a = *(next - 1);
   const Row& b = *next;
   const double s = static_cast<double>(sinceStart - a.time) / static_cast<double>(b.time - a.time);
-  const Vec3 way = b.position_m - a.position_m;
-  return {a.position_m + s * way, way / base::toSeconds(b.time - a.time),
+  const Vec3 step_m = b.position_m - a.position_m;
+  return {a.position_m + s * step_m, step_m / base::toSeconds(b.time - a.time),
           a.orientation.slerp(s, b.orientation), a.buttons};
 }
 

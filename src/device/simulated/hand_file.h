@@ -1,4 +1,5 @@
-// A recorded or scripted hand from a CSV file: t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons].
+// A recorded or scripted hand from a CSV file: t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons], or any file with the columns
+// time_ns,hip_x_m,hip_y_m,hip_z_m that hapticd writes (record/sample.h); other columns are ignored.
 #pragma once
 
 #include <filesystem>
@@ -12,14 +13,14 @@
 
 namespace hapticd::device {
 
-/// A file that cannot be read as a hand; the text names file, line and value.
+/// The file cannot be read as a hand; the text names file, line and value.
 class HandFileError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// Positions between rows are interpolated linearly, orientations by slerp; buttons stay until the next row.
-/// Before the first row and after the last the hand rests there.
+/// Interpolates positions linearly and orientations by slerp; buttons stay until the next row. Before the first row and
+/// after the last one the hand rests. With time_ns the hand begins at the first row.
 class HandFile final : public HandPath {
  public:
   /// Throws HandFileError.
@@ -32,6 +33,8 @@ class HandFile final : public HandPath {
   /// Time of the first row.
   Nanos begin() const noexcept { return rows_.front().time; }
   std::size_t rows() const noexcept { return rows_.size(); }
+  /// What a person should know about how the file was read, as the end of a sentence after its name; empty when nothing.
+  const std::string& remark() const noexcept { return remark_; }
 
  private:
   struct Row {
@@ -40,9 +43,11 @@ class HandFile final : public HandPath {
     Quat orientation;
     std::uint32_t buttons;
   };
+  class Parser;
   HandFile() = default;
 
   std::vector<Row> rows_;
+  std::string remark_;
 };
 
 }  // namespace hapticd::device

@@ -8,144 +8,75 @@
 namespace hapticd::server {
 namespace {
 
-using geometry::Vec3;
-
-Vec3 vec3(const wire::F32x3& v) {
-  return {v[0], v[1], v[2]};
+// Members of a message to members of a command: other types, the same values.
+template <class To, class From>
+void convert(const From& from, To& to) {
+  to = static_cast<To>(from);
 }
-Vec3 vec3(const wire::F64x3& v) {
-  return {v[0], v[1], v[2]};
+template <class From>
+void convert(const From& from, bool& to) {
+  to = from != 0;
 }
-
-template <class To, class From, std::size_t N>
-std::array<To, N> arrayOf(const std::array<From, N>& from) {
-  std::array<To, N> to{};
+template <std::size_t N>
+void convert(const wire::NameBuffer<N>& from, std::string& to) {
+  to = from.view();
+}
+template <class From, std::size_t N, class To>
+void convert(const std::array<From, N>& from, std::array<To, N>& to) {
   std::copy(from.begin(), from.end(), to.begin());
-  return to;
+}
+template <class From>
+void convert(const std::array<From, 3>& from, geometry::Vec3& to) {
+  to = geometry::Vec3(from[0], from[1], from[2]);
 }
 
-// The paper's interface.
-scene::SceneCommand toCommand(const wire::SetObjectNumber& m) {
-  return scene::SetObjectNumber{m.count};
+// The position in SceneCommand of the command that names this message; kNone when there is none.
+constexpr std::size_t kNone = std::variant_size_v<scene::SceneCommand>;
+constexpr std::size_t commandOf(std::string_view message) {
+  std::size_t found = kNone;
+  std::size_t next = 0;
+  scene::forEachCommand([&]<class C>() {
+    if (C::kInfo.message == message) found = next;
+    ++next;
+  });
+  return found;
 }
-scene::SceneCommand toCommand(const wire::SetTransformMatrix& m) {
-  return scene::SetTransform{m.object, m.matrix};
+
+// A message that some command names in its kInfo: they have the same members, in the same order.
+template <class M>
+concept SameMembers = commandOf(M::kInfo.name) != kNone;
+
+template <SameMembers M>
+scene::SceneCommand toCommand(const M& message) {
+  using Command = std::variant_alternative_t<commandOf(M::kInfo.name), scene::SceneCommand>;
+  constexpr std::size_t kMembers = Command::kInfo.fields.size();
+  Command command;
+  scene::withMembers<kMembers>(message, [&](const auto&... from) {
+    scene::withMembers<kMembers>(command, [&](auto&... to) { (convert(from, to), ...); });
+  });
+  return command;
 }
-scene::SceneCommand toCommand(const wire::SetHapticProperty& m) {
-  return scene::SetSurfaceProperty{m.object, std::string(m.property.view()), m.value};
-}
-scene::SceneCommand toCommand(const wire::SetTouchableFace& m) {
-  return scene::SetTouchableFaces{m.face};
-}
-scene::SceneCommand toCommand(const wire::SetWorkspaceProjectionMatrix& m) {
-  return scene::SetWorkspaceProjection{m.model, m.projection};
-}
-scene::SceneCommand toCommand(const wire::SetWorkspaceBoundingBox& m) {
-  return scene::SetWorkspaceBox{m.model, m.box};
-}
-scene::SceneCommand toCommand(const wire::Effect& m) {
-  return scene::DefineEffect{.type = std::string(m.type.view()),
-                             .index = m.index,
-                             .gain = m.gain,
-                             .magnitude_N = m.magnitude,
-                             .duration_ms = m.duration,
-                             .frequency = m.frequency,
-                             .position = vec3(m.position),
-                             .direction = vec3(m.direction)};
-}
-scene::SceneCommand toCommand(const wire::StartEffect& m) {
-  return scene::StartEffect{m.index};
-}
-scene::SceneCommand toCommand(const wire::StopEffect& m) {
-  return scene::StopEffect{m.index};
-}
-scene::SceneCommand toCommand(const wire::SetObjectIsTouchable& m) {
-  return scene::SetTouchable{m.object, m.touchable != 0};
+
+// Messages whose members differ from those of their command.
+geometry::Vec3 vec3(const wire::F32x3& v) {
+  return {v[0], v[1], v[2]};
 }
 scene::SceneCommand toCommand(const wire::ResetScene&) {
   return scene::ResetScene{};
 }
-
-// Stock objects and meshes.
-scene::SceneCommand toCommand(const wire::AddObject& m) {
-  return scene::AddObject{m.object, m.parent};
-}
-scene::SceneCommand toCommand(const wire::AddObjectExScene& m) {
-  return scene::AddObjectExScene{m.object};
-}
-scene::SceneCommand toCommand(const wire::MoveToParent& m) {
-  return scene::MoveToParent{m.object, m.parent};
-}
-scene::SceneCommand toCommand(const wire::SetObjectPosition& m) {
-  return scene::SetObjectPosition{m.object, vec3(m.position)};
-}
-scene::SceneCommand toCommand(const wire::SetObjectOrientation& m) {
-  return scene::SetObjectOrientation{m.object, vec3(m.axis), m.angle};
-}
-scene::SceneCommand toCommand(const wire::SetObjectScale& m) {
-  return scene::SetObjectScale{m.object, vec3(m.scale)};
-}
-scene::SceneCommand toCommand(const wire::RemoveObject& m) {
-  return scene::RemoveObject{m.object};
-}
 scene::SceneCommand toCommand(const wire::SetNormal& m) {
   return scene::SetNormal{m.object};
 }
-scene::SceneCommand toCommand(const wire::RemoveTriangle& m) {
-  return scene::RemoveTriangle{m.object, m.triangle};
-}
-scene::SceneCommand toCommand(const wire::UpdateTrimeshChanges& m) {
-  return scene::SetSurface{.object = m.object,
-                           .stiffness = m.stiffness,
-                           .damping = m.damping,
-                           .staticFriction = m.static_friction,
-                           .dynamicFriction = m.dynamic_friction};
-}
-scene::SceneCommand toCommand(const wire::TransformTrimesh& m) {
-  return scene::TransformMesh{m.object, m.matrix};
-}
-scene::SceneCommand toCommand(const wire::SetTrimeshType& m) {
-  return scene::SetTrimeshType{m.object, m.type};
-}
-scene::SceneCommand toCommand(const wire::ClearTrimesh& m) {
-  return scene::ClearMesh{m.object};
-}
-scene::SceneCommand toCommand(const wire::SetHapticOrigin& m) {
-  return scene::SetHapticOrigin{vec3(m.position), vec3(m.axis), m.angle};
-}
-scene::SceneCommand toCommand(const wire::SetHapticScale& m) {
-  return scene::SetHapticScale{m.scale};
-}
-scene::SceneCommand toCommand(const wire::SetSceneOrigin& m) {
-  return scene::SetSceneOrigin{vec3(m.position), vec3(m.axis), m.angle};
-}
-
-// Stock forces that belong to no object.
 scene::SceneCommand toCommand(const wire::Plane& m) {
-  return scene::SetPlane{.index = m.index,
-                         .plane = arrayOf<double>(m.plane),
-                         .stiffness = m.stiffness,
-                         .damping = m.damping,
-                         .staticFriction = m.static_friction,
-                         .dynamicFriction = m.dynamic_friction,
-                         .recoveryCycles = m.recovery_cycles};
-}
-scene::SceneCommand toCommand(const wire::Plane2& m) {
-  return scene::SetPlaneDetail{.adhesionNormal_N = m.normal_adhesion,
-                               .adhesionLateral_N = m.lateral_adhesion,
-                               .textureAmplitude_m = m.texture_amplitude,
-                               .textureWavelength_m = m.texture_wavelength,
-                               .buzzAmplitude_m = m.buzz_amplitude,
-                               .buzzFrequency_Hz = m.buzz_frequency};
-}
-scene::SceneCommand toCommand(const wire::ForceField& m) {
-  return scene::SetForceField{vec3(m.origin), vec3(m.force), arrayOf<double>(m.jacobian), m.radius};
-}
-scene::SceneCommand toCommand(const wire::ConstraintEnable& m) {
-  return scene::SetConstraintEnabled{m.enable != 0};
-}
-scene::SceneCommand toCommand(const wire::ConstraintMode& m) {
-  return scene::SetConstraintMode{m.mode};
+  scene::SetPlane command{.index = m.index,
+                          .plane = {},
+                          .stiffness = m.stiffness,
+                          .damping = m.damping,
+                          .staticFriction = m.static_friction,
+                          .dynamicFriction = m.dynamic_friction,
+                          .recoveryCycles = m.recovery_cycles};
+  convert(m.plane, command.plane);
+  return command;
 }
 scene::SceneCommand toCommand(const wire::ConstraintPoint& m) {
   return scene::SetConstraintVector{scene::ConstraintVector::point, vec3(m.point)};
@@ -162,20 +93,9 @@ scene::SceneCommand toCommand(const wire::ConstraintPlanePoint& m) {
 scene::SceneCommand toCommand(const wire::ConstraintPlaneNormal& m) {
   return scene::SetConstraintVector{scene::ConstraintVector::planeNormal, vec3(m.normal)};
 }
-scene::SceneCommand toCommand(const wire::ConstraintStiffness& m) {
-  return scene::SetConstraintStiffness{m.stiffness};
-}
 scene::SceneCommand toCommand(const wire::CustomEffect& m) {
   if (m.effect == wire::kStopCustomEffect) return scene::StopCustomEffect{};
   return scene::StartCustomEffect{m.effect, m.parameters.values};
-}
-
-// Our own.
-scene::SceneCommand toCommand(const wire::BatchBegin&) {
-  return scene::BeginBatch{};
-}
-scene::SceneCommand toCommand(const wire::BatchCommit&) {
-  return scene::CommitBatch{};
 }
 scene::SceneCommand toCommand(const wire::MeshVertices& m) {
   scene::SetVertices run{m.object, m.first, {}};
@@ -186,7 +106,7 @@ scene::SceneCommand toCommand(const wire::MeshVertices& m) {
   return run;
 }
 
-// A negative vertex becomes one that no mesh has, and the scene names it in its refusal.
+// A negative vertex number becomes one that no mesh has, so that the scene refuses it by its number.
 std::uint32_t corner(std::int32_t vertex) {
   return vertex < 0 ? std::numeric_limits<std::uint32_t>::max() : static_cast<std::uint32_t>(vertex);
 }
@@ -200,7 +120,7 @@ scene::SceneCommand toCommand(const wire::MeshTriangles& m) {
   return run;
 }
 
-// What a run holds besides its task.
+// Bytes of a bulk message in addition to its SceneTask.
 std::size_t bytesOf(const wire::MeshVertices& m) {
   return m.positions.values.size() * sizeof(float);
 }
@@ -212,7 +132,7 @@ std::size_t bytesOf(const M&) {
   return 0;
 }
 
-// Numbers of a bulk message come by three.
+// A bulk message holds triples.
 template <class M>
 bool isWhole(const M& message, std::string& error) {
   std::size_t numbers = 0;
@@ -220,11 +140,11 @@ bool isWhole(const M& message, std::string& error) {
   if constexpr (std::is_same_v<M, wire::MeshTriangles>) numbers = message.vertices.values.size();
   if (numbers % 3 == 0) return true;
   error = std::string(M::kInfo.name) + ": a list of " + std::to_string(numbers) +
-          " numbers, which is no multiple of three";
+          " numbers, not a multiple of three";
   return false;
 }
 
-// The last task, if it is a run of this client for this object.
+// The last task, when it is a run of this client for this object.
 template <class Run>
 Run* lastRun(std::vector<SceneTask>& tasks, scene::ClientId client, std::int32_t object) {
   if (tasks.empty() || tasks.back().client != client) return nullptr;

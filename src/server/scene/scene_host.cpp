@@ -41,7 +41,7 @@ void SceneHost::play(scene::ClientId client, const scene::SceneCommand* command)
 }
 
 void SceneHost::releaseForces(scene::ClientId client) {
-  if (thread_ && commanders_.count(client) != 0) thread_->pushUrgent({client, ReleaseForces{}});
+  if (thread_ && commanders_.count(client) != 0) thread_->pushUrgent({client, scene::SceneCommand{scene::ReleaseForces{}}});
 }
 
 void SceneHost::clientGone(scene::ClientId client) {

@@ -14,9 +14,6 @@ namespace hapticd::server {
 /// A client left: what it owns ramps out.
 struct ClientGone {};
 
-/// The forces that the client owns ramp out, although it may stay.
-struct ReleaseForces {};
-
 /// Asks for a description of the scene as it is after the tasks before it. The answer comes in the scene thread.
 struct DescribeScene {
   std::function<void(std::shared_ptr<const scene::SceneDescription>)> answer;
@@ -30,7 +27,7 @@ struct WhenPublished {
 /// One thing for the scene to do, from one client.
 struct SceneTask {
   scene::ClientId client = 0;
-  std::variant<scene::SceneCommand, ClientGone, ReleaseForces, DescribeScene, WhenPublished> what;
+  std::variant<scene::SceneCommand, ClientGone, DescribeScene, WhenPublished> what;
 };
 
 }  // namespace hapticd::server

@@ -116,9 +116,7 @@ void SceneThread::apply(SceneTask&& task) {
   std::vector<scene::Notice> repeated;
   for (std::size_t i = seats_.size(); i-- > 0;) {
     scene::SceneBuilder& builder = seats_[i].builder;
-    if (std::holds_alternative<ReleaseForces>(task.what)) {
-      builder.releaseForces(task.client, now);
-    } else if (command == nullptr) {
+    if (command == nullptr) {
       builder.clientGone(task.client, now);
     } else if (i > 0) {
       builder.apply(task.client, scene::SceneCommand(*command), now, repeated);

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cerrno>
 #include <ctime>
-#include <fstream>
-#include <system_error>
+
+#include "base/world.h"
+#include "record/export.h"
 
 namespace hapticd::server {
 namespace {
@@ -17,40 +17,12 @@ using realtime::TickReport;
 
 constexpr std::string_view kExtension = ".csv";
 
-std::string tripNames(std::uint32_t bits) {
-  std::string names;
-  for (const realtime::TripInfo& trip : realtime::kTrips) {
-    if ((bits & realtime::bit(trip.trip)) == 0) continue;
-    if (!names.empty()) names += '+';
-    names += trip.name;
-  }
-  return names;
-}
-
 // What may stand in a file name.
 std::string plain(std::string text) {
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return std::isalnum(c) == 0 && c != '_' && c != '-'; },
       '_');
   return text;
-}
-
-void put(std::ostream& out, const geometry::Vec3& v) {
-  out << ',' << v.x() << ',' << v.y() << ',' << v.z();
-}
-
-void writeTick(std::ostream& out, const TickReport& tick) {
-  const auto& q = tick.device.orientation;
-  out << tick.tick << ',' << tick.time << ',' << tick.timing.wakeupError << ',' << tick.timing.compute << ','
-      << tick.revision;
-  put(out, tick.device.position_m);
-  put(out, tick.device.velocity_m_per_s);
-  out << ',' << q.x() << ',' << q.y() << ',' << q.z() << ',' << q.w() << ',' << tick.device.buttons;
-  put(out, tick.rendering.proxy_m);
-  put(out, tick.rendering.force_N);
-  put(out, tick.force_N);
-  out << ',' << tick.rendering.touchedObject << ',' << tick.rendering.depth_m << ',' << tick.rendering.status
-      << ',' << tripNames(tick.guard.active) << ',' << tripNames(tick.guard.latched) << '\n';
 }
 
 // Names begin with the time, so the oldest sort first.
@@ -66,16 +38,11 @@ void deleteOldest(const fs::path& directory, int keep) {
 
 }  // namespace
 
-void writeBlackBox(const fs::path& file, const std::vector<TickReport>& ticks) {
-  errno = 0;
-  std::ofstream out(file);
-  out.precision(17);
-  out << "tick,time_ns,wakeup_error_ns,compute_ns,revision,x_m,y_m,z_m,vx_m_per_s,vy_m_per_s,vz_m_per_s,qx,qy,"
-         "qz,qw,buttons,proxy_x_m,proxy_y_m,proxy_z_m,rendered_x_N,rendered_y_N,rendered_z_N,written_x_N,"
-         "written_y_N,written_z_N,object,depth_m,status,active,latched\n";
-  for (const TickReport& tick : ticks) writeTick(out, tick);
+void writeBlackBox(const fs::path& file, const std::string& device, const std::vector<TickReport>& ticks) {
+  const base::Nanos wallOffset = base::wallNow() - base::now();
+  record::CsvFile out(file);
+  for (const TickReport& tick : ticks) out.add(record::sampleOf(device, tick, wallOffset));
   out.close();
-  if (!out) throw fs::filesystem_error("black box not written", file, {errno, std::generic_category()});
 }
 
 fs::path BlackBoxRecorder::nextFile(const std::string& fault) const {
@@ -95,7 +62,7 @@ void BlackBoxRecorder::look() {
   if (!box_.frozen()) return;
   std::vector<TickReport> ticks = box_.take();
   if (ticks.empty()) return;
-  const std::string fault = tripNames(ticks.back().guard.latched);
+  const std::string fault = namesOf(Trips(ticks.back().guard.latched));
   if (files_.keep == 0) {
     spdlog::warn("device '{}': forces are off: {}", name_, fault);
     return;
@@ -107,7 +74,7 @@ void BlackBoxRecorder::look() {
   writer_ = std::thread([this, file, ticks = std::move(ticks)] {
     try {
       fs::create_directories(file.parent_path());
-      writeBlackBox(file, ticks);
+      writeBlackBox(file, name_, ticks);
       deleteOldest(file.parent_path(), files_.keep);
     } catch (const std::exception& error) {
       spdlog::error("device '{}': {}; set black_box_dir to a directory that can be written", name_,

@@ -16,9 +16,10 @@ struct BlackBoxFiles {
   int keep = 10;  ///< newest files of this device; older ones are deleted. 0: none is written
 };
 
-/// Writes ticks as CSV, oldest first, SI units in the device's frame; columns are named in the first line.
-/// Throws std::filesystem::filesystem_error or std::runtime_error naming the file.
-void writeBlackBox(const std::filesystem::path& file, const std::vector<realtime::TickReport>& ticks);
+/// Writes ticks as CSV, oldest first, with the columns of `hapticd export` (record/sample.h). Throws std::runtime_error
+/// that names the file.
+void writeBlackBox(const std::filesystem::path& file, const std::string& device,
+                   const std::vector<realtime::TickReport>& ticks);
 
 /// Of one device. look() from the net thread; the file is written by a thread of its own.
 class BlackBoxRecorder {

@@ -119,7 +119,7 @@ void Station::Impl::recordTo(record::Recorder& session, SceneDevice& seat) {
                                                   .tick = tickOptions(config, *device)});
   seat.config.stopwatch = session.stopwatch(number);
   seat.publishing = [&session, number](base::Nanos now, std::uint64_t revision) {
-    session.published(number, now, revision);
+    session.recordPublish(number, now, revision);
   };
   tick.recordTo(&session.ring(number));
 }

@@ -78,11 +78,61 @@ TEST(HandFile, NamesFileLineAndValueOfAnError) {
   EXPECT_EQ(errorOf("0,0,0,0\n1,0,0,0,1\n"), "hand.csv:2: 5 columns where 4 are expected");
   EXPECT_EQ(errorOf("0,0,0,0,0,0,0,1,1,1\n"), "hand.csv:1: more than 9 columns");
   EXPECT_EQ(errorOf("t,x,y,z\n0,0,0,0\n"),
-            "hand.csv:1: header 't,x,y,z' is not t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons]");
+            "hand.csv:1: header 't,x,y,z' is not t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons] and has no columns "
+            "time_ns,hip_x_m,hip_y_m,hip_z_m");
   EXPECT_EQ(errorOf("0,0,0,0,1,1,0,1\n"), "hand.csv:1: quaternion of length 1.732051 is not a rotation");
   EXPECT_EQ(errorOf("0,0,0,0,1.5\n"), "hand.csv:1: buttons 1.500000 is not a set of bits");
   EXPECT_EQ(errorOf(""), "hand.csv: no row with a hand in it");
   EXPECT_EQ(errorOf("t_s,x_m,y_m,z_m\n"), "hand.csv: no row with a hand in it");
+}
+
+TEST(HandFile, ReadsWhatHapticdWrites) {
+  const auto hand = HandFile::parse(
+      "device,time_ns,tick,revision,hip_x_m,hip_y_m,hip_z_m,proxy_x_m,qx,qy,qz,qw,buttons,guard_active,gripper_rad\n"
+      "\"Left, my\",1700000000123456789,1,1,0.01,0.02,0.03,9,0,0,0,1,2,late+speed,\n"
+      "\"Left, my\",1700000000124456789,2,1,0.02,0.02,0.03,9,0,0,1,0,0,,\n",
+      "h");
+  EXPECT_EQ(hand->rows(), 2U);
+  EXPECT_EQ(hand->begin(), 0);
+  EXPECT_EQ(hand->duration(), 1 * kMs);
+  EXPECT_EQ(hand->at(0).position_m, Vec3(0.01, 0.02, 0.03));
+  EXPECT_EQ(hand->at(0).buttons, 2U);
+  EXPECT_EQ(hand->at(kMs).orientation.coeffs(), Quat(0, 0, 0, 1).coeffs());
+  EXPECT_EQ(hand->remark(), "");
+}
+
+TEST(HandFile, ReadsTheFilesOfOlderVersionsAndRemarksOnIt) {
+  const struct {
+    const char* text;
+    const char* remark;
+  } kCases[] = {
+      // export and record, watch --csv, render --out, black box
+      {"device,time_ns,tick,hand_x_m,hand_y_m,hand_z_m\nP,5000000,1,1,2,3\nP,6000000,2,4,5,6\n",
+       "reads 'time_ns' and 'hand_x_m', columns of an older version of hapticd"},
+      {"time_s,tick,hand_x_m,hand_y_m,hand_z_m\n1700000000.005000,1,1,2,3\n1700000000.006000,2,4,5,6\n",
+       "reads 'time_s' and 'hand_x_m', columns of an older version of hapticd"},
+      {"t_s,hip_x_m,hip_y_m,hip_z_m,depth_m\n0,1,2,3,0\n0.001,4,5,6,0\n",
+       "reads 't_s' and 'hip_x_m', columns of an older version of hapticd"},
+      {"tick,time_ns,x_m,y_m,z_m,active\n1,5000000,1,2,3,\n2,6000000,4,5,6,late\n",
+       "reads 'time_ns' and 'x_m', columns of an older version of hapticd"},
+  };
+  for (const auto& c : kCases) {
+    const auto hand = HandFile::parse(c.text, "h");
+    EXPECT_EQ(hand->rows(), 2U);
+    EXPECT_EQ(hand->begin(), 0);
+    EXPECT_NEAR(static_cast<double>(hand->duration()), kMs, 1000);
+    EXPECT_EQ(hand->at(hand->duration()).position_m, Vec3(4, 5, 6));
+    EXPECT_EQ(hand->remark(), c.remark);
+  }
+  EXPECT_EQ(HandFile::parse("t_s,x_m,y_m,z_m\n0,0,0,0\n", "h")->remark(), "");
+}
+
+TEST(HandFile, UsesTheFirstOfSeveralDevices) {
+  const auto hand = HandFile::parse(
+      "device,time_ns,hip_x_m,hip_y_m,hip_z_m\nA,10,1,0,0\nB,10,2,0,0\nA,20,3,0,0\nB,20,4,0,0\n", "h");
+  EXPECT_EQ(hand->rows(), 2U);
+  EXPECT_EQ(hand->at(10).position_m.x(), 3);
+  EXPECT_EQ(hand->remark(), "holds several devices, only the first is used: A");
 }
 
 TEST(HandFile, LoadsFromDiskAndNamesWhatIsNotThere) {

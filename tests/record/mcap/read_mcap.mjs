@@ -41,7 +41,7 @@ for await (const message of reader.readMessages()) {
   if (message.logTime < last) fail(`time goes back at ${topic}`);
   last = message.logTime;
   if (topic.endsWith("/tick")) ticks.push(value);
-  if (topic.endsWith("/hand") && value.pose.position.x === undefined) fail("a pose without a position");
+  if (topic.endsWith("/hip") && value.pose.position.x === undefined) fail("a pose without a position");
 }
 await handle.close();
 

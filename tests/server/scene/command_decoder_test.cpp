@@ -108,6 +108,84 @@ TEST_F(CommandDecoderTest, ExactlyTheSceneMessagesAreDecoded) {
   }
 }
 
+// Gives every number of a message another value, and lists them.
+struct NumberFiller {
+  std::vector<double> numbers;
+  std::string text;
+
+  template <class T>
+  requires std::is_arithmetic_v<T>
+  void operator()(const char*, T& value, const char* = "") {
+    value = static_cast<T>(std::is_same_v<T, wire::Bool16> ? 1 : numbers.size() + 1);
+    numbers.push_back(static_cast<double>(value));
+  }
+  template <class T, std::size_t N>
+  void operator()(const char*, std::array<T, N>& list, const char* = "") {
+    for (T& value : list) (*this)("", value);
+  }
+  template <std::size_t N>
+  void operator()(const char*, wire::NameBuffer<N>& name, const char* = "") {
+    name = wire::NameBuffer<N>(text = "a name");
+  }
+  template <class Count, class T, std::size_t Max>
+  void operator()(const char*, wire::Counted<Count, T, Max>&, const char* = "") {}
+};
+
+// Lists the numbers of a command.
+struct NumberLister {
+  std::vector<double> numbers;
+  std::string text;
+
+  template <class T>
+  requires std::is_arithmetic_v<T>
+  void operator()(const char*, const T& value) { numbers.push_back(static_cast<double>(value)); }
+  template <class T, std::size_t N>
+  void operator()(const char*, const std::array<T, N>& list) {
+    for (const T& value : list) numbers.push_back(static_cast<double>(value));
+  }
+  void operator()(const char*, const geometry::Vec3& v) { numbers.insert(numbers.end(), v.data(), v.data() + 3); }
+  void operator()(const char*, const std::string& name) { text = name; }
+  template <class T>
+  void operator()(const char*, const T&) {}
+};
+
+TEST_F(CommandDecoderTest, CommandsWithTheMembersOfTheirMessageGetItsValuesInOrder) {
+  int compared = 0;
+  wire::forEachMessage(wire::SceneMessages{}, [&]<class M>() {
+    scene::forEachCommand([&]<class Command>() {
+      if (Command::kInfo.message != M::kInfo.name) return;
+      M message;
+      NumberFiller expected;
+      M::fields(message, expected);
+      give(message);
+      NumberLister got;
+      fields(only<Command>(), got);
+      EXPECT_EQ(got.numbers, expected.numbers) << M::kInfo.name;
+      EXPECT_EQ(got.text, expected.text) << M::kInfo.name;
+      ++compared;
+    });
+  });
+  EXPECT_GE(compared, 32);
+}
+
+TEST_F(CommandDecoderTest, APlaneKeepsEachOfItsValues) {
+  give(wire::Plane{.plane = {1, 2, 3, 4},
+                   .stiffness = 5,
+                   .damping = 6,
+                   .dynamic_friction = 7,
+                   .static_friction = 8,
+                   .index = 9,
+                   .recovery_cycles = 10});
+  const auto& plane = only<scene::SetPlane>();
+  EXPECT_EQ(plane.plane, (std::array<double, 4>{1, 2, 3, 4}));
+  EXPECT_EQ(plane.stiffness, 5);
+  EXPECT_EQ(plane.damping, 6);
+  EXPECT_EQ(plane.dynamicFriction, 7);
+  EXPECT_EQ(plane.staticFriction, 8);
+  EXPECT_EQ(plane.index, 9);
+  EXPECT_EQ(plane.recoveryCycles, 10);
+}
+
 TEST_F(CommandDecoderTest, BulkMeshesAreRunsInTheMeshesOwnUnit) {
   EXPECT_EQ(give(wire::MeshVertices{3, 10, {{0, 1, 2, 3, 4, 5}}}), CommandDecoder::Outcome::taken);
   EXPECT_EQ(give(wire::MeshTriangles{3, 7, {{0, 1, 2, 2, 1, -1}}}), CommandDecoder::Outcome::taken);

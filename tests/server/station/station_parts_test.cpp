@@ -177,9 +177,20 @@ TEST_F(BlackBoxFilesTest, AFaultIsWrittenWithTheTicksBeforeIt) {
   ASSERT_EQ(lines.size(), 6U);
   const auto columns = [](const std::string& line) { return std::count(line.begin(), line.end(), ','); };
   for (const std::string& line : lines) EXPECT_EQ(columns(line), columns(lines[0]));
-  EXPECT_TRUE(lines[1].starts_with("4,"));
-  EXPECT_TRUE(lines[5].starts_with("8,"));
-  EXPECT_TRUE(lines[5].ends_with(",speed"));
+  const auto cell = [&](std::size_t line, const std::string& column) {
+    const auto cells = [](const std::string& text) {
+      std::vector<std::string> all;
+      std::istringstream in_(text);
+      for (std::string one; std::getline(in_, one, ',');) all.push_back(one);
+      return all;
+    };
+    const auto names = cells(lines[0]);
+    return cells(lines[line])[static_cast<std::size_t>(std::find(names.begin(), names.end(), column) - names.begin())];
+  };
+  EXPECT_EQ(cell(1, "tick"), "4");
+  EXPECT_EQ(cell(5, "tick"), "8");
+  EXPECT_EQ(cell(5, "guard_latched"), "speed");
+  EXPECT_EQ(cell(5, "device"), "Phantom/1");
 }
 
 TEST_F(BlackBoxFilesTest, OnlyTheNewestAreKept) {

@@ -1,39 +1,18 @@
-#include "record/pack_commands.h"
-
-#include "record/fields.h"
+#include "record/scene_event_codec.h"
 
 namespace hapticd::record {
 namespace {
 
 constexpr std::uint16_t kClientGone = 0;
 
-template <class C>
-constexpr CommandEntry<C> entryOf() {
-  CommandEntry<C> found{};
-  std::apply(
-      [&](const auto&... entry) {
-        const auto look = [&]<class E>(const E& e) {
-          if constexpr (std::same_as<E, CommandEntry<C>>) found = e;
-        };
-        (look(entry), ...);
-      },
-      kCommands);
-  return found;
-}
-
 // False when no command has this number.
 bool takeCommand(std::uint16_t number, Unpacker& in, scene::SceneCommand& command) {
   bool known = false;
-  std::apply(
-      [&](const auto&... entry) {
-        const auto look = [&]<class C>(const CommandEntry<C>& e) {
-          if (e.number != number) return;
-          known = true;
-          in.take(command.emplace<C>());
-        };
-        (look(entry), ...);
-      },
-      kCommands);
+  scene::forEachCommand([&]<class C>() {
+    if (commandNumber<C>() != number) return;
+    known = true;
+    in.take(command.emplace<C>());
+  });
   return known;
 }
 
@@ -51,7 +30,7 @@ void packSceneEvent(Bytes& out, std::uint32_t scene, scene::ClientId client, Nan
   }
   std::visit(
       [&]<class C>(const C& c) {
-        pack.put(entryOf<C>().number);
+        pack.put(commandNumber<C>());
         pack.put(c);
       },
       *command);
@@ -65,16 +44,16 @@ bool unpackSceneEvent(ByteView bytes, SceneEvent& event, std::string& error) {
   in.take(event.time);
   const auto number = in.next<std::uint16_t>();
   if (in.ok() && number != kClientGone && !takeCommand(number, in, event.command.emplace())) {
-    error = "a scene command of number " + std::to_string(number) + ", which this version does not know";
+    error = "unknown scene command number " + std::to_string(number) + "; use the hapticd that wrote the file";
     return false;
   }
   if (in.ok() && in.rest().empty()) return true;
-  error = in.ok() ? "a scene event that is longer than it should be" : "a scene event that is cut short";
+  error = in.ok() ? "a scene event is longer than its content" : "a scene event is truncated";
   return false;
 }
 
 const char* nameOf(const scene::SceneCommand& command) {
-  return std::visit([]<class C>(const C&) { return entryOf<C>().name; }, command);
+  return std::visit([]<class C>(const C&) { return C::kInfo.name; }, command);
 }
 
 }  // namespace hapticd::record
