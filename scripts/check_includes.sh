@@ -25,14 +25,6 @@ LIST
 # Files that still reach past src/base.
 seam_exceptions() {
   cat <<'LIST'
-src/server/config/config.cpp
-src/server/player.cpp
-src/server/player.h
-src/server/server.cpp
-src/server/station/black_box_recorder.cpp
-src/server/station/black_box_recorder.h
-src/server/station/device_keeper.cpp
-src/server/station/device_keeper.h
 LIST
 }
 

@@ -1,6 +1,5 @@
 #include "server/player.h"
 
-#include <chrono>
 #include <optional>
 
 #include "base/world.h"
@@ -50,71 +49,68 @@ ServerConfig Player::config() const {
 
 void Player::start(Callbacks callbacks) {
   callbacks_ = std::move(callbacks);
-  thread_ = std::thread([this] { run(); });
+  thread_ = base::Thread({.name = "player"}, [this] { return step(); });
 }
 
 void Player::stop() {
-  {
-    const std::lock_guard lock(mutex_);
-    stopping_ = true;
-  }
-  wake_.notify_one();
-  if (thread_.joinable()) thread_.join();
+  stopping_ = true;
+  thread_.stop();
 }
 
-void Player::run() {
-  std::string remark = playOnce();
-  while (options_.loop && remark.empty() && began_ && waitFor(firstRecorded_)) {
-    callbacks_.restart();
-    remark = playOnce();
-  }
-  const std::lock_guard lock(mutex_);
-  if (!stopping_) callbacks_.over(remark);
-}
-
-// What ended the file early, if something did.
-std::string Player::playOnce() {
-  began_ = false;
-  ahead_.clear();
-  try {
-    record::RecordingReader reader(options_.file);
-    for (bool more = true; more || !ahead_.empty();) {
-      more = more && readAhead(reader);
-      if (ahead_.empty()) continue;
+std::optional<Nanos> Player::step() {
+  while (!stopping_ && !over_) {
+    try {
+      if (!reader_) reader_ = std::make_unique<record::RecordingReader>(options_.file);
+      readAhead();
+      if (ahead_.empty()) {
+        endPass(reader_->remark());
+        continue;
+      }
       const auto next = ahead_.begin();
-      if (!waitFor(next->first)) return {};
+      if (const Nanos due = dueAt(next->first); base::now() < due) return due;
       play(next->second);
       ahead_.erase(next);
+    } catch (const record::RecordingError& error) {
+      endPass(error.what());
     }
-    return reader.remark();
-  } catch (const record::RecordingError& error) {
-    return error.what();
+  }
+  return std::nullopt;
+}
+
+void Player::readAhead() {
+  while (!atEnd_ && (ahead_.empty() || ahead_.rbegin()->first - ahead_.begin()->first < kAhead)) {
+    RecordingEvent event;
+    atEnd_ = !reader_->next(event);
+    if (atEnd_) return;
+    if (const auto time = timeOf(event)) ahead_.emplace(*time, std::move(event));
   }
 }
 
-// False at the end of the file.
-bool Player::readAhead(record::RecordingReader& reader) {
-  while (ahead_.empty() || ahead_.rbegin()->first - ahead_.begin()->first < kAhead) {
-    RecordingEvent event;
-    if (!reader.next(event)) return false;
-    if (const auto time = timeOf(event)) ahead_.emplace(*time, std::move(event));
+// `remark`: why the file ended early, if it did.
+void Player::endPass(const std::string& remark) {
+  if (options_.loop && remark.empty() && began_) {
+    callbacks_.restart();
+  } else {
+    over_ = true;
+    callbacks_.over(remark);
   }
-  return true;
+  reader_.reset();
+  ahead_.clear();
+  atEnd_ = false;
+  began_ = false;
 }
 
 Nanos Player::live(Nanos recorded) const {
   return firstLive_ + static_cast<Nanos>(static_cast<double>(recorded - firstRecorded_) / options_.speed);
 }
 
-// False when it is time to leave.
-bool Player::waitFor(Nanos recorded) {
+// The first event of a pass is due at once.
+Nanos Player::dueAt(Nanos recorded) {
   if (!std::exchange(began_, true)) {
     firstRecorded_ = recorded;
     firstLive_ = base::now();
   }
-  std::unique_lock lock(mutex_);
-  const auto wait = std::chrono::nanoseconds(std::max<Nanos>(live(recorded) - base::now(), 0));
-  return !wake_.wait_for(lock, wait, [this] { return stopping_; });
+  return live(recorded);
 }
 
 void Player::play(RecordingEvent& event) {

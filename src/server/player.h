@@ -2,15 +2,14 @@
 // which it was, or faster or slower.
 #pragma once
 
-#include <condition_variable>
+#include <atomic>
 #include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
-#include <thread>
+#include <optional>
 
-#include "base/time.h"
+#include "base/thread.h"
 #include "record/recording_reader.h"
 #include "server/config/config.h"
 
@@ -53,10 +52,10 @@ class Player {
   void stop();
 
  private:
-  void run();
-  std::string playOnce();
-  bool readAhead(record::RecordingReader& reader);
-  bool waitFor(base::Nanos recorded);
+  std::optional<base::Nanos> step();
+  void readAhead();
+  void endPass(const std::string& remark);
+  base::Nanos dueAt(base::Nanos recorded);
   base::Nanos live(base::Nanos recorded) const;
   void play(record::RecordingEvent& event);
 
@@ -65,15 +64,16 @@ class Player {
   Callbacks callbacks_;
 
   // The thread's.
+  std::unique_ptr<record::RecordingReader> reader_;  // of this pass through the file
   std::multimap<base::Nanos, record::RecordingEvent> ahead_;
-  bool began_ = false;
+  bool atEnd_ = false;  // of the file
+  bool began_ = false;  // an event of this pass was played
+  bool over_ = false;
   base::Nanos firstRecorded_ = 0;
   base::Nanos firstLive_ = 0;
 
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  bool stopping_ = false;
-  std::thread thread_;
+  std::atomic<bool> stopping_{false};
+  base::Thread thread_;
 };
 
 }  // namespace hapticd::server

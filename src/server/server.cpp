@@ -33,7 +33,7 @@ bool isLoopback(std::uint32_t address) {
 
 // The name may hold the time, so that every start of a server has a file of its own.
 std::unique_ptr<record::Recorder> openRecording(const std::string& name) {
-  const std::time_t now = std::time(nullptr);
+  const auto now = static_cast<std::time_t>(base::wallNow() / 1'000'000'000);
   std::tm local{};
   localtime_r(&now, &local);
   char path[4096] = {};

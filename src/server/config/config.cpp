@@ -2,11 +2,11 @@
 
 #include <toml++/toml.h>
 #include <algorithm>
-#include <fstream>
 #include <limits>
 #include <set>
 #include <sstream>
 
+#include "base/world.h"
 #include "server/config/config_fields.h"
 #include "server/config/vrpn_cfg.h"
 
@@ -203,12 +203,15 @@ const toml::node& placeOf(const InvalidValue& error, const toml::table& root) {
 }  // namespace
 
 ServerConfig loadConfig(const std::filesystem::path& file, std::vector<std::string>& remarks) {
-  std::ifstream in(file);
-  if (!in) throw ConfigError("cannot read the configuration file '" + file.string() + "'");
-  std::ostringstream text;
-  text << in.rdbuf();
-  if (file.extension() == ".cfg") return parseVrpnCfg(text.str(), file.string(), remarks);
-  return parseConfig(text.str(), file.string());
+  std::vector<std::byte> bytes;
+  try {
+    bytes = base::world().files.read(file);
+  } catch (const std::system_error& error) {
+    throw ConfigError("cannot read the configuration file '" + file.string() + "': " + error.code().message());
+  }
+  const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (file.extension() == ".cfg") return parseVrpnCfg(text, file.string(), remarks);
+  return parseConfig(text, file.string());
 }
 
 ServerConfig parseConfig(const std::string& text, const std::string& source) {

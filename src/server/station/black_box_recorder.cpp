@@ -27,13 +27,11 @@ std::string plain(std::string text) {
 
 // Names begin with the time, so the oldest sort first.
 void deleteOldest(const fs::path& directory, int keep) {
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(directory)) {
-    if (entry.path().extension() == kExtension) files.push_back(entry.path());
-  }
-  std::sort(files.begin(), files.end());
-  const auto tooMany = static_cast<std::ptrdiff_t>(files.size()) - keep;
-  for (std::ptrdiff_t i = 0; i < tooMany; ++i) fs::remove(files[static_cast<std::size_t>(i)]);
+  base::Files& files = base::world().files;
+  std::vector<std::string> names = files.list(directory);
+  std::erase_if(names, [](const std::string& name) { return fs::path(name).extension() != kExtension; });
+  const auto tooMany = static_cast<std::ptrdiff_t>(names.size()) - keep;
+  for (std::ptrdiff_t i = 0; i < tooMany; ++i) files.remove(directory / names[static_cast<std::size_t>(i)]);
 }
 
 }  // namespace
@@ -46,14 +44,14 @@ void writeBlackBox(const fs::path& file, const std::string& device, const std::v
 }
 
 fs::path BlackBoxRecorder::nextFile(const std::string& fault) const {
-  timespec now{};
-  clock_gettime(CLOCK_REALTIME, &now);
+  const base::Nanos now = base::wallNow();
+  const auto seconds = static_cast<std::time_t>(now / 1'000'000'000);
   std::tm utc{};
-  gmtime_r(&now.tv_sec, &utc);
+  gmtime_r(&seconds, &utc);
   char stamp[32] = {};
   std::strftime(stamp, sizeof stamp, "%Y%m%dT%H%M%S", &utc);
   char fraction[8] = {};
-  std::snprintf(fraction, sizeof fraction, ".%03dZ", static_cast<int>(now.tv_nsec / 1000000 % 1000));
+  std::snprintf(fraction, sizeof fraction, ".%03dZ", static_cast<int>(now / 1'000'000 % 1000));
   return files_.directory / plain(name_) /
          (std::string(stamp) + fraction + "-" + plain(fault) + std::string(kExtension));
 }
@@ -71,20 +69,23 @@ void BlackBoxRecorder::look() {
   spdlog::warn("device '{}': forces are off: {}; the {} ticks before it go to {}", name_, fault, ticks.size(),
                file.string());
   finish();
-  writer_ = std::thread([this, file, ticks = std::move(ticks)] {
+  writer_ = base::Thread({.name = "black box"}, [this, file, ticks = std::move(ticks)]() mutable -> std::optional<base::Nanos> {
+    const std::vector<TickReport> box = std::exchange(ticks, {});
+    if (box.empty()) return std::nullopt;  // written already
     try {
-      fs::create_directories(file.parent_path());
-      writeBlackBox(file, name_, ticks);
+      base::world().files.createFolder(file.parent_path());
+      writeBlackBox(file, name_, box);
       deleteOldest(file.parent_path(), files_.keep);
     } catch (const std::exception& error) {
       spdlog::error("device '{}': {}; set black_box_dir to a directory that can be written", name_,
                     error.what());
     }
+    return std::nullopt;
   });
 }
 
 void BlackBoxRecorder::finish() {
-  if (writer_.joinable()) writer_.join();
+  writer_.stop();
 }
 
 }  // namespace hapticd::server

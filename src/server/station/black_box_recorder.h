@@ -3,9 +3,9 @@
 
 #include <filesystem>
 #include <string>
-#include <thread>
 #include <vector>
 
+#include "base/thread.h"
 #include "realtime/servo/black_box.h"
 
 namespace hapticd::server {
@@ -42,7 +42,7 @@ class BlackBoxRecorder {
   std::string name_;
   BlackBoxFiles files_;
   realtime::BlackBox& box_;
-  std::thread writer_;
+  base::Thread writer_;
 };
 
 }  // namespace hapticd::server

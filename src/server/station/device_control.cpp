@@ -20,6 +20,18 @@ bool finite(const wire::HoldHand& m) {
 
 }  // namespace
 
+void DeviceControl::stopForces(const Order& order) {
+  stop_ = order;
+  guard_.stop();
+}
+
+bool DeviceControl::rearmForces(const Order& order) {
+  const bool sentEarlier = order.address == stop_.address && order.sent < stop_.sent;
+  if (order.received <= stop_.received || sentEarlier) return false;
+  guard_.rearm();
+  return true;
+}
+
 bool DeviceControl::hold(scene::ClientId client, const wire::HoldHand& wanted,
                          const realtime::TickReport& last, Refusal& refusal) {
   if (hand_ == nullptr) {

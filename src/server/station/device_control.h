@@ -1,7 +1,6 @@
 // Stop, re-arm and holding the simulated hand: what clients may do to the device itself.
 #pragma once
 
-#include <algorithm>
 #include <optional>
 #include <string>
 
@@ -21,18 +20,17 @@ class DeviceControl {
   DeviceControl(realtime::GuardControl& guard, device::SteeredHand* hand, const geometry::Box& workspace_m)
       : guard_(guard), hand_(hand), workspace_m_(workspace_m) {}
 
-  /// Zero force until a re-arm that was received later than this.
-  void stopForces(base::Nanos received) {
-    stopped_ = std::max(stopped_, received);
-    guard_.stop();
-  }
-  /// False, and nothing happens, when a stop was received at the same time or later: the re-arm was sent without
-  /// knowing of it.
-  bool rearmForces(base::Nanos received) {
-    if (received <= stopped_) return false;
-    guard_.rearm();
-    return true;
-  }
+  /// A stop or a re-arm on its way.
+  struct Order {
+    base::Nanos received = 0;  ///< when the server read it, on the servo clock
+    base::Nanos sent = 0;      ///< its time stamp, on the clock of the machine that sent it
+    std::string address;       ///< of that machine
+  };
+  /// Zero force until a re-arm that was sent later.
+  void stopForces(const Order& order);
+  /// False, and nothing happens, when a stop came after the re-arm: it was received at the same time or later, or the same
+  /// machine sent it later, by another connection.
+  bool rearmForces(const Order& order);
   /// After a reset of the scene: what is felt then comes in gently.
   void rampIn() { guard_.rampIn(); }
 
@@ -51,7 +49,7 @@ class DeviceControl {
   device::SteeredHand* hand_;
   geometry::Box workspace_m_;
   std::optional<scene::ClientId> holder_;
-  base::Nanos stopped_ = 0;  // when the last stop was received
+  Order stop_;  // the last one
 };
 
 }  // namespace hapticd::server

@@ -26,7 +26,7 @@ void DeviceKeeper::start() {
 }
 
 void DeviceKeeper::stop() noexcept {
-  if (attempt_.joinable()) attempt_.join();
+  if (attempt_.running()) attempt_.stop();
   stopLoop();
 }
 
@@ -64,9 +64,9 @@ void DeviceKeeper::stopLoop() noexcept {
 
 std::string DeviceKeeper::look(Nanos now) {
   sayPacedSetup();
-  if (attempt_.joinable()) {
+  if (attempt_.running()) {
     if (!attempted_.load(std::memory_order_acquire)) return doing_;
-    attempt_.join();
+    attempt_.stop();
     nextAttempt_ = now + kBetweenAttempts;
     lostSince_ = 0;
   }
@@ -91,16 +91,18 @@ std::string DeviceKeeper::look(Nanos now) {
 }
 
 void DeviceKeeper::calibrate() {
-  if (attempt_.joinable() || !refusal_.empty()) return;
+  if (attempt_.running() || !refusal_.empty()) return;
   begin("the device is being calibrated: keep hands off", [this] { tryToCalibrate(); });
 }
 
 void DeviceKeeper::begin(std::string doing, std::function<void()> attempt) {
   doing_ = std::move(doing);
   attempted_ = false;
-  attempt_ = std::thread([this, attempt = std::move(attempt)] {
+  attempt_ = base::Thread({.name = "device keeper"}, [this, attempt = std::move(attempt)]() -> std::optional<base::Nanos> {
+    if (attempted_.load(std::memory_order_relaxed)) return std::nullopt;  // the last step, at the end
     attempt();
     attempted_.store(true, std::memory_order_release);
+    return std::nullopt;
   });
 }
 

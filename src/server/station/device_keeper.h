@@ -6,7 +6,6 @@
 #include <functional>
 #include <optional>
 #include <string>
-#include <thread>
 
 #include "base/clock.h"
 #include "realtime/servo/servo_thread.h"
@@ -67,7 +66,7 @@ class DeviceKeeper {
   base::Nanos lostSince_ = 0;  // 0: not lost
   base::Nanos nextAttempt_ = 0;
   std::string doing_;  // of the attempt
-  std::thread attempt_;
+  base::Thread attempt_;
   std::atomic<bool> attempted_{false};
   // Of the last attempt to open and to calibrate; empty when it succeeded. The attempt's until attempted_.
   std::string refusal_;

@@ -19,7 +19,7 @@ namespace hapticd::server {
 struct Request {
   Session& session;
   wire::LocalSender name;  ///< the name under which the client addresses the device
-  base::Nanos received;    ///< when the server read it, on the servo clock
+  DeviceControl::Order order;
 };
 
 struct Station::Impl {
@@ -47,7 +47,7 @@ struct Station::Impl {
   void on(const Request& request, const wire::HoldHand& wanted);
   void on(const Request&, const wire::GetNewObjectId&) {}  // registered by VRPN, never sent
   void on(const Request&, const wire::Heartbeat&) {}           // the session handles it
-  void rearm(Session& session, wire::LocalSender name, base::Nanos received);
+  void rearm(Session& session, wire::LocalSender name, const DeviceControl::Order& order);
 
   const DeviceConfig config;
   const std::vector<wire::LocalSender> names;

@@ -30,7 +30,8 @@ bool Station::mayCommand(const Session& session, std::string& reason) {
 }
 
 void Station::onControl(Session& session, const wire::MessageReceived& message, base::Nanos received) {
-  const Request request{session, message.local_sender, received};
+  const base::Nanos sent = message.time.seconds * base::Nanos{1'000'000'000} + message.time.microseconds * base::Nanos{1000};
+  const Request request{session, message.local_sender, {received, sent, session.address()}};
   const auto handled = wire::dispatchControl(message.kind, message.payload,
                                              [&](const auto& control) { impl_->on(request, control); });
   if (!handled) session.refuse("malformed message: " + handled.error());
@@ -102,21 +103,21 @@ void Station::Impl::on(const Request& request, const wire::QueryCapabilities&) {
 void Station::Impl::on(const Request& request, const wire::StopForces&) {
   spdlog::warn("client {} ({}) stops the forces of '{}'", request.session.id(), request.session.description(),
                config.names.front());
-  control.stopForces(request.received);
+  control.stopForces(request.order);
 }
 
 void Station::Impl::on(const Request& request, const wire::RearmForces&) {
   spdlog::warn("client {} ({}) re-arms the forces of '{}'", request.session.id(), request.session.description(),
                config.names.front());
   rearming.insert(&request.session);
-  scene.whenPublished(request.session.id(), [this, session = &request.session, name = request.name, received = request.received] {
-    if (rearming.count(session) != 0) rearm(*session, name, received);
+  scene.whenPublished(request.session.id(), [this, session = &request.session, name = request.name, order = request.order] {
+    if (rearming.count(session) != 0) rearm(*session, name, order);
   });
 }
 
 // What the client sent before is felt from the first tick with force.
-void Station::Impl::rearm(Session& session, wire::LocalSender name, base::Nanos received) {
-  if (!control.rearmForces(received)) {
+void Station::Impl::rearm(Session& session, wire::LocalSender name, const DeviceControl::Order& order) {
+  if (!control.rearmForces(order)) {
     sendText(session, name, wire::kTextWarning, "Rearm_Forces ignored: the forces were stopped after it was sent");
     session.flush();
     return;

@@ -103,6 +103,21 @@ class HoldTest : public ::testing::Test {
   Refusal refusal_;
 };
 
+TEST_F(HoldTest, ARearmNeverUndoesALaterStop) {
+  const auto order = [](base::Nanos received, base::Nanos sent, const char* address) {
+    return DeviceControl::Order{received, sent, address};
+  };
+  control_.stopForces(order(100, 50, "10.0.0.1"));
+  EXPECT_FALSE(control_.rearmForces(order(99, 60, "10.0.0.1"))) << "received earlier";
+  EXPECT_FALSE(control_.rearmForces(order(100, 60, "10.0.0.1")));
+  EXPECT_FALSE(control_.rearmForces(order(101, 49, "10.0.0.1"))) << "sent earlier by the same machine";
+  EXPECT_TRUE(guard_.stopped());
+  EXPECT_TRUE(control_.rearmForces(order(101, 49, "10.0.0.2"))) << "another machine has another clock";
+  EXPECT_FALSE(guard_.stopped());
+  control_.stopForces(order(200, 150, "10.0.0.1"));
+  EXPECT_TRUE(control_.rearmForces(order(201, 151, "10.0.0.1")));
+}
+
 TEST_F(HoldTest, TheHandGoesWhereItsHolderWantsAndBackWhenLetGo) {
   hand_.open();
   ASSERT_TRUE(control_.hold(1, {.hold = 1, .position = {110, 20, 0}}, last_, refusal_)) << refusal_.text;
