@@ -42,7 +42,8 @@ export const TRIPS = {
 )";
   for (const TripInfo& trip : kTrips) {
     out += "  " + std::string(trip.name) + ": {\n    bit: " + std::to_string(static_cast<int>(trip.trip)) +
-           ",\n    action: " + typeScriptString(nameOf(trip.action)) + ",\n    what: " + typeScriptString(trip.what) +
+           ",\n    action: " + typeScriptString(nameOf(trip.action)) +
+           ",\n    what: " + typeScriptString(trip.what) +
            ",\n    remedy: " + typeScriptString(trip.remedy) + ",\n  },\n";
   }
   out += R"(} as const satisfies Record<string, Trip>;
