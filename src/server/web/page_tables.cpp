@@ -9,7 +9,7 @@ namespace hapticd::server {
 namespace {
 
 // A JSON string is a TypeScript string.
-std::string quoted(std::string_view text) {
+std::string typeScriptString(std::string_view text) {
   return nlohmann::json(text).dump();
 }
 
@@ -42,8 +42,9 @@ export const TRIPS = {
 )";
   for (const TripInfo& trip : kTrips) {
     out += "  " + std::string(trip.name) + ": {\n    bit: " + std::to_string(static_cast<int>(trip.trip)) +
-           ",\n    action: " + quoted(nameOf(trip.action)) + ",\n    what: " + quoted(trip.what) +
-           ",\n    remedy: " + quoted(trip.remedy) + ",\n  },\n";
+           ",\n    action: " + typeScriptString(nameOf(trip.action)) +
+           ",\n    what: " + typeScriptString(trip.what) +
+           ",\n    remedy: " + typeScriptString(trip.remedy) + ",\n  },\n";
   }
   out += R"(} as const satisfies Record<string, Trip>;
 
