@@ -64,7 +64,11 @@ enum class EffectType {
   contactVibration,  ///< a vibration along the surface normal, in contact only
 };
 /// The name on the wire: "constant", "spring", "viscous", "friction", "vibrationMotor" or "vibrationContact".
-HAPTICD_EXPORT std::string_view nameOf(EffectType type) noexcept;
+constexpr std::string_view nameOf(EffectType type) noexcept {
+  constexpr std::string_view kNames[] = {"constant", "spring",         "viscous",
+                                         "friction", "vibrationMotor", "vibrationContact"};
+  return kNames[static_cast<std::size_t>(type)];
+}
 
 /// A force that belongs to no object. The type decides which fields count: use the functions below.
 struct Effect {

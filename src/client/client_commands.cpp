@@ -3,12 +3,6 @@
 
 namespace hapticd {
 
-std::string_view nameOf(EffectType type) noexcept {
-  static constexpr std::string_view kNames[] = {"constant", "spring",         "viscous",
-                                                "friction", "vibrationMotor", "vibrationContact"};
-  return kNames[static_cast<std::size_t>(type)];
-}
-
 // --- scene, world units
 
 void Client::setObjectCount(int count) {
