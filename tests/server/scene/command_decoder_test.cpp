@@ -138,7 +138,7 @@ struct NumberLister {
 
   template <class T>
   requires std::is_arithmetic_v<T>
-  void operator()(const char*, T value) { numbers.push_back(static_cast<double>(value)); }
+  void operator()(const char*, const T& value) { numbers.push_back(static_cast<double>(value)); }
   template <class T, std::size_t N>
   void operator()(const char*, const std::array<T, N>& list) {
     for (const T& value : list) numbers.push_back(static_cast<double>(value));
