@@ -217,7 +217,7 @@ void Server::run() {
 void Server::everySecond() {
   clock_.refresh();
   closeStaleHandshakes();
-  noise_.newSecond();
+  throttledLog_.reportSuppressed();
   if (web_) web_->everySecond();
 }
 
@@ -274,14 +274,14 @@ void Server::addSession(net::Connection connection, std::unique_ptr<net::UdpSock
 void Server::onUdpRequest(std::span<const std::byte> datagram, const net::Endpoint& from) {
   const auto request = wire::parseUdpRequest(datagram);
   if (!request) {
-    noise_.warn("datagram from " + from.text() + " is no connection request: " + request.error());
+    throttledLog_.warn("datagram from " + from.text() + " is no connection request: " + request.error());
     return;
   }
   net::Endpoint client;
   try {
     client = net::Endpoint::parse(request->host, request->port);
   } catch (const net::Error& error) {
-    noise_.warn("connection request from " + from.text() + " refused: " + error.what());
+    throttledLog_.warn("connection request from " + from.text() + " refused: " + error.what());
     return;
   }
   // A forged request must not make this server connect to third parties.
@@ -289,7 +289,7 @@ void Server::onUdpRequest(std::span<const std::byte> datagram, const net::Endpoi
       client.address == from.address || (isLoopback(client.address) && isLoopback(from.address));
   const auto& allowed = config_.callbackHosts;
   if (!itself && std::find(allowed.begin(), allowed.end(), request->host) == allowed.end()) {
-    noise_.warn("connection request from " + from.text() + " names another host, " + client.text() +
+    throttledLog_.warn("connection request from " + from.text() + " names another host, " + client.text() +
                 ": refused; allow it with callback_hosts");
     return;
   }
@@ -317,7 +317,7 @@ void Server::connectBack(const net::Endpoint& client) {
              net::Connection connection = std::move(pending->connection);
              forget();
              if (connection.remote() == net::Endpoint{connection.local().address, address().port}) {
-               noise_.warn("connection request names this server itself: refused");
+               throttledLog_.warn("connection request names this server itself: refused");
                return;
              }
              addSession(std::move(connection), std::move(udp), SessionMode::udp);
@@ -326,7 +326,7 @@ void Server::connectBack(const net::Endpoint& client) {
        .onDrained = {},
        .onClosed =
            [this, client, forget](const std::string& reason) {
-             noise_.warn("calling back " + client.text() + ": " + reason);
+             throttledLog_.warn("calling back " + client.text() + ": " + reason);
              forget();
            }});
   reverseConnections_.push_back(std::move(owned));
@@ -429,7 +429,7 @@ bool Server::mayCommand(Session& session, Station& station, const wire::MessageR
   std::string reason;
   if (!wire::needsControl(message.kind) || station.mayCommand(session, reason)) return true;
   // One text for each read: a refused upload has thousands of messages.
-  if (std::exchange(refused_, session.id()) != session.id()) {
+  if (std::exchange(refusalSentTo_, session.id()) != session.id()) {
     session.send(message.local_sender,
                  wire::Text{.severity = wire::kTextError,
                             .level = static_cast<std::uint32_t>(RefusalCode::notPermitted),
@@ -439,7 +439,7 @@ bool Server::mayCommand(Session& session, Station& station, const wire::MessageR
 }
 
 void Server::onRemark(const Session& session, const std::string& text) {
-  noise_.warn("client " + std::to_string(session.id()) + ": " + text);
+  throttledLog_.warn("client " + std::to_string(session.id()) + ": " + text);
 }
 
 // A client that sends a lot must not delay the reports to others.
@@ -448,7 +448,7 @@ void Server::onReadSlice() {
 }
 
 void Server::onReadEnd(Session& session) {
-  refused_ = 0;
+  refusalSentTo_ = 0;
   for (const auto& scene : scenes_) {
     scene->flush(session.id());
     if (scene->full(session.id())) session.hold();

@@ -16,7 +16,7 @@
 #include "record/recorder.h"
 #include "server/session/wall_clock.h"
 #include "server/config/config.h"
-#include "server/session/noise_log.h"
+#include "server/session/throttled_log.h"
 #include "server/player.h"
 #include "server/scene/scene_host.h"
 #include "server/session/session.h"
@@ -87,7 +87,7 @@ class Server final : public SessionOwner, public WebOwner {
   ServerConfig config_;
   net::Loop loop_;
   WallClock clock_;
-  NoiseLog noise_;
+  ThrottledLog throttledLog_;
   wire::LocalNames names_;
   std::unique_ptr<Player> player_;              ///< null: live
   std::unique_ptr<record::Recorder> recorder_;  ///< outlives who tells it
@@ -95,7 +95,7 @@ class Server final : public SessionOwner, public WebOwner {
   std::vector<std::unique_ptr<Station>> stations_;
   std::map<scene::ClientId, std::unique_ptr<Session>> sessions_;
   std::map<scene::ClientId, base::Nanos> handshakes_;  ///< when the unfinished ones began
-  scene::ClientId refused_ = 0;  ///< whose commands of this read were refused; 0: nobody's
+  scene::ClientId refusalSentTo_ = 0;  ///< whose commands of this read were refused; 0: nobody's
   std::vector<std::unique_ptr<ReverseConnection>> reverseConnections_;
   std::vector<net::Subscription> subscriptions_;
   std::unique_ptr<net::TcpListener> listener_;

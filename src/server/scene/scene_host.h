@@ -61,7 +61,7 @@ class SceneHost {
   Post post_;
   std::unique_ptr<SceneThread> thread_;
   CommandDecoder decoder_;
-  std::set<scene::ClientId> commanders_;  // clients that sent a command to the scene
+  std::set<scene::ClientId> commandingClients_;  // clients that sent a command to the scene
 };
 
 }  // namespace hapticd::server

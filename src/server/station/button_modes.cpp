@@ -4,7 +4,7 @@
 
 namespace hapticd::server {
 
-bool ButtonModes::obey(const wire::ButtonAdmin& admin, std::vector<wire::ButtonAlert>& alerts,
+bool ButtonModes::setMode(const wire::ButtonAdmin& admin, std::vector<wire::ButtonAlert>& alerts,
                        std::string& error) {
   const bool momentary = admin.event == wire::kButtonMomentary;
   const bool on = admin.event == wire::kButtonToggleOn;

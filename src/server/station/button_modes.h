@@ -16,7 +16,7 @@ class ButtonModes {
 
   /// Obeys an Admin message; what its toggles then stand at is appended to `alerts`. Returns false for a
   /// button that does not exist or a mode that is none; `error` then says what was wrong.
-  bool obey(const wire::ButtonAdmin& admin, std::vector<wire::ButtonAlert>& alerts, std::string& error);
+  bool setMode(const wire::ButtonAdmin& admin, std::vector<wire::ButtonAlert>& alerts, std::string& error);
 
   /// From the device's buttons to what clients see: a toggle changes when its button goes down.
   std::uint32_t apply(std::uint32_t pressed, std::vector<wire::ButtonAlert>& alerts);

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "scene/workspace.h"
-#include "server/reports/view.h"
+#include "server/reports/client_tick.h"
 
 namespace hapticd::server {
 namespace {

@@ -4,9 +4,9 @@
 
 #include "base/world.h"
 #include "device/simulated/simulated_device.h"
-#include "server/station/answers.h"
+#include "server/station/replies.h"
 #include "server/station/devices.h"
-#include "server/station/explorer.h"
+#include "server/station/scripted_hand.h"
 #include "server/station/station_impl.h"
 
 namespace hapticd::server {
@@ -243,7 +243,7 @@ void Station::Impl::onPublished(const scene::SceneSnapshot& snapshot) {
   if (now == explored) return;
   explored = std::move(now);
   hand->setPath(std::make_shared<const device::WaypointPath>(
-      explore(snapshot, workspaceOf(config, profile), base::now()), device::WaypointPath::Repeat::yes));
+      planStrokes(snapshot, workspaceOf(config, profile), base::now()), device::WaypointPath::Repeat::yes));
 }
 
 DeviceStatus Station::status() const {

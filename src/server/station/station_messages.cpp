@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/station/answers.h"
+#include "server/station/replies.h"
 #include "server/station/station_impl.h"
 #include "wire/dispatch.h"
 #include "wire/text.h"
@@ -52,7 +52,7 @@ void Station::Impl::on(const Request& request, const wire::TrackerRequestToRoom&
 }
 
 void Station::Impl::on(const Request& request, const wire::TrackerRequestUnitToSensor&) {
-  for (std::int32_t sensor = 0; sensor < kSensors; ++sensor) {
+  for (std::int32_t sensor = 0; sensor < kSensorCount; ++sensor) {
     request.session.send(request.name, wire::TrackerUnitToSensor{
                            .sensor = sensor, .filler = 0, .position = {}, .orientation = {0, 0, 0, 1}});
   }
@@ -86,14 +86,14 @@ void Station::Impl::choose(Session& session, wire::LocalSender name, ReportChoic
 
 // From now on the tracker's poses count from where the proxy is.
 void Station::Impl::on(const Request&, const wire::TrackerResetOrigin&) {
-  const View view = viewOf(outbox.last(), config.forceReport);
-  frame.origin = view.proxy;
-  frame.turn = view.orientation;
+  const ClientTick clientTick = toClientTick(outbox.last(), config.forceReport);
+  frame.origin = clientTick.proxy;
+  frame.rotation = clientTick.orientation;
 }
 
 void Station::Impl::on(const Request& request, const wire::ButtonAdmin& admin) {
   std::string error;
-  if (!modes.obey(admin, alerts, error)) sendText(request.session, request.name, wire::kTextError, error);
+  if (!modes.setMode(admin, alerts, error)) sendText(request.session, request.name, wire::kTextError, error);
 }
 
 void Station::Impl::on(const Request& request, const wire::QueryCapabilities&) {
@@ -137,7 +137,7 @@ void Station::Impl::on(const Request& request, const wire::HoldHand& wanted) {
 void Station::onReset() {
   impl_->control.rampIn();  // what is felt after it comes in gently
   impl_->frame.origin.setZero();
-  impl_->frame.turn.setIdentity();
+  impl_->frame.rotation.setIdentity();
 }
 
 }  // namespace hapticd::server

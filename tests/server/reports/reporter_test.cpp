@@ -368,7 +368,7 @@ TEST_F(ReporterTest, PosesCountFromTheOriginThatWasSet) {
   tick_.rendering.proxy_m = Vec3(0.03, 0.01, 0);
   tick_.device.orientation = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ());
   frame_.origin = Vec3(0.02, 0.01, 0);
-  frame_.turn = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ());
+  frame_.rotation = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ());
   step();
   const auto pose = said<wire::TrackerPosQuat>().at(0);
   EXPECT_NEAR(pose.position[0], 0, 1e-12);

@@ -27,7 +27,7 @@ TEST(ButtonModes, AToggleChangesWhenItsButtonGoesDown) {
   EXPECT_EQ(modes.apply(0, alerts), 0U);
   EXPECT_TRUE(alerts.empty());
 
-  ASSERT_TRUE(modes.obey({0, wire::kButtonToggleOff}, alerts, error));
+  ASSERT_TRUE(modes.setMode({0, wire::kButtonToggleOff}, alerts, error));
   EXPECT_EQ(alerts.size(), 1U);
   alerts.clear();
   EXPECT_EQ(modes.apply(1, alerts), 1U);
@@ -44,9 +44,9 @@ TEST(ButtonModes, AllButtonsAndStartingOn) {
   ButtonModes modes(2);
   std::vector<wire::ButtonAlert> alerts;
   std::string error;
-  ASSERT_TRUE(modes.obey({wire::kAllButtons, wire::kButtonToggleOn}, alerts, error));
+  ASSERT_TRUE(modes.setMode({wire::kAllButtons, wire::kButtonToggleOn}, alerts, error));
   EXPECT_EQ(modes.apply(0, alerts), 3U);
-  ASSERT_TRUE(modes.obey({1, wire::kButtonMomentary}, alerts, error));
+  ASSERT_TRUE(modes.setMode({1, wire::kButtonMomentary}, alerts, error));
   EXPECT_EQ(modes.apply(0, alerts), 1U);
 }
 
@@ -54,9 +54,9 @@ TEST(ButtonModes, RefusesWhatDoesNotExist) {
   ButtonModes modes(2);
   std::vector<wire::ButtonAlert> alerts;
   std::string error;
-  EXPECT_FALSE(modes.obey({2, wire::kButtonToggleOn}, alerts, error));
+  EXPECT_FALSE(modes.setMode({2, wire::kButtonToggleOn}, alerts, error));
   EXPECT_NE(error.find("button 2 refused"), std::string::npos);
-  EXPECT_FALSE(modes.obey({0, 11}, alerts, error));
+  EXPECT_FALSE(modes.setMode({0, 11}, alerts, error));
   EXPECT_NE(error.find("mode 11 refused"), std::string::npos);
   EXPECT_TRUE(alerts.empty());
 }

@@ -1,4 +1,4 @@
-#include "server/station/answers.h"
+#include "server/station/replies.h"
 
 namespace hapticd::server {
 
@@ -24,7 +24,7 @@ wire::TrackerWorkspace trackerWorkspace(const Box& box, const realtime::TickRepo
 
 wire::TrackerToRoom trackerToRoom(const ReportFrame& frame) {
   const Vec3& p = frame.origin;
-  const geometry::Quat& q = frame.turn;
+  const geometry::Quat& q = frame.rotation;
   return {.position = {p.x(), p.y(), p.z()}, .orientation = {q.x(), q.y(), q.z(), q.w()}};
 }
 

@@ -1,4 +1,4 @@
-#include "server/station/explorer.h"
+#include "server/station/scripted_hand.h"
 
 #include <cmath>
 #include <numbers>
@@ -9,9 +9,9 @@
 namespace hapticd::server {
 namespace {
 
+using base::Nanos;
 using geometry::Affine;
 using geometry::Box;
-using base::Nanos;
 using geometry::Quat;
 using geometry::Vec3;
 
@@ -79,9 +79,9 @@ std::optional<SurfacePoint> firstSurface(const scene::SceneSnapshot& scene, cons
 }
 
 // Appends points to a path and gives each the time that the speed asks for.
-class Pen {
+class PathBuilder {
  public:
-  explicit Pen(const Vec3& start) { path_.push_back({0, start, Quat::Identity(), 0}); }
+  explicit PathBuilder(const Vec3& start) { path_.push_back({0, start, Quat::Identity(), 0}); }
 
   void moveTo(const Vec3& position, const Quat& orientation, double speed_m_per_s, bool press = false) {
     const double distance = (position - path_.back().position_m).norm();
@@ -111,7 +111,7 @@ std::vector<device::Waypoint> circle(const Box& workspace) {
   // caught in it.
   const double radius = 0.1 * workspace.extents().minCoeff();
   const Vec3 centre = workspace.centre() + Vec3(0, 0.5 * workspace.extents().y() - radius, 0);
-  Pen pen(centre + Vec3(radius, 0, 0));
+  PathBuilder pen(centre + Vec3(radius, 0, 0));
   for (int i = 1; i <= kSteps; ++i) {
     const double angle = 2 * std::numbers::pi * i / kSteps;
     const Quat turn(Eigen::AngleAxisd(0.3 * std::sin(angle), Vec3::UnitX()));
@@ -130,14 +130,15 @@ Vec3 direction(int i, int count) {
 
 }  // namespace
 
-std::vector<device::Waypoint> explore(const scene::SceneSnapshot& scene, const Box& workspace_m, Nanos now) {
+std::vector<device::Waypoint> planStrokes(const scene::SceneSnapshot& scene, const Box& workspace_m,
+                                          Nanos now) {
   const Box bounds = boundsInDevice(scene, now);
   if (bounds.empty()) return circle(workspace_m);
   const Vec3 centre = bounds.centre();
   const double outside = 0.5 * bounds.extents().norm() + kClearance_m;
 
   const Vec3 home = centre + outside * Vec3::UnitY();
-  Pen pen(home);
+  PathBuilder pen(home);
   for (int stroke = 0; stroke < kStrokes; ++stroke) {
     const Vec3 first = direction(stroke, kStrokes);
     const Vec3 along = first.unitOrthogonal();

@@ -7,13 +7,13 @@
 
 namespace hapticd::server {
 
-/// One thread. newSecond() is called once a second.
-class NoiseLog {
+/// One thread. reportSuppressed() is called once a second.
+class ThrottledLog {
  public:
   void warn(const std::string& text) {
     if (++lines_ <= kLinesPerSecond) spdlog::warn("{}", text);
   }
-  void newSecond() {
+  void reportSuppressed() {
     if (lines_ > kLinesPerSecond)
       spdlog::warn("{} more lines of this kind in the last second", lines_ - kLinesPerSecond);
     lines_ = 0;
