@@ -92,7 +92,7 @@ TEST_F(BadProtocol, ACountThatDoesNotFitEndsTheConnection) {
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, AFrameThatCannotBeEndsTheConnection) {
+TEST_F(BadProtocol, AnInvalidFrameEndsTheConnection) {
   for (const std::uint32_t length : {0U, 23U, 65'000U, 0xFFFFFFFFU}) {
     ScriptedPeer peer(server_.address());
     ASSERT_TRUE(peer.untilConnected());
@@ -107,23 +107,23 @@ TEST_F(BadProtocol, AFrameThatCannotBeEndsTheConnection) {
 
 // --- names
 
-TEST_F(BadProtocol, NamesWithoutANulAreCutAndNeverReadBeyond) {
+TEST_F(BadProtocol, NamesWithoutANulEndAtTheirField) {
   wire::SetHapticProperty property{0, {}, 1};
   property.property.bytes.fill('x');
   bad_.send(property);
-  EXPECT_TRUE(isTold("setHapticProperty object 0, 'xxxxxxxxxxxxxxxxxxxx': unknown property"));
+  EXPECT_TRUE(gotText("setHapticProperty object 0, 'xxxxxxxxxxxxxxxxxxxx': unknown property"));
   wire::Effect effect;
   effect.type.bytes.fill('y');
   bad_.send(effect);
-  EXPECT_TRUE(isTold("setEffect 0, 'yyyyyyyyyyyyyyyyyyyy': refused: unknown type"));
+  EXPECT_TRUE(gotText("setEffect 0, 'yyyyyyyyyyyyyyyyyyyy': refused: unknown type"));
   Bytes text(1032, std::byte{'z'});
   std::fill_n(text.begin(), 8, std::byte{0});
   bad_.sendPayload(wire::kindOf<wire::Text>, text);
-  EXPECT_TRUE(untilLogged("says \"" + std::string(60, 'z')));
+  EXPECT_TRUE(untilLogged("sent the text \"" + std::string(60, 'z')));
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, ADescriptionWithoutANulIsCut) {
+TEST_F(BadProtocol, ADescriptionWithoutANulEndsAtItsField) {
   wire::FrameEncoder frames;
   frames.append(wire::encodeCookie(0));
   Bytes payload = wire::encodeDescription("PhantomX");
@@ -135,7 +135,7 @@ TEST_F(BadProtocol, ADescriptionWithoutANulIsCut) {
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, WhatLiesBehindTheNulOfANameDoesNotMatter) {
+TEST_F(BadProtocol, BytesAfterTheNulOfANameAreIgnored) {
   wire::SetHapticProperty property{0, {}, 1};
   std::ranges::copy(std::string_view("stiffness\0damping\xff\xff!", 20), property.property.bytes.begin());
   good_.send(property);
@@ -143,7 +143,7 @@ TEST_F(BadProtocol, WhatLiesBehindTheNulOfANameDoesNotMatter) {
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, DescriptionsThatLieAboutTheirLengthEndTheConnection) {
+TEST_F(BadProtocol, DescriptionsWithAWrongLengthEndTheConnection) {
   for (const std::int32_t length : {-1, 0, 50, 0x7FFFFFFF}) {
     wire::FrameEncoder frames;
     frames.append(wire::encodeCookie(0));
@@ -156,7 +156,7 @@ TEST_F(BadProtocol, DescriptionsThatLieAboutTheirLengthEndTheConnection) {
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, TwoThousandSendersAndTypesAreKnownAndOneMoreIsNot) {
+TEST_F(BadProtocol, TwoThousandSendersAndTypesAreAcceptedAndOneMoreIsNot) {
   wire::FrameEncoder frames;
   frames.append(wire::encodeCookie(0));
   for (std::int32_t id = 0; id < 1999; ++id) {
@@ -178,7 +178,7 @@ TEST_F(BadProtocol, TwoThousandSendersAndTypesAreKnownAndOneMoreIsNot) {
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, MessagesOfUndescribedNumbersAreIgnored) {
+TEST_F(BadProtocol, MessagesOfUndescribedSendersAndTypesAreIgnored) {
   wire::FrameEncoder frames;
   for (const std::int32_t number : {1999, 2000, 0x7FFFFFFF, -1999}) {
     frames.addRaw({}, 1, number, Bytes(20));
@@ -192,14 +192,14 @@ TEST_F(BadProtocol, MessagesOfUndescribedNumbersAreIgnored) {
 
 // --- greetings
 
-TEST_F(BadProtocol, OtherMinorVersionsAreWelcome) {
+TEST_F(BadProtocol, OtherMinorVersionsAreAccepted) {
   for (const char* version : {"07.30", "07.34", "07.99"}) {
     EXPECT_TRUE(say(cookie(version))->untilConnected()) << version;
     EXPECT_TRUE(untilLogged(std::string("speaks VRPN ") + version));
   }
 }
 
-TEST_F(BadProtocol, OtherMajorVersionsAndGarbageAreClosedWithTheReason) {
+TEST_F(BadProtocol, OtherMajorVersionsAndGarbageCloseTheConnectionWithTheReason) {
   EXPECT_TRUE(isClosed(cookie("08.00"), "opened with \"vrpn: ver. 08.00"));
   EXPECT_TRUE(isClosed(cookie("06.38"), "opened with \"vrpn: ver. 06.38"));
   EXPECT_TRUE(isClosed(cookie("07.38", '7'), "log mode \"7\" is not 0 to 3"));
@@ -209,7 +209,7 @@ TEST_F(BadProtocol, OtherMajorVersionsAndGarbageAreClosedWithTheReason) {
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, HalfAGreetingWaitsForTheOtherHalf) {
+TEST_F(BadProtocol, APartialGreetingWaitsForTheRest) {
   const std::string whole = cookie("07.38");
   const auto slow = say(std::string_view(whole).substr(0, 11));
   const auto silent = say("");
@@ -232,13 +232,13 @@ TEST_F(BadProtocol, LogFilesAreRefused) {
   frames.addRaw({}, 3, wire::kLogDescription, wire::encodeLogDescription({3, file.string(), file.string()}));
   const auto peer = say(frames.bytes());
   EXPECT_TRUE(peer->untilText("log files on the server are refused"));
-  EXPECT_TRUE(untilLogged("asks for log files \"" + file.string()));
+  EXPECT_TRUE(untilLogged("requested log files \"" + file.string()));
   EXPECT_FALSE(std::filesystem::exists(file));
   EXPECT_TRUE(peer->open());
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, CallBacksToPortsBelow1024AreRefused) {
+TEST_F(BadProtocol, ReverseConnectionsToPortsBelow1024AreRefused) {
   for (const char* port : {"80", "0", "1023", "-5", "99999"}) {
     request(std::string("127.0.0.1 ") + port);
     EXPECT_TRUE(untilLogged("port \"" + std::string(port) + "\" is not 1024 to 65535")) << log_.text();
@@ -246,7 +246,7 @@ TEST_F(BadProtocol, CallBacksToPortsBelow1024AreRefused) {
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, RequestsThatAreNoneAreRefused) {
+TEST_F(BadProtocol, MalformedRequestsAreRefused) {
   request("");
   request("hello");
   request("127.0.0.1;reboot 4000");
@@ -255,14 +255,14 @@ TEST_F(BadProtocol, RequestsThatAreNoneAreRefused) {
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, CallBacksToAnotherHostAreRefusedWithTheRemedy) {
+TEST_F(BadProtocol, ReverseConnectionsToAnotherHostAreRefusedWithTheRemedy) {
   request("192.0.2.1 4000");
   EXPECT_TRUE(untilLogged("names another host, 192.0.2.1:4000: refused; allow it with callback_hosts"));
-  EXPECT_EQ(log_.count("calling back"), 0U);
+  EXPECT_EQ(log_.count("reverse connection to"), 0U);
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, CallBacksWithinThisMachineMayNameAnotherLoopbackAddress) {
+TEST_F(BadProtocol, ReverseConnectionsOnThisMachineMayUseAnotherLoopbackAddress) {
   net::Loop loop;
   bool called = false;
   const net::TcpListener listener(loop, net::Endpoint::parse("127.0.0.2", 0),
@@ -288,7 +288,7 @@ std::string ownAddress() {
   return found;
 }
 
-TEST(CallBackHosts, AHostOnTheListIsCalledBackThoughAnotherAsked) {
+TEST(CallbackHosts, AListedHostGetsAReverseConnectionRequestedByAnotherHost) {
   const std::string host = ownAddress();
   if (host.empty()) GTEST_SKIP() << "this machine has no address but loopback";
   server::ServerConfig config = RunningServer::anyPort();

@@ -131,7 +131,7 @@ class Conformance : public testing::TestWithParam<Mode> {
   ScriptedPeer client_{server_.address(), "Phantom", GetParam(), ScriptedPeer::Speech::raw};
 };
 
-TEST_P(Conformance, TheSceneIsFeltAndReported) {
+TEST_P(Conformance, TheSceneIsRenderedAndReported) {
   ASSERT_TRUE(untilTouched(0));
   ASSERT_TRUE(untilTouched(1));
   EXPECT_TRUE(client_.until([&] { return client_.last<wire::TouchedObject>()->object == -1; }));
@@ -148,7 +148,7 @@ TEST_P(Conformance, TheSceneIsFeltAndReported) {
   }
 }
 
-TEST_P(Conformance, EveryQuestionIsAnswered) {
+TEST_P(Conformance, EveryQueryIsAnswered) {
   playRest();
   EXPECT_TRUE(client_.until([&] { return client_.count<wire::TrackerToRoom>() == 1; }));
   EXPECT_TRUE(client_.until([&] { return client_.count<wire::TrackerUnitToSensor>() == 3; }))
@@ -162,9 +162,9 @@ TEST_P(Conformance, EveryQuestionIsAnswered) {
   EXPECT_EQ(client_.count<wire::TrackerAcceleration>(), 0U);
 }
 
-TEST_P(Conformance, WhatIsNotDoneAsAskedIsTold) {
+TEST_P(Conformance, ChangedAndRefusedRequestsAreReported) {
   playRest();
-  for (const char* words : {
+  for (const char* text : {
            "setEffect 2, gain 0.5 to 0.0",  // damping that no device renders stably
            "setNormal object 0: ignored: normals follow from the triangles",
            "setNormal object 1: ignored: normals follow from the triangles",
@@ -173,12 +173,12 @@ TEST_P(Conformance, WhatIsNotDoneAsAskedIsTold) {
            "setTrimeshType object -1, type 0: ignored: there is one way to collide",
            "startEffect (custom) 4: there is no such custom effect",
        }) {
-    EXPECT_TRUE(client_.untilText(words)) << words;
+    EXPECT_TRUE(client_.untilText(text)) << text;
   }
   EXPECT_TRUE(client_.open());
 }
 
-TEST_P(Conformance, TheResetAtTheEndTakesTheSceneAway) {
+TEST_P(Conformance, TheResetAtTheEndRemovesTheScene) {
   ASSERT_TRUE(untilTouched(1));
   playRest();
   client_.sendBytes(recording_.reset());
@@ -189,7 +189,7 @@ TEST_P(Conformance, TheResetAtTheEndTakesTheSceneAway) {
   EXPECT_TRUE(client_.open());
 }
 
-TEST_P(Conformance, ReportsTravelAsTheModeWants) {
+TEST_P(Conformance, ReportsUseTheTransportOfTheMode) {
   ASSERT_TRUE(untilTouched(0));
   playRest();
   for (const auto& message : client_.messages()) {

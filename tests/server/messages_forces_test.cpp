@@ -48,7 +48,7 @@ class ForceMessages : public testing::Test {
   ScriptedPeer peer_{server_.address()};
 };
 
-TEST_F(ForceMessages, ForceFieldPushesUntilItIsAllZero) {
+TEST_F(ForceMessages, ForceFieldPushesUntilItIsZero) {
   peer_.send(wire::ForceField{{}, {0.5F, 0, -0.5F}, {}, 1});
   ASSERT_TRUE(untilForce(peer_, {0.5, 0, -0.5}));
   peer_.send(wire::ForceField{});
@@ -100,7 +100,7 @@ TEST_F(ForceMessages, Plane2MakesThePlaneBuzz) {
   EXPECT_TRUE(peer_.until([&] { return oscillates(peer_, 1); }));
 }
 
-TEST(ForceMessagesInMotion, Plane2HoldsTheHandThatLeaves) {
+TEST(ForceMessagesInMotion, Plane2AdhesionHoldsTheHand) {
   const Hand hand = Hand::stroking();
   RunningServer server(hand.config());
   ScriptedPeer peer(server.address());
@@ -170,14 +170,14 @@ TEST_F(ForceMessages, CustomEffectBuzzesUntilStopped) {
   EXPECT_LE(peer_.count<wire::Force>(), 20U) << "the force still changes";
 }
 
-TEST_F(ForceMessages, CustomEffectOfAnotherNumberIsRefused) {
+TEST_F(ForceMessages, UnknownCustomEffectIsRefused) {
   wire::CustomEffect unknown;
   unknown.effect = 7;
   peer_.send(unknown);
   EXPECT_TRUE(peer_.untilText("there is no such custom effect"));
 }
 
-TEST_F(ForceMessages, EffectIsFeltFromStartToStop) {
+TEST_F(ForceMessages, EffectActsFromStartToStop) {
   peer_.send(effect("constant"));
   peer_.send(wire::StartEffect{0});
   ASSERT_TRUE(untilForce(peer_, {1, 0, 0}));
@@ -214,7 +214,7 @@ TEST_F(ForceMessages, EffectSpringPullsToItsPosition) {
   }));
 }
 
-TEST_F(ForceMessages, EffectMotorVibrationGoesRound) {
+TEST_F(ForceMessages, EffectMotorVibrationRotates) {
   for (const char* name : {"vibrationMotor", "motorVibration"}) {
     ASSERT_TRUE(catchUp(peer_));
     peer_.send(effect(name));

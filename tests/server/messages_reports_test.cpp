@@ -34,7 +34,7 @@ TEST_F(WorkspaceMessages, SetWorkspaceProjectionMatrixFitsTheView) {
   EXPECT_TRUE(untilHandAt(peer_, 2 * kPlace_m));
 }
 
-TEST_F(WorkspaceMessages, EachWorkspaceReplacesTheOneBefore) {
+TEST_F(WorkspaceMessages, EachWorkspaceReplacesThePreviousOne) {
   for (int i = 0; i < 3; ++i) {
     peer_.send(wire::SetWorkspaceBoundingBox{kIdentity, {-160, -120, -70, 160, 120, 70}});
   }
@@ -51,7 +51,7 @@ TEST_F(WorkspaceMessages, SetHapticOriginPlacesTheDevice) {
   EXPECT_TRUE(untilHandAt(peer_, {0.1 - kPlace_m.y(), kPlace_m.x(), kPlace_m.z()}));
 }
 
-TEST_F(WorkspaceMessages, ResetSceneBringsTheFirstWorkspaceBack) {
+TEST_F(WorkspaceMessages, ResetSceneRestoresTheInitialWorkspace) {
   peer_.send(wire::SetHapticScale{3});
   ASSERT_TRUE(untilHandAt(peer_, 3 * kPlace_m));
   peer_.send(wire::ResetScene{});
@@ -59,7 +59,7 @@ TEST_F(WorkspaceMessages, ResetSceneBringsTheFirstWorkspaceBack) {
 }
 
 // A datagram could overtake the names that it needs, and a hand at rest is reported only once.
-TEST_F(WorkspaceMessages, ALateClientIsToldByTcpWhereTheHandRests) {
+TEST_F(WorkspaceMessages, ALateClientGetsTheRestingPoseByTcp) {
   ScriptedPeer late(server_.address(), "Phantom", ScriptedPeer::Mode::udp);
   ASSERT_TRUE(untilHandAt(late, kPlace_m));
   for (const auto& message : late.messages()) {
@@ -92,7 +92,7 @@ TEST_F(Reports, ForcePushesOutAndEndsWithTheContact) {
   EXPECT_TRUE(untilForce(peer_, {0, 0, 0}, 2e-3));
 }
 
-TEST_F(Reports, DopIsHowFarTheHandIsBelowTheSurface) {
+TEST_F(Reports, DopIsTheDepthOfTheHipBelowTheSurface) {
   // The hand wants 5 mm and is a spring of 300 N/m against one of 500 N/m.
   EXPECT_TRUE(peer_.until([&] {
     const auto depth = peer_.last<wire::Dop>();
@@ -117,7 +117,7 @@ TEST_F(Reports, AngleIsBetweenStylusAndNormalInDegrees) {
   EXPECT_EQ(peer_.last<wire::Angle>()->angle, 0);
 }
 
-TEST_F(Reports, TouchedObjectAndIsTouchingTellOfContactAndItsEnd) {
+TEST_F(Reports, TouchedObjectAndIsTouchingReportContactAndItsEnd) {
   for (const std::int32_t object : {-1, 0, -1}) {
     ASSERT_TRUE(peer_.until([&] { return peer_.last<wire::TouchedObject>()->object == object; })) << object;
     ASSERT_TRUE(
@@ -125,7 +125,7 @@ TEST_F(Reports, TouchedObjectAndIsTouchingTellOfContactAndItsEnd) {
   }
 }
 
-TEST_F(Reports, PosQuatTellsOfProxyHandAndContact) {
+TEST_F(Reports, PosQuatReportsProxyHipAndContact) {
   std::set<std::int32_t> sensors;
   ASSERT_TRUE(peer_.until([&] {
     for (const auto& pose : peer_.all<wire::TrackerPosQuat>()) sensors.insert(pose.sensor);
@@ -141,7 +141,7 @@ TEST_F(Reports, PosQuatTellsOfProxyHandAndContact) {
   }
 }
 
-TEST_F(Reports, VelocityIsThatOfTheHand) {
+TEST_F(Reports, VelocityIsThatOfTheHip) {
   // 25 mm in 60 ms.
   EXPECT_TRUE(peer_.until([&] {
     const auto velocity = peer_.last<wire::TrackerVelocity>();
@@ -154,7 +154,7 @@ TEST_F(Reports, AccelerationIsNotReported) {
   EXPECT_EQ(peer_.count<wire::TrackerAcceleration>(), 0U);
 }
 
-TEST_F(Reports, ButtonChangeTellsOfEveryPressAndRelease) {
+TEST_F(Reports, ButtonChangeReportsEveryPressAndRelease) {
   std::vector<std::int32_t> states;  // of the button under the finger; touching is a button, too
   ASSERT_TRUE(peer_.until([&] {
     states.clear();
@@ -166,7 +166,7 @@ TEST_F(Reports, ButtonChangeTellsOfEveryPressAndRelease) {
   for (std::size_t i = 1; i < states.size(); ++i) EXPECT_EQ(states[i], 1 - states[i - 1]);
 }
 
-TEST(ReportsOfTrips, ForceErrorTellsOfATripAndOfItsEnd) {
+TEST(ReportsOfTrips, ForceErrorReportsATripAndItsEnd) {
   Hand hand = Hand::at({0, 0, 0});
   for (double t_s = 0.5; t_s < 60; t_s += 1) {  // 50 mm in 20 ms is 2.5 m/s
     hand.row(t_s, {0, 0, 0});

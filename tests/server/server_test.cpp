@@ -42,7 +42,7 @@ bool untilTouched(ScriptedPeer& peer) {
   });
 }
 
-TEST(Server, TcpClientHearsTheDevice) {
+TEST(Server, TcpClientReceivesReports) {
   RunningServer server;
   ScriptedPeer peer(server.address());
   ASSERT_TRUE(peer.untilConnected());
@@ -52,7 +52,7 @@ TEST(Server, TcpClientHearsTheDevice) {
   EXPECT_EQ(peer.datagrams(), 0U);
 }
 
-TEST(Server, UdpClientIsCalledBackAndHearsByDatagram) {
+TEST(Server, UdpClientGetsAReverseConnectionAndDatagrams) {
   RunningServer server;
   ScriptedPeer peer(server.address(), "Phantom", ScriptedPeer::Mode::udp);
   ASSERT_TRUE(peer.untilConnected());
@@ -91,7 +91,7 @@ TEST(Server, PingIsAnsweredWithPongAndButtonStates) {
   EXPECT_TRUE(peer.until([&] { return peer.count<wire::ButtonStates>() >= 1; }));
 }
 
-TEST(Server, TrackerQuestionsAreAnswered) {
+TEST(Server, TrackerQueriesAreAnswered) {
   RunningServer server;
   ScriptedPeer peer(server.address());
   ASSERT_TRUE(peer.until([&] { return peer.count<wire::IsTouching>() >= 1; }));
@@ -105,7 +105,7 @@ TEST(Server, TrackerQuestionsAreAnswered) {
               1e-12);  // metres, for a world in millimetres
 }
 
-TEST(Server, AnUploadedMeshIsTouchedAndLeft) {
+TEST(Server, ContactWithAnUploadedMeshBeginsAndEnds) {
   RunningServer server;
   ScriptedPeer peer(server.address());
   ASSERT_TRUE(peer.untilConnected());
@@ -126,7 +126,7 @@ TEST(Server, AnUploadedMeshIsTouchedAndLeft) {
   EXPECT_EQ(peer.all<wire::Dop>().back().depth, 0);
 }
 
-TEST(Server, ALateJoinerHearsTheContactAtOnce) {
+TEST(Server, ALateClientGetsTheContactAtOnce) {
   RunningServer server;
   ScriptedPeer first(server.address());
   ASSERT_TRUE(first.untilConnected());
@@ -148,7 +148,7 @@ TEST(Server, ALateJoinerHearsTheContactAtOnce) {
   }
 }
 
-TEST(Server, BadValuesGetATextAndLeaveTheSceneAlone) {
+TEST(Server, BadValuesGetATextAndDoNotChangeTheScene) {
   RunningServer server;
   ScriptedPeer peer(server.address());
   ASSERT_TRUE(peer.untilConnected());
@@ -163,7 +163,7 @@ TEST(Server, BadValuesGetATextAndLeaveTheSceneAlone) {
   EXPECT_TRUE(untilTouched(peer));
 }
 
-TEST(Server, AMalformedMessageEndsThatConnectionAlone) {
+TEST(Server, AMalformedMessageEndsOnlyItsConnection) {
   RunningServer server;
   ScriptedPeer good(server.address());
   ScriptedPeer bad(server.address());
@@ -178,7 +178,7 @@ TEST(Server, AMalformedMessageEndsThatConnectionAlone) {
   EXPECT_TRUE(good.open());
 }
 
-TEST(Server, AMalformedDatagramIsForgotten) {
+TEST(Server, AMalformedDatagramIsIgnored) {
   RunningServer server;
   ScriptedPeer peer(server.address(), "Phantom", ScriptedPeer::Mode::udp);
   ASSERT_TRUE(peer.until([&] { return peer.datagrams() >= 1; }));
@@ -192,7 +192,7 @@ TEST(Server, AMalformedDatagramIsForgotten) {
   EXPECT_TRUE(peer.open());
 }
 
-TEST(Server, NoiseOnBothPortsDisturbsNobody) {
+TEST(Server, RandomBytesOnBothPortsDoNotDisturbOtherClients) {
   RunningServer server;
   ScriptedPeer good(server.address());
   ASSERT_TRUE(good.untilConnected());
@@ -225,7 +225,7 @@ TEST(Server, NoiseOnBothPortsDisturbsNobody) {
   EXPECT_TRUE(good.open());
 }
 
-TEST(Server, AVanishedClientIsForgottenAndAnotherMayCome) {
+TEST(Server, AVanishedClientIsRemovedAndAnotherCanConnect) {
   RunningServer server;
   for (int i = 0; i < 5; ++i) {
     ScriptedPeer peer(server.address());
@@ -238,7 +238,7 @@ TEST(Server, AVanishedClientIsForgottenAndAnotherMayCome) {
   EXPECT_TRUE(last.untilNext<wire::IsTouching>());
 }
 
-TEST(Server, EveryNameOfADeviceAnswers) {
+TEST(Server, EveryNameOfADeviceWorks) {
   server::ServerConfig config = RunningServer::anyPort();
   config.devices[0].names = {"Phantom", "Tracker0"};
   RunningServer server(config);
@@ -250,7 +250,7 @@ TEST(Server, EveryNameOfADeviceAnswers) {
   EXPECT_TRUE(two.untilNext<wire::Pong>());
 }
 
-TEST(Server, TwoDevicesHaveScenesOfTheirOwn) {
+TEST(Server, TwoDevicesHaveSeparateScenes) {
   server::ServerConfig config = RunningServer::anyPort();
   config.devices.resize(2);
   config.devices[0].names = {"Left"};
@@ -266,7 +266,7 @@ TEST(Server, TwoDevicesHaveScenesOfTheirOwn) {
   for (const auto& touching : right.all<wire::IsTouching>()) EXPECT_EQ(touching.touching, 0);
 }
 
-TEST(Server, TheSceneStaysOrGoesWithItsClientAsConfigured) {
+TEST(Server, TheSceneIsKeptOrClearedAsConfiguredWhenItsClientDisconnects) {
   for (const auto choice : {server::SceneOnDisconnect::keep, server::SceneOnDisconnect::clear}) {
     server::ServerConfig config = RunningServer::anyPort();
     config.devices[0].sceneOnDisconnect = choice;
@@ -288,7 +288,7 @@ TEST(Server, TheSceneStaysOrGoesWithItsClientAsConfigured) {
   }
 }
 
-TEST(Server, ACallBackToAnotherHostIsRefused) {
+TEST(Server, AReverseConnectionToAnotherHostIsRefused) {
   RunningServer server;
   // An innocent third party listens; a forged request names it by an address that is not the sender's.
   net::Loop loop;
@@ -322,13 +322,13 @@ class Log {
   std::shared_ptr<spdlog::logger> before_;
 };
 
-std::size_t countOf(const std::string& words, const std::string& text) {
+std::size_t countOf(const std::string& text, const std::string& text) {
   std::size_t n = 0;
-  for (auto at = text.find(words); at != std::string::npos; at = text.find(words, at + 1)) ++n;
+  for (auto at = text.find(text); at != std::string::npos; at = text.find(text, at + 1)) ++n;
   return n;
 }
 
-TEST(Server, WhatClientsSayIsQuotedAndCannotFloodTheLog) {
+TEST(Server, TextsOfClientsAreQuotedAndCannotFloodTheLog) {
   Log log;
   {
     RunningServer server;
@@ -339,11 +339,11 @@ TEST(Server, WhatClientsSayIsQuotedAndCannotFloodTheLog) {
     peer.send(wire::Ping{});
     ASSERT_TRUE(peer.untilNext<wire::Pong>());
   }
-  EXPECT_GE(countOf("client 1: says \"fine\\x0aforged line\"", log.text()), 1U);
+  EXPECT_GE(countOf("client 1: sent the text \"fine\\x0aforged line\"", log.text()), 1U);
   EXPECT_LE(countOf("forged", log.text()), 200U);
 }
 
-TEST(Server, ADeviceThatDoesNotExistIsLoggedWithTheOnesThatDo) {
+TEST(Server, ARequestForAMissingDeviceIsLoggedWithTheAvailableOnes) {
   Log log;
   {
     RunningServer server;
@@ -353,10 +353,10 @@ TEST(Server, ADeviceThatDoesNotExistIsLoggedWithTheOnesThatDo) {
         std::vector<std::byte>(24));  // no frame: what came before it has been read when this ends it
     ASSERT_TRUE(peer.until([&] { return !peer.open(); }));
   }
-  EXPECT_EQ(countOf("asks for \"Fantom\", which is no device here; there is Phantom", log.text()), 1U);
+  EXPECT_EQ(countOf("requested the device \"Fantom\", which does not exist; available: Phantom", log.text()), 1U);
 }
 
-TEST(Server, ACallBackToTheServerItselfIsRefused) {
+TEST(Server, AReverseConnectionToTheServerItselfIsRefused) {
   Log log;
   {
     RunningServer server;
@@ -373,7 +373,7 @@ TEST(Server, ACallBackToTheServerItselfIsRefused) {
   EXPECT_EQ(countOf("speaks VRPN", log.text()), 1U);
 }
 
-TEST(Server, APortInUseIsSaidPlainly) {
+TEST(Server, APortInUseIsReported) {
   RunningServer server;
   server::ServerConfig second = RunningServer::anyPort();
   second.port = server.address().port;
@@ -387,7 +387,7 @@ TEST(Server, APortInUseIsSaidPlainly) {
 }
 
 // VRPN's own vrpn_ping says "Server, are you there?", a name from before the ping message.
-TEST(Server, MessagesOfOtherTypesAreNobodysBusiness) {
+TEST(Server, MessagesOfUnknownTypesAreIgnored) {
   RunningServer server;
   for (const auto mode : {ScriptedPeer::Mode::tcp, ScriptedPeer::Mode::udp}) {
     ScriptedPeer peer(server.address(), "Phantom", mode);

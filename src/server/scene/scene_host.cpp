@@ -54,8 +54,8 @@ void SceneHost::clientGone(scene::ClientId client) {
     push({client, scene::SceneCommand{scene::ResetScene{}}});
 }
 
-void SceneHost::describe(std::function<void(std::shared_ptr<const scene::SceneDescription>)> answer) {
-  if (thread_) push({0, DescribeScene{std::move(answer)}}, 0);
+void SceneHost::describe(std::function<void(std::shared_ptr<const scene::SceneDescription>)> reply) {
+  if (thread_) push({0, DescribeScene{std::move(reply)}}, 0);
 }
 
 void SceneHost::push(SceneTask&& task, std::size_t bytes) {

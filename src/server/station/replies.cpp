@@ -33,7 +33,8 @@ wire::Capabilities capabilities(const DeviceConfig& config, const device::Device
   const Box box = workspaceOf(config, profile);
   return {.version = wire::kExtensionVersion,
           .features = wire::kFeatureBulkMesh | wire::kFeatureBatch | wire::kFeatureSubscribe |
-                      wire::kFeatureStop | wire::kFeatureHeartbeat | (canBeHeld ? wire::kFeatureHoldHand : 0U),
+                      wire::kFeatureStop | wire::kFeatureHeartbeat |
+                      (canBeHeld ? wire::kFeatureHoldHand : 0U),
           .servo_rate = config.servoRate_Hz,
           .report_rate = config.reportRate_Hz,
           .peak_force = profile.peakForce_N,

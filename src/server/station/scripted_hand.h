@@ -1,4 +1,4 @@
-// A scripted hand: where a person would go to feel what is in the scene.
+// Plans the path of the scripted hand over the objects of a scene.
 #pragma once
 
 #include <vector>
@@ -9,10 +9,11 @@
 
 namespace hapticd::server {
 
-/// A round of strokes over the touchable objects of a scene: approach a point from outside, press a few
-/// millimetres in, slide along, lift, turn to the next. Deterministic. An empty scene gives a slow circle in
-/// the workspace. The path starts and ends at rest outside all objects, so it can be repeated.
+/// Plans strokes over the touchable objects of a scene: approach a point from outside, press a few
+/// millimetres in, slide, lift, move to the next. Deterministic; an empty scene gives a slow circle in the
+/// workspace. The path starts and ends at rest outside all objects, so it can be repeated. Metres, device
+/// frame; `now`: time of the objects' motion.
 std::vector<device::Waypoint> planStrokes(const scene::SceneSnapshot& scene, const geometry::Box& workspace_m,
-                                      base::Nanos now);
+                                          base::Nanos now);
 
 }  // namespace hapticd::server

@@ -66,7 +66,7 @@ class ReporterTest : public ::testing::Test {
   std::vector<Outgoing> out_;
 };
 
-TEST_F(ReporterTest, FreeAndAtRestOnlyIsTouchingIsSaidEveryPeriod) {
+TEST_F(ReporterTest, InFreeSpaceAtRestOnlyIsTouchingIsReportedEveryPeriod) {
   step();
   EXPECT_EQ(said<wire::TrackerPosQuat>().size(), 2U);  // proxy and device, once
   for (int i = 0; i < 5; ++i) {
@@ -94,7 +94,7 @@ TEST_F(ReporterTest, LengthsAreWorldOverThousandAndForcesAreNewtons) {
   EXPECT_NEAR(force[2], 1.0, 1e-12);
 }
 
-TEST_F(ReporterTest, OrientationAndTurningAreOfTheWorld) {
+TEST_F(ReporterTest, OrientationAndAngularVelocityAreInTheWorldFrame) {
   tick_.T_world_device = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ()) * Eigen::UniformScaling<double>(2000.0);
   tick_.device.orientation = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitX());
   tick_.device.velocity_m_per_s = Vec3(0.1, 0, 0);
@@ -111,7 +111,7 @@ TEST_F(ReporterTest, OrientationAndTurningAreOfTheWorld) {
   EXPECT_NEAR(velocity.rotation[3], std::cos(half), 1e-12);
 }
 
-TEST_F(ReporterTest, PoseIsSaidWhenItMovedOrTurnedMoreThanTheTolerance) {
+TEST_F(ReporterTest, PoseIsReportedWhenItChangedByMoreThanTheTolerance) {
   step();
   tick_.rendering.proxy_m = tick_.device.position_m = Vec3(0.0009, 0, 0);
   step();
@@ -135,7 +135,7 @@ TEST_F(ReporterTest, ZeroToleranceMeansEveryPeriod) {
   EXPECT_EQ(said<wire::TrackerPosQuat>().size(), 2U);
 }
 
-TEST_F(ReporterTest, ContactIsSaidOnChange) {
+TEST_F(ReporterTest, ContactIsReportedOnChange) {
   step();
   touch();
   tick_.device.orientation =
@@ -160,7 +160,7 @@ TEST_F(ReporterTest, ContactIsSaidOnChange) {
   EXPECT_EQ(said<wire::Dop>().size(), 1U);
 }
 
-TEST_F(ReporterTest, AForceThatEndsIsSaidToBeNothing) {
+TEST_F(ReporterTest, TheTransitionToZeroForceIsReported) {
   tick_.force_N = Vec3(0.0015, 0, 0);
   step();
   EXPECT_EQ(said<wire::Force>().size(), 1U);
@@ -192,7 +192,7 @@ TEST_F(ReporterTest, TheEndOfAContactIsReliableAndComplete) {
   EXPECT_TRUE(out_.empty());
 }
 
-TEST_F(ReporterTest, ReportRateIsKeptAndButtonsDoNotWait) {
+TEST_F(ReporterTest, TheReportRateIsKeptAndButtonsAreReportedAtOnce) {
   config_.reportRate_Hz = 100;
   step();
   int periods = 0;
@@ -209,7 +209,7 @@ TEST_F(ReporterTest, ReportRateIsKeptAndButtonsDoNotWait) {
   EXPECT_EQ(said<wire::ButtonChange>()[0].state, 1);
 }
 
-TEST_F(ReporterTest, SwitchesOfThePaperChangeForceAndQuaternion) {
+TEST_F(ReporterTest, OptionsSelectForceAndQuaternionOrder) {
   config_.forceReport = ForceReport::normal;
   config_.quaternionOrder = QuaternionOrder::wxyz;
   touch();
@@ -218,7 +218,7 @@ TEST_F(ReporterTest, SwitchesOfThePaperChangeForceAndQuaternion) {
   EXPECT_EQ(said<wire::TrackerPosQuat>().at(0).orientation, (wire::F64x4{1, 0, 0, 0}));
 }
 
-TEST_F(ReporterTest, TripsAreSaidOnceAndSoIsRecovery) {
+TEST_F(ReporterTest, TripsAndRecoveryAreReportedOnce) {
   step();
   tick_.guard.active = realtime::bit(realtime::Trip::speed) | realtime::bit(realtime::Trip::slew);
   step();
@@ -232,7 +232,7 @@ TEST_F(ReporterTest, TripsAreSaidOnceAndSoIsRecovery) {
   EXPECT_EQ(said<wire::ForceError>()[0].code, 4);
 }
 
-TEST_F(ReporterTest, ALateJoinerHearsThePresentState) {
+TEST_F(ReporterTest, ALateClientGetsThePresentState) {
   touch();
   tick_.device.buttons = 1;
   for (int i = 0; i < 3; ++i) step();
@@ -273,7 +273,7 @@ TEST_F(ReporterTest, ContactIsMirroredAsAnalogChannelsAndAButton) {
   EXPECT_EQ(said<wire::ButtonChange>().at(0).state, 0);
 }
 
-TEST_F(ReporterTest, AGripperIsTheChannelAfterTheContacts) {
+TEST_F(ReporterTest, AGripperIsTheAnalogChannelAfterTheContact) {
   const auto gripper = [&]() -> std::optional<double> {
     const auto channels = said<wire::AnalogChannels>();
     if (channels.size() != 1 || channels[0].channels.values.size() != 7) return std::nullopt;
@@ -307,7 +307,7 @@ TEST_F(ReporterTest, AGripperIsTheChannelAfterTheContacts) {
   EXPECT_TRUE(said<wire::AnalogChannels>().empty()) << "it was not chosen";
 }
 
-TEST_F(ReporterTest, OnlyWhatWasChosenIsSaid) {
+TEST_F(ReporterTest, OnlySubscribedKindsAreReported) {
   choice_.kinds = wire::kReportButton;
   touch();
   step();
@@ -318,7 +318,7 @@ TEST_F(ReporterTest, OnlyWhatWasChosenIsSaid) {
   EXPECT_EQ(said<wire::ForceError>().size(), 1U);  // errors always come
 }
 
-TEST_F(ReporterTest, AWholeTickIsInTheUnitsOfTheOtherReports) {
+TEST_F(ReporterTest, ATickReportUsesTheUnitsOfTheOtherReports) {
   choice_.kinds = wire::kReportTick;
   tick_.T_world_device = Eigen::Translation3d(500, 0, 0) * Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ()) *
                          Eigen::UniformScaling<double>(2000.0);
@@ -363,7 +363,7 @@ TEST_F(ReporterTest, EveryContactOfATickIsListedAndTheEndIsAnEmptyList) {
   EXPECT_TRUE(out_.empty());
 }
 
-TEST_F(ReporterTest, PosesCountFromTheOriginThatWasSet) {
+TEST_F(ReporterTest, PosesAreRelativeToTheOrigin) {
   config_.linearTolerance_m = 0;
   tick_.rendering.proxy_m = Vec3(0.03, 0.01, 0);
   tick_.device.orientation = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ());
@@ -376,7 +376,7 @@ TEST_F(ReporterTest, PosesCountFromTheOriginThatWasSet) {
   EXPECT_NEAR(std::abs(pose.orientation[3]), 1, 1e-12);
 }
 
-TEST_F(ReporterTest, TheGuardIsToldOnChange) {
+TEST_F(ReporterTest, TheGuardIsReportedOnChange) {
   const auto states = [this] { return said<wire::GuardState>(); };
   tick_.guard.armed = true;
   step();

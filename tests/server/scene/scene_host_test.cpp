@@ -100,7 +100,7 @@ class SceneHostTest : public ::testing::Test {
   std::string error_;
 };
 
-TEST_F(SceneHostTest, OnlyTheClientThatFloodsIsFullAndItIsRelievedWhenTheSceneGoesOn) {
+TEST_F(SceneHostTest, OnlyTheClientThatFloodsIsFullUntilTheSceneCatchesUp) {
   close();
   flood(1);
   EXPECT_FALSE(host_.full(2));
@@ -114,7 +114,7 @@ TEST_F(SceneHostTest, OnlyTheClientThatFloodsIsFullAndItIsRelievedWhenTheSceneGo
   EXPECT_FALSE(host_.full(1));
 }
 
-TEST_F(SceneHostTest, AClientWithNothingInTheQueueWaitsForNobody) {
+TEST_F(SceneHostTest, AClientWithoutQueuedCommandsDoesNotWait) {
   close();
   flood(1);
   bool reached = false;
@@ -134,7 +134,7 @@ TEST_F(SceneHostTest, AClientWaitsUntilItsOwnCommandsArePublished) {
 }
 
 // The builder waits for a pause between edits before it makes a mesh.
-TEST_F(SceneHostTest, AMeshCountsAsPublishedWhenTheServoCanFeelIt) {
+TEST_F(SceneHostTest, AMeshIsPublishedOnlyWhenTheServoHasIt) {
   ASSERT_TRUE(give(1, wire::SetObjectNumber{1}));
   ASSERT_TRUE(give(1, wire::MeshVertices{0, 0, {{0, 0, 0, 9, 0, 0, 0, 9, 0}}}));
   ASSERT_TRUE(give(1, wire::MeshTriangles{0, 0, {{0, 1, 2}}}));
@@ -151,7 +151,7 @@ TEST_F(SceneHostTest, AMeshCountsAsPublishedWhenTheServoCanFeelIt) {
   EXPECT_TRUE(felt);
 }
 
-TEST_F(SceneHostTest, TheForcesOfALostClientEndBeforeWhatItSentLast) {
+TEST_F(SceneHostTest, TheForcesOfALostClientEndBeforeItsQueuedCommandsAreApplied) {
   const wire::ForceField field{.origin = {0, 0, 0}, .force = {0, 1, 0}, .jacobian = {}, .radius = 10};
   ASSERT_TRUE(give(1, field));
   bool reached = false;

@@ -14,7 +14,7 @@ SceneParcel parcel(scene::ClientId client, std::size_t bytes) {
   return parcel;
 }
 
-TEST(SceneQueueTest, ParcelsLeaveInTheOrderOfArrivalWhoeverSentThem) {
+TEST(SceneQueueTest, ParcelsOfAllClientsAreTakenInOrderOfArrival) {
   SceneQueue queue;
   queue.push(parcel(1, 10));
   queue.push(parcel(2, 20));
@@ -26,14 +26,14 @@ TEST(SceneQueueTest, ParcelsLeaveInTheOrderOfArrivalWhoeverSentThem) {
   EXPECT_TRUE(queue.empty());
 }
 
-TEST(SceneQueueTest, AnUrgentParcelGoesBeforeAllOthers) {
+TEST(SceneQueueTest, AnUrgentParcelIsTakenFirst) {
   SceneQueue queue;
   queue.push(parcel(1, 10));
   queue.pushFront(parcel(2, 0));
   EXPECT_EQ(queue.take()->client, 2U);
 }
 
-TEST(SceneQueueTest, OnlyTheClientThatFillsTheQueueIsFull) {
+TEST(SceneQueueTest, OnlyTheClientThatExceedsTheLimitIsFull) {
   SceneQueue queue;
   queue.push(parcel(1, 5 * kMiB));
   queue.push(parcel(2, 100));

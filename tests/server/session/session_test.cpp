@@ -20,7 +20,7 @@ class CountingOwner final : public SessionOwner {
  public:
   void onSubscribed(Session& /*session*/, wire::LocalSender /*name*/) override {}
   void onMessage(Session& /*session*/, const wire::MessageReceived& /*message*/, base::Nanos) override { ++messages; }
-  void onRemark(const Session& /*session*/, const std::string& /*text*/) override {}
+  void onWarning(const Session& /*session*/, const std::string& /*text*/) override {}
   void onReadSlice() override {
     mostBetween = std::max(mostBetween, messages - last);
     last = messages;
@@ -30,7 +30,7 @@ class CountingOwner final : public SessionOwner {
     mostBetween = std::max(mostBetween, messages - last);
     last = messages;
   }
-  void onDeparted(Session& /*session*/, const std::string& /*reason*/) override {}
+  void onPeerGone(Session& /*session*/, const std::string& /*reason*/) override {}
   void onClosed(Session& /*session*/, const std::string& reason) override { closed = reason; }
 
   std::size_t messages = 0;

@@ -9,7 +9,7 @@ namespace {
 
 using geometry::Vec3;
 
-// A box of 40 mm around the origin, as a client would send it: one unit is a millimetre.
+// A box of 40 mm around the origin, as sent by a client whose world unit is a millimetre.
 std::shared_ptr<const scene::SceneSnapshot> boxScene() {
   scene::SceneBuilder builder;
   std::vector<scene::Notice> notices;
