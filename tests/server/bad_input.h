@@ -1,4 +1,5 @@
-// A fixture for bad input: one peer touches a scene, another sends bad input, and the first must not be affected.
+// A fixture for bad input: one peer touches a scene, another sends bad input, and the first must not be
+// affected.
 #pragma once
 
 #include <gtest/gtest.h>

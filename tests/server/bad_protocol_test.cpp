@@ -1,4 +1,4 @@
-// Peers that break the protocol, or use it to have the server do what it should not.
+// Peers that violate the protocol or abuse it.
 #include <ifaddrs.h>
 #include <netinet/in.h>
 
@@ -19,17 +19,17 @@ class BadProtocol : public BadInput {
  protected:
   using Speech = ScriptedPeer::Speech;
 
-  // A peer that says these bytes and nothing else.
-  std::unique_ptr<ScriptedPeer> say(ByteView bytes) {
+  // A peer that sends only these bytes.
+  std::unique_ptr<ScriptedPeer> sendBytes(ByteView bytes) {
     auto peer =
         std::make_unique<ScriptedPeer>(server_.address(), "Phantom", ScriptedPeer::Mode::tcp, Speech::raw);
     peer->sendBytes(bytes);
     return peer;
   }
-  std::unique_ptr<ScriptedPeer> say(std::string_view text) { return say(std::as_bytes(std::span(text))); }
-  // Whether a peer that says so is closed, with this reason in the log.
+  std::unique_ptr<ScriptedPeer> sendBytes(std::string_view text) { return sendBytes(std::as_bytes(std::span(text))); }
+  // Whether a peer that sends these bytes is disconnected, with this reason in the log.
   testing::AssertionResult isClosed(std::string_view text, const std::string& reason) {
-    const auto peer = say(text);
+    const auto peer = sendBytes(text);
     if (!peer->untilClosed()) return testing::AssertionFailure() << "not closed";
     if (!untilLogged(reason))
       return testing::AssertionFailure() << "no '" << reason << "' in\n" << log_.text();
@@ -83,7 +83,7 @@ TEST_F(BadProtocol, ACountThatDoesNotFitEndsTheConnection) {
   for (const std::uint32_t count : {2U, 0x7FFFFFFFU, 0xFFFFFFFFU}) {
     ScriptedPeer peer(server_.address());
     ASSERT_TRUE(peer.untilConnected());
-    Bytes payload(12);  // effect 0, and room for one parameter
+    Bytes payload(12);  // effect 0, and space for one parameter
     wire::storeBig(payload.data() + 4, count);
     peer.sendPayload(wire::kindOf<wire::CustomEffect>, payload);
     ASSERT_TRUE(peer.untilClosed()) << count;
@@ -130,7 +130,7 @@ TEST_F(BadProtocol, ADescriptionWithoutANulEndsAtItsField) {
   payload.pop_back();
   wire::storeBig(payload.data(), std::int32_t{8});
   frames.addRaw({}, 0, wire::kSenderDescription, payload);
-  const auto peer = say(frames.bytes());
+  const auto peer = sendBytes(frames.bytes());
   EXPECT_TRUE(peer->untilNext<wire::IsTouching>()) << "the length counts the NUL that is not there";
   EXPECT_TRUE(isIntact());
 }
@@ -150,7 +150,7 @@ TEST_F(BadProtocol, DescriptionsWithAWrongLengthEndTheConnection) {
     Bytes payload = wire::encodeDescription("Phantom");
     wire::storeBig(payload.data(), length);
     frames.addRaw({}, 0, wire::kSenderDescription, payload);
-    EXPECT_TRUE(say(frames.bytes())->untilClosed()) << length;
+    EXPECT_TRUE(sendBytes(frames.bytes())->untilClosed()) << length;
   }
   EXPECT_TRUE(untilLogged("description says its name has 50 bytes, it has 8"));
   EXPECT_TRUE(isIntact());
@@ -167,7 +167,7 @@ TEST_F(BadProtocol, TwoThousandSendersAndTypesAreAcceptedAndOneMoreIsNot) {
   frames.addRaw({}, 1999, wire::kSenderDescription, wire::encodeDescription("Phantom"));
   frames.addRaw({}, 1999, wire::kTypeDescription, wire::encodeDescription(wire::Ping::kInfo.name));
   frames.addRaw({}, 1999, 1999, {});
-  const auto peer = say(frames.bytes());
+  const auto peer = sendBytes(frames.bytes());
   EXPECT_TRUE(peer->untilNext<wire::Pong>());
 
   frames.clear();
@@ -194,7 +194,7 @@ TEST_F(BadProtocol, MessagesOfUndescribedSendersAndTypesAreIgnored) {
 
 TEST_F(BadProtocol, OtherMinorVersionsAreAccepted) {
   for (const char* version : {"07.30", "07.34", "07.99"}) {
-    EXPECT_TRUE(say(cookie(version))->untilConnected()) << version;
+    EXPECT_TRUE(sendBytes(cookie(version))->untilConnected()) << version;
     EXPECT_TRUE(untilLogged(std::string("speaks VRPN ") + version));
   }
 }
@@ -211,8 +211,8 @@ TEST_F(BadProtocol, OtherMajorVersionsAndGarbageCloseTheConnectionWithTheReason)
 
 TEST_F(BadProtocol, APartialGreetingWaitsForTheRest) {
   const std::string whole = cookie("07.38");
-  const auto slow = say(std::string_view(whole).substr(0, 11));
-  const auto silent = say("");
+  const auto slow = sendBytes(std::string_view(whole).substr(0, 11));
+  const auto silent = sendBytes("");
   EXPECT_TRUE(isIntact());
   EXPECT_TRUE(slow->open());
   const std::string_view rest = std::string_view(whole).substr(11);
@@ -222,7 +222,7 @@ TEST_F(BadProtocol, APartialGreetingWaitsForTheRest) {
   EXPECT_TRUE(silent->open());
 }
 
-// --- what a server must not do for strangers
+// --- requests that the server must refuse
 
 TEST_F(BadProtocol, LogFilesAreRefused) {
   const auto file = std::filesystem::temp_directory_path() / "hapticd_must_not_be_written";
@@ -230,7 +230,7 @@ TEST_F(BadProtocol, LogFilesAreRefused) {
   wire::FrameEncoder frames;
   frames.append(wire::encodeCookie(3));
   frames.addRaw({}, 3, wire::kLogDescription, wire::encodeLogDescription({3, file.string(), file.string()}));
-  const auto peer = say(frames.bytes());
+  const auto peer = sendBytes(frames.bytes());
   EXPECT_TRUE(peer->untilText("log files on the server are refused"));
   EXPECT_TRUE(untilLogged("requested log files \"" + file.string()));
   EXPECT_FALSE(std::filesystem::exists(file));
@@ -272,7 +272,7 @@ TEST_F(BadProtocol, ReverseConnectionsOnThisMachineMayUseAnotherLoopbackAddress)
   EXPECT_TRUE(called);
 }
 
-// An address of this machine that is not loopback, or nothing.
+// An address of this machine that is not loopback; empty if there is none.
 std::string ownAddress() {
   ifaddrs* all = nullptr;
   if (::getifaddrs(&all) != 0) return {};

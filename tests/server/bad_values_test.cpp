@@ -1,4 +1,4 @@
-// Messages whose form is right and whose values are not: a text says so, and nobody feels anything of it.
+// Well-formed messages with invalid values: each is refused with a text and affects nobody.
 #include <cmath>
 #include <limits>
 

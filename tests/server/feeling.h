@@ -63,7 +63,8 @@ inline bool untilTicks(ScriptedPeer& peer, std::size_t ticks) {
   return peer.until([&] { return peer.count<wire::IsTouching>() >= before + ticks; });
 }
 
-/// Waits until the scene has applied everything that the peer sent: a refused command after it is reported in order.
+/// Waits until the scene has applied everything that the peer sent: a refused command after it is reported in
+/// order.
 inline bool untilApplied(ScriptedPeer& peer) {
   static std::int32_t effect = 1'000'000;
   peer.send(wire::StopEffect{++effect});

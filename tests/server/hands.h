@@ -17,8 +17,8 @@ namespace hapticd::test {
 
 using geometry::Vec3;
 
-/// A temporary hand file. Positions in metres, device frame; with the initial workspace the reported metres are the same
-/// numbers.
+/// A temporary hand file. Positions in metres, device frame; with the initial workspace the reported metres
+/// are the same numbers.
 class Hand {
  public:
   /// Rests at a position until rows are added.
@@ -28,8 +28,8 @@ class Hand {
     return hand;
   }
 
-  /// Strokes for two minutes: down the y axis from 40 to 15 mm, a pause with button 0 pressed, and up again; rotated
-  /// about the z axis.
+  /// Strokes for two minutes: down the y axis from 40 to 15 mm, a pause with button 0 pressed, and up again;
+  /// rotated about the z axis.
   static Hand stroking(double turn_rad = 0) {
     constexpr double kHigh_m = 0.040;
     constexpr double kLow_m = 0.015;

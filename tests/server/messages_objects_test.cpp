@@ -1,4 +1,4 @@
-// Messages that make, shape and move objects: each is felt by a hand that strokes down onto them.
+// Messages that make, shape and move objects, checked by a hand that strokes down onto them.
 #include <gtest/gtest.h>
 
 #include "feeling.h"
@@ -13,7 +13,7 @@ class ObjectMessages : public testing::Test {
  protected:
   void SetUp() override { ASSERT_TRUE(peer_.untilConnected()); }
 
-  // A stiff stock box: metres, its triangles by number. The top is triangles 6 and 7.
+  // A stiff stock box in metres, with indexed triangles; 6 and 7 are the top.
   void sendStockBox(std::int32_t object, const Vec3f& half_m = Vec3f::Constant(0.020F)) {
     const std::vector<Vec3f> corners = boxTriples(half_m);
     sendVertices(peer_, object, corners);

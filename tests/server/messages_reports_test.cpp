@@ -1,4 +1,4 @@
-// Reports about the hand, the buttons and the contact, and the messages that change how they are told.
+// Reports of the HIP, the buttons and the contact, and the messages that change them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ class WorkspaceMessages : public testing::Test {
   ScriptedPeer peer_{server_.address()};
 };
 
-// The simulated device reaches 160 x 120 x 70 mm; views of twice that size double every motion.
+// The workspace of the simulated device is 160 x 120 x 70 mm; a view of twice that size doubles every motion.
 TEST_F(WorkspaceMessages, SetWorkspaceBoundingBoxFitsTheBox) {
   peer_.send(wire::SetWorkspaceBoundingBox{kIdentity, {-160, -120, -70, 160, 120, 70}});
   EXPECT_TRUE(untilHandAt(peer_, 2 * kPlace_m));
@@ -58,7 +58,7 @@ TEST_F(WorkspaceMessages, ResetSceneRestoresTheInitialWorkspace) {
   EXPECT_TRUE(untilHandAt(peer_, kPlace_m));
 }
 
-// A datagram could overtake the names that it needs, and a hand at rest is reported only once.
+// A datagram could overtake the descriptions that it needs, and a hand at rest is reported only once.
 TEST_F(WorkspaceMessages, ALateClientGetsTheRestingPoseByTcp) {
   ScriptedPeer late(server_.address(), "Phantom", ScriptedPeer::Mode::udp);
   ASSERT_TRUE(untilHandAt(late, kPlace_m));
@@ -93,7 +93,7 @@ TEST_F(Reports, ForcePushesOutAndEndsWithTheContact) {
 }
 
 TEST_F(Reports, DopIsTheDepthOfTheHipBelowTheSurface) {
-  // The hand wants 5 mm and is a spring of 300 N/m against one of 500 N/m.
+  // The target is 5 mm deep; the hand is a spring of 300 N/m against one of 500 N/m.
   EXPECT_TRUE(peer_.until([&] {
     const auto depth = peer_.last<wire::Dop>();
     return depth && std::abs(depth->depth - 0.005 * 300 / 800) < 2e-4;
@@ -155,7 +155,7 @@ TEST_F(Reports, AccelerationIsNotReported) {
 }
 
 TEST_F(Reports, ButtonChangeReportsEveryPressAndRelease) {
-  std::vector<std::int32_t> states;  // of the button under the finger; touching is a button, too
+  std::vector<std::int32_t> states;  // of button 0; "touching" is also a button
   ASSERT_TRUE(peer_.until([&] {
     states.clear();
     for (const auto& change : peer_.all<wire::ButtonChange>()) {
@@ -176,13 +176,13 @@ TEST(ReportsOfTrips, ForceErrorReportsATripAndItsEnd) {
   }
   RunningServer server(hand.config());
   ScriptedPeer peer(server.address());
-  const auto told = [&](std::int32_t code) {
+  const auto reportedError = [&](std::int32_t code) {
     return peer.until([&] {
       return peer.last<wire::ForceError>([&](const auto& m) { return m.code == code; }).has_value();
     });
   };
-  EXPECT_TRUE(told(2));
-  EXPECT_TRUE(told(4));
+  EXPECT_TRUE(reportedError(2));
+  EXPECT_TRUE(reportedError(4));
 }
 
 }  // namespace

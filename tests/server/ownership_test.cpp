@@ -124,7 +124,7 @@ TEST_P(OwnershipOf, EndsWithTheLastClientThatSetIt) {
   GetParam().send(*second);
   ASSERT_TRUE(untilApplied(*second));
   ASSERT_TRUE(untilTicks(watcher_, 20));
-  ASSERT_TRUE(untilForceAbove(watcher_, 0.8)) << "a buzz begins anew";
+  ASSERT_TRUE(untilForceAbove(watcher_, 0.8)) << "a vibration starts again from its phase 0";
   first->close();
   EXPECT_TRUE(stays(kPush_N));
   second->close();

@@ -1,4 +1,4 @@
-// What each client hears, over real sockets: rates, kinds, mirrors, toggles, origins.
+// Reports to each client over real sockets: rates, kinds, mirrored contact, toggles, origins.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -16,13 +16,13 @@ class ReportsTest : public ::testing::Test {
     EXPECT_TRUE(peer->until([&] { return peer->count<wire::IsTouching>() > 0; }));
     return peer;
   }
-  // A floor under the hand, which is held in it.
+  // A floor, with the hand steered into it.
   static void touchFloor(ScriptedPeer& peer) {
     peer.send(wire::HoldHand{.hold = 1, .position = {0, 10, 0}});
     peer.send(wire::Plane{.plane = {0, 1, 0, 0}, .stiffness = 0.5F, .damping = 0, .index = 0, .recovery_cycles = 1});
     peer.send(wire::HoldHand{.hold = 1, .position = {0, -3, 0}});
   }
-  // Two reports of one kind, this many ticks apart in the mean.
+  // Mean number of ticks between two tick reports.
   static double meanTicksBetween(ScriptedPeer& peer) {
     peer.forget();
     EXPECT_TRUE(peer.until([&] { return peer.count<wire::TickReport>() >= 30; }, 60s));
@@ -40,7 +40,7 @@ TEST_F(ReportsTest, EachClientHasItsOwnRate) {
   fast->send(wire::Subscribe{.kinds = wire::kReportTick, .rate = 1e6});  // as fast as the servo
   ASSERT_TRUE(slow->until([&] { return slow->count<wire::TickReport>() > 0; }));
   ASSERT_TRUE(fast->until([&] { return fast->count<wire::TickReport>() > 0; }));
-  // A stalled machine skips ticks, and reports then come after fewer of them.
+  // A stalled machine skips ticks, so that reports are fewer ticks apart.
   const double slowTicks = meanTicksBetween(*slow);
   EXPECT_GT(slowTicks, 5);
   EXPECT_LT(slowTicks, 10.5);

@@ -17,7 +17,7 @@ namespace {
 
 using geometry::Vec3f;
 
-// A cube of 40 mm around the origin, one setVertex for each corner of each triangle, and a stiff surface.
+// A stiff cube of 40 mm around the origin, one setVertex for each vertex of each triangle.
 void sendCube(ScriptedPeer& peer, float half_mm = 20) {
   std::int32_t vertex = 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -57,7 +57,7 @@ TEST(Server, UdpClientGetsAReverseConnectionAndDatagrams) {
   ScriptedPeer peer(server.address(), "Phantom", ScriptedPeer::Mode::udp);
   ASSERT_TRUE(peer.untilConnected());
   EXPECT_TRUE(peer.until([&] { return peer.datagrams() >= 20; }));
-  // Reliable messages go by TCP all the same.
+  // Reliable messages still use TCP.
   peer.send(wire::Ping{});
   EXPECT_TRUE(peer.untilNext<wire::Pong>());
   for (const auto& message : peer.messages()) {
@@ -135,8 +135,7 @@ TEST(Server, ALateClientGetsTheContactAtOnce) {
   ScriptedPeer late(server.address());
   ASSERT_TRUE(late.until([&] { return late.count<wire::ButtonStates>() >= 1; }));
   ASSERT_TRUE(late.untilNext<wire::IsTouching>());
-  // Everything between the states of the buttons and the next isTouching: said at once, not when it next
-  // changes.
+  // All reports between the button states and the next isTouching: sent at once, not on the next change.
   const auto& messages = late.messages();
   const auto kindIs = [](wire::MessageKind kind) { return [kind](const auto& m) { return m.kind == kind; }; };
   const auto begin = std::ranges::find_if(messages, kindIs(wire::kindOf<wire::ButtonStates>));
@@ -279,7 +278,8 @@ TEST(Server, TheSceneIsKeptOrClearedAsConfiguredWhenItsClientDisconnects) {
     }
     const auto touchedByNext = [&] {
       ScriptedPeer next(server.address());
-      next.until([&] { return next.count<wire::IsTouching>() >= 100; });  // the hand has let go of what went
+      next.until(
+          [&] { return next.count<wire::IsTouching>() >= 100; });  // the hand has left the removed object
       next.forget();
       return next.until([&] { return next.count<wire::IsTouching>() >= 1000; }) &&
              std::ranges::any_of(next.all<wire::IsTouching>(), [](const auto& m) { return m.touching != 0; });
@@ -290,7 +290,7 @@ TEST(Server, TheSceneIsKeptOrClearedAsConfiguredWhenItsClientDisconnects) {
 
 TEST(Server, AReverseConnectionToAnotherHostIsRefused) {
   RunningServer server;
-  // An innocent third party listens; a forged request names it by an address that is not the sender's.
+  // A third party listens; a forged request names its address instead of the sender's.
   net::Loop loop;
   bool called = false;
   net::TcpListener victim(loop, {net::kAnyAddress, 0}, [&](net::Connection) { called = true; });
@@ -299,15 +299,14 @@ TEST(Server, AReverseConnectionToAnotherHostIsRefused) {
   udp.sendTo(std::as_bytes(std::span(forged)), server.address());
   const std::string lowPort("127.0.0.1 80\0", 13);
   udp.sendTo(std::as_bytes(std::span(lowPort)), server.address());
-  // A client that asks for itself afterwards is served, so the server has read and refused the others by
-  // then.
+  // A later valid request is served, so the server has read and refused the others by then.
   ScriptedPeer peer(server.address(), "Phantom", ScriptedPeer::Mode::udp);
   EXPECT_TRUE(peer.untilConnected());
   loop.runOnce(0ms);
   EXPECT_FALSE(called);
 }
 
-// Catches what the server logs while it lives.
+// Captures the log of the server.
 class Log {
  public:
   Log() : before_(spdlog::default_logger()) {
@@ -322,9 +321,9 @@ class Log {
   std::shared_ptr<spdlog::logger> before_;
 };
 
-std::size_t countOf(const std::string& text, const std::string& text) {
+std::size_t countOf(const std::string& part, const std::string& text) {
   std::size_t n = 0;
-  for (auto at = text.find(text); at != std::string::npos; at = text.find(text, at + 1)) ++n;
+  for (auto at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
   return n;
 }
 
@@ -349,11 +348,12 @@ TEST(Server, ARequestForAMissingDeviceIsLoggedWithTheAvailableOnes) {
     RunningServer server;
     ScriptedPeer peer(server.address(), "Fantom");
     ASSERT_TRUE(peer.untilConnected());
-    peer.sendBytes(
-        std::vector<std::byte>(24));  // no frame: what came before it has been read when this ends it
+    peer.sendBytes(std::vector<std::byte>(
+        24));  // an invalid frame closes the connection after everything before it was read
     ASSERT_TRUE(peer.until([&] { return !peer.open(); }));
   }
-  EXPECT_EQ(countOf("requested the device \"Fantom\", which does not exist; available: Phantom", log.text()), 1U);
+  EXPECT_EQ(countOf("requested the device \"Fantom\", which does not exist; available: Phantom", log.text()),
+            1U);
 }
 
 TEST(Server, AReverseConnectionToTheServerItselfIsRefused) {
@@ -364,7 +364,7 @@ TEST(Server, AReverseConnectionToTheServerItselfIsRefused) {
     net::UdpSocket udp(loop, net::Endpoint{net::kLoopbackAddress, 0});
     const std::string request = wire::formatUdpRequest({"127.0.0.1", server.address().port});
     udp.sendTo(std::as_bytes(std::span(request)), server.address());
-    // The one connection this can make is taken and closed again.
+    // The only connection that this request can cause is accepted and closed again.
     ScriptedPeer peer(server.address());
     ASSERT_TRUE(peer.untilConnected());
     ASSERT_TRUE(peer.until([&] { return peer.count<wire::IsTouching>() >= 200; }));
@@ -386,7 +386,7 @@ TEST(Server, APortInUseIsReported) {
   }
 }
 
-// VRPN's own vrpn_ping says "Server, are you there?", a name from before the ping message.
+// vrpn_ping of VRPN sends "Server, are you there?", a type from before the ping message.
 TEST(Server, MessagesOfUnknownTypesAreIgnored) {
   RunningServer server;
   for (const auto mode : {ScriptedPeer::Mode::tcp, ScriptedPeer::Mode::udp}) {

@@ -140,7 +140,7 @@ void SceneThread::callPublishWaiters(std::optional<base::Nanos> oldestEdit) {
     return !oldestEdit || *oldestEdit > waiter.since;
   };
   for (const PublishWaiter& waiter : publishWaiters_) {
-    if (published(waiting)) waiter.reached();
+    if (published(waiter)) waiter.reached();
   }
   std::erase_if(publishWaiters_, published);
 }

@@ -52,7 +52,7 @@ TEST_F(CommandDecoderTest, OtherCommandsEndARunAndKeepTheOrder) {
   give(wire::SetVertex{1, 4, {}}, 2);  // another client
   give(wire::SetObjectNumber{4}, 2);
   give(wire::SetVertex{1, 5, {}}, 2);
-  give(wire::SetVertex{1, -1, {}}, 2);  // negative: the scene refuses it, alone
+  give(wire::SetVertex{1, -1, {}}, 2);  // negative: a separate run, which the scene refuses
   give(wire::SetVertex{1, 0, {}}, 2);
   EXPECT_EQ(decoder_.release().size(), 8U);
   EXPECT_TRUE(decoder_.empty());

@@ -1,4 +1,4 @@
-// Who fills the scene queue, and who has to wait for it.
+// Order and limits of the scene queue, for each client.
 #include "server/scene/scene_queue.h"
 
 #include <gtest/gtest.h>
@@ -73,7 +73,7 @@ TEST(SceneQueueTest, AClientIsPendingUntilItsLastEditIsPublished) {
   EXPECT_TRUE(queue.pending(1));
   queue.take();
   queue.done(1, 10, 100);
-  queue.published(100);  // an edit of that moment still waits
+  queue.published(100);  // an edit at exactly this time is not yet published
   EXPECT_TRUE(queue.pending(1));
   queue.published(101);
   EXPECT_FALSE(queue.pending(1));

@@ -44,7 +44,7 @@ TEST(HeartbeatWatchTest, PausesExcuseFiveSecondsInTotalAndThatIsReportedOnce) {
   watch.beat(0);
   watch.pause(0);
   watch.resume(3000 * kMillisecond);
-  watch.pause(3100 * kMillisecond);  // no heartbeat in between: the same row
+  watch.pause(3100 * kMillisecond);  // no heartbeat in between: the pauses add up
   EXPECT_EQ(watch.check(5100 * kMillisecond), Verdict::alive);
   EXPECT_EQ(watch.check(5101 * kMillisecond), Verdict::excused);
   EXPECT_EQ(watch.check(5200 * kMillisecond), Verdict::alive);

@@ -40,7 +40,7 @@ class CountingOwner final : public SessionOwner {
   std::string closed;
 };
 
-// The greeting of a client that calls itself `Phantom`, and then so many pings.
+// The handshake of a client with the sender `Phantom`, then `count` pings.
 std::vector<std::byte> pings(std::size_t count) {
   wire::LocalNames names;
   names.addSender("Phantom");
@@ -77,7 +77,7 @@ TEST(Session, ReportsSlicesOfALongRead) {
   EXPECT_EQ(owner.messages, kPings);
   EXPECT_EQ(owner.closed, "");
   EXPECT_GE(owner.slices, 1U);
-  EXPECT_LE(owner.mostBetween, 8 * 1024 / wire::kHeaderBytes + 1);  // one was cut
+  EXPECT_LE(owner.mostBetween, 8 * 1024 / wire::kHeaderBytes + 1);  // one frame spans the boundary
 }
 
 }  // namespace
