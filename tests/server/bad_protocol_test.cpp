@@ -131,7 +131,7 @@ TEST_F(BadProtocol, ADescriptionWithoutANulEndsAtItsField) {
   wire::storeBig(payload.data(), std::int32_t{8});
   frames.addRaw({}, 0, wire::kSenderDescription, payload);
   const auto peer = sendBytes(frames.bytes());
-  EXPECT_TRUE(peer->untilNext<wire::IsTouching>()) << "the length counts the NUL that is not there";
+  EXPECT_TRUE(peer->untilNext<wire::IsTouching>()) << "the length includes the missing NUL";
   EXPECT_TRUE(isIntact());
 }
 

@@ -81,7 +81,7 @@ TEST_F(HeldBackTest, StopPingAndReportsOfOtherClientsDoNotWait) {
   }));
   watcher_->send(wire::StopForces{});
   EXPECT_TRUE(untilStopped());
-  EXPECT_EQ(uploader->count<wire::Capabilities>(), 0U) << "the upload was over before the stop";
+  EXPECT_EQ(uploader->count<wire::Capabilities>(), 0U) << "the upload ended before the stop";
   openScene();
   EXPECT_TRUE(uploader->until([&] { return uploader->count<wire::Capabilities>() > 0; }, 60s));
 }
@@ -98,7 +98,7 @@ TEST_F(HeldBackTest, StopHeartbeatAndPingOvertakeTheClientsSceneCommands) {
     return stopped();
   }));
   EXPECT_TRUE(client->until([&] { return client->count<wire::Pong>() > 0; }));
-  EXPECT_EQ(client->count<wire::Capabilities>(), 0U) << "a query keeps its place";
+  EXPECT_EQ(client->count<wire::Capabilities>(), 0U) << "a query is not reordered";
   openScene();
   EXPECT_TRUE(client->until([&] { return client->count<wire::Capabilities>() > 0; }));
 }
@@ -170,7 +170,7 @@ TEST_F(HeldBackTest, APauseOfTheServerIsNotSilenceOfTheClient) {
   ASSERT_TRUE(pass(*client, 1500));  // three times the limit
   EXPECT_TRUE(client->open());
   openScene();
-  EXPECT_TRUE(client->until([&] { return !client->open(); }, 60s)) << "silent once the server reads again";
+  EXPECT_TRUE(client->until([&] { return !client->open(); }, 60s)) << "silent after the server resumed reading";
 }
 
 TEST_F(HeldBackTest, HeartbeatsInTheBacklogCount) {

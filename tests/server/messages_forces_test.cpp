@@ -192,7 +192,7 @@ TEST_F(ForceMessages, EffectActsFromStartToStop) {
 TEST_F(ForceMessages, EffectWithADurationEndsByItself) {
   peer_.send(effect("constant", 1));
   peer_.send(wire::StartEffect{1});
-  ASSERT_TRUE(untilForce(peer_, {1, 0, 0})) << "forces rise slowly after the start";
+  ASSERT_TRUE(untilForce(peer_, {1, 0, 0})) << "the force ramps in after the start";
   peer_.send(wire::StopEffect{1});
   ASSERT_TRUE(untilForce(peer_, {0, 0, 0}));
   wire::Effect brief = effect("constant");

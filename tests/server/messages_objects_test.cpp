@@ -57,7 +57,7 @@ TEST_F(ObjectMessages, UpdateTrimeshChangesSetsTheSurface) {
   peer_.send(soft);
   ASSERT_TRUE(untilApplied(peer_));
   ASSERT_TRUE(catchUp(peer_));
-  EXPECT_TRUE(untilUntouchedStroke(peer_)) << "an object without stiffness is not felt";
+  EXPECT_TRUE(untilUntouchedStroke(peer_)) << "an object without stiffness gives no force";
 }
 
 TEST_F(ObjectMessages, RemoveTriangleOpensTheMesh) {
@@ -188,7 +188,7 @@ TEST_F(ObjectMessages, SetTouchableFaceChoosesTheSide) {
   sendCube(peer_);
   ASSERT_TRUE(untilTouchedAt(peer_, 0, 0.020));
   peer_.send(wire::SetTouchableFace{1});
-  EXPECT_TRUE(untilUntouchedStroke(peer_)) << "from outside a back face is not felt";
+  EXPECT_TRUE(untilUntouchedStroke(peer_)) << "a back face gives no force from outside";
   peer_.send(wire::SetTouchableFace{0});
   ASSERT_TRUE(untilApplied(peer_));
   ASSERT_TRUE(catchUp(peer_));
@@ -197,7 +197,7 @@ TEST_F(ObjectMessages, SetTouchableFaceChoosesTheSide) {
 
 TEST_F(ObjectMessages, SetHapticPropertySetsTheStiffness) {
   sendVertices(peer_, 0, boxTriples(Vec3f::Constant(20)));
-  ASSERT_TRUE(untilUntouchedStroke(peer_)) << "nothing is felt before it has stiffness";
+  ASSERT_TRUE(untilUntouchedStroke(peer_)) << "no force before it has stiffness";
   peer_.send(wire::SetHapticProperty{0, "stiffness", 1.0F});
   EXPECT_TRUE(untilTouchedAt(peer_, 0, 0.020));
 }

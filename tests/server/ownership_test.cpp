@@ -262,10 +262,10 @@ TEST_F(SceneOwnership, ClearRemovesTheSceneWithTheLastClientThatCommandedIt) {
   ASSERT_TRUE(untilApplied(*other));
   makeAndLeave();
   ASSERT_TRUE(catchUp(*watcher_));
-  EXPECT_TRUE(untilTouchedAt(*watcher_, 1, 0.030)) << "another that commanded is still there";
+  EXPECT_TRUE(untilTouchedAt(*watcher_, 1, 0.030)) << "another client that commanded is still connected";
   other->close();
-  EXPECT_TRUE(untilUntouchedStroke(*watcher_)) << "who only watches does not count";
-  EXPECT_TRUE(untilHandAt(*watcher_, {0, 0.040, 0}, 2e-3)) << "the workspace is the first one again";
+  EXPECT_TRUE(untilUntouchedStroke(*watcher_)) << "a client that only watches does not count";
+  EXPECT_TRUE(untilHandAt(*watcher_, {0, 0.040, 0}, 2e-3)) << "the initial workspace is restored";
 }
 
 // A client killed by the system, beside one that lives on.

@@ -303,7 +303,7 @@ TEST_F(ReporterTest, AGripperIsTheAnalogChannelAfterTheContact) {
   choice_.kinds = wire::kReportForce;
   start();
   step();
-  EXPECT_TRUE(reported<wire::AnalogChannels>().empty()) << "it was not chosen";
+  EXPECT_TRUE(reported<wire::AnalogChannels>().empty()) << "analog reports are not subscribed";
 }
 
 TEST_F(ReporterTest, OnlySubscribedKindsAreReported) {
