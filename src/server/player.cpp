@@ -13,14 +13,14 @@ using record::SceneEvent;
 using record::RecordingEvent;
 using record::TickEvent;
 
-constexpr Nanos kAhead = 200'000'000;
-// Clients of the recording and those that watch it are not the same, whatever their numbers.
+constexpr Nanos kReadAhead = 200'000'000;
+// Offset that keeps the ids of recorded clients apart from those of connected clients.
 constexpr scene::ClientId kRecordedClients = 1U << 30U;
 
-// When it was; nothing for what is not played.
+// The recorded time; empty for events that are not replayed.
 std::optional<Nanos> timeOf(const RecordingEvent& event) {
   if (const auto* tick = std::get_if<TickEvent>(&event)) return tick->tick.report.time;
-  if (const auto* told = std::get_if<SceneEvent>(&event)) return told->time;
+  if (const auto* scene = std::get_if<SceneEvent>(&event)) return scene->time;
   return std::nullopt;
 }
 
@@ -33,17 +33,18 @@ ServerConfig Player::config() const {
   ServerConfig config = parseConfig(header_.config, options_.file.string());
   if (config.devices.size() != header_.devices.size()) {
     throw ConfigError("'" + options_.file.string() + "' names " + std::to_string(config.devices.size()) +
-                      " devices in its configuration and has " + std::to_string(header_.devices.size()) +
-                      "; it is damaged");
+                      " devices in its configuration but contains " + std::to_string(header_.devices.size()) +
+                      "; the recording is damaged");
   }
-  const ServerConfig usual;
-  config.listenAddress = usual.listenAddress;
-  config.port = usual.port;
-  config.http = usual.http;
+  const ServerConfig defaults;
+  config.listenAddress = defaults.listenAddress;
+  config.port = defaults.port;
+  config.http = defaults.http;
   config.httpAllow.clear();
-  config.seconds = usual.seconds;
+  config.seconds = defaults.seconds;
   config.record.clear();
-  for (DeviceConfig& device : config.devices) device.hand = DeviceConfig().hand;  // the file may be gone
+  for (DeviceConfig& device : config.devices)
+    device.hand = DeviceConfig().hand;  // the hand file may not exist here
   return config;
 }
 
@@ -58,18 +59,18 @@ void Player::stop() {
 }
 
 std::optional<Nanos> Player::step() {
-  while (!stopping_ && !over_) {
+  while (!stopping_ && !ended_) {
     try {
       if (!reader_) reader_ = std::make_unique<record::RecordingReader>(options_.file);
       readAhead();
-      if (ahead_.empty()) {
+      if (buffer_.empty()) {
         endPass(reader_->remark());
         continue;
       }
-      const auto next = ahead_.begin();
+      const auto next = buffer_.begin();
       if (const Nanos due = dueAt(next->first); base::now() < due) return due;
       play(next->second);
-      ahead_.erase(next);
+      buffer_.erase(next);
     } catch (const record::RecordingError& error) {
       endPass(error.what());
     }
@@ -78,48 +79,49 @@ std::optional<Nanos> Player::step() {
 }
 
 void Player::readAhead() {
-  while (!atEnd_ && (ahead_.empty() || ahead_.rbegin()->first - ahead_.begin()->first < kAhead)) {
+  while (!atEnd_ && (buffer_.empty() || buffer_.rbegin()->first - buffer_.begin()->first < kReadAhead)) {
     RecordingEvent event;
     atEnd_ = !reader_->next(event);
     if (atEnd_) return;
-    if (const auto time = timeOf(event)) ahead_.emplace(*time, std::move(event));
+    if (const auto time = timeOf(event)) buffer_.emplace(*time, std::move(event));
   }
 }
 
-// `remark`: why the file ended early, if it did.
+// `remark`: why the file ended early; empty at its regular end.
 void Player::endPass(const std::string& remark) {
-  if (options_.loop && remark.empty() && began_) {
+  if (options_.loop && remark.empty() && started_) {
     callbacks_.restart();
   } else {
-    over_ = true;
-    callbacks_.over(remark);
+    ended_ = true;
+    callbacks_.ended(remark);
   }
   reader_.reset();
-  ahead_.clear();
+  buffer_.clear();
   atEnd_ = false;
-  began_ = false;
+  started_ = false;
 }
 
-Nanos Player::live(Nanos recorded) const {
+Nanos Player::liveTime(Nanos recorded) const {
   return firstLive_ + static_cast<Nanos>(static_cast<double>(recorded - firstRecorded_) / options_.speed);
 }
 
-// The first event of a pass is due at once.
+// The live time of an event; the first event of a pass is due at once.
 Nanos Player::dueAt(Nanos recorded) {
-  if (!std::exchange(began_, true)) {
+  if (!std::exchange(started_, true)) {
     firstRecorded_ = recorded;
     firstLive_ = base::now();
   }
-  return live(recorded);
+  return liveTime(recorded);
 }
 
 void Player::play(RecordingEvent& event) {
   if (auto* tick = std::get_if<TickEvent>(&event)) {
-    tick->tick.report.time = live(tick->tick.report.time);
+    tick->tick.report.time = liveTime(tick->tick.report.time);
     tick->tick.report.device.time = tick->tick.report.time;
     callbacks_.tick(tick->device, tick->tick.report);
-  } else if (const auto* told = std::get_if<SceneEvent>(&event)) {
-    callbacks_.told(told->scene, kRecordedClients + told->client, told->command ? &*told->command : nullptr);
+  } else if (const auto* scene = std::get_if<SceneEvent>(&event)) {
+    callbacks_.command(scene->scene, kRecordedClients + scene->client,
+                       scene->command ? &*scene->command : nullptr);
   }
 }
 

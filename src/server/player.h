@@ -1,5 +1,5 @@
-// Plays a recorded session: what its servos reported and what its clients told the scene, at the times at
-// which it was, or faster or slower.
+// Replays a recording: the ticks of its devices and the commands of its clients, at the recorded times,
+// faster or slower.
 #pragma once
 
 #include <atomic>
@@ -18,22 +18,22 @@ namespace hapticd::server {
 struct ReplayOptions {
   std::filesystem::path file;
   double speed = 1;
-  bool loop = false;  ///< from the beginning again, instead of resting at the end
+  bool loop = false;  ///< start again at the end instead of keeping the last state
 };
 
-/// A thread of its own, between start() and stop(). Reads ahead a little, because a file holds the ticks of
-/// one moment device by device.
+/// Runs in its own thread between start() and stop(). Reads 0.2 s ahead and sorts by time, because a
+/// recording stores the ticks in blocks of one device each.
 class Player {
  public:
-  /// Called from the player's thread, times being those of now.
+  /// Called in the player's thread; the times in the reports are converted to the present.
   struct Callbacks {
     std::function<void(std::uint32_t device, const realtime::TickReport&)> tick;
-    /// Null: the client was gone.
-    std::function<void(std::uint32_t scene, scene::ClientId, const scene::SceneCommand*)> told;
-    /// Before the session begins again.
+    /// Null: the client disconnected.
+    std::function<void(std::uint32_t scene, scene::ClientId, const scene::SceneCommand*)> command;
+    /// Called before the recording starts again.
     std::function<void()> restart;
-    /// Once, at the end, or where the file could not be read further: why.
-    std::function<void(const std::string&)> over;
+    /// Called once at the end, with the reason if the file could not be read to its end, else empty.
+    std::function<void(const std::string&)> ended;
   };
 
   /// Reads the header. Throws record::RecordingError.
@@ -43,7 +43,7 @@ class Player {
   Player& operator=(const Player&) = delete;
 
   const record::RecordingHeader& header() const noexcept { return header_; }
-  /// The configuration that was recorded, for a server that replays it. Throws ConfigError when this version
+  /// The recorded configuration, adapted for a server that replays it. Throws ConfigError when this version
   /// cannot read it.
   ServerConfig config() const;
 
@@ -56,19 +56,19 @@ class Player {
   void readAhead();
   void endPass(const std::string& remark);
   base::Nanos dueAt(base::Nanos recorded);
-  base::Nanos live(base::Nanos recorded) const;
+  base::Nanos liveTime(base::Nanos recorded) const;
   void play(record::RecordingEvent& event);
 
   const ReplayOptions options_;
   record::RecordingHeader header_;
   Callbacks callbacks_;
 
-  // The thread's.
-  std::unique_ptr<record::RecordingReader> reader_;  // of this pass through the file
-  std::multimap<base::Nanos, record::RecordingEvent> ahead_;
-  bool atEnd_ = false;  // of the file
-  bool began_ = false;  // an event of this pass was played
-  bool over_ = false;
+  // Used by the thread only.
+  std::unique_ptr<record::RecordingReader> reader_;  // null between passes through the file
+  std::multimap<base::Nanos, record::RecordingEvent> buffer_;
+  bool atEnd_ = false;  // the reader reached the end of the file
+  bool started_ = false;  // an event of this pass was played
+  bool ended_ = false;
   base::Nanos firstRecorded_ = 0;
   base::Nanos firstLive_ = 0;
 

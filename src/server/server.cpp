@@ -21,7 +21,7 @@ constexpr Nanos kHandshakeLimit = 30'000'000'000;
 
 net::ConnectionOptions connectionOptions() {
   net::ConnectionOptions options;
-  // A client is lost when data stays unacknowledged this long; silence alone is never loss.
+  // A client is lost when data stays unacknowledged for this long; silence alone is not loss.
   options.lossTimeout = 500ms;
   options.keepAlive = 1s;
   return options;
@@ -31,21 +31,21 @@ bool isLoopback(std::uint32_t address) {
   return (address >> 24) == 127;
 }
 
-// The name may hold the time, so that every start of a server has a file of its own.
+// The name may contain strftime conversions, so that every start of the server writes a new file.
 std::unique_ptr<record::Recorder> openRecording(const std::string& name) {
   const auto now = static_cast<std::time_t>(base::wallNow() / 1'000'000'000);
   std::tm local{};
   localtime_r(&now, &local);
   char path[4096] = {};
   if (std::strftime(path, sizeof path, name.c_str(), &local) == 0) {
-    throw ConfigError("record: '" + name + "' is too long for the name of a file");
+    throw ConfigError("record: '" + name + "' is too long for a file name");
   }
   return std::make_unique<record::Recorder>(path, [](const std::string& text) { spdlog::error("{}", text); });
 }
 
 }  // namespace
 
-// A connection on its way to a client that asked by datagram to be called back.
+// A pending TCP connection to a client that requested it by datagram.
 struct Server::ReverseConnection {
   net::Endpoint client;
   net::Connection connection;
@@ -57,7 +57,7 @@ Server::Server(const ServerConfig& config, std::unique_ptr<Player> player)
     : config_(config), player_(std::move(player)) {
   validate(config_);
   loop_.setErrorHandler([](std::string_view text) { spdlog::error("{}", text); });
-  names_.addSender("VRPN Control");  // the stock library's sender 0
+  names_.addSender("VRPN Control");  // must be sender 0, as in stock VRPN
   if (!config_.record.empty()) recorder_ = openRecording(config_.record);
 
   for (const DeviceConfig& device : config_.devices) openDevice(device);
@@ -76,26 +76,26 @@ Server::Server(const ServerConfig& config, std::unique_ptr<Player> player)
 
 Server::~Server() {
   if (player_) player_->stop();
-  // The servo first: no force outlives the server.
+  // Stop the servos first: no force outlives the server.
   for (const auto& station : stations_) station->stop();
   for (const auto& scene : scenes_) scene->stop();
 }
 
-// A second server on one machine is no mistake when nobody has asked for its page.
+// A clash on the default HTTP port is not an error: run without the viewer.
 void Server::openWeb() {
   if (config_.http == kHttpOff) return;
-  const bool asked = config_.http != kHttpAuto;
+  const bool configured = config_.http != kHttpAuto;
   std::string address = "127.0.0.1";
   std::uint16_t port = 8080;
-  if (asked) parseListen(config_.http, address, port);
+  if (configured) parseListen(config_.http, address, port);
   std::vector<SceneHost*> scenes;
   for (const auto& scene : scenes_) scenes.push_back(scene.get());
   try {
     web_ = std::make_unique<WebServer>(loop_, net::Endpoint::parse(address, port), config_.httpAllow,
                                        connectionOptions(), *this, scenes);
   } catch (const net::Error& error) {
-    if (asked) throw;
-    spdlog::warn("no viewer: {}, or none with --http off", error.what());
+    if (configured) throw;
+    spdlog::warn("no viewer: {}, or disable it with --http off", error.what());
   }
 }
 
@@ -131,7 +131,7 @@ void Server::startPlaying() {
   if (!player_) return;
   player_->start(
       {.tick = [this](std::uint32_t device, const auto& report) { stations_[device]->play(report); },
-       .told =
+       .command =
            [this](std::uint32_t scene, scene::ClientId client, const auto* command) {
              if (scene < scenes_.size()) scenes_[scene]->play(client, command);
            },
@@ -140,10 +140,10 @@ void Server::startPlaying() {
              const scene::SceneCommand reset = scene::ResetScene{};
              for (const auto& scene : scenes_) scene->play(0, &reset);
            },
-       .over =
+       .ended =
            [](const std::string& remark) {
              if (!remark.empty()) spdlog::warn("replay: {}", remark);
-             spdlog::info("the replay is over; what was last stays");
+             spdlog::info("replay finished; the last state stays");
            }});
 }
 
@@ -197,7 +197,7 @@ void Server::run() {
     checkHeartbeats();
     for (const auto& station : stations_) {
       station->checkBlackBox();
-      if (const auto text = station->checkHealth()) tell(*station, *text);
+      if (const auto text = station->checkHealth()) sendText(*station, *text);
     }
   }));
   if (config_.seconds > 0) {
@@ -206,7 +206,7 @@ void Server::run() {
         [this] { loop_.stop(); }));
   }
   startPlaying();
-  realtime::requestShortTimeSlice();  // reports are to leave at once, whatever else the machine does
+  realtime::requestShortTimeSlice();  // reports must not wait for other processes
   loop_.run();
   if (player_) player_->stop();
   for (const auto& station : stations_) station->stop();
@@ -217,7 +217,7 @@ void Server::run() {
 void Server::everySecond() {
   clock_.refresh();
   closeStaleHandshakes();
-  noise_.newSecond();
+  throttledLog_.reportSuppressed();
   if (web_) web_->everySecond();
 }
 
@@ -246,8 +246,8 @@ ServerStatus Server::status() const {
   return status;
 }
 
-// To everybody who listens to this device.
-void Server::tell(const Station& station, const wire::Text& text) {
+// Sends a text to all clients of this device.
+void Server::sendText(const Station& station, const wire::Text& text) {
   for (const auto& [id, session] : sessions_) {
     const wire::LocalSender name = station.nameFor(*session);
     if (!session->wants(name)) continue;
@@ -264,7 +264,7 @@ void Server::addSession(net::Connection connection, std::unique_ptr<net::UdpSock
   const scene::ClientId id = nextClient_++;
   auto session =
       std::make_unique<Session>(id, *this, names_, clock_, std::move(connection), std::move(udp), mode);
-  spdlog::info("client {} connects from {}", id, session->description());
+  spdlog::info("client {} connected from {}", id, session->description());
   Session& added = *session;
   sessions_.emplace(id, std::move(session));
   handshakes_.emplace(id, base::now());
@@ -274,30 +274,30 @@ void Server::addSession(net::Connection connection, std::unique_ptr<net::UdpSock
 void Server::onUdpRequest(std::span<const std::byte> datagram, const net::Endpoint& from) {
   const auto request = wire::parseUdpRequest(datagram);
   if (!request) {
-    noise_.warn("datagram from " + from.text() + " is no connection request: " + request.error());
+    throttledLog_.warn("datagram from " + from.text() + " is not a connection request: " + request.error());
     return;
   }
   net::Endpoint client;
   try {
     client = net::Endpoint::parse(request->host, request->port);
   } catch (const net::Error& error) {
-    noise_.warn("connection request from " + from.text() + " refused: " + error.what());
+    throttledLog_.warn("connection request from " + from.text() + " refused: " + error.what());
     return;
   }
   // A forged request must not make this server connect to third parties.
-  const bool itself =
+  const bool sameHost =
       client.address == from.address || (isLoopback(client.address) && isLoopback(from.address));
   const auto& allowed = config_.callbackHosts;
-  if (!itself && std::find(allowed.begin(), allowed.end(), request->host) == allowed.end()) {
-    noise_.warn("connection request from " + from.text() + " names another host, " + client.text() +
-                ": refused; allow it with callback_hosts");
+  if (!sameHost && std::find(allowed.begin(), allowed.end(), request->host) == allowed.end()) {
+    throttledLog_.warn("connection request from " + from.text() + " names another host, " + client.text() +
+                       ": refused; allow it with callback_hosts");
     return;
   }
-  connectBack(client);
+  connectToClient(client);
 }
 
-void Server::connectBack(const net::Endpoint& client) {
-  // Clients repeat their request until they are called back.
+void Server::connectToClient(const net::Endpoint& client) {
+  // Clients repeat their request until the server connects.
   for (const auto& pending : reverseConnections_) {
     if (pending->client == client) return;
   }
@@ -317,7 +317,7 @@ void Server::connectBack(const net::Endpoint& client) {
              net::Connection connection = std::move(pending->connection);
              forget();
              if (connection.remote() == net::Endpoint{connection.local().address, address().port}) {
-               noise_.warn("connection request names this server itself: refused");
+               throttledLog_.warn("connection request names this server itself: refused");
                return;
              }
              addSession(std::move(connection), std::move(udp), SessionMode::udp);
@@ -326,14 +326,14 @@ void Server::connectBack(const net::Endpoint& client) {
        .onDrained = {},
        .onClosed =
            [this, client, forget](const std::string& reason) {
-             noise_.warn("calling back " + client.text() + ": " + reason);
+             throttledLog_.warn("reverse connection to " + client.text() + " failed: " + reason);
              forget();
            }});
   reverseConnections_.push_back(std::move(owned));
 }
 
 void Server::onClosed(Session& session, const std::string& reason) {
-  spdlog::info("client {} ({}) is gone: {}", session.id(), session.description(), reason);
+  spdlog::info("client {} ({}) disconnected: {}", session.id(), session.description(), reason);
   for (const auto& station : stations_) station->clientGone(session.id());
   for (const auto& scene : scenes_) scene->clientGone(session.id());
   handshakes_.erase(session.id());
@@ -353,7 +353,7 @@ void Server::closeStaleHandshakes() {
   }
 }
 
-// Disconnect clients whose heartbeat expired. onClosed() destroys the session, later.
+// Disconnect clients whose heartbeat expired. onClosed() destroys the session later.
 void Server::checkHeartbeats() {
   const Nanos now = base::now();
   for (const auto& [id, session] : sessions_) {
@@ -361,20 +361,21 @@ void Server::checkHeartbeats() {
       case HeartbeatWatch::Verdict::alive:
         break;
       case HeartbeatWatch::Verdict::lost:
-        session->abort("no heartbeat for 500 ms, as it had promised");
+        session->abort("no heartbeat for 500 ms");
         break;
       case HeartbeatWatch::Verdict::excused:
-        spdlog::warn("client {}: no heartbeat could be read for 5 s because the scene is behind; its forces ramp out", id);
+        spdlog::warn("client {}: read no heartbeat for 5 s because the scene is behind; its forces ramp out",
+                     id);
         releaseForces(id);
         break;
     }
   }
 }
 
-// The scene is behind, and the client left meanwhile. Its last commands are still applied.
-void Server::onDeparted(Session& session, const std::string& reason) {
-  spdlog::info("client {} ({}) left while its commands wait for the scene: {}", session.id(), session.description(),
-               reason);
+// The client disconnected while the scene is behind. Its last commands are still applied.
+void Server::onPeerGone(Session& session, const std::string& reason) {
+  spdlog::info("client {} ({}) disconnected while its commands wait for the scene: {}", session.id(),
+               session.description(), reason);
   releaseForces(session.id());
 }
 
@@ -393,7 +394,7 @@ void Server::onSubscribed(Session& session, wire::LocalSender name) {
   if (Station* station = stationOf(name)) station->onSubscribed(session, name);
 }
 
-// The one place where control and scene part.
+// Dispatch by role: control messages never wait for the scene.
 void Server::onMessage(Session& session, const wire::MessageReceived& message, Nanos received) {
   Station* station = stationOf(message.local_sender);
   if (station == nullptr || !mayCommand(session, *station, message)) return;
@@ -404,7 +405,7 @@ void Server::onMessage(Session& session, const wire::MessageReceived& message, N
     case wire::Role::scene:
       onSceneMessage(session, *station, message);
       return;
-    case wire::Role::report:  // does nothing here; a malformed one is refused like every other message
+    case wire::Role::report:  // no effect, but a malformed one is refused like every other message
       if (const auto decoded = wire::decode(message.kind, message.payload); !decoded)
         session.refuse("malformed message: " + decoded.error());
       return;
@@ -428,8 +429,8 @@ void Server::onSceneMessage(Session& session, Station& station, const wire::Mess
 bool Server::mayCommand(Session& session, Station& station, const wire::MessageReceived& message) {
   std::string reason;
   if (!wire::needsControl(message.kind) || station.mayCommand(session, reason)) return true;
-  // One text for each read: a refused upload has thousands of messages.
-  if (std::exchange(refused_, session.id()) != session.id()) {
+  // Send one text for each read: a refused upload has thousands of messages.
+  if (std::exchange(refusalSentTo_, session.id()) != session.id()) {
     session.send(message.local_sender,
                  wire::Text{.severity = wire::kTextError,
                             .level = static_cast<std::uint32_t>(RefusalCode::notPermitted),
@@ -438,24 +439,24 @@ bool Server::mayCommand(Session& session, Station& station, const wire::MessageR
   return false;
 }
 
-void Server::onRemark(const Session& session, const std::string& text) {
-  noise_.warn("client " + std::to_string(session.id()) + ": " + text);
+void Server::onWarning(const Session& session, const std::string& text) {
+  throttledLog_.warn("client " + std::to_string(session.id()) + ": " + text);
 }
 
-// A client that sends a lot must not delay the reports to others.
+// A client that sends much data must not delay the reports to others.
 void Server::onReadSlice() {
   for (const auto& station : stations_) report(*station);
 }
 
 void Server::onReadEnd(Session& session) {
-  refused_ = 0;
+  refusalSentTo_ = 0;
   for (const auto& scene : scenes_) {
     scene->flush(session.id());
     if (scene->full(session.id())) session.hold();
   }
 }
 
-// The scene has caught up with the client.
+// The scene caught up with the client.
 void Server::onRelieved(scene::ClientId client) {
   const auto session = sessions_.find(client);
   if (session == sessions_.end()) return;

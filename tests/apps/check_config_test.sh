@@ -26,13 +26,13 @@ cmp effective.toml again.toml
 
 printf '# lab\nvrpn_OpenHaptics A 1 500 1 0.02 Default PHANToM\nvrpn_Dial D 1\nvrpn_Phantom B 0 60 Second\n' >vrpn.cfg
 "$hapticd" serve --config vrpn.cfg --device simulated --check-config >effective.toml
-grep -q '^# vrpn.cfg:3: "vrpn_Dial" is no device of this server' effective.toml
+grep -q '^# vrpn.cfg:3: "vrpn_Dial" is not supported by this server' effective.toml
 [ "$(grep -cx 'driver = "simulated"' effective.toml)" = 2 ]
 "$hapticd" serve --config effective.toml --check-config >again.toml
 grep -v '^#' effective.toml | cmp - again.toml
 
 printf '\n[[device]]\nreport_rate_Hz = 2000\n' >bad.toml
-fails_with "bad.toml:3: device 'Phantom': report_rate_Hz is 2000; it must lie between" --config bad.toml
+fails_with "bad.toml:3: device 'Phantom': report_rate_Hz must be between 0.1 and 1000, got 2000" --config bad.toml
 printf 'vrpn_Phantom P 1 fast X\n' >bad.cfg
 fails_with 'bad.cfg:1: report_rate_Hz is "fast", expected a number' --config bad.cfg
-fails_with "no driver is called 'hal'" --device hal
+fails_with "unknown driver 'hal'" --device hal

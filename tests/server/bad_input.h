@@ -1,4 +1,5 @@
-// A scene that somebody feels, a peer that says wrong things, and the question whether the first one noticed.
+// A fixture for bad input: one peer touches a scene, another sends bad input, and the first must not be
+// affected.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -9,7 +10,7 @@
 
 namespace hapticd::test {
 
-/// The good peer owns a cube and feels it at each stroke.
+/// The good peer owns a cube and touches it at each stroke.
 class BadInput : public testing::Test {
  protected:
   void SetUp() override {
@@ -19,25 +20,24 @@ class BadInput : public testing::Test {
     ASSERT_TRUE(isIntact());
   }
 
-  // Whether the good peer is connected and feels what it felt: the cube's top, as stiff as it was, in a world
-  // of the same size.
+  // Whether the good peer is connected and touches the same cube: same height, stiffness and world scale.
   bool isIntact() {
     return catchUp(good_) && untilTouchedAt(good_, 0, kCubeTop_m) && good_.until([&] {
       const auto depth = good_.last<wire::Dop>();
       return depth && std::abs(depth->depth - kDepth_m) < 2e-4;
     }) && good_.open();
   }
-  // Whether the bad peer is told in these words, and still served.
-  testing::AssertionResult isTold(const std::string& words) {
-    if (!bad_.untilText(words)) return testing::AssertionFailure() << "no text with '" << words << "'";
+  // Whether the bad peer got this text and is still connected.
+  testing::AssertionResult gotText(const std::string& text) {
+    if (!bad_.untilText(text)) return testing::AssertionFailure() << "no text with '" << text << "'";
     if (!bad_.open()) return testing::AssertionFailure() << "closed: " << bad_.closeReason();
     return testing::AssertionSuccess();
   }
-  bool untilLogged(const std::string& words) {
-    return good_.until([&] { return log_.count(words) > 0; });
+  bool untilLogged(const std::string& text) {
+    return good_.until([&] { return log_.count(text) > 0; });
   }
 
-  // The hand wants 5 mm and is a spring of 300 N/m against the cube's of 500 N/m.
+  // The target is 5 mm deep; the hand is a spring of 300 N/m against the cube of 500 N/m.
   static constexpr double kDepth_m = 0.005 * 300 / 800;
 
   LogLines log_;

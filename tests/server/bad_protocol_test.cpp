@@ -1,4 +1,4 @@
-// Peers that break the protocol, or use it to have the server do what it should not.
+// Peers that violate the protocol or abuse it.
 #include <ifaddrs.h>
 #include <netinet/in.h>
 
@@ -19,17 +19,17 @@ class BadProtocol : public BadInput {
  protected:
   using Speech = ScriptedPeer::Speech;
 
-  // A peer that says these bytes and nothing else.
-  std::unique_ptr<ScriptedPeer> say(ByteView bytes) {
+  // A peer that sends only these bytes.
+  std::unique_ptr<ScriptedPeer> sendBytes(ByteView bytes) {
     auto peer =
         std::make_unique<ScriptedPeer>(server_.address(), "Phantom", ScriptedPeer::Mode::tcp, Speech::raw);
     peer->sendBytes(bytes);
     return peer;
   }
-  std::unique_ptr<ScriptedPeer> say(std::string_view text) { return say(std::as_bytes(std::span(text))); }
-  // Whether a peer that says so is closed, with this reason in the log.
+  std::unique_ptr<ScriptedPeer> sendBytes(std::string_view text) { return sendBytes(std::as_bytes(std::span(text))); }
+  // Whether a peer that sends these bytes is disconnected, with this reason in the log.
   testing::AssertionResult isClosed(std::string_view text, const std::string& reason) {
-    const auto peer = say(text);
+    const auto peer = sendBytes(text);
     if (!peer->untilClosed()) return testing::AssertionFailure() << "not closed";
     if (!untilLogged(reason))
       return testing::AssertionFailure() << "no '" << reason << "' in\n" << log_.text();
@@ -83,7 +83,7 @@ TEST_F(BadProtocol, ACountThatDoesNotFitEndsTheConnection) {
   for (const std::uint32_t count : {2U, 0x7FFFFFFFU, 0xFFFFFFFFU}) {
     ScriptedPeer peer(server_.address());
     ASSERT_TRUE(peer.untilConnected());
-    Bytes payload(12);  // effect 0, and room for one parameter
+    Bytes payload(12);  // effect 0, and space for one parameter
     wire::storeBig(payload.data() + 4, count);
     peer.sendPayload(wire::kindOf<wire::CustomEffect>, payload);
     ASSERT_TRUE(peer.untilClosed()) << count;
@@ -92,7 +92,7 @@ TEST_F(BadProtocol, ACountThatDoesNotFitEndsTheConnection) {
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, AFrameThatCannotBeEndsTheConnection) {
+TEST_F(BadProtocol, AnInvalidFrameEndsTheConnection) {
   for (const std::uint32_t length : {0U, 23U, 65'000U, 0xFFFFFFFFU}) {
     ScriptedPeer peer(server_.address());
     ASSERT_TRUE(peer.untilConnected());
@@ -107,35 +107,35 @@ TEST_F(BadProtocol, AFrameThatCannotBeEndsTheConnection) {
 
 // --- names
 
-TEST_F(BadProtocol, NamesWithoutANulAreCutAndNeverReadBeyond) {
+TEST_F(BadProtocol, NamesWithoutANulEndAtTheirField) {
   wire::SetHapticProperty property{0, {}, 1};
   property.property.bytes.fill('x');
   bad_.send(property);
-  EXPECT_TRUE(isTold("setHapticProperty object 0, 'xxxxxxxxxxxxxxxxxxxx': unknown property"));
+  EXPECT_TRUE(gotText("setHapticProperty object 0, 'xxxxxxxxxxxxxxxxxxxx': unknown property"));
   wire::Effect effect;
   effect.type.bytes.fill('y');
   bad_.send(effect);
-  EXPECT_TRUE(isTold("setEffect 0, 'yyyyyyyyyyyyyyyyyyyy': refused: unknown type"));
+  EXPECT_TRUE(gotText("setEffect 0, 'yyyyyyyyyyyyyyyyyyyy': refused: unknown type"));
   Bytes text(1032, std::byte{'z'});
   std::fill_n(text.begin(), 8, std::byte{0});
   bad_.sendPayload(wire::kindOf<wire::Text>, text);
-  EXPECT_TRUE(untilLogged("says \"" + std::string(60, 'z')));
+  EXPECT_TRUE(untilLogged("sent the text \"" + std::string(60, 'z')));
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, ADescriptionWithoutANulIsCut) {
+TEST_F(BadProtocol, ADescriptionWithoutANulEndsAtItsField) {
   wire::FrameEncoder frames;
   frames.append(wire::encodeCookie(0));
   Bytes payload = wire::encodeDescription("PhantomX");
   payload.pop_back();
   wire::storeBig(payload.data(), std::int32_t{8});
   frames.addRaw({}, 0, wire::kSenderDescription, payload);
-  const auto peer = say(frames.bytes());
-  EXPECT_TRUE(peer->untilNext<wire::IsTouching>()) << "the length counts the NUL that is not there";
+  const auto peer = sendBytes(frames.bytes());
+  EXPECT_TRUE(peer->untilNext<wire::IsTouching>()) << "the length includes the missing NUL";
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, WhatLiesBehindTheNulOfANameDoesNotMatter) {
+TEST_F(BadProtocol, BytesAfterTheNulOfANameAreIgnored) {
   wire::SetHapticProperty property{0, {}, 1};
   std::ranges::copy(std::string_view("stiffness\0damping\xff\xff!", 20), property.property.bytes.begin());
   good_.send(property);
@@ -143,20 +143,20 @@ TEST_F(BadProtocol, WhatLiesBehindTheNulOfANameDoesNotMatter) {
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, DescriptionsThatLieAboutTheirLengthEndTheConnection) {
+TEST_F(BadProtocol, DescriptionsWithAWrongLengthEndTheConnection) {
   for (const std::int32_t length : {-1, 0, 50, 0x7FFFFFFF}) {
     wire::FrameEncoder frames;
     frames.append(wire::encodeCookie(0));
     Bytes payload = wire::encodeDescription("Phantom");
     wire::storeBig(payload.data(), length);
     frames.addRaw({}, 0, wire::kSenderDescription, payload);
-    EXPECT_TRUE(say(frames.bytes())->untilClosed()) << length;
+    EXPECT_TRUE(sendBytes(frames.bytes())->untilClosed()) << length;
   }
   EXPECT_TRUE(untilLogged("description says its name has 50 bytes, it has 8"));
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, TwoThousandSendersAndTypesAreKnownAndOneMoreIsNot) {
+TEST_F(BadProtocol, TwoThousandSendersAndTypesAreAcceptedAndOneMoreIsNot) {
   wire::FrameEncoder frames;
   frames.append(wire::encodeCookie(0));
   for (std::int32_t id = 0; id < 1999; ++id) {
@@ -167,7 +167,7 @@ TEST_F(BadProtocol, TwoThousandSendersAndTypesAreKnownAndOneMoreIsNot) {
   frames.addRaw({}, 1999, wire::kSenderDescription, wire::encodeDescription("Phantom"));
   frames.addRaw({}, 1999, wire::kTypeDescription, wire::encodeDescription(wire::Ping::kInfo.name));
   frames.addRaw({}, 1999, 1999, {});
-  const auto peer = say(frames.bytes());
+  const auto peer = sendBytes(frames.bytes());
   EXPECT_TRUE(peer->untilNext<wire::Pong>());
 
   frames.clear();
@@ -178,7 +178,7 @@ TEST_F(BadProtocol, TwoThousandSendersAndTypesAreKnownAndOneMoreIsNot) {
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, MessagesOfUndescribedNumbersAreIgnored) {
+TEST_F(BadProtocol, MessagesOfUndescribedSendersAndTypesAreIgnored) {
   wire::FrameEncoder frames;
   for (const std::int32_t number : {1999, 2000, 0x7FFFFFFF, -1999}) {
     frames.addRaw({}, 1, number, Bytes(20));
@@ -192,14 +192,14 @@ TEST_F(BadProtocol, MessagesOfUndescribedNumbersAreIgnored) {
 
 // --- greetings
 
-TEST_F(BadProtocol, OtherMinorVersionsAreWelcome) {
+TEST_F(BadProtocol, OtherMinorVersionsAreAccepted) {
   for (const char* version : {"07.30", "07.34", "07.99"}) {
-    EXPECT_TRUE(say(cookie(version))->untilConnected()) << version;
+    EXPECT_TRUE(sendBytes(cookie(version))->untilConnected()) << version;
     EXPECT_TRUE(untilLogged(std::string("speaks VRPN ") + version));
   }
 }
 
-TEST_F(BadProtocol, OtherMajorVersionsAndGarbageAreClosedWithTheReason) {
+TEST_F(BadProtocol, OtherMajorVersionsAndGarbageCloseTheConnectionWithTheReason) {
   EXPECT_TRUE(isClosed(cookie("08.00"), "opened with \"vrpn: ver. 08.00"));
   EXPECT_TRUE(isClosed(cookie("06.38"), "opened with \"vrpn: ver. 06.38"));
   EXPECT_TRUE(isClosed(cookie("07.38", '7'), "log mode \"7\" is not 0 to 3"));
@@ -209,10 +209,10 @@ TEST_F(BadProtocol, OtherMajorVersionsAndGarbageAreClosedWithTheReason) {
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, HalfAGreetingWaitsForTheOtherHalf) {
+TEST_F(BadProtocol, APartialGreetingWaitsForTheRest) {
   const std::string whole = cookie("07.38");
-  const auto slow = say(std::string_view(whole).substr(0, 11));
-  const auto silent = say("");
+  const auto slow = sendBytes(std::string_view(whole).substr(0, 11));
+  const auto silent = sendBytes("");
   EXPECT_TRUE(isIntact());
   EXPECT_TRUE(slow->open());
   const std::string_view rest = std::string_view(whole).substr(11);
@@ -222,7 +222,7 @@ TEST_F(BadProtocol, HalfAGreetingWaitsForTheOtherHalf) {
   EXPECT_TRUE(silent->open());
 }
 
-// --- what a server must not do for strangers
+// --- requests that the server must refuse
 
 TEST_F(BadProtocol, LogFilesAreRefused) {
   const auto file = std::filesystem::temp_directory_path() / "hapticd_must_not_be_written";
@@ -230,15 +230,15 @@ TEST_F(BadProtocol, LogFilesAreRefused) {
   wire::FrameEncoder frames;
   frames.append(wire::encodeCookie(3));
   frames.addRaw({}, 3, wire::kLogDescription, wire::encodeLogDescription({3, file.string(), file.string()}));
-  const auto peer = say(frames.bytes());
+  const auto peer = sendBytes(frames.bytes());
   EXPECT_TRUE(peer->untilText("log files on the server are refused"));
-  EXPECT_TRUE(untilLogged("asks for log files \"" + file.string()));
+  EXPECT_TRUE(untilLogged("requested log files \"" + file.string()));
   EXPECT_FALSE(std::filesystem::exists(file));
   EXPECT_TRUE(peer->open());
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, CallBacksToPortsBelow1024AreRefused) {
+TEST_F(BadProtocol, ReverseConnectionsToPortsBelow1024AreRefused) {
   for (const char* port : {"80", "0", "1023", "-5", "99999"}) {
     request(std::string("127.0.0.1 ") + port);
     EXPECT_TRUE(untilLogged("port \"" + std::string(port) + "\" is not 1024 to 65535")) << log_.text();
@@ -246,7 +246,7 @@ TEST_F(BadProtocol, CallBacksToPortsBelow1024AreRefused) {
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, RequestsThatAreNoneAreRefused) {
+TEST_F(BadProtocol, MalformedRequestsAreRefused) {
   request("");
   request("hello");
   request("127.0.0.1;reboot 4000");
@@ -255,14 +255,14 @@ TEST_F(BadProtocol, RequestsThatAreNoneAreRefused) {
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, CallBacksToAnotherHostAreRefusedWithTheRemedy) {
+TEST_F(BadProtocol, ReverseConnectionsToAnotherHostAreRefusedWithTheRemedy) {
   request("192.0.2.1 4000");
   EXPECT_TRUE(untilLogged("names another host, 192.0.2.1:4000: refused; allow it with callback_hosts"));
-  EXPECT_EQ(log_.count("calling back"), 0U);
+  EXPECT_EQ(log_.count("reverse connection to"), 0U);
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadProtocol, CallBacksWithinThisMachineMayNameAnotherLoopbackAddress) {
+TEST_F(BadProtocol, ReverseConnectionsOnThisMachineMayUseAnotherLoopbackAddress) {
   net::Loop loop;
   bool called = false;
   const net::TcpListener listener(loop, net::Endpoint::parse("127.0.0.2", 0),
@@ -272,7 +272,7 @@ TEST_F(BadProtocol, CallBacksWithinThisMachineMayNameAnotherLoopbackAddress) {
   EXPECT_TRUE(called);
 }
 
-// An address of this machine that is not loopback, or nothing.
+// An address of this machine that is not loopback; empty if there is none.
 std::string ownAddress() {
   ifaddrs* all = nullptr;
   if (::getifaddrs(&all) != 0) return {};
@@ -288,7 +288,7 @@ std::string ownAddress() {
   return found;
 }
 
-TEST(CallBackHosts, AHostOnTheListIsCalledBackThoughAnotherAsked) {
+TEST(CallbackHosts, AListedHostGetsAReverseConnectionRequestedByAnotherHost) {
   const std::string host = ownAddress();
   if (host.empty()) GTEST_SKIP() << "this machine has no address but loopback";
   server::ServerConfig config = RunningServer::anyPort();

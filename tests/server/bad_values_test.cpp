@@ -1,4 +1,4 @@
-// Messages whose form is right and whose values are not: a text says so, and nobody feels anything of it.
+// Well-formed messages with invalid values: each is refused with a text and affects nobody.
 #include <cmath>
 #include <limits>
 
@@ -37,14 +37,14 @@ wire::Plane plane(std::int32_t index, float distance, float stiffness) {
 
 class BadValues : public BadInput {};
 
-TEST_F(BadValues, ObjectsThatAreNotThereAreNamed) {
+TEST_F(BadValues, MissingObjectsAreNamed) {
   for (const std::int32_t id : {-1, 1, 10'000, kLargest, kSmallest}) {
     bad_.forget();
     const auto refused = [&](const char* call) {
-      return isTold(std::string(call) + " object " + std::to_string(id) + ": refused");
+      return gotText(std::string(call) + " object " + std::to_string(id) + ": refused");
     };
     bad_.send(wire::SetVertex{id, 0, {1, 2, 3}});
-    EXPECT_TRUE(isTold("setObjectVertex object " + std::to_string(id) + ": refused"));
+    EXPECT_TRUE(gotText("setObjectVertex object " + std::to_string(id) + ": refused"));
     bad_.send(wire::SetTriangle{id, 0, {0, 1, 2}, {-1, -1, -1}});
     EXPECT_TRUE(refused("setTriangle"));
     bad_.send(wire::SetNormal{id, 0, {}});
@@ -77,17 +77,17 @@ TEST_F(BadValues, ObjectsThatAreNotThereAreNamed) {
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadValues, ObjectsThatCannotBeAreNotAdded) {
+TEST_F(BadValues, InvalidObjectsAreNotAdded) {
   for (const std::int32_t id : {-1, 10'000, kLargest, kSmallest}) {
     bad_.send(wire::AddObject{id, -1});
-    EXPECT_TRUE(isTold("addObject object " + std::to_string(id) + ", limit 10000: refused"));
+    EXPECT_TRUE(gotText("addObject object " + std::to_string(id) + ", limit 10000: refused"));
     bad_.send(wire::AddObjectExScene{id});
-    EXPECT_TRUE(isTold("addObjectExScene object " + std::to_string(id)));
+    EXPECT_TRUE(gotText("addObjectExScene object " + std::to_string(id)));
   }
   bad_.send(wire::AddObject{3, 77});
-  EXPECT_TRUE(isTold("addObject object 3, parent 77: refused: there is no such parent"));
+  EXPECT_TRUE(gotText("addObject object 3, parent 77: refused: there is no such parent"));
   bad_.send(wire::MoveToParent{0, 0});
-  EXPECT_TRUE(isTold("moveToParent object 0, parent 0: refused: the object would be its own ancestor"));
+  EXPECT_TRUE(gotText("moveToParent object 0, parent 0: refused: the object would be its own ancestor"));
   EXPECT_TRUE(isIntact());
 }
 
@@ -95,18 +95,18 @@ TEST_F(BadValues, VerticesTrianglesPlanesAndEffectsOutOfRangeAreRefused) {
   for (const std::int32_t number : {-1, kSmallest, kLargest}) {
     const std::string text = std::to_string(number);
     bad_.send(wire::SetVertex{0, number, {1, 2, 3}});
-    EXPECT_TRUE(isTold("setObjectVertex object 0, vertex " + text));
+    EXPECT_TRUE(gotText("setObjectVertex object 0, vertex " + text));
     bad_.send(wire::SetTriangle{0, number, {0, 1, 2}, {-1, -1, -1}});
-    EXPECT_TRUE(isTold("setTriangle object 0, triangle " + text));
+    EXPECT_TRUE(gotText("setTriangle object 0, triangle " + text));
     bad_.send(plane(number, -0.02F, 1));
-    EXPECT_TRUE(isTold("sendSurface plane " + text));
+    EXPECT_TRUE(gotText("sendSurface plane " + text));
   }
   bad_.send(wire::SetTriangle{0, 0, {0, -1, 2}, {-1, -1, -1}});
-  EXPECT_TRUE(isTold("setTriangle object 0, triangle 0, vertices 0 -1 2: refused"));
+  EXPECT_TRUE(gotText("setTriangle object 0, triangle 0, vertices 0 -1 2: refused"));
   bad_.send(effect("constant", -1));
-  EXPECT_TRUE(isTold("setEffect -1"));
+  EXPECT_TRUE(gotText("setEffect -1"));
   bad_.send(wire::StopEffect{kLargest});
-  EXPECT_TRUE(isTold("stopEffect 2147483647: no such effect was defined"));
+  EXPECT_TRUE(gotText("stopEffect 2147483647: no such effect was defined"));
   EXPECT_TRUE(isIntact());
 }
 
@@ -115,56 +115,56 @@ class BadNumbers : public BadInput, public testing::WithParamInterface<float> {}
 TEST_P(BadNumbers, OfObjectsAreRefused) {
   const float bad = GetParam();
   bad_.send(wire::SetVertex{0, 4, {0, bad, 0}});
-  EXPECT_TRUE(isTold("setObjectVertex object 0, 1 of the vertices from 4 on: refused"));
+  EXPECT_TRUE(gotText("setObjectVertex object 0, 1 of the vertices from 4 on: refused"));
   bad_.send(wire::SetTransformMatrix{0, {bad, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}});
-  EXPECT_TRUE(isTold("setTransformMatrix object 0: refused"));
+  EXPECT_TRUE(gotText("setTransformMatrix object 0: refused"));
   bad_.send(wire::SetHapticProperty{0, "stiffness", bad});
-  EXPECT_TRUE(isTold("setHapticProperty object 0, stiffness"));
+  EXPECT_TRUE(gotText("setHapticProperty object 0, stiffness"));
   bad_.send(wire::UpdateTrimeshChanges{0, bad, 0, 0, 0});
-  EXPECT_TRUE(isTold("updateTrimeshChanges object 0"));
+  EXPECT_TRUE(gotText("updateTrimeshChanges object 0"));
   bad_.send(wire::TransformTrimesh{0, {1, 0, 0, bad, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}});
-  EXPECT_TRUE(isTold("transformTrimesh object 0: refused"));
+  EXPECT_TRUE(gotText("transformTrimesh object 0: refused"));
   bad_.send(wire::SetObjectPosition{0, {bad, 0, 0}});
-  EXPECT_TRUE(isTold("setObjectPosition object 0"));
+  EXPECT_TRUE(gotText("setObjectPosition object 0"));
   bad_.send(wire::SetObjectOrientation{0, {0, 0, 1}, bad});
-  EXPECT_TRUE(isTold("setObjectOrientation object 0"));
+  EXPECT_TRUE(gotText("setObjectOrientation object 0"));
   bad_.send(wire::SetObjectScale{0, {1, bad, 1}});
-  EXPECT_TRUE(isTold("setObjectScale object 0"));
+  EXPECT_TRUE(gotText("setObjectScale object 0"));
   EXPECT_TRUE(isIntact());
 }
 
 TEST_P(BadNumbers, OfWorldsAndForcesAreRefused) {
   const float bad = GetParam();
   bad_.send(wire::SetWorkspaceBoundingBox{kIdentity, {-80, -60, -35, 80, bad, 35}});
-  EXPECT_TRUE(isTold("setWorkspaceBoundingBox: refused, the old map stays"));
+  EXPECT_TRUE(gotText("setWorkspaceBoundingBox: refused, the old map stays"));
   bad_.send(wire::SetWorkspaceProjectionMatrix{kIdentity, {bad}});
-  EXPECT_TRUE(isTold("setWorkspaceProjectionMatrix: refused, the old map stays"));
+  EXPECT_TRUE(gotText("setWorkspaceProjectionMatrix: refused, the old map stays"));
   bad_.send(wire::SetHapticOrigin{{bad, 0, 0}, {0, 0, 1}, 0});
-  EXPECT_TRUE(isTold("setHapticOrigin"));
+  EXPECT_TRUE(gotText("setHapticOrigin"));
   bad_.send(wire::SetHapticScale{bad});
-  EXPECT_TRUE(isTold("setHapticScale"));
+  EXPECT_TRUE(gotText("setHapticScale"));
   bad_.send(wire::SetSceneOrigin{{0, bad, 0}, {0, 0, 1}, 0});
-  EXPECT_TRUE(isTold("setSceneOrigin"));
+  EXPECT_TRUE(gotText("setSceneOrigin"));
   wire::Effect push = effect("constant", 0);
   push.magnitude = bad;
   bad_.send(push);
-  EXPECT_TRUE(isTold("setEffect 0, magnitude: refused"));
+  EXPECT_TRUE(gotText("setEffect 0, magnitude: refused"));
   bad_.send(wire::ForceField{{}, {bad, 0, 0}, {}, 1});
-  EXPECT_TRUE(isTold("sendForceField"));
+  EXPECT_TRUE(gotText("sendForceField"));
   bad_.send(plane(0, bad, 1));
-  EXPECT_TRUE(isTold("sendSurface plane 0, 0 1 0"));
+  EXPECT_TRUE(gotText("sendSurface plane 0, 0 1 0"));
   bad_.send(plane(1, -0.02F, bad));
-  EXPECT_TRUE(isTold("sendSurface plane 1"));
+  EXPECT_TRUE(gotText("sendSurface plane 1"));
   bad_.send(wire::Plane2{bad, 0, 0, 0, 0, 0});
-  EXPECT_TRUE(isTold("adhesion, texture or buzz"));
+  EXPECT_TRUE(gotText("adhesion, texture or buzz"));
   bad_.send(wire::ConstraintPoint{{0, bad, 0}});
-  EXPECT_TRUE(isTold("or a direction without length"));
+  EXPECT_TRUE(gotText("or a direction without length"));
   bad_.send(wire::ConstraintStiffness{bad});
-  EXPECT_TRUE(isTold("constraint_KSpring"));
+  EXPECT_TRUE(gotText("constraint_KSpring"));
   wire::CustomEffect buzz;
   buzz.parameters.values = {bad};
   bad_.send(buzz);
-  EXPECT_TRUE(isTold("startEffect (custom) 0: refused"));
+  EXPECT_TRUE(gotText("startEffect (custom) 0: refused"));
   EXPECT_TRUE(isIntact());
 }
 
@@ -178,40 +178,40 @@ INSTANTIATE_TEST_SUITE_P(NotFinite, BadNumbers, testing::Values(kNan, kInfinity,
 TEST_F(BadValues, MatricesThatCannotBeInvertedAreRefused) {
   bad_.send(wire::SetTransformMatrix{0, {}});
   EXPECT_TRUE(
-      isTold("setTransformMatrix object 0: refused: the matrix is not finite or too large, is singular"));
+      gotText("setTransformMatrix object 0: refused: the matrix is not finite or too large, is singular"));
   bad_.send(wire::TransformTrimesh{0, {}});
-  EXPECT_TRUE(isTold("transformTrimesh object 0: refused"));
+  EXPECT_TRUE(gotText("transformTrimesh object 0: refused"));
   bad_.send(wire::SetObjectScale{0, {1, 0, 1}});
-  EXPECT_TRUE(isTold("setObjectScale object 0, scale 1 0 1: refused"));
+  EXPECT_TRUE(gotText("setObjectScale object 0, scale 1 0 1: refused"));
   bad_.send(wire::SetObjectOrientation{0, {0, 0, 0}, 1});
-  EXPECT_TRUE(isTold("setObjectOrientation object 0"));
+  EXPECT_TRUE(gotText("setObjectOrientation object 0"));
   bad_.send(wire::SetWorkspaceBoundingBox{{}, {-80, -60, -35, 80, 60, 35}});
-  EXPECT_TRUE(isTold("setWorkspaceBoundingBox: refused, the old map stays: the model matrix"));
+  EXPECT_TRUE(gotText("setWorkspaceBoundingBox: refused, the old map stays: the model matrix"));
   bad_.send(wire::SetWorkspaceBoundingBox{kIdentity, {}});
-  EXPECT_TRUE(isTold("the view has no extent"));
+  EXPECT_TRUE(gotText("the view has no extent"));
   bad_.send(wire::SetWorkspaceProjectionMatrix{kIdentity, {}});
-  EXPECT_TRUE(isTold("the projection matrix is not finite or singular"));
+  EXPECT_TRUE(gotText("the projection matrix is not finite or singular"));
   bad_.send(wire::SetHapticScale{0});
-  EXPECT_TRUE(isTold("setHapticScale 0: refused"));
+  EXPECT_TRUE(gotText("setHapticScale 0: refused"));
   EXPECT_TRUE(isIntact());
 }
 
 TEST_F(BadValues, AMillionObjectsAreRefusedAndTenThousandAreNot) {
   for (const std::int32_t count : {1'000'000, kLargest, -1, kSmallest}) {
     bad_.send(wire::SetObjectNumber{count});
-    EXPECT_TRUE(isTold("setObjectNumber " + std::to_string(count) + ", limit 10000: refused"));
+    EXPECT_TRUE(gotText("setObjectNumber " + std::to_string(count) + ", limit 10000: refused"));
   }
   bad_.send(wire::SetObjectNumber{10'000});
   bad_.send(wire::SetObjectIsTouchable{9'999, 1});
   bad_.send(wire::SetObjectIsTouchable{10'000, 1});
-  EXPECT_TRUE(isTold("setObjectIsTouchable object 10000: refused"));
+  EXPECT_TRUE(gotText("setObjectIsTouchable object 10000: refused"));
   EXPECT_TRUE(isIntact());
 }
 
 TEST_F(BadValues, VerticesForAMissingObjectAreRefusedAndDoNotAppearLater) {
   const std::vector<Vec3f> higher = boxTriples({20, 30, 20});
   sendVertices(bad_, 3, higher);
-  EXPECT_TRUE(isTold("setObjectVertex object 3: refused: there is no such object; call setObjectNumber"));
+  EXPECT_TRUE(gotText("setObjectVertex object 3: refused: there is no such object; call setObjectNumber"));
   bad_.send(wire::SetObjectNumber{4});
   bad_.send(wire::SetHapticProperty{3, "stiffness", 1});
   ASSERT_TRUE(untilApplied(bad_));
@@ -220,11 +220,11 @@ TEST_F(BadValues, VerticesForAMissingObjectAreRefusedAndDoNotAppearLater) {
 
 TEST_F(BadValues, UnknownEffectsAndPropertiesAreNamed) {
   bad_.send(effect("earthquake", 0));
-  EXPECT_TRUE(isTold("setEffect 0, 'earthquake': refused: unknown type; use constant, spring"));
+  EXPECT_TRUE(gotText("setEffect 0, 'earthquake': refused: unknown type; use constant, spring"));
   bad_.send(wire::StopEffect{12});
-  EXPECT_TRUE(isTold("stopEffect 12: no such effect was defined"));
+  EXPECT_TRUE(gotText("stopEffect 12: no such effect was defined"));
   bad_.send(wire::SetHapticProperty{0, "squishiness", 1});
-  EXPECT_TRUE(isTold("setHapticProperty object 0, 'squishiness': unknown property, ignored; use stiffness"));
+  EXPECT_TRUE(gotText("setHapticProperty object 0, 'squishiness': unknown property, ignored; use stiffness"));
   EXPECT_TRUE(isIntact());
 }
 
@@ -242,14 +242,14 @@ TEST_F(BadValues, AnEffectMayBeStartedJustBeforeItIsDefined) {
 
 TEST_F(BadValues, AnEffectThatIsNeverDefinedIsNamedAfterASecond) {
   bad_.send(wire::StartEffect{6});
-  EXPECT_TRUE(isTold("startEffect 6: no such effect was defined within a second; call setEffect first"));
+  EXPECT_TRUE(gotText("startEffect 6: no such effect was defined within a second; call setEffect first"));
   EXPECT_TRUE(isIntact());
 }
 
-TEST_F(BadValues, ManyComplaintsAreCountedAndCrowdNobodyOut) {
+TEST_F(BadValues, ManyNoticesAreCountedAndDoNotDelayOthers) {
   for (std::int32_t i = 0; i < 20'000; ++i) bad_.queue(wire::SetHapticProperty{100 + i, "stiffness", 1});
   bad_.flush();
-  EXPECT_TRUE(isTold("more like this; the last: setHapticProperty object 20099"));
+  EXPECT_TRUE(gotText("more like this; the last: setHapticProperty object 20099"));
   EXPECT_LE(bad_.count<wire::Text>(), 100U);
   EXPECT_TRUE(isIntact());
 }

@@ -1,4 +1,4 @@
-// A client in a process of its own, which can be killed as the system kills.
+// A client in a separate process, which can be killed or suspended.
 #pragma once
 
 #include <signal.h>
@@ -12,10 +12,10 @@
 
 namespace hapticd::test {
 
-/// Make it before anything that has threads: the process is forked.
+/// Construct it before any thread exists: it forks the process.
 class ChildClient {
  public:
-  /// `live` gets the server's address in the child, connects, and goes on until the process is killed.
+  /// `live` runs in the child with the server's endpoint until the process is killed.
   template <class Live>
   explicit ChildClient(const Live& live) {
     int ends[2];
@@ -37,13 +37,13 @@ class ChildClient {
   ChildClient(const ChildClient&) = delete;
   ChildClient& operator=(const ChildClient&) = delete;
 
-  /// Tells the child where the server is; it goes on from there.
+  /// Sends the endpoint of the server to the child, which then runs `live`.
   void connectTo(const net::Endpoint& server) {
     if (::write(pipe_, &server, sizeof server) != sizeof server) throw std::runtime_error("no child");
   }
-  /// Its program stands still, its system does not.
+  /// Suspends the process; its kernel keeps acknowledging data.
   void suspend() { ::kill(pid_, SIGSTOP); }
-  /// As kill -9. Returns when it is gone.
+  /// Like kill -9. Returns when the process has ended.
   void kill() {
     if (pid_ <= 0) return;
     ::kill(pid_, SIGKILL);

@@ -1,4 +1,4 @@
-// docs/vrpn-compat.md against the table of messages and against the tests that it names.
+// Checks docs/vrpn-compat.md against the message table and against the tests that it names.
 #include <gtest/gtest.h>
 
 #include <filesystem>

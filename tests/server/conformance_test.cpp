@@ -1,5 +1,5 @@
-// The recorded clients speak, byte for byte, to the running server, in both modes: each gets every report and
-// every text that it must get. No other library takes part.
+// Recorded clients against the running server, byte for byte, in both modes: each must get all its reports
+// and texts. No other library is involved.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -20,7 +20,7 @@ using Mode = ScriptedPeer::Mode;
 constexpr double kUnits_per_m = (0.4 / 0.12 + 0.4 / 0.07) / 2;
 constexpr double kReported_m = 1e-3;  // of a world unit
 
-/// Strokes down onto the left cube, then onto the right one, and so on for two minutes.
+/// Strokes down onto the left and the right cube in turn for two minutes.
 Hand strokingBothCubes() {
   Hand hand = Hand::at({0, 0.09 / kUnits_per_m, 0});
   double side = -1;
@@ -34,7 +34,7 @@ Hand strokingBothCubes() {
   return hand;
 }
 
-/// The stream of one recorded client, cut at its frames.
+/// The stream of one recorded client, split into frames.
 class Recording {
  public:
   explicit Recording(const std::string& file) : bytes_(wire::recorded(file)) {
@@ -55,14 +55,14 @@ class Recording {
     }
   }
 
-  /// Has the client ask for datagrams to this port instead of its own.
+  /// Replaces the UDP port that the client requests.
   void describeUdp(std::uint16_t port) {
     wire::storeBig(bytes_.data() + udpDescription_ + 12, static_cast<std::int32_t>(port));
   }
-  /// What it said before it started its first effect, and the rest.
+  /// The bytes before its first startEffect, and the rest.
   wire::ByteView scene() const { return wire::ByteView(bytes_).first(firstStart_); }
   wire::ByteView rest() const { return wire::ByteView(bytes_).subspan(firstStart_); }
-  /// Bytes of a resetScene, which the recording lacks: the numbers are those of the client.
+  /// Bytes of a resetScene, which the recording lacks, with the client's sender and type numbers.
   Bytes reset() const {
     wire::FrameEncoder frames;
     frames.addRaw({}, device_, resetScene_, Bytes(1));
@@ -86,7 +86,7 @@ class Conformance : public testing::TestWithParam<Mode> {
  protected:
   static server::ServerConfig config(const Hand& hand) {
     server::ServerConfig config = hand.config();
-    config.devices[0].linearTolerance_m = 0;  // in a world this small nothing moves by a millimetre
+    config.devices[0].linearTolerance_m = 0;  // in so small a world no motion exceeds a millimetre
     return config;
   }
 
@@ -102,7 +102,7 @@ class Conformance : public testing::TestWithParam<Mode> {
       client_.sendDatagram(datagrams_.at(0));
     }
   }
-  // Goes on after the scene, and waits for the answers to the last pings.
+  // Sends the rest of the stream and waits for the answers to the last pings.
   void playRest() {
     client_.sendBytes(recording_.rest());
     for (std::size_t i = 1; i < datagrams_.size(); ++i) client_.sendDatagram(datagrams_[i]);
@@ -131,7 +131,7 @@ class Conformance : public testing::TestWithParam<Mode> {
   ScriptedPeer client_{server_.address(), "Phantom", GetParam(), ScriptedPeer::Speech::raw};
 };
 
-TEST_P(Conformance, TheSceneIsFeltAndReported) {
+TEST_P(Conformance, TheSceneIsRenderedAndReported) {
   ASSERT_TRUE(untilTouched(0));
   ASSERT_TRUE(untilTouched(1));
   EXPECT_TRUE(client_.until([&] { return client_.last<wire::TouchedObject>()->object == -1; }));
@@ -144,11 +144,11 @@ TEST_P(Conformance, TheSceneIsFeltAndReported) {
   }
   for (const auto& force : client_.all<wire::Force>()) EXPECT_LE(norm(force.force), 3.3 + 1e-9);
   for (const auto& angle : client_.all<wire::Angle>()) {
-    EXPECT_NEAR(angle.angle, 0, 0.1);  // the stylus stands on both tops
+    EXPECT_NEAR(angle.angle, 0, 0.1);  // the stylus is normal to both tops
   }
 }
 
-TEST_P(Conformance, EveryQuestionIsAnswered) {
+TEST_P(Conformance, EveryQueryIsAnswered) {
   playRest();
   EXPECT_TRUE(client_.until([&] { return client_.count<wire::TrackerToRoom>() == 1; }));
   EXPECT_TRUE(client_.until([&] { return client_.count<wire::TrackerUnitToSensor>() == 3; }))
@@ -157,15 +157,15 @@ TEST_P(Conformance, EveryQuestionIsAnswered) {
   EXPECT_TRUE(client_.until([&] { return client_.count<wire::ButtonStates>() >= pings() + 1; }))
       << "one on connection, and one for each ping";
   EXPECT_TRUE(client_.until([&] { return client_.count<wire::ButtonAlert>() >= 4; }))
-      << "each admin is told of";
+      << "each Admin message is reported";
   EXPECT_EQ(client_.count<wire::Pong>(), pings());
   EXPECT_EQ(client_.count<wire::TrackerAcceleration>(), 0U);
 }
 
-TEST_P(Conformance, WhatIsNotDoneAsAskedIsTold) {
+TEST_P(Conformance, ChangedAndRefusedRequestsAreReported) {
   playRest();
-  for (const char* words : {
-           "setEffect 2, gain 0.5 to 0.0",  // damping that no device renders stably
+  for (const char* text : {
+           "setEffect 2, gain 0.5 to 0.0",  // more damping than any device renders stably
            "setNormal object 0: ignored: normals follow from the triangles",
            "setNormal object 1: ignored: normals follow from the triangles",
            "transformTrimesh object 0: refused: the matrix",
@@ -173,23 +173,23 @@ TEST_P(Conformance, WhatIsNotDoneAsAskedIsTold) {
            "setTrimeshType object -1, type 0: ignored: there is one way to collide",
            "startEffect (custom) 4: there is no such custom effect",
        }) {
-    EXPECT_TRUE(client_.untilText(words)) << words;
+    EXPECT_TRUE(client_.untilText(text)) << text;
   }
   EXPECT_TRUE(client_.open());
 }
 
-TEST_P(Conformance, TheResetAtTheEndTakesTheSceneAway) {
+TEST_P(Conformance, TheResetAtTheEndRemovesTheScene) {
   ASSERT_TRUE(untilTouched(1));
   playRest();
   client_.sendBytes(recording_.reset());
-  ASSERT_TRUE(untilTicks(client_, 250));  // all that was felt has ramped out
+  ASSERT_TRUE(untilTicks(client_, 250));  // all forces have ramped out
   client_.forget();
   ASSERT_TRUE(untilTicks(client_, 450)) << "a stroke onto each cube";
   for (const auto& touching : client_.all<wire::IsTouching>()) EXPECT_EQ(touching.touching, 0);
   EXPECT_TRUE(client_.open());
 }
 
-TEST_P(Conformance, ReportsTravelAsTheModeWants) {
+TEST_P(Conformance, ReportsUseTheTransportOfTheMode) {
   ASSERT_TRUE(untilTouched(0));
   playRest();
   for (const auto& message : client_.messages()) {

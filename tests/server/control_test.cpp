@@ -13,7 +13,7 @@ namespace {
 
 using Config = server::ServerConfig;
 
-// A field that pushes up with 1 N wherever the hand is.
+// A force field of 1 N upwards everywhere.
 const wire::ForceField kUp{.origin = {0, 0, 0}, .force = {0, 1, 0}, .jacobian = {}, .radius = 10};
 
 double lastForce(const ScriptedPeer& peer) {
@@ -28,7 +28,7 @@ wire::GuardState lastGuard(const ScriptedPeer& peer) {
   return states.empty() ? wire::GuardState{} : states.back();
 }
 
-// Holds the hand still at a place, so that nothing but what is commanded is felt.
+// Holds the hand still at a position, so that only commanded forces act.
 void hold(ScriptedPeer& peer, double x, double y, double z) {
   peer.send(wire::HoldHand{.hold = 1, .position = {x, y, z}});
 }
@@ -46,7 +46,7 @@ class ControlTest : public ::testing::Test {
   std::unique_ptr<RunningServer> server_;
 };
 
-TEST_F(ControlTest, CapabilitiesTellOfTheDevice) {
+TEST_F(ControlTest, CapabilitiesDescribeTheDevice) {
   serve();
   const auto client = peer();
   client->send(wire::QueryCapabilities{});
@@ -59,7 +59,7 @@ TEST_F(ControlTest, CapabilitiesTellOfTheDevice) {
   EXPECT_NEAR(answer.workspace[3], 0.08, 1e-12);
 }
 
-TEST_F(ControlTest, AnyClientStopsTheForceAndReArmingBringsItBack) {
+TEST_F(ControlTest, AnyClientStopsTheForceAndReArmingRestoresIt) {
   serve();
   const auto owner = peer();
   const auto other = peer();
@@ -76,7 +76,7 @@ TEST_F(ControlTest, AnyClientStopsTheForceAndReArmingBringsItBack) {
   EXPECT_TRUE(untilForce(*owner, 1));
 }
 
-TEST_F(ControlTest, OnlyOneHoldsTheHandAndItGoesWhereItIsHeld) {
+TEST_F(ControlTest, OneClientSteersTheHandToItsTarget) {
   serve();
   auto holder = peer();
   const auto other = peer();
@@ -101,7 +101,7 @@ TEST_F(ControlTest, OnlyOneHoldsTheHandAndItGoesWhereItIsHeld) {
   }));
 }
 
-TEST_F(ControlTest, AClientThatPromisedHeartbeatsIsLostWithoutThem) {
+TEST_F(ControlTest, AClientThatOptedIntoHeartbeatsIsLostWithoutThem) {
   serve();
   const auto watcher = peer();
   const auto client = peer();
@@ -114,18 +114,18 @@ TEST_F(ControlTest, AClientThatPromisedHeartbeatsIsLostWithoutThem) {
   EXPECT_TRUE(watcher->open());
 }
 
-TEST_F(ControlTest, APromiseOfHeartbeatsCanBeTakenBack) {
+TEST_F(ControlTest, AClientCanOptOutOfHeartbeats) {
   serve();
   const auto client = peer();
   client->send(wire::Heartbeat{1});
   client->send(wire::Heartbeat{0});
   const auto since = client->count<wire::IsTouching>();
-  // 1.5 s of reports, told by their number.
+  // 1500 reports last 1.5 s.
   EXPECT_TRUE(client->until([&] { return client->count<wire::IsTouching>() > since + 1500; }, 60s));
   EXPECT_TRUE(client->open());
 }
 
-TEST_F(ControlTest, OnlyTheFirstCommandsUntilItLeaves) {
+TEST_F(ControlTest, OnlyTheFirstClientCommandsUntilItDisconnects) {
   Config config = RunningServer::anyPort();
   config.devices[0].control = server::Control::first;
   serve(config);
@@ -138,7 +138,7 @@ TEST_F(ControlTest, OnlyTheFirstCommandsUntilItLeaves) {
   second->send(kUp);
   ASSERT_TRUE(second->untilText("vrpn_ForceDevice Force_Field refused: client"));
   EXPECT_EQ(second->texts().back().level, static_cast<std::uint32_t>(server::RefusalCode::notPermitted));
-  second->send(wire::StopForces{});  // anybody may
+  second->send(wire::StopForces{});  // permitted for every client
   ASSERT_TRUE(first->until([&] { return lastGuard(*first).stopped == 1; }));
   second->send(wire::RearmForces{});
   ASSERT_TRUE(second->untilText("hapticd Rearm_Forces refused"));
@@ -146,7 +146,7 @@ TEST_F(ControlTest, OnlyTheFirstCommandsUntilItLeaves) {
   ASSERT_TRUE(first->until([&] { return lastGuard(*first).stopped == 0; }));
   first->close();
   first.reset();
-  // The server hears of that when it hears of it.
+  // The server notices the disconnection later.
   EXPECT_TRUE(second->until([&] {
     second->send(kUp);
     return lastForce(*second) > 0.5;
@@ -169,7 +169,7 @@ TEST_F(ControlTest, OnlyListedAddressesCommand) {
   EXPECT_TRUE(known->until([&] { return lastForce(*known) > 0.5; }));
 }
 
-TEST_F(ControlTest, ABatchIsFeltAtOnceOrNotAtAll) {
+TEST_F(ControlTest, ABatchActsInOneTickOrNotAtAll) {
   serve();
   const auto watcher = peer();
   auto client = peer();
@@ -198,7 +198,7 @@ TEST_F(ControlTest, ABatchIsFeltAtOnceOrNotAtAll) {
   EXPECT_TRUE(watcher->untilText("no batch was begun"));
 }
 
-TEST_F(ControlTest, ABulkMeshIsFeltInItsOwnUnit) {
+TEST_F(ControlTest, ABulkMeshIsRenderedInItsOwnUnit) {
   serve();
   const auto client = peer();
   // A floor at y = 0, 200 mm wide, in two triangles.
@@ -221,7 +221,7 @@ TEST_F(ControlTest, ABulkMeshIsFeltInItsOwnUnit) {
   }));
 }
 
-TEST_F(ControlTest, DevicesThatNameOneSceneFeelTheSame) {
+TEST_F(ControlTest, DevicesOfOneSceneShareItsObjects) {
   Config config = RunningServer::anyPort();
   config.devices.resize(3);
   config.devices[0].names = {"Left"};
@@ -243,7 +243,7 @@ TEST_F(ControlTest, DevicesThatNameOneSceneFeelTheSame) {
   EXPECT_EQ(texts, 1U);
 }
 
-TEST_F(ControlTest, ASceneThatFailsIsNotCommandedByMalformedOnes) {
+TEST_F(ControlTest, AMalformedMeshMessageEndsTheConnection) {
   serve();
   const auto client = peer();
   client->send(wire::MeshVertices{0, 0, {{1, 2}}});

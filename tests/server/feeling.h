@@ -1,4 +1,4 @@
-// What a client sends to have something to feel, and how a test waits until it is felt.
+// Helpers that send a haptic scene and wait for its reports.
 #pragma once
 
 #include <cmath>
@@ -12,7 +12,7 @@ namespace hapticd::test {
 using geometry::Vec3;
 using geometry::Vec3f;
 
-/// Corners of a box, three for each of its twelve triangles, seen from outside counter-clockwise.
+/// Vertices of a box, three for each of its twelve triangles, counter-clockwise from outside.
 inline std::vector<Vec3f> boxTriples(const Vec3f& half, const Vec3f& centre = Vec3f::Zero()) {
   std::vector<Vec3f> corners;
   for (int axis = 0; axis < 3; ++axis) {
@@ -29,7 +29,7 @@ inline std::vector<Vec3f> boxTriples(const Vec3f& half, const Vec3f& centre = Ve
   return corners;
 }
 
-/// One setVertex for each corner.
+/// Sends one setVertex for each vertex.
 inline void sendVertices(ScriptedPeer& peer, std::int32_t object, const std::vector<Vec3f>& vertices) {
   std::int32_t number = 0;
   for (const Vec3f& v : vertices) peer.queue(wire::SetVertex{object, number++, {v.x(), v.y(), v.z()}});
@@ -49,7 +49,7 @@ inline void sendCube(ScriptedPeer& peer, std::int32_t object = 0) {
 }
 inline constexpr double kCubeTop_m = 0.020;
 
-/// Waits until all that the server said so far has been read, and forgets it.
+/// Reads and discards everything that the server sent so far.
 inline bool catchUp(ScriptedPeer& peer) {
   peer.send(wire::Ping{});
   const bool answered = peer.untilNext<wire::Pong>();
@@ -63,7 +63,8 @@ inline bool untilTicks(ScriptedPeer& peer, std::size_t ticks) {
   return peer.until([&] { return peer.count<wire::IsTouching>() >= before + ticks; });
 }
 
-/// Waits until the scene has applied all that the peer sent so far: what comes after it is refused by name.
+/// Waits until the scene has applied everything that the peer sent: a refused command after it is reported in
+/// order.
 inline bool untilApplied(ScriptedPeer& peer) {
   static std::int32_t effect = 1'000'000;
   peer.send(wire::StopEffect{++effect});
@@ -74,7 +75,7 @@ inline double norm(const wire::F64x3& v) {
   return std::hypot(v[0], v[1], v[2]);
 }
 
-/// Waits until this object is touched, where its surface is at this height.
+/// Waits until this object is touched at this height.
 inline bool untilTouchedAt(ScriptedPeer& peer, std::int32_t object, double height_m) {
   return peer.until([&] {
     const auto touched = peer.last<wire::TouchedObject>();
@@ -82,7 +83,7 @@ inline bool untilTouchedAt(ScriptedPeer& peer, std::int32_t object, double heigh
     return touched && touched->object == object && scp && std::abs(scp->position[1] - height_m) < 2e-4;
   });
 }
-/// Waits until the hand has gone all the way down, through where the cube's top would be.
+/// Waits until the hand has stroked down through the position of the cube's top without contact.
 inline bool untilUntouchedStroke(ScriptedPeer& peer) {
   return peer.until([&] {
     const auto pose = peer.last<wire::TrackerPosQuat>([](const auto& m) { return m.sensor == 0; });
@@ -90,7 +91,7 @@ inline bool untilUntouchedStroke(ScriptedPeer& peer) {
   });
 }
 
-/// Waits until the reported force is this one.
+/// Waits until this force is reported.
 inline bool untilForce(ScriptedPeer& peer, const Vec3& force_N, double tolerance_N = 0.05) {
   return peer.until([&] {
     const auto force = peer.last<wire::Force>();
@@ -98,7 +99,7 @@ inline bool untilForce(ScriptedPeer& peer, const Vec3& force_N, double tolerance
                           force->force[2] - force_N.z()}) <= tolerance_N;
   });
 }
-/// Waits until there is a force of at least this size.
+/// Waits until a larger force than this is reported.
 inline bool untilForceAbove(ScriptedPeer& peer, double force_N) {
   return peer.until([&] {
     const auto force = peer.last<wire::Force>();
@@ -106,7 +107,7 @@ inline bool untilForceAbove(ScriptedPeer& peer, double force_N) {
   });
 }
 
-/// Waits until the hand of the device (sensor 1) is reported at this place.
+/// Waits until the HIP (sensor 1) is reported at this position.
 inline bool untilHandAt(ScriptedPeer& peer, const Vec3& position_m, double tolerance_m = 5e-4) {
   return peer.until([&] {
     const auto pose = peer.last<wire::TrackerPosQuat>([](const auto& m) { return m.sensor == 1; });

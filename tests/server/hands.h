@@ -1,4 +1,4 @@
-// Simulated hands that move as a test needs them, so that none waits for the script of the server.
+// Hand files for tests, so that no test waits for the scripted hand.
 #pragma once
 
 #include <unistd.h>
@@ -17,19 +17,19 @@ namespace hapticd::test {
 
 using geometry::Vec3;
 
-/// A hand path in a file, for as long as this lives. Positions in metres of the device; the initial workspace
-/// makes them thousandths of world units, and the reports give them as they are.
+/// A temporary hand file. Positions in metres, device frame; with the initial workspace the reported metres
+/// are the same numbers.
 class Hand {
  public:
-  /// Rests at a place, unless rows are added.
+  /// Rests at a position until rows are added.
   static Hand at(const Vec3& position_m) {
     Hand hand;
     hand.row(0, position_m);
     return hand;
   }
 
-  /// For two minutes strokes down the y axis, from 40 to 15 mm, stays there a moment with button 0 down, and
-  /// goes up again; turned about the z axis.
+  /// Strokes for two minutes: down the y axis from 40 to 15 mm, a pause with button 0 pressed, and up again;
+  /// rotated about the z axis.
   static Hand stroking(double turn_rad = 0) {
     constexpr double kHigh_m = 0.040;
     constexpr double kLow_m = 0.015;
@@ -55,7 +55,7 @@ class Hand {
         << ',' << std::cos(turn_rad / 2) << ',' << buttons << '\n';
   }
 
-  /// A server with this hand on a port of its own.
+  /// Configuration of a server with this hand on its own port.
   server::ServerConfig config() const {
     server::ServerConfig config = RunningServer::anyPort();
     config.devices[0].hand = file_;

@@ -1,5 +1,6 @@
-// A scene that is behind: who is held back, what overtakes, and what becomes of re-arms, heartbeats and clients that leave.
-// A question that is not answered at once holds the scene thread up for as long as a test needs.
+// A scene that is behind: which clients are held back, which messages overtake, and the effect on re-arms,
+// heartbeats and disconnections. A description request whose reply waits blocks the scene thread for as long
+// as a test needs.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -27,7 +28,7 @@ class HeldBackTest : public ::testing::Test {
     EXPECT_TRUE(peer->until([&] { return peer->count<wire::IsTouching>() > 0; }));
     return peer;
   }
-  // The scene thread stands still until openScene().
+  // Blocks the scene thread until openScene().
   void closeScene() {
     auto entered = std::make_shared<std::latch>(1);
     server_->server().stations().front()->scene().describe([entered, gate = gate_](const auto&) {
@@ -39,7 +40,7 @@ class HeldBackTest : public ::testing::Test {
   void openScene() {
     if (!gate_->try_wait()) gate_->count_down();
   }
-  // Scene commands of about this many bytes on the wire.
+  // Sends scene commands of about this many bytes.
   void flood(ScriptedPeer& client, std::size_t bytes) {
     constexpr std::size_t kFloats = 15'000;
     const wire::MeshVertices run{0, 0, {std::vector<float>(kFloats)}};
@@ -53,7 +54,7 @@ class HeldBackTest : public ::testing::Test {
   bool untilStopped() {
     return watcher_->until([&] { return stopped(); });
   }
-  // Lets `ticks` milliseconds of the servo pass, as the watcher sees them, while `client` is served, too.
+  // Waits until the watcher has seen `ticks` servo ticks, while `client` is served too.
   bool pass(ScriptedPeer& client, std::size_t ticks) {
     const std::size_t end = watcher_->count<wire::IsTouching>() + ticks;
     return watcher_->until([&] {
@@ -67,7 +68,7 @@ class HeldBackTest : public ::testing::Test {
   std::unique_ptr<ScriptedPeer> watcher_;
 };
 
-TEST_F(HeldBackTest, AnothersStopPingAndReportsDoNotWait) {
+TEST_F(HeldBackTest, StopPingAndReportsOfOtherClientsDoNotWait) {
   const auto uploader = peer();
   closeScene();
   flood(*uploader, 40 * kMiB);
@@ -80,15 +81,15 @@ TEST_F(HeldBackTest, AnothersStopPingAndReportsDoNotWait) {
   }));
   watcher_->send(wire::StopForces{});
   EXPECT_TRUE(untilStopped());
-  EXPECT_EQ(uploader->count<wire::Capabilities>(), 0U) << "the upload was over before the stop";
+  EXPECT_EQ(uploader->count<wire::Capabilities>(), 0U) << "the upload ended before the stop";
   openScene();
   EXPECT_TRUE(uploader->until([&] { return uploader->count<wire::Capabilities>() > 0; }, 60s));
 }
 
-TEST_F(HeldBackTest, AClientsOwnStopHeartbeatAndPingOvertakeItsSceneCommands) {
+TEST_F(HeldBackTest, StopHeartbeatAndPingOvertakeTheClientsSceneCommands) {
   const auto client = peer();
   closeScene();
-  flood(*client, 10 * kMiB);  // the queue takes 8, the rest is read ahead
+  flood(*client, 10 * kMiB);  // the queue takes 8 MiB, the backlog the rest
   client->queue(wire::QueryCapabilities{});
   client->queue(wire::Ping{});
   client->send(wire::StopForces{});
@@ -97,12 +98,12 @@ TEST_F(HeldBackTest, AClientsOwnStopHeartbeatAndPingOvertakeItsSceneCommands) {
     return stopped();
   }));
   EXPECT_TRUE(client->until([&] { return client->count<wire::Pong>() > 0; }));
-  EXPECT_EQ(client->count<wire::Capabilities>(), 0U) << "a query keeps its place";
+  EXPECT_EQ(client->count<wire::Capabilities>(), 0U) << "a query is not reordered";
   openScene();
   EXPECT_TRUE(client->until([&] { return client->count<wire::Capabilities>() > 0; }));
 }
 
-TEST_F(HeldBackTest, ARearmThatWasSentBeforeAStopDoesNotUndoIt) {
+TEST_F(HeldBackTest, ARearmSentBeforeAStopDoesNotUndoIt) {
   const auto client = peer();
   closeScene();
   flood(*client, 10 * kMiB);
@@ -118,7 +119,7 @@ TEST_F(HeldBackTest, ARearmThatWasSentBeforeAStopDoesNotUndoIt) {
   EXPECT_TRUE(stopped());
 }
 
-TEST_F(HeldBackTest, ARearmDoesNotUndoAnothersLaterStop) {
+TEST_F(HeldBackTest, ARearmDoesNotUndoALaterStopOfAnotherClient) {
   const auto client = peer();
   watcher_->send(wire::StopForces{});
   ASSERT_TRUE(untilStopped());
@@ -161,7 +162,7 @@ TEST_F(HeldBackTest, ARearmOfAClientWithoutCommandsActsAtOnce) {
   }));
 }
 
-TEST_F(HeldBackTest, TheServersPauseIsNoSilenceOfTheClient) {
+TEST_F(HeldBackTest, APauseOfTheServerIsNotSilenceOfTheClient) {
   const auto client = peer();
   closeScene();
   client->send(wire::Heartbeat{1});
@@ -169,10 +170,10 @@ TEST_F(HeldBackTest, TheServersPauseIsNoSilenceOfTheClient) {
   ASSERT_TRUE(pass(*client, 1500));  // three times the limit
   EXPECT_TRUE(client->open());
   openScene();
-  EXPECT_TRUE(client->until([&] { return !client->open(); }, 60s)) << "silent once the server reads again";
+  EXPECT_TRUE(client->until([&] { return !client->open(); }, 60s)) << "silent after the server resumed reading";
 }
 
-TEST_F(HeldBackTest, HeartbeatsThatAreReadAheadCount) {
+TEST_F(HeldBackTest, HeartbeatsInTheBacklogCount) {
   const auto client = peer();
   closeScene();
   client->send(wire::Heartbeat{1});
@@ -184,7 +185,7 @@ TEST_F(HeldBackTest, HeartbeatsThatAreReadAheadCount) {
   EXPECT_TRUE(client->open());
 }
 
-TEST_F(HeldBackTest, NothingThatAClientSentBeforeItLeftIsLost) {
+TEST_F(HeldBackTest, CommandsSentBeforeAClientDisconnectsAreApplied) {
   auto client = peer();
   closeScene();
   client->queue(wire::SetObjectNumber{1});
@@ -210,7 +211,7 @@ TEST_F(HeldBackTest, NothingThatAClientSentBeforeItLeftIsLost) {
   }));
 }
 
-TEST_F(HeldBackTest, TheForcesOfAClientThatLeavesEndAsSoonAsTheSceneGoesOn) {
+TEST_F(HeldBackTest, TheForcesOfADisconnectedClientEndBeforeItsQueuedCommands) {
   auto client = peer();
   watcher_->send(wire::HoldHand{.hold = 1, .position = {0, 0, 0}});
   client->send(kUp);

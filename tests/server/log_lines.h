@@ -1,4 +1,4 @@
-// What the server logs while this lives, instead of the terminal.
+// Captures the log of the server instead of writing it to the terminal.
 #pragma once
 
 #include <spdlog/sinks/base_sink.h>
@@ -12,7 +12,7 @@
 
 namespace hapticd::test {
 
-/// Make it before the server.
+/// Construct it before the server.
 class LogLines {
  public:
   LogLines() : sink_(std::make_shared<Sink>()), before_(spdlog::default_logger()) {
@@ -22,14 +22,14 @@ class LogLines {
   LogLines(const LogLines&) = delete;
   LogLines& operator=(const LogLines&) = delete;
 
-  /// How many lines hold these words, so far.
-  std::size_t count(const std::string& words) const {
+  /// Number of lines so far that contain this text.
+  std::size_t count(const std::string& text) const {
     const std::vector<std::string> lines = sink_->lines();
     return static_cast<std::size_t>(std::count_if(lines.begin(), lines.end(), [&](const std::string& line) {
-      return line.find(words) != std::string::npos;
+      return line.find(text) != std::string::npos;
     }));
   }
-  /// The end of it, for a failure's message.
+  /// The last 20 lines, for failure messages.
   std::string text() const {
     const std::vector<std::string> lines = sink_->lines();
     std::string end;

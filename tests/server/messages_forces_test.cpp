@@ -1,4 +1,4 @@
-// Messages that make forces without objects: each is felt by a hand at rest, or by one that strokes.
+// Messages that make forces without objects, checked by a hand that rests or strokes.
 #include <gtest/gtest.h>
 
 #include "feeling.h"
@@ -20,7 +20,7 @@ wire::Effect effect(const char* type, std::int32_t index = 0) {
           .direction = {1, 0, 0}};
 }
 
-// Whether the reported force has turned back and forth this often, by a tenth of a newton at least.
+// Whether the reported force has changed direction this often, by at least 0.1 N.
 bool oscillates(const ScriptedPeer& peer, int axis, int turns = 10) {
   double extreme = 0;
   int direction = 0;
@@ -48,7 +48,7 @@ class ForceMessages : public testing::Test {
   ScriptedPeer peer_{server_.address()};
 };
 
-TEST_F(ForceMessages, ForceFieldPushesUntilItIsAllZero) {
+TEST_F(ForceMessages, ForceFieldPushesUntilItIsZero) {
   peer_.send(wire::ForceField{{}, {0.5F, 0, -0.5F}, {}, 1});
   ASSERT_TRUE(untilForce(peer_, {0.5, 0, -0.5}));
   peer_.send(wire::ForceField{});
@@ -56,7 +56,7 @@ TEST_F(ForceMessages, ForceFieldPushesUntilItIsAllZero) {
 }
 
 TEST_F(ForceMessages, ForceFieldVariesByItsJacobianWithinItsRadius) {
-  // 100 N/m towards a point 10 mm aside, against the hand's 300 N/m.
+  // 100 N/m towards a point 10 mm away, against the hand of 300 N/m.
   wire::ForceField spring{{0.010F, 0.015F, 0}, {}, {-100, 0, 0, 0, -100, 0, 0, 0, -100}, 0.05F};
   peer_.send(spring);
   ASSERT_TRUE(untilForce(peer_, {0.75, 0, 0}));
@@ -74,7 +74,7 @@ TEST_F(ForceMessages, PlanePushesOutUntilItsNormalIsZero) {
                     .index = 0,
                     .recovery_cycles = 1};
   peer_.send(plane);
-  // As stiff as the hand: each yields 2.5 mm.
+  // As stiff as the hand: each deflects by 2.5 mm.
   ASSERT_TRUE(untilForce(peer_, {0, 0.0025 * kHandStiffness_N_per_m, 0}));
   EXPECT_EQ(peer_.last<wire::IsTouching>()->touching, 1);
   EXPECT_NEAR(peer_.last<wire::Scp>()->position[1], 0.020, 1e-4);
@@ -100,7 +100,7 @@ TEST_F(ForceMessages, Plane2MakesThePlaneBuzz) {
   EXPECT_TRUE(peer_.until([&] { return oscillates(peer_, 1); }));
 }
 
-TEST(ForceMessagesInMotion, Plane2HoldsTheHandThatLeaves) {
+TEST(ForceMessagesInMotion, Plane2AdhesionHoldsTheHand) {
   const Hand hand = Hand::stroking();
   RunningServer server(hand.config());
   ScriptedPeer peer(server.address());
@@ -170,14 +170,14 @@ TEST_F(ForceMessages, CustomEffectBuzzesUntilStopped) {
   EXPECT_LE(peer_.count<wire::Force>(), 20U) << "the force still changes";
 }
 
-TEST_F(ForceMessages, CustomEffectOfAnotherNumberIsRefused) {
+TEST_F(ForceMessages, UnknownCustomEffectIsRefused) {
   wire::CustomEffect unknown;
   unknown.effect = 7;
   peer_.send(unknown);
   EXPECT_TRUE(peer_.untilText("there is no such custom effect"));
 }
 
-TEST_F(ForceMessages, EffectIsFeltFromStartToStop) {
+TEST_F(ForceMessages, EffectActsFromStartToStop) {
   peer_.send(effect("constant"));
   peer_.send(wire::StartEffect{0});
   ASSERT_TRUE(untilForce(peer_, {1, 0, 0}));
@@ -192,7 +192,7 @@ TEST_F(ForceMessages, EffectIsFeltFromStartToStop) {
 TEST_F(ForceMessages, EffectWithADurationEndsByItself) {
   peer_.send(effect("constant", 1));
   peer_.send(wire::StartEffect{1});
-  ASSERT_TRUE(untilForce(peer_, {1, 0, 0})) << "forces rise slowly after the start";
+  ASSERT_TRUE(untilForce(peer_, {1, 0, 0})) << "the force ramps in after the start";
   peer_.send(wire::StopEffect{1});
   ASSERT_TRUE(untilForce(peer_, {0, 0, 0}));
   wire::Effect brief = effect("constant");
@@ -214,7 +214,7 @@ TEST_F(ForceMessages, EffectSpringPullsToItsPosition) {
   }));
 }
 
-TEST_F(ForceMessages, EffectMotorVibrationGoesRound) {
+TEST_F(ForceMessages, EffectMotorVibrationRotates) {
   for (const char* name : {"vibrationMotor", "motorVibration"}) {
     ASSERT_TRUE(catchUp(peer_));
     peer_.send(effect(name));

@@ -1,4 +1,4 @@
-// Messages that make, shape and move objects: each is felt by a hand that strokes down onto them.
+// Messages that make, shape and move objects, checked by a hand that strokes down onto them.
 #include <gtest/gtest.h>
 
 #include "feeling.h"
@@ -13,7 +13,7 @@ class ObjectMessages : public testing::Test {
  protected:
   void SetUp() override { ASSERT_TRUE(peer_.untilConnected()); }
 
-  // A stiff stock box: metres, its triangles by number. The top is triangles 6 and 7.
+  // A stiff stock box in metres, with indexed triangles; 6 and 7 are the top.
   void sendStockBox(std::int32_t object, const Vec3f& half_m = Vec3f::Constant(0.020F)) {
     const std::vector<Vec3f> corners = boxTriples(half_m);
     sendVertices(peer_, object, corners);
@@ -31,7 +31,7 @@ class ObjectMessages : public testing::Test {
   ScriptedPeer peer_{server_.address()};
 };
 
-TEST_F(ObjectMessages, SetVertexIsFeltInTriples) {
+TEST_F(ObjectMessages, SetVertexMakesATriangleOfEveryTriple) {
   sendVertices(peer_, 0, boxTriples(Vec3f::Constant(20)));
   peer_.send(wire::SetHapticProperty{0, "stiffness", 1.0F});
   EXPECT_TRUE(untilTouchedAt(peer_, 0, 0.020));
@@ -49,7 +49,7 @@ TEST_F(ObjectMessages, SetTriangleAndUpdateTrimeshChangesMakeAnIndexedMeshInMetr
   EXPECT_TRUE(untilTouchedAt(peer_, 0, 0.020));
 }
 
-TEST_F(ObjectMessages, UpdateTrimeshChangesGivesTheSurface) {
+TEST_F(ObjectMessages, UpdateTrimeshChangesSetsTheSurface) {
   sendStockBox(0);
   ASSERT_TRUE(untilTouchedAt(peer_, 0, 0.020));
   wire::UpdateTrimeshChanges soft = kStiff(0);
@@ -57,7 +57,7 @@ TEST_F(ObjectMessages, UpdateTrimeshChangesGivesTheSurface) {
   peer_.send(soft);
   ASSERT_TRUE(untilApplied(peer_));
   ASSERT_TRUE(catchUp(peer_));
-  EXPECT_TRUE(untilUntouchedStroke(peer_)) << "an object without stiffness is not felt";
+  EXPECT_TRUE(untilUntouchedStroke(peer_)) << "an object without stiffness gives no force";
 }
 
 TEST_F(ObjectMessages, RemoveTriangleOpensTheMesh) {
@@ -68,12 +68,12 @@ TEST_F(ObjectMessages, RemoveTriangleOpensTheMesh) {
   EXPECT_TRUE(untilUntouchedStroke(peer_));
 }
 
-TEST_F(ObjectMessages, SetNormalIsAnsweredByAText) {
+TEST_F(ObjectMessages, SetNormalIsIgnoredWithAText) {
   peer_.send(wire::SetNormal{0, 0, {0, 1, 0}});
   EXPECT_TRUE(peer_.untilText("setNormal object 0: ignored: normals follow from the triangles"));
 }
 
-TEST_F(ObjectMessages, SetTrimeshTypeIsAnsweredByAText) {
+TEST_F(ObjectMessages, SetTrimeshTypeIsIgnoredWithAText) {
   peer_.send(wire::SetTrimeshType{-1, 1});
   EXPECT_TRUE(peer_.untilText("setTrimeshType object -1, type 1: ignored"));
 }
@@ -85,7 +85,7 @@ TEST_F(ObjectMessages, GetNewObjectIdDoesNothing) {
   EXPECT_TRUE(peer_.open());
 }
 
-TEST_F(ObjectMessages, ClearTrimeshTakesTheMeshAway) {
+TEST_F(ObjectMessages, ClearTrimeshRemovesTheMesh) {
   sendCube(peer_);
   ASSERT_TRUE(untilTouchedAt(peer_, 0, 0.020));
   peer_.send(wire::ClearTrimesh{0});
@@ -116,7 +116,7 @@ TEST_F(ObjectMessages, SetObjectPositionPlacesInMetres) {
   EXPECT_TRUE(untilTouchedAt(peer_, 0, 0.025));
 }
 
-TEST_F(ObjectMessages, SetObjectOrientationTurns) {
+TEST_F(ObjectMessages, SetObjectOrientationRotates) {
   sendStockBox(0, {0.020F, 0.020F, 0.030F});
   peer_.send(wire::SetObjectOrientation{0, {1, 0, 0}, kTurn});
   EXPECT_TRUE(untilTouchedAt(peer_, 0, 0.030));
@@ -128,7 +128,7 @@ TEST_F(ObjectMessages, SetObjectScaleScales) {
   EXPECT_TRUE(untilTouchedAt(peer_, 0, 0.030));
 }
 
-TEST_F(ObjectMessages, AddObjectHangsBelowItsParent) {
+TEST_F(ObjectMessages, AddObjectMovesWithItsParent) {
   peer_.send(wire::AddObject{5, -1});
   peer_.send(wire::AddObject{6, 5});
   sendStockBox(6);
@@ -137,7 +137,7 @@ TEST_F(ObjectMessages, AddObjectHangsBelowItsParent) {
   EXPECT_TRUE(untilTouchedAt(peer_, 6, 0.025));
 }
 
-TEST_F(ObjectMessages, MoveToParentHangsItElsewhere) {
+TEST_F(ObjectMessages, MoveToParentChangesTheParent) {
   peer_.send(wire::AddObject{5, -1});
   peer_.send(wire::SetObjectPosition{5, {0, 0.005F, 0}});
   peer_.send(wire::AddObject{6, -1});
@@ -147,7 +147,7 @@ TEST_F(ObjectMessages, MoveToParentHangsItElsewhere) {
   EXPECT_TRUE(untilTouchedAt(peer_, 6, 0.025));
 }
 
-TEST_F(ObjectMessages, RemoveObjectTakesItAwayWithWhatHangsBelow) {
+TEST_F(ObjectMessages, RemoveObjectRemovesItsChildren) {
   peer_.send(wire::AddObject{5, -1});
   peer_.send(wire::AddObject{6, 5});
   sendStockBox(6);
@@ -188,21 +188,21 @@ TEST_F(ObjectMessages, SetTouchableFaceChoosesTheSide) {
   sendCube(peer_);
   ASSERT_TRUE(untilTouchedAt(peer_, 0, 0.020));
   peer_.send(wire::SetTouchableFace{1});
-  EXPECT_TRUE(untilUntouchedStroke(peer_)) << "from outside a back face is not felt";
+  EXPECT_TRUE(untilUntouchedStroke(peer_)) << "a back face gives no force from outside";
   peer_.send(wire::SetTouchableFace{0});
   ASSERT_TRUE(untilApplied(peer_));
   ASSERT_TRUE(catchUp(peer_));
   EXPECT_TRUE(untilTouchedAt(peer_, 0, 0.020));
 }
 
-TEST_F(ObjectMessages, SetHapticPropertyMakesItStiff) {
+TEST_F(ObjectMessages, SetHapticPropertySetsTheStiffness) {
   sendVertices(peer_, 0, boxTriples(Vec3f::Constant(20)));
-  ASSERT_TRUE(untilUntouchedStroke(peer_)) << "nothing is felt before it has stiffness";
+  ASSERT_TRUE(untilUntouchedStroke(peer_)) << "no force before it has stiffness";
   peer_.send(wire::SetHapticProperty{0, "stiffness", 1.0F});
   EXPECT_TRUE(untilTouchedAt(peer_, 0, 0.020));
 }
 
-TEST_F(ObjectMessages, ResetSceneTakesAllAway) {
+TEST_F(ObjectMessages, ResetSceneRemovesEverything) {
   peer_.send(wire::SetObjectNumber{2});
   sendCube(peer_, 1);
   peer_.send(wire::SetWorkspaceBoundingBox{{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1},

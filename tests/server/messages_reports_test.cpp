@@ -1,4 +1,4 @@
-// Reports about the hand, the buttons and the contact, and the messages that change how they are told.
+// Reports of the HIP, the buttons and the contact, and the messages that change them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ class WorkspaceMessages : public testing::Test {
   ScriptedPeer peer_{server_.address()};
 };
 
-// The simulated device reaches 160 x 120 x 70 mm; views of twice that size double every motion.
+// The workspace of the simulated device is 160 x 120 x 70 mm; a view of twice that size doubles every motion.
 TEST_F(WorkspaceMessages, SetWorkspaceBoundingBoxFitsTheBox) {
   peer_.send(wire::SetWorkspaceBoundingBox{kIdentity, {-160, -120, -70, 160, 120, 70}});
   EXPECT_TRUE(untilHandAt(peer_, 2 * kPlace_m));
@@ -34,7 +34,7 @@ TEST_F(WorkspaceMessages, SetWorkspaceProjectionMatrixFitsTheView) {
   EXPECT_TRUE(untilHandAt(peer_, 2 * kPlace_m));
 }
 
-TEST_F(WorkspaceMessages, EachWorkspaceReplacesTheOneBefore) {
+TEST_F(WorkspaceMessages, EachWorkspaceReplacesThePreviousOne) {
   for (int i = 0; i < 3; ++i) {
     peer_.send(wire::SetWorkspaceBoundingBox{kIdentity, {-160, -120, -70, 160, 120, 70}});
   }
@@ -51,15 +51,15 @@ TEST_F(WorkspaceMessages, SetHapticOriginPlacesTheDevice) {
   EXPECT_TRUE(untilHandAt(peer_, {0.1 - kPlace_m.y(), kPlace_m.x(), kPlace_m.z()}));
 }
 
-TEST_F(WorkspaceMessages, ResetSceneBringsTheFirstWorkspaceBack) {
+TEST_F(WorkspaceMessages, ResetSceneRestoresTheInitialWorkspace) {
   peer_.send(wire::SetHapticScale{3});
   ASSERT_TRUE(untilHandAt(peer_, 3 * kPlace_m));
   peer_.send(wire::ResetScene{});
   EXPECT_TRUE(untilHandAt(peer_, kPlace_m));
 }
 
-// A datagram could overtake the names that it needs, and a hand at rest is reported only once.
-TEST_F(WorkspaceMessages, ALateClientIsToldByTcpWhereTheHandRests) {
+// A datagram could overtake the descriptions that it needs, and a hand at rest is reported only once.
+TEST_F(WorkspaceMessages, ALateClientGetsTheRestingPoseByTcp) {
   ScriptedPeer late(server_.address(), "Phantom", ScriptedPeer::Mode::udp);
   ASSERT_TRUE(untilHandAt(late, kPlace_m));
   for (const auto& message : late.messages()) {
@@ -92,8 +92,8 @@ TEST_F(Reports, ForcePushesOutAndEndsWithTheContact) {
   EXPECT_TRUE(untilForce(peer_, {0, 0, 0}, 2e-3));
 }
 
-TEST_F(Reports, DopIsHowFarTheHandIsBelowTheSurface) {
-  // The hand wants 5 mm and is a spring of 300 N/m against one of 500 N/m.
+TEST_F(Reports, DopIsTheDepthOfTheHipBelowTheSurface) {
+  // The target is 5 mm deep; the hand is a spring of 300 N/m against one of 500 N/m.
   EXPECT_TRUE(peer_.until([&] {
     const auto depth = peer_.last<wire::Dop>();
     return depth && std::abs(depth->depth - 0.005 * 300 / 800) < 2e-4;
@@ -117,7 +117,7 @@ TEST_F(Reports, AngleIsBetweenStylusAndNormalInDegrees) {
   EXPECT_EQ(peer_.last<wire::Angle>()->angle, 0);
 }
 
-TEST_F(Reports, TouchedObjectAndIsTouchingTellOfContactAndItsEnd) {
+TEST_F(Reports, TouchedObjectAndIsTouchingReportContactAndItsEnd) {
   for (const std::int32_t object : {-1, 0, -1}) {
     ASSERT_TRUE(peer_.until([&] { return peer_.last<wire::TouchedObject>()->object == object; })) << object;
     ASSERT_TRUE(
@@ -125,7 +125,7 @@ TEST_F(Reports, TouchedObjectAndIsTouchingTellOfContactAndItsEnd) {
   }
 }
 
-TEST_F(Reports, PosQuatTellsOfProxyHandAndContact) {
+TEST_F(Reports, PosQuatReportsProxyHipAndContact) {
   std::set<std::int32_t> sensors;
   ASSERT_TRUE(peer_.until([&] {
     for (const auto& pose : peer_.all<wire::TrackerPosQuat>()) sensors.insert(pose.sensor);
@@ -141,7 +141,7 @@ TEST_F(Reports, PosQuatTellsOfProxyHandAndContact) {
   }
 }
 
-TEST_F(Reports, VelocityIsThatOfTheHand) {
+TEST_F(Reports, VelocityIsThatOfTheHip) {
   // 25 mm in 60 ms.
   EXPECT_TRUE(peer_.until([&] {
     const auto velocity = peer_.last<wire::TrackerVelocity>();
@@ -154,8 +154,8 @@ TEST_F(Reports, AccelerationIsNotReported) {
   EXPECT_EQ(peer_.count<wire::TrackerAcceleration>(), 0U);
 }
 
-TEST_F(Reports, ButtonChangeTellsOfEveryPressAndRelease) {
-  std::vector<std::int32_t> states;  // of the button under the finger; touching is a button, too
+TEST_F(Reports, ButtonChangeReportsEveryPressAndRelease) {
+  std::vector<std::int32_t> states;  // of button 0; "touching" is also a button
   ASSERT_TRUE(peer_.until([&] {
     states.clear();
     for (const auto& change : peer_.all<wire::ButtonChange>()) {
@@ -166,7 +166,7 @@ TEST_F(Reports, ButtonChangeTellsOfEveryPressAndRelease) {
   for (std::size_t i = 1; i < states.size(); ++i) EXPECT_EQ(states[i], 1 - states[i - 1]);
 }
 
-TEST(ReportsOfTrips, ForceErrorTellsOfATripAndOfItsEnd) {
+TEST(ReportsOfTrips, ForceErrorReportsATripAndItsEnd) {
   Hand hand = Hand::at({0, 0, 0});
   for (double t_s = 0.5; t_s < 60; t_s += 1) {  // 50 mm in 20 ms is 2.5 m/s
     hand.row(t_s, {0, 0, 0});
@@ -176,13 +176,13 @@ TEST(ReportsOfTrips, ForceErrorTellsOfATripAndOfItsEnd) {
   }
   RunningServer server(hand.config());
   ScriptedPeer peer(server.address());
-  const auto told = [&](std::int32_t code) {
+  const auto reportedError = [&](std::int32_t code) {
     return peer.until([&] {
       return peer.last<wire::ForceError>([&](const auto& m) { return m.code == code; }).has_value();
     });
   };
-  EXPECT_TRUE(told(2));
-  EXPECT_TRUE(told(4));
+  EXPECT_TRUE(reportedError(2));
+  EXPECT_TRUE(reportedError(4));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// What belongs to a client and goes with it, what belongs to the scene and stays.
+// Forces end with the client that owns them; objects belong to the scene and remain.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,7 +15,7 @@ constexpr wire::F64x16 kIdentity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}
 const Vec3 kPush_N{1, 0, 0};
 const Vec3 kNothing_N = Vec3::Zero();
 
-/// A constant force; the other parameters do not matter to it.
+/// A constant force; it ignores the other parameters.
 wire::Effect push(std::int32_t index, const Vec3& force_N) {
   return {.type = "constant",
           .index = index,
@@ -44,7 +44,7 @@ void sendConstraint(ScriptedPeer& peer) {
   peer.send(wire::ConstraintEnable{1});
 }
 
-/// Everything a client can own, each pushing with about a newton along x at the centre.
+/// Every kind of force that a client can own, each of about 1 N along x at the centre.
 struct Belonging {
   const char* name;
   void (*send)(ScriptedPeer&);
@@ -66,7 +66,7 @@ constexpr Belonging kBelongings[] = {
     {"Constraint", sendConstraint},
     {"CustomEffect",
      [](ScriptedPeer& peer) {
-       wire::CustomEffect slow;  // a buzz so slow that it is a push for as long as the test lasts
+       wire::CustomEffect slow;  // a vibration so slow that it is a constant force during the test
        slow.parameters.values = {1, 0.1F, 1000, 1, 0, 0};
        peer.send(slow);
      }},
@@ -83,14 +83,14 @@ class Ownership : public testing::Test {
   }
   void SetUp() override { ASSERT_TRUE(watcher_.untilConnected()); }
 
-  // Whether the watcher still feels this force when any ramp that began by now is over.
+  // Whether the watcher still sees this force after any ramp that has begun by now.
   bool stays(const Vec3& force_N) {
     watcher_.send(wire::Ping{});
     if (!watcher_.untilNext<wire::Pong>() || !untilTicks(watcher_, 400)) return false;
-    // What has ramped out stays away; what a late tick took comes back.
+    // A force that ramped out stays zero; one that a late tick removed returns.
     return untilForce(watcher_, force_N, 0.25);
   }
-  // Whether the watcher has felt the force fall little by little.
+  // Whether the watcher has seen the force decrease gradually.
   bool rampedOut() {
     const auto forces = watcher_.all<wire::Force>();
     return std::any_of(forces.begin(), forces.end(), [](const auto& m) {
@@ -116,7 +116,7 @@ TEST_P(OwnershipOf, RampsOutWithItsClient) {
   EXPECT_TRUE(rampedOut());
 }
 
-TEST_P(OwnershipOf, GoesWithTheLastThatSetIt) {
+TEST_P(OwnershipOf, EndsWithTheLastClientThatSetIt) {
   Client first = join();
   Client second = join();
   GetParam().send(*first);
@@ -124,7 +124,7 @@ TEST_P(OwnershipOf, GoesWithTheLastThatSetIt) {
   GetParam().send(*second);
   ASSERT_TRUE(untilApplied(*second));
   ASSERT_TRUE(untilTicks(watcher_, 20));
-  ASSERT_TRUE(untilForceAbove(watcher_, 0.8)) << "a buzz begins anew";
+  ASSERT_TRUE(untilForceAbove(watcher_, 0.8)) << "a vibration starts again from its phase 0";
   first->close();
   EXPECT_TRUE(stays(kPush_N));
   second->close();
@@ -147,7 +147,7 @@ TEST_P(OwnershipOf, StaysWhenOthersLeave) {
 INSTANTIATE_TEST_SUITE_P(Ownership, OwnershipOf, testing::ValuesIn(kBelongings),
                          [](const auto& instance) { return std::string(instance.param.name); });
 
-TEST_F(Ownership, AnEffectGoesWithTheClientThatStartedIt) {
+TEST_F(Ownership, AnEffectEndsWithTheClientThatStartedIt) {
   Client definer = join();
   Client starter = join();
   definer->send(push(0, kPush_N));
@@ -160,7 +160,7 @@ TEST_F(Ownership, AnEffectGoesWithTheClientThatStartedIt) {
   EXPECT_TRUE(untilForce(watcher_, kNothing_N, 2e-3));
 }
 
-TEST_F(Ownership, OfTwoEffectsOneGoesAndOneStays) {
+TEST_F(Ownership, OneOfTwoEffectsEndsWithItsClient) {
   Client one = join();
   Client two = join();
   one->send(push(0, {1, 0, 0}));
@@ -187,7 +187,7 @@ TEST_F(Ownership, TheLastWriterWins) {
   EXPECT_TRUE(untilForce(watcher_, kNothing_N));
 }
 
-TEST_F(Ownership, AnyClientMayWatchWithoutSayingAnything) {
+TEST_F(Ownership, AClientMayWatchWithoutSendingCommands) {
   for (const auto mode : {ScriptedPeer::Mode::tcp, ScriptedPeer::Mode::udp}) {
     const Client onlooker = join(mode);
     EXPECT_TRUE(onlooker->until([&] { return onlooker->count<wire::IsTouching>() >= 20; }));
@@ -195,7 +195,7 @@ TEST_F(Ownership, AnyClientMayWatchWithoutSayingAnything) {
   }
 }
 
-// What belongs to the scene: felt by a hand that strokes, after its maker has left.
+// Contents of the scene, touched by a stroking hand after the client that made them has disconnected.
 class SceneOwnership : public testing::Test {
  protected:
   void serve(server::SceneOnDisconnect choice = server::SceneOnDisconnect::keep) {
@@ -205,7 +205,7 @@ class SceneOwnership : public testing::Test {
     watcher_ = std::make_unique<ScriptedPeer>(server_->address());
     ASSERT_TRUE(watcher_->untilConnected());
   }
-  // A client makes objects, surface, workspace and faces, and goes.
+  // A client sets objects, surface, workspace and faces, then disconnects.
   void makeAndLeave() {
     ScriptedPeer maker(server_->address());
     ASSERT_TRUE(maker.untilConnected());
@@ -223,7 +223,7 @@ class SceneOwnership : public testing::Test {
   std::unique_ptr<ScriptedPeer> watcher_;
 };
 
-TEST_F(SceneOwnership, ObjectsSurfacesWorkspaceAndFacesStay) {
+TEST_F(SceneOwnership, ObjectsSurfacesWorkspaceAndFacesRemain) {
   serve();
   makeAndLeave();
   // The device's 40 mm are the world's 44.
@@ -236,14 +236,14 @@ TEST_F(SceneOwnership, ObjectsSurfacesWorkspaceAndFacesStay) {
   EXPECT_TRUE(untilUntouchedStroke(*watcher_));
 }
 
-TEST_F(SceneOwnership, HalfAnUploadStaysUsable) {
+TEST_F(SceneOwnership, AnIncompleteUploadStaysUsable) {
   serve();
   {
     ScriptedPeer maker(server_->address());
     ASSERT_TRUE(maker.untilConnected());
     maker.send(wire::SetHapticProperty{0, "stiffness", 1.0F});
     std::vector<Vec3f> half = boxTriples(Vec3f::Constant(20));
-    half.resize(25);  // the top face, and a triangle of which one corner came
+    half.resize(25);  // the top face and one vertex of the next triangle
     sendVertices(maker, 0, half);
     ASSERT_TRUE(untilTouchedAt(maker, 0, 0.020));
     maker.close();
@@ -254,7 +254,7 @@ TEST_F(SceneOwnership, HalfAnUploadStaysUsable) {
   EXPECT_TRUE(untilTouchedAt(*watcher_, 0, 0.025));
 }
 
-TEST_F(SceneOwnership, ClearTakesTheSceneWithTheLastThatCommanded) {
+TEST_F(SceneOwnership, ClearRemovesTheSceneWithTheLastClientThatCommandedIt) {
   serve(server::SceneOnDisconnect::clear);
   auto other = std::make_unique<ScriptedPeer>(server_->address());
   ASSERT_TRUE(other->untilConnected());
@@ -262,16 +262,16 @@ TEST_F(SceneOwnership, ClearTakesTheSceneWithTheLastThatCommanded) {
   ASSERT_TRUE(untilApplied(*other));
   makeAndLeave();
   ASSERT_TRUE(catchUp(*watcher_));
-  EXPECT_TRUE(untilTouchedAt(*watcher_, 1, 0.030)) << "another that commanded is still there";
+  EXPECT_TRUE(untilTouchedAt(*watcher_, 1, 0.030)) << "another client that commanded is still connected";
   other->close();
-  EXPECT_TRUE(untilUntouchedStroke(*watcher_)) << "who only watches does not count";
-  EXPECT_TRUE(untilHandAt(*watcher_, {0, 0.040, 0}, 2e-3)) << "the workspace is the first one again";
+  EXPECT_TRUE(untilUntouchedStroke(*watcher_)) << "a client that only watches does not count";
+  EXPECT_TRUE(untilHandAt(*watcher_, {0, 0.040, 0}, 2e-3)) << "the initial workspace is restored";
 }
 
 // A client killed by the system, beside one that lives on.
 class Killed : public testing::Test {
  protected:
-  // Pushes with an effect of its own and uploads a cube, and then only listens.
+  // Starts an effect and uploads a cube, then only receives.
   static void live(const net::Endpoint& server, ScriptedPeer::Mode mode) {
     ScriptedPeer peer(server, "Phantom", mode);
     if (!peer.untilConnected()) return;
@@ -289,7 +289,7 @@ class Killed : public testing::Test {
     for (ChildClient* child : {&tcp_, &udp_}) child->connectTo(server_.address());
     ASSERT_TRUE(untilForce(survivor_, {1, 0.5, 0.7}));
   }
-  // Whether only what the killed ones owned has gone.
+  // Whether only the forces of the killed clients have ended.
   bool onlyTheSurvivorsIsLeft() { return untilForce(survivor_, {0, 0, 0.7}, 2e-3) && survivor_.open(); }
 
   ChildClient tcp_{[](const auto& server) { live(server, ScriptedPeer::Mode::tcp); }};
@@ -299,17 +299,17 @@ class Killed : public testing::Test {
   ScriptedPeer survivor_{server_.address()};
 };
 
-TEST_F(Killed, BothTakeAlongWhatTheyOwned) {
+TEST_F(Killed, TheForcesOfBothEnd) {
   tcp_.kill();
   udp_.kill();
   EXPECT_TRUE(onlyTheSurvivorsIsLeft());
 }
 
-TEST_F(Killed, ItsSceneStays) {
+TEST_F(Killed, ItsSceneRemains) {
   tcp_.kill();
   udp_.kill();
   ASSERT_TRUE(onlyTheSurvivorsIsLeft());
-  // The cube is there still: a lift of 30 mm brings it under the hand, which is pushed out.
+  // The cube still exists: raising it by 30 mm brings it under the hand, which is pushed out.
   ASSERT_TRUE(catchUp(survivor_));
   for (int step = 1; step <= 30; ++step) {
     survivor_.send(wire::SetTransformMatrix{
@@ -319,8 +319,8 @@ TEST_F(Killed, ItsSceneStays) {
   EXPECT_TRUE(untilTouchedAt(survivor_, 0, 0.050));
 }
 
-// Its system goes on acknowledging, so it is slow and not lost.
-TEST_F(Killed, ASuspendedOneKeepsWhatItOwnsUntilItDies) {
+// The kernel still acknowledges data, so the client is slow but not lost.
+TEST_F(Killed, ASuspendedClientKeepsItsForcesUntilItDies) {
   tcp_.kill();
   udp_.suspend();
   ASSERT_TRUE(catchUp(survivor_));

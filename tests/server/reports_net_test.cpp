@@ -1,4 +1,4 @@
-// What each client hears, over real sockets: rates, kinds, mirrors, toggles, origins.
+// Reports to each client over real sockets: rates, kinds, mirrored contact, toggles, origins.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -16,13 +16,13 @@ class ReportsTest : public ::testing::Test {
     EXPECT_TRUE(peer->until([&] { return peer->count<wire::IsTouching>() > 0; }));
     return peer;
   }
-  // A floor under the hand, which is held in it.
+  // A floor, with the hand steered into it.
   static void touchFloor(ScriptedPeer& peer) {
     peer.send(wire::HoldHand{.hold = 1, .position = {0, 10, 0}});
     peer.send(wire::Plane{.plane = {0, 1, 0, 0}, .stiffness = 0.5F, .damping = 0, .index = 0, .recovery_cycles = 1});
     peer.send(wire::HoldHand{.hold = 1, .position = {0, -3, 0}});
   }
-  // Two reports of one kind, this many ticks apart in the mean.
+  // Mean number of ticks between two tick reports.
   static double meanTicksBetween(ScriptedPeer& peer) {
     peer.forget();
     EXPECT_TRUE(peer.until([&] { return peer.count<wire::TickReport>() >= 30; }, 60s));
@@ -33,14 +33,14 @@ class ReportsTest : public ::testing::Test {
   RunningServer server_;
 };
 
-TEST_F(ReportsTest, EachClientHasARateOfItsOwn) {
+TEST_F(ReportsTest, EachClientHasItsOwnRate) {
   const auto slow = peer();
   const auto fast = peer();
   slow->send(wire::Subscribe{.kinds = wire::kReportTick, .rate = 100});
   fast->send(wire::Subscribe{.kinds = wire::kReportTick, .rate = 1e6});  // as fast as the servo
   ASSERT_TRUE(slow->until([&] { return slow->count<wire::TickReport>() > 0; }));
   ASSERT_TRUE(fast->until([&] { return fast->count<wire::TickReport>() > 0; }));
-  // A stalled machine skips ticks, and reports then come after fewer of them.
+  // A stalled machine skips ticks, so that reports are fewer ticks apart.
   const double slowTicks = meanTicksBetween(*slow);
   EXPECT_GT(slowTicks, 5);
   EXPECT_LT(slowTicks, 10.5);
@@ -52,7 +52,7 @@ TEST_F(ReportsTest, EachClientHasARateOfItsOwn) {
   ASSERT_TRUE(slow->untilNext<wire::IsTouching>());
 }
 
-TEST_F(ReportsTest, SenselessRatesAreRefusedByName) {
+TEST_F(ReportsTest, InvalidRatesAreRefusedByName) {
   const auto client = peer();
   client->send(wire::TrackerSetUpdateRate{std::nan("")});
   EXPECT_TRUE(client->untilText("set_update_rate: rate nan Hz refused"));
@@ -61,7 +61,7 @@ TEST_F(ReportsTest, SenselessRatesAreRefusedByName) {
   EXPECT_TRUE(client->untilNext<wire::IsTouching>());
 }
 
-TEST_F(ReportsTest, TicksHaveTheirNumbersAndTimes) {
+TEST_F(ReportsTest, TicksHaveIncreasingNumbersAndTimes) {
   const auto client = peer();
   client->send(wire::Subscribe{.kinds = wire::kReportTick, .rate = 0});
   ASSERT_TRUE(client->until([&] { return client->count<wire::TickReport>() >= 50; }));
@@ -72,7 +72,7 @@ TEST_F(ReportsTest, TicksHaveTheirNumbersAndTimes) {
   }
 }
 
-TEST_F(ReportsTest, EveryContactIsListedAndItsEndToo) {
+TEST_F(ReportsTest, EveryContactAndItsEndAreListed) {
   const auto client = peer(ScriptedPeer::Mode::udp);
   client->send(wire::Subscribe{.kinds = wire::kReportDefault | wire::kReportContacts, .rate = 0});
   touchFloor(*client);
@@ -87,7 +87,7 @@ TEST_F(ReportsTest, EveryContactIsListedAndItsEndToo) {
   EXPECT_TRUE(client->until([&] { return client->all<wire::ContactList>().back().contacts.values.empty(); }));
 }
 
-TEST_F(ReportsTest, AClientThatKnowsOnlyAnalogAndButtonFeelsContact) {
+TEST_F(ReportsTest, AClientWithOnlyAnalogAndButtonSeesContact) {
   const auto client = peer();
   touchFloor(*client);
   ASSERT_TRUE(client->until([&] {
@@ -137,7 +137,7 @@ TEST_F(ReportsTest, AToggleStaysOnWhenItsButtonIsReleased) {
   EXPECT_TRUE(client->untilText("button 9 refused"));
 }
 
-TEST_F(ReportsTest, PosesCountFromTheOriginThatAClientResets) {
+TEST_F(ReportsTest, PosesAreRelativeToTheOriginThatAClientResets) {
   const auto client = peer();
   client->send(wire::HoldHand{.hold = 1, .position = {30, 20, 10}});
   const auto hip = [&](double x, double y, double z) {
@@ -160,7 +160,7 @@ TEST_F(ReportsTest, PosesCountFromTheOriginThatAClientResets) {
   EXPECT_TRUE(hip(0.03, 0.02, 0.01));
 }
 
-TEST_F(ReportsTest, ALateJoinerIsToldOfTheGuard) {
+TEST_F(ReportsTest, ALateClientGetsTheGuardState) {
   const auto client = peer();
   client->send(wire::StopForces{});
   ASSERT_TRUE(client->until([&] {

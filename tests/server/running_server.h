@@ -1,4 +1,4 @@
-// A whole server in its own thread, on a port of its own.
+// A whole server in its own thread, on its own port.
 #pragma once
 
 #include <spdlog/spdlog.h>
@@ -12,7 +12,7 @@ namespace hapticd::test {
 class RunningServer {
  public:
   explicit RunningServer(const server::ServerConfig& config = anyPort()) : server_(config) {
-    // Makes the log while there is one thread: how its library guards that, a thread sanitizer does not see.
+    // Creates the log while there is one thread: the thread sanitizer does not see the locks in its library.
     spdlog::default_logger();
     thread_ = std::thread([this] { server_.run(); });
   }
@@ -23,7 +23,7 @@ class RunningServer {
     config.port = 0;
     config.allowNoRealtime = true;
     config.http = server::kHttpOff;
-    // A stalled machine is no reason to write into somebody's home.
+    // A stalled machine latches faults: do not write black boxes to the user's home.
     config.devices.front().blackBoxKeep = 0;
     return config;
   }

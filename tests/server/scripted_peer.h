@@ -1,4 +1,4 @@
-// A VRPN client made of the wire and net rooms alone: says what a test scripts and keeps what comes back.
+// A VRPN client made of the wire and net rooms only: sends what a test scripts and keeps what it receives.
 #pragma once
 
 #include <chrono>
@@ -20,11 +20,11 @@ namespace hapticd::test {
 
 using namespace std::chrono_literals;
 
-/// One connection to a server under test. Every wait is bounded and ends on an event.
+/// One connection to a server under test. Every wait has a limit.
 class ScriptedPeer {
  public:
   enum class Mode { tcp, udp };
-  /// Whether the peer greets and describes itself as the protocol wants it, or says only what it is given.
+  /// Whether the peer performs the handshake of the protocol, or sends only the given bytes.
   enum class Speech { proper, raw };
 
   explicit ScriptedPeer(const net::Endpoint& server, const std::string& device = "Phantom",
@@ -32,7 +32,7 @@ class ScriptedPeer {
       : speech_(speech), sender_(names_.addSender("VRPN Control")), device_(names_.addSender(device)) {
     if (mode == Mode::tcp) {
       endpoint_ = std::make_unique<wire::Peer>(names_);
-      // Floods wait here, so that a test can send more than the server reads.
+      // A large queue, so that a test can send more than the server reads.
       net::ConnectionOptions options;
       options.hardLimitBytes = std::size_t{256} << 20;
       take(net::Connection::connect(loop_, server, 2s, options));
@@ -41,7 +41,7 @@ class ScriptedPeer {
     }
   }
 
-  /// Handles events until the condition holds; false after the limit.
+  /// Handles events until the condition holds; returns false after the limit.
   bool until(const std::function<bool()>& condition, std::chrono::seconds limit = 20s) {
     const auto end = std::chrono::steady_clock::now() + limit;
     while (!condition()) {
@@ -56,17 +56,17 @@ class ScriptedPeer {
   bool untilConnected() {
     return until([this] { return endpoint_ && endpoint_->connected(); });
   }
-  /// Waits for another message of a kind.
+  /// Waits for the next message of a kind.
   template <wire::WireMessage M>
   bool untilNext() {
     const std::size_t before = count<M>();
     return until([&] { return count<M>() > before; });
   }
-  /// Waits for a text that holds these words.
-  bool untilText(const std::string& words) {
+  /// Waits for a text that contains this one.
+  bool untilText(const std::string& part) {
     return until([&] {
       for (const wire::Text& text : texts_) {
-        if (text.text.text.find(words) != std::string::npos) return true;
+        if (text.text.text.find(part) != std::string::npos) return true;
       }
       return false;
     });
@@ -80,27 +80,27 @@ class ScriptedPeer {
     queue(message);
     flush();
   }
-  /// Leaves with the next flush() or send().
+  /// Queues a message; the next flush() or send() sends it.
   template <wire::WireMessage M>
   void queue(const M& message) {
     endpoint_->send({1, 2}, device_, message);
   }
-  /// A message with any payload, however wrong.
+  /// Sends a message with any payload, valid or not.
   void sendPayload(wire::MessageKind kind, const std::vector<std::byte>& payload) {
     endpoint_->sendRaw({1, 2}, device_, wire::localType(kind), payload, wire::Reliability::kReliable);
     flush();
   }
-  /// A message of a type that is not in the table.
+  /// Sends a message of a type that is not in the message table.
   void sendForeign(const std::string& type, const std::vector<std::byte>& payload) {
     endpoint_->sendRaw({1, 2}, device_, names_.addType(type), payload, wire::Reliability::kReliable);
     flush();
   }
-  /// Bytes as they are, whatever they are.
+  /// Sends raw bytes.
   void sendBytes(wire::ByteView bytes) {
     connection_.send(bytes);
     connection_.flush();
   }
-  /// Bytes as one datagram to where the server asked for them.
+  /// Sends raw bytes as one datagram to the server's UDP endpoint.
   void sendDatagram(wire::ByteView bytes) { udp_->sendTo(bytes, udpPeer_); }
   void flush() {
     std::vector<std::byte> bytes;
@@ -111,15 +111,15 @@ class ScriptedPeer {
     if (udp_) endpoint_->takeDatagrams([this](wire::ByteView datagram) { udp_->sendTo(datagram, udpPeer_); });
   }
   void close() { connection_.abort("test over"); }
-  /// Sends what is queued, then ends the connection in order.
+  /// Sends what is queued, then closes the connection.
   void end() { connection_.close("test over"); }
-  /// Handles what is ready, without waiting.
+  /// Handles pending events without waiting.
   void poll() {
     while (loop_.runOnce(std::chrono::milliseconds(0)) > 0) {
     }
   }
 
-  /// All messages of a kind so far, from our device.
+  /// All messages of a kind received so far from the device.
   template <wire::WireMessage M>
   std::vector<M> all() const {
     std::vector<M> found;
@@ -138,9 +138,9 @@ class ScriptedPeer {
     const auto entry = counts_.find(kind);
     return entry == counts_.end() ? 0 : entry->second;
   }
-  /// All texts so far, from any sender.
+  /// All texts received so far from any sender.
   const std::vector<wire::Text>& texts() const { return texts_; }
-  /// The newest message of a kind, or the newest that fits.
+  /// The newest message of a kind, or the newest that matches.
   template <wire::WireMessage M>
   std::optional<M> last() const {
     return last<M>([](const M&) { return true; });
@@ -163,7 +163,7 @@ class ScriptedPeer {
   bool open() const { return !closed_; }
   const std::string& closeReason() const { return reason_; }
   std::size_t datagrams() const { return datagrams_; }
-  /// Our port for datagrams, and where the server wants them.
+  /// The peer's UDP port, and the server's UDP endpoint.
   std::uint16_t udpPort() const { return udp_->local().port; }
   const net::Endpoint& udpPeer() const { return udpPeer_; }
   net::Connection& connection() { return connection_; }

@@ -17,7 +17,7 @@ namespace {
 
 using geometry::Vec3f;
 
-// A cube of 40 mm around the origin, one setVertex for each corner of each triangle, and a stiff surface.
+// A stiff cube of 40 mm around the origin, one setVertex for each vertex of each triangle.
 void sendCube(ScriptedPeer& peer, float half_mm = 20) {
   std::int32_t vertex = 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -42,7 +42,7 @@ bool untilTouched(ScriptedPeer& peer) {
   });
 }
 
-TEST(Server, TcpClientHearsTheDevice) {
+TEST(Server, TcpClientReceivesReports) {
   RunningServer server;
   ScriptedPeer peer(server.address());
   ASSERT_TRUE(peer.untilConnected());
@@ -52,12 +52,12 @@ TEST(Server, TcpClientHearsTheDevice) {
   EXPECT_EQ(peer.datagrams(), 0U);
 }
 
-TEST(Server, UdpClientIsCalledBackAndHearsByDatagram) {
+TEST(Server, UdpClientGetsAReverseConnectionAndDatagrams) {
   RunningServer server;
   ScriptedPeer peer(server.address(), "Phantom", ScriptedPeer::Mode::udp);
   ASSERT_TRUE(peer.untilConnected());
   EXPECT_TRUE(peer.until([&] { return peer.datagrams() >= 20; }));
-  // Reliable messages go by TCP all the same.
+  // Reliable messages still use TCP.
   peer.send(wire::Ping{});
   EXPECT_TRUE(peer.untilNext<wire::Pong>());
   for (const auto& message : peer.messages()) {
@@ -91,7 +91,7 @@ TEST(Server, PingIsAnsweredWithPongAndButtonStates) {
   EXPECT_TRUE(peer.until([&] { return peer.count<wire::ButtonStates>() >= 1; }));
 }
 
-TEST(Server, TrackerQuestionsAreAnswered) {
+TEST(Server, TrackerQueriesAreAnswered) {
   RunningServer server;
   ScriptedPeer peer(server.address());
   ASSERT_TRUE(peer.until([&] { return peer.count<wire::IsTouching>() >= 1; }));
@@ -105,7 +105,7 @@ TEST(Server, TrackerQuestionsAreAnswered) {
               1e-12);  // metres, for a world in millimetres
 }
 
-TEST(Server, AnUploadedMeshIsTouchedAndLeft) {
+TEST(Server, ContactWithAnUploadedMeshBeginsAndEnds) {
   RunningServer server;
   ScriptedPeer peer(server.address());
   ASSERT_TRUE(peer.untilConnected());
@@ -126,7 +126,7 @@ TEST(Server, AnUploadedMeshIsTouchedAndLeft) {
   EXPECT_EQ(peer.all<wire::Dop>().back().depth, 0);
 }
 
-TEST(Server, ALateJoinerHearsTheContactAtOnce) {
+TEST(Server, ALateClientGetsTheContactAtOnce) {
   RunningServer server;
   ScriptedPeer first(server.address());
   ASSERT_TRUE(first.untilConnected());
@@ -135,8 +135,7 @@ TEST(Server, ALateJoinerHearsTheContactAtOnce) {
   ScriptedPeer late(server.address());
   ASSERT_TRUE(late.until([&] { return late.count<wire::ButtonStates>() >= 1; }));
   ASSERT_TRUE(late.untilNext<wire::IsTouching>());
-  // Everything between the states of the buttons and the next isTouching: said at once, not when it next
-  // changes.
+  // All reports between the button states and the next isTouching: sent at once, not on the next change.
   const auto& messages = late.messages();
   const auto kindIs = [](wire::MessageKind kind) { return [kind](const auto& m) { return m.kind == kind; }; };
   const auto begin = std::ranges::find_if(messages, kindIs(wire::kindOf<wire::ButtonStates>));
@@ -148,7 +147,7 @@ TEST(Server, ALateJoinerHearsTheContactAtOnce) {
   }
 }
 
-TEST(Server, BadValuesGetATextAndLeaveTheSceneAlone) {
+TEST(Server, BadValuesGetATextAndDoNotChangeTheScene) {
   RunningServer server;
   ScriptedPeer peer(server.address());
   ASSERT_TRUE(peer.untilConnected());
@@ -163,7 +162,7 @@ TEST(Server, BadValuesGetATextAndLeaveTheSceneAlone) {
   EXPECT_TRUE(untilTouched(peer));
 }
 
-TEST(Server, AMalformedMessageEndsThatConnectionAlone) {
+TEST(Server, AMalformedMessageEndsOnlyItsConnection) {
   RunningServer server;
   ScriptedPeer good(server.address());
   ScriptedPeer bad(server.address());
@@ -178,7 +177,7 @@ TEST(Server, AMalformedMessageEndsThatConnectionAlone) {
   EXPECT_TRUE(good.open());
 }
 
-TEST(Server, AMalformedDatagramIsForgotten) {
+TEST(Server, AMalformedDatagramIsIgnored) {
   RunningServer server;
   ScriptedPeer peer(server.address(), "Phantom", ScriptedPeer::Mode::udp);
   ASSERT_TRUE(peer.until([&] { return peer.datagrams() >= 1; }));
@@ -192,7 +191,7 @@ TEST(Server, AMalformedDatagramIsForgotten) {
   EXPECT_TRUE(peer.open());
 }
 
-TEST(Server, NoiseOnBothPortsDisturbsNobody) {
+TEST(Server, RandomBytesOnBothPortsDoNotDisturbOtherClients) {
   RunningServer server;
   ScriptedPeer good(server.address());
   ASSERT_TRUE(good.untilConnected());
@@ -225,7 +224,7 @@ TEST(Server, NoiseOnBothPortsDisturbsNobody) {
   EXPECT_TRUE(good.open());
 }
 
-TEST(Server, AVanishedClientIsForgottenAndAnotherMayCome) {
+TEST(Server, AVanishedClientIsRemovedAndAnotherCanConnect) {
   RunningServer server;
   for (int i = 0; i < 5; ++i) {
     ScriptedPeer peer(server.address());
@@ -238,7 +237,7 @@ TEST(Server, AVanishedClientIsForgottenAndAnotherMayCome) {
   EXPECT_TRUE(last.untilNext<wire::IsTouching>());
 }
 
-TEST(Server, EveryNameOfADeviceAnswers) {
+TEST(Server, EveryNameOfADeviceWorks) {
   server::ServerConfig config = RunningServer::anyPort();
   config.devices[0].names = {"Phantom", "Tracker0"};
   RunningServer server(config);
@@ -250,7 +249,7 @@ TEST(Server, EveryNameOfADeviceAnswers) {
   EXPECT_TRUE(two.untilNext<wire::Pong>());
 }
 
-TEST(Server, TwoDevicesHaveScenesOfTheirOwn) {
+TEST(Server, TwoDevicesHaveSeparateScenes) {
   server::ServerConfig config = RunningServer::anyPort();
   config.devices.resize(2);
   config.devices[0].names = {"Left"};
@@ -266,7 +265,7 @@ TEST(Server, TwoDevicesHaveScenesOfTheirOwn) {
   for (const auto& touching : right.all<wire::IsTouching>()) EXPECT_EQ(touching.touching, 0);
 }
 
-TEST(Server, TheSceneStaysOrGoesWithItsClientAsConfigured) {
+TEST(Server, TheSceneIsKeptOrClearedAsConfiguredWhenItsClientDisconnects) {
   for (const auto choice : {server::SceneOnDisconnect::keep, server::SceneOnDisconnect::clear}) {
     server::ServerConfig config = RunningServer::anyPort();
     config.devices[0].sceneOnDisconnect = choice;
@@ -279,7 +278,8 @@ TEST(Server, TheSceneStaysOrGoesWithItsClientAsConfigured) {
     }
     const auto touchedByNext = [&] {
       ScriptedPeer next(server.address());
-      next.until([&] { return next.count<wire::IsTouching>() >= 100; });  // the hand has let go of what went
+      next.until(
+          [&] { return next.count<wire::IsTouching>() >= 100; });  // the hand has left the removed object
       next.forget();
       return next.until([&] { return next.count<wire::IsTouching>() >= 1000; }) &&
              std::ranges::any_of(next.all<wire::IsTouching>(), [](const auto& m) { return m.touching != 0; });
@@ -288,9 +288,9 @@ TEST(Server, TheSceneStaysOrGoesWithItsClientAsConfigured) {
   }
 }
 
-TEST(Server, ACallBackToAnotherHostIsRefused) {
+TEST(Server, AReverseConnectionToAnotherHostIsRefused) {
   RunningServer server;
-  // An innocent third party listens; a forged request names it by an address that is not the sender's.
+  // A third party listens; a forged request names its address instead of the sender's.
   net::Loop loop;
   bool called = false;
   net::TcpListener victim(loop, {net::kAnyAddress, 0}, [&](net::Connection) { called = true; });
@@ -299,15 +299,14 @@ TEST(Server, ACallBackToAnotherHostIsRefused) {
   udp.sendTo(std::as_bytes(std::span(forged)), server.address());
   const std::string lowPort("127.0.0.1 80\0", 13);
   udp.sendTo(std::as_bytes(std::span(lowPort)), server.address());
-  // A client that asks for itself afterwards is served, so the server has read and refused the others by
-  // then.
+  // A later valid request is served, so the server has read and refused the others by then.
   ScriptedPeer peer(server.address(), "Phantom", ScriptedPeer::Mode::udp);
   EXPECT_TRUE(peer.untilConnected());
   loop.runOnce(0ms);
   EXPECT_FALSE(called);
 }
 
-// Catches what the server logs while it lives.
+// Captures the log of the server.
 class Log {
  public:
   Log() : before_(spdlog::default_logger()) {
@@ -322,13 +321,13 @@ class Log {
   std::shared_ptr<spdlog::logger> before_;
 };
 
-std::size_t countOf(const std::string& words, const std::string& text) {
+std::size_t countOf(const std::string& part, const std::string& text) {
   std::size_t n = 0;
-  for (auto at = text.find(words); at != std::string::npos; at = text.find(words, at + 1)) ++n;
+  for (auto at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
   return n;
 }
 
-TEST(Server, WhatClientsSayIsQuotedAndCannotFloodTheLog) {
+TEST(Server, TextsOfClientsAreQuotedAndCannotFloodTheLog) {
   Log log;
   {
     RunningServer server;
@@ -339,24 +338,25 @@ TEST(Server, WhatClientsSayIsQuotedAndCannotFloodTheLog) {
     peer.send(wire::Ping{});
     ASSERT_TRUE(peer.untilNext<wire::Pong>());
   }
-  EXPECT_GE(countOf("client 1: says \"fine\\x0aforged line\"", log.text()), 1U);
+  EXPECT_GE(countOf("client 1: sent the text \"fine\\x0aforged line\"", log.text()), 1U);
   EXPECT_LE(countOf("forged", log.text()), 200U);
 }
 
-TEST(Server, ADeviceThatDoesNotExistIsLoggedWithTheOnesThatDo) {
+TEST(Server, ARequestForAMissingDeviceIsLoggedWithTheAvailableOnes) {
   Log log;
   {
     RunningServer server;
     ScriptedPeer peer(server.address(), "Fantom");
     ASSERT_TRUE(peer.untilConnected());
-    peer.sendBytes(
-        std::vector<std::byte>(24));  // no frame: what came before it has been read when this ends it
+    peer.sendBytes(std::vector<std::byte>(
+        24));  // an invalid frame closes the connection after everything before it was read
     ASSERT_TRUE(peer.until([&] { return !peer.open(); }));
   }
-  EXPECT_EQ(countOf("asks for \"Fantom\", which is no device here; there is Phantom", log.text()), 1U);
+  EXPECT_EQ(countOf("requested the device \"Fantom\", which does not exist; available: Phantom", log.text()),
+            1U);
 }
 
-TEST(Server, ACallBackToTheServerItselfIsRefused) {
+TEST(Server, AReverseConnectionToTheServerItselfIsRefused) {
   Log log;
   {
     RunningServer server;
@@ -364,7 +364,7 @@ TEST(Server, ACallBackToTheServerItselfIsRefused) {
     net::UdpSocket udp(loop, net::Endpoint{net::kLoopbackAddress, 0});
     const std::string request = wire::formatUdpRequest({"127.0.0.1", server.address().port});
     udp.sendTo(std::as_bytes(std::span(request)), server.address());
-    // The one connection this can make is taken and closed again.
+    // The only connection that this request can cause is accepted and closed again.
     ScriptedPeer peer(server.address());
     ASSERT_TRUE(peer.untilConnected());
     ASSERT_TRUE(peer.until([&] { return peer.count<wire::IsTouching>() >= 200; }));
@@ -373,7 +373,7 @@ TEST(Server, ACallBackToTheServerItselfIsRefused) {
   EXPECT_EQ(countOf("speaks VRPN", log.text()), 1U);
 }
 
-TEST(Server, APortInUseIsSaidPlainly) {
+TEST(Server, APortInUseIsReported) {
   RunningServer server;
   server::ServerConfig second = RunningServer::anyPort();
   second.port = server.address().port;
@@ -386,8 +386,8 @@ TEST(Server, APortInUseIsSaidPlainly) {
   }
 }
 
-// VRPN's own vrpn_ping says "Server, are you there?", a name from before the ping message.
-TEST(Server, MessagesOfOtherTypesAreNobodysBusiness) {
+// vrpn_ping of VRPN sends "Server, are you there?", a type from before the ping message.
+TEST(Server, MessagesOfUnknownTypesAreIgnored) {
   RunningServer server;
   for (const auto mode : {ScriptedPeer::Mode::tcp, ScriptedPeer::Mode::udp}) {
     ScriptedPeer peer(server.address(), "Phantom", mode);

@@ -13,8 +13,8 @@
 namespace hapticd::server {
 namespace {
 
-// Where a key stands in its file, for the error's first words.
-std::string where(const std::string& source, const toml::node& node) {
+// "FILE:LINE: ", the start of an error text.
+std::string location(const std::string& source, const toml::node& node) {
   std::ostringstream text;
   text << source << ":" << node.source().begin.line << ": ";
   return text.str();
@@ -35,7 +35,7 @@ std::size_t editDistance(const std::string& a, const std::string& b) {
   return row[b.size()];
 }
 
-// One table of the file; each key is read once, finish() rejects what nobody asked for.
+// Reads one table of the file, each key once; finish() rejects unknown keys.
 class Reader {
  public:
   Reader(const toml::table& table, std::string source) : table_(table), source_(std::move(source)) {}
@@ -43,10 +43,10 @@ class Reader {
   void field(const std::string& key, double& out) { take<double>(key, out, "a number"); }
   void field(const std::string& key, bool& out) { takeExact<bool>(key, out, "true or false"); }
   void field(const std::string& key, std::string& out) {
-    takeExact<std::string>(key, out, "a text in quotes");
+    takeExact<std::string>(key, out, "a quoted string");
   }
   void field(const std::string& key, std::vector<std::string>& out) {
-    takeList(key, out, "a list of texts in quotes");
+    takeList(key, out, "a list of quoted strings");
   }
   void field(const std::string& key, int& out) {
     std::int64_t value = out;
@@ -68,7 +68,8 @@ class Reader {
   }
   void names(const std::string& key, std::vector<std::string>& out) {
     const toml::node* single = find("name");
-    if (single != nullptr && find(key) != nullptr) fail(*single, "name", "no 'name' beside 'names'");
+    if (single != nullptr && find(key) != nullptr)
+      fail(*single, "name", "either 'name' or 'names', not both");
     if (single != nullptr) {
       out.resize(1);
       field("name", out.front());
@@ -82,7 +83,7 @@ class Reader {
     try {
       parseListen(text, address, port);
     } catch (const ConfigError& error) {
-      throw ConfigError(where(source_, *find(key)) + "listen: " + error.what());
+      throw ConfigError(location(source_, *find(key)) + "listen: " + error.what());
     }
   }
   void workspace(const std::string& key, std::vector<double>& out) {
@@ -123,7 +124,7 @@ class Reader {
       const auto nearest = std::min_element(known_.begin(), known_.end(), [&](const auto& a, const auto& b) {
         return editDistance(name, a) < editDistance(name, b);
       });
-      throw ConfigError(where(source_, node) + "unknown key '" + name + "'; did you mean '" + *nearest +
+      throw ConfigError(location(source_, node) + "unknown key '" + name + "'; did you mean '" + *nearest +
                         "'?");
     }
   }
@@ -132,7 +133,7 @@ class Reader {
   [[noreturn]] void fail(const toml::node& node, const std::string& key, const std::string& expected) const {
     std::ostringstream value;
     node.visit([&](const auto& n) { value << n; });
-    throw ConfigError(where(source_, node) + "'" + key + "' is " + value.str() + ", expected " + expected);
+    throw ConfigError(location(source_, node) + "'" + key + "' is " + value.str() + ", expected " + expected);
   }
 
   template <class T>
@@ -183,15 +184,16 @@ DeviceConfig readDevice(const toml::table& table, const std::string& source) {
 std::vector<DeviceConfig> readDevices(const toml::node& node, const std::string& source) {
   const toml::array* list = node.as_array();
   if (list == nullptr || list->empty() || !list->is_array_of_tables()) {
-    throw ConfigError(where(source, node) + "'device' must be written as [[device]], once for each device");
+    throw ConfigError(location(source, node) +
+                      "'device' must be an array of tables: one [[device]] for each device");
   }
   std::vector<DeviceConfig> devices;
   for (const toml::node& item : *list) devices.push_back(readDevice(*item.as_table(), source));
   return devices;
 }
 
-// Where a value is set, or, when it is a default, what it belongs to.
-const toml::node& placeOf(const InvalidValue& error, const toml::table& root) {
+// The node that sets the value; for a default the table that it belongs to.
+const toml::node& nodeOf(const InvalidValue& error, const toml::table& root) {
   const toml::table* table = &root;
   const toml::array* devices = root.get_as<toml::array>("device");
   if (error.device() && devices != nullptr) table = devices->get_as<toml::table>(*error.device());
@@ -202,7 +204,7 @@ const toml::node& placeOf(const InvalidValue& error, const toml::table& root) {
 
 }  // namespace
 
-ServerConfig loadConfig(const std::filesystem::path& file, std::vector<std::string>& remarks) {
+ServerConfig loadConfig(const std::filesystem::path& file, std::vector<std::string>& warnings) {
   std::vector<std::byte> bytes;
   try {
     bytes = base::world().files.read(file);
@@ -210,7 +212,7 @@ ServerConfig loadConfig(const std::filesystem::path& file, std::vector<std::stri
     throw ConfigError("cannot read the configuration file '" + file.string() + "': " + error.code().message());
   }
   const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  if (file.extension() == ".cfg") return parseVrpnCfg(text, file.string(), remarks);
+  if (file.extension() == ".cfg") return parseVrpnCfg(text, file.string(), warnings);
   return parseConfig(text, file.string());
 }
 
@@ -231,7 +233,7 @@ ServerConfig parseConfig(const std::string& text, const std::string& source) {
   try {
     validate(config);
   } catch (const InvalidValue& error) {
-    throw ConfigError(where(source, placeOf(error, root)) + error.what());
+    throw ConfigError(location(source, nodeOf(error, root)) + error.what());
   }
   return config;
 }

@@ -1,4 +1,4 @@
-// What the operator chose: one typed value for everything, from defaults, a TOML file and the command line.
+// The configuration of the server as one typed value: from defaults, a TOML file and the command line.
 #pragma once
 
 #include <array>
@@ -14,16 +14,16 @@
 
 namespace hapticd::server {
 
-/// Wrong configuration; the text names file, line, key, value and remedy.
+/// Invalid configuration; the text names file, line, key, value and remedy.
 class ConfigError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// A value that no server can live with. Knows where it is set, so that who read it can name file and line.
+/// An invalid value. Names its key, so that the reader of a file can add file and line.
 class InvalidValue : public ConfigError {
  public:
-  /// `device` counts from 0; nothing for a key of the server itself.
+  /// `device` counts from 0; empty for a key of the server itself.
   InvalidValue(std::optional<std::size_t> device, std::string key, const std::string& text)
       : ConfigError(text), device_(device), key_(std::move(key)) {}
   std::optional<std::size_t> device() const noexcept { return device_; }
@@ -41,20 +41,21 @@ using scene::WorkspaceFit;
 enum class QuaternionOrder { xyzw, wxyz };
 enum class ForceReport { total, normal };
 enum class SceneOnDisconnect { keep, clear };
-/// Who may change the scene: everybody, the first to try and as long as it stays, or listed addresses.
+/// Which clients may command: all, the first to command until it disconnects, or those at listed addresses.
 enum class Control { any, first, list };
 
-/// The box that the paper's server fits scenes to: min xyz, max xyz.
+/// The box to which the paper's server fits scenes: min xyz, max xyz.
 inline constexpr std::array<double, 6> kPaperWorkspace_mm{-80, -80, -70, 80, 80, 20};
 
-/// One haptic device and the names it answers to.
+/// One haptic device and its names.
 struct DeviceConfig {
   std::vector<std::string> names{"Phantom"};
   std::string driver = "simulated";
-  std::string hardware;  ///< which one, in the driver's words: a device name, an index, /dev/input/event5
+  std::string hardware;  ///< which device, as its driver names it: a device name, an index, /dev/input/event5
   std::map<std::string, std::string> driverKeys;  ///< keys that only some drivers read, as Driver::keys names them
-  bool calibrate = false;                         ///< consent to calibrate at the start and at a re-arm; may move the arm
-  bool isolate = false;  ///< the driver runs in a process of its own: its crash is a fault, not the end
+  bool calibrate = false;  ///< consent to calibrate at start and at a re-arm; may move the arm
+  bool isolate =
+      false;  ///< run the driver in a separate process: its crash is a fault of the device, not of the server
   bool enableForces = false;    ///< real devices start without force unless this is set
   std::string hand = "script";  ///< simulated device: "script", or a CSV file with the intended path
   double servoRate_Hz = 1000;
@@ -62,25 +63,26 @@ struct DeviceConfig {
   double linearTolerance_m = 0.001;  ///< of the reported position (world / 1000)
   double angularTolerance_rad = 0.02;
   double toolRadius_m = 0;
-  std::vector<double> workspace_mm;  ///< empty: the device's own; else min xyz, max xyz
-  bool forceShading = false;         ///< smooth meshes: the force turns from corner to corner
+  std::vector<double> workspace_mm;  ///< min xyz, max xyz; empty: that of the device
+  bool forceShading = false;  ///< turn the force towards the interpolated vertex normals of smooth meshes
   MaterialScale materialScale = MaterialScale::reference;
   QuaternionOrder quaternionOrder = QuaternionOrder::xyzw;
   ForceReport forceReport = ForceReport::total;
   WorkspaceFit workspaceFit = WorkspaceFit::published;
   VibrationUnit vibrationContactUnit = VibrationUnit::radPerSecond;
   VibrationFrame vibrationMotorFrame = VibrationFrame::stylus;
-  std::string scene;  ///< devices that name the same one share it; empty: one of its own
+  std::string scene;  ///< devices with the same name share a scene; empty: not shared
   SceneOnDisconnect sceneOnDisconnect = SceneOnDisconnect::keep;
   Control control = Control::any;
-  std::vector<std::string> controlList;  ///< IPv4 addresses of who may command, for Control::list
+  std::vector<std::string>
+      controlList;  ///< IPv4 addresses of the clients that may command, for Control::list
   std::string blackBoxDir;               ///< empty: the user's state directory
-  int blackBoxKeep = 10;                 ///< newest black boxes that stay; 0: none is written
+  int blackBoxKeep = 10;                 ///< how many of the newest black boxes are kept; 0: write none
 
   bool operator==(const DeviceConfig&) const = default;
 };
 
-/// The web port: 127.0.0.1:8080, or none when that is in use.
+/// `http` values besides ADDR:PORT. Auto: 127.0.0.1:8080, or no viewer when that port is in use.
 inline constexpr const char* kHttpAuto = "auto";
 inline constexpr const char* kHttpOff = "off";
 
@@ -89,28 +91,28 @@ struct ServerConfig {
   std::uint16_t port = 3883;
   bool allowNoRealtime = false;
   double seconds = 0;                      ///< 0: until stopped
-  std::vector<std::string> callbackHosts;  ///< hosts that a UDP request may name besides the sender's own
-  std::string record;                      ///< session file to write; may hold strftime's %; empty: none
-  std::string http = kHttpAuto;            ///< where the page is: ADDR:PORT, kHttpAuto or kHttpOff
-  std::vector<std::string> httpAllow;      ///< further names of the web port: HOST, or HOST:PORT
+  std::vector<std::string> callbackHosts;  ///< hosts that a UDP request may name besides its source address
+  std::string record;                  ///< recording to write; strftime conversions (%) allowed; empty: none
+  std::string http = kHttpAuto;        ///< endpoint of the viewer: ADDR:PORT, kHttpAuto or kHttpOff
+  std::vector<std::string> httpAllow;  ///< additional Host names accepted at the web port: HOST or HOST:PORT
   std::vector<DeviceConfig> devices{DeviceConfig{}};
 
   bool operator==(const ServerConfig&) const = default;
 };
 
-/// Reads a TOML file, or one called *.cfg in the form of vrpn.cfg, over the defaults. Throws ConfigError;
-/// unknown keys are errors, with the nearest known key named. What was left out of a vrpn.cfg is appended to
-/// `remarks`, one line each.
-ServerConfig loadConfig(const std::filesystem::path& file, std::vector<std::string>& remarks);
+/// Reads a TOML file, or a vrpn.cfg (extension .cfg), over the defaults. Throws ConfigError; an unknown key
+/// is an error that names the nearest known key. For each skipped line of a vrpn.cfg a text is appended to
+/// `warnings`.
+ServerConfig loadConfig(const std::filesystem::path& file, std::vector<std::string>& warnings);
 
 /// Parses the text of a TOML configuration; `source` names it in errors.
 ServerConfig parseConfig(const std::string& text, const std::string& source);
 
-/// The configuration as TOML with every key: parseConfig() of it gives the same configuration.
+/// The configuration as TOML with every key; parseConfig() of it returns an equal configuration.
 std::string toToml(const ServerConfig& config);
 
-/// Where black boxes are written unless configured: $XDG_STATE_HOME/hapticd, else ~/.local/state/hapticd,
-/// else (no home) hapticd in the directory for temporary files.
+/// Default directory of black boxes: $XDG_STATE_HOME/hapticd, else ~/.local/state/hapticd, else (without
+/// $HOME) hapticd in the directory for temporary files.
 std::filesystem::path defaultBlackBoxDir();
 
 /// Splits "ADDR:PORT", "ADDR" or ":PORT" over the given defaults. Throws ConfigError.

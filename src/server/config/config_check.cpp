@@ -13,20 +13,21 @@
 namespace hapticd::server {
 namespace {
 
-// Checks the values of one device, or of the server itself; each error names whose and which.
+// Checks the values of one device, or of the server itself; each error names the device and the key.
 class Checker {
  public:
   Checker() = default;
-  Checker(std::size_t device, const std::string& name) : device_(device), who_("device '" + name + "': ") {}
+  Checker(std::size_t device, const std::string& name)
+      : device_(device), prefix_("device '" + name + "': ") {}
 
   [[noreturn]] void fail(const std::string& key, const std::string& text) const {
-    throw InvalidValue(device_, key, who_ + text);
+    throw InvalidValue(device_, key, prefix_ + text);
   }
 
   void range(const std::string& key, double value, double low, double high) const {
     if (value >= low && value <= high) return;
     std::ostringstream text;
-    text << key << " is " << value << "; it must lie between " << low << " and " << high;
+    text << key << " must be between " << low << " and " << high << ", got " << value;
     fail(key, text.str());
   }
 
@@ -43,7 +44,7 @@ class Checker {
 
  private:
   std::optional<std::size_t> device_;
-  std::string who_;
+  std::string prefix_;
 };
 
 void checkName(std::size_t device, const std::string& name, std::map<std::string, int>& uses) {
@@ -56,27 +57,29 @@ void checkName(std::size_t device, const std::string& name, std::map<std::string
     fail("device name " + wire::inQuotes(name) +
          " must have 1 to 95 characters, no '@' and no control characters");
   }
-  if (name == "VRPN Control") fail("VRPN keeps the name 'VRPN Control' for itself");
-  if (++uses[name] > 1) fail("the name '" + name + "' is given twice; each must be unique");
+  if (name == "VRPN Control") fail("the name 'VRPN Control' is reserved by VRPN");
+  if (++uses[name] > 1) fail("the name '" + name + "' is used twice; device names must be unique");
 }
 
 void checkDriver(const Checker& check, const DeviceConfig& device) {
   const device::Driver* const driver = device::findDriver(device.driver);
   if (driver == nullptr) {
-    check.fail("driver", "no driver is called '" + device.driver + "'; there is " + device::driverNames());
+    check.fail("driver", "unknown driver '" + device.driver + "'; available: " + device::driverNames());
   }
   if (device.isolate && !driver->canBeIsolated) {
-    check.fail("isolate", "the driver '" + device.driver + "' loads no vendor's library, so it cannot be isolated; leave isolate out");
+    check.fail("isolate", "the driver '" + device.driver +
+                              "' loads no vendor library and cannot be isolated; remove isolate");
   }
   for (const auto& [key, value] : device.driverKeys) {
     if (std::find(driver->keys.begin(), driver->keys.end(), key) != driver->keys.end()) continue;
-    check.fail(key, "the driver '" + device.driver + "' has no key " + key + "; leave it out");
+    check.fail(key, "the driver '" + device.driver + "' has no key " + key + "; remove it");
   }
 }
 
 void checkWorkspace(const Checker& check, const std::vector<double>& box) {
   if (!box.empty() && (box.size() != 6 || !(box[0] < box[3] && box[1] < box[4] && box[2] < box[5]))) {
-    check.fail("workspace", "workspace needs six numbers, min x y z then max x y z, in mm");
+    check.fail("workspace",
+               "workspace needs six numbers in mm: min x y z, then max x y z, each min below its max");
   }
   for (const double bound : box) check.range("workspace", bound, -10000, 10000);
 }
@@ -84,7 +87,8 @@ void checkWorkspace(const Checker& check, const std::vector<double>& box) {
 void checkControl(const Checker& check, const DeviceConfig& device) {
   const bool listed = device.control == Control::list;
   if (listed && device.controlList.empty()) {
-    check.fail("control", R"(control is "list": name who may command, e.g. control_list = ["10.0.0.5"])");
+    check.fail("control",
+               R"(control = "list" needs the addresses that may command, e.g. control_list = ["10.0.0.5"])");
   }
   if (!listed && !device.controlList.empty()) {
     check.fail("control_list", R"(control_list has no effect without control = "list")");
@@ -92,7 +96,7 @@ void checkControl(const Checker& check, const DeviceConfig& device) {
   for (const std::string& address : device.controlList) check.address("control_list", address, "10.0.0.5");
 }
 
-// ADDR:PORT, and names that a browser can have in its address bar.
+// `http` must be ADDR:PORT; `http_allow` holds names that a browser can send as Host.
 void checkHttp(const Checker& check, const ServerConfig& config) {
   if (config.http != kHttpAuto && config.http != kHttpOff) {
     try {
@@ -137,9 +141,9 @@ void checkRecord(const Checker& check, const std::string& file) {
   const std::string extension = std::filesystem::path(file).extension();
   for (const char* to : {"mcap", "csv", "vrpn"}) {
     if (extension != std::string(".") + to) continue;
-    check.fail("record", "record: a server writes session files, not '" + file +
-                             "'; record to one called *.haptics, then 'hapticd export FILE.haptics --to " + to +
-                             "'");
+    check.fail("record", "record: the server writes *.haptics recordings only, got '" + file +
+                             "'; convert the recording afterwards with 'hapticd export FILE.haptics --to " +
+                             to + "'");
   }
 }
 
@@ -160,7 +164,7 @@ void parseListen(const std::string& text, std::string& address, std::uint16_t& p
 }
 
 std::filesystem::path defaultBlackBoxDir() {
-  // The standard says to ignore a relative one.
+  // The XDG specification says to ignore relative paths.
   const char* state = std::getenv("XDG_STATE_HOME");
   if (state != nullptr && std::filesystem::path(state).is_absolute()) {
     return std::filesystem::path(state) / "hapticd";
@@ -183,15 +187,15 @@ void validate(const ServerConfig& config) {
   for (std::size_t i = 0; i < config.devices.size(); ++i) {
     const DeviceConfig& device = config.devices[i];
     if (device.names.empty())
-      throw InvalidValue(i, "names", "a device needs a name, e.g. name = \"Phantom\"");
+      throw InvalidValue(i, "names", "a device needs at least one name, e.g. name = \"Phantom\"");
     for (const std::string& name : device.names) checkName(i, name, uses);
     const Checker check(i, device.names.front());
     checkDevice(check, device);
     if (device.scene.empty()) continue;
     const auto shared = scenes.try_emplace(device.scene, device.sceneOnDisconnect).first;
     if (shared->second != device.sceneOnDisconnect) {
-      check.fail("scene_on_disconnect", "the devices that share the scene '" + device.scene +
-                                            "' disagree; it stays or goes for all");
+      check.fail("scene_on_disconnect",
+                 "all devices of the scene '" + device.scene + "' must have the same scene_on_disconnect");
     }
   }
 }

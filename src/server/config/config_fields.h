@@ -1,4 +1,4 @@
-// Every key of the configuration, named once: what reads a file and what writes one both walk through here.
+// Every key of the configuration, named once, for the reader and the writer of files.
 #pragma once
 
 #include <array>
@@ -29,7 +29,7 @@ inline constexpr Choices<SceneOnDisconnect, 2> kSceneOnDisconnects{
 inline constexpr Choices<Control, 3> kControls{
     {{"any", Control::any}, {"first", Control::first}, {"list", Control::list}}};
 
-/// Calls `visitor` for each key of a [[device]] with the field that it stands for. `Device` may be const.
+/// Calls `visitor` for each key of a [[device]] with the corresponding field. `Device` may be const.
 template <class Visitor, class Device>
 void visitFields(Visitor& visitor, Device& device) {
   visitor.names("names", device.names);
@@ -61,7 +61,7 @@ void visitFields(Visitor& visitor, Device& device) {
   visitor.field("black_box_keep", device.blackBoxKeep);
 }
 
-/// The same for the keys of the server itself, but for its devices.
+/// The same for the keys of the server itself, without its devices.
 template <class Visitor, class Server>
 void visitFields(Visitor& visitor, Server& server) requires requires {
   server.devices;

@@ -17,10 +17,10 @@ constexpr const char* kOpenHaptics =
     "DEVICE";
 constexpr const char* kPhantom = "vrpn_Phantom NAME calibrate(0|1) report_rate_Hz DEVICE";
 
-// One line, taken word by word.
+// One line, read word by word.
 class Line {
  public:
-  Line(std::string_view text, std::string where) : rest_(text), where_(std::move(where)) { trim(); }
+  Line(std::string_view text, std::string location) : rest_(text), location_(std::move(location)) { trim(); }
 
   bool atEnd() const { return rest_.empty() || rest_.front() == '#'; }
   std::string_view word() {
@@ -29,11 +29,11 @@ class Line {
     trim();
     return word;
   }
-  /// What is left, spaces and all.
+  /// The rest of the line, including spaces.
   std::string rest() const { return atEnd() ? std::string() : std::string(rest_); }
 
-  double number(const char* what, double otherwise) {
-    if (atEnd()) return otherwise;
+  double number(const char* what, double defaultValue) {
+    if (atEnd()) return defaultValue;
     const std::string_view text = word();
     double value = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -47,10 +47,10 @@ class Line {
     return true;
   }
 
-  const std::string& where() const { return where_; }
-  void form(const char* form) { form_ = form; }
+  const std::string& location() const { return location_; }
+  void setFormat(const char* format) { format_ = format; }
   [[noreturn]] void fail(const std::string& text) const {
-    throw ConfigError(where_ + text + "; the line reads " + form_);
+    throw ConfigError(location_ + text + "; expected format: " + format_);
   }
 
  private:
@@ -63,11 +63,11 @@ class Line {
   }
 
   std::string_view rest_;
-  std::string where_;
-  const char* form_ = "";
+  std::string location_;
+  const char* format_ = "";
 };
 
-DeviceConfig readDevice(Line& line, bool openHaptics, std::vector<std::string>& remarks) {
+DeviceConfig readDevice(Line& line, bool openHaptics, std::vector<std::string>& warnings) {
   DeviceConfig device;
   device.driver = "openhaptics";
   if (line.atEnd()) line.fail("the name is missing");
@@ -76,9 +76,9 @@ DeviceConfig readDevice(Line& line, bool openHaptics, std::vector<std::string>& 
   device.reportRate_Hz = line.number("report_rate_Hz", device.reportRate_Hz);
   if (device.reportRate_Hz > device.servoRate_Hz) {
     std::ostringstream text;
-    text << line.where() << "report_rate_Hz is " << device.reportRate_Hz << ": reports come with each of the "
-         << device.servoRate_Hz << " servo ticks a second";
-    remarks.push_back(text.str());
+    text << line.location() << "report_rate_Hz must not exceed the servo rate, got " << device.reportRate_Hz
+         << ": reports use " << device.servoRate_Hz << " Hz";
+    warnings.push_back(text.str());
     device.reportRate_Hz = device.servoRate_Hz;
   }
   if (openHaptics) {
@@ -90,43 +90,46 @@ DeviceConfig readDevice(Line& line, bool openHaptics, std::vector<std::string>& 
   return device;
 }
 
-// A device of ours; nothing for other lines, which are remarked unless they say nothing.
-std::optional<DeviceConfig> readLine(Line& line, std::vector<std::string>& remarks) {
+// The device that the line configures; empty for blank lines, comments and, with a warning, devices of other
+// kinds.
+std::optional<DeviceConfig> readLine(Line& line, std::vector<std::string>& warnings) {
   if (line.atEnd()) return std::nullopt;
   const std::string_view kind = line.word();
   const bool openHaptics = kind == "vrpn_OpenHaptics";
   if (!openHaptics && kind != "vrpn_Phantom") {
-    remarks.push_back(line.where() + wire::inQuotes(kind) +
-                      " is no device of this server (vrpn_OpenHaptics, vrpn_Phantom): skipped");
+    warnings.push_back(
+        line.location() + wire::inQuotes(kind) +
+        " is not supported by this server (supported: vrpn_OpenHaptics, vrpn_Phantom): skipped");
     return std::nullopt;
   }
-  line.form(openHaptics ? kOpenHaptics : kPhantom);
-  return readDevice(line, openHaptics, remarks);
+  line.setFormat(openHaptics ? kOpenHaptics : kPhantom);
+  return readDevice(line, openHaptics, warnings);
 }
 
 }  // namespace
 
 ServerConfig parseVrpnCfg(const std::string& text, const std::string& source,
-                          std::vector<std::string>& remarks) {
+                          std::vector<std::string>& warnings) {
   ServerConfig config;
   config.devices.clear();
   std::istringstream in(text);
   std::string bytes;
   for (int number = 1; std::getline(in, bytes); ++number) {
     if (number == 1 && bytes.starts_with("\xEF\xBB\xBF")) bytes.erase(0, 3);
-    const std::string where = source + ":" + std::to_string(number) + ": ";
-    Line line(bytes, where);
-    const auto device = readLine(line, remarks);
+    const std::string location = source + ":" + std::to_string(number) + ": ";
+    Line line(bytes, location);
+    const auto device = readLine(line, warnings);
     if (!device) continue;
     config.devices.push_back(*device);
     try {
       validate(config);
     } catch (const InvalidValue& error) {
-      throw ConfigError(where + error.what());
+      throw ConfigError(location + error.what());
     }
   }
   if (config.devices.empty()) {
-    throw ConfigError(source + ": no line names a device of this server; one reads " + kOpenHaptics);
+    throw ConfigError(source +
+                      ": no line configures a device of this server; expected format: " + kOpenHaptics);
   }
   return config;
 }

@@ -27,10 +27,10 @@ Outbox::Outbox(const DeviceConfig& config, int buttonCount, std::vector<wire::Lo
       defaultChoice_{.kinds = wire::kReportDefault, .rate_Hz = config.reportRate_Hz} {}
 
 void Outbox::subscribe(Session& session, wire::LocalSender name) {
-  Listener& who = listener(session);
-  regroup(session, who);
-  for (const auto& group : who.groups) {
-    if (group->name == name) tellPresentState(session, name, *group);
+  Listener& entry = listener(session);
+  regroup(session, entry);
+  for (const auto& group : entry.groups) {
+    if (group->name == name) sendPresentState(session, name, *group);
   }
 }
 
@@ -40,10 +40,10 @@ ReportChoice Outbox::choiceOf(scene::ClientId client) const {
 }
 
 void Outbox::choose(Session& session, const ReportChoice& choice) {
-  Listener& who = listener(session);
-  who.choice = choice;
-  regroup(session, who);
-  for (const auto& group : who.groups) tellPresentState(session, group->name, *group);
+  Listener& entry = listener(session);
+  entry.choice = choice;
+  regroup(session, entry);
+  for (const auto& group : entry.groups) sendPresentState(session, group->name, *group);
 }
 
 void Outbox::clientGone(scene::ClientId client) {
@@ -72,8 +72,8 @@ std::shared_ptr<Outbox::Group> Outbox::group(wire::LocalSender name, const Repor
   return group;
 }
 
-void Outbox::tellPresentState(Session& session, wire::LocalSender name, const Group& group) {
-  if (last_.tick == 0) return;  // the first tick will tell
+void Outbox::sendPresentState(Session& session, wire::LocalSender name, const Group& group) {
+  if (last_.tick == 0) return;  // add() reports the state with the first tick
   std::vector<Outgoing> messages;
   group.reporter.presentState(last_, frame_, messages);
   for (const Outgoing& out : messages) session.sendReliably(name, out.message, lastTime_);
@@ -89,7 +89,7 @@ void Outbox::add(const realtime::TickReport& tick, const ReportFrame& frame, wir
     const std::shared_ptr<Group> group = weak.lock();
     if (!group) continue;
     outgoing_.clear();
-    // Who came before the first tick has heard nothing yet.
+    // Clients that subscribed before the first tick still need the initial state.
     if (first) {
       group->reporter.presentState(tick, frame, outgoing_);
     } else {
@@ -118,9 +118,9 @@ bool Outbox::collect() {
 }
 
 void Outbox::send(Session& session) {
-  Listener& who = listener(session);
-  if (who.groups.empty() || who.names != session.namesWanted()) regroup(session, who);
-  for (const auto& group : who.groups) {
+  Listener& entry = listener(session);
+  if (entry.groups.empty() || entry.names != session.namesWanted()) regroup(session, entry);
+  for (const auto& group : entry.groups) {
     if (group->lowLatencyFrames) session.sendShared(group->lowLatencyFrames, net::Delivery::lowLatency);
     if (group->reliableFrames) session.sendShared(group->reliableFrames, net::Delivery::reliable);
   }

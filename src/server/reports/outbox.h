@@ -1,4 +1,4 @@
-// From ticks to bytes for many clients: who hears what, each report encoded once for all who chose alike.
+// Encodes ticks for many clients: each report once for all clients with the same subscription.
 #pragma once
 
 #include <map>
@@ -13,32 +13,33 @@
 
 namespace hapticd::server {
 
-/// The reports of one device. Net thread.
+/// The reports of one device and their subscriptions. Net thread.
 class Outbox {
  public:
-  /// `names` are the device's, each a sender of its own.
+  /// `names`: the senders under which clients know the device.
   Outbox(const DeviceConfig& config, int buttonCount, std::vector<wire::LocalSender> names);
 
-  /// The client hears this name from now on: it gets the present state at once.
+  /// Subscribes the client to this name and sends it the present state.
   void subscribe(Session& session, wire::LocalSender name);
-  /// What the client has chosen, under all names; the default until it chooses.
+  /// The subscription of the client, the same for all names; the default until choose().
   ReportChoice choiceOf(scene::ClientId client) const;
   void choose(Session& session, const ReportChoice& choice);
   void clientGone(scene::ClientId client);
 
-  /// Says what the tick changed to every group of clients.
+  /// Encodes what the tick changed, for every group of clients.
   void add(const realtime::TickReport& tick, const ReportFrame& frame, wire::Time time);
-  /// Says one thing to all.
+  /// Encodes one reliable message for all clients.
   void add(const wire::Message& message, wire::Time time);
-  /// Hands over what was added since the last time; false when there was nothing.
+  /// Collects what was added since the last call, for send(); false when there was nothing.
   bool collect();
-  /// Queues what collect() handed over and this client listens to.
+  /// Queues the collected reports that this client subscribed to.
   void send(Session& session);
 
+  /// The newest tick; its number is 0 until there is one.
   const realtime::TickReport& last() const noexcept { return last_; }
 
  private:
-  // All clients with one choice, under one name.
+  // All clients with the same subscription to one name.
   struct Group {
     Group(wire::LocalSender name_, Reporter reporter_) : name(name_), reporter(std::move(reporter_)) {}
     void add(const Outgoing& out, wire::Time time);
@@ -50,21 +51,21 @@ class Outbox {
   };
   struct Listener {
     ReportChoice choice;
-    std::size_t names = 0;  // that the groups were chosen for
+    std::size_t names = 0;  // Session::namesWanted() when the groups were chosen
     std::vector<std::shared_ptr<Group>> groups;
   };
 
   Listener& listener(const Session& session);
   void regroup(const Session& session, Listener& listener);
   std::shared_ptr<Group> group(wire::LocalSender name, const ReportChoice& choice);
-  void tellPresentState(Session& session, wire::LocalSender name, const Group& group);
+  void sendPresentState(Session& session, wire::LocalSender name, const Group& group);
 
   const DeviceConfig config_;
   const int buttonCount_;
   const std::vector<wire::LocalSender> names_;
   const ReportChoice defaultChoice_;
   std::map<scene::ClientId, Listener> listeners_;
-  // Groups live as long as somebody is in them.
+  // A group lives as long as a client is in it.
   std::map<std::pair<std::int32_t, ReportChoice>, std::weak_ptr<Group>> groups_;
   realtime::TickReport last_;
   wire::Time lastTime_;

@@ -29,8 +29,8 @@ std::int16_t flag(bool value) {
   return value ? 1 : 0;
 }
 
-// What clamps the force is part of normal rendering; what takes it away is told.
-std::uint32_t tripped(const realtime::GuardReport& guard) {
+// Clamps are part of normal rendering; only trips that remove the force are reported as errors.
+std::uint32_t forceRemovingTrips(const realtime::GuardReport& guard) {
   return (guard.active | guard.latched) & ~realtime::tripsOf(realtime::TripAction::clamp);
 }
 
@@ -73,33 +73,33 @@ void Reporter::update(const TickReport& tick, const ReportFrame& frame, std::vec
   guard(tick, out);
   const bool touching = tick.rendering.touching;
   buttons(frame.buttons | std::uint32_t{touching} << buttonCount_, out);
-  const bool over = touching_ && !touching;
-  if (tick.time < due_ && !over) return;
+  const bool contactEnded = touching_ && !touching;
+  if (tick.time < due_ && !contactEnded) return;
   due_ = std::max(due_ + period_, tick.time - period_ / 2);
-  const View view = viewOf(tick, config_.forceReport);
-  tracker(view, frame, out);
-  if (over) {
-    contactEnd(view, out);
-  } else if (const bool changed = contact(view, out); gripped(view) || changed) {
-    analog(view, false, out);
+  const ClientTick clientTick = toClientTick(tick, config_.forceReport);
+  tracker(clientTick, frame, out);
+  if (contactEnded) {
+    contactEnd(clientTick, out);
+  } else if (const bool changed = contact(clientTick, out); gripperMoved(clientTick) || changed) {
+    analog(clientTick, false, out);
   }
-  touching_ = view.touching;
-  if (wants(wire::kReportForce)) out.push_back({wire::IsTouching{flag(view.touching)}, false});
-  wholeTick(tick, view, over, out);
+  touching_ = clientTick.touching;
+  if (wants(wire::kReportForce)) out.push_back({wire::IsTouching{flag(clientTick.touching)}, false});
+  tickReport(tick, clientTick, contactEnded, out);
 }
 
 void Reporter::guard(const TickReport& tick, std::vector<Outgoing>& out) {
   const wire::GuardState state = guardState(tick.guard);
   if (!(state == guard_)) out.push_back({guard_ = state, true});
-  const std::uint32_t now = tripped(tick.guard);
-  if (now == tripped_) return;
+  const std::uint32_t now = forceRemovingTrips(tick.guard);
+  if (now == reportedTrips_) return;
   for (const realtime::TripInfo& trip : realtime::kTrips) {
-    if ((now & ~tripped_ & realtime::bit(trip.trip)) != 0) {
+    if ((now & ~reportedTrips_ & realtime::bit(trip.trip)) != 0) {
       out.push_back({wire::ForceError{static_cast<std::int32_t>(trip.forceError)}, true});
     }
   }
   if (now == 0) out.push_back({wire::ForceError{static_cast<std::int32_t>(realtime::ForceError::recovered)}, true});
-  tripped_ = now;
+  reportedTrips_ = now;
 }
 
 wire::ButtonStates Reporter::buttonStates(int buttonCount, std::uint32_t buttons, bool touching) {
@@ -132,12 +132,12 @@ bool Reporter::moved(std::int32_t sensor, const Vec3& position, const Quat& orie
   return true;
 }
 
-void Reporter::tracker(const View& view, const ReportFrame& frame, std::vector<Outgoing>& out) {
+void Reporter::tracker(const ClientTick& clientTick, const ReportFrame& frame, std::vector<Outgoing>& out) {
   if (!wants(wire::kReportTracker)) return;
-  const Quat back = frame.turn.conjugate();
-  const Quat orientation = back * view.orientation;
+  const Quat toFrame = frame.rotation.conjugate();
+  const Quat orientation = toFrame * clientTick.orientation;
   const auto report = [&](std::int32_t sensor, const Vec3& world) {
-    const Vec3 position = back * (world - frame.origin);
+    const Vec3 position = toFrame * (world - frame.origin);
     if (!moved(sensor, position, orientation)) return;
     out.push_back({wire::TrackerPosQuat{.sensor = sensor,
                                         .filler = sensor,
@@ -145,109 +145,111 @@ void Reporter::tracker(const View& view, const ReportFrame& frame, std::vector<O
                                         .orientation = quaternion(orientation)},
                    false});
     if (sensor != kSensorHip) return;
-    // VRPN gives angular velocity as the rotation during an interval.
+    // VRPN encodes angular velocity as the rotation during an interval.
     constexpr double kInterval_s = 0.01;
-    const Vec3 angular = back * view.angularVelocity;
+    const Vec3 angular = toFrame * clientTick.angularVelocity;
     const double angle = angular.norm() * kInterval_s;
     const Quat turn = angle > 0 ? Quat(Eigen::AngleAxisd(angle, angular.normalized())) : Quat::Identity();
     out.push_back({wire::TrackerVelocity{.sensor = sensor,
                                          .filler = sensor,
-                                         .velocity = array(back * view.velocity),
+                                         .velocity = array(toFrame * clientTick.velocity),
                                          .rotation = quaternion(turn),
                                          .interval = kInterval_s},
                    false});
   };
-  report(kSensorProxy, view.proxy);
-  report(kSensorHip, view.hip);
-  if (view.touching) report(kSensorContact, view.scp);
+  report(kSensorProxy, clientTick.proxy);
+  report(kSensorHip, clientTick.hip);
+  if (clientTick.touching) report(kSensorContact, clientTick.scp);
 }
 
-bool Reporter::gripped(const View& view) const {
-  if (!view.gripper_rad) return false;
-  return !gripper_rad_ || std::abs(*view.gripper_rad - *gripper_rad_) > kGripperStep_rad;
+bool Reporter::gripperMoved(const ClientTick& clientTick) const {
+  if (!clientTick.gripper_rad) return false;
+  return !gripper_rad_ || std::abs(*clientTick.gripper_rad - *gripper_rad_) > kGripperStep_rad;
 }
 
-// True when something of it has changed.
-bool Reporter::contact(const View& view, std::vector<Outgoing>& out) {
+// Appends the changes of force and contact; true when any of them changed.
+bool Reporter::contact(const ClientTick& clientTick, std::vector<Outgoing>& out) {
   const std::size_t before = out.size();
-  // Nothing is said to be nothing, however small the rest before.
-  const bool ended = view.force_N.isZero(0) && !force_N_.isZero(0);
-  if (ended || (view.force_N - force_N_).norm() > kForceStep_N) {
-    force_N_ = view.force_N;
-    out.push_back({wire::Force{array(view.force_N)}, false});
+  // Always report the transition to exactly zero force, even below the threshold.
+  const bool ended = clientTick.force_N.isZero(0) && !force_N_.isZero(0);
+  if (ended || (clientTick.force_N - force_N_).norm() > kForceStep_N) {
+    force_N_ = clientTick.force_N;
+    out.push_back({wire::Force{array(clientTick.force_N)}, false});
   }
-  if (std::abs(view.depth - depth_) > kDepthStep_m) {
-    depth_ = view.depth;
-    out.push_back({wire::Dop{view.depth}, false});
+  if (std::abs(clientTick.depth - depth_) > kDepthStep_m) {
+    depth_ = clientTick.depth;
+    out.push_back({wire::Dop{clientTick.depth}, false});
   }
-  if (view.object != object_) {
-    object_ = view.object;
-    out.push_back({wire::TouchedObject{view.object}, false});
+  if (clientTick.object != object_) {
+    object_ = clientTick.object;
+    out.push_back({wire::TouchedObject{clientTick.object}, false});
   }
-  if (view.touching && (view.angle_deg != angle_deg_ || !touching_)) {
-    angle_deg_ = view.angle_deg;
-    out.push_back({wire::Angle{view.angle_deg, 1}, false});
+  if (clientTick.touching && (clientTick.angle_deg != angle_deg_ || !touching_)) {
+    angle_deg_ = clientTick.angle_deg;
+    out.push_back({wire::Angle{clientTick.angle_deg, 1}, false});
   }
   const bool changed = out.size() > before;
-  if (view.touching && view.scp != scp_) {
-    scp_ = view.scp;
-    out.push_back({wire::Scp{array(view.scp), quaternion(view.orientation)}, false});
+  if (clientTick.touching && clientTick.scp != scp_) {
+    scp_ = clientTick.scp;
+    out.push_back({wire::Scp{array(clientTick.scp), quaternion(clientTick.orientation)}, false});
   }
   if (!wants(wire::kReportForce)) out.erase(out.begin() + static_cast<std::ptrdiff_t>(before), out.end());
   return changed;
 }
 
-// The last words of a contact must arrive, or a client would believe in it for ever.
-void Reporter::contactEnd(const View& view, std::vector<Outgoing>& out) {
-  force_N_ = view.force_N;
+// Send end-of-contact reports reliably; a lost datagram would leave the client in contact.
+void Reporter::contactEnd(const ClientTick& clientTick, std::vector<Outgoing>& out) {
+  force_N_ = clientTick.force_N;
   depth_ = 0;
   object_ = -1;
   angle_deg_ = 0;
   scp_ = Vec3::Constant(1e300);
-  analog(view, true, out);
+  analog(clientTick, true, out);
   if (!wants(wire::kReportForce)) return;
-  out.push_back({wire::Force{array(view.force_N)}, true});
+  out.push_back({wire::Force{array(clientTick.force_N)}, true});
   out.push_back({wire::Dop{0}, true});
   out.push_back({wire::TouchedObject{-1}, true});
   out.push_back({wire::Angle{0, 0}, true});
 }
 
-void Reporter::analog(const View& view, bool reliable, std::vector<Outgoing>& out) {
-  gripper_rad_ = view.gripper_rad;
+void Reporter::analog(const ClientTick& clientTick, bool reliable, std::vector<Outgoing>& out) {
+  gripper_rad_ = clientTick.gripper_rad;
   if (!wants(wire::kReportAnalog)) return;
-  const Vec3& f = view.force_N;
+  const Vec3& f = clientTick.force_N;
   wire::AnalogChannels channels;
-  channels.channels.values = {f.x(),          f.y(), f.z(), view.depth, view.angle_deg,
-                              double(view.object)};
-  if (view.gripper_rad) channels.channels.values.push_back(*view.gripper_rad);
+  channels.channels.values = {
+      f.x(), f.y(), f.z(), clientTick.depth, clientTick.angle_deg, double(clientTick.object)};
+  if (clientTick.gripper_rad) channels.channels.values.push_back(*clientTick.gripper_rad);
   out.push_back({std::move(channels), reliable});
 }
 
-void Reporter::wholeTick(const TickReport& tick, const View& view, bool over, std::vector<Outgoing>& out) {
+void Reporter::tickReport(const TickReport& tick, const ClientTick& clientTick, bool contactEnded,
+                          std::vector<Outgoing>& out) {
   if (wants(wire::kReportTick)) {
     out.push_back({wire::TickReport{.tick = tick.tick,
                                     .time = tick.time,
                                     .revision = tick.revision,
-                                    .hand = array(view.hip),
-                                    .proxy = array(view.proxy),
-                                    .velocity = array(view.velocity),
-                                    .orientation = xyzw(view.orientation),
-                                    .force = array(view.force_N),
-                                    .depth = view.depth,
-                                    .object = view.object,
+                                    .hand = array(clientTick.hip),
+                                    .proxy = array(clientTick.proxy),
+                                    .velocity = array(clientTick.velocity),
+                                    .orientation = xyzw(clientTick.orientation),
+                                    .force = array(clientTick.force_N),
+                                    .depth = clientTick.depth,
+                                    .object = clientTick.object,
                                     .buttons = buttons_ & ~(1U << buttonCount_),
                                     .guard_active = tick.guard.active,
                                     .guard_latched = tick.guard.latched},
                    false});
   }
-  if (wants(wire::kReportContacts) && (view.touching || over)) out.push_back({contactList(tick), over});
+  if (wants(wire::kReportContacts) && (clientTick.touching || contactEnded))
+    out.push_back({contactList(tick), contactEnded});
 }
 
 void Reporter::presentState(const TickReport& tick, const ReportFrame& frame,
                             std::vector<Outgoing>& out) const {
   Reporter fresh(config_, buttonCount_, choice_);
   const bool touching = tick.rendering.touching;
-  fresh.touching_ = !touching;  // so that either kind of contact state is said in full
+  fresh.touching_ = !touching;  // makes update() report the whole contact state
   fresh.force_N_ = Vec3::Constant(1e300);
   fresh.depth_ = 1e300;
   fresh.object_ = -2;

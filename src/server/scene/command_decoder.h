@@ -1,4 +1,4 @@
-// From the wire to the scene: one overload for each message that commands it.
+// Decodes scene messages from the wire into scene commands.
 #pragma once
 
 #include <vector>
@@ -8,22 +8,22 @@
 
 namespace hapticd::server {
 
-/// Gathers one client's commands for one scene, in order, until they are handed over. Neighbouring setVertex
-/// messages become one run: an upload sends one message for each vertex. Net thread.
+/// Collects the commands of one client for one scene in order until release(). Consecutive setVertex messages
+/// become one run, because an upload sends one message for each vertex. Net thread.
 class CommandDecoder {
  public:
   enum class Outcome { taken, notACommand, malformed };
 
-  /// Takes a message if it is a scene command. Malformed ones change nothing; `error` then says why.
+  /// Decodes a message if its role is scene. A malformed message changes nothing; `error` is then the reason.
   Outcome take(scene::ClientId client, const wire::MessageReceived& message, std::string& error);
 
-  /// Adds something that is no message.
+  /// Adds a task that is not a message.
   void add(SceneTask&& task);
 
   bool empty() const noexcept { return tasks_.empty(); }
-  /// About how many bytes the tasks hold.
+  /// Approximate size of the collected tasks in bytes.
   std::size_t bytes() const noexcept { return bytes_; }
-  /// Hands the tasks over and starts anew.
+  /// Returns the collected tasks and starts an empty list.
   std::vector<SceneTask> release();
 
  private:

@@ -18,7 +18,7 @@ bool SceneHost::take(scene::ClientId client, const wire::MessageReceived& messag
 
 void SceneHost::flush(scene::ClientId client) {
   if (decoder_.empty() || !thread_) return;
-  commanders_.insert(client);
+  commandingClients_.insert(client);
   const std::size_t bytes = decoder_.bytes();
   thread_->push({client, decoder_.release(), bytes});
 }
@@ -41,20 +41,21 @@ void SceneHost::play(scene::ClientId client, const scene::SceneCommand* command)
 }
 
 void SceneHost::releaseForces(scene::ClientId client) {
-  if (thread_ && commanders_.count(client) != 0) thread_->pushUrgent({client, scene::SceneCommand{scene::ReleaseForces{}}});
+  if (!thread_ || commandingClients_.count(client) == 0) return;
+  thread_->pushUrgent({client, scene::SceneCommand{scene::ReleaseForces{}}});
 }
 
 void SceneHost::clientGone(scene::ClientId client) {
   if (!thread_) return;
   flush(client);
   push({client, ClientGone{}});
-  const bool lastToCommand = commanders_.erase(client) == 1 && commanders_.empty();
+  const bool lastToCommand = commandingClients_.erase(client) == 1 && commandingClients_.empty();
   if (lastToCommand && onDisconnect_ == SceneOnDisconnect::clear)
     push({client, scene::SceneCommand{scene::ResetScene{}}});
 }
 
-void SceneHost::describe(std::function<void(std::shared_ptr<const scene::SceneDescription>)> answer) {
-  if (thread_) push({0, DescribeScene{std::move(answer)}}, 0);
+void SceneHost::describe(std::function<void(std::shared_ptr<const scene::SceneDescription>)> reply) {
+  if (thread_) push({0, DescribeScene{std::move(reply)}}, 0);
 }
 
 void SceneHost::push(SceneTask&& task, std::size_t bytes) {

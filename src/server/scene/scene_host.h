@@ -1,4 +1,4 @@
-// One scene and the devices that touch it: commands in, one snapshot for each device out.
+// One scene with its devices: decodes and queues the commands of clients for the scene thread.
 #pragma once
 
 #include <functional>
@@ -13,43 +13,44 @@
 
 namespace hapticd::server {
 
-/// Net thread, but for play() and the callbacks.
+/// Net thread, except play() and the callbacks.
 class SceneHost {
  public:
-  /// Runs a function in the net thread, later; from any thread.
+  /// Posts a function to the net thread; from any thread.
   using Post = std::function<void(std::function<void()>)>;
 
-  /// `name` is that of the configuration; empty for the scene of one device alone.
+  /// `name`: the configured name; empty for a scene that is not shared.
   SceneHost(std::uint32_t number, std::string name, SceneOnDisconnect onDisconnect)
       : number_(number), name_(std::move(name)), onDisconnect_(onDisconnect) {}
 
-  /// From 0, in the order of the configuration.
+  /// Number of the scene from 0, in the order of the configuration.
   std::uint32_t number() const noexcept { return number_; }
   const std::string& name() const noexcept { return name_; }
 
-  /// Before start(): another device touches this scene.
+  /// Adds a device to the scene; before start().
   void add(SceneDevice device) { devices_.push_back(std::move(device)); }
-  /// The callbacks come from the scene thread.
+  /// The callbacks run in the scene thread.
   void start(SceneThread::Callbacks callbacks, Post post);
   void stop();
 
   /// Decodes a scene message and keeps its command until flush(). False, with the reason, when it is malformed.
   bool take(scene::ClientId client, const wire::MessageReceived& message, std::string& error);
-  /// Hands over the commands that take() kept, all of one client.
+  /// Queues the commands that take() kept; all of them are from this client.
   void flush(scene::ClientId client);
-  /// Whether the client is so far ahead of the scene that it must hold back further commands.
+  /// Whether the client is too far ahead of the scene: its session must hold back further commands.
   bool full(scene::ClientId client) const { return thread_ && thread_->queue().full(client); }
-  /// Calls, in the net thread, once everything that the client sent so far is published: at once when that is the case
-  /// already, so nobody waits for the commands of others.
+  /// Calls `reached` in the net thread once all commands that the client sent so far are published; at once
+  /// when they are already, so that a client never waits for the commands of others.
   void whenPublished(scene::ClientId client, std::function<void()> reached);
-  /// A command of a recorded client (null: it was gone). Any thread, between start() and stop().
+  /// Applies a command of a recorded client; null: it disconnected. Any thread, between start() and stop().
   void play(scene::ClientId client, const scene::SceneCommand* command);
-  /// The forces that the client owns ramp out before anything that is queued is applied; the client may stay.
+  /// Ramps out the forces that the client owns, ahead of all queued commands; the client may stay.
   void releaseForces(scene::ClientId client);
-  /// What the client owns ramps out; the last client that had commanded the scene clears it, if so configured.
+  /// Ramps out the forces that the client owns. When the last client that commanded the scene disconnects,
+  /// clears the scene if configured so.
   void clientGone(scene::ClientId client);
-  /// Asks for the scene as it is after everything that was flushed; the answer comes in the scene thread.
-  void describe(std::function<void(std::shared_ptr<const scene::SceneDescription>)> answer);
+  /// Requests a description of the scene after all flushed commands; `reply` is called in the scene thread.
+  void describe(std::function<void(std::shared_ptr<const scene::SceneDescription>)> reply);
 
  private:
   void push(SceneTask&& task, std::size_t bytes = sizeof(SceneTask));
@@ -61,7 +62,7 @@ class SceneHost {
   Post post_;
   std::unique_ptr<SceneThread> thread_;
   CommandDecoder decoder_;
-  std::set<scene::ClientId> commanders_;  // clients that sent a command to the scene
+  std::set<scene::ClientId> commandingClients_;  // connected clients that have commanded the scene
 };
 
 }  // namespace hapticd::server

@@ -1,4 +1,4 @@
-// What the net thread asks of a scene.
+// The tasks that the net thread gives to a scene thread.
 #pragma once
 
 #include <functional>
@@ -11,20 +11,21 @@
 
 namespace hapticd::server {
 
-/// A client left: what it owns ramps out.
+/// The client disconnected: the forces that it owns ramp out.
 struct ClientGone {};
 
-/// Asks for a description of the scene as it is after the tasks before it. The answer comes in the scene thread.
+/// Requests a description of the scene after the preceding tasks. `reply` is called in the scene thread.
 struct DescribeScene {
-  std::function<void(std::shared_ptr<const scene::SceneDescription>)> answer;
+  std::function<void(std::shared_ptr<const scene::SceneDescription>)> reply;
 };
 
-/// Asks for a call, in the scene thread, once everything that this client sent before is published to the servos.
+/// Requests a call in the scene thread once all preceding commands of this client are published to the
+/// servos.
 struct WhenPublished {
   std::function<void()> reached;
 };
 
-/// One thing for the scene to do, from one client.
+/// One task of one client.
 struct SceneTask {
   scene::ClientId client = 0;
   std::variant<scene::SceneCommand, ClientGone, DescribeScene, WhenPublished> what;

@@ -21,7 +21,7 @@ void mergeNotices(std::vector<scene::Notice>&& from, std::vector<scene::Notice>&
   }
 }
 
-void keepEarlier(std::optional<base::Nanos>& next, std::optional<base::Nanos> at) {
+void lowerTo(std::optional<base::Nanos>& next, std::optional<base::Nanos> at) {
   if (at) next = std::min(next.value_or(*at), *at);
 }
 
@@ -65,17 +65,18 @@ void SceneThread::pushUrgent(SceneTask&& task) {
 std::optional<base::Nanos> SceneThread::step() {
   applySlice();
   publish();
-  answerQuestions();
+  describeScene();
   const std::optional<base::Nanos> oldestEdit = this->oldestEdit();
   queue_.published(oldestEdit);
-  callWaiting(oldestEdit);
+  callPublishWaiters(oldestEdit);
   return queue_.empty() ? nextDeadline() : base::now();
 }
 
-// After a change the servo soon returns the snapshot that it replaced, which may hold a large mesh: wake once to free it.
+// After a publication the servo returns the replaced snapshot, which may hold a large mesh: wake once to free
+// it.
 std::optional<base::Nanos> SceneThread::nextDeadline() const {
   std::optional<base::Nanos> next = collectAt_;
-  for (const Seat& seat : seats_) keepEarlier(next, seat.builder.nextDeadline());
+  for (const Seat& seat : seats_) lowerTo(next, seat.builder.nextDeadline());
   return next;
 }
 
@@ -96,18 +97,18 @@ void SceneThread::apply(SceneParcel& parcel) {
       apply(std::move(task));
     } catch (const std::exception& error) {
       notices_.push_back(
-          {task.client, scene::Notice::Severity::error, std::string("not done: ") + error.what()});
+          {task.client, scene::Notice::Severity::error, std::string("the command failed: ") + error.what()});
     }
   }
 }
 
 void SceneThread::apply(SceneTask&& task) {
-  if (auto* question = std::get_if<DescribeScene>(&task.what)) {
-    questions_.push_back(std::move(*question));
+  if (auto* request = std::get_if<DescribeScene>(&task.what)) {
+    descriptionRequests_.push_back(std::move(*request));
     return;
   }
   if (auto* wanted = std::get_if<WhenPublished>(&task.what)) {
-    waiting_.push_back({base::now(), std::move(wanted->reached)});
+    publishWaiters_.push_back({base::now(), std::move(wanted->reached)});
     return;
   }
   const base::Nanos now = base::now();
@@ -130,16 +131,18 @@ void SceneThread::apply(SceneTask&& task) {
 // Builders delay the publication of a mesh until its edits have paused.
 std::optional<base::Nanos> SceneThread::oldestEdit() const {
   std::optional<base::Nanos> oldest;
-  for (const Seat& seat : seats_) keepEarlier(oldest, seat.builder.oldestEdit());
+  for (const Seat& seat : seats_) lowerTo(oldest, seat.builder.oldestEdit());
   return oldest;
 }
 
-void SceneThread::callWaiting(std::optional<base::Nanos> oldestEdit) {
-  const auto published = [&](const Waiting& waiting) { return !oldestEdit || *oldestEdit > waiting.since; };
-  for (const Waiting& waiting : waiting_) {
-    if (published(waiting)) waiting.reached();
+void SceneThread::callPublishWaiters(std::optional<base::Nanos> oldestEdit) {
+  const auto published = [&](const PublishWaiter& waiter) {
+    return !oldestEdit || *oldestEdit > waiter.since;
+  };
+  for (const PublishWaiter& waiter : publishWaiters_) {
+    if (published(waiter)) waiter.reached();
   }
-  std::erase_if(waiting_, published);
+  std::erase_if(publishWaiters_, published);
 }
 
 void SceneThread::publish() {
@@ -148,24 +151,24 @@ void SceneThread::publish() {
     try {
       publishTo(seat);
     } catch (const std::exception& error) {
-      // Out of memory, or the index could not be built: the scene that is felt stays as it is.
+      // Out of memory, or the index could not be built: the servo keeps the previous snapshot.
       spdlog::error("the scene could not be published: {}", error.what());
     }
   }
   if (!notices_.empty() && callbacks_.notices) callbacks_.notices(std::exchange(notices_, {}));
 }
 
-// All seats have the same scene, but for what is passive on each device.
-void SceneThread::answerQuestions() {
-  if (questions_.empty()) return;
+// One description serves all devices: their scenes differ only in the passivity bounds.
+void SceneThread::describeScene() {
+  if (descriptionRequests_.empty()) return;
   try {
     const auto description =
         std::make_shared<const scene::SceneDescription>(seats_.front().builder.describe());
-    for (const DescribeScene& question : questions_) question.answer(description);
+    for (const DescribeScene& request : descriptionRequests_) request.reply(description);
   } catch (const std::exception& error) {
     spdlog::error("the scene could not be described: {}", error.what());
   }
-  questions_.clear();
+  descriptionRequests_.clear();
 }
 
 void SceneThread::publishTo(Seat& seat) {

@@ -1,5 +1,5 @@
-// The scene thread: applies commands in order, builds geometry off the loop, publishes snapshots to the
-// servo.
+// The scene thread: applies commands in order, builds the geometry outside the servo loop and publishes
+// snapshots.
 #pragma once
 
 #include <functional>
@@ -14,33 +14,34 @@
 
 namespace hapticd::server {
 
-/// A device that touches the scene: what the scene must know of it, and where its snapshots go.
+/// A device at the scene: its configuration and the slot of its snapshots.
 struct SceneDevice {
   scene::SceneConfig config;
   scene::SnapshotSlot* slot = nullptr;
-  /// In the scene thread, after the slot has it.
+  /// Scene thread; called after the snapshot was passed to the slot.
   std::function<void(const std::shared_ptr<const scene::SceneSnapshot>&)> published;
-  /// In the scene thread, before the slot has it: when the builder was asked, and the revision that came; 0:
-  /// none. Empty unless somebody records.
+  /// Scene thread; called before a snapshot is passed to the slot, with the time at which the builder was
+  /// asked and the revision that it returned, 0 for none. Empty unless a recording is written.
   std::function<void(base::Nanos, std::uint64_t)> publishing;
 };
 
-/// Owns one scene and the thread that drives it: a builder for each device, because workspace and passivity
-/// bound differ; all builders get the same commands. The net thread pushes into queue() and wakes the thread; the
-/// callbacks run in the scene thread and must only pass things on.
+/// Owns one scene and its thread: one builder for each device, because workspace and passivity bound differ;
+/// all builders get the same commands. Other threads push parcels; the callbacks run in the scene thread and
+/// must return quickly.
 class SceneThread {
  public:
   struct Callbacks {
     std::function<void(std::vector<scene::Notice>&&)> notices;  ///< texts for clients
     std::function<void(scene::ClientId)> relieved;              ///< the client is no longer full
-    /// Before the builders get a command; null: the client is gone. Empty unless somebody records.
+    /// Called before the builders get a command; null: the client disconnected. Empty unless a recording is
+    /// written.
     std::function<void(scene::ClientId, base::Nanos, const scene::SceneCommand*)> applying;
   };
 
-  /// Commands are applied in slices of about this size, with a publication after each.
+  /// The thread applies about this many bytes of commands between publications.
   static constexpr std::size_t kSlice_bytes = 1U << 20;
 
-  /// At least one device; their slots outlive this.
+  /// `devices` must not be empty; their slots must outlive this object.
   SceneThread(std::vector<SceneDevice> devices, Callbacks callbacks);
   ~SceneThread();
   SceneThread(const SceneThread&) = delete;
@@ -48,23 +49,23 @@ class SceneThread {
 
   /// Publishes the empty scene to all devices and starts the thread.
   void start();
-  /// Applies what is queued and ends the thread. Idempotent.
+  /// Applies the queued commands and ends the thread. Idempotent.
   void stop();
 
   /// Appends a parcel; never waits for the scene. From any thread.
   void push(SceneParcel&& parcel);
-  /// The same for a task that goes before all that are queued.
+  /// Puts one task in front of all queued ones.
   void pushUrgent(SceneTask&& task);
   const SceneQueue& queue() const noexcept { return queue_; }
 
  private:
-  // One device's builder.
+  // One device at the scene: its slot and its builder.
   struct Seat {
     SceneDevice device;
     scene::SceneBuilder builder;
   };
-  struct Waiting {
-    base::Nanos since;  // edits up to then must be published
+  struct PublishWaiter {
+    base::Nanos since;  // edits up to this time must be published
     std::function<void()> reached;
   };
 
@@ -74,16 +75,16 @@ class SceneThread {
   void apply(SceneTask&& task);
   void publish();
   void publishTo(Seat& seat);
-  void answerQuestions();
+  void describeScene();
   std::optional<base::Nanos> oldestEdit() const;
-  void callWaiting(std::optional<base::Nanos> oldestEdit);
+  void callPublishWaiters(std::optional<base::Nanos> oldestEdit);
   std::optional<base::Nanos> nextDeadline() const;
 
   std::vector<Seat> seats_;
   Callbacks callbacks_;
   std::vector<scene::Notice> notices_;
-  std::vector<DescribeScene> questions_;
-  std::vector<Waiting> waiting_;
+  std::vector<DescribeScene> descriptionRequests_;
+  std::vector<PublishWaiter> publishWaiters_;
   std::optional<base::Nanos> collectAt_;
 
   SceneQueue queue_;

@@ -1,4 +1,4 @@
-// A client at one moment, as plain values: for the page and for metrics.
+// The state of a client at one moment, as plain values for the viewer and the metrics.
 #pragma once
 
 #include <cstdint>
@@ -11,15 +11,15 @@ struct ClientStatus {
   std::uint32_t id = 0;
   std::string address;
   std::string mode;                  ///< tcp, udp, web
-  std::vector<std::string> devices;  ///< names it listens to
+  std::vector<std::string> devices;  ///< names of the subscribed devices
   double connected_s = 0;
-  double rate_Hz = 0;  ///< of the reports it chose
+  double rate_Hz = 0;  ///< chosen report rate
   std::uint64_t bytesIn = 0;
   std::uint64_t bytesOut = 0;
-  std::uint64_t dropped = 0;  ///< low-latency buffers and datagrams it never got
+  std::uint64_t dropped = 0;  ///< low-latency buffers and datagrams dropped before sending
   std::size_t queuedBytes = 0;
   std::size_t unacknowledgedBytes = 0;
-  bool commands = false;  ///< may change a scene
+  bool commands = false;  ///< its role permits commands
 };
 
 }  // namespace hapticd::server

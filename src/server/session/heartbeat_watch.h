@@ -7,29 +7,29 @@
 
 namespace hapticd::server {
 
-/// Pure; one for each connection. Time in which the server itself does not read from the client is never held against the
-/// client, but it does not excuse a client for ever.
+/// One for each connection; reads no clock. Time during which the server itself does not read from the client
+/// does not count as silence, but it excuses a client for a limited time only.
 class HeartbeatWatch {
  public:
-  /// Silence after which the client counts as lost.
+  /// Silence after which the client is lost.
   static constexpr base::Nanos kLimit = 500'000'000;
-  /// How long pauses without a heartbeat in between excuse the client's forces.
+  /// Total length of pauses without a heartbeat in between after which the client's forces end.
   static constexpr base::Nanos kExcuse = 5'000'000'000;
 
   enum class Verdict {
     alive,
     lost,     ///< silent for kLimit: end the connection
-    excused,  ///< paused for kExcuse: end its forces; said once
+    excused,  ///< paused for kExcuse: end its forces; returned once
   };
 
-  /// A heartbeat came: watching begins or goes on.
+  /// A heartbeat was received: starts or continues the watch.
   void beat(base::Nanos now) noexcept {
     last_ = now;
     excuse_ = kExcuse;
-    ended_ = false;
+    excuseReported_ = false;
   }
-  /// The client took its promise back.
-  void forget() noexcept { last_.reset(); }
+  /// The client opted out of heartbeats.
+  void disable() noexcept { last_.reset(); }
 
   /// The server stops reading from the client.
   void pause(base::Nanos now) noexcept {
@@ -46,16 +46,16 @@ class HeartbeatWatch {
   Verdict check(base::Nanos now) noexcept {
     if (!last_) return Verdict::alive;
     if (!paused_) return now - *last_ > kLimit ? Verdict::lost : Verdict::alive;
-    if (ended_ || now - *paused_ <= excuse_) return Verdict::alive;
-    ended_ = true;
+    if (excuseReported_ || now - *paused_ <= excuse_) return Verdict::alive;
+    excuseReported_ = true;
     return Verdict::excused;
   }
 
  private:
   std::optional<base::Nanos> last_;    // empty: not watched
   std::optional<base::Nanos> paused_;  // since when the server does not read
-  base::Nanos excuse_ = kExcuse;       // what is left of it
-  bool ended_ = false;                 // the excuse was spent and reported
+  base::Nanos excuse_ = kExcuse;       // the remaining part
+  bool excuseReported_ = false;        // Verdict::excused was returned
 };
 
 }  // namespace hapticd::server

@@ -17,7 +17,7 @@ struct Header {
 
 void MessageBacklog::push(const wire::MessageReceived& message, base::Nanos received) {
   const Header header{message.kind, message.local_sender, message.time, received, message.payload.size()};
-  // Moving what is left costs less than what was read since.
+  // Compact when more than half is consumed: amortised constant cost per byte.
   if (begin_ > bytes_.size() / 2) {
     bytes_.erase(bytes_.begin(), bytes_.begin() + static_cast<std::ptrdiff_t>(begin_));
     begin_ = 0;

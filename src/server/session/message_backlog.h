@@ -1,4 +1,4 @@
-// Messages that a client has sent and that wait for the scene, as bytes in the order of arrival.
+// The messages of a client that wait for the scene, as bytes in order of arrival.
 #pragma once
 
 #include <cstddef>
@@ -9,12 +9,12 @@
 
 namespace hapticd::server {
 
-/// First in, first out. Messages of kinds that the table does not know are not kept. Net thread.
+/// FIFO queue of messages of known kinds. Net thread.
 class MessageBacklog {
  public:
-  /// A message as it was received; its views live until the next call of the backlog.
+  /// A message as it was received; its payload stays valid until the next non-const call.
   struct Entry {
-    wire::MessageReceived message;  ///< without the names and numbers of the peer
+    wire::MessageReceived message;  ///< without the sender and type of the remote peer
     base::Nanos received = 0;       ///< when the server read it, on the servo clock
   };
 
@@ -23,7 +23,7 @@ class MessageBacklog {
   Entry pop();
 
   bool empty() const noexcept { return begin_ == bytes_.size(); }
-  /// What it holds, in bytes.
+  /// Size of all entries in bytes, headers included.
   std::size_t size() const noexcept { return bytes_.size() - begin_; }
 
  private:

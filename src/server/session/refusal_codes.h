@@ -1,4 +1,4 @@
-// Why the server refused a command, as a stable number beside the text.
+// The reason of a refusal as a stable number in addition to the text.
 #pragma once
 
 #include <array>
@@ -8,9 +8,9 @@
 
 namespace hapticd::server {
 
-/// Travels in the `level` field of a text_message, so that a client need not parse the text. All other texts of this server
-/// have level 0; a stock VRPN server may send any level. Numbers never change their meaning; new ones are appended.
-/// docs/wire-extensions.md lists them.
+/// Sent in the `level` field of a text_message, so that clients need not parse the text. All other texts of
+/// this server have level 0; a stock VRPN server may send any level. Numbers never change their meaning; new
+/// ones are appended. docs/wire-extensions.md lists them.
 enum class RefusalCode : std::uint32_t {
   none = 0,              ///< not a refusal, or one without a code
   notPermitted = 1,      ///< the client's role, or a replayed recording, permits no commands
@@ -19,7 +19,7 @@ enum class RefusalCode : std::uint32_t {
   handPoseInvalid = 4,   ///< Hold_Hand: position or orientation is not finite, or the quaternion is zero
 };
 
-/// Why one command was refused.
+/// The refusal of one command.
 struct Refusal {
   RefusalCode code = RefusalCode::none;
   std::string text;

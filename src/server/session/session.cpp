@@ -48,7 +48,7 @@ ClientStatus Session::status() const {
   status.address = connection_.remote().text();
   status.mode = nameOf(mode_);
   for (const wire::LocalSender name : subscriptions_) {
-    if (name.value == 0) continue;  // VRPN's own
+    if (name.value == 0) continue;  // "VRPN Control"
     status.devices.push_back(names_.senders()[static_cast<std::size_t>(name.value)]);
   }
   status.connected_s = base::toSeconds(base::now() - since_);
@@ -75,7 +75,7 @@ void Session::start() {
   connection_.start({.onConnected = {},
                      .onBytes = [this](auto bytes) { onBytes(bytes); },
                      .onDrained = {},
-                     .onPeerGone = [this](const auto& reason) { owner_.onDeparted(*this, reason); },
+                     .onPeerGone = [this](const auto& reason) { owner_.onPeerGone(*this, reason); },
                      .onClosed = [this](const auto& reason) { onEnd(reason); }});
   flush();
 }
@@ -90,7 +90,7 @@ void Session::sendShared(const std::shared_ptr<const net::Buffer>& frames, net::
     wire::cutDatagrams(*frames, [this](wire::ByteView datagram) { udp_->sendTo(datagram, datagramPeer_); });
     return;
   }
-  drainPeer();  // what was queued earlier leaves earlier
+  drainPeer();  // keep the order of queued messages
   connection_.send(frames, delivery);
 }
 
@@ -111,18 +111,18 @@ bool Session::release() {
   flush();
   if (!backlog_.empty()) return !held_;
   pauseReading(false);
-  if (ended_) owner_.onClosed(*this, *ended_);
+  if (closeReason_) owner_.onClosed(*this, *closeReason_);
   return false;
 }
 
-// What the client sent before it left still counts.
+// Messages that the client sent before it disconnected are still handled.
 void Session::onEnd(const std::string& reason) {
   if (!failure_.empty() || backlog_.empty()) {
     owner_.onClosed(*this, failure_.empty() ? reason : failure_);
     return;
   }
-  ended_ = reason;
-  owner_.onDeparted(*this, reason);
+  closeReason_ = reason;
+  owner_.onPeerGone(*this, reason);
 }
 
 void Session::pauseReading(bool pause) {
@@ -148,7 +148,7 @@ void Session::abort(const std::string& reason) {
 
 void Session::refuse(const std::string& reason) {
   if (inDatagram_) {
-    remark(reason);
+    logWarning(reason);
   } else {
     close(reason);
   }
@@ -164,11 +164,11 @@ void Session::drainPeer() {
 }
 
 void Session::onBytes(std::span<const std::byte> bytes) {
-  constexpr std::size_t kPieceBytes = 8 * 1024;  // some tens of microseconds
+  constexpr std::size_t kSlice_bytes = 8 * 1024;  // takes tens of microseconds
   while (!bytes.empty() && !peer_.failed()) {
-    const auto piece = bytes.first(std::min(kPieceBytes, bytes.size()));
-    bytes = bytes.subspan(piece.size());
-    peer_.feed(clock_.now(), piece, [this](const wire::Event& event) { onEvent(event); });
+    const auto slice = bytes.first(std::min(kSlice_bytes, bytes.size()));
+    bytes = bytes.subspan(slice.size());
+    peer_.feed(clock_.now(), slice, [this](const wire::Event& event) { onEvent(event); });
     if (!bytes.empty()) owner_.onReadSlice();
   }
   owner_.onReadEnd(*this);
@@ -180,8 +180,7 @@ void Session::onBytes(std::span<const std::byte> bytes) {
 }
 
 void Session::onDatagram(std::span<const std::byte> bytes, const net::Endpoint& from) {
-  // Anybody can send datagrams to a port; only the machine at the other end of the TCP connection is the
-  // client.
+  // Anybody can send datagrams to a port; accept only those from the address of the TCP connection.
   if (from.address != connection_.remote().address) return;
   inDatagram_ = true;
   peer_.feedDatagram(bytes, [this](const wire::Event& event) { onEvent(event); });
@@ -207,15 +206,15 @@ void Session::onEvent(const wire::Event& event) {
 }
 
 void Session::onReceived(const wire::MessageReceived& message) {
-  // As on any VRPN connection, senders and types that are unknown here are meant for others.
-  if (message.local_sender.value < 0 || message.kind == wire::kUnknownKind || isOvertaken(message)) return;
+  // VRPN ignores messages of senders and types that the receiver does not know.
+  if (message.local_sender.value < 0 || message.kind == wire::kUnknownKind || isStale(message)) return;
   const base::Nanos received = base::now();
   if (!holding() || wire::overtakes(message.kind)) {
     deliver(message, received);
     return;
   }
   const bool full = backlog_.size() >= kReadAhead_bytes;
-  if (full && inDatagram_) return;  // lost, as any datagram may be: nothing else bounds them
+  if (full && inDatagram_) return;  // drop it: pausing the TCP connection does not stop datagrams
   backlog_.push(message, received);
   if (backlog_.size() >= kReadAhead_bytes) pauseReading(true);
 }
@@ -235,13 +234,13 @@ void Session::onHeartbeat(const wire::MessageReceived& message, base::Nanos rece
   } else if (heartbeat->watch != 0) {
     heartbeats_.beat(received);
   } else {
-    heartbeats_.forget();
+    heartbeats_.disable();
   }
 }
 
-// A client that ends a field or a plane says so by TCP, what it said before by UDP may come later and must
-// not bring it back.
-bool Session::isOvertaken(const wire::MessageReceived& message) {
+// A client ends a force field or a plane by TCP. A datagram that it sent earlier may arrive later and must
+// not start it again.
+bool Session::isStale(const wire::MessageReceived& message) {
   wire::Time& last = lastReliable_[static_cast<std::size_t>(message.kind)];
   const auto before = [](const wire::Time& a, const wire::Time& b) {
     return a.seconds != b.seconds ? a.seconds < b.seconds : a.microseconds < b.microseconds;
@@ -252,34 +251,35 @@ bool Session::isOvertaken(const wire::MessageReceived& message) {
 }
 
 void Session::onSender(std::string_view name) {
-  const auto ours = names_.findSender(name);
-  if (ours) {
-    if (subscriptions_.insert(*ours).second) owner_.onSubscribed(*this, *ours);
+  const auto sender = names_.findSender(name);
+  if (sender) {
+    if (subscriptions_.insert(*sender).second) owner_.onSubscribed(*this, *sender);
     return;
   }
   std::string devices;
   for (std::size_t i = 1; i < names_.senders().size(); ++i) devices += ' ' + names_.senders()[i];
-  remark("asks for " + wire::inQuotes(name) + ", which is no device here; there is" + devices);
+  logWarning("requested the device " + wire::inQuotes(name) + ", which does not exist; available:" + devices);
 }
 
 void Session::onUdp(const wire::UdpAddress& address) {
   try {
     datagramPeer_ = net::Endpoint::parse(address.host, address.port);
   } catch (const net::Error& error) {
-    remark(std::string("UDP address refused: ") + error.what());
+    logWarning(std::string("UDP address refused: ") + error.what());
     return;
   }
   if (datagramPeer_.address != connection_.remote().address) {
-    remark("asks for datagrams to " + datagramPeer_.text() + ", which is not where it is; all goes by TCP");
+    logWarning("requested datagrams to " + datagramPeer_.text() +
+               ", which is not its own address; using TCP only");
     return;
   }
   if (udp_) peer_.useDatagrams();
 }
 
-// Files that a stranger names are not written.
+// Never write to a path that a client chose.
 void Session::onLogRequest(const wire::LogRequest& request) {
-  remark("asks for log files " + wire::inQuotes(request.in_name) + ", " + wire::inQuotes(request.out_name) +
-         ": refused");
+  logWarning("requested log files " + wire::inQuotes(request.in_name) + ", " +
+             wire::inQuotes(request.out_name) + ": refused");
   send(wire::LocalSender{0}, wire::Text{.severity = wire::kTextWarning,
                                         .level = 0,
                                         .text = std::string("log files on the server are refused; log on "

@@ -1,4 +1,4 @@
-// One client: its connection, the protocol state on it, and which of our devices it listens to.
+// One client connection: its protocol state and the devices that it subscribed to.
 #pragma once
 
 #include <array>
@@ -27,35 +27,35 @@ class Session;
 enum class SessionMode { tcp, udp, web };
 std::string_view nameOf(SessionMode mode);
 
-/// What a session reports to the server. Called in the net thread.
+/// Receives the events of a session. Net thread.
 class SessionOwner {
  public:
   virtual ~SessionOwner() = default;
-  /// The client listens to one of our names from now on.
+  /// The client subscribed to one of the server's device names.
   virtual void onSubscribed(Session& session, wire::LocalSender name) = 0;
-  /// A message for one of our devices that the server read at `received` on the servo clock.
+  /// A message for one of the server's devices, read at `received` on the servo clock.
   virtual void onMessage(Session& session, const wire::MessageReceived& message, base::Nanos received) = 0;
-  /// Worth a line in the log, but a client can cause it as often as it likes.
-  virtual void onRemark(const Session& session, const std::string& text) = 0;
+  /// A warning for the log that a client can cause at any rate: throttle it.
+  virtual void onWarning(const Session& session, const std::string& text) = 0;
   /// Called between slices of a long read, so that pending reports can be flushed.
   virtual void onReadSlice() = 0;
-  /// All messages of one read were passed on.
+  /// All messages of one read were passed to onMessage().
   virtual void onReadEnd(Session& session) = 0;
-  /// The client is gone while the server does not read from it: its forces must end now. What it sent before is still
-  /// read, up to onClosed().
-  virtual void onDeparted(Session& session, const std::string& reason) = 0;
-  /// Over, with the reason; the owner destroys the session after this returns.
+  /// The client disconnected while the server does not read from it: end its forces now. Messages that it
+  /// sent before are still passed on until onClosed().
+  virtual void onPeerGone(Session& session, const std::string& reason) = 0;
+  /// The connection is closed; the owner destroys the session.
   virtual void onClosed(Session& session, const std::string& reason) = 0;
 };
 
 /// A connected client. Lives in the net thread.
 class Session {
  public:
-  /// Without `udp` everything goes by the connection. The socket must be bound already.
+  /// Without `udp` everything is sent by TCP. The socket must be bound already.
   Session(scene::ClientId id, SessionOwner& owner, const wire::LocalNames& names, const WallClock& clock,
           net::Connection connection, std::unique_ptr<net::UdpSocket> udp, SessionMode mode);
 
-  /// Begins to talk: our cookie leaves, the client's is awaited.
+  /// Starts the handshake: sends the server's cookie and waits for the client's.
   void start();
 
   scene::ClientId id() const noexcept { return id_; }
@@ -63,57 +63,57 @@ class Session {
   const std::string& description() const noexcept { return description_; }
   bool connected() const noexcept { return peer_.connected(); }
 
-  /// Whether reports under this name are wanted: those it described, or all while it has described none of
-  /// ours.
+  /// Whether the client wants reports under this name: it described the name, or none of the server's names
+  /// yet.
   bool wants(wire::LocalSender name) const noexcept;
-  /// How many of our names it has described so far.
+  /// How many of the server's names the client has described so far.
   std::size_t namesWanted() const noexcept { return subscriptions_.size(); }
-  /// Where the client is, without the port.
+  /// The client's IPv4 address, without the port.
   std::string address() const { return connection_.remote().addressText(); }
 
-  /// Queues one message; it leaves with the next flush().
+  /// Queues one message; the next flush() sends it.
   template <wire::WireMessage M>
   void send(wire::LocalSender from, const M& message) {
     peer_.send(clock_.now(), from, message);
   }
-  /// The same with the time of what it tells, and by TCP whatever its kind: datagrams may overtake the names
-  /// that they need.
+  /// The same with a time stamp, and by TCP whatever its kind: a datagram may overtake the descriptions that
+  /// the client needs to understand it.
   void sendReliably(wire::LocalSender from, const wire::Message& message, wire::Time time) {
     peer_.send(time, from, message, wire::Reliability::kReliable);
   }
-  /// Queues frames that are shared with other clients; dropped first when this client reads too slowly if
-  /// lowLatency.
+  /// Queues frames that are shared with other clients. Low-latency frames are dropped first when this client
+  /// reads too slowly.
   void sendShared(const std::shared_ptr<const net::Buffer>& frames, net::Delivery delivery);
-  /// Writes what is queued: one system call.
+  /// Sends everything queued with one system call.
   void flush();
 
-  /// A line in the log about this client, unless there are too many. Quote what the client said.
-  void remark(const std::string& text) { owner_.onRemark(*this, text); }
+  /// Logs a throttled warning about this client. Quote text from the client with wire::inQuotes().
+  void logWarning(const std::string& text) { owner_.onWarning(*this, text); }
 
-  /// Stops reading ahead of a held-back scene here: what stop, heartbeat and ping overtake at most.
+  /// Limit of the backlog, and so of the data that stop, heartbeat and ping can overtake.
   static constexpr std::size_t kReadAhead_bytes = 4U << 20;
 
-  /// Holds back what the client sends from now on, because the scene is behind; only messages that overtake are still
-  /// passed on. Beyond kReadAhead_bytes the session stops reading, and TCP makes the client wait.
+  /// Holds back further messages because the scene is behind; only kinds with wire::overtakes() are still
+  /// passed on. Beyond kReadAhead_bytes the session stops reading, and TCP flow control makes the client
+  /// wait.
   void hold() { held_ = true; }
-  /// Ends hold() and passes on what was held back, in order: a slice of about 64 KiB, or less when the owner calls
-  /// hold() again. True when more is left: call again, after giving others their turn. When it was the last of a client
-  /// that has left, onClosed() follows and the session is destroyed.
+  /// Ends hold() and passes on the backlog in order: a slice of about 64 KiB, or less when the owner calls
+  /// hold() again. Returns true when more is left: call again after other events were handled. After the last
+  /// message of a client that has disconnected, onClosed() follows and the session is destroyed.
   bool release();
   /// Whether messages are held back.
   bool holding() const noexcept { return held_ || !backlog_.empty(); }
-  /// Judges the client's heartbeats.
+  /// Checks the client's heartbeats.
   HeartbeatWatch::Verdict checkHeartbeat(base::Nanos now) noexcept { return heartbeats_.check(now); }
-  /// Ends it, with a reason for the log; onClosed follows.
+  /// Closes the connection; `reason` is for the log. onClosed() follows.
   void close(const std::string& reason);
-  /// The same at once, without waiting for a peer that may not read any more.
+  /// The same without flushing: the client may have stopped reading.
   void abort(const std::string& reason);
-  /// The message now being given is no good. In the stream this ends the session; in a datagram, which
-  /// anybody at the client's address can forge, it is remarked and forgotten.
+  /// Rejects the message being handled. In the stream this closes the session; in a datagram, which anybody
+  /// at the client's address can forge, it only logs a warning.
   void refuse(const std::string& reason);
 
-  /// What the client is, and what went to and fro. Which device it commands, and how often it hears of it, is
-  /// left to the caller.
+  /// State and traffic of the client. The caller fills in `commands` and `rate_Hz`.
   ClientStatus status() const;
 
  private:
@@ -129,7 +129,7 @@ class Session {
   void onUdp(const wire::UdpAddress& address);
   void onLogRequest(const wire::LogRequest& request);
   void drainPeer();
-  bool isOvertaken(const wire::MessageReceived& message);
+  bool isStale(const wire::MessageReceived& message);
 
   scene::ClientId id_;
   SessionOwner& owner_;
@@ -147,10 +147,11 @@ class Session {
   bool inDatagram_ = false;
   bool held_ = false;
   bool reading_ = true;
-  std::optional<std::string> ended_;  // the connection is over, the backlog is not
+  std::optional<std::string> closeReason_;  // set when the connection closed before the backlog was empty
   MessageBacklog backlog_;
   HeartbeatWatch heartbeats_;
-  std::array<wire::Time, wire::kMessageKinds> lastReliable_{};  // of each kind, by the client's clock
+  std::array<wire::Time, wire::kMessageKinds>
+      lastReliable_{};  // newest reliable message of each kind, client's clock
 };
 
 }  // namespace hapticd::server

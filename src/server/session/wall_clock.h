@@ -1,4 +1,4 @@
-// Wall time for what clients see.
+// Wall time of time stamps on the wire.
 #pragma once
 
 #include "base/world.h"
@@ -6,14 +6,13 @@
 
 namespace hapticd::server {
 
-/// Turns servo times into the wall times of time stamps. The offset is measured again only when it is off by
-/// more than a millisecond (somebody set the clock), so that stamps of neighbouring ticks differ by their
-/// true distance.
+/// Converts servo times to wall times. The offset changes only when it is off by more than a millisecond (the
+/// wall clock was set), so that the stamps of neighbouring ticks keep their true distance.
 class WallClock {
  public:
   WallClock() : offset_(measure()) {}
 
-  /// Notices when the wall clock was set; call it periodically.
+  /// Detects that the wall clock was set; call it periodically.
   void refresh() noexcept {
     const base::Nanos fresh = measure();
     if (fresh - offset_ > 1000000 || offset_ - fresh > 1000000) offset_ = fresh;
@@ -23,7 +22,7 @@ class WallClock {
     return {static_cast<std::uint32_t>(wall / 1000000000),
             static_cast<std::uint32_t>(wall % 1000000000 / 1000)};
   }
-  /// Wall time less servo time.
+  /// Wall time minus servo time.
   base::Nanos offset() const noexcept { return offset_; }
   wire::Time now() const noexcept { return at(base::now()); }
 

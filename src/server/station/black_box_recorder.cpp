@@ -17,7 +17,7 @@ using realtime::TickReport;
 
 constexpr std::string_view kExtension = ".csv";
 
-// What may stand in a file name.
+// Replaces characters that are not safe in a file name.
 std::string plain(std::string text) {
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return std::isalnum(c) == 0 && c != '_' && c != '-'; },
@@ -56,7 +56,7 @@ fs::path BlackBoxRecorder::nextFile(const std::string& fault) const {
          (std::string(stamp) + fraction + "-" + plain(fault) + std::string(kExtension));
 }
 
-void BlackBoxRecorder::look() {
+void BlackBoxRecorder::poll() {
   if (!box_.frozen()) return;
   std::vector<TickReport> ticks = box_.take();
   if (ticks.empty()) return;
@@ -66,7 +66,7 @@ void BlackBoxRecorder::look() {
     return;
   }
   const fs::path file = nextFile(fault);
-  spdlog::warn("device '{}': forces are off: {}; the {} ticks before it go to {}", name_, fault, ticks.size(),
+  spdlog::warn("device '{}': forces are off: {}; writing the last {} ticks to {}", name_, fault, ticks.size(),
                file.string());
   finish();
   writer_ = base::Thread({.name = "black box"}, [this, file, ticks = std::move(ticks)]() mutable -> std::optional<base::Nanos> {

@@ -1,4 +1,4 @@
-// Black boxes to files: when a fault latches, the ticks before it are written down.
+// Writes black boxes to files: the ticks before a fault that latched.
 #pragma once
 
 #include <filesystem>
@@ -10,10 +10,10 @@
 
 namespace hapticd::server {
 
-/// Where and how much of it is kept.
+/// Where black boxes are written, and how many are kept.
 struct BlackBoxFiles {
   std::filesystem::path directory;
-  int keep = 10;  ///< newest files of this device; older ones are deleted. 0: none is written
+  int keep = 10;  ///< newest files of this device to keep; 0: write none
 };
 
 /// Writes ticks as CSV, oldest first, with the columns of `hapticd export` (record/sample.h). Throws std::runtime_error
@@ -21,19 +21,20 @@ struct BlackBoxFiles {
 void writeBlackBox(const std::filesystem::path& file, const std::string& device,
                    const std::vector<realtime::TickReport>& ticks);
 
-/// Of one device. look() from the net thread; the file is written by a thread of its own.
+/// The black boxes of one device. Net thread; each file is written in a separate thread.
 class BlackBoxRecorder {
  public:
-  /// `name` is the device's, and that of its folder in the directory.
+  /// `name` is that of the device and of its folder in the directory.
   BlackBoxRecorder(std::string name, BlackBoxFiles files, realtime::BlackBox& box)
       : name_(std::move(name)), files_(std::move(files)), box_(box) {}
   ~BlackBoxRecorder() { finish(); }
   BlackBoxRecorder(const BlackBoxRecorder&) = delete;
   BlackBoxRecorder& operator=(const BlackBoxRecorder&) = delete;
 
-  /// Logs a fault that latched since the last call, and has its ticks written.
-  void look();
-  /// Waits until what was begun is written.
+  /// Logs a fault that latched since the last call and starts writing its ticks. Call several times per
+  /// second.
+  void poll();
+  /// Waits until a started file is written.
   void finish();
 
  private:

@@ -4,19 +4,19 @@
 
 namespace hapticd::server {
 
-bool ButtonModes::obey(const wire::ButtonAdmin& admin, std::vector<wire::ButtonAlert>& alerts,
-                       std::string& error) {
+bool ButtonModes::setMode(const wire::ButtonAdmin& admin, std::vector<wire::ButtonAlert>& alerts,
+                          std::string& error) {
   const bool momentary = admin.event == wire::kButtonMomentary;
   const bool on = admin.event == wire::kButtonToggleOn;
   if (!momentary && !on && admin.event != wire::kButtonToggleOff) {
     error = "Button Admin: mode " + std::to_string(admin.event) +
-            " refused: 10 is momentary, 20 a toggle that starts off, 21 one that starts on";
+            " refused: use 10 (momentary), 20 (toggle, initially off) or 21 (toggle, initially on)";
     return false;
   }
   const bool all = admin.button == wire::kAllButtons;
   if (!all && (admin.button < 0 || admin.button >= count_)) {
-    error = "Button Admin: button " + std::to_string(admin.button) + " refused: there are " +
-            std::to_string(count_) + ", from 0; -99 means all";
+    error = "Button Admin: button " + std::to_string(admin.button) + " refused: the device has " +
+            std::to_string(count_) + ", numbered from 0; use -99 for all";
     return false;
   }
   for (std::int32_t i = all ? 0 : admin.button; i < (all ? count_ : admin.button + 1); ++i) {
@@ -29,11 +29,11 @@ bool ButtonModes::obey(const wire::ButtonAdmin& admin, std::vector<wire::ButtonA
 }
 
 std::uint32_t ButtonModes::apply(std::uint32_t pressed, std::vector<wire::ButtonAlert>& alerts) {
-  const std::uint32_t turned = pressed & ~before_ & toggles_;
+  const std::uint32_t toggled = pressed & ~before_ & toggles_;
   before_ = pressed;
-  on_ ^= turned;
+  on_ ^= toggled;
   for (std::int32_t i = 0; i < count_; ++i) {
-    if ((turned >> i & 1U) == 0) continue;
+    if ((toggled >> i & 1U) == 0) continue;
     alerts.push_back({i, (on_ >> i & 1U) != 0 ? wire::kButtonToggleOn : wire::kButtonToggleOff});
   }
   return (pressed & ~toggles_) | (on_ & toggles_);

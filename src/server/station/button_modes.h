@@ -1,4 +1,4 @@
-// Buttons that clients made toggles, as VRPN's button filter knows them.
+// Toggle modes of buttons, as in VRPN's button filter.
 #pragma once
 
 #include <cstdint>
@@ -8,24 +8,24 @@
 
 namespace hapticd::server {
 
-/// One device's buttons between the servo and the reports. Net thread.
+/// Converts the buttons of one device from the servo to the reports. Net thread.
 class ButtonModes {
  public:
-  /// Above 31 buttons the others are momentary for ever.
+  /// `count`: number of buttons, at most 31; further ones are always momentary.
   explicit ButtonModes(int count) : count_(count) {}
 
-  /// Obeys an Admin message; what its toggles then stand at is appended to `alerts`. Returns false for a
-  /// button that does not exist or a mode that is none; `error` then says what was wrong.
-  bool obey(const wire::ButtonAdmin& admin, std::vector<wire::ButtonAlert>& alerts, std::string& error);
+  /// Applies an Admin message and appends the new states of its toggles to `alerts`. Returns false for an
+  /// unknown button or mode; `error` is then the reason.
+  bool setMode(const wire::ButtonAdmin& admin, std::vector<wire::ButtonAlert>& alerts, std::string& error);
 
-  /// From the device's buttons to what clients see: a toggle changes when its button goes down.
+  /// Converts the device's button bits to the reported ones: a toggle changes when its button is pressed.
   std::uint32_t apply(std::uint32_t pressed, std::vector<wire::ButtonAlert>& alerts);
 
  private:
   int count_;
   std::uint32_t toggles_ = 0;  // which buttons are toggles
-  std::uint32_t on_ = 0;       // which of these are on
-  std::uint32_t before_ = 0;   // the device's buttons of the tick before
+  std::uint32_t on_ = 0;       // which toggles are on
+  std::uint32_t before_ = 0;   // the device's buttons in the previous tick
 };
 
 }  // namespace hapticd::server

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "scene/workspace.h"
-#include "server/reports/view.h"
+#include "server/reports/client_tick.h"
 
 namespace hapticd::server {
 namespace {
@@ -36,18 +36,18 @@ bool DeviceControl::hold(scene::ClientId client, const wire::HoldHand& wanted,
                          const realtime::TickReport& last, Refusal& refusal) {
   if (hand_ == nullptr) {
     refusal = {RefusalCode::handNotSimulated,
-               "Hold_Hand refused: this is a real device, only a simulated hand can be held"};
+               "Hold_Hand refused: the device is real; only a simulated hand can be held"};
     return false;
   }
   if (holder_ && *holder_ != client) {
-    // Letting go of what one does not hold is no mistake worth a word.
+    // Releasing a hand that another client holds is not an error.
     if (wanted.hold == 0) return true;
     refusal = {RefusalCode::handHeldByOther,
                "Hold_Hand refused: client " + std::to_string(*holder_) + " holds the hand"};
     return false;
   }
   if (wanted.hold == 0) {
-    letGo();
+    releaseHand();
     return true;
   }
   if (!finite(wanted)) {
@@ -63,7 +63,7 @@ bool DeviceControl::hold(scene::ClientId client, const wire::HoldHand& wanted,
   }
   device::HandPose pose;
   const Vec3 world(wanted.position[0], wanted.position[1], wanted.position[2]);
-  // Until the first tick has told, the workspace is the one that scenes begin with.
+  // Before the first tick report, use the initial workspace of a scene.
   const geometry::Affine T_world_device =
       last.tick == 0 ? scene::Workspace{}.T_world_device : last.T_world_device;
   pose.position_m =
@@ -76,10 +76,10 @@ bool DeviceControl::hold(scene::ClientId client, const wire::HoldHand& wanted,
 }
 
 void DeviceControl::clientGone(scene::ClientId client) {
-  if (holder_ == client) letGo();
+  if (holder_ == client) releaseHand();
 }
 
-void DeviceControl::letGo() {
+void DeviceControl::releaseHand() {
   if (!std::exchange(holder_, std::nullopt)) return;
   hand_->releaseTarget();
 }

@@ -1,4 +1,4 @@
-// Stop, re-arm and holding the simulated hand: what clients may do to the device itself.
+// Commands of clients to the device itself: stop, re-arm, and steering the simulated hand.
 #pragma once
 
 #include <optional>
@@ -13,43 +13,45 @@
 
 namespace hapticd::server {
 
-/// One device. Net thread; what it does acts at the next tick.
+/// One device. Net thread; every call acts at the next tick.
 class DeviceControl {
  public:
-  /// `hand` is null for devices that a person moves. Both outlive this. Targets are clamped to the workspace.
+  /// `hand` is null for real devices. Both references must outlive this object. Targets are clamped to the
+  /// workspace.
   DeviceControl(realtime::GuardControl& guard, device::SteeredHand* hand, const geometry::Box& workspace_m)
       : guard_(guard), hand_(hand), workspace_m_(workspace_m) {}
 
-  /// A stop or a re-arm on its way.
+  /// A stop or a re-arm with its times.
   struct Order {
     base::Nanos received = 0;  ///< when the server read it, on the servo clock
     base::Nanos sent = 0;      ///< its time stamp, on the clock of the machine that sent it
     std::string address;       ///< of that machine
   };
-  /// Zero force until a re-arm that was sent later.
+  /// Zero force until a later re-arm.
   void stopForces(const Order& order);
-  /// False, and nothing happens, when a stop came after the re-arm: it was received at the same time or later, or the same
-  /// machine sent it later, by another connection.
+  /// Re-arms. Returns false without effect when a stop is later than the re-arm: it was received at the same time or later,
+  /// or the same machine sent it later on another connection.
   bool rearmForces(const Order& order);
-  /// After a reset of the scene: what is felt then comes in gently.
+  /// Ramps the force in from zero, as after a reset of the scene.
   void rampIn() { guard_.rampIn(); }
 
   bool canBeHeld() const noexcept { return hand_ != nullptr; }
-  /// Who holds the hand.
+  /// The client that holds the hand.
   const std::optional<scene::ClientId>& holder() const noexcept { return holder_; }
-  /// Moves the hand's target, or lets go. False when refused; `refusal` then has code and text.
+  /// Sets the hand's target, or releases the hand. Returns false when refused; `refusal` then has code and
+  /// text.
   bool hold(scene::ClientId client, const wire::HoldHand& wanted, const realtime::TickReport& last,
             Refusal& refusal);
   void clientGone(scene::ClientId client);
 
  private:
-  void letGo();
+  void releaseHand();
 
   realtime::GuardControl& guard_;
   device::SteeredHand* hand_;
   geometry::Box workspace_m_;
   std::optional<scene::ClientId> holder_;
-  Order stop_;  // the last one
+  Order stop_;  // the newest stop
 };
 
 }  // namespace hapticd::server

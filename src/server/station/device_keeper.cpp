@@ -12,8 +12,8 @@ namespace {
 
 using base::Nanos;
 
-constexpr Nanos kLostFor = 500'000'000;  // shorter pauses end by themselves
-constexpr Nanos kBetweenAttempts = 2'000'000'000;
+constexpr Nanos kReopenAfter = 500'000'000;  // devices recover from shorter losses themselves
+constexpr Nanos kRetryInterval = 2'000'000'000;
 
 }  // namespace
 
@@ -37,14 +37,15 @@ void DeviceKeeper::startLoop() {
     servo_.emplace([this](const realtime::Pacing& pacing) { tick_(pacing); }, clock_, options);
     const realtime::ThreadSetup& setup = servo_->start();
     realtime_ = setup.scheduling.granted;
-    for (const realtime::SetupAnswer* answer : setup.all()) say(*answer);
+    for (const realtime::SetupAnswer* answer : setup.all()) logSetup(*answer);
     return;
   }
-  say(realtime::setUpThread({.realtime = false}).memory);  // of the process, before the first tick
+  logSetup(realtime::setUpThread({.realtime = false})
+               .memory);  // locks the memory of the process before the first tick
   isPacedSetUp_ = false;
   device_.start([this, first = true](Nanos now) mutable {
     if (first) {
-      pacedSetup_ = realtime::setUpThread({.keepScheduling = options_.vendorsThread, .lockMemory = false});
+      pacedSetup_ = realtime::setUpThread({.keepScheduling = options_.vendorThread, .lockMemory = false});
       realtime_ = pacedSetup_.scheduling.granted;
       isPacedSetUp_.store(true, std::memory_order_release);
       first = false;
@@ -62,61 +63,61 @@ void DeviceKeeper::stopLoop() noexcept {
   }
 }
 
-std::string DeviceKeeper::look(Nanos now) {
-  sayPacedSetup();
+std::string DeviceKeeper::poll(Nanos now) {
+  logPacedSetup();
   if (attempt_.running()) {
-    if (!attempted_.load(std::memory_order_acquire)) return doing_;
+    if (!attemptDone_.load(std::memory_order_acquire)) return attemptText_;
     attempt_.stop();
-    nextAttempt_ = now + kBetweenAttempts;
+    nextAttempt_ = now + kRetryInterval;
     lostSince_ = 0;
   }
-  if (!refusal_.empty()) {
-    std::string refused = "the device does not open: " + refusal_ + "; it is tried again every 2 s";
-    // refusal_ is the attempt's from here on.
-    if (now >= nextAttempt_) begin("the device is being opened anew", [this] { openAnew(); });
+  if (!openError_.empty()) {
+    std::string refused = "the device does not open: " + openError_ + "; retrying every 2 s";
+    // The attempt owns openError_ from here on.
+    if (now >= nextAttempt_) startAttempt("the device is being reopened", [this] { reopen(); });
     return refused;
   }
-  std::string words = device_.faultText();
+  std::string fault = device_.faultText();
   if (!device_.lost()) {
     lostSince_ = 0;
   } else if (lostSince_ == 0) {
     lostSince_ = now;
-  } else if (now - lostSince_ > kLostFor) {
-    begin("the device is being opened anew", [this] { openAnew(); });
-    return words;
+  } else if (now - lostSince_ > kReopenAfter) {
+    startAttempt("the device is being reopened", [this] { reopen(); });
+    return fault;
   }
-  if (words.empty()) notCalibrated_.clear();
-  if (!notCalibrated_.empty()) words += "; the last calibration: " + notCalibrated_;
-  return words;
+  if (fault.empty()) calibrationError_.clear();
+  if (!calibrationError_.empty()) fault += "; the last calibration failed: " + calibrationError_;
+  return fault;
 }
 
 void DeviceKeeper::calibrate() {
-  if (attempt_.running() || !refusal_.empty()) return;
-  begin("the device is being calibrated: keep hands off", [this] { tryToCalibrate(); });
+  if (attempt_.running() || !openError_.empty()) return;
+  startAttempt("the device is being calibrated: keep hands off", [this] { runCalibration(); });
 }
 
-void DeviceKeeper::begin(std::string doing, std::function<void()> attempt) {
-  doing_ = std::move(doing);
-  attempted_ = false;
+void DeviceKeeper::startAttempt(std::string text, std::function<void()> attempt) {
+  attemptText_ = std::move(text);
+  attemptDone_ = false;
   attempt_ = base::Thread({.name = "device keeper"}, [this, attempt = std::move(attempt)]() -> std::optional<base::Nanos> {
-    if (attempted_.load(std::memory_order_relaxed)) return std::nullopt;  // the last step, at the end
+    if (attemptDone_.load(std::memory_order_relaxed)) return std::nullopt;  // the thread steps once more when it stops
     attempt();
-    attempted_.store(true, std::memory_order_release);
+    attemptDone_.store(true, std::memory_order_release);
     return std::nullopt;
   });
 }
 
-void DeviceKeeper::tryToCalibrate() noexcept {
-  notCalibrated_.clear();
+void DeviceKeeper::runCalibration() noexcept {
+  calibrationError_.clear();
   try {
     device_.calibrate();
   } catch (const std::exception& error) {
-    notCalibrated_ = error.what();
+    calibrationError_ = error.what();
   }
 }
 
-// The guard has latched the fault: whatever comes back, no force does before a re-arm.
-void DeviceKeeper::openAnew() noexcept {
+// The guard has latched the fault: the reopened device gives no force before a re-arm.
+void DeviceKeeper::reopen() noexcept {
   std::string refusal;
   try {
     stopLoop();
@@ -127,10 +128,10 @@ void DeviceKeeper::openAnew() noexcept {
     refusal = error.what();
     device_.close();
   }
-  refusal_ = refusal;
+  openError_ = refusal;
 }
 
-void DeviceKeeper::say(const realtime::SetupAnswer& answer) const {
+void DeviceKeeper::logSetup(const realtime::SetupAnswer& answer) const {
   if (!answer.asked) return;
   if (answer.granted) {
     spdlog::info("servo loop of '{}': {}", options_.name, answer.text);
@@ -139,9 +140,9 @@ void DeviceKeeper::say(const realtime::SetupAnswer& answer) const {
   }
 }
 
-void DeviceKeeper::sayPacedSetup() {
+void DeviceKeeper::logPacedSetup() {
   if (!isPacedSetUp_.load(std::memory_order_acquire)) return;
-  for (const realtime::SetupAnswer* answer : pacedSetup_.all()) say(*answer);
+  for (const realtime::SetupAnswer* answer : pacedSetup_.all()) logSetup(*answer);
   isPacedSetUp_ = false;
 }
 

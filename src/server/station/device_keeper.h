@@ -1,5 +1,4 @@
-// The loop of one device: paced here or by the device, and brought back when only opening the device anew
-// helps.
+// Runs the servo loop of one device, paced by the server or by the device, and reopens a lost device.
 #pragma once
 
 #include <atomic>
@@ -17,41 +16,41 @@ struct DeviceKeeperOptions {
   std::string name;  ///< for the log
   double rate_Hz = 1000;
   bool requireRealtime = false;
-  bool vendorsThread = false;  ///< the callback of a self-paced device comes in a thread that is not ours
+  bool vendorThread = false;  ///< the tick of a self-paced device runs in a thread of its vendor's library
 };
 
-/// Net thread, but for what it does itself in a thread of its own: opening a device may take seconds.
+/// Net thread. Opening and calibrating, which may take seconds, run in a separate thread.
 class DeviceKeeper {
  public:
-  /// All outlive the keeper; `device` is open.
+  /// All references must outlive the keeper; `device` must be open.
   DeviceKeeper(device::Device& device, realtime::Tick& tick, base::Clock& clock,
                const DeviceKeeperOptions& options);
   ~DeviceKeeper() { stop(); }
   DeviceKeeper(const DeviceKeeper&) = delete;
   DeviceKeeper& operator=(const DeviceKeeper&) = delete;
 
-  /// Starts the loop. Throws std::runtime_error when it gets no realtime rights and must have them.
+  /// Starts the loop. Throws std::runtime_error when realtime scheduling is required and refused.
   void start();
-  /// The loop has ended, and nothing is tried any more.
+  /// Waits for a running attempt and ends the loop.
   void stop() noexcept;
-  /// Some times a second: why forces are held, in words; empty when all is well. A device that has been lost
-  /// for half a second is closed and opened anew, every two seconds until it opens.
-  std::string look(base::Nanos now);
-  /// A person consents to a calibration now, which may move the arm. The loop goes on meanwhile; look() tells
-  /// how it ended. Nothing while the device is opened anew or calibrated already.
+  /// Call several times per second. Returns why the device gives no force, empty when it works. Closes and
+  /// reopens a device that has been lost for 0.5 s; retries every 2 s until it opens.
+  std::string poll(base::Nanos now);
+  /// Starts a calibration, which may move the arm: call only with the operator's consent. The loop keeps
+  /// running; poll() returns the result. No effect while the device is being reopened or calibrated.
   void calibrate();
 
-  /// The thread of the loop has realtime scheduling.
+  /// Whether the thread of the loop has realtime scheduling.
   bool realtime() const noexcept { return realtime_; }
 
  private:
   void startLoop();
   void stopLoop() noexcept;
-  void begin(std::string doing, std::function<void()> attempt);
-  void openAnew() noexcept;
-  void tryToCalibrate() noexcept;
-  void say(const realtime::SetupAnswer& answer) const;
-  void sayPacedSetup();
+  void startAttempt(std::string text, std::function<void()> attempt);
+  void reopen() noexcept;
+  void runCalibration() noexcept;
+  void logSetup(const realtime::SetupAnswer& answer) const;
+  void logPacedSetup();
 
   device::Device& device_;
   realtime::Tick& tick_;
@@ -59,18 +58,19 @@ class DeviceKeeper {
   const DeviceKeeperOptions options_;
   std::optional<realtime::ServoThread> servo_;
 
-  realtime::ThreadSetup pacedSetup_;  // the callback's, then the net thread's
+  realtime::ThreadSetup pacedSetup_;  // written by the first tick; read by the net thread after isPacedSetUp_
   std::atomic<bool> isPacedSetUp_{false};
   std::atomic<bool> realtime_{false};
 
   base::Nanos lostSince_ = 0;  // 0: not lost
   base::Nanos nextAttempt_ = 0;
-  std::string doing_;  // of the attempt
+  std::string attemptText_;  // reported while the attempt runs
   base::Thread attempt_;
-  std::atomic<bool> attempted_{false};
-  // Of the last attempt to open and to calibrate; empty when it succeeded. The attempt's until attempted_.
-  std::string refusal_;
-  std::string notCalibrated_;
+  std::atomic<bool> attemptDone_{false};
+  // Errors of the last attempts to open and to calibrate; empty after success. Owned by the attempt until
+  // attemptDone_.
+  std::string openError_;
+  std::string calibrationError_;
 };
 
 }  // namespace hapticd::server

@@ -1,4 +1,4 @@
-// A device and its loop at one moment, as plain values: for the page and for metrics.
+// The state of a device and its servo loop at one moment, as plain values for the viewer and the metrics.
 #pragma once
 
 #include <cstdint>
@@ -15,12 +15,12 @@ struct DeviceStatus {
   std::vector<std::string> names;
   std::string driver;
   bool simulated = false;
-  std::size_t scene = 0;  ///< which of the server's
+  std::size_t scene = 0;  ///< number of the scene in the server
   geometry::Box workspace_m;
   double peakForce_N = 0;
   double rate_Hz = 0;
-  bool realtime = false;  ///< the loop has its scheduling class
-  std::string hand;       ///< who moves it: scripted, file, held, user
+  bool realtime = false;  ///< the loop has realtime scheduling
+  std::string hand;       ///< what moves it: scripted, file, held (by a client), user
   std::optional<std::uint32_t> heldBy;
   std::string fault;
   std::uint64_t droppedReports = 0;

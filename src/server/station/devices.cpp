@@ -6,7 +6,7 @@
 namespace hapticd::server {
 namespace {
 
-// The process runs this program again, for one device alone.
+// The isolation host runs this program for one device.
 std::unique_ptr<device::Device> isolated(DeviceConfig config) {
   config.isolate = false;
   ServerConfig all;
@@ -18,10 +18,10 @@ std::unique_ptr<device::Device> isolated(DeviceConfig config) {
 }  // namespace
 
 std::unique_ptr<device::Device> makeDevice(const DeviceConfig& config) {
-  const std::string who = "device '" + config.names.front() + "': ";
+  const std::string prefix = "device '" + config.names.front() + "': ";
   const device::Driver* const driver = device::findDriver(config.driver);
   if (driver == nullptr) {
-    throw ConfigError(who + "no driver is called '" + config.driver + "'; there is " + device::driverNames());
+    throw ConfigError(prefix + "unknown driver '" + config.driver + "'; available: " + device::driverNames());
   }
   if (config.isolate) return isolated(config);
   try {
@@ -31,7 +31,7 @@ std::unique_ptr<device::Device> makeDevice(const DeviceConfig& config) {
                          .calibrate = config.calibrate,
                          .keys = config.driverKeys});
   } catch (const device::InvalidDriverOption& error) {
-    throw ConfigError(who + error.what());
+    throw ConfigError(prefix + error.what());
   }
 }
 

@@ -1,4 +1,4 @@
-// The device of a configuration.
+// Makes devices from their configuration.
 #pragma once
 
 #include <memory>
@@ -8,11 +8,11 @@
 
 namespace hapticd::server {
 
-/// Makes the device of a configuration, not yet open, in a process of its own if configured so. Throws ConfigError for
+/// Makes the configured device, not yet open; in an isolation host if configured so. Throws ConfigError for
 /// an unknown driver or a value that the driver does not accept.
 std::unique_ptr<device::Device> makeDevice(const DeviceConfig& config);
 
-/// The subcommand of hapticd that an isolated driver's process runs; its one argument is the configuration as TOML.
+/// The subcommand of hapticd that an isolation host runs; its only argument is the configuration as TOML.
 inline constexpr const char* kDeviceHostCommand = "device-host";
 
 }  // namespace hapticd::server

@@ -4,16 +4,16 @@
 
 #include "base/world.h"
 #include "device/simulated/simulated_device.h"
-#include "server/station/answers.h"
 #include "server/station/devices.h"
-#include "server/station/explorer.h"
+#include "server/station/replies.h"
+#include "server/station/scripted_hand.h"
 #include "server/station/station_impl.h"
 
 namespace hapticd::server {
 namespace {
 
-// Stands for one that was recorded: its profile is asked for, and nothing else.
-std::unique_ptr<device::Device> standIn(const record::RecordedDevice& recorded) {
+// Stands in for a recorded device; only its profile is used.
+std::unique_ptr<device::Device> placeholderFor(const record::RecordedDevice& recorded) {
   device::SimulatedOptions options;
   if (const auto* profile = device::findProfile(recorded.model)) options.profile = *profile;
   options.profile.workspace_m = recorded.sceneConfig.deviceWorkspace_m;
@@ -77,7 +77,7 @@ Station::Impl::Impl(const DeviceConfig& config_, std::vector<wire::LocalSender> 
              {.name = config.names.front(),
               .rate_Hz = config.servoRate_Hz,
               .requireRealtime = !allowNoRealtime,
-              .vendorsThread = device->traits().ticksInVendorThread}),
+              .vendorThread = device->traits().ticksInVendorThread}),
       control(tick.control(), hand, workspaceOf(config, profile)),
       roles(config.control, config.controlList),
       modes(profile.buttons),
@@ -87,19 +87,19 @@ Station::Impl::Impl(const DeviceConfig& config_, std::vector<wire::LocalSender> 
 Station::Station(const DeviceConfig& config, std::vector<wire::LocalSender> names, SceneHost& scene,
                  bool allowNoRealtime, record::Recorder* recorder)
     : impl_(std::make_unique<Impl>(config, std::move(names), scene, openDevice(config), allowNoRealtime)) {
-  Impl& my = *impl_;
-  SceneDevice seat{.config = sceneConfig(my.config, my.profile),
-                   .slot = &my.tick.snapshots(),
-                   .published = [&my](const auto& snapshot) { my.onPublished(*snapshot); },
-                   .publishing = {}};
-  if (recorder != nullptr) my.recordTo(*recorder, seat);
-  scene.add(std::move(seat));
+  Impl& impl = *impl_;
+  SceneDevice sceneDevice{.config = sceneConfig(impl.config, impl.profile),
+                          .slot = &impl.tick.snapshots(),
+                          .published = [&impl](const auto& snapshot) { impl.onPublished(*snapshot); },
+                          .publishing = {}};
+  if (recorder != nullptr) impl.recordTo(*recorder, sceneDevice);
+  scene.add(std::move(sceneDevice));
 }
 
 Station::Station(const DeviceConfig& config, std::vector<wire::LocalSender> names, SceneHost& scene,
                  const record::RecordedDevice& recorded)
-    : impl_(std::make_unique<Impl>(config, std::move(names), scene, standIn(recorded), true)) {
-  impl_->played = true;
+    : impl_(std::make_unique<Impl>(config, std::move(names), scene, placeholderFor(recorded), true)) {
+  impl_->replayed = true;
   scene.add(
       {.config = recorded.sceneConfig, .slot = &impl_->tick.snapshots(), .published = {}, .publishing = {}});
 }
@@ -109,19 +109,19 @@ void Station::play(const realtime::TickReport& report) noexcept {
   impl_->tick.wake().notify();
 }
 
-void Station::Impl::recordTo(record::Recorder& session, SceneDevice& seat) {
-  const std::uint32_t number = session.addDevice({.names = config.names,
+void Station::Impl::recordTo(record::Recorder& recording, SceneDevice& sceneDevice) {
+  const std::uint32_t number = recording.addDevice({.names = config.names,
                                                   .driver = config.driver,
                                                   .model = profile.model,
                                                   .buttons = profile.buttons,
                                                   .scene = scene.number(),
-                                                  .sceneConfig = seat.config,
+                                                  .sceneConfig = sceneDevice.config,
                                                   .tick = tickOptions(config, *device)});
-  seat.config.stopwatch = session.stopwatch(number);
-  seat.publishing = [&session, number](base::Nanos now, std::uint64_t revision) {
-    session.recordPublish(number, now, revision);
+  sceneDevice.config.stopwatch = recording.stopwatch(number);
+  sceneDevice.publishing = [&recording, number](base::Nanos now, std::uint64_t revision) {
+    recording.recordPublish(number, now, revision);
   };
-  tick.recordTo(&session.ring(number));
+  tick.recordTo(&recording.ring(number));
 }
 
 Station::~Station() {
@@ -129,29 +129,29 @@ Station::~Station() {
 }
 
 void Station::start() {
-  Impl& my = *impl_;
-  if (my.played) return;
-  my.running = true;
-  spdlog::info("device '{}': {}", my.config.names.front(), device::inWords(my.profile));
-  if (my.config.enableForces) my.tick.control().arm();
-  my.keeper.start();
+  Impl& impl = *impl_;
+  if (impl.replayed) return;
+  impl.running = true;
+  spdlog::info("device '{}': {}", impl.config.names.front(), device::inWords(impl.profile));
+  if (impl.config.enableForces) impl.tick.control().arm();
+  impl.keeper.start();
 }
 
 void Station::stop() {
-  Impl& my = *impl_;
-  if (!std::exchange(my.running, false)) return;
-  my.tick.control().stop();
-  my.keeper.stop();
-  my.tick.finish();
-  my.device->close();
-  my.recorder.finish();
-  const auto wake = my.tick.histograms().wakeupError.copy();
-  const auto compute = my.tick.histograms().compute.copy();
-  const realtime::TickReport& end = my.tick.last();
+  Impl& impl = *impl_;
+  if (!std::exchange(impl.running, false)) return;
+  impl.tick.control().stop();
+  impl.keeper.stop();
+  impl.tick.finish();
+  impl.device->close();
+  impl.recorder.finish();
+  const auto wake = impl.tick.histograms().wakeupError.copy();
+  const auto compute = impl.tick.histograms().compute.copy();
+  const realtime::TickReport& end = impl.tick.last();
   const auto us = [](base::Nanos t) { return static_cast<double>(t) * 1e-3; };
   spdlog::info("servo loop of '{}': {} ticks, {} overruns, {} periods skipped, {} reports dropped",
-               my.config.names.front(), end.tick, end.timing.overruns, end.timing.skippedPeriods,
-               my.droppedReports);
+               impl.config.names.front(), end.tick, end.timing.overruns, end.timing.skippedPeriods,
+               impl.droppedReports);
   spdlog::info("  wake-up error p50 {:.1f} us, p99 {:.1f} us, max {:.1f} us", us(wake.quantile(0.5)),
                us(wake.quantile(0.99)), us(wake.max));
   spdlog::info("  read-render-write p50 {:.1f} us, p99 {:.1f} us, max {:.1f} us", us(compute.quantile(0.5)),
@@ -164,24 +164,24 @@ void Station::stop() {
 }
 
 std::optional<wire::Text> Station::checkHealth() {
-  Impl& my = *impl_;
-  std::string text = my.keeper.look(base::now());
-  if (text == my.fault) return std::nullopt;
-  my.fault = std::move(text);
-  if (!my.fault.empty()) {
-    spdlog::warn("device '{}': {}", my.config.names.front(), my.fault);
-    return healthText(my.fault);
+  Impl& impl = *impl_;
+  std::string text = impl.keeper.poll(base::now());
+  if (text == impl.fault) return std::nullopt;
+  impl.fault = std::move(text);
+  if (!impl.fault.empty()) {
+    spdlog::warn("device '{}': {}", impl.config.names.front(), impl.fault);
+    return healthText(impl.fault);
   }
-  spdlog::info("device '{}': all is well again", my.config.names.front());
-  const bool latched = my.outbox.last().guard.latched != 0;
+  spdlog::info("device '{}': works again", impl.config.names.front());
+  const bool latched = impl.outbox.last().guard.latched != 0;
   return wire::Text{
       .severity = wire::kTextNormal,
       .level = 0,
-      .text = std::string("the device is well again") + (latched ? "; re-arm to feel forces" : "")};
+      .text = std::string("the device works again") + (latched ? "; re-arm to enable its forces" : "")};
 }
 
 void Station::checkBlackBox() {
-  impl_->recorder.look();
+  impl_->recorder.poll();
 }
 
 SceneHost& Station::scene() noexcept {
@@ -207,7 +207,7 @@ void Station::onSubscribed(Session& session, wire::LocalSender name) {
 void Station::clientGone(scene::ClientId client) {
   impl_->control.clientGone(client);
   impl_->roles.clientGone(client);
-  std::erase_if(impl_->rearming, [client](const Session* session) { return session->id() == client; });
+  std::erase_if(impl_->pendingRearms, [client](const Session* session) { return session->id() == client; });
   impl_->outbox.clientGone(client);
 }
 
@@ -216,16 +216,16 @@ int Station::wakeFd() const noexcept {
 }
 
 bool Station::collectReports(const WallClock& clock, const std::function<void()>& onTick) {
-  Impl& my = *impl_;
+  Impl& impl = *impl_;
   bool any = false;
-  my.tick.reports().consume([&](const realtime::TickReport& report) {
-    my.droppedReports = report.dropped;
-    my.frame.buttons = my.modes.apply(report.device.buttons, my.alerts);
+  impl.tick.reports().consume([&](const realtime::TickReport& report) {
+    impl.droppedReports = report.dropped;
+    impl.frame.buttons = impl.modes.apply(report.device.buttons, impl.alerts);
     const wire::Time time = clock.at(report.time);
-    my.outbox.add(report, my.frame, time);
-    for (const wire::ButtonAlert& alert : my.alerts) my.outbox.add(wire::Message(alert), time);
-    my.alerts.clear();
-    if (!my.outbox.collect()) return;
+    impl.outbox.add(report, impl.frame, time);
+    for (const wire::ButtonAlert& alert : impl.alerts) impl.outbox.add(wire::Message(alert), time);
+    impl.alerts.clear();
+    if (!impl.outbox.collect()) return;
     any = true;
     onTick();
   });
@@ -240,34 +240,34 @@ void Station::Impl::onPublished(const scene::SceneSnapshot& snapshot) {
   if (hand == nullptr || config.hand != "script") return;
   std::vector<std::pair<std::int32_t, std::uint64_t>> now;
   for (const auto& object : snapshot.objects) now.emplace_back(object->id, object->mesh->topology);
-  if (now == explored) return;
-  explored = std::move(now);
+  if (now == plannedFor) return;
+  plannedFor = std::move(now);
   hand->setPath(std::make_shared<const device::WaypointPath>(
-      explore(snapshot, workspaceOf(config, profile), base::now()), device::WaypointPath::Repeat::yes));
+      planStrokes(snapshot, workspaceOf(config, profile), base::now()), device::WaypointPath::Repeat::yes));
 }
 
 DeviceStatus Station::status() const {
-  const Impl& my = *impl_;
-  const device::DeviceProfile& profile = my.profile;
+  const Impl& impl = *impl_;
+  const device::DeviceProfile& profile = impl.profile;
   DeviceStatus status;
-  status.names = my.config.names;
-  status.driver = my.config.driver;
-  status.simulated = my.hand != nullptr;
-  status.workspace_m = workspaceOf(my.config, profile);
+  status.names = impl.config.names;
+  status.driver = impl.config.driver;
+  status.simulated = impl.hand != nullptr;
+  status.workspace_m = workspaceOf(impl.config, profile);
   status.peakForce_N = profile.peakForce_N;
-  status.rate_Hz = my.config.servoRate_Hz;
-  status.realtime = my.keeper.realtime();
-  status.heldBy = my.control.holder();
-  status.hand = !status.simulated            ? "user"
-                : status.heldBy              ? "held"
-                : my.config.hand == "script" ? "scripted"
-                                             : "file";
-  status.fault = my.fault;
-  status.droppedReports = my.droppedReports;
-  status.last = my.outbox.last();
-  status.period = my.tick.histograms().period.copy();
-  status.wakeup = my.tick.histograms().wakeupError.copy();
-  status.compute = my.tick.histograms().compute.copy();
+  status.rate_Hz = impl.config.servoRate_Hz;
+  status.realtime = impl.keeper.realtime();
+  status.heldBy = impl.control.holder();
+  status.hand = !status.simulated              ? "user"
+                : status.heldBy                ? "held"
+                : impl.config.hand == "script" ? "scripted"
+                                               : "file";
+  status.fault = impl.fault;
+  status.droppedReports = impl.droppedReports;
+  status.last = impl.outbox.last();
+  status.period = impl.tick.histograms().period.copy();
+  status.wakeup = impl.tick.histograms().wakeupError.copy();
+  status.compute = impl.tick.histograms().compute.copy();
   return status;
 }
 
@@ -276,7 +276,7 @@ double Station::rateOf(const Session& session) const {
 }
 
 bool Station::couldCommand(const Session& session) const {
-  return !impl_->played && impl_->roles.couldCommand(session.id(), session.address());
+  return !impl_->replayed && impl_->roles.couldCommand(session.id(), session.address());
 }
 
 }  // namespace hapticd::server

@@ -1,4 +1,4 @@
-// A station: one haptic device with its servo, its names, and what clients hear of it.
+// A station: one haptic device with its servo, its names and its reports.
 #pragma once
 
 #include <functional>
@@ -18,59 +18,60 @@ namespace hapticd::server {
 
 class SceneHost;
 
-/// One device between the threads: the servo's reports out, control in. Lives in the net thread.
+/// Connects one device and its servo to the net thread: reports out, control in. Net thread.
 class Station {
  public:
-  /// Opens the device and joins the scene. Throws ConfigError or std::runtime_error with a remedy.
-  /// `recorder`, when there is one, hears of it from the first tick on and outlives it.
+  /// Opens the device and adds it to the scene. Throws ConfigError or std::runtime_error with a remedy.
+  /// `recorder` may be null; else it records from the first tick and must outlive the station.
   Station(const DeviceConfig& config, std::vector<wire::LocalSender> names, SceneHost& scene,
           bool allowNoRealtime, record::Recorder* recorder = nullptr);
-  /// One without hardware and servo, for the reports of a recorded device; nobody may command it.
+  /// A station without hardware and servo, for the reports of a recorded device; no client may command it.
   Station(const DeviceConfig& config, std::vector<wire::LocalSender> names, SceneHost& scene,
           const record::RecordedDevice& recorded);
   ~Station();
 
-  /// Starts the servo. Throws std::runtime_error when the loop gets no realtime rights and must have them.
+  /// Starts the servo. Throws std::runtime_error when realtime scheduling is required and refused.
   void start();
-  /// Zero force, then the loop ends and the device is closed. Idempotent.
+  /// Stops the force, ends the loop and closes the device. Idempotent.
   void stop();
 
-  /// Brings a lost device back. Logs what the driver complains of, when it changed, and gives the words for
-  /// the clients. Call it some times a second.
+  /// Reopens a lost device; logs changes of its fault and returns the text for the clients. Call several
+  /// times per second.
   std::optional<wire::Text> checkHealth();
-  /// Writes down what the black box has kept. Call it some times a second.
+  /// Writes a frozen black box to a file. Call several times per second.
   void checkBlackBox();
 
   SceneHost& scene() noexcept;
   bool has(wire::LocalSender name) const noexcept;
-  /// The name under which this client knows the device.
+  /// The device name that this client subscribed to; by default the first one.
   wire::LocalSender nameFor(const Session& session) const noexcept;
 
-  /// Whether the client may command; when not, `reason` says who may.
+  /// Whether the client may command; if not, `reason` is set.
   bool mayCommand(const Session& session, std::string& reason);
-  /// A client's control message: stop and re-arm, choices, questions. `received`: when the server read it.
+  /// Handles a control message. `received`: when the server read it, on the servo clock.
   void onControl(Session& session, const wire::MessageReceived& message, base::Nanos received);
-  /// The scene of this device was put back to the beginning.
+  /// The scene of this device was reset.
   void onReset();
-  /// The client listens to this name from now on.
+  /// The client subscribed to this name.
   void onSubscribed(Session& session, wire::LocalSender name);
   void clientGone(scene::ClientId client);
 
-  /// How the device and its loop are; `scene` is left to the caller.
+  /// State of the device and its loop; the caller fills in `scene`.
   DeviceStatus status() const;
-  /// The rate that the client has chosen, and whether it may command.
+  /// The report rate that the client chose.
   double rateOf(const Session& session) const;
+  /// Whether the client may command, without giving it control.
   bool couldCommand(const Session& session) const;
 
-  /// Of a recorded device: clients hear this report. One thread.
+  /// Reports a tick of a recorded device. From one thread only.
   void play(const realtime::TickReport& report) noexcept;
 
-  /// Readable when reports wait.
+  /// Descriptor that is readable when reports wait.
   int wakeFd() const noexcept;
-  /// Encodes, once for all clients who chose alike, what the servo has reported, and calls onTick() after
-  /// each tick that says something, so that ticks leave in their order. False when there was none.
+  /// Encodes the pending ticks, once for all clients with the same subscription, and calls onTick() after
+  /// each tick with reports so that they are sent in order. Returns false when there were none.
   bool collectReports(const WallClock& clock, const std::function<void()>& onTick);
-  /// Queues what collectReports() encoded.
+  /// Queues the reports of the last collected tick for this client.
   void sendReports(Session& session);
 
  private:

@@ -1,4 +1,4 @@
-// The parts of a station, for station.cpp (lifetime and reports) and station_messages.cpp (what clients say).
+// Members of a station, for station.cpp (lifetime and reports) and station_messages.cpp (control messages).
 #pragma once
 
 #include <set>
@@ -15,7 +15,7 @@
 
 namespace hapticd::server {
 
-/// Where a control message comes from.
+/// The origin of a control message.
 struct Request {
   Session& session;
   wire::LocalSender name;  ///< the name under which the client addresses the device
@@ -26,12 +26,12 @@ struct Station::Impl {
   Impl(const DeviceConfig& config_, std::vector<wire::LocalSender> names_, SceneHost& scene_,
        std::unique_ptr<device::Device> device_, bool allowNoRealtime);
 
-  void recordTo(record::Recorder& session, SceneDevice& seat);
+  void recordTo(record::Recorder& recording, SceneDevice& sceneDevice);
   void onPublished(const scene::SceneSnapshot& snapshot);
   void choose(Session& session, wire::LocalSender name, ReportChoice choice, double rate_Hz,
               std::string_view call);
 
-  // One for each control message; a refusal is a text to the client.
+  // Handlers of control messages; a refusal is sent as a text.
   void on(const Request& request, const wire::Ping&);
   void on(const Request& request, const wire::Text& text);
   void on(const Request& request, const wire::TrackerRequestToRoom&);
@@ -54,27 +54,27 @@ struct Station::Impl {
   SceneHost& scene;
   base::MonotonicClock clock;
   std::unique_ptr<device::Device> device;
-  device::SteeredHand* const hand;      // null for devices that a person moves
-  const device::DeviceProfile profile;  // as when it was first opened
+  device::SteeredHand* const hand;      // null for real devices
+  const device::DeviceProfile profile;  // as after the first open()
   realtime::Tick tick;
   DeviceKeeper keeper;
   bool running = false;
-  bool played = false;  // reports come from a recording, the servo rests
+  bool replayed = false;  // reports come from a recording; no servo runs
 
-  // The net thread's.
+  // Net thread.
   DeviceControl control;
   Roles roles;
   ButtonModes modes;
-  std::vector<wire::ButtonAlert> alerts;  // not yet told
+  std::vector<wire::ButtonAlert> alerts;  // not yet reported
   ReportFrame frame;
   Outbox outbox;
   BlackBoxRecorder recorder;
   std::uint64_t droppedReports = 0;
-  std::string fault;  // as last told
-  std::set<Session*> rearming;  // sent a re-arm that may wait for the scene
+  std::string fault;                 // as last reported
+  std::set<Session*> pendingRearms;  // clients whose re-arm waits for the scene
 
-  // The scene thread's: what the scripted hand was planned for.
-  std::vector<std::pair<std::int32_t, std::uint64_t>> explored{{-1, 0}};
+  // Scene thread: object ids and topologies for which the scripted hand was planned.
+  std::vector<std::pair<std::int32_t, std::uint64_t>> plannedFor{{-1, 0}};
 };
 
 }  // namespace hapticd::server

@@ -1,10 +1,10 @@
-// What a client says to a device itself: questions, choices, control.
+// Control messages of clients: queries, subscriptions, stop, re-arm and steering.
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "server/station/answers.h"
+#include "server/station/replies.h"
 #include "server/station/station_impl.h"
 #include "wire/dispatch.h"
 #include "wire/text.h"
@@ -19,8 +19,8 @@ void sendText(Session& session, wire::LocalSender name, std::uint32_t severity, 
 }  // namespace
 
 bool Station::mayCommand(const Session& session, std::string& reason) {
-  if (impl_->played) {
-    reason = "this server replays a recording, which nobody can change";
+  if (impl_->replayed) {
+    reason = "this server replays a recording, which cannot be changed";
     return false;
   }
   Roles& roles = impl_->roles;
@@ -44,7 +44,7 @@ void Station::Impl::on(const Request& request, const wire::Ping&) {
 }
 
 void Station::Impl::on(const Request& request, const wire::Text& text) {
-  request.session.remark("says " + wire::inQuotes(text.text.text));
+  request.session.logWarning("sent the text " + wire::inQuotes(text.text.text));
 }
 
 void Station::Impl::on(const Request& request, const wire::TrackerRequestToRoom&) {
@@ -52,7 +52,7 @@ void Station::Impl::on(const Request& request, const wire::TrackerRequestToRoom&
 }
 
 void Station::Impl::on(const Request& request, const wire::TrackerRequestUnitToSensor&) {
-  for (std::int32_t sensor = 0; sensor < kSensors; ++sensor) {
+  for (std::int32_t sensor = 0; sensor < kSensorCount; ++sensor) {
     request.session.send(request.name, wire::TrackerUnitToSensor{
                            .sensor = sensor, .filler = 0, .position = {}, .orientation = {0, 0, 0, 1}});
   }
@@ -76,7 +76,7 @@ void Station::Impl::choose(Session& session, wire::LocalSender name, ReportChoic
                            std::string_view call) {
   if (!std::isfinite(rate_Hz) || rate_Hz < 0) {
     sendText(session, name, wire::kTextError,
-             fmt::format("{}: rate {} Hz refused: 0 keeps the rate, a positive one sets it", call, rate_Hz));
+             fmt::format("{}: rate {} Hz refused: use 0 to keep the rate or a positive rate", call, rate_Hz));
     return;
   }
   constexpr double kSlowest_Hz = 0.01;
@@ -84,16 +84,16 @@ void Station::Impl::choose(Session& session, wire::LocalSender name, ReportChoic
   outbox.choose(session, choice);
 }
 
-// From now on the tracker's poses count from where the proxy is.
+// The pose of the proxy becomes the origin of the tracker reports.
 void Station::Impl::on(const Request&, const wire::TrackerResetOrigin&) {
-  const View view = viewOf(outbox.last(), config.forceReport);
-  frame.origin = view.proxy;
-  frame.turn = view.orientation;
+  const ClientTick clientTick = toClientTick(outbox.last(), config.forceReport);
+  frame.origin = clientTick.proxy;
+  frame.rotation = clientTick.orientation;
 }
 
 void Station::Impl::on(const Request& request, const wire::ButtonAdmin& admin) {
   std::string error;
-  if (!modes.obey(admin, alerts, error)) sendText(request.session, request.name, wire::kTextError, error);
+  if (!modes.setMode(admin, alerts, error)) sendText(request.session, request.name, wire::kTextError, error);
 }
 
 void Station::Impl::on(const Request& request, const wire::QueryCapabilities&) {
@@ -109,20 +109,21 @@ void Station::Impl::on(const Request& request, const wire::StopForces&) {
 void Station::Impl::on(const Request& request, const wire::RearmForces&) {
   spdlog::warn("client {} ({}) re-arms the forces of '{}'", request.session.id(), request.session.description(),
                config.names.front());
-  rearming.insert(&request.session);
+  pendingRearms.insert(&request.session);
   scene.whenPublished(request.session.id(), [this, session = &request.session, name = request.name, order = request.order] {
-    if (rearming.count(session) != 0) rearm(*session, name, order);
+    if (pendingRearms.count(session) != 0) rearm(*session, name, order);
   });
 }
 
-// What the client sent before is felt from the first tick with force.
+// Called after the earlier commands of the client are published, so that they act from the first tick with force.
 void Station::Impl::rearm(Session& session, wire::LocalSender name, const DeviceControl::Order& order) {
   if (!control.rearmForces(order)) {
     sendText(session, name, wire::kTextWarning, "Rearm_Forces ignored: the forces were stopped after it was sent");
     session.flush();
     return;
   }
-  // The operator consented to motion at the start; this is the moment that a person chose.
+  // With `calibrate` the operator consented to motion of the arm; the re-arm is the moment that a person
+  // chose.
   if (config.calibrate && (outbox.last().device.hold & device::kHoldNotCalibrated) != 0) keeper.calibrate();
 }
 
@@ -135,9 +136,9 @@ void Station::Impl::on(const Request& request, const wire::HoldHand& wanted) {
 }
 
 void Station::onReset() {
-  impl_->control.rampIn();  // what is felt after it comes in gently
+  impl_->control.rampIn();
   impl_->frame.origin.setZero();
-  impl_->frame.turn.setIdentity();
+  impl_->frame.rotation.setIdentity();
 }
 
 }  // namespace hapticd::server

@@ -2,7 +2,7 @@
 #include <numbers>
 
 #include "base/time.h"
-#include "server/reports/view.h"
+#include "server/reports/client_tick.h"
 #include "server/web/state_report.h"
 #include "wire/messages.h"
 

@@ -69,7 +69,7 @@ TEST_F(InContact, AStylusThatIsPutIntoItsInkwellIsCalibratedThere) {
   expectWords("gives no force: the stylus is in the inkwell");
   EXPECT_TRUE(arm.left().isZero());
   arm->docked = false;
-  expectWords("the device is well again");
+  expectWords("the device works again");
   touch();
   endInOrder();
 }
@@ -111,7 +111,7 @@ TEST_F(InContact, ReArmingCalibratesAnArmWhereTheServerHasConsent) {
   expectWords("not calibrated: keep hands off");
   visitor->forget();
   visitor->client().rearmForces();
-  expectWords("the device is well again");
+  expectWords("the device works again");
   touch();
   endInOrder();
 }
@@ -123,7 +123,7 @@ TEST_F(InContact, ReArmingMovesNoArmWithoutConsent) {
   visitor->client().rearmForces();
   const std::int64_t before = arm->ticks;
   EXPECT_TRUE(visitor->until([&] { return arm->ticks > before + 500; }));
-  EXPECT_FALSE(visitor->heard("the device is well again")) << visitor->texts();
+  EXPECT_FALSE(visitor->heard("the device works again")) << visitor->texts();
   EXPECT_TRUE(arm.left().isZero());
   endInOrder();
 }
@@ -192,7 +192,7 @@ TEST_F(OpenHapticsIsolatedFault, AHangOfTheLibraryIsAFaultAndANewProcessBringsTh
   arm->fault = mock::kLibraryHangs;
   expectWords("posts no states");
   EXPECT_TRUE(visitor->until([&] { return visitor->latched(); }));
-  expectWords("being opened anew");
+  expectWords("being reopened");
   heal(false);
   endInOrder();
 }
@@ -261,7 +261,7 @@ TEST_F(InContact, AnUnpluggedJoystickIsFoundAgain) {
   EXPECT_TRUE(visitor->until([&] { return visitor->latched(); }));
   expectWords("the device does not open");
   kernel.plugIn();
-  expectWords("the device is well again");
+  expectWords("the device works again");
   EXPECT_TRUE(pressJoystick(kernel, joystick)) << server->log();
   EXPECT_GE(kernel.opened(), 2);
 }

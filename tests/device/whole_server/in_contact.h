@@ -87,7 +87,7 @@ class InContact : public testing::Test {
     if (reopens) {
       EXPECT_TRUE(visitor->until([&] { return arm->opened > opened; })) << server->log();
     }
-    expectWords("the device is well again");
+    expectWords("the device works again");
     touch();
   }
   void serveJoystick() {

@@ -98,21 +98,22 @@ TEST(Config, ErrorsNameLineKeyValueAndRemedy) {
   EXPECT_EQ(errorOf("[[device]]\nmaterial_scale = \"big\""),
             "test.toml:2: 'material_scale' is 'big', expected \"reference\" or \"device\"");
   EXPECT_EQ(errorOf("[[device]]\nreport_rate_Hz = 2000"),
-            "test.toml:2: device 'Phantom': report_rate_Hz is 2000; it must lie between 0.1 and 1000");
+            "test.toml:2: device 'Phantom': report_rate_Hz must be between 0.1 and 1000, got 2000");
   EXPECT_EQ(errorOf("[[device]]\nname=\"A\"\n[[device]]\nname=\"A\""),
-            "test.toml:4: the name 'A' is given twice; each must be unique");
+            "test.toml:4: the name 'A' is used twice; device names must be unique");
   EXPECT_EQ(
       errorOf("[[device]]\nname=\"A@B\""),
       "test.toml:2: device name \"A@B\" must have 1 to 95 characters, no '@' and no control characters");
   EXPECT_EQ(errorOf("[[device]]\nworkspace=[1,2,3]"),
-            "test.toml:2: device 'Phantom': workspace needs six numbers, min x y z then max x y z, in mm");
+            "test.toml:2: device 'Phantom': workspace needs six numbers in mm: min x y z, then max x y z, "
+            "each min below its max");
   EXPECT_NE(errorOf("listen = ").find("test.toml:1: "), std::string::npos);
   EXPECT_NE(errorOf("listen = \"1.2.3.4:70000\"").find("70000"), std::string::npos);
 }
 
-TEST(Config, ValuesThatNoServerCanLiveWithAreNamed) {
-  EXPECT_NE(errorOf("seconds = -5").find("seconds is -5"), std::string::npos);
-  EXPECT_NE(errorOf("seconds = nan").find("seconds is nan"), std::string::npos);
+TEST(Config, InvalidValuesAreNamed) {
+  EXPECT_NE(errorOf("seconds = -5").find("got -5"), std::string::npos);
+  EXPECT_NE(errorOf("seconds = nan").find("got nan"), std::string::npos);
   EXPECT_NE(errorOf("seconds = 1e300").find("1e+300"), std::string::npos);
   EXPECT_NE(errorOf("callback_hosts = [\"foo bar\"]").find("\"foo bar\""), std::string::npos);
   EXPECT_NE(errorOf("http = \"lab7:80\"").find("\"lab7:80\" is not ADDR:PORT"), std::string::npos);
@@ -125,30 +126,31 @@ TEST(Config, ValuesThatNoServerCanLiveWithAreNamed) {
 }
 
 TEST(Config, ValuesOutOfRangeAreNamedWithTheirLine) {
-  EXPECT_EQ(errorOf("\nseconds = -5"), "test.toml:2: seconds is -5; it must lie between 0 and 1e+09");
+  EXPECT_EQ(errorOf("\nseconds = -5"), "test.toml:2: seconds must be between 0 and 1e+09, got -5");
   EXPECT_EQ(errorOf("listen = \"localhost:1\""),
             "test.toml:1: listen: \"localhost\" is not an IPv4 address such as 127.0.0.1");
   EXPECT_EQ(errorOf("[[device]]\nname=\"A\"\n[[device]]\nname=\"B\"\n\ndriver=\"hal\""),
-            "test.toml:6: device 'B': no driver is called 'hal'; there is simulated, openhaptics, "
+            "test.toml:6: device 'B': unknown driver 'hal'; available: simulated, openhaptics, "
             "forcedimension, haply, evdev, replay");
-  // Nobody wrote the report rate that the servo cannot reach: its device is what can be pointed at.
+  // The report rate is a default, so the error names the line of its device.
   EXPECT_EQ(errorOf("\n\n[[device]]\nservo_rate_Hz=500"),
-            "test.toml:3: device 'Phantom': report_rate_Hz is 1000; it must lie between 0.1 and 500");
+            "test.toml:3: device 'Phantom': report_rate_Hz must be between 0.1 and 500, got 1000");
   EXPECT_EQ(errorOf("record=\"x.mcap\""),
-            "test.toml:1: record: a server writes session files, not 'x.mcap'; record to one called *.haptics, "
-            "then 'hapticd export FILE.haptics --to mcap'");
+            "test.toml:1: record: the server writes *.haptics recordings only, got 'x.mcap'; convert the "
+            "recording afterwards with 'hapticd export FILE.haptics --to mcap'");
   EXPECT_EQ(errorOf("[[device]]\nblack_box_keep=-1"),
-            "test.toml:2: device 'Phantom': black_box_keep is -1; it must lie between 0 and 1000");
+            "test.toml:2: device 'Phantom': black_box_keep must be between 0 and 1000, got -1");
   EXPECT_EQ(errorOf("[[device]]\nblack_box_keep=2.5"),
             "test.toml:2: 'black_box_keep' is 2.5, expected a whole number");
   EXPECT_NE(errorOf("[[device]]\nblack_box_keep=99999999999").find("99999999999"), std::string::npos);
   EXPECT_EQ(errorOf("[[device]]\nname=\"A\"\nnames=[\"B\"]"),
-            "test.toml:2: 'name' is 'A', expected no 'name' beside 'names'");
+            "test.toml:2: 'name' is 'A', expected either 'name' or 'names', not both");
 }
 
-TEST(Config, WhoMayCommandIsSaidInFull) {
+TEST(Config, ErrorsOfControlNameTheRemedy) {
   EXPECT_EQ(errorOf("[[device]]\ncontrol=\"list\""),
-            "test.toml:2: device 'Phantom': control is \"list\": name who may command, e.g. control_list = "
+            "test.toml:2: device 'Phantom': control = \"list\" needs the addresses that may command, e.g. "
+            "control_list = "
             "[\"10.0.0.5\"]");
   EXPECT_EQ(errorOf("[[device]]\ncontrol=\"first\"\ncontrol_list=[\"10.0.0.5\"]"),
             "test.toml:3: device 'Phantom': control_list has no effect without control = \"list\"");
@@ -159,14 +161,15 @@ TEST(Config, WhoMayCommandIsSaidInFull) {
             "test.toml:2: 'control' is 'nobody', expected \"any\" or \"first\" or \"list\"");
 }
 
-TEST(Config, DevicesThatShareASceneAgreeWhenItGoes) {
+TEST(Config, DevicesOfOneSceneMustAgreeOnSceneOnDisconnect) {
   const std::string text = errorOf(
       "[[device]]\nname=\"A\"\nscene=\"table\"\n[[device]]\nname=\"B\"\nscene=\"table\"\nscene_on_disconnect=\"clear\"");
-  EXPECT_EQ(text,
-            "test.toml:7: device 'B': the devices that share the scene 'table' disagree; it stays or goes for all");
+  EXPECT_EQ(
+      text,
+      "test.toml:7: device 'B': all devices of the scene 'table' must have the same scene_on_disconnect");
 }
 
-// Everything differs from its default, so that a key that is not written or not read shows.
+// Every key differs from its default, so that a key that is not written or not read is noticed.
 ServerConfig unusual() {
   ServerConfig config;
   config.listenAddress = "0.0.0.0";
@@ -215,17 +218,18 @@ ServerConfig unusual() {
 TEST(Config, KeysOfOtherDriversAreRefused) {
   EXPECT_EQ(errorOf("[[device]]\ndriver = \"evdev\"\nwheel_profile = \"wheel.toml\"\n"), "");
   EXPECT_EQ(errorOf("[[device]]\nwheel_profile = \"wheel.toml\"\n"),
-            "test.toml:2: device 'Phantom': the driver 'simulated' has no key wheel_profile; leave it out");
-  EXPECT_EQ(errorOf("[[device]]\nwheel_profile = \"\"\n"), "") << "as a written configuration has it";
+            "test.toml:2: device 'Phantom': the driver 'simulated' has no key wheel_profile; remove it");
+  EXPECT_EQ(errorOf("[[device]]\nwheel_profile = \"\"\n"), "") << "as toToml() writes it";
 }
 
-TEST(Config, ADriverWithoutAVendorsLibraryCannotBeIsolated) {
-  EXPECT_EQ(errorOf("[[device]]\nisolate = true\n"),
-            "test.toml:2: device 'Phantom': the driver 'simulated' loads no vendor's library, so it cannot be isolated; "
-            "leave isolate out");
+TEST(Config, ADriverWithoutAVendorLibraryCannotBeIsolated) {
+  EXPECT_EQ(
+      errorOf("[[device]]\nisolate = true\n"),
+      "test.toml:2: device 'Phantom': the driver 'simulated' loads no vendor library and cannot be isolated; "
+      "remove isolate");
 }
 
-TEST(Config, WhatIsWrittenReadsBackTheSame) {
+TEST(Config, AWrittenConfigurationReadsBackEqual) {
   EXPECT_EQ(parseConfig(toToml(ServerConfig{}), "written"), ServerConfig{});
   const ServerConfig config = unusual();
   const std::string text = toToml(config);
@@ -235,8 +239,8 @@ TEST(Config, WhatIsWrittenReadsBackTheSame) {
   EXPECT_NE(text.find("workspace = 'paper'\n"), std::string::npos) << text;
 }
 
-// So the test above notices any key that is not written, not read, or mixed up with another.
-TEST(Config, TheUnusualConfigurationDiffersFromTheUsualOneInEveryKey) {
+// The test above relies on this to notice any key that is not written, not read, or confused with another.
+TEST(Config, EveryKeyOfTheUnusualConfigurationDiffersFromItsDefault) {
   std::istringstream usual(toToml(ServerConfig{}));
   std::string unusualText = toToml(unusual());
   unusualText.resize(unusualText.rfind("[[device]]"));
@@ -249,7 +253,7 @@ TEST(Config, TheUnusualConfigurationDiffersFromTheUsualOneInEveryKey) {
   EXPECT_GE(keys, 30);
 }
 
-TEST(Config, BlackBoxesGoToTheStateDirectoryOfTheUser) {
+TEST(Config, BlackBoxesDefaultToTheStateDirectoryOfTheUser) {
   const auto with = [](const char* state, const char* home) {
     state != nullptr ? setenv("XDG_STATE_HOME", state, 1) : unsetenv("XDG_STATE_HOME");
     home != nullptr ? setenv("HOME", home, 1) : unsetenv("HOME");
@@ -265,7 +269,7 @@ TEST(Config, BlackBoxesGoToTheStateDirectoryOfTheUser) {
   setenv("HOME", home.c_str(), 1);
 }
 
-TEST(Config, ListenTakesAddressPortOrBoth) {
+TEST(Config, ListenAcceptsAddressPortOrBoth) {
   std::string address = "127.0.0.1";
   std::uint16_t port = 3883;
   parseListen(":4000", address, port);

@@ -10,12 +10,12 @@ namespace {
 
 struct Parsed {
   ServerConfig config;
-  std::vector<std::string> remarks;
+  std::vector<std::string> warnings;
 };
 
 Parsed parse(const std::string& text) {
   Parsed parsed;
-  parsed.config = parseVrpnCfg(text, "vrpn.cfg", parsed.remarks);
+  parsed.config = parseVrpnCfg(text, "vrpn.cfg", parsed.warnings);
   return parsed;
 }
 
@@ -30,9 +30,9 @@ std::string vrpnCfgError(const std::string& text) {
 
 const std::vector<double> kPaper{-80, -80, -70, 80, 80, 20};
 
-TEST(VrpnCfg, ALineOfThePapersServer) {
-  const auto [config, remarks] = parse("vrpn_OpenHaptics Phantom0 1 500 0.5 0.05 Default PHANToM\n");
-  EXPECT_TRUE(remarks.empty());
+TEST(VrpnCfg, ReadsALineOfThePapersServer) {
+  const auto [config, warnings] = parse("vrpn_OpenHaptics Phantom0 1 500 0.5 0.05 Default PHANToM\n");
+  EXPECT_TRUE(warnings.empty());
   ASSERT_EQ(config.devices.size(), 1U);
   const DeviceConfig& device = config.devices[0];
   EXPECT_EQ(device.names, std::vector<std::string>{"Phantom0"});
@@ -46,7 +46,7 @@ TEST(VrpnCfg, ALineOfThePapersServer) {
   EXPECT_EQ(device.workspace_mm, kPaper);
 }
 
-TEST(VrpnCfg, ALineOfStockVrpn) {
+TEST(VrpnCfg, ReadsALineOfStockVrpn) {
   const DeviceConfig device = parse("vrpn_Phantom\tPhantom0\t0\t60.0\tDefault PHANToM").config.devices.at(0);
   EXPECT_EQ(device.names, std::vector<std::string>{"Phantom0"});
   EXPECT_EQ(device.driver, "openhaptics");
@@ -57,8 +57,8 @@ TEST(VrpnCfg, ALineOfStockVrpn) {
   EXPECT_TRUE(device.workspace_mm.empty());
 }
 
-TEST(VrpnCfg, CommentsBlanksAndOtherDevicesAreLeftOut) {
-  const auto [config, remarks] = parse(
+TEST(VrpnCfg, CommentsBlankLinesAndOtherDevicesAreSkipped) {
+  const auto [config, warnings] = parse(
       "\xEF\xBB\xBF# our laboratory\r\n"
       "\r\n"
       "   \t \r\n"
@@ -71,13 +71,13 @@ TEST(VrpnCfg, CommentsBlanksAndOtherDevicesAreLeftOut) {
   EXPECT_EQ(config.devices[0].hardware, "Left Device  #2");
   EXPECT_EQ(config.devices[1].names.front(), "Right");
   EXPECT_EQ(config.devices[1].hardware, "Right Device");
-  ASSERT_EQ(remarks.size(), 1U);
-  EXPECT_EQ(remarks[0],
-            "vrpn.cfg:5: \"vrpn_Tracker_NULL\" is no device of this server (vrpn_OpenHaptics, vrpn_Phantom): "
-            "skipped");
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_EQ(warnings[0],
+            "vrpn.cfg:5: \"vrpn_Tracker_NULL\" is not supported by this server (supported: vrpn_OpenHaptics, "
+            "vrpn_Phantom): skipped");
 }
 
-TEST(VrpnCfg, WhatIsMissingAtTheEndHasDefaults) {
+TEST(VrpnCfg, MissingTrailingValuesHaveDefaults) {
   const DeviceConfig bare = parse("vrpn_OpenHaptics Phantom").config.devices.at(0);
   EXPECT_FALSE(bare.calibrate);
   EXPECT_EQ(bare.reportRate_Hz, 1000);
@@ -87,60 +87,61 @@ TEST(VrpnCfg, WhatIsMissingAtTheEndHasDefaults) {
   EXPECT_EQ(parse("vrpn_Phantom Phantom 1 60 # no name: the first").config.devices.at(0).hardware, "");
 }
 
-TEST(VrpnCfg, MoreReportsThanTicksAreRemarked) {
-  const auto [config, remarks] = parse("\nvrpn_Phantom Phantom 1 5000 X");
+TEST(VrpnCfg, AReportRateAboveTheServoRateIsReducedWithAWarning) {
+  const auto [config, warnings] = parse("\nvrpn_Phantom Phantom 1 5000 X");
   EXPECT_EQ(config.devices.at(0).reportRate_Hz, 1000);
-  ASSERT_EQ(remarks.size(), 1U);
-  EXPECT_EQ(remarks[0],
-            "vrpn.cfg:2: report_rate_Hz is 5000: reports come with each of the 1000 servo ticks a second");
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_EQ(warnings[0],
+            "vrpn.cfg:2: report_rate_Hz must not exceed the servo rate, got 5000: reports use 1000 Hz");
 }
 
 TEST(VrpnCfg, ErrorsNameTheLine) {
-  const std::string form = "; the line reads vrpn_Phantom NAME calibrate(0|1) report_rate_Hz DEVICE";
-  EXPECT_EQ(vrpnCfgError("#\nvrpn_Phantom"), "vrpn.cfg:2: the name is missing" + form);
-  EXPECT_EQ(vrpnCfgError("vrpn_Phantom P yes 60 X"), "vrpn.cfg:1: calibrate is \"yes\", expected 0 or 1" + form);
+  const std::string format = "; expected format: vrpn_Phantom NAME calibrate(0|1) report_rate_Hz DEVICE";
+  EXPECT_EQ(vrpnCfgError("#\nvrpn_Phantom"), "vrpn.cfg:2: the name is missing" + format);
+  EXPECT_EQ(vrpnCfgError("vrpn_Phantom P yes 60 X"),
+            "vrpn.cfg:1: calibrate is \"yes\", expected 0 or 1" + format);
   EXPECT_EQ(vrpnCfgError("vrpn_Phantom P 1 60,0 X"),
-            "vrpn.cfg:1: report_rate_Hz is \"60,0\", expected a number" + form);
+            "vrpn.cfg:1: report_rate_Hz is \"60,0\", expected a number" + format);
   EXPECT_EQ(
       vrpnCfgError("\n\nvrpn_OpenHaptics P 1 60 Default PHANToM"),
-      "vrpn.cfg:3: linear_tolerance_mm is \"Default\", expected a number; the line reads vrpn_OpenHaptics "
+      "vrpn.cfg:3: linear_tolerance_mm is \"Default\", expected a number; expected format: vrpn_OpenHaptics "
       "NAME reset_position(0|1) report_rate_Hz linear_tolerance_mm angular_tolerance_rad DEVICE");
   EXPECT_EQ(vrpnCfgError("vrpn_Phantom P 1 0 X"),
-            "vrpn.cfg:1: device 'P': report_rate_Hz is 0; it must lie between 0.1 and 1000");
+            "vrpn.cfg:1: device 'P': report_rate_Hz must be between 0.1 and 1000, got 0");
   EXPECT_EQ(vrpnCfgError("vrpn_OpenHaptics P 1 60 -1 0 X"),
-            "vrpn.cfg:1: device 'P': linear_tolerance_mm is -1; it must lie between 0 and 1000");
+            "vrpn.cfg:1: device 'P': linear_tolerance_mm must be between 0 and 1000, got -1");
   EXPECT_EQ(vrpnCfgError("vrpn_OpenHaptics P 1 nan 1 0 X"),
-            "vrpn.cfg:1: device 'P': report_rate_Hz is nan; it must lie between 0.1 and 1000");
+            "vrpn.cfg:1: device 'P': report_rate_Hz must be between 0.1 and 1000, got nan");
   EXPECT_EQ(vrpnCfgError("vrpn_Phantom P 1 60 X\nvrpn_Phantom P 1 60 Y"),
-            "vrpn.cfg:2: the name 'P' is given twice; each must be unique");
+            "vrpn.cfg:2: the name 'P' is used twice; device names must be unique");
   EXPECT_EQ(vrpnCfgError("vrpn_Phantom P@Q 1 60 X"),
             "vrpn.cfg:1: device name \"P@Q\" must have 1 to 95 characters, no '@' and no control characters");
 }
 
-TEST(VrpnCfg, AFileWithoutDevicesOfOursIsAnError) {
-  EXPECT_NE(
-      vrpnCfgError("# nothing\n").find("vrpn.cfg: no line names a device of this server; one reads vrpn_Open"),
-      std::string::npos);
+TEST(VrpnCfg, AFileWithoutSupportedDevicesIsAnError) {
+  EXPECT_NE(vrpnCfgError("# nothing\n")
+                .find("vrpn.cfg: no line configures a device of this server; expected format: vrpn_Open"),
+            std::string::npos);
 }
 
-TEST(VrpnCfg, WrittenAsTomlItReadsBackTheSame) {
+TEST(VrpnCfg, WrittenAsTomlItReadsBackEqual) {
   const ServerConfig config =
       parse("vrpn_OpenHaptics Left 0 333 0.3 0.02 Left Device\nvrpn_Phantom Right 1 60 \"Right\" \\Device")
           .config;
   EXPECT_EQ(parseConfig(toToml(config), "written"), config);
 }
 
-TEST(VrpnCfg, TheNameOfTheFileTellsItsForm) {
+TEST(VrpnCfg, TheFileExtensionSelectsTheFormat) {
   const std::filesystem::path directory = std::filesystem::path(testing::TempDir()) / "vrpn_cfg_test";
   std::filesystem::create_directories(directory);
   std::ofstream(directory / "vrpn.cfg") << "vrpn_Dial Dial0 1 2 3\nvrpn_Phantom P 1 60 X\n";
   std::ofstream(directory / "hapticd.toml") << "listen = \":4000\"\n";
-  std::vector<std::string> remarks;
-  EXPECT_EQ(loadConfig(directory / "vrpn.cfg", remarks).devices.at(0).names.front(), "P");
-  ASSERT_EQ(remarks.size(), 1U);
-  EXPECT_NE(remarks[0].find("vrpn.cfg:1: \"vrpn_Dial\""), std::string::npos) << remarks[0];
-  EXPECT_EQ(loadConfig(directory / "hapticd.toml", remarks).port, 4000);
-  EXPECT_THROW(loadConfig(directory / "none.toml", remarks), ConfigError);
+  std::vector<std::string> warnings;
+  EXPECT_EQ(loadConfig(directory / "vrpn.cfg", warnings).devices.at(0).names.front(), "P");
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_NE(warnings[0].find("vrpn.cfg:1: \"vrpn_Dial\""), std::string::npos) << warnings[0];
+  EXPECT_EQ(loadConfig(directory / "hapticd.toml", warnings).port, 4000);
+  EXPECT_THROW(loadConfig(directory / "none.toml", warnings), ConfigError);
   std::filesystem::remove_all(directory);
 }
 

@@ -23,7 +23,7 @@ class ReporterTest : public ::testing::Test {
     choice_.rate_Hz = config_.reportRate_Hz;
     reporter_ = std::make_unique<Reporter>(config_, 2, choice_);
   }
-  // One tick later.
+  // Advances by one tick.
   void step(Nanos by = kMs) {
     if (!reporter_) start();
     ++tick_.tick;
@@ -33,7 +33,7 @@ class ReporterTest : public ::testing::Test {
     reporter_->update(tick_, frame_, out_);
   }
   template <class M>
-  std::vector<M> said() const {
+  std::vector<M> reported() const {
     std::vector<M> found;
     for (const Outgoing& out : out_) {
       if (const M* m = out.message.as<M>()) found.push_back(*m);
@@ -41,21 +41,21 @@ class ReporterTest : public ::testing::Test {
     return found;
   }
   template <class M>
-  bool reliably() const {
+  bool isReliable() const {
     for (const Outgoing& out : out_) {
       if (out.message.as<M>() != nullptr) return out.reliable;
     }
     return false;
   }
   void touch(double depth_m = 0.002) {
-    realtime::Rendering& felt = tick_.rendering;
-    felt.touching = true;
-    felt.touchedObject = 3;
-    felt.depth_m = depth_m;
-    felt.normal = Vec3::UnitZ();
-    felt.normalForce_N = Vec3(0, 0, 500 * depth_m);
-    tick_.force_N = felt.normalForce_N + Vec3(0.1, 0, 0);
-    felt.scp_m = felt.proxy_m;
+    realtime::Rendering& rendering = tick_.rendering;
+    rendering.touching = true;
+    rendering.touchedObject = 3;
+    rendering.depth_m = depth_m;
+    rendering.normal = Vec3::UnitZ();
+    rendering.normalForce_N = Vec3(0, 0, 500 * depth_m);
+    tick_.force_N = rendering.normalForce_N + Vec3(0.1, 0, 0);
+    rendering.scp_m = rendering.proxy_m;
   }
 
   DeviceConfig config_;
@@ -66,13 +66,13 @@ class ReporterTest : public ::testing::Test {
   std::vector<Outgoing> out_;
 };
 
-TEST_F(ReporterTest, FreeAndAtRestOnlyIsTouchingIsSaidEveryPeriod) {
+TEST_F(ReporterTest, InFreeSpaceAtRestOnlyIsTouchingIsReportedEveryPeriod) {
   step();
-  EXPECT_EQ(said<wire::TrackerPosQuat>().size(), 2U);  // proxy and device, once
+  EXPECT_EQ(reported<wire::TrackerPosQuat>().size(), 2U);  // proxy and device, once
   for (int i = 0; i < 5; ++i) {
     step();
     ASSERT_EQ(out_.size(), 1U);
-    EXPECT_EQ(said<wire::IsTouching>().at(0).touching, 0);
+    EXPECT_EQ(reported<wire::IsTouching>().at(0).touching, 0);
   }
 }
 
@@ -83,27 +83,27 @@ TEST_F(ReporterTest, LengthsAreWorldOverThousandAndForcesAreNewtons) {
   tick_.device.position_m = Vec3(0.02, 0, 0);
   touch(0.002);
   step();
-  const auto poses = said<wire::TrackerPosQuat>();
+  const auto poses = reported<wire::TrackerPosQuat>();
   ASSERT_EQ(poses.size(), 3U);
   EXPECT_NEAR(poses[0].position[0], 0.5, 1e-12);   // (500 + 0) / 1000
-  EXPECT_NEAR(poses[0].position[1], 0.02, 1e-12);  // 0.01 m * 2000 / 1000, turned to +y
+  EXPECT_NEAR(poses[0].position[1], 0.02, 1e-12);  // 0.01 m * 2000 / 1000, rotated to +y
   EXPECT_NEAR(poses[1].position[1], 0.04, 1e-12);
-  EXPECT_NEAR(said<wire::Dop>().at(0).depth, 0.004, 1e-12);
-  const auto force = said<wire::Force>().at(0).force;
+  EXPECT_NEAR(reported<wire::Dop>().at(0).depth, 0.004, 1e-12);
+  const auto force = reported<wire::Force>().at(0).force;
   EXPECT_NEAR(force[1], 0.1, 1e-12);
   EXPECT_NEAR(force[2], 1.0, 1e-12);
 }
 
-TEST_F(ReporterTest, OrientationAndTurningAreOfTheWorld) {
+TEST_F(ReporterTest, OrientationAndAngularVelocityAreInTheWorldFrame) {
   tick_.T_world_device = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ()) * Eigen::UniformScaling<double>(2000.0);
   tick_.device.orientation = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitX());
   tick_.device.velocity_m_per_s = Vec3(0.1, 0, 0);
   tick_.device.angularVelocity_rad_per_s = Vec3(M_PI, 0, 0);
   step();
   // First about the stylus's x, then with the device about z: (1 + k)(1 + i) / 2 = (1 + i + j + k) / 2.
-  const auto pose = said<wire::TrackerPosQuat>().at(0);
+  const auto pose = reported<wire::TrackerPosQuat>().at(0);
   for (const double q : pose.orientation) EXPECT_NEAR(q, 0.5, 1e-12);
-  const auto velocity = said<wire::TrackerVelocity>().at(0);
+  const auto velocity = reported<wire::TrackerVelocity>().at(0);
   EXPECT_NEAR(velocity.velocity[1], 0.2, 1e-12);
   const double half = 0.5 * M_PI * velocity.interval;
   EXPECT_NEAR(velocity.rotation[0], 0, 1e-12);
@@ -111,68 +111,68 @@ TEST_F(ReporterTest, OrientationAndTurningAreOfTheWorld) {
   EXPECT_NEAR(velocity.rotation[3], std::cos(half), 1e-12);
 }
 
-TEST_F(ReporterTest, PoseIsSaidWhenItMovedOrTurnedMoreThanTheTolerance) {
+TEST_F(ReporterTest, PoseIsReportedWhenItChangedByMoreThanTheTolerance) {
   step();
   tick_.rendering.proxy_m = tick_.device.position_m = Vec3(0.0009, 0, 0);
   step();
-  EXPECT_TRUE(said<wire::TrackerPosQuat>().empty());
+  EXPECT_TRUE(reported<wire::TrackerPosQuat>().empty());
   tick_.rendering.proxy_m = Vec3(0.0011, 0, 0);
   step();
-  ASSERT_EQ(said<wire::TrackerPosQuat>().size(), 1U);
-  EXPECT_EQ(said<wire::TrackerPosQuat>()[0].sensor, kSensorProxy);
+  ASSERT_EQ(reported<wire::TrackerPosQuat>().size(), 1U);
+  EXPECT_EQ(reported<wire::TrackerPosQuat>()[0].sensor, kSensorProxy);
   tick_.device.orientation = Eigen::AngleAxisd(0.019, Vec3::UnitX());
   step();
-  EXPECT_TRUE(said<wire::TrackerPosQuat>().empty());
+  EXPECT_TRUE(reported<wire::TrackerPosQuat>().empty());
   tick_.device.orientation = Eigen::AngleAxisd(0.021, Vec3::UnitX());
   step();
-  EXPECT_EQ(said<wire::TrackerPosQuat>().size(), 2U);
+  EXPECT_EQ(reported<wire::TrackerPosQuat>().size(), 2U);
 }
 
 TEST_F(ReporterTest, ZeroToleranceMeansEveryPeriod) {
   config_.linearTolerance_m = 0;
   step();
   step();
-  EXPECT_EQ(said<wire::TrackerPosQuat>().size(), 2U);
+  EXPECT_EQ(reported<wire::TrackerPosQuat>().size(), 2U);
 }
 
-TEST_F(ReporterTest, ContactIsSaidOnChange) {
+TEST_F(ReporterTest, ContactIsReportedOnChange) {
   step();
   touch();
   tick_.device.orientation =
       Eigen::AngleAxisd(M_PI / 3, Vec3::UnitX());  // +Y of the stylus 30 degrees off +Z
   step();
-  EXPECT_EQ(said<wire::TouchedObject>().at(0).object, 3);
-  EXPECT_NEAR(said<wire::Angle>().at(0).angle, 30, 1e-9);
-  EXPECT_EQ(said<wire::Angle>().at(0).touching, 1);
-  EXPECT_EQ(said<wire::Scp>().size(), 1U);
-  EXPECT_EQ(said<wire::IsTouching>().at(0).touching, 1);
+  EXPECT_EQ(reported<wire::TouchedObject>().at(0).object, 3);
+  EXPECT_NEAR(reported<wire::Angle>().at(0).angle, 30, 1e-9);
+  EXPECT_EQ(reported<wire::Angle>().at(0).touching, 1);
+  EXPECT_EQ(reported<wire::Scp>().size(), 1U);
+  EXPECT_EQ(reported<wire::IsTouching>().at(0).touching, 1);
   step();
   EXPECT_EQ(out_.size(), 1U);  // nothing changed: isTouching alone
   tick_.force_N.x() += 0.0009;
   tick_.rendering.depth_m += 0.9e-5;
   step();
-  EXPECT_TRUE(said<wire::Force>().empty());
-  EXPECT_TRUE(said<wire::Dop>().empty());
+  EXPECT_TRUE(reported<wire::Force>().empty());
+  EXPECT_TRUE(reported<wire::Dop>().empty());
   tick_.force_N.x() += 0.0002;
   tick_.rendering.depth_m += 0.2e-5;
   step();
-  EXPECT_EQ(said<wire::Force>().size(), 1U);
-  EXPECT_EQ(said<wire::Dop>().size(), 1U);
+  EXPECT_EQ(reported<wire::Force>().size(), 1U);
+  EXPECT_EQ(reported<wire::Dop>().size(), 1U);
 }
 
-TEST_F(ReporterTest, AForceThatEndsIsSaidToBeNothing) {
+TEST_F(ReporterTest, TheTransitionToZeroForceIsReported) {
   tick_.force_N = Vec3(0.0015, 0, 0);
   step();
-  EXPECT_EQ(said<wire::Force>().size(), 1U);
+  EXPECT_EQ(reported<wire::Force>().size(), 1U);
   tick_.force_N = Vec3(0.0007, 0, 0);
   step();
-  EXPECT_TRUE(said<wire::Force>().empty());
+  EXPECT_TRUE(reported<wire::Force>().empty());
   tick_.force_N = Vec3::Zero();
   step();
-  ASSERT_EQ(said<wire::Force>().size(), 1U);
-  EXPECT_EQ(said<wire::Force>()[0].force, (wire::F64x3{0, 0, 0}));
+  ASSERT_EQ(reported<wire::Force>().size(), 1U);
+  EXPECT_EQ(reported<wire::Force>()[0].force, (wire::F64x3{0, 0, 0}));
   step();
-  EXPECT_TRUE(said<wire::Force>().empty());
+  EXPECT_TRUE(reported<wire::Force>().empty());
 }
 
 TEST_F(ReporterTest, TheEndOfAContactIsReliableAndComplete) {
@@ -182,100 +182,99 @@ TEST_F(ReporterTest, TheEndOfAContactIsReliableAndComplete) {
   tick_.rendering = {};
   tick_.force_N = Vec3::Zero();
   step();  // long before the next report period
-  EXPECT_EQ(said<wire::Force>().at(0).force, (wire::F64x3{0, 0, 0}));
-  EXPECT_EQ(said<wire::Dop>().at(0).depth, 0);
-  EXPECT_EQ(said<wire::TouchedObject>().at(0).object, -1);
-  EXPECT_EQ(said<wire::Angle>().at(0).touching, 0);
-  EXPECT_TRUE(reliably<wire::Force>() && reliably<wire::Dop>() && reliably<wire::TouchedObject>() &&
-              reliably<wire::Angle>());
+  EXPECT_EQ(reported<wire::Force>().at(0).force, (wire::F64x3{0, 0, 0}));
+  EXPECT_EQ(reported<wire::Dop>().at(0).depth, 0);
+  EXPECT_EQ(reported<wire::TouchedObject>().at(0).object, -1);
+  EXPECT_EQ(reported<wire::Angle>().at(0).touching, 0);
+  EXPECT_TRUE(isReliable<wire::Force>() && isReliable<wire::Dop>() && isReliable<wire::TouchedObject>() &&
+              isReliable<wire::Angle>());
   step();
   EXPECT_TRUE(out_.empty());
 }
 
-TEST_F(ReporterTest, ReportRateIsKeptAndButtonsDoNotWait) {
+TEST_F(ReporterTest, TheReportRateIsKeptAndButtonsAreReportedAtOnce) {
   config_.reportRate_Hz = 100;
   step();
   int periods = 0;
   for (int i = 0; i < 1000; ++i) {
     step();
-    periods += static_cast<int>(said<wire::IsTouching>().size());
+    periods += static_cast<int>(reported<wire::IsTouching>().size());
   }
   EXPECT_NEAR(periods, 100, 1);
   step();
   tick_.device.buttons = 2;
   step();
-  ASSERT_EQ(said<wire::ButtonChange>().size(), 1U);
-  EXPECT_EQ(said<wire::ButtonChange>()[0].button, 1);
-  EXPECT_EQ(said<wire::ButtonChange>()[0].state, 1);
+  ASSERT_EQ(reported<wire::ButtonChange>().size(), 1U);
+  EXPECT_EQ(reported<wire::ButtonChange>()[0].button, 1);
+  EXPECT_EQ(reported<wire::ButtonChange>()[0].state, 1);
 }
 
-TEST_F(ReporterTest, SwitchesOfThePaperChangeForceAndQuaternion) {
+TEST_F(ReporterTest, OptionsSelectForceAndQuaternionOrder) {
   config_.forceReport = ForceReport::normal;
   config_.quaternionOrder = QuaternionOrder::wxyz;
   touch();
   step();
-  EXPECT_EQ(said<wire::Force>().at(0).force, (wire::F64x3{0, 0, 1}));
-  EXPECT_EQ(said<wire::TrackerPosQuat>().at(0).orientation, (wire::F64x4{1, 0, 0, 0}));
+  EXPECT_EQ(reported<wire::Force>().at(0).force, (wire::F64x3{0, 0, 1}));
+  EXPECT_EQ(reported<wire::TrackerPosQuat>().at(0).orientation, (wire::F64x4{1, 0, 0, 0}));
 }
 
-TEST_F(ReporterTest, TripsAreSaidOnceAndSoIsRecovery) {
+TEST_F(ReporterTest, TripsAndRecoveryAreReportedOnce) {
   step();
   tick_.guard.active = realtime::bit(realtime::Trip::speed) | realtime::bit(realtime::Trip::slew);
   step();
-  ASSERT_EQ(said<wire::ForceError>().size(), 1U);  // a clamp is no error
-  EXPECT_EQ(said<wire::ForceError>()[0].code, 2);
+  ASSERT_EQ(reported<wire::ForceError>().size(), 1U);  // a clamp is not an error
+  EXPECT_EQ(reported<wire::ForceError>()[0].code, 2);
   step();
-  EXPECT_TRUE(said<wire::ForceError>().empty());
+  EXPECT_TRUE(reported<wire::ForceError>().empty());
   tick_.guard.active = 0;
   step();
-  ASSERT_EQ(said<wire::ForceError>().size(), 1U);
-  EXPECT_EQ(said<wire::ForceError>()[0].code, 4);
+  ASSERT_EQ(reported<wire::ForceError>().size(), 1U);
+  EXPECT_EQ(reported<wire::ForceError>()[0].code, 4);
 }
 
-TEST_F(ReporterTest, ALateJoinerHearsThePresentState) {
+TEST_F(ReporterTest, ALateClientGetsThePresentState) {
   touch();
   tick_.device.buttons = 1;
   for (int i = 0; i < 3; ++i) step();
   out_.clear();
   reporter_->presentState(tick_, frame_, out_);
-  EXPECT_EQ(said<wire::ButtonStates>().at(0).states.values, (std::vector<std::int32_t>{1, 0, 1}));
-  EXPECT_EQ(said<wire::TrackerPosQuat>().size(), 3U);
-  EXPECT_EQ(said<wire::TouchedObject>().at(0).object, 3);
-  EXPECT_EQ(said<wire::IsTouching>().at(0).touching, 1);
-  EXPECT_EQ(said<wire::Force>().size(), 1U);
-  EXPECT_EQ(said<wire::Dop>().size(), 1U);
-  EXPECT_EQ(said<wire::Scp>().size(), 1U);
-  EXPECT_EQ(said<wire::Angle>().size(), 1U);
+  EXPECT_EQ(reported<wire::ButtonStates>().at(0).states.values, (std::vector<std::int32_t>{1, 0, 1}));
+  EXPECT_EQ(reported<wire::TrackerPosQuat>().size(), 3U);
+  EXPECT_EQ(reported<wire::TouchedObject>().at(0).object, 3);
+  EXPECT_EQ(reported<wire::IsTouching>().at(0).touching, 1);
+  EXPECT_EQ(reported<wire::Force>().size(), 1U);
+  EXPECT_EQ(reported<wire::Dop>().size(), 1U);
+  EXPECT_EQ(reported<wire::Scp>().size(), 1U);
+  EXPECT_EQ(reported<wire::Angle>().size(), 1U);
   for (const Outgoing& out : out_) EXPECT_TRUE(out.reliable);
 }
 
 TEST_F(ReporterTest, ContactIsMirroredAsAnalogChannelsAndAButton) {
   touch(0.002);
   step();
-  const auto channels = said<wire::AnalogChannels>().at(0).channels.values;
+  const auto channels = reported<wire::AnalogChannels>().at(0).channels.values;
   ASSERT_EQ(channels.size(), 6U);
   EXPECT_NEAR(channels[0], 0.1, 1e-12);
   EXPECT_NEAR(channels[2], 1.0, 1e-12);
   EXPECT_NEAR(channels[3], 0.002, 1e-12);
   EXPECT_NEAR(channels[4], 90, 1e-9);
   EXPECT_EQ(channels[5], 3);
-  ASSERT_EQ(said<wire::ButtonChange>().size(), 1U);
-  EXPECT_EQ(said<wire::ButtonChange>()[0].button, 2);  // after the device's own two
-  EXPECT_EQ(said<wire::ButtonChange>()[0].state, 1);
+  ASSERT_EQ(reported<wire::ButtonChange>().size(), 1U);
+  EXPECT_EQ(reported<wire::ButtonChange>()[0].button, 2);  // after the device's own two
+  EXPECT_EQ(reported<wire::ButtonChange>()[0].state, 1);
   step();
-  EXPECT_TRUE(said<wire::AnalogChannels>().empty());  // nothing changed
+  EXPECT_TRUE(reported<wire::AnalogChannels>().empty());  // nothing changed
   tick_.rendering = {};
   tick_.force_N = Vec3::Zero();
   step();
-  EXPECT_EQ(said<wire::AnalogChannels>().at(0).channels.values,
-            (std::vector<double>{0, 0, 0, 0, 0, -1}));
-  EXPECT_TRUE(reliably<wire::AnalogChannels>());
-  EXPECT_EQ(said<wire::ButtonChange>().at(0).state, 0);
+  EXPECT_EQ(reported<wire::AnalogChannels>().at(0).channels.values, (std::vector<double>{0, 0, 0, 0, 0, -1}));
+  EXPECT_TRUE(isReliable<wire::AnalogChannels>());
+  EXPECT_EQ(reported<wire::ButtonChange>().at(0).state, 0);
 }
 
-TEST_F(ReporterTest, AGripperIsTheChannelAfterTheContacts) {
+TEST_F(ReporterTest, AGripperIsTheAnalogChannelAfterTheContact) {
   const auto gripper = [&]() -> std::optional<double> {
-    const auto channels = said<wire::AnalogChannels>();
+    const auto channels = reported<wire::AnalogChannels>();
     if (channels.size() != 1 || channels[0].channels.values.size() != 7) return std::nullopt;
     return channels[0].channels.values[6];
   };
@@ -284,7 +283,7 @@ TEST_F(ReporterTest, AGripperIsTheChannelAfterTheContacts) {
   EXPECT_EQ(gripper(), 0.3) << "without any contact";
   tick_.device.gripper_rad = 0.3005;
   step();
-  EXPECT_TRUE(said<wire::AnalogChannels>().empty()) << "less than a milliradian";
+  EXPECT_TRUE(reported<wire::AnalogChannels>().empty()) << "less than a milliradian";
   tick_.device.gripper_rad = 0.2985;
   step();
   EXPECT_EQ(gripper(), 0.2985);
@@ -296,29 +295,29 @@ TEST_F(ReporterTest, AGripperIsTheChannelAfterTheContacts) {
   step();
   EXPECT_EQ(gripper(), 0.1) << "at the end of the contact";
   step();
-  EXPECT_TRUE(said<wire::AnalogChannels>().empty());
+  EXPECT_TRUE(reported<wire::AnalogChannels>().empty());
   std::vector<Outgoing> late;
   reporter_->presentState(tick_, frame_, late);
   out_ = late;
-  EXPECT_EQ(gripper(), 0.1) << "to a client that comes late";
+  EXPECT_EQ(gripper(), 0.1) << "for a late client";
   choice_.kinds = wire::kReportForce;
   start();
   step();
-  EXPECT_TRUE(said<wire::AnalogChannels>().empty()) << "it was not chosen";
+  EXPECT_TRUE(reported<wire::AnalogChannels>().empty()) << "analog reports are not subscribed";
 }
 
-TEST_F(ReporterTest, OnlyWhatWasChosenIsSaid) {
+TEST_F(ReporterTest, OnlySubscribedKindsAreReported) {
   choice_.kinds = wire::kReportButton;
   touch();
   step();
-  EXPECT_EQ(said<wire::ButtonChange>().size(), 1U);
+  EXPECT_EQ(reported<wire::ButtonChange>().size(), 1U);
   EXPECT_EQ(out_.size(), 1U);
   tick_.guard.active = realtime::bit(realtime::Trip::speed);
   step();
-  EXPECT_EQ(said<wire::ForceError>().size(), 1U);  // errors always come
+  EXPECT_EQ(reported<wire::ForceError>().size(), 1U);  // errors are always reported
 }
 
-TEST_F(ReporterTest, AWholeTickIsInTheUnitsOfTheOtherReports) {
+TEST_F(ReporterTest, ATickReportUsesTheUnitsOfTheOtherReports) {
   choice_.kinds = wire::kReportTick;
   tick_.T_world_device = Eigen::Translation3d(500, 0, 0) * Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ()) *
                          Eigen::UniformScaling<double>(2000.0);
@@ -330,7 +329,7 @@ TEST_F(ReporterTest, AWholeTickIsInTheUnitsOfTheOtherReports) {
   touch(0.002);
   step();
   ASSERT_EQ(out_.size(), 1U);
-  const wire::TickReport whole = said<wire::TickReport>().at(0);
+  const wire::TickReport whole = reported<wire::TickReport>().at(0);
   EXPECT_EQ(whole.tick, 1U);
   EXPECT_EQ(whole.time, kMs);
   EXPECT_EQ(whole.revision, 7U);
@@ -352,32 +351,32 @@ TEST_F(ReporterTest, EveryContactOfATickIsListedAndTheEndIsAnEmptyList) {
   tick_.rendering.contacts[0] = {4, 1, Vec3(0.01, 0, 0), Vec3::UnitX(), Vec3(2, 0, 0)};
   tick_.rendering.contacts[1] = {5, 1, Vec3(0, 0.01, 0), Vec3::UnitY(), Vec3(0, 3, 0)};
   step();
-  const auto numbers = said<wire::ContactList>().at(0).contacts.values;
+  const auto numbers = reported<wire::ContactList>().at(0).contacts.values;
   EXPECT_EQ(numbers, (std::vector<double>{4, 0.01, 0, 0, 1, 0, 0, 2, 0, 0,  //
                                           5, 0, 0.01, 0, 0, 1, 0, 0, 3, 0}));
   tick_.rendering = {};
   step();
-  EXPECT_TRUE(said<wire::ContactList>().at(0).contacts.values.empty());
-  EXPECT_TRUE(reliably<wire::ContactList>());
+  EXPECT_TRUE(reported<wire::ContactList>().at(0).contacts.values.empty());
+  EXPECT_TRUE(isReliable<wire::ContactList>());
   step();
   EXPECT_TRUE(out_.empty());
 }
 
-TEST_F(ReporterTest, PosesCountFromTheOriginThatWasSet) {
+TEST_F(ReporterTest, PosesAreRelativeToTheOrigin) {
   config_.linearTolerance_m = 0;
   tick_.rendering.proxy_m = Vec3(0.03, 0.01, 0);
   tick_.device.orientation = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ());
   frame_.origin = Vec3(0.02, 0.01, 0);
-  frame_.turn = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ());
+  frame_.rotation = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ());
   step();
-  const auto pose = said<wire::TrackerPosQuat>().at(0);
+  const auto pose = reported<wire::TrackerPosQuat>().at(0);
   EXPECT_NEAR(pose.position[0], 0, 1e-12);
-  EXPECT_NEAR(pose.position[1], -0.01, 1e-12);  // 10 mm along x, seen by one turned to +y
+  EXPECT_NEAR(pose.position[1], -0.01, 1e-12);  // 10 mm along x in a frame that is rotated to +y
   EXPECT_NEAR(std::abs(pose.orientation[3]), 1, 1e-12);
 }
 
-TEST_F(ReporterTest, TheGuardIsToldOnChange) {
-  const auto states = [this] { return said<wire::GuardState>(); };
+TEST_F(ReporterTest, TheGuardIsReportedOnChange) {
+  const auto states = [this] { return reported<wire::GuardState>(); };
   tick_.guard.armed = true;
   step();
   ASSERT_EQ(states().size(), 1U);

@@ -45,14 +45,14 @@ TEST_F(CommandDecoderTest, NeighbouringVerticesBecomeOneRun) {
   EXPECT_EQ(run.positions[4], geometry::Vec3f(4, 1, 2));
 }
 
-TEST_F(CommandDecoderTest, AnythingElseEndsTheRunAndOrderIsKept) {
+TEST_F(CommandDecoderTest, OtherCommandsEndARunAndKeepTheOrder) {
   give(wire::SetVertex{0, 0, {}});
   give(wire::SetVertex{0, 2, {}});     // a gap
   give(wire::SetVertex{1, 3, {}});     // another object
   give(wire::SetVertex{1, 4, {}}, 2);  // another client
   give(wire::SetObjectNumber{4}, 2);
   give(wire::SetVertex{1, 5, {}}, 2);
-  give(wire::SetVertex{1, -1, {}}, 2);  // negative: the scene refuses it, alone
+  give(wire::SetVertex{1, -1, {}}, 2);  // negative: a separate run, which the scene refuses
   give(wire::SetVertex{1, 0, {}}, 2);
   EXPECT_EQ(decoder_.release().size(), 8U);
   EXPECT_TRUE(decoder_.empty());
@@ -75,14 +75,14 @@ TEST_F(CommandDecoderTest, WrongLengthIsMalformedAndChangesNothing) {
   EXPECT_TRUE(decoder_.empty());
 }
 
-TEST_F(CommandDecoderTest, QuestionsAndReportsAreNoCommands) {
+TEST_F(CommandDecoderTest, ControlMessagesAndReportsAreNotCommands) {
   EXPECT_EQ(give(wire::Ping{}), CommandDecoder::Outcome::notACommand);
   EXPECT_EQ(give(wire::TrackerRequestWorkspace{}), CommandDecoder::Outcome::notACommand);
   EXPECT_EQ(give(wire::Force{}), CommandDecoder::Outcome::notACommand);
   EXPECT_TRUE(decoder_.empty());
 }
 
-TEST_F(CommandDecoderTest, NamesAreCutAtTheFirstNul) {
+TEST_F(CommandDecoderTest, NamesEndAtTheFirstNul) {
   wire::SetHapticProperty property;
   property.property = wire::NameBuffer<20>("static friction");
   property.value = 0.5F;
@@ -204,7 +204,7 @@ TEST_F(CommandDecoderTest, BulkMeshesAreRunsInTheMeshesOwnUnit) {
   EXPECT_EQ(triangles.triangles[1][2], std::numeric_limits<std::uint32_t>::max());
 }
 
-TEST_F(CommandDecoderTest, BulkListsOfBrokenTriplesAreMalformed) {
+TEST_F(CommandDecoderTest, BulkListsOfIncompleteTriplesAreMalformed) {
   EXPECT_EQ(give(wire::MeshVertices{0, 0, {{0, 1}}}), CommandDecoder::Outcome::malformed);
   EXPECT_EQ(give(wire::MeshTriangles{0, 0, {{0, 1, 2, 3}}}), CommandDecoder::Outcome::malformed);
   EXPECT_TRUE(decoder_.empty());

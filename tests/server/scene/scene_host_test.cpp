@@ -1,4 +1,5 @@
-// One scene host alone: a real scene thread, a net thread made of the test, and a gate that holds the scene up.
+// One scene host with a real scene thread; the test acts as the net thread, and a gate blocks the scene
+// thread.
 #include "server/scene/scene_host.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +14,7 @@
 namespace hapticd::server {
 namespace {
 
-// Runs what the scene thread posts to the net thread.
+// Runs functions that the scene thread posts to the net thread.
 class NetThread {
  public:
   void post(std::function<void()> function) {
@@ -61,7 +62,7 @@ class SceneHostTest : public ::testing::Test {
     host_.stop();
   }
 
-  // The scene thread stands still from here until open().
+  // Blocks the scene thread until open().
   void close() {
     auto entered = std::make_shared<std::latch>(1);
     host_.describe([entered, gate = gate_](const auto&) {
@@ -83,7 +84,7 @@ class SceneHostTest : public ::testing::Test {
     received.payload = payload;
     return host_.take(client, received, error_);
   }
-  // As many vertices as one read of the server holds, until the client is full.
+  // Flushes as many vertices as one read contains, until the client is full.
   void flood(scene::ClientId client) {
     for (std::int32_t next = 0; !host_.full(client);) {
       for (int i = 0; i < 5000; ++i) ASSERT_TRUE(give(client, wire::SetVertex{static_cast<std::int32_t>(client), next++, {}}));
@@ -100,7 +101,7 @@ class SceneHostTest : public ::testing::Test {
   std::string error_;
 };
 
-TEST_F(SceneHostTest, OnlyTheClientThatFloodsIsFullAndItIsRelievedWhenTheSceneGoesOn) {
+TEST_F(SceneHostTest, OnlyTheClientThatFloodsIsFullUntilTheSceneCatchesUp) {
   close();
   flood(1);
   EXPECT_FALSE(host_.full(2));
@@ -114,7 +115,7 @@ TEST_F(SceneHostTest, OnlyTheClientThatFloodsIsFullAndItIsRelievedWhenTheSceneGo
   EXPECT_FALSE(host_.full(1));
 }
 
-TEST_F(SceneHostTest, AClientWithNothingInTheQueueWaitsForNobody) {
+TEST_F(SceneHostTest, AClientWithoutQueuedCommandsDoesNotWait) {
   close();
   flood(1);
   bool reached = false;
@@ -133,8 +134,8 @@ TEST_F(SceneHostTest, AClientWaitsUntilItsOwnCommandsArePublished) {
   net_.until([&] { return reached; });
 }
 
-// The builder waits for a pause between edits before it makes a mesh.
-TEST_F(SceneHostTest, AMeshCountsAsPublishedWhenTheServoCanFeelIt) {
+// The builder waits for a pause between edits before it builds a mesh.
+TEST_F(SceneHostTest, AMeshIsPublishedOnlyWhenTheServoHasIt) {
   ASSERT_TRUE(give(1, wire::SetObjectNumber{1}));
   ASSERT_TRUE(give(1, wire::MeshVertices{0, 0, {{0, 0, 0, 9, 0, 0, 0, 9, 0}}}));
   ASSERT_TRUE(give(1, wire::MeshTriangles{0, 0, {{0, 1, 2}}}));
@@ -151,7 +152,7 @@ TEST_F(SceneHostTest, AMeshCountsAsPublishedWhenTheServoCanFeelIt) {
   EXPECT_TRUE(felt);
 }
 
-TEST_F(SceneHostTest, TheForcesOfALostClientEndBeforeWhatItSentLast) {
+TEST_F(SceneHostTest, TheForcesOfALostClientEndBeforeItsQueuedCommandsAreApplied) {
   const wire::ForceField field{.origin = {0, 0, 0}, .force = {0, 1, 0}, .jacobian = {}, .radius = 10};
   ASSERT_TRUE(give(1, field));
   bool reached = false;
@@ -166,7 +167,7 @@ TEST_F(SceneHostTest, TheForcesOfALostClientEndBeforeWhatItSentLast) {
   flood(1);
   host_.releaseForces(1);
   open();
-  // The first snapshot after the gate opens has the release, long before the last vertex.
+  // The first snapshot after the gate opens contains the release, long before the last vertex.
   const scene::SceneSnapshot* after = before;
   net_.until([&] { return !relieved_.empty(); });
   after = slot_.take();

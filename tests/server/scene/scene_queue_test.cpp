@@ -1,4 +1,4 @@
-// Who fills the scene queue, and who has to wait for it.
+// Order and limits of the scene queue, for each client.
 #include "server/scene/scene_queue.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ SceneParcel parcel(scene::ClientId client, std::size_t bytes) {
   return parcel;
 }
 
-TEST(SceneQueueTest, ParcelsLeaveInTheOrderOfArrivalWhoeverSentThem) {
+TEST(SceneQueueTest, ParcelsOfAllClientsAreTakenInOrderOfArrival) {
   SceneQueue queue;
   queue.push(parcel(1, 10));
   queue.push(parcel(2, 20));
@@ -26,14 +26,14 @@ TEST(SceneQueueTest, ParcelsLeaveInTheOrderOfArrivalWhoeverSentThem) {
   EXPECT_TRUE(queue.empty());
 }
 
-TEST(SceneQueueTest, AnUrgentParcelGoesBeforeAllOthers) {
+TEST(SceneQueueTest, AnUrgentParcelIsTakenFirst) {
   SceneQueue queue;
   queue.push(parcel(1, 10));
   queue.pushFront(parcel(2, 0));
   EXPECT_EQ(queue.take()->client, 2U);
 }
 
-TEST(SceneQueueTest, OnlyTheClientThatFillsTheQueueIsFull) {
+TEST(SceneQueueTest, OnlyTheClientThatExceedsTheLimitIsFull) {
   SceneQueue queue;
   queue.push(parcel(1, 5 * kMiB));
   queue.push(parcel(2, 100));
@@ -73,7 +73,7 @@ TEST(SceneQueueTest, AClientIsPendingUntilItsLastEditIsPublished) {
   EXPECT_TRUE(queue.pending(1));
   queue.take();
   queue.done(1, 10, 100);
-  queue.published(100);  // an edit of that moment still waits
+  queue.published(100);  // an edit at exactly this time is not yet published
   EXPECT_TRUE(queue.pending(1));
   queue.published(101);
   EXPECT_FALSE(queue.pending(1));

@@ -8,7 +8,7 @@ namespace {
 using Verdict = HeartbeatWatch::Verdict;
 constexpr base::Nanos kMillisecond = 1'000'000;
 
-TEST(HeartbeatWatchTest, AClientThatPromisedNothingIsNeverLost) {
+TEST(HeartbeatWatchTest, AClientThatDidNotOptInIsNeverLost) {
   HeartbeatWatch watch;
   EXPECT_EQ(watch.check(1'000'000 * kMillisecond), Verdict::alive);
 }
@@ -22,14 +22,14 @@ TEST(HeartbeatWatchTest, SilenceBeyondTheLimitIsLoss) {
   EXPECT_EQ(watch.check(1002 * kMillisecond), Verdict::alive);
 }
 
-TEST(HeartbeatWatchTest, APromiseCanBeTakenBack) {
+TEST(HeartbeatWatchTest, AClientCanOptOut) {
   HeartbeatWatch watch;
   watch.beat(0);
-  watch.forget();
+  watch.disable();
   EXPECT_EQ(watch.check(10'000 * kMillisecond), Verdict::alive);
 }
 
-TEST(HeartbeatWatchTest, TheServersOwnPauseIsNotSilenceAndTheLimitCountsFromItsEnd) {
+TEST(HeartbeatWatchTest, APauseOfTheServerIsNotSilenceAndTheLimitCountsFromItsEnd) {
   HeartbeatWatch watch;
   watch.beat(0);
   watch.pause(400 * kMillisecond);
@@ -39,12 +39,12 @@ TEST(HeartbeatWatchTest, TheServersOwnPauseIsNotSilenceAndTheLimitCountsFromItsE
   EXPECT_EQ(watch.check(3501 * kMillisecond), Verdict::lost);
 }
 
-TEST(HeartbeatWatchTest, PausesExcuseFiveSecondsInARowAndThatIsReportedOnce) {
+TEST(HeartbeatWatchTest, PausesExcuseFiveSecondsInTotalAndThatIsReportedOnce) {
   HeartbeatWatch watch;
   watch.beat(0);
   watch.pause(0);
   watch.resume(3000 * kMillisecond);
-  watch.pause(3100 * kMillisecond);  // no heartbeat in between: the same row
+  watch.pause(3100 * kMillisecond);  // no heartbeat in between: the pauses add up
   EXPECT_EQ(watch.check(5100 * kMillisecond), Verdict::alive);
   EXPECT_EQ(watch.check(5101 * kMillisecond), Verdict::excused);
   EXPECT_EQ(watch.check(5200 * kMillisecond), Verdict::alive);
@@ -52,7 +52,7 @@ TEST(HeartbeatWatchTest, PausesExcuseFiveSecondsInARowAndThatIsReportedOnce) {
   EXPECT_EQ(watch.check(5400 * kMillisecond), Verdict::alive) << "the connection stays";
 }
 
-TEST(HeartbeatWatchTest, AHeartbeatBeginsANewRowOfPauses) {
+TEST(HeartbeatWatchTest, AHeartbeatRenewsTheExcuse) {
   HeartbeatWatch watch;
   watch.beat(0);
   watch.pause(0);

@@ -20,7 +20,7 @@ wire::MessageReceived messageOf(std::int32_t number, const std::vector<std::byte
   return message;
 }
 
-TEST(MessageBacklogTest, MessagesComeBackAsTheyWereAndInOrder) {
+TEST(MessageBacklogTest, MessagesAreReturnedUnchangedAndInOrder) {
   MessageBacklog backlog;
   EXPECT_TRUE(backlog.empty());
   std::mt19937 random(1);
@@ -46,7 +46,7 @@ TEST(MessageBacklogTest, MessagesComeBackAsTheyWereAndInOrder) {
   EXPECT_EQ(backlog.size(), 0U);
 }
 
-TEST(MessageBacklogTest, ItsSizeCountsWhatIsLeft) {
+TEST(MessageBacklogTest, SizeCountsTheRemainingBytes) {
   MessageBacklog backlog;
   const std::vector<std::byte> payload(1000);
   backlog.push(messageOf(0, payload), 0);

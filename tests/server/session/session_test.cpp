@@ -20,7 +20,7 @@ class CountingOwner final : public SessionOwner {
  public:
   void onSubscribed(Session& /*session*/, wire::LocalSender /*name*/) override {}
   void onMessage(Session& /*session*/, const wire::MessageReceived& /*message*/, base::Nanos) override { ++messages; }
-  void onRemark(const Session& /*session*/, const std::string& /*text*/) override {}
+  void onWarning(const Session& /*session*/, const std::string& /*text*/) override {}
   void onReadSlice() override {
     mostBetween = std::max(mostBetween, messages - last);
     last = messages;
@@ -30,7 +30,7 @@ class CountingOwner final : public SessionOwner {
     mostBetween = std::max(mostBetween, messages - last);
     last = messages;
   }
-  void onDeparted(Session& /*session*/, const std::string& /*reason*/) override {}
+  void onPeerGone(Session& /*session*/, const std::string& /*reason*/) override {}
   void onClosed(Session& /*session*/, const std::string& reason) override { closed = reason; }
 
   std::size_t messages = 0;
@@ -40,7 +40,7 @@ class CountingOwner final : public SessionOwner {
   std::string closed;
 };
 
-// The greeting of a client that calls itself `Phantom`, and then so many pings.
+// The handshake of a client with the sender `Phantom`, then `count` pings.
 std::vector<std::byte> pings(std::size_t count) {
   wire::LocalNames names;
   names.addSender("Phantom");
@@ -77,7 +77,7 @@ TEST(Session, ReportsSlicesOfALongRead) {
   EXPECT_EQ(owner.messages, kPings);
   EXPECT_EQ(owner.closed, "");
   EXPECT_GE(owner.slices, 1U);
-  EXPECT_LE(owner.mostBetween, 8 * 1024 / wire::kHeaderBytes + 1);  // one was cut
+  EXPECT_LE(owner.mostBetween, 8 * 1024 / wire::kHeaderBytes + 1);  // one frame spans the boundary
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
-// A device that is lost, refuses, and comes back, by a script: what its keeper does and says at which time.
+// DeviceKeeper with a scripted device that is lost, refuses to open, and recovers: its actions and texts over
+// time.
 #include "base/clock.h"
 #include "server/station/device_keeper.h"
 
@@ -32,7 +33,7 @@ bool eventually(const std::function<bool()>& condition) {
   return true;
 }
 
-// Counts what is done to it, and by which rules it was not.
+// Counts the calls, and reads while it is closed.
 class ScriptedDevice final : public device::Device {
  public:
   explicit ScriptedDevice(bool selfPaced) : selfPaced_(selfPaced) {}
@@ -42,7 +43,7 @@ class ScriptedDevice final : public device::Device {
     ++opens;
     while (openBlocks) std::this_thread::sleep_for(1ms);
     const std::lock_guard lock(mutex_);
-    if (!refusal_.empty()) throw std::runtime_error(refusal_);
+    if (!openError_.empty()) throw std::runtime_error(openError_);
     isOpen = true;
     isLost = false;
   }
@@ -86,9 +87,9 @@ class ScriptedDevice final : public device::Device {
     if (thread_.joinable()) thread_.join();
   }
 
-  void refuse(const std::string& words) {
+  void refuse(const std::string& reason) {
     const std::lock_guard lock(mutex_);
-    refusal_ = words;
+    openError_ = text;
   }
 
   std::atomic<int> opens{0}, closes{0}, reads{0}, readsWhileClosed{0};
@@ -100,7 +101,7 @@ class ScriptedDevice final : public device::Device {
   const bool selfPaced_;
   const device::DeviceProfile profile_;
   std::mutex mutex_;
-  std::string refusal_;
+  std::string openError_;
   std::thread thread_;
   std::atomic<bool> leave_{false};
 };
@@ -122,20 +123,20 @@ class KeeperTest : public testing::TestWithParam<bool> {
     std::this_thread::sleep_for(20ms);
     EXPECT_EQ(device_.reads, before);
   }
-  // Lost, and for long enough.
+  // Loses the device for long enough to be reopened.
   void loseAt(Nanos now) {
     device_.isLost = true;
-    EXPECT_EQ(keeper_.look(now), "the cable is out");
-    keeper_.look(now + 501 * kMs);
+    EXPECT_EQ(keeper_.poll(now), "the cable is out");
+    keeper_.poll(now + 501 * kMs);
   }
-  // What is said at this time when no attempt is under way any more.
-  std::string saidAt(Nanos now) {
-    std::string words;
+  // The fault text at this time, after a running attempt ended.
+  std::string faultAt(Nanos now) {
+    std::string fault;
     EXPECT_TRUE(eventually([&] {
-      words = keeper_.look(now);
-      return words != "the device is being opened anew";
+      fault = keeper_.poll(now);
+      return fault != "the device is being reopened";
     }));
-    return words;
+    return fault;
   }
 
   ScriptedDevice device_{GetParam()};
@@ -148,120 +149,120 @@ TEST_P(KeeperTest, TheLoopRunsUntilStopped) {
   expectNoLoop();
   keeper_.start();
   EXPECT_TRUE(loopRuns());
-  EXPECT_EQ(keeper_.look(0), "");
+  EXPECT_EQ(keeper_.poll(0), "");
   keeper_.stop();
   expectNoLoop();
   keeper_.stop();
-  EXPECT_EQ(device_.opens + device_.closes, 0) << "it was opened by somebody else, who closes it";
+  EXPECT_EQ(device_.opens + device_.closes, 0) << "the owner of the device opens and closes it";
 }
 
-TEST_P(KeeperTest, ACalibrationIsDoneBesideTheLoop) {
+TEST_P(KeeperTest, CalibratesWhileTheLoopRuns) {
   keeper_.start();
   device_.isCalibrated = false;
-  EXPECT_EQ(keeper_.look(1000 * kMs), "not calibrated");
-  EXPECT_EQ(device_.calibrations, 0) << "nobody asked";
+  EXPECT_EQ(keeper_.poll(1000 * kMs), "not calibrated");
+  EXPECT_EQ(device_.calibrations, 0) << "no calibration was requested";
   device_.calibrationBlocks = true;
   keeper_.calibrate();
   keeper_.calibrate();
-  EXPECT_EQ(keeper_.look(1050 * kMs), "the device is being calibrated: keep hands off");
+  EXPECT_EQ(keeper_.poll(1050 * kMs), "the device is being calibrated: keep hands off");
   EXPECT_TRUE(loopRuns());
   device_.calibrationBlocks = false;
-  EXPECT_TRUE(eventually([&] { return keeper_.look(1100 * kMs).empty(); }));
+  EXPECT_TRUE(eventually([&] { return keeper_.poll(1100 * kMs).empty(); }));
   EXPECT_EQ(device_.calibrations, 1);
   EXPECT_EQ(device_.opens + device_.closes, 0);
 }
 
-TEST_P(KeeperTest, ACalibrationThatFailsSaysWhyUntilOneSucceeds) {
+TEST_P(KeeperTest, ReportsAFailedCalibrationUntilOneSucceeds) {
   keeper_.start();
   device_.isCalibrated = false;
   device_.calibrationFails = true;
   keeper_.calibrate();
   EXPECT_TRUE(eventually([&] {
-    return keeper_.look(1000 * kMs) == "not calibrated; the last calibration: a hand was in the way";
+    return keeper_.poll(1000 * kMs) == "not calibrated; the last calibration failed: a hand was in the way";
   }));
   device_.calibrationFails = false;
   keeper_.calibrate();
-  EXPECT_TRUE(eventually([&] { return keeper_.look(1100 * kMs).empty(); }));
+  EXPECT_TRUE(eventually([&] { return keeper_.poll(1100 * kMs).empty(); }));
   device_.isCalibrated = false;
-  EXPECT_EQ(keeper_.look(1200 * kMs), "not calibrated");
+  EXPECT_EQ(keeper_.poll(1200 * kMs), "not calibrated");
 }
 
-TEST_P(KeeperTest, AShortLossIsToldAndNothingElse) {
+TEST_P(KeeperTest, AShortLossIsReportedWithoutReopening) {
   keeper_.start();
   device_.isLost = true;
-  EXPECT_EQ(keeper_.look(1000 * kMs), "the cable is out");
-  EXPECT_EQ(keeper_.look(1500 * kMs), "the cable is out");
+  EXPECT_EQ(keeper_.poll(1000 * kMs), "the cable is out");
+  EXPECT_EQ(keeper_.poll(1500 * kMs), "the cable is out");
   device_.isLost = false;
-  EXPECT_EQ(keeper_.look(1600 * kMs), "");
-  device_.isLost = true;  // another one, which counts anew
-  EXPECT_EQ(keeper_.look(1700 * kMs), "the cable is out");
-  EXPECT_EQ(keeper_.look(2200 * kMs), "the cable is out");
+  EXPECT_EQ(keeper_.poll(1600 * kMs), "");
+  device_.isLost = true;  // a new loss starts a new interval
+  EXPECT_EQ(keeper_.poll(1700 * kMs), "the cable is out");
+  EXPECT_EQ(keeper_.poll(2200 * kMs), "the cable is out");
   EXPECT_EQ(device_.opens + device_.closes, 0);
   EXPECT_TRUE(loopRuns());
 }
 
-TEST_P(KeeperTest, ALostDeviceIsOpenedAnewWhileNoLoopRuns) {
+TEST_P(KeeperTest, ReopensALostDeviceWhileNoLoopRuns) {
   keeper_.start();
   EXPECT_TRUE(loopRuns());
   device_.openBlocks = true;
   loseAt(1000 * kMs);
   EXPECT_TRUE(eventually([&] { return device_.opens == 1; }));
   EXPECT_EQ(device_.closes, 1);
-  EXPECT_EQ(keeper_.look(1600 * kMs), "the device is being opened anew");
-  EXPECT_EQ(keeper_.look(60'000 * kMs), "the device is being opened anew") << "however long it takes";
+  EXPECT_EQ(keeper_.poll(1600 * kMs), "the device is being reopened");
+  EXPECT_EQ(keeper_.poll(60'000 * kMs), "the device is being reopened") << "while the attempt runs";
   expectNoLoop();
   device_.openBlocks = false;
-  EXPECT_EQ(saidAt(60'001 * kMs), "");
+  EXPECT_EQ(faultAt(60'001 * kMs), "");
   EXPECT_TRUE(loopRuns());
   EXPECT_EQ(device_.opens, 1);
 }
 
-TEST_P(KeeperTest, ARefusalIsToldInItsWordsAndTriedAgainEveryTwoSeconds) {
+TEST_P(KeeperTest, ReportsAFailureToOpenAndRetriesEveryTwoSeconds) {
   keeper_.start();
   device_.refuse("no arm on this machine; plug it in");
   loseAt(1000 * kMs);
   const auto refused =
       AllOf(HasSubstr("does not open: no arm on this machine; plug it in"), HasSubstr("every 2 s"));
   Nanos now = 2000 * kMs;
-  EXPECT_THAT(saidAt(now), refused);
+  EXPECT_THAT(faultAt(now), refused);
   for (int attempts = 1; attempts < 4; ++attempts) {
     EXPECT_EQ(device_.opens, attempts);
-    EXPECT_EQ(device_.closes, 2 * attempts) << "before it, and after it failed";
-    EXPECT_THAT(keeper_.look(now + 1999 * kMs), refused);
+    EXPECT_EQ(device_.closes, 2 * attempts) << "before each attempt and after its failure";
+    EXPECT_THAT(keeper_.poll(now + 1999 * kMs), refused);
     EXPECT_EQ(device_.opens, attempts);
     now += 2000 * kMs;
-    EXPECT_THAT(keeper_.look(now), refused) << "what is known until the new attempt ends";
-    EXPECT_THAT(saidAt(now), refused);
+    EXPECT_THAT(keeper_.poll(now), refused) << "the old error stays until the new attempt ends";
+    EXPECT_THAT(faultAt(now), refused);
   }
   expectNoLoop();
   device_.refuse("");
-  keeper_.look(now + 2000 * kMs);
-  EXPECT_EQ(saidAt(now + 2001 * kMs), "");
+  keeper_.poll(now + 2000 * kMs);
+  EXPECT_EQ(faultAt(now + 2001 * kMs), "");
   EXPECT_TRUE(loopRuns());
   EXPECT_EQ(device_.opens, 5);
 }
 
-TEST_P(KeeperTest, ANewRefusalReplacesTheWords) {
+TEST_P(KeeperTest, ANewFailureReplacesTheText) {
   keeper_.start();
   device_.refuse("no power");
   loseAt(1000 * kMs);
-  EXPECT_THAT(saidAt(2000 * kMs), HasSubstr("no power"));
+  EXPECT_THAT(faultAt(2000 * kMs), HasSubstr("no power"));
   device_.refuse("no permission");
-  keeper_.look(4000 * kMs);
-  EXPECT_THAT(saidAt(4001 * kMs), AllOf(HasSubstr("no permission"), testing::Not(HasSubstr("no power"))));
+  keeper_.poll(4000 * kMs);
+  EXPECT_THAT(faultAt(4001 * kMs), AllOf(HasSubstr("no permission"), testing::Not(HasSubstr("no power"))));
 }
 
-TEST_P(KeeperTest, ItCanBeLostAgain) {
+TEST_P(KeeperTest, ReopensRepeatedly) {
   keeper_.start();
   for (int time = 1; time <= 3; ++time) {
     loseAt(time * 10'000 * kMs);
-    EXPECT_EQ(saidAt(time * 10'000 * kMs + 600 * kMs), "");
+    EXPECT_EQ(faultAt(time * 10'000 * kMs + 600 * kMs), "");
     EXPECT_EQ(device_.opens, time);
     EXPECT_TRUE(loopRuns());
   }
 }
 
-TEST_P(KeeperTest, StoppingWaitsForAnAttemptAndEndsItsLoop) {
+TEST_P(KeeperTest, StopWaitsForAnAttemptAndEndsItsLoop) {
   keeper_.start();
   device_.openBlocks = true;
   loseAt(1000 * kMs);
@@ -272,19 +273,19 @@ TEST_P(KeeperTest, StoppingWaitsForAnAttemptAndEndsItsLoop) {
     stopped = true;
   });
   std::this_thread::sleep_for(20ms);
-  EXPECT_FALSE(stopped) << "a driver is in the middle of opening";
+  EXPECT_FALSE(stopped) << "the driver is still opening the device";
   device_.openBlocks = false;
   other.join();
-  EXPECT_TRUE(device_.isOpen) << "for whoever closes it";
+  EXPECT_TRUE(device_.isOpen) << "its owner closes it";
   expectNoLoop();
   EXPECT_EQ(device_.opens, 1);
 }
 
-TEST_P(KeeperTest, StoppingARefusedDeviceLeavesItClosed) {
+TEST_P(KeeperTest, StopLeavesADeviceThatFailedToOpenClosed) {
   keeper_.start();
   device_.refuse("no power");
   loseAt(1000 * kMs);
-  EXPECT_THAT(saidAt(2000 * kMs), HasSubstr("no power"));
+  EXPECT_THAT(faultAt(2000 * kMs), HasSubstr("no power"));
   keeper_.stop();
   EXPECT_FALSE(device_.isOpen);
   EXPECT_EQ(device_.opens, 1);
@@ -297,15 +298,15 @@ INSTANTIATE_TEST_SUITE_P(Loop, KeeperTest, testing::Bool(), [](const auto& insta
 
 class SelfPacedKeeperTest : public KeeperTest {};
 
-TEST_P(SelfPacedKeeperTest, ALoopThatDoesNotStartIsARefusal) {
+TEST_P(SelfPacedKeeperTest, ALoopThatDoesNotStartIsAFailureToOpen) {
   keeper_.start();
   device_.startFails = true;
   loseAt(1000 * kMs);
-  EXPECT_THAT(saidAt(2000 * kMs), HasSubstr("does not open: the scheduler is refused"));
-  EXPECT_FALSE(device_.isOpen) << "nothing is left half open";
+  EXPECT_THAT(faultAt(2000 * kMs), HasSubstr("does not open: the scheduler is refused"));
+  EXPECT_FALSE(device_.isOpen) << "a failed attempt closes the device";
   device_.startFails = false;
-  keeper_.look(4000 * kMs);
-  EXPECT_EQ(saidAt(4001 * kMs), "");
+  keeper_.poll(4000 * kMs);
+  EXPECT_EQ(faultAt(4001 * kMs), "");
   EXPECT_TRUE(loopRuns());
 }
 

@@ -1,4 +1,4 @@
-// Small parts between clients and a device: buttons, roles, holding the hand, black boxes.
+// Small parts between clients and a device: buttons, roles, steering the hand, stop and re-arm, black boxes.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -19,19 +19,19 @@ namespace {
 namespace fs = std::filesystem;
 using geometry::Vec3;
 
-TEST(ButtonModes, AToggleChangesWhenItsButtonGoesDown) {
+TEST(ButtonModes, AToggleChangesWhenItsButtonIsPressed) {
   ButtonModes modes(2);
   std::vector<wire::ButtonAlert> alerts;
   std::string error;
-  EXPECT_EQ(modes.apply(1, alerts), 1U);  // momentary at first
+  EXPECT_EQ(modes.apply(1, alerts), 1U);  // initially momentary
   EXPECT_EQ(modes.apply(0, alerts), 0U);
   EXPECT_TRUE(alerts.empty());
 
-  ASSERT_TRUE(modes.obey({0, wire::kButtonToggleOff}, alerts, error));
+  ASSERT_TRUE(modes.setMode({0, wire::kButtonToggleOff}, alerts, error));
   EXPECT_EQ(alerts.size(), 1U);
   alerts.clear();
   EXPECT_EQ(modes.apply(1, alerts), 1U);
-  EXPECT_EQ(modes.apply(1, alerts), 1U);  // held
+  EXPECT_EQ(modes.apply(1, alerts), 1U);  // held down
   EXPECT_EQ(modes.apply(0, alerts), 1U);  // released, still on
   ASSERT_EQ(alerts.size(), 1U);
   EXPECT_EQ(alerts[0].event, wire::kButtonToggleOn);
@@ -40,28 +40,28 @@ TEST(ButtonModes, AToggleChangesWhenItsButtonGoesDown) {
   EXPECT_EQ(alerts[1].event, wire::kButtonToggleOff);
 }
 
-TEST(ButtonModes, AllButtonsAndStartingOn) {
+TEST(ButtonModes, SetsAllButtonsAndTogglesThatAreInitiallyOn) {
   ButtonModes modes(2);
   std::vector<wire::ButtonAlert> alerts;
   std::string error;
-  ASSERT_TRUE(modes.obey({wire::kAllButtons, wire::kButtonToggleOn}, alerts, error));
+  ASSERT_TRUE(modes.setMode({wire::kAllButtons, wire::kButtonToggleOn}, alerts, error));
   EXPECT_EQ(modes.apply(0, alerts), 3U);
-  ASSERT_TRUE(modes.obey({1, wire::kButtonMomentary}, alerts, error));
+  ASSERT_TRUE(modes.setMode({1, wire::kButtonMomentary}, alerts, error));
   EXPECT_EQ(modes.apply(0, alerts), 1U);
 }
 
-TEST(ButtonModes, RefusesWhatDoesNotExist) {
+TEST(ButtonModes, RefusesUnknownButtonsAndModes) {
   ButtonModes modes(2);
   std::vector<wire::ButtonAlert> alerts;
   std::string error;
-  EXPECT_FALSE(modes.obey({2, wire::kButtonToggleOn}, alerts, error));
+  EXPECT_FALSE(modes.setMode({2, wire::kButtonToggleOn}, alerts, error));
   EXPECT_NE(error.find("button 2 refused"), std::string::npos);
-  EXPECT_FALSE(modes.obey({0, 11}, alerts, error));
+  EXPECT_FALSE(modes.setMode({0, 11}, alerts, error));
   EXPECT_NE(error.find("mode 11 refused"), std::string::npos);
   EXPECT_TRUE(alerts.empty());
 }
 
-TEST(Roles, AnyFirstAndList) {
+TEST(Roles, PermitsAnyTheFirstOrListedClients) {
   Roles any(Control::any, {});
   EXPECT_TRUE(any.mayCommand(1, "10.0.0.1") && any.mayCommand(2, "10.0.0.2"));
 
@@ -85,7 +85,7 @@ class HoldTest : public ::testing::Test {
     last_.tick = 1;
     last_.T_world_device = Eigen::Translation3d(100, 0, 0) * Eigen::UniformScaling<double>(1000.0);
   }
-  // Where the hand is after a second.
+  // The position of the hand after two seconds.
   Vec3 handLater() {
     device::DeviceState state;
     for (int i = 0; i < 2000; ++i) {
@@ -118,7 +118,7 @@ TEST_F(HoldTest, ARearmNeverUndoesALaterStop) {
   EXPECT_TRUE(control_.rearmForces(order(201, 151, "10.0.0.1")));
 }
 
-TEST_F(HoldTest, TheHandGoesWhereItsHolderWantsAndBackWhenLetGo) {
+TEST_F(HoldTest, TheHandFollowsItsHolderAndReturnsWhenReleased) {
   hand_.open();
   ASSERT_TRUE(control_.hold(1, {.hold = 1, .position = {110, 20, 0}}, last_, refusal_)) << refusal_.text;
   EXPECT_NEAR((handLater() - Vec3(0.01, 0.02, 0)).norm(), 0, 1e-4);
@@ -133,13 +133,13 @@ TEST_F(HoldTest, TheHandGoesWhereItsHolderWantsAndBackWhenLetGo) {
   EXPECT_NEAR((handLater() - Vec3(0, 0, 0.01)).norm(), 0, 1e-4);
 }
 
-TEST_F(HoldTest, NoHandReachesBeyondItsArm) {
+TEST_F(HoldTest, TargetsAreClampedToTheWorkspace) {
   hand_.open();
   ASSERT_TRUE(control_.hold(1, {.hold = 1, .position = {100, 20000, 0}}, last_, refusal_));
   EXPECT_NEAR((handLater() - Vec3(0, hand_.profile().workspace_m.max.y(), 0)).norm(), 0, 1e-4);
 }
 
-TEST_F(HoldTest, RefusesWhatIsNoPoseAndRealDevices) {
+TEST_F(HoldTest, RefusesInvalidPosesAndRealDevices) {
   EXPECT_FALSE(control_.hold(1, {.hold = 1, .position = {NAN, 0, 0}}, last_, refusal_));
   EXPECT_EQ(refusal_.code, RefusalCode::handPoseInvalid);
   EXPECT_FALSE(control_.hold(1, {.hold = 1, .orientation = {0, 0, 0, 0}}, last_, refusal_));
@@ -176,13 +176,13 @@ class BlackBoxFilesTest : public ::testing::Test {
   fs::path directory_;
 };
 
-TEST_F(BlackBoxFilesTest, AFaultIsWrittenWithTheTicksBeforeIt) {
+TEST_F(BlackBoxFilesTest, WritesAFaultWithTheTicksBeforeIt) {
   realtime::BlackBox box(5);
   BlackBoxRecorder recorder("Phantom/1", {directory_, 3}, box);
-  recorder.look();
+  recorder.poll();
   EXPECT_FALSE(fs::exists(directory_));
   fail(box, 8);
-  recorder.look();
+  recorder.poll();
   recorder.finish();
   ASSERT_EQ(files().size(), 1U);
   EXPECT_NE(files()[0].filename().string().find("-speed.csv"), std::string::npos);
@@ -208,14 +208,14 @@ TEST_F(BlackBoxFilesTest, AFaultIsWrittenWithTheTicksBeforeIt) {
   EXPECT_EQ(cell(5, "device"), "Phantom/1");
 }
 
-TEST_F(BlackBoxFilesTest, OnlyTheNewestAreKept) {
+TEST_F(BlackBoxFilesTest, KeepsOnlyTheNewestFiles) {
   realtime::BlackBox box(5);
   BlackBoxRecorder recorder("Phantom/1", {directory_, 2}, box);
   for (int i = 0; i < 4; ++i) {
     fail(box, 2);
-    recorder.look();
+    recorder.poll();
     recorder.finish();
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));  // the names hold milliseconds
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));  // file names have a resolution of 1 ms
   }
   EXPECT_EQ(files().size(), 2U);
 }

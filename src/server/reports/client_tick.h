@@ -1,4 +1,4 @@
-// A tick in the client's terms.
+// A tick in the client's frame and units.
 #pragma once
 
 #include <optional>
@@ -8,24 +8,26 @@
 
 namespace hapticd::server {
 
-/// Reported lengths are world units over this: metres when the world is in millimetres, as the paper has it.
+/// Reported lengths are world units divided by this: metres when one world unit is a millimetre, as in the
+/// paper.
 inline constexpr double kWorldPerReported = 1000;
 
-/// What the hand feels in one tick: reported metres, the world's frame, newtons.
-struct View {
-  geometry::Vec3 proxy, hip, scp, velocity, force_N;
+/// One tick in the world frame: lengths in reported metres (world units / 1000), forces in newtons.
+struct ClientTick {
+  geometry::Vec3 proxy, hip, scp, velocity, force_N;  ///< `velocity`: reported metres per second
   geometry::Quat orientation;
   geometry::Vec3 angularVelocity;  ///< rad/s
   bool touching = false;
   std::int32_t object = -1;
-  double depth = 0;
+  double depth = 0;      ///< depth of penetration
   double angle_deg = 0;  ///< between the stylus and the surface normal
   std::optional<double> gripper_rad;
 };
 
-View viewOf(const realtime::TickReport& tick, ForceReport forceReport);
+/// Converts a tick; `forceReport` chooses between the total force and the normal force without the guard.
+ClientTick toClientTick(const realtime::TickReport& tick, ForceReport forceReport);
 
-/// World units of a device position in metres.
+/// Reported metres of a device position in metres.
 inline geometry::Vec3 reported(const realtime::TickReport& tick, const geometry::Vec3& position_m) {
   return tick.T_world_device * position_m / kWorldPerReported;
 }

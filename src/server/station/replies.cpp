@@ -1,4 +1,4 @@
-#include "server/station/answers.h"
+#include "server/station/replies.h"
 
 namespace hapticd::server {
 
@@ -24,7 +24,7 @@ wire::TrackerWorkspace trackerWorkspace(const Box& box, const realtime::TickRepo
 
 wire::TrackerToRoom trackerToRoom(const ReportFrame& frame) {
   const Vec3& p = frame.origin;
-  const geometry::Quat& q = frame.turn;
+  const geometry::Quat& q = frame.rotation;
   return {.position = {p.x(), p.y(), p.z()}, .orientation = {q.x(), q.y(), q.z(), q.w()}};
 }
 
@@ -33,7 +33,8 @@ wire::Capabilities capabilities(const DeviceConfig& config, const device::Device
   const Box box = workspaceOf(config, profile);
   return {.version = wire::kExtensionVersion,
           .features = wire::kFeatureBulkMesh | wire::kFeatureBatch | wire::kFeatureSubscribe |
-                      wire::kFeatureStop | wire::kFeatureHeartbeat | (canBeHeld ? wire::kFeatureHoldHand : 0U),
+                      wire::kFeatureStop | wire::kFeatureHeartbeat |
+                      (canBeHeld ? wire::kFeatureHoldHand : 0U),
           .servo_rate = config.servoRate_Hz,
           .report_rate = config.reportRate_Hz,
           .peak_force = profile.peakForce_N,

@@ -1,4 +1,4 @@
-// Questions about a device that need no scene: each is a pure function of what is known.
+// Replies to queries about a device, as pure functions of configuration, profile and tick.
 #pragma once
 
 #include "device/device.h"
@@ -7,15 +7,16 @@
 
 namespace hapticd::server {
 
-/// The box the device works in: its own, the paper's, or six numbers, as configured. Metres, device frame.
+/// The configured workspace of the device, by default that of its profile. Metres, device frame.
 geometry::Box workspaceOf(const DeviceConfig& config, const device::DeviceProfile& profile);
 
-/// The workspace in reported metres, as it lies in the world at this tick.
+/// The bounding box of the workspace in the world at this tick, in reported metres.
 wire::TrackerWorkspace trackerWorkspace(const geometry::Box& workspace_m, const realtime::TickReport& tick);
 
-/// The frame of reported poses in the room, which is the world over 1000.
+/// The frame of reported poses in VRPN's room, which is the world in reported metres.
 wire::TrackerToRoom trackerToRoom(const ReportFrame& frame);
 
+/// Extensions, rates, peak force and workspace of the device.
 wire::Capabilities capabilities(const DeviceConfig& config, const device::DeviceProfile& profile,
                                 bool canBeHeld);
 

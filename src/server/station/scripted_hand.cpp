@@ -1,4 +1,4 @@
-#include "server/station/explorer.h"
+#include "server/station/scripted_hand.h"
 
 #include <cmath>
 #include <numbers>
@@ -9,25 +9,25 @@
 namespace hapticd::server {
 namespace {
 
+using base::Nanos;
 using geometry::Affine;
 using geometry::Box;
-using base::Nanos;
 using geometry::Quat;
 using geometry::Vec3;
 
-constexpr double kPressDepth_m = 0.004;  // intended, below the surface; the hand's spring yields some of it
+constexpr double kPressDepth_m = 0.004;  // target below the surface; the hand's spring reaches part of it
 constexpr double kClearance_m = 0.012;   // above the surface before and after a stroke
 constexpr double kSlideSpeed_m_per_s = 0.06;
 constexpr double kFreeSpeed_m_per_s = 0.15;
 constexpr int kStrokes = 12;
 constexpr int kPointsInStroke = 7;
-constexpr double kLongestStep_m = 0.025;  // from above one point of a stroke to the next
-constexpr double kSteepest = 0.3;  // cosine between surface normal and the direction the hand comes from
+constexpr double kLongestStep_m = 0.025;  // between the lift-off positions of neighbouring points of a stroke
+constexpr double kSteepest = 0.3;  // lower bound of the cosine between surface normal and approach direction
 constexpr double kStrokeAngle_rad = 0.12;  // between neighbouring points of a stroke, seen from the centre
 
 struct SurfacePoint {
   Vec3 position;
-  Vec3 normal;  // out of the surface, towards where the hand comes from
+  Vec3 normal;  // outward, against the approach direction
 };
 
 Box boundsInDevice(const scene::SceneSnapshot& scene, Nanos now) {
@@ -45,7 +45,7 @@ Box boundsInDevice(const scene::SceneSnapshot& scene, Nanos now) {
   return box;
 }
 
-// First surface on the way from `from` to `to`; for planning only, so a plain test is enough.
+// First surface on the segment from `from` to `to`. For planning only, so an inexact test is sufficient.
 std::optional<SurfacePoint> firstSurface(const scene::SceneSnapshot& scene, const Vec3& from, const Vec3& to,
                                          Nanos now) {
   double best = 1.0;
@@ -78,17 +78,17 @@ std::optional<SurfacePoint> firstSurface(const scene::SceneSnapshot& scene, cons
   return found;
 }
 
-// Appends points to a path and gives each the time that the speed asks for.
-class Pen {
+// Appends waypoints to a path, with times from the speed.
+class PathBuilder {
  public:
-  explicit Pen(const Vec3& start) { path_.push_back({0, start, Quat::Identity(), 0}); }
+  explicit PathBuilder(const Vec3& start) { path_.push_back({0, start, Quat::Identity(), 0}); }
 
   void moveTo(const Vec3& position, const Quat& orientation, double speed_m_per_s, bool press = false) {
     const double distance = (position - path_.back().position_m).norm();
     const double time = path_.back().time_s + std::max(distance / speed_m_per_s, 0.05);
     path_.push_back({time, position, orientation, press ? 1U : 0U});
   }
-  // Around the centre on a great circle: a straight way could lead through the objects.
+  // On a great circle around the centre: a straight line could cross the objects.
   void arcTo(const Vec3& position, const Vec3& centre, const Quat& orientation) {
     const Vec3 from = path_.back().position_m - centre;
     const Quat turn = Quat::FromTwoVectors(from, position - centre);
@@ -105,22 +105,22 @@ class Pen {
   std::vector<device::Waypoint> path_;
 };
 
-std::vector<device::Waypoint> circle(const Box& workspace) {
+std::vector<device::Waypoint> idleCircle(const Box& workspace) {
   constexpr int kSteps = 32;
-  // At the top, out of the way of what a client may put in the middle: a hand inside a mesh that appears is
-  // caught in it.
+  // At the top of the workspace: clients place objects in the middle, and a mesh that appears around the hand
+  // would trap it.
   const double radius = 0.1 * workspace.extents().minCoeff();
   const Vec3 centre = workspace.centre() + Vec3(0, 0.5 * workspace.extents().y() - radius, 0);
-  Pen pen(centre + Vec3(radius, 0, 0));
+  PathBuilder path(centre + Vec3(radius, 0, 0));
   for (int i = 1; i <= kSteps; ++i) {
     const double angle = 2 * std::numbers::pi * i / kSteps;
     const Quat turn(Eigen::AngleAxisd(0.3 * std::sin(angle), Vec3::UnitX()));
-    pen.moveTo(centre + radius * Vec3(std::cos(angle), 0, std::sin(angle)), turn, 0.05, i == kSteps / 2);
+    path.moveTo(centre + radius * Vec3(std::cos(angle), 0, std::sin(angle)), turn, 0.05, i == kSteps / 2);
   }
-  return pen.take();
+  return path.take();
 }
 
-// Directions spread evenly over the sphere, neighbours in number far apart in angle.
+// Fibonacci sphere: evenly distributed directions; consecutive ones are far apart.
 Vec3 direction(int i, int count) {
   const double y = 1 - 2 * (i + 0.5) / count;
   const double radius = std::sqrt(1 - y * y);
@@ -130,38 +130,39 @@ Vec3 direction(int i, int count) {
 
 }  // namespace
 
-std::vector<device::Waypoint> explore(const scene::SceneSnapshot& scene, const Box& workspace_m, Nanos now) {
+std::vector<device::Waypoint> planStrokes(const scene::SceneSnapshot& scene, const Box& workspace_m,
+                                          Nanos now) {
   const Box bounds = boundsInDevice(scene, now);
-  if (bounds.empty()) return circle(workspace_m);
+  if (bounds.empty()) return idleCircle(workspace_m);
   const Vec3 centre = bounds.centre();
   const double outside = 0.5 * bounds.extents().norm() + kClearance_m;
 
   const Vec3 home = centre + outside * Vec3::UnitY();
-  Pen pen(home);
+  PathBuilder path(home);
   for (int stroke = 0; stroke < kStrokes; ++stroke) {
     const Vec3 first = direction(stroke, kStrokes);
     const Vec3 along = first.unitOrthogonal();
     const Quat stylus = Quat::FromTwoVectors(Vec3::UnitY(), (first + 0.4 * along).normalized());
     bool down = false;
-    Vec3 lift = centre + outside * first;
-    pen.arcTo(lift, centre, stylus);
+    Vec3 liftOff = centre + outside * first;
+    path.arcTo(liftOff, centre, stylus);
     for (int i = 0; i < kPointsInStroke; ++i) {
       const Vec3 ray = Eigen::AngleAxisd(kStrokeAngle_rad * i, first.cross(along)) * first;
       const auto surface = firstSurface(scene, centre + outside * ray, centre - outside * ray, now);
       if (!surface || surface->normal.dot(ray) < kSteepest) break;
-      // Another part of the object: the straight way there may lead through this one.
-      if (down && (surface->position - lift).norm() > kLongestStep_m) break;
-      if (!down) pen.moveTo(surface->position + kClearance_m * ray, stylus, kFreeSpeed_m_per_s);
-      pen.moveTo(surface->position - kPressDepth_m * surface->normal, stylus, kSlideSpeed_m_per_s,
-                 i == 2 && stroke % 3 == 0);
-      lift = surface->position + kClearance_m * surface->normal;
+      // The next point is on another part of the object: a straight line to it may cross this part.
+      if (down && (surface->position - liftOff).norm() > kLongestStep_m) break;
+      if (!down) path.moveTo(surface->position + kClearance_m * ray, stylus, kFreeSpeed_m_per_s);
+      path.moveTo(surface->position - kPressDepth_m * surface->normal, stylus, kSlideSpeed_m_per_s,
+                  i == 2 && stroke % 3 == 0);
+      liftOff = surface->position + kClearance_m * surface->normal;
       down = true;
     }
-    if (down) pen.moveTo(lift, stylus, kSlideSpeed_m_per_s);
-    pen.moveTo(centre + outside * (lift - centre).normalized(), stylus, kFreeSpeed_m_per_s);
+    if (down) path.moveTo(liftOff, stylus, kSlideSpeed_m_per_s);
+    path.moveTo(centre + outside * (liftOff - centre).normalized(), stylus, kFreeSpeed_m_per_s);
   }
-  pen.arcTo(home, centre, Quat::Identity());
-  return pen.take();
+  path.arcTo(home, centre, Quat::Identity());
+  return path.take();
 }
 
 }  // namespace hapticd::server

@@ -1,4 +1,4 @@
-// Log lines that any stranger can cause: a few each second, then a count.
+// Rate-limited log for warnings that untrusted clients can cause.
 #pragma once
 
 #include <spdlog/spdlog.h>
@@ -7,15 +7,16 @@
 
 namespace hapticd::server {
 
-/// One thread. newSecond() is called once a second.
-class NoiseLog {
+/// Logs up to five warnings per second and then only their number. One thread; call reportSuppressed() once
+/// per second.
+class ThrottledLog {
  public:
   void warn(const std::string& text) {
     if (++lines_ <= kLinesPerSecond) spdlog::warn("{}", text);
   }
-  void newSecond() {
+  void reportSuppressed() {
     if (lines_ > kLinesPerSecond)
-      spdlog::warn("{} more lines of this kind in the last second", lines_ - kLinesPerSecond);
+      spdlog::warn("{} more warnings about clients suppressed in the last second", lines_ - kLinesPerSecond);
     lines_ = 0;
   }
 

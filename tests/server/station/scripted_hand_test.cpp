@@ -1,4 +1,4 @@
-#include "server/station/explorer.h"
+#include "server/station/scripted_hand.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@ namespace {
 
 using geometry::Vec3;
 
-// A box of 40 mm around the origin, as a client would send it: one unit is a millimetre.
+// A box of 40 mm around the origin, as sent by a client whose world unit is a millimetre.
 std::shared_ptr<const scene::SceneSnapshot> boxScene() {
   scene::SceneBuilder builder;
   std::vector<scene::Notice> notices;
@@ -38,8 +38,8 @@ std::shared_ptr<const scene::SceneSnapshot> boxScene() {
 
 const geometry::Box kWorkspace{Vec3(-0.08, -0.06, -0.035), Vec3(0.08, 0.06, 0.035)};
 
-TEST(Explorer, EmptySceneGivesAClosedCircleInTheWorkspace) {
-  const auto path = explore(scene::SceneSnapshot{}, kWorkspace, 0);
+TEST(ScriptedHand, EmptySceneGivesAClosedCircleInTheWorkspace) {
+  const auto path = planStrokes(scene::SceneSnapshot{}, kWorkspace, 0);
   ASSERT_GT(path.size(), 8U);
   EXPECT_LT((path.front().position_m - path.back().position_m).norm(), 1e-9);
   for (const auto& point : path) {
@@ -48,8 +48,8 @@ TEST(Explorer, EmptySceneGivesAClosedCircleInTheWorkspace) {
   }
 }
 
-TEST(Explorer, StrokesDipIntoTheSurfaceAndTimesIncrease) {
-  const auto path = explore(*boxScene(), kWorkspace, 0);
+TEST(ScriptedHand, StrokesDipIntoTheSurfaceAndTimesIncrease) {
+  const auto path = planStrokes(*boxScene(), kWorkspace, 0);
   int inside = 0;
   bool pressed = false;
   for (std::size_t i = 0; i < path.size(); ++i) {
@@ -68,10 +68,10 @@ TEST(Explorer, StrokesDipIntoTheSurfaceAndTimesIncrease) {
   EXPECT_NO_THROW(device::WaypointPath(path, device::WaypointPath::Repeat::yes));
 }
 
-TEST(Explorer, TheSameSceneGivesTheSamePath) {
+TEST(ScriptedHand, TheSameSceneGivesTheSamePath) {
   const auto scene = boxScene();
-  const auto a = explore(*scene, kWorkspace, 0);
-  const auto b = explore(*scene, kWorkspace, 0);
+  const auto a = planStrokes(*scene, kWorkspace, 0);
+  const auto b = planStrokes(*scene, kWorkspace, 0);
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i].position_m, b[i].position_m);
 }
