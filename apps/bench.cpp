@@ -15,7 +15,8 @@ namespace {
 
 /// Replaces this process; returns only by throwing.
 [[noreturn]] void runSuite(std::vector<std::string> arguments) {
-  const std::filesystem::path suite = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "hapticd-bench";
+  const std::filesystem::path suite =
+      std::filesystem::read_symlink("/proc/self/exe").parent_path() / "hapticd-bench";
   arguments.insert(arguments.begin(), suite.string());
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
@@ -28,7 +29,8 @@ namespace {
 }  // namespace
 
 void addBench(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("bench", "Measure how fast it is, against yardsticks on this machine");
+  CLI::App* command =
+      app.add_subcommand("bench", "Measure how fast it is, against yardsticks on this machine");
   // The suite reads all arguments itself, --help too.
   command->set_help_flag();
   command->prefix_command();

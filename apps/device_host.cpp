@@ -1,4 +1,5 @@
-// hapticd device-host: runs one driver in its own process (the isolation host). Started by the server, not by people.
+// hapticd device-host: runs one driver in its own process (the isolation host). Started by the server, not by
+// people.
 #include <memory>
 #include <string>
 
@@ -11,7 +12,8 @@ namespace hapticd::apps {
 
 void addDeviceHost(CLI::App& app) {
   auto text = std::make_shared<std::string>();
-  CLI::App* command = app.add_subcommand(server::kDeviceHostCommand, "Run one driver in its own process; started by the server");
+  CLI::App* command = app.add_subcommand(server::kDeviceHostCommand,
+                                         "Run one driver in its own process; started by the server");
   command->group("");  // hidden from the help
   command->add_option("config", *text, "Configuration with exactly one device, as TOML")->required();
   command->callback([text] {
@@ -19,9 +21,10 @@ void addDeviceHost(CLI::App& app) {
     const auto device = server::makeDevice(config);
     realtime::setUpThread({.realtime = false});  // locks the memory of the process
     exitCode = device::runDeviceHost(
-        *device, {.rate_Hz = config.servoRate_Hz, .beforeFirstTick = [vendors = device->traits().ticksInVendorThread] {
-                    realtime::setUpThread({.keepScheduling = vendors, .lockMemory = false});
-                  }});
+        *device,
+        {.rate_Hz = config.servoRate_Hz, .beforeFirstTick = [vendors = device->traits().ticksInVendorThread] {
+           realtime::setUpThread({.keepScheduling = vendors, .lockMemory = false});
+         }});
   });
 }
 

@@ -1,4 +1,5 @@
-// hapticd devices: lists the haptic devices of this machine, and the reason and remedy for drivers without one.
+// hapticd devices: lists the haptic devices of this machine, and the reason and remedy for drivers without
+// one.
 #include <cstdio>
 #include <memory>
 
@@ -24,8 +25,7 @@ void addDevices(CLI::App& app) {
   command->add_flag(
       "--open", options->openThem,
       "Also open devices that can be detected in no other way, without force (occupies the device briefly)");
-  command->add_option("--haply-host", options->haplyHost, "Host of the Haply service")
-      ->capture_default_str();
+  command->add_option("--haply-host", options->haplyHost, "Host of the Haply service")->capture_default_str();
   command->add_option("--haply-port", options->haplyPort, "Port of the Haply service")->capture_default_str();
   command->footer("'hapticd serve --device DRIVER' uses a device; udev rules are in packaging/udev.");
   command->callback([options] { printDevices(device::findDevices(*options)); });

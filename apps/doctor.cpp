@@ -1,5 +1,5 @@
-// hapticd doctor: checks the usual causes of trouble on a machine, measures the servo loop, and prints a verdict with
-// remedies.
+// hapticd doctor: checks the usual causes of trouble on a machine, measures the servo loop, and prints a
+// verdict with remedies.
 #include <netinet/in.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
@@ -72,8 +72,7 @@ Finding memoryLock() {
 
 Finding governor() {
   const std::string name = firstLine("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor");
-  if (name.empty())
-    return {Verdict::note, "no CPU frequency governor found (usual in virtual machines)", ""};
+  if (name.empty()) return {Verdict::note, "no CPU frequency governor found (usual in virtual machines)", ""};
   if (name == "performance") return {Verdict::good, "CPU governor is 'performance'", ""};
   return {Verdict::note, "CPU governor is '" + name + "'",
           "sudo cpupower frequency-set -g performance (idle cores wake up late)"};
@@ -98,12 +97,14 @@ Finding preemption() {
   if (build.find("PREEMPT_RT") != std::string::npos)
     return {Verdict::good, "the kernel is a realtime kernel (PREEMPT_RT)", ""};
   const bool preemptible = build.find("PREEMPT") != std::string::npos;
-  const bool enabled =
-      build.find("PREEMPT_DYNAMIC") == std::string::npos || bootOptions.find("preempt=full") != std::string::npos;
-  if (preemptible && enabled) return {Verdict::good, "the kernel preempts system calls of other programs", ""};
+  const bool enabled = build.find("PREEMPT_DYNAMIC") == std::string::npos ||
+                       bootOptions.find("preempt=full") != std::string::npos;
+  if (preemptible && enabled)
+    return {Verdict::good, "the kernel preempts system calls of other programs", ""};
   return {Verdict::note,
           "long system calls of other programs may delay the loop by milliseconds (kernel: " + build + ")",
-          preemptible ? "boot with preempt=full, or use a kernel with PREEMPT_RT" : "use a kernel with PREEMPT_RT"};
+          preemptible ? "boot with preempt=full, or use a kernel with PREEMPT_RT"
+                      : "use a kernel with PREEMPT_RT"};
 }
 
 Finding portFree(int type, const char* protocol, std::uint16_t port) {
@@ -127,10 +128,11 @@ Finding isolation(double seconds) {
   try {
     const IsolationCheck check = measureIsolation(seconds);
     char text[256];
-    std::snprintf(text, sizeof text,
-                  "from the driver's post to the tick p50 %.1f us, p99 %.1f us, max %.1f us (medians of %d rounds), "
-                  "plus one tick of delay",
-                  check.postToTick_us.p50, check.postToTick_us.p99, check.postToTick_us.max, check.rounds);
+    std::snprintf(
+        text, sizeof text,
+        "from the driver's post to the tick p50 %.1f us, p99 %.1f us, max %.1f us (medians of %d rounds), "
+        "plus one tick of delay",
+        check.postToTick_us.p50, check.postToTick_us.p99, check.postToTick_us.max, check.rounds);
     if (check.postToTick_us.p99 < kCheap_us) return {Verdict::good, text, ""};
     return {Verdict::note, text,
             "more than 20 us at the 99th percentile: realtime rights and a quiet machine help"};
@@ -169,7 +171,8 @@ int run(double seconds, std::uint16_t port) {
       loop.wakeup_us.p50, loop.wakeup_us.p99, loop.wakeup_us.max, loop.compute_us.p99);
   const bool steady = loop.wakeup_us.p99 < 100 && loop.overruns * 1000 <= loop.ticks;
   add({steady ? Verdict::good : Verdict::bad, text,
-       steady ? "" : "close other programs, get realtime rights for the loop, or use a kernel with PREEMPT_RT"});
+       steady ? ""
+              : "close other programs, get realtime rights for the loop, or use a kernel with PREEMPT_RT"});
 
   std::printf("a driver in its own process (--isolate), %g s\n", seconds);
   std::fflush(stdout);

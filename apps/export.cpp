@@ -32,7 +32,8 @@ wire::Time stamp(base::Nanos wall_ns) {
           static_cast<std::uint32_t>(wall_ns % 1'000'000'000 / 1000)};
 }
 
-void addReports(ReportedDevice& device, const realtime::TickReport& tick, wire::Time time, record::VrpnLog& log) {
+void addReports(ReportedDevice& device, const realtime::TickReport& tick, wire::Time time,
+                record::VrpnLog& log) {
   server::ReportFrame frame;
   frame.buttons = tick.device.buttons;
   std::vector<server::Outgoing> messages;
@@ -100,7 +101,8 @@ void addExport(CLI::App& app) {
   command->footer(
       "mcap  ticks, poses, guard and scene commands, for Foxglove and other readers of MCAP\n"
       "csv   one row for each tick of each device; --hand of 'hapticd serve' and 'hapticd render' reads it\n"
-      "vrpn  the reports that a client would have received; VRPN clients open it as Phantom@file:///path/to/the.vrpn\n"
+      "vrpn  the reports that a client would have received; VRPN clients open it as "
+      "Phantom@file:///path/to/the.vrpn\n"
       "Example: hapticd export my.haptics --to mcap -o my.mcap");
   command->callback([options] { exitCode = run(*options); });
 }

@@ -1,5 +1,5 @@
-#include "base/time.h"
 #include "isolation_check.h"
+#include "base/time.h"
 
 #include <algorithm>
 #include <atomic>

@@ -7,7 +7,8 @@ namespace hapticd::apps {
 
 struct IsolationCheck {
   int rounds = 0;
-  Percentiles postToTick_us;  ///< from the driver process to the servo tick; each figure is the median over the rounds
+  Percentiles postToTick_us;  ///< from the driver process to the servo tick; each figure is the median over
+                              ///< the rounds
 };
 
 /// Runs the simulated device in its own process, in several rounds, for `seconds` in total. Throws

@@ -1,4 +1,5 @@
-// A progress bar and a table that are redrawn in place on a terminal; elsewhere the progress bar prints plain lines.
+// A progress bar and a table that are redrawn in place on a terminal; elsewhere the progress bar prints plain
+// lines.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-#include "base/clock.h"
 #include "loop_check.h"
+#include "base/clock.h"
 
 #include <chrono>
 #include <thread>

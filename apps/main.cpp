@@ -35,7 +35,8 @@ int main(int argc, char** argv) {
   } catch (const CLI::RequiredError& error) {
     const std::vector<std::string> rest = app.remaining();
     if (app.get_subcommands().empty() && !rest.empty()) {
-      std::fprintf(stderr, "hapticd: unknown command '%s'; 'hapticd --help' lists the commands\n", rest[0].c_str());
+      std::fprintf(stderr, "hapticd: unknown command '%s'; 'hapticd --help' lists the commands\n",
+                   rest[0].c_str());
       return 2;
     }
     return app.exit(error) == 0 ? 0 : 2;

@@ -113,10 +113,10 @@ void recordTicks(Client& client, record::SampleFile& file, const Options& option
 int run(const Options& options) {
   const auto samples = sampleFile(options.file);
   if (!samples && std::filesystem::path(options.file).extension() != ".vrpn") {
-    throw std::runtime_error(
-        "'" + options.file +
-        "': a client records to a file called *.vrpn, *.csv or *.mcap; the server itself writes recordings that can be "
-        "replayed: hapticd serve --record FILE.haptics");
+    throw std::runtime_error("'" + options.file +
+                             "': a client records to a file called *.vrpn, *.csv or *.mcap; the server "
+                             "itself writes recordings that can be "
+                             "replayed: hapticd serve --record FILE.haptics");
   }
   const StopSignals signals;
   Client client(options.server, {.reconnect = false});
@@ -146,7 +146,8 @@ void addRecord(CLI::App& app) {
       ->check(within(0.1, 4000))
       ->capture_default_str();
   command->footer(
-      "Records what a client receives: reports, in the frame that the server reports, without the scene. The server\n"
+      "Records what a client receives: reports, in the frame that the server reports, without the scene. The "
+      "server\n"
       "itself writes recordings that can be replayed and re-rendered: hapticd serve --record FILE.haptics\n"
       "*.vrpn works with any VRPN server; csv and mcap need the ticks of a hapticd.\n"
       "A csv can be given to --hand of 'hapticd serve' and 'hapticd render'.\n"

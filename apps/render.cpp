@@ -26,7 +26,10 @@ void addMeshOptions(CLI::App& command, MeshRenderOptions& options) {
       .add_option("--size-mm", options.size_mm,
                   "Scale the mesh to this largest extent and centre it [unchanged]")
       ->check(within(1e-6, 1e6));
-  command.add_option("--hand", options.hand, "CSV: t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons] in device metres, or any CSV that hapticd wrote")
+  command
+      .add_option(
+          "--hand", options.hand,
+          "CSV: t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons] in device metres, or any CSV that hapticd wrote")
       ->check(CLI::ExistingFile);
   command
       .add_option("--faces", options.faces,
@@ -44,8 +47,8 @@ void addSurfaceOptions(CLI::App& command, MeshRenderOptions& options) {
   add("--stiffness-N-per-m,--stiffness", options.stiffness_N_per_m, "Stiffness K", 1e6);
   add("--damping-Ns-per-m,--damping", options.damping_Ns_per_m, "Damping B along the normal", 1e6);
   add("--static-friction", options.staticFriction, "Coulomb coefficient while sticking", 1e6);
-  add("--dynamic-friction", options.dynamicFriction,
-      "Coulomb coefficient while sliding, at most the static", 1e6);
+  add("--dynamic-friction", options.dynamicFriction, "Coulomb coefficient while sliding, at most the static",
+      1e6);
   add("--tool-radius-mm,--tool-radius", options.toolRadius_mm, "Radius of the tip; 0 is a point", 50);
   command.add_flag("--raw", options.raw,
                    "Leave out the guard, the passivity clamp and the limits of surfaces");
@@ -70,8 +73,9 @@ int run(const CLI::App& command, const Options& options) {
   if (!options.session.empty()) {
     for (const char* name : {"--mesh", "--hand", "--mesh-unit", "--size-mm", "--faces", "--timing"}) {
       if (command.count(name) == 0) continue;
-      throw std::runtime_error(std::string(name) + " belongs to --mesh; --session has its own scene and "
-                                                   "hand, leave one of them out");
+      throw std::runtime_error(std::string(name) +
+                               " belongs to --mesh; --session has its own scene and "
+                               "hand, leave one of them out");
     }
     return renderSession({.session = options.session,
                           .out = options.mesh.out,
@@ -92,18 +96,18 @@ void addRender(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "render", "Render a mesh along a recorded hand, or re-render a recording; offline and deterministic");
   addMeshOptions(*command, options->mesh);
-  command
-      ->add_option("--session", options->session,
-                   "Recording of 'hapticd serve --record' to re-render")
+  command->add_option("--session", options->session, "Recording of 'hapticd serve --record' to re-render")
       ->check(CLI::ExistingFile);
   command->add_option("--out", options->mesh.out, "CSV to write, one row for each tick");
   command->add_option("--report", options->report,
                       "With --session: HTML page with plots of force and depth, recorded and re-rendered");
   addSurfaceOptions(*command, options->mesh);
   command->footer(
-      "With --mesh, --out has the columns of 'hapticd export --to csv' (docs/recording.md): hip_[xyz]_m, proxy_[xyz]_m,\n"
+      "With --mesh, --out has the columns of 'hapticd export --to csv' (docs/recording.md): hip_[xyz]_m, "
+      "proxy_[xyz]_m,\n"
       "force_[xyz]_N (on the hand), depth_m, ... Device frame: +x right, +y up, +z to the user.\n"
-      "With --session, options change surfaces (of all objects and planes), tool radius and guard; all else stays as\n"
+      "With --session, options change surfaces (of all objects and planes), tool radius and guard; all else "
+      "stays as\n"
       "recorded. Without changes the forces equal the recorded ones bit for bit, or the exit status is 1.\n"
       "Examples:\n"
       "  hapticd render --mesh bunny.obj --hand stroke.csv --out felt.csv --raw\n"

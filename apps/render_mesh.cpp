@@ -27,7 +27,8 @@ using geometry::Vec3;
 constexpr Nanos kPeriod = 1'000'000;
 
 // The scene through the same commands that a client sends; stock units: stiffness 1 is 1000 N/m.
-std::shared_ptr<const scene::SceneSnapshot> makeScene(const MeshRenderOptions& options, geometry::TriangleMesh&& mesh) {
+std::shared_ptr<const scene::SceneSnapshot> makeScene(const MeshRenderOptions& options,
+                                                      geometry::TriangleMesh&& mesh) {
   scene::SceneConfig config;
   config.raw = options.raw;
   scene::SceneBuilder builder(config);
@@ -40,10 +41,10 @@ std::shared_ptr<const scene::SceneSnapshot> makeScene(const MeshRenderOptions& o
   apply(scene::SetTriangles{0, 0, std::move(mesh.triangles)});
   apply(scene::SetTransform{0, {scale, 0, 0, 0, 0, scale, 0, 0, 0, 0, scale, 0, 0, 0, 0, 1}});
   apply(scene::SetSurface{.object = 0,
-                        .stiffness = options.stiffness_N_per_m / 1000,
-                        .damping = options.damping_Ns_per_m / 1000,
-                        .staticFriction = options.staticFriction,
-                        .dynamicFriction = options.dynamicFriction});
+                          .stiffness = options.stiffness_N_per_m / 1000,
+                          .damping = options.damping_Ns_per_m / 1000,
+                          .staticFriction = options.staticFriction,
+                          .dynamicFriction = options.dynamicFriction});
   apply(scene::SetTouchableFaces{options.faces == "front" ? 0 : options.faces == "back" ? 1 : 2});
   apply(scene::CommitBatch{});
   auto snapshot = builder.publish(0, notices);
@@ -62,8 +63,8 @@ struct Summary {
   std::size_t touching = 0;
 };
 
-Summary follow(const MeshRenderOptions& options, const device::HandFile& hand, const scene::SceneSnapshot& snapshot,
-            record::CsvFile& out) {
+Summary follow(const MeshRenderOptions& options, const device::HandFile& hand,
+               const scene::SceneSnapshot& snapshot, record::CsvFile& out) {
   realtime::Renderer renderer({.toolRadius_m = options.toolRadius_mm * 1e-3, .forceShading = false});
   realtime::GuardOptions guardOptions = realtime::GuardOptions::of(device::profiles().front());
   guardOptions.enabled = !options.raw;
@@ -136,7 +137,8 @@ double quantile(std::vector<double>& values, double share) {
 
 int renderMesh(const MeshRenderOptions& options) {
   const auto hand = device::HandFile::load(options.hand);
-  if (!hand->remark().empty()) std::fprintf(stderr, "hapticd: %s: %s\n", options.hand.c_str(), hand->remark().c_str());
+  if (!hand->remark().empty())
+    std::fprintf(stderr, "hapticd: %s: %s\n", options.hand.c_str(), hand->remark().c_str());
   geometry::TriangleMesh mesh = mesh_io::loadMesh(options.mesh);
   const std::size_t triangles = mesh.triangles.size();
   if (options.size_mm > 0) fit(mesh, options);
@@ -153,8 +155,8 @@ int renderMesh(const MeshRenderOptions& options) {
   getrusage(RUSAGE_SELF, &usage);
   std::printf("mesh        %zu triangles, scene and index built in %.3f s\n", triangles, build_s);
   std::printf("hand        %zu ticks of 1 ms, %zu touching\n", summary.step_us.size(), summary.touching);
-  std::printf("felt        peak force %.3f N, deepest %.3f mm%s\n", summary.peakForce_N, summary.deepest_m * 1e3,
-              options.raw ? " (raw: without the guard)" : "");
+  std::printf("felt        peak force %.3f N, deepest %.3f mm%s\n", summary.peakForce_N,
+              summary.deepest_m * 1e3, options.raw ? " (raw: without the guard)" : "");
   std::printf("step time   p50 %.2f us, p99 %.2f us, max %.2f us\n", quantile(summary.step_us, 0.5),
               quantile(summary.step_us, 0.99), quantile(summary.step_us, 1.0));
   std::printf("peak memory %.1f MiB\n", static_cast<double>(usage.ru_maxrss) / 1024);

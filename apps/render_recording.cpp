@@ -75,10 +75,10 @@ int renderSession(const RecordingRenderOptions& options) {
   }
   if (!remark.empty()) std::fprintf(stderr, "hapticd: %s\n", remark.c_str());
   if (same || !options.changes.none()) return 0;
-  std::fprintf(
-      stderr,
-      "hapticd: nothing was changed, but the forces differ: another version or another kind of machine wrote the "
-      "recording, or ticks were lost\n");
+  std::fprintf(stderr,
+               "hapticd: nothing was changed, but the forces differ: another version or another kind of "
+               "machine wrote the "
+               "recording, or ticks were lost\n");
   return 1;
 }
 

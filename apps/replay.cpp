@@ -53,14 +53,14 @@ void addReplay(CLI::App& app) {
       ->capture_default_str();
   command->add_flag("--loop", options->replay.loop, "Start again at the end, until a signal");
   command->add_option("--listen", options->listen, "ADDR:PORT for TCP and UDP [127.0.0.1:3883]");
-  command->add_option("--port", options->port, "Only the port; 0: any free one")
-      ->check(CLI::Range(0, 65535));
+  command->add_option("--port", options->port, "Only the port; 0: any free one")->check(CLI::Range(0, 65535));
   command->add_option("--http", options->http,
                       "ADDR:PORT of the viewer's page, or 'off' [127.0.0.1:8080, if free]");
   command->add_option("--seconds", options->seconds, "Stop after this time [until a signal]")
       ->check(within(0.001, kLongest_s));
   command->footer(
-      "Clients connect as to the live server and receive the recorded reports, stamped with the present time, and the\n"
+      "Clients connect as to the live server and receive the recorded reports, stamped with the present "
+      "time, and the\n"
       "recorded scene. Their commands are refused. After the end the last state stays until a signal.\n"
       "Examples:\n"
       "  hapticd replay my.haptics\n"

@@ -18,7 +18,8 @@ void keep(std::deque<double>& values, double value) {
 }  // namespace
 
 std::string sparkline(const std::deque<double>& values, double most) {
-  constexpr std::array kEighths{" ", "\u2581", "\u2582", "\u2583", "\u2584", "\u2585", "\u2586", "\u2587", "\u2588"};
+  constexpr std::array kEighths{" ",      "\u2581", "\u2582", "\u2583", "\u2584",
+                                "\u2585", "\u2586", "\u2587", "\u2588"};
   std::string bars(kBars - values.size(), ' ');
   for (const double value : values) {
     const double share = most > 0 ? std::clamp(value / most, 0.0, 1.0) : 0;
@@ -57,7 +58,8 @@ std::vector<std::string> ReportView::table(const ReportSummary& summary) {
   add("  force      %8.3f %8.3f %8.3f N    |F| %.3f N   peak %.3f N", f[0], f[1], f[2],
       std::hypot(f[0], f[1], f[2]), summary.peakForce_N());
   add("  |F|        %s %.2f N", sparkline(forces_N_, summary.peakForce_N()).c_str(), summary.peakForce_N());
-  add("  depth      %s %.2f mm", sparkline(depths_m_, summary.deepest_m()).c_str(), summary.deepest_m() * 1000);
+  add("  depth      %s %.2f mm", sparkline(depths_m_, summary.deepest_m()).c_str(),
+      summary.deepest_m() * 1000);
   // Channel 6 is the gripper on this server only; other servers may use it for anything.
   const std::vector<double>& channels = latest.analog.channels;
   if (client_.capabilities() && channels.size() == 7) add("  gripper    %8.3f rad", channels[6]);

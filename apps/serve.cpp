@@ -104,26 +104,24 @@ void addServe(CLI::App& app) {
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("serve", "Own a haptic device and serve it to VRPN clients");
   command
-      ->add_option("--config", options->configFile, "TOML file with all settings, or a vrpn.cfg; flags override it")
+      ->add_option("--config", options->configFile,
+                   "TOML file with all settings, or a vrpn.cfg; flags override it")
       ->check(CLI::ExistingFile);
   command->add_flag("--check-config", options->checkConfig,
                     "Print the configuration in effect as TOML, or the error in it, and exit");
   command->add_option("--listen", options->listen,
                       "ADDR:PORT for TCP and UDP [127.0.0.1:3883]; 0.0.0.0 for all networks");
-  command->add_option(
-      "--http", options->http,
-      "ADDR:PORT of the viewer, its data and the metrics [127.0.0.1:8080 if free, otherwise\n"
-      "none]; 'off' for none; 0.0.0.0:8080 for all networks");
-  command->add_option(
-      "--http-allow", options->httpAllow,
-      "HOST or HOST:PORT by which browsers may open the viewer; repeat it for more.\n"
-      "IP addresses and localhost are always allowed");
+  command->add_option("--http", options->http,
+                      "ADDR:PORT of the viewer, its data and the metrics [127.0.0.1:8080 if free, otherwise\n"
+                      "none]; 'off' for none; 0.0.0.0:8080 for all networks");
+  command->add_option("--http-allow", options->httpAllow,
+                      "HOST or HOST:PORT by which browsers may open the viewer; repeat it for more.\n"
+                      "IP addresses and localhost are always allowed");
   command->add_option("--name", options->names,
                       "Device name that clients open [Phantom]; repeat it for more names");
-  command->add_option(
-      "--device", options->driver,
-      "Driver [simulated]: " + device::driverNames() +
-          "\nDRIVER:WHICH selects one of several devices, e.g. evdev:/dev/input/event5");
+  command->add_option("--device", options->driver,
+                      "Driver [simulated]: " + device::driverNames() +
+                          "\nDRIVER:WHICH selects one of several devices, e.g. evdev:/dev/input/event5");
   command->add_flag("--enable-forces", options->enableForces,
                     "Enable forces on a real device; without this flag it starts disarmed");
   command->add_flag(

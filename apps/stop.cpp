@@ -40,7 +40,8 @@ int run(const StopOptions& options) {
   std::printf(options.rearm ? "%s: re-armed; forces ramp in over half a second\n"
                             : "%s: forces are off; 'hapticd stop --rearm' re-arms\n",
               options.server.c_str());
-  if (options.rearm && !guard->armed) std::printf("forces are not enabled on this device: start the server with --enable-forces\n");
+  if (options.rearm && !guard->armed)
+    std::printf("forces are not enabled on this device: start the server with --enable-forces\n");
   return 0;
 }
 
@@ -48,7 +49,8 @@ int run(const StopOptions& options) {
 
 void addStop(CLI::App& app) {
   auto options = std::make_shared<StopOptions>();
-  CLI::App* command = app.add_subcommand("stop", "Bring the force of a device to zero immediately, until re-armed");
+  CLI::App* command =
+      app.add_subcommand("stop", "Bring the force of a device to zero immediately, until re-armed");
   command->add_option("server", options->server, "NAME@host[:port] or NAME@tcp://host[:port]")
       ->capture_default_str();
   command->add_flag("--rearm", options->rearm, "End a stop and clear latched faults");

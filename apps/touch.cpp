@@ -12,14 +12,14 @@
 #include <vector>
 
 #include "commands.h"
-#include "report_summary.h"
-#include "report_view.h"
 #include "geometry/crossings.h"
 #include "geometry/mesh_check.h"
 #include "geometry/triangle_mesh.h"
 #include "hapticd/client.h"
 #include "live_table.h"
 #include "mesh_io/mesh_io.h"
+#include "report_summary.h"
+#include "report_view.h"
 #include "stop_signals.h"
 
 namespace hapticd::apps {
@@ -65,7 +65,8 @@ TriangleMesh load(const TouchOptions& options) {
   TriangleMesh mesh = mesh_io::loadMesh(options.mesh);
   std::printf("%s: %zu vertices, %zu triangles, %s units\n", options.mesh.c_str(), mesh.vertices.size(),
               mesh.triangles.size(), extentsText(mesh).c_str());
-  if (mesh.triangles.empty()) throw std::runtime_error(options.mesh + " has no triangles, so there is nothing to touch");
+  if (mesh.triangles.empty())
+    throw std::runtime_error(options.mesh + " has no triangles, so there is nothing to touch");
   auto findings = geometry::describe(geometry::checkMesh(mesh.vertices, mesh.triangles));
   for (std::string& finding : geometry::describe(geometry::findCrossings(mesh.vertices, mesh.triangles)))
     findings.push_back(std::move(finding));
@@ -167,12 +168,14 @@ void addTouch(CLI::App& app) {
   command->add_option("--object", options->object, "Number of the object that gets the mesh")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  command->add_option("--size-mm", options->size_mm, "Largest extent on the device in mm; 0: fit a small device")
+  command
+      ->add_option("--size-mm", options->size_mm, "Largest extent on the device in mm; 0: fit a small device")
       ->check(within(0, 1000))
       ->capture_default_str();
   command->add_flag("--keep-scene", options->keepScene, "Do not clear the server's scene first");
   command->add_flag("--json", options->json, "Also print the summary as one line of JSON, at the end");
-  command->footer("Exit status: 0 when done, 1 when the server cannot be reached, disconnects or sends no reports.");
+  command->footer(
+      "Exit status: 0 when done, 1 when the server cannot be reached, disconnects or sends no reports.");
   command->callback([options] { exitCode = run(*options); });
 }
 

@@ -1,4 +1,5 @@
-// hapticd watch: shows reports on a terminal or streams them to other programs; a client that sends no commands.
+// hapticd watch: shows reports on a terminal or streams them to other programs; a client that sends no
+// commands.
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -7,11 +8,11 @@
 #include <string>
 
 #include "commands.h"
-#include "report_summary.h"
-#include "report_view.h"
 #include "hapticd/client.h"
 #include "live_table.h"
 #include "record/text_fields.h"
+#include "report_summary.h"
+#include "report_view.h"
 #include "sample_of.h"
 #include "stop_signals.h"
 
@@ -133,7 +134,8 @@ int run(const WatchOptions& options) {
 
 void addWatch(CLI::App& app) {
   auto options = std::make_shared<WatchOptions>();
-  CLI::App* command = app.add_subcommand("watch", "Show pose, contact and force live, or stream them to other programs");
+  CLI::App* command =
+      app.add_subcommand("watch", "Show pose, contact and force live, or stream them to other programs");
   command->add_option("server", options->server, "NAME@host[:port] or NAME@tcp://host[:port]")
       ->capture_default_str();
   command->add_option("--seconds", options->seconds, "How long to watch; 0: until Ctrl-C")
@@ -142,7 +144,8 @@ void addWatch(CLI::App& app) {
   command->add_option("--rate", options->rate_Hz, "Reports or lines per second [the server's rate; 10 lines]")
       ->check(within(0.1, 4000));
   CLI::Option* json = command->add_flag("--json", options->json, "Print one line of JSON for each tick");
-  command->add_flag("--csv", options->csv, "Print one line of CSV for each tick, after a header line")->excludes(json);
+  command->add_flag("--csv", options->csv, "Print one line of CSV for each tick, after a header line")
+      ->excludes(json);
   command->footer(
       "Sends no commands, so it does not affect other clients. Also works with other VRPN servers.\n"
       "Examples:\n"

@@ -53,9 +53,7 @@ int run(const Options& options) {
     return 0;
   }
   Run run;
-  run.length = options.longest ? Length::longest
-               : options.full  ? Length::full
-                               : Length::windows;
+  run.length = options.longest ? Length::longest : options.full ? Length::full : Length::windows;
   for (const std::string& line : describeMachine(run.length)) std::printf("%s\n", line.c_str());
   std::vector<Measured> all;
   for (const Benchmark* benchmark : chosen(options.names)) {
@@ -84,7 +82,8 @@ void declare(CLI::App& app, Options& options) {
   app.name("hapticd bench");
   app.add_option("names", options.names, "Benchmarks to run [all of them]");
   app.add_flag("--list", options.list, "List the benchmarks and exit");
-  app.add_flag("--full", options.full, "Longer measurements, about 25 minutes in all [windows of some seconds]");
+  app.add_flag("--full", options.full,
+               "Longer measurements, about 25 minutes in all [windows of some seconds]");
   app.add_flag("--long", options.longest, "The longest measurements, about an hour");
   app.add_option("--out", options.out, "Directory for results.json, results.csv, results.md and drawings");
   app.add_option("--helper", options.helper, "A process that the suite starts for itself")->group("");

@@ -55,8 +55,8 @@ class WorkDirectory {
 /// `hapticd serve` with the simulated hand, ready for clients.
 class ServerProcess {
  public:
-  /// `hand` is the text of a CSV file as serve reads it, empty for a resting hand. Appends `more` to the arguments of
-  /// serve. Throws std::runtime_error with the server's output when it does not start.
+  /// `hand` is the text of a CSV file as serve reads it, empty for a resting hand. Appends `more` to the
+  /// arguments of serve. Throws std::runtime_error with the server's output when it does not start.
   explicit ServerProcess(const std::string& hand = "", const std::vector<std::string>& more = {});
 
   std::uint16_t port() const noexcept { return port_; }

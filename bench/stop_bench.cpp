@@ -127,12 +127,13 @@ Outcome measureStop(const Run& run) {
     run.progress(std::to_string(uploaders) + " uploading");
     std::uint64_t late = none;
     const Samples stops = stopsWhile(uploaders, seconds, late);
-    Row row{"stop while " + std::to_string(uploaders) + (uploaders == 1 ? " client uploads" : " clients upload"),
-            "ms",
-            stops.summary(),
-            quiet.summary(),
-            {},
-            late > 0 ? "a stop did not act within 20 s" : ""};
+    Row row{
+        "stop while " + std::to_string(uploaders) + (uploaders == 1 ? " client uploads" : " clients upload"),
+        "ms",
+        stops.summary(),
+        quiet.summary(),
+        {},
+        late > 0 ? "a stop did not act within 20 s" : ""};
     row.checks.push_back({"p99 in ms", late > 0 ? 20'000 : row.ours.p99, kLimit_ms, false, reason});
     outcome.rows.push_back(std::move(row));
   }

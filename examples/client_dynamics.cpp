@@ -1,6 +1,6 @@
-// Dynamics in the client: the hand pushes a box in thick oil. The client integrates the motion of the box from the
-// contacts of every servo tick and streams its pose back. The client also moves a simulated hand; with a real device,
-// push the box yourself.
+// Dynamics in the client: the hand pushes a box in thick oil. The client integrates the motion of the box
+// from the contacts of every servo tick and streams its pose back. The client also moves a simulated hand;
+// with a real device, push the box yourself.
 //   client_dynamics [NAME@host] [seconds]
 #include <algorithm>
 #include <cmath>
@@ -61,8 +61,7 @@ int main(int argc, char** argv) try {
   std::chrono::nanoseconds last{};
   client.onContacts([&](const hapticd::ContactsReport& r) {
     // The contacts of this report also stand for those of lost reports, for at most a few ticks.
-    const double dt_s =
-        std::clamp(std::chrono::duration<double>(r.tickTime - last).count(), 0.0, 5 * tick_s);
+    const double dt_s = std::clamp(std::chrono::duration<double>(r.tickTime - last).count(), 0.0, 5 * tick_s);
     last = r.tickTime;
     for (const hapticd::Contact& c : r.contacts) {
       for (std::size_t i = 0; i < 3; ++i) box.impulse_N_s[i] -= c.force_N[i] * dt_s;

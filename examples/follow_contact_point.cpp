@@ -1,5 +1,5 @@
-// The surface contact point beside the position of the device. A renderer draws the former: the device itself is inside
-// the object.
+// The surface contact point beside the position of the device. A renderer draws the former: the device itself
+// is inside the object.
 //   follow_contact_point [NAME@host] [seconds]
 #include <cstdio>
 #include <cstdlib>

@@ -1,4 +1,5 @@
-// Writes all reports of a device to standard output as CSV, one row per report, with the time stamp of the server.
+// Writes all reports of a device to standard output as CSV, one row per report, with the time stamp of the
+// server.
 //   log_to_csv [NAME@host] [seconds] > session.csv
 #include <cstdio>
 #include <cstdlib>

@@ -1,5 +1,5 @@
-// One client builds the scene and two watch it, all in one thread. Objects stay when their client disconnects; its
-// effects end.
+// One client builds the scene and two watch it, all in one thread. Objects stay when their client
+// disconnects; its effects end.
 //   several_clients [NAME@host] [seconds]
 #include <cstdio>
 #include <cstdlib>

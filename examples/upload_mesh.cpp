@@ -1,4 +1,5 @@
-// Reads a Wavefront OBJ file, fits it into the workspace, uploads it, and prints what the server reports about it.
+// Reads a Wavefront OBJ file, fits it into the workspace, uploads it, and prints what the server reports
+// about it.
 //   upload_mesh FILE.obj [NAME@host]
 #include <algorithm>
 #include <cstdio>

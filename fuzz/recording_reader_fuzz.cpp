@@ -1,4 +1,5 @@
-// Untrusted recordings, read to the end: as they are, and as blocks with valid checksums, which no fuzzer guesses.
+// Untrusted recordings, read to the end: as they are, and as blocks with valid checksums, which no fuzzer
+// guesses.
 #include <unistd.h>
 
 #include <cstdint>

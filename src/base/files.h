@@ -31,8 +31,8 @@ class InputFile {
   virtual ~InputFile() = default;
   /// Bytes from the start to the end when it was opened.
   virtual std::uint64_t size() const = 0;
-  /// Fills `into` from the current position on and returns how many bytes it got: fewer only at the end. Throws
-  /// std::system_error with the path and the system's reason.
+  /// Fills `into` from the current position on and returns how many bytes it got: fewer only at the end.
+  /// Throws std::system_error with the path and the system's reason.
   virtual std::size_t read(std::span<std::byte> into) = 0;
 };
 

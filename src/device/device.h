@@ -50,7 +50,7 @@ struct DeviceProfile {
   int buttons = 2;
   std::uint32_t switches = kHoldNone;  ///< which of kHoldDeadMan, kHoldInkwell have a switch
   int inputDof = 6;                    ///< measured degrees of freedom: 3 position, 3 orientation, 1 gripper
-  int outputDof = 3;                   ///< degrees of freedom with a motor, in the same order; only the force is rendered
+  int outputDof = 3;  ///< degrees of freedom with a motor, in the same order; only the force is rendered
   bool hasGripper = false;
   bool startsArmed = false;  ///< real devices wait for --enable-forces
 };
@@ -63,7 +63,8 @@ struct DeviceTraits {
   bool ticksInVendorThread = false;
   /// It calibrates itself in its loop, with the consent it was made with: no calibrate() after open().
   bool calibratesInLoop = false;
-  /// A person must re-arm forces after a trip. False where there is no person to protect: the guard recovers by itself.
+  /// A person must re-arm forces after a trip. False where there is no person to protect: the guard recovers
+  /// by itself.
   bool needsRearm = true;
 };
 
@@ -101,9 +102,9 @@ class Device {
   virtual std::string faultText() const { return {}; }
   /// True while nothing but close() and open() can bring the device back. Any thread but the servo's.
   virtual bool lost() const noexcept { return false; }
-  /// A person consents to calibrate now, which may move the arm or require a certain pose; faultText() explains what is
-  /// needed. May block for seconds; forces are held meanwhile. Throws std::runtime_error on failure. Not in the servo
-  /// thread.
+  /// A person consents to calibrate now, which may move the arm or require a certain pose; faultText()
+  /// explains what is needed. May block for seconds; forces are held meanwhile. Throws std::runtime_error on
+  /// failure. Not in the servo thread.
   virtual void calibrate() {}
 
   /// Self-paced, after open(): calls `onTick` with the time of CLOCK_MONOTONIC once per period, in a thread

@@ -28,11 +28,13 @@ class InvalidDriverOption : public std::runtime_error {
 
 /// A driver: one constant of this type in the folder of each, listed in src/device/CMakeLists.txt.
 struct Driver {
-  const char* name;                   ///< for --device and the key `driver`
-  const char* help;                   ///< one line: which devices it runs
-  std::span<const char* const> keys;  ///< keys of a [[device]] that only this driver reads; their values are texts
-  bool canBeIsolated = true;          ///< may run in a process of its own
-  /// Makes a device, not yet open. Throws InvalidDriverOption, or std::runtime_error for a file that it cannot read.
+  const char* name;  ///< for --device and the key `driver`
+  const char* help;  ///< one line: which devices it runs
+  std::span<const char* const>
+      keys;                   ///< keys of a [[device]] that only this driver reads; their values are texts
+  bool canBeIsolated = true;  ///< may run in a process of its own
+  /// Makes a device, not yet open. Throws InvalidDriverOption, or std::runtime_error for a file that it
+  /// cannot read.
   std::unique_ptr<Device> (*make)(const DriverOptions& options);
 };
 

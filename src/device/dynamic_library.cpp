@@ -24,7 +24,8 @@ std::string loadersWords(const char* name) {
 
 #else
 
-// RTLD_NOW: a missing dependency shows here and not later, in use. RTLD_LOCAL: two vendors may export the same names.
+// RTLD_NOW: a missing dependency shows here and not later, in use. RTLD_LOCAL: two vendors may export the
+// same names.
 void* load(const char* name) {
   return dlopen(name, RTLD_NOW | RTLD_LOCAL);
 }

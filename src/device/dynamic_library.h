@@ -13,8 +13,8 @@ class LibraryError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Where to look for a library: only the file that an environment variable names, if it is set, otherwise these names in
-/// order.
+/// Where to look for a library: only the file that an environment variable names, if it is set, otherwise
+/// these names in order.
 struct LibraryNames {
   const char* environment;
   std::vector<const char*> unixNames;

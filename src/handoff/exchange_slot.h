@@ -45,8 +45,8 @@ class ExchangeSlot {
     return returned_.consume([](Node* node) { delete node; });
   }
 
-  /// Reader: the newest value, null before the first. Valid until the take() after the one that replaces it, so
-  /// that the reader can compare it with its successor. Wait-free: no allocation, no lock.
+  /// Reader: the newest value, null before the first. Valid until the take() after the one that replaces it,
+  /// so that the reader can compare it with its successor. Wait-free: no allocation, no lock.
   const T* take() noexcept {
     if (retired_ != nullptr && returned_.push(retired_)) retired_ = nullptr;
     if (retired_ == nullptr) {

@@ -31,7 +31,6 @@ class TimerState final : public Subscription::State {
     wait();
   }
 
-
   void cancel() noexcept override {
     State::cancel();
     loop_.guard([this] { timer_.cancel(); });
@@ -190,7 +189,8 @@ std::shared_ptr<Connection::Impl> AsioLoop::connect(const Endpoint& peer, std::c
   return connection;
 }
 
-std::shared_ptr<TcpListener::Impl> AsioLoop::listen(const Endpoint& local, std::function<void(Connection)> onAccept,
+std::shared_ptr<TcpListener::Impl> AsioLoop::listen(const Endpoint& local,
+                                                    std::function<void(Connection)> onAccept,
                                                     const ConnectionOptions& options, const char* option) {
   return listenWithAsio(*this, local, std::move(onAccept), options, option);
 }

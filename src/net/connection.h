@@ -19,15 +19,15 @@
 
 namespace hapticd::net {
 
-/// The bounds of a connection. With zero timeouts a lost peer is noticed only when the system gives up, after about 15
-/// minutes.
+/// The bounds of a connection. With zero timeouts a lost peer is noticed only when the system gives up, after
+/// about 15 minutes.
 struct ConnectionOptions {
   /// Queued bytes above which low-latency buffers are dropped.
   std::size_t lowMarkBytes = std::size_t{256} * 1024;
   /// Queued reliable bytes above which the connection ends: its peer does not read.
   std::size_t hardLimitBytes = std::size_t{8} * 1024 * 1024;
-  /// Time without an acknowledgement that is due, after which the peer counts as lost. A peer whose program stops reading
-  /// still acknowledges, so it is not lost.
+  /// Time without an acknowledgement that is due, after which the peer counts as lost. A peer whose program
+  /// stops reading still acknowledges, so it is not lost.
   std::chrono::milliseconds lossTimeout{0};
   /// Silence after which, and interval at which, an idle peer is probed (TCP keep-alive).
   std::chrono::seconds keepAlive{0};
@@ -45,10 +45,10 @@ struct ConnectionHandlers {
   std::function<void(std::span<const std::byte>)> onBytes = {};
   /// The queue is empty again after the system had not accepted all of it.
   std::function<void()> onDrained = {};
-  /// While reading is paused: the peer has ended, reset or lost the connection, perhaps behind bytes that wait to be
-  /// read. Called at most once, within 50 ms of the event's arrival. The connection stays: abort() it, or
-  /// resumeReading() to read the rest up to onClosed. An end that the peer sent behind more bytes than the system
-  /// takes while nobody reads (about 3 MiB) arrives only after reading.
+  /// While reading is paused: the peer has ended, reset or lost the connection, perhaps behind bytes that
+  /// wait to be read. Called at most once, within 50 ms of the event's arrival. The connection stays: abort()
+  /// it, or resumeReading() to read the rest up to onClosed. An end that the peer sent behind more bytes than
+  /// the system takes while nobody reads (about 3 MiB) arrives only after reading.
   std::function<void(const std::string& reason)> onPeerGone = {};
   /// The connection has ended: called once, whichever side ended it, with the reason. No callback follows.
   std::function<void(const std::string&)> onClosed = {};
@@ -76,8 +76,8 @@ class Connection {
   Connection& operator=(Connection&& other) noexcept;
   ~Connection();
 
-  /// Starts to connect and returns at once; onConnected or onClosed ("cannot connect to ...") follows. Sends are queued
-  /// until then.
+  /// Starts to connect and returns at once; onConnected or onClosed ("cannot connect to ...") follows. Sends
+  /// are queued until then.
   [[nodiscard]] static Connection connect(Loop& loop, const Endpoint& peer, std::chrono::milliseconds timeout,
                                           const ConnectionOptions& options = {});
 
@@ -101,8 +101,9 @@ class Connection {
   /// Ends the connection at once by a reset; the queue is lost.
   void abort(std::string reason);
 
-  /// Stops reading, so that TCP holds the peer back. The end of the peer is reported by onPeerGone; onClosed follows
-  /// only after resumeReading() and after all that the peer sent, although isOpen() may be false before.
+  /// Stops reading, so that TCP holds the peer back. The end of the peer is reported by onPeerGone; onClosed
+  /// follows only after resumeReading() and after all that the peer sent, although isOpen() may be false
+  /// before.
   void pauseReading();
   /// Resumes reading.
   void resumeReading();

@@ -1,4 +1,5 @@
-// The interface behind Connection: implemented by TCP, by a WebSocket on top of it, and by simulated networks.
+// The interface behind Connection: implemented by TCP, by a WebSocket on top of it, and by simulated
+// networks.
 #pragma once
 
 #include "net/connection.h"

@@ -8,7 +8,8 @@
 
 namespace hapticd::net {
 
-/// A socket could not be opened or a name not resolved; what() names the address and, where there is one, the remedy.
+/// A socket could not be opened or a name not resolved; what() names the address and, where there is one, the
+/// remedy.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

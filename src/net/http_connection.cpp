@@ -149,7 +149,8 @@ void HttpConnection::sendHead(const HttpResponse& response) {
   connection_.send(std::as_bytes(std::span(head)));
 }
 
-// In pieces, each after the system has accepted the previous one: a slow client costs the memory of one piece.
+// In pieces, each after the system has accepted the previous one: a slow client costs the memory of one
+// piece.
 void HttpConnection::sendBody() {
   constexpr std::size_t kPiece = std::size_t{256} * 1024;
   while (state_ == State::answering && body_) {

@@ -26,8 +26,8 @@ struct HttpOptions {
 
 class HttpConnection;
 
-/// Answers one request, once, in the loop's thread; copies refer to the same request. An answer after the end of the
-/// connection is dropped.
+/// Answers one request, once, in the loop's thread; copies refer to the same request. An answer after the end
+/// of the connection is dropped.
 class HttpReply {
  public:
   HttpReply(std::weak_ptr<HttpConnection> connection, std::uint64_t request)

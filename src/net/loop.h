@@ -67,8 +67,8 @@ class Loop {
   /// Error for descriptors that cannot be polled.
   [[nodiscard]] Subscription watchFd(int fd, std::function<void()> function);
 
-  /// Receives the text of exceptions that belong to no connection, in the loop's thread; until it is set, they go to
-  /// standard error.
+  /// Receives the text of exceptions that belong to no connection, in the loop's thread; until it is set,
+  /// they go to standard error.
   void setErrorHandler(std::function<void(std::string_view)> handler);
 
   /// What a Network implements; for this room only.

@@ -1,4 +1,5 @@
-// What an event loop does behind Loop, and the sockets that live in it: AsioLoop in production, a simulated one in tests.
+// What an event loop does behind Loop, and the sockets that live in it: AsioLoop in production, a simulated
+// one in tests.
 #pragma once
 
 #include <exception>
@@ -47,7 +48,8 @@ class Loop::Impl {
 
   virtual std::shared_ptr<Connection::Impl> connect(const Endpoint& peer, std::chrono::milliseconds timeout,
                                                     const ConnectionOptions& options) = 0;
-  virtual std::shared_ptr<TcpListener::Impl> listen(const Endpoint& local, std::function<void(Connection)> onAccept,
+  virtual std::shared_ptr<TcpListener::Impl> listen(const Endpoint& local,
+                                                    std::function<void(Connection)> onAccept,
                                                     const ConnectionOptions& options, const char* option) = 0;
   virtual std::shared_ptr<UdpSocket::Impl> bind(const Endpoint& local) = 0;
 
@@ -119,8 +121,9 @@ class UdpSocket::Impl {
   virtual const UdpStatistics& statistics() const = 0;
 };
 
-/// Why a socket of the given kind ("TCP", "UDP") could not be bound (an errno), with the remedy: another choice for
-/// `option`.
-std::string bindErrorText(const char* kind, const Endpoint& local, int error, const std::string& option = "--listen");
+/// Why a socket of the given kind ("TCP", "UDP") could not be bound (an errno), with the remedy: another
+/// choice for `option`.
+std::string bindErrorText(const char* kind, const Endpoint& local, int error,
+                          const std::string& option = "--listen");
 
 }  // namespace hapticd::net

@@ -16,12 +16,12 @@ struct LinkState {
   std::chrono::milliseconds sinceHeard{0};  ///< since the last acknowledgement or data
 };
 
-/// Measures how long an acknowledgement has been due. A peer whose program does not read still acknowledges, so it is
-/// never lost. Time between two checks counts for two intervals at most: after a stall of this machine the answers are
-/// still in its queues. Pure; one for each connection.
+/// Measures how long an acknowledgement has been due. A peer whose program does not read still acknowledges,
+/// so it is never lost. Time between two checks counts for two intervals at most: after a stall of this
+/// machine the answers are still in its queues. Pure; one for each connection.
 ///
-/// While the peer's window is closed the system probes it at growing intervals, so a peer that does not read for some time
-/// and then vanishes is noticed only after about the same time.
+/// While the peer's window is closed the system probes it at growing intervals, so a peer that does not read
+/// for some time and then vanishes is noticed only after about the same time.
 class LossWatch {
  public:
   using Milliseconds = std::chrono::milliseconds;

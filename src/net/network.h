@@ -23,7 +23,8 @@ class Network {
 /// The machine's network, or the one that a ScopedNetwork put in its place. From any thread.
 Network& network() noexcept;
 
-/// Replaces the network while it lives. Make it before, and destroy it after, every Loop of that network; one at a time.
+/// Replaces the network while it lives. Make it before, and destroy it after, every Loop of that network; one
+/// at a time.
 class ScopedNetwork {
  public:
   explicit ScopedNetwork(Network& network) noexcept;

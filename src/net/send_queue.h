@@ -18,9 +18,9 @@ enum class Delivery : std::uint8_t {
   lowLatency,  ///< Worthless when late: dropped as a whole while the peer is behind.
 };
 
-/// A FIFO that drops low-latency buffers when it is long. Above the low mark, a new low-latency buffer replaces those that
-/// wait; if the reliable buffers alone exceed the mark, the new one is dropped, too. A partly sent buffer is never
-/// dropped. Not thread-safe.
+/// A FIFO that drops low-latency buffers when it is long. Above the low mark, a new low-latency buffer
+/// replaces those that wait; if the reliable buffers alone exceed the mark, the new one is dropped, too. A
+/// partly sent buffer is never dropped. Not thread-safe.
 class SendQueue {
  public:
   explicit SendQueue(std::size_t lowMarkBytes) : lowMarkBytes_(lowMarkBytes) {}

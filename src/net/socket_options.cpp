@@ -58,8 +58,8 @@ PeerEnd peerEnd(int fd) noexcept {
   return (request.revents & POLLRDHUP) != 0 ? PeerEnd::closed : PeerEnd::none;
 }
 
-// SO_RCVBUF is limited to net.core.rmem_max (208 KiB) and ends the automatic growth. The low-water mark enlarges the
-// buffer as a side effect, up to tcp_rmem's maximum, and can be set back.
+// SO_RCVBUF is limited to net.core.rmem_max (208 KiB) and ends the automatic growth. The low-water mark
+// enlarges the buffer as a side effect, up to tcp_rmem's maximum, and can be set back.
 void widenReceiveBuffer(int fd) noexcept {
   setOption(fd, SOL_SOCKET, SO_RCVLOWAT, std::numeric_limits<int>::max());
   setOption(fd, SOL_SOCKET, SO_RCVLOWAT, 1);

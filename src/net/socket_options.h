@@ -1,5 +1,5 @@
-// Socket options and queries that need the operating system's own calls. A port to another system rewrites this file, and
-// also sendmmsg, eventfd and the resolver.
+// Socket options and queries that need the operating system's own calls. A port to another system rewrites
+// this file, and also sendmmsg, eventfd and the resolver.
 #pragma once
 
 #include <chrono>
@@ -24,8 +24,8 @@ std::optional<LinkState> linkState(int fd) noexcept;
 enum class PeerEnd { none, closed, reset };
 /// Sees an end also behind unread bytes; consumes neither bytes nor the pending error.
 PeerEnd peerEnd(int fd) noexcept;
-/// Lets the system take in as much as its limits allow (half of tcp_rmem's maximum) while nobody reads, so that the
-/// end of the peer can arrive. Otherwise the receive buffer grows only with reading.
+/// Lets the system take in as much as its limits allow (half of tcp_rmem's maximum) while nobody reads, so
+/// that the end of the peer can arrive. Otherwise the receive buffer grows only with reading.
 void widenReceiveBuffer(int fd) noexcept;
 /// Bytes handed to the system that the peer has not acknowledged.
 std::size_t unacknowledgedBytes(int fd) noexcept;

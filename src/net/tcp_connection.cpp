@@ -272,8 +272,8 @@ void TcpConnection::queueEmptied(bool wasBlocked) {
   }
 }
 
-// A peer that sent a lot and left without reading its reports resets the connection, but its bytes can still be read. The
-// reader reaches the end by itself.
+// A peer that sent a lot and left without reading its reports resets the connection, but its bytes can still
+// be read. The reader reaches the end by itself.
 void TcpConnection::writeFailed(const ErrorCode& error) {
   if (state_ != State::open) {
     finish(reason_);

@@ -50,7 +50,8 @@ class UdpSocket {
 
   /// Sets the callbacks and starts receiving.
   void start(UdpHandlers handlers);
-  /// Fixes the peer: send() sends there, and only its datagrams are received. Throws Error when there is no route.
+  /// Fixes the peer: send() sends there, and only its datagrams are received. Throws Error when there is no
+  /// route.
   void connect(const Endpoint& peer);
 
   /// Sends one datagram to the connected peer; false when it was dropped. Never blocks.

@@ -7,11 +7,12 @@
 
 namespace hapticd::net {
 
-// Each buffer is sent as one binary message, so that a low-latency one can still be dropped as a whole. The queue, its
-// limits, loss detection and pauses are those of the TCP connection underneath.
+// Each buffer is sent as one binary message, so that a low-latency one can still be dropped as a whole. The
+// queue, its limits, loss detection and pauses are those of the TCP connection underneath.
 class WebSocket final : public Connection::Impl, public std::enable_shared_from_this<WebSocket> {
  public:
-  /// Takes over a connection after the handshake. `ahead` holds the bytes that the client sent directly after its request.
+  /// Takes over a connection after the handshake. `ahead` holds the bytes that the client sent directly after
+  /// its request.
   WebSocket(Loop::Impl& loop, Connection stream, Buffer ahead);
 
   void start(ConnectionHandlers handlers) override;

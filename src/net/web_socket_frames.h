@@ -27,7 +27,8 @@ enum class WebSocketOpcode : std::uint8_t {
 inline constexpr std::uint16_t kWebSocketNormal = 1000;
 inline constexpr std::uint16_t kWebSocketProtocolError = 1002;
 inline constexpr std::uint16_t kWebSocketUnsupported = 1003;
-inline constexpr std::uint16_t kWebSocketNoStatus = 1005;  ///< never on the wire: a close frame without a code
+inline constexpr std::uint16_t kWebSocketNoStatus =
+    1005;  ///< never on the wire: a close frame without a code
 
 /// How the peer ended the connection, or the protocol error found.
 struct WebSocketEnd {
@@ -38,13 +39,14 @@ struct WebSocketEnd {
 
 /// The content of one read.
 struct WebSocketInput {
-  Buffer data;                ///< payload of binary messages, in order, without their boundaries
-  std::vector<Buffer> pings;  ///< each requires a pong with the same payload
+  Buffer data;                      ///< payload of binary messages, in order, without their boundaries
+  std::vector<Buffer> pings;        ///< each requires a pong with the same payload
   std::optional<WebSocketEnd> end;  ///< nothing after it is read
 };
 
-/// Parses the bytes of a client, in pieces of any size. A byte stream has no message boundaries, so payload is passed on as
-/// it arrives and no message is too long; the reader buffers only a header and a control frame.
+/// Parses the bytes of a client, in pieces of any size. A byte stream has no message boundaries, so payload
+/// is passed on as it arrives and no message is too long; the reader buffers only a header and a control
+/// frame.
 class WebSocketReader {
  public:
   void feed(std::span<const std::byte> bytes, WebSocketInput& out);

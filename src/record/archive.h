@@ -1,7 +1,7 @@
 // Values as bytes, by the one list of fields that each type has (fields.h, scene/command_info.h).
 //
-// Big-endian as on the wire; a list starts with its length. Reading trusts no length: missing bytes are an error, and memory
-// grows only with the bytes that exist.
+// Big-endian as on the wire; a list starts with its length. Reading trusts no length: missing bytes are an
+// error, and memory grows only with the bytes that exist.
 #pragma once
 
 #include <array>

@@ -46,9 +46,10 @@ BlockReader::BlockReader(const std::filesystem::path& file) {
     throw RecordingError("cannot read " + name + ": " + error.code().message());
   }
   if (got != kMagicBytes || std::memcmp(begin.data(), kMagic, kMagicBytes) != 0) {
-    throw RecordingError(name +
-                         " is not a recording: it does not begin with 'HAPTICS'; 'hapticd serve --record FILE' "
-                         "writes recordings");
+    throw RecordingError(
+        name +
+        " is not a recording: it does not begin with 'HAPTICS'; 'hapticd serve --record FILE' "
+        "writes recordings");
   }
   offset_ = kMagicBytes;
 }
@@ -68,7 +69,8 @@ bool BlockReader::next(Block& block) {
 std::string BlockReader::read(Block& block, const std::string& where) {
   const std::uint64_t rest = size_ - offset_;
   std::array<std::byte, kBlockHeadBytes> head{};
-  if (rest < kBlockHeadBytes || file_->read(head) != kBlockHeadBytes) return "the file is cut within a block" + where;
+  if (rest < kBlockHeadBytes || file_->read(head) != kBlockHeadBytes)
+    return "the file is cut within a block" + where;
   const auto length = wire::loadBig<std::uint32_t>(head.data() + 4);
   if (length > rest - kBlockHeadBytes)
     return "the file is cut within a block" + where + ", or the length of the block is damaged";

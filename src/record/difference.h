@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "record/rerender.h"
 #include "record/recording.h"
+#include "record/rerender.h"
 
 namespace hapticd::record {
 
@@ -66,7 +66,8 @@ std::vector<Difference> compare(const std::filesystem::path& session, const Rere
 /// The changes for a headline: "stiffness 300 N/m, tool radius 2 mm"; "nothing".
 std::string describe(const RerenderChanges& changes);
 
-/// A self-contained page with the figures and with plots of force and depth over time, recorded and re-rendered.
+/// A self-contained page with the figures and with plots of force and depth over time, recorded and
+/// re-rendered.
 std::string htmlReport(const std::string& session, const RerenderChanges& changes,
                        const std::vector<Difference>& devices, const std::string& remark);
 

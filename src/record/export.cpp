@@ -120,8 +120,9 @@ void McapFile::addGuard(Channels& channels, const Sample& sample) {
   channels.first = false;
   channels.active = sample.guardActive;
   channels.latched = sample.guardLatched;
-  const nlohmann::json guard{
-      {"tick", sample.tick}, {"active", namesIn(sample.guardActive)}, {"latched", namesIn(sample.guardLatched)}};
+  const nlohmann::json guard{{"tick", sample.tick},
+                             {"active", namesIn(sample.guardActive)},
+                             {"latched", namesIn(sample.guardLatched)}};
   writer_.add(channels.guard, sample.time_ns, guard.dump());
 }
 

@@ -39,8 +39,8 @@ class CsvFile final : public SampleFile {
   std::string row_;
 };
 
-/// For each device the ticks, HIP and proxy as poses that Foxglove draws, and the trips of the guard; for the scenes, their
-/// commands.
+/// For each device the ticks, HIP and proxy as poses that Foxglove draws, and the trips of the guard; for the
+/// scenes, their commands.
 class McapFile final : public SampleFile {
  public:
   explicit McapFile(const std::filesystem::path& file);

@@ -1,6 +1,6 @@
-// The fields of everything in a recording except scene commands, which describe themselves (scene/command_info.h).
-// Structured bindings count the members: a new one does not compile until it is listed, and then kFormatVersion
-// must increase.
+// The fields of everything in a recording except scene commands, which describe themselves
+// (scene/command_info.h). Structured bindings count the members: a new one does not compile until it is
+// listed, and then kFormatVersion must increase.
 #pragma once
 
 #include <concepts>

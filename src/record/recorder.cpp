@@ -80,7 +80,8 @@ void Recorder::appendEvent(BlockKind kind, Bytes&& content) {
   appendBlock(events_, kind, content);
 }
 
-// The rings before the events: the commands that a tick saw were recorded before it, so they are in this batch, too.
+// The rings before the events: the commands that a tick saw were recorded before it, so they are in this
+// batch, too.
 void Recorder::drain() {
   for (const auto& device : devices_) {
     device->packer.restart();
@@ -152,9 +153,10 @@ void Recorder::fail(const std::error_code& error) {
     failed_ = true;
     events_ = {};
   }
-  onProblem_("recording to '" + path_.string() + "' has stopped: " + error.message() +
-             "; what was written before stays readable" +
-             (error == std::errc::no_space_on_device ? "; make room on the disk and start a new recording" : ""));
+  onProblem_(
+      "recording to '" + path_.string() + "' has stopped: " + error.message() +
+      "; what was written before stays readable" +
+      (error == std::errc::no_space_on_device ? "; make room on the disk and start a new recording" : ""));
 }
 
 void Recorder::finish() {

@@ -1,5 +1,6 @@
-// Writes a recording while the server runs, in a thread "recorder". No other thread waits for it: the servo pushes into
-// a ring, the scene thread appends to a buffer, and what does not fit is counted, reported and marked in the file.
+// Writes a recording while the server runs, in a thread "recorder". No other thread waits for it: the servo
+// pushes into a ring, the scene thread appends to a buffer, and what does not fit is counted, reported and
+// marked in the file.
 #pragma once
 
 #include <filesystem>
@@ -32,8 +33,8 @@ struct RecorderCounts {
 
 class Recorder {
  public:
-  /// Called in the recorder's thread with a text for the log: when the file cannot be written further, and at most once
-  /// a second when something was lost.
+  /// Called in the recorder's thread with a text for the log: when the file cannot be written further, and at
+  /// most once a second when something was lost.
   using OnProblem = std::function<void(const std::string&)>;
 
   /// Creates the file. Throws RecordingError when that fails or the file exists.
@@ -50,8 +51,8 @@ class Recorder {
   std::uint32_t addDevice(RecordedDevice device);
   /// For Tick::recordTo(); lives as long as the recorder.
   realtime::RecordRing& ring(std::uint32_t device) { return devices_[device]->ring; }
-  /// For SceneConfig::stopwatch of a device: keeps its readings for the next recordPublish() of the device. The scene
-  /// thread calls it.
+  /// For SceneConfig::stopwatch of a device: keeps its readings for the next recordPublish() of the device.
+  /// The scene thread calls it.
   std::function<Nanos()> stopwatch(std::uint32_t device);
   /// Writes the header and starts the thread.
   void start(Nanos wallOffset, std::string config);
@@ -59,8 +60,10 @@ class Recorder {
   // From start() on, in the scene thread:
 
   /// Before the builders apply the command. Null: the client left.
-  void recordCommand(std::uint32_t scene, scene::ClientId client, Nanos time, const scene::SceneCommand* command);
-  /// After publish() of the device's builder, before its servo can see the snapshot. Revision 0: nothing had changed.
+  void recordCommand(std::uint32_t scene, scene::ClientId client, Nanos time,
+                     const scene::SceneCommand* command);
+  /// After publish() of the device's builder, before its servo can see the snapshot. Revision 0: nothing had
+  /// changed.
   void recordPublish(std::uint32_t device, Nanos time, std::uint64_t revision);
 
   /// After servos and scenes have ended: writes what is left and closes the file. Idempotent.

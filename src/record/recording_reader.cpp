@@ -11,14 +11,14 @@ RecordingReader::RecordingReader(const std::filesystem::path& file) : path_(file
 
 void RecordingReader::fail(const std::string& what) const {
   throw RecordingError("'" + path_.string() + "', block at byte " + std::to_string(block_.offset) + ": " +
-                     what);
+                       what);
 }
 
 void RecordingReader::readHeader() {
   if (!blocks_.next(block_)) {
     const std::string& damage = blocks_.damage();
     throw RecordingError("'" + path_.string() +
-                       "' has no whole header: " + (damage.empty() ? "it is empty" : damage));
+                         "' has no whole header: " + (damage.empty() ? "it is empty" : damage));
   }
   if (block_.kind != BlockKind::header) fail("the first block is not a header");
   Unpacker in(block_.content);

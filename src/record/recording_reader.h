@@ -1,4 +1,5 @@
-// A recording as its events, in the order of writing: the commands of a scene precede the first tick that saw them.
+// A recording as its events, in the order of writing: the commands of a scene precede the first tick that saw
+// them.
 #pragma once
 
 #include <filesystem>
@@ -18,7 +19,8 @@ class RecordingReader {
 
   const RecordingHeader& header() const noexcept { return header_; }
 
-  /// The next event; false at the end. Throws RecordingError, naming the byte, for a whole block with impossible content.
+  /// The next event; false at the end. Throws RecordingError, naming the byte, for a whole block with
+  /// impossible content.
   bool next(RecordingEvent& event);
 
   /// After the last event: why the recording is incomplete; empty when it is complete.

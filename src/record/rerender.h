@@ -1,8 +1,9 @@
 // Re-rendering: the recorded device states in the recorded scene, by the same renderer and guard.
 //
-// The builder gets every command and every call of publish() at the recorded times, with the readings of the stopwatch;
-// the servo gets the state, pacing and control of every tick, and each revision in the tick that saw it. So, without
-// changes, the same program on the same kind of machine gives the recorded forces bit for bit.
+// The builder gets every command and every call of publish() at the recorded times, with the readings of the
+// stopwatch; the servo gets the state, pacing and control of every tick, and each revision in the tick that
+// saw it. So, without changes, the same program on the same kind of machine gives the recorded forces bit for
+// bit.
 #pragma once
 
 #include <deque>
@@ -15,8 +16,8 @@
 
 namespace hapticd::record {
 
-/// Differences from the recording; all else stays. Surface values apply to all objects and planes, within the passivity
-/// bound unless raw.
+/// Differences from the recording; all else stays. Surface values apply to all objects and planes, within the
+/// passivity bound unless raw.
 struct RerenderChanges {
   std::optional<double> stiffness_N_per_m{};
   std::optional<double> damping_Ns_per_m{};

@@ -1,5 +1,5 @@
-// One tick as other programs see it: the one list of columns and keys of `export`, `record`, `watch`, `render --out`, the
-// black box and MCAP. `--hand` reads the same columns (device/simulated/hand_file.h).
+// One tick as other programs see it: the one list of columns and keys of `export`, `record`, `watch`, `render
+// --out`, the black box and MCAP. `--hand` reads the same columns (device/simulated/hand_file.h).
 //
 // To add a field: here, in sampleOf(), and in docs/recording.md.
 #pragma once
@@ -36,9 +36,9 @@ struct Sample {
 
 template <Is<Sample> T, class V>
 void fields(T& sample, V&& v) {
-  auto& [device, time_ns, tick, revision, hip_m, proxy_m, velocity_m_per_s, orientation, force_N, depth_m, touching,
-         object, buttons, guardActive, guardLatched, gripper_rad, renderedForce_N, normal, renderStatus, wakeupError_ns,
-         compute_ns] = sample;
+  auto& [device, time_ns, tick, revision, hip_m, proxy_m, velocity_m_per_s, orientation, force_N, depth_m,
+         touching, object, buttons, guardActive, guardLatched, gripper_rad, renderedForce_N, normal,
+         renderStatus, wakeupError_ns, compute_ns] = sample;
   v("device", device);
   v("time_ns", time_ns);
   v("tick", tick);

@@ -44,7 +44,8 @@ bool unpackSceneEvent(ByteView bytes, SceneEvent& event, std::string& error) {
   in.take(event.time);
   const auto number = in.next<std::uint16_t>();
   if (in.ok() && number != kClientGone && !takeCommand(number, in, event.command.emplace())) {
-    error = "unknown scene command number " + std::to_string(number) + "; use the hapticd that wrote the file";
+    error =
+        "unknown scene command number " + std::to_string(number) + "; use the hapticd that wrote the file";
     return false;
   }
   if (in.ok() && in.rest().empty()) return true;

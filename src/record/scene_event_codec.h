@@ -6,7 +6,8 @@
 
 namespace hapticd::record {
 
-/// The number of a command in files: its position in SceneCommand, from 1. 0 is not a command: the client left.
+/// The number of a command in files: its position in SceneCommand, from 1. 0 is not a command: the client
+/// left.
 template <class C>
 consteval std::uint16_t commandNumber() {
   std::uint16_t number = 0;

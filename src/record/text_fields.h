@@ -1,5 +1,5 @@
-// Values as text by their lists of fields: columns of CSV, and objects of JSON with their schema. JSON that is not
-// written per tick uses nlohmann::json instead.
+// Values as text by their lists of fields: columns of CSV, and objects of JSON with their schema. JSON that
+// is not written per tick uses nlohmann::json instead.
 #pragma once
 
 #include <charconv>
@@ -36,8 +36,8 @@ inline void appendQuoted(std::string& out, std::string_view text) {
   out += '"';
 }
 
-/// One row of CSV: vectors take a column per coordinate, trips are names joined by "+", and absent values leave their
-/// columns empty. The one writer of CSV.
+/// One row of CSV: vectors take a column per coordinate, trips are names joined by "+", and absent values
+/// leave their columns empty. The one writer of CSV.
 class CsvRow {
  public:
   explicit CsvRow(std::string& out) : out_(out) {}
@@ -121,8 +121,8 @@ class CsvHeader {
   std::string& out_;
 };
 
-/// An object of JSON. Numbers that are not finite are null, trips are their bit field, a list of more than 64 items is
-/// its length, and absent values are left out.
+/// An object of JSON. Numbers that are not finite are null, trips are their bit field, a list of more than 64
+/// items is its length, and absent values are left out.
 class JsonObject {
  public:
   explicit JsonObject(std::string& out) : out_(out) { out_ += '{'; }

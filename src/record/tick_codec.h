@@ -6,8 +6,8 @@
 
 namespace hapticd::record {
 
-/// Appends the ticks of one run. The placement of the device and the counts of the guard are written with the first tick
-/// and when they change.
+/// Appends the ticks of one run. The placement of the device and the counts of the guard are written with the
+/// first tick and when they change.
 class TickPacker {
  public:
   void add(const realtime::TickRecord& tick, Bytes& out);

@@ -33,7 +33,8 @@ void VrpnLog::describe(wire::Time time, std::int32_t kind, std::int32_t id, cons
   entry(time, id, kind, wire::encodeDescription(name));
 }
 
-// The head of an entry is a struct that the stock library once wrote as it was in memory; the last number was a pointer.
+// The head of an entry is a struct that the stock library once wrote as it was in memory; the last number was
+// a pointer.
 void VrpnLog::entry(wire::Time time, std::int32_t sender, std::int32_t type, wire::ByteView payload) {
   Bytes head;
   Packer pack(head);

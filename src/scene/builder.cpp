@@ -52,7 +52,6 @@ class SceneBuilder::State {
     forces_.clientGone(client, now);
   }
 
-
   std::optional<Nanos> nextDeadline() const {
     std::optional<Nanos> next;
     for (const auto& at : {board_.nextDeadline(), objects_.nextDeadline(), forces_.nextDeadline()}) {

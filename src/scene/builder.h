@@ -1,9 +1,9 @@
 // From scene commands to snapshots.
 //
 // For one thread: the server's scene thread applies the commands that arrived, publishes, and sleeps until
-// nextDeadline() or the next command. What it publishes depends on the commands, on `now` and on the readings of
-// SceneConfig::stopwatch. It starts threads that rebuild aged trees of the spatial index; they change which triangles are
-// proposed as candidates, never the forces.
+// nextDeadline() or the next command. What it publishes depends on the commands, on `now` and on the readings
+// of SceneConfig::stopwatch. It starts threads that rebuild aged trees of the spatial index; they change
+// which triangles are proposed as candidates, never the forces.
 #pragma once
 
 #include <memory>
@@ -26,8 +26,8 @@ class SceneBuilder {
   SceneBuilder(SceneBuilder&&) noexcept;
   SceneBuilder& operator=(SceneBuilder&&) noexcept;
 
-  /// Applies one command of a client, or queues it in the client's open batch. A command that is refused leaves the scene
-  /// unchanged and appends the reason to `notices`.
+  /// Applies one command of a client, or queues it in the client's open batch. A command that is refused
+  /// leaves the scene unchanged and appends the reason to `notices`.
   void apply(ClientId client, SceneCommand&& command, Nanos now, std::vector<Notice>& notices);
 
   /// The client left: drops its open batch; the forces that it owns ramp out.
@@ -36,12 +36,12 @@ class SceneBuilder {
   /// When publish() is due even without a command; nothing when it is not.
   std::optional<Nanos> nextDeadline() const;
 
-  /// The oldest edit that is applied but not yet published: meshes wait for a pause between edits. Empty when all is
-  /// published.
+  /// The oldest edit that is applied but not yet published: meshes wait for a pause between edits. Empty when
+  /// all is published.
   std::optional<Nanos> oldestEdit() const;
 
-  /// A snapshot of the scene; null when nothing changed since the last call. The first call never returns null. Builds
-  /// the meshes that are due, which may take long; appends notices that became due.
+  /// A snapshot of the scene; null when nothing changed since the last call. The first call never returns
+  /// null. Builds the meshes that are due, which may take long; appends notices that became due.
   std::shared_ptr<const SceneSnapshot> publish(Nanos now, std::vector<Notice>& notices);
 
   /// The scene as of the last publish(), for people to look at.

@@ -1,5 +1,5 @@
-// What describes a scene command beside its members: the decoder, the builder, recordings, exports and the tables in
-// docs/recording-format.md are derived from it.
+// What describes a scene command beside its members: the decoder, the builder, recordings, exports and the
+// tables in docs/recording-format.md are derived from it.
 #pragma once
 
 #include <array>
@@ -19,12 +19,13 @@ inline constexpr std::string_view kNoMessage;
 template <std::size_t N>
 struct CommandInfo {
   template <class... Fields>
-  constexpr CommandInfo(const char* commandName, std::string_view wireMessage, Target executedBy, Fields... names)
+  constexpr CommandInfo(const char* commandName, std::string_view wireMessage, Target executedBy,
+                        Fields... names)
       : name(commandName), message(wireMessage), target(executedBy), fields{names...} {}
 
   const char* name;
-  /// The wire name of the message whose members, in their order, are those of the command; units may differ in type
-  /// only. kNoMessage where the decoder converts by hand.
+  /// The wire name of the message whose members, in their order, are those of the command; units may differ
+  /// in type only. kNoMessage where the decoder converts by hand.
   std::string_view message;
   Target target;
   std::array<const char*, N> fields;  ///< names of the members, in their order
@@ -32,7 +33,8 @@ struct CommandInfo {
 template <class... Fields>
 CommandInfo(const char*, std::string_view, Target, Fields...) -> CommandInfo<sizeof...(Fields)>;
 
-/// Calls f with references to the N members of an aggregate, in their order. Another number of members does not compile.
+/// Calls f with references to the N members of an aggregate, in their order. Another number of members does
+/// not compile.
 template <std::size_t N, class T, class F>
 constexpr decltype(auto) withMembers(T& value, F&& f) {
   static_assert(N <= 8, "add a case for more members");
@@ -68,7 +70,9 @@ constexpr decltype(auto) withMembers(T& value, F&& f) {
 
 /// A struct that describes itself by a kInfo as above.
 template <class C>
-concept Described = requires { std::remove_const_t<C>::kInfo.fields.size(); };
+concept Described = requires {
+  std::remove_const_t<C>::kInfo.fields.size();
+};
 
 /// Calls `visit(name, value)` for each member, in their order.
 template <Described C, class Visit>

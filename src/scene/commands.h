@@ -1,11 +1,12 @@
 // Every command of the scene, as plain values in the client's own units.
 //
-// "World units" are the client's; "metres" are the unit of stock VRPN calls, world / 1000 whatever the workspace.
-// Values are unchecked: the builder checks them and answers with notices.
+// "World units" are the client's; "metres" are the unit of stock VRPN calls, world / 1000 whatever the
+// workspace. Values are unchecked: the builder checks them and answers with notices.
 //
 // To add a command: its struct with kInfo here, at the END of SceneCommand, and its handler: handle() in
-// object_commands.cpp or free_force_commands.cpp, apply() in builder.cpp, by its Target. The decoder converts the
-// message that kInfo names; recordings store the members as they are, so a command in use never changes them.
+// object_commands.cpp or free_force_commands.cpp, apply() in builder.cpp, by its Target. The decoder converts
+// the message that kInfo names; recordings store the members as they are, so a command in use never changes
+// them.
 #pragma once
 
 #include <array>
@@ -34,18 +35,18 @@ struct SetObjectNumber {
 
 /// Sets a run of vertices from number `first` on. Without triangles, consecutive triples are faces.
 struct SetVertices {
-  static constexpr CommandInfo kInfo{"SetVertices", kNoMessage, Target::objects, "object", "first",
-                                     "positions"};
+  static constexpr CommandInfo kInfo{"SetVertices", kNoMessage, Target::objects,
+                                     "object",      "first",    "positions"};
   std::int32_t object = 0;
   std::int32_t first = 0;
   std::vector<Vec3f> positions;  ///< object units
 };
 
-/// Sets a run of triangles from number `first` on. The mesh is indexed from then on and, unless the triangles came in
-/// bulk, in metres as in stock VRPN.
+/// Sets a run of triangles from number `first` on. The mesh is indexed from then on and, unless the triangles
+/// came in bulk, in metres as in stock VRPN.
 struct SetTriangles {
-  static constexpr CommandInfo kInfo{"SetTriangles", kNoMessage, Target::objects, "object", "first",
-                                     "triangles", "makesMetres"};
+  static constexpr CommandInfo kInfo{"SetTriangles", kNoMessage,  Target::objects, "object",
+                                     "first",        "triangles", "makesMetres"};
   std::int32_t object = 0;
   std::int32_t first = 0;
   std::vector<Triangle> triangles;
@@ -71,7 +72,8 @@ struct ClearMesh {
   std::int32_t object = 0;
 };
 
-/// Places the mesh in its object; replaces the previous placement. Row-major, translation in 3, 7, 11, metres.
+/// Places the mesh in its object; replaces the previous placement. Row-major, translation in 3, 7, 11,
+/// metres.
 struct TransformMesh {
   static constexpr CommandInfo kInfo{"TransformMesh", "vrpn_ForceDevice transformTrimesh", Target::objects,
                                      "object", "matrix"};
@@ -125,15 +127,19 @@ struct SetTransform {
 };
 
 struct SetObjectPosition {
-  static constexpr CommandInfo kInfo{"SetObjectPosition", "vrpn_ForceDevice setObjectPosition", Target::objects,
-                                     "object", "position_m"};
+  static constexpr CommandInfo kInfo{"SetObjectPosition", "vrpn_ForceDevice setObjectPosition",
+                                     Target::objects, "object", "position_m"};
   std::int32_t object = 0;
   Vec3 position_m = Vec3::Zero();
 };
 
 struct SetObjectOrientation {
-  static constexpr CommandInfo kInfo{"SetObjectOrientation", "vrpn_ForceDevice setObjectOrientation", Target::objects,
-                                     "object", "axis", "angle_rad"};
+  static constexpr CommandInfo kInfo{"SetObjectOrientation",
+                                     "vrpn_ForceDevice setObjectOrientation",
+                                     Target::objects,
+                                     "object",
+                                     "axis",
+                                     "angle_rad"};
   std::int32_t object = 0;
   Vec3 axis = Vec3::UnitZ();
   double angle_rad = 0;
@@ -158,8 +164,8 @@ struct SetTouchable {
 /// One property by name: "stiffness", "damping", "static friction", "dynamic friction", "popthrough" in 0…1,
 /// "mass" in kg.
 struct SetSurfaceProperty {
-  static constexpr CommandInfo kInfo{"SetSurfaceProperty", "vrpn_ForceDevice setHapticProperty", Target::objects,
-                                     "object", "name", "value"};
+  static constexpr CommandInfo kInfo{
+      "SetSurfaceProperty", "vrpn_ForceDevice setHapticProperty", Target::objects, "object", "name", "value"};
   std::int32_t object = 0;
   std::string name;
   double value = 0;
@@ -167,8 +173,10 @@ struct SetSurfaceProperty {
 
 /// Stock units: stiffness 1 is 1000 N/m, damping 0.005 is 5 N·s/m. Also publishes mesh edits at once.
 struct SetSurface {
-  static constexpr CommandInfo kInfo{"SetSurface", "vrpn_ForceDevice updateTrimeshChanges", Target::objects,
-                                     "object", "stiffness", "damping", "staticFriction", "dynamicFriction"};
+  static constexpr CommandInfo kInfo{"SetSurface",     "vrpn_ForceDevice updateTrimeshChanges",
+                                     Target::objects,  "object",
+                                     "stiffness",      "damping",
+                                     "staticFriction", "dynamicFriction"};
   std::int32_t object = 0;
   double stiffness = 0;
   double damping = 0;
@@ -188,24 +196,25 @@ struct SetTouchableFaces {
 /// Fits the clip cube of the projection to the device workspace. Matrices are column-major.
 struct SetWorkspaceProjection {
   static constexpr CommandInfo kInfo{"SetWorkspaceProjection",
-                                     "vrpn_ForceDevice setWorkspaceProjectionMatrix", Target::scene,
-                                     "model", "projection"};
+                                     "vrpn_ForceDevice setWorkspaceProjectionMatrix", Target::scene, "model",
+                                     "projection"};
   std::array<double, 16> model{};
   std::array<double, 16> projection{};
 };
 
 /// Fits the box (min xyz, max xyz, world units), transformed by `model`, to the device workspace.
 struct SetWorkspaceBox {
-  static constexpr CommandInfo kInfo{"SetWorkspaceBox", "vrpn_ForceDevice setWorkspaceBoundingBox", Target::scene,
-                                     "model", "box"};
+  static constexpr CommandInfo kInfo{"SetWorkspaceBox", "vrpn_ForceDevice setWorkspaceBoundingBox",
+                                     Target::scene, "model", "box"};
   std::array<double, 16> model{};
   std::array<double, 6> box{};
 };
 
 /// Places the device in the world.
 struct SetHapticOrigin {
-  static constexpr CommandInfo kInfo{"SetHapticOrigin", "vrpn_ForceDevice setHapticOrigin", Target::scene,
-                                     "position_m", "axis", "angle_rad"};
+  static constexpr CommandInfo kInfo{
+      "SetHapticOrigin", "vrpn_ForceDevice setHapticOrigin", Target::scene, "position_m", "axis",
+      "angle_rad"};
   Vec3 position_m = Vec3::Zero();
   Vec3 axis = Vec3::UnitZ();
   double angle_rad = 0;
@@ -219,8 +228,9 @@ struct SetHapticScale {
 
 /// Places the scene in the world.
 struct SetSceneOrigin {
-  static constexpr CommandInfo kInfo{"SetSceneOrigin", "vrpn_ForceDevice setSceneOrigin", Target::objects,
-                                     "position_m", "axis", "angle_rad"};
+  static constexpr CommandInfo kInfo{"SetSceneOrigin", "vrpn_ForceDevice setSceneOrigin",
+                                     Target::objects,  "position_m",
+                                     "axis",           "angle_rad"};
   Vec3 position_m = Vec3::Zero();
   Vec3 axis = Vec3::UnitZ();
   double angle_rad = 0;
@@ -230,9 +240,12 @@ struct SetSceneOrigin {
 
 /// Defines or redefines an effect; kEffectKinds in effect.h has the types.
 struct DefineEffect {
-  static constexpr CommandInfo kInfo{"DefineEffect", "vrpn_ForceDevice Effect", Target::forces, "type",
-                                     "index", "gain", "magnitude_N", "duration_ms", "frequency",
-                                     "position", "direction"};
+  static constexpr CommandInfo kInfo{"DefineEffect", "vrpn_ForceDevice Effect",
+                                     Target::forces, "type",
+                                     "index",        "gain",
+                                     "magnitude_N",  "duration_ms",
+                                     "frequency",    "position",
+                                     "direction"};
   std::string type;
   std::int32_t index = 0;
   double gain = 0;  ///< N/mm, viscous N/(mm/s)
@@ -255,8 +268,9 @@ struct StopEffect {
 
 /// a x + b y + c z + d = 0 with d in metres; a zero normal removes it. Stock units as in SetSurface.
 struct SetPlane {
-  static constexpr CommandInfo kInfo{"SetPlane", kNoMessage, Target::forces, "index", "plane", "stiffness",
-                                     "damping", "staticFriction", "dynamicFriction", "recoveryCycles"};
+  static constexpr CommandInfo kInfo{"SetPlane",        kNoMessage,      Target::forces, "index",
+                                     "plane",           "stiffness",     "damping",      "staticFriction",
+                                     "dynamicFriction", "recoveryCycles"};
   std::int32_t index = 0;
   std::array<double, 4> plane{};
   double stiffness = 0;
@@ -268,9 +282,9 @@ struct SetPlane {
 
 /// Adhesion, texture and buzz of plane 0.
 struct SetPlaneDetail {
-  static constexpr CommandInfo kInfo{"SetPlaneDetail", "vrpn_ForceDevice Plane2", Target::forces,
-                                     "adhesionNormal_N", "adhesionLateral_N", "textureAmplitude_m",
-                                     "textureWavelength_m", "buzzAmplitude_m", "buzzFrequency_Hz"};
+  static constexpr CommandInfo kInfo{"SetPlaneDetail",      "vrpn_ForceDevice Plane2", Target::forces,
+                                     "adhesionNormal_N",    "adhesionLateral_N",       "textureAmplitude_m",
+                                     "textureWavelength_m", "buzzAmplitude_m",         "buzzFrequency_Hz"};
   double adhesionNormal_N = 0;
   double adhesionLateral_N = 0;
   double textureAmplitude_m = 0;
@@ -281,8 +295,10 @@ struct SetPlaneDetail {
 
 /// F = force + jacobian (x - origin) within the radius; all zero stops it.
 struct SetForceField {
-  static constexpr CommandInfo kInfo{"SetForceField", "vrpn_ForceDevice Force_Field", Target::forces,
-                                     "origin_m", "force_N", "jacobian_N_per_m", "radius_m"};
+  static constexpr CommandInfo kInfo{"SetForceField", "vrpn_ForceDevice Force_Field",
+                                     Target::forces,  "origin_m",
+                                     "force_N",       "jacobian_N_per_m",
+                                     "radius_m"};
   Vec3 origin_m = Vec3::Zero();
   Vec3 force_N = Vec3::Zero();
   std::array<double, 9> jacobian_N_per_m{};  ///< row by row
@@ -290,8 +306,8 @@ struct SetForceField {
 };
 
 struct SetConstraintEnabled {
-  static constexpr CommandInfo kInfo{"SetConstraintEnabled", "vrpn_ForceDevice constraint_enable", Target::forces,
-                                     "enabled"};
+  static constexpr CommandInfo kInfo{"SetConstraintEnabled", "vrpn_ForceDevice constraint_enable",
+                                     Target::forces, "enabled"};
   bool enabled = false;
 };
 
@@ -312,12 +328,13 @@ struct SetConstraintVector {
 };
 
 struct SetConstraintStiffness {
-  static constexpr CommandInfo kInfo{"SetConstraintStiffness", "vrpn_ForceDevice constraint_KSpring", Target::forces,
-                                     "stiffness_N_per_m"};
+  static constexpr CommandInfo kInfo{"SetConstraintStiffness", "vrpn_ForceDevice constraint_KSpring",
+                                     Target::forces, "stiffness_N_per_m"};
   double stiffness_N_per_m = 0;
 };
 
-/// Effect 0 is a buzz: amplitude (N), frequency (Hz), duration (s), direction xyz; missing ones have defaults.
+/// Effect 0 is a buzz: amplitude (N), frequency (Hz), duration (s), direction xyz; missing ones have
+/// defaults.
 struct StartCustomEffect {
   static constexpr CommandInfo kInfo{"StartCustomEffect", kNoMessage, Target::forces, "effect", "parameters"};
   std::uint32_t effect = 0;
@@ -328,8 +345,8 @@ struct StopCustomEffect {
   static constexpr CommandInfo kInfo{"StopCustomEffect", kNoMessage, Target::forces};
 };
 
-/// The forces that the client owns ramp out, although it stays connected. Takes effect in an open batch, too. The server
-/// issues it for a client that it does not hear.
+/// The forces that the client owns ramp out, although it stays connected. Takes effect in an open batch, too.
+/// The server issues it for a client that it does not hear.
 struct ReleaseForces {
   static constexpr CommandInfo kInfo{"ReleaseForces", kNoMessage, Target::forces};
 };

@@ -99,8 +99,8 @@ bool Deformation::spareIsFree() const {
   return true;
 }
 
-// A tree with many refits stays in use while a new one is built. The moment of the exchange changes no force: an index
-// only proposes candidates.
+// A tree with many refits stays in use while a new one is built. The moment of the exchange changes no force:
+// an index only proposes candidates.
 SpatialIndex Deformation::indexOver(const std::shared_ptr<const std::vector<Triangle>>& triangles) {
   const auto boxed = [](const std::vector<Triangle>& all, const Sweep& sweep) {
     return BoxedTriangles{all, sweep.lower, sweep.upper};

@@ -40,9 +40,9 @@ class Deformation {
   /// Forgets the shapes so far: the triangles changed, or there are none.
   void restart();
 
-  /// The next shape: its surface travels from where the servo renders `old` to `target`, in at most `longest`.
-  /// `triangles` are those of `old`, of which some may lack corners; `clock` is the time, `before` that of the previous
-  /// shape.
+  /// The next shape: its surface travels from where the servo renders `old` to `target`, in at most
+  /// `longest`. `triangles` are those of `old`, of which some may lack corners; `clock` is the time, `before`
+  /// that of the previous shape.
   std::shared_ptr<MeshGeometry> next(std::shared_ptr<MeshGeometry> old,
                                      std::shared_ptr<const std::vector<Triangle>> triangles,
                                      std::shared_ptr<const std::vector<Vec3f>> target,
@@ -61,7 +61,8 @@ class Deformation {
   bool begun_ = false;
   std::vector<std::uint32_t> lone_;  // vertices of no triangle
   Sweep sweep_;
-  std::shared_ptr<MeshGeometry> spare_;  // the shape before the last; its index is reused once no snapshot holds it
+  std::shared_ptr<MeshGeometry>
+      spare_;  // the shape before the last; its index is reused once no snapshot holds it
   IndexBuilder rebuild_;
 };
 

@@ -21,8 +21,8 @@ struct ObjectDescription {
   Affine T_world_object = Affine::Identity();  ///< world units; where it is, or is on its way to
   Affine T_object_mesh = Affine::Identity();
   Surface surface;  ///< as rendered
-  /// The mesh that is rendered, null when there is none; equal pointers mean an equal shape. While it deforms, where
-  /// it is on its way to.
+  /// The mesh that is rendered, null when there is none; equal pointers mean an equal shape. While it
+  /// deforms, where it is on its way to.
   std::shared_ptr<const std::vector<geometry::Vec3f>> vertices;
   std::shared_ptr<const std::vector<geometry::Triangle>> triangles;
 };

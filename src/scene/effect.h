@@ -1,7 +1,7 @@
 // Force effects of the scene, in the units of the client.
 //
-// To add one: its type and its line in kEffectKinds here, its force in realtime/render/effects.cpp, and its function in
-// include/hapticd/scene.h.
+// To add one: its type and its line in kEffectKinds here, its force in realtime/render/effects.cpp, and its
+// function in include/hapticd/scene.h.
 #pragma once
 
 #include <cstdint>
@@ -37,7 +37,7 @@ struct Effect {
   EffectType type = EffectType::constant;
   double gain = 0;                                    ///< N/m (spring, friction) or N·s/m (viscous)
   double magnitude_N = 0;                             ///< force, or its limit
-  base::Nanos duration = 0;                       ///< 0: until stopped
+  base::Nanos duration = 0;                           ///< 0: until stopped
   double angularFrequency_rad_per_s = 0;              ///< vibrations
   geometry::Vec3 position = geometry::Vec3::Zero();   ///< world units
   geometry::Vec3 direction = geometry::Vec3::Zero();  ///< world frame, not normalised

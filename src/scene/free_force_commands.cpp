@@ -88,10 +88,7 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
   const auto* kind = std::find_if(std::begin(kEffectKinds), std::end(kEffectKinds),
                                   [&](const EffectKind& k) { return k.name == c.type; });
   if (kind == std::end(kEffectKinds)) {
-    call.refuse(
-        "setEffect",
-        "refused: unknown type; use " + kindNames(),
-        " ", c.index, ", '", c.type, "'");
+    call.refuse("setEffect", "refused: unknown type; use " + kindNames(), " ", c.index, ", '", c.type, "'");
     return;
   }
   if (const auto what = firstUnusable(*kind, c)) {

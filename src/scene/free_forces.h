@@ -40,8 +40,8 @@ class FreeForces {
   void reset(Nanos now);
 
   std::optional<Nanos> nextDeadline() const;
-  /// Removes ended forces and reports startEffect calls whose definition never arrived. True when something changed
-  /// since the last call.
+  /// Removes ended forces and reports startEffect calls whose definition never arrived. True when something
+  /// changed since the last call.
   bool update(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   /// Force fields depend on the workspace: a stiff one is kept passive in device metres.
   PublishedForces publish(double worldUnitsPerMetre) const;

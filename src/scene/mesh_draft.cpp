@@ -22,8 +22,8 @@ bool sameBytes(const Vec3f* a, const std::vector<Vec3f>& b) {
   return std::memcmp(a, b.data(), b.size() * sizeof(Vec3f)) == 0;
 }
 
-// Empty for a triangle with a corner that is not a number. Uses floats as far as they are exact because it is called for
-// each triangle of a mesh at every build.
+// Empty for a triangle with a corner that is not a number. Uses floats as far as they are exact because it is
+// called for each triangle of a mesh at every build.
 Box boxOfTriangle(const Triangle& t, const std::vector<Vec3f>& vertices) {
   if (t[0] >= vertices.size() || t[1] >= vertices.size() || t[2] >= vertices.size()) return {};
   const Vec3f& a = vertices[t[0]];
@@ -158,7 +158,8 @@ std::shared_ptr<MeshGeometry> MeshDraft::build(std::uint64_t topology) {
   return mesh;
 }
 
-std::shared_ptr<const MeshGeometry> MeshDraft::commit(const std::function<Nanos()>& clock, std::uint64_t topology) {
+std::shared_ptr<const MeshGeometry> MeshDraft::commit(const std::function<Nanos()>& clock,
+                                                      std::uint64_t topology) {
   if (triangleCount() == 0 || !current_ || shapeChanged_) {
     deformation_.restart();
     current_ = triangleCount() > 0 ? build(topology) : nullptr;

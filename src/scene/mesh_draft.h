@@ -42,12 +42,12 @@ class CopyOnWrite {
   std::shared_ptr<const std::vector<T>> shared_;
 };
 
-/// Vertices and triangles by number. Runs arrive in any order. A vertex that was never set is NaN, and a triangle with such
-/// a corner exerts no force.
+/// Vertices and triangles by number. Runs arrive in any order. A vertex that was never set is NaN, and a
+/// triangle with such a corner exerts no force.
 class MeshDraft {
  public:
-  static constexpr Nanos kPause = 4'000'000;      ///< from the last edit, of positions alone, to its publication
-  static constexpr Nanos kQuiet = 20'000'000;     ///< from the last edit of a mesh to its publication
+  static constexpr Nanos kPause = 4'000'000;   ///< from the last edit, of positions alone, to its publication
+  static constexpr Nanos kQuiet = 20'000'000;  ///< from the last edit of a mesh to its publication
   static constexpr Nanos kLongest = 250'000'000;  ///< from the first edit to the publication, at most
   static constexpr Nanos kLongestMorph = 50'000'000;
 
@@ -77,8 +77,9 @@ class MeshDraft {
   std::optional<Nanos> oldestEdit() const { return dirty_ ? std::optional(firstEdit_) : std::nullopt; }
   bool hasBeenPublished() const { return current_ != nullptr; }
 
-  /// Builds the mesh with all edits; null when it has no triangles. `clock` is read again after the work, so that a morph
-  /// starts from the surface that is rendered then. `topology` numbers a new list of triangles; no other mesh has it.
+  /// Builds the mesh with all edits; null when it has no triangles. `clock` is read again after the work, so
+  /// that a morph starts from the surface that is rendered then. `topology` numbers a new list of triangles;
+  /// no other mesh has it.
   std::shared_ptr<const MeshGeometry> commit(const std::function<Nanos()>& clock, std::uint64_t topology);
 
  private:

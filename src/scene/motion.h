@@ -6,8 +6,8 @@
 
 namespace hapticd::scene {
 
-using geometry::Affine;
 using base::Nanos;
+using geometry::Affine;
 
 /// T_world_object as a function of servo time. Immutable; evaluation is noexcept and allocation-free.
 class Motion {

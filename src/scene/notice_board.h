@@ -68,7 +68,7 @@ struct Call {
   /// "name parts…: reason".
   template <class... Parts>
   void send(Notice::Severity severity, std::string_view name, std::string_view reason,
-           const Parts&... parts) const {
+            const Parts&... parts) const {
     std::ostringstream text;
     text << name;
     static_cast<void>((text << ... << parts));

@@ -21,8 +21,7 @@ Box withRoom(const Object& object, const Box& swept) {
   constexpr double kRoom_s = 0.25;
   const Vec3 centre = object.geometry->index.bounds().centre();
   const Vec3 way = motion.destination() * centre - motion.origin() * centre;
-  const double ahead =
-      std::clamp(kRoom_s / base::toSeconds(std::max<Nanos>(object.travel, 1)), 1.0, 64.0);
+  const double ahead = std::clamp(kRoom_s / base::toSeconds(std::max<Nanos>(object.travel, 1)), 1.0, 64.0);
   Box box = swept;
   box.extend(Box{swept.min + ahead * way, swept.max + ahead * way});
   const Vec3 turning = 0.05 * swept.extents();
@@ -87,7 +86,8 @@ void ObjectTable::commitMeshes(Nanos now, NoticeBoard& board, std::vector<Notice
     } catch (const std::exception& error) {
       object->mesh.giveUp();
       const Call call{object->meshSetBy, now, false, board, out};
-      call.refuse("mesh", "could not be built, the previous one stays", " of object ", id, ", ", error.what());
+      call.refuse("mesh", "could not be built, the previous one stays", " of object ", id, ", ",
+                  error.what());
     }
     if (rebuild) rebuildNotBefore_ = clock() + 3 * (clock() - begin);
   }

@@ -35,7 +35,7 @@ struct PoseStream {
 
 /// One object as clients see it.
 struct Object {
-  static constexpr std::int32_t kScene = -1;    ///< parent: below the scene's origin
+  static constexpr std::int32_t kScene = -1;     ///< parent: below the scene's origin
   static constexpr std::int32_t kNoParent = -2;  ///< parent: a root of its own
 
   std::int32_t id = 0;
@@ -96,7 +96,8 @@ class ObjectTable {
   std::optional<Nanos> nextDeadline() const;
   /// The oldest edit of a mesh that is not published yet.
   std::optional<Nanos> oldestEdit() const;
-  /// Brings `published` up to date; false when nothing changed. Remarks on a surface go to the client that set it.
+  /// Brings `published` up to date; false when nothing changed. Remarks on a surface go to the client that
+  /// set it.
   bool publish(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   const PublishedObjects& published() const { return published_; }
   /// Appends every object, whether it exerts force or not.
@@ -148,7 +149,7 @@ class ObjectTable {
   std::uint64_t vertices_ = 0;
   std::uint64_t triangles_ = 0;
   std::uint64_t lastTopology_ = 0;  // one counter for all meshes: no number is used twice
-  std::uint32_t jumps_ = 0;  // one counter for all: no number is used twice
+  std::uint32_t jumps_ = 0;         // one counter for all: no number is used twice
 
   std::vector<std::int32_t> changed_;
   std::vector<std::int32_t> edited_;  // meshes with edits

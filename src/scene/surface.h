@@ -3,7 +3,8 @@
 
 namespace hapticd::scene {
 
-/// Surface of one object, in SI. All zero until a client sets it: an object exerts force once it has stiffness.
+/// Surface of one object, in SI. All zero until a client sets it: an object exerts force once it has
+/// stiffness.
 struct Surface {
   double stiffness_N_per_m = 0;
   double damping_Ns_per_m = 0;

@@ -9,8 +9,8 @@ namespace hapticd::server {
 namespace {
 
 using base::Nanos;
-using record::SceneEvent;
 using record::RecordingEvent;
+using record::SceneEvent;
 using record::TickEvent;
 
 constexpr Nanos kReadAhead = 200'000'000;

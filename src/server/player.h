@@ -66,7 +66,7 @@ class Player {
   // Used by the thread only.
   std::unique_ptr<record::RecordingReader> reader_;  // null between passes through the file
   std::multimap<base::Nanos, record::RecordingEvent> buffer_;
-  bool atEnd_ = false;  // the reader reached the end of the file
+  bool atEnd_ = false;    // the reader reached the end of the file
   bool started_ = false;  // an event of this pass was played
   bool ended_ = false;
   base::Nanos firstRecorded_ = 0;

@@ -169,16 +169,16 @@ void Server::startScene(SceneHost& scene) {
       recorder_->recordCommand(number, client, now, command);
     };
   }
-  scene.start({.notices =
-                   [this, &scene](std::vector<scene::Notice>&& notices) {
-                     loop_.post([this, &scene, notices = std::move(notices)]() mutable {
-                       deliver(scene, std::move(notices));
-                     });
-                   },
-               .relieved =
-                   [this](scene::ClientId client) { loop_.post([this, client] { onRelieved(client); }); },
-               .applying = std::move(applying)},
-              [this](std::function<void()> function) { loop_.post(std::move(function)); });
+  scene.start(
+      {.notices =
+           [this, &scene](std::vector<scene::Notice>&& notices) {
+             loop_.post([this, &scene, notices = std::move(notices)]() mutable {
+               deliver(scene, std::move(notices));
+             });
+           },
+       .relieved = [this](scene::ClientId client) { loop_.post([this, client] { onRelieved(client); }); },
+       .applying = std::move(applying)},
+      [this](std::function<void()> function) { loop_.post(std::move(function)); });
 }
 
 void Server::run() {

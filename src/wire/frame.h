@@ -1,5 +1,5 @@
-// Frames: the 24-byte header that precedes every payload, and the padding behind it. For callers that loop over
-// raw bytes: nothing here allocates or copies.
+// Frames: the 24-byte header that precedes every payload, and the padding behind it. For callers that loop
+// over raw bytes: nothing here allocates or copies.
 #pragma once
 
 #include <string>
@@ -76,7 +76,8 @@ inline FrameStatus readFrame(ByteView bytes, FrameView& frame) noexcept {
 /// The reason why readFrame() refused the bytes (at least 4), as an error text.
 std::string invalidFrame(ByteView bytes);
 
-/// Iterates over the frames in bytes: `while (reader.next(frame)) ...`, then status() gives the reason for the end.
+/// Iterates over the frames in bytes: `while (reader.next(frame)) ...`, then status() gives the reason for
+/// the end.
 class FrameReader {
  public:
   explicit FrameReader(ByteView bytes) noexcept : rest_(bytes) {}

@@ -37,9 +37,9 @@ constexpr LocalType localType(MessageKind kind) noexcept {
 template <WireMessage M>
 inline constexpr LocalType kLocalType = localType(kindOf<M>);
 
-/// The names we use, shared by all peers of a process. Starts with every message of the table and no sender. Names
-/// are never removed. A peer announces new ones when it next feeds or sends. Not thread safe: one thread owns the
-/// names and their peers.
+/// The names we use, shared by all peers of a process. Starts with every message of the table and no sender.
+/// Names are never removed. A peer announces new ones when it next feeds or sends. Not thread safe: one
+/// thread owns the names and their peers.
 class LocalNames {
  public:
   LocalNames();

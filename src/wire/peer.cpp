@@ -24,8 +24,7 @@ Entry& entryFor(std::vector<Entry>& table, std::int32_t id) {
 
 }  // namespace
 
-Peer::Peer(const LocalNames& names, PeerOptions options)
-    : names_(&names), options_(std::move(options)) {
+Peer::Peer(const LocalNames& names, PeerOptions options) : names_(&names), options_(std::move(options)) {
   stream_.append(encodeCookie(options_.log ? options_.log->mode : 0));
 }
 
@@ -53,8 +52,8 @@ void Peer::feedStream(Time now, ByteView bytes, EventSink sink) {
   }
 }
 
-// Size of the cookie or frame that starts with these bytes, as far as they show it; for an invalid length only the
-// bytes of the length.
+// Size of the cookie or frame that starts with these bytes, as far as they show it; for an invalid length
+// only the bytes of the length.
 std::size_t Peer::unitBytes(ByteView start) const noexcept {
   if (state_ == State::kAwaitingCookie) return kCookieBytes;
   constexpr std::size_t kLengthBytes = sizeof(std::uint32_t);
@@ -199,8 +198,7 @@ bool Peer::send(Time time, LocalSender sender, const Message& message, Reliabili
   return true;
 }
 
-bool Peer::sendRaw(Time time, LocalSender sender, LocalType type, ByteView payload,
-                       Reliability reliability) {
+bool Peer::sendRaw(Time time, LocalSender sender, LocalType type, ByteView payload, Reliability reliability) {
   if (!announce(time)) return false;
   route(reliability, kHeaderBytes + payload.size()).addRaw(time, sender.value, type.value, payload);
   return true;

@@ -50,8 +50,8 @@ struct MessageReceived {
 struct UdpDescribed {
   UdpAddress address;
 };
-/// The peer asks for log files. Whether to open files that a peer names is the caller's decision; the stock server
-/// does.
+/// The peer asks for log files. Whether to open files that a peer names is the caller's decision; the stock
+/// server does.
 struct LogRequested {
   LogRequest request;
 };

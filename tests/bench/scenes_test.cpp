@@ -1,5 +1,5 @@
-#include "base/time.h"
 #include "bench/scenes.h"
+#include "base/time.h"
 
 #include <gtest/gtest.h>
 

@@ -73,8 +73,7 @@ TEST(Client, CommandsSleepAndThenFailWhenTheServerDoesNotRead) {
       client.setVertex(0, sent, 0, 0, 0);
       if (sent % 1000 == 0) {
         const Statistics s = client.statistics();
-        mostWaiting =
-            std::max(mostWaiting, s.messagesOut * 48 - std::min(s.messagesOut * 48, s.tcpBytesOut));
+        mostWaiting = std::max(mostWaiting, s.messagesOut * 48 - std::min(s.messagesOut * 48, s.tcpBytesOut));
       }
     }
   };
@@ -91,8 +90,7 @@ TEST(Client, AServerThatReadsLaterReceivesEverything) {
   while (!client.connected() && std::chrono::steady_clock::now() < end) client.poll(10ms);
   std::vector<std::array<float, 3>> corners(kManyVertices);
   std::thread later([&] {
-    std::this_thread::sleep_for(
-        50ms);  // so that the upload usually waits; the result does not depend on it
+    std::this_thread::sleep_for(50ms);  // so that the upload usually waits; the result does not depend on it
     server.startReading();
   });
   client.uploadCorners(0, corners);

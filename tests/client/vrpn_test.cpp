@@ -34,8 +34,8 @@ bool runUntil(Device& device, Condition&& condition) {
 
 class Vrpn : public ::testing::TestWithParam<bool> {
  protected:
-  /// Waits for a message by TCP, which follows the server's descriptions of its names. Datagrams may overtake those, and
-  /// without them have no meaning.
+  /// Waits for a message by TCP, which follows the server's descriptions of its names. Datagrams may overtake
+  /// those, and without them have no meaning.
   static bool ready(vrpn_BaseClass& device) {
     const vrpn_int32 sender = device.connectionPtr()->register_sender("Phantom");
     return runUntil(device, [&] { return device.connectionPtr()->heard(sender); });

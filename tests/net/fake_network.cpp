@@ -89,12 +89,15 @@ class FakeLoop final : public Loop::Impl {
     });
   }
   /// After the delay of the network.
-  void arriving(std::function<void()> function) { at(network_.time() + network_.options.delay, std::move(function)); }
+  void arriving(std::function<void()> function) {
+    at(network_.time() + network_.options.delay, std::move(function));
+  }
   FakeNetwork& network() { return network_; }
 
  private:
   FakeNetwork& network_;
-  std::shared_ptr<FakeLoop*> self_ = std::make_shared<FakeLoop*>(this);  // events of a loop that is gone are dropped
+  std::shared_ptr<FakeLoop*> self_ =
+      std::make_shared<FakeLoop*>(this);  // events of a loop that is gone are dropped
   bool stopped_ = false;
   std::size_t handled_ = 0;
 };
@@ -162,8 +165,13 @@ class FakeWatch final : public Subscription::State {
 // The states and their changes are those of TcpConnection; the wire is a few lines in write() and arrive().
 class FakeConnection final : public Connection::Impl, public std::enable_shared_from_this<FakeConnection> {
  public:
-  FakeConnection(FakeLoop& loop, const ConnectionOptions& options, const Endpoint& local, const Endpoint& remote)
-      : loop_(loop), network_(loop.network()), options_(options), queue_(options.lowMarkBytes), local_(local),
+  FakeConnection(FakeLoop& loop, const ConnectionOptions& options, const Endpoint& local,
+                 const Endpoint& remote)
+      : loop_(loop),
+        network_(loop.network()),
+        options_(options),
+        queue_(options.lowMarkBytes),
+        local_(local),
         remote_(remote) {}
 
   void connect(milliseconds timeout) {
@@ -385,8 +393,8 @@ class FakeConnection final : public Connection::Impl, public std::enable_shared_
 
   void armRead() {
     if (state_ == State::open && paused_ && (endArrived_ || !failure_.empty())) reportPeerGone();
-    const bool wanted =
-        state_ == State::open ? handlers_ && !paused_ : state_ == State::flushing || state_ == State::draining;
+    const bool wanted = state_ == State::open ? handlers_ && !paused_
+                                              : state_ == State::flushing || state_ == State::draining;
     const bool something = !unread_.empty() || endArrived_ || !failure_.empty();
     if (readArmed_ || peerEnded_ || !wanted || !something) return;
     readArmed_ = true;
@@ -418,7 +426,8 @@ class FakeConnection final : public Connection::Impl, public std::enable_shared_
     const auto other = other_.lock();
     if (other && other->blocked_ && !cut_) {
       other->loop_.arriving([other] {
-        if (other->blocked_ && (other->state_ == State::open || other->state_ == State::flushing)) other->write();
+        if (other->blocked_ && (other->state_ == State::open || other->state_ == State::flushing))
+          other->write();
       });
     }
     if (state_ == State::open) call(&ConnectionHandlers::onBytes, std::span<const std::byte>(bytes));
@@ -444,9 +453,10 @@ class FakeConnection final : public Connection::Impl, public std::enable_shared_
 
   void armTimer(milliseconds timeout, std::string reason) {
     const std::uint64_t number = ++timerNumber_;
-    loop_.at(network_.time() + nanos(timeout), [self = shared_from_this(), number, reason = std::move(reason)] {
-      if (self->timerNumber_ == number) self->finish(reason);
-    });
+    loop_.at(network_.time() + nanos(timeout),
+             [self = shared_from_this(), number, reason = std::move(reason)] {
+               if (self->timerNumber_ == number) self->finish(reason);
+             });
   }
 
   void finish(std::string reason) {
@@ -554,7 +564,8 @@ class FakeUdpSocket final : public UdpSocket::Impl, public std::enable_shared_fr
   void start(UdpHandlers handlers) override {
     handlers_ = std::make_shared<UdpHandlers>(std::move(handlers));
     for (const auto& [bytes, from] : std::exchange(waiting_, {})) {
-      loop_.at(loop_.network().time(), [self = shared_from_this(), b = bytes, f = from] { self->receive(b, f); });
+      loop_.at(loop_.network().time(),
+               [self = shared_from_this(), b = bytes, f = from] { self->receive(b, f); });
     }
   }
   void connect(const Endpoint& peer) override {
@@ -585,8 +596,8 @@ class FakeUdpSocket final : public UdpSocket::Impl, public std::enable_shared_fr
     return true;
   }
   std::size_t sendBatch(std::span<const Datagram> datagrams) override {
-    return static_cast<std::size_t>(
-        std::count_if(datagrams.begin(), datagrams.end(), [this](const Datagram& d) { return sendTo(d.bytes, d.to); }));
+    return static_cast<std::size_t>(std::count_if(
+        datagrams.begin(), datagrams.end(), [this](const Datagram& d) { return sendTo(d.bytes, d.to); }));
   }
   void close() noexcept override {
     handlers_.reset();
@@ -652,7 +663,8 @@ std::shared_ptr<Connection::Impl> FakeLoop::connect(const Endpoint& peer, millis
   return connection;
 }
 
-std::shared_ptr<TcpListener::Impl> FakeLoop::listen(const Endpoint& local, std::function<void(Connection)> onAccept,
+std::shared_ptr<TcpListener::Impl> FakeLoop::listen(const Endpoint& local,
+                                                    std::function<void(Connection)> onAccept,
                                                     const ConnectionOptions& options, const char* option) {
   std::vector<Endpoint> used;
   for (const FakeListener* listener : network_.listeners_) used.push_back(listener->local());
@@ -697,11 +709,13 @@ void FakeNetwork::cut(const Endpoint& oneEnd) {
 void FakeNetwork::reset(const Endpoint& oneEnd) {
   for (const auto& weak : connections_) {
     const auto connection = weak.lock();
-    if (connection && (connection->local() == oneEnd || connection->remote() == oneEnd)) connection->beReset();
+    if (connection && (connection->local() == oneEnd || connection->remote() == oneEnd))
+      connection->beReset();
   }
 }
 
-void FakeNetwork::schedule(Nanos when, const std::shared_ptr<FakeLoop*>& loop, std::function<void()> function) {
+void FakeNetwork::schedule(Nanos when, const std::shared_ptr<FakeLoop*>& loop,
+                           std::function<void()> function) {
   queue_.emplace(std::pair(std::max(when, time()), sequence_++), Event{loop, std::move(function)});
 }
 
@@ -731,8 +745,8 @@ bool FakeNetwork::runNext(Nanos limit) {
   return true;
 }
 
-Endpoint FakeNetwork::freeEndpoint(const Endpoint& wanted, const std::vector<Endpoint>& used, const char* kind,
-                                   const std::string& option) {
+Endpoint FakeNetwork::freeEndpoint(const Endpoint& wanted, const std::vector<Endpoint>& used,
+                                   const char* kind, const std::string& option) {
   constexpr std::uint32_t kLoopbackNet = 127;
   if (wanted.address != kAnyAddress && wanted.address >> 24 != kLoopbackNet) {
     throw Error(bindErrorText(kind, wanted, EADDRNOTAVAIL, option));

@@ -1,8 +1,9 @@
 // A network in memory, in one thread, on a clock that the test controls: the same calls give the same events.
 //
-// All loops of the network share one queue of events, ordered by time. Whichever loop runs handles the events of all of
-// them, so that a server and its clients make progress together; the clock jumps from event to event. A connection
-// behaves as the TCP connections of src/net do: callbacks only from the loop, a bounded window, the same reasons.
+// All loops of the network share one queue of events, ordered by time. Whichever loop runs handles the events
+// of all of them, so that a server and its clients make progress together; the clock jumps from event to
+// event. A connection behaves as the TCP connections of src/net do: callbacks only from the loop, a bounded
+// window, the same reasons.
 #pragma once
 
 #include <cstdint>
@@ -28,9 +29,10 @@ class FakeWatch;
 
 /// How bytes and datagrams travel; a change holds for what is sent or read afterwards.
 struct FakeNetworkOptions {
-  base::Nanos delay = 50'000;                       ///< one way
+  base::Nanos delay = 50'000;                         ///< one way
   std::size_t windowBytes = std::size_t{256} * 1024;  ///< sent but not yet read by the peer's program
-  /// How many of the bytes that have arrived one read returns (clamped to 1 ... available); empty: up to 64 KiB.
+  /// How many of the bytes that have arrived one read returns (clamped to 1 ... available); empty: up to 64
+  /// KiB.
   std::function<std::size_t(std::size_t available)> readSize = {};
   /// Whether the datagram of this number (from 0, over all sockets) is lost; empty: none.
   std::function<bool(std::uint64_t number)> losesDatagram = {};
@@ -55,7 +57,8 @@ class FakeNetwork final : public Network {
   void reset(const Endpoint& oneEnd);
 
   base::Nanos time() const noexcept { return clock_.now(); }
-  /// When the next event is due; nothing when there is none. For simulators that have further sources of events.
+  /// When the next event is due; nothing when there is none. For simulators that have further sources of
+  /// events.
   std::optional<base::Nanos> next();
   /// Advances the clock to the next event and handles it; false when none is due up to `limit`.
   bool runNext(base::Nanos limit);

@@ -63,7 +63,9 @@ TEST_F(FakeNetworkTest, BytesTakeTheDelayExactly) {
 
 TEST_F(FakeNetworkTest, ReadsAreSplitWhereTheTestSays) {
   join();
-  network_.options.readSize = [](std::size_t available) { return available > 3 ? std::size_t{3} : available; };
+  network_.options.readSize = [](std::size_t available) {
+    return available > 3 ? std::size_t{3} : available;
+  };
   send(10);
   loop_.runFor(milliseconds(1));
   EXPECT_EQ(reads_, (std::vector<std::size_t>{3, 3, 3, 1}));
@@ -86,8 +88,9 @@ TEST_F(FakeNetworkTest, ChosenDatagramsAreLost) {
   UdpSocket to(loop_, kAnyPort);
   UdpSocket from(loop_, kAnyPort);
   std::string received;
-  to.start({.onDatagram = [&](std::span<const std::byte> bytes, const Endpoint&) { received += textOf(bytes); },
-            .onRefused = {}});
+  to.start(
+      {.onDatagram = [&](std::span<const std::byte> bytes, const Endpoint&) { received += textOf(bytes); },
+       .onRefused = {}});
   network_.options.losesDatagram = [](std::uint64_t number) { return number % 3 == 1; };
   for (const char* text : {"a", "b", "c", "d", "e"}) EXPECT_TRUE(from.sendTo(bytesOf(text), to.local()));
   loop_.runFor(milliseconds(1));

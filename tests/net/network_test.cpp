@@ -50,7 +50,8 @@ template <class N>
 class NetworkTest : public testing::Test {
  protected:
   void join(const ConnectionOptions& options = {}) {
-    listener.emplace(loop(), kAnyPort, [this](Connection c) { server.take(std::move(c)); }, options);
+    listener.emplace(
+        loop(), kAnyPort, [this](Connection c) { server.take(std::move(c)); }, options);
     client.take(Connection::connect(loop(), listener->local(), milliseconds(20000), options));
     ASSERT_TRUE(until([this] { return client.connected && server.connection; }));
   }
@@ -86,7 +87,8 @@ class Frames {
     std::vector<std::string> frames;
     while (input_.size() >= 4) {
       std::size_t size = 0;
-      for (int i = 0; i < 4; ++i) size = size << 8 | static_cast<unsigned char>(input_[static_cast<std::size_t>(i)]);
+      for (int i = 0; i < 4; ++i)
+        size = size << 8 | static_cast<unsigned char>(input_[static_cast<std::size_t>(i)]);
       if (input_.size() < 4 + size) break;
       frames.push_back(input_.substr(4, size));
       input_.erase(0, 4 + size);
@@ -98,17 +100,19 @@ class Frames {
   std::string input_;
 };
 
-// As VRPN begins and goes on: cookies both ways, an address for datagrams, commands by TCP and reports by UDP.
+// As VRPN begins and goes on: cookies both ways, an address for datagrams, commands by TCP and reports by
+// UDP.
 TYPED_TEST(NetworkTest, ACookieThenCommandsByTcpAndReportsByUdp) {
   constexpr char kCookie[] = "vrpn: ver. 07.35  0     ";
   constexpr int kCommands = 100;
   UdpSocket reports(this->loop(), kAnyPort);
   UdpSocket here(this->loop(), kAnyPort);
   std::vector<std::string> reported;
-  here.start({.onDatagram = [&](std::span<const std::byte> bytes, const Endpoint& from) {
-    EXPECT_EQ(from, reports.local());
-    reported.push_back(textOf(bytes));
-  },
+  here.start({.onDatagram =
+                  [&](std::span<const std::byte> bytes, const Endpoint& from) {
+                    EXPECT_EQ(from, reports.local());
+                    reported.push_back(textOf(bytes));
+                  },
               .onRefused = {}});
   Frames commands;
   std::string cookie;
@@ -185,8 +189,9 @@ TYPED_TEST(NetworkTest, MegabytesBothWaysKeepTheirOrder) {
   while (text.size() < 8'000'000) text += std::to_string(text.size()) + ' ';
   this->client.send(text);
   this->server.send(text);
-  ASSERT_TRUE(this->until(
-      [&] { return this->server.received.size() >= text.size() && this->client.received.size() >= text.size(); }));
+  ASSERT_TRUE(this->until([&] {
+    return this->server.received.size() >= text.size() && this->client.received.size() >= text.size();
+  }));
   EXPECT_TRUE(this->server.received == text);
   EXPECT_TRUE(this->client.received == text);
   EXPECT_GT(this->client.drained, 0);

@@ -26,7 +26,8 @@ class PausedPeer : public testing::Test {
   void upload(std::size_t size) {
     const std::string chunk(64 * 1024, 'u');
     ASSERT_TRUE(pumpUntil(loop_, [&] {
-      const ssize_t sent = ::send(peer_.fd(), chunk.data(), std::min(size, chunk.size()), MSG_DONTWAIT | MSG_NOSIGNAL);
+      const ssize_t sent =
+          ::send(peer_.fd(), chunk.data(), std::min(size, chunk.size()), MSG_DONTWAIT | MSG_NOSIGNAL);
       if (sent > 0) size -= static_cast<std::size_t>(sent);
       return size == 0;
     }));

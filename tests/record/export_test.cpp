@@ -36,10 +36,12 @@ TEST(Csv, HasAColumnForEachNumberAndQuotesNames) {
             "x_m_per_s,"
             "velocity_y_m_per_s,velocity_z_m_per_s,qx,qy,qz,qw,force_x_N,force_y_N,force_z_N,depth_m,"
             "touching,object,"
-            "buttons,guard_active,guard_latched,gripper_rad,rendered_force_x_N,rendered_force_y_N,rendered_force_z_N,"
+            "buttons,guard_active,guard_latched,gripper_rad,rendered_force_x_N,rendered_force_y_N,rendered_"
+            "force_z_N,"
             "normal_x,normal_y,normal_z,render_status,wakeup_error_ns,compute_ns\n"
             "\"Left, \"\"my\"\" "
-            "hand\",1700000000123456789,0,0,0,0,0,0,0,0,0,0,0,0,0,0,1,0.1,-2,1e-300,0,0,-1,0,late+stopped,,,,,,,,,,,\n");
+            "hand\",1700000000123456789,0,0,0,0,0,0,0,0,0,0,0,0,0,0,1,0.1,-2,1e-300,0,0,-1,0,late+stopped,,,,"
+            ",,,,,,,\n");
 }
 
 TEST(Csv, OptionalValuesFillTheirColumns) {

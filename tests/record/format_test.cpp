@@ -9,18 +9,18 @@
 #include "record/block_file.h"
 #include "record/crc32.h"
 #include "record/fields.h"
-#include "record/scene_event_codec.h"
 #include "record/recorder.h"
 #include "record/recording_file.h"
 #include "record/recording_reader.h"
+#include "record/scene_event_codec.h"
 
 namespace hapticd::record {
 namespace {
 
 using test::RecordingFile;
 
-// Fills every field with random bits, by the lists of fields that the file is written by: their structured bindings
-// guarantee that no field is missing.
+// Fills every field with random bits, by the lists of fields that the file is written by: their structured
+// bindings guarantee that no field is missing.
 class Filler {
  public:
   explicit Filler(std::uint64_t seed) : random_(seed) {}
@@ -171,11 +171,13 @@ TEST(Commands, AreInTheDocument) {
     TypeLister types;
     const C command{};
     fields(command, types);
-    table += "| " + std::to_string(commandNumber<C>()) + " | `" + C::kInfo.name + "` | " + types.text() + " |\n";
+    table +=
+        "| " + std::to_string(commandNumber<C>()) + " | `" + C::kInfo.name + "` | " + types.text() + " |\n";
   });
   std::ifstream in(HAPTICD_TESTDATA "/../docs/recording-format.md");
   const std::string text{std::istreambuf_iterator<char>(in), {}};
-  EXPECT_NE(text.find(table), std::string::npos) << "put this table into docs/recording-format.md:\n" << table;
+  EXPECT_NE(text.find(table), std::string::npos) << "put this table into docs/recording-format.md:\n"
+                                                 << table;
 }
 
 realtime::TickRecord anyTick(Filler& filler, std::uint64_t number) {

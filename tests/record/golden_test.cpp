@@ -1,7 +1,8 @@
 // Recordings that older versions wrote are read as they were meant and give the recorded forces bit for bit.
 //
-// testdata/recordings/ holds one file of each format version and the scene commands in it as JSON. To add a file for a
-// new format version: --gtest_also_run_disabled_tests --gtest_filter='*WritesTheFiles', with HAPTICD_GOLDEN_DIR set.
+// testdata/recordings/ holds one file of each format version and the scene commands in it as JSON. To add a
+// file for a new format version: --gtest_also_run_disabled_tests --gtest_filter='*WritesTheFiles', with
+// HAPTICD_GOLDEN_DIR set.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -12,11 +13,11 @@
 #include "base/clock.h"
 #include "record/block_file.h"
 #include "record/fields.h"
-#include "record/scene_event_codec.h"
 #include "record/recorder.h"
 #include "record/recording_file.h"
 #include "record/recording_reader.h"
 #include "record/rerender.h"
+#include "record/scene_event_codec.h"
 #include "record/text_fields.h"
 #include "scene/builder.h"
 
@@ -205,7 +206,8 @@ void markAsVersion1(const std::filesystem::path& file) {
     if (block.kind == BlockKind::header) wire::storeBig(block.content.data(), std::uint32_t{1});
     appendBlock(old, block.kind, block.content);
   }
-  std::ofstream(file, std::ios::binary).write(reinterpret_cast<const char*>(old.data()), static_cast<std::streamsize>(old.size()));
+  std::ofstream(file, std::ios::binary)
+      .write(reinterpret_cast<const char*>(old.data()), static_cast<std::streamsize>(old.size()));
 }
 
 TEST(Golden, DISABLED_WritesTheFiles) {
@@ -230,8 +232,8 @@ TEST_P(GoldenFile, GivesTheRecordedForcesBitForBit) {
     const realtime::TickReport* now = again.feed(event);
     if (now == nullptr) continue;
     const realtime::TickReport& then = std::get<TickEvent>(event).tick.report;
-    EXPECT_TRUE(sameOutcome(*now, then)) << "tick " << then.tick << ": " << now->force_N.transpose() << " N, recorded "
-                                         << then.force_N.transpose() << " N";
+    EXPECT_TRUE(sameOutcome(*now, then)) << "tick " << then.tick << ": " << now->force_N.transpose()
+                                         << " N, recorded " << then.force_N.transpose() << " N";
     ++ticks;
     touching += then.rendering.touching ? 1 : 0;
     revisions.insert(then.revision);
@@ -241,7 +243,8 @@ TEST_P(GoldenFile, GivesTheRecordedForcesBitForBit) {
   EXPECT_GE(revisions.size(), 8U);
 }
 
-INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenFile, testing::Values("all_commands_v1.haptics", "gripper_v2.haptics"),
+INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenFile,
+                         testing::Values("all_commands_v1.haptics", "gripper_v2.haptics"),
                          [](const auto& file) {
                            const std::string name = file.param;
                            return name.substr(0, name.find('.'));

@@ -1,5 +1,5 @@
-// A recording of a real server with real clients: two hands, moving and deforming objects, effects, a stop, a batch, and
-// clients that leave.
+// A recording of a real server with real clients: two hands, moving and deforming objects, effects, a stop, a
+// batch, and clients that leave.
 #pragma once
 
 #include <filesystem>

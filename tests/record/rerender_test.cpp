@@ -5,9 +5,9 @@
 #include <set>
 #include <sstream>
 
-#include "record/scene_event_codec.h"
 #include "record/recorded_file.h"
 #include "record/rerender.h"
+#include "record/scene_event_codec.h"
 
 namespace hapticd::test {
 namespace {

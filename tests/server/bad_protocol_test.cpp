@@ -26,7 +26,9 @@ class BadProtocol : public BadInput {
     peer->sendBytes(bytes);
     return peer;
   }
-  std::unique_ptr<ScriptedPeer> sendBytes(std::string_view text) { return sendBytes(std::as_bytes(std::span(text))); }
+  std::unique_ptr<ScriptedPeer> sendBytes(std::string_view text) {
+    return sendBytes(std::as_bytes(std::span(text)));
+  }
   // Whether a peer that sends these bytes is disconnected, with this reason in the log.
   testing::AssertionResult isClosed(std::string_view text, const std::string& reason) {
     const auto peer = sendBytes(text);
@@ -54,7 +56,7 @@ std::string cookie(std::string_view version, char log = '0') {
 template <class M>
 void wrongLengths(std::vector<std::pair<wire::MessageKind, std::size_t>>& cases) {
   if (M::kInfo.direction == wire::Direction::kToClient) return;
-  if (wire::kPayloadSize<M> > 0) cases.emplace_back(wire::kindOf<M>, wire::kPayloadSize<M> - 1);
+  if (wire::kPayloadSize < M >> 0) cases.emplace_back(wire::kindOf<M>, wire::kPayloadSize<M> - 1);
   if (!wire::kIsCounted<M>) cases.emplace_back(wire::kindOf<M>, wire::kPayloadSize<M> + 1);
 }
 

@@ -44,7 +44,8 @@ std::set<std::string> testNames() {
   const std::sregex_iterator end;
   for (std::sregex_iterator it(list.begin(), list.end(), program); it != end; ++it) {
     for (const auto& file : fs::recursive_directory_iterator(folder)) {
-      if ((*it)[2].str().find(' ' + file.path().lexically_relative(folder).string()) == std::string::npos) continue;
+      if ((*it)[2].str().find(' ' + file.path().lexically_relative(folder).string()) == std::string::npos)
+        continue;
       if (!file.is_regular_file()) continue;
       const std::string source = contents(file.path());
       for (std::sregex_iterator t(source.begin(), source.end(), test); t != end; ++t) {

@@ -1,5 +1,5 @@
-// Control of a device by its clients, over real sockets: stop, re-arm, roles, heartbeat, holding the hand, batches,
-// shared scenes.
+// Control of a device by its clients, over real sockets: stop, re-arm, roles, heartbeat, holding the hand,
+// batches, shared scenes.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -18,10 +18,12 @@ const wire::ForceField kUp{.origin = {0, 0, 0}, .force = {0, 1, 0}, .jacobian = 
 
 double lastForce(const ScriptedPeer& peer) {
   const auto forces = peer.all<wire::Force>();
-  return forces.empty() ? 0 : std::hypot(forces.back().force[0], forces.back().force[1], forces.back().force[2]);
+  return forces.empty() ? 0
+                        : std::hypot(forces.back().force[0], forces.back().force[1], forces.back().force[2]);
 }
 bool untilForce(ScriptedPeer& peer, double force_N, double tolerance_N = 0.02) {
-  return peer.until([&] { return std::abs(lastForce(peer) - force_N) < tolerance_N && peer.count<wire::Force>(); });
+  return peer.until(
+      [&] { return std::abs(lastForce(peer) - force_N) < tolerance_N && peer.count<wire::Force>(); });
 }
 wire::GuardState lastGuard(const ScriptedPeer& peer) {
   const auto states = peer.all<wire::GuardState>();
@@ -239,7 +241,8 @@ TEST_F(ControlTest, DevicesOfOneSceneShareItsObjects) {
   right->send(wire::StopEffect{77});
   EXPECT_TRUE(right->untilText("77"));
   std::size_t texts = 0;
-  for (const auto& text : right->all<wire::Text>()) texts += text.text.text.find("77") != std::string::npos ? 1 : 0;
+  for (const auto& text : right->all<wire::Text>())
+    texts += text.text.text.find("77") != std::string::npos ? 1 : 0;
   EXPECT_EQ(texts, 1U);
 }
 

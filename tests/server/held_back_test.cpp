@@ -57,10 +57,12 @@ class HeldBackTest : public ::testing::Test {
   // Waits until the watcher has seen `ticks` servo ticks, while `client` is served too.
   bool pass(ScriptedPeer& client, std::size_t ticks) {
     const std::size_t end = watcher_->count<wire::IsTouching>() + ticks;
-    return watcher_->until([&] {
-      client.poll();
-      return watcher_->count<wire::IsTouching>() > end;
-    }, 60s);
+    return watcher_->until(
+        [&] {
+          client.poll();
+          return watcher_->count<wire::IsTouching>() > end;
+        },
+        60s);
   }
 
   std::shared_ptr<std::latch> gate_ = std::make_shared<std::latch>(1);
@@ -170,7 +172,8 @@ TEST_F(HeldBackTest, APauseOfTheServerIsNotSilenceOfTheClient) {
   ASSERT_TRUE(pass(*client, 1500));  // three times the limit
   EXPECT_TRUE(client->open());
   openScene();
-  EXPECT_TRUE(client->until([&] { return !client->open(); }, 60s)) << "silent after the server resumed reading";
+  EXPECT_TRUE(client->until([&] { return !client->open(); }, 60s))
+      << "silent after the server resumed reading";
 }
 
 TEST_F(HeldBackTest, HeartbeatsInTheBacklogCount) {
@@ -203,7 +206,8 @@ TEST_F(HeldBackTest, CommandsSentBeforeAClientDisconnectsAreApplied) {
     std::latch answered(1);
     bool has = false;
     server_->server().stations().front()->scene().describe([&](const auto& description) {
-      has = !description->objects.empty() && description->objects[0].triangles && description->objects[0].triangles->size() == 1;
+      has = !description->objects.empty() && description->objects[0].triangles &&
+            description->objects[0].triangles->size() == 1;
       answered.count_down();
     });
     answered.wait();

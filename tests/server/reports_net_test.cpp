@@ -19,7 +19,8 @@ class ReportsTest : public ::testing::Test {
   // A floor, with the hand steered into it.
   static void touchFloor(ScriptedPeer& peer) {
     peer.send(wire::HoldHand{.hold = 1, .position = {0, 10, 0}});
-    peer.send(wire::Plane{.plane = {0, 1, 0, 0}, .stiffness = 0.5F, .damping = 0, .index = 0, .recovery_cycles = 1});
+    peer.send(wire::Plane{
+        .plane = {0, 1, 0, 0}, .stiffness = 0.5F, .damping = 0, .index = 0, .recovery_cycles = 1});
     peer.send(wire::HoldHand{.hold = 1, .position = {0, -3, 0}});
   }
   // Mean number of ticks between two tick reports.
@@ -27,7 +28,8 @@ class ReportsTest : public ::testing::Test {
     peer.forget();
     EXPECT_TRUE(peer.until([&] { return peer.count<wire::TickReport>() >= 30; }, 60s));
     const auto ticks = peer.all<wire::TickReport>();
-    return static_cast<double>(ticks.back().tick - ticks.front().tick) / static_cast<double>(ticks.size() - 1);
+    return static_cast<double>(ticks.back().tick - ticks.front().tick) /
+           static_cast<double>(ticks.size() - 1);
   }
 
   RunningServer server_;
@@ -78,7 +80,8 @@ TEST_F(ReportsTest, EveryContactAndItsEndAreListed) {
   touchFloor(*client);
   ASSERT_TRUE(client->until([&] {
     const auto lists = client->all<wire::ContactList>();
-    return !lists.empty() && lists.back().contacts.values.size() == 10 && lists.back().contacts.values[8] > 0.3;
+    return !lists.empty() && lists.back().contacts.values.size() == 10 &&
+           lists.back().contacts.values[8] > 0.3;
   }));
   const auto contact = client->all<wire::ContactList>().back().contacts.values;
   EXPECT_EQ(contact[0], -1);  // a plane
@@ -110,7 +113,9 @@ TEST_F(ReportsTest, AClientWithOnlyAnalogAndButtonSeesContact) {
 TEST_F(ReportsTest, AToggleStaysOnWhenItsButtonIsReleased) {
   const auto client = peer();
   const auto watcher = peer();
-  const auto button = [](std::uint32_t buttons) { return wire::HoldHand{.hold = 1, .position = {}, .buttons = buttons}; };
+  const auto button = [](std::uint32_t buttons) {
+    return wire::HoldHand{.hold = 1, .position = {}, .buttons = buttons};
+  };
   const auto isOn = [](ScriptedPeer& who, std::int32_t state) {
     const auto changes = who.all<wire::ButtonChange>();
     for (auto change = changes.rbegin(); change != changes.rend(); ++change) {
@@ -124,7 +129,8 @@ TEST_F(ReportsTest, AToggleStaysOnWhenItsButtonIsReleased) {
   EXPECT_EQ(watcher->all<wire::ButtonAlert>().back().event, wire::kButtonToggleOff);
   client->send(button(1));
   ASSERT_TRUE(watcher->until([&] { return isOn(*watcher, 1); }));
-  ASSERT_TRUE(watcher->until([&] { return watcher->all<wire::ButtonAlert>().back().event == wire::kButtonToggleOn; }));
+  ASSERT_TRUE(watcher->until(
+      [&] { return watcher->all<wire::ButtonAlert>().back().event == wire::kButtonToggleOn; }));
   client->send(button(0));
   client->send(wire::Ping{});
   ASSERT_TRUE(client->untilNext<wire::Pong>());

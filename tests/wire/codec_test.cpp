@@ -181,7 +181,8 @@ void expectRoundTrip(MessageKind kind) {
 
 TEST(Codec, EveryMessageSurvivesTheRoundTrip) {
   for (const MessageKind kind : allKinds()) {
-    EXPECT_TRUE(rc::check(std::string(info(kind).name), [kind] { expectRoundTrip(kind); })) << info(kind).name;
+    EXPECT_TRUE(rc::check(std::string(info(kind).name), [kind] { expectRoundTrip(kind); }))
+        << info(kind).name;
   }
 }
 
@@ -210,7 +211,8 @@ TEST(Codec, RefusesEveryOtherLengthOfAFixedMessage) {
   for (const MessageDescription& description : describeMessages()) {
     for (std::size_t size = 0; size <= description.payload_bytes + 16; ++size) {
       const Result<Message> message = decode(description.kind, ByteView(zeros).first(size));
-      const bool valid = description.counted ? size >= description.payload_bytes : size == description.payload_bytes;
+      const bool valid =
+          description.counted ? size >= description.payload_bytes : size == description.payload_bytes;
       ASSERT_EQ(static_cast<bool>(message), valid) << description.info.name << ' ' << size;
       if (valid) continue;
       EXPECT_NE(message.error().find(description.info.name), std::string::npos);

@@ -9,7 +9,8 @@
 namespace hapticd::wire {
 namespace {
 
-// The control messages by wire name: 'c' needs control of the device, 'o' overtakes the sender's scene commands.
+// The control messages by wire name: 'c' needs control of the device, 'o' overtakes the sender's scene
+// commands.
 const std::map<std::string_view, std::string_view> kControl = {
     {"vrpn_Base ping_message", "o"},
     {"vrpn_Base text_message", ""},
@@ -141,7 +142,8 @@ struct OnlyStops {
   void operator()(const Text&) {}
 };
 static_assert(handlesAll<CountingHandler>(ControlMessages{}));
-static_assert(!handlesAll<OnlyStops>(ControlMessages{}), "dispatchControl must not compile with this handler");
+static_assert(!handlesAll<OnlyStops>(ControlMessages{}),
+              "dispatchControl must not compile with this handler");
 static_assert(handlesAll<OnlyStops>(MessageList<StopForces, Text>{}));
 
 }  // namespace

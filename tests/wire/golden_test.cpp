@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "wire/cookie.h"
-#include "wire/peer.h"
 #include "wire/event_text.h"
+#include "wire/peer.h"
 #include "wire/recording.h"
 #include "wire/udp_request.h"
 

@@ -75,7 +75,8 @@ class FieldsEqualJson final : public FieldVisitor {
   explicit FieldsEqualJson(const Json& fields) : fields_(fields) {}
 
   void number(const Field& field, const Numbers& one) override {
-    one.with([&]<class T>(std::span<T> values) { EXPECT_EQ(values[0], numberOf<T>(of(field))) << field.name; });
+    one.with(
+        [&]<class T>(std::span<T> values) { EXPECT_EQ(values[0], numberOf<T>(of(field))) << field.name; });
   }
   void array(const Field& field, const Numbers& values) override { compare(field, values); }
   void name(const Field& field, std::span<char> bytes) override {
@@ -154,15 +155,31 @@ TEST(Vectors, HoldTheseBytes) {
   const std::map<std::string, std::string> byHand = {
       {"hapticd Stop_Forces", ""},
       // 257, -514, then 3/8, -4/8 and 5/8 as floats
-      {"vrpn_ForceDevice setVertex", "00000101" "fffffdfe" "3ec00000" "bf000000" "3f200000"},
+      {"vrpn_ForceDevice setVertex",
+       "00000101"
+       "fffffdfe"
+       "3ec00000"
+       "bf000000"
+       "3f200000"},
       // "spring", 257, -2/8
       {"vrpn_ForceDevice setHapticProperty",
-       "00000101" "737072696e67" "0000000000000000000000000000" "be800000"},
+       "00000101"
+       "737072696e67"
+       "0000000000000000000000000000"
+       "be800000"},
       // 1/8, -514
-      {"vrpn_ForceDevice Angle", "3fc0000000000000" "fdfe"},
+      {"vrpn_ForceDevice Angle",
+       "3fc0000000000000"
+       "fdfe"},
       // 257 unsigned, -2/8
-      {"hapticd Subscribe", "00000101" "bfd0000000000000"},
-      {"hapticd Guard_State", "00000101" "00000202" "0303" "fbfc"},
+      {"hapticd Subscribe",
+       "00000101"
+       "bfd0000000000000"},
+      {"hapticd Guard_State",
+       "00000101"
+       "00000202"
+       "0303"
+       "fbfc"},
   };
   std::map<std::string, std::string> found;
   for (const Json& vector : Json::parse(vectorsFile())) {

@@ -26,7 +26,8 @@ constexpr const char* kUdev =
 // The devices of one driver as the kernel lists them, without the driver's library.
 struct Usb {
   std::vector<UsbDevice> devices;
-  std::string words;     // devices that are plugged in and nodes that this user may not open, each followed by "; "
+  std::string
+      words;  // devices that are plugged in and nodes that this user may not open, each followed by "; "
   bool refused = false;  // for lack of permission
 };
 
@@ -130,8 +131,8 @@ DriverReport findHaply(const DiscoveryOptions& options) {
   return report;
 }
 
-// Whether an input device has a constant force. The kernel shows a bit set to every user: hexadecimal words, the
-// highest first.
+// Whether an input device has a constant force. The kernel shows a bit set to every user: hexadecimal words,
+// the highest first.
 bool hasForce(const std::filesystem::path& inputDevice) {
   constexpr std::size_t kConstantForce = 0x52;
   constexpr std::size_t kWord = CHAR_BIT * sizeof(unsigned long);

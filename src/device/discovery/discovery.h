@@ -22,8 +22,8 @@ struct DriverReport {
 std::error_code mayReadAndWrite(const std::filesystem::path& node);
 
 struct DiscoveryOptions {
-  bool openThem =
-      false;  ///< also opens devices, without force, where nothing else identifies them; occupies each briefly
+  bool openThem = false;  ///< also opens devices, without force, where nothing else identifies them; occupies
+                          ///< each briefly
   std::string haplyHost = "localhost";
   std::string haplyPort = "10001";
   std::filesystem::path usbDevices = "/sys/bus/usb/devices";

@@ -26,7 +26,8 @@ struct UsbDevice {
   std::string vendor;   ///< four hexadecimal digits
   std::string product;  ///< four hexadecimal digits
   std::string name;     ///< product string; may be empty
-  /// Nodes below /dev that a library opens to reach it: a serial line or HID device, else the USB device itself.
+  /// Nodes below /dev that a library opens to reach it: a serial line or HID device, else the USB device
+  /// itself.
   std::vector<std::string> nodes;
 
   std::string text() const {

@@ -22,7 +22,8 @@ std::span<const Driver* const> drivers() noexcept {
 
 const Driver* findDriver(std::string_view name) noexcept {
   const auto all = drivers();
-  const auto found = std::find_if(all.begin(), all.end(), [&](const Driver* driver) { return driver->name == name; });
+  const auto found =
+      std::find_if(all.begin(), all.end(), [&](const Driver* driver) { return driver->name == name; });
   return found == all.end() ? nullptr : *found;
 }
 

@@ -9,13 +9,14 @@ constexpr const char* kKeys[] = {kWheelProfile};
 
 std::unique_ptr<Device> make(const DriverOptions& options) {
   const auto profile = options.keys.find(kWheelProfile);
-  return std::make_unique<EvdevDevice>(
-      EvdevOptions{.path = options.hardware, .profile = profile == options.keys.end() ? "" : profile->second});
+  return std::make_unique<EvdevDevice>(EvdevOptions{
+      .path = options.hardware, .profile = profile == options.keys.end() ? "" : profile->second});
 }
 
 }  // namespace
 
 extern const Driver evdev;
-const Driver evdev{.name = "evdev", .help = "force-feedback joysticks and wheels of Linux", .keys = kKeys, .make = make};
+const Driver evdev{
+    .name = "evdev", .help = "force-feedback joysticks and wheels of Linux", .keys = kKeys, .make = make};
 
 }  // namespace hapticd::device::drivers_in_this_build

@@ -1,7 +1,8 @@
 // Force-feedback joysticks and wheels through Linux evdev: two axes, x and z, or x alone.
 //
-// The kernel may block in an upload, so a thread of the driver exchanges with the device at up to 500 Hz. The servo only
-// stores its newest force and takes the newest state. The driver zeroes a force that the servo has not renewed for 20 ms.
+// The kernel may block in an upload, so a thread of the driver exchanges with the device at up to 500 Hz. The
+// servo only stores its newest force and takes the newest state. The driver zeroes a force that the servo has
+// not renewed for 20 ms.
 #pragma once
 
 #include <array>

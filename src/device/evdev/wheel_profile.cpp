@@ -56,8 +56,8 @@ WheelProfile WheelProfile::load(const std::filesystem::path& file) {
   WheelProfile profile;
   try {
     const std::vector<std::byte> bytes = base::world().files.read(file);
-    const toml::table table =
-        toml::parse(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()), file.string());
+    const toml::table table = toml::parse(
+        std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()), file.string());
     Reader reader(table, file.string());
     reader.number("force_N", profile.force_N, 0.05, 100);
     profile.continuousForce_N = 0.5 * profile.force_N;

@@ -1,4 +1,5 @@
-// Our own declarations of the DHD and DRD functions of Force Dimension that this driver calls, bound at run time.
+// Our own declarations of the DHD and DRD functions of Force Dimension that this driver calls, bound at run
+// time.
 #pragma once
 
 #include "device/dynamic_library.h"

@@ -1,7 +1,8 @@
 // omega, delta, sigma and lambda by Force Dimension through libdrd or libdhd, which the user installs.
 //
 // Polled: read() and write() each exchange a USB frame, so the servo may run at up to 4 kHz. The amplifiers
-// stay off until the first force, and the device switches them off by itself when it receives no command for 20 ms.
+// stay off until the first force, and the device switches them off by itself when it receives no command for
+// 20 ms.
 #pragma once
 
 #include <atomic>

@@ -23,6 +23,9 @@ std::unique_ptr<Device> make(const DriverOptions& options) {
 }  // namespace
 
 extern const Driver haply;
-const Driver haply{.name = "haply", .help = "Haply Inverse3 and Minverse, through the Inverse Service", .keys = {}, .make = make};
+const Driver haply{.name = "haply",
+                   .help = "Haply Inverse3 and Minverse, through the Inverse Service",
+                   .keys = {},
+                   .make = make};
 
 }  // namespace hapticd::device::drivers_in_this_build

@@ -1,7 +1,7 @@
 // Haply Inverse3 (and Minverse) through the Inverse Service on this machine.
 //
-// The service answers every message with one state, so each write of the servo triggers one exchange in a thread of the
-// driver. The servo only stores its newest force and takes the newest state.
+// The service answers every message with one state, so each write of the servo triggers one exchange in a
+// thread of the driver. The servo only stores its newest force and takes the newest state.
 #pragma once
 
 #include <atomic>

@@ -1,4 +1,5 @@
-// Runs a driver in a process of its own, so that a crash of a vendor's library is a fault and does not end the server.
+// Runs a driver in a process of its own, so that a crash of a vendor's library is a fault and does not end
+// the server.
 //
 // The driver's process posts each state and writes the newest force, one tick late; without a fresh force for
 // 3 ms it writes zero. Here, each post wakes the loop.

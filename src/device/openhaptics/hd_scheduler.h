@@ -23,8 +23,8 @@ class Participant {
   virtual void onError(Enum code) noexcept = 0;
 };
 
-/// All calls except drainErrors() must come from other threads than the scheduler's. They stop the scheduler briefly,
-/// because the library allows most calls only then.
+/// All calls except drainErrors() must come from other threads than the scheduler's. They stop the scheduler
+/// briefly, because the library allows most calls only then.
 class Scheduler {
  public:
   /// The scheduler of this process; loads the library at first use. Throws LibraryError.
@@ -32,7 +32,8 @@ class Scheduler {
 
   const Api& api() const noexcept { return api_; }
 
-  /// Opens a device: first by `name` unless empty, then by each default name. Throws std::runtime_error with all errors.
+  /// Opens a device: first by `name` unless empty, then by each default name. Throws std::runtime_error with
+  /// all errors.
   Handle open(const std::string& name, std::string& nameThatWorked);
   void close(Handle device) noexcept;
 
@@ -43,13 +44,14 @@ class Scheduler {
   void join(Handle device, Participant& participant, double rate_Hz);
   void leave(Participant& participant) noexcept;
 
-  /// Whether the library has reported a device error. It reports an identical error only once, so the next one may go
-  /// unreported. Any thread.
+  /// Whether the library has reported a device error. It reports an identical error only once, so the next
+  /// one may go unreported. Any thread.
   bool deviceErrorTold() const noexcept { return deviceErrorTold_.load(std::memory_order_relaxed); }
 
   /// Passes the errors on the stack to the devices that they name. Scheduler's thread.
   void drainErrors() noexcept;
-  /// Empties the error stack and returns its text; empty when there was no error. Only while the scheduler is stopped.
+  /// Empties the error stack and returns its text; empty when there was no error. Only while the scheduler is
+  /// stopped.
   std::string takeErrors() noexcept;
 
  private:

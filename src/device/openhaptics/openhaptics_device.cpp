@@ -201,8 +201,8 @@ void OpenHapticsDevice::sample(Nanos now) noexcept {
   hold_.store(state_.hold, std::memory_order_relaxed);
 }
 
-// The library reports an identical error only once, and a cable may be pulled twice. The second loss shows only as an arm
-// that does not move under a force.
+// The library reports an identical error only once, and a cable may be pulled twice. The second loss shows
+// only as an arm that does not move under a force.
 void OpenHapticsDevice::noticeSilence() noexcept {
   const bool same = state_.position_m == before_.position_m &&
                     state_.velocity_m_per_s == before_.velocity_m_per_s &&
@@ -237,8 +237,9 @@ std::uint32_t OpenHapticsDevice::holds(Nanos now) noexcept {
   return hold;
 }
 
-// The position jumps with an update, so update only after a frame without force. A stylus in the inkwell is in the right
-// place, and a person put it there. Where no switch shows the place of the arm, a person must consent.
+// The position jumps with an update, so update only after a frame without force. A stylus in the inkwell is
+// in the right place, and a person put it there. Where no switch shows the place of the arm, a person must
+// consent.
 void OpenHapticsDevice::updateCalibration(hd::Enum status) noexcept {
   if (!written_N_.isZero()) return;
   const bool encoders = (calibrationStyle_ & hd::kStyleEncoderReset) != 0;

@@ -36,8 +36,8 @@ class OpenHapticsDevice final : public Device, private hd::Participant {
 
   std::string faultText() const override;
   bool lost() const noexcept override { return lost_; }
-  /// Encoder reset: the arm must be in its reset position. Inkwell: the stylus must be docked, which counts as consent where
-  /// the device has the switch. The loop must run.
+  /// Encoder reset: the arm must be in its reset position. Inkwell: the stylus must be docked, which counts
+  /// as consent where the device has the switch. The loop must run.
   void calibrate() override;
 
   DeviceTraits traits() const noexcept override {
@@ -78,7 +78,7 @@ class OpenHapticsDevice final : public Device, private hd::Participant {
   std::atomic<bool> consent_{false};
   std::atomic<std::uint32_t> hold_{kHoldNone};
   std::atomic<hd::Enum> lastError_{hd::kSuccess};
-  std::atomic<bool> lost_{false};  // until reopened
+  std::atomic<bool> lost_{false};    // until reopened
   std::atomic<bool> silent_{false};  // lost without an error
 
   // Scheduler thread only, from here on.

@@ -5,7 +5,8 @@
 
 namespace hapticd::device {
 
-/// A force limit that falls slowly to the continuous force while the motors are warmer than 0.7, and rises again below 0.5. step() is realtime: noexcept, no allocation, no lock.
+/// A force limit that falls slowly to the continuous force while the motors are warmer than 0.7, and rises
+/// again below 0.5. step() is realtime: noexcept, no allocation, no lock.
 class ThermalDerating {
  public:
   ThermalDerating(double peak_N, double continuous_N) noexcept

@@ -57,8 +57,8 @@ struct Columns {
   std::size_t orientation = kAbsent;  ///< qx, qy, qz, qw
   std::size_t buttons = kAbsent;
   std::size_t device = kAbsent;
-  bool nanoseconds = false;  ///< the time; seconds otherwise
-  bool fromFirstRow = false; ///< times are absolute: the hand begins at the first row
+  bool nanoseconds = false;   ///< the time; seconds otherwise
+  bool fromFirstRow = false;  ///< times are absolute: the hand begins at the first row
   std::string remark;
 };
 
@@ -104,7 +104,8 @@ Columns named(const std::vector<std::string_view>& names, std::string_view text,
   }
   if (columns.time == kAbsent || columns.position == kAbsent) {
     line.fail("header '" + std::string(text) +
-              "' is not t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons] and has no columns time_ns,hip_x_m,hip_y_m,hip_z_m");
+              "' is not t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons] and has no columns "
+              "time_ns,hip_x_m,hip_y_m,hip_z_m");
   }
   columns.orientation = findAll<4>(names, {"qx", "qy", "qz", "qw"});
   columns.buttons = find(names, "buttons");
@@ -173,7 +174,8 @@ class HandFile::Parser {
     }
     if (columns_.count == 0) columns_ = unnamed(cells_.size(), line);
     if (cells_.size() != columns_.count) {
-      line.fail(std::to_string(cells_.size()) + " columns where " + std::to_string(columns_.count) + " are expected");
+      line.fail(std::to_string(cells_.size()) + " columns where " + std::to_string(columns_.count) +
+                " are expected");
     }
     if (isOfThisDevice()) addRow(line);
   }
@@ -196,7 +198,9 @@ class HandFile::Parser {
     return device == device_;
   }
 
-  double number(std::size_t column, const Line& line) const { return readNumber(cells_[column], column, line); }
+  double number(std::size_t column, const Line& line) const {
+    return readNumber(cells_[column], column, line);
+  }
 
   void addRow(const Line& line) {
     Nanos time = readTime(cells_[columns_.time], columns_, line);
@@ -209,8 +213,8 @@ class HandFile::Parser {
     const std::size_t x = columns_.position;
     Row row{time, Vec3(number(x, line), number(x + 1, line), number(x + 2, line)), Quat::Identity(), 0};
     if (const std::size_t q = columns_.orientation; q != kAbsent) {
-      row.orientation =
-          readOrientation(Quat(number(q + 3, line), number(q, line), number(q + 1, line), number(q + 2, line)), line);
+      row.orientation = readOrientation(
+          Quat(number(q + 3, line), number(q, line), number(q + 1, line), number(q + 2, line)), line);
     }
     if (columns_.buttons != kAbsent) row.buttons = readButtons(number(columns_.buttons, line), line);
     hand_.rows_.push_back(row);

@@ -1,5 +1,5 @@
-// A recorded or scripted hand from a CSV file: t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons], or any file with the columns
-// time_ns,hip_x_m,hip_y_m,hip_z_m that hapticd writes (record/sample.h); other columns are ignored.
+// A recorded or scripted hand from a CSV file: t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons], or any file with the
+// columns time_ns,hip_x_m,hip_y_m,hip_z_m that hapticd writes (record/sample.h); other columns are ignored.
 #pragma once
 
 #include <filesystem>
@@ -19,8 +19,8 @@ class HandFileError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Interpolates positions linearly and orientations by slerp; buttons stay until the next row. Before the first row and
-/// after the last one the hand rests. With time_ns the hand begins at the first row.
+/// Interpolates positions linearly and orientations by slerp; buttons stay until the next row. Before the
+/// first row and after the last one the hand rests. With time_ns the hand begins at the first row.
 class HandFile final : public HandPath {
  public:
   /// Throws HandFileError.
@@ -33,7 +33,8 @@ class HandFile final : public HandPath {
   /// Time of the first row.
   Nanos begin() const noexcept { return rows_.front().time; }
   std::size_t rows() const noexcept { return rows_.size(); }
-  /// What a person should know about how the file was read, as the end of a sentence after its name; empty when nothing.
+  /// What a person should know about how the file was read, as the end of a sentence after its name; empty
+  /// when nothing.
   const std::string& remark() const noexcept { return remark_; }
 
  private:

@@ -1,7 +1,7 @@
 // A simulated device: a point mass held by a spring-damper hand that follows an intended path.
 //
-// Contact pushes the mass back, so forces are closed-loop and an unstable wall shows. Time is the argument of read():
-// the same calls give the same bytes, in real time or as fast as the machine can.
+// Contact pushes the mass back, so forces are closed-loop and an unstable wall shows. Time is the argument of
+// read(): the same calls give the same bytes, in real time or as fast as the machine can.
 #pragma once
 
 #include <memory>

@@ -209,7 +209,8 @@ ServerConfig loadConfig(const std::filesystem::path& file, std::vector<std::stri
   try {
     bytes = base::world().files.read(file);
   } catch (const std::system_error& error) {
-    throw ConfigError("cannot read the configuration file '" + file.string() + "': " + error.code().message());
+    throw ConfigError("cannot read the configuration file '" + file.string() +
+                      "': " + error.code().message());
   }
   const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   if (file.extension() == ".cfg") return parseVrpnCfg(text, file.string(), warnings);

@@ -52,7 +52,8 @@ struct DeviceConfig {
   std::vector<std::string> names{"Phantom"};
   std::string driver = "simulated";
   std::string hardware;  ///< which device, as its driver names it: a device name, an index, /dev/input/event5
-  std::map<std::string, std::string> driverKeys;  ///< keys that only some drivers read, as Driver::keys names them
+  std::map<std::string, std::string>
+      driverKeys;          ///< keys that only some drivers read, as Driver::keys names them
   bool calibrate = false;  ///< consent to calibrate at start and at a re-arm; may move the arm
   bool isolate =
       false;  ///< run the driver in a separate process: its crash is a fault of the device, not of the server
@@ -75,9 +76,9 @@ struct DeviceConfig {
   SceneOnDisconnect sceneOnDisconnect = SceneOnDisconnect::keep;
   Control control = Control::any;
   std::vector<std::string>
-      controlList;  ///< IPv4 addresses of the clients that may command, for Control::list
-  std::string blackBoxDir;               ///< empty: the user's state directory
-  int blackBoxKeep = 10;                 ///< how many of the newest black boxes are kept; 0: write none
+      controlList;          ///< IPv4 addresses of the clients that may command, for Control::list
+  std::string blackBoxDir;  ///< empty: the user's state directory
+  int blackBoxKeep = 10;    ///< how many of the newest black boxes are kept; 0: write none
 
   bool operator==(const DeviceConfig&) const = default;
 };

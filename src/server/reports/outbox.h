@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "net/send_queue.h"
-#include "server/session/wall_clock.h"
 #include "server/reports/reporter.h"
 #include "server/session/session.h"
+#include "server/session/wall_clock.h"
 #include "wire/frame_encoder.h"
 
 namespace hapticd::server {

@@ -98,7 +98,8 @@ void Reporter::guard(const TickReport& tick, std::vector<Outgoing>& out) {
       out.push_back({wire::ForceError{static_cast<std::int32_t>(trip.forceError)}, true});
     }
   }
-  if (now == 0) out.push_back({wire::ForceError{static_cast<std::int32_t>(realtime::ForceError::recovered)}, true});
+  if (now == 0)
+    out.push_back({wire::ForceError{static_cast<std::int32_t>(realtime::ForceError::recovered)}, true});
   reportedTrips_ = now;
 }
 

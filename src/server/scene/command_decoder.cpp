@@ -44,7 +44,8 @@ constexpr std::size_t commandOf(std::string_view message) {
 
 // A message that some command names in its kInfo: they have the same members, in the same order.
 template <class M>
-concept SameMembers = commandOf(M::kInfo.name) != kNone;
+concept SameMembers = commandOf(M::kInfo.name)
+!= kNone;
 
 template <SameMembers M>
 scene::SceneCommand toCommand(const M& message) {

@@ -33,7 +33,8 @@ class SceneHost {
   void start(SceneThread::Callbacks callbacks, Post post);
   void stop();
 
-  /// Decodes a scene message and keeps its command until flush(). False, with the reason, when it is malformed.
+  /// Decodes a scene message and keeps its command until flush(). False, with the reason, when it is
+  /// malformed.
   bool take(scene::ClientId client, const wire::MessageReceived& message, std::string& error);
   /// Queues the commands that take() kept; all of them are from this client.
   void flush(scene::ClientId client);

@@ -13,10 +13,10 @@
 #include "net/connection.h"
 #include "net/udp_socket.h"
 #include "scene/notice.h"
+#include "server/session/client_status.h"
 #include "server/session/heartbeat_watch.h"
 #include "server/session/message_backlog.h"
 #include "server/session/wall_clock.h"
-#include "server/session/client_status.h"
 #include "wire/peer.h"
 
 namespace hapticd::server {

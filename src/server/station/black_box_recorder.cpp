@@ -69,19 +69,20 @@ void BlackBoxRecorder::poll() {
   spdlog::warn("device '{}': forces are off: {}; writing the last {} ticks to {}", name_, fault, ticks.size(),
                file.string());
   finish();
-  writer_ = base::Thread({.name = "black box"}, [this, file, ticks = std::move(ticks)]() mutable -> std::optional<base::Nanos> {
-    const std::vector<TickReport> box = std::exchange(ticks, {});
-    if (box.empty()) return std::nullopt;  // written already
-    try {
-      base::world().files.createFolder(file.parent_path());
-      writeBlackBox(file, name_, box);
-      deleteOldest(file.parent_path(), files_.keep);
-    } catch (const std::exception& error) {
-      spdlog::error("device '{}': {}; set black_box_dir to a directory that can be written", name_,
-                    error.what());
-    }
-    return std::nullopt;
-  });
+  writer_ = base::Thread(
+      {.name = "black box"}, [this, file, ticks = std::move(ticks)]() mutable -> std::optional<base::Nanos> {
+        const std::vector<TickReport> box = std::exchange(ticks, {});
+        if (box.empty()) return std::nullopt;  // written already
+        try {
+          base::world().files.createFolder(file.parent_path());
+          writeBlackBox(file, name_, box);
+          deleteOldest(file.parent_path(), files_.keep);
+        } catch (const std::exception& error) {
+          spdlog::error("device '{}': {}; set black_box_dir to a directory that can be written", name_,
+                        error.what());
+        }
+        return std::nullopt;
+      });
 }
 
 void BlackBoxRecorder::finish() {

@@ -16,8 +16,8 @@ struct BlackBoxFiles {
   int keep = 10;  ///< newest files of this device to keep; 0: write none
 };
 
-/// Writes ticks as CSV, oldest first, with the columns of `hapticd export` (record/sample.h). Throws std::runtime_error
-/// that names the file.
+/// Writes ticks as CSV, oldest first, with the columns of `hapticd export` (record/sample.h). Throws
+/// std::runtime_error that names the file.
 void writeBlackBox(const std::filesystem::path& file, const std::string& device,
                    const std::vector<realtime::TickReport>& ticks);
 

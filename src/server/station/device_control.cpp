@@ -66,8 +66,7 @@ bool DeviceControl::hold(scene::ClientId client, const wire::HoldHand& wanted,
   // Before the first tick report, use the initial workspace of a scene.
   const geometry::Affine T_world_device =
       last.tick == 0 ? scene::Workspace{}.T_world_device : last.T_world_device;
-  pose.position_m =
-      (T_world_device.inverse() * world).cwiseMax(workspace_m_.min).cwiseMin(workspace_m_.max);
+  pose.position_m = (T_world_device.inverse() * world).cwiseMax(workspace_m_.min).cwiseMin(workspace_m_.max);
   pose.orientation = (Quat(rotationOf(last)).conjugate() * orientation).normalized();
   pose.buttons = wanted.buttons;
   holder_ = client;

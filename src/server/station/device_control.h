@@ -29,8 +29,8 @@ class DeviceControl {
   };
   /// Zero force until a later re-arm.
   void stopForces(const Order& order);
-  /// Re-arms. Returns false without effect when a stop is later than the re-arm: it was received at the same time or later,
-  /// or the same machine sent it later on another connection.
+  /// Re-arms. Returns false without effect when a stop is later than the re-arm: it was received at the same
+  /// time or later, or the same machine sent it later on another connection.
   bool rearmForces(const Order& order);
   /// Ramps the force in from zero, as after a reset of the scene.
   void rampIn() { guard_.rampIn(); }

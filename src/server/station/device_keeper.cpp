@@ -99,12 +99,14 @@ void DeviceKeeper::calibrate() {
 void DeviceKeeper::startAttempt(std::string text, std::function<void()> attempt) {
   attemptText_ = std::move(text);
   attemptDone_ = false;
-  attempt_ = base::Thread({.name = "device keeper"}, [this, attempt = std::move(attempt)]() -> std::optional<base::Nanos> {
-    if (attemptDone_.load(std::memory_order_relaxed)) return std::nullopt;  // the thread steps once more when it stops
-    attempt();
-    attemptDone_.store(true, std::memory_order_release);
-    return std::nullopt;
-  });
+  attempt_ = base::Thread({.name = "device keeper"},
+                          [this, attempt = std::move(attempt)]() -> std::optional<base::Nanos> {
+                            if (attemptDone_.load(std::memory_order_relaxed))
+                              return std::nullopt;  // the thread steps once more when it stops
+                            attempt();
+                            attemptDone_.store(true, std::memory_order_release);
+                            return std::nullopt;
+                          });
 }
 
 void DeviceKeeper::runCalibration() noexcept {

@@ -111,12 +111,12 @@ void Station::play(const realtime::TickReport& report) noexcept {
 
 void Station::Impl::recordTo(record::Recorder& recording, SceneDevice& sceneDevice) {
   const std::uint32_t number = recording.addDevice({.names = config.names,
-                                                  .driver = config.driver,
-                                                  .model = profile.model,
-                                                  .buttons = profile.buttons,
-                                                  .scene = scene.number(),
-                                                  .sceneConfig = sceneDevice.config,
-                                                  .tick = tickOptions(config, *device)});
+                                                    .driver = config.driver,
+                                                    .model = profile.model,
+                                                    .buttons = profile.buttons,
+                                                    .scene = scene.number(),
+                                                    .sceneConfig = sceneDevice.config,
+                                                    .tick = tickOptions(config, *device)});
   sceneDevice.config.stopwatch = recording.stopwatch(number);
   sceneDevice.publishing = [&recording, number](base::Nanos now, std::uint64_t revision) {
     recording.recordPublish(number, now, revision);

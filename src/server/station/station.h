@@ -9,8 +9,8 @@
 #include "record/recorder.h"
 #include "server/config/config.h"
 #include "server/reports/outbox.h"
-#include "server/session/roles.h"
 #include "server/scene/scene_thread.h"
+#include "server/session/roles.h"
 #include "server/session/session.h"
 #include "server/station/device_status.h"
 

@@ -6,11 +6,11 @@
 #include "base/clock.h"
 #include "device/simulated/steered_hand.h"
 #include "realtime/servo/tick.h"
+#include "server/scene/scene_host.h"
 #include "server/station/black_box_recorder.h"
 #include "server/station/button_modes.h"
 #include "server/station/device_control.h"
 #include "server/station/device_keeper.h"
-#include "server/scene/scene_host.h"
 #include "server/station/station.h"
 
 namespace hapticd::server {
@@ -46,7 +46,7 @@ struct Station::Impl {
   void on(const Request& request, const wire::RearmForces&);
   void on(const Request& request, const wire::HoldHand& wanted);
   void on(const Request&, const wire::GetNewObjectId&) {}  // registered by VRPN, never sent
-  void on(const Request&, const wire::Heartbeat&) {}           // the session handles it
+  void on(const Request&, const wire::Heartbeat&) {}       // the session handles it
   void rearm(Session& session, wire::LocalSender name, const DeviceControl::Order& order);
 
   const DeviceConfig config;

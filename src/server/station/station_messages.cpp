@@ -30,7 +30,8 @@ bool Station::mayCommand(const Session& session, std::string& reason) {
 }
 
 void Station::onControl(Session& session, const wire::MessageReceived& message, base::Nanos received) {
-  const base::Nanos sent = message.time.seconds * base::Nanos{1'000'000'000} + message.time.microseconds * base::Nanos{1000};
+  const base::Nanos sent =
+      message.time.seconds * base::Nanos{1'000'000'000} + message.time.microseconds * base::Nanos{1000};
   const Request request{session, message.local_sender, {received, sent, session.address()}};
   const auto handled = wire::dispatchControl(message.kind, message.payload,
                                              [&](const auto& control) { impl_->on(request, control); });
@@ -40,7 +41,8 @@ void Station::onControl(Session& session, const wire::MessageReceived& message, 
 void Station::Impl::on(const Request& request, const wire::Ping&) {
   const realtime::TickReport& last = outbox.last();
   request.session.send(request.name, wire::Pong{});
-  request.session.send(request.name, Reporter::buttonStates(profile.buttons, frame.buttons, last.rendering.touching));
+  request.session.send(request.name,
+                       Reporter::buttonStates(profile.buttons, frame.buttons, last.rendering.touching));
 }
 
 void Station::Impl::on(const Request& request, const wire::Text& text) {
@@ -53,8 +55,9 @@ void Station::Impl::on(const Request& request, const wire::TrackerRequestToRoom&
 
 void Station::Impl::on(const Request& request, const wire::TrackerRequestUnitToSensor&) {
   for (std::int32_t sensor = 0; sensor < kSensorCount; ++sensor) {
-    request.session.send(request.name, wire::TrackerUnitToSensor{
-                           .sensor = sensor, .filler = 0, .position = {}, .orientation = {0, 0, 0, 1}});
+    request.session.send(request.name,
+                         wire::TrackerUnitToSensor{
+                             .sensor = sensor, .filler = 0, .position = {}, .orientation = {0, 0, 0, 1}});
   }
 }
 
@@ -63,7 +66,8 @@ void Station::Impl::on(const Request& request, const wire::TrackerRequestWorkspa
 }
 
 void Station::Impl::on(const Request& request, const wire::TrackerSetUpdateRate& wanted) {
-  choose(request.session, request.name, outbox.choiceOf(request.session.id()), wanted.rate, "set_update_rate");
+  choose(request.session, request.name, outbox.choiceOf(request.session.id()), wanted.rate,
+         "set_update_rate");
 }
 
 void Station::Impl::on(const Request& request, const wire::Subscribe& wanted) {
@@ -107,18 +111,21 @@ void Station::Impl::on(const Request& request, const wire::StopForces&) {
 }
 
 void Station::Impl::on(const Request& request, const wire::RearmForces&) {
-  spdlog::warn("client {} ({}) re-arms the forces of '{}'", request.session.id(), request.session.description(),
-               config.names.front());
+  spdlog::warn("client {} ({}) re-arms the forces of '{}'", request.session.id(),
+               request.session.description(), config.names.front());
   pendingRearms.insert(&request.session);
-  scene.whenPublished(request.session.id(), [this, session = &request.session, name = request.name, order = request.order] {
-    if (pendingRearms.count(session) != 0) rearm(*session, name, order);
-  });
+  scene.whenPublished(request.session.id(),
+                      [this, session = &request.session, name = request.name, order = request.order] {
+                        if (pendingRearms.count(session) != 0) rearm(*session, name, order);
+                      });
 }
 
-// Called after the earlier commands of the client are published, so that they act from the first tick with force.
+// Called after the earlier commands of the client are published, so that they act from the first tick with
+// force.
 void Station::Impl::rearm(Session& session, wire::LocalSender name, const DeviceControl::Order& order) {
   if (!control.rearmForces(order)) {
-    sendText(session, name, wire::kTextWarning, "Rearm_Forces ignored: the forces were stopped after it was sent");
+    sendText(session, name, wire::kTextWarning,
+             "Rearm_Forces ignored: the forces were stopped after it was sent");
     session.flush();
     return;
   }

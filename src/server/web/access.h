@@ -1,8 +1,8 @@
 // Access control of the HTTP port: our own pages and programs may use it, pages of other sites may not.
 //
-// A browser lets any web page send requests to this machine. The Origin header names the site that the page comes from.
-// The Host header names the server that the browser believes it talks to, which reveals DNS rebinding: a foreign name
-// that resolves to this machine.
+// A browser lets any web page send requests to this machine. The Origin header names the site that the page
+// comes from. The Host header names the server that the browser believes it talks to, which reveals DNS
+// rebinding: a foreign name that resolves to this machine.
 #pragma once
 
 #include <string>
@@ -13,7 +13,8 @@
 
 namespace hapticd::server {
 
-/// No side effects. `local` is the listening address; `allowed` are further names, HOST (with our port) or HOST:PORT.
+/// No side effects. `local` is the listening address; `allowed` are further names, HOST (with our port) or
+/// HOST:PORT.
 class WebAccess {
  public:
   WebAccess(const net::Endpoint& local, std::vector<std::string> allowed);

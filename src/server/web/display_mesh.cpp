@@ -34,13 +34,14 @@ bool isUsable(std::span<const Vec3f> vertices, const Triangle& t) {
 // Only the vertices that triangles use, in the order of their use.
 Mesh compact(std::span<const Vec3f> vertices, Corners corners) {
   Mesh mesh{std::vector<Vec3f>(vertices.size()), std::move(corners)};
-  mesh.vertices.resize(meshopt_optimizeVertexFetch(mesh.vertices.data(), mesh.corners.data(), mesh.corners.size(),
-                                                   vertices.data(), vertices.size(), sizeof(Vec3f)));
+  mesh.vertices.resize(meshopt_optimizeVertexFetch(mesh.vertices.data(), mesh.corners.data(),
+                                                   mesh.corners.size(), vertices.data(), vertices.size(),
+                                                   sizeof(Vec3f)));
   return mesh;
 }
 
-// Scaled into the unit cube, since the simplifier squares coordinates in single precision. Adding 0 makes -0 and 0 the
-// same bits, which is how it finds equal positions.
+// Scaled into the unit cube, since the simplifier squares coordinates in single precision. Adding 0 makes -0
+// and 0 the same bits, which is how it finds equal positions.
 std::vector<Vec3f> inUnitCube(const std::vector<Vec3f>& vertices) {
   Vec3f low = vertices.front();
   Vec3f high = low;
@@ -49,7 +50,8 @@ std::vector<Vec3f> inUnitCube(const std::vector<Vec3f>& vertices) {
     high = high.cwiseMax(v);
   }
   const Eigen::Array3d origin = low.cast<double>();
-  const double side = std::max((high.cast<double>().array() - origin).maxCoeff(), std::numeric_limits<double>::min());
+  const double side =
+      std::max((high.cast<double>().array() - origin).maxCoeff(), std::numeric_limits<double>::min());
   std::vector<Vec3f> scaled;
   scaled.reserve(vertices.size());
   for (const Vec3f& v : vertices) {
@@ -58,12 +60,12 @@ std::vector<Vec3f> inUnitCube(const std::vector<Vec3f>& vertices) {
   return scaled;
 }
 
-// Clients often send three vertices per triangle: gives vertices at one position one number, and drops triangles that
-// have two corners at one position.
+// Clients often send three vertices per triangle: gives vertices at one position one number, and drops
+// triangles that have two corners at one position.
 Corners weld(const Corners& corners, const std::vector<Vec3f>& positions) {
   Corners all(corners.size());
-  meshopt_generateShadowIndexBuffer(all.data(), corners.data(), corners.size(), positions.data(), positions.size(),
-                                    sizeof(Vec3f), sizeof(Vec3f));
+  meshopt_generateShadowIndexBuffer(all.data(), corners.data(), corners.size(), positions.data(),
+                                    positions.size(), sizeof(Vec3f), sizeof(Vec3f));
   Corners welded;
   welded.reserve(all.size());
   for (std::size_t i = 0; i < all.size(); i += 3) {
@@ -73,7 +75,8 @@ Corners weld(const Corners& corners, const std::vector<Vec3f>& positions) {
   return welded;
 }
 
-// Evenly spaced triangles: for a soup of separate triangles smaller than any cell, where clustering leaves nothing.
+// Evenly spaced triangles: for a soup of separate triangles smaller than any cell, where clustering leaves
+// nothing.
 Corners sample(const Corners& corners, std::size_t most) {
   const std::size_t count = corners.size() / 3;
   Corners some;
@@ -84,8 +87,9 @@ Corners sample(const Corners& corners, std::size_t most) {
   return some;
 }
 
-// Edge collapses give the better picture, but take about a second per million triangles and keep the topology, so that
-// they cannot reduce a soup. Clustering in a grid comes before them in huge meshes and after them where they got stuck.
+// Edge collapses give the better picture, but take about a second per million triangles and keep the
+// topology, so that they cannot reduce a soup. Clustering in a grid comes before them in huge meshes and
+// after them where they got stuck.
 Corners simplify(const Mesh& mesh, std::size_t most, const std::atomic<bool>& cancelled) {
   constexpr std::size_t kMostCollapsed = 4 * kDisplayTriangles;
   constexpr float kAnyError = 1e6F;

@@ -32,8 +32,8 @@ net::HttpResponse meshResponse(const std::shared_ptr<const net::Buffer>& bytes) 
 }
 
 net::HttpResponse busyResponse() {
-  net::HttpResponse response =
-      net::HttpResponse::of(503, errorJson("the mesh is being simplified for display; retry in 1 s"), "application/json");
+  net::HttpResponse response = net::HttpResponse::of(
+      503, errorJson("the mesh is being simplified for display; retry in 1 s"), "application/json");
   response.headers = {{"Retry-After", "1"}};
   return response;
 }
@@ -44,7 +44,8 @@ MeshStore::~MeshStore() {
   for (auto& [key, entry] : entries_) *entry.cancelled = true;
 }
 
-void MeshStore::get(std::size_t scene, const ObservedScene& observed, std::size_t position, const Respond& respond) {
+void MeshStore::get(std::size_t scene, const ObservedScene& observed, std::size_t position,
+                    const Respond& respond) {
   const scene::ObjectDescription& object = observed.description->objects[position];
   const Key key{scene, object.id};
   const std::size_t share = sharesOf(observed)[position];
@@ -68,7 +69,8 @@ void MeshStore::get(std::size_t scene, const ObservedScene& observed, std::size_
   });
 }
 
-// The job owns a reference to the shape: if it is the last one, the worker frees the shape, not the net thread.
+// The job owns a reference to the shape: if it is the last one, the worker frees the shape, not the net
+// thread.
 void MeshStore::build(const Key& key, Entry& entry, const scene::ObjectDescription& object) {
   worker_.post([this, key, geometry = entry.geometry, share = entry.share, cancelled = entry.cancelled,
                 vertices = object.vertices, triangles = object.triangles] {

@@ -24,8 +24,8 @@ class MeshStore {
   MeshStore(net::Loop& loop, Worker& worker) : loop_(loop), worker_(worker) {}
   ~MeshStore();
 
-  /// Responds with the mesh of the object at `position` in `observed`, or with 503 when building it takes longer than
-  /// 500 ms; the result is kept for the client's retry.
+  /// Responds with the mesh of the object at `position` in `observed`, or with 503 when building it takes
+  /// longer than 500 ms; the result is kept for the client's retry.
   void get(std::size_t scene, const ObservedScene& observed, std::size_t position, const Respond& respond);
 
   /// Triangles of each object's display mesh; for one that is not built yet, its upper bound.

@@ -54,8 +54,8 @@ void forces(Text& out, const StateReport& report) {
   ofDevices(out, report, "hapticd_force_limit_newtons", "gauge",
             "Peak force of the device, reduced by its thermal budget.",
             [](const auto& d) { return d.last.guard.limit_N; });
-  ofDevices(out, report, "hapticd_force_saturation_ratio", "gauge", "Force of the last tick divided by its limit.",
-            [](const auto& d) {
+  ofDevices(out, report, "hapticd_force_saturation_ratio", "gauge",
+            "Force of the last tick divided by its limit.", [](const auto& d) {
               return d.last.guard.limit_N > 0 ? d.last.force_N.norm() / d.last.guard.limit_N : 0;
             });
   ofDevices(out, report, "hapticd_touching", "gauge", "1 while the tool touches something.",
@@ -102,16 +102,15 @@ void clients(Text& out, const StateReport& report) {
   out.sample(static_cast<double>(report.server.clients.size()));
   ofClients(out, report, "hapticd_client_received_bytes_total", "counter", "Bytes received from the client.",
             [](const auto& c) { return c.bytesIn; });
-  ofClients(out, report, "hapticd_client_sent_bytes_total", "counter", "Bytes handed to the operating system for the client.",
-            [](const auto& c) { return c.bytesOut; });
-  ofClients(out, report, "hapticd_client_report_rate_hertz", "gauge", "Report rate that the client requested.",
-            [](const auto& c) { return c.rate_Hz; });
+  ofClients(out, report, "hapticd_client_sent_bytes_total", "counter",
+            "Bytes handed to the operating system for the client.", [](const auto& c) { return c.bytesOut; });
+  ofClients(out, report, "hapticd_client_report_rate_hertz", "gauge",
+            "Report rate that the client requested.", [](const auto& c) { return c.rate_Hz; });
   ofClients(out, report, "hapticd_client_lag_bytes", "gauge",
             "Bytes queued in the server or the operating system that the client has not acknowledged.",
             [](const auto& c) { return c.queuedBytes + c.unacknowledgedBytes; });
   ofClients(out, report, "hapticd_client_dropped_total", "counter",
-            "Reports dropped because the client reads too slowly.",
-            [](const auto& c) { return c.dropped; });
+            "Reports dropped because the client reads too slowly.", [](const auto& c) { return c.dropped; });
 }
 
 template <class Value>
@@ -127,8 +126,8 @@ void ofScenes(Text& out, const StateReport& report, std::string_view name, std::
 
 void scenes(Text& out, const StateReport& report) {
   using Scene = scene::SceneDescription;
-  ofScenes(out, report, "hapticd_scene_changes_total", "counter",
-           "Published changes of the scene.", [](const Scene& s) { return s.revision; });
+  ofScenes(out, report, "hapticd_scene_changes_total", "counter", "Published changes of the scene.",
+           [](const Scene& s) { return s.revision; });
   ofScenes(out, report, "hapticd_scene_objects", "gauge", "Objects in the scene.",
            [](const Scene& s) { return s.objects.size(); });
   ofScenes(out, report, "hapticd_scene_vertices", "gauge", "Vertices of all objects.", [](const Scene& s) {

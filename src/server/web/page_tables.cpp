@@ -15,9 +15,12 @@ std::string typeScriptString(std::string_view text) {
 
 std::string_view nameOf(TripAction action) {
   switch (action) {
-    case TripAction::clamp: return "clamp";
-    case TripAction::hold: return "hold";
-    case TripAction::latch: return "latch";
+    case TripAction::clamp:
+      return "clamp";
+    case TripAction::hold:
+      return "hold";
+    case TripAction::latch:
+      return "latch";
   }
   return "";
 }
@@ -43,8 +46,8 @@ export const TRIPS = {
   for (const TripInfo& trip : kTrips) {
     out += "  " + std::string(trip.name) + ": {\n    bit: " + std::to_string(static_cast<int>(trip.trip)) +
            ",\n    action: " + typeScriptString(nameOf(trip.action)) +
-           ",\n    what: " + typeScriptString(trip.what) +
-           ",\n    remedy: " + typeScriptString(trip.remedy) + ",\n  },\n";
+           ",\n    what: " + typeScriptString(trip.what) + ",\n    remedy: " + typeScriptString(trip.remedy) +
+           ",\n  },\n";
   }
   out += R"(} as const satisfies Record<string, Trip>;
 
@@ -52,7 +55,8 @@ export const TRIPS = {
 export const REFUSAL = {
 )";
   for (const RefusalInfo& refusal : kRefusals) {
-    out += "  " + std::string(refusal.name) + ": " + std::to_string(static_cast<std::uint32_t>(refusal.code)) + ",\n";
+    out += "  " + std::string(refusal.name) + ": " +
+           std::to_string(static_cast<std::uint32_t>(refusal.code)) + ",\n";
   }
   return out + "} as const;\n";
 }

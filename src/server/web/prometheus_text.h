@@ -16,7 +16,8 @@ class PrometheusText {
  public:
   using Labels = std::initializer_list<std::pair<std::string_view, std::string_view>>;
 
-  /// `type`: counter, gauge or histogram. By convention a counter's name ends in _total, other names end in their unit.
+  /// `type`: counter, gauge or histogram. By convention a counter's name ends in _total, other names end in
+  /// their unit.
   void family(std::string_view name, std::string_view type, std::string_view help);
   void sample(double value, Labels labels = {});
   /// Converts a histogram of nanoseconds to seconds, with a bucket for each power of two from 1 us to 0.5 s.

@@ -28,7 +28,8 @@ void SceneWatch::beginRound() {
     });
   }
   // A scene that builds a large mesh replies late: an old description is better than a late response.
-  const bool allKnown = std::all_of(latest_.begin(), latest_.end(), [](const auto& v) { return v != nullptr; });
+  const bool allKnown =
+      std::all_of(latest_.begin(), latest_.end(), [](const auto& v) { return v != nullptr; });
   timeout_ = loop_.after(allKnown ? 250ms : 3000ms, [this] { endRound(); });
 }
 
@@ -41,7 +42,8 @@ void SceneWatch::onReply(std::size_t scene, std::shared_ptr<const scene::SceneDe
   if (std::none_of(pending_.begin(), pending_.end(), [](char pending) { return pending != 0; })) endRound();
 }
 
-// Both lists are sorted by id. The previous description keeps its shapes alive, so pointer equality means the same shape.
+// Both lists are sorted by id. The previous description keeps its shapes alive, so pointer equality means the
+// same shape.
 std::vector<std::uint64_t> SceneWatch::shapeNumbers(const scene::SceneDescription& now,
                                                     const ObservedScene* before) {
   static const std::vector<scene::ObjectDescription> kNone;

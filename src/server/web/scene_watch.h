@@ -1,4 +1,5 @@
-// Descriptions of the scenes for HTTP responses, requested on demand: an unwatched server does no work for them.
+// Descriptions of the scenes for HTTP responses, requested on demand: an unwatched server does no work for
+// them.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +16,8 @@ namespace hapticd::server {
 /// One scene at one moment. Immutable; any thread reads it.
 struct ObservedScene {
   std::shared_ptr<const scene::SceneDescription> description;
-  std::vector<std::uint64_t> geometry;  ///< shape number of each object; it changes with the shape; 0: no shape
+  std::vector<std::uint64_t>
+      geometry;  ///< shape number of each object; it changes with the shape; 0: no shape
 };
 
 /// Net thread. Keeps at most one request to each scene under way, however many clients ask.
@@ -26,7 +28,8 @@ class SceneWatch {
   /// `dispose` takes old descriptions, which may be large, and frees them on another thread.
   SceneWatch(net::Loop& loop, std::vector<SceneHost*> scenes, Dispose dispose);
 
-  /// Calls `then` when all scenes have replied. A busy scene delays it by 250 ms at most, by 3 s before its first reply.
+  /// Calls `then` when all scenes have replied. A busy scene delays it by 250 ms at most, by 3 s before its
+  /// first reply.
   void refresh(std::function<void()> then);
   /// Latest description of each scene; null until the first reply.
   const std::vector<std::shared_ptr<const ObservedScene>>& latest() const noexcept { return latest_; }

@@ -31,7 +31,8 @@ std::string metricsText(const StateReport& report);
 /// Body of /api/messages: the names of all wire messages, with direction and meaning.
 std::string messagesJson();
 
-/// Body of an HTTP error: {"error": text}. The text may contain any bytes; what is not UTF-8 is replaced by U+FFFD.
+/// Body of an HTTP error: {"error": text}. The text may contain any bytes; what is not UTF-8 is replaced by
+/// U+FFFD.
 std::string errorJson(std::string_view text);
 
 }  // namespace hapticd::server

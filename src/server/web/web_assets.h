@@ -21,8 +21,8 @@ std::span<const WebAsset> webAssets();
 /// The media type for a file name, by its extension.
 std::string mediaTypeOf(std::string_view path);
 
-/// The response to a URL path; "/" is index.html. Without the viewer it is a page with build instructions; 404 for an
-/// unknown path.
+/// The response to a URL path; "/" is index.html. Without the viewer it is a page with build instructions;
+/// 404 for an unknown path.
 net::HttpResponse assetResponse(std::string_view path);
 
 }  // namespace hapticd::server

@@ -26,8 +26,9 @@ Number numberIn(const net::HttpRequest& request, std::string_view name, std::str
     if (code == std::errc{} && end == text->data() + text->size()) return number;
   }
   constexpr std::size_t kShown = 80;
-  error = std::string(name) + (text ? " must be a whole number, got '" + std::string(text->substr(0, kShown)) + "'"
-                                    : std::string(" is missing")) +
+  error = std::string(name) +
+          (text ? " must be a whole number, got '" + std::string(text->substr(0, kShown)) + "'"
+                : std::string(" is missing")) +
           ": expected /api/mesh?scene=0&object=0&geometry=1";
   return 0;
 }
@@ -101,7 +102,8 @@ void WebServer::onRequest(const net::HttpRequest& request, const net::HttpReply&
 void WebServer::route(const net::HttpRequest& request, const net::HttpReply& reply) {
   const std::string_view path = request.path();
   if (path == "/vrpn") {
-    net::HttpResponse response = net::HttpResponse::of(426, "/vrpn is a WebSocket that carries a VRPN stream\n");
+    net::HttpResponse response =
+        net::HttpResponse::of(426, "/vrpn is a WebSocket that carries a VRPN stream\n");
     response.headers = {{"Upgrade", "websocket"}, {"Connection", "Upgrade"}};
     response.onWebSocket = [this](net::Connection connection) { owner_.onWebClient(std::move(connection)); };
     respond(reply, std::move(response));

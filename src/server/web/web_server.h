@@ -24,8 +24,8 @@ class WebOwner {
   virtual void onWebClient(net::Connection connection) = 0;
 };
 
-/// Net thread; it builds response texts and display meshes on two workers. Destroy it after the scenes have stopped and
-/// before the loop.
+/// Net thread; it builds response texts and display meshes on two workers. Destroy it after the scenes have
+/// stopped and before the loop.
 class WebServer {
  public:
   /// `allowed` are further host names that requests may use. Throws net::Error when it cannot listen.

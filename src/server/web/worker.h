@@ -10,7 +10,8 @@
 
 namespace hapticd::server {
 
-/// Runs jobs in order, one at a time, at niceness 10. The destructor waits for the running job and discards queued ones.
+/// Runs jobs in order, one at a time, at niceness 10. The destructor waits for the running job and discards
+/// queued ones.
 class Worker {
  public:
   /// `name`: of the thread, at most 15 bytes.
@@ -19,7 +20,8 @@ class Worker {
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  /// Always from the same thread; the first call starts the worker. An exception that leaves the job is logged.
+  /// Always from the same thread; the first call starts the worker. An exception that leaves the job is
+  /// logged.
   void post(std::function<void()> job);
 
  private:

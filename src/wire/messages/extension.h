@@ -1,5 +1,5 @@
-// Messages that VRPN does not know. Peers learn names in the handshake and ignore unknown ones, so none of these
-// disturbs a stock client or server. Their meaning: docs/wire-extensions.md.
+// Messages that VRPN does not know. Peers learn names in the handshake and ignore unknown ones, so none of
+// these disturbs a stock client or server. Their meaning: docs/wire-extensions.md.
 #pragma once
 
 #include "wire/types.h"

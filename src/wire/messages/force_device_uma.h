@@ -80,9 +80,9 @@ struct SetHapticProperty {
 };
 
 struct SetTouchableFace {
-  static constexpr MessageInfo kInfo{"vrpn_ForceDevice setTouchableFace", Direction::kToServer,
-                                     Reliability::kReliable, Role::scene,
-                                     "Chooses the faces that are rendered: 0 front, 1 back, any other value both."};
+  static constexpr MessageInfo kInfo{
+      "vrpn_ForceDevice setTouchableFace", Direction::kToServer, Reliability::kReliable, Role::scene,
+      "Chooses the faces that are rendered: 0 front, 1 back, any other value both."};
   std::int32_t face = 2;
 
   template <class M, class V>

@@ -1,5 +1,5 @@
-// Messages of vrpn_ForceDevice that every VRPN has, second part: the scene that a client builds. A call of the C++
-// client that names no object addresses object 0.
+// Messages of vrpn_ForceDevice that every VRPN has, second part: the scene that a client builds. A call of
+// the C++ client that names no object addresses object 0.
 #pragma once
 
 #include "wire/types.h"

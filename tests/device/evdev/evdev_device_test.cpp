@@ -1,6 +1,6 @@
 // A force-feedback joystick on a fake of its file.
-#include "base/clock.h"
 #include "device/evdev/evdev_device.h"
+#include "base/clock.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

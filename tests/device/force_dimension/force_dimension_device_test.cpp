@@ -1,6 +1,6 @@
 // omega and its relatives on a mock of libdrd that aborts where a caller would do harm.
-#include "base/clock.h"
 #include "device/force_dimension/force_dimension_device.h"
+#include "base/clock.h"
 
 #include <dlfcn.h>
 #include <gmock/gmock.h>

@@ -1,6 +1,6 @@
 // Inverse3 on a mock of its service.
-#include "base/clock.h"
 #include "device/haply/haply_device.h"
+#include "base/clock.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 // A driver in a process of its own.
-#include "base/clock.h"
 #include "device/isolation/isolated_device.h"
+#include "base/clock.h"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>

@@ -1,6 +1,6 @@
 // A recorded hand as a device.
-#include "base/clock.h"
 #include "device/replay/replay_device.h"
+#include "base/clock.h"
 
 #include <gtest/gtest.h>
 

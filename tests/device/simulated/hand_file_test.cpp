@@ -88,7 +88,8 @@ TEST(HandFile, NamesFileLineAndValueOfAnError) {
 
 TEST(HandFile, ReadsWhatHapticdWrites) {
   const auto hand = HandFile::parse(
-      "device,time_ns,tick,revision,hip_x_m,hip_y_m,hip_z_m,proxy_x_m,qx,qy,qz,qw,buttons,guard_active,gripper_rad\n"
+      "device,time_ns,tick,revision,hip_x_m,hip_y_m,hip_z_m,proxy_x_m,qx,qy,qz,qw,buttons,guard_active,"
+      "gripper_rad\n"
       "\"Left, my\",1700000000123456789,1,1,0.01,0.02,0.03,9,0,0,0,1,2,late+speed,\n"
       "\"Left, my\",1700000000124456789,2,1,0.02,0.02,0.03,9,0,0,1,0,0,,\n",
       "h");

@@ -1,8 +1,8 @@
 // The hand of arithmetic against walls of arithmetic.
 //
 //      intended point  o~~300 N/m, 5 N·s/m~~[0.1 kg]     | wall: F = K depth for y < 0
-#include "base/time.h"
 #include "device/simulated/simulated_device.h"
+#include "base/time.h"
 
 #include <gtest/gtest.h>
 

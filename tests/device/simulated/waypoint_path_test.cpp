@@ -1,6 +1,6 @@
 // Smooth paths through points.
-#include "base/time.h"
 #include "device/simulated/waypoint_path.h"
+#include "base/time.h"
 #include "support/milliseconds.h"
 
 #include <gtest/gtest.h>

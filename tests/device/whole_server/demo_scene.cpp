@@ -1,5 +1,5 @@
-#include "base/clock.h"
 #include "device/whole_server/demo_scene.h"
+#include "base/clock.h"
 
 #include <cmath>
 #include <stdexcept>

@@ -4,7 +4,8 @@
 #include <cstdio>
 
 int main(int, char** argv) try {
-  const std::vector<std::array<float, 3>> floor{{-80, -10, -40}, {-80, -10, 40}, {80, -10, 40}, {80, -10, -40}};
+  const std::vector<std::array<float, 3>> floor{
+      {-80, -10, -40}, {-80, -10, 40}, {80, -10, 40}, {80, -10, -40}};
   const std::vector<std::array<std::uint32_t, 3>> triangles{{0, 1, 2}, {0, 2, 3}};
   hapticd::Client client(argv[1]);
   client.setSurface(0, {.stiffness = 0.8F});

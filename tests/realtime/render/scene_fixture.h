@@ -12,10 +12,10 @@
 
 namespace hapticd::realtime::fixture {
 
-using geometry::Affine;
-using geometry::Box;
 using base::Nanos;
 using base::toNanos;
+using geometry::Affine;
+using geometry::Box;
 using geometry::TriangleMesh;
 using geometry::Vec3;
 using geometry::Vec3f;

@@ -163,7 +163,8 @@ TEST(Config, ErrorsOfControlNameTheRemedy) {
 
 TEST(Config, DevicesOfOneSceneMustAgreeOnSceneOnDisconnect) {
   const std::string text = errorOf(
-      "[[device]]\nname=\"A\"\nscene=\"table\"\n[[device]]\nname=\"B\"\nscene=\"table\"\nscene_on_disconnect=\"clear\"");
+      "[[device]]\nname=\"A\"\nscene=\"table\"\n[[device]]\nname=\"B\"\nscene=\"table\"\nscene_on_disconnect="
+      "\"clear\"");
   EXPECT_EQ(
       text,
       "test.toml:7: device 'B': all devices of the scene 'table' must have the same scene_on_disconnect");

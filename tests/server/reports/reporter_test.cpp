@@ -1,13 +1,13 @@
-#include "base/time.h"
 #include "server/reports/reporter.h"
+#include "base/time.h"
 
 #include <gtest/gtest.h>
 
 namespace hapticd::server {
 namespace {
 
-using geometry::Affine;
 using base::Nanos;
+using geometry::Affine;
 using geometry::Vec3;
 
 constexpr Nanos kMs = 1'000'000;
@@ -352,8 +352,8 @@ TEST_F(ReporterTest, EveryContactOfATickIsListedAndTheEndIsAnEmptyList) {
   tick_.rendering.contacts[1] = {5, 1, Vec3(0, 0.01, 0), Vec3::UnitY(), Vec3(0, 3, 0)};
   step();
   const auto numbers = reported<wire::ContactList>().at(0).contacts.values;
-  EXPECT_EQ(numbers, (std::vector<double>{4, 0.01, 0, 0, 1, 0, 0, 2, 0, 0,  //
-                                          5, 0, 0.01, 0, 0, 1, 0, 0, 3, 0}));
+  EXPECT_EQ(numbers, (std::vector<double>{4, 0.01, 0,    0, 1, 0, 0, 2, 0, 0,  //
+                                          5, 0,    0.01, 0, 0, 1, 0, 0, 3, 0}));
   tick_.rendering = {};
   step();
   EXPECT_TRUE(reported<wire::ContactList>().at(0).contacts.values.empty());

@@ -18,7 +18,7 @@ class CommandDecoderTest : public ::testing::Test {
     return giveRaw(wire::kindOf<M>, payload, client);
   }
   CommandDecoder::Outcome giveRaw(wire::MessageKind kind, const std::vector<std::byte>& payload,
-                         scene::ClientId client = 1) {
+                                  scene::ClientId client = 1) {
     wire::MessageReceived received;
     received.kind = kind;
     received.payload = payload;
@@ -68,7 +68,8 @@ TEST_F(CommandDecoderTest, TrianglesBecomeRunsAndKeepNegativeCornersRefusable) {
 }
 
 TEST_F(CommandDecoderTest, WrongLengthIsMalformedAndChangesNothing) {
-  EXPECT_EQ(giveRaw(wire::kindOf<wire::SetVertex>, std::vector<std::byte>(19)), CommandDecoder::Outcome::malformed);
+  EXPECT_EQ(giveRaw(wire::kindOf<wire::SetVertex>, std::vector<std::byte>(19)),
+            CommandDecoder::Outcome::malformed);
   EXPECT_NE(error_.find("19 bytes, expected 20"), std::string::npos) << error_;
   EXPECT_EQ(giveRaw(wire::kindOf<wire::SetObjectNumber>, std::vector<std::byte>(5)),
             CommandDecoder::Outcome::malformed);
@@ -143,7 +144,9 @@ struct NumberLister {
   void operator()(const char*, const std::array<T, N>& list) {
     for (const T& value : list) numbers.push_back(static_cast<double>(value));
   }
-  void operator()(const char*, const geometry::Vec3& v) { numbers.insert(numbers.end(), v.data(), v.data() + 3); }
+  void operator()(const char*, const geometry::Vec3& v) {
+    numbers.insert(numbers.end(), v.data(), v.data() + 3);
+  }
   void operator()(const char*, const std::string& name) { text = name; }
   template <class T>
   void operator()(const char*, const T&) {}

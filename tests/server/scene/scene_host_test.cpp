@@ -50,12 +50,17 @@ class SceneHostTest : public ::testing::Test {
  protected:
   void SetUp() override {
     host_.add({.config = {}, .slot = &slot_, .published = {}, .publishing = {}});
-    host_.start({.notices = [this](auto&& notices) { net_.post([this, notices] {
-                                                for (const auto& notice : notices) texts_.push_back(notice.text);
-                                              }); },
-                 .relieved = [this](scene::ClientId client) { net_.post([this, client] { relieved_.push_back(client); }); },
-                 .applying = {}},
-                [this](std::function<void()> function) { net_.post(std::move(function)); });
+    host_.start(
+        {.notices =
+             [this](auto&& notices) {
+               net_.post([this, notices] {
+                 for (const auto& notice : notices) texts_.push_back(notice.text);
+               });
+             },
+         .relieved =
+             [this](scene::ClientId client) { net_.post([this, client] { relieved_.push_back(client); }); },
+         .applying = {}},
+        [this](std::function<void()> function) { net_.post(std::move(function)); });
   }
   void TearDown() override {
     open();
@@ -87,7 +92,8 @@ class SceneHostTest : public ::testing::Test {
   // Flushes as many vertices as one read contains, until the client is full.
   void flood(scene::ClientId client) {
     for (std::int32_t next = 0; !host_.full(client);) {
-      for (int i = 0; i < 5000; ++i) ASSERT_TRUE(give(client, wire::SetVertex{static_cast<std::int32_t>(client), next++, {}}));
+      for (int i = 0; i < 5000; ++i)
+        ASSERT_TRUE(give(client, wire::SetVertex{static_cast<std::int32_t>(client), next++, {}}));
       host_.flush(client);
     }
   }

@@ -19,7 +19,9 @@ using namespace std::chrono_literals;
 class CountingOwner final : public SessionOwner {
  public:
   void onSubscribed(Session& /*session*/, wire::LocalSender /*name*/) override {}
-  void onMessage(Session& /*session*/, const wire::MessageReceived& /*message*/, base::Nanos) override { ++messages; }
+  void onMessage(Session& /*session*/, const wire::MessageReceived& /*message*/, base::Nanos) override {
+    ++messages;
+  }
   void onWarning(const Session& /*session*/, const std::string& /*text*/) override {}
   void onReadSlice() override {
     mostBetween = std::max(mostBetween, messages - last);

@@ -1,7 +1,7 @@
 // DeviceKeeper with a scripted device that is lost, refuses to open, and recovers: its actions and texts over
 // time.
-#include "base/clock.h"
 #include "server/station/device_keeper.h"
+#include "base/clock.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -89,7 +89,7 @@ class ScriptedDevice final : public device::Device {
 
   void refuse(const std::string& reason) {
     const std::lock_guard lock(mutex_);
-    openError_ = text;
+    openError_ = reason;
   }
 
   std::atomic<int> opens{0}, closes{0}, reads{0}, readsWhileClosed{0};

@@ -8,10 +8,10 @@
 #include "base/time.h"
 #include "device/simulated/simulated_device.h"
 #include "hapticd/trips.h"
+#include "server/session/roles.h"
 #include "server/station/black_box_recorder.h"
 #include "server/station/button_modes.h"
 #include "server/station/device_control.h"
-#include "server/session/roles.h"
 
 namespace hapticd::server {
 namespace {
@@ -200,7 +200,8 @@ TEST_F(BlackBoxFilesTest, WritesAFaultWithTheTicksBeforeIt) {
       return all;
     };
     const auto names = cells(lines[0]);
-    return cells(lines[line])[static_cast<std::size_t>(std::find(names.begin(), names.end(), column) - names.begin())];
+    return cells(
+        lines[line])[static_cast<std::size_t>(std::find(names.begin(), names.end(), column) - names.begin())];
   };
   EXPECT_EQ(cell(1, "tick"), "4");
   EXPECT_EQ(cell(5, "tick"), "8");
@@ -222,9 +223,12 @@ TEST_F(BlackBoxFilesTest, KeepsOnlyTheNewestFiles) {
 
 std::string_view effectOn(TripAction action) {
   switch (action) {
-    case TripAction::clamp: return "shaped";
-    case TripAction::hold: return "zero while it lasts";
-    case TripAction::latch: return "zero until re-armed";
+    case TripAction::clamp:
+      return "shaped";
+    case TripAction::hold:
+      return "zero while it lasts";
+    case TripAction::latch:
+      return "zero until re-armed";
   }
   return {};
 }
@@ -235,8 +239,8 @@ TEST(Trips, AreInTheDocumentWithTheirSentences) {
   ASSERT_FALSE(text.empty());
   for (const TripInfo& trip : kTrips) {
     std::ostringstream row;
-    row << "| " << static_cast<int>(trip.trip) << " | `" << trip.name << "` | " << effectOn(trip.action) << " | "
-        << static_cast<int>(trip.forceError) << " | " << trip.what << " | " << trip.remedy << " |\n";
+    row << "| " << static_cast<int>(trip.trip) << " | `" << trip.name << "` | " << effectOn(trip.action)
+        << " | " << static_cast<int>(trip.forceError) << " | " << trip.what << " | " << trip.remedy << " |\n";
     EXPECT_NE(text.find(row.str()), std::string::npos) << row.str();
   }
 }

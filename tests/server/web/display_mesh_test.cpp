@@ -193,12 +193,15 @@ TEST(DisplayMesh, SoupsOfSeparateTrianglesStayWithinTheLimitAndVisible) {
 // The library's assertions are enabled in Debian's package: no input may reach one.
 TEST(DisplayMesh, AnyInputGivesAMeshWithinTheLimit) {
   std::mt19937 random(6);
-  constexpr float kExtremes[] = {0, -0.0F, 1, -1, 1e-45F, 3e38F, -3e38F, std::numeric_limits<float>::infinity()};
+  constexpr float kExtremes[] = {0,      -0.0F, 1,      -1,
+                                 1e-45F, 3e38F, -3e38F, std::numeric_limits<float>::infinity()};
   for (int round = 0; round < 300; ++round) {
     Shape shape;
     const std::uint32_t vertices = 1 + random() % 200;
     for (std::uint32_t i = 0; i < vertices; ++i) {
-      const auto at = [&] { return random() % 4 == 0 ? kExtremes[random() % 8] : static_cast<float>(random() % 10); };
+      const auto at = [&] {
+        return random() % 4 == 0 ? kExtremes[random() % 8] : static_cast<float>(random() % 10);
+      };
       const float x = at(), y = at(), z = at();
       shape.vertices.emplace_back(x, y, z);
     }

@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "net/loopback.h"
 #include "net/endpoint.h"
+#include "net/loopback.h"
 #include "running_server.h"
 
 namespace hapticd::test {

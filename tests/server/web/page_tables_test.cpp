@@ -21,14 +21,15 @@ TEST(PageTables, TheCommittedFileIsUpToDate) {
 TEST(PageTables, HoldsEveryTripAndRefusalCode) {
   const std::string tables = pageTables();
   for (const TripInfo& trip : kTrips) {
-    EXPECT_NE(tables.find("  " + std::string(trip.name) + ": {\n    bit: " + std::to_string(static_cast<int>(trip.trip)) +
-                          ",\n"),
+    EXPECT_NE(tables.find("  " + std::string(trip.name) +
+                          ": {\n    bit: " + std::to_string(static_cast<int>(trip.trip)) + ",\n"),
               std::string::npos)
         << trip.name;
   }
   for (std::size_t i = 0; i < kRefusals.size(); ++i) {
     EXPECT_EQ(static_cast<std::size_t>(kRefusals[i].code), i);
-    EXPECT_NE(tables.find("  " + std::string(kRefusals[i].name) + ": " + std::to_string(i) + ",\n"), std::string::npos);
+    EXPECT_NE(tables.find("  " + std::string(kRefusals[i].name) + ": " + std::to_string(i) + ",\n"),
+              std::string::npos);
   }
 }
 

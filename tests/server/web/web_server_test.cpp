@@ -239,8 +239,10 @@ TEST_F(Web, ExplainsWhyThereIsNoMesh) {
     EXPECT_THAT(error(query, 400), HasSubstr("/api/mesh?scene=0&object=0&geometry=1")) << query;
   }
   EXPECT_THAT(error("?scene=0&geometry=1", 400), HasSubstr("object is missing"));
-  EXPECT_THAT(error("?scene=0&object=\"x\\&geometry=1", 400), HasSubstr("object must be a whole number, got '\"x\\'"));
-  EXPECT_THAT(error("?scene=0&object=0&geometry=" + std::string(3000, '9'), 400), testing::SizeIs(testing::Lt(250)));
+  EXPECT_THAT(error("?scene=0&object=\"x\\&geometry=1", 400),
+              HasSubstr("object must be a whole number, got '\"x\\'"));
+  EXPECT_THAT(error("?scene=0&object=0&geometry=" + std::string(3000, '9'), 400),
+              testing::SizeIs(testing::Lt(250)));
 }
 
 // One large grid in bulk messages.

@@ -1,5 +1,5 @@
-// Forwards TCP connections to a server's WebSocket, with an independent WebSocket implementation: any test peer that
-// speaks VRPN over TCP can then connect as a page does.
+// Forwards TCP connections to a server's WebSocket, with an independent WebSocket implementation: any test
+// peer that speaks VRPN over TCP can then connect as a page does.
 #pragma once
 
 #include <array>

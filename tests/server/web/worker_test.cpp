@@ -61,7 +61,8 @@ class LazyThreads final : public base::Threads {
     started.push_back(std::move(options));
     return std::make_unique<Lazy>(std::move(step));
   }
-  std::unique_ptr<base::BlockingThread::Impl> startBlocking(base::ThreadOptions, std::function<void()>) override {
+  std::unique_ptr<base::BlockingThread::Impl> startBlocking(base::ThreadOptions,
+                                                            std::function<void()>) override {
     throw std::logic_error("a worker has no blocking thread");
   }
 
