@@ -148,7 +148,7 @@ TEST_F(HoldTest, RefusesInvalidPosesAndRealDevices) {
   EXPECT_FALSE(real.canBeHeld());
   EXPECT_FALSE(real.hold(1, {.hold = 1}, last_, refusal_));
   EXPECT_EQ(refusal_.code, RefusalCode::handNotSimulated);
-  EXPECT_NE(refusal_.text.find("real device"), std::string::npos);
+  EXPECT_NE(refusal_.text.find("the device is real"), std::string::npos);
 }
 
 class BlackBoxFilesTest : public ::testing::Test {
