@@ -83,6 +83,19 @@ class FilesTest : public testing::Test {
 using Kinds = testing::Types<OnDisk, InMemory>;
 TYPED_TEST_SUITE(FilesTest, Kinds);
 
+TYPED_TEST(FilesTest, ReadsAnOpenFilePieceByPiece) {
+  this->files.create(this->a, Existing::refuse)->write("abcdefg");
+  const auto file = this->files.open(this->a);
+  EXPECT_EQ(file->size(), 7U);
+  std::byte piece[4] = {};
+  EXPECT_EQ(file->read(piece), 4U);
+  EXPECT_EQ(static_cast<char>(piece[3]), 'd');
+  EXPECT_EQ(file->read(piece), 3U) << "the rest";
+  EXPECT_EQ(static_cast<char>(piece[0]), 'e');
+  EXPECT_EQ(file->read(piece), 0U) << "the end";
+  expectError([&] { this->files.open(this->folder / "absent"); }, ENOENT, (this->folder / "absent").string());
+}
+
 TYPED_TEST(FilesTest, KeepsWhatIsAppended) {
   const auto file = this->files.create(this->a, Existing::refuse);
   file->write("one ");

@@ -113,7 +113,9 @@ Columns named(const std::vector<std::string_view>& names, std::string_view text,
   columns.nanoseconds = time == "time_ns";
   columns.fromFirstRow = time != "t_s";
   // What hapticd writes has time_ns and hip_x_m, what people write t_s and x_m.
-  if ((time == "time_ns") != (prefix == "hip_") || (time == "t_s") != prefix.empty())
+  const bool written = time == "time_ns" && prefix == "hip_";
+  const bool byHand = time == "t_s" && prefix.empty();
+  if (!written && !byHand)
     columns.remark = "reads '" + time + "' and '" + prefix + "x_m', columns of an older version of hapticd";
   return columns;
 }
@@ -206,8 +208,8 @@ class HandFile::Parser {
     Nanos time = readTime(cells_[columns_.time], columns_, line);
     if (hand_.rows_.empty() && columns_.fromFirstRow) begin_ = time;
     time -= begin_;
-    // A client that samples reports may write one of them twice.
-    if (columns_.fromFirstRow && !hand_.rows_.empty() && time == hand_.rows_.back().time) return;
+    // A client may write a report twice, or a late one after its successor.
+    if (columns_.fromFirstRow && !hand_.rows_.empty() && time <= hand_.rows_.back().time) return;
     if (!hand_.rows_.empty() && time <= hand_.rows_.back().time)
       line.fail("time " + std::to_string(base::toSeconds(time)) + " s is not after the row before");
     const std::size_t x = columns_.position;

@@ -20,7 +20,8 @@ class HandFileError : public std::runtime_error {
 };
 
 /// Interpolates positions linearly and orientations by slerp; buttons stay until the next row. Before the
-/// first row and after the last one the hand rests. With time_ns the hand begins at the first row.
+/// first row and after the last one the hand rests. With time_ns the hand begins at the first row, and rows
+/// that repeat or precede their predecessor are ignored.
 class HandFile final : public HandPath {
  public:
   /// Throws HandFileError.

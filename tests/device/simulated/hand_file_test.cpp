@@ -128,6 +128,14 @@ TEST(HandFile, ReadsTheFilesOfOlderVersionsAndRemarksOnIt) {
   EXPECT_EQ(HandFile::parse("t_s,x_m,y_m,z_m\n0,0,0,0\n", "h")->remark(), "");
 }
 
+TEST(HandFile, IgnoresRepeatedAndLateRowsOfARecording) {
+  const auto hand = HandFile::parse(
+      "device,time_ns,hip_x_m,hip_y_m,hip_z_m\nA,10,1,0,0\nA,20,2,0,0\nA,20,3,0,0\nA,15,4,0,0\nA,5,5,0,0\nA,30,6,0,0\n", "h");
+  EXPECT_EQ(hand->rows(), 3U);
+  EXPECT_EQ(hand->duration(), 20);
+  EXPECT_EQ(hand->at(20).position_m.x(), 6);
+}
+
 TEST(HandFile, UsesTheFirstOfSeveralDevices) {
   const auto hand = HandFile::parse(
       "device,time_ns,hip_x_m,hip_y_m,hip_z_m\nA,10,1,0,0\nB,10,2,0,0\nA,20,3,0,0\nB,20,4,0,0\n", "h");
