@@ -109,8 +109,8 @@ TEST_F(ControlTest, AClientThatOptedIntoHeartbeatsIsLostWithoutThem) {
   const auto client = peer();
   hold(*watcher, 0, 0, 0);
   client->send(kUp);
-  client->send(wire::Heartbeat{1});
   ASSERT_TRUE(untilForce(*watcher, 1));
+  client->send(wire::Heartbeat{1});  // from here on the clock runs
   EXPECT_TRUE(client->until([&] { return !client->open(); }));
   EXPECT_TRUE(untilForce(*watcher, 0, 1e-9));
   EXPECT_TRUE(watcher->open());

@@ -30,7 +30,8 @@ std::string thousandths(double value) {
 
 std::string quoted(const std::string& value) {
   std::ostringstream out;
-  out << toml::value<std::string>(value);
+  const toml::value<std::string> node(value);
+  out << toml::toml_formatter(node, toml::format_flags::none);  // no 'literal' and no multi-line strings
   return out.str();
 }
 

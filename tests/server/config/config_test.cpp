@@ -237,7 +237,7 @@ TEST(Config, AWrittenConfigurationReadsBackEqual) {
   EXPECT_EQ(parseConfig(text, "written"), config) << text;
   EXPECT_EQ(toToml(parseConfig(text, "written")), text);
   EXPECT_NE(text.find("linear_tolerance_mm = 0.3\n"), std::string::npos) << text;
-  EXPECT_NE(text.find("workspace = 'paper'\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("workspace = \"paper\"\n"), std::string::npos) << text;
 }
 
 // The test above relies on this to notice any key that is not written, not read, or confused with another.

@@ -4,6 +4,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <functional>
 #include <optional>
 
 #include "net/loop.h"
@@ -44,20 +45,9 @@ class CountingOwner final : public SessionOwner {
 
 // The handshake of a client with the sender `Phantom`, then `count` pings.
 std::vector<std::byte> pings(std::size_t count) {
-  wire::LocalNames names;
-  names.addSender("Phantom");
-  wire::Peer peer(names);
-  net::Buffer bytes;
-  peer.takeStream(bytes);
-  wire::Peer other(names);
-  net::Buffer answer;
-  other.takeStream(answer);
-  peer.feed({}, answer, [](const wire::Event&) {});
-  for (std::size_t i = 0; i < count; ++i) peer.send({}, *names.findSender("Phantom"), wire::Ping{});
-  net::Buffer rest;
-  peer.takeStream(rest);
-  bytes.insert(bytes.end(), rest.begin(), rest.end());
-  return bytes;
+  return bytesWith([count](wire::Peer& peer, wire::LocalSender sender) {
+    for (std::size_t i = 0; i < count; ++i) peer.send({}, sender, wire::Ping{});
+  });
 }
 
 TEST(Session, ReportsSlicesOfALongRead) {
@@ -80,6 +70,36 @@ TEST(Session, ReportsSlicesOfALongRead) {
   EXPECT_EQ(owner.closed, "");
   EXPECT_GE(owner.slices, 1U);
   EXPECT_LE(owner.mostBetween, 8 * 1024 / wire::kHeaderBytes + 1);  // one frame spans the boundary
+}
+
+// The promise to send heartbeats is seen although everything else is held back: later silence counts.
+TEST(Session, ReadsHeartbeatsAheadOfWhatIsHeldBack) {
+  net::Loop loop;
+  wire::LocalNames names;
+  names.addSender("Phantom");
+  WallClock clock;
+  CountingOwner owner;
+  std::optional<Session> session;
+  net::TcpListener listener(loop, net::Endpoint::parse("127.0.0.1", 0), [&](net::Connection connection) {
+    session.emplace(1, owner, names, clock, std::move(connection), nullptr, SessionMode::tcp);
+    session->hold();
+    session->start();
+  });
+  net::Connection client = net::Connection::connect(loop, listener.local(), 20s);
+  client.start({});
+  client.send(bytesWith([](wire::Peer& peer, wire::LocalSender sender) {
+    peer.send({}, sender, wire::StartEffect{1});
+    peer.send({}, sender, wire::Heartbeat{1});
+    peer.send({}, sender, wire::StopForces{});
+  }));
+  for (int i = 0; i < 2000 && owner.messages < 1; ++i) loop.runOnce(10ms);
+  EXPECT_EQ(owner.messages, 1U) << "the stop alone";
+  const base::Nanos later = base::now() + 2 * HeartbeatWatch::kLimit;
+  EXPECT_EQ(session->checkHeartbeat(later), HeartbeatWatch::Verdict::lost) << "the heartbeat was read";
+  EXPECT_TRUE(session->holding());
+  EXPECT_FALSE(session->release());
+  EXPECT_EQ(owner.messages, 2U) << "the effect follows";
+  EXPECT_FALSE(session->holding());
 }
 
 }  // namespace
