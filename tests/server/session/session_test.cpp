@@ -43,7 +43,24 @@ class CountingOwner final : public SessionOwner {
   std::string closed;
 };
 
-// The handshake of a client with the sender `Phantom`, then `count` pings.
+// The handshake of a client with the sender `Phantom`, then what `write` sends.
+std::vector<std::byte> bytesWith(const std::function<void(wire::Peer&, wire::LocalSender)>& write) {
+  wire::LocalNames names;
+  names.addSender("Phantom");
+  wire::Peer peer(names);
+  net::Buffer bytes;
+  peer.takeStream(bytes);
+  wire::Peer other(names);
+  net::Buffer answer;
+  other.takeStream(answer);
+  peer.feed({}, answer, [](const wire::Event&) {});
+  write(peer, *names.findSender("Phantom"));
+  net::Buffer rest;
+  peer.takeStream(rest);
+  bytes.insert(bytes.end(), rest.begin(), rest.end());
+  return bytes;
+}
+
 std::vector<std::byte> pings(std::size_t count) {
   return bytesWith([count](wire::Peer& peer, wire::LocalSender sender) {
     for (std::size_t i = 0; i < count; ++i) peer.send({}, sender, wire::Ping{});
