@@ -45,8 +45,6 @@ total_failed=0
 total_skipped=0
 flaky=()
 summary=()
-testing=""  # process that runs the tests in the background
-trap '[ -z "$testing" ] || kill "$testing" 2>/dev/null || true' EXIT
 
 # Arguments for ctest, by preset.
 filter_of() {
@@ -73,13 +71,13 @@ targets_of() {
   esac
 }
 
-# build PRESET: prints every tenth step, so that a log stays readable. Takes only the time that tests leave.
+# build PRESET: prints every tenth step, so that a log stays readable.
 build() {
   if [ -z "$room" ] || [ ! -e "build/$1/build.ninja" ]; then
     cmake --preset "$1" >"build/$1.configure.log" 2>&1 || { cat "build/$1.configure.log"; return 1; }
   fi
   # shellcheck disable=SC2046
-  nice -n 19 cmake --build "build/$1" --parallel "$jobs" --target $(targets_of "$1") |
+  cmake --build "build/$1" --parallel "$jobs" --target $(targets_of "$1") |
     awk 'NR % 10 == 1 || !/^\[[0-9]+\/[0-9]+\] (Building|Linking)/'
 }
 
@@ -160,26 +158,20 @@ build_s=$SECONDS
 for i in "${!presets[@]}"; do
   preset=${presets[i]}
   next=${presets[i + 1]:-}
-  # The tests mostly wait: the next build uses that time, at the lowest priority.
-  echo "== $preset: testing${next:+; $next: building}"
-  (
-    SECONDS=0
-    status=0
-    run_ctest "$preset" "build/$preset/test.log" --parallel "$jobs" || status=$?
-    echo "$status $SECONDS" >"build/$preset/test.result"
-  ) &
-  testing=$!
-  next_build_s=0
-  if [ -n "$next" ]; then
-    SECONDS=0
-    build "$next"
-    next_build_s=$SECONDS
-  fi
-  wait "$testing"
-  testing=""
-  read -r status test_s <"build/$preset/test.result"
+  # Builds and tests in turn: many tests watch what happens within milliseconds, and a compiler beside them makes them
+  # fail.
+  echo "== $preset: testing"
+  test_start=$SECONDS
+  status=0
+  run_ctest "$preset" "build/$preset/test.log" --parallel "$jobs" || status=$?
+  test_s=$((SECONDS - test_start))
   judge "$preset" "$status" "$build_s" "$test_s"
-  build_s=$next_build_s
+  if [ -n "$next" ]; then
+    echo "== $next: building"
+    build_start=$SECONDS
+    build "$next"
+    build_s=$((SECONDS - build_start))
+  fi
 done
 
 if [ -n "$long" ]; then
