@@ -188,7 +188,7 @@ TEST_F(HeldBackTest, CommandsSentBeforeAClientDisconnectsAreApplied) {
   client->queue(wire::MeshTriangles{0, 0, {{0, 1, 2}}});
   client->queue(wire::SetHapticProperty{0, "stiffness", 1.0F});
   client->send(wire::SetTouchableFace{0});
-  ASSERT_TRUE(pass(*client, 200));
+  ASSERT_TRUE(client->until([&] { return client->delivered(); }, 60s));
   client->end();
   ASSERT_TRUE(pass(*client, 100));
   client.reset();
