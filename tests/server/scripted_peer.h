@@ -113,6 +113,11 @@ class ScriptedPeer {
   void close() { connection_.abort("test over"); }
   /// Sends what is queued, then closes the connection.
   void end() { connection_.close("test over"); }
+  /// Whether the server's machine has received everything that was sent.
+  bool delivered() const {
+    const net::ConnectionStatistics statistics = connection_.statistics();
+    return statistics.queuedBytes == 0 && statistics.unacknowledgedBytes == 0;
+  }
   /// Handles pending events without waiting.
   void poll() {
     while (loop_.runOnce(std::chrono::milliseconds(0)) > 0) {
