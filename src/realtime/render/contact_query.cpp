@@ -41,6 +41,12 @@ double exitOf(const Vec3& p, const Vec3& d, const Vec3& centre, double radius) {
   return std::clamp((root - b) / a, 0.0, 1.0);
 }
 
+// Four units in the last place of a float of this size.
+double gapToleranceOf(double largestCoordinate_m) {
+  constexpr double kFloatSpacing = 0x1p-23;
+  return std::clamp(4 * kFloatSpacing * largestCoordinate_m, kGapTolerance_m, kLargestGapTolerance_m);
+}
+
 const ObjectState* find(const scene::SceneSnapshot& scene, std::int32_t id) {
   const auto it =
       std::lower_bound(scene.objects.begin(), scene.objects.end(), id,
@@ -72,6 +78,7 @@ void ContactQuery::beginTick(const SceneAtTime& now, const SceneAtTime& before,
                                                   now.scene->workspace.T_device_world.matrix();
   objectCount_ = 0;
   minSkin_ = kRelativeSkin;
+  radius_ = toolRadius_;
   overflowed_ = false;
   if (now.scene != before.scene) invalidate();
 }
@@ -89,7 +96,7 @@ void ContactQuery::addObjectsNear(const Vec3& centre, double reach) noexcept {
 void ContactQuery::addObjectsByIndex(const scene::SceneSnapshot& scene, const Vec3& centre,
                                      double reach) noexcept {
   const Affine& T_world_device = scene.workspace.T_world_device;
-  const double worldReach = (reach + radius_) * kWiden * stretchOf(T_world_device.linear());
+  const double worldReach = (reach + std::max(toolRadius_, 0.5 * kLargestGapTolerance_m)) * kWiden * stretchOf(T_world_device.linear());
   std::array<std::uint32_t, kMaxObjects> found{};
   std::size_t count = 0;
   scene.objectIndex->visitNear(T_world_device * centre, worldReach, [&](std::uint32_t i) noexcept {
@@ -134,6 +141,7 @@ void ContactQuery::add(const ObjectState& state) noexcept {
   }
   ++objectCount_;
   minSkin_ = objectCount_ == 1 ? placed.skin : std::min(minSkin_, placed.skin);
+  radius_ = std::max(radius_, placed.radius);
 }
 
 bool ContactQuery::place(const ObjectState& state, PlacedObject& placed) const noexcept {
@@ -154,6 +162,7 @@ bool ContactQuery::place(const ObjectState& state, PlacedObject& placed) const n
   const double extent = std::max(farthest.maxCoeff(), kSmallestObject_m);
   const double size = 0.5 * box.extents().maxCoeff() / placed.stretch;
   placed.skin = std::max(std::min(kRelativeSkin * extent, kPadShare * size), kRoundingFloor * extent);
+  placed.radius = std::max(toolRadius_, 0.5 * gapToleranceOf(extent));
   return std::isfinite(placed.skin);
 }
 
@@ -182,6 +191,7 @@ const Facet* ContactQuery::facetOf(int i, std::uint32_t triangle) const noexcept
     memo.generation = 0;
     if (!makeFacet(placed.corners(triangle, now_.time), placed.skin, memo.facet)) return nullptr;
     memo.facet.triangle = triangle;
+    memo.facet.radius = placed.radius;
     memo.state = placed.state;
     if (placed.atRest) memo.generation = generation_;
   }
@@ -200,14 +210,14 @@ bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
     // Deforming facets count at any distance: they may have come from farther away.
     const auto visit = [&](std::uint32_t triangle) noexcept {
       if (!cache_.complete()) return;
-      if (radius_ > 0) {
+      if (!keepsFacets_) {
         const double distance = distanceBound(placed.state->mesh->corners(triangle, now_.time), inObject);
         cache_.add({triangle, i}, distance / (kWiden * placed.stretch), placed.skin, placed.deformed);
       } else if (const Facet* const facet = facetOf(i, triangle)) {
         cache_.add(*facet, placed.deformed);
       }
     };
-    const double reach = radius + radius_ + 4 * placed.skin;
+    const double reach = radius + placed.radius + 4 * placed.skin;
     placed.state->mesh->index.visitNear(inObject, reach * kWiden * placed.stretch, visit);
   }
   gatheredCount_ = objectCount_;
@@ -216,7 +226,7 @@ bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
 }
 
 bool ContactQuery::ensureGathered(const Vec3& centre, double radius) noexcept {
-  const double reserve = kReserveShare * radius_;
+  const double reserve = keepsFacets_ ? 0 : kReserveShare * radius_;
   // A fast tick gathers too many for the slow ticks after it.
   const bool smallEnough = cache_.size() <= kReuseLimit || cache_.reach() <= 2 * std::max(radius, reserve);
   if (smallEnough && cache_.covers(centre, radius)) return true;
@@ -233,8 +243,7 @@ bool ContactQuery::sameObjects() const noexcept {
 
 bool ContactQuery::castAtFacet(const Facet& f, const Vec3& p, const Vec3& g, ObjectHit& hit) const noexcept {
   const Vec3 d = g - p;
-  const bool found =
-      radius_ > 0 ? castBall(f, faces(), radius_, p, d, 1, 1, hit) : castPoint(f, faces(), p, d, 1, hit);
+  const bool found = castBall(f, faces(), p, d, 1, 1, hit);
   hit.object = f.object;
   hit.triangle = f.triangle;
   return found;
@@ -244,10 +253,8 @@ bool ContactQuery::castAtFacet(const Facet& f, const Vec3& p, const Vec3& g, Obj
 void ContactQuery::considerFacet(const Facet& f, const Path& path, ObjectHit& best,
                                  bool& found) const noexcept {
   ObjectHit hit;
-  const bool met = radius_ > 0 ? castBall(f, faces(), radius_, path.p, path.d, path.limit,
-                                          found ? best.stop : path.limit, hit)
-                               : castPoint(f, faces(), path.p, path.d, path.limit, hit);
-  if (!met) return;
+  const double latest = found ? best.stop : path.end;
+  if (!castBall(f, faces(), path.p, path.d, 1, latest, hit) || hit.stop > latest) return;
   hit.object = f.object;
   hit.triangle = f.triangle;
   const auto rank = [this](const ObjectHit& h) {
@@ -258,62 +265,50 @@ void ContactQuery::considerFacet(const Facet& f, const Path& path, ObjectHit& be
   found = true;
 }
 
-// visit() returns the parameter in [0, 1] beyond which facets do not matter.
-template <class Visit>
-void ContactQuery::forEachOnSegment(const Vec3& p, const Vec3& d, double limit, int only,
-                                    Visit&& visit) const noexcept {
-  if (only < 0 && planes_ != nullptr) {
-    for (const PlacedPlane& plane : *planes_) visit(plane.facet);
-  }
-  for (int i = 0; i < objectCount_; ++i) {
-    if (only >= 0 && i != only) continue;
-    const PlacedObject& placed = object(i);
-    placed.state->mesh->index.visitSegment(placed.T_object_device * p,
-                                           placed.T_object_device * (p + limit * d),
-                                           [&](std::uint32_t triangle) noexcept {
-                                             const Facet* const f = facetOf(i, triangle);
-                                             return f != nullptr ? visit(*f) : 1.0;
-                                           });
-  }
+bool ContactQuery::castGathered(const Path& path, int only, ObjectHit& hit) noexcept {
+  return keepsFacets_ ? castAtFacets(path, only, hit) : castAtTriangles(path, only, hit);
 }
 
-bool ContactQuery::castGathered(const Vec3& p, const Vec3& d, double limit, int only,
-                                ObjectHit& hit) noexcept {
-  return radius_ > 0 ? castBallGathered({p, d, limit}, only, hit)
-                     : castPointGathered({p, d, limit}, only, hit);
-}
-
-// Two passes: the first finds how far the path is free of faces, the second stops it earlier, where it is a
-// skin above all of them.
-bool ContactQuery::castPointGathered(const Path& path, int only, ObjectHit& hit) noexcept {
-  std::array<const Facet*, FacetCache::kMaxFacets + scene::kMaxPlanes> candidates;
-  int count = cache_.facetsNearPath(path.p, path.d, path.limit, candidates.data());
-  if (only < 0 && planes_ != nullptr) {
-    for (const PlacedPlane& plane : *planes_) candidates[static_cast<std::size_t>(count++)] = &plane.facet;
-  }
-  double free = path.limit;
-  bool blocked = false;
-  const auto forEach = [&](auto&& visit) {
-    for (int i = 0; i < count; ++i) {
-      const Facet& f = *candidates[static_cast<std::size_t>(i)];
-      if (only < 0 || f.object == only) visit(f);
-    }
-  };
-  forEach([&](const Facet& f) {
-    const double t = crossingParameter(f, faces(), path.p, path.d, free);
-    if (t > 1) return;
-    blocked = true;
-    free = t;
-  });
-  if (!blocked) return false;
-  const Path freePath{path.p, path.d, free};
+bool ContactQuery::castAtFacets(const Path& path, int only, ObjectHit& hit) noexcept {
+  std::array<const Facet*, FacetCache::kMaxFacets> candidates;
+  const int count = cache_.facetsNearPath(path.p + path.begin * path.d, (path.end - path.begin) * path.d, candidates.data());
   bool found = false;
-  forEach([&](const Facet& f) { considerFacet(f, freePath, hit, found); });
+  if (only < 0 && planes_ != nullptr) {
+    for (const PlacedPlane& plane : *planes_) considerFacet(plane.facet, path, hit, found);
+  }
+  // The facet that blocked the last cast often blocks this one: then the others are soon known to be farther.
+  const Facet* const first = cache_.begin() + lastBlocker_;
+  const auto consider = [&](const Facet& f) {
+    if (only < 0 || f.object == only) considerFacet(f, path, hit, found);
+  };
+  const auto last = candidates.begin() + count;
+  if (std::find(candidates.begin(), last, first) != last) consider(*first);
+  for (auto f = candidates.begin(); f != last; ++f) {
+    if (*f == first) continue;
+    const double before = found ? hit.stop : path.end;
+    consider(**f);
+    if (found && hit.stop < before) lastBlocker_ = static_cast<int>(*f - cache_.begin());
+  }
   return found;
 }
 
-bool ContactQuery::castBallGathered(const Path& path, int only, ObjectHit& hit) noexcept {
-  cache_.moveTo(path.p);
+double ContactQuery::freeOfFaces(const Vec3& p, const Vec3& g) noexcept {
+  std::array<const Facet*, FacetCache::kMaxFacets> candidates;
+  const Vec3 d = g - p;
+  ensureGathered(p, d.norm());
+  const int count = cache_.facetsNearPath(p, d, candidates.data());
+  double free = 1;
+  for (int i = 0; i < count; ++i) {
+    Facet thin = *candidates[static_cast<std::size_t>(i)];
+    thin.radius = 0;
+    CastHit hit;
+    if (castBall(thin, faces(), p, d, 1, free, hit)) free = std::min(free, hit.stop);
+  }
+  return free;
+}
+
+bool ContactQuery::castAtTriangles(const Path& path, int only, ObjectHit& hit) noexcept {
+  cache_.moveTo(path.p + path.begin * path.d);
   bool found = false;
   if (only < 0 && planes_ != nullptr) {
     for (const PlacedPlane& plane : *planes_) considerFacet(plane.facet, path, hit, found);
@@ -324,7 +319,7 @@ bool ContactQuery::castBallGathered(const Path& path, int only, ObjectHit& hit) 
   const double length = path.d.norm();
   const double touching = radius_ + 2 * cache_.maxSkin();
   for (int i = 0;; ++i) {
-    i = cache_.nextWithin(touching + (found ? hit.stop : path.limit) * length, i);
+    i = cache_.nextWithin(touching + ((found ? hit.stop : path.end) - path.begin) * length, i);
     if (i == cache_.size()) return found;
     if (i != first) considerGathered(i, path, only, hit, found);
   }
@@ -335,43 +330,23 @@ void ContactQuery::considerGathered(int i, const Path& path, int only, ObjectHit
   const FacetCache::TriangleId& id = cache_.triangle(i);
   if (only >= 0 && id.object != only) return;
   const double touching = radius_ + 2 * cache_.maxSkin();
-  const double latest = found ? best.stop : path.limit;
-  if (cache_.lowerBound(i, latest * path.d) > touching) return;
+  const double latest = found ? best.stop : path.end;
+  const Vec3 ahead = (latest - path.begin) * path.d;
+  if (cache_.lowerBound(i, ahead) > touching) return;
   const Facet* const f = facetOf(id.object, id.triangle);
   if (f == nullptr) return cache_.exclude(i);
-  if (cache_.refine(i, nearestPointOf(*f, path.p), latest * path.d) > touching) return;
+  if (cache_.refine(i, nearestPointOf(*f, path.p + path.begin * path.d), ahead) > touching) return;
   considerFacet(*f, path, best, found);
   if (found && best.stop < latest) lastBlocker_ = i;
 }
 
-bool ContactQuery::castTree(const Vec3& p, const Vec3& d, int only, ObjectHit& hit) const noexcept {
-  double free = 1;
-  bool blocked = false;
-  forEachOnSegment(p, d, 1, only, [&](const Facet& f) noexcept {
-    const double t = crossingParameter(f, faces(), p, d, free);
-    if (t <= 1) {
-      blocked = true;
-      free = t;
-    }
-    return free;
-  });
-  if (!blocked) return false;
-  bool found = false;
-  const Path path{p, d, free};
-  forEachOnSegment(p, d, free, only, [&](const Facet& f) noexcept {
-    considerFacet(f, path, hit, found);
-    return 1.0;
-  });
-  return found;
-}
-
 // The index has no query for a swept ball: gathers along the path from `begin` on, in steps that grow while
 // the path is free and shrink when the storage overflows.
-bool ContactQuery::castBallInSteps(const Vec3& p, const Vec3& d, double begin, int only,
+bool ContactQuery::castInSteps(const Vec3& p, const Vec3& d, double begin, int only,
                                    ObjectHit& hit) noexcept {
   constexpr int kMaxSteps = 64;
   const double length = d.norm();
-  double step = std::min(1.0, std::max(0.125 * radius_ / length, 1.0 / kMaxSteps));
+  double step = keepsFacets_ ? 1.0 : std::min(1.0, std::max(0.125 * radius_ / length, 1.0 / kMaxSteps));
   for (int i = 0; i < kMaxSteps && begin < 1; ++i) {
     step = std::min(step, 1 - begin);
     const Vec3 from = p + begin * d;
@@ -381,10 +356,7 @@ bool ContactQuery::castBallInSteps(const Vec3& p, const Vec3& d, double begin, i
       continue;
     }
     overflowed_ = overflowed_ || !cache_.complete();
-    if (castGathered(from, step * d, 1, only, hit)) {
-      hit.stop = begin + step * hit.stop;
-      return true;
-    }
+    if (castGathered({p, d, begin, begin + step}, only, hit)) return true;
     begin += step;
     step *= 2;
   }
@@ -396,20 +368,20 @@ bool ContactQuery::cast(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept {
   double free = 0;
   if (cache_.covers(p, 0)) {
     free = exitOf(p, d, cache_.centre(), cache_.reach());
-    if (castGathered(p, d, free, -1, hit)) return true;
+    if (castGathered({p, d, 0, free}, -1, hit)) return true;
     if (free == 1) return false;
   }
-  return radius_ > 0 ? castBallInSteps(p, d, free, -1, hit) : castTree(p, d, -1, hit);
+  return castInSteps(p, d, free, -1, hit);
 }
 
 bool ContactQuery::castWithinGathered(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept {
   if (!isGathered(p)) return cast(p, g, hit);
   const Vec3 d = g - p;
-  return castGathered(p, d, exitOf(p, d, cache_.centre(), cache_.reach()), -1, hit);
+  return castGathered({p, d, 0, exitOf(p, d, cache_.centre(), cache_.reach())}, -1, hit);
 }
 
 bool ContactQuery::castAtObject(int object, const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept {
-  return radius_ > 0 ? castBallInSteps(p, g - p, 0, object, hit) : castTree(p, g - p, object, hit);
+  return castInSteps(p, g - p, 0, object, hit);
 }
 
 }  // namespace hapticd::realtime

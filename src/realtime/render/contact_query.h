@@ -6,6 +6,7 @@
 // does not depend on the order of candidates.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -19,6 +20,12 @@ namespace hapticd::realtime {
 using base::Nanos;
 using geometry::Affine;
 
+/// Faces whose gaps are narrower than this are impassable, so the point tool touches them as a ball of half the
+/// width. Exports and assembled scenes leave such gaps where faces do not share vertices.
+inline constexpr double kGapTolerance_m = 10e-6;
+/// The tolerance of an object far from the origin grows with the spacing of its float coordinates, up to this.
+inline constexpr double kLargestGapTolerance_m = 50e-6;
+
 /// An object in this tick and, if it existed, in the previous one.
 struct PlacedObject {
   const scene::ObjectState* state = nullptr;
@@ -26,6 +33,7 @@ struct PlacedObject {
   Affine T_object_device = Affine::Identity();
   double stretch = 1;                ///< largest number of object units per metre, over all directions
   double skin = 0;                   ///< see facet.h
+  double radius = 0;                 ///< of the ball that touches it; see kGapTolerance_m
   bool atRest = false;               ///< neither moves nor deforms any more in this scene
   std::uint64_t restGeneration = 0;  ///< generation in which it was found at rest
   bool mirrored = false;             ///< the placement contains a reflection, which reverses the winding
@@ -58,7 +66,10 @@ struct SceneAtTime {
 /// Servo thread: noexcept, fixed storage, no allocation. Object indices are valid until the next beginTick().
 class ContactQuery {
  public:
-  explicit ContactQuery(double toolRadius_m) noexcept : radius_(toolRadius_m), cache_(toolRadius_m) {}
+  explicit ContactQuery(double toolRadius_m) noexcept
+      : toolRadius_(std::max(toolRadius_m, 0.5 * kGapTolerance_m)),
+        keepsFacets_(toolRadius_m <= kLargestGapTolerance_m),
+        cache_(toolRadius_) {}
 
   /// Before a tick that does not follow the previous one: drops all that was kept from its scene.
   void invalidate() noexcept { ++generation_; }
@@ -72,6 +83,11 @@ class ContactQuery {
   int addObject(std::int32_t id) noexcept;
 
   int objectCount() const noexcept { return objectCount_; }
+  /// Whether no near object moved or deformed since the previous tick.
+  bool allAtRest() const noexcept {
+    return std::none_of(objects_.begin(), objects_.begin() + objectCount_,
+                        [](const PlacedObject& o) { return o.moved || o.deformed || o.jumped; });
+  }
   const PlacedObject& object(int i) const noexcept { return objects_[static_cast<std::size_t>(i)]; }
 
   /// Gathers the facets that a tool inside the ball can touch, so that casts inside it need no index. False
@@ -95,6 +111,8 @@ class ContactQuery {
   /// The same against one object only.
   bool castAtObject(int object, const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept;
 
+  /// The share of the path from p to g on which a point, rather than a ball, meets no face. For a point tool.
+  double freeOfFaces(const Vec3& p, const Vec3& g) noexcept;
   /// The same against one facet.
   bool castAtFacet(const Facet& f, const Vec3& p, const Vec3& g, ObjectHit& hit) const noexcept;
 
@@ -102,7 +120,8 @@ class ContactQuery {
   double minSkin() const noexcept { return minSkin_; }
   /// Largest skin of the gathered facets.
   double maxSkin() const noexcept { return cache_.maxSkin(); }
-  double toolRadius() const noexcept { return radius_; }
+  /// Largest radius of the ball that touches the near objects: the tool's, or half the gap tolerance.
+  double radius() const noexcept { return radius_; }
   scene::TouchableFaces faces() const noexcept { return now_.scene->faces; }
   /// True when objects or facets had to be left out in this tick.
   bool overflowed() const noexcept { return overflowed_; }
@@ -118,15 +137,15 @@ class ContactQuery {
     Facet facet;
   };
 
-  // p + t d, t in [0, limit].
+  // The part [begin, end] of the path p + t d, t in [0, 1]. A hit is computed on the whole path, so that it does not
+  // depend on the parts.
   struct Path {
     const Vec3& p;
     const Vec3& d;
-    double limit;
+    double begin;
+    double end;
   };
 
-  template <class Visit>
-  void forEachOnSegment(const Vec3& p, const Vec3& d, double limit, int only, Visit&& visit) const noexcept;
   void addObjectsByIndex(const scene::SceneSnapshot& scene, const Vec3& centre, double reach) noexcept;
   void add(const scene::ObjectState& state) noexcept;
   bool place(const scene::ObjectState& state, PlacedObject& placed) const noexcept;
@@ -134,14 +153,15 @@ class ContactQuery {
   void compareWithBefore(PlacedObject& placed) const noexcept;
   const Facet* facetOf(int object, std::uint32_t triangle) const noexcept;
   void considerFacet(const Facet& f, const Path& path, ObjectHit& best, bool& found) const noexcept;
-  bool castGathered(const Vec3& p, const Vec3& d, double limit, int only, ObjectHit& hit) noexcept;
-  bool castPointGathered(const Path& path, int only, ObjectHit& hit) noexcept;
-  bool castBallGathered(const Path& path, int only, ObjectHit& hit) noexcept;
+  bool castGathered(const Path& path, int only, ObjectHit& hit) noexcept;
+  bool castAtFacets(const Path& path, int only, ObjectHit& hit) noexcept;
+  bool castAtTriangles(const Path& path, int only, ObjectHit& hit) noexcept;
   void considerGathered(int i, const Path& path, int only, ObjectHit& best, bool& found) noexcept;
-  bool castTree(const Vec3& p, const Vec3& d, int only, ObjectHit& hit) const noexcept;
-  bool castBallInSteps(const Vec3& p, const Vec3& d, double begin, int only, ObjectHit& hit) noexcept;
+  bool castInSteps(const Vec3& p, const Vec3& d, double begin, int only, ObjectHit& hit) noexcept;
 
-  double radius_;
+  double toolRadius_;
+  bool keepsFacets_;  // see facet_cache.h
+  double radius_ = toolRadius_;
   SceneAtTime now_;
   SceneAtTime before_;
   const PlacedPlanes* planes_ = nullptr;
@@ -162,7 +182,7 @@ class ContactQuery {
 
 template <class Visit>
 void ContactQuery::forEachGathered(const Vec3& p, double distance, Visit&& visit) noexcept {
-  if (radius_ == 0) {
+  if (keepsFacets_) {
     for (const Facet& f : cache_) visit(f);
     return;
   }

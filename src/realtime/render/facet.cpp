@@ -1,6 +1,7 @@
 #include "realtime/render/facet.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace hapticd::realtime {
@@ -8,31 +9,9 @@ namespace {
 
 using scene::TouchableFaces;
 
-constexpr double kPasses = 2;            // a parameter beyond the end of every path
-constexpr double kMargin = 0.25;         // in skins; see facet.h
-constexpr double kCrossingSlack = 1e-6;  // ten times the error of a height, in skins
-constexpr double kThinness = 1e-3;       // ratio of height to length below which the normal is corrected
-
-// Inside the edge u-v or at most `margin` outside, seen along the normal; without a square root.
-inline bool withinEdge(const Facet& f, const Vec3& u, const Vec3& v, const Vec3& q, double margin) {
-  const Vec3 e = v - u;
-  const double inside = f.normal.cross(e).dot(q - u);
-  return inside >= 0 || inside * inside <= margin * margin * e.squaredNorm();
-}
-
-inline bool overFacet(const Facet& f, const Vec3& q, double margin) {
-  if (f.unbounded) return true;
-  if (!withinEdge(f, f.a, f.b, q, margin) || !withinEdge(f, f.b, f.c, q, margin) ||
-      !withinEdge(f, f.c, f.a, q, margin)) {
-    return false;
-  }
-  // The widened sides of a needle meet far beyond its ends: cut them off there.
-  const Vec3 e = f.b - f.a;
-  const double along = e.dot(q - f.a);
-  const double length2 = e.squaredNorm();
-  const double slack = margin * std::sqrt(length2);
-  return along >= -slack && along <= length2 + slack;
-}
+// Beside an edge the distance grows with the square of the overhang, so that a normal from it is precise to 1e-4 only.
+constexpr double kFlat = 1 - 0.5e-8;
+constexpr double kThinness = 1e-3;  // ratio of height to length below which the normal is corrected
 
 // The side of a facet that faces the start of the path, and the heights of both ends above it.
 struct Heights {
@@ -48,6 +27,57 @@ inline bool touchableSide(const Facet& f, TouchableFaces faces, const Vec3& p, c
   const bool fromBack = faces == TouchableFaces::back || (faces == TouchableFaces::both && h.start < 0);
   if (fromBack && !f.unbounded) h = {-1.0, -h.start, -h.end};
   return h.start >= -0.5 * f.skin;
+}
+
+// Calls visit(outward, corner) for the sides of a facet, seen along its normal, until it returns false. `outward` has the
+// length of the side.
+template <class Visit>
+inline bool forEachSide(const Facet& f, Visit&& visit) {
+  return f.unbounded || (visit((f.b - f.a).cross(f.normal), f.a) && visit((f.c - f.b).cross(f.normal), f.b) &&
+                         visit((f.a - f.c).cross(f.normal), f.c));
+}
+
+// Whether the path from x to x + d passes outside one of the sides by more than the margin.
+inline bool beyondSide(const Facet& f, const Vec3& x, const Vec3& d, double margin) {
+  return !forEachSide(f, [&](const Vec3& outward, const Vec3& corner) {
+    const double out = outward.dot(x - corner) + std::min(0.0, outward.dot(d));
+    return !(out > 0 && out * out > margin * margin * outward.squaredNorm());
+  });
+}
+
+// Whether both ends of the path from x to x + d are above the facet.
+inline bool overFacet(const Facet& f, const Vec3& x, const Vec3& d) {
+  return forEachSide(f, [&](const Vec3& outward, const Vec3& corner) {
+    return outward.dot(x - corner) + std::max(0.0, outward.dot(d)) <= 0;
+  });
+}
+
+// The distance to a convex set is convex along a line: Newton's steps from the start never pass the first root, and
+// without a negative slope there is none.
+bool castBallAtEdges(const Facet& f, const Vec3& up, const Vec3& p, const Vec3& d, double limit, double latest,
+                     CastHit& out) {
+  const double standoff = f.radius + f.skin;
+  const double contact = standoff - 0.5 * f.skin;
+  const double fine = 1e-3 * f.skin;
+  double t = 0;
+  bool stopped = false;
+  for (int i = 0; i < 32 && t <= (stopped ? limit : latest); ++i) {
+    const Vec3 x = p + t * d;
+    const Vec3 foot = nearestPointOf(f, x);
+    const Vec3 away = x - foot;
+    const double distance = away.norm();
+    Vec3 n = distance > f.skin ? Vec3(away / distance) : up;
+    if (n.dot(up) > kFlat) n = up;
+    const double slope = n.dot(d);
+    if (!stopped && distance <= standoff + fine) {
+      out = {t, -slope, {n, foot, standoff}};
+      stopped = true;
+    }
+    if (!(slope < 0)) return false;
+    if (stopped && distance <= contact + fine) return true;
+    t += (distance - (stopped ? contact : standoff)) / -slope;
+  }
+  return stopped && t <= limit;
 }
 
 }  // namespace
@@ -78,34 +108,6 @@ bool makeFacet(const scene::Corners& corners, double skin, Facet& f) noexcept {
   }
   f.normal = n;
   f.skin = skin;
-  return true;
-}
-
-double crossingParameter(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d,
-                         double limit) noexcept {
-  Heights h;
-  if (!touchableSide(f, faces, p, d, limit, h) || !(h.end < 0.5 * f.skin)) return kPasses;
-  // The deepest point above the face: the crossing, or else the end of the path.
-  double t = limit;
-  double margin = kMargin * f.skin;
-  if (h.end < 0) {
-    const double fall = h.start - h.end;
-    t = h.start > 0 ? limit * (h.start / fall) : 0.0;
-    if (h.start > 0) margin += kCrossingSlack * f.skin * limit * d.norm() / fall;
-  }
-  return overFacet(f, p + t * d, margin) ? t : kPasses;
-}
-
-bool castPoint(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d, double limit,
-               CastHit& out) noexcept {
-  if (crossingParameter(f, faces, p, d, limit) > 1) return false;
-  Heights h;
-  touchableSide(f, faces, p, d, limit, h);
-  const double fall = h.start - h.end;
-  if (!(fall > 0) && limit < 1) return false;  // it moves away, and the end of the full path is not known
-  out.stop = fall > 0 ? limit * std::clamp((h.start - f.skin) / fall, 0.0, 1.0) : 0.0;
-  out.depth = f.skin - h.end;
-  out.halfSpace = {h.sign * f.normal, f.a, f.skin};
   return true;
 }
 
@@ -151,33 +153,25 @@ Vec3 nearestPointOf(const Facet& f, const Vec3& x) noexcept {
   return x - f.normal * f.normal.dot(ax);
 }
 
-bool castBall(const Facet& f, TouchableFaces faces, double radius, const Vec3& p, const Vec3& d, double limit,
-              double latest, CastHit& out) noexcept {
-  const double standoff = radius + f.skin;
+bool castBall(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d, double limit, double latest,
+              CastHit& out) noexcept {
+  const double standoff = f.radius + f.skin;
+  const double contact = standoff - 0.5 * f.skin;
   Heights h;
   if (!touchableSide(f, faces, p, d, limit, h) || !(h.end < standoff)) return false;
-  // The distance to a convex set is convex along a line: Newton's steps from the start never pass the first
-  // root, and without a negative slope there is none.
-  const double contact = standoff - 0.5 * f.skin;
-  const double fine = 1e-3 * f.skin;
-  double t = 0;
-  bool stopped = false;
-  for (int i = 0; i < 32 && t <= (stopped ? limit : latest); ++i) {
-    const Vec3 x = p + t * d;
-    const Vec3 foot = nearestPointOf(f, x);
-    const Vec3 away = x - foot;
-    const double distance = away.norm();
-    const Vec3 n = distance > f.skin ? Vec3(away / distance) : Vec3(h.sign * f.normal);
-    const double slope = n.dot(d);
-    if (!stopped && distance <= standoff + fine) {
-      out = {t, -slope, {n, foot, standoff}};
-      stopped = true;
+  const double fall = (h.start - h.end) / limit;
+  if (!(h.start - latest * fall < standoff)) return false;
+  if (beyondSide(f, p, latest * d, standoff)) return false;
+  // Most paths end above the face itself.
+  if (fall > 0 && h.end <= contact) {
+    const double stop = std::max(0.0, (h.start - standoff) / fall);
+    const double through = std::max(0.0, (h.start - contact) / fall);
+    if (overFacet(f, p + stop * d, (through - stop) * d)) {
+      out = {stop, fall, {h.sign * f.normal, f.a, standoff}};
+      return true;
     }
-    if (!(slope < 0)) return false;
-    if (stopped && distance <= contact + fine) return true;
-    t += (distance - (stopped ? contact : standoff)) / -slope;
   }
-  return stopped && t <= limit;
+  return castBallAtEdges(f, h.sign * f.normal, p, d, limit, latest, out);
 }
 
 }  // namespace hapticd::realtime

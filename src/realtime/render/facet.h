@@ -1,9 +1,8 @@
-// One triangle in device metres, and casts of a point or a ball against it.
+// One triangle in device metres, and casts of a ball against it.
 //
-// A standoff keeps the proxy off a face: the tool radius plus `skin`, a length far above the rounding error
-// of all computations here and far below what can be felt. So no sign is decided near its own rounding error.
-// For the test a face is widened by a quarter of the skin: neighbours overlap and rounding opens no gap
-// between them. The proxy passes an edge at a greater height, so the overlap does not catch it.
+// A standoff keeps the centre off a face: the radius of the ball plus `skin`, a length far above the rounding
+// error of all computations here and far below what can be felt. So no sign is decided near its own rounding
+// error.
 #pragma once
 
 #include <cstdint>
@@ -21,6 +20,7 @@ struct Facet {
   Vec3 c = Vec3::Zero();
   Vec3 normal = Vec3::Zero();  ///< unit, out of the front
   double skin = 0;
+  double radius = 0;  ///< of the ball that touches it
   std::uint32_t triangle = 0;
   int object = 0;          ///< index of the near object; negative for a plane of the scene
   bool unbounded = false;  ///< a plane: no edges, touchable from the front only
@@ -33,23 +33,14 @@ struct CastHit {
   HalfSpace halfSpace;
 };
 
-/// False for triangles that are not finite or thinner than the skin, which the margins of their neighbours
-/// cover.
+/// False for triangles that are not finite or thinner than the skin: their neighbours are nearer than a ball is
+/// wide.
 bool makeFacet(const scene::Corners& corners, double skin, Facet& facet) noexcept;
 
-/// Point tool: the first parameter in [0, limit] at which the path p + t d reaches the facet itself, or ends
-/// within half a skin of it; > 1 when it does neither.
-double crossingParameter(const Facet& f, scene::TouchableFaces faces, const Vec3& p, const Vec3& d,
-                         double limit) noexcept;
-
-/// Point tool: where the facet blocks the path p + t d, t in [0, limit]. False when it does not.
-bool castPoint(const Facet& f, scene::TouchableFaces faces, const Vec3& p, const Vec3& d, double limit,
-               CastHit& out) noexcept;
-
-/// Ball tool: where the facet blocks the centre's path p + t d, t in [0, limit]. False when it does not, or
-/// only beyond `latest`.
-bool castBall(const Facet& f, scene::TouchableFaces faces, double radius, const Vec3& p, const Vec3& d,
-              double limit, double latest, CastHit& out) noexcept;
+/// Where the facet blocks the centre's path p + t d, t in [0, limit]. False when it does not, or only beyond
+/// `latest`.
+bool castBall(const Facet& f, scene::TouchableFaces faces, const Vec3& p, const Vec3& d, double limit,
+              double latest, CastHit& out) noexcept;
 
 /// A lower bound of the distance of x from a triangle: the distance from the disc around it.
 double distanceBound(const scene::Corners& corners, const Vec3& x) noexcept;

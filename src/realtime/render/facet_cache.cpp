@@ -7,8 +7,7 @@
 namespace hapticd::realtime {
 namespace {
 
-// In skins: a path at half a skin above a face is free of it; the rest covers rounding.
-constexpr double kClear = 0.625;
+constexpr double kClear = 2;  // in skins: beyond the radius, the ball is free of a face
 
 }  // namespace
 
@@ -18,17 +17,21 @@ void FacetCache::restart(const Vec3& centre, double reach) noexcept {
   complete_ = true;
   count_ = 0;
   maxSkin_ = 0;
+  maxRadius_ = 0;
   travel_ = 0;
 }
 
 void FacetCache::add(const Facet& facet, bool deforming) noexcept {
-  const double limit = reach_ + 4 * facet.skin;
+  const double limit = reach_ + facet.radius + 4 * facet.skin;
   if (std::abs(facet.normal.dot(centre_ - facet.a)) > limit && !deforming) return;
   if (count_ == kMaxFacets) return invalidate();
   const auto i = static_cast<std::size_t>(count_++);
   facets_[i] = facet;
   supportPlanes_[i] = {facet.normal, facet.normal.dot(facet.a)};
+  const Vec3 middle = 0.5 * (facet.a + facet.b);  // of the longest edge
+  bounds_[i] = {middle, std::sqrt(std::max((facet.a - middle).squaredNorm(), (facet.c - middle).squaredNorm()))};
   maxSkin_ = std::max(maxSkin_, facet.skin);
+  maxRadius_ = std::max(maxRadius_, facet.radius);
 }
 
 void FacetCache::add(const TriangleId& id, double distance, double skin, bool deforming) noexcept {
@@ -41,17 +44,22 @@ void FacetCache::add(const TriangleId& id, double distance, double skin, bool de
   maxSkin_ = std::max(maxSkin_, skin);
 }
 
-int FacetCache::facetsNearPath(const Vec3& p, const Vec3& d, double limit,
-                               const Facet** found) const noexcept {
-  const Vec3 displacement = limit * d;
-  const double height = kClear * maxSkin_;
+int FacetCache::facetsNearPath(const Vec3& p, const Vec3& d, const Facet** found) const noexcept {
+  const double height = maxRadius_ + kClear * maxSkin_;
+  const Vec3 middle = p + 0.5 * d;
+  const double reach = 0.5 * d.norm() + height;
   int n = 0;
   for (int i = 0; i < count_; ++i) {
     const SupportPlane& plane = supportPlanes_[static_cast<std::size_t>(i)];
     const double start = plane.normal.dot(p) - plane.offset;
-    const double end = start + plane.normal.dot(displacement);
+    const double end = start + plane.normal.dot(d);
     found[n] = &facets_[static_cast<std::size_t>(i)];
-    n += std::min(start, end) < height && std::max(start, end) > -height ? 1 : 0;
+    const Bound& bound = bounds_[static_cast<std::size_t>(i)];
+    const double farthest = bound.radius + reach;
+    n += std::min(start, end) < height && std::max(start, end) > -height &&
+                 (bound.centre - middle).squaredNorm() <= farthest * farthest
+             ? 1
+             : 0;
   }
   return n;
 }

@@ -1,7 +1,7 @@
 // The facets that a tool inside a ball around the proxy can touch, in fixed storage.
 //
-// Point tool: keeps the facets themselves. A path first discards the faces that have both of its ends on one
-// side, which leaves few. Ball tool: many triangles lie within its radius and few touch it. It keeps their
+// Point tool: keeps the facets themselves. A path first discards the faces whose plane or whose ball it does not
+// come near, which leaves few. Ball tool: many triangles lie within its radius and few touch it. It keeps their
 // ids, with a lower bound of the distance and a supporting plane for each; exact facets are made only for
 // those that pass both tests.
 #pragma once
@@ -24,7 +24,6 @@ class FacetCache {
     int object = 0;
   };
 
-  /// Radius 0: a point tool.
   explicit FacetCache(double toolRadius_m) noexcept : toolRadius_(toolRadius_m) {}
 
   /// Clears the cache; from now on it collects the facets that a tool within `reach` of `centre` can touch.
@@ -62,9 +61,8 @@ class FacetCache {
   double refine(int i, const Vec3& foot, const Vec3& d) noexcept;
   /// Marks entry i as unreachable.
   void exclude(int i) noexcept;
-  /// Point tool: all facets that the path p + t d, t in [0, limit], or a part of it from p on, may reach.
-  /// `found` has room for kMaxFacets. Returns how many.
-  int facetsNearPath(const Vec3& p, const Vec3& d, double limit, const Facet** found) const noexcept;
+  /// Point tool: all facets that the path from p to p + d may reach. `found` has room for kMaxFacets. Returns how many.
+  int facetsNearPath(const Vec3& p, const Vec3& d, const Facet** found) const noexcept;
 
  private:
   // normal . x = offset: the plane of the face (point tool), or a plane with the face on its back (ball
@@ -74,14 +72,22 @@ class FacetCache {
     double offset;
   };
 
+  // A ball around a facet.
+  struct Bound {
+    Vec3 centre;
+    double radius;
+  };
+
   double toolRadius_;
   Vec3 centre_ = Vec3::Zero();
   double reach_ = 0;
   bool complete_ = false;
   int count_ = 0;
-  double maxSkin_ = 0;  // over all entries
+  double maxSkin_ = 0;    // over all entries
+  double maxRadius_ = 0;  // of the ball that touches them
   std::array<SupportPlane, kMaxTriangles> supportPlanes_;
   std::array<Facet, kMaxFacets> facets_;
+  std::array<Bound, kMaxFacets> bounds_;
   Vec3 toolPosition_ = Vec3::Zero();
   double travel_ = 0;                            // of the tool since restart()
   std::array<double, kMaxTriangles> distances_;  // lower bounds, plus the travel at that time

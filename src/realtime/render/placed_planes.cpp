@@ -59,7 +59,7 @@ void PlacedPlanes::forgetAllExcept(const scene::SceneSnapshot& scene) noexcept {
 }
 
 void PlacedPlanes::place(const scene::SceneSnapshot& scene, Nanos now, const Vec3& hip, const Vec3& proxy,
-                         double toolRadius_m) noexcept {
+                         double toolRadius_m, double radius_m) noexcept {
   const geometry::Affine& T_world_device = scene.workspace.T_world_device;
   forgetAllExcept(scene);
   count_ = 0;
@@ -69,6 +69,7 @@ void PlacedPlanes::place(const scene::SceneSnapshot& scene, Nanos now, const Vec
     placed = PlacedPlane{};
     placed.state = &plane;
     placed.facet.object = -1 - count_;
+    placed.facet.radius = radius_m;
     if (placeOne(T_world_device, now, hip, proxy, toolRadius_m, placed)) ++count_;
   }
 }

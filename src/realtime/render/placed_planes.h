@@ -25,9 +25,10 @@ struct PlacedPlane {
 /// All planes, with their state from tick to tick. Servo thread: noexcept, no allocation.
 class PlacedPlanes {
  public:
-  /// Starts a tick: places the planes of `scene`. `hip` and `proxy` in device metres.
+  /// Starts a tick: places the planes of `scene`. `hip` and `proxy` in device metres;
+  /// `radius_m` is that of the ball that touches the planes.
   void place(const scene::SceneSnapshot& scene, Nanos now, const Vec3& hip, const Vec3& proxy,
-             double toolRadius_m) noexcept;
+             double toolRadius_m, double radius_m) noexcept;
   /// Ends a tick: bit i of `touched` is set when plane i holds the proxy.
   void remember(unsigned touched, const Vec3& proxy) noexcept;
   void reset() noexcept { memoryCount_ = 0; }

@@ -39,7 +39,7 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   period_s_ = period_s;
   casts_ = 0;
   if (!started_) startAt(now, hip);
-  planes_.place(*now.scene, now.time, hip, position_, query_.toolRadius());
+  planes_.place(*now.scene, now.time, hip, position_, toolRadius_, query_.radius());
   query_.beginTick(now, before_, &planes_);
   const bool wasFree = contactSet_.count == 0;
   const Vec3 from = position_;
@@ -144,7 +144,7 @@ void Proxy::moveFrictionless(const Vec3& target, ActiveSet& active) noexcept {
   const double skin = query_.minSkin();
   // A point comes to rest on planes after finitely many approaches; a ball on edges and corners only
   // converges.
-  const double gain = std::max(1e-4 * skin, kBallConvergence * query_.toolRadius());
+  const double gain = std::max(1e-4 * skin, kBallConvergence * toolRadius_);
   // Allows for a proxy within the skin, which the first approach moves outwards.
   double nearest = (position_ - target).norm() + 4 * skin;
   Vec3 step = Vec3::Zero();
@@ -167,7 +167,7 @@ void Proxy::moveFrictionless(const Vec3& target, ActiveSet& active) noexcept {
       distance = (position_ - target).norm();
     }
     nearest = distance;
-    if (query_.toolRadius() > 0) step = position_ - from;
+    if (toolRadius_ > 0) step = position_ - from;
   }
 }
 
@@ -229,7 +229,7 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
   const int count = std::min(active.count, kMaxActive);
   std::array<double, kMaxActive> depths{};
   const bool onAll =
-      depthsOf(active.hits.data(), count, query_.toolRadius(), position_ - hip, hip, depths.data());
+      depthsOf(active.hits.data(), count, toolRadius_, position_ - hip, hip, depths.data());
   double hardest = -1;
   for (int i = 0; i < count; ++i) {
     const ObjectHit& hit = active.hits[static_cast<std::size_t>(i)];
@@ -261,7 +261,25 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
     }
   }
   if (count > 0 && onAll) contactSet_.lateral_m = position_ - goal;
+  reported_ = position_;
+  if (toolRadius_ == 0 && count > 0 && onAll) reported_ = onFaces(hip, active);
   if (count == 0) popthroughArmed_ = true;
+}
+
+// The proxy on the faces that hold it, at their skins so that rounding does not put it behind one of them. Another face
+// may be in between: where the planes of two faces meet behind it, or where it moved.
+Vec3 Proxy::onFaces(const Vec3& hip, const ActiveSet& active) noexcept {
+  const int count = std::min(active.count, kMaxActive);
+  std::array<double, kMaxActive> depths{};
+  depthsOf(active.hits.data(), count, query_.minSkin(), position_ - hip, hip, depths.data());
+  Vec3 place = hip + contactSet_.lateral_m;
+  for (int i = 0; i < count; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    place += depths[k] * active.hits[k].halfSpace.normal;
+  }
+  // Nothing that rests is nearer to the proxy than the one face that it touches.
+  if (count == 1 && query_.allAtRest()) return place;
+  return position_ + query_.freeOfFaces(position_, place) * (place - position_);
 }
 
 // Above the popthrough force, the proxy steps through the faces that hold it and moves on to the HIP.
@@ -292,7 +310,7 @@ void Proxy::applyForceShading() noexcept {
   for (int i = 0; i < contactSet_.count; ++i) {
     ContactConstraint& constraint = contactSet_.constraints[static_cast<std::size_t>(i)];
     if (constraint.source < 0) continue;
-    const Vec3 at = position_ - query_.toolRadius() * constraint.halfSpace.normal;
+    const Vec3 at = position_ - query_.radius() * constraint.halfSpace.normal;
     constraint.forceDirection = shadedNormal(query_.object(constraint.source), constraint.triangle, now_.time,
                                              constraint.halfSpace.normal, at);
   }

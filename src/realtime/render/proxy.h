@@ -41,7 +41,7 @@ struct ContactSet {
 class Proxy {
  public:
   Proxy(double toolRadius_m, bool forceShading) noexcept
-      : query_(toolRadius_m), forceShading_(forceShading) {}
+      : toolRadius_(toolRadius_m), query_(toolRadius_m), forceShading_(forceShading) {}
 
   void reset() noexcept;
 
@@ -50,7 +50,8 @@ class Proxy {
   const ContactSet& follow(const SceneAtTime& now, const Vec3& hip, double period_s,
                            std::uint32_t& status) noexcept;
 
-  const Vec3& position() const noexcept { return position_; }
+  /// Where the proxy is: for a point tool in contact on the faces themselves, without the standoff.
+  const Vec3& position() const noexcept { return reported_; }
   const ContactSet& contactSet() const noexcept { return contactSet_; }
   PlacedPlanes& planes() noexcept { return planes_; }
 
@@ -78,6 +79,7 @@ class Proxy {
   bool approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Vec3& goal) noexcept;
   bool escapeCorner(const Vec3& target, const ActiveSet& active) noexcept;
   void extrapolateStep(const Vec3& step, const Vec3& target) noexcept;
+  double cornerSlack() const noexcept;
   void collectTouchedFaces(DescentDirections& descent) noexcept;
   void findDescentDirections(const Vec3& pull, const ActiveSet& active,
                              DescentDirections& descent) const noexcept;
@@ -85,11 +87,13 @@ class Proxy {
   void findConstraints(const Vec3& hip, ActiveSet& active) noexcept;
   bool frictionless() const noexcept;
   static FrictionCone frictionConeOf(const ContactSet& contactSet) noexcept;
+  Vec3 onFaces(const Vec3& hip, const ActiveSet& active) noexcept;
   void updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet& active) noexcept;
   void popThrough(const Vec3& hip, std::uint32_t& status) noexcept;
   void applyForceShading() noexcept;
   void releaseWhenDeep(bool wasFree, std::uint32_t& status) noexcept;
 
+  double toolRadius_;  // 0: a point
   ContactQuery query_;
   bool forceShading_;
   PlacedPlanes planes_;
@@ -102,6 +106,7 @@ class Proxy {
   bool popthroughArmed_ = true;
   bool released_ = false;  // contact released until the HIP leaves the surface
   Vec3 position_ = Vec3::Zero();
+  Vec3 reported_ = Vec3::Zero();
   Vec3 positionBefore_ = Vec3::Zero();
   Vec3 hipBefore_ = Vec3::Zero();
   Vec3 slipDirection_ = Vec3::Zero();

@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kTouching = 256;  // in skins: planes at their skins meet that far from a sharp corner
 constexpr double kLifts[] = {4, 4 * kTouching};
+constexpr double kSmallBall_m = kLargestGapTolerance_m;  // its rounding is smaller than the places where faces end
 constexpr double kMinDescent = 1e-3;  // share of the pull; flatter directions lead nowhere
 constexpr double kClimb = 1e-3;       // share of the tool radius
 
@@ -34,15 +35,22 @@ struct Proxy::DescentDirections {
   }
 };
 
+// How far from the proxy, beyond its radius, faces and edges may be that a corner is made of.
+double Proxy::cornerSlack() const noexcept {
+  const double rounding = query_.radius() <= kSmallBall_m ? query_.radius() : 0;
+  return kTouching * query_.maxSkin() + rounding;
+}
+
 // Sorted by id, so that the result does not depend on the order of visits.
 void Proxy::collectTouchedFaces(DescentDirections& descent) noexcept {
   const auto before = [this](const Facet& a, const Facet& b) {
     return std::tuple(query_.object(a.object).state->id, a.triangle) <
            std::tuple(query_.object(b.object).state->id, b.triangle);
   };
-  const double farthest = query_.toolRadius() + kTouching * query_.maxSkin();
+  const double slack = cornerSlack();
+  const double farthest = query_.radius() + slack;
   query_.forEachGathered(position_, farthest, [&](const Facet& f) {
-    const double touching = query_.toolRadius() + kTouching * f.skin;
+    const double touching = f.radius + slack;
     if (std::abs(f.normal.dot(position_ - f.a)) > touching) return;
     if ((position_ - nearestPointOf(f, position_)).norm() > touching) return;
     if (descent.faceCount == DescentDirections::kMaxFaces && before(descent.faces.back(), f)) return;
@@ -64,14 +72,13 @@ void Proxy::findDescentDirections(const Vec3& pull, const ActiveSet& active,
   for (int i = 0; i < descent.faceCount; ++i) {
     const Facet& f = descent.faces[static_cast<std::size_t>(i)];
     const Vec3 foot = nearestPointOf(f, p);
-    const Vec3 n = query_.toolRadius() > 0 ? Vec3((p - foot).normalized())
-                                           : Vec3(f.normal.dot(p - f.a) < 0 ? -f.normal : f.normal);
+    const Vec3 n = (p - foot).normalized();
     descent.outward += n;
     descent.add(pull - n * n.dot(pull), shortest);
     const std::array<Vec3, 3> corners{f.a, f.b, f.c};
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec3 edge = (corners[(k + 1) % 3] - corners[k]).normalized();
-      const bool onEdge = edge.cross(foot - corners[k]).norm() <= kTouching * f.skin;
+      const bool onEdge = edge.cross(foot - corners[k]).norm() <= cornerSlack();
       if (onEdge) descent.add(edge * edge.dot(pull), shortest);
     }
   }
@@ -117,8 +124,10 @@ bool Proxy::escapeCorner(const Vec3& target, const ActiveSet& active) noexcept {
   collectTouchedFaces(descent);
   findDescentDirections(pull, active, descent);
   if (!(descent.outward.norm() > 0)) return false;
-  for (const double lift : kLifts) {
-    const Vec3 start = position_ + lift * skin * descent.outward.normalized();
+  const bool small = query_.radius() <= kSmallBall_m;
+  for (const double lift : {kLifts[0] * skin, kLifts[1] * skin, small ? 0.25 * query_.radius() : 0.0}) {
+    if (lift == 0) break;
+    const Vec3 start = position_ + lift * descent.outward.normalized();
     if (freeShare(descent, position_, start) < 1) continue;
     for (int i = 0; i < descent.count && casts_ < kMaxCasts; ++i) {
       const Vec3& direction = descent.directions[static_cast<std::size_t>(i)];
@@ -141,7 +150,7 @@ bool Proxy::escapeCorner(const Vec3& target, const ActiveSet& active) noexcept {
 // the next approach doubles them. The step is straight and the free space is round, so it may climb a little.
 void Proxy::extrapolateStep(const Vec3& step, const Vec3& target) noexcept {
   const Vec3 pull = target - position_;
-  const double farthest = pull.norm() + kClimb * query_.toolRadius();
+  const double farthest = pull.norm() + kClimb * query_.radius();
   const double a = step.squaredNorm();
   const double b = step.dot(pull);
   const double c = pull.squaredNorm() - farthest * farthest;

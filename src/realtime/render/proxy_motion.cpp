@@ -90,7 +90,7 @@ void Proxy::push(const Vec3& from, std::uint32_t& status) noexcept {
 // The back of a plane is solid without end: move the proxy to the front.
 void Proxy::pushByPlanes(std::uint32_t& status) noexcept {
   for (const PlacedPlane& plane : planes_) {
-    const HalfSpace face{plane.facet.normal, plane.facet.a, query_.toolRadius() + plane.facet.skin};
+    const HalfSpace face{plane.facet.normal, plane.facet.a, plane.facet.radius + plane.facet.skin};
     const double below = -face.height(position_);
     if (below <= 0.5 * plane.facet.skin) continue;
     const Vec3 displacement = below * face.normal;

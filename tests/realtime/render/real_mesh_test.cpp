@@ -28,6 +28,7 @@ constexpr int kTicks = 15'000;
 constexpr int kSplits = 4;
 #endif
 constexpr double kStiffness = 1000;
+constexpr double kHop_m = 10e-6;  // minima that are shallower than the gap tolerance do not count
 
 TriangleMesh readObj(const std::filesystem::path& path) {
   TriangleMesh mesh;
@@ -173,6 +174,7 @@ class Judge {
  private:
   void judgeWay(const Rendering& r) {
     if (oracle_.entered(last_.proxy_m, r.proxy_m) <= 0) return;
+    if (getenv("DBG")) {std::cout.precision(12); std::cout << "TUNNEL " << last_.proxy_m.transpose() << " -> " << r.proxy_m.transpose() << " len " << (last_.proxy_m-r.proxy_m).norm() << " depth " << r.depth_m << '\n';}
     ++(oracle_.borderNear(last_.proxy_m, r.proxy_m) ? verdict.aroundBorder : verdict.tunnelled);
   }
 
@@ -186,8 +188,8 @@ class Judge {
     const double allowed = kStiffness * depth * std::sin(edge) + 0.02;
     if (step <= moved + allowed) return;
     ++verdict.overStep;
-    const Vec3 rest = oracle_.descend(last_.proxy_m, hip, 0.05, 2e-7);
-    if (kStiffness * (rest - last_.proxy_m).norm() <= allowed) ++verdict.unexplained;
+    const Vec3 rest = oracle_.descend(last_.proxy_m, hip, 0.05, kHop_m);
+    if (kStiffness * (rest - last_.proxy_m).norm() <= allowed) { ++verdict.unexplained; if (getenv("DBG")) { std::cout.precision(9); std::cout << "UNEXPL hip " << hip.transpose() << " last " << last_.proxy_m.transpose() << " now " << r.proxy_m.transpose() << " rest " << rest.transpose() << " d " << last_.depth_m << ' ' << r.depth_m << " dist " << (hip-last_.proxy_m).norm() << ' ' << (hip-r.proxy_m).norm() << " " << (rest-hip).norm() << " allowed " << allowed << '\n'; } }
   }
 
   void judgeRest(const Vec3& hip, const Rendering& r) {
@@ -195,7 +197,7 @@ class Judge {
     const Vec3 rest = oracle_.descend(r.proxy_m, hip, 3e-4);
     const double gain = (r.proxy_m - hip).norm() - (rest - hip).norm();
     verdict.worst_m = std::max(verdict.worst_m, gain);
-    if (gain > 10e-6) ++verdict.stuck;
+    if (gain > 10e-6) { ++verdict.stuck; if (getenv("DBG")) {std::cout.precision(10); std::cout << "STUCK " << gain << " hip " << hip.transpose() << " proxy " << r.proxy_m.transpose() << " rest " << rest.transpose() << " n " << r.normal.transpose() << " depth " << r.depth_m << " st " << r.status << " tri " << r.contacts[0].triangle << " c " << r.contactCount << '\n';} }
   }
 
   MeshOracle oracle_;
