@@ -71,24 +71,28 @@ RTCDevice device() {
 }
 
 struct NearQuery {
-  void (*thunk)(void*, std::uint32_t) noexcept;
+  bool (*thunk)(void*, std::uint32_t) noexcept;
   void* visitor;
+  bool ended = false;
 };
 
 // A segment can ask for the boxes around its middle instead.
 struct AsNear {
   double (*thunk)(void*, std::uint32_t) noexcept;
   void* visitor;
-  static void call(void* self, std::uint32_t id) noexcept {
+  static bool call(void* self, std::uint32_t id) noexcept {
     const auto* adapter = static_cast<const AsNear*>(self);
     adapter->thunk(adapter->visitor, id);
+    return true;
   }
 };
 
 bool onNear(RTCPointQueryFunctionArguments* args) {
-  const auto* query = static_cast<const NearQuery*>(args->userPtr);
-  query->thunk(query->visitor, args->primID);
-  return false;
+  auto* query = static_cast<NearQuery*>(args->userPtr);
+  if (query->ended || query->thunk(query->visitor, args->primID)) return false;
+  query->ended = true;
+  args->query->radius = 0;  // Embree skips what is beyond it
+  return true;
 }
 
 // Embree hands the context back to the leaf callback: the extra members follow its own.
@@ -275,7 +279,7 @@ void SpatialIndex::visitNearImpl(const Vec3& centre, double radius, NearThunk th
   // clamped point: every box within reach of the centre is within the same reach of the clamped one.
   const Vec3 inside = centre.cwiseMax(bounds_.min).cwiseMin(bounds_.max);
   if (!((inside - centre).norm() <= radius + pad_)) return;
-  NearQuery query{thunk, visitor};
+  NearQuery query{thunk, visitor, false};
   RTCPointQueryContext context;
   rtcInitPointQueryContext(&context);
   RTCPointQuery point{};

@@ -10,6 +10,7 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "geometry/triangle_mesh.h"
@@ -61,12 +62,20 @@ class SpatialIndex {
   const Box& bounds() const noexcept { return bounds_; }
   std::uint32_t size() const noexcept { return count_; }
 
-  /// Calls visit(id) for at least every box within `radius` of `centre`.
+  /// Calls visit(id) for at least every box within `radius` of `centre`; a visit that returns false is the last one.
   template <class Visit>
   void visitNear(const Vec3& centre, double radius, Visit&& visit) const noexcept {
     visitNearImpl(
         centre, radius,
-        [](void* v, std::uint32_t id) noexcept { (*static_cast<std::remove_reference_t<Visit>*>(v))(id); },
+        [](void* v, std::uint32_t id) noexcept -> bool {
+          auto& call = *static_cast<std::remove_reference_t<Visit>*>(v);
+          if constexpr (std::is_void_v<decltype(call(id))>) {
+            call(id);
+            return true;
+          } else {
+            return call(id);
+          }
+        },
         const_cast<void*>(static_cast<const void*>(std::addressof(visit))));
   }
 
@@ -84,7 +93,7 @@ class SpatialIndex {
   }
 
  private:
-  using NearThunk = void (*)(void*, std::uint32_t) noexcept;
+  using NearThunk = bool (*)(void*, std::uint32_t) noexcept;
   using SegmentThunk = double (*)(void*, std::uint32_t) noexcept;
   void visitNearImpl(const Vec3& centre, double radius, NearThunk thunk, void* visitor) const noexcept;
   void visitSegmentImpl(const Vec3& from, const Vec3& to, SegmentThunk thunk, void* visitor) const noexcept;

@@ -80,6 +80,7 @@ void ContactQuery::beginTick(const SceneAtTime& now, const SceneAtTime& before,
   minSkin_ = kRelativeSkin;
   radius_ = toolRadius_;
   overflowed_ = false;
+  visits_ = 0;
   if (now.scene != before.scene) invalidate();
 }
 
@@ -208,17 +209,20 @@ bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
     reusable = reusable && placed.atRest && !placed.deformed;
     const Vec3 inObject = placed.T_object_device * centre;
     // Deforming facets count at any distance: they may have come from farther away.
-    const auto visit = [&](std::uint32_t triangle) noexcept {
-      if (!cache_.complete()) return;
+    const auto visit = [&](std::uint32_t triangle) noexcept -> bool {
+      ++visits_;
       if (!keepsFacets_) {
         const double distance = distanceBound(placed.state->mesh->corners(triangle, now_.time), inObject);
         cache_.add({triangle, i}, distance / (kWiden * placed.stretch), placed.skin, placed.deformed);
       } else if (const Facet* const facet = facetOf(i, triangle)) {
         cache_.add(*facet, placed.deformed);
       }
+      if (workSpent()) cache_.invalidate();
+      return cache_.complete();
     };
     const double reach = radius + placed.radius + 4 * placed.skin;
     placed.state->mesh->index.visitNear(inObject, reach * kWiden * placed.stretch, visit);
+    if (!cache_.complete()) break;
   }
   gatheredCount_ = objectCount_;
   gatheredGeneration_ = reusable ? generation_ : 0;
@@ -340,23 +344,50 @@ void ContactQuery::considerGathered(int i, const Path& path, int only, ObjectHit
   if (found && best.stop < latest) lastBlocker_ = i;
 }
 
+// Where more triangles meet than can be gathered: examines them one after the other.
+bool ContactQuery::castAtEach(const Path& path, int only, ObjectHit& hit) noexcept {
+  bool found = false;
+  if (only < 0 && planes_ != nullptr) {
+    for (const PlacedPlane& plane : *planes_) considerFacet(plane.facet, path, hit, found);
+  }
+  const Vec3 middle = path.p + 0.5 * (path.begin + path.end) * path.d;
+  const double reach = 0.5 * (path.end - path.begin) * path.d.norm();
+  for (int i = 0; i < objectCount_; ++i) {
+    if (only >= 0 && i != only) continue;
+    const PlacedObject& placed = object(i);
+    const double radius = (reach + placed.radius + 4 * placed.skin) * kWiden * placed.stretch;
+    placed.state->mesh->index.visitNear(placed.T_object_device * middle, radius,
+                                        [&](std::uint32_t triangle) noexcept -> bool {
+                                          if (workSpent()) return false;
+                                          ++visits_;
+                                          const Facet* const f = facetOf(i, triangle);
+                                          if (f != nullptr) considerFacet(*f, path, hit, found);
+                                          return true;
+                                        });
+  }
+  if (!workSpent()) return found;
+  hit = ObjectHit{};
+  hit.stop = path.begin;
+  hit.unexamined = true;
+  return true;
+}
+
 // The index has no query for a swept ball: gathers along the path from `begin` on, in steps that grow while
 // the path is free and shrink when the storage overflows.
-bool ContactQuery::castInSteps(const Vec3& p, const Vec3& d, double begin, int only,
-                                   ObjectHit& hit) noexcept {
-  constexpr int kMaxSteps = 64;
+bool ContactQuery::castInSteps(const Vec3& p, const Vec3& d, double begin, int only, ObjectHit& hit) noexcept {
+  constexpr double kSmallestStep = 1.0 / 64;
   const double length = d.norm();
-  double step = keepsFacets_ ? 1.0 : std::min(1.0, std::max(0.125 * radius_ / length, 1.0 / kMaxSteps));
-  for (int i = 0; i < kMaxSteps && begin < 1; ++i) {
+  double step = keepsFacets_ ? 1.0 : std::min(1.0, std::max(0.125 * radius_ / length, kSmallestStep));
+  while (begin < 1) {
     step = std::min(step, 1 - begin);
-    const Vec3 from = p + begin * d;
-    ensureGathered(from + 0.5 * step * d, 0.5 * step * length * kWiden);
-    if (!cache_.complete() && step > 1.0 / kMaxSteps) {
+    const double middle = begin + 0.5 * step;
+    ensureGathered(p + middle * d, 0.5 * step * length * kWiden);
+    if (!cache_.complete() && step > kSmallestStep && !workSpent()) {
       step *= 0.25;
       continue;
     }
-    overflowed_ = overflowed_ || !cache_.complete();
-    if (castGathered({p, d, begin, begin + step}, only, hit)) return true;
+    const Path path{p, d, begin, begin + step};
+    if (cache_.complete() ? castGathered(path, only, hit) : castAtEach(path, only, hit)) return true;
     begin += step;
     step *= 2;
   }

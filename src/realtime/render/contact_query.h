@@ -20,6 +20,8 @@ namespace hapticd::realtime {
 using base::Nanos;
 using geometry::Affine;
 
+/// Triangles that a tick examines. A count and not a time, so that the clock never changes a force.
+inline constexpr int kMaxVisits = 8192;
 /// Faces whose gaps are narrower than this are impassable, so the point tool touches them as a ball of half the
 /// width. Exports and assembled scenes leave such gaps where faces do not share vertices.
 inline constexpr double kGapTolerance_m = 10e-6;
@@ -51,8 +53,9 @@ struct PlacedObject {
   Vec3 carried(const Vec3& p) const noexcept;
 };
 
-/// The first facet that blocks a path.
+/// What ends a path: the first facet that blocks it, or the place up to which it was examined.
 struct ObjectHit : CastHit {
+  bool unexamined = false;  ///< the work of this tick is spent: nothing is known of the path beyond `stop`
   int object = 0;  ///< index of the near object; -1 - index for a plane of the scene
   std::uint32_t triangle = 0;
 };
@@ -104,7 +107,7 @@ class ContactQuery {
   template <class Visit>
   void forEachGathered(const Vec3& p, double distance, Visit&& visit) noexcept;
 
-  /// The first obstacle on the path from p to g; false when the path is free.
+  /// The first obstacle on the path from p to g, or the end of what was examined; false when the path is free.
   bool cast(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept;
   /// The same for the start of the path only: as far as the gathered facets reach.
   bool castWithinGathered(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept;
@@ -125,6 +128,8 @@ class ContactQuery {
   scene::TouchableFaces faces() const noexcept { return now_.scene->faces; }
   /// True when objects or facets had to be left out in this tick.
   bool overflowed() const noexcept { return overflowed_; }
+  /// True when this tick examined kMaxVisits triangles.
+  bool workSpent() const noexcept { return visits_ >= kMaxVisits; }
 
  private:
   static constexpr int kMaxObjects = 64;
@@ -157,6 +162,7 @@ class ContactQuery {
   bool castAtFacets(const Path& path, int only, ObjectHit& hit) noexcept;
   bool castAtTriangles(const Path& path, int only, ObjectHit& hit) noexcept;
   void considerGathered(int i, const Path& path, int only, ObjectHit& best, bool& found) noexcept;
+  bool castAtEach(const Path& path, int only, ObjectHit& hit) noexcept;
   bool castInSteps(const Vec3& p, const Vec3& d, double begin, int only, ObjectHit& hit) noexcept;
 
   double toolRadius_;
@@ -178,6 +184,7 @@ class ContactQuery {
   std::uint64_t generation_ = 1;  // of all that is kept from tick to tick
   mutable std::array<MemoFacet, 1U << kMemoBits> facetMemo_;
   bool overflowed_ = false;
+  int visits_ = 0;  // of triangles, in this tick
 };
 
 template <class Visit>

@@ -59,6 +59,7 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   planes_.remember(touched, position_);
   if (casts_ >= kMaxCasts) status |= kRenderIterationLimit;
   if (query_.overflowed()) status |= kRenderCandidateLimit;
+  fadeWhenOverworked(status);
   before_ = now;
   positionBefore_ = position_;
   hipBefore_ = hip;
@@ -74,6 +75,8 @@ void Proxy::startAt(const SceneAtTime& now, const Vec3& hip) noexcept {
   started_ = true;
   popthroughArmed_ = true;
   released_ = false;
+  overworked_ = 0;
+  share_ = 1;
   position_ = positionBefore_ = hipBefore_ = hip;
   contactSet_ = ContactSet{};
   query_.invalidate();
@@ -148,7 +151,7 @@ void Proxy::moveFrictionless(const Vec3& target, ActiveSet& active) noexcept {
   // Allows for a proxy within the skin, which the first approach moves outwards.
   double nearest = (position_ - target).norm() + 4 * skin;
   Vec3 step = Vec3::Zero();
-  while (casts_ < kMaxCasts) {
+  while (casts_ < kMaxCasts && !query_.workSpent()) {
     const Vec3 from = position_;
     const ActiveSet held = active;
     if (!step.isZero(0)) extrapolateStep(step, target);
@@ -210,6 +213,10 @@ bool Proxy::approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Ve
       if (held) return false;
       position_ = goal;
       return active.count == 0;
+    }
+    if (hit.unexamined) {
+      if (!stopAtFirst) position_ += hit.stop * displacement;
+      return false;
     }
     const double move = hit.stop * displacement.norm();
     if (held && move > skin) return false;
@@ -314,6 +321,17 @@ void Proxy::applyForceShading() noexcept {
     constraint.forceDirection = shadedNormal(query_.object(constraint.source), constraint.triangle, now_.time,
                                              constraint.halfSpace.normal, at);
   }
+}
+
+// Where the work of every tick is spent, the proxy lags behind the hand and its force is not the surface's: after
+// kMaxOverworked ticks in a row it fades out, and it returns when the HIP has left.
+void Proxy::fadeWhenOverworked(std::uint32_t& status) noexcept {
+  constexpr int kMaxOverworked = 20;
+  constexpr double kFade_s = 0.050;
+  if (query_.workSpent()) status |= kRenderWorkLimit;
+  overworked_ = query_.workSpent() ? overworked_ + 1 : 0;
+  if (contactSet_.count == 0 && !query_.workSpent()) share_ = 1;
+  if (share_ < 1 || overworked_ > kMaxOverworked) share_ = std::max(0.0, share_ - period_s_ / kFade_s);
 }
 
 // A first contact this deep does not come from motion of the HIP.

@@ -53,6 +53,8 @@ class Proxy {
   /// Where the proxy is: for a point tool in contact on the faces themselves, without the standoff.
   const Vec3& position() const noexcept { return reported_; }
   const ContactSet& contactSet() const noexcept { return contactSet_; }
+  /// Share of the contact force that is felt, 1 … 0: less than 1 where the work of a tick does not suffice.
+  double feltShare() const noexcept { return share_; }
   PlacedPlanes& planes() noexcept { return planes_; }
 
  private:
@@ -91,6 +93,7 @@ class Proxy {
   void updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet& active) noexcept;
   void popThrough(const Vec3& hip, std::uint32_t& status) noexcept;
   void applyForceShading() noexcept;
+  void fadeWhenOverworked(std::uint32_t& status) noexcept;
   void releaseWhenDeep(bool wasFree, std::uint32_t& status) noexcept;
 
   double toolRadius_;  // 0: a point
@@ -104,6 +107,8 @@ class Proxy {
   int casts_ = 0;                // in this tick
   bool started_ = false;         // false until the first tick after a reset
   bool popthroughArmed_ = true;
+  int overworked_ = 0;  // ticks in a row whose work was spent
+  double share_ = 1;
   bool released_ = false;  // contact released until the HIP leaves the surface
   Vec3 position_ = Vec3::Zero();
   Vec3 reported_ = Vec3::Zero();

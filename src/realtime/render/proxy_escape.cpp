@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kTouching = 256;  // in skins: planes at their skins meet that far from a sharp corner
 constexpr double kLifts[] = {4, 4 * kTouching};
+constexpr double kLiftShare = 0.25;  // of the radius of a small ball
 constexpr double kSmallBall_m = kLargestGapTolerance_m;  // its rounding is smaller than the places where faces end
 constexpr double kMinDescent = 1e-3;  // share of the pull; flatter directions lead nowhere
 constexpr double kClimb = 1e-3;       // share of the tool radius
@@ -124,9 +125,8 @@ bool Proxy::escapeCorner(const Vec3& target, const ActiveSet& active) noexcept {
   collectTouchedFaces(descent);
   findDescentDirections(pull, active, descent);
   if (!(descent.outward.norm() > 0)) return false;
-  const bool small = query_.radius() <= kSmallBall_m;
-  for (const double lift : {kLifts[0] * skin, kLifts[1] * skin, small ? 0.25 * query_.radius() : 0.0}) {
-    if (lift == 0) break;
+  const double first = query_.radius() <= kSmallBall_m ? kLiftShare * query_.radius() : kLifts[0] * skin;
+  for (const double lift : {first, kLifts[1] * skin}) {
     const Vec3 start = position_ + lift * descent.outward.normalized();
     if (freeShare(descent, position_, start) < 1) continue;
     for (int i = 0; i < descent.count && casts_ < kMaxCasts; ++i) {

@@ -13,6 +13,13 @@ namespace {
 
 constexpr double kShortestPeriod_s = 1e-5;  // keeps speeds finite when a time stamp repeats
 
+void scaleContact(double share, Rendering& out) {
+  if (share == 1) return;
+  out.contactForce_N *= share;
+  out.normalForce_N *= share;
+  for (std::uint32_t i = 0; i < out.contactCount; ++i) out.contacts[i].force_N *= share;
+}
+
 }  // namespace
 
 struct Renderer::State {
@@ -49,6 +56,7 @@ void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState
   out.proxy_m = out.scp_m = s.proxy.position();
   if ((out.status & kRenderReleased) == 0) {
     applySurfaceLaw(contactSet, out.proxy_m, device.velocity_m_per_s, radius, out);
+    scaleContact(s.proxy.feltShare(), out);
     applyAdhesion(s.proxy.planes().adhesion(hip, radius), out);
   }
   out.force_N = out.contactForce_N;

@@ -50,6 +50,7 @@ enum RenderStatus : std::uint32_t {
   kRenderGeometryJump = 1U << 3,    ///< geometry at the proxy jumped; the guard blends the force
   kRenderReleased = 1U << 4,        ///< a first contact was too deep; no contact force until the HIP leaves
   kRenderPopthrough = 1U << 5,
+  kRenderWorkLimit = 1U << 6,  ///< too many triangles meet here: the proxy moved as far as they were examined
 };
 
 /// Options of the operator, fixed while the loop runs.

@@ -291,7 +291,6 @@ TEST_P(Tumble, proxy_stays_outside) {
       const Rendering& r = hand.at(hip);
       touching += r.touching ? 1 : 0;
       ASSERT_EQ(r.status & ~kRenderIterationLimit, 0U) << "round " << round << " tick " << i;
-      if (getenv("DBG") && isInside(*object.mesh, object.motion.at(now).inverse() * r.proxy_m, now)) std::printf("INSIDE depth %g count %u st %u tri %u moved %g\n", r.depth_m, r.contactCount, r.status, r.contacts[0].triangle, (r.proxy_m - hip).norm());
       ASSERT_FALSE(isInside(*object.mesh, object.motion.at(now).inverse() * r.proxy_m, now))
           << "round " << round << " tick " << i;
     }

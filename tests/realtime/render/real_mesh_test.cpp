@@ -174,7 +174,6 @@ class Judge {
  private:
   void judgeWay(const Rendering& r) {
     if (oracle_.entered(last_.proxy_m, r.proxy_m) <= 0) return;
-    if (getenv("DBG")) {std::cout.precision(12); std::cout << "TUNNEL " << last_.proxy_m.transpose() << " -> " << r.proxy_m.transpose() << " len " << (last_.proxy_m-r.proxy_m).norm() << " depth " << r.depth_m << '\n';}
     ++(oracle_.borderNear(last_.proxy_m, r.proxy_m) ? verdict.aroundBorder : verdict.tunnelled);
   }
 
@@ -189,7 +188,7 @@ class Judge {
     if (step <= moved + allowed) return;
     ++verdict.overStep;
     const Vec3 rest = oracle_.descend(last_.proxy_m, hip, 0.05, kHop_m);
-    if (kStiffness * (rest - last_.proxy_m).norm() <= allowed) { ++verdict.unexplained; if (getenv("DBG")) { std::cout.precision(9); std::cout << "UNEXPL hip " << hip.transpose() << " last " << last_.proxy_m.transpose() << " now " << r.proxy_m.transpose() << " rest " << rest.transpose() << " d " << last_.depth_m << ' ' << r.depth_m << " dist " << (hip-last_.proxy_m).norm() << ' ' << (hip-r.proxy_m).norm() << " " << (rest-hip).norm() << " allowed " << allowed << '\n'; } }
+    if (kStiffness * (rest - last_.proxy_m).norm() <= allowed) ++verdict.unexplained;
   }
 
   void judgeRest(const Vec3& hip, const Rendering& r) {
@@ -197,7 +196,7 @@ class Judge {
     const Vec3 rest = oracle_.descend(r.proxy_m, hip, 3e-4);
     const double gain = (r.proxy_m - hip).norm() - (rest - hip).norm();
     verdict.worst_m = std::max(verdict.worst_m, gain);
-    if (gain > 10e-6) { ++verdict.stuck; if (getenv("DBG")) {std::cout.precision(10); std::cout << "STUCK " << gain << " hip " << hip.transpose() << " proxy " << r.proxy_m.transpose() << " rest " << rest.transpose() << " n " << r.normal.transpose() << " depth " << r.depth_m << " st " << r.status << " tri " << r.contacts[0].triangle << " c " << r.contactCount << '\n';} }
+    if (gain > 10e-6) ++verdict.stuck;
   }
 
   MeshOracle oracle_;

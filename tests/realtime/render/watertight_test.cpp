@@ -73,8 +73,11 @@ TEST_P(SegmentsTest, every_segment_into_a_closed_mesh_hits) {
     scene.faces = faces;
     const auto snapshot = scene.snapshot();
     ContactQuery query(0);
-    query.beginTick({snapshot.get(), 0}, {});
-    query.addObjectsNear(offset(), 1);
+    const auto newTick = [&] {
+      query.beginTick({snapshot.get(), 0}, {snapshot.get(), 0});
+      query.addObjectsNear(offset(), 1);
+    };
+    newTick();
     while (shots < segmentCount() * (faces == scene::TouchableFaces::front ? 1 : 2) / 2) {
       // Where the corners are once they went through floats in the scene's unit.
       const auto& t = mesh.triangles[random() % mesh.triangles.size()];
@@ -88,12 +91,14 @@ TEST_P(SegmentsTest, every_segment_into_a_closed_mesh_hits) {
       if (shots % 3 == 1) aim += u * (corner(1) - corner(0));
       if (shots % 3 == 2) aim += u * (1 - w) * (corner(1) - corner(0)) + w * (corner(2) - corner(0));
       const Vec3 inside = offset() + 0.025 * Vec3(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
-      const Vec3 from = aim + uniform(0.1, 2) * (aim - inside);
+      const Vec3 way = (aim - inside).normalized();
+      const Vec3 from = aim + uniform(0.003, 0.01) * way;
       if ((from - offset()).norm() < 0.052) continue;
       ++shots;
       ObjectHit hit;
       const bool endsOnTheFace = shots % 8 == 0;
-      if (!query.cast(from, endsOnTheFace ? aim : inside, hit)) ++misses;
+      newTick();
+      if (!query.cast(from, endsOnTheFace ? aim : Vec3(aim - 0.002 * way), hit) || hit.unexamined) ++misses;
     }
   }
   EXPECT_EQ(misses, 0) << "of " << shots;
