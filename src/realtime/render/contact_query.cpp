@@ -299,7 +299,7 @@ bool ContactQuery::castAtFacets(const Path& path, int only, ObjectHit& hit) noex
 double ContactQuery::freeOfFaces(const Vec3& p, const Vec3& g) noexcept {
   std::array<const Facet*, FacetCache::kMaxFacets> candidates;
   const Vec3 d = g - p;
-  ensureGathered(p, d.norm());
+  if (!ensureGathered(p, d.norm())) return 0;
   const int count = cache_.facetsNearPath(p, d, candidates.data());
   double free = 1;
   for (int i = 0; i < count; ++i) {

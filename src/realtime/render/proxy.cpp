@@ -269,7 +269,8 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
   }
   if (count > 0 && onAll) contactSet_.lateral_m = position_ - goal;
   reported_ = position_;
-  if (toolRadius_ == 0 && count > 0 && onAll) reported_ = onFaces(hip, active);
+  const bool arrived = casts_ < kMaxCasts && !query_.workSpent();
+  if (toolRadius_ == 0 && count > 0 && onAll && arrived) reported_ = onFaces(hip, active);
   if (count == 0) popthroughArmed_ = true;
 }
 
