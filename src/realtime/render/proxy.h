@@ -7,7 +7,11 @@
 // towards a target that the friction cone draws back.
 #pragma once
 
+#include <algorithm>
+
 #include "realtime/render/contact_query.h"
+#include "realtime/render/renderer.h"
+#include "realtime/render/stiffness_blend.h"
 
 namespace hapticd::realtime {
 
@@ -35,13 +39,23 @@ struct ContactSet {
   Vec3 normal_m = Vec3::Zero();   ///< sum of depth times normal over the constraints
   Vec3 lateral_m = Vec3::Zero();  ///< the tangential part, which friction bears
   bool sliding = false;
+  double staticShare = 1;  ///< of static friction in the coefficient, the rest is dynamic; see slidingShare()
+  /// The spring between HIP and proxy, one for all constraints; see stiffness_blend.h.
+  BlendedSpring spring;
+
+  double frictionOf(const scene::Surface& surface) const noexcept {
+    const double dynamic = std::min(surface.dynamic_friction, surface.static_friction);
+    return dynamic + staticShare * (surface.static_friction - dynamic);
+  }
 };
 
 /// The proxy and its state from tick to tick. Device frame, metres. Servo thread: noexcept, no allocation.
 class Proxy {
  public:
-  Proxy(double toolRadius_m, bool forceShading) noexcept
-      : query_(toolRadius_m), forceShading_(forceShading) {}
+  explicit Proxy(const RenderOptions& options) noexcept
+      : query_(options.toolRadius_m),
+        forceShading_(options.forceShading),
+        stribeckSpeed_m_per_s_(options.stribeckSpeed_m_per_s) {}
 
   void reset() noexcept;
 
@@ -62,9 +76,12 @@ class Proxy {
 
   struct DescentDirections;
 
-  struct FrictionCone {
-    double sticking_m = 0;
-    double sliding_m = 0;
+  // A slide, from the breakaway to a reversal or to a pause.
+  struct Slide {
+    bool active = false;
+    Vec3 direction = Vec3::Zero();  // from the HIP to the proxy; also that of the last slide
+    double speed_m_per_s = 0;       // mean over the last milliseconds
+    double pause_s = 0;             // since the proxy last slipped
   };
 
   void startAt(const SceneAtTime& now, const Vec3& hip) noexcept;
@@ -84,7 +101,9 @@ class Proxy {
   double freeShare(const DescentDirections& descent, const Vec3& from, const Vec3& to) const noexcept;
   void findConstraints(const Vec3& hip, ActiveSet& active) noexcept;
   bool frictionless() const noexcept;
-  static FrictionCone frictionConeOf(const ContactSet& contactSet) noexcept;
+  static double frictionConeOf(const ContactSet& contactSet) noexcept;
+  double slidingShare() const noexcept;
+  void advanceSlide(double slip_m) noexcept;
   void updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet& active) noexcept;
   void popThrough(const Vec3& hip, std::uint32_t& status) noexcept;
   void applyForceShading() noexcept;
@@ -92,6 +111,7 @@ class Proxy {
 
   ContactQuery query_;
   bool forceShading_;
+  double stribeckSpeed_m_per_s_;
   PlacedPlanes planes_;
   SceneAtTime now_;
   SceneAtTime before_;
@@ -104,7 +124,7 @@ class Proxy {
   Vec3 position_ = Vec3::Zero();
   Vec3 positionBefore_ = Vec3::Zero();
   Vec3 hipBefore_ = Vec3::Zero();
-  Vec3 slipDirection_ = Vec3::Zero();
+  Slide slide_;
   ContactSet contactSet_;
   std::int32_t touchedObject_ = -1;
   std::uint32_t touchedTriangle_ = 0;

@@ -16,7 +16,7 @@ constexpr double kShortestPeriod_s = 1e-5;  // keeps speeds finite when a time s
 }  // namespace
 
 struct Renderer::State {
-  explicit State(const RenderOptions& o) : options(o), proxy(o.toolRadius_m, o.forceShading) {}
+  explicit State(const RenderOptions& o) : options(o), proxy(o), effects(o.contactVibrationPulls) {}
 
   RenderOptions options;
   Proxy proxy;
