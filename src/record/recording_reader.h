@@ -38,7 +38,7 @@ class RecordingReader {
   BlockReader blocks_;
   RecordingHeader header_;
   BlockReader::Block block_;
-  bool pending_ = false;  // block_ was read and not used
+  bool pending_ = false;               // block_ was read and not used
   std::optional<TickUnpacker> ticks_;  // of the present block
   std::uint32_t ticksOf_ = 0;
   bool ended_ = false;

@@ -2,8 +2,8 @@
 // recorded forces bit for bit.
 //
 // testdata/recordings/ holds one file of each format version and each force law, and the scene commands in it
-// as JSON. To add a file for a new version or law: --gtest_also_run_disabled_tests --gtest_filter='*WritesTheFiles', with
-// HAPTICD_GOLDEN_DIR set.
+// as JSON. To add a file for a new version or law: --gtest_also_run_disabled_tests
+// --gtest_filter='*WritesTheFiles', with HAPTICD_GOLDEN_DIR set.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -235,7 +235,8 @@ void PrintTo(const GoldenName& name, std::ostream* out) {
 
 class GoldenFile : public testing::TestWithParam<GoldenName> {};
 
-// Contact of law 1 differs: friction, and stiffness where box and plane meet. Without contact nothing differs.
+// Contact of law 1 differs: friction, and stiffness where box and plane meet. Without contact nothing
+// differs.
 TEST_P(GoldenFile, GivesTheRecordedForcesBitForBit) {
   RecordingReader reader(kFolder / GetParam().file);
   ASSERT_EQ(reader.header().law.number, GetParam().law);

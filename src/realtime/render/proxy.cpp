@@ -100,7 +100,8 @@ double Proxy::frictionConeOf(const ContactSet& contactSet) noexcept {
   double cone = 0;
   for (int i = 0; i < contactSet.count; ++i) {
     const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
-    cone += contactSet.frictionOf(constraint.surface) * constraint.depth_m + constraint.adhesion_N / stiffness;
+    cone += contactSet.frictionOf(constraint.surface) * constraint.presence * constraint.depth_m +
+            constraint.adhesion_N / stiffness;
   }
   return cone;
 }
@@ -142,8 +143,8 @@ void Proxy::updateProxy(const Vec3& hip) noexcept {
     return;
   }
   const BlendedSpring& spring = contactSet_.spring;
-  const Vec3 held = spring.stiffness_N_per_m > 0 ? Vec3(spring.slope_N / spring.stiffness_N_per_m)
-                                                 : Vec3(Vec3::Zero());
+  const Vec3 held =
+      spring.stiffness_N_per_m > 0 ? Vec3(spring.slope_N / spring.stiffness_N_per_m) : Vec3(Vec3::Zero());
   const Vec3 borne = contactSet_.lateral_m - held;
   if (borne.dot(slide_.direction) < 0) slide_.active = false;
   contactSet_.staticShare = slidingShare();
@@ -269,6 +270,7 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
     if (hit.object < 0) {
       const PlacedPlane& plane = planes_[-1 - hit.object];
       constraint.surface = plane.surface;
+      constraint.presence = plane.presence();
       constraint.adhesion_N = plane.state->adhesionLateral_N;
     } else {
       const PlacedObject& object = query_.object(hit.object);

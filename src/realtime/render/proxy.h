@@ -25,6 +25,7 @@ struct ContactConstraint {
   int source = 0;            ///< index of the near object; -1 - index for a plane of the scene
   std::uint32_t triangle = 0;
   scene::Surface surface;
+  double presence = 1;                 ///< less while a plane ramps out: share of its force and of its weight
   Vec3 forceDirection = Vec3::Zero();  ///< unit; the normal of the half-space unless force shading turns it
   double adhesion_N = 0;               ///< tangential force that it bears besides friction
   HalfSpace halfSpace;

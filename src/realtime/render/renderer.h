@@ -56,8 +56,8 @@ enum RenderStatus : std::uint32_t {
 struct RenderOptions {
   double toolRadius_m = 0;
   bool forceShading = false;
-  double stribeckSpeed_m_per_s = 0;     ///< 0: friction falls to the dynamic one as soon as the proxy slides
-  bool contactVibrationPulls = false;   ///< a contact vibration may exceed the normal force and pull
+  double stribeckSpeed_m_per_s = 0;    ///< 0: friction falls to the dynamic one as soon as the proxy slides
+  bool contactVibrationPulls = false;  ///< a contact vibration may exceed the normal force and pull
 };
 
 /// Number of the laws from contact to force. It changes when the same ticks give other forces on purpose, so

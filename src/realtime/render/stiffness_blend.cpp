@@ -17,17 +17,19 @@ constexpr double kWidthPerDepth = 1.75;
 // or the rest of a face that passes through it, lies far below; the next faces of a round surface do not.
 constexpr double kHidden = 6;
 constexpr double kHiddenExcess = kHidden * kHidden - 1;
-constexpr double kFacing_m = 10e-6;  // a face that is lower than the proxy by less does not show its back
-constexpr double kWiden = 1 + 1e-6;  // covers the rounding of queries that change frames
+constexpr double kFacing_m = 10e-6;      // a face that is lower than the proxy by less does not show its back
+constexpr double kWiden = 1 + 1e-6;      // covers the rounding of queries that change frames
+constexpr double kSameDirection = 1e-7;  // |n1 x n2|^2 of faces that are one plane
 constexpr int kMaxStiffnesses = 16;
 constexpr int kMaxNeighbours = 64;
-constexpr int kMaxVisits = 1024;          // triangles in one search
-constexpr std::size_t kFewObjects = 4;    // fewer than a query of the index would cost
+constexpr int kMaxVisits = 1024;        // triangles in one search
+constexpr std::size_t kFewObjects = 4;  // fewer than a query of the index would cost
 
 // The nearest surface of one stiffness.
 struct Neighbour {
   double stiffness = 0;
   double distance = 0;
+  double presence = 1;         // less for a plane that ramps out
   Vec3 offset = Vec3::Zero();  // of its point from the proxy
 };
 
@@ -139,7 +141,8 @@ Vec3 alongContactSet(const ContactSet& contactSet, const Vec3& v) {
   if (contactSet.count == 2) {
     const Vec3 edge = n.cross(c[1].halfSpace.normal);
     const double length2 = edge.squaredNorm();
-    if (length2 > 0) return edge * (edge.dot(v) / length2);
+    // Faces of one plane act as one: the proxy is in their edge for less than a micrometre.
+    if (length2 > kSameDirection) return edge * (edge.dot(v) / length2);
   }
   return v - n * n.dot(v);
 }
@@ -149,13 +152,20 @@ class Search {
   Search(const SceneAtTime& now, double width, const Gauge& gauge, const Vec3& proxy)
       : now_(now), width_(width), gauge_(gauge), proxy_(proxy) {}
 
-  void addTouched(double stiffness) {
-    if (Neighbour* const n = neighbourOf(stiffness)) n->distance = 0;
+  void addTouched(const PlacedPlanes& planes, const ContactConstraint& constraint) {
+    const double stiffness = constraint.source < 0
+                                 ? planes[-1 - constraint.source].state->surface.stiffness_N_per_m
+                                 : constraint.surface.stiffness_N_per_m;
+    Neighbour* const n = neighbourOf(stiffness);
+    if (n == nullptr) return;
+    n->presence = n->distance > 0 ? constraint.presence : std::max(n->presence, constraint.presence);
+    n->distance = 0;
   }
   void addPlanes(const PlacedPlanes& planes) {
     for (const PlacedPlane& plane : planes) {
-      Neighbour* const n = neighbourOf(plane.surface.stiffness_N_per_m);
-      if (n != nullptr && n->distance > 0) consider(*n, nearestInGauge(gauge_, plane.facet, proxy_));
+      Neighbour* const n = neighbourOf(plane.state->surface.stiffness_N_per_m);
+      if (n == nullptr || !(n->distance > 0)) continue;
+      consider(*n, nearestInGauge(gauge_, plane.facet, proxy_), plane.presence());
     }
   }
   void addObjects();
@@ -176,7 +186,7 @@ class Search {
       return nullptr;
     }
     ++count_;
-    *known = {stiffness, width_, Vec3::Zero()};
+    *known = {stiffness, width_, 1, Vec3::Zero()};
     return known;
   }
   bool isTouched(double stiffness) const {
@@ -184,11 +194,12 @@ class Search {
       return n.stiffness == stiffness && n.distance == 0;
     });
   }
-  void consider(Neighbour& n, const Vec3& offset) const {
+  void consider(Neighbour& n, const Vec3& offset, double presence = 1) const {
     const double distance = std::max(0.0, gauge_(offset));
     if (!(distance < n.distance)) return;
     n.distance = distance;
     n.offset = offset;
+    n.presence = presence;
   }
   bool facesProxy(const Facet& f) const {
     const double height = f.normal.dot(proxy_ - f.a);
@@ -218,8 +229,7 @@ void Search::addObjects() {
   std::array<std::uint32_t, kMaxNeighbours> found{};
   std::size_t count = 0;
   const Affine& T_world_device = scene.workspace.T_world_device;
-  const double reach =
-      (width_ + gauge_.radius) * kWiden * std::sqrt(T_world_device.linear().squaredNorm());
+  const double reach = (width_ + gauge_.radius) * kWiden * std::sqrt(T_world_device.linear().squaredNorm());
   scene.objectIndex->visitNear(T_world_device * proxy_, reach, [&](std::uint32_t i) noexcept {
     if (isTouched(scene.objects[i]->surface.stiffness_N_per_m)) return;
     if (count == found.size()) {
@@ -259,8 +269,8 @@ void Search::addObject(const scene::ObjectState& state) {
 }
 
 // The weight of a surface at distance t * width: 1 at 0, 0 at 1, and between two surfaces
-// kappa = K_1 + (K_2 - K_1) s with s = 1/2 (1 - 3 t^2 + 2 t^3). s has no slope at either end, so the force has
-// no step where a second surface is touched or leaves the width.
+// kappa = K_1 + (K_2 - K_1) s with s = 1/2 (1 - 3 t^2 + 2 t^3). s has no slope at either end, so the force
+// has no step where a second surface is touched or leaves the width.
 struct Weight {
   double value;
   double slope;  // by t
@@ -284,8 +294,8 @@ struct Width {
 };
 
 // With t = rho / w and m = growth d / w < 1, two surfaces K and K + D give the force
-//   along the spring  d (K + D x),  x = s + 3/2 t^2 (1 - t) m,  at most d max(K, K + D), since x <= 1/2 + 2/9,
-//   along the face    d |D| y,  y <= 3/2 t (1 - t) sqrt(m) / c.
+//   along the spring  d (K + D x),  x = s + 3/2 t^2 (1 - t) m,  at most d max(K, K + D), since x <= 1/2 +
+//   2/9, along the face    d |D| y,  y <= 3/2 t (1 - t) sqrt(m) / c.
 // y^2 <= 2 x - x^2 bounds the sum by the stiffer spring for D = -K, and smaller |D| follow. It holds because
 // 2 x - x^2 >= 1.28 x >= 1.9 t^2 (1 - t) m, and y^2 is at most 2.25 / c^2 times t^2 (1 - t) m.
 // More than two unequal surfaces at one place can exceed the bound: limit() scales the force there.
@@ -305,11 +315,12 @@ void combine(const Search& search, const Gauge& gauge, const Width& width, const
   double weights = 0;
   double stiffest = 0;
   for (const Neighbour& n : search) {
-    const double weight = Weight(n.distance / width.value).value;
+    const double weight = n.presence * Weight(n.distance / width.value).value;
     sum += weight * n.stiffness;
     weights += weight;
     if (weight > 0) stiffest = std::max(stiffest, n.stiffness);
   }
+  if (!(weights > 0)) return;
   const double kappa = sum / weights;
   const Vec3 spring = contactSet.normal_m + contactSet.lateral_m;
   const double distance = spring.norm();
@@ -320,7 +331,7 @@ void combine(const Search& search, const Gauge& gauge, const Width& width, const
   for (const Neighbour& n : search) {
     const double t = n.distance / width.value;
     if (!(t > 0 && t < 1)) continue;
-    const double slope = (n.stiffness - kappa) / weights * Weight(t).slope / width.value;
+    const double slope = n.presence * (n.stiffness - kappa) / weights * Weight(t).slope / width.value;
     const double length = gauge.length(n.offset);
     byPosition -= slope / length * gauge.rise(n.offset);
     byDistance -= slope * t * width.growth;
@@ -340,14 +351,16 @@ void combine(const Search& search, const Gauge& gauge, const Width& width, const
 BlendedSpring blendedSpring(const SceneAtTime& now, const PlacedPlanes& planes, double toolRadius_m,
                             const Vec3& proxy, const ContactSet& contactSet) noexcept {
   BlendedSpring out;
-  out.stiffness_N_per_m = contactSet.constraints[0].surface.stiffness_N_per_m;
+  const ContactConstraint& first = contactSet.constraints[0];
+  out.stiffness_N_per_m = first.source < 0 ? planes[-1 - first.source].state->surface.stiffness_N_per_m
+                                           : first.surface.stiffness_N_per_m;
   const double depth = contactSet.normal_m.norm();
   if (!(depth > 0)) return out;
   const Gauge gauge{contactSet.normal_m / depth, toolRadius_m};
   const Width width((contactSet.normal_m + contactSet.lateral_m).norm());
   Search search(now, width.value, gauge, proxy);
   for (int i = 0; i < contactSet.count; ++i) {
-    search.addTouched(contactSet.constraints[static_cast<std::size_t>(i)].surface.stiffness_N_per_m);
+    search.addTouched(planes, contactSet.constraints[static_cast<std::size_t>(i)]);
   }
   search.addPlanes(planes);
   search.addObjects();

@@ -14,10 +14,10 @@ struct ContactSet;
 
 /// The spring at a proxy: force = stiffness * (proxy - HIP) + slope + turn.
 struct BlendedSpring {
-  double stiffness_N_per_m = 0;   ///< kappa, and its growth with the depth
-  Vec3 slope_N = Vec3::Zero();    ///< along the contact set, towards softer places
-  Vec3 turn_N = Vec3::Zero();     ///< across an edge: from a surface that the touched faces hide partly
-  bool complete = true;           ///< false: more surfaces or triangles near the proxy than are searched
+  double stiffness_N_per_m = 0;  ///< kappa, and its growth with the depth
+  Vec3 slope_N = Vec3::Zero();   ///< along the contact set, towards softer places
+  Vec3 turn_N = Vec3::Zero();    ///< across an edge: from a surface that the touched faces hide partly
+  bool complete = true;          ///< false: more surfaces or triangles near the proxy than are searched
 };
 
 /// The spring of a contact set that touches something. With one stiffness within the width it is that

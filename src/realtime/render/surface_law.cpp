@@ -42,7 +42,7 @@ void addNormalForces(const ContactSet& contactSet, const Vec3& proxy_m, const Ve
     const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
     ContactShare& share = shares[static_cast<std::size_t>(i)];
     share.contact = &contactWith(constraint.object, out);
-    share.spring_N = contactSet.spring.stiffness_N_per_m * constraint.depth_m;
+    share.spring_N = contactSet.spring.stiffness_N_per_m * (constraint.presence * constraint.depth_m);
     share.normal_N = normalForce(constraint, share.spring_N, hipVelocity);
     share.friction_N = contactSet.frictionOf(constraint.surface) * share.normal_N + constraint.adhesion_N;
     share.contact->force_N += share.normal_N * constraint.forceDirection;

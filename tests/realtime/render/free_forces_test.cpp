@@ -100,7 +100,8 @@ TEST_P(FreeForcesTest, contact_vibration_only_while_touching) {
   EXPECT_NEAR(at({0.0013, 0.0021, -0.002}).force_N.z(), 2 + 1.5 * std::sin(phase), 1e-4);
 }
 
-// 1 N of the surface and vibrations of 1.5 N twice: the surface lets go at most, unless an option lets it pull.
+// 1 N of the surface and vibrations of 1.5 N twice: the surface lets go at most, unless an option lets it
+// pull.
 TEST_P(FreeForcesTest, contact_vibration_does_not_pull) {
   scene::Effect e = effect(EffectType::contactVibration);
   scene.effects = {e, e};
@@ -122,7 +123,8 @@ TEST_P(FreeForcesTest, contact_vibration_does_not_pull) {
   }
 }
 
-// A sweep of the frequency: the angle is its integral, so no step of the force is larger than one of the angle.
+// A sweep of the frequency: the angle is its integral, so no step of the force is larger than one of the
+// angle.
 TEST_P(FreeForcesTest, frequency_of_a_running_vibration_changes_without_a_jump) {
   scene::Effect e = effect(EffectType::motorVibration);
   run(e);

@@ -126,7 +126,9 @@ TEST(SlowSliding, cycles_give_no_energy) {
   SceneFixture scene;
   scene.add(plane(0.05, 40), surface(1000, 0.5, 0.3));
   std::mt19937 random(6);
-  const auto uniform = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
+  const auto uniform = [&](double a, double b) {
+    return std::uniform_real_distribution<double>(a, b)(random);
+  };
   for (int i = 0; i < 60; ++i) {
     RenderOptions options;
     options.stribeckSpeed_m_per_s = i % 2 == 0 ? 0 : uniform(1e-4, 1e-2);
@@ -135,7 +137,8 @@ TEST(SlowSliding, cycles_give_no_energy) {
     const int steps = static_cast<int>(std::exp(uniform(std::log(50.0), std::log(20'000.0))));
     const double phase = uniform(0, 6);
     const auto path = [&](double a) {
-      return Vec3(size * std::cos(a), 0.5 * size * std::sin(2 * a + phase), -0.001 + 0.0005 * std::sin(a + phase));
+      return Vec3(size * std::cos(a), 0.5 * size * std::sin(2 * a + phase),
+                  -0.001 + 0.0005 * std::sin(a + phase));
     };
     loop.at({size, 0, 0.001});
     loop.to(path(0));

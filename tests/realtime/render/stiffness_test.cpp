@@ -24,8 +24,8 @@ class StiffnessTest : public testing::Test {
                                double length = 0.04, double mu = 0) {
     TriangleMesh mesh;
     const Vec3 y = 0.05 * Vec3::UnitY();
-    for (const Vec3& v : {Vec3(edge - y), Vec3(edge + y), Vec3(edge + length * out + y),
-                          Vec3(edge + length * out - y)}) {
+    for (const Vec3& v :
+         {Vec3(edge - y), Vec3(edge + y), Vec3(edge + length * out + y), Vec3(edge + length * out - y)}) {
       mesh.vertices.push_back(v.cast<float>());
     }
     const bool turned = y.cross(out).dot(normal) < 0;
@@ -134,9 +134,8 @@ TEST_F(StiffnessTest, force_in_a_narrow_groove_is_at_most_that_of_the_stiffer_wa
   Hand hand(scene.snapshot());
   hand.at({0, 0, 0.02});
   hand.to({0, 0, 0});
-  hand.to({0, 0, -0.004}, 0.01, [&](const Rendering& r) {
-    EXPECT_LE(r.force_N.norm(), 1000 * r.depth_m * (1 + 1e-9) + 1e-9);
-  });
+  hand.to({0, 0, -0.004}, 0.01,
+          [&](const Rendering& r) { EXPECT_LE(r.force_N.norm(), 1000 * r.depth_m * (1 + 1e-9) + 1e-9); });
   EXPECT_NEAR(hand.now().depth_m, 0.004, 1e-6);
   EXPECT_LE(hand.now().force_N.norm(), 4.0 * (1 + 1e-9));
 }
@@ -158,8 +157,10 @@ TEST_F(StiffnessTest, closed_paths_over_random_planes_do_no_work) {
     const Loop loop({uniform(-1e-3, 1e-3), uniform(-1e-3, 1e-3), uniform(-3e-3, 0)}, 1.2e-3,
                     [this](double a, double b) { return uniform(a, b); });
     hand.to(loop.at(0));
-    turn(hand, [&](double s) { return loop.at(s); }, 2000);
-    const Turn t = turn(hand, [&](double s) { return loop.at(s); }, kSteps);
+    turn(
+        hand, [&](double s) { return loop.at(s); }, 2000);
+    const Turn t = turn(
+        hand, [&](double s) { return loop.at(s); }, kSteps);
     EXPECT_LE(std::abs(t.work), 1e-9) << "scene " << i;
     EXPECT_LT(t.proxyMoved, 1e-8) << "scene " << i;
     EXPECT_LE(t.largestRatio, stiffest * (1 + 1e-9)) << "scene " << i;
@@ -188,8 +189,10 @@ TEST_F(StiffnessTest, closed_paths_over_random_plates_do_no_work) {
     const Loop loop({uniform(-1e-3, 1e-3), uniform(-1e-3, 1e-3), uniform(-3e-3, 0)}, 1.2e-3,
                     [this](double a, double b) { return uniform(a, b); });
     hand.to(loop.at(0));
-    turn(hand, [&](double s) { return loop.at(s); }, 2000);
-    const Turn t = turn(hand, [&](double s) { return loop.at(s); }, kSteps);
+    turn(
+        hand, [&](double s) { return loop.at(s); }, 2000);
+    const Turn t = turn(
+        hand, [&](double s) { return loop.at(s); }, kSteps);
     EXPECT_LE(std::abs(t.work), 1e-9) << "scene " << i;
     EXPECT_LT(t.proxyMoved, 1e-8) << "scene " << i;
     EXPECT_LE(t.largestRatio, stiffest * (1 + 1e-9)) << "scene " << i;
@@ -211,8 +214,13 @@ TEST_F(StiffnessTest, convex_edges_give_no_energy) {
     const Loop loop({uniform(-2e-3, 2e-3), 0, uniform(-3e-3, -1e-3)}, 2e-3,
                     [this](double a, double b) { return uniform(a, b); });
     hand.to(loop.at(0));
-    turn(hand, [&](double s) { return loop.at(s); }, 2000);
-    EXPECT_LE(turn(hand, [&](double s) { return loop.at(s); }, 20'000).work, 1e-8) << "angle " << angle;
+    turn(
+        hand, [&](double s) { return loop.at(s); }, 2000);
+    EXPECT_LE(turn(
+                  hand, [&](double s) { return loop.at(s); }, 20'000)
+                  .work,
+              1e-8)
+        << "angle " << angle;
   }
 }
 
@@ -253,8 +261,8 @@ TEST_F(StiffnessTest, flat_seam_costs_its_energy) {
   std::printf("largest tangential force %.3f N\n", largest);
 }
 
-// A surface keeps its stiffness, to the bit, where no other one is within the width; a floor below a sheet and
-// the hidden side of a crossing plate are not there to be felt.
+// A surface keeps its stiffness, to the bit, where no other one is within the width; a floor below a sheet
+// and the hidden side of a crossing plate are not there to be felt.
 TEST_F(StiffnessTest, surface_touched_alone_keeps_its_stiffness) {
   scene.add(plane(0.02, 5), surface(200));
   TriangleMesh floor = plane(0.02, 5);
@@ -295,7 +303,8 @@ TEST_F(StiffnessTest, nearly_coplanar_faces_act_as_one) {
     for (int i = 0; i <= 500; ++i) {
       const Vec3 p(-0.004 + 1e-5 * i, 0.0003, -0.001);
       const Vec3 f = flat.at(p).force_N;
-      EXPECT_NEAR((tilted.at(p).force_N - f).norm(), 0, 1e-4 + 20 * std::abs(tilt)) << tilt << " at " << p.x();
+      EXPECT_NEAR((tilted.at(p).force_N - f).norm(), 0, 1e-4 + 20 * std::abs(tilt))
+          << tilt << " at " << p.x();
     }
   }
 }
@@ -367,8 +376,14 @@ TEST_F(StiffnessTest, friction_on_a_seam_gives_no_energy) {
       const Loop loop({uniform(-1e-3, 1e-3), 0, -2e-3}, i % 2 == 0 ? 2e-3 : 3e-4,
                       [this](double a, double b) { return uniform(a, b); });
       hand.to(loop.at(0));
-      for (int k = 0; k < 2; ++k) turn(hand, [&](double s) { return loop.at(s); }, 20'000);
-      EXPECT_LE(turn(hand, [&](double s) { return loop.at(s); }, 20'000).work, 1e-8) << mu << " " << i;
+      for (int k = 0; k < 2; ++k)
+        turn(
+            hand, [&](double s) { return loop.at(s); }, 20'000);
+      EXPECT_LE(turn(
+                    hand, [&](double s) { return loop.at(s); }, 20'000)
+                    .work,
+                1e-8)
+          << mu << " " << i;
     }
   }
 }
