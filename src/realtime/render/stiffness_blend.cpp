@@ -294,10 +294,10 @@ struct Width {
 };
 
 // With t = rho / w and m = growth d / w < 1, two surfaces K and K + D give the force
-//   along the spring  d (K + D x),  x = s + 3/2 t^2 (1 - t) m,  at most d max(K, K + D), since x <= 1/2 +
-//   2/9, along the face    d |D| y,  y <= 3/2 t (1 - t) sqrt(m) / c.
-// y^2 <= 2 x - x^2 bounds the sum by the stiffer spring for D = -K, and smaller |D| follow. It holds because
-// 2 x - x^2 >= 1.28 x >= 1.9 t^2 (1 - t) m, and y^2 is at most 2.25 / c^2 times t^2 (1 - t) m.
+//   d (K + D x) along the spring, x = s + 3/2 t^2 (1 - t) m <= 1/2 + 2/9,
+//   d |D| y along the face, y <= 3/2 t (1 - t) sqrt(m) / c.
+// The stiffer spring bounds the sum if y^2 <= 2 x - x^2: that is the case D = -K, and smaller |D| follow.
+// 2 x - x^2 >= 1.28 x >= 1.9 t^2 (1 - t) m, and y^2 <= 2.25 / c^2 t^2 (1 - t) m.
 // More than two unequal surfaces at one place can exceed the bound: limit() scales the force there.
 void limit(double stiffest, const Vec3& spring, BlendedSpring& out) {
   const double allowed = stiffest * spring.norm();
