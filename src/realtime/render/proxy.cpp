@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kReservedCasts = 32;         // per tick, reserved for finding the constraints at the end
 constexpr double kPause_s = 0.2;           // a slide that pauses longer has ended: static friction returns
-constexpr double kSpeedMemory_s = 5e-3;    // over which the speed of a slide is averaged
+constexpr double kSpeedMemory_s = 0.02;    // over which the speed of a slide is averaged
 constexpr double kBallConvergence = 1e-8;  // share of the tool radius, in distance to the target
 
 // Depths of the HIP below the faces themselves, without the skin that keeps the proxy off them. False when

@@ -164,15 +164,14 @@ TEST(SlowSliding, stribeck_curve_follows_the_speed) {
   SceneFixture scene;
   scene.add(plane(0.05, 40), surface(1000, 0.5, 0.3));
   RenderOptions options;
-  options.stribeckSpeed_m_per_s = 2e-3;
-  for (const double speed : {0.2e-3, 1e-3, 2e-3, 10e-3}) {
-    const double mu = 0.3 + 0.2 * std::exp(-std::pow(speed / 2e-3, 2));
+  options.stribeckSpeed_m_per_s = 0.02;
+  for (const double speed : {0.002, 0.01, 0.02, 0.06}) {
+    const double mu = 0.3 + 0.2 * std::exp(-std::pow(speed / 0.02, 2));
     for (const double rate : kRates_Hz) {
       Loop loop(scene.snapshot(), rate, options);
-      loop.at({0, 0.0002, 0.001});
-      loop.to({0, 0.0002, -0.001});
-      loop.to({0.001, 0.0002, -0.001}, 0.01);
-      loop.to({0.002, 0.0002, -0.001}, speed);
+      loop.at({-0.03, 0.0002, 0.001});
+      loop.to({-0.03, 0.0002, -0.001});
+      loop.to({-0.03 + std::max(0.002, 0.5 * speed), 0.0002, -0.001}, speed);
       EXPECT_NEAR(-loop.now().force_N.x(), mu, 0.02 * mu) << speed << " m/s at " << rate << " Hz";
     }
   }
