@@ -102,24 +102,29 @@ Part partOf(const std::array<Vec3, 3>& corners, const std::array<double, 3>& hei
   return part;
 }
 
-// The point of least gauge. Below the tangent plane the gauge is a distance in a stretched frame.
-Vec3 nearestInGauge(const Gauge& gauge, const std::array<Vec3, 3>& corners) {
+// The point of least gauge, in the part below the tangent plane or in all of the triangle. Below, the gauge
+// is a distance in a stretched frame. False when there is no such point.
+bool nearestInGauge(const Gauge& gauge, const std::array<Vec3, 3>& corners, bool belowOnly, Vec3& best) {
   std::array<double, 3> heights;
   for (std::size_t i = 0; i < 3; ++i) heights[i] = gauge.up.dot(corners[i]) + gauge.radius;
   const auto [lowest, highest] = std::minmax({heights[0], heights[1], heights[2]});
-  if (lowest >= 0) return nearestToOrigin(corners[0], corners[1], corners[2]);
+  if (lowest >= 0) {
+    best = nearestToOrigin(corners[0], corners[1], corners[2]);
+    return !belowOnly;
+  }
   Part below = partOf(corners, heights, -1);
   const double shift = gauge.radius * kHiddenExcess / (1 + kHiddenExcess);
   for (Vec3& corner : below.corners) {
     const double height = gauge.up.dot(corner);
     corner += (kHidden * (height + shift) - height) * gauge.up;
   }
-  Vec3 best = below.nearest();
+  best = below.nearest();
   const double stretched = gauge.up.dot(best);
   best += (stretched / kHidden - shift - stretched) * gauge.up;
-  if (!(highest > 0)) return best;
+  if (belowOnly || !(highest > 0)) return true;
   const Vec3 above = partOf(corners, heights, 1).nearest();
-  return gauge.length(above) < gauge.length(best) ? above : best;
+  if (gauge.length(above) < gauge.length(best)) best = above;
+  return true;
 }
 
 Vec3 nearestInGauge(const Gauge& gauge, const Facet& plane, const Vec3& proxy) {
@@ -201,6 +206,7 @@ class Search {
     n.offset = offset;
     n.presence = presence;
   }
+  // A face that is turned away counts below the tangent plane: it may begin at a ridge.
   bool facesProxy(const Facet& f) const {
     const double height = f.normal.dot(proxy_ - f.a);
     if (now_.scene->faces == scene::TouchableFaces::both) return true;
@@ -262,8 +268,11 @@ void Search::addObject(const scene::ObjectState& state) {
     }
     ++visits_;
     Facet f;
-    if (!makeFacet(placed.corners(triangle, now_.time), 0, f) || !facesProxy(f)) return reach();
-    consider(*n, nearestInGauge(gauge_, {f.a - proxy_, f.b - proxy_, f.c - proxy_}));
+    if (!makeFacet(placed.corners(triangle, now_.time), 0, f)) return reach();
+    Vec3 offset;
+    if (nearestInGauge(gauge_, {f.a - proxy_, f.b - proxy_, f.c - proxy_}, !facesProxy(f), offset)) {
+      consider(*n, offset);
+    }
     return reach();
   });
 }
