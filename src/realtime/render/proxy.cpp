@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "realtime/render/force_shading.h"
 #include "realtime/render/renderer.h"
@@ -10,6 +11,7 @@ namespace hapticd::realtime {
 namespace {
 
 constexpr int kReservedCasts = 32;         // per tick, reserved for finding the constraints at the end
+constexpr double kUnloaded = 0.5;          // of the bound: a slide that bears less has ended
 constexpr double kPause_s = 0.2;           // a slide that pauses longer has ended: static friction returns
 constexpr double kSpeedMemory_s = 0.02;    // over which the speed of a slide is averaged
 constexpr double kBallConvergence = 1e-8;  // share of the tool radius, in distance to the target
@@ -146,19 +148,20 @@ void Proxy::updateProxy(const Vec3& hip) noexcept {
   const Vec3 held =
       spring.stiffness_N_per_m > 0 ? Vec3(spring.slope_N / spring.stiffness_N_per_m) : Vec3(Vec3::Zero());
   const Vec3 borne = contactSet_.lateral_m - held;
-  if (borne.dot(slide_.direction) < 0) slide_.active = false;
-  contactSet_.staticShare = slidingShare();
   const double lateral = borne.norm();
-  const double bound = frictionConeOf(contactSet_);
-  if (lateral <= bound) {
+  contactSet_.staticShare = slidingShare();
+  if (borne.dot(slide_.direction) < kUnloaded * frictionConeOf(contactSet_)) slide_.active = false;
+  contactSet_.staticShare = slidingShare();
+  if (lateral <= frictionConeOf(contactSet_)) {
     advanceSlide(0);
     contactSet_.staticShare = slidingShare();
     return;
   }
   slide_.direction = borne / lateral;
   const Vec3 start = position_;
-  slide_.active = true;
+  const bool wasSliding = std::exchange(slide_.active, true);
   contactSet_.staticShare = slidingShare();
+  slide_.active = wasSliding;
   moveFrictionless(hip + held + slide_.direction * frictionConeOf(contactSet_), active);
   findConstraints(hip, active);
   advanceSlide((position_ - start).norm());

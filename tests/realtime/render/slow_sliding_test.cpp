@@ -10,9 +10,10 @@ namespace hapticd::realtime::fixture {
 namespace {
 
 // A renderer at a rate of its own.
-class Loop {
+class LoopAtRate {
  public:
-  Loop(std::shared_ptr<const scene::SceneSnapshot> scene, double rate_Hz, const RenderOptions& options = {})
+  LoopAtRate(std::shared_ptr<const scene::SceneSnapshot> scene, double rate_Hz,
+             const RenderOptions& options = {})
       : scene_(std::move(scene)), renderer_(options), period_(toNanos(1 / rate_Hz)) {}
 
   const Rendering& at(const Vec3& p) {
@@ -55,7 +56,7 @@ TEST(SlowSliding, force_does_not_depend_on_the_rate) {
   scene.add(plane(0.05, 40), surface(1000, 0.5, 0.3));
   for (const double speed : {0.05e-3, 0.2e-3, 1e-3, 5e-3, 50e-3}) {
     for (const double rate : kRates_Hz) {
-      Loop loop(scene.snapshot(), rate);
+      LoopAtRate loop(scene.snapshot(), rate);
       loop.at({0, 0.0002, 0.001});
       loop.to({0, 0.0002, -0.001});
       loop.to({0.00045, 0.0002, -0.001}, 0.01);
@@ -83,7 +84,7 @@ TEST(SlowSliding, slide_ends_after_a_pause_in_seconds) {
   scene.add(plane(0.05, 40), surface(1000, 0.5, 0.3));
   for (const double rate : kRates_Hz) {
     for (const double pause_s : {0.1, 0.3}) {
-      Loop loop(scene.snapshot(), rate);
+      LoopAtRate loop(scene.snapshot(), rate);
       loop.at({0, 0.0002, 0.001});
       loop.to({0, 0.0002, -0.001});
       loop.to({0.002, 0.0002, -0.001}, 0.01);
@@ -101,7 +102,7 @@ TEST(SlowSliding, tremor_does_not_move_the_proxy) {
   SceneFixture scene;
   scene.add(plane(0.05, 40), surface(1000, 0.5, 0.3));
   for (const double lean : {0.0, 0.00028, 0.0006}) {  // resting, near the dynamic bound, sliding at first
-    Loop loop(scene.snapshot(), 1000);
+    LoopAtRate loop(scene.snapshot(), 1000);
     std::mt19937 random(5);
     std::uniform_real_distribution<double> tremor(-20e-6, 20e-6);
     loop.at({0, 0.0002, 0.001});
@@ -132,7 +133,7 @@ TEST(SlowSliding, cycles_give_no_energy) {
   for (int i = 0; i < 60; ++i) {
     RenderOptions options;
     options.stribeckSpeed_m_per_s = i % 2 == 0 ? 0 : uniform(1e-4, 1e-2);
-    Loop loop(scene.snapshot(), kRates_Hz[i % 3], options);
+    LoopAtRate loop(scene.snapshot(), kRates_Hz[i % 3], options);
     const double size = std::exp(uniform(std::log(1e-5), std::log(3e-3)));
     const int steps = static_cast<int>(std::exp(uniform(std::log(50.0), std::log(20'000.0))));
     const double phase = uniform(0, 6);
@@ -168,7 +169,7 @@ TEST(SlowSliding, stribeck_curve_follows_the_speed) {
   for (const double speed : {0.002, 0.01, 0.02, 0.06}) {
     const double mu = 0.3 + 0.2 * std::exp(-std::pow(speed / 0.02, 2));
     for (const double rate : kRates_Hz) {
-      Loop loop(scene.snapshot(), rate, options);
+      LoopAtRate loop(scene.snapshot(), rate, options);
       loop.at({-0.03, 0.0002, 0.001});
       loop.to({-0.03, 0.0002, -0.001});
       loop.to({-0.03 + std::max(0.002, 0.5 * speed), 0.0002, -0.001}, speed);

@@ -53,10 +53,10 @@ class StiffnessTest : public testing::Test {
 };
 
 // A smooth closed path.
-class Loop {
+class ClosedPath {
  public:
   template <class Random>
-  Loop(const Vec3& centre, double size, Random&& uniform) : centre_(centre) {
+  ClosedPath(const Vec3& centre, double size, Random&& uniform) : centre_(centre) {
     for (int k = 0; k < 3; ++k) {
       for (Vec3* v : {&cosine_[k], &sine_[k]}) {
         *v = size / (k + 1) * Vec3(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
@@ -178,8 +178,8 @@ TEST_F(StiffnessTest, closed_paths_over_random_planes_do_no_work) {
     }
     Hand hand(scene.snapshot());
     hand.at({0, 0, 0.02});
-    const Loop loop({uniform(-1e-3, 1e-3), uniform(-1e-3, 1e-3), uniform(-3e-3, 0)}, 1.2e-3,
-                    [this](double a, double b) { return uniform(a, b); });
+    const ClosedPath loop({uniform(-1e-3, 1e-3), uniform(-1e-3, 1e-3), uniform(-3e-3, 0)}, 1.2e-3,
+                          [this](double a, double b) { return uniform(a, b); });
     hand.to(loop.at(0));
     const auto path = [&](double share) { return loop.at(share); };
     turn(hand, path, 2000);
@@ -211,8 +211,8 @@ TEST_F(StiffnessTest, closed_paths_over_random_plates_do_no_work) {
     }
     Hand hand(scene.snapshot());
     hand.at({0, 0, 0.02});
-    const Loop loop({uniform(-1e-3, 1e-3), uniform(-1e-3, 1e-3), uniform(-3e-3, 0)}, 1.2e-3,
-                    [this](double a, double b) { return uniform(a, b); });
+    const ClosedPath loop({uniform(-1e-3, 1e-3), uniform(-1e-3, 1e-3), uniform(-3e-3, 0)}, 1.2e-3,
+                          [this](double a, double b) { return uniform(a, b); });
     hand.to(loop.at(0));
     const auto path = [&](double share) { return loop.at(share); };
     turn(hand, path, 2000);
@@ -237,8 +237,8 @@ TEST_F(StiffnessTest, convex_edges_give_no_energy) {
              Vec3(std::sin(angle), 0, std::cos(angle)), stiffness());
     Hand hand(scene.snapshot());
     hand.at({0, 0, 0.02});
-    const Loop loop({uniform(-2e-3, 2e-3), 0, uniform(-3e-3, -1e-3)}, 2e-3,
-                    [this](double a, double b) { return uniform(a, b); });
+    const ClosedPath loop({uniform(-2e-3, 2e-3), 0, uniform(-3e-3, -1e-3)}, 2e-3,
+                          [this](double a, double b) { return uniform(a, b); });
     hand.to(loop.at(0));
     turn(
         hand, [&](double s) { return loop.at(s); }, 2000);
@@ -400,8 +400,8 @@ TEST_F(StiffnessTest, friction_on_a_seam_gives_no_energy) {
     for (int i = 0; i < 6; ++i) {
       Hand hand(scene.snapshot());
       hand.at({0, 0, 0.01});
-      const Loop loop({uniform(-1e-3, 1e-3), 0, -2e-3}, i % 2 == 0 ? 2e-3 : 3e-4,
-                      [this](double a, double b) { return uniform(a, b); });
+      const ClosedPath loop({uniform(-1e-3, 1e-3), 0, -2e-3}, i % 2 == 0 ? 2e-3 : 3e-4,
+                            [this](double a, double b) { return uniform(a, b); });
       hand.to(loop.at(0));
       for (int k = 0; k < 2; ++k)
         turn(
