@@ -22,7 +22,7 @@ constexpr double kWiden = 1 + 1e-6;      // covers the rounding of queries that 
 constexpr double kSameDirection = 1e-7;  // |n1 x n2|^2 of faces that are one plane
 constexpr int kMaxStiffnesses = 16;
 constexpr int kMaxNeighbours = 64;
-constexpr int kMaxVisits = 1024;        // triangles in one search
+constexpr int kMaxVisits = 512;         // triangles in one search
 constexpr std::size_t kFewObjects = 4;  // fewer than a query of the index would cost
 
 // The nearest surface of one stiffness.
