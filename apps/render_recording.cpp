@@ -60,9 +60,11 @@ void print(const Difference& d) {
 
 int renderSession(const RecordingRenderOptions& options) {
   std::string remark;
-  const std::vector<Difference> devices = record::compare(options.session, options.changes, remark);
+  std::string law;
+  const std::vector<Difference> devices = record::compare(options.session, options.changes, remark, law);
   std::printf("session     %s\nchanged     %s\n", options.session.c_str(),
               record::describe(options.changes).c_str());
+  if (!law.empty()) std::printf("force law   %s\n", law.c_str());
   bool same = true;
   for (const Difference& device : devices) {
     print(device);
@@ -74,7 +76,8 @@ int renderSession(const RecordingRenderOptions& options) {
     std::printf("report      %s\n", options.report.c_str());
   }
   if (!remark.empty()) std::fprintf(stderr, "hapticd: %s\n", remark.c_str());
-  if (same || !options.changes.none()) return 0;
+  // Another law gives other forces on purpose: the largest difference above is the result, not a failure.
+  if (same || !options.changes.none() || !law.empty()) return 0;
   std::fprintf(stderr,
                "hapticd: nothing was changed, but the forces differ: another version or another kind of "
                "machine wrote the "

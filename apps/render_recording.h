@@ -14,7 +14,8 @@ struct RecordingRenderOptions {
   record::RerenderChanges changes;
 };
 
-/// Prints the difference. Returns 1 when nothing was changed but something differs, else 0.
+/// Prints the difference. Returns 1 when nothing was changed and the force law is the same but something
+/// differs, else 0.
 int renderSession(const RecordingRenderOptions& options);
 
 }  // namespace hapticd::apps

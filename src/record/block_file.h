@@ -12,7 +12,15 @@
 namespace hapticd::record {
 
 /// What a block holds. Numbers are never used again.
-enum class BlockKind : std::uint32_t { header = 1, scene = 2, publish = 3, ticks = 4, lost = 5, end = 6 };
+enum class BlockKind : std::uint32_t {
+  header = 1,
+  scene = 2,
+  publish = 3,
+  ticks = 4,
+  lost = 5,
+  end = 6,
+  law = 7
+};
 
 inline constexpr std::size_t kMagicBytes = 8;
 inline constexpr std::size_t kBlockHeadBytes = 12;

@@ -51,9 +51,16 @@ double Difference::meanDepth_m() const noexcept {
   return shareOf(sumDepth_m_);
 }
 
+std::string lawDifference(const RecordingHeader& header) {
+  if (header.law.number == realtime::kForceLaw) return {};
+  return "the recording has force law " + std::to_string(header.law.number) + ", this program law " +
+         std::to_string(realtime::kForceLaw);
+}
+
 std::vector<Difference> compare(const std::filesystem::path& session, const RerenderChanges& changes,
-                                std::string& remark) {
+                                std::string& remark, std::string& law) {
   RecordingReader reader(session);
+  law = lawDifference(reader.header());
   Rerenderer again(reader.header(), changes);
   std::vector<Difference> devices;
   for (const RecordedDevice& device : reader.header().devices) devices.emplace_back(device.names.front());

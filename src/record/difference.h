@@ -59,9 +59,13 @@ class Difference {
   double sumDepth_m_ = 0;
 };
 
+/// "the recording has force law 1, this program law 2"; empty when they agree.
+std::string lawDifference(const RecordingHeader& header);
+
 /// Re-renders a whole recording. `remark` says why the file ends early, if it does. Throws RecordingError.
+/// `law` is the lawDifference() of the recording.
 std::vector<Difference> compare(const std::filesystem::path& session, const RerenderChanges& changes,
-                                std::string& remark);
+                                std::string& remark, std::string& law);
 
 /// The changes for a headline: "stiffness 300 N/m, tool radius 2 mm"; "nothing".
 std::string describe(const RerenderChanges& changes);

@@ -56,9 +56,25 @@ void fields(T& config, V&& v) {
 
 template <Is<realtime::RenderOptions> T, class V>
 void fields(T& options, V&& v) {
-  auto& [toolRadius_m, forceShading] = options;
+  auto& [toolRadius_m, forceShading, stribeckSpeed_m_per_s, contactVibrationPulls] = options;
   v("tool_radius_m", toolRadius_m);
   v("force_shading", forceShading);
+  static_cast<void>(stribeckSpeed_m_per_s);  // in the block of the law
+  static_cast<void>(contactVibrationPulls);
+}
+
+template <Is<LawOptions> T, class V>
+void fields(T& options, V&& v) {
+  auto& [stribeckSpeed_m_per_s, contactVibrationPulls] = options;
+  v("stribeck_speed_m_per_s", stribeckSpeed_m_per_s);
+  v("contact_vibration_pulls", contactVibrationPulls);
+}
+
+template <Is<LawRecord> T, class V>
+void fields(T& law, V&& v) {
+  auto& [number, devices] = law;
+  v("number", number);
+  v("devices", devices);
 }
 
 template <Is<realtime::GuardOptions> T, class V>
@@ -105,11 +121,12 @@ void fields(T& device, V&& v) {
 
 template <Is<RecordingHeader> T, class V>
 void fields(T& header, V&& v) {
-  auto& [program, wallOffset, config, devices] = header;
+  auto& [program, wallOffset, config, devices, law] = header;
   v("program", program);
   v("wall_offset_ns", wallOffset);
   v("config", config);
   v("devices", devices);
+  static_cast<void>(law);  // a block of its own, so that old readers skip it
 }
 
 template <Is<PublishEvent> T, class V>

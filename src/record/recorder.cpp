@@ -45,9 +45,17 @@ void Recorder::start(Nanos wallOffset, std::string config) {
   Bytes content;
   Packer pack(content);
   pack.put(kFormatVersion);
-  pack.put(RecordingHeader{"hapticd " HAPTICD_VERSION, wallOffset, std::move(config), header_});
+  pack.put(RecordingHeader{"hapticd " HAPTICD_VERSION, wallOffset, std::move(config), header_, {}});
   out_.assign(magic().begin(), magic().end());
   appendBlock(out_, BlockKind::header, content);
+  LawRecord law{realtime::kForceLaw, {}};
+  for (const RecordedDevice& device : header_) {
+    const realtime::RenderOptions& render = device.tick.render;
+    law.devices.push_back({render.stribeckSpeed_m_per_s, render.contactVibrationPulls});
+  }
+  content.clear();
+  pack.put(law);
+  appendBlock(out_, BlockKind::law, content);
   write();
   thread_ = base::Thread({.name = "recorder"}, [this] {
     drain();

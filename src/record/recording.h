@@ -38,12 +38,25 @@ struct RecordedDevice {
   realtime::TickOptions tick;
 };
 
-/// The first block.
+/// Options of a device's renderer that came with law 2.
+struct LawOptions {
+  double stribeckSpeed_m_per_s = 0;
+  bool contactVibrationPulls = false;
+};
+
+/// By which laws the forces were made.
+struct LawRecord {
+  std::uint32_t number = 1;         ///< realtime::kForceLaw of the program that recorded
+  std::vector<LawOptions> devices;  ///< in the order of the header
+};
+
+/// The first block, and what belongs to it.
 struct RecordingHeader {
   std::string program;
   Nanos wallOffset = 0;  ///< wall time minus servo time at the start
   std::string config;    ///< of the server, as TOML
   std::vector<RecordedDevice> devices;
+  LawRecord law;  ///< the second block; files without one have law 1
 };
 
 /// A command as the scene applied it; without one, the client left.

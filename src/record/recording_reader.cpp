@@ -7,6 +7,7 @@ namespace hapticd::record {
 
 RecordingReader::RecordingReader(const std::filesystem::path& file) : path_(file), blocks_(file) {
   readHeader();
+  readLaw();
 }
 
 void RecordingReader::fail(const std::string& what) const {
@@ -35,6 +36,23 @@ void RecordingReader::readHeader() {
   }
 }
 
+// The block after the header, if it is one of this kind: older files have none.
+void RecordingReader::readLaw() {
+  pending_ = blocks_.next(block_);
+  if (!pending_ || block_.kind != BlockKind::law) return;
+  pending_ = false;
+  Unpacker in(block_.content);
+  in.take(header_.law);
+  if (!in.ok() || !in.rest().empty() || header_.law.devices.size() != header_.devices.size()) {
+    fail("the force law does not match the devices");
+  }
+  for (std::size_t i = 0; i < header_.devices.size(); ++i) {
+    realtime::RenderOptions& render = header_.devices[i].tick.render;
+    render.stribeckSpeed_m_per_s = header_.law.devices[i].stribeckSpeed_m_per_s;
+    render.contactVibrationPulls = header_.law.devices[i].contactVibrationPulls;
+  }
+}
+
 bool RecordingReader::next(RecordingEvent& event) {
   for (;;) {
     if (ticks_) {
@@ -44,7 +62,8 @@ bool RecordingReader::next(RecordingEvent& event) {
       if (!ticks_->ok()) fail("a damaged tick");
       ticks_.reset();
     }
-    if (!blocks_.next(block_)) return false;
+    if (!pending_ && !blocks_.next(block_)) return false;
+    pending_ = false;
     if (readBlock(event)) return true;
   }
 }

@@ -28,6 +28,7 @@ class RecordingReader {
 
  private:
   void readHeader();
+  void readLaw();
   bool readBlock(RecordingEvent& event);
   template <class Event>
   void takeWhole(RecordingEvent& event);
@@ -37,6 +38,7 @@ class RecordingReader {
   BlockReader blocks_;
   RecordingHeader header_;
   BlockReader::Block block_;
+  bool pending_ = false;               // block_ was read and not used
   std::optional<TickUnpacker> ticks_;  // of the present block
   std::uint32_t ticksOf_ = 0;
   bool ended_ = false;

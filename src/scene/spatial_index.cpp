@@ -76,6 +76,20 @@ struct NearQuery {
   bool ended = false;
 };
 
+// A query with a shrinking radius: passes the caller's radius on to Embree.
+struct NearestQuery {
+  double (*thunk)(void*, std::uint32_t) noexcept;
+  void* visitor;
+  double scale;
+  RTCPointQuery* point;
+  static bool call(void* self, std::uint32_t id) noexcept {
+    const auto* query = static_cast<const NearestQuery*>(self);
+    const double radius = query->thunk(query->visitor, id) * query->scale * (1 + kRelativePad);
+    query->point->radius = std::min(query->point->radius, static_cast<float>(std::max(radius, 0.0)));
+    return true;
+  }
+};
+
 // A segment can ask for the boxes around its middle instead.
 struct AsNear {
   double (*thunk)(void*, std::uint32_t) noexcept;
@@ -89,10 +103,11 @@ struct AsNear {
 
 bool onNear(RTCPointQueryFunctionArguments* args) {
   auto* query = static_cast<NearQuery*>(args->userPtr);
-  if (query->ended || query->thunk(query->visitor, args->primID)) return false;
-  query->ended = true;
-  args->query->radius = 0;  // Embree skips what is beyond it
-  return true;
+  if (query->ended) return false;
+  const float radius = args->query->radius;
+  query->ended = !query->thunk(query->visitor, args->primID);
+  if (query->ended) args->query->radius = 0;  // Embree skips what is beyond it
+  return args->query->radius < radius;
 }
 
 // Embree hands the context back to the leaf callback: the extra members follow its own.
@@ -157,6 +172,16 @@ struct SpatialIndex::Tree {
 
   double pad() const noexcept { return kRelativePad * kReach / scale; }
   Vec3f inTree(const Vec3& p) const noexcept { return ((p - origin) * scale).cast<float>(); }
+
+  RTCPointQuery pointQuery(const Vec3& centre, double radius) const noexcept {
+    RTCPointQuery query{};
+    const Vec3f at = inTree(centre);
+    query.x = at.x();
+    query.y = at.y();
+    query.z = at.z();
+    query.radius = static_cast<float>(std::min(radius * scale * (1 + kRelativePad), kWholeTree));
+    return query;
+  }
 
   Lanes lower(const Lanes& p) const noexcept { return (p - near) * times + below; }
   Lanes upper(const Lanes& p) const noexcept { return (p - near) * times + above; }
@@ -282,13 +307,22 @@ void SpatialIndex::visitNearImpl(const Vec3& centre, double radius, NearThunk th
   NearQuery query{thunk, visitor, false};
   RTCPointQueryContext context;
   rtcInitPointQueryContext(&context);
-  RTCPointQuery point{};
-  const Vec3f at = tree_->inTree(inside);
-  point.x = at.x();
-  point.y = at.y();
-  point.z = at.z();
-  point.radius = static_cast<float>(std::min(radius * tree_->scale * (1 + kRelativePad), kWholeTree));
+  RTCPointQuery point = tree_->pointQuery(inside, radius);
   rtcPointQuery(tree_->scene, &point, &context, nullptr, &query);
+}
+
+void SpatialIndex::visitNearestImpl(const Vec3& centre, double radius, SegmentThunk thunk,
+                                    void* visitor) const noexcept {
+  if (!tree_) return;
+  // As in visitNearImpl().
+  const Vec3 inside = centre.cwiseMax(bounds_.min).cwiseMin(bounds_.max);
+  if (!((inside - centre).norm() <= radius + pad_)) return;
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  RTCPointQuery point = tree_->pointQuery(inside, radius);
+  NearestQuery query{thunk, visitor, tree_->scale, &point};
+  NearQuery adapter{&NearestQuery::call, &query, false};
+  rtcPointQuery(tree_->scene, &point, &context, nullptr, &adapter);
 }
 
 void SpatialIndex::visitSegmentImpl(const Vec3& from, const Vec3& to, SegmentThunk thunk,

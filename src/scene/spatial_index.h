@@ -79,6 +79,18 @@ class SpatialIndex {
         const_cast<void*>(static_cast<const void*>(std::addressof(visit))));
   }
 
+  /// As visitNear(), roughly near to far, with a radius that shrinks: visit returns the radius beyond which
+  /// nothing more is wanted, 0 or less to end.
+  template <class Visit>
+  void visitNearest(const Vec3& centre, double radius, Visit&& visit) const noexcept {
+    visitNearestImpl(
+        centre, radius,
+        [](void* v, std::uint32_t id) noexcept -> double {
+          return (*static_cast<std::remove_reference_t<Visit>*>(v))(id);
+        },
+        const_cast<void*>(static_cast<const void*>(std::addressof(visit))));
+  }
+
   /// Calls visit(id) for at least every box that the segment touches, roughly near to far. visit returns the
   /// segment parameter in [0,1] beyond which nothing more is wanted (1 to go on, the hit parameter after a
   /// hit).
@@ -96,6 +108,7 @@ class SpatialIndex {
   using NearThunk = bool (*)(void*, std::uint32_t) noexcept;
   using SegmentThunk = double (*)(void*, std::uint32_t) noexcept;
   void visitNearImpl(const Vec3& centre, double radius, NearThunk thunk, void* visitor) const noexcept;
+  void visitNearestImpl(const Vec3& centre, double radius, SegmentThunk thunk, void* visitor) const noexcept;
   void visitSegmentImpl(const Vec3& from, const Vec3& to, SegmentThunk thunk, void* visitor) const noexcept;
 
   struct Tree;

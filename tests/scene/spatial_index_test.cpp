@@ -39,6 +39,16 @@ std::set<std::uint32_t> near(const SpatialIndex& index, const Vec3& centre, doub
   return ids;
 }
 
+// The smallest distance within `radius`; Infinity when there is none.
+double nearest(const SpatialIndex& index, const std::vector<Box>& boxes, const Vec3& centre, double radius) {
+  double best = INFINITY;
+  index.visitNearest(centre, radius, [&](std::uint32_t id) {
+    best = std::min(best, distance(boxes[id], centre));
+    return std::min(best, radius);
+  });
+  return best;
+}
+
 std::set<std::uint32_t> along(const SpatialIndex& index, const Vec3& from, const Vec3& to) {
   std::set<std::uint32_t> ids;
   index.visitSegment(from, to, [&](std::uint32_t id) {
@@ -102,12 +112,14 @@ void checkSuperset(const SpatialIndex& index, const std::vector<Box>& boxes, Wor
     const double radius = query % 5 == 0 ? 0 : (q - p).norm() * world.random() / 1.8e19;
     const auto foundNear = near(index, p, radius);
     const auto foundAlong = along(index, p, q);
+    const double foundNearest = nearest(index, boxes, p, radius);
     for (std::uint32_t id = 0; id < boxes.size(); ++id) {
       if (leftOut(boxes[id])) {
         RC_ASSERT(foundNear.count(id) + foundAlong.count(id) == 0U);
         continue;
       }
       if (distance(boxes[id], p) <= radius) RC_ASSERT(foundNear.count(id) == 1U);
+      if (distance(boxes[id], p) <= radius) RC_ASSERT(foundNearest <= distance(boxes[id], p));
       if (touches(boxes[id], p, q)) RC_ASSERT(foundAlong.count(id) == 1U);
     }
   }

@@ -27,6 +27,19 @@ Vec3 frictionForce(const Effect& effect, const Vec3& proxy, Vec3& anchor) {
 
 }  // namespace
 
+double Effects::Phase::at(Nanos now, Nanos start, double angularFrequency_rad_per_s) noexcept {
+  if (since_ < 0) {
+    since_ = start;
+    frequency_ = angularFrequency_rad_per_s;
+  }
+  if (frequency_ != angularFrequency_rad_per_s) {
+    angle_ = std::fmod(angle_ + frequency_ * base::toSeconds(now - since_), 2 * M_PI);
+    since_ = now;
+    frequency_ = angularFrequency_rad_per_s;
+  }
+  return angle_ + frequency_ * base::toSeconds(now - since_);
+}
+
 Effects::Running* Effects::running(const Effect& effect, Nanos now, const Vec3& proxy) noexcept {
   for (int i = 0; i < count_; ++i) {
     Running& r = running_[static_cast<std::size_t>(i)];
@@ -34,7 +47,7 @@ Effects::Running* Effects::running(const Effect& effect, Nanos now, const Vec3& 
   }
   if (count_ == kMaxEffects) return nullptr;
   Running& fresh = running_[static_cast<std::size_t>(count_++)];
-  fresh = {effect.index, effect.start, now, -1, proxy, true};
+  fresh = {effect.index, effect.start, now, -1, proxy, true, {}};
   return &fresh;
 }
 
@@ -46,7 +59,6 @@ void Effects::forgetUnseen() noexcept {
 
 Vec3 Effects::forceOf(const Effect& effect, Running& r, const Affine& T_device_world,
                       const device::DeviceState& device, const Rendering& contact, Nanos now) noexcept {
-  const double phase = effect.angularFrequency_rad_per_s * base::toSeconds(now - r.begin);
   switch (effect.type) {
     case EffectType::constant:
       return effect.magnitude_N * rotated(T_device_world, effect.direction).stableNormalized();
@@ -57,13 +69,21 @@ Vec3 Effects::forceOf(const Effect& effect, Running& r, const Affine& T_device_w
     case EffectType::friction:
       return frictionForce(effect, contact.proxy_m, r.anchor);
     case EffectType::motorVibration: {
+      const double phase = r.phase.at(now, r.begin, effect.angularFrequency_rad_per_s);
       const Vec3 force = effect.magnitude_N * Vec3(std::cos(phase), std::sin(phase), 0);
       return effect.inDeviceFrame ? force : Vec3(device.orientation * force);
     }
     case EffectType::contactVibration:
-      return effect.magnitude_N * std::sin(phase) * contact.normal;  // zero without contact
+      return effect.magnitude_N * std::sin(r.phase.at(now, r.begin, effect.angularFrequency_rad_per_s)) *
+             contact.normal;  // zero without contact
   }
   return Vec3::Zero();
+}
+
+// All contact vibrations together. A surface that vibrates lets go at most; it does not pull.
+Vec3 Effects::contactVibration(double force_N, const Rendering& contact) const noexcept {
+  const double pressed = contact.normalForce_N.dot(contact.normal);
+  return (contactVibrationPulls_ ? force_N : std::max(force_N, -std::max(0.0, pressed))) * contact.normal;
 }
 
 Vec3 Effects::force(const scene::SceneSnapshot& scene, const device::DeviceState& device,
@@ -71,6 +91,7 @@ Vec3 Effects::force(const scene::SceneSnapshot& scene, const device::DeviceState
   for (int i = 0; i < count_; ++i) running_[static_cast<std::size_t>(i)].seen = false;
   const Affine& T_device_world = scene.workspace.T_device_world;
   Vec3 sum = Vec3::Zero();
+  double alongNormal = 0;
   for (const Effect& effect : scene.effects) {
     Running* r = running(effect, now, contact.proxy_m);
     if (r == nullptr) continue;
@@ -79,10 +100,14 @@ Vec3 Effects::force(const scene::SceneSnapshot& scene, const device::DeviceState
     Vec3 force = forceOf(effect, *r, T_device_world, device, contact, now);
     if (effect.releasing && r->releaseBegin < 0) r->releaseBegin = now;
     if (r->releaseBegin >= 0) force *= remainingShare(r->releaseBegin, now);
-    sum += force;
+    if (effect.type == EffectType::contactVibration) {
+      alongNormal += force.dot(contact.normal);
+    } else {
+      sum += force;
+    }
   }
   forgetUnseen();
-  return sum;
+  return sum + contactVibration(alongNormal, contact);
 }
 
 }  // namespace hapticd::realtime

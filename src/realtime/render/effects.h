@@ -7,15 +7,30 @@
 
 namespace hapticd::realtime {
 
-/// Start times and anchors of the running effects. Servo thread: noexcept, no allocation.
+/// Start times, phases and anchors of the running effects. Servo thread: noexcept, no allocation.
 class Effects {
  public:
+  /// `contactVibrationPulls`: a contact vibration may exceed the normal force of the contact.
+  explicit Effects(bool contactVibrationPulls) noexcept : contactVibrationPulls_(contactVibrationPulls) {}
+
   /// Sum of the forces of all running effects at `now`, device frame, newtons. `contact` holds the proxy and
   /// the surface normal of this tick.
   Vec3 force(const scene::SceneSnapshot& scene, const device::DeviceState& device, const Rendering& contact,
              Nanos now) noexcept;
 
   void reset() noexcept { count_ = 0; }
+
+  /// The angle of a vibration whose frequency may change while it runs: the frequency over time, integrated.
+  class Phase {
+   public:
+    /// At `now`, radians; `start` is the time of phase zero.
+    double at(Nanos now, Nanos start, double angularFrequency_rad_per_s) noexcept;
+
+   private:
+    double frequency_ = 0;  // rad/s, since since_
+    double angle_ = 0;      // at since_
+    Nanos since_ = -1;      // -1: not started
+  };
 
  private:
   static constexpr int kMaxEffects = 64;
@@ -27,13 +42,16 @@ class Effects {
     Nanos releaseBegin = -1;  ///< -1: not releasing
     Vec3 anchor = Vec3::Zero();
     bool seen = false;
+    Phase phase;
   };
 
   static Vec3 forceOf(const scene::Effect& effect, Running& r, const Affine& T_device_world,
                       const device::DeviceState& device, const Rendering& contact, Nanos now) noexcept;
+  Vec3 contactVibration(double force_N, const Rendering& contact) const noexcept;
   Running* running(const scene::Effect& effect, Nanos now, const Vec3& proxy) noexcept;
   void forgetUnseen() noexcept;
 
+  bool contactVibrationPulls_;
   std::array<Running, kMaxEffects> running_;
   int count_ = 0;
 };

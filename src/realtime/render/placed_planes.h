@@ -20,6 +20,12 @@ struct PlacedPlane {
   Facet facet;                  ///< unbounded, device metres; facet.object is -1 - index
   scene::Surface surface;       ///< weaker while the plane ramps out
   double insertionDepth_m = 0;  ///< depth of the HIP at the placement; 0 unless placed in this tick
+
+  /// The share of its stiffness that is left, 1 … 0; 0 also without stiffness.
+  double presence() const noexcept {
+    const double whole = state->surface.stiffness_N_per_m;
+    return whole > 0 ? surface.stiffness_N_per_m / whole : 0;
+  }
 };
 
 /// All planes, with their state from tick to tick. Servo thread: noexcept, no allocation.

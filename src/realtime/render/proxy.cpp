@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "realtime/render/force_shading.h"
 #include "realtime/render/renderer.h"
@@ -10,7 +11,9 @@ namespace hapticd::realtime {
 namespace {
 
 constexpr int kReservedCasts = 32;         // per tick, reserved for finding the constraints at the end
-constexpr double kRestick_m = 0.5e-6;      // a shorter move in one tick counts as rest
+constexpr double kUnloaded = 0.5;          // of the bound: a slide that bears less has ended
+constexpr double kPause_s = 0.2;           // a slide that pauses longer has ended: static friction returns
+constexpr double kSpeedMemory_s = 0.02;    // over which the speed of a slide is averaged
 constexpr double kBallConvergence = 1e-8;  // share of the tool radius, in distance to the target
 
 // Depths of the HIP below the faces themselves, without the skin that keeps the proxy off them. False when
@@ -58,7 +61,7 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   }
   planes_.remember(touched, position_);
   if (casts_ >= kMaxCasts) status |= kRenderIterationLimit;
-  if (query_.overflowed()) status |= kRenderCandidateLimit;
+  if (query_.overflowed() || !contactSet_.spring.complete) status |= kRenderCandidateLimit;
   fadeWhenOverworked(status);
   before_ = now;
   positionBefore_ = position_;
@@ -73,6 +76,7 @@ void Proxy::reset() noexcept {
 
 void Proxy::startAt(const SceneAtTime& now, const Vec3& hip) noexcept {
   started_ = true;
+  slide_ = Slide{};
   popthroughArmed_ = true;
   released_ = false;
   overworked_ = 0;
@@ -94,51 +98,77 @@ bool Proxy::frictionless() const noexcept {
   return true;
 }
 
-// The friction bound of a contact set, as a length of the spring.
-Proxy::FrictionCone Proxy::frictionConeOf(const ContactSet& contactSet) noexcept {
-  FrictionCone cone;
-  double adhesion = 0;
-  double weight = 0;
+// The friction bound as a length of the spring: each contact bears mu_i N_i, however the normals point.
+double Proxy::frictionConeOf(const ContactSet& contactSet) noexcept {
+  const double stiffness = contactSet.spring.stiffness_N_per_m;
+  if (!(stiffness > 0) || !(contactSet.normal_m.norm() > 0)) return 0;
+  double cone = 0;
   for (int i = 0; i < contactSet.count; ++i) {
     const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
-    const double force = constraint.surface.stiffness_N_per_m * constraint.depth_m;
-    cone.sticking_m += force * constraint.surface.static_friction;
-    cone.sliding_m +=
-        force * std::min(constraint.surface.dynamic_friction, constraint.surface.static_friction);
-    adhesion += constraint.adhesion_N;
-    weight += force;
+    cone += contactSet.frictionOf(constraint.surface) * constraint.presence * constraint.depth_m +
+            constraint.adhesion_N / stiffness;
   }
-  const double depth = contactSet.normal_m.norm();
-  if (!(weight > 0) || !(depth > 0)) return {};
-  const double held = adhesion * depth / weight;
-  cone.sticking_m = cone.sticking_m * depth / weight + held;
-  cone.sliding_m = cone.sliding_m * depth / weight + held;
   return cone;
 }
 
+// Stribeck: the coefficient falls from the static to the dynamic one with the speed of the slide. Without
+// the curve it falls at once.
+double Proxy::slidingShare() const noexcept {
+  if (!slide_.active) return 1;
+  if (!(stribeckSpeed_m_per_s_ > 0)) return 0;
+  const double ratio = slide_.speed_m_per_s / stribeckSpeed_m_per_s_;
+  return std::exp(-ratio * ratio);
+}
+
+// In metres and seconds, so that a slow slide does not depend on the rate of the servo.
+void Proxy::advanceSlide(double slip_m) noexcept {
+  const bool slipped = slip_m > query_.minSkin();  // less is rounding
+  slide_.active = slide_.active || slipped;
+  slide_.pause_s = slipped ? 0 : slide_.pause_s + period_s_;
+  if (slide_.pause_s >= kPause_s) slide_.active = false;
+  const double forgotten = -std::expm1(-period_s_ / kSpeedMemory_s);
+  slide_.speed_m_per_s =
+      slide_.active ? slide_.speed_m_per_s + forgotten * (slip_m / period_s_ - slide_.speed_m_per_s) : 0;
+  contactSet_.sliding = slide_.active;
+}
+
 // The proxy sticks while friction bears the lateral part; otherwise it slides until friction bears what is
-// left.
+// left. The slope of the stiffness pushes the proxy, too: what it holds, friction need not.
 void Proxy::updateProxy(const Vec3& hip) noexcept {
   ActiveSet active;
   if (frictionless()) {
     moveFrictionless(hip, active);
     updateContactSet(hip, position_, active);
+    slide_ = Slide{};
     return;
   }
-  const bool wasSliding = contactSet_.sliding && contactSet_.count > 0;
   findConstraints(hip, active);
-  if (contactSet_.count == 0) return;
-  const FrictionCone cone = frictionConeOf(contactSet_);
-  const double lateral = contactSet_.lateral_m.norm();
-  const bool reversed = contactSet_.lateral_m.dot(slipDirection_) < 0;
-  if (lateral <= (wasSliding && !reversed ? cone.sliding_m : cone.sticking_m)) return;
-
-  slipDirection_ = contactSet_.lateral_m / lateral;
+  if (contactSet_.count == 0) {
+    slide_ = Slide{};
+    return;
+  }
+  const BlendedSpring& spring = contactSet_.spring;
+  const Vec3 held =
+      spring.stiffness_N_per_m > 0 ? Vec3(spring.slope_N / spring.stiffness_N_per_m) : Vec3(Vec3::Zero());
+  const Vec3 borne = contactSet_.lateral_m - held;
+  const double lateral = borne.norm();
+  contactSet_.staticShare = slidingShare();
+  if (borne.dot(slide_.direction) < kUnloaded * frictionConeOf(contactSet_)) slide_.active = false;
+  contactSet_.staticShare = slidingShare();
+  if (lateral <= frictionConeOf(contactSet_)) {
+    advanceSlide(0);
+    contactSet_.staticShare = slidingShare();
+    return;
+  }
+  slide_.direction = borne / lateral;
   const Vec3 start = position_;
-  moveFrictionless(hip + slipDirection_ * cone.sliding_m, active);
-  const bool moved = (position_ - start).norm() >= kRestick_m;
+  const bool wasSliding = std::exchange(slide_.active, true);
+  contactSet_.staticShare = slidingShare();
+  slide_.active = wasSliding;
+  moveFrictionless(hip + held + slide_.direction * frictionConeOf(contactSet_), active);
   findConstraints(hip, active);
-  contactSet_.sliding = moved;
+  advanceSlide((position_ - start).norm());
+  contactSet_.staticShare = slidingShare();
 }
 
 // Moves as near to the target as the surfaces allow. Each approach starts with an empty active set, so that
@@ -250,6 +280,7 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
     if (hit.object < 0) {
       const PlacedPlane& plane = planes_[-1 - hit.object];
       constraint.surface = plane.surface;
+      constraint.presence = plane.presence();
       constraint.adhesion_N = plane.state->adhesionLateral_N;
     } else {
       const PlacedObject& object = query_.object(hit.object);
@@ -267,11 +298,15 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
       touchedTriangle_ = constraint.triangle;
     }
   }
-  if (count > 0 && onAll) contactSet_.lateral_m = position_ - goal;
   reported_ = position_;
+  if (count == 0) {
+    popthroughArmed_ = true;
+    return;
+  }
+  if (onAll) contactSet_.lateral_m = position_ - goal;
   const bool arrived = casts_ < kMaxCasts && !query_.workSpent();
-  if (toolRadius_ == 0 && count > 0 && onAll && arrived) reported_ = onFaces(hip, active);
-  if (count == 0) popthroughArmed_ = true;
+  if (toolRadius_ == 0 && onAll && arrived) reported_ = onFaces(hip, active);
+  contactSet_.spring = blendedSpring(now_, planes_, toolRadius_, reported_, contactSet_);
 }
 
 // The proxy on the faces that hold it, at their skins so that rounding does not put it behind one of them. Another face

@@ -7,7 +7,11 @@
 // towards a target that the friction cone draws back.
 #pragma once
 
+#include <algorithm>
+
 #include "realtime/render/contact_query.h"
+#include "realtime/render/renderer.h"
+#include "realtime/render/stiffness_blend.h"
 
 namespace hapticd::realtime {
 
@@ -21,6 +25,7 @@ struct ContactConstraint {
   int source = 0;            ///< index of the near object; -1 - index for a plane of the scene
   std::uint32_t triangle = 0;
   scene::Surface surface;
+  double presence = 1;                 ///< less while a plane ramps out: share of its force and of its weight
   Vec3 forceDirection = Vec3::Zero();  ///< unit; the normal of the half-space unless force shading turns it
   double adhesion_N = 0;               ///< tangential force that it bears besides friction
   HalfSpace halfSpace;
@@ -35,13 +40,24 @@ struct ContactSet {
   Vec3 normal_m = Vec3::Zero();   ///< sum of depth times normal over the constraints
   Vec3 lateral_m = Vec3::Zero();  ///< the tangential part, which friction bears
   bool sliding = false;
+  double staticShare = 1;  ///< of static friction in the coefficient, the rest is dynamic; see slidingShare()
+  /// The spring between HIP and proxy, one for all constraints; see stiffness_blend.h.
+  BlendedSpring spring;
+
+  double frictionOf(const scene::Surface& surface) const noexcept {
+    const double dynamic = std::min(surface.dynamic_friction, surface.static_friction);
+    return dynamic + staticShare * (surface.static_friction - dynamic);
+  }
 };
 
 /// The proxy and its state from tick to tick. Device frame, metres. Servo thread: noexcept, no allocation.
 class Proxy {
  public:
-  Proxy(double toolRadius_m, bool forceShading) noexcept
-      : toolRadius_(toolRadius_m), query_(toolRadius_m), forceShading_(forceShading) {}
+  explicit Proxy(const RenderOptions& options) noexcept
+      : toolRadius_(options.toolRadius_m),
+        query_(options.toolRadius_m),
+        forceShading_(options.forceShading),
+        stribeckSpeed_m_per_s_(options.stribeckSpeed_m_per_s) {}
 
   void reset() noexcept;
 
@@ -65,9 +81,12 @@ class Proxy {
 
   struct DescentDirections;
 
-  struct FrictionCone {
-    double sticking_m = 0;
-    double sliding_m = 0;
+  // A slide, from the breakaway to a reversal or to a pause.
+  struct Slide {
+    bool active = false;
+    Vec3 direction = Vec3::Zero();  // from the HIP to the proxy; also that of the last slide
+    double speed_m_per_s = 0;       // mean over the last milliseconds
+    double pause_s = 0;             // since the proxy last slipped
   };
 
   void startAt(const SceneAtTime& now, const Vec3& hip) noexcept;
@@ -88,7 +107,9 @@ class Proxy {
   double freeShare(const DescentDirections& descent, const Vec3& from, const Vec3& to) const noexcept;
   void findConstraints(const Vec3& hip, ActiveSet& active) noexcept;
   bool frictionless() const noexcept;
-  static FrictionCone frictionConeOf(const ContactSet& contactSet) noexcept;
+  static double frictionConeOf(const ContactSet& contactSet) noexcept;
+  double slidingShare() const noexcept;
+  void advanceSlide(double slip_m) noexcept;
   Vec3 onFaces(const Vec3& hip, const ActiveSet& active) noexcept;
   void updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet& active) noexcept;
   void popThrough(const Vec3& hip, std::uint32_t& status) noexcept;
@@ -99,6 +120,7 @@ class Proxy {
   double toolRadius_;  // 0: a point
   ContactQuery query_;
   bool forceShading_;
+  double stribeckSpeed_m_per_s_;
   PlacedPlanes planes_;
   SceneAtTime now_;
   SceneAtTime before_;
@@ -114,7 +136,7 @@ class Proxy {
   Vec3 reported_ = Vec3::Zero();
   Vec3 positionBefore_ = Vec3::Zero();
   Vec3 hipBefore_ = Vec3::Zero();
-  Vec3 slipDirection_ = Vec3::Zero();
+  Slide slide_;
   ContactSet contactSet_;
   std::int32_t touchedObject_ = -1;
   std::uint32_t touchedTriangle_ = 0;

@@ -23,7 +23,7 @@ void scaleContact(double share, Rendering& out) {
 }  // namespace
 
 struct Renderer::State {
-  explicit State(const RenderOptions& o) : options(o), proxy(o.toolRadius_m, o.forceShading) {}
+  explicit State(const RenderOptions& o) : options(o), proxy(o), effects(o.contactVibrationPulls) {}
 
   RenderOptions options;
   Proxy proxy;

@@ -10,14 +10,13 @@ struct ContactShare {
   Contact* contact = nullptr;
   double normal_N = 0;    // spring and damper
   double spring_N = 0;    // spring alone
-  double friction_N = 0;  // bound that follows from the spring's force
+  double friction_N = 0;  // bound of friction and adhesion
 };
 
 // Spring and damper along the normal. The damper may reduce the force, but the surface never pulls.
-double normalForce(const ContactConstraint& constraint, const Vec3& hipVelocity) {
-  const scene::Surface& surface = constraint.surface;
+double normalForce(const ContactConstraint& constraint, double spring_N, const Vec3& hipVelocity) {
   const double leaving = constraint.halfSpace.normal.dot(hipVelocity - constraint.surfaceVelocity_m_per_s);
-  return std::max(0.0, surface.stiffness_N_per_m * constraint.depth_m - surface.damping_Ns_per_m * leaving);
+  return std::max(0.0, spring_N - constraint.surface.damping_Ns_per_m * leaving);
 }
 
 // All faces of one object make one contact.
@@ -43,10 +42,9 @@ void addNormalForces(const ContactSet& contactSet, const Vec3& proxy_m, const Ve
     const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
     ContactShare& share = shares[static_cast<std::size_t>(i)];
     share.contact = &contactWith(constraint.object, out);
-    share.normal_N = normalForce(constraint, hipVelocity);
-    share.spring_N = constraint.surface.stiffness_N_per_m * constraint.depth_m;
-    share.friction_N = share.spring_N * (contactSet.sliding ? constraint.surface.dynamic_friction
-                                                            : constraint.surface.static_friction);
+    share.spring_N = contactSet.spring.stiffness_N_per_m * (constraint.presence * constraint.depth_m);
+    share.normal_N = normalForce(constraint, share.spring_N, hipVelocity);
+    share.friction_N = contactSet.frictionOf(constraint.surface) * share.normal_N + constraint.adhesion_N;
     share.contact->force_N += share.normal_N * constraint.forceDirection;
     out.normalForce_N += share.normal_N * constraint.forceDirection;
     unshaded += share.normal_N * constraint.halfSpace.normal;
@@ -69,41 +67,53 @@ void addNormalForces(const ContactSet& contactSet, const Vec3& proxy_m, const Ve
   for (std::uint32_t i = 0; i < out.contactCount; ++i) out.contacts[i].force_N *= kept;
 }
 
-// Friction and adhesion act along the lateral part; each face bears its share of their bound.
+// Adds a force to the contacts in proportion to a part of their shares.
+template <class Part>
+void distribute(const Vec3& force, const ContactShares& shares, int count, Part&& part) {
+  double all = 0;
+  for (int i = 0; i < count; ++i) all += part(shares[static_cast<std::size_t>(i)]);
+  if (!(all > 0)) {
+    shares[0].contact->force_N += force;
+    return;
+  }
+  for (int i = 0; i < count; ++i) {
+    const ContactShare& share = shares[static_cast<std::size_t>(i)];
+    share.contact->force_N += part(share) / all * force;
+  }
+}
+
+// The slope of the stiffness pushes along the surfaces. Friction and adhesion bear what else the lateral part
+// of the spring exerts, each contact within its bound.
 void addTangentialForces(const ContactSet& contactSet, const ContactShares& shares, Rendering& out) {
   Vec3 spring = Vec3::Zero();
-  double friction = 0;
-  double weight = 0;
-  double adhesion = 0;
+  double bound = 0;
   for (int i = 0; i < contactSet.count; ++i) {
-    const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
     const ContactShare& share = shares[static_cast<std::size_t>(i)];
-    spring += share.spring_N * constraint.halfSpace.normal;
-    friction += share.friction_N;
-    weight += share.spring_N;
-    adhesion += constraint.adhesion_N;
+    spring += share.spring_N * contactSet.constraints[static_cast<std::size_t>(i)].halfSpace.normal;
+    bound += share.friction_N;
   }
-  const double stretch = contactSet.lateral_m.norm();
-  if (!(stretch > 0) || !(weight > 0) || !(out.depth_m > 0)) return;
-  const double perFriction = out.normalForce_N.norm() / weight;
-  const double limit = friction * perFriction + adhesion;
-  if (!(limit > 0)) return;
+  if (!(out.depth_m > 0)) return;
+  const Vec3 slope = contactSet.spring.slope_N + contactSet.spring.turn_N;
+  if (!slope.isZero(0)) {
+    out.contactForce_N += slope;
+    distribute(slope, shares, contactSet.count, [](const ContactShare& s) { return s.spring_N; });
+  }
+  if (!(bound > 0)) return;
   const double stiffness = spring.norm() / out.depth_m;
-  const Vec3 force = contactSet.lateral_m * (std::min(stiffness * stretch, limit) / stretch);
-  for (int i = 0; i < contactSet.count; ++i) {
-    const ContactShare& share = shares[static_cast<std::size_t>(i)];
-    const double held =
-        share.friction_N * perFriction + contactSet.constraints[static_cast<std::size_t>(i)].adhesion_N;
-    share.contact->force_N += held / limit * force;
-  }
-  out.contactForce_N += force;
+  const Vec3 lateral = stiffness * contactSet.lateral_m - contactSet.spring.slope_N;
+  const double force = lateral.norm();
+  if (!(force > 0)) return;
+  const Vec3 friction = std::min(1.0, bound / force) * lateral;
+  out.contactForce_N += friction;
+  distribute(friction, shares, contactSet.count, [](const ContactShare& s) { return s.friction_N; });
 }
 
 }  // namespace
 
 void applySurfaceLaw(const ContactSet& contactSet, const Vec3& proxy_m, const Vec3& hipVelocity_m_per_s,
                      double toolRadius_m, Rendering& out) noexcept {
-  if (contactSet.count == 0) return;
+  // The proxy keeps a small distance from faces, so that it may be held before the HIP is below them.
+  if (contactSet.normal_m.isZero(0)) return;
   ContactShares shares;
   addNormalForces(contactSet, proxy_m, hipVelocity_m_per_s, toolRadius_m, shares, out);
   Vec3 inward = Vec3::Zero();

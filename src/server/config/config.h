@@ -66,6 +66,8 @@ struct DeviceConfig {
   double toolRadius_m = 0;
   std::vector<double> workspace_mm;  ///< min xyz, max xyz; empty: that of the device
   bool forceShading = false;  ///< turn the force towards the interpolated vertex normals of smooth meshes
+  double stribeckSpeed_m_per_s = 0;    ///< over which friction falls from static to dynamic; 0: at once
+  bool vibrationContactPulls = false;  ///< contact vibrations may exceed the normal force
   MaterialScale materialScale = MaterialScale::reference;
   QuaternionOrder quaternionOrder = QuaternionOrder::xyzw;
   ForceReport forceReport = ForceReport::total;

@@ -47,11 +47,13 @@ void visitFields(Visitor& visitor, Device& device) {
   visitor.milli("tool_radius_mm", device.toolRadius_m);
   visitor.workspace("workspace", device.workspace_mm);
   visitor.field("force_shading", device.forceShading);
+  visitor.milli("stribeck_speed_mm_per_s", device.stribeckSpeed_m_per_s);
   visitor.choice("material_scale", device.materialScale, kMaterialScales);
   visitor.choice("quaternion_order", device.quaternionOrder, kQuaternionOrders);
   visitor.choice("force_report", device.forceReport, kForceReports);
   visitor.choice("workspace_fit", device.workspaceFit, kWorkspaceFits);
   visitor.choice("vibration_contact_unit", device.vibrationContactUnit, kVibrationUnits);
+  visitor.field("vibration_contact_pulls", device.vibrationContactPulls);
   visitor.choice("vibration_motor_frame", device.vibrationMotorFrame, kVibrationFrames);
   visitor.field("scene", device.scene);
   visitor.choice("scene_on_disconnect", device.sceneOnDisconnect, kSceneOnDisconnects);

@@ -48,6 +48,8 @@ realtime::TickOptions tickOptions(const DeviceConfig& config, const device::Devi
   options.rate_Hz = config.servoRate_Hz;
   options.render.toolRadius_m = config.toolRadius_m;
   options.render.forceShading = config.forceShading;
+  options.render.stribeckSpeed_m_per_s = config.stribeckSpeed_m_per_s;
+  options.render.contactVibrationPulls = config.vibrationContactPulls;
   options.guard = realtime::GuardOptions::of(device.profile());
   options.guard.selfRecover = !device.traits().needsRearm;
   return options;

@@ -97,7 +97,46 @@ TEST_P(FreeForcesTest, contact_vibration_only_while_touching) {
   start({0.0013, 0.0021, 0.001});
   EXPECT_EQ(to({0.0013, 0.0021, 0.0005}).force_N.norm(), 0);
   const double phase = 200 * base::toSeconds(hand->time());
-  EXPECT_NEAR(at({0.0013, 0.0021, -0.001}).force_N.z(), 1 + 1.5 * std::sin(phase), 1e-4);
+  EXPECT_NEAR(at({0.0013, 0.0021, -0.002}).force_N.z(), 2 + 1.5 * std::sin(phase), 1e-4);
+}
+
+// 1 N of the surface and vibrations of 1.5 N twice: the surface lets go at most, unless an option lets it
+// pull.
+TEST_P(FreeForcesTest, contact_vibration_does_not_pull) {
+  scene::Effect e = effect(EffectType::contactVibration);
+  scene.effects = {e, e};
+  scene.effects[1].index = e.index + 1;
+  add(plane(0.05, 10), surface());
+  for (const bool pulls : {false, true}) {
+    RenderOptions options;
+    options.contactVibrationPulls = pulls;
+    start({0.0013, 0.0021, 0.001}, options);
+    at({0.0013, 0.0021, -0.001});
+    double least = 1;
+    for (int i = 0; i < 100; ++i) {
+      const double phase = 200 * base::toSeconds(hand->time());
+      const double force = at({0.0013, 0.0021, -0.001}).force_N.z();
+      EXPECT_NEAR(force, pulls ? 1 + 3 * std::sin(phase) : std::max(0.0, 1 + 3 * std::sin(phase)), 1e-4);
+      least = std::min(least, force);
+    }
+    EXPECT_NEAR(least, pulls ? -2 : 0, 0.05);
+  }
+}
+
+// A sweep of the frequency: the angle is its integral, so no step of the force is larger than one of the
+// angle.
+TEST_P(FreeForcesTest, frequency_of_a_running_vibration_changes_without_a_jump) {
+  scene::Effect e = effect(EffectType::motorVibration);
+  run(e);
+  start({0, 0, 0});
+  double angle = 0;
+  for (int i = 1; i < 400; ++i) {
+    angle += e.angularFrequency_rad_per_s * 1e-3;
+    e.angularFrequency_rad_per_s = 200 + 150 * std::sin(0.1 * i);
+    run(e);
+    hand->show(scene.snapshot());
+    EXPECT_NEAR((at({0, 0, 0}).force_N - 1.5 * Vec3(std::cos(angle), std::sin(angle), 0)).norm(), 0, 1e-9);
+  }
 }
 
 TEST_P(FreeForcesTest, effects_end_and_ramp_out) {

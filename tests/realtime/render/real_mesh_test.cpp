@@ -156,8 +156,12 @@ class Judge {
   void see(const Vec3& hip, const Rendering& r, bool check) {
     const bool finished = (r.status & (kRenderIterationLimit | kRenderWorkLimit)) == 0;
     if (!finished) ++verdict.unfinished;
-    if (r.force_N.norm() > kStiffness * r.depth_m * std::sqrt(1 + mu_ * mu_) * 1.01 + 1e-9)
+    // Normal force by depth, and with friction by the spring to the proxy: between walls, friction is not
+    // bounded by the resultant.
+    if (r.normalForce_N.norm() > kStiffness * r.depth_m * 1.01 + 1e-9 ||
+        r.force_N.norm() > kStiffness * (hip - r.proxy_m).norm() * 1.01 + 1e-9) {
       ++verdict.tooStrong;
+    }
     if (r.touching) ++verdict.touching;
     if (started_) judgeWay(r);
     if (started_ && mu_ == 0) judgeStep(hip, r);

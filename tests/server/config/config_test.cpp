@@ -44,6 +44,8 @@ angular_tolerance_rad = 0.1
 tool_radius_mm = 2
 workspace = "paper"
 force_shading = true
+stribeck_speed_mm_per_s = 3
+vibration_contact_pulls = true
 scene = "shared"
 control = "list"
 control_list = ["10.0.0.5", "10.0.0.6"]
@@ -75,6 +77,8 @@ workspace = [-1, -2, -3, 4, 5, 6]
   EXPECT_DOUBLE_EQ(left.toolRadius_m, 0.002);
   EXPECT_EQ(left.workspace_mm, (std::vector<double>{-80, -80, -70, 80, 80, 20}));
   EXPECT_TRUE(left.forceShading);
+  EXPECT_DOUBLE_EQ(left.stribeckSpeed_m_per_s, 0.003);
+  EXPECT_TRUE(left.vibrationContactPulls);
   EXPECT_EQ(left.scene, "shared");
   EXPECT_EQ(left.control, Control::list);
   EXPECT_EQ(left.controlList, (std::vector<std::string>{"10.0.0.5", "10.0.0.6"}));
@@ -203,6 +207,8 @@ ServerConfig unusual() {
   device.vibrationContactUnit = VibrationUnit::hertz;
   device.vibrationMotorFrame = VibrationFrame::device;
   device.forceShading = true;
+  device.stribeckSpeed_m_per_s = 0.004;
+  device.vibrationContactPulls = true;
   device.scene = "shared";
   device.sceneOnDisconnect = SceneOnDisconnect::clear;
   device.control = Control::list;

@@ -1,0 +1,419 @@
+// Surfaces of unequal stiffness near each other: one potential, each surface's own stiffness alone, and never
+// more than the stiffest spring. The expected numbers follow from energies and from formulas given here.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <vector>
+
+#include "meshes.h"
+#include "scene_fixture.h"
+
+namespace hapticd::realtime::fixture {
+namespace {
+
+class StiffnessTest : public testing::Test {
+ protected:
+  std::mt19937 random{11};
+  SceneFixture scene;
+
+  double uniform(double from, double to) { return std::uniform_real_distribution<double>(from, to)(random); }
+  // Evenly in the logarithm: contrasts up to 40.
+  double stiffness() { return 50 * std::exp(uniform(0, std::log(40.0))); }
+
+  // A plate from the line through `edge` along +-y, `length` wide in the direction `out`, felt from `normal`.
+  scene::ObjectState& addPlate(const Vec3& edge, const Vec3& out, const Vec3& normal, double k,
+                               double length = 0.04, double mu = 0) {
+    TriangleMesh mesh;
+    const Vec3 y = 0.05 * Vec3::UnitY();
+    for (const Vec3& v :
+         {Vec3(edge - y), Vec3(edge + y), Vec3(edge + length * out + y), Vec3(edge + length * out - y)}) {
+      mesh.vertices.push_back(v.cast<float>());
+    }
+    const bool turned = y.cross(out).dot(normal) < 0;
+    mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+    if (turned) mesh.triangles = {{0, 2, 1}, {0, 3, 2}};
+    return scene.add(mesh, surface(k, mu, mu));
+  }
+  // A groove along y with its crease at the origin, `angle` between its walls, open upwards.
+  void addGroove(double angle, double left, double right, double mu = 0) {
+    const double c = std::cos(angle / 2);
+    const double s = std::sin(angle / 2);
+    addPlate(Vec3::Zero(), Vec3(-s, 0, c), Vec3(c, 0, s), left, 0.04, mu);
+    addPlate(Vec3::Zero(), Vec3(s, 0, c), Vec3(-c, 0, s), right, 0.04, mu);
+  }
+  void addPlane(const Vec3& normal, double height, double k) {
+    scene::Plane plane;
+    plane.index = static_cast<std::int32_t>(scene.planes.size());
+    plane.normal = normal;
+    plane.offset = -height;
+    plane.surface = surface(k);
+    scene.planes.push_back(plane);
+  }
+};
+
+// A smooth closed path.
+class ClosedPath {
+ public:
+  template <class Random>
+  ClosedPath(const Vec3& centre, double size, Random&& uniform) : centre_(centre) {
+    for (int k = 0; k < 3; ++k) {
+      for (Vec3* v : {&cosine_[k], &sine_[k]}) {
+        *v = size / (k + 1) * Vec3(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
+      }
+    }
+  }
+  Vec3 at(double share) const {
+    Vec3 p = centre_;
+    for (int k = 0; k < 3; ++k) {
+      const double a = 2 * M_PI * (k + 1) * share;
+      p += std::cos(a) * cosine_[k] + std::sin(a) * sine_[k];
+    }
+    return p;
+  }
+
+ private:
+  Vec3 centre_;
+  Vec3 cosine_[3];
+  Vec3 sine_[3];
+};
+
+struct Turn {
+  double work = 0;          // done on the hand
+  double proxyMoved = 0;    // from the start of the turn to its end
+  double largestRatio = 0;  // |F| / depth
+  double largestStep = 0;
+  double touching = 0;  // share of the ticks
+};
+
+// One turn of the hand, with the trapezoidal rule. A third unequal surface gives the potential a kink where
+// an edge is reached: ticks with `fine` are divided by a thousand, so that a step of the force costs no
+// accuracy.
+template <class Path>
+Turn turn(Hand& hand, const Path& path, int steps, const std::vector<bool>& fine = {}) {
+  Turn t;
+  Vec3 last = path(0.0);
+  hand.at(last);
+  Vec3 lastForce = hand.now().force_N;
+  const Vec3 proxy = hand.now().proxy_m;
+  for (int i = 1; i <= steps; ++i) {
+    const int parts = !fine.empty() && fine[static_cast<std::size_t>(i)] ? 1000 : 1;
+    for (int k = 1; k <= parts; ++k) {
+      const Vec3 p =
+          i == steps && k == parts ? path(0.0) : path((i - 1 + static_cast<double>(k) / parts) / steps);
+      const Rendering& r = hand.at(p);
+      t.work += 0.5 * (r.force_N + lastForce).dot(p - last);
+      t.largestStep = std::max(t.largestStep, (r.force_N - lastForce).norm());
+      if (r.depth_m > 0) t.largestRatio = std::max(t.largestRatio, r.force_N.norm() / r.depth_m);
+      t.touching += r.touching ? 1.0 / steps / parts : 0;
+      last = p;
+      lastForce = r.force_N;
+    }
+  }
+  t.proxyMoved = (hand.now().proxy_m - proxy).norm();
+  return t;
+}
+
+// The ticks of a turn in which the force steps.
+template <class Path>
+std::vector<bool> stepsOf(Hand& hand, const Path& path, int steps, double stiffest) {
+  std::vector<bool> fine(static_cast<std::size_t>(steps) + 1);
+  Vec3 last = path(0.0);
+  Vec3 lastForce = hand.at(last).force_N;
+  for (int i = 1; i <= steps; ++i) {
+    const Vec3 p = path(static_cast<double>(i % steps) / steps);
+    const Vec3 force = hand.at(p).force_N;
+    fine[static_cast<std::size_t>(i)] = (force - lastForce).norm() > 5 * stiffest * (p - last).norm();
+    last = p;
+    lastForce = force;
+  }
+  return fine;
+}
+
+constexpr int kSteps = 100'000;
+
+// The review's groove: circles of 1 mm, 3 mm below the crease. A sum of K_i d_i n_i gave 4.9 and 10.6 mJ.
+TEST_F(StiffnessTest, unequal_groove_gives_no_energy) {
+  for (const double degrees : {90.0, 60.0, 30.0, 15.0}) {
+    scene = SceneFixture();
+    addGroove(degrees * M_PI / 180, 1000, 100);
+    Hand hand(scene.snapshot());
+    hand.at({0, 0, 0.01});
+    hand.to({0, 0, -0.003});
+    for (const double way : {1.0, -1.0}) {
+      const auto circle = [&](double share) {
+        const double a = way * 2 * M_PI * share;
+        return Vec3(0.001 * std::sin(a), 0, -0.003 + 0.001 * (1 - std::cos(a)));
+      };
+      const Turn t = turn(hand, circle, kSteps);
+      EXPECT_NEAR(t.work, 0, 1e-9) << degrees;
+      EXPECT_LT(t.proxyMoved, 1e-8);
+      EXPECT_LE(t.largestRatio, 1000 * (1 + 1e-9)) << degrees;
+    }
+  }
+}
+
+TEST_F(StiffnessTest, force_in_a_narrow_groove_is_at_most_that_of_the_stiffer_wall) {
+  addGroove(15 * M_PI / 180, 1000, 100);
+  Hand hand(scene.snapshot());
+  hand.at({0, 0, 0.02});
+  hand.to({0, 0, 0});
+  hand.to({0, 0, -0.004}, 0.01,
+          [&](const Rendering& r) { EXPECT_LE(r.force_N.norm(), 1000 * r.depth_m * (1 + 1e-9) + 1e-9); });
+  EXPECT_NEAR(hand.now().depth_m, 0.004, 1e-6);
+  EXPECT_LE(hand.now().force_N.norm(), 4.0 * (1 + 1e-9));
+}
+
+// Pairs and triples of planes at random: the path passes faces, edges, corners and free space.
+TEST_F(StiffnessTest, closed_paths_over_random_planes_do_no_work) {
+  double worst = 0;
+  for (int i = 0; i < 12; ++i) {
+    scene = SceneFixture();
+    double stiffest = 0;
+    for (int k = 0; k < 2 + i % 2; ++k) {
+      const Vec3 n = Vec3(uniform(-1, 1), uniform(-1, 1), uniform(0.2, 1)).normalized();
+      const double stiff = stiffness();
+      stiffest = std::max(stiffest, stiff);
+      addPlane(n, uniform(-5e-4, 5e-4), stiff);
+    }
+    Hand hand(scene.snapshot());
+    hand.at({0, 0, 0.02});
+    const ClosedPath loop({uniform(-1e-3, 1e-3), uniform(-1e-3, 1e-3), uniform(-3e-3, 0)}, 1.2e-3,
+                          [this](double a, double b) { return uniform(a, b); });
+    hand.to(loop.at(0));
+    const auto path = [&](double share) { return loop.at(share); };
+    turn(hand, path, 2000);
+    const std::vector<bool> fine = stepsOf(hand, path, kSteps, stiffest);
+    EXPECT_LT(std::count(fine.begin(), fine.end(), true), 30) << "scene " << i;
+    const Turn t = turn(hand, path, kSteps, fine);
+    EXPECT_LE(std::abs(t.work), 1e-9) << "scene " << i;
+    EXPECT_LT(t.proxyMoved, 1e-8) << "scene " << i;
+    EXPECT_LE(t.largestRatio, stiffest * (1 + 1e-9)) << "scene " << i;
+    EXPECT_GT(t.touching, 0.3);
+    worst = std::max(worst, std::abs(t.work));
+  }
+  std::printf("largest |work| %.3g J\n", worst);
+}
+
+// The same with plates that pass through each other, in transforms of their own.
+TEST_F(StiffnessTest, closed_paths_over_random_plates_do_no_work) {
+  double worst = 0;
+  for (int i = 0; i < 6; ++i) {
+    scene = SceneFixture();
+    double stiffest = 0;
+    for (int k = 0; k < 2 + i % 2; ++k) {
+      const Vec3 n = Vec3(uniform(-0.7, 0.7), uniform(-0.7, 0.7), 1).normalized();
+      const double stiff = stiffness();
+      stiffest = std::max(stiffest, stiff);
+      Affine placed(Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), n));
+      placed.pretranslate(uniform(-5e-4, 5e-4) * n);
+      scene.add(plane(0.05, 7), surface(stiff), placed);
+    }
+    Hand hand(scene.snapshot());
+    hand.at({0, 0, 0.02});
+    const ClosedPath loop({uniform(-1e-3, 1e-3), uniform(-1e-3, 1e-3), uniform(-3e-3, 0)}, 1.2e-3,
+                          [this](double a, double b) { return uniform(a, b); });
+    hand.to(loop.at(0));
+    const auto path = [&](double share) { return loop.at(share); };
+    turn(hand, path, 2000);
+    const std::vector<bool> fine = stepsOf(hand, path, kSteps, stiffest);
+    EXPECT_LT(std::count(fine.begin(), fine.end(), true), 30) << "scene " << i;
+    const Turn t = turn(hand, path, kSteps, fine);
+    EXPECT_LE(std::abs(t.work), 1e-9) << "scene " << i;
+    EXPECT_LT(t.proxyMoved, 1e-8) << "scene " << i;
+    EXPECT_LE(t.largestRatio, stiffest * (1 + 1e-9)) << "scene " << i;
+    worst = std::max(worst, std::abs(t.work));
+  }
+  std::printf("largest |work| %.3g J\n", worst);
+}
+
+// A convex edge takes energy, as with equal surfaces, and gives none: also from soft to stiff.
+TEST_F(StiffnessTest, convex_edges_give_no_energy) {
+  for (int i = 0; i < 20; ++i) {
+    scene = SceneFixture();
+    const double angle = uniform(0.01, 1.2);
+    addPlate(Vec3::Zero(), -Vec3::UnitX(), Vec3::UnitZ(), stiffness());
+    addPlate(Vec3::Zero(), Vec3(std::cos(angle), 0, -std::sin(angle)),
+             Vec3(std::sin(angle), 0, std::cos(angle)), stiffness());
+    Hand hand(scene.snapshot());
+    hand.at({0, 0, 0.02});
+    const ClosedPath loop({uniform(-2e-3, 2e-3), 0, uniform(-3e-3, -1e-3)}, 2e-3,
+                          [this](double a, double b) { return uniform(a, b); });
+    hand.to(loop.at(0));
+    turn(
+        hand, [&](double s) { return loop.at(s); }, 2000);
+    EXPECT_LE(turn(
+                  hand, [&](double s) { return loop.at(s); }, 20'000)
+                  .work,
+              1e-8)
+        << "angle " << angle;
+  }
+}
+
+// K 100 | K 1000 at 2 mm depth: the way there costs the difference of the energies, the way back returns it.
+// The force along the seam follows from K(x), and is what 1/2 (K2 - K1) d^2 over a length of 2 w needs.
+TEST_F(StiffnessTest, flat_seam_costs_its_energy) {
+  constexpr double kDepth = 0.002;
+  const double width = std::hypot(0.001, 1.75 * kDepth);
+  addPlate(Vec3::Zero(), -Vec3::UnitX(), Vec3::UnitZ(), 100);
+  addPlate(Vec3::Zero(), Vec3::UnitX(), Vec3::UnitZ(), 1000);
+  Hand hand(scene.snapshot());
+  hand.at({-0.01, 0.0003, 0.001});
+  hand.to({-0.01, 0.0003, -kDepth});
+  EXPECT_EQ(hand.now().force_N.z(), 100 * kDepth);
+  double there = 0;
+  double largest = 0;
+  double step = 0;
+  Vec3 last = hand.hip();
+  Vec3 lastForce = hand.now().force_N;
+  const auto measure = [&](double& work) {
+    return [&](const Rendering& r) {
+      const double t = std::min(1.0, std::abs(hand.hip().x()) / width);
+      EXPECT_NEAR(-r.force_N.x(), 0.5 * 900 * kDepth * kDepth / width * 1.5 * 2 * t * (1 - t), 1e-5);
+      work += 0.5 * (r.force_N + lastForce).dot(hand.hip() - last);
+      step = std::max(step, (r.force_N - lastForce).norm());
+      largest = std::max(largest, std::abs(r.force_N.x()));
+      last = hand.hip();
+      lastForce = r.force_N;
+    };
+  };
+  hand.to({0.01, 0.0003, -kDepth}, 0.01, measure(there));
+  EXPECT_NEAR(hand.now().force_N.z(), 1000 * kDepth, 1e-9);
+  EXPECT_NEAR(there, -0.5 * 900 * kDepth * kDepth, 1e-7);
+  double back = 0;
+  hand.to({-0.01, 0.0003, -kDepth}, 0.01, measure(back));
+  EXPECT_NEAR(there + back, 0, 1e-9);
+  EXPECT_LT(step, 0.01);  // 1.8 N without a width
+  std::printf("largest tangential force %.3f N\n", largest);
+}
+
+// A surface keeps its stiffness, to the bit, where no other one is within the width; a floor below a sheet
+// and the hidden side of a crossing plate are not there to be felt.
+TEST_F(StiffnessTest, surface_touched_alone_keeps_its_stiffness) {
+  scene.add(plane(0.02, 5), surface(200));
+  TriangleMesh floor = plane(0.02, 5);
+  geometry::scaleAndMove(floor, 1, Vec3(0, 0, -0.002));
+  scene.add(floor, surface(2000));
+  TriangleMesh beside = plane(0.01, 5);
+  geometry::scaleAndMove(beside, 1, Vec3(0.04, 0, 0));
+  scene.add(beside, surface(900));
+  Hand hand(scene.snapshot());
+  hand.at({0.001, 0.002, 0.001});
+  for (int i = 1; i <= 40; ++i) {
+    const double depth = i * 1e-4;
+    const Rendering& r = hand.to({0.001, 0.002, -depth});
+    EXPECT_EQ(r.force_N, Vec3(0, 0, r.depth_m * 200)) << depth;
+  }
+}
+
+// Two plates that are one plane, within rounding or 0.0001 rad: as one plate, also beside a third stiffness.
+TEST_F(StiffnessTest, nearly_coplanar_faces_act_as_one) {
+  for (const double tilt : {0.0, 1e-7, -1e-7, 1e-4, -1e-4}) {
+    SceneFixture one;
+    const auto other = plane(0.01, 5);
+    std::swap(one, scene);
+    addPlate({-0.03, 0, 0}, Vec3::UnitX(), Vec3::UnitZ(), 500, 0.03);
+    addPlate(Vec3::Zero(), Vec3::UnitX(), Vec3::UnitZ(), 500, 0.002);
+    addPlate({0.002, 0, 0}, Vec3::UnitX(), Vec3::UnitZ(), 1500, 0.02);
+    std::swap(one, scene);
+    scene = SceneFixture();
+    addPlate({-0.03, 0, 0.03 * tilt}, Vec3(1, 0, -tilt).normalized(), Vec3(tilt, 0, 1).normalized(), 500,
+             0.03);
+    addPlate(Vec3::Zero(), Vec3::UnitX(), Vec3::UnitZ(), 500, 0.002);
+    addPlate({0.002, 0, 0}, Vec3::UnitX(), Vec3::UnitZ(), 1500, 0.02);
+    Hand flat(one.snapshot());
+    Hand tilted(scene.snapshot());
+    for (Hand* hand : {&flat, &tilted}) {
+      hand->at({-0.004, 0.0003, 0.001});
+      hand->to({-0.004, 0.0003, -0.001});
+    }
+    for (int i = 0; i <= 500; ++i) {
+      const Vec3 p(-0.004 + 1e-5 * i, 0.0003, -0.001);
+      const Vec3 f = flat.at(p).force_N;
+      EXPECT_NEAR((tilted.at(p).force_N - f).norm(), 0, 1e-4 + 20 * std::abs(tilt))
+          << tilt << " at " << p.x();
+    }
+  }
+}
+
+// No more than the stiffest spring, whatever meets: plates, planes, boxes, point and ball.
+TEST_F(StiffnessTest, force_never_exceeds_the_stiffest_spring) {
+  for (int i = 0; i < 40; ++i) {
+    scene = SceneFixture();
+    scene.faces = i % 3 == 0 ? scene::TouchableFaces::both : scene::TouchableFaces::front;
+    double stiffest = 0;
+    const auto any = [&] {
+      const double k = stiffness();
+      stiffest = std::max(stiffest, k);
+      return k;
+    };
+    for (int k = 0; k < 5; ++k) {
+      const Vec3 n = Vec3(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)).normalized();
+      Affine placed(Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), n));
+      placed.pretranslate(Vec3(uniform(-4e-3, 4e-3), uniform(-4e-3, 4e-3), uniform(-4e-3, 4e-3)));
+      if (k % 2 == 0) {
+        scene.add(box(Vec3::Constant(-0.003), Vec3::Constant(0.003)), surface(any()), placed);
+      } else {
+        scene.add(plane(0.006, 5), surface(any()), placed);
+      }
+    }
+    if (i % 2 == 0) addPlane(Vec3(0.1, 0.2, 1).normalized(), -0.004, any());
+    RenderOptions options;
+    options.toolRadius_m = i % 4 == 3 ? 0.001 : 0;
+    Hand hand(scene.snapshot(), options);
+    hand.at({0, 0, 0.02});
+    for (int k = 0; k < 12; ++k) {
+      hand.to({uniform(-6e-3, 6e-3), uniform(-6e-3, 6e-3), uniform(-6e-3, 6e-3)}, 0.05,
+              [&](const Rendering& r) {
+                EXPECT_LE(r.force_N.norm(), stiffest * r.depth_m * (1 + 1e-9) + 1e-12) << "scene " << i;
+              });
+    }
+  }
+}
+
+// Millimetres and other transforms of the same scene give the same force.
+TEST_F(StiffnessTest, blend_does_not_depend_on_the_unit) {
+  std::array<Vec3, 2> force;
+  for (std::size_t k = 0; k < 2; ++k) {
+    scene = SceneFixture();
+    const double units = k == 0 ? 1 : 1000;
+    scene.setWorldUnitsPerMetre(units);
+    for (const double side : {-1.0, 1.0}) {
+      Affine placed{Eigen::UniformScaling<double>(units)};
+      placed.translate(Vec3(side * 0.02, 0, 0));
+      scene.add(plane(0.02, 8), surface(side < 0 ? 300 : 1200), placed);
+    }
+    Hand hand(scene.snapshot());
+    hand.at({0.0007, 0.0003, 0.001});
+    force[k] = hand.to({0.0007, 0.0003, -0.001}).force_N;
+  }
+  EXPECT_NEAR((force[1] - force[0]).norm(), 0, 1e-6);
+  EXPECT_LT(force[0].x(), -0.01);
+}
+
+// With friction the slope of the stiffness is held by the proxy, and a cycle gives no energy either.
+TEST_F(StiffnessTest, friction_on_a_seam_gives_no_energy) {
+  for (const double mu : {0.02, 0.1, 0.5}) {
+    scene = SceneFixture();
+    addPlate(Vec3::Zero(), -Vec3::UnitX(), Vec3::UnitZ(), 100, 0.04, mu);
+    addPlate(Vec3::Zero(), Vec3::UnitX(), Vec3::UnitZ(), 1000, 0.04, mu);
+    for (int i = 0; i < 6; ++i) {
+      Hand hand(scene.snapshot());
+      hand.at({0, 0, 0.01});
+      const ClosedPath loop({uniform(-1e-3, 1e-3), 0, -2e-3}, i % 2 == 0 ? 2e-3 : 3e-4,
+                            [this](double a, double b) { return uniform(a, b); });
+      hand.to(loop.at(0));
+      for (int k = 0; k < 2; ++k)
+        turn(
+            hand, [&](double s) { return loop.at(s); }, 20'000);
+      EXPECT_LE(turn(
+                    hand, [&](double s) { return loop.at(s); }, 20'000)
+                    .work,
+                1e-8)
+          << mu << " " << i;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace hapticd::realtime::fixture
