@@ -121,6 +121,21 @@ TEST_P(Appearing, parts_that_overlap_and_inverted_meshes) {
   }
 }
 
+// The object leaves the hand instead of the hand the object.
+TEST_P(Appearing, object_that_moves_away_from_the_hand_does_not_take_it_along) {
+  const Vec3 inside(0.0011, 0.0047, 0.0013);
+  loop.rest(inside, toNanos(0.1));
+  addCube();
+  loop.rest(inside, toNanos(0.3));
+  EXPECT_NE(loop.out.status, 0U);
+  loop.place(0, {0, -12, 0});
+  loop.rest(inside, toNanos(0.3), [&] { EXPECT_EQ(loop.out.force_N.norm(), 0); });
+  EXPECT_EQ(loop.out.status, 0U);
+  loop.place(0, {0, -3 - 1e3 * GetParam(), 0});
+  loop.rest(inside, toNanos(0.1));
+  EXPECT_NEAR(loop.out.force_N.y(), 0.0023 * kStiffness_N_per_m, 0.01);
+}
+
 // A room whose walls face inwards, touchable from the front: the hand is not behind its walls.
 TEST_P(Appearing, room_around_the_hand_is_felt_at_once) {
   loop.send(scene::SetTouchableFaces{0});
