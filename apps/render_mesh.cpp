@@ -22,6 +22,7 @@ namespace hapticd::apps {
 namespace {
 
 using base::Nanos;
+using geometry::Vec3;
 
 constexpr Nanos kPeriod = 1'000'000;
 
@@ -86,13 +87,14 @@ Summary follow(const MeshRenderOptions& options, const device::HandFile& hand,
     const Nanos before = base::now();
     renderer.step(snapshot, state, t, kPeriod, rendering);
     const Nanos step_ns = base::now() - before;
-    const geometry::Vec3 force_N = guard.step({.force_N = rendering.force_N,
-                                     .state = &state,
-                                     .period = kPeriod,
-                                     .late = 0,
-                                     .writeFailed = false,
-                                     .geometryJump = (rendering.status & realtime::kRenderGeometryJump) != 0,
-                                     .deepContact = (rendering.status & realtime::kRenderReleased) != 0});
+    const Vec3 force_N = guard.step(
+        {.force_N = rendering.force_N,
+         .state = &state,
+         .period = kPeriod,
+         .late = 0,
+         .writeFailed = false,
+         .geometryJump = (rendering.status & realtime::kRenderGeometryJump) != 0,
+         .deepContact = (rendering.status & (realtime::kRenderReleased | realtime::kRenderEnclosed)) != 0});
 
     realtime::TickReport tick;
     tick.tick = summary.step_us.size() + 1;

@@ -17,6 +17,9 @@ namespace hapticd::realtime {
 
 inline constexpr int kMaxCasts = 128;     ///< per tick; a path over 0.2 mm cells at 1 m/s needs about 20
 inline constexpr double kJump_m = 0.030;  ///< a longer move in one tick is a jump
+inline constexpr double kNear_m = 0.050;  ///< parts of an object this near decide whether its pose is a jump
+inline constexpr double kFastestHip_m_per_s = 1.2;  ///< a late tick allows a first contact this much deeper
+inline constexpr double kLongestTick_s = 0.050;
 inline constexpr double kGatherMargin_m = 10e-6;  ///< tremor of the HIP
 
 /// One face that keeps the proxy from the HIP.
@@ -95,6 +98,12 @@ class Proxy {
   void push(const Vec3& from, std::uint32_t& status) noexcept;
   void pushByDeformingFaces(const Vec3& from, double reach, std::uint32_t& status) noexcept;
   void pushByPlanes(std::uint32_t& status) noexcept;
+  bool isJump(const PlacedObject& object) const noexcept;
+  static bool isJump(const PlacedObject& object, std::uint32_t triangle) noexcept;
+  bool contactChangedByCommand() const noexcept;
+  void liftOutOf(const PlacedObject& object) noexcept;
+  void releaseByJump(std::uint32_t& status) noexcept;
+  static double missedMove(const PlacedObject& object) noexcept;
   void updateProxy(const Vec3& hip) noexcept;
   void moveFrictionless(const Vec3& target, ActiveSet& active) noexcept;
   bool approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Vec3& goal) noexcept;
@@ -131,7 +140,8 @@ class Proxy {
   bool popthroughArmed_ = true;
   int overworked_ = 0;  // ticks in a row whose work was spent
   double share_ = 1;
-  bool released_ = false;  // contact released until the HIP leaves the surface
+  bool released_ = false;       // contact released until the HIP leaves the surface
+  bool carriedByJump_ = false;  // in this tick
   Vec3 position_ = Vec3::Zero();
   Vec3 reported_ = Vec3::Zero();
   Vec3 positionBefore_ = Vec3::Zero();

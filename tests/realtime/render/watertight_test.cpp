@@ -75,7 +75,7 @@ TEST_P(SegmentsTest, every_segment_into_a_closed_mesh_hits) {
     ContactQuery query(0);
     const auto newTick = [&] {
       query.beginTick({snapshot.get(), 0}, {snapshot.get(), 0});
-      query.addObjectsNear(offset(), 1);
+      query.addObjectsNear(offset(), 1, offset() + Vec3(1, 0, 0));
     };
     newTick();
     while (shots < segmentCount() * (faces == scene::TouchableFaces::front ? 1 : 2) / 2) {
