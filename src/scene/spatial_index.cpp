@@ -76,20 +76,6 @@ struct NearQuery {
   bool ended = false;
 };
 
-// A query with a shrinking radius: passes the caller's radius on to Embree.
-struct NearestQuery {
-  double (*thunk)(void*, std::uint32_t) noexcept;
-  void* visitor;
-  double scale;
-  RTCPointQuery* point;
-  static bool call(void* self, std::uint32_t id) noexcept {
-    const auto* query = static_cast<const NearestQuery*>(self);
-    const double radius = query->thunk(query->visitor, id) * query->scale * (1 + kRelativePad);
-    query->point->radius = std::min(query->point->radius, static_cast<float>(std::max(radius, 0.0)));
-    return true;
-  }
-};
-
 // A segment can ask for the boxes around its middle instead.
 struct AsNear {
   double (*thunk)(void*, std::uint32_t) noexcept;
@@ -104,10 +90,9 @@ struct AsNear {
 bool onNear(RTCPointQueryFunctionArguments* args) {
   auto* query = static_cast<NearQuery*>(args->userPtr);
   if (query->ended) return false;
-  const float radius = args->query->radius;
   query->ended = !query->thunk(query->visitor, args->primID);
   if (query->ended) args->query->radius = 0;  // Embree skips what is beyond it
-  return args->query->radius < radius;
+  return query->ended;
 }
 
 struct NearestQuery {
@@ -341,20 +326,6 @@ void SpatialIndex::visitNearImpl(const Vec3& centre, double radius, NearThunk th
   rtcInitPointQueryContext(&context);
   RTCPointQuery point = tree_->pointQuery(inside, radius);
   rtcPointQuery(tree_->scene, &point, &context, nullptr, &query);
-}
-
-void SpatialIndex::visitNearestImpl(const Vec3& centre, double radius, SegmentThunk thunk,
-                                    void* visitor) const noexcept {
-  if (!tree_) return;
-  // As in visitNearImpl().
-  const Vec3 inside = centre.cwiseMax(bounds_.min).cwiseMin(bounds_.max);
-  if (!((inside - centre).norm() <= radius + pad_)) return;
-  RTCPointQueryContext context;
-  rtcInitPointQueryContext(&context);
-  RTCPointQuery point = tree_->pointQuery(inside, radius);
-  NearestQuery query{thunk, visitor, tree_->scale, &point};
-  NearQuery adapter{&NearestQuery::call, &query, false};
-  rtcPointQuery(tree_->scene, &point, &context, nullptr, &adapter);
 }
 
 void SpatialIndex::visitSegmentImpl(const Vec3& from, const Vec3& to, SegmentThunk thunk,
