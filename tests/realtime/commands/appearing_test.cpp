@@ -1,0 +1,208 @@
+// Objects that appear around a HIP never grip it: they are felt once the HIP has left them.
+#include <cmath>
+
+#include "loop.h"
+
+namespace hapticd::realtime::commands {
+namespace {
+
+const std::vector<Vec3> kWays{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
+
+class Appearing : public testing::TestWithParam<double> {
+ protected:
+  Appearing() : loop({.toolRadius_m = GetParam()}) {}
+
+  void addCube(std::int32_t id = 0) { loop.add(id, boxTriples(Vec3::Constant(-10), Vec3::Constant(10))); }
+
+  // The hand leaves through a side without a force, and feels that side when it returns.
+  void expectFeltOnlyFromOutside(const Vec3& inside_m, const Vec3& way) {
+    double most = 0;
+    bool reported = true;
+    const Vec3 outside = inside_m + (0.011 + GetParam() - way.dot(inside_m)) * way;
+    loop.to(outside, [&] {
+      most = std::max(most, loop.out.force_N.norm());
+      const double height = way.dot(loop.state.position_m) - 0.010;
+      if (height < -1e-4) reported = reported && (loop.out.status & ~kRenderGeometryJump) != 0;
+    });
+    EXPECT_EQ(most, 0) << way.transpose();
+    EXPECT_TRUE(reported) << way.transpose();
+    loop.tick(outside + 0.001 * way);
+    EXPECT_EQ(loop.out.status, 0U) << way.transpose();
+    loop.to(outside - 0.003 * way);
+    EXPECT_NEAR(loop.out.force_N.dot(way), 0.002 * kStiffness_N_per_m, 0.01) << way.transpose();
+    loop.to(outside + 0.005 * way);
+  }
+
+  Loop loop;
+};
+INSTANTIATE_TEST_SUITE_P(, Appearing, testing::Values(0.0, 0.002),
+                         [](const auto& test) { return test.param > 0 ? "ball" : "point"; });
+
+TEST_P(Appearing, object_loaded_around_the_hand) {
+  for (const Vec3& way : kWays) {
+    loop.send(scene::ResetScene{});
+    const Vec3 inside = 0.003 * way + Vec3(0.0011, 0.0007, 0.0013);
+    loop.rest(inside, toNanos(0.1));
+    loop.send(scene::SetObjectNumber{1});
+    addCube();
+    loop.rest(inside, toNanos(0.1));
+    expectFeltOnlyFromOutside(inside, way);
+  }
+}
+
+TEST_P(Appearing, object_made_touchable_around_the_hand) {
+  addCube();
+  for (const Vec3& way : kWays) {
+    loop.send(scene::SetTouchable{0, false});
+    const Vec3 inside = 0.007 * way + Vec3(0.0011, 0.0007, 0.0013);
+    loop.rest(inside, toNanos(0.1));
+    loop.send(scene::SetTouchable{0, true});
+    loop.rest(inside, toNanos(0.1));
+    expectFeltOnlyFromOutside(inside, way);
+  }
+}
+
+TEST_P(Appearing, object_that_gets_stiffness_around_the_hand) {
+  addCube();
+  loop.send(scene::SetSurfaceProperty{0, "stiffness", 0});
+  const Vec3 inside(0.0011, 0.0007, 0.0013);
+  loop.rest(inside, toNanos(0.1));
+  loop.send(scene::SetSurfaceProperty{0, "stiffness", 1});
+  loop.rest(inside, toNanos(0.1));
+  expectFeltOnlyFromOutside(inside, {0, 1, 0});
+}
+
+TEST_P(Appearing, first_tick_inside_an_object) {
+  addCube();
+  loop.now += toNanos(0.1);
+  loop.publish();
+  expectFeltOnlyFromOutside({0.0011, 0.0007, 0.0013}, {0, 1, 0});
+}
+
+// A workspace that puts the hand into the object.
+TEST_P(Appearing, workspace_that_changes_around_the_hand) {
+  addCube();
+  loop.place(0, {0, 100, 0});
+  const Vec3 inside(0.0011, 0.0007, 0.0013);
+  loop.rest(inside, toNanos(0.5));
+  loop.send(scene::SetHapticOrigin{Vec3(0, 0.1, 0), Vec3::UnitX(), 0});
+  loop.rest(inside, toNanos(0.1));
+  expectFeltOnlyFromOutside(inside, {0, 1, 0});
+}
+
+TEST_P(Appearing, both_faces_of_a_mesh_around_the_hand) {
+  loop.send(scene::SetTouchableFaces{0});
+  addCube();
+  const Vec3 inside(0.0011, 0.0007, 0.0013);
+  loop.send(scene::SetTouchable{0, false});
+  loop.rest(inside, toNanos(0.1));
+  loop.send(scene::SetTouchable{0, true});
+  loop.rest(inside, toNanos(0.1));
+  loop.send(scene::SetTouchableFaces{2});
+  loop.rest(inside, toNanos(0.1));
+  expectFeltOnlyFromOutside(inside, {0, 1, 0});
+}
+
+// Within two overlapping parts of one mesh, and within a mesh that is wound the wrong way.
+TEST_P(Appearing, parts_that_overlap_and_inverted_meshes) {
+  std::vector<Vec3f> two = boxTriples(Vec3::Constant(-10), Vec3::Constant(10));
+  const std::vector<Vec3f> second = boxTriples(Vec3::Constant(-5), Vec3(9, 9, 9));
+  two.insert(two.end(), second.begin(), second.end());
+  std::vector<Vec3f> inverted = boxTriples(Vec3::Constant(-10), Vec3::Constant(10));
+  for (std::size_t i = 0; i < inverted.size(); i += 3) std::swap(inverted[i], inverted[i + 1]);
+  for (const auto& mesh : {two, inverted}) {
+    loop.send(scene::ResetScene{});
+    const Vec3 inside(0.0011, 0.0007, 0.0013);
+    loop.rest(inside, toNanos(0.1));
+    loop.send(scene::SetObjectNumber{1});
+    loop.add(0, mesh);
+    loop.rest(inside, toNanos(0.1));
+    expectFeltOnlyFromOutside(inside, {0, 1, 0});
+  }
+}
+
+// The object leaves the hand instead of the hand the object.
+TEST_P(Appearing, object_that_moves_away_from_the_hand_does_not_take_it_along) {
+  const Vec3 inside(0.0011, 0.0047, 0.0013);
+  loop.rest(inside, toNanos(0.1));
+  addCube();
+  loop.rest(inside, toNanos(0.3));
+  EXPECT_NE(loop.out.status, 0U);
+  loop.place(0, {0, -12, 0});
+  loop.rest(inside, toNanos(0.3), [&] { EXPECT_EQ(loop.out.force_N.norm(), 0); });
+  EXPECT_EQ(loop.out.status, 0U);
+  loop.place(0, {0, -3 - 1e3 * GetParam(), 0});
+  loop.rest(inside, toNanos(0.1));
+  EXPECT_NEAR(loop.out.force_N.y(), 0.0023 * kStiffness_N_per_m, 0.01);
+}
+
+// A room whose walls face inwards, touchable from the front: the hand is not behind its walls.
+TEST_P(Appearing, room_around_the_hand_is_felt_at_once) {
+  loop.send(scene::SetTouchableFaces{0});
+  std::vector<Vec3f> room = boxTriples(Vec3::Constant(-10), Vec3::Constant(10));
+  for (std::size_t i = 0; i < room.size(); i += 3) std::swap(room[i], room[i + 1]);
+  const Vec3 inside(0.0011, 0.0007, 0.0013);
+  loop.rest(inside, toNanos(0.1));
+  loop.add(0, room);
+  loop.rest(inside, toNanos(0.1));
+  EXPECT_EQ(loop.out.status, 0U);
+  loop.to({0.001, -0.012 + GetParam(), 0.002});
+  EXPECT_NEAR(loop.out.force_N.y(), 1, 0.01);
+}
+
+// Others are felt meanwhile: a floor inside the cube that appears.
+TEST_P(Appearing, other_objects_stay_felt) {
+  loop.add(0, boxTriples(Vec3(-5, -5, -5), Vec3(5, 0, 5)));
+  const Vec3 above(0.001, GetParam() + 0.001, 0.002);
+  loop.rest(above, toNanos(0.1));
+  loop.to(above - Vec3(0, 0.003, 0));
+  EXPECT_NEAR(loop.out.force_N.y(), 1, 0.01);
+  addCube(1);
+  loop.rest(above - Vec3(0, 0.003, 0), toNanos(0.1));
+  EXPECT_NEAR(loop.out.force_N.y(), 1, 0.01);
+  EXPECT_EQ(loop.out.touchedObject, 0);
+}
+
+// An open surface is not around the hand: a sheet approached from its back, and a cup from within.
+TEST_P(Appearing, open_surfaces_are_felt_at_once) {
+  loop.rest({0.001, -0.005, 0.002}, toNanos(0.1));
+  loop.add(0, sheetTriples(40));
+  loop.rest({0.001, -0.005, 0.002}, toNanos(0.1));
+  EXPECT_EQ(loop.out.status, 0U);
+  loop.to({0.001, 0.002 - GetParam(), 0.002});
+  EXPECT_NEAR(loop.out.force_N.y(), -1, 0.01) << "from the back";
+
+  loop.send(scene::ResetScene{});
+  const Vec3 inside(0.001, 0.001, 0.002);
+  loop.rest(inside, toNanos(0.1));
+  std::vector<Vec3f> cup = boxTriples(Vec3::Constant(-10), Vec3::Constant(10));
+  cup.erase(cup.begin() + 18, cup.begin() + 24);  // without its top
+  loop.send(scene::SetObjectNumber{1});
+  loop.add(0, cup);
+  loop.rest(inside, toNanos(0.1));
+  EXPECT_EQ(loop.out.status, 0U);
+  loop.to({0.001, -0.012 + GetParam(), 0.002});
+  EXPECT_NEAR(loop.out.force_N.y(), 1, 0.01) << "on the bottom of the cup";
+}
+
+// New triangles of a touched mesh: the proxy is outside, although the HIP is inside.
+TEST_P(Appearing, touched_mesh_with_new_triangles_stays_felt) {
+  addCube();
+  const Vec3 above(0.001, 0.011 + GetParam(), 0.002);
+  loop.rest(above, toNanos(0.1));
+  loop.to(above - Vec3(0, 0.003, 0));
+  EXPECT_NEAR(loop.out.force_N.y(), 1, 0.01);
+  for (const double top : {10.0, 10.1, 9.9}) {
+    std::vector<Vec3f> mesh = boxTriples(Vec3::Constant(-10), Vec3(10, top, 10));
+    const std::vector<Vec3f> more = boxTriples(Vec3(-10, -14, -10), Vec3(10, -12, 10));
+    mesh.insert(mesh.end(), more.begin(), more.end());
+    if (top == 9.9) mesh.resize(mesh.size() - 3);
+    loop.send(scene::ClearMesh{0});
+    loop.send(scene::SetVertices{0, 0, mesh});
+    loop.rest(above - Vec3(0, 0.003, 0), toNanos(0.3));
+  }
+  EXPECT_GE(loop.out.force_N.y(), 0);
+}
+
+}  // namespace
+}  // namespace hapticd::realtime::commands

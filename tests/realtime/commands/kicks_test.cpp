@@ -1,0 +1,201 @@
+// Forces in contact while a client changes surface, material and contact: no kick by a command.
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "loop.h"
+#include "realtime/servo/guard.h"
+
+namespace hapticd::realtime::commands {
+namespace {
+
+constexpr double kRounding_N = 1e-9;
+
+// The distance of `next` from the segment between zero and `last`.
+double turnOf(const Vec3& last, const Vec3& next) {
+  const double length2 = last.squaredNorm();
+  const double share = length2 > 0 ? std::clamp(next.dot(last) / length2, 0.0, 1.0) : 0.0;
+  return (next - share * last).norm();
+}
+
+class Kicks : public testing::Test {
+ protected:
+  static GuardOptions armed() {
+    GuardOptions options;
+    options.armed = true;
+    return options;
+  }
+  void tick(const Vec3& hip_m) {
+    loop.tick(hip_m);
+    GuardInput in;
+    in.force_N = loop.out.force_N;
+    in.state = &loop.state;
+    in.period = kMs;
+    in.geometryJump = (loop.out.status & kRenderGeometryJump) != 0;
+    const Vec3 next = guard.step(in);
+    step_N = std::max(step_N, (next - force_N).norm());
+    turn_N = std::max(turn_N, turnOf(force_N, next));
+    force_N = next;
+  }
+  void rest(const Vec3& hip_m, Nanos duration) {
+    for (Nanos t = 0; t < duration; t += kMs) tick(hip_m);
+  }
+  void press(double depth_m) {
+    Vec3 hip(0.001, 0.002, 0.002);
+    for (int i = 0; i < 600; ++i) tick(hip);
+    for (; hip.y() > -depth_m + 1e-9; hip.y() -= 1e-4) tick(hip);
+    pressed = {hip.x(), -depth_m, hip.z()};
+    rest(pressed, toNanos(0.1));
+    step_N = turn_N = 0;
+  }
+  // After a command: the force changes by at most 1 N/ms, and is that of `expected` after 50 ms.
+  void expectRamp(const std::string& what, const Vec3& expected_N) {
+    rest(pressed, toNanos(0.1));
+    EXPECT_LE(step_N, 1 + kRounding_N) << what;
+    EXPECT_NEAR((force_N - expected_N).norm(), 0, 0.02) << what;
+    step_N = turn_N = 0;
+  }
+  void addPlate(std::int32_t id = 0) { loop.add(id, boxTriples(Vec3(-40, -30, -40), Vec3(40, 0, 40))); }
+
+  Loop loop;
+  GuardControl control{true};
+  Guard guard{armed(), control, kMs};
+  Vec3 force_N = Vec3::Zero();
+  Vec3 pressed = Vec3::Zero();
+  double step_N = 0;
+  double turn_N = 0;
+};
+
+TEST_F(Kicks, stiffness_that_changes_under_pressure) {
+  addPlate();
+  loop.send(scene::SetSurface{0, 1.0, 0, 0, 0});
+  loop.send(scene::SetObjectScale{0, Vec3::Constant(0.001)});
+  press(0.003);
+  ASSERT_NEAR(force_N.y(), 3, 0.02);
+  for (const double stiffness : {0.2, 1.0, 0.1, 1.0}) {
+    loop.send(scene::SetSurface{0, stiffness, 0, 0, 0});
+    expectRamp("stiffness " + std::to_string(stiffness), {0, 3 * stiffness, 0});
+  }
+}
+
+TEST_F(Kicks, contact_that_a_command_ends) {
+  struct Row {
+    const char* name;
+    std::function<void()> command;
+    double left_N;
+  };
+  const Row rows[] = {
+      {"untouchable",
+       [&] {
+         loop.send(scene::SetTouchable{0, false});
+       },
+       0},
+      {"removed", [&] { loop.send(scene::RemoveObject{0}); }, 0},
+      {"cleared", [&] { loop.send(scene::ClearMesh{0}); }, 0},
+      {"no stiffness",
+       [&] {
+         loop.send(scene::SetSurfaceProperty{0, "stiffness", 0});
+       },
+       0},
+      {"popthrough",
+       [&] {
+         loop.send(scene::SetSurfaceProperty{0, "popthrough", 0.3});
+       },
+       0},
+      {"back faces", [&] { loop.send(scene::SetTouchableFaces{1}); }, 0},
+      {"scene reset", [&] { loop.send(scene::ResetScene{}); }, 0},
+      {"workspace", [&] { loop.send(scene::SetHapticScale{0.5}); }, 0.5},
+  };
+  for (const Row& row : rows) {
+    loop.send(scene::ResetScene{});
+    rest({0.001, 0.002, 0.002}, toNanos(0.1));
+    loop.send(scene::SetObjectNumber{1});
+    addPlate();
+    loop.send(scene::SetTouchable{0, true});
+    press(0.005);
+    ASSERT_NEAR(force_N.y(), 2.5, 0.02) << row.name;
+    row.command();
+    rest(pressed, toNanos(0.1));
+    EXPECT_LE(step_N, 1 + kRounding_N) << row.name;
+    if (row.left_N == 0) {
+      EXPECT_NEAR(force_N.norm(), 0, 0.01) << row.name;
+    }
+  }
+}
+
+TEST_F(Kicks, second_object_in_contact_that_vanishes) {
+  addPlate();
+  loop.add(1, boxTriples(Vec3(-40, -30, -40), Vec3(0.5, 30, 40)));
+  loop.rest({0.003, 0.002, 0.002}, toNanos(0.1));
+  Vec3 hip(0.003, 0.002, 0.002);
+  for (int i = 0; i < 600; ++i) tick(hip);
+  for (int i = 0; i < 55; ++i) tick(hip += Vec3(-1e-4, -1e-4, 0));
+  rest(pressed = hip, toNanos(0.1));
+  ASSERT_GT(force_N.x(), 1);
+  ASSERT_GT(force_N.y(), 1);
+  step_N = 0;
+  loop.send(scene::SetTouchable{1, false});
+  rest(pressed, toNanos(0.1));
+  EXPECT_LE(step_N, 1 + kRounding_N);
+  EXPECT_NEAR(force_N.x(), 0, 0.01);
+}
+
+TEST_F(Kicks, plane_of_the_scene_that_changes) {
+  const auto plane = [](double stiffness) {
+    scene::SetPlane p;
+    p.plane = {0, 1, 0, 0};
+    p.stiffness = stiffness;
+    return p;
+  };
+  loop.send(plane(1));
+  press(0.003);
+  ASSERT_NEAR(force_N.y(), 3, 0.02);
+  loop.send(plane(0.2));
+  rest(pressed, toNanos(0.1));
+  EXPECT_LE(step_N, 1 + kRounding_N) << "softer";
+  loop.send(plane(1));
+  rest(pressed, toNanos(0.1));
+  step_N = 0;
+  scene::SetPlane none = plane(1);
+  none.plane = {};
+  loop.send(none);
+  rest(pressed, toNanos(0.1));
+  EXPECT_LE(step_N, 1 + kRounding_N) << "removed";
+  EXPECT_NEAR(force_N.norm(), 0, 1e-6);
+}
+
+// A hand that slips off by its own motion is physics: the force may fall at once, but not turn.
+TEST_F(Kicks, slipping_off_falls_at_once_and_turns_slowly) {
+  addPlate();
+  press(0.005);
+  Vec3 hip = pressed;
+  for (int i = 0; i < 60; ++i) tick(hip += Vec3(0.001, 0, 0));
+  EXPECT_EQ(force_N.norm(), 0);
+  EXPECT_LE(turn_N, 1 + kRounding_N);
+}
+
+TEST_F(Kicks, large_force_of_a_strong_device_ramps_as_slowly) {
+  GuardOptions options = armed();
+  options.peakForce_N = options.continuousForce_N = 60;
+  Guard strong(options, control, kMs);
+  GuardInput in;
+  in.state = &loop.state;
+  in.period = kMs;
+  in.force_N = Vec3(0, 60, 0);
+  Vec3 last = Vec3::Zero();
+  for (int i = 0; i < 700; ++i) last = strong.step(in);
+  ASSERT_NEAR(last.y(), 60, 1e-6);
+  in.force_N = Vec3(0, 2, 0);
+  in.geometryJump = true;
+  for (int i = 0; i < 100; ++i) {
+    const Vec3 next = strong.step(in);
+    in.geometryJump = false;
+    EXPECT_LE((next - last).norm(), 1 + kRounding_N) << i;
+    last = next;
+  }
+  EXPECT_NEAR(last.y(), 2, 1e-6);
+}
+
+}  // namespace
+}  // namespace hapticd::realtime::commands

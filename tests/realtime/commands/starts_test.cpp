@@ -1,0 +1,258 @@
+// Objects and meshes that start to move beside a resting hand, streams of poses that stall, late ticks, and
+// poses that are too far to be a motion. The oracle is the client's own path of a flat face.
+#include <cmath>
+#include <random>
+
+#include "loop.h"
+
+namespace hapticd::realtime::commands {
+namespace {
+
+constexpr double kFrame_s = 1.0 / 60;
+
+// A solid plate or a thin sheet whose upper face is at y = 0 of its frame.
+std::vector<Vec3f> plate(bool solid) {
+  return solid ? boxTriples(Vec3(-40, -20, -40), Vec3(40, 0, 40)) : sheetTriples(40);
+}
+
+class Starts : public testing::TestWithParam<std::tuple<bool, double>> {
+ protected:
+  static constexpr double kHeight_m = 0.003;  // of the hand, at rest
+
+  Starts() : loop({.toolRadius_m = std::get<1>(GetParam())}) {
+    loop.add(0, plate(std::get<0>(GetParam())));
+    loop.place(0, {0, top_mm(0), 0});
+    loop.rest(hip, toNanos(0.5));
+  }
+  double radius() const { return std::get<1>(GetParam()); }
+  // World height at which the plate's face is `gap` below the tool.
+  double top_mm(double above_m) const { return 1e3 * (hip.y() - radius() - gap_m + above_m); }
+  // The face is `depth` above the lowest point of the tool.
+  ::testing::AssertionResult feels(double depth_m) const {
+    const double force = loop.out.force_N.y();
+    if (std::abs(force - kStiffness_N_per_m * depth_m) < 0.02 && loop.out.status == 0)
+      return ::testing::AssertionSuccess();
+    return ::testing::AssertionFailure()
+           << "force " << force << " N at depth " << depth_m << " m, status " << loop.out.status;
+  }
+
+  const Vec3 hip{0.001, kHeight_m, 0.002};
+  double gap_m = 0.0005;
+  Loop loop;
+};
+INSTANTIATE_TEST_SUITE_P(, Starts, testing::Combine(testing::Bool(), testing::Values(0.0, 0.002)),
+                         [](const auto& test) {
+                           return std::string(std::get<0>(test.param) ? "solid_" : "sheet_") +
+                                  (std::get<1>(test.param) > 0 ? "ball" : "point");
+                         });
+
+TEST_P(Starts, object_at_rest_that_starts_to_move_takes_the_hand_along) {
+  for (const double speed : {0.02, 0.05, 0.3, 0.9}) {
+    loop.place(0, {0, top_mm(0), 0});
+    loop.rest(hip, toNanos(0.5));
+    const double way = std::min(0.02, 0.3 * speed);
+    Nanos next = loop.now;
+    const Nanos begin = loop.now;
+    while (loop.now < begin + toNanos(way / speed)) {
+      if (loop.now >= next) {
+        loop.place(0, {0, top_mm(speed * base::toSeconds(next - begin + toNanos(kFrame_s))), 0});
+        next += toNanos(kFrame_s);
+      }
+      loop.tick(hip);
+    }
+    loop.place(0, {0, top_mm(way), 0});
+    loop.rest(hip, 100 * kMs);
+    EXPECT_TRUE(feels(way - gap_m)) << speed << " m/s";
+  }
+}
+
+TEST_P(Starts, single_pose_after_a_pause_is_a_motion) {
+  for (const double way : {0.001, 0.005, 0.019}) {
+    loop.place(0, {0, top_mm(0), 0});
+    loop.rest(hip, toNanos(2));
+    loop.place(0, {0, top_mm(way), 0});
+    double last = 0;
+    loop.rest(hip, 60 * kMs, [&] {
+      EXPECT_LE(loop.out.force_N.y() - last, kStiffness_N_per_m * 1.0001e-3 * std::max(1.0, way / 0.016))
+          << "slower than 1 m/s";
+      last = loop.out.force_N.y();
+    });
+    EXPECT_TRUE(feels(way - gap_m)) << way << " m";
+  }
+}
+
+// The client goes on where it would be after the stall.
+TEST_P(Starts, stalled_stream_does_not_swallow_the_hand) {
+  int felt = 0;
+  for (const double speed : {0.02, 0.05, 0.1, 0.3}) {
+    for (const double stall : {0.09, 0.11, 0.3}) {
+      for (const double before : {0.0, 0.2, 0.9}) {  // share of the stall's way between the face and the hand
+        const double way = speed * (stall + 0.05);
+        loop.place(0, {0, top_mm(-0.06), 0});
+        loop.rest(hip, toNanos(0.5));
+        Nanos next = loop.now;
+        const Nanos begin = loop.now;
+        const double start = -0.2 * speed - before * way;
+        const auto path = [&](Nanos t) { return start + speed * base::toSeconds(t - begin); };
+        bool released = false;
+        const auto stream = [&](Nanos duration) {
+          for (const Nanos end = loop.now + duration; loop.now < end;) {
+            if (loop.now >= next) {
+              loop.place(0, {0, top_mm(path(loop.now)), 0});
+              next = loop.now + toNanos(kFrame_s);
+            }
+            loop.tick(hip);
+            released = released || loop.out.status != 0;
+          }
+        };
+        stream(toNanos(0.2));
+        const double standing = path(loop.now);
+        loop.rest(hip, toNanos(stall), [&] { released = released || loop.out.status != 0; });
+        const bool jump = path(loop.now) - standing > 0.02 - 0.3 * kFrame_s;
+        next = loop.now;
+        stream(toNanos(0.05));
+        const double end = std::max(path(loop.now), gap_m + 0.001);
+        loop.place(0, {0, top_mm(end), 0});
+        loop.rest(hip, 100 * kMs);
+        if (jump && released) continue;  // a jump may release the hand, with a status
+        EXPECT_TRUE(feels(end - gap_m)) << speed << " m/s, stall of " << stall << " s, " << before;
+        ++felt;
+      }
+    }
+  }
+  EXPECT_GE(felt, 24);
+}
+
+// Periods of 3 to 50 ms at random while the plate rams the hand.
+TEST_P(Starts, late_ticks_do_not_swallow_the_hand) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  int rams = 0;
+  for (const double speed : {0.1, 0.3, 0.5, 1.0}) {
+    for (int round = 0; round < 30; ++round) {
+      const double way = 0.012 + 0.01 * uniform(random);
+      const double start = -0.01 - 0.03 * uniform(random);
+      loop.place(0, {0, top_mm(-0.06), 0});
+      loop.rest(hip, toNanos(0.3));
+      const Nanos begin = loop.now;
+      const auto path = [&](Nanos t) { return std::min(way, start + speed * base::toSeconds(t - begin)); };
+      Nanos next = begin;
+      bool ended = false;
+      while (!ended) {
+        const Nanos period = uniform(random) < 0.25 ? toNanos(0.003 + 0.047 * uniform(random)) : kMs;
+        const Nanos due = loop.now + period;
+        while (next <= due && !ended) {  // the scene thread is not late
+          loop.now = next;
+          loop.place(0, {0, top_mm(path(next)), 0});
+          ended = path(next) == way;
+          next += toNanos(kFrame_s);
+        }
+        loop.now = due;
+        loop.render(hip, period);
+      }
+      loop.rest(hip, 100 * kMs);
+      EXPECT_TRUE(feels(way - gap_m)) << speed << " m/s, round " << round;
+      ++rams;
+    }
+  }
+  EXPECT_EQ(rams, 120);
+}
+
+// The hand ends outside on the near side, or released with a status; never silently inside or beyond.
+TEST_P(Starts, pose_that_is_too_far_never_swallows_the_hand_silently) {
+  for (const double way : {0.021, 0.03, 0.06, 0.2, 1.0}) {
+    loop.place(0, {0, top_mm(-0.002), 0});
+    loop.rest(hip, toNanos(1));
+    loop.place(0, {0, top_mm(way), 0});
+    std::uint32_t status = 0;
+    loop.rest(hip, 60 * kMs, [&] { status |= loop.out.status; });
+    const bool above = loop.out.proxy_m.y() - radius() >= 1e-3 * top_mm(way) - 1e-6;
+    const bool released = loop.out.force_N.norm() == 0;
+    EXPECT_TRUE(above || released) << way;
+    EXPECT_NE(status & (kRenderGeometryJump | kRenderReleased), 0U) << way;
+    if (released && std::get<0>(GetParam()) && way < 0.025) {
+      EXPECT_NE(loop.out.status & kRenderReleased, 0U) << way;
+    }
+    // Once the hand has left, the plate is felt again.
+    loop.place(0, {0, top_mm(-0.06), 0});
+    loop.rest(hip, toNanos(0.2));
+    loop.place(0, {0, top_mm(-0.001), 0});
+    loop.rest(hip, toNanos(0.2));
+    EXPECT_EQ(loop.out.status, 0U) << way;
+    EXPECT_NEAR(loop.to(hip - Vec3(0, gap_m + 0.003, 0)).force_N.y(), kStiffness_N_per_m * 0.002, 0.02)
+        << way;
+    loop.to(hip);
+  }
+}
+
+TEST_P(Starts, object_far_from_the_hand_may_jump) {
+  loop.add(1, boxTriples(Vec3::Constant(-5), Vec3::Constant(5)));
+  loop.place(1, {500, 0, 0});
+  loop.rest(hip, toNanos(0.5));
+  loop.place(1, {-500, 300, 200});
+  loop.rest(hip, 100 * kMs, [&] { EXPECT_EQ(loop.out.status, 0U); });
+  loop.place(0, {0, top_mm(0.003), 0});
+  loop.rest(hip, 100 * kMs);
+  EXPECT_TRUE(feels(0.003 - gap_m));
+}
+
+// Vertices that move after a pause.
+TEST_P(Starts, mesh_that_starts_to_deform_takes_the_hand_along) {
+  const auto shifted = [&](double by_mm) {
+    std::vector<Vec3f> vertices = plate(std::get<0>(GetParam()));
+    for (Vec3f& v : vertices) v.y() += static_cast<float>(by_mm);
+    return vertices;
+  };
+  for (const double way : {0.001, 0.005, 0.019}) {
+    loop.send(scene::SetVertices{0, 0, shifted(0)});
+    loop.rest(hip, toNanos(1));
+    loop.send(scene::SetVertices{0, 0, shifted(1e3 * way)});
+    double last = 0;
+    loop.rest(hip, 100 * kMs, [&] {
+      EXPECT_LE(loop.out.force_N.y() - last, kStiffness_N_per_m * 1.2e-3) << "about 1 m/s at most";
+      last = loop.out.force_N.y();
+    });
+    EXPECT_TRUE(feels(way - gap_m)) << way << " m";
+  }
+}
+
+// Frames in quick succession: a frame's way takes at least its distance at 1 m/s.
+TEST_P(Starts, quick_frames_of_a_mesh_do_not_swallow_the_hand) {
+  const auto shifted = [&](double by_mm) {
+    std::vector<Vec3f> vertices = plate(std::get<0>(GetParam()));
+    for (Vec3f& v : vertices) v.y() += static_cast<float>(by_mm);
+    return vertices;
+  };
+  loop.send(scene::SetVertices{0, 0, shifted(-1)});
+  loop.rest(hip, 5 * kMs);
+  loop.send(scene::SetVertices{0, 0, shifted(18)});
+  loop.rest(hip, 100 * kMs);
+  EXPECT_TRUE(feels(0.018 - gap_m));
+}
+
+TEST_P(Starts, late_ticks_during_a_deformation_do_not_swallow_the_hand) {
+  const auto shifted = [&](double by_mm) {
+    std::vector<Vec3f> vertices = plate(std::get<0>(GetParam()));
+    for (Vec3f& v : vertices) v.y() += static_cast<float>(by_mm);
+    return vertices;
+  };
+  for (const Nanos late : {5 * kMs, 20 * kMs, 50 * kMs}) {
+    loop.send(scene::SetVertices{0, 0, shifted(-20)});
+    loop.rest(hip, toNanos(0.3));
+    const Nanos due = loop.now + late;
+    // Frames every 10 ms that the servo does not see.
+    for (double by = -12; loop.now < due; by += 8) {
+      loop.send(scene::SetVertices{0, 0, shifted(std::min(4.0, by))});
+      loop.now = std::min(due, loop.now + 5 * kMs);
+      loop.publish();
+      loop.now = std::min(due, loop.now + 5 * kMs);
+    }
+    loop.render(hip, late);
+    loop.send(scene::SetVertices{0, 0, shifted(4)});
+    loop.rest(hip, 100 * kMs);
+    EXPECT_TRUE(feels(0.004 - gap_m)) << late;
+  }
+}
+
+}  // namespace
+}  // namespace hapticd::realtime::commands
