@@ -65,7 +65,7 @@ class SceneBuilder::State {
   std::shared_ptr<const SceneSnapshot> publish(Nanos now, std::vector<Notice>& out) {
     board_.flush(now, out);
     const bool forces = forces_.update(now, board_, out);
-    const bool objects = objects_.publish(now, board_, out);
+    const bool objects = objects_.publish(now, workspace_.worldUnitsPerMetre, board_, out);
     if (!forces && !objects && !changed_) return nullptr;
     changed_ = false;
     auto snapshot = std::make_shared<SceneSnapshot>();

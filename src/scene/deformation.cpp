@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -92,6 +93,26 @@ void Deformation::sweep(const MeshGeometry& old, const std::vector<Vec3f>& targe
   }
 }
 
+double Deformation::Moves::add(double move, Nanos now) {
+  constexpr Nanos kLength = 100'000'000;
+  if (now - begin > kLength) {
+    older = now - begin > 2 * kLength ? 0 : recent;
+    recent = 0;
+    begin = now;
+  }
+  recent += move;
+  return recent + older;
+}
+
+// Upper bound of the way of a vertex to the new shape.
+double Deformation::longestMove() const {
+  const auto count = static_cast<Eigen::Index>(sweep_.lower.size() - 1);
+  if (count <= 0) return 0;
+  const Eigen::Map<const Eigen::ArrayXf> lower(sweep_.lower.data(), count);
+  const Eigen::Map<const Eigen::ArrayXf> upper(sweep_.upper.data(), count);
+  return std::max(0.0, std::sqrt(3.0) * static_cast<double>((upper - lower).maxCoeff()));
+}
+
 bool Deformation::spareIsFree() const {
   // use_count() == 1: this is the only reference, so nobody else can acquire one.
   if (!spare_ || spare_.use_count() != 1) return false;
@@ -121,8 +142,7 @@ SpatialIndex Deformation::indexOver(const std::shared_ptr<const std::vector<Tria
 std::shared_ptr<MeshGeometry> Deformation::next(std::shared_ptr<MeshGeometry> old,
                                                 std::shared_ptr<const std::vector<Triangle>> triangles,
                                                 std::shared_ptr<const std::vector<Vec3f>> target,
-                                                const std::function<Nanos()>& clock, Nanos before,
-                                                Nanos longest) {
+                                                const std::function<Nanos()>& clock, const Pace& pace) {
   if (!begun_) lone_ = loneOf(*triangles, target->size());
   begun_ = true;
   auto mesh = std::make_shared<MeshGeometry>();
@@ -131,6 +151,7 @@ std::shared_ptr<MeshGeometry> Deformation::next(std::shared_ptr<MeshGeometry> ol
   sweep(*old, *target, clock());
   mesh->index = indexOver(triangles);
   mesh->target = std::move(target);
+  mesh->before = old->target ? old->target : old->vertices;
 
   const Nanos begin = clock();
   if (old->deformingAfter(begin)) {
@@ -138,10 +159,16 @@ std::shared_ptr<MeshGeometry> Deformation::next(std::shared_ptr<MeshGeometry> ol
     placesOf(*old, begin, from->data()->data());
     mesh->vertices = std::move(from);
   } else {
-    mesh->vertices = old->target ? old->target : old->vertices;
+    mesh->vertices = mesh->before;
   }
   mesh->morphBegin = begin;
-  mesh->morphEnd = begin + std::clamp<Nanos>(begin - before, 1'000'000, longest);
+  const double move = longestMove();
+  mesh->shape = old->shape + 1;
+  mesh->recentMove = moves_.add(move, begin);
+  const Nanos shortest = std::max<Nanos>(1'000'000, pace.shortest(move));
+  const Nanos gap = begin - pace.before;
+  const Nanos interval = gap > pace.longestGap ? pace.unmeasured : gap;
+  mesh->morphEnd = begin + std::clamp(interval, std::min(shortest, pace.longest), pace.longest);
   spare_ = std::move(old);
   return mesh;
 }

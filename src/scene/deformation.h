@@ -40,13 +40,21 @@ class Deformation {
   /// Forgets the shapes so far: the triangles changed, or there are none.
   void restart();
 
-  /// The next shape: its surface travels from where the servo renders `old` to `target`, in at most
-  /// `longest`. `triangles` are those of `old`, of which some may lack corners; `clock` is the time, `before`
-  /// that of the previous shape.
+  /// What determines the duration of a morph.
+  struct Pace {
+    Nanos before = 0;                       ///< time of the previous shape
+    Nanos longestGap = 0;                   ///< beyond, no interval is measured
+    Nanos unmeasured = 0;                   ///< the duration without an interval
+    Nanos longest = 0;                      ///< at most
+    std::function<Nanos(double)> shortest;  ///< at least, for a distance in object units
+  };
+
+  /// The next shape: its surface travels from where the servo renders `old` to `target`. `triangles` are
+  /// those of `old`, of which some may lack corners; `clock` is the time.
   std::shared_ptr<MeshGeometry> next(std::shared_ptr<MeshGeometry> old,
                                      std::shared_ptr<const std::vector<Triangle>> triangles,
                                      std::shared_ptr<const std::vector<Vec3f>> target,
-                                     const std::function<Nanos()>& clock, Nanos before, Nanos longest);
+                                     const std::function<Nanos()>& clock, const Pace& pace);
 
  private:
   // A box for each vertex, as in BoxedTriangles.
@@ -55,10 +63,20 @@ class Deformation {
   };
 
   void sweep(const MeshGeometry& old, const std::vector<Vec3f>& target, Nanos now);
+  double longestMove() const;
   bool spareIsFree() const;
   SpatialIndex indexOver(const std::shared_ptr<const std::vector<Triangle>>& triangles);
 
+  // Sums of longestMove() over the last 100 to 200 ms.
+  struct Moves {
+    double recent = 0;
+    double older = 0;
+    Nanos begin = 0;
+    double add(double move, Nanos now);
+  };
+
   bool begun_ = false;
+  Moves moves_;
   std::vector<std::uint32_t> lone_;  // vertices of no triangle
   Sweep sweep_;
   std::shared_ptr<MeshGeometry>

@@ -159,14 +159,19 @@ std::shared_ptr<MeshGeometry> MeshDraft::build(std::uint64_t topology) {
 }
 
 std::shared_ptr<const MeshGeometry> MeshDraft::commit(const std::function<Nanos()>& clock,
-                                                      std::uint64_t topology) {
+                                                      std::uint64_t topology,
+                                                      const std::function<Nanos(double)>& shortestMorph) {
   if (triangleCount() == 0 || !current_ || shapeChanged_) {
     deformation_.restart();
     current_ = triangleCount() > 0 ? build(topology) : nullptr;
   } else {
     auto asSent = indexed_ ? triangles_.share() : current_->triangles;
-    current_ =
-        deformation_.next(current_, std::move(asSent), vertices_.share(), clock, lastCommit_, kLongestMorph);
+    current_ = deformation_.next(current_, std::move(asSent), vertices_.share(), clock,
+                                 {.before = lastCommit_,
+                                  .longestGap = kLongestGap,
+                                  .unmeasured = kUnmeasured,
+                                  .longest = kLongestMorph,
+                                  .shortest = shortestMorph});
   }
   dirty_ = false;
   shapeChanged_ = false;

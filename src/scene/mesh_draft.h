@@ -50,6 +50,8 @@ class MeshDraft {
   static constexpr Nanos kQuiet = 20'000'000;  ///< from the last edit of a mesh to its publication
   static constexpr Nanos kLongest = 250'000'000;  ///< from the first edit to the publication, at most
   static constexpr Nanos kLongestMorph = 50'000'000;
+  static constexpr Nanos kLongestGap = 100'000'000;  ///< between shapes; beyond, no interval is measured
+  static constexpr Nanos kUnmeasured = 16'000'000;   ///< duration of a morph without an interval
 
   std::size_t vertexCount() const { return vertices_.read().size(); }
   /// Numbered triangles; triples when there are none.
@@ -79,8 +81,10 @@ class MeshDraft {
 
   /// Builds the mesh with all edits; null when it has no triangles. `clock` is read again after the work, so
   /// that a morph starts from the surface that is rendered then. `topology` numbers a new list of triangles;
-  /// no other mesh has it.
-  std::shared_ptr<const MeshGeometry> commit(const std::function<Nanos()>& clock, std::uint64_t topology);
+  /// no other mesh has it. `shortestMorph` gives the least duration of a morph over a distance in object
+  /// units.
+  std::shared_ptr<const MeshGeometry> commit(const std::function<Nanos()>& clock, std::uint64_t topology,
+                                             const std::function<Nanos(double)>& shortestMorph);
 
  private:
   void edited(Nanos now);

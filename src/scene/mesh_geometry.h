@@ -26,8 +26,14 @@ struct MeshGeometry {
   std::shared_ptr<const std::vector<Triangle>> triangles;
   std::shared_ptr<const std::vector<Vec3f>> vertices;
   std::shared_ptr<const std::vector<Vec3f>> target;  ///< null unless deforming
+  std::shared_ptr<const std::vector<Vec3f>>
+      before;  ///< the target before `target`, which may not be reached yet
   Nanos morphBegin = 0;
   Nanos morphEnd = 0;
+  std::uint32_t shape = 0;  ///< counts the shapes of one list of triangles
+  /// Upper bound of the way of a vertex during the shapes of the last 100 ms, object units. The index does
+  /// not cover it: a late tick that missed a shape adds it to its reach.
+  double recentMove = 0;
   SpatialIndex index;  ///< over triangle ids, in object units
 
   bool deformingAfter(Nanos now) const noexcept { return target && now < morphEnd; }

@@ -55,7 +55,7 @@ Motion::Factors Motion::factorise(const Affine& t) {
 
 Motion Motion::fixed(const Affine& T_world_object, std::uint32_t jumps) {
   Motion motion;
-  motion.from_ = T_world_object;
+  motion.before_ = motion.from_ = T_world_object;
   motion.to_ = T_world_object;
   motion.jumps_ = jumps;
   return motion;
@@ -63,7 +63,7 @@ Motion Motion::fixed(const Affine& T_world_object, std::uint32_t jumps) {
 
 Motion Motion::between(const Affine& from, const Affine& to, Nanos begin, Nanos end, std::uint32_t jumps) {
   Motion motion;
-  motion.from_ = from;
+  motion.before_ = motion.from_ = from;
   motion.to_ = to;
   if (!sameLinear(from, to)) {
     motion.fromFactors_ = factorise(from);
@@ -78,7 +78,10 @@ Motion Motion::between(const Affine& from, const Affine& to, Nanos begin, Nanos 
 Affine Motion::at(Nanos now) const noexcept {
   if (now >= end_) return to_;
   if (now <= begin_) return from_;
-  const double s = static_cast<double>(now - begin_) / static_cast<double>(end_ - begin_);
+  return atShare(static_cast<double>(now - begin_) / static_cast<double>(end_ - begin_));
+}
+
+Affine Motion::atShare(double s) const noexcept {
   Affine t;
   if (sameLinear(from_, to_)) {
     t.linear() = from_.linear();
@@ -88,6 +91,35 @@ Affine Motion::at(Nanos now) const noexcept {
   }
   t.translation() = (1 - s) * from_.translation() + s * to_.translation();
   return t;
+}
+
+// The difference of two placements is affine in the point, so that its length is largest at a corner.
+double longestMove(const Affine& from, const Affine& to, const geometry::Box& box) noexcept {
+  double longest2 = 0;
+  for (int i = 0; i < 8; ++i) {
+    const geometry::Vec3 p((i & 1) != 0 ? box.max.x() : box.min.x(), (i & 2) != 0 ? box.max.y() : box.min.y(),
+                           (i & 4) != 0 ? box.max.z() : box.min.z());
+    longest2 = std::max(longest2, (to * p - from * p).squaredNorm());
+  }
+  return std::sqrt(longest2);
+}
+
+// Seen from the object, the centre travels. It does so on a straight line when the linear part stays;
+// otherwise the box around a few of its places covers the curve between them.
+double Motion::longestMoveNear(const geometry::Box& box, const geometry::Vec3& centre,
+                               double reach) const noexcept {
+  if (box.empty()) return 0;
+  const int samples = sameLinear(from_, to_) ? 2 : 5;
+  geometry::Box near;
+  for (int i = 0; i < samples; ++i) {
+    const Affine toObject = atShare(static_cast<double>(i) / (samples - 1)).inverse();
+    const geometry::Vec3 half = reach * toObject.linear().rowwise().norm();
+    const geometry::Vec3 middle = toObject * centre;
+    near.extend(geometry::Box{middle - half, middle + half});
+  }
+  near.min = near.min.cwiseMax(box.min);
+  near.max = near.max.cwiseMin(box.max);
+  return near.empty() ? 0 : longestMove(before_, to_, near);
 }
 
 // A path x(s) leaves its chord by at most max|x''|/8. Here x = R(s) S(s) p + t(s) with |R'| = θ, |R''| = θ²

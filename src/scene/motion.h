@@ -20,6 +20,11 @@ class Motion {
   /// outside.
   static Motion between(const Affine& from, const Affine& to, Nanos begin, Nanos end,
                         std::uint32_t jumps = 0);
+  /// The same for a pose that arrives while the one before, `before`, is not reached yet.
+  Motion& after(const Affine& before) noexcept {
+    before_ = before;
+    return *this;
+  }
 
   /// World from object (world units) at time `now`.
   Affine at(Nanos now) const noexcept;
@@ -27,6 +32,9 @@ class Motion {
   bool movingAfter(Nanos now) const noexcept { return end_ > begin_ && now < end_; }
   /// Box in the world around all that a box of the object's frame sweeps on the way. Empty stays empty.
   geometry::Box sweep(const geometry::Box& box) const;
+  /// Upper bound of the distance between the pose before and the destination of any point of `box` (object
+  /// frame) that comes within `reach` of `centre` on the way. World units; 0 when no point comes near.
+  double longestMoveNear(const geometry::Box& box, const geometry::Vec3& centre, double reach) const noexcept;
   /// The final placement.
   const Affine& destination() const noexcept { return to_; }
   /// Where it started.
@@ -40,7 +48,9 @@ class Motion {
     geometry::Mat3 stretch = geometry::Mat3::Identity();
   };
   static Factors factorise(const Affine& t);
+  Affine atShare(double share) const noexcept;
 
+  Affine before_ = Affine::Identity();  // the pose before: the origin, or farther on the old way
   Affine from_ = Affine::Identity();
   Affine to_ = Affine::Identity();
   Factors fromFactors_;
@@ -49,5 +59,8 @@ class Motion {
   Nanos end_ = 0;
   std::uint32_t jumps_ = 0;
 };
+
+/// The largest distance between the places of a point of `box` under two placements.
+double longestMove(const Affine& from, const Affine& to, const geometry::Box& box) noexcept;
 
 }  // namespace hapticd::scene

@@ -306,8 +306,9 @@ void ObjectTable::handle(SetSceneOrigin& c, const Call& call) {
     return;
   }
   T_world_scene_ = Eigen::Translation3d(1000 * c.position_m) * *rotation;
+  const Nanos travel = scenePoses_.next(call.now);
   for (const auto& object : objects_) {
-    if (object && object->parent == Object::kScene) moveAll(*object, 0);
+    if (object && object->parent == Object::kScene) moveAll(*object, travel);
   }
 }
 

@@ -8,6 +8,14 @@ namespace hapticd::scene {
 namespace {
 
 constexpr Nanos kCheckSlice = 2'000'000;
+constexpr double kFastestSweep_m_per_s = 1;
+constexpr double kLongestMotion_m =
+    0.020;  // beyond, the renderer takes a pose for a jump if it is near the hand
+
+// The duration of a sweep over this distance; that of a jump does not depend on it.
+Nanos shortestSweep(double distance_m) {
+  return base::toNanos(std::min(distance_m, kLongestMotion_m) / kFastestSweep_m_per_s);
+}
 
 bool contains(const Box& outer, const Box& inner) {
   return (outer.min.array() <= inner.min.array()).all() && (inner.max.array() <= outer.max.array()).all();
@@ -96,7 +104,10 @@ void ObjectTable::commitMeshes(Nanos now, NoticeBoard& board, std::vector<Notice
 
 void ObjectTable::commitMesh(Object& object, Nanos now, const std::function<Nanos()>& clock) {
   const std::uint64_t topology = object.geometry ? object.geometry->topology : 0;
-  object.geometry = object.mesh.commit(clock, ++lastTopology_);
+  const double metresPerUnit =
+      object.motion.destination().linear().colwise().norm().maxCoeff() / worldUnitsPerMetre_;
+  const auto shortest = [metresPerUnit](double distance) { return shortestSweep(distance * metresPerUnit); };
+  object.geometry = object.mesh.commit(clock, ++lastTopology_, shortest);
   object.stateChanged = true;
   queue(object);
   if (!config_.checkMeshes || !object.geometry || object.geometry->topology == topology) return;
@@ -128,11 +139,23 @@ void ObjectTable::updateMotion(Object& object, Nanos now) {
   if (!isInvertible(T_world_object)) return;  // a chain of parents out of range: stay
   if (!first && T_world_object.matrix() == present.matrix()) return;
   const bool sameHand = T_world_object.linear().determinant() * present.linear().determinant() > 0;
-  object.motion = object.travel > 0 && sameHand && !first
-                      ? Motion::between(object.motion.at(now), T_world_object, now, now + object.travel,
-                                        object.motion.jumps())
-                      : Motion::fixed(T_world_object, ++jumps_);
   object.stateChanged = true;
+  // The way of an object that cannot be felt matters to nobody.
+  if (first || !sameHand || object.travel == 0 || object.position < 0) {
+    object.motion = Motion::fixed(T_world_object, ++jumps_);
+    object.trail.clear();
+    return;
+  }
+  const Affine begin = object.motion.at(now);
+  const Box bounds = object.geometry ? object.geometry->index.bounds() : Box{};
+  const auto sweep = [&](const Affine& from, const Affine& to) {
+    return bounds.empty() ? 0 : shortestSweep(longestMove(from, to, bounds) / worldUnitsPerMetre_);
+  };
+  const Affine before = present;
+  const Nanos travel = std::max(object.travel, sweep(begin, before) + sweep(before, T_world_object));
+  object.motion = Motion::between(begin, T_world_object, now,
+                                  now + std::min(travel, PoseStream::kLongestBlend), object.motion.jumps())
+                      .after(before);
 }
 
 void ObjectTable::updateSurface(Object& object, Nanos now, NoticeBoard& board, std::vector<Notice>& out) {
@@ -148,7 +171,9 @@ void ObjectTable::updateSurface(Object& object, Nanos now, NoticeBoard& board, s
   object.stateChanged = true;
 }
 
-bool ObjectTable::publish(Nanos now, NoticeBoard& board, std::vector<Notice>& out) {
+bool ObjectTable::publish(Nanos now, double worldUnitsPerMetre, NoticeBoard& board,
+                          std::vector<Notice>& out) {
+  worldUnitsPerMetre_ = worldUnitsPerMetre;
   commitMeshes(now, board, out);
   if (checks_.due().value_or(now + 1) <= now && rebuildNotBefore_ <= now) checkMeshes(now, board, out);
   return updatePublished(now, board, out);
@@ -168,32 +193,35 @@ bool ObjectTable::updatePublished(Nanos now, NoticeBoard& board, std::vector<Not
     if (listed != object->isTouchable()) {
       listChanged_ = true;
     } else if (listed && object->stateChanged) {
-      replaceState(*object);
+      replaceState(*object, now);
       changed = true;
     }
   }
   changed_.clear();
   if (listChanged_) {
-    rebuildList();
+    rebuildList(now);
     changed = true;
   }
   if (indexStale_) rebuildIndex();
   return changed;
 }
 
-void ObjectTable::replaceState(Object& object) {
+void ObjectTable::replaceState(Object& object, Nanos now) {
   object.state = std::make_shared<const ObjectState>(
       ObjectState{object.id, object.geometry, object.motion, object.surface});
   object.stateChanged = false;
   const auto position = static_cast<std::size_t>(object.position);
   published_.objects[position] = object.state;
   const Box swept = object.motion.sweep(object.geometry->index.bounds());
+  const Box before = object.trail.around(now);
+  object.trail.add(swept, now);
   if (contains(boxes_[position], swept)) return;
   boxes_[position] = withRoom(object, swept);
+  boxes_[position].extend(before);
   indexStale_ = true;
 }
 
-void ObjectTable::rebuildList() {
+void ObjectTable::rebuildList(Nanos now) {
   published_.objects.clear();
   boxes_.clear();
   for (const auto& object : objects_) {
@@ -208,9 +236,10 @@ void ObjectTable::rebuildList() {
     published_.objects.push_back(object->state);
     boxes_.emplace_back();
     if (object->stateChanged) {
-      replaceState(*object);
+      replaceState(*object, now);
     } else {
       boxes_.back() = object->motion.sweep(object->geometry->index.bounds());
+      boxes_.back().extend(object->trail.around(now));
     }
   }
   listChanged_ = false;

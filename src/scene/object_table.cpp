@@ -3,23 +3,38 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/world.h"
 
 namespace hapticd::scene {
 Nanos PoseStream::next(Nanos now) {
   const Nanos gap = now - last_;
-  if (!any_ || gap > kLongestGap) {
-    any_ = true;
+  if (any_ && gap < kSameMoment) return blend_;
+  last_ = now;
+  if (!std::exchange(any_, true) || gap > kLongestGap) {
     interval_ = 0;
-    last_ = now;
-    return 0;
+    return blend_ = kUnmeasured;
   }
-  if (gap < kSameMoment) return std::min(interval_, kLongestBlend);
   // A late pose lengthens the blend at once, early ones shorten it little by little: networks bunch.
   interval_ = interval_ == 0 || gap > interval_ ? gap : interval_ + (gap - interval_) / 4;
-  last_ = now;
-  return std::clamp<Nanos>(interval_, kSameMoment, kLongestBlend);
+  return blend_ = std::clamp<Nanos>(interval_, kSameMoment, kLongestBlend);
+}
+
+void Trail::add(const Box& swept, Nanos now) {
+  if (now - begin_ > kLength) {
+    older_ = now - begin_ > 2 * kLength ? Box{} : recent_;
+    recent_ = Box{};
+    begin_ = now;
+  }
+  recent_.extend(swept);
+}
+
+Box Trail::around(Nanos now) const {
+  if (now - begin_ > 2 * kLength) return {};
+  Box all = recent_;
+  all.extend(older_);
+  return all;
 }
 
 ObjectTable::ObjectTable(const SceneConfig& config)
@@ -36,6 +51,7 @@ void ObjectTable::reset() {
   edited_.clear();
   checks_.clear();
   T_world_scene_ = Affine::Identity();
+  scenePoses_ = {};
   vertices_ = 0;
   triangles_ = 0;
   listChanged_ = true;

@@ -18,19 +18,36 @@
 
 namespace hapticd::scene {
 
-/// Joins poses that follow each other closely into one movement.
+/// Measures the interval of the poses of an object: the duration of the movement to each.
 struct PoseStream {
   static constexpr Nanos kSameMoment = 500'000;      ///< parts of one pose
-  static constexpr Nanos kLongestGap = 100'000'000;  ///< beyond, a pose is a jump
+  static constexpr Nanos kLongestGap = 100'000'000;  ///< beyond, no interval is measured
   static constexpr Nanos kLongestBlend = 50'000'000;
+  static constexpr Nanos kUnmeasured = 16'000'000;  ///< without an interval
 
-  /// Call with each pose. Returns the duration of the movement to it; 0 is a jump.
+  /// Call with each pose. Returns the duration of the movement to it.
   Nanos next(Nanos now);
 
  private:
   bool any_ = false;
   Nanos last_ = 0;
   Nanos interval_ = 0;
+  Nanos blend_ = kUnmeasured;
+};
+
+/// Where an object was in the last 100 to 200 ms. A late tick looks for it there.
+class Trail {
+ public:
+  void add(const Box& swept, Nanos now);
+  /// Box around all; empty when the object rested.
+  Box around(Nanos now) const;
+  void clear() { *this = {}; }
+
+ private:
+  static constexpr Nanos kLength = 100'000'000;
+  Box recent_;
+  Box older_;
+  Nanos begin_ = 0;
 };
 
 /// One object as clients see it.
@@ -60,13 +77,14 @@ struct Object {
   Surface surface;
   std::string surfaceRemark;
   Motion motion;
+  Trail trail;
   std::shared_ptr<const ObjectState> state;
   bool queued = false;      ///< in the table's list of changed ones
   bool meshQueued = false;  ///< in its list of edited meshes
   bool stateChanged = true;
   bool surfaceChanged = false;
   bool moved = false;
-  Nanos travel = 0;            ///< of the pending move; 0 is a jump
+  Nanos travel = 0;            ///< shortest duration of the pending move; 0 is a jump
   std::int64_t position = -1;  ///< in the published list
 
   double worldUnits() const { return inMetres ? 1000 : 1; }
@@ -97,8 +115,8 @@ class ObjectTable {
   /// The oldest edit of a mesh that is not published yet.
   std::optional<Nanos> oldestEdit() const;
   /// Brings `published` up to date; false when nothing changed. Remarks on a surface go to the client that
-  /// set it.
-  bool publish(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
+  /// set it. The scale of the workspace gives speeds in metres.
+  bool publish(Nanos now, double worldUnitsPerMetre, NoticeBoard& board, std::vector<Notice>& out);
   const PublishedObjects& published() const { return published_; }
   /// Appends every object, whether it exerts force or not.
   void describe(SceneDescription& out) const;
@@ -137,8 +155,8 @@ class ObjectTable {
   void updateMotion(Object& object, Nanos now);
   void updateSurface(Object& object, Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   bool updatePublished(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
-  void replaceState(Object& object);
-  void rebuildList();
+  void replaceState(Object& object, Nanos now);
+  void rebuildList(Nanos now);
   void rebuildIndex();
 
   const SceneConfig& config_;
@@ -146,6 +164,8 @@ class ObjectTable {
   std::function<Nanos()> stopwatch_;
   std::vector<std::unique_ptr<Object>> objects_;
   Affine T_world_scene_ = Affine::Identity();
+  PoseStream scenePoses_;
+  double worldUnitsPerMetre_ = 1000;
   std::uint64_t vertices_ = 0;
   std::uint64_t triangles_ = 0;
   std::uint64_t lastTopology_ = 0;  // one counter for all meshes: no number is used twice

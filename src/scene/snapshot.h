@@ -1,6 +1,7 @@
 // The scene at one moment, immutable, for the servo loop.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -37,6 +38,14 @@ struct SceneSnapshot {
   std::vector<Plane> planes;       ///< at most kMaxPlanes, by ascending index
   std::vector<ForceField> fields;  ///< their forces add up; constraints are among them
   std::optional<Buzz> buzz;
+
+  /// The object with this id; null when it does not exert force.
+  const ObjectState* find(std::int32_t id) const noexcept {
+    const auto it =
+        std::lower_bound(objects.begin(), objects.end(), id,
+                         [](const auto& object, std::int32_t wanted) { return object->id < wanted; });
+    return it != objects.end() && (*it)->id == id ? it->get() : nullptr;
+  }
 };
 
 }  // namespace hapticd::scene

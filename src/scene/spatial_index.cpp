@@ -91,6 +91,21 @@ bool onNear(RTCPointQueryFunctionArguments* args) {
   return false;
 }
 
+struct NearestQuery {
+  double (*thunk)(void*, std::uint32_t) noexcept;
+  void* visitor;
+  double scale;
+};
+
+bool onNearest(RTCPointQueryFunctionArguments* args) {
+  const auto* query = static_cast<const NearestQuery*>(args->userPtr);
+  const double radius = query->thunk(query->visitor, args->primID);
+  const auto shrunk = static_cast<float>(radius * query->scale * (1 + kRelativePad));
+  if (!(shrunk < args->query->radius)) return false;
+  args->query->radius = std::max(shrunk, 0.0F);
+  return true;
+}
+
 // Embree hands the context back to the leaf callback: the extra members follow its own.
 struct SegmentContext {
   RTCIntersectContext embree;
@@ -266,6 +281,23 @@ void SpatialIndex::refit(const BoxedTriangles& all) {
   // To the bit what build() would give: the renderer takes lengths from them.
   bounds_ = bounds;
   ++refits_;
+}
+
+void SpatialIndex::visitNearestImpl(const Vec3& centre, double radius, SegmentThunk thunk,
+                                    void* visitor) const noexcept {
+  if (!tree_) return;
+  const Vec3 inside = centre.cwiseMax(bounds_.min).cwiseMin(bounds_.max);  // see visitNearImpl()
+  if (!((inside - centre).norm() <= radius + pad_)) return;
+  NearestQuery query{thunk, visitor, tree_->scale};
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  RTCPointQuery point{};
+  const Vec3f at = tree_->inTree(inside);
+  point.x = at.x();
+  point.y = at.y();
+  point.z = at.z();
+  point.radius = static_cast<float>(std::min(radius * tree_->scale * (1 + kRelativePad), kWholeTree));
+  rtcPointQuery(tree_->scene, &point, &context, &onNearest, &query);
 }
 
 void SpatialIndex::visitNearImpl(const Vec3& centre, double radius, NearThunk thunk,

@@ -70,6 +70,17 @@ class SpatialIndex {
         const_cast<void*>(static_cast<const void*>(std::addressof(visit))));
   }
 
+  /// As visitNear(), roughly near to far. visit returns the radius beyond which nothing more is wanted.
+  template <class Visit>
+  void visitNearest(const Vec3& centre, double radius, Visit&& visit) const noexcept {
+    visitNearestImpl(
+        centre, radius,
+        [](void* v, std::uint32_t id) noexcept -> double {
+          return (*static_cast<std::remove_reference_t<Visit>*>(v))(id);
+        },
+        const_cast<void*>(static_cast<const void*>(std::addressof(visit))));
+  }
+
   /// Calls visit(id) for at least every box that the segment touches, roughly near to far. visit returns the
   /// segment parameter in [0,1] beyond which nothing more is wanted (1 to go on, the hit parameter after a
   /// hit).
@@ -87,6 +98,7 @@ class SpatialIndex {
   using NearThunk = void (*)(void*, std::uint32_t) noexcept;
   using SegmentThunk = double (*)(void*, std::uint32_t) noexcept;
   void visitNearImpl(const Vec3& centre, double radius, NearThunk thunk, void* visitor) const noexcept;
+  void visitNearestImpl(const Vec3& centre, double radius, SegmentThunk thunk, void* visitor) const noexcept;
   void visitSegmentImpl(const Vec3& from, const Vec3& to, SegmentThunk thunk, void* visitor) const noexcept;
 
   struct Tree;

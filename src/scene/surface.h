@@ -12,6 +12,8 @@ struct Surface {
   double dynamic_friction = 0;  ///< Coulomb coefficient while sliding, at most the static one
   double popthrough_N = 0;      ///< normal spring force that lets the proxy through; 0 is off
   double mass_kg = 0;
+
+  friend bool operator==(const Surface&, const Surface&) = default;
 };
 
 /// Which side of a face can be touched; the front sees its corners counter-clockwise.
