@@ -92,7 +92,7 @@ Summary follow(const MeshRenderOptions& options, const device::HandFile& hand,
                                      .late = 0,
                                      .writeFailed = false,
                                      .geometryJump = (rendering.status & realtime::kRenderGeometryJump) != 0,
-                                     .deepContact = (rendering.status & realtime::kRenderReleased) != 0});
+                                     .deepContact = (rendering.status & (realtime::kRenderReleased | realtime::kRenderEnclosed)) != 0});
 
     realtime::TickReport tick;
     tick.tick = summary.step_us.size() + 1;

@@ -1,7 +1,10 @@
 #include "realtime/render/contact_query.h"
 
+#include "realtime/render/enclosure.h"
+
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <tuple>
 #include <utility>
 
@@ -41,13 +44,6 @@ double exitOf(const Vec3& p, const Vec3& d, const Vec3& centre, double radius) {
   return std::clamp((root - b) / a, 0.0, 1.0);
 }
 
-const ObjectState* find(const scene::SceneSnapshot& scene, std::int32_t id) {
-  const auto it =
-      std::lower_bound(scene.objects.begin(), scene.objects.end(), id,
-                       [](const auto& object, std::int32_t wanted) { return object->id < wanted; });
-  return it != scene.objects.end() && (*it)->id == id ? it->get() : nullptr;
-}
-
 }  // namespace
 
 scene::Corners PlacedObject::corners(std::uint32_t triangle, Nanos now) const noexcept {
@@ -71,41 +67,115 @@ void ContactQuery::beginTick(const SceneAtTime& now, const SceneAtTime& before,
   sameWorkspace_ = before.scene != nullptr && before.scene->workspace.T_device_world.matrix() ==
                                                   now.scene->workspace.T_device_world.matrix();
   objectCount_ = 0;
+  freeTravel_ = std::numeric_limits<double>::infinity();
   minSkin_ = kRelativeSkin;
   overflowed_ = false;
-  if (now.scene != before.scene) invalidate();
+  if (now.scene == before.scene) return;
+  ++generation_;
+  allAppeared_ = allAppeared_ || before.scene == nullptr || before.scene->faces != now.scene->faces;
 }
 
-void ContactQuery::addObjectsNear(const Vec3& centre, double reach) noexcept {
+void ContactQuery::addObjectsNear(const Vec3& centre, double reach, const Vec3& tool) noexcept {
   const scene::SceneSnapshot& scene = *now_.scene;
   if (!scene.objectIndex || scene.objects.size() <= 2) {
     for (const auto& object : scene.objects) add(*object);
   } else {
-    addObjectsByIndex(scene, centre, reach);
+    addObjectsByIndex(scene, centre, reach, tool);
   }
+  leaveOutEnclosing(tool);
   if (gatheredGeneration_ != generation_ || !sameObjects()) cache_.invalidate();
 }
 
-void ContactQuery::addObjectsByIndex(const scene::SceneSnapshot& scene, const Vec3& centre,
-                                     double reach) noexcept {
+void ContactQuery::addObjectsByIndex(const scene::SceneSnapshot& scene, const Vec3& centre, double reach,
+                                     const Vec3& tool) noexcept {
+  if (crowd_ == scene.objects.size()) return addNearestObjects(scene, (centre - tool).norm() + reach, tool);
+  if (std::exchange(crowd_, 0) != 0) distances_.restart();
   const Affine& T_world_device = scene.workspace.T_world_device;
   const double worldReach = (reach + radius_) * kWiden * stretchOf(T_world_device.linear());
   std::array<std::uint32_t, kMaxObjects> found{};
   std::size_t count = 0;
   scene.objectIndex->visitNear(T_world_device * centre, worldReach, [&](std::uint32_t i) noexcept {
-    if (count == found.size()) {
-      overflowed_ = true;
-    } else {
-      found[count++] = i;
-    }
+    if (count < found.size()) found[count] = i;
+    ++count;
   });
+  if (count > ObjectDistances::kRoom) {
+    crowd_ = scene.objects.size();
+    return addNearestObjects(scene, (centre - tool).norm() + reach, tool);
+  }
   // By id, so that the proxy does not depend on the order of visits.
   std::sort(found.begin(), found.begin() + count);
   for (std::size_t k = 0; k < count; ++k) add(*scene.objects[found[k]]);
 }
 
+// More boxes around the tool than fit: the nearest surfaces, and the tool moves only as far as all are known.
+void ContactQuery::addNearestObjects(const scene::SceneSnapshot& scene, double reach,
+                                     const Vec3& tool) noexcept {
+  ObjectDistances::Nearest nearest;
+  distances_.findNearest(scene, now_.time, before_.time, tool, (reach + radius_) * kWiden, nearest);
+  if (nearest.free_m < reach + radius_) {
+    freeTravel_ = std::max(0.0, nearest.free_m - radius_);
+    freeFrom_ = tool;
+  }
+  overflowed_ = overflowed_ || !nearest.complete || nearest.free_m < reach + radius_;
+  std::sort(nearest.candidates.begin(), nearest.candidates.begin() + nearest.count,
+            [](const auto& a, const auto& b) { return a.object < b.object; });
+  for (int i = 0; i < nearest.count; ++i) {
+    const auto& candidate = nearest.candidates[static_cast<std::size_t>(i)];
+    const int before = objectCount_;
+    add(*scene.objects[candidate.object]);
+    if (candidate.fresh && objectCount_ > before) objects_[static_cast<std::size_t>(before)].before = nullptr;
+  }
+}
+
+bool ContactQuery::shorten(const Vec3& p, Vec3& g) const noexcept {
+  if (!std::isfinite(freeTravel_) || (g - freeFrom_).norm() <= freeTravel_) return false;
+  if ((p - freeFrom_).norm() >= freeTravel_) {
+    g = p;
+  } else {
+    g = p + exitOf(p, g - p, freeFrom_, freeTravel_) * (g - p);
+  }
+  return true;
+}
+
+// An object that appears around the tool would hold it inside: it cannot be felt until the tool has left it.
+void ContactQuery::leaveOutEnclosing(const Vec3& tool) noexcept {
+  const auto appeared = [all = std::exchange(allAppeared_, false)](const PlacedObject& placed) {
+    return all || placed.before == nullptr || placed.jumped;
+  };
+  const auto end = objects_.begin() + objectCount_;
+  if (enclosingCount_ == 0 && std::none_of(objects_.begin(), end, appeared)) return;
+  const auto known = enclosing_;
+  const auto knownEnd = known.begin() + enclosingCount_;
+  enclosingCount_ = 0;
+  // In a crowd, an object whose surface is far may still be around the tool.
+  for (auto id = known.begin(); crowd_ > 0 && id != knownEnd; ++id) {
+    const bool here =
+        std::any_of(objects_.begin(), end, [&](const PlacedObject& o) { return o.state->id == *id; });
+    if (!here && now_.scene->find(*id) != nullptr)
+      enclosing_[static_cast<std::size_t>(enclosingCount_++)] = *id;
+  }
+  EnclosureBudget budget;
+  int kept = 0;
+  for (auto placed = objects_.begin(); placed != end; ++placed) {
+    const std::int32_t id = placed->state->id;
+    const bool around =
+        std::find(known.begin(), knownEnd, id) != knownEnd
+            ? !hasLeft(*placed, faces(), now_.time, tool, radius_, budget)
+            : appeared(*placed) && encloses(*placed, faces(), now_.time, tool, radius_, budget);
+    if (around && enclosingCount_ < kMaxObjects) {
+      enclosing_[static_cast<std::size_t>(enclosingCount_++)] = id;
+      continue;
+    }
+    // Its way out of the tool is no way over it.
+    if (std::find(known.begin(), knownEnd, id) != knownEnd) placed->before = nullptr;
+    PlacedObject& target = objects_[static_cast<std::size_t>(kept++)];
+    if (&target != &*placed) target = *placed;
+  }
+  objectCount_ = kept;
+}
+
 int ContactQuery::addObject(std::int32_t id) noexcept {
-  const ObjectState* state = find(*now_.scene, id);
+  const ObjectState* state = now_.scene->find(id);
   if (state == nullptr) return -1;
   add(*state);
   for (int i = 0; i < objectCount_; ++i) {
@@ -160,7 +230,7 @@ bool ContactQuery::place(const ObjectState& state, PlacedObject& placed) const n
 void ContactQuery::compareWithBefore(PlacedObject& placed) const noexcept {
   if (before_.scene == nullptr) return;
   const ObjectState& state = *placed.state;
-  placed.before = find(*before_.scene, state.id);
+  placed.before = before_.scene->find(state.id);
   if (placed.before == nullptr) return;
   const ObjectState& before = *placed.before;
   placed.T_device_objectBefore = placed.T_device_object;
@@ -170,7 +240,11 @@ void ContactQuery::compareWithBefore(PlacedObject& placed) const noexcept {
   }
   const bool sameTriangles = before.mesh->topology == state.mesh->topology;
   placed.deformed = sameTriangles && (before.mesh != state.mesh || state.mesh->deformingAfter(before_.time));
-  placed.jumped = !sameTriangles || before.motion.jumps() != state.motion.jumps();
+  // A workspace is not interpolated: a small change is a motion within this tick.
+  const bool farWorkspace =
+      !sameWorkspace_ && scene::longestMove(placed.T_device_objectBefore, placed.T_device_object,
+                                            state.mesh->index.bounds()) > kLongestMotion_m;
+  placed.jumped = !sameTriangles || before.motion.jumps() != state.motion.jumps() || farWorkspace;
 }
 
 // Facets of objects at rest stay the same from tick to tick. Null for a degenerate triangle; valid until the

@@ -11,6 +11,7 @@
 
 #include "base/time.h"
 #include "realtime/render/facet_cache.h"
+#include "realtime/render/object_distances.h"
 #include "realtime/render/placed_planes.h"
 #include "scene/snapshot.h"
 
@@ -18,6 +19,9 @@ namespace hapticd::realtime {
 
 using base::Nanos;
 using geometry::Affine;
+
+/// A pose that moves a part near the proxy farther is a jump.
+inline constexpr double kLongestMotion_m = 0.020;
 
 /// An object in this tick and, if it existed, in the previous one.
 struct PlacedObject {
@@ -61,18 +65,30 @@ class ContactQuery {
   explicit ContactQuery(double toolRadius_m) noexcept : radius_(toolRadius_m), cache_(toolRadius_m) {}
 
   /// Before a tick that does not follow the previous one: drops all that was kept from its scene.
-  void invalidate() noexcept { ++generation_; }
+  void restart() noexcept {
+    ++generation_;
+    allAppeared_ = true;
+    enclosingCount_ = 0;
+    crowd_ = 0;
+    distances_.restart();
+  }
   /// Starts a tick without objects. `planes` take part in every cast and must live until the next
   /// beginTick().
   void beginTick(const SceneAtTime& now, const SceneAtTime& before,
                  const PlacedPlanes* planes = nullptr) noexcept;
-  /// Adds the objects within `reach` of `centre`; drops gathered facets that are out of date.
-  void addObjectsNear(const Vec3& centre, double reach) noexcept;
+  /// Adds the objects within `reach` of `centre`, except those that appeared around `tool` and that it has
+  /// not left since; drops gathered facets that are out of date.
+  void addObjectsNear(const Vec3& centre, double reach, const Vec3& tool) noexcept;
   /// Adds one object by its id and returns its index; -1 when the scene does not contain it.
   int addObject(std::int32_t id) noexcept;
 
   int objectCount() const noexcept { return objectCount_; }
   const PlacedObject& object(int i) const noexcept { return objects_[static_cast<std::size_t>(i)]; }
+
+  /// Ends a path from p to g where objects that were left out begin; true when it did.
+  bool shorten(const Vec3& p, Vec3& g) const noexcept;
+  /// True when an object is left out because it appeared around the tool.
+  bool isEnclosed() const noexcept { return enclosingCount_ > 0; }
 
   /// Gathers the facets that a tool inside the ball can touch, so that casts inside it need no index. False
   /// when they exceed the storage; casts then use the index.
@@ -127,8 +143,11 @@ class ContactQuery {
 
   template <class Visit>
   void forEachOnSegment(const Vec3& p, const Vec3& d, double limit, int only, Visit&& visit) const noexcept;
-  void addObjectsByIndex(const scene::SceneSnapshot& scene, const Vec3& centre, double reach) noexcept;
+  void addObjectsByIndex(const scene::SceneSnapshot& scene, const Vec3& centre, double reach,
+                         const Vec3& tool) noexcept;
+  void addNearestObjects(const scene::SceneSnapshot& scene, double reach, const Vec3& tool) noexcept;
   void add(const scene::ObjectState& state) noexcept;
+  void leaveOutEnclosing(const Vec3& tool) noexcept;
   bool place(const scene::ObjectState& state, PlacedObject& placed) const noexcept;
   bool sameObjects() const noexcept;
   void compareWithBefore(PlacedObject& placed) const noexcept;
@@ -148,6 +167,15 @@ class ContactQuery {
   bool sameWorkspace_ = true;
   std::array<PlacedObject, kMaxObjects> objects_;
   int objectCount_ = 0;
+  // Ids of the objects that appeared around the tool.
+  std::array<std::int32_t, kMaxObjects> enclosing_{};
+  int enclosingCount_ = 0;
+  bool allAppeared_ = true;  // in this tick
+  std::size_t crowd_ = 0;    // number of objects in a scene with more boxes around the tool than fit, or 0
+  ObjectDistances distances_;
+  // The tool may move this far from there: beyond, there are objects that did not fit.
+  double freeTravel_ = 0;
+  Vec3 freeFrom_ = Vec3::Zero();
   double minSkin_ = 0;
   FacetCache cache_;
   int lastBlocker_ = 0;  // the gathered facet that blocked the last cast of a ball

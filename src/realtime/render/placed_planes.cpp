@@ -58,9 +58,19 @@ void PlacedPlanes::forgetAllExcept(const scene::SceneSnapshot& scene) noexcept {
   memoryCount_ = static_cast<int>(end - memory_.begin());
 }
 
+bool PlacedPlanes::changesInContact(const scene::SceneSnapshot& scene) const noexcept {
+  return std::any_of(memory_.begin(), memory_.begin() + memoryCount_, [&](const Memory& m) {
+    const auto now = std::find_if(scene.planes.begin(), scene.planes.end(),
+                                  [&](const scene::Plane& p) { return p.index == m.index; });
+    return m.touched &&
+           (now == scene.planes.end() || now->placement != m.placement || !(now->surface == m.surface));
+  });
+}
+
 void PlacedPlanes::place(const scene::SceneSnapshot& scene, Nanos now, const Vec3& hip, const Vec3& proxy,
                          double toolRadius_m) noexcept {
   const geometry::Affine& T_world_device = scene.workspace.T_world_device;
+  changedInContact_ = changesInContact(scene);
   forgetAllExcept(scene);
   count_ = 0;
   for (const scene::Plane& plane : scene.planes) {
@@ -85,7 +95,7 @@ bool PlacedPlanes::placeOne(const geometry::Affine& T_world_device, Nanos now, c
   Memory& memory = memoryOf(plane, now, toolRadius_m - hipHeight, fresh);
   if (fresh) placed.insertionDepth_m = memory.depth_m;
 
-  placed.surface = plane.surface;
+  memory.surface = placed.surface = plane.surface;
   if (plane.releasing && memory.releaseBegin < 0) memory.releaseBegin = now;
   if (memory.releaseBegin >= 0) {
     const double left = remainingShare(memory.releaseBegin, now);

@@ -31,6 +31,8 @@ class PlacedPlanes {
   /// Ends a tick: bit i of `touched` is set when plane i holds the proxy.
   void remember(unsigned touched, const Vec3& proxy) noexcept;
   void reset() noexcept { memoryCount_ = 0; }
+  /// In this tick a touched plane vanished, got another placement or another surface.
+  bool changedInContact() const noexcept { return changedInContact_; }
 
   const PlacedPlane* begin() const noexcept { return planes_.data(); }
   const PlacedPlane* end() const noexcept { return planes_.data() + count_; }
@@ -46,6 +48,7 @@ class PlacedPlanes {
     Nanos placed = 0;
     Nanos releaseBegin = -1;
     double depth_m = 0;  ///< of the HIP at the placement
+    scene::Surface surface;
     bool touched = false;
     bool adheres = false;
     Vec3 firstContact = Vec3::Zero();
@@ -53,6 +56,7 @@ class PlacedPlanes {
 
   Memory& memoryOf(const scene::Plane& plane, Nanos now, double depth_m, bool& fresh) noexcept;
   void forgetAllExcept(const scene::SceneSnapshot& scene) noexcept;
+  bool changesInContact(const scene::SceneSnapshot& scene) const noexcept;
   bool placeOne(const geometry::Affine& T_world_device, Nanos now, const Vec3& hip, const Vec3& proxy,
                 double toolRadius_m, PlacedPlane& placed) noexcept;
   static double heightOf(const scene::Plane& plane, const Memory& memory, Nanos now, const Vec3& normal,
@@ -62,6 +66,7 @@ class PlacedPlanes {
   int count_ = 0;
   std::array<Memory, scene::kMaxPlanes> memory_;
   int memoryCount_ = 0;
+  bool changedInContact_ = false;
 };
 
 }  // namespace hapticd::realtime

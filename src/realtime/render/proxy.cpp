@@ -42,6 +42,7 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   planes_.place(*now.scene, now.time, hip, position_, query_.toolRadius());
   query_.beginTick(now, before_, &planes_);
   const bool wasFree = contactSet_.count == 0;
+  if (contactChangedByCommand()) status |= kRenderGeometryJump;
   const Vec3 from = position_;
   carry(hip, status);
   expectedTravel_m_ = (hip - hipBefore_).norm() + (position_ - from).norm();
@@ -59,6 +60,7 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   planes_.remember(touched, position_);
   if (casts_ >= kMaxCasts) status |= kRenderIterationLimit;
   if (query_.overflowed()) status |= kRenderCandidateLimit;
+  if (query_.isEnclosed()) status |= kRenderEnclosed;
   before_ = now;
   positionBefore_ = position_;
   hipBefore_ = hip;
@@ -73,10 +75,10 @@ void Proxy::reset() noexcept {
 void Proxy::startAt(const SceneAtTime& now, const Vec3& hip) noexcept {
   started_ = true;
   popthroughArmed_ = true;
-  released_ = false;
+  released_ = carriedByJump_ = false;
   position_ = positionBefore_ = hipBefore_ = hip;
   contactSet_ = ContactSet{};
-  query_.invalidate();
+  query_.restart();
   before_ = now;
   touchedObject_ = -1;
 }
@@ -200,16 +202,18 @@ bool Proxy::approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Ve
       const auto k = static_cast<std::size_t>(i);
       active.hits[k] = all.hits[static_cast<std::size_t>(nearest.active[k])];
     }
-    const Vec3 displacement = goal - position_;
-    if (displacement.norm() <= 1e-3 * skin) return active.count == 0;
+    Vec3 end = goal;
+    const bool shortened = query_.shorten(position_, end);
+    const Vec3 displacement = end - position_;
+    if (displacement.norm() <= 1e-3 * skin) return active.count == 0 || shortened;
     ++casts_;
     ObjectHit hit;
     // Further constraints are at the proxy: the start of the path is enough.
     const bool held = stopAtFirst && active.count > 0;
-    if (!(held ? query_.castWithinGathered(position_, goal, hit) : query_.cast(position_, goal, hit))) {
+    if (!(held ? query_.castWithinGathered(position_, end, hit) : query_.cast(position_, end, hit))) {
       if (held) return false;
-      position_ = goal;
-      return active.count == 0;
+      position_ = end;
+      return active.count == 0 || shortened;
     }
     const double move = hit.stop * displacement.norm();
     if (held && move > skin) return false;
@@ -298,13 +302,15 @@ void Proxy::applyForceShading() noexcept {
   }
 }
 
-// A first contact this deep does not come from motion of the HIP.
+// A first contact this deep does not come from motion of the HIP, and a hand does not yield to an object that
+// jumps.
 void Proxy::releaseWhenDeep(bool wasFree, std::uint32_t& status) noexcept {
   if (contactSet_.count == 0) {
     released_ = false;
     return;
   }
-  if (wasFree && contactSet_.normal_m.norm() > kJump_m) released_ = true;
+  const double deepest = std::max(kJump_m, kFastestHip_m_per_s * std::min(period_s_, kLongestTick_s));
+  if ((wasFree || carriedByJump_) && contactSet_.normal_m.norm() > deepest) released_ = true;
   if (released_) status |= kRenderReleased;
 }
 

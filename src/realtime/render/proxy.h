@@ -13,6 +13,9 @@ namespace hapticd::realtime {
 
 inline constexpr int kMaxCasts = 128;     ///< per tick; a path over 0.2 mm cells at 1 m/s needs about 20
 inline constexpr double kJump_m = 0.030;  ///< a longer move in one tick is a jump
+inline constexpr double kNear_m = 0.050;  ///< parts of an object this near decide whether its pose is a jump
+inline constexpr double kFastestHip_m_per_s = 1.2;  ///< a late tick allows a first contact this much deeper
+inline constexpr double kLongestTick_s = 0.050;
 inline constexpr double kGatherMargin_m = 10e-6;  ///< tremor of the HIP
 
 /// One face that keeps the proxy from the HIP.
@@ -73,6 +76,12 @@ class Proxy {
   void push(const Vec3& from, std::uint32_t& status) noexcept;
   void pushByDeformingFaces(const Vec3& from, double reach, std::uint32_t& status) noexcept;
   void pushByPlanes(std::uint32_t& status) noexcept;
+  bool isJump(const PlacedObject& object) const noexcept;
+  static bool isJump(const PlacedObject& object, std::uint32_t triangle) noexcept;
+  bool contactChangedByCommand() const noexcept;
+  void liftOutOf(const PlacedObject& object) noexcept;
+  void releaseByJump(std::uint32_t& status) noexcept;
+  static double missedMove(const PlacedObject& object) noexcept;
   void updateProxy(const Vec3& hip) noexcept;
   void moveFrictionless(const Vec3& target, ActiveSet& active) noexcept;
   bool approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Vec3& goal) noexcept;
@@ -100,7 +109,8 @@ class Proxy {
   int casts_ = 0;                // in this tick
   bool started_ = false;         // false until the first tick after a reset
   bool popthroughArmed_ = true;
-  bool released_ = false;  // contact released until the HIP leaves the surface
+  bool released_ = false;       // contact released until the HIP leaves the surface
+  bool carriedByJump_ = false;  // in this tick
   Vec3 position_ = Vec3::Zero();
   Vec3 positionBefore_ = Vec3::Zero();
   Vec3 hipBefore_ = Vec3::Zero();

@@ -3,6 +3,7 @@
 #include <limits>
 #include <tuple>
 
+#include "realtime/render/enclosure.h"
 #include "realtime/render/proxy.h"
 #include "realtime/render/renderer.h"
 
@@ -13,8 +14,52 @@ constexpr int kMaxPushes = 8;
 
 }  // namespace
 
+// The pose that the object follows moves a part near the proxy farther than a motion does. Decided when the
+// object meets the proxy, and only then: it depends on the snapshot and on this tick.
+bool Proxy::isJump(const PlacedObject& object) const noexcept {
+  const scene::Workspace& workspace = now_.scene->workspace;
+  const double units = workspace.worldUnitsPerMetre;
+  return object.state->motion.longestMoveNear(object.state->mesh->index.bounds(),
+                                              workspace.T_world_device * position_,
+                                              kNear_m * units) > kLongestMotion_m * units;
+}
+
+// The same for the shape that a mesh is taking, at the triangle that meets the proxy.
+bool Proxy::isJump(const PlacedObject& object, std::uint32_t triangle) noexcept {
+  const scene::MeshGeometry& mesh = *object.state->mesh;
+  if (!mesh.target || !mesh.before) return false;
+  double longest = 0;
+  for (const std::uint32_t v : (*mesh.triangles)[triangle]) {
+    const Vec3 move = ((*mesh.target)[v] - (*mesh.before)[v]).cast<double>();
+    longest = std::max(longest, (object.T_device_object.linear() * move).norm());
+  }
+  return longest > kLongestMotion_m;
+}
+
+// The hand did not cause such a change of the force.
+bool Proxy::contactChangedByCommand() const noexcept {
+  if (contactSet_.count == 0 || now_.scene == before_.scene) return false;
+  const scene::SceneSnapshot& now = *now_.scene;
+  const scene::SceneSnapshot& before = *before_.scene;
+  if (now.faces != before.faces || planes_.changedInContact() ||
+      now.workspace.T_device_world.matrix() != before.workspace.T_device_world.matrix())
+    return true;
+  for (int i = 0; i < contactSet_.count; ++i) {
+    const ContactConstraint& constraint = contactSet_.constraints[static_cast<std::size_t>(i)];
+    if (constraint.object < 0) continue;
+    const scene::ObjectState* const present = now.find(constraint.object);
+    const scene::ObjectState* const past = before.find(constraint.object);
+    if (present == past) continue;
+    if (present == nullptr || past == nullptr || !(present->surface == past->surface) ||
+        present->mesh->topology != past->mesh->topology || present->motion.jumps() != past->motion.jumps())
+      return true;
+  }
+  return false;
+}
+
 // The proxy stays at its place on the touched object, however that moved or deformed.
 void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
+  carriedByJump_ = false;
   if (contactSet_.count > 0) {
     const int touched = query_.addObject(touchedObject_);
     if (touchedObject_ < 0) {
@@ -24,9 +69,11 @@ void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
     } else {
       const PlacedObject& object = query_.object(touched);
       const Vec3 carried = carriedBy(object, touchedTriangle_, position_);
-      if (object.jumped) status |= kRenderGeometryJump;
-      if ((carried - position_).norm() <= kJump_m) {
+      carriedByJump_ = object.jumped || (carried != position_ && isJump(object));
+      if (carriedByJump_) status |= kRenderGeometryJump;
+      if (!object.jumped || (carried - position_).norm() <= kJump_m) {
         position_ = carried;
+        if (object.jumped) liftOutOf(object);
       } else {
         status |= kRenderGeometryJump;
         position_ = hip;
@@ -35,8 +82,18 @@ void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
     }
   }
   // The proxy stays within this distance of the HIP during the tick.
-  query_.addObjectsNear(hip,
-                        std::max((position_ - hip).norm(), (positionBefore_ - hip).norm()) + kGatherMargin_m);
+  query_.addObjectsNear(
+      hip, std::max((position_ - hip).norm(), (positionBefore_ - hip).norm()) + kGatherMargin_m, position_);
+}
+
+// New triangles of a touched mesh may rise a little above the proxy, which was outside.
+void Proxy::liftOutOf(const PlacedObject& object) noexcept {
+  constexpr double kLift_m = 0.5e-3;
+  EnclosureBudget budget;
+  const Vec3 lifted = position_ + kLift_m * contactSet_.normal_m.normalized();
+  if (encloses(object, query_.faces(), now_.time, position_, query_.toolRadius(), budget) &&
+      !encloses(object, query_.faces(), now_.time, lifted, query_.toolRadius(), budget))
+    position_ = lifted;
 }
 
 Vec3 Proxy::carriedBy(const PlacedObject& object, std::uint32_t triangle, const Vec3& p) const noexcept {
@@ -58,7 +115,8 @@ Vec3 Proxy::carriedBy(const PlacedObject& object, std::uint32_t triangle, const 
 }
 
 // Geometry that passed over the proxy takes it along: a cast in the frame of the moving object, from the
-// previous place of the proxy in that frame to the present one.
+// previous place of the proxy in that frame to the present one. An object that jumps over the proxy takes it
+// along without a force.
 void Proxy::push(const Vec3& from, std::uint32_t& status) noexcept {
   const bool carried = position_ != from;
   bool deforming = false;
@@ -67,24 +125,33 @@ void Proxy::push(const Vec3& from, std::uint32_t& status) noexcept {
     const PlacedObject& object = query_.object(i);
     if (object.deformed) {
       deforming = true;
-      reach = std::max(reach, (object.carried(from) - position_).norm());
+      reach = std::max(reach, (object.carried(from) - position_).norm() + missedMove(object));
     }
     if (!(object.moved || carried) || object.deformed || object.jumped || object.before == nullptr) continue;
     const Vec3 start = object.carried(from);
     const Vec3 displacement = position_ - start;
-    if (displacement.norm() > kJump_m) {
-      status |= kRenderGeometryJump;
-      continue;
-    }
     ObjectHit hit;
     if (displacement.squaredNorm() > 0 && query_.castAtObject(i, start, position_, hit)) {
       position_ = start + hit.stop * displacement;
       expectedTravel_m_ += displacement.norm();
       touchedObject_ = object.state->id;
+      if (object.moved && isJump(object)) releaseByJump(status);
     }
   }
   if (deforming) pushByDeformingFaces(from, reach, status);
   pushByPlanes(status);
+}
+
+void Proxy::releaseByJump(std::uint32_t& status) noexcept {
+  released_ = true;
+  status |= kRenderGeometryJump;
+}
+
+// How far a vertex may have moved in shapes that this servo did not see, metres.
+double Proxy::missedMove(const PlacedObject& object) noexcept {
+  const scene::MeshGeometry& mesh = *object.state->mesh;
+  if (mesh.shape - object.before->mesh->shape <= 1) return 0;
+  return mesh.recentMove * object.T_device_object.linear().norm();
 }
 
 // The back of a plane is solid without end: move the proxy to the front.
@@ -113,7 +180,7 @@ void Proxy::pushByDeformingFaces(const Vec3& from, double reach, std::uint32_t& 
       if (!object.deformed) return;
       const Vec3 start = carriedBy(object, f.triangle, from);
       ObjectHit hit;
-      if ((position_ - start).norm() > kJump_m || !query_.castAtFacet(f, start, position_, hit)) return;
+      if (!query_.castAtFacet(f, start, position_, hit)) return;
       const double above = hit.halfSpace.height(position_);
       if (above > -0.25 * f.skin) return;
       if (std::tuple(above, hit.object, hit.triangle) <
@@ -124,6 +191,7 @@ void Proxy::pushByDeformingFaces(const Vec3& from, double reach, std::uint32_t& 
     });
     if (height == 0) return;
     position_ -= height * farthest.halfSpace.normal;
+    if (isJump(query_.object(farthest.object), farthest.triangle)) releaseByJump(status);
   }
 }
 

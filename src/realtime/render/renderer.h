@@ -47,9 +47,12 @@ enum RenderStatus : std::uint32_t {
       1U << 0,  ///< the proxy spent its casts before it came to rest; it continues in the next tick
   kRenderCandidateLimit = 1U << 1,  ///< more objects or triangles near the proxy than fit
   kRenderNotFinite = 1U << 2,       ///< an input or the sum was not finite; the force of this tick is zero
-  kRenderGeometryJump = 1U << 3,    ///< geometry at the proxy jumped; the guard blends the force
-  kRenderReleased = 1U << 4,        ///< a first contact was too deep; no contact force until the HIP leaves
+  kRenderGeometryJump =
+      1U << 3,                ///< geometry or surface in contact changed at once; the guard blends the force
+  kRenderReleased = 1U << 4,  ///< a first contact was too deep; no contact force until the HIP leaves
   kRenderPopthrough = 1U << 5,
+  kRenderEnclosed =
+      1U << 6,  ///< an object appeared around the HIP; it cannot be felt until the HIP has left it
 };
 
 /// Options of the operator, fixed while the loop runs.

@@ -289,8 +289,10 @@ TEST_P(Tumble, proxy_stays_outside) {
       }
       hip += (goal - hip) / left--;
       const Rendering& r = hand.at(hip);
-      touching += r.touching ? 1 : 0;
-      ASSERT_EQ(r.status & ~kRenderIterationLimit, 0U) << "round " << round << " tick " << i;
+      touching += r.touching || (r.status & kRenderReleased) != 0 ? 1 : 0;
+      // Many of the poses are jumps.
+      ASSERT_EQ(r.status & ~(kRenderIterationLimit | kRenderGeometryJump | kRenderReleased), 0U)
+          << "round " << round << " tick " << i;
       ASSERT_FALSE(isInside(*object.mesh, object.motion.at(now).inverse() * r.proxy_m, now))
           << "round " << round << " tick " << i;
     }

@@ -74,7 +74,7 @@ TEST_P(SegmentsTest, every_segment_into_a_closed_mesh_hits) {
     const auto snapshot = scene.snapshot();
     ContactQuery query(0);
     query.beginTick({snapshot.get(), 0}, {});
-    query.addObjectsNear(offset(), 1);
+    query.addObjectsNear(offset(), 1, offset() + Vec3(1, 0, 0));
     while (shots < segmentCount() * (faces == scene::TouchableFaces::front ? 1 : 2) / 2) {
       // Where the corners are once they went through floats in the scene's unit.
       const auto& t = mesh.triangles[random() % mesh.triangles.size()];

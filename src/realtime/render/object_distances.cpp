@@ -1,0 +1,219 @@
+#include "realtime/render/object_distances.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "realtime/render/facet.h"
+
+namespace hapticd::realtime {
+namespace {
+
+constexpr double kFarthest_m = 0.2;       // of a search for the surface
+constexpr float kRounding_m = 2e-6F;      // of a bound with its travel, in floats
+constexpr double kLongestTravel_m = 4;    // beyond, floats would be too coarse
+constexpr int kExaminations = 64;         // in a tick, of bounds that have run out
+constexpr int kUnknownExaminations = 32;  // in a tick, of objects without a bound
+constexpr int kTurns = 2;                 // in a tick, of others
+constexpr int kMovesFollowed = 64;        // in a tick: the bounds of further objects that moved are lost
+constexpr int kLookAhead = 64;            // when objects were added or removed
+
+// An upper bound of the largest singular value.
+double stretchOf(const geometry::Mat3& m) {
+  return std::sqrt((m.transpose() * m).cwiseAbs().rowwise().sum().maxCoeff());
+}
+
+}  // namespace
+
+// The distance now, at least, and the least on the rest of its motion.
+double ObjectDistances::examine(const scene::ObjectState& state, const geometry::Affine& T_device_world,
+                                Nanos now, const Vec3& tool, double& later_m) const noexcept {
+  const scene::MeshGeometry& mesh = *state.mesh;
+  const geometry::Box& box = mesh.index.bounds();
+  const geometry::Affine placed = state.motion.at(now);
+  const geometry::Affine T_object_device = (T_device_world * placed).inverse();
+  const double stretch = stretchOf(T_object_device.linear());
+  later_m = std::numeric_limits<double>::infinity();
+  if (!std::isfinite(stretch) || box.empty()) return later_m;
+  const Vec3 p = T_object_device * tool;
+  const double outside = (p - p.cwiseMax(box.min).cwiseMin(box.max)).norm();
+  double nearest = kFarthest_m * stretch;
+  if (outside < nearest) {
+    mesh.index.visitNearest(p, nearest, [&](std::uint32_t triangle) noexcept {
+      const scene::Corners now_ = mesh.corners(triangle, now);
+      return nearest = std::min(nearest, distanceBound(now_, p));
+    });
+  }
+  const double distance_m = std::max(outside, nearest) / stretch;
+  later_m = distance_m;
+  if (state.motion.movingAfter(now))
+    later_m -= scene::longestMove(placed, state.motion.destination(), box) * metresPerUnit_;
+  if (mesh.deformingAfter(now)) later_m -= mesh.recentMove * (T_device_world * placed).linear().norm();
+  return distance_m;
+}
+
+float ObjectDistances::boundAfterMove(const scene::ObjectState& before, const scene::ObjectState& now,
+                                      float bound) const noexcept {
+  if (before.id != now.id || before.mesh != now.mesh || before.motion.jumps() != now.motion.jumps())
+    return kUnknown;
+  const geometry::Box& box = now.mesh->index.bounds();
+  // The bound holds up to the destination before; motions between may have been missed.
+  const double way = (scene::longestMove(before.motion.destination(), now.motion.origin(), box) +
+                      scene::longestMove(now.motion.origin(), now.motion.destination(), box)) *
+                     metresPerUnit_;
+  return std::max(0.0F, bound - static_cast<float>(way) - kRounding_m);
+}
+
+// The bounds of unchanged objects stay. States are compared by address: the previous snapshot still lives.
+void ObjectDistances::follow(const scene::SceneSnapshot& scene) noexcept {
+  const int count = static_cast<int>(std::min<std::size_t>(scene.objects.size(), kMaxTracked));
+  const double metresPerUnit = 1 / scene.workspace.worldUnitsPerMetre;
+  const bool sameWorkspace = scene_ != nullptr && scene_->workspace.T_device_world.matrix() ==
+                                                      scene.workspace.T_device_world.matrix();
+  metresPerUnit_ = metresPerUnit;
+  if (count_ == 0 || !sameWorkspace) {
+    std::fill_n(bounds_.begin(), count, kUnknown);
+    for (int i = 0; i < count; ++i)
+      states_[static_cast<std::size_t>(i)] = scene.objects[static_cast<std::size_t>(i)].get();
+    count_ = count;
+    scene_ = &scene;
+    return;
+  }
+  const auto object = [&](int i) { return scene.objects[static_cast<std::size_t>(i)].get(); };
+  int followed = 0;
+  if (count == count_) {
+    for (int i = 0; i < count; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      if (states_[k] == object(i)) continue;
+      if (bounds_[k] != kUnknown) {
+        bounds_[k] =
+            ++followed <= kMovesFollowed ? boundAfterMove(*states_[k], *object(i), bounds_[k]) : kUnknown;
+      }
+      states_[k] = object(i);
+    }
+  } else {
+    // Shifted places: looks for each state near the shift of the one before.
+    const int shift = count - count_;
+    if (shift > 0) {
+      // From the end, so that no bound is overwritten before it is read.
+      int from = count_ - 1;
+      for (int i = count - 1; i >= 0; --i) {
+        const auto k = static_cast<std::size_t>(i);
+        if (from >= 0 && states_[static_cast<std::size_t>(from)] == object(i)) {
+          bounds_[k] = bounds_[static_cast<std::size_t>(from)];
+          --from;
+        } else {
+          bounds_[k] = kUnknown;
+          if (from >= i) --from;
+        }
+        states_[k] = object(i);
+      }
+    } else {
+      int from = 0;
+      for (int i = 0; i < count; ++i) {
+        const auto k = static_cast<std::size_t>(i);
+        int ahead = from;
+        while (ahead < count_ && ahead - from < kLookAhead &&
+               states_[static_cast<std::size_t>(ahead)] != object(i))
+          ++ahead;
+        const bool found = ahead < count_ && states_[static_cast<std::size_t>(ahead)] == object(i);
+        bounds_[k] = found ? bounds_[static_cast<std::size_t>(ahead)] : kUnknown;
+        if (found) from = ahead + 1;
+        states_[k] = object(i);
+      }
+    }
+    count_ = count;
+  }
+  scene_ = &scene;
+}
+
+// Most bounds are far beyond the limit: a loop without branches finds that out.
+bool ObjectDistances::isBlockBeyond(int first, float limit) const noexcept {
+  if (first + kBlock > count_) return false;
+  float least = bounds_[static_cast<std::size_t>(first)];
+  for (int i = 1; i < kBlock; ++i) {
+    const float bound = bounds_[static_cast<std::size_t>(first + i)];
+    least = bound < least ? bound : least;
+  }
+  return least > limit;
+}
+
+// Keeps the nearest; a candidate without room limits how far the tool may move.
+void ObjectDistances::consider(Nearest& nearest, const Candidate& candidate) const noexcept {
+  const auto before = [](const Candidate& a, const Candidate& b) {
+    return std::tie(a.distance_m, a.object) < std::tie(b.distance_m, b.object);
+  };
+  const auto begin = nearest.candidates.begin();
+  auto end = begin + nearest.count;
+  const auto place = std::upper_bound(begin, end, candidate, before);
+  if (nearest.count == kRoom) {
+    const double lost = place == end ? candidate.distance_m : (end - 1)->distance_m;
+    nearest.free_m = std::min(nearest.free_m, lost);
+    if (place == end) return;
+    --end;
+  } else {
+    ++nearest.count;
+  }
+  std::move_backward(place, end, end + 1);
+  *place = candidate;
+}
+
+void ObjectDistances::findNearest(const scene::SceneSnapshot& scene, Nanos now, Nanos before,
+                                  const Vec3& tool, double reach_m, Nearest& nearest) noexcept {
+  nearest.count = 0;
+  nearest.free_m = std::numeric_limits<double>::infinity();
+  nearest.complete = scene.objects.size() <= kMaxTracked;
+  if (count_ == 0) tool_ = tool;
+  if (&scene != scene_ || count_ == 0) follow(scene);
+  travel_ += (tool - tool_).norm();
+  tool_ = tool;
+  if (travel_ > kLongestTravel_m) {
+    for (int i = 0; i < count_; ++i) {
+      float& bound = bounds_[static_cast<std::size_t>(i)];
+      if (bound != kUnknown) bound = std::max(0.0F, bound - static_cast<float>(travel_) - kRounding_m);
+    }
+    travel_ = 0;
+  }
+  const auto limit = static_cast<float>(travel_ + reach_m) + kRounding_m;
+  int examinations = 0;
+  int unknown = 0;
+  const auto examineAt = [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    const bool fresh = bounds_[k] == kUnknown;
+    double later_m = 0;
+    const double distance_m = examine(*states_[k], scene.workspace.T_device_world, now, tool, later_m);
+    bounds_[k] = static_cast<float>(travel_ + std::clamp(later_m, 0.0, 2 * kFarthest_m)) - kRounding_m;
+    bounds_[k] = std::max(0.0F, bounds_[k]);
+    // One that moved may have passed over the tool, and one that appeared may be around it.
+    if (fresh || distance_m <= reach_m || states_[k]->motion.movingAfter(before))
+      consider(nearest, {distance_m, static_cast<std::uint32_t>(i), fresh});
+  };
+  for (int i = 0; i < count_; ++i) {
+    if (i % kBlock == 0 && isBlockBeyond(i, limit)) {
+      i += kBlock - 1;
+      continue;
+    }
+    const auto k = static_cast<std::size_t>(i);
+    if (bounds_[k] > limit) continue;
+    if (bounds_[k] == kUnknown) {
+      if (++unknown <= kUnknownExaminations) {
+        examineAt(i);
+      } else {
+        nearest.complete = false;
+      }
+    } else if (++examinations <= kExaminations) {
+      examineAt(i);
+    } else {
+      consider(nearest, {std::max(0.0, static_cast<double>(bounds_[k]) - travel_),
+                         static_cast<std::uint32_t>(i), false});
+    }
+  }
+  // Bounds of objects that rest around the tool would otherwise run out at the same time.
+  for (int i = 0; i < kTurns && unknown == 0 && count_ > 0; ++i) {
+    turn_ = (turn_ + 1) % count_;
+    const auto k = static_cast<std::size_t>(turn_);
+    if (bounds_[k] > limit) examineAt(turn_);
+  }
+}
+
+}  // namespace hapticd::realtime

@@ -1,0 +1,68 @@
+// Which objects are nearest to the tool, in scenes where more boxes surround it than fit into a tick.
+//
+// Keeps a lower bound of the distance between the tool and the surface of each object. A bound falls with the
+// travel of the tool, so that a tick examines only objects whose bound has run out, and a few more in turn.
+// The number of examined objects is bounded; it depends on the snapshots and on the ticks before, never on
+// time.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+
+#include "base/time.h"
+#include "scene/snapshot.h"
+
+namespace hapticd::realtime {
+
+using base::Nanos;
+using geometry::Vec3;
+
+/// Servo thread: noexcept, fixed storage, no allocation.
+class ObjectDistances {
+ public:
+  static constexpr int kMaxTracked = 16'384;
+  static constexpr int kRoom = 60;
+
+  struct Candidate {
+    double distance_m = 0;     ///< of the surface from the tool, at least
+    std::uint32_t object = 0;  ///< position in SceneSnapshot::objects
+    bool fresh = false;        ///< found for the first time: it appeared
+  };
+  struct Nearest {
+    std::array<Candidate, kRoom> candidates;
+    int count = 0;
+    double free_m = std::numeric_limits<double>::infinity();  ///< no other known object is nearer
+    bool complete = true;                                     ///< every object is known
+  };
+
+  /// The objects whose surface may be within `reach` of the tool, nearest first. `before` is the time of the
+  /// previous tick. Call in every tick, or restart().
+  void findNearest(const scene::SceneSnapshot& scene, Nanos now, Nanos before, const Vec3& tool,
+                   double reach_m, Nearest& nearest) noexcept;
+  /// Forgets everything: all objects count as fresh.
+  void restart() noexcept { count_ = 0; }
+
+ private:
+  static constexpr float kUnknown = -1;
+  static constexpr int kBlock = 64;
+
+  void follow(const scene::SceneSnapshot& scene) noexcept;
+  float boundAfterMove(const scene::ObjectState& before, const scene::ObjectState& now,
+                       float bound) const noexcept;
+  double examine(const scene::ObjectState& state, const geometry::Affine& T_device_world, Nanos now,
+                 const Vec3& tool, double& later_m) const noexcept;
+  bool isBlockBeyond(int first, float limit) const noexcept;
+  void consider(Nearest& nearest, const Candidate& candidate) const noexcept;
+
+  std::array<float, kMaxTracked> bounds_{};  // lower bound of the distance plus the travel until then
+  std::array<const scene::ObjectState*, kMaxTracked> states_{};
+  int count_ = 0;
+  const scene::SceneSnapshot* scene_ = nullptr;
+  double metresPerUnit_ = 0;
+  double travel_ = 0;
+  Vec3 tool_ = Vec3::Zero();
+  int turn_ = 0;
+};
+
+}  // namespace hapticd::realtime
