@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/time.h"
+#include "realtime/servo/force_rate.h"
 
 namespace hapticd::realtime {
 namespace {
@@ -24,7 +25,8 @@ Guard::Guard(const GuardOptions& options, const GuardControl& control, Nanos nom
       longestStep_(2 * nominalPeriod),
       budget_(options.peakForce_N, options.continuousForce_N),
       seen_(control.read()),
-      blended_(options.blend) {}
+      blended_(options.blend),
+      blendTime_(options.blend) {}
 
 Vec3 Guard::step(const GuardInput& in) noexcept {
   now_ = 0;
@@ -36,18 +38,19 @@ Vec3 Guard::step(const GuardInput& in) noexcept {
   }
   // A late tick may raise a force or a ramp by no more than two ticks on time.
   const Nanos dt = std::clamp<Nanos>(in.period, 0, longestStep_);
-  budget_.add(report_.gain * shaped_.norm(), in.period);
+  budget_.add(written_.norm(), in.period);
 
   obeyControl();
   checkDevice(in);
   checkTime(in);
   note(Trip::deepContact, in.deepContact);
 
-  shaped_ = slewLimited(clamped(blended(rendered, in.geometryJump, dt)), dt);
+  shaped_ = clamped(blended(rendered, in.geometryJump, dt));
   report_.gain = gain(dt);
+  limitSlew(dt);
   report_.limit_N = budget_.limit_N();
   count();
-  return report_.gain * shaped_;
+  return written_;
 }
 
 void Guard::obeyControl() noexcept {
@@ -103,17 +106,19 @@ Vec3 Guard::finite(const Vec3& force) noexcept {
   return Vec3::Zero();
 }
 
-// From the force before the jump to the one after it. The blend advances in its first tick, so that the force
-// still follows geometry that jumps in every tick.
+// From the force before the jump to the one after it, within the slew rate also when the device is strong.
+// The blend advances in its first tick, so that the force still follows geometry that jumps in every tick.
 Vec3 Guard::blended(const Vec3& force, bool jump, Nanos dt) noexcept {
   if (jump) {
     blendFrom_ = shaped_;
     blended_ = 0;
+    const double change_N = std::min((force - shaped_).norm(), 2 * options_.peakForce_N);
+    blendTime_ = std::max(options_.blend, base::toNanos(change_N / options_.slew_N_per_s));
     note(Trip::geometryJump);
   }
-  if (blended_ >= options_.blend) return force;
+  if (blended_ >= blendTime_) return force;
   blended_ += dt;
-  return blendFrom_ + share(blended_, options_.blend) * (force - blendFrom_);
+  return blendFrom_ + share(blended_, blendTime_) * (force - blendFrom_);
 }
 
 Vec3 Guard::clamped(const Vec3& force) noexcept {
@@ -127,17 +132,15 @@ Vec3 Guard::clamped(const Vec3& force) noexcept {
   return limit * (force / largest).normalized();
 }
 
-// The direction is always that of `force`. The component of the last force along it counts as reached, and
-// the rest may rise by the slew rate. Falling, also through zero, is not limited.
-Vec3 Guard::slewLimited(const Vec3& force, Nanos dt) noexcept {
-  const double wanted = force.norm();
-  if (wanted == 0) return force;
-  const Vec3 direction = force / wanted;
-  const double reached = std::clamp(shaped_.dot(direction), 0.0, wanted);
-  const double allowed = reached + options_.slew_N_per_s * base::toSeconds(dt);
-  if (wanted <= allowed * (1 + kRounding)) return force;
-  note(Trip::slew);
-  return allowed * direction;
+// A blend starts from the force that was written: a limited one replaces the force before the gain.
+void Guard::limitSlew(Nanos dt) noexcept {
+  const Vec3 wanted = report_.gain * shaped_;
+  const Vec3 allowed = withinForceRate(written_, wanted, options_.slew_N_per_s * base::toSeconds(dt));
+  if (allowed != wanted) {
+    note(Trip::slew);
+    shaped_ = allowed / report_.gain;
+  }
+  written_ = allowed;
 }
 
 double Guard::gain(Nanos dt) noexcept {

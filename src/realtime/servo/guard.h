@@ -1,9 +1,9 @@
 // The last stage before the device: every rendered force passes the guard.
 //
-// In this order: finite check, blend after a jump of geometry, clamp to the peak force (direction kept) and
-// to the thermal budget, slew limit, gain. The gain is zero while a trip holds the force, falls over 20 ms
-// after a late tick, and rises over 0.5 s after every pause. All laws are in seconds, hence the same at 250
-// Hz and 4 kHz; only the speed trip counts ticks.
+// In this order: finite check, blend after a change by a command, clamp to the peak force (direction kept)
+// and to the thermal budget, gain, slew limit (force_rate.h). The gain is zero while a trip holds the force,
+// falls over 20 ms after a late tick, and rises over 0.5 s after every pause. All laws are in seconds, hence
+// the same at 250 Hz and 4 kHz; only the speed trip counts ticks.
 #pragma once
 
 #include <array>
@@ -62,7 +62,7 @@ struct GuardInput {
   Nanos period = 0;                            ///< since the previous tick; 0 in the first
   Nanos late = 0;                              ///< start of this tick minus its deadline
   bool writeFailed = false;                    ///< the device refused the previous force
-  bool geometryJump = false;
+  bool geometryJump = false;                   ///< geometry or surface in contact changed at once
   bool deepContact = false;
 };
 
@@ -86,7 +86,7 @@ class Guard {
   Vec3 finite(const Vec3& force) noexcept;
   Vec3 blended(const Vec3& force, bool jump, Nanos dt) noexcept;
   Vec3 clamped(const Vec3& force) noexcept;
-  Vec3 slewLimited(const Vec3& force, Nanos dt) noexcept;
+  void limitSlew(Nanos dt) noexcept;
   double gain(Nanos dt) noexcept;
   void note(Trip trip, bool acts = true) noexcept { now_ |= acts ? bit(trip) : 0; }
   void latch(Trip trip) noexcept { report_.latched |= bit(trip); }
@@ -106,9 +106,11 @@ class Guard {
   int fastTicks_ = 0;
   bool waitForCalm_ = false;
 
-  Vec3 shaped_ = Vec3::Zero();  // force after the slew limit, before the gain
+  Vec3 shaped_ = Vec3::Zero();   // force before the gain
+  Vec3 written_ = Vec3::Zero();  // by the last step
   Vec3 blendFrom_ = Vec3::Zero();
-  Nanos blended_;  // since the last jump
+  Nanos blended_;    // since the last jump
+  Nanos blendTime_;  // of that jump
   Phase phase_ = Phase::zero;
   Nanos inPhase_ = 0;
   double decayFrom_ = 0;

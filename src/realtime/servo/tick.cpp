@@ -59,7 +59,7 @@ GuardInput Tick::guardInput() const noexcept {
   in.late = std::max(report_.timing.wakeupError, report_.timing.period - period_);
   in.writeFailed = !written_;
   in.geometryJump = (report_.rendering.status & kRenderGeometryJump) != 0;
-  in.deepContact = (report_.rendering.status & kRenderReleased) != 0;
+  in.deepContact = (report_.rendering.status & (kRenderReleased | kRenderEnclosed)) != 0;
   return in;
 }
 

@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <limits>
+#include <random>
 #include <vector>
 
 namespace hapticd::realtime {
@@ -170,6 +171,61 @@ TEST(Guard, TheForceFallsAtOnceAndTurnsThroughZero) {
   EXPECT_NEAR(bench.step().y(), -3, kTiny);
   bench.in.force_N = Vec3(3, 0, 0);
   EXPECT_NEAR((bench.step() - Vec3(1, 0, 0)).norm(), 0, kTiny);
+}
+
+// From F0 to F1: by the distance of F1 from the segment between zero and F0, computed here by a search.
+TEST_P(AtRate, ForcesGrowTurnAndReverseByOneNewtonInAMillisecond) {
+  Bench bench(armedOptions(), period());
+  bench.settle(Vec3::Zero());
+  const double perTick = 1000 * base::toSeconds(period());
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  Vec3 last = Vec3::Zero();
+  double most = 0;
+  double dropped = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    if (i % 7 == 0) {
+      const double size = i % 3 == 0 ? 0 : 3.3;
+      bench.in.force_N = size * Vec3(uniform(random), uniform(random), uniform(random)).normalized();
+    }
+    const Vec3 next = bench.step();
+    double distance = 1e9;
+    for (int k = 0; k <= 100; ++k) distance = std::min(distance, (next - 0.01 * k * last).norm());
+    ASSERT_LE(distance, perTick + 0.01 * last.norm() + kTiny) << i;
+    most = std::max(most, distance);
+    dropped = std::max(dropped, last.norm() - next.norm());
+    last = next;
+  }
+  EXPECT_GT(most, 0.9 * std::min(perTick, 3.0));
+  EXPECT_GT(dropped, 2) << "towards zero at once";
+}
+
+TEST(Guard, ALimitedForceStaysAsNearToTheWantedOneAsItMay) {
+  Bench bench;
+  bench.settle(Vec3(3, 0, 0));
+  bench.in.force_N = Vec3(1.5, 2.5, 0);  // falls to 1.5 N at once and turns by 1 N
+  EXPECT_NEAR((bench.step() - Vec3(1.5, 1, 0)).norm(), 0, kTiny);
+  EXPECT_TRUE(bench.active(Trip::slew));
+  for (int i = 0; i < 5; ++i) bench.step();
+  EXPECT_NEAR((bench.step() - Vec3(1.5, 2.5, 0)).norm(), 0, kTiny);
+  EXPECT_FALSE(bench.active(Trip::slew));
+}
+
+// The written force obeys the law while the gain ramps in, too.
+TEST(Guard, TheGainDoesNotLetAForceReverseFaster) {
+  Bench bench;
+  Vec3 last = Vec3::Zero();
+  for (int i = 0; i < 600; ++i) {
+    bench.in.force_N = Vec3(0, i / 10 % 2 == 0 ? 3.3 : -3.3, 0);
+    const Vec3 next = bench.step();
+    const double allowed = 1 + kTiny;
+    if (next.y() * last.y() < 0) {
+      ASSERT_LE(std::abs(next.y()), allowed) << i;
+    } else {
+      ASSERT_LE(std::abs(next.y()) - std::abs(last.y()), allowed) << i;
+    }
+    last = next;
+  }
 }
 
 TEST(Guard, TurningForcesKeepTheirSize) {
