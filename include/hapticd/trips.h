@@ -101,10 +101,11 @@ inline constexpr std::array<TripInfo, kTripCount> kTrips{{
     {Trip::disarmed, "disarmed", TripAction::hold, ForceError::other,
      "Forces are not enabled for this device.", "Start the server with --enable-forces."},
     {Trip::geometryJump, "geometry_jump", TripAction::clamp, ForceError::other,
-     "Geometry in contact with the device jumped, and the force was blended over 20 ms.",
-     "No action is needed; moving objects in smaller steps avoids it."},
+     "A command changed geometry or surface in contact at once, and the force was blended over 20 ms.",
+     "No action is needed; smaller steps avoid it."},
     {Trip::deepContact, "deep_contact", TripAction::clamp, ForceError::valueOutOfRange,
-     "The first contact with an object was too deep, so the object exerts no force.",
+     "An object appeared around the device or jumped over it, or the first contact was too deep: it exerts "
+     "no force.",
      "Move the device out of the object; then the object can be felt."},
 }};
 

@@ -104,13 +104,13 @@ export const TRIPS = {
   geometry_jump: {
     bit: 15,
     action: "clamp",
-    what: "Geometry in contact with the device jumped, and the force was blended over 20 ms.",
-    remedy: "No action is needed; moving objects in smaller steps avoids it.",
+    what: "A command changed geometry or surface in contact at once, and the force was blended over 20 ms.",
+    remedy: "No action is needed; smaller steps avoid it.",
   },
   deep_contact: {
     bit: 16,
     action: "clamp",
-    what: "The first contact with an object was too deep, so the object exerts no force.",
+    what: "An object appeared around the device or jumped over it, or the first contact was too deep: it exerts no force.",
     remedy: "Move the device out of the object; then the object can be felt.",
   },
 } as const satisfies Record<string, Trip>;

@@ -16,6 +16,7 @@ using realtime::TickReport;
 constexpr double kForceStep_N = 1e-3;
 constexpr double kDepthStep_m = 1e-5;
 constexpr double kGripperStep_rad = 1e-3;
+constexpr base::Nanos kTextPeriod = 1'000'000'000;
 
 wire::F64x3 array(const Vec3& v) {
   return {v.x(), v.y(), v.z()};
@@ -91,6 +92,17 @@ void Reporter::update(const TickReport& tick, const ReportFrame& frame, std::vec
 void Reporter::guard(const TickReport& tick, std::vector<Outgoing>& out) {
   const wire::GuardState state = guardState(tick.guard);
   if (!(state == guard_)) out.push_back({guard_ = state, true});
+  constexpr std::uint32_t kInside = realtime::bit(realtime::Trip::deepContact);
+  const bool inside = (tick.guard.active & kInside) != 0;
+  if (inside && !inside_ && tick.time >= insideTextDue_) {
+    const realtime::TripInfo& trip = realtime::kTrips[static_cast<std::size_t>(realtime::Trip::deepContact)];
+    out.push_back({wire::Text{.severity = wire::kTextWarning,
+                              .level = 0,
+                              .text = std::string(trip.what) + " " + std::string(trip.remedy)},
+                   true});
+    insideTextDue_ = tick.time + kTextPeriod;
+  }
+  inside_ = inside;
   const std::uint32_t now = forceRemovingTrips(tick.guard);
   if (now == reportedTrips_) return;
   for (const realtime::TripInfo& trip : realtime::kTrips) {

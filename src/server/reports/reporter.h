@@ -92,6 +92,8 @@ class Reporter {
   std::optional<double> gripper_rad_;
   geometry::Vec3 scp_ = geometry::Vec3::Constant(1e300);
   std::uint32_t reportedTrips_ = 0;  ///< bits of the trips that removed the force
+  bool inside_ = false;              ///< an object is not felt because the HIP is inside
+  base::Nanos insideTextDue_ = 0;
   wire::GuardState guard_;
 };
 
