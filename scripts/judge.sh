@@ -28,11 +28,11 @@ commit=$(git rev-parse --short=10 HEAD)
 work=build/judge/$commit
 mkdir -p "$work"
 
-# Every run gets a block of seeds of its own: seconds since 1970, times a billion for each job.
+# Every run gets a block of 2^30 seeds of its own, and every job a sixteenth of it.
 base=$(date +%s)
 pids=()
 for ((job = 0; job < jobs; ++job)); do
-  nice -n 10 build/release/bin/hapticd_judge --seconds "$seconds" --seed $(((base * 100 + job) * 1000000000)) \
+  nice -n 10 build/release/bin/hapticd_judge --seconds "$seconds" --seed $(((base << 30) + (job << 26))) \
     --findings 100 --out "$work" >"$work/$job.log" 2>&1 &
   pids+=($!)
 done
