@@ -15,6 +15,7 @@
 
 #include "truth/random_trial.h"
 #include "truth/referee.h"
+#include "truth/session.h"
 #include "truth/shrink.h"
 
 namespace hapticd::truth {
@@ -132,6 +133,7 @@ class Judge {
     write(file, small);
     std::printf("  shrunk to %zu triangles and %zu ticks: hapticd_judge --replay %s\n", small.triangleCount(), small.hips.size(),
                 name.c_str());
+    if (writeSession(small, name + ".haptics")) std::printf("  as a recording: hapticd render --session %s.haptics\n", name.c_str());
     std::fflush(stdout);
   }
 
