@@ -35,20 +35,29 @@ std::uint64_t mixed(std::uint64_t a, std::uint64_t b) {
   return x ^ (x >> 31U);
 }
 
-// Distance of a vector from the cone of non-negative sums of others, by cyclic descent.
-double distanceFromCone(const Point& f, const std::vector<Point>& normals) {
-  std::vector<double> share(normals.size(), 0.0);
-  Point rest = f;
-  for (int round = 0; round < 400; ++round) {
-    const double before = rest.squaredNorm();
-    for (std::size_t i = 0; i < normals.size(); ++i) {
-      const double next = std::max(0.0, share[i] + normals[i].dot(rest));
-      rest -= (next - share[i]) * normals[i];
-      share[i] = next;
+// Distance of a vector from the cone of non-negative sums of others. The nearest point of a cone in space is a sum of at most
+// three of them: tries all sets.
+double distanceFromCone(const Point& f, const std::vector<Point>& n) {
+  double nearest = f.norm();
+  const auto consider = [&](const Point& sum) { nearest = std::min(nearest, (f - sum).norm()); };
+  for (std::size_t i = 0; i < n.size(); ++i) {
+    consider(std::max(0.0, n[i].dot(f)) * n[i]);
+    for (std::size_t j = 0; j < i; ++j) {
+      const Point across = n[i].cross(n[j]);
+      if (across.squaredNorm() < 1e-20) continue;
+      const double a = across.dot(f.cross(n[j])) / across.squaredNorm();
+      const double b = across.dot(n[i].cross(f)) / across.squaredNorm();
+      if (a >= 0 && b >= 0) consider(a * n[i] + b * n[j]);
+      for (std::size_t k = 0; k < j; ++k) {
+        const double determinant = across.dot(n[k]);
+        const double u = n[j].cross(n[k]).dot(f) / determinant;
+        const double v = n[k].cross(n[i]).dot(f) / determinant;
+        const double w = across.dot(f) / determinant;
+        if (u >= 0 && v >= 0 && w >= 0) return 0;
+      }
     }
-    if (before - rest.squaredNorm() <= 1e-12 * f.squaredNorm()) break;
   }
-  return rest.norm();
+  return nearest;
 }
 
 class Referee {
@@ -60,7 +69,11 @@ class Referee {
     static_ = trial.isStatic();
   }
 
+  // A trial that does not begin in free space has nothing to judge: inside and outside follow from the history.
   Verdict run() {
+    reference_.moveTo(0);
+    if (trial_.hips.empty() || !reference_.near(trial_.hips[0], trial_.toolRadius_m + kTouch_m).empty()) return verdict_;
+    if (beyondWalls(trial_.hips[0]) > 0) return verdict_;
     for (std::size_t i = 0; i < trial_.hips.size() && !verdict_.finding; ++i) tick(static_cast<int>(i));
     return verdict_;
   }
@@ -94,7 +107,7 @@ class Referee {
     state.position_m = hip_;
     state.velocity_m_per_s = velocity_;
     renderer_.step(stage_.at(i), state, state.time, realtime::fixture::kTick, rendering_);
-    reference_.moveTo(i);
+    if (i > 0) reference_.moveTo(i);
     ++verdict_.ticks;
     verdict_.touching += rendering_.touching ? 1 : 0;
     judgeNumbers();
@@ -138,13 +151,16 @@ class Referee {
     return fastest / kPeriod_s;
   }
 
+  double beyondWalls(const Point& p) const {
+    double farthest = -std::numeric_limits<double>::infinity();
+    for (const Wall& wall : trial_.enclosure) farthest = std::max(farthest, wall.normal.dot(p) - wall.offset_m);
+    return farthest;
+  }
+
   void judgePlaces() {
     const Point& p = rendering_.proxy_m;
     const double rounding = 1e-9 + 8e-9 * std::max(reference_.extent(), 1e-3);
-    for (const Wall& wall : trial_.enclosure) {
-      const double beyond = wall.normal.dot(p) - wall.offset_m;
-      if (beyond > kGap_m) return report("escaped", beyond, " m beyond a wall, proxy ", p.transpose());
-    }
+    if (beyondWalls(p) > kGap_m) return report("escaped", beyondWalls(p), " m beyond a wall, proxy ", p.transpose());
     const double spring = (p - hip_).norm();
     const bool unfinished = (rendering_.status & kUnfinished) != 0;
     if (!rendering_.touching && !unfinished && spring > rounding) {
@@ -153,11 +169,12 @@ class Referee {
     // Frictionless, the place of the tick before was free and nearer.
     const double now = spring;
     const double before = (proxyBefore_ - hip_).norm();
-    if (static_ && friction_ == 0 && tick_ > 0 && now > before + kGap_m + 2e-3 * trial_.toolRadius_m) {
+    const bool popped = (rendering_.status & realtime::kRenderPopthrough) != 0;
+    if (static_ && friction_ == 0 && tick_ > 0 && !popped && now > before + kGap_m + 2e-3 * trial_.toolRadius_m) {
       return report("climbed", "the proxy moved from ", before, " m to ", now, " m from the HIP");
     }
     reference_.heights(p, proxyHeights_);
-    if (tick_ > 0 && (rendering_.status & realtime::kRenderPopthrough) == 0) judgePassage();
+    if (tick_ > 0 && !popped) judgePassage();
     heightsBefore_.swap(proxyHeights_);
     if (rendering_.contactForce_N.norm() > stiffest_ * kForceTolerance_m + damping_ * velocity_.norm()) judgeFreeForce();
   }
@@ -210,7 +227,7 @@ class Referee {
     for (const double widening : {kSuspect_m, 0.0}) {
       const auto visible = [&](const Point& q) {
         return std::none_of(space.faces().begin(), space.faces().end(),
-                            [&](int i) { return reference_.crosses(i, previousPlace(i), q, widening); });
+                            [&](int i) { return reference_.pierces(i, previousPlace(i), q, widening); });
       };
       for (const int i : suspects_) {
         const Point base = previousPlace(i);
@@ -225,7 +242,7 @@ class Referee {
     for (const double widening : {kSuspect_m, 0.0}) {
       const auto visible = [&](const Point& q) {
         return std::none_of(space.faces().begin(), space.faces().end(),
-                            [&](int i) { return reference_.crosses(i, q, rendering_.proxy_m, widening); });
+                            [&](int i) { return reference_.pierces(i, q, rendering_.proxy_m, widening); });
       };
       if (const auto place = space.placeNear(rendering_.proxy_m, visible)) return place;
     }
@@ -311,7 +328,7 @@ class Referee {
       const Point n = normalAt(reference_.face(i));
       const auto same = [&](const Point& m) { return (m - n).squaredNorm() < 1e-18; };
       if (std::none_of(normals.begin(), normals.end(), same)) normals.push_back(n);
-      if (normals.size() == 64) return;
+      if (normals.size() == 24) return;  // the set is not worth its time
     }
     const double off = distanceFromCone(force, normals);
     if (off > 2e-3 * force.norm() + stiffest_ * kForceTolerance_m) {
@@ -367,7 +384,7 @@ class Referee {
     // Only where a ball as wide as the gap fits: within a slit, edges hold a point on purpose.
     FreeSpace space(reference_, better, 200e-6, 1.2 * kFollower_m, trial_.seed);
     const auto visible = [&](const Point& q) {
-      return std::none_of(space.faces().begin(), space.faces().end(), [&](int i) { return reference_.crosses(i, better, q, 0); });
+      return std::none_of(space.faces().begin(), space.faces().end(), [&](int i) { return reference_.pierces(i, better, q, 0); });
     };
     if (radius == 0 && !space.placeNear(better, visible)) return;
     report("stuck", "at ", p.transpose(), ", ", spring, " m from the HIP ", hip_.transpose(), "; ", better.transpose(), " is nearer by ", gain);

@@ -216,12 +216,16 @@ Point Reference::carried(const Point& p, int face) const {
   return now.a + local.x() * (now.b - now.a) + local.y() * (now.c - now.a) + local.z() * now.normal;
 }
 
-bool Reference::crosses(int face, const Point& p, const Point& q, double widening) const {
-  const Face& f = faces_[static_cast<std::size_t>(face)];
+bool Reference::pierces(int i, const Point& p, const Point& q, double widening) const {
+  const Face& f = face(i);
   const double start = f.normal.dot(p - f.a);
   const double end = f.normal.dot(q - f.a);
-  if ((start >= 0) == (end >= 0) || !touchableFrom(f, start)) return false;
-  return over(f, p + start / (start - end) * (q - p), widening);
+  return (start >= 0) != (end >= 0) && over(f, p + start / (start - end) * (q - p), widening);
+}
+
+bool Reference::crosses(int i, const Point& p, const Point& q, double widening) const {
+  const Face& f = face(i);
+  return touchableFrom(f, f.normal.dot(p - f.a)) && pierces(i, p, q, widening);
 }
 
 }  // namespace hapticd::truth

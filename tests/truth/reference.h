@@ -48,6 +48,8 @@ class Reference {
 
   /// Whether the straight path goes through the face, widened by `widening`, from a side that can be touched.
   bool crosses(int face, const Point& p, const Point& q, double widening) const;
+  /// The same from either side, touchable or not.
+  bool pierces(int face, const Point& p, const Point& q, double widening) const;
   /// Whether a tool at this height above a face is on a side of it that can be touched.
   bool touchableFrom(const Face& f, double height) const {
     if (f.unbounded) return height >= 0;

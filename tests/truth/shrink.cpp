@@ -15,11 +15,8 @@ class Shrinker {
     do {
       before = size();
       dropFirstTicks();
-      dropFrom([](Trial& t) -> auto& { return t.objects; });
-      dropFrom([](Trial& t) -> auto& { return t.planes; });
-      for (std::size_t i = 0; i < best_.objects.size(); ++i) {
-        dropFrom([i](Trial& t) -> auto& { return t.objects[i].triangles; });
-      }
+      // What is no longer enclosed may escape.
+      if (rule_ != "escaped") dropParts();
       dropFrom([](Trial& t) -> auto& { return t.hips; });
       simplify();
     } while (size() < before && runs_ > 0);
@@ -51,6 +48,14 @@ class Shrinker {
         trial.hips.erase(trial.hips.begin(), trial.hips.begin() + static_cast<std::ptrdiff_t>(n));
         if (!take(std::move(trial))) break;
       }
+    }
+  }
+
+  void dropParts() {
+    dropFrom([](Trial& t) -> auto& { return t.objects; });
+    dropFrom([](Trial& t) -> auto& { return t.planes; });
+    for (std::size_t i = 0; i < best_.objects.size(); ++i) {
+      dropFrom([i](Trial& t) -> auto& { return t.objects[i].triangles; });
     }
   }
 
