@@ -166,7 +166,7 @@ INSTANTIATE_TEST_SUITE_P(, CrackTest,
                                          SeamCase{"soup_point", Parts::soup, false}, SeamCase{"soup_ball", Parts::soup, true},
                                          SeamCase{"pocket_point", Parts::pocket, false},
                                          SeamCase{"pocket_ball", Parts::pocket, true}),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& seamCase) { return std::string(seamCase.param.name); });
 
 TEST_P(CrackTest, nothing_passes_a_seam) {
   int through = 0;

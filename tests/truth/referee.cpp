@@ -113,7 +113,8 @@ class Referee {
     judgeNumbers();
     if (verdict_.finding) return;
     judgePlaces();
-    if (static_) judgeEnergy();
+    const bool mayBePushedOut = trial_.sides != Sides::both && trial_.toolRadius_m > 0;
+    if (static_ && !mayBePushedOut) judgeEnergy();
     const bool last = static_cast<std::size_t>(i) + 1 == trial_.hips.size();
     const bool chosen = static_cast<double>(mixed(trial_.seed, static_cast<std::uint64_t>(i)) >> 11U) * 0x1p-53 < options_.share;
     if (rendering_.touching && (options_.longRulesAtTheEnd ? last : chosen)) judgeAtLength();
@@ -170,13 +171,20 @@ class Referee {
     const double now = spring;
     const double before = (proxyBefore_ - hip_).norm();
     const bool popped = (rendering_.status & realtime::kRenderPopthrough) != 0;
-    if (static_ && friction_ == 0 && tick_ > 0 && !popped && now > before + kGap_m + 2e-3 * trial_.toolRadius_m) {
+    if (static_ && friction_ == 0 && tick_ > 0 && !popped && now > before + kGap_m + 2e-3 * trial_.toolRadius_m &&
+        !pushedOutOfOneSide()) {
       return report("climbed", "the proxy moved from ", before, " m to ", now, " m from the HIP");
     }
     reference_.heights(p, proxyHeights_);
     if (tick_ > 0 && !popped) judgePassage();
     heightsBefore_.swap(proxyHeights_);
     if (rendering_.contactForce_N.norm() > stiffest_ * kForceTolerance_m + damping_ * velocity_.norm()) judgeFreeForce();
+  }
+
+  // A ball that comes from the untouchable side overlaps the face, until its centre is in front; then the face pushes it out.
+  bool pushedOutOfOneSide() const {
+    if (trial_.sides == Sides::both || trial_.toolRadius_m == 0) return false;
+    return !reference_.near(proxyBefore_, trial_.toolRadius_m - 2e-6).empty();
   }
 
   // A move is suspected when it goes through a face, or past its edge nearer than any gap is wide.
