@@ -67,6 +67,7 @@ class Referee {
     for (const TrialObject& object : trial.objects) consider(object.material);
     for (const TrialPlane& plane : trial.planes) consider(plane.material);
     static_ = trial.isStatic();
+    oneSidedBall_ = trial.sides != Sides::both && trial.toolRadius_m > 0;
   }
 
   // A trial that does not begin in free space has nothing to judge: inside and outside follow from the history.
@@ -113,11 +114,11 @@ class Referee {
     judgeNumbers();
     if (verdict_.finding) return;
     judgePlaces();
-    const bool mayBePushedOut = trial_.sides != Sides::both && trial_.toolRadius_m > 0;
-    if (static_ && !mayBePushedOut) judgeEnergy();
+    if (static_ && !oneSidedBall_) judgeEnergy();
     const bool last = static_cast<std::size_t>(i) + 1 == trial_.hips.size();
     const bool chosen = static_cast<double>(mixed(trial_.seed, static_cast<std::uint64_t>(i)) >> 11U) * 0x1p-53 < options_.share;
-    if (rendering_.touching && (options_.longRulesAtTheEnd ? last : chosen)) judgeAtLength();
+    const bool judgeable = rendering_.touching && !oneSidedBall_ && (rendering_.status & kUnfinished) == 0;
+    if (judgeable && (options_.longRulesAtTheEnd ? last : chosen)) judgeAtLength();
   }
 
   // What the report alone shows.
@@ -134,8 +135,11 @@ class Referee {
     if (!r.touching && (r.depth_m != 0 || !r.contactForce_N.isZero(0))) {
       return report("fields", "depth ", r.depth_m, " and force ", r.contactForce_N.norm(), " without contact");
     }
-    if (r.touching && !(std::abs(r.normal.norm() - 1) < 1e-9)) return report("fields", "a normal of length ", r.normal.norm());
     const double spring = (r.proxy_m - hip_).norm();
+    if (r.touching && r.depth_m == 0 && spring > kForceTolerance_m && (r.status & kUnfinished) == 0) {
+      return report("fields", "depth 0 in contact, with the proxy ", spring, " m from the HIP");
+    }
+    if (r.touching && !(std::abs(r.normal.norm() - 1) < 1e-9)) return report("fields", "a normal of length ", r.normal.norm());
     const double bound = stiffest_ * (spring * (1 + 1e-6) + kForceTolerance_m) * (1 + friction_) +
                          3 * damping_ * (velocity_.norm() + surfaceSpeed()) * (1 + friction_);
     if (!(r.contactForce_N.norm() <= bound)) {
@@ -172,19 +176,13 @@ class Referee {
     const double before = (proxyBefore_ - hip_).norm();
     const bool popped = (rendering_.status & realtime::kRenderPopthrough) != 0;
     if (static_ && friction_ == 0 && tick_ > 0 && !popped && now > before + kGap_m + 2e-3 * trial_.toolRadius_m &&
-        !pushedOutOfOneSide()) {
+        !unfinished && !oneSidedBall_) {
       return report("climbed", "the proxy moved from ", before, " m to ", now, " m from the HIP");
     }
     reference_.heights(p, proxyHeights_);
     if (tick_ > 0 && !popped) judgePassage();
     heightsBefore_.swap(proxyHeights_);
     if (rendering_.contactForce_N.norm() > stiffest_ * kForceTolerance_m + damping_ * velocity_.norm()) judgeFreeForce();
-  }
-
-  // A ball that comes from the untouchable side overlaps the face, until its centre is in front; then the face pushes it out.
-  bool pushedOutOfOneSide() const {
-    if (trial_.sides == Sides::both || trial_.toolRadius_m == 0) return false;
-    return !reference_.near(proxyBefore_, trial_.toolRadius_m - 2e-6).empty();
   }
 
   // A move is suspected when it goes through a face, or past its edge nearer than any gap is wide.
@@ -312,8 +310,8 @@ class Referee {
     judgeDirection(near);
     judgeLaw(near);
     if (radius > 0 && trial_.sides == Sides::both) judgeOverlap(near);
-    const bool restless = (rendering_.status & (kUnfinished | realtime::kRenderPopthrough)) != 0;
-    if (static_ && friction_ == 0 && !restless) judgeRest();
+    const bool popped = (rendering_.status & realtime::kRenderPopthrough) != 0;
+    if (static_ && friction_ == 0 && !popped) judgeRest();
   }
 
   Point normalAt(const Face& f) const {
@@ -405,6 +403,9 @@ class Referee {
   realtime::Renderer renderer_;
   Verdict verdict_;
   bool static_ = true;
+  // Behind a one-sided face a ball may overlap it; the face pushes it out once its centre is in front. Rules that rely on a
+  // ball beside the faces do not apply.
+  bool oneSidedBall_ = false;
   double stiffest_ = 0;
   double damping_ = 0;
   double friction_ = 0;
