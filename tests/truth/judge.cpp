@@ -22,13 +22,13 @@ namespace hapticd::truth {
 namespace {
 
 #ifdef HAPTICD_SANITIZED
-constexpr std::uint64_t kTicks = 200'000;
+constexpr std::uint64_t kTicks = 300'000;
 #else
-constexpr std::uint64_t kTicks = 2'000'000;
+constexpr std::uint64_t kTicks = 5'000'000;
 #endif
 
 struct Options {
-  std::uint64_t ticks = std::getenv("HAPTICD_LONG") != nullptr ? 5 * kTicks : kTicks;
+  std::uint64_t ticks = std::getenv("HAPTICD_LONG") != nullptr ? 3 * kTicks : kTicks;
   double seconds = 0;  // 0: ticks count
   std::uint64_t seed = 1;
   std::string kind;
@@ -127,11 +127,11 @@ class Judge {
     print(trial, finding);
     Trial small = options_.shrink ? shrink(trial, finding) : trial;
     std::filesystem::create_directories(options_.out);
-    const std::string name = options_.out + "/" + finding.rule + "-" + std::to_string(trial.seed) + ".trial";
-    std::ofstream file(name);
+    const std::string name = options_.out + "/" + finding.rule + "-" + std::to_string(trial.seed);
+    std::ofstream file(name + ".trial");
     file << "# " << finding.rule << ": " << finding.text << '\n';
     write(file, small);
-    std::printf("  shrunk to %zu triangles and %zu ticks: hapticd_judge --replay %s\n", small.triangleCount(), small.hips.size(),
+    std::printf("  shrunk to %zu triangles and %zu ticks: hapticd_judge --replay %s.trial\n", small.triangleCount(), small.hips.size(),
                 name.c_str());
     if (writeSession(small, name + ".haptics")) std::printf("  as a recording: hapticd render --session %s.haptics\n", name.c_str());
     std::fflush(stdout);

@@ -100,6 +100,7 @@ class Referee {
     const bool first = i == 0;
     hipBefore_ = first ? trial_.hips[0] : hip_;
     proxyBefore_ = first ? trial_.hips[0] : Point(rendering_.proxy_m);
+    touchedBefore_ = !first && rendering_.touching;
     forceBefore_ = first ? Point(Point::Zero()) : Point(rendering_.contactForce_N);
     hip_ = trial_.hips[static_cast<std::size_t>(i)];
     velocity_ = (hip_ - hipBefore_) / kPeriod_s;
@@ -199,7 +200,21 @@ class Referee {
     }
     if (suspects_.empty()) return;
     ++verdict_.suspected;
-    searchPassage();
+    if (static_ && !touchedBefore_ && !rendering_.touching) judgeFreeMove();
+    if (!verdict_.finding) searchPassage();
+  }
+
+  // From free motion to free motion, through the inside of a face that is alone and lies below the HIP: it must have held
+  // the proxy, however near a way around is.
+  void judgeFreeMove() {
+    for (const int i : suspects_) {
+      const Face& f = reference_.face(i);
+      const Point foot = nearestOf(f, hip_);
+      const bool below = (hip_ - foot).cross(f.normal).norm() < 1e-9;
+      if (!below || !reference_.crosses(i, proxyBefore_, hip_, -kGap_m)) continue;
+      if (reference_.near(0.5 * (proxyBefore_ + hip_), (hip_ - proxyBefore_).norm() + trial_.toolRadius_m).size() > 1) continue;
+      return report("through", "from ", proxyBefore_.transpose(), " to ", hip_.transpose(), " through face ", i, ", alone");
+    }
   }
 
   Point previousPlace(int face) const {
@@ -361,7 +376,7 @@ class Referee {
   }
 
   bool othersNear(int object) const {
-    const double blended = std::max(2e-3, 2 * (rendering_.proxy_m - hip_).norm()) + trial_.toolRadius_m;
+    const double blended = 1.2e-3 + 2 * (rendering_.proxy_m - hip_).norm() + trial_.toolRadius_m;
     const std::vector<int> near = reference_.near(rendering_.proxy_m, blended);
     return std::any_of(near.begin(), near.end(), [&](int i) { return reference_.face(i).object != object; });
   }
@@ -382,6 +397,8 @@ class Referee {
     const double radius = trial_.toolRadius_m;
     const double spring = (p - hip_).norm();
     if (spring < kStuck_m) return;
+    // A ball converges on edges over several ticks: judged once it rests.
+    if (radius > 0 && (p - proxyBefore_).norm() > kGap_m) return;
     Descent descent(reference_, p, kDescentReach_m, radius, radius > 0 ? 0.0 : 1.2 * kFollower_m,
                     trial_.seed + static_cast<std::uint64_t>(tick_));
     const Point better = descent.from(p, hip_);
@@ -402,6 +419,7 @@ class Referee {
   Reference reference_;
   realtime::Renderer renderer_;
   Verdict verdict_;
+  bool touchedBefore_ = false;
   bool static_ = true;
   // Behind a one-sided face a ball may overlap it; the face pushes it out once its centre is in front. Rules that rely on a
   // ball beside the faces do not apply.
