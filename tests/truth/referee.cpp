@@ -117,9 +117,19 @@ class Referee {
     judgePlaces();
     if (static_ && !oneSidedBall_) judgeEnergy();
     const bool last = static_cast<std::size_t>(i) + 1 == trial_.hips.size();
-    const bool chosen = static_cast<double>(mixed(trial_.seed, static_cast<std::uint64_t>(i)) >> 11U) * 0x1p-53 < options_.share;
     const bool judgeable = rendering_.touching && !oneSidedBall_ && (rendering_.status & kUnfinished) == 0;
-    if (judgeable && (options_.longRulesAtTheEnd ? last : chosen)) judgeAtLength();
+    if (judgeable && (options_.longRulesAtTheEnd ? last : drawn(options_.share))) return judgeAtLength();
+    // Where a proxy stuck, it is in the same place as before.
+    if (judgeable && heldFast() && (options_.longRulesAtTheEnd ? last : drawn(20 * options_.share))) judgeRest();
+  }
+
+  // At random, with this probability; the same in every run of the trial.
+  bool drawn(double probability) const {
+    return static_cast<double>(mixed(trial_.seed, static_cast<std::uint64_t>(tick_)) >> 11U) * 0x1p-53 < probability;
+  }
+  bool heldFast() const {
+    const double way = (hip_ - hipBefore_).norm();
+    return way > kGap_m && (rendering_.proxy_m - proxyBefore_).norm() < 0.02 * way;
   }
 
   // What the report alone shows.
@@ -325,8 +335,7 @@ class Referee {
     judgeDirection(near);
     judgeLaw(near);
     if (radius > 0 && trial_.sides == Sides::both) judgeOverlap(near);
-    const bool popped = (rendering_.status & realtime::kRenderPopthrough) != 0;
-    if (static_ && friction_ == 0 && !popped) judgeRest();
+    judgeRest();
   }
 
   Point normalAt(const Face& f) const {
@@ -393,6 +402,7 @@ class Referee {
   }
 
   void judgeRest() {
+    if (!static_ || friction_ > 0 || (rendering_.status & realtime::kRenderPopthrough) != 0) return;
     const Point& p = rendering_.proxy_m;
     const double radius = trial_.toolRadius_m;
     const double spring = (p - hip_).norm();
