@@ -220,7 +220,8 @@ class Referee {
     for (const int i : suspects_) {
       const Face& f = reference_.face(i);
       const Point foot = nearestOf(f, hip_);
-      const bool below = (hip_ - foot).cross(f.normal).norm() < 1e-9;
+      // By a gap's width inside: at its rim the proxy may slide off.
+      const bool below = reference_.pierces(i, foot + (foot - hip_), hip_, -kGap_m) && (hip_ - foot).cross(f.normal).norm() < 1e-9;
       if (!below || !reference_.crosses(i, proxyBefore_, hip_, -kGap_m)) continue;
       if (reference_.near(0.5 * (proxyBefore_ + hip_), (hip_ - proxyBefore_).norm() + trial_.toolRadius_m).size() > 1) continue;
       return report("through", "from ", proxyBefore_.transpose(), " to ", hip_.transpose(), " through face ", i, ", alone");
