@@ -1,0 +1,463 @@
+#include "truth/referee.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <sstream>
+
+#include "realtime/render/renderer.h"
+#include "truth/descent.h"
+#include "truth/free_space.h"
+#include "truth/reference.h"
+#include "truth/stage.h"
+
+namespace hapticd::truth {
+namespace {
+
+using realtime::Rendering;
+
+constexpr double kGap_m = 10e-6;            // narrower gaps are closed
+constexpr double kFollower_m = 0.49 * kGap_m;  // radius of the ball that follows the proxy
+constexpr double kSuspect_m = 30e-6;        // beside a face: a move there is searched for a path
+constexpr double kForceTolerance_m = 20e-6;  // times stiffness; twice the gap
+constexpr double kTouch_m = 25e-6;          // faces within this of the tool may hold it
+constexpr double kStuck_m = 10e-6;
+constexpr double kDescentReach_m = 1e-3;
+constexpr unsigned kUnexpected =
+    realtime::kRenderNotFinite | realtime::kRenderGeometryJump | realtime::kRenderReleased;
+constexpr unsigned kUnfinished = realtime::kRenderIterationLimit | realtime::kRenderCandidateLimit;
+
+std::uint64_t mixed(std::uint64_t a, std::uint64_t b) {
+  std::uint64_t x = a + 0x9E3779B97F4A7C15U * (b + 1);
+  x = (x ^ (x >> 30U)) * 0xBF58476D1CE4E5B9U;
+  x = (x ^ (x >> 27U)) * 0x94D049BB133111EBU;
+  return x ^ (x >> 31U);
+}
+
+// Distance of a vector from the cone of non-negative sums of others. The nearest point of a cone in space is a sum of at most
+// three of them: tries all sets.
+double distanceFromCone(const Point& f, const std::vector<Point>& n) {
+  double nearest = f.norm();
+  const auto consider = [&](const Point& sum) { nearest = std::min(nearest, (f - sum).norm()); };
+  for (std::size_t i = 0; i < n.size(); ++i) {
+    consider(std::max(0.0, n[i].dot(f)) * n[i]);
+    for (std::size_t j = 0; j < i; ++j) {
+      const Point across = n[i].cross(n[j]);
+      if (across.squaredNorm() < 1e-20) continue;
+      const double a = across.dot(f.cross(n[j])) / across.squaredNorm();
+      const double b = across.dot(n[i].cross(f)) / across.squaredNorm();
+      if (a >= 0 && b >= 0) consider(a * n[i] + b * n[j]);
+      for (std::size_t k = 0; k < j; ++k) {
+        const double determinant = across.dot(n[k]);
+        const double u = n[j].cross(n[k]).dot(f) / determinant;
+        const double v = n[k].cross(n[i]).dot(f) / determinant;
+        const double w = across.dot(f) / determinant;
+        if (u >= 0 && v >= 0 && w >= 0) return 0;
+      }
+    }
+  }
+  return nearest;
+}
+
+class Referee {
+ public:
+  Referee(const Trial& trial, const RefereeOptions& options)
+      : trial_(trial), options_(options), stage_(trial), reference_(trial), renderer_({trial.toolRadius_m, false}) {
+    for (const TrialObject& object : trial.objects) consider(object.material);
+    for (const TrialPlane& plane : trial.planes) consider(plane.material);
+    static_ = trial.isStatic();
+    oneSidedBall_ = trial.sides != Sides::both && trial.toolRadius_m > 0;
+  }
+
+  // A trial that does not begin in free space has nothing to judge: inside and outside follow from the history.
+  Verdict run() {
+    reference_.moveTo(0);
+    if (trial_.hips.empty() || !reference_.near(trial_.hips[0], trial_.toolRadius_m + kTouch_m).empty()) return verdict_;
+    if (beyondWalls(trial_.hips[0]) > 0) return verdict_;
+    for (std::size_t i = 0; i < trial_.hips.size() && !verdict_.finding; ++i) tick(static_cast<int>(i));
+    return verdict_;
+  }
+
+ private:
+  void consider(const Material& m) {
+    stiffest_ = std::max(stiffest_, m.stiffness_N_per_m);
+    damping_ = std::max(damping_, m.damping_Ns_per_m);
+    friction_ = std::max(friction_, m.staticFriction);
+  }
+
+  template <class... Words>
+  void report(const char* rule, const Words&... words) {
+    if (verdict_.finding) return;
+    std::ostringstream text;
+    text.precision(12);
+    (text << ... << words);
+    verdict_.finding = Finding{rule, tick_, text.str()};
+  }
+
+  void tick(int i) {
+    tick_ = i;
+    const bool first = i == 0;
+    hipBefore_ = first ? trial_.hips[0] : hip_;
+    proxyBefore_ = first ? trial_.hips[0] : Point(rendering_.proxy_m);
+    touchedBefore_ = !first && rendering_.touching;
+    forceBefore_ = first ? Point(Point::Zero()) : Point(rendering_.contactForce_N);
+    hip_ = trial_.hips[static_cast<std::size_t>(i)];
+    velocity_ = (hip_ - hipBefore_) / kPeriod_s;
+    device::DeviceState state;
+    state.time = i * realtime::fixture::kTick;
+    state.position_m = hip_;
+    state.velocity_m_per_s = velocity_;
+    renderer_.step(stage_.at(i), state, state.time, realtime::fixture::kTick, rendering_);
+    if (i > 0) reference_.moveTo(i);
+    ++verdict_.ticks;
+    verdict_.touching += rendering_.touching ? 1 : 0;
+    judgeNumbers();
+    if (verdict_.finding) return;
+    judgePlaces();
+    if (static_ && !oneSidedBall_) judgeEnergy();
+    const bool last = static_cast<std::size_t>(i) + 1 == trial_.hips.size();
+    const bool judgeable = rendering_.touching && !oneSidedBall_ && (rendering_.status & kUnfinished) == 0;
+    if (judgeable && (options_.longRulesAtTheEnd ? last : drawn(options_.share))) return judgeAtLength();
+    // Where a proxy stuck, it is in the same place as before.
+    if (judgeable && heldFast() && (options_.longRulesAtTheEnd ? last : drawn(20 * options_.share))) judgeRest();
+  }
+
+  // At random, with this probability; the same in every run of the trial.
+  bool drawn(double probability) const {
+    return static_cast<double>(mixed(trial_.seed, static_cast<std::uint64_t>(tick_)) >> 11U) * 0x1p-53 < probability;
+  }
+  bool heldFast() const {
+    const double way = (hip_ - hipBefore_).norm();
+    return way > kGap_m && (rendering_.proxy_m - proxyBefore_).norm() < 0.02 * way;
+  }
+
+  // What the report alone shows.
+  void judgeNumbers() {
+    const Rendering& r = rendering_;
+    if (!r.force_N.allFinite() || !r.proxy_m.allFinite() || !r.contactForce_N.allFinite()) return report("finite", "");
+    if ((r.status & kUnexpected) != 0) return report("status", "bits ", r.status);
+    Point sum = Point::Zero();
+    for (std::uint32_t k = 0; k < r.contactCount; ++k) sum += r.contacts[k].force_N;
+    if ((sum - r.contactForce_N).norm() > 1e-9 * (1 + r.contactForce_N.norm())) {
+      return report("fields", "the contacts sum to ", sum.transpose(), " instead of ", r.contactForce_N.transpose());
+    }
+    if (r.touching != (r.contactCount > 0)) return report("fields", "touching ", r.touching, ", contacts ", r.contactCount);
+    if (!r.touching && (r.depth_m != 0 || !r.contactForce_N.isZero(0))) {
+      return report("fields", "depth ", r.depth_m, " and force ", r.contactForce_N.norm(), " without contact");
+    }
+    const double spring = (r.proxy_m - hip_).norm();
+    if (r.touching && r.depth_m == 0 && spring > kForceTolerance_m && (r.status & kUnfinished) == 0) {
+      return report("fields", "depth 0 in contact, with the proxy ", spring, " m from the HIP");
+    }
+    if (r.touching && !(std::abs(r.normal.norm() - 1) < 1e-9)) return report("fields", "a normal of length ", r.normal.norm());
+    const double bound = stiffest_ * (spring * (1 + 1e-6) + kForceTolerance_m) * (1 + friction_) +
+                         3 * damping_ * (velocity_.norm() + surfaceSpeed()) * (1 + friction_);
+    if (!(r.contactForce_N.norm() <= bound)) {
+      report("force", r.contactForce_N.norm(), " N with the proxy ", spring, " m from the HIP; at most ", bound, " N");
+    }
+  }
+
+  double surfaceSpeed() const {
+    double fastest = 0;
+    for (std::size_t i = 0; i < trial_.objects.size() && reference_.moved(); ++i) {
+      fastest = std::max(fastest, (reference_.carriedByObject(proxyBefore_, static_cast<int>(i)) - proxyBefore_).norm());
+      if (!trial_.objects[i].target.empty()) fastest = std::max(fastest, 1e-3);  // the fastest deformation
+    }
+    return fastest / kPeriod_s;
+  }
+
+  double beyondWalls(const Point& p) const {
+    double farthest = -std::numeric_limits<double>::infinity();
+    for (const Wall& wall : trial_.enclosure) farthest = std::max(farthest, wall.normal.dot(p) - wall.offset_m);
+    return farthest;
+  }
+
+  void judgePlaces() {
+    const Point& p = rendering_.proxy_m;
+    const double rounding = 1e-9 + 8e-9 * std::max(reference_.extent(), 1e-3);
+    if (beyondWalls(p) > kGap_m) return report("escaped", beyondWalls(p), " m beyond a wall, proxy ", p.transpose());
+    const double spring = (p - hip_).norm();
+    const bool unfinished = (rendering_.status & kUnfinished) != 0;
+    if (!rendering_.touching && !unfinished && spring > rounding) {
+      return report("lost", "no contact, and the proxy is ", spring, " m from the HIP");
+    }
+    // Frictionless, the place of the tick before was free and nearer.
+    const double now = spring;
+    const double before = (proxyBefore_ - hip_).norm();
+    const bool popped = (rendering_.status & realtime::kRenderPopthrough) != 0;
+    if (static_ && friction_ == 0 && tick_ > 0 && !popped && now > before + kGap_m + 2e-3 * trial_.toolRadius_m &&
+        !unfinished && !oneSidedBall_) {
+      return report("climbed", "the proxy moved from ", before, " m to ", now, " m from the HIP");
+    }
+    reference_.heights(p, proxyHeights_);
+    if (tick_ > 0 && !popped) judgePassage();
+    heightsBefore_.swap(proxyHeights_);
+    if (rendering_.contactForce_N.norm() > stiffest_ * kForceTolerance_m + damping_ * velocity_.norm()) judgeFreeForce();
+  }
+
+  // A move is suspected when it goes through a face, or past its edge nearer than any gap is wide.
+  void judgePassage() {
+    const auto n = static_cast<int>(reference_.faces().size());
+    suspects_.clear();
+    for (int i = 0; i < n; ++i) {
+      if (!reference_.moved()) {
+        if ((heightsBefore_[i] >= 0) == (proxyHeights_[i] >= 0)) continue;
+      }
+      if (reference_.face(i).thin) continue;
+      const Point from = reference_.moved() ? reference_.carried(proxyBefore_, i) : proxyBefore_;
+      if (reference_.crosses(i, from, rendering_.proxy_m, kSuspect_m)) suspects_.push_back(i);
+    }
+    if (suspects_.empty()) return;
+    ++verdict_.suspected;
+    if (static_ && !touchedBefore_ && !rendering_.touching) judgeFreeMove();
+    if (!verdict_.finding) searchPassage();
+  }
+
+  // From free motion to free motion, through the inside of a face that is alone and lies below the HIP: it must have held
+  // the proxy, however near a way around is.
+  void judgeFreeMove() {
+    for (const int i : suspects_) {
+      const Face& f = reference_.face(i);
+      const Point foot = nearestOf(f, hip_);
+      // By a gap's width inside: at its rim the proxy may slide off.
+      const bool below = reference_.pierces(i, foot + (foot - hip_), hip_, -kGap_m) && (hip_ - foot).cross(f.normal).norm() < 1e-9;
+      if (!below || !reference_.crosses(i, proxyBefore_, hip_, -kGap_m)) continue;
+      if (reference_.near(0.5 * (proxyBefore_ + hip_), (hip_ - proxyBefore_).norm() + trial_.toolRadius_m).size() > 1) continue;
+      return report("through", "from ", proxyBefore_.transpose(), " to ", hip_.transpose(), " through face ", i, ", alone");
+    }
+  }
+
+  Point previousPlace(int face) const {
+    return reference_.moved() ? reference_.carried(proxyBefore_, face) : proxyBefore_;
+  }
+
+  // The follower: from the proxy's place before, carried with each face, to its place now.
+  void searchPassage() {
+    const Point& p = rendering_.proxy_m;
+    double way = (p - proxyBefore_).norm();
+    for (const int i : suspects_) way = std::max(way, (p - previousPlace(i)).norm());
+    bool decided = false;
+    for (const double reach : {1.0 * way + 100e-6, 5 * way + 400e-6}) {
+      FreeSpace space(reference_, 0.5 * (p + proxyBefore_), reach, kFollower_m, trial_.seed + static_cast<std::uint64_t>(tick_));
+      const std::optional<Point> start = placeBefore(space);
+      const std::optional<Point> end = placeNow(space);
+      if (!start || !end) continue;
+      decided = true;
+      if (space.connects(*start, *end)) return;
+    }
+    if (!decided) {
+      ++verdict_.undecided;
+      return;
+    }
+    const Face& f = reference_.face(suspects_.front());
+    report("through", "from ", proxyBefore_.transpose(), " to ", p.transpose(), " past face ", suspects_.front(), " of object ",
+           f.object, ", force ", rendering_.contactForce_N.norm());
+  }
+
+  std::optional<Point> placeBefore(FreeSpace& space) const {
+    for (const double widening : {kSuspect_m, 0.0}) {
+      const auto visible = [&](const Point& q) {
+        return std::none_of(space.faces().begin(), space.faces().end(),
+                            [&](int i) { return reference_.pierces(i, previousPlace(i), q, widening); });
+      };
+      for (const int i : suspects_) {
+        const Point base = previousPlace(i);
+        if (const auto place = space.placeNear(base, visible)) return place;
+        if (!reference_.moved()) break;
+      }
+    }
+    return std::nullopt;
+  }
+
+  std::optional<Point> placeNow(FreeSpace& space) const {
+    for (const double widening : {kSuspect_m, 0.0}) {
+      const auto visible = [&](const Point& q) {
+        return std::none_of(space.faces().begin(), space.faces().end(),
+                            [&](int i) { return reference_.pierces(i, q, rendering_.proxy_m, widening); });
+      };
+      if (const auto place = space.placeNear(rendering_.proxy_m, visible)) return place;
+    }
+    return std::nullopt;
+  }
+
+  void judgeFreeForce() {
+    const Point& p = rendering_.proxy_m;
+    const Point way = hip_ - p;
+    if (way.norm() < 60e-6) return;
+    // Cheap: a face on the way.
+    const double radius = trial_.toolRadius_m;
+    reference_.heights(hip_, hipHeights_);
+    const double margin = radius + 1.5e-6;
+    for (Eigen::Index i = 0; i < hipHeights_.size(); ++i) {
+      const double start = heightsBefore_[i];  // of the proxy: swapped above
+      const double end = hipHeights_[i];
+      if (std::min(start, end) > margin || std::max(start, end) < -margin) continue;
+      if (radius == 0 && reference_.crosses(static_cast<int>(i), p, hip_, 1.2 * kGap_m)) return;
+      if (radius > 0 && distanceOf(reference_.face(static_cast<int>(i)), p, hip_) < radius + 1e-6) {
+        if (leavesFace(static_cast<int>(i), p)) continue;
+        return;
+      }
+    }
+    // Edges within the gap may hold a point.
+    const Point off = p + way * std::min(1.0, 30e-6 / way.norm());
+    for (Eigen::Index i = 0; radius == 0 && i < hipHeights_.size(); ++i) {
+      if (std::min(heightsBefore_[i], hipHeights_[i]) > 2 * kGap_m || std::max(heightsBefore_[i], hipHeights_[i]) < -2 * kGap_m) continue;
+      if (distanceOf(reference_.face(static_cast<int>(i)), off, hip_) < 1.2 * kGap_m) return;
+    }
+    report("free", rendering_.contactForce_N.norm(), " N, and the way from the proxy ", p.transpose(), " to the HIP ", hip_.transpose(),
+           " is free");
+  }
+
+  // A ball that rests on a face and is pulled off it.
+  bool leavesFace(int i, const Point& p) const {
+    const Face& f = reference_.face(i);
+    const Point away = p - nearestOf(f, p);
+    return away.dot(hip_ - p) > 1e-3 * away.norm() * (hip_ - p).norm() &&
+           (hip_ - nearestOf(f, hip_)).norm() > trial_.toolRadius_m;
+  }
+
+  // Work on the hand since the last tick without contact, when no spring was loaded. The trapezoid's error is at most half
+  // of the change of the force times the way.
+  void judgeEnergy() {
+    const Point way = hip_ - hipBefore_;
+    work_J_ += 0.5 * (forceBefore_ + rendering_.contactForce_N).dot(way);
+    workTolerance_J_ += 0.5 * (rendering_.contactForce_N - forceBefore_).norm() * way.norm();
+    if (work_J_ > workTolerance_J_ + 1e-9 + stiffest_ * kForceTolerance_m * kForceTolerance_m) {
+      report("energy", "the hand gained ", work_J_, " J; the error of the sum is at most ", workTolerance_J_);
+    }
+    if (!rendering_.touching) work_J_ = workTolerance_J_ = 0;
+  }
+
+  void judgeAtLength() {
+    ++verdict_.longRules;
+    const double radius = trial_.toolRadius_m;
+    const std::vector<int> near = reference_.near(rendering_.proxy_m, radius + kTouch_m);
+    judgeDirection(near);
+    judgeLaw(near);
+    if (radius > 0 && trial_.sides == Sides::both) judgeOverlap(near);
+    judgeRest();
+  }
+
+  Point normalAt(const Face& f) const {
+    const Point& p = rendering_.proxy_m;
+    if (trial_.toolRadius_m > 0) return (p - nearestOf(f, p)).stableNormalized();
+    return f.normal.dot(p - f.a) < 0 && !f.unbounded ? Point(-f.normal) : f.normal;
+  }
+
+  bool mixedStiffness() const {
+    const auto other = [&](const auto& o) { return o.material.stiffness_N_per_m != stiffest_; };
+    return std::any_of(trial_.objects.begin(), trial_.objects.end(), other) ||
+           std::any_of(trial_.planes.begin(), trial_.planes.end(), other);
+  }
+
+  void judgeDirection(const std::vector<int>& near) {
+    if (mixedStiffness()) return;  // blending adds a tangential part
+    const Point& force = rendering_.normalForce_N;
+    std::vector<Point> normals;
+    for (const int i : near) {
+      const Point n = normalAt(reference_.face(i));
+      const auto same = [&](const Point& m) { return (m - n).squaredNorm() < 1e-18; };
+      if (std::none_of(normals.begin(), normals.end(), same)) normals.push_back(n);
+      if (normals.size() == 24) return;  // the set is not worth its time
+    }
+    const double off = distanceFromCone(force, normals);
+    if (off > 2e-3 * force.norm() + stiffest_ * kForceTolerance_m) {
+      report("direction", "the force ", force.transpose(), " is off the cone of ", normals.size(), " normals by ", off, " N");
+    }
+  }
+
+  void judgeLaw(const std::vector<int>& near) {
+    if (near.empty() || (damping_ > 0 && !static_)) return;
+    const Point n = normalAt(reference_.face(near[0]));
+    const Face& f = reference_.face(near[0]);
+    for (const int i : near) {
+      if (reference_.face(i).object != f.object || (normalAt(reference_.face(i)) - n).norm() > 1e-9) return;
+    }
+    // With unequal neighbours near, the stiffness is blended.
+    if (mixedStiffness() && othersNear(f.object)) return;
+    const Material& m = reference_.materialOf(near[0]);
+    const double depth = trial_.toolRadius_m - n.dot(hip_ - nearestOf(f, rendering_.proxy_m));
+    const Point expected = std::max(0.0, m.stiffness_N_per_m * std::max(0.0, depth) - m.damping_Ns_per_m * n.dot(velocity_)) * n;
+    const double off = (rendering_.normalForce_N - expected).norm();
+    if (off > 1e-6 * expected.norm() + m.stiffness_N_per_m * kForceTolerance_m) {
+      report("law", "the force ", rendering_.normalForce_N.transpose(), " on one surface, expected ", expected.transpose());
+    }
+  }
+
+  bool othersNear(int object) const {
+    const double blended = 1.2e-3 + 2 * (rendering_.proxy_m - hip_).norm() + trial_.toolRadius_m;
+    const std::vector<int> near = reference_.near(rendering_.proxy_m, blended);
+    return std::any_of(near.begin(), near.end(), [&](int i) { return reference_.face(i).object != object; });
+  }
+
+  void judgeOverlap(const std::vector<int>& near) {
+    const double slack = 2e-6 + (static_ ? 0.0 : 1e-5);
+    for (const int i : near) {
+      const Face& f = reference_.face(i);
+      const double distance = (rendering_.proxy_m - nearestOf(f, rendering_.proxy_m)).norm();
+      if (distance < trial_.toolRadius_m - slack && !f.thin) {
+        return report("overlap", "the ball is ", trial_.toolRadius_m - distance, " m in face ", i);
+      }
+    }
+  }
+
+  void judgeRest() {
+    if (!static_ || friction_ > 0 || (rendering_.status & realtime::kRenderPopthrough) != 0) return;
+    const Point& p = rendering_.proxy_m;
+    const double radius = trial_.toolRadius_m;
+    const double spring = (p - hip_).norm();
+    if (spring < kStuck_m) return;
+    // A ball converges on edges over several ticks: judged once it rests.
+    if (radius > 0 && (p - proxyBefore_).norm() > kGap_m) return;
+    Descent descent(reference_, p, kDescentReach_m, radius, radius > 0 ? 0.0 : 1.2 * kFollower_m,
+                    trial_.seed + static_cast<std::uint64_t>(tick_));
+    const Point better = descent.from(p, hip_);
+    const double gain = spring - (better - hip_).norm();
+    if (gain <= kStuck_m + 2e-3 * radius) return;
+    // Only where a ball as wide as the gap fits: within a slit, edges hold a point on purpose.
+    FreeSpace space(reference_, better, 200e-6, 1.2 * kFollower_m, trial_.seed);
+    const auto visible = [&](const Point& q) {
+      return std::none_of(space.faces().begin(), space.faces().end(), [&](int i) { return reference_.pierces(i, better, q, 0); });
+    };
+    if (radius == 0 && !space.placeNear(better, visible)) return;
+    report("stuck", "at ", p.transpose(), ", ", spring, " m from the HIP ", hip_.transpose(), "; ", better.transpose(), " is nearer by ", gain);
+  }
+
+  const Trial& trial_;
+  const RefereeOptions options_;
+  Stage stage_;
+  Reference reference_;
+  realtime::Renderer renderer_;
+  Verdict verdict_;
+  bool touchedBefore_ = false;
+  bool static_ = true;
+  // Behind a one-sided face a ball may overlap it; the face pushes it out once its centre is in front. Rules that rely on a
+  // ball beside the faces do not apply.
+  bool oneSidedBall_ = false;
+  double stiffest_ = 0;
+  double damping_ = 0;
+  double friction_ = 0;
+
+  int tick_ = 0;
+  Rendering rendering_;
+  Point hip_ = Point::Zero();
+  Point hipBefore_ = Point::Zero();
+  Point velocity_ = Point::Zero();
+  Point proxyBefore_ = Point::Zero();
+  Point forceBefore_ = Point::Zero();
+  double work_J_ = 0;
+  double workTolerance_J_ = 0;
+  Eigen::ArrayXd heightsBefore_;  // of the proxy
+  Eigen::ArrayXd proxyHeights_;
+  Eigen::ArrayXd hipHeights_;
+  std::vector<int> suspects_;
+};
+
+}  // namespace
+
+Verdict judge(const Trial& trial, const RefereeOptions& options) {
+  return Referee(trial, options).run();
+}
+
+}  // namespace hapticd::truth

@@ -1,0 +1,53 @@
+// Drives the renderer through a trial and judges every tick.
+//
+// | rule | claim |
+// |---|---|
+// | finite | force and proxy are finite |
+// | status | no jump and no release: trials contain neither |
+// | fields | touching, depth, contact count and the sum of the contacts agree |
+// | force | |F| <= largest K * |proxy - HIP|, plus damping and friction |
+// | through | the proxy did not get where a ball of 4.9 µm can not follow: never through a face or a gap below 10 µm |
+// | escaped | the proxy is within the walls of the trial |
+// | lost | without contact the proxy is at the HIP |
+// | free | no force while the straight way from the proxy to the HIP is free |
+// | climbed | frictionless, static: the proxy never moves away from the HIP |
+// | stuck | frictionless, static: no place nearer to the HIP by more than 10 µm can be reached in small moves |
+// | direction | the normal force is a non-negative sum of the normals of the faces at the proxy |
+// | law | one surface alone: F = (K depth - B v) normal |
+// | overlap | a ball overlaps no face |
+// | energy | static: the hand gains no energy over any contact, from free motion on |
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "truth/trial.h"
+
+namespace hapticd::truth {
+
+struct Finding {
+  std::string rule;
+  int tick = 0;
+  std::string text;
+};
+
+struct RefereeOptions {
+  /// Of the ticks, for the rules that take long: stuck, direction, law, overlap.
+  double share = 0.01;
+  /// Those rules judge the last tick only: for the shrinker.
+  bool longRulesAtTheEnd = false;
+};
+
+struct Verdict {
+  std::optional<Finding> finding;  ///< the first one, which ends the trial
+  std::uint64_t ticks = 0;
+  std::uint64_t touching = 0;
+  std::uint64_t suspected = 0;  ///< moves near an edge of a face, judged by a search for a path
+  std::uint64_t undecided = 0;  ///< of those: in a wedge too narrow to tell
+  std::uint64_t longRules = 0;  ///< ticks that all rules judged
+};
+
+Verdict judge(const Trial& trial, const RefereeOptions& options = {});
+
+}  // namespace hapticd::truth

@@ -1,0 +1,121 @@
+// The reference and the referee themselves, on scenes whose answers are known.
+#include "truth/referee.h"
+
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+#include "truth/free_space.h"
+#include "truth/meshes.h"
+#include "truth/random_trial.h"
+#include "truth/reference.h"
+#include "truth/shrink.h"
+
+namespace hapticd::truth {
+namespace {
+
+Trial plate(double holeAt = 1, double holeWidth = 0) {
+  Dice dice(1);
+  Trial trial;
+  Shape shape = patch({-0.02, -0.02, 0}, {holeAt < 1 ? 0.02 + holeAt - 0.5 * holeWidth : 0.04, 0, 0}, {0, 0.04, 0}, 2, 3, 0, dice);
+  if (holeAt < 1) {
+    const double begin = holeAt + 0.5 * holeWidth;
+    shape.append(patch({begin, -0.02, 0}, {0.02 - begin, 0, 0}, {0, 0.04, 0}, 3, 2, 0, dice));
+  }
+  trial.objects.push_back(bake(shape, Pose{}));
+  return trial;
+}
+
+bool joined(const Trial& trial, const Point& p, const Point& q, double reach) {
+  Reference reference(trial);
+  reference.moveTo(0);
+  FreeSpace space(reference, 0.5 * (p + q), reach, 4.9e-6, 1);
+  return space.connects(p, q);
+}
+
+TEST(FreeSpace, a_plate_separates_its_sides) {
+  EXPECT_FALSE(joined(plate(), {0, 0, 1e-4}, {0, 0, -1e-4}, 1e-3));
+}
+
+TEST(FreeSpace, paths_lead_around_a_rim) {
+  EXPECT_TRUE(joined(plate(), {0.0199, 0, 1e-4}, {0.0199, 0, -1e-4}, 1e-3));
+}
+
+TEST(FreeSpace, a_gap_below_the_tolerance_joins_nothing) {
+  EXPECT_FALSE(joined(plate(0, 0), {0, 0, 1e-4}, {0, 0, -1e-4}, 4e-4));
+  EXPECT_FALSE(joined(plate(0, 9e-6), {0, 0, 1e-4}, {0, 0, -1e-4}, 4e-4));
+}
+
+TEST(FreeSpace, a_wider_hole_joins_both_sides) {
+  EXPECT_TRUE(joined(plate(0, 14e-6), {0, 0, 1e-4}, {1e-5, 0, -1e-4}, 4e-4));
+}
+
+TEST(FreeSpace, a_face_that_is_touchable_from_the_front_lets_through_what_comes_from_behind) {
+  Trial trial = plate();
+  trial.sides = Sides::front;
+  EXPECT_FALSE(joined(trial, {0, 0, 1e-4}, {0, 0, -1e-4}, 1e-3));
+  EXPECT_TRUE(joined(trial, {0, 0, -1e-4}, {0, 0, 1e-4}, 1e-3));
+}
+
+TEST(Reference, distance_of_a_segment_from_a_triangle) {
+  const Face f{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  EXPECT_DOUBLE_EQ(distanceOf(f, {0.2, 0.2, 1}, {0.3, 0.3, 2}), 1);
+  EXPECT_DOUBLE_EQ(distanceOf(f, {0.2, 0.2, 1}, {0.3, 0.3, -1}), 0);
+  EXPECT_DOUBLE_EQ(distanceOf(f, {-1, -1, 0}, {3, -1, 0}), 1);
+  EXPECT_NEAR(distanceOf(f, {1, 1, -1}, {1, 1, 1}), std::sqrt(0.5), 1e-15);
+}
+
+TEST(Reference, carries_points_with_a_turning_object) {
+  Trial trial = plate();
+  Pose turned;
+  turned.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(0.32, Point::UnitZ()));
+  trial.objects[0].poses = {Pose{}, turned};
+  Reference reference(trial);
+  reference.moveTo(7);
+  reference.moveTo(8);
+  const Point p(std::cos(0.14), std::sin(0.14), 0.1);
+  EXPECT_LT((reference.carried(p, 0) - Point(std::cos(0.16), std::sin(0.16), 0.1)).norm(), 1e-12);
+  EXPECT_TRUE(reference.moved());
+  reference.moveTo(20);
+  reference.moveTo(21);
+  EXPECT_FALSE(reference.moved());
+}
+
+TEST(Trial, text_gives_the_same_trial) {
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    const Trial trial = randomTrial(seed);
+    std::stringstream first;
+    write(first, trial);
+    std::stringstream second;
+    write(second, read(first));
+    EXPECT_EQ(first.str(), second.str());
+  }
+}
+
+TEST(Trial, text_that_is_not_a_trial_is_refused) {
+  std::istringstream nonsense("hip 1 2 x\n");
+  EXPECT_THROW(read(nonsense), std::runtime_error);
+  std::istringstream early("vertex 1 2 3\n");
+  EXPECT_THROW(read(early), std::runtime_error);
+}
+
+// A hand that presses on a plate: nothing to find. With a false wall in front of the plate, the referee finds it, and two
+// ticks show it.
+TEST(Referee, judges_a_press_and_shrinks_what_it_finds) {
+  Trial trial = plate();
+  for (int i = 0; i < 300; ++i) trial.hips.emplace_back(1e-5 * i, 2e-5 * i, 0.003 - 2e-5 * i);
+  RefereeOptions all;
+  all.share = 1;
+  const Verdict clean = judge(trial, all);
+  EXPECT_FALSE(clean.finding) << clean.finding->rule << clean.finding->text;
+  EXPECT_GT(clean.longRules, 100U);
+  trial.enclosure.push_back({-Point::UnitZ(), -0.001});
+  const Verdict found = judge(trial, all);
+  ASSERT_TRUE(found.finding);
+  EXPECT_EQ(found.finding->rule, "escaped");
+  const Trial small = shrink(trial, *found.finding);
+  EXPECT_EQ(small.hips.size(), 2U);
+}
+
+}  // namespace
+}  // namespace hapticd::truth
