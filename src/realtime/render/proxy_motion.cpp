@@ -91,8 +91,8 @@ void Proxy::liftOutOf(const PlacedObject& object) noexcept {
   constexpr double kLift_m = 0.5e-3;
   EnclosureBudget budget;
   const Vec3 lifted = position_ + kLift_m * contactSet_.normal_m.normalized();
-  if (encloses(object, query_.faces(), now_.time, position_, query_.toolRadius(), budget) &&
-      !encloses(object, query_.faces(), now_.time, lifted, query_.toolRadius(), budget))
+  if (encloses(object, query_.faces(), now_.time, position_, toolRadius_, budget) &&
+      !encloses(object, query_.faces(), now_.time, lifted, toolRadius_, budget))
     position_ = lifted;
 }
 
