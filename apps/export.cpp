@@ -14,7 +14,7 @@
 namespace hapticd::apps {
 namespace {
 
-struct Options {
+struct ExportOptions {
   std::string recording;
   std::string to;
   std::string out;
@@ -47,7 +47,7 @@ void addReports(ReportedDevice& device, const realtime::TickReport& tick, wire::
   }
 }
 
-void exportVrpn(const Options& options, std::string& remark) {
+void exportVrpn(const ExportOptions& options, std::string& remark) {
   record::RecordingReader reader(options.recording);
   const record::RecordingHeader& header = reader.header();
   const server::ServerConfig config = server::parseConfig(header.config, options.recording);
@@ -71,7 +71,7 @@ void exportVrpn(const Options& options, std::string& remark) {
   remark = reader.remark();
 }
 
-int run(const Options& options) {
+int run(const ExportOptions& options) {
   std::string remark;
   if (options.to == "vrpn") {
     exportVrpn(options, remark);
@@ -89,7 +89,7 @@ int run(const Options& options) {
 }  // namespace
 
 void addExport(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ExportOptions>();
   CLI::App* command = app.add_subcommand("export", "Convert a recording to MCAP, CSV or a VRPN log");
   command->add_option("file", options->recording, "Recording of 'hapticd serve --record'")
       ->required()

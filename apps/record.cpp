@@ -20,7 +20,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-struct Options {
+struct RecordOptions {
   std::string server;
   std::string file;
   double seconds = 0;
@@ -93,7 +93,7 @@ void pollUntilEnd(Client& client, double seconds) {
   }
 }
 
-void recordTicks(Client& client, record::SampleFile& file, const Options& options) {
+void recordTicks(Client& client, record::SampleFile& file, const RecordOptions& options) {
   const auto capabilities = client.waitCapabilities();
   if (!capabilities || !capabilities->subscribe) {
     throw std::runtime_error(client.server() +
@@ -110,7 +110,7 @@ void recordTicks(Client& client, record::SampleFile& file, const Options& option
   file.close();
 }
 
-int run(const Options& options) {
+int run(const RecordOptions& options) {
   const auto samples = sampleFile(options.file);
   if (!samples && std::filesystem::path(options.file).extension() != ".vrpn") {
     throw std::runtime_error("'" + options.file +
@@ -135,7 +135,7 @@ int run(const Options& options) {
 }  // namespace
 
 void addRecord(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RecordOptions>();
   CLI::App* command = app.add_subcommand("record", "Record the reports of a server as a client");
   command->add_option("server", options->server, "NAME@host[:port] or NAME@tcp://host[:port]")->required();
   command->add_option("file", options->file, "*.vrpn, *.csv or *.mcap")->required();

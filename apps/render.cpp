@@ -11,7 +11,7 @@
 namespace hapticd::apps {
 namespace {
 
-struct Options {
+struct RenderCommandOptions {
   MeshRenderOptions mesh;
   std::string session;
   std::string report;
@@ -54,7 +54,7 @@ void addSurfaceOptions(CLI::App& command, MeshRenderOptions& options) {
                    "Leave out the guard, the passivity clamp and the limits of surfaces");
 }
 
-// Options on the command line are changes; all else stays as recorded.
+// RenderCommandOptions on the command line are changes; all else stays as recorded.
 record::RerenderChanges changesOf(const CLI::App& command, const MeshRenderOptions& options) {
   const auto given = [&](const char* name, double value) {
     return command.count(name) > 0 ? std::optional<double>(value) : std::nullopt;
@@ -69,7 +69,7 @@ record::RerenderChanges changesOf(const CLI::App& command, const MeshRenderOptio
   return changes;
 }
 
-int run(const CLI::App& command, const Options& options) {
+int run(const CLI::App& command, const RenderCommandOptions& options) {
   if (!options.session.empty()) {
     for (const char* name : {"--mesh", "--hand", "--mesh-unit", "--size-mm", "--faces", "--timing"}) {
       if (command.count(name) == 0) continue;
@@ -92,7 +92,7 @@ int run(const CLI::App& command, const Options& options) {
 }  // namespace
 
 void addRender(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RenderCommandOptions>();
   CLI::App* command = app.add_subcommand(
       "render", "Render a mesh along a recorded hand, or re-render a recording; offline and deterministic");
   addMeshOptions(*command, options->mesh);

@@ -22,7 +22,6 @@ namespace hapticd::apps {
 namespace {
 
 using base::Nanos;
-using geometry::Vec3;
 
 constexpr Nanos kPeriod = 1'000'000;
 
@@ -87,7 +86,7 @@ Summary follow(const MeshRenderOptions& options, const device::HandFile& hand,
     const Nanos before = base::now();
     renderer.step(snapshot, state, t, kPeriod, rendering);
     const Nanos step_ns = base::now() - before;
-    const Vec3 force_N = guard.step(
+    const geometry::Vec3 force_N = guard.step(
         {.force_N = rendering.force_N,
          .state = &state,
          .period = kPeriod,

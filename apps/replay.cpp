@@ -13,7 +13,7 @@
 namespace hapticd::apps {
 namespace {
 
-struct Options {
+struct ReplayOptions {
   server::ReplayOptions replay;
   std::string listen;
   std::string http;
@@ -21,7 +21,7 @@ struct Options {
   double seconds = 0;
 };
 
-int run(const Options& options) {
+int run(const ReplayOptions& options) {
   spdlog::set_pattern("%H:%M:%S.%e %^%l%$ %v");
   spdlog::flush_on(spdlog::level::info);
   auto player = std::make_unique<server::Player>(options.replay);
@@ -43,7 +43,7 @@ int run(const Options& options) {
 }  // namespace
 
 void addReplay(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ReplayOptions>();
   CLI::App* command = app.add_subcommand("replay", "Serve a recording to clients");
   command->add_option("file", options->replay.file, "Recording of 'hapticd serve --record'")
       ->required()

@@ -14,7 +14,7 @@
 namespace hapticd::apps {
 namespace {
 
-struct Options {
+struct ServeOptions {
   std::string configFile;
   std::string listen;
   std::string http;
@@ -33,7 +33,7 @@ struct Options {
   bool checkConfig = false;
 };
 
-void applyFlags(const Options& options, server::DeviceConfig& device) {
+void applyFlags(const ServeOptions& options, server::DeviceConfig& device) {
   if (!options.driver.empty()) {
     const std::size_t colon = options.driver.find(':');
     const std::string driver = options.driver.substr(0, colon);
@@ -52,7 +52,7 @@ void applyFlags(const Options& options, server::DeviceConfig& device) {
   if (options.reportRate_Hz > 0) device.reportRate_Hz = options.reportRate_Hz;
 }
 
-server::ServerConfig configOf(const Options& options, std::vector<std::string>& remarks) {
+server::ServerConfig configOf(const ServeOptions& options, std::vector<std::string>& remarks) {
   server::ServerConfig config;
   const std::filesystem::path file = options.configFile;
   if (!file.empty()) config = server::loadConfig(file, remarks);
@@ -72,7 +72,7 @@ server::ServerConfig configOf(const Options& options, std::vector<std::string>& 
   return config;
 }
 
-int run(const Options& options) {
+int run(const ServeOptions& options) {
   spdlog::set_pattern("%H:%M:%S.%e %^%l%$ %v");
   spdlog::set_level(options.verbose ? spdlog::level::debug : spdlog::level::info);
   spdlog::flush_on(spdlog::level::info);
@@ -101,7 +101,7 @@ int run(const Options& options) {
 }  // namespace
 
 void addServe(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ServeOptions>();
   CLI::App* command = app.add_subcommand("serve", "Own a haptic device and serve it to VRPN clients");
   command
       ->add_option("--config", options->configFile,

@@ -43,6 +43,15 @@ function(hapticd_precompile target headers)
   endif()
 endfunction()
 
+# hapticd_unite(TARGET COUNT): compiles the sources of TARGET in files of COUNT, unless HAPTICD_UNITY is OFF. For programs,
+# whose sources share few headers of their own but many large ones of others.
+function(hapticd_unite target count)
+  if(HAPTICD_UNITY)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${count})
+    target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
+  endif()
+endfunction()
+
 # hapticd_speed_up(TARGET HEADERS KIND): the same; where HAPTICD_UNITY is KIND or ALL, all sources of TARGET are one file.
 function(hapticd_speed_up target headers kind)
   if(HAPTICD_UNITY STREQUAL kind OR HAPTICD_UNITY STREQUAL ALL)

@@ -3,6 +3,7 @@
 
 #include <utility>  // before Asio: Boost 1.74 uses std::exchange without including it
 //
+#include <algorithm>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/address_v4.hpp>
@@ -16,6 +17,7 @@ namespace hapticd::net {
 class AsioLoop final : public Loop::Impl {
  public:
   static constexpr std::size_t kReadBufferBytes = std::size_t{64} * 1024;
+  static constexpr std::size_t kSmallestRead = std::size_t{4} * 1024;
 
   void run() override;
   void runFor(Loop::Duration duration) override;
@@ -30,6 +32,13 @@ class AsioLoop final : public Loop::Impl {
   std::shared_ptr<TcpListener::Impl> listen(const Endpoint& local, std::function<void(Connection)> onAccept,
                                             const ConnectionOptions& options, const char* option) override;
   std::shared_ptr<UdpSocket::Impl> bind(const Endpoint& local) override;
+
+  /// How much one connection may read in its turn: the connections that send faster than they are read share the
+  /// buffer, so that a short message waits for about one buffer, however many of them there are.
+  std::size_t readShare() const noexcept {
+    return std::max(kSmallestRead, kReadBufferBytes / std::max<std::size_t>(1, busyReaders));
+  }
+  std::size_t busyReaders = 0;  // connections whose last read left something behind
 
   // One buffer for all sockets: each read is consumed before the next, so memory does not grow with clients.
   std::unique_ptr<std::byte[]> readBuffer = std::make_unique_for_overwrite<std::byte[]>(kReadBufferBytes);

@@ -164,8 +164,9 @@ void TcpConnection::armRead() {
 // One read per wake-up, so that a fast sender does not starve the others.
 void TcpConnection::readable() {
   ErrorCode error;
-  const std::size_t size =
-      socket_.read_some(asio::buffer(loop_.readBuffer.get(), AsioLoop::kReadBufferBytes), error);
+  const std::size_t share = loop_.readShare();
+  const std::size_t size = socket_.read_some(asio::buffer(loop_.readBuffer.get(), share), error);
+  setBusy(!error && size == share);
   if (!error) {
     deliver(size);
   } else if (error == asio::error::eof) {
@@ -174,6 +175,13 @@ void TcpConnection::readable() {
     finish(failure_.empty() ? endText(error) : failure_);
   }
   armRead();
+}
+
+void TcpConnection::setBusy(bool busy) noexcept {
+  if (busy != busy_) {
+    loop_.busyReaders += busy ? 1 : -1;
+  }
+  busy_ = busy;
 }
 
 void TcpConnection::deliver(std::size_t bytes) {
@@ -332,6 +340,7 @@ void TcpConnection::finish(std::string reason) {
   }
   reason_ = state_ == State::flushing || state_ == State::draining ? reason_ : std::move(reason);
   state_ = State::closed;
+  setBusy(false);
   queue_.clear();
   timer_.cancel();
   watchTimer_.cancel();
@@ -351,6 +360,7 @@ void TcpConnection::release() noexcept {
   handlers_.reset();
   loop_.guard([this] {
     state_ = State::closed;
+    setBusy(false);
     queue_.clear();
     timer_.cancel();
     watchTimer_.cancel();
@@ -362,6 +372,9 @@ void TcpConnection::release() noexcept {
 
 void TcpConnection::setPaused(bool paused) {
   paused_ = paused;
+  if (paused) {
+    setBusy(false);
+  }
   armRead();
 }
 

@@ -48,6 +48,7 @@ class TcpConnection final : public Connection::Impl, public std::enable_shared_f
   void applyOptions();
   void armRead();
   void readable();
+  void setBusy(bool busy) noexcept;
   void deliver(std::size_t bytes);
   void peerEnded();
   void armWrite();
@@ -77,6 +78,7 @@ class TcpConnection final : public Connection::Impl, public std::enable_shared_f
   Endpoint remote_;
   State state_ = State::connecting;
   bool readArmed_ = false;
+  bool busy_ = false;  // counted in AsioLoop::busyReaders
   bool writeArmed_ = false;
   bool paused_ = false;
   bool peerEnded_ = false;
