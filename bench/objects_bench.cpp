@@ -16,7 +16,7 @@ namespace hapticd::bench {
 namespace {
 
 constexpr base::Nanos kPeriod = 1'000'000;
-constexpr std::int64_t kFrame_ns = 16'666'667;
+constexpr std::int64_t kObjectsFrame_ns = 16'666'667;
 constexpr double kSpacing_mm = 9;
 constexpr double kClear_mm = 44;  // of the touched ball in the middle
 
@@ -39,9 +39,9 @@ std::vector<Vec3> placesOf(int count) {
   return places;
 }
 
-class Crowd {
+class CrowdedScene {
  public:
-  explicit Crowd(int objects) : places_(placesOf(objects - 1)), builder_(config()) {
+  explicit CrowdedScene(int objects) : places_(placesOf(objects - 1)), builder_(config()) {
     const geometry::TriangleMesh small = makeBumpyBall(100, 3);
     tell(builder_, 0, bumpyBall(1'000), 0);
     for (std::size_t i = 0; i < places_.size(); ++i) {
@@ -94,8 +94,8 @@ void replay(realtime::Renderer& renderer, const scene::SceneSnapshot& scene,
 Row resting(int objects, double seconds) {
   const FineClock clock;
   const std::vector<HandTick> hand = handOf(1);
-  const auto many = Crowd(objects).publish(1'000'000'000);
-  const auto one = Crowd(1).publish(1'000'000'000);
+  const auto many = CrowdedScene(objects).publish(1'000'000'000);
+  const auto one = CrowdedScene(1).publish(1'000'000'000);
   realtime::Renderer inMany;
   realtime::Renderer inOne;
   base::Nanos nowMany = 2'000'000'000;
@@ -125,12 +125,13 @@ struct Moved {
 Moved observeMoving(int objects, bool move, double seconds) {
   Moved moved;
   ServoLoop loop;
-  Crowd crowd(objects);
+  CrowdedScene crowd(objects);
   loop.snapshots().publish(crowd.publish(nowNs()));
   loop.begin();
   std::atomic<bool> stop{false};
   std::thread publisher([&] {
-    for (std::int64_t due = nowNs(); move && !stop; sleepUntilNs(due = std::max(due + kFrame_ns, nowNs()))) {
+    for (std::int64_t due = nowNs(); move && !stop;
+         sleepUntilNs(due = std::max(due + kObjectsFrame_ns, nowNs()))) {
       const std::int64_t begin = nowNs();
       crowd.move(begin);
       if (auto snapshot = crowd.publish(begin)) loop.snapshots().publish(std::move(snapshot));

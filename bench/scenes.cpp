@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "base/time.h"
+#include "geometry/rotation.h"
 
 namespace hapticd::bench {
 namespace {
@@ -31,7 +32,7 @@ Vec3 slideDirection(double t) {
 // From where the hand is: up, round the ball and down again.
 void addWay(const Vec3& to, std::vector<HandTick>& ticks) {
   const Vec3 from = ticks.back().position_m;
-  const geometry::Quat turn = geometry::Quat::FromTwoVectors(from, to);
+  const geometry::Quat turn = geometry::rotationBetween(from, to);
   for (int i = 1; i <= kWayTicks; ++i) {
     const double s = static_cast<double>(i) / (kWayTicks + 1);
     const double height = std::min(1.0, 4 * std::min(s, 1 - s)) * kWayHeight_m;

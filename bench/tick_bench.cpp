@@ -14,7 +14,7 @@
 namespace hapticd::bench {
 namespace {
 
-constexpr base::Nanos kPeriod = 1'000'000;
+constexpr base::Nanos kTickPeriod = 1'000'000;
 constexpr std::size_t kBlock = 250;  // ticks of one before the other has its turn
 
 // A hand that is where it is told, for a whole turn of the servo.
@@ -53,7 +53,7 @@ class Rendered final : public Stepper {
       : scene_(scene), hand_(hand), renderer_({.toolRadius_m = radius_m, .forceShading = false}) {}
   void step(std::size_t i) override {
     state_.position_m = hand_[i].position_m;
-    renderer_.step(scene_, state_, now_ += kPeriod, kPeriod, rendering_);
+    renderer_.step(scene_, state_, now_ += kTickPeriod, kTickPeriod, rendering_);
   }
   const realtime::Rendering& rendering() const noexcept { return rendering_; }
 
@@ -75,7 +75,7 @@ class WholeTurn final : public Stepper {
   }
   void step(std::size_t i) override {
     device_.position_m = hand_[i].position_m;
-    tick_(now_ += kPeriod);
+    tick_(now_ += kTickPeriod);
   }
   void after() override {
     tick_.reports().consume([](const realtime::TickReport&) {});
@@ -184,7 +184,7 @@ class Measurement {
 
   void prepare(Regime regime, std::int64_t& due) {
     if (regime == Regime::cold) return evictor_.evict();
-    sleepUntilNs(due += kPeriod / 2);
+    sleepUntilNs(due += kTickPeriod / 2);
   }
 
   void measure(Stepper& stepper, std::size_t i, std::map<Act, Samples>& into) {

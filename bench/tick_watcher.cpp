@@ -12,7 +12,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr std::int64_t kPeriod_ns = 1'000'000;
+constexpr std::int64_t kWatchPeriod_ns = 1'000'000;
 constexpr std::int64_t kLate_ns = 500'000;
 
 }  // namespace
@@ -55,7 +55,7 @@ void TickWatcher::watch(const std::string& device) try {
       const auto steps = static_cast<std::int64_t>(tick.tick - before.tick);
       const std::int64_t gap = (tick.tickTime - before.tickTime).count();
       seen_.lost += static_cast<std::uint64_t>(steps - 1);
-      if (gap - steps * kPeriod_ns > kLate_ns) ++seen_.overruns;
+      if (gap - steps * kWatchPeriod_ns > kLate_ns) ++seen_.overruns;
       if (steps == 1) seen_.longestGap_ms = std::max(seen_.longestGap_ms, static_cast<double>(gap) * 1e-6);
       if (tick.revision != before.revision) {
         ++seen_.revisions;

@@ -26,6 +26,35 @@ struct PublishedForces {
   std::optional<Buzz> buzz;
 };
 
+/// One of them, and whose it is. At namespace level, as is what follows: clang refuses a std::optional of a
+/// nested class with default member initialisers inside the class around it.
+template <class T>
+struct OwnedForce {
+  static constexpr Nanos kNever = std::numeric_limits<Nanos>::max();
+
+  ClientId owner = 0;
+  T value;
+  Nanos goneAt = kNever;  ///< when it has ended or ramped out
+};
+
+struct RunningEffect {
+  Effect effect;
+  bool running = false;
+  Nanos startedAt = 0;
+};
+
+struct ForceConstraint {
+  bool enabled = false;
+  std::int32_t mode = 0;
+  Vec3 point_m = Vec3::Zero();
+  Vec3 linePoint_m = Vec3::Zero();
+  Vec3 lineDirection = Vec3::UnitZ();
+  Vec3 planePoint_m = Vec3::Zero();
+  Vec3 planeNormal = Vec3::UnitY();
+  double stiffness_N_per_m = 1000;
+  bool releasing = false;
+};
+
 /// All of them, by index. A command checks all of its values before it changes anything.
 class FreeForces {
  public:
@@ -54,27 +83,8 @@ class FreeForces {
   void handle(Command& command, const Call& call);
 
   template <class T>
-  struct Owned {
-    ClientId owner = 0;
-    T value;
-    Nanos goneAt = kNever;  ///< when it has ended or ramped out
-  };
-  struct RunningEffect {
-    Effect effect;
-    bool running = false;
-    Nanos startedAt = 0;
-  };
-  struct Constraint {
-    bool enabled = false;
-    std::int32_t mode = 0;
-    Vec3 point_m = Vec3::Zero();
-    Vec3 linePoint_m = Vec3::Zero();
-    Vec3 lineDirection = Vec3::UnitZ();
-    Vec3 planePoint_m = Vec3::Zero();
-    Vec3 planeNormal = Vec3::UnitY();
-    double stiffness_N_per_m = 1000;
-    bool releasing = false;
-  };
+  using Owned = OwnedForce<T>;
+  using Constraint = ForceConstraint;
   static constexpr double kWorldUnitsPerStockMetre = 1000;
   static constexpr Nanos kNever = std::numeric_limits<Nanos>::max();
   static constexpr Nanos kRelease = 300'000'000;     ///< ramping out takes 250 ms in the servo

@@ -147,8 +147,8 @@ TEST(Recorder, AFullDiskEndsTheRecordingAndNothingElse) {
   EXPECT_LE(recorder.counts().bytes, std::filesystem::file_size(link.path()));
 
   RecordingReader reader(link.path());
-  std::uint64_t ticks = 0;
-  for (RecordingEvent event; reader.next(event);) ticks += std::holds_alternative<TickEvent>(event) ? 1 : 0;
+  for (RecordingEvent event; reader.next(event);) {
+  }
   EXPECT_NE(reader.remark(), "");
   EXPECT_NE(reader.remark().find("cut"), std::string::npos) << reader.remark();
 }

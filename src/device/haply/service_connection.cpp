@@ -15,7 +15,8 @@ using ErrorCode = boost::system::error_code;
 
 struct ServiceConnection::Impl {
   asio::io_context context{1};
-  beast::websocket::stream<asio::ip::tcp::socket> stream{context};
+  // A client that offers no compression: without the code for it.
+  beast::websocket::stream<asio::ip::tcp::socket, false> stream{context};
   beast::flat_buffer buffer;
 
   // Runs one operation; `begin` receives the completion handler.

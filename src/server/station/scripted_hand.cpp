@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "base/time.h"
+#include "geometry/rotation.h"
 
 namespace hapticd::server {
 namespace {
@@ -91,7 +92,7 @@ class PathBuilder {
   // On a great circle around the centre: a straight line could cross the objects.
   void arcTo(const Vec3& position, const Vec3& centre, const Quat& orientation) {
     const Vec3 from = path_.back().position_m - centre;
-    const Quat turn = Quat::FromTwoVectors(from, position - centre);
+    const Quat turn = geometry::rotationBetween(from, position - centre);
     const double angle = Eigen::AngleAxisd(turn).angle();
     const int steps = 1 + static_cast<int>(angle / 0.3);
     for (int i = 1; i <= steps; ++i) {
@@ -142,7 +143,7 @@ std::vector<device::Waypoint> planStrokes(const scene::SceneSnapshot& scene, con
   for (int stroke = 0; stroke < kStrokes; ++stroke) {
     const Vec3 first = direction(stroke, kStrokes);
     const Vec3 along = first.unitOrthogonal();
-    const Quat stylus = Quat::FromTwoVectors(Vec3::UnitY(), (first + 0.4 * along).normalized());
+    const Quat stylus = geometry::rotationBetween(Vec3::UnitY(), (first + 0.4 * along).normalized());
     bool down = false;
     Vec3 liftOff = centre + outside * first;
     path.arcTo(liftOff, centre, stylus);

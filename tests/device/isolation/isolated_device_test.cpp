@@ -149,9 +149,9 @@ TEST_P(IsolationTest, AHangIsAFault) {
 }
 
 TEST_P(IsolationTest, AServerThatStopsTickingLosesItsForce) {
+  std::atomic<bool> stuck{false};  // outlives the device, whose thread reads it
   IsolatedDevice device(host(GetParam()));
   device.open();
-  std::atomic<bool> stuck{false};
   device.start([&](Nanos now) {
     DeviceState read;
     device.read(now, read);
