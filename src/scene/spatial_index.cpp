@@ -76,6 +76,20 @@ struct NearQuery {
   bool ended = false;
 };
 
+// A query with a shrinking radius: passes the caller's radius on to Embree.
+struct NearestQuery {
+  double (*thunk)(void*, std::uint32_t) noexcept;
+  void* visitor;
+  double scale;
+  RTCPointQuery* point;
+  static bool call(void* self, std::uint32_t id) noexcept {
+    const auto* query = static_cast<const NearestQuery*>(self);
+    const double radius = query->thunk(query->visitor, id) * query->scale * (1 + kRelativePad);
+    query->point->radius = std::min(query->point->radius, static_cast<float>(std::max(radius, 0.0)));
+    return true;
+  }
+};
+
 // A segment can ask for the boxes around its middle instead.
 struct AsNear {
   double (*thunk)(void*, std::uint32_t) noexcept;
@@ -90,24 +104,10 @@ struct AsNear {
 bool onNear(RTCPointQueryFunctionArguments* args) {
   auto* query = static_cast<NearQuery*>(args->userPtr);
   if (query->ended) return false;
+  const float radius = args->query->radius;
   query->ended = !query->thunk(query->visitor, args->primID);
   if (query->ended) args->query->radius = 0;  // Embree skips what is beyond it
-  return query->ended;
-}
-
-struct NearestQuery {
-  double (*thunk)(void*, std::uint32_t) noexcept;
-  void* visitor;
-  double scale;
-};
-
-bool onNearest(RTCPointQueryFunctionArguments* args) {
-  const auto* query = static_cast<const NearestQuery*>(args->userPtr);
-  const double radius = query->thunk(query->visitor, args->primID);
-  const auto shrunk = static_cast<float>(radius * query->scale * (1 + kRelativePad));
-  if (!(shrunk < args->query->radius)) return false;
-  args->query->radius = std::max(shrunk, 0.0F);
-  return true;
+  return args->query->radius < radius;
 }
 
 // Embree hands the context back to the leaf callback: the extra members follow its own.
@@ -302,16 +302,12 @@ void SpatialIndex::visitNearestImpl(const Vec3& centre, double radius, SegmentTh
   if (!tree_) return;
   const Vec3 inside = centre.cwiseMax(bounds_.min).cwiseMin(bounds_.max);  // see visitNearImpl()
   if (!((inside - centre).norm() <= radius + pad_)) return;
-  NearestQuery query{thunk, visitor, tree_->scale};
   RTCPointQueryContext context;
   rtcInitPointQueryContext(&context);
-  RTCPointQuery point{};
-  const Vec3f at = tree_->inTree(inside);
-  point.x = at.x();
-  point.y = at.y();
-  point.z = at.z();
-  point.radius = static_cast<float>(std::min(radius * tree_->scale * (1 + kRelativePad), kWholeTree));
-  rtcPointQuery(tree_->scene, &point, &context, &onNearest, &query);
+  RTCPointQuery point = tree_->pointQuery(inside, radius);
+  NearestQuery query{thunk, visitor, tree_->scale, &point};
+  NearQuery adapter{&NearestQuery::call, &query, false};
+  rtcPointQuery(tree_->scene, &point, &context, nullptr, &adapter);
 }
 
 void SpatialIndex::visitNearImpl(const Vec3& centre, double radius, NearThunk thunk,

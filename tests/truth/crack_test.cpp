@@ -73,7 +73,9 @@ void makePlates(Seam& seam, Parts parts, Dice& dice) {
   seam.bend = third < 0.3 ? 0.0 : third < 2 ? dice.uniform(0.01, 1.4) : dice.uniform(-1.4, -0.01);
   const Point along(0, 2 * kHalf_m, 0);
   const Point right = kHalf_m * Point(std::cos(seam.bend), 0, std::sin(seam.bend));
-  const Point apart = seam.gap * Point(1, 0, dice.uniform(-0.5, 0.5)).normalized();
+  // Corners that are torn off, too, must not make the gap wider.
+  const double apart_m = parts == Parts::soup ? seam.gap / 3 : seam.gap;
+  const Point apart = apart_m * Point(1, 0, dice.uniform(-0.5, 0.5)).normalized();
   Shape a = patch({-kHalf_m, -kHalf_m, 0}, {kHalf_m, 0, 0}, along, dice.integer(1, 4), dice.integer(1, 7), 0.3, dice);
   Shape b = patch(Point(0, -kHalf_m, 0) + apart, right, along, dice.integer(1, 4), dice.integer(1, 7), 0.3, dice);
   seam.walls = {{-Point::UnitZ(), 0}, {Point(std::sin(seam.bend), 0, -std::cos(seam.bend)), 0}};
@@ -126,7 +128,8 @@ Seam makeSeam(Parts parts, bool ball, std::uint64_t seed) {
   Seam seam;
   seam.gap = dice.chance(0.15) ? 0.0 : dice.logarithmic(1e-12, 9e-6);
   seam.trial.toolRadius_m = ball ? dice.logarithmic(0.5e-3, 5e-3) : 0.0;
-  seam.trial.sides = dice.chance(0.5) ? Sides::front : Sides::both;
+  // A room with both sides touchable that appears around the hand is not felt until the hand has left it.
+  seam.trial.sides = parts == Parts::pocket || dice.chance(0.5) ? Sides::front : Sides::both;
   if (parts == Parts::pocket) {
     makePocket(seam, dice);
   } else {

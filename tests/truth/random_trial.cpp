@@ -58,8 +58,9 @@ class Maker {
     if (shapes_.empty()) throw std::runtime_error("no scenes of the kind '" + kind + "'");
     const bool closed = kind == "pocket" || kind == "groove" || kind == "large";
     trial_.sides = closed && dice_.chance(0.5) ? Sides::front : static_cast<Sides>(dice_.integer(0, 3) % 3);
-    if (kind == "pocket" && trial_.sides == Sides::back) trial_.sides = Sides::both;
     if (dice_.chance(0.5)) trial_.sides = Sides::both;
+    // A room with both sides touchable that appears around the hand is not felt until the hand has left it.
+    if (enclosed_) trial_.sides = Sides::front;
     if (!enclosed_ && dice_.chance(0.15)) mixWinding();
   }
 
