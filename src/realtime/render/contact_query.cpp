@@ -377,12 +377,14 @@ double ContactQuery::freeOfFaces(const Vec3& p, const Vec3& g) noexcept {
   if (!ensureGathered(p, d.norm())) return 0;
   const int count = cache_.facetsNearPath(p, d, candidates.data());
   double free = 1;
-  for (int i = 0; i < count; ++i) {
-    Facet thin = *candidates[static_cast<std::size_t>(i)];
-    thin.radius = 0;
+  const auto meet = [&](Facet facet) {
+    facet.radius = 0;
     CastHit hit;
-    if (castBall(thin, faces(), p, d, 1, free, hit)) free = std::min(free, hit.stop);
-  }
+    if (castBall(facet, faces(), p, d, 1, free, hit)) free = std::min(free, hit.stop);
+  };
+  for (int i = 0; i < count; ++i) meet(*candidates[static_cast<std::size_t>(i)]);
+  if (planes_ == nullptr) return free;
+  for (const PlacedPlane& plane : *planes_) meet(plane.facet);
   return free;
 }
 

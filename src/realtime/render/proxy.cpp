@@ -26,10 +26,10 @@ bool depthsOf(const ObjectHit* hits, int count, double toolRadius_m, const Vec3&
     halfSpaces[static_cast<std::size_t>(i)] = hits[i].halfSpace;
     halfSpaces[static_cast<std::size_t>(i)].standoff = toolRadius_m;
   }
-  depthsBelow(halfSpaces.data(), count, hip, depths);
+  const bool room = depthsBelow(halfSpaces.data(), count, hip, depths);
   Vec3 normal = Vec3::Zero();
   for (int i = 0; i < count; ++i) normal += depths[i] * hits[i].halfSpace.normal;
-  if (normal.squaredNorm() <= spring.squaredNorm()) return true;
+  if (normal.squaredNorm() <= spring.squaredNorm()) return room;
   for (int i = 0; i < count; ++i) depths[i] *= spring.norm() / normal.norm();
   return false;
 }
@@ -272,7 +272,10 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
   const bool onAll =
       depthsOf(active.hits.data(), count, toolRadius_, position_ - hip, hip, depths.data());
   double hardest = -1;
+  // The proxy keeps a distance from faces, so that one may hold it that the HIP is not below.
+  const bool below = std::any_of(depths.begin(), depths.end(), [](double depth) { return depth > 0; });
   for (int i = 0; i < count; ++i) {
+    if (below && depths[static_cast<std::size_t>(i)] == 0) continue;
     const ObjectHit& hit = active.hits[static_cast<std::size_t>(i)];
     ContactConstraint& constraint = contactSet_.constraints[static_cast<std::size_t>(contactSet_.count++)];
     constraint.source = hit.object;
