@@ -62,7 +62,8 @@ class SpatialIndex {
   const Box& bounds() const noexcept { return bounds_; }
   std::uint32_t size() const noexcept { return count_; }
 
-  /// Calls visit(id) for at least every box within `radius` of `centre`; a visit that returns false is the last one.
+  /// Calls visit(id) for at least every box within `radius` of `centre`; a visit that returns false is the
+  /// last one.
   template <class Visit>
   void visitNear(const Vec3& centre, double radius, Visit&& visit) const noexcept {
     visitNearImpl(

@@ -235,8 +235,8 @@ void PrintTo(const GoldenName& name, std::ostream* out) {
 
 class GoldenFile : public testing::TestWithParam<GoldenName> {};
 
-// Contact of law 1 differs: friction, and stiffness where box and plane meet. Without contact, effects may pull at a
-// proxy that is some micrometres away.
+// Contact of law 1 differs: friction, and stiffness where box and plane meet. Without contact, effects may
+// pull at a proxy that is some micrometres away.
 TEST_P(GoldenFile, GivesTheRecordedForcesBitForBit) {
   RecordingReader reader(kFolder / GetParam().file);
   ASSERT_EQ(reader.header().law.number, GetParam().law);

@@ -1,5 +1,5 @@
-// Surfaces whose gaps are below the gap tolerance of 10 µm are impassable, within one object and between objects; wider holes
-// stay holes.
+// Surfaces whose gaps are below the gap tolerance of 10 µm are impassable, within one object and between
+// objects; wider holes stay holes.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -24,8 +24,8 @@ int seamCount() {
 #endif
 }
 
-// Two plates that meet along the y axis, seen from +z, with a gap between them; or a pocket. `walls` bound the free space:
-// all of them in a concave scene, one of them in a convex one.
+// Two plates that meet along the y axis, seen from +z, with a gap between them; or a pocket. `walls` bound
+// the free space: all of them in a concave scene, one of them in a convex one.
 struct Seam {
   Trial trial;
   std::vector<Wall> walls;
@@ -52,7 +52,8 @@ Shape torn(const Shape& shape, double gap, Dice& dice) {
   Shape out;
   for (const auto& t : shape.triangles) {
     const auto first = static_cast<std::uint32_t>(out.vertices.size());
-    for (const std::uint32_t v : t) out.vertices.push_back(shape.vertices[v] + gap / 3 * dice.uniform(0, 1) * dice.direction());
+    for (const std::uint32_t v : t)
+      out.vertices.push_back(shape.vertices[v] + gap / 3 * dice.uniform(0, 1) * dice.direction());
     out.triangles.push_back({first, first + 1, first + 2});
   }
   return out;
@@ -76,8 +77,10 @@ void makePlates(Seam& seam, Parts parts, Dice& dice) {
   // Corners that are torn off, too, must not make the gap wider.
   const double apart_m = parts == Parts::soup ? seam.gap / 3 : seam.gap;
   const Point apart = apart_m * Point(1, 0, dice.uniform(-0.5, 0.5)).normalized();
-  Shape a = patch({-kHalf_m, -kHalf_m, 0}, {kHalf_m, 0, 0}, along, dice.integer(1, 4), dice.integer(1, 7), 0.3, dice);
-  Shape b = patch(Point(0, -kHalf_m, 0) + apart, right, along, dice.integer(1, 4), dice.integer(1, 7), 0.3, dice);
+  Shape a = patch({-kHalf_m, -kHalf_m, 0}, {kHalf_m, 0, 0}, along, dice.integer(1, 4), dice.integer(1, 7),
+                  0.3, dice);
+  Shape b =
+      patch(Point(0, -kHalf_m, 0) + apart, right, along, dice.integer(1, 4), dice.integer(1, 7), 0.3, dice);
   seam.walls = {{-Point::UnitZ(), 0}, {Point(std::sin(seam.bend), 0, -std::cos(seam.bend)), 0}};
   seam.concave = seam.bend >= 0;
   seam.bottom = (seam.walls[0].normal + seam.walls[1].normal).normalized();
@@ -108,7 +111,8 @@ void makeHand(Seam& seam, Parts parts, Dice& dice) {
   const Point aim = pocket ? seam.bottom : Point(0, dice.uniform(-0.6, 0.6) * kHalf_m, 0);
   const Point into = seam.bottom.normalized();
   const double radius = seam.trial.toolRadius_m;
-  Point hip = pocket ? Point(Point::Zero()) : Point(aim - (0.004 + 1.5 * radius + 0.01 * (radius > 0 ? 1 : 0)) * into);
+  Point hip = pocket ? Point(Point::Zero())
+                     : Point(aim - (0.004 + 1.5 * radius + 0.01 * (radius > 0 ? 1 : 0)) * into);
   std::vector<Point>& hips = seam.trial.hips;
   hips.push_back(hip);
   const auto move = [&](const Point& to, int ticks) {
@@ -166,7 +170,8 @@ INSTANTIATE_TEST_SUITE_P(, CrackTest,
                                          SeamCase{"junction_ball", Parts::junction, true},
                                          SeamCase{"objects_point", Parts::objects, false},
                                          SeamCase{"objects_ball", Parts::objects, true},
-                                         SeamCase{"soup_point", Parts::soup, false}, SeamCase{"soup_ball", Parts::soup, true},
+                                         SeamCase{"soup_point", Parts::soup, false},
+                                         SeamCase{"soup_ball", Parts::soup, true},
                                          SeamCase{"pocket_point", Parts::pocket, false},
                                          SeamCase{"pocket_ball", Parts::pocket, true}),
                          [](const auto& seamCase) { return std::string(seamCase.param.name); });
@@ -220,7 +225,8 @@ TEST(HoleTest, a_point_enters_holes_wider_than_the_tolerance) {
           device::DeviceState state;
           state.time = static_cast<base::Nanos>(k) * realtime::fixture::kTick;
           state.position_m = trial.hips[k];
-          renderer.step(stage.at(static_cast<int>(k)), state, state.time, realtime::fixture::kTick, rendering);
+          renderer.step(stage.at(static_cast<int>(k)), state, state.time, realtime::fixture::kTick,
+                        rendering);
         }
         EXPECT_LT(rendering.proxy_m.z(), -0.0019) << width * 1e6 << " um, square " << square;
         EXPECT_EQ(rendering.force_N.norm(), 0);

@@ -13,8 +13,8 @@ constexpr int kSteps = 40;
 
 }  // namespace
 
-Descent::Descent(const Reference& reference, const Point& centre, double reach, double toolRadius_m, double widening,
-                 std::uint64_t seed)
+Descent::Descent(const Reference& reference, const Point& centre, double reach, double toolRadius_m,
+                 double widening, std::uint64_t seed)
     : reference_(reference),
       reach_(reach),
       radius_(toolRadius_m),
@@ -127,7 +127,8 @@ Point Descent::from(const Point& start, const Point& goal) {
   Point x = start;
   double length = 1e-4;
   for (int i = 0; i < kSteps && (x - start).norm() < 0.5 * reach_; ++i) {
-    const Point next = radius_ > 0 ? stepOfBall(x, goal, std::min(length, 0.25 * reach_)) : stepOfPoint(x, goal);
+    const Point next =
+        radius_ > 0 ? stepOfBall(x, goal, std::min(length, 0.25 * reach_)) : stepOfPoint(x, goal);
     if (next == x) {
       length *= 0.3;
       if (radius_ == 0 || length < 1e-6) break;

@@ -1,5 +1,6 @@
-// How near to its goal a tool could come that is drawn there by hand, in small moves that cross no face: the judge of a proxy
-// that rests. It needs no topology: directions are the pull, its projections on the faces and edges nearby, and random ones.
+// How near to its goal a tool could come that is drawn there by hand, in small moves that cross no face: the
+// judge of a proxy that rests. It needs no topology: directions are the pull, its projections on the faces
+// and edges nearby, and random ones.
 #pragma once
 
 #include <random>

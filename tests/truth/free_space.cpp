@@ -11,7 +11,8 @@ constexpr int kTreeNodes = 1500;
 
 }  // namespace
 
-FreeSpace::FreeSpace(const Reference& reference, const Point& centre, double reach, double ballRadius, std::uint64_t seed)
+FreeSpace::FreeSpace(const Reference& reference, const Point& centre, double reach, double ballRadius,
+                     std::uint64_t seed)
     : reference_(reference), centre_(centre), reach_(reach), radius_(ballRadius), random_(seed) {
   for (const int i : reference.near(centre, 2 * reach + 2 * ballRadius)) {
     if (!reference.faces()[static_cast<std::size_t>(i)].thin) faces_.push_back(i);
@@ -23,7 +24,9 @@ bool FreeSpace::clear(const Point& p, const Point& q) const {
     const Face& f = reference_.faces()[static_cast<std::size_t>(i)];
     const double start = f.normal.dot(p - f.a);
     const double end = f.normal.dot(q - f.a);
-    if (std::min(start, end) > radius_ || std::max(start, end) < -radius_ || !reference_.touchableFrom(f, start)) return true;
+    if (std::min(start, end) > radius_ || std::max(start, end) < -radius_ ||
+        !reference_.touchableFrom(f, start))
+      return true;
     return distanceOf(f, p, q) >= radius_;
   });
 }
@@ -107,7 +110,9 @@ bool FreeSpace::connectsByTrees(const Point& p, const Point& q) {
   const auto nearestIn = [&](int tree, const Point& x) {
     const Node* nearest = nullptr;
     for (const Node& n : nodes) {
-      if (n.tree == tree && (nearest == nullptr || (n.at - x).squaredNorm() < (nearest->at - x).squaredNorm())) nearest = &n;
+      if (n.tree == tree &&
+          (nearest == nullptr || (n.at - x).squaredNorm() < (nearest->at - x).squaredNorm()))
+        nearest = &n;
     }
     return nearest->at;
   };

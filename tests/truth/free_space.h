@@ -1,4 +1,5 @@
-// Whether two points are in the same part of the space that a small ball can reach: gaps narrower than the ball join nothing.
+// Whether two points are in the same part of the space that a small ball can reach: gaps narrower than the
+// ball join nothing.
 #pragma once
 
 #include <functional>
@@ -14,7 +15,8 @@ namespace hapticd::truth {
 class FreeSpace {
  public:
   /// `reach`: of all paths, around `centre`.
-  FreeSpace(const Reference& reference, const Point& centre, double reach, double ballRadius, std::uint64_t seed);
+  FreeSpace(const Reference& reference, const Point& centre, double reach, double ballRadius,
+            std::uint64_t seed);
 
   /// A path free of faces, as far from each as the ball's radius.
   bool clear(const Point& p, const Point& q) const;

@@ -1,7 +1,8 @@
 // hapticd_judge: random scenes and hands through the renderer, each tick judged by the referee.
 //
 // Without options: a fixed number of ticks from a fixed seed, as the tests run it. The last line is
-// 'judged N ticks of M trials, F findings'. Exit status 1 with more findings than --allow, 2 for bad arguments.
+// 'judged N ticks of M trials, F findings'. Exit status 1 with more findings than --allow, 2 for bad
+// arguments.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -40,7 +41,8 @@ struct Options {
 };
 
 constexpr const char* kUsage =
-    "hapticd_judge [--ticks N | --seconds S] [--seed N] [--kind KIND] [--out DIR] [--findings N] [--allow N] [--no-shrink]\n"
+    "hapticd_judge [--ticks N | --seconds S] [--seed N] [--kind KIND] [--out DIR] [--findings N] [--allow N] "
+    "[--no-shrink]\n"
     "hapticd_judge --replay FILE\n"
     "  --ticks     end after this many ticks\n"
     "  --seconds   end after this time\n"
@@ -85,8 +87,8 @@ Options parsed(int count, char** words) {
 }
 
 void print(const Trial& trial, const Finding& finding) {
-  std::printf("seed %llu, scene '%s', tick %d: %s: %s\n", static_cast<unsigned long long>(trial.seed), trial.kind.c_str(),
-              finding.tick, finding.rule.c_str(), finding.text.c_str());
+  std::printf("seed %llu, scene '%s', tick %d: %s: %s\n", static_cast<unsigned long long>(trial.seed),
+              trial.kind.c_str(), finding.tick, finding.rule.c_str(), finding.text.c_str());
 }
 
 class Judge {
@@ -101,19 +103,25 @@ class Judge {
       add(trial, verdict);
       if (verdict.finding) save(trial, *verdict.finding);
     }
-    for (const auto& [kind, ticks] : byKind_) std::printf("  %-10s %llu ticks\n", kind.c_str(), static_cast<unsigned long long>(ticks));
-    std::printf("touching %llu, long rules %llu, searched %llu, undecided %llu; seeds %llu to %llu; %.2f us per tick\n",
-                static_cast<unsigned long long>(sum_.touching), static_cast<unsigned long long>(sum_.longRules),
-                static_cast<unsigned long long>(sum_.suspected), static_cast<unsigned long long>(sum_.undecided),
-                static_cast<unsigned long long>(options_.seed), static_cast<unsigned long long>(seed - 1),
-                seconds() / static_cast<double>(std::max<std::uint64_t>(sum_.ticks, 1)) * 1e6);
-    std::printf("judged %llu ticks of %llu trials, %d findings\n", static_cast<unsigned long long>(sum_.ticks),
+    for (const auto& [kind, ticks] : byKind_)
+      std::printf("  %-10s %llu ticks\n", kind.c_str(), static_cast<unsigned long long>(ticks));
+    std::printf(
+        "touching %llu, long rules %llu, searched %llu, undecided %llu; seeds %llu to %llu; %.2f us per "
+        "tick\n",
+        static_cast<unsigned long long>(sum_.touching), static_cast<unsigned long long>(sum_.longRules),
+        static_cast<unsigned long long>(sum_.suspected), static_cast<unsigned long long>(sum_.undecided),
+        static_cast<unsigned long long>(options_.seed), static_cast<unsigned long long>(seed - 1),
+        seconds() / static_cast<double>(std::max<std::uint64_t>(sum_.ticks, 1)) * 1e6);
+    std::printf("judged %llu ticks of %llu trials, %d findings\n",
+                static_cast<unsigned long long>(sum_.ticks),
                 static_cast<unsigned long long>(seed - options_.seed), findings_);
     return findings_ > options_.allowed ? 1 : 0;
   }
 
  private:
-  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count(); }
+  double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  }
   bool done() const {
     if (findings_ >= options_.findings) return true;
     return options_.seconds > 0 ? seconds() >= options_.seconds : sum_.ticks >= options_.ticks;
@@ -135,9 +143,10 @@ class Judge {
     std::ofstream file(name + ".trial");
     file << "# " << finding.rule << ": " << finding.text << '\n';
     write(file, small);
-    std::printf("  shrunk to %zu triangles and %zu ticks: hapticd_judge --replay %s.trial\n", small.triangleCount(), small.hips.size(),
-                name.c_str());
-    if (writeSession(small, name + ".haptics")) std::printf("  as a recording: hapticd render --session %s.haptics\n", name.c_str());
+    std::printf("  shrunk to %zu triangles and %zu ticks: hapticd_judge --replay %s.trial\n",
+                small.triangleCount(), small.hips.size(), name.c_str());
+    if (writeSession(small, name + ".haptics"))
+      std::printf("  as a recording: hapticd render --session %s.haptics\n", name.c_str());
     std::fflush(stdout);
   }
 
@@ -156,7 +165,8 @@ int replay(const std::string& name) {
   options.share = 1;
   const Verdict verdict = judge(trial, options);
   if (verdict.finding) print(trial, *verdict.finding);
-  std::printf("judged %llu ticks of 1 trials, %d findings\n", static_cast<unsigned long long>(verdict.ticks), verdict.finding ? 1 : 0);
+  std::printf("judged %llu ticks of 1 trials, %d findings\n", static_cast<unsigned long long>(verdict.ticks),
+              verdict.finding ? 1 : 0);
   return verdict.finding ? 1 : 0;
 }
 

@@ -25,7 +25,8 @@ Eigen::Quaterniond Dice::rotation() {
   return Eigen::Quaterniond(Eigen::AngleAxisd(uniform(0, 2 * std::numbers::pi), direction()));
 }
 
-Shape patch(const Point& origin, const Point& u, const Point& v, int cellsU, int cellsV, double jitter, Dice& dice) {
+Shape patch(const Point& origin, const Point& u, const Point& v, int cellsU, int cellsV, double jitter,
+            Dice& dice) {
   Shape out;
   for (int j = 0; j <= cellsV; ++j) {
     for (int i = 0; i <= cellsU; ++i) {
@@ -95,7 +96,8 @@ Shape soup(int triangles, double half, double smallest, double largest, Dice& di
   for (int i = 0; i < triangles; ++i) {
     const Point centre = dice.inCube(half);
     const auto first = static_cast<std::uint32_t>(out.vertices.size());
-    for (int k = 0; k < 3; ++k) out.vertices.push_back(centre + dice.logarithmic(smallest, largest) * dice.direction());
+    for (int k = 0; k < 3; ++k)
+      out.vertices.push_back(centre + dice.logarithmic(smallest, largest) * dice.direction());
     out.triangles.push_back({first, first + 1, first + 2});
   }
   return out;
@@ -107,7 +109,8 @@ Shape fan(int n, double radius, double height) {
   for (int i = 0; i < n; ++i) {
     const double angle = 2 * std::numbers::pi * i / n;
     out.vertices.emplace_back(radius * std::cos(angle), radius * std::sin(angle), 0);
-    out.triangles.push_back({0, static_cast<std::uint32_t>(1 + i), static_cast<std::uint32_t>(1 + (i + 1) % n)});
+    out.triangles.push_back(
+        {0, static_cast<std::uint32_t>(1 + i), static_cast<std::uint32_t>(1 + (i + 1) % n)});
   }
   return out;
 }
@@ -145,7 +148,9 @@ Shape sphere(int n, double radius, double roughness, Dice& dice) {
   std::map<std::array<int, 3>, std::uint32_t> ids;
   const auto id = [&](int x, int y, int z) {
     const auto [it, fresh] = ids.try_emplace({x, y, z}, static_cast<std::uint32_t>(ids.size()));
-    if (fresh) out.vertices.push_back(radius * dice.uniform(1 - roughness, 1 + roughness) * Point(x, y, z).normalized());
+    if (fresh)
+      out.vertices.push_back(radius * dice.uniform(1 - roughness, 1 + roughness) *
+                             Point(x, y, z).normalized());
     return it->second;
   };
   for (int octant = 0; octant < 8; ++octant) {

@@ -36,10 +36,12 @@ class Dice {
   std::mt19937_64 engine_;
 };
 
-/// The parallelogram origin + [0, 1] u + [0, 1] v in cells, front along u x v; inner vertices move by up to `jitter` cells and
-/// diagonals alternate at random.
-Shape patch(const Point& origin, const Point& u, const Point& v, int cellsU, int cellsV, double jitter, Dice& dice);
-/// Six patches, each with cells and a jitter of its own, and shrunk by a gap of up to `gap` at each side. Front inwards.
+/// The parallelogram origin + [0, 1] u + [0, 1] v in cells, front along u x v; inner vertices move by up to
+/// `jitter` cells and diagonals alternate at random.
+Shape patch(const Point& origin, const Point& u, const Point& v, int cellsU, int cellsV, double jitter,
+            Dice& dice);
+/// Six patches, each with cells and a jitter of its own, and shrunk by a gap of up to `gap` at each side.
+/// Front inwards.
 Shape pocket(const Point& half, int maxCells, double gap, Dice& dice);
 Shape box(const Point& centre, const Point& half);
 Shape soup(int triangles, double half, double smallest, double largest, Dice& dice);

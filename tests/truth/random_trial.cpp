@@ -11,7 +11,7 @@
 namespace hapticd::truth {
 namespace {
 
-constexpr std::array kKinds{"soup",   "junctions", "pocket", "groove", "needles", "fan",
+constexpr std::array kKinds{"soup",   "junctions", "pocket", "groove", "needles",   "fan",
                             "sheets", "nested",    "bumps",  "moving", "deforming", "large"};
 constexpr double kHalf_m = 0.02;  // of most scenes
 
@@ -51,9 +51,11 @@ class Maker {
     if (kind == "fan") makeFan();
     if (kind == "sheets") makeSheets();
     if (kind == "nested") makeNested();
-    if (kind == "bumps") shapes_.push_back(bumps(dice_.integer(2, 9), kHalf_m, dice_.uniform(0, 0.006), 0.3, dice_));
+    if (kind == "bumps")
+      shapes_.push_back(bumps(dice_.integer(2, 9), kHalf_m, dice_.uniform(0, 0.006), 0.3, dice_));
     if (kind == "moving") makeMoving();
-    if (kind == "deforming") shapes_.push_back(bumps(dice_.integer(2, 7), kHalf_m, dice_.uniform(0, 0.004), 0.3, dice_));
+    if (kind == "deforming")
+      shapes_.push_back(bumps(dice_.integer(2, 7), kHalf_m, dice_.uniform(0, 0.004), 0.3, dice_));
     if (kind == "large") makeLarge();
     if (shapes_.empty()) throw std::runtime_error("no scenes of the kind '" + kind + "'");
     const bool closed = kind == "pocket" || kind == "groove" || kind == "large";
@@ -66,15 +68,18 @@ class Maker {
 
   void makeSoup() {
     const int objects = dice_.integer(1, 3);
-    for (int i = 0; i < objects; ++i) shapes_.push_back(soup(dice_.integer(2, 40), 0.012, 0.001, 0.02, dice_));
+    for (int i = 0; i < objects; ++i)
+      shapes_.push_back(soup(dice_.integer(2, 40), 0.012, 0.001, 0.02, dice_));
   }
 
   // Two halves of a plate, of different cells and angles, that share no vertices.
   void makeJunctions() {
     const double bend = dice_.chance(0.3) ? 0.0 : dice_.uniform(-1.2, 1.2);
     const Point down(std::cos(bend), 0, std::sin(bend));
-    Shape left = patch({-kHalf_m, -kHalf_m, 0}, {kHalf_m, 0, 0}, {0, 2 * kHalf_m, 0}, dice_.integer(1, 4), dice_.integer(1, 7), 0.3, dice_);
-    const Shape right = patch({smallGap(), -kHalf_m, 0}, kHalf_m * down, {0, 2 * kHalf_m, 0}, dice_.integer(1, 4), dice_.integer(1, 7), 0.3, dice_);
+    Shape left = patch({-kHalf_m, -kHalf_m, 0}, {kHalf_m, 0, 0}, {0, 2 * kHalf_m, 0}, dice_.integer(1, 4),
+                       dice_.integer(1, 7), 0.3, dice_);
+    const Shape right = patch({smallGap(), -kHalf_m, 0}, kHalf_m * down, {0, 2 * kHalf_m, 0},
+                              dice_.integer(1, 4), dice_.integer(1, 7), 0.3, dice_);
     if (dice_.chance(0.5)) {
       left.append(right);
       shapes_.push_back(left);
@@ -95,7 +100,8 @@ class Maker {
   void splitIntoObjects(int count) {
     const Shape all = shapes_[0];
     shapes_.assign(static_cast<std::size_t>(count), Shape{all.vertices, {}});
-    for (const auto& t : all.triangles) shapes_[static_cast<std::size_t>(dice_.integer(0, count - 1))].triangles.push_back(t);
+    for (const auto& t : all.triangles)
+      shapes_[static_cast<std::size_t>(dice_.integer(0, count - 1))].triangles.push_back(t);
     std::erase_if(shapes_, [](const Shape& s) { return s.triangles.empty(); });
   }
 
@@ -108,8 +114,9 @@ class Maker {
       const double up = angle + side * turn;
       const Point wall = 1.5 * kHalf_m * Point(side * std::cos(up), 0, std::sin(up));
       const Point origin(side * smallGap(), -kHalf_m, 0);
-      shapes_.push_back(side > 0 ? patch(origin, wall, along, dice_.integer(1, 4), dice_.integer(1, 7), 0.3, dice_)
-                                 : patch(origin, along, wall, dice_.integer(1, 7), dice_.integer(1, 4), 0.3, dice_));
+      shapes_.push_back(
+          side > 0 ? patch(origin, wall, along, dice_.integer(1, 4), dice_.integer(1, 7), 0.3, dice_)
+                   : patch(origin, along, wall, dice_.integer(1, 7), dice_.integer(1, 4), 0.3, dice_));
     }
     if (dice_.chance(0.4)) {
       shapes_[0].append(shapes_[1]);
@@ -132,7 +139,8 @@ class Maker {
 
   void makeFan() {
     shapes_.push_back(fan(dice_.integer(3, 150), kHalf_m, dice_.uniform(-0.02, 0.02)));
-    if (dice_.chance(0.3)) shapes_.push_back(fan(dice_.integer(3, 40), 0.5 * kHalf_m, dice_.uniform(-0.02, 0.02)));
+    if (dice_.chance(0.3))
+      shapes_.push_back(fan(dice_.integer(3, 40), 0.5 * kHalf_m, dice_.uniform(-0.02, 0.02)));
   }
 
   // Copies of one sheet, at most a little apart, and a sheet that crosses them.
@@ -157,14 +165,16 @@ class Maker {
   void makeNested() {
     const double roughness = dice_.uniform(0, 0.2);
     shapes_.push_back(sphere(dice_.integer(1, 4), 0.012, roughness, dice_));
-    shapes_.push_back(dice_.chance(0.5) ? sphere(dice_.integer(1, 3), dice_.uniform(0.006, 0.0119), roughness, dice_)
-                                        : box(dice_.inCube(0.002), Point::Constant(dice_.uniform(0.002, 0.008))));
+    shapes_.push_back(dice_.chance(0.5)
+                          ? sphere(dice_.integer(1, 3), dice_.uniform(0.006, 0.0119), roughness, dice_)
+                          : box(dice_.inCube(0.002), Point::Constant(dice_.uniform(0.002, 0.008))));
     if (dice_.chance(0.3)) shapes_.push_back(box(dice_.inCube(0.01), Point(0.03, 0.001, 0.004)));
   }
 
   void makeMoving() {
     for (int i = dice_.integer(1, 3); i > 0; --i) {
-      Shape shape = dice_.chance(0.5) ? box(Point::Zero(), Point(0.008, 0.008, 0.002)) : sphere(dice_.integer(1, 4), 0.008, 0.1, dice_);
+      Shape shape = dice_.chance(0.5) ? box(Point::Zero(), Point(0.008, 0.008, 0.002))
+                                      : sphere(dice_.integer(1, 4), 0.008, 0.1, dice_);
       transform(shape, dice_.rotation(), dice_.inCube(0.008));
       shapes_.push_back(shape);
     }
@@ -204,7 +214,8 @@ class Maker {
       pose.position_m = offset_ + dice_.inCube(0.02);
       if (dice_.chance(0.7)) pose.rotation = dice_.rotation();
       pose.scale = Point::Constant(dice_.chance(0.5) ? 0.001 : dice_.logarithmic(0.001, 10));
-      if (dice_.chance(0.2)) pose.scale = pose.scale.cwiseProduct(Point(1, dice_.uniform(0.3, 3), dice_.uniform(0.3, 3)));
+      if (dice_.chance(0.2))
+        pose.scale = pose.scale.cwiseProduct(Point(1, dice_.uniform(0.3, 3), dice_.uniform(0.3, 3)));
       trial_.objects.push_back(bake(shape, pose));
     }
     if (enclosed_) {
@@ -234,7 +245,8 @@ class Maker {
       const double t = k * kPoseTicks * kPeriod_s;
       Pose pose = first;
       pose.position_m += std::sin(sway * t) / sway * velocity;
-      pose.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(std::sin(sway * t) / sway * spin, axis)) * first.rotation;
+      pose.rotation =
+          Eigen::Quaterniond(Eigen::AngleAxisd(std::sin(sway * t) / sway * spin, axis)) * first.rotation;
       object.poses.push_back(pose);
     }
   }
@@ -281,8 +293,10 @@ class Maker {
 
   // A point of a random face in the frame of the scene, and the face's normal.
   std::pair<Point, Point> onSurface() {
-    const Shape& shape = shapes_[static_cast<std::size_t>(dice_.integer(0, static_cast<int>(shapes_.size()) - 1))];
-    const auto& t = shape.triangles[static_cast<std::size_t>(dice_.integer(0, static_cast<int>(shape.triangles.size()) - 1))];
+    const Shape& shape =
+        shapes_[static_cast<std::size_t>(dice_.integer(0, static_cast<int>(shapes_.size()) - 1))];
+    const auto& t = shape.triangles[static_cast<std::size_t>(
+        dice_.integer(0, static_cast<int>(shape.triangles.size()) - 1))];
     const Point& a = shape.vertices[t[0]];
     const Point e = shape.vertices[t[1]] - a;
     const Point f = shape.vertices[t[2]] - a;
@@ -302,12 +316,24 @@ class Maker {
     addHip(hip_);
     while (static_cast<int>(trial_.hips.size()) < ticks) {
       switch (dice_.integer(0, 5)) {
-        case 0: press(); break;
-        case 1: tremble(); break;
-        case 2: slide(); break;
-        case 3: circle(); break;
-        case 4: tap(); break;
-        default: stroke(); break;
+        case 0:
+          press();
+          break;
+        case 1:
+          tremble();
+          break;
+        case 2:
+          slide();
+          break;
+        case 3:
+          circle();
+          break;
+        case 4:
+          tap();
+          break;
+        default:
+          stroke();
+          break;
       }
     }
     trial_.hips.resize(static_cast<std::size_t>(ticks));
@@ -318,9 +344,10 @@ class Maker {
     Point start = 0.06 * dice_.direction();
     if (!trial_.planes.empty()) {
       for (int i = 0; i < 200; ++i) {
-        const bool inFront = std::all_of(trial_.planes.begin(), trial_.planes.end(), [&](const TrialPlane& p) {
-          return p.normal.dot(rotation_ * start + offset_) + p.offset_m > trial_.toolRadius_m + 1e-4;
-        });
+        const bool inFront =
+            std::all_of(trial_.planes.begin(), trial_.planes.end(), [&](const TrialPlane& p) {
+              return p.normal.dot(rotation_ * start + offset_) + p.offset_m > trial_.toolRadius_m + 1e-4;
+            });
         if (inFront) return start;
         start = 0.06 * dice_.direction();
       }

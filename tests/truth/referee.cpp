@@ -17,11 +17,11 @@ namespace {
 
 using realtime::Rendering;
 
-constexpr double kGap_m = 10e-6;            // narrower gaps are closed
+constexpr double kGap_m = 10e-6;               // narrower gaps are closed
 constexpr double kFollower_m = 0.49 * kGap_m;  // radius of the ball that follows the proxy
-constexpr double kSuspect_m = 30e-6;        // beside a face: a move there is searched for a path
-constexpr double kForceTolerance_m = 20e-6;  // times stiffness; twice the gap
-constexpr double kTouch_m = 25e-6;          // faces within this of the tool may hold it
+constexpr double kSuspect_m = 30e-6;           // beside a face: a move there is searched for a path
+constexpr double kForceTolerance_m = 20e-6;    // times stiffness; twice the gap
+constexpr double kTouch_m = 25e-6;             // faces within this of the tool may hold it
 constexpr double kStuck_m = 10e-6;
 constexpr double kDescentReach_m = 1e-3;
 constexpr unsigned kUnexpected =
@@ -35,8 +35,8 @@ std::uint64_t mixed(std::uint64_t a, std::uint64_t b) {
   return x ^ (x >> 31U);
 }
 
-// Distance of a vector from the cone of non-negative sums of others. The nearest point of a cone in space is a sum of at most
-// three of them: tries all sets.
+// Distance of a vector from the cone of non-negative sums of others. The nearest point of a cone in space is
+// a sum of at most three of them: tries all sets.
 double distanceFromCone(const Point& f, const std::vector<Point>& n) {
   double nearest = f.norm();
   const auto consider = [&](const Point& sum) { nearest = std::min(nearest, (f - sum).norm()); };
@@ -63,17 +63,23 @@ double distanceFromCone(const Point& f, const std::vector<Point>& n) {
 class Referee {
  public:
   Referee(const Trial& trial, const RefereeOptions& options)
-      : trial_(trial), options_(options), stage_(trial), reference_(trial), renderer_({trial.toolRadius_m, false}) {
+      : trial_(trial),
+        options_(options),
+        stage_(trial),
+        reference_(trial),
+        renderer_({trial.toolRadius_m, false}) {
     for (const TrialObject& object : trial.objects) consider(object.material);
     for (const TrialPlane& plane : trial.planes) consider(plane.material);
     static_ = trial.isStatic();
     oneSidedBall_ = trial.sides != Sides::both && trial.toolRadius_m > 0;
   }
 
-  // A trial that does not begin in free space has nothing to judge: inside and outside follow from the history.
+  // A trial that does not begin in free space has nothing to judge: inside and outside follow from the
+  // history.
   Verdict run() {
     reference_.moveTo(0);
-    if (trial_.hips.empty() || !reference_.near(trial_.hips[0], trial_.toolRadius_m + kTouch_m).empty()) return verdict_;
+    if (trial_.hips.empty() || !reference_.near(trial_.hips[0], trial_.toolRadius_m + kTouch_m).empty())
+      return verdict_;
     if (beyondWalls(trial_.hips[0]) > 0) return verdict_;
     for (std::size_t i = 0; i < trial_.hips.size() && !verdict_.finding; ++i) tick(static_cast<int>(i));
     return verdict_;
@@ -120,12 +126,14 @@ class Referee {
     const bool judgeable = rendering_.touching && !oneSidedBall_ && (rendering_.status & kUnfinished) == 0;
     if (judgeable && (options_.longRulesAtTheEnd ? last : drawn(options_.share))) return judgeAtLength();
     // Where a proxy stuck, it is in the same place as before.
-    if (judgeable && heldFast() && (options_.longRulesAtTheEnd ? last : drawn(20 * options_.share))) judgeRest();
+    if (judgeable && heldFast() && (options_.longRulesAtTheEnd ? last : drawn(20 * options_.share)))
+      judgeRest();
   }
 
   // At random, with this probability; the same in every run of the trial.
   bool drawn(double probability) const {
-    return static_cast<double>(mixed(trial_.seed, static_cast<std::uint64_t>(tick_)) >> 11U) * 0x1p-53 < probability;
+    return static_cast<double>(mixed(trial_.seed, static_cast<std::uint64_t>(tick_)) >> 11U) * 0x1p-53 <
+           probability;
   }
   bool heldFast() const {
     const double way = (hip_ - hipBefore_).norm();
@@ -135,33 +143,40 @@ class Referee {
   // What the report alone shows.
   void judgeNumbers() {
     const Rendering& r = rendering_;
-    if (!r.force_N.allFinite() || !r.proxy_m.allFinite() || !r.contactForce_N.allFinite()) return report("finite", "");
+    if (!r.force_N.allFinite() || !r.proxy_m.allFinite() || !r.contactForce_N.allFinite())
+      return report("finite", "");
     if ((r.status & kUnexpected) != 0) return report("status", "bits ", r.status);
     Point sum = Point::Zero();
     for (std::uint32_t k = 0; k < r.contactCount; ++k) sum += r.contacts[k].force_N;
     if ((sum - r.contactForce_N).norm() > 1e-9 * (1 + r.contactForce_N.norm())) {
-      return report("fields", "the contacts sum to ", sum.transpose(), " instead of ", r.contactForce_N.transpose());
+      return report("fields", "the contacts sum to ", sum.transpose(), " instead of ",
+                    r.contactForce_N.transpose());
     }
-    if (r.touching != (r.contactCount > 0)) return report("fields", "touching ", r.touching, ", contacts ", r.contactCount);
+    if (r.touching != (r.contactCount > 0))
+      return report("fields", "touching ", r.touching, ", contacts ", r.contactCount);
     if (!r.touching && (r.depth_m != 0 || !r.contactForce_N.isZero(0))) {
-      return report("fields", "depth ", r.depth_m, " and force ", r.contactForce_N.norm(), " without contact");
+      return report("fields", "depth ", r.depth_m, " and force ", r.contactForce_N.norm(),
+                    " without contact");
     }
     const double spring = (r.proxy_m - hip_).norm();
     if (r.touching && r.depth_m == 0 && spring > kForceTolerance_m && (r.status & kUnfinished) == 0) {
       return report("fields", "depth 0 in contact, with the proxy ", spring, " m from the HIP");
     }
-    if (r.touching && !(std::abs(r.normal.norm() - 1) < 1e-9)) return report("fields", "a normal of length ", r.normal.norm());
+    if (r.touching && !(std::abs(r.normal.norm() - 1) < 1e-9))
+      return report("fields", "a normal of length ", r.normal.norm());
     const double bound = stiffest_ * (spring * (1 + 1e-6) + kForceTolerance_m) * (1 + friction_) +
                          3 * damping_ * (velocity_.norm() + surfaceSpeed()) * (1 + friction_);
     if (!(r.contactForce_N.norm() <= bound)) {
-      report("force", r.contactForce_N.norm(), " N with the proxy ", spring, " m from the HIP; at most ", bound, " N");
+      report("force", r.contactForce_N.norm(), " N with the proxy ", spring, " m from the HIP; at most ",
+             bound, " N");
     }
   }
 
   double surfaceSpeed() const {
     double fastest = 0;
     for (std::size_t i = 0; i < trial_.objects.size() && reference_.moved(); ++i) {
-      fastest = std::max(fastest, (reference_.carriedByObject(proxyBefore_, static_cast<int>(i)) - proxyBefore_).norm());
+      fastest = std::max(
+          fastest, (reference_.carriedByObject(proxyBefore_, static_cast<int>(i)) - proxyBefore_).norm());
       if (!trial_.objects[i].target.empty()) fastest = std::max(fastest, 1e-3);  // the fastest deformation
     }
     return fastest / kPeriod_s;
@@ -169,14 +184,16 @@ class Referee {
 
   double beyondWalls(const Point& p) const {
     double farthest = -std::numeric_limits<double>::infinity();
-    for (const Wall& wall : trial_.enclosure) farthest = std::max(farthest, wall.normal.dot(p) - wall.offset_m);
+    for (const Wall& wall : trial_.enclosure)
+      farthest = std::max(farthest, wall.normal.dot(p) - wall.offset_m);
     return farthest;
   }
 
   void judgePlaces() {
     const Point& p = rendering_.proxy_m;
     const double rounding = 1e-9 + 8e-9 * std::max(reference_.extent(), 1e-3);
-    if (beyondWalls(p) > kGap_m) return report("escaped", beyondWalls(p), " m beyond a wall, proxy ", p.transpose());
+    if (beyondWalls(p) > kGap_m)
+      return report("escaped", beyondWalls(p), " m beyond a wall, proxy ", p.transpose());
     const double spring = (p - hip_).norm();
     const bool unfinished = (rendering_.status & kUnfinished) != 0;
     if (!rendering_.touching && !unfinished && spring > rounding) {
@@ -186,14 +203,15 @@ class Referee {
     const double now = spring;
     const double before = (proxyBefore_ - hip_).norm();
     const bool popped = (rendering_.status & realtime::kRenderPopthrough) != 0;
-    if (static_ && friction_ == 0 && tick_ > 0 && !popped && now > before + kGap_m + 2e-3 * trial_.toolRadius_m &&
-        !unfinished && !oneSidedBall_) {
+    if (static_ && friction_ == 0 && tick_ > 0 && !popped &&
+        now > before + kGap_m + 2e-3 * trial_.toolRadius_m && !unfinished && !oneSidedBall_) {
       return report("climbed", "the proxy moved from ", before, " m to ", now, " m from the HIP");
     }
     reference_.heights(p, proxyHeights_);
     if (tick_ > 0 && !popped) judgePassage();
     heightsBefore_.swap(proxyHeights_);
-    if (rendering_.contactForce_N.norm() > stiffest_ * kForceTolerance_m + damping_ * velocity_.norm()) judgeFreeForce();
+    if (rendering_.contactForce_N.norm() > stiffest_ * kForceTolerance_m + damping_ * velocity_.norm())
+      judgeFreeForce();
   }
 
   // A move is suspected when it goes through a face, or past its edge nearer than any gap is wide.
@@ -214,17 +232,21 @@ class Referee {
     if (!verdict_.finding) searchPassage();
   }
 
-  // From free motion to free motion, through the inside of a face that is alone and lies below the HIP: it must have held
-  // the proxy, however near a way around is.
+  // From free motion to free motion, through the inside of a face that is alone and lies below the HIP: it
+  // must have held the proxy, however near a way around is.
   void judgeFreeMove() {
     for (const int i : suspects_) {
       const Face& f = reference_.face(i);
       const Point foot = nearestOf(f, hip_);
       // By a gap's width inside: at its rim the proxy may slide off.
-      const bool below = reference_.pierces(i, foot + (foot - hip_), hip_, -kGap_m) && (hip_ - foot).cross(f.normal).norm() < 1e-9;
+      const bool below = reference_.pierces(i, foot + (foot - hip_), hip_, -kGap_m) &&
+                         (hip_ - foot).cross(f.normal).norm() < 1e-9;
       if (!below || !reference_.crosses(i, proxyBefore_, hip_, -kGap_m)) continue;
-      if (reference_.near(0.5 * (proxyBefore_ + hip_), (hip_ - proxyBefore_).norm() + trial_.toolRadius_m).size() > 1) continue;
-      return report("through", "from ", proxyBefore_.transpose(), " to ", hip_.transpose(), " through face ", i, ", alone");
+      if (reference_.near(0.5 * (proxyBefore_ + hip_), (hip_ - proxyBefore_).norm() + trial_.toolRadius_m)
+              .size() > 1)
+        continue;
+      return report("through", "from ", proxyBefore_.transpose(), " to ", hip_.transpose(), " through face ",
+                    i, ", alone");
     }
   }
 
@@ -239,7 +261,8 @@ class Referee {
     for (const int i : suspects_) way = std::max(way, (p - previousPlace(i)).norm());
     bool decided = false;
     for (const double reach : {1.0 * way + 100e-6, 5 * way + 400e-6}) {
-      FreeSpace space(reference_, 0.5 * (p + proxyBefore_), reach, kFollower_m, trial_.seed + static_cast<std::uint64_t>(tick_));
+      FreeSpace space(reference_, 0.5 * (p + proxyBefore_), reach, kFollower_m,
+                      trial_.seed + static_cast<std::uint64_t>(tick_));
       const std::optional<Point> start = placeBefore(space);
       const std::optional<Point> end = placeNow(space);
       if (!start || !end) continue;
@@ -251,8 +274,8 @@ class Referee {
       return;
     }
     const Face& f = reference_.face(suspects_.front());
-    report("through", "from ", proxyBefore_.transpose(), " to ", p.transpose(), " past face ", suspects_.front(), " of object ",
-           f.object, ", force ", rendering_.contactForce_N.norm());
+    report("through", "from ", proxyBefore_.transpose(), " to ", p.transpose(), " past face ",
+           suspects_.front(), " of object ", f.object, ", force ", rendering_.contactForce_N.norm());
   }
 
   std::optional<Point> placeBefore(FreeSpace& space) const {
@@ -302,11 +325,13 @@ class Referee {
     // Edges within the gap may hold a point.
     const Point off = p + way * std::min(1.0, 30e-6 / way.norm());
     for (Eigen::Index i = 0; radius == 0 && i < hipHeights_.size(); ++i) {
-      if (std::min(heightsBefore_[i], hipHeights_[i]) > 2 * kGap_m || std::max(heightsBefore_[i], hipHeights_[i]) < -2 * kGap_m) continue;
+      if (std::min(heightsBefore_[i], hipHeights_[i]) > 2 * kGap_m ||
+          std::max(heightsBefore_[i], hipHeights_[i]) < -2 * kGap_m)
+        continue;
       if (distanceOf(reference_.face(static_cast<int>(i)), off, hip_) < 1.2 * kGap_m) return;
     }
-    report("free", rendering_.contactForce_N.norm(), " N, and the way from the proxy ", p.transpose(), " to the HIP ", hip_.transpose(),
-           " is free");
+    report("free", rendering_.contactForce_N.norm(), " N, and the way from the proxy ", p.transpose(),
+           " to the HIP ", hip_.transpose(), " is free");
   }
 
   // A ball that rests on a face and is pulled off it.
@@ -317,8 +342,8 @@ class Referee {
            (hip_ - nearestOf(f, hip_)).norm() > trial_.toolRadius_m;
   }
 
-  // Work on the hand since the last tick without contact, when no spring was loaded. The trapezoid's error is at most half
-  // of the change of the force times the way.
+  // Work on the hand since the last tick without contact, when no spring was loaded. The trapezoid's error is
+  // at most half of the change of the force times the way.
   void judgeEnergy() {
     const Point way = hip_ - hipBefore_;
     work_J_ += 0.5 * (forceBefore_ + rendering_.contactForce_N).dot(way);
@@ -363,7 +388,8 @@ class Referee {
     }
     const double off = distanceFromCone(force, normals);
     if (off > 2e-3 * force.norm() + stiffest_ * kForceTolerance_m) {
-      report("direction", "the force ", force.transpose(), " is off the cone of ", normals.size(), " normals by ", off, " N");
+      report("direction", "the force ", force.transpose(), " is off the cone of ", normals.size(),
+             " normals by ", off, " N");
     }
   }
 
@@ -378,10 +404,12 @@ class Referee {
     if (mixedStiffness() && othersNear(f.object)) return;
     const Material& m = reference_.materialOf(near[0]);
     const double depth = trial_.toolRadius_m - n.dot(hip_ - nearestOf(f, rendering_.proxy_m));
-    const Point expected = std::max(0.0, m.stiffness_N_per_m * std::max(0.0, depth) - m.damping_Ns_per_m * n.dot(velocity_)) * n;
+    const Point expected =
+        std::max(0.0, m.stiffness_N_per_m * std::max(0.0, depth) - m.damping_Ns_per_m * n.dot(velocity_)) * n;
     const double off = (rendering_.normalForce_N - expected).norm();
     if (off > 1e-6 * expected.norm() + m.stiffness_N_per_m * kForceTolerance_m) {
-      report("law", "the force ", rendering_.normalForce_N.transpose(), " on one surface, expected ", expected.transpose());
+      report("law", "the force ", rendering_.normalForce_N.transpose(), " on one surface, expected ",
+             expected.transpose());
     }
   }
 
@@ -418,10 +446,12 @@ class Referee {
     // Only where a ball as wide as the gap fits: within a slit, edges hold a point on purpose.
     FreeSpace space(reference_, better, 200e-6, 1.2 * kFollower_m, trial_.seed);
     const auto visible = [&](const Point& q) {
-      return std::none_of(space.faces().begin(), space.faces().end(), [&](int i) { return reference_.pierces(i, better, q, 0); });
+      return std::none_of(space.faces().begin(), space.faces().end(),
+                          [&](int i) { return reference_.pierces(i, better, q, 0); });
     };
     if (radius == 0 && !space.placeNear(better, visible)) return;
-    report("stuck", "at ", p.transpose(), ", ", spring, " m from the HIP ", hip_.transpose(), "; ", better.transpose(), " is nearer by ", gain);
+    report("stuck", "at ", p.transpose(), ", ", spring, " m from the HIP ", hip_.transpose(), "; ",
+           better.transpose(), " is nearer by ", gain);
   }
 
   const Trial& trial_;
@@ -432,8 +462,8 @@ class Referee {
   Verdict verdict_;
   bool touchedBefore_ = false;
   bool static_ = true;
-  // Behind a one-sided face a ball may overlap it; the face pushes it out once its centre is in front. Rules that rely on a
-  // ball beside the faces do not apply.
+  // Behind a one-sided face a ball may overlap it; the face pushes it out once its centre is in front. Rules
+  // that rely on a ball beside the faces do not apply.
   bool oneSidedBall_ = false;
   double stiffest_ = 0;
   double damping_ = 0;

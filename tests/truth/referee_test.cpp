@@ -17,7 +17,8 @@ namespace {
 Trial plate(double holeAt = 1, double holeWidth = 0) {
   Dice dice(1);
   Trial trial;
-  Shape shape = patch({-0.02, -0.02, 0}, {holeAt < 1 ? 0.02 + holeAt - 0.5 * holeWidth : 0.04, 0, 0}, {0, 0.04, 0}, 2, 3, 0, dice);
+  Shape shape = patch({-0.02, -0.02, 0}, {holeAt < 1 ? 0.02 + holeAt - 0.5 * holeWidth : 0.04, 0, 0},
+                      {0, 0.04, 0}, 2, 3, 0, dice);
   if (holeAt < 1) {
     const double begin = holeAt + 0.5 * holeWidth;
     shape.append(patch({begin, -0.02, 0}, {0.02 - begin, 0, 0}, {0, 0.04, 0}, 3, 2, 0, dice));
@@ -99,8 +100,8 @@ TEST(Trial, text_that_is_not_a_trial_is_refused) {
   EXPECT_THROW(read(early), std::runtime_error);
 }
 
-// A hand that presses on a plate: nothing to find. With a false wall in front of the plate, the referee finds it, and two
-// ticks show it.
+// A hand that presses on a plate: nothing to find. With a false wall in front of the plate, the referee finds
+// it, and two ticks show it.
 TEST(Referee, judges_a_press_and_shrinks_what_it_finds) {
   Trial trial = plate();
   for (int i = 0; i < 300; ++i) trial.hips.emplace_back(1e-5 * i, 2e-5 * i, 0.003 - 2e-5 * i);

@@ -25,8 +25,8 @@ bool over(const Face& f, const Point& x, double widening) {
   return !beyond(f.a, f.b) && !beyond(f.b, f.c) && !beyond(f.c, f.a);
 }
 
-// Of two segments, by alternating projection: convex, so it converges; two rounds from both ends suffice for a bound from
-// above, and the exact minimum follows from the closed form when the lines are not parallel.
+// Of two segments, by alternating projection: convex, so it converges; two rounds from both ends suffice for
+// a bound from above, and the exact minimum follows from the closed form when the lines are not parallel.
 double distanceOfSegments(const Point& p, const Point& q, const Point& a, const Point& b) {
   const Point d = q - p;
   const Point e = b - a;
@@ -35,7 +35,9 @@ double distanceOfSegments(const Point& p, const Point& q, const Point& a, const 
   const double ee = e.squaredNorm();
   const double de = d.dot(e);
   const double denominator = dd * ee - de * de;
-  double s = denominator > 1e-14 * dd * ee ? std::clamp((de * e.dot(r) - ee * d.dot(r)) / denominator, 0.0, 1.0) : 0.0;
+  double s = denominator > 1e-14 * dd * ee
+                 ? std::clamp((de * e.dot(r) - ee * d.dot(r)) / denominator, 0.0, 1.0)
+                 : 0.0;
   double nearest = std::numeric_limits<double>::infinity();
   const auto consider = [&](double t) {
     const Point x = p + t * d;
@@ -113,7 +115,8 @@ Reference::Placement Reference::placementAt(const TrialObject& object, int tick)
   const double s = k == last ? 0.0 : static_cast<double>(tick - k * kPoseTicks) / kPoseTicks;
   Placement out;
   const Point scale = (1 - s) * from.scale + s * to.scale;
-  out.linear = (s == 0 ? from.rotation : between(from.rotation, to.rotation, s)).toRotationMatrix() * scale.asDiagonal();
+  out.linear = (s == 0 ? from.rotation : between(from.rotation, to.rotation, s)).toRotationMatrix() *
+               scale.asDiagonal();
   out.origin = (1 - s) * from.position_m + s * to.position_m;
   return out;
 }
@@ -127,7 +130,8 @@ void Reference::place(std::size_t i, int tick) {
   corners.reserve(object.vertices.size());
   double progress = 0;
   if (!object.target.empty()) {
-    progress = std::clamp(static_cast<double>(tick - object.morphBegin) / (object.morphEnd - object.morphBegin), 0.0, 1.0);
+    progress = std::clamp(
+        static_cast<double>(tick - object.morphBegin) / (object.morphEnd - object.morphBegin), 0.0, 1.0);
   }
   for (std::size_t k = 0; k < object.vertices.size(); ++k) {
     Point x = object.vertices[k].cast<double>();
@@ -138,10 +142,12 @@ void Reference::place(std::size_t i, int tick) {
   for (std::size_t k = 0; k < object.triangles.size(); ++k) {
     const auto& t = object.triangles[k];
     Face& f = faces_[firstFace_[i] + k];
-    f = {corners[t[0]], corners[t[mirrored ? 2 : 1]], corners[t[mirrored ? 1 : 2]], Point::Zero(), static_cast<int>(i)};
+    f = {corners[t[0]], corners[t[mirrored ? 2 : 1]], corners[t[mirrored ? 1 : 2]], Point::Zero(),
+         static_cast<int>(i)};
     const Point cross = (f.b - f.a).cross(f.c - f.a);
     const double area2 = cross.norm();
-    const double longest = std::sqrt(std::max({(f.b - f.a).squaredNorm(), (f.c - f.b).squaredNorm(), (f.a - f.c).squaredNorm()}));
+    const double longest = std::sqrt(
+        std::max({(f.b - f.a).squaredNorm(), (f.c - f.b).squaredNorm(), (f.a - f.c).squaredNorm()}));
     f.thin = !(area2 > kThin * std::max(extent_, 1e-3) * longest);
     if (area2 > 0 && std::isfinite(area2)) f.normal = cross / area2;
     setHeights(firstFace_[i] + k);
@@ -207,7 +213,8 @@ Point Reference::carried(const Point& p, int face) const {
   if (!moved_) return p;
   const Face& now = faces_[static_cast<std::size_t>(face)];
   if (now.unbounded) return p;
-  if (trial_.objects[static_cast<std::size_t>(now.object)].target.empty()) return carriedByObject(p, now.object);
+  if (trial_.objects[static_cast<std::size_t>(now.object)].target.empty())
+    return carriedByObject(p, now.object);
   const Face& then = facesBefore_[static_cast<std::size_t>(face)];
   Eigen::Matrix3d frame;
   frame << then.b - then.a, then.c - then.a, then.normal;

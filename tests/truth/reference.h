@@ -1,7 +1,8 @@
-// The geometry of a trial at one tick, by brute force over all triangles: no index, no cache, and no code of the renderer.
+// The geometry of a trial at one tick, by brute force over all triangles: no index, no cache, and no code of
+// the renderer.
 //
-// It does not compute a proxy. It answers what a judge has to ask: which faces a path crosses, how far they are, and where a
-// point that rides on a face is now.
+// It does not compute a proxy. It answers what a judge has to ask: which faces a path crosses, how far they
+// are, and where a point that rides on a face is now.
 #pragma once
 
 #include <vector>
@@ -13,10 +14,11 @@ namespace hapticd::truth {
 /// One triangle at one tick, device metres.
 struct Face {
   Point a, b, c;
-  Point normal;  ///< unit, out of the front
-  int object = 0;         ///< -1 - index for a plane of the scene
+  Point normal;            ///< unit, out of the front
+  int object = 0;          ///< -1 - index for a plane of the scene
   bool unbounded = false;  ///< a plane: through a, solid below
-  /// So thin that a renderer may leave it out, because its rounding hides it: it may be felt and it may be missed.
+  /// So thin that a renderer may leave it out, because its rounding hides it: it may be felt and it may be
+  /// missed.
   bool thin = false;
 };
 

@@ -27,7 +27,8 @@ class TrialHand final : public device::Device {
   bool read(base::Nanos now, device::DeviceState& state) noexcept override {
     const Point& hip = trial_.hips[next_];
     state.time = now;
-    state.velocity_m_per_s = next_ > 0 ? Point((hip - trial_.hips[next_ - 1]) / kPeriod_s) : Point(Point::Zero());
+    state.velocity_m_per_s =
+        next_ > 0 ? Point((hip - trial_.hips[next_ - 1]) / kPeriod_s) : Point(Point::Zero());
     state.position_m = hip;
     ++next_;
     return true;
@@ -89,8 +90,8 @@ record::RecordedDevice deviceOf(const Trial& trial) {
 bool writeSession(const Trial& trial, const std::filesystem::path& file) {
   if (!trial.isStatic() || !trial.planes.empty()) return false;
   std::filesystem::remove(file);
-  record::Recorder recorder(
-      file, [](const std::string& problem) { throw std::runtime_error(problem); }, {.ticks = trial.hips.size() + 1});
+  record::Recorder recorder(file, [](const std::string& problem) { throw std::runtime_error(problem); },
+                            {.ticks = trial.hips.size() + 1});
   record::RecordedDevice device = deviceOf(trial);
   recorder.addDevice(device);
   device.sceneConfig.stopwatch = recorder.stopwatch(0);

@@ -7,8 +7,9 @@
 
 namespace hapticd::truth {
 
-/// Records the trial as a server would have, without guard and limits. False, and no file, for trials that move, deform or
-/// have planes, which the commands of a client cannot repeat tick by tick. Throws record::RecordingError.
+/// Records the trial as a server would have, without guard and limits. False, and no file, for trials that
+/// move, deform or have planes, which the commands of a client cannot repeat tick by tick. Throws
+/// record::RecordingError.
 bool writeSession(const Trial& trial, const std::filesystem::path& file);
 
 }  // namespace hapticd::truth

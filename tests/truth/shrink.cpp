@@ -8,7 +8,8 @@ namespace {
 
 class Shrinker {
  public:
-  Shrinker(Trial trial, std::string rule, int runs) : best_(std::move(trial)), rule_(std::move(rule)), runs_(runs) {}
+  Shrinker(Trial trial, std::string rule, int runs)
+      : best_(std::move(trial)), rule_(std::move(rule)), runs_(runs) {}
 
   Trial run() {
     std::size_t before = 0;
@@ -17,7 +18,7 @@ class Shrinker {
       dropFirstTicks();
       // What is no longer enclosed may escape.
       if (rule_ != "escaped") dropParts();
-      dropFrom([](Trial& t) -> auto& { return t.hips; });
+      dropFrom([](Trial & t) -> auto& { return t.hips; });
       simplify();
     } while (size() < before && runs_ > 0);
     dropVertices();
@@ -25,7 +26,9 @@ class Shrinker {
   }
 
  private:
-  std::size_t size() const { return best_.triangleCount() + best_.hips.size() + best_.objects.size() + best_.planes.size(); }
+  std::size_t size() const {
+    return best_.triangleCount() + best_.hips.size() + best_.objects.size() + best_.planes.size();
+  }
 
   // Takes the trial over when it still breaks the rule; its ticks then end there.
   bool take(Trial trial) {
@@ -52,10 +55,10 @@ class Shrinker {
   }
 
   void dropParts() {
-    dropFrom([](Trial& t) -> auto& { return t.objects; });
-    dropFrom([](Trial& t) -> auto& { return t.planes; });
+    dropFrom([](Trial & t) -> auto& { return t.objects; });
+    dropFrom([](Trial & t) -> auto& { return t.planes; });
     for (std::size_t i = 0; i < best_.objects.size(); ++i) {
-      dropFrom([i](Trial& t) -> auto& { return t.objects[i].triangles; });
+      dropFrom([i](Trial & t) -> auto& { return t.objects[i].triangles; });
     }
   }
 

@@ -28,8 +28,9 @@ scene::Surface surfaceOf(const Material& m) {
 Stage::Stage(const Trial& trial) : trial_(trial) {
   for (const TrialObject& object : trial.objects) {
     const geometry::TriangleMesh mesh{object.vertices, object.triangles};
-    geometry_.push_back(fixture::geometryOf(mesh, 1 + geometry_.size(), object.target.empty() ? nullptr : &object.target,
-                                            object.morphBegin * fixture::kTick, object.morphEnd * fixture::kTick));
+    geometry_.push_back(
+        fixture::geometryOf(mesh, 1 + geometry_.size(), object.target.empty() ? nullptr : &object.target,
+                            object.morphBegin * fixture::kTick, object.morphEnd * fixture::kTick));
     lastPhase_ = std::max(lastPhase_, static_cast<int>(object.poses.size()) - 1);
   }
 }
@@ -55,9 +56,10 @@ std::shared_ptr<const scene::SceneSnapshot> Stage::snapshotOf(int phase) const {
     };
     const bool moving = static_cast<std::size_t>(phase) + 1 < object.poses.size();
     built.add(geometry_[i], surfaceOf(object.material),
-              moving ? scene::Motion::between(pose(phase), pose(phase + 1), phase * kPoseTicks * fixture::kTick,
-                                              (phase + 1) * kPoseTicks * fixture::kTick)
-                     : scene::Motion::fixed(pose(phase)));
+              moving
+                  ? scene::Motion::between(pose(phase), pose(phase + 1), phase * kPoseTicks * fixture::kTick,
+                                           (phase + 1) * kPoseTicks * fixture::kTick)
+                  : scene::Motion::fixed(pose(phase)));
   }
   for (const TrialPlane& p : trial_.planes) {
     scene::Plane plane;

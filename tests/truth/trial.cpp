@@ -19,7 +19,8 @@ struct Words {
   }
   Words& operator<<(const Point& p) { return *this << p.x() << p.y() << p.z(); }
   Words& operator<<(const Material& m) {
-    return *this << m.stiffness_N_per_m << m.damping_Ns_per_m << m.staticFriction << m.dynamicFriction << m.popthrough_N;
+    return *this << m.stiffness_N_per_m << m.damping_Ns_per_m << m.staticFriction << m.dynamicFriction
+                 << m.popthrough_N;
   }
   Words& operator<<(const Eigen::Quaterniond& q) { return *this << q.x() << q.y() << q.z() << q.w(); }
 };
@@ -28,7 +29,8 @@ std::istream& operator>>(std::istream& in, Point& p) {
   return in >> p.x() >> p.y() >> p.z();
 }
 std::istream& operator>>(std::istream& in, Material& m) {
-  return in >> m.stiffness_N_per_m >> m.damping_Ns_per_m >> m.staticFriction >> m.dynamicFriction >> m.popthrough_N;
+  return in >> m.stiffness_N_per_m >> m.damping_Ns_per_m >> m.staticFriction >> m.dynamicFriction >>
+         m.popthrough_N;
 }
 std::istream& operator>>(std::istream& in, Corner& c) {
   return in >> c.x() >> c.y() >> c.z();
@@ -67,7 +69,8 @@ bool readObjectLine(const std::string& key, std::istream& in, Trial& trial) {
     in >> object.material;
   } else if (key == "pose") {
     Pose& pose = lastObject(trial).poses.emplace_back();
-    in >> pose.position_m >> pose.rotation.x() >> pose.rotation.y() >> pose.rotation.z() >> pose.rotation.w() >> pose.scale;
+    in >> pose.position_m >> pose.rotation.x() >> pose.rotation.y() >> pose.rotation.z() >>
+        pose.rotation.w() >> pose.scale;
   } else if (key == "vertex") {
     in >> lastObject(trial).vertices.emplace_back();
   } else if (key == "target") {

@@ -1,4 +1,5 @@
-// A scene and the path of a hand as plain numbers: what the referee judges, the shrinker reduces, and a file holds.
+// A scene and the path of a hand as plain numbers: what the referee judges, the shrinker reduces, and a file
+// holds.
 #pragma once
 
 #include <Eigen/Core>

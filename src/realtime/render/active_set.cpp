@@ -6,7 +6,7 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr double kRounding_m = 1e-12;
+constexpr double kFeasible_m = 1e-12;
 
 // Two normals closer than this (as |n1 x n2|^2), or three with a smaller determinant, are dependent within
 // rounding; the solution that would need them differs by less than the tolerance from one with fewer
@@ -142,7 +142,7 @@ Projection projectOntoActiveSet(const HalfSpace* halfSpaces, int count, const Ve
 bool depthsBelow(const HalfSpace* halfSpaces, int count, const Vec3& target, double* depths) noexcept {
   std::fill(depths, depths + count, 0.0);
   if (count == 0) return true;
-  const Projection nearest = projectOntoActiveSet(halfSpaces, count, target, target, kRounding_m);
+  const Projection nearest = projectOntoActiveSet(halfSpaces, count, target, target, kFeasible_m);
   for (int i = 0; i < nearest.count; ++i) {
     const auto k = static_cast<std::size_t>(i);
     depths[nearest.active[k]] = std::max(0.0, nearest.multiplier[k]);

@@ -38,8 +38,9 @@ struct Projection {
 Projection projectOntoActiveSet(const HalfSpace* halfSpaces, int count, const Vec3& target, const Vec3& from,
                                 double tolerance) noexcept;
 
-/// Depths of the target below an active set: lengths l_i >= 0 such that target + sum l_i normal_i is the nearest point
-/// in all of the `count` <= 3 half-spaces. False when they leave no room: the largest height alone.
+/// Depths of the target below an active set: lengths l_i >= 0 such that target + sum l_i normal_i is the
+/// nearest point in all of the `count` <= 3 half-spaces. False when they leave no room: the largest height
+/// alone.
 bool depthsBelow(const HalfSpace* halfSpaces, int count, const Vec3& target, double* depths) noexcept;
 
 }  // namespace hapticd::realtime

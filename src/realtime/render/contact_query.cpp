@@ -22,11 +22,6 @@ constexpr double kWiden = 1 + 1e-6;         // covers the rounding of queries th
 constexpr double kReserveShare = 0.2;       // share of the tool radius that is gathered in reserve
 constexpr int kReuseLimit = 32;  // reuse the cached facets up to this count instead of querying again
 
-// An upper bound of the largest singular value, exact for similarities.
-double stretchOf(const Mat3& m) {
-  return std::sqrt((m.transpose() * m).cwiseAbs().rowwise().sum().maxCoeff());
-}
-
 scene::Corners mapped(const Affine& t, const scene::Corners& c, bool mirrored) {
   scene::Corners out{t * c.a, t * c.b, t * c.c};
   if (mirrored) std::swap(out.b, out.c);
@@ -99,7 +94,8 @@ void ContactQuery::addObjectsByIndex(const scene::SceneSnapshot& scene, const Ve
   if (crowd_ == scene.objects.size()) return addNearestObjects(scene, (centre - tool).norm() + reach, tool);
   if (std::exchange(crowd_, 0) != 0) distances_.restart();
   const Affine& T_world_device = scene.workspace.T_world_device;
-  const double worldReach = (reach + std::max(toolRadius_, 0.5 * kLargestGapTolerance_m)) * kWiden * stretchOf(T_world_device.linear());
+  const double largestRadius = std::max(toolRadius_, 0.5 * kLargestGapTolerance_m);
+  const double worldReach = (reach + largestRadius) * kWiden * stretchOf(T_world_device.linear());
   std::array<std::uint32_t, kMaxObjects> found{};
   std::size_t count = 0;
   scene.objectIndex->visitNear(T_world_device * centre, worldReach, [&](std::uint32_t i) noexcept {
@@ -350,7 +346,8 @@ bool ContactQuery::castGathered(const Path& path, int only, ObjectHit& hit) noex
 
 bool ContactQuery::castAtFacets(const Path& path, int only, ObjectHit& hit) noexcept {
   std::array<const Facet*, FacetCache::kMaxFacets> candidates;
-  const int count = cache_.facetsNearPath(path.p + path.begin * path.d, (path.end - path.begin) * path.d, candidates.data());
+  const int count = cache_.facetsNearPath(path.p + path.begin * path.d, (path.end - path.begin) * path.d,
+                                          candidates.data());
   bool found = false;
   if (only < 0 && planes_ != nullptr) {
     for (const PlacedPlane& plane : *planes_) considerFacet(plane.facet, path, hit, found);
@@ -451,7 +448,8 @@ bool ContactQuery::castAtEach(const Path& path, int only, ObjectHit& hit) noexce
 
 // The index has no query for a swept ball: gathers along the path from `begin` on, in steps that grow while
 // the path is free and shrink when the storage overflows.
-bool ContactQuery::castInSteps(const Vec3& p, const Vec3& d, double begin, int only, ObjectHit& hit) noexcept {
+bool ContactQuery::castInSteps(const Vec3& p, const Vec3& d, double begin, int only,
+                               ObjectHit& hit) noexcept {
   constexpr double kSmallestStep = 1.0 / 64;
   const double length = d.norm();
   double step = keepsFacets_ ? 1.0 : std::min(1.0, std::max(0.125 * radius_ / length, kSmallestStep));

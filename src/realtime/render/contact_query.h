@@ -23,10 +23,11 @@ using geometry::Affine;
 
 /// Triangles that a tick examines. A count and not a time, so that the clock never changes a force.
 inline constexpr int kMaxVisits = 8192;
-/// Faces whose gaps are narrower than this are impassable, so the point tool touches them as a ball of half the
-/// width. Exports and assembled scenes leave such gaps where faces do not share vertices.
+/// Faces whose gaps are narrower than this are impassable, so the point tool touches them as a ball of half
+/// the width. Exports and assembled scenes leave such gaps where faces do not share vertices.
 inline constexpr double kGapTolerance_m = 10e-6;
-/// The tolerance of an object far from the origin grows with the spacing of its float coordinates, up to this.
+/// The tolerance of an object far from the origin grows with the spacing of its float coordinates, up to
+/// this.
 inline constexpr double kLargestGapTolerance_m = 50e-6;
 /// A pose that moves a part near the proxy farther is a jump.
 inline constexpr double kLongestMotion_m = 0.020;
@@ -59,7 +60,7 @@ struct PlacedObject {
 /// What ends a path: the first facet that blocks it, or the place up to which it was examined.
 struct ObjectHit : CastHit {
   bool unexamined = false;  ///< the work of this tick is spent: nothing is known of the path beyond `stop`
-  int object = 0;  ///< index of the near object; -1 - index for a plane of the scene
+  int object = 0;           ///< index of the near object; -1 - index for a plane of the scene
   std::uint32_t triangle = 0;
 };
 
@@ -122,7 +123,8 @@ class ContactQuery {
   template <class Visit>
   void forEachGathered(const Vec3& p, double distance, Visit&& visit) noexcept;
 
-  /// The first obstacle on the path from p to g, or the end of what was examined; false when the path is free.
+  /// The first obstacle on the path from p to g, or the end of what was examined; false when the path is
+  /// free.
   bool cast(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept;
   /// The same for the start of the path only: as far as the gathered facets reach.
   bool castWithinGathered(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept;
@@ -157,8 +159,8 @@ class ContactQuery {
     Facet facet;
   };
 
-  // The part [begin, end] of the path p + t d, t in [0, 1]. A hit is computed on the whole path, so that it does not
-  // depend on the parts.
+  // The part [begin, end] of the path p + t d, t in [0, 1]. A hit is computed on the whole path, so that it
+  // does not depend on the parts.
   struct Path {
     const Vec3& p;
     const Vec3& d;

@@ -9,7 +9,8 @@ namespace {
 
 using scene::TouchableFaces;
 
-// Beside an edge the distance grows with the square of the overhang, so that a normal from it is precise to 1e-4 only.
+// Beside an edge the distance grows with the square of the overhang, so that a normal from it is precise to
+// 1e-4 only.
 constexpr double kFlat = 1 - 0.5e-8;
 constexpr double kThinness = 1e-3;  // ratio of height to length below which the normal is corrected
 
@@ -29,8 +30,8 @@ inline bool touchableSide(const Facet& f, TouchableFaces faces, const Vec3& p, c
   return h.start >= -0.5 * f.skin;
 }
 
-// Calls visit(outward, corner) for the sides of a facet, seen along its normal, until it returns false. `outward` has the
-// length of the side.
+// Calls visit(outward, corner) for the sides of a facet, seen along its normal, until it returns false.
+// `outward` has the length of the side.
 template <class Visit>
 inline bool forEachSide(const Facet& f, Visit&& visit) {
   return f.unbounded || (visit((f.b - f.a).cross(f.normal), f.a) && visit((f.c - f.b).cross(f.normal), f.b) &&
@@ -52,10 +53,10 @@ inline bool overFacet(const Facet& f, const Vec3& x, const Vec3& d) {
   });
 }
 
-// The distance to a convex set is convex along a line: Newton's steps from the start never pass the first root, and
-// without a negative slope there is none.
-bool castBallAtEdges(const Facet& f, const Vec3& up, const Vec3& p, const Vec3& d, double limit, double latest,
-                     CastHit& out) {
+// The distance to a convex set is convex along a line: Newton's steps from the start never pass the first
+// root, and without a negative slope there is none.
+bool castBallAtEdges(const Facet& f, const Vec3& up, const Vec3& p, const Vec3& d, double limit,
+                     double latest, CastHit& out) {
   const double standoff = f.radius + f.skin;
   const double contact = standoff - 0.5 * f.skin;
   const double fine = 1e-3 * f.skin;

@@ -33,8 +33,8 @@ struct CastHit {
   HalfSpace halfSpace;
 };
 
-/// False for triangles that are not finite or thinner than the skin: their neighbours are nearer than a ball is
-/// wide.
+/// False for triangles that are not finite or thinner than the skin: their neighbours are nearer than a ball
+/// is wide.
 bool makeFacet(const scene::Corners& corners, double skin, Facet& facet) noexcept;
 
 /// Where the facet blocks the centre's path p + t d, t in [0, limit]. False when it does not, or only beyond

@@ -29,7 +29,8 @@ void FacetCache::add(const Facet& facet, bool deforming) noexcept {
   facets_[i] = facet;
   supportPlanes_[i] = {facet.normal, facet.normal.dot(facet.a)};
   const Vec3 middle = 0.5 * (facet.a + facet.b);  // of the longest edge
-  bounds_[i] = {middle, std::sqrt(std::max((facet.a - middle).squaredNorm(), (facet.c - middle).squaredNorm()))};
+  bounds_[i] = {middle,
+                std::sqrt(std::max((facet.a - middle).squaredNorm(), (facet.c - middle).squaredNorm()))};
   maxSkin_ = std::max(maxSkin_, facet.skin);
   maxRadius_ = std::max(maxRadius_, facet.radius);
 }

@@ -1,9 +1,9 @@
 // The facets that a tool inside a ball around the proxy can touch, in fixed storage.
 //
-// Point tool: keeps the facets themselves. A path first discards the faces whose plane or whose ball it does not
-// come near, which leaves few. Ball tool: many triangles lie within its radius and few touch it. It keeps their
-// ids, with a lower bound of the distance and a supporting plane for each; exact facets are made only for
-// those that pass both tests.
+// Point tool: keeps the facets themselves. A path first discards the faces whose plane or whose ball it does
+// not come near, which leaves few. Ball tool: many triangles lie within its radius and few touch it. It keeps
+// their ids, with a lower bound of the distance and a supporting plane for each; exact facets are made only
+// for those that pass both tests.
 #pragma once
 
 #include <array>
@@ -61,7 +61,8 @@ class FacetCache {
   double refine(int i, const Vec3& foot, const Vec3& d) noexcept;
   /// Marks entry i as unreachable.
   void exclude(int i) noexcept;
-  /// Point tool: all facets that the path from p to p + d may reach. `found` has room for kMaxFacets. Returns how many.
+  /// Point tool: all facets that the path from p to p + d may reach. `found` has room for kMaxFacets. Returns
+  /// how many.
   int facetsNearPath(const Vec3& p, const Vec3& d, const Facet** found) const noexcept;
 
  private:

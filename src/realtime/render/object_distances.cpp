@@ -18,12 +18,11 @@ constexpr int kTurns = 2;                 // in a tick, of others
 constexpr int kMovesFollowed = 64;        // in a tick: the bounds of further objects that moved are lost
 constexpr int kLookAhead = 64;            // when objects were added or removed
 
-// An upper bound of the largest singular value.
-double stretchOf(const geometry::Mat3& m) {
+}  // namespace
+
+double stretchOf(const geometry::Mat3& m) noexcept {
   return std::sqrt((m.transpose() * m).cwiseAbs().rowwise().sum().maxCoeff());
 }
-
-}  // namespace
 
 // The distance now, at least, and the least on the rest of its motion.
 double ObjectDistances::examine(const scene::ObjectState& state, const geometry::Affine& T_device_world,

@@ -18,6 +18,10 @@ namespace hapticd::realtime {
 using base::Nanos;
 using geometry::Vec3;
 
+/// An upper bound of the largest singular value, exact for similarities: how much a placement stretches
+/// lengths.
+double stretchOf(const geometry::Mat3& m) noexcept;
+
 /// Servo thread: noexcept, fixed storage, no allocation.
 class ObjectDistances {
  public:

@@ -269,8 +269,7 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
   contactSet_ = ContactSet{};
   const int count = std::min(active.count, kMaxActive);
   std::array<double, kMaxActive> depths{};
-  const bool onAll =
-      depthsOf(active.hits.data(), count, toolRadius_, position_ - hip, hip, depths.data());
+  const bool onAll = depthsOf(active.hits.data(), count, toolRadius_, position_ - hip, hip, depths.data());
   double hardest = -1;
   // The proxy keeps a distance from faces, so that one may hold it that the HIP is not below.
   const bool below = std::any_of(depths.begin(), depths.end(), [](double depth) { return depth > 0; });
@@ -316,8 +315,8 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
   contactSet_.spring = blendedSpring(now_, planes_, toolRadius_, reported_, contactSet_);
 }
 
-// The proxy on the faces that hold it, at their skins so that rounding does not put it behind one of them. Another face
-// may be in between: where the planes of two faces meet behind it, or where it moved.
+// The proxy on the faces that hold it, at their skins so that rounding does not put it behind one of them.
+// Another face may be in between: where the planes of two faces meet behind it, or where it moved.
 Vec3 Proxy::onFaces(const Vec3& hip, const ActiveSet& active) noexcept {
   const int count = std::min(active.count, kMaxActive);
   std::array<double, kMaxActive> depths{};
@@ -366,8 +365,8 @@ void Proxy::applyForceShading() noexcept {
   }
 }
 
-// Where the work of every tick is spent, the proxy lags behind the hand and its force is not the surface's: after
-// kMaxOverworked ticks in a row it fades out, and it returns when the HIP has left.
+// Where the work of every tick is spent, the proxy lags behind the hand and its force is not the surface's:
+// after kMaxOverworked ticks in a row it fades out, and it returns when the HIP has left.
 void Proxy::fadeWhenOverworked(std::uint32_t& status) noexcept {
   constexpr int kMaxOverworked = 20;
   constexpr double kFade_s = 0.050;

@@ -12,7 +12,8 @@ namespace {
 constexpr double kTouching = 256;  // in skins: planes at their skins meet that far from a sharp corner
 constexpr double kLifts[] = {4, 4 * kTouching};
 constexpr double kLiftShare = 0.25;  // of the radius of a small ball
-constexpr double kSmallBall_m = kLargestGapTolerance_m;  // its rounding is smaller than the places where faces end
+constexpr double kSmallBall_m =
+    kLargestGapTolerance_m;           // its rounding is smaller than the places where faces end
 constexpr double kMinDescent = 1e-3;  // share of the pull; flatter directions lead nowhere
 constexpr double kClimb = 1e-3;       // share of the tool radius
 

@@ -17,9 +17,9 @@ constexpr double kWidthPerDepth = 1.75;
 // or the rest of a face that passes through it, lies far below; the next faces of a round surface do not.
 constexpr double kHidden = 6;
 constexpr double kHiddenExcess = kHidden * kHidden - 1;
-constexpr double kFacing_m = 10e-6;      // a face that is lower than the proxy by less does not show its back
-constexpr double kWiden = 1 + 1e-6;      // covers the rounding of queries that change frames
-constexpr double kSameDirection = 1e-7;  // |n1 x n2|^2 of faces that are one plane
+constexpr double kFacing_m = 10e-6;  // a face that is lower than the proxy by less does not show its back
+constexpr double kQueryMargin = 1 + 1e-6;  // covers the rounding of queries that change frames
+constexpr double kSameDirection = 1e-7;    // |n1 x n2|^2 of faces that are one plane
 constexpr int kMaxStiffnesses = 16;
 constexpr int kMaxNeighbours = 64;
 constexpr int kMaxVisits = 512;         // triangles in one search
@@ -152,9 +152,9 @@ Vec3 alongContactSet(const ContactSet& contactSet, const Vec3& v) {
   return v - n * n.dot(v);
 }
 
-class Search {
+class NeighbourSearch {
  public:
-  Search(const SceneAtTime& now, double width, const Gauge& gauge, const Vec3& proxy)
+  NeighbourSearch(const SceneAtTime& now, double width, const Gauge& gauge, const Vec3& proxy)
       : now_(now), width_(width), gauge_(gauge), proxy_(proxy) {}
 
   void addTouched(const PlacedPlanes& planes, const ContactConstraint& constraint) {
@@ -224,7 +224,7 @@ class Search {
   bool complete_ = true;
 };
 
-void Search::addObjects() {
+void NeighbourSearch::addObjects() {
   const scene::SceneSnapshot& scene = *now_.scene;
   if (!scene.objectIndex || scene.objects.size() <= kFewObjects) {
     for (const auto& object : scene.objects) {
@@ -235,7 +235,8 @@ void Search::addObjects() {
   std::array<std::uint32_t, kMaxNeighbours> found{};
   std::size_t count = 0;
   const Affine& T_world_device = scene.workspace.T_world_device;
-  const double reach = (width_ + gauge_.radius) * kWiden * std::sqrt(T_world_device.linear().squaredNorm());
+  const double reach =
+      (width_ + gauge_.radius) * kQueryMargin * std::sqrt(T_world_device.linear().squaredNorm());
   scene.objectIndex->visitNear(T_world_device * proxy_, reach, [&](std::uint32_t i) noexcept {
     if (isTouched(scene.objects[i]->surface.stiffness_N_per_m)) return;
     if (count == found.size()) {
@@ -249,7 +250,7 @@ void Search::addObjects() {
   for (std::size_t k = 0; k < count; ++k) addObject(*scene.objects[found[k]]);
 }
 
-void Search::addObject(const scene::ObjectState& state) {
+void NeighbourSearch::addObject(const scene::ObjectState& state) {
   Neighbour* const n = neighbourOf(state.surface.stiffness_N_per_m);
   if (n == nullptr) return;
   PlacedObject placed;
@@ -259,7 +260,7 @@ void Search::addObject(const scene::ObjectState& state) {
   if (determinant == 0 || !std::isfinite(determinant)) return;
   placed.mirrored = determinant < 0;
   const Affine T_object_device = placed.T_device_object.inverse();
-  const double stretch = kWiden * T_object_device.linear().norm();
+  const double stretch = kQueryMargin * T_object_device.linear().norm();
   const auto reach = [&] { return (n->distance + gauge_.radius) * stretch; };
   state.mesh->index.visitNearest(T_object_device * proxy_, reach(), [&](std::uint32_t triangle) noexcept {
     if (visits_ == kMaxVisits) {
@@ -318,8 +319,8 @@ void limit(double stiffest, const Vec3& spring, BlendedSpring& out) {
   out.turn_N *= share;
 }
 
-void combine(const Search& search, const Gauge& gauge, const Width& width, const ContactSet& contactSet,
-             BlendedSpring& out) {
+void combine(const NeighbourSearch& search, const Gauge& gauge, const Width& width,
+             const ContactSet& contactSet, BlendedSpring& out) {
   double sum = 0;
   double weights = 0;
   double stiffest = 0;
@@ -367,7 +368,7 @@ BlendedSpring blendedSpring(const SceneAtTime& now, const PlacedPlanes& planes, 
   if (!(depth > 0)) return out;
   const Gauge gauge{contactSet.normal_m / depth, toolRadius_m};
   const Width width((contactSet.normal_m + contactSet.lateral_m).norm());
-  Search search(now, width.value, gauge, proxy);
+  NeighbourSearch search(now, width.value, gauge, proxy);
   for (int i = 0; i < contactSet.count; ++i) {
     search.addTouched(planes, contactSet.constraints[static_cast<std::size_t>(i)]);
   }
