@@ -33,8 +33,8 @@ class AsioLoop final : public Loop::Impl {
                                             const ConnectionOptions& options, const char* option) override;
   std::shared_ptr<UdpSocket::Impl> bind(const Endpoint& local) override;
 
-  /// How much one connection may read in its turn: the connections that send faster than they are read share the
-  /// buffer, so that a short message waits for about one buffer, however many of them there are.
+  /// How much one connection may read in its turn: the connections that send faster than they are read share
+  /// the buffer, so that a short message waits for about one buffer, however many of them there are.
   std::size_t readShare() const noexcept {
     return std::max(kSmallestRead, kReadBufferBytes / std::max<std::size_t>(1, busyReaders));
   }

@@ -130,7 +130,9 @@ TEST(HandFile, ReadsTheFilesOfOlderVersionsAndRemarksOnIt) {
 
 TEST(HandFile, IgnoresRepeatedAndLateRowsOfARecording) {
   const auto hand = HandFile::parse(
-      "device,time_ns,hip_x_m,hip_y_m,hip_z_m\nA,10,1,0,0\nA,20,2,0,0\nA,20,3,0,0\nA,15,4,0,0\nA,5,5,0,0\nA,30,6,0,0\n", "h");
+      "device,time_ns,hip_x_m,hip_y_m,hip_z_m\nA,10,1,0,0\nA,20,2,0,0\nA,20,3,0,0\nA,15,4,0,0\nA,5,5,0,0\nA,"
+      "30,6,0,0\n",
+      "h");
   EXPECT_EQ(hand->rows(), 3U);
   EXPECT_EQ(hand->duration(), 20);
   EXPECT_EQ(hand->at(20).position_m.x(), 6);
