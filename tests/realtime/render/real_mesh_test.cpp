@@ -275,7 +275,7 @@ TEST_P(RealMeshTest, exploring_hand_neither_tunnels_nor_sticks) {
   const Case& c = GetParam();
   const auto path = std::filesystem::path(HAPTICD_TESTDATA) / "meshes" / (std::string(c.name) + ".obj");
   const int ticks = kTicks;
-  const Verdict v = explore(scan(path, c.splits), c.mu, c.radius_m, ticks, 5);
+  const Verdict v = explore(scan(path, c.splits), c.mu, c.radius_m, ticks, c.radius_m > 0 ? 25 : 5);
   std::cout << v << '\n';
   EXPECT_GT(v.touching, ticks / 40);
   expectRight(v, c.radius_m);

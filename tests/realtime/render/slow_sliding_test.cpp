@@ -4,6 +4,7 @@
 #include <random>
 
 #include "meshes.h"
+#include "reduced.h"
 #include "scene_fixture.h"
 
 namespace hapticd::realtime::fixture {
@@ -114,7 +115,7 @@ TEST(SlowSliding, tremor_does_not_move_the_proxy) {
     for (int i = 0; i < 1000; ++i) tick();
     const Vec3 held = loop.now().proxy_m;
     double drift = 0;
-    for (int i = 0; i < 1'000'000; ++i) {
+    for (int i = 0; i < reduced(1'000'000); ++i) {
       tick();
       drift = std::max(drift, (loop.now().proxy_m - held).norm());
     }
@@ -130,7 +131,7 @@ TEST(SlowSliding, cycles_give_no_energy) {
   const auto uniform = [&](double a, double b) {
     return std::uniform_real_distribution<double>(a, b)(random);
   };
-  for (int i = 0; i < 60; ++i) {
+  for (int i = 0; i < reduced(60, 6); ++i) {
     RenderOptions options;
     options.stribeckSpeed_m_per_s = i % 2 == 0 ? 0 : uniform(1e-4, 1e-2);
     LoopAtRate loop(scene.snapshot(), kRates_Hz[i % 3], options);

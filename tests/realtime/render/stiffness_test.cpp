@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "meshes.h"
+#include "reduced.h"
 #include "scene_fixture.h"
 
 namespace hapticd::realtime::fixture {
@@ -130,7 +131,7 @@ std::vector<bool> stepsOf(Hand& hand, const Path& path, int steps, double stiffe
   return fine;
 }
 
-constexpr int kSteps = 100'000;
+constexpr int kSteps = reduced(100'000);
 
 // The review's groove: circles of 1 mm, 3 mm below the crease. A sum of K_i d_i n_i gave 4.9 and 10.6 mJ.
 TEST_F(StiffnessTest, unequal_groove_gives_no_energy) {
@@ -167,7 +168,7 @@ TEST_F(StiffnessTest, force_in_a_narrow_groove_is_at_most_that_of_the_stiffer_wa
 // Pairs and triples of planes at random: the path passes faces, edges, corners and free space.
 TEST_F(StiffnessTest, closed_paths_over_random_planes_do_no_work) {
   double worst = 0;
-  for (int i = 0; i < 12; ++i) {
+  for (int i = 0; i < reduced(12, 2); ++i) {
     scene = SceneFixture();
     double stiffest = 0;
     for (int k = 0; k < 2 + i % 2; ++k) {
@@ -198,7 +199,7 @@ TEST_F(StiffnessTest, closed_paths_over_random_planes_do_no_work) {
 // The same with plates that pass through each other, in transforms of their own.
 TEST_F(StiffnessTest, closed_paths_over_random_plates_do_no_work) {
   double worst = 0;
-  for (int i = 0; i < 6; ++i) {
+  for (int i = 0; i < reduced(6, 2); ++i) {
     scene = SceneFixture();
     double stiffest = 0;
     for (int k = 0; k < 2 + i % 2; ++k) {
@@ -229,7 +230,7 @@ TEST_F(StiffnessTest, closed_paths_over_random_plates_do_no_work) {
 
 // A convex edge takes energy, as with equal surfaces, and gives none: also from soft to stiff.
 TEST_F(StiffnessTest, convex_edges_give_no_energy) {
-  for (int i = 0; i < 20; ++i) {
+  for (int i = 0; i < reduced(20, 2); ++i) {
     scene = SceneFixture();
     const double angle = uniform(0.01, 1.2);
     addPlate(Vec3::Zero(), -Vec3::UnitX(), Vec3::UnitZ(), stiffness());
@@ -338,7 +339,7 @@ TEST_F(StiffnessTest, nearly_coplanar_faces_act_as_one) {
 
 // No more than the stiffest spring, whatever meets: plates, planes, boxes, point and ball.
 TEST_F(StiffnessTest, force_never_exceeds_the_stiffest_spring) {
-  for (int i = 0; i < 40; ++i) {
+  for (int i = 0; i < reduced(40, 6); ++i) {
     scene = SceneFixture();
     scene.faces = i % 3 == 0 ? scene::TouchableFaces::both : scene::TouchableFaces::front;
     double stiffest = 0;
@@ -397,7 +398,7 @@ TEST_F(StiffnessTest, friction_on_a_seam_gives_no_energy) {
     scene = SceneFixture();
     addPlate(Vec3::Zero(), -Vec3::UnitX(), Vec3::UnitZ(), 100, 0.04, mu);
     addPlate(Vec3::Zero(), Vec3::UnitX(), Vec3::UnitZ(), 1000, 0.04, mu);
-    for (int i = 0; i < 6; ++i) {
+    for (int i = 0; i < reduced(6, 2); ++i) {
       Hand hand(scene.snapshot());
       hand.at({0, 0, 0.01});
       const ClosedPath loop({uniform(-1e-3, 1e-3), 0, -2e-3}, i % 2 == 0 ? 2e-3 : 3e-4,
@@ -405,9 +406,9 @@ TEST_F(StiffnessTest, friction_on_a_seam_gives_no_energy) {
       hand.to(loop.at(0));
       for (int k = 0; k < 2; ++k)
         turn(
-            hand, [&](double s) { return loop.at(s); }, 20'000);
+            hand, [&](double s) { return loop.at(s); }, reduced(20'000));
       EXPECT_LE(turn(
-                    hand, [&](double s) { return loop.at(s); }, 20'000)
+                    hand, [&](double s) { return loop.at(s); }, reduced(20'000))
                     .work,
                 1e-8)
           << mu << " " << i;
