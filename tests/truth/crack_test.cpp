@@ -190,6 +190,32 @@ TEST_P(CrackTest, nothing_passes_a_seam) {
   EXPECT_EQ(through, 0) << "of " << seamCount() << "; first: " << first;
 }
 
+// Vertices 200 m from the origin of their object, as of a building in its surveyor's coordinates: floats are 15 um apart
+// there, and the plates meet at the device's origin.
+TEST(CoarseFloatsTest, nothing_passes_a_seam_of_coarse_floats) {
+  constexpr double kSpacing_m = 0x1p-16;
+  int through = 0;
+  for (int seed = 1; seed <= seamCount() / 5; ++seed) {
+    Dice dice(static_cast<std::uint64_t>(seed));
+    Seam seam;
+    seam.bend = dice.uniform(0.1, 1.4);
+    const Point along(0, 2 * kHalf_m, 0);
+    const Point right = kHalf_m * Point(std::cos(seam.bend), 0, std::sin(seam.bend));
+    Shape both = patch({-kHalf_m, -kHalf_m, 0}, {kHalf_m, 0, 0}, along, 2, dice.integer(1, 7), 0.3, dice);
+    both.append(patch({0, -kHalf_m, 0}, right, along, 2, dice.integer(1, 7), 0.3, dice));
+    seam.walls = {{-Point::UnitZ(), 0}, {Point(std::sin(seam.bend), 0, -std::cos(seam.bend)), 0}};
+    seam.bottom = (seam.walls[0].normal + seam.walls[1].normal).normalized();
+    Pose pose;
+    pose.position_m = 200 * dice.direction();
+    pose.rotation = dice.rotation();
+    seam.trial.objects.push_back(bake(both, pose));
+    seam.trial.objects.back().material.stiffness_N_per_m = 1000;
+    makeHand(seam, Parts::junction, dice);
+    if (farthestBeyond(seam) > 2 * 4 * kSpacing_m) ++through;
+  }
+  EXPECT_EQ(through, 0);
+}
+
 // A hole in a plate: a slit, or a square of four plates around it.
 Trial plateWithHole(double width, bool square, Dice& dice) {
   const double inner = 0.5 * width;

@@ -39,7 +39,7 @@ double exitOf(const Vec3& p, const Vec3& d, const Vec3& centre, double radius) {
   return std::clamp((root - b) / a, 0.0, 1.0);
 }
 
-// Four units in the last place of a float of this size.
+// Four units in the last place of floats of this size.
 double gapToleranceOf(double largestCoordinate_m) {
   constexpr double kFloatSpacing = 0x1p-23;
   return std::clamp(4 * kFloatSpacing * largestCoordinate_m, kGapTolerance_m, kLargestGapTolerance_m);
@@ -230,7 +230,9 @@ bool ContactQuery::place(const ObjectState& state, PlacedObject& placed) const n
   const double extent = std::max(farthest.maxCoeff(), kSmallestObject_m);
   const double size = 0.5 * box.extents().maxCoeff() / placed.stretch;
   placed.skin = std::max(std::min(kRelativeSkin * extent, kPadShare * size), kRoundingFloor * extent);
-  placed.radius = std::max(toolRadius_, 0.5 * gapToleranceOf(extent));
+  // Vertices are floats in the frame of the object: its placement rounds nothing.
+  const Vec3 largest = linear.cwiseAbs() * box.min.cwiseAbs().cwiseMax(box.max.cwiseAbs());
+  placed.radius = std::max(toolRadius_, 0.5 * gapToleranceOf(largest.maxCoeff()));
   return std::isfinite(placed.skin);
 }
 
