@@ -1,5 +1,9 @@
 #include "scene/object_checks.h"
 
+#include <algorithm>
+#include <sstream>
+
+#include "geometry/gap_tolerance.h"
 #include "geometry/mesh_check.h"
 
 namespace hapticd::scene {
@@ -17,6 +21,20 @@ std::string joined(const std::vector<std::string>& sentences) {
   std::string text;
   for (const std::string& sentence : sentences) text += (text.empty() ? "" : " ") + sentence;
   return text;
+}
+
+// Empty where the floats of the vertices are fine enough for the gap tolerance.
+std::string describeCoarseFloats(const std::vector<Vec3f>& vertices, double metresPerUnit) {
+  double largest = 0;
+  for (const Vec3f& v : vertices) largest = std::max(largest, static_cast<double>(v.cwiseAbs().maxCoeff()));
+  const double tolerance_m = geometry::fourFloatSteps(largest) * metresPerUnit;
+  if (!(tolerance_m > geometry::kLargestGapTolerance_m)) return {};
+  std::ostringstream text;
+  text << "Coordinates are as large as " << largest << ", where four steps of a float are "
+       << tolerance_m * 1e6 << " um of the device: a hand may slip through seams with gaps above "
+       << geometry::kLargestGapTolerance_m * 1e6
+       << " um. Send vertices near the origin of their object, and place the object by its position.";
+  return text.str();
 }
 
 }  // namespace
@@ -68,6 +86,8 @@ void MeshChecks::start(const Pending& check, const Subject& subject, Nanos begin
   const auto vertices = latestVertices(*subject.geometry);
   const auto& triangles = subject.geometry->triangles;
   std::vector<std::string> sentences = geometry::describe(geometry::checkMesh(*vertices, subject.asSent));
+  if (std::string coarse = describeCoarseFloats(*vertices, subject.metresPerUnit); !coarse.empty())
+    sentences.push_back(std::move(coarse));
   search_ = Search{check.object, check.topology, vertices, triangles,
                    geometry::CrossingSearch(*vertices, *triangles)};
   if (slice(begin)) {

@@ -25,6 +25,7 @@ class MeshChecks {
     std::shared_ptr<const MeshGeometry> geometry;
     /// Triangles as the client numbers them, of which some may lack corners.
     std::span<const Triangle> asSent;
+    double metresPerUnit = 1;  ///< of its coordinates, in the device frame
   };
   /// The mesh of an object while its shape is that topology; nothing when it has changed or gone.
   using Find = std::function<std::optional<Subject>(std::int32_t object, std::uint64_t topology)>;

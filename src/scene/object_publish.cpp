@@ -102,11 +102,15 @@ void ObjectTable::commitMeshes(Nanos now, NoticeBoard& board, std::vector<Notice
   edited_ = std::move(later);
 }
 
+double ObjectTable::metresPerUnit(const Object& object) const {
+  return object.motion.destination().linear().colwise().norm().maxCoeff() / worldUnitsPerMetre_;
+}
+
 void ObjectTable::commitMesh(Object& object, Nanos now, const std::function<Nanos()>& clock) {
   const std::uint64_t topology = object.geometry ? object.geometry->topology : 0;
-  const double metresPerUnit =
-      object.motion.destination().linear().colwise().norm().maxCoeff() / worldUnitsPerMetre_;
-  const auto shortest = [metresPerUnit](double distance) { return shortestSweep(distance * metresPerUnit); };
+  const auto shortest = [scale = metresPerUnit(object)](double distance) {
+    return shortestSweep(distance * scale);
+  };
   object.geometry = object.mesh.commit(clock, ++lastTopology_, shortest);
   object.stateChanged = true;
   queue(object);
@@ -121,7 +125,8 @@ void ObjectTable::checkMeshes(Nanos now, NoticeBoard& board, std::vector<Notice>
     if (object == nullptr || !object->geometry || object->geometry->topology != topology) return std::nullopt;
     const MeshDraft& mesh = object->mesh;
     return MeshChecks::Subject{object->geometry,
-                               mesh.indexed() ? mesh.triangles() : *object->geometry->triangles};
+                               mesh.indexed() ? mesh.triangles() : *object->geometry->triangles,
+                               metresPerUnit(*object)};
   };
   const auto report = [&](std::int32_t id, const std::string& text) {
     const Call call{find(id)->meshSetBy, now, false, board, out};

@@ -150,6 +150,7 @@ class ObjectTable {
   /// World from the object's frame, measured in world units; the chain of parents without a mesh's own part.
   Affine frameOf(const Object& object) const;
   void commitMeshes(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
+  double metresPerUnit(const Object& object) const;
   void commitMesh(Object& object, Nanos now, const std::function<Nanos()>& clock);
   void checkMeshes(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   void updateMotion(Object& object, Nanos now);

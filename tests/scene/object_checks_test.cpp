@@ -49,6 +49,21 @@ TEST_F(ObjectChecks, TrianglesThatRunThroughEachOtherAreToldWithTheRest) {
       "is out of reach; the mesh was left as it is.");
 }
 
+// World units are millimetres.
+TEST_F(ObjectChecks, CoordinatesThatAreTooLargeForFloatsAreReported) {
+  const auto upload = [&](float far) {
+    restart([] { return Nanos{0}; });
+    say(SetVertices{0, 0, {Vec3f(far, 0, 0), Vec3f(far + 64, 0, 0), Vec3f(far, 64, 0)}});
+    run(1'000 * kMillisecond);
+    return onlyNotice(Notice::Severity::normal);
+  };
+  EXPECT_THAT(upload(1e5F), Not(HasSubstr("float")));
+  EXPECT_THAT(
+      upload(4e5F),
+      AllOf(HasSubstr("Coordinates are as large as 400064, where four steps of a float are 190.765 um"),
+            HasSubstr("place the object by its position")));
+}
+
 TEST_F(ObjectChecks, TouchingTrianglesAreNoCrossing) {
   say(SetVertices{
       0,

@@ -190,8 +190,8 @@ TEST_P(CrackTest, nothing_passes_a_seam) {
   EXPECT_EQ(through, 0) << "of " << seamCount() << "; first: " << first;
 }
 
-// Vertices 200 m from the origin of their object, as of a building in its surveyor's coordinates: floats are 15 um apart
-// there, and the plates meet at the device's origin.
+// Vertices 200 m from the origin of their object, as of a building in its surveyor's coordinates: floats are
+// 15 um apart there, and the plates meet at the device's origin.
 TEST(CoarseFloatsTest, nothing_passes_a_seam_of_coarse_floats) {
   constexpr double kSpacing_m = 0x1p-16;
   int through = 0;

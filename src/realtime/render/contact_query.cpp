@@ -39,12 +39,6 @@ double exitOf(const Vec3& p, const Vec3& d, const Vec3& centre, double radius) {
   return std::clamp((root - b) / a, 0.0, 1.0);
 }
 
-// Four units in the last place of floats of this size.
-double gapToleranceOf(double largestCoordinate_m) {
-  constexpr double kFloatSpacing = 0x1p-23;
-  return std::clamp(4 * kFloatSpacing * largestCoordinate_m, kGapTolerance_m, kLargestGapTolerance_m);
-}
-
 }  // namespace
 
 scene::Corners PlacedObject::corners(std::uint32_t triangle, Nanos now) const noexcept {
@@ -232,7 +226,7 @@ bool ContactQuery::place(const ObjectState& state, PlacedObject& placed) const n
   placed.skin = std::max(std::min(kRelativeSkin * extent, kPadShare * size), kRoundingFloor * extent);
   // Vertices are floats in the frame of the object: its placement rounds nothing.
   const Vec3 largest = linear.cwiseAbs() * box.min.cwiseAbs().cwiseMax(box.max.cwiseAbs());
-  placed.radius = std::max(toolRadius_, 0.5 * gapToleranceOf(largest.maxCoeff()));
+  placed.radius = std::max(toolRadius_, 0.5 * geometry::gapToleranceOf(largest.maxCoeff()));
   return std::isfinite(placed.skin);
 }
 

@@ -11,6 +11,7 @@
 #include <cstdint>
 
 #include "base/time.h"
+#include "geometry/gap_tolerance.h"
 #include "realtime/render/facet_cache.h"
 #include "realtime/render/object_distances.h"
 #include "realtime/render/placed_planes.h"
@@ -23,12 +24,8 @@ using geometry::Affine;
 
 /// Triangles that a tick examines. A count and not a time, so that the clock never changes a force.
 inline constexpr int kMaxVisits = 8192;
-/// Faces whose gaps are narrower than this are impassable, so the point tool touches them as a ball of half
-/// the width. Exports and assembled scenes leave such gaps where faces do not share vertices.
-inline constexpr double kGapTolerance_m = 10e-6;
-/// The tolerance of an object far from the origin grows with the spacing of its float coordinates, up to
-/// this.
-inline constexpr double kLargestGapTolerance_m = 50e-6;
+using geometry::kGapTolerance_m;
+using geometry::kLargestGapTolerance_m;
 /// A pose that moves a part near the proxy farther is a jump.
 inline constexpr double kLongestMotion_m = 0.020;
 
