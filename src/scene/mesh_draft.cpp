@@ -5,6 +5,8 @@
 #include <cstring>
 #include <limits>
 
+#include "geometry/repeated_triangles.h"
+
 namespace hapticd::scene {
 namespace {
 
@@ -153,8 +155,11 @@ std::shared_ptr<MeshGeometry> MeshDraft::build(std::uint64_t topology) {
   const std::vector<Vec3f>& vertices = *mesh->vertices;
   // Only the list as sent shows which triangles lack a corner; the published one has others in their place.
   const std::vector<Triangle>& triangles = indexed_ ? triangles_.read() : *mesh->triangles;
-  mesh->index = SpatialIndex::build(static_cast<std::uint32_t>(triangles.size()),
-                                    [&](std::uint32_t id) { return boxOfTriangle(triangles[id], vertices); });
+  // What repeats a triangle cannot be felt apart from it, and would only cost time.
+  const std::vector<bool> repeated = geometry::repeatedTriangles(vertices, triangles);
+  mesh->index = SpatialIndex::build(static_cast<std::uint32_t>(triangles.size()), [&](std::uint32_t id) {
+    return !repeated.empty() && repeated[id] ? Box{} : boxOfTriangle(triangles[id], vertices);
+  });
   return mesh;
 }
 

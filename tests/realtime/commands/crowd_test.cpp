@@ -6,6 +6,7 @@
 #include <random>
 
 #include "loop.h"
+#include "reduced.h"
 
 namespace hapticd::realtime::commands {
 namespace {
@@ -154,6 +155,26 @@ TEST_P(Crowd, moving_sheet_in_a_crowd_takes_the_hand_along) {
   }
   EXPECT_NEAR(loop.out.force_N.y(), 0.004 * kStiffness_N_per_m, 1e-3);
   EXPECT_EQ(status, 0U);
+}
+
+// More copies of one face than a tick examines: the index has it once.
+TEST(Copies, of_one_face_are_felt_as_one) {
+  Loop loop;
+  std::vector<Vec3f> copies;
+  for (int i = 0; i < reduced(20'000, 10'000); ++i) {
+    const std::vector<Vec3f> sheet = sheetTriples(60);
+    copies.insert(copies.end(), sheet.begin(), sheet.end());
+  }
+  loop.add(0, std::move(copies));
+  Vec3 hip(0.001, 0.001, 0.002);
+  loop.rest(hip, toNanos(1));
+  for (int i = 1; i <= 500; ++i) {
+    hip.y() = 0.001 - 0.003 * std::min(1.0, i / 300.0);
+    loop.now += kMs;
+    loop.render(hip, kMs);
+    ASSERT_EQ(loop.out.status, 0U) << i;
+  }
+  EXPECT_NEAR(loop.out.force_N.y(), 0.002 * kStiffness_N_per_m, 1e-3);
 }
 
 }  // namespace
