@@ -1,5 +1,5 @@
-// A simulated hand presses on a wall that a client renders across a network: how stiff may the wall be? For the
-// tests and for the benchmark that prints the table.
+// A simulated hand presses on a wall that a client renders across a network: how stiff may the wall be? For
+// the tests and for the benchmark that prints the table.
 #pragma once
 
 #include <cstdint>
