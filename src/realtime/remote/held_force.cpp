@@ -31,7 +31,6 @@ Vec3 HeldForceLaw::target(const HeldForce& wanted, Nanos now) const noexcept {
 
 // Cuts the part along the velocity when the tank is empty; the part that brakes or guides stays.
 Vec3 HeldForceLaw::withinEnergy(const Vec3& force_N, const Vec3& velocity_m_per_s, double step_s) noexcept {
-  if (tank_.energy_J() <= 0) spent_ = true;
   if (tank_.energy_J() >= std::min(kResume_J, tank_.budget().capacity_J)) spent_ = false;
   cut_ = std::clamp(cut_ + (spent_ ? step_s : -step_s) / kCutTime_s, 0.0, 1.0);
   const double speed = velocity_m_per_s.norm();
@@ -50,6 +49,7 @@ void HeldForceLaw::step(const HeldForce& wanted, const Vec3& hip_m, const Vec3& 
   const double work = force_N_.dot(hip_m - lastHip_m_);
   lastHip_m_ = hip_m;
   tank_.give(work > 0 ? work : work * guardGain);
+  if (tank_.energy_J() <= 0) spent_ = true;
   tank_.refill(step_s);
 
   const Vec3 goal = withinEnergy(target(wanted, now), velocity_m_per_s, step_s);

@@ -7,9 +7,13 @@
 namespace hapticd::realtime {
 namespace {
 
-// Of the 0.3 N/ms, so that friction, which follows the normal force, stays within them, too.
+// Of the 0.3 N/ms. One contact leaves a rest for friction, which follows the normal force. Several share
+// less, because in a corner the force changes faster than what each face demands; a fade and corrections
+// share it, too.
 constexpr double kCorrection_N_per_s = 0.8 * kRemoteRate_N_per_s;
-constexpr double kFade_N_per_s = 0.8 * kRemoteRate_N_per_s;
+constexpr double kShared_N_per_s = 0.45 * kRemoteRate_N_per_s;
+constexpr double kFade_N_per_s = 0.4 * kRemoteRate_N_per_s;
+constexpr double kBesideFade_N_per_s = 0.25 * kRemoteRate_N_per_s;
 constexpr double kLongestAge_s = 0.2;  // a surface moves on no longer than this without an update
 constexpr int kSweeps = 40;
 constexpr double kConverged_N = 1e-7;
@@ -63,13 +67,22 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
   if (!any_) return Vec3::Zero();
   fadeOut(now, step_s);
 
-  int inForce = 0;
-  for (const Slot& slot : slots_) inForce += slot.used && slot.demand_N > 0;
-  const double budget_N = kCorrection_N_per_s * step_s / std::max(inForce, 1);
-  held_ = false;
+  int changing = 0;
+  bool fading = resumed_;
+  resumed_ = false;
   for (Slot& slot : slots_) {
     if (!slot.used) continue;
     locate(slot, hand, now);
+    changing += slot.fade == 0 && (slot.demand_N > 0 || slot.depth_m > slot.shift_m);
+    fading = fading || (slot.fade > 0 && slot.demand_N > 0);
+  }
+  const double budget_N = (fading         ? kBesideFade_N_per_s
+                           : changing > 1 ? kShared_N_per_s
+                                          : kCorrection_N_per_s) *
+                          step_s / std::max(changing, 1);
+  held_ = false;
+  for (Slot& slot : slots_) {
+    if (!slot.used) continue;
     if (slot.fade == 0) correct(slot, hand, budget_N, step_s);
     demand(slot, hand, now);
   }
@@ -120,10 +133,12 @@ void RemoteContacts::take(const RemoteContactSet& set, const RemoteHand& hand, N
 void RemoteContacts::replace(Slot& slot, const RemoteContact& contact, const RemoteContactSet& set,
                              const RemoteHand& hand, Nanos now) noexcept {
   const bool known = slot.used;
+  const double stiffness = slot.contact.stiffness_N_per_m;
   double spring_N = 0;
   Vec3 normal = contact.normal;
   if (known) {
     locate(slot, hand, now);
+    resumed_ = resumed_ || slot.fade > 0;
     spring_N = gain(slot, now) * slot.contact.stiffness_N_per_m * std::max(0.0, slot.depth_m);
     normal = slot.normal;
   } else {
@@ -147,6 +162,8 @@ void RemoteContacts::replace(Slot& slot, const RemoteContact& contact, const Rem
     slot.shift_m = std::min(0.0, -slot.depth_m);
   } else {
     slot.shift_m = spring_N / contact.stiffness_N_per_m - slot.depth_m;
+    slot.anchor_m =
+        hand.position_m + stiffness / contact.stiffness_N_per_m * (slot.anchor_m - hand.position_m);
     slot.turn = rotationVector(slot.normal, normal);
   }
 }
@@ -208,7 +225,7 @@ void RemoteContacts::correct(Slot& slot, const RemoteHand& hand, double budget_N
     slot.depth_m += moved_m;
     const double after_N = c.stiffness_N_per_m * std::max(0.0, slot.depth_m);
     if (!c.yields) corrections_.give(0.5 * (before_N + after_N) * moved_m);
-    budget_N -= std::abs(after_N - before_N);
+    budget_N = std::max(0.0, budget_N - std::abs(after_N - before_N));
   }
   const double force_N = slot.demand_N;
   const double angle = slot.turn.norm();

@@ -72,7 +72,8 @@ class RemoteContacts {
   std::array<Slot, kSlots> slots_;
   std::uint64_t taken_ = 0;
   bool any_ = false;
-  double pressed_N = 0;  // sum of the normal forces in the last tick
+  bool resumed_ = false;  // an update came during a fade
+  double pressed_N = 0;   // sum of the normal forces in the last tick
   EnergyTank corrections_{EnergyBudget{}};
   bool held_ = false;  // a correction waited for energy in this tick
 };

@@ -190,7 +190,7 @@ TEST(RemoteContacts, LifeIncludesTheFade) {
     const double force = rig.step().y();
     EXPECT_LE(force, last + kExact_N);
     EXPECT_GE(force, last - kRate_N_per_ms);
-    if (rig.now <= received + 40 * kMs) {
+    if (rig.now <= received + 30 * kMs) {
       EXPECT_NEAR(force, 3.2, 1e-6);
     }
     last = force;
@@ -216,7 +216,7 @@ TEST(RemoteContacts, AbsentOnesFadeAtOnce) {
     EXPECT_NEAR(rig.force.y(), 1.6, 1e-6);
     last = rig.force.x();
   }
-  EXPECT_LT(ms, 10);
+  EXPECT_LT(ms, 20);
 }
 
 TEST(RemoteContacts, SurfacesOnTopOfEachOtherAreAsStiffAsOne) {
@@ -311,7 +311,7 @@ TEST(RemoteContacts, UnstatedMotionIsPaidFromTheTank) {
     EXPECT_EQ(held, !yields);
   }
   EXPECT_GT(worked[1], 0.06);
-  EXPECT_LT(worked[0], 0.020 + 0.020 + 0.002);
+  EXPECT_LT(worked[0], 0.020 + 0.020 + 0.005) << "the start, the refill, and what the spring had stored";
 }
 
 struct Holding {
@@ -365,17 +365,20 @@ TEST(HeldForce, TankLimitsTheWorkAndTheBrakingPartStays) {
     const Vec3 before = h.out.heldForce_N;
     const Vec3 force = h.step();
     work += before.y() * 0.2e-3;
-    if (cutAt < 0 && h.out.energy_J <= 0) cutAt = ms;
+    if (cutAt < 0 && (h.out.status & kRemoteEnergySpent) != 0) cutAt = ms;
     if (cutAt >= 0 && zeroAt < 0 && std::abs(force.y()) < 1e-9) zeroAt = ms;
-    if (zeroAt >= 0) {
+    if (zeroAt == ms) {
       EXPECT_NEAR(force.x(), 1, 1e-9) << "across the motion nothing is cut";
     }
-    if (ms == 100) EXPECT_TRUE((h.out.status & kRemoteEnergySpent) != 0);
+    if (ms == 100) {
+      EXPECT_NE(h.out.status & kRemoteEnergySpent, 0U);
+    }
   }
   ASSERT_GE(cutAt, 0);
   ASSERT_GE(zeroAt, 0);
   EXPECT_LE(zeroAt - cutAt, 10);
-  EXPECT_LT(work, 0.020 + 2 * 0.020 + 0.020) << "the start, the refill of two seconds, and what a cut takes";
+  EXPECT_LT(work, 0.020 + 2 * 0.020 + 0.005)
+      << "the start, the refill of two seconds, and what one cut takes";
 }
 
 TEST(HeldForce, WhatTheHandReturnsRefillsTheTank) {
