@@ -16,14 +16,15 @@ constexpr double kFade_N_per_s = 0.4 * kRemoteRate_N_per_s;
 constexpr double kBesideFade_N_per_s = 0.25 * kRemoteRate_N_per_s;
 constexpr double kLongestAge_s = 0.2;  // a surface moves on no longer than this without an update
 constexpr int kSweeps = 40;
-constexpr double kConverged_N = 1e-7;
+constexpr double kConverged_N = 1e-6;
 constexpr double kLateral = 0.5;        // share of the stiffness that holds a sticking point
 constexpr double kStick = 0.9;          // of the dynamic bound: sliding ends below it
 constexpr double kSlow_m_per_s = 0.01;  // below it the damping coefficient may change as at this speed
 
 Vec3 rotatedBy(const Vec3& rotation, const Vec3& v) noexcept {
-  const double angle = rotation.norm();
-  if (angle < 1e-12) return v;
+  const double square = rotation.squaredNorm();
+  if (square < 1e-24) return v;
+  const double angle = std::sqrt(square);
   const Vec3 axis = rotation / angle;
   const double cosine = std::cos(angle);
   return cosine * v + std::sin(angle) * axis.cross(v) + (1 - cosine) * axis.dot(v) * axis;
@@ -55,7 +56,7 @@ double towards(double value, double goal, double force_N, double& budget_N) noex
 
 void RemoteContacts::reset() noexcept {
   for (Slot& slot : slots_) slot.used = false;
-  any_ = false;
+  top_ = 0;
   pressed_N = 0;
 }
 
@@ -64,13 +65,13 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
   out.contactsTime = newest.clientTime;
   corrections_.refill(step_s);
   if (newest.number != taken_) take(newest, hand, now);
-  if (!any_) return Vec3::Zero();
+  if (top_ == 0) return Vec3::Zero();
   fadeOut(now, step_s);
 
   int changing = 0;
   bool fading = resumed_;
   resumed_ = false;
-  for (Slot& slot : slots_) {
+  for (Slot& slot : inUse()) {
     if (!slot.used) continue;
     locate(slot, hand, now);
     changing += slot.fade == 0 && (slot.demand_N > 0 || slot.depth_m > slot.shift_m);
@@ -81,13 +82,13 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
                                           : kCorrection_N_per_s) *
                           step_s / std::max(changing, 1);
   held_ = false;
-  for (Slot& slot : slots_) {
+  for (Slot& slot : inUse()) {
     if (!slot.used) continue;
     if (slot.fade == 0) correct(slot, hand, budget_N, step_s);
     demand(slot, hand, now);
   }
   Vec3 force = share(hand);
-  for (Slot& slot : slots_) {
+  for (Slot& slot : inUse()) {
     if (!slot.used) continue;
     const Vec3 tangential = friction(slot, hand, pressed_N, step_s);
     force += tangential;
@@ -103,25 +104,25 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
 
 RemoteContacts::Slot* RemoteContacts::slotFor(std::int32_t id) noexcept {
   Slot* unused = nullptr;
-  for (Slot& slot : slots_) {
+  for (Slot& slot : inUse()) {
     if (slot.used && slot.contact.id == id) return &slot;
     if (!slot.used && unused == nullptr) unused = &slot;
   }
+  if (unused == nullptr && top_ < kSlots) unused = &slots_[top_++];
   return unused;
 }
 
 // A contact without a slot waits for the next update: all slots fade out within the longest life.
 void RemoteContacts::take(const RemoteContactSet& set, const RemoteHand& hand, Nanos now) noexcept {
   taken_ = set.number;
-  for (Slot& slot : slots_) slot.stated = false;
+  for (Slot& slot : inUse()) slot.stated = false;
   for (std::uint32_t i = 0; i < set.count; ++i) {
     Slot* slot = slotFor(set.contacts[i].id);
     if (slot != nullptr) replace(*slot, set.contacts[i], set, hand, now);
   }
-  any_ = any_ || set.count > 0;
   double leaving_N = 0;
-  for (const Slot& slot : slots_) leaving_N += slot.used && !slot.stated ? slot.demand_N : 0;
-  for (Slot& slot : slots_) {
+  for (const Slot& slot : inUse()) leaving_N += slot.used && !slot.stated ? slot.demand_N : 0;
+  for (Slot& slot : inUse()) {
     if (!slot.used || slot.stated || slot.fade > 0) continue;
     const Nanos length = std::max<Nanos>(base::toNanos(leaving_N / kFade_N_per_s), 1);
     slot.end = std::min(slot.end, now + length);
@@ -171,8 +172,8 @@ void RemoteContacts::replace(Slot& slot, const RemoteContact& contact, const Rem
 // The fade of all contacts that end together takes the time in which their force may fall.
 void RemoteContacts::fadeOut(Nanos now, double step_s) noexcept {
   const Nanos needed = base::toNanos(pressed_N / kFade_N_per_s + step_s);
-  any_ = false;
-  for (Slot& slot : slots_) {
+  std::size_t top = 0;
+  for (Slot& slot : inUse()) {
     if (!slot.used) continue;
     const Nanos left = slot.end - now;
     if (left <= 0) {
@@ -180,8 +181,9 @@ void RemoteContacts::fadeOut(Nanos now, double step_s) noexcept {
     } else if (slot.fade == 0 && left <= needed) {
       slot.fade = left;
     }
-    any_ = any_ || slot.used;
+    if (slot.used) top = static_cast<std::size_t>(&slot - slots_.data()) + 1;
   }
+  top_ = top;
 }
 
 double RemoteContacts::gain(const Slot& slot, Nanos now) noexcept {
@@ -193,10 +195,12 @@ void RemoteContacts::locate(Slot& slot, const RemoteHand& hand, Nanos now) noexc
   const double age_s = std::clamp(base::toSeconds(now - slot.statedAt), 0.0, kLongestAge_s);
   const SurfaceAt at = surfaceAt(slot.contact, age_s, hand.position_m);
   slot.depth_m = at.depth_m + slot.shift_m;
-  slot.stated_m_per_s = slot.contact.velocity_m_per_s +
-                        slot.contact.angularVelocity_rad_per_s.cross(hand.position_m - at.point_m);
-  const double speed = slot.stated_m_per_s.norm();
-  if (speed > kRemoteSpeed_m_per_s) slot.stated_m_per_s *= kRemoteSpeed_m_per_s / speed;
+  slot.stated_m_per_s = slot.contact.velocity_m_per_s;
+  if (!slot.contact.angularVelocity_rad_per_s.isZero(0)) {
+    slot.stated_m_per_s += slot.contact.angularVelocity_rad_per_s.cross(hand.position_m - at.point_m);
+    const double speed = slot.stated_m_per_s.norm();
+    if (speed > kRemoteSpeed_m_per_s) slot.stated_m_per_s *= kRemoteSpeed_m_per_s / speed;
+  }
   slot.normal = rotatedBy(slot.turn, at.normal);
 }
 
@@ -204,6 +208,16 @@ void RemoteContacts::locate(Slot& slot, const RemoteHand& hand, Nanos now) noexc
 // surface that rises against the hand does work on it: unless it yields, that work comes from the tank.
 void RemoteContacts::correct(Slot& slot, const RemoteHand& hand, double budget_N, double step_s) noexcept {
   const RemoteContact& c = slot.contact;
+  if (slot.depth_m - slot.shift_m <= 0 && slot.depth_m <= 0) {  // untouched: nothing can be felt
+    slot.depth_m -= slot.shift_m;
+    slot.shift_m = 0;
+    slot.turn.setZero();
+    slot.velocity = slot.stated_m_per_s;
+    slot.damping = c.damping_Ns_per_m;
+    slot.staticFriction = c.staticFriction;
+    slot.dynamicFriction = c.dynamicFriction;
+    return;
+  }
   budget_N /= 1 + slot.staticFriction;
   if (slot.shift_m != 0 && slot.depth_m <= 0) {  // free: up to the HIP at once
     const double stated_m = slot.depth_m - slot.shift_m;
@@ -250,11 +264,12 @@ void RemoteContacts::correct(Slot& slot, const RemoteHand& hand, double budget_N
 // Spring and damper. The damper exerts no more than the spring, so that a touch begins without a step and the
 // surface never pulls.
 void RemoteContacts::demand(Slot& slot, const RemoteHand& hand, Nanos now) noexcept {
-  slot.spring_N = slot.contact.stiffness_N_per_m * std::max(0.0, slot.depth_m);
+  slot.demand_N = slot.normal_N = 0;
+  if (slot.depth_m <= 0) return;
+  const double spring_N = slot.contact.stiffness_N_per_m * slot.depth_m;
   const double leaving = slot.normal.dot(hand.velocity_m_per_s - slot.velocity);
-  const double damper_N = std::clamp(slot.damping * leaving, -slot.spring_N, slot.spring_N);
-  slot.demand_N = gain(slot, now) * (slot.spring_N - damper_N);
-  slot.normal_N = 0;
+  const double damper_N = std::clamp(slot.damping * leaving, -spring_N, spring_N);
+  slot.demand_N = gain(slot, now) * (spring_N - damper_N);
 }
 
 // Each contact adds what the others do not already exert along its normal, so that surfaces on top of each
@@ -262,7 +277,7 @@ void RemoteContacts::demand(Slot& slot, const RemoteHand& hand, Nanos now) noexc
 Vec3 RemoteContacts::share(const RemoteHand& hand) noexcept {
   std::array<Slot*, kSlots> active;
   std::size_t count = 0;
-  for (Slot& slot : slots_) {
+  for (Slot& slot : inUse()) {
     if (slot.used && slot.demand_N > 0) active[count++] = &slot;
   }
   pressed_N = 0;

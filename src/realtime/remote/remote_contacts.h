@@ -5,6 +5,8 @@
 // limited rate. docs/remote-contacts.md derives it.
 #pragma once
 
+#include <span>
+
 #include "realtime/remote/energy_tank.h"
 #include "realtime/remote/remote_report.h"
 #include "realtime/remote/remote_shape.h"
@@ -52,7 +54,6 @@ class RemoteContacts {
     Vec3 stated_m_per_s = Vec3::Zero();  // velocity of the surface at the HIP, as stated
     double depth_m = 0;
     Vec3 normal = Vec3::UnitY();
-    double spring_N = 0;
     double demand_N = 0;  // normal force that this contact alone would exert
     double normal_N = 0;  // its share of the normal force of all
   };
@@ -60,6 +61,7 @@ class RemoteContacts {
   void take(const RemoteContactSet& set, const RemoteHand& hand, Nanos now) noexcept;
   void replace(Slot& slot, const RemoteContact& contact, const RemoteContactSet& set, const RemoteHand& hand,
                Nanos now) noexcept;
+  std::span<Slot> inUse() noexcept { return {slots_.data(), top_}; }
   Slot* slotFor(std::int32_t id) noexcept;
   void fadeOut(Nanos now, double step_s) noexcept;
   static double gain(const Slot& slot, Nanos now) noexcept;
@@ -71,7 +73,7 @@ class RemoteContacts {
 
   std::array<Slot, kSlots> slots_;
   std::uint64_t taken_ = 0;
-  bool any_ = false;
+  std::size_t top_ = 0;   // slots from here on are unused
   bool resumed_ = false;  // an update came during a fade
   double pressed_N = 0;   // sum of the normal forces in the last tick
   EnergyTank corrections_{EnergyBudget{}};
