@@ -15,7 +15,7 @@ namespace {
 using geometry::Vec3;
 using testing::HasSubstr;
 
-constexpr base::Nanos kMillisecond = 1'000'000;
+constexpr base::Nanos kStreamMillisecond = 1'000'000;
 
 class StreamedInputTest : public testing::Test {
  protected:
@@ -43,14 +43,14 @@ class StreamedInputTest : public testing::Test {
   StreamedInput::Slot slot_;
   StreamedInput streamed_{slot_, config(), {}, false};
   realtime::TickReport last_;
-  base::Nanos now_ = 5000 * kMillisecond;
+  base::Nanos now_ = 5000 * kStreamMillisecond;
 };
 
 TEST_F(StreamedInputTest, ConvertsToTheFrameOfTheDevice) {
   EXPECT_TRUE(send(floorAt(0.01)).taken);
   EXPECT_NEAR((first().point_m - Vec3(0, 0.01, 0)).norm(), 0, 1e-12) << "before the first tick: millimetres";
   EXPECT_NEAR((first().normal - Vec3::UnitY()).norm(), 0, 1e-12);
-  EXPECT_EQ(first().lifetime, 100 * kMillisecond);
+  EXPECT_EQ(first().lifetime, 100 * kStreamMillisecond);
   EXPECT_EQ(slot_.read().contacts.received, now_);
 
   // A world twice as large as the travel of the device, turned by 90 degrees about z.
@@ -90,17 +90,17 @@ TEST_F(StreamedInputTest, LimitsWhatIsTooFastTooLongOrTooStiff) {
   EXPECT_NEAR(first().stiffness_N_per_m, 0.999 * 5 / 0.0005, 1e-6);
   EXPECT_EQ(first().staticFriction, 1);
   EXPECT_EQ(first().dynamicFriction, 1);
-  EXPECT_EQ(first().lifetime, 100 * kMillisecond);
+  EXPECT_EQ(first().lifetime, 100 * kStreamMillisecond);
 }
 
 // Delay bounds the stiffness of what follows the hand, and of that alone.
 TEST_F(StreamedInputTest, AYieldingContactPaysForTheRoundTrip) {
   std::vector<double> n = floorAt(0);
   n[18] = 5000;
-  send(n, 1, 0, now_ - 40 * kMillisecond);
+  send(n, 1, 0, now_ - 40 * kStreamMillisecond);
   EXPECT_EQ(first().stiffness_N_per_m, 5000);
   n[23] = 1;
-  send(n, 1, 0, now_ - 40 * kMillisecond);
+  send(n, 1, 0, now_ - 40 * kStreamMillisecond);
   EXPECT_NEAR(first().stiffness_N_per_m, 0.999 * 5 / 0.0405, 1e-6);
   // Surfaces from two sides share the bound.
   n[23] = 0;
@@ -125,18 +125,18 @@ TEST_F(StreamedInputTest, RefusesWhatCannotBeUsedAndKeepsTheRest) {
   EXPECT_EQ(first().id, 2);
 
   for (const std::size_t at : {0U, 1U, 4U, 18U, 22U}) {
-    now_ += 2000 * kMillisecond;
+    now_ += 2000 * kStreamMillisecond;
     std::vector<double> bad = floorAt(0);
     bad[at] = std::numeric_limits<double>::quiet_NaN();
     EXPECT_EQ(send(bad).text.code, RefusalCode::streamInvalid) << at;
     EXPECT_EQ(slot_.read().contacts.count, 0U);
   }
-  now_ += 2000 * kMillisecond;
+  now_ += 2000 * kStreamMillisecond;
   EXPECT_FALSE(send({1, 2, 3}).taken);
   EXPECT_FALSE(hold({std::numeric_limits<double>::infinity(), 0, 0}).taken);
   std::vector<double> twice = floorAt(0);
   twice.insert(twice.end(), twice.begin(), twice.begin() + 24);
-  now_ += 2000 * kMillisecond;
+  now_ += 2000 * kStreamMillisecond;
   EXPECT_THAT(send(twice).text.text, HasSubstr("give each its own"));
   EXPECT_EQ(slot_.read().contacts.count, 1U);
   EXPECT_TRUE(send(twice).text.text.empty()) << "one text per second";
@@ -146,7 +146,7 @@ TEST_F(StreamedInputTest, OneClientStreamsUntilItsLastValueExpires) {
   EXPECT_TRUE(send(floorAt(0), 1).taken);
   EXPECT_EQ(send(floorAt(0), 2).text.code, RefusalCode::streamedByOther);
   EXPECT_TRUE(hold({1, 0, 0}, 2).taken) << "forces are another stream";
-  now_ += 100 * kMillisecond;
+  now_ += 100 * kStreamMillisecond;
   EXPECT_TRUE(send(floorAt(0), 2).taken);
   streamed_.clientGone(2);
   EXPECT_EQ(slot_.read().contacts.count, 0U);
@@ -157,14 +157,14 @@ TEST_F(StreamedInputTest, OneClientStreamsUntilItsLastValueExpires) {
 // The newest wins: a datagram that was overtaken changes nothing. Jitter of the way is not motion of the
 // surface.
 TEST_F(StreamedInputTest, OrdersByTheStampsOfTheClient) {
-  constexpr std::int64_t kFar = 77'000 * kMillisecond;
+  constexpr std::int64_t kFar = 77'000 * kStreamMillisecond;
   send(floorAt(0.01), 1, kFar);
-  now_ += 20 * kMillisecond;
-  send(floorAt(0.02), 1, kFar + 20 * kMillisecond);
-  EXPECT_FALSE(send(floorAt(0.03), 1, kFar + 10 * kMillisecond).taken);
+  now_ += 20 * kStreamMillisecond;
+  send(floorAt(0.02), 1, kFar + 20 * kStreamMillisecond);
+  EXPECT_FALSE(send(floorAt(0.03), 1, kFar + 10 * kStreamMillisecond).taken);
   EXPECT_NEAR(first().point_m.y(), 0.02, 1e-12);
-  now_ += 27 * kMillisecond;
-  send(floorAt(0.02), 1, kFar + 40 * kMillisecond);
+  now_ += 27 * kStreamMillisecond;
+  send(floorAt(0.02), 1, kFar + 40 * kStreamMillisecond);
   EXPECT_EQ(slot_.read().contacts.received, now_);
   EXPECT_NEAR(base::toSeconds(now_ - slot_.read().contacts.stated), 0.007, 0.0003) << "it was 7 ms late";
 }
