@@ -27,7 +27,8 @@ constexpr Nanos kUnknownRoundTrip = 100'000'000;  // of a client that does not m
 constexpr Nanos kLongestRoundTrip = 1'000'000'000;
 constexpr Nanos kDrift = 50'000;          // of the two clocks between two messages, at most
 constexpr double kRoundTripDecay = 0.99;  // of the largest one, with each message
-constexpr double kSoftest_N_per_m = 1;    // a softer contact is none
+constexpr std::int64_t kLatestStamp = 4'000'000'000'000'000'000;  // 127 years
+constexpr double kSoftest_N_per_m = 1;                            // a softer contact is none
 constexpr double kThinnest_m = 1e-4;
 constexpr double kLargest = 1e9;
 constexpr double kOpposing = -0.5;  // cosine between normals of contacts that may squeeze the hand
@@ -57,6 +58,11 @@ class ToDevice {
   geometry::Mat3 rotation_;
   double scale_ = 1;
 };
+
+// A stamp beyond any clock counts as none.
+std::int64_t stampOf(std::int64_t time) {
+  return time > -kLatestStamp && time < kLatestStamp ? time : 0;
+}
 
 Vec3 atMost(const Vec3& v, double limit) {
   const double size = v.norm();
@@ -118,7 +124,7 @@ bool StreamedInput::begin(Stream& stream, scene::ClientId client, std::int64_t t
     }
     stream = {};
   }
-  if (stream.client && time < stream.newest) return false;
+  if (stream.client && time != 0 && time < stream.newest) return false;
   if (!stream.client) stream.offset = received - time;
   stream.client = client;
   stream.newest = time;
@@ -172,8 +178,9 @@ std::string StreamedInput::keepWithinBounds(RemoteContactSet& set) const {
 StreamedInput::Answer StreamedInput::on(scene::ClientId client, const wire::RemoteContacts& message,
                                         const realtime::TickReport& last, Nanos received) {
   constexpr std::size_t kNumbers = wire::RemoteContacts::kNumbers;
+  const std::int64_t time = stampOf(message.time);
   Refusal text;
-  if (!begin(contacts_, client, message.time, received, text)) {
+  if (!begin(contacts_, client, time, received, text)) {
     if (!text.text.empty()) text.text = "Remote_Contacts " + text.text;
     return answer(client, Kind::contacts, received, false, std::move(text));
   }
@@ -192,9 +199,9 @@ StreamedInput::Answer StreamedInput::on(scene::ClientId client, const wire::Remo
 
   RemoteContactSet& set = input_.contacts;
   ++set.number;
-  set.clientTime = message.time;
+  set.clientTime = time;
   set.received = received;
-  set.stated = statedAt(contacts_, message.time, received);
+  set.stated = statedAt(contacts_, time, received);
   set.count = 0;
   contacts_.until = received;
   const ToDevice toDevice(last);
@@ -225,8 +232,9 @@ StreamedInput::Answer StreamedInput::on(scene::ClientId client, const wire::Remo
 
 StreamedInput::Answer StreamedInput::on(scene::ClientId client, const wire::HeldForce& message,
                                         const realtime::TickReport& last, Nanos received) {
+  const std::int64_t time = stampOf(message.time);
   Refusal text;
-  if (!begin(force_, client, message.time, received, text)) {
+  if (!begin(force_, client, time, received, text)) {
     if (!text.text.empty()) text.text = "Held_Force " + text.text;
     return answer(client, Kind::force, received, false, std::move(text));
   }
@@ -241,7 +249,7 @@ StreamedInput::Answer StreamedInput::on(scene::ClientId client, const wire::Held
     text.text = "Held_Force: this device renders no torque; only the force is felt";
   realtime::HeldForce& force = input_.force;
   ++force.number;
-  force.clientTime = message.time;
+  force.clientTime = time;
   force.received = received;
   force.lifetime = message.lifetime > 0 ? lifetimeOf(message.lifetime) : 0;
   force.force_N = ToDevice(last).direction(message.force.data());

@@ -154,6 +154,14 @@ TEST_F(StreamedInputTest, OneClientStreamsUntilItsLastValueExpires) {
   EXPECT_TRUE(send(floorAt(0), 1).taken);
 }
 
+TEST_F(StreamedInputTest, StampsBeyondAnyClockCountAsNone) {
+  EXPECT_TRUE(send(floorAt(0), 1, std::numeric_limits<std::int64_t>::min()).taken);
+  EXPECT_TRUE(send(floorAt(0), 1, std::numeric_limits<std::int64_t>::max()).taken);
+  EXPECT_TRUE(send(floorAt(0), 1, 0, std::numeric_limits<std::int64_t>::max()).taken);
+  EXPECT_EQ(slot_.read().contacts.clientTime, 0);
+  EXPECT_EQ(slot_.read().contacts.stated, now_);
+}
+
 // The newest wins: a datagram that was overtaken changes nothing. Jitter of the way is not motion of the
 // surface.
 TEST_F(StreamedInputTest, OrdersByTheStampsOfTheClient) {
