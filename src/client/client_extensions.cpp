@@ -25,7 +25,9 @@ void Client::Impl::greet() {
   offer.reset();
   answered = false;
   link.sendNow(sender, wire::QueryCapabilities{});
-  if (subscription) link.sendNow(sender, *subscription);
+  // Without a subscription the server sends what stock VRPN clients can bear: sensor 0 alone.
+  const auto usual = wire::Subscribe{static_cast<std::uint32_t>(Reports::usual), 0};
+  link.sendNow(sender, subscription.value_or(usual));
   if (heartbeats) link.sendNow(sender, wire::Heartbeat{1});
 }
 

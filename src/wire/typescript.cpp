@@ -104,6 +104,10 @@ std::string messagesAsTypeScript() {
   constant("REPORT_ANALOG", kReportAnalog);
   constant("REPORT_TICK", kReportTick);
   constant("REPORT_CONTACTS", kReportContacts);
+  constant("REPORT_HAND", kReportHand);
+  constant("REPORT_CONTACT_POINT", kReportContactPoint);
+  constant("REPORT_TOUCH_BUTTON", kReportTouchButton);
+  constant("REPORT_CONTACT_ANALOG", kReportContactAnalog);
   text += "/** Bits of Capabilities.features. */\n";
   constant("FEATURE_BULK_MESH", kFeatureBulkMesh);
   constant("FEATURE_BATCH", kFeatureBatch);

@@ -57,6 +57,8 @@ force_report = "normal"
 workspace_fit = "enclose"
 vibration_contact_unit = "Hz"
 vibration_motor_frame = "device"
+mirrors = true
+compat_mirrors = true
 scene_on_disconnect = "clear"
 [[device]]
 name = "Right"
