@@ -25,9 +25,7 @@ void Client::Impl::greet() {
   offer.reset();
   answered = false;
   link.sendNow(sender, wire::QueryCapabilities{});
-  // Without a subscription the server sends what stock VRPN clients can bear: sensor 0 alone.
-  const auto usual = wire::Subscribe{static_cast<std::uint32_t>(Reports::usual), 0};
-  link.sendNow(sender, subscription.value_or(usual));
+  if (subscription) link.sendNow(sender, *subscription);
   if (heartbeats) link.sendNow(sender, wire::Heartbeat{1});
 }
 

@@ -108,6 +108,25 @@ TEST_F(ReportsTest, StockClientsGetSensor0AndTheDevicesButtonsOnly) {
   EXPECT_EQ(client->count<wire::AnalogChannels>(), 0U);
 }
 
+// The question for the capabilities is the mark of a client that knows the extensions.
+TEST_F(ReportsTest, AClientThatAsksForCapabilitiesGetsAllSensorsUnlessItChooses) {
+  const auto client = peer();
+  client->send(wire::QueryCapabilities{});
+  EXPECT_TRUE(client->until([&] {
+    return client->last<wire::TrackerPosQuat>([](const auto& m) { return m.sensor == 1; }).has_value();
+  }));
+  client->send(wire::TrackerRequestUnitToSensor{});
+  EXPECT_TRUE(client->until([&] { return client->count<wire::TrackerUnitToSensor>() == 3; }));
+  const auto other = peer();
+  other->send(wire::Subscribe{.kinds = wire::kReportDefault, .rate = 0});
+  other->send(wire::QueryCapabilities{});
+  ASSERT_TRUE(other->untilNext<wire::Capabilities>());
+  other->send(wire::TrackerRequestUnitToSensor{});
+  EXPECT_TRUE(other->untilNext<wire::TrackerUnitToSensor>());
+  EXPECT_TRUE(other->untilNext<wire::IsTouching>());
+  EXPECT_EQ(other->count<wire::TrackerUnitToSensor>(), 1U);
+}
+
 // Waits until these clients saw contact as channels and as this button, and then its end.
 void expectContactMirrored(ScriptedPeer& mirror, ScriptedPeer& hand, std::int32_t button) {
   ASSERT_TRUE(mirror.until([&] {

@@ -50,8 +50,17 @@ ReportChoice Outbox::choiceOf(scene::ClientId client) const {
 }
 
 void Outbox::choose(Session& session, const ReportChoice& choice) {
-  listener(session).choice = withMirrors(config_, choice);
+  Listener& entry = listener(session);
+  entry.chosen = true;
+  entry.choice = withMirrors(config_, choice);
   sendPresentState(session);
+}
+
+void Outbox::extend(Session& session) {
+  if (listener(session).chosen) return;
+  ReportChoice choice = choiceOf(session.id());
+  choice.kinds |= wire::kReportHand | wire::kReportContactPoint;
+  choose(session, choice);
 }
 
 void Outbox::clientGone(scene::ClientId client) {
@@ -65,7 +74,7 @@ Reporter Outbox::reporterFor(scene::ClientId client, wire::LocalSender name) con
 }
 
 Outbox::Listener& Outbox::listener(const Session& session) {
-  return listeners_.try_emplace(session.id(), Listener{.choice = defaultChoice_, .names = 0, .groups = {}})
+  return listeners_.try_emplace(session.id(), Listener{.choice = defaultChoice_, .chosen = false, .names = 0, .groups = {}})
       .first->second;
 }
 

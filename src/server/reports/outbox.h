@@ -28,6 +28,8 @@ class Outbox {
   /// The subscription of the client, the same for all names; the default until choose().
   ReportChoice choiceOf(scene::ClientId client) const;
   void choose(Session& session, const ReportChoice& choice);
+  /// The client knows the extensions: unless it chooses, it gets all tracker sensors.
+  void extend(Session& session);
   void clientGone(scene::ClientId client);
   /// A reporter with the choice of the client, for answers under this name.
   Reporter reporterFor(scene::ClientId client, wire::LocalSender name) const;
@@ -59,6 +61,7 @@ class Outbox {
   };
   struct Listener {
     ReportChoice choice;
+    bool chosen = false;    // by choose() or extend()
     std::size_t names = 0;  // Session::namesWanted() when the groups were chosen
     std::vector<std::shared_ptr<Group>> groups;
   };

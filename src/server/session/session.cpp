@@ -316,11 +316,9 @@ void Session::onUdp(const wire::UdpAddress& address) {
 void Session::onLogRequest(const wire::LogRequest& request) {
   logWarning("requested log files " + wire::inQuotes(request.in_name) + ", " +
              wire::inQuotes(request.out_name) + ": refused");
-  if (subscriptions_.empty()) {
-    logsRefused_ = true;  // stock clients print only texts of devices that they use
-  } else {
-    refuseLogs(*subscriptions_.begin());
-  }
+  // Stock clients print only texts of devices that they use, and describe those later.
+  logsRefused_ = subscriptions_.empty();
+  refuseLogs(logsRefused_ ? wire::LocalSender{0} : *subscriptions_.begin());
 }
 
 void Session::refuseLogs(wire::LocalSender from) {

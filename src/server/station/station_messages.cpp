@@ -108,6 +108,7 @@ void Station::Impl::on(const Request& request, const wire::ButtonAdmin& admin) {
 
 void Station::Impl::on(const Request& request, const wire::QueryCapabilities&) {
   request.session.send(request.name, capabilities(config, profile, control.canBeHeld()));
+  outbox.extend(request.session);
 }
 
 void Station::Impl::on(const Request& request, const wire::StopForces&) {
