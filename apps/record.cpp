@@ -47,7 +47,8 @@ void pollUntilEnd(const std::string& server, double seconds, const std::function
   }
 }
 
-// Every message of the device as it came, also of types that this project does not know. Returns their number.
+// Every message of the device as it came, also of types that this project does not know. Returns their
+// number.
 std::size_t recordMessages(const RecordOptions& options, record::VrpnLog& log) {
   constexpr auto kTimeout = 5s;
   const client::DeviceAddress address = client::parseDevice(options.server);

@@ -41,8 +41,8 @@ class SpscRing {
   }
 
   /// Consumer: passes all items present at the call to visit(const T&), oldest first, and returns how many. A
-  /// cell is free again as soon as its visit ends. A visit(const T&, std::size_t) also gets the number of newer
-  /// items present.
+  /// cell is free again as soon as its visit ends. A visit(const T&, std::size_t) also gets the number of
+  /// newer items present.
   template <class Visit>
   std::size_t consume(Visit&& visit) {
     std::uint64_t tail = tail_.load(std::memory_order_relaxed);

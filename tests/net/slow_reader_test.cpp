@@ -85,7 +85,8 @@ TEST(SlowReader, LosesLowLatencyRecordsOnlyAndGetsTheRestInOrder) {
   EXPECT_EQ(gotLowLatency.back(), lowLatency - 1) << "the newest state is the one to keep";
 }
 
-// With a limit of unsent bytes a reader that was behind gets the newest record after what was under way already.
+// With a limit of unsent bytes a reader that was behind gets the newest record after what was under way
+// already.
 TEST(SlowReader, GetsTheNewestRecordInsteadOfAQueue) {
   Loop loop;
   Server server(loop, {.unsentLimitBytes = kSmallBuffer}, true);
@@ -184,8 +185,8 @@ TEST(SlowReader, StaysConnectedHoweverLongItDoesNotRead) {
   EXPECT_EQ(parseRecord(slow.receive(kRecordBytes)), std::pair('L', 0));
 }
 
-// Small messages use up a small receive buffer long before its window is full: the peer's system discards bytes
-// in flight, closes the window and answers every repetition.
+// Small messages use up a small receive buffer long before its window is full: the peer's system discards
+// bytes in flight, closes the window and answers every repetition.
 TEST(SlowReader, StaysConnectedHoweverLittleMemoryItHas) {
   Loop loop;
   ConnectionOptions options;

@@ -109,8 +109,8 @@ inline bool untilForceAbove(ScriptedPeer& peer, double force_N) {
 
 /// Subscribes to all tracker sensors: 0 the proxy, 1 the HIP, 2 the contact point.
 inline void subscribeToSensors(ScriptedPeer& peer) {
-  peer.send(wire::Subscribe{
-      .kinds = wire::kReportDefault | wire::kReportHand | wire::kReportContactPoint, .rate = 0});
+  peer.send(wire::Subscribe{.kinds = wire::kReportDefault | wire::kReportHand | wire::kReportContactPoint,
+                            .rate = 0});
 }
 
 /// Subscribes to the HIP (sensor 1) and waits until it is reported at this position.

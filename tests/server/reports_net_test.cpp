@@ -164,9 +164,10 @@ TEST_F(ReportsTest, AClientWithOnlyAnalogAndButtonSeesContact) {
     EXPECT_EQ(peer->count<wire::IsTouching>(), 0U);
   }
   EXPECT_EQ(mirror.count<wire::TrackerPosQuat>(), 0U);
+  mirror.forget();
   mirror.send(wire::Ping{});
-  ASSERT_TRUE(mirror.untilNext<wire::Pong>());
-  ASSERT_TRUE(mirror.untilNext<wire::ButtonStates>());
+  ASSERT_TRUE(mirror.until(
+      [&] { return mirror.count<wire::Pong>() == 1 && mirror.count<wire::ButtonStates>() == 1; }));
   EXPECT_EQ(mirror.all<wire::ButtonStates>().back().states.values.size(), 1U);
 }
 

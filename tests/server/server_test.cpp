@@ -52,8 +52,8 @@ TEST(Server, TcpClientReceivesReports) {
   EXPECT_EQ(peer.datagrams(), 0U);
 }
 
-// A reader of the raw protocol, a logger or a filter: it describes "VRPN Control" like every stock client, and no
-// device. Nobody else is connected.
+// A reader of the raw protocol, a logger or a filter: it describes "VRPN Control" like every stock client,
+// and no device. Nobody else is connected.
 void expectEverything(ScriptedPeer::Mode mode) {
   RunningServer server;
   ScriptedPeer listener(server.address(), "VRPN Control", mode);

@@ -16,10 +16,12 @@
 #include "vrpn_Shared.h"
 #include "vrpn_Types.h"
 
-namespace hapticd::client {
+namespace hapticd {
+namespace client {
 class Link;
 struct Arrival;
-}  // namespace hapticd::client
+}  // namespace client
+}  // namespace hapticd
 
 struct vrpn_HANDLERPARAM {
   vrpn_int32 type;

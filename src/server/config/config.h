@@ -45,8 +45,8 @@ enum class SceneOnDisconnect { keep, clear };
 /// Which clients may command: all, the first to command until it disconnects, or those at listed addresses.
 enum class Control { any, first, list };
 
-/// What a client finds under a name of the device. Stock clients take every sensor for the first one and every
-/// button for one of the device, so anything beyond them has a name of its own.
+/// What a client finds under a name of the device. Stock clients take every sensor for the first one and
+/// every button for one of the device, so anything beyond them has a name of its own.
 enum class View {
   device,   ///< everything that the client subscribed to
   hand,     ///< tracker whose sensor 0 is the HIP
@@ -89,7 +89,8 @@ struct DeviceConfig {
   VibrationUnit vibrationContactUnit = VibrationUnit::radPerSecond;
   VibrationFrame vibrationMotorFrame = VibrationFrame::stylus;
   bool mirrors = false;  ///< also offer NAME.hand, NAME.contact and NAME.touch, see View
-  bool compatMirrors = false;  ///< send hand, contact point, touch button and contact channels under the device's names
+  bool compatMirrors =
+      false;  ///< send hand, contact point, touch button and contact channels under the device's names
   std::string scene;  ///< devices with the same name share a scene; empty: not shared
   SceneOnDisconnect sceneOnDisconnect = SceneOnDisconnect::keep;
   Control control = Control::any;

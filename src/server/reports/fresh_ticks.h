@@ -9,9 +9,9 @@
 
 namespace hapticd::server {
 
-/// Limits the age of reports when the net thread is behind: of the ticks that wait it admits the newest ones, as
-/// many as can be sent before the oldest of them is kMaxAge old. The costs are the smallest of the last few
-/// passes, so that one preemption is not taken for load. Pure; one for each device.
+/// Limits the age of reports when the net thread is behind: of the ticks that wait it admits the newest ones,
+/// as many as can be sent before the oldest of them is kMaxAge old. The costs are the smallest of the last
+/// few passes, so that one preemption is not taken for load. Pure; one for each device.
 class FreshTicks {
  public:
   static constexpr base::Nanos kMaxAge = 12'000'000;

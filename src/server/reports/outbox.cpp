@@ -74,7 +74,9 @@ Reporter Outbox::reporterFor(scene::ClientId client, wire::LocalSender name) con
 }
 
 Outbox::Listener& Outbox::listener(const Session& session) {
-  return listeners_.try_emplace(session.id(), Listener{.choice = defaultChoice_, .chosen = false, .names = 0, .groups = {}})
+  return listeners_
+      .try_emplace(session.id(),
+                   Listener{.choice = defaultChoice_, .chosen = false, .names = 0, .groups = {}})
       .first->second;
 }
 
@@ -92,8 +94,7 @@ std::shared_ptr<Outbox::Group> Outbox::group(const DeviceName& name, const Repor
   std::weak_ptr<Group>& known = groups_[{name.sender.value, choice}];
   std::shared_ptr<Group> group = known.lock();
   if (!group) {
-    known = group =
-        std::make_shared<Group>(name.sender, Reporter(config_, buttonCount_, choice, name.view));
+    known = group = std::make_shared<Group>(name.sender, Reporter(config_, buttonCount_, choice, name.view));
   }
   return group;
 }

@@ -173,7 +173,9 @@ wire::ButtonStates Reporter::buttonStates(std::uint32_t buttons, bool touching) 
 
 std::int32_t Reporter::sensorCount() const noexcept {
   if (view_ != View::device) return 1;
-  return wants(wire::kReportContactPoint) ? kSensorContact + 1 : wants(wire::kReportHand) ? kSensorHip + 1 : 1;
+  return wants(wire::kReportContactPoint) ? kSensorContact + 1
+         : wants(wire::kReportHand)       ? kSensorHip + 1
+                                          : 1;
 }
 
 void Reporter::buttons(std::uint32_t buttons, bool touching, std::vector<Outgoing>& out) {

@@ -57,14 +57,13 @@ struct ReportFrame {
 /// gripper, its opening in radians. Without the mirror the opening is the only analog channel.
 class Reporter {
  public:
-  Reporter(const DeviceConfig& config, int buttonCount, const ReportChoice& choice,
-           View view = View::device);
+  Reporter(const DeviceConfig& config, int buttonCount, const ReportChoice& choice, View view = View::device);
 
   /// Appends the reports of this tick: changes of buttons, of the guard and the end of a contact at once, the
   /// rest once per report period.
   void update(const realtime::TickReport& tick, const ReportFrame& frame, std::vector<Outgoing>& out);
-  /// The same for a tick that is too old to report: omits and counts what is due, unless contact begins or ends.
-  /// The next update() reports the changes since the last report.
+  /// The same for a tick that is too old to report: omits and counts what is due, unless contact begins or
+  /// ends. The next update() reports the changes since the last report.
   void skip(const realtime::TickReport& tick, const ReportFrame& frame, std::vector<Outgoing>& out);
   /// Number of ticks whose due reports skip() omitted since the last call.
   std::uint64_t takeSkipped() noexcept { return std::exchange(skipped_, 0); }

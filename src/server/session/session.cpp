@@ -170,9 +170,8 @@ void Session::sendLastText(const std::string& reason) {
   drainPeer();
   wire::FrameEncoder encoder;  // the protocol's state may be the failure
   encoder.add(clock_.now(), from,
-              wire::Message(wire::Text{.severity = wire::kTextError,
-                                       .level = 0,
-                                       .text = reason + "; the connection ends"}));
+              wire::Message(wire::Text{
+                  .severity = wire::kTextError, .level = 0, .text = reason + "; the connection ends"}));
   net::Buffer bytes;
   encoder.swapOut(bytes);
   connection_.send(std::make_shared<const net::Buffer>(std::move(bytes)));

@@ -23,8 +23,8 @@ class Station {
  public:
   /// Opens the device and adds it to the scene. Throws ConfigError or std::runtime_error with a remedy.
   /// `recorder` may be null; else it records from the first tick and must outlive the station.
-  Station(const DeviceConfig& config, std::vector<DeviceName> names, SceneHost& scene,
-          bool allowNoRealtime, record::Recorder* recorder = nullptr);
+  Station(const DeviceConfig& config, std::vector<DeviceName> names, SceneHost& scene, bool allowNoRealtime,
+          record::Recorder* recorder = nullptr);
   /// A station without hardware and servo, for the reports of a recorded device; no client may command it.
   Station(const DeviceConfig& config, std::vector<DeviceName> names, SceneHost& scene,
           const record::RecordedDevice& recorded);
@@ -73,8 +73,8 @@ class Station {
   /// Descriptor that is readable when reports wait.
   int wakeFd() const noexcept;
   /// Encodes the pending ticks, once for all clients with the same subscription, and calls onTick() after
-  /// each tick with reports so that they are sent in order. When the net thread is behind, only the newest ticks
-  /// are reported, see FreshTicks. Returns false when there were none.
+  /// each tick with reports so that they are sent in order. When the net thread is behind, only the newest
+  /// ticks are reported, see FreshTicks. Returns false when there were none.
   bool collectReports(const WallClock& clock, const std::function<void()>& onTick);
   /// The time that flushing the queues of all clients took after collectReports().
   void flushTook(base::Nanos time);

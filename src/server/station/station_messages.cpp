@@ -41,8 +41,9 @@ void Station::onControl(Session& session, const wire::MessageReceived& message, 
 void Station::Impl::on(const Request& request, const wire::Ping&) {
   const bool touching = outbox.last().rendering.touching;
   request.session.send(request.name, wire::Pong{});
-  request.session.send(request.name, outbox.reporterFor(request.session.id(), request.name)
-                                         .buttonStates(frame.buttons, touching));
+  request.session.send(
+      request.name,
+      outbox.reporterFor(request.session.id(), request.name).buttonStates(frame.buttons, touching));
 }
 
 void Station::Impl::on(const Request& request, const wire::Text& text) {

@@ -211,6 +211,8 @@ ServerConfig unusual() {
   device.forceShading = true;
   device.stribeckSpeed_m_per_s = 0.004;
   device.vibrationContactPulls = true;
+  device.mirrors = true;
+  device.compatMirrors = true;
   device.scene = "shared";
   device.sceneOnDisconnect = SceneOnDisconnect::clear;
   device.control = Control::list;
@@ -229,6 +231,12 @@ TEST(Config, KeysOfOtherDriversAreRefused) {
   EXPECT_EQ(errorOf("[[device]]\nwheel_profile = \"wheel.toml\"\n"),
             "test.toml:2: device 'Phantom': the driver 'simulated' has no key wheel_profile; remove it");
   EXPECT_EQ(errorOf("[[device]]\nwheel_profile = \"\"\n"), "") << "as toToml() writes it";
+}
+
+TEST(Config, NamesOfMirrorsMustBeFree) {
+  const std::string text = "[[device]]\nnames = [\"A\", \"A.touch\"]\n";
+  EXPECT_EQ(errorOf(text), "");
+  EXPECT_NE(errorOf(text + "mirrors = true\n").find("'A.touch' is used twice"), std::string::npos);
 }
 
 TEST(Config, ADriverWithoutAVendorLibraryCannotBeIsolated) {

@@ -1,6 +1,6 @@
 #include "server/reports/reporter.h"
-#include "server/reports/fresh_ticks.h"
 #include "base/time.h"
+#include "server/reports/fresh_ticks.h"
 
 #include <gtest/gtest.h>
 
@@ -18,8 +18,8 @@ class ReporterTest : public ::testing::Test {
   ReporterTest() {
     config_.linearTolerance_m = 0.001;
     config_.angularTolerance_rad = 0.02;
-    choice_.kinds |= wire::kReportHand | wire::kReportContactPoint | wire::kReportTouchButton |
-                     wire::kReportContactAnalog;
+    choice_.kinds |=
+        wire::kReportHand | wire::kReportContactPoint | wire::kReportTouchButton | wire::kReportContactAnalog;
     tick_.T_world_device = Affine(Eigen::UniformScaling<double>(1000.0));
   }
   void start() {
