@@ -94,7 +94,7 @@ ReportChoice defaultChoice(const DeviceConfig& config) {
 
 Reporter::Reporter(const DeviceConfig& config, int buttonCount, const ReportChoice& choice, View view)
     : config_(config),
-      buttonCount_(view == View::touch ? 0 : buttonCount),
+      buttonCount_(view == View::device ? buttonCount : 0),
       view_(view),
       choice_(choiceFor(view, choice)),
       period_(base::toNanos(1.0 / choice.rate_Hz)) {}
