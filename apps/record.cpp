@@ -55,7 +55,7 @@ std::size_t recordMessages(const RecordOptions& options, record::VrpnLog& log) {
   client::Link link(address.server, {.reconnect = false, .adoptNames = true});
   const wire::LocalSender device = link.addDevice(address.device);
   link.onUp = [&] {
-    constexpr std::uint32_t kKinds = wire::kReportDefault | wire::kReportHand | wire::kReportContactPoint;
+    constexpr std::uint32_t kKinds = wire::kReportDefault | wire::kReportHip | wire::kReportContactPoint;
     link.sendNow(device, wire::Subscribe{.kinds = kKinds, .rate = 0});
   };
   if (!link.waitConnected(kTimeout)) throw ConnectError(address.device + ": " + link.whyNotConnected());

@@ -32,13 +32,13 @@ enum class Reports : std::uint32_t {
   analog = 8,           ///< the opening of a gripper
   tick = 16,            ///< TickReport
   contacts = 32,        ///< ContactsReport
-  hand = 64,            ///< poses and velocities of sensor 1, the device itself
+  hip = 1024,           ///< poses and velocities of sensor 1, the device itself
   contactPoint = 128,   ///< poses of sensor 2, the surface contact point
   touchButton = 256,    ///< contact as one more button than the device has
   contactAnalog = 512,  ///< contact as analog channels, see AnalogReport
-  tracker = proxy | hand | contactPoint,
+  tracker = proxy | hip | contactPoint,
   usual = tracker | force | button | analog,  ///< what a Client receives that did not subscribe
-  all = 1023
+  all = 2047
 };
 constexpr Reports operator|(Reports a, Reports b) {
   return static_cast<Reports>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));

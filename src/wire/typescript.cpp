@@ -104,7 +104,7 @@ std::string messagesAsTypeScript() {
   constant("REPORT_ANALOG", kReportAnalog);
   constant("REPORT_TICK", kReportTick);
   constant("REPORT_CONTACTS", kReportContacts);
-  constant("REPORT_HAND", kReportHand);
+  constant("REPORT_HIP", kReportHip);
   constant("REPORT_CONTACT_POINT", kReportContactPoint);
   constant("REPORT_TOUCH_BUTTON", kReportTouchButton);
   constant("REPORT_CONTACT_ANALOG", kReportContactAnalog);

@@ -207,7 +207,7 @@ TEST(Extensions, ASubscriptionIsRepeatedOnTheNextConnection) {
   const auto received = server.waitReceived(2);
   ASSERT_EQ(received.size(), 2U);
   constexpr std::uint32_t kKinds =
-      wire::kReportDefault | wire::kReportHand | wire::kReportContactPoint | wire::kReportContacts;
+      wire::kReportDefault | wire::kReportHip | wire::kReportContactPoint | wire::kReportContacts;
   for (const Received& t : received) EXPECT_TRUE(is(t, wire::Subscribe{kKinds, 500}));
 
   for (const double rate : {-1.0, std::numeric_limits<double>::quiet_NaN()}) {

@@ -109,7 +109,7 @@ inline bool untilForceAbove(ScriptedPeer& peer, double force_N) {
 
 /// Subscribes to all tracker sensors: 0 the proxy, 1 the HIP, 2 the contact point.
 inline void subscribeToSensors(ScriptedPeer& peer) {
-  peer.send(wire::Subscribe{.kinds = wire::kReportDefault | wire::kReportHand | wire::kReportContactPoint,
+  peer.send(wire::Subscribe{.kinds = wire::kReportDefault | wire::kReportHip | wire::kReportContactPoint,
                             .rate = 0});
 }
 

@@ -222,7 +222,7 @@ TEST_F(ReportsTest, AToggleStaysOnWhenItsButtonIsReleased) {
 
 TEST_F(ReportsTest, PosesAreRelativeToTheOriginThatAClientResets) {
   const auto client = peer();
-  client->send(wire::Subscribe{.kinds = wire::kReportHand, .rate = 0});
+  client->send(wire::Subscribe{.kinds = wire::kReportHip, .rate = 0});
   client->send(wire::HoldHand{.hold = 1, .position = {30, 20, 10}});
   const auto hip = [&](double x, double y, double z) {
     return client->until([&] {

@@ -59,7 +59,7 @@ void Outbox::choose(Session& session, const ReportChoice& choice) {
 void Outbox::extend(Session& session) {
   if (listener(session).chosen) return;
   ReportChoice choice = choiceOf(session.id());
-  choice.kinds |= wire::kReportHand | wire::kReportContactPoint;
+  choice.kinds |= wire::kReportHip | wire::kReportContactPoint;
   choose(session, choice);
 }
 

@@ -64,7 +64,7 @@ ReportChoice choiceFor(View view, ReportChoice choice) {
     case View::device:
       break;
     case View::hand:
-      choice.kinds = wire::kReportHand;
+      choice.kinds = wire::kReportHip;
       break;
     case View::contact:
       choice.kinds = wire::kReportContactPoint;
@@ -81,7 +81,7 @@ ReportChoice choiceFor(View view, ReportChoice choice) {
 ReportChoice withMirrors(const DeviceConfig& config, ReportChoice choice) {
   if (!config.compatMirrors) return choice;
   if ((choice.kinds & wire::kReportTracker) != 0) {
-    choice.kinds |= wire::kReportHand | wire::kReportContactPoint;
+    choice.kinds |= wire::kReportHip | wire::kReportContactPoint;
   }
   if ((choice.kinds & wire::kReportButton) != 0) choice.kinds |= wire::kReportTouchButton;
   if ((choice.kinds & wire::kReportAnalog) != 0) choice.kinds |= wire::kReportContactAnalog;
@@ -174,7 +174,7 @@ wire::ButtonStates Reporter::buttonStates(std::uint32_t buttons, bool touching) 
 std::int32_t Reporter::sensorCount() const noexcept {
   if (view_ != View::device) return 1;
   return wants(wire::kReportContactPoint) ? kSensorContact + 1
-         : wants(wire::kReportHand)       ? kSensorHip + 1
+         : wants(wire::kReportHip)       ? kSensorHip + 1
                                           : 1;
 }
 
@@ -204,7 +204,7 @@ bool Reporter::moved(std::int32_t sensor, const Vec3& position, const Quat& orie
 }
 
 void Reporter::tracker(const ClientTick& clientTick, const ReportFrame& frame, std::vector<Outgoing>& out) {
-  constexpr std::uint32_t kAny = wire::kReportTracker | wire::kReportHand | wire::kReportContactPoint;
+  constexpr std::uint32_t kAny = wire::kReportTracker | wire::kReportHip | wire::kReportContactPoint;
   if (!wants(kAny)) return;
   const Quat toFrame = frame.rotation.conjugate();
   const Quat orientation = toFrame * clientTick.orientation;
@@ -222,9 +222,9 @@ void Reporter::tracker(const ClientTick& clientTick, const ReportFrame& frame, s
   };
   pose(wire::kReportTracker, kSensorProxy, clientTick.proxy);
   // A client without sensor 1 gets the velocity of the HIP as that of sensor 0, as from a stock server.
-  if (pose(wire::kReportHand, kSensorHip, clientTick.hip) &&
-      wants(wire::kReportTracker | wire::kReportHand)) {
-    const bool separate = view_ == View::device && wants(wire::kReportHand);
+  if (pose(wire::kReportHip, kSensorHip, clientTick.hip) &&
+      wants(wire::kReportTracker | wire::kReportHip)) {
+    const bool separate = view_ == View::device && wants(wire::kReportHip);
     velocity(clientTick, toFrame, separate ? kSensorHip : kSensorProxy, out);
   }
   if (clientTick.touching) pose(wire::kReportContactPoint, kSensorContact, clientTick.scp);

@@ -27,12 +27,12 @@ enum ReportKinds : std::uint32_t {
   kReportAnalog = 1U << 3,         ///< Channel: the gripper's opening
   kReportTick = 1U << 4,           ///< hapticd Tick
   kReportContacts = 1U << 5,       ///< hapticd Contacts
-  kReportHand = 1U << 6,           ///< Pos_Quat and Velocity of sensor 1, the HIP
+  kReportHip = 1U << 10,          ///< Pos_Quat and Velocity of sensor 1, the HIP
   kReportContactPoint = 1U << 7,   ///< Pos_Quat of sensor 2, the surface contact point
   kReportTouchButton = 1U << 8,    ///< Change of the button after the device's own: touching
   kReportContactAnalog = 1U << 9,  ///< Channel: force, depth, angle, touched object, the gripper's opening
   kReportDefault = kReportTracker | kReportForce | kReportButton | kReportAnalog,
-  kReportAll = (1U << 10) - 1,
+  kReportAll = (1U << 11) - 1,
 };
 
 struct QueryCapabilities {

@@ -19,7 +19,7 @@ class ReporterTest : public ::testing::Test {
     config_.linearTolerance_m = 0.001;
     config_.angularTolerance_rad = 0.02;
     choice_.kinds |=
-        wire::kReportHand | wire::kReportContactPoint | wire::kReportTouchButton | wire::kReportContactAnalog;
+        wire::kReportHip | wire::kReportContactPoint | wire::kReportTouchButton | wire::kReportContactAnalog;
     tick_.T_world_device = Affine(Eigen::UniformScaling<double>(1000.0));
   }
   void start() {
