@@ -56,8 +56,7 @@ void exportVrpn(const ExportOptions& options, std::string& remark) {
   for (std::size_t i = 0; i < header.devices.size(); ++i) {
     const server::DeviceConfig& device = config.devices.at(i);
     devices.push_back(
-        {.reporter = server::Reporter(device, header.devices[i].buttons,
-                                      {.kinds = wire::kReportDefault, .rate_Hz = device.reportRate_Hz}),
+        {.reporter = server::Reporter(device, header.devices[i].buttons, server::defaultChoice(device)),
          .names = {}});
     for (const std::string& name : device.names) devices.back().names.push_back(log.addSender(name));
   }

@@ -2,12 +2,13 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
 
-#include "base/time.h"
+#include "client/link.h"
 #include "commands.h"
 #include "hapticd/client.h"
 #include "record/export.h"
@@ -27,12 +28,6 @@ struct RecordOptions {
   double rate_Hz = 1000;
 };
 
-wire::Time stamp(Time time) {
-  const base::Nanos ns = nanosOf(time);
-  return {static_cast<std::uint32_t>(ns / 1'000'000'000),
-          static_cast<std::uint32_t>(ns % 1'000'000'000 / 1000)};
-}
-
 std::unique_ptr<record::SampleFile> sampleFile(const std::string& file) {
   const std::string extension = std::filesystem::path(file).extension();
   if (extension == ".csv") return std::make_unique<record::CsvFile>(file);
@@ -40,74 +35,74 @@ std::unique_ptr<record::SampleFile> sampleFile(const std::string& file) {
   return nullptr;
 }
 
-// Every report as the message that carried it.
-void logReports(Client& client, record::VrpnLog& log, wire::LocalSender sender) {
-  const auto add = [&log, sender](Time time, const wire::Message& message) {
-    log.add(stamp(time), sender, message);
-  };
-  const auto flag = [](bool value) -> wire::Bool16 { return value ? 1 : 0; };
-  client.onPose([add](const PoseReport& r) {
-    add(r.time, wire::TrackerPosQuat{r.sensor, r.sensor, r.position_m, r.orientation});
-  });
-  client.onVelocity([add](const VelocityReport& r) {
-    add(r.time,
-        wire::TrackerVelocity{r.sensor, r.sensor, r.velocity_m_per_s, r.rotation, r.rotationInterval_s});
-  });
-  client.onButton([add](const ButtonReport& r) {
-    add(r.time, wire::ButtonChange{r.button, r.pressed ? 1 : 0});
-  });
-  client.onAnalog([add](const AnalogReport& r) {
-    wire::AnalogChannels channels;
-    channels.channels.values = r.channels;
-    add(r.time, channels);
-  });
-  client.onForce([add](const ForceReport& r) { add(r.time, wire::Force{r.force_N}); });
-  client.onDepth([add](const DepthReport& r) { add(r.time, wire::Dop{r.depth_m}); });
-  client.onContactPoint([add](const ContactPointReport& r) {
-    add(r.time, wire::Scp{r.position_m, r.orientation});
-  });
-  client.onTouching(
-      [add, flag](const TouchingReport& r) { add(r.time, wire::IsTouching{flag(r.touching)}); });
-  client.onTouchedObject([add](const TouchedObjectReport& r) { add(r.time, wire::TouchedObject{r.object}); });
-  client.onAngle([add, flag](const AngleReport& r) {
-    add(r.time, wire::Angle{r.angle_deg, flag(r.touching)});
-  });
-  client.onForceError([add](const ForceErrorReport& r) {
-    add(r.time, wire::ForceError{static_cast<std::int32_t>(r.error)});
-  });
-  client.onText([add](const TextReport& r) {
-    add(r.time, wire::Text{.severity = static_cast<std::uint32_t>(r.severity), .level = 0, .text = r.text});
-  });
-}
-
-void pollUntilEnd(Client& client, double seconds) {
+// Calls poll(20 ms), short so that signals take effect, until the end; it returns whether still connected.
+void pollUntilEnd(const std::string& server, double seconds, const std::function<bool()>& poll) {
   const auto start = std::chrono::steady_clock::now();
   const auto isOver = [&] {
     return seconds > 0 && std::chrono::steady_clock::now() - start >= std::chrono::duration<double>(seconds);
   };
   while (!stopRequested() && !isOver()) {
-    client.poll(20ms);  // short, so that signals take effect
-    if (!client.connected())
-      throw ConnectionLost("the connection to " + client.server() +
-                           " was lost; the file holds everything before");
+    if (!poll())
+      throw ConnectionLost("the connection to " + server + " was lost; the file holds everything before");
   }
 }
 
-void recordTicks(Client& client, record::SampleFile& file, const RecordOptions& options) {
+// Every message of the device as it came, also of types that this project does not know. Returns their
+// number.
+std::size_t recordMessages(const RecordOptions& options, record::VrpnLog& log) {
+  constexpr auto kTimeout = 5s;
+  const client::DeviceAddress address = client::parseDevice(options.server);
+  client::Link link(address.server, {.reconnect = false, .adoptNames = true});
+  const wire::LocalSender device = link.addDevice(address.device);
+  link.onUp = [&] {
+    constexpr std::uint32_t kKinds = wire::kReportDefault | wire::kReportHip | wire::kReportContactPoint;
+    link.sendNow(device, wire::Subscribe{.kinds = kKinds, .rate = 0});
+  };
+  if (!link.waitConnected(kTimeout)) throw ConnectError(address.device + ": " + link.whyNotConnected());
+  if (!link.waitHeard(device, kTimeout)) {
+    throw ConnectError("no device '" + address.device + "' answers at " + address.server.text());
+  }
+  const wire::LocalSender sender = log.addSender(address.device);
+  std::size_t count = 0;
+  const auto add = [&](const client::Arrival& arrival) {
+    const bool report = arrival.kind != wire::kindOf<wire::Pong>;
+    if (arrival.what != client::Arrival::What::message || arrival.sender != device || !report) return;
+    if (arrival.type.value < 0) return;
+    const std::string& type = link.names().types()[static_cast<std::size_t>(arrival.type.value)];
+    log.addRaw(arrival.time, sender, type, arrival.bytes);
+    ++count;
+  };
+  pollUntilEnd(address.server.text(), options.seconds, [&] {
+    link.poll(20ms, add);
+    return link.connected();
+  });
+  return count;
+}
+
+std::size_t recordTicks(record::SampleFile& file, const RecordOptions& options) {
+  Client client(options.server, {.reconnect = false});
   const auto capabilities = client.waitCapabilities();
   if (!capabilities || !capabilities->subscribe) {
     throw std::runtime_error(client.server() +
                              " is not a hapticd and reports no ticks; record to a file called *.vrpn");
   }
-  client.onTick([&](const TickReport& tick) { file.add(sampleOf(client.device(), tick)); });
+  std::size_t count = 0;
+  client.onTick([&](const TickReport& tick) {
+    file.add(sampleOf(client.device(), tick));
+    ++count;
+  });
   client.subscribe(Reports::tick, options.rate_Hz);
   try {
-    pollUntilEnd(client, options.seconds);
+    pollUntilEnd(client.server(), options.seconds, [&] {
+      client.poll(20ms);
+      return client.connected();
+    });
   } catch (const ConnectionLost&) {
     file.close();
     throw;
   }
   file.close();
+  return count;
 }
 
 int run(const RecordOptions& options) {
@@ -119,16 +114,20 @@ int run(const RecordOptions& options) {
                              "replayed: hapticd serve --record FILE.haptics");
   }
   const StopSignals signals;
-  Client client(options.server, {.reconnect = false});
+  std::size_t count = 0;
   if (samples) {
-    recordTicks(client, *samples, options);
+    count = recordTicks(*samples, options);
   } else {
     record::VrpnLog log(options.file);
-    logReports(client, log, log.addSender(client.device()));
-    pollUntilEnd(client, options.seconds);
+    count = recordMessages(options, log);
     log.close();
   }
-  std::printf("recorded %s to %s\n", options.server.c_str(), options.file.c_str());
+  if (count == 0) {
+    throw std::runtime_error("nothing to record: " + options.server + " reported nothing within the time; " +
+                             options.file + " is empty");
+  }
+  std::printf("recorded %zu %s of %s to %s\n", count, samples ? "ticks" : "messages", options.server.c_str(),
+              options.file.c_str());
   return 0;
 }
 

@@ -32,7 +32,7 @@ class Crowd {
  public:
   Crowd(std::uint16_t port, std::size_t clients, bool greet) : epoll_(epoll_create1(EPOLL_CLOEXEC)) {
     const std::vector<std::byte> hello =
-        greeting(wire::kReportTracker | wire::kReportForce | wire::kReportTick, 1000);
+        greeting(wire::kReportTracker | wire::kReportHip | wire::kReportForce | wire::kReportTick, 1000);
     for (std::size_t i = 0; i < clients; ++i) {
       readers_.push_back(
           {Socket::connect(port), i % std::max<std::size_t>(1, clients / kSampled) == 0, greet});

@@ -27,15 +27,20 @@ struct Capabilities {
 /// Kinds of reports to subscribe to; combine them by |. Force errors, guard states and texts are always sent.
 enum class Reports : std::uint32_t {
   none = 0,
-  tracker = 1,  ///< poses and velocities
-  force = 2,    ///< force, contact point, depth, touching, touched object, angle
+  proxy = 1,  ///< poses of sensor 0, the proxy
+  force = 2,  ///< force, contact point, depth, touching, touched object, angle
   button = 4,
-  analog = 8,
-  tick = 16,      ///< TickReport
-  contacts = 32,  ///< ContactsReport
-  hand = 64,      ///< HandReport
-  usual = 15,     ///< what a client without a subscription receives
-  all = 127
+  analog = 8,           ///< the opening of a gripper
+  tick = 16,            ///< TickReport
+  contacts = 32,        ///< ContactsReport
+  hand = 64,            ///< HandReport
+  contactPoint = 128,   ///< poses of sensor 2, the surface contact point
+  touchButton = 256,    ///< contact as one more button than the device has
+  contactAnalog = 512,  ///< contact as analog channels, see AnalogReport
+  hip = 1024,           ///< poses and velocities of sensor 1, the device itself
+  tracker = proxy | hip | contactPoint,
+  usual = tracker | force | button | analog,  ///< what a Client receives that did not subscribe
+  all = 2047
 };
 constexpr Reports operator|(Reports a, Reports b) {
   return static_cast<Reports>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));

@@ -31,6 +31,11 @@ std::uint16_t parsePort(std::string_view digits, std::string_view whole) {
 ServerAddress parseServer(std::string_view text) {
   ServerAddress server;
   std::string_view rest = text;
+  if (rest.starts_with("file:")) {
+    throw std::invalid_argument(
+        "server " + wire::inQuotes(text) +
+        ": this library reads no files; open it with a client of VRPN, or connect to 'hapticd replay'");
+  }
   server.tcpOnly = dropPrefix(rest, "tcp:");
   if (!server.tcpOnly) dropPrefix(rest, "x-vrpn:");
   dropPrefix(rest, "//");

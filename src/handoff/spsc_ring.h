@@ -41,14 +41,20 @@ class SpscRing {
   }
 
   /// Consumer: passes all items present at the call to visit(const T&), oldest first, and returns how many. A
-  /// cell is free again as soon as its visit ends.
+  /// cell is free again as soon as its visit ends. A visit(const T&, std::size_t) also gets the number of
+  /// newer items present.
   template <class Visit>
   std::size_t consume(Visit&& visit) {
     std::uint64_t tail = tail_.load(std::memory_order_relaxed);
     const std::uint64_t head = head_.load(std::memory_order_acquire);
     const std::size_t count = head - tail;
     while (tail != head) {
-      visit(static_cast<const T&>(cells_[tail & mask_]));
+      const T& item = cells_[tail & mask_];
+      if constexpr (std::is_invocable_v<Visit&, const T&, std::size_t>) {
+        visit(item, static_cast<std::size_t>(head - tail - 1));
+      } else {
+        visit(item);
+      }
       tail_.store(++tail, std::memory_order_release);
     }
     return count;

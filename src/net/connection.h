@@ -26,6 +26,10 @@ struct ConnectionOptions {
   std::size_t lowMarkBytes = std::size_t{256} * 1024;
   /// Queued reliable bytes above which the connection ends: its peer does not read.
   std::size_t hardLimitBytes = std::size_t{8} * 1024 * 1024;
+  /// Bytes that the system may hold for the peer without having sent them; 0: no limit. With a limit, a new
+  /// low-latency buffer replaces those that wait while the system takes no more, so that a slow reader gets
+  /// the newest ones.
+  int unsentLimitBytes = 0;
   /// Time without an acknowledgement that is due, after which the peer counts as lost. A peer whose program
   /// stops reading still acknowledges, so it is not lost.
   std::chrono::milliseconds lossTimeout{0};

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <optional>
 
 #include "base/time.h"
@@ -13,6 +14,8 @@ namespace hapticd::net {
 struct LinkState {
   bool inFlight = false;                    ///< sent bytes that the peer has not acknowledged
   int probes = 0;                           ///< window or keep-alive probes without an answer so far
+  bool windowClosed = false;                ///< the peer takes no bytes at present
+  std::uint32_t retransmissions = 0;        ///< since the start of the connection
   std::chrono::milliseconds sinceHeard{0};  ///< since the last acknowledgement or data
 };
 
@@ -21,7 +24,8 @@ struct LinkState {
 /// machine the answers are still in its queues. Pure; one for each connection.
 ///
 /// While the peer's window is closed the system probes it at growing intervals, so a peer that does not read
-/// for some time and then vanishes is noticed only after about the same time.
+/// for some time and then vanishes is noticed only after about the same time. A peer without memory can close
+/// its window below bytes in flight: it discards them and answers, and their retransmissions are the probes.
 class LossWatch {
  public:
   using Milliseconds = std::chrono::milliseconds;
@@ -33,9 +37,10 @@ class LossWatch {
   /// Interval at which to call isLost().
   Milliseconds interval() const { return std::max(timeout_ / 5, Milliseconds(1)); }
 
-  bool isLost(const LinkState& link, base::Nanos now) {
+  bool isLost(LinkState link, base::Nanos now) {
     const auto gap = std::chrono::duration_cast<Milliseconds>(std::chrono::nanoseconds(now - lastCheck_));
     lastCheck_ = now;
+    countProbesInFlight(link, gap);
     const bool silent = awaitsAnswer(link);
     if (!silent) {
       waited_.reset();
@@ -51,6 +56,14 @@ class LossWatch {
   // Peers answer probes at most twice per second, so silence after an earlier probe means nothing.
   static constexpr Milliseconds kAnswerPause{600};
 
+  void countProbesInFlight(LinkState& link, Milliseconds gap) {
+    const bool probing = link.inFlight && link.windowClosed;
+    if (!probing || link.sinceHeard <= gap) answered_ = link.retransmissions;
+    if (!probing) return;
+    link.inFlight = false;
+    link.probes += static_cast<int>(link.retransmissions - answered_);
+  }
+
   bool awaitsAnswer(const LinkState& link) {
     if (link.probes == 0) {
       probeCounts_.reset();
@@ -62,6 +75,7 @@ class LossWatch {
 
   Milliseconds timeout_;
   base::Nanos lastCheck_ = 0;
+  std::uint32_t answered_ = 0;          // retransmissions at the last answer
   std::optional<bool> probeCounts_;     // whether the first probe requires an answer
   std::optional<Milliseconds> waited_;  // time since an answer became due
 };

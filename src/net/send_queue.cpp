@@ -5,13 +5,13 @@
 
 namespace hapticd::net {
 
-void SendQueue::push(std::shared_ptr<const Buffer> buffer, Delivery delivery) {
+void SendQueue::push(std::shared_ptr<const Buffer> buffer, Delivery delivery, bool replace) {
   if (!buffer || buffer->empty()) {
     return;
   }
   const std::size_t size = buffer->size();
   if (delivery == Delivery::lowLatency) {
-    if (bytes_ > lowMarkBytes_) {
+    if (replace || bytes_ > lowMarkBytes_) {
       dropWaitingLowLatency();
     }
     if (bytes_ > lowMarkBytes_) {

@@ -20,12 +20,13 @@ enum class Delivery : std::uint8_t {
 
 /// A FIFO that drops low-latency buffers when it is long. Above the low mark, a new low-latency buffer
 /// replaces those that wait; if the reliable buffers alone exceed the mark, the new one is dropped, too. A
-/// partly sent buffer is never dropped. Not thread-safe.
+/// partly sent buffer is never dropped. A push with `replace` drops those that wait at any length. Not
+/// thread-safe.
 class SendQueue {
  public:
   explicit SendQueue(std::size_t lowMarkBytes) : lowMarkBytes_(lowMarkBytes) {}
 
-  void push(std::shared_ptr<const Buffer> buffer, Delivery delivery);
+  void push(std::shared_ptr<const Buffer> buffer, Delivery delivery, bool replace = false);
 
   /// Fills `parts` with the next bytes to send, in order, and returns how many parts there are.
   std::size_t gather(std::span<std::span<const std::byte>> parts) const;

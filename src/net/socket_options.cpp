@@ -2,8 +2,8 @@
 
 #include <fcntl.h>
 #include <linux/sockios.h>
+#include <linux/tcp.h>  // netinet/tcp.h has a tcp_info without the window
 #include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <poll.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
@@ -32,6 +32,10 @@ void setSendBuffer(int fd, int bytes) noexcept {
   setOption(fd, SOL_SOCKET, SO_SNDBUF, bytes);
 }
 
+void setUnsentLimit(int fd, int bytes) noexcept {
+  setOption(fd, IPPROTO_TCP, TCP_NOTSENT_LOWAT, bytes);
+}
+
 void setKeepAlive(int fd, std::chrono::seconds interval) noexcept {
   constexpr int kProbes = 3;
   const int seconds = static_cast<int>(interval.count());
@@ -45,10 +49,15 @@ void setKeepAlive(int fd, std::chrono::seconds interval) noexcept {
 
 std::optional<LinkState> linkState(int fd) noexcept {
   tcp_info info{};
+  info.tcpi_snd_wnd = 1;  // as seen with systems that do not report it
   socklen_t size = sizeof info;
   if (::getsockopt(fd, IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return std::nullopt;
-  return LinkState{info.tcpi_unacked > 0, info.tcpi_probes,
-                   std::chrono::milliseconds(std::min(info.tcpi_last_ack_recv, info.tcpi_last_data_recv))};
+  return LinkState{
+      .inFlight = info.tcpi_unacked > 0,
+      .probes = info.tcpi_probes,
+      .windowClosed = info.tcpi_snd_wnd == 0,
+      .retransmissions = info.tcpi_total_retrans,
+      .sinceHeard = std::chrono::milliseconds(std::min(info.tcpi_last_ack_recv, info.tcpi_last_data_recv))};
 }
 
 PeerEnd peerEnd(int fd) noexcept {

@@ -16,6 +16,8 @@ void setCloseOnExec(int fd) noexcept;
 void setNoDelay(int fd) noexcept;
 /// Size of the system's send buffer.
 void setSendBuffer(int fd, int bytes) noexcept;
+/// Bytes that the system takes before it has sent them.
+void setUnsentLimit(int fd, int bytes) noexcept;
 /// How often a silent peer is probed; zero: never.
 void setKeepAlive(int fd, std::chrono::seconds interval) noexcept;
 /// Input of LossWatch; nothing when the socket is closed.

@@ -89,6 +89,9 @@ void TcpConnection::applyOptions() {
   if (options_.sendBufferBytes > 0) {
     setSendBuffer(fd, options_.sendBufferBytes);
   }
+  if (options_.unsentLimitBytes > 0) {
+    setUnsentLimit(fd, options_.unsentLimitBytes);
+  }
   setKeepAlive(fd, options_.keepAlive);
   armWatch();
 }
@@ -208,7 +211,7 @@ void TcpConnection::send(std::shared_ptr<const Buffer> buffer, Delivery delivery
   if (!sendable()) {
     return;
   }
-  queue_.push(std::move(buffer), delivery);
+  queue_.push(std::move(buffer), delivery, writeArmed_ && options_.unsentLimitBytes > 0);
   if (queue_.reliableBytes() <= options_.hardLimitBytes) {
     return;
   }

@@ -16,7 +16,14 @@ wire::LocalSender VrpnLog::addSender(std::string_view name) {
 }
 
 void VrpnLog::add(wire::Time time, wire::LocalSender sender, const wire::Message& message) {
-  const std::int32_t type = wire::localType(message.kind()).value;
+  Bytes payload(wire::payloadSize(message));
+  wire::encodePayload(message, payload.data());
+  addRaw(time, sender, wire::info(message.kind()).name, payload);
+}
+
+void VrpnLog::addRaw(wire::Time time, wire::LocalSender sender, std::string_view typeName,
+                     wire::ByteView payload) {
+  const std::int32_t type = names_.addType(typeName).value;
   if (senders_.insert(sender.value).second) {
     describe(time, wire::kSenderDescription, sender.value,
              names_.senders()[static_cast<std::size_t>(sender.value)]);
@@ -24,8 +31,6 @@ void VrpnLog::add(wire::Time time, wire::LocalSender sender, const wire::Message
   if (types_.insert(type).second) {
     describe(time, wire::kTypeDescription, type, names_.types()[static_cast<std::size_t>(type)]);
   }
-  Bytes payload(wire::payloadSize(message));
-  wire::encodePayload(message, payload.data());
   entry(time, sender.value, type, payload);
 }
 

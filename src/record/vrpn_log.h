@@ -20,6 +20,8 @@ class VrpnLog {
 
   wire::LocalSender addSender(std::string_view name);
   void add(wire::Time time, wire::LocalSender sender, const wire::Message& message);
+  /// The same for an encoded payload, also of a message that this project does not know.
+  void addRaw(wire::Time time, wire::LocalSender sender, std::string_view type, wire::ByteView payload);
   /// Throws RecordingError when the file could not be written whole.
   void close() { file_.close(); }
 

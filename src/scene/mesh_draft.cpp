@@ -14,10 +14,16 @@ constexpr float kNotYet = std::numeric_limits<float>::quiet_NaN();
 constexpr std::uint32_t kNoVertex = 0xFFFFFFFF;
 constexpr Triangle kNoTriangle{kNoVertex, kNoVertex, kNoVertex};
 
-bool allFinite(const std::vector<Vec3f>& run) {
-  bool finite = true;
-  for (const Vec3f& v : run) finite &= std::isfinite(v.x()) && std::isfinite(v.y()) && std::isfinite(v.z());
-  return finite;
+// Not for NaN.
+bool isUsable(const Vec3f& v) {
+  constexpr auto kMost = static_cast<float>(MeshDraft::kLargestCoordinate);
+  return std::abs(v.x()) <= kMost && std::abs(v.y()) <= kMost && std::abs(v.z()) <= kMost;
+}
+
+bool allUsable(const std::vector<Vec3f>& run) {
+  bool usable = true;
+  for (const Vec3f& v : run) usable &= isUsable(v);
+  return usable;
 }
 
 bool sameBytes(const Vec3f* a, const std::vector<Vec3f>& b) {
@@ -64,13 +70,11 @@ std::size_t MeshDraft::setVertices(std::uint32_t first, std::vector<Vec3f>&& run
   const bool inPlace = end <= before;
   if (inPlace && sameBytes(vertices_.read().data() + first, run)) return 0;
   std::size_t refused = 0;
-  const bool finite = allFinite(run);
-  if (!finite && std::none_of(run.begin(), run.end(), [](const Vec3f& v) { return v.allFinite(); })) {
-    return run.size();
-  }
-  if (finite && first == 0 && end >= before) {
+  const bool usable = allUsable(run);
+  if (!usable && std::none_of(run.begin(), run.end(), isUsable)) return run.size();
+  if (usable && first == 0 && end >= before) {
     vertices_.replace(std::move(run));
-  } else if (finite) {
+  } else if (usable) {
     std::vector<Vec3f>& vertices = vertices_.write(end);
     if (first > before) grow(vertices, first);
     const std::size_t overlap = std::min<std::size_t>(run.size(), vertices.size() - first);
@@ -80,7 +84,7 @@ std::size_t MeshDraft::setVertices(std::uint32_t first, std::vector<Vec3f>&& run
     std::vector<Vec3f>& vertices = vertices_.write(end);
     if (end > before) grow(vertices, end);
     for (std::size_t i = 0; i < run.size(); ++i) {
-      if (run[i].allFinite()) {
+      if (isUsable(run[i])) {
         vertices[first + i] = run[i];
       } else {
         ++refused;

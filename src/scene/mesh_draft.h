@@ -48,6 +48,8 @@ class MeshDraft {
  public:
   static constexpr Nanos kPause = 4'000'000;   ///< from the last edit, of positions alone, to its publication
   static constexpr Nanos kQuiet = 20'000'000;  ///< from the last edit of a mesh to its publication
+  /// Coordinates in world units: beyond it sizes and normals lose their meaning.
+  static constexpr double kLargestCoordinate = 1e12;
   static constexpr Nanos kLongest = 250'000'000;  ///< from the first edit to the publication, at most
   static constexpr Nanos kLongestMorph = 50'000'000;
   static constexpr Nanos kLongestGap = 100'000'000;  ///< between shapes; beyond, no interval is measured
@@ -60,7 +62,8 @@ class MeshDraft {
   /// As numbered by the client: removed ones and missing corners have vertex numbers that do not exist.
   const std::vector<Triangle>& triangles() const { return triangles_.read(); }
 
-  /// Writes a run; values that are not finite leave their vertex as it was. Returns how many those were.
+  /// Writes a run; values that are not finite or beyond kLargestCoordinate leave their vertex as it
+  /// was. Returns how many those were.
   std::size_t setVertices(std::uint32_t first, std::vector<Vec3f>&& run, Nanos now);
   void setTriangles(std::uint32_t first, const std::vector<Triangle>& run, Nanos now);
   /// False when there is no such triangle.

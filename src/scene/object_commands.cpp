@@ -67,8 +67,8 @@ void ObjectTable::handle(SetVertices& c, const Call& call) {
   const std::size_t refused =
       object->mesh.setVertices(static_cast<std::uint32_t>(c.first), std::move(c.positions), call.now);
   if (refused > 0) {
-    call.refuse(kName, "refused: a coordinate is not finite; the vertex stays as it was", " object ",
-                c.object, ", ", refused, " of the vertices from ", c.first, " on");
+    call.refuse(kName, "refused: a coordinate is not finite or too large; the vertex stays as it was",
+                " object ", c.object, ", ", refused, " of the vertices from ", c.first, " on");
   }
   vertices_ += object->mesh.vertexCount() - before;
   triangles_ += object->mesh.triangleCount() - trianglesBefore;

@@ -24,6 +24,7 @@ net::ConnectionOptions connectionOptions() {
   // A client is lost when data stays unacknowledged for this long; silence alone is not loss.
   options.lossTimeout = 500ms;
   options.keepAlive = 1s;
+  options.unsentLimitBytes = 32 * 1024;  // some 50 ticks: later ones are skipped, not queued
   return options;
 }
 
@@ -104,8 +105,13 @@ std::optional<net::Endpoint> Server::webAddress() const {
 }
 
 void Server::openDevice(const DeviceConfig& device) {
-  std::vector<wire::LocalSender> senders;
-  for (const std::string& name : device.names) senders.push_back(names_.addSender(name));
+  std::vector<DeviceName> senders;
+  for (const std::string& name : device.names) senders.push_back({names_.addSender(name), View::device});
+  if (device.mirrors) {
+    for (const std::string& name : device.names) {
+      for (const auto& [view, suffix] : kMirrors) senders.push_back({names_.addSender(name + suffix), view});
+    }
+  }
   SceneHost& scene = sceneFor(device);
   if (player_) {
     const record::RecordedDevice& recorded = player_->header().devices[stations_.size()];
@@ -345,6 +351,10 @@ void Server::closeStaleHandshakes() {
   for (auto entry = handshakes_.begin(); entry != handshakes_.end();) {
     const auto session = sessions_.find(entry->first);
     if (session == sessions_.end() || session->second->connected()) {
+      // A client that describes none of the devices listens to all of them.
+      if (session != sessions_.end() && session->second->namesWanted() == 0) {
+        for (const auto& station : stations_) station->sendPresentState(*session->second);
+      }
       entry = handshakes_.erase(entry);
       continue;
     }
@@ -388,6 +398,14 @@ Station* Server::stationOf(wire::LocalSender name) noexcept {
     if (station->has(name)) return station.get();
   }
   return nullptr;
+}
+
+void Server::onConnected(Session& session) {
+  for (const auto& station : stations_) station->onConnected(session);
+}
+
+void Server::onCaughtUp(Session& session) {
+  for (const auto& station : stations_) station->sendPresentState(session);
 }
 
 void Server::onSubscribed(Session& session, wire::LocalSender name) {
@@ -470,7 +488,9 @@ void Server::report(Station& station) {
     for (const auto& [id, session] : sessions_) station.sendReports(*session);
   });
   if (!any) return;
+  const Nanos start = base::now();
   for (const auto& [id, session] : sessions_) session->flush();
+  station.flushTook(base::now() - start);
 }
 
 wire::LocalSender Server::nameFor(const Session& session, const SceneHost& scene) const noexcept {

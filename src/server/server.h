@@ -50,6 +50,8 @@ class Server final : public SessionOwner, public WebOwner {
  private:
   struct ReverseConnection;
 
+  void onConnected(Session& session) override;
+  void onCaughtUp(Session& session) override;
   void onSubscribed(Session& session, wire::LocalSender name) override;
   void onMessage(Session& session, const wire::MessageReceived& message, base::Nanos received) override;
   void onWarning(const Session& session, const std::string& text) override;

@@ -105,6 +105,10 @@ std::string messagesAsTypeScript() {
   constant("REPORT_TICK", kReportTick);
   constant("REPORT_CONTACTS", kReportContacts);
   constant("REPORT_HAND", kReportHand);
+  constant("REPORT_CONTACT_POINT", kReportContactPoint);
+  constant("REPORT_TOUCH_BUTTON", kReportTouchButton);
+  constant("REPORT_CONTACT_ANALOG", kReportContactAnalog);
+  constant("REPORT_HIP", kReportHip);
   text += "/** Bits of Capabilities.features. */\n";
   constant("FEATURE_BULK_MESH", kFeatureBulkMesh);
   constant("FEATURE_BATCH", kFeatureBatch);

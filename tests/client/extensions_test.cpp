@@ -207,7 +207,9 @@ TEST(Extensions, ASubscriptionIsRepeatedOnTheNextConnection) {
   ASSERT_TRUE(waitReconnected(client, server, 2));
   const auto received = server.waitReceived(2);
   ASSERT_EQ(received.size(), 2U);
-  for (const Received& t : received) EXPECT_TRUE(is(t, wire::Subscribe{47, 500}));
+  constexpr std::uint32_t kKinds =
+      wire::kReportDefault | wire::kReportHip | wire::kReportContactPoint | wire::kReportContacts;
+  for (const Received& t : received) EXPECT_TRUE(is(t, wire::Subscribe{kKinds, 500}));
 
   for (const double rate : {-1.0, std::numeric_limits<double>::quiet_NaN()}) {
     EXPECT_THAT(textOf<std::invalid_argument>([&] { client.subscribe(Reports::all, rate); }),

@@ -1,10 +1,14 @@
 // VRPN's classes over this client, as a program written for VRPN uses them.
 #include <gtest/gtest.h>
+#include <quat.h>
+#include <unistd.h>
 #include <vrpn_Analog.h>
+#include <vrpn_Analog_Output.h>
 #include <vrpn_Button.h>
 #include <vrpn_Connection.h>
 #include <vrpn_Dial.h>
 #include <vrpn_ForceDevice.h>
+#include <vrpn_Poser.h>
 #include <vrpn_Text.h>
 #include <vrpn_Tracker.h>
 
@@ -368,6 +372,214 @@ TEST_P(Vrpn, HandlersMayUnregisterThemselves) {
   server_.send(wire::Force{});
   ASSERT_TRUE(runUntil(device, [&] { return forces.size() == 2; }));
   EXPECT_EQ(leaver.calls, 1);
+}
+
+// Servers of this project have no posers, so the requests are seen where the library would send them.
+class Requests : public vrpn_Connection {
+ public:
+  Requests() : vrpn_Connection("tcp://127.0.0.1:1") {}
+  int pack_message(vrpn_uint32 length, timeval, vrpn_int32 type, vrpn_int32, const char* payload,
+                   vrpn_uint32 service) override {
+    sent.push_back({message_type_name(type), std::string(payload, length)});
+    reliable = (service & vrpn_CONNECTION_RELIABLE) != 0;
+    return 0;
+  }
+  struct Sent {
+    std::string type, payload;
+    double number(std::size_t index) const {
+      const char* at = payload.data() + 8 * index;
+      return vrpn_unbuffer<vrpn_float64>(at);
+    }
+  };
+  std::vector<Sent> sent;
+  bool reliable = false;
+};
+
+TEST(VrpnRequests, PosersAskForPosesAndVelocities) {
+  Requests requests;
+  {
+    vrpn_Poser_Remote poser("Arm", &requests);
+    const vrpn_float64 position[3] = {1, 2, 3};
+    const vrpn_float64 turn[4] = {0, 0, 0, 1};
+    const timeval now{};
+    EXPECT_EQ(poser.request_pose(now, position, turn), 0);
+    EXPECT_EQ(poser.request_pose_velocity_relative(now, position, turn, 0.5), 0);
+  }
+  ASSERT_EQ(requests.sent.size(), 2U);
+  EXPECT_EQ(requests.sent[0].type, "vrpn_Poser Request Pos_Quat");
+  EXPECT_EQ(requests.sent[0].payload.size(), 56U);
+  EXPECT_EQ(requests.sent[0].number(1), 2);
+  EXPECT_EQ(requests.sent[0].number(6), 1);
+  EXPECT_EQ(requests.sent[1].type, "vrpn_Poser Request Relative Velocity");
+  EXPECT_EQ(requests.sent[1].payload.size(), 64U);
+  EXPECT_EQ(requests.sent[1].number(7), 0.5);
+  EXPECT_TRUE(requests.reliable);
+}
+
+TEST(VrpnRequests, AnalogOutputsAskForValues) {
+  Requests requests;
+  {
+    vrpn_Analog_Output_Remote output("Out", &requests);
+    vrpn_float64 values[2] = {0.25, -4};
+    EXPECT_EQ(output.getNumChannels(), 0);
+    EXPECT_TRUE(output.request_change_channel_value(3, 1.5));
+    EXPECT_TRUE(output.request_change_channels(2, values));
+    EXPECT_FALSE(output.request_change_channels(vrpn_CHANNEL_MAX + 1, values));
+  }
+  ASSERT_EQ(requests.sent.size(), 2U);
+  EXPECT_EQ(requests.sent[0].type, "vrpn_Analog_Output Change_request");
+  const char* at = requests.sent[0].payload.data();
+  EXPECT_EQ(vrpn_unbuffer<vrpn_int32>(at), 3);
+  EXPECT_EQ(requests.sent[0].number(1), 1.5);
+  EXPECT_EQ(requests.sent[1].payload.size(), 24U);
+  EXPECT_EQ(requests.sent[1].number(2), -4);
+}
+
+TEST_P(Vrpn, AnalogOutputsLearnTheirNumberOfChannels) {
+  vrpn_Analog_Output_Remote output(name().c_str());
+  ASSERT_TRUE(ready(output));
+  server_.sendOther("vrpn_Analog_Output Num_Channels_report", std::string("\0\0\0\x05", 4));
+  EXPECT_TRUE(runUntil(output, [&] { return output.getNumChannels() == 5; }));
+}
+
+class Speaker : public vrpn_Tracker_Remote {
+ public:
+  using vrpn_Tracker_Remote::vrpn_Tracker_Remote;
+  void say(const char* text) { send_text_message(vrpn_TEXT_WARNING)(text); }
+  static std::string throughBuffer(const char* text) {
+    char buffer[2 * sizeof(vrpn_uint32) + vrpn_MAX_TEXT_LEN];
+    char out[vrpn_MAX_TEXT_LEN] = {};
+    vrpn_TEXT_SEVERITY severity = vrpn_TEXT_NORMAL;
+    vrpn_uint32 level = 0;
+    EXPECT_EQ(encode_text_message_to_buffer(buffer, vrpn_TEXT_ERROR, 7, text), 0);
+    EXPECT_EQ(decode_text_message_from_buffer(out, &severity, &level, buffer), 0);
+    EXPECT_EQ(severity, vrpn_TEXT_ERROR);
+    EXPECT_EQ(level, 7U);
+    return out;
+  }
+};
+
+TEST_P(Vrpn, DerivedDevicesSendTextsOfASeverity) {
+  Speaker speaker(name().c_str());
+  ASSERT_TRUE(ready(speaker));
+  speaker.say("hot");
+  speaker.mainloop();
+  const auto received = server_.waitReceived(1);
+  ASSERT_EQ(received.size(), 1U);
+  EXPECT_TRUE(is(received[0], wire::Text{wire::kTextWarning, 0, std::string("hot")}));
+  EXPECT_EQ(Speaker::throughBuffer("cold"), "cold");
+}
+
+TEST(VrpnNames, AreTakenApart) {
+  const auto text = [](char* owned) {
+    const std::string copy(owned);
+    delete[] owned;
+    return copy;
+  };
+  EXPECT_EQ(text(vrpn_copy_machine_name("b:3")), "b");
+  EXPECT_EQ(text(vrpn_copy_machine_name("Phantom@tcp://lab7:3884")), "lab7");
+  EXPECT_EQ(text(vrpn_copy_machine_name("tcp:lab7")), "lab7");
+  EXPECT_EQ(vrpn_get_port_number("Phantom@tcp://lab7:3884"), 3884);
+  EXPECT_EQ(vrpn_get_port_number("Phantom@tcp://lab7"), vrpn_DEFAULT_LISTEN_PORT_NO);
+  EXPECT_EQ(text(vrpn_copy_file_name("Phantom@file:///tmp/x.vrpn")), "/tmp/x.vrpn");
+  EXPECT_EQ(text(vrpn_copy_file_name("file:x")), "x");
+  EXPECT_EQ(vrpn_copy_file_name("Phantom@lab7"), nullptr);
+  EXPECT_EQ(text(vrpn_set_service_name("Phantom@lab7:1", "Other")), "Other@lab7:1");
+}
+
+TEST(VrpnNames, CookiesAreCompared) {
+  char cookie[32];
+  ASSERT_EQ(write_vrpn_cookie(cookie, sizeof cookie, vrpn_LOG_OUTGOING), 0);
+  EXPECT_STREQ(cookie, "vrpn: ver. 07.38  2");
+  EXPECT_EQ(write_vrpn_cookie(cookie, vrpn_cookie_size(), 0), -1);
+  EXPECT_EQ(check_vrpn_cookie(cookie), 0);
+  EXPECT_EQ(check_vrpn_cookie("vrpn: ver. 07.34  0"), 1);
+  EXPECT_EQ(check_vrpn_cookie("vrpn: ver. 08.00  0"), -1);
+}
+
+TEST(VrpnShared, BytesPassThroughAPipe) {
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  EXPECT_EQ(vrpn_noint_block_write(ends[1], "whole", 5), 5);
+  close(ends[1]);
+  char bytes[8] = {};
+  EXPECT_EQ(vrpn_noint_block_read(ends[0], bytes, sizeof bytes), 5);
+  EXPECT_STREQ(bytes, "whole");
+  close(ends[0]);
+  EXPECT_EQ(vrpn_noint_block_write(-1, "x", 1), -1);
+}
+
+TEST(VrpnShared, NumbersTurnIntoTheOrderOfMessages) {
+  const vrpn_float64 sent = vrpn_htond(1.0);
+  EXPECT_EQ(reinterpret_cast<const unsigned char*>(&sent)[0], 0x3f);
+  EXPECT_EQ(vrpn_ntohd(sent), 1.0);
+  unsigned char bytes[8];
+  unsigned char* at = bytes;
+  vrpn_int32 left = sizeof bytes;
+  EXPECT_EQ(vrpn_buffer(&at, &left, -2.5), 0);
+  EXPECT_EQ(left, 0);
+  const unsigned char* take = bytes;
+  EXPECT_EQ(vrpn_unbuffer<vrpn_float64>(take), -2.5);
+  char name[3] = "zz";
+  vrpn_strncpynull(name, "abcdef", sizeof name);
+  EXPECT_STREQ(name, "ab");
+}
+
+// Values of the stock library for the same inputs, to six digits.
+TEST(VrpnQuat, RotatesFromTheLeft) {
+  q_type z, x, both;
+  q_from_axis_angle(z, 0, 0, 2, Q_PI / 2);
+  q_from_axis_angle(x, 1, 0, 0, Q_PI / 2);
+  q_mult(both, z, x);  // first about x
+  q_vec_type v = {0, 1, 0};
+  q_xform(v, both, v);
+  EXPECT_NEAR(v[2], 1, 1e-12);
+  q_vec_type euler;
+  q_to_euler(euler, both);
+  EXPECT_NEAR(euler[Q_YAW], Q_PI / 2, 1e-12);
+  EXPECT_NEAR(euler[Q_ROLL], Q_PI / 2, 1e-12);
+  q_matrix_type rows, columns;
+  q_to_row_matrix(rows, z);
+  q_to_col_matrix(columns, z);
+  EXPECT_NEAR(rows[0][1], 1, 1e-12);
+  EXPECT_NEAR(columns[1][0], 1, 1e-12);
+  for (double angle = 0.1; angle < 6; angle += 0.5) {
+    q_type q, back;
+    q_from_axis_angle(q, 1, -2, 0.5, angle);
+    for (const bool byRows : {false, true}) {
+      byRows ? q_to_row_matrix(rows, q) : q_to_col_matrix(rows, q);
+      byRows ? q_from_row_matrix(back, rows) : q_from_col_matrix(back, rows);
+      const double sign = back[Q_W] * q[Q_W] < 0 ? -1 : 1;
+      for (int i = 0; i < 4; ++i) EXPECT_NEAR(sign * back[i], q[i], 1e-9) << angle;
+    }
+    q_log(back, q);
+    q_exp(back, back);
+    for (int i = 0; i < 4; ++i) EXPECT_NEAR(back[i], q[i], 1e-9) << angle;
+  }
+}
+
+TEST(VrpnQuat, PosesComposeAndInvert) {
+  q_xyz_quat_type a = {{1, 2, 3}, Q_ID_QUAT};
+  q_from_axis_angle(a.quat, 0, 1, 0, 0.7);
+  q_xyz_quat_type inverse, unit;
+  q_xyz_quat_invert(&inverse, &a);
+  q_xyz_quat_compose(&unit, &a, &inverse);
+  EXPECT_NEAR(q_vec_magnitude(unit.xyz), 0, 1e-12);
+  EXPECT_NEAR(unit.quat[Q_W], 1, 1e-12);
+  qogl_matrix_type matrix;
+  q_xyz_quat_to_ogl_matrix(matrix, &a);
+  EXPECT_EQ(matrix[13], 2);
+  q_xyz_quat_type back;
+  q_ogl_matrix_to_xyz_quat(&back, matrix);
+  EXPECT_NEAR(back.quat[Q_Y], a.quat[Q_Y], 1e-12);
+  q_type half, whole, none = Q_ID_QUAT;
+  q_from_axis_angle(whole, 0, 0, 1, 1);
+  q_slerp(half, none, whole, 0.5);
+  EXPECT_NEAR(half[Q_Z], sin(0.25), 1e-12);
+  const q_vec_type right = {2, 0, 0}, left = {-1, 0, 0};
+  q_from_two_vecs(half, right, left);
+  EXPECT_NEAR(half[Q_W], 0, 1e-12);
+  EXPECT_NEAR(half[Q_X], 0, 1e-12);
 }
 
 TEST(VrpnShared, TimevalArithmetic) {

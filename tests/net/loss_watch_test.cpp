@@ -12,7 +12,17 @@ class LossWatchTest : public testing::Test {
  protected:
   bool look(bool inFlight, int probes, int sinceHeard_ms, int gap_ms = 100) {
     now_ += base::Nanos{1'000'000} * gap_ms;
-    return watch_.isLost({inFlight, probes, milliseconds(sinceHeard_ms)}, now_);
+    return watch_.isLost({.inFlight = inFlight, .probes = probes, .sinceHeard = milliseconds(sinceHeard_ms)},
+                         now_);
+  }
+  // A closed window with bytes in flight.
+  bool lookClosed(std::uint32_t retransmissions, int sinceHeard_ms) {
+    now_ += base::Nanos{1'000'000} * 100;
+    return watch_.isLost({.inFlight = true,
+                          .windowClosed = true,
+                          .retransmissions = retransmissions,
+                          .sinceHeard = milliseconds(sinceHeard_ms)},
+                         now_);
   }
 
   LossWatch watch_{milliseconds(500)};
@@ -59,6 +69,27 @@ TEST_F(LossWatchTest, OneOfTwoProbesMustBeAnswered) {
   EXPECT_FALSE(look(false, 1, 350));
   for (int i = 0; i < 5; ++i) EXPECT_FALSE(look(false, 2, 650 + 100 * i)) << i;
   EXPECT_TRUE(look(false, 2, 1150));
+}
+
+// The system repeats what the peer discarded after 0.2 s, 0.4 s, ... and the peer answers each time.
+TEST_F(LossWatchTest, APeerWithoutMemoryThatAnswersIsNotLost) {
+  std::uint32_t retransmissions = 7;
+  EXPECT_FALSE(look(true, 0, 10));
+  for (int pause_ms = 200; pause_ms < 60'000; pause_ms *= 2) {
+    ++retransmissions;
+    for (int t_ms = 20; t_ms < pause_ms; t_ms += 100) {
+      ASSERT_FALSE(lookClosed(retransmissions, t_ms)) << pause_ms << " " << t_ms;
+    }
+  }
+}
+
+TEST_F(LossWatchTest, APeerWithoutMemoryThatVanishesIsLost) {
+  EXPECT_FALSE(lookClosed(3, 20));
+  EXPECT_FALSE(lookClosed(3, 120));
+  EXPECT_FALSE(lookClosed(4, 220)) << "the first repetition";
+  EXPECT_FALSE(lookClosed(4, 320));
+  for (int i = 0; i < 5; ++i) EXPECT_FALSE(lookClosed(5, 620 + 100 * i)) << i;
+  EXPECT_TRUE(lookClosed(5, 1120));
 }
 
 TEST_F(LossWatchTest, WithoutATimeoutNothingIsEverLost) {

@@ -49,6 +49,17 @@ TEST(SendQueue, AboveTheMarkTheNewestLowLatencyBufferReplacesThoseWaiting) {
   EXPECT_EQ(queue.bytes(), 4u);
 }
 
+TEST(SendQueue, AReplacingBufferDropsThoseWaitingAtAnyLength) {
+  SendQueue queue(1000);
+  queue.push(bufferOf("head"), Delivery::lowLatency);
+  queue.consume(2);
+  queue.push(bufferOf("AA"), Delivery::reliable);
+  queue.push(bufferOf("old"), Delivery::lowLatency);
+  queue.push(bufferOf("new"), Delivery::lowLatency, true);
+  EXPECT_EQ(contents(queue), "adAAnew") << "a partly sent buffer is kept";
+  EXPECT_EQ(queue.droppedBuffers(), 1u);
+}
+
 TEST(SendQueue, ReliableBytesAloneAboveTheMarkDropEveryLowLatencyBuffer) {
   SendQueue queue(3);
   queue.push(bufferOf("AAAA"), Delivery::reliable);

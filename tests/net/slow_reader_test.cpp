@@ -85,6 +85,34 @@ TEST(SlowReader, LosesLowLatencyRecordsOnlyAndGetsTheRestInOrder) {
   EXPECT_EQ(gotLowLatency.back(), lowLatency - 1) << "the newest state is the one to keep";
 }
 
+// With a limit of unsent bytes a reader that was behind gets the newest record after what was under way
+// already.
+TEST(SlowReader, GetsTheNewestRecordInsteadOfAQueue) {
+  Loop loop;
+  Server server(loop, {.unsentLimitBytes = kSmallBuffer}, true);
+  RawSocket slow = server.join(kSmallBuffer);
+  Connection& connection = server.last().connection;
+  int sent = 0;
+  while (sent < 1000) {
+    connection.send(record(Delivery::lowLatency, sent++), Delivery::lowLatency);
+    connection.flush();
+  }
+  EXPECT_LE(connection.statistics().queuedBytes, 2 * kRecordBytes) << "the newest, and a partly sent one";
+  std::vector<int> got;
+  std::thread reader([&] {
+    for (std::string text; !(text = slow.receive(kRecordBytes)).empty();) {
+      got.push_back(parseRecord(text).second);
+    }
+    slow.close();
+  });
+  connection.close("done");
+  const bool closed = pumpUntil(loop, [&] { return !server.sessions[0]->closed.empty(); });
+  reader.join();
+  ASSERT_TRUE(closed);
+  EXPECT_LT(got.size(), 400u);
+  EXPECT_EQ(got.back(), sent - 1);
+}
+
 TEST(SlowReader, IsClosedWithAReasonAboveTheHardLimit) {
   Loop loop;
   Server server(loop, tightOptions(), true);
@@ -155,6 +183,29 @@ TEST(SlowReader, StaysConnectedHoweverLongItDoesNotRead) {
   EXPECT_EQ(server.last().closed, "");
   EXPECT_EQ(parseRecord(slow.receive(kRecordBytes)), std::pair('R', 0));
   EXPECT_EQ(parseRecord(slow.receive(kRecordBytes)), std::pair('L', 0));
+}
+
+// Small messages use up a small receive buffer long before its window is full: the peer's system discards
+// bytes in flight, closes the window and answers every repetition.
+TEST(SlowReader, StaysConnectedHoweverLittleMemoryItHas) {
+  Loop loop;
+  ConnectionOptions options;
+  options.lossTimeout = std::chrono::milliseconds(200);
+  options.keepAlive = std::chrono::seconds(1);
+  Server server(loop, options);
+  std::vector<RawSocket> peers;
+  for (const int buffer : {2 * 1024, 4 * 1024, 8 * 1024, 8 * 1024, 16 * 1024, 64 * 1024}) {
+    peers.push_back(server.join(buffer));
+  }
+  const auto report = bufferOf(std::string(150, 'x'));
+  const Subscription reports = loop.every(std::chrono::milliseconds(1), [&] {
+    for (const auto& session : server.sessions) {
+      for (int i = 0; i < 4; ++i) session->connection.send(report, Delivery::lowLatency);
+      session->connection.flush();
+    }
+  });
+  loop.runFor(std::chrono::milliseconds(2500));
+  for (const auto& session : server.sessions) EXPECT_EQ(session->closed, "");
 }
 
 }  // namespace

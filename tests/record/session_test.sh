@@ -17,6 +17,9 @@ wait "$heard"
 wait "$rows"
 [ "$(wc -l <"$work/heard.csv")" -gt 50 ]
 cp "$work/my.haptics" "$work/live.haptics" # while it is written
+for type in 'vrpn_Button States' 'hapticd Guard_State' 'vrpn_Tracker Pos_Quat' 'vrpn_ForceDevice Force'; do
+  grep -qaF "$type" "$work/heard.vrpn" || { echo "no '$type' in the log of a client"; exit 1; }
+done
 kill -INT "$server"
 wait "$server" || true
 grep -q 'recorded [0-9]* ticks' "$work/log"

@@ -237,7 +237,26 @@ TEST_F(BadProtocol, LogFilesAreRefused) {
   EXPECT_TRUE(untilLogged("requested log files \"" + file.string()));
   EXPECT_FALSE(std::filesystem::exists(file));
   EXPECT_TRUE(peer->open());
+  wire::FrameEncoder description;
+  description.addRaw({}, 0, wire::kSenderDescription, wire::encodeDescription("Phantom"));
+  peer->sendBytes(description.bytes());
+  EXPECT_TRUE(peer->until([&] { return peer->texts().size() >= 2; }))
+      << "the text of the device, which a stock client prints";
   EXPECT_TRUE(isIntact());
+}
+
+// The client is notified of the reason, too.
+TEST_F(BadProtocol, AMalformedMessageIsAnsweredWithATextBeforeTheEnd) {
+  ScriptedPeer peer(server_.address());
+  ASSERT_TRUE(peer.untilConnected());
+  peer.sendPayload(wire::kindOf<wire::SetVertex>, Bytes(3));
+  EXPECT_TRUE(peer.untilText("payload of 3 bytes"));
+  EXPECT_TRUE(peer.untilClosed());
+  ScriptedPeer torn(server_.address());
+  ASSERT_TRUE(torn.untilConnected());
+  torn.sendBytes(Bytes(64, std::byte{0xFF}));
+  EXPECT_TRUE(torn.untilText("; the connection ends"));
+  EXPECT_TRUE(torn.untilClosed());
 }
 
 TEST_F(BadProtocol, ReverseConnectionsToPortsBelow1024AreRefused) {

@@ -77,6 +77,16 @@ TEST_F(BadValues, MissingObjectsAreNamed) {
   EXPECT_TRUE(isIntact());
 }
 
+TEST_F(BadValues, NumbersWithoutMeaningAreRefusedOrReported) {
+  bad_.send(wire::SetObjectNumber{1});
+  bad_.send(wire::SetVertex{0, 0, {1e38F, 0, 0}});
+  EXPECT_TRUE(gotText("refused: a coordinate is not finite or too large"));
+  bad_.send(wire::TrackerSetUpdateRate{1e-300});
+  EXPECT_TRUE(gotText("set_update_rate: rate 1e-300 Hz is below the slowest, 0.01 Hz"));
+  bad_.send(wire::TrackerSetUpdateRate{1000});
+  EXPECT_TRUE(isIntact());
+}
+
 TEST_F(BadValues, InvalidObjectsAreNotAdded) {
   for (const std::int32_t id : {-1, 10'000, kLargest, kSmallest}) {
     bad_.send(wire::AddObject{id, -1});

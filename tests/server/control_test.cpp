@@ -83,6 +83,7 @@ TEST_F(ControlTest, OneClientSteersTheHandToItsTarget) {
   auto holder = peer();
   const auto other = peer();
   hold(*holder, 30, 20, 10);
+  other->send(wire::Subscribe{.kinds = wire::kReportHip, .rate = 0});
   const auto isAt = [&](double x, double y, double z) {
     const auto poses = other->all<wire::TrackerPosQuat>();
     for (auto pose = poses.rbegin(); pose != poses.rend(); ++pose) {

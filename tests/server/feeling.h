@@ -107,8 +107,16 @@ inline bool untilForceAbove(ScriptedPeer& peer, double force_N) {
   });
 }
 
-/// Waits until the HIP (sensor 1) is reported at this position.
+/// Subscribes to all tracker sensors: 0 the proxy, 1 the HIP, 2 the contact point.
+inline void subscribeToSensors(ScriptedPeer& peer) {
+  peer.send(wire::Subscribe{.kinds = wire::kReportDefault | wire::kReportHip | wire::kReportContactPoint,
+                            .rate = 0});
+}
+
+/// Subscribes to the HIP (sensor 1) and waits until it is reported at this position.
 inline bool untilHandAt(ScriptedPeer& peer, const Vec3& position_m, double tolerance_m = 5e-4) {
+  if (!peer.untilConnected()) return false;
+  subscribeToSensors(peer);
   return peer.until([&] {
     const auto pose = peer.last<wire::TrackerPosQuat>([](const auto& m) { return m.sensor == 1; });
     return pose && norm({pose->position[0] - position_m.x(), pose->position[1] - position_m.y(),

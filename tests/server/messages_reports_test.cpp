@@ -126,6 +126,7 @@ TEST_F(Reports, TouchedObjectAndIsTouchingReportContactAndItsEnd) {
 }
 
 TEST_F(Reports, PosQuatReportsProxyHipAndContact) {
+  subscribeToSensors(peer_);
   std::set<std::int32_t> sensors;
   ASSERT_TRUE(peer_.until([&] {
     for (const auto& pose : peer_.all<wire::TrackerPosQuat>()) sensors.insert(pose.sensor);
@@ -145,7 +146,7 @@ TEST_F(Reports, VelocityIsThatOfTheHip) {
   // 25 mm in 60 ms.
   EXPECT_TRUE(peer_.until([&] {
     const auto velocity = peer_.last<wire::TrackerVelocity>();
-    return velocity && velocity->sensor == 1 && std::abs(velocity->velocity[1] + 0.417) < 0.05;
+    return velocity && velocity->sensor == 0 && std::abs(velocity->velocity[1] + 0.417) < 0.05;
   }));
 }
 
@@ -155,7 +156,7 @@ TEST_F(Reports, AccelerationIsNotReported) {
 }
 
 TEST_F(Reports, ButtonChangeReportsEveryPressAndRelease) {
-  std::vector<std::int32_t> states;  // of button 0; "touching" is also a button
+  std::vector<std::int32_t> states;
   ASSERT_TRUE(peer_.until([&] {
     states.clear();
     for (const auto& change : peer_.all<wire::ButtonChange>()) {

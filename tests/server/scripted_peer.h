@@ -225,7 +225,8 @@ class ScriptedPeer {
       if (message->kind == wire::kindOf<wire::Text>) {
         texts_.push_back(*wire::decode<wire::Text>(message->payload));
       }
-      if (message->local_sender != device_) return;
+      const bool listensToAll = device_ == sender_;  // uses no device
+      if (!listensToAll && message->local_sender != device_) return;
       messages_.push_back(
           {message->kind, message->time, {message->payload.begin(), message->payload.end()}, byDatagram});
       ++counts_[message->kind];

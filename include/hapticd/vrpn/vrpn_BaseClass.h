@@ -47,6 +47,22 @@ class VRPN_API vrpn_BaseClass {
   vrpn_Connection* connectionPtr() { return d_connection; }
   virtual void mainloop() = 0;
 
+  /// A text message of one severity: what send_text_message(severity) returns.
+  class SendTextMessageBoundCall {
+   public:
+    SendTextMessageBoundCall(vrpn_BaseClass* device, vrpn_TEXT_SEVERITY severity)
+        : device_(device), severity_(severity) {}
+    int operator()(const char* text) const {
+      struct timeval now;
+      vrpn_gettimeofday(&now);
+      return device_->send_text_message(text, now, severity_);
+    }
+
+   private:
+    vrpn_BaseClass* device_;
+    vrpn_TEXT_SEVERITY severity_;
+  };
+
   /// Suppresses the warning about a server that does not answer.
   bool shutup = false;
 
@@ -64,6 +80,25 @@ class VRPN_API vrpn_BaseClass {
   void listen(const char* type, vrpn_MESSAGEHANDLER handler);
   int send_text_message(const char* text, struct timeval time, vrpn_TEXT_SEVERITY severity = vrpn_TEXT_NORMAL,
                         vrpn_uint32 level = 0);
+  SendTextMessageBoundCall send_text_message(vrpn_TEXT_SEVERITY severity) {
+    return SendTextMessageBoundCall(this, severity);
+  }
+  /// The payload of a text message: 2 * 4 + vrpn_MAX_TEXT_LEN bytes.
+  static int encode_text_message_to_buffer(char* buffer, vrpn_TEXT_SEVERITY severity, vrpn_uint32 level,
+                                           const char* text) {
+    vrpn_int32 left = 2 * sizeof(vrpn_uint32) + vrpn_MAX_TEXT_LEN;
+    vrpn_buffer(&buffer, &left, static_cast<vrpn_uint32>(severity));
+    vrpn_buffer(&buffer, &left, level);
+    return vrpn_buffer(&buffer, &left, text, -1);
+  }
+  static int decode_text_message_from_buffer(char* text, vrpn_TEXT_SEVERITY* severity, vrpn_uint32* level,
+                                             const char* buffer) {
+    vrpn_uint32 number = 0;
+    vrpn_unbuffer(&buffer, &number);
+    *severity = static_cast<vrpn_TEXT_SEVERITY>(number);
+    vrpn_unbuffer(&buffer, level);
+    return vrpn_unbuffer(&buffer, text, -static_cast<vrpn_int32>(vrpn_MAX_TEXT_LEN));
+  }
   /// Runs the connection, and prints a warning while the device does not answer.
   void client_mainloop();
 

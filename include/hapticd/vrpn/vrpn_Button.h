@@ -5,6 +5,7 @@
 #include "vrpn_BaseClass.h"
 
 const int vrpn_BUTTON_MAX_BUTTONS = 256;
+const int VRPN_BUTTON_BUF_SIZE = 256;
 const int vrpn_BUTTON_MOMENTARY = 10;
 const int vrpn_BUTTON_TOGGLE_OFF = 20;
 const int vrpn_BUTTON_TOGGLE_ON = 21;

@@ -2,7 +2,11 @@
 #ifndef VRPN_CONNECTION_H
 #define VRPN_CONNECTION_H
 
+#include <errno.h>
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
 
 #include <memory>
 #include <string>
@@ -12,10 +16,12 @@
 #include "vrpn_Shared.h"
 #include "vrpn_Types.h"
 
-namespace hapticd::client {
+namespace hapticd {
+namespace client {
 class Link;
 struct Arrival;
-}  // namespace hapticd::client
+}  // namespace client
+}  // namespace hapticd
 
 struct vrpn_HANDLERPARAM {
   vrpn_int32 type;
@@ -26,10 +32,25 @@ struct vrpn_HANDLERPARAM {
 };
 typedef int(VRPN_CALLBACK* vrpn_MESSAGEHANDLER)(void* userdata, vrpn_HANDLERPARAM p);
 
+/// Decides whether a message is logged; this library writes no logs.
+typedef int(VRPN_CALLBACK* vrpn_LOGFILTER)(void* userdata, vrpn_HANDLERPARAM p);
+
 const vrpn_int32 vrpn_ANY_SENDER = -1;
 const vrpn_int32 vrpn_ANY_TYPE = -1;
 const int vrpn_CONNECTION_TCP_BUFLEN = 64000;
 const int vrpn_CONNECTION_UDP_BUFLEN = 1472;
+const int vrpn_CONNECTION_MAX_SENDERS = 2000;
+const int vrpn_CONNECTION_MAX_TYPES = 2000;
+const int vrpn_MAX_ENDPOINTS = 256;
+const unsigned vrpn_ALIGN = 8;
+const vrpn_int32 vrpn_CONNECTION_SENDER_DESCRIPTION = -1;
+const vrpn_int32 vrpn_CONNECTION_TYPE_DESCRIPTION = -2;
+const vrpn_int32 vrpn_CONNECTION_UDP_DESCRIPTION = -3;
+const vrpn_int32 vrpn_CONNECTION_LOG_DESCRIPTION = -4;
+const vrpn_int32 vrpn_CONNECTION_DISCONNECT_MESSAGE = -5;
+const long vrpn_LOG_NONE = 0;
+const long vrpn_LOG_INCOMING = 1 << 0;
+const long vrpn_LOG_OUTGOING = 1 << 1;
 const unsigned vrpn_CNAME_LENGTH = 100;
 typedef char vrpn_CNAME[vrpn_CNAME_LENGTH];
 
@@ -44,6 +65,8 @@ extern VRPN_API const char* vrpn_got_connection;
 extern VRPN_API const char* vrpn_dropped_connection;
 extern VRPN_API const char* vrpn_dropped_last_connection;
 extern VRPN_API const char* vrpn_CONTROL;
+
+class vrpn_File_Connection;
 
 class VRPN_API vrpn_Connection {
  public:
@@ -74,6 +97,12 @@ class VRPN_API vrpn_Connection {
   /// NULL for an unknown number.
   virtual const char* sender_name(vrpn_int32 sender);
   virtual const char* message_type_name(vrpn_int32 type);
+
+  /// A client accepts nobody, and this library reads and writes no logs, so these do nothing.
+  void Jane_stop_this_crazy_thing(vrpn_uint32) {}
+  vrpn_File_Connection* get_File_Connection() { return NULL; }
+  int register_log_filter(vrpn_LOGFILTER, void*) { return 0; }
+  int save_log_so_far() { return 0; }
 
   void addReference();
   void removeReference();
@@ -118,5 +147,88 @@ VRPN_API vrpn_Connection* vrpn_get_connection_by_name(const char* name, const ch
 /// The part before, or behind, the @; the caller releases it by delete[].
 VRPN_API char* vrpn_copy_service_name(const char* name);
 VRPN_API char* vrpn_copy_service_location(const char* name);
+
+/// The host of a name such as NAME@tcp://host:port; the caller releases it by delete[].
+inline char* vrpn_copy_machine_name(const char* name) {
+  const char* at = strrchr(name, '@');
+  std::string host(at != NULL ? at + 1 : name);
+  const size_t scheme = host.find("//");
+  if (scheme != std::string::npos) {
+    host.erase(0, scheme + 2);
+  } else if (host.compare(0, 4, "tcp:") == 0) {
+    host.erase(0, 4);
+  } else if (host.compare(0, 7, "x-vrpn:") == 0) {
+    host.erase(0, 7);
+  }
+  const size_t end = host.find_first_of(":/");
+  if (end != std::string::npos) host.erase(end);
+  char* copy = new char[host.size() + 1];
+  memcpy(copy, host.c_str(), host.size() + 1);
+  return copy;
+}
+/// The port behind the last colon; VRPN's own when there is none.
+inline int vrpn_get_port_number(const char* name) {
+  const char* colon = strrchr(name, ':');
+  const int port = colon != NULL ? atoi(colon + 1) : 0;
+  return port > 0 ? port : vrpn_DEFAULT_LISTEN_PORT_NO;
+}
+/// The path in NAME@file:path or file://path, NULL for other names; the caller releases it by delete[].
+inline char* vrpn_copy_file_name(const char* name) {
+  const char* at = strchr(name, '@');
+  const char* path = at != NULL ? at + 1 : name;
+  if (strncmp(path, "file:", 5) != 0) return NULL;
+  path += strncmp(path, "file://", 7) == 0 ? 7 : 5;
+  char* copy = new char[strlen(path) + 1];
+  memcpy(copy, path, strlen(path) + 1);
+  return copy;
+}
+/// NAME@server with another NAME; the caller releases it by delete[].
+inline char* vrpn_set_service_name(const char* name, const char* service) {
+  const char* at = strrchr(name, '@');
+  const std::string text = std::string(service) + "@" + (at != NULL ? at + 1 : name);
+  char* copy = new char[text.size() + 1];
+  memcpy(copy, text.c_str(), text.size() + 1);
+  return copy;
+}
+
+/// The greeting of both sides: VRPN's version and the log mode in 24 bytes.
+inline size_t vrpn_cookie_size() {
+  return 24;
+}
+/// -1 when the buffer is too short.
+inline int write_vrpn_cookie(char* buffer, size_t length, long remote_log_mode) {
+  if (length < vrpn_cookie_size() + 1) return -1;
+  memset(buffer, 0, vrpn_cookie_size() + 1);
+  snprintf(buffer, length, "vrpn: ver. 07.38  %c", static_cast<char>('0' + (remote_log_mode & 3)));
+  return 0;
+}
+/// 0 for the same version, 1 for another minor one, -1 for a peer that speaks something else.
+inline int check_vrpn_cookie(const char* buffer) {
+  const char* const ours = "vrpn: ver. 07.38";
+  if (strncmp(buffer, ours, strlen(ours) - 2) != 0) return -1;
+  return strncmp(buffer, ours, strlen(ours)) == 0 ? 0 : 1;
+}
+
+/// write() and read() of all bytes, repeated after interruptions; the number of bytes, or -1.
+inline int vrpn_noint_block_write(int descriptor, const char* buffer, size_t length) {
+  size_t done = 0;
+  while (done < length) {
+    const ssize_t count = write(descriptor, buffer + done, length - done);
+    if (count < 0 && errno != EINTR) return -1;
+    if (count == 0) break;
+    if (count > 0) done += static_cast<size_t>(count);
+  }
+  return static_cast<int>(done);
+}
+inline int vrpn_noint_block_read(int descriptor, char* buffer, size_t length) {
+  size_t done = 0;
+  while (done < length) {
+    const ssize_t count = read(descriptor, buffer + done, length - done);
+    if (count < 0 && errno != EINTR) return -1;
+    if (count == 0) break;
+    if (count > 0) done += static_cast<size_t>(count);
+  }
+  return static_cast<int>(done);
+}
 
 #endif

@@ -8,12 +8,24 @@
 #include <sys/time.h>
 
 #include <type_traits>
+#include <vector>
 
 #include "vrpn_Types.h"
 
 #define VRPN_PI (3.14159265358979323846)
 #define VRPN_DEGREES_TO_RADIANS (VRPN_PI / 180.0)
 #define VRPN_RADIANS_TO_DEGREES (180.0 / VRPN_PI)
+
+#define VRPN_INCHES_TO_METERS (0.0254)
+#define VRPN_METERS_TO_INCHES (1 / 0.0254)
+
+typedef int vrpn_SOCKET;
+#ifndef INVALID_SOCKET
+#define INVALID_SOCKET (-1)
+#endif
+
+template <class T>
+using vrpn_vector = std::vector<T>;
 
 inline int vrpn_gettimeofday(struct timeval* now, void* = nullptr) {
   return gettimeofday(now, nullptr);
@@ -56,6 +68,13 @@ int vrpn_buffer(char** insert, vrpn_int32* left, const T value) {
   *left -= static_cast<vrpn_int32>(sizeof(T));
   return 0;
 }
+template <class T>
+int vrpn_buffer(unsigned char** insert, vrpn_int32* left, const T value) {
+  char* at = reinterpret_cast<char*>(*insert);
+  const int result = vrpn_buffer(&at, left, value);
+  *insert = reinterpret_cast<unsigned char*>(at);
+  return result;
+}
 /// Reads a big-endian scalar and advances.
 template <class T>
 int vrpn_unbuffer(const char** buffer, T* value) {
@@ -69,6 +88,38 @@ int vrpn_unbuffer(const char** buffer, T* value) {
   *buffer += sizeof(T);
   return 0;
 }
+template <class T, class Byte>
+T vrpn_unbuffer(Byte*& buffer) {
+  static_assert(sizeof(Byte) == 1, "a buffer of bytes");
+  const char* at = reinterpret_cast<const char*>(buffer);
+  T value;
+  vrpn_unbuffer(&at, &value);
+  buffer += sizeof(T);
+  return value;
+}
+
+/// Between the byte orders of this machine and of messages (big endian).
+inline vrpn_float64 vrpn_htond(vrpn_float64 value) {
+  char bytes[sizeof value];
+  char* at = bytes;
+  vrpn_int32 left = sizeof value;
+  vrpn_buffer(&at, &left, value);
+  memcpy(&value, bytes, sizeof value);
+  return value;
+}
+inline vrpn_float64 vrpn_ntohd(vrpn_float64 value) {
+  return vrpn_htond(value);
+}
+
+/// Copies at most size - 1 characters; terminated by a NUL unless size is 0.
+inline char* vrpn_strncpynull(char* to, const char* from, size_t size) {
+  if (size == 0) return to;
+  const size_t length = strnlen(from, size - 1);
+  memcpy(to, from, length);
+  to[length] = '\0';
+  return to;
+}
+
 VRPN_API int vrpn_buffer(char** insert, vrpn_int32* left, const struct timeval t);
 VRPN_API int vrpn_unbuffer(const char** buffer, struct timeval* t);
 /// Text of the given length, or (-1) up to and including its NUL.

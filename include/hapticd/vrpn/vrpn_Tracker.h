@@ -8,6 +8,17 @@
 
 const int vrpn_ALL_SENSORS = -1;
 
+// States of a tracker's driver.
+const int vrpn_TRACKER_SYNCING = 3;
+const int vrpn_TRACKER_AWAITING_STATION = 2;
+const int vrpn_TRACKER_REPORT_READY = 1;
+const int vrpn_TRACKER_PARTIAL = 0;
+const int vrpn_TRACKER_RESETTING = -1;
+const int vrpn_TRACKER_FAIL = -2;
+
+typedef vrpn_float64 vrpn_Tracker_Pos[3];
+typedef vrpn_float64 vrpn_Tracker_Quat[4];
+
 typedef struct _vrpn_TRACKERCB {
   struct timeval msg_time;
   vrpn_int32 sensor;

@@ -8,6 +8,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "scene/config.h"
@@ -44,6 +45,19 @@ enum class SceneOnDisconnect { keep, clear };
 /// Which clients may command: all, the first to command until it disconnects, or those at listed addresses.
 enum class Control { any, first, list };
 
+/// What a client finds under a name of the device. Stock clients take every sensor for the first one and
+/// every button for one of the device, so anything beyond them has a name of its own.
+enum class View {
+  device,   ///< everything that the client subscribed to
+  hand,     ///< tracker whose sensor 0 is the HIP
+  contact,  ///< tracker whose sensor 0 is the surface contact point, during contact
+  touch,    ///< button 0 is "touching"; the analog channels mirror the contact
+};
+
+/// The mirrors of a device NAME are called NAME.hand, NAME.contact and NAME.touch.
+inline constexpr std::array<std::pair<View, const char*>, 3> kMirrors{
+    {{View::hand, ".hand"}, {View::contact, ".contact"}, {View::touch, ".touch"}}};
+
 /// The box to which the paper's server fits scenes: min xyz, max xyz.
 inline constexpr std::array<double, 6> kPaperWorkspace_mm{-80, -80, -70, 80, 80, 20};
 
@@ -75,6 +89,9 @@ struct DeviceConfig {
   WorkspaceFit workspaceFit = WorkspaceFit::published;
   VibrationUnit vibrationContactUnit = VibrationUnit::radPerSecond;
   VibrationFrame vibrationMotorFrame = VibrationFrame::stylus;
+  bool mirrors = false;  ///< also offer NAME.hand, NAME.contact and NAME.touch, see View
+  bool compatMirrors =
+      false;  ///< send hand, contact point, touch button and contact channels under the device's names
   std::string scene;  ///< devices with the same name share a scene; empty: not shared
   SceneOnDisconnect sceneOnDisconnect = SceneOnDisconnect::keep;
   Control control = Control::any;

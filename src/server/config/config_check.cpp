@@ -190,7 +190,11 @@ void validate(const ServerConfig& config) {
     const DeviceConfig& device = config.devices[i];
     if (device.names.empty())
       throw InvalidValue(i, "names", "a device needs at least one name, e.g. name = \"Phantom\"");
-    for (const std::string& name : device.names) checkName(i, name, uses);
+    for (const std::string& name : device.names) {
+      checkName(i, name, uses);
+      if (!device.mirrors) continue;
+      for (const auto& mirror : kMirrors) checkName(i, name + mirror.second, uses);
+    }
     const Checker check(i, device.names.front());
     checkDevice(check, device);
     if (device.scene.empty()) continue;

@@ -56,6 +56,8 @@ void visitFields(Visitor& visitor, Device& device) {
   visitor.choice("vibration_contact_unit", device.vibrationContactUnit, kVibrationUnits);
   visitor.field("vibration_contact_pulls", device.vibrationContactPulls);
   visitor.choice("vibration_motor_frame", device.vibrationMotorFrame, kVibrationFrames);
+  visitor.field("mirrors", device.mirrors);
+  visitor.field("compat_mirrors", device.compatMirrors);
   visitor.field("scene", device.scene);
   visitor.choice("scene_on_disconnect", device.sceneOnDisconnect, kSceneOnDisconnects);
   visitor.choice("control", device.control, kControls);

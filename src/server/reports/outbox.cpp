@@ -20,11 +20,21 @@ void Outbox::Group::add(const Outgoing& out, wire::Time time) {
   (mayBeLost ? lowLatency : reliable).add(time, name, out.message);
 }
 
-Outbox::Outbox(const DeviceConfig& config, int buttonCount, std::vector<wire::LocalSender> names)
+Outbox::Outbox(const DeviceConfig& config, int buttonCount, std::vector<DeviceName> names)
     : config_(config),
       buttonCount_(buttonCount),
       names_(std::move(names)),
-      defaultChoice_{.kinds = wire::kReportDefault, .rate_Hz = config.reportRate_Hz} {}
+      defaultChoice_(defaultChoice(config)) {}
+
+void Outbox::join(Session& session) {
+  regroup(session, listener(session));
+}
+
+void Outbox::sendPresentState(Session& session) {
+  Listener& entry = listener(session);
+  regroup(session, entry);
+  for (const auto& group : entry.groups) sendPresentState(session, group->name, *group);
+}
 
 void Outbox::subscribe(Session& session, wire::LocalSender name) {
   Listener& entry = listener(session);
@@ -41,34 +51,51 @@ ReportChoice Outbox::choiceOf(scene::ClientId client) const {
 
 void Outbox::choose(Session& session, const ReportChoice& choice) {
   Listener& entry = listener(session);
-  entry.choice = choice;
-  regroup(session, entry);
-  for (const auto& group : entry.groups) sendPresentState(session, group->name, *group);
+  entry.chosen = true;
+  entry.choice = withMirrors(config_, choice);
+  sendPresentState(session);
+}
+
+void Outbox::extend(Session& session) {
+  if (listener(session).chosen) return;
+  ReportChoice choice = choiceOf(session.id());
+  choice.kinds |= wire::kReportHip | wire::kReportContactPoint;
+  choose(session, choice);
 }
 
 void Outbox::clientGone(scene::ClientId client) {
   listeners_.erase(client);
 }
 
+Reporter Outbox::reporterFor(scene::ClientId client, wire::LocalSender name) const {
+  const auto known = std::find_if(names_.begin(), names_.end(),
+                                  [name](const DeviceName& entry) { return entry.sender == name; });
+  return {config_, buttonCount_, choiceOf(client), known == names_.end() ? View::device : known->view};
+}
+
 Outbox::Listener& Outbox::listener(const Session& session) {
-  return listeners_.try_emplace(session.id(), Listener{.choice = defaultChoice_, .names = 0, .groups = {}})
+  return listeners_
+      .try_emplace(session.id(),
+                   Listener{.choice = defaultChoice_, .chosen = false, .names = 0, .groups = {}})
       .first->second;
 }
 
 void Outbox::regroup(const Session& session, Listener& listener) {
   std::vector<std::shared_ptr<Group>> groups;
-  for (const wire::LocalSender name : names_) {
-    if (session.wants(name)) groups.push_back(group(name, listener.choice));
+  for (const DeviceName& name : names_) {
+    if (session.wants(name.sender)) groups.push_back(group(name, listener.choice));
   }
   listener.groups = std::move(groups);
   listener.names = session.namesWanted();
 }
 
-std::shared_ptr<Outbox::Group> Outbox::group(wire::LocalSender name, const ReportChoice& choice) {
+std::shared_ptr<Outbox::Group> Outbox::group(const DeviceName& name, const ReportChoice& choice) {
   std::erase_if(groups_, [](const auto& entry) { return entry.second.expired(); });
-  std::weak_ptr<Group>& known = groups_[{name.value, choice}];
+  std::weak_ptr<Group>& known = groups_[{name.sender.value, choice}];
   std::shared_ptr<Group> group = known.lock();
-  if (!group) known = group = std::make_shared<Group>(name, Reporter(config_, buttonCount_, choice));
+  if (!group) {
+    known = group = std::make_shared<Group>(name.sender, Reporter(config_, buttonCount_, choice, name.view));
+  }
   return group;
 }
 
@@ -80,7 +107,7 @@ void Outbox::sendPresentState(Session& session, wire::LocalSender name, const Gr
   session.flush();
 }
 
-void Outbox::add(const realtime::TickReport& tick, const ReportFrame& frame, wire::Time time) {
+void Outbox::add(const realtime::TickReport& tick, const ReportFrame& frame, wire::Time time, bool late) {
   const bool first = last_.tick == 0;
   last_ = tick;
   lastTime_ = time;
@@ -92,6 +119,8 @@ void Outbox::add(const realtime::TickReport& tick, const ReportFrame& frame, wir
     // Clients that subscribed before the first tick still need the initial state.
     if (first) {
       group->reporter.presentState(tick, frame, outgoing_);
+    } else if (late) {
+      group->reporter.skip(tick, frame, outgoing_);
     } else {
       group->reporter.update(tick, frame, outgoing_);
     }
@@ -114,13 +143,18 @@ bool Outbox::collect() {
     group->reliableFrames = takeBuffer(group->reliable);
     any = any || group->lowLatencyFrames || group->reliableFrames;
   }
-  return any;
+  if (!any) return false;
+  for (const auto& [key, weak] : groups_) {
+    if (const std::shared_ptr<Group> group = weak.lock()) group->skipped = group->reporter.takeSkipped();
+  }
+  return true;
 }
 
 void Outbox::send(Session& session) {
   Listener& entry = listener(session);
   if (entry.groups.empty() || entry.names != session.namesWanted()) regroup(session, entry);
   for (const auto& group : entry.groups) {
+    session.countSkipped(group->skipped);
     if (group->lowLatencyFrames) session.sendShared(group->lowLatencyFrames, net::Delivery::lowLatency);
     if (group->reliableFrames) session.sendShared(group->reliableFrames, net::Delivery::reliable);
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/time.h"
 #include "wire/codec.h"
@@ -91,12 +92,45 @@ wire::HandState handState(const TickReport& tick, const ClientTick& clientTick, 
   return state;
 }
 
+// The mirrors have fixed kinds: a client that addresses them by name need not know of subscriptions.
+ReportChoice choiceFor(View view, ReportChoice choice) {
+  switch (view) {
+    case View::device:
+      break;
+    case View::hand:
+      choice.kinds = wire::kReportHip;
+      break;
+    case View::contact:
+      choice.kinds = wire::kReportContactPoint;
+      break;
+    case View::touch:
+      choice.kinds = wire::kReportTouchButton | wire::kReportContactAnalog;
+      break;
+  }
+  return choice;
+}
+
 }  // namespace
 
-Reporter::Reporter(const DeviceConfig& config, int buttonCount, const ReportChoice& choice)
+ReportChoice withMirrors(const DeviceConfig& config, ReportChoice choice) {
+  if (!config.compatMirrors) return choice;
+  if ((choice.kinds & wire::kReportTracker) != 0) {
+    choice.kinds |= wire::kReportHip | wire::kReportContactPoint;
+  }
+  if ((choice.kinds & wire::kReportButton) != 0) choice.kinds |= wire::kReportTouchButton;
+  if ((choice.kinds & wire::kReportAnalog) != 0) choice.kinds |= wire::kReportContactAnalog;
+  return choice;
+}
+
+ReportChoice defaultChoice(const DeviceConfig& config) {
+  return withMirrors(config, {.kinds = wire::kReportDefault, .rate_Hz = config.reportRate_Hz});
+}
+
+Reporter::Reporter(const DeviceConfig& config, int buttonCount, const ReportChoice& choice, View view)
     : config_(config),
-      buttonCount_(buttonCount),
-      choice_(choice),
+      buttonCount_(view == View::device ? buttonCount : 0),
+      view_(view),
+      choice_(choiceFor(view, choice)),
       period_(base::toNanos(1.0 / choice.rate_Hz)) {}
 
 wire::F64x4 Reporter::quaternion(const Quat& q) const {
@@ -107,23 +141,36 @@ wire::F64x4 Reporter::quaternion(const Quat& q) const {
 void Reporter::update(const TickReport& tick, const ReportFrame& frame, std::vector<Outgoing>& out) {
   guard(tick, out);
   const bool touching = tick.rendering.touching;
-  buttons(frame.buttons | std::uint32_t{touching} << buttonCount_, out);
+  buttons(frame.buttons, touching, out);
   const bool contactEnded = touching_ && !touching;
+  const bool contactChanged = touching_ != touching;
   if (tick.time < due_ && !contactEnded) return;
   due_ = std::max(due_ + period_, tick.time - period_ / 2);
   const ClientTick clientTick = toClientTick(tick, config_.forceReport);
   tracker(clientTick, frame, out);
   if (contactEnded) {
     contactEnd(clientTick, out);
-  } else if (const bool changed = contact(clientTick, out); gripperMoved(clientTick) || changed) {
-    analog(clientTick, false, out);
+  } else {
+    const bool changed = contact(clientTick, out) && wants(wire::kReportContactAnalog);
+    if (changed || gripperMoved(clientTick)) analog(clientTick, false, out);
   }
   touching_ = clientTick.touching;
-  if (wants(wire::kReportForce)) out.push_back({wire::IsTouching{flag(clientTick.touching)}, false});
+  if (wants(wire::kReportForce)) out.push_back({wire::IsTouching{flag(clientTick.touching)}, contactChanged});
   tickReport(tick, clientTick, contactEnded, out);
 }
 
+void Reporter::skip(const TickReport& tick, const ReportFrame& frame, std::vector<Outgoing>& out) {
+  if (touching_ != tick.rendering.touching) {
+    update(tick, frame, out);
+    return;
+  }
+  guard(tick, out);
+  buttons(frame.buttons, tick.rendering.touching, out);
+  if (tick.time >= due_) ++skipped_;
+}
+
 void Reporter::guard(const TickReport& tick, std::vector<Outgoing>& out) {
+  if (view_ != View::device) return;
   const wire::GuardState state = guardState(tick.guard);
   if (!(state == guard_)) out.push_back({guard_ = state, true});
   constexpr std::uint32_t kInside = realtime::bit(realtime::Trip::deepContact);
@@ -149,22 +196,33 @@ void Reporter::guard(const TickReport& tick, std::vector<Outgoing>& out) {
   reportedTrips_ = now;
 }
 
-wire::ButtonStates Reporter::buttonStates(int buttonCount, std::uint32_t buttons, bool touching) {
+wire::ButtonStates Reporter::buttonStates(std::uint32_t buttons, bool touching) const {
   wire::ButtonStates states;
-  for (int i = 0; i < buttonCount; ++i) {
+  for (int i = 0; i < buttonCount_; ++i) {
     states.states.values.push_back(static_cast<std::int32_t>(buttons >> i & 1U));
   }
-  states.states.values.push_back(touching ? 1 : 0);
+  if (wants(wire::kReportTouchButton)) states.states.values.push_back(touching ? 1 : 0);
   return states;
 }
 
-void Reporter::buttons(std::uint32_t buttons, std::vector<Outgoing>& out) {
-  const std::uint32_t changed = buttons ^ buttons_;
-  buttons_ = buttons;
-  if (!wants(wire::kReportButton)) return;
-  for (std::int32_t i = 0; i < 32; ++i) {
-    if ((changed >> i & 1U) == 0) continue;
-    out.push_back({wire::ButtonChange{i, static_cast<std::int32_t>(buttons >> i & 1U)}, true});
+std::int32_t Reporter::sensorCount() const noexcept {
+  if (view_ != View::device) return 1;
+  return wants(wire::kReportContactPoint) ? kSensorContact + 1
+         : wants(wire::kReportHip)       ? kSensorHip + 1
+                                          : 1;
+}
+
+void Reporter::buttons(std::uint32_t buttons, bool touching, std::vector<Outgoing>& out) {
+  const std::uint32_t changed = buttons ^ std::exchange(buttons_, buttons);
+  const bool touchChanged = touching != std::exchange(touchButton_, touching);
+  if (wants(wire::kReportButton)) {
+    for (std::int32_t i = 0; i < buttonCount_; ++i) {
+      if ((changed >> i & 1U) == 0) continue;
+      out.push_back({wire::ButtonChange{i, static_cast<std::int32_t>(buttons >> i & 1U)}, true});
+    }
+  }
+  if (touchChanged && wants(wire::kReportTouchButton)) {
+    out.push_back({wire::ButtonChange{buttonCount_, touching ? 1 : 0}, true});
   }
 }
 
@@ -180,33 +238,45 @@ bool Reporter::moved(std::int32_t sensor, const Vec3& position, const Quat& orie
 }
 
 void Reporter::tracker(const ClientTick& clientTick, const ReportFrame& frame, std::vector<Outgoing>& out) {
-  if (!wants(wire::kReportTracker)) return;
+  constexpr std::uint32_t kAny = wire::kReportTracker | wire::kReportHip | wire::kReportContactPoint;
+  if (!wants(kAny)) return;
   const Quat toFrame = frame.rotation.conjugate();
   const Quat orientation = toFrame * clientTick.orientation;
-  const auto report = [&](std::int32_t sensor, const Vec3& world) {
+  const auto pose = [&](std::uint32_t kind, std::int32_t sensor, const Vec3& world) {
     const Vec3 position = toFrame * (world - frame.origin);
-    if (!moved(sensor, position, orientation)) return;
-    out.push_back({wire::TrackerPosQuat{.sensor = sensor,
-                                        .filler = sensor,
+    if (!moved(sensor, position, orientation)) return false;
+    if (!wants(kind)) return true;
+    const std::int32_t number = view_ == View::device ? sensor : 0;
+    out.push_back({wire::TrackerPosQuat{.sensor = number,
+                                        .filler = number,
                                         .position = array(position),
                                         .orientation = quaternion(orientation)},
                    false});
-    if (sensor != kSensorHip) return;
-    // VRPN encodes angular velocity as the rotation during an interval.
-    constexpr double kInterval_s = 0.01;
-    const Vec3 angular = toFrame * clientTick.angularVelocity;
-    const double angle = angular.norm() * kInterval_s;
-    const Quat turn = angle > 0 ? Quat(Eigen::AngleAxisd(angle, angular.normalized())) : Quat::Identity();
-    out.push_back({wire::TrackerVelocity{.sensor = sensor,
-                                         .filler = sensor,
-                                         .velocity = array(toFrame * clientTick.velocity),
-                                         .rotation = quaternion(turn),
-                                         .interval = kInterval_s},
-                   false});
+    return true;
   };
-  report(kSensorProxy, clientTick.proxy);
-  report(kSensorHip, clientTick.hip);
-  if (clientTick.touching) report(kSensorContact, clientTick.scp);
+  pose(wire::kReportTracker, kSensorProxy, clientTick.proxy);
+  // A client without sensor 1 gets the velocity of the HIP as that of sensor 0, as from a stock server.
+  if (pose(wire::kReportHip, kSensorHip, clientTick.hip) &&
+      wants(wire::kReportTracker | wire::kReportHip)) {
+    const bool separate = view_ == View::device && wants(wire::kReportHip);
+    velocity(clientTick, toFrame, separate ? kSensorHip : kSensorProxy, out);
+  }
+  if (clientTick.touching) pose(wire::kReportContactPoint, kSensorContact, clientTick.scp);
+}
+
+void Reporter::velocity(const ClientTick& clientTick, const Quat& toFrame, std::int32_t sensor,
+                        std::vector<Outgoing>& out) const {
+  // VRPN encodes angular velocity as the rotation during an interval.
+  constexpr double kInterval_s = 0.01;
+  const Vec3 angular = toFrame * clientTick.angularVelocity;
+  const double angle = angular.norm() * kInterval_s;
+  const Quat turn = angle > 0 ? Quat(Eigen::AngleAxisd(angle, angular.normalized())) : Quat::Identity();
+  out.push_back({wire::TrackerVelocity{.sensor = sensor,
+                                       .filler = sensor,
+                                       .velocity = array(toFrame * clientTick.velocity),
+                                       .rotation = quaternion(turn),
+                                       .interval = kInterval_s},
+                 false});
 }
 
 bool Reporter::gripperMoved(const ClientTick& clientTick) const {
@@ -261,11 +331,14 @@ void Reporter::contactEnd(const ClientTick& clientTick, std::vector<Outgoing>& o
 
 void Reporter::analog(const ClientTick& clientTick, bool reliable, std::vector<Outgoing>& out) {
   gripper_rad_ = clientTick.gripper_rad;
-  if (!wants(wire::kReportAnalog)) return;
+  const bool mirrored = wants(wire::kReportContactAnalog);
+  if (!mirrored && !(wants(wire::kReportAnalog) && clientTick.gripper_rad)) return;
   const Vec3& f = clientTick.force_N;
   wire::AnalogChannels channels;
-  channels.channels.values = {
-      f.x(), f.y(), f.z(), clientTick.depth, clientTick.angle_deg, double(clientTick.object)};
+  if (mirrored) {
+    channels.channels.values = {
+        f.x(), f.y(), f.z(), clientTick.depth, clientTick.angle_deg, double(clientTick.object)};
+  }
   if (clientTick.gripper_rad) channels.channels.values.push_back(*clientTick.gripper_rad);
   out.push_back({std::move(channels), reliable});
 }
@@ -283,7 +356,7 @@ void Reporter::tickReport(const TickReport& tick, const ClientTick& clientTick, 
                                     .force = array(clientTick.force_N),
                                     .depth = clientTick.depth,
                                     .object = clientTick.object,
-                                    .buttons = buttons_ & ~(1U << buttonCount_),
+                                    .buttons = buttons_,
                                     .guard_active = tick.guard.active,
                                     .guard_latched = tick.guard.latched},
                    false});
@@ -296,15 +369,18 @@ void Reporter::tickReport(const TickReport& tick, const ClientTick& clientTick, 
 
 void Reporter::presentState(const TickReport& tick, const ReportFrame& frame,
                             std::vector<Outgoing>& out) const {
-  Reporter fresh(config_, buttonCount_, choice_);
+  Reporter fresh(config_, buttonCount_, choice_, view_);
   const bool touching = tick.rendering.touching;
   fresh.touching_ = !touching;  // makes update() report the whole contact state
   fresh.force_N_ = Vec3::Constant(1e300);
   fresh.depth_ = 1e300;
   fresh.object_ = -2;
   fresh.guard_.armed = -1;
-  if (wants(wire::kReportButton)) out.push_back({buttonStates(buttonCount_, frame.buttons, touching), true});
-  fresh.buttons_ = frame.buttons | std::uint32_t{touching} << buttonCount_;
+  if (wants(wire::kReportButton | wire::kReportTouchButton)) {
+    out.push_back({buttonStates(frame.buttons, touching), true});
+  }
+  fresh.buttons_ = frame.buttons;
+  fresh.touchButton_ = touching;
   fresh.update(tick, frame, out);
   for (Outgoing& message : out) message.reliable = true;
 }

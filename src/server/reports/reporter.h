@@ -4,11 +4,13 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "base/time.h"
 #include "server/reports/client_tick.h"
 #include "wire/message.h"
+#include "wire/names.h"
 
 namespace hapticd::server {
 
@@ -25,6 +27,17 @@ struct ReportChoice {
   friend auto operator<=>(const ReportChoice&, const ReportChoice&) = default;
 };
 
+/// A sender under which clients know the device.
+struct DeviceName {
+  wire::LocalSender sender;
+  View view = View::device;
+};
+
+/// The reports of a client without a subscription.
+ReportChoice defaultChoice(const DeviceConfig& config);
+/// The choice as this device serves it: with compat_mirrors the mirrors belong to tracker, button and analog.
+ReportChoice withMirrors(const DeviceConfig& config, ReportChoice choice);
+
 /// Tracker sensors of a device.
 inline constexpr std::int32_t kSensorProxy = 0;
 inline constexpr std::int32_t kSensorHip = 1;
@@ -39,28 +52,37 @@ struct ReportFrame {
 };
 
 /// Keeps the last reported values and reports changes. One for each ReportChoice; net thread; no clock and no
-/// socket. Contact is mirrored for clients without a force device: the button after the device's own is
+/// socket. Contact can be mirrored for clients without a force device: the button after the device's own is
 /// "touching", and the analog channels are force x y z, depth, angle, touched object and, if the device has a
-/// gripper, its opening in radians.
+/// gripper, its opening in radians. Without the mirror the opening is the only analog channel.
 class Reporter {
  public:
-  Reporter(const DeviceConfig& config, int buttonCount, const ReportChoice& choice);
+  Reporter(const DeviceConfig& config, int buttonCount, const ReportChoice& choice, View view = View::device);
 
   /// Appends the reports of this tick: changes of buttons, of the guard and the end of a contact at once, the
   /// rest once per report period.
   void update(const realtime::TickReport& tick, const ReportFrame& frame, std::vector<Outgoing>& out);
+  /// The same for a tick that is too old to report: omits and counts what is due, unless contact begins or
+  /// ends. The next update() reports the changes since the last report.
+  void skip(const realtime::TickReport& tick, const ReportFrame& frame, std::vector<Outgoing>& out);
+  /// Number of ticks whose due reports skip() omitted since the last call.
+  std::uint64_t takeSkipped() noexcept { return std::exchange(skipped_, 0); }
 
   /// Appends the whole present state, for a client that has just subscribed.
   void presentState(const realtime::TickReport& tick, const ReportFrame& frame,
                     std::vector<Outgoing>& out) const;
 
-  /// The states of all buttons of the device, then "touching".
-  static wire::ButtonStates buttonStates(int buttonCount, std::uint32_t buttons, bool touching);
+  /// The states of all buttons that this choice reports; "touching" is the last one.
+  wire::ButtonStates buttonStates(std::uint32_t buttons, bool touching) const;
+  /// Number of tracker sensors that this choice reports.
+  std::int32_t sensorCount() const noexcept;
 
  private:
   void guard(const realtime::TickReport& tick, std::vector<Outgoing>& out);
-  void buttons(std::uint32_t buttons, std::vector<Outgoing>& out);
+  void buttons(std::uint32_t buttons, bool touching, std::vector<Outgoing>& out);
   void tracker(const ClientTick& clientTick, const ReportFrame& frame, std::vector<Outgoing>& out);
+  void velocity(const ClientTick& clientTick, const geometry::Quat& toFrame, std::int32_t sensor,
+                std::vector<Outgoing>& out) const;
   bool contact(const ClientTick& clientTick, std::vector<Outgoing>& out);
   bool gripperMoved(const ClientTick& clientTick) const;
   void contactEnd(const ClientTick& clientTick, std::vector<Outgoing>& out);
@@ -74,6 +96,7 @@ class Reporter {
 
   const DeviceConfig config_;
   const int buttonCount_;
+  const View view_;
   const ReportChoice choice_;
   base::Nanos period_;
   base::Nanos due_ = 0;
@@ -84,6 +107,8 @@ class Reporter {
   };
   std::array<Sent, kSensorCount> sensors_;
   std::uint32_t buttons_ = 0;
+  std::uint64_t skipped_ = 0;
+  bool touchButton_ = false;
   bool touching_ = false;
   std::int32_t object_ = -1;
   geometry::Vec3 force_N_ = geometry::Vec3::Zero();

@@ -16,7 +16,7 @@ struct ClientStatus {
   double rate_Hz = 0;  ///< chosen report rate
   std::uint64_t bytesIn = 0;
   std::uint64_t bytesOut = 0;
-  std::uint64_t dropped = 0;  ///< low-latency buffers and datagrams dropped before sending
+  std::uint64_t dropped = 0;  ///< batches of reports not sent: the client or the server was behind
   std::size_t queuedBytes = 0;
   std::size_t unacknowledgedBytes = 0;
   bool commands = false;  ///< its role permits commands

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "base/world.h"
+#include "wire/frame_encoder.h"
 #include "wire/text.h"
 
 namespace hapticd::server {
@@ -48,14 +49,13 @@ ClientStatus Session::status() const {
   status.address = connection_.remote().text();
   status.mode = nameOf(mode_);
   for (const wire::LocalSender name : subscriptions_) {
-    if (name.value == 0) continue;  // "VRPN Control"
     status.devices.push_back(names_.senders()[static_cast<std::size_t>(name.value)]);
   }
   status.connected_s = base::toSeconds(base::now() - since_);
   const net::ConnectionStatistics stream = connection_.statistics();
   status.bytesIn = stream.bytesIn;
   status.bytesOut = stream.bytesOut;
-  status.dropped = stream.droppedBuffers;
+  status.dropped = skipped_ + stream.droppedBuffers;
   status.queuedBytes = stream.queuedBytes;
   status.unacknowledgedBytes = stream.unacknowledgedBytes;
   if (udp_) {
@@ -74,7 +74,7 @@ void Session::start() {
   }
   connection_.start({.onConnected = {},
                      .onBytes = [this](auto bytes) { onBytes(bytes); },
-                     .onDrained = {},
+                     .onDrained = [this] { onDrained(); },
                      .onPeerGone = [this](const auto& reason) { owner_.onPeerGone(*this, reason); },
                      .onClosed = [this](const auto& reason) { onEnd(reason); }});
   flush();
@@ -115,6 +115,12 @@ bool Session::release() {
   return false;
 }
 
+// A dropped report may have been the last one of its value.
+void Session::onDrained() {
+  const std::uint64_t drops = connection_.statistics().droppedBuffers;
+  if (std::exchange(dropsSeen_, drops) != drops && peer_.connected()) owner_.onCaughtUp(*this);
+}
+
 // Messages that the client sent before it disconnected are still handled.
 void Session::onEnd(const std::string& reason) {
   if (!failure_.empty() || backlog_.empty()) {
@@ -150,8 +156,25 @@ void Session::refuse(const std::string& reason) {
   if (inDatagram_) {
     logWarning(reason);
   } else {
+    sendLastText(reason);
     close(reason);
   }
+}
+
+// Stock clients print only texts of devices that they use, so it comes from one.
+void Session::sendLastText(const std::string& reason) {
+  if (!greeted_ || !failure_.empty()) return;
+  const bool named = names_.senders().size() > 1;
+  const wire::LocalSender from =
+      subscriptions_.empty() ? wire::LocalSender{named ? 1 : 0} : *subscriptions_.begin();
+  drainPeer();
+  wire::FrameEncoder encoder;  // the protocol's state may be the failure
+  encoder.add(clock_.now(), from,
+              wire::Message(wire::Text{
+                  .severity = wire::kTextError, .level = 0, .text = reason + "; the connection ends"}));
+  net::Buffer bytes;
+  encoder.swapOut(bytes);
+  connection_.send(std::make_shared<const net::Buffer>(std::move(bytes)));
 }
 
 void Session::drainPeer() {
@@ -173,7 +196,11 @@ void Session::onBytes(std::span<const std::byte> bytes) {
   }
   owner_.onReadEnd(*this);
   if (peer_.failed()) {
-    connection_.abort(failure_);
+    if (greeted_) {
+      connection_.close(failure_);  // sends the text
+    } else {
+      connection_.abort(failure_);
+    }
     return;
   }
   flush();
@@ -193,6 +220,8 @@ void Session::onEvent(const wire::Event& event) {
   std::visit(Overloaded{[this](const wire::MessageReceived& message) { onReceived(message); },
                         [this](const wire::Connected& connected) {
                           spdlog::info("client {} ({}) speaks VRPN {}", id_, description_, connected.version);
+                          greeted_ = true;
+                          owner_.onConnected(*this);
                         },
                         [this](const wire::SenderDescribed& described) { onSender(described.name); },
                         [](const wire::TypeDescribed&) {},
@@ -201,7 +230,10 @@ void Session::onEvent(const wire::Event& event) {
                         [this](const wire::Ignored& ignored) {
                           spdlog::debug("client {}: {} ({})", id_, ignored.reason, ignored.value);
                         },
-                        [this](const wire::ProtocolError& error) { failure_ = std::string(error.reason); }},
+                        [this](const wire::ProtocolError& error) {
+                          sendLastText(std::string(error.reason));
+                          failure_ = std::string(error.reason);
+                        }},
              event);
 }
 
@@ -253,6 +285,9 @@ bool Session::isStale(const wire::MessageReceived& message) {
 void Session::onSender(std::string_view name) {
   const auto sender = names_.findSender(name);
   if (sender) {
+    // Every stock client describes "VRPN Control", also one that only listens.
+    if (sender->value == 0) return;
+    if (std::exchange(logsRefused_, false)) refuseLogs(*sender);
     if (subscriptions_.insert(*sender).second) owner_.onSubscribed(*this, *sender);
     return;
   }
@@ -280,10 +315,15 @@ void Session::onUdp(const wire::UdpAddress& address) {
 void Session::onLogRequest(const wire::LogRequest& request) {
   logWarning("requested log files " + wire::inQuotes(request.in_name) + ", " +
              wire::inQuotes(request.out_name) + ": refused");
-  send(wire::LocalSender{0}, wire::Text{.severity = wire::kTextWarning,
-                                        .level = 0,
-                                        .text = std::string("log files on the server are refused; log on "
-                                                            "the client")});
+  // Stock clients print only texts of devices that they use, and describe those later.
+  logsRefused_ = subscriptions_.empty();
+  refuseLogs(logsRefused_ ? wire::LocalSender{0} : *subscriptions_.begin());
+}
+
+void Session::refuseLogs(wire::LocalSender from) {
+  send(from, wire::Text{.severity = wire::kTextWarning,
+                        .level = 0,
+                        .text = std::string("log files on the server are refused; log on the client")});
 }
 
 }  // namespace hapticd::server

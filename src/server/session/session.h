@@ -31,6 +31,10 @@ std::string_view nameOf(SessionMode mode);
 class SessionOwner {
  public:
   virtual ~SessionOwner() = default;
+  /// The handshake is done; the client has described nothing yet.
+  virtual void onConnected(Session& session) = 0;
+  /// The client has read all that was queued, after low-latency frames for it were dropped.
+  virtual void onCaughtUp(Session& session) = 0;
   /// The client subscribed to one of the server's device names.
   virtual void onSubscribed(Session& session, wire::LocalSender name) = 0;
   /// A message for one of the server's devices, read at `received` on the servo clock.
@@ -66,7 +70,7 @@ class Session {
   /// Whether the client wants reports under this name: it described the name, or none of the server's names
   /// yet.
   bool wants(wire::LocalSender name) const noexcept;
-  /// How many of the server's names the client has described so far.
+  /// How many of the server's devices the client has described so far.
   std::size_t namesWanted() const noexcept { return subscriptions_.size(); }
   /// The client's IPv4 address, without the port.
   std::string address() const { return connection_.remote().addressText(); }
@@ -84,6 +88,8 @@ class Session {
   /// Queues frames that are shared with other clients. Low-latency frames are dropped first when this client
   /// reads too slowly.
   void sendShared(const std::shared_ptr<const net::Buffer>& frames, net::Delivery delivery);
+  /// Counts ticks that were not reported to this client because the server was behind.
+  void countSkipped(std::uint64_t ticks) noexcept { skipped_ += ticks; }
   /// Sends everything queued with one system call.
   void flush();
 
@@ -124,10 +130,13 @@ class Session {
   void onHeartbeat(const wire::MessageReceived& message, base::Nanos received);
   void deliver(const wire::MessageReceived& message, base::Nanos received);
   void pauseReading(bool pause);
+  void onDrained();
   void onEnd(const std::string& reason);
   void onSender(std::string_view name);
   void onUdp(const wire::UdpAddress& address);
   void onLogRequest(const wire::LogRequest& request);
+  void refuseLogs(wire::LocalSender from);
+  void sendLastText(const std::string& reason);
   void drainPeer();
   bool isStale(const wire::MessageReceived& message);
 
@@ -142,8 +151,12 @@ class Session {
   SessionMode mode_;
   base::Nanos since_ = base::now();
   std::string description_;
-  std::set<wire::LocalSender> subscriptions_;
+  std::set<wire::LocalSender> subscriptions_;  // without "VRPN Control"
+  std::uint64_t skipped_ = 0;
+  std::uint64_t dropsSeen_ = 0;
   std::string failure_;
+  bool greeted_ = false;
+  bool logsRefused_ = false;  // the client has not been notified yet
   bool inDatagram_ = false;
   bool held_ = false;
   bool reading_ = true;

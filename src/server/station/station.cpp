@@ -72,7 +72,7 @@ wire::Text healthText(const std::string& fault) {
 
 }  // namespace
 
-Station::Impl::Impl(const DeviceConfig& config_, std::vector<wire::LocalSender> names_, SceneHost& scene_,
+Station::Impl::Impl(const DeviceConfig& config_, std::vector<DeviceName> names_, SceneHost& scene_,
                     std::unique_ptr<device::Device> device_, bool allowNoRealtime)
     : config(config_),
       names(std::move(names_)),
@@ -93,7 +93,7 @@ Station::Impl::Impl(const DeviceConfig& config_, std::vector<wire::LocalSender> 
       outbox(config, profile.buttons, names),
       recorder(config.names.front(), blackBoxFiles(config), tick.blackBox()) {}
 
-Station::Station(const DeviceConfig& config, std::vector<wire::LocalSender> names, SceneHost& scene,
+Station::Station(const DeviceConfig& config, std::vector<DeviceName> names, SceneHost& scene,
                  bool allowNoRealtime, record::Recorder* recorder)
     : impl_(std::make_unique<Impl>(config, std::move(names), scene, openDevice(config), allowNoRealtime)) {
   Impl& impl = *impl_;
@@ -105,7 +105,7 @@ Station::Station(const DeviceConfig& config, std::vector<wire::LocalSender> name
   scene.add(std::move(sceneDevice));
 }
 
-Station::Station(const DeviceConfig& config, std::vector<wire::LocalSender> names, SceneHost& scene,
+Station::Station(const DeviceConfig& config, std::vector<DeviceName> names, SceneHost& scene,
                  const record::RecordedDevice& recorded)
     : impl_(std::make_unique<Impl>(config, std::move(names), scene, placeholderFor(recorded), true)) {
   impl_->replayed = true;
@@ -199,14 +199,23 @@ SceneHost& Station::scene() noexcept {
 }
 
 bool Station::has(wire::LocalSender name) const noexcept {
-  return std::find(impl_->names.begin(), impl_->names.end(), name) != impl_->names.end();
+  return std::any_of(impl_->names.begin(), impl_->names.end(),
+                     [name](const DeviceName& known) { return known.sender == name; });
 }
 
 wire::LocalSender Station::nameFor(const Session& session) const noexcept {
-  for (const wire::LocalSender name : impl_->names) {
-    if (session.wants(name)) return name;
+  for (const DeviceName& name : impl_->names) {
+    if (session.wants(name.sender)) return name.sender;
   }
-  return impl_->names.front();
+  return impl_->names.front().sender;
+}
+
+void Station::onConnected(Session& session) {
+  impl_->outbox.join(session);
+}
+
+void Station::sendPresentState(Session& session) {
+  impl_->outbox.sendPresentState(session);
 }
 
 void Station::onSubscribed(Session& session, wire::LocalSender name) {
@@ -229,18 +238,28 @@ int Station::wakeFd() const noexcept {
 bool Station::collectReports(const WallClock& clock, const std::function<void()>& onTick) {
   Impl& impl = *impl_;
   bool any = false;
-  impl.tick.reports().consume([&](const realtime::TickReport& report) {
+  std::size_t admitted = 0;
+  bool first = true;
+  impl.tick.reports().consume([&](const realtime::TickReport& report, std::size_t newer) {
+    if (std::exchange(first, false)) admitted = impl.freshTicks.admit(newer + 1);
+    const base::Nanos start = base::now();
+    const bool late = newer >= admitted;
     impl.droppedReports = report.dropped;
     impl.frame.buttons = impl.modes.apply(report.device.buttons, impl.alerts);
     const wire::Time time = clock.at(report.time);
-    impl.outbox.add(report, impl.frame, time);
+    impl.outbox.add(report, impl.frame, time, late);
     for (const wire::ButtonAlert& alert : impl.alerts) impl.outbox.add(wire::Message(alert), time);
     impl.alerts.clear();
     if (!impl.outbox.collect()) return;
     any = true;
     onTick();
+    if (!late) impl.freshTicks.tickTook(base::now() - start);
   });
   return any;
+}
+
+void Station::flushTook(base::Nanos time) {
+  impl_->freshTicks.flushTook(time);
 }
 
 void Station::sendReports(Session& session) {

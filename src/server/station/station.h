@@ -23,10 +23,10 @@ class Station {
  public:
   /// Opens the device and adds it to the scene. Throws ConfigError or std::runtime_error with a remedy.
   /// `recorder` may be null; else it records from the first tick and must outlive the station.
-  Station(const DeviceConfig& config, std::vector<wire::LocalSender> names, SceneHost& scene,
-          bool allowNoRealtime, record::Recorder* recorder = nullptr);
+  Station(const DeviceConfig& config, std::vector<DeviceName> names, SceneHost& scene, bool allowNoRealtime,
+          record::Recorder* recorder = nullptr);
   /// A station without hardware and servo, for the reports of a recorded device; no client may command it.
-  Station(const DeviceConfig& config, std::vector<wire::LocalSender> names, SceneHost& scene,
+  Station(const DeviceConfig& config, std::vector<DeviceName> names, SceneHost& scene,
           const record::RecordedDevice& recorded);
   ~Station();
 
@@ -52,6 +52,10 @@ class Station {
   void onControl(Session& session, const wire::MessageReceived& message, base::Nanos received);
   /// The scene of this device was reset.
   void onReset();
+  /// The client is connected and has described no name yet.
+  void onConnected(Session& session);
+  /// Sends the client the present state under all names that it wants.
+  void sendPresentState(Session& session);
   /// The client subscribed to this name.
   void onSubscribed(Session& session, wire::LocalSender name);
   void clientGone(scene::ClientId client);
@@ -69,8 +73,11 @@ class Station {
   /// Descriptor that is readable when reports wait.
   int wakeFd() const noexcept;
   /// Encodes the pending ticks, once for all clients with the same subscription, and calls onTick() after
-  /// each tick with reports so that they are sent in order. Returns false when there were none.
+  /// each tick with reports so that they are sent in order. When the net thread is behind, only the newest
+  /// ticks are reported, see FreshTicks. Returns false when there were none.
   bool collectReports(const WallClock& clock, const std::function<void()>& onTick);
+  /// The time that flushing the queues of all clients took after collectReports().
+  void flushTook(base::Nanos time);
   /// Queues the reports of the last collected tick for this client.
   void sendReports(Session& session);
 

@@ -6,6 +6,7 @@
 #include "base/clock.h"
 #include "device/simulated/steered_hand.h"
 #include "realtime/servo/tick.h"
+#include "server/reports/fresh_ticks.h"
 #include "server/scene/scene_host.h"
 #include "server/station/black_box_recorder.h"
 #include "server/station/button_modes.h"
@@ -24,7 +25,7 @@ struct Request {
 };
 
 struct Station::Impl {
-  Impl(const DeviceConfig& config_, std::vector<wire::LocalSender> names_, SceneHost& scene_,
+  Impl(const DeviceConfig& config_, std::vector<DeviceName> names_, SceneHost& scene_,
        std::unique_ptr<device::Device> device_, bool allowNoRealtime);
 
   void recordTo(record::Recorder& recording, SceneDevice& sceneDevice);
@@ -55,7 +56,7 @@ struct Station::Impl {
   void rearm(Session& session, wire::LocalSender name, const DeviceControl::Order& order);
 
   const DeviceConfig config;
-  const std::vector<wire::LocalSender> names;
+  const std::vector<DeviceName> names;
   SceneHost& scene;
   base::MonotonicClock clock;
   std::unique_ptr<device::Device> device;
@@ -74,6 +75,7 @@ struct Station::Impl {
   std::vector<wire::ButtonAlert> alerts;  // not yet reported
   ReportFrame frame;
   Outbox outbox;
+  FreshTicks freshTicks{config.servoRate_Hz};
   BlackBoxRecorder recorder;
   std::uint64_t droppedReports = 0;
   std::string fault;                 // as last reported

@@ -39,10 +39,11 @@ void Station::onControl(Session& session, const wire::MessageReceived& message, 
 }
 
 void Station::Impl::on(const Request& request, const wire::Ping&) {
-  const realtime::TickReport& last = outbox.last();
+  const bool touching = outbox.last().rendering.touching;
   request.session.send(request.name, wire::Pong{});
-  request.session.send(request.name,
-                       Reporter::buttonStates(profile.buttons, frame.buttons, last.rendering.touching));
+  request.session.send(
+      request.name,
+      outbox.reporterFor(request.session.id(), request.name).buttonStates(frame.buttons, touching));
 }
 
 void Station::Impl::on(const Request& request, const wire::Text& text) {
@@ -54,7 +55,8 @@ void Station::Impl::on(const Request& request, const wire::TrackerRequestToRoom&
 }
 
 void Station::Impl::on(const Request& request, const wire::TrackerRequestUnitToSensor&) {
-  for (std::int32_t sensor = 0; sensor < kSensorCount; ++sensor) {
+  const std::int32_t sensors = outbox.reporterFor(request.session.id(), request.name).sensorCount();
+  for (std::int32_t sensor = 0; sensor < sensors; ++sensor) {
     request.session.send(request.name,
                          wire::TrackerUnitToSensor{
                              .sensor = sensor, .filler = 0, .position = {}, .orientation = {0, 0, 0, 1}});
@@ -84,6 +86,11 @@ void Station::Impl::choose(Session& session, wire::LocalSender name, ReportChoic
     return;
   }
   constexpr double kSlowest_Hz = 0.01;
+  if (rate_Hz > 0 && rate_Hz < kSlowest_Hz) {
+    sendText(session, name, wire::kTextWarning,
+             fmt::format("{}: rate {} Hz is below the slowest, {} Hz, which is used instead", call, rate_Hz,
+                         kSlowest_Hz));
+  }
   if (rate_Hz > 0) choice.rate_Hz = std::clamp(rate_Hz, kSlowest_Hz, config.servoRate_Hz);
   outbox.choose(session, choice);
 }
@@ -102,6 +109,7 @@ void Station::Impl::on(const Request& request, const wire::ButtonAdmin& admin) {
 
 void Station::Impl::on(const Request& request, const wire::QueryCapabilities&) {
   request.session.send(request.name, capabilities(config, profile, control.canBeHeld()));
+  outbox.extend(request.session);
 }
 
 void Station::Impl::on(const Request& request, const wire::StopForces&) {

@@ -110,7 +110,8 @@ void clients(Text& out, const StateReport& report) {
             "Bytes queued in the server or the operating system that the client has not acknowledged.",
             [](const auto& c) { return c.queuedBytes + c.unacknowledgedBytes; });
   ofClients(out, report, "hapticd_client_dropped_total", "counter",
-            "Reports dropped because the client reads too slowly.", [](const auto& c) { return c.dropped; });
+            "Batches of reports that were not sent: the client reads too slowly, or the server was behind.",
+            [](const auto& c) { return c.dropped; });
 }
 
 template <class Value>

@@ -22,15 +22,19 @@ enum Feature : std::uint32_t {
 
 /// Bits of Subscribe::kinds.
 enum ReportKinds : std::uint32_t {
-  kReportTracker = 1U << 0,   ///< Pos_Quat and Velocity
-  kReportForce = 1U << 1,     ///< Force, SCP, DOP, isTouching, TouchedObject, Angle
-  kReportButton = 1U << 2,    ///< Change
-  kReportAnalog = 1U << 3,    ///< Channel
-  kReportTick = 1U << 4,      ///< hapticd Tick
-  kReportContacts = 1U << 5,  ///< hapticd Contacts
-  kReportHand = 1U << 6,      ///< hapticd Hand_State
+  kReportTracker = 1U << 0,        ///< Pos_Quat of sensor 0 (the proxy) and Velocity
+  kReportForce = 1U << 1,          ///< Force, SCP, DOP, isTouching, TouchedObject, Angle
+  kReportButton = 1U << 2,         ///< Change
+  kReportAnalog = 1U << 3,         ///< Channel: the gripper's opening
+  kReportTick = 1U << 4,           ///< hapticd Tick
+  kReportContacts = 1U << 5,       ///< hapticd Contacts
+  kReportHand = 1U << 6,           ///< hapticd Hand_State
+  kReportContactPoint = 1U << 7,   ///< Pos_Quat of sensor 2, the surface contact point
+  kReportTouchButton = 1U << 8,    ///< Change of the button after the device's own: touching
+  kReportContactAnalog = 1U << 9,  ///< Channel: force, depth, angle, touched object, the gripper's opening
+  kReportHip = 1U << 10,           ///< Pos_Quat and Velocity of sensor 1, the HIP
   kReportDefault = kReportTracker | kReportForce | kReportButton | kReportAnalog,
-  kReportAll = (1U << 7) - 1,
+  kReportAll = (1U << 11) - 1,
 };
 
 struct QueryCapabilities {

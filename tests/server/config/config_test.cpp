@@ -58,6 +58,8 @@ force_report = "normal"
 workspace_fit = "enclose"
 vibration_contact_unit = "Hz"
 vibration_motor_frame = "device"
+mirrors = true
+compat_mirrors = true
 scene_on_disconnect = "clear"
 [[device]]
 name = "Right"
@@ -212,6 +214,8 @@ ServerConfig unusual() {
   device.stribeckSpeed_m_per_s = 0.004;
   device.heldForcePower_W = 0.005;
   device.vibrationContactPulls = true;
+  device.mirrors = true;
+  device.compatMirrors = true;
   device.scene = "shared";
   device.sceneOnDisconnect = SceneOnDisconnect::clear;
   device.control = Control::list;
@@ -230,6 +234,12 @@ TEST(Config, KeysOfOtherDriversAreRefused) {
   EXPECT_EQ(errorOf("[[device]]\nwheel_profile = \"wheel.toml\"\n"),
             "test.toml:2: device 'Phantom': the driver 'simulated' has no key wheel_profile; remove it");
   EXPECT_EQ(errorOf("[[device]]\nwheel_profile = \"\"\n"), "") << "as toToml() writes it";
+}
+
+TEST(Config, NamesOfMirrorsMustBeFree) {
+  const std::string text = "[[device]]\nnames = [\"A\", \"A.touch\"]\n";
+  EXPECT_EQ(errorOf(text), "");
+  EXPECT_NE(errorOf(text + "mirrors = true\n").find("'A.touch' is used twice"), std::string::npos);
 }
 
 TEST(Config, ADriverWithoutAVendorLibraryCannotBeIsolated) {

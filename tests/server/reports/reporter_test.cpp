@@ -1,5 +1,6 @@
 #include "server/reports/reporter.h"
 #include "base/time.h"
+#include "server/reports/fresh_ticks.h"
 
 #include <gtest/gtest.h>
 
@@ -17,6 +18,8 @@ class ReporterTest : public ::testing::Test {
   ReporterTest() {
     config_.linearTolerance_m = 0.001;
     config_.angularTolerance_rad = 0.02;
+    choice_.kinds |=
+        wire::kReportHip | wire::kReportContactPoint | wire::kReportTouchButton | wire::kReportContactAnalog;
     tick_.T_world_device = Affine(Eigen::UniformScaling<double>(1000.0));
   }
   void start() {
@@ -31,6 +34,14 @@ class ReporterTest : public ::testing::Test {
     out_.clear();
     frame_.buttons = tick_.device.buttons;
     reporter_->update(tick_, frame_, out_);
+  }
+  // The same for a tick behind which a newer one waits.
+  void skip() {
+    ++tick_.tick;
+    tick_.time += kMs;
+    out_.clear();
+    frame_.buttons = tick_.device.buttons;
+    reporter_->skip(tick_, frame_, out_);
   }
   template <class M>
   std::vector<M> reported() const {
@@ -306,8 +317,78 @@ TEST_F(ReporterTest, AGripperIsTheAnalogChannelAfterTheContact) {
   EXPECT_TRUE(reported<wire::AnalogChannels>().empty()) << "analog reports are not subscribed";
 }
 
+TEST_F(ReporterTest, WithoutSubscriptionThereIsOneSensorAndNoMirror) {
+  choice_ = defaultChoice(config_);
+  tick_.device.buttons = 1;
+  tick_.device.gripper_rad = 0.3;
+  step();
+  touch();
+  tick_.rendering.proxy_m = tick_.device.position_m = Vec3(0.01, 0, 0);
+  step();
+  ASSERT_EQ(reported<wire::TrackerPosQuat>().size(), 1U);
+  EXPECT_EQ(reported<wire::TrackerPosQuat>()[0].sensor, kSensorProxy);
+  ASSERT_EQ(reported<wire::TrackerVelocity>().size(), 1U);
+  EXPECT_EQ(reported<wire::TrackerVelocity>()[0].sensor, kSensorProxy);
+  EXPECT_TRUE(reported<wire::ButtonChange>().empty());
+  EXPECT_TRUE(reported<wire::AnalogChannels>().empty());
+  out_.clear();
+  reporter_->presentState(tick_, frame_, out_);
+  EXPECT_EQ(reported<wire::ButtonStates>().at(0).states.values, (std::vector<std::int32_t>{1, 0}));
+  EXPECT_EQ(reported<wire::AnalogChannels>().at(0).channels.values, (std::vector<double>{0.3}));
+}
+
+TEST_F(ReporterTest, CompatMirrorsRestoreEverySensorAndTheMirrors) {
+  config_.compatMirrors = true;
+  EXPECT_EQ(defaultChoice(config_).kinds, choice_.kinds);
+  EXPECT_EQ(withMirrors(config_, {.kinds = wire::kReportTick, .rate_Hz = 1}).kinds, wire::kReportTick);
+}
+
+TEST_F(ReporterTest, ALateTickReportsEventsOnlyAndTheNextOneReportsTheRest) {
+  step();
+  touch();
+  step();
+  ASSERT_EQ(reported<wire::IsTouching>().size(), 1U);
+  EXPECT_TRUE(isReliable<wire::IsTouching>()) << "contact begins";
+  tick_.force_N.x() += 1;
+  tick_.device.buttons = 1;
+  skip();
+  ASSERT_EQ(out_.size(), 1U) << "the button";
+  EXPECT_EQ(reported<wire::ButtonChange>().at(0).state, 1);
+  EXPECT_EQ(reporter_->takeSkipped(), 1U);
+  EXPECT_EQ(reporter_->takeSkipped(), 0U);
+  step();
+  EXPECT_EQ(reported<wire::Force>().size(), 1U) << "changed in the skipped tick";
+  tick_.rendering = {};
+  tick_.force_N = Vec3::Zero();
+  skip();
+  EXPECT_EQ(reported<wire::IsTouching>().at(0).touching, 0) << "the end of a contact is never skipped";
+  EXPECT_TRUE(isReliable<wire::Force>());
+  EXPECT_EQ(reporter_->takeSkipped(), 0U);
+}
+
+TEST_F(ReporterTest, ATickThatIsNotDueIsNotCountedAsSkipped) {
+  config_.reportRate_Hz = 10;
+  step();
+  skip();
+  EXPECT_EQ(reporter_->takeSkipped(), 0U);
+}
+
+// The sawtooth of a net thread that needs 5 ms for each tick of a 1 kHz servo.
+TEST(FreshTicks, AdmitsAsManyAsStayYoung) {
+  FreshTicks fresh(1000);
+  EXPECT_EQ(fresh.admit(1), 1U);
+  EXPECT_EQ(fresh.admit(5), 5U);
+  EXPECT_EQ(fresh.admit(1000), 12U) << "the rest is older than 12 ms";
+  for (int i = 0; i < 7; ++i) fresh.tickTook(5 * kMs);
+  EXPECT_EQ(fresh.admit(10), 10U) << "one fast pass of the last eight: no load, but a preemption";
+  fresh.tickTook(5 * kMs);
+  EXPECT_EQ(fresh.admit(10), 2U);
+  for (int i = 0; i < 8; ++i) fresh.flushTook(30 * kMs);
+  EXPECT_EQ(fresh.admit(10), 1U) << "the newest is always reported";
+}
+
 TEST_F(ReporterTest, OnlySubscribedKindsAreReported) {
-  choice_.kinds = wire::kReportButton;
+  choice_.kinds = wire::kReportTouchButton;
   touch();
   step();
   EXPECT_EQ(reported<wire::ButtonChange>().size(), 1U);

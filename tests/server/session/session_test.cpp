@@ -19,6 +19,8 @@ using namespace std::chrono_literals;
 
 class CountingOwner final : public SessionOwner {
  public:
+  void onConnected(Session& /*session*/) override {}
+  void onCaughtUp(Session& /*session*/) override {}
   void onSubscribed(Session& /*session*/, wire::LocalSender /*name*/) override {}
   void onMessage(Session& /*session*/, const wire::MessageReceived& /*message*/, base::Nanos) override {
     ++messages;

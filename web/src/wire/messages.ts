@@ -1052,6 +1052,10 @@ export const REPORT_ANALOG = 8;
 export const REPORT_TICK = 16;
 export const REPORT_CONTACTS = 32;
 export const REPORT_HAND = 64;
+export const REPORT_CONTACT_POINT = 128;
+export const REPORT_TOUCH_BUTTON = 256;
+export const REPORT_CONTACT_ANALOG = 512;
+export const REPORT_HIP = 1024;
 /** Bits of Capabilities.features. */
 export const FEATURE_BULK_MESH = 1;
 export const FEATURE_BATCH = 2;
