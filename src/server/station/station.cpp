@@ -245,7 +245,8 @@ void Station::Impl::onPublished(const scene::SceneSnapshot& snapshot) {
   if (now == plannedFor) return;
   plannedFor = std::move(now);
   hand->setPath(std::make_shared<const device::WaypointPath>(
-      planStrokes(snapshot, workspaceOf(config, profile), base::now()), device::WaypointPath::Repeat::yes));
+      planStrokes(snapshot, workspaceOf(config, profile), base::now()), device::WaypointPath::Repeat::yes,
+      kScriptedStrength_N));
 }
 
 DeviceStatus Station::status() const {
