@@ -27,6 +27,7 @@ inline CLI::Validator within(double least, double most) {
 inline constexpr double kLongest_s = 1e9;
 
 void addServe(CLI::App& app);
+void addDemo(CLI::App& app);
 void addTouch(CLI::App& app);
 void addStop(CLI::App& app);
 void addWatch(CLI::App& app);
@@ -38,5 +39,7 @@ void addReplay(CLI::App& app);
 void addDoctor(CLI::App& app);
 void addDevices(CLI::App& app);
 void addBench(CLI::App& app);
+void addSelfTest(CLI::App& app);
+void addManual(CLI::App& app);
 
 }  // namespace hapticd::apps

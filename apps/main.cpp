@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "version.h"
 
 int main(int argc, char** argv) {
   using namespace hapticd::apps;
@@ -12,12 +13,15 @@ int main(int argc, char** argv) {
       "hapticd: a haptics server that speaks VRPN.\n"
       "One process owns a haptic device, takes a scene from any VRPN client, renders forces at 1 kHz\n"
       "and reports pose, contact and force to all clients.\n\n"
-      "A first touch, without hardware, in two terminals:\n"
+      "A first touch, without hardware:\n"
+      "  hapticd demo\n"
+      "The same in two terminals, with a mesh of your own:\n"
       "  hapticd serve\n"
       "  hapticd touch bunny.obj --server Phantom@localhost"};
   app.name("hapticd");
-  app.set_version_flag("--version", "hapticd " HAPTICD_VERSION);
+  app.set_version_flag("--version", versionText());
   app.require_subcommand(1);
+  addDemo(app);
   addServe(app);
   addTouch(app);
   addWatch(app);
@@ -28,7 +32,9 @@ int main(int argc, char** argv) {
   addReplay(app);
   addDoctor(app);
   addDevices(app);
+  addSelfTest(app);
   addBench(app);
+  addManual(app);
   addDeviceHost(app);
   try {
     app.parse(argc, argv);

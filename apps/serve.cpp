@@ -95,6 +95,7 @@ int run(const ServeOptions& options) {
   announce(server, config);
   stopper.watch(server);
   server.run();
+  stopper.finish();
   return 0;
 }
 
@@ -142,7 +143,7 @@ void addServe(CLI::App& app) {
       "Write a recording (all scene commands and ticks) for replay, render and export; %Y%m%d-%H%M%S\n"
       "in the name becomes the time");
   command->add_flag("--allow-no-rt", options->allowNoRealtime,
-                    "Run even if the system refuses realtime rights (fine for the simulated hand)");
+                    "Run a real device even if the system refuses realtime rights; the simulated hand always runs");
   command->add_flag("-v,--verbose", options->verbose, "Log more");
   command->footer(
       "Clients open NAME@HOST, NAME@HOST:PORT or NAME@tcp://HOST:PORT as Tracker, Button or ForceDevice.\n"

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "fit_mesh.h"
 #include "geometry/crossings.h"
 #include "geometry/mesh_check.h"
 #include "geometry/triangle_mesh.h"
@@ -46,21 +47,6 @@ std::string extentsText(const TriangleMesh& mesh) {
   return text;
 }
 
-void scaleIntoWorkspace(TriangleMesh& mesh, double size_mm) {
-  const geometry::Vec3 kTouch_mm(160, 120, 70);
-  constexpr double kFill = 0.8;
-  constexpr double kLargestDefault_mm = 100;
-  const geometry::Box bounds = geometry::boundsOf(mesh);
-  const geometry::Vec3 extents = bounds.extents().cwiseMax(1e-12);
-  if (bounds.empty() || bounds.extents().maxCoeff() <= 0) {
-    throw std::runtime_error("the mesh has no extent, so there is nothing to touch");
-  }
-  const double fitting = std::min((kFill * kTouch_mm.array() / extents.array()).minCoeff(),
-                                  kLargestDefault_mm / extents.maxCoeff());
-  const double scale = size_mm > 0 ? size_mm / extents.maxCoeff() : fitting;
-  geometry::scaleAndMove(mesh, scale, -scale * bounds.centre());
-}
-
 TriangleMesh load(const TouchOptions& options) {
   TriangleMesh mesh = mesh_io::loadMesh(options.mesh);
   std::printf("%s: %zu vertices, %zu triangles, %s units\n", options.mesh.c_str(), mesh.vertices.size(),
@@ -72,7 +58,7 @@ TriangleMesh load(const TouchOptions& options) {
     findings.push_back(std::move(finding));
   if (findings.empty()) std::printf("mesh check: clean\n");
   for (const std::string& finding : findings) std::printf("mesh check: %s\n", finding.c_str());
-  scaleIntoWorkspace(mesh, options.size_mm);
+  fitIntoWorkspace(mesh, options.size_mm);
   std::printf("scaled to %s mm, centred in the workspace\n", extentsText(mesh).c_str());
   return mesh;
 }

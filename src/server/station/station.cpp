@@ -78,7 +78,8 @@ Station::Impl::Impl(const DeviceConfig& config_, std::vector<wire::LocalSender> 
       keeper(*device, tick, clock,
              {.name = config.names.front(),
               .rate_Hz = config.servoRate_Hz,
-              .requireRealtime = !allowNoRealtime,
+              // A device without a person at it cannot hurt: realtime rights are wanted, not demanded.
+              .requireRealtime = !allowNoRealtime && device->traits().needsRearm,
               .vendorThread = device->traits().ticksInVendorThread}),
       control(tick.control(), hand, workspaceOf(config, profile)),
       roles(config.control, config.controlList),
