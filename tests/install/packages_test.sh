@@ -11,13 +11,17 @@ kind=${3:-overlay}
 skip() { echo "skipped: $1"; exit 77; }
 [ "$(id -u)" = 0 ] || skip "not root"
 
-if [ "${HAPTICD_IN_NAMESPACE:-}" != yes ]; then
+# All mounts are in a namespace and vanish with it; nothing of the machine is mounted below the root in a way that the root could
+# write to, and nothing is deleted recursively.
+if [ "${HAPTICD_PACKAGES_WORK:-}" = "" ]; then
   unshare -m true 2>/dev/null || skip "no mount namespace here"
-  HAPTICD_IN_NAMESPACE=yes exec unshare -m --propagation private "$0" "$packages" "$version" "$kind"
+  work=$(mktemp -d)
+  status=0
+  HAPTICD_PACKAGES_WORK=$work unshare -m --propagation private "$0" "$packages" "$version" "$kind" || status=$?
+  rmdir "$work"
+  exit "$status"
 fi
-
-work=$(mktemp -d)
-trap 'rm -rf "$work" 2>/dev/null || true' EXIT
+work=$HAPTICD_PACKAGES_WORK
 mount -t tmpfs tmpfs "$work"
 root=$work/root
 mkdir -p "$root" "$work/upper" "$work/work"
@@ -32,7 +36,10 @@ else
   install="apt-get install -y -q --no-install-recommends"
 fi
 mount -t proc proc "$root/proc"
-mount --bind /dev "$root/dev"
+mount -t tmpfs -o mode=755 tmpfs "$root/dev"
+for node in null:3 zero:5 full:7 random:8 urandom:9; do mknod -m 666 "$root/dev/${node%:*}" c 1 "${node#*:}"; done
+ln -s /proc/self/fd "$root/dev/fd"
+mkdir -m 1777 "$root/dev/shm"
 printf '#!/bin/sh\nexit 101\n' >"$root/usr/sbin/policy-rc.d"  # starts no service
 chmod 755 "$root/usr/sbin/policy-rc.d"
 mkdir -p "$root/packages" "$root/home/someone"
