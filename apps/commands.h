@@ -3,7 +3,9 @@
 
 #include <CLI/CLI.hpp>
 #include <cmath>
+#include <filesystem>
 #include <sstream>
+#include <stdexcept>
 #include <string>
 
 namespace hapticd::apps {
@@ -23,6 +25,13 @@ inline CLI::Validator within(double least, double most) {
       },
       range.str());
 }
+/// Throws std::runtime_error when the file exists and `force` is not given. Pipes and devices may be written.
+inline void keepFile(const std::string& file, bool force) {
+  if (force || file.empty() || !std::filesystem::is_regular_file(file)) return;
+  throw std::runtime_error("'" + file + "' exists: choose another name, or overwrite it by --force");
+}
+inline constexpr const char* kForceText = "Overwrite an existing file";
+
 /// Largest duration that an option accepts, in seconds: 30 years.
 inline constexpr double kLongest_s = 1e9;
 
@@ -33,6 +42,7 @@ void addStop(CLI::App& app);
 void addWatch(CLI::App& app);
 void addDeviceHost(CLI::App& app);
 void addExport(CLI::App& app);
+void addInfo(CLI::App& app);
 void addRecord(CLI::App& app);
 void addRender(CLI::App& app);
 void addReplay(CLI::App& app);

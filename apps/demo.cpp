@@ -37,7 +37,8 @@ std::unique_ptr<server::Server> startServer(const DemoOptions& options) {
   server::ServerConfig config;
   if (!options.listen.empty()) server::parseListen(options.listen, config.listenAddress, config.port);
   if (options.seconds > 0) config.seconds = options.seconds;
-  for (const Ports& ports : {Ports{3883, "127.0.0.1:8080"}, Ports{3883, "127.0.0.1:0"}, Ports{0, "127.0.0.1:0"}}) {
+  for (const Ports& ports :
+       {Ports{3883, "127.0.0.1:8080"}, Ports{3883, "127.0.0.1:0"}, Ports{0, "127.0.0.1:0"}}) {
     if (options.listen.empty()) config.port = ports.vrpn;
     config.http = options.http.empty() ? ports.http : options.http;
     server::validate(config);

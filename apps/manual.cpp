@@ -80,12 +80,14 @@ std::string manPage(const CLI::App& command, const std::string& name) {
   if (!commands.empty()) {
     page += ".SH COMMANDS\n";
     for (const CLI::App* each : commands)
-      page += ".TP\n.BR " + roff("hapticd-" + each->get_name()) + " (1)\n" + roff(each->get_description()) + "\n";
+      page +=
+          ".TP\n.BR " + roff("hapticd-" + each->get_name()) + " (1)\n" + roff(each->get_description()) + "\n";
   }
   page += ".SH OPTIONS\n";
   for (const CLI::Option* option : optionsOf(command)) {
     std::string names = option->get_name(true, true);
-    for (std::size_t at = 0; (at = names.find(',', at)) != std::string::npos; at += 2) names.replace(at, 1, ", ");
+    for (std::size_t at = 0; (at = names.find(',', at)) != std::string::npos; at += 2)
+      names.replace(at, 1, ", ");
     if (takesValue(*option)) names += " " + option->get_type_name();
     page += ".TP\n.B " + roff(names) + "\n" + roff(option->get_description());
     if (!option->get_default_str().empty()) page += " [" + roff(option->get_default_str()) + "]";
@@ -126,8 +128,7 @@ std::string plain(const std::string& text) {
 }
 
 std::string zshCompletion(const CLI::App& app) {
-  std::string text =
-      "#compdef hapticd\nlocal -a commands\ncommands=(\n";
+  std::string text = "#compdef hapticd\nlocal -a commands\ncommands=(\n";
   for (const CLI::App* command : commandsOf(app))
     text += "  '" + command->get_name() + ":" + plain(command->get_description()) + "'\n";
   text += ")\nif (( CURRENT == 2 )); then\n  _describe command commands\n  return\nfi\ncase $words[2] in\n";

@@ -25,6 +25,7 @@ struct RecordOptions {
   std::string file;
   double seconds = 0;
   double rate_Hz = 1000;
+  bool force = false;
 };
 
 wire::Time stamp(Time time) {
@@ -111,6 +112,7 @@ void recordTicks(Client& client, record::SampleFile& file, const RecordOptions& 
 }
 
 int run(const RecordOptions& options) {
+  keepFile(options.file, options.force);
   const auto samples = sampleFile(options.file);
   if (!samples && std::filesystem::path(options.file).extension() != ".vrpn") {
     throw std::runtime_error("'" + options.file +
@@ -145,6 +147,7 @@ void addRecord(CLI::App& app) {
   command->add_option("--rate", options->rate_Hz, "At most this many ticks per second, for csv and mcap")
       ->check(within(0.1, 4000))
       ->capture_default_str();
+  command->add_flag("--force", options->force, kForceText);
   command->footer(
       "Records what a client receives: reports, in the frame that the server reports, without the scene. The "
       "server\n"

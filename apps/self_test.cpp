@@ -126,7 +126,8 @@ Outcome touchThrough(const std::string& device, bool upload) {
     fitIntoWorkspace(mesh);
     std::vector<std::array<float, 3>> vertices;
     for (const auto& v : mesh.vertices) vertices.push_back({v.x(), v.y(), v.z()});
-    client.setSurface(0, {.stiffness = 0.8F, .damping = 0.1F, .staticFriction = 0.3F, .dynamicFriction = 0.2F});
+    client.setSurface(0,
+                      {.stiffness = 0.8F, .damping = 0.1F, .staticFriction = 0.3F, .dynamicFriction = 0.2F});
     client.uploadMesh(0, {vertices, mesh.triangles});
   }
   const auto begin = std::chrono::steady_clock::now();
@@ -140,7 +141,8 @@ Outcome touchThrough(const std::string& device, bool upload) {
     std::snprintf(text, sizeof text, "%s feels object 0 with %.2f N", device.c_str(), force_N);
     return {true, text, ""};
   }
-  return {false, device + " felt nothing within 15 s", "a firewall on the loopback interface? See 'hapticd doctor'"};
+  return {false, device + " felt nothing within 15 s",
+          "a firewall on the loopback interface? See 'hapticd doctor'"};
 }
 
 // The first bytes of the answer to a GET.
@@ -173,7 +175,8 @@ Outcome viewer(std::uint16_t port) {
   const std::string page = get(port, "/");
   const std::string script = get(port, "/viewer.js");
   const bool good = page.find("viewer.js") != std::string::npos && script.find(" 200 ") < 20;
-  return {good, good ? "page, script and state are answered" : "the page is not answered", "report this line"};
+  return {good, good ? "page, script and state are answered" : "the page is not answered",
+          "report this line"};
 }
 
 int run(double seconds) {

@@ -150,7 +150,8 @@ std::string realtimeRemedy() {
   std::vector<char> buffer(16384);
   getgrnam_r(kGroup, &entry, buffer.data(), buffer.size(), &found);
   if (found == nullptr)
-    return "install the package hapticd, or run 'sudo scripts/setup_group.sh' of its sources, and log in again";
+    return "install the package hapticd, or run 'sudo scripts/setup_group.sh' of its sources, and log in "
+           "again";
   return "sudo usermod -aG hapticd $USER, and log in again";
 }
 

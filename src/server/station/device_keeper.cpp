@@ -149,8 +149,8 @@ void DeviceKeeper::logSetup(const realtime::ThreadSetup& setup) const {
       remedy += (remedy.empty() ? "" : "; ") + answer->remedy;
   }
   if (refused.empty()) return;
-  spdlog::warn("servo loop of '{}': {}. Ticks may be late while the machine is busy. Remedy: {}", options_.name,
-               refused, remedy);
+  spdlog::warn("servo loop of '{}': {}. Ticks may be late while the machine is busy. Remedy: {}",
+               options_.name, refused, remedy);
 }
 
 void DeviceKeeper::logPacedSetup() {

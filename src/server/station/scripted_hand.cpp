@@ -17,12 +17,12 @@ using geometry::Quat;
 using geometry::Vec3;
 
 constexpr int kStrokes = 14;
-constexpr int kAttempts = 8;              // approaches that are tried for each stroke
-constexpr double kPressDepth_m = 0.004;   // target below the surface; the hand's spring reaches part of it
-constexpr double kThinShare = 0.4;        // of the thickness below the surface, where that is less
-constexpr double kClearance_m = 0.012;    // above the surface before a stroke, and around everything
-constexpr double kLift_m = 0.003;         // above the surface: what must be free between two points of a stroke
-constexpr double kStep_m = 0.003;         // between neighbouring points of a stroke
+constexpr int kAttempts = 8;             // approaches that are tried for each stroke
+constexpr double kPressDepth_m = 0.004;  // target below the surface; the hand's spring reaches part of it
+constexpr double kThinShare = 0.4;       // of the thickness below the surface, where that is less
+constexpr double kClearance_m = 0.012;   // above the surface before a stroke, and around everything
+constexpr double kLift_m = 0.003;  // above the surface: what must be free between two points of a stroke
+constexpr double kStep_m = 0.003;  // between neighbouring points of a stroke
 constexpr double kLongestStroke_m = 0.1;
 constexpr std::size_t kShortestStroke = 5;  // points; shorter ones are taken only for want of others
 constexpr double kSlideSpeed_m_per_s = 0.06;
