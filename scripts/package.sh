@@ -23,7 +23,7 @@ for argument in "$@"; do
   esac
 done
 
-for tool in dh dpkg-buildpackage lintian; do
+for tool in dh dpkg-buildpackage lintian systemd-analyze; do
   command -v "$tool" >/dev/null || { scripts/install_packages.sh package; break; }
 done
 
