@@ -1,4 +1,4 @@
-// Bundles the page into the folder $HAPTICD_WEB_OUT (default dist/ beside this file): index.html, viewer.js,
+// Bundles the page into the folder $HAPTICD_WEB_OUT (default dist/ beside this file): index.html, viewer.js, read_worker.js,
 // viewer.css, viewer.svg, bunny.obj (which the build copies from testdata/meshes).
 import { copyFile, mkdir } from "node:fs/promises";
 import { dirname, join, resolve } from "node:path";
@@ -11,7 +11,7 @@ const out = resolve(process.env.HAPTICD_WEB_OUT || join(here, "dist"));
 await mkdir(out, { recursive: true });
 await build({
   absWorkingDir: here,
-  entryPoints: { viewer: "src/main.ts" },
+  entryPoints: { viewer: "src/main.ts", read_worker: "src/mesh/read_worker.ts" },
   outdir: out,
   bundle: true,
   minify: true,

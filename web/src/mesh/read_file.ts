@@ -5,19 +5,15 @@ import { OBJLoader } from "three/examples/jsm/loaders/OBJLoader.js";
 import { PLYLoader } from "three/examples/jsm/loaders/PLYLoader.js";
 import { STLLoader } from "three/examples/jsm/loaders/STLLoader.js";
 import { shapeOf } from "./gltf_shape";
+import { isMeshFile, kindOf } from "./mesh_files";
 import { type FileMesh, weld } from "./weld";
 
-export const KINDS = ["obj", "stl", "ply", "gltf", "glb"];
 /** The limit of one batch in the server. */
 const MAX_TRIANGLES = 12_000_000;
 
-const kindOf = (name: string): string => name.split(".").at(-1)!.toLowerCase();
-
-export const isMeshFile = (name: string): boolean => KINDS.includes(kindOf(name));
-
 /** Reads the first mesh file of the list; the others may be files that it refers to. The error names the file and the reason. */
 export async function readMesh(files: File[]): Promise<{ name: string; mesh: FileMesh }> {
-  const file = files.find((f) => KINDS.includes(kindOf(f.name)));
+  const file = files.find((f) => isMeshFile(f.name));
   if (!file)
     throw new Error(`${files[0]?.name ?? "The file"} is not a mesh file: drop an OBJ, STL, PLY, glTF or GLB file.`);
   try {
