@@ -3,7 +3,9 @@
 
 #include <CLI/CLI.hpp>
 #include <cmath>
+#include <filesystem>
 #include <sstream>
+#include <stdexcept>
 #include <string>
 
 namespace hapticd::apps {
@@ -23,20 +25,31 @@ inline CLI::Validator within(double least, double most) {
       },
       range.str());
 }
+/// Throws std::runtime_error when the file exists and `force` is not given. Pipes and devices may be written.
+inline void keepFile(const std::string& file, bool force) {
+  if (force || file.empty() || !std::filesystem::is_regular_file(file)) return;
+  throw std::runtime_error("'" + file + "' exists: choose another name, or overwrite it by --force");
+}
+inline constexpr const char* kForceText = "Overwrite an existing file";
+
 /// Largest duration that an option accepts, in seconds: 30 years.
 inline constexpr double kLongest_s = 1e9;
 
 void addServe(CLI::App& app);
+void addDemo(CLI::App& app);
 void addTouch(CLI::App& app);
 void addStop(CLI::App& app);
 void addWatch(CLI::App& app);
 void addDeviceHost(CLI::App& app);
 void addExport(CLI::App& app);
+void addInfo(CLI::App& app);
 void addRecord(CLI::App& app);
 void addRender(CLI::App& app);
 void addReplay(CLI::App& app);
 void addDoctor(CLI::App& app);
 void addDevices(CLI::App& app);
 void addBench(CLI::App& app);
+void addSelfTest(CLI::App& app);
+void addManual(CLI::App& app);
 
 }  // namespace hapticd::apps

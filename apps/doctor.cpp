@@ -18,6 +18,7 @@
 #include "device_list.h"
 #include "isolation_check.h"
 #include "loop_check.h"
+#include "realtime/servo/thread_setup.h"
 
 namespace hapticd::apps {
 namespace {
@@ -53,10 +54,7 @@ Finding realtimePriority() {
     return {Verdict::good, "SCHED_FIFO priority 80 is granted", ""};
   }
   return {Verdict::bad, "SCHED_FIFO is refused: " + std::string(std::strerror(errno)),
-          "put '@realtime - rtprio 95' and '@realtime - memlock unlimited' into "
-          "/etc/security/limits.d/realtime.conf,\n"
-          "           add yourself to the group realtime, log in again; or: setcap "
-          "cap_sys_nice,cap_ipc_lock+ep hapticd"};
+          realtime::realtimeRemedy()};
 }
 
 Finding memoryLock() {
@@ -65,9 +63,10 @@ Finding memoryLock() {
   if (geteuid() == 0 || limit.rlim_cur == RLIM_INFINITY)
     return {Verdict::good, "memory can be locked without limit", ""};
   const auto kib = static_cast<unsigned long>(limit.rlim_cur / 1024);
-  return {
-      Verdict::note, "only " + std::to_string(kib) + " KiB of memory can be locked",
-      "a page fault in the loop costs up to a millisecond: raise memlock as above ('ulimit -l' shows it)"};
+  return {Verdict::note,
+          "only " + std::to_string(kib) +
+              " KiB of memory can be locked: a page fault in the loop costs up to a millisecond",
+          realtime::realtimeRemedy()};
 }
 
 Finding governor() {
@@ -188,7 +187,7 @@ int run(double seconds, std::uint16_t port) {
     std::printf("verdict: ready to render forces (%d notes above)\n", notes);
   } else {
     const std::string problems = bad == 1 ? "problem" : std::to_string(bad) + " problems";
-    std::printf("verdict: fix the %s marked -> above first; the simulated hand runs with --allow-no-rt\n",
+    std::printf("verdict: fix the %s marked -> above first; the simulated hand runs without\n",
                 problems.c_str());
   }
   return bad == 0 ? 0 : 1;

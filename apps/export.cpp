@@ -18,6 +18,7 @@ struct ExportOptions {
   std::string recording;
   std::string to;
   std::string out;
+  bool force = false;
 };
 
 // Reports of one device, as a client with the default subscription receives them.
@@ -71,6 +72,7 @@ void exportVrpn(const ExportOptions& options, std::string& remark) {
 }
 
 int run(const ExportOptions& options) {
+  keepFile(options.out, options.force);
   std::string remark;
   if (options.to == "vrpn") {
     exportVrpn(options, remark);
@@ -97,6 +99,7 @@ void addExport(CLI::App& app) {
       ->required()
       ->check(CLI::IsMember({"mcap", "csv", "vrpn"}));
   command->add_option("-o,--out", options->out, "File to write")->required();
+  command->add_flag("--force", options->force, kForceText);
   command->footer(
       "mcap  ticks, poses, guard and scene commands, for Foxglove and other readers of MCAP\n"
       "csv   one row for each tick of each device; --hand of 'hapticd serve' and 'hapticd render' reads it\n"

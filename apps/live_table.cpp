@@ -12,9 +12,15 @@
 namespace hapticd::apps {
 namespace {
 
-std::size_t terminalWidth() {
+struct TerminalSize {
+  std::size_t columns = 80;
+  std::size_t rows = 24;
+};
+
+TerminalSize terminalSize() {
   winsize size{};
-  return ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
+  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0 || size.ws_row == 0) return {};
+  return {size.ws_col, size.ws_row};
 }
 
 // The first `columns` characters of UTF-8 text.
@@ -65,11 +71,14 @@ void ProgressBar::finish() {
 
 void LiveTable::show(const std::vector<std::string>& lines) {
   if (height_ > 0) std::printf("\x1b[%zuA", height_);
-  const std::size_t width = terminalWidth();  // a wrapped line would count as two in the next redraw
-  for (const std::string& line : lines) std::printf("%s\x1b[K\n", cutTo(line, width - 1).c_str());
+  // A wrapped line, or one that scrolls, would count as two in the next redraw.
+  const TerminalSize size = terminalSize();
+  const std::size_t shown = std::min(lines.size(), size.rows - 1);
+  for (std::size_t i = 0; i < shown; ++i)
+    std::printf("%s\x1b[K\n", cutTo(lines[i], size.columns - 1).c_str());
   std::printf("\x1b[J");
   std::fflush(stdout);
-  height_ = lines.size();
+  height_ = shown;
 }
 
 }  // namespace hapticd::apps

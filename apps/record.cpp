@@ -26,6 +26,7 @@ struct RecordOptions {
   std::string file;
   double seconds = 0;
   double rate_Hz = 1000;
+  bool force = false;
 };
 
 std::unique_ptr<record::SampleFile> sampleFile(const std::string& file) {
@@ -106,6 +107,7 @@ std::size_t recordTicks(record::SampleFile& file, const RecordOptions& options) 
 }
 
 int run(const RecordOptions& options) {
+  keepFile(options.file, options.force);
   const auto samples = sampleFile(options.file);
   if (!samples && std::filesystem::path(options.file).extension() != ".vrpn") {
     throw std::runtime_error("'" + options.file +
@@ -144,6 +146,7 @@ void addRecord(CLI::App& app) {
   command->add_option("--rate", options->rate_Hz, "At most this many ticks per second, for csv and mcap")
       ->check(within(0.1, 4000))
       ->capture_default_str();
+  command->add_flag("--force", options->force, kForceText);
   command->footer(
       "Records what a client receives: reports, in the frame that the server reports, without the scene. The "
       "server\n"

@@ -1,4 +1,5 @@
 // hapticd render: renders a mesh along a recorded hand, or re-renders a recording; offline and deterministic.
+#include <cstdio>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -15,6 +16,7 @@ struct RenderCommandOptions {
   MeshRenderOptions mesh;
   std::string session;
   std::string report;
+  bool force = false;
 };
 
 void addMeshOptions(CLI::App& command, MeshRenderOptions& options) {
@@ -70,6 +72,8 @@ record::RerenderChanges changesOf(const CLI::App& command, const MeshRenderOptio
 }
 
 int run(const CLI::App& command, const RenderCommandOptions& options) {
+  keepFile(options.mesh.out, options.force);
+  keepFile(options.report, options.force);
   if (!options.session.empty()) {
     for (const char* name : {"--mesh", "--hand", "--mesh-unit", "--size-mm", "--faces", "--timing"}) {
       if (command.count(name) == 0) continue;
@@ -83,7 +87,8 @@ int run(const CLI::App& command, const RenderCommandOptions& options) {
                           .changes = changesOf(command, options.mesh)});
   }
   if (options.mesh.mesh.empty() || options.mesh.hand.empty() || options.mesh.out.empty()) {
-    throw std::runtime_error("nothing to render: give --mesh, --hand and --out, or --session");
+    std::fprintf(stderr, "hapticd: nothing to render: give --mesh, --hand and --out, or --session\n");
+    return 2;
   }
   if (!options.report.empty()) throw std::runtime_error("--report needs a --session to compare with");
   return renderMesh(options.mesh);
@@ -101,6 +106,7 @@ void addRender(CLI::App& app) {
   command->add_option("--out", options->mesh.out, "CSV to write, one row for each tick");
   command->add_option("--report", options->report,
                       "With --session: HTML page with plots of force and depth, recorded and re-rendered");
+  command->add_flag("--force", options->force, kForceText);
   addSurfaceOptions(*command, options->mesh);
   command->footer(
       "With --mesh, --out has the columns of 'hapticd export --to csv' (docs/recording.md): hip_[xyz]_m, "

@@ -37,6 +37,7 @@ int run(const ReplayOptions& options) {
   announce(server, config, "replay");
   stopper.watch(server);
   server.run();
+  stopper.finish();
   return 0;
 }
 

@@ -28,6 +28,14 @@ std::string sparkline(const std::deque<double>& values, double most) {
   return bars;
 }
 
+// The sensors of this server have a meaning; those of others a number.
+std::string ReportView::sensorName(int sensor) const {
+  static constexpr std::array kNames{"0 proxy", "1 hip", "2 contact"};
+  if (client_.capabilities() && sensor >= 0 && sensor < static_cast<int>(kNames.size()))
+    return kNames[static_cast<std::size_t>(sensor)];
+  return "sensor " + std::to_string(sensor);
+}
+
 void ReportView::remember() {
   const LatestReports& latest = client_.latest();
   const Vec3& f = latest.force.force_N;
@@ -51,11 +59,11 @@ std::vector<std::string> ReportView::table(const ReportSummary& summary) {
   for (const auto& [sensor, pose] : latest.pose) {
     const Vec3& p = pose.position_m;
     const Quaternion& q = pose.orientation;
-    add("  sensor %d   %8.2f %8.2f %8.2f mm   %6.3f %6.3f %6.3f %6.3f", sensor, p[0] * 1000, p[1] * 1000,
-        p[2] * 1000, q[0], q[1], q[2], q[3]);
+    add("  %-10s %8.2f %8.2f %8.2f mm  %6.3f %6.3f %6.3f %6.3f", sensorName(sensor).c_str(), p[0] * 1000,
+        p[1] * 1000, p[2] * 1000, q[0], q[1], q[2], q[3]);
   }
   const Vec3& f = latest.force.force_N;
-  add("  force      %8.3f %8.3f %8.3f N    |F| %.3f N   peak %.3f N", f[0], f[1], f[2],
+  add("  force      %8.3f %8.3f %8.3f N  |F| %.3f N  peak %.3f N", f[0], f[1], f[2],
       std::hypot(f[0], f[1], f[2]), summary.peakForce_N());
   add("  |F|        %s %.2f N", sparkline(forces_N_, summary.peakForce_N()).c_str(), summary.peakForce_N());
   add("  depth      %s %.2f mm", sparkline(depths_m_, summary.deepest_m()).c_str(),
@@ -63,7 +71,7 @@ std::vector<std::string> ReportView::table(const ReportSummary& summary) {
   // Channel 6 is the gripper on this server only; other servers may use it for anything.
   const std::vector<double>& channels = latest.analog.channels;
   if (client_.capabilities() && channels.size() == 7) add("  gripper    %8.3f rad", channels[6]);
-  add("  touching   %s   object %d   depth %.3f mm   angle %.1f deg   %.1f %% of the time",
+  add("  touching   %s  object %d  depth %.3f mm  angle %.1f deg  %.0f %% of time",
       latest.touching.touching ? "yes" : "no ", latest.touchedObject.object, latest.depth.depth_m * 1000,
       latest.angle.angle_deg, 100 * summary.contactFraction());
   for (std::size_t i = 0; i < kReportKinds; ++i) {

@@ -24,6 +24,7 @@ class ReportView {
  private:
   // Appends force and depth to the bars.
   void remember();
+  std::string sensorName(int sensor) const;
 
   Client& client_;
   Statistics before_;

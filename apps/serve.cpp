@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <stdexcept>
 
 #include "announce.h"
 #include "commands.h"
@@ -17,6 +18,7 @@ namespace {
 struct ServeOptions {
   std::string configFile;
   std::string listen;
+  int port = -1;
   std::string http;
   std::vector<std::string> httpAllow;
   std::vector<std::string> names;
@@ -57,6 +59,7 @@ server::ServerConfig configOf(const ServeOptions& options, std::vector<std::stri
   const std::filesystem::path file = options.configFile;
   if (!file.empty()) config = server::loadConfig(file, remarks);
   if (!options.listen.empty()) server::parseListen(options.listen, config.listenAddress, config.port);
+  if (options.port >= 0) config.port = static_cast<std::uint16_t>(options.port);
   if (!options.http.empty()) config.http = options.http;
   config.httpAllow.insert(config.httpAllow.end(), options.httpAllow.begin(), options.httpAllow.end());
   if (options.allowNoRealtime) config.allowNoRealtime = true;
@@ -70,6 +73,22 @@ server::ServerConfig configOf(const ServeOptions& options, std::vector<std::stri
   }
   server::validate(config);
   return config;
+}
+
+// A driver knows what its device or library answered; 'hapticd devices' knows the remedy.
+std::unique_ptr<server::Server> openServer(const server::ServerConfig& config) {
+  try {
+    return std::make_unique<server::Server>(config);
+  } catch (const net::Error&) {
+    throw;
+  } catch (const std::runtime_error& error) {
+    bool real = false;
+    for (const server::DeviceConfig& device : config.devices) real = real || device.driver != "simulated";
+    if (!real) throw;
+    throw std::runtime_error(
+        std::string(error.what()) +
+        "\nhapticd: 'hapticd devices' lists what was found, and the remedy for each driver");
+  }
 }
 
 int run(const ServeOptions& options) {
@@ -91,10 +110,11 @@ int run(const ServeOptions& options) {
   }
   for (const std::string& remark : remarks) spdlog::warn("{}", remark);
   StopOnSignal stopper;
-  server::Server server(config);
-  announce(server, config);
-  stopper.watch(server);
-  server.run();
+  const std::unique_ptr<server::Server> server = openServer(config);
+  announce(*server, config);
+  stopper.watch(*server);
+  server->run();
+  stopper.finish();
   return 0;
 }
 
@@ -111,6 +131,7 @@ void addServe(CLI::App& app) {
                     "Print the configuration in effect as TOML, or the error in it, and exit");
   command->add_option("--listen", options->listen,
                       "ADDR:PORT for TCP and UDP [127.0.0.1:3883]; 0.0.0.0 for all networks");
+  command->add_option("--port", options->port, "Only the port; 0: any free one")->check(CLI::Range(0, 65535));
   command->add_option("--http", options->http,
                       "ADDR:PORT of the viewer, its data and the metrics [127.0.0.1:8080 if free, otherwise\n"
                       "none]; 'off' for none; 0.0.0.0:8080 for all networks");
@@ -141,8 +162,9 @@ void addServe(CLI::App& app) {
       "--record", options->record,
       "Write a recording (all scene commands and ticks) for replay, render and export; %Y%m%d-%H%M%S\n"
       "in the name becomes the time");
-  command->add_flag("--allow-no-rt", options->allowNoRealtime,
-                    "Run even if the system refuses realtime rights (fine for the simulated hand)");
+  command->add_flag(
+      "--allow-no-rt", options->allowNoRealtime,
+      "Run a real device even if the system refuses realtime rights; the simulated hand always runs");
   command->add_flag("-v,--verbose", options->verbose, "Log more");
   command->footer(
       "Clients open NAME@HOST, NAME@HOST:PORT or NAME@tcp://HOST:PORT as Tracker, Button or ForceDevice.\n"

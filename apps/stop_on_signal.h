@@ -3,6 +3,7 @@
 
 #include <pthread.h>
 
+#include <atomic>
 #include <csignal>
 #include <thread>
 
@@ -19,22 +20,26 @@ class StopOnSignal {
     sigaddset(&signals_, SIGTERM);
     pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
   }
-  /// Calls server.stop() at the first signal, from a separate thread; `server` outlives this.
+  /// Calls server.stop() at the first signal, from a separate thread, until finish().
   void watch(server::Server& server) {
     thread_ = std::thread([this, &server] {
       int signal = 0;
       sigwait(&signals_, &signal);
-      server.stop();
+      if (!finished_) server.stop();
     });
   }
-  ~StopOnSignal() {
+  /// Call it before the server ends: its thread uses the server no more. Idempotent.
+  void finish() {
     if (!thread_.joinable()) return;
+    finished_ = true;
     pthread_kill(thread_.native_handle(), SIGTERM);
     thread_.join();
   }
+  ~StopOnSignal() { finish(); }
 
  private:
   sigset_t signals_{};
+  std::atomic<bool> finished_{false};
   std::thread thread_;
 };
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "fit_mesh.h"
 #include "geometry/crossings.h"
 #include "geometry/mesh_check.h"
 #include "geometry/triangle_mesh.h"
@@ -36,6 +37,8 @@ struct TouchOptions {
   int object = 0;
   double size_mm = 0;
   bool keepScene = false;
+  bool replace = false;
+  bool trueSize = false;
   bool json = false;
 };
 
@@ -46,25 +49,11 @@ std::string extentsText(const TriangleMesh& mesh) {
   return text;
 }
 
-void scaleIntoWorkspace(TriangleMesh& mesh, double size_mm) {
-  const geometry::Vec3 kTouch_mm(160, 120, 70);
-  constexpr double kFill = 0.8;
-  constexpr double kLargestDefault_mm = 100;
-  const geometry::Box bounds = geometry::boundsOf(mesh);
-  const geometry::Vec3 extents = bounds.extents().cwiseMax(1e-12);
-  if (bounds.empty() || bounds.extents().maxCoeff() <= 0) {
-    throw std::runtime_error("the mesh has no extent, so there is nothing to touch");
-  }
-  const double fitting = std::min((kFill * kTouch_mm.array() / extents.array()).minCoeff(),
-                                  kLargestDefault_mm / extents.maxCoeff());
-  const double scale = size_mm > 0 ? size_mm / extents.maxCoeff() : fitting;
-  geometry::scaleAndMove(mesh, scale, -scale * bounds.centre());
-}
-
 TriangleMesh load(const TouchOptions& options) {
   TriangleMesh mesh = mesh_io::loadMesh(options.mesh);
-  std::printf("%s: %zu vertices, %zu triangles, %s units\n", options.mesh.c_str(), mesh.vertices.size(),
-              mesh.triangles.size(), extentsText(mesh).c_str());
+  std::printf("%s: %zu vertices, %zu %s, %s units\n", options.mesh.c_str(), mesh.vertices.size(),
+              mesh.triangles.size(), mesh.triangles.size() == 1 ? "triangle" : "triangles",
+              extentsText(mesh).c_str());
   if (mesh.triangles.empty())
     throw std::runtime_error(options.mesh + " has no triangles, so there is nothing to touch");
   auto findings = geometry::describe(geometry::checkMesh(mesh.vertices, mesh.triangles));
@@ -72,30 +61,36 @@ TriangleMesh load(const TouchOptions& options) {
     findings.push_back(std::move(finding));
   if (findings.empty()) std::printf("mesh check: clean\n");
   for (const std::string& finding : findings) std::printf("mesh check: %s\n", finding.c_str());
-  scaleIntoWorkspace(mesh, options.size_mm);
-  std::printf("scaled to %s mm, centred in the workspace\n", extentsText(mesh).c_str());
+  if (options.trueSize) {
+    const geometry::Box bounds = geometry::boundsOf(mesh);
+    geometry::scaleAndMove(mesh, 1, -bounds.centre());
+    std::printf("%s mm, centred in the workspace\n", extentsText(mesh).c_str());
+  } else {
+    fitIntoWorkspace(mesh, options.size_mm);
+    std::printf("scaled to %s mm, centred in the workspace\n", extentsText(mesh).c_str());
+  }
   return mesh;
 }
 
 void send(Client& client, const TriangleMesh& mesh, const TouchOptions& options) {
-  std::vector<std::array<float, 3>> corners;
-  corners.reserve(mesh.triangles.size() * 3);
-  for (const auto& triangle : mesh.triangles) {
-    for (const auto index : triangle) {
-      const auto& v = mesh.vertices[index];
-      corners.push_back({v.x(), v.y(), v.z()});
-    }
-  }
-  if (!options.keepScene) client.resetScene();
+  std::vector<std::array<float, 3>> vertices;
+  vertices.reserve(mesh.vertices.size());
+  for (const auto& v : mesh.vertices) vertices.push_back({v.x(), v.y(), v.z()});
+  if (options.replace) client.resetScene();
   client.setObjectCount(options.object + 1);
+  // The object may have another mesh, elsewhere.
+  client.clearMesh(options.object);
+  client.setTransform(options.object, kIdentity);
+  client.setTouchable(options.object, true);
   client.setSurface(options.object, options.surface);
   ProgressBar bar("sending");
   const auto start = std::chrono::steady_clock::now();
-  client.uploadCorners(options.object, corners,
-                       [&](const UploadProgress& p) { bar.show(p.bytesSent, p.bytesTotal); });
+  client.uploadMesh(options.object, {vertices, mesh.triangles},
+                    [&](const UploadProgress& p) { bar.show(p.bytesSent, p.bytesTotal); });
   bar.finish();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  std::printf("sent %zu vertices in %.3f s to object %d of %s@%s\n", corners.size(), seconds, options.object,
+  std::printf("sent %zu %s in %.3f s to object %d of %s@%s\n", mesh.triangles.size(),
+              mesh.triangles.size() == 1 ? "triangle" : "triangles", seconds, options.object,
               client.device().c_str(), client.server().c_str());
 }
 
@@ -172,7 +167,12 @@ void addTouch(CLI::App& app) {
       ->add_option("--size-mm", options->size_mm, "Largest extent on the device in mm; 0: fit a small device")
       ->check(within(0, 1000))
       ->capture_default_str();
-  command->add_flag("--keep-scene", options->keepScene, "Do not clear the server's scene first");
+  command->add_flag("--true-size", options->trueSize, "One unit of the file is one millimetre of the device")
+      ->excludes("--size-mm");
+  command->add_flag("--replace", options->replace,
+                    "Empty the whole scene first: all objects, effects and the workspace, of all clients.\n"
+                    "Without it only the mesh of the object is replaced");
+  command->add_flag("--keep-scene", options->keepScene)->group("");  // the default since 0.1
   command->add_flag("--json", options->json, "Also print the summary as one line of JSON, at the end");
   command->footer(
       "Exit status: 0 when done, 1 when the server cannot be reached, disconnects or sends no reports.");

@@ -6,6 +6,9 @@ file(REMOVE_RECURSE ${OUT}/dist ${copy}/src ${copy}/static)
 file(REMOVE ${OUT}/bundle.stamp)
 file(COPY ${WEB}/ DESTINATION ${copy} PATTERN node_modules EXCLUDE PATTERN dist EXCLUDE)
 
+# "Load the bunny" of the empty page.
+file(COPY ${WEB}/../testdata/meshes/bunny.obj DESTINATION ${copy}/static)
+
 function(run_npm result)
   execute_process(COMMAND ${CMAKE_COMMAND} -E env HAPTICD_WEB_OUT=${OUT}/dist ${NPM} ${ARGN} WORKING_DIRECTORY ${copy}
     RESULT_VARIABLE status OUTPUT_VARIABLE said ERROR_VARIABLE said)

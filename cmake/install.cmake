@@ -38,19 +38,37 @@ foreach(package hapticd hapticd-vrpn)
 endforeach()
 
 install(FILES packaging/grafana/hapticd.json DESTINATION ${CMAKE_INSTALL_DATADIR}/hapticd/grafana)
+install(FILES testdata/meshes/bunny.obj DESTINATION ${CMAKE_INSTALL_DATADIR}/hapticd/meshes)
+# What an operator copies into the system; the Debian package does it (scripts/package.sh).
+install(FILES packaging/systemd/hapticd.service packaging/sysusers/hapticd.conf packaging/udev/70-hapticd.rules packaging/hapticd.toml
+        DESTINATION ${CMAKE_INSTALL_DATADIR}/hapticd/system)
+install(FILES packaging/limits/hapticd.conf DESTINATION ${CMAKE_INSTALL_DATADIR}/hapticd/system RENAME limits.conf)
+install(FILES packaging/desktop/hapticd.desktop DESTINATION ${CMAKE_INSTALL_DATADIR}/applications)
+install(FILES packaging/desktop/io.hapticd.viewer.metainfo.xml DESTINATION ${CMAKE_INSTALL_DATADIR}/metainfo)
+install(FILES web/static/viewer.svg DESTINATION ${CMAKE_INSTALL_DATADIR}/icons/hicolor/scalable/apps RENAME hapticd.svg)
+install(FILES LICENSE CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+# Man pages and completion, from the options of the program.
+install(CODE "
+  execute_process(COMMAND $<TARGET_FILE:hapticd> manual \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DATADIR}\"
+    COMMAND_ERROR_IS_FATAL ANY)
+  ")
 
 # Programs and shared libraries are installed without symbols. The symbols are in .debug/NAME.debug beside each file, where
-# debuggers look.
+# debuggers look; with HAPTICD_NO_DEBUG_FILES in the environment, the symbols are left out.
 function(hapticd_split_symbols target directory)
   install(CODE "
     set(file \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${directory}/$<TARGET_FILE_NAME:${target}>\")
-    cmake_path(GET file PARENT_PATH folder)
-    cmake_path(GET file FILENAME name)
-    file(MAKE_DIRECTORY \${folder}/.debug)
-    execute_process(COMMAND ${CMAKE_OBJCOPY} --only-keep-debug \${file} \${folder}/.debug/\${name}.debug COMMAND_ERROR_IS_FATAL ANY)
-    execute_process(COMMAND ${CMAKE_STRIP} \${file} COMMAND_ERROR_IS_FATAL ANY)
-    execute_process(COMMAND ${CMAKE_OBJCOPY} --add-gnu-debuglink=.debug/\${name}.debug \${file}
-      WORKING_DIRECTORY \${folder} COMMAND_ERROR_IS_FATAL ANY)
+    if(DEFINED ENV{HAPTICD_NO_DEBUG_FILES})
+      execute_process(COMMAND ${CMAKE_STRIP} \${file} COMMAND_ERROR_IS_FATAL ANY)
+    else()
+      cmake_path(GET file PARENT_PATH folder)
+      cmake_path(GET file FILENAME name)
+      file(MAKE_DIRECTORY \${folder}/.debug)
+      execute_process(COMMAND ${CMAKE_OBJCOPY} --only-keep-debug \${file} \${folder}/.debug/\${name}.debug COMMAND_ERROR_IS_FATAL ANY)
+      execute_process(COMMAND ${CMAKE_STRIP} \${file} COMMAND_ERROR_IS_FATAL ANY)
+      execute_process(COMMAND ${CMAKE_OBJCOPY} --add-gnu-debuglink=.debug/\${name}.debug \${file}
+        WORKING_DIRECTORY \${folder} COMMAND_ERROR_IS_FATAL ANY)
+    endif()
     ")
 endfunction()
 hapticd_split_symbols(hapticd ${CMAKE_INSTALL_BINDIR})

@@ -32,9 +32,9 @@ if [ -n "$keep" ]; then
   http=127.0.0.1:8080
   (exec 3<>/dev/tcp/127.0.0.1/8080) 2>/dev/null && http=127.0.0.1:0  # taken: any free port
   # setsid: the server outlives this script and its terminal.
-  setsid "$program" serve --http "$http" --allow-no-rt </dev/null >"$log" 2>&1 &
+  setsid "$program" serve --http "$http" </dev/null >"$log" 2>&1 &
 else
-  "$program" serve --listen 127.0.0.1:0 --http off --allow-no-rt --seconds 60 >"$log" 2>&1 &
+  "$program" serve --listen 127.0.0.1:0 --http off --seconds 60 >"$log" 2>&1 &
 fi
 server=$!
 stop() { kill "$server" 2>/dev/null || true; wait "$server" 2>/dev/null || true; }

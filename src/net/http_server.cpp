@@ -42,6 +42,7 @@ class HttpServer::Impl {
 };
 
 void HttpReply::operator()(HttpResponse response) const {
+  response.headers.insert(response.headers.end(), headers_.begin(), headers_.end());
   if (const auto connection = connection_.lock()) connection->answer(request_, std::move(response));
 }
 

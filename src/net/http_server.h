@@ -33,8 +33,15 @@ class HttpReply {
   HttpReply(std::weak_ptr<HttpConnection> connection, std::uint64_t request)
       : connection_(std::move(connection)), request_(request) {}
   void operator()(HttpResponse response) const;
+  /// The same answer, with these headers besides its own.
+  HttpReply with(std::vector<std::pair<std::string, std::string>> headers) const {
+    HttpReply reply = *this;
+    reply.headers_ = std::move(headers);
+    return reply;
+  }
 
  private:
+  std::vector<std::pair<std::string, std::string>> headers_;
   std::weak_ptr<HttpConnection> connection_;
   std::uint64_t request_;
 };

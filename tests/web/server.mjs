@@ -55,6 +55,7 @@ export class Server {
     await promisify(execFile)(this.hapticd, [
       "touch",
       mesh,
+      "--replace",
       "--server",
       `Phantom@tcp://${this.vrpn}`,
       "--seconds",

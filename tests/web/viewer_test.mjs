@@ -40,6 +40,28 @@ test("an empty scene says how to load one", async () => {
     async () => (await viewer.ask("document.querySelector('#notice').dataset.notice")) === "empty",
   );
   assert.match(await viewer.text("#notice-text"), /Drop a mesh here/);
+  await viewer.page.click("#load-bunny");
+  await viewer.showsTriangles(3674);
+  await viewer.until("the notice is gone", async () => !(await viewer.page.isVisible("#notice")));
+});
+
+test("on a phone, STOP and Re-arm are on the screen and work", async () => {
+  const { page } = viewer;
+  const size = page.viewportSize();
+  await page.setViewportSize({ width: 390, height: 844 });
+  for (const id of ["#stop", "#rearm"]) {
+    const box = await page.locator(id).boundingBox();
+    assert.ok(box.x >= 0 && box.x + box.width <= 390, `${id} from ${box.x} to ${box.x + box.width}`);
+    assert.ok(box.y >= 0 && box.y + box.height <= 844, `${id} from ${box.y} to ${box.y + box.height}`);
+  }
+  await page.locator("aside").evaluate((e) => e.scrollIntoView({ block: "end" }));
+  await page.click("#stop");
+  await viewer.until("the stop", async () => (await server.state()).devices[0].guard.stopped);
+  await viewer.until("STOPPED", () => viewer.ask("document.querySelector('#stage').dataset.held === 'STOPPED'"));
+  await page.screenshot({ path: process.env.HAPTICD_PHONE_PICTURE ?? "/dev/null", type: "png" });
+  await page.click("#rearm");
+  await viewer.until("the re-arm", async () => !(await server.state()).devices[0].guard.stopped);
+  await page.setViewportSize(size);
 });
 
 test("the scene appears", async () => {
@@ -123,9 +145,14 @@ test("switching an effect changes the force", async () => {
   await viewer.page.locator("#effects").getByRole("button", { name: "Add" }).click();
   const active = viewer.page.getByLabel("Effect 0 is on");
   await active.waitFor();
-  await viewer.forceIs("zero before the effect", zero);
+  await viewer.forceIs("1 N: it starts when it is added", (force_N) => Math.abs(force_N - 1) < 0.02);
+  await viewer.until("the effect's name", async () =>
+    (await viewer.text("#touching")).includes("effect 0 (constant)"),
+  );
+  await active.uncheck();
+  await viewer.forceIs("zero without the effect", zero);
   await active.check();
-  await viewer.forceIs("1 N", (force_N) => Math.abs(force_N - 1) < 0.02);
+  await viewer.forceIs("1 N again", (force_N) => Math.abs(force_N - 1) < 0.02);
   const [x, y, z] = await viewer.ask("viewer.tick.force_N");
   assert.ok(y > 0.98 && Math.hypot(x, z) < 0.05, `up, not ${[x, y, z]}`);
   await active.uncheck();

@@ -1,7 +1,8 @@
 // Loads a mesh file that the user drops onto the page or chooses: reads, places and sends it, then waits for the server.
 import { byId, countText, el, setText } from "./panels/dom";
 import type { Link } from "./link";
-import { readMesh } from "./mesh/read_file";
+import { readMeshBeside } from "./mesh/read_beside";
+import { isMeshFile } from "./mesh/mesh_files";
 import { Placing } from "./mesh/placing";
 import { upload } from "./mesh/upload";
 import type { FileMesh } from "./mesh/weld";
@@ -32,6 +33,7 @@ export class DropMesh {
       void this.open([...(chooser.files ?? [])]);
       chooser.value = "";
     });
+    byId("load-bunny").addEventListener("click", () => void this.loadBunny());
     document.addEventListener("dragover", (e) => {
       e.preventDefault();
       document.body.classList.add("dropping");
@@ -70,8 +72,29 @@ export class DropMesh {
     this.show(`Reading ${files[0]!.name} …`);
     await new Promise((resolve) => setTimeout(resolve, 30)); // lets the browser show the text first
     try {
-      const { name, mesh } = await readMesh(files);
+      const { name, mesh } = await readMeshBeside(files);
       this.place(name, mesh, device);
+      const others = files.filter((f) => f.name !== name && isMeshFile(f.name));
+      if (others.length > 0)
+        this.show(`One file at a time: ${others.map((f) => f.name).join(", ")} not loaded.`, "bad");
+    } catch (error) {
+      this.show((error as Error).message, "bad");
+    }
+  }
+
+  /** The mesh that every server brings along, at its usual place. */
+  private async loadBunny(): Promise<void> {
+    const device = this.context.device();
+    if (!device) return;
+    this.panel.hidden = false;
+    this.placing?.end();
+    try {
+      const response = await fetch("bunny.obj");
+      if (!response.ok) throw new Error(`the server has no bunny (status ${response.status})`);
+      const { mesh } = await readMeshBeside([new File([await response.blob()], "bunny.obj")]);
+      const placing = new Placing("bunny.obj", mesh, this.context.view, device, this.context.objects());
+      this.placing = placing;
+      await this.load("bunny.obj", mesh, placing);
     } catch (error) {
       this.show((error as Error).message, "bad");
     }

@@ -135,6 +135,7 @@ class Page {
 
   private onState(state: ServerState | undefined): void {
     this.serverResponds = state !== undefined;
+    if (!state && this.state) this.clearReadout();
     if (state) {
       this.state = state;
       this.showDevices(state.devices);
@@ -156,7 +157,7 @@ class Page {
     this.meshes.update(device.scene, this.objects());
     this.showObjects();
     this.drop.update(this.objects());
-    this.showArmed(device.guard.stopped || device.guard.latched.length > 0);
+    this.showArmed(device.guard.stopped, device.guard.latched.length > 0);
     this.showHand();
     const { server } = state;
     byId("recording").hidden = server.recording === null;
@@ -220,10 +221,20 @@ class Page {
     if (state === "open") this.subscribe();
     if (state === "lost") {
       this.hand.onLost();
-      for (const id of ["force", "depth", "touching"]) setText(byId(id), "–");
+      this.clearReadout();
       this.meshes.clear(); // another server numbers its shapes from 1, too
     }
     this.showNotice();
+  }
+
+  // What is not known is a dash, not a number of before.
+  private clearReadout(): void {
+    this.tick = undefined;
+    this.tickIsNew = false;
+    for (const id of ["force", "depth", "touching"]) setText(byId(id), "–");
+    this.guard.lost();
+    this.showHeld("NO CONNECTION");
+    this.showHand();
   }
 
   private subscribe(): void {
@@ -240,7 +251,7 @@ class Page {
         return;
       case wire.GUARD_STATE: {
         const guard = wire.decodeGuardState(message.payload);
-        return this.showArmed(guard.stopped || guard.latched !== 0);
+        return this.showArmed(guard.stopped, guard.latched !== 0);
       }
       case wire.TEXT:
         return this.onText(wire.decodeText(message.payload));
@@ -302,7 +313,7 @@ class Page {
 
   private handText(): string {
     const { device, hand } = this;
-    if (!device) return "";
+    if (!device || this.link.state !== "open" || !this.serverResponds) return "";
     if (!device.simulated) return "A user holds this device; the page cannot move it.";
     if (hand.held)
       return hand.strokes
@@ -312,9 +323,15 @@ class Page {
     return "Drag over an object to touch it. Right mouse button: camera.";
   }
 
-  private showArmed(stopped: boolean): void {
-    byId<HTMLButtonElement>("rearm").disabled = !stopped;
-    document.body.classList.toggle("stopped", stopped);
+  private showArmed(stopped: boolean, tripped: boolean): void {
+    byId<HTMLButtonElement>("rearm").disabled = !stopped && !tripped;
+    document.body.classList.toggle("stopped", stopped || tripped);
+    this.showHeld(stopped ? "STOPPED" : tripped ? "TRIPPED" : "");
+  }
+
+  /** Why there is no force, in letters that are read across a lab. */
+  private showHeld(word: string): void {
+    byId("stage").dataset["held"] = word;
   }
 
   // Every frame.
@@ -339,7 +356,26 @@ class Page {
     setText(byId("force"), Math.hypot(...tick.force_N).toFixed(2));
     setText(byId("depth"), `${this.depth_mm(tick).toFixed(2)} mm`);
     const stopped = (tick.guardActive & (1 << TRIPS.stopped.bit)) !== 0 ? " (stopped)" : "";
-    setText(byId("touching"), (tick.object >= 0 ? `object ${tick.object}` : "nothing") + stopped);
+    setText(byId("touching"), this.touchingText(tick) + stopped);
+  }
+
+  // Everything that may push: objects, planes, and what needs no surface.
+  private touchingText(tick: wire.Tick): string {
+    const { scene } = this;
+    const names: string[] = [];
+    const inContact = tick.object >= 0 || tick.depth > 0;
+    const touched = new Set(inContact ? this.contacts.map((c) => c.object) : []);
+    if (inContact) touched.add(tick.object);
+    for (const object of [...touched].sort((a, b) => a - b)) {
+      if (object >= 0) names.push(`object ${object}`);
+      else names.push(scene?.planes.length === 1 ? `plane ${scene.planes[0]!.index}` : "a plane");
+    }
+    if (Math.hypot(...tick.force_N) > 0) {
+      for (const e of scene?.effects ?? []) if (e.active) names.push(`effect ${e.index} (${e.type})`);
+      if (scene?.constraint) names.push(`constraint (${scene.constraint.mode})`);
+      if ((scene?.fields ?? 0) > 0 && !scene?.constraint) names.push("force field");
+    }
+    return names.join(", ") || "nothing";
   }
 }
 

@@ -15,7 +15,7 @@ const TEXTS: Record<Exclude<Notice, "">, [title: string, text: string]> = {
   ],
   empty: [
     "The scene is empty",
-    "Drop a mesh here (OBJ, STL, PLY or glTF), or run “hapticd touch testdata/meshes/bunny.obj”.",
+    "Drop a mesh here (OBJ, STL, PLY or glTF), or run “hapticd touch FILE”.",
   ],
 };
 
@@ -32,6 +32,7 @@ export function showNotice(notice: Notice): void {
   if (notice === "") return;
   setText(byId("notice-title"), TEXTS[notice][0]);
   setText(byId("notice-text"), TEXTS[notice][1]);
+  byId("load-bunny").hidden = notice !== "empty";
 }
 
 /** Severity as in VRPN's text messages: 0 normal, 1 warning, 2 error. */

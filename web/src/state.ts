@@ -2,6 +2,8 @@
 import type { ObjectState, ServerState } from "./state_types";
 
 const EVERY_MS = 250;
+/** Without a server: each failed request is a line in the browser's console. */
+const EVERY_LOST_MS = 2000;
 const RETRY_MS = 1000;
 /** Limit of the server for the display meshes of a scene together. */
 const MAX_DISPLAY_TRIANGLES = 100_000;
@@ -36,7 +38,7 @@ export function pollState(onState: (state: ServerState | undefined) => void): vo
       // The server does not respond: undefined.
     }
     onState(state);
-    window.setTimeout(() => void poll(), EVERY_MS);
+    window.setTimeout(() => void poll(), state ? EVERY_MS : EVERY_LOST_MS);
   };
   void poll();
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 
 #include "base/time.h"
 #include "geometry/types.h"
@@ -33,6 +34,9 @@ class HandPath {
   virtual HandPose at(Nanos sinceStart) const noexcept = 0;
   /// From start to end; 0 for a path that stands still.
   virtual Nanos duration() const noexcept = 0;
+  /// The largest force of the hand towards the path. A hand that meets something in its way presses with no
+  /// more than this.
+  virtual double strength_N() const noexcept { return std::numeric_limits<double>::infinity(); }
 };
 
 }  // namespace hapticd::device

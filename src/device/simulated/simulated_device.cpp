@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "base/time.h"
@@ -107,13 +108,20 @@ void SimulatedDevice::reach(const HandPose& goal, double step_s) noexcept {
   intended_.buttons = goal.buttons;
 }
 
+double SimulatedDevice::strength_N() const noexcept {
+  const bool follows = !external_.active && script_ != nullptr && script_->path;
+  return follows ? script_->path->strength_N() : std::numeric_limits<double>::infinity();
+}
+
 // Implicit in the damper, so that no step is too long for it; symplectic in the spring.
 void SimulatedDevice::move(double step_s) noexcept {
   const double b = options_.handDamping_Ns_per_m;
-  const Vec3 pull = options_.handStiffness_N_per_m * (intended_.position_m - position_m_) +
-                    b * intended_.velocity_m_per_s + force_N_;
+  Vec3 hand_N =
+      options_.handStiffness_N_per_m * (intended_.position_m - position_m_) + b * intended_.velocity_m_per_s;
+  const double strength = strength_N();
+  if (hand_N.squaredNorm() > strength * strength) hand_N *= strength / hand_N.norm();
   velocity_m_per_s_ =
-      (options_.mass_kg * velocity_m_per_s_ + step_s * pull) / (options_.mass_kg + step_s * b);
+      (options_.mass_kg * velocity_m_per_s_ + step_s * (hand_N + force_N_)) / (options_.mass_kg + step_s * b);
   position_m_ += step_s * velocity_m_per_s_;
 }
 

@@ -56,6 +56,7 @@ class SimulatedDevice final : public Device, public SteeredHand {
 
   void chooseSource() noexcept;
   HandPose wanted() const noexcept;
+  double strength_N() const noexcept;
   void intend(Nanos step) noexcept;
   void reach(const HandPose& goal, double step_s) noexcept;
   void move(double step_s) noexcept;

@@ -20,8 +20,8 @@ double slope(double before, double after, double lengthBefore, double lengthAfte
 
 }  // namespace
 
-WaypointPath::WaypointPath(std::vector<Waypoint> points, Repeat repeat)
-    : points_(std::move(points)), repeat_(repeat == Repeat::yes) {
+WaypointPath::WaypointPath(std::vector<Waypoint> points, Repeat repeat, double strength_N)
+    : points_(std::move(points)), repeat_(repeat == Repeat::yes), strength_N_(strength_N) {
   if (points_.empty()) throw std::invalid_argument("a path needs at least one point");
   for (std::size_t i = 0; i < points_.size(); ++i) {
     Waypoint& point = points_[i];

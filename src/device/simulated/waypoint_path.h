@@ -1,6 +1,7 @@
 // A hand that passes given points at given times, smoothly.
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "device/simulated/hand_path.h"
@@ -23,10 +24,12 @@ class WaypointPath final : public HandPath {
 
   /// Throws std::invalid_argument when there is no point, a value is not finite or times do not increase.
   /// A path that repeats should end where it starts.
-  explicit WaypointPath(std::vector<Waypoint> points, Repeat repeat = Repeat::no);
+  explicit WaypointPath(std::vector<Waypoint> points, Repeat repeat = Repeat::no,
+                        double strength_N = std::numeric_limits<double>::infinity());
 
   HandPose at(Nanos sinceStart) const noexcept override;
   Nanos duration() const noexcept override { return times_.back() - times_.front(); }
+  double strength_N() const noexcept override { return strength_N_; }
 
  private:
   void findVelocities();
@@ -35,6 +38,7 @@ class WaypointPath final : public HandPath {
   std::vector<Nanos> times_;
   std::vector<Vec3> velocities_;
   bool repeat_;
+  double strength_N_;
 };
 
 }  // namespace hapticd::device

@@ -24,7 +24,9 @@ const ThreadSetup& ServoThread::start() {
   go_.notify_one();
   if (leave) {
     thread_.join();
-    throw std::runtime_error("the system refused what the servo thread requires\n" + setup_.complaints());
+    throw std::runtime_error("the system refused what the servo thread of a real device requires\n" +
+                             setup_.complaints() +
+                             "; --allow-no-rt starts without: late ticks then make the force rough");
   }
   return setup_;
 }

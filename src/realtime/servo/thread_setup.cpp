@@ -1,5 +1,6 @@
 #include "realtime/servo/thread_setup.h"
 
+#include <grp.h>
 #include <linux/capability.h>
 #include <pthread.h>
 #include <sched.h>
@@ -13,6 +14,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <vector>
 
 #include "realtime/servo/flush_denormals.h"
 
@@ -72,10 +74,7 @@ void requestScheduling(const ThreadRequest& request, SetupAnswer& answer) {
     answer.text = "normal scheduling: SCHED_FIFO priority " + std::to_string(request.priority) +
                   " was refused (" + std::strerror(error) + ", RLIMIT_RTPRIO is " +
                   std::to_string(limit.rlim_cur) + ")";
-    answer.remedy = "add '<user> - rtprio " + std::to_string(request.priority) +
-                    "' to /etc/security/limits.d/hapticd.conf and log in again, or give the service "
-                    "LimitRTPRIO=" +
-                    std::to_string(request.priority) + ", or the program CAP_SYS_NICE";
+    answer.remedy = realtimeRemedy();
   }
 }
 
@@ -114,9 +113,7 @@ void requestMemory(const ThreadRequest& request, SetupAnswer& answer) {
   if (limit.rlim_cur != RLIM_INFINITY && !hasCapability(CAP_IPC_LOCK)) {
     answer.text =
         "memory may be paged out: RLIMIT_MEMLOCK is " + std::to_string(limit.rlim_cur / 1024) + " kB";
-    answer.remedy =
-        "add '<user> - memlock unlimited' to /etc/security/limits.d/hapticd.conf and log in again, or "
-        "give the service LimitMEMLOCK=infinity, or the program CAP_IPC_LOCK";
+    answer.remedy = realtimeRemedy();
     return;
   }
   // MCL_ONFAULT locks pages when they are first touched: reserved address space costs nothing.
@@ -136,12 +133,26 @@ void requestMemory(const ThreadRequest& request, SetupAnswer& answer) {
 
 std::string ThreadSetup::complaints() const {
   std::string text;
+  std::string remedies;
   for (const SetupAnswer* answer : all()) {
     if (!answer->asked || answer->granted) continue;
-    if (!text.empty()) text += '\n';
-    text += std::string(answer->name) + ": " + answer->text + "; " + answer->remedy;
+    text += std::string(answer->name) + ": " + answer->text + '\n';
+    if (remedies.find(answer->remedy) == std::string::npos)
+      remedies += (remedies.empty() ? "" : "; ") + answer->remedy;
   }
-  return text;
+  return text.empty() ? text : text + "remedy: " + remedies;
+}
+
+std::string realtimeRemedy() {
+  static constexpr const char* kGroup = "hapticd";
+  group entry{};
+  group* found = nullptr;
+  std::vector<char> buffer(16384);
+  getgrnam_r(kGroup, &entry, buffer.data(), buffer.size(), &found);
+  if (found == nullptr)
+    return "install the package hapticd, or run 'sudo scripts/setup_group.sh' of its sources, and log in "
+           "again";
+  return "sudo usermod -aG hapticd $USER, and log in again";
 }
 
 void requestShortTimeSlice() noexcept {

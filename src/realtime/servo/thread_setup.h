@@ -43,9 +43,12 @@ struct ThreadSetup {
     }
     return true;
   }
-  /// One line per refused request, with its remedy.
+  /// One line per refused request, then the remedies, each once.
   std::string complaints() const;
 };
+
+/// The one way to realtime rights and locked memory for the calling user: the group that the package creates.
+std::string realtimeRemedy();
 
 /// Requests a 0.1 ms scheduler slice for the calling thread (sched_setattr), so that it runs soon after a
 /// wake-up. Needs no rights and takes no processor time from other threads. Threads that it starts get the

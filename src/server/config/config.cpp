@@ -117,10 +117,15 @@ class Reader {
     return table_.get(key);
   }
 
-  void finish() const {
+  const std::set<std::string>& known() const { return known_; }
+
+  /// `elsewhere`: keys of the other kind of table, and where they belong.
+  void finish(const std::set<std::string>& elsewhere, const std::string& place) const {
     for (const auto& [key, node] : table_) {
       const std::string name(key.str());
       if (known_.count(name) != 0) continue;
+      if (elsewhere.count(name) != 0)
+        throw ConfigError(location(source_, node) + "'" + name + "' belongs " + place);
       const auto nearest = std::min_element(known_.begin(), known_.end(), [&](const auto& a, const auto& b) {
         return editDistance(name, a) < editDistance(name, b);
       });
@@ -173,11 +178,21 @@ class Reader {
   std::set<std::string> known_;
 };
 
+// The keys of a kind of table, asked from an empty one.
+template <class Config>
+std::set<std::string> keysOf() {
+  const toml::table none;
+  Reader reader(none, "");
+  Config config;
+  visitFields(reader, config);
+  return reader.known();
+}
+
 DeviceConfig readDevice(const toml::table& table, const std::string& source) {
   DeviceConfig device;
   Reader reader(table, source);
   visitFields(reader, device);
-  reader.finish();
+  reader.finish(keysOf<ServerConfig>(), "above the first [[device]]");
   return device;
 }
 
@@ -230,7 +245,7 @@ ServerConfig parseConfig(const std::string& text, const std::string& source) {
   Reader reader(root, source);
   visitFields(reader, config);
   if (const toml::node* node = reader.find("device")) config.devices = readDevices(*node, source);
-  reader.finish();
+  reader.finish(keysOf<DeviceConfig>(), "in a [[device]]");
   try {
     validate(config);
   } catch (const InvalidValue& error) {

@@ -37,11 +37,12 @@ void DeviceKeeper::startLoop() {
     servo_.emplace([this](const realtime::Pacing& pacing) { tick_(pacing); }, clock_, options);
     const realtime::ThreadSetup& setup = servo_->start();
     realtime_ = setup.scheduling.granted;
-    for (const realtime::SetupAnswer* answer : setup.all()) logSetup(*answer);
+    logSetup(setup);
     return;
   }
-  logSetup(realtime::setUpThread({.realtime = false})
-               .memory);  // locks the memory of the process before the first tick
+  realtime::ThreadSetup memory;  // locks the memory of the process before the first tick
+  memory.memory = realtime::setUpThread({.realtime = false}).memory;
+  logSetup(memory);
   isPacedSetUp_ = false;
   device_.start([this, first = true](Nanos now) mutable {
     if (first) {
@@ -133,18 +134,28 @@ void DeviceKeeper::reopen() noexcept {
   openError_ = refusal;
 }
 
-void DeviceKeeper::logSetup(const realtime::SetupAnswer& answer) const {
-  if (!answer.asked) return;
-  if (answer.granted) {
-    spdlog::info("servo loop of '{}': {}", options_.name, answer.text);
-  } else {
-    spdlog::warn("servo loop of '{}': {}; {}", options_.name, answer.text, answer.remedy);
+// Refusals are one line: what is missing, what that costs, and the remedy.
+void DeviceKeeper::logSetup(const realtime::ThreadSetup& setup) const {
+  std::string refused;
+  std::string remedy;
+  for (const realtime::SetupAnswer* answer : setup.all()) {
+    if (!answer->asked) continue;
+    if (answer->granted) {
+      spdlog::info("servo loop of '{}': {}", options_.name, answer->text);
+      continue;
+    }
+    refused += (refused.empty() ? "" : "; ") + answer->text;
+    if (remedy.find(answer->remedy) == std::string::npos)
+      remedy += (remedy.empty() ? "" : "; ") + answer->remedy;
   }
+  if (refused.empty()) return;
+  spdlog::warn("servo loop of '{}': {}. Ticks may be late while the machine is busy. Remedy: {}",
+               options_.name, refused, remedy);
 }
 
 void DeviceKeeper::logPacedSetup() {
   if (!isPacedSetUp_.load(std::memory_order_acquire)) return;
-  for (const realtime::SetupAnswer* answer : pacedSetup_.all()) logSetup(*answer);
+  logSetup(pacedSetup_);
   isPacedSetUp_ = false;
 }
 

@@ -49,7 +49,7 @@ class DeviceKeeper {
   void startAttempt(std::string text, std::function<void()> attempt);
   void reopen() noexcept;
   void runCalibration() noexcept;
-  void logSetup(const realtime::SetupAnswer& answer) const;
+  void logSetup(const realtime::ThreadSetup& setup) const;
   void logPacedSetup();
 
   device::Device& device_;

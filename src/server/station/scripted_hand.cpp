@@ -16,15 +16,22 @@ using geometry::Box;
 using geometry::Quat;
 using geometry::Vec3;
 
+constexpr int kStrokes = 14;
+constexpr int kAttempts = 8;             // approaches that are tried for each stroke
 constexpr double kPressDepth_m = 0.004;  // target below the surface; the hand's spring reaches part of it
-constexpr double kClearance_m = 0.012;   // above the surface before and after a stroke
+constexpr double kThinShare = 0.4;       // of the thickness below the surface, where that is less
+constexpr double kClearance_m = 0.012;   // above the surface before a stroke, and around everything
+constexpr double kLift_m = 0.003;  // above the surface: what must be free between two points of a stroke
+constexpr double kStep_m = 0.003;  // between neighbouring points of a stroke
+constexpr double kLongestStroke_m = 0.1;
+constexpr std::size_t kShortestStroke = 5;  // points; shorter ones are taken only for want of others
 constexpr double kSlideSpeed_m_per_s = 0.06;
 constexpr double kFreeSpeed_m_per_s = 0.15;
-constexpr int kStrokes = 12;
-constexpr int kPointsInStroke = 7;
-constexpr double kLongestStep_m = 0.025;  // between the lift-off positions of neighbouring points of a stroke
-constexpr double kSteepest = 0.3;  // lower bound of the cosine between surface normal and approach direction
-constexpr double kStrokeAngle_rad = 0.12;  // between neighbouring points of a stroke, seen from the centre
+constexpr double kSteepest = 0.5;         // lower bound of the cosine between surface normal and approach
+constexpr double kSharpest = 0.77;        // lower bound of the cosine between normals of neighbouring points
+constexpr double kCurl_rad = 0.05;        // turn of the heading from point to point
+constexpr double kSmallObject_m = 0.06;   // diagonal below which steps and depths shrink with the object
+constexpr double kAboveSurface_m = 2e-5;  // start of a segment that must not hit the surface it starts from
 
 struct SurfacePoint {
   Vec3 position;
@@ -78,6 +85,97 @@ std::optional<SurfacePoint> firstSurface(const scene::SceneSnapshot& scene, cons
   }
   return found;
 }
+
+// Plans single strokes over what is in a scene.
+class StrokePlanner {
+ public:
+  StrokePlanner(const scene::SceneSnapshot& scene, const Box& bounds, Nanos now)
+      : scene_(scene),
+        now_(now),
+        centre_(bounds.centre()),
+        outside_(0.5 * bounds.extents().norm() + kClearance_m),
+        size_(std::min(1.0, bounds.extents().norm() / kSmallObject_m)) {}
+
+  /// Where the surface is met from `start`, a point on the sphere around everything, on the way to `target`;
+  /// nothing where it is too steep to press on, or where there is no way out.
+  std::optional<SurfacePoint> approach(const Vec3& start, const Vec3& target) const {
+    const Vec3 way = (target - start).normalized();
+    const auto found = first(start, start + 2 * outside_ * way);
+    if (!found || found->normal.dot(-way) < kSteepest || !wayOut(*found)) return std::nullopt;
+    return found;
+  }
+
+  /// Follows the surface like a finger: straight over it with a slow turn, and to another side in front of an
+  /// edge, a wall or a place without a way out. Starts with `from`.
+  std::vector<SurfacePoint> stroke(const SurfacePoint& from, Vec3 heading) const {
+    static constexpr double kTurns_rad[] = {0, 0.9, -0.9, 1.8, -1.8};
+    std::vector<SurfacePoint> points{from};
+    const int most = static_cast<int>(kLongestStroke_m / kStep_m);
+    while (static_cast<int>(points.size()) < most) {
+      const SurfacePoint& last = points.back();
+      heading -= heading.dot(last.normal) * last.normal;
+      if (heading.norm() < 1e-9) heading = last.normal.unitOrthogonal();
+      heading.normalize();
+      std::optional<SurfacePoint> next;
+      Vec3 chosen;
+      for (const double turn : kTurns_rad) {
+        chosen = Eigen::AngleAxisd(turn + kCurl_rad, last.normal) * heading;
+        next = step(last, chosen);
+        if (next) break;
+      }
+      if (!next) break;
+      heading = chosen;
+      points.push_back(*next);
+    }
+    return points;
+  }
+
+  /// A straight way from the surface to the sphere around everything: its end on the sphere.
+  std::optional<Vec3> wayOut(const SurfacePoint& at) const {
+    const Vec3 radial = (at.position - centre_).normalized();
+    for (const Vec3& way : {at.normal, Vec3((at.normal + radial).normalized()), radial}) {
+      if (!way.allFinite() || way.dot(at.normal) < kSteepest) continue;
+      const Vec3 from = at.position - centre_;
+      const double along = from.dot(way);
+      const double inside = outside_ * outside_ - from.squaredNorm() + along * along;
+      const Vec3 end = at.position + (std::sqrt(std::max(inside, 0.0)) - along) * way;
+      if (!first(at.position + kAboveSurface_m * at.normal, end)) return end;
+    }
+    return std::nullopt;
+  }
+
+  /// How far below the surface the hand aims: less where the object is thin.
+  double pressDepth(const SurfacePoint& at) const {
+    const double depth = size_ * kPressDepth_m;
+    const auto behind =
+        first(at.position - kAboveSurface_m * at.normal, at.position - depth / kThinShare * at.normal);
+    return behind ? std::min(depth, kThinShare * (behind->position - at.position).norm()) : depth;
+  }
+
+  const Vec3& centre() const { return centre_; }
+  double outside() const { return outside_; }
+  double size() const { return size_; }
+
+ private:
+  std::optional<SurfacePoint> first(const Vec3& from, const Vec3& to) const {
+    return firstSurface(scene_, from, to, now_);
+  }
+
+  std::optional<SurfacePoint> step(const SurfacePoint& from, const Vec3& heading) const {
+    const double lift = size_ * kLift_m;
+    const Vec3 above = from.position + size_ * kStep_m * heading + lift * from.normal;
+    if (first(from.position + lift * from.normal, above)) return std::nullopt;
+    auto next = first(above, above - 2 * lift * from.normal);
+    if (!next || next->normal.dot(from.normal) < kSharpest || !wayOut(*next)) return std::nullopt;
+    return next;
+  }
+
+  const scene::SceneSnapshot& scene_;
+  const Nanos now_;
+  const Vec3 centre_;
+  const double outside_;
+  const double size_;  // 1, less for small objects
+};
 
 // Appends waypoints to a path, with times from the speed.
 class PathBuilder {
@@ -135,32 +233,39 @@ std::vector<device::Waypoint> planStrokes(const scene::SceneSnapshot& scene, con
                                           Nanos now) {
   const Box bounds = boundsInDevice(scene, now);
   if (bounds.empty()) return idleCircle(workspace_m);
-  const Vec3 centre = bounds.centre();
-  const double outside = 0.5 * bounds.extents().norm() + kClearance_m;
+  const StrokePlanner planner(scene, bounds, now);
+  const Vec3 centre = planner.centre();
+  const double outside = planner.outside();
 
   const Vec3 home = centre + outside * Vec3::UnitY();
   PathBuilder path(home);
   for (int stroke = 0; stroke < kStrokes; ++stroke) {
-    const Vec3 first = direction(stroke, kStrokes);
-    const Vec3 along = first.unitOrthogonal();
-    const Quat stylus = geometry::rotationBetween(Vec3::UnitY(), (first + 0.4 * along).normalized());
-    bool down = false;
-    Vec3 liftOff = centre + outside * first;
-    path.arcTo(liftOff, centre, stylus);
-    for (int i = 0; i < kPointsInStroke; ++i) {
-      const Vec3 ray = Eigen::AngleAxisd(kStrokeAngle_rad * i, first.cross(along)) * first;
-      const auto surface = firstSurface(scene, centre + outside * ray, centre - outside * ray, now);
-      if (!surface || surface->normal.dot(ray) < kSteepest) break;
-      // The next point is on another part of the object: a straight line to it may cross this part.
-      if (down && (surface->position - liftOff).norm() > kLongestStep_m) break;
-      if (!down) path.moveTo(surface->position + kClearance_m * ray, stylus, kFreeSpeed_m_per_s);
-      path.moveTo(surface->position - kPressDepth_m * surface->normal, stylus, kSlideSpeed_m_per_s,
-                  i == 2 && stroke % 3 == 0);
-      liftOff = surface->position + kClearance_m * surface->normal;
-      down = true;
+    for (int attempt = 0; attempt < kAttempts; ++attempt) {
+      const int number = stroke * kAttempts + attempt;
+      const Vec3 ray = direction(number, kStrokes * kAttempts);
+      const Vec3 start = centre + outside * ray;
+      // Not only towards the centre: flat and hollow things have their surface elsewhere.
+      const Vec3 aside = 0.35 * bounds.extents().cwiseProduct(direction((7 * number) % 31, 31));
+      const auto first = planner.approach(start, attempt == 0 ? centre : Vec3(centre + aside));
+      if (!first) continue;
+      const auto points = planner.stroke(*first, ray.unitOrthogonal());
+      if (points.size() < kShortestStroke && attempt + 1 < kAttempts) continue;
+
+      const Vec3 along = ray.unitOrthogonal();
+      const Quat stylus = geometry::rotationBetween(Vec3::UnitY(), (ray + 0.4 * along).normalized());
+      path.arcTo(start, centre, stylus);
+      path.moveTo(first->position + planner.size() * kClearance_m * (start - first->position).normalized(),
+                  stylus, kFreeSpeed_m_per_s);
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        path.moveTo(points[i].position - planner.pressDepth(points[i]) * points[i].normal, stylus,
+                    kSlideSpeed_m_per_s, i == 2 && stroke % 3 == 0);
+      }
+      const SurfacePoint& last = points.back();
+      const Vec3 out = planner.wayOut(last).value_or(start);
+      path.moveTo(last.position + planner.size() * kLift_m * last.normal, stylus, kSlideSpeed_m_per_s);
+      path.moveTo(out, stylus, kFreeSpeed_m_per_s);
+      break;
     }
-    if (down) path.moveTo(liftOff, stylus, kSlideSpeed_m_per_s);
-    path.moveTo(centre + outside * (liftOff - centre).normalized(), stylus, kFreeSpeed_m_per_s);
   }
   path.arcTo(home, centre, Quat::Identity());
   return path.take();

@@ -9,10 +9,13 @@
 
 namespace hapticd::server {
 
+/// The largest force of the scripted hand, N: a curious person presses no harder.
+inline constexpr double kScriptedStrength_N = 2;
+
 /// Plans strokes over the touchable objects of a scene: approach a point from outside, press a few
-/// millimetres in, slide, lift, move to the next. Deterministic; an empty scene gives a slow circle in the
-/// workspace. The path starts and ends at rest outside all objects, so it can be repeated. Metres, device
-/// frame; `now`: time of the objects' motion.
+/// millimetres in, follow the surface, lift where there is a free way out, go to the next. Deterministic; an
+/// empty scene gives a slow circle in the workspace. The path starts and ends at rest outside all objects, so
+/// it can be repeated. Metres, device frame; `now`: time of the objects' motion.
 std::vector<device::Waypoint> planStrokes(const scene::SceneSnapshot& scene, const geometry::Box& workspace_m,
                                           base::Nanos now);
 

@@ -84,7 +84,8 @@ Station::Impl::Impl(const DeviceConfig& config_, std::vector<DeviceName> names_,
       keeper(*device, tick, clock,
              {.name = config.names.front(),
               .rate_Hz = config.servoRate_Hz,
-              .requireRealtime = !allowNoRealtime,
+              // A device without a person at it cannot hurt: realtime rights are wanted, not demanded.
+              .requireRealtime = !allowNoRealtime && device->traits().needsRearm,
               .vendorThread = device->traits().ticksInVendorThread}),
       control(tick.control(), hand, workspaceOf(config, profile)),
       streamed(tick.remote(), sceneConfig(config, profile), energyBudget(config), profile.outputDof > 3),
@@ -273,7 +274,8 @@ void Station::Impl::onPublished(const scene::SceneSnapshot& snapshot) {
   if (now == plannedFor) return;
   plannedFor = std::move(now);
   hand->setPath(std::make_shared<const device::WaypointPath>(
-      planStrokes(snapshot, workspaceOf(config, profile), base::now()), device::WaypointPath::Repeat::yes));
+      planStrokes(snapshot, workspaceOf(config, profile), base::now()), device::WaypointPath::Repeat::yes,
+      kScriptedStrength_N));
 }
 
 DeviceStatus Station::status() const {

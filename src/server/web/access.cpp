@@ -53,15 +53,18 @@ std::string WebAccess::refusal(const net::HttpRequest& request) const {
     return "this server does not answer to the name " + quoted(host) +
            ": use its address, or allow the name with --http-allow if it is yours";
   }
+  bool allowedOrigin = false;
   for (const auto& [name, value] : request.headers) {
     if (name != "origin") continue;
     const std::string_view origin = value;
-    if (origin.starts_with("http://") && isOurs(origin.substr(7), ":80", request)) continue;
-    if (origin.starts_with("https://") && isOurs(origin.substr(8), ":443", request)) continue;
+    allowedOrigin = (origin.starts_with("http://") && isOurs(origin.substr(7), ":80", request)) ||
+                    (origin.starts_with("https://") && isOurs(origin.substr(8), ":443", request));
+    if (allowedOrigin) continue;
     return "pages from " + quoted(origin) + " may not use this server";
   }
   // Browsers load images and scripts for other sites' pages without an Origin header.
-  if (request.header("sec-fetch-site") == "cross-site" && request.header("sec-fetch-mode") != "navigate") {
+  if (!allowedOrigin && request.header("sec-fetch-site") == "cross-site" &&
+      request.header("sec-fetch-mode") != "navigate") {
     return "pages from other sites may not use this server";
   }
   return "";

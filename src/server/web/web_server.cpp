@@ -83,6 +83,17 @@ void WebServer::respond(const net::HttpReply& reply, net::HttpResponse response)
   reply(std::move(response));
 }
 
+namespace {
+
+// Scripts of pages from an allowed origin may read the responses. Access refused all other origins before.
+net::HttpReply withOrigin(const net::HttpRequest& request, const net::HttpReply& reply) {
+  const std::string origin(request.header("origin"));
+  if (origin.empty()) return reply;
+  return reply.with({{"Access-Control-Allow-Origin", origin}, {"Vary", "Origin"}});
+}
+
+}  // namespace
+
 void WebServer::onRequest(const net::HttpRequest& request, const net::HttpReply& reply) {
   idleSeconds_ = 0;
   const std::string refusal = access_.refusal(request);
@@ -95,7 +106,7 @@ void WebServer::onRequest(const net::HttpRequest& request, const net::HttpReply&
   } else if (!request.target.starts_with('/')) {
     respond(reply, net::HttpResponse::of(400, "the request target must begin with '/'\n"));
   } else {
-    route(request, reply);
+    route(request, withOrigin(request, reply));
   }
 }
 

@@ -46,6 +46,23 @@ TEST(SimulatedDevice, RestsAtTheCentreWithoutAPath) {
   EXPECT_TRUE(device.profile().startsArmed);
 }
 
+TEST(SimulatedDevice, AHandPressesWithNoMoreThanItsStrength) {
+  constexpr double kStrength_N = 1;
+  SimulatedDevice device;
+  // Meant to be 50 mm inside a wall: without a limit, 12 N.
+  device.setPath(
+      std::make_shared<WaypointPath>(std::vector<Waypoint>{{0, Vec3(0, 0.01, 0), Quat::Identity(), 0},
+                                                           {1, Vec3(0, -0.05, 0), Quat::Identity(), 0}},
+                                     WaypointPath::Repeat::no, kStrength_N));
+  const Wall wall{1000};
+  DeviceState state;
+  for (Nanos t = 0; t < 2000 * kMs; t += kMs) {
+    device.read(t, state);
+    device.write(wall.force(state));
+  }
+  EXPECT_NEAR(wall.force(state).y(), kStrength_N, 0.01);
+}
+
 TEST(SimulatedDevice, SettlesAtItsPath) {
   SimulatedDevice device;
   device.setPath(pressing(0.02));

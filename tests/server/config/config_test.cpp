@@ -101,6 +101,9 @@ workspace = [-1, -2, -3, 4, 5, 6]
 
 TEST(Config, ErrorsNameLineKeyValueAndRemedy) {
   EXPECT_EQ(errorOf("listn = \"x\""), "test.toml:1: unknown key 'listn'; did you mean 'listen'?");
+  EXPECT_EQ(errorOf("report_rate_Hz = 500"), "test.toml:1: 'report_rate_Hz' belongs in a [[device]]");
+  EXPECT_EQ(errorOf("[[device]]\nlisten = \"127.0.0.1\""),
+            "test.toml:2: 'listen' belongs above the first [[device]]");
   EXPECT_EQ(errorOf("\n[[device]]\nreport_rate_Hz = \"fast\""),
             "test.toml:3: 'report_rate_Hz' is 'fast', expected a number");
   EXPECT_EQ(errorOf("[[device]]\nmaterial_scale = \"big\""),

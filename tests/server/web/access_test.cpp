@@ -82,6 +82,12 @@ TEST(WebAccess, AllowsTheAddressThatTheClientConnectedTo) {
 TEST(WebAccess, AllowsConfiguredNames) {
   const WebAccess access(kLocal, {"Lab7", "proxy.example:443"});
   EXPECT_EQ(refusal({{"host", "lab7:8080"}, {"origin", "http://lab7:8080"}}, access), "");
+  EXPECT_EQ(refusal({{"host", "localhost:8080"},
+                     {"origin", "http://lab7:8080"},
+                     {"sec-fetch-site", "cross-site"},
+                     {"sec-fetch-mode", "cors"}},
+                    access),
+            "");
   EXPECT_NE(refusal({{"host", "lab7:8081"}}, access), "");
   EXPECT_EQ(refusal({{"host", "proxy.example:443"}}, access), "");
   EXPECT_EQ(refusal({{"host", "proxy.example:443"}, {"origin", "https://proxy.example"}}, access), "")

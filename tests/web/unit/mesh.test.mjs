@@ -104,6 +104,8 @@ test("errors name the file and the reason", async () => {
       [file("points.ply", PLY.replace("element face 2", "element face 0").replace(/3 0 1 2\n3 0 2 3\n/, ""))],
       /points\.ply: no triangles/,
     ],
+    [[file("short.stl", "x".repeat(100))], /short\.stl: the file is truncated, or not a valid STL file/],
+    [[file("index.obj", OBJ.replace("f 1 2 3", "f 1 2 9"))], /refers to a vertex that the file does not have/],
     [[file("bad.obj", OBJ.replace("2 2 0", "2 nan 0"))], /bad\.obj: a corner of triangle 0 is not finite/],
     [[file("cut.stl", Buffer.alloc(40))], /cut\.stl: /],
     [[file("cut.glb", "{")], /cut\.glb: /],

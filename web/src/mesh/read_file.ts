@@ -5,17 +5,15 @@ import { OBJLoader } from "three/examples/jsm/loaders/OBJLoader.js";
 import { PLYLoader } from "three/examples/jsm/loaders/PLYLoader.js";
 import { STLLoader } from "three/examples/jsm/loaders/STLLoader.js";
 import { shapeOf } from "./gltf_shape";
+import { isMeshFile, kindOf } from "./mesh_files";
 import { type FileMesh, weld } from "./weld";
 
-export const KINDS = ["obj", "stl", "ply", "gltf", "glb"];
 /** The limit of one batch in the server. */
 const MAX_TRIANGLES = 12_000_000;
 
-const kindOf = (name: string): string => name.split(".").at(-1)!.toLowerCase();
-
 /** Reads the first mesh file of the list; the others may be files that it refers to. The error names the file and the reason. */
 export async function readMesh(files: File[]): Promise<{ name: string; mesh: FileMesh }> {
-  const file = files.find((f) => KINDS.includes(kindOf(f.name)));
+  const file = files.find((f) => isMeshFile(f.name));
   if (!file)
     throw new Error(`${files[0]?.name ?? "The file"} is not a mesh file: drop an OBJ, STL, PLY, glTF or GLB file.`);
   try {
@@ -23,8 +21,15 @@ export async function readMesh(files: File[]): Promise<{ name: string; mesh: Fil
     check(corners);
     return { name: file.name, mesh: weld(corners) };
   } catch (error) {
-    throw new Error(`${file.name}: ${error instanceof Error ? error.message : String(error)}`);
+    throw new Error(`${file.name}: ${reasonOf(error, kindOf(file.name))}`);
   }
+}
+
+/** The parsers of three fail on broken files with the errors of the language. */
+function reasonOf(error: unknown, kind: string): string {
+  if (error instanceof RangeError || error instanceof TypeError || error instanceof SyntaxError)
+    return `the file is truncated, or not a valid ${kind.toUpperCase()} file`;
+  return error instanceof Error ? error.message : String(error);
 }
 
 async function cornersOf(file: File, files: File[]): Promise<Float32Array> {
@@ -81,5 +86,7 @@ function check(corners: Float32Array): void {
   if (triangles > MAX_TRIANGLES)
     throw new Error(`the mesh has ${triangles} triangles, the limit is ${MAX_TRIANGLES}: simplify it first`);
   const bad = corners.findIndex((x) => !Number.isFinite(x));
-  if (bad >= 0) throw new Error(`a corner of triangle ${Math.floor(bad / 9)} is not finite`);
+  if (bad >= 0) throw new Error(
+      `a corner of triangle ${Math.floor(bad / 9)} is not finite: a number of the file is broken, or it refers to a vertex that the file does not have`,
+    );
 }

@@ -59,7 +59,10 @@ export class EffectsPanel {
       ...Object.entries(NEW).map(([value, { label }]) => el("option", { value }, label)),
     );
     const add = el("button", { type: "button" }, "Add");
-    add.addEventListener("click", () => send(setEffect(this.newEffect(type.value))));
+    add.addEventListener("click", () => {
+      const effect = this.newEffect(type.value);
+      send(setEffect(effect), startEffect(effect.index));
+    });
     parent.append(this.list, el("div", { className: "row adder" }, type, add));
   }
 

@@ -21,6 +21,13 @@ export class GuardPanel {
     parent.append(this.summary, this.list);
   }
 
+  /** Nothing is known of the guard. */
+  lost(): void {
+    this.summary.dataset["level"] = "bad";
+    setText(this.summary, "Unknown: no connection to the server.");
+    this.rows.update([]);
+  }
+
   update(device: DeviceState): void {
     const { guard } = device;
     const zero =

@@ -1,0 +1,131 @@
+// hapticd info: what a recording holds: devices, times, forces, commands, and the configuration of its
+// server.
+#include <ctime>
+
+#include <algorithm>
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <string>
+#include <type_traits>
+#include <variant>
+#include <vector>
+
+#include "base/time.h"
+#include "commands.h"
+#include "record/recording_reader.h"
+
+namespace hapticd::apps {
+namespace {
+
+struct DeviceFacts {
+  std::uint64_t ticks = 0;
+  std::uint64_t inContact = 0;
+  std::uint64_t lost = 0;
+  double peakForce_N = 0;
+  double deepest_m = 0;
+  std::uint32_t trips = 0;  // bits of realtime::Trip that acted
+};
+
+struct RecordingFacts {
+  std::vector<DeviceFacts> devices;
+  std::map<std::string, std::uint64_t> commands;  // by name
+  base::Nanos first = 0;
+  base::Nanos last = 0;
+};
+
+void add(RecordingFacts& facts, const record::TickEvent& event) {
+  const realtime::TickReport& report = event.tick.report;
+  if (facts.first == 0) facts.first = report.time;
+  facts.last = std::max(facts.last, report.time);
+  DeviceFacts& device = facts.devices.at(event.device);
+  ++device.ticks;
+  device.inContact += report.rendering.touching ? 1 : 0;
+  device.peakForce_N = std::max(device.peakForce_N, report.force_N.norm());
+  if (report.rendering.touching) device.deepest_m = std::max(device.deepest_m, report.rendering.depth_m);
+  device.trips |= report.guard.active;
+}
+
+void add(RecordingFacts& facts, const record::SceneEvent& event) {
+  if (!event.command) return;
+  ++facts.commands[std::visit(
+      [](const auto& command) { return std::string(std::decay_t<decltype(command)>::kInfo.name); },
+      *event.command)];
+}
+
+RecordingFacts factsOf(record::RecordingReader& reader) {
+  RecordingFacts facts;
+  facts.devices.resize(reader.header().devices.size());
+  for (record::RecordingEvent event; reader.next(event);) {
+    if (const auto* tick = std::get_if<record::TickEvent>(&event)) add(facts, *tick);
+    if (const auto* scene = std::get_if<record::SceneEvent>(&event)) add(facts, *scene);
+    const auto* lost = std::get_if<record::LostEvent>(&event);
+    if (lost != nullptr && lost->what == record::LostEvent::What::ticks)
+      facts.devices.at(lost->device).lost += lost->count;
+  }
+  return facts;
+}
+
+std::string dateText(base::Nanos wall) {
+  const std::time_t seconds = wall / 1'000'000'000;
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  char text[40];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
+  return text;
+}
+
+void print(const DeviceFacts& facts, const record::RecordedDevice& device) {
+  std::string names;
+  for (const std::string& name : device.names) names += (names.empty() ? "" : ", ") + name;
+  std::printf("device      %s: %s (%s), scene %u, %g ticks per second\n", names.c_str(), device.model.c_str(),
+              device.driver.c_str(), device.scene, device.tick.rate_Hz);
+  const auto count = [](std::uint64_t n) { return static_cast<unsigned long long>(n); };
+  const double part =
+      facts.ticks > 0 ? 100.0 * static_cast<double>(facts.inContact) / static_cast<double>(facts.ticks) : 0;
+  std::printf("  ticks     %llu, %llu lost, %.1f %% in contact\n", count(facts.ticks), count(facts.lost),
+              part);
+  std::printf("  force     at most %.3f N, depth at most %.3f mm\n", facts.peakForce_N,
+              1e3 * facts.deepest_m);
+  std::string trips;
+  for (const realtime::TripInfo& trip : realtime::kTrips) {
+    if ((facts.trips >> static_cast<unsigned>(trip.trip) & 1U) != 0)
+      trips += (trips.empty() ? "" : ", ") + std::string(trip.name);
+  }
+  std::printf("  guard     %s\n", trips.empty() ? "never acted" : trips.c_str());
+}
+
+int run(const std::string& file, bool config) {
+  record::RecordingReader reader(file);
+  const record::RecordingHeader& header = reader.header();
+  const RecordingFacts facts = factsOf(reader);
+  std::printf("recording   %s\n", file.c_str());
+  std::printf("written by  %s, force law %u\n", header.program.c_str(), header.law.number);
+  std::printf("began       %s\n", dateText(facts.first + header.wallOffset).c_str());
+  std::printf("lasts       %.3f s\n", base::toSeconds(facts.last - facts.first));
+  for (std::size_t i = 0; i < facts.devices.size(); ++i) print(facts.devices[i], header.devices[i]);
+  for (const auto& [name, count] : facts.commands)
+    std::printf("command     %s, %llu times\n", name.c_str(), static_cast<unsigned long long>(count));
+  if (config) std::printf("\n%s", header.config.c_str());
+  if (!reader.remark().empty()) std::fprintf(stderr, "hapticd: %s\n", reader.remark().c_str());
+  return 0;
+}
+
+}  // namespace
+
+void addInfo(CLI::App& app) {
+  struct Options {
+    std::string file;
+    bool config = false;
+  };
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("info", "Show what a recording holds: devices, time, forces, commands");
+  command->add_option("file", options->file, "Recording of 'hapticd serve --record'")
+      ->required()
+      ->check(CLI::ExistingFile);
+  command->add_flag("--config", options->config, "Also print the configuration of its server, as TOML");
+  command->callback([options] { exitCode = run(options->file, options->config); });
+}
+
+}  // namespace hapticd::apps
