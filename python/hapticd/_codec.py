@@ -27,7 +27,7 @@ class DecodeError(ValueError):
 class _Field(NamedTuple):
     name: str
     form: str  # "one", "array", "name", "text", "list"
-    count: int  # of numbers, or bytes of a text, or the longest list
+    count: int  # type: ignore[assignment]  # of numbers, or bytes of a text, or the longest list
     count_letter: str = ""
     letter: str = ""
 
@@ -83,7 +83,7 @@ class Layout(Generic[M]):
             raise DecodeError(f"{self.name} of {len(payload)} bytes, expected {self.payload_bytes}") from error
         if self._plain:
             return self._make(values)  # type: ignore[no-any-return]
-        items = [values[pick] for pick in self._picks]
+        items: List[Any] = [values[pick] for pick in self._picks]
         for position, field in self._texts:
             text = items[position].split(b"\0", 1)[0]
             items[position] = text.decode("utf-8", "replace")

@@ -343,7 +343,7 @@ class Client(Core):
         if self._out_bytes > max(self.options.queue_limit_bytes, 1):
             self._drain_to(self.options.queue_limit_bytes // 2)
 
-    def _drain_to(self, limit: int, on_step: Optional[Callable[[], None]] = None) -> None:
+    def _drain_to(self, limit: int, on_step: Optional[Callable[[], object]] = None) -> None:
         connection = self._counts.connections
         self._push()
         progress = time.monotonic()

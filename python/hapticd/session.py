@@ -186,7 +186,7 @@ class Lost(NamedTuple):
 
     what: str  # "ticks" or "scene events"
     device: int  # for ticks
-    count: int
+    count: int  # type: ignore[assignment]
 
 
 class Ticks:
@@ -225,7 +225,7 @@ class Ticks:
         return self._session._gather(self._offsets + offset, dtype)
 
     def _has(self, flag: int) -> "npt.NDArray[np.bool_]":
-        return (self["flags"] & flag) != 0
+        return np.not_equal(self["flags"] & flag, 0)
 
     def _tail(self) -> "npt.NDArray[np.int64]":
         """Where the optional parts of each tick begin."""
@@ -236,7 +236,7 @@ class Ticks:
         """Values of the ticks that have one; the others have that of the tick before."""
         if not len(values):
             return np.zeros((len(self), *values.shape[1:]), values.dtype)
-        return values[np.maximum(np.cumsum(has) - 1, 0)]
+        return np.asarray(values[np.maximum(np.cumsum(has) - 1, 0)])
 
     def _derive(self, column: str) -> "npt.NDArray[Any]":
         touching = self["touching"] if column in ("depth_m", "object", "normal") else None

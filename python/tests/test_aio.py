@@ -1,0 +1,118 @@
+"""The asyncio client against a real server with the simulated hand."""
+
+import asyncio
+from typing import Any, Callable, Coroutine, List
+
+import numpy as np
+import pytest
+
+import hapticd
+from conftest import ScriptedServer, Server
+from hapticd import Reports, Surface
+
+
+def run(main: Coroutine[Any, Any, None]) -> None:
+    asyncio.run(asyncio.wait_for(main, 120), debug=False)
+
+
+async def until(hand: hapticd.aio.Client, condition: Callable[[], Any]) -> None:
+    for _ in range(6000):
+        if condition():
+            return
+        await hand.poll(0.01)
+    raise AssertionError(f"never became true; latest tick {hand.latest.tick}")
+
+
+@pytest.mark.parametrize("way", ["tcp", "udp"])
+def test_a_sphere_is_felt(server: Server, way: str) -> None:
+    async def main() -> None:
+        async with hapticd.aio.connect(getattr(server, way)) as hand:
+            async with hand.batch():
+                await hand.upload_mesh(0, *hapticd.sphere(25))
+                hand.set_surface(0, Surface(0.8))
+            await hand.subscribe(Reports.ALL)
+            await hand.hold_hand((0, 0, 22))
+            await until(hand, lambda: hand.latest.force.force_N[2] > 0.2)
+            rows = await hand.collect("tick", 0.3)
+            assert len(rows) > 2 and rows["object"][-1] == 0
+            async for report in hand.reports("force", 5):
+                assert report.force_N[2] > 0
+                break
+            await hand.stop_forces()
+            await until(hand, lambda: hand.latest.guard.stopped)
+            await hand.rearm_forces()
+            await hand.release_hand()
+            assert (hand.statistics().udp_bytes_in > 0) == (way == "udp")
+
+    run(main())
+
+
+def test_many_clients_share_one_loop(server: Server) -> None:
+    async def main() -> None:
+        hands = await asyncio.gather(*(hapticd.aio.connect(server.tcp) for _ in range(4)))
+        ticks = await asyncio.gather(*(hand.collect("pose", 0.3) for hand in hands))
+        assert all(len(rows) > 0 for rows in ticks)
+        await asyncio.gather(*(hand.close() for hand in hands))
+
+    run(main())
+
+
+def test_an_exception_of_a_callback_goes_to_the_loop(server: Server) -> None:
+    async def main() -> None:
+        errors: List[Any] = []
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: errors.append(context["exception"]))
+        async with hapticd.aio.connect(server.tcp) as hand:
+            hand.on_pose(lambda _: 1 / 0)
+            await until(hand, lambda: len(errors) > 2)
+            assert isinstance(errors[0], ZeroDivisionError) and hand.latest.pose
+
+    run(main())
+
+
+def test_a_stop_passes_a_large_upload(server: Server) -> None:
+    async def main() -> None:
+        vertices, triangles = hapticd.sphere(25, rings=300)
+        async with hapticd.aio.connect(server.tcp) as hand:
+            upload = asyncio.ensure_future(hand.upload_mesh(0, vertices, triangles))
+            await asyncio.sleep(0)
+            await hand.stop_forces()
+            await until(hand, lambda: hand.latest.guard.stopped)
+            await upload
+            await hand.rearm_forces()
+            await until(hand, lambda: not hand.latest.guard.stopped)
+
+    run(main())
+
+
+def test_a_lost_connection_comes_back(server: Server) -> None:
+    async def main() -> None:
+        async with hapticd.aio.connect(server.tcp) as hand:
+            events: List[bool] = []
+            hand.on_connection(lambda c: events.append(c.connected))
+            await hand.enable_heartbeat()
+            assert hand._transport is not None
+            hand._transport.abort()
+            await until(hand, lambda: events[-2:] == [False, True])
+            await until(hand, lambda: hand.latest.pose)
+
+    run(main())
+
+
+def test_errors() -> None:
+    async def main() -> None:
+        with pytest.raises(hapticd.ConnectError, match="nothing listens on 127.0.0.1:1 "):
+            await hapticd.aio.connect("Phantom@tcp://127.0.0.1:1", connect_timeout=0.3)
+        with pytest.raises(hapticd.ConnectError, match="nothing listens on 127.0.0.1:1 "):
+            await hapticd.aio.connect("Phantom@127.0.0.1:1", connect_timeout=0.3)
+        scripted = ScriptedServer(extensions=False)
+        async with hapticd.aio.connect(scripted.name) as hand:
+            with pytest.raises(hapticd.Unsupported, match="without the extensions"):
+                await hand.stop_forces()
+            await hand.upload_mesh(0, np.eye(3), [[0, 1, 2]])
+        scripted.close()
+        wrong = ScriptedServer(device="Tracker0")
+        with pytest.raises(hapticd.ConnectError, match="no device 'Phantom' answers at .*; it has Tracker0"):
+            await hapticd.aio.connect(wrong.name.replace("Tracker0", "Phantom"), connect_timeout=0.3)
+        wrong.close()
+
+    run(main())
