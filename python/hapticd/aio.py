@@ -140,6 +140,8 @@ class Client(Core):
                 await self._lost.wait()
             except asyncio.TimeoutError:
                 self._last_failure = "no answer to the connection attempt"
+            except ConnectionRefusedError:
+                self._last_failure = "Connection refused"
             except OSError as error:
                 self._last_failure = str(error)
             if self._counts.connections and not self.options.reconnect:

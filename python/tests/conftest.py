@@ -11,6 +11,7 @@ from typing import Any, Iterator, List, Tuple
 
 import pytest
 
+import hapticd
 from hapticd import _messages as m
 from hapticd._codec import frame
 from hapticd._core import _NUMBERS
@@ -74,13 +75,30 @@ def shared_server() -> Iterator[Server]:
 @pytest.fixture
 def server(shared_server: Server) -> Server:
     """The shared server, with the scene as at its start."""
-    import hapticd
-
     with hapticd.connect(shared_server.tcp) as hand:
         hand.reset_scene()
         hand.rearm_forces()
         hand.flush_all()
     return shared_server
+
+
+def feel_a_sphere(hand: Any, depth_mm: float = 3) -> None:
+    """Uploads a sphere of 25 mm and presses the hand onto it, from outside: an object that appears around the hand is
+    not felt."""
+    hand.hold_hand((0, 0, 33))
+    _until(hand, lambda: 1 in hand.latest.pose and hand.latest.pose[1].position_m[2] > 0.03)
+    with hand.batch():
+        hand.upload_mesh(0, *hapticd.sphere(25))
+        hand.set_surface(0, hapticd.Surface(0.8))
+    hand.hold_hand((0, 0, 25 - depth_mm))
+    _until(hand, lambda: hand.latest.force.force_N[2] > 0.2)
+
+
+def _until(hand: Any, condition: Any) -> None:
+    deadline = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < deadline, f"never became true; poses {hand.latest.pose}"
+        hand.poll(0.1)
 
 
 class ScriptedServer:

@@ -27,6 +27,8 @@ async def until(hand: hapticd.aio.Client, condition: Callable[[], Any]) -> None:
 def test_a_sphere_is_felt(server: Server, way: str) -> None:
     async def main() -> None:
         async with hapticd.aio.connect(getattr(server, way)) as hand:
+            await hand.hold_hand((0, 0, 33))
+            await until(hand, lambda: 1 in hand.latest.pose and hand.latest.pose[1].position_m[2] > 0.03)
             async with hand.batch():
                 await hand.upload_mesh(0, *hapticd.sphere(25))
                 hand.set_surface(0, Surface(0.8))

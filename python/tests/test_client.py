@@ -1,6 +1,5 @@
 """The synchronous client against a real server with the simulated hand, and against scripted VRPN servers."""
 
-import os
 import pathlib
 import signal
 import socket
@@ -15,8 +14,8 @@ import numpy as np
 import pytest
 
 import hapticd
-from conftest import HAPTICD, ScriptedServer, Server
-from hapticd import Effect, Plane, Reports, Surface
+from conftest import ScriptedServer, Server, feel_a_sphere
+from hapticd import Effect, Plane, Reports
 
 WIRE = pathlib.Path(__file__).resolve().parents[2] / "testdata/wire"
 
@@ -31,12 +30,9 @@ def until(hand: hapticd.Client, condition: Any, seconds: float = 60) -> None:
 @pytest.mark.parametrize("way", ["tcp", "udp"])
 def test_a_sphere_is_felt(server: Server, way: str) -> None:
     with hapticd.connect(getattr(server, way)) as hand:
-        with hand.batch():
-            hand.upload_mesh(0, *hapticd.sphere(25))
-            hand.set_surface(0, Surface(0.8))
+        feel_a_sphere(hand)
         hand.subscribe(Reports.ALL)
-        hand.hold_hand((0, 0, 22))
-        until(hand, lambda: hand.latest.force.force_N[2] > 0.2)
+        until(hand, lambda: hand.latest.tick.object == 0)
         tick = hand.latest.tick
         assert tick.object == 0 and tick.depth_m > 0 and np.linalg.norm(tick.proxy_m) == pytest.approx(0.025, abs=3e-4)
         until(hand, lambda: len(hand.latest.contacts.contacts) == 1)
@@ -56,7 +52,7 @@ def test_rows_are_structured_arrays(server: Server) -> None:
         hand.subscribe(Reports.TICK | Reports.TRACKER, 500)
         rows = hand.collect("tick", 0.5)
         assert len(rows) > 2 and rows["force_N"].shape == (len(rows), 3)
-        assert np.all(np.diff(rows["tick"].astype(np.int64)) >= 2)
+        assert np.all(np.diff(rows["tick"].astype(np.int64)) > 0)
         assert np.all(np.diff(rows["time"]) > 0)
         until(hand, lambda: 1 in hand.latest.pose)
         sensors = set()
@@ -271,4 +267,3 @@ def test_waiting_takes_no_processor_time(server: Server) -> None:
         assert time.process_time() - start < 0.5
     with pytest.raises(hapticd.ConnectionLost, match="is closed"):
         hand.poll()
-    assert os.path.exists(HAPTICD)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import hapticd
-from conftest import HAPTICD, ROOT, Server
+from conftest import HAPTICD, ROOT, Server, feel_a_sphere
 from hapticd.session import _COMMANDS
 
 RECORDINGS = ROOT / "testdata/recordings"
@@ -62,10 +62,7 @@ def test_a_fresh_recording(tmp_path: pathlib.Path) -> None:
     file = tmp_path / "fresh.haptics"
     server = Server("--record", str(file))
     with hapticd.connect(server.tcp) as hand:
-        hand.upload_mesh(0, *hapticd.sphere(25))
-        hand.hold_hand((0, 0, 22))
-        while hand.latest.force.force_N[2] < 0.2:
-            hand.poll(0.1)
+        feel_a_sphere(hand)
         hand.run_for(0.2)
     server.stop()
     check_against_export(file, tmp_path)
