@@ -504,12 +504,10 @@ class Session:
         base, shape = (dtype.subdtype or (dtype, ()))[:2]
         if not len(at):
             return np.empty((0, *shape), base.newbyteorder("="))
+        # One item for each byte of the file, overlapping: numpy copies items faster than rows.
         width = dtype.itemsize
-        windows = np.lib.stride_tricks.as_strided(
-            self._data, (len(self._data) - width + 1, width), (1, 1), writeable=False
-        )
-        raw = windows[at]
-        return raw.view(base).reshape(len(at), *shape).astype(base.newbyteorder("="))
+        items: npt.NDArray[Any] = np.ndarray((len(self._data) - width + 1,), f"V{width}", self._data, 0, (1,))
+        return items[at].view(base).reshape(len(at), *shape).astype(base.newbyteorder("="))
 
     def commands(self) -> Iterator[Command]:
         """The commands of all scenes in the order of their execution."""
