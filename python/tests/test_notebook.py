@@ -1,11 +1,13 @@
 """The notebook, executed as a user would."""
 
+import pathlib
 import re
 
 import nbformat
 import pytest
 from nbclient import NotebookClient
 
+import hapticd
 from conftest import ROOT, Server
 
 NOTEBOOK = ROOT / "examples/python/feel_a_surface.ipynb"
@@ -24,6 +26,8 @@ def run() -> "tuple[float, float, float, list[str]]":
 
 def test_the_notebook_runs_and_feels_the_sphere(shared_server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HAPTICD_DEVICE", shared_server.tcp)
+    # Debian's kernel runs the system's Python, which does not see the environment of this test.
+    monkeypatch.setenv("PYTHONPATH", str(pathlib.Path(hapticd.__file__).parents[1]))
     # A stiffness of 0.8 is 0.4 N/mm. After a late tick, which a busy machine causes, the force is lower for half a
     # second: run it again then.
     for _ in range(3):

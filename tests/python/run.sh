@@ -9,9 +9,12 @@ name=$3
 python=${HAPTICD_PYTHON:-/usr/bin/python3}
 
 [ -x "$python" ] || { echo "skipped: $python is missing; install the section python of packages.txt"; exit 77; }
-for module in numpy pytest setuptools wheel venv nbclient ipykernel mypy; do
-  "$python" -c "import $module" 2>/dev/null || { echo "skipped: $python has no $module; install the section python of packages.txt"; exit 77; }
-done
+missing=$("$python" - numpy pytest setuptools wheel venv nbclient ipykernel mypy <<'END'
+import importlib.util, sys
+print(*(name for name in sys.argv[1:] if importlib.util.find_spec(name) is None))
+END
+)
+[ -z "$missing" ] || { echo "skipped: $python has no $missing; install the section python of packages.txt"; exit 77; }
 unset PYTHONPATH PYTHONHOME VIRTUAL_ENV
 export PYTHONDONTWRITEBYTECODE=1
 
@@ -20,18 +23,19 @@ if [ "$name" = install ]; then
   mkdir -p "$environment"
   "$python" -m venv --system-site-packages "$environment/venv"
   # Copies, because setuptools writes beside the sources.
-  for package in python python/lerobot_teleoperator_hapticd; do
-    copy="$environment/$(basename "$package")"
-    mkdir -p "$copy"
-    (cd "$source_dir/$package" && find . -path ./lerobot_teleoperator_hapticd -prune -o -type f -print0 |
-      grep -zvE '^\./(build|tests)/|\.egg-info/|__pycache__' | xargs -0 cp --parents -t "$copy")
+  for package in python/hapticd python/lerobot_teleoperator_hapticd/lerobot_teleoperator_hapticd; do
+    name=$(basename "$package")
+    folder=$source_dir/$(dirname "$package")
+    mkdir -p "$environment/$name"
+    cp "$folder/pyproject.toml" "$folder/README.md" "$environment/$name"
+    cp -r "$source_dir/$package" "$environment/$name"
     "$environment/venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-index --no-build-isolation \
-      --no-deps "$copy"
+      --no-deps "$environment/$name"
   done
   cd / && "$environment/venv/bin/python" -c 'import hapticd; print(hapticd.__file__)'
   exit 0
 fi
-test=$(ls "$source_dir"/python/tests/"test_$name.py" "$source_dir"/python/*/tests/"test_$name.py" 2>/dev/null | head -1)
+test=$(find "$source_dir/python" -name "test_$name.py" -print -quit)
 [ -n "$test" ] || { echo "no test_$name.py"; exit 1; }
 cd /
 exec "$environment/venv/bin/python" -m pytest -q -p no:cacheprovider --rootdir "$(dirname "$test")" "$test"
