@@ -1,6 +1,6 @@
 """Measures the Python package: reports decoded, mesh upload, reader of recordings, round trip.
 
-    PYTHONPATH=python python3 bench/python_package.py build/release/bin/hapticd
+    PYTHONPATH=python python3 bench/python_package.py build/release/bin/hapticd [build/release/bin/client_script]
 """
 
 import os
@@ -53,6 +53,25 @@ def decoded(kind, message, count=100_000):
     return count / seconds
 
 
+def round_trips(name, count):
+    """Median and 99th percentile of the time from a question to its answer, in microseconds."""
+    with hapticd.connect(name) as hand:
+        answers = []
+        hand.on_workspace(answers.append)
+        hand.subscribe(hapticd.Reports.NONE)
+        hand.run_for(1)
+        times = []
+        for _ in range(count):
+            before = len(answers)
+            start = time.perf_counter()
+            hand.request_workspace()
+            while len(answers) == before:
+                hand.poll(1.0)
+            times.append((time.perf_counter() - start) * 1e6)
+            time.sleep(0.0005)
+    return tuple(np.quantile(times, [0.5, 0.99]))
+
+
 def long_recording(program, folder, ticks):
     """A recording of so many ticks: the blocks of a real one, again and again."""
     short = os.path.join(folder, "short.haptics")
@@ -83,6 +102,7 @@ def main():
     program = sys.argv[1]
     print(f"tick reports decoded:  {decoded('tick', m.TickReport()):9.0f} /s")
     print(f"pose reports decoded:  {decoded('pose', m.TrackerPosQuat()):9.0f} /s")
+    rounds = {"Python": [], "C++": []}
     process, name = serve(program)
     grid = 708  # 708 * 708 * 2 = 1 002 528 triangles
     x, z = np.meshgrid(np.linspace(-50, 50, grid + 1), np.linspace(-50, 50, grid + 1))
@@ -98,20 +118,15 @@ def main():
         size = hand.statistics().tcp_bytes_out - sent
         print(f"upload of {len(triangles)} triangles: {size / 1e6:.1f} MB in {seconds:.3f} s, {size / 1e6 / seconds:.0f} MB/s; "
               f"processor of the client {processor:.3f} s")
-    with hapticd.connect(name) as hand:
-        hand.subscribe(hapticd.Reports.NONE)
-        hand.run_for(1)
-        times = []
-        for _ in range(2000):
-            pongs = hand._pongs
-            start = time.perf_counter()
-            hand._put_now(m.Ping())
-            while hand._pongs == pongs:
-                hand._step(1.0)
-            times.append(time.perf_counter() - start)
-            time.sleep(0.0005)
-        p50, p99 = np.quantile(times, [0.5, 0.99]) * 1e6
-        print(f"ping to pong: median {p50:.0f} us, p99 {p99:.0f} us")
+    for turn in range(5):  # alternating, so that both meet the same machine
+        rounds["Python"].append(round_trips(name, 1000))
+        if len(sys.argv) > 2:
+            told = subprocess.run([sys.argv[2], name, "1000"], check=True, capture_output=True, text=True).stdout
+            rounds["C++"].append(tuple(map(float, told.split())))
+    for language, values in rounds.items():
+        if values:
+            p50, p99 = np.median(values, axis=0)
+            print(f"question to answer in {language}: median {p50:.0f} us, p99 {p99:.0f} us (medians of 5 x 1000)")
     process.terminate()
     process.wait()
     with tempfile.TemporaryDirectory() as folder:

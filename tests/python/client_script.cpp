@@ -1,6 +1,13 @@
 // Calls every command of the client once, in the order of python/tests/test_transcript.py:
 //   client_script NAME@HOST:PORT
+// Prints median and 99th percentile of so many round trips, in microseconds (bench/python_package.py):
+//   client_script NAME@HOST:PORT COUNT
+#include <algorithm>
+#include <chrono>
 #include <iostream>
+#include <string>
+#include <thread>
+#include <vector>
 
 #include "hapticd/client.h"
 
@@ -97,11 +104,38 @@ void rest(Client& client) {
   client.sendText("end of the script", Severity::warning);
 }
 
+// From a question to its answer, as the program sees it, with nothing else on the connection.
+void roundTrips(Client& client, int count) {
+  using Clock = std::chrono::steady_clock;
+  int answers = 0;
+  client.onWorkspace([&](const WorkspaceReport&) { ++answers; });
+  client.subscribe(Reports::none);
+  client.runFor(std::chrono::seconds(1));
+  std::vector<double> times_us;
+  for (int i = 0; i < count; ++i) {
+    const int before = answers;
+    const Clock::time_point start = Clock::now();
+    client.requestWorkspace();
+    while (answers == before) client.poll(std::chrono::seconds(1));
+    times_us.push_back(std::chrono::duration<double, std::micro>(Clock::now() - start).count());
+    std::this_thread::sleep_for(std::chrono::microseconds(500));
+  }
+  std::sort(times_us.begin(), times_us.end());
+  const auto quantile = [&](double q) {
+    return times_us[static_cast<std::size_t>(q * static_cast<double>(times_us.size() - 1))];
+  };
+  std::cout << quantile(0.5) << ' ' << quantile(0.99) << '\n';
+}
+
 }  // namespace
 
 int main(int argc, char** argv) try {
-  if (argc != 2) return 2;
+  if (argc != 2 && argc != 3) return 2;
   Client client(argv[1]);
+  if (argc == 3) {
+    roundTrips(client, std::stoi(argv[2]));
+    return 0;
+  }
   Matrix4 m{};
   for (std::size_t i = 0; i < 16; ++i) m[i] = 0.5 + static_cast<double>(i);
   client.waitCapabilities();
