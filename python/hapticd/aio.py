@@ -182,7 +182,10 @@ class Client(Core):
                 self._adopted.set_result(None)
 
     def _begin(self, udp: Optional[Tuple[str, int]]) -> None:
-        if self._transport is None:
+        if self._transport is None:  # lost meanwhile
+            if self._udp is not None:
+                self._udp.close()
+                self._udp = None
             return
         self._opened(udp)
         if udp is not None:

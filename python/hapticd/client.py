@@ -13,7 +13,7 @@ import socket
 import sys
 import time
 from collections import deque
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, Callable, Deque, Iterator, List, Optional, Tuple
 
 import numpy as np
@@ -117,7 +117,8 @@ class Client(Core):
 
     def __del__(self) -> None:
         if hasattr(self, "_selector"):
-            self.close()
+            with suppress(Exception):  # at the end of the interpreter, modules are gone
+                self.close()
 
     # --- connecting
 
@@ -290,7 +291,7 @@ class Client(Core):
         if self._closed_by_user:
             raise ConnectionLost(f"this client of {self.device}@{self.server} is closed")
         at = time.monotonic()
-        until = at + timeout
+        until = at + min(timeout, 3600.0)  # select() refuses longer times
         if self._sock is None and self._listener is None:
             if self._retry_at:
                 if at >= self._retry_at:
