@@ -288,7 +288,8 @@ class Core(Commands):
         self._peer.stream_bytes += self._backlog_bytes
         self._backlog, self._backlog_bytes = [], 0
         self._inbox.append((_CONNECTED, 0, 0, time.time(), b""))
-        self._ping_at = 0.0
+        self._ping()  # also when a report arrives first: its pong answers the question for the capabilities
+        self._ping_at = time.monotonic() + PING_S
 
     def peer_described(self, sender: str) -> None:
         # Stock servers describe our own name back to us; that is no evidence of a device.

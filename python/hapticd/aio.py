@@ -78,6 +78,7 @@ class Client(Core):
         self._transport: Optional[asyncio.Transport] = None
         self._udp: Optional[asyncio.DatagramTransport] = None
         self._remote = ""
+        self._early = b""  # of the stream, before the datagram socket exists
         self._lost = asyncio.Event()
         self._writable = asyncio.Event()
         self._writable.set()
@@ -177,7 +178,7 @@ class Client(Core):
         if not reverse:
             self._begin(None)
         else:
-            transport.pause_reading()  # until the datagram socket exists
+            self._early = b""
             if self._adopted is not None and not self._adopted.done():
                 self._adopted.set_result(None)
 
@@ -188,9 +189,10 @@ class Client(Core):
                 self._udp = None
             return
         self._opened(udp)
-        if udp is not None:
-            self._transport.resume_reading()
         self._push()
+        early, self._early = self._early, b""
+        if early:
+            self._data(early)
         self._turn()
 
     def _gone(self, reason: str) -> None:
@@ -215,6 +217,7 @@ class Client(Core):
 
     def _data(self, data: bytes) -> None:
         if self._peer is None:
+            self._early += data
             return
         try:
             self._received(data)

@@ -84,21 +84,24 @@ def server(shared_server: Server) -> Server:
 
 def feel_a_sphere(hand: Any, depth_mm: float = 3) -> None:
     """Uploads a sphere of 25 mm and presses the hand onto it, from outside: an object that appears around the hand is
-    not felt."""
-    hand.hold_hand((0, 0, 33))
-    _until(hand, lambda: 1 in hand.latest.pose and hand.latest.pose[1].position_m[2] > 0.03)
-    with hand.batch():
-        hand.upload_mesh(0, *hapticd.sphere(25))
-        hand.set_surface(0, hapticd.Surface(0.8))
-    hand.hold_hand((0, 0, 25 - depth_mm))
-    _until(hand, lambda: hand.latest.force.force_N[2] > 0.2)
+    not felt. On a busy machine a late tick can put the hand so deep that the contact is not felt either: again then."""
+    for _ in range(20):
+        hand.hold_hand((0, 0, 33))
+        _wait(hand, lambda: 1 in hand.latest.pose and hand.latest.pose[1].position_m[2] > 0.03)
+        with hand.batch():
+            hand.upload_mesh(0, *hapticd.sphere(25))
+            hand.set_surface(0, hapticd.Surface(0.8))
+        hand.hold_hand((0, 0, 25 - depth_mm))
+        if _wait(hand, lambda: hand.latest.force.force_N[2] > 0.2):
+            return
+    raise AssertionError(f"felt nothing; poses {hand.latest.pose}, guard {hand.latest.guard}")
 
 
-def _until(hand: Any, condition: Any) -> None:
-    deadline = time.monotonic() + 60
-    while not condition():
-        assert time.monotonic() < deadline, f"never became true; poses {hand.latest.pose}"
+def _wait(hand: Any, condition: Any, seconds: float = 5) -> bool:
+    deadline = time.monotonic() + seconds
+    while not condition() and time.monotonic() < deadline:
         hand.poll(0.1)
+    return bool(condition())
 
 
 class ScriptedServer:
@@ -163,3 +166,16 @@ class ScriptedServer:
 
     def close(self) -> None:
         self.listener.close()
+
+
+class Listener:
+    """Notes the messages that a peer reads."""
+
+    def __init__(self) -> None:
+        self.messages: List[Tuple[int, str, int, int, bytes]] = []
+
+    def peer_connected(self) -> None: ...
+    def peer_described(self, sender: str) -> None: ...
+    def peer_listens(self, host: str, port: int) -> None: ...
+    def peer_message(self, *message: Any) -> None:
+        self.messages.append(message)

@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 
 import hapticd
-from conftest import ScriptedServer, Server, feel_a_sphere
+from conftest import Listener, ScriptedServer, Server, feel_a_sphere
 from hapticd import Effect, Plane, Reports
+from hapticd._peer import TYPE_NAMES, Peer
 
 WIRE = pathlib.Path(__file__).resolve().parents[2] / "testdata/wire"
 
@@ -220,13 +221,17 @@ def test_a_vrpn_server_without_extensions() -> None:
 def test_a_recorded_stock_server_is_understood() -> None:
     """The bytes of VRPN's own server, as a client of it received them."""
     listener = socket.create_server(("127.0.0.1", 0))
+    received = bytearray()
 
     def serve() -> None:
         connection = listener.accept()[0]
         with connection:
             connection.sendall((WIRE / "tcp.s2c.tcp.bin").read_bytes())
-            while connection.recv(1 << 16):
-                pass
+            while True:
+                data = connection.recv(1 << 16)
+                received.extend(data)
+                if not data:
+                    break
 
     thread = threading.Thread(target=serve, daemon=True)
     thread.start()
@@ -234,8 +239,13 @@ def test_a_recorded_stock_server_is_understood() -> None:
         until(hand, lambda: hand.latest.pose and hand.latest.force.time > 0)
         assert hand.capabilities is None and hand.statistics().messages_damaged == 0
         assert abs(np.linalg.norm(hand.latest.pose[0].orientation) - 1) < 1e-6
-    thread.join(10)
+    thread.join(60)
     listener.close()
+    # Also when reports arrive together with the cookie: without a ping there is no pong, and no answer to wait for.
+    assert b"vrpn_Base ping_message" in received
+    listening = Listener()
+    Peer(listening, [], None).feed(bytes(received))
+    assert "vrpn_Base ping_message" in [TYPE_NAMES[message[0]] for message in listening.messages]
 
 
 def test_ctrl_c_ends_a_wait_and_nothing_is_left(server: Server) -> None:

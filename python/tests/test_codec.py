@@ -8,6 +8,8 @@ from typing import Any, Dict, List, Tuple
 import numpy as np
 import pytest
 
+from conftest import Listener
+
 from hapticd import _messages as m
 from hapticd._codec import DecodeError, frame
 from hapticd._core import _NUMBERS
@@ -63,17 +65,6 @@ def test_values_that_do_not_fit_name_the_field() -> None:
         LAYOUTS["vrpn_ForceDevice setHapticProperty"].encode(m.SetHapticProperty(0, "x" * 21, 0))
     with pytest.raises(ValueError, match="setObjectNumber"):
         LAYOUTS["vrpn_ForceDevice setObjectNumber"].encode(m.SetObjectNumber(1 << 40))
-
-
-class Listener:
-    def __init__(self) -> None:
-        self.messages: List[Tuple[int, str, int, int, bytes]] = []
-
-    def peer_connected(self) -> None: ...
-    def peer_described(self, sender: str) -> None: ...
-    def peer_listens(self, host: str, port: int) -> None: ...
-    def peer_message(self, *message: Any) -> None:
-        self.messages.append(message)
 
 
 def hear(data: bytes, piece: int) -> List[Tuple[int, str, int, int, bytes]]:
