@@ -43,10 +43,10 @@ def test_a_sphere_is_felt(server: Server, way: str) -> None:
                 await hand.hold_hand((0, 0, 22))
                 if await wait(hand, lambda: hand.latest.force.force_N[2] > 0.2):
                     break
-            rows = await hand.collect("tick", 0.3)
-            assert len(rows) > 2 and rows["object"][-1] == 0
-            async for report in hand.reports("force", 5):
-                assert report.force_N[2] > 0
+            rows = await hand.collect("tick", 0.5)
+            assert len(rows) > 2 and rows["force_N"].shape == (len(rows), 3)
+            async for report in hand.reports("tick", 60):
+                assert report.tick > rows["tick"][-1]
                 break
             await hand.stop_forces()
             await until(hand, lambda: hand.latest.guard.stopped)
@@ -60,8 +60,7 @@ def test_a_sphere_is_felt(server: Server, way: str) -> None:
 def test_many_clients_share_one_loop(server: Server) -> None:
     async def main() -> None:
         hands = await asyncio.gather(*(hapticd.aio.connect(server.tcp) for _ in range(4)))
-        ticks = await asyncio.gather(*(hand.collect("pose", 0.3) for hand in hands))
-        assert all(len(rows) > 0 for rows in ticks)
+        await asyncio.gather(*(until(hand, lambda hand=hand: hand.latest.pose) for hand in hands))  # type: ignore[misc]
         await asyncio.gather(*(hand.close() for hand in hands))
 
     run(main())

@@ -57,8 +57,10 @@ def test_rows_are_structured_arrays(server: Server) -> None:
         assert np.all(np.diff(rows["time"]) > 0)
         until(hand, lambda: 1 in hand.latest.pose)
         sensors = set()
-        for report in hand.reports("pose", seconds=0.3):
+        for report in hand.reports("pose", seconds=60):
             sensors.add(report.sensor)
+            if {0, 1} <= sensors:
+                break
         assert {0, 1} <= sensors
         with pytest.raises(ValueError, match="no rows of kind 'text'"):
             hand.collect("text", 0)
@@ -153,9 +155,14 @@ def test_a_stop_passes_a_large_upload(server: Server) -> None:
 
 
 def test_heartbeats_stop_with_the_polling(server: Server) -> None:
-    with hapticd.connect(server.tcp, reconnect=False) as hand, hapticd.connect(server.tcp) as other:
+    for _ in range(5):  # a busy machine may not run this process for 500 ms
+        hand = hapticd.connect(server.tcp, reconnect=False)
         hand.enable_heartbeat()
         hand.run_for(0.8)
+        if hand.connected:
+            break
+        hand.close()
+    with hand, hapticd.connect(server.tcp) as other:
         assert hand.connected
         losses: List[hapticd.ConnectionReport] = []
         hand.on_connection(losses.append)
