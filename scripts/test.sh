@@ -61,7 +61,7 @@ targets_of() {
     tsan) echo threads_tests ;;
     release)
       case "$room" in
-        "" | apps | examples | install | web) echo all ;;
+        "" | apps | examples | install | python | web) echo all ;;
         *)
           if [ "${#programs[@]}" -gt 0 ]; then printf '%s_test\n' "${programs[@]}"; return; fi
           echo "tests/$room/all"
@@ -145,10 +145,10 @@ judge() {
 
 mkdir -p build
 if [ -z "$room" ]; then
-  scripts/install_packages.sh build viewer test lint
+  scripts/install_packages.sh build viewer test python lint
   scripts/check_includes.sh
 else
-  scripts/install_packages.sh build test
+  scripts/install_packages.sh build test python
 fi
 
 echo "== release: building"

@@ -39,6 +39,9 @@ std::string messagesAsMarkdown();
 /// web/src/wire/messages.ts.
 std::string messagesAsTypeScript();
 
+/// python/hapticd/_messages.py.
+std::string messagesAsPython();
+
 /// A libFuzzer dictionary: every wire name and every frame length of the table.
 std::string messagesAsFuzzDictionary();
 

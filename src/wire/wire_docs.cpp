@@ -1,6 +1,7 @@
 // Prints what is derived from the table of messages:
 //   wire_docs markdown    docs/wire-messages.md
 //   wire_docs typescript  web/src/wire/messages.ts
+//   wire_docs python      python/hapticd/_messages.py
 //   wire_docs vectors     testdata/wire/vectors.json
 //   wire_docs dictionary  for libFuzzer
 #include <cstdio>
@@ -16,9 +17,10 @@ int main(int argc, char** argv) {
   std::string text;
   if (what == "markdown") text = messagesAsMarkdown();
   if (what == "typescript") text = messagesAsTypeScript();
+  if (what == "python") text = messagesAsPython();
   if (what == "vectors") text = vectorsAsJson();
   if (what == "dictionary") text = messagesAsFuzzDictionary();
   if (!text.empty()) return std::fputs(text.c_str(), stdout) < 0 || std::fflush(stdout) != 0;
-  std::fputs("usage: wire_docs markdown|typescript|vectors|dictionary\n", stderr);
+  std::fputs("usage: wire_docs markdown|typescript|python|vectors|dictionary\n", stderr);
   return 2;
 }

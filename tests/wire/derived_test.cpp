@@ -16,6 +16,12 @@ TEST(Documents, AreWhatTheTableSays) {
   EXPECT_EQ(text, messagesAsMarkdown()) << "stale: run wire_docs markdown > docs/wire-messages.md";
 }
 
+TEST(Documents, PythonHasTheMessagesOfTheTable) {
+  std::ifstream in(HAPTICD_TESTDATA "/../python/hapticd/_messages.py");
+  const std::string text((std::istreambuf_iterator<char>(in)), {});
+  EXPECT_EQ(text, messagesAsPython()) << "stale: run wire_docs python > python/hapticd/_messages.py";
+}
+
 TEST(Descriptions, HaveOffsetsThatFollowEachOther) {
   const std::vector<MessageDescription> messages = describeMessages();
   ASSERT_EQ(messages.size(), kMessageKinds);

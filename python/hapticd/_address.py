@@ -1,0 +1,59 @@
+"""Addresses as VRPN writes them."""
+
+import re
+import socket
+from typing import NamedTuple, Tuple
+
+from ._peer import DEFAULT_PORT, MAX_NAME_BYTES
+from .errors import ConnectError
+
+
+class Address(NamedTuple):
+    """One device of one server."""
+
+    device: str
+    host: str
+    port: int
+    tcp_only: bool
+
+    @property
+    def server(self) -> str:
+        return f"{self.host}:{self.port}"
+
+
+_FORM = re.compile(r"(?:(tcp:)|x-vrpn:)?(?://)?([^\s/@:]{1,255})(?::(.*))?", re.ASCII)
+
+
+def parse(text: str) -> Address:
+    """NAME@host, NAME@host:port or NAME@tcp://host:port. Raises ValueError for another form."""
+    device, at, rest = text.partition("@")
+    form = "NAME@host, NAME@host:port or NAME@tcp://host:port"
+    if not at or not device or len(device.encode()) > MAX_NAME_BYTES:
+        raise ValueError(f"device {text!r}: expected {form}")
+    match = _FORM.fullmatch(rest)
+    if match is None:
+        raise ValueError(f"device {text!r}: expected {form}")
+    tcp, host, digits = match.groups()
+    port = DEFAULT_PORT
+    if digits is not None:
+        if not re.fullmatch(r"[0-9]{1,5}", digits) or not 1 <= int(digits) <= 65535:
+            raise ValueError(f"device {text!r}: port {digits!r}, expected 1 to 65535")
+        port = int(digits)
+    return Address(device, host, port, tcp is not None)
+
+
+def resolve(address: Address) -> Tuple[str, int]:
+    """Numeric IPv4 address and port; may block. Raises ConnectError for an unknown host."""
+    try:
+        found = socket.getaddrinfo(address.host, address.port, socket.AF_INET, socket.SOCK_STREAM)
+    except OSError as error:
+        raise ConnectError(f"no server at {address.server}: {error}") from error
+    host, port = found[0][4][:2]
+    return str(host), int(port)
+
+
+def local_towards(server: Tuple[str, int]) -> str:
+    """Our own address on the way to the server. Sends nothing. Raises OSError."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.connect(server)
+        return str(probe.getsockname()[0])

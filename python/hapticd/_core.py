@@ -1,0 +1,699 @@
+"""The client without sockets: what both faces share. A face moves bytes, keeps time and waits."""
+
+import copy
+import time
+from collections import deque
+from dataclasses import dataclass
+from typing import Any, Callable, Deque, Dict, Final, Generic, List, NamedTuple, Optional, Tuple, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _messages as m
+from . import reports as r
+from ._address import Address
+from ._codec import HEADER, DecodeError, Numbers, by_class, frame, padded
+from ._commands import Commands
+from ._peer import Peer, now
+from ._statistics import Statistics
+from .errors import ConnectError, ConnectionLost, ServerError, Unsupported
+from .scene import Capabilities, Reports
+
+HANDSHAKE_S: Final = 3.0
+RETRY_S: Final = 0.25
+PING_S: Final = 1.0
+HEARTBEAT_S: Final = 0.1
+#: Bytes that accumulate before they are given to the system.
+BATCH_BYTES: Final = 64 * 1024
+#: A stop on the first connection waits behind no more than this; beyond it, it also takes a second connection.
+STOP_BACKLOG_BYTES: Final = 64 * 1024
+MAX_COMMAND_BATCH_BYTES: Final = 256 * 1024 * 1024
+#: Reports that may wait for dispatch; beyond it the client stops reading.
+MAX_WAITING_BYTES: Final = 64 * 1024 * 1024
+
+_NUMBERS = by_class(m.LAYOUTS)
+_PONG = _NUMBERS[m.Pong][0]
+_CAPABILITIES = _NUMBERS[m.Capabilities][0]
+
+Report = TypeVar("Report")
+
+
+@dataclass(frozen=True)
+class Options:
+    """Options of a client; times in seconds."""
+
+    connect_timeout: float = 3.0  # how long connect() waits before it raises; 0: it does not wait
+    reconnect: bool = True  # whether to reconnect, without limit, when a connection ends
+    send_timeout: float = 10.0  # how long the server may accept no data while data waits
+    queue_limit_bytes: int = 4 * 1024 * 1024  # that may wait to be sent; a command that would exceed them sleeps
+    throw_on_error: bool = False  # poll() raises ServerError for a text of severity error, after the callbacks
+
+
+class UploadProgress(NamedTuple):
+    """Progress of an upload: bytes that the system has accepted, of all bytes of the mesh."""
+
+    bytes_sent: int
+    bytes_total: int
+
+
+class Subscription(Generic[Report]):
+    """One callback of a client. It stays for the life of the client unless end() is called; as a context manager
+    it ends with the block."""
+
+    def __init__(self, callbacks: "List[Subscription[Any]]", callback: Callable[[Report], object]) -> None:
+        self._callbacks = callbacks
+        self.callback = callback
+        self.active = True
+        callbacks.append(self)
+
+    def end(self) -> None:
+        """Ends the callback; does nothing when it has ended before."""
+        if self.active:
+            self.active = False
+            self._callbacks.remove(self)
+
+    def __enter__(self) -> "Subscription[Report]":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
+
+
+Arrival = Tuple[int, int, int, float, bytes]  # kind, seconds, microseconds, time of arrival, payload
+_CONNECTED: Final = -2
+_LOST: Final = -3
+
+_array = np.array
+
+
+def _object_number(value: float) -> int:
+    """The wire has object numbers as floats; -1 stands for everything that is no object number."""
+    return int(value) if 0 <= value <= 2147483647 else -1
+
+
+def _contacts(t: float, c: m.ContactList) -> r.ContactsReport:
+    n = _array(c.contacts[: len(c.contacts) // 10 * 10], dtype=np.float64).reshape(-1, 10)
+    contacts = [r.Contact(_object_number(row[0]), row[1:4], row[4:7], row[7:10]) for row in n]
+    return r.ContactsReport(t, c.tick, c.time, contacts)
+
+
+# From a message to a report, by message class. Arrays are built here, once, so that the codec stays independent.
+_CONVERT: Final[Dict[Any, Tuple[str, Callable[[float, Any], Any]]]] = {
+    m.TrackerPosQuat: ("pose", lambda t, x: r.PoseReport(t, x.sensor, _array(x.position), _array(x.orientation))),
+    m.TrackerVelocity: (
+        "velocity",
+        lambda t, x: r.VelocityReport(t, x.sensor, _array(x.velocity), _array(x.rotation), x.interval),
+    ),
+    m.TrackerAcceleration: (
+        "acceleration",
+        lambda t, x: r.AccelerationReport(t, x.sensor, _array(x.acceleration), _array(x.rotation), x.interval),
+    ),
+    m.ButtonChange: ("button", lambda t, x: r.ButtonReport(t, x.button, x.state != 0)),
+    m.AnalogChannels: ("analog", lambda t, x: r.AnalogReport(t, _array(x.channels, dtype=np.float64))),
+    m.Force: ("force", lambda t, x: r.ForceReport(t, _array(x.force))),
+    m.Dop: ("depth", lambda t, x: r.DepthReport(t, x.depth)),
+    m.Scp: ("contact_point", lambda t, x: r.ContactPointReport(t, _array(x.position), _array(x.orientation))),
+    m.IsTouching: ("touching", lambda t, x: r.TouchingReport(t, x.touching != 0)),
+    m.TouchedObject: ("touched_object", lambda t, x: r.TouchedObjectReport(t, x.object)),
+    m.Angle: ("angle", lambda t, x: r.AngleReport(t, x.angle, x.touching != 0)),
+    m.ForceError: ("force_error", lambda t, x: r.ForceErrorReport(t, x.code)),
+    m.Text: ("text", lambda t, x: r.TextReport(t, r.Severity(min(x.severity, 2)), x.text, x.level)),
+    m.TrackerToRoom: ("to_room", lambda t, x: r.ToRoomReport(t, _array(x.position), _array(x.orientation))),
+    m.TrackerUnitToSensor: (
+        "unit_to_sensor",
+        lambda t, x: r.UnitToSensorReport(t, x.sensor, _array(x.position), _array(x.orientation)),
+    ),
+    m.TrackerWorkspace: ("workspace", lambda t, x: r.WorkspaceReport(t, _array(x.min), _array(x.max))),
+    m.TickReport: (
+        "tick",
+        lambda t, x: r.TickReport(
+            t, x.tick, x.time, x.revision, _array(x.hand), _array(x.proxy), _array(x.velocity),
+            _array(x.orientation), _array(x.force), x.depth, x.object, x.buttons, r.Trips(x.guard_active),
+            r.Trips(x.guard_latched),
+        ),
+    ),
+    m.ContactList: ("contacts", _contacts),
+    m.GuardState: (
+        "guard",
+        lambda t, x: r.GuardReport(t, r.Trips(x.active), r.Trips(x.latched), x.armed != 0, x.stopped != 0),
+    ),
+}  # fmt: skip
+_LATEST: Final = frozenset(
+    ("analog", "force", "depth", "contact_point", "touching", "touched_object", "angle", "tick", "contacts", "guard")
+)
+_BY_KIND: Final = {_NUMBERS[cls][0]: (_NUMBERS[cls][1].decode, *entry) for cls, entry in _CONVERT.items()}
+_STATES: Final = _NUMBERS[m.ButtonStates][0]
+_TEXT: Final = _NUMBERS[m.Text][0]
+
+_SET_VERTEX_ROW = np.dtype(
+    [("header", ">u4", 6), ("object", ">i4"), ("vertex", ">i4"), ("position", ">f4", 3), ("padding", "V4")]
+)
+
+
+def as_vertices(vertices: "npt.ArrayLike") -> "npt.NDArray[Any]":
+    """(n, 3) positions in wire order. Raises ValueError for another shape."""
+    array = np.ascontiguousarray(vertices, dtype=">f4")
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ValueError(f"vertices of shape {array.shape}: give (n, 3)")
+    return array
+
+
+def as_triangles(triangles: "npt.ArrayLike", vertices: int) -> "npt.NDArray[Any]":
+    """(m, 3) vertex numbers in wire order. Raises ValueError for another shape, or a vertex that is not there."""
+    given = np.asarray(triangles)
+    if given.ndim != 2 or given.shape[1] != 3 or not (given.dtype.kind in "iu" or given.size == 0):
+        raise ValueError(f"triangles of shape {given.shape} and type {given.dtype}: give (m, 3) integers")
+    if given.size and (given.min() < 0 or given.max() >= vertices):
+        wrong = np.argwhere((given < 0) | (given >= vertices))[0]
+        raise ValueError(f"triangle {wrong[0]} names vertex {given[tuple(wrong)]}, the mesh has {vertices}")
+    return np.ascontiguousarray(given, dtype=">i4")
+
+
+class Core(Commands):
+    """Commands in, bytes out; bytes in, callbacks and latest reports out."""
+
+    def __init__(self, address: Address, options: Options) -> None:
+        self.options = options
+        #: NAME of the device.
+        self.device: Final = address.device
+        #: HOST:PORT of the server.
+        self.server: Final = address.server
+        #: The newest report of each kind; changes while the client polls.
+        self.latest = r.LatestReports()
+        self._address = address
+        self._peer: Optional[Peer] = None
+        self._backlog: List[bytes] = []  # commands before the first connection
+        self._backlog_bytes = 0
+        self._held: Optional[List[bytes]] = None  # commands of a batch
+        self._held_bytes = 0
+        self._inbox: Deque[Arrival] = deque()
+        self._inbox_bytes = 0
+        self._arrived = 0.0
+        self._offer: Optional[m.Capabilities] = None  # by the server of this connection
+        self._answered = False  # the server has answered, or does not know the question
+        self._heard = False
+        self._pings = self._pongs = 0  # of this connection
+        self._server_devices: List[str] = []
+        self._subscription: Optional[m.Subscribe] = None
+        self._heartbeats = False
+        self._callbacks: Dict[str, List[Subscription[Any]]] = {kind: [] for kind in (*r.KINDS, "connection")}
+        self._first_error = ""
+        self._last_failure = ""
+        self._dispatching = False
+        self._udp_target: Optional[Tuple[str, int]] = None
+        self._counts = Statistics()
+        self._ping_at = 0.0
+        self._heartbeat_at = 0.0
+        self._handshake_at = 0.0
+
+    # --- the face moves bytes
+
+    def _opened(self, udp: Optional[Tuple[str, int]]) -> None:
+        """The TCP connection is up."""
+        self._peer = Peer(self, [self.device], udp)
+        self._handshake_at = time.monotonic() + HANDSHAKE_S
+
+    def _received(self, data: bytes) -> None:
+        """Raises ProtocolError."""
+        assert self._peer is not None
+        self._counts.tcp_bytes_in += len(data)
+        self._arrived = time.time()
+        self._peer.feed(data)
+
+    def _received_datagram(self, data: bytes) -> None:
+        self._counts.udp_bytes_in += len(data)
+        self._arrived = time.time()
+        if self._peer is not None and self._inbox_bytes <= MAX_WAITING_BYTES:
+            self._peer.feed_datagram(data)
+
+    def _closed(self, reason: str) -> None:
+        """The connection is gone; the reason must not be empty."""
+        was_connected = self.connected
+        self._last_failure = reason
+        self._peer = None
+        self._udp_target = None
+        self._heard = self._answered = False
+        self._offer = None
+        self._server_devices = []
+        if was_connected:
+            self._inbox.append((_LOST, 0, 0, time.time(), reason.encode()))
+
+    def _run_timers(self) -> float:
+        """Sends what is due, and returns the time (monotonic) of the next turn."""
+        at = time.monotonic()
+        peer = self._peer
+        if peer is None:
+            return at + PING_S
+        if not peer.connected:
+            return self._handshake_at
+        following = at + PING_S
+        if not self._heard:
+            if at >= self._ping_at:
+                self._ping_at = at + PING_S
+                self._ping()
+            following = min(following, self._ping_at)
+        if self._heartbeats:
+            if at >= self._heartbeat_at:
+                self._heartbeat_at = at + HEARTBEAT_S
+                self._put_now(m.Heartbeat(1))
+            following = min(following, self._heartbeat_at)
+        return following
+
+    def _ping(self) -> None:
+        if self._put_now(m.Ping()):
+            self._pings += 1
+
+    @property
+    def _all_pongs(self) -> bool:
+        """Servers answer in order: everything before the last ping has been handled."""
+        return self._pongs >= self._pings > 0
+
+    def _handshake_expired(self) -> bool:
+        return self._peer is not None and not self._peer.connected and time.monotonic() >= self._handshake_at
+
+    # --- the peer reports
+
+    def peer_connected(self) -> None:
+        """Servers answer in order. The question for the capabilities precedes the ping, so a pong without
+        capabilities before it means that the server does not know the question."""
+        assert self._peer is not None
+        self._counts.connections += 1
+        self._pings = self._pongs = 0
+        self._put_now(m.QueryCapabilities())
+        if self._subscription is not None:
+            self._put_now(self._subscription)
+        if self._heartbeats:
+            self._put_now(m.Heartbeat(1))
+        self._peer.stream.extend(self._backlog)
+        self._peer.stream_bytes += self._backlog_bytes
+        self._backlog, self._backlog_bytes = [], 0
+        self._inbox.append((_CONNECTED, 0, 0, time.time(), b""))
+        self._ping()  # also when a report arrives first: its pong answers the question for the capabilities
+        self._ping_at = time.monotonic() + PING_S
+
+    def peer_described(self, sender: str) -> None:
+        # Stock servers describe our own name back to us; that is no evidence of a device.
+        if sender not in (self.device, "VRPN Control"):
+            self._server_devices.append(sender)
+
+    def peer_listens(self, host: str, port: int) -> None:
+        parts = host.split(".")
+        if len(parts) == 4 and all(p.isdigit() and int(p) < 256 for p in parts) and 1 <= port <= 65535:
+            self._udp_target = (host, port)
+            assert self._peer is not None
+            self._peer.use_datagrams = True
+
+    def peer_message(self, kind: int, sender: str, seconds: int, microseconds: int, payload: bytes) -> None:
+        self._counts.messages_in += 1
+        if sender != self.device:
+            return
+        self._heard = True
+        if kind == _PONG:
+            self._answered = True
+            self._pongs += 1
+        elif kind == _CAPABILITIES:
+            try:
+                self._offer = m.LAYOUTS[_CAPABILITIES].decode(payload)
+                self._answered = True
+            except DecodeError:
+                self._counts.messages_damaged += 1
+        else:
+            self._inbox.append((kind, seconds, microseconds, self._arrived, payload))
+            self._inbox_bytes += len(payload)
+
+    # --- from arrivals to reports
+
+    def _dispatch(self) -> int:
+        """Runs the callbacks for everything that waits. An exception of a callback leaves; the rest waits on."""
+        if self._dispatching:
+            return 0
+        self._dispatching = True
+        count = 0
+        inbox = self._inbox
+        try:
+            while inbox:
+                arrival = inbox.popleft()
+                self._inbox_bytes -= len(arrival[4])
+                count += 1
+                self._handle(arrival)
+        finally:
+            self._dispatching = False
+        return count
+
+    def _handle(self, arrival: Arrival) -> None:
+        kind, seconds, microseconds, arrived, payload = arrival
+        entry = _BY_KIND.get(kind)
+        stamp = seconds + microseconds * 1e-6
+        if entry is not None:
+            decode, name, convert = entry
+            try:
+                message = decode(payload)
+            except DecodeError:
+                self._counts.messages_damaged += 1
+                return
+            if kind == _TEXT and message.severity >= 2 and not self._first_error:
+                self._first_error = message.text
+            self._deliver(name, convert(stamp, message), arrived - stamp)
+        elif kind == _STATES:
+            self._handle_states(payload, stamp, arrived)
+        elif kind in (_CONNECTED, _LOST):
+            if kind == _LOST:
+                self.latest = r.LatestReports()
+            self._call("connection", r.ConnectionReport(arrived, kind == _CONNECTED, payload.decode()))
+
+    def _handle_states(self, payload: bytes, stamp: float, arrived: float) -> None:
+        """Servers resend all button states periodically; report changes only."""
+        try:
+            states = m.LAYOUTS[_STATES].decode(payload).states
+        except DecodeError:
+            self._counts.messages_damaged += 1
+            return
+        for button, state in enumerate(states):
+            if self.latest.pressed.get(button, False) != (state != 0):
+                self._deliver("button", r.ButtonReport(stamp, button, state != 0), arrived - stamp)
+
+    def _deliver(self, name: str, report: Any, latency: float) -> None:
+        counts = self._counts.reports[name]
+        counts.count += 1
+        counts.latency.add(latency)
+        if name in _LATEST:
+            setattr(self.latest, name, report)
+        elif name == "pose":
+            self.latest.pose[report.sensor] = report
+        elif name == "velocity":
+            self.latest.velocity[report.sensor] = report
+        elif name == "button":
+            self.latest.pressed[report.button] = report.pressed
+        self._call(name, report)
+
+    def _call(self, name: str, report: Any) -> None:
+        callbacks = self._callbacks[name]
+        if callbacks:
+            for subscription in tuple(callbacks):
+                if subscription.active:
+                    subscription.callback(report)
+
+    def _raise_first_error(self) -> None:
+        if self.options.throw_on_error and self._first_error:
+            text, self._first_error = self._first_error, ""
+            raise ServerError(f"{self.device}@{self.server}: {text}")
+
+    # --- sending
+
+    def _frame(self, message: Any) -> bytes:
+        number, layout = _NUMBERS[type(message)]
+        return frame(*now(), 0, number, layout.encode(message))
+
+    def _send(self, message: Any, fast: bool = False) -> None:
+        one = self._frame(message)
+        if fast and self._held is None and self.connected:
+            assert self._peer is not None
+            self._peer.send_fast(one)
+            self._counts.messages_out += 1
+            self._collected(len(one))
+        else:
+            self._send_frames([one], 1)
+
+    def _send_frames(self, frames: List[bytes], messages: int) -> None:
+        """Whole frames of commands, in this order: into the batch, to the peer, or kept for the first connection;
+        dropped and counted while a later connection is lost."""
+        size = sum(map(len, frames))
+        if self._held is not None:
+            self._held.extend(frames)
+            self._held_bytes += size
+            self._counts.messages_out += messages
+            return
+        if self.connected:
+            assert self._peer is not None
+            self._peer.stream.extend(frames)
+            self._peer.stream_bytes += size
+        elif self._counts.connections == 0:
+            if self._backlog_bytes + size > max(self.options.queue_limit_bytes, BATCH_BYTES):
+                raise ConnectError(f"{self._why_not_connected()}; {self._backlog_bytes + size} bytes wait to be sent")
+            self._backlog.extend(frames)
+            self._backlog_bytes += size
+        else:
+            self._counts.messages_dropped += messages
+            return
+        self._counts.messages_out += messages
+        self._collected(size)
+
+    def _collected(self, size: int) -> None:
+        """Called with each command that was collected; a face may send, and sleep."""
+
+    def _put_now(self, message: Any) -> bool:
+        """Appends a message ahead of a batch that is held; false without a connection. The face sends it."""
+        if not self.connected:
+            self._counts.messages_dropped += 1
+            return False
+        assert self._peer is not None
+        self._peer.send_frames(self._frame(message))
+        self._counts.messages_out += 1
+        return True
+
+    @property
+    def connected(self) -> bool:
+        """Whether commands reach a server now."""
+        return self._peer is not None and self._peer.connected
+
+    def _why_not_connected(self) -> str:
+        server, failure = self.server, self._last_failure
+        if "refused" in failure.lower():
+            return (
+                f"nothing listens on {server} ({failure}): start `hapticd serve` there, or correct host and port"
+            )
+        if not failure and not self._address.tcp_only:
+            return (
+                f"no server at {server} answers the UDP request: start `hapticd serve` there, correct host and port, "
+                f"or, if a firewall blocks the connection from the server, connect to NAME@tcp://{server}"
+            )
+        return f"no VRPN server at {server}: {failure or 'no answer'}"
+
+    def _no_device(self) -> str:
+        others = ", ".join(self._server_devices) or "no other device"
+        return f"no device '{self.device}' answers at {self.server}; it has {others}"
+
+    def statistics(self) -> Statistics:
+        """Counts since the client was constructed: a copy."""
+        result = copy.deepcopy(self._counts)
+        result.taken = time.monotonic()
+        return result
+
+    # --- features
+
+    def _has(self, feature: int) -> bool:
+        return self._offer is not None and self._offer.features & feature != 0
+
+    def _require_now(self, feature: int, what: str) -> None:
+        """After waiting for the answer: raises unless the device has the feature."""
+        if not self._answered:
+            if not self.connected:
+                raise ConnectionLost(f"connection to {self.server} lost: {self._why_not_connected()}")
+            raise ConnectError(
+                f"device '{self.device}' at {self.server} did not answer the question for its capabilities"
+            )
+        if not self._has(feature):
+            why = (
+                f"{self.server} is a VRPN server without the extensions of hapticd"
+                if self._offer is None
+                else f"device '{self.device}' at {self.server} does not support it"
+            )
+            raise Unsupported(f"cannot {what}: {why}")
+
+    @property
+    def capabilities(self) -> Optional[Capabilities]:
+        """What the server and its device support; the client asks on every connection. None without a connection,
+        before the answer, and for servers of other makes. Does not wait."""
+        c = self._offer
+        if c is None or not self.connected:
+            return None
+        features = (
+            m.FEATURE_BULK_MESH, m.FEATURE_BATCH, m.FEATURE_SUBSCRIBE, m.FEATURE_STOP, m.FEATURE_HEARTBEAT,
+            m.FEATURE_HOLD_HAND,
+        )  # fmt: skip
+        flags = [self._has(feature) for feature in features]
+        box = tuple(c.workspace)
+        return Capabilities(
+            c.version, *flags, c.servo_rate, c.report_rate, c.peak_force, c.buttons, box[:3], box[3:]  # type: ignore
+        )
+
+    def _set_subscription(self, kinds: Reports, rate_Hz: float) -> None:
+        self._subscription = m.Subscribe(int(kinds), rate_Hz)
+        if self.connected:
+            self._put_now(self._subscription)
+
+    @staticmethod
+    def _check_rate(rate_Hz: float) -> None:
+        if not 0 <= rate_Hz < float("inf"):
+            raise ValueError(f"a report rate of {rate_Hz} Hz: give 0 (as it is) or more")
+
+    def _set_heartbeats(self, enable: bool) -> None:
+        self._heartbeats = enable
+        if self.connected:
+            self._heartbeat_at = time.monotonic() + HEARTBEAT_S
+            self._put_now(m.Heartbeat(int(enable)))
+
+    # --- batches and meshes
+
+    def _begin_batch(self) -> None:
+        if self._held is not None:
+            raise RuntimeError("batch() inside batch(): batches do not nest")
+        self._held, self._held_bytes = [], 0
+
+    def _end_batch(self, connection: int, send: bool) -> None:
+        """Sends what is held as one batch, or drops it."""
+        frames, size = self._held or [], self._held_bytes
+        self._held, self._held_bytes = None, 0
+        if not send:
+            return
+        if not self.connected or self._counts.connections != connection:
+            raise ConnectionLost(
+                f"connection to {self.server} lost before a batch was complete; nothing of it was sent"
+            )
+        if size > MAX_COMMAND_BATCH_BYTES:
+            raise ValueError(f"a batch of {size} bytes, at most {MAX_COMMAND_BATCH_BYTES}: send it in several")
+        self._send_frames([self._frame(m.BatchBegin()), *frames, self._frame(m.BatchCommit())], 2)
+
+    def _run_frames(self, cls: Any, object: int, first: int, rows: "npt.NDArray[Any]") -> List[bytes]:
+        """Frames of MeshVertices or MeshTriangles; the rows are in wire order."""
+        number, layout = _NUMBERS[cls]
+        seconds, microseconds = now()
+        data = memoryview(rows.reshape(-1).view(np.uint8))  # type: ignore[arg-type]
+        frames = []
+        for at in range(0, len(rows), m.MOST_IN_ONE_MESSAGE):
+            count = min(m.MOST_IN_ONE_MESSAGE, len(rows) - at)
+            head = layout.encode(cls(object, first + at, ()))[:-4] + (3 * count).to_bytes(4, "big")
+            size = HEADER.size + len(head) + 12 * count
+            header = HEADER.pack(size, seconds, microseconds, 0, number, 0)
+            frames.append(b"".join((header, head, data[12 * at : 12 * (at + count)], bytes(padded(size) - size))))
+        return frames
+
+    def _vertex_frames(self, object: int, first: int, rows: "npt.NDArray[Any]") -> bytes:
+        """Frames of set_vertex for all rows, made at once."""
+        table = np.zeros(len(rows), dtype=_SET_VERTEX_ROW)
+        number, layout = _NUMBERS[m.SetVertex]
+        table["header"] = (HEADER.size + layout.payload_bytes, *now(), 0, number, 0)
+        table["object"] = object
+        table["vertex"] = np.arange(first, first + len(rows))
+        table["position"] = rows
+        return table.tobytes()
+
+    def _mesh_frames(
+        self, object: int, vertices: "npt.NDArray[Any]", triangles: "Optional[npt.NDArray[Any]]"
+    ) -> Tuple[List[bytes], int]:
+        """Frames and number of messages of a mesh: thousands of vertices per message where the server supports it,
+        else one by one. Without triangles, consecutive triples of vertices are triangles."""
+        if self._has(m.FEATURE_BULK_MESH):
+            frames = self._run_frames(m.MeshVertices, object, 0, vertices)
+            if triangles is not None:
+                frames += self._run_frames(m.MeshTriangles, object, 0, triangles)
+            return frames, len(frames)
+        corners = vertices if triangles is None else vertices[triangles.astype(np.int64).ravel()]
+        return [self._vertex_frames(object, 0, corners)], len(corners)
+
+    def _batched(self, frames: List[bytes]) -> List[bytes]:
+        """The frames of an upload as a batch if it fits, so that no tick renders half a mesh."""
+        fits = sum(map(len, frames)) <= MAX_COMMAND_BATCH_BYTES
+        if self._held is not None or not fits or not self._has(m.FEATURE_BATCH):
+            return frames
+        return [self._frame(m.BatchBegin()), *frames, self._frame(m.BatchCommit())]
+
+    def set_vertices(self, object: int, first: int, positions: "npt.ArrayLike") -> None:
+        """Sets vertices from number `first` on, for meshes that deform: (n, 3), object units, object frame."""
+        rows = as_vertices(positions)
+        if self._has(m.FEATURE_BULK_MESH):
+            frames = self._run_frames(m.MeshVertices, object, first, rows)
+            self._send_frames(frames, len(frames))
+        elif len(rows):
+            self._send_frames([self._vertex_frames(object, first, rows)], len(rows))
+
+    # --- callbacks
+
+    def _on(self, kind: str, callback: Callable[[Report], object]) -> "Subscription[Report]":
+        return Subscription(self._callbacks[kind], callback)
+
+    def on(self, kind: str, callback: Callable[[Any], object]) -> "Subscription[Any]":
+        """Adds a callback for a kind of reports by its name, as in hapticd.reports.KINDS, or "connection"."""
+        if kind not in self._callbacks:
+            raise ValueError(f"no reports of kind {kind!r}; there are {', '.join(self._callbacks)}")
+        return self._on(kind, callback)
+
+    def on_pose(self, callback: Callable[[r.PoseReport], object]) -> "Subscription[r.PoseReport]":
+        """Adds a callback for each PoseReport."""
+        return self._on("pose", callback)
+
+    def on_velocity(self, callback: Callable[[r.VelocityReport], object]) -> "Subscription[r.VelocityReport]":
+        """Adds a callback for each VelocityReport."""
+        return self._on("velocity", callback)
+
+    def on_acceleration(self, callback: Callable[[r.AccelerationReport], object]) -> "Subscription[r.AccelerationReport]":
+        """Adds a callback for each AccelerationReport."""
+        return self._on("acceleration", callback)
+
+    def on_button(self, callback: Callable[[r.ButtonReport], object]) -> "Subscription[r.ButtonReport]":
+        """On change, and once for each button that is down when a server connects."""
+        return self._on("button", callback)
+
+    def on_analog(self, callback: Callable[[r.AnalogReport], object]) -> "Subscription[r.AnalogReport]":
+        """Adds a callback for each AnalogReport."""
+        return self._on("analog", callback)
+
+    def on_force(self, callback: Callable[[r.ForceReport], object]) -> "Subscription[r.ForceReport]":
+        """Adds a callback for each ForceReport."""
+        return self._on("force", callback)
+
+    def on_depth(self, callback: Callable[[r.DepthReport], object]) -> "Subscription[r.DepthReport]":
+        """Adds a callback for each DepthReport."""
+        return self._on("depth", callback)
+
+    def on_contact_point(self, callback: Callable[[r.ContactPointReport], object]) -> "Subscription[r.ContactPointReport]":
+        """Adds a callback for each ContactPointReport."""
+        return self._on("contact_point", callback)
+
+    def on_touching(self, callback: Callable[[r.TouchingReport], object]) -> "Subscription[r.TouchingReport]":
+        """Adds a callback for each TouchingReport."""
+        return self._on("touching", callback)
+
+    def on_touched_object(self, callback: Callable[[r.TouchedObjectReport], object]) -> "Subscription[r.TouchedObjectReport]":
+        """Adds a callback for each TouchedObjectReport."""
+        return self._on("touched_object", callback)
+
+    def on_angle(self, callback: Callable[[r.AngleReport], object]) -> "Subscription[r.AngleReport]":
+        """Adds a callback for each AngleReport."""
+        return self._on("angle", callback)
+
+    def on_force_error(self, callback: Callable[[r.ForceErrorReport], object]) -> "Subscription[r.ForceErrorReport]":
+        """Adds a callback for each ForceErrorReport."""
+        return self._on("force_error", callback)
+
+    def on_text(self, callback: Callable[[r.TextReport], object]) -> "Subscription[r.TextReport]":
+        """Adds a callback for each TextReport."""
+        return self._on("text", callback)
+
+    def on_to_room(self, callback: Callable[[r.ToRoomReport], object]) -> "Subscription[r.ToRoomReport]":
+        """Adds a callback for each ToRoomReport."""
+        return self._on("to_room", callback)
+
+    def on_unit_to_sensor(self, callback: Callable[[r.UnitToSensorReport], object]) -> "Subscription[r.UnitToSensorReport]":
+        """Adds a callback for each UnitToSensorReport."""
+        return self._on("unit_to_sensor", callback)
+
+    def on_workspace(self, callback: Callable[[r.WorkspaceReport], object]) -> "Subscription[r.WorkspaceReport]":
+        """Adds a callback for each WorkspaceReport."""
+        return self._on("workspace", callback)
+
+    def on_tick(self, callback: Callable[[r.TickReport], object]) -> "Subscription[r.TickReport]":
+        """Only after subscribe(Reports.TICK)."""
+        return self._on("tick", callback)
+
+    def on_contacts(self, callback: Callable[[r.ContactsReport], object]) -> "Subscription[r.ContactsReport]":
+        """Only after subscribe(Reports.CONTACTS)."""
+        return self._on("contacts", callback)
+
+    def on_guard(self, callback: Callable[[r.GuardReport], object]) -> "Subscription[r.GuardReport]":
+        """Adds a callback for each GuardReport."""
+        return self._on("guard", callback)
+
+    def on_connection(self, callback: Callable[[r.ConnectionReport], object]) -> "Subscription[r.ConnectionReport]":
+        """Connections and losses from now on; the first connection is reported by the first poll."""
+        return self._on("connection", callback)

@@ -1,0 +1,556 @@
+"""The client for asyncio.
+
+    async with hapticd.aio.connect("Phantom@localhost") as hand:
+        await hand.upload_mesh(0, *hapticd.sphere(30))
+        async for report in hand.reports("force", seconds=5):
+            print(report.force_N)
+
+Reports arrive whenever the event loop runs; callbacks run there, too. Commands are plain calls, as in
+hapticd.Client: they only collect, and the event loop sends them in its next turn. A command never sleeps, so a
+program that sends much awaits flush_all() from time to time. What must wait for the server is a coroutine.
+"""
+
+import asyncio
+import time
+from collections import deque
+from contextlib import asynccontextmanager
+from typing import Any, AsyncIterator, Callable, Deque, Generator, List, Optional, Set, Tuple
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _messages as m
+from . import reports as r
+from ._address import local_towards, parse, resolve
+from ._codec import Numbers
+from ._core import BATCH_BYTES, RETRY_S, STOP_BACKLOG_BYTES, Core, Options, UploadProgress, as_triangles, as_vertices
+from ._peer import ProtocolError
+from .client import unacknowledged
+from .errors import ConnectError, ConnectionLost
+from .scene import Capabilities, Reports
+
+
+class _Stream(asyncio.Protocol):
+    def __init__(self, client: "Client", reverse: bool) -> None:
+        self.client = client
+        self.reverse = reverse
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        self.client._adopt(transport, self.reverse)
+
+    def data_received(self, data: bytes) -> None:
+        self.client._data(data)
+
+    def pause_writing(self) -> None:
+        self.client._writable.clear()
+
+    def resume_writing(self) -> None:
+        self.client._writable.set()
+
+    def connection_lost(self, error: Optional[Exception]) -> None:
+        self.client._gone(str(error) if error is not None else "the server closed the connection")
+
+
+class _Datagrams(asyncio.DatagramProtocol):
+    def __init__(self, client: "Client") -> None:
+        self.client = client
+
+    def datagram_received(self, data: bytes, sender: Tuple[Any, ...]) -> None:
+        self.client._datagram(data, str(sender[0]))
+
+
+class _Requests(asyncio.DatagramProtocol):
+    def __init__(self, client: "Client") -> None:
+        self.client = client
+
+    def error_received(self, error: Exception) -> None:
+        self.client._last_failure = f"UDP request: {error}"
+
+
+class Client(Core):
+    """One device of one server; see hapticd.Client for everything that both faces share. It belongs to one event
+    loop. Made by connect()."""
+
+    def __init__(self, device: str, options: Options = Options()) -> None:
+        super().__init__(parse(device), options)
+        self._loop = asyncio.get_running_loop()
+        self._transport: Optional[asyncio.Transport] = None
+        self._udp: Optional[asyncio.DatagramTransport] = None
+        self._remote = ""
+        self._early = b""  # of the stream, before the datagram socket exists
+        self._lost = asyncio.Event()
+        self._writable = asyncio.Event()
+        self._writable.set()
+        self._changed: Set["asyncio.Future[None]"] = set()
+        self._timer: Optional[asyncio.TimerHandle] = None
+        self._soon: Optional[asyncio.Handle] = None
+        self._adopted: Optional["asyncio.Future[None]"] = None
+        self._task: Optional["asyncio.Task[None]"] = None
+        self._finished = False
+
+    async def _start(self) -> None:
+        self._target = await self._loop.run_in_executor(None, resolve, self._address)
+        self._task = self._loop.create_task(self._stay_connected())
+        if self.options.connect_timeout > 0:
+            try:
+                await self.wait_connected(self.options.connect_timeout)
+            except BaseException:
+                await self.close()
+                raise
+
+    async def close(self) -> None:
+        """Sends what is collected, and closes all sockets. Does nothing the second time."""
+        if self._finished:
+            return
+        self._finished = True
+        if self.connected:
+            self._push()
+        if self._task is not None:
+            self._task.cancel()
+            try:
+                await self._task
+            except asyncio.CancelledError:
+                pass
+        for handle in (self._timer, self._soon):
+            if handle is not None:
+                handle.cancel()
+        transport = self._transport
+        if transport is not None:
+            transport.close()
+            self._gone("closed")
+            await asyncio.sleep(0)  # the transport closes its socket in the next turn
+
+    async def __aenter__(self) -> "Client":
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+    # --- connecting
+
+    async def _stay_connected(self) -> None:
+        while True:
+            self._lost.clear()
+            try:
+                if self._address.tcp_only:
+                    attempt = self._loop.create_connection(lambda: _Stream(self, False), *self._target)
+                    await asyncio.wait_for(attempt, 3.0)
+                else:
+                    await self._ask_for_connection()
+                await self._lost.wait()
+            except asyncio.TimeoutError:
+                self._last_failure = "no answer to the connection attempt"
+            except ConnectionRefusedError:
+                self._last_failure = "Connection refused"
+            except OSError as error:
+                self._last_failure = str(error)
+            if self._counts.connections and not self.options.reconnect:
+                return
+            await asyncio.sleep(RETRY_S)
+
+    async def _ask_for_connection(self) -> None:
+        local = local_towards(self._target)
+        self._adopted = self._loop.create_future()
+        server = await self._loop.create_server(lambda: _Stream(self, True), local, 0)
+        request: Optional[asyncio.DatagramTransport] = None
+        try:
+            request, _ = await self._loop.create_datagram_endpoint(
+                lambda: _Requests(self), local_addr=(local, 0), remote_addr=self._target
+            )
+            text = f"{local} {server.sockets[0].getsockname()[1]}\0".encode()
+            while not self._adopted.done():
+                request.sendto(text)
+                await asyncio.wait([self._adopted], timeout=1.0)
+        finally:
+            server.close()
+            if request is not None:
+                request.close()
+        self._udp, _ = await self._loop.create_datagram_endpoint(lambda: _Datagrams(self), local_addr=(local, 0))
+        self._begin((local, self._udp.get_extra_info("sockname")[1]))
+
+    def _adopt(self, transport: asyncio.Transport, reverse: bool) -> None:
+        if self._transport is not None or self._finished:
+            transport.abort()
+            return
+        self._transport = transport
+        self._remote = str(transport.get_extra_info("peername")[0])
+        if not reverse:
+            self._begin(None)
+        else:
+            self._early = b""
+            if self._adopted is not None and not self._adopted.done():
+                self._adopted.set_result(None)
+
+    def _begin(self, udp: Optional[Tuple[str, int]]) -> None:
+        if self._transport is None:  # lost meanwhile
+            if self._udp is not None:
+                self._udp.close()
+                self._udp = None
+            return
+        self._opened(udp)
+        self._push()
+        early, self._early = self._early, b""
+        if early:
+            self._data(early)
+        self._turn()
+
+    def _gone(self, reason: str) -> None:
+        if self._transport is None:
+            return
+        self._transport = None
+        if self._udp is not None:
+            self._udp.close()
+            self._udp = None
+        self._closed(reason)
+        self._writable.set()
+        self._lost.set()
+        self._deliver_all()
+
+    def _abort(self, reason: str) -> None:
+        transport = self._transport
+        self._gone(reason)
+        if transport is not None:
+            transport.abort()
+
+    # --- moving bytes
+
+    def _data(self, data: bytes) -> None:
+        if self._peer is None:
+            self._early += data
+            return
+        try:
+            self._received(data)
+        except ProtocolError as error:
+            return self._abort(f"it broke the VRPN protocol: {error}")
+        self._push()
+        self._deliver_all()
+
+    def _datagram(self, data: bytes, sender: str) -> None:
+        if sender == self._remote or (self._udp_target is not None and sender == self._udp_target[0]):
+            self._received_datagram(data)
+            self._deliver_all()
+
+    def _deliver_all(self) -> None:
+        """Runs callbacks; their exceptions go to the event loop's handler."""
+        while True:
+            try:
+                self._dispatch()
+                break
+            except Exception as error:
+                self._loop.call_exception_handler({"message": "a callback of a haptic client raised", "exception": error})
+        for future in self._changed:
+            if not future.done():
+                future.set_result(None)
+        self._changed.clear()
+
+    def _push(self) -> None:
+        peer, transport = self._peer, self._transport
+        if peer is None or transport is None or transport.is_closing():
+            return
+        if peer.stream:
+            data = peer.take_stream()
+            self._counts.tcp_bytes_out += len(data)
+            transport.write(data)
+        if self._udp is not None and self._udp_target is not None:
+            for datagram in peer.take_datagrams():
+                self._counts.udp_bytes_out += len(datagram)
+                self._udp.sendto(datagram, self._udp_target)
+
+    def _collected(self, size: int) -> None:
+        if self._soon is None:
+            self._soon = self._loop.call_soon(self._push_soon)
+
+    def _push_soon(self) -> None:
+        self._soon = None
+        self._push()
+
+    def _turn(self) -> None:
+        """Heartbeats, pings and the end of the handshake, when they are due."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if self._handshake_expired():
+            return self._abort("it accepts connections, but does not answer as a VRPN server")
+        if self._transport is None:
+            return
+        at = self._run_timers()
+        self._push()
+        self._timer = self._loop.call_later(max(0.0, at - time.monotonic()), self._turn)
+
+    def peer_connected(self) -> None:
+        super().peer_connected()
+        self._loop.call_soon(self._turn)
+
+    async def _wait(self, condition: Callable[[], bool], timeout: float) -> bool:
+        deadline = self._loop.time() + timeout
+        while not condition():
+            left = deadline - self._loop.time()
+            if left <= 0:
+                return False
+            future = self._loop.create_future()
+            self._changed.add(future)
+            await asyncio.wait([future], timeout=left)
+            self._changed.discard(future)
+        return True
+
+    # --- waiting, receiving
+
+    async def wait_connected(self, timeout: float) -> None:
+        """Waits for a connection and for an answer of the device, so many seconds. Raises ConnectError."""
+        start = self._loop.time()
+        if not await self._wait(lambda: self.connected, timeout):
+            raise ConnectError(f"{self.device}: {self._why_not_connected()}")
+        left = timeout - (self._loop.time() - start)
+        if not await self._wait(lambda: self._heard or not self.connected, max(left, 1.0)) or not self.connected:
+            raise ConnectError(self._no_device() if self.connected else self._why_not_connected())
+
+    async def wait_capabilities(self) -> Optional[Capabilities]:
+        """What the server and its device support, after waiting for the answer. Raises ConnectError without a
+        connection."""
+        await self._wait_answer()
+        return self.capabilities
+
+    async def _wait_answer(self) -> None:
+        if not self.connected:
+            await self.wait_connected(self.options.connect_timeout)
+        await self._wait(lambda: self._answered or not self.connected, max(self.options.connect_timeout, 1.0))
+
+    async def _require(self, feature: int, what: str) -> None:
+        await self._wait_answer()
+        self._require_now(feature, what)
+
+    async def poll(self, timeout: float) -> int:
+        """Waits up to `timeout` seconds for the next reports, and returns how many arrived. Raises ServerError
+        (Options.throw_on_error)."""
+        before = self._counts.messages_in
+        await self._wait(lambda: self._counts.messages_in != before, timeout)
+        self._raise_first_error()
+        return self._counts.messages_in - before
+
+    async def reports(self, kind: str, seconds: float = float("inf")) -> AsyncIterator[Any]:
+        """Iterates over the reports of one kind, as they arrive, for so many seconds."""
+        async for batch in self._batches(kind, seconds):
+            for report in batch:
+                yield report
+
+    async def rows(self, kind: str, seconds: float = float("inf")) -> "AsyncIterator[npt.NDArray[Any]]":
+        """Iterates over structured arrays with the reports of one kind, as they arrive, for so many seconds."""
+        r.dtype_of(kind)
+        async for batch in self._batches(kind, seconds):
+            yield r.rows_of(kind, batch)
+
+    async def collect(self, kind: str, seconds: float) -> "npt.NDArray[Any]":
+        """All reports of one kind of the next so many seconds, as one structured array."""
+        parts = [rows async for rows in self.rows(kind, seconds)]
+        return np.concatenate([np.empty(0, dtype=r.dtype_of(kind)), *parts])
+
+    async def _batches(self, kind: str, seconds: float) -> "AsyncIterator[List[Any]]":
+        waiting: Deque[Any] = deque()
+        with self.on(kind, waiting.append):
+            deadline = self._loop.time() + seconds
+            while True:
+                await self._wait(lambda: bool(waiting), min(deadline - self._loop.time(), 3600.0))
+                if waiting:
+                    batch = list(waiting)
+                    waiting.clear()
+                    yield batch
+                self._raise_first_error()
+                if self._loop.time() >= deadline:
+                    return
+
+    # --- sending
+
+    def flush(self) -> None:
+        """Gives what is collected to the event loop now."""
+        self._push()
+
+    async def flush_all(self) -> None:
+        """Sends what is collected and waits until the system has accepted nearly all of it (64 KiB may wait). Raises
+        ConnectionLost."""
+        self._push()
+        transport, connection = self._transport, self._counts.connections
+        if transport is not None:
+            left = transport.get_write_buffer_size()
+            progress = self._loop.time()
+            while not self._writable.is_set():
+                try:
+                    await asyncio.wait_for(self._writable.wait(), 0.1)
+                except asyncio.TimeoutError:
+                    waiting = transport.get_write_buffer_size()
+                    if waiting < left:
+                        left, progress = waiting, self._loop.time()
+                    elif self._loop.time() - progress > self.options.send_timeout:
+                        self._abort(
+                            f"{self.server} accepted no data for {self.options.send_timeout:g} s; {waiting} bytes wait to "
+                            "be sent"
+                        )
+        if not self.connected or self._counts.connections != connection:
+            raise ConnectionLost(f"connection to {self.server} lost while sending: {self._last_failure}")
+
+    async def upload_mesh(
+        self,
+        object: int,
+        vertices: "npt.ArrayLike",
+        triangles: "npt.ArrayLike",
+        progress: Optional[Callable[[UploadProgress], object]] = None,
+    ) -> None:
+        """Sends a mesh; see hapticd.Client.upload_mesh()."""
+        rows = as_vertices(vertices)
+        await self._upload(object, rows, as_triangles(triangles, len(rows)), progress)
+
+    async def upload_corners(
+        self, object: int, corners: "npt.ArrayLike", progress: Optional[Callable[[UploadProgress], object]] = None
+    ) -> None:
+        """The same for a list of corners, (n, 3): three consecutive ones are a triangle. Object units."""
+        await self._upload(object, as_vertices(corners), None, progress)
+
+    async def _upload(
+        self,
+        object: int,
+        vertices: "npt.NDArray[Any]",
+        triangles: "Optional[npt.NDArray[Any]]",
+        progress: Optional[Callable[[UploadProgress], object]],
+    ) -> None:
+        await self._wait_answer()
+        frames, messages = self._mesh_frames(object, vertices, triangles)
+        if self._held is not None:
+            self._send_frames(frames, messages)
+            return
+        frames = self._batched(frames)
+        total = sum(map(len, frames))
+        self._counts.messages_out += messages
+        sent = 0
+        step: List[bytes] = []
+        for one in frames:
+            step.append(one)
+            sent += len(one)
+            if sum(map(len, step)) >= 16 * BATCH_BYTES or sent == total:
+                if self._peer is None:
+                    raise ConnectionLost(f"connection to {self.server} lost during an upload: {self._last_failure}")
+                self._peer.stream.extend(step)
+                step = []
+                await self.flush_all()
+                if progress is not None:
+                    progress(UploadProgress(sent, total))
+
+    @asynccontextmanager
+    async def batch(self) -> AsyncIterator[None]:
+        """async with hand.batch(): everything that the block commands takes effect in one tick. Other tasks must not
+        command meanwhile: what they send becomes part of the batch. See hapticd.Client.batch()."""
+        if self._held is None:
+            await self._require(m.FEATURE_BATCH, "make several changes visible at once")
+        self._begin_batch()
+        connection = self._counts.connections
+        try:
+            yield
+        except BaseException:
+            self._end_batch(connection, send=False)
+            raise
+        self._end_batch(connection, send=True)
+
+    # --- extensions; see hapticd.Client
+
+    async def subscribe(self, kinds: Reports, rate_Hz: float = 0) -> None:
+        """Chooses the kinds of reports that this client receives, and the highest rate; 0 keeps the rate."""
+        self._check_rate(rate_Hz)
+        if self.connected:
+            await self._require(m.FEATURE_SUBSCRIBE, "choose reports")
+        self._set_subscription(kinds, rate_Hz)
+        self._push()
+
+    async def stop_forces(self) -> None:
+        """Brings the force of the device to zero within one tick of its arrival, until rearm_forces(); on a second
+        connection, too, while more than 64 KiB of this one may be ahead of it."""
+        backlog = self._peer.stream_bytes if self._peer is not None else 0
+        if self._transport is not None:
+            backlog += self._transport.get_write_buffer_size()
+            sock = self._transport.get_extra_info("socket")
+            if sock is not None and not self._transport.is_closing():
+                backlog += unacknowledged(sock)
+        if not self._put_now(m.StopForces()):
+            raise ConnectionLost(f"forces not stopped: {self._why_not_connected()}")
+        self._push()
+        if backlog > STOP_BACKLOG_BYTES and (not self._answered or self._has(m.FEATURE_STOP)):
+            await self._stop_beside(backlog)
+        await self._require(m.FEATURE_STOP, "stop the forces")
+
+    async def _stop_beside(self, backlog: int) -> None:
+        timeout = max(self.options.connect_timeout, 1.0)
+        options = Options(connect_timeout=0, reconnect=False)
+        deadline = self._loop.time() + timeout
+        async with connect(f"{self.device}@tcp://{self._target[0]}:{self._target[1]}", options) as beside:
+            sent = await beside._wait(lambda: beside.connected, timeout)
+            if sent:
+                beside._put_now(m.StopForces())
+                beside._ping()
+                beside._push()
+                sent = await beside._wait(lambda: beside._all_pongs, max(0.0, deadline - self._loop.time()))
+            if not sent:
+                raise ConnectError(
+                    f"stop not confirmed: it waits behind {backlog} bytes, and a second connection to {self.server} got "
+                    f"no answer: {beside._why_not_connected()}"
+                )
+
+    async def rearm_forces(self) -> None:
+        """Ends a stop and clears latched trips; the force ramps in over half a second."""
+        await self._require(m.FEATURE_STOP, "re-arm the forces")
+        self._put_now(m.RearmForces())
+        self._push()
+
+    async def enable_heartbeat(self, enable: bool = True) -> None:
+        """From now on the server disconnects this client and ends its effects when it receives no heartbeat for
+        500 ms: a program that blocks the event loop that long is disconnected."""
+        if self.connected:
+            await self._require(m.FEATURE_HEARTBEAT, "watch the heartbeat")
+        self._set_heartbeats(enable)
+        self._push()
+        self._turn()
+
+    async def hold_hand(
+        self, position: Numbers, orientation: Numbers = (0.0, 0.0, 0.0, 1.0), buttons: int = 0
+    ) -> None:
+        """Takes hold of the simulated hand and moves it to the pose; world units, orientation x y z w."""
+        if self.connected:
+            await self._require(m.FEATURE_HOLD_HAND, "hold the hand")
+        self._put_now(m.HoldHand(1, position, orientation, buttons))
+        self._push()
+
+    async def release_hand(self) -> None:
+        """Releases the simulated hand. Disconnecting releases it, too."""
+        if self.connected:
+            await self._require(m.FEATURE_HOLD_HAND, "release the hand")
+        self._put_now(m.HoldHand())
+        self._push()
+
+
+class _Connecting:
+    """What connect() gives: to be awaited, or entered by `async with`."""
+
+    def __init__(self, device: str, options: Options) -> None:
+        self._device = device
+        self._options = options
+        self._client: Optional[Client] = None
+
+    async def _open(self) -> Client:
+        client = Client(self._device, self._options)
+        await client._start()
+        return client
+
+    def __await__(self) -> Generator[Any, None, Client]:
+        return self._open().__await__()
+
+    async def __aenter__(self) -> Client:
+        self._client = await self._open()
+        return self._client
+
+    async def __aexit__(self, *_: object) -> None:
+        assert self._client is not None
+        await self._client.close()
+
+
+def connect(device: str, options: Optional[Options] = None, **fields: Any) -> _Connecting:
+    """`hand = await connect(...)` or `async with connect(...) as hand`; arguments as in hapticd.connect()."""
+    if options is not None and fields:
+        raise ValueError("give either options or single fields of it")
+    return _Connecting(device, options or Options(**fields))

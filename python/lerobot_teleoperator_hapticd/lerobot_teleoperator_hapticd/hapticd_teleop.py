@@ -1,0 +1,180 @@
+"""The teleoperator: actions from pose, gripper and buttons; feedback by a force or a contact."""
+
+import math
+import time
+from typing import Any, Dict, Optional
+
+import numpy as np
+from lerobot.teleoperators.teleoperator import Teleoperator
+
+import hapticd
+
+from .config_hapticd_teleop import HapticdTeleopConfig
+
+_POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
+_FORCE = ("force_x", "force_y", "force_z")
+_CONTACT = (
+    "contact_x", "contact_y", "contact_z", "contact_nx", "contact_ny", "contact_nz", "contact_stiffness"
+)  # fmt: skip
+_EFFECT = 63  # the last of the server's 64 effects: a program beside this one starts from 0
+_PLANE = 7  # likewise
+_GRIPPER_CHANNEL = 6
+_SENSORS = {"proxy": 0, "hand": 1}
+
+
+class HapticdTeleop(Teleoperator):
+    """One haptic device of one server.
+
+    Action, all of them floats: x, y, z (m, server's frame: +x right, +y up, +z towards the user), qx, qy, qz, qw
+    (from stylus to world), gripper (0 closed, 1 open), button_0 and so on (0 or 1).
+
+    Feedback, any of: force_x, force_y, force_z (N, on the hand), held until the next call; contact_x, contact_y,
+    contact_z (m, a point of a surface in the frame of the action), contact_nx, contact_ny, contact_nz (its normal,
+    out of the surface), contact_stiffness (N/m at the device, 0: none), which the server renders at 1 kHz. A contact
+    is stiff and stable where a held force is not: prefer it. Feedback ends `feedback_hold_s` after the last call of
+    send_feedback(), with the next call of get_action(); when the program hangs, the server ends it after 500 ms.
+    """
+
+    config_class = HapticdTeleopConfig
+    name = "hapticd"
+
+    def __init__(self, config: HapticdTeleopConfig) -> None:
+        if config.point not in _SENSORS:
+            raise ValueError(f'point {config.point!r}: expected "hand" or "proxy"')
+        if config.scale == 0 or not math.isfinite(config.scale):
+            raise ValueError(f"scale {config.scale}: expected a number other than 0")
+        self._hand: Optional[hapticd.Client] = None
+        super().__init__(config)
+        self.config = config
+        self._offset = np.array([config.offset_x, config.offset_y, config.offset_z])
+        self._feedback_at = 0.0
+        self._force = False
+        self._contact = False
+
+    @property
+    def action_features(self) -> Dict[str, type]:
+        names = (*_POSE, "gripper", *(f"button_{i}" for i in range(self.config.buttons)))
+        return {name: float for name in names}
+
+    @property
+    def feedback_features(self) -> Dict[str, type]:
+        return {name: float for name in (*_FORCE, *_CONTACT)}
+
+    @property
+    def is_connected(self) -> bool:
+        return self._hand is not None and self._hand.connected
+
+    def connect(self, calibrate: bool = True) -> None:
+        """Raises ConnectionError with the server's address and the remedy."""
+        if self.is_connected:
+            raise ConnectionError(f"{self} is connected already")
+        self.disconnect()
+        self._hand = hapticd.connect(self.config.device, connect_timeout=self.config.connect_timeout)
+        try:
+            self.configure()
+            deadline = time.monotonic() + max(self.config.connect_timeout, 1.0)
+            while _SENSORS[self.config.point] not in self._hand.latest.pose:
+                if time.monotonic() > deadline:
+                    raise ConnectionError(f"{self.config.device} reports no pose")
+                self._hand.poll(0.1)
+        except BaseException:
+            self.disconnect()
+            raise
+
+    @property
+    def is_calibrated(self) -> bool:
+        return True
+
+    def calibrate(self) -> None:
+        """Nothing to do: the server calibrates its device (`hapticd serve --calibrate`)."""
+
+    def configure(self) -> None:
+        hand = self._connected()
+        if hand.wait_capabilities() is not None:
+            kinds = hapticd.Reports.TRACKER | hapticd.Reports.BUTTON | hapticd.Reports.ANALOG
+            hand.subscribe(kinds, self.config.rate_Hz)
+            hand.enable_heartbeat()
+
+    def _connected(self) -> hapticd.Client:
+        if self._hand is None:
+            raise ConnectionError(f"{self} is not connected: call connect() first")
+        return self._hand
+
+    def get_action(self) -> Dict[str, float]:
+        hand = self._connected()
+        while hand.poll(0):
+            pass
+        if (self._force or self._contact) and time.monotonic() - self._feedback_at > self.config.feedback_hold_s:
+            self._end_feedback(hand)
+        latest = hand.latest
+        pose = latest.pose.get(_SENSORS[self.config.point])
+        if not hand.connected or pose is None:
+            raise ConnectionError(f"{self}: connection to {self.config.device} lost")
+        position = self.config.scale * pose.position_m + self._offset
+        values = [*position, *pose.orientation, self._gripper(latest)]
+        values += [float(latest.pressed.get(i, False)) for i in range(self.config.buttons)]
+        return dict(zip(self.action_features, map(float, values)))
+
+    def _gripper(self, latest: hapticd.LatestReports) -> float:
+        channels = latest.analog.channels
+        if len(channels) > _GRIPPER_CHANNEL:
+            return float(np.clip(channels[_GRIPPER_CHANNEL] / self.config.gripper_open_rad, 0.0, 1.0))
+        return 0.0 if latest.pressed.get(self.config.gripper_button, False) else 1.0
+
+    def send_feedback(self, feedback: Dict[str, Any]) -> None:
+        hand = self._connected()
+        unknown = set(feedback) - set(self.feedback_features)
+        if unknown:
+            raise ValueError(f"feedback {sorted(unknown)}: expected {', '.join(self.feedback_features)}")
+        if not all(math.isfinite(float(value)) for value in feedback.values()):
+            raise ValueError(f"feedback with a value that is not finite: {feedback}")
+        self._feedback_at = time.monotonic()
+        if any(name in feedback for name in _FORCE):
+            self._send_force(hand, np.array([float(feedback.get(name, 0.0)) for name in _FORCE]))
+        if "contact_stiffness" in feedback:
+            self._send_contact(hand, [float(feedback.get(name, 0.0)) for name in _CONTACT])
+        hand.flush()
+
+    def _send_force(self, hand: hapticd.Client, force_N: "np.ndarray[Any, Any]") -> None:
+        size = float(np.linalg.norm(force_N))
+        if size == 0:
+            if self._force:
+                hand.stop_effect(_EFFECT)
+            self._force = False
+            return
+        hand.set_effect(_EFFECT, hapticd.Effect.constant(force_N / size, min(size, self.config.max_force_N)))
+        if not self._force:
+            hand.start_effect(_EFFECT)
+        self._force = True
+
+    def _send_contact(self, hand: hapticd.Client, contact: "list[float]") -> None:
+        point = (np.array(contact[:3]) - self._offset) / self.config.scale  # in the frame of the device
+        normal = np.array(contact[3:6]) * math.copysign(1.0, self.config.scale)
+        length = float(np.linalg.norm(normal))
+        stiffness = contact[6]
+        if stiffness <= 0:
+            if self._contact:
+                hand.stop_plane(_PLANE)
+            self._contact = False
+            return
+        if length == 0:
+            raise ValueError("a contact with the normal 0, 0, 0: give contact_nx, contact_ny, contact_nz")
+        normal /= length
+        hand.set_plane(
+            hapticd.Plane((*normal, -float(normal @ point)), min(stiffness / 1000.0, 1.0), index=_PLANE, recovery_ms=20)
+        )
+        self._contact = True
+
+    def _end_feedback(self, hand: hapticd.Client) -> None:
+        if self._force:
+            hand.stop_effect(_EFFECT)
+        if self._contact:
+            hand.stop_plane(_PLANE)
+        self._force = self._contact = False
+        hand.flush()
+
+    def disconnect(self) -> None:
+        hand, self._hand = self._hand, None
+        self._force = self._contact = False
+        if hand is not None:
+            hand.close()

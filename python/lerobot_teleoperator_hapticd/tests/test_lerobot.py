@@ -1,0 +1,209 @@
+"""The teleoperator against a real server, below a test double of LeRobot's base class.
+
+LeRobot is no Debian package, so the abstract class and the registry stand here as its documentation describes them.
+"""
+
+import abc
+import importlib
+import importlib.metadata
+import pathlib
+import sys
+import time
+import types
+from dataclasses import dataclass
+from typing import Any, Dict, Iterator
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tests"))
+
+import hapticd  # noqa: E402
+from conftest import Server  # noqa: E402
+
+
+def lerobot_double() -> Dict[str, types.ModuleType]:
+    @dataclass(kw_only=True)
+    class TeleoperatorConfig(abc.ABC):
+        id: "str | None" = None
+        calibration_dir: "pathlib.Path | None" = None
+        registry = {}  # type: ignore[var-annotated]
+
+        @classmethod
+        def register_subclass(cls, name: str) -> Any:
+            def register(config: type) -> type:
+                cls.registry[name] = config
+                return config
+
+            return register
+
+    class Teleoperator(abc.ABC):
+        def __init__(self, config: Any) -> None:
+            self.id = config.id
+
+        def __str__(self) -> str:
+            return f"{self.id} {type(self).__name__}"
+
+        def __enter__(self) -> Any:
+            self.connect()
+            return self
+
+        def __exit__(self, *_: object) -> None:
+            self.disconnect()
+
+        action_features = property(abc.abstractmethod(lambda self: None))
+        feedback_features = property(abc.abstractmethod(lambda self: None))
+        is_connected = property(abc.abstractmethod(lambda self: None))
+        is_calibrated = property(abc.abstractmethod(lambda self: None))
+
+        @abc.abstractmethod
+        def connect(self, calibrate: bool = True) -> None: ...
+        @abc.abstractmethod
+        def calibrate(self) -> None: ...
+        @abc.abstractmethod
+        def configure(self) -> None: ...
+        @abc.abstractmethod
+        def get_action(self) -> Dict[str, Any]: ...
+        @abc.abstractmethod
+        def send_feedback(self, feedback: Dict[str, Any]) -> None: ...
+        @abc.abstractmethod
+        def disconnect(self) -> None: ...
+
+    modules = {name: types.ModuleType(name) for name in ("lerobot", "lerobot.teleoperators", "lerobot.teleoperators.config",
+                                                         "lerobot.teleoperators.teleoperator")}  # fmt: skip
+    modules["lerobot.teleoperators.config"].TeleoperatorConfig = TeleoperatorConfig  # type: ignore[attr-defined]
+    modules["lerobot.teleoperators.teleoperator"].Teleoperator = Teleoperator  # type: ignore[attr-defined]
+    return modules
+
+
+sys.modules.update(lerobot_double())
+plugin = importlib.import_module("lerobot_teleoperator_hapticd")
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Server]:
+    server = Server()
+    yield server
+    server.stop()
+
+
+def make(server: Server, **fields: Any) -> Any:
+    """As LeRobot makes it: the class is named as its configuration without "Config", in the same package."""
+    config = sys.modules["lerobot.teleoperators.config"].TeleoperatorConfig.registry["hapticd"](device=server.tcp, **fields)
+    module = importlib.import_module(type(config).__module__.rpartition(".")[0])
+    return getattr(module, type(config).__name__.removesuffix("Config"))(config)
+
+
+def until(condition: Any) -> None:
+    deadline = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+def test_the_installed_package_has_the_prefix_that_lerobot_looks_for() -> None:
+    names = [d.metadata["Name"] for d in importlib.metadata.distributions()]
+    if pathlib.Path(plugin.__file__).parts[-3] == "site-packages":
+        assert "lerobot_teleoperator_hapticd" in [name.replace("-", "_") for name in names]
+
+
+def test_actions_follow_the_hand(server: Server) -> None:
+    with make(server, id="right") as teleop, hapticd.connect(server.tcp) as person:
+        person.hold_hand((20, 10, 5), (0, 0, 1, 0), buttons=2)
+        goal = np.array([0.02, 0.01, 0.005])
+        until(lambda: np.linalg.norm([teleop.get_action()[k] for k in "xyz"] - goal) < 1e-3)
+        until(lambda: teleop.get_action()["button_1"] == 1.0)
+        action = teleop.get_action()
+        assert list(action) == list(teleop.action_features)
+        assert all(type(value) is teleop.action_features[name] for name, value in action.items())
+        assert action["gripper"] == 1.0
+        until(lambda: abs(teleop.get_action()["qz"]) > 0.99)
+        person.hold_hand((20, 10, 5), buttons=1)
+        until(lambda: teleop.get_action()["gripper"] == 0.0)
+    assert not teleop.is_connected
+
+
+def test_scale_and_offset_place_the_action(server: Server) -> None:
+    with make(server, scale=2.0, offset_x=0.3) as teleop, hapticd.connect(server.tcp) as person:
+        person.hold_hand((20, 10, 5))
+        goal = np.array([0.34, 0.02, 0.01])
+        until(lambda: np.linalg.norm([teleop.get_action()[k] for k in "xyz"] - goal) < 2e-3)
+
+
+def test_a_contact_is_felt_and_ends_without_renewal(server: Server) -> None:
+    with make(server) as teleop, hapticd.connect(server.tcp) as person:
+        person.hold_hand((0, 0, 0))
+        until(lambda: person.poll(0.05) is not None and abs(teleop.get_action()["y"]) < 1e-3)
+        contact = dict(contact_x=0.0, contact_y=0.004, contact_z=0.0, contact_nx=0.0, contact_ny=2.0, contact_nz=0.0,
+                       contact_stiffness=400.0)  # fmt: skip
+        felt = []
+        person.on_force(lambda report: felt.append(report.force_N))
+
+        def feel() -> bool:
+            teleop.send_feedback(contact)
+            teleop.get_action()
+            person.poll(0.01)
+            return bool(felt and felt[-1][1] > 0.3)
+
+        until(feel)
+        assert abs(felt[-1][0]) < 0.05
+
+        def ended() -> bool:
+            teleop.get_action()
+            person.poll(0.01)
+            return bool(felt[-1][1] == 0)
+
+        until(ended)
+
+
+def test_a_force_is_limited_and_ends(server: Server) -> None:
+    with make(server, max_force_N=1.0) as teleop, hapticd.connect(server.tcp) as person:
+        person.hold_hand((0, 0, 0))
+        felt = []
+        person.on_force(lambda report: felt.append(report.force_N))
+
+        def feel() -> bool:
+            teleop.send_feedback({"force_x": 50.0, "force_y": 0.0, "force_z": 0.0})
+            person.poll(0.01)
+            return bool(felt and felt[-1][0] > 0.99)
+
+        until(feel)
+        assert max(force[0] for force in felt) < 1.01
+        teleop.send_feedback({"force_x": 0.0})
+        until(lambda: person.poll(0.01) is not None and felt[-1][0] == 0)
+
+
+def test_what_is_wrong_is_named(server: Server) -> None:
+    teleop = make(server, id="left")
+    with pytest.raises(ConnectionError, match="left HapticdTeleop is not connected: call connect"):
+        teleop.get_action()
+    with pytest.raises(ValueError, match="point 'stylus'"):
+        make(server, point="stylus")
+    with make(server) as teleop:
+        with pytest.raises(ConnectionError, match="is connected already"):
+            teleop.connect()
+        with pytest.raises(ValueError, match=r"feedback \['force'\]: expected force_x"):
+            teleop.send_feedback({"force": 1.0})
+        with pytest.raises(ValueError, match="not finite"):
+            teleop.send_feedback({"force_x": float("nan")})
+        assert teleop.is_calibrated and set(teleop.feedback_features) >= {"force_x", "contact_stiffness"}
+        teleop.calibrate()
+    wrong = make(server, connect_timeout=0.2)
+    wrong.config.device = "Phantom@tcp://127.0.0.1:1"
+    with pytest.raises(ConnectionError, match="nothing listens on 127.0.0.1:1"):
+        wrong.connect()
+    assert not wrong.is_connected
+
+
+def test_a_demonstration_of_a_hundred_frames(server: Server) -> None:
+    """The loop of LeRobot's recorder: an action and a feedback for each frame."""
+    with make(server) as teleop, hapticd.connect(server.tcp) as person:
+        frames = []
+        for i in range(100):
+            person.hold_hand((10 * np.sin(i / 10), 0, 10 * np.cos(i / 10)))
+            action = teleop.get_action()
+            teleop.send_feedback({"force_x": 0.0, "force_y": 0.1, "force_z": 0.0})
+            frames.append(action)
+            time.sleep(0.01)
+        path = np.array([[frame[k] for k in "xyz"] for frame in frames])
+        assert np.all(np.isfinite(path)) and np.ptp(path[:, 0]) > 0.004

@@ -1,0 +1,154 @@
+"""The asyncio client against a real server with the simulated hand."""
+
+import asyncio
+import socket
+import threading
+import time
+from typing import Any, Callable, Coroutine, List
+
+import numpy as np
+import pytest
+
+import hapticd
+from conftest import ROOT, ScriptedServer, Server
+from hapticd import Reports, Surface
+
+
+def run(main: Coroutine[Any, Any, None]) -> None:
+    asyncio.run(asyncio.wait_for(main, 120), debug=False)
+
+
+async def until(hand: hapticd.aio.Client, condition: Callable[[], Any]) -> None:
+    assert await wait(hand, condition, 60), f"never became true; latest tick {hand.latest.tick}"
+
+
+async def wait(hand: hapticd.aio.Client, condition: Callable[[], Any], seconds: float = 5) -> bool:
+    deadline = time.monotonic() + seconds
+    while not condition() and time.monotonic() < deadline:
+        await hand.poll(0.05)
+    return bool(condition())
+
+
+@pytest.mark.parametrize("way", ["tcp", "udp"])
+def test_a_sphere_is_felt(server: Server, way: str) -> None:
+    async def main() -> None:
+        async with hapticd.aio.connect(getattr(server, way)) as hand:
+            await hand.subscribe(Reports.ALL)
+            for _ in range(20):  # as conftest.feel_a_sphere()
+                await hand.hold_hand((0, 0, 33))
+                await wait(hand, lambda: 1 in hand.latest.pose and hand.latest.pose[1].position_m[2] > 0.03)
+                async with hand.batch():
+                    await hand.upload_mesh(0, *hapticd.sphere(25))
+                    hand.set_surface(0, Surface(0.8))
+                await hand.hold_hand((0, 0, 22))
+                if await wait(hand, lambda: hand.latest.force.force_N[2] > 0.2):
+                    break
+            rows = await hand.collect("tick", 0.5)
+            assert len(rows) > 2 and rows["force_N"].shape == (len(rows), 3)
+            async for report in hand.reports("tick", 60):
+                assert report.tick > rows["tick"][-1]
+                break
+            await hand.stop_forces()
+            await until(hand, lambda: hand.latest.guard.stopped)
+            await hand.rearm_forces()
+            await hand.release_hand()
+            assert (hand.statistics().udp_bytes_in > 0) == (way == "udp")
+
+    run(main())
+
+
+def test_many_clients_share_one_loop(server: Server) -> None:
+    async def main() -> None:
+        hands = await asyncio.gather(*(hapticd.aio.connect(server.tcp) for _ in range(4)))
+        await asyncio.gather(*(until(hand, lambda hand=hand: hand.latest.pose) for hand in hands))  # type: ignore[misc]
+        await asyncio.gather(*(hand.close() for hand in hands))
+
+    run(main())
+
+
+def test_an_exception_of_a_callback_goes_to_the_loop(server: Server) -> None:
+    async def main() -> None:
+        errors: List[Any] = []
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: errors.append(context["exception"]))
+        async with hapticd.aio.connect(server.tcp) as hand:
+            hand.on_pose(lambda _: 1 / 0)
+            await until(hand, lambda: len(errors) > 2)
+            assert isinstance(errors[0], ZeroDivisionError) and hand.latest.pose
+
+    run(main())
+
+
+def test_a_stop_passes_a_large_upload(server: Server) -> None:
+    async def main() -> None:
+        vertices, triangles = hapticd.sphere(25, rings=300)
+        async with hapticd.aio.connect(server.tcp) as hand:
+            upload = asyncio.ensure_future(hand.upload_mesh(0, vertices, triangles))
+            await asyncio.sleep(0)
+            await hand.stop_forces()
+            await until(hand, lambda: hand.latest.guard.stopped)
+            await upload
+            await hand.rearm_forces()
+            await until(hand, lambda: not hand.latest.guard.stopped)
+
+    run(main())
+
+
+def test_a_lost_connection_comes_back(server: Server) -> None:
+    async def main() -> None:
+        async with hapticd.aio.connect(server.tcp) as hand:
+            events: List[bool] = []
+            hand.on_connection(lambda c: events.append(c.connected))
+            await hand.enable_heartbeat()
+            assert hand._transport is not None
+            hand._transport.abort()
+            await until(hand, lambda: events[-2:] == [False, True])
+            await until(hand, lambda: hand.latest.pose)
+
+    run(main())
+
+
+def test_errors() -> None:
+    async def main() -> None:
+        with pytest.raises(hapticd.ConnectError, match="nothing listens on 127.0.0.1:1 "):
+            await hapticd.aio.connect("Phantom@tcp://127.0.0.1:1", connect_timeout=0.3)
+        with pytest.raises(hapticd.ConnectError, match="nothing listens on 127.0.0.1:1 "):
+            await hapticd.aio.connect("Phantom@127.0.0.1:1", connect_timeout=0.3)
+        scripted = ScriptedServer(extensions=False)
+        async with hapticd.aio.connect(scripted.name) as hand:
+            with pytest.raises(hapticd.Unsupported, match="without the extensions"):
+                await hand.stop_forces()
+            await hand.upload_mesh(0, np.eye(3), [[0, 1, 2]])
+        scripted.close()
+        wrong = ScriptedServer(device="Tracker0")
+        with pytest.raises(hapticd.ConnectError, match="no device 'Phantom' answers at .*; it has Tracker0"):
+            await hapticd.aio.connect(wrong.name.replace("Tracker0", "Phantom"), connect_timeout=0.3)
+        wrong.close()
+
+    run(main())
+
+
+def test_a_server_that_speaks_at_once_loses_nothing() -> None:
+    """By UDP request: the first bytes of a stock server arrive before the client's datagram socket exists."""
+    recorded = (ROOT / "testdata/wire/udp.s2c.tcp.bin").read_bytes()
+    request = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    request.bind(("127.0.0.1", 0))
+    request.settimeout(60)
+    port = request.getsockname()[1]
+
+    def serve() -> None:
+        host, _, listening = request.recv(1000).rstrip(b"\0").decode().partition(" ")
+        with socket.create_connection((host, int(listening))) as connection:
+            connection.sendall(recorded)
+            while connection.recv(1 << 16):
+                pass
+
+    async def main() -> None:
+        async with hapticd.aio.connect(f"Phantom@127.0.0.1:{port}") as hand:
+            await until(hand, lambda: hand.statistics().tcp_bytes_in == len(recorded))
+            assert hand.connected
+
+    thread = threading.Thread(target=serve, daemon=True)
+    thread.start()
+    run(main())
+    thread.join(60)
+    request.close()

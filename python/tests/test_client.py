@@ -1,0 +1,286 @@
+"""The synchronous client against a real server with the simulated hand, and against scripted VRPN servers."""
+
+import pathlib
+import signal
+import socket
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+from typing import Any, List
+
+import numpy as np
+import pytest
+
+import hapticd
+from conftest import Listener, ScriptedServer, Server, feel_a_sphere
+from hapticd import Effect, Plane, Reports
+from hapticd._peer import TYPE_NAMES, Peer
+
+WIRE = pathlib.Path(__file__).resolve().parents[2] / "testdata/wire"
+
+
+def until(hand: hapticd.Client, condition: Any, seconds: float = 60) -> None:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, f"never became true; latest tick {hand.latest.tick}"
+        hand.poll(0.1)
+
+
+@pytest.mark.parametrize("way", ["tcp", "udp"])
+def test_a_sphere_is_felt(server: Server, way: str) -> None:
+    with hapticd.connect(getattr(server, way)) as hand:
+        feel_a_sphere(hand)
+        hand.subscribe(Reports.ALL)
+        until(hand, lambda: hand.latest.tick.object == 0)
+        tick = hand.latest.tick
+        assert tick.object == 0 and tick.depth_m > 0 and np.linalg.norm(tick.proxy_m) == pytest.approx(0.025, abs=3e-4)
+        until(hand, lambda: len(hand.latest.contacts.contacts) == 1)
+        contact = hand.latest.contacts.contacts[0]
+        assert contact.object == 0 and contact.normal[2] > 0.9 and contact.force_N[2] > 0
+        assert hand.latest.touching.touching and hand.latest.touched_object.object == 0
+        assert len(hand.latest.analog.channels) >= 6 and hand.latest.analog.channels[2] > 0
+        hand.release_hand()
+        statistics = hand.statistics()
+        assert statistics.messages_damaged == 0 and statistics.reports["tick"].count > 0
+        assert (statistics.udp_bytes_in > 0) == (way == "udp")
+        assert statistics.reports["tick"].latency.count == statistics.reports["tick"].count
+
+
+def test_rows_are_structured_arrays(server: Server) -> None:
+    with hapticd.connect(server.tcp) as hand:
+        hand.subscribe(Reports.TICK | Reports.TRACKER, 500)
+        rows = hand.collect("tick", 0.5)
+        assert len(rows) > 2 and rows["force_N"].shape == (len(rows), 3)
+        assert np.all(np.diff(rows["tick"].astype(np.int64)) > 0)
+        assert np.all(np.diff(rows["time"]) > 0)
+        until(hand, lambda: 1 in hand.latest.pose)
+        sensors = set()
+        for report in hand.reports("pose", seconds=60):
+            sensors.add(report.sensor)
+            if {0, 1} <= sensors:
+                break
+        assert {0, 1} <= sensors
+        with pytest.raises(ValueError, match="no rows of kind 'text'"):
+            hand.collect("text", 0)
+        with pytest.raises(ValueError, match="no reports of kind 'poses'; there are pose, velocity"):
+            hand.on("poses", print)
+
+
+def test_buttons_effects_planes_and_guard(server: Server) -> None:
+    with hapticd.connect(server.tcp) as hand:
+        hand.hold_hand((0, 0, 0), buttons=2)
+        until(hand, lambda: hand.latest.pressed.get(1, False))
+        hand.hold_hand((0, 0, 0))
+        until(hand, lambda: not hand.latest.pressed[1])
+        hand.set_effect(0, Effect.constant((0, 1, 0), 1.5))
+        hand.start_effect(0)
+        until(hand, lambda: hand.latest.force.force_N[1] > 1.4)
+        hand.stop_forces()
+        until(hand, lambda: hand.latest.guard.stopped and hand.latest.force.force_N[1] == 0)
+        assert "stopped" in hand.latest.guard.active and hand.latest.guard.active.names == ("stopped",)
+        assert "A client stopped the forces." in hand.latest.guard.active.explain()
+        hand.rearm_forces()
+        until(hand, lambda: not hand.latest.guard.stopped and hand.latest.force.force_N[1] > 1.4)
+        hand.stop_effect(0)
+        hand.set_plane(Plane((0, 1, 0, -0.005), 0.4))
+        until(hand, lambda: hand.latest.force.force_N[1] > 0.5)
+        hand.stop_plane()
+        until(hand, lambda: hand.latest.force.force_N[1] == 0)
+
+
+def test_errors_have_the_servers_text(server: Server) -> None:
+    with hapticd.connect(server.tcp, throw_on_error=True) as hand:
+        texts: List[hapticd.TextReport] = []
+        with hand.on_text(texts.append):
+            hand.set_object_count(-4)
+            with pytest.raises(hapticd.ServerError, match="-4"):
+                until(hand, lambda: False)
+        assert texts[-1].severity == hapticd.Severity.ERROR
+
+
+def test_a_second_hand_is_refused_with_its_code(server: Server) -> None:
+    with hapticd.connect(server.tcp) as first, hapticd.connect(server.tcp) as second:
+        first.hold_hand((0, 0, 0))
+        until(first, lambda: 1 in first.latest.pose)
+        texts: List[hapticd.TextReport] = []
+        second.on_text(texts.append)
+        second.hold_hand((1, 0, 0))
+        until(second, lambda: texts)
+        assert texts[0].level == 3
+
+
+def test_a_batch_that_raises_sends_nothing(server: Server) -> None:
+    with hapticd.connect(server.tcp) as hand:
+        texts: List[hapticd.TextReport] = []
+        hand.on_text(texts.append)
+        sent = hand.statistics().tcp_bytes_out
+        with pytest.raises(KeyError):
+            with hand.batch():
+                hand.set_object_count(-1)
+                raise KeyError
+        hand.run_for(0.1)
+        assert hand.statistics().tcp_bytes_out - sent < 200 and texts == []
+        with pytest.raises(RuntimeError, match="batches do not nest"):
+            with hand.batch():
+                with hand.batch():
+                    pass
+
+
+def test_a_large_mesh_reports_its_progress(server: Server) -> None:
+    vertices, triangles = hapticd.sphere(25, rings=100)
+    with hapticd.connect(server.tcp) as hand:
+        steps: List[hapticd.UploadProgress] = []
+        hand.upload_mesh(0, vertices, triangles, steps.append)
+        assert steps[-1].bytes_sent == steps[-1].bytes_total > 12 * (len(vertices) + len(triangles))
+        assert [s.bytes_sent for s in steps] == sorted(s.bytes_sent for s in steps)
+        with pytest.raises(ValueError, match="triangle 1 names vertex 7, the mesh has 3"):
+            hand.upload_mesh(0, np.zeros((3, 3)), [[0, 1, 2], [0, 7, 1]])
+        with pytest.raises(ValueError, match=r"vertices of shape \(3, 2\): give \(n, 3\)"):
+            hand.upload_mesh(0, np.zeros((3, 2)), [[0, 1, 2]])
+
+
+def test_a_stop_passes_a_large_upload(server: Server) -> None:
+    vertices, triangles = hapticd.sphere(25, rings=300)
+    with hapticd.connect(server.tcp) as hand:
+        for object in range(3):
+            frames, _ = hand._mesh_frames(object, np.asarray(vertices, ">f4"), np.asarray(triangles, ">i4"))
+            hand._peer.stream.extend(frames)  # type: ignore[union-attr]
+        hand.flush()
+        hand.stop_forces()
+        until(hand, lambda: hand.latest.guard.stopped)
+        hand.rearm_forces()
+        until(hand, lambda: not hand.latest.guard.stopped)
+
+
+def test_heartbeats_stop_with_the_polling(server: Server) -> None:
+    for _ in range(5):  # a busy machine may not run this process for 500 ms
+        hand = hapticd.connect(server.tcp, reconnect=False)
+        hand.enable_heartbeat()
+        hand.run_for(0.8)
+        if hand.connected:
+            break
+        hand.close()
+    with hand, hapticd.connect(server.tcp) as other:
+        assert hand.connected
+        losses: List[hapticd.ConnectionReport] = []
+        hand.on_connection(losses.append)
+        time.sleep(1.0)
+        until(hand, lambda: not hand.connected)
+        hand.poll()
+        assert losses and not losses[-1].connected and losses[-1].reason
+        with pytest.raises(hapticd.ConnectionLost):
+            hand.stop_forces()
+        assert other.connected
+
+
+def test_a_restarted_server_is_found_again() -> None:
+    server = Server()
+    with hapticd.connect(server.tcp) as hand:
+        hand.subscribe(Reports.TICK)
+        until(hand, lambda: hand.latest.tick.tick > 0)
+        events: List[bool] = []
+        hand.on_connection(lambda c: events.append(c.connected))
+        server.stop()
+        until(hand, lambda: events == [False])
+        assert hand.latest.tick.tick == 0
+        hand.set_object_count(2)
+        assert hand.statistics().messages_dropped == 1
+        server.start(f"127.0.0.1:{server.port}")
+        until(hand, lambda: events == [False, True] and hand.latest.tick.tick > 0)
+    server.stop()
+
+
+def test_what_is_wrong_with_a_connection_is_named(server: Server) -> None:
+    with pytest.raises(ValueError, match="expected NAME@host"):
+        hapticd.connect("localhost")
+    with pytest.raises(ValueError, match="port '99999', expected 1 to 65535"):
+        hapticd.connect("Phantom@localhost:99999")
+    with pytest.raises(hapticd.ConnectError, match=r"no device 'Nobody' answers at 127.0.0.1:\d+; it has Phantom"):
+        hapticd.connect(server.tcp.replace("Phantom", "Nobody"), connect_timeout=0.3)
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+    with pytest.raises(hapticd.ConnectError, match="nothing listens on 127.0.0.1"):
+        hapticd.connect(f"Phantom@tcp://127.0.0.1:{port}", connect_timeout=0.3)
+    with pytest.raises(hapticd.ConnectError, match="nothing listens on 127.0.0.1"):
+        hapticd.connect(f"Phantom@127.0.0.1:{port}", connect_timeout=0.3)
+    with pytest.raises(hapticd.ConnectError, match="no server at no.such.host.invalid"):
+        hapticd.connect("Phantom@no.such.host.invalid")
+
+
+def test_a_vrpn_server_without_extensions() -> None:
+    scripted = ScriptedServer(extensions=False)
+    with hapticd.connect(scripted.name) as hand:
+        assert hand.wait_capabilities() is None
+        for call in (hand.stop_forces, hand.rearm_forces, hand.enable_heartbeat, lambda: hand.hold_hand((0, 0, 0))):
+            with pytest.raises(hapticd.Unsupported, match="without the extensions of hapticd"):
+                call()
+        hand.upload_mesh(0, np.eye(3), [[0, 1, 2], [2, 1, 0]])
+        hand.send_text("end")
+        hand.flush_all()
+        scripted.wait_for("vrpn_Base text_message")
+    vertices = [payload for name, payload in scripted.received if name == "vrpn_ForceDevice setVertex"]
+    assert len(vertices) == 6 and vertices[3][4:8] == (3).to_bytes(4, "big")
+    scripted.close()
+
+
+def test_a_recorded_stock_server_is_understood() -> None:
+    """The bytes of VRPN's own server, as a client of it received them."""
+    listener = socket.create_server(("127.0.0.1", 0))
+    received = bytearray()
+
+    def serve() -> None:
+        connection = listener.accept()[0]
+        with connection:
+            connection.sendall((WIRE / "tcp.s2c.tcp.bin").read_bytes())
+            while True:
+                data = connection.recv(1 << 16)
+                received.extend(data)
+                if not data:
+                    break
+
+    thread = threading.Thread(target=serve, daemon=True)
+    thread.start()
+    with hapticd.connect(f"Phantom@tcp://127.0.0.1:{listener.getsockname()[1]}") as hand:
+        until(hand, lambda: hand.latest.pose and hand.latest.force.time > 0)
+        assert hand.capabilities is None and hand.statistics().messages_damaged == 0
+        assert abs(np.linalg.norm(hand.latest.pose[0].orientation) - 1) < 1e-6
+    thread.join(60)
+    listener.close()
+    # Also when reports arrive together with the cookie: without a ping there is no pong, and no answer to wait for.
+    assert b"vrpn_Base ping_message" in received
+    listening = Listener()
+    Peer(listening, [], None).feed(bytes(received))
+    assert "vrpn_Base ping_message" in [TYPE_NAMES[message[0]] for message in listening.messages]
+
+
+def test_ctrl_c_ends_a_wait_and_nothing_is_left(server: Server) -> None:
+    program = textwrap.dedent(
+        f"""
+        import hapticd
+        hand = hapticd.connect("{server.tcp}")
+        hand.set_effect(9, hapticd.Effect.constant((1, 0, 0), 1)); hand.start_effect(9); hand.flush_all()
+        print("ready", flush=True)
+        hand.run_for(1000)
+        """
+    )
+    child = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert child.stdout is not None and child.stdout.readline() == "ready\n"
+    with hapticd.connect(server.tcp) as hand:
+        until(hand, lambda: hand.latest.force.force_N[0] > 0.5)
+        child.send_signal(signal.SIGINT)
+        _, errors = child.communicate(timeout=60)
+        assert child.returncode != 0 and errors.rstrip().endswith("KeyboardInterrupt")
+        until(hand, lambda: hand.latest.force.force_N[0] == 0)
+
+
+def test_waiting_takes_no_processor_time(server: Server) -> None:
+    with hapticd.connect(server.tcp) as hand:
+        hand.subscribe(Reports.NONE)
+        hand.run_for(0.2)
+        start = time.process_time()
+        hand.run_for(1.0)
+        assert time.process_time() - start < 0.5
+    with pytest.raises(hapticd.ConnectionLost, match="is closed"):
+        hand.poll()

@@ -1,0 +1,158 @@
+"""Recordings against what `hapticd export` and the committed list of commands say of them."""
+
+import csv
+import json
+import pathlib
+import re
+import struct
+import subprocess
+import zlib
+from typing import Any, Dict, List
+
+import numpy as np
+import pytest
+
+import hapticd
+from conftest import HAPTICD, ROOT, Server, feel_a_sphere
+from hapticd.session import _COMMANDS
+
+RECORDINGS = ROOT / "testdata/recordings"
+FILES = ["all_commands_law2", "all_commands_v1", "gripper_v2"]
+
+
+def exported(file: pathlib.Path, to: pathlib.Path) -> List[Dict[str, str]]:
+    subprocess.run([HAPTICD, "export", "--to", "csv", "-o", str(to), str(file)], check=True, capture_output=True)
+    return list(csv.DictReader(to.read_text().splitlines()))
+
+
+def columns_of(ticks: hapticd.session.Ticks) -> Dict[str, Any]:
+    """The columns under the names of the CSV file."""
+    table: Dict[str, Any] = {}
+    for name in ("time_ns", "tick", "revision", "depth_m", "touching", "object", "buttons", "render_status",
+                 "wakeup_error_ns", "compute_ns"):  # fmt: skip
+        table[name] = ticks[name]
+    for name, pattern in (("hip_m", "hip_{}_m"), ("proxy_m", "proxy_{}_m"), ("velocity_m_per_s", "velocity_{}_m_per_s"),
+                          ("force_N", "force_{}_N"), ("rendered_force_N", "rendered_force_{}_N"),
+                          ("normal", "normal_{}"), ("orientation_xyzw", "q{}")):  # fmt: skip
+        array = ticks[name]
+        for i in range(array.shape[1]):
+            table[pattern.format("xyzw"[i])] = array[:, i]
+    return table
+
+
+def check_against_export(file: pathlib.Path, tmp_path: pathlib.Path) -> None:
+    rows = exported(file, tmp_path / "export.csv")
+    with hapticd.Session(file) as session:
+        ticks = session.ticks
+        assert len(rows) == len(ticks) > 0
+        for name, column in columns_of(ticks).items():
+            assert np.array_equal(np.array([float(row[name]) for row in rows]), column.astype(float)), name
+        gripper = np.array([float(row["gripper_rad"] or "nan") for row in rows])
+        assert np.array_equal(gripper, ticks["gripper_rad"], equal_nan=True)
+        for column, name in (("guard_active", "guard_active"), ("guard_latched", "guard_latched")):
+            assert ["+".join(session.trips(bits).names) for bits in ticks[name]] == [row[column] for row in rows]
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_columns_are_those_of_the_export(name: str, tmp_path: pathlib.Path) -> None:
+    check_against_export(RECORDINGS / f"{name}.haptics", tmp_path)
+
+
+def test_a_fresh_recording(tmp_path: pathlib.Path) -> None:
+    file = tmp_path / "fresh.haptics"
+    server = Server("--record", str(file))
+    with hapticd.connect(server.tcp) as hand:
+        feel_a_sphere(hand)
+        hand.run_for(0.2)
+    server.stop()
+    check_against_export(file, tmp_path)
+    with hapticd.Session(file) as session:
+        assert session.remark == "" and session.devices[0].names == ("Phantom",)
+        assert session.devices[0].rate_Hz == 1000 and "Phantom" in session.config
+        ticks = session.ticks
+        assert np.all(np.diff(ticks["tick"].astype(np.int64)) >= 1)
+        assert session.lost == () or session.lost[0].count > 0
+        contacts = ticks.contacts()
+        assert len(contacts) == ticks["contact_count"].sum() > 0
+        last = contacts[contacts["tick"] == contacts["tick"][-1]]
+        total = last["force_N"].sum(axis=0)
+        assert np.allclose(total, ticks["contact_force_N"][np.searchsorted(ticks["tick"], contacts["tick"][-1])])
+        meshes = [c for c in session.commands() if c.name == "SetVertices"]
+        assert np.allclose(np.linalg.norm(np.concatenate([c.fields["positions"] for c in meshes]), axis=1), 25, atol=1e-3)
+        to_world = ticks["T_world_device"][-1]
+        assert to_world.shape == (3, 4) and np.allclose(to_world[:, :3], 1000 * np.eye(3))
+        assert ticks["guard_counts"].shape == (len(ticks), 17)
+        assert ticks.to_array(["tick", "force_N"]).dtype["force_N"].shape == (3,)
+        with pytest.raises(KeyError, match="no column 'forces'; there are time_ns"):
+            ticks["forces"]
+        with pytest.raises(KeyError, match="no device 'Omni'.*there is Phantom"):
+            session.ticks_of("Omni")
+
+
+def test_commands_are_those_of_the_committed_list() -> None:
+    expected = [json.loads(line) for line in (RECORDINGS / "all_commands.jsonl").read_text().splitlines()]
+    for name in ("all_commands_v1", "all_commands_law2"):
+        with hapticd.Session(RECORDINGS / f"{name}.haptics") as session:
+            ours = [c for c in session.commands()]
+            listed = [c for c in ours if c.name != "ClientLeft"]
+            compared = [e for e in expected if e["command"] in {c.name for c in listed}]
+            assert [c.name for c in listed] == [e["command"] for e in compared]
+            for command, e in zip(listed, compared):
+                assert list(command.fields) == list(e["fields"])
+                for member, value in e["fields"].items():
+                    mine = command.fields[member]
+                    assert np.asarray(mine, dtype=object if isinstance(mine, str) else None).size == np.asarray(value).size
+                    if isinstance(value, str):
+                        assert mine == value
+                    else:
+                        assert np.allclose(np.ravel(mine), np.ravel(value), rtol=1e-6), (command.name, member)
+
+
+def test_the_list_of_commands_is_that_of_the_documents() -> None:
+    text = (ROOT / "docs/recording-format.md").read_text()
+    documented = {}
+    for number, name, members in re.findall(r"^\| (\d+) \| `(\w+)` \| (.*) \|$", text, re.M):
+        documented[int(number)] = (name, tuple((m, t) for t, m in re.findall(r"([^,`]+) `(\w+)`", members)))
+    short = {"i32": "i", "u32": "I", "f32": "f", "f64": "d", "truth": "?", "text": "text"}
+
+    def form(type_: str) -> str:
+        type_ = type_.strip()
+        listed = type_.startswith("list of ")
+        base, _, count = type_.replace("list of ", "").rstrip("]").partition("[")
+        return f"list{count or 1}{short[base]}" if listed else count + short[base]
+
+    ours = {number: entry for number, entry in _COMMANDS.items() if number}
+    assert len(documented) == len(ours)
+    for number, (name, members) in documented.items():
+        assert ours[number] == (name, tuple((member, form(type_)) for member, type_ in members))
+
+
+def test_damage_is_named_and_everything_before_it_is_read(tmp_path: pathlib.Path) -> None:
+    data = (RECORDINGS / "all_commands_law2.haptics").read_bytes()
+    file = tmp_path / "cut.haptics"
+    file.write_bytes(data[: len(data) // 2])
+    with hapticd.Session(file) as cut:
+        assert re.fullmatch(r"the block at byte \d+ is cut; everything before it was read", cut.remark)
+        assert 0 < len(list(cut.commands()))
+        cut.ticks["force_N"]
+    broken = bytearray(data)
+    broken[len(data) // 2] ^= 1
+    file.write_bytes(broken)
+    with hapticd.Session(file) as damaged:
+        assert "the checksum of the block at byte" in damaged.remark
+    file.write_bytes(b"nothing like it")
+    with pytest.raises(hapticd.RecordingError, match="is not a recording of hapticd"):
+        hapticd.Session(file)
+    head = struct.pack(">II", 1, 4)
+    content = struct.pack(">I", 99)
+    file.write_bytes(b"HAPTICS\n" + head + struct.pack(">I", zlib.crc32(head + content)) + content)
+    with pytest.raises(hapticd.RecordingError, match="version 99 of the format, this program reads versions 1 to 2"):
+        hapticd.Session(file)
+
+
+def test_columns_outlive_the_session() -> None:
+    with hapticd.Session(RECORDINGS / "gripper_v2.haptics") as session:
+        opening = session.ticks["gripper_rad"]
+    assert np.all(np.isfinite(opening))
+    with pytest.raises(ValueError):
+        opening[0] = 1

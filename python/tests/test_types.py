@@ -1,0 +1,33 @@
+"""mypy --strict, on the package and on a program that uses it as the documents show."""
+
+import pathlib
+import re
+import subprocess
+import sys
+
+import hapticd
+
+PACKAGE = pathlib.Path(hapticd.__file__).parent
+DOCS = pathlib.Path(__file__).resolve().parents[2] / "docs/python.md"
+
+
+def mypy(tmp_path: pathlib.Path, *what: str) -> None:
+    command = [sys.executable, "-m", "mypy", "--strict", "--python-version", "3.9", "--cache-dir", str(tmp_path / "cache"), *what]
+    result = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    assert result.returncode == 0, result.stdout + result.stderr
+
+
+def test_the_package_and_the_examples_of_its_document_are_typed(tmp_path: pathlib.Path) -> None:
+    programs = re.findall(r"```python\n(.*?)```", DOCS.read_text(), re.S)
+    assert len(programs) >= 5
+    files = []
+    for number, program in enumerate(programs):
+        file = tmp_path / f"example_{number}.py"
+        file.write_text(program)
+        compile(program, str(file), "exec")
+        files.append(str(file))
+    mypy(tmp_path, str(PACKAGE), *files)
+
+
+def test_the_package_declares_its_types() -> None:
+    assert (PACKAGE / "py.typed").exists()
