@@ -4,11 +4,14 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "announce.h"
 #include "commands.h"
 #include "device/drivers/drivers.h"
+#include "log_writer.h"
 #include "server/server.h"
+#include "server/station/devices.h"
 #include "stop_on_signal.h"
 
 namespace hapticd::apps {
@@ -24,7 +27,7 @@ struct ServeOptions {
   std::string hand;
   bool enableForces = false;
   bool calibrate = false;
-  bool isolate = false;
+  std::optional<bool> isolate;
   double reportRate_Hz = 0;
   double seconds = 0;
   std::string record;
@@ -47,9 +50,23 @@ void applyFlags(const ServeOptions& options, server::DeviceConfig& device) {
   }
   if (options.enableForces) device.enableForces = true;
   if (options.calibrate) device.calibrate = true;
-  if (options.isolate) device.isolate = true;
+  if (options.isolate) device.isolate = options.isolate;
   if (!options.hand.empty()) device.hand = options.hand;
   if (options.reportRate_Hz > 0) device.reportRate_Hz = options.reportRate_Hz;
+}
+
+// Makes each driver, without opening it: files and hardware names that only the driver understands.
+void checkDrivers(const server::ServerConfig& config) {
+  for (server::DeviceConfig device : config.devices) {
+    device.isolate = false;
+    try {
+      server::makeDevice(device);
+    } catch (const server::ConfigError&) {
+      throw;
+    } catch (const std::exception& error) {
+      throw server::ConfigError("device '" + device.names.front() + "': " + error.what());
+    }
+  }
 }
 
 server::ServerConfig configOf(const ServeOptions& options, std::vector<std::string>& remarks) {
@@ -69,13 +86,11 @@ server::ServerConfig configOf(const ServeOptions& options, std::vector<std::stri
     for (server::DeviceConfig& device : config.devices) applyFlags(options, device);
   }
   server::validate(config);
+  checkDrivers(config);
   return config;
 }
 
 int run(const ServeOptions& options) {
-  spdlog::set_pattern("%H:%M:%S.%e %^%l%$ %v");
-  spdlog::set_level(options.verbose ? spdlog::level::debug : spdlog::level::info);
-  spdlog::flush_on(spdlog::level::info);
   std::vector<std::string> remarks;
   server::ServerConfig config;
   try {
@@ -89,8 +104,10 @@ int run(const ServeOptions& options) {
     std::printf("%s", server::toToml(config).c_str());
     return 0;
   }
-  for (const std::string& remark : remarks) spdlog::warn("{}", remark);
   StopOnSignal stopper;
+  const LogWriter log;
+  spdlog::set_level(options.verbose ? spdlog::level::debug : spdlog::level::info);
+  for (const std::string& remark : remarks) spdlog::warn("{}", remark);
   server::Server server(config);
   announce(server, config);
   stopper.watch(server);
@@ -127,8 +144,10 @@ void addServe(CLI::App& app) {
   command->add_flag(
       "--calibrate", options->calibrate,
       "Consent to calibration at the start and at a re-arm after it was lost; MAY MOVE THE ARM");
-  command->add_flag("--isolate", options->isolate,
-                    "Run the driver in its own process: a crash is then a fault, not the end of the server");
+  command->add_flag("--isolate,!--in-process", options->isolate,
+                    "Run the driver in its own process: a crash is then a fault, not the end of the server, and\n"
+                    "that process ends the force when the server hangs or dies. Default for openhaptics, which\n"
+                    "has no watchdog; --in-process saves one tick of delay and that protection");
   command->add_option(
       "--hand", options->hand,
       "Simulated device: 'script' strokes the objects of the scene [script], FILE.csv follows the path\n"

@@ -157,8 +157,9 @@ void Server::finishRecording() {
   if (!recorder_) return;
   recorder_->finish();
   const record::RecorderCounts& counts = recorder_->counts();
-  spdlog::info("recorded {} ticks, {:.1f} MB, in {}", counts.ticks, static_cast<double>(counts.bytes) * 1e-6,
-               recorder_->path().string());
+  spdlog::info("recorded {} ticks, {:.1f} MB, in {}{}", counts.ticks,
+               static_cast<double>(counts.bytes) * 1e-6, recorder_->path().string(),
+               recorder_->writes() ? "" : ", which is incomplete");
   recorder_.reset();
 }
 
@@ -210,6 +211,7 @@ void Server::run() {
   loop_.run();
   if (player_) player_->stop();
   for (const auto& station : stations_) station->stop();
+  devicesClosed_.store(true, std::memory_order_release);
   for (const auto& scene : scenes_) scene->stop();
   finishRecording();
 }
@@ -228,7 +230,7 @@ void Server::onWebClient(net::Connection connection) {
 ServerStatus Server::status() const {
   ServerStatus status;
   status.uptime_s = base::toSeconds(base::now() - started_);
-  if (recorder_) status.recording = recorder_->path().string();
+  if (recorder_ && recorder_->writes()) status.recording = recorder_->path().string();
   status.scenes.resize(scenes_.size());
   for (const auto& station : stations_) {
     DeviceStatus& device = status.devices.emplace_back(station->status());
@@ -260,11 +262,22 @@ void Server::stop() {
   loop_.stop();
 }
 
+bool Server::stopForces() noexcept {
+  constexpr Nanos kLongest = 40'000'000;
+  for (const auto& station : stations_) station->stopForces();
+  const auto atZero = [](const auto& station) { return station->isStoppedAtZero(); };
+  for (const Nanos end = base::now() + kLongest; base::now() < end; base::sleepFor(500'000)) {
+    if (std::all_of(stations_.begin(), stations_.end(), atZero)) return true;
+  }
+  return false;
+}
+
 void Server::addSession(net::Connection connection, std::unique_ptr<net::UdpSocket> udp, SessionMode mode) {
   const scene::ClientId id = nextClient_++;
   auto session =
       std::make_unique<Session>(id, *this, names_, clock_, std::move(connection), std::move(udp), mode);
-  spdlog::info("client {} connected from {}", id, session->description());
+  throttledLog_.log(spdlog::level::info, session->address(),
+                    fmt::format("client {} connected from {}", id, session->description()));
   Session& added = *session;
   sessions_.emplace(id, std::move(session));
   handshakes_.emplace(id, base::now());
@@ -316,7 +329,10 @@ void Server::connectToClient(const net::Endpoint& client) {
              auto udp = std::make_unique<net::UdpSocket>(loop_, local);
              net::Connection connection = std::move(pending->connection);
              forget();
-             if (connection.remote() == net::Endpoint{connection.local().address, address().port}) {
+             // All of 127.0.0.0/8 is this machine; any other address of its own is its source address, too.
+             const net::Endpoint remote = connection.remote();
+             if (remote.port == address().port &&
+                 (isLoopback(remote.address) || remote.address == connection.local().address)) {
                throttledLog_.warn("connection request names this server itself: refused");
                return;
              }
@@ -333,7 +349,9 @@ void Server::connectToClient(const net::Endpoint& client) {
 }
 
 void Server::onClosed(Session& session, const std::string& reason) {
-  spdlog::info("client {} ({}) disconnected: {}", session.id(), session.description(), reason);
+  throttledLog_.log(
+      spdlog::level::info, "client " + std::to_string(session.id()),
+      fmt::format("client {} ({}) disconnected: {}", session.id(), session.description(), reason));
   for (const auto& station : stations_) station->clientGone(session.id());
   for (const auto& scene : scenes_) scene->clientGone(session.id());
   handshakes_.erase(session.id());
@@ -355,7 +373,13 @@ void Server::closeStaleHandshakes() {
 
 // Disconnect clients whose heartbeat expired. onClosed() destroys the session later.
 void Server::checkHeartbeats() {
+  constexpr Nanos kStall = 150'000'000;  // between two checks; 50 ms are usual
   const Nanos now = base::now();
+  const bool stalled = now - std::exchange(heartbeatsCheckedAt_, now) > kStall;
+  if (stalled) {  // this thread has not read what the clients sent
+    for (const auto& [id, session] : sessions_) session->excuseStall(now);
+    return;
+  }
   for (const auto& [id, session] : sessions_) {
     switch (session->checkHeartbeat(now)) {
       case HeartbeatWatch::Verdict::alive:
@@ -374,8 +398,9 @@ void Server::checkHeartbeats() {
 
 // The client disconnected while the scene is behind. Its last commands are still applied.
 void Server::onPeerGone(Session& session, const std::string& reason) {
-  spdlog::info("client {} ({}) disconnected while its commands wait for the scene: {}", session.id(),
-               session.description(), reason);
+  throttledLog_.log(spdlog::level::info, session.address(),
+                    fmt::format("client {} ({}) disconnected while its commands wait for the scene: {}",
+                                session.id(), session.description(), reason));
   releaseForces(session.id());
 }
 
@@ -440,7 +465,13 @@ bool Server::mayCommand(Session& session, Station& station, const wire::MessageR
 }
 
 void Server::onWarning(const Session& session, const std::string& text) {
-  throttledLog_.warn("client " + std::to_string(session.id()) + ": " + text);
+  const std::string client = "client " + std::to_string(session.id());
+  throttledLog_.log(spdlog::level::warn, client, client + ": " + text);
+}
+
+void Server::onNote(const Session& session, const std::string& text) {
+  throttledLog_.log(spdlog::level::info, session.address(),
+                    fmt::format("client {} ({}) {}", session.id(), session.description(), text));
 }
 
 // A client that sends much data must not delay the reports to others.

@@ -373,6 +373,25 @@ TEST(Server, AReverseConnectionToTheServerItselfIsRefused) {
   EXPECT_EQ(countOf("speaks VRPN", log.text()), 1U);
 }
 
+TEST(Server, AReverseConnectionToAnotherAddressOfTheServerIsRefused) {
+  Log log;
+  {
+    server::ServerConfig config = RunningServer::anyPort();
+    config.listenAddress = "0.0.0.0";
+    RunningServer server(config);
+    const net::Endpoint here{net::kLoopbackAddress, server.address().port};
+    net::Loop loop;
+    net::UdpSocket udp(loop, net::Endpoint{net::kLoopbackAddress, 0});
+    const std::string request = wire::formatUdpRequest({"127.0.0.2", here.port});
+    udp.sendTo(std::as_bytes(std::span(request)), here);
+    ScriptedPeer peer(here);
+    ASSERT_TRUE(peer.untilConnected());
+    ASSERT_TRUE(peer.until([&] { return peer.count<wire::IsTouching>() >= 200; }));
+  }
+  EXPECT_EQ(countOf("names this server itself", log.text()), 1U);
+  EXPECT_EQ(countOf("speaks VRPN", log.text()), 1U);
+}
+
 TEST(Server, APortInUseIsReported) {
   RunningServer server;
   server::ServerConfig second = RunningServer::anyPort();

@@ -55,8 +55,9 @@ struct DeviceConfig {
   std::map<std::string, std::string>
       driverKeys;          ///< keys that only some drivers read, as Driver::keys names them
   bool calibrate = false;  ///< consent to calibrate at start and at a re-arm; may move the arm
-  bool isolate =
-      false;  ///< run the driver in a separate process: its crash is a fault of the device, not of the server
+  /// Run the driver in a separate process: its crash is a fault of the device, not of the server, and that
+  /// process ends the force when the server hangs or dies. Nothing: as the driver needs it.
+  std::optional<bool> isolate;
   bool enableForces = false;    ///< real devices start without force unless this is set
   std::string hand = "script";  ///< simulated device: "script", or a CSV file with the intended path
   double servoRate_Hz = 1000;
