@@ -102,7 +102,8 @@ class LogWriter::Queue {
 LogWriter::LogWriter() : queue_(std::make_shared<Queue>()) {
   class Sink final : public spdlog::sinks::base_sink<std::mutex> {
    public:
-    explicit Sink(std::shared_ptr<Queue> queue) : queue_(std::move(queue)), colours_(isatty(STDOUT_FILENO) == 1) {}
+    explicit Sink(std::shared_ptr<Queue> queue)
+        : queue_(std::move(queue)), colours_(isatty(STDOUT_FILENO) == 1) {}
 
    private:
     void sink_it_(const spdlog::details::log_msg& message) override {

@@ -5,9 +5,9 @@
 
 namespace hapticd::apps {
 
-/// While it lives, spdlog's default logger writes through a bounded queue. A queue that is full because nobody
-/// reads the output drops lines and counts them. Construct it after StopOnSignal, so that its thread takes no
-/// signals.
+/// While it lives, spdlog's default logger writes through a bounded queue. A queue that is full because
+/// nobody reads the output drops lines and counts them. Construct it after StopOnSignal, so that its thread
+/// takes no signals.
 class LogWriter {
  public:
   LogWriter();

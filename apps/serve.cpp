@@ -1,10 +1,11 @@
 // hapticd serve: owns the devices and serves them to VRPN clients.
 #include <spdlog/spdlog.h>
+#include <sys/resource.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <optional>
 
 #include "announce.h"
 #include "commands.h"
@@ -27,7 +28,8 @@ struct ServeOptions {
   std::string hand;
   bool enableForces = false;
   bool calibrate = false;
-  std::optional<bool> isolate;
+  bool isolate = false;
+  bool inProcess = false;
   double reportRate_Hz = 0;
   double seconds = 0;
   std::string record;
@@ -50,7 +52,8 @@ void applyFlags(const ServeOptions& options, server::DeviceConfig& device) {
   }
   if (options.enableForces) device.enableForces = true;
   if (options.calibrate) device.calibrate = true;
-  if (options.isolate) device.isolate = options.isolate;
+  if (options.isolate) device.isolate = true;
+  if (options.inProcess) device.isolate = false;
   if (!options.hand.empty()) device.hand = options.hand;
   if (options.reportRate_Hz > 0) device.reportRate_Hz = options.reportRate_Hz;
 }
@@ -90,6 +93,15 @@ server::ServerConfig configOf(const ServeOptions& options, std::vector<std::stri
   return config;
 }
 
+// Many systems give 1024, which 400 clients use up.
+void raiseDescriptorLimit() {
+  constexpr rlim_t kEnough = 16'384;
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur >= kEnough) return;
+  limit.rlim_cur = std::min(limit.rlim_max, kEnough);
+  setrlimit(RLIMIT_NOFILE, &limit);
+}
+
 int run(const ServeOptions& options) {
   std::vector<std::string> remarks;
   server::ServerConfig config;
@@ -104,6 +116,7 @@ int run(const ServeOptions& options) {
     std::printf("%s", server::toToml(config).c_str());
     return 0;
   }
+  raiseDescriptorLimit();
   StopOnSignal stopper;
   const LogWriter log;
   spdlog::set_level(options.verbose ? spdlog::level::debug : spdlog::level::info);
@@ -144,10 +157,14 @@ void addServe(CLI::App& app) {
   command->add_flag(
       "--calibrate", options->calibrate,
       "Consent to calibration at the start and at a re-arm after it was lost; MAY MOVE THE ARM");
-  command->add_flag("--isolate,!--in-process", options->isolate,
-                    "Run the driver in its own process: a crash is then a fault, not the end of the server, and\n"
-                    "that process ends the force when the server hangs or dies. Default for openhaptics, which\n"
-                    "has no watchdog; --in-process saves one tick of delay and that protection");
+  CLI::Option* const isolate = command->add_flag(
+      "--isolate", options->isolate,
+      "Run the driver in its own process: a crash is then a fault, not the end of the server, and that\n"
+      "process ends the force when the server hangs or dies. Default for openhaptics, which has no watchdog");
+  command
+      ->add_flag("--in-process", options->inProcess,
+                 "Run the driver in the server's process: saves one tick of delay and that protection")
+      ->excludes(isolate);
   command->add_option(
       "--hand", options->hand,
       "Simulated device: 'script' strokes the objects of the scene [script], FILE.csv follows the path\n"

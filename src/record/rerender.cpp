@@ -12,8 +12,8 @@ namespace {
 using realtime::GuardControl;
 using realtime::TickReport;
 
-// Its states and the results of its writes are the recorded ones; it takes the time that made a recorded force
-// too old.
+// Its states and the results of its writes are the recorded ones; it takes the time that made a recorded
+// force too old.
 class RecordedHand final : public device::Device {
  public:
   explicit RecordedHand(base::SimulatedClock& clock) noexcept : clock_(clock) {}

@@ -55,8 +55,8 @@ struct SceneConfig {
   /// Measures how long building takes, so that it takes at most a quarter of the thread; empty: steady clock.
   std::function<base::Nanos()> stopwatch;
 
-  /// Tells the servo which clients are gone; null: it learns so from snapshots only. Shared by all builders of
-  /// a scene.
+  /// Tells the servo which clients are gone; null: it learns so from snapshots only. Shared by all builders
+  /// of a scene.
   std::shared_ptr<ForceOwners> owners;
 };
 

@@ -26,7 +26,7 @@ struct Buzz {
   double angularFrequency_rad_per_s = 0;
   base::Nanos duration = 0;
   std::uint32_t start = 0;
-  bool releasing = false;  ///< its owner is gone: ramp out in 250 ms
+  bool releasing = false;                   ///< its owner is gone: ramp out in 250 ms
   std::shared_ptr<const ForceOwner> owner;  ///< null: of no client
 };
 

@@ -22,8 +22,8 @@ class ForceOwner {
     leftAt_.compare_exchange_strong(here, now, std::memory_order_acq_rel);
   }
   /// The share of its forces that is left: 1 while it is here and for kGrace, in which the scene thread
-  /// usually releases them itself, then down to 0 within kRampOut. `releasedAt` is when the scene thread began
-  /// to release the force, negative when it has not: a release in time needs no help.
+  /// usually releases them itself, then down to 0 within kRampOut. `releasedAt` is when the scene thread
+  /// began to release the force, negative when it has not: a release in time needs no help.
   double share(base::Nanos releasedAt, base::Nanos now) const noexcept {
     const base::Nanos left = leftAt_.load(std::memory_order_acquire);
     if (left == kHere || (releasedAt >= 0 && releasedAt <= left + kGrace)) return 1;

@@ -28,9 +28,9 @@ bool ObjectTable::hasRoom(const Object& object, std::int32_t first, std::size_t 
   }
   // Numbers far beyond the present ones would make a few bytes cost megabytes.
   if (static_cast<std::size_t>(first) > 2 * present + kLargestGap) {
-    call.refuse(name, "refused: too far beyond the numbers that were sent; send them in about ascending order",
-                " object ", object.id, ", ", what, " ", first, ", at most ", 2 * present + kLargestGap,
-                " now");
+    call.refuse(
+        name, "refused: too far beyond the numbers that were sent; send them in about ascending order",
+        " object ", object.id, ", ", what, " ", first, ", at most ", 2 * present + kLargestGap, " now");
     return false;
   }
   if (end > present && used + (end - present) > inAll) {

@@ -175,8 +175,8 @@ class ObjectTable {
   std::uint64_t lastTopology_ = 0;  // one counter for all meshes: no number is used twice
   std::uint32_t jumps_ = 0;         // one counter for all: no number is used twice
 
-  std::vector<std::int32_t> moves_;    // objects with movePending
-  std::optional<Nanos> sceneTravel_;   // of the pending move of the scene's origin
+  std::vector<std::int32_t> moves_;   // objects with movePending
+  std::optional<Nanos> sceneTravel_;  // of the pending move of the scene's origin
   std::vector<std::int32_t> changed_;
   std::vector<std::int32_t> edited_;  // meshes with edits
   Nanos rebuildNotBefore_ = 0;

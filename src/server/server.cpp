@@ -1,5 +1,7 @@
 #include "server/server.h"
 
+#include <sys/resource.h>
+
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -18,6 +20,19 @@ using namespace std::chrono_literals;
 using base::Nanos;
 
 constexpr Nanos kHandshakeLimit = 30'000'000'000;
+constexpr std::size_t kMostReverseConnections = 64;  // pending at once
+constexpr std::size_t kReserve = 16;                 // connections that may only stop forces
+constexpr std::uint64_t kOtherDescriptors = 192;     // devices, files, the web port, pending connections
+
+// The program may raise it: see docs/limits.md.
+std::size_t mostSessions(std::size_t configured) {
+  rlimit limit{};
+  getrlimit(RLIMIT_NOFILE, &limit);
+  const std::uint64_t present = limit.rlim_cur;
+  // In mode udp a client takes two.
+  const std::uint64_t possible = present > 2 * kOtherDescriptors ? (present - kOtherDescriptors) / 2 : 16;
+  return std::min<std::size_t>(configured, possible);
+}
 
 net::ConnectionOptions connectionOptions() {
   net::ConnectionOptions options;
@@ -281,7 +296,26 @@ void Server::addSession(net::Connection connection, std::unique_ptr<net::UdpSock
   Session& added = *session;
   sessions_.emplace(id, std::move(session));
   handshakes_.emplace(id, base::now());
+  admit(added);
   added.start();
+}
+
+// Beyond the limits a client may still stop forces. The newest have this chance: those that hold on to theirs
+// must not keep others from it.
+void Server::admit(Session& session) {
+  const std::string address = session.address();
+  const std::size_t ofAddress = ++sessionsOf_[address];
+  const bool full =
+      sessions_.size() - reserve_.size() > mostSessions(static_cast<std::size_t>(config_.connections));
+  if (!full && ofAddress <= static_cast<std::size_t>(config_.connectionsPerAddress)) return;
+  reserve_.push_back(session.id());
+  if (reserve_.size() <= kReserve) return;
+  const auto oldest = sessions_.find(reserve_.front());
+  if (oldest != sessions_.end()) oldest->second->close("the server is full, and others wait to stop forces");
+}
+
+bool Server::mayOnlyStop(const Session& session) const noexcept {
+  return std::find(reserve_.begin(), reserve_.end(), session.id()) != reserve_.end();
 }
 
 void Server::onUdpRequest(std::span<const std::byte> datagram, const net::Endpoint& from) {
@@ -313,6 +347,11 @@ void Server::connectToClient(const net::Endpoint& client) {
   // Clients repeat their request until the server connects.
   for (const auto& pending : reverseConnections_) {
     if (pending->client == client) return;
+  }
+  if (reverseConnections_.size() >= kMostReverseConnections) {
+    throttledLog_.warn("connection request to " + client.text() +
+                       " ignored: " + std::to_string(kMostReverseConnections) + " others are pending");
+    return;
   }
   auto owned = std::make_unique<ReverseConnection>();
   ReverseConnection* pending = owned.get();
@@ -350,11 +389,14 @@ void Server::connectToClient(const net::Endpoint& client) {
 
 void Server::onClosed(Session& session, const std::string& reason) {
   throttledLog_.log(
-      spdlog::level::info, "client " + std::to_string(session.id()),
+      spdlog::level::info, session.address(),
       fmt::format("client {} ({}) disconnected: {}", session.id(), session.description(), reason));
   for (const auto& station : stations_) station->clientGone(session.id());
   for (const auto& scene : scenes_) scene->clientGone(session.id());
   handshakes_.erase(session.id());
+  std::erase(reserve_, session.id());
+  const auto ofAddress = sessionsOf_.find(session.address());
+  if (ofAddress != sessionsOf_.end() && --ofAddress->second == 0) sessionsOf_.erase(ofAddress);
   sessions_.erase(session.id());
 }
 
@@ -453,7 +495,14 @@ void Server::onSceneMessage(Session& session, Station& station, const wire::Mess
 
 bool Server::mayCommand(Session& session, Station& station, const wire::MessageReceived& message) {
   std::string reason;
-  if (!wire::needsControl(message.kind) || station.mayCommand(session, reason)) return true;
+  if (message.kind == wire::kindOf<wire::StopForces>) return true;
+  if (!reserve_.empty() && mayOnlyStop(session)) {
+    if (message.kind == wire::kindOf<wire::Ping> || message.kind == wire::kindOf<wire::Heartbeat>)
+      return true;
+    reason = "the server is full: this connection may only stop forces";
+  } else if (!wire::needsControl(message.kind) || station.mayCommand(session, reason)) {
+    return true;
+  }
   // Send one text for each read: a refused upload has thousands of messages.
   if (std::exchange(refusalSentTo_, session.id()) != session.id()) {
     session.send(message.local_sender,

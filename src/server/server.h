@@ -5,6 +5,7 @@
 #pragma once
 
 #include <atomic>
+#include <deque>
 #include <map>
 #include <memory>
 #include <optional>
@@ -68,6 +69,8 @@ class Server final : public SessionOwner, public WebOwner {
   ServerStatus status() const override;
   void onWebClient(net::Connection connection) override;
 
+  void admit(Session& session);
+  bool mayOnlyStop(const Session& session) const noexcept;
   void addSession(net::Connection connection, std::unique_ptr<net::UdpSocket> udp, SessionMode mode);
   void onUdpRequest(std::span<const std::byte> datagram, const net::Endpoint& from);
   void connectToClient(const net::Endpoint& client);
@@ -101,6 +104,8 @@ class Server final : public SessionOwner, public WebOwner {
   std::vector<std::unique_ptr<SceneHost>> scenes_;
   std::vector<std::unique_ptr<Station>> stations_;
   std::map<scene::ClientId, std::unique_ptr<Session>> sessions_;
+  std::map<std::string, std::size_t> sessionsOf_;      ///< number by address
+  std::deque<scene::ClientId> reserve_;                ///< clients beyond the limits, oldest first
   std::map<scene::ClientId, base::Nanos> handshakes_;  ///< start times of unfinished handshakes
   scene::ClientId refusalSentTo_ = 0;  ///< client already notified of a refusal during this read; 0: none
   std::vector<std::unique_ptr<ReverseConnection>> reverseConnections_;

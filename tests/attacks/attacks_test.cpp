@@ -1,8 +1,8 @@
 // Attacks over the network on a server whose mock arm logs what its motors get.
 //
-// A hand rests in a contact. One after the other, each attack either must not change the force, or must end the
-// force of the attacker's own effects; afterwards a stop from a new connection must reach the motors, and a
-// re-arm must bring the force back. HAPTICD_ATTACK_TABLE=FILE writes the measured values as the table of
+// A hand rests in a contact. One after the other, each attack either must not change the force, or must end
+// the force of the attacker's own effects; afterwards a stop from a new connection must reach the motors, and
+// a re-arm must bring the force back. HAPTICD_ATTACK_TABLE=FILE writes the measured values as the table of
 // docs/safety.md; nothing is asserted about them, because they depend on the machine.
 #include <fcntl.h>
 #include <netinet/in.h>
@@ -55,13 +55,13 @@ class Attacks : public InContact {
   std::uint16_t port(const std::string& before) const {
     const std::string log = server->log();
     const std::size_t at = log.find(before);
-    return at == std::string::npos
-               ? 0
-               : static_cast<std::uint16_t>(std::atoi(log.c_str() + at + before.size()));
+    return at == std::string::npos ? 0
+                                   : static_cast<std::uint16_t>(std::atoi(log.c_str() + at + before.size()));
   }
   void noteReport() {
     const auto now = Clock::now();
-    if (lastReport_ != Clock::time_point{}) row_.gap_ms = std::max(row_.gap_ms, milliseconds(now - lastReport_));
+    if (lastReport_ != Clock::time_point{})
+      row_.gap_ms = std::max(row_.gap_ms, milliseconds(now - lastReport_));
     lastReport_ = now;
   }
   double memory_MB() const {
@@ -82,7 +82,8 @@ class Attacks : public InContact {
     ASSERT_TRUE(visitor->until([&] {
       if (visitor->latched()) visitor->client().rearmForces();
       return rests();
-    })) << "before: " << server->log();
+    })) << "before: "
+        << server->log();
     row_ = {name};
     lastReport_ = {};
     visitor->client().runFor(5ms);
@@ -112,7 +113,8 @@ class Attacks : public InContact {
       row_.stop_ms = milliseconds(Clock::now() - begin);
       const std::int64_t zero = arm->ticks;
       EXPECT_TRUE(visitor->until([&] { return arm->ticks > zero + 20; }));
-      for (std::int64_t tick = zero + 3; tick < zero + 20; ++tick) EXPECT_TRUE(arm.force(tick).isZero()) << tick;
+      for (std::int64_t tick = zero + 3; tick < zero + 20; ++tick)
+        EXPECT_TRUE(arm.force(tick).isZero()) << tick;
       panel.rearmForces();
       panel.flushAll();
       EXPECT_TRUE(visitor->until([&] {
@@ -129,7 +131,8 @@ class Attacks : public InContact {
         visitor->client().runFor(20ms);
       }
       return rests();
-    })) << "after: " << server->log();
+    })) << "after: "
+        << server->log();
     rows_.push_back(row_);
   }
 
@@ -169,7 +172,9 @@ class Attacks : public InContact {
     int id_;
     bool connected_ = false;
   };
-  Socket& socketTo(const net::Endpoint& to, int type = SOCK_STREAM) { return sockets_.emplace_back(to, type); }
+  Socket& socketTo(const net::Endpoint& to, int type = SOCK_STREAM) {
+    return sockets_.emplace_back(to, type);
+  }
   void poll() { visitor->client().poll(0ms); }
   void attackWithBytes(const std::string& name, std::string_view bytes, int times = 1) {
     attack(name, [&] {
@@ -215,8 +220,8 @@ class Attacks : public InContact {
   }
   static std::string header(std::uint32_t length, std::int32_t sender, std::int32_t type) {
     std::string bytes;
-    for (const std::uint32_t value : {length, 0U, 0U, static_cast<std::uint32_t>(sender),
-                                      static_cast<std::uint32_t>(type), 0U}) {
+    for (const std::uint32_t value :
+         {length, 0U, 0U, static_cast<std::uint32_t>(sender), static_cast<std::uint32_t>(type), 0U}) {
       for (int shift = 24; shift >= 0; shift -= 8) bytes += static_cast<char>(value >> shift & 0xff);
     }
     return bytes;
@@ -226,9 +231,10 @@ class Attacks : public InContact {
     for (const Row& row : rows_) {
       char line[256];
       char force[32] = "as before";
-      if (row.forceLeft_ticks >= 0) std::snprintf(force, sizeof force, "%ld", static_cast<long>(row.forceLeft_ticks));
-      std::snprintf(line, sizeof line, "| %s | %s | %.0f | %.0f | %.0f |\n", row.name.c_str(), force, row.stop_ms,
-                    row.gap_ms, row.memory_MB);
+      if (row.forceLeft_ticks >= 0)
+        std::snprintf(force, sizeof force, "%ld", static_cast<long>(row.forceLeft_ticks));
+      std::snprintf(line, sizeof line, "| %s | %s | %.0f | %.0f | %.0f |\n", row.name.c_str(), force,
+                    row.stop_ms, row.gap_ms, row.memory_MB);
       out << line;
     }
   }
@@ -313,7 +319,8 @@ TEST_F(Attacks, OfTheWebPort) {
   attackWithHttp("a path out of the pages", "GET /../../../../etc/passwd HTTP/1.1\r\n" + host + "\r\n");
   attackWithHttp("a page of another site", "GET /api/state HTTP/1.1\r\nHost: evil.example\r\n\r\n");
   attackWithHttp("a body of 1 TB", "POST / HTTP/1.1\r\n" + host + "Content-Length: 1099511627776\r\n\r\n");
-  attackWithHttp("an unknown transfer coding", "GET / HTTP/1.1\r\n" + host + "Transfer-Encoding: xchunked\r\n\r\n5\r\n");
+  attackWithHttp("an unknown transfer coding",
+                 "GET / HTTP/1.1\r\n" + host + "Transfer-Encoding: xchunked\r\n\r\n5\r\n");
   attackWithHttp("zeros", std::string(4096, '\0'));
   const std::string upgrade = "GET /vrpn HTTP/1.1\r\n" + host +
                               "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
@@ -343,20 +350,25 @@ TEST_F(Attacks, OfTheWebPort) {
 TEST_F(Attacks, OfMessages) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float huge = std::numeric_limits<float>::max();
-  attackWithMessage("a field of NaN", wire::ForceField{.origin = {nan, 0, 0}, .force = {nan, nan, nan}, .jacobian = {}, .radius = nan});
+  attackWithMessage(
+      "a field of NaN",
+      wire::ForceField{.origin = {nan, 0, 0}, .force = {nan, nan, nan}, .jacobian = {}, .radius = nan});
   attackWithMessage("a vertex number of 16 million, twice", wire::SetVertex{1, 15'999'999, {}}, 2);
   attackWithMessage("a negative vertex number", wire::SetVertex{0, -5, {}});
   attackWithMessage("an object that does not exist, 2000 times", wire::SetVertex{9999, 0, {}}, 2000);
   attackWithMessage("a million objects", wire::SetObjectNumber{1'000'000});
   attackWithMessage("10,000 objects", wire::SetObjectNumber{10'000});
   attackWithMessage("a vertex at 3e38", wire::SetVertex{2, 0, {huge, -huge, huge}});
-  attackWithMessage("20,000 moves of the scene's origin, to where it is", wire::SetSceneOrigin{{0, 0, 0}, {0, 0, 1}, 0}, 20000);
+  attackWithMessage("20,000 moves of the scene's origin, to where it is",
+                    wire::SetSceneOrigin{{0, 0, 0}, {0, 0, 1}, 0}, 20000);
   attackWithMessage("20,000 stops", wire::StopForces{}, 20000);
   attackWithMessage("a report that only servers send, 1000 times", wire::Pong{}, 1000);
   attackWithMessage("20,000 pings", wire::Ping{}, 20000);
-  attackWithMessage("5000 texts", wire::Text{.severity = 2, .level = 0, .text = std::string(200, '\x1b')}, 5000);
+  attackWithMessage("5000 texts", wire::Text{.severity = 2, .level = 0, .text = std::string(200, '\x1b')},
+                    5000);
   attackWithMessage("holds the real hand", wire::HoldHand{.hold = 1, .position = {1e300, 0, 0}});
-  attackWithMessage("a report rate of NaN", wire::TrackerSetUpdateRate{std::numeric_limits<double>::quiet_NaN()});
+  attackWithMessage("a report rate of NaN",
+                    wire::TrackerSetUpdateRate{std::numeric_limits<double>::quiet_NaN()});
   attack("unknown types, 2000 of them", [&] {
     ScriptedPeer& attacker = peer();
     for (int i = 0; i < 1900; ++i) {
@@ -411,39 +423,40 @@ TEST_F(Attacks, OfClientsThatVanish) {
     }));
   };
   const auto ended = [&] { return rests(); };
-  attackThatEnds("a field, then the client is gone", begin, [&] { peers_.clear(); }, ended);
-  attackThatEnds("a field, then a reset in the middle of a frame",
-                 begin,
-                 [&] {
-                   peers_.back().sendBytes(std::as_bytes(std::span("\0\0\4", 3)));
-                   peers_.back().close();
-                 },
-                 ended);
-  attackThatEnds("a field, then a malformed message",
-                 begin,
-                 [&] {
-                   peers_.back().sendPayload(wire::kindOf<wire::SetVertex>, std::vector<std::byte>(3));
-                   for (int i = 0; i < 10; ++i) {
-                     peers_.back().poll();
-                     poll();
-                   }
-                 },
-                 ended);
-  attackThatEnds("a field; gone while the scene is busy with another client's upload",
-                 begin,
-                 [&] {
-                   ScriptedPeer& busy = peer();
-                   busy.queue(wire::SetObjectNumber{10'000});
-                   for (int i = 0; i < 60'000; ++i) busy.queue(wire::SetSceneOrigin{{0, 0, 0}, {0, 0, 1}, 0});
-                   busy.flush();
-                   for (int i = 0; i < 50; ++i) {
-                     busy.poll();
-                     poll();
-                   }
-                   peers_.pop_front();
-                   busy.poll();
-                 },
-                 ended);
+  attackThatEnds(
+      "a field, then the client is gone", begin, [&] { peers_.clear(); }, ended);
+  attackThatEnds(
+      "a field, then a reset in the middle of a frame", begin,
+      [&] {
+        peers_.back().sendBytes(std::as_bytes(std::span("\0\0\4", 3)));
+        peers_.back().close();
+      },
+      ended);
+  attackThatEnds(
+      "a field, then a malformed message", begin,
+      [&] {
+        peers_.back().sendPayload(wire::kindOf<wire::SetVertex>, std::vector<std::byte>(3));
+        for (int i = 0; i < 10; ++i) {
+          peers_.back().poll();
+          poll();
+        }
+      },
+      ended);
+  attackThatEnds(
+      "a field; gone while the scene is busy with another client's upload", begin,
+      [&] {
+        ScriptedPeer& busy = peer();
+        busy.queue(wire::SetObjectNumber{10'000});
+        for (int i = 0; i < 60'000; ++i) busy.queue(wire::SetSceneOrigin{{0, 0, 0}, {0, 0, 1}, 0});
+        busy.flush();
+        for (int i = 0; i < 50; ++i) {
+          busy.poll();
+          poll();
+        }
+        peers_.pop_front();
+        busy.poll();
+      },
+      ended);
 }
 
 }  // namespace

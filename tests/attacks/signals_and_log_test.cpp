@@ -1,5 +1,5 @@
-// Signals, and a log that nobody reads: what they leave on the motors of a driver in the server's own process,
-// where no isolation host helps.
+// Signals, and a log that nobody reads: what they leave on the motors of a driver in the server's own
+// process, where no isolation host helps.
 #include <fcntl.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -60,7 +60,8 @@ TEST_P(EndingSignals, LeaveNoForce) {
   EXPECT_TRUE(arm.left().isZero());
   EXPECT_EQ(arm->closed, 1) << "in order";
 }
-INSTANTIATE_TEST_SUITE_P(By, EndingSignals, testing::Values(SIGHUP, SIGQUIT, SIGUSR1, SIGVTALRM, SIGRTMIN + 3),
+INSTANTIATE_TEST_SUITE_P(By, EndingSignals,
+                         testing::Values(SIGHUP, SIGQUIT, SIGUSR1, SIGVTALRM, SIGRTMIN + 3),
                          [](const auto& instance) { return "Signal" + std::to_string(instance.param); });
 
 TEST_F(Signals, OfPipesLimitsAndTerminalsAreIgnored) {
@@ -99,12 +100,14 @@ TEST_F(Signals, ToTheIsolationHostChangeNothingAndItOutlivesTheServer) {
     visitor->client().runFor(20ms);
     EXPECT_TRUE(forceRests()) << signal << server->log();
   }
-  // A server that is stopped by a debugger or SIGSTOP renews no force: three ticks, and the one that had begun.
+  // A server that is stopped by a debugger or SIGSTOP renews no force: three ticks, and the one that had
+  // begun.
   server->signal(SIGSTOP);
   ASSERT_TRUE(eventually([&] { return stateOfServer() == 'T'; }));
   const std::int64_t stopped = arm->ticks;
   ASSERT_TRUE(eventually([&] { return arm->ticks > stopped + 60; }));
-  for (std::int64_t tick = stopped + 4; tick < stopped + 60; ++tick) EXPECT_TRUE(arm.force(tick).isZero()) << tick;
+  for (std::int64_t tick = stopped + 4; tick < stopped + 60; ++tick)
+    EXPECT_TRUE(arm.force(tick).isZero()) << tick;
   server->signal(SIGKILL);
   EXPECT_NE(server->end(), -1);
   EXPECT_TRUE(eventually([&] { return arm->closed == 1; }));
@@ -140,8 +143,8 @@ class UnreadLog : public Signals {
   // More lines than a pipe holds.
   void chatter() {
     const std::size_t colon = address_.find(':');
-    const auto endpoint = net::Endpoint::parse(address_.substr(0, colon),
-                                               static_cast<std::uint16_t>(std::stoi(address_.substr(colon + 1))));
+    const auto endpoint = net::Endpoint::parse(
+        address_.substr(0, colon), static_cast<std::uint16_t>(std::stoi(address_.substr(colon + 1))));
     test::ScriptedPeer peer(endpoint);
     EXPECT_TRUE(peer.untilConnected());
     for (int i = 0; i < 100; ++i) {

@@ -202,8 +202,9 @@ TEST_F(Meshes, AVertexFarBeyondTheOthersIsRefused) {
   EXPECT_TRUE(notices_.empty());
   builder_ = SceneBuilder(simulated({}));
   say(SetVertices{0, 65'537, soup(1)});
-  EXPECT_THAT(onlyNotice(Severity::error),
-              HasSubstr("setObjectVertex object 0, vertex 65537, at most 65536 now: refused: too far beyond"));
+  EXPECT_THAT(
+      onlyNotice(Severity::error),
+      HasSubstr("setObjectVertex object 0, vertex 65537, at most 65536 now: refused: too far beyond"));
   say(SetTriangles{0, 15'999'999, {{0, 1, 2}}});
   EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("setTriangle"));
   say(SetVertices{0, 0, std::vector<Vec3f>(10'000, Vec3f::Zero())});

@@ -17,8 +17,8 @@ inline double remainingShare(base::Nanos begin, base::Nanos now) noexcept {
   return std::max(0.0, 1 - base::toSeconds(now - begin) / kReleaseTime_s);
 }
 
-/// The share of a force whose release began at `begin`, negative when it has not begun, and whose owner may be
-/// gone without the scene thread having noticed; `owner` may be null.
+/// The share of a force whose release began at `begin`, negative when it has not begun, and whose owner may
+/// be gone without the scene thread having noticed; `owner` may be null.
 inline double remainingShare(base::Nanos begin, const scene::ForceOwner* owner, base::Nanos now) noexcept {
   const double released = begin < 0 ? 1 : remainingShare(begin, now);
   return owner == nullptr ? released : std::min(released, owner->share(begin, now));

@@ -64,9 +64,9 @@ class Tick {
   scene::SnapshotSlot& snapshots() noexcept { return snapshots_; }
   /// Any thread: when the last tick ended, on the clock of the constructor; 0 before the first.
   Nanos finishedAt() const noexcept { return finishedAt_.load(std::memory_order_acquire); }
-  /// One other thread, while the loop runs: ends the force of a servo that does not finish its tick. That tick
-  /// commands zero if it ever comes to its write, and later forces ramp in. False when the driver cannot end
-  /// the force from this thread.
+  /// One other thread, while the loop runs: ends the force of a servo that does not finish its tick. That
+  /// tick commands zero if it ever comes to its write, and later forces ramp in. False when the driver cannot
+  /// end the force from this thread.
   bool overtake() noexcept {
     overtakes_.fetch_add(1, std::memory_order_acq_rel);
     return device_.zeroFromOtherThread();

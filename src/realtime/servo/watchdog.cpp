@@ -28,7 +28,8 @@ void Watchdog::stop() noexcept {
 
 Nanos Watchdog::silence() const noexcept {
   const Nanos finished = tick_.finishedAt();
-  if (!watching_.load(std::memory_order_acquire) || finished == ended_.load(std::memory_order_acquire)) return 0;
+  if (!watching_.load(std::memory_order_acquire) || finished == ended_.load(std::memory_order_acquire))
+    return 0;
   return std::max<Nanos>(clock_.now() - finished, 0);
 }
 

@@ -20,7 +20,8 @@ class Watchdog {
   static constexpr Nanos kSilence = 20'000'000;
   static constexpr Nanos kStep = 5'000'000;
 
-  /// Both must outlive the watchdog; `clock` is that of the tick. `suspended` is the total time of suspension.
+  /// Both must outlive the watchdog; `clock` is that of the tick. `suspended` is the total time of
+  /// suspension.
   Watchdog(Tick& tick, base::Clock& clock, Nanos (*suspended)() noexcept = base::suspendedTime)
       : tick_(tick), clock_(clock), suspended_(suspended) {}
   ~Watchdog() { stop(); }
@@ -51,9 +52,9 @@ class Watchdog {
   std::atomic<bool> overtook_{false};
   std::atomic<bool> canZero_{false};
   std::atomic<bool> resumed_{false};
-  bool isSetUp_ = false;      // by the thread
+  bool isSetUp_ = false;       // by the thread
   Nanos suspendedBefore_ = 0;  // likewise
-  base::Thread thread_;   // last: its step uses the others
+  base::Thread thread_;        // last: its step uses the others
 };
 
 }  // namespace hapticd::realtime

@@ -98,6 +98,8 @@ struct ServerConfig {
   std::vector<std::string> callbackHosts;  ///< hosts that a UDP request may name besides its source address
   std::string record;                  ///< recording to write; strftime conversions (%) allowed; empty: none
   std::string http = kHttpAuto;        ///< endpoint of the viewer: ADDR:PORT, kHttpAuto or kHttpOff
+  int connections = 4096;              ///< of clients at once; further ones may only stop forces
+  int connectionsPerAddress = 2048;    ///< the same for each address
   std::vector<std::string> httpAllow;  ///< additional Host names accepted at the web port: HOST or HOST:PORT
   std::vector<DeviceConfig> devices{DeviceConfig{}};
 

@@ -196,6 +196,8 @@ void validate(const ServerConfig& config) {
   checkRecord(server, config.record);
   server.range("seconds", config.seconds, 0, 1e9);
   checkHttp(server, config);
+  server.range("connections", config.connections, 1, 100'000);
+  server.range("connections_per_address", config.connectionsPerAddress, 1, 100'000);
   for (const std::string& host : config.callbackHosts) server.address("callback_hosts", host, "10.0.0.7");
   std::map<std::string, int> uses;
   std::map<std::string, const DeviceConfig*> scenes;

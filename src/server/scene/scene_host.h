@@ -50,8 +50,8 @@ class SceneHost {
   void play(scene::ClientId client, const scene::SceneCommand* command);
   /// Ramps out the forces that the client owns, however busy the scene is; the client may stay.
   void releaseForces(scene::ClientId client);
-  /// Ramps out the forces that the client owns, however busy the scene is. When the last client that commanded the scene disconnects,
-  /// clears the scene if configured so.
+  /// Ramps out the forces that the client owns, however busy the scene is. When the last client that
+  /// commanded the scene disconnects, clears the scene if configured so.
   void clientGone(scene::ClientId client);
   /// Requests a description of the scene after all flushed commands; `reply` is called in the scene thread.
   void describe(std::function<void(std::shared_ptr<const scene::SceneDescription>)> reply);

@@ -9,17 +9,20 @@
 
 namespace hapticd::server {
 
-/// Logs up to kLinesPerSource lines per second and source, and up to kLines of all sources; of the others only
-/// the number. One thread; call reportSuppressed() once per second.
+/// Logs up to kLinesPerSource lines per second and source, and up to kLines of all sources; of the others
+/// only the number. Addresses of this machine may cause kLocalLines besides. One thread; call
+/// reportSuppressed() once per second.
 class ThrottledLog {
  public:
   static constexpr int kLinesPerSource = 20;
   static constexpr int kLines = 60;
+  static constexpr int kLocalLines = 1000;
 
   /// `source` is what one client cannot change at will: its number or its address.
   void log(spdlog::level::level_enum level, const std::string& source, const std::string& text) {
-    if (lines_ < kLines && ++bySource_[source] <= kLinesPerSource) {
-      ++lines_;
+    const bool local = source.starts_with("127.");
+    if (++bySource_[source] <= (local ? kLocalLines : kLinesPerSource) && (local || lines_ < kLines)) {
+      if (!local) ++lines_;
       spdlog::log(level, "{}", text);
     } else {
       ++suppressed_;

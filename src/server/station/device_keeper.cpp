@@ -81,7 +81,7 @@ std::string DeviceKeeper::poll(Nanos now) {
     return refused;
   }
   if (watchdog_.silence() > kHang) {  // the driver may hang as well: do not call it
-    const char* const force = !watchdog_.overtook()  ? "its last force stays until the device ends it"
+    const char* const force = !watchdog_.overtook() ? "its last force stays until the device ends it"
                               : watchdog_.canZero() ? "the watchdog has ended its force"
                                                     : "the device or the isolation host ends its force";
     return std::string("the servo loop hangs: no tick has ended for more than 1 s; ") + force +

@@ -264,8 +264,9 @@ void Station::Impl::onPublished(const scene::SceneSnapshot& snapshot) {
         planStrokes(snapshot, workspaceOf(config, profile), base::now()), device::WaypointPath::Repeat::yes));
   } catch (const std::exception& error) {
     // The scene is published all the same. Once for each change of its objects.
-    spdlog::warn("device '{}': the scripted hand finds no path over this scene and keeps the previous one: {}",
-                 config.names.front(), error.what());
+    spdlog::warn(
+        "device '{}': the scripted hand finds no path over this scene and keeps the previous one: {}",
+        config.names.front(), error.what());
   }
 }
 

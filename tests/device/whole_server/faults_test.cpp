@@ -228,7 +228,8 @@ TEST(InitFailure, EndsTheServerWithWords) {
     std::string words;
   };
   const std::vector<Start> starts{
-      {{"--device", "openhaptics", "--in-process"}, "no OpenHaptics device opens: the default device: HD_DEVICE_FAULT"},
+      {{"--device", "openhaptics", "--in-process"},
+       "no OpenHaptics device opens: the default device: HD_DEVICE_FAULT"},
       {{"--device", "openhaptics", "--isolate"},
        "no OpenHaptics device opens: the default device: HD_DEVICE"},
       {{"--device", "forcedimension"}, "Force Dimension device 0 does not open: mock error"},

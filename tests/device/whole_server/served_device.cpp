@@ -91,7 +91,8 @@ ServerProcess::ServerProcess(const WorkDirectory& work, const std::vector<std::s
   if (output >= 0) {
     posix_spawn_file_actions_adddup2(&files, output, STDOUT_FILENO);
   } else {
-    posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, log_.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0600);
+    posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, log_.c_str(), O_WRONLY | O_CREAT | O_APPEND,
+                                     0600);
   }
   posix_spawn_file_actions_adddup2(&files, STDOUT_FILENO, STDERR_FILENO);
   const int error =

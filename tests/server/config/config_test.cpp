@@ -190,6 +190,8 @@ ServerConfig unusual() {
   config.record = "session.haptics";
   config.http = "10.0.0.1:9000";
   config.httpAllow = {"lab7"};
+  config.connections = 12;
+  config.connectionsPerAddress = 7;
   DeviceConfig device;
   device.names = {"Left \"hand\" \\", "Tracker0"};
   device.driver = "evdev";
@@ -243,15 +245,17 @@ TEST(Config, ADriverWithoutAVendorLibraryCannotBeIsolated) {
 
 TEST(Config, IsolationIsTheDriversChoiceUnlessConfigured) {
   EXPECT_EQ(parseConfig("", "test").devices.front().isolate, std::nullopt);
-  EXPECT_EQ(parseConfig("[[device]]\ndriver = \"openhaptics\"\nisolate = false\n", "test").devices.front().isolate,
-            false);
+  EXPECT_EQ(
+      parseConfig("[[device]]\ndriver = \"openhaptics\"\nisolate = false\n", "test").devices.front().isolate,
+      false);
   EXPECT_TRUE(device::findDriver("openhaptics")->isolatedByDefault) << "HDAPI has no watchdog";
 }
 
 TEST(Config, WhatCannotWorkIsRefused) {
   EXPECT_THAT(errorOf("listen = \"127.0.0.1:4000\"\nhttp = \"127.0.0.1:4000\"\n"),
               HasSubstr("http: \"127.0.0.1:4000\" is the port of listen"));
-  EXPECT_THAT(errorOf("listen = \"0.0.0.0:4000\"\nhttp = \"127.0.0.1:4000\"\n"), HasSubstr("use another port"));
+  EXPECT_THAT(errorOf("listen = \"0.0.0.0:4000\"\nhttp = \"127.0.0.1:4000\"\n"),
+              HasSubstr("use another port"));
   EXPECT_EQ(errorOf("listen = \"127.0.0.1:4000\"\nhttp = \"127.0.0.2:4000\"\n"), "");
   EXPECT_EQ(errorOf("listen = \"127.0.0.1:0\"\nhttp = \"127.0.0.1:0\"\n"), "");
   EXPECT_THAT(errorOf("[[device]]\nworkspace = [0, 0, 0, 1e-300, 100, 100]\n"),
