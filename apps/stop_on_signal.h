@@ -1,7 +1,5 @@
-// SIGINT and SIGTERM shut a server down in order: zero force first.
+// Signals that would end or stop a server bring its forces to zero first.
 #pragma once
-
-#include <pthread.h>
 
 #include <atomic>
 #include <csignal>
@@ -11,35 +9,29 @@
 
 namespace hapticd::apps {
 
-/// Blocks both signals in the calling thread, so construct it before any other thread starts.
+/// Blocks the signals in the calling thread, so construct it before any other thread starts. SIGINT, SIGTERM,
+/// SIGHUP, SIGQUIT and all others that by default end a process end the server in order. SIGTSTP stops the
+/// forces before it stops the process; they stay stopped when it continues. SIGPIPE, SIGXFSZ and those of a
+/// background process at a terminal are ignored. A crash is not handled: see docs/safety.md.
 class StopOnSignal {
  public:
-  StopOnSignal() {
-    sigemptyset(&signals_);
-    sigaddset(&signals_, SIGINT);
-    sigaddset(&signals_, SIGTERM);
-    pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
-  }
-  /// Calls server.stop() at the first signal, from a separate thread, until finish().
-  void watch(server::Server& server) {
-    thread_ = std::thread([this, &server] {
-      int signal = 0;
-      sigwait(&signals_, &signal);
-      if (!finished_) server.stop();
-    });
-  }
-  /// Call it before the server ends: its thread uses the server no more. Idempotent.
-  void finish() {
-    if (!thread_.joinable()) return;
-    finished_ = true;
-    pthread_kill(thread_.native_handle(), SIGTERM);
-    thread_.join();
-  }
+  StopOnSignal();
   ~StopOnSignal() { finish(); }
+  StopOnSignal(const StopOnSignal&) = delete;
+  StopOnSignal& operator=(const StopOnSignal&) = delete;
+
+  /// Handles signals in a separate thread that waits for no other, until finish(). A server that has not ended 10 s
+  /// after a signal is ended by _exit().
+  void watch(server::Server& server);
+  /// Its thread uses the server no more. Idempotent; the destructor calls it.
+  void finish();
 
  private:
+  void run(server::Server& server);
+  void end(server::Server& server, int signal);
+
   sigset_t signals_{};
-  std::atomic<bool> finished_{false};
+  std::atomic<bool> leaving_{false};
   std::thread thread_;
 };
 
