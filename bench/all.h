@@ -10,6 +10,7 @@ Outcome measureObjects(const Run& run);
 Outcome measureWakeup(const Run& run);
 Outcome measureDisturbance(const Run& run);
 Outcome measureStop(const Run& run);
+Outcome measureRemote(const Run& run);
 Outcome measureLatency(const Run& run);
 Outcome measureUpload(const Run& run);
 Outcome measureFanOut(const Run& run);

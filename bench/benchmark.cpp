@@ -15,6 +15,8 @@ const std::vector<Benchmark>& benchmarks() {
        "the same server just before, undisturbed", &measureDisturbance},
       {"stop", "From a client's stop to the first tick that writes zero, while others upload",
        "the same server, undisturbed", &measureStop},
+      {"remote", "The stiffest wall that settles when a client streams it, and the servo's time for contacts",
+       "the same wall in the server's scene, at 1 kHz; a tick without contacts", &measureRemote},
       {"latency", "From the servo's tick to the callback of a client, isTouching at 1 kHz",
        "a raw pipeline: thread, wake, thread, TCP, blocking reader; 32 bytes at 1 kHz", &measureLatency},
       {"upload", "Meshes into the server", "raw TCP of the same bytes into a process that drops them",

@@ -21,6 +21,7 @@
 #include "hapticd/error.h"
 #include "hapticd/export.h"
 #include "hapticd/extensions.h"
+#include "hapticd/remote.h"
 #include "hapticd/reports.h"
 #include "hapticd/scene.h"
 #include "hapticd/statistics.h"
@@ -129,6 +130,8 @@ class HAPTICD_EXPORT Client {
   Subscription onTick(Callback<TickReport> callback);
   /// Only after subscribe(Reports::contacts).
   Subscription onContacts(Callback<ContactsReport> callback);
+  /// Only after subscribe(Reports::hand).
+  Subscription onHand(Callback<HandReport> callback);
   Subscription onGuard(Callback<GuardReport> callback);
   /// Connections and losses from now on. The constructor's connection is reported by the first poll().
   Subscription onConnection(Callback<ConnectionReport> callback);
@@ -221,6 +224,24 @@ class HAPTICD_EXPORT Client {
   void holdHand(const HandPose& pose);
   /// Releases the simulated hand. Disconnecting releases it, too.
   void releaseHand();
+
+  // --- Streamed state, for simulations that run in the client. Each call is sent at once, even inside
+  // batch() and ahead of everything collected, by datagram where the connection has them: the newest value
+  // wins, and a lost one is not repeated, so call at a steady rate of 30 to 1000 Hz. Dropped without a
+  // connection. One client streams each kind to a device at a time; the server refuses others with a text.
+
+  /// Replaces this client's contacts, at most 16. The server renders them at its servo rate, moves them by
+  /// their velocities, and takes over changes within 0.3 N/ms. Contacts that are not repeated end at the end
+  /// of their lifetime, contacts that are absent from a later call fade out at once, all of them when the
+  /// client leaves. HandReport has the force of each. Throws std::invalid_argument for more than 16.
+  void setRemoteContacts(std::span<const RemoteContact> contacts);
+  /// Has a force (N, world frame) held until the next call, at most for `lifetime` (10 to 100 ms). The server
+  /// changes it by at most 0.3 N/ms, and cuts the part that adds power to the hand when its budget of energy
+  /// is spent (HandReport::energySpent). A torque (N m) is felt only on devices that render it; a text says
+  /// when it is not. Prefer setRemoteContacts() for everything that is stiff: a force is always late by the
+  /// round trip.
+  void setForce(const std::array<double, 3>& force_N, const std::array<double, 3>& torque_Nm = {},
+                Duration lifetime = std::chrono::milliseconds(100));
 
   // --- Stock VRPN scene, in metres. The first of these calls that names an object makes it an object in
   // metres.

@@ -21,6 +21,7 @@ struct Capabilities {
   int buttons = 0;                         ///< number of buttons
   std::array<double, 3> workspaceMin_m{};  ///< reach of the device in its own frame, real metres
   std::array<double, 3> workspaceMax_m{};
+  bool remoteContacts = false;  ///< Client::setRemoteContacts(), setForce() and Reports::hand
 };
 
 /// Kinds of reports to subscribe to; combine them by |. Force errors, guard states and texts are always sent.
@@ -32,8 +33,9 @@ enum class Reports : std::uint32_t {
   analog = 8,
   tick = 16,      ///< TickReport
   contacts = 32,  ///< ContactsReport
+  hand = 64,      ///< HandReport
   usual = 15,     ///< what a client without a subscription receives
-  all = 63
+  all = 127
 };
 constexpr Reports operator|(Reports a, Reports b) {
   return static_cast<Reports>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));

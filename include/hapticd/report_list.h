@@ -22,4 +22,5 @@
   X(workspace, Workspace, "workspace")              \
   X(tick, Tick, "tick")                             \
   X(contacts, Contacts, "contacts")                 \
-  X(guard, Guard, "guard")
+  X(guard, Guard, "guard")                          \
+  X(hand, Hand, "hand")

@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -178,6 +179,39 @@ struct ContactsReport {
   std::vector<Contact> contacts;
 };
 
+/// A contact of Client::setRemoteContacts() that exerts force.
+struct RemoteContactForce {
+  int id = 0;
+  Vec3 proxy_m{};  ///< the point of the rendered surface nearest to the device
+  Vec3 force_N{};  ///< on the hand; the object receives the opposite
+  double depth_m = 0;
+};
+
+/// What a client needs that streams contacts or forces: the newest tick at the time of sending. See
+/// Client::subscribe().
+struct HandReport {
+  Time time;
+  std::uint64_t tick = 0;               ///< as in TickReport
+  std::chrono::nanoseconds tickTime{};  ///< on the monotonic clock of the server
+  /// When this client sent the newest contacts and force that the tick knows, on its own
+  /// std::chrono::steady_clock; 0: none.
+  std::chrono::nanoseconds contactsSent{};
+  std::chrono::nanoseconds forceSent{};
+  Vec3 position_m{};                   ///< haptic interface point: where the device is
+  Quaternion orientation{0, 0, 0, 1};  ///< from stylus to world
+  Vec3 velocity_m_per_s{};
+  Vec3 angularVelocity_rad_per_s{};
+  Vec3 force_N{};       ///< on the hand, as written to the device: all forces together
+  Vec3 heldForce_N{};   ///< the part of Client::setForce(), before the guard
+  double energy_J = 0;  ///< that the held force may still add to the hand
+  std::optional<double> gripper_rad;
+  std::uint32_t buttons = 0;     ///< bit 0: button 0 is down
+  bool energySpent = false;      ///< the part of the held force that adds power is cut
+  bool correctionsHeld = false;  ///< a remote contact moved without a stated velocity and waits for energy
+  Trips guardActive;
+  std::vector<RemoteContactForce> contacts;
+};
+
 /// State of the guard: why the force may differ from the rendered one. Sent on change and to each new client.
 struct GuardReport {
   Time time;
@@ -227,6 +261,7 @@ struct LatestReports {
   TickReport tick;
   ContactsReport contacts;
   GuardReport guard;
+  HandReport hand;
 };
 
 }  // namespace hapticd

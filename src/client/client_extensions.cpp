@@ -79,7 +79,8 @@ std::optional<Capabilities> Client::capabilities() const {
                       c.peak_force,
                       c.buttons,
                       {w[0], w[1], w[2]},
-                      {w[3], w[4], w[5]}};
+                      {w[3], w[4], w[5]},
+                      impl_->has(wire::kFeatureRemoteContacts)};
 }
 
 std::optional<Capabilities> Client::waitCapabilities() {
@@ -169,6 +170,49 @@ void Client::enableHeartbeat(bool enable) {
   impl_->heartbeatTimer = impl_->link.every(kHeartbeatInterval, [impl = impl_.get()] {
     if (impl->link.connected()) impl->link.sendNow(impl->sender, wire::Heartbeat{1});
   });
+}
+
+// --- streamed state
+
+namespace {
+
+void append(std::vector<double>& numbers, const std::array<double, 3>& v) {
+  numbers.insert(numbers.end(), v.begin(), v.end());
+}
+
+}  // namespace
+
+void Client::setRemoteContacts(std::span<const RemoteContact> contacts) {
+  if (contacts.size() > wire::RemoteContacts::kMost) {
+    throw std::invalid_argument("setRemoteContacts(): " + std::to_string(contacts.size()) +
+                                " contacts; give the 16 nearest to the hand");
+  }
+  if (connected()) impl_->require(wire::kFeatureRemoteContacts, "stream contacts");
+  wire::RemoteContacts message{
+      .time = base::now(), .state_time = impl_->latest.hand.tickTime.count(), .contacts = {}};
+  std::vector<double>& numbers = message.contacts.values;
+  numbers.reserve(contacts.size() * wire::RemoteContacts::kNumbers);
+  for (const RemoteContact& c : contacts) {
+    numbers.insert(numbers.end(), {double(c.id), double(static_cast<int>(c.shape)), c.radius_m});
+    append(numbers, c.point_m);
+    append(numbers, c.normal);
+    append(numbers, c.axis);
+    append(numbers, c.velocity_m_per_s);
+    append(numbers, c.angularVelocity_rad_per_s);
+    numbers.insert(numbers.end(),
+                   {c.stiffness_N_per_m, c.damping_Ns_per_m, c.staticFriction, c.dynamicFriction,
+                    std::chrono::duration<double>(c.lifetime).count(), c.yields ? 1.0 : 0.0});
+  }
+  impl_->link.sendNow(impl_->sender, message, wire::Reliability::kLowLatency);
+}
+
+void Client::setForce(const std::array<double, 3>& force_N, const std::array<double, 3>& torque_Nm,
+                      Duration lifetime) {
+  if (connected()) impl_->require(wire::kFeatureRemoteContacts, "hold a force");
+  impl_->link.sendNow(
+      impl_->sender,
+      wire::HeldForce{base::now(), force_N, torque_Nm, std::chrono::duration<double>(lifetime).count()},
+      wire::Reliability::kLowLatency);
 }
 
 // --- the simulated hand

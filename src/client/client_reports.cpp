@@ -1,4 +1,6 @@
 // From arrivals to reports: decodes, counts, stores and delivers them.
+#include <algorithm>
+
 #include "client/client_impl.h"
 #include "wire/codec.h"
 #include "wire/text.h"
@@ -60,6 +62,9 @@ void keep(LatestReports& latest, const ContactsReport& r) {
 void keep(LatestReports& latest, const GuardReport& r) {
   latest.guard = r;
 }
+void keep(LatestReports& latest, const HandReport& r) {
+  latest.hand = r;
+}
 template <class Other>
 void keep(LatestReports&, const Other&) {}
 
@@ -90,6 +95,37 @@ ContactsReport toReport(const wire::ContactList& m) {
                                {n[i + 1], n[i + 2], n[i + 3]},
                                {n[i + 4], n[i + 5], n[i + 6]},
                                {n[i + 7], n[i + 8], n[i + 9]}});
+  }
+  return report;
+}
+
+HandReport toReport(const wire::HandState& m) {
+  HandReport report{{},
+                    m.tick,
+                    std::chrono::nanoseconds(m.time),
+                    std::chrono::nanoseconds(m.contacts_time),
+                    std::chrono::nanoseconds(m.force_time),
+                    m.position,
+                    m.orientation,
+                    m.velocity,
+                    m.angular_velocity,
+                    m.force,
+                    m.held_force,
+                    m.energy,
+                    std::nullopt,
+                    m.buttons,
+                    (m.flags & wire::kHandEnergySpent) != 0,
+                    (m.flags & wire::kHandCorrectionsHeld) != 0,
+                    Trips(m.guard_active),
+                    {}};
+  if ((m.flags & wire::kHandHasGripper) != 0) report.gripper_rad = m.gripper;
+  constexpr std::size_t kNumbers = wire::HandState::kNumbers;
+  const std::vector<double>& n = m.contacts.values;
+  for (std::size_t i = 0; i + kNumbers <= n.size(); i += kNumbers) {
+    report.contacts.push_back({static_cast<int>(std::clamp(n[i], -2147483648.0, 2147483647.0)),
+                               {n[i + 1], n[i + 2], n[i + 3]},
+                               {n[i + 4], n[i + 5], n[i + 6]},
+                               n[i + 7]});
   }
   return report;
 }
@@ -206,6 +242,8 @@ void Client::Impl::dispatchMessage(const Arrival& a) {
       return decode<wire::TickReport>(a, [&](const auto& m) { deliver(a, toReport(m)); });
     case wire::kindOf<wire::ContactList>:
       return decode<wire::ContactList>(a, [&](const auto& m) { deliver(a, toReport(m)); });
+    case wire::kindOf<wire::HandState>:
+      return decode<wire::HandState>(a, [&](const auto& m) { deliver(a, toReport(m)); });
     case wire::kindOf<wire::GuardState>:
       return decode<wire::GuardState>(a, [&](const auto& m) {
         deliver(a, GuardReport{{}, Trips(m.active), Trips(m.latched), m.armed != 0, m.stopped != 0});

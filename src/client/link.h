@@ -90,15 +90,16 @@ class Link {
   /// The same for an encoded payload.
   void sendRaw(wire::Time time, wire::LocalSender sender, wire::LocalType type, wire::ByteView payload,
                wire::Reliability reliability);
-  /// Sends a message now and reliably, ahead of what is held. Without a connection: counts it as dropped,
-  /// returns false.
+  /// Sends a message now, ahead of what is held, and reliably unless it says otherwise. Without a connection:
+  /// counts it as dropped, returns false.
   template <wire::WireMessage M>
-  bool sendNow(wire::LocalSender sender, const M& message) {
+  bool sendNow(wire::LocalSender sender, const M& message,
+               wire::Reliability reliability = wire::Reliability::kReliable) {
     if (!connected()) {
       ++statistics_.messagesDropped;
       return false;
     }
-    peer_->send(wireNow(), sender, message, wire::Reliability::kReliable);
+    peer_->send(wireNow(), sender, message, reliability);
     ++statistics_.messagesOut;
     pushOut();
     return true;

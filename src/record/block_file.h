@@ -19,7 +19,8 @@ enum class BlockKind : std::uint32_t {
   ticks = 4,
   lost = 5,
   end = 6,
-  law = 7
+  law = 7,
+  stream = 8
 };
 
 inline constexpr std::size_t kMagicBytes = 8;

@@ -71,6 +71,10 @@ std::vector<Difference> compare(const std::filesystem::path& session, const Rere
     }
     const auto* lost = std::get_if<LostEvent>(&event);
     if (lost != nullptr && lost->what == LostEvent::What::ticks) devices[lost->device].addLost(lost->count);
+    if (lost != nullptr && lost->what == LostEvent::What::streamed) {
+      remark = "the recorder lost " + std::to_string(lost->count) +
+               " streamed values: their remote contacts and forces are missing. ";
+    }
     if (lost != nullptr && lost->what == LostEvent::What::sceneEvents) {
       remark = "the recorder lost " + std::to_string(lost->count) +
                " scene events: from there on the scene is another. ";

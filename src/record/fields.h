@@ -229,4 +229,55 @@ void fields(T& seen, V&& v) {
   v("ramps", ramps);
 }
 
+template <Is<realtime::RemoteContact> T, class V>
+void fields(T& contact, V&& v) {
+  auto& [id, shape, yields, radius_m, point_m, normal, axis, velocity_m_per_s, angularVelocity_rad_per_s,
+         stiffness_N_per_m, damping_Ns_per_m, staticFriction, dynamicFriction, lifetime] = contact;
+  v("id", id);
+  v("shape", shape);
+  v("yields", yields);
+  v("radius_m", radius_m);
+  v("point_m", point_m);
+  v("normal", normal);
+  v("axis", axis);
+  v("velocity_m_per_s", velocity_m_per_s);
+  v("angular_velocity_rad_per_s", angularVelocity_rad_per_s);
+  v("stiffness_N_per_m", stiffness_N_per_m);
+  v("damping_Ns_per_m", damping_Ns_per_m);
+  v("static_friction", staticFriction);
+  v("dynamic_friction", dynamicFriction);
+  v("lifetime_ns", lifetime);
+}
+
+/// Without the contacts, of which there are `count`.
+template <Is<realtime::RemoteContactSet> T, class V>
+void fields(T& set, V&& v) {
+  auto& [number, clientTime, received, stated, count, contacts] = set;
+  v("number", number);
+  v("client_time_ns", clientTime);
+  v("received_ns", received);
+  v("stated_ns", stated);
+  v("count", count);
+  static_cast<void>(contacts);
+}
+
+template <Is<realtime::EnergyBudget> T, class V>
+void fields(T& budget, V&& v) {
+  auto& [start_J, capacity_J, refill_W] = budget;
+  v("start_J", start_J);
+  v("capacity_J", capacity_J);
+  v("refill_W", refill_W);
+}
+
+template <Is<realtime::HeldForce> T, class V>
+void fields(T& force, V&& v) {
+  auto& [number, clientTime, received, lifetime, force_N, budget] = force;
+  v("number", number);
+  v("client_time_ns", clientTime);
+  v("received_ns", received);
+  v("lifetime_ns", lifetime);
+  v("force_N", force_N);
+  v("budget", budget);
+}
+
 }  // namespace hapticd::record

@@ -30,7 +30,7 @@ Recorder::Recorder(std::filesystem::path file, OnProblem onProblem, const Record
 
 std::uint32_t Recorder::addDevice(RecordedDevice device) {
   header_.push_back(std::move(device));
-  devices_.push_back(std::make_unique<Device>(options_.ticks));
+  devices_.push_back(std::make_unique<Device>(options_.ticks, options_.streamed));
   return static_cast<std::uint32_t>(devices_.size() - 1);
 }
 
@@ -107,19 +107,35 @@ void Recorder::drain() {
     lostEvents = lostEvents_;
   }
   appendLost(LostEvent::What::sceneEvents, 0, lostEvents, counts_.lostSceneEvents);
-  for (std::uint32_t i = 0; i < devices_.size(); ++i) appendTicks(i, *devices_[i]);
+  for (std::uint32_t i = 0; i < devices_.size(); ++i) {
+    appendStreamed(i, *devices_[i]);  // after the rings of ticks for the same reason as the events
+    appendTicks(i, *devices_[i]);
+  }
   write();
   reportLosses();
 }
 
 void Recorder::reportLosses() {
-  const std::uint64_t losses = counts_.lostTicks + counts_.lostSceneEvents;
+  const std::uint64_t losses = counts_.lostTicks + counts_.lostSceneEvents + counts_.lostStreamed;
   if (losses == reportedLosses_ || base::now() < nextLossReport_ || !file_) return;
   reportedLosses_ = losses;
   nextLossReport_ = base::now() + kBetweenLossReports;
-  onProblem_("recording to '" + path_.string() + "': " + std::to_string(counts_.lostTicks) + " ticks and " +
-             std::to_string(counts_.lostSceneEvents) +
-             " scene events lost so far because the disk is too slow; record to a faster one");
+  onProblem_("recording to '" + path_.string() + "': " + std::to_string(counts_.lostTicks) + " ticks, " +
+             std::to_string(counts_.lostSceneEvents) + " scene events and " +
+             std::to_string(counts_.lostStreamed) +
+             " streamed values lost so far because the disk is too slow; record to a faster one");
+}
+
+void Recorder::appendStreamed(std::uint32_t number, Device& device) {
+  device.streams.consume([&](const realtime::StreamRecord& stream) {
+    Bytes content;
+    Packer(content).put(number);
+    packStream(stream, content);
+    appendBlock(out_, BlockKind::stream, content);
+  });
+  const std::uint64_t before = device.lostStreamed;
+  appendLost(LostEvent::What::streamed, number, device.streams.dropped(), device.lostStreamed);
+  counts_.lostStreamed += device.lostStreamed - before;
 }
 
 void Recorder::appendTicks(std::uint32_t number, Device& device) {

@@ -20,6 +20,7 @@ namespace hapticd::record {
 
 struct RecorderOptions {
   std::size_t ticks = 4096;              ///< of one device that may wait to be written
+  std::size_t streamed = 512;            ///< values that clients stream to one device, the same
   std::size_t sceneBytes = 256U << 20U;  ///< of scene events that may wait to be written
 };
 
@@ -29,6 +30,7 @@ struct RecorderCounts {
   std::uint64_t ticks = 0;
   std::uint64_t lostTicks = 0;
   std::uint64_t lostSceneEvents = 0;
+  std::uint64_t lostStreamed = 0;
 };
 
 class Recorder {
@@ -51,6 +53,8 @@ class Recorder {
   std::uint32_t addDevice(RecordedDevice device);
   /// For Tick::recordTo(); lives as long as the recorder.
   realtime::RecordRing& ring(std::uint32_t device) { return devices_[device]->ring; }
+  /// The same for what clients stream.
+  realtime::StreamRing& streamRing(std::uint32_t device) { return devices_[device]->streams; }
   /// For SceneConfig::stopwatch of a device: keeps its readings for the next recordPublish() of the device.
   /// The scene thread calls it.
   std::function<Nanos()> stopwatch(std::uint32_t device);
@@ -73,18 +77,21 @@ class Recorder {
 
  private:
   struct Device {
-    explicit Device(std::size_t ticks) : ring(ticks) {}
+    Device(std::size_t ticks, std::size_t streamed) : ring(ticks), streams(streamed) {}
     realtime::RecordRing ring;
+    realtime::StreamRing streams;
     std::vector<Nanos> readings;  // of the stopwatch; scene thread
     TickPacker packer;            // from here on: recorder thread
     Bytes run;
     std::uint64_t lost = 0;
+    std::uint64_t lostStreamed = 0;
     Nanos newest = 0;
   };
 
   void drain();
   void appendEvent(BlockKind kind, Bytes&& content);
   void appendTicks(std::uint32_t number, Device& device);
+  void appendStreamed(std::uint32_t number, Device& device);
   void appendLost(LostEvent::What what, std::uint32_t device, std::uint64_t total, std::uint64_t& known);
   void write();
   void fail(const std::error_code& error);

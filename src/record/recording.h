@@ -75,6 +75,12 @@ struct PublishEvent {
   std::vector<Nanos> stopwatch;  ///< its readings since the previous event
 };
 
+/// What clients streamed, in the first tick that knew it; precedes that tick.
+struct StreamEvent {
+  std::uint32_t device = 0;
+  realtime::StreamRecord stream;
+};
+
 /// One tick of a device.
 struct TickEvent {
   std::uint32_t device = 0;
@@ -83,9 +89,9 @@ struct TickEvent {
 
 /// Data is missing here because the disk was too slow.
 struct LostEvent {
-  enum class What : std::int32_t { ticks, sceneEvents };
+  enum class What : std::int32_t { ticks, sceneEvents, streamed };
   What what = What::ticks;
-  std::uint32_t device = 0;  ///< for ticks
+  std::uint32_t device = 0;  ///< for ticks and streamed values
   std::uint64_t count = 0;   ///< since the previous such event
 };
 
@@ -94,6 +100,6 @@ struct EndEvent {
   Nanos time = 0;
 };
 
-using RecordingEvent = std::variant<SceneEvent, PublishEvent, TickEvent, LostEvent, EndEvent>;
+using RecordingEvent = std::variant<SceneEvent, PublishEvent, StreamEvent, TickEvent, LostEvent, EndEvent>;
 
 }  // namespace hapticd::record

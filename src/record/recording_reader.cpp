@@ -94,6 +94,13 @@ bool RecordingReader::readBlock(RecordingEvent& event) {
       ticks_.emplace(in.rest());
       break;
     }
+    case BlockKind::stream: {
+      Unpacker in(block_.content);
+      StreamEvent& stream = event.emplace<StreamEvent>();
+      device = stream.device = in.next<std::uint32_t>();
+      if (!unpackStream(in, stream.stream) || !in.rest().empty()) fail("a damaged streamed value");
+      break;
+    }
     case BlockKind::lost:
       takeWhole<LostEvent>(event);
       device = std::get<LostEvent>(event).device;

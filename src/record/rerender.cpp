@@ -124,6 +124,7 @@ struct Rerenderer::Seat {
   std::shared_ptr<const scene::SceneSnapshot> newest;
   std::deque<std::pair<std::uint64_t, std::shared_ptr<const scene::SceneSnapshot>>> unseen;
   std::uint64_t shown = 0;
+  std::deque<realtime::StreamRecord> streamed;  // not yet seen by a tick
 
   base::SimulatedClock clock;
   RecordedHand device;
@@ -141,6 +142,7 @@ Rerenderer::~Rerenderer() = default;
 const TickReport* Rerenderer::feed(const RecordingEvent& event) {
   if (const auto* command = std::get_if<SceneEvent>(&event)) on(*command);
   if (const auto* published = std::get_if<PublishEvent>(&event)) on(*published);
+  if (const auto* streamed = std::get_if<StreamEvent>(&event)) on(*streamed);
   if (const auto* tick = std::get_if<TickEvent>(&event)) return on(*tick);
   return nullptr;
 }
@@ -176,11 +178,17 @@ void Rerenderer::on(const PublishEvent& event) {
   if (event.revision != 0) seat.unseen.emplace_back(event.revision, seat.newest);
 }
 
+void Rerenderer::on(const StreamEvent& event) {
+  seats_.at(event.device)->streamed.push_back(event.stream);
+}
+
 const TickReport* Rerenderer::on(const TickEvent& event) {
   Seat& seat = *seats_.at(event.device);
   const TickReport& recorded = event.tick.report;
   seat.publish(recorded.revision);
   seat.apply(event.tick.control);
+  for (; !seat.streamed.empty() && seat.streamed.front().tick <= recorded.tick; seat.streamed.pop_front())
+    seat.tick.remote().write(seat.streamed.front().input);
   seat.device.use(event.tick);
   seat.tick(
       {recorded.time, recorded.timing.wakeupError, recorded.timing.overruns, recorded.timing.skippedPeriods});

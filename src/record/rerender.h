@@ -48,6 +48,7 @@ class Rerenderer {
 
   void on(const SceneEvent& event);
   void on(const PublishEvent& event);
+  void on(const StreamEvent& event);
   const realtime::TickReport* on(const TickEvent& event);
 
   std::vector<std::unique_ptr<Seat>> seats_;

@@ -54,6 +54,26 @@ void TickPacker::add(const TickRecord& tick, Bytes& out) {
   before_ = report;
 }
 
+void packStream(const realtime::StreamRecord& stream, Bytes& out) {
+  const realtime::RemoteContactSet& set = stream.input.contacts;
+  Packer pack(out);
+  pack.put(stream.tick);
+  pack.put(set);
+  for (std::uint32_t i = 0; i < set.count; ++i) pack.put(set.contacts[i]);
+  pack.put(stream.input.force);
+}
+
+bool unpackStream(Unpacker& in, realtime::StreamRecord& stream) {
+  stream = realtime::StreamRecord();
+  realtime::RemoteContactSet& set = stream.input.contacts;
+  in.take(stream.tick);
+  in.take(set);
+  if (!in.ok() || set.count > set.contacts.size()) return false;
+  for (std::uint32_t i = 0; i < set.count; ++i) in.take(set.contacts[i]);
+  in.take(stream.input.force);
+  return in.ok();
+}
+
 bool TickUnpacker::next(TickRecord& tick) {
   if (!ok_ || in_.rest().empty()) return false;
   tick = TickRecord();

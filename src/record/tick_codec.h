@@ -19,6 +19,11 @@ class TickPacker {
   realtime::TickReport before_;
 };
 
+/// Appends what was streamed.
+void packStream(const realtime::StreamRecord& stream, Bytes& out);
+/// Takes one; false when it is damaged.
+bool unpackStream(Unpacker& in, realtime::StreamRecord& stream);
+
 /// Takes the ticks of one run.
 class TickUnpacker {
  public:

@@ -61,7 +61,8 @@ using AllMessages = MessageList<
     AnalogChannels,
     // Our own
     QueryCapabilities, Capabilities, MeshVertices, MeshTriangles, BatchBegin, BatchCommit, Subscribe,
-    TickReport, ContactList, StopForces, RearmForces, GuardState, Heartbeat, HoldHand>;
+    TickReport, ContactList, StopForces, RearmForces, GuardState, Heartbeat, HoldHand, RemoteContacts,
+    HeldForce, HandState>;
 
 /// Which message: a small integer for switch and table look-up, `case kindOf<SetVertex>:`.
 enum class MessageKind : std::uint8_t {};

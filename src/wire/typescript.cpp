@@ -104,6 +104,7 @@ std::string messagesAsTypeScript() {
   constant("REPORT_ANALOG", kReportAnalog);
   constant("REPORT_TICK", kReportTick);
   constant("REPORT_CONTACTS", kReportContacts);
+  constant("REPORT_HAND", kReportHand);
   text += "/** Bits of Capabilities.features. */\n";
   constant("FEATURE_BULK_MESH", kFeatureBulkMesh);
   constant("FEATURE_BATCH", kFeatureBatch);
@@ -111,6 +112,7 @@ std::string messagesAsTypeScript() {
   constant("FEATURE_STOP", kFeatureStop);
   constant("FEATURE_HEARTBEAT", kFeatureHeartbeat);
   constant("FEATURE_HOLD_HAND", kFeatureHoldHand);
+  constant("FEATURE_REMOTE_CONTACTS", kFeatureRemoteContacts);
   return text;
 }
 

@@ -33,6 +33,7 @@ TEST_P(BothWays, ReceivesTheCapabilities) {
   ASSERT_TRUE(c);
   EXPECT_EQ(c->version, 1);
   EXPECT_TRUE(c->bulkMesh && c->batch && c->subscribe && c->stop && c->heartbeat && c->holdHand);
+  EXPECT_TRUE(c->remoteContacts);
   EXPECT_EQ(c->servoRate_Hz, 1000);
   EXPECT_EQ(c->reportRate_Hz, 250);
   EXPECT_EQ(c->peakForce_N, 3.3);
@@ -333,6 +334,55 @@ TEST(Extensions, TheHandIsHeldAndReleasedInOrder) {
   EXPECT_TRUE(is(received[1], wire::HoldHand{1, {4, 5, 6}, {0, 0, 0, 1}, 0}));
   EXPECT_TRUE(is(received[2], wire::HoldHand{}));
   for (const Received& t : received) EXPECT_FALSE(t.byDatagram);
+}
+
+TEST_P(BothWays, StreamedStateIsSentAtOnce) {
+  ScriptedServer server(able());
+  Client client(name(server));
+  ASSERT_TRUE(client.waitCapabilities());
+  RemoteContact contact;
+  contact.id = 7;
+  contact.shape = RemoteShape::cylinder;
+  contact.point_m = {1, 2, 3};
+  contact.normal = {4, 5, 6};
+  contact.radius_m = 7;
+  contact.axis = {8, 9, 10};
+  contact.velocity_m_per_s = {11, 12, 13};
+  contact.angularVelocity_rad_per_s = {14, 15, 16};
+  contact.stiffness_N_per_m = 17;
+  contact.damping_Ns_per_m = 18;
+  contact.staticFriction = 19;
+  contact.dynamicFriction = 20;
+  contact.lifetime = 21ms;
+  contact.yields = true;
+  client.batch([&] {
+    client.setVertex(0, 0, 1, 2, 3);
+    client.setRemoteContacts({&contact, 1});
+    client.setForce({1, 2, 3}, {4, 5, 6}, 50ms);
+    const auto received = server.waitReceived(2);  // before the batch
+    ASSERT_EQ(received.size(), 2U);
+    const auto* contacts = received[0].message.as<wire::RemoteContacts>();
+    ASSERT_NE(contacts, nullptr);
+    EXPECT_GT(contacts->time, 0);
+    EXPECT_THAT(contacts->contacts.values, ElementsAre(7, 2, 7, 1, 2, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14,
+                                                       15, 16, 17, 18, 19, 20, 0.021, 1));
+    const auto* force = received[1].message.as<wire::HeldForce>();
+    ASSERT_NE(force, nullptr);
+    EXPECT_GE(force->time, contacts->time);
+    EXPECT_THAT(force->force, ElementsAre(1, 2, 3));
+    EXPECT_THAT(force->torque, ElementsAre(4, 5, 6));
+    EXPECT_DOUBLE_EQ(force->lifetime, 0.05);
+    for (const Received& r : received) EXPECT_EQ(r.byDatagram, !tcpOnly());
+  });
+  const std::vector<RemoteContact> many(17);
+  EXPECT_THAT(textOf<std::invalid_argument>([&] { client.setRemoteContacts(many); }), HasSubstr("17"));
+}
+
+TEST(Extensions, WithoutRemoteContactsTheCallsThrow) {
+  ScriptedServer server(ableBut(wire::kFeatureRemoteContacts));
+  Client client(server.name());
+  EXPECT_THROW(client.setRemoteContacts({}), Unsupported);
+  EXPECT_THROW(client.setForce({}), Unsupported);
 }
 
 }  // namespace

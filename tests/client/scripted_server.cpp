@@ -13,7 +13,7 @@ using namespace std::chrono_literals;
 wire::Capabilities allCapabilities() {
   return {wire::kExtensionVersion,
           wire::kFeatureBulkMesh | wire::kFeatureBatch | wire::kFeatureSubscribe | wire::kFeatureStop |
-              wire::kFeatureHeartbeat | wire::kFeatureHoldHand,
+              wire::kFeatureHeartbeat | wire::kFeatureHoldHand | wire::kFeatureRemoteContacts,
           1000,
           250,
           3.3,

@@ -2,6 +2,7 @@
 #include "client/client_tests.h"
 
 #include <cmath>
+#include <deque>
 #include <thread>
 
 #include "server/running_server.h"
@@ -147,6 +148,99 @@ TEST_P(WithServer, ASubscriptionToNothingLeavesTexts) {
   const std::uint64_t before = client.statistics()[ReportKind::pose].count;
   client.runFor(200ms);
   EXPECT_EQ(client.statistics()[ReportKind::pose].count, before);
+}
+
+// A client at 60 Hz whose messages take 20 ms each way and get lost, 1 of 100: the delays are in this test.
+class BadLine {
+ public:
+  explicit BadLine(Client& client) : client_(client) {
+    client.onHand([this](const HandReport& report) { arriving_.push_back({Clock::now() + kDelay, report}); });
+  }
+  // Polls and lets through what is due; returns the report that the client knows.
+  const HandReport& run() {
+    client_.poll(1ms);
+    while (!arriving_.empty() && arriving_.front().first <= Clock::now()) {
+      known_ = arriving_.front().second;
+      arriving_.pop_front();
+    }
+    if (Clock::now() >= next_) {
+      next_ = Clock::now() + 16ms + std::chrono::milliseconds(sent_ * 7 % 11 - 5);
+      if (++sent_ % 100 != 0) leaving_.push_back(Clock::now() + kDelay);
+    }
+    while (!leaving_.empty() && leaving_.front() <= Clock::now()) {
+      leaving_.pop_front();
+      client_.setRemoteContacts({&wall, 1});
+    }
+    return known_;
+  }
+  RemoteContact wall;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr auto kDelay = 20ms;
+  Client& client_;
+  std::deque<std::pair<Clock::time_point, HandReport>> arriving_;
+  std::deque<Clock::time_point> leaving_;
+  HandReport known_;
+  Clock::time_point next_{};
+  int sent_ = 0;
+};
+
+// On a stalled machine the wall may expire and return; it is at rest in between.
+TEST_P(WithServer, AStreamedWallIsStiffAcrossABadLine) {
+  auto client = std::make_unique<Client>(name());
+  client->subscribe(Reports::hand, 250);
+  client->holdHand({{0, 10, 0}});
+  ASSERT_TRUE(pollUntil(*client, [&] { return client->latest().hand.position_m[1] > 0.008; }));
+  BadLine line(*client);
+  line.wall.stiffness_N_per_m = 1000;
+  for (int i = 0; i < 100; ++i) line.run();
+  client->holdHand({{0, -6, 0}});
+  // The hand's spring of 300 N/m against 1000 N/m.
+  const double depth_m = 0.006 * 300 / 1300;
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  int calm = 0;
+  std::uint64_t last = 0;
+  while (calm < 60 && std::chrono::steady_clock::now() < end) {
+    const HandReport& hand = line.run();
+    if (hand.tick == last) continue;
+    last = hand.tick;
+    const bool there = hand.contacts.size() == 1 && std::abs(hand.position_m[1] + depth_m) < 2e-5 &&
+                       std::abs(hand.contacts[0].force_N[1] - 1000 * depth_m) < 0.02;
+    calm = there ? calm + 1 : 0;
+  }
+  EXPECT_EQ(calm, 60) << client->latest().hand.position_m[1] << " instead of " << -depth_m;
+  EXPECT_GT(client->latest().hand.contactsSent.count(), 0);
+
+  // A second client is refused while the first one streams; then the first one leaves and its wall ends.
+  Client other(name());
+  std::string text;
+  other.onText([&](const TextReport& r) { text += r.text; });
+  other.subscribe(Reports::hand, 250);
+  ASSERT_TRUE(pollUntil(other, [&] {
+    line.run();
+    other.setRemoteContacts({});
+    return !text.empty();
+  }));
+  EXPECT_THAT(text, HasSubstr("streams to this device"));
+  client.reset();
+  EXPECT_TRUE(pollUntil(other, [&] {
+    const HandReport& hand = other.latest().hand;
+    return hand.tick > 0 && hand.contacts.empty() && std::abs(hand.force_N[1]) < 1e-9;
+  }));
+}
+
+TEST_P(WithServer, AHeldForceIsFeltAndEndsByItself) {
+  Client client(name());
+  std::string text;
+  client.onText([&](const TextReport& r) { text += r.text; });
+  client.subscribe(Reports::hand, 250);
+  ASSERT_TRUE(pollUntil(client, [&] {
+    client.setForce({0.5, 0, 0}, {0, 0, 0.1});
+    return client.latest().hand.heldForce_N[0] > 0.45;
+  }));
+  EXPECT_THAT(text, HasSubstr("no torque"));
+  EXPECT_TRUE(pollUntil(client, [&] { return client.latest().hand.heldForce_N[0] == 0; }));
 }
 
 }  // namespace

@@ -86,6 +86,18 @@ inline bool playSession(RunningServer& server) {
     second.send(wire::HoldHand{.hold = 1, .position = {8 * std::cos(turn), 18, 8 * std::sin(turn)}});
     untilTicks(second, 5);
   }
+  // A client streams a sphere that moves, and a force.
+  for (int i = 0; i < 40; ++i) {
+    const double angle = 0.05 * i;
+    wire::RemoteContacts contacts{.time = 1'000'000LL * i + 1, .state_time = 0, .contacts = {}};
+    contacts.contacts.values = {
+        3,   1, 0.02, 0,   0.014, 0, std::sin(angle), std::cos(angle), 0, 0, 0, 1, 0.01, 0, 0, 0, 0, 0.5,
+        400, 1, 0.3,  0.2, 0.1,   0};
+    second.send(contacts);
+    second.send(
+        wire::HeldForce{.time = 1'000'000LL * i + 1, .force = {0, 0, 0.2}, .torque = {}, .lifetime = 0.1});
+    untilTicks(second, 5);
+  }
   second.send(wire::HoldHand{.hold = 0, .position = {}});
 
   peer.send(wire::BatchBegin{});

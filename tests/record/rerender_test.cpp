@@ -125,5 +125,30 @@ TEST_F(Rerender, AllCommandsAreInTheFile) {
   }
 }
 
+// Without what was streamed the same ticks give other forces: so the file has it, and it counts.
+TEST_F(Rerender, StreamedContactsAndForcesAreInTheFile) {
+  record::RecordingReader reader(file_->path());
+  record::Rerenderer without(reader.header());
+  std::size_t streamed = 0;
+  std::size_t other = 0;
+  double held_N = 0;
+  std::uint32_t contacts = 0;
+  for (record::RecordingEvent event; reader.next(event);) {
+    if (const auto* stream = std::get_if<record::StreamEvent>(&event)) {
+      ++streamed;
+      EXPECT_EQ(stream->device, 1U);
+      contacts = std::max(contacts, stream->stream.input.contacts.count);
+      held_N = std::max(held_N, stream->stream.input.force.force_N.norm());
+      continue;
+    }
+    const realtime::TickReport* now = without.feed(event);
+    if (now != nullptr && !record::sameOutcome(*now, std::get<record::TickEvent>(event).tick.report)) ++other;
+  }
+  EXPECT_GT(streamed, 20U);
+  EXPECT_EQ(contacts, 1U);
+  EXPECT_NEAR(held_N, 0.2, 1e-9);
+  EXPECT_GT(other, 50U);
+}
+
 }  // namespace
 }  // namespace hapticd::test

@@ -105,6 +105,23 @@ TEST_F(HeldBackTest, StopHeartbeatAndPingOvertakeTheClientsSceneCommands) {
   EXPECT_TRUE(client->until([&] { return client->count<wire::Capabilities>() > 0; }));
 }
 
+TEST_F(HeldBackTest, StreamedStateOvertakesTheClientsSceneCommands) {
+  const auto client = peer();
+  watcher_->send(wire::Subscribe{.kinds = wire::kReportHand | wire::kReportForce, .rate = 0});
+  closeScene();
+  flood(*client, 10 * kMiB);
+  client->send(wire::QueryCapabilities{});
+  EXPECT_TRUE(watcher_->until([&] {
+    client->send(wire::HeldForce{.time = 0, .force = {0, 0.5, 0}, .torque = {}, .lifetime = 0.1});
+    client->poll();
+    const auto hand = watcher_->last<wire::HandState>();
+    return hand && hand->held_force[1] > 0.3;
+  }));
+  EXPECT_EQ(client->count<wire::Capabilities>(), 0U);
+  openScene();
+  EXPECT_TRUE(client->until([&] { return client->count<wire::Capabilities>() > 0; }));
+}
+
 TEST_F(HeldBackTest, ARearmSentBeforeAStopDoesNotUndoIt) {
   const auto client = peer();
   closeScene();

@@ -27,6 +27,8 @@ const std::map<std::string_view, std::string_view> kControl = {
     {"hapticd Rearm_Forces", "c"},
     {"hapticd Heartbeat", "o"},
     {"hapticd Hold_Hand", "c"},
+    {"hapticd Remote_Contacts", "co"},
+    {"hapticd Held_Force", "co"},
 };
 
 MessageKind kindAt(std::size_t index) {

@@ -5,6 +5,7 @@
 
 #include "device/device.h"
 #include "handoff/spsc_ring.h"
+#include "realtime/remote/remote_report.h"
 #include "realtime/render/renderer.h"
 #include "realtime/servo/guard.h"
 
@@ -22,11 +23,12 @@ struct TickTiming {
 /// A plain value without pointers: a copy neither allocates nor throws. Device frame unless a name says
 /// otherwise.
 struct TickReport {
-  std::uint64_t tick = 0;      ///< from 1
-  Nanos time = 0;              ///< start of the tick on the servo clock
-  std::uint64_t revision = 0;  ///< of the rendered snapshot; 0 before the first
-  device::DeviceState device;  ///< the last state that the device delivered
-  Rendering rendering;
+  std::uint64_t tick = 0;       ///< from 1
+  Nanos time = 0;               ///< start of the tick on the servo clock
+  std::uint64_t revision = 0;   ///< of the rendered snapshot; 0 before the first
+  device::DeviceState device;   ///< the last state that the device delivered
+  Rendering rendering;          ///< its total force includes the remote one
+  RemoteRendering remote;       ///< of what clients stream; not recorded, re-rendering makes it again
   Vec3 force_N = Vec3::Zero();  ///< as written to the device
   GuardReport guard;
   TickTiming timing;

@@ -26,6 +26,7 @@ void Tick::operator()(const Pacing& pacing) noexcept {
   haveState_ = device_.read(report_.time, report_.device);
   const Nanos period = report_.tick == 1 ? period_ : report_.timing.period;
   renderer_.step(scene, report_.device, report_.time, period, report_.rendering);
+  addRemote(period);
   report_.force_N = guard_.step(guardInput());
   written_ = device_.write(report_.force_N);
 
@@ -48,6 +49,35 @@ const scene::SceneSnapshot& Tick::takeSnapshot() noexcept {
   report_.revision = scene.revision;
   report_.T_world_device = scene.workspace.T_world_device;
   return scene;
+}
+
+// Nothing streamed so far, and nothing left of it, costs two comparisons.
+void Tick::addRemote(Nanos period) noexcept {
+  const RemoteInput& input = remoteInput_.read();
+  if (recordStreamTo_ != nullptr &&
+      (input.contacts.number != contactsSeen_ || input.force.number != forceSeen_)) {
+    recordStreamTo_->push({report_.tick, input});
+  }
+  contactsSeen_ = input.contacts.number;
+  forceSeen_ = input.force.number;
+  RemoteRendering& out = report_.remote;
+  out.status = 0;
+  out.count = 0;
+  if (contactsSeen_ == 0 && forceSeen_ == 0) return;
+  Rendering& rendering = report_.rendering;
+  if ((rendering.status & kRenderNotFinite) != 0) {
+    remoteContacts_.reset();
+    heldForce_.reset();
+    out.contactForce_N.setZero();
+    out.heldForce_N.setZero();
+    return;
+  }
+  const double step_s = base::toSeconds(std::min(period, 2 * period_));  // a late tick changes no more
+  const RemoteHand hand{report_.device.position_m, report_.device.velocity_m_per_s, rendering.normalForce_N};
+  rendering.force_N += remoteContacts_.step(input.contacts, hand, report_.time, step_s, out);
+  heldForce_.step(input.force, hand.position_m, hand.velocity_m_per_s, report_.time, step_s,
+                  report_.guard.gain, out);
+  rendering.force_N += out.heldForce_N;
 }
 
 GuardInput Tick::guardInput() const noexcept {

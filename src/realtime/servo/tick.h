@@ -9,6 +9,9 @@
 #include "base/clock.h"
 #include "base/histogram.h"
 #include "device/device.h"
+#include "handoff/latest_value.h"
+#include "realtime/remote/held_force.h"
+#include "realtime/remote/remote_contacts.h"
 #include "realtime/render/renderer.h"
 #include "realtime/servo/black_box.h"
 #include "realtime/servo/guard.h"
@@ -54,9 +57,13 @@ class Tick {
 
   /// Before the first tick: records every tick to `ring` as well, which must outlive this object.
   void recordTo(RecordRing* ring) noexcept { recordTo_ = ring; }
+  /// The same for what clients stream.
+  void recordTo(StreamRing* ring) noexcept { recordStreamTo_ = ring; }
 
   /// Scene thread: publishes snapshots and collects old ones.
   scene::SnapshotSlot& snapshots() noexcept { return snapshots_; }
+  /// For the one writer of what clients stream: the next tick takes the newest value.
+  handoff::LatestValue<RemoteInput>& remote() noexcept { return remoteInput_; }
   /// For the one consumer of reports.
   ReportRing& reports() noexcept { return reports_; }
   /// Notified once per tick.
@@ -71,6 +78,7 @@ class Tick {
  private:
   void begin(const Pacing& pacing) noexcept;
   const scene::SceneSnapshot& takeSnapshot() noexcept;
+  void addRemote(Nanos period) noexcept;
   GuardInput guardInput() const noexcept;
   void publish() noexcept;
 
@@ -80,6 +88,11 @@ class Tick {
   const scene::SceneSnapshot nothing_;  // before the first snapshot
   scene::SnapshotSlot snapshots_;
   Renderer renderer_;
+  handoff::LatestValue<RemoteInput> remoteInput_;
+  RemoteContacts remoteContacts_;
+  HeldForceLaw heldForce_;
+  std::uint64_t contactsSeen_ = 0;
+  std::uint64_t forceSeen_ = 0;
   GuardControl control_;
   Guard guard_;
   ReportRing reports_;
@@ -88,6 +101,7 @@ class Tick {
   TickHistograms histograms_;
   TickReport report_;
   RecordRing* recordTo_ = nullptr;
+  StreamRing* recordStreamTo_ = nullptr;
   bool haveState_ = false;  // the device delivered a state in this tick
   bool written_ = true;     // the device accepted the last force
 };

@@ -133,6 +133,7 @@ void checkDevice(const Checker& check, const DeviceConfig& device) {
   check.range("angular_tolerance_rad", device.angularTolerance_rad, 0, 3.2);
   check.range("tool_radius_mm", device.toolRadius_m * 1e3, 0, 50);
   check.range("stribeck_speed_mm_per_s", device.stribeckSpeed_m_per_s * 1e3, 0, 1000);
+  check.range("held_force_power_mW", device.heldForcePower_W * 1e3, 0, 10'000);
   check.range("black_box_keep", device.blackBoxKeep, 0, 1000);
   checkWorkspace(check, device.workspace_mm);
   checkControl(check, device);

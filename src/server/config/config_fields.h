@@ -48,6 +48,7 @@ void visitFields(Visitor& visitor, Device& device) {
   visitor.workspace("workspace", device.workspace_mm);
   visitor.field("force_shading", device.forceShading);
   visitor.milli("stribeck_speed_mm_per_s", device.stribeckSpeed_m_per_s);
+  visitor.milli("held_force_power_mW", device.heldForcePower_W);
   visitor.choice("material_scale", device.materialScale, kMaterialScales);
   visitor.choice("quaternion_order", device.quaternionOrder, kQuaternionOrders);
   visitor.choice("force_report", device.forceReport, kForceReports);

@@ -57,6 +57,40 @@ wire::ContactList contactList(const TickReport& tick) {
   return list;
 }
 
+wire::HandState handState(const TickReport& tick, const ClientTick& clientTick, std::uint32_t buttons) {
+  const realtime::RemoteRendering& remote = tick.remote;
+  const geometry::Mat3 rotation = rotationOf(tick);
+  wire::HandState state{.tick = tick.tick,
+                        .time = tick.time,
+                        .contacts_time = remote.contactsTime,
+                        .force_time = remote.forceTime,
+                        .position = array(clientTick.hip),
+                        .orientation = xyzw(clientTick.orientation),
+                        .velocity = array(clientTick.velocity),
+                        .angular_velocity = array(clientTick.angularVelocity),
+                        .force = array(rotation * tick.force_N),
+                        .held_force = array(rotation * remote.heldForce_N),
+                        .energy = remote.energy_J,
+                        .gripper = clientTick.gripper_rad.value_or(0),
+                        .buttons = buttons,
+                        .flags = 0,
+                        .guard_active = tick.guard.active,
+                        .contacts = {}};
+  if (clientTick.gripper_rad) state.flags |= wire::kHandHasGripper;
+  if ((remote.status & realtime::kRemoteEnergySpent) != 0) state.flags |= wire::kHandEnergySpent;
+  if ((remote.status & realtime::kRemoteCorrectionsHeld) != 0) state.flags |= wire::kHandCorrectionsHeld;
+  const double metre = tick.T_world_device.linear().col(0).norm() / kWorldPerReported;
+  for (std::uint32_t i = 0; i < remote.count; ++i) {
+    const realtime::RemoteContactReport& contact = remote.contacts[i];
+    const Vec3 proxy = reported(tick, contact.proxy_m.cast<double>());
+    const Vec3 force = rotation * contact.force_N.cast<double>();
+    state.contacts.values.insert(state.contacts.values.end(),
+                                 {double(contact.id), proxy.x(), proxy.y(), proxy.z(), force.x(), force.y(),
+                                  force.z(), contact.depth_m * metre});
+  }
+  return state;
+}
+
 }  // namespace
 
 Reporter::Reporter(const DeviceConfig& config, int buttonCount, const ReportChoice& choice)
@@ -254,6 +288,8 @@ void Reporter::tickReport(const TickReport& tick, const ClientTick& clientTick, 
                                     .guard_latched = tick.guard.latched},
                    false});
   }
+  if (wants(wire::kReportHand))
+    out.push_back({handState(tick, clientTick, buttons_ & ~(1U << buttonCount_)), false});
   if (wants(wire::kReportContacts) && (clientTick.touching || contactEnded))
     out.push_back({contactList(tick), contactEnded});
 }

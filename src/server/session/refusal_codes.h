@@ -17,6 +17,8 @@ enum class RefusalCode : std::uint32_t {
   handNotSimulated = 2,  ///< Hold_Hand: the device is real
   handHeldByOther = 3,   ///< Hold_Hand: another client holds the simulated hand
   handPoseInvalid = 4,   ///< Hold_Hand: position or orientation is not finite, or the quaternion is zero
+  streamedByOther = 5,   ///< Remote_Contacts, Held_Force: another client streams them
+  streamInvalid = 6,     ///< Remote_Contacts, Held_Force: a number is not usable
 };
 
 /// The refusal of one command.
@@ -31,12 +33,14 @@ struct RefusalInfo {
 };
 
 /// All codes, in order.
-inline constexpr std::array<RefusalInfo, 5> kRefusals{{
+inline constexpr std::array<RefusalInfo, 7> kRefusals{{
     {RefusalCode::none, "none"},
     {RefusalCode::notPermitted, "notPermitted"},
     {RefusalCode::handNotSimulated, "handNotSimulated"},
     {RefusalCode::handHeldByOther, "handHeldByOther"},
     {RefusalCode::handPoseInvalid, "handPoseInvalid"},
+    {RefusalCode::streamedByOther, "streamedByOther"},
+    {RefusalCode::streamInvalid, "streamInvalid"},
 }};
 
 }  // namespace hapticd::server

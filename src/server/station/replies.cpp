@@ -33,7 +33,7 @@ wire::Capabilities capabilities(const DeviceConfig& config, const device::Device
   const Box box = workspaceOf(config, profile);
   return {.version = wire::kExtensionVersion,
           .features = wire::kFeatureBulkMesh | wire::kFeatureBatch | wire::kFeatureSubscribe |
-                      wire::kFeatureStop | wire::kFeatureHeartbeat |
+                      wire::kFeatureStop | wire::kFeatureHeartbeat | wire::kFeatureRemoteContacts |
                       (canBeHeld ? wire::kFeatureHoldHand : 0U),
           .servo_rate = config.servoRate_Hz,
           .report_rate = config.reportRate_Hz,

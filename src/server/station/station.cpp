@@ -55,6 +55,12 @@ realtime::TickOptions tickOptions(const DeviceConfig& config, const device::Devi
   return options;
 }
 
+realtime::EnergyBudget energyBudget(const DeviceConfig& config) {
+  realtime::EnergyBudget budget;
+  budget.refill_W = config.heldForcePower_W;
+  return budget;
+}
+
 BlackBoxFiles blackBoxFiles(const DeviceConfig& config) {
   if (config.blackBoxDir.empty()) return {defaultBlackBoxDir(), config.blackBoxKeep};
   return {config.blackBoxDir, config.blackBoxKeep};
@@ -81,6 +87,7 @@ Station::Impl::Impl(const DeviceConfig& config_, std::vector<wire::LocalSender> 
               .requireRealtime = !allowNoRealtime,
               .vendorThread = device->traits().ticksInVendorThread}),
       control(tick.control(), hand, workspaceOf(config, profile)),
+      streamed(tick.remote(), sceneConfig(config, profile), energyBudget(config), profile.outputDof > 3),
       roles(config.control, config.controlList),
       modes(profile.buttons),
       outbox(config, profile.buttons, names),
@@ -124,6 +131,7 @@ void Station::Impl::recordTo(record::Recorder& recording, SceneDevice& sceneDevi
     recording.recordPublish(number, now, revision);
   };
   tick.recordTo(&recording.ring(number));
+  tick.recordTo(&recording.streamRing(number));
 }
 
 Station::~Station() {
@@ -208,6 +216,7 @@ void Station::onSubscribed(Session& session, wire::LocalSender name) {
 
 void Station::clientGone(scene::ClientId client) {
   impl_->control.clientGone(client);
+  impl_->streamed.clientGone(client);
   impl_->roles.clientGone(client);
   std::erase_if(impl_->pendingRearms, [client](const Session* session) { return session->id() == client; });
   impl_->outbox.clientGone(client);

@@ -12,6 +12,7 @@
 #include "server/station/device_control.h"
 #include "server/station/device_keeper.h"
 #include "server/station/station.h"
+#include "server/station/streamed_input.h"
 
 namespace hapticd::server {
 
@@ -45,6 +46,10 @@ struct Station::Impl {
   void on(const Request& request, const wire::StopForces&);
   void on(const Request& request, const wire::RearmForces&);
   void on(const Request& request, const wire::HoldHand& wanted);
+  void on(const Request& request, const wire::RemoteContacts& message) { onStreamed(request, message); }
+  void on(const Request& request, const wire::HeldForce& message) { onStreamed(request, message); }
+  template <class M>
+  void onStreamed(const Request& request, const M& message);
   void on(const Request&, const wire::GetNewObjectId&) {}  // registered by VRPN, never sent
   void on(const Request&, const wire::Heartbeat&) {}       // the session handles it
   void rearm(Session& session, wire::LocalSender name, const DeviceControl::Order& order);
@@ -63,6 +68,7 @@ struct Station::Impl {
 
   // Net thread.
   DeviceControl control;
+  StreamedInput streamed;
   Roles roles;
   ButtonModes modes;
   std::vector<wire::ButtonAlert> alerts;  // not yet reported

@@ -142,6 +142,19 @@ void Station::Impl::on(const Request& request, const wire::HoldHand& wanted) {
                                                 .text = refusal.text});
 }
 
+template <class M>
+void Station::Impl::onStreamed(const Request& request, const M& message) {
+  const StreamedInput::Answer answer =
+      streamed.on(request.session.id(), message, outbox.last(), request.order.received);
+  if (answer.text.text.empty()) return;
+  const bool refused = answer.text.code != RefusalCode::none;
+  request.session.send(request.name, wire::Text{.severity = refused ? wire::kTextError : wire::kTextWarning,
+                                                .level = static_cast<std::uint32_t>(answer.text.code),
+                                                .text = answer.text.text});
+}
+template void Station::Impl::onStreamed(const Request&, const wire::RemoteContacts&);
+template void Station::Impl::onStreamed(const Request&, const wire::HeldForce&);
+
 void Station::onReset() {
   impl_->control.rampIn();
   impl_->frame.origin.setZero();

@@ -16,7 +16,8 @@ enum Feature : std::uint32_t {
   kFeatureSubscribe = 1U << 2,
   kFeatureStop = 1U << 3,
   kFeatureHeartbeat = 1U << 4,
-  kFeatureHoldHand = 1U << 5,  ///< the device is simulated
+  kFeatureHoldHand = 1U << 5,        ///< the device is simulated
+  kFeatureRemoteContacts = 1U << 6,  ///< Remote_Contacts, Held_Force and Hand_State
 };
 
 /// Bits of Subscribe::kinds.
@@ -27,8 +28,9 @@ enum ReportKinds : std::uint32_t {
   kReportAnalog = 1U << 3,    ///< Channel
   kReportTick = 1U << 4,      ///< hapticd Tick
   kReportContacts = 1U << 5,  ///< hapticd Contacts
+  kReportHand = 1U << 6,      ///< hapticd Hand_State
   kReportDefault = kReportTracker | kReportForce | kReportButton | kReportAnalog,
-  kReportAll = (1U << 6) - 1,
+  kReportAll = (1U << 7) - 1,
 };
 
 struct QueryCapabilities {
@@ -265,6 +267,117 @@ struct HoldHand {
     v("position", m.position, "world units");
     v("orientation", m.orientation);
     v("buttons", m.buttons);
+  }
+};
+
+/// Shapes of a remote contact: the first number behind its id.
+enum RemoteShape : std::uint32_t {
+  kRemoteHalfSpace = 0,
+  kRemoteSphere = 1,    ///< of a radius; the point is on its surface
+  kRemoteCylinder = 2,  ///< of a radius, without ends; the point is on its surface
+};
+
+/// A client's own simulation around the tool. World frame, lengths in world units / 1000 as in the reports.
+struct RemoteContacts {
+  static constexpr std::size_t kMost = 16;
+  /// Numbers of one contact, in this order: id, shape, radius (m; negative: touched from inside), point xyz
+  /// (m), normal xyz, axis xyz (of a cylinder), velocity xyz of the surface at the point (m/s), angular
+  /// velocity xyz (rad/s), stiffness (N/m), damping (N s/m), static and dynamic friction, lifetime (s),
+  /// yields (0 or 1).
+  static constexpr std::size_t kNumbers = 24;
+  static constexpr MessageInfo kInfo{
+      "hapticd Remote_Contacts",
+      Direction::kToServer,
+      Reliability::kLowLatency,
+      Role::control,
+      "Replaces the client's contacts near the hand, up to 16 (24 numbers each): felt until they expire.",
+      Access::command,
+      Order::overtaking};
+  std::int64_t time = 0;        ///< on the client's clock; older messages than the newest are ignored
+  std::int64_t state_time = 0;  ///< `time` of the Hand_State that the contacts follow from; 0: none
+  Counted<std::int32_t, double, kMost * kNumbers> contacts;
+
+  template <class M, class V>
+  static constexpr void fields(M& m, V&& v) {
+    v("time", m.time, "ns");
+    v("state_time", m.state_time, "ns");
+    v("contacts", m.contacts);
+  }
+};
+
+struct HeldForce {
+  static constexpr MessageInfo kInfo{
+      "hapticd Held_Force",
+      Direction::kToServer,
+      Reliability::kLowLatency,
+      Role::control,
+      "Sets a force that the server holds for its lifetime, within a budget of energy.",
+      Access::command,
+      Order::overtaking};
+  std::int64_t time = 0;
+  F64x3 force{};
+  F64x3 torque{};
+  double lifetime = 0;
+
+  template <class M, class V>
+  static constexpr void fields(M& m, V&& v) {
+    v("time", m.time, "ns");
+    v("force", m.force, "N");
+    v("torque", m.torque, "N m");
+    v("lifetime", m.lifetime, "s");
+  }
+};
+
+/// Bits of HandState::flags.
+enum HandFlags : std::uint32_t {
+  kHandHasGripper = 1U << 0,
+  kHandEnergySpent = 1U << 1,      ///< the part of the held force that adds power is cut
+  kHandCorrectionsHeld = 1U << 2,  ///< a remote contact moved without a stated velocity and waits for energy
+};
+
+/// What a client that streams contacts or forces needs of a tick. Positions in world units / 1000 in the
+/// world frame.
+struct HandState {
+  /// Numbers of one remote contact: id, proxy xyz (m), force on the hand xyz (N), depth (m).
+  static constexpr std::size_t kNumbers = 8;
+  static constexpr MessageInfo kInfo{
+      "hapticd Hand_State", Direction::kToClient, Reliability::kLowLatency, Role::report,
+      "Reports the newest tick: pose, velocity, buttons, force written, remote contacts (8 numbers each)."};
+  std::uint64_t tick = 0;
+  std::int64_t time = 0;
+  std::int64_t contacts_time = 0;  ///< `time` of the newest Remote_Contacts that this tick knows, 0: none
+  std::int64_t force_time = 0;     ///< `time` of the newest Held_Force that this tick knows, 0: none
+  F64x3 position{};
+  F64x4 orientation{0, 0, 0, 1};
+  F64x3 velocity{};
+  F64x3 angular_velocity{};
+  F64x3 force{};
+  F64x3 held_force{};
+  double energy = 0;
+  double gripper = 0;
+  std::uint32_t buttons = 0;
+  std::uint32_t flags = 0;
+  std::uint32_t guard_active = 0;
+  Counted<std::int32_t, double, RemoteContacts::kMost * kNumbers> contacts;
+
+  template <class M, class V>
+  static constexpr void fields(M& m, V&& v) {
+    v("tick", m.tick);
+    v("time", m.time, "ns");
+    v("contacts_time", m.contacts_time, "ns");
+    v("force_time", m.force_time, "ns");
+    v("position", m.position, "m");
+    v("orientation", m.orientation);
+    v("velocity", m.velocity, "m/s");
+    v("angular_velocity", m.angular_velocity, "rad/s");
+    v("force", m.force, "N");
+    v("held_force", m.held_force, "N");
+    v("energy", m.energy, "J");
+    v("gripper", m.gripper, "rad");
+    v("buttons", m.buttons);
+    v("flags", m.flags);
+    v("guard_active", m.guard_active);
+    v("contacts", m.contacts);
   }
 };
 

@@ -8,11 +8,15 @@
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
+#include <random>
 #include <string>
 
 #include "base/time.h"
+#include "bench/remote_loop.h"
 #include "device/simulated/simulated_device.h"
 #include "device/simulated/waypoint_path.h"
+#include "realtime/render/meshes.h"
+#include "realtime/render/scene_fixture.h"
 #include "realtime/servo/fakes.h"
 #include "realtime/servo/tick.h"
 #include "scene/passivity.h"
@@ -165,6 +169,143 @@ TEST(ClosedLoopLimit, stiffest_wall_grows_with_the_rate) {
     EXPECT_GT(quiet, 1.5 * last);
     last = quiet;
   }
+}
+
+// --- surfaces that a client renders across a network of 20 ms each way
+
+bench::RemoteLoop badLine(bench::WallBy by) {
+  bench::RemoteLoop loop;
+  loop.by = by;
+  loop.rate_Hz = 60;
+  loop.jitter_s = 0.005;
+  loop.delay_s = 0.020;
+  loop.loss = 0.01;
+  return loop;
+}
+
+TEST(RemoteLoop, streamed_wall_is_as_stiff_as_a_local_one) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    bench::RemoteLoop loop = badLine(bench::WallBy::remoteContact);
+    loop.seed = seed;
+    const bench::WallPress press = bench::pressWall(1000, loop);
+    EXPECT_LT(press.peakToPeak_m, kSettled_m);
+    EXPECT_NEAR(press.force_N, 1000 * 300 * 0.008 / 1300, 0.01) << "two springs in a row";
+  }
+}
+
+TEST(RemoteLoop, held_force_does_not_settle_there_and_the_tank_calms_it) {
+  const bench::WallPress raw = bench::pressWall(1000, badLine(bench::WallBy::heldForce));
+  const bench::WallPress tanked = bench::pressWall(1000, badLine(bench::WallBy::tankedForce));
+  EXPECT_GT(raw.peakToPeak_m, 0.01);
+  EXPECT_LT(tanked.peakToPeak_m, 0.6 * raw.peakToPeak_m);
+}
+
+constexpr double kBall_m = 0.030;
+
+scene::Surface ballSurface() {
+  scene::Surface surface;
+  surface.stiffness_N_per_m = 500;
+  surface.static_friction = 0.2;
+  surface.dynamic_friction = 0.1;
+  return surface;
+}
+
+// The contact of a client that knows the hand as it was 20 ms ago: the point of its sphere nearest to it.
+RemoteContact ballContact(const Vec3& hand_m) {
+  const scene::Surface surface = ballSurface();
+  RemoteContact contact;
+  contact.shape = RemoteShape::sphere;
+  contact.radius_m = kBall_m;
+  contact.normal = hand_m.normalized();
+  contact.point_m = kBall_m * contact.normal;
+  contact.stiffness_N_per_m = surface.stiffness_N_per_m;
+  contact.staticFriction = surface.static_friction;
+  contact.dynamicFriction = surface.dynamic_friction;
+  return contact;
+}
+
+// Slides over a quarter of the sphere at 60 mm/s, 2 mm below its surface; from 5 mm above it.
+TEST(RemoteLoop, streamed_sphere_feels_as_the_mesh) {
+  fixture::SceneFixture scene;
+  scene.add(fixture::sphere(kBall_m, 40), ballSurface());
+  const auto mesh = scene.snapshot();
+  Renderer renderer;
+  RemoteContacts remote;
+  RemoteContactSet set;
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> share(0, 1);
+  Vec3 last = Vec3::Zero();
+  int next = 0;
+  std::vector<Vec3> path;
+  for (int ms = 0; ms < 900; ++ms) {
+    const double height = ms < 100 ? 0.005 - 0.00007 * ms : -0.002;
+    const double angle = 0.06 / kBall_m * 1e-3 * ms;
+    path.push_back((kBall_m + height) * Vec3(std::sin(angle), std::cos(angle), 0));
+  }
+  for (int ms = 1; ms < 900; ++ms) {
+    const Nanos now = ms * 1'000'000LL;
+    const Vec3& hip = path[static_cast<std::size_t>(ms)];
+    if (ms >= next) {
+      next = ms + 16 + static_cast<int>(10 * share(random) - 5);
+      if (share(random) > 0.01) {
+        ++set.number;
+        set.received = set.stated = now;
+        set.count = 1;
+        set.contacts[0] = ballContact(path[static_cast<std::size_t>(std::max(0, ms - 40))]);
+      }
+    }
+    device::DeviceState state;
+    state.position_m = hip;
+    state.velocity_m_per_s = (hip - path[static_cast<std::size_t>(ms - 1)]) * 1e3;
+    Rendering rendering;
+    renderer.step(*mesh, state, now, 1'000'000, rendering);
+    RemoteRendering out;
+    const Vec3 force = remote.step(set, {hip, state.velocity_m_per_s, Vec3::Zero()}, now, 1e-3, out);
+    EXPECT_LT((force - last).norm(), 0.3) << ms;
+    if (ms > 150) {
+      EXPECT_GT(rendering.force_N.norm(), 0.8);
+      EXPECT_LT((force - rendering.force_N).norm(), 0.05 * rendering.force_N.norm()) << ms;
+    }
+    last = force;
+  }
+}
+
+// The client sends nothing any more: the force is zero 100 ms after its last update, and falls to it without
+// a step.
+TEST(RemoteLoop, force_of_a_lost_client_is_zero_after_100_ms) {
+  FakeDevice device;
+  FakeClock clock;
+  TickOptions options;
+  options.guard = GuardOptions::of(device.profile());
+  options.guard.rampIn = 0;
+  Tick tick(device, clock, options);
+  RemoteInput input;
+  Nanos now = 0;
+  const auto step = [&] {
+    tick(now += 1'000'000);
+    tick.reports().consume([](const TickReport&) {});
+    return tick.last().force_N.y();
+  };
+  for (int ms = 0; ms < 200; ++ms) {
+    device.state.position_m.y() = std::max(-0.003, 0.001 - 0.00005 * ms);
+    if (ms % 16 == 0) {
+      ++input.contacts.number;
+      input.contacts.received = input.contacts.stated = now;
+      input.contacts.count = 1;
+      input.contacts.contacts[0].stiffness_N_per_m = 1000;
+      tick.remote().write(input);
+    }
+    step();
+  }
+  const Nanos lastUpdate = input.contacts.received;
+  double last = tick.last().force_N.y();
+  ASSERT_NEAR(last, 3, 1e-6);
+  while (now < lastUpdate + 100'000'000) {
+    const double force = step();
+    EXPECT_LE(std::abs(force - last), 0.3);
+    last = force;
+  }
+  EXPECT_EQ(last, 0);
 }
 
 }  // namespace

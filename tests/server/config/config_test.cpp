@@ -45,6 +45,7 @@ tool_radius_mm = 2
 workspace = "paper"
 force_shading = true
 stribeck_speed_mm_per_s = 3
+held_force_power_mW = 30
 vibration_contact_pulls = true
 scene = "shared"
 control = "list"
@@ -78,6 +79,7 @@ workspace = [-1, -2, -3, 4, 5, 6]
   EXPECT_EQ(left.workspace_mm, (std::vector<double>{-80, -80, -70, 80, 80, 20}));
   EXPECT_TRUE(left.forceShading);
   EXPECT_DOUBLE_EQ(left.stribeckSpeed_m_per_s, 0.003);
+  EXPECT_DOUBLE_EQ(left.heldForcePower_W, 0.030);
   EXPECT_TRUE(left.vibrationContactPulls);
   EXPECT_EQ(left.scene, "shared");
   EXPECT_EQ(left.control, Control::list);
@@ -208,6 +210,7 @@ ServerConfig unusual() {
   device.vibrationMotorFrame = VibrationFrame::device;
   device.forceShading = true;
   device.stribeckSpeed_m_per_s = 0.004;
+  device.heldForcePower_W = 0.005;
   device.vibrationContactPulls = true;
   device.scene = "shared";
   device.sceneOnDisconnect = SceneOnDisconnect::clear;

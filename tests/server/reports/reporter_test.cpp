@@ -362,6 +362,40 @@ TEST_F(ReporterTest, EveryContactOfATickIsListedAndTheEndIsAnEmptyList) {
   EXPECT_TRUE(out_.empty());
 }
 
+TEST_F(ReporterTest, TheHandsStateHasTheRemoteContacts) {
+  choice_.kinds = wire::kReportHand;
+  tick_.T_world_device = Affine(Eigen::UniformScaling<double>(2000.0));
+  tick_.T_world_device.rotate(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ()));
+  tick_.device.position_m = Vec3(0.02, 0, 0);
+  tick_.device.buttons = 1;
+  tick_.device.gripper_rad = 0.4;
+  tick_.force_N = Vec3(3, 0, 0);
+  tick_.remote.heldForce_N = Vec3(1, 0, 0);
+  tick_.remote.energy_J = 0.01;
+  tick_.remote.contactsTime = 11;
+  tick_.remote.forceTime = 12;
+  tick_.remote.status = realtime::kRemoteEnergySpent;
+  tick_.remote.count = 1;
+  tick_.remote.contacts[0] = {9, geometry::Vec3f(0.5F, 0, 0), geometry::Vec3f(2, 0, 0), 0.25F};
+  step();
+  ASSERT_EQ(out_.size(), 1U);
+  const wire::HandState state = reported<wire::HandState>().at(0);
+  EXPECT_EQ(state.tick, 1U);
+  EXPECT_EQ(state.contacts_time, 11);
+  EXPECT_EQ(state.force_time, 12);
+  EXPECT_NEAR(state.position[1], 0.04, 1e-12);
+  EXPECT_NEAR(state.force[1], 3, 1e-12);
+  EXPECT_NEAR(state.held_force[1], 1, 1e-12);
+  EXPECT_EQ(state.energy, 0.01);
+  EXPECT_EQ(state.gripper, 0.4);
+  EXPECT_EQ(state.buttons, 1U);
+  EXPECT_EQ(state.flags, wire::kHandHasGripper | wire::kHandEnergySpent);
+  const std::vector<double> expected{9, 0, 1, 0, 0, 2, 0, 0.5};
+  ASSERT_EQ(state.contacts.values.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i)
+    EXPECT_NEAR(state.contacts.values[i], expected[i], 1e-9) << i;
+}
+
 TEST_F(ReporterTest, PosesAreRelativeToTheOrigin) {
   config_.linearTolerance_m = 0;
   tick_.rendering.proxy_m = Vec3(0.03, 0.01, 0);

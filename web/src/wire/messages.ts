@@ -873,6 +873,86 @@ export const HoldHand = /* @__PURE__ */ define<HoldHand>("hapticd Hold_Hand", [
   ["buttons", "u32"],
 ]);
 
+/** Replaces the client's contacts near the hand, up to 16 (24 numbers each): felt until they expire. */
+export interface RemoteContacts {
+  /** ns */
+  time: number;
+  /** ns */
+  stateTime: number;
+  contacts: ArrayLike<number>;
+}
+export const RemoteContacts = /* @__PURE__ */ define<RemoteContacts>("hapticd Remote_Contacts", [
+  ["time", "i64"],
+  ["stateTime", "i64"],
+  ["contacts", "list", "i32", "f64", 384],
+]);
+
+/** Sets a force that the server holds for its lifetime, within a budget of energy. */
+export interface HeldForce {
+  /** ns */
+  time: number;
+  /** N */
+  force: Vec3;
+  /** N m */
+  torque: Vec3;
+  /** s */
+  lifetime: number;
+}
+export const HeldForce = /* @__PURE__ */ define<HeldForce>("hapticd Held_Force", [
+  ["time", "i64"],
+  ["force", "f64", 3],
+  ["torque", "f64", 3],
+  ["lifetime", "f64"],
+]);
+
+/** Reports the newest tick: pose, velocity, buttons, force written, remote contacts (8 numbers each). */
+export interface HandState {
+  tick: number;
+  /** ns */
+  time: number;
+  /** ns */
+  contactsTime: number;
+  /** ns */
+  forceTime: number;
+  /** m */
+  position: Vec3;
+  orientation: Vec4;
+  /** m/s */
+  velocity: Vec3;
+  /** rad/s */
+  angularVelocity: Vec3;
+  /** N */
+  force: Vec3;
+  /** N */
+  heldForce: Vec3;
+  /** J */
+  energy: number;
+  /** rad */
+  gripper: number;
+  buttons: number;
+  flags: number;
+  guardActive: number;
+  contacts: ArrayLike<number>;
+}
+export const HandState = /* @__PURE__ */ define<HandState>("hapticd Hand_State", [
+  ["tick", "u64"],
+  ["time", "i64"],
+  ["contactsTime", "i64"],
+  ["forceTime", "i64"],
+  ["position", "f64", 3],
+  ["orientation", "f64", 4],
+  ["velocity", "f64", 3],
+  ["angularVelocity", "f64", 3],
+  ["force", "f64", 3],
+  ["heldForce", "f64", 3],
+  ["energy", "f64"],
+  ["gripper", "f64"],
+  ["buttons", "u32"],
+  ["flags", "u32"],
+  ["guardActive", "u32"],
+  ["contacts", "list", "i32", "f64", 128],
+]);
+
 /** Every message, in the order of the table. */
 export const ALL_MESSAGES = [
   Text,
@@ -957,6 +1037,9 @@ export const ALL_MESSAGES = [
   GuardState,
   Heartbeat,
   HoldHand,
+  RemoteContacts,
+  HeldForce,
+  HandState,
 ] as const;
 
 /** Vertices or triangles in one message at most. */
@@ -968,6 +1051,7 @@ export const REPORT_BUTTON = 4;
 export const REPORT_ANALOG = 8;
 export const REPORT_TICK = 16;
 export const REPORT_CONTACTS = 32;
+export const REPORT_HAND = 64;
 /** Bits of Capabilities.features. */
 export const FEATURE_BULK_MESH = 1;
 export const FEATURE_BATCH = 2;
@@ -975,3 +1059,4 @@ export const FEATURE_SUBSCRIBE = 4;
 export const FEATURE_STOP = 8;
 export const FEATURE_HEARTBEAT = 16;
 export const FEATURE_HOLD_HAND = 32;
+export const FEATURE_REMOTE_CONTACTS = 64;

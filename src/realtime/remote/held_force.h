@@ -1,0 +1,31 @@
+// The law of held forces: slew-limited, zero at the end of their life, and within a budget of energy, so that
+// a delayed loop cannot pump the arm.
+#pragma once
+
+#include "realtime/remote/energy_tank.h"
+#include "realtime/remote/remote_report.h"
+
+namespace hapticd::realtime {
+
+/// One per servo, called in its thread: noexcept, no allocation.
+class HeldForceLaw {
+ public:
+  /// The force of this tick, also in `out`. `guardGain`: 0 … 1, the guard's in the last tick: a force that
+  /// was not written returns no energy.
+  void step(const HeldForce& wanted, const Vec3& hip_m, const Vec3& velocity_m_per_s, Nanos now,
+            double step_s, double guardGain, RemoteRendering& out) noexcept;
+  void reset() noexcept;
+
+ private:
+  Vec3 target(const HeldForce& wanted, Nanos now) const noexcept;
+  Vec3 withinEnergy(const Vec3& force_N, const Vec3& velocity_m_per_s, double step_s) noexcept;
+
+  EnergyTank tank_{EnergyBudget{}};
+  bool started_ = false;  // the tank has its first budget
+  bool spent_ = false;
+  double cut_ = 0;  // share of the adding part that is cut
+  Vec3 force_N_ = Vec3::Zero();
+  Vec3 lastHip_m_ = Vec3::Zero();
+};
+
+}  // namespace hapticd::realtime

@@ -1,0 +1,83 @@
+// The law of remote contacts: surfaces that a client streams, rendered at the servo's rate.
+//
+// A surface moves by its stated velocities. An update that says otherwise never moves it at once: the law
+// keeps the force of the moment, by shifting and turning the surface, and takes shift and turn back at a
+// limited rate. docs/remote-contacts.md derives it.
+#pragma once
+
+#include <span>
+
+#include "realtime/remote/energy_tank.h"
+#include "realtime/remote/remote_report.h"
+#include "realtime/remote/remote_shape.h"
+
+namespace hapticd::realtime {
+
+/// The hand in one tick. Device frame.
+struct RemoteHand {
+  Vec3 position_m = Vec3::Zero();
+  Vec3 velocity_m_per_s = Vec3::Zero();
+  Vec3 sceneForce_N =
+      Vec3::Zero();  ///< normal force of meshes and planes: remote contacts add what is missing
+};
+
+/// One per servo, called in its thread: noexcept, no allocation.
+class RemoteContacts {
+ public:
+  /// One tick. Returns the force on the hand; `out` gets the contacts that exert it.
+  Vec3 step(const RemoteContactSet& newest, const RemoteHand& hand, Nanos now, double step_s,
+            RemoteRendering& out) noexcept;
+  /// Forgets all contacts at once.
+  void reset() noexcept;
+
+ private:
+  // Those of the newest set, and as many that fade out.
+  static constexpr std::size_t kSlots = 2 * kMaxRemoteContacts;
+
+  struct Slot {
+    bool used = false;
+    bool stated = false;  // in the newest set
+    RemoteContact contact;
+    Nanos statedAt = 0;
+    Nanos end = 0;
+    Nanos fade = 0;                // length of the fade to `end`; 0: it has not begun
+    double shift_m = 0;            // of the rendered surface, out of the material
+    Vec3 turn = Vec3::Zero();      // rotation vector from the stated to the rendered normal
+    Vec3 velocity = Vec3::Zero();  // of the surface for damper and friction
+    double damping = 0;
+    double staticFriction = 0;
+    double dynamicFriction = 0;
+    Vec3 anchor_m = Vec3::Zero();
+    bool sliding = false;
+
+    // Of this tick.
+    Vec3 stated_m_per_s = Vec3::Zero();  // velocity of the surface at the HIP, as stated
+    double depth_m = 0;
+    Vec3 normal = Vec3::UnitY();
+    double demand_N = 0;  // normal force that this contact alone would exert
+    double normal_N = 0;  // its share of the normal force of all
+  };
+
+  void take(const RemoteContactSet& set, const RemoteHand& hand, Nanos now) noexcept;
+  void replace(Slot& slot, const RemoteContact& contact, const RemoteContactSet& set, const RemoteHand& hand,
+               Nanos now) noexcept;
+  std::span<Slot> inUse() noexcept { return {slots_.data(), top_}; }
+  Slot* slotFor(std::int32_t id) noexcept;
+  void fadeOut(Nanos now, double step_s) noexcept;
+  static double gain(const Slot& slot, Nanos now) noexcept;
+  static void locate(Slot& slot, const RemoteHand& hand, Nanos now) noexcept;
+  void correct(Slot& slot, const RemoteHand& hand, double budget_N, double step_s) noexcept;
+  static void demand(Slot& slot, const RemoteHand& hand, Nanos now) noexcept;
+  Vec3 share(const RemoteHand& hand) noexcept;
+  static Vec3 friction(Slot& slot, const RemoteHand& hand, double ofAll, double step_s) noexcept;
+
+  std::array<Slot, kSlots> slots_;
+  std::uint64_t taken_ = 0;
+  std::size_t top_ = 0;   // slots from here on are unused
+  bool resumed_ = false;  // an update came during a fade
+  double pressed_N = 0;   // sum of the normal forces in the last tick
+  EnergyTank corrections_{EnergyBudget{}};
+  bool held_ = false;  // a correction waited for energy in this tick
+};
+
+}  // namespace hapticd::realtime

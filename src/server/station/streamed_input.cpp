@@ -1,0 +1,279 @@
+#include "server/station/streamed_input.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/time.h"
+#include "scene/passivity.h"
+#include "scene/surface_settings.h"
+#include "scene/workspace.h"
+#include "server/reports/client_tick.h"
+
+namespace hapticd::server {
+namespace {
+
+using base::Nanos;
+using geometry::Vec3;
+using realtime::RemoteContact;
+using realtime::RemoteContactSet;
+using realtime::RemoteShape;
+
+constexpr Nanos kTextPeriod = 1'000'000'000;
+constexpr Nanos kShortestLife = 10'000'000;
+constexpr Nanos kLongestJitter = 50'000'000;
+constexpr Nanos kUnknownRoundTrip = 100'000'000;  // of a client that does not measure it
+constexpr Nanos kLongestRoundTrip = 1'000'000'000;
+constexpr Nanos kDrift = 50'000;          // of the two clocks between two messages, at most
+constexpr double kRoundTripDecay = 0.99;  // of the largest one, with each message
+constexpr std::int64_t kLatestStamp = 4'000'000'000'000'000'000;  // 127 years
+constexpr double kSoftest_N_per_m = 1;                            // a softer contact is none
+constexpr double kThinnest_m = 1e-4;
+constexpr double kLargest = 1e9;
+constexpr double kOpposing = -0.5;  // cosine between normals of contacts that may squeeze the hand
+
+// From a client's frame and units to the device's.
+class ToDevice {
+ public:
+  explicit ToDevice(const realtime::TickReport& last) {
+    const geometry::Affine T_world_device =
+        last.tick == 0 ? scene::Workspace{}.T_world_device : last.T_world_device;
+    T_device_world_ = T_world_device.inverse();
+    const geometry::Mat3 linear = T_device_world_.linear();
+    scale_ = std::cbrt(std::abs(linear.determinant()));
+    rotation_ = linear / scale_;
+  }
+  Vec3 position(const double* n) const {
+    return T_device_world_ * Vec3(kWorldPerReported * Vec3(n[0], n[1], n[2]));
+  }
+  Vec3 vector(const double* n) const {
+    return kWorldPerReported * (T_device_world_.linear() * Vec3(n[0], n[1], n[2]));
+  }
+  Vec3 direction(const double* n) const { return rotation_ * Vec3(n[0], n[1], n[2]); }
+  double length(double reported) const { return kWorldPerReported * scale_ * reported; }
+
+ private:
+  geometry::Affine T_device_world_;
+  geometry::Mat3 rotation_;
+  double scale_ = 1;
+};
+
+// A stamp beyond any clock counts as none.
+std::int64_t stampOf(std::int64_t time) {
+  return time > -kLatestStamp && time < kLatestStamp ? time : 0;
+}
+
+Vec3 atMost(const Vec3& v, double limit) {
+  const double size = v.norm();
+  return size > limit ? Vec3(limit / size * v) : v;
+}
+
+Nanos lifetimeOf(double lifetime_s) {
+  return std::clamp(base::toNanos(std::clamp(lifetime_s, 0.0, 1.0)), kShortestLife,
+                    realtime::kLongestRemoteLife);
+}
+
+bool usable(const double* numbers, std::size_t count) {
+  return std::all_of(numbers, numbers + count,
+                     [](double x) { return std::isfinite(x) && std::abs(x) <= kLargest; });
+}
+
+// The numbers of one contact, see wire::RemoteContacts. Returns why they are none, or an empty text.
+std::string contactOf(const double* n, const ToDevice& toDevice, RemoteContact& contact) {
+  if (!usable(n, wire::RemoteContacts::kNumbers)) return "a number is not finite or too large";
+  if (!(n[1] == 0 || n[1] == 1 || n[1] == 2))  // wire::RemoteShape
+    return fmt::format("shape {} is unknown; use 0 (half-space), 1 (sphere) or 2 (cylinder)", n[1]);
+  contact.id = static_cast<std::int32_t>(std::clamp(n[0], -2147483648.0, 2147483647.0));
+  contact.shape = static_cast<RemoteShape>(static_cast<int>(n[1]));
+  contact.radius_m = toDevice.length(n[2]);
+  if (contact.shape != RemoteShape::halfSpace && std::abs(contact.radius_m) < kThinnest_m)
+    return fmt::format("radius {} m is smaller than 0.1 mm of the device", n[2]);
+  contact.point_m = toDevice.position(n + 3);
+  contact.normal = toDevice.direction(n + 6);
+  if (contact.normal.norm() < 1e-6) return "the normal is zero";
+  contact.normal.normalize();
+  contact.axis = toDevice.direction(n + 9);
+  if (contact.shape == RemoteShape::cylinder) {
+    contact.axis -= contact.normal.dot(contact.axis) * contact.normal;
+    if (contact.axis.norm() < 1e-6) return "the axis of the cylinder is zero or along the normal";
+    contact.axis.normalize();
+  }
+  contact.velocity_m_per_s = atMost(toDevice.vector(n + 12), realtime::kRemoteSpeed_m_per_s);
+  contact.angularVelocity_rad_per_s = atMost(toDevice.direction(n + 15), realtime::kRemoteTurn_rad_per_s);
+  contact.stiffness_N_per_m = n[18];
+  contact.damping_Ns_per_m = std::max(n[19], 0.0);
+  contact.staticFriction = std::clamp(n[20], 0.0, 1.0);
+  contact.dynamicFriction = std::clamp(n[21], 0.0, contact.staticFriction);
+  contact.lifetime = lifetimeOf(n[22]);
+  contact.yields = n[23] != 0;
+  return {};
+}
+
+}  // namespace
+
+// False when another client streams, with the refusal, or when the message is older than the newest.
+bool StreamedInput::begin(Stream& stream, scene::ClientId client, std::int64_t time, Nanos received,
+                          Refusal& refusal) {
+  if (stream.client && *stream.client != client) {
+    if (received < stream.until) {
+      refusal = {RefusalCode::streamedByOther,
+                 "refused: client " + std::to_string(*stream.client) +
+                     " streams to this device; wait until its last value has expired"};
+      return false;
+    }
+    stream = {};
+  }
+  if (stream.client && time != 0 && time < stream.newest) return false;
+  if (!stream.client) stream.offset = received - time;
+  stream.client = client;
+  stream.newest = time;
+  return true;
+}
+
+// When the values were true, on the servo clock: the receipt without the jitter of the way.
+Nanos StreamedInput::statedAt(Stream& stream, std::int64_t time, Nanos received) const {
+  if (time == 0) return received;
+  stream.offset = std::min(stream.offset + kDrift, received - time);
+  return std::clamp(time + stream.offset, received - kLongestJitter, received);
+}
+
+StreamedInput::Answer StreamedInput::answer(scene::ClientId client, Kind kind, Nanos now, bool taken,
+                                            Refusal text) {
+  if (!text.text.empty()) {
+    Nanos& next = nextText_[{client, kind}];
+    if (now < next) {
+      text.text.clear();
+    } else {
+      next = now + kTextPeriod;
+    }
+  }
+  return {taken, std::move(text)};
+}
+
+// As any surface: what the sampled and delayed loop can bear. Surfaces from two sides share it.
+std::string StreamedInput::keepWithinBounds(RemoteContactSet& set) const {
+  std::string remark;
+  for (std::uint32_t i = 0; i < set.count; ++i) {
+    RemoteContact& contact = set.contacts[i];
+    scene::SceneConfig config = config_;
+    if (contact.yields) config.transportDelay_s += base::toSeconds(contacts_.roundTrip);
+    for (std::uint32_t j = 0; j < set.count; ++j) {
+      if (contact.normal.dot(set.contacts[j].normal) < kOpposing) {
+        config.ownDamping_Ns_per_m = config_.ownDamping_Ns_per_m / 2;
+      }
+    }
+    scene::Surface surface;
+    surface.stiffness_N_per_m = contact.stiffness_N_per_m;
+    surface.damping_Ns_per_m = contact.damping_Ns_per_m;
+    std::string lowered;
+    scene::keepPassive(surface, scene::PassivityBound(config), lowered);
+    contact.stiffness_N_per_m = surface.stiffness_N_per_m;
+    contact.damping_Ns_per_m = surface.damping_Ns_per_m;
+    if (!lowered.empty() && remark.empty()) remark = fmt::format("contact {}: {}", contact.id, lowered);
+  }
+  return remark;
+}
+
+StreamedInput::Answer StreamedInput::on(scene::ClientId client, const wire::RemoteContacts& message,
+                                        const realtime::TickReport& last, Nanos received) {
+  constexpr std::size_t kNumbers = wire::RemoteContacts::kNumbers;
+  const std::int64_t time = stampOf(message.time);
+  Refusal text;
+  if (!begin(contacts_, client, time, received, text)) {
+    if (!text.text.empty()) text.text = "Remote_Contacts " + text.text;
+    return answer(client, Kind::contacts, received, false, std::move(text));
+  }
+  const std::vector<double>& numbers = message.contacts.values;
+  if (numbers.size() % kNumbers != 0) {
+    text = {
+        RefusalCode::streamInvalid,
+        fmt::format("Remote_Contacts refused: {} numbers are no multiple of {}", numbers.size(), kNumbers)};
+    return answer(client, Kind::contacts, received, false, std::move(text));
+  }
+  const Nanos measured = message.state_time > 0
+                             ? std::clamp<Nanos>(received - message.state_time, 0, kLongestRoundTrip)
+                             : kUnknownRoundTrip;
+  contacts_.roundTrip =
+      std::max(measured, static_cast<Nanos>(kRoundTripDecay * static_cast<double>(contacts_.roundTrip)));
+
+  RemoteContactSet& set = input_.contacts;
+  ++set.number;
+  set.clientTime = time;
+  set.received = received;
+  set.stated = statedAt(contacts_, time, received);
+  set.count = 0;
+  contacts_.until = received;
+  const ToDevice toDevice(last);
+  for (std::size_t at = 0; at < numbers.size() && set.count < realtime::kMaxRemoteContacts; at += kNumbers) {
+    RemoteContact& contact = set.contacts[set.count];
+    const std::string wrong = contactOf(numbers.data() + at, toDevice, contact);
+    if (!wrong.empty()) {
+      text = {RefusalCode::streamInvalid,
+              fmt::format("Remote_Contacts: contact {} ignored: {}", at / kNumbers, wrong)};
+      continue;
+    }
+    const auto sameId = [&](const RemoteContact& c) { return c.id == contact.id; };
+    if (std::any_of(set.contacts.begin(), set.contacts.begin() + set.count, sameId)) {
+      text = {RefusalCode::streamInvalid,
+              fmt::format("Remote_Contacts: contact id {} ignored the second time; give each its own",
+                          contact.id)};
+      continue;
+    }
+    if (contact.stiffness_N_per_m < kSoftest_N_per_m) continue;
+    contacts_.until = std::max(contacts_.until, received + contact.lifetime);
+    ++set.count;
+  }
+  const std::string remark = keepWithinBounds(set);
+  if (text.text.empty() && !remark.empty()) text.text = "Remote_Contacts: " + remark;
+  send();
+  return answer(client, Kind::contacts, received, true, std::move(text));
+}
+
+StreamedInput::Answer StreamedInput::on(scene::ClientId client, const wire::HeldForce& message,
+                                        const realtime::TickReport& last, Nanos received) {
+  const std::int64_t time = stampOf(message.time);
+  Refusal text;
+  if (!begin(force_, client, time, received, text)) {
+    if (!text.text.empty()) text.text = "Held_Force " + text.text;
+    return answer(client, Kind::force, received, false, std::move(text));
+  }
+  if (!usable(message.force.data(), 3) || !usable(message.torque.data(), 3) ||
+      !usable(&message.lifetime, 1)) {
+    text = {RefusalCode::streamInvalid, "Held_Force refused: a number is not finite or too large"};
+    return answer(client, Kind::force, received, false, std::move(text));
+  }
+  const bool turns =
+      std::any_of(message.torque.begin(), message.torque.end(), [](double t) { return t != 0; });
+  if (turns && !rendersTorque_)
+    text.text = "Held_Force: this device renders no torque; only the force is felt";
+  realtime::HeldForce& force = input_.force;
+  ++force.number;
+  force.clientTime = time;
+  force.received = received;
+  force.lifetime = message.lifetime > 0 ? lifetimeOf(message.lifetime) : 0;
+  force.force_N = ToDevice(last).direction(message.force.data());
+  force.budget = budget_;
+  force_.until = received + force.lifetime;
+  send();
+  return answer(client, Kind::force, received, true, std::move(text));
+}
+
+void StreamedInput::clientGone(scene::ClientId client) {
+  std::erase_if(nextText_, [client](const auto& entry) { return entry.first.first == client; });
+  const bool contacts = contacts_.client == client;
+  const bool force = force_.client == client;
+  if (contacts) {
+    contacts_ = {};
+    ++input_.contacts.number;
+    input_.contacts.count = 0;
+  }
+  if (force) {
+    force_ = {};
+    ++input_.force.number;
+    input_.force.lifetime = 0;
+  }
+  if (contacts || force) send();
+}
+
+}  // namespace hapticd::server

@@ -1,0 +1,399 @@
+// The laws of remote contacts and held forces against closed forms.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "base/time.h"
+#include "realtime/remote/held_force.h"
+#include "realtime/remote/remote_contacts.h"
+
+namespace hapticd::realtime {
+namespace {
+
+constexpr Nanos kMs = 1'000'000;
+constexpr double kRate_N_per_ms = 0.3;
+constexpr double kExact_N = 1e-9;
+
+RemoteContact floorAt(double height_m, double stiffness = 800) {
+  RemoteContact c;
+  c.point_m = {0.02, height_m, -0.01};
+  c.normal = Vec3::UnitY();
+  c.stiffness_N_per_m = stiffness;
+  return c;
+}
+
+// A servo of 1 kHz and a client that states whatever the test sets.
+struct Rig {
+  RemoteContacts law;
+  RemoteContactSet set;
+  RemoteHand hand;
+  RemoteRendering out;
+  Vec3 force = Vec3::Zero();
+  Nanos now = 1000 * kMs;
+
+  void state(std::vector<RemoteContact> contacts) {
+    ++set.number;
+    set.received = set.stated = now;
+    set.count = static_cast<std::uint32_t>(contacts.size());
+    std::copy(contacts.begin(), contacts.end(), set.contacts.begin());
+  }
+  const Vec3& step() {
+    now += kMs;
+    out = {};
+    force = law.step(set, hand, now, 1e-3, out);
+    return force;
+  }
+  // States the same every 16 ms.
+  void settle(const std::vector<RemoteContact>& contacts, int ticks) {
+    for (int i = 0; i < ticks; ++i) {
+      if (i % 16 == 0) state(contacts);
+      step();
+    }
+  }
+  // From outside to the place, so that nothing appears around the hand.
+  void approach(const std::vector<RemoteContact>& contacts, const Vec3& from, const Vec3& to) {
+    for (int i = 0; i <= 100; ++i) {
+      hand.position_m = from + i / 100.0 * (to - from);
+      if (i % 16 == 0) state(contacts);
+      step();
+    }
+  }
+};
+
+void expectNear(const Vec3& a, const Vec3& b, double tolerance) {
+  EXPECT_LE((a - b).norm(), tolerance) << a.transpose() << " instead of " << b.transpose();
+}
+
+TEST(RemoteContacts, HalfSpaceIsASpringFromTheFirstTouch) {
+  Rig rig;
+  rig.state({floorAt(0)});
+  for (double y = 0.001; y > -0.003; y -= 0.0001) {
+    rig.hand.position_m = {0, y, 0};
+    if (rig.now % (10 * kMs) == 0) rig.state({floorAt(0)});
+    expectNear(rig.step(), {0, 800 * std::max(0.0, -y), 0}, kExact_N);
+  }
+  ASSERT_EQ(rig.out.count, 1U);
+  EXPECT_NEAR(rig.out.contacts[0].depth_m, -rig.hand.position_m.y(), 1e-9);
+  EXPECT_NEAR(rig.out.contacts[0].proxy_m.y(), 0, 1e-9);
+  EXPECT_NEAR(rig.out.contacts[0].force_N.y(), rig.force.y(), 1e-6);
+}
+
+TEST(RemoteContacts, SphereStaysRoundBetweenUpdates) {
+  Rig rig;
+  RemoteContact ball = floorAt(0);
+  ball.shape = RemoteShape::sphere;
+  ball.radius_m = 0.030;
+  ball.point_m = {0, 0.030, 0};  // its centre is the origin
+  for (const double angle : {0.0, 0.3, -0.8, 1.2}) {
+    const Vec3 out(std::sin(angle), std::cos(angle), 0);
+    rig.approach({ball}, 0.031 * out, 0.0285 * out);
+    expectNear(rig.force, 800 * 0.0015 * out, 1e-6);
+  }
+  // The same from inside a hollow sphere: it pushes to the centre.
+  Rig hollow;
+  ball.radius_m = -0.030;
+  ball.normal = -Vec3::UnitY();
+  hollow.approach({ball}, {0.028, 0, 0}, {0.0315, 0, 0});
+  expectNear(hollow.force, {-800 * 0.0015, 0, 0}, 1e-6);
+}
+
+TEST(RemoteContacts, CylinderIsFlatAlongItsAxis) {
+  Rig rig;
+  RemoteContact rod = floorAt(0);
+  rod.shape = RemoteShape::cylinder;
+  rod.radius_m = 0.010;
+  rod.point_m = {0, 0.010, 0};
+  rod.axis = Vec3::UnitZ();
+  const Vec3 out(0.6, 0.8, 0);
+  rig.approach({rod}, 0.011 * out, 0.009 * out + Vec3(0, 0, 0.05));
+  expectNear(rig.force, 800 * 0.001 * out, 1e-6);
+}
+
+TEST(RemoteContacts, SurfacesMoveByTheirVelocities) {
+  Rig rig;
+  rig.hand.position_m = {0, -0.001, 0};
+  RemoteContact rising = floorAt(-0.002);
+  rising.point_m.setZero();
+  rising.point_m.y() = -0.002;
+  rising.velocity_m_per_s = {0, 0.1, 0};
+  rig.state({rising});
+  for (int ms = 1; ms <= 30; ++ms)
+    expectNear(rig.step(), {0, 800 * std::max(0.0, 1e-4 * ms - 0.001), 0}, 1e-9);
+
+  Rig turning;
+  RemoteContact wheel = floorAt(0);
+  wheel.point_m.setZero();
+  wheel.angularVelocity_rad_per_s = {0, 0, 2};
+  turning.hand.position_m = {-0.02, 0.0001, 0};
+  turning.state({wheel});
+  for (int ms = 1; ms <= 40; ++ms) turning.step();
+  const double angle = 2 * 0.040;
+  const Vec3 normal(-std::sin(angle), std::cos(angle), 0);
+  const double depth = -normal.dot(turning.hand.position_m);
+  EXPECT_LT(depth, 0) << "the surface turns away on this side";
+  turning.hand.position_m = {0.02, 0.0001, 0};
+  Rig other;
+  other.hand.position_m = {0.02, 0.0001, 0};
+  other.state({wheel});
+  for (int ms = 1; ms <= 40; ++ms) other.step();
+  expectNear(other.force, 800 * -normal.dot(other.hand.position_m) * normal, 1e-6);
+}
+
+// Whatever a client states, with the hand at rest: no step above the rate, not of many contacts either.
+TEST(RemoteContacts, NoUpdateMakesAStep) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (const int most : {1, 3, 16}) {
+    Rig rig;
+    Vec3 last = Vec3::Zero();
+    double largest = 0;
+    double touched = 0;
+    for (int ms = 0; ms < 6000; ++ms) {
+      if (ms % 17 == 0) {
+        std::vector<RemoteContact> contacts;
+        for (int id = 0; id < most; ++id) {
+          if (unit(random) > 0.5) continue;
+          RemoteContact c = floorAt(0.002 * unit(random), 300 + 250 * unit(random));
+          c.id = id;
+          c.normal = Vec3(0.3 * unit(random), 1, 0.3 * unit(random)).normalized();
+          c.velocity_m_per_s = 0.02 * Vec3(unit(random), unit(random), unit(random));
+          c.damping_Ns_per_m = 1 + unit(random);
+          c.staticFriction = 0.3 + 0.3 * unit(random);
+          c.dynamicFriction = 0.5 * c.staticFriction;
+          c.yields = true;
+          c.lifetime = 40 * kMs;
+          contacts.push_back(c);
+        }
+        rig.state(contacts);
+      }
+      const Vec3 force = rig.step();
+      // What the stated velocities do is no step of an update: 0.02 m/s at 550 N/m.
+      largest = std::max(largest, (force - last).norm());
+      touched = std::max(touched, force.norm());
+      last = force;
+    }
+    EXPECT_GT(touched, 0.5) << most;
+    EXPECT_LT(largest, kRate_N_per_ms) << most;
+  }
+}
+
+TEST(RemoteContacts, LifeIncludesTheFade) {
+  Rig rig;
+  RemoteContact c = floorAt(0);
+  c.lifetime = 60 * kMs;
+  rig.approach({c}, {0, 0.001, 0}, {0, -0.004, 0});
+  ASSERT_NEAR(rig.force.y(), 3.2, 1e-6);
+  rig.state({c});
+  const Nanos received = rig.now;
+  double last = rig.force.y();
+  while (rig.now < received + 60 * kMs) {
+    const double force = rig.step().y();
+    EXPECT_LE(force, last + kExact_N);
+    EXPECT_GE(force, last - kRate_N_per_ms);
+    if (rig.now <= received + 30 * kMs) {
+      EXPECT_NEAR(force, 3.2, 1e-6);
+    }
+    last = force;
+  }
+  EXPECT_EQ(last, 0);
+  EXPECT_EQ(rig.out.count, 0U);
+}
+
+TEST(RemoteContacts, AbsentOnesFadeAtOnce) {
+  Rig rig;
+  RemoteContact side = floorAt(0);
+  side.id = 1;
+  side.point_m.setZero();
+  side.normal = Vec3::UnitX();
+  rig.approach({floorAt(0), side}, {0.001, 0.001, 0}, {-0.002, -0.002, 0});
+  ASSERT_NEAR(rig.force.x(), 1.6, 1e-6);
+  rig.state({floorAt(0)});
+  double last = rig.force.x();
+  int ms = 0;
+  for (; last > 0 && ms < 100; ++ms) {
+    rig.step();
+    EXPECT_GE(rig.force.x(), last - kRate_N_per_ms);
+    EXPECT_NEAR(rig.force.y(), 1.6, 1e-6);
+    last = rig.force.x();
+  }
+  EXPECT_LT(ms, 20);
+}
+
+TEST(RemoteContacts, SurfacesOnTopOfEachOtherAreAsStiffAsOne) {
+  Rig rig;
+  std::vector<RemoteContact> contacts;
+  for (int id = 0; id < 16; ++id) {
+    contacts.push_back(floorAt(0));
+    contacts.back().id = id;
+    contacts.back().point_m.x() = 0.001 * id;
+  }
+  rig.approach(contacts, {0, 0.001, 0}, {0, -0.002, 0});
+  expectNear(rig.force, {0, 1.6, 0}, 1e-6);
+
+  // What the scene exerts already is not added again; across it, contacts add up.
+  rig.hand.sceneForce_N = {0, 1, 0};
+  rig.settle(contacts, 1);
+  expectNear(rig.force, {0, 0.6, 0}, 1e-6);
+  rig.hand.sceneForce_N = {1, 0, 0};
+  rig.settle(contacts, 1);
+  expectNear(rig.force, {0, 1.6, 0}, 1e-6);
+}
+
+// Each demands its spring force along its normal: the forces of a corner of 60 degrees are solved, not
+// summed.
+TEST(RemoteContacts, CornersExertWhatEachFaceDemands) {
+  Rig rig;
+  RemoteContact a = floorAt(0);
+  a.point_m.setZero();
+  a.normal = Vec3(std::sin(0.5), std::cos(0.5), 0);
+  RemoteContact b = a;
+  b.id = 1;
+  b.normal.x() = -b.normal.x();
+  rig.approach({a, b}, {0, 0.001, 0}, {0.0003, -0.002, 0});
+  EXPECT_NEAR(rig.force.dot(a.normal), -800 * a.normal.dot(rig.hand.position_m), 1e-5);
+  EXPECT_NEAR(rig.force.dot(b.normal), -800 * b.normal.dot(rig.hand.position_m), 1e-5);
+}
+
+TEST(RemoteContacts, FrictionSticksAndSlides) {
+  Rig rig;
+  RemoteContact c = floorAt(0);
+  c.staticFriction = 0.5;
+  c.dynamicFriction = 0.3;
+  rig.approach({c}, {0, 0.001, 0}, {0, -0.002, 0});
+  const double normal = 1.6;
+  double largest = 0;
+  for (int i = 0; i < 200; ++i) {
+    rig.hand.position_m.x() += 5e-5;
+    if (i % 16 == 0) rig.state({c});
+    rig.step();
+    largest = std::max(largest, -rig.force.x());
+  }
+  EXPECT_NEAR(largest, 0.5 * normal, 0.03);
+  EXPECT_NEAR(rig.force.x(), -0.3 * normal, 1e-6);
+  EXPECT_NEAR(rig.force.y(), normal, 1e-6);
+}
+
+TEST(RemoteContacts, DamperTakesEnergyAndNeverPulls) {
+  Rig rig;
+  RemoteContact c = floorAt(0);
+  c.damping_Ns_per_m = 2;
+  rig.approach({c}, {0, 0.001, 0}, {0, -0.002, 0});
+  rig.hand.velocity_m_per_s = {0, -0.1, 0};
+  EXPECT_NEAR(rig.step().y(), 1.6 + 0.2, 1e-6);
+  rig.hand.velocity_m_per_s = {0, 0.1, 0};
+  EXPECT_NEAR(rig.step().y(), 1.6 - 0.2, 1e-6);
+  rig.hand.velocity_m_per_s = {0, 5, 0};
+  EXPECT_EQ(rig.step().y(), 0);
+}
+
+// A surface that jumps into the hand again and again, without a velocity, pumps no more than the tank holds;
+// one that yields may.
+TEST(RemoteContacts, UnstatedMotionIsPaidFromTheTank) {
+  double worked[2] = {};
+  for (const bool yields : {false, true}) {
+    Rig rig;
+    RemoteContact c = floorAt(0);
+    c.yields = yields;
+    rig.approach({c}, {0, 0.001, 0}, {0, -0.001, 0});
+    bool held = false;
+    for (int ms = 0; ms < 1000; ++ms) {
+      // The client lets the floor follow the hand upwards, and the hand gives way.
+      if (ms % 16 == 0) {
+        c.point_m.y() = rig.hand.position_m.y() + 0.002;
+        rig.state({c});
+      }
+      rig.step();
+      const double moved = 0.05e-3;
+      worked[yields] += rig.force.y() * moved;
+      rig.hand.position_m.y() += moved;
+      held = held || (rig.out.status & kRemoteCorrectionsHeld) != 0;
+    }
+    EXPECT_EQ(held, !yields);
+  }
+  EXPECT_GT(worked[1], 0.06);
+  EXPECT_LT(worked[0], 0.020 + 0.020 + 0.005) << "the start, the refill, and what the spring had stored";
+}
+
+struct Holding {
+  HeldForceLaw law;
+  HeldForce wanted;
+  RemoteRendering out;
+  Vec3 hip = Vec3::Zero();
+  Vec3 velocity = Vec3::Zero();
+  Nanos now = 1000 * kMs;
+  double gain = 1;
+
+  void hold(const Vec3& force_N, Nanos lifetime = 100 * kMs) {
+    ++wanted.number;
+    wanted.received = now;
+    wanted.lifetime = lifetime;
+    wanted.force_N = force_N;
+  }
+  Vec3 step() {
+    now += kMs;
+    hip += 1e-3 * velocity;
+    out = {};
+    law.step(wanted, hip, velocity, now, 1e-3, gain, out);
+    return out.heldForce_N;
+  }
+};
+
+TEST(HeldForce, RisesAtTheRateAndIsZeroAtTheEndOfItsLife) {
+  Holding h;
+  h.hold({0, 3, 0});
+  Vec3 last = Vec3::Zero();
+  double largest = 0;
+  for (int ms = 1; ms <= 100; ++ms) {
+    const Vec3 force = h.step();
+    EXPECT_LE((force - last).norm(), kRate_N_per_ms + kExact_N);
+    largest = std::max(largest, force.y());
+    last = force;
+  }
+  EXPECT_DOUBLE_EQ(largest, 3);
+  EXPECT_NEAR(last.y(), 0, 1e-6);
+  EXPECT_EQ(h.step().y(), 0);
+}
+
+TEST(HeldForce, TankLimitsTheWorkAndTheBrakingPartStays) {
+  Holding h;
+  h.velocity = {0, 0.2, 0};
+  double work = 0;
+  int cutAt = -1;
+  int zeroAt = -1;
+  for (int ms = 0; ms < 2000; ++ms) {
+    if (ms % 20 == 0) h.hold({1, 2, 0});
+    const Vec3 before = h.out.heldForce_N;
+    const Vec3 force = h.step();
+    work += before.y() * 0.2e-3;
+    if (cutAt < 0 && (h.out.status & kRemoteEnergySpent) != 0) cutAt = ms;
+    if (cutAt >= 0 && zeroAt < 0 && std::abs(force.y()) < 1e-9) zeroAt = ms;
+    if (zeroAt == ms) {
+      EXPECT_NEAR(force.x(), 1, 1e-9) << "across the motion nothing is cut";
+    }
+    if (ms == 100) {
+      EXPECT_NE(h.out.status & kRemoteEnergySpent, 0U);
+    }
+  }
+  ASSERT_GE(cutAt, 0);
+  ASSERT_GE(zeroAt, 0);
+  EXPECT_LE(zeroAt - cutAt, 10);
+  EXPECT_LT(work, 0.020 + 2 * 0.020 + 0.005)
+      << "the start, the refill of two seconds, and what one cut takes";
+}
+
+TEST(HeldForce, WhatTheHandReturnsRefillsTheTank) {
+  for (const double gain : {1.0, 0.0}) {
+    Holding h;
+    h.gain = gain;
+    h.wanted.budget.refill_W = 0;
+    h.velocity = {0, -0.2, 0};
+    for (int ms = 0; ms < 200; ++ms) {
+      if (ms % 20 == 0) h.hold({0, 2, 0});
+      h.step();
+    }
+    EXPECT_NEAR(h.out.energy_J, gain > 0 ? 0.050 : 0.020, 1e-9) << "gain " << gain;
+  }
+}
+
+}  // namespace
+}  // namespace hapticd::realtime

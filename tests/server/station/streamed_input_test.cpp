@@ -1,0 +1,181 @@
+// From the wire to the servo: frames, limits, bounds, owners.
+#include "server/station/streamed_input.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "base/time.h"
+
+namespace hapticd::server {
+namespace {
+
+using geometry::Vec3;
+using testing::HasSubstr;
+
+constexpr base::Nanos kStreamMillisecond = 1'000'000;
+
+class StreamedInputTest : public testing::Test {
+ protected:
+  // A floor at a height in reported metres.
+  static std::vector<double> floorAt(double y, double id = 0) {
+    return {id, 0, 0, 0, y, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 500, 1, 0.4, 0.3, 0.1, 0};
+  }
+  StreamedInput::Answer send(std::vector<double> numbers, scene::ClientId client = 1, std::int64_t time = 0,
+                             std::int64_t stateTime = 0) {
+    wire::RemoteContacts message{.time = time, .state_time = stateTime, .contacts = {}};
+    message.contacts.values = std::move(numbers);
+    return streamed_.on(client, message, last_, now_);
+  }
+  StreamedInput::Answer hold(const wire::F64x3& force, scene::ClientId client = 1) {
+    return streamed_.on(client, wire::HeldForce{.time = 0, .force = force, .torque = {}, .lifetime = 0.05},
+                        last_, now_);
+  }
+  const realtime::RemoteContact& first() { return slot_.read().contacts.contacts[0]; }
+
+  static scene::SceneConfig config() {
+    scene::SceneConfig config;
+    config.ownDamping_Ns_per_m = 5;
+    return config;
+  }
+  StreamedInput::Slot slot_;
+  StreamedInput streamed_{slot_, config(), {}, false};
+  realtime::TickReport last_;
+  base::Nanos now_ = 5000 * kStreamMillisecond;
+};
+
+TEST_F(StreamedInputTest, ConvertsToTheFrameOfTheDevice) {
+  EXPECT_TRUE(send(floorAt(0.01)).taken);
+  EXPECT_NEAR((first().point_m - Vec3(0, 0.01, 0)).norm(), 0, 1e-12) << "before the first tick: millimetres";
+  EXPECT_NEAR((first().normal - Vec3::UnitY()).norm(), 0, 1e-12);
+  EXPECT_EQ(first().lifetime, 100 * kStreamMillisecond);
+  EXPECT_EQ(slot_.read().contacts.received, now_);
+
+  // A world twice as large as the travel of the device, turned by 90 degrees about z.
+  last_.tick = 1;
+  last_.T_world_device = geometry::Affine(Eigen::UniformScaling<double>(2000.0));
+  last_.T_world_device.rotate(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ()));
+  std::vector<double> ball = floorAt(0.01);
+  ball[1] = 1;
+  ball[2] = 0.02;
+  ball[12] = 0.2;
+  ball[17] = 3;
+  EXPECT_TRUE(send(ball).taken);
+  EXPECT_NEAR((first().point_m - Vec3(0.005, 0, 0)).norm(), 0, 1e-12);
+  EXPECT_NEAR((first().normal - Vec3::UnitX()).norm(), 0, 1e-12);
+  EXPECT_NEAR(first().radius_m, 0.01, 1e-12);
+  EXPECT_NEAR((first().velocity_m_per_s - Vec3(0, -0.1, 0)).norm(), 0, 1e-12);
+  EXPECT_NEAR((first().angularVelocity_rad_per_s - Vec3(0, 0, 3)).norm(), 0, 1e-12);
+  EXPECT_EQ(first().stiffness_N_per_m, 500);
+  EXPECT_TRUE(hold({1, 2, 0}).taken);
+  EXPECT_NEAR((slot_.read().force.force_N - Vec3(2, -1, 0)).norm(), 0, 1e-12);
+}
+
+TEST_F(StreamedInputTest, LimitsWhatIsTooFastTooLongOrTooStiff) {
+  std::vector<double> n = floorAt(0);
+  n[12] = 3;
+  n[15] = 100;
+  n[18] = 1e6;
+  n[20] = 7;
+  n[21] = 8;
+  n[22] = 5;
+  const StreamedInput::Answer answer = send(n);
+  EXPECT_TRUE(answer.taken);
+  EXPECT_THAT(answer.text.text, HasSubstr("unstable"));
+  EXPECT_EQ(answer.text.code, RefusalCode::none);
+  EXPECT_NEAR(first().velocity_m_per_s.norm(), 1, 1e-12);
+  EXPECT_NEAR(first().angularVelocity_rad_per_s.norm(), 20, 1e-9);
+  EXPECT_NEAR(first().stiffness_N_per_m, 0.999 * 5 / 0.0005, 1e-6);
+  EXPECT_EQ(first().staticFriction, 1);
+  EXPECT_EQ(first().dynamicFriction, 1);
+  EXPECT_EQ(first().lifetime, 100 * kStreamMillisecond);
+}
+
+// Delay bounds the stiffness of what follows the hand, and of that alone.
+TEST_F(StreamedInputTest, AYieldingContactPaysForTheRoundTrip) {
+  std::vector<double> n = floorAt(0);
+  n[18] = 5000;
+  send(n, 1, 0, now_ - 40 * kStreamMillisecond);
+  EXPECT_EQ(first().stiffness_N_per_m, 5000);
+  n[23] = 1;
+  send(n, 1, 0, now_ - 40 * kStreamMillisecond);
+  EXPECT_NEAR(first().stiffness_N_per_m, 0.999 * 5 / 0.0405, 1e-6);
+  // Surfaces from two sides share the bound.
+  n[23] = 0;
+  n[18] = 1e5;
+  std::vector<double> both = n;
+  n[0] = 1;
+  n[7] = -2;
+  both.insert(both.end(), n.begin(), n.end());
+  send(both);
+  EXPECT_NEAR(first().stiffness_N_per_m, 0.999 * 2.5 / 0.0005, 1e-6);
+}
+
+TEST_F(StreamedInputTest, RefusesWhatCannotBeUsedAndKeepsTheRest) {
+  std::vector<double> n = floorAt(0, 1);
+  const std::vector<double> good = floorAt(0.02, 2);
+  n[6] = n[7] = n[8] = 0;
+  n.insert(n.end(), good.begin(), good.end());
+  const StreamedInput::Answer answer = send(n);
+  EXPECT_EQ(answer.text.code, RefusalCode::streamInvalid);
+  EXPECT_THAT(answer.text.text, HasSubstr("the normal is zero"));
+  EXPECT_EQ(slot_.read().contacts.count, 1U);
+  EXPECT_EQ(first().id, 2);
+
+  for (const std::size_t at : {0U, 1U, 4U, 18U, 22U}) {
+    now_ += 2000 * kStreamMillisecond;
+    std::vector<double> bad = floorAt(0);
+    bad[at] = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_EQ(send(bad).text.code, RefusalCode::streamInvalid) << at;
+    EXPECT_EQ(slot_.read().contacts.count, 0U);
+  }
+  now_ += 2000 * kStreamMillisecond;
+  EXPECT_FALSE(send({1, 2, 3}).taken);
+  EXPECT_FALSE(hold({std::numeric_limits<double>::infinity(), 0, 0}).taken);
+  std::vector<double> twice = floorAt(0);
+  twice.insert(twice.end(), twice.begin(), twice.begin() + 24);
+  now_ += 2000 * kStreamMillisecond;
+  EXPECT_THAT(send(twice).text.text, HasSubstr("give each its own"));
+  EXPECT_EQ(slot_.read().contacts.count, 1U);
+  EXPECT_TRUE(send(twice).text.text.empty()) << "one text per second";
+}
+
+TEST_F(StreamedInputTest, OneClientStreamsUntilItsLastValueExpires) {
+  EXPECT_TRUE(send(floorAt(0), 1).taken);
+  EXPECT_EQ(send(floorAt(0), 2).text.code, RefusalCode::streamedByOther);
+  EXPECT_TRUE(hold({1, 0, 0}, 2).taken) << "forces are another stream";
+  now_ += 100 * kStreamMillisecond;
+  EXPECT_TRUE(send(floorAt(0), 2).taken);
+  streamed_.clientGone(2);
+  EXPECT_EQ(slot_.read().contacts.count, 0U);
+  EXPECT_EQ(slot_.read().force.lifetime, 0);
+  EXPECT_TRUE(send(floorAt(0), 1).taken);
+}
+
+TEST_F(StreamedInputTest, StampsBeyondAnyClockCountAsNone) {
+  EXPECT_TRUE(send(floorAt(0), 1, std::numeric_limits<std::int64_t>::min()).taken);
+  EXPECT_TRUE(send(floorAt(0), 1, std::numeric_limits<std::int64_t>::max()).taken);
+  EXPECT_TRUE(send(floorAt(0), 1, 0, std::numeric_limits<std::int64_t>::max()).taken);
+  EXPECT_EQ(slot_.read().contacts.clientTime, 0);
+  EXPECT_EQ(slot_.read().contacts.stated, now_);
+}
+
+// The newest wins: a datagram that was overtaken changes nothing. Jitter of the way is not motion of the
+// surface.
+TEST_F(StreamedInputTest, OrdersByTheStampsOfTheClient) {
+  constexpr std::int64_t kFar = 77'000 * kStreamMillisecond;
+  send(floorAt(0.01), 1, kFar);
+  now_ += 20 * kStreamMillisecond;
+  send(floorAt(0.02), 1, kFar + 20 * kStreamMillisecond);
+  EXPECT_FALSE(send(floorAt(0.03), 1, kFar + 10 * kStreamMillisecond).taken);
+  EXPECT_NEAR(first().point_m.y(), 0.02, 1e-12);
+  now_ += 27 * kStreamMillisecond;
+  send(floorAt(0.02), 1, kFar + 40 * kStreamMillisecond);
+  EXPECT_EQ(slot_.read().contacts.received, now_);
+  EXPECT_NEAR(base::toSeconds(now_ - slot_.read().contacts.stated), 0.007, 0.0003) << "it was 7 ms late";
+}
+
+}  // namespace
+}  // namespace hapticd::server
