@@ -4,7 +4,7 @@ import copy
 import time
 from collections import deque
 from dataclasses import dataclass
-from typing import Any, Callable, Deque, Dict, Final, Generic, List, NamedTuple, Optional, Tuple, TypeVar
+from typing import Any, Callable, Deque, Dict, Final, Generic, List, NamedTuple, Optional, Sequence, Tuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,7 @@ from ._commands import Commands
 from ._peer import Peer, now
 from ._statistics import Statistics
 from .errors import ConnectError, ConnectionLost, ServerError, Unsupported
-from .scene import Capabilities, Reports
+from .scene import Capabilities, RemoteContact, Reports
 
 HANDSHAKE_S: Final = 3.0
 RETRY_S: Final = 0.25
@@ -97,6 +97,17 @@ def _contacts(t: float, c: m.ContactList) -> r.ContactsReport:
     return r.ContactsReport(t, c.tick, c.time, contacts)
 
 
+def _hand(t: float, h: m.HandState) -> r.HandReport:
+    n = _array(h.contacts[: len(h.contacts) // 8 * 8], dtype=np.float64).reshape(-1, 8)
+    contacts = [r.RemoteContactForce(int(row[0]), row[1:4], row[4:7], float(row[7])) for row in n]
+    return r.HandReport(
+        t, h.tick, h.time, h.contacts_time, h.force_time, _array(h.position), _array(h.orientation),
+        _array(h.velocity), _array(h.angular_velocity), _array(h.force), _array(h.held_force), h.energy,
+        h.gripper if h.flags & m.HAND_HAS_GRIPPER else float("nan"), h.buttons, h.flags & m.HAND_ENERGY_SPENT != 0,
+        h.flags & m.HAND_CORRECTIONS_HELD != 0, r.Trips(h.guard_active), contacts,
+    )  # fmt: skip
+
+
 # From a message to a report, by message class. Arrays are built here, once, so that the codec stays independent.
 _CONVERT: Final[Dict[Any, Tuple[str, Callable[[float, Any], Any]]]] = {
     m.TrackerPosQuat: ("pose", lambda t, x: r.PoseReport(t, x.sensor, _array(x.position), _array(x.orientation))),
@@ -133,13 +144,14 @@ _CONVERT: Final[Dict[Any, Tuple[str, Callable[[float, Any], Any]]]] = {
         ),
     ),
     m.ContactList: ("contacts", _contacts),
+    m.HandState: ("hand", _hand),
     m.GuardState: (
         "guard",
         lambda t, x: r.GuardReport(t, r.Trips(x.active), r.Trips(x.latched), x.armed != 0, x.stopped != 0),
     ),
 }  # fmt: skip
 _LATEST: Final = frozenset(
-    ("analog", "force", "depth", "contact_point", "touching", "touched_object", "angle", "tick", "contacts", "guard")
+    ("hand", "analog", "force", "depth", "contact_point", "touching", "touched_object", "angle", "tick", "contacts", "guard")
 )
 _BY_KIND: Final = {_NUMBERS[cls][0]: (_NUMBERS[cls][1].decode, *entry) for cls, entry in _CONVERT.items()}
 _STATES: Final = _NUMBERS[m.ButtonStates][0]
@@ -514,7 +526,8 @@ class Core(Commands):
         flags = [self._has(feature) for feature in features]
         box = tuple(c.workspace)
         return Capabilities(
-            c.version, *flags, c.servo_rate, c.report_rate, c.peak_force, c.buttons, box[:3], box[3:]  # type: ignore
+            c.version, *flags, c.servo_rate, c.report_rate, c.peak_force, c.buttons, box[:3], box[3:],  # type: ignore
+            remote_contacts=self._has(m.FEATURE_REMOTE_CONTACTS),
         )
 
     def _set_subscription(self, kinds: Reports, rate_Hz: float) -> None:
@@ -532,6 +545,33 @@ class Core(Commands):
         if self.connected:
             self._heartbeat_at = time.monotonic() + HEARTBEAT_S
             self._put_now(m.Heartbeat(int(enable)))
+
+    # --- streamed state
+
+    def _put_fast(self, message: Any) -> None:
+        """Appends a message ahead of a batch that is held, by datagram where there are any; dropped and counted
+        without a connection. The face sends it."""
+        if not self.connected:
+            self._counts.messages_dropped += 1
+            return
+        assert self._peer is not None
+        self._peer.send_fast(self._frame(message))
+        self._counts.messages_out += 1
+
+    def _put_contacts(self, contacts: Sequence[RemoteContact]) -> None:
+        if len(contacts) > 16:
+            raise ValueError(f"{len(contacts)} remote contacts: give the 16 nearest to the hand")
+        numbers: List[float] = []
+        for c in contacts:
+            numbers += (c.id, c.shape, c.radius_m, *c.point_m, *c.normal, *c.axis, *c.velocity_m_per_s)
+            numbers += (*c.angular_velocity_rad_per_s, c.stiffness_N_per_m, c.damping_Ns_per_m, c.static_friction)
+            numbers += (c.dynamic_friction, c.lifetime_s, c.yields)
+        if len(numbers) != 24 * len(contacts):
+            raise ValueError("remote contacts: give three numbers for each vector")
+        self._put_fast(m.RemoteContacts(time.monotonic_ns(), self.latest.hand.tick_time_ns, numbers))
+
+    def _put_force(self, force_N: Numbers, torque_Nm: Numbers, lifetime_s: float) -> None:
+        self._put_fast(m.HeldForce(time.monotonic_ns(), force_N, torque_Nm, lifetime_s))
 
     # --- batches and meshes
 
@@ -697,3 +737,7 @@ class Core(Commands):
     def on_connection(self, callback: Callable[[r.ConnectionReport], object]) -> "Subscription[r.ConnectionReport]":
         """Connections and losses from now on; the first connection is reported by the first poll."""
         return self._on("connection", callback)
+
+    def on_hand(self, callback: Callable[[r.HandReport], object]) -> "Subscription[r.HandReport]":
+        """Only after subscribe(Reports.HAND)."""
+        return self._on("hand", callback)

@@ -585,6 +585,44 @@ class HoldHand(NamedTuple):
     buttons: int = 0
 
 
+class RemoteContacts(NamedTuple):
+    """Replaces the client's contacts near the hand, up to 16 (24 numbers each): felt until they expire."""
+
+    time: int = 0  # ns
+    state_time: int = 0  # ns
+    contacts: Numbers = ()
+
+
+class HeldForce(NamedTuple):
+    """Sets a force that the server holds for its lifetime, within a budget of energy."""
+
+    time: int = 0  # ns
+    force: Vec3 = (0.0, 0.0, 0.0)  # N
+    torque: Vec3 = (0.0, 0.0, 0.0)  # N m
+    lifetime: float = 0.0  # s
+
+
+class HandState(NamedTuple):
+    """Reports the newest tick: pose, velocity, buttons, force written, remote contacts (8 numbers each)."""
+
+    tick: int = 0
+    time: int = 0  # ns
+    contacts_time: int = 0  # ns
+    force_time: int = 0  # ns
+    position: Vec3 = (0.0, 0.0, 0.0)  # m
+    orientation: Vec4 = (0.0, 0.0, 0.0, 1.0)
+    velocity: Vec3 = (0.0, 0.0, 0.0)  # m/s
+    angular_velocity: Vec3 = (0.0, 0.0, 0.0)  # rad/s
+    force: Vec3 = (0.0, 0.0, 0.0)  # N
+    held_force: Vec3 = (0.0, 0.0, 0.0)  # N
+    energy: float = 0.0  # J
+    gripper: float = 0.0  # rad
+    buttons: int = 0
+    flags: int = 0
+    guard_active: int = 0
+    contacts: Numbers = ()
+
+
 #: The layout of every message, in the order of the table.
 LAYOUTS: Final[Tuple[Layout[Any], ...]] = (
     define(Text, "vrpn_Base text_message", (
@@ -915,6 +953,35 @@ LAYOUTS: Final[Tuple[Layout[Any], ...]] = (
         ("orientation", "d", 4),
         ("buttons", "I"),
     )),
+    define(RemoteContacts, "hapticd Remote_Contacts", (
+        ("time", "q"),
+        ("state_time", "q"),
+        ("contacts", "listid", 384),
+    )),
+    define(HeldForce, "hapticd Held_Force", (
+        ("time", "q"),
+        ("force", "d", 3),
+        ("torque", "d", 3),
+        ("lifetime", "d"),
+    )),
+    define(HandState, "hapticd Hand_State", (
+        ("tick", "Q"),
+        ("time", "q"),
+        ("contacts_time", "q"),
+        ("force_time", "q"),
+        ("position", "d", 3),
+        ("orientation", "d", 4),
+        ("velocity", "d", 3),
+        ("angular_velocity", "d", 3),
+        ("force", "d", 3),
+        ("held_force", "d", 3),
+        ("energy", "d"),
+        ("gripper", "d"),
+        ("buttons", "I"),
+        ("flags", "I"),
+        ("guard_active", "I"),
+        ("contacts", "listid", 128),
+    )),
 )
 
 #: Vertices or triangles in one message at most.
@@ -928,6 +995,7 @@ REPORT_BUTTON: Final = 4
 REPORT_ANALOG: Final = 8
 REPORT_TICK: Final = 16
 REPORT_CONTACTS: Final = 32
+REPORT_HAND: Final = 64
 #: Bits of Capabilities.features.
 FEATURE_BULK_MESH: Final = 1
 FEATURE_BATCH: Final = 2
@@ -935,6 +1003,11 @@ FEATURE_SUBSCRIBE: Final = 4
 FEATURE_STOP: Final = 8
 FEATURE_HEARTBEAT: Final = 16
 FEATURE_HOLD_HAND: Final = 32
+FEATURE_REMOTE_CONTACTS: Final = 64
+#: Bits of HandState.flags.
+HAND_HAS_GRIPPER: Final = 1
+HAND_ENERGY_SPENT: Final = 2
+HAND_CORRECTIONS_HELD: Final = 4
 #: Names, sentences and remedies of the trips, by bit.
 TRIPS: Final[Tuple[Tuple[str, str, str], ...]] = (
     ("not_finite", "The rendered force or the device state was not a finite number.", "Check the meshes and effects for values that are not finite."),

@@ -14,7 +14,7 @@ import asyncio
 import time
 from collections import deque
 from contextlib import asynccontextmanager
-from typing import Any, AsyncIterator, Callable, Deque, Generator, List, Optional, Set, Tuple
+from typing import Any, AsyncIterator, Callable, Deque, Generator, List, Optional, Sequence, Set, Tuple
 
 import numpy as np
 import numpy.typing as npt
@@ -27,7 +27,7 @@ from ._core import BATCH_BYTES, RETRY_S, STOP_BACKLOG_BYTES, Core, Options, Uplo
 from ._peer import ProtocolError
 from .client import unacknowledged
 from .errors import ConnectError, ConnectionLost
-from .scene import Capabilities, Reports
+from .scene import Capabilities, RemoteContact, Reports
 
 
 class _Stream(asyncio.Protocol):
@@ -506,6 +506,29 @@ class Client(Core):
         self._set_heartbeats(enable)
         self._push()
         self._turn()
+
+    async def set_remote_contacts(self, contacts: Sequence[RemoteContact]) -> None:
+        """Replaces this client's contacts, at most 16, for simulations that run in the client. Sent at once, even inside
+        batch(), by datagram where the connection has them: the newest value wins, and a lost one is not repeated, so call
+        at a steady rate of 30 to 1000 Hz. The server renders them at its servo rate, moves them by their velocities, and
+        takes over changes within 0.3 N/ms. Contacts that are not repeated end at the end of their lifetime, contacts that
+        are absent from a later call fade out at once, all of them when the client leaves. Dropped without a connection.
+        One client streams to a device at a time; the server refuses others with a text. HandReport has the force of
+        each."""
+        if self.connected:
+            await self._require(m.FEATURE_REMOTE_CONTACTS, "stream contacts")
+        self._put_contacts(contacts)
+        self._push()
+
+    async def set_force(self, force_N: Numbers, torque_Nm: Numbers = (0.0, 0.0, 0.0), lifetime_s: float = 0.1) -> None:
+        """Has a force (N, world frame) held until the next call, at most for `lifetime_s` (0.01 to 0.1). Sent as
+        set_remote_contacts(). The server changes it by at most 0.3 N/ms, and cuts the part that adds power to the hand
+        when its budget of energy is spent (HandReport.energy_spent). A torque (N m) is felt only on devices that render
+        it. Prefer set_remote_contacts() for everything that is stiff: a force is always late by the round trip."""
+        if self.connected:
+            await self._require(m.FEATURE_REMOTE_CONTACTS, "hold a force")
+        self._put_force(force_N, torque_Nm, lifetime_s)
+        self._push()
 
     async def hold_hand(
         self, position: Numbers, orientation: Numbers = (0.0, 0.0, 0.0, 1.0), buttons: int = 0

@@ -240,6 +240,40 @@ class GuardReport(NamedTuple):
     stopped: bool  # a client stopped the forces
 
 
+class RemoteContactForce(NamedTuple):
+    """A contact of set_remote_contacts() that exerts force."""
+
+    id: int
+    proxy_m: Array  # (3,), the point of the rendered surface nearest to the device
+    force_N: Array  # (3,), on the hand; the object receives the opposite
+    depth_m: float
+
+
+class HandReport(NamedTuple):
+    """What a client needs that streams contacts or forces: the newest tick at the time of sending. Only after
+    subscribe(Reports.HAND)."""
+
+    time: float
+    tick: int  # as in TickReport
+    tick_time_ns: int  # on the monotonic clock of the server
+    # When this client sent the newest contacts and force that the tick knows, by time.monotonic_ns(); 0: none.
+    contacts_sent_ns: int
+    force_sent_ns: int
+    position_m: Array  # (3,), haptic interface point: where the device is
+    orientation: Array  # (4,), from stylus to world
+    velocity_m_per_s: Array  # (3,)
+    angular_velocity_rad_per_s: Array  # (3,)
+    force_N: Array  # (3,), on the hand, as written to the device: all forces together
+    held_force_N: Array  # (3,), the part of set_force(), before the guard
+    energy_J: float  # that the held force may still add to the hand
+    gripper_rad: float  # NaN without a gripper
+    buttons: int  # bit 0: button 0 is down
+    energy_spent: bool  # the part of the held force that adds power is cut
+    corrections_held: bool  # a remote contact moved without a stated velocity and waits for energy
+    guard_active: Trips
+    contacts: List[RemoteContactForce]
+
+
 class ConnectionReport(NamedTuple):
     """The connection was established, or lost for the given reason."""
 
@@ -277,6 +311,10 @@ class LatestReports:
         )
         self.contacts = ContactsReport(0.0, 0, 0, [])
         self.guard = GuardReport(0.0, none, none, False, False)
+        self.hand = HandReport(
+            0.0, 0, 0, 0, 0, _zeros(), _identity(), _zeros(), _zeros(), _zeros(), _zeros(), 0.0, float("nan"), 0, False,
+            False, none, [],
+        )  # fmt: skip
 
 
 #: Report class of each kind, in the order of the C++ ReportKind.
@@ -300,11 +338,13 @@ KINDS: Final[Dict[str, Any]] = {
     "tick": TickReport,
     "contacts": ContactsReport,
     "guard": GuardReport,
+    "hand": HandReport,
 }
 
 _VECTORS = {
     "position_m": 3, "orientation": 4, "velocity_m_per_s": 3, "acceleration_m_per_s2": 3, "rotation": 4,
     "force_N": 3, "min_m": 3, "max_m": 3, "hand_m": 3, "proxy_m": 3, "point_m": 3, "normal": 3,
+    "angular_velocity_rad_per_s": 3, "held_force_N": 3,
 }  # fmt: skip
 _TYPES = {float: "f8", int: "i8", bool: "?", Trips: "u4", Severity: "i4"}
 
@@ -320,6 +360,8 @@ def dtype_of(kind: str) -> "np.dtype[Any]":
         raise ValueError(f"no rows of kind {kind!r}; there are {known}")
     columns: List[Any] = []
     for name, type_ in KINDS[kind].__annotations__.items():
+        if name == "contacts":  # their number varies
+            continue
         if name in _VECTORS:
             columns.append((name, "f8", _VECTORS[name]))
         elif name in ("tick", "revision"):

@@ -63,8 +63,9 @@ class Reports(enum.IntFlag):
     ANALOG = 8
     TICK = 16
     CONTACTS = 32
+    HAND = 64  # HandReport
     USUAL = 15  # what a client without a subscription receives
-    ALL = 63
+    ALL = 127
 
 
 class Effect(NamedTuple):
@@ -157,6 +158,37 @@ class Capabilities(NamedTuple):
     buttons: int  # number of buttons
     workspace_min_m: Tuple[float, ...]  # reach of the device in its own frame, real metres
     workspace_max_m: Tuple[float, ...]
+    remote_contacts: bool = False  # set_remote_contacts(), set_force() and Reports.HAND
+
+
+class RemoteShape(enum.IntEnum):
+    """Shape of a remote contact."""
+
+    HALF_SPACE = 0
+    SPHERE = 1
+    CYLINDER = 2  # without ends
+
+
+class RemoteContact(NamedTuple):
+    """One surface near the tool, as the client's simulation knows it now. World frame; lengths as in the reports
+    (world units / 1000: metres when the world is in millimetres)."""
+
+    id: int  # the same surface keeps its number from update to update, and moves without a step
+    point_m: Numbers  # on the surface
+    normal: Numbers  # of any length, out of the material
+    stiffness_N_per_m: float = 500.0  # of the device's metres; the server lowers it to what its loop can bear
+    damping_Ns_per_m: float = 0.0
+    static_friction: float = 0.0  # Coulomb coefficient, at most 1
+    dynamic_friction: float = 0.0  # at most the static one
+    velocity_m_per_s: Numbers = (0.0, 0.0, 0.0)  # of the surface at the point, at most 1 m/s of the device
+    angular_velocity_rad_per_s: Numbers = (0.0, 0.0, 0.0)  # at most 20 rad/s
+    shape: RemoteShape = RemoteShape.HALF_SPACE
+    radius_m: float = 0.0  # of a sphere or cylinder; negative: touched from inside
+    axis: Numbers = (0.0, 0.0, 1.0)  # of a cylinder, across the normal
+    lifetime_s: float = 0.1  # 0.01 to 0.1, with the fade at its end
+    # The surface follows the hand, as a simulated object that the hand pushes: its position may change at any rate, and
+    # the client's round trip lowers the stiffness that the server allows. Otherwise it moves by its stated velocity.
+    yields: bool = False
 
 
 def sphere(radius: float, center: Numbers = (0.0, 0.0, 0.0), rings: int = 32) -> "Tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]":

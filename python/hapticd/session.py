@@ -184,8 +184,8 @@ class Command(NamedTuple):
 class Lost(NamedTuple):
     """Data is missing because the disk was too slow."""
 
-    what: str  # "ticks" or "scene events"
-    device: int  # for ticks
+    what: str  # "ticks", "scene events" or "streamed values"
+    device: int  # for ticks and streamed values
     count: int  # type: ignore[assignment]
 
 
@@ -532,7 +532,7 @@ class Session:
         for kind, start, length in self._blocks:
             if kind == _LOST and length == 16:
                 what, device, count = struct.unpack_from(">iIQ", self._bytes, start)
-                found.append(Lost("scene events" if what else "ticks", device, count))
+                found.append(Lost({0: "ticks", 1: "scene events"}.get(what, "streamed values"), device, count))
         return tuple(found)
 
     @staticmethod

@@ -112,6 +112,7 @@ class ScriptedServer:
         self.extensions = extensions
         self.device = device
         self.received: List[Tuple[str, bytes]] = []
+        self.answer = b""  # sent behind each pong
         self.listener = socket.create_server(("127.0.0.1", 0))
         self.port = self.listener.getsockname()[1]
         self.name = f"{device}@tcp://127.0.0.1:{self.port}"
@@ -132,8 +133,9 @@ class ScriptedServer:
         self.received.append((TYPE_NAMES[kind], payload))
         if kind == _NUMBERS[m.Ping][0]:
             self.send(m.Pong())
+            self.peer.send_frames(self.answer)
         if kind == _NUMBERS[m.QueryCapabilities][0] and self.extensions:
-            self.send(m.Capabilities(1, 63, 1000.0, 1000.0, 3.3, 2, (-0.1, -0.1, -0.1, 0.1, 0.1, 0.1)))
+            self.send(m.Capabilities(1, 127, 1000.0, 1000.0, 3.3, 2, (-0.1, -0.1, -0.1, 0.1, 0.1, 0.1)))
 
     def send(self, message: Any) -> None:
         number, layout = _NUMBERS[type(message)]

@@ -16,6 +16,9 @@ import pytest
 import hapticd
 from conftest import Listener, ScriptedServer, Server, feel_a_sphere
 from hapticd import Effect, Plane, Reports
+from hapticd import _messages as m
+from hapticd._codec import frame
+from hapticd._core import _NUMBERS
 from hapticd._peer import TYPE_NAMES, Peer
 
 WIRE = pathlib.Path(__file__).resolve().parents[2] / "testdata/wire"
@@ -284,3 +287,30 @@ def test_waiting_takes_no_processor_time(server: Server) -> None:
         assert time.process_time() - start < 0.5
     with pytest.raises(hapticd.ConnectionLost, match="is closed"):
         hand.poll()
+
+
+def test_streamed_state_is_reported_back() -> None:
+    scripted = ScriptedServer()
+    with hapticd.connect(scripted.name) as hand:
+        with hand.batch():  # streamed state does not wait for the end of a batch
+            hand.set_remote_contacts([hapticd.RemoteContact(3, (0, 0, 0), (0, 1, 0))])
+            hand.set_force((0, 0, 1))
+            scripted.wait_for("hapticd Held_Force")
+            assert "hapticd Batch_Begin" not in [name for name, _ in scripted.received]
+        with pytest.raises(ValueError, match="17 remote contacts: give the 16 nearest"):
+            hand.set_remote_contacts([hapticd.RemoteContact(i, (0, 0, 0), (0, 1, 0)) for i in range(17)])
+        with pytest.raises(ValueError, match="give three numbers for each vector"):
+            hand.set_remote_contacts([hapticd.RemoteContact(0, (0, 0), (0, 1, 0))])
+        number, layout = _NUMBERS[m.HandState]
+        numbers = (3.0, 1, 2, 3, 4, 5, 6, 0.5)
+        state = m.HandState(9, 8, 7, 6, force=(1, 2, 3), energy=0.02, flags=3, gripper=0.25, contacts=numbers)
+        scripted.answer = frame(5, 0, 0, number, layout.encode(state))
+        hand._ping()
+        until(hand, lambda: hand.latest.hand.tick == 9)
+        report = hand.latest.hand
+        assert (report.tick_time_ns, report.contacts_sent_ns, report.force_sent_ns) == (8, 7, 6)
+        assert report.energy_J == 0.02 and report.gripper_rad == 0.25 and report.energy_spent
+        assert not report.corrections_held and list(report.force_N) == [1, 2, 3]
+        assert report.contacts[0].id == 3 and list(report.contacts[0].force_N) == [4, 5, 6]
+        assert hapticd.reports.rows_of("hand", [report])["energy_J"][0] == 0.02
+    scripted.close()

@@ -85,6 +85,12 @@ async def script(hand: Any, do: Callable[[Any], Any], batch: Callable[[], Any]) 
     await do(hand.enable_heartbeat(False))
     await do(hand.hold_hand((1, 2, 3), (0, 0, 1, 0), 2))
     await do(hand.release_hand())
+    contact = hapticd.RemoteContact(
+        7, (1, 2, 3), (0, 1, 0), 600, 0.5, 0.4, 0.3, (4, 5, 6), (7, 8, 9), hapticd.RemoteShape.CYLINDER, 0.25, (1, 0, 0),
+        0.05, True,
+    )  # fmt: skip
+    await do(hand.set_remote_contacts([contact, hapticd.RemoteContact(8, (1, 2, 3), (0, 1, 0))]))
+    await do(hand.set_force((1, 2, 3), (4, 5, 6), 0.05))
 
     hand.request_to_room()
     hand.request_unit_to_sensor()
@@ -141,7 +147,8 @@ def commands(play: Callable[[str], None]) -> List[Tuple[str, bytes]]:
     server.wait_for(LAST)
     server.close()
     beats = ("vrpn_Base ping_message",)
-    return [message for message in server.received if message[0] not in beats]
+    clocked = ("hapticd Remote_Contacts", "hapticd Held_Force")  # they begin with the client's time
+    return [(name, p[8:] if name in clocked else p) for name, p in server.received if name not in beats]
 
 
 def test_both_faces_send_the_same() -> None:

@@ -142,6 +142,7 @@ std::string messagesAsPython() {
   constant("REPORT_ANALOG", kReportAnalog);
   constant("REPORT_TICK", kReportTick);
   constant("REPORT_CONTACTS", kReportContacts);
+  constant("REPORT_HAND", kReportHand);
   text += "#: Bits of Capabilities.features.\n";
   constant("FEATURE_BULK_MESH", kFeatureBulkMesh);
   constant("FEATURE_BATCH", kFeatureBatch);
@@ -149,6 +150,11 @@ std::string messagesAsPython() {
   constant("FEATURE_STOP", kFeatureStop);
   constant("FEATURE_HEARTBEAT", kFeatureHeartbeat);
   constant("FEATURE_HOLD_HAND", kFeatureHoldHand);
+  constant("FEATURE_REMOTE_CONTACTS", kFeatureRemoteContacts);
+  text += "#: Bits of HandState.flags.\n";
+  constant("HAND_HAS_GRIPPER", kHandHasGripper);
+  constant("HAND_ENERGY_SPENT", kHandEnergySpent);
+  constant("HAND_CORRECTIONS_HELD", kHandCorrectionsHeld);
   text += "#: Names, sentences and remedies of the trips, by bit.\n";
   text += "TRIPS: Final[Tuple[Tuple[str, str, str], ...]] = (\n";
   for (const TripInfo& trip : kTrips) {

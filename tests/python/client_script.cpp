@@ -92,6 +92,25 @@ void extensions(Client& client) {
   client.enableHeartbeat(false);
   client.holdHand({{1, 2, 3}, {0, 0, 1, 0}, 2});
   client.releaseHand();
+  RemoteContact contact;
+  contact.id = 7;
+  contact.shape = RemoteShape::cylinder;
+  contact.point_m = {1, 2, 3};
+  contact.radius_m = 0.25;
+  contact.axis = {1, 0, 0};
+  contact.velocity_m_per_s = {4, 5, 6};
+  contact.angularVelocity_rad_per_s = {7, 8, 9};
+  contact.stiffness_N_per_m = 600;
+  contact.damping_Ns_per_m = 0.5;
+  contact.staticFriction = 0.4;
+  contact.dynamicFriction = 0.3;
+  contact.lifetime = std::chrono::milliseconds(50);
+  contact.yields = true;
+  RemoteContact plain;
+  plain.id = 8;
+  plain.point_m = {1, 2, 3};
+  client.setRemoteContacts(std::array{contact, plain});
+  client.setForce({1, 2, 3}, {4, 5, 6}, std::chrono::milliseconds(50));
 }
 
 void rest(Client& client) {
