@@ -264,8 +264,11 @@ void RemoteContacts::correct(Slot& slot, const RemoteHand& hand, double budget_N
 // Spring and damper. The damper exerts no more than the spring, so that a touch begins without a step and the
 // surface never pulls.
 void RemoteContacts::demand(Slot& slot, const RemoteHand& hand, Nanos now) noexcept {
-  slot.demand_N = slot.normal_N = 0;
-  if (slot.depth_m <= 0) return;
+  slot.demand_N = 0;
+  if (slot.depth_m <= 0) {
+    slot.normal_N = 0;
+    return;
+  }
   const double spring_N = slot.contact.stiffness_N_per_m * slot.depth_m;
   const double leaving = slot.normal.dot(hand.velocity_m_per_s - slot.velocity);
   const double damper_N = std::clamp(slot.damping * leaving, -spring_N, spring_N);
@@ -278,7 +281,11 @@ Vec3 RemoteContacts::share(const RemoteHand& hand) noexcept {
   std::array<Slot*, kSlots> active;
   std::size_t count = 0;
   for (Slot& slot : inUse()) {
-    if (slot.used && slot.demand_N > 0) active[count++] = &slot;
+    if (slot.used && slot.demand_N > 0) {
+      active[count++] = &slot;
+    } else {
+      slot.normal_N = 0;
+    }
   }
   pressed_N = 0;
   Vec3 force = Vec3::Zero();
@@ -290,6 +297,7 @@ Vec3 RemoteContacts::share(const RemoteHand& hand) noexcept {
     for (std::size_t j = 0; j < i; ++j)
       overlap[i][j] = overlap[j][i] = std::max(0.0, active[i]->normal.dot(active[j]->normal));
   }
+  // The shares of the last tick are nearly those of this one.
   double change = kConverged_N;
   for (int sweep = 0; sweep < kSweeps && change >= kConverged_N; ++sweep) {
     change = 0;

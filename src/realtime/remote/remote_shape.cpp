@@ -19,8 +19,8 @@ SurfaceAt surfaceAt(const RemoteContact& contact, double age_s, const Vec3& hip_
   at.point_m = contact.point_m + age_s * contact.velocity_m_per_s;
   at.normal = contact.normal;
   Vec3 axis = contact.axis;
-  const double speed = contact.angularVelocity_rad_per_s.norm();
-  if (speed > 0) {
+  if (!contact.angularVelocity_rad_per_s.isZero(0)) {
+    const double speed = contact.angularVelocity_rad_per_s.norm();
     const Vec3 about = contact.angularVelocity_rad_per_s / speed;
     const double cosine = std::cos(speed * age_s);
     const double sine = std::sin(speed * age_s);

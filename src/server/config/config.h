@@ -83,7 +83,7 @@ struct DeviceConfig {
   bool forceShading = false;  ///< turn the force towards the interpolated vertex normals of smooth meshes
   double stribeckSpeed_m_per_s = 0;    ///< over which friction falls from static to dynamic; 0: at once
   bool vibrationContactPulls = false;  ///< contact vibrations may exceed the normal force
-  double heldForcePower_W = 0.020;  ///< that a held force may add to the hand in the long run
+  double heldForcePower_W = 0.020;     ///< that a held force may add to the hand in the long run
   MaterialScale materialScale = MaterialScale::reference;
   QuaternionOrder quaternionOrder = QuaternionOrder::xyzw;
   ForceReport forceReport = ForceReport::total;
