@@ -6,6 +6,7 @@
 # Needs root; without it, or without mmdebstrap, it prints the reason and returns 77 (skipped).
 set -euo pipefail
 packages=$(realpath "$1")
+without=""  # a package that this root cannot take
 version=$2
 kind=${3:-overlay}
 skip() { echo "skipped: $1"; exit 77; }
@@ -29,6 +30,7 @@ if [ "$kind" = overlay ]; then
   ! dpkg-query -W hapticd >/dev/null 2>&1 || skip "hapticd is installed on this machine"
   mount -t overlay overlay -o "lowerdir=/,upperdir=$work/upper,workdir=$work/work" "$root" 2>/dev/null || skip "no overlay file system"
   install="dpkg -i"
+  dpkg-query -W python3-numpy >/dev/null 2>&1 || without=python3-hapticd  # it would miss its dependency
 else
   command -v mmdebstrap >/dev/null || skip "mmdebstrap is missing"
   mmdebstrap --variant=apt --quiet bookworm "$root" || skip "mmdebstrap reaches no mirror"
@@ -45,6 +47,7 @@ chmod 755 "$root/usr/sbin/policy-rc.d"
 mkdir -p "$root/packages" "$root/home/someone"
 chmod 777 "$root/home/someone"
 cp "$packages"/*.deb "$root/packages/"
+[ -z "$without" ] || rm -f "$root/packages/$without"_*.deb
 in_root() { env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 DEBIAN_FRONTEND=noninteractive HOME=/root chroot "$root" "$@"; }
 as_user() { in_root setpriv --reuid=65534 --regid=65534 --clear-groups env HOME=/home/someone "$@"; }
 fail() { echo "FAILED: $1"; exit 1; }
@@ -76,7 +79,7 @@ if in_root sh -c 'command -v g++ && command -v pkg-config' >/dev/null; then
   printf '#include "hapticd/client.h"\nint main() { try { hapticd::Client c("P@tcp://127.0.0.1:1"); } catch (const hapticd::Error&) { return 0; } return 1; }\n' >"$root/packages/user.cpp"
   in_root sh -c 'cd /packages && g++ -std=c++20 user.cpp $(pkg-config --cflags hapticd) -lhapticd -o user && ./user'
 fi
-if ls "$packages"/python3-hapticd_*.deb >/dev/null 2>&1; then
+if ls "$root"/packages/python3-hapticd_*.deb >/dev/null 2>&1; then
   in_root sh -c 'cd / && /usr/bin/python3 -c "import hapticd; print(hapticd.__name__)"'
 fi
 

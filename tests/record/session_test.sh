@@ -44,7 +44,7 @@ grep -q '<polyline class="now"' "$work/soft.html"
 [ "$(head -1 "$work/my.csv" | tr ',' '\n' | wc -l)" = "$(tail -1 "$work/my.csv" | tr ',' '\n' | wc -l)" ]
 # Exports and client recordings are hands, as they are.
 for hand in my heard; do
-  "$hapticd" render --mesh "$source_dir/testdata/meshes/bunny.obj" --size-mm 73 --hand "$work/$hand.csv" --out "$work/felt.csv" >/dev/null 2>"$work/error.txt"
+  "$hapticd" render --mesh "$source_dir/testdata/meshes/bunny.obj" --size-mm 73 --hand "$work/$hand.csv" --out "$work/felt.csv" --force >/dev/null 2>"$work/error.txt"
   [ ! -s "$work/error.txt" ] || { cat "$work/error.txt"; exit 1; }
 done
 "$hapticd" export "$work/my.haptics" --to vrpn -o "$work/my.vrpn"
