@@ -95,10 +95,14 @@ class Attacks : public InContact {
                       const std::function<void()>& fault, const std::function<bool()>& ended) {
     attack(name, [&] {
       prepare();
+      const Vec3& resting = expected[static_cast<std::size_t>(deep)];
+      const Vec3 added = arm.left() - resting;
       const std::int64_t before = arm->ticks;
       fault();
       EXPECT_TRUE(visitor->until(ended));
-      row_.forceLeft_ticks = arm->ticks - before;
+      std::int64_t tick = arm->ticks - 1;
+      while (tick > before && (arm.force(tick) - resting).dot(added) < 0.1 * added.squaredNorm()) --tick;
+      row_.forceLeft_ticks = tick - before;
     });
   }
 
