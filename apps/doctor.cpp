@@ -55,8 +55,8 @@ Finding realtimePriority() {
   return {Verdict::bad, "SCHED_FIFO is refused: " + std::string(std::strerror(errno)),
           "put '@realtime - rtprio 95' and '@realtime - memlock unlimited' into "
           "/etc/security/limits.d/realtime.conf,\n"
-          "           add yourself to the group realtime, log in again; or: setcap "
-          "cap_sys_nice,cap_ipc_lock+ep hapticd"};
+          "           add yourself to the group realtime and log in again; or run it as a service "
+          "with LimitRTPRIO"};
 }
 
 Finding memoryLock() {

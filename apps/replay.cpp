@@ -6,6 +6,7 @@
 
 #include "announce.h"
 #include "commands.h"
+#include "log_writer.h"
 #include "server/player.h"
 #include "server/server.h"
 #include "stop_on_signal.h"
@@ -22,8 +23,8 @@ struct ReplayOptions {
 };
 
 int run(const ReplayOptions& options) {
-  spdlog::set_pattern("%H:%M:%S.%e %^%l%$ %v");
-  spdlog::flush_on(spdlog::level::info);
+  StopOnSignal stopper;
+  const LogWriter log;
   auto player = std::make_unique<server::Player>(options.replay);
   server::ServerConfig config = player->config();
   if (!options.listen.empty()) server::parseListen(options.listen, config.listenAddress, config.port);
@@ -32,7 +33,6 @@ int run(const ReplayOptions& options) {
   config.seconds = options.seconds;
   server::validate(config);
 
-  StopOnSignal stopper;
   server::Server server(config, std::move(player));
   announce(server, config, "replay");
   stopper.watch(server);

@@ -1,8 +1,7 @@
-// SIGINT and SIGTERM shut a server down in order: zero force first.
+// Signals that would end or stop a server bring its forces to zero first.
 #pragma once
 
-#include <pthread.h>
-
+#include <atomic>
 #include <csignal>
 #include <thread>
 
@@ -10,31 +9,27 @@
 
 namespace hapticd::apps {
 
-/// Blocks both signals in the calling thread, so construct it before any other thread starts.
+/// Blocks the signals in the calling thread, so construct it before any other thread starts. SIGINT, SIGTERM,
+/// SIGHUP, SIGQUIT and all others that by default end a process end the server in order. SIGTSTP stops the
+/// forces before it stops the process; they stay stopped when it continues. SIGPIPE, SIGXFSZ and those of a
+/// background process at a terminal are ignored. A crash is not handled: see docs/safety.md.
 class StopOnSignal {
  public:
-  StopOnSignal() {
-    sigemptyset(&signals_);
-    sigaddset(&signals_, SIGINT);
-    sigaddset(&signals_, SIGTERM);
-    pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
-  }
-  /// Calls server.stop() at the first signal, from a separate thread; `server` outlives this.
-  void watch(server::Server& server) {
-    thread_ = std::thread([this, &server] {
-      int signal = 0;
-      sigwait(&signals_, &signal);
-      server.stop();
-    });
-  }
-  ~StopOnSignal() {
-    if (!thread_.joinable()) return;
-    pthread_kill(thread_.native_handle(), SIGTERM);
-    thread_.join();
-  }
+  StopOnSignal();
+  ~StopOnSignal();
+  StopOnSignal(const StopOnSignal&) = delete;
+  StopOnSignal& operator=(const StopOnSignal&) = delete;
+
+  /// Handles signals in a separate thread that waits for no other; `server` outlives this. A server that has
+  /// not ended 10 s after a signal is ended by _exit().
+  void watch(server::Server& server);
 
  private:
+  void run(server::Server& server);
+  void end(server::Server& server, int signal);
+
   sigset_t signals_{};
+  std::atomic<bool> leaving_{false};
   std::thread thread_;
 };
 

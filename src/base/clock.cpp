@@ -1,4 +1,5 @@
 #include "base/clock.h"
+#include "base/suspend.h"
 
 #include <cerrno>
 #include <ctime>
@@ -30,6 +31,19 @@ void MonotonicClock::sleepUntil(Nanos deadline) noexcept {
   time.tv_nsec = deadline % kSecond;
   while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr) == EINTR) {
   }
+}
+
+// Two clocks cannot be read at one moment: repeat a reading that was interrupted.
+Nanos suspendedTime() noexcept {
+  constexpr Nanos kUninterrupted = 1'000'000;
+  Nanos before = 0;
+  Nanos boot = 0;
+  for (int i = 0; i < 10; ++i) {
+    before = read(CLOCK_MONOTONIC);
+    boot = read(CLOCK_BOOTTIME);
+    if (read(CLOCK_MONOTONIC) - before < kUninterrupted) break;
+  }
+  return boot - before;
 }
 
 }  // namespace hapticd::base

@@ -96,6 +96,11 @@ class Device {
   /// Commands a force in the device frame, in effect until the next write. While `hold` is set, the driver
   /// itself keeps the force at zero.
   virtual bool write(const Vec3& force_N) noexcept = 0;
+  /// Ends the force while the servo thread may be stuck in, or run, read() and write(); no force that was
+  /// written before this call acts after it. False where the driver cannot: such a device ends forces that
+  /// nobody renews by itself, or its driver runs isolated. Between start and stop of the loop, from one
+  /// thread besides the servo's; noexcept, non-blocking.
+  virtual bool zeroFromOtherThread() noexcept { return false; }
 
   /// Why forces are held and what a person can do about it; empty when all is well. Any thread but the
   /// servo's.

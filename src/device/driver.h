@@ -33,6 +33,9 @@ struct Driver {
   std::span<const char* const>
       keys;                   ///< keys of a [[device]] that only this driver reads; their values are texts
   bool canBeIsolated = true;  ///< may run in a process of its own
+  /// Does so unless configured otherwise: a vendor's library whose last force nothing ends when the process
+  /// hangs or dies.
+  bool isolatedByDefault = false;
   /// Makes a device, not yet open. Throws InvalidDriverOption, or std::runtime_error for a file that it
   /// cannot read.
   std::unique_ptr<Device> (*make)(const DriverOptions& options);

@@ -42,11 +42,13 @@ std::string loadersWords(const char* name) {
 DynamicLibrary::DynamicLibrary(const LibraryNames& names) {
 #ifdef _WIN32
   const auto& usual = names.windowsNames;
+  const char* chosen = std::getenv(names.environment);
 #else
   const auto& usual = names.unixNames;
+  // Not for a program with more rights than its user, such as file capabilities: the library would get them.
+  const char* chosen = secure_getenv(names.environment);
 #endif
   std::vector<std::string> candidates;
-  const char* chosen = std::getenv(names.environment);
   if (chosen != nullptr && *chosen != '\0') {
     candidates.emplace_back(chosen);
   } else {

@@ -1,5 +1,6 @@
 #include "geometry/weld.h"
 
+#include <algorithm>
 #include <bit>
 
 namespace hapticd::geometry {
@@ -33,6 +34,8 @@ std::vector<std::uint32_t> firstAtSamePosition(std::span<const Vec3f> vertices) 
 }
 
 void weld(TriangleMesh& mesh) {
+  const auto exists = [&](std::uint32_t i) { return i < mesh.vertices.size(); };
+  std::erase_if(mesh.triangles, [&](const Triangle& t) { return !std::all_of(t.begin(), t.end(), exists); });
   const std::vector<std::uint32_t> first = firstAtSamePosition(mesh.vertices);
   std::vector<std::uint32_t> renumbered(mesh.vertices.size(), kNoVertex);
   for (Triangle& t : mesh.triangles) {

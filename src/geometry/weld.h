@@ -16,7 +16,8 @@ inline constexpr std::uint32_t kNoVertex = 0xFFFFFFFF;
 /// coordinate is not finite. Linear time.
 std::vector<std::uint32_t> firstAtSamePosition(std::span<const Vec3f> vertices);
 
-/// Makes triangles share vertices and removes unused vertices; keeps the order of both.
+/// Makes triangles share vertices and removes unused vertices, and triangles with a corner that does not
+/// exist; keeps the order of both.
 void weld(TriangleMesh& mesh);
 
 }  // namespace hapticd::geometry

@@ -102,6 +102,11 @@ void HttpConnection::ask() {
   keepAlive_ = parser_->keep_alive();
   HttpRequest request = requestFrom(parser_->release());
   parser_.reset();
+  // Of another coding the parser does not know where the body ends, and would take it for the next request.
+  const std::string coding = lowerCase(request.header("transfer-encoding"));
+  if (!coding.empty() && (coding != "chunked" || request.count("transfer-encoding") != 1)) {
+    return refuse(501, "the transfer coding of the request is not chunked");
+  }
   request.local = connection_.local();
   request.remote = connection_.remote();
   headOnly_ = request.method == "HEAD";

@@ -36,6 +36,10 @@ class SendQueue {
   bool empty() const { return head_ == items_.size(); }
   std::size_t bytes() const { return bytes_; }
   std::size_t reliableBytes() const { return bytes_ - lowLatencyBytes_; }
+  /// Memory that the peer makes this side hold: reliable bytes, and kItemBytes for each buffer, which matters
+  /// for many small ones.
+  std::size_t cost() const { return reliableBytes() + kItemBytes * (items_.size() - head_); }
+  static constexpr std::size_t kItemBytes = 128;
   std::uint64_t droppedBuffers() const { return droppedBuffers_; }
   std::uint64_t droppedBytes() const { return droppedBytes_; }
 

@@ -209,13 +209,13 @@ void TcpConnection::send(std::shared_ptr<const Buffer> buffer, Delivery delivery
     return;
   }
   queue_.push(std::move(buffer), delivery);
-  if (queue_.reliableBytes() <= options_.hardLimitBytes) {
+  if (queue_.cost() <= options_.hardLimitBytes) {
     return;
   }
   flush();
-  if (sendable() && queue_.reliableBytes() > options_.hardLimitBytes) {
-    abort("the peer does not read: " + std::to_string(queue_.reliableBytes()) +
-          " bytes wait for it, the limit is " + std::to_string(options_.hardLimitBytes));
+  if (sendable() && queue_.cost() > options_.hardLimitBytes) {
+    abort("the peer does not read: " + std::to_string(queue_.cost()) + " bytes wait for it, the limit is " +
+          std::to_string(options_.hardLimitBytes));
   }
 }
 

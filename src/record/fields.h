@@ -37,7 +37,7 @@ template <Is<scene::SceneConfig> T, class V>
 void fields(T& config, V&& v) {
   auto& [materialScale, workspaceFit, contactVibrationUnit, motorVibrationFrame, deviceWorkspace_m,
          nominalStiffness_N_per_m, nominalForce_N, ownDamping_Ns_per_m, servoPeriod_s, transportDelay_s, raw,
-         checkMeshes, limits, stopwatch] = config;
+         checkMeshes, limits, stopwatch, owners] = config;
   v("material_scale", materialScale);
   v("workspace_fit", workspaceFit);
   v("contact_vibration_unit", contactVibrationUnit);
@@ -52,6 +52,7 @@ void fields(T& config, V&& v) {
   v("check_meshes", checkMeshes);
   v("limits", limits);
   static_cast<void>(stopwatch);  // its readings are in the publish events
+  static_cast<void>(owners);
 }
 
 template <Is<realtime::RenderOptions> T, class V>

@@ -13,6 +13,7 @@ namespace {
 
 constexpr Nanos kPeriod = 20'000'000;  // a crash loses no more than this
 constexpr Nanos kBetweenLossReports = 1'000'000'000;
+constexpr Nanos kBetweenLooks = 1'000'000'000;
 
 }  // namespace
 
@@ -97,7 +98,7 @@ void Recorder::drain() {
     device->ring.consume([&](const realtime::TickRecord& tick) {
       device->packer.add(tick, device->run);
       device->newest = tick.report.time;
-      ++counts_.ticks;
+      if (file_) ++counts_.ticks;
     });
   }
   std::uint64_t lostEvents = 0;
@@ -109,7 +110,19 @@ void Recorder::drain() {
   appendLost(LostEvent::What::sceneEvents, 0, lostEvents, counts_.lostSceneEvents);
   for (std::uint32_t i = 0; i < devices_.size(); ++i) appendTicks(i, *devices_[i]);
   write();
+  lookForFile();
   reportLosses();
+}
+
+// A file that was removed can be written and is lost.
+void Recorder::lookForFile() {
+  if (!file_ || base::now() < nextLook_) return;
+  nextLook_ = base::now() + kBetweenLooks;
+  try {
+    base::world().files.open(path_);
+  } catch (const std::system_error& error) {
+    fail(error.code());
+  }
 }
 
 void Recorder::reportLosses() {
@@ -156,6 +169,7 @@ void Recorder::write() {
 
 void Recorder::fail(const std::error_code& error) {
   file_.reset();
+  writes_.store(false, std::memory_order_release);
   {
     const std::lock_guard lock(mutex_);
     failed_ = true;

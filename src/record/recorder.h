@@ -3,6 +3,7 @@
 // marked in the file.
 #pragma once
 
+#include <atomic>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -68,6 +69,8 @@ class Recorder {
 
   /// After servos and scenes have ended: writes what is left and closes the file. Idempotent.
   void finish();
+  /// Whether the file is still written. Any thread.
+  bool writes() const noexcept { return writes_.load(std::memory_order_acquire); }
   /// After finish().
   const RecorderCounts& counts() const noexcept { return counts_; }
 
@@ -87,6 +90,7 @@ class Recorder {
   void appendTicks(std::uint32_t number, Device& device);
   void appendLost(LostEvent::What what, std::uint32_t device, std::uint64_t total, std::uint64_t& known);
   void write();
+  void lookForFile();
   void fail(const std::error_code& error);
   void reportLosses();
 
@@ -100,6 +104,8 @@ class Recorder {
   Bytes out_;  // whole blocks on their way to the file
   std::uint64_t reportedLosses_ = 0;
   Nanos nextLossReport_ = 0;
+  Nanos nextLook_ = 0;
+  std::atomic<bool> writes_{true};
 
   std::mutex mutex_;
   Bytes events_;                  // whole blocks of scene events

@@ -12,15 +12,18 @@ namespace {
 using realtime::GuardControl;
 using realtime::TickReport;
 
-// Its states and the results of its writes are the recorded ones.
+// Its states and the results of its writes are the recorded ones; it takes the time that made a recorded
+// force too old.
 class RecordedHand final : public device::Device {
  public:
+  explicit RecordedHand(base::SimulatedClock& clock) noexcept : clock_(clock) {}
   void use(const realtime::TickRecord& tick) noexcept { tick_ = &tick; }
 
   void open() override {}
   void close() noexcept override {}
   const device::DeviceProfile& profile() const noexcept override { return profile_; }
   bool read(Nanos /*now*/, device::DeviceState& state) noexcept override {
+    if (tick_->discarded) clock_.sleepUntil(clock_.now() + realtime::kOldestForce + 1);
     if (tick_->haveState) state = tick_->report.device;
     return tick_->haveState;
   }
@@ -29,6 +32,7 @@ class RecordedHand final : public device::Device {
   }
 
  private:
+  base::SimulatedClock& clock_;
   const device::DeviceProfile profile_;
   const realtime::TickRecord* tick_ = nullptr;
 };
@@ -126,7 +130,7 @@ struct Rerenderer::Seat {
   std::uint64_t shown = 0;
 
   base::SimulatedClock clock;
-  RecordedHand device;
+  RecordedHand device{clock};
   realtime::Tick tick;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <utility>
 
 #include "scene/free_forces.h"
 #include "scene/notice_board.h"
@@ -36,18 +37,23 @@ class SceneBuilder::State {
       return;
     }
     Batch& batch = open->second;
-    batch.bytes += bytesOf(command);
-    if (batch.bytes > config_.limits.batch_bytes) {
+    const std::size_t bytes = bytesOf(command);
+    batch.bytes += bytes;
+    if (batch.bytes > config_.limits.batch_bytes || heldInBatches_ + bytes > config_.limits.batch_bytes) {
+      batch.bytes = config_.limits.batch_bytes + 1;  // refused as a whole
       batch.commands = {};
+      heldInBatches_ -= std::exchange(batch.held, 0);
       call.refuse("batch", "refused as a whole: too long; commit more often", ", limit ",
                   config_.limits.batch_bytes, " bytes");
       return;
     }
+    batch.held += bytes;
+    heldInBatches_ += bytes;
     batch.commands.push_back(std::move(command));
   }
 
   void clientGone(ClientId client, Nanos now) {
-    batches_.erase(client);
+    if (auto batch = batches_.extract(client)) heldInBatches_ -= batch.mapped().held;
     board_.forget(client);
     forces_.clientGone(client, now);
   }
@@ -97,7 +103,8 @@ class SceneBuilder::State {
  private:
   struct Batch {
     std::vector<SceneCommand> commands;
-    std::size_t bytes = 0;
+    std::size_t bytes = 0;  ///< of all commands, also of a batch that is too long
+    std::size_t held = 0;   ///< of those in memory
   };
 
   void dispatch(SceneCommand& command, const Call& call) {
@@ -188,6 +195,7 @@ class SceneBuilder::State {
       call.warn("commit of batch", "ignored: no batch was begun");
       return;
     }
+    heldInBatches_ -= batch.mapped().held;
     if (batch.mapped().bytes > config_.limits.batch_bytes) return;
     const Call inside{call.client, call.now, true, call.board, call.out};
     for (SceneCommand& command : batch.mapped().commands) dispatch(command, inside);
@@ -203,6 +211,7 @@ class SceneBuilder::State {
   Workspace workspace_;
   TouchableFaces faces_ = TouchableFaces::both;
   std::map<ClientId, Batch> batches_;
+  std::size_t heldInBatches_ = 0;  // bytes, of all open batches
   std::uint64_t revision_ = 0;
   bool changed_ = true;
 };

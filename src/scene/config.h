@@ -3,9 +3,11 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 
 #include "base/time.h"
 #include "geometry/types.h"
+#include "scene/force_owner.h"
 
 namespace hapticd::scene {
 
@@ -52,6 +54,10 @@ struct SceneConfig {
 
   /// Measures how long building takes, so that it takes at most a quarter of the thread; empty: steady clock.
   std::function<base::Nanos()> stopwatch;
+
+  /// Tells the servo which clients are gone; null: it learns so from snapshots only. Shared by all builders
+  /// of a scene.
+  std::shared_ptr<ForceOwners> owners;
 };
 
 }  // namespace hapticd::scene

@@ -5,10 +5,12 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string_view>
 
 #include "base/time.h"
 #include "geometry/types.h"
+#include "scene/force_owner.h"
 
 namespace hapticd::scene {
 
@@ -44,6 +46,7 @@ struct Effect {
   std::uint32_t start = 0;                            ///< counts starts of this index
   bool inDeviceFrame = false;  ///< motor vibration on the device's x and y instead of the stylus'
   bool releasing = false;      ///< its owner is gone: ramp out in 250 ms
+  std::shared_ptr<const ForceOwner> owner;  ///< null: of no client
 };
 
 }  // namespace hapticd::scene

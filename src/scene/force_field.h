@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 
 #include "base/time.h"
 #include "geometry/types.h"
+#include "scene/force_owner.h"
 
 namespace hapticd::scene {
 
@@ -15,6 +17,7 @@ struct ForceField {
   geometry::Mat3 jacobian_N_per_unit = geometry::Mat3::Zero();  ///< newtons per world unit
   double radius = 0;                                            ///< world units; may be infinite
   bool releasing = false;                                       ///< its owner is gone: ramp out in 250 ms
+  std::shared_ptr<const ForceOwner> owner;                      ///< null: of no client
 };
 
 /// F = force sin(ω t) for a while; the servo starts its clock when it first sees a new `start` number.
@@ -23,7 +26,8 @@ struct Buzz {
   double angularFrequency_rad_per_s = 0;
   base::Nanos duration = 0;
   std::uint32_t start = 0;
-  bool releasing = false;  ///< its owner is gone: ramp out in 250 ms
+  bool releasing = false;                   ///< its owner is gone: ramp out in 250 ms
+  std::shared_ptr<const ForceOwner> owner;  ///< null: of no client
 };
 
 }  // namespace hapticd::scene

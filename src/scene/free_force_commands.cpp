@@ -107,6 +107,7 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
   if (entry.value.effect.releasing) entry.value.running = false;
   const std::uint32_t started = entry.value.effect.start;
   entry.value.effect = effect;
+  entry.value.effect.owner = ownerOf(call.client);
   entry.value.effect.start = started;
   entry.owner = call.client;
   entry.goneAt = kNever;
@@ -186,6 +187,7 @@ void FreeForces::handle(SetPlane& c, const Call& call) {
   const bool stays = known != planes_.end() && known->second.value.normal == plane.normal &&
                      known->second.value.offset == plane.offset;
   plane.placement = stays ? known->second.value.placement : ++placements_;
+  plane.owner = ownerOf(call.client);
   planes_[c.index] = {call.client, plane, kNever};
   changed_ = true;
 }
@@ -234,6 +236,7 @@ void FreeForces::handle(SetForceField& c, const Call& call) {
   if (field.force_N.isZero(0) && field.jacobian_N_per_unit.isZero(0)) {
     field_.reset();
   } else {
+    field.owner = ownerOf(call.client);
     field_ = {call.client, field, kNever};
   }
 }
@@ -243,6 +246,7 @@ FreeForces::Constraint& FreeForces::constraintFor(const Call& call) {
   constraint_->owner = call.client;
   constraint_->goneAt = kNever;
   constraint_->value.releasing = false;
+  constraint_->value.owner = ownerOf(call.client);
   changed_ = true;
   return constraint_->value;
 }
@@ -326,6 +330,7 @@ void FreeForces::handle(StartCustomEffect& c, const Call& call) {
   buzz.angularFrequency_rad_per_s = kTau * p[1];
   buzz.duration = base::toNanos(std::min(p[2], kLongest_ms / 1000));
   buzz.start = ++starts_;
+  buzz.owner = ownerOf(call.client);
   buzz_ = {call.client, buzz, call.now + buzz.duration + kAfterEnd};
   changed_ = true;
 }

@@ -16,6 +16,7 @@ void FreeForces::start(Owned<RunningEffect>& entry, ClientId client, Nanos now) 
   entry.value.startedAt = now;
   entry.value.effect.start = ++starts_;
   entry.value.effect.releasing = false;
+  entry.value.effect.owner = ownerOf(client);
   const Nanos duration = entry.value.effect.duration;
   entry.goneAt = duration > 0 ? now + duration + kAfterEnd : kNever;
   changed_ = true;
@@ -34,6 +35,7 @@ std::optional<ForceField> FreeForces::fieldOf(const Constraint& c) const {
   field.jacobian_N_per_unit = -c.stiffness_N_per_m / kWorldUnitsPerStockMetre * outer;
   field.radius = std::numeric_limits<double>::infinity();
   field.releasing = c.releasing;
+  field.owner = c.owner;
   return field;
 }
 

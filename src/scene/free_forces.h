@@ -4,6 +4,7 @@
 
 #include <limits>
 #include <map>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -53,6 +54,7 @@ struct ForceConstraint {
   Vec3 planeNormal = Vec3::UnitY();
   double stiffness_N_per_m = 1000;
   bool releasing = false;
+  std::shared_ptr<const ForceOwner> owner;
 };
 
 /// All of them, by index. A command checks all of its values before it changes anything.
@@ -91,6 +93,9 @@ class FreeForces {
   static constexpr Nanos kAfterEnd = 50'000'000;     ///< the servo ends a timed force by its own clock
   static constexpr Nanos kRemember = 1'000'000'000;  ///< a start whose definition has not arrived yet
 
+  std::shared_ptr<const ForceOwner> ownerOf(ClientId client) const {
+    return config_.owners ? config_.owners->of(client) : nullptr;
+  }
   void start(Owned<RunningEffect>& entry, ClientId client, Nanos now);
   template <class F>
   void release(const F& whose, Nanos now);

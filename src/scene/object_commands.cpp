@@ -9,6 +9,8 @@ namespace {
 constexpr std::string_view kBadMatrix =
     "refused: the matrix is not finite or too large, is singular, or its last row is not 0 0 0 1";
 
+constexpr std::size_t kLargestGap = 65'536;  // vertices or triangles that may be missing before a run
+
 }  // namespace
 
 bool ObjectTable::hasRoom(const Object& object, std::int32_t first, std::size_t count, std::size_t present,
@@ -22,6 +24,13 @@ bool ObjectTable::hasRoom(const Object& object, std::int32_t first, std::size_t 
   if (end > perObject) {
     call.refuse(name, "refused: beyond the limit of one object", " object ", object.id, ", ", what, " ",
                 end - 1, ", limit ", perObject);
+    return false;
+  }
+  // Numbers far beyond the present ones would make a few bytes cost megabytes.
+  if (static_cast<std::size_t>(first) > 2 * present + kLargestGap) {
+    call.refuse(
+        name, "refused: too far beyond the numbers that were sent; send them in about ascending order",
+        " object ", object.id, ", ", what, " ", first, ", at most ", 2 * present + kLargestGap, " now");
     return false;
   }
   if (end > present && used + (end - present) > inAll) {
@@ -306,10 +315,7 @@ void ObjectTable::handle(SetSceneOrigin& c, const Call& call) {
     return;
   }
   T_world_scene_ = Eigen::Translation3d(1000 * c.position_m) * *rotation;
-  const Nanos travel = scenePoses_.next(call.now);
-  for (const auto& object : objects_) {
-    if (object && object->parent == Object::kScene) moveAll(*object, travel);
-  }
+  moveScene(scenePoses_.next(call.now));
 }
 
 void ObjectTable::apply(SceneCommand& command, const Call& call) {

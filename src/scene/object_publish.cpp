@@ -180,6 +180,7 @@ bool ObjectTable::publish(Nanos now, double worldUnitsPerMetre, NoticeBoard& boa
 }
 
 bool ObjectTable::updatePublished(Nanos now, NoticeBoard& board, std::vector<Notice>& out) {
+  spreadMoves();
   bool changed = false;
   for (const std::int32_t id : changed_) {
     Object* object = find(id);

@@ -47,6 +47,8 @@ ObjectTable::ObjectTable(const SceneConfig& config)
 
 void ObjectTable::reset() {
   objects_.clear();
+  moves_.clear();
+  sceneTravel_.reset();
   changed_.clear();
   edited_.clear();
   checks_.clear();
@@ -147,13 +149,35 @@ void ObjectTable::queue(Object& object) {
   changed_.push_back(object.id);
 }
 
-// A jump is not undone by a stream of a parent in the same moment.
+// Only notes the move: a command must not cost more than its size, however many objects are below. A jump is
+// not undone by a stream of a parent in the same moment.
 void ObjectTable::moveAll(Object& root, Nanos travel) {
-  withDescendants(root, [&](Object& object) {
-    object.travel = object.moved ? std::min(object.travel, travel) : travel;
-    object.moved = true;
-    queue(object);
-  });
+  root.pendingTravel = root.movePending ? std::min(root.pendingTravel, travel) : travel;
+  if (!std::exchange(root.movePending, true)) moves_.push_back(root.id);
+}
+
+void ObjectTable::moveScene(Nanos travel) {
+  sceneTravel_ = std::min(sceneTravel_.value_or(travel), travel);
+}
+
+// An object that got another parent since its move was noted has a jump of its own, which wins.
+void ObjectTable::spreadMoves() {
+  if (sceneTravel_) {
+    for (const auto& object : objects_) {
+      if (object && object->parent == Object::kScene) moveAll(*object, *sceneTravel_);
+    }
+    sceneTravel_.reset();
+  }
+  for (const std::int32_t id : moves_) {
+    Object* root = find(id);
+    if (root == nullptr || !std::exchange(root->movePending, false)) continue;
+    withDescendants(*root, [&](Object& object) {
+      object.travel = object.moved ? std::min(object.travel, root->pendingTravel) : root->pendingTravel;
+      object.moved = true;
+      queue(object);
+    });
+  }
+  moves_.clear();
 }
 
 void ObjectTable::becomeStock(Object& object) {

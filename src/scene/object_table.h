@@ -84,6 +84,8 @@ struct Object {
   bool stateChanged = true;
   bool surfaceChanged = false;
   bool moved = false;
+  bool movePending = false;    ///< it and its descendants move, which publish() works out
+  Nanos pendingTravel = 0;     ///< of that move
   Nanos travel = 0;            ///< shortest duration of the pending move; 0 is a jump
   std::int64_t position = -1;  ///< in the published list
 
@@ -144,6 +146,8 @@ class ObjectTable {
   void becomeStock(Object& object);
   void place(Object& object, const Affine& T_parent_object, const Call& call);
   void moveAll(Object& object, Nanos travel);
+  void moveScene(Nanos travel);
+  void spreadMoves();
   void queue(Object& object);
   void meshEdited(Object& object, const Call& call);
 
@@ -171,6 +175,8 @@ class ObjectTable {
   std::uint64_t lastTopology_ = 0;  // one counter for all meshes: no number is used twice
   std::uint32_t jumps_ = 0;         // one counter for all: no number is used twice
 
+  std::vector<std::int32_t> moves_;   // objects with movePending
+  std::optional<Nanos> sceneTravel_;  // of the pending move of the scene's origin
   std::vector<std::int32_t> changed_;
   std::vector<std::int32_t> edited_;  // meshes with edits
   Nanos rebuildNotBefore_ = 0;

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 
 #include "base/time.h"
 #include "geometry/types.h"
+#include "scene/force_owner.h"
 #include "scene/surface.h"
 
 namespace hapticd::scene {
@@ -26,6 +28,7 @@ struct Plane {
   double buzzAngularFrequency_rad_per_s = 0;
   std::uint32_t placement = 0;  ///< counts placements: a new number is a plane that was not there before
   bool releasing = false;       ///< its owner is gone: ramp out in 250 ms
+  std::shared_ptr<const ForceOwner> owner;  ///< null: of no client
 };
 
 }  // namespace hapticd::scene

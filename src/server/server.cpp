@@ -1,5 +1,7 @@
 #include "server/server.h"
 
+#include <sys/resource.h>
+
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -18,6 +20,19 @@ using namespace std::chrono_literals;
 using base::Nanos;
 
 constexpr Nanos kHandshakeLimit = 30'000'000'000;
+constexpr std::size_t kMostReverseConnections = 64;  // pending at once
+constexpr std::size_t kReserve = 16;                 // connections that may only stop forces
+constexpr std::uint64_t kOtherDescriptors = 192;     // devices, files, the web port, pending connections
+
+// The program may raise it: see docs/limits.md.
+std::size_t mostSessions(std::size_t configured) {
+  rlimit limit{};
+  getrlimit(RLIMIT_NOFILE, &limit);
+  const std::uint64_t present = limit.rlim_cur;
+  // In mode udp a client takes two.
+  const std::uint64_t possible = present > 2 * kOtherDescriptors ? (present - kOtherDescriptors) / 2 : 16;
+  return std::min<std::size_t>(configured, possible);
+}
 
 net::ConnectionOptions connectionOptions() {
   net::ConnectionOptions options;
@@ -157,8 +172,9 @@ void Server::finishRecording() {
   if (!recorder_) return;
   recorder_->finish();
   const record::RecorderCounts& counts = recorder_->counts();
-  spdlog::info("recorded {} ticks, {:.1f} MB, in {}", counts.ticks, static_cast<double>(counts.bytes) * 1e-6,
-               recorder_->path().string());
+  spdlog::info("recorded {} ticks, {:.1f} MB, in {}{}", counts.ticks,
+               static_cast<double>(counts.bytes) * 1e-6, recorder_->path().string(),
+               recorder_->writes() ? "" : ", which is incomplete");
   recorder_.reset();
 }
 
@@ -210,6 +226,7 @@ void Server::run() {
   loop_.run();
   if (player_) player_->stop();
   for (const auto& station : stations_) station->stop();
+  devicesClosed_.store(true, std::memory_order_release);
   for (const auto& scene : scenes_) scene->stop();
   finishRecording();
 }
@@ -228,7 +245,7 @@ void Server::onWebClient(net::Connection connection) {
 ServerStatus Server::status() const {
   ServerStatus status;
   status.uptime_s = base::toSeconds(base::now() - started_);
-  if (recorder_) status.recording = recorder_->path().string();
+  if (recorder_ && recorder_->writes()) status.recording = recorder_->path().string();
   status.scenes.resize(scenes_.size());
   for (const auto& station : stations_) {
     DeviceStatus& device = status.devices.emplace_back(station->status());
@@ -260,15 +277,45 @@ void Server::stop() {
   loop_.stop();
 }
 
+bool Server::stopForces() noexcept {
+  constexpr Nanos kLongest = 40'000'000;
+  for (const auto& station : stations_) station->stopForces();
+  const auto atZero = [](const auto& station) { return station->isStoppedAtZero(); };
+  for (const Nanos end = base::now() + kLongest; base::now() < end; base::sleepFor(500'000)) {
+    if (std::all_of(stations_.begin(), stations_.end(), atZero)) return true;
+  }
+  return false;
+}
+
 void Server::addSession(net::Connection connection, std::unique_ptr<net::UdpSocket> udp, SessionMode mode) {
   const scene::ClientId id = nextClient_++;
   auto session =
       std::make_unique<Session>(id, *this, names_, clock_, std::move(connection), std::move(udp), mode);
-  spdlog::info("client {} connected from {}", id, session->description());
+  throttledLog_.log(spdlog::level::info, session->address(),
+                    fmt::format("client {} connected from {}", id, session->description()));
   Session& added = *session;
   sessions_.emplace(id, std::move(session));
   handshakes_.emplace(id, base::now());
+  admit(added);
   added.start();
+}
+
+// Beyond the limits a client may still stop forces. The newest have this chance: those that hold on to theirs
+// must not keep others from it.
+void Server::admit(Session& session) {
+  const std::string address = session.address();
+  const std::size_t ofAddress = ++sessionsOf_[address];
+  const bool full =
+      sessions_.size() - reserve_.size() > mostSessions(static_cast<std::size_t>(config_.connections));
+  if (!full && ofAddress <= static_cast<std::size_t>(config_.connectionsPerAddress)) return;
+  reserve_.push_back(session.id());
+  if (reserve_.size() <= kReserve) return;
+  const auto oldest = sessions_.find(reserve_.front());
+  if (oldest != sessions_.end()) oldest->second->close("the server is full, and others wait to stop forces");
+}
+
+bool Server::mayOnlyStop(const Session& session) const noexcept {
+  return std::find(reserve_.begin(), reserve_.end(), session.id()) != reserve_.end();
 }
 
 void Server::onUdpRequest(std::span<const std::byte> datagram, const net::Endpoint& from) {
@@ -301,6 +348,11 @@ void Server::connectToClient(const net::Endpoint& client) {
   for (const auto& pending : reverseConnections_) {
     if (pending->client == client) return;
   }
+  if (reverseConnections_.size() >= kMostReverseConnections) {
+    throttledLog_.warn("connection request to " + client.text() +
+                       " ignored: " + std::to_string(kMostReverseConnections) + " others are pending");
+    return;
+  }
   auto owned = std::make_unique<ReverseConnection>();
   ReverseConnection* pending = owned.get();
   pending->client = client;
@@ -316,7 +368,10 @@ void Server::connectToClient(const net::Endpoint& client) {
              auto udp = std::make_unique<net::UdpSocket>(loop_, local);
              net::Connection connection = std::move(pending->connection);
              forget();
-             if (connection.remote() == net::Endpoint{connection.local().address, address().port}) {
+             // All of 127.0.0.0/8 is this machine; any other address of its own is its source address, too.
+             const net::Endpoint remote = connection.remote();
+             if (remote.port == address().port &&
+                 (isLoopback(remote.address) || remote.address == connection.local().address)) {
                throttledLog_.warn("connection request names this server itself: refused");
                return;
              }
@@ -333,10 +388,15 @@ void Server::connectToClient(const net::Endpoint& client) {
 }
 
 void Server::onClosed(Session& session, const std::string& reason) {
-  spdlog::info("client {} ({}) disconnected: {}", session.id(), session.description(), reason);
+  throttledLog_.log(
+      spdlog::level::info, session.address(),
+      fmt::format("client {} ({}) disconnected: {}", session.id(), session.description(), reason));
   for (const auto& station : stations_) station->clientGone(session.id());
   for (const auto& scene : scenes_) scene->clientGone(session.id());
   handshakes_.erase(session.id());
+  std::erase(reserve_, session.id());
+  const auto ofAddress = sessionsOf_.find(session.address());
+  if (ofAddress != sessionsOf_.end() && --ofAddress->second == 0) sessionsOf_.erase(ofAddress);
   sessions_.erase(session.id());
 }
 
@@ -355,7 +415,13 @@ void Server::closeStaleHandshakes() {
 
 // Disconnect clients whose heartbeat expired. onClosed() destroys the session later.
 void Server::checkHeartbeats() {
+  constexpr Nanos kStall = 150'000'000;  // between two checks; 50 ms are usual
   const Nanos now = base::now();
+  const bool stalled = now - std::exchange(heartbeatsCheckedAt_, now) > kStall;
+  if (stalled) {  // this thread has not read what the clients sent
+    for (const auto& [id, session] : sessions_) session->excuseStall(now);
+    return;
+  }
   for (const auto& [id, session] : sessions_) {
     switch (session->checkHeartbeat(now)) {
       case HeartbeatWatch::Verdict::alive:
@@ -374,8 +440,9 @@ void Server::checkHeartbeats() {
 
 // The client disconnected while the scene is behind. Its last commands are still applied.
 void Server::onPeerGone(Session& session, const std::string& reason) {
-  spdlog::info("client {} ({}) disconnected while its commands wait for the scene: {}", session.id(),
-               session.description(), reason);
+  throttledLog_.log(spdlog::level::info, session.address(),
+                    fmt::format("client {} ({}) disconnected while its commands wait for the scene: {}",
+                                session.id(), session.description(), reason));
   releaseForces(session.id());
 }
 
@@ -428,7 +495,14 @@ void Server::onSceneMessage(Session& session, Station& station, const wire::Mess
 
 bool Server::mayCommand(Session& session, Station& station, const wire::MessageReceived& message) {
   std::string reason;
-  if (!wire::needsControl(message.kind) || station.mayCommand(session, reason)) return true;
+  if (message.kind == wire::kindOf<wire::StopForces>) return true;
+  if (!reserve_.empty() && mayOnlyStop(session)) {
+    if (message.kind == wire::kindOf<wire::Ping> || message.kind == wire::kindOf<wire::Heartbeat>)
+      return true;
+    reason = "the server is full: this connection may only stop forces";
+  } else if (!wire::needsControl(message.kind) || station.mayCommand(session, reason)) {
+    return true;
+  }
   // Send one text for each read: a refused upload has thousands of messages.
   if (std::exchange(refusalSentTo_, session.id()) != session.id()) {
     session.send(message.local_sender,
@@ -440,7 +514,13 @@ bool Server::mayCommand(Session& session, Station& station, const wire::MessageR
 }
 
 void Server::onWarning(const Session& session, const std::string& text) {
-  throttledLog_.warn("client " + std::to_string(session.id()) + ": " + text);
+  const std::string client = "client " + std::to_string(session.id());
+  throttledLog_.log(spdlog::level::warn, client, client + ": " + text);
+}
+
+void Server::onNote(const Session& session, const std::string& text) {
+  throttledLog_.log(spdlog::level::info, session.address(),
+                    fmt::format("client {} ({}) {}", session.id(), session.description(), text));
 }
 
 // A client that sends much data must not delay the reports to others.

@@ -4,6 +4,8 @@
 // Everything runs in the net thread, which never waits for a scene or a servo.
 #pragma once
 
+#include <atomic>
+#include <deque>
 #include <map>
 #include <memory>
 #include <optional>
@@ -39,6 +41,11 @@ class Server final : public SessionOwner, public WebOwner {
   void run();
   /// From any thread, including one that waits for signals.
   void stop();
+  /// From any thread, without the help of any other: stops the forces of all devices until a re-arm. Waits
+  /// until the servos have written zero; false when one has not for 40 ms (the watchdog then ends the force).
+  bool stopForces() noexcept;
+  /// From any thread: run() has ended the forces and closed all devices.
+  bool devicesClosed() const noexcept { return devicesClosed_.load(std::memory_order_acquire); }
 
   /// The endpoint of the listener, with the actual port.
   const net::Endpoint& address() const noexcept { return listener_->local(); }
@@ -53,6 +60,7 @@ class Server final : public SessionOwner, public WebOwner {
   void onSubscribed(Session& session, wire::LocalSender name) override;
   void onMessage(Session& session, const wire::MessageReceived& message, base::Nanos received) override;
   void onWarning(const Session& session, const std::string& text) override;
+  void onNote(const Session& session, const std::string& text) override;
   void onReadSlice() override;
   void onReadEnd(Session& session) override;
   void onPeerGone(Session& session, const std::string& reason) override;
@@ -61,6 +69,8 @@ class Server final : public SessionOwner, public WebOwner {
   ServerStatus status() const override;
   void onWebClient(net::Connection connection) override;
 
+  void admit(Session& session);
+  bool mayOnlyStop(const Session& session) const noexcept;
   void addSession(net::Connection connection, std::unique_ptr<net::UdpSocket> udp, SessionMode mode);
   void onUdpRequest(std::span<const std::byte> datagram, const net::Endpoint& from);
   void connectToClient(const net::Endpoint& client);
@@ -94,6 +104,8 @@ class Server final : public SessionOwner, public WebOwner {
   std::vector<std::unique_ptr<SceneHost>> scenes_;
   std::vector<std::unique_ptr<Station>> stations_;
   std::map<scene::ClientId, std::unique_ptr<Session>> sessions_;
+  std::map<std::string, std::size_t> sessionsOf_;      ///< number by address
+  std::deque<scene::ClientId> reserve_;                ///< clients beyond the limits, oldest first
   std::map<scene::ClientId, base::Nanos> handshakes_;  ///< start times of unfinished handshakes
   scene::ClientId refusalSentTo_ = 0;  ///< client already notified of a refusal during this read; 0: none
   std::vector<std::unique_ptr<ReverseConnection>> reverseConnections_;
@@ -102,6 +114,8 @@ class Server final : public SessionOwner, public WebOwner {
   std::unique_ptr<net::UdpSocket> requests_;
   std::unique_ptr<WebServer> web_;
   scene::ClientId nextClient_ = 1;
+  base::Nanos heartbeatsCheckedAt_ = base::now();
+  std::atomic<bool> devicesClosed_{false};
   const base::Nanos started_ = base::now();
 };
 

@@ -36,3 +36,9 @@ fails_with "bad.toml:3: device 'Phantom': report_rate_Hz must be between 0.1 and
 printf 'vrpn_Phantom P 1 fast X\n' >bad.cfg
 fails_with 'bad.cfg:1: report_rate_Hz is "fast", expected a number' --config bad.cfg
 fails_with "unknown driver 'hal'" --device hal
+# What only the driver understands is checked without opening a device.
+fails_with "device 'Phantom': " --hand nosuch.csv
+fails_with "nosuch.csv" --hand nosuch.csv
+fails_with "device 'Phantom': " --hand .
+fails_with "hardware is 'x', expected the number" --device forcedimension:x
+fails_with "is the port of listen" --listen 127.0.0.1:4000 --http 127.0.0.1:4000

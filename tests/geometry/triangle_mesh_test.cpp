@@ -57,5 +57,13 @@ TEST(Weld, LeavesVerticesThatAreNoNumbersAlone) {
   EXPECT_EQ(mesh.triangles[0], (Triangle{0, 1, 2}));
 }
 
+TEST(Weld, TrianglesWithoutACornerAreLeftOut) {
+  TriangleMesh mesh{{Vec3f(0, 0, 0), Vec3f(1, 0, 0), Vec3f(0, 1, 0)},
+                    {{0, 1, 900'000'000}, {0, 1, 2}, {3, 1, 2}}};
+  weld(mesh);
+  EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}}));
+  EXPECT_EQ(mesh.vertices.size(), 3U);
+}
+
 }  // namespace
 }  // namespace hapticd::geometry

@@ -173,6 +173,14 @@ TEST(HttpServer, WhatIsNoHttpIsRefused) {
   EXPECT_THAT(http.ask("GET / HTTP/1.1\r\nContent-Length: 1\r\nTransfer-Encoding: chunked\r\n\r\n"),
               StartsWith("HTTP/1.1 400 "));
   EXPECT_THAT(http.ask("GET / HTTP/1.1\r\nbad header\r\n\r\n"), StartsWith("HTTP/1.1 400 "));
+  // The body of an unknown coding must not be taken for the next request.
+  const std::string smuggled = "GET /smuggled HTTP/1.1\r\n\r\n";
+  for (const char* coding : {"xchunked", "identity", "gzip, chunked"}) {
+    EXPECT_THAT(
+        http.ask(std::string("GET / HTTP/1.1\r\nTransfer-Encoding: ") + coding + "\r\n\r\n" + smuggled),
+        AnyOf(StartsWith("HTTP/1.1 501 "), StartsWith("HTTP/1.1 400 ")))
+        << coding;
+  }
   EXPECT_TRUE(http.requests.empty());
 }
 

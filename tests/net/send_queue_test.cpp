@@ -101,5 +101,15 @@ TEST(SendQueue, GatherGivesAtMostWhatThereIsRoomFor) {
   EXPECT_EQ(textOf(parts[0]), "b");
 }
 
+TEST(SendQueue, ManySmallBuffersCostMoreThanTheirBytes) {
+  SendQueue queue(1 << 20);
+  const auto byte = std::make_shared<const Buffer>(1);
+  for (int i = 0; i < 1000; ++i) queue.push(byte, Delivery::reliable);
+  EXPECT_EQ(queue.reliableBytes(), 1000U);
+  EXPECT_EQ(queue.cost(), 1000 + 1000 * SendQueue::kItemBytes);
+  queue.consume(999);
+  EXPECT_EQ(queue.cost(), 1 + SendQueue::kItemBytes);
+}
+
 }  // namespace
 }  // namespace hapticd::net

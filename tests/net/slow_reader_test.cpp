@@ -100,7 +100,7 @@ TEST(SlowReader, IsClosedWithAReasonAboveTheHardLimit) {
   EXPECT_LE(mostQueued, 256u * 1024);
   EXPECT_EQ(session.closed, "") << "called back from inside send()";
   ASSERT_TRUE(pumpUntil(loop, [&] { return !session.closed.empty(); }));
-  EXPECT_EQ(session.closed, "the peer does not read: 263168 bytes wait for it, the limit is 262144");
+  EXPECT_EQ(session.closed, "the peer does not read: 262656 bytes wait for it, the limit is 262144");
   EXPECT_TRUE(isServed(server, loop));
 }
 

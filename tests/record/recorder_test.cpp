@@ -112,6 +112,21 @@ TEST(Recorder, SceneEventsBeyondTheMemoryAreCounted) {
   EXPECT_NE(problems.all().find("1 scene events lost"), std::string::npos);
 }
 
+TEST(Recorder, AFileThatIsRemovedEndsTheRecording) {
+  RecordingFile file;
+  Problems problems;
+  Recorder recorder(file.path(), problems.listener());
+  recorder.addDevice(phantom());
+  recorder.start(0, "");
+  EXPECT_TRUE(recorder.writes());
+  std::filesystem::remove(file.path());
+  EXPECT_TRUE(problems.until("has stopped: No such file"));
+  EXPECT_FALSE(recorder.writes());
+  recorder.ring(0).push(realtime::TickRecord());
+  recorder.finish();
+  EXPECT_EQ(recorder.counts().ticks, 0U) << "lost ticks were not recorded";
+}
+
 TEST(Recorder, AFullDiskEndsTheRecordingAndNothingElse) {
   RecordingFile link;
   std::filesystem::create_symlink("/dev/full", link.path());

@@ -197,6 +197,21 @@ TEST_F(Meshes, LimitsHoldForOneObjectAndForAll) {
   EXPECT_TRUE(notices_.empty());
 }
 
+TEST_F(Meshes, AVertexFarBeyondTheOthersIsRefused) {
+  say(SetVertices{0, 65'536, soup(1)});
+  EXPECT_TRUE(notices_.empty());
+  builder_ = SceneBuilder(simulated({}));
+  say(SetVertices{0, 65'537, soup(1)});
+  EXPECT_THAT(
+      onlyNotice(Severity::error),
+      HasSubstr("setObjectVertex object 0, vertex 65537, at most 65536 now: refused: too far beyond"));
+  say(SetTriangles{0, 15'999'999, {{0, 1, 2}}});
+  EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("setTriangle"));
+  say(SetVertices{0, 0, std::vector<Vec3f>(10'000, Vec3f::Zero())});
+  say(SetVertices{0, 85'536, soup(1)});
+  EXPECT_TRUE(notices_.empty()) << "a large mesh has room for a larger gap";
+}
+
 TEST_F(Meshes, AreCheckedOnceTheyAreComplete) {
   SceneConfig config = simulated({});
   config.checkMeshes = true;

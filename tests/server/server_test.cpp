@@ -6,6 +6,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <deque>
 #include <random>
 #include <sstream>
 
@@ -371,6 +372,64 @@ TEST(Server, AReverseConnectionToTheServerItselfIsRefused) {
   }
   EXPECT_EQ(countOf("names this server itself", log.text()), 1U);
   EXPECT_EQ(countOf("speaks VRPN", log.text()), 1U);
+}
+
+TEST(Server, AReverseConnectionToAnotherAddressOfTheServerIsRefused) {
+  Log log;
+  {
+    server::ServerConfig config = RunningServer::anyPort();
+    config.listenAddress = "0.0.0.0";
+    RunningServer server(config);
+    const net::Endpoint here{net::kLoopbackAddress, server.address().port};
+    net::Loop loop;
+    net::UdpSocket udp(loop, net::Endpoint{net::kLoopbackAddress, 0});
+    const std::string request = wire::formatUdpRequest({"127.0.0.2", here.port});
+    udp.sendTo(std::as_bytes(std::span(request)), here);
+    ScriptedPeer peer(here);
+    ASSERT_TRUE(peer.untilConnected());
+    ASSERT_TRUE(peer.until([&] { return peer.count<wire::IsTouching>() >= 200; }));
+  }
+  EXPECT_EQ(countOf("names this server itself", log.text()), 1U);
+  EXPECT_EQ(countOf("speaks VRPN", log.text()), 1U);
+}
+
+TEST(Server, AFullServerStillTakesAStopAndNothingElse) {
+  server::ServerConfig config = RunningServer::anyPort();
+  config.connections = 2;
+  RunningServer server(config);
+  ScriptedPeer first(server.address());
+  ScriptedPeer second(server.address());
+  ASSERT_TRUE(first.untilConnected());
+  ASSERT_TRUE(second.untilConnected());
+  ScriptedPeer late(server.address());
+  ASSERT_TRUE(late.untilConnected());
+  late.send(wire::SetObjectNumber{2});
+  EXPECT_TRUE(
+      late.untilText("setObjectNumber refused: the server is full: this connection may only stop forces"));
+  late.send(wire::Ping{});
+  EXPECT_TRUE(late.untilNext<wire::Pong>());
+  late.send(wire::StopForces{});
+  EXPECT_TRUE(first.until([&] {
+    const auto guard = first.last<wire::GuardState>();
+    return guard && guard->stopped != 0;
+  }));
+  // Whoever holds on to the reserve loses it to those that come later.
+  std::deque<ScriptedPeer> more;
+  for (int i = 0; i < 16; ++i) {
+    ASSERT_TRUE(more.emplace_back(server.address()).untilConnected());
+  }
+  EXPECT_TRUE(late.untilClosed());
+  EXPECT_TRUE(first.open() && second.open());
+  // A place that is free again is a whole one.
+  more.clear();
+  second.close();
+  EXPECT_TRUE(first.until([&] {
+    ScriptedPeer next(server.address());
+    if (!next.untilConnected()) return false;
+    next.send(wire::SetObjectNumber{-1});
+    return next.untilText("setObjectNumber") &&
+           next.texts().back().text.text.find("full") == std::string::npos;
+  }));
 }
 
 TEST(Server, APortInUseIsReported) {

@@ -63,7 +63,8 @@ class Exchange {
       lastCommand_ = command.number;
       commandTime_ = now;
     }
-    const bool fresh = now - commandTime_ <= kCommandLife && command.force_N.allFinite();
+    const bool ended = command.number <= block_.endedUpTo.load(std::memory_order_acquire);
+    const bool fresh = !ended && now - commandTime_ <= kCommandLife && command.force_N.allFinite();
     device_.write(fresh ? command.force_N : Vec3(Vec3::Zero()));
   }
 
@@ -115,7 +116,10 @@ std::string receive() {
 }  // namespace
 
 int runDeviceHost(Device& device, const DeviceHostOptions& options) {
-  std::signal(SIGINT, SIG_IGN);  // Ctrl-C concerns the server, which then ends this process in order
+  // Signals concern the server, which then ends this process in order; so does its death.
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP, SIGTTOU, SIGPIPE}) {
+    std::signal(signal, SIG_IGN);
+  }
   try {
     const SharedMemory memory(kMemoryDescriptor);
     try {

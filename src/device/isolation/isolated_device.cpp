@@ -75,8 +75,16 @@ void IsolatedDevice::spawn(int socketOfChild) {
   posix_spawn_file_actions_adddup2(&files, STDERR_FILENO, STDOUT_FILENO);  // banners
   posix_spawn_file_actions_adddup2(&files, memory, kMemoryDescriptor);
   posix_spawn_file_actions_adddup2(&files, socket, kSocketDescriptor);
+  // In a session of its own the process outlives the terminal of the server, whose end it notices by itself.
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  sigset_t none;
+  sigemptyset(&none);
+  posix_spawnattr_setsigmask(&attributes, &none);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGMASK);
   pid_t process = -1;
-  const int error = posix_spawn(&process, arguments[0], &files, nullptr, arguments.data(), environ);
+  const int error = posix_spawn(&process, arguments[0], &files, &attributes, arguments.data(), environ);
+  posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&files);
   ::close(memory);
   ::close(socket);
@@ -194,6 +202,13 @@ bool IsolatedDevice::read(Nanos now, DeviceState& state) noexcept {
 bool IsolatedDevice::write(const Vec3& force_N) noexcept {
   if (!memory_ || !force_N.allFinite()) return false;
   (*memory_)->command.write({silent_ ? Vec3(Vec3::Zero()) : force_N, ++commands_});
+  return true;
+}
+
+// A command that is being written now has the next number at most.
+bool IsolatedDevice::zeroFromOtherThread() noexcept {
+  if (!memory_) return false;
+  (*memory_)->endedUpTo.store(commands_.load() + 1, std::memory_order_release);
   return true;
 }
 

@@ -40,6 +40,7 @@ class IsolatedDevice final : public Device {
 
   bool read(Nanos now, DeviceState& state) noexcept override;
   bool write(const Vec3& force_N) noexcept override;
+  bool zeroFromOtherThread() noexcept override;
 
   std::string faultText() const override;
   bool lost() const noexcept override { return silent_ || lostThere_; }
@@ -75,9 +76,10 @@ class IsolatedDevice final : public Device {
   std::atomic<bool> silent_{false};
   std::atomic<bool> lostThere_{false};
 
+  std::atomic<std::uint64_t> commands_{0};  // counted by the loop's thread
+
   // Loop's thread only.
   Nanos lastPost_ = 0;
-  std::uint64_t commands_ = 0;
   Nanos postToTick_ = 0;
 };
 

@@ -8,6 +8,7 @@ const Driver openhaptics{
     .name = "openhaptics",
     .help = "3D Systems Touch, Touch X and Phantom, through OpenHaptics",
     .keys = {},
+    .isolatedByDefault = true,  // HDAPI has no watchdog
     .make = [](const DriverOptions& options) -> std::unique_ptr<Device> {
       return std::make_unique<OpenHapticsDevice>(OpenHapticsOptions{
           .name = options.hardware, .rate_Hz = options.servoRate_Hz, .calibrate = options.calibrate});

@@ -13,6 +13,11 @@ constexpr Nanos kSubStep = 50'000;
 constexpr Nanos kLongestRead = 100'000'000;  // a pause longer than this did not happen to the hand
 constexpr double kTurn_rad_per_s = 6;        // while reaching
 
+bool isFinite(const HandPose& pose) noexcept {
+  return pose.position_m.allFinite() && pose.velocity_m_per_s.allFinite() &&
+         pose.orientation.coeffs().allFinite();
+}
+
 }  // namespace
 
 SimulatedDevice::SimulatedDevice(const SimulatedOptions& options) : options_(options) {
@@ -29,11 +34,14 @@ void SimulatedDevice::setPath(std::shared_ptr<const HandPath> path) {
 }
 
 bool SimulatedDevice::write(const Vec3& force_N) noexcept {
+  if (!force_N.allFinite()) return false;
   force_N_ = force_N;
+  forceEnded_.store(false, std::memory_order_release);
   return true;
 }
 
 bool SimulatedDevice::read(Nanos now, DeviceState& state) noexcept {
+  if (forceEnded_.load(std::memory_order_acquire)) force_N_.setZero();
   chooseSource();
   const Nanos elapsed = started_ ? std::clamp<Nanos>(now - time_, 0, kLongestRead) : 0;
   if (!started_) {
@@ -51,7 +59,7 @@ bool SimulatedDevice::read(Nanos now, DeviceState& state) noexcept {
     intend(step);
     done += step;
   }
-  if (options_.openLoop) {
+  if (options_.openLoop || !position_m_.allFinite() || !velocity_m_per_s_.allFinite()) {
     position_m_ = intended_.position_m;
     velocity_m_per_s_ = intended_.velocity_m_per_s;
   }
@@ -68,13 +76,17 @@ void SimulatedDevice::chooseSource() noexcept {
     reaching_ = true;
   }
   const Target& target = target_.read();
+  if (target.active && !isFinite(target.pose)) return;  // keeps the previous one
   if (target.active != external_.active) reaching_ = true;
   external_ = target;
 }
 
 HandPose SimulatedDevice::wanted() const noexcept {
   if (external_.active) return external_.pose;
-  if (script_ != nullptr && script_->path) return script_->path->at(onPath_);
+  if (script_ != nullptr && script_->path) {
+    const HandPose onPath = script_->path->at(onPath_);
+    if (isFinite(onPath)) return onPath;
+  }
   HandPose rest;
   rest.position_m = options_.profile.workspace_m.centre();
   return rest;

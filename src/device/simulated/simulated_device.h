@@ -4,6 +4,7 @@
 // read(): the same calls give the same bytes, in real time or as fast as the machine can.
 #pragma once
 
+#include <atomic>
 #include <memory>
 
 #include "device/device.h"
@@ -39,6 +40,10 @@ class SimulatedDevice final : public Device, public SteeredHand {
 
   bool read(Nanos now, DeviceState& state) noexcept override;
   bool write(const Vec3& force_N) noexcept override;
+  bool zeroFromOtherThread() noexcept override {
+    forceEnded_.store(true, std::memory_order_release);
+    return true;
+  }
 
   void setPath(std::shared_ptr<const HandPath> path) override;
   void setTarget(const HandPose& pose) noexcept override { target_.write({true, pose}); }
@@ -64,6 +69,8 @@ class SimulatedDevice final : public Device, public SteeredHand {
   const SimulatedOptions options_;
   handoff::ExchangeSlot<Script> scripts_;
   handoff::LatestValue<Target> target_;
+
+  std::atomic<bool> forceEnded_{false};  // since the last write
 
   // Servo thread only, from here on.
   bool started_ = false;

@@ -99,7 +99,7 @@ Vec3 Effects::force(const scene::SceneSnapshot& scene, const device::DeviceState
     if (effect.duration > 0 && now - r->begin >= effect.duration) continue;
     Vec3 force = forceOf(effect, *r, T_device_world, device, contact, now);
     if (effect.releasing && r->releaseBegin < 0) r->releaseBegin = now;
-    if (r->releaseBegin >= 0) force *= remainingShare(r->releaseBegin, now);
+    force *= remainingShare(r->releaseBegin, effect.owner.get(), now);
     if (effect.type == EffectType::contactVibration) {
       alongNormal += force.dot(contact.normal);
     } else {

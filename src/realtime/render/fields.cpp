@@ -26,16 +26,16 @@ Vec3 forceOf(const scene::ForceField& field, const Vec3& hip) noexcept {
 
 // Fields have no id: one that ramps out is identified by its origin.
 double Fields::left(const scene::ForceField& field, Nanos now) noexcept {
-  if (!field.releasing) return 1;
+  if (!field.releasing) return remainingShare(-1, field.owner.get(), now);
   for (int i = 0; i < releasingCount_; ++i) {
     Releasing& r = releasing_[static_cast<std::size_t>(i)];
     if (r.origin != field.origin) continue;
     r.seen = true;
-    return remainingShare(r.begin, now);
+    return remainingShare(r.begin, field.owner.get(), now);
   }
   if (releasingCount_ == kMaxReleasing) return 0;
   releasing_[static_cast<std::size_t>(releasingCount_++)] = {field.origin, now, true};
-  return 1;
+  return remainingShare(now, field.owner.get(), now);
 }
 
 Vec3 Fields::buzz(const scene::Buzz& b, Nanos now) noexcept {
@@ -47,7 +47,7 @@ Vec3 Fields::buzz(const scene::Buzz& b, Nanos now) noexcept {
   }
   if (b.releasing && buzzReleaseBegin_ < 0) buzzReleaseBegin_ = now;
   if (now - buzzBegin_ >= b.duration) return Vec3::Zero();
-  const double share = buzzReleaseBegin_ < 0 ? 1 : remainingShare(buzzReleaseBegin_, now);
+  const double share = remainingShare(buzzReleaseBegin_, b.owner.get(), now);
   return share * std::sin(b.angularFrequency_rad_per_s * base::toSeconds(now - buzzBegin_)) * b.force_N;
 }
 

@@ -98,9 +98,9 @@ bool PlacedPlanes::placeOne(const geometry::Affine& T_world_device, Nanos now, c
 
   memory.surface = placed.surface = plane.surface;
   if (plane.releasing && memory.releaseBegin < 0) memory.releaseBegin = now;
-  if (memory.releaseBegin >= 0) {
-    const double left = remainingShare(memory.releaseBegin, now);
-    if (left == 0) return false;
+  const double left = remainingShare(memory.releaseBegin, plane.owner.get(), now);
+  if (left == 0) return false;
+  if (left < 1) {
     placed.surface.stiffness_N_per_m *= left;
     placed.surface.damping_Ns_per_m *= left;
   }

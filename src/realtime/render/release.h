@@ -6,6 +6,7 @@
 
 #include "base/time.h"
 #include "geometry/types.h"
+#include "scene/force_owner.h"
 
 namespace hapticd::realtime {
 
@@ -14,6 +15,13 @@ inline constexpr double kReleaseTime_s = 0.250;
 /// The share, 1 … 0, of a force that began to ramp out at `begin`.
 inline double remainingShare(base::Nanos begin, base::Nanos now) noexcept {
   return std::max(0.0, 1 - base::toSeconds(now - begin) / kReleaseTime_s);
+}
+
+/// The share of a force whose release began at `begin`, negative when it has not begun, and whose owner may
+/// be gone without the scene thread having noticed; `owner` may be null.
+inline double remainingShare(base::Nanos begin, const scene::ForceOwner* owner, base::Nanos now) noexcept {
+  const double released = begin < 0 ? 1 : remainingShare(begin, now);
+  return owner == nullptr ? released : std::min(released, owner->share(begin, now));
 }
 
 /// A force in another frame: rotated, never scaled. `t` is a similarity.

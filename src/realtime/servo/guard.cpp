@@ -53,6 +53,17 @@ Vec3 Guard::step(const GuardInput& in) noexcept {
   return written_;
 }
 
+void Guard::discardForce() noexcept {
+  if (!options_.enabled) return;
+  const std::uint32_t late = bit(Trip::late);
+  if ((report_.active & late) == 0) ++report_.counts[static_cast<std::size_t>(Trip::late)];
+  report_.active |= late;
+  report_.gain = 0;
+  phase_ = Phase::zero;
+  shaped_.setZero();
+  written_.setZero();
+}
+
 void Guard::obeyControl() noexcept {
   const GuardControl::Seen seen = control_.read();
   restart_ = seen.ramps != seen_.ramps || seen.rearms != seen_.rearms;
@@ -93,6 +104,7 @@ void Guard::checkSpeed(const device::DeviceState& state) noexcept {
 
 void Guard::checkTime(const GuardInput& in) noexcept {
   note(Trip::late, in.late > options_.late);
+  overdue_ = in.late > options_.lateDecay;  // the decay would have ended by now
   if (in.late > options_.stalled) {
     latch(Trip::stalled);
   } else if (options_.selfRecover && in.late <= options_.late) {
@@ -144,7 +156,7 @@ void Guard::limitSlew(Nanos dt) noexcept {
 }
 
 double Guard::gain(Nanos dt) noexcept {
-  if (((now_ | report_.latched) & kZeroing) != 0) {
+  if (((now_ | report_.latched) & kZeroing) != 0 || overdue_) {
     phase_ = Phase::zero;
     return 0;
   }

@@ -74,6 +74,9 @@ class Guard {
 
   /// The force to write, device frame, newtons.
   Vec3 step(const GuardInput& in) noexcept;
+  /// The force of the last step came too late and zero was written instead: counts as a late tick, and forces
+  /// ramp in.
+  void discardForce() noexcept;
   const GuardReport& report() const noexcept { return report_; }
   /// The state of the control in the last step.
   const GuardControl::Seen& seen() const noexcept { return seen_; }
@@ -102,6 +105,7 @@ class Guard {
   std::uint32_t now_ = 0;  // trips of this tick
   GuardControl::Seen seen_;
   bool restart_ = false;  // the ramp starts again
+  bool overdue_ = false;  // the tick is later than a decay takes
 
   int fastTicks_ = 0;
   bool waitForCalm_ = false;

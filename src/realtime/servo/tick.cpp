@@ -21,16 +21,36 @@ void Tick::operator()(const Pacing& pacing) noexcept {
   const FlushDenormals flush;
   begin(pacing);
   const Nanos started = clock_.now();
+  const std::uint32_t overtakes = overtakes_.load(std::memory_order_acquire);
   const scene::SceneSnapshot& scene = takeSnapshot();
 
   haveState_ = device_.read(report_.time, report_.device);
   const Nanos period = report_.tick == 1 ? period_ : report_.timing.period;
   renderer_.step(scene, report_.device, report_.time, period, report_.rendering);
   report_.force_N = guard_.step(guardInput());
-  written_ = device_.write(report_.force_N);
+  write(started, overtakes);
 
   report_.timing.compute = clock_.now() - started;
   publish();
+  stoppedAtZero_.store(guard_.seen().stopped && report_.force_N.isZero(0), std::memory_order_release);
+  finishedAt_.store(clock_.now(), std::memory_order_release);
+}
+
+// Between the check and the end of the write the watchdog may overtake this tick: then zero follows at once.
+void Tick::write(Nanos started, std::uint32_t overtakes) noexcept {
+  const auto overtaken = [&] { return overtakes_.load(std::memory_order_acquire) != overtakes; };
+  discarded_ = overtaken() || clock_.now() - started > kOldestForce;
+  if (discarded_) discardForce();
+  written_ = device_.write(report_.force_N);
+  if (discarded_ || !overtaken()) return;
+  discarded_ = true;
+  discardForce();
+  written_ = device_.write(report_.force_N);
+}
+
+void Tick::discardForce() noexcept {
+  guard_.discardForce();
+  report_.force_N.setZero();
 }
 
 void Tick::begin(const Pacing& pacing) noexcept {
@@ -73,7 +93,7 @@ void Tick::publish() noexcept {
 
   blackBox_.record(report_);
   if ((report_.guard.latched & ~latchedBefore) != 0) blackBox_.freeze();
-  if (recordTo_ != nullptr) recordTo_->push({report_, guard_.seen(), haveState_, written_});
+  if (recordTo_ != nullptr) recordTo_->push({report_, guard_.seen(), haveState_, written_, discarded_});
   reports_.push(report_);
   wake_.notify();
 }

@@ -4,7 +4,9 @@
 // rendering calls it as fast as possible. Only one thread may call it at a time.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
+#include <cstdint>
 
 #include "base/clock.h"
 #include "base/histogram.h"
@@ -27,6 +29,9 @@ struct TickOptions {
   std::size_t reports = 1024;  ///< capacity of the ring
   double blackBox_s = 2;
 };
+
+/// A tick that takes longer than this until its write commands zero instead: its force belongs to the past.
+inline constexpr Nanos kOldestForce = 3'000'000;
 
 /// Periods, wake-up errors and compute times of all ticks. Any thread may read.
 struct TickHistograms {
@@ -57,6 +62,17 @@ class Tick {
 
   /// Scene thread: publishes snapshots and collects old ones.
   scene::SnapshotSlot& snapshots() noexcept { return snapshots_; }
+  /// Any thread: when the last tick ended, on the clock of the constructor; 0 before the first.
+  Nanos finishedAt() const noexcept { return finishedAt_.load(std::memory_order_acquire); }
+  /// One other thread, while the loop runs: ends the force of a servo that does not finish its tick. That
+  /// tick commands zero if it ever comes to its write, and later forces ramp in. False when the driver cannot
+  /// end the force from this thread.
+  bool overtake() noexcept {
+    overtakes_.fetch_add(1, std::memory_order_acq_rel);
+    return device_.zeroFromOtherThread();
+  }
+  /// Any thread: the last tick saw stop() and commanded zero.
+  bool stoppedAtZero() const noexcept { return stoppedAtZero_.load(std::memory_order_acquire); }
   /// For the one consumer of reports.
   ReportRing& reports() noexcept { return reports_; }
   /// Notified once per tick.
@@ -72,6 +88,8 @@ class Tick {
   void begin(const Pacing& pacing) noexcept;
   const scene::SceneSnapshot& takeSnapshot() noexcept;
   GuardInput guardInput() const noexcept;
+  void write(Nanos started, std::uint32_t overtakes) noexcept;
+  void discardForce() noexcept;
   void publish() noexcept;
 
   device::Device& device_;
@@ -90,6 +108,10 @@ class Tick {
   RecordRing* recordTo_ = nullptr;
   bool haveState_ = false;  // the device delivered a state in this tick
   bool written_ = true;     // the device accepted the last force
+  bool discarded_ = false;  // the force of this tick was too old: zero was written
+  std::atomic<Nanos> finishedAt_{0};
+  std::atomic<std::uint32_t> overtakes_{0};
+  std::atomic<bool> stoppedAtZero_{false};
 };
 
 }  // namespace hapticd::realtime

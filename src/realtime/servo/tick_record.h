@@ -14,6 +14,7 @@ struct TickRecord {
   GuardControl::Seen control{};  ///< as the guard read it in this tick
   bool haveState = false;        ///< the device delivered a state
   bool written = false;          ///< the device accepted the force
+  bool discarded = false;        ///< the rendered force was too old; zero was written
 };
 
 /// From the servo to a recorder. A full ring counts the records that it refuses.

@@ -42,6 +42,12 @@ class Reader {
 
   void field(const std::string& key, double& out) { take<double>(key, out, "a number"); }
   void field(const std::string& key, bool& out) { takeExact<bool>(key, out, "true or false"); }
+  void field(const std::string& key, std::optional<bool>& out) {
+    bool value = false;
+    if (find(key) == nullptr) return;
+    field(key, value);
+    out = value;
+  }
   void field(const std::string& key, std::string& out) {
     takeExact<std::string>(key, out, "a quoted string");
   }

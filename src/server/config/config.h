@@ -55,8 +55,9 @@ struct DeviceConfig {
   std::map<std::string, std::string>
       driverKeys;          ///< keys that only some drivers read, as Driver::keys names them
   bool calibrate = false;  ///< consent to calibrate at start and at a re-arm; may move the arm
-  bool isolate =
-      false;  ///< run the driver in a separate process: its crash is a fault of the device, not of the server
+  /// Run the driver in a separate process: its crash is a fault of the device, not of the server, and that
+  /// process ends the force when the server hangs or dies. Nothing: as the driver needs it.
+  std::optional<bool> isolate;
   bool enableForces = false;    ///< real devices start without force unless this is set
   std::string hand = "script";  ///< simulated device: "script", or a CSV file with the intended path
   double servoRate_Hz = 1000;
@@ -97,6 +98,8 @@ struct ServerConfig {
   std::vector<std::string> callbackHosts;  ///< hosts that a UDP request may name besides its source address
   std::string record;                  ///< recording to write; strftime conversions (%) allowed; empty: none
   std::string http = kHttpAuto;        ///< endpoint of the viewer: ADDR:PORT, kHttpAuto or kHttpOff
+  int connections = 4096;              ///< of clients at once; further ones may only stop forces
+  int connectionsPerAddress = 2048;    ///< the same for each address
   std::vector<std::string> httpAllow;  ///< additional Host names accepted at the web port: HOST or HOST:PORT
   std::vector<DeviceConfig> devices{DeviceConfig{}};
 

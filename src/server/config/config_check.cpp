@@ -66,7 +66,7 @@ void checkDriver(const Checker& check, const DeviceConfig& device) {
   if (driver == nullptr) {
     check.fail("driver", "unknown driver '" + device.driver + "'; available: " + device::driverNames());
   }
-  if (device.isolate && !driver->canBeIsolated) {
+  if (device.isolate.value_or(false) && !driver->canBeIsolated) {
     check.fail("isolate", "the driver '" + device.driver +
                               "' loads no vendor library and cannot be isolated; remove isolate");
   }
@@ -82,6 +82,13 @@ void checkWorkspace(const Checker& check, const std::vector<double>& box) {
                "workspace needs six numbers in mm: min x y z, then max x y z, each min below its max");
   }
   for (const double bound : box) check.range("workspace", bound, -10000, 10000);
+  constexpr double kSmallest_mm = 1;
+  for (std::size_t i = 0; box.size() == 6 && i < 3; ++i) {
+    if (box[i + 3] - box[i] >= kSmallest_mm) continue;
+    std::ostringstream text;
+    text << "workspace: an edge of " << box[i + 3] - box[i] << " mm is too short; use 1 mm or more";
+    check.fail("workspace", text.str());
+  }
 }
 
 void checkControl(const Checker& check, const DeviceConfig& device) {
@@ -99,14 +106,21 @@ void checkControl(const Checker& check, const DeviceConfig& device) {
 // `http` must be ADDR:PORT; `http_allow` holds names that a browser can send as Host.
 void checkHttp(const Checker& check, const ServerConfig& config) {
   if (config.http != kHttpAuto && config.http != kHttpOff) {
+    const std::string kAny = "0.0.0.0";
+    bool clash = false;
     try {
       std::string address = "127.0.0.1";
       std::uint16_t port = 8080;
       parseListen(config.http, address, port);
       net::Endpoint::parse(address, port);
+      clash = port != 0 && port == config.port &&
+              (address == config.listenAddress || address == kAny || config.listenAddress == kAny);
     } catch (const std::runtime_error&) {
       check.fail("http", "http: " + wire::inQuotes(config.http) +
                              " is not ADDR:PORT such as 127.0.0.1:8080, auto or off");
+    }
+    if (clash) {
+      check.fail("http", "http: " + wire::inQuotes(config.http) + " is the port of listen; use another port");
     }
   }
   for (const std::string& name : config.httpAllow) {
@@ -182,9 +196,11 @@ void validate(const ServerConfig& config) {
   checkRecord(server, config.record);
   server.range("seconds", config.seconds, 0, 1e9);
   checkHttp(server, config);
+  server.range("connections", config.connections, 1, 100'000);
+  server.range("connections_per_address", config.connectionsPerAddress, 1, 100'000);
   for (const std::string& host : config.callbackHosts) server.address("callback_hosts", host, "10.0.0.7");
   std::map<std::string, int> uses;
-  std::map<std::string, SceneOnDisconnect> scenes;
+  std::map<std::string, const DeviceConfig*> scenes;
   for (std::size_t i = 0; i < config.devices.size(); ++i) {
     const DeviceConfig& device = config.devices[i];
     if (device.names.empty())
@@ -193,11 +209,14 @@ void validate(const ServerConfig& config) {
     const Checker check(i, device.names.front());
     checkDevice(check, device);
     if (device.scene.empty()) continue;
-    const auto shared = scenes.try_emplace(device.scene, device.sceneOnDisconnect).first;
-    if (shared->second != device.sceneOnDisconnect) {
-      check.fail("scene_on_disconnect",
-                 "all devices of the scene '" + device.scene + "' must have the same scene_on_disconnect");
-    }
+    const DeviceConfig& first = *scenes.try_emplace(device.scene, &device).first->second;
+    const auto same = [&](const char* key, bool is) {
+      if (!is) check.fail(key, "all devices of the scene '" + device.scene + "' must have the same " + key);
+    };
+    same("scene_on_disconnect", device.sceneOnDisconnect == first.sceneOnDisconnect);
+    // Commands to one device of a scene are felt on all.
+    same("control", device.control == first.control);
+    same("control_list", device.controlList == first.controlList);
   }
 }
 

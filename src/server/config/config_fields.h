@@ -76,6 +76,8 @@ void visitFields(Visitor& visitor, Server& server) requires requires {
   visitor.field("record", server.record);
   visitor.field("http", server.http);
   visitor.field("http_allow", server.httpAllow);
+  visitor.field("connections", server.connections);
+  visitor.field("connections_per_address", server.connectionsPerAddress);
 }
 
 }  // namespace hapticd::server

@@ -39,6 +39,9 @@ class Writer {
  public:
   void field(const char* key, const std::string& value) { line(key, quoted(value)); }
   void field(const char* key, bool value) { line(key, value ? "true" : "false"); }
+  void field(const char* key, std::optional<bool> value) {
+    if (value) field(key, *value);
+  }
   void field(const char* key, int value) { line(key, std::to_string(value)); }
   void field(const char* key, double value) { line(key, text(value)); }
   void field(const char* key, const std::vector<std::string>& values) { list(key, values, quoted); }

@@ -1,5 +1,7 @@
 #include "server/scene/scene_host.h"
 
+#include "base/world.h"
+
 namespace hapticd::server {
 
 void SceneHost::start(SceneThread::Callbacks callbacks, Post post) {
@@ -42,12 +44,14 @@ void SceneHost::play(scene::ClientId client, const scene::SceneCommand* command)
 
 void SceneHost::releaseForces(scene::ClientId client) {
   if (!thread_ || commandingClients_.count(client) == 0) return;
+  owners_->leave(client, base::now());
   thread_->pushUrgent({client, scene::SceneCommand{scene::ReleaseForces{}}});
 }
 
 void SceneHost::clientGone(scene::ClientId client) {
   if (!thread_) return;
   flush(client);
+  if (commandingClients_.count(client) != 0) owners_->leave(client, base::now());
   push({client, ClientGone{}});
   const bool lastToCommand = commandingClients_.erase(client) == 1 && commandingClients_.empty();
   if (lastToCommand && onDisconnect_ == SceneOnDisconnect::clear)

@@ -28,7 +28,10 @@ class SceneHost {
   const std::string& name() const noexcept { return name_; }
 
   /// Adds a device to the scene; before start().
-  void add(SceneDevice device) { devices_.push_back(std::move(device)); }
+  void add(SceneDevice device) {
+    device.config.owners = owners_;
+    devices_.push_back(std::move(device));
+  }
   /// The callbacks run in the scene thread.
   void start(SceneThread::Callbacks callbacks, Post post);
   void stop();
@@ -45,10 +48,10 @@ class SceneHost {
   void whenPublished(scene::ClientId client, std::function<void()> reached);
   /// Applies a command of a recorded client; null: it disconnected. Any thread, between start() and stop().
   void play(scene::ClientId client, const scene::SceneCommand* command);
-  /// Ramps out the forces that the client owns, ahead of all queued commands; the client may stay.
+  /// Ramps out the forces that the client owns, however busy the scene is; the client may stay.
   void releaseForces(scene::ClientId client);
-  /// Ramps out the forces that the client owns. When the last client that commanded the scene disconnects,
-  /// clears the scene if configured so.
+  /// Ramps out the forces that the client owns, however busy the scene is. When the last client that
+  /// commanded the scene disconnects, clears the scene if configured so.
   void clientGone(scene::ClientId client);
   /// Requests a description of the scene after all flushed commands; `reply` is called in the scene thread.
   void describe(std::function<void(std::shared_ptr<const scene::SceneDescription>)> reply);
@@ -63,6 +66,7 @@ class SceneHost {
   Post post_;
   std::unique_ptr<SceneThread> thread_;
   CommandDecoder decoder_;
+  const std::shared_ptr<scene::ForceOwners> owners_ = std::make_shared<scene::ForceOwners>();
   std::set<scene::ClientId> commandingClients_;  // connected clients that have commanded the scene
 };
 

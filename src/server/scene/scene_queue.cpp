@@ -4,21 +4,23 @@ namespace hapticd::server {
 
 void SceneQueue::push(SceneParcel&& parcel) {
   const std::lock_guard lock(mutex_);
-  charge(parcel);
-  parcels_.push_back(std::move(parcel));
+  Account& account = charge(parcel);
+  if (account.queued.empty()) turns_.push_back(parcel.client);
+  account.queued.push_back(std::move(parcel));
 }
 
 void SceneQueue::pushFront(SceneParcel&& parcel) {
   const std::lock_guard lock(mutex_);
   charge(parcel);
-  parcels_.push_front(std::move(parcel));
+  urgent_.push_back(std::move(parcel));
 }
 
-void SceneQueue::charge(const SceneParcel& parcel) {
+SceneQueue::Account& SceneQueue::charge(const SceneParcel& parcel) {
   Account& account = accounts_[parcel.client];
   account.bytes += parcel.bytes;
   ++account.parcels;
   account.full = account.full || account.bytes > kClientLimit_bytes;
+  return account;
 }
 
 bool SceneQueue::full(scene::ClientId client) const {
@@ -34,9 +36,18 @@ bool SceneQueue::pending(scene::ClientId client) const {
 
 std::optional<SceneParcel> SceneQueue::take() {
   const std::lock_guard lock(mutex_);
-  if (parcels_.empty()) return std::nullopt;
-  std::optional<SceneParcel> oldest(std::move(parcels_.front()));
-  parcels_.pop_front();
+  const auto first = [](std::deque<SceneParcel>& parcels) {
+    std::optional<SceneParcel> oldest(std::move(parcels.front()));
+    parcels.pop_front();
+    return oldest;
+  };
+  if (!urgent_.empty()) return first(urgent_);
+  if (turns_.empty()) return std::nullopt;
+  const scene::ClientId client = turns_.front();
+  turns_.pop_front();
+  std::deque<SceneParcel>& queued = accounts_.at(client).queued;
+  std::optional<SceneParcel> oldest = first(queued);
+  if (!queued.empty()) turns_.push_back(client);
   return oldest;
 }
 
@@ -61,7 +72,7 @@ void SceneQueue::published(std::optional<base::Nanos> oldestEdit) {
 
 bool SceneQueue::empty() const {
   const std::lock_guard lock(mutex_);
-  return parcels_.empty();
+  return urgent_.empty() && turns_.empty();
 }
 
 }  // namespace hapticd::server

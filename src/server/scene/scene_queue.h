@@ -21,7 +21,8 @@ struct SceneParcel {
   std::size_t bytes = 0;
 };
 
-/// FIFO over all clients. Thread-safe; no call waits for the scene.
+/// In order for each client; clients take turns, so that one with much work does not delay the others.
+/// Thread-safe; no call waits for the scene.
 class SceneQueue {
  public:
   /// A client with more bytes than this in the queue is full: its session holds back further scene commands.
@@ -31,7 +32,7 @@ class SceneQueue {
 
   /// Appends a parcel and charges its client.
   void push(SceneParcel&& parcel);
-  /// The same at the front of the queue.
+  /// The same, ahead of all clients.
   void pushFront(SceneParcel&& parcel);
 
   /// Whether the client exceeded the limit and is not yet relieved.
@@ -39,7 +40,7 @@ class SceneQueue {
   /// Whether a command of the client is not yet published.
   bool pending(scene::ClientId client) const;
 
-  /// The oldest parcel; its bytes stay charged until done().
+  /// The oldest parcel of the client whose turn it is; its bytes stay charged until done().
   std::optional<SceneParcel> take();
   /// A parcel of the client was applied at `now`. Returns true when this relieves the client.
   bool done(scene::ClientId client, std::size_t bytes, base::Nanos now);
@@ -49,16 +50,18 @@ class SceneQueue {
 
  private:
   struct Account {
+    std::deque<SceneParcel> queued;
     std::size_t bytes = 0;
     std::size_t parcels = 0;  // not yet applied
     base::Nanos appliedAt = 0;
     bool full = false;
   };
 
-  void charge(const SceneParcel& parcel);
+  Account& charge(const SceneParcel& parcel);
 
   mutable std::mutex mutex_;
-  std::deque<SceneParcel> parcels_;
+  std::deque<SceneParcel> urgent_;
+  std::deque<scene::ClientId> turns_;            // clients with queued parcels, the next one first
   std::map<scene::ClientId, Account> accounts_;  // clients with unpublished commands
 };
 

@@ -113,6 +113,7 @@ void SceneThread::apply(SceneTask&& task) {
   }
   const base::Nanos now = base::now();
   auto* command = std::get_if<scene::SceneCommand>(&task.what);
+  const bool released = command == nullptr || std::holds_alternative<scene::ReleaseForces>(*command);
   if (callbacks_.applying) callbacks_.applying(task.client, now, command);
   std::vector<scene::Notice> repeated;
   for (std::size_t i = seats_.size(); i-- > 0;) {
@@ -126,6 +127,8 @@ void SceneThread::apply(SceneTask&& task) {
     }
   }
   mergeNotices(std::move(repeated), notices_);
+  const scene::SceneConfig& config = seats_.front().device.config;
+  if (released && config.owners) config.owners->forget(task.client);
 }
 
 // Builders delay the publication of a mesh until its edits have paused.

@@ -43,6 +43,11 @@ class HeartbeatWatch {
     if (last_) last_ = now;
   }
 
+  /// The server stood still until now and may not have read heartbeats that were sent.
+  void excuseStall(base::Nanos now) noexcept {
+    if (last_ && !paused_) last_ = now;
+  }
+
   Verdict check(base::Nanos now) noexcept {
     if (!last_) return Verdict::alive;
     if (!paused_) return now - *last_ > kLimit ? Verdict::lost : Verdict::alive;

@@ -192,7 +192,7 @@ void Session::onDatagram(std::span<const std::byte> bytes, const net::Endpoint& 
 void Session::onEvent(const wire::Event& event) {
   std::visit(Overloaded{[this](const wire::MessageReceived& message) { onReceived(message); },
                         [this](const wire::Connected& connected) {
-                          spdlog::info("client {} ({}) speaks VRPN {}", id_, description_, connected.version);
+                          owner_.onNote(*this, "speaks VRPN " + std::string(connected.version));
                         },
                         [this](const wire::SenderDescribed& described) { onSender(described.name); },
                         [](const wire::TypeDescribed&) {},

@@ -37,6 +37,8 @@ class SessionOwner {
   virtual void onMessage(Session& session, const wire::MessageReceived& message, base::Nanos received) = 0;
   /// A warning for the log that a client can cause at any rate: throttle it.
   virtual void onWarning(const Session& session, const std::string& text) = 0;
+  /// As onWarning(), for what is no fault of the client.
+  virtual void onNote(const Session& session, const std::string& text) = 0;
   /// Called between slices of a long read, so that pending reports can be flushed.
   virtual void onReadSlice() = 0;
   /// All messages of one read were passed to onMessage().
@@ -105,6 +107,8 @@ class Session {
   bool holding() const noexcept { return held_ || !backlog_.empty(); }
   /// Checks the client's heartbeats.
   HeartbeatWatch::Verdict checkHeartbeat(base::Nanos now) noexcept { return heartbeats_.check(now); }
+  /// The server itself stood still until `now`: silence counts from here.
+  void excuseStall(base::Nanos now) noexcept { heartbeats_.excuseStall(now); }
   /// Closes the connection; `reason` is for the log. onClosed() follows.
   void close(const std::string& reason);
   /// The same without flushing: the client may have stopped reading.

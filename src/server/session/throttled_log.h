@@ -1,28 +1,47 @@
-// Rate-limited log for warnings that untrusted clients can cause.
+// Rate-limited log for lines that untrusted clients can cause.
 #pragma once
 
 #include <spdlog/spdlog.h>
 
+#include <cstdint>
+#include <map>
 #include <string>
 
 namespace hapticd::server {
 
-/// Logs up to five warnings per second and then only their number. One thread; call reportSuppressed() once
-/// per second.
+/// Logs up to kLinesPerSource lines per second and source, and up to kLines of all sources; of the others
+/// only the number. Addresses of this machine may cause kLocalLines besides. One thread; call
+/// reportSuppressed() once per second.
 class ThrottledLog {
  public:
-  void warn(const std::string& text) {
-    if (++lines_ <= kLinesPerSecond) spdlog::warn("{}", text);
+  static constexpr int kLinesPerSource = 20;
+  static constexpr int kLines = 60;
+  static constexpr int kLocalLines = 1000;
+
+  /// `source` is what one client cannot change at will: its number or its address.
+  void log(spdlog::level::level_enum level, const std::string& source, const std::string& text) {
+    const bool local = source.starts_with("127.");
+    if (++bySource_[source] <= (local ? kLocalLines : kLinesPerSource) && (local || lines_ < kLines)) {
+      if (!local) ++lines_;
+      spdlog::log(level, "{}", text);
+    } else {
+      ++suppressed_;
+    }
   }
+  /// A warning about a peer that is no client.
+  void warn(const std::string& text) { log(spdlog::level::warn, {}, text); }
   void reportSuppressed() {
-    if (lines_ > kLinesPerSecond)
-      spdlog::warn("{} more warnings about clients suppressed in the last second", lines_ - kLinesPerSecond);
+    if (suppressed_ > 0)
+      spdlog::warn("{} more lines about clients suppressed in the last second", suppressed_);
+    bySource_.clear();
     lines_ = 0;
+    suppressed_ = 0;
   }
 
  private:
-  static constexpr int kLinesPerSecond = 5;
+  std::map<std::string, int> bySource_;
   int lines_ = 0;
+  std::uint64_t suppressed_ = 0;
 };
 
 }  // namespace hapticd::server

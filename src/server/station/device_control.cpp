@@ -69,6 +69,12 @@ bool DeviceControl::hold(scene::ClientId client, const wire::HoldHand& wanted,
   pose.position_m = (T_world_device.inverse() * world).cwiseMax(workspace_m_.min).cwiseMin(workspace_m_.max);
   pose.orientation = (Quat(rotationOf(last)).conjugate() * orientation).normalized();
   pose.buttons = wanted.buttons;
+  // The map to the device multiplies: finite numbers may leave it infinite or undefined.
+  if (!pose.position_m.allFinite() || !pose.orientation.coeffs().allFinite()) {
+    refusal = {RefusalCode::handPoseInvalid,
+               "Hold_Hand refused: position or orientation is too large for the workspace"};
+    return false;
+  }
   holder_ = client;
   hand_->setTarget(pose);
   return true;

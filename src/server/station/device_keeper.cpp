@@ -14,12 +14,13 @@ using base::Nanos;
 
 constexpr Nanos kReopenAfter = 500'000'000;  // devices recover from shorter losses themselves
 constexpr Nanos kRetryInterval = 2'000'000'000;
+constexpr Nanos kHang = 1'000'000'000;  // a loop without a tick for so long is reported
 
 }  // namespace
 
 DeviceKeeper::DeviceKeeper(device::Device& device, realtime::Tick& tick, base::Clock& clock,
                            const DeviceKeeperOptions& options)
-    : device_(device), tick_(tick), clock_(clock), options_(options) {}
+    : device_(device), tick_(tick), clock_(clock), options_(options), watchdog_(tick, clock) {}
 
 void DeviceKeeper::start() {
   startLoop();
@@ -31,6 +32,7 @@ void DeviceKeeper::stop() noexcept {
 }
 
 void DeviceKeeper::startLoop() {
+  watchdog_.start();
   if (!device_.traits().selfPaced) {
     const realtime::ServoThreadOptions options{
         .rate_Hz = options_.rate_Hz, .request = {}, .requireRealtime = options_.requireRealtime};
@@ -56,6 +58,7 @@ void DeviceKeeper::startLoop() {
 }
 
 void DeviceKeeper::stopLoop() noexcept {
+  watchdog_.stop();
   if (device_.traits().selfPaced) {
     device_.stop();
   } else {
@@ -76,6 +79,13 @@ std::string DeviceKeeper::poll(Nanos now) {
     // The attempt owns openError_ from here on.
     if (now >= nextAttempt_) startAttempt("the device is being reopened", [this] { reopen(); });
     return refused;
+  }
+  if (watchdog_.silence() > kHang) {  // the driver may hang as well: do not call it
+    const char* const force = !watchdog_.overtook() ? "its last force stays until the device ends it"
+                              : watchdog_.canZero() ? "the watchdog has ended its force"
+                                                    : "the device or the isolation host ends its force";
+    return std::string("the servo loop hangs: no tick has ended for more than 1 s; ") + force +
+           "; restart the server if this lasts";
   }
   std::string fault = device_.faultText();
   if (!device_.lost()) {

@@ -9,6 +9,7 @@
 #include "base/clock.h"
 #include "realtime/servo/servo_thread.h"
 #include "realtime/servo/tick.h"
+#include "realtime/servo/watchdog.h"
 
 namespace hapticd::server {
 
@@ -40,6 +41,12 @@ class DeviceKeeper {
   /// running; poll() returns the result. No effect while the device is being reopened or calibrated.
   void calibrate();
 
+  /// How long no tick has ended; 0 without a loop. Any thread.
+  base::Nanos silence() const noexcept { return watchdog_.silence(); }
+
+  /// Whether forces were stopped after a suspension of the machine since the last call.
+  bool takeResumed() noexcept { return watchdog_.takeResumed(); }
+
   /// Whether the thread of the loop has realtime scheduling.
   bool realtime() const noexcept { return realtime_; }
 
@@ -56,6 +63,7 @@ class DeviceKeeper {
   realtime::Tick& tick_;
   base::Clock& clock_;
   const DeviceKeeperOptions options_;
+  realtime::Watchdog watchdog_;
   std::optional<realtime::ServoThread> servo_;
 
   realtime::ThreadSetup pacedSetup_;  // written by the first tick; read by the net thread after isPacedSetUp_

@@ -23,7 +23,7 @@ std::unique_ptr<device::Device> makeDevice(const DeviceConfig& config) {
   if (driver == nullptr) {
     throw ConfigError(prefix + "unknown driver '" + config.driver + "'; available: " + device::driverNames());
   }
-  if (config.isolate) return isolated(config);
+  if (config.isolate.value_or(driver->isolatedByDefault)) return isolated(config);
   try {
     return driver->make({.hardware = config.hardware,
                          .hand = config.hand,

@@ -165,8 +165,23 @@ void Station::stop() {
   }
 }
 
+void Station::stopForces() noexcept {
+  impl_->tick.control().stop();
+}
+
+bool Station::isStoppedAtZero() const noexcept {
+  return impl_->tick.finishedAt() == 0 || impl_->tick.stoppedAtZero();
+}
+
 std::optional<wire::Text> Station::checkHealth() {
   Impl& impl = *impl_;
+  if (impl.keeper.takeResumed()) {
+    spdlog::warn("device '{}': the machine was suspended; forces are stopped until re-armed",
+                 impl.config.names.front());
+    return wire::Text{.severity = wire::kTextError,
+                      .level = 0,
+                      .text = "the machine was suspended: forces are stopped until re-armed"};
+  }
   std::string text = impl.keeper.poll(base::now());
   if (text == impl.fault) return std::nullopt;
   impl.fault = std::move(text);
@@ -244,8 +259,15 @@ void Station::Impl::onPublished(const scene::SceneSnapshot& snapshot) {
   for (const auto& object : snapshot.objects) now.emplace_back(object->id, object->mesh->topology);
   if (now == plannedFor) return;
   plannedFor = std::move(now);
-  hand->setPath(std::make_shared<const device::WaypointPath>(
-      planStrokes(snapshot, workspaceOf(config, profile), base::now()), device::WaypointPath::Repeat::yes));
+  try {
+    hand->setPath(std::make_shared<const device::WaypointPath>(
+        planStrokes(snapshot, workspaceOf(config, profile), base::now()), device::WaypointPath::Repeat::yes));
+  } catch (const std::exception& error) {
+    // The scene is published all the same. Once for each change of its objects.
+    spdlog::warn(
+        "device '{}': the scripted hand finds no path over this scene and keeps the previous one: {}",
+        config.names.front(), error.what());
+  }
 }
 
 DeviceStatus Station::status() const {

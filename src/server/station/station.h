@@ -35,6 +35,11 @@ class Station {
   /// Stops the force, ends the loop and closes the device. Idempotent.
   void stop();
 
+  /// Any thread: stops the forces until a re-arm.
+  void stopForces() noexcept;
+  /// Any thread: the servo has written zero since stopForces(), or has not run.
+  bool isStoppedAtZero() const noexcept;
+
   /// Reopens a lost device; logs changes of its fault and returns the text for the clients. Call several
   /// times per second.
   std::optional<wire::Text> checkHealth();

@@ -105,14 +105,14 @@ void Station::Impl::on(const Request& request, const wire::QueryCapabilities&) {
 }
 
 void Station::Impl::on(const Request& request, const wire::StopForces&) {
-  spdlog::warn("client {} ({}) stops the forces of '{}'", request.session.id(), request.session.description(),
-               config.names.front());
+  request.session.logWarning(
+      fmt::format("({}) stops the forces of '{}'", request.session.description(), config.names.front()));
   control.stopForces(request.order);
 }
 
 void Station::Impl::on(const Request& request, const wire::RearmForces&) {
-  spdlog::warn("client {} ({}) re-arms the forces of '{}'", request.session.id(),
-               request.session.description(), config.names.front());
+  request.session.logWarning(
+      fmt::format("({}) re-arms the forces of '{}'", request.session.description(), config.names.front()));
   pendingRearms.insert(&request.session);
   scene.whenPublished(request.session.id(),
                       [this, session = &request.session, name = request.name, order = request.order] {

@@ -46,6 +46,48 @@ TEST(SimulatedDevice, RestsAtTheCentreWithoutAPath) {
   EXPECT_TRUE(device.profile().startsArmed);
 }
 
+TEST(SimulatedDevice, NoPoseAndNoForceLeavesItWithoutAPosition) {
+  SimulatedDevice device;
+  DeviceState state;
+  Nanos t = 0;
+  const auto run = [&] {
+    for (int i = 0; i < 1000; ++i) device.read(t += kMs, state);
+    return state.position_m.allFinite() && state.velocity_m_per_s.allFinite() &&
+           state.orientation.coeffs().allFinite();
+  };
+  HandPose pose;
+  pose.position_m = Vec3(0.01, NAN, 0);
+  device.setTarget(pose);
+  EXPECT_TRUE(run());
+  EXPECT_EQ(state.position_m, Vec3::Zero()) << "as before";
+  pose.position_m = Vec3(0.01, 0, 0);
+  pose.orientation.coeffs().setConstant(NAN);
+  device.setTarget(pose);
+  EXPECT_TRUE(run());
+  EXPECT_FALSE(device.write(Vec3(0, INFINITY, 0)));
+  EXPECT_TRUE(run());
+  pose.orientation.setIdentity();
+  device.setTarget(pose);
+  EXPECT_TRUE(run());
+  EXPECT_NEAR(state.position_m.x(), 0.01, 1e-6);
+}
+
+TEST(SimulatedDevice, AForceCanBeEndedFromAnotherThread) {
+  SimulatedDevice device;
+  DeviceState state;
+  Nanos t = 0;
+  const auto restsAt = [&] {
+    for (int i = 0; i < 3000; ++i) device.read(t += kMs, state);
+    return state.position_m.y();
+  };
+  device.write(Vec3(0, 3, 0));
+  EXPECT_NEAR(restsAt(), 3 / kHand_N_per_m, 1e-6);
+  EXPECT_TRUE(device.zeroFromOtherThread());
+  EXPECT_NEAR(restsAt(), 0, 1e-6);
+  device.write(Vec3(0, 3, 0));
+  EXPECT_NEAR(restsAt(), 3 / kHand_N_per_m, 1e-6);
+}
+
 TEST(SimulatedDevice, SettlesAtItsPath) {
   SimulatedDevice device;
   device.setPath(pressing(0.02));

@@ -41,7 +41,7 @@ class DeviceFault : public InContact, public testing::WithParamInterface<Case> {
 class OpenHapticsFault : public DeviceFault {};
 
 TEST_P(OpenHapticsFault, EndsInNoForceAndHeals) {
-  serve({"--device", "openhaptics"}, {"HAPTICD_HDAPI_LIB=" MOCK_HD});
+  serve({"--device", "openhaptics", "--in-process"}, {"HAPTICD_HDAPI_LIB=" MOCK_HD});
   endsInNoForceAndHeals();
 }
 
@@ -61,7 +61,7 @@ INSTANTIATE_TEST_SUITE_P(
     kName);
 
 TEST_F(InContact, AStylusThatIsPutIntoItsInkwellIsCalibratedThere) {
-  serve({"--device", "openhaptics"}, {"HAPTICD_HDAPI_LIB=" MOCK_HD});
+  serve({"--device", "openhaptics", "--in-process"}, {"HAPTICD_HDAPI_LIB=" MOCK_HD});
   strike(mock::kNotCalibrated, 100);
   expectWords("not calibrated: put the stylus into the inkwell");
   visitor->forget();
@@ -76,7 +76,7 @@ TEST_F(InContact, AStylusThatIsPutIntoItsInkwellIsCalibratedThere) {
 
 // The library tells an identical error only once in its process.
 TEST_F(InContact, ASecondPullOfTheCableIsNoticedWithoutAnError) {
-  serve({"--device", "openhaptics"}, {"HAPTICD_HDAPI_LIB=" MOCK_HD});
+  serve({"--device", "openhaptics", "--in-process"}, {"HAPTICD_HDAPI_LIB=" MOCK_HD});
   strike(mock::kUnplugged, 1);
   expectWords("HD_COMM_ERROR");
   heal(true);
@@ -228,7 +228,8 @@ TEST(InitFailure, EndsTheServerWithWords) {
     std::string words;
   };
   const std::vector<Start> starts{
-      {{"--device", "openhaptics"}, "no OpenHaptics device opens: the default device: HD_DEVICE_FAULT"},
+      {{"--device", "openhaptics", "--in-process"},
+       "no OpenHaptics device opens: the default device: HD_DEVICE_FAULT"},
       {{"--device", "openhaptics", "--isolate"},
        "no OpenHaptics device opens: the default device: HD_DEVICE"},
       {{"--device", "forcedimension"}, "Force Dimension device 0 does not open: mock error"},

@@ -28,6 +28,9 @@ class InContact : public testing::Test {
     server.emplace(work, arguments, environment);
     const std::string address = server->address();
     ASSERT_FALSE(address.empty()) << server->log();
+    visit(address);
+  }
+  void visit(const std::string& address) {
     visitor.emplace(address);
     scene.upload(visitor->client());
     ASSERT_TRUE(visitor->until([&] {

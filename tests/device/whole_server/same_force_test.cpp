@@ -136,7 +136,7 @@ class SameForce : public testing::Test {
 };
 
 TEST_F(SameForce, OpenHaptics) {
-  serve({"--device", "openhaptics", "--enable-forces"},
+  serve({"--device", "openhaptics", "--in-process", "--enable-forces"},
         {"HAPTICD_HDAPI_LIB=" MOCK_HD, "HAPTICD_MOCK_ARM=" + work.file("arm")});
   compare("openhaptics", true);
 }

@@ -77,7 +77,7 @@ bool eventually(const std::function<bool()>& condition) {
 }
 
 ServerProcess::ServerProcess(const WorkDirectory& work, const std::vector<std::string>& arguments,
-                             const std::vector<std::string>& environment)
+                             const std::vector<std::string>& environment, int output)
     : log_(work.file("log")) {
   std::vector<std::string> words{HAPTICD, "serve", "--listen", "127.0.0.1:0", "--allow-no-rt"};
   words.insert(words.end(), arguments.begin(), arguments.end());
@@ -88,7 +88,12 @@ ServerProcess::ServerProcess(const WorkDirectory& work, const std::vector<std::s
   }
   posix_spawn_file_actions_t files;
   posix_spawn_file_actions_init(&files);
-  posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, log_.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0600);
+  if (output >= 0) {
+    posix_spawn_file_actions_adddup2(&files, output, STDOUT_FILENO);
+  } else {
+    posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, log_.c_str(), O_WRONLY | O_CREAT | O_APPEND,
+                                     0600);
+  }
   posix_spawn_file_actions_adddup2(&files, STDOUT_FILENO, STDERR_FILENO);
   const int error =
       posix_spawn(&id_, HAPTICD, &files, nullptr, pointers(words).data(), pointers(settings).data());

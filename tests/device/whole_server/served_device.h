@@ -55,8 +55,9 @@ bool eventually(const std::function<bool()>& condition);
 /// `hapticd serve` with these arguments and NAME=VALUE settings.
 class ServerProcess {
  public:
+  /// `output`: a descriptor for its output instead of the file of log().
   ServerProcess(const WorkDirectory& work, const std::vector<std::string>& arguments,
-                const std::vector<std::string>& environment);
+                const std::vector<std::string>& environment, int output = -1);
   ~ServerProcess();
   ServerProcess(const ServerProcess&) = delete;
   ServerProcess& operator=(const ServerProcess&) = delete;

@@ -39,7 +39,7 @@ class AfterTheServer : public InContact, public testing::WithParamInterface<End>
 };
 
 TEST_P(AfterTheServer, OpenHaptics) {
-  serve({"--device", "openhaptics"}, {"HAPTICD_HDAPI_LIB=" MOCK_HD});
+  serve({"--device", "openhaptics", "--in-process"}, {"HAPTICD_HDAPI_LIB=" MOCK_HD});
   endServer();
   EXPECT_EQ(arm->closed, GetParam().inOrder ? 1 : 0);
   // Nobody is left to take the last force back: that is the vendor's driver's then.
@@ -47,7 +47,7 @@ TEST_P(AfterTheServer, OpenHaptics) {
 }
 
 TEST_P(AfterTheServer, OpenHapticsInAProcessOfItsOwn) {
-  serve({"--device", "openhaptics", "--isolate"}, {"HAPTICD_HDAPI_LIB=" MOCK_HD});
+  serve({"--device", "openhaptics"}, {"HAPTICD_HDAPI_LIB=" MOCK_HD});  // the default
   const std::int64_t gone = endServer();
   EXPECT_TRUE(eventually([&] { return arm->closed == 1; })) << "closed in order";
   EXPECT_TRUE(arm.left().isZero());

@@ -156,6 +156,65 @@ TEST_P(FreeForcesTest, effects_end_and_ramp_out) {
     EXPECT_NEAR(at({0, 0, 0}).force_N.x(), 1.5 * std::max(0.0, 1 - i / 250.0), 1e-9);
 }
 
+// The scene thread is busy: no snapshot shows that the owner is gone.
+TEST_P(FreeForcesTest, forces_ramp_out_when_their_owner_is_gone_though_no_snapshot_shows_it) {
+  const auto owner = std::make_shared<scene::ForceOwner>();
+  scene::Effect e = effect(EffectType::constant);
+  e.direction = Vec3::UnitX();
+  e.owner = owner;
+  run(e);
+  scene::ForceField field;
+  field.origin = units() * offset();
+  field.force_N = Vec3(0, 1, 0);
+  field.radius = units();
+  field.owner = owner;
+  scene.fields = {field};
+  scene.buzz = scene::Buzz{.force_N = Vec3(0, 0, 1),
+                           .angularFrequency_rad_per_s = 0,
+                           .duration = toNanos(9),
+                           .start = 1,
+                           .owner = owner};
+  scene.buzz->angularFrequency_rad_per_s = M_PI * 500;  // every other tick at a peak, to either side
+  scene.planes = {floor(0.001)};
+  scene.planes[0].owner = owner;
+  start({0, 0, 0});
+  EXPECT_TRUE(hand->now().touching || at({0, 0, 0.0009}).touching);
+  owner->leave(hand->time());               // that of the next tick
+  owner->leave(hand->time() + toNanos(1));  // the first time counts
+  for (int i = 1; i <= 260; ++i) {
+    const Rendering& now = at({0, 0, 0});
+    const double left = std::clamp(1 - (i - 51) / 200.0, 0.0, 1.0);
+    EXPECT_NEAR(now.force_N.x(), 1.5 * left, 1e-9) << i;
+    EXPECT_NEAR(now.force_N.y(), 1 * left, 1e-9) << i;
+    if (i >= 251) {
+      EXPECT_EQ(now.force_N.norm(), 0) << i;
+    }
+  }
+}
+
+// In time, its release alone counts, as in a recording that is rendered again. Late, the force goes on
+// falling.
+TEST_P(FreeForcesTest, a_release_by_the_scene_joins_the_one_by_the_owner) {
+  for (const int late : {20, 100}) {
+    const auto owner = std::make_shared<scene::ForceOwner>();
+    scene::Effect e = effect(EffectType::constant);
+    e.direction = Vec3::UnitX();
+    e.owner = owner;
+    run(e);
+    start({0, 0, 0});
+    owner->leave(hand->time());
+    for (int i = 1; i < 400; ++i) {
+      if (i == late) {
+        scene.effects[0].releasing = true;
+        hand->show(scene.snapshot());
+      }
+      const double bySnapshot = i < late ? 1 : std::max(0.0, 1 - (i - late) / 250.0);
+      const double byOwner = late <= 50 ? 1 : std::clamp(1 - (i - 51) / 200.0, 0.0, 1.0);
+      EXPECT_NEAR(at({0, 0, 0}).force_N.x(), 1.5 * std::min(bySnapshot, byOwner), 1e-9) << late << " " << i;
+    }
+  }
+}
+
 // A start of a running effect restarts its phase and its duration.
 TEST_P(FreeForcesTest, restart_begins_anew) {
   scene::Effect e = effect(EffectType::motorVibration);

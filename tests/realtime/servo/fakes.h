@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -23,6 +24,7 @@ class FakeDevice final : public device::Device {
   const device::DeviceProfile& profile() const noexcept override { return profile_; }
   bool read(base::Nanos now, device::DeviceState& out) noexcept override {
     ++reads;
+    if (onRead) onRead();
     if (!gives) return false;
     out = state;
     out.time = now;
@@ -34,7 +36,14 @@ class FakeDevice final : public device::Device {
     if (onWrite != nullptr) onWrite(context);
     return takes;
   }
+  bool zeroFromOtherThread() noexcept override {
+    ++zeroes;
+    written_N.setZero();
+    return true;
+  }
 
+  std::function<void()> onRead;
+  int zeroes = 0;
   device::DeviceState state;
   bool gives = true;
   bool takes = true;

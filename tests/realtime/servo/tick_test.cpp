@@ -7,7 +7,9 @@
 #include <limits>
 #include <vector>
 
+#include "base/fake_world.h"
 #include "realtime/servo/fakes.h"
+#include "realtime/servo/watchdog.h"
 #include "support/milliseconds.h"
 
 namespace hapticd::realtime {
@@ -189,6 +191,125 @@ TEST_F(TickTest, FlushesDenormalsInsideAloneAndLeavesTheCallerAsItWas) {
   run(kMs);
   EXPECT_EQ(inside, 0.0);
   EXPECT_GT(small / 2, 0.0);
+}
+
+// The tests of old forces render 2 N along y.
+class OldForceTest : public TickTest {
+ protected:
+  OldForceTest() {
+    tick.snapshots().publish(constantForce(1, Vec3(0, 2, 0)));
+    run(1000 * kMs);
+    EXPECT_NEAR(device.written_N.y(), 2, 1e-9);
+  }
+};
+
+TEST_F(OldForceTest, ATickThatTakesLongerThanThreeMillisecondsWritesZeroAndForcesRampIn) {
+  device.onRead = [&] { clock.advance(kOldestForce + 1); };
+  const TickReport late = run(kMs);
+  EXPECT_TRUE(device.written_N.isZero(0));
+  EXPECT_TRUE(late.force_N.isZero(0));
+  EXPECT_NE(late.guard.active & bit(Trip::late), 0U);
+  EXPECT_EQ(late.guard.counts[static_cast<std::size_t>(Trip::late)], 1U);
+  device.onRead = nullptr;
+  EXPECT_LT(run(kMs).force_N.norm(), 0.01);
+  EXPECT_NEAR(run(250 * kMs).force_N.y(), 1, 0.05);
+  EXPECT_NEAR(run(300 * kMs).force_N.y(), 2, 1e-9);
+}
+
+TEST_F(OldForceTest, ATickThatTakesThreeMillisecondsIsInTime) {
+  device.onRead = [&] { clock.advance(kOldestForce); };
+  EXPECT_NEAR(run(kMs).force_N.y(), 2, 1e-9);
+}
+
+TEST_F(OldForceTest, AnOvertakenTickWritesZero) {
+  device.onRead = [&] { EXPECT_TRUE(tick.overtake()); };
+  EXPECT_TRUE(run(kMs).force_N.isZero(0));
+  EXPECT_TRUE(device.written_N.isZero(0));
+  EXPECT_EQ(device.zeroes, 1);
+  device.onRead = nullptr;
+  EXPECT_LT(run(kMs).force_N.norm(), 0.01) << "forces ramp in";
+}
+
+TEST_F(OldForceTest, ZeroFollowsAWriteThatWasOvertaken) {
+  struct Late {
+    FakeDevice* device;
+    Tick* tick;
+  } late{&device, &tick};
+  device.context = &late;
+  device.onWrite = [](void* context) {
+    const Late& now = *static_cast<Late*>(context);
+    if (now.device->zeroes > 0) return;
+    // As if the force reached the motors after the watchdog's zero.
+    const Vec3 old = now.device->written_N;
+    now.tick->overtake();
+    now.device->written_N = old;
+  };
+  const int before = device.writes;
+  EXPECT_TRUE(run(kMs).force_N.isZero(0));
+  EXPECT_EQ(device.writes, before + 2);
+  EXPECT_TRUE(device.written_N.isZero(0));
+}
+
+TEST_F(OldForceTest, ATickMoreThanTwentyMillisecondsLateGivesNoForce) {
+  EXPECT_TRUE(runLate(30 * kMs).force_N.isZero(0));
+  EXPECT_EQ(tick.last().guard.latched, 0U);
+  EXPECT_LT(run(2 * kMs).force_N.norm(), 0.02);
+}
+
+TEST_F(OldForceTest, ReportsThatAStopHasReachedTheMotors) {
+  EXPECT_FALSE(tick.stoppedAtZero());
+  tick.control().stop();
+  EXPECT_FALSE(tick.stoppedAtZero());
+  run(kMs);
+  EXPECT_TRUE(tick.stoppedAtZero());
+}
+
+class WatchdogTest : public OldForceTest {
+ protected:
+  base::FakeWorld world;
+  static inline Nanos suspended = 0;
+  Watchdog watchdog{tick, clock, []() noexcept { return suspended; }};
+};
+
+TEST_F(WatchdogTest, EndsTheForceAfterTwentyMillisecondsOfSilence) {
+  watchdog.start();
+  run(kMs);
+  for (Nanos t = 0; t <= 20 * kMs; t += kMs) {
+    clock.advance(kMs);
+    run(kMs);
+    world.threads.runUntil(world.clock.now() + kMs);
+  }
+  EXPECT_EQ(device.zeroes, 0) << "ticks end";
+  clock.advance(Watchdog::kSilence);
+  world.threads.runUntil(world.clock.now() + Watchdog::kStep);
+  EXPECT_EQ(device.zeroes, 0);
+  clock.advance(1);
+  world.threads.runUntil(world.clock.now() + Watchdog::kStep);
+  EXPECT_EQ(device.zeroes, 1);
+  EXPECT_TRUE(watchdog.overtook());
+  EXPECT_TRUE(watchdog.canZero());
+  EXPECT_GT(watchdog.silence(), Watchdog::kSilence);
+  world.threads.runUntil(world.clock.now() + 2 * Watchdog::kStep);
+  EXPECT_EQ(device.zeroes, 3) << "again in every step";
+  run(kMs);
+  world.threads.runUntil(world.clock.now() + Watchdog::kStep);
+  EXPECT_FALSE(watchdog.overtook());
+  watchdog.stop();
+  EXPECT_EQ(watchdog.silence(), 0);
+  clock.advance(1000 * kMs);
+  EXPECT_EQ(world.threads.nextDeadline(), std::nullopt);
+}
+
+TEST_F(WatchdogTest, StopsTheForcesAfterASuspensionOfTheMachine) {
+  watchdog.start();
+  world.threads.runUntil(world.clock.now() + Watchdog::kStep);
+  EXPECT_FALSE(tick.control().stopped());
+  EXPECT_FALSE(watchdog.takeResumed());
+  suspended += 60'000 * kMs;
+  world.threads.runUntil(world.clock.now() + Watchdog::kStep);
+  EXPECT_TRUE(tick.control().stopped());
+  EXPECT_TRUE(watchdog.takeResumed());
+  EXPECT_FALSE(watchdog.takeResumed());
 }
 
 }  // namespace

@@ -1,13 +1,18 @@
 #include "server/config/config.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstdlib>
 #include <filesystem>
 #include <sstream>
 
+#include "device/drivers/drivers.h"
+
 namespace hapticd::server {
 namespace {
+
+using testing::HasSubstr;
 
 std::string errorOf(const std::string& text) {
   try {
@@ -185,6 +190,8 @@ ServerConfig unusual() {
   config.record = "session.haptics";
   config.http = "10.0.0.1:9000";
   config.httpAllow = {"lab7"};
+  config.connections = 12;
+  config.connectionsPerAddress = 7;
   DeviceConfig device;
   device.names = {"Left \"hand\" \\", "Tracker0"};
   device.driver = "evdev";
@@ -234,6 +241,37 @@ TEST(Config, ADriverWithoutAVendorLibraryCannotBeIsolated) {
       errorOf("[[device]]\nisolate = true\n"),
       "test.toml:2: device 'Phantom': the driver 'simulated' loads no vendor library and cannot be isolated; "
       "remove isolate");
+}
+
+TEST(Config, IsolationIsTheDriversChoiceUnlessConfigured) {
+  EXPECT_EQ(parseConfig("", "test").devices.front().isolate, std::nullopt);
+  EXPECT_EQ(
+      parseConfig("[[device]]\ndriver = \"openhaptics\"\nisolate = false\n", "test").devices.front().isolate,
+      false);
+  EXPECT_TRUE(device::findDriver("openhaptics")->isolatedByDefault) << "HDAPI has no watchdog";
+}
+
+TEST(Config, WhatCannotWorkIsRefused) {
+  EXPECT_THAT(errorOf("listen = \"127.0.0.1:4000\"\nhttp = \"127.0.0.1:4000\"\n"),
+              HasSubstr("http: \"127.0.0.1:4000\" is the port of listen"));
+  EXPECT_THAT(errorOf("listen = \"0.0.0.0:4000\"\nhttp = \"127.0.0.1:4000\"\n"),
+              HasSubstr("use another port"));
+  EXPECT_EQ(errorOf("listen = \"127.0.0.1:4000\"\nhttp = \"127.0.0.2:4000\"\n"), "");
+  EXPECT_EQ(errorOf("listen = \"127.0.0.1:0\"\nhttp = \"127.0.0.1:0\"\n"), "");
+  EXPECT_THAT(errorOf("[[device]]\nworkspace = [0, 0, 0, 1e-300, 100, 100]\n"),
+              HasSubstr("workspace: an edge of 1e-300 mm is too short; use 1 mm or more"));
+}
+
+TEST(Config, DevicesThatShareASceneShareItsControl) {
+  const std::string shared = "[[device]]\nname = \"A\"\nscene = \"s\"\n";
+  const std::string other = "[[device]]\nname = \"B\"\nscene = \"s\"\n";
+  EXPECT_EQ(errorOf(shared + other), "");
+  EXPECT_THAT(errorOf(shared + other + "control = \"first\"\n"),
+              HasSubstr("all devices of the scene 's' must have the same control"));
+  const std::string listed = "control = \"list\"\ncontrol_list = [\"10.0.0.5\"]\n";
+  EXPECT_EQ(errorOf(shared + listed + other + listed), "");
+  EXPECT_THAT(errorOf(shared + listed + other + "control = \"list\"\ncontrol_list = [\"10.0.0.6\"]\n"),
+              HasSubstr("must have the same control_list"));
 }
 
 TEST(Config, AWrittenConfigurationReadsBackEqual) {

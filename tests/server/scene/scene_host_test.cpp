@@ -9,6 +9,7 @@
 #include <latch>
 #include <mutex>
 
+#include "base/world.h"
 #include "wire/codec.h"
 
 namespace hapticd::server {
@@ -179,6 +180,38 @@ TEST_F(SceneHostTest, TheForcesOfALostClientEndBeforeItsQueuedCommandsAreApplied
   after = slot_.take();
   ASSERT_NE(after, nullptr);
   EXPECT_TRUE(after->fields.empty() || after->fields[0].releasing);
+}
+
+TEST_F(SceneHostTest, TheServoLearnsAtOnceThatAClientIsGoneHoweverBusyTheSceneIs) {
+  const wire::ForceField field{.origin = {0, 0, 0}, .force = {0, 1, 0}, .jacobian = {}, .radius = 10};
+  ASSERT_TRUE(give(1, field));
+  bool reached = false;
+  host_.whenPublished(1, [&] { reached = true; });
+  net_.until([&] { return reached; });
+  const auto owner = slot_.take()->fields[0].owner;
+  const base::Nanos before = base::now();
+  const base::Nanos whole = scene::ForceOwner::kGrace + scene::ForceOwner::kRampOut;
+  EXPECT_EQ(owner->share(-1, before + 2 * whole), 1);
+
+  close();
+  host_.clientGone(1);
+  EXPECT_EQ(owner->share(-1, base::now() + whole), 0);
+  EXPECT_EQ(owner->share(-1, before), 1);
+}
+
+TEST_F(SceneHostTest, AClientThatStaysExertsForceAgainAfterARelease) {
+  const wire::ForceField field{.origin = {0, 0, 0}, .force = {0, 1, 0}, .jacobian = {}, .radius = 10};
+  const auto felt = [&] {
+    EXPECT_TRUE(give(1, field));
+    bool reached = false;
+    host_.whenPublished(1, [&] { reached = true; });
+    net_.until([&] { return reached; });
+    const scene::SceneSnapshot* now = slot_.take();
+    return now->fields[0].owner->share(-1, base::now() + 1'000'000'000) > 0;
+  };
+  EXPECT_TRUE(felt());
+  host_.releaseForces(1);
+  EXPECT_TRUE(felt());
 }
 
 TEST_F(SceneHostTest, AMalformedMessageIsNamedAndChangesNothing) {

@@ -14,14 +14,14 @@ SceneParcel parcel(scene::ClientId client, std::size_t bytes) {
   return parcel;
 }
 
-TEST(SceneQueueTest, ParcelsOfAllClientsAreTakenInOrderOfArrival) {
+TEST(SceneQueueTest, ClientsTakeTurnsAndEachKeepsItsOrder) {
   SceneQueue queue;
   queue.push(parcel(1, 10));
-  queue.push(parcel(2, 20));
   queue.push(parcel(1, 30));
-  EXPECT_EQ(queue.take()->bytes, 10U);
-  EXPECT_EQ(queue.take()->bytes, 20U);
-  EXPECT_EQ(queue.take()->bytes, 30U);
+  queue.push(parcel(1, 50));
+  queue.push(parcel(2, 20));
+  queue.push(parcel(2, 40));
+  for (const std::size_t bytes : {10U, 20U, 30U, 40U, 50U}) EXPECT_EQ(queue.take()->bytes, bytes);
   EXPECT_FALSE(queue.take());
   EXPECT_TRUE(queue.empty());
 }

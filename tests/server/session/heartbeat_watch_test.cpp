@@ -71,5 +71,15 @@ TEST(HeartbeatWatchTest, PausingTwiceCountsOnce) {
   EXPECT_EQ(watch.check(5001 * kMillisecond), Verdict::excused);
 }
 
+TEST(HeartbeatWatchTest, AStallOfTheServerIsNoSilenceOfTheClient) {
+  HeartbeatWatch watch;
+  watch.excuseStall(0);
+  EXPECT_EQ(watch.check(10 * HeartbeatWatch::kLimit), HeartbeatWatch::Verdict::alive) << "it never opted in";
+  watch.beat(0);
+  watch.excuseStall(2 * HeartbeatWatch::kLimit);
+  EXPECT_EQ(watch.check(3 * HeartbeatWatch::kLimit), HeartbeatWatch::Verdict::alive);
+  EXPECT_EQ(watch.check(3 * HeartbeatWatch::kLimit + 1), HeartbeatWatch::Verdict::lost);
+}
+
 }  // namespace
 }  // namespace hapticd::server

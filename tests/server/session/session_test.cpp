@@ -24,6 +24,7 @@ class CountingOwner final : public SessionOwner {
     ++messages;
   }
   void onWarning(const Session& /*session*/, const std::string& /*text*/) override {}
+  void onNote(const Session& /*session*/, const std::string& /*text*/) override {}
   void onReadSlice() override {
     mostBetween = std::max(mostBetween, messages - last);
     last = messages;

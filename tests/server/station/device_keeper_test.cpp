@@ -55,11 +55,16 @@ class ScriptedDevice final : public device::Device {
   const device::DeviceProfile& profile() const noexcept override { return profile_; }
   bool read(Nanos now, device::DeviceState& state) noexcept override {
     if (!isOpen) ++readsWhileClosed;
+    while (readBlocks) std::this_thread::sleep_for(1ms);
     ++reads;
     state.time = now;
     return true;
   }
   bool write(const Vec3& /*force_N*/) noexcept override { return true; }
+  bool zeroFromOtherThread() noexcept override {
+    ++zeroes;
+    return true;
+  }
   void calibrate() override {
     ++calibrations;
     while (calibrationBlocks) std::this_thread::sleep_for(1ms);
@@ -94,6 +99,8 @@ class ScriptedDevice final : public device::Device {
 
   std::atomic<int> opens{0}, closes{0}, reads{0}, readsWhileClosed{0};
   std::atomic<bool> isOpen{false}, isLost{false}, openBlocks{false}, startFails{false};
+  std::atomic<int> zeroes{0};
+  std::atomic<bool> readBlocks{false};
   std::atomic<int> calibrations{0};
   std::atomic<bool> isCalibrated{true}, calibrationBlocks{false}, calibrationFails{false};
 
@@ -185,6 +192,21 @@ TEST_P(KeeperTest, ReportsAFailedCalibrationUntilOneSucceeds) {
   EXPECT_TRUE(eventually([&] { return keeper_.poll(1100 * kMs).empty(); }));
   device_.isCalibrated = false;
   EXPECT_EQ(keeper_.poll(1200 * kMs), "not calibrated");
+}
+
+TEST_P(KeeperTest, AHangingLoopGivesNoForceAndIsReported) {
+  keeper_.start();
+  EXPECT_TRUE(loopRuns());
+  device_.readBlocks = true;
+  EXPECT_TRUE(eventually([&] { return device_.zeroes > 3; }));
+  EXPECT_TRUE(eventually([&] {
+    return keeper_.poll(clock_.now()) ==
+           "the servo loop hangs: no tick has ended for more than 1 s; the watchdog has ended its force; "
+           "restart the server if this lasts";
+  }));
+  device_.readBlocks = false;
+  EXPECT_TRUE(eventually([&] { return keeper_.poll(clock_.now()).empty(); }));
+  EXPECT_TRUE(loopRuns());
 }
 
 TEST_P(KeeperTest, AShortLossIsReportedWithoutReopening) {

@@ -144,6 +144,12 @@ TEST_F(HoldTest, RefusesInvalidPosesAndRealDevices) {
   EXPECT_EQ(refusal_.code, RefusalCode::handPoseInvalid);
   EXPECT_FALSE(control_.hold(1, {.hold = 1, .orientation = {0, 0, 0, 0}}, last_, refusal_));
   EXPECT_NE(refusal_.text.find("zero quaternion"), std::string::npos);
+  // A small turned map of the workspace makes infinite terms of finite numbers, and their sum undefined.
+  last_.tick = 1;
+  last_.T_world_device.linear() =
+      1e-3 * Eigen::AngleAxisd(M_PI / 4, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  EXPECT_FALSE(control_.hold(1, {.hold = 1, .position = {1.7e308, 1.7e308, 0}}, last_, refusal_));
+  EXPECT_EQ(refusal_.code, RefusalCode::handPoseInvalid);
   DeviceControl real(guard_, nullptr, {});
   EXPECT_FALSE(real.canBeHeld());
   EXPECT_FALSE(real.hold(1, {.hold = 1}, last_, refusal_));

@@ -1,0 +1,66 @@
+// Tells the servo at once that the owner of a force is gone, however busy the scene thread is.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <limits>
+#include <map>
+#include <memory>
+#include <mutex>
+
+#include "base/time.h"
+#include "scene/notice.h"
+
+namespace hapticd::scene {
+
+/// A client as its forces know it. Any thread, lock-free.
+class ForceOwner {
+ public:
+  /// The client's forces must end; the first call counts. Servo clock.
+  void leave(base::Nanos now) noexcept {
+    base::Nanos here = kHere;
+    leftAt_.compare_exchange_strong(here, now, std::memory_order_acq_rel);
+  }
+  /// The share of its forces that is left: 1 while it is here and for kGrace, in which the scene thread
+  /// usually releases them itself, then down to 0 within kRampOut. `releasedAt` is when the scene thread
+  /// began to release the force, negative when it has not: a release in time needs no help.
+  double share(base::Nanos releasedAt, base::Nanos now) const noexcept {
+    const base::Nanos left = leftAt_.load(std::memory_order_acquire);
+    if (left == kHere || (releasedAt >= 0 && releasedAt <= left + kGrace)) return 1;
+    return std::clamp(1 - base::toSeconds(now - left - kGrace) / base::toSeconds(kRampOut), 0.0, 1.0);
+  }
+
+  static constexpr base::Nanos kGrace = 50'000'000;
+  static constexpr base::Nanos kRampOut = 200'000'000;
+
+ private:
+  static constexpr base::Nanos kHere = std::numeric_limits<base::Nanos>::max();
+  std::atomic<base::Nanos> leftAt_{kHere};
+};
+
+/// The owners of one scene, by client. Any thread but a servo's.
+class ForceOwners {
+ public:
+  std::shared_ptr<const ForceOwner> of(ClientId client) { return find(client); }
+  /// The client left, or its forces must end: those that it has commanded until now, also in commands that
+  /// still wait.
+  void leave(ClientId client, base::Nanos now) { find(client)->leave(now); }
+  /// The scene thread has released the client's forces: later commands of this client exert force again.
+  void forget(ClientId client) {
+    const std::lock_guard lock(mutex_);
+    owners_.erase(client);
+  }
+
+ private:
+  std::shared_ptr<ForceOwner> find(ClientId client) {
+    const std::lock_guard lock(mutex_);
+    auto& owner = owners_[client];
+    if (!owner) owner = std::make_shared<ForceOwner>();
+    return owner;
+  }
+
+  std::mutex mutex_;
+  std::map<ClientId, std::shared_ptr<ForceOwner>> owners_;
+};
+
+}  // namespace hapticd::scene
