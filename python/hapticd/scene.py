@@ -57,15 +57,20 @@ class Reports(enum.IntFlag):
     """Kinds of reports to subscribe to; combine them by |. Force errors, guard states and texts are always sent."""
 
     NONE = 0
-    TRACKER = 1  # poses and velocities
+    PROXY = 1  # poses of sensor 0, the proxy
     FORCE = 2  # force, contact point, depth, touching, touched object, angle
     BUTTON = 4
-    ANALOG = 8
+    ANALOG = 8  # the opening of a gripper
     TICK = 16
     CONTACTS = 32
     HAND = 64  # HandReport
-    USUAL = 15  # what a client without a subscription receives
-    ALL = 127
+    CONTACT_POINT = 128  # poses of sensor 2, the surface contact point
+    TOUCH_BUTTON = 256  # contact as one more button than the device has
+    CONTACT_ANALOG = 512  # contact as analog channels
+    HIP = 1024  # poses and velocities of sensor 1, the device itself
+    TRACKER = PROXY | HIP | CONTACT_POINT
+    USUAL = TRACKER | FORCE | BUTTON | ANALOG  # what a client without a subscription receives
+    ALL = 2047
 
 
 class Effect(NamedTuple):
