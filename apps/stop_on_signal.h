@@ -20,8 +20,8 @@ class StopOnSignal {
   StopOnSignal(const StopOnSignal&) = delete;
   StopOnSignal& operator=(const StopOnSignal&) = delete;
 
-  /// Handles signals in a separate thread that waits for no other, until finish(). A server that has not ended 10 s
-  /// after a signal is ended by _exit().
+  /// Handles signals in a separate thread that waits for no other, until finish(). A server that has not
+  /// ended 10 s after a signal is ended by _exit().
   void watch(server::Server& server);
   /// Its thread uses the server no more. Idempotent; the destructor calls it.
   void finish();

@@ -1,6 +1,7 @@
 #include "hapticd/trips.h"
 #include "wire/describe.h"
 #include "wire/fields.h"
+#include "wire/named_bits.h"
 
 namespace hapticd::wire {
 
@@ -136,21 +137,9 @@ std::string messagesAsPython() {
   text += "#: The effect of CustomEffect that stops it.\n";
   constant("STOP_CUSTOM_EFFECT", kStopCustomEffect);
   text += "#: Bits of Subscribe.kinds.\n";
-  constant("REPORT_TRACKER", kReportTracker);
-  constant("REPORT_FORCE", kReportForce);
-  constant("REPORT_BUTTON", kReportButton);
-  constant("REPORT_ANALOG", kReportAnalog);
-  constant("REPORT_TICK", kReportTick);
-  constant("REPORT_CONTACTS", kReportContacts);
-  constant("REPORT_HAND", kReportHand);
+  for (const NamedBit& report : kReportBits) constant(report.name, report.bit);
   text += "#: Bits of Capabilities.features.\n";
-  constant("FEATURE_BULK_MESH", kFeatureBulkMesh);
-  constant("FEATURE_BATCH", kFeatureBatch);
-  constant("FEATURE_SUBSCRIBE", kFeatureSubscribe);
-  constant("FEATURE_STOP", kFeatureStop);
-  constant("FEATURE_HEARTBEAT", kFeatureHeartbeat);
-  constant("FEATURE_HOLD_HAND", kFeatureHoldHand);
-  constant("FEATURE_REMOTE_CONTACTS", kFeatureRemoteContacts);
+  for (const NamedBit& feature : kFeatureBits) constant(feature.name, feature.bit);
   text += "#: Bits of HandState.flags.\n";
   constant("HAND_HAS_GRIPPER", kHandHasGripper);
   constant("HAND_ENERGY_SPENT", kHandEnergySpent);

@@ -2,6 +2,7 @@
 
 #include "wire/describe.h"
 #include "wire/fields.h"
+#include "wire/named_bits.h"
 
 namespace hapticd::wire {
 
@@ -98,25 +99,9 @@ std::string messagesAsTypeScript() {
   static_assert(MeshVertices::kMost == MeshTriangles::kMost);
   constant("MOST_IN_ONE_MESSAGE", MeshVertices::kMost);
   text += "/** Bits of Subscribe.kinds. */\n";
-  constant("REPORT_TRACKER", kReportTracker);
-  constant("REPORT_FORCE", kReportForce);
-  constant("REPORT_BUTTON", kReportButton);
-  constant("REPORT_ANALOG", kReportAnalog);
-  constant("REPORT_TICK", kReportTick);
-  constant("REPORT_CONTACTS", kReportContacts);
-  constant("REPORT_HAND", kReportHand);
-  constant("REPORT_CONTACT_POINT", kReportContactPoint);
-  constant("REPORT_TOUCH_BUTTON", kReportTouchButton);
-  constant("REPORT_CONTACT_ANALOG", kReportContactAnalog);
-  constant("REPORT_HIP", kReportHip);
+  for (const NamedBit& report : kReportBits) constant(report.name, report.bit);
   text += "/** Bits of Capabilities.features. */\n";
-  constant("FEATURE_BULK_MESH", kFeatureBulkMesh);
-  constant("FEATURE_BATCH", kFeatureBatch);
-  constant("FEATURE_SUBSCRIBE", kFeatureSubscribe);
-  constant("FEATURE_STOP", kFeatureStop);
-  constant("FEATURE_HEARTBEAT", kFeatureHeartbeat);
-  constant("FEATURE_HOLD_HAND", kFeatureHoldHand);
-  constant("FEATURE_REMOTE_CONTACTS", kFeatureRemoteContacts);
+  for (const NamedBit& feature : kFeatureBits) constant(feature.name, feature.bit);
   return text;
 }
 

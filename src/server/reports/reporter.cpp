@@ -207,9 +207,7 @@ wire::ButtonStates Reporter::buttonStates(std::uint32_t buttons, bool touching) 
 
 std::int32_t Reporter::sensorCount() const noexcept {
   if (view_ != View::device) return 1;
-  return wants(wire::kReportContactPoint) ? kSensorContact + 1
-         : wants(wire::kReportHip)       ? kSensorHip + 1
-                                          : 1;
+  return wants(wire::kReportContactPoint) ? kSensorContact + 1 : wants(wire::kReportHip) ? kSensorHip + 1 : 1;
 }
 
 void Reporter::buttons(std::uint32_t buttons, bool touching, std::vector<Outgoing>& out) {
@@ -256,8 +254,7 @@ void Reporter::tracker(const ClientTick& clientTick, const ReportFrame& frame, s
   };
   pose(wire::kReportTracker, kSensorProxy, clientTick.proxy);
   // A client without sensor 1 gets the velocity of the HIP as that of sensor 0, as from a stock server.
-  if (pose(wire::kReportHip, kSensorHip, clientTick.hip) &&
-      wants(wire::kReportTracker | wire::kReportHip)) {
+  if (pose(wire::kReportHip, kSensorHip, clientTick.hip) && wants(wire::kReportTracker | wire::kReportHip)) {
     const bool separate = view_ == View::device && wants(wire::kReportHip);
     velocity(clientTick, toFrame, separate ? kSensorHip : kSensorProxy, out);
   }
