@@ -85,7 +85,7 @@ TEST(Recorder, TicksOfAFullRingAreCountedInTheLogAndInTheFile) {
     recorder.ring(0).push(tick);
   }
   recorder.start(0, "");
-  EXPECT_TRUE(problems.until("12 ticks and 0 scene events lost so far"));
+  EXPECT_TRUE(problems.until("12 ticks, 0 scene events and 0 streamed values lost so far"));
   recorder.finish();
   EXPECT_EQ(recorder.counts().ticks, 8U);
   EXPECT_EQ(recorder.counts().lostTicks, 12U);
@@ -109,7 +109,7 @@ TEST(Recorder, SceneEventsBeyondTheMemoryAreCounted) {
   recorder.recordCommand(0, 1, 3, nullptr);
   recorder.finish();
   EXPECT_EQ(recorder.counts().lostSceneEvents, 1U);
-  EXPECT_NE(problems.all().find("1 scene events lost"), std::string::npos);
+  EXPECT_NE(problems.all().find("1 scene events and 0 streamed values lost"), std::string::npos);
 }
 
 TEST(Recorder, AFileThatIsRemovedEndsTheRecording) {

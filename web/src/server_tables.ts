@@ -122,4 +122,6 @@ export const REFUSAL = {
   handNotSimulated: 2,
   handHeldByOther: 3,
   handPoseInvalid: 4,
+  streamedByOther: 5,
+  streamInvalid: 6,
 } as const;
