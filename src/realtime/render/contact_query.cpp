@@ -224,9 +224,10 @@ bool ContactQuery::place(const ObjectState& state, PlacedObject& placed) const n
   const double extent = std::max(farthest.maxCoeff(), kSmallestObject_m);
   const double size = 0.5 * box.extents().maxCoeff() / placed.stretch;
   placed.skin = std::max(std::min(kRelativeSkin * extent, kPadShare * size), kRoundingFloor * extent);
-  // Vertices are floats in the frame of the object: its placement rounds nothing.
+  // Vertices are floats in the frame of their object, and clients compute its placement from floats of the
+  // scene.
   const Vec3 largest = linear.cwiseAbs() * box.min.cwiseAbs().cwiseMax(box.max.cwiseAbs());
-  placed.radius = std::max(toolRadius_, 0.5 * geometry::gapToleranceOf(largest.maxCoeff()));
+  placed.radius = std::max(toolRadius_, 0.5 * geometry::gapToleranceOf(std::max(extent, largest.maxCoeff())));
   return std::isfinite(placed.skin);
 }
 
