@@ -145,7 +145,7 @@ judge() {
 
 mkdir -p build
 if [ -z "$room" ]; then
-  scripts/install_packages.sh build viewer test python lint
+  scripts/install_packages.sh build viewer test python lint package
   scripts/check_includes.sh
 else
   scripts/install_packages.sh build test python
