@@ -15,14 +15,14 @@ constexpr std::uint32_t kNoVertex = 0xFFFFFFFF;
 constexpr Triangle kNoTriangle{kNoVertex, kNoVertex, kNoVertex};
 
 // Not for NaN.
-bool isUsable(const Vec3f& v) {
+bool isVertex(const Vec3f& v) {
   constexpr auto kMost = static_cast<float>(MeshDraft::kLargestCoordinate);
   return std::abs(v.x()) <= kMost && std::abs(v.y()) <= kMost && std::abs(v.z()) <= kMost;
 }
 
 bool allUsable(const std::vector<Vec3f>& run) {
   bool usable = true;
-  for (const Vec3f& v : run) usable &= isUsable(v);
+  for (const Vec3f& v : run) usable &= isVertex(v);
   return usable;
 }
 
@@ -71,7 +71,7 @@ std::size_t MeshDraft::setVertices(std::uint32_t first, std::vector<Vec3f>&& run
   if (inPlace && sameBytes(vertices_.read().data() + first, run)) return 0;
   std::size_t refused = 0;
   const bool usable = allUsable(run);
-  if (!usable && std::none_of(run.begin(), run.end(), isUsable)) return run.size();
+  if (!usable && std::none_of(run.begin(), run.end(), isVertex)) return run.size();
   if (usable && first == 0 && end >= before) {
     vertices_.replace(std::move(run));
   } else if (usable) {
@@ -84,7 +84,7 @@ std::size_t MeshDraft::setVertices(std::uint32_t first, std::vector<Vec3f>&& run
     std::vector<Vec3f>& vertices = vertices_.write(end);
     if (end > before) grow(vertices, end);
     for (std::size_t i = 0; i < run.size(); ++i) {
-      if (isUsable(run[i])) {
+      if (isVertex(run[i])) {
         vertices[first + i] = run[i];
       } else {
         ++refused;
