@@ -43,6 +43,16 @@ if(HAPTICD_SANITIZE MATCHES "address")
 endif()
 set(HAPTICD_COMPUTING_ROOMS "/(geometry|scene|realtime|truth|simulated)(/|$)")
 
+# Asio and Beast. They are compiled into each source that includes them, so all sources must see the same options.
+find_package(Boost 1.74 REQUIRED)
+add_library(hapticd_asio INTERFACE)
+target_link_libraries(hapticd_asio INTERFACE Boost::headers)
+target_compile_definitions(hapticd_asio INTERFACE BOOST_ASIO_NO_DEPRECATED)
+if(HAPTICD_SANITIZE MATCHES "thread")
+  # ThreadSanitizer does not know fences; Asio's locks, which it knows, order the same accesses.
+  target_compile_definitions(hapticd_asio INTERFACE BOOST_ASIO_DISABLE_FENCED_BLOCK)
+endif()
+
 # hapticd_precompile(TARGET HEADERS): TARGET includes the precompiled headers of HEADERS, if HAPTICD_PCH has them made.
 function(hapticd_precompile target headers)
   if(TARGET ${headers} AND NOT CMAKE_CURRENT_SOURCE_DIR MATCHES "${HAPTICD_COMPUTING_ROOMS}")
