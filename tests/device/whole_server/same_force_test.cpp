@@ -226,6 +226,12 @@ TEST_F(SameForce, ReplayIsItsRecording) {
     if (visitor->latched()) visitor->client().rearmForces();
     if (ticks.size() < 800) return false;
     ticks.erase(ticks.begin(), std::find_if(ticks.begin(), ticks.end(), inAir));
+    // A server that is behind skips reports, and the force belongs to the whole way.
+    const auto gap = [](const TickReport& a, const TickReport& b) { return b.tick != a.tick + 1; };
+    if (std::adjacent_find(ticks.begin(), ticks.end(), gap) != ticks.end()) {
+      ticks.clear();
+      return false;
+    }
     places.clear();
     for (const TickReport& tick : ticks) places.emplace_back(tick.hand_m[0], tick.hand_m[1], tick.hand_m[2]);
     const std::vector<Vec3> expected = scene.forces(places);
