@@ -36,11 +36,7 @@ if(HAPTICD_SANITIZE)
   endif()
 endif()
 
-# Under ASan the optimiser takes a third of the compile time. It is worth that only in the rooms that compute, and they are
-# compiled without precompiled headers, which must have the same options.
-if(HAPTICD_SANITIZE MATCHES "address")
-  set(HAPTICD_PCH_OPTIONS -O0)
-endif()
+# These rooms are compiled without precompiled headers, because some have options of their own.
 set(HAPTICD_COMPUTING_ROOMS "/(geometry|scene|realtime|truth|simulated)(/|$)")
 
 # Asio and Beast. They are compiled into each source that includes them, so all sources must see the same options.
@@ -57,7 +53,6 @@ endif()
 function(hapticd_precompile target headers)
   if(TARGET ${headers} AND NOT CMAKE_CURRENT_SOURCE_DIR MATCHES "${HAPTICD_COMPUTING_ROOMS}")
     target_precompile_headers(${target} REUSE_FROM ${headers})
-    target_compile_options(${target} PRIVATE ${HAPTICD_PCH_OPTIONS})
     # GCC 12 reports accesses beyond arrays inside of precompiled standard headers, where there are none.
     target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds>)
   endif()
@@ -93,7 +88,7 @@ function(hapticd_headers name kind)
   file(CONFIGURE OUTPUT ${source} CONTENT "// CMake precompiles headers for targets with sources only.\n")
   add_library(${name} OBJECT ${source})
   target_link_libraries(${name} PRIVATE hapticd_flags ${A_LIBS})
-  target_compile_options(${name} PRIVATE ${A_OPTIONS} ${HAPTICD_PCH_OPTIONS})
+  target_compile_options(${name} PRIVATE ${A_OPTIONS})
   target_precompile_headers(${name} PRIVATE ${A_HEADERS})
   set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE ${A_PIC})
 endfunction()
@@ -133,8 +128,12 @@ if(HAPTICD_SANITIZE MATCHES "undefined")
   target_compile_options(hapticd_test_flags INTERFACE -fno-sanitize=null,alignment,vptr)
 endif()
 
-# Each test runs once: optimising it more would take longer than it saves.
+# Each test runs once: optimising it more would take longer than it saves. Under ASan the optimiser takes a third of the
+# compile time; only tests that compute are worth that.
 set(HAPTICD_TEST_OPTIONS $<$<CONFIG:Release>:-O1>)
+if(HAPTICD_SANITIZE MATCHES "address")
+  set(HAPTICD_TEST_OPTIONS -O0)
+endif()
 
 # hapticd_test_support(NAME SOURCES ... [DEPENDS rooms ...] [LIBS ...]): sources that several test programs share, compiled
 # once; the programs name it in SUPPORT.
@@ -154,7 +153,9 @@ function(hapticd_compile_as_test target)
   if(TARGET hapticd_test_headers)
     target_link_libraries(${target} PRIVATE Eigen3::Eigen GTest::gtest GTest::gmock)  # what the precompiled headers include
   endif()
-  target_compile_options(${target} PRIVATE ${HAPTICD_TEST_OPTIONS})
+  if(NOT (HAPTICD_SANITIZE AND CMAKE_CURRENT_SOURCE_DIR MATCHES "${HAPTICD_COMPUTING_ROOMS}"))
+    target_compile_options(${target} PRIVATE ${HAPTICD_TEST_OPTIONS})
+  endif()
   target_compile_definitions(${target} PRIVATE HAPTICD_TESTDATA="${PROJECT_SOURCE_DIR}/testdata")
   hapticd_speed_up(${target} hapticd_test_headers TESTS)
 endfunction()
