@@ -163,7 +163,7 @@ for i in "${!presets[@]}"; do
   echo "== $preset: testing"
   test_start=$SECONDS
   status=0
-  run_ctest "$preset" "build/$preset/test.log" --parallel "$((jobs + 1))" || status=$?
+  run_ctest "$preset" "build/$preset/test.log" --parallel "$([ "$preset" = release ] && echo $((jobs + 1)) || echo "$jobs")" || status=$?
   test_s=$((SECONDS - test_start))
   judge "$preset" "$status" "$build_s" "$test_s"
   if [ -n "$next" ]; then
