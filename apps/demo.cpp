@@ -35,6 +35,7 @@ std::unique_ptr<server::Server> startServer(const DemoOptions& options) {
     const char* http;
   };
   server::ServerConfig config;
+  config.insecure = true;  // a simulated hand hurts nobody
   if (!options.listen.empty()) server::parseListen(options.listen, config.listenAddress, config.port);
   if (options.seconds > 0) config.seconds = options.seconds;
   for (const Ports& ports :

@@ -5,6 +5,7 @@
 
 #include "commands.h"
 #include "device_list.h"
+#include "print_json.h"
 
 namespace hapticd::apps {
 
@@ -18,8 +19,22 @@ void printDevices(const std::vector<device::DriverReport>& reports) {
   std::printf("simulated\n  found    a simulated hand, always available\n");
 }
 
+nlohmann::json jsonOf(const std::vector<device::DriverReport>& reports) {
+  nlohmann::json drivers = nlohmann::json::array();
+  for (const device::DriverReport& report : reports) {
+    drivers.push_back({{"driver", report.driver},
+                       {"found", report.devices},
+                       {"missing", report.reason},
+                       {"remedy", report.remedy}});
+  }
+  drivers.push_back(
+      {{"driver", "simulated"}, {"found", {"a simulated hand"}}, {"missing", ""}, {"remedy", ""}});
+  return drivers;
+}
+
 void addDevices(CLI::App& app) {
   auto options = std::make_shared<device::DiscoveryOptions>();
+  auto json = std::make_shared<bool>(false);
   CLI::App* command =
       app.add_subcommand("devices", "List the haptic devices found, and why others cannot be used");
   command->add_flag(
@@ -27,8 +42,16 @@ void addDevices(CLI::App& app) {
       "Also open devices that can be detected in no other way, without force (occupies the device briefly)");
   command->add_option("--haply-host", options->haplyHost, "Host of the Haply service")->capture_default_str();
   command->add_option("--haply-port", options->haplyPort, "Port of the Haply service")->capture_default_str();
+  command->add_flag("--json", *json, kJsonText);
   command->footer("'hapticd serve --device DRIVER' uses a device; udev rules are in packaging/udev.");
-  command->callback([options] { printDevices(device::findDevices(*options)); });
+  command->callback([options, json] {
+    const std::vector<device::DriverReport> reports = device::findDevices(*options);
+    if (*json) {
+      printJson(jsonOf(reports));
+    } else {
+      printDevices(reports);
+    }
+  });
 }
 
 }  // namespace hapticd::apps

@@ -18,6 +18,7 @@
 #include "device_list.h"
 #include "isolation_check.h"
 #include "loop_check.h"
+#include "print_json.h"
 #include "realtime/servo/thread_setup.h"
 
 namespace hapticd::apps {
@@ -140,28 +141,40 @@ Finding isolation(double seconds) {
   }
 }
 
-int run(double seconds, std::uint16_t port) {
+nlohmann::json findingJson(const Finding& finding) {
+  static constexpr const char* kVerdicts[] = {"ok", "note", "bad"};
+  return {{"verdict", kVerdicts[static_cast<int>(finding.verdict)]},
+          {"what", finding.what},
+          {"remedy", finding.remedy}};
+}
+
+int run(double seconds, std::uint16_t port, bool json) {
   std::vector<Finding> findings;
   const auto add = [&](const Finding& finding) {
-    print(finding);
+    if (!json) print(finding);
     findings.push_back(finding);
   };
-  std::printf("realtime\n");
+  const auto title = [&](const char* format, auto... arguments) {
+    if (json) return;
+    std::printf(format, arguments...);
+    std::fflush(stdout);
+  };
+  title("realtime\n");
   add(realtimePriority());
   add(memoryLock());
   add(governor());
   add(timerResolution());
   add(preemption());
-  std::printf("network\n");
+  title("network\n");
   add(portFree(SOCK_STREAM, "TCP", port));
   add(portFree(SOCK_DGRAM, "UDP", port));
-  std::printf("devices\n");
-  printDevices(device::findDevices());
+  title("devices\n");
+  const std::vector<device::DriverReport> devices = device::findDevices();
+  if (!json) printDevices(devices);
 
-  std::printf("loop, %g s at 1 kHz with the simulated hand\n", seconds);
-  std::fflush(stdout);
+  title("loop, %g s at 1 kHz with the simulated hand\n", seconds);
   const LoopCheck loop = measureLoop(seconds);
-  for (const std::string& line : loop.setup) std::printf("        %s\n", line.c_str());
+  for (const std::string& line : loop.setup) title("        %s\n", line.c_str());
   char text[256];
   std::snprintf(
       text, sizeof text,
@@ -173,8 +186,7 @@ int run(double seconds, std::uint16_t port) {
        steady ? ""
               : "close other programs, get realtime rights for the loop, or use a kernel with PREEMPT_RT"});
 
-  std::printf("a driver in its own process (--isolate), %g s\n", seconds);
-  std::fflush(stdout);
+  title("a driver in its own process (--isolate), %g s\n", seconds);
   add(isolation(seconds));
 
   int bad = 0;
@@ -183,7 +195,20 @@ int run(double seconds, std::uint16_t port) {
     bad += finding.verdict == Verdict::bad ? 1 : 0;
     notes += finding.verdict == Verdict::note ? 1 : 0;
   }
-  if (bad == 0) {
+  if (json) {
+    nlohmann::json checks = nlohmann::json::array();
+    for (const Finding& finding : findings) checks.push_back(findingJson(finding));
+    printJson({{"ready", bad == 0},
+               {"checks", checks},
+               {"devices", jsonOf(devices)},
+               {"loop",
+                {{"ticks", loop.ticks},
+                 {"overruns", loop.overruns},
+                 {"wakeup_p50_us", loop.wakeup_us.p50},
+                 {"wakeup_p99_us", loop.wakeup_us.p99},
+                 {"wakeup_max_us", loop.wakeup_us.max},
+                 {"compute_p99_us", loop.compute_us.p99}}}});
+  } else if (bad == 0) {
     std::printf("verdict: ready to render forces (%d notes above)\n", notes);
   } else {
     const std::string problems = bad == 1 ? "problem" : std::to_string(bad) + " problems";
@@ -199,6 +224,7 @@ void addDoctor(CLI::App& app) {
   struct Options {
     double seconds = 3;
     std::uint16_t port = 3883;
+    bool json = false;
   };
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand(
@@ -209,7 +235,8 @@ void addDoctor(CLI::App& app) {
       ->capture_default_str();
   command->add_option("--port", options->port, "TCP and UDP port to check")->capture_default_str();
   command->footer("Exit status: 0 when ready, 1 when a problem must be fixed first.");
-  command->callback([options] { exitCode = run(options->seconds, options->port); });
+  command->add_flag("--json", options->json, kJsonText);
+  command->callback([options] { exitCode = run(options->seconds, options->port, options->json); });
 }
 
 }  // namespace hapticd::apps

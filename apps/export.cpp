@@ -4,10 +4,14 @@
 #include <stdexcept>
 #include <string>
 
+#include "base/files.h"
 #include "base/time.h"
+#include "base/world.h"
 #include "commands.h"
+#include "print_json.h"
 #include "record/export.h"
 #include "record/recording_reader.h"
+#include "record/sidecar.h"
 #include "record/vrpn_log.h"
 #include "server/reports/reporter.h"
 
@@ -19,6 +23,7 @@ struct ExportOptions {
   std::string to;
   std::string out;
   bool force = false;
+  bool json = false;
 };
 
 // Reports of one device, as a client with the default subscription receives them.
@@ -73,6 +78,8 @@ void exportVrpn(const ExportOptions& options, std::string& remark) {
 
 int run(const ExportOptions& options) {
   keepFile(options.out, options.force);
+  const std::string beside = options.to == "vrpn" ? "" : options.out + ".json";
+  keepFile(beside, options.force);
   std::string remark;
   if (options.to == "vrpn") {
     exportVrpn(options, remark);
@@ -83,7 +90,16 @@ int run(const ExportOptions& options) {
     record::McapFile file(options.out);
     record::exportRecording(options.recording, file, remark);
   }
+  if (!beside.empty())
+    base::world().files.create(beside, base::Existing::replace)->write(record::sidecarOf(options.recording));
   if (!remark.empty()) std::fprintf(stderr, "hapticd: %s\n", remark.c_str());
+  if (options.json) {
+    printJson({{"recording", options.recording},
+               {"out", options.out},
+               {"to", options.to},
+               {"beside", beside.empty() ? nlohmann::json() : nlohmann::json(beside)},
+               {"remark", remark}});
+  }
   return 0;
 }
 
@@ -100,11 +116,13 @@ void addExport(CLI::App& app) {
       ->check(CLI::IsMember({"mcap", "csv", "vrpn"}));
   command->add_option("-o,--out", options->out, "File to write")->required();
   command->add_flag("--force", options->force, kForceText);
+  command->add_flag("--json", options->json, kJsonText);
   command->footer(
       "mcap  ticks, poses, guard and scene commands, for Foxglove and other readers of MCAP\n"
       "csv   one row for each tick of each device; --hand of 'hapticd serve' and 'hapticd render' reads it\n"
       "vrpn  the reports that a client would have received; VRPN clients open it as "
       "Phantom@file:///path/to/the.vrpn\n"
+      "mcap and csv come with OUT.json: program, devices, configuration, surfaces, markers.\n"
       "Example: hapticd export my.haptics --to mcap -o my.mcap");
   command->callback([options] { exitCode = run(*options); });
 }

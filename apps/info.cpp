@@ -14,6 +14,7 @@
 #include "base/time.h"
 #include "commands.h"
 #include "record/recording_reader.h"
+#include "record/sidecar.h"
 
 namespace hapticd::apps {
 namespace {
@@ -30,6 +31,7 @@ struct DeviceFacts {
 struct RecordingFacts {
   std::vector<DeviceFacts> devices;
   std::map<std::string, std::uint64_t> commands;  // by name
+  std::vector<record::MarkerEvent> markers;
   base::Nanos first = 0;
   base::Nanos last = 0;
 };
@@ -59,6 +61,7 @@ RecordingFacts factsOf(record::RecordingReader& reader) {
   for (record::RecordingEvent event; reader.next(event);) {
     if (const auto* tick = std::get_if<record::TickEvent>(&event)) add(facts, *tick);
     if (const auto* scene = std::get_if<record::SceneEvent>(&event)) add(facts, *scene);
+    if (const auto* marker = std::get_if<record::MarkerEvent>(&event)) facts.markers.push_back(*marker);
     const auto* lost = std::get_if<record::LostEvent>(&event);
     if (lost != nullptr && lost->what == record::LostEvent::What::ticks)
       facts.devices.at(lost->device).lost += lost->count;
@@ -95,7 +98,11 @@ void print(const DeviceFacts& facts, const record::RecordedDevice& device) {
   std::printf("  guard     %s\n", trips.empty() ? "never acted" : trips.c_str());
 }
 
-int run(const std::string& file, bool config) {
+int run(const std::string& file, bool config, bool json) {
+  if (json) {
+    std::fputs(record::sidecarOf(file).c_str(), stdout);
+    return 0;
+  }
   record::RecordingReader reader(file);
   const record::RecordingHeader& header = reader.header();
   const RecordingFacts facts = factsOf(reader);
@@ -106,6 +113,8 @@ int run(const std::string& file, bool config) {
   for (std::size_t i = 0; i < facts.devices.size(); ++i) print(facts.devices[i], header.devices[i]);
   for (const auto& [name, count] : facts.commands)
     std::printf("command     %s, %llu times\n", name.c_str(), static_cast<unsigned long long>(count));
+  for (const record::MarkerEvent& marker : facts.markers)
+    std::printf("marker      %.3f s: %s\n", base::toSeconds(marker.time - facts.first), marker.text.c_str());
   if (config) std::printf("\n%s", header.config.c_str());
   if (!reader.remark().empty()) std::fprintf(stderr, "hapticd: %s\n", reader.remark().c_str());
   return 0;
@@ -117,6 +126,7 @@ void addInfo(CLI::App& app) {
   struct Options {
     std::string file;
     bool config = false;
+    bool json = false;
   };
   auto options = std::make_shared<Options>();
   CLI::App* command =
@@ -125,7 +135,9 @@ void addInfo(CLI::App& app) {
       ->required()
       ->check(CLI::ExistingFile);
   command->add_flag("--config", options->config, "Also print the configuration of its server, as TOML");
-  command->callback([options] { exitCode = run(options->file, options->config); });
+  command->add_flag("--json", options->json,
+                    "One JSON object for programs: devices, surfaces, markers, configuration");
+  command->callback([options] { exitCode = run(options->file, options->config, options->json); });
 }
 
 }  // namespace hapticd::apps

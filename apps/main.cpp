@@ -1,42 +1,22 @@
 // hapticd: a haptics server that speaks VRPN, and the tools around it.
-#include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "base/nearest_name.h"
 #include "commands.h"
 #include "version.h"
 
 namespace {
 
-// The number of letters to change, leave out or add.
-std::size_t editDistance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t cost = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, cost});
-    }
-  }
-  return row[b.size()];
-}
-
-std::string nearestCommand(const CLI::App& app, const std::string& typed) {
-  std::string nearest;
-  std::size_t least = 4;  // farther names are no help
+std::optional<std::string> nearestCommand(const CLI::App& app, const std::string& typed) {
+  std::vector<std::string> names;
   for (const CLI::App* command :
-       app.get_subcommands([](const CLI::App* each) { return !each->get_group().empty(); })) {
-    const std::size_t distance = editDistance(typed, command->get_name());
-    if (distance >= least) continue;
-    least = distance;
-    nearest = command->get_name();
-  }
-  return nearest;
+       app.get_subcommands([](const CLI::App* each) { return !each->get_group().empty(); }))
+    names.push_back(command->get_name());
+  return hapticd::base::nearestName(typed, names);
 }
 
 }  // namespace
@@ -60,9 +40,12 @@ int main(int argc, char** argv) {
   addTouch(app);
   addWatch(app);
   addStop(app);
+  addTunnel(app);
+  addMark(app);
   addRecord(app);
   addExport(app);
   addInfo(app);
+  addPlot(app);
   addRender(app);
   addReplay(app);
   addDoctor(app);
@@ -76,9 +59,9 @@ int main(int argc, char** argv) {
   } catch (const CLI::RequiredError& error) {
     const std::vector<std::string> rest = app.remaining();
     if (app.get_subcommands().empty() && !rest.empty()) {
-      const std::string nearest = nearestCommand(app, rest[0]);
+      const std::optional<std::string> nearest = nearestCommand(app, rest[0]);
       std::fprintf(stderr, "hapticd: unknown command '%s';%s 'hapticd --help' lists the commands\n",
-                   rest[0].c_str(), nearest.empty() ? "" : (" did you mean '" + nearest + "'?").c_str());
+                   rest[0].c_str(), nearest ? (" did you mean '" + *nearest + "'?").c_str() : "");
       return 2;
     }
     return app.exit(error) == 0 ? 0 : 2;

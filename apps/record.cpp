@@ -7,6 +7,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include "client/link.h"
 #include "commands.h"
@@ -22,6 +23,9 @@ namespace {
 using namespace std::chrono_literals;
 
 struct RecordOptions {
+  bool onServer = false;
+  bool detach = false;
+  bool end = false;
   std::string server;
   std::string file;
   double seconds = 0;
@@ -106,7 +110,69 @@ std::size_t recordTicks(record::SampleFile& file, const RecordOptions& options) 
   return count;
 }
 
+// Begins and ends a recording of the server itself; it answers by texts.
+class ServerRecording {
+ public:
+  explicit ServerRecording(const std::string& server)
+      : server_(server),
+        address_(client::parseDevice(server)),
+        link_(address_.server, {.reconnect = false, .adoptNames = true}),
+        device_(link_.addDevice(address_.device)) {
+    if (!link_.waitConnected(kTimeout)) throw ConnectError(address_.device + ": " + link_.whyNotConnected());
+    if (!link_.waitHeard(device_, kTimeout))
+      throw ConnectError("no device '" + address_.device + "' answers at " + address_.server.text());
+  }
+
+  /// The answer, which begins like this.
+  std::string ask(bool record, const std::string& name, std::string_view answer) {
+    link_.sendNow(device_, wire::RecordingControl{.record = static_cast<std::int16_t>(record),
+                                                  .name = std::string_view(name)});
+    const auto end = std::chrono::steady_clock::now() + kTimeout;
+    while (link_.connected() && std::chrono::steady_clock::now() < end) {
+      poll();
+      if (!refusal_.empty()) throw Error(server_ + ": " + refusal_);
+      if (last_.starts_with(answer)) return last_;
+    }
+    throw Error(server_ + " did not answer within 5 s; only a hapticd records by itself");
+  }
+  bool poll() {
+    link_.poll(20ms, [this](const client::Arrival& arrival) {
+      if (arrival.what != client::Arrival::What::message || arrival.kind != wire::kindOf<wire::Text>) return;
+      const auto text = wire::decode<wire::Text>(arrival.bytes);
+      if (!text) return;
+      const std::string heard(text->text.text);
+      (text->severity == wire::kTextError && heard.starts_with("Recording_Control") ? refusal_ : last_) =
+          heard;
+    });
+    return link_.connected();
+  }
+
+ private:
+  static constexpr auto kTimeout = 5s;
+  const std::string server_;
+  const client::DeviceAddress address_;
+  client::Link link_;
+  const wire::LocalSender device_;
+  std::string last_;
+  std::string refusal_;
+};
+
+int recordOnServer(const RecordOptions& options) {
+  ServerRecording recording(options.server);
+  const StopSignals signals;
+  if (!options.end) {
+    std::printf("%s: %s\n", options.server.c_str(),
+                recording.ask(true, options.file, "recording to").c_str());
+    std::fflush(stdout);
+    if (options.detach) return 0;
+    pollUntilEnd(options.server, options.seconds, [&] { return recording.poll(); });
+  }
+  std::printf("%s: %s\n", options.server.c_str(), recording.ask(false, "", "recorded").c_str());
+  return 0;
+}
+
 int run(const RecordOptions& options) {
+  if (options.onServer) return recordOnServer(options);
   keepFile(options.file, options.force);
   const auto samples = sampleFile(options.file);
   if (!samples && std::filesystem::path(options.file).extension() != ".vrpn") {
@@ -139,7 +205,14 @@ void addRecord(CLI::App& app) {
   auto options = std::make_shared<RecordOptions>();
   CLI::App* command = app.add_subcommand("record", "Record the reports of a server as a client");
   command->add_option("server", options->server, "NAME@host[:port] or NAME@tcp://host[:port]")->required();
-  command->add_option("file", options->file, "*.vrpn, *.csv or *.mcap")->required();
+  command->add_option("file", options->file,
+                      "*.vrpn, *.csv or *.mcap; with --server a name that ends with .haptics, or none");
+  CLI::Option* const onServer = command->add_flag(
+      "--server", options->onServer,
+      "The server itself records, scene included, on its own disk, until --seconds or Ctrl-C");
+  command->add_flag("--detach", options->detach, "With --server: begin the recording and return")
+      ->needs(onServer);
+  command->add_flag("--end", options->end, "With --server: end the recording at hand")->needs(onServer);
   command->add_option("--seconds", options->seconds, "Duration; 0: until Ctrl-C")
       ->check(within(0, kLongest_s))
       ->capture_default_str();
@@ -150,13 +223,18 @@ void addRecord(CLI::App& app) {
   command->footer(
       "Records what a client receives: reports, in the frame that the server reports, without the scene. The "
       "server\n"
-      "itself writes recordings that can be replayed and re-rendered: hapticd serve --record FILE.haptics\n"
+      "itself writes recordings that can be replayed and re-rendered: --server, or hapticd serve --record "
+      "FILE.haptics\n"
       "*.vrpn works with any VRPN server; csv and mcap need the ticks of a hapticd.\n"
       "A csv can be given to --hand of 'hapticd serve' and 'hapticd render'.\n"
       "Examples:\n"
       "  hapticd record Phantom@localhost stroke.mcap --seconds 10\n"
-      "  hapticd record Tracker0@lab7 stroke.vrpn");
-  command->callback([options] { exitCode = run(*options); });
+      "  hapticd record Tracker0@lab7 stroke.vrpn\n"
+      "  hapticd record Phantom@localhost --server trial3.haptics --seconds 60");
+  command->callback([options] {
+    if (options->file.empty() && !options->onServer) throw CLI::RequiredError("file");
+    exitCode = run(*options);
+  });
 }
 
 }  // namespace hapticd::apps

@@ -45,6 +45,9 @@ std::string csv(const std::vector<Difference>& devices) {
 void print(const Difference& d) {
   std::printf("device      %s: %llu ticks, %llu touching in either\n", d.device().c_str(),
               static_cast<unsigned long long>(d.ticks()), static_cast<unsigned long long>(d.touching()));
+  if (d.skipped() > 0)
+    std::printf("not compared %llu ticks: the recording began while the device moved, until it was free\n",
+                static_cast<unsigned long long>(d.skipped()));
   if (d.lost() > 0)
     std::printf("not recorded %llu ticks: the ticks after them may differ\n",
                 static_cast<unsigned long long>(d.lost()));

@@ -27,6 +27,7 @@ int run(const ReplayOptions& options) {
   const LogWriter log;
   auto player = std::make_unique<server::Player>(options.replay);
   server::ServerConfig config = player->config();
+  config.insecure = true;  // a recording takes no commands
   if (!options.listen.empty()) server::parseListen(options.listen, config.listenAddress, config.port);
   if (options.port >= 0) config.port = static_cast<std::uint16_t>(options.port);
   if (!options.http.empty()) config.http = options.http;

@@ -1,10 +1,12 @@
 // hapticd serve: owns the devices and serves them to VRPN clients.
 #include <spdlog/spdlog.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <stdexcept>
 
@@ -14,6 +16,7 @@
 #include "log_writer.h"
 #include "server/server.h"
 #include "server/station/devices.h"
+#include "service_manager.h"
 #include "stop_on_signal.h"
 
 namespace hapticd::apps {
@@ -36,6 +39,7 @@ struct ServeOptions {
   double seconds = 0;
   std::string record;
   bool allowNoRealtime = false;
+  bool insecure = false;
   bool verbose = false;
   bool checkConfig = false;
 };
@@ -82,6 +86,7 @@ server::ServerConfig configOf(const ServeOptions& options, std::vector<std::stri
   if (options.port >= 0) config.port = static_cast<std::uint16_t>(options.port);
   if (!options.http.empty()) config.http = options.http;
   config.httpAllow.insert(config.httpAllow.end(), options.httpAllow.begin(), options.httpAllow.end());
+  if (options.insecure) config.insecure = true;
   if (options.allowNoRealtime) config.allowNoRealtime = true;
   if (options.seconds > 0) config.seconds = options.seconds;
   if (!options.record.empty()) config.record = options.record;
@@ -93,6 +98,7 @@ server::ServerConfig configOf(const ServeOptions& options, std::vector<std::stri
   }
   server::validate(config);
   checkDrivers(config);
+  server::Credentials(config, geteuid());
   return config;
 }
 
@@ -121,6 +127,27 @@ void raiseDescriptorLimit() {
   setrlimit(RLIMIT_NOFILE, &limit);
 }
 
+// Present while a service runs, so that one which the service manager restarts after a crash knows of it.
+class CrashMark {
+ public:
+  CrashMark() {
+    const char* const folder = secure_getenv("RUNTIME_DIRECTORY");
+    if (folder == nullptr || *folder != '/') return;
+    file_ = std::filesystem::path(folder) / "running";
+    crashed_ = std::filesystem::exists(file_);
+    const std::ofstream mark(file_);
+  }
+  bool crashed() const { return crashed_; }
+  void endedInOrder() const {
+    std::error_code ignored;
+    if (!file_.empty()) std::filesystem::remove(file_, ignored);
+  }
+
+ private:
+  std::filesystem::path file_;
+  bool crashed_ = false;
+};
+
 int run(const ServeOptions& options) {
   std::vector<std::string> remarks;
   server::ServerConfig config;
@@ -143,7 +170,16 @@ int run(const ServeOptions& options) {
   const std::unique_ptr<server::Server> server = openServer(config);
   announce(*server, config);
   stopper.watch(*server);
+  const CrashMark mark;
+  if (mark.crashed()) {
+    server->stopForces();
+    spdlog::warn("the server did not end in order last time: forces are stopped until re-armed");
+  }
+  server->onAlive([] { notifyServiceManager("WATCHDOG=1"); });
+  notifyServiceManager("READY=1");
   server->run();
+  notifyServiceManager("STOPPING=1");
+  mark.endedInOrder();
   return 0;
 }
 
@@ -200,15 +236,17 @@ void addServe(CLI::App& app) {
   command->add_flag(
       "--allow-no-rt", options->allowNoRealtime,
       "Run a real device even if the system refuses realtime rights; the simulated hand always runs");
+  command->add_flag(
+      "--insecure", options->insecure,
+      "Let other machines in without encryption: everybody who reaches the port can move the arm");
   command->add_flag("-v,--verbose", options->verbose, "Log more");
   command->footer(
       "Clients open NAME@HOST, NAME@HOST:PORT or NAME@tcp://HOST:PORT as Tracker, Button or ForceDevice.\n"
       "Examples:\n"
       "  hapticd serve                                    the simulated hand, on this machine only\n"
       "  hapticd serve --name Tracker0 --name Button0     more names for one device\n"
-      "  hapticd serve --listen 0.0.0.0:3883              for other machines as well\n"
-      "  hapticd serve --http 0.0.0.0:8080 --http-allow lab7  the page at http://lab7:8080/ from other "
-      "machines\n"
+      "  hapticd serve --listen 0.0.0.0:3883 --insecure   for all of a network where you trust everybody\n"
+      "  hapticd serve --http 0.0.0.0:8080 --http-allow lab7 --insecure  the page at http://lab7:8080/\n"
       "  hapticd serve --config vrpn.cfg --device simulated   a VRPN server's file, without its hardware\n"
       "  hapticd serve --config my.toml --check-config    check a file and print its settings\n"
       "'hapticd doctor' explains how to get realtime rights.");

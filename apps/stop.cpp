@@ -5,8 +5,12 @@
 #include <optional>
 #include <string>
 
+#include "client/server_address.h"
 #include "commands.h"
 #include "hapticd/client.h"
+#include "net/local_socket.h"
+#include "print_json.h"
+#include "token_file.h"
 
 namespace hapticd::apps {
 namespace {
@@ -16,10 +20,34 @@ using namespace std::chrono_literals;
 struct StopOptions {
   std::string server = "Phantom@localhost";
   bool rearm = false;
+  bool json = false;
+  std::string tokenFile;
 };
 
+// On this machine, the server's Unix socket takes a stop when its port is full, and there the kernel names
+// the user who re-arms. Empty: none, or another machine.
+std::string socketOf(const StopOptions& options) {
+  const client::DeviceAddress address = client::parseDevice(options.server);
+  const std::string& host = address.server.host;
+  if (host != "localhost" && !host.starts_with("127.")) return "";
+  const auto path = net::findServerSocket(address.server.port, options.rearm);
+  return path ? address.device + "@unix:" + path->string() : "";
+}
+
+Client openClient(const StopOptions& options) {
+  if (const std::string local = socketOf(options); !local.empty()) {
+    try {
+      return Client(local, {.connectTimeout = 1s, .reconnect = false});
+    } catch (const Error&) {
+      // Of a server that was killed, or without this device.
+    }
+  }
+  return Client(options.server, {.reconnect = false});
+}
+
 int run(const StopOptions& options) {
-  Client client(options.server, {.reconnect = false});
+  Client client = openClient(options);
+  if (!options.tokenFile.empty()) client.presentToken(readToken(options.tokenFile));
   std::optional<GuardReport> guard;
   std::string refusal;
   client.onGuard([&](const GuardReport& report) { guard = report; });
@@ -37,6 +65,10 @@ int run(const StopOptions& options) {
   while (!isDone() && refusal.empty() && std::chrono::steady_clock::now() < end) client.poll(50ms);
   if (!refusal.empty()) throw Error(client.server() + " refused: " + refusal);
   if (!isDone()) throw Error(client.server() + " sent no confirmation within 3 s");
+  if (options.json) {
+    printJson({{"server", options.server}, {"stopped", guard->stopped}, {"armed", guard->armed}});
+    return 0;
+  }
   std::printf(options.rearm ? "%s: re-armed; forces ramp in over half a second\n"
                             : "%s: forces are off; 'hapticd stop --rearm' re-arms\n",
               options.server.c_str());
@@ -54,8 +86,14 @@ void addStop(CLI::App& app) {
   command->add_option("server", options->server, "NAME@host[:port] or NAME@tcp://host[:port]")
       ->capture_default_str();
   command->add_flag("--rearm", options->rearm, "End a stop and clear latched faults");
+  command
+      ->add_option("--token-file", options->tokenFile,
+                   "File with the token of an operator, mode 0600, for a server on another machine")
+      ->check(CLI::ExistingFile);
+  command->add_flag("--json", options->json, kJsonText);
   command->footer(
-      "Any client may stop a device; only clients that may command it can re-arm it.\n"
+      "Any client may stop a device. Re-arming after it takes the server's user or root on its machine, or\n"
+      "the token of an operator.\n"
       "Exit status: 0 when the server has confirmed it, 1 when it cannot be reached or refuses.");
   command->callback([options] { exitCode = run(*options); });
 }

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -82,6 +83,7 @@ void send(Client& client, const TriangleMesh& mesh, const TouchOptions& options)
   client.clearMesh(options.object);
   client.setTransform(options.object, kIdentity);
   client.setTouchable(options.object, true);
+  client.setObjectName(options.object, std::filesystem::path(options.mesh).filename().string());
   client.setSurface(options.object, options.surface);
   ProgressBar bar("sending");
   const auto start = std::chrono::steady_clock::now();

@@ -63,22 +63,27 @@ void printCsv(const record::Sample& sample) {
   std::fputs(row.c_str(), stdout);
 }
 
-// Returns after `seconds` or at a stop signal; throws ConnectionLost when the server disconnects.
+// Returns after `seconds` or at a stop signal. The client connects again when the server comes back.
 template <class OnInterval>
 void pollUntilEnd(Client& client, double seconds, std::chrono::nanoseconds interval, OnInterval onInterval) {
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
   auto next = start + interval;
+  bool connected = true;
   while (!stopRequested()) {
     const auto now = Clock::now();
     if (seconds > 0 && std::chrono::duration<double>(now - start).count() >= seconds) return;
     if (now >= next) {
-      onInterval();
+      if (connected) onInterval();
       next = std::max(next + interval, now - interval);
     }
     const auto left = std::max(next - Clock::now(), Clock::duration::zero());
     client.poll(std::min<std::chrono::nanoseconds>(left, 20ms));  // short, so that signals take effect
-    if (!client.connected()) throw ConnectionLost("the connection to " + client.server() + " was lost");
+    if (connected != client.connected())
+      std::fprintf(stderr,
+                   connected ? "the connection to %s was lost; waiting for it\n" : "connected to %s again\n",
+                   client.server().c_str());
+    connected = client.connected();
   }
 }
 
@@ -121,7 +126,7 @@ void show(Client& client, const WatchOptions& options) {
 int run(const WatchOptions& options) {
   std::signal(SIGPIPE, SIG_IGN);  // so that `watch --json | head` ends with a write error
   const StopSignals signals;
-  Client client(options.server, {.reconnect = false});
+  Client client(options.server);
   if (options.json || options.csv) {
     stream(client, options);
   } else {

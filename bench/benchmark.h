@@ -40,7 +40,7 @@ struct Row {
 };
 
 /// A histogram to be drawn: series over one axis.
-struct Picture {
+struct Figure {
   struct Series {
     std::string label;
     Samples samples;
@@ -55,7 +55,7 @@ struct Picture {
 
 struct Outcome {
   std::vector<Row> rows;
-  std::vector<Picture> pictures;
+  std::vector<Figure> figures;
   std::vector<std::string> remarks;
 };
 

@@ -27,12 +27,29 @@ struct Heard {
   double median_ticks_per_s = 0;
 };
 
-// Many clients in one thread: most count bytes, some read what there is.
+// How clients introduce themselves to a server.
+enum class Manners {
+  none,         // to a helper, which needs no greeting
+  subscribes,   // describes the device and subscribes to five messages for each tick
+  onlyListens,  // describes nothing: gets the default reports
+};
+
+std::int64_t wallUs() {
+  timespec t{};
+  clock_gettime(CLOCK_REALTIME, &t);
+  return std::int64_t{1'000'000} * t.tv_sec + t.tv_nsec / 1000;
+}
+
+// Many clients in one thread: most count bytes, some read what there is. A tick's report is that of kind
+// `tickType`, and its latency is that of the stamp in its header when it has no other.
 class Crowd {
  public:
-  Crowd(std::uint16_t port, std::size_t clients, bool greet) : epoll_(epoll_create1(EPOLL_CLOEXEC)) {
-    const std::vector<std::byte> hello =
+  Crowd(std::uint16_t port, std::size_t clients, Manners manners, wire::LocalType tickType)
+      : epoll_(epoll_create1(EPOLL_CLOEXEC)), tickType_(tickType) {
+    const bool greet = manners != Manners::none;
+    std::vector<std::byte> hello =
         greeting(wire::kReportTracker | wire::kReportHip | wire::kReportForce | wire::kReportTick, 1000);
+    if (manners == Manners::onlyListens) hello.resize(wire::kCookieBytes);
     for (std::size_t i = 0; i < clients; ++i) {
       readers_.push_back(
           {Socket::connect(port), i % std::max<std::size_t>(1, clients / kSampled) == 0, greet});
@@ -105,19 +122,27 @@ class Crowd {
     if (reader.awaitsCookie && bytes.size() < wire::kCookieBytes) return;
     if (std::exchange(reader.awaitsCookie, false)) bytes = bytes.subspan(wire::kCookieBytes);
     const std::int64_t now = nowNs();
+    const std::int64_t wall_us = wallUs();
     wire::FrameReader frames(bytes);
     for (wire::FrameView frame; frames.next(frame);) {
-      if (frame.header.type != wire::kLocalType<wire::TickReport>.value) continue;
-      const auto report = wire::decode<wire::TickReport>(frame.payload);
-      if (!report) continue;
+      if (frame.header.type != tickType_.value) continue;
       ++reader.ticks;
-      if (latencies != nullptr) latencies->add(static_cast<double>(now - report->time) * 1e-3);
+      if (latencies == nullptr) continue;
+      if (const auto report = wire::decode<wire::TickReport>(frame.payload);
+          report && tickType_ == wire::kLocalType<wire::TickReport>) {
+        latencies->add(static_cast<double>(now - report->time) * 1e-3);
+      } else {
+        const wire::Time& stamp = frame.header.time;
+        latencies->add(
+            static_cast<double>(wall_us - std::int64_t{1'000'000} * stamp.seconds - stamp.microseconds));
+      }
     }
     const std::vector<std::byte> rest(frames.rest().begin(), frames.rest().end());
     reader.partial = rest;
   }
 
   Socket epoll_;
+  const wire::LocalType tickType_;
   std::vector<Reader> readers_;
   std::vector<std::byte> buffer_ = std::vector<std::byte>(64 * 1024);
 };
@@ -131,26 +156,55 @@ class FanOut {
 
   void of(std::size_t clients) {
     run_.progress(std::to_string(clients) + " clients");
-    const double seconds = run_.seconds(1.5, 5, 30);
-    Heard ours;
-    Heard raw;
-    double bytes = 0;
-    for (int half = 0; half < 2; ++half) {
-      {
-        ServerProcess server("", {"--config", (work_ / "server.toml").string()});
-        Crowd crowd(server.port(), clients, true);
-        add(crowd.hear(seconds), ours);
-        bytes = crowd.bytesOfTick();
-      }
-      Helper blaster({"blaster", std::to_string(clients)});
-      Crowd crowd(blaster.port(), clients, false);
-      add(crowd.hear(seconds), raw);
-    }
-    rows(clients, ours, raw, bytes);
+    const Compared c = compare(clients, Manners::subscribes, wire::kLocalType<wire::TickReport>, "blaster");
+    rows(clients, c.ours, c.raw, c.bytes);
+  }
+  // Loggers and filters of the raw protocol, and nobody else.
+  void ofListeners(std::size_t clients) {
+    const std::string who = std::to_string(clients) + " clients that describe nothing";
+    run_.progress(who);
+    const Compared c =
+        compare(clients, Manners::onlyListens, wire::kLocalType<wire::IsTouching>, "default-blaster");
+    outcome_.rows.push_back({who + ": ticks that each hears",
+                             "1/s",
+                             Summary::of(c.ours.median_ticks_per_s),
+                             Summary::of(c.raw.median_ticks_per_s),
+                             {{"ticks/s of who hears least", c.ours.slowest_ticks_per_s, 990, true, {}}},
+                             std::to_string(static_cast<int>(c.bytes)) + " bytes a tick and client"});
+    const Summary ours = c.ours.latency_us.summary();
+    const Summary raw = c.raw.latency_us.summary();
+    outcome_.rows.push_back({who + ": from the tick to the reader",
+                             "us",
+                             ours,
+                             raw,
+                             {{"p99 ratio", raw.p99 > 0 ? ours.p99 / raw.p99 : 0, 1.5}},
+                             {}});
   }
   Outcome take() { return std::move(outcome_); }
 
  private:
+  struct Compared {
+    Heard ours, raw;
+    double bytes = 0;
+  };
+
+  Compared compare(std::size_t clients, Manners manners, wire::LocalType tickType, const char* helper) const {
+    const double seconds = run_.seconds(1.5, 5, 30);
+    Compared compared;
+    for (int half = 0; half < 2; ++half) {
+      {
+        ServerProcess server("", {"--config", (work_ / "server.toml").string()});
+        Crowd crowd(server.port(), clients, manners, tickType);
+        add(crowd.hear(seconds), compared.ours);
+        compared.bytes = crowd.bytesOfTick();
+      }
+      Helper blaster({helper, std::to_string(clients)});
+      Crowd crowd(blaster.port(), clients, Manners::none, tickType);
+      add(crowd.hear(seconds), compared.raw);
+    }
+    return compared;
+  }
+
   static void add(const Heard& half, Heard& all) {
     all.latency_us.add(half.latency_us);
     all.slowest_ticks_per_s += half.slowest_ticks_per_s / 2;
@@ -197,6 +251,7 @@ Outcome measureFanOut(const Run& run) {
   raiseDescriptorLimit();
   FanOut fanOut(run);
   for (const std::size_t clients : {1, 16, 64, 255, 1000}) fanOut.of(clients);
+  fanOut.ofListeners(64);
   return fanOut.take();
 }
 

@@ -14,6 +14,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "bench/all.h"
 #include "bench/sockets.h"
 #include "bench/timing.h"
 #include "handoff/spsc_ring.h"
@@ -34,10 +35,12 @@ PipelineMessage stamped(std::int64_t time_ns) {
   return message;
 }
 
-// Calls tick(time) at 1 kHz with the rights of a servo thread, for ever.
+enum class Rights { servo, normal };
+
+// Calls tick(time) at 1 kHz, for ever.
 template <class Tick>
-[[noreturn]] void pace(Tick&& tick) {
-  becomeRealtime();
+[[noreturn]] void pace(Tick&& tick, Rights rights = Rights::servo) {
+  if (rights == Rights::servo) becomeRealtime();
   for (std::int64_t due = nowNs() + kPeriod_ns;; due = std::max(due + kPeriod_ns, nowNs())) {
     sleepUntilNs(due);
     tick(nowNs());
@@ -99,7 +102,22 @@ void encodeTick(std::int64_t time_ns, std::uint64_t tick, wire::FrameEncoder& en
   encoder.add({}, sender, report);
 }
 
-int blaster(std::size_t clients) {
+// The messages of one tick for a client that did not choose, stamped in their headers.
+void encodeDefaultTick(wire::FrameEncoder& encoder) {
+  const wire::LocalSender sender{1};
+  timespec now{};
+  clock_gettime(CLOCK_REALTIME, &now);
+  const wire::Time stamp{static_cast<std::uint32_t>(now.tv_sec),
+                         static_cast<std::uint32_t>(now.tv_nsec / 1000)};
+  encoder.clear();
+  encoder.add(stamp, sender, wire::TrackerPosQuat{});
+  encoder.add(stamp, sender, wire::TrackerVelocity{});
+  encoder.add(stamp, sender, wire::IsTouching{});
+}
+
+enum class Messages { five, byDefault };
+
+int blaster(std::size_t clients, Messages messages) {
   raiseDescriptorLimit();
   Listener listener;
   std::printf("listening on 127.0.0.1:%d\n", static_cast<int>(listener.port()));
@@ -109,7 +127,11 @@ int blaster(std::size_t clients) {
   wire::FrameEncoder encoder;
   std::uint64_t tick = 0;
   pace([&](std::int64_t time) {
-    encodeTick(time, ++tick, encoder);
+    if (messages == Messages::five) {
+      encodeTick(time, ++tick, encoder);
+    } else {
+      encodeDefaultTick(encoder);
+    }
     const wire::ByteView bytes = encoder.bytes();
     for (const Socket& socket : sockets) {
       // Who has no room for a whole tick misses it.
@@ -117,6 +139,35 @@ int blaster(std::size_t clients) {
       if (errno != EAGAIN && errno != EWOULDBLOCK) _exit(0);
     }
   });
+}
+
+// The policy of a stock server: one thread of normal priority, which sleeps, takes the present state and
+// sends it to everybody. A tick that it cannot serve in time does not happen.
+int stock(std::size_t clients) {
+  raiseDescriptorLimit();
+  Listener listener;
+  std::printf("listening on 127.0.0.1:%d\n", static_cast<int>(listener.port()));
+  std::fflush(stdout);
+  std::vector<Socket> streams;
+  std::vector<Socket> sockets;
+  while (sockets.size() < clients) {
+    streams.push_back(listener.accept());
+    std::uint16_t port = 0;
+    if (!streams.back().receiveAll(std::as_writable_bytes(std::span(&port, 1)))) return 1;
+    sockets.push_back(Socket::connectDatagrams(port));
+  }
+  wire::FrameEncoder encoder;
+  std::uint64_t tick = 0;
+  pace(
+      [&](std::int64_t time) {
+        encodeTick(time, ++tick, encoder);
+        const wire::ByteView bytes = encoder.bytes();
+        for (const Socket& socket : sockets) {
+          if (::send(socket.fd(), bytes.data(), bytes.size(), MSG_DONTWAIT) < 0 && errno == ECONNREFUSED)
+            _exit(0);
+        }
+      },
+      Rights::normal);
 }
 
 }  // namespace
@@ -128,7 +179,10 @@ int runHelper(const std::vector<std::string>& arguments) {
   if (role == "pipeline") return pipeline(port());
   if (role == "plain") return plain(port());
   if (role == "sink") return sink(port(), number(2));
-  if (role == "blaster") return blaster(number(1));
+  if (role == "blaster") return blaster(number(1), Messages::five);
+  if (role == "default-blaster") return blaster(number(1), Messages::byDefault);
+  if (role == "stock") return stock(number(1));
+  if (role == "device-host") return hostStrokingDevice();
   throw std::invalid_argument("there is no helper '" + role + "'");
 }
 

@@ -8,7 +8,8 @@
 
 namespace hapticd::bench {
 
-/// Runs one: "pipeline PORT", "plain PORT", "sink PORT BYTES", "blaster CLIENTS". Returns the exit code.
+/// Runs one: "pipeline PORT", "plain PORT", "sink PORT BYTES", "blaster CLIENTS",
+/// "default-blaster CLIENTS", "stock CLIENTS", "device-host". Returns the exit code.
 int runHelper(const std::vector<std::string>& arguments);
 
 /// Bytes of one message of the raw pipelines; the first eight are the time it is about, CLOCK_MONOTONIC in

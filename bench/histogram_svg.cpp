@@ -26,9 +26,9 @@ std::string format(const char* pattern, auto... values) {
 // One decade of shares takes the same height; the floor is one sample.
 class Axes {
  public:
-  explicit Axes(const Picture& picture) : from_(picture.from), to_(picture.to) {
+  explicit Axes(const Figure& figure) : from_(figure.from), to_(figure.to) {
     std::size_t most = 10;
-    for (const auto& series : picture.series) most = std::max(most, series.samples.count());
+    for (const auto& series : figure.series) most = std::max(most, series.samples.count());
     floor_ = -std::ceil(std::log10(static_cast<double>(most)));
   }
   double x(double value) const { return kLeft + (value - from_) / (to_ - from_) * (kWidth - kLeft - kRight); }
@@ -48,7 +48,7 @@ class Axes {
   double floor_ = -5;
 };
 
-std::string grid(const Picture& picture, const Axes& axes) {
+std::string grid(const Figure& figure, const Axes& axes) {
   std::string svg;
   for (int decade = 0; decade >= static_cast<int>(axes.floorDecade()); --decade) {
     const double y = axes.y(std::pow(10.0, decade));
@@ -58,49 +58,48 @@ std::string grid(const Picture& picture, const Axes& axes) {
                   100 * std::pow(10.0, decade));
   }
   for (int i = 0; i <= 6; ++i) {
-    const double value = picture.from + (picture.to - picture.from) * i / 6;
+    const double value = figure.from + (figure.to - figure.from) * i / 6;
     svg += format("<text x='%.1f' y='%.0f' text-anchor='middle'>%g</text>\n", axes.x(value),
                   kHeight - kBottom + 18, value);
   }
   return svg +
          format("<text x='%.0f' y='%.0f' text-anchor='middle'>%s; the last column holds all above</text>\n",
-                (kLeft + kWidth - kRight) / 2, kHeight - 8, picture.unit.c_str());
+                (kLeft + kWidth - kRight) / 2, kHeight - 8, figure.unit.c_str());
 }
 
-std::string curve(const Picture::Series& series, const Axes& axes, const Picture& picture,
-                  const char* colour) {
+std::string curve(const Figure::Series& series, const Axes& axes, const Figure& figure, const char* colour) {
   std::array<double, kBins> share{};
   for (const double value : series.samples.values()) {
     share[static_cast<std::size_t>(axes.binOf(value))] += 1.0 / static_cast<double>(series.samples.count());
   }
-  std::string points = format("%.1f,%.1f", axes.x(picture.from), axes.y(0));
+  std::string points = format("%.1f,%.1f", axes.x(figure.from), axes.y(0));
   for (int i = 0; i < kBins; ++i) {
     const double y = axes.y(share[static_cast<std::size_t>(i)]);
-    const double left = picture.from + i * axes.binWidth();
+    const double left = figure.from + i * axes.binWidth();
     points += format(" %.1f,%.1f %.1f,%.1f", axes.x(left), y, axes.x(left + axes.binWidth()), y);
   }
-  points += format(" %.1f,%.1f", axes.x(picture.to), axes.y(0));
+  points += format(" %.1f,%.1f", axes.x(figure.to), axes.y(0));
   return "<polyline points='" + points + "' fill='" + colour + "' fill-opacity='0.15' stroke='" + colour +
          "' stroke-width='1.5'/>\n";
 }
 
 }  // namespace
 
-std::string asSvg(const Picture& picture) {
-  const Axes axes(picture);
+std::string asSvg(const Figure& figure) {
+  const Axes axes(figure);
   std::string svg = format(
       "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 %.0f %.0f' font-family='sans-serif' "
       "font-size='11'>\n"
       "<rect width='100%%' height='100%%' fill='white'/>\n",
       kWidth, kHeight);
-  svg += "<text x='60' y='18' font-size='13'>" + picture.title + "</text>\n" + grid(picture, axes);
+  svg += "<text x='60' y='18' font-size='13'>" + figure.title + "</text>\n" + grid(figure, axes);
   double x = kLeft;
-  for (std::size_t i = 0; i < picture.series.size(); ++i) {
+  for (std::size_t i = 0; i < figure.series.size(); ++i) {
     const char* colour = kColours[i % kColours.size()];
-    svg += curve(picture.series[i], axes, picture, colour);
+    svg += curve(figure.series[i], axes, figure, colour);
     svg +=
-        format("<text x='%.0f' y='33' fill='%s'>&#9632; ", x, colour) + picture.series[i].label + "</text>\n";
-    x += 30 + 6.5 * static_cast<double>(picture.series[i].label.size());
+        format("<text x='%.0f' y='33' fill='%s'>&#9632; ", x, colour) + figure.series[i].label + "</text>\n";
+    x += 30 + 6.5 * static_cast<double>(figure.series[i].label.size());
   }
   return svg + "</svg>\n";
 }

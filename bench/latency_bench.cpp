@@ -148,14 +148,14 @@ Outcome measureLatency(const Run& run) {
                    sharesOf(plain.latencies_us())}};
   outcome.remarks.push_back("The raw pipeline: " + sharesOf(pipeline.latencies_us()));
   outcome.remarks.push_back("The paper: 99.68 % under 300 us.");
-  outcome.pictures.push_back({"latency",
-                              "From the tick to the callback of a client",
-                              "us",
-                              0,
-                              360,
-                              {{"hapticd, client in poll", polling.latencies_us()},
-                               {"hapticd, client spinning", spinning.latencies_us()},
-                               {"raw pipeline", pipeline.latencies_us()}}});
+  outcome.figures.push_back({"latency",
+                             "From the tick to the callback of a client",
+                             "us",
+                             0,
+                             360,
+                             {{"hapticd, client in poll", polling.latencies_us()},
+                              {"hapticd, client spinning", spinning.latencies_us()},
+                              {"raw pipeline", pipeline.latencies_us()}}});
   return outcome;
 }
 

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -19,6 +20,7 @@ struct Options {
   bool full = false;
   bool longest = false;
   bool list = false;
+  bool json = false;
   std::string out;
   std::vector<std::string> helper;
 };
@@ -42,12 +44,18 @@ void write(const std::filesystem::path& directory, const std::vector<Measured>& 
   const auto machine = describeMachine(length);
   writeJson(directory / "results.json", all, machine);
   writeCsv(directory / "results.csv", all);
-  writePictures(directory, all);
+  writeFigures(directory, all);
   writeFile(directory / "results.md", asMarkdown(all, machine));
 }
 
 int run(const Options& options) {
   if (!options.helper.empty()) return runHelper(options.helper);
+  if (options.list && options.json) {
+    nlohmann::json list = nlohmann::json::array();
+    for (const Benchmark& b : benchmarks()) list.push_back({{"name", b.name}, {"what", b.what}});
+    std::printf("%s\n", list.dump().c_str());
+    return 0;
+  }
   if (options.list) {
     for (const Benchmark& b : benchmarks()) std::printf("%-12s %s\n", b.name.c_str(), b.what.c_str());
     return 0;
@@ -81,7 +89,8 @@ int run(const Options& options) {
 void declare(CLI::App& app, Options& options) {
   app.name("hapticd bench");
   app.add_option("names", options.names, "Benchmarks to run [all of them]");
-  app.add_flag("--list", options.list, "List the benchmarks and exit");
+  CLI::Option* const list = app.add_flag("--list", options.list, "List the benchmarks and exit");
+  app.add_flag("--json", options.json, "With --list: as JSON")->needs(list);
   app.add_flag("--full", options.full,
                "Longer measurements, about 25 minutes in all [windows of some seconds]");
   app.add_flag("--long", options.longest, "The longest measurements, about an hour");

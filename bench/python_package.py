@@ -72,6 +72,33 @@ def round_trips(name, count):
     return tuple(np.quantile(times, [0.5, 0.99]))
 
 
+def contact_turns(name, seconds):
+    """Median and 99th percentile of the time in the client from a Hand_State that can be read to 16 contacts that the
+    system has taken, in microseconds, and how many there were."""
+    with hapticd.connect(name) as hand:
+        hand.subscribe(hapticd.Reports.HAND, rate_Hz=1000)
+        contacts = [hapticd.RemoteContact(i, (0, -0.05 - 0.001 * i, 0), (0, 1, 0), velocity_m_per_s=(0.01, 0, 0)) for i in range(16)]
+        readable = [0.0]
+        select = hand._select
+
+        def noted(timeout):
+            ready = select(timeout)
+            readable[0] = time.perf_counter()
+            return ready
+
+        hand._select = noted
+        times = []
+
+        def answer(state):
+            hand.set_remote_contacts(contacts)
+            hand.flush()
+            times.append((time.perf_counter() - readable[0]) * 1e6)
+
+        hand.on_hand(answer)
+        hand.run_for(seconds)
+    return (*np.quantile(times, [0.5, 0.99]), len(times))
+
+
 def long_recording(program, folder, ticks):
     """A recording of so many ticks: the blocks of a real one, again and again."""
     short = os.path.join(folder, "short.haptics")
@@ -127,8 +154,14 @@ def main():
         if values:
             p50, p99 = np.median(values, axis=0)
             print(f"question to answer in {language}: median {p50:.0f} us, p99 {p99:.0f} us (medians of 5 x 1000)")
+    if rounds["C++"]:
+        ours, theirs = (np.median(rounds[language], axis=0) for language in ("Python", "C++"))
+        print(f"  Python over C++: median {ours[0] / theirs[0]:.1f}, p99 {ours[1] / theirs[1]:.1f}")
+    p50, p99, count = contact_turns(name, 5)
+    print(f"Hand_State in to 16 remote contacts out: median {p50:.0f} us, p99 {p99:.0f} us ({count} in 5 s)")
     process.terminate()
     process.wait()
+    print(f"load: {os.getloadavg()[0]:.1f}")
     with tempfile.TemporaryDirectory() as folder:
         path = long_recording(program, folder, 1_000_000)
         for verify in (True, False):

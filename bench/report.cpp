@@ -152,8 +152,8 @@ std::string asMarkdown(const std::vector<Measured>& all, const std::vector<std::
       text += goals + " |\n";
     }
     for (const std::string& remark : measured.outcome.remarks) text += "\n" + remark + "\n";
-    for (const Picture& picture : measured.outcome.pictures) {
-      text += "\n![" + picture.title + "](figures/" + picture.file + ".svg)\n";
+    for (const Figure& figure : measured.outcome.figures) {
+      text += "\n![" + figure.title + "](figures/" + figure.file + ".svg)\n";
     }
   }
   return text;
@@ -199,10 +199,10 @@ void writeCsv(const std::filesystem::path& file, const std::vector<Measured>& al
   writeFile(file, text);
 }
 
-void writePictures(const std::filesystem::path& directory, const std::vector<Measured>& all) {
+void writeFigures(const std::filesystem::path& directory, const std::vector<Measured>& all) {
   for (const Measured& measured : all) {
-    for (const Picture& picture : measured.outcome.pictures) {
-      writeFile(directory / (picture.file + ".svg"), asSvg(picture));
+    for (const Figure& figure : measured.outcome.figures) {
+      writeFile(directory / (figure.file + ".svg"), asSvg(figure));
     }
   }
 }

@@ -26,10 +26,10 @@ std::string asMarkdown(const std::vector<Measured>& all, const std::vector<std::
 void writeJson(const std::filesystem::path& file, const std::vector<Measured>& all,
                const std::vector<std::string>& machine);
 void writeCsv(const std::filesystem::path& file, const std::vector<Measured>& all);
-void writePictures(const std::filesystem::path& directory, const std::vector<Measured>& all);
+void writeFigures(const std::filesystem::path& directory, const std::vector<Measured>& all);
 void writeFile(const std::filesystem::path& file, const std::string& text);
 
 /// A histogram as a drawing, the share of samples (logarithmic) over the value.
-std::string asSvg(const Picture& picture);
+std::string asSvg(const Figure& figure);
 
 }  // namespace hapticd::bench

@@ -83,6 +83,15 @@ Socket Socket::connect(std::uint16_t port, int receiveBuffer_bytes) {
   return socket;
 }
 
+Socket Socket::connectDatagrams(std::uint16_t port) {
+  Socket socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  if (socket.fd_ < 0) fail("socket");
+  const sockaddr_in address = loopback(port);
+  if (::connect(socket.fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
+    fail("connect");
+  return socket;
+}
+
 void Socket::sendAll(std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
     const ssize_t sent = ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL);

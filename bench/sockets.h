@@ -20,6 +20,8 @@ class Socket {
 
   /// To 127.0.0.1, without Nagle's delay. A small receive buffer makes a slow reader slow sooner.
   static Socket connect(std::uint16_t port, int receiveBuffer_bytes = 0);
+  /// A datagram socket that sends to this port of 127.0.0.1.
+  static Socket connectDatagrams(std::uint16_t port);
 
   int fd() const noexcept { return fd_; }
   void sendAll(std::span<const std::byte> bytes);

@@ -68,12 +68,12 @@ Outcome measureWakeup(const Run& run) {
   row.checks.push_back({"p99 ratio", against(row.ours.p99, t.p99), 1.2, false, reason});
   row.checks.push_back({"p99.9 ratio", against(row.ours.p999, t.p999), 1.5, false, reason});
   outcome.rows.push_back(row);
-  outcome.pictures.push_back({"wakeup",
-                              "Wake-up error of the loop and of cyclictest",
-                              "us",
-                              0,
-                              120,
-                              {{"hapticd", ours}, {"cyclictest", theirs}}});
+  outcome.figures.push_back({"wakeup",
+                             "Wake-up error of the loop and of cyclictest",
+                             "us",
+                             0,
+                             120,
+                             {{"hapticd", ours}, {"cyclictest", theirs}}});
   return outcome;
 }
 

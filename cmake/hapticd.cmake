@@ -36,8 +36,12 @@ if(HAPTICD_SANITIZE)
   endif()
 endif()
 
-# These rooms are compiled without precompiled headers, because some have options of their own.
+# Rooms whose tests compute so much that they are optimised under the sanitizers, too.
 set(HAPTICD_COMPUTING_ROOMS "/(geometry|scene|realtime|truth|simulated)(/|$)")
+
+# For the rooms that a tick runs through. A tenth fewer instructions, and 5 % of its time. Nobody replaces our functions or
+# reads errno after our roots.
+set(HAPTICD_TICK_OPTIONS $<$<CONFIG:Release>:-O3> -fno-semantic-interposition -fno-math-errno)
 
 # Asio and Beast. They are compiled into each source that includes them, so all sources must see the same options.
 find_package(Boost 1.74 REQUIRED)
@@ -51,13 +55,11 @@ endif()
 
 # hapticd_precompile(TARGET HEADERS): TARGET includes the precompiled headers of HEADERS, if HAPTICD_PCH has them made.
 function(hapticd_precompile target headers)
-  if(TARGET ${headers} AND NOT CMAKE_CURRENT_SOURCE_DIR MATCHES "${HAPTICD_COMPUTING_ROOMS}")
+  if(TARGET ${headers})
     target_precompile_headers(${target} REUSE_FROM ${headers})
-    # GCC 12 reports accesses beyond arrays inside of precompiled standard headers, where there are none.
-    target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds>)
-    if(HAPTICD_SANITIZE MATCHES "thread")
-      target_compile_options(${target} PRIVATE "$<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-stringop-overflow>")  # the same with copies
-    endif()
+    # GCC 12 reports copies beyond arrays inside of precompiled standard headers, where there are none.
+    target_compile_options(${target} PRIVATE
+      "$<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds;-Wno-restrict;-Wno-stringop-overflow>")
   endif()
 endfunction()
 
@@ -101,11 +103,14 @@ set(HAPTICD_STD_HEADERS <algorithm> <array> <atomic> <chrono> <cmath> <cstdint> 
   <vector>)
 hapticd_headers(hapticd_room_headers ROOMS PIC
   LIBS Eigen3::Eigen HEADERS ${HAPTICD_STD_HEADERS} <Eigen/Core> <Eigen/Geometry>)
+hapticd_headers(hapticd_tick_headers ROOMS PIC
+  LIBS Eigen3::Eigen OPTIONS ${HAPTICD_TICK_OPTIONS} HEADERS ${HAPTICD_STD_HEADERS} <Eigen/Core> <Eigen/Geometry>)
 
-# hapticd_library(NAME SOURCES ... DEPENDS rooms ... [LIBS external ...] [PRIVATE_LIBS external ...])
+# hapticd_library(NAME [TICK] SOURCES ... DEPENDS rooms ... [LIBS external ...] [PRIVATE_LIBS external ...])
 # One library for each folder of src/. DEPENDS lists the rooms that it may include; scripts/check_includes.sh reads it.
+# TICK: nearly every tick runs through the room.
 function(hapticd_library name)
-  cmake_parse_arguments(A "" "" "SOURCES;DEPENDS;LIBS;PRIVATE_LIBS" ${ARGN})
+  cmake_parse_arguments(A "TICK" "" "SOURCES;DEPENDS;LIBS;PRIVATE_LIBS" ${ARGN})
   set(deps ${A_DEPENDS})
   list(TRANSFORM deps PREPEND hapticd_)
   if(A_SOURCES)
@@ -113,7 +118,12 @@ function(hapticd_library name)
     target_include_directories(hapticd_${name} PUBLIC ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/include)
     target_link_libraries(hapticd_${name} PUBLIC ${deps} ${A_LIBS} PRIVATE hapticd_flags ${A_PRIVATE_LIBS})
     set_target_properties(hapticd_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
-    hapticd_speed_up(hapticd_${name} hapticd_room_headers ALL)
+    if(A_TICK)
+      target_compile_options(hapticd_${name} PRIVATE ${HAPTICD_TICK_OPTIONS})
+      hapticd_speed_up(hapticd_${name} hapticd_tick_headers ALL)
+    else()
+      hapticd_speed_up(hapticd_${name} hapticd_room_headers ALL)
+    endif()
   else()
     add_library(hapticd_${name} INTERFACE)
     target_include_directories(hapticd_${name} INTERFACE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/include)
@@ -156,11 +166,13 @@ function(hapticd_compile_as_test target)
   if(TARGET hapticd_test_headers)
     target_link_libraries(${target} PRIVATE Eigen3::Eigen GTest::gtest GTest::gmock)  # what the precompiled headers include
   endif()
-  if(NOT (HAPTICD_SANITIZE AND CMAKE_CURRENT_SOURCE_DIR MATCHES "${HAPTICD_COMPUTING_ROOMS}"))
-    target_compile_options(${target} PRIVATE ${HAPTICD_TEST_OPTIONS})
-  endif()
   target_compile_definitions(${target} PRIVATE HAPTICD_TESTDATA="${PROJECT_SOURCE_DIR}/testdata")
-  hapticd_speed_up(${target} hapticd_test_headers TESTS)
+  if(HAPTICD_SANITIZE MATCHES "address" AND CMAKE_CURRENT_SOURCE_DIR MATCHES "${HAPTICD_COMPUTING_ROOMS}")
+    hapticd_speed_up(${target} hapticd_computing_test_headers TESTS)
+  else()
+    target_compile_options(${target} PRIVATE ${HAPTICD_TEST_OPTIONS})
+    hapticd_speed_up(${target} hapticd_test_headers TESTS)
+  endif()
 endfunction()
 
 # hapticd_test(NAME SOURCES ... DEPENDS rooms ... [SUPPORT ...] [LIBS ...] [LABELS ...])

@@ -40,7 +40,7 @@ endforeach()
 install(FILES packaging/grafana/hapticd.json DESTINATION ${CMAKE_INSTALL_DATADIR}/hapticd/grafana)
 install(FILES testdata/meshes/bunny.obj DESTINATION ${CMAKE_INSTALL_DATADIR}/hapticd/meshes)
 # What an operator copies into the system; the Debian package does it (scripts/package.sh).
-install(FILES packaging/systemd/hapticd.service packaging/sysusers/hapticd.conf packaging/udev/70-hapticd.rules packaging/hapticd.toml
+install(FILES packaging/systemd/hapticd.service packaging/systemd/hapticd-loopback.service packaging/sysusers/hapticd.conf packaging/udev/70-hapticd.rules packaging/hapticd.toml
         DESTINATION ${CMAKE_INSTALL_DATADIR}/hapticd/system)
 install(FILES packaging/limits/hapticd.conf DESTINATION ${CMAKE_INSTALL_DATADIR}/hapticd/system RENAME limits.conf)
 install(FILES packaging/desktop/hapticd.desktop DESTINATION ${CMAKE_INSTALL_DATADIR}/applications)

@@ -142,10 +142,10 @@ class HAPTICD_EXPORT Client {
   void setObjectCount(int count);
   /// Sends a mesh and returns when the system has accepted all of it; calls `progress` meanwhile, the last
   /// time with all bytes. A server of this project receives bulk messages in a batch, so that no tick renders
-  /// part of the mesh; other servers receive three setVertex() per triangle. Vertices and triangles of an
-  /// earlier, larger mesh remain: call resetScene() or clearMesh() first. Inside batch() it only collects and
-  /// reports no progress. Throws std::invalid_argument for a triangle with an index outside the vertices,
-  /// ConnectError without a connection, and ConnectionLost.
+  /// part of the mesh; other servers receive three setVertex() per triangle. Replaces the mesh that the
+  /// object has; setVertices() changes parts of it. Inside batch() it only collects and reports no progress.
+  /// Throws std::invalid_argument for a triangle with an index outside the vertices, ConnectError without a
+  /// connection, and ConnectionLost.
   void uploadMesh(int object, const MeshView& mesh, const Callback<UploadProgress>& progress = {});
   /// The same for a list of corners: three consecutive ones are a triangle. Object units.
   void uploadCorners(int object, std::span<const std::array<float, 3>> corners,
@@ -162,6 +162,9 @@ class HAPTICD_EXPORT Client {
   void setSurfaceProperty(int object, std::string_view property, float value);
   /// Places an object in the world. It may be called at any rate: the hand feels the object move.
   void setTransform(int object, const Matrix4& T_world_object);
+  /// Names an object for people, in the viewer and in recordings: at most 64 bytes. Servers without
+  /// extensions ignore it.
+  void setObjectName(int object, std::string_view name);
   /// Starts or stops rendering an object.
   void setTouchable(int object, bool touchable);
   /// Chooses which sides of all objects are rendered; both initially.
@@ -212,9 +215,17 @@ class HAPTICD_EXPORT Client {
   /// confirmed within ClientOptions::connectTimeout (at least 1 s); the stop on the first connection then
   /// still takes effect when the server reads it.
   void stopForces();
+  /// Marks a moment, such as "trial 3 begins": the server records it and reports it to all clients. At most
+  /// 255 bytes. Sends at once. Throws ConnectionLost without a connection.
+  void mark(std::string_view text);
   /// Ends a stop and clears latched trips; the force ramps in over half a second. It keeps its place behind
-  /// the commands sent before it, and never undoes a stop that is sent after it.
+  /// the commands sent before it, and never undoes a stop that is sent after it. The server refuses it, by a
+  /// text that names who stopped, while a stop of another client stands, unless this one is an operator by a
+  /// token or a user id.
   void rearmForces();
+  /// Presents a token for a role, on every connection from now on; 16 to 128 characters, or empty for none
+  /// (std::invalid_argument). Without TLS, everybody on the way can read it. A refusal arrives as a text.
+  void presentToken(std::string_view token);
   /// From now on the server disconnects this client and ends its effects when it receives no heartbeat for
   /// 500 ms. The client sends ten heartbeats per second while it polls or waits: a program that hangs, or
   /// does not poll for 500 ms, is disconnected. Repeated on every new connection.

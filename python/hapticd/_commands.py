@@ -154,6 +154,10 @@ class Commands:
         which answer with a text."""
         self._send(m.SetTrimeshType(object, type))
 
+    def set_object_name(self, object: int, name: str) -> None:
+        """Names an object for people, in the viewer and in recordings: at most 64 bytes."""
+        self._send(m.SetObjectName(object, name))
+
     def clear_mesh(self, object: int) -> None:
         """Removes all vertices and triangles of an object."""
         self._send(m.ClearTrimesh(object))

@@ -1,6 +1,7 @@
 """The client without sockets: what both faces share. A face moves bytes, keeps time and waits."""
 
 import copy
+import secrets
 import time
 from collections import deque
 from dataclasses import dataclass
@@ -207,6 +208,8 @@ class Core(Commands):
         self._pings = self._pongs = 0  # of this connection
         self._server_devices: List[str] = []
         self._subscription: Optional[m.Subscribe] = None
+        self._token = ""
+        self._key = secrets.randbits(63) | 1  # by which the server knows the connections of this client
         self._heartbeats = False
         self._callbacks: Dict[str, List[Subscription[Any]]] = {kind: [] for kind in (*r.KINDS, "connection")}
         self._first_error = ""
@@ -292,6 +295,8 @@ class Core(Commands):
         self._counts.connections += 1
         self._pings = self._pongs = 0
         self._put_now(m.QueryCapabilities())
+        if self._token:
+            self._put_now(self._identity())
         if self._subscription is not None:
             self._put_now(self._subscription)
         if self._heartbeats:
@@ -530,6 +535,16 @@ class Core(Commands):
             remote_contacts=self._has(m.FEATURE_REMOTE_CONTACTS),
         )
 
+    def _identity(self) -> m.Identify:
+        return m.Identify(self._token, self._key)
+
+    def _set_token(self, token: str) -> None:
+        if token and not 16 <= len(token.encode()) <= 128:
+            raise ValueError(f"present_token(): {len(token.encode())} characters; a token has 16 to 128")
+        self._token = token
+        if self.connected and token:
+            self._put_now(self._identity())
+
     def _set_subscription(self, kinds: Reports, rate_Hz: float) -> None:
         self._subscription = m.Subscribe(int(kinds), rate_Hz)
         if self.connected:
@@ -622,14 +637,16 @@ class Core(Commands):
         self, object: int, vertices: "npt.NDArray[Any]", triangles: "Optional[npt.NDArray[Any]]"
     ) -> Tuple[List[bytes], int]:
         """Frames and number of messages of a mesh: thousands of vertices per message where the server supports it,
-        else one by one. Without triangles, consecutive triples of vertices are triangles."""
+        else one by one, after a message that removes the present mesh. Without triangles, consecutive triples of
+        vertices are triangles."""
+        clear = [self._frame(m.ClearTrimesh(object))]
         if self._has(m.FEATURE_BULK_MESH):
-            frames = self._run_frames(m.MeshVertices, object, 0, vertices)
+            frames = clear + self._run_frames(m.MeshVertices, object, 0, vertices)
             if triangles is not None:
                 frames += self._run_frames(m.MeshTriangles, object, 0, triangles)
             return frames, len(frames)
         corners = vertices if triangles is None else vertices[triangles.astype(np.int64).ravel()]
-        return [self._vertex_frames(object, 0, corners)], len(corners)
+        return [*clear, self._vertex_frames(object, 0, corners)], 1 + len(corners)
 
     def _batched(self, frames: List[bytes]) -> List[bytes]:
         """The frames of an upload as a batch if it fits, so that no tick renders half a mesh."""

@@ -623,6 +623,54 @@ class HandState(NamedTuple):
     contacts: Numbers = ()
 
 
+class Identify(NamedTuple):
+    """Presents a token for a role, and a random key that the connections of one program share."""
+
+    token: str = ""
+    key: int = 0
+
+
+class ReleaseControl(NamedTuple):
+    """Gives up the control that `control = "first"` gave to this client, for the next one to command."""
+
+
+class Poses(NamedTuple):
+    """Reports the objects that move, until 1 s after they rest: 13 numbers each, up to 256 in one tick."""
+
+    tick: int = 0
+    time: int = 0  # ns
+    poses: Numbers = ()
+
+
+class SetObjectName(NamedTuple):
+    """Names an object, for the viewer and for recordings."""
+
+    object: int = 0
+    text: str = ""
+
+
+class Marker(NamedTuple):
+    """Marks a moment, such as "trial 3 begins": recorded, and reported to all clients with its time."""
+
+    time: int = 0  # ns
+    text: str = ""
+
+
+class ReplayControl(NamedTuple):
+    """Pauses a replayed recording, changes its speed (0 keeps it), or seeks (a negative time does not)."""
+
+    paused: int = 0
+    speed: float = 0.0
+    position: float = -1.0  # s
+
+
+class RecordingControl(NamedTuple):
+    """Begins or ends a recording on the server, in a file of this name; answered by a text."""
+
+    record: int = 0
+    name: str = ""
+
+
 #: The layout of every message, in the order of the table.
 LAYOUTS: Final[Tuple[Layout[Any], ...]] = (
     define(Text, "vrpn_Base text_message", (
@@ -982,6 +1030,33 @@ LAYOUTS: Final[Tuple[Layout[Any], ...]] = (
         ("guard_active", "I"),
         ("contacts", "listid", 128),
     )),
+    define(Identify, "hapticd Identify", (
+        ("token", "name", 128),
+        ("key", "Q"),
+    )),
+    define(ReleaseControl, "hapticd Release_Control", ()),
+    define(Poses, "hapticd Poses", (
+        ("tick", "Q"),
+        ("time", "q"),
+        ("poses", "listid", 3328),
+    )),
+    define(SetObjectName, "hapticd Set_Object_Name", (
+        ("object", "i"),
+        ("text", "name", 64),
+    )),
+    define(Marker, "hapticd Marker", (
+        ("time", "q"),
+        ("text", "text", 256),
+    )),
+    define(ReplayControl, "hapticd Replay_Control", (
+        ("paused", "h"),
+        ("speed", "d"),
+        ("position", "d"),
+    )),
+    define(RecordingControl, "hapticd Recording_Control", (
+        ("record", "h"),
+        ("name", "name", 128),
+    )),
 )
 
 #: Vertices or triangles in one message at most.
@@ -1000,6 +1075,7 @@ REPORT_CONTACT_POINT: Final = 128
 REPORT_TOUCH_BUTTON: Final = 256
 REPORT_CONTACT_ANALOG: Final = 512
 REPORT_HIP: Final = 1024
+REPORT_POSES: Final = 2048
 #: Bits of Capabilities.features.
 FEATURE_BULK_MESH: Final = 1
 FEATURE_BATCH: Final = 2

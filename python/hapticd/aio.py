@@ -468,10 +468,13 @@ class Client(Core):
             sock = self._transport.get_extra_info("socket")
             if sock is not None and not self._transport.is_closing():
                 backlog += unacknowledged(sock)
+        behind = backlog > STOP_BACKLOG_BYTES and (not self._answered or self._has(m.FEATURE_STOP))
+        if behind:  # both connections stop, and this one may undo both
+            self._put_now(self._identity())
         if not self._put_now(m.StopForces()):
             raise ConnectionLost(f"forces not stopped: {self._why_not_connected()}")
         self._push()
-        if backlog > STOP_BACKLOG_BYTES and (not self._answered or self._has(m.FEATURE_STOP)):
+        if behind:
             await self._stop_beside(backlog)
         await self._require(m.FEATURE_STOP, "stop the forces")
 
@@ -482,6 +485,7 @@ class Client(Core):
         async with connect(f"{self.device}@tcp://{self._target[0]}:{self._target[1]}", options) as beside:
             sent = await beside._wait(lambda: beside.connected, timeout)
             if sent:
+                beside._put_now(self._identity())
                 beside._put_now(m.StopForces())
                 beside._ping()
                 beside._push()
@@ -496,6 +500,17 @@ class Client(Core):
         """Ends a stop and clears latched trips; the force ramps in over half a second."""
         await self._require(m.FEATURE_STOP, "re-arm the forces")
         self._put_now(m.RearmForces())
+        self._push()
+
+    async def mark(self, text: str) -> None:
+        """Marks a moment, such as "trial 3 begins"; see hapticd.Client.mark()."""
+        self._put_now(m.Marker(0, text))
+        self._push()
+
+    def present_token(self, token: str) -> None:
+        """Presents a token for a role, on every connection from now on: 16 to 128 characters, or empty for none. Without
+        TLS, everybody on the way can read it. A refusal arrives as a text. Raises ValueError for another length."""
+        self._set_token(token)
         self._push()
 
     async def enable_heartbeat(self, enable: bool = True) -> None:

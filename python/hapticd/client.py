@@ -471,9 +471,9 @@ class Client(Core):
         """Sends a mesh, (n, 3) positions in object units and (m, 3) vertex numbers, counter-clockwise seen from the
         front, and returns when the system has accepted all of it; calls `progress` meanwhile, the last time with all
         bytes. A server of this project receives it in a batch, so that no tick renders part of the mesh; other
-        servers receive three set_vertex() per triangle. Vertices and triangles of an earlier, larger mesh remain:
-        call reset_scene() or clear_mesh() first. Inside batch() it only collects. Raises ValueError for a wrong shape
-        or a triangle with an index outside the vertices, ConnectError and ConnectionLost."""
+        servers receive three set_vertex() per triangle. Replaces the mesh that the object has; set_vertices()
+        changes parts of it. Inside batch() it only collects. Raises ValueError for a wrong shape or a triangle with an
+        index outside the vertices, ConnectError and ConnectionLost."""
         rows = as_vertices(vertices)
         self._upload(object, rows, as_triangles(triangles, len(rows)), progress)
 
@@ -543,10 +543,13 @@ class Client(Core):
         backlog = self._out_bytes + (self._peer.stream_bytes if self._peer is not None else 0)
         if self._sock is not None and not self._connecting:
             backlog += unacknowledged(self._sock)
+        behind = backlog > STOP_BACKLOG_BYTES and (not self._answered or self._has(m.FEATURE_STOP))
+        if behind:  # both connections stop, and this one may undo both
+            self._put_now(self._identity())
         if not self._put_now(m.StopForces()):
             raise ConnectionLost(f"forces not stopped: {self._why_not_connected()}")
         self._push()
-        if backlog > STOP_BACKLOG_BYTES and (not self._answered or self._has(m.FEATURE_STOP)):
+        if behind:
             self._stop_beside(backlog)
         self._require(m.FEATURE_STOP, "stop the forces")
 
@@ -559,7 +562,7 @@ class Client(Core):
             sent = False
             while not (sent and beside._all_pongs) and time.monotonic() < deadline:
                 if not sent and beside.connected:
-                    sent = beside._put_now(m.StopForces())
+                    sent = beside._put_now(self._identity()) and beside._put_now(m.StopForces())
                     beside._ping()
                 beside._step(0.005)
                 self._step(0.0)  # heartbeats
@@ -574,6 +577,18 @@ class Client(Core):
         commands sent before it, and never undoes a stop that is sent after it."""
         self._require(m.FEATURE_STOP, "re-arm the forces")
         self._put_now(m.RearmForces())
+        self._push()
+
+    def mark(self, text: str) -> None:
+        """Marks a moment, such as "trial 3 begins": the server records it and reports it to all clients. At most 255
+        bytes."""
+        self._put_now(m.Marker(0, text))
+        self._push()
+
+    def present_token(self, token: str) -> None:
+        """Presents a token for a role, on every connection from now on: 16 to 128 characters, or empty for none. Without
+        TLS, everybody on the way can read it. A refusal arrives as a text. Raises ValueError for another length."""
+        self._set_token(token)
         self._push()
 
     def enable_heartbeat(self, enable: bool = True) -> None:

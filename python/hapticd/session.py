@@ -22,6 +22,7 @@ _MAGIC: Final = b"HAPTICS\n"
 _HEAD: Final = struct.Struct(">III")
 _VERSION: Final = 2
 _HEADER, _SCENE, _PUBLISH, _TICKS, _LOST, _END, _LAW = range(1, 8)
+_MARKER = 9
 _MAX_CONTACTS: Final = 1024
 
 _FIXED: Final = np.dtype(
@@ -113,6 +114,7 @@ _COMMANDS: Final[Dict[int, Tuple[str, Tuple[Tuple[str, str], ...]]]] = {
     39: ("BeginBatch", ()),
     40: ("CommitBatch", ()),
     41: ("ReleaseForces", ()),
+    42: ("SetObjectName", (("object", "i"), ("text", "text"))),
 }  # fmt: skip
 
 
@@ -179,6 +181,13 @@ class Command(NamedTuple):
     client: int
     name: str
     fields: Dict[str, Any]
+
+
+class Marker(NamedTuple):
+    """A moment that a client marked."""
+
+    time_ns: int  # since 1970
+    text: str
 
 
 class Lost(NamedTuple):
@@ -524,6 +533,20 @@ class Session:
             except _Cut:
                 raise self._fail(start, "a scene event is truncated") from None
             yield Command(time + self.wall_offset_ns, scene, client, name, fields)
+
+    @property
+    def markers(self) -> Tuple[Marker, ...]:
+        """The moments that clients marked, such as "trial 3 begins"."""
+        found = []
+        for kind, start, length in self._blocks:
+            if kind != _MARKER:
+                continue
+            unpack = _Unpacker(self._bytes[start : start + length])
+            try:
+                found.append(Marker(unpack.one("q") + self.wall_offset_ns, str(unpack.value("text"))))
+            except _Cut:
+                raise self._fail(start, "a marker is truncated") from None
+        return tuple(found)
 
     @property
     def lost(self) -> Tuple[Lost, ...]:

@@ -19,7 +19,7 @@ from hapticd import Effect, Plane, Reports
 from hapticd import _messages as m
 from hapticd._codec import frame
 from hapticd._core import _NUMBERS
-from hapticd._peer import TYPE_NAMES, Peer
+from hapticd._peer import COOKIE, TYPE_NAMES, Peer, _description
 
 WIRE = pathlib.Path(__file__).resolve().parents[2] / "testdata/wire"
 
@@ -256,6 +256,68 @@ def test_a_recorded_stock_server_is_understood() -> None:
     listening = Listener()
     Peer(listening, [], None).feed(bytes(received))
     assert "vrpn_Base ping_message" in [TYPE_NAMES[message[0]] for message in listening.messages]
+
+
+def test_a_stock_server_of_several_devices() -> None:
+    """As VRPN's generic server with a null tracker, a button, dials and analog channels: numbers of its own for senders
+    and types, every device's reports on each connection, a message that no client of this project knows."""
+    pose = m.TrackerPosQuat(sensor=1, position=(0.1, 0.2, 0.3), orientation=(0.0, 0.0, 0.6, 0.8))
+    said = [
+        ("VRPN Control", m.Text(1, 3, "stock text")),
+        ("Button0", m.ButtonChange(2, 1)),
+        ("Tracker0", pose),
+        ("Tracker0", m.TrackerVelocity(sensor=1, velocity=(1.0, 2.0, 3.0))),
+        ("Tracker0", m.TrackerAcceleration(sensor=1, acceleration=(4.0, 5.0, 6.0))),
+        ("Analog0", m.AnalogChannels((1.5, -2.5))),
+        ("Tracker0", m.TrackerWorkspace((-0.2, -0.2, -0.1), (0.2, 0.2, 0.2))),
+    ]
+    senders = ["VRPN Control", "Button0", "Analog0", "Dial0", "Tracker0"]
+    types = [_NUMBERS[type(message)] for _, message in reversed(said)]
+    stream = COOKIE + frame(0, 0, 0, -2, _description(b"vrpn_Dial update"))
+    for i, (_, layout) in enumerate(types, 1):
+        stream += frame(0, 0, i, -2, _description(layout.name.encode()))
+    for i, name in enumerate(senders):
+        stream += frame(0, 0, i, -1, _description(name.encode()))
+    stream += frame(7, 0, senders.index("Dial0"), 0, bytes(24))
+    stream += frame(7, 0, senders.index("Tracker0"), 0, bytes(24))
+    for name, message in said:
+        at = types.index(_NUMBERS[type(message)])
+        stream += frame(7, 500_000, senders.index(name), at + 1, types[at][1].encode(message))
+    for device, kinds in {
+        "Tracker0": {"pose", "velocity", "acceleration", "workspace"},
+        "Button0": {"button"},
+        "Analog0": {"analog"},
+    }.items():
+        listener = socket.create_server(("127.0.0.1", 0))
+
+        def serve(listener: socket.socket = listener) -> None:
+            connection = listener.accept()[0]
+            with connection:
+                connection.sendall(stream)
+                while connection.recv(1 << 16):
+                    pass
+
+        thread = threading.Thread(target=serve, daemon=True)
+        thread.start()
+        seen = {}
+        with hapticd.connect(f"{device}@tcp://127.0.0.1:{listener.getsockname()[1]}") as client:
+            for kind in hapticd.reports.KINDS:
+                getattr(client, f"on_{kind}")(lambda report, kind=kind: seen.setdefault(kind, report))
+            until(client, lambda: kinds <= set(seen))
+            client.run_for(0.1)
+            assert set(seen) == kinds
+            assert client.capabilities is None and client.statistics().messages_damaged == 0
+        thread.join(60)
+        listener.close()
+        assert all(report.time == 7.5 for report in seen.values())
+        if device == "Tracker0":
+            assert seen["pose"].sensor == 1 and seen["pose"].position_m.tolist() == [0.1, 0.2, 0.3]
+            assert seen["acceleration"].acceleration_m_per_s2.tolist() == [4, 5, 6]
+            assert seen["workspace"].max_m.tolist() == [0.2, 0.2, 0.2]
+        elif device == "Button0":
+            assert (seen["button"].button, seen["button"].pressed) == (2, True)
+        else:
+            assert seen["analog"].channels.tolist() == [1.5, -2.5]
 
 
 def test_ctrl_c_ends_a_wait_and_nothing_is_left(server: Server) -> None:

@@ -1,5 +1,4 @@
 #include "base/clock.h"
-#include "base/suspend.h"
 
 #include <cerrno>
 #include <ctime>
@@ -34,7 +33,7 @@ void MonotonicClock::sleepUntil(Nanos deadline) noexcept {
 }
 
 // Two clocks cannot be read at one moment: repeat a reading that was interrupted.
-Nanos suspendedTime() noexcept {
+Nanos MonotonicClock::suspendedTime() noexcept {
   constexpr Nanos kUninterrupted = 1'000'000;
   Nanos before = 0;
   Nanos boot = 0;

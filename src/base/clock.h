@@ -20,6 +20,8 @@ class Clock {
   virtual void sleepUntil(Nanos deadline) noexcept = 0;
   /// Nanoseconds since 1970, UTC. Jumps when the clock of the machine is set.
   virtual Nanos wallNow() noexcept = 0;
+  /// Total time for which the machine was suspended since it started, to within some microseconds. Realtime.
+  virtual Nanos suspendedTime() noexcept { return 0; }
 };
 
 /// CLOCK_MONOTONIC and CLOCK_REALTIME. Deadlines are absolute: a late wake-up does not shift the ones after
@@ -29,6 +31,8 @@ class MonotonicClock final : public Clock {
   Nanos now() noexcept override;
   void sleepUntil(Nanos deadline) noexcept override;
   Nanos wallNow() noexcept override;
+  /// CLOCK_BOOTTIME less CLOCK_MONOTONIC.
+  Nanos suspendedTime() noexcept override;
 };
 
 /// Advances only by sleepUntil(), which returns at once. For offline rendering and simulated worlds. One
@@ -45,10 +49,17 @@ class SimulatedClock final : public Clock {
   Nanos wallNow() noexcept override { return now_ + wallOffset_; }
   /// Sets the wall clock; now() does not change.
   void setWall(Nanos wall) noexcept { wallOffset_ = wall - now_; }
+  Nanos suspendedTime() noexcept override { return suspended_; }
+  /// The machine was suspended: now() does not change, the wall clock goes on.
+  void suspendFor(Nanos duration) noexcept {
+    suspended_ += duration;
+    wallOffset_ += duration;
+  }
 
  private:
   Nanos now_ = 0;
   Nanos wallOffset_;
+  Nanos suspended_ = 0;
 };
 
 }  // namespace hapticd::base

@@ -90,6 +90,19 @@ class SystemBlockingThread final : public BlockingThread::Impl {
   std::thread thread_;
 };
 
+class SystemPacedThread final : public PacedThread::Impl {
+ public:
+  SystemPacedThread(ThreadOptions options, Clock& clock, Step step)
+      : thread_([options = std::move(options), &clock, step = std::move(step)] {
+          applyOptions(options);
+          while (const std::optional<Nanos> deadline = step()) clock.sleepUntil(*deadline);
+        }) {}
+  ~SystemPacedThread() override { thread_.join(); }
+
+ private:
+  std::thread thread_;
+};
+
 }  // namespace
 
 Thread::Thread(ThreadOptions options, Step step)
@@ -109,6 +122,9 @@ void Thread::stop() {
 BlockingThread::BlockingThread(ThreadOptions options, std::function<void()> body)
     : impl_(world().threads.startBlocking(std::move(options), std::move(body))) {}
 
+PacedThread::PacedThread(ThreadOptions options, Clock& clock, Step step)
+    : impl_(world().threads.startPaced(std::move(options), clock, std::move(step))) {}
+
 std::unique_ptr<Thread::Impl> SystemThreads::start(ThreadOptions options, Step step) {
   return std::make_unique<SystemThread>(std::move(options), std::move(step));
 }
@@ -116,6 +132,10 @@ std::unique_ptr<Thread::Impl> SystemThreads::start(ThreadOptions options, Step s
 std::unique_ptr<BlockingThread::Impl> SystemThreads::startBlocking(ThreadOptions options,
                                                                    std::function<void()> body) {
   return std::make_unique<SystemBlockingThread>(std::move(options), std::move(body));
+}
+
+std::unique_ptr<PacedThread::Impl> SystemThreads::startPaced(ThreadOptions options, Clock& clock, Step step) {
+  return std::make_unique<SystemPacedThread>(std::move(options), clock, std::move(step));
 }
 
 }  // namespace hapticd::base

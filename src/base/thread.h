@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "base/clock.h"
 #include "base/time.h"
 
 namespace hapticd::base {
@@ -57,6 +58,29 @@ class Thread {
   std::unique_ptr<Impl> impl_;
 };
 
+/// A thread that runs its step at the deadlines that the step itself returns and ends after a step that
+/// returns none. It sleeps on a clock, takes no lock and cannot be woken, as a realtime loop needs it. The
+/// first step may run before the constructor returns.
+class PacedThread {
+ public:
+  class Impl {
+   public:
+    virtual ~Impl() = default;
+  };
+
+  PacedThread() noexcept = default;
+  /// Starts a thread of world(). `clock` must outlive it. Throws std::system_error when the system refuses.
+  PacedThread(ThreadOptions options, Clock& clock, Step step);
+
+  bool running() const noexcept { return impl_ != nullptr; }
+  /// Waits for the last step, which the owner must bring about: the next step returns no deadline.
+  /// Idempotent.
+  void join() { impl_.reset(); }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
 /// A thread that blocks in calls that no world replaces, such as those of a vendor library; simulated worlds
 /// have none. Its owner must make the body return before join(), destruction or assignment, all of which wait
 /// for it.
@@ -86,6 +110,10 @@ class Threads {
   virtual std::unique_ptr<Thread::Impl> start(ThreadOptions options, Step step) = 0;
   virtual std::unique_ptr<BlockingThread::Impl> startBlocking(ThreadOptions options,
                                                               std::function<void()> body) = 0;
+  virtual std::unique_ptr<PacedThread::Impl> startPaced(ThreadOptions options, Clock& clock, Step step) = 0;
+  /// Whether the threads are steps of a simulation: then nothing may be requested from the operating system
+  /// for them.
+  virtual bool simulated() const noexcept { return false; }
 };
 
 /// Threads of the operating system.
@@ -94,6 +122,7 @@ class SystemThreads final : public Threads {
   std::unique_ptr<Thread::Impl> start(ThreadOptions options, Step step) override;
   std::unique_ptr<BlockingThread::Impl> startBlocking(ThreadOptions options,
                                                       std::function<void()> body) override;
+  std::unique_ptr<PacedThread::Impl> startPaced(ThreadOptions options, Clock& clock, Step step) override;
 };
 
 }  // namespace hapticd::base

@@ -56,6 +56,10 @@ inline Nanos now() noexcept {
 inline Nanos wallNow() noexcept {
   return world().clock.wallNow();
 }
+/// Total time of suspension of the machine. Realtime: one thread may call it in every step.
+inline Nanos suspendedTime() noexcept {
+  return world().clock.suspendedTime();
+}
 inline void sleepFor(Nanos duration) noexcept {
   world().clock.sleepUntil(now() + duration);
 }

@@ -33,7 +33,8 @@ Client::Impl::Impl(const client::DeviceAddress& address, const ClientOptions& cl
       server(address.server.text()),
       options(clientOptions),
       link(address.server, linkOptions(clientOptions)),
-      sender(link.addDevice(address.device)) {
+      sender(link.addDevice(address.device)),
+      key(base::world().random.next() | 1) {
   link.onUp = [this] { greet(); };
   link.onArrival = [this](auto kind, auto from, auto payload) { onArrival(kind, from, payload); };
 }

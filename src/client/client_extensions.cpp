@@ -25,6 +25,7 @@ void Client::Impl::greet() {
   offer.reset();
   answered = false;
   link.sendNow(sender, wire::QueryCapabilities{});
+  if (!token.empty()) link.sendNow(sender, identity());
   if (subscription) link.sendNow(sender, *subscription);
   if (heartbeats) link.sendNow(sender, wire::Heartbeat{1});
 }
@@ -122,11 +123,23 @@ void Client::subscribe(Reports kinds, double rate_Hz) {
 // Send the stop before asking whether the server knows it: a server that does not ignores it.
 void Client::stopForces() {
   const bool behind = impl_->link.backlogBytes() > kStopBacklogBytes;
+  const bool beside = behind && (!impl_->answered || impl_->has(wire::kFeatureStop));
+  // Both connections stop, and the first one may undo both.
+  if (beside) impl_->link.sendNow(impl_->sender, impl_->identity());
   if (!impl_->link.sendNow(impl_->sender, wire::StopForces{})) {
     throw ConnectionLost("forces not stopped: " + impl_->link.whyNotConnected());
   }
-  if (behind && (!impl_->answered || impl_->has(wire::kFeatureStop))) impl_->stopBesideBacklog();
+  if (beside) impl_->stopBesideBacklog();
   impl_->require(wire::kFeatureStop, "stop the forces");
+}
+
+void Client::mark(std::string_view text) {
+  if (!impl_->link.sendNow(impl_->sender, wire::Marker{.time = 0, .text = std::string(text)}))
+    throw ConnectionLost("not marked: " + impl_->link.whyNotConnected());
+}
+
+void Client::setObjectName(int object, std::string_view name) {
+  impl_->send(wire::SetObjectName{object, name});
 }
 
 // The stop on the first connection stays where it is: a re-arm, which follows it there, then ends both.
@@ -144,7 +157,8 @@ void Client::Impl::stopBesideBacklog() {
   while (!confirmed && Duration(base::now() - start) < timeout) {
     if (!sent && beside.connected()) {
       // The server handles the messages of a connection in order, so the pong confirms the stop.
-      sent = beside.sendNow(target, wire::StopForces{}) && beside.sendNow(target, wire::Ping{});
+      sent = beside.sendNow(target, identity()) && beside.sendNow(target, wire::StopForces{}) &&
+             beside.sendNow(target, wire::Ping{});
     }
     beside.waitUntil([&] { return confirmed || (!sent && beside.connected()); }, kSlice);
     link.runOnce();  // heartbeats
@@ -159,6 +173,16 @@ void Client::Impl::stopBesideBacklog() {
 void Client::rearmForces() {
   impl_->require(wire::kFeatureStop, "re-arm the forces");
   impl_->link.sendNow(impl_->sender, wire::RearmForces{});
+}
+
+void Client::presentToken(std::string_view token) {
+  constexpr std::size_t kShortest = 16;
+  if (!token.empty() && (token.size() < kShortest || token.size() > wire::Identify::kLongestToken)) {
+    throw std::invalid_argument("presentToken(): " + std::to_string(token.size()) +
+                                " characters; a token has 16 to 128");
+  }
+  impl_->token = token;
+  if (connected() && !token.empty()) impl_->link.sendNow(impl_->sender, impl_->identity());
 }
 
 void Client::enableHeartbeat(bool enable) {
@@ -203,16 +227,14 @@ void Client::setRemoteContacts(std::span<const RemoteContact> contacts) {
                    {c.stiffness_N_per_m, c.damping_Ns_per_m, c.staticFriction, c.dynamicFriction,
                     std::chrono::duration<double>(c.lifetime).count(), c.yields ? 1.0 : 0.0});
   }
-  impl_->link.sendNow(impl_->sender, message, wire::Reliability::kLowLatency);
+  impl_->link.sendNow(impl_->sender, message);
 }
 
 void Client::setForce(const std::array<double, 3>& force_N, const std::array<double, 3>& torque_Nm,
                       Duration lifetime) {
   if (connected()) impl_->require(wire::kFeatureRemoteContacts, "hold a force");
-  impl_->link.sendNow(
-      impl_->sender,
-      wire::HeldForce{base::now(), force_N, torque_Nm, std::chrono::duration<double>(lifetime).count()},
-      wire::Reliability::kLowLatency);
+  impl_->link.sendNow(impl_->sender, wire::HeldForce{base::now(), force_N, torque_Nm,
+                                                     std::chrono::duration<double>(lifetime).count()});
 }
 
 // --- the simulated hand

@@ -14,6 +14,8 @@ using Triangles = std::span<const std::array<std::uint32_t, 3>>;
 constexpr std::size_t kBlock = 1024;
 constexpr std::uint64_t kVertexFrameBytes =
     wire::kHeaderBytes + wire::padded(wire::kPayloadSize<wire::SetVertex>);
+constexpr std::uint64_t kClearFrameBytes =
+    wire::kHeaderBytes + wire::padded(wire::kPayloadSize<wire::ClearTrimesh>);
 
 /// Bytes of this many vertices or triangles, in messages of at most Run::kMost.
 template <class Run>
@@ -124,16 +126,21 @@ void Client::Impl::sendRuns(int object, std::size_t first, Vertices vertices, Tr
 // In a batch if it fits, so that no tick renders half a mesh.
 void Client::Impl::uploadRuns(int object, Vertices vertices, Triangles triangles,
                               const Callback<UploadProgress>& progress) {
-  if (link.holding()) return sendRuns(object, 0, vertices, triangles, {});
-  const std::uint64_t bytes =
-      runBytes<wire::MeshVertices>(vertices.size()) + runBytes<wire::MeshTriangles>(triangles.size());
+  if (link.holding()) {
+    send(wire::ClearTrimesh{object});
+    return sendRuns(object, 0, vertices, triangles, {});
+  }
+  const std::uint64_t bytes = kClearFrameBytes + runBytes<wire::MeshVertices>(vertices.size()) +
+                              runBytes<wire::MeshTriangles>(triangles.size());
   Upload upload(link, bytes, progress);
   if (has(wire::kFeatureBatch) && bytes <= client::Link::kMaxBatchBytes) {
     client::HeldBatch batch(link);
+    send(wire::ClearTrimesh{object});
     sendRuns(object, 0, vertices, triangles, {});
     upload.check();
     batch.commit(sender);
   } else {
+    send(wire::ClearTrimesh{object});
     sendRuns(object, 0, vertices, triangles, [&] { upload.check(); });
   }
   upload.check();
@@ -143,6 +150,7 @@ void Client::Impl::uploadRuns(int object, Vertices vertices, Triangles triangles
 template <class CornerAt>
 void Client::Impl::uploadTriples(int object, std::size_t count, const Callback<UploadProgress>& progress,
                                  CornerAt&& cornerAt) {
+  send(wire::ClearTrimesh{object});
   if (link.holding())
     return sendCorners(
         link, sender, object, count, [] {}, cornerAt);

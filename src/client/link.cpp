@@ -7,6 +7,7 @@
 
 #include "base/world.h"
 #include "hapticd/error.h"
+#include "net/local_socket.h"
 #include "wire/text.h"
 
 namespace hapticd::client {
@@ -42,7 +43,7 @@ std::chrono::system_clock::time_point wallTimePoint() {
 
 Link::Link(const ServerAddress& server, const LinkOptions& options) : server_(server), options_(options) {
   try {
-    address_ = {net::resolve(server_.host), server_.port};
+    if (server_.socket.empty()) address_ = {net::resolve(server_.host), server_.port};
   } catch (const net::Error& error) {
     throw ConnectError("no server at " + server_.text() + ": " + error.what());
   }
@@ -65,7 +66,9 @@ wire::LocalSender Link::addDevice(std::string_view name) {
 void Link::attempt() {
   retryTimer_.cancel();
   try {
-    if (server_.tcpOnly) {
+    if (!server_.socket.empty()) {
+      adopt(net::connectLocal(loop_, server_.socket, connectionOptions(options_)));
+    } else if (server_.tcpOnly) {
       adopt(net::Connection::connect(loop_, address_, kHandshakeTimeout, connectionOptions(options_)));
     } else {
       reverseConnection_.emplace(

@@ -151,7 +151,9 @@ class Link {
 
   const ServerAddress& server() const noexcept { return server_; }
   /// The same server by its resolved address, reached by one TCP connection.
-  ServerAddress resolvedServer() const { return {address_.addressText(), server_.port, true}; }
+  ServerAddress resolvedServer() const {
+    return {address_.addressText(), server_.port, true, server_.socket};
+  }
   /// Number of the connection, 0 before the first.
   std::uint64_t connectionNumber() const noexcept { return connections_; }
   /// Bytes given to this connection's TCP stream, and those of them that the system has accepted.

@@ -36,6 +36,14 @@ ServerAddress parseServer(std::string_view text) {
         "server " + wire::inQuotes(text) +
         ": this library reads no files; open it with a client of VRPN, or connect to 'hapticd replay'");
   }
+  if (dropPrefix(rest, "unix:")) {
+    if (!rest.starts_with('/')) {
+      throw std::invalid_argument("server " + wire::inQuotes(text) + ": expected unix:/path");
+    }
+    server.socket = rest;
+    server.tcpOnly = true;
+    return server;
+  }
   server.tcpOnly = dropPrefix(rest, "tcp:");
   if (!server.tcpOnly) dropPrefix(rest, "x-vrpn:");
   dropPrefix(rest, "//");

@@ -1,4 +1,4 @@
-// How VRPN names a device: NAME@host, NAME@host:port, NAME@tcp://host:port.
+// How VRPN names a device: NAME@host, NAME@host:port, NAME@tcp://host:port; and NAME@unix:/path.
 #pragma once
 
 #include <cstdint>
@@ -16,8 +16,11 @@ struct ServerAddress {
   /// One TCP connection from the client; otherwise a reverse connection with datagrams.
   bool tcpOnly = false;
 
-  /// "host:port".
-  std::string text() const { return host + ':' + std::to_string(port); }
+  /// Path of a Unix socket on this machine, instead of host and port; empty: none.
+  std::string socket;
+
+  /// "host:port" or "unix:/path".
+  std::string text() const { return socket.empty() ? host + ':' + std::to_string(port) : "unix:" + socket; }
 };
 
 struct DeviceAddress {

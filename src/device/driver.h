@@ -39,6 +39,8 @@ struct Driver {
   /// Makes a device, not yet open. Throws InvalidDriverOption, or std::runtime_error for a file that it
   /// cannot read.
   std::unique_ptr<Device> (*make)(const DriverOptions& options);
+  /// HOST:PORT of the service that a device with this `hardware` is reached through; null when none is.
+  std::string (*service)(const std::string& hardware) = nullptr;
 };
 
 }  // namespace hapticd::device

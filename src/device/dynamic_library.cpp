@@ -6,6 +6,8 @@
 #include <windows.h>
 #else
 #include <dlfcn.h>
+#include <sys/stat.h>
+#include <unistd.h>
 #endif
 
 namespace hapticd::device {
@@ -35,6 +37,18 @@ std::string loadersWords(const char* name) {
   return words != nullptr ? words : std::string(name) + ": no reason given";
 }
 
+// Its code runs with all rights of this process: a file that other users can change is refused. Empty: none
+// is.
+std::string objectionTo(const std::string& file) {
+  if (!file.starts_with('/')) return file + ": not an absolute path";
+  struct stat found {};
+  if (stat(file.c_str(), &found) != 0) return {};  // the loader has the words
+  if (found.st_uid != 0 && found.st_uid != geteuid())
+    return file + ": belongs to another user; make root its owner";
+  if ((found.st_mode & S_IWOTH) != 0) return file + ": every user may change it; chmod o-w";
+  return {};
+}
+
 #endif
 
 }  // namespace
@@ -50,6 +64,10 @@ DynamicLibrary::DynamicLibrary(const LibraryNames& names) {
 #endif
   std::vector<std::string> candidates;
   if (chosen != nullptr && *chosen != '\0') {
+#ifndef _WIN32
+    const std::string objection = objectionTo(chosen);
+    if (!objection.empty()) throw LibraryError(objection + " (" + names.environment + ")");
+#endif
     candidates.emplace_back(chosen);
   } else {
     candidates.assign(usual.begin(), usual.end());

@@ -4,6 +4,7 @@
 #include <array>
 #include <cctype>
 #include <cstdio>
+#include <limits>
 
 namespace hapticd::device {
 namespace {
@@ -14,22 +15,24 @@ struct Row {
   double width_mm, height_mm, depth_mm;
   double peak_N, continuous_N;
   double stiffness_N_per_m, damping_Ns_per_m;
+  double bareDamping_Ns_per_m;
   int buttons;
   std::uint32_t switches;
   int inputDof, outputDof;
 };
 
-// The damping (device plus grip) is a design choice, not measured.
+// The damping (device plus grip, and the bare arm) is a design choice, not measured.
+constexpr double kHeld = std::numeric_limits<double>::infinity();
 constexpr Row kRows[] = {
-    {"simulated", "", 160, 120, 70, 3.3, 3.3, 1000, 5, 2, kHoldNone, 6, 3},
-    {"Touch", "Omni", 160, 120, 70, 3.3, 0.88, 500, 2.5, 2, kHoldInkwell, 6, 3},
-    {"Touch X", "Desktop", 160, 120, 120, 7.9, 1.75, 1000, 3, 2, kHoldNone, 6, 3},
-    {"Premium 1.5", "", 381, 267, 191, 8.5, 1.4, 1000, 3, 1, kHoldNone, 6, 3},
-    {"omega.3", "", 160, 160, 110, 12, 12, 5000, 30, 1, kHoldNone, 3, 3},
-    {"delta.3", "", 400, 400, 260, 20, 20, 5000, 30, 1, kHoldNone, 3, 3},
-    {"sigma.7", "", 190, 190, 130, 12, 12, 4000, 30, 2, kHoldNone, 7, 7},
-    {"Inverse3", "", 240, 160, 160, 7, 4, 1000, 3, 3, kHoldNone, 3, 3},
-    {"lambda.7", "", 200, 200, 150, 12, 12, 8000, 30, 2, kHoldNone, 7, 7},
+    {"simulated", "", 160, 120, 70, 3.3, 3.3, 1000, 5, kHeld, 2, kHoldNone, 6, 3},
+    {"Touch", "Omni", 160, 120, 70, 3.3, 0.88, 500, 2.5, 0.1, 2, kHoldInkwell, 6, 3},
+    {"Touch X", "Desktop", 160, 120, 120, 7.9, 1.75, 1000, 3, 0.1, 2, kHoldNone, 6, 3},
+    {"Premium 1.5", "", 381, 267, 191, 8.5, 1.4, 1000, 3, 0.05, 1, kHoldNone, 6, 3},
+    {"omega.3", "", 160, 160, 110, 12, 12, 5000, 30, 0.3, 1, kHoldNone, 3, 3},
+    {"delta.3", "", 400, 400, 260, 20, 20, 5000, 30, 0.3, 1, kHoldNone, 3, 3},
+    {"sigma.7", "", 190, 190, 130, 12, 12, 4000, 30, 0.3, 2, kHoldNone, 7, 7},
+    {"Inverse3", "", 240, 160, 160, 7, 4, 1000, 3, 0.1, 3, kHoldNone, 3, 3},
+    {"lambda.7", "", 200, 200, 150, 12, 12, 8000, 30, 0.3, 2, kHoldNone, 7, 7},
 };
 
 std::array<DeviceProfile, std::size(kRows)> build() {
@@ -72,6 +75,11 @@ const DeviceProfile* findProfile(std::string_view model) {
     if (sameName(model, kRows[i].model) || sameName(model, kRows[i].alias)) return &profiles()[i];
   }
   return nullptr;
+}
+
+double bareDampingOf(std::string_view model) {
+  const DeviceProfile* const known = findProfile(model);
+  return known == nullptr ? 0 : kRows[known - profiles().data()].bareDamping_Ns_per_m;
 }
 
 std::string inWords(const DeviceProfile& profile) {

@@ -15,6 +15,11 @@ std::span<const DeviceProfile> profiles();
 /// The profile of a model by its name or one of its other trade names, case-insensitive; null when unknown.
 const DeviceProfile* findProfile(std::string_view model);
 
+/// Viscous friction of the arm of a model without a hand, N s/m, which the passivity controller credits. A
+/// cautious choice, not measured; zero for an unknown model. Infinity for the simulated hand: nobody lets it
+/// go.
+double bareDampingOf(std::string_view model);
+
 /// Summary for the log, on one line.
 std::string inWords(const DeviceProfile& profile);
 

@@ -3,6 +3,9 @@
 // Protocol (triple buffer): three cells, one owned by the writer, one by the reader, one in the middle. A
 // write fills the writer's cell and exchanges it with the middle one, marked as fresh; a read exchanges the
 // reader's cell with the middle one if that is fresh. No thread touches a cell of the other.
+//
+// Also between processes, in shared memory: whatever the other process leaves there, each side accesses only
+// the three cells.
 #pragma once
 
 #include <array>
@@ -25,19 +28,22 @@ class LatestValue {
 
   /// Writer: replaces the value.
   void write(const T& value) noexcept {
-    cells_[writing_] = value;
-    writing_ = middle_.exchange(writing_ | kFresh, std::memory_order_acq_rel) & kIndex;
+    const std::uint8_t cell = valid(writing_);
+    cells_[cell] = value;
+    writing_ = middle_.exchange(cell | kFresh, std::memory_order_acq_rel) & kIndex;
   }
 
   /// Reader: the newest value, default-constructed before the first write. Valid until the next read.
   const T& read() noexcept {
     if ((middle_.load(std::memory_order_relaxed) & kFresh) != 0) {
-      reading_ = middle_.exchange(reading_, std::memory_order_acq_rel) & kIndex;
+      reading_ = middle_.exchange(valid(reading_), std::memory_order_acq_rel) & kIndex;
     }
-    return cells_[reading_];
+    return cells_[valid(reading_)];
   }
 
  private:
+  static constexpr std::uint8_t valid(std::uint8_t cell) noexcept { return cell < 3 ? cell : 0; }
+
   static constexpr std::uint8_t kIndex = 3;
   static constexpr std::uint8_t kFresh = 4;
 

@@ -195,6 +195,12 @@ std::shared_ptr<TcpListener::Impl> AsioLoop::listen(const Endpoint& local,
   return listenWithAsio(*this, local, std::move(onAccept), options, option);
 }
 
+std::shared_ptr<Connection::Impl> AsioLoop::adopt(int fd, const ConnectionOptions& options) {
+  auto connection = std::make_shared<TcpConnection>(*this, options);
+  connection->adoptLocal(fd);
+  return connection;
+}
+
 std::shared_ptr<UdpSocket::Impl> AsioLoop::bind(const Endpoint& local) {
   return bindWithAsio(*this, local);
 }

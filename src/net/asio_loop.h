@@ -32,6 +32,8 @@ class AsioLoop final : public Loop::Impl {
   std::shared_ptr<TcpListener::Impl> listen(const Endpoint& local, std::function<void(Connection)> onAccept,
                                             const ConnectionOptions& options, const char* option) override;
   std::shared_ptr<UdpSocket::Impl> bind(const Endpoint& local) override;
+  std::shared_ptr<Connection::Impl> adopt(int fd, const ConnectionOptions& options) override;
+  bool hasLocalSockets() const noexcept override { return true; }
 
   /// How much one connection may read in its turn: the connections that send faster than they are read share
   /// the buffer, so that a short message waits for about one buffer, however many of them there are.

@@ -136,7 +136,7 @@ void HttpConnection::refuse(int status, std::string_view text) {
 
 void HttpConnection::answer(std::uint64_t request, HttpResponse response) {
   if (state_ != State::answering || request != request_ || body_) return;
-  if (response.onWebSocket && !webSocketKey_.empty()) return becomeWebSocket(response.onWebSocket);
+  if (response.onWebSocket && !webSocketKey_.empty()) return becomeWebSocket(response);
   sendHead(response);
   static const auto nothing = std::make_shared<const Buffer>();
   body_ = response.body && !headOnly_ ? response.body : nothing;
@@ -189,7 +189,7 @@ void HttpConnection::answered() {
   });
 }
 
-void HttpConnection::becomeWebSocket(const std::function<void(Connection)>& taker) {
+void HttpConnection::becomeWebSocket(const HttpResponse& response) {
   const std::string head =
       "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
       "Sec-WebSocket-Accept: " +
@@ -198,11 +198,12 @@ void HttpConnection::becomeWebSocket(const std::function<void(Connection)>& take
   connection_.flush();
   connection_.resumeReading();
   const auto ahead = std::as_bytes(std::span(input_));
-  auto socket =
-      std::make_shared<WebSocket>(loop_.impl(), std::move(connection_), Buffer(ahead.begin(), ahead.end()));
+  const auto content = response.webSocketOfTexts ? WebSocketContent::texts : WebSocketContent::bytes;
+  auto socket = std::make_shared<WebSocket>(loop_.impl(), std::move(connection_),
+                                            Buffer(ahead.begin(), ahead.end()), content);
   const auto self = shared_from_this();
   gone();
-  taker(Connection(std::move(socket)));
+  response.onWebSocket(Connection(std::move(socket)));
 }
 
 // --- the end

@@ -35,7 +35,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   void sendHead(const HttpResponse& response);
   void sendBody();
   void answered();
-  void becomeWebSocket(const std::function<void(Connection)>& taker);
+  void becomeWebSocket(const HttpResponse& response);
   void limit(std::chrono::milliseconds time, const char* text);
   void gone();
 

@@ -42,6 +42,8 @@ struct HttpResponse {
   std::shared_ptr<const Buffer> body;                        ///< shared: never copied as a whole
   /// Takes the connection when the request wants a WebSocket; the rest of the response is then ignored.
   std::function<void(Connection)> onWebSocket;
+  /// Of that connection: texts instead of a byte stream, one in each onBytes and in each buffer sent.
+  bool webSocketOfTexts = false;
 
   /// A response with a text.
   static HttpResponse of(int status, std::string_view text,

@@ -27,6 +27,8 @@ class HttpServer::Impl {
       connection.abort("too many connections");
       return;
     }
+    if (options_.secured) connection = options_.secured(std::move(connection));
+    if (!connection) return;
     auto client =
         std::make_shared<HttpConnection>(loop_, std::move(connection), options_, onRequest_,
                                          [this](HttpConnection* gone) { connections_.erase(gone); });

@@ -22,6 +22,8 @@ struct HttpOptions {
   std::chrono::milliseconds idleTimeout{60000};     ///< without a request
   std::chrono::milliseconds answerTimeout{30000};   ///< for the handler, then for the client to read a piece
   ConnectionOptions connection;
+  /// Puts encryption around an accepted connection; an empty one refuses it. Empty: none.
+  std::function<Connection(Connection)> secured = {};
 };
 
 class HttpConnection;

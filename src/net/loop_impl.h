@@ -52,6 +52,9 @@ class Loop::Impl {
                                                     std::function<void(Connection)> onAccept,
                                                     const ConnectionOptions& options, const char* option) = 0;
   virtual std::shared_ptr<UdpSocket::Impl> bind(const Endpoint& local) = 0;
+  /// Takes over a connected stream socket that is no TCP socket; only where hasLocalSockets().
+  virtual std::shared_ptr<Connection::Impl> adopt(int fd, const ConnectionOptions& options);
+  virtual bool hasLocalSockets() const noexcept { return false; }
 
   /// Hands a text to the error handler.
   void report(std::string_view text) noexcept;

@@ -70,6 +70,15 @@ void TcpConnection::adopt(Socket socket) {
   becomeOpen();
 }
 
+void TcpConnection::adoptLocal(int fd) {
+  ErrorCode error;
+  socket_.assign(tcp::v4(), fd, error);  // Asio does not look at the kind
+  socket_.non_blocking(true, error);
+  local_ = remote_ = {kLoopbackAddress, 0};
+  state_ = State::open;
+  if (error) finish("cannot watch the connection: " + error.message());
+}
+
 void TcpConnection::becomeOpen() {
   state_ = State::open;
   ErrorCode error;

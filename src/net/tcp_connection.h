@@ -23,6 +23,8 @@ class TcpConnection final : public Connection::Impl, public std::enable_shared_f
   void connect(const Endpoint& peer, std::chrono::milliseconds timeout);
   /// Takes over an accepted socket; its reading waits for start().
   void adopt(Socket socket);
+  /// The same for a Unix-domain stream socket, which behaves as one of TCP without addresses.
+  void adoptLocal(int fd);
 
   void start(ConnectionHandlers handlers) override;
   bool sendable() const override {

@@ -2,8 +2,12 @@
 
 namespace hapticd::net {
 
-WebSocket::WebSocket(Loop::Impl& loop, Connection stream, Buffer ahead)
-    : loop_(loop), stream_(std::move(stream)), ahead_(std::move(ahead)) {}
+WebSocket::WebSocket(Loop::Impl& loop, Connection stream, Buffer ahead, WebSocketContent content)
+    : loop_(loop),
+      stream_(std::move(stream)),
+      ahead_(std::move(ahead)),
+      content_(content),
+      reader_(content) {}
 
 void WebSocket::start(ConnectionHandlers callbacks) {
   handlers_ = std::make_shared<ConnectionHandlers>(std::move(callbacks));
@@ -40,6 +44,9 @@ void WebSocket::receive(std::span<const std::byte> bytes) {
   if (!in.pings.empty()) flush();
   const auto handlers = handlers_;
   if (!in.data.empty() && handlers && handlers->onBytes) handlers->onBytes(in.data);
+  for (const Buffer& text : in.texts) {
+    if (handlers_ && !closing_ && handlers->onBytes) handlers->onBytes(text);
+  }
   if (in.end && handlers_) end(*in.end);
 }
 
@@ -55,7 +62,8 @@ void WebSocket::end(const WebSocketEnd& end) {
 
 void WebSocket::send(std::shared_ptr<const Buffer> buffer, Delivery delivery) {
   if (!sendable() || !buffer || buffer->empty()) return;
-  stream_.send(std::make_shared<const Buffer>(webSocketFrame(WebSocketOpcode::binary, *buffer)), delivery);
+  const auto opcode = content_ == WebSocketContent::texts ? WebSocketOpcode::text : WebSocketOpcode::binary;
+  stream_.send(std::make_shared<const Buffer>(webSocketFrame(opcode, *buffer)), delivery);
 }
 
 void WebSocket::sendFrame(Buffer&& frame) {

@@ -1,4 +1,4 @@
-// A byte stream inside a WebSocket, with the contract of Connection.
+// A WebSocket with the contract of Connection: a byte stream, or texts.
 #pragma once
 
 #include "net/connection_impl.h"
@@ -7,13 +7,14 @@
 
 namespace hapticd::net {
 
-// Each buffer is sent as one binary message, so that a low-latency one can still be dropped as a whole. The
-// queue, its limits, loss detection and pauses are those of the TCP connection underneath.
+// Each buffer is sent as one message, so that a low-latency one can still be dropped as a whole; each text
+// arrives in an onBytes of its own. The queue, its limits, loss detection and pauses are those of the TCP
+// connection underneath.
 class WebSocket final : public Connection::Impl, public std::enable_shared_from_this<WebSocket> {
  public:
   /// Takes over a connection after the handshake. `ahead` holds the bytes that the client sent directly after
   /// its request.
-  WebSocket(Loop::Impl& loop, Connection stream, Buffer ahead);
+  WebSocket(Loop::Impl& loop, Connection stream, Buffer ahead, WebSocketContent content);
 
   void start(ConnectionHandlers handlers) override;
   bool sendable() const override { return !closing_ && stream_.isOpen(); }
@@ -40,6 +41,7 @@ class WebSocket final : public Connection::Impl, public std::enable_shared_from_
   Loop::Impl& loop_;
   Connection stream_;
   Buffer ahead_;
+  const WebSocketContent content_;
   WebSocketReader reader_;
   // Shared, so that the captures of a callback outlive a connection that it destroys.
   std::shared_ptr<ConnectionHandlers> handlers_;

@@ -1,6 +1,7 @@
 #include "net/web_socket_frames.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "net/sha1.h"
 
@@ -50,7 +51,10 @@ void WebSocketReader::checkStart(WebSocketInput& out) {
       if (!inMessage_) wrong("a message goes on that was not begun");
       return;
     case WebSocketOpcode::text:
-      return fail(out, kWebSocketUnsupported, "a text message: only binary ones are understood here");
+      if (content_ == WebSocketContent::bytes)
+        return fail(out, kWebSocketUnsupported, "a text message: only binary ones are understood here");
+      if (inMessage_) wrong("a message begins inside another");
+      return;
     case WebSocketOpcode::binary:
       if (inMessage_) wrong("a message begins inside another");
       return;
@@ -75,6 +79,9 @@ void WebSocketReader::beginFrame(WebSocketInput& out) {
     }
   }
   std::copy_n(header_.begin() + static_cast<std::ptrdiff_t>(2 + lengthBytes), 4, mask_.begin());
+  if (!isControl() && content_ == WebSocketContent::texts && length_ > kLongestText - text_.size()) {
+    return fail(out, kWebSocketTooBig, "a message is longer than " + std::to_string(kLongestText) + " bytes");
+  }
   headerHave_ = 0;
   taken_ = 0;
   control_.clear();
@@ -84,7 +91,7 @@ void WebSocketReader::beginFrame(WebSocketInput& out) {
 
 std::size_t WebSocketReader::takePayload(std::span<const std::byte> bytes, WebSocketInput& out) {
   const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(bytes.size(), length_ - taken_));
-  Buffer& into = isControl() ? control_ : out.data;
+  Buffer& into = payload(out);
   into.reserve(into.size() + count);
   for (std::size_t i = 0; i < count; ++i) {
     into.push_back(bytes[i] ^ static_cast<std::byte>(mask_[(taken_ + i) % 4]));
@@ -94,10 +101,16 @@ std::size_t WebSocketReader::takePayload(std::span<const std::byte> bytes, WebSo
   return count;
 }
 
+Buffer& WebSocketReader::payload(WebSocketInput& out) {
+  if (isControl()) return control_;
+  return content_ == WebSocketContent::texts ? text_ : out.data;
+}
+
 void WebSocketReader::endFrame(WebSocketInput& out) {
   inPayload_ = false;
   if (!isControl()) {
     inMessage_ = !final_;
+    if (final_ && content_ == WebSocketContent::texts) out.texts.push_back(std::exchange(text_, {}));
   } else if (opcode_ == WebSocketOpcode::ping) {
     out.pings.push_back(control_);
   } else if (opcode_ == WebSocketOpcode::close) {

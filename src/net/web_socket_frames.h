@@ -27,6 +27,7 @@ enum class WebSocketOpcode : std::uint8_t {
 inline constexpr std::uint16_t kWebSocketNormal = 1000;
 inline constexpr std::uint16_t kWebSocketProtocolError = 1002;
 inline constexpr std::uint16_t kWebSocketUnsupported = 1003;
+inline constexpr std::uint16_t kWebSocketTooBig = 1009;
 inline constexpr std::uint16_t kWebSocketNoStatus =
     1005;  ///< never on the wire: a close frame without a code
 
@@ -40,15 +41,26 @@ struct WebSocketEnd {
 /// The content of one read.
 struct WebSocketInput {
   Buffer data;                      ///< payload of binary messages, in order, without their boundaries
+  std::vector<Buffer> texts;        ///< whole messages, in order
   std::vector<Buffer> pings;        ///< each requires a pong with the same payload
   std::optional<WebSocketEnd> end;  ///< nothing after it is read
 };
 
-/// Parses the bytes of a client, in pieces of any size. A byte stream has no message boundaries, so payload
-/// is passed on as it arrives and no message is too long; the reader buffers only a header and a control
-/// frame.
+/// What the messages of a WebSocket carry.
+enum class WebSocketContent {
+  bytes,  ///< a byte stream in binary messages of any size; their boundaries mean nothing
+  texts,  ///< one text per message, up to kLongestText; peers may mark it as binary
+};
+
+/// Parses the bytes of a client, in pieces of any size. A byte stream is passed on as it arrives, and the
+/// reader buffers only a header and a control frame; of texts it buffers one message. Whether a text is UTF-8
+/// is for its reader to check.
 class WebSocketReader {
  public:
+  static constexpr std::size_t kLongestText = std::size_t{64} * 1024;
+
+  explicit WebSocketReader(WebSocketContent content = WebSocketContent::bytes) : content_(content) {}
+
   void feed(std::span<const std::byte> bytes, WebSocketInput& out);
 
  private:
@@ -62,9 +74,11 @@ class WebSocketReader {
   void beginFrame(WebSocketInput& out);
   void endFrame(WebSocketInput& out);
   void closingFrame(WebSocketInput& out);
+  Buffer& payload(WebSocketInput& out);
   void fail(WebSocketInput& out, std::uint16_t code, std::string text);
   bool isControl() const { return static_cast<std::uint8_t>(opcode_) >= 8; }
 
+  WebSocketContent content_;
   std::array<std::uint8_t, kLongestHeader> header_{};
   std::size_t headerHave_ = 0;
   bool inPayload_ = false;
@@ -76,6 +90,7 @@ class WebSocketReader {
   std::uint64_t taken_ = 0;
   std::array<std::uint8_t, 4> mask_{};
   Buffer control_;
+  Buffer text_;  // the message so far
 };
 
 /// One whole, unmasked frame with this payload.

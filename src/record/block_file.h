@@ -20,7 +20,9 @@ enum class BlockKind : std::uint32_t {
   lost = 5,
   end = 6,
   law = 7,
-  stream = 8
+  stream = 8,
+  passivity = 9,
+  marker = 10
 };
 
 inline constexpr std::size_t kMagicBytes = 8;

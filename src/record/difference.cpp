@@ -67,7 +67,11 @@ std::vector<Difference> compare(const std::filesystem::path& session, const Rere
   for (RecordingEvent event; reader.next(event);) {
     if (const realtime::TickReport* now = again.feed(event)) {
       const auto& [device, tick] = std::get<TickEvent>(event);
-      devices[device].add(tick.report, *now);
+      if (again.comparable(device)) {
+        devices[device].add(tick.report, *now);
+      } else {
+        devices[device].skip();
+      }
     }
     const auto* lost = std::get_if<LostEvent>(&event);
     if (lost != nullptr && lost->what == LostEvent::What::ticks) devices[lost->device].addLost(lost->count);

@@ -26,6 +26,8 @@ class Difference {
 
   void add(const realtime::TickReport& then, const realtime::TickReport& now);
   void addLost(std::uint64_t ticks) { lost_ += ticks; }
+  /// A tick before the recording can be compared.
+  void skip() { ++skipped_; }
 
   const std::string& device() const noexcept { return device_; }
   std::uint64_t ticks() const noexcept { return points_.size(); }
@@ -33,6 +35,8 @@ class Difference {
   std::uint64_t same() const noexcept { return same_; }
   /// Ticks that the recorder dropped; the ticks after them may differ.
   std::uint64_t lost() const noexcept { return lost_; }
+  /// Ticks before a recording that began while the server ran can be compared.
+  std::uint64_t skipped() const noexcept { return skipped_; }
   std::uint64_t touching() const noexcept { return touching_; }  ///< in either of the two
   /// The norm of the largest difference of the two forces.
   double largest_N() const noexcept { return largest_N_; }
@@ -51,6 +55,7 @@ class Difference {
   Nanos begin_ = 0;
   std::uint64_t same_ = 0;
   std::uint64_t lost_ = 0;
+  std::uint64_t skipped_ = 0;
   std::uint64_t touching_ = 0;
   double largest_N_ = 0;
   double largestAt_s_ = 0;
@@ -59,7 +64,7 @@ class Difference {
   double sumDepth_m_ = 0;
 };
 
-/// "the recording has force law 1, this program law 2"; empty when they agree.
+/// "the recording has force law 1, this program law 4"; empty when they agree.
 std::string lawDifference(const RecordingHeader& header);
 
 /// Re-renders a whole recording. `remark` says why the file ends early, if it does. Throws RecordingError.

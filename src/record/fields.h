@@ -57,11 +57,13 @@ void fields(T& config, V&& v) {
 
 template <Is<realtime::RenderOptions> T, class V>
 void fields(T& options, V&& v) {
-  auto& [toolRadius_m, forceShading, stribeckSpeed_m_per_s, contactVibrationPulls] = options;
+  auto& [toolRadius_m, forceShading, stribeckSpeed_m_per_s, contactVibrationPulls, bareDamping_Ns_per_m] =
+      options;
   v("tool_radius_m", toolRadius_m);
   v("force_shading", forceShading);
   static_cast<void>(stribeckSpeed_m_per_s);  // in the block of the law
   static_cast<void>(contactVibrationPulls);
+  static_cast<void>(bareDamping_Ns_per_m);  // in a block of its own
 }
 
 template <Is<LawOptions> T, class V>
@@ -69,6 +71,12 @@ void fields(T& options, V&& v) {
   auto& [stribeckSpeed_m_per_s, contactVibrationPulls] = options;
   v("stribeck_speed_m_per_s", stribeckSpeed_m_per_s);
   v("contact_vibration_pulls", contactVibrationPulls);
+}
+
+template <Is<PassivityRecord> T, class V>
+void fields(T& record, V&& v) {
+  auto& [bareDamping_Ns_per_m] = record;
+  v("bare_damping_Ns_per_m", bareDamping_Ns_per_m);
 }
 
 template <Is<LawRecord> T, class V>
@@ -145,6 +153,13 @@ void fields(T& event, V&& v) {
   v("what", what);
   v("device", device);
   v("count", count);
+}
+
+template <Is<MarkerEvent> T, class V>
+void fields(T& event, V&& v) {
+  auto& [time, text] = event;
+  v("time_ns", time);
+  v("text", text);
 }
 
 template <Is<EndEvent> T, class V>

@@ -1,6 +1,7 @@
 #include "record/recorder.h"
 
 #include <algorithm>
+#include <cmath>
 #include <system_error>
 
 #include "base/world.h"
@@ -57,11 +58,42 @@ void Recorder::start(Nanos wallOffset, std::string config) {
   content.clear();
   pack.put(law);
   appendBlock(out_, BlockKind::law, content);
+  PassivityRecord passivity;
+  for (const RecordedDevice& device : header_)
+    passivity.bareDamping_Ns_per_m.push_back(device.tick.render.bareDamping_Ns_per_m);
+  const auto controlled = [](double damping) { return std::isfinite(damping); };
+  if (std::any_of(passivity.bareDamping_Ns_per_m.begin(), passivity.bareDamping_Ns_per_m.end(), controlled)) {
+    content.clear();
+    pack.put(passivity);
+    appendBlock(out_, BlockKind::passivity, content);
+  }
   write();
-  thread_ = base::Thread({.name = "recorder"}, [this] {
-    drain();
-    return base::now() + kPeriod;
-  });
+  thread_ = base::Thread({.name = "recorder"}, [this] { return step(); });
+}
+
+std::optional<Nanos> Recorder::step() {
+  if (ended()) return std::nullopt;
+  const bool last = ending_.load(std::memory_order_acquire);
+  drain();
+  if (!last) return base::now() + kPeriod;
+  close();
+  ended_.store(true, std::memory_order_release);
+  return std::nullopt;
+}
+
+void Recorder::end() {
+  ending_.store(true, std::memory_order_release);
+  thread_.wake();
+}
+
+void Recorder::close() {
+  EndEvent end;
+  for (const auto& device : devices_) end.time = std::max(end.time, device->newest);
+  Bytes content;
+  Packer(content).put(end);
+  appendBlock(out_, BlockKind::end, content);
+  write();
+  file_.reset();
 }
 
 void Recorder::recordCommand(std::uint32_t scene, scene::ClientId client, Nanos time,
@@ -77,6 +109,12 @@ void Recorder::recordPublish(std::uint32_t device, Nanos time, std::uint64_t rev
   Bytes content;
   Packer(content).put(event);
   appendEvent(BlockKind::publish, std::move(content));
+}
+
+void Recorder::recordMarker(Nanos time, const std::string& text) {
+  Bytes content;
+  Packer(content).put(MarkerEvent{time, text});
+  appendEvent(BlockKind::marker, std::move(content));
 }
 
 void Recorder::appendEvent(BlockKind kind, Bytes&& content) {
@@ -175,6 +213,8 @@ void Recorder::appendLost(LostEvent::What what, std::uint32_t device, std::uint6
 void Recorder::write() {
   const Bytes bytes = std::exchange(out_, {});
   if (!file_ || bytes.empty()) return;
+  if (counts_.bytes + bytes.size() > options_.fileBytes)
+    return fail(std::make_error_code(std::errc::file_too_large));
   try {
     file_->write(bytes);
     counts_.bytes += bytes.size();
@@ -191,21 +231,17 @@ void Recorder::fail(const std::error_code& error) {
     failed_ = true;
     events_ = {};
   }
-  onProblem_(
-      "recording to '" + path_.string() + "' has stopped: " + error.message() +
-      "; what was written before stays readable" +
-      (error == std::errc::no_space_on_device ? "; make room on the disk and start a new recording" : ""));
+  const char* remedy = "";
+  if (error == std::errc::no_space_on_device) remedy = "; make room on the disk and start a new recording";
+  if (error == std::errc::file_too_large) remedy = "; start a new one, or raise recording_MB in [limits]";
+  onProblem_("recording to '" + path_.string() + "' has stopped: " + error.message() +
+             "; what was written before stays readable" + remedy);
 }
 
 void Recorder::finish() {
   if (thread_.running()) {
     thread_.stop();  // its last step drains
-    EndEvent end;
-    for (const auto& device : devices_) end.time = std::max(end.time, device->newest);
-    Bytes content;
-    Packer(content).put(end);
-    appendBlock(out_, BlockKind::end, content);
-    write();
+    if (!ended()) close();
   }
   file_.reset();
 }

@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "base/files.h"
@@ -23,6 +24,7 @@ struct RecorderOptions {
   std::size_t ticks = 4096;              ///< of one device that may wait to be written
   std::size_t streamed = 512;            ///< values that clients stream to one device, the same
   std::size_t sceneBytes = 256U << 20U;  ///< of scene events that may wait to be written
+  std::uint64_t fileBytes = UINT64_MAX;  ///< of the file; the recording ends before it would exceed them
 };
 
 /// What was written and what was lost so far.
@@ -71,11 +73,21 @@ class Recorder {
   /// changed.
   void recordPublish(std::uint32_t device, Nanos time, std::uint64_t revision);
 
+  /// From any thread: a client marked a moment.
+  void recordMarker(Nanos time, const std::string& text);
+
+  /// While the server runs, after nothing records any more: the thread writes what is left and closes the
+  /// file. Any thread.
+  void end();
+  /// After end(): the file is complete. Any thread.
+  bool ended() const noexcept { return ended_.load(std::memory_order_acquire); }
   /// After servos and scenes have ended: writes what is left and closes the file. Idempotent.
   void finish();
   /// Whether the file is still written. Any thread.
   bool writes() const noexcept { return writes_.load(std::memory_order_acquire); }
-  /// After finish().
+  /// After finish(), or when ended(): something could not be written.
+  bool failed() const noexcept { return !writes(); }
+  /// The same.
   const RecorderCounts& counts() const noexcept { return counts_; }
 
  private:
@@ -91,7 +103,9 @@ class Recorder {
     Nanos newest = 0;
   };
 
+  std::optional<Nanos> step();
   void drain();
+  void close();
   void appendEvent(BlockKind kind, Bytes&& content);
   void appendTicks(std::uint32_t number, Device& device);
   void appendStreamed(std::uint32_t number, Device& device);
@@ -113,6 +127,8 @@ class Recorder {
   Nanos nextLossReport_ = 0;
   Nanos nextLook_ = 0;
   std::atomic<bool> writes_{true};
+  std::atomic<bool> ending_{false};
+  std::atomic<bool> ended_{false};
 
   std::mutex mutex_;
   Bytes events_;                  // whole blocks of scene events

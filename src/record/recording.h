@@ -50,6 +50,12 @@ struct LawRecord {
   std::vector<LawOptions> devices;  ///< in the order of the header
 };
 
+/// The credit of each device's passivity controller, in the order of the header. Recordings without one had
+/// none.
+struct PassivityRecord {
+  std::vector<double> bareDamping_Ns_per_m;
+};
+
 /// The first block, and what belongs to it.
 struct RecordingHeader {
   std::string program;
@@ -87,6 +93,12 @@ struct TickEvent {
   realtime::TickRecord tick;
 };
 
+/// A client marked a moment.
+struct MarkerEvent {
+  Nanos time = 0;
+  std::string text;
+};
+
 /// Data is missing here because the disk was too slow.
 struct LostEvent {
   enum class What : std::int32_t { ticks, sceneEvents, streamed };
@@ -100,6 +112,7 @@ struct EndEvent {
   Nanos time = 0;
 };
 
-using RecordingEvent = std::variant<SceneEvent, PublishEvent, StreamEvent, TickEvent, LostEvent, EndEvent>;
+using RecordingEvent =
+    std::variant<SceneEvent, PublishEvent, StreamEvent, TickEvent, LostEvent, EndEvent, MarkerEvent>;
 
 }  // namespace hapticd::record

@@ -8,6 +8,7 @@ namespace hapticd::record {
 RecordingReader::RecordingReader(const std::filesystem::path& file) : path_(file), blocks_(file) {
   readHeader();
   readLaw();
+  readPassivity();
 }
 
 void RecordingReader::fail(const std::string& what) const {
@@ -51,6 +52,21 @@ void RecordingReader::readLaw() {
     render.stribeckSpeed_m_per_s = header_.law.devices[i].stribeckSpeed_m_per_s;
     render.contactVibrationPulls = header_.law.devices[i].contactVibrationPulls;
   }
+}
+
+// The block after the law, if it is one of this kind.
+void RecordingReader::readPassivity() {
+  if (!pending_) pending_ = blocks_.next(block_);
+  if (!pending_ || block_.kind != BlockKind::passivity) return;
+  pending_ = false;
+  PassivityRecord record;
+  Unpacker in(block_.content);
+  in.take(record);
+  if (!in.ok() || !in.rest().empty() || record.bareDamping_Ns_per_m.size() != header_.devices.size()) {
+    fail("the passivity controllers do not match the devices");
+  }
+  for (std::size_t i = 0; i < header_.devices.size(); ++i)
+    header_.devices[i].tick.render.bareDamping_Ns_per_m = record.bareDamping_Ns_per_m[i];
 }
 
 bool RecordingReader::next(RecordingEvent& event) {
@@ -105,6 +121,9 @@ bool RecordingReader::readBlock(RecordingEvent& event) {
       takeWhole<LostEvent>(event);
       device = std::get<LostEvent>(event).device;
       break;
+    case BlockKind::marker:
+      takeWhole<MarkerEvent>(event);
+      return true;
     case BlockKind::end:
       takeWhole<EndEvent>(event);
       ended_ = true;

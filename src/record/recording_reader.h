@@ -29,6 +29,7 @@ class RecordingReader {
  private:
   void readHeader();
   void readLaw();
+  void readPassivity();
   bool readBlock(RecordingEvent& event);
   template <class Event>
   void takeWhole(RecordingEvent& event);

@@ -110,6 +110,19 @@ struct Rerenderer::Seat {
     control = wanted;
   }
 
+  // A recording that began while the server ran starts between two ticks: the state of its first tick is the
+  // recorded one, and until both are free of contact the proxy is not that of the recording.
+  void follow(const TickReport& recorded) {
+    if (!begun && recorded.tick > 1) {
+      tick.resume(recorded);
+      settled = false;
+    } else if (!settled) {
+      settled = !recorded.rendering.touching && !tick.last().rendering.touching;
+      if (settled) tick.resume(recorded);  // without the trips of a contact that began here only
+    }
+    begun = true;
+  }
+
   void publish(std::uint64_t revision) {
     if (revision == shown) return;
     while (!unseen.empty() && unseen.front().first < revision) unseen.pop_front();
@@ -129,6 +142,9 @@ struct Rerenderer::Seat {
   std::deque<std::pair<std::uint64_t, std::shared_ptr<const scene::SceneSnapshot>>> unseen;
   std::uint64_t shown = 0;
   std::deque<realtime::StreamRecord> streamed;  // not yet seen by a tick
+
+  bool begun = false;
+  bool settled = true;
 
   base::SimulatedClock clock;
   RecordedHand device{clock};
@@ -179,7 +195,13 @@ void Rerenderer::on(const PublishEvent& event) {
     // The published scene stays as it is, as in the recording.
   }
   // Other surfaces may make another number of revisions: pair the recorded one with the newest snapshot.
-  if (event.revision != 0) seat.unseen.emplace_back(event.revision, seat.newest);
+  if (event.revision == 0 || !seat.newest) return;
+  if (seat.newest->revision != event.revision) {
+    auto numbered = std::make_shared<scene::SceneSnapshot>(*seat.newest);
+    numbered->revision = event.revision;
+    seat.newest = std::move(numbered);
+  }
+  seat.unseen.emplace_back(event.revision, seat.newest);
 }
 
 void Rerenderer::on(const StreamEvent& event) {
@@ -196,7 +218,12 @@ const TickReport* Rerenderer::on(const TickEvent& event) {
   seat.device.use(event.tick);
   seat.tick(
       {recorded.time, recorded.timing.wakeupError, recorded.timing.overruns, recorded.timing.skippedPeriods});
+  seat.follow(recorded);
   return &seat.tick.last();
+}
+
+bool Rerenderer::comparable(std::uint32_t device) const {
+  return seats_.at(device)->settled;
 }
 
 }  // namespace hapticd::record

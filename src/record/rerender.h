@@ -42,6 +42,9 @@ class Rerenderer {
 
   /// For a tick, the re-rendered one, valid until the next call; null for all other events.
   const realtime::TickReport* feed(const RecordingEvent& event);
+  /// False for the first ticks of a device whose recording began while it touched something, or while the
+  /// server ran: what the proxy did before is not in the file.
+  bool comparable(std::uint32_t device) const;
 
  private:
   struct Seat;

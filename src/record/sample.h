@@ -6,6 +6,7 @@
 
 #include "hapticd/trips.h"
 #include "record/fields.h"
+#include "record/text_fields.h"
 
 namespace hapticd::record {
 
@@ -29,6 +30,7 @@ struct Sample {
   std::optional<double> gripper_rad{};
   std::optional<geometry::Vec3> renderedForce_N{};  ///< before the guard
   std::optional<geometry::Vec3> normal{};           ///< of the touched surface; zero when free
+  std::optional<geometry::Vec3> contactPoint_m{};   ///< on the touched surface; empty when free
   std::optional<std::uint32_t> renderStatus{};      ///< bits of realtime::RenderStatus
   std::optional<Nanos> wakeupError_ns{};
   std::optional<Nanos> compute_ns{};  ///< the servo's time for the tick
@@ -38,9 +40,9 @@ template <Is<Sample> T, class V>
 void fields(T& sample, V&& v) {
   auto& [device, time_ns, tick, revision, hip_m, proxy_m, velocity_m_per_s, orientation, force_N, depth_m,
          touching, object, buttons, guardActive, guardLatched, gripper_rad, renderedForce_N, normal,
-         renderStatus, wakeupError_ns, compute_ns] = sample;
+         contactPoint_m, renderStatus, wakeupError_ns, compute_ns] = sample;
   v("device", device);
-  v("time_ns", time_ns);
+  v("time_ns", ExactNanos{time_ns});
   v("tick", tick);
   v("revision", revision);
   v("hip_m", hip_m);
@@ -57,6 +59,7 @@ void fields(T& sample, V&& v) {
   v("gripper_rad", gripper_rad);
   v("rendered_force_N", renderedForce_N);
   v("normal", normal);
+  v("contact_point_m", contactPoint_m);
   v("render_status", renderStatus);
   v("wakeup_error_ns", wakeupError_ns);
   v("compute_ns", compute_ns);
@@ -84,6 +87,7 @@ inline Sample sampleOf(const std::string& device, const realtime::TickReport& ti
   sample.gripper_rad = tick.device.gripper_rad;
   sample.renderedForce_N = rendering.force_N;
   sample.normal = rendering.touching ? rendering.normal : geometry::Vec3(geometry::Vec3::Zero());
+  if (rendering.touching) sample.contactPoint_m = rendering.scp_m;
   sample.renderStatus = rendering.status;
   sample.wakeupError_ns = tick.timing.wakeupError;
   sample.compute_ns = tick.timing.compute;

@@ -4,6 +4,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <string>
 
 #include "hapticd/trips.h"
@@ -17,6 +18,12 @@ void appendNumber(std::string& out, T value) {
   char text[40];
   out.append(text, std::to_chars(text, text + sizeof text, value).ptr);
 }
+
+/// A time that JSON has as a text: its readers hold whole numbers up to 2^53, and nanoseconds since 1970 are
+/// more.
+struct ExactNanos {
+  std::int64_t value = 0;
+};
 
 /// Appends in quotes, for JSON; bytes that are not UTF-8 stay as they are.
 inline void appendQuoted(std::string& out, std::string_view text) {
@@ -55,6 +62,7 @@ class CsvRow {
   }
   void put(bool value) { put(std::uint8_t{value}); }
   void put(Trips trips) { put(namesOf(trips)); }
+  void put(ExactNanos time) { put(time.value); }
   void put(const std::string& text) {
     separate();
     if (text.find_first_of(",\"\r\n") == std::string::npos) {
@@ -159,6 +167,11 @@ class JsonObject {
   }
   void put(bool value) { out_ += value ? "true" : "false"; }
   void put(Trips trips) { put(trips.bits()); }
+  void put(ExactNanos time) {
+    out_ += '"';
+    appendNumber(out_, time.value);
+    out_ += '"';
+  }
   void put(const std::string& text) { appendQuoted(out_, text); }
   template <IsEnum T>
   void put(T value) {
@@ -223,7 +236,7 @@ class JsonSchema {
     using T = typename Plain<Field>::Type;
     if constexpr (std::same_as<T, bool>)
       return "boolean";
-    else if constexpr (std::same_as<T, std::string>)
+    else if constexpr (std::same_as<T, std::string> || std::same_as<T, ExactNanos>)
       return "string";
     else if constexpr (std::integral<T> || std::same_as<T, Trips>)
       return "integer";

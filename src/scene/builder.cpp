@@ -1,6 +1,11 @@
 #include "scene/builder.h"
 
+#ifdef __linux__
+#include <malloc.h>
+#endif
+
 #include <algorithm>
+#include <deque>
 #include <map>
 #include <utility>
 
@@ -11,6 +16,15 @@
 
 namespace hapticd::scene {
 namespace {
+
+constexpr std::size_t kLargeBatch_bytes = std::size_t{16} << 20;
+
+// The C library keeps the memory of many small commands for itself, and it may be locked.
+void releaseFreedMemory() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
+}
 
 std::size_t bytesOf(const SceneCommand& command) {
   std::size_t bytes = sizeof(SceneCommand);
@@ -43,6 +57,7 @@ class SceneBuilder::State {
       batch.bytes = config_.limits.batch_bytes + 1;  // refused as a whole
       batch.commands = {};
       heldInBatches_ -= std::exchange(batch.held, 0);
+      releaseFreedMemory();
       call.refuse("batch", "refused as a whole: too long; commit more often", ", limit ",
                   config_.limits.batch_bytes, " bytes");
       return;
@@ -53,7 +68,10 @@ class SceneBuilder::State {
   }
 
   void clientGone(ClientId client, Nanos now) {
-    if (auto batch = batches_.extract(client)) heldInBatches_ -= batch.mapped().held;
+    std::size_t held = 0;
+    if (auto batch = batches_.extract(client)) held = batch.mapped().held;
+    heldInBatches_ -= held;
+    if (held > kLargeBatch_bytes) releaseFreedMemory();
     board_.forget(client);
     forces_.clientGone(client, now);
   }
@@ -98,13 +116,26 @@ class SceneBuilder::State {
     return description;
   }
 
+  std::vector<ClientCommand> commands(Nanos now) const {
+    std::vector<ClientCommand> commands;
+    asked_.appendTo(commands);
+    objects_.appendCommands(commands);
+    forces_.appendCommands(now, commands);
+    for (const auto& [client, batch] : batches_) {
+      commands.push_back({client, BeginBatch{}});
+      for (const SceneCommand& command : batch.commands) commands.push_back({client, command});
+    }
+    return commands;
+  }
+
+  std::uint64_t revision() const noexcept { return revision_; }
   NoticeBoard& board() { return board_; }
 
  private:
   struct Batch {
-    std::vector<SceneCommand> commands;
-    std::size_t bytes = 0;  ///< of all commands, also of a batch that is too long
-    std::size_t held = 0;   ///< of those in memory
+    std::deque<SceneCommand> commands;  // grows without a copy
+    std::size_t bytes = 0;              ///< of all commands, also of a batch that is too long
+    std::size_t held = 0;               ///< of those in memory
   };
 
   void dispatch(SceneCommand& command, const Call& call) {
@@ -122,6 +153,7 @@ class SceneBuilder::State {
   }
 
   void apply(SetTouchableFaces& c, const Call&) {
+    asked_.keep(c);
     faces_ = c.faces == 0   ? TouchableFaces::front
              : c.faces == 1 ? TouchableFaces::back
                             : TouchableFaces::both;
@@ -129,23 +161,32 @@ class SceneBuilder::State {
   }
 
   void apply(SetWorkspaceProjection& c, const Call& call) {
-    use(fitProjection(c.model, c.projection, config_.deviceWorkspace_m, config_.workspaceFit),
-        "setWorkspaceProjectionMatrix", call);
+    if (!use(fitProjection(c.model, c.projection, config_.deviceWorkspace_m, config_.workspaceFit),
+             "setWorkspaceProjectionMatrix", call)) {
+      return;
+    }
+    asked_.drop<SetWorkspaceBox>();
+    asked_.keep(c);
   }
   void apply(SetWorkspaceBox& c, const Call& call) {
-    use(fitBox(c.model, c.box, config_.deviceWorkspace_m, config_.workspaceFit), "setWorkspaceBoundingBox",
-        call);
+    if (!use(fitBox(c.model, c.box, config_.deviceWorkspace_m, config_.workspaceFit),
+             "setWorkspaceBoundingBox", call)) {
+      return;
+    }
+    asked_.drop<SetWorkspaceProjection>();
+    asked_.keep(c);
   }
-  void use(const FittedWorkspace& fitted, std::string_view name, const Call& call) {
+  bool use(const FittedWorkspace& fitted, std::string_view name, const Call& call) {
     if (!fitted.T_world_device) {
       call.refuse(name, "refused, the old map stays: " + fitted.refusal);
-      return;
+      return false;
     }
     if (!fitted.warning.empty()) call.warn(name, fitted.warning);
     T_world_device_ = *fitted.T_world_device;
     T_scene_haptic_ = Affine::Identity();
     hapticScale_ = 1;
     updateWorkspace();
+    return true;
   }
 
   void apply(SetHapticOrigin& c, const Call& call) {
@@ -155,6 +196,7 @@ class SceneBuilder::State {
                   c.position_m.transpose(), ", axis ", c.axis.transpose(), ", angle ", c.angle_rad);
       return;
     }
+    asked_.keep(c);
     T_scene_haptic_ = Eigen::Translation3d(1000 * c.position_m) * *rotation;
     updateWorkspace();
   }
@@ -163,6 +205,7 @@ class SceneBuilder::State {
       call.refuse("setHapticScale", "refused: not a positive number", " ", c.scale);
       return;
     }
+    asked_.keep(c);
     hapticScale_ = c.scale;
     updateWorkspace();
   }
@@ -172,6 +215,7 @@ class SceneBuilder::State {
     changed_ = true;
   }
   void resetWorkspace() {
+    asked_.clear();
     T_world_device_ = Workspace().T_world_device;
     T_scene_haptic_ = Affine::Identity();
     hapticScale_ = 1;
@@ -210,6 +254,7 @@ class SceneBuilder::State {
   double hapticScale_ = 1;
   Workspace workspace_;
   TouchableFaces faces_ = TouchableFaces::both;
+  LastCommands asked_;  // of the map and the faces
   std::map<ClientId, Batch> batches_;
   std::size_t heldInBatches_ = 0;  // bytes, of all open batches
   std::uint64_t revision_ = 0;
@@ -243,6 +288,14 @@ std::shared_ptr<const SceneSnapshot> SceneBuilder::publish(Nanos now, std::vecto
 
 SceneDescription SceneBuilder::describe() const {
   return state_->describe();
+}
+
+std::vector<ClientCommand> SceneBuilder::commands(Nanos now) const {
+  return state_->commands(now);
+}
+
+std::uint64_t SceneBuilder::revision() const noexcept {
+  return state_->revision();
 }
 
 }  // namespace hapticd::scene

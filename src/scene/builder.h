@@ -13,6 +13,7 @@
 #include "scene/commands.h"
 #include "scene/config.h"
 #include "scene/description.h"
+#include "scene/last_commands.h"
 #include "scene/notice.h"
 #include "scene/snapshot.h"
 
@@ -46,6 +47,12 @@ class SceneBuilder {
 
   /// The scene as of the last publish(), for people to look at.
   SceneDescription describe() const;
+
+  /// Commands that make an empty scene this one, open batches included. Effects and the motions at hand begin
+  /// anew; forces whose client left are not among them.
+  std::vector<ClientCommand> commands(Nanos now) const;
+  /// Of the last snapshot.
+  std::uint64_t revision() const noexcept;
 
  private:
   class State;

@@ -159,6 +159,14 @@ struct SetTouchable {
   bool touchable = true;
 };
 
+/// A name for people; without effect on forces.
+struct SetObjectName {
+  static constexpr CommandInfo kInfo{"SetObjectName", "hapticd Set_Object_Name", Target::objects, "object",
+                                     "text"};
+  std::int32_t object = 0;
+  std::string text;
+};
+
 // Surfaces.
 
 /// One property by name: "stiffness", "damping", "static friction", "dynamic friction", "popthrough" in 0…1,
@@ -375,7 +383,12 @@ using SceneCommand =
                  SetHapticOrigin, SetHapticScale, SetSceneOrigin, DefineEffect, StartEffect, StopEffect,
                  SetPlane, SetPlaneDetail, SetForceField, SetConstraintEnabled, SetConstraintMode,
                  SetConstraintVector, SetConstraintStiffness, StartCustomEffect, StopCustomEffect, ResetScene,
-                 BeginBatch, CommitBatch, ReleaseForces>;
+                 BeginBatch, CommitBatch, ReleaseForces, SetObjectName>;
+
+/// Which part of a scene executes the command.
+inline Target targetOf(const SceneCommand& command) {
+  return std::visit([]<class C>(const C&) { return C::kInfo.target; }, command);
+}
 
 /// Calls `visit.operator()<C>()` for each type of command, in the order of SceneCommand.
 template <class Visit>

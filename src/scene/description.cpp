@@ -12,6 +12,8 @@ void ObjectTable::describe(SceneDescription& out) const {
     to.id = object->id;
     to.parent = object->parent;
     to.touchable = object->touchable;
+    to.name = object->name;
+    to.worldUnits = object->worldUnits();
     to.T_world_object = frameOf(*object) * Eigen::UniformScaling<double>(object->worldUnits());
     to.T_object_mesh = object->T_object_mesh;
     to.surface = object->surface;
@@ -27,7 +29,7 @@ void FreeForces::describe(SceneDescription& out) const {
     out.effects.push_back({entry.value.effect, entry.value.running});
   }
   for (const auto& [index, entry] : planes_) out.planes.push_back(entry.value);
-  out.fields = field_ ? 1 : 0;
+  if (field_) out.fields.push_back(field_->value);
   if (!constraint_ || !constraint_->value.enabled) return;
   const Constraint& c = constraint_->value;
   const auto add = [&](std::string_view mode, const Vec3& point_m, const Vec3& direction) {

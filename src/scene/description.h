@@ -3,11 +3,13 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
 #include "geometry/triangle_mesh.h"
 #include "scene/effect.h"
+#include "scene/force_field.h"
 #include "scene/plane.h"
 #include "scene/surface.h"
 #include "scene/workspace.h"
@@ -18,6 +20,8 @@ struct ObjectDescription {
   std::int32_t id = 0;
   std::int32_t parent = -1;  ///< another object, -1 the scene, -2 nothing
   bool touchable = true;
+  std::string name;       ///< for people; may be empty
+  double worldUnits = 1;  ///< of one unit of the object, in which clients place it: 1000 for stock geometry
   Affine T_world_object = Affine::Identity();  ///< world units; where it is, or is on its way to
   Affine T_object_mesh = Affine::Identity();
   Surface surface;  ///< as rendered
@@ -48,7 +52,7 @@ struct SceneDescription {
   std::vector<EffectDescription> effects;  ///< by ascending index, also those that do not run
   std::vector<Plane> planes;
   std::optional<ConstraintDescription> constraint;
-  std::size_t fields = 0;  ///< force fields, without the constraint
+  std::vector<ForceField> fields;  ///< without the constraint; stiff ones as the client sent them
 };
 
 /// The name of an effect's type, as clients send it.

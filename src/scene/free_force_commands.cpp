@@ -101,6 +101,7 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
                 c.index, ", at most ", config_.limits.effects, " effects");
     return;
   }
+  asked_.keep(c, call.client, c.index);
   const Effect effect = effectFrom(*kind, c, config_, bound_, call);
   Owned<RunningEffect>& entry = effects_[c.index];
   // An effect whose owner left ramps out until it is started again.
@@ -157,7 +158,7 @@ void FreeForces::handle(SetPlane& c, const Call& call) {
     return;
   }
   const Vec3 normal(c.plane[0], c.plane[1], c.plane[2]);
-  const double length = normal.stableNorm();
+  const double length = lengthOf(normal);
   if (length == 0) {
     changed_ |= planes_.erase(c.index) != 0;
     return;
@@ -189,6 +190,7 @@ void FreeForces::handle(SetPlane& c, const Call& call) {
   plane.placement = stays ? known->second.value.placement : ++placements_;
   plane.owner = ownerOf(call.client);
   planes_[c.index] = {call.client, plane, kNever};
+  asked_.keep(c, call.client, c.index);
   changed_ = true;
 }
 
@@ -204,6 +206,7 @@ void FreeForces::handle(SetPlaneDetail& c, const Call& call) {
                 " plane 0, ", value);
     return;
   }
+  asked_.keep(c, call.client);
   planeDetail_.adhesionNormal_N = c.adhesionNormal_N;
   planeDetail_.adhesionLateral_N = c.adhesionLateral_N;
   planeDetail_.textureAmplitude = kWorldUnitsPerStockMetre * c.textureAmplitude_m;
@@ -238,11 +241,15 @@ void FreeForces::handle(SetForceField& c, const Call& call) {
   } else {
     field.owner = ownerOf(call.client);
     field_ = {call.client, field, kNever};
+    asked_.keep(c, call.client);
   }
 }
 
 FreeForces::Constraint& FreeForces::constraintFor(const Call& call) {
-  if (!constraint_) constraint_ = Owned<Constraint>{};
+  if (!constraint_) {
+    constraint_ = Owned<Constraint>{};
+    askedOfConstraint_.clear();
+  }
   constraint_->owner = call.client;
   constraint_->goneAt = kNever;
   constraint_->value.releasing = false;
@@ -254,6 +261,7 @@ FreeForces::Constraint& FreeForces::constraintFor(const Call& call) {
 template <>
 void FreeForces::handle(SetConstraintEnabled& c, const Call& call) {
   constraintFor(call).enabled = c.enabled;
+  askedOfConstraint_.keep(c);
 }
 
 template <>
@@ -263,18 +271,20 @@ void FreeForces::handle(SetConstraintMode& c, const Call& call) {
     return;
   }
   constraintFor(call).mode = c.mode;
+  askedOfConstraint_.keep(c);
 }
 
 template <>
 void FreeForces::handle(SetConstraintVector& c, const Call& call) {
   const bool direction =
       c.which == ConstraintVector::lineDirection || c.which == ConstraintVector::planeNormal;
-  if (!isUsable(c.value) || (direction && !(c.value.stableNorm() > 0))) {
+  if (!isUsable(c.value) || (direction && !(lengthOf(c.value) > 0))) {
     call.refuse("constraint", "refused: not finite or too large, or a direction without length", " ",
                 c.value.transpose());
     return;
   }
   Constraint& constraint = constraintFor(call);
+  askedOfConstraint_.keep(c, 0, static_cast<int>(c.which));
   switch (c.which) {
     case ConstraintVector::point:
       constraint.point_m = c.value;
@@ -301,6 +311,7 @@ void FreeForces::handle(SetConstraintStiffness& c, const Call& call) {
     return;
   }
   constraintFor(call).stiffness_N_per_m = c.stiffness_N_per_m;
+  askedOfConstraint_.keep(c);
 }
 
 template <>
@@ -332,6 +343,7 @@ void FreeForces::handle(StartCustomEffect& c, const Call& call) {
   buzz.start = ++starts_;
   buzz.owner = ownerOf(call.client);
   buzz_ = {call.client, buzz, call.now + buzz.duration + kAfterEnd};
+  asked_.keep(c, call.client);
   changed_ = true;
 }
 

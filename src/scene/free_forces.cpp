@@ -73,6 +73,32 @@ PublishedForces FreeForces::publish(double worldUnitsPerMetre) const {
   return forces;
 }
 
+// By their owners, whichever client sent the command.
+void FreeForces::appendCommands(Nanos now, std::vector<ClientCommand>& out) const {
+  const auto add = [&](ClientId owner, const auto* command) {
+    if (command != nullptr) out.push_back({owner, *command});
+  };
+  for (const auto& [index, entry] : effects_) {
+    if (entry.value.effect.releasing) continue;
+    add(entry.owner, asked_.find<DefineEffect>(index));
+    if (entry.value.running) out.push_back({entry.owner, StartEffect{index}});
+  }
+  for (const auto& [index, entry] : waitingStarts_) out.push_back({entry.owner, StartEffect{index}});
+  add(0, asked_.find<SetPlaneDetail>());
+  for (const auto& [index, entry] : planes_) {
+    if (!entry.value.releasing) add(entry.owner, asked_.find<SetPlane>(index));
+  }
+  if (field_ && !field_->value.releasing) add(field_->owner, asked_.find<SetForceField>());
+  if (constraint_ && !constraint_->value.releasing) {
+    const std::size_t first = out.size();
+    askedOfConstraint_.appendTo(out);
+    for (std::size_t i = first; i < out.size(); ++i) out[i].client = constraint_->owner;
+  }
+  if (buzz_ && !buzz_->value.releasing && buzz_->goneAt > now) {
+    add(buzz_->owner, asked_.find<StartCustomEffect>());
+  }
+}
+
 template <class F>
 void FreeForces::release(const F& whose, Nanos now) {
   const auto letGo = [&](auto& owned, bool& releasing) {
@@ -97,6 +123,7 @@ void FreeForces::clientGone(ClientId client, Nanos now) {
 void FreeForces::reset(Nanos now) {
   release([](ClientId) { return true; }, now);
   planeDetail_ = {};
+  asked_.drop<SetPlaneDetail>();
 }
 
 template <class F>

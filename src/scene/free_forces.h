@@ -13,6 +13,7 @@
 #include "scene/description.h"
 #include "scene/effect.h"
 #include "scene/force_field.h"
+#include "scene/last_commands.h"
 #include "scene/notice_board.h"
 #include "scene/passivity.h"
 #include "scene/plane.h"
@@ -78,6 +79,8 @@ class FreeForces {
   PublishedForces publish(double worldUnitsPerMetre) const;
   /// Appends all of them, running or not.
   void describe(SceneDescription& out) const;
+  /// Appends commands that set and start all but those that ramp out; effects start anew.
+  void appendCommands(Nanos now, std::vector<ClientCommand>& out) const;
 
  private:
   // One specialisation for each command, in free_force_commands.cpp; a missing one does not link.
@@ -116,6 +119,8 @@ class FreeForces {
   std::optional<Owned<Buzz>> buzz_;
   std::uint32_t starts_ = 0;      // one counter for all: no number is used twice
   std::uint32_t placements_ = 0;  // the same for planes
+  LastCommands asked_;            // also of forces that are gone
+  LastCommands askedOfConstraint_;
   bool changed_ = false;
 };
 

@@ -4,6 +4,11 @@
 
 namespace hapticd::scene {
 
+double lengthOf(const Vec3& v) {
+  const double largest = v.cwiseAbs().maxCoeff();
+  return largest > 0 ? largest * (v / largest).norm() : largest;
+}
+
 Mat4 fromColumns(const std::array<double, 16>& m) {
   return Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::ColMajor>>(m.data());
 }
@@ -32,7 +37,7 @@ std::optional<Affine> affineFrom(const Mat4& m) {
 std::optional<geometry::Quat> rotationFrom(const Vec3& axis, double angle_rad) {
   if (!isUsable(axis) || !isUsable(angle_rad)) return std::nullopt;
   if (angle_rad == 0) return geometry::Quat::Identity();
-  const double length = axis.stableNorm();
+  const double length = lengthOf(axis);
   if (!(length > 0)) return std::nullopt;
   return geometry::Quat(Eigen::AngleAxisd(angle_rad, axis / length));
 }

@@ -25,6 +25,10 @@ inline bool isUsable(const Vec3& v) {
   return (v.array().abs() <= kLargest).all();
 }
 
+/// The length, also of vectors whose squares are not numbers. Eigen's stableNorm() adds in an order that
+/// depends on the address, so that one command would not always make the same scene.
+double lengthOf(const Vec3& v);
+
 /// Column-major, as OpenGL keeps them.
 Mat4 fromColumns(const std::array<double, 16>& m);
 /// Row-major.

@@ -127,6 +127,34 @@ void MeshDraft::clear(Nanos now) {
   finished_ = true;
 }
 
+// Vertices that have not come are not numbers and stay so; triangles that were removed come with three equal
+// corners and are removed again.
+void MeshDraft::appendCommands(std::int32_t object, ClientId client, bool inMetres,
+                               std::vector<ClientCommand>& out) const {
+  constexpr std::size_t kRun = 1U << 20U;
+  const auto runs = [&](const auto& items, const auto& add) {
+    for (std::size_t first = 0; first < items.size(); first += kRun) {
+      const auto begin = items.begin() + static_cast<std::ptrdiff_t>(first);
+      add(static_cast<std::int32_t>(first),
+          std::vector(begin, begin + static_cast<std::ptrdiff_t>(std::min(kRun, items.size() - first))));
+    }
+  };
+  runs(vertices_.read(), [&](std::int32_t first, std::vector<Vec3f>&& run) {
+    out.push_back({client, SetVertices{object, first, std::move(run)}});
+  });
+  if (!indexed_) return;
+  std::vector<std::int32_t> removed;
+  runs(triangles_.read(), [&](std::int32_t first, std::vector<Triangle>&& run) {
+    for (std::size_t i = 0; i < run.size(); ++i) {
+      if (run[i] != kNoTriangle) continue;
+      run[i] = Triangle{};
+      removed.push_back(first + static_cast<std::int32_t>(i));
+    }
+    out.push_back({client, SetTriangles{object, first, std::move(run), inMetres}});
+  });
+  for (const std::int32_t triangle : removed) out.push_back({client, RemoveTriangle{object, triangle}});
+}
+
 // Triples keep one list as long as their number stays; numbered triangles get a copy only when some lack a
 // corner, so that every published number is a vertex.
 std::shared_ptr<const std::vector<Triangle>> MeshDraft::shareTriangles() {

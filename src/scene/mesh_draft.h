@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "scene/deformation.h"
+#include "scene/last_commands.h"
 
 namespace hapticd::scene {
 
@@ -74,6 +75,10 @@ class MeshDraft {
 
   /// Does not publish the edits so far until the next edit.
   void giveUp() { dirty_ = false; }
+
+  /// Appends commands that make an empty draft this one.
+  void appendCommands(std::int32_t object, ClientId client, bool inMetres,
+                      std::vector<ClientCommand>& out) const;
 
   bool finished() const { return finished_; }
   /// When edits should be published; nothing when there are none.

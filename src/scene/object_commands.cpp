@@ -9,13 +9,17 @@ namespace {
 constexpr std::string_view kBadMatrix =
     "refused: the matrix is not finite or too large, is singular, or its last row is not 0 0 0 1";
 
-constexpr std::size_t kLargestGap = 65'536;  // vertices or triangles that may be missing before a run
+// Vertices or triangles that may be missing before a run. Clients may send a mesh from its end, or with
+// numbers that leave room: all meshes together have a bounded number of such gaps, which sending the numbers
+// closes.
+constexpr std::size_t kGap = 65'536;
+constexpr std::size_t kGapsInAll = 1'000'000;
 
 }  // namespace
 
-bool ObjectTable::hasRoom(const Object& object, std::int32_t first, std::size_t count, std::size_t present,
+bool ObjectTable::hasRoom(Object& object, std::int32_t first, std::size_t count, std::size_t present,
                           std::uint32_t perObject, std::uint64_t inAll, std::uint64_t used,
-                          std::string_view name, std::string_view what, const Call& call) const {
+                          std::string_view name, std::string_view what, const Call& call) {
   if (first < 0) {
     call.refuse(name, "refused: numbers start at 0", " object ", object.id, ", ", what, " ", first);
     return false;
@@ -26,19 +30,34 @@ bool ObjectTable::hasRoom(const Object& object, std::int32_t first, std::size_t 
                 end - 1, ", limit ", perObject);
     return false;
   }
-  // Numbers far beyond the present ones would make a few bytes cost megabytes.
-  if (static_cast<std::size_t>(first) > 2 * present + kLargestGap) {
-    call.refuse(
-        name, "refused: too far beyond the numbers that were sent; send them in about ascending order",
-        " object ", object.id, ", ", what, " ", first, ", at most ", 2 * present + kLargestGap, " now");
-    return false;
-  }
   if (end > present && used + (end - present) > inAll) {
     call.refuse(name, "refused: the scene is full; clear or remove objects first", " object ", object.id,
                 ", ", what, " ", end - 1, ", limit ", inAll, " in all objects");
     return false;
   }
+  // Numbers far beyond the present ones would make a few bytes cost megabytes.
+  const std::size_t start = static_cast<std::size_t>(first);
+  if (start > 2 * present + kGap) {
+    const std::size_t gap = start - present;
+    if (gaps_ + gap > kGapsInAll) {
+      call.refuse(name,
+                  "refused: too far beyond the numbers that were sent; send them in about ascending order",
+                  " object ", object.id, ", ", what, " ", first, ", at most ",
+                  std::max(2 * present + kGap, present + kGapsInAll - gaps_), " now");
+      return false;
+    }
+    object.gap += gap;
+    gaps_ += gap;
+  } else if (end <= present) {
+    closeGap(object, count);
+  }
   return true;
+}
+
+void ObjectTable::closeGap(Object& object, std::size_t count) {
+  count = std::min(count, object.gap);
+  object.gap -= count;
+  gaps_ -= count;
 }
 
 void ObjectTable::meshEdited(Object& object, const Call& call) {
@@ -136,6 +155,7 @@ void ObjectTable::handle(ClearMesh& c, const Call& call) {
   vertices_ -= object->mesh.vertexCount();
   triangles_ -= object->mesh.triangleCount();
   object->mesh.clear(call.now);
+  closeGap(*object, object->gap);
   meshEdited(*object, call);
 }
 
@@ -150,6 +170,7 @@ void ObjectTable::handle(TransformMesh& c, const Call& call) {
     return;
   }
   becomeStock(*object);
+  object->asked.keep(c, call.client);
   const Nanos travel = object->poses.next(call.now);
   if (t->matrix() == object->T_object_mesh.matrix()) return;
   object->T_object_mesh = *t;
@@ -222,6 +243,7 @@ void ObjectTable::handle(SetTransform& c, const Call& call) {
     call.refuse(kName, kBadMatrix, " object ", c.object);
     return;
   }
+  object->asked.keep(c, call.client);
   object->rotation = geometry::Quat::Identity();
   object->scale = Vec3::Ones();
   place(*object, *t, call);
@@ -238,6 +260,7 @@ void ObjectTable::handle(SetObjectPosition& c, const Call& call) {
     return;
   }
   becomeStock(*object);
+  object->asked.keep(c, call.client);
   Affine t = object->T_parent_object;
   t.translation() = c.position_m;
   place(*object, t, call);
@@ -255,6 +278,7 @@ void ObjectTable::handle(SetObjectOrientation& c, const Call& call) {
     return;
   }
   becomeStock(*object);
+  object->asked.keep(c, call.client);
   object->rotation = *rotation;
   Affine t = object->T_parent_object;
   t.linear() = object->rotation.toRotationMatrix() * object->scale.asDiagonal();
@@ -274,6 +298,7 @@ void ObjectTable::handle(SetObjectScale& c, const Call& call) {
     return;
   }
   becomeStock(*object);
+  object->asked.keep(c, call.client);
   object->scale = c.scale;
   place(*object, t, call);
 }
@@ -282,14 +307,24 @@ template <>
 void ObjectTable::handle(SetTouchable& c, const Call& call) {
   Object* object = find(c.object, "setObjectIsTouchable", call);
   if (object == nullptr || object->touchable == c.touchable) return;
+  object->asked.keep(c, call.client);
   object->touchable = c.touchable;
   queue(*object);
+}
+
+template <>
+void ObjectTable::handle(SetObjectName& c, const Call& call) {
+  Object* object = find(c.object, "setObjectName", call);
+  if (object == nullptr) return;
+  object->asked.keep(c, call.client);
+  object->name = std::move(c.text);
 }
 
 template <>
 void ObjectTable::handle(SetSurfaceProperty& c, const Call& call) {
   Object* object = find(c.object, "setHapticProperty", call);
   if (object == nullptr || !object->settings.set(c, config_, call)) return;
+  object->asked.keep(c, call.client, SurfaceSettings::numberOf(c.name));
   object->surfaceSetBy = call.client;
   object->surfaceChanged = true;
   queue(*object);
@@ -300,6 +335,7 @@ void ObjectTable::handle(SetSurface& c, const Call& call) {
   Object* object = find(c.object, "updateTrimeshChanges", call);
   if (object == nullptr || !object->settings.set(c, config_, call)) return;
   becomeStock(*object);
+  object->asked.keep(c, call.client);
   object->surfaceSetBy = call.client;
   object->surfaceChanged = true;
   queue(*object);
@@ -314,6 +350,7 @@ void ObjectTable::handle(SetSceneOrigin& c, const Call& call) {
                 c.position_m.transpose(), ", axis ", c.axis.transpose(), ", angle ", c.angle_rad);
     return;
   }
+  asked_.keep(c, call.client);
   T_world_scene_ = Eigen::Translation3d(1000 * c.position_m) * *rotation;
   moveScene(scenePoses_.next(call.now));
 }

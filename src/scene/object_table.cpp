@@ -53,8 +53,10 @@ void ObjectTable::reset() {
   edited_.clear();
   checks_.clear();
   T_world_scene_ = Affine::Identity();
+  asked_.clear();
   scenePoses_ = {};
   vertices_ = 0;
+  gaps_ = 0;
   triangles_ = 0;
   listChanged_ = true;
   create(0, Object::kScene);
@@ -104,6 +106,7 @@ void ObjectTable::erase(std::int32_t id) {
   detach(object);
   if (object.position >= 0) listChanged_ = true;
   vertices_ -= object.mesh.vertexCount();
+  closeGap(object, object.gap);
   triangles_ -= object.mesh.triangleCount();
   objects_[static_cast<std::size_t>(id)].reset();
   if (id == 0) create(0, Object::kScene);
@@ -141,6 +144,30 @@ bool ObjectTable::checkParent(std::int32_t id, std::int32_t parent, std::string_
     return false;
   }
   return true;
+}
+
+// First all objects below the scene, then the tree: each of its states is a part of the final one.
+void ObjectTable::appendCommands(std::vector<ClientCommand>& out) const {
+  const auto add = [&](SceneCommand command, ClientId client = 0) {
+    out.push_back({client, std::move(command)});
+  };
+  add(SetObjectNumber{static_cast<std::int32_t>(objects_.size())});
+  for (std::size_t id = 0; id < objects_.size(); ++id) {
+    if (!objects_[id]) add(RemoveObject{static_cast<std::int32_t>(id)});
+  }
+  for (const auto& object : objects_) {
+    if (!object) continue;
+    if (object->parent == Object::kNoParent) {
+      add(AddObjectExScene{object->id});
+    } else if (object->inMetres) {
+      add(AddObject{object->id, object->parent});
+    } else if (object->parent != Object::kScene) {
+      add(MoveToParent{object->id, object->parent});
+    }
+    object->mesh.appendCommands(object->id, object->meshSetBy, object->inMetres, out);
+    object->asked.appendTo(out);
+  }
+  asked_.appendTo(out);
 }
 
 void ObjectTable::queue(Object& object) {

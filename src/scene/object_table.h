@@ -9,6 +9,7 @@
 #include "scene/commands.h"
 #include "scene/config.h"
 #include "scene/description.h"
+#include "scene/last_commands.h"
 #include "scene/matrices.h"
 #include "scene/mesh_draft.h"
 #include "scene/notice_board.h"
@@ -56,8 +57,10 @@ struct Object {
   static constexpr std::int32_t kNoParent = -2;  ///< parent: a root of its own
 
   std::int32_t id = 0;
+  std::size_t gap = 0;    ///< its part of ObjectTable::gaps_
   bool inMetres = false;  ///< stock geometry: one object unit is 1000 world units
   bool touchable = true;
+  std::string name;  ///< for people
   std::int32_t parent = kScene;
   std::vector<std::int32_t> children;
 
@@ -71,6 +74,7 @@ struct Object {
   ClientId meshSetBy = 0;
   SurfaceSettings settings;
   ClientId surfaceSetBy = 0;
+  LastCommands asked;  ///< all but the tree and the mesh
 
   // The published part, and what of it is out of date.
   std::shared_ptr<const MeshGeometry> geometry;
@@ -122,6 +126,8 @@ class ObjectTable {
   const PublishedObjects& published() const { return published_; }
   /// Appends every object, whether it exerts force or not.
   void describe(SceneDescription& out) const;
+  /// Appends commands that make an empty table this one.
+  void appendCommands(std::vector<ClientCommand>& out) const;
 
  private:
   // One specialisation for each command, in object_commands.cpp; a missing one does not link.
@@ -140,9 +146,10 @@ class ObjectTable {
   template <class F>
   void withDescendants(Object& object, const F& f);
 
-  bool hasRoom(const Object& object, std::int32_t first, std::size_t count, std::size_t present,
+  bool hasRoom(Object& object, std::int32_t first, std::size_t count, std::size_t present,
                std::uint32_t perObject, std::uint64_t inAll, std::uint64_t used, std::string_view name,
-               std::string_view what, const Call& call) const;
+               std::string_view what, const Call& call);
+  void closeGap(Object& object, std::size_t count);
   void becomeStock(Object& object);
   void place(Object& object, const Affine& T_parent_object, const Call& call);
   void moveAll(Object& object, Nanos travel);
@@ -169,9 +176,11 @@ class ObjectTable {
   std::function<Nanos()> stopwatch_;
   std::vector<std::unique_ptr<Object>> objects_;
   Affine T_world_scene_ = Affine::Identity();
+  LastCommands asked_;  // of the scene's origin
   PoseStream scenePoses_;
   double worldUnitsPerMetre_ = 1000;
   std::uint64_t vertices_ = 0;
+  std::size_t gaps_ = 0;  // numbers below large gaps that were not sent yet, of all objects
   std::uint64_t triangles_ = 0;
   std::uint64_t lastTopology_ = 0;  // one counter for all meshes: no number is used twice
   std::uint32_t jumps_ = 0;         // one counter for all: no number is used twice

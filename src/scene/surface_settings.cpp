@@ -35,6 +35,13 @@ double clampStock(double value, double max, bool raw, std::string_view what, con
 
 }  // namespace
 
+int SurfaceSettings::numberOf(std::string_view name) {
+  constexpr std::string_view kNames[] = {"stiffness",        "damping",    "static friction",
+                                         "dynamic friction", "popthrough", "mass"};
+  const auto* known = std::find(std::begin(kNames), std::end(kNames), name);
+  return known == std::end(kNames) ? -1 : static_cast<int>(known - std::begin(kNames));
+}
+
 bool SurfaceSettings::set(const SetSurfaceProperty& command, const SceneConfig& config, const Call& call) {
   constexpr std::string_view kName = "setHapticProperty";
   const bool ofDevice = config.materialScale == MaterialScale::device;

@@ -17,6 +17,8 @@ namespace hapticd::scene {
 /// The requested values in SI, not yet limited against each other: properties arrive one by one in any order.
 class SurfaceSettings {
  public:
+  /// Of the property with this name; -1: there is none.
+  static int numberOf(std::string_view name);
   /// One property by its name; answers by notices. False when nothing changed.
   bool set(const SetSurfaceProperty& command, const SceneConfig& config, const Call& call);
   /// All but popthrough and mass, in stock units. False when refused.

@@ -1,9 +1,12 @@
 #include "server/player.h"
 
+#include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "base/world.h"
 #include "server/session/wall_clock.h"
+#include "server/time_line.h"
 
 namespace hapticd::server {
 namespace {
@@ -21,13 +24,20 @@ constexpr scene::ClientId kRecordedClients = 1U << 30U;
 std::optional<Nanos> timeOf(const RecordingEvent& event) {
   if (const auto* tick = std::get_if<TickEvent>(&event)) return tick->tick.report.time;
   if (const auto* scene = std::get_if<SceneEvent>(&event)) return scene->time;
+  if (const auto* marker = std::get_if<record::MarkerEvent>(&event)) return marker->time;
   return std::nullopt;
 }
 
 }  // namespace
 
 Player::Player(ReplayOptions options)
-    : options_(std::move(options)), header_(record::RecordingReader(options_.file).header()) {}
+    : options_(std::move(options)),
+      header_(record::RecordingReader(options_.file).header()),
+      speed_(options_.speed) {
+  status_.file = options_.file.filename().string();
+  status_.speed = options_.speed;
+  status_.loop = options_.loop;
+}
 
 ServerConfig Player::config() const {
   ServerConfig config = parseConfig(header_.config, options_.file.string());
@@ -50,16 +60,48 @@ ServerConfig Player::config() const {
 
 void Player::start(Callbacks callbacks) {
   callbacks_ = std::move(callbacks);
+  // Beside the replay: a long recording is read for some seconds.
+  scan_ = base::Thread({.name = "time line", .niceness = 10}, [this]() -> std::optional<Nanos> {
+    if (stopping_ || status().timeLine) return std::nullopt;
+    auto line = std::make_shared<TimeLine>();
+    try {
+      *line = readTimeLine(options_.file, stopping_);
+    } catch (const record::RecordingError&) {
+      // The replay itself reports it.
+    }
+    const std::lock_guard lock(mutex_);
+    status_.timeLine = std::move(line);
+    return std::nullopt;
+  });
   thread_ = base::Thread({.name = "player"}, [this] { return step(); });
 }
 
 void Player::stop() {
   stopping_ = true;
   thread_.stop();
+  scan_.stop();
+}
+
+void Player::order(const ReplayOrder& order) {
+  {
+    const std::lock_guard lock(mutex_);
+    std::optional<double> seek;
+    if (order_) seek = order_->position_s;
+    order_ = order;
+    if (!order_->position_s) order_->position_s = seek;
+  }
+  thread_.wake();
+}
+
+ReplayStatus Player::status() const {
+  const std::lock_guard lock(mutex_);
+  return status_;
 }
 
 std::optional<Nanos> Player::step() {
-  while (!stopping_ && !ended_) {
+  while (!stopping_) {
+    takeOrder();
+    if (ended_) return std::nullopt;
     try {
       if (!reader_) reader_ = std::make_unique<record::RecordingReader>(options_.file);
       readAhead();
@@ -68,14 +110,56 @@ std::optional<Nanos> Player::step() {
         continue;
       }
       const auto next = buffer_.begin();
-      if (const Nanos due = dueAt(next->first); base::now() < due) return due;
-      play(next->second);
+      if (!std::exchange(started_, true)) {
+        begin_ = next->first;
+        setPresent(begin_);
+      }
+      if (seek_s_) {
+        skipTo_ = begin_ + base::toNanos(*std::exchange(seek_s_, std::nullopt));
+        toShow_.assign(header_.devices.size(), 1);
+      }
+      const bool skips = skipTo_ && next->first < *skipTo_;
+      if (skipTo_ && !skips) {
+        setPresent(*skipTo_);
+        skipTo_.reset();
+      }
+      const bool shows = std::find(toShow_.begin(), toShow_.end(), 1) != toShow_.end();
+      if (!skips) {
+        if (paused_ && !shows) return std::nullopt;
+        if (const Nanos due = liveTime(next->first); !paused_ && base::now() < due) return due;
+      }
+      if (!skips || std::holds_alternative<SceneEvent>(next->second)) play(next->second);
+      const auto* tick = std::get_if<TickEvent>(&next->second);
+      if (tick != nullptr && !skips && !toShow_.empty()) toShow_[tick->device] = 0;
+      position_ = next->first;
       buffer_.erase(next);
     } catch (const record::RecordingError& error) {
       endPass(error.what());
     }
+    const std::lock_guard lock(mutex_);
+    status_.position_s = base::toSeconds(position_ - begin_);
   }
   return std::nullopt;
+}
+
+void Player::takeOrder() {
+  const std::lock_guard lock(mutex_);
+  if (!order_) return;
+  const ReplayOrder order = *std::exchange(order_, std::nullopt);
+  const Nanos now = base::now();
+  // While it runs, the moment between two events counts, too.
+  const Nanos present = paused_ || ended_ || !started_ ? position_ : recordedTime(now);
+  paused_ = order.paused;
+  if (std::isfinite(order.speed) && order.speed > 0) speed_ = std::clamp(order.speed, kSlowest, kFastest);
+  setPresent(present);
+  if (order.position_s && std::isfinite(*order.position_s)) {
+    seek_s_ = std::clamp(*order.position_s, 0.0, 1e9);
+    if (ended_ || (started_ && begin_ + base::toNanos(*seek_s_) <= position_)) rewind();
+    ended_ = false;
+  }
+  status_.paused = paused_;
+  status_.speed = speed_;
+  status_.ended = ended_;
 }
 
 void Player::readAhead() {
@@ -87,41 +171,57 @@ void Player::readAhead() {
   }
 }
 
-// `remark`: why the file ended early; empty at its regular end.
-void Player::endPass(const std::string& remark) {
-  if (options_.loop && remark.empty() && started_) {
-    callbacks_.restart();
-  } else {
-    ended_ = true;
-    callbacks_.ended(remark);
-  }
+// To the beginning of the file.
+void Player::rewind() {
+  callbacks_.restart();
   reader_.reset();
   buffer_.clear();
   atEnd_ = false;
   started_ = false;
+  skipTo_.reset();
+}
+
+// `remark`: why the file ended early; empty at its regular end.
+void Player::endPass(const std::string& remark) {
+  if (options_.loop && remark.empty() && started_) {
+    rewind();
+    return;
+  }
+  ended_ = true;
+  callbacks_.ended(remark);
+  reader_.reset();
+  buffer_.clear();
+  skipTo_.reset();
+  atEnd_ = false;
+  started_ = false;
+  const std::lock_guard lock(mutex_);
+  status_.ended = true;
+}
+
+// From now on, this recorded moment is the present one.
+void Player::setPresent(Nanos recorded) {
+  firstRecorded_ = recorded;
+  firstLive_ = base::now();
 }
 
 Nanos Player::liveTime(Nanos recorded) const {
-  return firstLive_ + static_cast<Nanos>(static_cast<double>(recorded - firstRecorded_) / options_.speed);
+  return firstLive_ + static_cast<Nanos>(static_cast<double>(recorded - firstRecorded_) / speed_);
 }
 
-// The live time of an event; the first event of a pass is due at once.
-Nanos Player::dueAt(Nanos recorded) {
-  if (!std::exchange(started_, true)) {
-    firstRecorded_ = recorded;
-    firstLive_ = base::now();
-  }
-  return liveTime(recorded);
+Nanos Player::recordedTime(Nanos live) const {
+  return firstRecorded_ + static_cast<Nanos>(static_cast<double>(live - firstLive_) * speed_);
 }
 
 void Player::play(RecordingEvent& event) {
   if (auto* tick = std::get_if<TickEvent>(&event)) {
-    tick->tick.report.time = liveTime(tick->tick.report.time);
+    tick->tick.report.time = paused_ ? base::now() : liveTime(tick->tick.report.time);
     tick->tick.report.device.time = tick->tick.report.time;
     callbacks_.tick(tick->device, tick->tick.report);
   } else if (const auto* scene = std::get_if<SceneEvent>(&event)) {
     callbacks_.command(scene->scene, kRecordedClients + scene->client,
                        scene->command ? &*scene->command : nullptr);
+  } else if (const auto* marker = std::get_if<record::MarkerEvent>(&event)) {
+    if (callbacks_.marker) callbacks_.marker(liveTime(marker->time), marker->text);
   }
 }
 

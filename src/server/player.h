@@ -1,5 +1,5 @@
 // Replays a recording: the ticks of its devices and the commands of its clients, at the recorded times,
-// faster or slower.
+// faster or slower, from any moment on.
 #pragma once
 
 #include <atomic>
@@ -7,11 +7,13 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 
 #include "base/thread.h"
 #include "record/recording_reader.h"
 #include "server/config/config.h"
+#include "server/web/replay_status.h"
 
 namespace hapticd::server {
 
@@ -19,6 +21,13 @@ struct ReplayOptions {
   std::filesystem::path file;
   double speed = 1;
   bool loop = false;  ///< start again at the end instead of keeping the last state
+};
+
+/// What a person changes while a recording is replayed.
+struct ReplayOrder {
+  bool paused = false;
+  double speed = 0;                  ///< 0: as before
+  std::optional<double> position_s;  ///< since the first event
 };
 
 /// Runs in its own thread between start() and stop(). Reads 0.2 s ahead and sorts by time, because a
@@ -30,11 +39,16 @@ class Player {
     std::function<void(std::uint32_t device, const realtime::TickReport&)> tick;
     /// Null: the client disconnected.
     std::function<void(std::uint32_t scene, scene::ClientId, const scene::SceneCommand*)> command;
-    /// Called before the recording starts again.
+    std::function<void(base::Nanos time, const std::string& text)> marker;
+    /// Called before the recording starts again, also to seek backwards.
     std::function<void()> restart;
-    /// Called once at the end, with the reason if the file could not be read to its end, else empty.
+    /// Called at the end, with the reason if the file could not be read to its end, else empty.
     std::function<void(const std::string&)> ended;
   };
+
+  /// Slowest and fastest.
+  static constexpr double kSlowest = 0.001;
+  static constexpr double kFastest = 1000;
 
   /// Reads the header. Throws record::RecordingError.
   explicit Player(ReplayOptions options);
@@ -51,12 +65,21 @@ class Player {
   /// Idempotent.
   void stop();
 
+  /// From any thread, between start() and stop(). A seek applies the scene's commands up to the moment
+  /// without waiting; a paused replay shows the ticks there and stays paused.
+  void order(const ReplayOrder& order);
+  /// From any thread.
+  ReplayStatus status() const;
+
  private:
   std::optional<base::Nanos> step();
+  void takeOrder();
   void readAhead();
+  void rewind();
   void endPass(const std::string& remark);
-  base::Nanos dueAt(base::Nanos recorded);
+  void setPresent(base::Nanos recorded);
   base::Nanos liveTime(base::Nanos recorded) const;
+  base::Nanos recordedTime(base::Nanos live) const;
   void play(record::RecordingEvent& event);
 
   const ReplayOptions options_;
@@ -69,10 +92,22 @@ class Player {
   bool atEnd_ = false;    // the reader reached the end of the file
   bool started_ = false;  // an event of this pass was played
   bool ended_ = false;
-  base::Nanos firstRecorded_ = 0;
+  bool paused_ = false;
+  double speed_ = 1;
+  std::optional<double> seek_s_;       // not yet begun
+  std::optional<base::Nanos> skipTo_;  // recorded time; ticks before it are not shown
+  std::vector<char> toShow_;           // devices that show a tick although the replay is paused
+  base::Nanos begin_ = 0;              // recorded time of the first event
+  base::Nanos firstRecorded_ = 0;      // was, or is, due at
   base::Nanos firstLive_ = 0;
+  base::Nanos position_ = 0;  // recorded time of the last event
+
+  mutable std::mutex mutex_;
+  std::optional<ReplayOrder> order_;
+  ReplayStatus status_;
 
   std::atomic<bool> stopping_{false};
+  base::Thread scan_;
   base::Thread thread_;
 };
 

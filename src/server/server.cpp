@@ -1,16 +1,17 @@
 #include "server/server.h"
 
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <chrono>
-#include <ctime>
 
 #include "base/world.h"
 #include "realtime/servo/thread_setup.h"
 #include "server/session/refusal_codes.h"
+#include "wire/text.h"
 #include "wire/udp_request.h"
 
 namespace hapticd::server {
@@ -34,8 +35,9 @@ std::size_t mostSessions(std::size_t configured) {
   return std::min<std::size_t>(configured, possible);
 }
 
-net::ConnectionOptions connectionOptions() {
+net::ConnectionOptions connectionOptions(const LimitsConfig& limits) {
   net::ConnectionOptions options;
+  options.hardLimitBytes = static_cast<std::size_t>(limits.sendQueue_MB) << 20;
   // A client is lost when data stays unacknowledged for this long; silence alone is not loss.
   options.lossTimeout = 500ms;
   options.keepAlive = 1s;
@@ -47,16 +49,21 @@ bool isLoopback(std::uint32_t address) {
   return (address >> 24) == 127;
 }
 
-// The name may contain strftime conversions, so that every start of the server writes a new file.
-std::unique_ptr<record::Recorder> openRecording(const std::string& name) {
-  const auto now = static_cast<std::time_t>(base::wallNow() / 1'000'000'000);
-  std::tm local{};
-  localtime_r(&now, &local);
-  char path[4096] = {};
-  if (std::strftime(path, sizeof path, name.c_str(), &local) == 0) {
-    throw ConfigError("record: '" + name + "' is too long for a file name");
-  }
-  return std::make_unique<record::Recorder>(path, [](const std::string& text) { spdlog::error("{}", text); });
+// The way on which a client came: Unix socket, this machine, another machine.
+std::size_t wayOf(const Session& session) {
+  if (session.mode() == SessionMode::local) return 0;
+  return isLoopback(session.remote().address) ? 1 : 2;
+}
+
+// What counts as one address: on the Unix socket, a user.
+std::string sourceOf(const Session& session) {
+  return session.user() ? "user " + std::to_string(*session.user()) : session.address();
+}
+
+std::optional<tls::Context> openTls(const ServerConfig& config) {
+  if (config.tls == kTlsOff) return std::nullopt;
+  if (config.tls == kTlsGenerated) return tls::Context::serverWithNewKey();
+  return tls::Context::server(config.tls, config.tlsKey);
 }
 
 }  // namespace
@@ -70,24 +77,50 @@ struct Server::ReverseConnection {
 Server::Server(const ServerConfig& config) : Server(config, nullptr) {}
 
 Server::Server(const ServerConfig& config, std::unique_ptr<Player> player)
-    : config_(config), player_(std::move(player)) {
-  validate(config_);
+    : config_((validate(config), config)),
+      throttledLog_(static_cast<std::size_t>(config_.limits.log_kB_per_second) * 1000),
+      credentials_(config, geteuid()),
+      tls_(openTls(config)),
+      trusted_(parseSubnets(config.trustedNetworks)),
+      player_(std::move(player)),
+      recordings_(scenes_, stations_,
+                  [this](std::function<void()> function) { loop_.post(std::move(function)); },
+                  {.folder = std::filesystem::path(config.record).parent_path(),
+                   .mostBytes = static_cast<std::uint64_t>(config.limits.recording_MB) * 1'000'000}) {
   loop_.setErrorHandler([](std::string_view text) { spdlog::error("{}", text); });
   names_.addSender("VRPN Control");  // must be sender 0, as in stock VRPN
-  if (!config_.record.empty()) recorder_ = openRecording(config_.record);
+  if (!config_.record.empty()) recordings_.create(config_.record);
 
   for (const DeviceConfig& device : config_.devices) openDevice(device);
 
-  net::Endpoint local = net::Endpoint::parse(config_.listenAddress, config_.port);
-  listener_ = std::make_unique<net::TcpListener>(
-      loop_, local,
-      [this](net::Connection connection) { addSession(std::move(connection), nullptr, SessionMode::tcp); },
-      connectionOptions());
-  local.port = listener_->local().port;
-  requests_ = std::make_unique<net::UdpSocket>(loop_, local);
+  openPorts();
   requests_->start(
       {.onDatagram = [this](auto bytes, const auto& from) { onUdpRequest(bytes, from); }, .onRefused = {}});
+  openSocket();
   openWeb();
+  openHaply();
+}
+
+// TCP and UDP have the same number. The system chooses a free one for TCP only.
+void Server::openPorts() {
+  for (int attempt = 1;; ++attempt) {
+    constexpr int kMostAttempts = 20;
+    net::Endpoint local = net::Endpoint::parse(config_.listenAddress, config_.port);
+    listener_ = std::make_unique<net::TcpListener>(
+        loop_, local,
+        [this](net::Connection connection) {
+          net::Connection safe = secured(std::move(connection));
+          if (safe) addSession(std::move(safe), nullptr, SessionMode::tcp);
+        },
+        connectionOptions(config_.limits));
+    local.port = listener_->local().port;
+    try {
+      requests_ = std::make_unique<net::UdpSocket>(loop_, local);
+      return;
+    } catch (const net::Error&) {
+      if (config_.port != 0 || attempt == kMostAttempts) throw;
+    }
+  }
 }
 
 Server::~Server() {
@@ -95,6 +128,41 @@ Server::~Server() {
   // Stop the servos first: no force outlives the server.
   for (const auto& station : stations_) station->stop();
   for (const auto& scene : scenes_) scene->stop();
+}
+
+// Whether packets of this address travel without TLS.
+bool Server::isNear(std::uint32_t address) const {
+  if (isLoopback(address) && !config_.tlsLoopback) return true;
+  return std::any_of(trusted_.begin(), trusted_.end(), [&](const Subnet& s) { return s.has(address); });
+}
+
+// An empty connection: refused.
+net::Connection Server::secured(net::Connection connection) {
+  if (isNear(connection.remote().address)) return connection;
+  if (tls_) return tls::wrap(*tls_, std::move(connection));
+  if (config_.insecure) return connection;
+  throttledLog_.warn("connection from " + connection.remote().text() +
+                     " refused: its network is not in trusted_networks, and tls is off");
+  return {};
+}
+
+// For stops when the port is full or flooded, and for clients that the kernel identifies.
+void Server::openSocket() {
+  if (config_.socket == kSocketOff) return;
+  const bool configured = config_.socket != kSocketAuto;
+  const std::filesystem::path path =
+      configured ? std::filesystem::path(config_.socket) : net::defaultSocketPath(listener_->local().port);
+  try {
+    localListener_ = std::make_unique<net::LocalListener>(
+        loop_, path,
+        [this](net::Connection connection) {
+          addSession(std::move(connection), nullptr, SessionMode::local);
+        },
+        connectionOptions(config_.limits));
+  } catch (const net::Error& error) {
+    if (configured) throw;
+    spdlog::warn("no Unix socket: {}; choose another path by socket in the configuration", error.what());
+  }
 }
 
 // A clash on the default HTTP port is not an error: run without the viewer.
@@ -108,11 +176,24 @@ void Server::openWeb() {
   for (const auto& scene : scenes_) scenes.push_back(scene.get());
   try {
     web_ = std::make_unique<WebServer>(loop_, net::Endpoint::parse(address, port), config_.httpAllow,
-                                       connectionOptions(), *this, scenes);
+                                       connectionOptions(config_.limits), *this, scenes);
   } catch (const net::Error& error) {
     if (configured) throw;
     spdlog::warn("no viewer: {}, or disable it with --http off", error.what());
   }
+}
+
+void Server::openHaply() {
+  if (config_.compat.haply.empty()) return;
+  std::string address = "127.0.0.1";
+  std::uint16_t port = kHaplyPort;
+  parseListen(config_.compat.haply, address, port);
+  haply_ = std::make_unique<HaplyPort>(loop_, net::Endpoint::parse(address, port), config_.compat,
+                                       connectionOptions(config_.limits), *this, stations_);
+}
+
+std::optional<net::Endpoint> Server::haplyAddress() const {
+  return haply_ ? std::optional(haply_->local()) : std::nullopt;
 }
 
 std::optional<net::Endpoint> Server::webAddress() const {
@@ -132,8 +213,11 @@ void Server::openDevice(const DeviceConfig& device) {
     const record::RecordedDevice& recorded = player_->header().devices[stations_.size()];
     stations_.push_back(std::make_unique<Station>(device, senders, scene, recorded));
   } else {
-    stations_.push_back(
-        std::make_unique<Station>(device, senders, scene, config_.allowNoRealtime, recorder_.get()));
+    stations_.push_back(std::make_unique<Station>(device, senders, scene, config_.allowNoRealtime));
+  }
+  for (const auto& station : stations_) {
+    if (station != stations_.back() && &station->scene() == &scene)
+      stations_.back()->shareControlWith(*station);
   }
 }
 
@@ -145,7 +229,8 @@ SceneHost& Server::sceneFor(const DeviceConfig& device) {
     }
   }
   const auto number = static_cast<std::uint32_t>(scenes_.size());
-  return *scenes_.emplace_back(std::make_unique<SceneHost>(number, device.scene, device.sceneOnDisconnect));
+  return *scenes_.emplace_back(
+      std::make_unique<SceneHost>(number, device.scene, device.sceneOnDisconnect, config_.limits));
 }
 
 void Server::startPlaying() {
@@ -156,6 +241,9 @@ void Server::startPlaying() {
            [this](std::uint32_t scene, scene::ClientId client, const auto* command) {
              if (scene < scenes_.size()) scenes_[scene]->play(client, command);
            },
+       .marker = [this](
+                     Nanos time,
+                     const std::string& text) { loop_.post([this, time, text] { sendMarker(time, text); }); },
        .restart =
            [this] {
              const scene::SceneCommand reset = scene::ResetScene{};
@@ -168,29 +256,7 @@ void Server::startPlaying() {
            }});
 }
 
-void Server::startRecording() {
-  if (!recorder_) return;
-  recorder_->start(clock_.offset(), toToml(config_));
-  spdlog::info("recording to {}", recorder_->path().string());
-}
-
-void Server::finishRecording() {
-  if (!recorder_) return;
-  recorder_->finish();
-  const record::RecorderCounts& counts = recorder_->counts();
-  spdlog::info("recorded {} ticks, {:.1f} MB, in {}{}", counts.ticks,
-               static_cast<double>(counts.bytes) * 1e-6, recorder_->path().string(),
-               recorder_->writes() ? "" : ", which is incomplete");
-  recorder_.reset();
-}
-
 void Server::startScene(SceneHost& scene) {
-  std::function<void(scene::ClientId, Nanos, const scene::SceneCommand*)> applying;
-  if (recorder_) {
-    applying = [this, number = scene.number()](auto client, Nanos now, const auto* command) {
-      recorder_->recordCommand(number, client, now, command);
-    };
-  }
   scene.start(
       {.notices =
            [this, &scene](std::vector<scene::Notice>&& notices) {
@@ -199,25 +265,32 @@ void Server::startScene(SceneHost& scene) {
              });
            },
        .relieved = [this](scene::ClientId client) { loop_.post([this, client] { onRelieved(client); }); },
-       .applying = std::move(applying)},
+       .applying = [this, number = scene.number()](
+                       auto client, Nanos now,
+                       const auto* command) { recordings_.command(number, client, now, command); }},
       [this](std::function<void()> function) { loop_.post(std::move(function)); });
 }
 
 void Server::run() {
-  startRecording();
+  recordings_.begin(clock_.offset(), toToml(config_));
   for (const auto& scene : scenes_) startScene(*scene);
   for (const auto& owned : stations_) {
     Station* station = owned.get();
     subscriptions_.push_back(loop_.watchFd(station->wakeFd(), [this, station] {
       net::drainEventFd(station->wakeFd());
       report(*station);
+      if (haply_) haply_->answer();
     }));
     station->start();
   }
   subscriptions_.push_back(loop_.every(1s, [this] { everySecond(); }));
   subscriptions_.push_back(loop_.every(50ms, [this] {
     checkHeartbeats();
+    checkMemory();
+    recordings_.poll();
+    if (haply_) haply_->answer();  // a device that is gone has no ticks
     for (const auto& station : stations_) {
+      report(*station);  // the rest, should the ticks have ended
       station->checkBlackBox();
       if (const auto text = station->checkHealth()) sendText(*station, *text);
     }
@@ -234,24 +307,83 @@ void Server::run() {
   for (const auto& station : stations_) station->stop();
   devicesClosed_.store(true, std::memory_order_release);
   for (const auto& scene : scenes_) scene->stop();
-  finishRecording();
+  recordings_.finish();
 }
 
 void Server::everySecond() {
+  if (alive_) alive_();
   clock_.refresh();
   closeStaleHandshakes();
   throttledLog_.reportSuppressed();
+  markers_ = 0;
   if (web_) web_->everySecond();
 }
 
-void Server::onWebClient(net::Connection connection) {
-  addSession(std::move(connection), nullptr, SessionMode::web);
+void Server::onWebClient(net::Connection connection, std::string_view token, bool ofPage) {
+  Session& session = addSession(std::move(connection), nullptr, SessionMode::web);
+  if (ofPage) session.setOfPage();
+  if (!token.empty()) identify(session, token, wire::LocalSender{0});
+}
+
+void Server::onIdentify(Session& session, const wire::MessageReceived& message) {
+  const auto decoded = wire::decode<wire::Identify>(message.payload);
+  if (!decoded) {
+    session.refuse("malformed message: " + decoded.error());
+    return;
+  }
+  if (decoded->key != 0) session.setKey(decoded->key);
+  const std::string_view token = decoded->token.view();
+  if (!token.empty()) identify(session, token, message.local_sender);
+}
+
+void Server::identify(Session& session, std::string_view token, wire::LocalSender name) {
+  std::string error;
+  const auto identity = credentials_.check(token, sourceOf(session), base::now(), error);
+  if (!identity) {
+    session.logWarning("(" + session.description() + ") presented a token that is refused: " + error);
+    session.send(name, wire::Text{.severity = wire::kTextError,
+                                  .level = static_cast<std::uint32_t>(RefusalCode::tokenRefused),
+                                  .text = "Identify refused: " + error});
+    return;
+  }
+  session.setIdentity(*identity);
+  onNote(session, "is " + std::string(nameOf(identity->role)) + " by a token");
+}
+
+std::optional<Commander> Server::admitHaply(const net::Endpoint& remote, std::string& refusal) {
+  const std::string address = remote.addressText();
+  if (!isNear(remote.address) && !config_.insecure) {
+    refusal = "this port is not encrypted, and " + address + " is not in trusted_networks";
+  } else if (!hasRoom(address)) {
+    refusal = "the server is full";
+  } else {
+    ++sessionsOf_[address];
+    const scene::ClientId id = nextClient_++;
+    throttledLog_.log(spdlog::level::info, address,
+                      fmt::format("client {} connected from {}, haply", id, address));
+    return Commander{id, address, credentials_.identityOf(remote.address, std::nullopt)};
+  }
+  throttledLog_.warn("haply connection from " + address + " refused: " + refusal);
+  return std::nullopt;
+}
+
+void Server::onHaplyGone(const Commander& client, const std::string& reason) {
+  throttledLog_.log(spdlog::level::info, client.address,
+                    fmt::format("client {} ({}, haply) disconnected: {}", client.id, client.address, reason));
+  for (const auto& station : stations_) station->clientGone(client.id);
+  forgetSource(client.address);
+}
+
+void Server::onHaplyWarning(scene::ClientId client, const std::string& text) {
+  const std::string source = "client " + std::to_string(client);
+  throttledLog_.log(spdlog::level::warn, source, source + ": " + text);
 }
 
 ServerStatus Server::status() const {
   ServerStatus status;
   status.uptime_s = base::toSeconds(base::now() - started_);
-  if (recorder_ && recorder_->writes()) status.recording = recorder_->path().string();
+  status.recording = recordings_.file();
+  if (player_) status.replay = player_->status();
   status.scenes.resize(scenes_.size());
   for (const auto& station : stations_) {
     DeviceStatus& device = status.devices.emplace_back(station->status());
@@ -263,8 +395,11 @@ ServerStatus Server::status() const {
     for (const auto& station : stations_) {
       const bool listens = session->wants(station->nameFor(*session));
       if (listens && client.rate_Hz == 0) client.rate_Hz = station->rateOf(*session);
-      client.commands = client.commands || station->couldCommand(*session);
+      client.commands = client.commands || station->couldCommand(session->commander());
     }
+  }
+  if (haply_) {
+    for (ClientStatus& client : haply_->status()) status.clients.push_back(std::move(client));
   }
   return status;
 }
@@ -293,35 +428,106 @@ bool Server::stopForces() noexcept {
   return false;
 }
 
-void Server::addSession(net::Connection connection, std::unique_ptr<net::UdpSocket> udp, SessionMode mode) {
+Session& Server::addSession(net::Connection connection, std::unique_ptr<net::UdpSocket> udp,
+                            SessionMode mode) {
   const scene::ClientId id = nextClient_++;
   auto session =
       std::make_unique<Session>(id, *this, names_, clock_, std::move(connection), std::move(udp), mode);
   throttledLog_.log(spdlog::level::info, session->address(),
                     fmt::format("client {} connected from {}", id, session->description()));
   Session& added = *session;
-  sessions_.emplace(id, std::move(session));
-  handshakes_.emplace(id, base::now());
+  added.setIdentity(credentials_.identityOf(added.remote().address, added.user()));
+  added.setMostPerSecond(config_.limits.commandsPerSecond);
   admit(added);
+  sessions_.emplace(id, std::move(session));
+  unfinished_.insert(id);
+  handshakes_.emplace(id, base::now());
   added.start();
+  evictUnfinished();
+  return added;
 }
 
-// Beyond the limits a client may still stop forces. The newest have this chance: those that hold on to theirs
-// must not keep others from it.
+// Beyond the limits a client may still stop forces. The newest of each way have this chance: those that hold
+// on to theirs must not keep others from it.
 void Server::admit(Session& session) {
-  const std::string address = session.address();
-  const std::size_t ofAddress = ++sessionsOf_[address];
-  const bool full =
-      sessions_.size() - reserve_.size() > mostSessions(static_cast<std::size_t>(config_.connections));
-  if (!full && ofAddress <= static_cast<std::size_t>(config_.connectionsPerAddress)) return;
-  reserve_.push_back(session.id());
-  if (reserve_.size() <= kReserve) return;
-  const auto oldest = sessions_.find(reserve_.front());
+  const std::string source = sourceOf(session);
+  const bool room = hasRoom(source);
+  ++sessionsOf_[source];
+  if (room) return;
+  auto& reserve = reserves_[wayOf(session)];
+  reserve.push_back(session.id());
+  if (reserve.size() <= kReserve) return;
+  const auto oldest = sessions_.find(reserve.front());
   if (oldest != sessions_.end()) oldest->second->close("the server is full, and others wait to stop forces");
 }
 
+// The newest ones have the chance to greet: a stop must not wait for a flood of silent connections.
+void Server::evictUnfinished() {
+  if (unfinished_.size() <= static_cast<std::size_t>(config_.limits.unfinishedConnections)) return;
+  const auto oldest = sessions_.find(*unfinished_.begin());
+  unfinished_.erase(unfinished_.begin());
+  if (oldest != sessions_.end()) oldest->second->abort("no VRPN greeting so far, and others wait to greet");
+}
+
+// What waits beyond the limits: each client for itself, then the largest.
+void Server::checkMemory() {
+  const auto most = static_cast<std::size_t>(config_.limits.memory_MB) << 20;
+  const auto mostOfOne = static_cast<std::size_t>(config_.limits.clientMemory_MB) << 20;
+  std::map<scene::ClientId, std::size_t> waiting;
+  for (const auto& scene : scenes_) {
+    for (const auto& [client, bytes] : scene->waiting()) waiting[client] += bytes;
+  }
+  constexpr std::size_t kUnread_bytes = 64 * 1024;
+  // What a client does not read is freed at once; it would not read the text either.
+  const auto end = [](Session& session, const std::string& reason) {
+    if (session.status().queuedBytes > kUnread_bytes) {
+      session.abort(reason);
+    } else {
+      session.refuse(reason);
+    }
+  };
+  std::size_t sum = 0;
+  std::vector<std::pair<std::size_t, Session*>> holders;
+  for (const auto& [id, session] : sessions_) {
+    const auto commands = waiting.find(id);
+    const std::size_t bytes = session->waitingBytes() + (commands == waiting.end() ? 0 : commands->second);
+    if (session->ending()) continue;
+    sum += bytes;
+    if (bytes > mostOfOne) {
+      end(*session, "this client uses more than " + std::to_string(config_.limits.clientMemory_MB) +
+                        " MiB of the server; send less at a time, and read");
+    } else {
+      holders.emplace_back(bytes, session.get());
+    }
+  }
+  if (sum <= most) return;
+  std::sort(holders.rbegin(), holders.rend());
+  for (const auto& [bytes, session] : holders) {
+    if (sum <= most) return;
+    sum -= bytes;
+    end(*session, "all clients together use more than " + std::to_string(config_.limits.memory_MB) +
+                      " MiB of the server, and this one uses most");
+  }
+}
+
+// For one client more.
+bool Server::hasRoom(const std::string& source) const {
+  std::size_t present = sessions_.size() + (haply_ ? haply_->clients() : 0);
+  for (const auto& reserve : reserves_) present -= reserve.size();
+  const auto ofSource = sessionsOf_.find(source);
+  return present < mostSessions(static_cast<std::size_t>(config_.limits.connections)) &&
+         (ofSource == sessionsOf_.end() ||
+          ofSource->second < static_cast<std::size_t>(config_.limits.connectionsPerAddress));
+}
+
+void Server::forgetSource(const std::string& source) {
+  const auto ofSource = sessionsOf_.find(source);
+  if (ofSource != sessionsOf_.end() && --ofSource->second == 0) sessionsOf_.erase(ofSource);
+}
+
 bool Server::mayOnlyStop(const Session& session) const noexcept {
-  return std::find(reserve_.begin(), reserve_.end(), session.id()) != reserve_.end();
+  const auto& reserve = reserves_[wayOf(session)];
+  return std::find(reserve.begin(), reserve.end(), session.id()) != reserve.end();
 }
 
 void Server::onUdpRequest(std::span<const std::byte> datagram, const net::Endpoint& from) {
@@ -341,9 +547,16 @@ void Server::onUdpRequest(std::span<const std::byte> datagram, const net::Endpoi
   const bool sameHost =
       client.address == from.address || (isLoopback(client.address) && isLoopback(from.address));
   const auto& allowed = config_.callbackHosts;
-  if (!sameHost && std::find(allowed.begin(), allowed.end(), request->host) == allowed.end()) {
+  const bool listed = std::find(allowed.begin(), allowed.end(), request->host) != allowed.end();
+  if (!sameHost && !listed) {
     throttledLog_.warn("connection request from " + from.text() + " names another host, " + client.text() +
                        ": refused; allow it with callback_hosts");
+    return;
+  }
+  if (!isNear(client.address) && !listed && !config_.insecure) {
+    throttledLog_.warn("connection request from " + from.text() +
+                       " refused: datagrams cannot be encrypted; use 'hapticd tunnel' on that machine, "
+                       "trusted_networks or insecure");
     return;
   }
   connectToClient(client);
@@ -362,7 +575,7 @@ void Server::connectToClient(const net::Endpoint& client) {
   auto owned = std::make_unique<ReverseConnection>();
   ReverseConnection* pending = owned.get();
   pending->client = client;
-  pending->connection = net::Connection::connect(loop_, client, 2s, connectionOptions());
+  pending->connection = net::Connection::connect(loop_, client, 2s, connectionOptions(config_.limits));
   const auto forget = [this, pending] {
     std::erase_if(reverseConnections_, [pending](const auto& entry) { return entry.get() == pending; });
   };
@@ -393,16 +606,22 @@ void Server::connectToClient(const net::Endpoint& client) {
   reverseConnections_.push_back(std::move(owned));
 }
 
+void Server::onEnding(Session& session) {
+  for (const auto& scene : scenes_) scene->clientGone(session.id());
+}
+
 void Server::onClosed(Session& session, const std::string& reason) {
   throttledLog_.log(
       spdlog::level::info, session.address(),
       fmt::format("client {} ({}) disconnected: {}", session.id(), session.description(), reason));
   for (const auto& station : stations_) station->clientGone(session.id());
-  for (const auto& scene : scenes_) scene->clientGone(session.id());
+  if (!session.ending()) {
+    for (const auto& scene : scenes_) scene->clientGone(session.id());
+  }
   handshakes_.erase(session.id());
-  std::erase(reserve_, session.id());
-  const auto ofAddress = sessionsOf_.find(session.address());
-  if (ofAddress != sessionsOf_.end() && --ofAddress->second == 0) sessionsOf_.erase(ofAddress);
+  unfinished_.erase(session.id());
+  std::erase(reserves_[wayOf(session)], session.id());
+  forgetSource(sourceOf(session));
   sessions_.erase(session.id());
 }
 
@@ -468,6 +687,7 @@ Station* Server::stationOf(wire::LocalSender name) noexcept {
 }
 
 void Server::onConnected(Session& session) {
+  unfinished_.erase(session.id());
   for (const auto& station : stations_) station->onConnected(session);
 }
 
@@ -482,10 +702,16 @@ void Server::onSubscribed(Session& session, wire::LocalSender name) {
 // Dispatch by role: control messages never wait for the scene.
 void Server::onMessage(Session& session, const wire::MessageReceived& message, Nanos received) {
   Station* station = stationOf(message.local_sender);
-  if (station == nullptr || !mayCommand(session, *station, message)) return;
+  // Of any sender: it concerns the connection.
+  if (message.kind == wire::kindOf<wire::Identify>) return onIdentify(session, message);
+  if (station == nullptr) return;
+  if (!mayCommand(session, *station, message)) return;
   switch (wire::role(message.kind)) {
     case wire::Role::control:
-      station->onControl(session, message, received);
+      if (message.kind == wire::kindOf<wire::Marker>) return onMarker(session, message, received);
+      if (message.kind == wire::kindOf<wire::ReplayControl>) return onReplayControl(session, message);
+      if (message.kind == wire::kindOf<wire::RecordingControl>) return onRecordingControl(session, message);
+      station->onControl(session, message, received, credentials_.hasOperators());
       return;
     case wire::Role::scene:
       onSceneMessage(session, *station, message);
@@ -497,6 +723,79 @@ void Server::onMessage(Session& session, const wire::MessageReceived& message, N
     case wire::Role::unknown:
       return;
   }
+}
+
+void Server::onMarker(Session& session, const wire::MessageReceived& message, Nanos received) {
+  constexpr int kMostPerSecond = 100;
+  const auto marker = wire::decode<wire::Marker>(message.payload);
+  if (!marker) return session.refuse("malformed message: " + marker.error());
+  if (++markers_ > kMostPerSecond) {
+    session.send(message.local_sender, wire::Text{.severity = wire::kTextError,
+                                                  .level = 0,
+                                                  .text = "Marker refused: the server takes " +
+                                                          std::to_string(kMostPerSecond) + " in a second"});
+    return;
+  }
+  recordings_.marker(received, marker->text.text);
+  throttledLog_.log(spdlog::level::info, session.address(),
+                    fmt::format("client {} marks {}", session.id(), wire::inQuotes(marker->text.text)));
+  sendMarker(received, marker->text.text);
+}
+
+// Every client once, under a name that it knows.
+void Server::sendMarker(Nanos time, const std::string& text) {
+  for (const auto& [id, session] : sessions_) {
+    for (const auto& station : stations_) {
+      const wire::LocalSender name = station->nameFor(*session);
+      if (!session->wants(name)) continue;
+      session->send(name, wire::Marker{.time = time, .text = text});
+      session->flush();
+      break;
+    }
+  }
+}
+
+void Server::onReplayControl(Session& session, const wire::MessageReceived& message) {
+  const auto wanted = wire::decode<wire::ReplayControl>(message.payload);
+  if (!wanted) return session.refuse("malformed message: " + wanted.error());
+  if (!player_) {
+    session.send(message.local_sender,
+                 wire::Text{.severity = wire::kTextError,
+                            .level = 0,
+                            .text = "Replay_Control refused: this server replays no recording; start one by "
+                                    "'hapticd replay FILE'"});
+    return;
+  }
+  ReplayOrder order{.paused = wanted->paused != 0, .speed = wanted->speed, .position_s = {}};
+  if (wanted->position >= 0) order.position_s = wanted->position;
+  player_->order(order);
+}
+
+// Both outcomes are a text: the client that asked for a recording wants to know the file.
+void Server::onRecordingControl(Session& session, const wire::MessageReceived& message) {
+  const auto wanted = wire::decode<wire::RecordingControl>(message.payload);
+  if (!wanted) return session.refuse("malformed message: " + wanted.error());
+  const auto answer = [this, id = session.id(), name = message.local_sender](std::uint32_t severity,
+                                                                             const std::string& text) {
+    const auto client = sessions_.find(id);
+    if (client == sessions_.end()) return;
+    client->second->send(name, wire::Text{.severity = severity, .level = 0, .text = text});
+    client->second->flush();
+  };
+  const auto refuse = [&](const std::string& why) { answer(wire::kTextError, "Recording_Control " + why); };
+  if (player_) return refuse("refused: this server replays a recording");
+  if (wanted->record != 0) {
+    try {
+      recordings_.start(std::string(wanted->name.view()), clock_.offset(), toToml(config_));
+      spdlog::info("client {} began it", session.id());
+      answer(wire::kTextNormal, "recording to " + recordings_.file());
+    } catch (const record::RecordingError& error) {
+      refuse(error.what());
+    }
+    return;
+  }
+  if (!recordings_.end([answer](const std::string& text) { answer(wire::kTextNormal, text); }))
+    refuse("refused: nothing is recorded");
 }
 
 void Server::onSceneMessage(Session& session, Station& station, const wire::MessageReceived& message) {
@@ -514,11 +813,15 @@ void Server::onSceneMessage(Session& session, Station& station, const wire::Mess
 bool Server::mayCommand(Session& session, Station& station, const wire::MessageReceived& message) {
   std::string reason;
   if (message.kind == wire::kindOf<wire::StopForces>) return true;
-  if (!reserve_.empty() && mayOnlyStop(session)) {
-    if (message.kind == wire::kindOf<wire::Ping> || message.kind == wire::kindOf<wire::Heartbeat>)
-      return true;
-    reason = "the server is full: this connection may only stop forces";
-  } else if (!wire::needsControl(message.kind) || station.mayCommand(session, reason)) {
+  if (mayOnlyStop(session)) {
+    // A client library asks first whether the server knows a stop.
+    for (const wire::MessageKind kind :
+         {wire::kindOf<wire::Ping>, wire::kindOf<wire::Heartbeat>, wire::kindOf<wire::QueryCapabilities>,
+          wire::kindOf<wire::RearmForces>})
+      if (message.kind == kind) return true;
+    reason = "the server is full: this connection may only stop and re-arm forces";
+  } else if (!wire::needsControl(message.kind) ||
+             station.mayCommand(session.commander(), message.kind, reason)) {
     return true;
   }
   // Send one text for each read: a refused upload has thousands of messages.
@@ -564,13 +867,13 @@ void Server::onRelieved(scene::ClientId client) {
 }
 
 void Server::report(Station& station) {
-  const bool any = station.collectReports(clock_, [this, &station] {
-    for (const auto& [id, session] : sessions_) station.sendReports(*session);
+  if (!station.report(clock_, sessions_)) return;
+  // The rest after what else waits: a stop does not wait until very many clients got their reports.
+  if (!unfinishedReports_.insert(&station).second) return;
+  loop_.post([this, &station] {
+    unfinishedReports_.erase(&station);
+    report(station);
   });
-  if (!any) return;
-  const Nanos start = base::now();
-  for (const auto& [id, session] : sessions_) session->flush();
-  station.flushTook(base::now() - start);
 }
 
 wire::LocalSender Server::nameFor(const Session& session, const SceneHost& scene) const noexcept {

@@ -4,30 +4,36 @@
 // Everything runs in the net thread, which never waits for a scene or a servo.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <deque>
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "base/world.h"
+#include "net/local_socket.h"
 #include "net/loop.h"
 #include "net/tcp_listener.h"
 #include "net/udp_socket.h"
-#include "record/recorder.h"
+#include "server/compat/haply_port.h"
 #include "server/config/config.h"
 #include "server/player.h"
+#include "server/recordings.h"
 #include "server/scene/scene_host.h"
+#include "server/session/credentials.h"
 #include "server/session/session.h"
 #include "server/session/throttled_log.h"
 #include "server/session/wall_clock.h"
 #include "server/station/station.h"
 #include "server/web/web_server.h"
+#include "tls/tls.h"
 
 namespace hapticd::server {
 
-class Server final : public SessionOwner, public WebOwner {
+class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
  public:
   /// Opens the devices and the ports. Throws ConfigError, net::Error or std::runtime_error with a remedy in
   /// the text.
@@ -44,13 +50,19 @@ class Server final : public SessionOwner, public WebOwner {
   /// From any thread, without the help of any other: stops the forces of all devices until a re-arm. Waits
   /// until the servos have written zero; false when one has not for 40 ms (the watchdog then ends the force).
   bool stopForces() noexcept;
+  /// Called in the net thread once per second from run() on: this process does not hang. Before run().
+  void onAlive(std::function<void()> function) { alive_ = std::move(function); }
   /// From any thread: run() has ended the forces and closed all devices.
   bool devicesClosed() const noexcept { return devicesClosed_.load(std::memory_order_acquire); }
 
   /// The endpoint of the listener, with the actual port.
   const net::Endpoint& address() const noexcept { return listener_->local(); }
+  /// Of the certificate for TLS; empty when TLS is off.
+  std::string fingerprint() const { return tls_ ? tls_->fingerprint() : ""; }
   /// The endpoint of the viewer, with the actual port; empty when there is no viewer.
   std::optional<net::Endpoint> webAddress() const;
+  /// The endpoint of the port for clients of Haply's service, with the actual port; empty when there is none.
+  std::optional<net::Endpoint> haplyAddress() const;
   /// Stations in the order of the configuration.
   const std::vector<std::unique_ptr<Station>>& stations() const noexcept { return stations_; }
 
@@ -66,26 +78,43 @@ class Server final : public SessionOwner, public WebOwner {
   void onReadSlice() override;
   void onReadEnd(Session& session) override;
   void onPeerGone(Session& session, const std::string& reason) override;
+  void onEnding(Session& session) override;
   void onClosed(Session& session, const std::string& reason) override;
 
   ServerStatus status() const override;
-  void onWebClient(net::Connection connection) override;
+  void onWebClient(net::Connection connection, std::string_view token, bool ofPage) override;
+  std::optional<Commander> admitHaply(const net::Endpoint& remote, std::string& refusal) override;
+  void onHaplyGone(const Commander& client, const std::string& reason) override;
+  void onHaplyWarning(scene::ClientId client, const std::string& text) override;
 
+  void openPorts();
+  void openSocket();
+  bool isNear(std::uint32_t address) const;
+  net::Connection secured(net::Connection connection) override;
   void admit(Session& session);
+  void onIdentify(Session& session, const wire::MessageReceived& message);
+  void identify(Session& session, std::string_view token, wire::LocalSender name);
   bool mayOnlyStop(const Session& session) const noexcept;
-  void addSession(net::Connection connection, std::unique_ptr<net::UdpSocket> udp, SessionMode mode);
+  Session& addSession(net::Connection connection, std::unique_ptr<net::UdpSocket> udp, SessionMode mode);
   void onUdpRequest(std::span<const std::byte> datagram, const net::Endpoint& from);
   void connectToClient(const net::Endpoint& client);
   void openDevice(const DeviceConfig& device);
   void openWeb();
+  void openHaply();
+  bool hasRoom(const std::string& source) const;
+  void evictUnfinished();
+  void checkMemory();
+  void forgetSource(const std::string& source);
   SceneHost& sceneFor(const DeviceConfig& device);
   void startScene(SceneHost& scene);
   void startPlaying();
-  void startRecording();
-  void finishRecording();
+  void onRecordingControl(Session& session, const wire::MessageReceived& message);
   void everySecond();
   void report(Station& station);
   void sendText(const Station& station, const wire::Text& text);
+  void onMarker(Session& session, const wire::MessageReceived& message, base::Nanos received);
+  void onReplayControl(Session& session, const wire::MessageReceived& message);
+  void sendMarker(base::Nanos time, const std::string& text);
   void onSceneMessage(Session& session, Station& station, const wire::MessageReceived& message);
   void onRelieved(scene::ClientId client);
   void releaseForces(scene::ClientId client);
@@ -100,23 +129,34 @@ class Server final : public SessionOwner, public WebOwner {
   net::Loop loop_;
   WallClock clock_;
   ThrottledLog throttledLog_;
+  Credentials credentials_;
+  std::optional<tls::Context> tls_;  ///< empty: off
+  std::vector<Subnet> trusted_;
   wire::LocalNames names_;
-  std::unique_ptr<Player> player_;              ///< null unless a recording is replayed
-  std::unique_ptr<record::Recorder> recorder_;  ///< null unless recording; outlives scenes and stations
+  std::unique_ptr<Player> player_;  ///< null unless a recording is replayed
+  Recordings recordings_;           ///< outlives scenes and stations
   std::vector<std::unique_ptr<SceneHost>> scenes_;
   std::vector<std::unique_ptr<Station>> stations_;
   std::map<scene::ClientId, std::unique_ptr<Session>> sessions_;
-  std::map<std::string, std::size_t> sessionsOf_;      ///< number by address
-  std::deque<scene::ClientId> reserve_;                ///< clients beyond the limits, oldest first
+  std::map<std::string, std::size_t> sessionsOf_;  ///< number by address
+  // Clients beyond the limits, oldest first. Each kind of way has a reserve of its own: a flood on one must
+  // not keep a stop on another from its turn.
+  std::array<std::deque<scene::ClientId>, 3> reserves_;
   std::map<scene::ClientId, base::Nanos> handshakes_;  ///< start times of unfinished handshakes
+  std::set<scene::ClientId> unfinished_;               ///< without a greeting, oldest first
+  std::set<Station*> unfinishedReports_;               ///< with clients that a pass has not reached yet
+  int markers_ = 0;                                    ///< in the present second
   scene::ClientId refusalSentTo_ = 0;  ///< client already notified of a refusal during this read; 0: none
   std::vector<std::unique_ptr<ReverseConnection>> reverseConnections_;
   std::vector<net::Subscription> subscriptions_;
   std::unique_ptr<net::TcpListener> listener_;
+  std::unique_ptr<net::LocalListener> localListener_;
   std::unique_ptr<net::UdpSocket> requests_;
   std::unique_ptr<WebServer> web_;
+  std::unique_ptr<HaplyPort> haply_;  ///< null unless configured
   scene::ClientId nextClient_ = 1;
   base::Nanos heartbeatsCheckedAt_ = base::now();
+  std::function<void()> alive_;
   std::atomic<bool> devicesClosed_{false};
   const base::Nanos started_ = base::now();
 };

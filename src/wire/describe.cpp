@@ -87,7 +87,8 @@ std::string roleText(const MessageInfo& info) {
 
 std::string_view accessText(const MessageInfo& info) {
   if (info.role == Role::report) return "";
-  return info.access == Access::command ? "in control" : "all";
+  if (info.access == Access::operate) return "operator";
+  return info.access == Access::command ? "owner in control" : "all";
 }
 
 std::string layoutText(const MessageDescription& message) {

@@ -62,7 +62,8 @@ using AllMessages = MessageList<
     // Our own
     QueryCapabilities, Capabilities, MeshVertices, MeshTriangles, BatchBegin, BatchCommit, Subscribe,
     TickReport, ContactList, StopForces, RearmForces, GuardState, Heartbeat, HoldHand, RemoteContacts,
-    HeldForce, HandState>;
+    HeldForce, HandState, Identify, ReleaseControl, Poses, SetObjectName, Marker, ReplayControl,
+    RecordingControl>;
 
 /// Which message: a small integer for switch and table look-up, `case kindOf<SetVertex>:`.
 enum class MessageKind : std::uint8_t {};
@@ -138,9 +139,14 @@ constexpr Role role(MessageKind kind) noexcept {
   return kind == kUnknownKind ? Role::unknown : info(kind).role;
 }
 
-/// Whether only clients that may command the device may send it: it changes what others feel.
+/// Who may send it; Access::free for kUnknownKind.
+constexpr Access access(MessageKind kind) noexcept {
+  return kind == kUnknownKind ? Access::free : info(kind).access;
+}
+
+/// Whether not every client may send it: it changes what others feel.
 constexpr bool needsControl(MessageKind kind) noexcept {
-  return kind != kUnknownKind && info(kind).access == Access::command;
+  return access(kind) != Access::free;
 }
 
 /// Whether the server handles it before scene commands that the same client sent earlier.

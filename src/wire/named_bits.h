@@ -24,6 +24,7 @@ inline constexpr NamedBit kReportBits[] = {
     {"REPORT_TOUCH_BUTTON", kReportTouchButton},
     {"REPORT_CONTACT_ANALOG", kReportContactAnalog},
     {"REPORT_HIP", kReportHip},
+    {"REPORT_POSES", kReportPoses},
 };
 
 inline constexpr NamedBit kFeatureBits[] = {

@@ -1,6 +1,8 @@
 #include "wire/peer.h"
 
 #include <algorithm>
+#include <array>
+#include <cstring>
 
 #include "wire/cookie.h"
 #include "wire/text.h"
@@ -20,6 +22,15 @@ Entry& entryFor(std::vector<Entry>& table, std::int32_t id) {
   const auto index = static_cast<std::size_t>(id);
   if (index >= table.size()) table.resize(index + 1);
   return table[index];
+}
+
+// As encodeDescription(), without its allocation: a new connection describes every message of the table.
+void addDescription(FrameEncoder& out, Time now, std::size_t id, std::int32_t type, std::string_view name) {
+  std::array<std::byte, sizeof(std::int32_t) + kMaxNameBytes + 1> payload{};
+  storeBig(payload.data(), static_cast<std::int32_t>(name.size() + 1));
+  std::memcpy(payload.data() + sizeof(std::int32_t), name.data(), std::min(name.size(), kMaxNameBytes));
+  out.addRaw(now, static_cast<std::int32_t>(id), type,
+             ByteView(payload).first(sizeof(std::int32_t) + name.size() + 1));
 }
 
 }  // namespace
@@ -172,8 +183,7 @@ bool Peer::announce(Time now) {
   const auto& senders = names_->senders();
   if (announced_senders_ < senders.size()) {
     for (; announced_senders_ < senders.size(); ++announced_senders_) {
-      stream_.addRaw(now, static_cast<std::int32_t>(announced_senders_), kSenderDescription,
-                     encodeDescription(senders[announced_senders_]));
+      addDescription(stream_, now, announced_senders_, kSenderDescription, senders[announced_senders_]);
     }
     for (SenderEntry& entry : senders_) {
       if (entry.described) entry.local = names_->findSender(entry.name).value_or(LocalSender{});
@@ -181,8 +191,7 @@ bool Peer::announce(Time now) {
   }
   const auto& types = names_->types();
   for (; announced_types_ < types.size(); ++announced_types_) {
-    stream_.addRaw(now, static_cast<std::int32_t>(announced_types_), kTypeDescription,
-                   encodeDescription(types[announced_types_]));
+    addDescription(stream_, now, announced_types_, kTypeDescription, types[announced_types_]);
   }
   return true;
 }

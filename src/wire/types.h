@@ -34,8 +34,9 @@ enum class Role : std::uint8_t {
 
 /// Who may send a message to the server.
 enum class Access : std::uint8_t {
-  free,    ///< every client: it changes nothing that others feel
-  command  ///< clients that may command the device: it changes what others feel
+  free,     ///< every client: it changes nothing that others feel
+  operate,  ///< operators and owners: it re-arms, or moves the simulated hand
+  command   ///< owners in control of the device: it changes what others feel
 };
 
 /// When the server handles a control message.

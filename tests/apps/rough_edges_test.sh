@@ -17,6 +17,10 @@ refused 2 "unknown command 'xyzzyx'; 'hapticd --help'" "$hapticd" xyzzyx
 refused 2 "nothing to render" "$hapticd" render
 refused 2 "excludes" "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --true-size --size-mm 3
 refused 1 "hapticd devices" "$hapticd" serve --device openhaptics --listen 127.0.0.1:0 --http off
+printf '{"asset":%0200000d' 0 | tr 0 '[' >"$work/deep.gltf"  # overflows the stack of the reader
+refused 1 "deep.gltf': its reader crashed" "$hapticd" touch "$work/deep.gltf"
+printf 'OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n' >"$work/three.off"
+refused 1 "three.off': the format '.off' is not supported" "$hapticd" touch "$work/three.off"
 
 # Nothing is overwritten without --force.
 "$hapticd" record "Phantom@tcp://$address" "$work/own.csv" --seconds 0.3
@@ -30,6 +34,27 @@ refused 1 "--force" "$hapticd" export "$recording" --to csv -o "$work/out.csv"
 "$hapticd" info "$recording" >"$work/info"
 grep -q '^device      ' "$work/info" && grep -q '^  force     at most [0-9.]* N' "$work/info" && grep -q '^command     SetVertices, 4 times' "$work/info" ||
   { cat "$work/info"; exit 1; }
+
+# What columns do not say stands beside them, for programs and people.
+grep -q '"program": "hapticd' "$work/out.csv.json" && grep -q '"stiffness_N_per_m"' "$work/out.csv.json" || { cat "$work/out.csv.json"; exit 1; }
+"$hapticd" info "$recording" --json | grep -q '"driver": "simulated"'
+
+# Figures: of a recording, over nothing else, and each in its format.
+"$hapticd" plot "$recording" --out "$work/my.svg" | grep -q "ticks of 'Phantom' from 0.000 s"
+grep -q '<polyline' "$work/my.svg" && grep -q 'N/m</text>' "$work/my.svg" && tail -1 "$work/my.svg" | grep -qx '</svg>'
+refused 1 "--force" "$hapticd" plot "$recording" --out "$work/my.svg"
+refused 1 "must end with .svg or .pdf" "$hapticd" plot "$recording" --out "$work/my.gif"
+refused 1 "it has Phantom" "$hapticd" plot "$recording" --out "$work/other.svg" --device Nobody
+refused 1 "has no ticks of 'Phantom' in this time" "$hapticd" plot "$recording" --out "$work/other.svg" --from 1000
+"$hapticd" plot "$recording" --out "$work/my.pdf" >/dev/null
+[ "$(head -c 8 "$work/my.pdf")" = "%PDF-1.4" ] && [ "$(tail -1 "$work/my.pdf")" = "%%EOF" ]
+# The table of the file names the byte of each object.
+at=$(grep -aA1 '^startxref' "$work/my.pdf" | tail -1)
+[ "$(tail -c +$((at + 1)) "$work/my.pdf" | head -c 4)" = xref ]
+
+# A marker is confirmed and recorded.
+"$hapticd" mark "trial 3 begins" --server "Phantom@tcp://$address" | grep -q 'marked "trial 3 begins"'
+refused 2 "must have 1 to 255 bytes" "$hapticd" mark "$(printf 'x%.0s' $(seq 256))" --server "Phantom@tcp://$address"
 
 # A smaller mesh replaces a larger one in its object; another object stays.
 printf 'v 0 0 0\nv 30 0 0\nv 0 30 0\nf 1 2 3\n' >"$work/one.obj"

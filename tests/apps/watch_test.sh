@@ -16,5 +16,5 @@ awk -F, 'NR == 1 { columns = NF; for (i = 1; i <= NF; i++) c[$i] = i; next }
          END { exit bad || !force || NR < 100 }' "$work/csv" || { tail -3 "$work/csv"; exit 1; }
 
 "$hapticd" watch "Phantom@tcp://$address" --json --seconds 1 >"$work/json"
-grep -qE '^\{"device":"Phantom","time_ns":[0-9]+,"tick":[0-9]+,.*"force_N":\[[^]]*\],.*\}$' "$work/json"
+grep -qE '^\{"device":"Phantom","time_ns":"[0-9]{19}","tick":[0-9]+,.*"force_N":\[[^]]*\],.*\}$' "$work/json"
 "$hapticd" watch "Phantom@tcp://$address" --seconds 2 | grep -q 'reports total'

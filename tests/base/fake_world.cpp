@@ -100,6 +100,28 @@ std::unique_ptr<BlockingThread::Impl> FakeThreads::startBlocking(ThreadOptions o
   throw std::logic_error("a simulated world cannot run the blocking thread " + options.name);
 }
 
+class FakeThreads::FakePacedThread final : public PacedThread::Impl {
+ public:
+  FakePacedThread(FakeThreads& threads, std::string name, Step step)
+      : thread_(threads, std::move(name), [this, step = std::move(step)]() -> std::optional<Nanos> {
+          if (ended_) return std::nullopt;
+          const std::optional<Nanos> deadline = step();
+          ended_ = !deadline;
+          return deadline;
+        }) {
+    threads.threads_.push_back(&thread_);
+    thread_.run();
+  }
+
+ private:
+  bool ended_ = false;
+  FakeThread thread_;  // last: its step uses the others
+};
+
+std::unique_ptr<PacedThread::Impl> FakeThreads::startPaced(ThreadOptions options, Clock&, Step step) {
+  return std::make_unique<FakePacedThread>(*this, std::move(options.name), std::move(step));
+}
+
 void FakeThreads::schedule(FakeThread& thread, Nanos due) noexcept {
   thread.due = due;
   thread.turn = scheduled_++;

@@ -43,6 +43,9 @@ class FakeThreads final : public Threads {
   /// Throws std::logic_error with the name: a thread that blocks cannot share one thread with others.
   std::unique_ptr<BlockingThread::Impl> startBlocking(ThreadOptions options,
                                                       std::function<void()> body) override;
+  /// The first step runs at once, the last one when the thread is joined.
+  std::unique_ptr<PacedThread::Impl> startPaced(ThreadOptions options, Clock& clock, Step step) override;
+  bool simulated() const noexcept override { return true; }
 
   /// Runs one step that is due now. False when there is none. What a step throws leaves here. Throws
   /// std::logic_error when called from within a step.
@@ -62,6 +65,7 @@ class FakeThreads final : public Threads {
 
  private:
   class FakeThread;
+  class FakePacedThread;
 
   void schedule(FakeThread& thread, Nanos due) noexcept;
   FakeThread* pick();

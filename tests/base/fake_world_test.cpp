@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -145,6 +146,35 @@ TEST(FakeThreads, ASeedChoosesTheOrder) {
 TEST(FakeThreads, HaveNoBlockingThreads) {
   FakeWorld world;
   EXPECT_THROW(BlockingThread({"vendor"}, [] {}), std::logic_error);
+}
+
+TEST(FakeThreads, APacedThreadStepsAtItsDeadlinesUntilAStepReturnsNone) {
+  FakeWorld world;
+  EXPECT_TRUE(world.threads.simulated());
+  std::vector<Nanos> steps;
+  bool stopping = false;
+  PacedThread thread({"servo"}, world.clock, [&]() -> std::optional<Nanos> {
+    steps.push_back(world.clock.now());
+    return stopping ? std::nullopt : std::optional(world.clock.now() + 1000);
+  });
+  EXPECT_THAT(steps, ElementsAre(0)) << "the first step runs at once";
+  world.threads.runUntil(2500);
+  EXPECT_THAT(steps, ElementsAre(0, 1000, 2000));
+  stopping = true;
+  world.threads.runUntil(3000);
+  world.threads.runUntil(9000);
+  EXPECT_THAT(steps, ElementsAre(0, 1000, 2000, 3000));
+  thread.join();
+  EXPECT_EQ(steps.size(), 4U) << "it has ended";
+}
+
+TEST(SimulatedClock, ASuspensionMovesTheWallClockOnly) {
+  FakeWorld world;
+  const Nanos wall = wallNow();
+  world.clock.suspendFor(5000);
+  EXPECT_EQ(now(), 0);
+  EXPECT_EQ(wallNow(), wall + 5000);
+  EXPECT_EQ(suspendedTime(), 5000);
 }
 
 TEST(SeededRandom, GivesTheSameNumbersForTheSameSeed) {

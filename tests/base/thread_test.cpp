@@ -8,6 +8,7 @@
 
 #include <array>
 #include <atomic>
+#include <optional>
 #include <semaphore>
 #include <string>
 #include <thread>
@@ -244,6 +245,27 @@ TEST(Thread, WakesFromManyThreadsAllCount) {
   for (std::thread& waker : wakers) waker.join();
   for (int seen = sum; seen < 2000; seen = sum) sum.wait(seen);
   EXPECT_EQ(sum, 2000);
+}
+
+TEST(PacedThread, StepsUntilAStepReturnsNoDeadlineAndSleepsInBetween) {
+  MonotonicClock clock;
+  std::vector<Nanos> deadlines;
+  std::vector<Nanos> begins;
+  std::string name;
+  PacedThread thread({"servo"}, clock, [&]() -> std::optional<Nanos> {
+    name = nameOfThisThread();
+    begins.push_back(clock.now());
+    if (begins.size() == 4) return std::nullopt;
+    deadlines.push_back(begins.back() + kMs);
+    return deadlines.back();
+  });
+  EXPECT_TRUE(thread.running());
+  thread.join();
+  EXPECT_FALSE(thread.running());
+  ASSERT_EQ(begins.size(), 4U);
+  for (std::size_t i = 0; i < deadlines.size(); ++i) EXPECT_GE(begins[i + 1], deadlines[i]);
+  EXPECT_EQ(name, "servo");
+  EXPECT_FALSE(world().threads.simulated());
 }
 
 TEST(BlockingThread, RunsItsBodyAndJoins) {

@@ -82,9 +82,9 @@ TEST(Report, unwritableFileIsNamed) {
 }
 
 TEST(Report, drawingHasACurveForEachSeries) {
-  Picture picture{"file", "A title", "us", 0, 100, {{"one", {}}, {"two", {}}}};
-  for (int i = 0; i < 100; ++i) picture.series[0].samples.add(i), picture.series[1].samples.add(1e6);
-  const std::string svg = asSvg(picture);
+  Figure figure{"file", "A title", "us", 0, 100, {{"one", {}}, {"two", {}}}};
+  for (int i = 0; i < 100; ++i) figure.series[0].samples.add(i), figure.series[1].samples.add(1e6);
+  const std::string svg = asSvg(figure);
   std::size_t curves = 0;
   for (std::size_t at = 0; (at = svg.find("<polyline", at)) != std::string::npos; ++at) ++curves;
   EXPECT_EQ(curves, 2U);

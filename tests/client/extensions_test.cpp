@@ -149,9 +149,11 @@ TEST(Extensions, AMeshIsSentInBulkMessagesWithinABatch) {
   EXPECT_EQ(progress.bytesSent, progress.bytesTotal);
   EXPECT_GE(progress.bytesTotal, (vertices.size() + triangles.size()) * 12);
 
-  const auto received = server.waitReceived(6);
-  ASSERT_EQ(received.size(), 6U);
+  auto received = server.waitReceived(7);
+  ASSERT_EQ(received.size(), 7U);
   EXPECT_TRUE(is(received[0], wire::BatchBegin{}));
+  EXPECT_TRUE(is(received[1], wire::ClearTrimesh{3})) << "it replaces the mesh that the object has";
+  received.erase(received.begin());
   const auto* first = received[1].message.as<wire::MeshVertices>();
   const auto* second = received[2].message.as<wire::MeshVertices>();
   ASSERT_TRUE(first && second);
@@ -176,9 +178,11 @@ TEST(Extensions, AMeshInsideABatchBelongsToIt) {
     client.setVertices(0, 1, std::span(corners).first(1));
   });
   client.flushAll();
-  const auto received = server.waitReceived(4);
-  ASSERT_EQ(received.size(), 4U);
+  auto received = server.waitReceived(5);
+  ASSERT_EQ(received.size(), 5U);
   EXPECT_TRUE(is(received[0], wire::BatchBegin{}));
+  EXPECT_TRUE(is(received[1], wire::ClearTrimesh{0}));
+  received.erase(received.begin());
   EXPECT_TRUE(is(received[1], wire::MeshVertices{0, 0, {{0, 0, 0, 1, 0, 0, 0, 1, 0}}}));
   EXPECT_TRUE(is(received[2], wire::MeshVertices{0, 1, {{0, 0, 0}}}));
   EXPECT_TRUE(is(received[3], wire::BatchCommit{}));
@@ -284,6 +288,18 @@ TEST(Extensions, TicksContactsAndGuardStatesArriveAsPlainValues) {
   EXPECT_EQ(client.statistics()[ReportKind::contacts].count, 3U);
 }
 
+TEST(Extensions, MarkersAndNamesAreSent) {
+  ScriptedServer server(able());
+  Client client(server.tcpName());
+  client.mark("trial 3 begins");
+  client.setObjectName(2, "part.stl");
+  client.flushAll();
+  const auto received = server.waitReceived(2);
+  ASSERT_EQ(received.size(), 2U);
+  EXPECT_TRUE(is(received[0], wire::Marker{0, "trial 3 begins"}));
+  EXPECT_TRUE(is(received[1], wire::SetObjectName{2, "part.stl"}));
+}
+
 TEST(Extensions, AStopOvertakesABatchAndNeedsAConnection) {
   ScriptedServer server(able());
   Client client(server.tcpName());
@@ -374,7 +390,8 @@ TEST_P(BothWays, StreamedStateIsSentAtOnce) {
     EXPECT_THAT(force->force, ElementsAre(1, 2, 3));
     EXPECT_THAT(force->torque, ElementsAre(4, 5, 6));
     EXPECT_DOUBLE_EQ(force->lifetime, 0.05);
-    for (const Received& r : received) EXPECT_EQ(r.byDatagram, !tcpOnly());
+    // What renders forces counts by TCP only.
+    for (const Received& r : received) EXPECT_FALSE(r.byDatagram);
   });
   const std::vector<RemoteContact> many(17);
   EXPECT_THAT(textOf<std::invalid_argument>([&] { client.setRemoteContacts(many); }), HasSubstr("17"));

@@ -174,7 +174,9 @@ TEST(Client, CallbacksMayCommandUploadAndPoll) {
   ASSERT_TRUE(pollUntil(client, [&] { return order.size() == 3; }));
   EXPECT_EQ(order, (std::vector<int>{1, -5, 2}));
   EXPECT_EQ(server.waitVertices(3000).size(), 3000U);
-  EXPECT_TRUE(is(server.waitReceived(1).at(0), wire::StartEffect{9}));
+  const auto received = server.waitReceived(2);
+  EXPECT_TRUE(is(received.at(0), wire::ClearTrimesh{0})) << "an upload replaces the mesh";
+  EXPECT_TRUE(is(received.at(1), wire::StartEffect{9}));
 }
 
 TEST(Client, CallbacksKeepTheirStateAndMayAddOthers) {

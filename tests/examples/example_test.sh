@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
 # Runs one example against a server with the simulated hand, and reads what it prints. The hand may need a while
 # to find the surface on a slow machine: an example that felt nothing is run again, a few times.
-#   example_test.sh HAPTICD PATH_OF_EXAMPLE SOURCE_DIR
+#   example_test.sh HAPTICD PATH_OF_EXAMPLE SOURCE_DIR [SCENE]
 set -euo pipefail
 hapticd=$1
 example=$2
 source_dir=$3
+scene=${4:-}
 name=$(basename "$example")
 . "$source_dir/tests/apps/server.sh"
 device="Phantom@$address"
@@ -49,6 +50,11 @@ check() {
     example_client_dynamics)
       "$example" "$device" 6 >"$work/out"
       at_least 'the box moved' 5 && grep -qE '^touched in [1-9][0-9]+ ticks, at most [0-9.]+ N' "$work/out" ;;
+    example_mujoco)
+      "$example" "$source_dir/examples/mujoco/$scene.xml" "$device" 5 "$work/picture.svg" >"$work/out"
+      # The peg is in its hole: its middle is 16 mm above its end.
+      { [ "$scene" != peg_in_hole ] || grep -q 'down to -[0-9]' "$work/out"; } &&
+        at_least 'at most' 0.2 && grep -qE '^touched in [1-9][0-9]+ of' "$work/out" && [ "$(grep -c '<path' "$work/picture.svg")" -gt 500 ] ;;
     *) echo "no test for $name"; exit 1 ;;
   esac
 }

@@ -53,7 +53,7 @@ as_user() { in_root setpriv --reuid=65534 --regid=65534 --clear-groups env HOME=
 fail() { echo "FAILED: $1"; exit 1; }
 
 # What was there before, but for caches and logs.
-list() { in_root find / -xdev \( -path /proc -o -path /dev -o -path /packages -o -path /tmp -o -path /var/cache -o -path /var/log -o -path /var/lib/apt \
+list() { in_root find / -xdev \( -path /proc -o -path /run -o -path /dev -o -path /packages -o -path /tmp -o -path /var/cache -o -path /var/log -o -path /var/lib/apt \
   -o -path /var/lib/dpkg -o -path /work -o -path /var/lib/systemd -o -path /home \) -prune -o -path '*hapticd*' -print 2>/dev/null | sort; }
 list >"$work/before"
 

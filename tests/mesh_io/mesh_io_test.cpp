@@ -5,10 +5,14 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <array>
 #include <cstring>
 #include <fstream>
+#include <map>
+#include <random>
 
 #include "geometry/mesh_check.h"
+#include "mesh_io/mesh_bytes.h"
 
 namespace hapticd::mesh_io {
 namespace {
@@ -194,7 +198,9 @@ TEST_F(MeshFiles, ErrorsNameTheFileAndTheReason) {
   EXPECT_THAT(errorOf(directory_ / "none.obj"), AllOf(HasSubstr("none.obj"), HasSubstr("No such file")));
   EXPECT_THAT(errorOf(directory_), HasSubstr("not a regular file"));
   EXPECT_THAT(errorOf(write("notes.txt", "hello")),
-              AllOf(HasSubstr("notes.txt"), HasSubstr("No suitable reader")));
+              AllOf(HasSubstr("notes.txt"), HasSubstr("'.txt' is not supported: convert it to OBJ, STL")));
+  EXPECT_THAT(errorOf(write("cube.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")), HasSubstr("'.off'"))
+      << "a format of Assimp that the help does not name";
   EXPECT_THAT(errorOf(write("points.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n")), HasSubstr("points.obj"));
   EXPECT_THAT(errorOf(write("empty.stl", "")), HasSubstr("empty.stl"));
   EXPECT_THAT(errorOf(write("cut.glb", glb(gltfJson("", R"([{"mesh":0}])")).substr(0, 300))),
@@ -202,6 +208,211 @@ TEST_F(MeshFiles, ErrorsNameTheFileAndTheReason) {
   std::string far(80, ' ');
   far += bytes<std::uint32_t>({1'000'000});
   EXPECT_THAT(errorOf(write("short.stl", far)), HasSubstr("short.stl"));
+}
+
+// The bytes of a mesh with these vertices and triangles.
+std::vector<std::byte> sentBytes(const TriangleMesh& mesh) {
+  std::vector<std::byte> sent;
+  sendMesh(mesh, [&](std::span<const std::byte> part) { sent.insert(sent.end(), part.begin(), part.end()); });
+  return sent;
+}
+
+std::string refusalOf(std::span<const std::byte> sent) {
+  try {
+    receivedMesh(sent);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(MeshBytes, OnlyAWholeMeshOfFiniteNumbersIsAccepted) {
+  const TriangleMesh good{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
+  const std::vector<std::byte> sent = sentBytes(good);
+  EXPECT_EQ(refusalOf(sent), "accepted");
+  EXPECT_EQ(receivedMesh(sent).vertices, good.vertices);
+  EXPECT_EQ(receivedMesh(sent).triangles, good.triangles);
+  for (std::size_t size = 0; size < sent.size(); ++size) {
+    EXPECT_THAT(refusalOf(std::span(sent).first(size)), HasSubstr("incomplete")) << size;
+  }
+  std::vector<std::byte> huge = sent;
+  huge[7] = std::byte{0x80};  // 2^63 vertices
+  EXPECT_THAT(refusalOf(huge), HasSubstr("incomplete"));
+
+  TriangleMesh bad = good;
+  bad.triangles.push_back({0, 1, 3});
+  EXPECT_EQ(refusalOf(sentBytes(bad)), "triangle 1 has corner 3, but there are 3 vertices");
+  bad = good;
+  bad.vertices[1].y() = std::numeric_limits<float>::infinity();
+  EXPECT_EQ(refusalOf(sentBytes(bad)), "a coordinate of vertex 1 is not finite");
+  EXPECT_THAT(refusalOf(sentBytes({good.vertices, {}})), HasSubstr("no triangles"));
+}
+
+TEST_F(MeshFiles, AnotherFormatUnderTheNameOfAMeshIsNotRead) {
+  EXPECT_THAT(errorOf(write("disguised.ply", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")),
+              HasSubstr("disguised.ply"));
+}
+
+TEST_F(MeshFiles, AGltfReadsNoBufferOfAnotherFolder) {
+  std::filesystem::create_directories(directory_ / "inner");
+  write("cube.bin", gltfData());
+  EXPECT_THAT(errorOf(write("inner/cube.gltf", gltfJson(R"("uri":"../cube.bin",)", R"([{"mesh":0}])"))),
+              HasSubstr("cube.gltf"));
+}
+
+TEST_F(MeshFiles, CornersThatDoNotExistAreNoMemoryErrors) {
+  const std::string header =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+      "element face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+  EXPECT_THAT(errorOf(write("far.ply", header + "3 0 1 900000000\n")), HasSubstr("far.ply"));
+  EXPECT_THAT(errorOf(write("negative.ply", header + "3 0 1 -2\n")), HasSubstr("negative.ply"));
+}
+
+// Loads in a child with small limits.
+std::string outcomeOf(const std::filesystem::path& file) {
+  try {
+    // A network namespace takes longer than reading such a file.
+    const TriangleMesh mesh =
+        loadMesh(file, {.memory_bytes = 256U << 20U, .time_s = 0.25, .networkNamespace = false});
+    for (const Triangle& t : mesh.triangles) {
+      for (const std::uint32_t corner : t) {
+        if (corner >= mesh.vertices.size()) return "a corner that does not exist";
+      }
+    }
+    for (const Vec3f& v : mesh.vertices) {
+      if (!v.allFinite()) return "a vertex that is not finite";
+    }
+    return "mesh";
+  } catch (const MeshError& error) {
+    const std::string text = error.what();
+    return text.find(file.filename().string()) == std::string::npos ? "no name in: " + text : "error";
+  }
+}
+
+void mutate(std::string& bytes, std::mt19937& random) {
+  static const std::array<std::string, 10> kPieces = {
+      "4000000000",      "-1", "1e39", "nan", std::string(4, '\xff'), std::string(4, '\0'),
+      "{\"a\":[[[[[[[[", "0",  "\n\n", " "};
+  const auto below = [&](std::size_t n) { return n == 0 ? 0 : random() % n; };
+  for (std::size_t changes = 1 + below(2); changes > 0; --changes) {
+    const std::size_t at = below(bytes.size());
+    const std::size_t length = std::min(bytes.size() - at, below(40));
+    switch (below(8)) {
+      case 0:
+        bytes.resize(at);
+        break;
+      case 1:
+        bytes.erase(at, length);
+        break;
+      case 2:
+        bytes.insert(at, bytes.substr(at, length));
+        break;
+      case 3:
+        bytes.replace(at, std::min<std::size_t>(4, bytes.size() - at), kPieces[below(kPieces.size())]);
+        break;
+      case 4:
+        if (const std::size_t digit = bytes.find_first_of("0123456789", at); digit != std::string::npos)
+          bytes.replace(digit, 1, kPieces[below(kPieces.size())]);
+        break;
+      default:
+        if (!bytes.empty()) bytes[at] = static_cast<char>(random());
+    }
+  }
+}
+
+TEST_F(MeshFiles, AFileThatTakesForEverIsAnError) {
+  // Assimp cuts a polygon into triangles in a time that grows with the square of its corners.
+  std::string obj;
+  std::string face = "f";
+  for (int i = 0; i < 60'000; ++i) {
+    obj += "v " + std::to_string(i % 977) + " " + std::to_string(i * 7919 % 991) + " 0\n";
+    face += " " + std::to_string(i + 1);
+  }
+  const std::filesystem::path file = write("polygon.obj", obj + face + "\n");
+  try {
+    loadMesh(file, {.time_s = 0.3});
+    ADD_FAILURE() << "it was read";
+  } catch (const MeshError& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("polygon.obj"), HasSubstr("takes longer than 0.3 s")));
+  }
+}
+
+#ifndef HAPTICD_SANITIZED  // sanitizers map more than any limit
+TEST_F(MeshFiles, AFileThatTakesAllMemoryIsAnError) {
+  const std::filesystem::path file =
+      write("faces.ply",
+            "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+            "property float z\nelement face 200000000\nproperty list uchar int vertex_indices\nend_header\n" +
+                bytes<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}));
+  try {
+    loadMesh(file, {.memory_bytes = 256U << 20U});
+    ADD_FAILURE() << "it was read";
+  } catch (const MeshError& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("faces.ply"), HasSubstr("more than 256 MiB of memory")));
+  }
+}
+#endif
+
+TEST_F(MeshFiles, AFileThatOverflowsTheStackIsAnError) {
+  EXPECT_THAT(errorOf(write("deep.gltf", "{\"asset\":" + std::string(200'000, '['))), HasSubstr("deep.gltf"));
+}
+
+TEST_F(MeshFiles, MutatedFilesAreMeshesOrErrors) {
+  write("cube.bin", gltfData());
+  const std::string cube = gltfJson(R"("uri":"cube.bin",)", R"([{"mesh":0}])");
+  std::string obj = "mtllib cube.mtl\n";
+  std::string stl(80, ' ');
+  std::string ply =
+      "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n"
+      "element face 6\nproperty list uchar int vertex_indices\nend_header\n";
+  stl += bytes<std::uint32_t>({12});
+  const std::string binary_ply =
+      "ply\nformat binary_little_endian 1.0" + ply.substr(std::strlen("ply\nformat ascii 1.0"));
+  std::string binary = binary_ply;
+  for (const Vec3f& v : kCorners) {
+    const std::string text =
+        std::to_string(v.x()) + " " + std::to_string(v.y()) + " " + std::to_string(v.z()) + "\n";
+    obj += "v " + text;
+    ply += text;
+    binary += bytes<float>({v.x(), v.y(), v.z()});
+  }
+  for (const auto& q : kQuads) {
+    obj += "f";
+    ply += "4";
+    binary += bytes<std::uint8_t>({4});
+    for (const int i : q) {
+      obj += " " + std::to_string(i + 1);
+      ply += " " + std::to_string(i);
+      binary += bytes<std::int32_t>({i});
+    }
+    obj += "\n";
+    ply += "\n";
+    for (const auto& corners : {std::array<std::size_t, 3>{0, 1, 2}, std::array<std::size_t, 3>{0, 2, 3}}) {
+      stl += bytes<float>({0, 0, 0});
+      for (const std::size_t i : corners) {
+        const Vec3f& v = kCorners[static_cast<std::size_t>(q[i])];
+        stl += bytes<float>({v.x(), v.y(), v.z()});
+      }
+      stl += bytes<std::uint16_t>({0});
+    }
+  }
+  const std::vector<std::pair<std::string, std::string>> files = {
+      {"a.obj", obj},
+      {"b.stl", stl},
+      {"c.ply", ply},
+      {"d.ply", binary},
+      {"e.glb", glb(gltfJson("", R"([{"mesh":0}])"))},
+      {"f.gltf", cube}};
+  std::mt19937 random(17);
+  std::map<std::string, int> outcomes;
+  for (int i = 0; i < 240; ++i) {
+    auto [name, content] = files[static_cast<std::size_t>(i) % files.size()];
+    mutate(content, random);
+    ++outcomes[outcomeOf(write(std::to_string(i) + name, content))];
+  }
+  EXPECT_EQ(outcomes.size(), 2U) << ::testing::PrintToString(outcomes);
+  EXPECT_GT(outcomes["mesh"], 30);
+  EXPECT_GT(outcomes["error"], 30);
 }
 
 TEST(RealMeshes, ClosedScanAndOpenTeapot) {

@@ -7,6 +7,7 @@
 #include <pthread.h>
 #include <sched.h>
 #include <sys/mman.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -33,9 +34,10 @@ enum Fault : int {
 };
 
 struct ArmTick {
-  double force_N[3] = {};  ///< what the motors give from now on
-  int place = 0;           ///< where the hand was
-  int fault = kHealthy;    ///< what was wrong
+  double force_N[3] = {};    ///< what the motors give from now on
+  std::int64_t time_ns = 0;  ///< when they got it, since 1970
+  int place = 0;             ///< where the hand was
+  int fault = kHealthy;      ///< what was wrong
 };
 
 struct ArmBlock {
@@ -89,6 +91,9 @@ class Arm {
     const std::int64_t tick = block_->ticks.load(std::memory_order_relaxed);
     ArmTick& entry = block_->log[tick % kLogTicks];
     for (int i = 0; i < 3; ++i) entry.force_N[i] = force_N[i];
+    timespec now{};
+    clock_gettime(CLOCK_REALTIME, &now);
+    entry.time_ns = now.tv_sec * std::int64_t{1'000'000'000} + now.tv_nsec;
     entry.place = place;
     entry.fault = fault;
     leave(force_N);

@@ -36,7 +36,14 @@ bool matches(const Endpoint& bound, const Endpoint& wanted) {
 
 class FakeLoop final : public Loop::Impl {
  public:
-  explicit FakeLoop(FakeNetwork& network) : network_(network) {}
+  explicit FakeLoop(FakeNetwork& network) : network_(network), number_(network.queues_.size()) {
+    network.queues_.push_back({this, {}});
+  }
+  // What the events hold may send as it goes.
+  ~FakeLoop() override {
+    network_.queues_[number_].loop = nullptr;
+    const auto events = std::exchange(network_.queues_[number_].events, {});
+  }
 
   void run() override {
     const RunScope scope(*this);
@@ -71,6 +78,7 @@ class FakeLoop final : public Loop::Impl {
 
   void post(std::function<void()> function) override {
     at(network_.time(), [this, f = std::move(function)] { guard(f); });
+    network_.posted();
   }
 
   std::shared_ptr<Subscription::State> after(Loop::Duration delay, std::function<void()> function) override;
@@ -83,7 +91,7 @@ class FakeLoop final : public Loop::Impl {
   std::shared_ptr<UdpSocket::Impl> bind(const Endpoint& local) override;
 
   void at(Nanos when, std::function<void()> function) {
-    network_.schedule(when, self_, [this, f = std::move(function)] {
+    network_.schedule(when, number_, [this, f = std::move(function)] {
       ++handled_;
       f();
     });
@@ -96,8 +104,7 @@ class FakeLoop final : public Loop::Impl {
 
  private:
   FakeNetwork& network_;
-  std::shared_ptr<FakeLoop*> self_ =
-      std::make_shared<FakeLoop*>(this);  // events of a loop that is gone are dropped
+  const std::size_t number_;
   bool stopped_ = false;
   std::size_t handled_ = 0;
 };
@@ -325,6 +332,8 @@ class FakeConnection final : public Connection::Impl, public std::enable_shared_
           return;
         }
         receiver.unread_.insert(receiver.unread_.end(), bytes.begin(), bytes.end());
+        if (const auto& arrived = receiver.network_.options.arrived)
+          arrived(receiver.local_, receiver.remote_, receiver.bytesIn_ + receiver.unread_.size());
         receiver.armRead();
       });
     }
@@ -335,7 +344,9 @@ class FakeConnection final : public Connection::Impl, public std::enable_shared_
   template <class Function>
   void toOther(Function function) {
     if (const auto other = other_.lock()) {
-      other->loop_.arriving([other, function = std::move(function)] { function(*other); });
+      const Nanos jitter = network_.options.jitter ? network_.options.jitter() : 0;
+      latest_ = std::max(latest_, network_.time() + network_.options.delay + jitter);
+      other->loop_.at(latest_, [other, function = std::move(function)] { function(*other); });
     } else {
       beReset();
     }
@@ -430,7 +441,9 @@ class FakeConnection final : public Connection::Impl, public std::enable_shared_
           other->write();
       });
     }
+    if (network_.options.reads) network_.options.reads(local_, remote_, size);
     if (state_ == State::open) call(&ConnectionHandlers::onBytes, std::span<const std::byte>(bytes));
+    if (network_.options.hasRead) network_.options.hasRead(local_, remote_, bytesIn_);
   }
 
   void peerEnded() {
@@ -505,6 +518,7 @@ class FakeConnection final : public Connection::Impl, public std::enable_shared_
   bool aborted_ = false;
   bool cut_ = false;
   std::uint64_t timerNumber_ = 0;
+  Nanos latest_ = 0;  // when the last piece that was sent arrives
   std::string failure_;
   std::string reason_;
   std::uint64_t bytesIn_ = 0;
@@ -590,9 +604,11 @@ class FakeUdpSocket final : public UdpSocket::Impl, public std::enable_shared_fr
       if (peer_) loop_.arriving([self = shared_from_this()] { self->refuse(); });
       return true;
     }
-    there->loop_.arriving([there = there->weak_from_this(), from, copy = Buffer(bytes.begin(), bytes.end())] {
-      if (const auto socket = there.lock()) socket->receive(copy, from);
-    });
+    const Nanos jitter = network.options.jitter ? network.options.jitter() : 0;
+    there->loop_.at(network.time() + network.options.delay + jitter,
+                    [there = there->weak_from_this(), from, copy = Buffer(bytes.begin(), bytes.end())] {
+                      if (const auto socket = there.lock()) socket->receive(copy, from);
+                    });
     return true;
   }
   std::size_t sendBatch(std::span<const Datagram> datagrams) override {
@@ -714,9 +730,8 @@ void FakeNetwork::reset(const Endpoint& oneEnd) {
   }
 }
 
-void FakeNetwork::schedule(Nanos when, const std::shared_ptr<FakeLoop*>& loop,
-                           std::function<void()> function) {
-  queue_.emplace(std::pair(std::max(when, time()), sequence_++), Event{loop, std::move(function)});
+void FakeNetwork::schedule(Nanos when, std::size_t loop, std::function<void()> function) {
+  queues_[loop].events.emplace(std::pair(std::max(when, time()), sequence_++), std::move(function));
 }
 
 void FakeNetwork::pollWatches() {
@@ -728,20 +743,39 @@ void FakeNetwork::pollWatches() {
 
 std::optional<Nanos> FakeNetwork::next() {
   pollWatches();
-  while (!queue_.empty() && queue_.begin()->second.loop.expired()) queue_.erase(queue_.begin());
-  if (queue_.empty()) return std::nullopt;
-  return queue_.begin()->first.first;
+  std::optional<Nanos> earliest;
+  for (std::size_t i = 0; i < queues_.size(); ++i) {
+    const auto when = nextOf(i);
+    if (when && (!earliest || *when < *earliest)) earliest = when;
+  }
+  return earliest;
+}
+
+std::optional<Nanos> FakeNetwork::nextOf(std::size_t loop) const {
+  const auto& events = queues_[loop].events;
+  return events.empty() || queues_[loop].loop == nullptr ? std::nullopt
+                                                         : std::optional(events.begin()->first.first);
+}
+
+void FakeNetwork::runNextOf(std::size_t loop) {
+  auto& events = queues_[loop].events;
+  const std::function<void()> function = std::move(events.begin()->second);
+  events.erase(events.begin());
+  ++events_;
+  queues_[loop].loop->guard(function);
 }
 
 bool FakeNetwork::runNext(Nanos limit) {
   const auto when = next();
   if (!when || *when > limit) return false;
   clock_.sleepUntil(*when);
-  const Event event = std::move(queue_.begin()->second);
-  queue_.erase(queue_.begin());
-  ++events_;
-  const auto loop = event.loop.lock();
-  (*loop)->guard(event.function);
+  std::size_t first = queues_.size();
+  for (std::size_t i = 0; i < queues_.size(); ++i) {
+    const auto& events = queues_[i].events;
+    if (!nextOf(i)) continue;
+    if (first == queues_.size() || events.begin()->first < queues_[first].events.begin()->first) first = i;
+  }
+  runNextOf(first);
   return true;
 }
 

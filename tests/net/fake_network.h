@@ -36,9 +36,16 @@ struct FakeNetworkOptions {
   std::function<std::size_t(std::size_t available)> readSize = {};
   /// Whether the datagram of this number (from 0, over all sockets) is lost; empty: none.
   std::function<bool(std::uint64_t number)> losesDatagram = {};
+  /// Further delay of each piece of a stream, which stays in order, and of each datagram; empty: none.
+  std::function<base::Nanos()> jitter = {};
+  /// Calls around a read by the program at `local`, which had `total` bytes from `remote` before and now gets
+  /// `size` more; the first when they arrived. Empty: nobody watches.
+  std::function<void(const Endpoint& local, const Endpoint& remote, std::uint64_t total)> arrived = {};
+  std::function<void(const Endpoint& local, const Endpoint& remote, std::size_t size)> reads = {};
+  std::function<void(const Endpoint& local, const Endpoint& remote, std::uint64_t total)> hasRead = {};
 };
 
-class FakeNetwork final : public Network {
+class FakeNetwork : public Network {
  public:
   /// The clock is advanced by sleepUntil(); it outlives the network, which outlives its loops.
   explicit FakeNetwork(base::Clock& clock) : clock_(clock) {}
@@ -61,9 +68,19 @@ class FakeNetwork final : public Network {
   /// events.
   std::optional<base::Nanos> next();
   /// Advances the clock to the next event and handles it; false when none is due up to `limit`.
-  bool runNext(base::Nanos limit);
+  virtual bool runNext(base::Nanos limit);
   /// Handled so far.
   std::uint64_t events() const noexcept { return events_; }
+
+ protected:
+  // For a simulator that decides which loop runs: loops are numbered from 0 in the order of their making.
+  std::size_t loops() const noexcept { return queues_.size(); }
+  std::optional<base::Nanos> nextOf(std::size_t loop) const;
+  /// Handles the next event of the loop, which must have one; the clock must have reached it.
+  void runNextOf(std::size_t loop);
+  void pollWatches();
+  /// A function was posted to a loop, perhaps from another thread.
+  virtual void posted() {}
 
  private:
   friend class FakeLoop;
@@ -72,20 +89,19 @@ class FakeNetwork final : public Network {
   friend class FakeConnection;
   friend class FakeWatch;
 
-  struct Event {
-    std::weak_ptr<FakeLoop*> loop;
-    std::function<void()> function;
+  struct Queue {
+    FakeLoop* loop;  // null when it is gone
+    std::map<std::pair<base::Nanos, std::uint64_t>, std::function<void()>> events;
   };
 
-  void schedule(base::Nanos when, const std::shared_ptr<FakeLoop*>& loop, std::function<void()> function);
-  void pollWatches();
+  void schedule(base::Nanos when, std::size_t loop, std::function<void()> function);
   Endpoint freeEndpoint(const Endpoint& wanted, const std::vector<Endpoint>& used, const char* kind,
                         const std::string& option);
   FakeListener* listenerAt(const Endpoint& endpoint) const;
   FakeUdpSocket* udpSocketAt(const Endpoint& endpoint) const;
 
   base::Clock& clock_;
-  std::map<std::pair<base::Nanos, std::uint64_t>, Event> queue_;
+  std::vector<Queue> queues_;  // by the number of the loop
   std::uint64_t sequence_ = 0;
   std::uint64_t events_ = 0;
   std::uint64_t datagrams_ = 0;

@@ -109,6 +109,43 @@ TEST(WebSocketFrames, AnySplitGivesTheSame) {
   }
 }
 
+constexpr std::uint8_t kText = 0x81;
+constexpr std::uint8_t kTextBegin = 0x01;
+
+TEST(WebSocketFrames, TextsAreWholeMessages) {
+  const std::string stream = clientFrame(kText, "one") + clientFrame(kTextBegin, "tw") +
+                             clientFrame(kPing, "p") + clientFrame(kMore, "") + clientFrame(kLast, "o") +
+                             clientFrame(kBinary, "") +
+                             clientFrame(kText, std::string(WebSocketReader::kLongestText, 'x'));
+  for (const std::size_t piece : {std::size_t{1}, std::size_t{7}, stream.size()}) {
+    WebSocketReader reader(WebSocketContent::texts);
+    WebSocketInput in;
+    for (std::size_t at = 0; at < stream.size(); at += piece)
+      reader.feed(bytesOf(std::string_view(stream).substr(at, piece)), in);
+    ASSERT_EQ(in.texts.size(), 4U) << piece;
+    EXPECT_EQ(textOf(in.texts[0]), "one");
+    EXPECT_EQ(textOf(in.texts[1]), "two");
+    EXPECT_TRUE(in.texts[2].empty());
+    EXPECT_EQ(in.texts[3].size(), WebSocketReader::kLongestText);
+    EXPECT_TRUE(in.data.empty());
+    EXPECT_EQ(in.pings.size(), 1U);
+    EXPECT_FALSE(in.end);
+  }
+}
+
+TEST(WebSocketFrames, TextsAreBounded) {
+  const auto endOf = [](const std::string& bytes) {
+    WebSocketReader reader(WebSocketContent::texts);
+    WebSocketInput in;
+    reader.feed(bytesOf(bytes), in);
+    return in.end.value_or(WebSocketEnd{});
+  };
+  const std::string half(WebSocketReader::kLongestText / 2 + 1, 'x');
+  EXPECT_EQ(endOf(clientFrame(kTextBegin, half) + clientFrame(kLast, half)).code, kWebSocketTooBig);
+  EXPECT_EQ(endOf("\x81\xff\x7f\xff\xff\xff\xff\xff\xff\xff\x00\x00\x00\x00"s).code, kWebSocketTooBig);
+  EXPECT_EQ(endOf(clientFrame(kTextBegin, "x") + clientFrame(kText, "y")).code, kWebSocketProtocolError);
+}
+
 TEST(WebSocketFrames, WhatIsNoClientsFrameIsAnError) {
   expectError("\x82\x01x", kWebSocketProtocolError, "not masked");
   expectError(clientFrame(0xc2, "x"), kWebSocketProtocolError, "reserved bits");

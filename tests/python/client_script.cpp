@@ -54,6 +54,7 @@ void stockScene(Client& client) {
   client.updateMesh(3, {0.1F, 0.002F, 0.3F, 0.4F, 0.5F, 0.6F});
   client.transformMesh(3, rows);
   client.setMeshType(3, 1);
+  client.setObjectName(3, "part.stl");
   client.clearMesh(3);
   client.removeObject(3);
   client.setHapticOrigin(v, {0, 1, 0}, 0.25F);
@@ -88,6 +89,7 @@ void extensions(Client& client) {
   client.subscribe(Reports::tick | Reports::button, 250);
   client.stopForces();
   client.rearmForces();
+  client.mark("trial 3 begins");
   client.enableHeartbeat();
   client.enableHeartbeat(false);
   client.holdHand({{1, 2, 3}, {0, 0, 1, 0}, 2});

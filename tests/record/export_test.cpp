@@ -38,10 +38,11 @@ TEST(Csv, HasAColumnForEachNumberAndQuotesNames) {
             "touching,object,"
             "buttons,guard_active,guard_latched,gripper_rad,rendered_force_x_N,rendered_force_y_N,rendered_"
             "force_z_N,"
-            "normal_x,normal_y,normal_z,render_status,wakeup_error_ns,compute_ns\n"
+            "normal_x,normal_y,normal_z,contact_point_x_m,contact_point_y_m,contact_point_z_m,render_status,"
+            "wakeup_error_ns,compute_ns\n"
             "\"Left, \"\"my\"\" "
             "hand\",1700000000123456789,0,0,0,0,0,0,0,0,0,0,0,0,0,0,1,0.1,-2,1e-300,0,0,-1,0,late+stopped,,,,"
-            ",,,,,,,\n");
+            ",,,,,,,,,,\n");
 }
 
 TEST(Csv, OptionalValuesFillTheirColumns) {
@@ -54,7 +55,7 @@ TEST(Csv, OptionalValuesFillTheirColumns) {
   csv.add(sample);
   csv.close();
   const std::string text = textOf(file.path());
-  EXPECT_EQ(text.substr(text.find(",0.25,")), ",0.25,1,2,3,,,,,,7\n");
+  EXPECT_EQ(text.substr(text.find(",0.25,")), ",0.25,1,2,3,,,,,,,,,7\n");
 }
 
 TEST(Csv, AFileThatCannotBeCreatedIsRefused) {

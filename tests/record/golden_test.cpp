@@ -150,7 +150,7 @@ void writeRecording(const std::filesystem::path& file, bool gripper, int ticks) 
   config.stopwatch = recorder.stopwatch(0);
   scene::SceneBuilder builder(config);
   realtime::Tick tick(hand, clock, device.tick);
-  tick.recordTo(&recorder.ring(0));
+  tick.recordTo(&recorder.ring(0), nullptr);
   recorder.start(1'700'000'000'000'000'000, "");
   std::vector<scene::Notice> notices;
   for (int i = 0; i < ticks; ++i) {
@@ -219,7 +219,7 @@ TEST(Golden, DISABLED_WritesTheFiles) {
   markAsVersion1WithoutLaw(folder / "all_commands_v1.haptics");
   std::ofstream(folder / "all_commands.jsonl") << commandsOf(folder / "all_commands_v1.haptics");
   writeRecording(folder / "gripper_v2.haptics", true, 130);
-  writeRecording(folder / "all_commands_law2.haptics", false, 230);
+  writeRecording(folder / "all_commands_law4.haptics", false, 230);
 }
 
 const std::filesystem::path kFolder = std::filesystem::path(HAPTICD_TESTDATA) / "recordings";
@@ -235,14 +235,16 @@ void PrintTo(const GoldenName& name, std::ostream* out) {
 
 class GoldenFile : public testing::TestWithParam<GoldenName> {};
 
-// Contact of law 1 differs: friction, and stiffness where box and plane meet. Without contact, effects may
-// pull at a proxy that is some micrometres away.
+// Contact of law 1 differs: friction, and stiffness where box and plane meet. Without contact, effects of
+// laws 1 to 3 may pull at a proxy that is some micrometres away.
 TEST_P(GoldenFile, GivesTheRecordedForcesBitForBit) {
   RecordingReader reader(kFolder / GetParam().file);
   ASSERT_EQ(reader.header().law.number, GetParam().law);
   const bool sameLaw = GetParam().law == realtime::kForceLaw;
   EXPECT_EQ(lawDifference(reader.header()),
-            sameLaw ? "" : "the recording has force law 1, this program law 2");
+            sameLaw
+                ? ""
+                : "the recording has force law " + std::to_string(GetParam().law) + ", this program law 4");
   Rerenderer again(reader.header());
   std::uint64_t same = 0;
   double largest_N = 0;
@@ -278,7 +280,9 @@ TEST_P(GoldenFile, GivesTheRecordedForcesBitForBit) {
 INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenFile,
                          testing::Values(GoldenName{"all_commands_v1.haptics", 1},
                                          GoldenName{"gripper_v2.haptics", 1},
-                                         GoldenName{"all_commands_law2.haptics", 2}),
+                                         GoldenName{"all_commands_law2.haptics", 2},
+                                         GoldenName{"all_commands_law3.haptics", 3},
+                                         GoldenName{"all_commands_law4.haptics", 4}),
                          [](const auto& file) {
                            const std::string name = file.param.file;
                            return name.substr(0, name.find('.'));

@@ -112,6 +112,24 @@ TEST(Recorder, SceneEventsBeyondTheMemoryAreCounted) {
   EXPECT_NE(problems.all().find("1 scene events and 0 streamed values lost"), std::string::npos);
 }
 
+TEST(Recorder, MarkersAreKept) {
+  RecordingFile file;
+  Problems problems;
+  Recorder recorder(file.path(), problems.listener());
+  recorder.addDevice(phantom());
+  recorder.start(0, "");
+  recorder.recordMarker(77, "trial 3 begins");
+  recorder.finish();
+  RecordingReader reader(file.path());
+  std::vector<MarkerEvent> markers;
+  for (RecordingEvent event; reader.next(event);) {
+    if (const auto* marker = std::get_if<MarkerEvent>(&event)) markers.push_back(*marker);
+  }
+  ASSERT_EQ(markers.size(), 1U);
+  EXPECT_EQ(markers[0].time, 77);
+  EXPECT_EQ(markers[0].text, "trial 3 begins");
+}
+
 TEST(Recorder, AFileThatIsRemovedEndsTheRecording) {
   RecordingFile file;
   Problems problems;

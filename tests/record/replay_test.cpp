@@ -1,6 +1,7 @@
 // A replay over the network: clients receive the recorded reports and cannot change the scene.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <map>
 
 #include "record/recorded_file.h"
@@ -73,6 +74,37 @@ TEST_F(Replay, CommandsAreRefused) {
   ASSERT_TRUE(peer.untilConnected());
   peer.send(wire::ResetScene{});
   EXPECT_TRUE(peer.untilText("refused: this server replays a recording"));
+}
+
+TEST_F(Replay, ClientsPauseAndSeek) {
+  ScriptedPeer peer(server_->address());
+  ASSERT_TRUE(peer.untilConnected());
+  peer.send(wire::Subscribe{wire::kReportTick, 1000});
+  const base::Nanos first = ticks_.begin()->second.time;
+  // The recorded time of the newest tick, in seconds.
+  const auto position = [&] {
+    const auto tick = peer.last<wire::TickReport>();
+    return tick ? base::toSeconds(ticks_[tick->tick].time - first) : -1;
+  };
+  const auto showsAbout = [&](double wanted) {
+    return peer.until([&] { return std::abs(position() - wanted) < 0.1; });
+  };
+  peer.send(wire::ReplayControl{.paused = 1, .speed = 0, .position = 0.6});
+  EXPECT_TRUE(showsAbout(0.6));
+  peer.send(wire::ReplayControl{.paused = 1, .speed = 0, .position = 0.2});
+  EXPECT_TRUE(showsAbout(0.2)) << "backwards";
+  peer.send(wire::ReplayControl{.paused = 1, .speed = 0, .position = 0.8});
+  EXPECT_TRUE(showsAbout(0.8)) << "forwards";
+  const std::uint64_t paused = peer.last<wire::TickReport>()->tick;
+  peer.send(wire::ReplayControl{.paused = 0, .speed = 1, .position = -1});
+  ASSERT_TRUE(peer.until([&] { return peer.last<wire::TickReport>()->tick > paused + 50; }));
+  std::uint64_t last = 0;
+  for (const wire::TickReport& tick : peer.all<wire::TickReport>()) {
+    if (last == paused && tick.tick > paused) {
+      EXPECT_LT(tick.tick, paused + 20) << "it goes on where it paused";
+    }
+    last = tick.tick;
+  }
 }
 
 TEST_F(Replay, TheSecondDeviceIsReplayed) {

@@ -16,6 +16,7 @@ using record::RerenderChanges;
 
 struct Compared {
   std::uint64_t ticks = 0;
+  std::uint64_t skipped = 0;
   std::uint64_t same = 0;
   std::uint64_t touching = 0;
   std::uint64_t stopped = 0;
@@ -34,6 +35,10 @@ std::vector<Compared> rerender(const std::filesystem::path& file, const Rerender
     if (now == nullptr) continue;
     const auto& [device, tick] = std::get<record::TickEvent>(event);
     Compared& compared = devices[device];
+    if (!again.comparable(device)) {
+      ++compared.skipped;
+      continue;
+    }
     ++compared.ticks;
     compared.touching += tick.report.rendering.touching ? 1 : 0;
     compared.stopped += tick.report.guard.stopped ? 1 : 0;
@@ -77,6 +82,7 @@ TEST_F(Rerender, GivesTheRecordedForcesBitForBit) {
   ASSERT_EQ(devices.size(), 2U);
   for (const Compared& device : devices) {
     EXPECT_EQ(device.same, device.ticks) << device.firstDifference;
+    EXPECT_EQ(device.skipped, 0U);
     EXPECT_EQ(device.largest_N, 0);
     EXPECT_GT(device.touching, 100U);
     EXPECT_GT(device.revisions.size(), 10U);
@@ -123,6 +129,71 @@ TEST_F(Rerender, AllCommandsAreInTheFile) {
         "BeginBatch", "CommitBatch", "AddObject", "SetSceneOrigin", "ResetScene"}) {
     EXPECT_GE(commands[name], 1) << name;
   }
+}
+
+// A client ends the recording of the start and begins another: while one hand is held in a touched cube, an
+// effect runs and a force field pulls.
+TEST_F(Rerender, RecordingBegunWhileTheServerRunsReplaysItsScene) {
+  const RecordingFile first;
+  const std::filesystem::path folder = std::filesystem::path(first.path()).parent_path();
+  const std::string name = std::filesystem::path(first.path()).stem().string() + "-2.haptics";
+  {
+    const Hand hand = Hand::stroking();
+    RunningServer server(recordingConfig(hand, first.path()));
+    ScriptedPeer peer(server.address());
+    ScriptedPeer second(server.address(), "Second");
+    ASSERT_TRUE(peer.untilConnected() && second.untilConnected());
+    // Outside first: what appears around a hand is not felt.
+    second.send(wire::HoldHand{.hold = 1, .position = {5, 40, 5}});
+    ASSERT_TRUE(untilTicks(second, 500));
+    sendCube(peer);
+    peer.send(wire::SetHapticProperty{0, "static friction", 0.4F});
+    peer.send(wire::AddObject{7, -1});
+    sendBox(peer, 7, {5, 5, 5}, {-50, 40, 0});
+    ASSERT_TRUE(untilApplied(peer));
+    peer.send(wire::SetSceneOrigin{{0, 0.001F, 0}, {0, 0, 1}, 0.1F});
+    peer.send(wire::ForceField{.origin = {0, 0, 0}, .force = {0.3F, 0.2F, 0}, .jacobian = {}, .radius = 10});
+    const auto hold = [&](double height, bool touches) {
+      second.send(wire::HoldHand{.hold = 1, .position = {5, height, 5}});
+      return second.until([&] {
+        const auto touched = second.last<wire::TouchedObject>();
+        return touched && (touched->object == 0) == touches;
+      });
+    };
+    ASSERT_TRUE(hold(18, true));
+    peer.send(wire::RecordingControl{.record = 1, .name = std::string_view(name)});
+    ASSERT_TRUE(peer.untilText("refused: this server records to"));
+    peer.send(wire::RecordingControl{.record = 0, .name = {}});
+    ASSERT_TRUE(peer.untilText("recorded "));
+    peer.send(wire::RecordingControl{.record = 0, .name = {}});
+    ASSERT_TRUE(peer.untilText("refused: nothing is recorded"));
+    for (const char* elsewhere : {"../x.haptics", ".haptics", "x.csv"}) {
+      peer.forget();
+      peer.send(wire::RecordingControl{.record = 1, .name = elsewhere});
+      ASSERT_TRUE(peer.untilText("the name of a recording has")) << elsewhere;
+    }
+    peer.send(wire::RecordingControl{.record = 1, .name = std::string_view(name)});
+    ASSERT_TRUE(peer.untilText("recording to"));
+    peer.forget();
+    ASSERT_TRUE(untilTicks(second, 100));
+    ASSERT_TRUE(hold(40, false));
+    ASSERT_TRUE(untilTicks(second, 300));
+    ASSERT_TRUE(hold(18, true));
+    animate(peer, 20);
+    second.send(wire::HoldHand{.hold = 0, .position = {}});
+    peer.send(wire::RecordingControl{.record = 0, .name = {}});
+    ASSERT_TRUE(peer.untilText("recorded "));
+  }
+  const auto devices = rerender(folder / name);
+  std::filesystem::remove(folder / name);
+  ASSERT_EQ(devices.size(), 2U);
+  for (const Compared& device : devices) {
+    EXPECT_EQ(device.same, device.ticks) << device.firstDifference;
+    EXPECT_GT(device.ticks, 0U);
+  }
+  EXPECT_GT(devices[1].skipped, 0U) << "until the hand was free";
+  EXPECT_GT(devices[1].touching, 100U);
+  EXPECT_EQ(devices[1].largest_N, 0);
 }
 
 // Without what was streamed the same ticks give other forces: so the file has it, and it counts.

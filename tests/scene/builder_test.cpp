@@ -1,6 +1,9 @@
 // Commands, snapshots, sharing and batches.
 #include <gmock/gmock.h>
 
+#include <fstream>
+#include <string>
+
 #include "scene_fixture.h"
 
 namespace hapticd::scene {
@@ -271,6 +274,29 @@ TEST_F(Builder, SameComplaintAgainAndAgainIsCounted) {
   run(2'000 * kMillisecond);
   EXPECT_EQ(builder_.nextDeadline(), std::nullopt);
 }
+
+#ifndef HAPTICD_SANITIZED  // which keep freed memory
+double resident_MB() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.starts_with("VmRSS:")) return std::stod(line.substr(6)) / 1024;
+  }
+  return 0;
+}
+
+TEST_F(Builder, BatchOfAClientThatLeavesKeepsNoMemory) {
+  say(BeginBatch{}, 2);
+  const double before = resident_MB();
+  for (int i = 0; i < 300'000; ++i) {
+    say(SetVertices{0, i, {Vec3f::Zero()}}, 2);
+    if (i % 100 == 0) say(SetVertices{0, i % 60'000, {Vec3f::Zero()}});  // lives on between the others
+  }
+  const double during = resident_MB();
+  ASSERT_GT(during, before + 30);
+  builder_.clientGone(2, now_);
+  EXPECT_LT(resident_MB(), before + (during - before) / 2);
+}
+#endif
 
 TEST_F(Builder, BatchThatIsTooLongIsRefusedAsAWhole) {
   SceneConfig config = simulated({});

@@ -197,19 +197,41 @@ TEST_F(Meshes, LimitsHoldForOneObjectAndForAll) {
   EXPECT_TRUE(notices_.empty());
 }
 
-TEST_F(Meshes, AVertexFarBeyondTheOthersIsRefused) {
+TEST_F(Meshes, VerticesFarBeyondTheOthersShareABoundedNumberOfGaps) {
   say(SetVertices{0, 65'536, soup(1)});
   EXPECT_TRUE(notices_.empty());
   builder_ = SceneBuilder(simulated({}));
-  say(SetVertices{0, 65'537, soup(1)});
+  say(SetVertices{0, 1'000'001, soup(1)});
   EXPECT_THAT(
       onlyNotice(Severity::error),
-      HasSubstr("setObjectVertex object 0, vertex 65537, at most 65536 now: refused: too far beyond"));
-  say(SetTriangles{0, 15'999'999, {{0, 1, 2}}});
+      HasSubstr("setObjectVertex object 0, vertex 1000001, at most 1000000 now: refused: too far beyond"));
+  say(SetVertices{0, 15'000'000, soup(1)});
+  EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("too far beyond"));
+  say(SetObjectNumber{3});
+  say(SetVertices{0, 600'000, soup(1)});
+  EXPECT_TRUE(notices_.empty());
+  say(SetVertices{1, 600'000, soup(1)});
+  EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("at most 400000 now"));
+  say(SetTriangles{1, 600'000, {{0, 1, 2}}});
   EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("setTriangle"));
-  say(SetVertices{0, 0, std::vector<Vec3f>(10'000, Vec3f::Zero())});
-  say(SetVertices{0, 85'536, soup(1)});
+  say(ClearMesh{0});
+  say(SetVertices{1, 600'000, soup(1)});
+  EXPECT_TRUE(notices_.empty()) << "a cleared mesh has no gap";
+  say(SetVertices{2, 0, std::vector<Vec3f>(10'000, Vec3f::Zero())});
+  say(SetVertices{2, 85'536, soup(1)});
   EXPECT_TRUE(notices_.empty()) << "a large mesh has room for a larger gap";
+}
+
+// As clients do that number from the end, or that reserve numbers.
+TEST_F(Meshes, AreAcceptedFromTheirEnd) {
+  say(SetObjectNumber{2});
+  constexpr std::int32_t kVertices = 900'000;
+  constexpr std::int32_t kRun = 30'000;
+  for (std::int32_t object = 0; object < 2; ++object) {
+    for (std::int32_t first = kVertices - kRun; first >= 0; first -= kRun)
+      say(SetVertices{object, first, std::vector<Vec3f>(kRun, Vec3f(1, 2, 3))});
+  }
+  EXPECT_TRUE(notices_.empty()) << "the gap of the first object was closed";
 }
 
 TEST_F(Meshes, AreCheckedOnceTheyAreComplete) {

@@ -4,6 +4,7 @@
 
 #include <random>
 #include <set>
+#include <tuple>
 
 #include "scene_fixture.h"
 
@@ -189,6 +190,116 @@ RC_GTEST_PROP(RandomCommands, LeaveAConsistentScene, (std::uint64_t seed)) {
     if (held.size() > 3) held.erase(held.begin());
   }
   RC_ASSERT(builder.nextDeadline().value_or(now) >= 0);
+}
+
+bool same(const std::shared_ptr<const std::vector<Vec3f>>& a,
+          const std::shared_ptr<const std::vector<Vec3f>>& b) {
+  if (!a || !b) return a == b;
+  const auto equal = [](const Vec3f& p, const Vec3f& q) {
+    return p == q || (!p.allFinite() && !q.allFinite());
+  };
+  return std::equal(a->begin(), a->end(), b->begin(), b->end(), equal);
+}
+
+void checkSame(const SceneDescription& a, const SceneDescription& b) {
+  RC_ASSERT(a.workspace.T_world_device.matrix() == b.workspace.T_world_device.matrix());
+  RC_ASSERT(a.faces == b.faces);
+  RC_ASSERT(a.objects.size() == b.objects.size());
+  for (std::size_t i = 0; i < a.objects.size(); ++i) {
+    const ObjectDescription& x = a.objects[i];
+    const ObjectDescription& y = b.objects[i];
+    RC_ASSERT(std::tie(x.id, x.parent, x.touchable, x.name, x.worldUnits) ==
+              std::tie(y.id, y.parent, y.touchable, y.name, y.worldUnits));
+    RC_ASSERT(x.T_world_object.matrix() == y.T_world_object.matrix());
+    RC_ASSERT(x.T_object_mesh.matrix() == y.T_object_mesh.matrix());
+    RC_ASSERT(x.surface.stiffness_N_per_m == y.surface.stiffness_N_per_m);
+    RC_ASSERT(x.surface.damping_Ns_per_m == y.surface.damping_Ns_per_m);
+    RC_ASSERT(x.surface.static_friction == y.surface.static_friction);
+    RC_ASSERT(x.surface.dynamic_friction == y.surface.dynamic_friction);
+    RC_ASSERT(same(x.vertices, y.vertices));
+    RC_ASSERT(!x.triangles == !y.triangles);
+    if (x.triangles) RC_ASSERT(*x.triangles == *y.triangles);
+  }
+  RC_ASSERT(a.effects.size() == b.effects.size());
+  for (std::size_t i = 0; i < a.effects.size(); ++i) {
+    const Effect& x = a.effects[i].effect;
+    const Effect& y = b.effects[i].effect;
+    RC_ASSERT(std::tie(x.index, x.type, x.gain, x.magnitude_N, x.duration, x.angularFrequency_rad_per_s) ==
+              std::tie(y.index, y.type, y.gain, y.magnitude_N, y.duration, y.angularFrequency_rad_per_s));
+    RC_ASSERT(x.position == y.position && x.direction == y.direction);
+    RC_ASSERT(a.effects[i].active == b.effects[i].active);
+  }
+  RC_ASSERT(a.planes.size() == b.planes.size());
+  for (std::size_t i = 0; i < a.planes.size(); ++i) {
+    RC_ASSERT(a.planes[i].normal == b.planes[i].normal && a.planes[i].offset == b.planes[i].offset);
+    RC_ASSERT(a.planes[i].surface.stiffness_N_per_m == b.planes[i].surface.stiffness_N_per_m);
+  }
+  RC_ASSERT(!a.constraint == !b.constraint);
+  if (a.constraint) {
+    RC_ASSERT(a.constraint->mode == b.constraint->mode && a.constraint->point == b.constraint->point);
+    RC_ASSERT(a.constraint->stiffness_N_per_m == b.constraint->stiffness_N_per_m);
+  }
+  RC_ASSERT(a.fields.size() == b.fields.size());
+  for (std::size_t i = 0; i < a.fields.size(); ++i) {
+    RC_ASSERT(a.fields[i].origin == b.fields[i].origin && a.fields[i].force_N == b.fields[i].force_N);
+    RC_ASSERT(a.fields[i].jacobian_N_per_unit == b.fields[i].jacobian_N_per_unit);
+  }
+}
+
+// What a recording that starts at any time begins with.
+RC_GTEST_PROP(RandomCommands, TheCommandsOfASceneMakeItAgain, (std::uint64_t seed)) {
+  Speaker speaker(seed);
+  SceneConfig config;
+  config.stopwatch = [] { return Nanos{0}; };
+  SceneBuilder builder(config);
+  std::vector<Notice> notices;
+  Nanos now = 0;
+  builder.apply(0, SetObjectNumber{6}, now, notices);
+  for (std::int32_t id = 0; id < 6; ++id) {
+    builder.apply(0, SetSurfaceProperty{id, "stiffness", 0.5}, now, notices);
+    builder.apply(0, SetVertices{id, 0, oneTriangle()}, now, notices);
+  }
+  for (int step = 0; step < 200; ++step) {
+    now += speaker.pick(3) == 0 ? speaker.pick(30) * kMillisecond : 0;
+    const auto client = static_cast<ClientId>(speaker.pick(3));
+    switch (speaker.pick(12)) {
+      case 0:
+        builder.apply(client, SetConstraintEnabled{speaker.pick(4) != 0}, now, notices);
+        break;
+      case 1:
+        builder.apply(client, SetConstraintMode{1 + speaker.pick(3)}, now, notices);
+        break;
+      case 2:
+        builder.apply(client, SetConstraintVector{ConstraintVector::point, {0, 0, 0.01 * speaker.pick(9)}},
+                      now, notices);
+        break;
+      case 3:
+        builder.apply(client, SetObjectName{speaker.pick(6), std::to_string(step)}, now, notices);
+        break;
+      default:
+        builder.apply(client, speaker.next(), now, notices);
+    }
+    if (speaker.pick(60) == 0) builder.clientGone(client, now);
+    if (speaker.pick(3) == 0) builder.publish(now, notices);
+  }
+  now += 1000 * kMillisecond;  // what ramps out is gone
+  builder.publish(now, notices);
+
+  SceneBuilder again(config);
+  for (ClientCommand& c : builder.commands(now)) again.apply(c.client, std::move(c.command), now, notices);
+  now += 500 * kMillisecond;
+  again.publish(now, notices);
+  builder.publish(now, notices);
+  checkSame(builder.describe(), again.describe());
+  // Nothing accumulates, and open batches are there: both go on alike.
+  RC_ASSERT(again.commands(now).size() <= builder.commands(now).size());
+  for (ClientId client = 0; client < 3; ++client) {
+    for (SceneBuilder* one : {&builder, &again}) one->apply(client, CommitBatch{}, now, notices);
+  }
+  now += 500 * kMillisecond;
+  again.publish(now, notices);
+  builder.publish(now, notices);
+  checkSame(builder.describe(), again.describe());
 }
 
 }  // namespace

@@ -2,7 +2,9 @@
 #include "scene/spatial_index.h"
 
 #include <gtest/gtest.h>
+
 #include <rapidcheck/gtest.h>
+#include <chrono>
 
 #include <algorithm>
 #include <limits>
@@ -291,6 +293,36 @@ TEST(SpatialIndex, MovedIndexAnswersLikeBefore) {
   b.refit({triangle, std::vector<float>(4, 5), std::vector<float>(4, 6)});
   EXPECT_TRUE(near(b, Vec3(0.5, 0.5, 0.5), 0.1).empty());
   EXPECT_EQ(near(b, Vec3(5.5, 5.5, 5.5), 0.1).size(), 1U);
+}
+
+// However many boxes are around the point: an attacker sends a million of them.
+TEST(SpatialIndex, AQueryThatIsEndedExaminesNothingMore) {
+  constexpr std::uint32_t kBoxes = 100'000;
+  const SpatialIndex index = SpatialIndex::build(kBoxes, [](std::uint32_t i) {
+    const double e = 1e-7 * i;
+    return Box{Vec3(-1 - e, -1, -1 + e), Vec3(1, 1 + e, 1)};
+  });
+  const Vec3 p(0.1, 0, 0);
+  int visits = 0;
+  index.visitNearest(p, 0.01, [&](std::uint32_t) noexcept { return ++visits < 100 ? 0.01 : -1; });
+  EXPECT_EQ(visits, 100);
+  visits = 0;
+  index.visitSegment(p, Vec3(0.2, 0, 0), [&](std::uint32_t) noexcept { return ++visits < 100 ? 1.0 : -1.0; });
+  EXPECT_LT(visits, 120);
+  // Calls that the caller does not see take time all the same.
+  const auto timeOf = [&](int most) {
+    auto least = std::chrono::steady_clock::duration::max();
+    for (int i = 0; i < 5; ++i) {
+      visits = 0;
+      const auto begin = std::chrono::steady_clock::now();
+      index.visitNear(p, 0.01, [&](std::uint32_t) noexcept -> bool { return ++visits < most; });
+      least = std::min(least, std::chrono::steady_clock::now() - begin);
+    }
+    return least;
+  };
+  const auto all = timeOf(2 * kBoxes);
+  EXPECT_EQ(visits, kBoxes);
+  EXPECT_LT(20 * timeOf(100), all);
 }
 
 }  // namespace

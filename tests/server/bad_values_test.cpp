@@ -71,6 +71,8 @@ TEST_F(BadValues, MissingObjectsAreNamed) {
     EXPECT_TRUE(refused("setTransformMatrix"));
     bad_.send(wire::SetHapticProperty{id, "stiffness", 0});
     EXPECT_TRUE(refused("setHapticProperty"));
+    bad_.send(wire::SetObjectName{id, "part"});
+    EXPECT_TRUE(refused("setObjectName"));
     bad_.send(wire::SetObjectIsTouchable{id, 0});
     EXPECT_TRUE(refused("setObjectIsTouchable"));
   }

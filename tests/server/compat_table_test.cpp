@@ -34,12 +34,10 @@ std::multimap<std::string, std::string> rows() {
   return found;
 }
 
-// "program.Suite.Name" of every test of this folder.
-std::set<std::string> testNames() {
-  std::set<std::string> names;
+// Adds "program.Suite.Name" of every test of a folder.
+void addTestNames(const fs::path& folder, std::set<std::string>& names) {
   const std::regex program(R"(hapticd_test\(\s*(\w+)([^)]*)\))");
   const std::regex test(R"(\bTEST(?:_F|_P)?\(\s*(\w+)\s*,\s*(\w+)\s*\))");
-  const fs::path folder = kTop / "tests/server";
   const std::string list = contents(folder / "CMakeLists.txt");
   const std::sregex_iterator end;
   for (std::sregex_iterator it(list.begin(), list.end(), program); it != end; ++it) {
@@ -53,6 +51,11 @@ std::set<std::string> testNames() {
       }
     }
   }
+}
+
+std::set<std::string> testNames() {
+  std::set<std::string> names;
+  for (const char* folder : {"tests/server", "tests/record"}) addTestNames(kTop / folder, names);
   return names;
 }
 

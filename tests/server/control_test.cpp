@@ -2,8 +2,13 @@
 // batches, shared scenes.
 #include <gtest/gtest.h>
 
-#include <cmath>
+#include <unistd.h>
 
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "hapticd/client.h"
 #include "running_server.h"
 #include "scripted_peer.h"
 #include "server/session/refusal_codes.h"
@@ -73,6 +78,9 @@ TEST_F(ControlTest, AnyClientStopsTheForceAndReArmingRestoresIt) {
   ASSERT_TRUE(owner->until([&] { return lastGuard(*owner).stopped == 1; }));
   ASSERT_TRUE(untilForce(*owner, 0, 1e-9));
   ASSERT_TRUE(owner->until([&] { return owner->count<wire::ForceError>() > 0; }));
+  owner->send(wire::RearmForces{});
+  ASSERT_TRUE(owner->untilText("stopped the forces; it may re-arm")) << "the text names who stopped";
+  EXPECT_EQ(lastGuard(*owner).stopped, 1);
   other->send(wire::RearmForces{});
   ASSERT_TRUE(owner->until([&] { return lastGuard(*owner).stopped == 0; }));
   EXPECT_TRUE(untilForce(*owner, 1));
@@ -143,17 +151,207 @@ TEST_F(ControlTest, OnlyTheFirstClientCommandsUntilItDisconnects) {
   EXPECT_EQ(second->texts().back().level, static_cast<std::uint32_t>(server::RefusalCode::notPermitted));
   second->send(wire::StopForces{});  // permitted for every client
   ASSERT_TRUE(first->until([&] { return lastGuard(*first).stopped == 1; }));
-  second->send(wire::RearmForces{});
-  ASSERT_TRUE(second->untilText("hapticd Rearm_Forces refused"));
   first->send(wire::RearmForces{});
+  ASSERT_TRUE(first->untilText("stopped the forces"));
+  second->send(wire::RearmForces{});  // undoes its own stop
   ASSERT_TRUE(first->until([&] { return lastGuard(*first).stopped == 0; }));
-  first->close();
-  first.reset();
-  // The server notices the disconnection later.
+  first->send(wire::ReleaseControl{});
+  first->send(wire::Ping{});
+  ASSERT_TRUE(first->untilNext<wire::Pong>());
   EXPECT_TRUE(second->until([&] {
     second->send(kUp);
     return lastForce(*second) > 0.5;
   }));
+}
+
+TEST_F(ControlTest, OnlyASceneCommandTakesControl) {
+  Config config = RunningServer::anyPort();
+  config.devices[0].control = server::Control::first;
+  serve(config);
+  const auto first = peer();
+  const auto second = peer();
+  first->send(wire::TrackerResetOrigin{});
+  hold(*first, 0, 0, 0);
+  first->send(wire::Ping{});
+  ASSERT_TRUE(first->untilNext<wire::Pong>());
+  second->send(kUp);
+  EXPECT_TRUE(second->until([&] { return lastForce(*second) > 0.5; }));
+  hold(*first, 10, 0, 0);
+  EXPECT_TRUE(first->untilText("is in control"));
+}
+
+TEST_F(ControlTest, DevicesOfOneSceneShareItsControl) {
+  Config config = RunningServer::anyPort();
+  config.devices.resize(2);
+  config.devices[0].names = {"Left"};
+  config.devices[1].names = {"Right"};
+  for (auto& device : config.devices) {
+    device.scene = "table";
+    device.control = server::Control::first;
+  }
+  serve(config);
+  const auto left = peer("Left");
+  const auto right = peer("Right");
+  left->send(wire::SetObjectNumber{2});
+  left->send(wire::Ping{});
+  ASSERT_TRUE(left->untilNext<wire::Pong>());
+  right->send(kUp);
+  EXPECT_TRUE(right->untilText("is in control"));
+}
+
+// The frames of a message, as the client would send them by datagram.
+template <wire::WireMessage M>
+std::vector<std::byte> datagramOf(ScriptedPeer& peer, const M& message) {
+  std::vector<std::byte> bytes;
+  peer.endpoint().send({1, 2}, peer.device(), wire::Message(message), wire::Reliability::kLowLatency);
+  peer.endpoint().takeDatagrams(
+      [&](wire::ByteView datagram) { bytes.assign(datagram.begin(), datagram.end()); });
+  return bytes;
+}
+
+class DatagramTest : public ControlTest {
+ protected:
+  void SetUp() override {
+    serve();
+    client_ = std::make_unique<ScriptedPeer>(server_->address(), "Phantom", ScriptedPeer::Mode::udp);
+    ASSERT_TRUE(client_->until([&] { return client_->datagrams() > 0 && client_->udpPeer().port != 0; }));
+    hold(*client_, 0, 0, 0);
+  }
+  // Whether the server has handled all datagrams and messages before; both sockets of the client are local.
+  void settle() {
+    for (int i = 0; i < 20; ++i) {
+      client_->send(wire::Ping{});
+      ASSERT_TRUE(client_->untilNext<wire::Pong>());
+    }
+  }
+  std::unique_ptr<ScriptedPeer> client_;
+};
+
+TEST_F(DatagramTest, CountFromTheSourceOfTheFirstOneOnly) {
+  net::Loop loop;
+  net::UdpSocket stranger(loop, {net::kLoopbackAddress, 0});
+  // What counts for nothing does not make a source.
+  stranger.sendTo(datagramOf(*client_, wire::StopForces{}), client_->udpPeer());
+  stranger.sendTo(std::vector<std::byte>(50), client_->udpPeer());
+  settle();
+  client_->sendDatagram(datagramOf(*client_, kUp));
+  ASSERT_TRUE(untilForce(*client_, 1));
+  stranger.sendTo(datagramOf(*client_, wire::ForceField{}), client_->udpPeer());
+  settle();
+  client_->forget();
+  EXPECT_TRUE(untilForce(*client_, 1)) << "the stranger did not end it";
+  EXPECT_EQ(lastGuard(*client_).stopped, 0);
+}
+
+TEST_F(DatagramTest, CarryOnlyWhatStockClientsSendSo) {
+  client_->sendDatagram(datagramOf(*client_, kUp));
+  ASSERT_TRUE(untilForce(*client_, 1));
+  client_->sendDatagram(datagramOf(*client_, wire::StopForces{}));
+  client_->sendDatagram(datagramOf(*client_, wire::ResetScene{}));
+  client_->sendDatagram(datagramOf(*client_, wire::HoldHand{.hold = 1, .position = {30, 0, 0}}));
+  client_->sendDatagram(datagramOf(*client_, wire::SetObjectNumber{9}));
+  for (int i = 1; i < 30; ++i) {
+    client_->sendDatagram(datagramOf(*client_, wire::HeldForce{i, {0, -3, 0}, {}, 0.1}));
+    client_->sendDatagram(datagramOf(*client_, wire::HeldForce{i, {0, -3, 0}, {}, 0.1}));
+  }
+  settle();
+  client_->forget();
+  EXPECT_TRUE(untilForce(*client_, 1));
+  client_->send(wire::StopForces{});
+  ASSERT_TRUE(client_->until([&] { return lastGuard(*client_).stopped == 1; }));
+  client_->sendDatagram(datagramOf(*client_, wire::RearmForces{}));
+  settle();
+  EXPECT_EQ(lastGuard(*client_).stopped, 1);
+}
+
+// Roles by token, over TCP.
+class RolesTest : public ControlTest {
+ protected:
+  void SetUp() override {
+    std::ofstream(file_) << "owner " << kOwner << "\noperator " << kOperator << "\n";
+    std::filesystem::permissions(file_, std::filesystem::perms::owner_read);
+    Config config = RunningServer::anyPort();
+    config.tokens = file_;
+    serve(config);
+  }
+  void TearDown() override { std::filesystem::remove(file_); }
+  void present(ScriptedPeer& client, const char* token) {
+    client.send(wire::Identify{.token = token, .key = 0});
+  }
+
+  static constexpr const char* kOwner = "0123456789abcdef-owner";
+  static constexpr const char* kOperator = "0123456789abcdef-operator";
+  const std::string file_ = std::filesystem::path(testing::TempDir()) / ("roles-" + std::to_string(getpid()));
+};
+
+TEST_F(RolesTest, AnObserverReadsAndStopsOnly) {
+  const auto observer = peer();
+  const auto owner = peer();
+  present(*owner, kOwner);
+  hold(*owner, 0, 0, 0);
+  owner->send(kUp);
+  ASSERT_TRUE(untilForce(*observer, 1));
+  observer->send(wire::SetObjectNumber{3});
+  ASSERT_TRUE(observer->untilText("your role is observer"));
+  hold(*observer, 0, 0, 0);
+  ASSERT_TRUE(observer->untilText("Hold_Hand refused"));
+  observer->send(wire::StopForces{});
+  EXPECT_TRUE(untilForce(*owner, 0, 1e-9));
+}
+
+TEST_F(RolesTest, AnOperatorRearmsAndHoldsButLeavesTheSceneAlone) {
+  const auto observer = peer();
+  const auto person = peer();
+  present(*person, kOperator);
+  hold(*person, 0, 0, 0);
+  person->send(kUp);
+  ASSERT_TRUE(person->untilText("your role is operator"));
+  observer->send(wire::StopForces{});
+  ASSERT_TRUE(person->until([&] { return lastGuard(*person).stopped == 1; }));
+  person->send(wire::RearmForces{});
+  ASSERT_TRUE(person->until([&] { return lastGuard(*person).stopped == 0; })) << "of another's stop";
+  for (const wire::Text& text : person->texts())
+    EXPECT_EQ(text.text.text.find("Hold_Hand"), std::string::npos);
+}
+
+TEST_F(RolesTest, TenWrongTokensBlockTheAddress) {
+  const auto guesser = peer();
+  for (int i = 0; i < 10; ++i) present(*guesser, "0123456789abcdef-guess");
+  ASSERT_TRUE(guesser->untilText("wrong token"));
+  present(*guesser, kOwner);
+  ASSERT_TRUE(guesser->untilText("too many wrong tokens"));
+  EXPECT_EQ(guesser->texts().back().level, static_cast<std::uint32_t>(server::RefusalCode::tokenRefused));
+  guesser->send(wire::StopForces{});
+  EXPECT_TRUE(guesser->until([&] { return lastGuard(*guesser).stopped == 1; })) << "a stop needs no role";
+}
+
+// The kernel names the user of a Unix socket: that of the server re-arms whoever stopped, also one that left.
+TEST_F(ControlTest, TheServersUserRearmsOverTheUnixSocket) {
+  Config config = RunningServer::anyPort();
+  config.socket =
+      std::filesystem::path(testing::TempDir()) / ("hapticd-" + std::to_string(getpid()) + ".sock");
+  serve(config);
+  const auto watcher = peer();
+  {
+    const auto stopper = peer();
+    stopper->send(wire::StopForces{});
+    ASSERT_TRUE(watcher->until([&] { return lastGuard(*watcher).stopped == 1; }));
+  }
+  ASSERT_TRUE(watcher->until([&] {
+    watcher->send(wire::RearmForces{});
+    for (const wire::Text& text : watcher->texts()) {
+      if (text.text.text.find("and is gone") != std::string::npos) return true;
+    }
+    return false;
+  }));
+  Client person("Phantom@unix:" + config.socket);
+  person.rearmForces();
+  EXPECT_TRUE(watcher->until([&] {
+    person.poll(0ms);
+    return lastGuard(*watcher).stopped == 0;
+  }));
+  server_.reset();
+  EXPECT_FALSE(std::filesystem::exists(config.socket));
 }
 
 TEST_F(ControlTest, OnlyListedAddressesCommand) {

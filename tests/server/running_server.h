@@ -23,6 +23,7 @@ class RunningServer {
     config.port = 0;
     config.allowNoRealtime = true;
     config.http = server::kHttpOff;
+    config.socket = server::kSocketOff;
     // A stalled machine latches faults: do not write black boxes to the user's home.
     config.devices.front().blackBoxKeep = 0;
     return config;

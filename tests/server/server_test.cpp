@@ -2,13 +2,12 @@
 #include "server/server.h"
 
 #include <gtest/gtest.h>
-#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/sinks/ringbuffer_sink.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <deque>
 #include <random>
-#include <sstream>
 
 #include "running_server.h"
 #include "scripted_peer.h"
@@ -202,9 +201,9 @@ TEST(Server, AMalformedDatagramIsIgnored) {
   RunningServer server;
   ScriptedPeer peer(server.address(), "Phantom", ScriptedPeer::Mode::udp);
   ASSERT_TRUE(peer.until([&] { return peer.datagrams() >= 1; }));
-  // A setVertex of 19 bytes: in the stream it would end the connection.
-  peer.endpoint().sendRaw({1, 2}, peer.device(), wire::kLocalType<wire::SetVertex>,
-                          std::vector<std::byte>(19), wire::Reliability::kLowLatency);
+  // A plane of 19 bytes: in the stream it would end the connection.
+  peer.endpoint().sendRaw({1, 2}, peer.device(), wire::kLocalType<wire::Plane>, std::vector<std::byte>(19),
+                          wire::Reliability::kLowLatency);
   peer.flush();
   peer.send(wire::Ping{});
   EXPECT_TRUE(peer.untilNext<wire::Pong>());
@@ -330,16 +329,18 @@ TEST(Server, AReverseConnectionToAnotherHostIsRefused) {
 // Captures the log of the server.
 class Log {
  public:
-  Log() : before_(spdlog::default_logger()) {
-    spdlog::set_default_logger(
-        std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::ostream_sink_mt>(text_)));
-  }
+  Log() { spdlog::set_default_logger(std::make_shared<spdlog::logger>("test", lines_)); }
   ~Log() { spdlog::set_default_logger(before_); }
-  std::string text() const { return text_.str(); }
+  std::string text() const {
+    std::string all;
+    for (const std::string& line : lines_->last_formatted()) all += line;
+    return all;
+  }
 
  private:
-  std::ostringstream text_;
-  std::shared_ptr<spdlog::logger> before_;
+  const std::shared_ptr<spdlog::sinks::ringbuffer_sink_mt> lines_ =
+      std::make_shared<spdlog::sinks::ringbuffer_sink_mt>(10'000);
+  const std::shared_ptr<spdlog::logger> before_ = spdlog::default_logger();
 };
 
 std::size_t countOf(const std::string& part, const std::string& text) {
@@ -399,6 +400,7 @@ TEST(Server, AReverseConnectionToAnotherAddressOfTheServerIsRefused) {
   {
     server::ServerConfig config = RunningServer::anyPort();
     config.listenAddress = "0.0.0.0";
+    config.insecure = true;
     RunningServer server(config);
     const net::Endpoint here{net::kLoopbackAddress, server.address().port};
     net::Loop loop;
@@ -415,7 +417,7 @@ TEST(Server, AReverseConnectionToAnotherAddressOfTheServerIsRefused) {
 
 TEST(Server, AFullServerStillTakesAStopAndNothingElse) {
   server::ServerConfig config = RunningServer::anyPort();
-  config.connections = 2;
+  config.limits.connections = 2;
   RunningServer server(config);
   ScriptedPeer first(server.address());
   ScriptedPeer second(server.address());
@@ -424,8 +426,8 @@ TEST(Server, AFullServerStillTakesAStopAndNothingElse) {
   ScriptedPeer late(server.address());
   ASSERT_TRUE(late.untilConnected());
   late.send(wire::SetObjectNumber{2});
-  EXPECT_TRUE(
-      late.untilText("setObjectNumber refused: the server is full: this connection may only stop forces"));
+  EXPECT_TRUE(late.untilText(
+      "setObjectNumber refused: the server is full: this connection may only stop and re-arm forces"));
   late.send(wire::Ping{});
   EXPECT_TRUE(late.untilNext<wire::Pong>());
   late.send(wire::StopForces{});
@@ -450,6 +452,76 @@ TEST(Server, AFullServerStillTakesAStopAndNothingElse) {
     return next.untilText("setObjectNumber") &&
            next.texts().back().text.text.find("full") == std::string::npos;
   }));
+}
+
+TEST(Server, AClientThatSendsMoreThanAllowedIsToldAndClosedAndAStopStillActs) {
+  server::ServerConfig config = RunningServer::anyPort();
+  config.limits.commandsPerSecond = 1000;
+  RunningServer server(config);
+  ScriptedPeer other(server.address());
+  ScriptedPeer greedy(server.address());
+  ASSERT_TRUE(other.untilConnected());
+  ASSERT_TRUE(greedy.untilConnected());
+  for (int i = 0; i < 5000; ++i) greedy.queue(wire::SetVertex{0, i, {}});
+  for (int i = 0; i < 1000; ++i) greedy.queue(wire::StopForces{});
+  greedy.send(wire::Ping{});
+  EXPECT_TRUE(greedy.untilNext<wire::Pong>()) << "those that fill meshes and stops do not count";
+  for (int i = 0; i < 5000; ++i) greedy.queue(wire::Ping{});
+  greedy.flush();
+  EXPECT_TRUE(greedy.untilText("more than 1000 messages in a second; send fewer; the connection ends"));
+  EXPECT_TRUE(greedy.untilClosed());
+  other.send(wire::Ping{});
+  EXPECT_TRUE(other.untilNext<wire::Pong>());
+}
+
+TEST(Server, OfConnectionsWithoutAGreetingTheOldestIsClosed) {
+  server::ServerConfig config = RunningServer::anyPort();
+  config.limits.unfinishedConnections = 16;
+  RunningServer server(config);
+  ScriptedPeer greeted(server.address());
+  ASSERT_TRUE(greeted.untilConnected());
+  // The server has read the greeting, too.
+  greeted.send(wire::Ping{});
+  ASSERT_TRUE(greeted.untilNext<wire::Pong>());
+  std::deque<ScriptedPeer> silent;
+  for (int i = 0; i < 17; ++i) {
+    silent.emplace_back(server.address(), "Phantom", ScriptedPeer::Mode::tcp, ScriptedPeer::Speech::raw);
+    // The server accepts them in order.
+    silent.back().sendBytes(std::as_bytes(std::span("v", 1)));
+    EXPECT_TRUE(silent.back().until([&] { return silent.back().delivered(); }));
+  }
+  EXPECT_TRUE(silent.front().untilClosed());
+  EXPECT_TRUE(silent.back().open());
+  greeted.send(wire::Ping{});
+  EXPECT_TRUE(greeted.untilNext<wire::Pong>());
+}
+
+TEST(Server, AClientThatUsesMoreMemoryThanAllowedIsClosedAndTheOthersStay) {
+  server::ServerConfig config = RunningServer::anyPort();
+  config.limits.sendQueue_MB = 1000;  // the memory of the client ends it first
+  config.limits.memory_MB = 64;
+  config.limits.clientMemory_MB = 32;
+  config.limits.commandsPerSecond = 1'000'000'000;
+  Log log;
+  RunningServer server(config);
+  ScriptedPeer other(server.address());
+  ASSERT_TRUE(other.untilConnected());
+  {
+    ScriptedPeer greedy(server.address());
+    ASSERT_TRUE(greedy.untilConnected());
+    greedy.connection().pauseReading();
+    const auto end = std::chrono::steady_clock::now() + 60s;
+    while (std::chrono::steady_clock::now() < end &&
+           log.text().find("this client uses more than 32 MiB of the server") == std::string::npos) {
+      for (int i = 0; i < 10'000; ++i) greedy.queue(wire::QueryCapabilities{});
+      greedy.flush();
+      greedy.poll();
+      other.poll();
+    }
+  }
+  EXPECT_NE(log.text().find("this client uses more than 32 MiB of the server"), std::string::npos);
+  other.send(wire::Ping{});
+  EXPECT_TRUE(other.untilNext<wire::Pong>());
 }
 
 TEST(Server, APortInUseIsReported) {

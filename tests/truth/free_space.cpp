@@ -7,7 +7,7 @@
 namespace hapticd::truth {
 namespace {
 
-constexpr int kTreeNodes = 1500;
+constexpr int kTreeNodes = 8000;
 
 }  // namespace
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 #include <sstream>
 
@@ -20,8 +21,10 @@ using realtime::Rendering;
 constexpr double kGap_m = 10e-6;               // narrower gaps are closed
 constexpr double kFollower_m = 0.49 * kGap_m;  // radius of the ball that follows the proxy
 constexpr double kSuspect_m = 30e-6;           // beside a face: a move there is searched for a path
-constexpr double kForceTolerance_m = 20e-6;    // times stiffness; twice the gap
-constexpr double kTouch_m = 25e-6;             // faces within this of the tool may hold it
+constexpr double kOnPlane = 4;               // roundings: corners of neighbours are rounded each on their own
+constexpr double kForceTolerance_m = 20e-6;  // times stiffness; twice the gap
+constexpr double kWedge_m = 60e-6;           // the reported proxy is at most 50 um from the ball that touches
+constexpr double kTouch_m = 25e-6;           // faces within this of the tool may hold it
 constexpr double kStuck_m = 10e-6;
 constexpr double kDescentReach_m = 1e-3;
 constexpr unsigned kUnexpected =
@@ -90,6 +93,7 @@ class Referee {
     stiffest_ = std::max(stiffest_, m.stiffness_N_per_m);
     damping_ = std::max(damping_, m.damping_Ns_per_m);
     friction_ = std::max(friction_, m.staticFriction);
+    pops_ = pops_ || (m.popthrough_N > 0 && trial_.toolRadius_m > 0);
   }
 
   template <class... Words>
@@ -191,12 +195,12 @@ class Referee {
 
   void judgePlaces() {
     const Point& p = rendering_.proxy_m;
-    const double rounding = 1e-9 + 8e-9 * std::max(reference_.extent(), 1e-3);
+    rounding_ = 1e-9 + 8e-9 * std::max(reference_.extent(), 1e-3);
     if (beyondWalls(p) > kGap_m)
       return report("escaped", beyondWalls(p), " m beyond a wall, proxy ", p.transpose());
     const double spring = (p - hip_).norm();
     const bool unfinished = (rendering_.status & kUnfinished) != 0;
-    if (!rendering_.touching && !unfinished && spring > rounding) {
+    if (!rendering_.touching && !unfinished && spring > rounding_) {
       return report("lost", "no contact, and the proxy is ", spring, " m from the HIP");
     }
     // Frictionless, the place of the tick before was free and nearer.
@@ -204,32 +208,72 @@ class Referee {
     const double before = (proxyBefore_ - hip_).norm();
     const bool popped = (rendering_.status & realtime::kRenderPopthrough) != 0;
     if (static_ && friction_ == 0 && tick_ > 0 && !popped &&
-        now > before + kGap_m + 2e-3 * trial_.toolRadius_m && !unfinished && !oneSidedBall_) {
+        now > before + kGap_m + 2e-3 * trial_.toolRadius_m && !unfinished && !oneSidedBall_ && !pops_ &&
+        !(now < before + kWedge_m && inWedge())) {
       return report("climbed", "the proxy moved from ", before, " m to ", now, " m from the HIP");
     }
     reference_.heights(p, proxyHeights_);
     if (tick_ > 0 && !popped) judgePassage();
+    rememberSides();
     heightsBefore_.swap(proxyHeights_);
     if (rendering_.contactForce_N.norm() > stiffest_ * kForceTolerance_m + damping_ * velocity_.norm())
       judgeFreeForce();
+  }
+
+  // Where faces meet at an acute angle, the ball of the point tool does not reach as far as the reported
+  // proxy.
+  bool inWedge() const {
+    return trial_.toolRadius_m == 0 && (reference_.near(proxyBefore_, kTouch_m).size() > 1 ||
+                                        reference_.near(rendering_.proxy_m, kTouch_m).size() > 1);
   }
 
   // A move is suspected when it goes through a face, or past its edge nearer than any gap is wide.
   void judgePassage() {
     const auto n = static_cast<int>(reference_.faces().size());
     suspects_.clear();
+    byMemory_ = false;
     for (int i = 0; i < n; ++i) {
-      if (!reference_.moved()) {
+      if (!reference_.moved() && std::abs(heightsBefore_[i]) > rounding_) {
         if ((heightsBefore_[i] >= 0) == (proxyHeights_[i] >= 0)) continue;
       }
       if (reference_.face(i).thin) continue;
-      const Point from = reference_.moved() ? reference_.carried(proxyBefore_, i) : proxyBefore_;
-      if (reference_.crosses(i, from, rendering_.proxy_m, kSuspect_m)) suspects_.push_back(i);
+      if (reference_.crosses(i, previousPlace(i), rendering_.proxy_m, kSuspect_m)) suspects_.push_back(i);
     }
     if (suspects_.empty()) return;
     ++verdict_.suspected;
     if (static_ && !touchedBefore_ && !rendering_.touching) judgeFreeMove();
-    if (!verdict_.finding) searchPassage();
+    if (verdict_.finding || passageFound()) return;
+    // On the plane of a face, within rounding, the proxy may still be on the side where it was seen last,
+    // where it last was off the plane, or where rounding put it.
+    byMemory_ = true;
+    if (passageFound() || roomCloses()) return;
+    const Eigen::ArrayXd sides = sides_;
+    sides_ = seen_;
+    if (passageFound()) {
+      sides_ = sides;
+      return;
+    }
+    byMemory_ = false;
+    sides_ =
+        (heightsBefore_ >= 0).select(Eigen::ArrayXd::Ones(sides.size()), -Eigen::ArrayXd::Ones(sides.size()));
+    if (passageFound()) return;
+    sides_ = sides;
+    const Face& f = reference_.face(suspects_.front());
+    report("through", "from ", proxyBefore_.transpose(), " to ", rendering_.proxy_m.transpose(),
+           " past face ", suspects_.front(), " of object ", f.object, ", force ",
+           rendering_.contactForce_N.norm());
+  }
+
+  // The sides of the faces on which the proxy is now, and on which it was last seen off their planes.
+  void rememberSides() {
+    if (sides_.size() == 0) sides_ = seen_ = Eigen::ArrayXd::Zero(proxyHeights_.size());
+    for (Eigen::Index i = 0; i < sides_.size(); ++i) {
+      const bool onPlane = std::abs(proxyHeights_[i]) <= kOnPlane * rounding_;
+      const double side = proxyHeights_[i] >= 0 ? 1 : -1;
+      const bool keep = byMemory_ && sides_[i] != 0 && onPlane;
+      if (!keep) sides_[i] = side;
+      if (!onPlane || seen_[i] == 0) seen_[i] = side;
+    }
   }
 
   // From free motion to free motion, through the inside of a face that is alone and lies below the HIP: it
@@ -250,12 +294,22 @@ class Referee {
     }
   }
 
-  Point previousPlace(int face) const {
-    return reference_.moved() ? reference_.carried(proxyBefore_, face) : proxyBefore_;
+  // Where the proxy was, relative to a face: from its plane, within rounding, lifted to the side where it
+  // was.
+  Point previousPlace(int i) const {
+    return lifted(i, reference_.moved() ? reference_.carried(proxyBefore_, i) : proxyBefore_);
+  }
+  Point presentPlace(int i) const {
+    return byMemory_ ? lifted(i, rendering_.proxy_m) : Point(rendering_.proxy_m);
+  }
+  Point lifted(int i, const Point& p) const {
+    const Face& f = reference_.face(i);
+    if (std::abs(f.normal.dot(p - f.a)) > kOnPlane * rounding_) return p;
+    return p + 2 * kOnPlane * rounding_ * sides_[i] * f.normal;
   }
 
   // The follower: from the proxy's place before, carried with each face, to its place now.
-  void searchPassage() {
+  bool passageFound() {
     const Point& p = rendering_.proxy_m;
     double way = (p - proxyBefore_).norm();
     for (const int i : suspects_) way = std::max(way, (p - previousPlace(i)).norm());
@@ -267,19 +321,28 @@ class Referee {
       const std::optional<Point> end = placeNow(space);
       if (!start || !end) continue;
       decided = true;
-      if (space.connects(*start, *end)) return;
+      if (space.connects(*start, *end)) return true;
     }
-    if (!decided) {
-      ++verdict_.undecided;
-      return;
-    }
-    const Face& f = reference_.face(suspects_.front());
-    report("through", "from ", proxyBefore_.transpose(), " to ", p.transpose(), " past face ",
-           suspects_.front(), " of object ", f.object, ", force ", rendering_.contactForce_N.norm());
+    if (!decided) ++verdict_.undecided;
+    return !decided;
   }
 
-  std::optional<Point> placeBefore(FreeSpace& space) const {
-    for (const double widening : {kSuspect_m, 0.0}) {
+  // Where the proxy's room is narrower than the way of its walls in this tick: nothing keeps a proxy in a
+  // room that closes.
+  bool roomCloses() {
+    if (!reference_.moved()) return false;
+    double way = 0;
+    for (const int i : suspects_) way = std::max(way, (proxyBefore_ - previousPlace(i)).norm());
+    FreeSpace space(reference_, proxyBefore_, 5 * way + 400e-6, kFollower_m + way,
+                    trial_.seed + static_cast<std::uint64_t>(tick_));
+    if (placeBefore(space, {kSuspect_m})) return false;
+    ++verdict_.undecided;
+    return true;
+  }
+
+  std::optional<Point> placeBefore(FreeSpace& space,
+                                   std::initializer_list<double> widenings = {kSuspect_m, 0}) const {
+    for (const double widening : widenings) {
       const auto visible = [&](const Point& q) {
         return std::none_of(space.faces().begin(), space.faces().end(),
                             [&](int i) { return reference_.pierces(i, previousPlace(i), q, widening); });
@@ -297,7 +360,7 @@ class Referee {
     for (const double widening : {kSuspect_m, 0.0}) {
       const auto visible = [&](const Point& q) {
         return std::none_of(space.faces().begin(), space.faces().end(),
-                            [&](int i) { return reference_.pierces(i, q, rendering_.proxy_m, widening); });
+                            [&](int i) { return reference_.pierces(i, q, presentPlace(i), widening); });
       };
       if (const auto place = space.placeNear(rendering_.proxy_m, visible)) return place;
     }
@@ -322,13 +385,13 @@ class Referee {
         return;
       }
     }
-    // Edges within the gap may hold a point.
+    // Edges near a point may hold it.
     const Point off = p + way * std::min(1.0, 30e-6 / way.norm());
     for (Eigen::Index i = 0; radius == 0 && i < hipHeights_.size(); ++i) {
-      if (std::min(heightsBefore_[i], hipHeights_[i]) > 2 * kGap_m ||
-          std::max(heightsBefore_[i], hipHeights_[i]) < -2 * kGap_m)
+      if (std::min(heightsBefore_[i], hipHeights_[i]) > kTouch_m ||
+          std::max(heightsBefore_[i], hipHeights_[i]) < -kTouch_m)
         continue;
-      if (distanceOf(reference_.face(static_cast<int>(i)), off, hip_) < 1.2 * kGap_m) return;
+      if (distanceOf(reference_.face(static_cast<int>(i)), off, hip_) < kTouch_m) return;
     }
     report("free", rendering_.contactForce_N.norm(), " N, and the way from the proxy ", p.transpose(),
            " to the HIP ", hip_.transpose(), " is free");
@@ -360,7 +423,7 @@ class Referee {
     const std::vector<int> near = reference_.near(rendering_.proxy_m, radius + kTouch_m);
     judgeDirection(near);
     judgeLaw(near);
-    if (radius > 0 && trial_.sides == Sides::both) judgeOverlap(near);
+    if (radius > 0 && trial_.sides == Sides::both && !pops_) judgeOverlap(near);
     judgeRest();
   }
 
@@ -376,6 +439,49 @@ class Referee {
            std::any_of(trial_.planes.begin(), trial_.planes.end(), other);
   }
 
+  // A point is a ball of the gap's radius, and friction holds it on the round of a rim. There the surface
+  // turns from the normal of the face to the outward direction in its plane. A rim: no other face goes on
+  // beyond it.
+  std::vector<Point> rimsOf(const Face& f, const std::vector<int>& near) const {
+    std::vector<Point> rims;
+    const Point& p = rendering_.proxy_m;
+    const std::array<Point, 3> corners{f.a, f.b, f.c};
+    for (std::size_t k = 0; k < 3 && !f.unbounded && trial_.toolRadius_m == 0; ++k) {
+      const Point along = (corners[(k + 1) % 3] - corners[k]).stableNormalized();
+      const Point outward = along.cross(f.normal);
+      if (std::abs(outward.dot(p - corners[k])) > kGap_m) continue;
+      const Point beyond = p + 2 * kGap_m * outward;
+      const auto goesOn = [&](int i) {
+        const Face& other = reference_.face(i);
+        if (other.a == f.a && other.b == f.b && other.c == f.c) return false;
+        return outward.dot(normalAt(other)) < -1e-6 ||
+               (nearestOf(other, beyond) - beyond).norm() < 1.5 * kGap_m;
+      };
+      if (std::none_of(near.begin(), near.end(), goesOn)) rims.push_back(outward);
+    }
+    return rims;
+  }
+
+  // Directions in the plane of a face in which no face goes on, beside a point: at a corner or in a notch.
+  std::vector<Point> openDirections(const Face& f, const std::vector<int>& near) const {
+    std::vector<Point> open;
+    if (f.unbounded || trial_.toolRadius_m > 0 || friction_ == 0) return open;
+    const Point& p = rendering_.proxy_m;
+    if ((p - nearestOf(f, p)).norm() > kGap_m) return open;
+    const Point u = (f.b - f.a).stableNormalized();
+    const Point v = f.normal.cross(u);
+    for (int k = 0; k < 16; ++k) {
+      const double angle = k * M_PI / 8;
+      const Point way = std::cos(angle) * u + std::sin(angle) * v;
+      const Point beyond = p + 2 * kGap_m * way;
+      const auto covers = [&](int i) {
+        return (nearestOf(reference_.face(i), beyond) - beyond).norm() < 0.3 * kGap_m;
+      };
+      if (std::none_of(near.begin(), near.end(), covers)) open.push_back(way);
+    }
+    return open;
+  }
+
   void judgeDirection(const std::vector<int>& near) {
     if (mixedStiffness()) return;  // blending adds a tangential part
     const Point& force = rendering_.normalForce_N;
@@ -384,7 +490,16 @@ class Referee {
       const Point n = normalAt(reference_.face(i));
       const auto same = [&](const Point& m) { return (m - n).squaredNorm() < 1e-18; };
       if (std::none_of(normals.begin(), normals.end(), same)) normals.push_back(n);
-      if (normals.size() == 24) return;  // the set is not worth its time
+      const std::vector<Point> open = openDirections(reference_.face(i), near);
+      if (!open.empty()) {
+        normals.insert(normals.end(), open.begin(), open.end());
+        if (trial_.sides == Sides::both) normals.push_back(-n);
+      }
+      for (const Point& rim : rimsOf(reference_.face(i), near)) {
+        normals.push_back(rim);
+        if (trial_.sides == Sides::both) normals.push_back(-n);
+      }
+      if (normals.size() >= 24) return;  // the set is not worth its time
     }
     const double off = distanceFromCone(force, normals);
     if (off > 2e-3 * force.norm() + stiffest_ * kForceTolerance_m) {
@@ -402,6 +517,8 @@ class Referee {
     }
     // With unequal neighbours near, the stiffness is blended.
     if (mixedStiffness() && othersNear(f.object)) return;
+    const auto hasRim = [&](int i) { return !rimsOf(reference_.face(i), near).empty(); };
+    if (friction_ > 0 && std::any_of(near.begin(), near.end(), hasRim)) return;
     const Material& m = reference_.materialOf(near[0]);
     const double depth = trial_.toolRadius_m - n.dot(hip_ - nearestOf(f, rendering_.proxy_m));
     const Point expected =
@@ -430,12 +547,24 @@ class Referee {
     }
   }
 
+  // A ball may balance on an edge, with the HIP exactly behind: no small move brings it nearer.
+  bool balances() const {
+    const Point& p = rendering_.proxy_m;
+    if (trial_.toolRadius_m == 0) return false;
+    const Point pull = (hip_ - p).stableNormalized();
+    const std::vector<int> near = reference_.near(p, trial_.toolRadius_m + 1e-6);
+    return std::any_of(near.begin(), near.end(), [&](int i) {
+      const Point in = nearestOf(reference_.face(i), p) - p;
+      return in.stableNormalized().cross(pull).norm() < 1e-4 && (hip_ - p).norm() > in.norm();
+    });
+  }
+
   void judgeRest() {
     if (!static_ || friction_ > 0 || (rendering_.status & realtime::kRenderPopthrough) != 0) return;
     const Point& p = rendering_.proxy_m;
     const double radius = trial_.toolRadius_m;
     const double spring = (p - hip_).norm();
-    if (spring < kStuck_m) return;
+    if (spring < kStuck_m || balances()) return;
     // A ball converges on edges over several ticks: judged once it rests.
     if (radius > 0 && (p - proxyBefore_).norm() > kGap_m) return;
     Descent descent(reference_, p, kDescentReach_m, radius, radius > 0 ? 0.0 : 1.2 * kFollower_m,
@@ -465,6 +594,8 @@ class Referee {
   // Behind a one-sided face a ball may overlap it; the face pushes it out once its centre is in front. Rules
   // that rely on a ball beside the faces do not apply.
   bool oneSidedBall_ = false;
+  // A ball that steps through a face may overlap others of that object, which then push it out.
+  bool pops_ = false;
   double stiffest_ = 0;
   double damping_ = 0;
   double friction_ = 0;
@@ -478,7 +609,11 @@ class Referee {
   Point forceBefore_ = Point::Zero();
   double work_J_ = 0;
   double workTolerance_J_ = 0;
+  double rounding_ = 0;           // of float coordinates: no side is decided below it
   Eigen::ArrayXd heightsBefore_;  // of the proxy
+  Eigen::ArrayXd sides_;          // of the faces, +-1, where the proxy was
+  Eigen::ArrayXd seen_;           // the same, where it was last off their planes
+  bool byMemory_ = false;         // on the plane of a face, the proxy counts as on the side where it was
   Eigen::ArrayXd proxyHeights_;
   Eigen::ArrayXd hipHeights_;
   std::vector<int> suspects_;

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
 #include <sstream>
 
 #include "truth/free_space.h"
@@ -98,6 +100,22 @@ TEST(Trial, text_that_is_not_a_trial_is_refused) {
   EXPECT_THROW(read(nonsense), std::runtime_error);
   std::istringstream early("vertex 1 2 3\n");
   EXPECT_THROW(read(early), std::runtime_error);
+}
+
+// What the referee found before, shrunk. Each of these trials broke the rule in its name.
+TEST(Referee, mended_findings_stay_mended) {
+  RefereeOptions all;
+  all.share = 1;
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(HAPTICD_TESTDATA "/truth")) {
+    std::ifstream file(entry.path());
+    const Verdict verdict = judge(read(file), all);
+    EXPECT_GT(verdict.ticks, 1U) << entry.path();
+    EXPECT_FALSE(verdict.finding) << entry.path() << ": " << verdict.finding->rule << ": "
+                                  << verdict.finding->text;
+    ++count;
+  }
+  EXPECT_GE(count, 30);
 }
 
 // A hand that presses on a plate: nothing to find. With a false wall in front of the plate, the referee finds

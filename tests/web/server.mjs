@@ -23,18 +23,12 @@ export async function until(what, ask, deadline_ms = 30_000) {
 export class Server {
   log = "";
 
-  static async start(hapticd, { http = "127.0.0.1:0", more = [] } = {}) {
+  /** `hapticd serve`, or `hapticd replay` of a recording. */
+  static async start(hapticd, { http = "127.0.0.1:0", more = [], replay = "" } = {}) {
     const server = new Server();
     server.hapticd = hapticd;
-    server.process = spawn(hapticd, [
-      "serve",
-      "--listen",
-      "127.0.0.1:0",
-      "--http",
-      http,
-      "--allow-no-rt",
-      ...more,
-    ]);
+    const what = replay ? ["replay", replay] : ["serve", "--allow-no-rt"];
+    server.process = spawn(hapticd, [...what, "--listen", "127.0.0.1:0", "--http", http, ...more]);
     for (const stream of [server.process.stdout, server.process.stderr])
       stream.on("data", (text) => (server.log += text));
     server.ended = new Promise((resolve) => server.process.on("exit", resolve));

@@ -1,11 +1,13 @@
 // The viewer in a real browser against a real server: the steps of a new user.
 //   node viewer_test.mjs HAPTICD [--screenshots DIR]      writes the pictures of docs/viewer.md to DIR
 import assert from "node:assert/strict";
+import { mkdtemp, rm } from "node:fs/promises";
 import { createServer, request } from "node:http";
+import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, beforeEach, test } from "node:test";
 import { launch, Viewer } from "./browser.mjs";
-import { sourceDir } from "./bundled.mjs";
+import { packageNamed, sourceDir } from "./bundled.mjs";
 import { Server, until } from "./server.mjs";
 
 const [hapticd, option, folder] = process.argv.slice(2);
@@ -74,11 +76,13 @@ test("the scene appears", async () => {
     const [rgb] = await viewer.pixels([await viewer.pointOnObject()]);
     return rgb[more] > rgb[less] + least;
   };
+  await viewer.page.selectOption("#quantity", "stiffness");
   await viewer.until("400 of 500 N/m are yellow", () => differs(0, 2, 40));
   assert.deepEqual(await viewer.pixels([corner]), [[0xe9, 0xec, 0xf0]]);
   await viewer.page.selectOption("#quantity", "friction");
   await viewer.until("a friction of 0.3 is blue", () => differs(2, 0, 20));
-  await viewer.page.selectOption("#quantity", "stiffness");
+  await viewer.page.selectOption("#quantity", "object");
+  assert.equal(await viewer.text("[data-object='0'] strong"), "bunny.obj");
 });
 
 test("dragging the hand over the bunny raises the force", async () => {
@@ -89,7 +93,7 @@ test("dragging the hand over the bunny raises the force", async () => {
   await viewer.forceIs("there where the pointer presses", pressed);
   await viewer.dragTo(await viewer.pointOnObject(60, -40), 30);
   await viewer.forceIs("there after a stroke", pressed);
-  assert.equal(await viewer.text("#touching"), "object 0");
+  assert.equal(await viewer.text("#touching"), "bunny.obj");
   const before = await viewer.force_N();
   for (let i = 0; i < 6; ++i) await viewer.page.mouse.wheel(0, -100);
   await viewer.forceIs("larger after the wheel", (force_N) => force_N > before + 0.1);
@@ -130,7 +134,7 @@ test("an untouchable object exerts no force", async () => {
 });
 
 test("a slider changes the surface", async () => {
-  await viewer.page.locator("[data-object='0'] summary").click();
+  await viewer.page.locator("[data-object='0'] summary", { hasText: "Surface" }).click();
   const slider = viewer.page.locator("[data-object='0'] input[name='stiffness']");
   const stiffness = async () => Math.round((await server.state()).scenes[0].objects[0].stiffness_N_per_m);
   await slider.fill("0.4");
@@ -138,7 +142,7 @@ test("a slider changes the surface", async () => {
   await slider.fill("0.8");
   await until("400 N/m", async () => (await stiffness()) === 400);
   await picture("surface");
-  await viewer.page.locator("[data-object='0'] summary").click();
+  await viewer.page.locator("[data-object='0'] summary", { hasText: "Surface" }).click();
 });
 
 test("switching an effect changes the force", async () => {
@@ -155,15 +159,106 @@ test("switching an effect changes the force", async () => {
   await viewer.forceIs("1 N again", (force_N) => Math.abs(force_N - 1) < 0.02);
   const [x, y, z] = await viewer.ask("viewer.tick.force_N");
   assert.ok(y > 0.98 && Math.hypot(x, z) < 0.05, `up, not ${[x, y, z]}`);
-  await active.uncheck();
+  await viewer.page.locator("[data-effect='0'] summary").click();
+  const strength = viewer.page.getByLabel("Force, N of effect 0");
+  await strength.fill("0.5");
+  await strength.press("Enter");
+  await viewer.forceIs("0.5 N after the edit", (force_N) => Math.abs(force_N - 0.5) < 0.02);
+  await viewer.page.getByLabel("Remove effect 0").click();
   await viewer.forceIs("zero after the effect", zero);
+  await viewer.until("it is gone", async () => (await viewer.page.locator("[data-effect='0']").count()) === 0);
   await viewer.letGo();
+});
+
+test("moving objects are drawn where each tick has them", async () => {
+  const { wire, send, close } = await server.client();
+  const at = (x) => [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, 0, 0, 1];
+  let seen;
+  const drawn = viewer
+    .ask(
+      `new Promise((resolve) => {
+        const seen = [];
+        const frame = () => {
+          seen.push(viewer.view.objects.matrixOf(0)[12]);
+          seen.length < 30 ? requestAnimationFrame(frame) : resolve(seen);
+        };
+        requestAnimationFrame(frame);
+      })`,
+    )
+    .then((xs) => (seen = xs));
+  for (let i = 0; !seen; ++i) {
+    send(wire.setTransformMatrix(0, at(20 * Math.sin(0.1 * i))));
+    await new Promise((resolve) => setTimeout(resolve, 18));
+  }
+  await drawn;
+  const moved = seen.filter((x, i) => i > 0 && x !== seen[i - 1]).length;
+  // The polled state has 4 positions per second.
+  assert.ok(moved >= 10, `${moved} positions in ${seen.length} frames`);
+  send(wire.setTransformMatrix(0, at(0)));
+  await viewer.until("it rests", async () => (await viewer.ask("viewer.view.objects.matrixOf(0)[12]")) === 0);
+  close();
+});
+
+test("planes, fields and constraints are listed, drawn and switched", async () => {
+  const { wire, send, close } = await server.client();
+  await viewer.holdInAir();
+  const tick = await viewer.ask("viewer.tick.tick");
+  await viewer.until("the hand rests", () =>
+    viewer.ask(`viewer.tick.tick > ${tick} + 500 && Math.hypot(...viewer.tick.velocity) < 0.0005`),
+  );
+  const hip_mm = 1000 * (await viewer.ask("viewer.tick.hand[1]"));
+  send(wire.setPlane(0, [0, 1, 0, -(hip_mm + 2) / 1000], 0.4, 0, 0.3, 0.2));
+  await viewer.forceIs("of the plane", pressed);
+  await viewer.until("its name", async () => (await viewer.text("#touching")) === "plane 0");
+  assert.ok(await viewer.ask("viewer.view.sources.group.children.length > 0"));
+  await viewer.page.getByLabel("arrow per source").check();
+  await viewer.until("an arrow for it", () => viewer.ask("viewer.view.sources.live.children.filter((c) => c.visible).length >= 2"));
+  await picture("sources");
+  const planes = async () => (await server.state()).scenes[0].planes.length;
+  await viewer.page.getByLabel("Plane 0 is on").uncheck();
+  await until("no plane", async () => (await planes()) === 0);
+  await viewer.forceIs("zero without the plane", zero);
+  await viewer.page.getByLabel("Plane 0 is on").check();
+  await until("the plane again", async () => (await planes()) === 1);
+  await viewer.page.getByLabel("Plane 0 is on").uncheck();
+  const none = Array(9).fill(0);
+  send(wire.setForceField([0, 0, 0], [0, 0.6, 0], none, 1));
+  await viewer.until("the field's name", async () => (await viewer.text("#touching")).includes("force field"));
+  await viewer.page.getByLabel("Force field is on").uncheck();
+  await viewer.forceIs("zero without the field", zero);
+  await viewer.page.getByLabel("arrow per source").uncheck();
+  await viewer.letGo();
+  close();
+});
+
+test("an object is moved, turned and scaled after loading", async () => {
+  await viewer.page.locator("[data-object='0'] summary", { hasText: "Placement" }).click();
+  const matrix = async () => (await server.state()).scenes[0].objects[0].T_world_object;
+  const edit = async (label, value) => {
+    const field = viewer.page.getByLabel(label);
+    await field.fill(value);
+    await field.press("Enter");
+  };
+  await viewer.until("the placement", async () =>
+    (await viewer.page.getByLabel("Scale of object 0").inputValue()) === "1");
+  const x = Number(await viewer.page.getByLabel("Position x of object 0").inputValue());
+  await edit("Position x of object 0", String(x + 12.5));
+  await until("moved", async () => Math.abs((await matrix())[12] - 12.5) < 1e-3);
+  await edit("Scale of object 0", "0.5");
+  await until("scaled", async () => Math.abs((await matrix())[0] - 0.5) < 1e-6);
+  await edit("Rotation about y, degrees, of object 0", "90");
+  await until("turned", async () => Math.abs((await matrix())[8] - 0.5) < 1e-6);
+  await edit("Rotation about y, degrees, of object 0", "0");
+  await edit("Scale of object 0", "1");
+  await edit("Position x of object 0", String(x));
+  await until("back", async () => Math.abs((await matrix())[12]) < 1e-3);
+  await viewer.page.locator("[data-object='0'] summary", { hasText: "Placement" }).click();
 });
 
 test("a dropped mesh can be touched", async () => {
   await viewer.holdInAir(); // a mesh that appears around the HIP keeps it inside
   await viewer.drop({ "cube.obj": CUBE });
-  await viewer.page.getByLabel("Target object").selectOption({ label: "replace object 0" });
+  await viewer.page.getByLabel("Target object").selectOption({ label: "replace object 0 (bunny.obj)" });
   await viewer.page.getByLabel("Largest extent").fill("40");
   await picture("drop");
   await viewer.page.getByRole("button", { name: "Load into the scene" }).click();
@@ -299,6 +394,102 @@ test("a foreign web page does not reach the server", async () => {
 test("no complaint in the console, no request to another host", () => {
   assert.deepEqual(viewer.complaints, []);
   assert.deepEqual(viewer.foreign, []);
+});
+
+test("markers, trips and a recording that the page begins and that is replayed", async () => {
+  const folder = await mkdtemp(join(tmpdir(), "hapticd-replay-"));
+  const live = await Server.start(hapticd, { more: ["--record", join(folder, "first.haptics")] });
+  const page = await Viewer.open(browser.context, live.url);
+  await page.connected();
+  await page.holdInAir(); // a mesh that appears around the HIP keeps it inside
+  await page.page.click("#load-bunny");
+  await page.showsTriangles(3674);
+  const recorded = async () => (await live.state()).server.recording;
+  await page.page.getByRole("button", { name: "End recording" }).click();
+  await page.until("no recording", async () => (await recorded()) === null);
+  await page.page.getByRole("button", { name: "Record", exact: true }).click();
+  const file = await page.until("a recording named by the time", async () => {
+    const name = await recorded();
+    return name !== null && /session-[0-9]{8}-[0-9]{6}/.test(name) && name;
+  });
+  await page.press(await page.pointOnObject());
+  await page.forceIs("of the bunny", pressed);
+  await page.release();
+  await page.page.fill("#mark-text", "trial 3 begins");
+  await page.page.press("#mark-text", "Enter");
+  await page.until("the marker in the plots", () =>
+    page.ask("viewer.plots.marks.some((m) => m.label === 'trial 3 begins')"));
+  await page.page.keyboard.press("Escape");
+  await page.forceIs("zero", zero);
+  assert.match(await page.ask("viewer.plots.csv()"), /time_s,force_N,depth_mm,latency_ms\n[0-9.]+,/);
+  await live.stop();
+  await page.until("dashes", async () => (await page.text("#force")) === "–");
+  await page.page.close();
+
+  const replayed = await Server.start(hapticd, { replay: file });
+  const replay = await Viewer.open(browser.context, replayed.url);
+  await replay.connected();
+  const state = async () => (await replayed.state()).server.replay;
+  const line = await until("the time line", async () => (await state()).duration_s !== null && (await state()));
+  assert.deepEqual(line.markers.map(([, text]) => text), ["trial 3 begins"]);
+  assert.ok(line.contacts.length > 0 && line.trips.some(([, name]) => name === "stopped"), JSON.stringify(line));
+  await replay.page.locator("#replay").waitFor();
+  for (const id of ["#stop", "#load-mesh", "#mark", "#record", "#hand-bar"])
+    assert.equal(await replay.page.isVisible(id), false, `${id} can do nothing here`);
+  const [from, to] = line.contacts[0];
+  const during = (from + to) / 2;
+  await replay.page.getByLabel("Position in the recording, seconds").fill(during.toFixed(2));
+  await replay.page.locator("#replay button").click();
+  await until("paused or ended", async () => (await state()).paused || (await state()).ended);
+  const client = await replayed.client();
+  // The contact goes on after the hand was let go and after the stop: one of these moments has a force.
+  const moments = [0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75].map((share) => from + share * (to - from));
+  let next = 0;
+  await replay.until("the force of then", async () => {
+    const moment = moments[next++ % moments.length];
+    client.send(client.wire.replayControl(true, 0, moment));
+    await until("there", async () => Math.abs((await state()).position_s - moment) < 0.3 && (await state()).paused);
+    return (await replay.force_N()) > 0.05;
+  });
+  await replay.showsTriangles(3674);
+  await replay.until("Play", async () => (await replay.text("#replay button")) === "Play");
+  await picture("replay", replay);
+  assert.deepEqual(replay.complaints, []);
+  client.close();
+  await replay.page.close();
+  await replayed.stop();
+  await rm(folder, { recursive: true });
+});
+
+/** What axe finds against WCAG 2 A and AA. */
+async function axeFindings(of) {
+  await of.page.evaluate(packageNamed("axe-core").source);
+  return of.page.evaluate(async () => {
+    const { violations } = await globalThis.axe.run(document, {
+      runOnly: { type: "tag", values: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"] },
+    });
+    return violations.flatMap((v) => v.nodes.map((n) => `${v.id}: ${n.html.slice(0, 120)} ${n.failureSummary ?? ""}`));
+  });
+}
+
+test("accessible on a phone, a laptop and a projector, light and dark", async () => {
+  const size = viewer.page.viewportSize();
+  await viewer.page.locator("[data-object='0'] summary", { hasText: "Surface" }).click();
+  await viewer.page.locator("[data-object='0'] summary", { hasText: "Placement" }).click();
+  const widths = { phone: [390, 844], laptop: [1366, 768], projector: [1920, 1080] };
+  const layouts = process.env.HAPTICD_LAYOUT_PICTURES;
+  for (const theme of ["light", "dark"]) {
+    for (const [name, [width, height]] of Object.entries(widths)) {
+      await viewer.page.setViewportSize({ width, height });
+      const scrolls = await viewer.ask("document.documentElement.scrollWidth > innerWidth");
+      assert.equal(scrolls, false, `${name} scrolls sideways`);
+      // The colours of a theme are the same at every width: axe takes seconds.
+      if (theme === "light" || name === "laptop") assert.deepEqual(await axeFindings(viewer), [], `${theme}, ${name}`);
+      if (layouts) await viewer.page.screenshot({ path: join(layouts, `${name}_${theme}.png`) });
+    }
+    await viewer.page.click("#theme");
+  }
+  await viewer.page.setViewportSize(size);
 });
 
 test("the page reconnects to a restarted server", async () => {

@@ -29,6 +29,11 @@ const std::map<std::string_view, std::string_view> kControl = {
     {"hapticd Hold_Hand", "c"},
     {"hapticd Remote_Contacts", "co"},
     {"hapticd Held_Force", "co"},
+    {"hapticd Identify", "o"},
+    {"hapticd Release_Control", ""},
+    {"hapticd Marker", ""},
+    {"hapticd Replay_Control", ""},
+    {"hapticd Recording_Control", "c"},
 };
 
 MessageKind kindAt(std::size_t index) {

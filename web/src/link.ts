@@ -48,6 +48,8 @@ export class Link {
   constructor(
     private readonly onState: (state: LinkState) => void,
     private readonly onMessage: (message: Incoming, age_s: number) => void,
+    /** What each connection sends first. */
+    private readonly greeting: () => Outgoing[] = () => [],
   ) {}
 
   /** Connects as a client of this device, and reconnects when the connection is lost. */
@@ -102,6 +104,7 @@ export class Link {
 
   private opened(): void {
     this.retry_ms = RETRY_FIRST_MS;
+    for (const message of this.greeting()) this.peer?.send(this.device, message);
     this.setState("open");
     const sendPing = (): void => {
       this.clock.sent();

@@ -1,7 +1,8 @@
 // The plots of the page and their data.
 import { between, share } from "./plots/counts";
 import { LoopHistogram } from "./plots/histogram";
-import { Plot } from "./plots/plot";
+import { css, type Mark, Plot } from "./plots/plot";
+import { TRIPS } from "./server_tables";
 import type { DeviceState, Histogram } from "./state_types";
 import type { Tick } from "./wire";
 import { byId, countText, setText } from "./panels/dom";
@@ -10,6 +11,9 @@ const SECONDS = 10;
 const LOOP_SECONDS = 60;
 /** 10 s of ticks at 125 Hz, with a margin. */
 const MAX_SAMPLES = 1400;
+
+/** Marks older than the window are dropped beyond this number. */
+const MOST_MARKS = 100;
 
 type LoopTime = "period_us" | "wakeup_us" | "compute_us";
 
@@ -26,8 +30,11 @@ export class LivePlots {
   private meanSince: Tick | undefined;
   private device = "";
   private turn = 0;
+  private readonly marks: Mark[] = [];
+  private trips = 0;
 
   constructor() {
+    this.bindTools();
     const parent = byId("plots");
     const one = (
       title: string,
@@ -45,7 +52,7 @@ export class LivePlots {
         curves: [{ label, colour }],
         seconds: SECONDS,
         most: MAX_SAMPLES,
-      });
+      }, this.marks);
     this.force = one("Force", "N", "force", 0.5, 2, "--force");
     this.depth = one("Depth", "mm", "depth", 1, 2, "--proxy");
     this.latency = one("Latency", "ms", "latency", 2, 1, "--second");
@@ -71,6 +78,83 @@ export class LivePlots {
     this.force.push(time_s, force_N);
     this.depth.push(time_s, depth_mm);
     this.latency.push(time_s, latency_ms);
+    this.markTrips(tick, time_s);
+  }
+
+  /** A marker of a client, on the server's clock. */
+  marker(time_s: number, label: string): void {
+    this.mark({ time_s, label, colour: "--second" });
+  }
+
+  /** Nothing is known any more. */
+  lost(): void {
+    for (const plot of this.timed) plot.lost();
+    setText(this.summary, "–");
+  }
+
+  private mark(mark: Mark): void {
+    this.marks.push(mark);
+    if (this.marks.length > MOST_MARKS) this.marks.shift();
+  }
+
+  // Trips that remove the force; clamps are part of normal rendering.
+  private markTrips(tick: Tick, time_s: number): void {
+    const now = tick.guardActive | tick.guardLatched;
+    const begun = now & ~this.trips;
+    this.trips = now;
+    if (begun === 0) return;
+    for (const [name, trip] of Object.entries(TRIPS))
+      if ((begun & (1 << trip.bit)) !== 0 && trip.action !== "clamp")
+        this.mark({ time_s, label: name, colour: "--bad" });
+  }
+
+  private get timed(): Plot[] {
+    return [this.force, this.depth, this.latency, this.period];
+  }
+
+  private bindTools(): void {
+    const pause = byId("plots-pause");
+    pause.addEventListener("click", () => {
+      const on = pause.ariaPressed !== "true";
+      pause.ariaPressed = String(on);
+      for (const plot of this.timed) plot.paused = on;
+    });
+    byId("plots-csv").addEventListener("click", () => save(new Blob([this.csv()], { type: "text/csv" }), "csv"));
+    byId("plots-png").addEventListener("click", () =>
+      this.png().toBlob((blob) => blob && save(blob, "png"), "image/png"),
+    );
+  }
+
+  /** Force, depth and latency of the shown samples, with marks as comments. */
+  csv(): string {
+    const [time, force] = this.force.data();
+    const depth = this.depth.data()[1]!;
+    const latency = this.latency.data()[1]!;
+    const rows = Array.from(time!, (t, i) => `${t.toFixed(6)},${force![i]!},${depth[i]!},${latency[i]!}`);
+    const marks = this.marks
+      .filter((m) => m.time_s >= (time![0] ?? Infinity))
+      .map((m) => `# ${m.time_s.toFixed(6)} ${m.label.replaceAll(/[\r\n]/g, " ")}`);
+    return [...marks, "time_s,force_N,depth_mm,latency_ms", ...rows].join("\n") + "\n";
+  }
+
+  private png(): HTMLCanvasElement {
+    const plots = this.timed.filter((p) => p.canvas);
+    const head = 22 * devicePixelRatio;
+    const all = document.createElement("canvas");
+    all.width = Math.max(1, ...plots.map((p) => p.canvas!.width));
+    all.height = plots.reduce((sum, p) => sum + p.canvas!.height + head, 0);
+    const context = all.getContext("2d")!;
+    context.fillStyle = css("--panel");
+    context.fillRect(0, 0, all.width, all.height);
+    context.font = `${13 * devicePixelRatio}px system-ui, sans-serif`;
+    let y = 0;
+    for (const plot of plots) {
+      context.fillStyle = css("--ink");
+      context.fillText(`${plot.title}, ${plot.unit}`, 6 * devicePixelRatio, y + 0.75 * head);
+      context.drawImage(plot.canvas!, 0, y + head);
+      y += plot.canvas!.height + head;
+    }
+    return all;
   }
 
   state(device: DeviceState, time_s: number): void {
@@ -90,7 +174,7 @@ export class LivePlots {
     this.histogram.update(shown);
     setText(
       this.summary,
-      `p50 ${us(shown.p50)}, p99 ${us(shown.p99)}, p99.9 ${us(shown.p999)}, max ${us(shown.max)} of ${countText(device.loop.ticks)} ticks; ${countText(device.loop.overruns)} overruns, ${countText(device.loop.dropped_reports)} reports dropped`,
+      `p50 ≤ ${us(shown.p50)}, p99 ≤ ${us(shown.p99)}, p99.9 ≤ ${us(shown.p999)}, max ${us(shown.max)} of ${countText(device.loop.ticks)} ticks; ${countText(device.loop.overruns)} overruns, ${countText(device.loop.dropped_reports)} reports dropped`,
     );
   }
 
@@ -114,3 +198,11 @@ export class LivePlots {
 }
 
 const us = (value: number): string => `${value < 10 ? value.toFixed(1) : value.toFixed(0)} µs`;
+
+function save(blob: Blob, extension: string): void {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = `hapticd-${new Date().toISOString().slice(0, 19).replaceAll(":", "")}.${extension}`;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}

@@ -1,5 +1,5 @@
 // The page: creates all parts and connects them.
-import { Box3, Matrix4, Vector3 } from "three";
+import { Box3, Matrix4, Ray, Vector3 } from "three";
 import "uplot/dist/uPlot.min.css";
 import "./viewer.css";
 import { DropMesh } from "./drop_mesh";
@@ -12,13 +12,17 @@ import { byId, setText } from "./panels/dom";
 import { EffectsPanel } from "./panels/effects";
 import { GuardPanel } from "./panels/guard";
 import { ObjectsPanel } from "./panels/objects";
+import { ReplayBar } from "./panels/replay";
+import { SourcesPanel } from "./panels/sources";
 import { css } from "./plots/plot";
 import { type Quantity, rampCss, rangeOf } from "./scene3d/colours";
 import { View } from "./scene3d/view";
 import { REFUSAL, TRIPS } from "./server_tables";
 import { Meshes, pollState } from "./state";
 import type { DeviceState, ObjectState, SceneState, ServerState } from "./state_types";
+import { effectNames, feltForces, nameOfObject, type RemoteContact } from "./sources";
 import { startTheme } from "./theme";
+import { bindToken, credentials } from "./token";
 import * as wire from "./wire";
 
 const REPORTS_HZ = 125;
@@ -37,6 +41,11 @@ class Page {
   private scene: SceneState | undefined;
   private tick: wire.Tick | undefined;
   private contacts: wire.Contact[] = [];
+  private remote: RemoteContact[] = [];
+  private marked = 0;
+  private recording = false;
+  /** When each trip acted last. */
+  private readonly tripAt_ms = new Map<string, number>();
   private tickIsNew = false;
   private readoutAt_ms = 0;
   private serverResponds = true;
@@ -47,6 +56,7 @@ class Page {
   private readonly link = new Link(
     () => this.onLinkState(),
     (message, age_s) => this.onMessage(message, age_s),
+    credentials,
   );
   private readonly plots = new LivePlots();
   private readonly hand = new Hand(
@@ -67,7 +77,13 @@ class Page {
   });
   private readonly guard = new GuardPanel(byId("guard"));
   private readonly clients = new ClientsPanel(byId("clients"));
-  private readonly objectsPanel = new ObjectsPanel(byId("objects"), (...m) => this.send(...m));
+  private readonly objectsPanel = new ObjectsPanel(
+    byId("objects"),
+    (...m) => this.send(...m),
+    (id) => this.view.objects.centreOf(id),
+  );
+  private readonly sourcesPanel = new SourcesPanel(byId("sources"), (...m) => this.send(...m));
+  private readonly replay = new ReplayBar((...m) => this.send(...m));
   private readonly effects = new EffectsPanel(byId("effects"), (...m) => this.send(...m));
   private readonly deviceChoice = byId<HTMLSelectElement>("device");
   private readonly quantity = byId<HTMLSelectElement>("quantity");
@@ -88,9 +104,19 @@ class Page {
   private bindControls(): void {
     byId("stop").addEventListener("click", () => this.stop());
     byId("rearm").addEventListener("click", () => this.send(wire.rearmForces()));
+    bindToken((...m) => this.send(...m));
     byId("home").addEventListener("click", () => this.view.home());
     byId("let-go").addEventListener("click", () => this.hand.letGo());
     this.quantity.addEventListener("change", () => this.showObjects());
+    byId<HTMLInputElement>("arrows").addEventListener("change", (e) => {
+      this.view.sources.arrows = (e.target as HTMLInputElement).checked;
+      this.tickIsNew = true;
+    });
+    byId("record").addEventListener("click", () => this.send(wire.recordingControl(!this.recording)));
+    byId("mark").addEventListener("submit", (e) => {
+      e.preventDefault();
+      this.mark();
+    });
     this.deviceChoice.addEventListener("change", () => this.chooseDevice(this.deviceChoice.value));
     byId("drag-is").addEventListener("change", (e) => this.chooseDrag((e.target as HTMLInputElement).value));
     window.addEventListener("keydown", (e) => this.key(e), { capture: true });
@@ -98,8 +124,17 @@ class Page {
 
   private key(e: KeyboardEvent): void {
     if (e.key === "Escape") return this.stop();
-    const typing = e.target instanceof HTMLElement && e.target.matches("input[type=number], select");
-    if (!typing && e.key.toLowerCase() === "l" && !e.ctrlKey && !e.metaKey && !e.altKey) this.hand.letGo();
+    const typing =
+      e.target instanceof HTMLElement && e.target.matches("input[type=number], input[type=text], input[type=password], select");
+    if (typing || e.ctrlKey || e.metaKey || e.altKey) return;
+    if (e.key.toLowerCase() === "l") this.hand.letGo();
+    if (e.key.toLowerCase() === "m") this.mark();
+  }
+
+  /** Marks the moment, in the recording and for all clients. */
+  private mark(): void {
+    const input = byId<HTMLInputElement>("mark-text");
+    this.send(wire.mark(input.value.trim() || `mark ${++this.marked}`));
   }
 
   private stop(): void {
@@ -128,6 +163,7 @@ class Page {
       normal: css("--normal"),
       box: css("--box"),
     });
+    this.view.sources.setColours(css("--source"), css("--second"));
     this.plots.restyle();
   }
 
@@ -150,21 +186,28 @@ class Page {
 
   private show(device: DeviceState, state: ServerState): void {
     this.view.setDevice(device);
-    this.guard.update(device);
+    this.guard.update(device, this.recentTrips());
     this.clients.update(state.clients);
     this.effects.update(this.scene?.effects ?? []);
     this.plots.state(device, performance.now() / 1000);
+    this.sourcesPanel.update(this.scene, this.remote);
+    if (this.view.sources.update(this.scene)) this.view.invalidate();
     this.meshes.update(device.scene, this.objects());
     this.showObjects();
     this.drop.update(this.objects());
     this.showArmed(device.guard.stopped, device.guard.latched.length > 0);
     this.showHand();
     const { server } = state;
-    byId("recording").hidden = server.recording === null;
+    this.replay.update(server.replay);
+    if (server.replay && this.hand.enabled) this.chooseDrag("camera");
+    this.recording = server.recording !== null;
+    byId("record").setAttribute("aria-pressed", String(this.recording));
+    setText(byId("record"), this.recording ? "End recording" : "Record");
+    byId("recording").hidden = !this.recording;
     setText(byId("recording"), `● ${server.recording ?? ""}`);
     setText(
       byId("about"),
-      `hapticd ${server.version}, ${device.driver} at ${device.rate_Hz} Hz${device.realtime ? "" : ", not realtime"}, running for ${durationText(server.uptime_s)}`,
+      `hapticd ${server.version}, ${server.replay ? `replays ${server.replay.file}` : `${device.driver} at ${device.rate_Hz} Hz${device.realtime ? "" : ", not realtime"}`}, running for ${durationText(server.uptime_s)}`,
     );
   }
 
@@ -174,15 +217,21 @@ class Page {
 
   private showObjects(): void {
     const quantity = this.quantity.value as Quantity;
-    this.view.objects.update(this.objects(), quantity);
+    if (this.view.objects.update(this.objects(), quantity)) this.view.invalidate();
     this.objectsPanel.update(this.objects(), this.tick?.object ?? -1);
+    byId("legend-scale").hidden = quantity === "object";
     setText(byId("legend-to"), quantity === "stiffness" ? `${rangeOf(this.objects(), quantity)} N/m` : "1");
-    this.view.invalidate();
   }
 
   private setMesh(change: () => void): void {
     change();
     this.showObjects();
+    this.view.invalidate();
+  }
+
+  private recentTrips(): string[] {
+    const since = performance.now() - 1000;
+    return [...this.tripAt_ms].filter(([, at]) => at > since).map(([name]) => name);
   }
 
   private showDevices(devices: DeviceState[]): void {
@@ -196,6 +245,7 @@ class Page {
     this.hand.letGo();
     this.link.use(name);
     this.meshes.clear();
+    this.sourcesPanel.clear();
     this.tick = undefined;
     this.subscribe();
   }
@@ -233,12 +283,15 @@ class Page {
     this.tickIsNew = false;
     for (const id of ["force", "depth", "touching"]) setText(byId(id), "–");
     this.guard.lost();
+    this.plots.lost();
     this.showHeld("NO CONNECTION");
     this.showHand();
   }
 
   private subscribe(): void {
-    this.link.send(wire.subscribe(wire.REPORT_TICK | wire.REPORT_CONTACTS | wire.REPORT_BUTTON, REPORTS_HZ));
+    const kinds =
+      wire.REPORT_TICK | wire.REPORT_CONTACTS | wire.REPORT_BUTTON | wire.REPORT_HAND | wire.REPORT_POSES;
+    this.link.send(wire.subscribe(kinds, REPORTS_HZ));
   }
 
   private onMessage(message: wire.Incoming, age_s: number): void {
@@ -249,6 +302,17 @@ class Page {
       case wire.CONTACTS:
         this.contacts = wire.decodeContacts(message.payload);
         return;
+      case wire.HAND_STATE:
+        this.remote = wire.decodeRemoteContacts(message.payload);
+        return;
+      case wire.POSES: // of the tick that follows, so that force and cause are drawn at one time
+        if (this.view.objects.place(wire.decodePoses(message.payload), performance.now())) this.view.moved();
+        return;
+      case wire.MARKER: {
+        const { time, text } = wire.decodeMarker(message.payload);
+        this.plots.marker(time / 1e9, text);
+        return toast(`Marked: ${text}`, 0);
+      }
       case wire.GUARD_STATE: {
         const guard = wire.decodeGuardState(message.payload);
         return this.showArmed(guard.stopped, guard.latched !== 0);
@@ -261,6 +325,8 @@ class Page {
   private onTick(tick: wire.Tick, age_s: number): void {
     this.tick = tick;
     this.tickIsNew = true;
+    for (const [name, trip] of Object.entries(TRIPS))
+      if ((tick.guardActive & (1 << trip.bit)) !== 0) this.tripAt_ms.set(name, performance.now());
     this.plots.tick(tick, Math.hypot(...tick.force_N), this.depth_mm(tick), age_s * 1000);
   }
 
@@ -341,9 +407,14 @@ class Page {
     if (this.tick && this.tickIsNew) {
       this.tickIsNew = false;
       const contacts = this.tick.object < 0 && this.tick.depth === 0 ? [] : this.contacts;
-      this.view.markers.update(this.tick, contacts);
-      this.view.objects.touch(this.tick.object);
-      this.view.invalidate();
+      const { markers, objects, sources } = this.view;
+      markers.update(this.tick, contacts);
+      const scale = this.device?.world_per_reported ?? 1000;
+      sources.tick(this.tick, contacts, this.remote, this.scene, scale, markers.perNewton);
+      const hip = markers.world(this.tick.hand);
+      markers.setShadow(objects.surface(new Ray(hip, markers.down)));
+      if (objects.touch(this.tick.object)) this.view.invalidate();
+      this.view.invalidateLive();
       if (time_ms - this.readoutAt_ms > READOUT_MS) this.readout(this.tick, time_ms);
     }
     this.view.draw();
@@ -362,19 +433,18 @@ class Page {
   // Everything that may push: objects, planes, and what needs no surface.
   private touchingText(tick: wire.Tick): string {
     const { scene } = this;
-    const names: string[] = [];
     const inContact = tick.object >= 0 || tick.depth > 0;
     const touched = new Set(inContact ? this.contacts.map((c) => c.object) : []);
     if (inContact) touched.add(tick.object);
-    for (const object of [...touched].sort((a, b) => a - b)) {
-      if (object >= 0) names.push(`object ${object}`);
-      else names.push(scene?.planes.length === 1 ? `plane ${scene.planes[0]!.index}` : "a plane");
-    }
-    if (Math.hypot(...tick.force_N) > 0) {
-      for (const e of scene?.effects ?? []) if (e.active) names.push(`effect ${e.index} (${e.type})`);
-      if (scene?.constraint) names.push(`constraint (${scene.constraint.mode})`);
-      if ((scene?.fields ?? 0) > 0 && !scene?.constraint) names.push("force field");
-    }
+    const names = [...touched].sort((a, b) => a - b).map((id) => {
+      if (id >= 0) return nameOfObject(scene, id);
+      return scene?.planes.length === 1 ? `plane ${scene.planes[0]!.index}` : "a plane";
+    });
+    const scale = this.device?.world_per_reported ?? 1000;
+    // What needs no surface, as far as it pushes here; effects have no report of their own.
+    for (const { name } of feltForces({ ...tick, object: -1, depth: 0 }, [], this.remote, scene, scale))
+      if (!name.startsWith("effect")) names.push(name);
+    if (Math.hypot(...tick.force_N) > 0) names.push(...effectNames(scene));
     return names.join(", ") || "nothing";
   }
 }

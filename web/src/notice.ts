@@ -39,7 +39,7 @@ export function showNotice(notice: Notice): void {
 export function toast(text: string, severity: number): void {
   const box = byId("toasts");
   for (const old of [...box.children]) if (old.textContent === text) old.remove();
-  const item = el("div", { data: { level: severity >= 2 ? "bad" : "warn" } }, text);
+  const item = el("div", { data: { level: severity >= 2 ? "bad" : severity >= 1 ? "warn" : "" } }, text);
   box.append(item);
   while (box.children.length > MAX_TOASTS) box.firstElementChild!.remove();
   setTimeout(() => item.remove(), TOAST_MS);

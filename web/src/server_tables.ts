@@ -124,4 +124,6 @@ export const REFUSAL = {
   handPoseInvalid: 4,
   streamedByOther: 5,
   streamInvalid: 6,
+  stoppedByOther: 7,
+  tokenRefused: 8,
 } as const;

@@ -38,20 +38,26 @@ export interface ClientState {
   id: number;
   address: string;
   mode: string;
+  role: string;
   devices: string[];
   connected_s: number;
   rate_Hz: number;
   bytes_in: number;
   bytes_out: number;
   dropped: number;
+  ignored_datagrams: number;
   queued_bytes: number;
   commands: boolean;
 }
 
 export interface ObjectState {
   id: number;
+  /** A file, as a rule; may be empty. */
+  name: string;
   parent: number;
   touchable: boolean;
+  /** Of one unit of the object: setTransformMatrix() takes its translation in these. */
+  world_units: number;
   vertices: number;
   triangles: number;
   geometry: number;
@@ -74,6 +80,49 @@ export interface EffectState {
   gain: number;
   duration_ms: number;
   frequency_Hz: number;
+  position: number[];
+  direction: number[];
+}
+
+export interface PlaneState {
+  index: number;
+  plane: number[];
+  stiffness_N_per_m: number;
+  damping_Ns_per_m: number;
+  static_friction: number;
+  dynamic_friction: number;
+}
+
+/** World units. */
+export interface FieldState {
+  origin: number[];
+  force_N: number[];
+  /** Row by row. */
+  jacobian_N_per_unit: number[];
+  /** null: everywhere. */
+  radius: number | null;
+}
+
+export interface ConstraintState {
+  mode: string;
+  point: number[];
+  direction: number[];
+  stiffness_N_per_m: number;
+}
+
+/** A replayed recording; times in seconds since its first event. */
+export interface ReplayState {
+  file: string;
+  position_s: number;
+  speed: number;
+  paused: boolean;
+  ended: boolean;
+  loop: boolean;
+  /** null while the server reads the file. */
+  duration_s: number | null;
+  contacts: [from_s: number, to_s: number][];
+  trips: [at_s: number, name: string][];
+  markers: [at_s: number, text: string][];
 }
 
 export interface SceneState {
@@ -81,13 +130,13 @@ export interface SceneState {
   revision: number;
   objects: ObjectState[];
   effects: EffectState[];
-  planes: { index: number; plane: number[]; stiffness_N_per_m: number }[];
-  constraint: { mode: string } | null;
-  fields: number;
+  planes: PlaneState[];
+  constraint: ConstraintState | null;
+  fields: FieldState[];
 }
 
 export interface ServerState {
-  server: { version: string; uptime_s: number; recording: string | null };
+  server: { version: string; uptime_s: number; recording: string | null; replay: ReplayState | null };
   devices: DeviceState[];
   clients: ClientState[];
   scenes: SceneState[];

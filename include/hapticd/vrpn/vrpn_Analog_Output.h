@@ -19,7 +19,7 @@ class vrpn_Analog_Output_Remote : public vrpn_Analog_Output {
  public:
   vrpn_Analog_Output_Remote(const char* name, vrpn_Connection* connection = NULL)
       : vrpn_Analog_Output(name, connection) {
-    listen("vrpn_Analog_Output Num_Channels_report", handleNumber);
+    listen("vrpn_Analog_Output Num_Channels_report", handleNumber, this);
   }
 
   virtual void mainloop() { client_mainloop(); }

@@ -15,6 +15,7 @@ typedef enum { vrpn_TEXT_NORMAL = 0, vrpn_TEXT_WARNING = 1, vrpn_TEXT_ERROR = 2 
 const unsigned vrpn_MAX_TEXT_LEN = 1024;
 
 class vrpn_BaseClass;
+class vrpn_BaseClassUnique;
 
 /// Prints the text messages of all devices to standard output.
 class VRPN_API vrpn_TextPrinter {
@@ -26,31 +27,30 @@ class VRPN_API vrpn_TextPrinter {
   void remove_object(vrpn_BaseClass* device);
 
  private:
-  friend class vrpn_BaseClass;
-  void print(const vrpn_BaseClass* device, const vrpn_HANDLERPARAM& p) const;
+  friend class vrpn_BaseClassUnique;
+  void print(const vrpn_BaseClassUnique* device, const vrpn_HANDLERPARAM& p) const;
 
-  std::vector<vrpn_BaseClass*> devices_;
+  std::vector<vrpn_BaseClassUnique*> devices_;
   FILE* stream_ = stdout;
   vrpn_TEXT_SEVERITY severity_ = vrpn_TEXT_WARNING;
   vrpn_uint32 level_ = 0;
 };
 extern VRPN_API vrpn_TextPrinter& vrpn_System_TextPrinter;
 
-class VRPN_API vrpn_BaseClass {
+/// What a device has once, however many device classes it is made of: name, connection, texts and pings.
+class VRPN_API vrpn_BaseClassUnique {
  public:
-  /// Opens NAME@server, or the device NAME of the given connection.
-  vrpn_BaseClass(const char* name, vrpn_Connection* connection = NULL);
-  virtual ~vrpn_BaseClass();
-  vrpn_BaseClass(const vrpn_BaseClass&) = delete;
-  vrpn_BaseClass& operator=(const vrpn_BaseClass&) = delete;
+  vrpn_BaseClassUnique() {}
+  virtual ~vrpn_BaseClassUnique();
+  vrpn_BaseClassUnique(const vrpn_BaseClassUnique&) = delete;
+  vrpn_BaseClassUnique& operator=(const vrpn_BaseClassUnique&) = delete;
 
   vrpn_Connection* connectionPtr() { return d_connection; }
-  virtual void mainloop() = 0;
 
   /// A text message of one severity: what send_text_message(severity) returns.
   class SendTextMessageBoundCall {
    public:
-    SendTextMessageBoundCall(vrpn_BaseClass* device, vrpn_TEXT_SEVERITY severity)
+    SendTextMessageBoundCall(vrpn_BaseClassUnique* device, vrpn_TEXT_SEVERITY severity)
         : device_(device), severity_(severity) {}
     int operator()(const char* text) const {
       struct timeval now;
@@ -59,7 +59,7 @@ class VRPN_API vrpn_BaseClass {
     }
 
    private:
-    vrpn_BaseClass* device_;
+    vrpn_BaseClassUnique* device_;
     vrpn_TEXT_SEVERITY severity_;
   };
 
@@ -69,18 +69,11 @@ class VRPN_API vrpn_BaseClass {
  protected:
   friend class vrpn_TextPrinter;
 
-  // For derived device classes: init() calls both.
-  virtual int init();
-  virtual int register_senders() { return 0; }
-  virtual int register_types() { return 0; }
-
   int register_autodeleted_handler(vrpn_int32 type, vrpn_MESSAGEHANDLER handler, void* userdata,
                                    vrpn_int32 sender = vrpn_ANY_SENDER);
-  /// The same for a message of this device, by the name of the message.
-  void listen(const char* type, vrpn_MESSAGEHANDLER handler);
   int send_text_message(const char* text, struct timeval time, vrpn_TEXT_SEVERITY severity = vrpn_TEXT_NORMAL,
                         vrpn_uint32 level = 0);
-  SendTextMessageBoundCall send_text_message(vrpn_TEXT_SEVERITY severity) {
+  SendTextMessageBoundCall send_text_message(vrpn_TEXT_SEVERITY severity = vrpn_TEXT_NORMAL) {
     return SendTextMessageBoundCall(this, severity);
   }
   /// The payload of a text message: 2 * 4 + vrpn_MAX_TEXT_LEN bytes.
@@ -99,30 +92,56 @@ class VRPN_API vrpn_BaseClass {
     vrpn_unbuffer(&buffer, level);
     return vrpn_unbuffer(&buffer, text, -static_cast<vrpn_int32>(vrpn_MAX_TEXT_LEN));
   }
-  /// Runs the connection, and prints a warning while the device does not answer.
+  /// For the mainloop() of a server's device: from the first call on, pings of clients are answered. The
+  /// program itself runs the connection.
+  void server_mainloop();
+  /// For the mainloop() of a client's device: runs the connection, and prints a warning while the device does
+  /// not answer.
   void client_mainloop();
 
-  vrpn_Connection* d_connection;
-  char* d_servicename;
+  vrpn_Connection* d_connection = NULL;
+  char* d_servicename = NULL;
   vrpn_int32 d_sender_id = -1;
   vrpn_int32 d_text_message_id = -1;
   vrpn_int32 d_ping_message_id = -1;
   vrpn_int32 d_pong_message_id = -1;
 
  private:
+  friend class vrpn_BaseClass;
   struct Registered {
     vrpn_int32 type;
     vrpn_MESSAGEHANDLER handler;
     void* userdata;
     vrpn_int32 sender;
   };
+  void open(const char* name, vrpn_Connection* connection);
   static int VRPN_CALLBACK handleText(void* self, vrpn_HANDLERPARAM p);
+  static int VRPN_CALLBACK handlePing(void* self, vrpn_HANDLERPARAM p);
 
   std::vector<Registered> registered_;
   struct timeval silentSince_ = {};
   int warned_s_ = 0;
+  bool serves_ = false;
 };
-typedef vrpn_BaseClass vrpn_BaseClassUnique;
+
+/// The base of each device class. A device made of several classes has one name and one connection.
+class VRPN_API vrpn_BaseClass : public virtual vrpn_BaseClassUnique {
+ public:
+  /// Opens NAME@server, or the device NAME of the given connection.
+  vrpn_BaseClass(const char* name, vrpn_Connection* connection = NULL);
+  virtual ~vrpn_BaseClass();
+
+  virtual void mainloop() = 0;
+
+ protected:
+  // For derived device classes: init() calls both.
+  virtual int init();
+  virtual int register_senders() { return 0; }
+  virtual int register_types() { return 0; }
+
+  /// Registers a handler for a message of this device, by the name of the message; `self` is its userdata.
+  void listen(const char* type, vrpn_MESSAGEHANDLER handler, void* self);
+};
 
 /// Handlers of one kind of report. A running handler may unregister itself and others.
 template <class Report>

@@ -19,8 +19,12 @@
 namespace hapticd {
 namespace client {
 class Link;
+class ServerLink;
 struct Arrival;
 }  // namespace client
+namespace wire {
+class LocalNames;
+}  // namespace wire
 }  // namespace hapticd
 
 struct vrpn_HANDLERPARAM {
@@ -67,6 +71,7 @@ extern VRPN_API const char* vrpn_dropped_last_connection;
 extern VRPN_API const char* vrpn_CONTROL;
 
 class vrpn_File_Connection;
+class vrpn_TranslationTable;  // VRPN's own, never used here
 
 class VRPN_API vrpn_Connection {
  public:
@@ -98,9 +103,9 @@ class VRPN_API vrpn_Connection {
   virtual const char* sender_name(vrpn_int32 sender);
   virtual const char* message_type_name(vrpn_int32 type);
 
-  /// A client accepts nobody, and this library reads and writes no logs, so these do nothing.
+  /// This library reads and writes no logs and limits no messages, so these do nothing.
   void Jane_stop_this_crazy_thing(vrpn_uint32) {}
-  vrpn_File_Connection* get_File_Connection() { return NULL; }
+  virtual vrpn_File_Connection* get_File_Connection() { return NULL; }
   int register_log_filter(vrpn_LOGFILTER, void*) { return 0; }
   int save_log_so_far() { return 0; }
 
@@ -109,11 +114,20 @@ class VRPN_API vrpn_Connection {
   /// Whether the connection is deleted with its last reference.
   void setAutoDeleteStatus(bool value) { autoDelete_ = value; }
 
-  // Not in VRPN: for the remote devices of this library.
+  // Not in VRPN: for the devices of this library.
   hapticd::client::Link* link() { return link_.get(); }
+  /// Serves at this address (NULL: every one of this machine); port 0 lets the system choose one, a negative
+  /// one serves this program only. Throws hapticd's errors of the network.
+  vrpn_Connection(const char* address, int port);
+  /// The port that is served; 0 for the connection of a client.
+  int servedPort() const;
   vrpn_int32 registerDevice(const char* name);
   /// Whether anything arrived from this sender on the present connection.
   bool heard(vrpn_int32 sender) const;
+
+ protected:
+  /// Calls the handlers of a message.
+  void callHandlers(const vrpn_HANDLERPARAM& p);
 
  private:
   struct Handler {
@@ -122,17 +136,45 @@ class VRPN_API vrpn_Connection {
     vrpn_MESSAGEHANDLER function;  // NULL: unregistered while handlers are called
     void* userdata;
   };
+  const hapticd::wire::LocalNames* names() const;
   void dispatch(const hapticd::client::Arrival& arrival);
-  void callHandlers(const vrpn_HANDLERPARAM& p);
   void callControlHandlers(const char* type);
 
   std::string name_;
-  std::unique_ptr<hapticd::client::Link> link_;
+  std::unique_ptr<hapticd::client::Link> link_;          // of a client, or
+  std::unique_ptr<hapticd::client::ServerLink> served_;  // of a server
+  int clients_ = 0;  // whose connection was reported to handlers; a client counts its server
   std::vector<Handler> handlers_;
   struct timeval opened_;
   int references_ = 0;
   int calling_ = 0;
   bool autoDelete_ = false;
+};
+
+/// A connection that serves the devices of this program: on a port of this machine, or at [address][:port];
+/// "loopback:" serves this program only. NULL, with an error on stderr, when the port is taken. The caller
+/// holds a reference. This library writes no log files.
+VRPN_API vrpn_Connection* vrpn_create_server_connection(int port = vrpn_DEFAULT_LISTEN_PORT_NO,
+                                                        const char* local_in_logfile = NULL,
+                                                        const char* local_out_logfile = NULL,
+                                                        const char* NIC_address = NULL);
+VRPN_API vrpn_Connection* vrpn_create_server_connection(const char* name, const char* local_in_logfile = NULL,
+                                                        const char* local_out_logfile = NULL);
+
+/// VRPN's names for connections of one kind; here all are vrpn_Connection.
+typedef vrpn_Connection vrpn_Connection_IP;
+typedef vrpn_Connection vrpn_Connection_Loopback;
+
+/// The connections of this program.
+class VRPN_API vrpn_ConnectionManager {
+ public:
+  static vrpn_ConnectionManager& instance();
+  /// The connection to a server by the name that opened it, without NAME@; NULL when there is none. Does not
+  /// open one and adds no reference.
+  vrpn_Connection* getByName(const char* name);
+
+ private:
+  vrpn_ConnectionManager() {}
 };
 
 /// The connection to a server (the part of the name behind the last @), opened unless it is open. This

@@ -61,7 +61,12 @@ typedef void(VRPN_CALLBACK* vrpn_ANGLEHANDLER)(void* userdata, const vrpn_ANGLEC
 /// Surface, force field and custom effect of the device, as set before they are sent.
 class VRPN_API vrpn_ForceDevice : public vrpn_BaseClass {
  public:
-  vrpn_ForceDevice(const char* name, vrpn_Connection* connection = NULL) : vrpn_BaseClass(name, connection) {}
+  vrpn_ForceDevice(const char* name, vrpn_Connection* connection = NULL);
+
+  void print_report();
+  void print_plane();
+  /// For servers: reports a fault, one of the FD_ codes.
+  void sendError(int code);
 
   enum ConstraintGeometry { NO_CONSTRAINT, POINT_CONSTRAINT, LINE_CONSTRAINT, PLANE_CONSTRAINT };
 
@@ -91,6 +96,73 @@ class VRPN_API vrpn_ForceDevice : public vrpn_BaseClass {
   int connectionAvailable() { return d_connection != NULL; }
 
  protected:
+  virtual int register_types();
+
+  // For servers. The caller releases an encoded payload by delete[]; decoding returns -1 for a damaged one.
+  static char* encode_force(vrpn_int32& length, const vrpn_float64* force_N);
+  static char* encode_scp(vrpn_int32& length, const vrpn_float64* position, const vrpn_float64* quaternion);
+  static char* encode_error(vrpn_int32& length, vrpn_int32 code);
+  static vrpn_int32 decode_force(const char* buffer, vrpn_int32 length, vrpn_float64* force_N);
+  static vrpn_int32 decode_scp(const char* buffer, vrpn_int32 length, vrpn_float64* position,
+                               vrpn_float64* quaternion);
+  static vrpn_int32 decode_error(const char* buffer, vrpn_int32 length, vrpn_int32* code);
+  static vrpn_int32 decode_plane(const char* buffer, vrpn_int32 length, vrpn_float32* plane,
+                                 vrpn_float32* kspring, vrpn_float32* kdamp, vrpn_float32* fdyn,
+                                 vrpn_float32* fstat, vrpn_int32* index, vrpn_int32* recovery_cycles);
+  static vrpn_int32 decode_surface_effects(const char* buffer, vrpn_int32 length,
+                                           vrpn_float32* adhesion_normal, vrpn_float32* adhesion_lateral,
+                                           vrpn_float32* texture_amplitude, vrpn_float32* texture_wavelength,
+                                           vrpn_float32* buzz_amplitude, vrpn_float32* buzz_frequency);
+  static vrpn_int32 decode_forcefield(const char* buffer, vrpn_int32 length, vrpn_float32 origin[3],
+                                      vrpn_float32 force[3], vrpn_float32 jacobian[3][3],
+                                      vrpn_float32* radius);
+  /// *parameters must be allocated by new[] or NULL; it is replaced.
+  static vrpn_int32 decode_custom_effect(const char* buffer, vrpn_int32 length, vrpn_uint32* effect,
+                                         vrpn_float32** parameters, vrpn_uint32* count);
+
+  vrpn_int32 force_message_id = -1;
+  vrpn_int32 scp_message_id = -1;
+  vrpn_int32 error_message_id = -1;
+  vrpn_int32 plane_message_id = -1;
+  vrpn_int32 plane_effects_message_id = -1;
+  vrpn_int32 forcefield_message_id = -1;
+  vrpn_int32 custom_effect_message_id = -1;
+  vrpn_int32 addObject_message_id = -1;
+  vrpn_int32 addObjectExScene_message_id = -1;
+  vrpn_int32 moveToParent_message_id = -1;
+  vrpn_int32 setObjectPosition_message_id = -1;
+  vrpn_int32 setObjectOrientation_message_id = -1;
+  vrpn_int32 setObjectScale_message_id = -1;
+  vrpn_int32 removeObject_message_id = -1;
+  vrpn_int32 setVertex_message_id = -1;
+  vrpn_int32 setNormal_message_id = -1;
+  vrpn_int32 setTriangle_message_id = -1;
+  vrpn_int32 removeTriangle_message_id = -1;
+  vrpn_int32 updateTrimeshChanges_message_id = -1;
+  vrpn_int32 transformTrimesh_message_id = -1;
+  vrpn_int32 setTrimeshType_message_id = -1;
+  vrpn_int32 clearTrimesh_message_id = -1;
+  vrpn_int32 setHapticOrigin_message_id = -1;
+  vrpn_int32 setHapticScale_message_id = -1;
+  vrpn_int32 setSceneOrigin_message_id = -1;
+  vrpn_int32 getNewObjectID_message_id = -1;
+  vrpn_int32 setObjectIsTouchable_message_id = -1;
+  vrpn_int32 enableConstraint_message_id = -1;
+  vrpn_int32 setConstraintMode_message_id = -1;
+  vrpn_int32 setConstraintPoint_message_id = -1;
+  vrpn_int32 setConstraintLinePoint_message_id = -1;
+  vrpn_int32 setConstraintLineDirection_message_id = -1;
+  vrpn_int32 setConstraintPlanePoint_message_id = -1;
+  vrpn_int32 setConstraintPlaneNormal_message_id = -1;
+  vrpn_int32 setConstraintKSpring_message_id = -1;
+
+  struct timeval timestamp = {};
+  vrpn_int32 errorCode = FD_OK;
+  // The last report, N and m.
+  vrpn_float64 force[3] = {};
+  vrpn_float64 scp_pos[3] = {};
+  vrpn_float64 scp_quat[4] = {0, 0, 0, 1};
+
   vrpn_int32 which_plane = 0;
   vrpn_float32 plane[4] = {};
   vrpn_float32 ff_origin[3] = {};
@@ -177,7 +249,7 @@ class VRPN_API vrpn_ForceDevice_Remote : public vrpn_ForceDevice {
   void setConstraintPlanePoint(vrpn_float32 point[3]);
   void setConstraintPlaneNormal(vrpn_float32 normal[3]);
   void setConstraintKSpring(vrpn_float32 k);
-  void sendForceField(vrpn_float32 origin[3], vrpn_float32 force[3], vrpn_float32 jacobian[3][3],
+  void sendForceField(vrpn_float32 origin[3], vrpn_float32 strength[3], vrpn_float32 jacobian[3][3],
                       vrpn_float32 radius);
   void sendForceField();
   void stopForceField();

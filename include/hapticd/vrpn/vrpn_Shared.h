@@ -10,6 +10,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "vrpn_Thread.h"
 #include "vrpn_Types.h"
 
 #define VRPN_PI (3.14159265358979323846)
@@ -109,6 +110,18 @@ inline vrpn_float64 vrpn_htond(vrpn_float64 value) {
 }
 inline vrpn_float64 vrpn_ntohd(vrpn_float64 value) {
   return vrpn_htond(value);
+}
+
+/// Whether packing and unpacking work on this machine.
+inline bool vrpn_test_pack_unpack() {
+  char bytes[sizeof(vrpn_float64)];
+  char* end = bytes;
+  vrpn_int32 left = sizeof bytes;
+  vrpn_buffer(&end, &left, static_cast<vrpn_float64>(-1.5));
+  const char* begin = bytes;
+  vrpn_float64 value = 0;
+  vrpn_unbuffer(&begin, &value);
+  return bytes[0] == static_cast<char>(0xBF) && value == -1.5 && vrpn_ntohd(vrpn_htond(value)) == value;
 }
 
 /// Copies at most size - 1 characters; terminated by a NUL unless size is 0.

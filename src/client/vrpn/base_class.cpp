@@ -1,6 +1,7 @@
 #include "hapticd/vrpn/vrpn_BaseClass.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "client/vrpn/messages.h"
 #include "hapticd/vrpn/vrpn_Text.h"
@@ -38,8 +39,8 @@ void vrpn_TextPrinter::remove_object(vrpn_BaseClass* device) {
 }
 
 // Several devices of one name receive the same text: the first of them prints it.
-void vrpn_TextPrinter::print(const vrpn_BaseClass* device, const vrpn_HANDLERPARAM& p) const {
-  const auto first = std::find_if(devices_.begin(), devices_.end(), [&](const vrpn_BaseClass* d) {
+void vrpn_TextPrinter::print(const vrpn_BaseClassUnique* device, const vrpn_HANDLERPARAM& p) const {
+  const auto first = std::find_if(devices_.begin(), devices_.end(), [&](const vrpn_BaseClassUnique* d) {
     return d->d_connection == device->d_connection && d->d_sender_id == device->d_sender_id;
   });
   if (!stream_ || first == devices_.end() || *first != device) return;
@@ -52,8 +53,10 @@ void vrpn_TextPrinter::print(const vrpn_BaseClass* device, const vrpn_HANDLERPAR
   });
 }
 
-vrpn_BaseClass::vrpn_BaseClass(const char* name, vrpn_Connection* connection)
-    : d_connection(connection), d_servicename(vrpn_copy_service_name(name)) {
+void vrpn_BaseClassUnique::open(const char* name, vrpn_Connection* connection) {
+  if (d_servicename) return;  // by another class of this device
+  d_servicename = vrpn_copy_service_name(name);
+  d_connection = connection;
   if (d_connection) {
     d_connection->addReference();
   } else {
@@ -65,12 +68,12 @@ vrpn_BaseClass::vrpn_BaseClass(const char* name, vrpn_Connection* connection)
   d_text_message_id = d_connection->register_message_type("vrpn_Base text_message");
   d_ping_message_id = d_connection->register_message_type("vrpn_Base ping_message");
   d_pong_message_id = d_connection->register_message_type("vrpn_Base pong_message");
-  systemPrinter().add_object(this);
-  listen("vrpn_Base text_message", handleText);
+  systemPrinter().devices_.push_back(this);
+  register_autodeleted_handler(d_text_message_id, handleText, this, d_sender_id);
 }
 
-vrpn_BaseClass::~vrpn_BaseClass() {
-  systemPrinter().remove_object(this);
+vrpn_BaseClassUnique::~vrpn_BaseClassUnique() {
+  std::erase(systemPrinter().devices_, this);
   if (d_connection) {
     for (const Registered& r : registered_)
       d_connection->unregister_handler(r.type, r.handler, r.userdata, r.sender);
@@ -79,35 +82,37 @@ vrpn_BaseClass::~vrpn_BaseClass() {
   delete[] d_servicename;
 }
 
-int vrpn_BaseClass::init() {
-  return register_senders() == 0 && register_types() == 0 ? 0 : -1;
-}
-
-int vrpn_BaseClass::handleText(void* self, vrpn_HANDLERPARAM p) {
-  systemPrinter().print(static_cast<vrpn_BaseClass*>(self), p);
+int vrpn_BaseClassUnique::handleText(void* self, vrpn_HANDLERPARAM p) {
+  systemPrinter().print(static_cast<vrpn_BaseClassUnique*>(self), p);
   return 0;
 }
 
-int vrpn_BaseClass::register_autodeleted_handler(vrpn_int32 type, vrpn_MESSAGEHANDLER handler, void* userdata,
-                                                 vrpn_int32 sender) {
+int vrpn_BaseClassUnique::handlePing(void* self, vrpn_HANDLERPARAM) {
+  const auto* device = static_cast<vrpn_BaseClassUnique*>(self);
+  sendMessage(device->d_connection, device->d_sender_id, wire::Pong{});
+  return 0;
+}
+
+int vrpn_BaseClassUnique::register_autodeleted_handler(vrpn_int32 type, vrpn_MESSAGEHANDLER handler,
+                                                       void* userdata, vrpn_int32 sender) {
   if (!d_connection || d_connection->register_handler(type, handler, userdata, sender) != 0) return -1;
   registered_.push_back({type, handler, userdata, sender});
   return 0;
 }
 
-void vrpn_BaseClass::listen(const char* type, vrpn_MESSAGEHANDLER handler) {
-  if (d_connection) {
-    register_autodeleted_handler(d_connection->register_message_type(type), handler, this, d_sender_id);
-  }
-}
-
-int vrpn_BaseClass::send_text_message(const char* text, timeval, vrpn_TEXT_SEVERITY severity,
-                                      vrpn_uint32 level) {
-  sendMessage(d_connection, d_sender_id, wire::Text{static_cast<std::uint32_t>(severity), level, text});
+int vrpn_BaseClassUnique::send_text_message(const char* text, timeval time, vrpn_TEXT_SEVERITY severity,
+                                            vrpn_uint32 level) {
+  sendMessage(d_connection, d_sender_id, wire::Text{static_cast<std::uint32_t>(severity), level, text},
+              wire::Reliability::kReliable, &time);
   return d_connection ? 0 : -1;
 }
 
-void vrpn_BaseClass::client_mainloop() {
+void vrpn_BaseClassUnique::server_mainloop() {
+  if (std::exchange(serves_, true)) return;
+  register_autodeleted_handler(d_ping_message_id, handlePing, this, d_sender_id);
+}
+
+void vrpn_BaseClassUnique::client_mainloop() {
   if (!d_connection) return;
   d_connection->mainloop();
   const timeval now = d_connection->get_time();
@@ -124,9 +129,25 @@ void vrpn_BaseClass::client_mainloop() {
   fprintf(stderr, "VRPN: no answer of %s for %d s\n", d_servicename, silent_s);
 }
 
+vrpn_BaseClass::vrpn_BaseClass(const char* name, vrpn_Connection* connection) {
+  open(name, connection);
+}
+
+vrpn_BaseClass::~vrpn_BaseClass() = default;
+
+int vrpn_BaseClass::init() {
+  return register_senders() == 0 && register_types() == 0 ? 0 : -1;
+}
+
+void vrpn_BaseClass::listen(const char* type, vrpn_MESSAGEHANDLER handler, void* self) {
+  if (d_connection) {
+    register_autodeleted_handler(d_connection->register_message_type(type), handler, self, d_sender_id);
+  }
+}
+
 vrpn_Text_Receiver::vrpn_Text_Receiver(const char* name, vrpn_Connection* connection)
     : vrpn_BaseClass(name, connection) {
-  listen("vrpn_Base text_message", handleMessage);
+  listen("vrpn_Base text_message", handleMessage, this);
 }
 
 int vrpn_Text_Receiver::handleMessage(void* self, vrpn_HANDLERPARAM p) {
@@ -138,4 +159,11 @@ int vrpn_Text_Receiver::handleMessage(void* self, vrpn_HANDLERPARAM p) {
     report.level = m.level;
     static_cast<vrpn_Text_Receiver*>(self)->messages_.call_handlers(report);
   });
+}
+
+int vrpn_Text_Sender::send_message(const char* text, vrpn_TEXT_SEVERITY severity, vrpn_uint32 level,
+                                   const timeval time) {
+  timeval stamp = time;
+  if (stamp.tv_sec == 0 && stamp.tv_usec == 0) vrpn_gettimeofday(&stamp);
+  return send_text_message(text, stamp, severity, level);
 }

@@ -8,20 +8,18 @@
 
 #include "base/world.h"
 #include "client/vrpn/messages.h"
+#include "client/vrpn/server_link.h"
 #include "hapticd/vrpn/vrpn_FileConnection.h"
 
 using hapticd::client::Arrival;
 using hapticd::client::Link;
+using hapticd::client::ServerLink;
 
 const char* vrpn_got_first_connection = "VRPN_Connection_Got_First_Connection";
 const char* vrpn_got_connection = "VRPN_Connection_Got_Connection";
 const char* vrpn_dropped_connection = "VRPN_Connection_Dropped_Connection";
 const char* vrpn_dropped_last_connection = "VRPN_Connection_Dropped_Last_Connection";
 const char* vrpn_CONTROL = "VRPN Control";
-
-bool vrpn_FILE_CONNECTIONS_SHOULD_PRELOAD = true;
-bool vrpn_FILE_CONNECTIONS_SHOULD_ACCUMULATE = true;
-bool vrpn_FILE_CONNECTIONS_SHOULD_SKIP_TO_USER_MESSAGES = true;
 
 namespace {
 
@@ -37,6 +35,12 @@ const std::array<const char*, 4>& controlTypes() {
 std::map<std::string, vrpn_Connection*>& knownConnections() {
   static std::map<std::string, vrpn_Connection*> connections;
   return connections;
+}
+
+void refuseLogs(std::initializer_list<const char*> files) {
+  for (const char* file : files) {
+    if (file && *file) fprintf(stderr, "VRPN: log file %s is not written by this library\n", file);
+  }
 }
 
 char* copyOf(std::string_view text) {
@@ -59,6 +63,21 @@ vrpn_Connection::vrpn_Connection(const char* server) : name_(server), opened_(ge
   }
 }
 
+vrpn_Connection::vrpn_Connection(const char* address, int port) : opened_(get_time()) {
+  std::optional<hapticd::net::Endpoint> local;
+  if (port >= 0) {
+    local.emplace();
+    if (address != nullptr && *address != '\0') local->address = hapticd::net::resolve(address);
+    local->port = static_cast<std::uint16_t>(port);
+  }
+  served_ = std::make_unique<ServerLink>(local);
+  served_->addSender(vrpn_CONTROL);
+}
+
+int vrpn_Connection::servedPort() const {
+  return served_ ? served_->port() : 0;
+}
+
 vrpn_Connection::~vrpn_Connection() {
   auto& known = knownConnections();
   const auto self =
@@ -67,22 +86,28 @@ vrpn_Connection::~vrpn_Connection() {
 }
 
 vrpn_bool vrpn_Connection::doing_okay() const {
-  return link_ != nullptr;
+  return link_ || served_;
 }
 vrpn_bool vrpn_Connection::connected() const {
-  return link_ && link_->connected();
+  return served_ ? clients_ > 0 : link_ && link_->connected();
 }
+// The devices of a server are in this program.
 bool vrpn_Connection::heard(vrpn_int32 sender) const {
-  return sender >= 0 && link_ && link_->heard({sender});
+  return served_ || (sender >= 0 && link_ && link_->heard({sender}));
 }
 
 int vrpn_Connection::mainloop(const timeval* timeout) {
-  if (!link_) return -1;
+  if (!doing_okay()) return -1;
   const auto wait = timeout
                         ? std::chrono::seconds(timeout->tv_sec) + std::chrono::microseconds(timeout->tv_usec)
                         : std::chrono::microseconds(0);
   try {
-    link_->poll(wait, [this](const Arrival& arrival) { dispatch(arrival); });
+    const auto handler = [this](const Arrival& arrival) { dispatch(arrival); };
+    if (served_) {
+      served_->poll(wait, handler);
+    } else {
+      link_->poll(wait, handler);
+    }
   } catch (const hapticd::Error& error) {
     fprintf(stderr, "VRPN: %s\n", error.what());
     return -1;
@@ -92,11 +117,11 @@ int vrpn_Connection::mainloop(const timeval* timeout) {
 
 void vrpn_Connection::dispatch(const Arrival& arrival) {
   if (arrival.what == Arrival::What::connected) {
-    callControlHandlers(vrpn_got_first_connection);
+    if (clients_++ == 0) callControlHandlers(vrpn_got_first_connection);
     callControlHandlers(vrpn_got_connection);
   } else if (arrival.what == Arrival::What::lost) {
     callControlHandlers(vrpn_dropped_connection);
-    callControlHandlers(vrpn_dropped_last_connection);
+    if (--clients_ == 0) callControlHandlers(vrpn_dropped_last_connection);
   } else if (arrival.type.value >= 0 && arrival.sender.value >= 0) {
     callHandlers(
         {arrival.type.value,
@@ -124,7 +149,7 @@ void vrpn_Connection::callHandlers(const vrpn_HANDLERPARAM& p) {
 
 vrpn_int32 vrpn_Connection::register_sender(const char* name) {
   try {
-    return link_ ? link_->addSender(name).value : -1;
+    return served_ ? served_->addSender(name).value : link_ ? link_->addSender(name).value : -1;
   } catch (const std::logic_error& error) {
     fprintf(stderr, "VRPN: %s\n", error.what());
     return -1;
@@ -132,8 +157,8 @@ vrpn_int32 vrpn_Connection::register_sender(const char* name) {
 }
 
 vrpn_int32 vrpn_Connection::registerDevice(const char* name) {
-  if (register_sender(name) < 0) return -1;
-  return link_->addDevice(name).value;
+  const vrpn_int32 sender = register_sender(name);
+  return sender < 0 || served_ ? sender : link_->addDevice(name).value;
 }
 
 vrpn_int32 vrpn_Connection::register_message_type(const char* name) {
@@ -141,7 +166,7 @@ vrpn_int32 vrpn_Connection::register_message_type(const char* name) {
     if (std::strcmp(name, controlTypes()[i]) == 0) return kFirstControlType + static_cast<vrpn_int32>(i);
   }
   try {
-    return link_ ? link_->addType(name).value : -1;
+    return served_ ? served_->addType(name).value : link_ ? link_->addType(name).value : -1;
   } catch (const std::logic_error& error) {
     fprintf(stderr, "VRPN: %s\n", error.what());
     return -1;
@@ -171,17 +196,25 @@ int vrpn_Connection::unregister_handler(vrpn_int32 type, vrpn_MESSAGEHANDLER han
 
 int vrpn_Connection::pack_message(vrpn_uint32 len, timeval time, vrpn_int32 type, vrpn_int32 sender,
                                   const char* buffer, vrpn_uint32 class_of_service) {
-  if (!link_ || !message_type_name(type) || !sender_name(sender)) return -1;
+  if (!message_type_name(type) || !sender_name(sender)) return -1;
   if (type >= kFirstControlType) {
     callHandlers({type, sender, time, static_cast<vrpn_int32>(len), buffer});
     return 0;
   }
   using hapticd::wire::Reliability;
   const bool reliable = (class_of_service & vrpn_CONNECTION_RELIABLE) != 0;
+  const hapticd::wire::Time stamp{static_cast<std::uint32_t>(time.tv_sec),
+                                  static_cast<std::uint32_t>(time.tv_usec)};
+  const hapticd::wire::ByteView payload(reinterpret_cast<const std::byte*>(buffer), len);
+  const Reliability reliability = reliable ? Reliability::kReliable : Reliability::kLowLatency;
   try {
-    link_->sendRaw({static_cast<std::uint32_t>(time.tv_sec), static_cast<std::uint32_t>(time.tv_usec)},
-                   {sender}, {type}, {reinterpret_cast<const std::byte*>(buffer), len},
-                   reliable ? Reliability::kReliable : Reliability::kLowLatency);
+    if (served_) {
+      served_->send(stamp, {sender}, {type}, payload, reliability);
+      // Remote devices in the server's own program hear it, too.
+      callHandlers({type, sender, time, static_cast<vrpn_int32>(len), buffer});
+    } else {
+      link_->sendRaw(stamp, {sender}, {type}, payload, reliability);
+    }
   } catch (const std::exception& error) {
     fprintf(stderr, "VRPN: %s\n", error.what());
     return -1;
@@ -190,8 +223,12 @@ int vrpn_Connection::pack_message(vrpn_uint32 len, timeval time, vrpn_int32 type
 }
 
 int vrpn_Connection::send_pending_reports() {
-  if (!link_) return -1;
-  link_->flush();
+  if (!doing_okay()) return -1;
+  if (served_) {
+    served_->flush();
+  } else {
+    link_->flush();
+  }
   return 0;
 }
 
@@ -205,10 +242,13 @@ timeval vrpn_Connection::get_time() {
   return {static_cast<time_t>(us / 1'000'000), static_cast<suseconds_t>(us % 1'000'000)};
 }
 
+const hapticd::wire::LocalNames* vrpn_Connection::names() const {
+  return served_ ? &served_->names() : link_ ? &link_->names() : nullptr;
+}
+
 const char* vrpn_Connection::sender_name(vrpn_int32 sender) {
-  if (!link_ || sender < 0 || static_cast<std::size_t>(sender) >= link_->names().senders().size())
-    return nullptr;
-  return link_->names().senders()[static_cast<std::size_t>(sender)].c_str();
+  if (!names() || sender < 0 || static_cast<std::size_t>(sender) >= names()->senders().size()) return nullptr;
+  return names()->senders()[static_cast<std::size_t>(sender)].c_str();
 }
 
 const char* vrpn_Connection::message_type_name(vrpn_int32 type) {
@@ -216,8 +256,8 @@ const char* vrpn_Connection::message_type_name(vrpn_int32 type) {
     const auto index = static_cast<std::size_t>(type - kFirstControlType);
     return index < controlTypes().size() ? controlTypes()[index] : nullptr;
   }
-  if (!link_ || type < 0 || static_cast<std::size_t>(type) >= link_->names().types().size()) return nullptr;
-  return link_->names().types()[static_cast<std::size_t>(type)].c_str();
+  if (!names() || type < 0 || static_cast<std::size_t>(type) >= names()->types().size()) return nullptr;
+  return names()->types()[static_cast<std::size_t>(type)].c_str();
 }
 
 void vrpn_Connection::addReference() {
@@ -233,21 +273,56 @@ vrpn_Connection* vrpn_get_connection_by_name(const char* name, const char* local
                                              const char* local_out_logfile, const char* remote_in_logfile,
                                              const char* remote_out_logfile, const char*, bool force_reopen) {
   if (!name) return nullptr;
-  for (const char* log : {local_in_logfile, local_out_logfile, remote_in_logfile, remote_out_logfile}) {
-    if (log && *log) fprintf(stderr, "VRPN: log file %s is not written by this library\n", log);
-  }
+  refuseLogs({local_in_logfile, local_out_logfile, remote_in_logfile, remote_out_logfile});
   const char* at = std::strrchr(name, '@');
   const std::string server = at ? at + 1 : name;
   auto& known = knownConnections();
   const auto found = known.find(server);
   vrpn_Connection* connection = found != known.end() && !force_reopen ? found->second : nullptr;
   if (!connection) {
-    connection = new vrpn_Connection(server.c_str());
+    const std::unique_ptr<char[]> file(vrpn_copy_file_name(name));
+    connection = file ? new vrpn_File_Connection(name) : new vrpn_Connection(server.c_str());
     connection->setAutoDeleteStatus(true);
     known[server] = connection;
   }
   connection->addReference();
   return connection;
+}
+
+vrpn_Connection* vrpn_create_server_connection(int port, const char* local_in_logfile,
+                                               const char* local_out_logfile, const char* NIC_address) {
+  refuseLogs({local_in_logfile, local_out_logfile});
+  try {
+    auto* connection = new vrpn_Connection(NIC_address, port);
+    connection->setAutoDeleteStatus(true);
+    connection->addReference();
+    return connection;
+  } catch (const std::exception& error) {
+    fprintf(stderr, "VRPN: %s\n", error.what());
+    return nullptr;
+  }
+}
+
+vrpn_Connection* vrpn_create_server_connection(const char* name, const char* local_in_logfile,
+                                               const char* local_out_logfile) {
+  const char* at = std::strrchr(name, '@');
+  const char* location = at ? at + 1 : name;
+  if (std::strncmp(location, "loopback:", std::strlen("loopback:")) == 0) {
+    return vrpn_create_server_connection(-1, local_in_logfile, local_out_logfile, nullptr);
+  }
+  const std::unique_ptr<char[]> address(vrpn_copy_machine_name(location));
+  return vrpn_create_server_connection(vrpn_get_port_number(location), local_in_logfile, local_out_logfile,
+                                       address.get());
+}
+
+vrpn_ConnectionManager& vrpn_ConnectionManager::instance() {
+  static vrpn_ConnectionManager manager;
+  return manager;
+}
+
+vrpn_Connection* vrpn_ConnectionManager::getByName(const char* name) {
+  const auto found = knownConnections().find(name);
+  return found == knownConnections().end() ? nullptr : found->second;
 }
 
 char* vrpn_copy_service_name(const char* name) {

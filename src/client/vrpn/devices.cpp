@@ -16,7 +16,7 @@ using hapticd::client::sendMessage;
 
 vrpn_Analog_Remote::vrpn_Analog_Remote(const char* name, vrpn_Connection* connection)
     : vrpn_Analog(name, connection) {
-  listen("vrpn_Analog Channel", handleChange);
+  listen("vrpn_Analog Channel", handleChange, this);
 }
 
 int vrpn_Analog_Remote::handleChange(void* self, vrpn_HANDLERPARAM p) {
@@ -45,13 +45,18 @@ void vrpn_Button::set_toggle(vrpn_int32 button, vrpn_int32 state) {
 
 vrpn_Button_Remote::vrpn_Button_Remote(const char* name, vrpn_Connection* connection)
     : vrpn_Button(name, connection) {
-  listen("vrpn_Button Change", handleChange);
-  listen("vrpn_Button States", handleStates);
+  listen("vrpn_Button Change", handleChange, this);
+  listen("vrpn_Button States", handleStates, this);
 }
 
 int vrpn_Button_Remote::handleChange(void* self, vrpn_HANDLERPARAM p) {
   return receiveMessage<wire::ButtonChange>(p, [&](const wire::ButtonChange& m) {
-    static_cast<vrpn_Button_Remote*>(self)->changes_.call_handlers({p.msg_time, m.button, m.state});
+    auto* remote = static_cast<vrpn_Button_Remote*>(self);
+    if (m.button >= 0 && m.button < vrpn_BUTTON_MAX_BUTTONS) {
+      remote->num_buttons = std::max(remote->num_buttons, m.button + 1);
+      remote->buttons[m.button] = m.state != 0;
+    }
+    remote->changes_.call_handlers({p.msg_time, m.button, m.state});
   });
 }
 
@@ -61,7 +66,11 @@ int vrpn_Button_Remote::handleStates(void* self, vrpn_HANDLERPARAM p) {
     report.msg_time = p.msg_time;
     report.num_buttons = static_cast<vrpn_int32>(m.states.values.size());
     std::copy(m.states.values.begin(), m.states.values.end(), report.states);
-    static_cast<vrpn_Button_Remote*>(self)->states_.call_handlers(report);
+    auto* remote = static_cast<vrpn_Button_Remote*>(self);
+    remote->num_buttons = report.num_buttons;
+    std::transform(m.states.values.begin(), m.states.values.end(), remote->buttons,
+                   [](std::int32_t state) { return static_cast<unsigned char>(state != 0); });
+    remote->states_.call_handlers(report);
   });
 }
 
@@ -69,7 +78,7 @@ int vrpn_Button_Remote::handleStates(void* self, vrpn_HANDLERPARAM p) {
 
 vrpn_Dial_Remote::vrpn_Dial_Remote(const char* name, vrpn_Connection* connection)
     : vrpn_Dial(name, connection) {
-  listen("vrpn_Dial update", handleChange);
+  listen("vrpn_Dial update", handleChange, this);
 }
 
 // Servers of this project have no dials, so the message is not in the wire table.
@@ -87,12 +96,12 @@ int vrpn_Dial_Remote::handleChange(void* self, vrpn_HANDLERPARAM p) {
 
 vrpn_Tracker_Remote::vrpn_Tracker_Remote(const char* name, vrpn_Connection* connection)
     : vrpn_Tracker(name, connection) {
-  listen("vrpn_Tracker Pos_Quat", handlePose);
-  listen("vrpn_Tracker Velocity", handleVelocity);
-  listen("vrpn_Tracker Acceleration", handleAcceleration);
-  listen("vrpn_Tracker To_Room", handleRoom);
-  listen("vrpn_Tracker Unit_To_Sensor", handleMount);
-  listen("vrpn_Tracker Workspace", handleWorkspace);
+  listen("vrpn_Tracker Pos_Quat", handlePose, this);
+  listen("vrpn_Tracker Velocity", handleVelocity, this);
+  listen("vrpn_Tracker Acceleration", handleAcceleration, this);
+  listen("vrpn_Tracker To_Room", handleRoom, this);
+  listen("vrpn_Tracker Unit_To_Sensor", handleMount, this);
+  listen("vrpn_Tracker Workspace", handleWorkspace, this);
 }
 
 int vrpn_Tracker_Remote::request_t2r_xform() {
@@ -130,7 +139,11 @@ int vrpn_Tracker_Remote::handlePose(void* self, vrpn_HANDLERPARAM p) {
     vrpn_TRACKERCB report{p.msg_time, m.sensor, {}, {}};
     copyTo(report.pos, m.position);
     copyTo(report.quat, m.orientation);
-    static_cast<vrpn_Tracker_Remote*>(self)->callSensor(&Sensor::poses, report);
+    auto* remote = static_cast<vrpn_Tracker_Remote*>(self);
+    remote->d_sensor = m.sensor;
+    copyTo(remote->pos, m.position);
+    copyTo(remote->d_quat, m.orientation);
+    remote->callSensor(&Sensor::poses, report);
   });
 }
 

@@ -10,6 +10,68 @@ using hapticd::client::copyTo;
 using hapticd::client::receiveMessage;
 using hapticd::client::sendMessage;
 
+vrpn_ForceDevice::vrpn_ForceDevice(const char* name, vrpn_Connection* connection)
+    : vrpn_BaseClass(name, connection) {
+  vrpn_ForceDevice::register_types();
+}
+
+int vrpn_ForceDevice::register_types() {
+  if (!d_connection) return 0;
+  const auto type = [this](const char* name) { return d_connection->register_message_type(name); };
+  force_message_id = type("vrpn_ForceDevice Force");
+  scp_message_id = type("vrpn_ForceDevice SCP");
+  error_message_id = type("vrpn_ForceDevice Force_Error");
+  plane_message_id = type("vrpn_ForceDevice Plane");
+  plane_effects_message_id = type("vrpn_ForceDevice Plane2");
+  forcefield_message_id = type("vrpn_ForceDevice Force_Field");
+  custom_effect_message_id = type("vrpn_ForceDevice Custom Effect");
+  addObject_message_id = type("vrpn_ForceDevice addObject");
+  addObjectExScene_message_id = type("vrpn_ForceDevice addObjectExScene");
+  moveToParent_message_id = type("vrpn_ForceDevice moveToParent");
+  setObjectPosition_message_id = type("vrpn_ForceDevice setObjectPosition");
+  setObjectOrientation_message_id = type("vrpn_ForceDevice setObjectOrientation");
+  setObjectScale_message_id = type("vrpn_ForceDevice setObjectScale");
+  removeObject_message_id = type("vrpn_ForceDevice removeObject");
+  setVertex_message_id = type("vrpn_ForceDevice setVertex");
+  setNormal_message_id = type("vrpn_ForceDevice setNormal");
+  setTriangle_message_id = type("vrpn_ForceDevice setTriangle");
+  removeTriangle_message_id = type("vrpn_ForceDevice removeTriangle");
+  updateTrimeshChanges_message_id = type("vrpn_ForceDevice updateTrimeshChanges");
+  transformTrimesh_message_id = type("vrpn_ForceDevice transformTrimesh");
+  setTrimeshType_message_id = type("vrpn_ForceDevice setTrimeshType");
+  clearTrimesh_message_id = type("vrpn_ForceDevice clearTrimesh");
+  setHapticOrigin_message_id = type("vrpn_ForceDevice setHapticOrigin");
+  setHapticScale_message_id = type("vrpn_ForceDevice setHapticScale");
+  setSceneOrigin_message_id = type("vrpn_ForceDevice setSceneOrigin");
+  getNewObjectID_message_id = type("vrpn_ForceDevice getNewObjectID");
+  setObjectIsTouchable_message_id = type("vrpn_ForceDevice setObjectIsTouchable");
+  enableConstraint_message_id = type("vrpn_ForceDevice constraint_enable");
+  setConstraintMode_message_id = type("vrpn_ForceDevice constraint_mode");
+  setConstraintPoint_message_id = type("vrpn_ForceDevice constraint_point");
+  setConstraintLinePoint_message_id = type("vrpn_ForceDevice constraint_linept");
+  setConstraintLineDirection_message_id = type("vrpn_ForceDevice constraint_linedir");
+  setConstraintPlanePoint_message_id = type("vrpn_ForceDevice constraint_plpt");
+  setConstraintPlaneNormal_message_id = type("vrpn_ForceDevice constraint_plnorm");
+  setConstraintKSpring_message_id = type("vrpn_ForceDevice constraint_KSpring");
+  return 0;
+}
+
+void vrpn_ForceDevice::print_report() {
+  printf("force of %s: %g %g %g N; surface contact point: %g %g %g m, quaternion %g %g %g %g\n",
+         d_servicename, force[0], force[1], force[2], scp_pos[0], scp_pos[1], scp_pos[2], scp_quat[0],
+         scp_quat[1], scp_quat[2], scp_quat[3]);
+}
+
+void vrpn_ForceDevice::print_plane() {
+  printf("plane of %s: %g %g %g %g\n", d_servicename, static_cast<double>(plane[0]),
+         static_cast<double>(plane[1]), static_cast<double>(plane[2]), static_cast<double>(plane[3]));
+}
+
+void vrpn_ForceDevice::sendError(int code) {
+  errorCode = code;
+  sendMessage(d_connection, d_sender_id, wire::ForceError{code});
+}
+
 // --- settings that are sent later
 
 void vrpn_ForceDevice::setCustomEffect(vrpn_int32 effect, vrpn_float32* parameters, vrpn_uint32 count) {
@@ -43,19 +105,20 @@ void vrpn_ForceDevice::set_plane(vrpn_float32 a, vrpn_float32 b, vrpn_float32 c,
 
 vrpn_ForceDevice_Remote::vrpn_ForceDevice_Remote(const char* name, vrpn_Connection* connection)
     : vrpn_ForceDevice(name, connection) {
-  listen("vrpn_ForceDevice Force", handleForce);
-  listen("vrpn_ForceDevice SCP", handleScp);
-  listen("vrpn_ForceDevice Force_Error", handleError);
-  listen("vrpn_ForceDevice DOP", handleDop);
-  listen("vrpn_ForceDevice isTouching", handleTouching);
-  listen("vrpn_ForceDevice TouchedObject", handleObject);
-  listen("vrpn_ForceDevice Angle", handleAngle);
+  listen("vrpn_ForceDevice Force", handleForce, this);
+  listen("vrpn_ForceDevice SCP", handleScp, this);
+  listen("vrpn_ForceDevice Force_Error", handleError, this);
+  listen("vrpn_ForceDevice DOP", handleDop, this);
+  listen("vrpn_ForceDevice isTouching", handleTouching, this);
+  listen("vrpn_ForceDevice TouchedObject", handleObject, this);
+  listen("vrpn_ForceDevice Angle", handleAngle, this);
 }
 
 int vrpn_ForceDevice_Remote::handleForce(void* self, vrpn_HANDLERPARAM p) {
   return receiveMessage<wire::Force>(p, [&](const wire::Force& m) {
     vrpn_FORCECB report{p.msg_time, {}};
     copyTo(report.force, m.force);
+    copyTo(static_cast<vrpn_ForceDevice_Remote*>(self)->force, m.force);
     static_cast<vrpn_ForceDevice_Remote*>(self)->forces_.call_handlers(report);
   });
 }
@@ -64,6 +127,8 @@ int vrpn_ForceDevice_Remote::handleScp(void* self, vrpn_HANDLERPARAM p) {
     vrpn_FORCESCPCB report{p.msg_time, {}, {}};
     copyTo(report.pos, m.position);
     copyTo(report.quat, m.orientation);
+    copyTo(static_cast<vrpn_ForceDevice_Remote*>(self)->scp_pos, m.position);
+    copyTo(static_cast<vrpn_ForceDevice_Remote*>(self)->scp_quat, m.orientation);
     static_cast<vrpn_ForceDevice_Remote*>(self)->scps_.call_handlers(report);
   });
 }
@@ -199,10 +264,11 @@ void vrpn_ForceDevice_Remote::sendField(bool reliably) {
 void vrpn_ForceDevice_Remote::sendForceField() {
   sendField(false);
 }
-void vrpn_ForceDevice_Remote::sendForceField(vrpn_float32 origin[3], vrpn_float32 force[3],
+void vrpn_ForceDevice_Remote::sendForceField(vrpn_float32 origin[3], vrpn_float32 strength[3],
                                              vrpn_float32 jacobian[3][3], vrpn_float32 radius) {
-  sendMessage(d_connection, d_sender_id,
-              wire::ForceField{arrayOf<3>(origin), arrayOf<3>(force), arrayOf<9>(&jacobian[0][0]), radius});
+  sendMessage(
+      d_connection, d_sender_id,
+      wire::ForceField{arrayOf<3>(origin), arrayOf<3>(strength), arrayOf<9>(&jacobian[0][0]), radius});
 }
 void vrpn_ForceDevice_Remote::stopForceField() {
   send(wire::ForceField{});

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <vector>
 
 #include "client/link.h"
 #include "hapticd/error.h"
@@ -11,16 +12,32 @@
 
 namespace hapticd::client {
 
-/// Sends a message of a device; prints errors, as VRPN does.
+/// Writes the payload of a message to a buffer that is large enough; returns its size.
+template <wire::WireMessage M>
+vrpn_int32 writePayload(const M& message, char* out) {
+  wire::encodePayload(message, reinterpret_cast<std::byte*>(out));
+  return static_cast<vrpn_int32>(wire::payloadSize(message));
+}
+
+/// Sends a message of a device, stamped with the present or the given time; prints errors, as VRPN does.
 template <wire::WireMessage M>
 void sendMessage(vrpn_Connection* connection, vrpn_int32 sender, const M& message,
-                 wire::Reliability reliability = M::kInfo.reliability) {
-  if (!connection || !connection->link()) return;
-  try {
-    connection->link()->send(wireNow(), {sender}, message, reliability);
-  } catch (const hapticd::Error& error) {
-    std::fprintf(stderr, "VRPN: %s\n", error.what());
+                 wire::Reliability reliability = M::kInfo.reliability, const timeval* time = nullptr) {
+  if (!connection || !connection->doing_okay()) return;
+  if (connection->link() && !time) {
+    try {
+      connection->link()->send(wireNow(), {sender}, message, reliability);
+    } catch (const hapticd::Error& error) {
+      std::fprintf(stderr, "VRPN: %s\n", error.what());
+    }
+    return;
   }
+  std::vector<char> payload(wire::payloadSize(message));
+  writePayload(message, payload.data());
+  connection->pack_message(
+      static_cast<vrpn_uint32>(payload.size()), time ? *time : connection->get_time(),
+      wire::kLocalType<M>.value, sender, payload.data(),
+      reliability == wire::Reliability::kReliable ? vrpn_CONNECTION_RELIABLE : vrpn_CONNECTION_LOW_LATENCY);
 }
 
 /// Calls use(message) with the decoded payload. Ignores a damaged one, where stock VRPN drops the connection.

@@ -5,19 +5,28 @@ namespace hapticd::device::drivers_in_this_build {
 namespace {
 
 // [HOST:PORT/]ID; each part may stand alone.
-std::unique_ptr<Device> make(const DriverOptions& options) {
+HaplyOptions optionsOf(const std::string& hardware) {
   HaplyOptions own;
-  const std::size_t slash = options.hardware.find('/');
-  const std::string place = options.hardware.substr(0, slash);
+  const std::size_t slash = hardware.find('/');
+  const std::string place = hardware.substr(0, slash);
   const std::size_t colon = place.rfind(':');
   if (colon != std::string::npos) {
     own.host = place.substr(0, colon);
     own.port = place.substr(colon + 1);
-    own.deviceId = slash == std::string::npos ? "" : options.hardware.substr(slash + 1);
+    own.deviceId = slash == std::string::npos ? "" : hardware.substr(slash + 1);
   } else {
-    own.deviceId = options.hardware;
+    own.deviceId = hardware;
   }
-  return std::make_unique<HaplyDevice>(own);
+  return own;
+}
+
+std::unique_ptr<Device> make(const DriverOptions& options) {
+  return std::make_unique<HaplyDevice>(optionsOf(options.hardware));
+}
+
+std::string service(const std::string& hardware) {
+  const HaplyOptions options = optionsOf(hardware);
+  return options.host + ":" + options.port;
 }
 
 }  // namespace
@@ -26,6 +35,7 @@ extern const Driver haply;
 const Driver haply{.name = "haply",
                    .help = "Haply Inverse3 and Minverse, through the Inverse Service",
                    .keys = {},
-                   .make = make};
+                   .make = make,
+                   .service = service};
 
 }  // namespace hapticd::device::drivers_in_this_build

@@ -51,9 +51,11 @@ class Exchange {
 
  private:
   void tick(Nanos now) noexcept {
-    Posted posted;
-    posted.valid = device_.read(now, posted.state);
-    posted.lost = device_.lost();
+    DeviceState state;
+    const bool valid = device_.read(now, state);
+    Posted posted = Posted::of(state);
+    posted.valid = valid ? 1 : 0;
+    posted.lost = device_.lost() ? 1 : 0;
     posted.time = base::now();
     block_.state.write(posted);
     countUp(block_.posts);
@@ -128,8 +130,7 @@ int runDeviceHost(Device& device, const DeviceHostOptions& options) {
       send(std::string("-") + error.what());
       return 1;
     }
-    memory->profile = SharedProfile::of(device.profile());
-    memory->traits = device.traits();
+    memory->profile = SharedProfile::of(device.profile(), device.traits());
     {
       Exchange exchange(device, *memory, options);
       send("+");

@@ -52,11 +52,14 @@ void IsolatedDevice::open() {
     close();
     throw;
   }
-  profile_ = (*memory_)->profile.toProfile();
+  try {
+    profile_ = (*memory_)->profile.toProfile();
+  } catch (...) {
+    close();
+    throw;
+  }
   profile_.transportDelay_s += kOneTick_s;
-  traits_ = (*memory_)->traits;
-  traits_.selfPaced = true;
-  traits_.ticksInVendorThread = false;
+  traits_ = (*memory_)->profile.toTraits();
   silent_ = lostThere_ = false;
 }
 
@@ -190,11 +193,12 @@ void IsolatedDevice::run() noexcept {
 
 bool IsolatedDevice::read(Nanos now, DeviceState& state) noexcept {
   if (!memory_) return false;
-  const Posted& posted = (*memory_)->state.read();
-  if (!posted.valid && !silent_) return false;
-  postToTick_ = now - posted.time;
-  lostThere_.store(posted.lost, std::memory_order_relaxed);
-  state = posted.state;
+  const Posted posted = (*memory_)->state.read();
+  if (posted.valid == 0 && !silent_) return false;
+  // The difference of any two numbers, without overflow.
+  postToTick_ = static_cast<Nanos>(static_cast<std::uint64_t>(now) - static_cast<std::uint64_t>(posted.time));
+  lostThere_.store(posted.lost != 0, std::memory_order_relaxed);
+  state = posted.toState();
   if (silent_) state.hold |= kHoldFault;
   return true;
 }

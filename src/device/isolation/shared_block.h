@@ -20,11 +20,25 @@ inline constexpr int kSocketDescriptor = 4;
 /// The driver's process zeroes a force that is older than this.
 inline constexpr Nanos kCommandLife = 3'000'000;
 
+/// A state without types that some bytes are no value of: the driver's process may leave anything here.
 struct Posted {
-  DeviceState state;
-  bool valid = false;
-  bool lost = false;
+  Nanos stateTime = 0;
+  std::array<double, 3> position_m{};
+  std::array<double, 4> orientation_xyzw{0, 0, 0, 1};
+  std::array<double, 3> velocity_m_per_s{};
+  std::array<double, 3> angularVelocity_rad_per_s{};
+  std::uint32_t buttons = 0;
+  std::uint32_t hold = 0;
+  double motorTemperature = 0;
+  double gripper_rad = 0;
+  std::uint32_t hasGripper = 0;
+  std::uint32_t valid = 0;
+  std::uint32_t lost = 0;
   Nanos time = 0;  ///< of the post, CLOCK_MONOTONIC
+
+  static Posted of(const DeviceState& state);
+  /// Numbers as they were posted, also those that are not finite.
+  DeviceState toState() const;
 };
 
 struct Command {
@@ -32,10 +46,10 @@ struct Command {
   std::uint64_t number = 0;
 };
 
-/// A profile without pointers.
+/// A profile without pointers, and what of the traits the server needs.
 struct SharedProfile {
   std::array<char, 128> model{};
-  geometry::Box workspace_m;
+  std::array<double, 6> workspace_m{};  ///< min xyz, max xyz
   double peakForce_N = 0;
   double continuousForce_N = 0;
   double nominalStiffness_N_per_m = 0;
@@ -45,18 +59,22 @@ struct SharedProfile {
   std::uint32_t switches = 0;
   int inputDof = 0;
   int outputDof = 0;
-  bool hasGripper = false;
-  bool startsArmed = false;
+  std::uint32_t hasGripper = 0;
+  std::uint32_t startsArmed = 0;
+  std::uint32_t calibratesInLoop = 0;
+  std::uint32_t needsRearm = 1;
 
-  static SharedProfile of(const DeviceProfile& profile);
+  static SharedProfile of(const DeviceProfile& profile, const DeviceTraits& traits);
+  /// Throws std::runtime_error, naming the value, when no device has such a profile.
   DeviceProfile toProfile() const;
+  /// Those of an isolated device: self-paced in a thread of ours.
+  DeviceTraits toTraits() const;
 };
 
 /// Made by the server; both processes are the same build.
 struct SharedBlock {
   std::uint64_t size = sizeof(SharedBlock);
   SharedProfile profile;  ///< set before the first answer on the socket
-  DeviceTraits traits;    ///< likewise
   std::atomic<std::uint32_t> posts{0};
   handoff::LatestValue<Posted> state;
   handoff::LatestValue<Command> command;

@@ -1,8 +1,10 @@
 #include "realtime/remote/remote_contacts.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "base/time.h"
+#include "realtime/remote/normal_shares.h"
 
 namespace hapticd::realtime {
 namespace {
@@ -14,21 +16,15 @@ constexpr double kCorrection_N_per_s = 0.8 * kRemoteRate_N_per_s;
 constexpr double kShared_N_per_s = 0.45 * kRemoteRate_N_per_s;
 constexpr double kFade_N_per_s = 0.4 * kRemoteRate_N_per_s;
 constexpr double kBesideFade_N_per_s = 0.25 * kRemoteRate_N_per_s;
-constexpr double kLongestAge_s = 0.2;  // a surface moves on no longer than this without an update
-constexpr int kSweeps = 40;
-constexpr double kConverged_N = 1e-6;
+constexpr double kOfAll_N_per_s = 0.75 * kRemoteRate_N_per_s;  // what corrections change in the sum
+constexpr int kTries = 4;
+constexpr double kFadeOfAll = 0.8;      // part of it that a fade may take
+constexpr double kLeast = 0.2;          // part of it for corrections, however much a fade takes
+constexpr double kEarly = 1.5;          // several contacts begin to fade earlier: their fade may be held up
+constexpr double kLongestAge_s = 0.2;   // a surface moves on no longer than this without an update
 constexpr double kLateral = 0.5;        // share of the stiffness that holds a sticking point
 constexpr double kStick = 0.9;          // of the dynamic bound: sliding ends below it
 constexpr double kSlow_m_per_s = 0.01;  // below it the damping coefficient may change as at this speed
-
-Vec3 rotatedBy(const Vec3& rotation, const Vec3& v) noexcept {
-  const double square = rotation.squaredNorm();
-  if (square < 1e-24) return v;
-  const double angle = std::sqrt(square);
-  const Vec3 axis = rotation / angle;
-  const double cosine = std::cos(angle);
-  return cosine * v + std::sin(angle) * axis.cross(v) + (1 - cosine) * axis.dot(v) * axis;
-}
 
 // The shortest rotation between unit vectors; for opposite ones half a turn about any axis across.
 Vec3 rotationVector(const Vec3& from, const Vec3& to) noexcept {
@@ -58,6 +54,7 @@ void RemoteContacts::reset() noexcept {
   for (Slot& slot : slots_) slot.used = false;
   top_ = 0;
   pressed_N = 0;
+  force_N_.setZero();
 }
 
 Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand, Nanos now, double step_s,
@@ -65,40 +62,97 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
   out.contactsTime = newest.clientTime;
   corrections_.refill(step_s);
   if (newest.number != taken_) take(newest, hand, now);
-  if (top_ == 0) return Vec3::Zero();
+  if (top_ == 0) {
+    force_N_.setZero();
+    return force_N_;
+  }
   fadeOut(now, step_s);
 
   int changing = 0;
-  bool fading = resumed_;
+  int leaving = 0;
+  bool correcting = false;
+  const bool resumed = resumed_;
   resumed_ = false;
   for (Slot& slot : inUse()) {
     if (!slot.used) continue;
     locate(slot, hand, now);
-    changing += slot.fade == 0 && (slot.demand_N > 0 || slot.depth_m > slot.shift_m);
-    fading = fading || (slot.fade > 0 && slot.demand_N > 0);
+    changing += !slot.fading && (slot.demand_N > 0 || slot.depth_m > slot.shift_m);
+    leaving += slot.fading && slot.demand_N > 0;
+    correcting = correcting || (!slot.fading && !isCorrected(slot));
   }
+  const bool fading = resumed || leaving > 0;
   const double budget_N = (fading         ? kBesideFade_N_per_s
                            : changing > 1 ? kShared_N_per_s
                                           : kCorrection_N_per_s) *
                           step_s / std::max(changing, 1);
+  const bool mayRetry = (correcting || fading) && changing + leaving > 1;
+  if (mayRetry) {
+    std::copy_n(slots_.begin(), top_, before_.rendered.begin());
+    before_.corrections = corrections_;
+  }
+  const Change change{budget_N, 1};
+  Vec3 force = forceWith(change, hand, step_s);
+  // In a corner the sum changes faster than what each face demands.
+  const double most_N = kOfAll_N_per_s * step_s;
+  if (mayRetry && (force - force_N_).squaredNorm() > most_N * most_N)
+    force = forceWithin(change, hand, step_s);
+  force_N_ = force;
+  for (const Slot& slot : inUse()) {
+    if (!slot.used || slot.normal_N <= 0 || out.count == kMaxRemoteContacts) continue;
+    out.contacts[out.count++] = {
+        slot.contact.id, (hand.position_m + slot.depth_m * slot.normal).cast<float>(),
+        (slot.normal_N * slot.normal + slot.friction_N).cast<float>(), static_cast<float>(slot.depth_m)};
+  }
+  if (held_) out.status |= kRemoteCorrectionsHeld;
+  out.contactForce_N = force;
+  return force;
+}
+
+// Changes and solves.
+Vec3 RemoteContacts::forceWith(const Change& change, const RemoteHand& hand, double step_s) noexcept {
   held_ = false;
   for (Slot& slot : inUse()) {
     if (!slot.used) continue;
-    if (slot.fade == 0) correct(slot, hand, budget_N, step_s);
-    demand(slot, hand, now);
+    if (slot.fading) {
+      slot.gain -= change.fade * slot.fadeStep;
+    } else {
+      correct(slot, hand, change.correction_N, step_s);
+    }
+    demand(slot, hand);
   }
   Vec3 force = share(hand);
   for (Slot& slot : inUse()) {
     if (!slot.used) continue;
-    const Vec3 tangential = friction(slot, hand, pressed_N, step_s);
-    force += tangential;
-    if (slot.normal_N <= 0 || out.count == kMaxRemoteContacts) continue;
-    out.contacts[out.count++] = {
-        slot.contact.id, (hand.position_m + slot.depth_m * slot.normal).cast<float>(),
-        (slot.normal_N * slot.normal + tangential).cast<float>(), static_cast<float>(slot.depth_m)};
+    slot.friction_N = friction(slot, hand, pressed_N, step_s);
+    force += slot.friction_N;
   }
-  if (held_) out.status |= kRemoteCorrectionsHeld;
-  out.contactForce_N = force;
+  return force;
+}
+
+Vec3 RemoteContacts::forceAgain(const Change& change, const RemoteHand& hand, double step_s) noexcept {
+  for (std::size_t i = 0; i < top_; ++i) static_cast<Rendered&>(slots_[i]) = before_.rendered[i];
+  corrections_ = before_.corrections;
+  return forceWith(change, hand, step_s);
+}
+
+// As large a part of the changes as the rate allows; the fade comes first, because it must end in time.
+Vec3 RemoteContacts::forceWithin(const Change& most, const RemoteHand& hand, double step_s) noexcept {
+  const double most_N = kOfAll_N_per_s * step_s;
+  const Vec3 unchanged = forceAgain({}, hand, step_s);
+  Change change{0, most.fade};
+  Vec3 force = forceAgain(change, hand, step_s);
+  for (int i = 0; i < kTries && (force - unchanged).norm() > kFadeOfAll * most_N; ++i) {
+    change.fade *= 0.9 * kFadeOfAll * most_N / (force - unchanged).norm();
+    force = forceAgain(change, hand, step_s);
+  }
+  const Vec3 faded = force;
+  const double left_N = std::max(most_N - (faded - unchanged).norm(), kLeast * most_N);
+  change.correction_N = most.correction_N;
+  force = forceAgain(change, hand, step_s);
+  for (int i = 0; i < kTries && (force - faded).norm() > left_N; ++i) {
+    change.correction_N *= 0.9 * left_N / (force - faded).norm();
+    force = forceAgain(change, hand, step_s);
+  }
   return force;
 }
 
@@ -122,11 +176,11 @@ void RemoteContacts::take(const RemoteContactSet& set, const RemoteHand& hand, N
   }
   double leaving_N = 0;
   for (const Slot& slot : inUse()) leaving_N += slot.used && !slot.stated ? slot.demand_N : 0;
+  const Nanos length = base::toNanos(leaving_N / kFade_N_per_s);
   for (Slot& slot : inUse()) {
-    if (!slot.used || slot.stated || slot.fade > 0) continue;
-    const Nanos length = std::max<Nanos>(base::toNanos(leaving_N / kFade_N_per_s), 1);
-    slot.end = std::min(slot.end, now + length);
-    slot.fade = std::max<Nanos>(slot.end - now, 1);
+    if (!slot.used || slot.stated || slot.fading) continue;
+    slot.fading = true;
+    slot.fadeEnd = std::min(slot.end, now + length);
   }
 }
 
@@ -137,10 +191,12 @@ void RemoteContacts::replace(Slot& slot, const RemoteContact& contact, const Rem
   const double stiffness = slot.contact.stiffness_N_per_m;
   double spring_N = 0;
   Vec3 normal = contact.normal;
+  Vec3 velocity = Vec3::Zero();
   if (known) {
     locate(slot, hand, now);
-    resumed_ = resumed_ || slot.fade > 0;
-    spring_N = gain(slot, now) * slot.contact.stiffness_N_per_m * std::max(0.0, slot.depth_m);
+    velocity = slot.velocity;
+    resumed_ = resumed_ || slot.fading;
+    spring_N = slot.gain * slot.contact.stiffness_N_per_m * std::max(0.0, slot.depth_m);
     normal = slot.normal;
   } else {
     slot = Slot{};
@@ -154,11 +210,13 @@ void RemoteContacts::replace(Slot& slot, const RemoteContact& contact, const Rem
   slot.contact = contact;
   slot.statedAt = set.stated;
   slot.end = set.received + contact.lifetime;
-  slot.fade = 0;
+  slot.fading = false;
+  slot.gain = 1;
   slot.shift_m = 0;
   slot.turn.setZero();
+  slot.drift_m_per_s.setZero();
   locate(slot, hand, now);
-  if (!known) slot.velocity = slot.stated_m_per_s;
+  if (known) slot.drift_m_per_s = velocity - slot.velocity;
   if (spring_N <= 0) {
     slot.shift_m = std::min(0.0, -slot.depth_m);
   } else {
@@ -171,37 +229,47 @@ void RemoteContacts::replace(Slot& slot, const RemoteContact& contact, const Rem
 
 // The fade of all contacts that end together takes the time in which their force may fall.
 void RemoteContacts::fadeOut(Nanos now, double step_s) noexcept {
-  const Nanos needed = base::toNanos(pressed_N / kFade_N_per_s + step_s);
+  const auto pressing =
+      std::ranges::count_if(inUse(), [](const Slot& s) { return s.used && s.normal_N > 0; });
+  const Nanos needed = base::toNanos((pressing > 1 ? kEarly : 1) * pressed_N / kFade_N_per_s + step_s);
   std::size_t top = 0;
   for (Slot& slot : inUse()) {
     if (!slot.used) continue;
-    const Nanos left = slot.end - now;
-    if (left <= 0) {
-      slot.used = false;
-    } else if (slot.fade == 0 && left <= needed) {
-      slot.fade = left;
+    if (!slot.fading && slot.end - now <= needed) {
+      slot.fading = true;
+      slot.fadeEnd = slot.end;
     }
-    if (slot.used) top = static_cast<std::size_t>(&slot - slots_.data()) + 1;
+    if (slot.end <= now || (slot.fading && slot.gain <= 0)) {
+      slot.used = false;
+      continue;
+    }
+    const double left_s = std::max(0.0, base::toSeconds(slot.fadeEnd - now));
+    slot.fadeStep = slot.gain * step_s / (left_s + step_s);
+    top = static_cast<std::size_t>(&slot - slots_.data()) + 1;
   }
   top_ = top;
-}
-
-double RemoteContacts::gain(const Slot& slot, Nanos now) noexcept {
-  if (slot.fade == 0) return 1;
-  return std::clamp(static_cast<double>(slot.end - now) / static_cast<double>(slot.fade), 0.0, 1.0);
 }
 
 void RemoteContacts::locate(Slot& slot, const RemoteHand& hand, Nanos now) noexcept {
   const double age_s = std::clamp(base::toSeconds(now - slot.statedAt), 0.0, kLongestAge_s);
   const SurfaceAt at = surfaceAt(slot.contact, age_s, hand.position_m);
   slot.depth_m = at.depth_m + slot.shift_m;
-  slot.stated_m_per_s = slot.contact.velocity_m_per_s;
+  slot.velocity = slot.contact.velocity_m_per_s;
   if (!slot.contact.angularVelocity_rad_per_s.isZero(0)) {
-    slot.stated_m_per_s += slot.contact.angularVelocity_rad_per_s.cross(hand.position_m - at.point_m);
-    const double speed = slot.stated_m_per_s.norm();
-    if (speed > kRemoteSpeed_m_per_s) slot.stated_m_per_s *= kRemoteSpeed_m_per_s / speed;
+    slot.velocity += slot.contact.angularVelocity_rad_per_s.cross(hand.position_m - at.point_m);
+    const double square = slot.velocity.squaredNorm();
+    if (square > kRemoteSpeed_m_per_s * kRemoteSpeed_m_per_s)
+      slot.velocity *= kRemoteSpeed_m_per_s / std::sqrt(square);
   }
-  slot.normal = rotatedBy(slot.turn, at.normal);
+  slot.velocity += slot.drift_m_per_s;
+  slot.normal = slot.turn.isZero(0) ? at.normal : turnedBy(slot.turn, at.normal);
+}
+
+bool RemoteContacts::isCorrected(const Slot& slot) noexcept {
+  const RemoteContact& c = slot.contact;
+  return slot.shift_m == 0 && slot.turn.isZero(0) && slot.drift_m_per_s.isZero(0) &&
+         slot.damping == c.damping_Ns_per_m && slot.staticFriction == c.staticFriction &&
+         slot.dynamicFriction == c.dynamicFriction;
 }
 
 // Takes back shift and turn and lets velocity, damping and friction follow, together within the budget. A
@@ -212,12 +280,14 @@ void RemoteContacts::correct(Slot& slot, const RemoteHand& hand, double budget_N
     slot.depth_m -= slot.shift_m;
     slot.shift_m = 0;
     slot.turn.setZero();
-    slot.velocity = slot.stated_m_per_s;
+    slot.velocity -= slot.drift_m_per_s;
+    slot.drift_m_per_s.setZero();
     slot.damping = c.damping_Ns_per_m;
     slot.staticFriction = c.staticFriction;
     slot.dynamicFriction = c.dynamicFriction;
     return;
   }
+  if (isCorrected(slot)) return;
   budget_N /= 1 + slot.staticFriction;
   if (slot.shift_m != 0 && slot.depth_m <= 0) {  // free: up to the HIP at once
     const double stated_m = slot.depth_m - slot.shift_m;
@@ -242,17 +312,20 @@ void RemoteContacts::correct(Slot& slot, const RemoteHand& hand, double budget_N
     budget_N = std::max(0.0, budget_N - std::abs(after_N - before_N));
   }
   const double force_N = slot.demand_N;
-  const double angle = slot.turn.norm();
-  if (angle > 0) {
+  if (const double angle = slot.turn.norm(); angle > 0) {
     const double left = towards(angle, 0, force_N, budget_N);
-    slot.normal = rotatedBy((left - angle) / angle * slot.turn, slot.normal);
+    slot.normal = turnedBy((left - angle) / angle * slot.turn, slot.normal);
     slot.turn *= left / angle;
+  } else {
+    slot.turn.setZero();
   }
-  const Vec3& stated = slot.stated_m_per_s;
-  const double apart = (stated - slot.velocity).norm();
-  if (apart > 0) {
+  if (const double apart = slot.drift_m_per_s.norm(); apart > 0) {
     const double left = towards(apart, 0, force_N > 0 ? slot.damping : 0, budget_N);
-    slot.velocity = stated + left / apart * (slot.velocity - stated);
+    const Vec3 back = (left / apart - 1) * slot.drift_m_per_s;
+    slot.drift_m_per_s += back;
+    slot.velocity += back;
+  } else {
+    slot.drift_m_per_s.setZero();  // the norm of the smallest numbers is 0, although they are not
   }
   const double leaving = slot.normal.dot(hand.velocity_m_per_s - slot.velocity);
   slot.damping = towards(slot.damping, c.damping_Ns_per_m,
@@ -263,7 +336,7 @@ void RemoteContacts::correct(Slot& slot, const RemoteHand& hand, double budget_N
 
 // Spring and damper. The damper exerts no more than the spring, so that a touch begins without a step and the
 // surface never pulls.
-void RemoteContacts::demand(Slot& slot, const RemoteHand& hand, Nanos now) noexcept {
+void RemoteContacts::demand(Slot& slot, const RemoteHand& hand) noexcept {
   slot.demand_N = 0;
   if (slot.depth_m <= 0) {
     slot.normal_N = 0;
@@ -272,49 +345,30 @@ void RemoteContacts::demand(Slot& slot, const RemoteHand& hand, Nanos now) noexc
   const double spring_N = slot.contact.stiffness_N_per_m * slot.depth_m;
   const double leaving = slot.normal.dot(hand.velocity_m_per_s - slot.velocity);
   const double damper_N = std::clamp(slot.damping * leaving, -spring_N, spring_N);
-  slot.demand_N = gain(slot, now) * (spring_N - damper_N);
+  slot.demand_N = slot.gain * (spring_N - damper_N);
 }
 
-// Each contact adds what the others do not already exert along its normal, so that surfaces on top of each
-// other are as stiff as one, and surfaces across each other add up.
+// The normal force of all contacts together, beside that of meshes and planes.
 Vec3 RemoteContacts::share(const RemoteHand& hand) noexcept {
-  std::array<Slot*, kSlots> active;
-  std::size_t count = 0;
+  PressingContacts pressing;
+  std::array<Slot*, kSlots> slots;
   for (Slot& slot : inUse()) {
     if (slot.used && slot.demand_N > 0) {
-      active[count++] = &slot;
+      slots[pressing.count] = &slot;
+      const double scene_N = std::max(0.0, slot.normal.dot(hand.sceneForce_N));
+      pressing.add(slot.normal, slot.demand_N - scene_N, slot.normal_N);
     } else {
       slot.normal_N = 0;
     }
   }
+  shareNormalForce(pressing);
   pressed_N = 0;
   Vec3 force = Vec3::Zero();
-  if (count == 0) return force;
-  std::array<double, kSlots> wanted;
-  std::array<std::array<double, kSlots>, kSlots> overlap;
-  for (std::size_t i = 0; i < count; ++i) {
-    wanted[i] = active[i]->demand_N - std::max(0.0, active[i]->normal.dot(hand.sceneForce_N));
-    for (std::size_t j = 0; j < i; ++j)
-      overlap[i][j] = overlap[j][i] = std::max(0.0, active[i]->normal.dot(active[j]->normal));
-  }
-  // The shares of the last tick are nearly those of this one.
-  double change = kConverged_N;
-  for (int sweep = 0; sweep < kSweeps && change >= kConverged_N; ++sweep) {
-    change = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-      double rest = wanted[i];
-      for (std::size_t j = 0; j < count; ++j) {
-        if (j != i) rest -= overlap[i][j] * active[j]->normal_N;
-      }
-      rest = std::max(0.0, rest);
-      change = std::max(change, std::abs(rest - active[i]->normal_N));
-      active[i]->normal_N = rest;
-    }
-    if (count == 1) break;
-  }
-  for (std::size_t i = 0; i < count; ++i) {
-    force += active[i]->normal_N * active[i]->normal;
-    pressed_N += active[i]->normal_N;
+  for (std::size_t i = 0; i < pressing.count; ++i) {
+    Slot& slot = *slots[i];
+    slot.normal_N = pressing.share_N[i];
+    force += slot.normal_N * slot.normal;
+    pressed_N += slot.normal_N;
   }
   return force;
 }

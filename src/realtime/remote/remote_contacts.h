@@ -34,28 +34,36 @@ class RemoteContacts {
   // Those of the newest set, and as many that fade out.
   static constexpr std::size_t kSlots = 2 * kMaxRemoteContacts;
 
-  struct Slot {
-    bool used = false;
-    bool stated = false;  // in the newest set
-    RemoteContact contact;
-    Nanos statedAt = 0;
-    Nanos end = 0;
-    Nanos fade = 0;                // length of the fade to `end`; 0: it has not begun
-    double shift_m = 0;            // of the rendered surface, out of the material
-    Vec3 turn = Vec3::Zero();      // rotation vector from the stated to the rendered normal
-    Vec3 velocity = Vec3::Zero();  // of the surface for damper and friction
+  // What a tick changes, and may try again.
+  struct Rendered {
+    double shift_m = 0;                 // of the rendered surface, out of the material
+    Vec3 turn = Vec3::Zero();           // rotation vector from the stated to the rendered normal
+    Vec3 drift_m_per_s = Vec3::Zero();  // rendered velocity of the surface less the stated one
     double damping = 0;
     double staticFriction = 0;
     double dynamicFriction = 0;
     Vec3 anchor_m = Vec3::Zero();
     bool sliding = false;
+    double gain = 1;  // falls to 0 in a fade
 
     // Of this tick.
-    Vec3 stated_m_per_s = Vec3::Zero();  // velocity of the surface at the HIP, as stated
+    Vec3 velocity = Vec3::Zero();  // of the surface at the HIP, for damper and friction
     double depth_m = 0;
     Vec3 normal = Vec3::UnitY();
     double demand_N = 0;  // normal force that this contact alone would exert
     double normal_N = 0;  // its share of the normal force of all
+    Vec3 friction_N = Vec3::Zero();
+  };
+
+  struct Slot : Rendered {
+    bool used = false;
+    bool stated = false;  // in the newest set
+    RemoteContact contact;
+    Nanos statedAt = 0;
+    Nanos end = 0;  // of its life
+    bool fading = false;
+    Nanos fadeEnd = 0;    // at most `end`
+    double fadeStep = 0;  // by which the gain falls in this tick
   };
 
   void take(const RemoteContactSet& set, const RemoteHand& hand, Nanos now) noexcept;
@@ -63,19 +71,34 @@ class RemoteContacts {
                Nanos now) noexcept;
   std::span<Slot> inUse() noexcept { return {slots_.data(), top_}; }
   Slot* slotFor(std::int32_t id) noexcept;
+  // What a tick changes besides following the hand and the stated motion.
+  struct Change {
+    double correction_N = 0;  // for each contact
+    double fade = 0;          // share of the fade steps
+  };
+  // Of one tick, which may be tried again with smaller changes.
+  struct Tried {
+    std::array<Rendered, kSlots> rendered;
+    EnergyTank corrections{EnergyBudget{}};
+  };
+  Vec3 forceWith(const Change& change, const RemoteHand& hand, double step_s) noexcept;
+  Vec3 forceAgain(const Change& change, const RemoteHand& hand, double step_s) noexcept;
+  Vec3 forceWithin(const Change& most, const RemoteHand& hand, double step_s) noexcept;
   void fadeOut(Nanos now, double step_s) noexcept;
-  static double gain(const Slot& slot, Nanos now) noexcept;
   static void locate(Slot& slot, const RemoteHand& hand, Nanos now) noexcept;
+  static bool isCorrected(const Slot& slot) noexcept;
   void correct(Slot& slot, const RemoteHand& hand, double budget_N, double step_s) noexcept;
-  static void demand(Slot& slot, const RemoteHand& hand, Nanos now) noexcept;
+  static void demand(Slot& slot, const RemoteHand& hand) noexcept;
   Vec3 share(const RemoteHand& hand) noexcept;
   static Vec3 friction(Slot& slot, const RemoteHand& hand, double ofAll, double step_s) noexcept;
 
   std::array<Slot, kSlots> slots_;
   std::uint64_t taken_ = 0;
-  std::size_t top_ = 0;   // slots from here on are unused
-  bool resumed_ = false;  // an update came during a fade
-  double pressed_N = 0;   // sum of the normal forces in the last tick
+  std::size_t top_ = 0;          // slots from here on are unused
+  bool resumed_ = false;         // an update came during a fade
+  Tried before_;                 // before this tick's corrections, where there are some
+  Vec3 force_N_ = Vec3::Zero();  // of the last tick
+  double pressed_N = 0;          // sum of the normal forces in the last tick
   EnergyTank corrections_{EnergyBudget{}};
   bool held_ = false;  // a correction waited for energy in this tick
 };

@@ -12,6 +12,9 @@ struct SurfaceAt {
   Vec3 point_m = Vec3::Zero();  ///< the stated point, carried along
 };
 
+/// `v` turned by a rotation vector, of at most some turns.
+Vec3 turnedBy(const Vec3& rotation, const Vec3& v) noexcept;
+
 /// The surface `age_s` after it was stated, carried by its velocities.
 SurfaceAt surfaceAt(const RemoteContact& contact, double age_s, const Vec3& hip_m) noexcept;
 

@@ -20,6 +20,7 @@ constexpr double kRoundingFloor = 1e-12;    // of the largest coordinate: a thou
 constexpr double kSmallestObject_m = 1e-3;  // below this size the HIP's coordinates dominate the rounding
 constexpr double kWiden = 1 + 1e-6;         // covers the rounding of queries that change frames
 constexpr double kReserveShare = 0.2;       // share of the tool radius that is gathered in reserve
+constexpr int kNoReserve = 50;              // ticks without one, after one that did not fit
 constexpr int kReuseLimit = 32;  // reuse the cached facets up to this count instead of querying again
 
 scene::Corners mapped(const Affine& t, const scene::Corners& c, bool mirrored) {
@@ -66,7 +67,8 @@ void ContactQuery::beginTick(const SceneAtTime& now, const SceneAtTime& before,
   minSkin_ = kRelativeSkin;
   radius_ = toolRadius_;
   overflowed_ = false;
-  visits_ = 0;
+  work_ = 0;
+  noReserve_ = std::max(0, noReserve_ - 1);
   if (now.scene == before.scene) return;
   ++generation_;
   allAppeared_ = allAppeared_ || before.scene == nullptr || before.scene->faces != now.scene->faces;
@@ -218,14 +220,15 @@ bool ContactQuery::place(const ObjectState& state, PlacedObject& placed) const n
   placed.mirrored = determinant < 0;
   placed.T_object_device = placed.T_device_object.inverse();
   placed.stretch = stretchOf(placed.T_object_device.linear());
+  placed.stretchAlong = placed.T_object_device.linear().rowwise().norm();
   if (!std::isfinite(placed.stretch) || determinant == 0) return false;  // flattened by its placement
   const Vec3 farthest =
       (placed.T_device_object * box.centre()).cwiseAbs() + linear.cwiseAbs() * (0.5 * box.extents());
   const double extent = std::max(farthest.maxCoeff(), kSmallestObject_m);
   const double size = 0.5 * box.extents().maxCoeff() / placed.stretch;
   placed.skin = std::max(std::min(kRelativeSkin * extent, kPadShare * size), kRoundingFloor * extent);
-  // Vertices are floats in the frame of their object, and clients compute its placement from floats of the
-  // scene.
+  // Two objects that meet were rounded to floats in frames of their own: a gap grows with the coordinates on
+  // the device as well as with those of the object's own frame.
   const Vec3 largest = linear.cwiseAbs() * box.min.cwiseAbs().cwiseMax(box.max.cwiseAbs());
   placed.radius = std::max(toolRadius_, 0.5 * geometry::gapToleranceOf(std::max(extent, largest.maxCoeff())));
   return std::isfinite(placed.skin);
@@ -249,6 +252,21 @@ void ContactQuery::compareWithBefore(PlacedObject& placed) const noexcept {
       !sameWorkspace_ && scene::longestMove(placed.T_device_objectBefore, placed.T_device_object,
                                             state.mesh->index.bounds()) > kLongestMotion_m;
   placed.jumped = !sameTriangles || before.motion.jumps() != state.motion.jumps() || farWorkspace;
+}
+
+// The index is asked for a ball in the object's frame, which is an ellipsoid in the device frame. Of the
+// triangles of an object that is scaled unevenly, most are beyond the box around it.
+bool ContactQuery::mayReach(const PlacedObject& placed, std::uint32_t triangle, const Vec3& inObject,
+                            double reach_m) noexcept {
+  constexpr double kUneven = 0.8;
+  if (placed.stretchAlong.minCoeff() > kUneven * placed.stretch) return true;
+  const scene::Corners k = placed.state->mesh->corners(triangle, now_.time);
+  const Vec3 low = k.a.cwiseMin(k.b).cwiseMin(k.c);
+  const Vec3 high = k.a.cwiseMax(k.b).cwiseMax(k.c);
+  const Vec3 beyond = (low - inObject).cwiseMax(inObject - high);
+  if (!(beyond.array() > reach_m * kWiden * placed.stretchAlong.array()).any()) return true;
+  ++work_;
+  return false;
 }
 
 // Facets of objects at rest stay the same from tick to tick. Null for a degenerate triangle; valid until the
@@ -276,9 +294,14 @@ bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
     gatheredFrom_[static_cast<std::size_t>(i)] = placed.state;
     reusable = reusable && placed.atRest && !placed.deformed;
     const Vec3 inObject = placed.T_object_device * centre;
+    const double reach = radius + placed.radius + 4 * placed.skin;
     // Deforming facets count at any distance: they may have come from farther away.
     const auto visit = [&](std::uint32_t triangle) noexcept -> bool {
-      ++visits_;
+      if (!placed.deformed && !mayReach(placed, triangle, inObject, reach)) {
+        if (workSpent()) cache_.invalidate();
+        return cache_.complete();
+      }
+      work_ += kVisit;
       if (!keepsFacets_) {
         const double distance = distanceBound(placed.state->mesh->corners(triangle, now_.time), inObject);
         cache_.add({triangle, i}, distance / (kWiden * placed.stretch), placed.skin, placed.deformed);
@@ -288,7 +311,6 @@ bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
       if (workSpent()) cache_.invalidate();
       return cache_.complete();
     };
-    const double reach = radius + placed.radius + 4 * placed.skin;
     placed.state->mesh->index.visitNear(inObject, reach * kWiden * placed.stretch, visit);
     if (!cache_.complete()) break;
   }
@@ -302,7 +324,11 @@ bool ContactQuery::ensureGathered(const Vec3& centre, double radius) noexcept {
   // A fast tick gathers too many for the slow ticks after it.
   const bool smallEnough = cache_.size() <= kReuseLimit || cache_.reach() <= 2 * std::max(radius, reserve);
   if (smallEnough && cache_.covers(centre, radius)) return true;
-  return (reserve > radius && gather(centre, reserve)) || gather(centre, radius);
+  if (reserve > radius && noReserve_ == 0) {
+    if (gather(centre, reserve)) return true;
+    noReserve_ = kNoReserve;
+  }
+  return gather(centre, radius);
 }
 
 bool ContactQuery::sameObjects() const noexcept {
@@ -324,6 +350,7 @@ bool ContactQuery::castAtFacet(const Facet& f, const Vec3& p, const Vec3& g, Obj
 // A total order on hits, so that the first one does not depend on the order of visits.
 void ContactQuery::considerFacet(const Facet& f, const Path& path, ObjectHit& best,
                                  bool& found) const noexcept {
+  if (f.object >= 0 && (passable_ >> static_cast<unsigned>(f.object) & 1U) != 0) return;
   ObjectHit hit;
   const double latest = found ? best.stop : path.end;
   if (!castBall(f, faces(), path.p, path.d, 1, latest, hit) || hit.stop > latest) return;
@@ -365,13 +392,15 @@ bool ContactQuery::castAtFacets(const Path& path, int only, ObjectHit& hit) noex
   return found;
 }
 
-double ContactQuery::freeOfFaces(const Vec3& p, const Vec3& g) noexcept {
+double ContactQuery::freeOfFaces(const Vec3& p, const Vec3& g, bool closesGaps) noexcept {
   std::array<const Facet*, FacetCache::kMaxFacets> candidates;
   const Vec3 d = g - p;
   if (!ensureGathered(p, d.norm())) return 0;
   const int count = cache_.facetsNearPath(p, d, candidates.data());
   double free = 1;
   const auto meet = [&](Facet facet) {
+    double stop = 1;
+    if (closesGaps && castPoint(facet, faces(), p, d, facet.radius, stop)) free = std::min(free, stop);
     facet.radius = 0;
     CastHit hit;
     if (castBall(facet, faces(), p, d, 1, free, hit)) free = std::min(free, hit.stop);
@@ -426,11 +455,13 @@ bool ContactQuery::castAtEach(const Path& path, int only, ObjectHit& hit) noexce
   for (int i = 0; i < objectCount_; ++i) {
     if (only >= 0 && i != only) continue;
     const PlacedObject& placed = object(i);
-    const double radius = (reach + placed.radius + 4 * placed.skin) * kWiden * placed.stretch;
-    placed.state->mesh->index.visitNear(placed.T_object_device * middle, radius,
+    const double reach_m = reach + placed.radius + 4 * placed.skin;
+    const Vec3 inObject = placed.T_object_device * middle;
+    placed.state->mesh->index.visitNear(inObject, reach_m * kWiden * placed.stretch,
                                         [&](std::uint32_t triangle) noexcept -> bool {
                                           if (workSpent()) return false;
-                                          ++visits_;
+                                          if (!mayReach(placed, triangle, inObject, reach_m)) return true;
+                                          work_ += kVisit;
                                           const Facet* const f = facetOf(i, triangle);
                                           if (f != nullptr) considerFacet(*f, path, hit, found);
                                           return true;
@@ -475,6 +506,13 @@ bool ContactQuery::cast(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept {
     if (free == 1) return false;
   }
   return castInSteps(p, d, free, -1, hit);
+}
+
+bool ContactQuery::castPast(std::uint64_t passable, const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept {
+  passable_ = passable;
+  const bool found = cast(p, g, hit);
+  passable_ = 0;
+  return found;
 }
 
 bool ContactQuery::castWithinGathered(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept {

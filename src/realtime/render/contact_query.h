@@ -34,7 +34,9 @@ struct PlacedObject {
   const scene::ObjectState* state = nullptr;
   Affine T_device_object = Affine::Identity();
   Affine T_object_device = Affine::Identity();
-  double stretch = 1;                ///< largest number of object units per metre, over all directions
+  double stretch = 1;  ///< largest number of object units per metre, over all directions
+  /// Largest number of object units per metre along each axis of the object.
+  Vec3 stretchAlong = Vec3::Ones();
   double skin = 0;                   ///< see facet.h
   double radius = 0;                 ///< of the ball that touches it; see kGapTolerance_m
   bool atRest = false;               ///< neither moves nor deforms any more in this scene
@@ -125,11 +127,14 @@ class ContactQuery {
   bool cast(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept;
   /// The same for the start of the path only: as far as the gathered facets reach.
   bool castWithinGathered(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept;
+  /// As cast(), through the objects whose bits are set in `passable`.
+  bool castPast(std::uint64_t passable, const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept;
   /// The same against one object only.
   bool castAtObject(int object, const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept;
 
   /// The share of the path from p to g on which a point, rather than a ball, meets no face. For a point tool.
-  double freeOfFaces(const Vec3& p, const Vec3& g) noexcept;
+  /// With `closesGaps` it passes none that the ball does not pass.
+  double freeOfFaces(const Vec3& p, const Vec3& g, bool closesGaps = false) noexcept;
   /// The same against one facet.
   bool castAtFacet(const Facet& f, const Vec3& p, const Vec3& g, ObjectHit& hit) const noexcept;
 
@@ -143,11 +148,12 @@ class ContactQuery {
   /// True when objects or facets had to be left out in this tick.
   bool overflowed() const noexcept { return overflowed_; }
   /// True when this tick examined kMaxVisits triangles.
-  bool workSpent() const noexcept { return visits_ >= kMaxVisits; }
+  bool workSpent() const noexcept { return work_ >= kMaxVisits * kVisit; }
 
  private:
   static constexpr int kMaxObjects = 64;
   static constexpr int kMemoBits = 8;
+  static constexpr int kVisit = 4;
 
   // The result of makeFacet(); generation 0: not valid in the next tick.
   struct MemoFacet {
@@ -173,6 +179,8 @@ class ContactQuery {
   bool place(const scene::ObjectState& state, PlacedObject& placed) const noexcept;
   bool sameObjects() const noexcept;
   void compareWithBefore(PlacedObject& placed) const noexcept;
+  bool mayReach(const PlacedObject& object, std::uint32_t triangle, const Vec3& inObject,
+                double reach_m) noexcept;
   const Facet* facetOf(int object, std::uint32_t triangle) const noexcept;
   void considerFacet(const Facet& f, const Path& path, ObjectHit& best, bool& found) const noexcept;
   bool castGathered(const Path& path, int only, ObjectHit& hit) noexcept;
@@ -202,6 +210,7 @@ class ContactQuery {
   Vec3 freeFrom_ = Vec3::Zero();
   double minSkin_ = 0;
   FacetCache cache_;
+  int noReserve_ = 0;    // ticks in which none is gathered: there were too many triangles for it
   int lastBlocker_ = 0;  // the gathered facet that blocked the last cast of a ball
   // Generation and objects of the last gather(); 0: not reusable in another tick.
   std::uint64_t gatheredGeneration_ = 0;
@@ -210,7 +219,8 @@ class ContactQuery {
   std::uint64_t generation_ = 1;  // of all that is kept from tick to tick
   mutable std::array<MemoFacet, 1U << kMemoBits> facetMemo_;
   bool overflowed_ = false;
-  int visits_ = 0;  // of triangles, in this tick
+  int work_ = 0;                // of this tick: kVisit for a triangle, 1 for one that its box rules out
+  std::uint64_t passable_ = 0;  // objects that the present cast does not meet
 };
 
 template <class Visit>

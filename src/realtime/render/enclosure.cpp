@@ -53,7 +53,7 @@ class Test {
     const Vec3 d = (ray % 2 == 0 ? reach_ : -reach_) * kLines[static_cast<std::size_t>(ray / 2)];
     int sum = 0;
     mesh_.index.visitSegment(p_, p_ + d, [&](std::uint32_t triangle) noexcept {
-      if (--budget_.visits <= 0) return 0.0;
+      if (--budget_.visits <= 0) return -1.0;
       sum += crossing(mesh_.corners(triangle, now_), p_, d);
       return 1.0;
     });
@@ -68,11 +68,12 @@ class Test {
     if (radius_m == 0) return false;
     bool within = false;
     const Vec3 at = object_.T_device_object * p_;
-    mesh_.index.visitNear(p_, radius_m * object_.stretch, [&](std::uint32_t triangle) noexcept {
-      if (within || --budget_.visits <= 0) return;
+    mesh_.index.visitNear(p_, radius_m * object_.stretch, [&](std::uint32_t triangle) noexcept -> bool {
+      if (--budget_.visits <= 0) return false;
       Facet facet;
-      if (!makeFacet(object_.corners(triangle, now_), object_.skin, facet)) return;
+      if (!makeFacet(object_.corners(triangle, now_), object_.skin, facet)) return true;
       within = (nearestPointOf(facet, at) - at).norm() < radius_m;
+      return !within;
     });
     return within || isSpent();
   }

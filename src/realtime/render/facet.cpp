@@ -71,7 +71,7 @@ bool castBallAtEdges(const Facet& f, const Vec3& up, const Vec3& p, const Vec3& 
     if (n.dot(up) > kFlat) n = up;
     const double slope = n.dot(d);
     if (!stopped && distance <= standoff + fine) {
-      out = {t, -slope, {n, foot, standoff}};
+      out = {t, -slope, {n, foot, standoff}, n != up};
       stopped = true;
     }
     if (!(slope < 0)) return false;
@@ -159,20 +159,30 @@ bool castBall(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d
   const double standoff = f.radius + f.skin;
   const double contact = standoff - 0.5 * f.skin;
   Heights h;
-  if (!touchableSide(f, faces, p, d, limit, h) || !(h.end < standoff)) return false;
+  if (!touchableSide(f, faces, p, d, limit, h)) return false;
   const double fall = (h.start - h.end) / limit;
-  if (!(h.start - latest * fall < standoff)) return false;
+  // A path that rises past the standoff may meet an edge before.
+  if (!(h.start < standoff) && !(h.start - latest * fall < standoff)) return false;
   if (beyondSide(f, p, latest * d, standoff)) return false;
   // Most paths end above the face itself.
   if (fall > 0 && h.end <= contact) {
     const double stop = std::max(0.0, (h.start - standoff) / fall);
     const double through = std::max(0.0, (h.start - contact) / fall);
     if (overFacet(f, p + stop * d, (through - stop) * d)) {
-      out = {stop, fall, {h.sign * f.normal, f.a, standoff}};
+      out = {stop, fall, {h.sign * f.normal, f.a, standoff}, false};
       return true;
     }
   }
   return castBallAtEdges(f, h.sign * f.normal, p, d, limit, latest, out);
+}
+
+bool castPoint(const Facet& f, scene::TouchableFaces faces, const Vec3& p, const Vec3& d, double widening,
+               double& stop) noexcept {
+  Heights h;
+  if (!touchableSide(f, faces, p, d, 1, h) || !(h.end < f.skin) || !(h.start > h.end)) return false;
+  stop = std::max(0.0, (h.start - f.skin) / (h.start - h.end));
+  const Vec3 x = p + stop * d;
+  return (x - nearestPointOf(f, x)).norm() <= widening + f.skin;
 }
 
 }  // namespace hapticd::realtime

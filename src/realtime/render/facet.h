@@ -31,6 +31,7 @@ struct CastHit {
   double stop = 0;
   double depth = 0;  ///< of the end of the path below the half-space; orders equal stops
   HalfSpace halfSpace;
+  bool atEdge = false;  ///< beside the face: the half-space touches the ball, not the face
 };
 
 /// False for triangles that are not finite or thinner than the skin: their neighbours are nearer than a ball
@@ -41,6 +42,10 @@ bool makeFacet(const scene::Corners& corners, double skin, Facet& facet) noexcep
 /// `latest`.
 bool castBall(const Facet& f, scene::TouchableFaces faces, const Vec3& p, const Vec3& d, double limit,
               double latest, CastHit& out) noexcept;
+
+/// The same for a point and a face that reaches `widening` beyond its edges; `stop` is at the skin.
+bool castPoint(const Facet& f, scene::TouchableFaces faces, const Vec3& p, const Vec3& d, double widening,
+               double& stop) noexcept;
 
 /// A lower bound of the distance of x from a triangle: the distance from the disc around it.
 double distanceBound(const scene::Corners& corners, const Vec3& x) noexcept;

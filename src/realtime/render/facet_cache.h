@@ -15,8 +15,9 @@ namespace hapticd::realtime {
 /// Servo thread: noexcept, no allocation.
 class FacetCache {
  public:
-  static constexpr int kMaxFacets = 512;      ///< for a point tool
-  static constexpr int kMaxTriangles = 1024;  ///< for a ball tool
+  static constexpr int kMaxFacets = 512;  ///< for a point tool
+  static constexpr int kMaxTriangles =
+      8192;  ///< for a ball tool; a bowl of its radius is within reach as a whole
 
   /// A triangle of a near object, both by index.
   struct TriangleId {

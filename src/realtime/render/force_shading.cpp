@@ -7,18 +7,21 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr double kSharp = 0.7;  // cosine of 45 degrees: sharper edges stay edges
+constexpr int kMostFaces = 1024;  // at a corner, in one tick
+constexpr double kSharp = 0.7;    // cosine of 45 degrees: sharper edges stay edges
 
 // Mean normal of the faces that meet at a corner and continue smoothly from the touched one, whose normal is
 // `face`. Corners are identified by position, so that unwelded meshes work.
 Vec3 cornerNormal(const PlacedObject& object, const Vec3& face, const Vec3& corner, Nanos now) {
   const scene::MeshGeometry& mesh = *object.state->mesh;
   Vec3 sum = Vec3::Zero();
-  mesh.index.visitNear(corner, 0, [&](std::uint32_t t) noexcept {
+  int visits = 0;
+  mesh.index.visitNear(corner, 0, [&](std::uint32_t t) noexcept -> bool {
+    if (++visits > kMostFaces) return false;
     const scene::Corners inObject = mesh.corners(t, now);
     const scene::Corners k = object.corners(t, now);
     Facet f;
-    if (!makeFacet(k, object.skin, f) || f.normal.dot(face) < kSharp) return;
+    if (!makeFacet(k, object.skin, f) || f.normal.dot(face) < kSharp) return true;
     const auto add = [&](const Vec3& place, const Vec3& a, const Vec3& b, const Vec3& c) {
       if (place != corner) return;
       sum += std::acos(std::clamp((b - a).normalized().dot((c - a).normalized()), -1.0, 1.0)) * f.normal;
@@ -27,6 +30,7 @@ Vec3 cornerNormal(const PlacedObject& object, const Vec3& face, const Vec3& corn
     // A mirrored placement swaps the other two corners.
     add(object.mirrored ? inObject.c : inObject.b, k.b, k.c, k.a);
     add(object.mirrored ? inObject.b : inObject.c, k.c, k.a, k.b);
+    return true;
   });
   return sum;
 }

@@ -16,6 +16,7 @@ constexpr int kExaminations = 64;         // in a tick, of bounds that have run 
 constexpr int kUnknownExaminations = 32;  // in a tick, of objects without a bound
 constexpr int kTurns = 2;                 // in a tick, of others
 constexpr int kMovesFollowed = 64;        // in a tick: the bounds of further objects that moved are lost
+constexpr int kMostTriangles = 2048;      // in one examination; beyond, the object counts as touching
 constexpr int kLookAhead = 64;            // when objects were added or removed
 
 }  // namespace
@@ -38,7 +39,12 @@ double ObjectDistances::examine(const scene::ObjectState& state, const geometry:
   const double outside = (p - p.cwiseMax(box.min).cwiseMin(box.max)).norm();
   double nearest = kFarthest_m * stretch;
   if (outside < nearest) {
+    int visits = 0;
     mesh.index.visitNearest(p, nearest, [&](std::uint32_t triangle) noexcept {
+      if (++visits > kMostTriangles) {
+        nearest = 0;
+        return -1.0;
+      }
       const scene::Corners now_ = mesh.corners(triangle, now);
       return nearest = std::min(nearest, distanceBound(now_, p));
     });

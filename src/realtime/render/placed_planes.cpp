@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/time.h"
 #include "realtime/render/release.h"
@@ -105,6 +106,7 @@ bool PlacedPlanes::placeOne(const geometry::Affine& T_world_device, Nanos now, c
     placed.surface.damping_Ns_per_m *= left;
   }
   const double raised = heightOf(plane, memory, now, normal, proxy, 1 / unitsPerMetre);
+  placed.rests = !fresh && raised == std::exchange(memory.raised_m, raised);
   placed.facet.unbounded = true;
   placed.facet.normal = normal;
   placed.facet.a = hip - normal * (hipHeight - raised);

@@ -20,6 +20,7 @@ struct PlacedPlane {
   Facet facet;                  ///< unbounded, device metres; facet.object is -1 - index
   scene::Surface surface;       ///< weaker while the plane ramps out
   double insertionDepth_m = 0;  ///< depth of the HIP at the placement; 0 unless placed in this tick
+  bool rests = false;           ///< its surface is where it was in the tick before
 
   /// The share of its stiffness that is left, 1 … 0; 0 also without stiffness.
   double presence() const noexcept {
@@ -44,6 +45,11 @@ class PlacedPlanes {
   const PlacedPlane* begin() const noexcept { return planes_.data(); }
   const PlacedPlane* end() const noexcept { return planes_.data() + count_; }
   const PlacedPlane& operator[](int i) const noexcept { return planes_[static_cast<std::size_t>(i)]; }
+  /// Lowers a plane for this tick.
+  void lower(int i, double depth_m) noexcept {
+    Facet& facet = planes_[static_cast<std::size_t>(i)].facet;
+    facet.a -= depth_m * facet.normal;
+  }
 
   /// Adhesive force on a HIP that leaves, device frame, newtons. A plane whose limit is exceeded lets go.
   Vec3 adhesion(const Vec3& hip, double toolRadius_m) noexcept;
@@ -56,6 +62,7 @@ class PlacedPlanes {
     Nanos releaseBegin = -1;
     double depth_m = 0;  ///< of the HIP at the placement
     scene::Surface surface;
+    double raised_m = 0;  ///< of the surface above the plane, in the last tick
     bool touched = false;
     bool adheres = false;
     Vec3 firstContact = Vec3::Zero();

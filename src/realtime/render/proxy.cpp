@@ -220,6 +220,9 @@ void Proxy::findConstraints(const Vec3& hip, ActiveSet& active) noexcept {
 bool Proxy::approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Vec3& goal) noexcept {
   const double skin = query_.minSkin();
   const int limit = stopAtFirst ? kMaxCasts + kReservedCasts : kMaxCasts;
+  // A face that the tool overlaps moves it out, by its own way in at most. Faces that leave it no room would
+  // move it far: their planes may meet anywhere.
+  const double farthest = (position_ - target).norm() + 2 * query_.radius() + 4 * skin;
   std::array<HalfSpace, kMaxHalfSpaces> halfSpaces;
   while (casts_ < limit) {
     for (int i = 0; i < active.count; ++i) {
@@ -228,7 +231,11 @@ bool Proxy::approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Ve
     const Projection nearest =
         projectOntoActiveSet(halfSpaces.data(), active.count, target, position_, skin / 16);
     goal = nearest.point;
-    if (!nearest.found) break;  // jammed
+    jammed_ = !nearest.found || (goal - target).norm() > farthest;
+    if (jammed_) {
+      goal = position_;
+      break;
+    }
     const ActiveSet all = active;
     active.count = nearest.count;
     for (int i = 0; i < nearest.count; ++i) {
@@ -287,11 +294,13 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
       const PlacedPlane& plane = planes_[-1 - hit.object];
       constraint.surface = plane.surface;
       constraint.presence = plane.presence();
+      constraint.rests = plane.rests;
       constraint.adhesion_N = plane.state->adhesionLateral_N;
     } else {
       const PlacedObject& object = query_.object(hit.object);
       constraint.object = object.state->id;
       constraint.surface = object.state->surface;
+      constraint.rests = object.before != nullptr && !object.moved && !object.deformed && !object.jumped;
       if (!object.jumped) {
         const Vec3 carried = carriedBy(object, hit.triangle, positionBefore_);
         constraint.surfaceVelocity_m_per_s = (carried - positionBefore_) / period_s_;
@@ -318,6 +327,11 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
 // The proxy on the faces that hold it, at their skins so that rounding does not put it behind one of them.
 // Another face may be in between: where the planes of two faces meet behind it, or where it moved.
 Vec3 Proxy::onFaces(const Vec3& hip, const ActiveSet& active) noexcept {
+  // Only the ball touches: the HIP itself is free.
+  if (contactSet_.normal_m.isZero(0))
+    return position_ + query_.freeOfFaces(position_, hip) * (hip - position_);
+  // Where faces leave the tool no room, their planes may meet anywhere.
+  if (jammed_) return position_;
   const int count = std::min(active.count, kMaxActive);
   std::array<double, kMaxActive> depths{};
   depthsOf(active.hits.data(), count, query_.minSkin(), position_ - hip, hip, depths.data());
@@ -326,29 +340,65 @@ Vec3 Proxy::onFaces(const Vec3& hip, const ActiveSet& active) noexcept {
     const auto k = static_cast<std::size_t>(i);
     place += depths[k] * active.hits[k].halfSpace.normal;
   }
+  const auto overlaps = [&](const ObjectHit& h) {
+    return h.halfSpace.height(position_) < -std::max(query_.maxSkin(), query_.minSkin());
+  };
+  if (std::any_of(active.hits.begin(), active.hits.begin() + count, overlaps)) return position_;
+  // The same where they meet at a very acute angle: the faces may end before.
+  const Vec3 way = place - position_;
+  if (way.norm() > kLargestGapTolerance_m) place = position_ + kLargestGapTolerance_m * way.normalized();
   // Nothing that rests is nearer to the proxy than the one face that it touches.
   if (count == 1 && query_.allAtRest()) return place;
-  return position_ + query_.freeOfFaces(position_, place) * (place - position_);
+  // Beside an edge the half-space touches the ball and not the face: where two meet may be past a gap.
+  const bool atEdge = count > 1 && std::any_of(active.hits.begin(), active.hits.begin() + count,
+                                               [](const ObjectHit& h) { return h.atEdge; });
+  return position_ + query_.freeOfFaces(position_, place, atEdge) * (place - position_);
 }
 
-// Above the popthrough force, the proxy steps through the faces that hold it and moves on to the HIP.
+// Above the popthrough force, the proxy steps through the faces that give way and moves on to the HIP. Other
+// surfaces stop it as ever: without room behind the face, it stays in front.
 void Proxy::popThrough(const Vec3& hip, std::uint32_t& status) noexcept {
-  if (!popthroughArmed_) return;
+  if (!popthroughArmed_ || contactSet_.count == 0) return;
+  const auto givesWay = [](const scene::Surface& surface, double depth) {
+    return surface.popthrough_N > 0 && surface.stiffness_N_per_m * depth > surface.popthrough_N;
+  };
+  std::uint64_t passable = 0;
+  for (int i = 0; i < query_.objectCount(); ++i) {
+    if (givesWay(query_.object(i).state->surface, contactSet_.normal_m.norm()))
+      passable |= std::uint64_t{1} << i;
+  }
   bool pressed = false;
+  Vec3 direction = Vec3::Zero();
+  const auto holds = [&](const ContactConstraint& c) {
+    return c.source < 0 || (passable >> static_cast<unsigned>(c.source) & 1U) == 0;
+  };
   for (int i = 0; i < contactSet_.count; ++i) {
     const ContactConstraint& constraint = contactSet_.constraints[static_cast<std::size_t>(i)];
-    const scene::Surface& surface = constraint.surface;
-    pressed = pressed || (surface.popthrough_N > 0 &&
-                          surface.stiffness_N_per_m * constraint.depth_m > surface.popthrough_N);
+    if (holds(constraint)) continue;
+    direction -= constraint.depth_m * constraint.halfSpace.normal;
+    pressed = pressed || givesWay(constraint.surface, constraint.depth_m);
   }
   if (!pressed) return;
-  const Vec3 direction = -contactSet_.normal_m.normalized();
+  for (int i = 0; i < contactSet_.count; ++i) {
+    const ContactConstraint& constraint = contactSet_.constraints[static_cast<std::size_t>(i)];
+    const Vec3& normal = constraint.halfSpace.normal;
+    if (holds(constraint)) direction -= std::min(0.0, normal.dot(direction)) * normal;
+  }
+  direction.normalize();
   double step = 0;
   for (int i = 0; i < contactSet_.count; ++i) {
-    const HalfSpace& face = contactSet_.constraints[static_cast<std::size_t>(i)].halfSpace;
+    const ContactConstraint& constraint = contactSet_.constraints[static_cast<std::size_t>(i)];
+    const HalfSpace& face = constraint.halfSpace;
     const double fall = -face.normal.dot(direction);
-    if (fall > 0.1) step = std::max(step, (face.height(position_) + 2 * face.standoff) / fall);
+    if (!holds(constraint) && fall > 0.1)
+      step = std::max(step, (face.height(position_) + 2 * face.standoff) / fall);
   }
+  if (step == 0) return;
+  // A ball gives way once its centre is beyond the face: before, the face would push it on from behind.
+  if ((position_ + step * direction - hip).norm() > (position_ - hip).norm()) return;
+  ObjectHit hit;
+  ++casts_;
+  if (query_.castPast(passable, position_, position_ + step * direction, hit)) return;
   position_ += step * direction;
   status |= kRenderPopthrough;
   updateProxy(hip);

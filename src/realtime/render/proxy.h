@@ -34,6 +34,7 @@ struct ContactConstraint {
   HalfSpace halfSpace;
   double depth_m = 0;                           ///< of the HIP below the surface, along the normal, >= 0
   Vec3 surfaceVelocity_m_per_s = Vec3::Zero();  ///< at the proxy
+  bool rests = true;                            ///< the surface neither moves nor deforms in this tick
 };
 
 /// The faces in contact: proxy - HIP = normal_m + lateral_m.
@@ -84,6 +85,13 @@ class Proxy {
 
   struct DescentDirections;
 
+  // The faces that pushed the proxy in this tick.
+  struct Pushers {
+    std::array<HalfSpace, kMaxHalfSpaces> faces;
+    int count = 0;
+    bool jammed = false;  // they leave the proxy no room
+  };
+
   // A slide, from the breakaway to a reversal or to a pause.
   struct Slide {
     bool active = false;
@@ -96,8 +104,11 @@ class Proxy {
   void carry(const Vec3& hip, std::uint32_t& status) noexcept;
   Vec3 carriedBy(const PlacedObject& object, std::uint32_t triangle, const Vec3& p) const noexcept;
   void push(const Vec3& from, std::uint32_t& status) noexcept;
-  void pushByDeformingFaces(const Vec3& from, double reach, std::uint32_t& status) noexcept;
-  void pushByPlanes(std::uint32_t& status) noexcept;
+  bool pushByObjects(const Vec3& from, Pushers& pushers, std::uint32_t& status) noexcept;
+  bool pushByDeformingFaces(const Vec3& from, Pushers& pushers, std::uint32_t& status) noexcept;
+  bool pushByPlanes(Pushers& pushers, std::uint32_t& status) noexcept;
+  void pushTo(const Vec3& place, const HalfSpace& face, Pushers& pushers) noexcept;
+  void holdPlanesBack() noexcept;
   bool isJump(const PlacedObject& object) const noexcept;
   static bool isJump(const PlacedObject& object, std::uint32_t triangle) noexcept;
   bool contactChangedByCommand() const noexcept;
@@ -142,6 +153,7 @@ class Proxy {
   double share_ = 1;
   bool released_ = false;       // contact released until the HIP leaves the surface
   bool carriedByJump_ = false;  // in this tick
+  bool jammed_ = false;         // the last approach found faces that leave the tool no room
   Vec3 position_ = Vec3::Zero();
   Vec3 reported_ = Vec3::Zero();
   Vec3 positionBefore_ = Vec3::Zero();

@@ -10,7 +10,7 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr int kMaxPushes = 8;
+constexpr int kMaxPushes = 16;
 
 }  // namespace
 
@@ -114,32 +114,61 @@ Vec3 Proxy::carriedBy(const PlacedObject& object, std::uint32_t triangle, const 
   return n.a + local.x() * (n.b - n.a) + local.y() * (n.c - n.a) + local.z() * now.normal;
 }
 
-// Geometry that passed over the proxy takes it along: a cast in the frame of the moving object, from the
-// previous place of the proxy in that frame to the present one. An object that jumps over the proxy takes it
-// along without a force.
+// Geometry that passed over the proxy takes it along. The way on which one face pushes it is a way relative
+// to all others, so this goes on until no face passes the proxy any more.
 void Proxy::push(const Vec3& from, std::uint32_t& status) noexcept {
-  const bool carried = position_ != from;
-  bool deforming = false;
-  double reach = 0;
-  for (int i = 0; i < query_.objectCount(); ++i) {
+  Pushers pushers;
+  for (int k = 0; k < kMaxPushes && !pushers.jammed; ++k) {
+    bool pushed = pushByObjects(from, pushers, status);
+    pushed = (!pushers.jammed && pushByDeformingFaces(from, pushers, status)) || pushed;
+    pushed = (!pushers.jammed && pushByPlanes(pushers, status)) || pushed;
+    if (!pushed) return;
+  }
+  holdPlanesBack();
+}
+
+// Moves the proxy to where a face pushes it, and above those that pushed it before. Without room for that,
+// the newest face has its way.
+void Proxy::pushTo(const Vec3& place, const HalfSpace& face, Pushers& pushers) noexcept {
+  pushers.faces[static_cast<std::size_t>(pushers.count++)] = face;
+  expectedTravel_m_ += (place - position_).norm();
+  position_ = place;
+  if (pushers.count == 1) return;
+  const Projection nearest =
+      projectOntoActiveSet(pushers.faces.data(), pushers.count, place, place, query_.minSkin() / 16);
+  const double move = (nearest.point - place).norm();
+  pushers.jammed = !nearest.found || move > kJump_m;
+  if (pushers.jammed) return;
+  expectedTravel_m_ += move;
+  position_ = nearest.point;
+  // At most three hold it; the others push again if it meets them.
+  const auto faces = pushers.faces;
+  pushers.count = nearest.count;
+  for (int i = 0; i < nearest.count; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    pushers.faces[k] = faces[static_cast<std::size_t>(nearest.active[k])];
+  }
+}
+
+// A cast in the frame of each object, from the previous place of the proxy in that frame to the present one.
+// An object that jumps over the proxy takes it along without a force.
+bool Proxy::pushByObjects(const Vec3& from, Pushers& pushers, std::uint32_t& status) noexcept {
+  bool pushed = false;
+  for (int i = 0; i < query_.objectCount() && !pushers.jammed; ++i) {
     const PlacedObject& object = query_.object(i);
-    if (object.deformed) {
-      deforming = true;
-      reach = std::max(reach, (object.carried(from) - position_).norm() + missedMove(object));
-    }
-    if (!(object.moved || carried) || object.deformed || object.jumped || object.before == nullptr) continue;
+    if (!(object.moved || position_ != from) || object.deformed || object.jumped || object.before == nullptr)
+      continue;
     const Vec3 start = object.carried(from);
     const Vec3 displacement = position_ - start;
     ObjectHit hit;
     if (displacement.squaredNorm() > 0 && query_.castAtObject(i, start, position_, hit)) {
-      position_ = start + hit.stop * displacement;
-      expectedTravel_m_ += displacement.norm();
+      pushTo(start + hit.stop * displacement, hit.halfSpace, pushers);
+      pushed = true;
       touchedObject_ = object.state->id;
       if (object.moved && isJump(object)) releaseByJump(status);
     }
   }
-  if (deforming) pushByDeformingFaces(from, reach, status);
-  pushByPlanes(status);
+  return pushed;
 }
 
 void Proxy::releaseByJump(std::uint32_t& status) noexcept {
@@ -155,44 +184,66 @@ double Proxy::missedMove(const PlacedObject& object) noexcept {
 }
 
 // The back of a plane is solid without end: move the proxy to the front.
-void Proxy::pushByPlanes(std::uint32_t& status) noexcept {
+bool Proxy::pushByPlanes(Pushers& pushers, std::uint32_t& status) noexcept {
+  bool pushed = false;
   for (const PlacedPlane& plane : planes_) {
     const HalfSpace face{plane.facet.normal, plane.facet.a, plane.facet.radius + plane.facet.skin};
     const double below = -face.height(position_);
-    if (below <= 0.5 * plane.facet.skin) continue;
+    if (below <= 0.5 * plane.facet.skin || pushers.jammed) continue;
     const Vec3 displacement = below * face.normal;
     ObjectHit hit;
-    position_ += (query_.cast(position_, position_ + displacement, hit) ? hit.stop : 1.0) * displacement;
-    expectedTravel_m_ += below;
+    if (query_.cast(position_, position_ + displacement, hit)) {
+      pushTo(position_ + hit.stop * displacement, hit.halfSpace, pushers);
+      if (!pushers.jammed) pushTo(position_, face, pushers);
+    } else {
+      pushTo(position_ + displacement, face, pushers);
+    }
+    pushed = true;
     if (plane.insertionDepth_m > 0 && plane.state->recovery == 0) status |= kRenderGeometryJump;
+  }
+  return pushed;
+}
+
+// A proxy that objects keep behind a plane leaves it no room: it stays below the proxy for this tick.
+void Proxy::holdPlanesBack() noexcept {
+  for (const PlacedPlane& plane : planes_) {
+    const double below =
+        plane.facet.radius + plane.facet.skin - plane.facet.normal.dot(position_ - plane.facet.a);
+    if (below > 0.5 * plane.facet.skin) planes_.lower(static_cast<int>(&plane - planes_.begin()), below);
   }
 }
 
 // As push(), for each face in its own frame; the face that passed farthest pushes first. The boxes of the
-// index cover the whole deformation, so `reach` need only add the motion of the placement and of the proxy.
-void Proxy::pushByDeformingFaces(const Vec3& from, double reach, std::uint32_t& status) noexcept {
-  for (int k = 0; k < kMaxPushes; ++k) {
-    if (!query_.gather(position_, reach + kGatherMargin_m)) status |= kRenderCandidateLimit;
-    ObjectHit farthest;
-    double height = 0;
-    query_.forEachGathered(position_, std::numeric_limits<double>::infinity(), [&](const Facet& f) {
-      const PlacedObject& object = query_.object(f.object);
-      if (!object.deformed) return;
-      const Vec3 start = carriedBy(object, f.triangle, from);
-      ObjectHit hit;
-      if (!query_.castAtFacet(f, start, position_, hit)) return;
-      const double above = hit.halfSpace.height(position_);
-      if (above > -0.25 * f.skin) return;
-      if (std::tuple(above, hit.object, hit.triangle) <
-          std::tuple(height, farthest.object, farthest.triangle)) {
-        farthest = hit;
-        height = above;
-      }
-    });
-    if (height == 0) return;
-    position_ -= height * farthest.halfSpace.normal;
-    if (isJump(query_.object(farthest.object), farthest.triangle)) releaseByJump(status);
+// index cover the whole deformation, so the reach need only add the motion of the placement and of the proxy.
+bool Proxy::pushByDeformingFaces(const Vec3& from, Pushers& pushers, std::uint32_t& status) noexcept {
+  double reach = -1;
+  for (int i = 0; i < query_.objectCount(); ++i) {
+    const PlacedObject& object = query_.object(i);
+    if (object.deformed)
+      reach = std::max(reach, (object.carried(from) - position_).norm() + missedMove(object));
   }
+  if (reach < 0) return false;
+  if (!query_.gather(position_, reach + kGatherMargin_m)) status |= kRenderCandidateLimit;
+  ObjectHit farthest;
+  double height = 0;
+  query_.forEachGathered(position_, std::numeric_limits<double>::infinity(), [&](const Facet& f) {
+    const PlacedObject& object = query_.object(f.object);
+    if (!object.deformed) return;
+    const Vec3 start = carriedBy(object, f.triangle, from);
+    ObjectHit hit;
+    if (!query_.castAtFacet(f, start, position_, hit)) return;
+    const double above = hit.halfSpace.height(position_);
+    if (above > -0.25 * f.skin) return;
+    if (std::tuple(above, hit.object, hit.triangle) <
+        std::tuple(height, farthest.object, farthest.triangle)) {
+      farthest = hit;
+      height = above;
+    }
+  });
+  if (height == 0) return false;
+  if (isJump(query_.object(farthest.object), farthest.triangle)) releaseByJump(status);
+  pushTo(position_ - height * farthest.halfSpace.normal, farthest.halfSpace, pushers);
+  return true;
 }
 
 }  // namespace hapticd::realtime

@@ -5,6 +5,7 @@
 #include "base/time.h"
 #include "realtime/render/effects.h"
 #include "realtime/render/fields.h"
+#include "realtime/render/passivity_controller.h"
 #include "realtime/render/proxy.h"
 #include "realtime/render/surface_law.h"
 
@@ -20,15 +21,38 @@ void scaleContact(double share, Rendering& out) {
   for (std::uint32_t i = 0; i < out.contactCount; ++i) out.contacts[i].force_N *= share;
 }
 
+// The springs of surfaces at rest. Nothing where something moves, where the surface changes, or where the
+// blend of unequal stiffness adds its slope.
+SpringState restingSprings(const ContactSet& contactSet, const Rendering& out) {
+  constexpr std::uint32_t kChanged =
+      kRenderGeometryJump | kRenderReleased | kRenderPopthrough | kRenderWorkLimit | kRenderEnclosed;
+  SpringState state;
+  const BlendedSpring& spring = contactSet.spring;
+  if (!out.touching || (out.status & kChanged) != 0 || !spring.slope_N.isZero(0) || !spring.turn_N.isZero(0))
+    return state;
+  for (int i = 0; i < contactSet.count; ++i) {
+    const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
+    if (!constraint.rests || constraint.presence != 1) return state;
+  }
+  const double stiffness = spring.stiffness_N_per_m;
+  state.force_N = out.contactForce_N - out.normalForce_N + stiffness * contactSet.normal_m;
+  state.contact_N = out.contactForce_N;
+  state.stored_J = 0.5 * stiffness * (contactSet.normal_m + contactSet.lateral_m).squaredNorm();
+  state.stiffness_N_per_m = stiffness;
+  return state;
+}
+
 }  // namespace
 
 struct Renderer::State {
-  explicit State(const RenderOptions& o) : options(o), proxy(o), effects(o.contactVibrationPulls) {}
+  explicit State(const RenderOptions& o)
+      : options(o), proxy(o), effects(o.contactVibrationPulls), passivity(o.bareDamping_Ns_per_m) {}
 
   RenderOptions options;
   Proxy proxy;
   Effects effects;
   Fields fields;
+  PassivityController passivity;
 };
 
 Renderer::Renderer(const RenderOptions& options) : state_(std::make_unique<State>(options)) {}
@@ -38,6 +62,7 @@ void Renderer::reset() noexcept {
   state_->proxy.reset();
   state_->effects.reset();
   state_->fields.reset();
+  state_->passivity.reset();
 }
 
 void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState& device, Nanos now,
@@ -48,18 +73,22 @@ void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState
   if (!hip.allFinite() || !device.velocity_m_per_s.allFinite() || !device.orientation.coeffs().allFinite()) {
     out.status = kRenderNotFinite;
     s.proxy.reset();
+    s.passivity.reset();
     return;
   }
   const double radius = s.options.toolRadius_m;
-  const ContactSet& contactSet =
-      s.proxy.follow({&scene, now}, hip, std::max(base::toSeconds(period), kShortestPeriod_s), out.status);
+  const double period_s = std::max(base::toSeconds(period), kShortestPeriod_s);
+  const ContactSet& contactSet = s.proxy.follow({&scene, now}, hip, period_s, out.status);
   out.proxy_m = out.scp_m = s.proxy.position();
   if ((out.status & kRenderReleased) == 0) {
     applySurfaceLaw(contactSet, out.proxy_m, device.velocity_m_per_s, radius, out);
     scaleContact(s.proxy.feltShare(), out);
+  }
+  const Vec3 brake = s.passivity.step(restingSprings(contactSet, out), hip, period_s);
+  if ((out.status & kRenderReleased) == 0) {
     applyAdhesion(s.proxy.planes().adhesion(hip, radius), out);
   }
-  out.force_N = out.contactForce_N;
+  out.force_N = out.contactForce_N + brake;
   out.force_N += s.effects.force(scene, device, out, now);
   out.force_N += s.fields.force(scene, hip, now);
   if (!out.force_N.allFinite()) {

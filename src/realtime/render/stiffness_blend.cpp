@@ -265,7 +265,7 @@ void NeighbourSearch::addObject(const scene::ObjectState& state) {
   state.mesh->index.visitNearest(T_object_device * proxy_, reach(), [&](std::uint32_t triangle) noexcept {
     if (visits_ == kMaxVisits) {
       complete_ = false;
-      return 0.0;
+      return -1.0;
     }
     ++visits_;
     Facet f;

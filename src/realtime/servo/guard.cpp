@@ -64,6 +64,15 @@ void Guard::discardForce() noexcept {
   written_.setZero();
 }
 
+void Guard::resume(const GuardReport& report, const Vec3& written_N) noexcept {
+  report_ = report;
+  written_ = written_N;
+  shaped_ = report.gain > 0 ? Vec3(written_N / report.gain) : Vec3::Zero();
+  phase_ = report.gain > 0 ? Phase::rampIn : Phase::zero;
+  inPhase_ = static_cast<Nanos>(std::llround(report.gain * static_cast<double>(options_.rampIn)));
+  waitForCalm_ = (report.active & bit(Trip::speed)) != 0;
+}
+
 void Guard::obeyControl() noexcept {
   const GuardControl::Seen seen = control_.read();
   restart_ = seen.ramps != seen_.ramps || seen.rearms != seen_.rearms;

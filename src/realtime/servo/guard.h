@@ -78,6 +78,8 @@ class Guard {
   /// ramp in.
   void discardForce() noexcept;
   const GuardReport& report() const noexcept { return report_; }
+  /// Continues after a step that reported this and wrote this force, as far as that tells.
+  void resume(const GuardReport& report, const Vec3& written_N) noexcept;
   /// The state of the control in the last step.
   const GuardControl::Seen& seen() const noexcept { return seen_; }
 

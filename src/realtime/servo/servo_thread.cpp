@@ -16,13 +16,9 @@ ServoThread::~ServoThread() {
 }
 
 const ThreadSetup& ServoThread::start() {
-  thread_ = base::BlockingThread({"servo"}, [this] { run(); });
+  thread_ = base::PacedThread({"servo"}, clock_, [this] { return step(); });
   isSetUp_.wait(false, std::memory_order_acquire);
-  const auto refused = [](const SetupAnswer& answer) { return !answer.granted; };
-  const bool leave = options_.requireRealtime && (refused(setup_.scheduling) || refused(setup_.memory));
-  go_.store(leave ? Go::leave : Go::run, std::memory_order_release);
-  go_.notify_one();
-  if (leave) {
+  if (refused()) {
     thread_.join();
     throw std::runtime_error("the system refused what the servo thread of a real device requires\n" +
                              setup_.complaints() +
@@ -36,21 +32,25 @@ void ServoThread::stop() noexcept {
   thread_.join();
 }
 
-void ServoThread::run() {
-  setup_ = setUpThread(options_.request);
-  isSetUp_.store(true, std::memory_order_release);
-  isSetUp_.notify_one();
-  go_.wait(Go::wait, std::memory_order_acquire);
-  if (go_.load(std::memory_order_acquire) == Go::run) loop();
+bool ServoThread::refused() const noexcept {
+  const auto refused = [](const SetupAnswer& answer) { return !answer.granted; };
+  return options_.requireRealtime && (refused(setup_.scheduling) || refused(setup_.memory));
 }
 
-void ServoThread::loop() noexcept {
-  Pacer pacer(clock_.now(), period_);
-  while (!stopping_.load(std::memory_order_acquire)) {
-    clock_.sleepUntil(pacer.deadline());
-    tick_(pacer.begin(clock_.now()));
-    pacer.end(clock_.now());
+std::optional<Nanos> ServoThread::step() {
+  if (!pacer_) {
+    setup_ = setUpThread(options_.request);
+    const bool leave = refused();
+    pacer_.emplace(clock_.now(), period_);
+    isSetUp_.store(true, std::memory_order_release);
+    isSetUp_.notify_one();
+    if (leave) return std::nullopt;
+  } else {
+    tick_(pacer_->begin(clock_.now()));
+    pacer_->end(clock_.now());
   }
+  if (stopping_.load(std::memory_order_acquire)) return std::nullopt;
+  return pacer_->deadline();
 }
 
 }  // namespace hapticd::realtime

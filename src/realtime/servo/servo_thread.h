@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <functional>
+#include <optional>
 
 #include "base/clock.h"
 #include "base/thread.h"
@@ -41,10 +42,8 @@ class ServoThread {
   Nanos period() const noexcept { return period_; }
 
  private:
-  enum class Go { wait, run, leave };
-
-  void run();
-  void loop() noexcept;
+  std::optional<Nanos> step();
+  bool refused() const noexcept;
 
   const std::function<void(const Pacing&)> tick_;
   base::Clock& clock_;
@@ -52,9 +51,9 @@ class ServoThread {
   const Nanos period_;
   ThreadSetup setup_;
   std::atomic<bool> isSetUp_{false};
-  std::atomic<Go> go_{Go::wait};
   std::atomic<bool> stopping_{false};
-  base::BlockingThread thread_;  // last: its body uses the others
+  std::optional<Pacer> pacer_;  // by the thread; empty before its first step
+  base::PacedThread thread_;    // last: its step uses the others
 };
 
 }  // namespace hapticd::realtime

@@ -16,6 +16,7 @@
 #include <cstring>
 #include <vector>
 
+#include "base/world.h"
 #include "realtime/servo/flush_denormals.h"
 
 namespace hapticd::realtime {
@@ -167,6 +168,7 @@ void requestShortTimeSlice() noexcept {
     std::uint64_t deadline_ns = 0;
     std::uint64_t period_ns = 0;
   } attributes;
+  if (base::world().threads.simulated()) return;
   if (sched_getscheduler(0) != SCHED_OTHER) return;  // the operator chose another policy
   attributes.nice = getpriority(PRIO_PROCESS, 0);
   syscall(SYS_sched_setattr, 0, &attributes, 0U);  // a refusal changes nothing
@@ -174,6 +176,13 @@ void requestShortTimeSlice() noexcept {
 
 ThreadSetup setUpThread(const ThreadRequest& request) {
   ThreadSetup setup;
+  if (base::world().threads.simulated()) {
+    for (SetupAnswer* answer : {&setup.scheduling, &setup.memory}) {
+      answer->granted = true;
+      answer->text = "simulated";
+    }
+    return setup;
+  }
   requestScheduling(request, setup.scheduling);
   requestAffinity(request, setup.affinity);
   requestMemory(request, setup.memory);

@@ -74,9 +74,8 @@ const scene::SceneSnapshot& Tick::takeSnapshot() noexcept {
 // Nothing streamed so far, and nothing left of it, costs two comparisons.
 void Tick::addRemote(Nanos period) noexcept {
   const RemoteInput& input = remoteInput_.read();
-  if (recordStreamTo_ != nullptr &&
-      (input.contacts.number != contactsSeen_ || input.force.number != forceSeen_)) {
-    recordStreamTo_->push({report_.tick, input});
+  if (input.contacts.number != contactsSeen_ || input.force.number != forceSeen_) {
+    if (StreamRing* ring = recordStreamTo_.load(std::memory_order_acquire)) ring->push({report_.tick, input});
   }
   contactsSeen_ = input.contacts.number;
   forceSeen_ = input.force.number;
@@ -113,6 +112,11 @@ GuardInput Tick::guardInput() const noexcept {
   return in;
 }
 
+void Tick::resume(const TickReport& last) noexcept {
+  report_ = last;
+  guard_.resume(last.guard, last.force_N);
+}
+
 void Tick::publish() noexcept {
   const std::uint32_t latchedBefore = report_.guard.latched;
   report_.guard = guard_.report();
@@ -123,7 +127,8 @@ void Tick::publish() noexcept {
 
   blackBox_.record(report_);
   if ((report_.guard.latched & ~latchedBefore) != 0) blackBox_.freeze();
-  if (recordTo_ != nullptr) recordTo_->push({report_, guard_.seen(), haveState_, written_, discarded_});
+  if (RecordRing* ring = recordTo_.load(std::memory_order_acquire))
+    ring->push({report_, guard_.seen(), haveState_, written_, discarded_});
   reports_.push(report_);
   wake_.notify();
 }

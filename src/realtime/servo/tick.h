@@ -60,10 +60,15 @@ class Tick {
   /// After the last tick, from any thread: writes zero force.
   void finish() noexcept { device_.write(Vec3::Zero()); }
 
-  /// Before the first tick: records every tick to `ring` as well, which must outlive this object.
-  void recordTo(RecordRing* ring) noexcept { recordTo_ = ring; }
-  /// The same for what clients stream.
-  void recordTo(StreamRing* ring) noexcept { recordStreamTo_ = ring; }
+  /// From any thread: records every tick from the next one on, and what clients stream, to the rings as well;
+  /// null: no longer. Rings that were given must live until a tick that began later has finished.
+  void recordTo(RecordRing* ticks, StreamRing* streams) noexcept {
+    if (ticks == nullptr) recordTo_.store(nullptr, std::memory_order_release);
+    recordStreamTo_.store(streams, std::memory_order_release);
+    if (ticks != nullptr) recordTo_.store(ticks, std::memory_order_release);
+  }
+  /// For a replay that begins between two ticks: the next one follows this one, which was the last.
+  void resume(const TickReport& last) noexcept;
 
   /// Scene thread: publishes snapshots and collects old ones.
   scene::SnapshotSlot& snapshots() noexcept { return snapshots_; }
@@ -118,8 +123,8 @@ class Tick {
   BlackBox blackBox_;
   TickHistograms histograms_;
   TickReport report_;
-  RecordRing* recordTo_ = nullptr;
-  StreamRing* recordStreamTo_ = nullptr;
+  std::atomic<RecordRing*> recordTo_{nullptr};
+  std::atomic<StreamRing*> recordStreamTo_{nullptr};
   bool haveState_ = false;  // the device delivered a state in this tick
   bool written_ = true;     // the device accepted the last force
   bool discarded_ = false;  // the force of this tick was too old: zero was written

@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "base/clock.h"
-#include "base/suspend.h"
 #include "base/thread.h"
+#include "base/world.h"
 #include "realtime/servo/tick.h"
 
 namespace hapticd::realtime {

@@ -1,11 +1,12 @@
 #include "server/config/config.h"
 
 #include <toml++/toml.h>
-#include <algorithm>
 #include <limits>
+#include <optional>
 #include <set>
 #include <sstream>
 
+#include "base/nearest_name.h"
 #include "base/world.h"
 #include "server/config/config_fields.h"
 #include "server/config/vrpn_cfg.h"
@@ -18,21 +19,6 @@ std::string location(const std::string& source, const toml::node& node) {
   std::ostringstream text;
   text << source << ":" << node.source().begin.line << ": ";
   return text.str();
-}
-
-std::size_t editDistance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t cost = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, cost});
-    }
-  }
-  return row[b.size()];
 }
 
 // Reads one table of the file, each key once; finish() rejects unknown keys.
@@ -125,18 +111,20 @@ class Reader {
 
   const std::set<std::string>& known() const { return known_; }
 
-  /// `elsewhere`: keys of the other kind of table, and where they belong.
-  void finish(const std::set<std::string>& elsewhere, const std::string& place) const {
+  /// `elsewhere`: keys of the other kinds of tables, and where they belong.
+  void finish(const std::vector<std::pair<std::set<std::string>, std::string>>& elsewhere) const {
     for (const auto& [key, node] : table_) {
       const std::string name(key.str());
       if (known_.count(name) != 0) continue;
-      if (elsewhere.count(name) != 0)
-        throw ConfigError(location(source_, node) + "'" + name + "' belongs " + place);
-      const auto nearest = std::min_element(known_.begin(), known_.end(), [&](const auto& a, const auto& b) {
-        return editDistance(name, a) < editDistance(name, b);
-      });
-      throw ConfigError(location(source_, node) + "unknown key '" + name + "'; did you mean '" + *nearest +
-                        "'?");
+      for (const auto& [keys, place] : elsewhere) {
+        if (keys.count(name) != 0)
+          throw ConfigError(location(source_, node) + "'" + name + "' belongs " + place);
+      }
+      const std::vector<std::string> keys(known_.begin(), known_.end());
+      const std::optional<std::string> nearest = base::nearestName(name, keys);
+      throw ConfigError(
+          location(source_, node) + "unknown key '" + name + "'; " +
+          (nearest ? "did you mean '" + *nearest + "'?" : "docs/configuration.md lists the keys"));
     }
   }
 
@@ -198,7 +186,8 @@ DeviceConfig readDevice(const toml::table& table, const std::string& source) {
   DeviceConfig device;
   Reader reader(table, source);
   visitFields(reader, device);
-  reader.finish(keysOf<ServerConfig>(), "above the first [[device]]");
+  reader.finish({{keysOf<ServerConfig>(), "above the first [[device]]"},
+                 {keysOf<LimitsConfig>(), "in [limits], which belongs above the first [[device]]"}});
   return device;
 }
 
@@ -213,12 +202,30 @@ std::vector<DeviceConfig> readDevices(const toml::node& node, const std::string&
   return devices;
 }
 
+// A table that the file has once: [compat], [limits].
+template <class Config>
+Config readTable(const toml::node& node, const std::string& name, const std::string& source) {
+  const toml::table* table = node.as_table();
+  if (table == nullptr)
+    throw ConfigError(location(source, node) + "'" + name + "' must be a table: [" + name + "]");
+  Config config;
+  Reader reader(*table, source);
+  visitFields(reader, config);
+  const std::string place = "outside [" + name + "]";
+  reader.finish({{keysOf<ServerConfig>(), place}, {keysOf<DeviceConfig>(), place}});
+  return config;
+}
+
 // The node that sets the value; for a default the table that it belongs to.
 const toml::node& nodeOf(const InvalidValue& error, const toml::table& root) {
   const toml::table* table = &root;
   const toml::array* devices = root.get_as<toml::array>("device");
   if (error.device() && devices != nullptr) table = devices->get_as<toml::table>(*error.device());
   const toml::node* node = table->get(error.key());
+  for (const char* name : {"compat", "limits"}) {
+    const toml::table* const named = root.get_as<toml::table>(name);
+    if (node == nullptr && !error.device() && named != nullptr) node = named->get(error.key());
+  }
   if (node == nullptr && error.key() == "names") node = table->get("name");
   return node == nullptr ? *table : *node;
 }
@@ -251,7 +258,11 @@ ServerConfig parseConfig(const std::string& text, const std::string& source) {
   Reader reader(root, source);
   visitFields(reader, config);
   if (const toml::node* node = reader.find("device")) config.devices = readDevices(*node, source);
-  reader.finish(keysOf<DeviceConfig>(), "in a [[device]]");
+  if (const toml::node* node = reader.find("compat"))
+    config.compat = readTable<CompatConfig>(*node, "compat", source);
+  if (const toml::node* node = reader.find("limits"))
+    config.limits = readTable<LimitsConfig>(*node, "limits", source);
+  reader.finish({{keysOf<DeviceConfig>(), "in a [[device]]"}, {keysOf<LimitsConfig>(), "in [limits]"}});
   try {
     validate(config);
   } catch (const InvalidValue& error) {

@@ -108,17 +108,77 @@ struct DeviceConfig {
 inline constexpr const char* kHttpAuto = "auto";
 inline constexpr const char* kHttpOff = "off";
 
+/// `socket` values besides a path. Auto: net::defaultSocketPath(), or none where that fails.
+inline constexpr const char* kSocketAuto = "auto";
+inline constexpr const char* kSocketOff = "off";
+
+/// `tls` values besides a file.
+inline constexpr const char* kTlsOff = "off";
+inline constexpr const char* kTlsGenerated = "generated";
+
+/// A range of IPv4 addresses in host byte order.
+struct Subnet {
+  std::uint32_t network = 0;
+  std::uint32_t mask = 0;
+  bool has(std::uint32_t address) const noexcept { return (address & mask) == network; }
+};
+/// Reads "10.0.0.0/8" or one address. Throws ConfigError.
+std::vector<Subnet> parseSubnets(const std::vector<std::string>& texts);
+/// The system's numbers of users, given as names or numbers. Throws ConfigError that names `key`.
+std::vector<std::uint32_t> usersNamed(const std::vector<std::string>& names, const std::string& key);
+/// The port of the service whose clients `haply` serves.
+inline constexpr std::uint16_t kHaplyPort = 10001;
+
+/// Ports for programs written for other services.
+struct CompatConfig {
+  std::string haply;                      ///< ADDR:PORT, by default kHaplyPort; empty: none
+  double haplyHold_s = 0.1;               ///< how long a force is held without another message
+  std::vector<std::string> haplyOrigins;  ///< origins of pages that may use it, "http://localhost:5173"
+
+  bool operator==(const CompatConfig&) const = default;
+};
+
+/// Limits on what clients may use. docs/limits.md has what happens beyond each.
+struct LimitsConfig {
+  int connections = 4096;             ///< of clients at once; further ones may only stop forces
+  int connectionsPerAddress = 2048;   ///< the same for each address
+  int unfinishedConnections = 512;    ///< without a VRPN greeting so far
+  int memory_MB = 1024;               ///< that waits for all clients together, without open batches
+  int clientMemory_MB = 64;           ///< the same for each client
+  int sendQueue_MB = 8;               ///< unsent reliable data of one connection
+  int batches_MB = 512;               ///< open batches of all clients together
+  int objects = 10'000;               ///< of one scene
+  int vertices = 6'000'000;           ///< of all objects of one scene
+  int triangles = 6'000'000;          ///< the same
+  int effects = 64;                   ///< of one scene
+  int commandsPerSecond = 1'000'000;  ///< of one client, without those that fill meshes
+  int recording_MB = 100'000;         ///< of one recording
+  int blackBoxes_MB = 100;            ///< of all black boxes of one device
+  int log_kB_per_second = 256;        ///< of log lines that clients cause
+
+  bool operator==(const LimitsConfig&) const = default;
+};
+
 struct ServerConfig {
   std::string listenAddress = "127.0.0.1";
   std::uint16_t port = 3883;
   bool allowNoRealtime = false;
   double seconds = 0;                      ///< 0: until stopped
   std::vector<std::string> callbackHosts;  ///< hosts that a UDP request may name besides its source address
-  std::string record;                  ///< recording to write; strftime conversions (%) allowed; empty: none
-  std::string http = kHttpAuto;        ///< endpoint of the viewer: ADDR:PORT, kHttpAuto or kHttpOff
-  int connections = 4096;              ///< of clients at once; further ones may only stop forces
-  int connectionsPerAddress = 2048;    ///< the same for each address
+  std::string record;                   ///< recording to write; strftime conversions (%) allowed; empty: none
+  std::string http = kHttpAuto;         ///< endpoint of the viewer: ADDR:PORT, kHttpAuto or kHttpOff
+  std::string socket = kSocketAuto;     ///< path of the Unix socket, kSocketAuto or kSocketOff
+  std::string tokens;                   ///< file of tokens, mode 0600; empty: none
+  std::vector<std::string> ownerUsers;  ///< users that are owners over the Unix socket
+  std::vector<std::string> operatorUsers;    ///< users that are operators over the Unix socket
+  std::vector<std::string> trustedNetworks;  ///< whose clients are owners: "10.0.0.0/24"
+  std::string tls = kTlsOff;                 ///< kTlsOff, kTlsGenerated, or the file of a certificate (PEM)
+  std::string tlsKey;                        ///< file of its key, mode 0600
+  bool tlsLoopback = false;                  ///< TLS for clients on this machine, too
+  bool insecure = false;                     ///< other machines may command without TLS
   std::vector<std::string> httpAllow;  ///< additional Host names accepted at the web port: HOST or HOST:PORT
+  CompatConfig compat;
+  LimitsConfig limits;
   std::vector<DeviceConfig> devices{DeviceConfig{}};
 
   bool operator==(const ServerConfig&) const = default;

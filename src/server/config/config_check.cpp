@@ -1,3 +1,5 @@
+#include <pwd.h>
+
 #include <algorithm>
 #include <cctype>
 #include <charconv>
@@ -139,6 +141,117 @@ void checkHttp(const Checker& check, const ServerConfig& config) {
   }
 }
 
+void checkAccess(const Checker& check, const ServerConfig& config) {
+  const auto checked = [&](const char* key, const auto& parse) {
+    try {
+      parse();
+    } catch (const InvalidValue&) {
+      throw;
+    } catch (const ConfigError& error) {
+      check.fail(key, error.what());
+    }
+  };
+  checked("trusted_networks", [&] { parseSubnets(config.trustedNetworks); });
+  checked("owner_users", [&] { usersNamed(config.ownerUsers, "owner_users"); });
+  checked("operator_users", [&] { usersNamed(config.operatorUsers, "operator_users"); });
+  const bool path = config.socket.starts_with('/');
+  if (!path && config.socket != kSocketAuto && config.socket != kSocketOff) {
+    check.fail("socket", "socket: " + wire::inQuotes(config.socket) +
+                             " is not an absolute path such as /run/hapticd/lab.sock, auto or off");
+  }
+}
+
+// Whether other machines can reach this address of ours.
+bool reachesOut(const std::string& address) {
+  return net::Endpoint::parse(address, 1).address >> 24 != 127;
+}
+
+void checkTransport(const Checker& check, const ServerConfig& config) {
+  const bool file = config.tls != kTlsOff && config.tls != kTlsGenerated;
+  if (file && !config.tls.starts_with('/')) {
+    check.fail("tls", "tls: " + wire::inQuotes(config.tls) +
+                          " is not off, generated, or the absolute path of a certificate (PEM)");
+  }
+  if (file != !config.tlsKey.empty()) {
+    check.fail("tls_key", file ? "tls: the certificate '" + config.tls + "' needs its key: set tls_key"
+                               : "tls_key has no effect without a certificate: set tls to its file");
+  }
+  if (config.tls == kTlsOff && config.tlsLoopback)
+    check.fail("tls_loopback", R"(tls_loopback needs a certificate: set tls to "generated" or to its file)");
+  if (config.insecure || config.tls != kTlsOff || !config.trustedNetworks.empty()) return;
+  std::string http = "127.0.0.1";
+  std::uint16_t port = 0;
+  if (config.http != kHttpAuto && config.http != kHttpOff) parseListen(config.http, http, port);
+  for (const auto& [key, address] : {std::pair{"listen", config.listenAddress}, std::pair{"http", http}}) {
+    if (!reachesOut(address)) continue;
+    check.fail(key,
+               std::string(key) + ": " + wire::inQuotes(address) +
+                   " lets other machines in, without encryption and without knowing who they are: "
+                   "everybody on these networks could move the arm. Set tls, or trusted_networks for the "
+                   "networks where you trust everybody, or accept it by insecure = true (--insecure)");
+  }
+}
+
+// HOST:PORT with a numeric host; every name of this machine is 127.0.0.1, and 0.0.0.0 is any address of it.
+bool sameService(const std::string& a, const std::string& b) {
+  const auto hostOf = [](const std::string& text) {
+    const std::string host = text.substr(0, text.rfind(':'));
+    return host == "localhost" || host == "0.0.0.0" || host.starts_with("127.") || host.empty()
+               ? std::string("127.0.0.1")
+               : host;
+  };
+  return hostOf(a) == hostOf(b) && a.substr(a.rfind(':') + 1) == b.substr(b.rfind(':') + 1);
+}
+
+void checkHaply(const Checker& check, const ServerConfig& config) {
+  const CompatConfig& compat = config.compat;
+  check.range("haply_hold_ms", compat.haplyHold_s * 1e3, 10, 100);
+  for (const std::string& origin : compat.haplyOrigins) {
+    const std::size_t host = origin.find("://");
+    const bool web = origin.starts_with("http://") || origin.starts_with("https://");
+    if (web && host + 3 < origin.size() && origin.find_first_of("/* ", host + 3) == std::string::npos)
+      continue;
+    check.fail("haply_origins", "haply_origins: " + wire::inQuotes(origin) +
+                                    " is not an origin such as http://localhost:5173");
+  }
+  if (compat.haply.empty()) return;
+  std::string address = "127.0.0.1";
+  std::uint16_t port = kHaplyPort;
+  try {
+    parseListen(compat.haply, address, port);
+    net::Endpoint::parse(address, port);
+  } catch (const std::runtime_error&) {
+    check.fail("haply",
+               "haply: " + wire::inQuotes(compat.haply) + " is not ADDR:PORT such as 127.0.0.1:10001");
+  }
+  if (reachesOut(address) && !config.insecure && config.trustedNetworks.empty()) {
+    check.fail("haply",
+               "haply: " + wire::inQuotes(compat.haply) +
+                   " lets other machines in, and this port is not encrypted: set trusted_networks for "
+                   "the networks where you trust everybody, or accept it by insecure = true");
+  }
+  if (port == 0) return;
+  const std::string place = address + ":" + std::to_string(port);
+  const auto refuse = [&](const std::string& other) {
+    check.fail("haply",
+               "haply: " + wire::inQuotes(compat.haply) + " is the port of " + other + "; use another port");
+  };
+  if (sameService(place, config.listenAddress + ":" + std::to_string(config.port))) refuse("listen");
+  if (config.http != kHttpOff) {
+    std::string webAddress = "127.0.0.1";
+    std::uint16_t webPort = 8080;
+    if (config.http != kHttpAuto) parseListen(config.http, webAddress, webPort);
+    if (sameService(place, webAddress + ":" + std::to_string(webPort))) refuse("http");
+  }
+  // The driver would be served by its own server.
+  for (const DeviceConfig& device : config.devices) {
+    const device::Driver* const driver = device::findDriver(device.driver);
+    if (driver == nullptr || driver->service == nullptr) continue;
+    if (sameService(place, driver->service(device.hardware)))
+      refuse("the service that the device '" + device.names.front() + "' is reached through");
+  }
+}
+
 void checkDevice(const Checker& check, const DeviceConfig& device) {
   checkDriver(check, device);
   check.range("servo_rate_Hz", device.servoRate_Hz, 250, 4000);
@@ -151,6 +264,25 @@ void checkDevice(const Checker& check, const DeviceConfig& device) {
   check.range("black_box_keep", device.blackBoxKeep, 0, 1000);
   checkWorkspace(check, device.workspace_mm);
   checkControl(check, device);
+}
+
+void checkLimits(const Checker& check, const LimitsConfig& limits) {
+  constexpr int kMostTriangles = 32'000'000;
+  check.range("connections", limits.connections, 1, 100'000);
+  check.range("connections_per_address", limits.connectionsPerAddress, 1, 100'000);
+  check.range("connections_unfinished", limits.unfinishedConnections, 16, 100'000);
+  check.range("memory_MB", limits.memory_MB, 64, 1'000'000);
+  check.range("client_memory_MB", limits.clientMemory_MB, 32, limits.memory_MB);
+  check.range("send_queue_MB", limits.sendQueue_MB, 1, 1000);
+  check.range("batches_MB", limits.batches_MB, 1, 100'000);
+  check.range("objects", limits.objects, 1, 10'000);
+  check.range("vertices", limits.vertices, 3, kMostTriangles);
+  check.range("triangles", limits.triangles, 1, kMostTriangles);
+  check.range("effects", limits.effects, 1, 64);
+  check.range("commands_per_second", limits.commandsPerSecond, 1000, 1e9);
+  check.range("recording_MB", limits.recording_MB, 1, 1e9);
+  check.range("black_boxes_MB", limits.blackBoxes_MB, 1, 1'000'000);
+  check.range("log_kB_per_second", limits.log_kB_per_second, 1, 1'000'000);
 }
 
 void checkRecord(const Checker& check, const std::string& file) {
@@ -179,6 +311,50 @@ void parseListen(const std::string& text, std::string& address, std::uint16_t& p
   port = static_cast<std::uint16_t>(value);
 }
 
+std::vector<Subnet> parseSubnets(const std::vector<std::string>& texts) {
+  std::vector<Subnet> subnets;
+  for (const std::string& text : texts) {
+    const std::size_t slash = text.find('/');
+    unsigned bits = 32;
+    bool good = text.find(':') == std::string::npos;
+    if (slash != std::string::npos) {
+      const char* const last = text.data() + text.size();
+      const auto [end, error] = std::from_chars(text.data() + slash + 1, last, bits);
+      good = good && error == std::errc{} && end == last && bits <= 32;
+    }
+    Subnet subnet;
+    try {
+      subnet.network = net::Endpoint::parse(text.substr(0, slash), 1).address;
+    } catch (const net::Error&) {
+      good = false;
+    }
+    subnet.mask = bits == 0 || bits > 32 ? 0 : ~std::uint32_t{0} << (32 - bits);
+    if (!good || (subnet.network & ~subnet.mask) != 0) {
+      throw ConfigError("trusted_networks: " + wire::inQuotes(text) +
+                        " is not a network such as 10.0.0.0/24, or an address");
+    }
+    subnets.push_back(subnet);
+  }
+  return subnets;
+}
+
+std::vector<std::uint32_t> usersNamed(const std::vector<std::string>& names, const std::string& key) {
+  std::vector<std::uint32_t> users;
+  for (const std::string& name : names) {
+    std::uint32_t number = 0;
+    const char* const last = name.data() + name.size();
+    const auto [end, error] = std::from_chars(name.data(), last, number);
+    if (error == std::errc{} && end == last) {
+      users.push_back(number);
+    } else if (const passwd* const user = getpwnam(name.c_str())) {
+      users.push_back(user->pw_uid);
+    } else {
+      throw ConfigError(key + ": there is no user " + wire::inQuotes(name) + " on this machine");
+    }
+  }
+  return users;
+}
+
 std::filesystem::path defaultBlackBoxDir() {
   // The XDG specification says to ignore relative paths.
   const char* state = std::getenv("XDG_STATE_HOME");
@@ -197,8 +373,9 @@ void validate(const ServerConfig& config) {
   checkRecord(server, config.record);
   server.range("seconds", config.seconds, 0, 1e9);
   checkHttp(server, config);
-  server.range("connections", config.connections, 1, 100'000);
-  server.range("connections_per_address", config.connectionsPerAddress, 1, 100'000);
+  checkLimits(server, config.limits);
+  checkAccess(server, config);
+  checkTransport(server, config);
   for (const std::string& host : config.callbackHosts) server.address("callback_hosts", host, "10.0.0.7");
   std::map<std::string, int> uses;
   std::map<std::string, const DeviceConfig*> scenes;
@@ -223,6 +400,7 @@ void validate(const ServerConfig& config) {
     same("control", device.control == first.control);
     same("control_list", device.controlList == first.controlList);
   }
+  checkHaply(server, config);
 }
 
 }  // namespace hapticd::server

@@ -31,7 +31,10 @@ inline constexpr Choices<Control, 3> kControls{
 
 /// Calls `visitor` for each key of a [[device]] with the corresponding field. `Device` may be const.
 template <class Visitor, class Device>
-void visitFields(Visitor& visitor, Device& device) {
+void visitFields(Visitor& visitor, Device& device) requires requires {
+  device.names;
+}
+{
   visitor.names("names", device.names);
   visitor.field("driver", device.driver);
   visitor.field("hardware", device.hardware);
@@ -66,7 +69,41 @@ void visitFields(Visitor& visitor, Device& device) {
   visitor.field("black_box_keep", device.blackBoxKeep);
 }
 
-/// The same for the keys of the server itself, without its devices.
+/// The same for the keys of [compat].
+template <class Visitor, class Compat>
+void visitFields(Visitor& visitor, Compat& compat) requires requires {
+  compat.haply;
+}
+{
+  visitor.field("haply", compat.haply);
+  visitor.milli("haply_hold_ms", compat.haplyHold_s);
+  visitor.field("haply_origins", compat.haplyOrigins);
+}
+
+/// The same for the keys of [limits].
+template <class Visitor, class Limits>
+void visitFields(Visitor& visitor, Limits& limits) requires requires {
+  limits.connections;
+}
+{
+  visitor.field("connections", limits.connections);
+  visitor.field("connections_per_address", limits.connectionsPerAddress);
+  visitor.field("connections_unfinished", limits.unfinishedConnections);
+  visitor.field("memory_MB", limits.memory_MB);
+  visitor.field("client_memory_MB", limits.clientMemory_MB);
+  visitor.field("send_queue_MB", limits.sendQueue_MB);
+  visitor.field("batches_MB", limits.batches_MB);
+  visitor.field("objects", limits.objects);
+  visitor.field("vertices", limits.vertices);
+  visitor.field("triangles", limits.triangles);
+  visitor.field("effects", limits.effects);
+  visitor.field("commands_per_second", limits.commandsPerSecond);
+  visitor.field("recording_MB", limits.recording_MB);
+  visitor.field("black_boxes_MB", limits.blackBoxes_MB);
+  visitor.field("log_kB_per_second", limits.log_kB_per_second);
+}
+
+/// The same for the keys of the server itself, without its devices, [compat] and [limits].
 template <class Visitor, class Server>
 void visitFields(Visitor& visitor, Server& server) requires requires {
   server.devices;
@@ -79,8 +116,15 @@ void visitFields(Visitor& visitor, Server& server) requires requires {
   visitor.field("record", server.record);
   visitor.field("http", server.http);
   visitor.field("http_allow", server.httpAllow);
-  visitor.field("connections", server.connections);
-  visitor.field("connections_per_address", server.connectionsPerAddress);
+  visitor.field("socket", server.socket);
+  visitor.field("tokens", server.tokens);
+  visitor.field("owner_users", server.ownerUsers);
+  visitor.field("operator_users", server.operatorUsers);
+  visitor.field("trusted_networks", server.trustedNetworks);
+  visitor.field("tls", server.tls);
+  visitor.field("tls_key", server.tlsKey);
+  visitor.field("tls_loopback", server.tlsLoopback);
+  visitor.field("insecure", server.insecure);
 }
 
 }  // namespace hapticd::server

@@ -88,6 +88,10 @@ class Writer {
 std::string toToml(const ServerConfig& config) {
   Writer writer;
   visitFields(writer, config);
+  writer.out << "\n[compat]\n";
+  visitFields(writer, config.compat);
+  writer.out << "\n[limits]\n";
+  visitFields(writer, config.limits);
   for (const DeviceConfig& device : config.devices) {
     writer.out << "\n[[device]]\n";
     visitFields(writer, device);

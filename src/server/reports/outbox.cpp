@@ -3,23 +3,6 @@
 #include <algorithm>
 
 namespace hapticd::server {
-namespace {
-
-std::shared_ptr<const net::Buffer> takeBuffer(wire::FrameEncoder& encoder) {
-  if (encoder.empty()) return nullptr;
-  net::Buffer bytes;
-  encoder.swapOut(bytes);
-  return std::make_shared<const net::Buffer>(std::move(bytes));
-}
-
-}  // namespace
-
-void Outbox::Group::add(const Outgoing& out, wire::Time time) {
-  const wire::Reliability usual = wire::info(out.message.kind()).reliability;
-  const bool mayBeLost = !out.reliable && usual == wire::Reliability::kLowLatency;
-  (mayBeLost ? lowLatency : reliable).add(time, name, out.message);
-}
-
 Outbox::Outbox(const DeviceConfig& config, int buttonCount, std::vector<DeviceName> names)
     : config_(config),
       buttonCount_(buttonCount),
@@ -33,14 +16,14 @@ void Outbox::join(Session& session) {
 void Outbox::sendPresentState(Session& session) {
   Listener& entry = listener(session);
   regroup(session, entry);
-  for (const auto& group : entry.groups) sendPresentState(session, group->name, *group);
+  for (const Member& member : entry.groups) sendPresentState(session, *member.group);
 }
 
 void Outbox::subscribe(Session& session, wire::LocalSender name) {
   Listener& entry = listener(session);
   regroup(session, entry);
-  for (const auto& group : entry.groups) {
-    if (group->name == name) sendPresentState(session, name, *group);
+  for (const Member& member : entry.groups) {
+    if (member.group->name() == name) sendPresentState(session, *member.group);
   }
 }
 
@@ -81,83 +64,82 @@ Outbox::Listener& Outbox::listener(const Session& session) {
 }
 
 void Outbox::regroup(const Session& session, Listener& listener) {
-  std::vector<std::shared_ptr<Group>> groups;
+  std::vector<Member> groups;
   for (const DeviceName& name : names_) {
-    if (session.wants(name.sender)) groups.push_back(group(name, listener.choice));
+    if (!session.wants(name.sender)) continue;
+    const auto wanted = group(name, listener.choice);
+    const auto member = std::find_if(listener.groups.begin(), listener.groups.end(),
+                                     [&](const Member& known) { return known.group == wanted; });
+    groups.push_back({wanted, member == listener.groups.end() ? wanted->end() : member->position});
   }
   listener.groups = std::move(groups);
   listener.names = session.namesWanted();
 }
 
-std::shared_ptr<Outbox::Group> Outbox::group(const DeviceName& name, const ReportChoice& choice) {
+std::shared_ptr<ReportGroup> Outbox::group(const DeviceName& name, const ReportChoice& choice) {
   std::erase_if(groups_, [](const auto& entry) { return entry.second.expired(); });
-  std::weak_ptr<Group>& known = groups_[{name.sender.value, choice}];
-  std::shared_ptr<Group> group = known.lock();
-  if (!group) {
-    known = group = std::make_shared<Group>(name.sender, Reporter(config_, buttonCount_, choice, name.view));
-  }
+  std::weak_ptr<ReportGroup>& known = groups_[{name.sender.value, choice}];
+  std::shared_ptr<ReportGroup> group = known.lock();
+  if (!group) known = group = std::make_shared<ReportGroup>(config_, buttonCount_, choice, name);
   return group;
 }
 
-void Outbox::sendPresentState(Session& session, wire::LocalSender name, const Group& group) {
-  if (last_.tick == 0) return;  // add() reports the state with the first tick
+void Outbox::sendPresentState(Session& session, const ReportGroup& group) {
+  if (newest_->tick.tick == 0) return;  // add() reports the state with the first tick
   std::vector<Outgoing> messages;
-  group.reporter.presentState(last_, frame_, messages);
-  for (const Outgoing& out : messages) session.sendReliably(name, out.message, lastTime_);
+  group.presentState(*newest_, messages);
+  for (const Outgoing& out : messages) session.sendReliably(group.name(), out.message, newest_->time);
   session.flush();
 }
 
 void Outbox::add(const realtime::TickReport& tick, const ReportFrame& frame, wire::Time time, bool late) {
-  const bool first = last_.tick == 0;
-  last_ = tick;
-  lastTime_ = time;
-  frame_ = frame;
+  const bool first = newest_->tick.tick == 0;
+  newest_ = std::make_shared<const TimedTick>(TimedTick{tick, frame, time});
   for (const auto& [key, weak] : groups_) {
-    const std::shared_ptr<Group> group = weak.lock();
+    const std::shared_ptr<ReportGroup> group = weak.lock();
     if (!group) continue;
-    outgoing_.clear();
     // Clients that subscribed before the first tick still need the initial state.
     if (first) {
-      group->reporter.presentState(tick, frame, outgoing_);
-    } else if (late) {
-      group->reporter.skip(tick, frame, outgoing_);
+      group->addFirst(*newest_);
     } else {
-      group->reporter.update(tick, frame, outgoing_);
+      group->add(newest_, late);
     }
-    for (const Outgoing& out : outgoing_) group->add(out, time);
   }
 }
 
 void Outbox::add(const wire::Message& message, wire::Time time) {
   for (const auto& [key, weak] : groups_) {
-    if (const std::shared_ptr<Group> group = weak.lock()) group->add({message, true}, time);
+    if (const std::shared_ptr<ReportGroup> group = weak.lock()) group->add(message, time);
   }
 }
 
 bool Outbox::collect() {
   bool any = false;
   for (const auto& [key, weak] : groups_) {
-    const std::shared_ptr<Group> group = weak.lock();
-    if (!group) continue;
-    group->lowLatencyFrames = takeBuffer(group->lowLatency);
-    group->reliableFrames = takeBuffer(group->reliable);
-    any = any || group->lowLatencyFrames || group->reliableFrames;
+    if (const std::shared_ptr<ReportGroup> group = weak.lock()) any = group->collect() || any;
   }
-  if (!any) return false;
-  for (const auto& [key, weak] : groups_) {
-    if (const std::shared_ptr<Group> group = weak.lock()) group->skipped = group->reporter.takeSkipped();
-  }
-  return true;
+  return any;
 }
 
-void Outbox::send(Session& session) {
+void Outbox::beginPass() {
+  for (const auto& [key, weak] : groups_) {
+    if (const std::shared_ptr<ReportGroup> group = weak.lock()) group->beginPass();
+  }
+}
+
+std::size_t Outbox::send(Session& session, std::size_t most) {
   Listener& entry = listener(session);
   if (entry.groups.empty() || entry.names != session.namesWanted()) regroup(session, entry);
-  for (const auto& group : entry.groups) {
-    session.countSkipped(group->skipped);
-    if (group->lowLatencyFrames) session.sendShared(group->lowLatencyFrames, net::Delivery::lowLatency);
-    if (group->reliableFrames) session.sendShared(group->reliableFrames, net::Delivery::reliable);
+  std::size_t reports = 0;
+  for (Member& member : entry.groups) {
+    const auto sent = member.group->advance(
+        member.position, most, [&session](const ReportGroup::Frames& frames, net::Delivery delivery) {
+          session.sendShared(frames, delivery);
+        });
+    session.countSkipped(sent.skipped);
+    reports = std::max(reports, sent.reports);
   }
+  return reports;
 }
 
 }  // namespace hapticd::server

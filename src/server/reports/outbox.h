@@ -5,11 +5,8 @@
 #include <memory>
 #include <vector>
 
-#include "net/send_queue.h"
-#include "server/reports/reporter.h"
+#include "server/reports/report_group.h"
 #include "server/session/session.h"
-#include "server/session/wall_clock.h"
-#include "wire/frame_encoder.h"
 
 namespace hapticd::server {
 
@@ -39,37 +36,33 @@ class Outbox {
   void add(const realtime::TickReport& tick, const ReportFrame& frame, wire::Time time, bool late = false);
   /// Encodes one reliable message for all clients.
   void add(const wire::Message& message, wire::Time time);
-  /// Collects what was added since the last call, for send(); false when there was nothing.
+  /// Makes what was added since the last call a link of each group's chain; false when there was nothing.
   bool collect();
-  /// Queues the collected reports that this client subscribed to.
-  void send(Session& session);
+  /// Begins a pass of send() over all clients.
+  void beginPass();
+  /// Queues what this client does not have yet of the reports that it subscribed to, see
+  /// ReportGroup::advance(). Returns the number of low-latency sends under one name.
+  std::size_t send(Session& session, std::size_t most);
 
   /// The newest tick; its number is 0 until there is one.
-  const realtime::TickReport& last() const noexcept { return last_; }
+  const realtime::TickReport& last() const noexcept { return newest_->tick; }
 
  private:
-  // All clients with the same subscription to one name.
-  struct Group {
-    Group(wire::LocalSender name_, Reporter reporter_) : name(name_), reporter(std::move(reporter_)) {}
-    void add(const Outgoing& out, wire::Time time);
-
-    wire::LocalSender name;
-    Reporter reporter;
-    wire::FrameEncoder lowLatency, reliable;
-    std::shared_ptr<const net::Buffer> lowLatencyFrames, reliableFrames;
-    std::uint64_t skipped = 0;  // ticks skipped before these frames
+  struct Member {
+    std::shared_ptr<ReportGroup> group;
+    ReportGroup::Position position = 0;
   };
   struct Listener {
     ReportChoice choice;
     bool chosen = false;    // by choose() or extend()
     std::size_t names = 0;  // Session::namesWanted() when the groups were chosen
-    std::vector<std::shared_ptr<Group>> groups;
+    std::vector<Member> groups;
   };
 
   Listener& listener(const Session& session);
   void regroup(const Session& session, Listener& listener);
-  std::shared_ptr<Group> group(const DeviceName& name, const ReportChoice& choice);
-  void sendPresentState(Session& session, wire::LocalSender name, const Group& group);
+  std::shared_ptr<ReportGroup> group(const DeviceName& name, const ReportChoice& choice);
+  void sendPresentState(Session& session, const ReportGroup& group);
 
   const DeviceConfig config_;
   const int buttonCount_;
@@ -77,11 +70,8 @@ class Outbox {
   const ReportChoice defaultChoice_;
   std::map<scene::ClientId, Listener> listeners_;
   // A group lives as long as a client is in it.
-  std::map<std::pair<std::int32_t, ReportChoice>, std::weak_ptr<Group>> groups_;
-  realtime::TickReport last_;
-  wire::Time lastTime_;
-  ReportFrame frame_;
-  std::vector<Outgoing> outgoing_;
+  std::map<std::pair<std::int32_t, ReportChoice>, std::weak_ptr<ReportGroup>> groups_;
+  std::shared_ptr<const TimedTick> newest_ = std::make_shared<TimedTick>();
 };
 
 }  // namespace hapticd::server

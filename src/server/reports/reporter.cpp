@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/time.h"
+#include "server/reports/moving_objects.h"
 #include "wire/codec.h"
 
 namespace hapticd::server {
@@ -156,6 +157,7 @@ void Reporter::update(const TickReport& tick, const ReportFrame& frame, std::vec
   }
   touching_ = clientTick.touching;
   if (wants(wire::kReportForce)) out.push_back({wire::IsTouching{flag(clientTick.touching)}, contactChanged});
+  poses(tick, frame, out);
   tickReport(tick, clientTick, contactEnded, out);
 }
 
@@ -364,7 +366,15 @@ void Reporter::tickReport(const TickReport& tick, const ClientTick& clientTick, 
     out.push_back({contactList(tick), contactEnded});
 }
 
-void Reporter::presentState(const TickReport& tick, const ReportFrame& frame,
+// Before the tick, so that a picture of the tick has its poses.
+void Reporter::poses(const TickReport& tick, const ReportFrame& frame, std::vector<Outgoing>& out) {
+  if (!wants(wire::kReportPoses) || frame.moving == nullptr || view_ != View::device) return;
+  wire::Poses message{.tick = tick.tick, .time = tick.time, .poses = {}};
+  frame.moving->append(tick.time, wire::Poses::kMost, nextPose_, message.poses.values);
+  if (!message.poses.values.empty()) out.push_back({std::move(message), false});
+}
+
+void Reporter::presentState(const TickReport& tick, const ReportFrame& frame, bool touchButton,
                             std::vector<Outgoing>& out) const {
   Reporter fresh(config_, buttonCount_, choice_, view_);
   const bool touching = tick.rendering.touching;
@@ -374,8 +384,9 @@ void Reporter::presentState(const TickReport& tick, const ReportFrame& frame,
   fresh.object_ = -2;
   fresh.guard_.armed = -1;
   if (wants(wire::kReportButton | wire::kReportTouchButton)) {
-    out.push_back({buttonStates(frame.buttons, touching), true});
+    out.push_back({buttonStates(frame.buttons, touchButton), true});
   }
+  fresh.nextPose_ = nextPose_;
   fresh.buttons_ = frame.buttons;
   fresh.touchButton_ = touching;
   fresh.update(tick, frame, out);

@@ -14,6 +14,8 @@
 
 namespace hapticd::server {
 
+class MovingObjects;
+
 /// A message to send. `reliable`: it must not be lost, although its kind is low-latency.
 struct Outgoing {
   wire::Message message;
@@ -48,7 +50,8 @@ inline constexpr std::int32_t kSensorCount = 3;
 struct ReportFrame {
   geometry::Vec3 origin = geometry::Vec3::Zero();  ///< reported metres
   geometry::Quat rotation = geometry::Quat::Identity();
-  std::uint32_t buttons = 0;  ///< bits of the device's buttons, after ButtonModes
+  std::uint32_t buttons = 0;        ///< bits of the device's buttons, after ButtonModes
+  MovingObjects* moving = nullptr;  ///< null: nothing moves
 };
 
 /// Keeps the last reported values and reports changes. One for each ReportChoice; net thread; no clock and no
@@ -68,8 +71,13 @@ class Reporter {
   /// Number of ticks whose due reports skip() omitted since the last call.
   std::uint64_t takeSkipped() noexcept { return std::exchange(skipped_, 0); }
 
-  /// Appends the whole present state, for a client that has just subscribed.
+  /// Appends the whole state of this tick, for a client that has just subscribed.
   void presentState(const realtime::TickReport& tick, const ReportFrame& frame,
+                    std::vector<Outgoing>& out) const {
+    presentState(tick, frame, tick.rendering.touching, out);
+  }
+  /// The same with another state of the button "touching", which is reported with every tick, due or not.
+  void presentState(const realtime::TickReport& tick, const ReportFrame& frame, bool touchButton,
                     std::vector<Outgoing>& out) const;
 
   /// The states of all buttons that this choice reports; "touching" is the last one.
@@ -89,6 +97,7 @@ class Reporter {
   void analog(const ClientTick& clientTick, bool reliable, std::vector<Outgoing>& out);
   void tickReport(const realtime::TickReport& tick, const ClientTick& clientTick, bool contactEnded,
                   std::vector<Outgoing>& out);
+  void poses(const realtime::TickReport& tick, const ReportFrame& frame, std::vector<Outgoing>& out);
 
   bool wants(std::uint32_t kind) const noexcept { return (choice_.kinds & kind) != 0; }
   bool moved(std::int32_t sensor, const geometry::Vec3& position, const geometry::Quat& orientation);
@@ -108,6 +117,7 @@ class Reporter {
   std::array<Sent, kSensorCount> sensors_;
   std::uint32_t buttons_ = 0;
   std::uint64_t skipped_ = 0;
+  std::size_t nextPose_ = 0;  ///< of more moving objects than fit into one message
   bool touchButton_ = false;
   bool touching_ = false;
   std::int32_t object_ = -1;

@@ -62,6 +62,12 @@ void SceneHost::describe(std::function<void(std::shared_ptr<const scene::SceneDe
   if (thread_) push({0, DescribeScene{std::move(reply)}}, 0);
 }
 
+bool SceneHost::inspect(std::function<void(const std::vector<const scene::SceneBuilder*>&)> call) {
+  if (!thread_) return false;
+  push({0, Inspect{std::move(call)}}, 0);
+  return true;
+}
+
 void SceneHost::push(SceneTask&& task, std::size_t bytes) {
   SceneParcel parcel{.client = task.client, .tasks = {}, .bytes = bytes};
   parcel.tasks.push_back(std::move(task));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <set>
 #include <string>
@@ -20,12 +21,14 @@ class SceneHost {
   using Post = std::function<void(std::function<void()>)>;
 
   /// `name`: the configured name; empty for a scene that is not shared.
-  SceneHost(std::uint32_t number, std::string name, SceneOnDisconnect onDisconnect)
-      : number_(number), name_(std::move(name)), onDisconnect_(onDisconnect) {}
+  SceneHost(std::uint32_t number, std::string name, SceneOnDisconnect onDisconnect,
+            const LimitsConfig& limits = {})
+      : number_(number), name_(std::move(name)), onDisconnect_(onDisconnect), limits_(limits) {}
 
   /// Number of the scene from 0, in the order of the configuration.
   std::uint32_t number() const noexcept { return number_; }
   const std::string& name() const noexcept { return name_; }
+  const LimitsConfig& limits() const noexcept { return limits_; }
 
   /// Adds a device to the scene; before start().
   void add(SceneDevice device) {
@@ -43,6 +46,10 @@ class SceneHost {
   void flush(scene::ClientId client);
   /// Whether the client is too far ahead of the scene: its session must hold back further commands.
   bool full(scene::ClientId client) const { return thread_ && thread_->queue().full(client); }
+  /// Bytes of commands that wait for the scene, by client.
+  std::map<scene::ClientId, std::size_t> waiting() const {
+    return thread_ ? thread_->queue().waiting() : std::map<scene::ClientId, std::size_t>{};
+  }
   /// Calls `reached` in the net thread once all commands that the client sent so far are published; at once
   /// when they are already, so that a client never waits for the commands of others.
   void whenPublished(scene::ClientId client, std::function<void()> reached);
@@ -55,6 +62,9 @@ class SceneHost {
   void clientGone(scene::ClientId client);
   /// Requests a description of the scene after all flushed commands; `reply` is called in the scene thread.
   void describe(std::function<void(std::shared_ptr<const scene::SceneDescription>)> reply);
+  /// Calls in the scene thread with the builders, in the order in which devices were added. False before
+  /// start().
+  bool inspect(std::function<void(const std::vector<const scene::SceneBuilder*>&)> call);
 
  private:
   void push(SceneTask&& task, std::size_t bytes = sizeof(SceneTask));
@@ -62,6 +72,7 @@ class SceneHost {
   std::uint32_t number_;
   std::string name_;
   SceneOnDisconnect onDisconnect_;
+  LimitsConfig limits_;
   std::vector<SceneDevice> devices_;
   Post post_;
   std::unique_ptr<SceneThread> thread_;

@@ -29,6 +29,15 @@ bool SceneQueue::full(scene::ClientId client) const {
   return account != accounts_.end() && account->second.full;
 }
 
+std::map<scene::ClientId, std::size_t> SceneQueue::waiting() const {
+  std::map<scene::ClientId, std::size_t> bytes;
+  const std::lock_guard lock(mutex_);
+  for (const auto& [client, account] : accounts_) {
+    if (account.bytes > 0) bytes.emplace(client, account.bytes);
+  }
+  return bytes;
+}
+
 bool SceneQueue::pending(scene::ClientId client) const {
   const std::lock_guard lock(mutex_);
   return accounts_.count(client) != 0;

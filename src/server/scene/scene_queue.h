@@ -37,6 +37,8 @@ class SceneQueue {
 
   /// Whether the client exceeded the limit and is not yet relieved.
   bool full(scene::ClientId client) const;
+  /// Bytes in the queue by client.
+  std::map<scene::ClientId, std::size_t> waiting() const;
   /// Whether a command of the client is not yet published.
   bool pending(scene::ClientId client) const;
 

@@ -4,7 +4,9 @@
 #include <functional>
 #include <memory>
 #include <variant>
+#include <vector>
 
+#include "scene/builder.h"
 #include "scene/commands.h"
 #include "scene/description.h"
 #include "scene/notice.h"
@@ -25,10 +27,16 @@ struct WhenPublished {
   std::function<void()> reached;
 };
 
+/// Requests a call in the scene thread after the preceding tasks, with the builders in the order of the
+/// devices.
+struct Inspect {
+  std::function<void(const std::vector<const scene::SceneBuilder*>&)> call;
+};
+
 /// One task of one client.
 struct SceneTask {
   scene::ClientId client = 0;
-  std::variant<scene::SceneCommand, ClientGone, DescribeScene, WhenPublished> what;
+  std::variant<scene::SceneCommand, ClientGone, DescribeScene, WhenPublished, Inspect> what;
 };
 
 }  // namespace hapticd::server

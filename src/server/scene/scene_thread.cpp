@@ -111,6 +111,12 @@ void SceneThread::apply(SceneTask&& task) {
     publishWaiters_.push_back({base::now(), std::move(wanted->reached)});
     return;
   }
+  if (const auto* inspect = std::get_if<Inspect>(&task.what)) {
+    std::vector<const scene::SceneBuilder*> builders;
+    for (const Seat& seat : seats_) builders.push_back(&seat.builder);
+    inspect->call(builders);
+    return;
+  }
   const base::Nanos now = base::now();
   auto* command = std::get_if<scene::SceneCommand>(&task.what);
   const bool released = command == nullptr || std::holds_alternative<scene::ReleaseForces>(*command);

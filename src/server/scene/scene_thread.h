@@ -21,7 +21,7 @@ struct SceneDevice {
   /// Scene thread; called after the snapshot was passed to the slot.
   std::function<void(const std::shared_ptr<const scene::SceneSnapshot>&)> published;
   /// Scene thread; called before a snapshot is passed to the slot, with the time at which the builder was
-  /// asked and the revision that it returned, 0 for none. Empty unless a recording is written.
+  /// asked and the revision that it returned, 0 for none. May be empty.
   std::function<void(base::Nanos, std::uint64_t)> publishing;
 };
 
@@ -33,8 +33,7 @@ class SceneThread {
   struct Callbacks {
     std::function<void(std::vector<scene::Notice>&&)> notices;  ///< texts for clients
     std::function<void(scene::ClientId)> relieved;              ///< the client is no longer full
-    /// Called before the builders get a command; null: the client disconnected. Empty unless a recording is
-    /// written.
+    /// Called before the builders get a command; null: the client disconnected. May be empty.
     std::function<void(scene::ClientId, base::Nanos, const scene::SceneCommand*)> applying;
   };
 

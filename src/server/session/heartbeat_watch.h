@@ -13,7 +13,8 @@ class HeartbeatWatch {
  public:
   /// Silence after which the client is lost.
   static constexpr base::Nanos kLimit = 500'000'000;
-  /// Total length of pauses without a heartbeat in between after which the client's forces end.
+  /// Total length of pauses, and of other data, without a heartbeat in between after which the client's
+  /// forces end, or the client is lost after kLimit.
   static constexpr base::Nanos kExcuse = 5'000'000'000;
 
   enum class Verdict {
@@ -41,6 +42,16 @@ class HeartbeatWatch {
     excuse_ -= now - *paused_;
     paused_.reset();
     if (last_) last_ = now;
+  }
+
+  /// Other data of the client was received: heartbeats may be behind it, on a link that is slower than the
+  /// client.
+  void receive(base::Nanos now) noexcept {
+    if (!last_ || paused_) return;
+    const base::Nanos silence = now - *last_;
+    if (silence > excuse_) return;
+    excuse_ -= silence;
+    last_ = now;
   }
 
   /// The server stood still until now and may not have read heartbeats that were sent.

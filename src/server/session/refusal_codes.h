@@ -19,6 +19,8 @@ enum class RefusalCode : std::uint32_t {
   handPoseInvalid = 4,   ///< Hold_Hand: position or orientation is not finite, or the quaternion is zero
   streamedByOther = 5,   ///< Remote_Contacts, Held_Force: another client streams them
   streamInvalid = 6,     ///< Remote_Contacts, Held_Force: a number is not usable
+  stoppedByOther = 7,    ///< Rearm_Forces: a stop of another client stands, and only certain ones may undo it
+  tokenRefused = 8,      ///< Identify: no such token, or too many wrong ones from this address
 };
 
 /// The refusal of one command.
@@ -33,7 +35,7 @@ struct RefusalInfo {
 };
 
 /// All codes, in order.
-inline constexpr std::array<RefusalInfo, 7> kRefusals{{
+inline constexpr std::array<RefusalInfo, 9> kRefusals{{
     {RefusalCode::none, "none"},
     {RefusalCode::notPermitted, "notPermitted"},
     {RefusalCode::handNotSimulated, "handNotSimulated"},
@@ -41,6 +43,8 @@ inline constexpr std::array<RefusalInfo, 7> kRefusals{{
     {RefusalCode::handPoseInvalid, "handPoseInvalid"},
     {RefusalCode::streamedByOther, "streamedByOther"},
     {RefusalCode::streamInvalid, "streamInvalid"},
+    {RefusalCode::stoppedByOther, "stoppedByOther"},
+    {RefusalCode::tokenRefused, "tokenRefused"},
 }};
 
 }  // namespace hapticd::server

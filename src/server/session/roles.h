@@ -1,4 +1,4 @@
-// Decides which clients may command a device.
+// Decides which owners may command a scene. The role of a client itself: identity.h.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace hapticd::server {
 
-/// The configured `control` of one device. Net thread.
+/// The configured `control` of one scene, for all of its devices. Net thread.
 class Roles {
  public:
   Roles(Control control, std::vector<std::string> list) : control_(control), list_(std::move(list)) {}
@@ -27,8 +27,8 @@ class Roles {
     if (control_ != Control::first) return Roles(*this).mayCommand(client, address);
     return !first_ || *first_ == client;
   }
-  /// When the client in control disconnects, the next client to command gets control.
-  void clientGone(std::uint64_t client) {
+  /// The client disconnects or gives up control: the next one to command gets it.
+  void release(std::uint64_t client) {
     if (first_ == client) first_.reset();
   }
   /// The reason in the text of a refusal.

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "base/world.h"
+#include "net/local_socket.h"
 #include "wire/frame_encoder.h"
 #include "wire/text.h"
 
@@ -27,7 +28,17 @@ wire::PeerOptions peerOptions(const net::UdpSocket* udp) {
 }  // namespace
 
 std::string_view nameOf(SessionMode mode) {
-  return mode == SessionMode::tcp ? "tcp" : mode == SessionMode::udp ? "udp" : "web";
+  switch (mode) {
+    case SessionMode::tcp:
+      return "tcp";
+    case SessionMode::udp:
+      return "udp";
+    case SessionMode::web:
+      return "web";
+    case SessionMode::local:
+      break;
+  }
+  return "local";
 }
 
 Session::Session(scene::ClientId id, SessionOwner& owner, const wire::LocalNames& names,
@@ -41,13 +52,17 @@ Session::Session(scene::ClientId id, SessionOwner& owner, const wire::LocalNames
       udp_(std::move(udp)),
       peer_(names, peerOptions(udp_.get())),
       mode_(mode),
-      description_(connection_.remote().text() + ", " + std::string(nameOf(mode))) {}
+      user_(net::peerUser(connection_)) {
+  description_ = user_ ? "user " + std::to_string(*user_) : connection_.remote().text();
+  description_ += ", " + std::string(nameOf(mode));
+}
 
 ClientStatus Session::status() const {
   ClientStatus status;
   status.id = id_;
   status.address = connection_.remote().text();
   status.mode = nameOf(mode_);
+  status.role = nameOf(identity_.role);
   for (const wire::LocalSender name : subscriptions_) {
     status.devices.push_back(names_.senders()[static_cast<std::size_t>(name.value)]);
   }
@@ -56,6 +71,7 @@ ClientStatus Session::status() const {
   status.bytesIn = stream.bytesIn;
   status.bytesOut = stream.bytesOut;
   status.dropped = skipped_ + stream.droppedBuffers;
+  status.ignoredDatagrams = ignoredDatagrams_;
   status.queuedBytes = stream.queuedBytes;
   status.unacknowledgedBytes = stream.unacknowledgedBytes;
   if (udp_) {
@@ -65,6 +81,10 @@ ClientStatus Session::status() const {
     status.dropped += datagrams.dropped;
   }
   return status;
+}
+
+std::size_t Session::waitingBytes() const {
+  return connection_.statistics().queuedBytes + backlog_.size();
 }
 
 void Session::start() {
@@ -103,13 +123,17 @@ bool Session::release() {
   constexpr std::size_t kSlice_bytes = 64 * 1024;
   held_ = false;
   const std::size_t before = backlog_.size();
-  while (!backlog_.empty() && !held_ && before - backlog_.size() < kSlice_bytes && peer_.connected()) {
+  const auto goesOn = [&] {
+    return !backlog_.empty() && !held_ && before - backlog_.size() < kSlice_bytes && peer_.connected() &&
+           !ending_;
+  };
+  while (goesOn()) {
     const MessageBacklog::Entry entry = backlog_.pop();
     deliver(entry.message, entry.received);
   }
   owner_.onReadEnd(*this);
   flush();
-  if (!backlog_.empty()) return !held_;
+  if (!backlog_.empty() && !ending_) return !held_;
   pauseReading(false);
   if (closeReason_) owner_.onClosed(*this, *closeReason_);
   return false;
@@ -142,12 +166,18 @@ void Session::pauseReading(bool pause) {
   }
 }
 
+void Session::beginEnd() {
+  if (!std::exchange(ending_, true)) owner_.onEnding(*this);
+}
+
 void Session::close(const std::string& reason) {
+  beginEnd();
   failure_ = reason;
   connection_.close(reason);
 }
 
 void Session::abort(const std::string& reason) {
+  beginEnd();
   failure_ = reason;
   connection_.abort(reason);
 }
@@ -188,6 +218,7 @@ void Session::drainPeer() {
 
 void Session::onBytes(std::span<const std::byte> bytes) {
   constexpr std::size_t kSlice_bytes = 8 * 1024;  // takes tens of microseconds
+  heartbeats_.receive(base::now());
   while (!bytes.empty() && !peer_.failed()) {
     const auto slice = bytes.first(std::min(kSlice_bytes, bytes.size()));
     bytes = bytes.subspan(slice.size());
@@ -196,6 +227,7 @@ void Session::onBytes(std::span<const std::byte> bytes) {
   }
   owner_.onReadEnd(*this);
   if (peer_.failed()) {
+    beginEnd();
     if (greeted_) {
       connection_.close(failure_);  // sends the text
     } else {
@@ -206,12 +238,22 @@ void Session::onBytes(std::span<const std::byte> bytes) {
   flush();
 }
 
+// Anybody can send datagrams to a port, and forge their address. The socket is this session's own, at a port
+// that only this client was told.
 void Session::onDatagram(std::span<const std::byte> bytes, const net::Endpoint& from) {
-  // Anybody can send datagrams to a port; accept only those from the address of the TCP connection.
-  if (from.address != connection_.remote().address) return;
-  inDatagram_ = true;
-  peer_.feedDatagram(bytes, [this](const wire::Event& event) { onEvent(event); });
-  inDatagram_ = false;
+  const bool fromClient =
+      from.address == connection_.remote().address && datagramSource_.value_or(from.port) == from.port;
+  datagramCounts_ = false;
+  if (fromClient) {
+    inDatagram_ = true;
+    peer_.feedDatagram(bytes, [this](const wire::Event& event) { onEvent(event); });
+    inDatagram_ = false;
+  }
+  if (datagramCounts_) {
+    datagramSource_ = from.port;
+  } else {
+    ++ignoredDatagrams_;
+  }
   owner_.onReadEnd(*this);
   flush();
 }
@@ -239,8 +281,19 @@ void Session::onEvent(const wire::Event& event) {
 
 void Session::onReceived(const wire::MessageReceived& message) {
   // VRPN ignores messages of senders and types that the receiver does not know.
-  if (message.local_sender.value < 0 || message.kind == wire::kUnknownKind || isStale(message)) return;
+  if (message.local_sender.value < 0 || message.kind == wire::kUnknownKind) return;
+  if (ending_ && message.kind != wire::kindOf<wire::StopForces>) return;
+  // Whatever stock clients send by TCP only is forged here.
+  const wire::MessageInfo& info = wire::info(message.kind);
+  if (inDatagram_ && (info.reliability != wire::Reliability::kLowLatency || info.role != wire::Role::scene))
+    return;
+  if (inDatagram_) datagramCounts_ = true;
+  if (isStale(message)) return;
   const base::Nanos received = base::now();
+  if (isOneTooMany(message.kind, received)) {
+    refuse("more than " + std::to_string(mostPerSecond_) + " messages in a second; send fewer");
+    return;
+  }
   if (!holding() || wire::overtakes(message.kind)) {
     deliver(message, received);
     return;
@@ -280,6 +333,20 @@ bool Session::isStale(const wire::MessageReceived& message) {
   if (inDatagram_) return before(message.time, last);
   last = message.time;
   return false;
+}
+
+// The number of messages that fill meshes is bounded by the meshes, and their bytes by the queue.
+bool Session::isOneTooMany(wire::MessageKind kind, base::Nanos received) {
+  constexpr base::Nanos kSecond = 1'000'000'000;
+  constexpr std::array kUncounted{wire::kindOf<wire::StopForces>, wire::kindOf<wire::SetVertex>,
+                                  wire::kindOf<wire::SetTriangle>, wire::kindOf<wire::MeshVertices>,
+                                  wire::kindOf<wire::MeshTriangles>};
+  if (std::find(kUncounted.begin(), kUncounted.end(), kind) != kUncounted.end()) return false;
+  if (received - secondBegan_ >= kSecond) {
+    secondBegan_ = received;
+    inThisSecond_ = 0;
+  }
+  return inThisSecond_++ >= mostPerSecond_;
 }
 
 void Session::onSender(std::string_view name) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <climits>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "scene/notice.h"
 #include "server/session/client_status.h"
 #include "server/session/heartbeat_watch.h"
+#include "server/session/identity.h"
 #include "server/session/message_backlog.h"
 #include "server/session/wall_clock.h"
 #include "wire/peer.h"
@@ -24,7 +26,7 @@ namespace hapticd::server {
 class Session;
 
 /// How a client is connected.
-enum class SessionMode { tcp, udp, web };
+enum class SessionMode { tcp, udp, web, local };
 std::string_view nameOf(SessionMode mode);
 
 /// Receives the events of a session. Net thread.
@@ -50,6 +52,9 @@ class SessionOwner {
   /// The client disconnected while the server does not read from it: end its forces now. Messages that it
   /// sent before are still passed on until onClosed().
   virtual void onPeerGone(Session& session, const std::string& reason) = 0;
+  /// The server begins to close the connection, which may take 2 s while the client does not read: end its
+  /// forces now. Called at most once; after it only stops are passed on, until onClosed().
+  virtual void onEnding(Session& session) = 0;
   /// The connection is closed; the owner destroys the session.
   virtual void onClosed(Session& session, const std::string& reason) = 0;
 };
@@ -74,8 +79,29 @@ class Session {
   bool wants(wire::LocalSender name) const noexcept;
   /// How many of the server's devices the client has described so far.
   std::size_t namesWanted() const noexcept { return subscriptions_.size(); }
+  const net::Endpoint& remote() const noexcept { return connection_.remote(); }
   /// The client's IPv4 address, without the port.
   std::string address() const { return connection_.remote().addressText(); }
+
+  SessionMode mode() const noexcept { return mode_; }
+  /// Most messages per second besides stops and those that fill meshes; beyond it the session ends.
+  void setMostPerSecond(int count) noexcept { mostPerSecond_ = count; }
+  /// Memory that waits for the client or for the server to handle what it sent.
+  std::size_t waitingBytes() const;
+  /// Whether onEnding() was called.
+  bool ending() const noexcept { return ending_; }
+  /// What the client may do; the owner sets it.
+  const Identity& identity() const noexcept { return identity_; }
+  Commander commander() const { return {id_, address(), identity_}; }
+  void setIdentity(const Identity& identity) noexcept { identity_ = identity; }
+  /// Key that the connections of one program share; 0: none.
+  std::uint64_t key() const noexcept { return key_; }
+  void setKey(std::uint64_t key) noexcept { key_ = key; }
+  /// The connection was opened by a page in a browser.
+  bool ofPage() const noexcept { return ofPage_; }
+  void setOfPage() noexcept { ofPage_ = true; }
+  /// For a Unix socket, the number of the client's user.
+  const std::optional<std::uint32_t>& user() const noexcept { return user_; }
 
   /// Queues one message; the next flush() sends it.
   template <wire::WireMessage M>
@@ -142,7 +168,9 @@ class Session {
   void refuseLogs(wire::LocalSender from);
   void sendLastText(const std::string& reason);
   void drainPeer();
+  void beginEnd();
   bool isStale(const wire::MessageReceived& message);
+  bool isOneTooMany(wire::MessageKind kind, base::Nanos received);
 
   scene::ClientId id_;
   SessionOwner& owner_;
@@ -151,6 +179,9 @@ class Session {
   net::Connection connection_;
   std::unique_ptr<net::UdpSocket> udp_;
   net::Endpoint datagramPeer_;
+  std::optional<std::uint16_t> datagramSource_;  // port of the first datagram that counted
+  bool datagramCounts_ = false;                  // a message of the present one was taken
+  std::uint64_t ignoredDatagrams_ = 0;
   wire::Peer peer_;
   SessionMode mode_;
   base::Nanos since_ = base::now();
@@ -158,7 +189,15 @@ class Session {
   std::set<wire::LocalSender> subscriptions_;  // without "VRPN Control"
   std::uint64_t skipped_ = 0;
   std::uint64_t dropsSeen_ = 0;
+  Identity identity_;
+  std::uint64_t key_ = 0;
+  bool ofPage_ = false;
+  std::optional<std::uint32_t> user_;
   std::string failure_;
+  int mostPerSecond_ = INT_MAX;
+  int inThisSecond_ = 0;
+  base::Nanos secondBegan_ = 0;
+  bool ending_ = false;
   bool greeted_ = false;
   bool logsRefused_ = false;  // the client has not been notified yet
   bool inDatagram_ = false;

@@ -9,20 +9,25 @@
 
 namespace hapticd::server {
 
-/// Logs up to kLinesPerSource lines per second and source, and up to kLines of all sources; of the others
-/// only the number. Addresses of this machine may cause kLocalLines besides. One thread; call
-/// reportSuppressed() once per second.
+/// Logs up to kLinesPerSource lines per second and source, up to kLines of all sources, and up to a number of
+/// bytes; of the others only the number. Addresses of this machine may cause kLocalLines besides. One thread;
+/// call reportSuppressed() once per second.
 class ThrottledLog {
  public:
   static constexpr int kLinesPerSource = 20;
   static constexpr int kLines = 60;
   static constexpr int kLocalLines = 1000;
 
+  explicit ThrottledLog(std::size_t bytesPerSecond = SIZE_MAX) : most_(bytesPerSecond) {}
+
   /// `source` is what one client cannot change at will: its number or its address.
   void log(spdlog::level::level_enum level, const std::string& source, const std::string& text) {
     const bool local = source.starts_with("127.");
-    if (++bySource_[source] <= (local ? kLocalLines : kLinesPerSource) && (local || lines_ < kLines)) {
+    const bool mayLog =
+        ++bySource_[source] <= (local ? kLocalLines : kLinesPerSource) && (local || lines_ < kLines);
+    if (mayLog && bytes_ + text.size() <= most_) {
       if (!local) ++lines_;
+      bytes_ += text.size();
       spdlog::log(level, "{}", text);
     } else {
       ++suppressed_;
@@ -35,10 +40,13 @@ class ThrottledLog {
       spdlog::warn("{} more lines about clients suppressed in the last second", suppressed_);
     bySource_.clear();
     lines_ = 0;
+    bytes_ = 0;
     suppressed_ = 0;
   }
 
  private:
+  std::size_t most_;
+  std::size_t bytes_ = 0;
   std::map<std::string, int> bySource_;
   int lines_ = 0;
   std::uint64_t suppressed_ = 0;

@@ -25,13 +25,27 @@ std::string plain(std::string text) {
   return text;
 }
 
+// Whether the name is one that nextFile() makes.
+bool isBlackBox(const std::string& name) {
+  constexpr std::string_view kForm = "00000000T000000.000Z-";
+  if (name.size() <= kForm.size() + kExtension.size() || !name.ends_with(kExtension)) return false;
+  return std::equal(kForm.begin(), kForm.end(), name.begin(), [](char form, char c) {
+    return form == '0' ? std::isdigit(static_cast<unsigned char>(c)) != 0 : form == c;
+  });
+}
+
 // Names begin with the time, so the oldest sort first.
-void deleteOldest(const fs::path& directory, int keep) {
+void deleteOldest(const fs::path& directory, int keep, std::uint64_t bytes) {
   base::Files& files = base::world().files;
   std::vector<std::string> names = files.list(directory);
-  std::erase_if(names, [](const std::string& name) { return fs::path(name).extension() != kExtension; });
-  const auto tooMany = static_cast<std::ptrdiff_t>(names.size()) - keep;
-  for (std::ptrdiff_t i = 0; i < tooMany; ++i) files.remove(directory / names[static_cast<std::size_t>(i)]);
+  std::erase_if(names, [](const std::string& name) { return !isBlackBox(name); });
+  std::uint64_t kept = 0;
+  for (std::size_t i = names.size(); i-- > 0;) {
+    const fs::path file = directory / names[i];
+    kept += files.open(file)->size();
+    const std::size_t newer = names.size() - 1 - i;
+    if (newer > 0 && (newer >= static_cast<std::size_t>(keep) || kept > bytes)) files.remove(file);
+  }
 }
 
 }  // namespace
@@ -76,7 +90,7 @@ void BlackBoxRecorder::poll() {
         try {
           base::world().files.createFolder(file.parent_path());
           writeBlackBox(file, name_, box);
-          deleteOldest(file.parent_path(), files_.keep);
+          deleteOldest(file.parent_path(), files_.keep, files_.bytes);
         } catch (const std::exception& error) {
           spdlog::error("device '{}': {}; set black_box_dir to a directory that can be written", name_,
                         error.what());

@@ -1,6 +1,7 @@
 // Writes black boxes to files: the ticks before a fault that latched.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -10,10 +11,11 @@
 
 namespace hapticd::server {
 
-/// Where black boxes are written, and how many are kept.
+/// Where black boxes are written, and how much is kept.
 struct BlackBoxFiles {
   std::filesystem::path directory;
-  int keep = 10;  ///< newest files of this device to keep; 0: write none
+  int keep = 10;                     ///< newest files of this device to keep; 0: write none
+  std::uint64_t bytes = 100U << 20;  ///< of all of them; the newest is kept whatever its size
 };
 
 /// Writes ticks as CSV, oldest first, with the columns of `hapticd export` (record/sample.h). Throws

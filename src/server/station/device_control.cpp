@@ -20,14 +20,60 @@ bool finite(const wire::HoldHand& m) {
 
 }  // namespace
 
-void DeviceControl::stopForces(const Order& order) {
-  stop_ = order;
-  guard_.stop();
+bool DeviceControl::Stop::isOf(const Sender& sender) const noexcept {
+  const bool sameKey = key != 0 && key == sender.key;
+  return sameKey || std::find(clients.begin(), clients.end(), sender.client) != clients.end();
 }
 
-bool DeviceControl::rearmForces(const Order& order) {
-  const bool sentEarlier = order.address == stop_.address && order.sent < stop_.sent;
-  if (order.received <= stop_.received || sentEarlier) return false;
+void DeviceControl::stopForces(const Order& order, const Sender& sender) {
+  constexpr std::size_t kMostGone = 32;
+  stop_ = order;
+  guard_.stop();
+  const auto own = std::find_if(stops_.begin(), stops_.end(), [&](const Stop& s) { return s.isOf(sender); });
+  if (own != stops_.end()) {
+    if (std::find(own->clients.begin(), own->clients.end(), sender.client) == own->clients.end())
+      own->clients.push_back(sender.client);
+    return;
+  }
+  stops_.push_back({sender.key, {sender.client}, sender.description});
+  // One that is forgotten only merges with others that their programs can no longer undo.
+  const auto gone = [](const Stop& stop) { return stop.clients.empty(); };
+  if (static_cast<std::size_t>(std::count_if(stops_.begin(), stops_.end(), gone)) <= kMostGone) return;
+  const auto first = std::find_if(stops_.begin(), stops_.end(), gone);
+  const auto second = std::find_if(first + 1, stops_.end(), gone);
+  second->key = 0;
+  stops_.erase(first);
+}
+
+bool DeviceControl::rearmForces(const Order& order, const Sender& sender, bool faults, Refusal& refusal) {
+  // One connection keeps its order by itself.
+  const bool otherConnection = order.address == stop_.address && order.client != stop_.client;
+  const bool sentEarlier =
+      otherConnection && order.sent < stop_.sent && stop_.sent - order.sent <= kLongestTravel;
+  if (order.received <= stop_.received || sentEarlier) {
+    refusal = {RefusalCode::none, "Rearm_Forces ignored: the forces were stopped after it was sent"};
+    return false;
+  }
+  const auto gone = [](const Stop& stop) { return stop.clients.empty(); };
+  if (sender.isOperator ||
+      (sender.isPage && !sender.hasOperators && std::all_of(stops_.begin(), stops_.end(), gone))) {
+    stops_.clear();
+  }
+  const bool undoes = std::erase_if(stops_, [&](const Stop& stop) { return stop.isOf(sender); }) > 0;
+  if (!stops_.empty()) {
+    const Stop& other = stops_.back();
+    refusal = {RefusalCode::stoppedByOther,
+               "Rearm_Forces refused: " + other.description + " stopped the forces" +
+                   (gone(other) ? " and is gone" : "") + "; " + (gone(other) ? "" : "it may re-arm, or ") +
+                   "an operator, or 'hapticd stop --rearm' by the server's user on its machine"};
+    return false;
+  }
+  if (!sender.mayCommand && (!undoes || faults)) {
+    refusal = {RefusalCode::notPermitted,
+               "Rearm_Forces refused: this client may undo its own stop only, not " +
+                   std::string(faults ? "faults" : "others'")};
+    return false;
+  }
   guard_.rearm();
   return true;
 }
@@ -82,6 +128,7 @@ bool DeviceControl::hold(scene::ClientId client, const wire::HoldHand& wanted,
 
 void DeviceControl::clientGone(scene::ClientId client) {
   if (holder_ == client) releaseHand();
+  for (Stop& stop : stops_) std::erase(stop.clients, client);
 }
 
 void DeviceControl::releaseHand() {

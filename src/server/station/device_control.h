@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "device/simulated/steered_hand.h"
 #include "realtime/servo/guard_control.h"
@@ -26,12 +27,31 @@ class DeviceControl {
     base::Nanos received = 0;  ///< when the server read it, on the servo clock
     base::Nanos sent = 0;      ///< its time stamp, on the clock of the machine that sent it
     std::string address;       ///< of that machine
+    scene::ClientId client = 0;
   };
-  /// Zero force until a later re-arm.
-  void stopForces(const Order& order);
-  /// Re-arms. Returns false without effect when a stop is later than the re-arm: it was received at the same
-  /// time or later, or the same machine sent it later on another connection.
-  bool rearmForces(const Order& order);
+  static constexpr base::Nanos kLongestTravel = 10'000'000'000;
+
+  /// Who gives an order.
+  struct Sender {
+    scene::ClientId client = 0;
+    std::uint64_t key = 0;      ///< that the connections of one program share; 0: none
+    std::string description;    ///< for texts
+    bool mayCommand = false;    ///< an owner in control, or an operator
+    bool isOperator = false;    ///< proven by a token or a user id
+    bool isPage = false;        ///< a page in a browser
+    bool hasOperators = false;  ///< the server knows somebody who could prove to be one
+  };
+  /// Zero force until a later re-arm. Any client may.
+  void stopForces(const Order& order, const Sender& sender);
+  /// Re-arms. Returns false, with the reason, when
+  /// - a stop is later than the re-arm: it was received at the same time or later, or the same machine sent
+  /// it
+  ///   later on another connection (a stamp that is earlier by more than kLongestTravel proves nothing: the
+  ///   clock of that machine was set);
+  /// - a stop of another program stands. Each program may undo its own; operators undo all; where there are
+  ///   none, a page in a browser does, once all those programs are gone;
+  /// - the sender may not command, and there is more to re-arm than its own stop (`faults`: latched trips).
+  bool rearmForces(const Order& order, const Sender& sender, bool faults, Refusal& refusal);
   /// Ramps the force in from zero, as after a reset of the scene.
   void rampIn() { guard_.rampIn(); }
 
@@ -50,8 +70,17 @@ class DeviceControl {
   realtime::GuardControl& guard_;
   device::SteeredHand* hand_;
   geometry::Box workspace_m_;
+  // A stop that stands. The program is its key or, without one, its connection.
+  struct Stop {
+    std::uint64_t key = 0;
+    std::vector<scene::ClientId> clients;  // connections of the program that stopped and are open
+    std::string description;
+    bool isOf(const Sender& sender) const noexcept;
+  };
+
   std::optional<scene::ClientId> holder_;
-  Order stop_;  // the newest stop
+  Order stop_;               // the newest stop
+  std::vector<Stop> stops_;  // oldest first
 };
 
 }  // namespace hapticd::server

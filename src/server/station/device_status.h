@@ -20,7 +20,7 @@ struct DeviceStatus {
   double peakForce_N = 0;
   double rate_Hz = 0;
   bool realtime = false;  ///< the loop has realtime scheduling
-  std::string hand;       ///< what moves it: scripted, file, held (by a client), user
+  std::string hand;       ///< what moves it: scripted, file, held (by a client), user, recorded
   std::optional<std::uint32_t> heldBy;
   std::string fault;
   std::uint64_t droppedReports = 0;

@@ -1,8 +1,10 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <iterator>
 
 #include "base/world.h"
+#include "device/profiles.h"
 #include "device/simulated/simulated_device.h"
 #include "server/station/devices.h"
 #include "server/station/replies.h"
@@ -43,6 +45,16 @@ scene::SceneConfig sceneConfig(const DeviceConfig& config, const device::DeviceP
   return scene;
 }
 
+scene::SceneLimits sceneLimits(const LimitsConfig& config) {
+  scene::SceneLimits limits;
+  limits.objects = config.objects;
+  limits.verticesInAll = static_cast<std::uint64_t>(config.vertices);
+  limits.trianglesInAll = static_cast<std::uint64_t>(config.triangles);
+  limits.effects = static_cast<std::size_t>(config.effects);
+  limits.batch_bytes = static_cast<std::size_t>(config.batches_MB) << 20;
+  return limits;
+}
+
 realtime::TickOptions tickOptions(const DeviceConfig& config, const device::Device& device) {
   realtime::TickOptions options;
   options.rate_Hz = config.servoRate_Hz;
@@ -50,6 +62,7 @@ realtime::TickOptions tickOptions(const DeviceConfig& config, const device::Devi
   options.render.forceShading = config.forceShading;
   options.render.stribeckSpeed_m_per_s = config.stribeckSpeed_m_per_s;
   options.render.contactVibrationPulls = config.vibrationContactPulls;
+  options.render.bareDamping_Ns_per_m = device::bareDampingOf(device.profile().model);
   options.guard = realtime::GuardOptions::of(device.profile());
   options.guard.selfRecover = !device.traits().needsRearm;
   return options;
@@ -61,9 +74,12 @@ realtime::EnergyBudget energyBudget(const DeviceConfig& config) {
   return budget;
 }
 
-BlackBoxFiles blackBoxFiles(const DeviceConfig& config) {
-  if (config.blackBoxDir.empty()) return {defaultBlackBoxDir(), config.blackBoxKeep};
-  return {config.blackBoxDir, config.blackBoxKeep};
+BlackBoxFiles blackBoxFiles(const DeviceConfig& config, const LimitsConfig& limits) {
+  BlackBoxFiles files{.directory = config.blackBoxDir,
+                      .keep = config.blackBoxKeep,
+                      .bytes = static_cast<std::uint64_t>(limits.blackBoxes_MB) << 20};
+  if (config.blackBoxDir.empty()) files.directory = defaultBlackBoxDir();
+  return files;
 }
 
 wire::Text healthText(const std::string& fault) {
@@ -89,20 +105,31 @@ Station::Impl::Impl(const DeviceConfig& config_, std::vector<DeviceName> names_,
               .vendorThread = device->traits().ticksInVendorThread}),
       control(tick.control(), hand, workspaceOf(config, profile)),
       streamed(tick.remote(), sceneConfig(config, profile), energyBudget(config), profile.outputDof > 3),
-      roles(config.control, config.controlList),
+      roles(std::make_shared<Roles>(config.control, config.controlList)),
       modes(profile.buttons),
       outbox(config, profile.buttons, names),
-      recorder(config.names.front(), blackBoxFiles(config), tick.blackBox()) {}
+      recorder(config.names.front(), blackBoxFiles(config, scene_.limits()), tick.blackBox()) {}
 
 Station::Station(const DeviceConfig& config, std::vector<DeviceName> names, SceneHost& scene,
-                 bool allowNoRealtime, record::Recorder* recorder)
+                 bool allowNoRealtime)
     : impl_(std::make_unique<Impl>(config, std::move(names), scene, openDevice(config), allowNoRealtime)) {
   Impl& impl = *impl_;
   SceneDevice sceneDevice{.config = sceneConfig(impl.config, impl.profile),
                           .slot = &impl.tick.snapshots(),
-                          .published = [&impl](const auto& snapshot) { impl.onPublished(*snapshot); },
-                          .publishing = {}};
-  if (recorder != nullptr) impl.recordTo(*recorder, sceneDevice);
+                          .published =
+                              [&impl](const auto& snapshot) {
+                                impl.moving.published(*snapshot, base::now());
+                                impl.onPublished(*snapshot);
+                              },
+                          .publishing =
+                              [&impl](base::Nanos now, std::uint64_t revision) {
+                                if (impl.recording != nullptr)
+                                  impl.recording->recordPublish(impl.recordedAs, now, revision);
+                              }};
+  sceneDevice.config.limits = sceneLimits(scene.limits());
+  impl.recordedScene = sceneDevice.config;
+  impl.recordedOptions = tickOptions(impl.config, *impl.device);
+  sceneDevice.config.stopwatch = [&impl] { return impl.stopwatch ? impl.stopwatch() : base::now(); };
   scene.add(std::move(sceneDevice));
 }
 
@@ -110,8 +137,11 @@ Station::Station(const DeviceConfig& config, std::vector<DeviceName> names, Scen
                  const record::RecordedDevice& recorded)
     : impl_(std::make_unique<Impl>(config, std::move(names), scene, placeholderFor(recorded), true)) {
   impl_->replayed = true;
-  scene.add(
-      {.config = recorded.sceneConfig, .slot = &impl_->tick.snapshots(), .published = {}, .publishing = {}});
+  Impl& impl = *impl_;
+  scene.add({.config = recorded.sceneConfig,
+             .slot = &impl.tick.snapshots(),
+             .published = [&impl](const auto& snapshot) { impl.moving.published(*snapshot, base::now()); },
+             .publishing = {}});
 }
 
 void Station::play(const realtime::TickReport& report) noexcept {
@@ -119,20 +149,31 @@ void Station::play(const realtime::TickReport& report) noexcept {
   impl_->tick.wake().notify();
 }
 
-void Station::Impl::recordTo(record::Recorder& recording, SceneDevice& sceneDevice) {
-  const std::uint32_t number = recording.addDevice({.names = config.names,
-                                                    .driver = config.driver,
-                                                    .model = profile.model,
-                                                    .buttons = profile.buttons,
-                                                    .scene = scene.number(),
-                                                    .sceneConfig = sceneDevice.config,
-                                                    .tick = tickOptions(config, *device)});
-  sceneDevice.config.stopwatch = recording.stopwatch(number);
-  sceneDevice.publishing = [&recording, number](base::Nanos now, std::uint64_t revision) {
-    recording.recordPublish(number, now, revision);
-  };
-  tick.recordTo(&recording.ring(number));
-  tick.recordTo(&recording.streamRing(number));
+record::RecordedDevice Station::recorded() const {
+  const Impl& impl = *impl_;
+  return {.names = impl.config.names,
+          .driver = impl.config.driver,
+          .model = impl.profile.model,
+          .buttons = impl.profile.buttons,
+          .scene = impl.scene.number(),
+          .sceneConfig = impl.recordedScene,
+          .tick = impl.recordedOptions};
+}
+
+void Station::recordTo(record::Recorder* recording, std::uint32_t number) {
+  Impl& impl = *impl_;
+  impl.recording = recording;
+  impl.recordedAs = number;
+  impl.stopwatch = recording != nullptr ? recording->stopwatch(number) : nullptr;
+  if (recording != nullptr) {
+    impl.tick.recordTo(&recording->ring(number), &recording->streamRing(number));
+  } else {
+    impl.tick.recordTo(nullptr, nullptr);
+  }
+}
+
+base::Nanos Station::finishedAt() const noexcept {
+  return impl_->tick.finishedAt();
 }
 
 Station::~Station() {
@@ -242,7 +283,7 @@ void Station::onSubscribed(Session& session, wire::LocalSender name) {
 void Station::clientGone(scene::ClientId client) {
   impl_->control.clientGone(client);
   impl_->streamed.clientGone(client);
-  impl_->roles.clientGone(client);
+  impl_->roles->release(client);
   std::erase_if(impl_->pendingRearms, [client](const Session* session) { return session->id() == client; });
   impl_->outbox.clientGone(client);
 }
@@ -251,35 +292,41 @@ int Station::wakeFd() const noexcept {
   return impl_->tick.wake().descriptor();
 }
 
-bool Station::collectReports(const WallClock& clock, const std::function<void()>& onTick) {
-  Impl& impl = *impl_;
+// Encodes the ticks that wait; false when nothing is to be sent.
+bool Station::Impl::takeTicks(const WallClock& wallClock) {
   bool any = false;
-  std::size_t admitted = 0;
-  bool first = true;
-  impl.tick.reports().consume([&](const realtime::TickReport& report, std::size_t newer) {
-    if (std::exchange(first, false)) admitted = impl.freshTicks.admit(newer + 1);
-    const base::Nanos start = base::now();
-    const bool late = newer >= admitted;
-    impl.droppedReports = report.dropped;
-    impl.frame.buttons = impl.modes.apply(report.device.buttons, impl.alerts);
-    const wire::Time time = clock.at(report.time);
-    impl.outbox.add(report, impl.frame, time, late);
-    for (const wire::ButtonAlert& alert : impl.alerts) impl.outbox.add(wire::Message(alert), time);
-    impl.alerts.clear();
-    if (!impl.outbox.collect()) return;
-    any = true;
-    onTick();
-    if (!late) impl.freshTicks.tickTook(base::now() - start);
+  const std::size_t admitted = freshTicks.affordable();
+  tick.reports().consume([&](const realtime::TickReport& report, std::size_t newer) {
+    droppedReports = report.dropped;
+    frame.buttons = modes.apply(report.device.buttons, alerts);
+    const wire::Time time = wallClock.at(report.time);
+    outbox.add(report, frame, time, newer >= admitted);
+    for (const wire::ButtonAlert& alert : alerts) outbox.add(wire::Message(alert), time);
+    alerts.clear();
+    any = outbox.collect() || any;
   });
   return any;
 }
 
-void Station::flushTook(base::Nanos time) {
-  impl_->freshTicks.flushTook(time);
-}
-
-void Station::sendReports(Session& session) {
-  impl_->outbox.send(session);
+bool Station::report(const WallClock& clock,
+                     const std::map<scene::ClientId, std::unique_ptr<Session>>& clients) {
+  Impl& impl = *impl_;
+  const bool newer = impl.takeTicks(clock);
+  if (impl.passUpTo) {
+    impl.clientsBehind = impl.clientsBehind || newer;  // those that this pass has served
+  } else {
+    if (!newer && !impl.clientsBehind) return false;
+    impl.clientsBehind = false;
+    impl.outbox.beginPass();
+  }
+  const auto next = serveSlice(
+      impl.passUpTo ? clients.upper_bound(*impl.passUpTo) : clients.begin(), clients.end(), clients.size(),
+      impl.freshTicks,
+      [&](const auto& entry, std::size_t most) { return impl.outbox.send(*entry.second, most); },
+      [](const auto& entry) { entry.second->flush(); });
+  impl.passUpTo.reset();
+  if (next != clients.end()) impl.passUpTo = std::prev(next)->first;
+  return impl.passUpTo.has_value();
 }
 
 void Station::Impl::onPublished(const scene::SceneSnapshot& snapshot) {
@@ -306,13 +353,14 @@ DeviceStatus Station::status() const {
   DeviceStatus status;
   status.names = impl.config.names;
   status.driver = impl.config.driver;
-  status.simulated = impl.hand != nullptr;
+  status.simulated = impl.hand != nullptr && !impl.replayed;
   status.workspace_m = workspaceOf(impl.config, profile);
   status.peakForce_N = profile.peakForce_N;
   status.rate_Hz = impl.config.servoRate_Hz;
   status.realtime = impl.keeper.realtime();
   status.heldBy = impl.control.holder();
-  status.hand = !status.simulated              ? "user"
+  status.hand = impl.replayed                  ? "recorded"
+                : !status.simulated            ? "user"
                 : status.heldBy                ? "held"
                 : impl.config.hand == "script" ? "scripted"
                                                : "file";
@@ -325,12 +373,21 @@ DeviceStatus Station::status() const {
   return status;
 }
 
+const realtime::TickReport& Station::lastTick() const noexcept {
+  return impl_->outbox.last();
+}
+
+const std::string& Station::name() const noexcept {
+  return impl_->config.names.front();
+}
+
 double Station::rateOf(const Session& session) const {
   return impl_->outbox.choiceOf(session.id()).rate_Hz;
 }
 
-bool Station::couldCommand(const Session& session) const {
-  return !impl_->replayed && impl_->roles.couldCommand(session.id(), session.address());
+bool Station::couldCommand(const Commander& client) const {
+  return !impl_->replayed && client.identity.role == ClientRole::owner &&
+         impl_->roles->couldCommand(client.id, client.address);
 }
 
 }  // namespace hapticd::server

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "server/config/config.h"
 #include "server/reports/outbox.h"
 #include "server/scene/scene_thread.h"
+#include "server/session/refusal_codes.h"
 #include "server/session/roles.h"
 #include "server/session/session.h"
 #include "server/station/device_status.h"
@@ -22,9 +24,7 @@ class SceneHost;
 class Station {
  public:
   /// Opens the device and adds it to the scene. Throws ConfigError or std::runtime_error with a remedy.
-  /// `recorder` may be null; else it records from the first tick and must outlive the station.
-  Station(const DeviceConfig& config, std::vector<DeviceName> names, SceneHost& scene, bool allowNoRealtime,
-          record::Recorder* recorder = nullptr);
+  Station(const DeviceConfig& config, std::vector<DeviceName> names, SceneHost& scene, bool allowNoRealtime);
   /// A station without hardware and servo, for the reports of a recorded device; no client may command it.
   Station(const DeviceConfig& config, std::vector<DeviceName> names, SceneHost& scene,
           const record::RecordedDevice& recorded);
@@ -46,15 +46,32 @@ class Station {
   /// Writes a frozen black box to a file. Call several times per second.
   void checkBlackBox();
 
+  /// The device as a recording describes it.
+  record::RecordedDevice recorded() const;
+  /// Scene thread, or before it starts: records the scene and the ticks as the device of this number; null:
+  /// ends. The recorder must live until finishedAt() is later than the end, or the servo has ended.
+  void recordTo(record::Recorder* recording, std::uint32_t number);
+  /// Any thread: when the last tick ended; 0 before the first.
+  base::Nanos finishedAt() const noexcept;
+
   SceneHost& scene() noexcept;
   bool has(wire::LocalSender name) const noexcept;
   /// The device name that this client subscribed to; by default the first one.
   wire::LocalSender nameFor(const Session& session) const noexcept;
 
-  /// Whether the client may command; if not, `reason` is set.
-  bool mayCommand(const Session& session, std::string& reason);
-  /// Handles a control message. `received`: when the server read it, on the servo clock.
-  void onControl(Session& session, const wire::MessageReceived& message, base::Nanos received);
+  /// Shares the control of its scene with another device of it.
+  void shareControlWith(const Station& other);
+  /// Whether the client's role and the control of the scene permit this message; if not, `reason` is set.
+  /// Scene commands take control where the first one to command gets it.
+  bool mayCommand(const Commander& client, wire::MessageKind kind, std::string& reason);
+  /// Holds a force in the device frame for this client, within the budget of energy of all held forces.
+  /// Returns why not, or an empty text; the same text at most once a second.
+  Refusal holdForce(scene::ClientId client, const geometry::Vec3& force_N, base::Nanos lifetime,
+                    base::Nanos received);
+  /// Handles a control message. `received`: when the server read it, on the servo clock. `hasOperators`: see
+  /// Credentials.
+  void onControl(Session& session, const wire::MessageReceived& message, base::Nanos received,
+                 bool hasOperators);
   /// The scene of this device was reset.
   void onReset();
   /// The client is connected and has described no name yet.
@@ -65,26 +82,27 @@ class Station {
   void onSubscribed(Session& session, wire::LocalSender name);
   void clientGone(scene::ClientId client);
 
+  /// The newest tick that the net thread has; its number is 0 before the first.
+  const realtime::TickReport& lastTick() const noexcept;
+  /// The name that stands for the device where it can have only one.
+  const std::string& name() const noexcept;
   /// State of the device and its loop; the caller fills in `scene`.
   DeviceStatus status() const;
   /// The report rate that the client chose.
   double rateOf(const Session& session) const;
   /// Whether the client may command, without giving it control.
-  bool couldCommand(const Session& session) const;
+  bool couldCommand(const Commander& client) const;
 
   /// Reports a tick of a recorded device. From one thread only.
   void play(const realtime::TickReport& report) noexcept;
 
   /// Descriptor that is readable when reports wait.
   int wakeFd() const noexcept;
-  /// Encodes the pending ticks, once for all clients with the same subscription, and calls onTick() after
-  /// each tick with reports so that they are sent in order. When the net thread is behind, only the newest
-  /// ticks are reported, see FreshTicks. Returns false when there were none.
-  bool collectReports(const WallClock& clock, const std::function<void()>& onTick);
-  /// The time that flushing the queues of all clients took after collectReports().
-  void flushTook(base::Nanos time);
-  /// Queues the reports of the last collected tick for this client.
-  void sendReports(Session& session);
+  /// Encodes the pending ticks, once for all clients with the same subscription, and sends them to all
+  /// clients, for FreshTicks::kSlice at most. When the net thread is behind, only the newest ticks are
+  /// reported, see FreshTicks. When newer ticks came half-way, the next pass sends them to the clients
+  /// before, also without a new tick. Returns whether clients remain in this pass: call it again soon.
+  bool report(const WallClock& clock, const std::map<scene::ClientId, std::unique_ptr<Session>>& clients);
 
  private:
   struct Impl;

@@ -1,12 +1,14 @@
 // Members of a station, for station.cpp (lifetime and reports) and station_messages.cpp (control messages).
 #pragma once
 
+#include <optional>
 #include <set>
 
-#include "base/clock.h"
+#include "base/world.h"
 #include "device/simulated/steered_hand.h"
 #include "realtime/servo/tick.h"
 #include "server/reports/fresh_ticks.h"
+#include "server/reports/moving_objects.h"
 #include "server/scene/scene_host.h"
 #include "server/station/black_box_recorder.h"
 #include "server/station/button_modes.h"
@@ -22,14 +24,15 @@ struct Request {
   Session& session;
   wire::LocalSender name;  ///< the name under which the client addresses the device
   DeviceControl::Order order;
+  DeviceControl::Sender sender;
 };
 
 struct Station::Impl {
   Impl(const DeviceConfig& config_, std::vector<DeviceName> names_, SceneHost& scene_,
        std::unique_ptr<device::Device> device_, bool allowNoRealtime);
 
-  void recordTo(record::Recorder& recording, SceneDevice& sceneDevice);
   void onPublished(const scene::SceneSnapshot& snapshot);
+  bool takeTicks(const WallClock& wallClock);
   void choose(Session& session, wire::LocalSender name, ReportChoice choice, double rate_Hz,
               std::string_view call);
 
@@ -51,35 +54,51 @@ struct Station::Impl {
   void on(const Request& request, const wire::HeldForce& message) { onStreamed(request, message); }
   template <class M>
   void onStreamed(const Request& request, const M& message);
-  void on(const Request&, const wire::GetNewObjectId&) {}  // registered by VRPN, never sent
-  void on(const Request&, const wire::Heartbeat&) {}       // the session handles it
-  void rearm(Session& session, wire::LocalSender name, const DeviceControl::Order& order);
+  void on(const Request&, const wire::GetNewObjectId&) {}    // registered by VRPN, never sent
+  void on(const Request&, const wire::Heartbeat&) {}         // the session handles it
+  void on(const Request&, const wire::Identify&) {}          // the server handles it
+  void on(const Request&, const wire::Marker&) {}            // the server handles it
+  void on(const Request&, const wire::ReplayControl&) {}     // the server handles it
+  void on(const Request&, const wire::RecordingControl&) {}  // the server handles it
+  void on(const Request& request, const wire::ReleaseControl&);
+  void rearm(Session& session, wire::LocalSender name, const DeviceControl::Order& order,
+             const DeviceControl::Sender& sender);
 
   const DeviceConfig config;
   const std::vector<DeviceName> names;
   SceneHost& scene;
-  base::MonotonicClock clock;
+  base::Clock& clock = base::world().clock;
   std::unique_ptr<device::Device> device;
   device::SteeredHand* const hand;      // null for real devices
   const device::DeviceProfile profile;  // as after the first open()
   realtime::Tick tick;
   DeviceKeeper keeper;
   bool running = false;
+  scene::SceneConfig recordedScene;  // as recordings have them
+  realtime::TickOptions recordedOptions;
   bool replayed = false;  // reports come from a recording; no servo runs
 
   // Net thread.
   DeviceControl control;
   StreamedInput streamed;
-  Roles roles;
+  std::shared_ptr<Roles> roles;  // of the scene
   ButtonModes modes;
   std::vector<wire::ButtonAlert> alerts;  // not yet reported
-  ReportFrame frame;
+  MovingObjects moving;
+  ReportFrame frame{.moving = &moving};
   Outbox outbox;
   FreshTicks freshTicks{config.servoRate_Hz};
+  bool clientsBehind = false;               // after the last pass
+  std::optional<scene::ClientId> passUpTo;  // the last client that the present pass has served
   BlackBoxRecorder recorder;
   std::uint64_t droppedReports = 0;
   std::string fault;                 // as last reported
   std::set<Session*> pendingRearms;  // clients whose re-arm waits for the scene
+
+  // The recording at hand, null for none, and the number of this device in it. Scene thread.
+  record::Recorder* recording = nullptr;
+  std::uint32_t recordedAs = 0;
+  std::function<base::Nanos()> stopwatch;  // of the recording; empty: the clock
 
   // Scene thread: object ids and topologies for which the scripted hand was planned.
   std::vector<std::pair<std::int32_t, std::uint64_t>> plannedFor{{-1, 0}};

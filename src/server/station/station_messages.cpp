@@ -18,21 +18,56 @@ void sendText(Session& session, wire::LocalSender name, std::uint32_t severity, 
 
 }  // namespace
 
-bool Station::mayCommand(const Session& session, std::string& reason) {
+void Station::shareControlWith(const Station& other) {
+  impl_->roles = other.impl_->roles;
+}
+
+bool Station::mayCommand(const Commander& client, wire::MessageKind kind, std::string& reason) {
   if (impl_->replayed) {
     reason = "this server replays a recording, which cannot be changed";
     return false;
   }
-  Roles& roles = impl_->roles;
-  if (roles.mayCommand(session.id(), session.address())) return true;
+  // Anybody may undo their own stop: the device decides.
+  if (kind == wire::kindOf<wire::RearmForces>) return true;
+  const bool owns = wire::access(kind) == wire::Access::command;
+  if (client.identity.role < (owns ? ClientRole::owner : ClientRole::operating)) {
+    reason = "your role is " + std::string(nameOf(client.identity.role)) + "; present the token of an " +
+             (owns ? "owner" : "operator or owner");
+    return false;
+  }
+  Roles& roles = *impl_->roles;
+  const bool takes = wire::role(kind) == wire::Role::scene;
+  if (takes ? roles.mayCommand(client.id, client.address) : roles.couldCommand(client.id, client.address))
+    return true;
+  // An operator by name has the arm even while somebody else has the scene.
+  if (!owns && client.identity.proven) return true;
   reason = roles.reason();
   return false;
 }
 
-void Station::onControl(Session& session, const wire::MessageReceived& message, base::Nanos received) {
+Refusal Station::holdForce(scene::ClientId client, const geometry::Vec3& force_N, base::Nanos lifetime,
+                           base::Nanos received) {
+  return impl_->streamed.on(client, force_N, lifetime, received).text;
+}
+
+void Station::onControl(Session& session, const wire::MessageReceived& message, base::Nanos received,
+                        bool hasOperators) {
   const base::Nanos sent =
       message.time.seconds * base::Nanos{1'000'000'000} + message.time.microseconds * base::Nanos{1000};
-  const Request request{session, message.local_sender, {received, sent, session.address()}};
+  const Identity& identity = session.identity();
+  const bool operates = identity.role >= ClientRole::operating;
+  const Request request{
+      session,
+      message.local_sender,
+      {received, sent, session.address(), session.id()},
+      {.client = session.id(),
+       .key = session.key(),
+       .description = "client " + std::to_string(session.id()) + " (" + session.description() + ")",
+       .mayCommand =
+           operates && (identity.proven || impl_->roles->couldCommand(session.id(), session.address())),
+       .isOperator = operates && identity.proven,
+       .isPage = operates && session.ofPage(),
+       .hasOperators = hasOperators}};
   const auto handled = wire::dispatchControl(message.kind, message.payload,
                                              [&](const auto& control) { impl_->on(request, control); });
   if (!handled) session.refuse("malformed message: " + handled.error());
@@ -115,31 +150,40 @@ void Station::Impl::on(const Request& request, const wire::QueryCapabilities&) {
 void Station::Impl::on(const Request& request, const wire::StopForces&) {
   request.session.logWarning(
       fmt::format("({}) stops the forces of '{}'", request.session.description(), config.names.front()));
-  control.stopForces(request.order);
+  control.stopForces(request.order, request.sender);
 }
 
 void Station::Impl::on(const Request& request, const wire::RearmForces&) {
-  request.session.logWarning(
-      fmt::format("({}) re-arms the forces of '{}'", request.session.description(), config.names.front()));
   pendingRearms.insert(&request.session);
-  scene.whenPublished(request.session.id(),
-                      [this, session = &request.session, name = request.name, order = request.order] {
-                        if (pendingRearms.count(session) != 0) rearm(*session, name, order);
-                      });
+  scene.whenPublished(request.session.id(), [this, session = &request.session, name = request.name,
+                                             order = request.order, sender = request.sender] {
+    if (pendingRearms.count(session) != 0) rearm(*session, name, order, sender);
+  });
 }
 
 // Called after the earlier commands of the client are published, so that they act from the first tick with
 // force.
-void Station::Impl::rearm(Session& session, wire::LocalSender name, const DeviceControl::Order& order) {
-  if (!control.rearmForces(order)) {
-    sendText(session, name, wire::kTextWarning,
-             "Rearm_Forces ignored: the forces were stopped after it was sent");
+void Station::Impl::rearm(Session& session, wire::LocalSender name, const DeviceControl::Order& order,
+                          const DeviceControl::Sender& sender) {
+  Refusal refusal;
+  const bool faults = outbox.last().guard.latched != 0;
+  if (!control.rearmForces(order, sender, faults, refusal)) {
+    const bool ignored = refusal.code == RefusalCode::none;
+    session.send(name, wire::Text{.severity = ignored ? wire::kTextWarning : wire::kTextError,
+                                  .level = static_cast<std::uint32_t>(refusal.code),
+                                  .text = refusal.text});
     session.flush();
     return;
   }
+  session.logWarning(fmt::format("({}, {}) re-armed the forces of '{}'", session.description(),
+                                 nameOf(session.identity().role), config.names.front()));
   // With `calibrate` the operator consented to motion of the arm; the re-arm is the moment that a person
   // chose.
   if (config.calibrate && (outbox.last().device.hold & device::kHoldNotCalibrated) != 0) keeper.calibrate();
+}
+
+void Station::Impl::on(const Request& request, const wire::ReleaseControl&) {
+  roles->release(request.session.id());
 }
 
 void Station::Impl::on(const Request& request, const wire::HoldHand& wanted) {

@@ -232,12 +232,7 @@ StreamedInput::Answer StreamedInput::on(scene::ClientId client, const wire::Remo
 
 StreamedInput::Answer StreamedInput::on(scene::ClientId client, const wire::HeldForce& message,
                                         const realtime::TickReport& last, Nanos received) {
-  const std::int64_t time = stampOf(message.time);
   Refusal text;
-  if (!begin(force_, client, time, received, text)) {
-    if (!text.text.empty()) text.text = "Held_Force " + text.text;
-    return answer(client, Kind::force, received, false, std::move(text));
-  }
   if (!usable(message.force.data(), 3) || !usable(message.torque.data(), 3) ||
       !usable(&message.lifetime, 1)) {
     text = {RefusalCode::streamInvalid, "Held_Force refused: a number is not finite or too large"};
@@ -247,16 +242,36 @@ StreamedInput::Answer StreamedInput::on(scene::ClientId client, const wire::Held
       std::any_of(message.torque.begin(), message.torque.end(), [](double t) { return t != 0; });
   if (turns && !rendersTorque_)
     text.text = "Held_Force: this device renders no torque; only the force is felt";
+  return hold(client, stampOf(message.time), ToDevice(last).direction(message.force.data()),
+              message.lifetime > 0 ? lifetimeOf(message.lifetime) : 0, received, std::move(text));
+}
+
+StreamedInput::Answer StreamedInput::on(scene::ClientId client, const Vec3& force_N, Nanos lifetime,
+                                        Nanos received) {
+  if (!usable(force_N.data(), 3)) {
+    return answer(client, Kind::force, received, false,
+                  {RefusalCode::streamInvalid, "force refused: a number is not finite or too large"});
+  }
+  return hold(client, 0, force_N, std::min(lifetime, realtime::kLongestRemoteLife), received, {});
+}
+
+StreamedInput::Answer StreamedInput::hold(scene::ClientId client, std::int64_t time, const Vec3& force_N,
+                                          Nanos lifetime, Nanos received, Refusal remark) {
+  Refusal refusal;
+  if (!begin(force_, client, time, received, refusal)) {
+    if (!refusal.text.empty()) refusal.text = "Held_Force " + refusal.text;
+    return answer(client, Kind::force, received, false, std::move(refusal));
+  }
   realtime::HeldForce& force = input_.force;
   ++force.number;
   force.clientTime = time;
   force.received = received;
-  force.lifetime = message.lifetime > 0 ? lifetimeOf(message.lifetime) : 0;
-  force.force_N = ToDevice(last).direction(message.force.data());
+  force.lifetime = lifetime;
+  force.force_N = force_N;
   force.budget = budget_;
   force_.until = received + force.lifetime;
   send();
-  return answer(client, Kind::force, received, true, std::move(text));
+  return answer(client, Kind::force, received, true, std::move(remark));
 }
 
 void StreamedInput::clientGone(scene::ClientId client) {

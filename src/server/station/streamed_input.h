@@ -37,6 +37,9 @@ class StreamedInput {
             base::Nanos received);
   Answer on(scene::ClientId client, const wire::HeldForce& message, const realtime::TickReport& last,
             base::Nanos received);
+  /// A held force in the device frame, from a client without a clock.
+  Answer on(scene::ClientId client, const geometry::Vec3& force_N, base::Nanos lifetime,
+            base::Nanos received);
   /// Its contacts fade out now, and its force ends.
   void clientGone(scene::ClientId client);
 
@@ -55,6 +58,8 @@ class StreamedInput {
              Refusal& refusal);
   base::Nanos statedAt(Stream& stream, std::int64_t time, base::Nanos received) const;
   Answer answer(scene::ClientId client, Kind kind, base::Nanos now, bool taken, Refusal text);
+  Answer hold(scene::ClientId client, std::int64_t time, const geometry::Vec3& force_N, base::Nanos lifetime,
+              base::Nanos received, Refusal remark);
   std::string keepWithinBounds(realtime::RemoteContactSet& set) const;
   void send() { servo_.write(input_); }
 

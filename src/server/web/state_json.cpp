@@ -1,3 +1,4 @@
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
@@ -96,12 +97,14 @@ Json json(const ClientStatus& client) {
   return {{"id", client.id},
           {"address", client.address},
           {"mode", client.mode},
+          {"role", client.role},
           {"devices", client.devices},
           {"connected_s", client.connected_s},
           {"rate_Hz", client.rate_Hz},
           {"bytes_in", client.bytesIn},
           {"bytes_out", client.bytesOut},
           {"dropped", client.dropped},
+          {"ignored_datagrams", client.ignoredDatagrams},
           {"queued_bytes", client.queuedBytes},
           {"unacknowledged_bytes", client.unacknowledgedBytes},
           {"commands", client.commands}};
@@ -109,8 +112,10 @@ Json json(const ClientStatus& client) {
 
 Json json(const scene::ObjectDescription& object, std::uint64_t geometry, std::size_t displayTriangles) {
   return {{"id", object.id},
+          {"name", object.name},
           {"parent", object.parent},
           {"touchable", object.touchable},
+          {"world_units", object.worldUnits},
           {"vertices", object.vertices ? object.vertices->size() : 0},
           {"triangles", object.triangles ? object.triangles->size() : 0},
           {"geometry", geometry},
@@ -141,7 +146,21 @@ Json json(const scene::EffectDescription& described) {
 Json json(const scene::Plane& plane) {
   return {{"index", plane.index},
           {"plane", {plane.normal.x(), plane.normal.y(), plane.normal.z(), plane.offset}},
-          {"stiffness_N_per_m", plane.surface.stiffness_N_per_m}};
+          {"stiffness_N_per_m", plane.surface.stiffness_N_per_m},
+          {"damping_Ns_per_m", plane.surface.damping_Ns_per_m},
+          {"static_friction", plane.surface.static_friction},
+          {"dynamic_friction", plane.surface.dynamic_friction}};
+}
+
+Json json(const scene::ForceField& field) {
+  Json jacobian = Json::array();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) jacobian.push_back(field.jacobian_N_per_unit(row, column));
+  }
+  return {{"origin", json(field.origin)},
+          {"force_N", json(field.force_N)},
+          {"jacobian_N_per_unit", std::move(jacobian)},
+          {"radius", std::isfinite(field.radius) ? Json(field.radius) : Json()}};
 }
 
 Json json(const std::optional<scene::ConstraintDescription>& constraint) {
@@ -173,7 +192,29 @@ Json json(const SceneReport& report, const std::vector<std::string>& devices) {
           {"effects", jsonList(scene.effects)},
           {"planes", jsonList(scene.planes)},
           {"constraint", json(scene.constraint)},
-          {"fields", scene.fields}};
+          {"fields", jsonList(scene.fields)}};
+}
+
+Json json(const std::vector<std::pair<double, std::string>>& moments) {
+  Json list = Json::array();
+  for (const auto& [time_s, text] : moments) list.push_back({time_s, text});
+  return list;
+}
+
+// The time line is null until the file was read once.
+Json json(const std::optional<ReplayStatus>& replay) {
+  if (!replay) return nullptr;
+  Json out = {{"file", replay->file},     {"position_s", replay->position_s}, {"speed", replay->speed},
+              {"paused", replay->paused}, {"ended", replay->ended},           {"loop", replay->loop},
+              {"duration_s", nullptr},    {"contacts", Json::array()},        {"trips", Json::array()},
+              {"markers", Json::array()}};
+  if (const TimeLine* line = replay->timeLine.get()) {
+    out["duration_s"] = line->duration_s;
+    for (const auto& [from, to] : line->contacts) out["contacts"].push_back({from, to});
+    out["trips"] = json(line->trips);
+    out["markers"] = json(line->markers);
+  }
+  return out;
 }
 
 // Names may contain any bytes, JSON is UTF-8: replace what is not.
@@ -192,7 +233,8 @@ std::string stateJson(const StateReport& report) {
   return textOf({{"server",
                   {{"version", report.version},
                    {"uptime_s", server.uptime_s},
-                   {"recording", server.recording.empty() ? Json() : Json(server.recording)}}},
+                   {"recording", server.recording.empty() ? Json() : Json(server.recording)},
+                   {"replay", json(server.replay)}}},
                  {"devices", jsonList(server.devices)},
                  {"clients", jsonList(server.clients)},
                  {"scenes", std::move(scenes)}});

@@ -59,6 +59,10 @@ std::string mediaTypeOf(std::string_view path) {
   return "application/octet-stream";
 }
 
+void prepareAssets() {
+  buffers();
+}
+
 net::HttpResponse assetResponse(std::string_view path) {
   const std::string_view name = path == "/" ? "index.html" : path.substr(1);
   const auto found = buffers().find(name);

@@ -21,6 +21,9 @@ std::span<const WebAsset> webAssets();
 /// The media type for a file name, by its extension.
 std::string mediaTypeOf(std::string_view path);
 
+/// Reads all files into memory. Without it the first response does, from a disk, while clients wait.
+void prepareAssets();
+
 /// The response to a URL path; "/" is index.html. Without the viewer it is a page with build instructions;
 /// 404 for an unknown path.
 net::HttpResponse assetResponse(std::string_view path);

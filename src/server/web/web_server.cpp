@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <charconv>
+#include <chrono>
+#include <map>
 
 #include "server/web/web_assets.h"
 
@@ -33,8 +35,9 @@ Number numberIn(const net::HttpRequest& request, std::string_view name, std::str
   return 0;
 }
 
-net::HttpOptions httpOptions(const net::ConnectionOptions& connection) {
+net::HttpOptions httpOptions(const net::ConnectionOptions& connection, WebOwner& owner) {
   net::HttpOptions options;
+  options.secured = [&owner](net::Connection accepted) { return owner.secured(std::move(accepted)); };
   options.connection = connection;
   return options;
 }
@@ -69,8 +72,10 @@ WebServer::WebServer(net::Loop& loop, const net::Endpoint& local, const std::vec
       meshes_(loop, meshWorker_),
       http_(
           loop, local, [this](const auto& request, const auto& reply) { onRequest(request, reply); },
-          httpOptions(connection)),
-      access_(http_.local(), allowed) {}
+          httpOptions(connection, owner)),
+      access_(http_.local(), allowed) {
+  prepareAssets();
+}
 
 WebServer::~WebServer() = default;
 
@@ -116,7 +121,12 @@ void WebServer::route(const net::HttpRequest& request, const net::HttpReply& rep
     net::HttpResponse response =
         net::HttpResponse::of(426, "/vrpn is a WebSocket that carries a VRPN stream\n");
     response.headers = {{"Upgrade", "websocket"}, {"Connection", "Upgrade"}};
-    response.onWebSocket = [this](net::Connection connection) { owner_.onWebClient(std::move(connection)); };
+    constexpr std::string_view kBearer = "Bearer ";
+    const std::string_view field = request.header("authorization");
+    response.onWebSocket =
+        [this, ofPage = !request.header("origin").empty(),
+         token = std::string(field.starts_with(kBearer) ? field.substr(kBearer.size()) : "")](
+            net::Connection connection) { owner_.onWebClient(std::move(connection), token, ofPage); };
     respond(reply, std::move(response));
   } else if (path == "/api/state") {
     sendState(reply, &stateJson, "application/json");
@@ -145,11 +155,35 @@ StateReport WebServer::report() {
 }
 
 void WebServer::sendState(const net::HttpReply& reply, Format format, const char* contentType) {
-  watch_.refresh([this, reply, format, contentType] {
-    textWorker_.post([this, reply, format, contentType, report = report()] {
-      auto response = net::HttpResponse::of(200, format(report), contentType);
-      loop_.post(
-          [this, reply, response = std::move(response)]() mutable { respond(reply, std::move(response)); });
+  askers_.push_back({reply, format, contentType});
+  nextReport();
+}
+
+// One report answers all who asked before it was made, and reports take a tenth of this thread at most: they
+// cost more with more clients.
+void WebServer::nextReport() {
+  if (reporting_ || askers_.empty()) return;
+  reporting_ = true;
+  const base::Nanos wait = nextReport_ - base::now();
+  const auto make = [this] { watch_.refresh([this] { answer(std::exchange(askers_, {})); }); };
+  if (wait <= 0) return make();
+  reportTimer_ = loop_.after(std::chrono::nanoseconds(wait), make);
+}
+
+void WebServer::answer(const std::vector<Asker>& askers) {
+  const base::Nanos start = base::now();
+  auto made = report();
+  const base::Nanos end = base::now();
+  nextReport_ = end + 9 * (end - start);
+  textWorker_.post([this, askers, report = std::move(made)] {
+    std::map<Format, std::string> texts;
+    for (const Asker& asker : askers) texts.try_emplace(asker.format);
+    for (auto& [format, text] : texts) text = format(report);
+    loop_.post([this, askers, texts = std::move(texts)] {
+      for (const Asker& asker : askers)
+        respond(asker.reply, net::HttpResponse::of(200, texts.at(asker.format), asker.contentType));
+      reporting_ = false;
+      nextReport();
     });
   });
 }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/world.h"
 #include "net/http_server.h"
 #include "server/web/access.h"
 #include "server/web/mesh_store.h"
@@ -20,8 +21,11 @@ class WebOwner {
  public:
   virtual ~WebOwner() = default;
   virtual ServerStatus status() const = 0;
-  /// A page opened a WebSocket for a VRPN stream.
-  virtual void onWebClient(net::Connection connection) = 0;
+  /// Somebody opened a WebSocket for a VRPN stream: with the token of its header `Authorization: Bearer`, or
+  /// an empty one; `ofPage`: from a browser, which names the origin of its page.
+  virtual void onWebClient(net::Connection connection, std::string_view token, bool ofPage) = 0;
+  /// The connection with TLS around it where its address needs it; empty when it is refused.
+  virtual net::Connection secured(net::Connection connection) = 0;
 };
 
 /// Net thread; it builds response texts and display meshes on two workers. Destroy it after the scenes have
@@ -40,10 +44,17 @@ class WebServer {
 
  private:
   using Format = std::string (*)(const StateReport&);
+  struct Asker {
+    net::HttpReply reply;
+    Format format;
+    const char* contentType;
+  };
 
   void onRequest(const net::HttpRequest& request, const net::HttpReply& reply);
   void route(const net::HttpRequest& request, const net::HttpReply& reply);
   void sendState(const net::HttpReply& reply, Format format, const char* contentType);
+  void nextReport();
+  void answer(const std::vector<Asker>& askers);
   void sendMesh(const net::HttpRequest& request, const net::HttpReply& reply);
   bool findMesh(std::size_t scene, std::int64_t object, std::uint64_t geometry, const net::HttpReply& reply,
                 std::string& error);
@@ -53,6 +64,10 @@ class WebServer {
   net::Loop& loop_;
   WebOwner& owner_;
   int idleSeconds_ = 0;
+  std::vector<Asker> askers_;  // for the next report
+  bool reporting_ = false;
+  base::Nanos nextReport_ = 0;
+  net::Subscription reportTimer_;
   Worker textWorker_{"web-text"};
   Worker meshWorker_{"web-mesh"};
   SceneWatch watch_;

@@ -33,8 +33,9 @@ enum ReportKinds : std::uint32_t {
   kReportTouchButton = 1U << 8,    ///< Change of the button after the device's own: touching
   kReportContactAnalog = 1U << 9,  ///< Channel: force, depth, angle, touched object, the gripper's opening
   kReportHip = 1U << 10,           ///< Pos_Quat and Velocity of sensor 1, the HIP
+  kReportPoses = 1U << 11,         ///< hapticd Poses
   kReportDefault = kReportTracker | kReportForce | kReportButton | kReportAnalog,
-  kReportAll = (1U << 11) - 1,
+  kReportAll = (1U << 12) - 1,
 };
 
 struct QueryCapabilities {
@@ -211,7 +212,7 @@ struct RearmForces {
                                      Reliability::kReliable,
                                      Role::control,
                                      "Clears a stop and latched faults; forces return over 0.5 s.",
-                                     Access::command};
+                                     Access::operate};
 
   template <class M, class V>
   static constexpr void fields(M&, V&&) {}
@@ -256,10 +257,10 @@ struct HoldHand {
   static constexpr MessageInfo kInfo{
       "hapticd Hold_Hand",
       Direction::kToServer,
-      Reliability::kLowLatency,
+      Reliability::kReliable,
       Role::control,
       "Moves the simulated hand's target while hold is set; one client holds it at a time.",
-      Access::command};
+      Access::operate};
   Bool16 hold = 0;
   F64x3 position{};
   F64x4 orientation{0, 0, 0, 1};
@@ -292,7 +293,7 @@ struct RemoteContacts {
   static constexpr MessageInfo kInfo{
       "hapticd Remote_Contacts",
       Direction::kToServer,
-      Reliability::kLowLatency,
+      Reliability::kReliable,
       Role::control,
       "Replaces the client's contacts near the hand, up to 16 (24 numbers each): felt until they expire.",
       Access::command,
@@ -313,7 +314,7 @@ struct HeldForce {
   static constexpr MessageInfo kInfo{
       "hapticd Held_Force",
       Direction::kToServer,
-      Reliability::kLowLatency,
+      Reliability::kReliable,
       Role::control,
       "Sets a force that the server holds for its lifetime, within a budget of energy.",
       Access::command,
@@ -382,6 +383,123 @@ struct HandState {
     v("flags", m.flags);
     v("guard_active", m.guard_active);
     v("contacts", m.contacts);
+  }
+};
+
+/// Who a connection belongs to. A token is a secret: it must not be logged or recorded.
+struct Identify {
+  static constexpr std::size_t kLongestToken = 128;
+  static constexpr MessageInfo kInfo{
+      "hapticd Identify",
+      Direction::kToServer,
+      Reliability::kReliable,
+      Role::control,
+      "Presents a token for a role, and a random key that the connections of one program share.",
+      Access::free,
+      Order::overtaking};
+  NameBuffer<kLongestToken> token;  ///< empty: none
+  std::uint64_t key = 0;            ///< a stop on one of them may be undone on another; 0: none
+
+  template <class M, class V>
+  static constexpr void fields(M& m, V&& v) {
+    v("token", m.token);
+    v("key", m.key);
+  }
+};
+
+struct ReleaseControl {
+  static constexpr MessageInfo kInfo{
+      "hapticd Release_Control", Direction::kToServer, Reliability::kReliable, Role::control,
+      "Gives up the control that `control = \"first\"` gave to this client, for the next one to command."};
+
+  template <class M, class V>
+  static constexpr void fields(M&, V&&) {}
+};
+
+/// Where the objects that move are in a tick, so that a picture shows the force and its cause at one time.
+/// World frame and units.
+struct Poses {
+  static constexpr std::size_t kMost = 256;
+  /// Numbers of one object: id, then the columns x, y, z and the translation of the transform from its mesh
+  /// to the world.
+  static constexpr std::size_t kNumbers = 13;
+  static constexpr MessageInfo kInfo{
+      "hapticd Poses", Direction::kToClient, Reliability::kLowLatency, Role::report,
+      "Reports the objects that move, until 1 s after they rest: 13 numbers each, up to 256 in one tick."};
+  std::uint64_t tick = 0;
+  std::int64_t time = 0;
+  Counted<std::int32_t, double, kMost * kNumbers> poses;
+
+  template <class M, class V>
+  static constexpr void fields(M& m, V&& v) {
+    v("tick", m.tick);
+    v("time", m.time, "ns");
+    v("poses", m.poses);
+  }
+};
+
+/// A name for people. It has no effect on forces.
+struct SetObjectName {
+  static constexpr MessageInfo kInfo{"hapticd Set_Object_Name", Direction::kToServer, Reliability::kReliable,
+                                     Role::scene, "Names an object, for the viewer and for recordings."};
+  std::int32_t object = 0;
+  NameBuffer<64> text;
+
+  template <class M, class V>
+  static constexpr void fields(M& m, V&& v) {
+    v("object", m.object);
+    v("text", m.text);
+  }
+};
+
+/// Marks a moment of an experiment: written to the recording, and sent to all clients of the device.
+struct Marker {
+  static constexpr MessageInfo kInfo{
+      "hapticd Marker", Direction::kBoth, Reliability::kReliable, Role::control,
+      "Marks a moment, such as \"trial 3 begins\": recorded, and reported to all clients with its time."};
+  std::int64_t time = 0;  ///< from the server: on its monotonic clock; to the server: ignored
+  TextBuffer<256> text;
+
+  template <class M, class V>
+  static constexpr void fields(M& m, V&& v) {
+    v("time", m.time, "ns");
+    v("text", m.text);
+  }
+};
+
+/// Steers a server that replays a recording; all of its clients see the same.
+struct ReplayControl {
+  static constexpr MessageInfo kInfo{
+      "hapticd Replay_Control", Direction::kToServer, Reliability::kReliable, Role::control,
+      "Pauses a replayed recording, changes its speed (0 keeps it), or seeks (a negative time does not)."};
+  Bool16 paused = 0;
+  double speed = 0;
+  double position = -1;
+
+  template <class M, class V>
+  static constexpr void fields(M& m, V&& v) {
+    v("paused", m.paused);
+    v("speed", m.speed);
+    v("position", m.position, "s");
+  }
+};
+
+/// Begins and ends a recording on the server's disk.
+struct RecordingControl {
+  static constexpr MessageInfo kInfo{
+      "hapticd Recording_Control",
+      Direction::kToServer,
+      Reliability::kReliable,
+      Role::control,
+      "Begins or ends a recording on the server, in a file of this name; answered by a text.",
+      Access::operate};
+  Bool16 record = 0;
+  NameBuffer<128> name;  ///< *.haptics, without a folder; empty: named by the time
+
+  template <class M, class V>
+  static constexpr void fields(M& m, V&& v) {
+    v("record", m.record);
+    v("name", m.name);
   }
 };
 

@@ -7,6 +7,9 @@
 #include <gtest/gtest.h>
 #include <sys/mman.h>
 #include <unistd.h>
+#include <array>
+#include <cstring>
+#include <memory>
 
 #include <algorithm>
 #include <atomic>
@@ -247,6 +250,98 @@ TEST(Isolation, CarriesAVendorsLibrary) {
   });
   EXPECT_TRUE(eventually([&] { return good > 100; }));
   device.close();
+}
+
+// A library that writes where it should not has the shared memory within its reach.
+
+using isolation::Posted;
+using isolation::SharedBlock;
+using isolation::SharedProfile;
+
+std::string impossible(const SharedProfile& shared) {
+  try {
+    shared.toProfile();
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "taken";
+}
+
+TEST(SharedBlock, ProfileAndStateSurvive) {
+  DeviceProfile profile;
+  profile.model = "a model";
+  profile.peakForce_N = 7;
+  profile.hasGripper = profile.startsArmed = true;
+  const SharedProfile shared = SharedProfile::of(profile, {.calibratesInLoop = true, .needsRearm = false});
+  const DeviceProfile again = shared.toProfile();
+  EXPECT_EQ(again.model, "a model");
+  EXPECT_EQ(again.workspace_m.min, profile.workspace_m.min);
+  EXPECT_EQ(again.workspace_m.max, profile.workspace_m.max);
+  EXPECT_EQ(again.peakForce_N, 7);
+  EXPECT_TRUE(again.hasGripper && again.startsArmed);
+  EXPECT_TRUE(shared.toTraits().selfPaced && shared.toTraits().calibratesInLoop);
+  EXPECT_FALSE(shared.toTraits().needsRearm || shared.toTraits().ticksInVendorThread);
+
+  DeviceState state{.time = 5,
+                    .position_m = {1, 2, 3},
+                    .orientation = Quat(0.5, 0.5, 0.5, 0.5),
+                    .velocity_m_per_s = {4, 5, 6},
+                    .angularVelocity_rad_per_s = {7, 8, 9},
+                    .buttons = 3,
+                    .hold = kHoldFault,
+                    .motorTemperature = 0.5,
+                    .gripper_rad = 0.25};
+  const DeviceState copy = Posted::of(state).toState();
+  EXPECT_EQ(copy.time, 5);
+  EXPECT_EQ(copy.position_m, state.position_m);
+  EXPECT_EQ(copy.orientation.coeffs(), state.orientation.coeffs());
+  EXPECT_EQ(copy.velocity_m_per_s, state.velocity_m_per_s);
+  EXPECT_EQ(copy.angularVelocity_rad_per_s, state.angularVelocity_rad_per_s);
+  EXPECT_EQ(copy.buttons, 3U);
+  EXPECT_EQ(copy.hold, kHoldFault);
+  EXPECT_EQ(copy.motorTemperature, 0.5);
+  EXPECT_EQ(copy.gripper_rad, 0.25);
+  state.gripper_rad.reset();
+  EXPECT_FALSE(Posted::of(state).toState().gripper_rad);
+}
+
+TEST(SharedBlock, AnImpossibleProfileIsRefused) {
+  const SharedProfile good = SharedProfile::of({}, {});
+  EXPECT_EQ(impossible(good), "taken");
+  SharedProfile bad = good;
+  bad.model.fill('x');  // without an end
+  EXPECT_EQ(bad.toProfile().model, std::string(128, 'x'));
+  bad.peakForce_N = std::nan("");
+  EXPECT_EQ(impossible(bad), "the driver's process reports the impossible peak force nan");
+  bad = good;
+  bad.buttons = -1;
+  EXPECT_EQ(impossible(bad), "the driver's process reports the impossible number of buttons -1");
+  bad = good;
+  bad.workspace_m[3] = bad.workspace_m[0] - 1;
+  EXPECT_NE(impossible(bad), "taken");
+}
+
+// A write of the other process to the index of a cell must not make this one read or write elsewhere.
+TEST(SharedBlock, ScribbledBytesStayWithinTheBlock) {
+  struct Guarded {
+    std::array<std::byte, 4096> before;
+    alignas(64) std::array<std::byte, sizeof(SharedBlock)> block;
+    std::array<std::byte, 1U << 20U> after;
+  };
+  const auto memory = std::make_unique<Guarded>();
+  for (const int scribble : {0x03, 0x07, 0x7F, 0xFF}) {
+    std::memset(static_cast<void*>(memory.get()), scribble, sizeof(Guarded));
+    auto& block = *reinterpret_cast<SharedBlock*>(memory->block.data());
+    for (int i = 0; i < 3; ++i) {
+      const auto* read = reinterpret_cast<const std::byte*>(&block.state.read());
+      EXPECT_GE(read, memory->block.data());
+      EXPECT_LE(read + sizeof(Posted), memory->block.data() + memory->block.size());
+      block.command.write({Vec3(1, 2, 3), 4});
+    }
+    const auto scribbled = [&](std::byte b) { return b == static_cast<std::byte>(scribble); };
+    EXPECT_TRUE(std::all_of(memory->before.begin(), memory->before.end(), scribbled));
+    EXPECT_TRUE(std::all_of(memory->after.begin(), memory->after.end(), scribbled));
+  }
 }
 
 }  // namespace

@@ -4,7 +4,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <cstdlib>
+#include <filesystem>
 
 namespace hapticd::device {
 namespace {
@@ -45,6 +49,24 @@ TEST_F(DynamicLibraryTest, TheEnvironmentsFileIsTheOnlyOneTried) {
               AllOf(HasSubstr("/nowhere/libvendor.so"), HasSubstr(kVariable)));
   setenv(kVariable, MOCK_PLAIN, 1);
   EXPECT_EQ(refusal({kVariable, {"libhapticd_none.so"}, {}}), "loaded " MOCK_PLAIN);
+}
+
+TEST_F(DynamicLibraryTest, AFileThatOthersCanChangeIsRefused) {
+  setenv(kVariable, "libhapticd_none.so", 1);
+  EXPECT_THAT(refusal({kVariable, {}, {}}), AllOf(HasSubstr("not an absolute path"), HasSubstr(kVariable)));
+  const std::string copy = testing::TempDir() + "hapticd_library_" + std::to_string(getpid()) + ".so";
+  std::filesystem::copy_file(MOCK_PLAIN, copy);
+  setenv(kVariable, copy.c_str(), 1);
+  chmod(copy.c_str(), 0755);
+  EXPECT_EQ(refusal({kVariable, {}, {}}), "loaded " + copy);
+  chmod(copy.c_str(), 0757);
+  EXPECT_THAT(refusal({kVariable, {}, {}}), HasSubstr("every user may change it"));
+  chmod(copy.c_str(), 0755);
+  if (geteuid() == 0) {
+    ASSERT_EQ(chown(copy.c_str(), 65534, 65534), 0);
+    EXPECT_THAT(refusal({kVariable, {}, {}}), HasSubstr("belongs to another user"));
+  }
+  std::filesystem::remove(copy);
 }
 
 TEST_F(DynamicLibraryTest, SaysWhichDependencyIsMissing) {

@@ -5,11 +5,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
+#include <limits>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "base/time.h"
 #include "bench/remote_loop.h"
@@ -168,6 +171,172 @@ TEST(ClosedLoopLimit, stiffest_wall_grows_with_the_rate) {
     EXPECT_GT(quiet, 0.8 * passiveStiffness(rate));
     EXPECT_GT(quiet, 1.5 * last);
     last = quiet;
+  }
+}
+
+// --- an arm that nobody holds
+
+// In code that shares nothing with the renderer or the simulated hand: a mass with viscous and Coulomb
+// friction, an encoder, and a constant pull into the wall. It is let go at the surface.
+struct BareArm {
+  double mass_kg = 0.1;
+  double damping_Ns_per_m = 0.1;
+  double coulomb_N = 0.05;
+  double encoder_m = 55e-6;
+  double pull_N = 1;
+
+  double y = 0;
+  double speed = 0;
+
+  double measured() const { return std::round(y / encoder_m) * encoder_m; }
+  void move(double force_N, double period_s) {
+    constexpr int kSteps = 100;
+    const double step_s = period_s / kSteps;
+    for (int i = 0; i < kSteps; ++i) {
+      const double drive = force_N - pull_N - damping_Ns_per_m * speed;
+      if (speed == 0 && std::abs(drive) <= coulomb_N) return;
+      const double against = speed != 0 ? std::copysign(coulomb_N, speed) : std::copysign(coulomb_N, drive);
+      const double next = speed + step_s * (drive - against) / mass_kg;
+      speed = next * speed < 0 ? 0 : next;
+      y += step_s * speed;
+    }
+  }
+};
+
+struct LetGo {
+  double peakToPeak_m = 0;  // one second after it was let go, for 0.3 s
+  double rest_m = 0;
+};
+
+LetGo letGo(BareArm arm, double stiffness_N_per_m, double bareDamping_Ns_per_m) {
+  const auto scene = wall(stiff(stiffness_N_per_m));
+  Renderer renderer({.bareDamping_Ns_per_m = bareDamping_Ns_per_m});
+  Rendering rendering;
+  device::DeviceState state;
+  double lowest = 1;
+  double highest = -1;
+  for (int i = 0; i < 1300; ++i) {
+    const Vec3 before = state.position_m;
+    state.time = i * fixture::kTick;
+    state.position_m.y() = arm.measured();
+    state.velocity_m_per_s = (state.position_m - before) / 1e-3;
+    renderer.step(*scene, state, state.time, fixture::kTick, rendering);
+    arm.move(rendering.force_N.y(), 1e-3);
+    if (i < 1000) continue;
+    lowest = std::min(lowest, arm.y);
+    highest = std::max(highest, arm.y);
+  }
+  return {highest - lowest, arm.y};
+}
+
+constexpr double kNeverHelps = std::numeric_limits<double>::infinity();
+
+TEST(BareArmTest, bounces_on_a_stiff_wall_without_the_controller) {
+  EXPECT_GT(letGo({}, 3500, kNeverHelps).peakToPeak_m, 1e-3);
+  EXPECT_GT(letGo({.mass_kg = 0.05, .damping_Ns_per_m = 0.05}, 2000, kNeverHelps).peakToPeak_m, 1e-3);
+}
+
+// A light spring takes longer than a second to come to rest by itself under a heavy arm with little friction.
+// The wall gives no energy there, so the controller has nothing to take: from 500 N/m on, all rest.
+TEST(BareArmTest, comes_to_rest_within_a_second) {
+  for (const double mass : {0.05, 0.1, 0.2, 0.3}) {
+    for (const double damping : {0.05, 0.1, 0.3, 1.0}) {
+      for (const double stiffness : {500.0, 1000.0, 2000.0, 3500.0, 5000.0}) {
+        const BareArm arm{.mass_kg = mass, .damping_Ns_per_m = damping};
+        const LetGo end = letGo(arm, stiffness, damping);
+        EXPECT_LT(end.peakToPeak_m, 100e-6)
+            << mass << " kg, " << damping << " N s/m, " << stiffness << " N/m";
+        // The pull, within friction and the step of the encoder.
+        EXPECT_NEAR(end.rest_m, -1 / stiffness, 0.06 / stiffness + 2 * arm.encoder_m);
+      }
+    }
+  }
+}
+
+TEST(BareArmTest, soft_walls_are_no_worse_than_without_the_controller) {
+  for (const double mass : {0.05, 0.1, 0.2, 0.3}) {
+    for (const double stiffness : {100.0, 200.0}) {
+      const BareArm arm{.mass_kg = mass, .damping_Ns_per_m = 0.05};
+      EXPECT_LE(letGo(arm, stiffness, 0.05).peakToPeak_m,
+                letGo(arm, stiffness, kNeverHelps).peakToPeak_m + 1e-6);
+    }
+  }
+}
+
+// A profile that credits less damping than the arm has is safe.
+TEST(BareArmTest, a_cautious_profile_suffices) {
+  for (const double stiffness : {500.0, 2000.0, 5000.0})
+    EXPECT_LT(letGo({.damping_Ns_per_m = 0.3}, stiffness, 0.05).peakToPeak_m, 100e-6) << stiffness;
+}
+
+// The same hand in the same scene, with and without the controller. True when every force has the same bytes.
+bool sameForces(const std::shared_ptr<const scene::SceneSnapshot>& scene, double bareDamping_Ns_per_m,
+                double speed_m_per_s) {
+  fixture::Hand plain(scene);
+  fixture::Hand guarded(scene, {.bareDamping_Ns_per_m = bareDamping_Ns_per_m});
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> place(-0.012, 0.012);
+  bool touched = false;
+  plain.at({0, 0, 0.045});
+  guarded.at({0, 0, 0.045});
+  for (int k = 0; k < 60; ++k) {
+    const Vec3 goal(place(random), place(random), 0.031 + 0.2 * place(random));
+    std::vector<Vec3> forces;
+    plain.to(goal, speed_m_per_s, [&](const Rendering& r) { forces.push_back(r.force_N); });
+    std::size_t i = 0;
+    bool same = true;
+    guarded.to(goal, speed_m_per_s, [&](const Rendering& r) {
+      same = same && r.force_N == forces[i++];
+      touched = touched || r.touching;
+    });
+    if (!same) return false;
+  }
+  return touched;
+}
+
+std::shared_ptr<const scene::SceneSnapshot> ball(double friction, bool moving) {
+  fixture::SceneFixture built;
+  built.setWorldUnitsPerMetre(1);
+  geometry::Affine later = geometry::Affine::Identity();
+  later.translation().z() = 0.004;
+  built.add(fixture::geometryOf(fixture::sphere(0.03, 24), 1),
+            fixture::surface(1000, friction, 0.7 * friction),
+            moving ? scene::Motion::between(geometry::Affine::Identity(), later, 0, 60'000'000'000)
+                   : scene::Motion::fixed(geometry::Affine::Identity()));
+  return built.snapshot();
+}
+
+// 5 N s/m: the simulated hand's own. K T / 2 is a tenth of it: no path gains energy, however fast.
+TEST(PassivityControl, adds_nothing_where_the_arm_dissipates_what_the_wall_gives) {
+  for (const double friction : {0.0, 0.5}) {
+    for (const double speed : {0.01, 0.1, 1.0})
+      EXPECT_TRUE(sameForces(ball(friction, false), kHandDamping, speed)) << friction << ' ' << speed;
+  }
+}
+
+TEST(PassivityControl, brakes_an_arm_with_little_friction) {
+  EXPECT_FALSE(sameForces(ball(0, false), 0.05, 0.1));
+}
+
+TEST(PassivityControl, never_brakes_on_what_moves) {
+  EXPECT_TRUE(sameForces(ball(0, true), 0.0, 0.1));
+}
+
+// Effects and fields are no part of the account.
+TEST(PassivityControl, leaves_vibrations_and_fields_alone) {
+  fixture::SceneFixture built;
+  scene::Effect vibration;
+  vibration.type = scene::EffectType::motorVibration;
+  vibration.magnitude_N = 1;
+  vibration.angularFrequency_rad_per_s = 600;
+  built.effects = {vibration};
+  fixture::Hand plain(built.snapshot());
+  fixture::Hand controlled(built.snapshot(), {.bareDamping_Ns_per_m = 0});
+  for (int i = 0; i < 200; ++i) {
+    const Vec3 at(1e-4 * i, 0, 0);
+    const Vec3 force = plain.at(at).force_N;
+    EXPECT_EQ(controlled.at(at).force_N, force);
+    EXPECT_GT(force.norm(), 0.5);
   }
 }
 

@@ -5,6 +5,7 @@
 
 #include "base/time.h"
 #include "realtime/remote/held_force.h"
+#include "realtime/remote/normal_shares.h"
 #include "realtime/remote/remote_contacts.h"
 
 namespace hapticd::realtime {
@@ -177,6 +178,45 @@ TEST(RemoteContacts, NoUpdateMakesAStep) {
   }
 }
 
+// In a corner the sum changes faster than what each face demands. Without friction, whose slip is no update.
+TEST(RemoteContacts, NoUpdateOfACornerMakesAStep) {
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (const bool comeAndGo : {false, true}) {
+    for (const int faces : {2, 3, 5}) {
+      for (unsigned seed = 0; seed < 60; ++seed) {
+        std::mt19937 random(seed);
+        const auto draw = [&] { return unit(random); };
+        Rig rig;
+        Vec3 last = Vec3::Zero();
+        double largest = 0;
+        for (int ms = 0; ms < 3000; ++ms) {
+          if (ms % 17 == 0) {
+            std::vector<RemoteContact> contacts;
+            for (int id = 0; id < faces; ++id) {
+              if (comeAndGo && draw() > 0.6) continue;  // it fades
+              const double stiffness = 300 + 250 * draw();
+              RemoteContact c = floorAt(0.002 * draw(), stiffness);
+              c.id = id;
+              c.normal.x() = 0.3 * draw();
+              c.normal.z() = 0.3 * draw();
+              c.normal.normalize();
+              c.damping_Ns_per_m = 1 + draw();
+              c.yields = true;
+              contacts.push_back(c);
+            }
+            rig.state(contacts);
+          }
+          const Vec3 force = rig.step();
+          largest = std::max(largest, (force - last).norm());
+          last = force;
+        }
+        EXPECT_LT(largest, kRate_N_per_ms)
+            << faces << " faces, seed " << seed << (comeAndGo ? ", some absent" : "");
+      }
+    }
+  }
+}
+
 TEST(RemoteContacts, LifeIncludesTheFade) {
   Rig rig;
   RemoteContact c = floorAt(0);
@@ -241,6 +281,40 @@ TEST(RemoteContacts, SurfacesOnTopOfEachOtherAreAsStiffAsOne) {
 
 // Each demands its spring force along its normal: the forces of a corner of 60 degrees are solved, not
 // summed.
+// Whatever the contacts, each adds what the others do not exert, to the solver's last digits. The shares of
+// the last tick are those of other contacts here.
+TEST(RemoteContacts, SharesMeetEveryDemandOnce) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  int inexact = 0;
+  for (int trial = 0; trial < 20'000; ++trial) {
+    PressingContacts contacts;
+    const int count = 1 + static_cast<int>(random() % 16);
+    const double spread = trial % 2 == 0 ? 0.3 : 3;
+    for (int i = 0; i < count; ++i) {
+      const bool same = i > 0 && unit(random) > 0.7;  // two points of one plane
+      const Vec3 normal = Vec3(spread * unit(random), 1, spread * unit(random)).normalized();
+      contacts.add(same ? Vec3(contacts.x[0], contacts.y[0], contacts.z[0]) : normal, 2 + 2 * unit(random),
+                   std::max(0.0, unit(random)));
+    }
+    shareNormalForce(contacts);
+    double worst_N = 0;
+    for (std::size_t i = 0; i < contacts.count; ++i) {
+      double others_N = 0;
+      for (std::size_t j = 0; j < contacts.count; ++j) {
+        const double cosine =
+            contacts.x[i] * contacts.x[j] + contacts.y[i] * contacts.y[j] + contacts.z[i] * contacts.z[j];
+        if (j != i) others_N += std::max(0.0, cosine) * contacts.share_N[j];
+      }
+      worst_N =
+          std::max(worst_N, std::abs(contacts.share_N[i] - std::max(0.0, contacts.demand_N[i] - others_N)));
+    }
+    ASSERT_LT(worst_N, 0.1) << count << " contacts, trial " << trial;
+    inexact += worst_N > 1e-6;
+  }
+  EXPECT_LT(inexact, 200) << "the sweeps that replace the solver end early";
+}
+
 TEST(RemoteContacts, CornersExertWhatEachFaceDemands) {
   Rig rig;
   RemoteContact a = floorAt(0);
@@ -271,6 +345,32 @@ TEST(RemoteContacts, FrictionSticksAndSlides) {
   EXPECT_NEAR(largest, 0.5 * normal, 0.03);
   EXPECT_NEAR(rig.force.x(), -0.3 * normal, 1e-6);
   EXPECT_NEAR(rig.force.y(), normal, 1e-6);
+}
+
+TEST(RemoteContacts, TheSlowestTurnIsNone) {
+  RemoteContact floor = floorAt(0);
+  floor.angularVelocity_rad_per_s = {1e-321, 0, 1e-200};  // whose norm is 0 in double precision
+  Rig rig;
+  rig.approach({floor}, {0, 0.01, 0}, {0, -0.001, 0});
+  rig.settle({floor}, 100);
+  EXPECT_NEAR(rig.force.y(), 0.8, kExact_N);
+  EXPECT_TRUE(rig.force.allFinite());
+}
+
+// A body that comes to rest in a simulation: its velocity falls through the smallest numbers, whose norm is
+// 0.
+TEST(RemoteContacts, SurfacesThatComeToRestStayFelt) {
+  Rig rig;
+  RemoteContact c = floorAt(0);
+  c.damping_Ns_per_m = 1;
+  c.yields = true;
+  rig.approach({c}, {0, 0.001, 0}, {0, -0.002, 0});
+  for (double speed = 1e-3; speed > 0; speed *= 1e-30) {
+    c.velocity_m_per_s = {-speed, 0, 0};
+    rig.state({c});
+    for (int ms = 0; ms < 4; ++ms) rig.step();
+    ASSERT_NEAR(rig.force.y(), 1.6, 0.01) << "at " << speed << " m/s";
+  }
 }
 
 TEST(RemoteContacts, DamperTakesEnergyAndNeverPulls) {

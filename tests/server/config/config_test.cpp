@@ -37,10 +37,15 @@ TEST(Config, DefaultsAreOneSimulatedPhantomOnLoopback) {
 TEST(Config, ReadsEverySwitch) {
   const ServerConfig config = parseConfig(R"(
 listen = "0.0.0.0:4000"
+insecure = true
 callback_hosts = ["10.0.0.7"]
 record = "session-%H%M.haptics"
 http = "0.0.0.0:80"
 http_allow = ["lab7", "lab7.example.org:9000"]
+[compat]
+haply = "127.0.0.1:10002"
+haply_hold_ms = 50
+haply_origins = ["http://localhost:5173"]
 [[device]]
 names = ["Left", "Tracker0"]
 report_rate_Hz = 250
@@ -77,6 +82,9 @@ workspace = [-1, -2, -3, 4, 5, 6]
   EXPECT_EQ(config.record, "session-%H%M.haptics");
   EXPECT_EQ(config.http, "0.0.0.0:80");
   EXPECT_EQ(config.httpAllow, (std::vector<std::string>{"lab7", "lab7.example.org:9000"}));
+  EXPECT_EQ(config.compat.haply, "127.0.0.1:10002");
+  EXPECT_DOUBLE_EQ(config.compat.haplyHold_s, 0.05);
+  EXPECT_EQ(config.compat.haplyOrigins, std::vector<std::string>{"http://localhost:5173"});
   ASSERT_EQ(config.devices.size(), 2U);
   const DeviceConfig& left = config.devices[0];
   EXPECT_EQ(left.names, (std::vector<std::string>{"Left", "Tracker0"}));
@@ -106,6 +114,8 @@ workspace = [-1, -2, -3, 4, 5, 6]
 
 TEST(Config, ErrorsNameLineKeyValueAndRemedy) {
   EXPECT_EQ(errorOf("listn = \"x\""), "test.toml:1: unknown key 'listn'; did you mean 'listen'?");
+  EXPECT_EQ(errorOf("frobnicate = 1"),
+            "test.toml:1: unknown key 'frobnicate'; docs/configuration.md lists the keys");
   EXPECT_EQ(errorOf("report_rate_Hz = 500"), "test.toml:1: 'report_rate_Hz' belongs in a [[device]]");
   EXPECT_EQ(errorOf("[[device]]\nlisten = \"127.0.0.1\""),
             "test.toml:2: 'listen' belongs above the first [[device]]");
@@ -186,6 +196,33 @@ TEST(Config, DevicesOfOneSceneMustAgreeOnSceneOnDisconnect) {
       "test.toml:7: device 'B': all devices of the scene 'table' must have the same scene_on_disconnect");
 }
 
+TEST(Config, ListeningForOtherMachinesNeedsTlsTrustOrAPlainWord) {
+  const std::string open = "listen = \"0.0.0.0\"\n";
+  EXPECT_THAT(errorOf(open), testing::HasSubstr("insecure = true"));
+  EXPECT_THAT(errorOf("http = \"0.0.0.0:8080\"\n"), testing::HasSubstr("everybody on these networks"));
+  for (const std::string good :
+       {"insecure = true\n", "tls = \"generated\"\n", "tls = \"/c.pem\"\ntls_key = \"/k.pem\"\n",
+        "trusted_networks = [\"10.0.0.0/8\"]\n"}) {
+    EXPECT_NO_THROW(parseConfig(good + open, "test.toml")) << good;
+  }
+  EXPECT_NO_THROW(parseConfig("listen = \"127.0.0.2\"\n", "test.toml"));
+}
+
+TEST(Config, RefusesMalformedAccess) {
+  const std::pair<const char*, const char*> bad[]{
+      {"trusted_networks = [\"10.0.0.1/24\"]\n", "is not a network such as 10.0.0.0/24"},
+      {"trusted_networks = [\"10.0.0.0/33\"]\n", "is not a network"},
+      {"trusted_networks = [\"lab\"]\n", "is not a network"},
+      {"owner_users = [\"no such user\"]\n", "there is no user"},
+      {"socket = \"relative.sock\"\n", "is not an absolute path"},
+      {"tls = \"on\"\n", "is not off, generated, or the absolute path"},
+      {"tls = \"/c.pem\"\n", "needs its key"},
+      {"tls_key = \"/k.pem\"\n", "has no effect without a certificate"},
+      {"tls_loopback = true\n", "needs a certificate"},
+  };
+  for (const auto& [text, error] : bad) EXPECT_THAT(errorOf(text), testing::HasSubstr(error)) << text;
+}
+
 // Every key differs from its default, so that a key that is not written or not read is noticed.
 ServerConfig unusual() {
   ServerConfig config;
@@ -197,8 +234,31 @@ ServerConfig unusual() {
   config.record = "session.haptics";
   config.http = "10.0.0.1:9000";
   config.httpAllow = {"lab7"};
-  config.connections = 12;
-  config.connectionsPerAddress = 7;
+  config.socket = "/run/lab.sock";
+  config.tokens = "/etc/tokens";
+  config.ownerUsers = {"0"};
+  config.operatorUsers = {"5000"};
+  config.trustedNetworks = {"10.0.0.0/24"};
+  config.tls = "/etc/cert.pem";
+  config.tlsKey = "/etc/key.pem";
+  config.tlsLoopback = true;
+  config.insecure = true;
+  config.compat = {"10.0.0.1:10002", 0.02, {"https://lab7"}};
+  config.limits = {.connections = 12,
+                   .connectionsPerAddress = 7,
+                   .unfinishedConnections = 17,
+                   .memory_MB = 100,
+                   .clientMemory_MB = 40,
+                   .sendQueue_MB = 4,
+                   .batches_MB = 50,
+                   .objects = 20,
+                   .vertices = 1000,
+                   .triangles = 2000,
+                   .effects = 8,
+                   .commandsPerSecond = 5000,
+                   .recording_MB = 9,
+                   .blackBoxes_MB = 3,
+                   .log_kB_per_second = 11};
   DeviceConfig device;
   device.names = {"Left \"hand\" \\", "Tracker0"};
   device.driver = "evdev";
@@ -239,6 +299,31 @@ ServerConfig unusual() {
   return config;
 }
 
+TEST(Config, TheHaplyPortIsNoOtherPort) {
+  const std::string port = "[compat]\nhaply = \"127.0.0.1:10001\"\n";
+  EXPECT_EQ(errorOf(port), "");
+  EXPECT_EQ(errorOf(port + "[[device]]\ndriver = \"haply\"\n"),
+            "test.toml:2: haply: \"127.0.0.1:10001\" is the port of the service that the device 'Phantom' is "
+            "reached through; use another port");
+  EXPECT_NE(errorOf(port + "[[device]]\ndriver = \"haply\"\nhardware = \"127.0.0.1:10001/04BA\"\n"), "");
+  EXPECT_EQ(errorOf(port + "[[device]]\ndriver = \"haply\"\nhardware = \"127.0.0.1:9999/04BA\"\n"), "");
+  EXPECT_EQ(errorOf(port + "[[device]]\ndriver = \"haply\"\nhardware = \"10.0.0.7:10001\"\n"), "");
+  EXPECT_NE(errorOf("[compat]\nhaply = \"0.0.0.0\"\n[[device]]\ndriver = \"haply\"\n"), "");
+  EXPECT_NE(errorOf("[compat]\nhaply = \":3883\"\n").find("the port of listen"), std::string::npos);
+  EXPECT_NE(errorOf("[compat]\nhaply = \":8080\"\n").find("the port of http"), std::string::npos);
+}
+
+TEST(Config, ErrorsInCompatNameTheirLine) {
+  EXPECT_EQ(errorOf("[compat]\n\nhaply = \"here\""),
+            "test.toml:3: haply: \"here\" is not ADDR:PORT such as 127.0.0.1:10001");
+  EXPECT_EQ(errorOf("[compat]\nhaply_hold_ms = 500"),
+            "test.toml:2: haply_hold_ms must be between 10 and 100, got 500");
+  EXPECT_EQ(errorOf("[compat]\nhaply_origins = [\"localhost\"]"),
+            "test.toml:2: haply_origins: \"localhost\" is not an origin such as http://localhost:5173");
+  EXPECT_EQ(errorOf("[compat]\nhapli = \"\""), "test.toml:2: unknown key 'hapli'; did you mean 'haply'?");
+  EXPECT_EQ(errorOf("compat = 3"), "test.toml:1: 'compat' must be a table: [compat]");
+}
+
 TEST(Config, KeysOfOtherDriversAreRefused) {
   EXPECT_EQ(errorOf("[[device]]\ndriver = \"evdev\"\nwheel_profile = \"wheel.toml\"\n"), "");
   EXPECT_EQ(errorOf("[[device]]\nwheel_profile = \"wheel.toml\"\n"),
@@ -270,12 +355,26 @@ TEST(Config, IsolationIsTheDriversChoiceUnlessConfigured) {
 TEST(Config, WhatCannotWorkIsRefused) {
   EXPECT_THAT(errorOf("listen = \"127.0.0.1:4000\"\nhttp = \"127.0.0.1:4000\"\n"),
               HasSubstr("http: \"127.0.0.1:4000\" is the port of listen"));
-  EXPECT_THAT(errorOf("listen = \"0.0.0.0:4000\"\nhttp = \"127.0.0.1:4000\"\n"),
+  EXPECT_THAT(errorOf("insecure = true\nlisten = \"0.0.0.0:4000\"\nhttp = \"127.0.0.1:4000\"\n"),
               HasSubstr("use another port"));
   EXPECT_EQ(errorOf("listen = \"127.0.0.1:4000\"\nhttp = \"127.0.0.2:4000\"\n"), "");
   EXPECT_EQ(errorOf("listen = \"127.0.0.1:0\"\nhttp = \"127.0.0.1:0\"\n"), "");
   EXPECT_THAT(errorOf("[[device]]\nworkspace = [0, 0, 0, 1e-300, 100, 100]\n"),
               HasSubstr("workspace: an edge of 1e-300 mm is too short; use 1 mm or more"));
+}
+
+TEST(Config, LimitsHaveOneTableAndNameValueAndRemedy) {
+  EXPECT_EQ(parseConfig("[limits]\nobjects = 5\n", "test.toml").limits.objects, 5);
+  EXPECT_EQ(errorOf("connections = 5"), "test.toml:1: 'connections' belongs in [limits]");
+  EXPECT_EQ(errorOf("[[device]]\neffects = 5"),
+            "test.toml:2: 'effects' belongs in [limits], which belongs above the first [[device]]");
+  EXPECT_EQ(errorOf("[limits]\nlisten = \"127.0.0.1\""), "test.toml:2: 'listen' belongs outside [limits]");
+  EXPECT_EQ(errorOf("limits = 3"), "test.toml:1: 'limits' must be a table: [limits]");
+  EXPECT_EQ(errorOf("[limits]\nmemory = 3"), "test.toml:2: unknown key 'memory'; did you mean 'memory_MB'?");
+  EXPECT_EQ(errorOf("[limits]\nobjects = 100000"),
+            "test.toml:2: objects must be between 1 and 10000, got 100000");
+  EXPECT_EQ(errorOf("[limits]\nmemory_MB = 100\n\nclient_memory_MB = 200"),
+            "test.toml:4: client_memory_MB must be between 32 and 100, got 200");
 }
 
 TEST(Config, DevicesThatShareASceneShareItsControl) {

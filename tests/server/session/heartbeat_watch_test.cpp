@@ -22,6 +22,32 @@ TEST(HeartbeatWatchTest, SilenceBeyondTheLimitIsLoss) {
   EXPECT_EQ(watch.check(1002 * kMillisecond), Verdict::alive);
 }
 
+TEST(HeartbeatWatchTest, OtherDataExcusesFiveSecondsInTotal) {
+  HeartbeatWatch watch;
+  watch.beat(0);
+  base::Nanos now = 0;
+  for (; now <= 5000 * kMillisecond; now += 100 * kMillisecond) {
+    watch.receive(now);
+    ASSERT_EQ(watch.check(now), Verdict::alive) << now;
+  }
+  for (; now <= 5500 * kMillisecond; now += 100 * kMillisecond) {
+    watch.receive(now);
+    ASSERT_EQ(watch.check(now), Verdict::alive) << now;
+  }
+  watch.receive(5501 * kMillisecond);
+  EXPECT_EQ(watch.check(5501 * kMillisecond), Verdict::lost);
+}
+
+TEST(HeartbeatWatchTest, AHeartbeatRenewsTheExcuseOfOtherData) {
+  HeartbeatWatch watch;
+  watch.beat(0);
+  for (base::Nanos now = 0; now <= 12'000 * kMillisecond; now += 250 * kMillisecond) {
+    watch.receive(now);
+    if (now % (4000 * kMillisecond) == 0) watch.beat(now);
+    ASSERT_EQ(watch.check(now), Verdict::alive) << now;
+  }
+}
+
 TEST(HeartbeatWatchTest, AClientCanOptOut) {
   HeartbeatWatch watch;
   watch.beat(0);

@@ -37,8 +37,10 @@ class CountingOwner final : public SessionOwner {
     last = messages;
   }
   void onPeerGone(Session& /*session*/, const std::string& /*reason*/) override {}
+  void onEnding(Session& /*session*/) override { ++endings; }
   void onClosed(Session& /*session*/, const std::string& reason) override { closed = reason; }
 
+  std::size_t endings = 0;
   std::size_t messages = 0;
   std::size_t last = 0;
   std::size_t slices = 0;

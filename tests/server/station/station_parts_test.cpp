@@ -69,9 +69,9 @@ TEST(Roles, PermitsAnyTheFirstOrListedClients) {
   EXPECT_TRUE(first.mayCommand(1, "10.0.0.1"));
   EXPECT_FALSE(first.mayCommand(2, "10.0.0.1"));
   EXPECT_NE(first.reason().find("client 1"), std::string::npos);
-  first.clientGone(2);
+  first.release(2);
   EXPECT_FALSE(first.mayCommand(2, "10.0.0.1"));
-  first.clientGone(1);
+  first.release(1);
   EXPECT_TRUE(first.mayCommand(2, "10.0.0.1"));
 
   Roles list(Control::list, {"10.0.0.5"});
@@ -104,18 +104,131 @@ class HoldTest : public ::testing::Test {
 };
 
 TEST_F(HoldTest, ARearmNeverUndoesALaterStop) {
-  const auto order = [](base::Nanos received, base::Nanos sent, const char* address) {
-    return DeviceControl::Order{received, sent, address};
+  scene::ClientId client = 0;  // each order comes by another connection
+  const auto order = [&](base::Nanos received, base::Nanos sent, const char* address) {
+    return DeviceControl::Order{received, sent, address, ++client};
   };
-  control_.stopForces(order(100, 50, "10.0.0.1"));
-  EXPECT_FALSE(control_.rearmForces(order(99, 60, "10.0.0.1"))) << "received earlier";
-  EXPECT_FALSE(control_.rearmForces(order(100, 60, "10.0.0.1")));
-  EXPECT_FALSE(control_.rearmForces(order(101, 49, "10.0.0.1"))) << "sent earlier by the same machine";
+  const DeviceControl::Sender anyone{.client = 1, .key = 0, .description = "one", .mayCommand = true};
+  const auto rearms = [&](const DeviceControl::Order& given) {
+    return control_.rearmForces(given, anyone, false, refusal_);
+  };
+  control_.stopForces(order(100, 50, "10.0.0.1"), anyone);
+  EXPECT_FALSE(rearms(order(99, 60, "10.0.0.1"))) << "received earlier";
+  EXPECT_FALSE(rearms(order(100, 60, "10.0.0.1")));
+  EXPECT_FALSE(rearms(order(101, 49, "10.0.0.1"))) << "sent earlier by the same machine";
   EXPECT_TRUE(guard_.stopped());
-  EXPECT_TRUE(control_.rearmForces(order(101, 49, "10.0.0.2"))) << "another machine has another clock";
+  EXPECT_TRUE(rearms(order(101, 49, "10.0.0.2"))) << "another machine has another clock";
   EXPECT_FALSE(guard_.stopped());
-  control_.stopForces(order(200, 150, "10.0.0.1"));
-  EXPECT_TRUE(control_.rearmForces(order(201, 151, "10.0.0.1")));
+  control_.stopForces(order(200, 150, "10.0.0.1"), anyone);
+  EXPECT_TRUE(rearms(order(201, 151, "10.0.0.1")));
+}
+
+class RearmTest : public HoldTest {
+ protected:
+  using Sender = DeviceControl::Sender;
+  static Sender client(scene::ClientId id, std::uint64_t key = 0) {
+    return {.client = id, .key = key, .description = "client " + std::to_string(id), .mayCommand = true};
+  }
+  void stop(const Sender& sender) { control_.stopForces({++time_, time_, "10.0.0.1"}, sender); }
+  bool rearms(const Sender& sender, bool faults = false) {
+    return control_.rearmForces({++time_, time_, "10.0.0.1"}, sender, faults, refusal_);
+  }
+  base::Nanos time_ = 0;
+};
+
+TEST_F(RearmTest, OnlyTheConnectionThatStoppedUndoesItsStop) {
+  stop(client(1));
+  EXPECT_FALSE(rearms(client(2)));
+  EXPECT_EQ(refusal_.code, RefusalCode::stoppedByOther);
+  EXPECT_NE(refusal_.text.find("client 1 stopped the forces"), std::string::npos) << refusal_.text;
+  EXPECT_TRUE(guard_.stopped());
+  EXPECT_TRUE(rearms(client(1)));
+  EXPECT_FALSE(guard_.stopped());
+}
+
+TEST_F(RearmTest, AStopOfOnesOwnUndoesNoOther) {
+  stop(client(1));
+  stop(client(2));
+  EXPECT_FALSE(rearms(client(2)));
+  EXPECT_TRUE(guard_.stopped());
+  control_.clientGone(1);
+  EXPECT_FALSE(rearms(client(2))) << "and not when the other is gone";
+  EXPECT_NE(refusal_.text.find("client 1 stopped the forces and is gone"), std::string::npos);
+  EXPECT_TRUE(guard_.stopped());
+}
+
+TEST_F(RearmTest, AnOperatorUndoesAllStops) {
+  for (scene::ClientId id = 1; id < 100; ++id) {
+    stop(client(id));
+    if (id % 2 == 0) control_.clientGone(id);
+  }
+  Sender person = client(200);
+  person.isOperator = true;
+  person.hasOperators = true;
+  EXPECT_TRUE(rearms(person, true));
+  EXPECT_FALSE(guard_.stopped());
+  stop(client(1));
+  EXPECT_TRUE(rearms(client(1))) << "nothing is left of the others";
+}
+
+TEST_F(RearmTest, APageDoesOnceTheClientIsGoneAndThereIsNoOperator) {
+  stop(client(1));
+  Sender page = client(2);
+  page.isPage = true;
+  EXPECT_FALSE(rearms(page)) << "the client that stopped is there";
+  control_.clientGone(1);
+  page.hasOperators = true;
+  EXPECT_FALSE(rearms(page)) << "an operator can do it";
+  page.hasOperators = false;
+  EXPECT_TRUE(rearms(page));
+}
+
+TEST_F(RearmTest, TheConnectionsOfOneProgramAreOne) {
+  stop(client(1, 77));
+  stop(client(2, 77));
+  control_.clientGone(1);
+  EXPECT_TRUE(rearms(client(2, 77)));
+  stop(client(3, 77));
+  control_.clientGone(3);
+  EXPECT_FALSE(rearms(client(4, 78)));
+  EXPECT_TRUE(rearms(client(5, 77))) << "the program has connected again";
+}
+
+TEST_F(RearmTest, OneThatMayNotCommandUndoesItsStopButNoFault) {
+  Sender observer = client(1);
+  observer.mayCommand = false;
+  EXPECT_FALSE(rearms(observer)) << "there is nothing of its own";
+  EXPECT_EQ(refusal_.code, RefusalCode::notPermitted);
+  stop(observer);
+  EXPECT_FALSE(rearms(observer, true)) << "a fault is latched, too";
+  EXPECT_TRUE(guard_.stopped());
+  stop(observer);
+  EXPECT_TRUE(rearms(observer));
+}
+
+// Stops that nobody can undo do not grow without bound, and are not forgotten.
+TEST_F(RearmTest, ManyStopsOfClientsThatLeftStand) {
+  for (scene::ClientId id = 1; id <= 100'000; ++id) {
+    stop(client(id, id));
+    control_.clientGone(id);
+  }
+  EXPECT_FALSE(rearms(client(200'000, 50)));
+  EXPECT_TRUE(guard_.stopped());
+}
+
+TEST_F(RearmTest, AClockThatIsSetBackKeepsNobodyFromRearming) {
+  constexpr base::Nanos kNoon = 43'200'000'000'000;
+  const Sender program = client(1, 7);  // with two connections
+  const auto rearms = [&](base::Nanos sent, scene::ClientId connection) {
+    return control_.rearmForces({101, sent, "10.0.0.1", connection}, program, false, refusal_);
+  };
+  const DeviceControl::Order stop{100, kNoon, "10.0.0.1", 1};
+  control_.stopForces(stop, program);
+  EXPECT_TRUE(rearms(kNoon - 1, 1)) << "the same connection";
+  control_.stopForces(stop, program);
+  EXPECT_FALSE(rearms(kNoon - DeviceControl::kLongestTravel, 2));
+  EXPECT_TRUE(rearms(kNoon - DeviceControl::kLongestTravel - 1, 2));
+  EXPECT_FALSE(guard_.stopped());
 }
 
 TEST_F(HoldTest, TheHandFollowsItsHolderAndReturnsWhenReleased) {
@@ -218,13 +331,28 @@ TEST_F(BlackBoxFilesTest, WritesAFaultWithTheTicksBeforeIt) {
 TEST_F(BlackBoxFilesTest, KeepsOnlyTheNewestFiles) {
   realtime::BlackBox box(5);
   BlackBoxRecorder recorder("Phantom/1", {directory_, 2}, box);
+  fs::create_directories(directory_ / "Phantom_1");
+  for (const char* foreign : {"a.csv", "20200101T000000.000Z.csv", "20200101T000000x000Z-speed.csv"})
+    std::ofstream(directory_ / "Phantom_1" / foreign) << "a person's";
   for (int i = 0; i < 4; ++i) {
     fail(box, 2);
     recorder.poll();
     recorder.finish();
     std::this_thread::sleep_for(std::chrono::milliseconds(2));  // file names have a resolution of 1 ms
   }
-  EXPECT_EQ(files().size(), 2U);
+  EXPECT_EQ(files().size(), 2U + 3U) << "files of others stay";
+}
+
+TEST_F(BlackBoxFilesTest, KeepsTheNewestWithinTheirBytes) {
+  realtime::BlackBox box(5);
+  BlackBoxRecorder recorder("Phantom/1", {directory_, 10, 1}, box);
+  for (int i = 0; i < 3; ++i) {
+    fail(box, 2);
+    recorder.poll();
+    recorder.finish();
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    EXPECT_EQ(files().size(), 1U) << "the newest stays whatever its size";
+  }
 }
 
 std::string_view effectOn(TripAction action) {

@@ -76,6 +76,7 @@ TEST_F(Web, TheStateHasEveryFieldThePageReads) {
                       .frequency = 0,
                       .position = {1, 2, 3},
                       .direction = {0, 1, 0}};
+  peer.send(wire::SetObjectName{0, "a cube"});
   peer.send(spring);
   peer.send(wire::Plane{.plane = {0, 1, 0, 0.05F},
                         .stiffness = 0.5F,
@@ -141,6 +142,7 @@ TEST_F(Web, TheStateHasEveryFieldThePageReads) {
   EXPECT_GT(scene["revision"], 0);
   const json& object = scene["objects"].at(0);
   EXPECT_EQ(object["id"], 0);
+  EXPECT_EQ(object["name"], "a cube");
   EXPECT_EQ(object["parent"], -1);
   EXPECT_EQ(object["touchable"], true);
   EXPECT_EQ(object["vertices"], 36);
@@ -166,7 +168,7 @@ TEST_F(Web, TheStateHasEveryFieldThePageReads) {
   EXPECT_EQ(plane["stiffness_N_per_m"], 500);
   EXPECT_EQ(scene["constraint"]["mode"], "point");
   EXPECT_NEAR(scene["constraint"]["point"].at(0).get<double>(), 10, 1e-5);
-  EXPECT_EQ(scene["fields"], 0);
+  EXPECT_EQ(scene["fields"], json::array());
 }
 
 TEST_F(Web, ListsAnUntouchableChildWithItsPose) {

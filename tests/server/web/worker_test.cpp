@@ -65,6 +65,10 @@ class LazyThreads final : public base::Threads {
                                                             std::function<void()>) override {
     throw std::logic_error("a worker has no blocking thread");
   }
+  std::unique_ptr<base::PacedThread::Impl> startPaced(base::ThreadOptions, base::Clock&,
+                                                      base::Step) override {
+    throw std::logic_error("a worker has no paced thread");
+  }
 
   std::vector<base::ThreadOptions> started;
 };

@@ -39,7 +39,7 @@ export class Placing {
   private readonly isNew = new Set<number>();
 
   constructor(
-    name: string,
+    private readonly name: string,
     mesh: FileMesh,
     private readonly view: View,
     device: DeviceState,
@@ -93,6 +93,7 @@ export class Placing {
     const object = Number(this.target.value);
     return {
       object,
+      name: this.name,
       isNew: this.isNew.has(object),
       T_world_mesh: this.matrix().toArray(),
       surface: this.surface.values(),
@@ -114,7 +115,7 @@ export class Placing {
     if (free.length === 0) this.isNew.add(next);
     this.target.append(el("option", { value: String(next) }, `new object ${next}`));
     this.target.append(
-      ...used.map((o) => el("option", { value: String(o.id) }, `replace object ${o.id}`)),
+      ...used.map((o) => el("option", { value: String(o.id) }, `replace object ${o.id}${o.name ? ` (${o.name})` : ""}`)),
     );
   }
 

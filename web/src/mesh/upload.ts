@@ -7,6 +7,8 @@ const MAX_QUEUED_BYTES = 1_000_000;
 
 export interface Placement {
   object: number;
+  /** Of the file, for people. */
+  name: string;
   /** The object does not exist yet: the scene must first grow to hold it. */
   isNew: boolean;
   T_world_mesh: number[];
@@ -26,6 +28,7 @@ export async function upload(
       throw new Error("the connection was lost; the server discarded the mesh");
   };
   send(wire.batchBegin(), ...(to.isNew ? [wire.setObjectNumber(object + 1)] : [wire.clearTrimesh(object)]));
+  send(wire.setObjectName(object, to.name));
   send(wire.setTransformMatrix(object, to.T_world_mesh), wire.setObjectIsTouchable(object, true));
   for (const [property, value] of to.surface) send(wire.setHapticProperty(object, property, value));
   const step = 3 * wire.MOST_IN_ONE_MESSAGE;

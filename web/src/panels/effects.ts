@@ -1,5 +1,5 @@
-// Force effects: starts and stops defined ones, defines new ones.
-import { type Effect, type Outgoing, setEffect, startEffect, stopEffect } from "../wire";
+// Force effects: starts, stops and edits defined ones, defines new ones, hides stopped ones.
+import { type Effect, type Outgoing, setEffect, startEffect, stopEffect, type Vec3 } from "../wire";
 import type { EffectState } from "../state_types";
 import { el, Rows, setText } from "./dom";
 import { Switch } from "./switch";
@@ -16,29 +16,113 @@ const NEW: Record<string, { label: string; effect: Partial<Effect> }> = {
   vibrationContact: { label: "Vibration in contact", effect: { magnitude_N: 0.5, frequency: 400 } },
 };
 
+type Parameter = "magnitude_N" | "gain" | "frequency" | "duration_ms" | "position" | "direction";
+const FIELDS: Record<string, Parameter[]> = {
+  constant: ["magnitude_N", "direction", "duration_ms"],
+  spring: ["gain", "magnitude_N", "position"],
+  viscous: ["gain", "magnitude_N"],
+  friction: ["gain", "magnitude_N"],
+  vibrationMotor: ["magnitude_N", "frequency", "direction", "duration_ms"],
+  vibrationContact: ["magnitude_N", "frequency", "duration_ms"],
+};
+const LABELS: Record<Parameter, string> = {
+  magnitude_N: "Limit, N",
+  gain: "Gain, N/mm",
+  frequency: "Hz",
+  duration_ms: "Time, ms",
+  position: "Position",
+  direction: "Direction",
+};
+
+const effectOf = (e: EffectState): Effect => ({
+  type: e.type,
+  index: e.index,
+  gain: e.gain,
+  magnitude_N: e.magnitude_N,
+  duration_ms: e.duration_ms,
+  frequency: e.frequency_Hz,
+  position: e.position as Vec3,
+  direction: e.direction as Vec3,
+});
+
+class EffectForm {
+  readonly root = el("div", { className: "placing" });
+  private readonly inputs: [Parameter, number, HTMLInputElement][] = [];
+
+  constructor(
+    e: EffectState,
+    private readonly onChange: (effect: Effect) => void,
+  ) {
+    for (const name of FIELDS[e.type] ?? ["magnitude_N"]) {
+      const count = name === "position" || name === "direction" ? 3 : 1;
+      const label = name === "magnitude_N" && e.type === "constant" ? "Force, N" : LABELS[name];
+      const parts = Array.from({ length: count }, (_, i) => {
+        const what = count === 3 ? `${label} ${"xyz"[i]!}` : label;
+        const input = el("input", { type: "number", step: "any", ariaLabel: `${what} of effect ${e.index}` });
+        this.inputs.push([name, i, input]);
+        return input;
+      });
+      this.root.append(el("div", { className: "field" }, el("span", {}, label), ...parts));
+    }
+    this.root.addEventListener("change", () => this.change());
+  }
+
+  private latest: Effect | undefined;
+  update(e: EffectState): void {
+    if (this.root.contains(document.activeElement) && this.latest) return;
+    this.latest = effectOf(e);
+    for (const [name, i, input] of this.inputs) {
+      const value = this.latest[name];
+      const text = String(Number((typeof value === "number" ? value : value[i]!).toPrecision(6)));
+      if (input.value !== text) input.value = text;
+    }
+  }
+
+  private change(): void {
+    if (!this.latest || this.inputs.some(([, , input]) => !Number.isFinite(input.valueAsNumber))) return;
+    const effect: Effect = { ...this.latest, position: [...this.latest.position], direction: [...this.latest.direction] };
+    for (const [name, i, input] of this.inputs) {
+      if (name === "position" || name === "direction") effect[name][i] = input.valueAsNumber;
+      else effect[name] = input.valueAsNumber;
+    }
+    this.latest = effect;
+    this.onChange(effect);
+  }
+}
+
 class EffectRow {
   readonly root: HTMLElement;
   private readonly facts = el("span", { className: "quiet" });
   private readonly active: Switch;
+  private readonly form: EffectForm;
+  private readonly details = el("details");
 
-  constructor({ index }: EffectState, send: Send) {
+  constructor(
+    private state: EffectState,
+    send: Send,
+    onRemove: () => void,
+  ) {
+    const { index } = state;
     this.active = new Switch("on", `Effect ${index} is on`, (on) =>
       send(on ? startEffect(index) : stopEffect(index)),
     );
-    const row = el(
-      "div",
-      { className: "row" },
-      el("strong", {}, `Effect ${index}`),
-      this.facts,
-      this.active.root,
-    );
-    this.root = el("li", { data: { effect: String(index) } }, row);
+    this.form = new EffectForm(state, (effect) => send(setEffect(effect)));
+    const remove = el("button", { type: "button", className: "small", ariaLabel: `Remove effect ${index}` }, "Remove");
+    remove.addEventListener("click", onRemove);
+    const summary = el("summary", {}, "Parameters");
+    // At the click, not at the later "toggle": by then a quick hand has begun to type.
+    summary.addEventListener("click", () => this.form.update(this.state));
+    this.details.append(summary, this.form.root, remove);
+    const row = el("div", { className: "row" }, el("strong", {}, `Effect ${index}`), this.facts, this.active.root);
+    this.root = el("li", { data: { effect: String(index) } }, row, this.details);
   }
 
   update(e: EffectState): void {
+    this.state = e;
     const limit = e.duration_ms > 0 ? `, ${e.duration_ms} ms` : "";
-    setText(this.facts, `${e.type}, ${e.magnitude_N} N${limit}`);
+    setText(this.facts, `${e.type}, ${Number(e.magnitude_N.toPrecision(4))} N${limit}`);
     this.active.update(e.active);
+    if (this.details.open) this.form.update(e);
   }
 }
 
@@ -46,12 +130,18 @@ export class EffectsPanel {
   private readonly list = el("ul", { className: "cards" });
   private readonly rows: Rows<EffectState, EffectRow>;
   private used: number[] = [];
+  /** The wire has no call that forgets an effect: a removed one is stopped, hidden, and its index used again. */
+  private readonly removed = new Set<number>();
 
   constructor(parent: HTMLElement, send: Send) {
     this.rows = new Rows(
       this.list,
-      (e) => String(e.index),
-      (e) => new EffectRow(e, send),
+      (e) => `${e.index} ${e.type}`,
+      (e) =>
+        new EffectRow(e, send, () => {
+          send(stopEffect(e.index));
+          this.removed.add(e.index);
+        }),
     );
     const type = el(
       "select",
@@ -61,14 +151,17 @@ export class EffectsPanel {
     const add = el("button", { type: "button" }, "Add");
     add.addEventListener("click", () => {
       const effect = this.newEffect(type.value);
+      this.removed.delete(effect.index);
       send(setEffect(effect), startEffect(effect.index));
     });
     parent.append(this.list, el("div", { className: "row adder" }, type, add));
   }
 
   update(effects: EffectState[]): void {
-    this.used = effects.map((e) => e.index);
-    this.rows.update(effects);
+    for (const e of effects) if (e.active && !this.used.includes(e.index)) this.removed.delete(e.index);
+    const shown = effects.filter((e) => e.active || !this.removed.has(e.index));
+    this.used = shown.map((e) => e.index);
+    this.rows.update(shown.filter((e) => !this.removed.has(e.index)));
   }
 
   private newEffect(type: string): Effect {

@@ -28,7 +28,10 @@ export class GuardPanel {
     this.rows.update([]);
   }
 
-  update(device: DeviceState): void {
+  /** `recent`: trips of the last second, which the polled state may have missed. */
+  update(device: DeviceState, recent: string[] = []): void {
+    const active = [...new Set([...device.guard.active, ...recent])];
+    device = { ...device, guard: { ...device.guard, active } };
     const { guard } = device;
     const zero =
       guard.stopped ||

@@ -1,7 +1,10 @@
-// The objects of the scene: makes them touchable or not, edits their surface, removes their mesh.
-import { clearTrimesh, type Outgoing, setHapticProperty, setObjectIsTouchable } from "../wire";
+// The objects of the scene: makes them touchable or not, edits their surface and placement, removes them.
+import type { Vector3 } from "three";
+import { clearTrimesh, type Outgoing, removeObject, setHapticProperty, setObjectIsTouchable } from "../wire";
+import { colourOfObject } from "../scene3d/colours";
 import type { ObjectState } from "../state_types";
 import { countText, el, Rows, setText } from "./dom";
+import { PoseForm } from "./pose";
 import { SurfaceForm } from "./surface";
 import { Switch } from "./switch";
 
@@ -9,52 +12,72 @@ type Send = (...messages: Outgoing[]) => void;
 
 class ObjectRow {
   readonly root: HTMLElement;
+  private readonly name = el("strong");
   private readonly facts = el("span", { className: "quiet" });
   private readonly touchable: Switch;
   private readonly surface: SurfaceForm;
-  private readonly details = el("details");
+  private readonly pose: PoseForm;
+  private readonly surfacePart = el("details");
+  private readonly posePart = el("details");
 
-  constructor(id: number, send: Send) {
+  constructor(
+    private readonly id: number,
+    send: Send,
+    centreOf: (id: number) => Vector3,
+  ) {
     this.touchable = new Switch("touchable", `Object ${id} is touchable`, (on) =>
       send(setObjectIsTouchable(id, on)),
     );
     this.surface = new SurfaceForm((property, share) => send(setHapticProperty(id, property, share)));
-    const remove = el("button", { type: "button", className: "small" }, "Remove mesh");
-    remove.addEventListener("click", () => send(clearTrimesh(id)));
-    this.details.append(el("summary", {}, "Surface"), this.surface.root, remove);
-    const head = el(
-      "div",
-      { className: "row" },
-      el("strong", {}, `Object ${id}`),
-      this.facts,
-      this.touchable.root,
-    );
-    this.root = el("li", { data: { object: String(id) } }, head, this.details);
+    this.pose = new PoseForm(id, send, centreOf);
+    const remove = el("button", { type: "button", className: "small", ariaLabel: `Remove object ${id}` }, "Remove");
+    // Object 0 always exists: it becomes empty.
+    remove.addEventListener("click", () => send(id === 0 ? clearTrimesh(id) : removeObject(id)));
+    const surface = el("summary", {}, "Surface");
+    const placement = el("summary", {}, "Placement");
+    // At the click, not at the later "toggle": by then a quick hand has begun to type.
+    surface.addEventListener("click", () => this.last && this.surface.update(this.last.o));
+    placement.addEventListener("click", () => this.last && this.pose.update(this.last.o, this.last.all));
+    this.surfacePart.append(surface, this.surface.root);
+    this.posePart.append(placement, this.pose.root, remove);
+    const swatch = el("span", { className: "swatch", ariaHidden: "true" });
+    swatch.style.background = `#${colourOfObject(id).getHexString()}`;
+    const head = el("div", { className: "row" }, swatch, this.name, this.facts, this.touchable.root);
+    this.root = el("li", { data: { object: String(id) } }, head, this.surfacePart, this.posePart);
   }
 
-  update(o: ObjectState): void {
+  private last: { o: ObjectState; all: ObjectState[] } | undefined;
+
+  update(o: ObjectState, all: ObjectState[]): void {
+    this.last = { o, all };
     const note = o.stiffness_N_per_m > 0 ? "" : ", no stiffness: cannot be felt";
+    setText(this.name, o.name || `Object ${this.id}`);
+    this.name.title = `Object ${this.id}`;
     setText(this.facts, o.triangles === 0 ? "no mesh" : `${countText(o.triangles)} triangles${note}`);
     this.touchable.update(o.touchable);
-    if (this.details.open) this.surface.update(o);
+    if (this.surfacePart.open) this.surface.update(o);
+    if (this.posePart.open) this.pose.update(o, all);
   }
 }
 
 export class ObjectsPanel {
   private readonly list = el("ul", { className: "cards" });
-  private readonly rows: Rows<ObjectState, ObjectRow>;
+  private readonly rows: Rows<{ o: ObjectState; all: ObjectState[] }, { root: HTMLElement; update(item: { o: ObjectState; all: ObjectState[] }): void }>;
 
-  constructor(parent: HTMLElement, send: Send) {
+  constructor(parent: HTMLElement, send: Send, centreOf: (id: number) => Vector3) {
     this.rows = new Rows(
       this.list,
-      (o) => String(o.id),
-      (o) => new ObjectRow(o.id, send),
+      ({ o }) => String(o.id),
+      ({ o }) => {
+        const row = new ObjectRow(o.id, send, centreOf);
+        return { root: row.root, update: (item) => row.update(item.o, item.all) };
+      },
     );
     parent.append(this.list);
   }
 
   update(objects: ObjectState[], touched: number): void {
-    this.rows.update(objects);
+    this.rows.update(objects.map((o) => ({ o, all: objects })));
     for (const item of this.list.children)
       (item as HTMLElement).dataset["touched"] = String(
         (item as HTMLElement).dataset["object"] === String(touched),

@@ -24,3 +24,20 @@ export function share(bins: [from_us: number, count: number][], part: number, al
   }
   return 0;
 }
+
+/** Centres of bins from their lower ends; a bin without a known neighbour counts as an eighth of its start wide. */
+export function centres(from: number[]): number[] {
+  return from.map((start, i) => (start + Math.min(from[i + 1] ?? Infinity, 1.125 * start)) / 2);
+}
+
+/** The largest value, unless few values lie far above all others: a single peak must not hide the rest. */
+export function usualEnd(columns: Float64Array[]): number {
+  let end = 0;
+  for (const column of columns) {
+    const sorted = column.filter(Number.isFinite).sort();
+    const largest = sorted.at(-1) ?? 0;
+    const usual = sorted[Math.floor(0.98 * (sorted.length - 1))] ?? 0;
+    end = Math.max(end, largest > 3 * usual && usual > 0 ? 1.5 * usual : largest);
+  }
+  return end;
+}

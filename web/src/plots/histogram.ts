@@ -1,6 +1,7 @@
 // The histogram of the servo loop since the server started, on logarithmic scales.
 import uPlot from "uplot";
 import type { Histogram } from "../state_types";
+import { centres } from "./counts";
 import { axis, css } from "./plot";
 
 /** Shorter times are drawn here. */
@@ -36,7 +37,7 @@ export class LoopHistogram {
   private data(): uPlot.AlignedData {
     const bins = this.last?.bins.filter(([, count]) => count > 0) ?? [];
     return [
-      bins.map(([from]) => Math.log10(Math.max(from, LEAST_US))),
+      centres(bins.map(([from]) => from)).map((time) => Math.log10(Math.max(time, LEAST_US))),
       bins.map(([, count]) => Math.log10(count) + 0.3),
     ];
   }
@@ -76,7 +77,7 @@ export class LoopHistogram {
         {
           stroke: css("--force"),
           fill: css("--force"),
-          paths: uPlot.paths.bars!({ size: [0.9, 12, 2], align: 1 }),
+          paths: uPlot.paths.bars!({ size: [0.9, 12, 2], align: 0 }),
           points: { show: false },
         },
       ],

@@ -1,5 +1,6 @@
 // One live plot: uPlot over a sliding window of samples, in the colours of the page.
 import uPlot from "uplot";
+import { usualEnd } from "./counts";
 import { Window } from "./window";
 
 export interface Curve {
@@ -32,8 +33,20 @@ export function axis(): uPlot.Axis {
   };
 }
 
+const LABEL_PX = 45;
+
+/** A moment on the time axis. */
+export interface Mark {
+  time_s: number;
+  label: string;
+  /** Name of a CSS variable. */
+  colour: string;
+}
+
 export class Plot {
   readonly window: Window;
+  /** While set, the plot shows these samples instead of the newest. */
+  private held: Float64Array[] | undefined;
   private plot: uPlot | undefined;
   private readonly value: HTMLElement;
   private readonly body: HTMLElement;
@@ -42,6 +55,7 @@ export class Plot {
   constructor(
     parent: HTMLElement,
     private readonly options: PlotOptions,
+    private readonly marks: Mark[] = [],
   ) {
     this.window = new Window(1 + options.curves.length, options.most);
     const figure = document.createElement("figure");
@@ -73,13 +87,63 @@ export class Plot {
     this.resize();
   }
 
+  get title(): string {
+    return this.options.title;
+  }
+  get unit(): string {
+    return this.options.unit;
+  }
+  get canvas(): HTMLCanvasElement | null {
+    return this.body.querySelector("canvas");
+  }
+
+  /** Holds the picture, or goes on. */
+  set paused(on: boolean) {
+    this.held = on ? this.window.data().map((column) => column.slice()) : undefined;
+    this.changed = true;
+  }
+
+  /** The samples that are shown: time and values. */
+  data(): Float64Array[] {
+    return this.held ?? this.window.data();
+  }
+
+  /** The present value is not known. */
+  lost(): void {
+    this.value.textContent = `– ${this.options.unit}`;
+  }
+
   draw(): void {
     if (!this.changed || !this.plot || this.window.size === 0) return;
     this.changed = false;
-    const data = this.window.data();
+    const data = this.data();
     this.plot.setData(data as unknown as uPlot.AlignedData);
     const last = data[1]!.at(-1)!;
     this.value.textContent = `${last.toFixed(this.options.decimals)} ${this.options.unit}`;
+  }
+
+  private drawMarks(u: uPlot): void {
+    const { min, max } = u.scales["x"]!;
+    const { left, top, width, height } = u.bbox;
+    const context = u.ctx;
+    context.save();
+    let before = -Infinity;
+    for (const { time_s, label, colour } of this.marks) {
+      if (time_s < min! || time_s > max!) continue;
+      const x = left + ((time_s - min!) / (max! - min!)) * width;
+      context.strokeStyle = context.fillStyle = css(colour);
+      context.lineWidth = devicePixelRatio;
+      context.beginPath();
+      context.moveTo(x, top);
+      context.lineTo(x, top + height);
+      context.stroke();
+      if (Math.abs(x - before) < LABEL_PX * devicePixelRatio) continue; // its text would cover the other one
+      before = x;
+      context.font = `${10 * devicePixelRatio}px system-ui, sans-serif`;
+      context.textAlign = x > left + width / 2 ? "right" : "left";
+      context.fillText(label, x + (x > left + width / 2 ? -3 : 3) * devicePixelRatio, top + 10 * devicePixelRatio);
+    }
+    context.restore();
   }
 
   private resize(): void {
@@ -103,7 +167,7 @@ export class Plot {
       cursor: { show: false },
       scales: {
         x: { time: false, range: (_, __, max) => [(max ?? 0) - seconds, max ?? seconds] },
-        y: { range: (_, __, max) => [0, niceEnd(Math.max(max ?? 0, least))] },
+        y: { range: () => [0, niceEnd(Math.max(usualEnd(this.data().slice(1)), least))] },
       },
       axes: [
         {
@@ -115,6 +179,7 @@ export class Plot {
         },
         { ...axis(), size: 38, gap: 2, space: 24, values: (_, splits) => splits.map(shortText) },
       ],
+      hooks: { draw: [(u) => this.drawMarks(u)] },
       series: [
         {},
         ...curves.map((c): uPlot.Series => ({

@@ -4,7 +4,17 @@ import type { ObjectState } from "../state_types";
 
 const RAMP = ["#27408b", "#2f7fb5", "#5fb4a2", "#d9c75f", "#e8743b"].map((c) => new Color(c));
 
-export type Quantity = "stiffness" | "friction";
+export type Quantity = "object" | "stiffness" | "friction";
+
+/** Told apart also without red or green; the violet of what is no object is not among them. */
+const PALETTE = ["#d9a441", "#3f8fc4", "#4aa98b", "#c96f5e", "#8fa63f", "#b07ab0", "#6f8fa8", "#c4c04f"].map(
+  (c) => new Color(c),
+);
+export const colourOfObject = (id: number): Color => PALETTE[id % PALETTE.length]!;
+
+export function colourOf(o: ObjectState, quantity: Quantity, end: number): Color {
+  return quantity === "object" ? colourOfObject(o.id) : rampColour(valueOf(o, quantity) / end);
+}
 
 /** The colour of a value from 0 to 1. */
 export function rampColour(share: number): Color {
@@ -18,7 +28,7 @@ export const rampCss = (): string =>
   `linear-gradient(to right, ${RAMP.map((c) => `#${c.getHexString()}`).join(", ")})`;
 
 export function valueOf(o: ObjectState, quantity: Quantity): number {
-  return quantity === "stiffness" ? o.stiffness_N_per_m : o.static_friction;
+  return quantity === "friction" ? o.static_friction : o.stiffness_N_per_m;
 }
 
 /** Upper end of the legend: a round number at or above every value. */

@@ -3,8 +3,8 @@ import {
   BoxGeometry,
   BufferAttribute,
   BufferGeometry,
-  ConeGeometry,
-  CylinderGeometry,
+  CircleGeometry,
+  DoubleSide,
   EdgesGeometry,
   Group,
   Line,
@@ -20,8 +20,9 @@ import {
 } from "three";
 import type { Contact, Tick, Vec3 } from "../wire";
 import type { DeviceState } from "../state_types";
+import { Arrow } from "./arrow";
 
-const UP = new Vector3(0, 1, 0);
+const FORWARD = new Vector3(0, 0, 1);
 const MOST_NORMALS = 8;
 /** Relative to the largest extent of the workspace. */
 const BALL = 0.016;
@@ -36,31 +37,6 @@ export interface MarkerColours {
   box: string;
 }
 
-/** An arrow along +y. */
-class Arrow extends Group {
-  private readonly shaft: Mesh;
-  private readonly head: Mesh;
-  constructor(
-    readonly material: MeshStandardMaterial,
-    private readonly width: number,
-  ) {
-    super();
-    this.shaft = new Mesh(new CylinderGeometry(1, 1, 1, 12).translate(0, 0.5, 0), material);
-    this.head = new Mesh(new ConeGeometry(2.4, 1, 16).translate(0, 0.5, 0), material);
-    this.add(this.shaft, this.head);
-  }
-  point(from: Vector3, direction: Vector3, length: number, unit: number): void {
-    const width = Math.min(this.width * unit, length / 10); // a short arrow is thin
-    const head = Math.min(5 * width, 0.6 * length);
-    this.visible = length > 0;
-    this.position.copy(from);
-    this.quaternion.setFromUnitVectors(UP, direction);
-    this.shaft.scale.set(width, Math.max(length - head, 1e-9), width);
-    this.head.scale.set(width, head, width);
-    this.head.position.y = length - head;
-  }
-}
-
 const coloured = (): MeshStandardMaterial => new MeshStandardMaterial({ roughness: 0.6 });
 
 export class Markers {
@@ -71,6 +47,11 @@ export class Markers {
   );
   private readonly proxy = new Mesh(new SphereGeometry(1, 24, 16), coloured());
   private readonly force = new Arrow(coloured(), 0.007);
+  /** Below the HIP on the next surface: a cue of depth. */
+  private readonly shadow = new Mesh(
+    new CircleGeometry(1, 24),
+    new MeshBasicMaterial({ color: "#000000", transparent: true, opacity: 0.35, depthWrite: false, side: DoubleSide }),
+  );
   private readonly normals: Arrow[] = [];
   private readonly normalMaterial = coloured();
   private readonly spring = new Line(
@@ -91,7 +72,8 @@ export class Markers {
     this.spring.renderOrder = 1;
     this.spring.frustumCulled = false;
     this.box.matrixAutoUpdate = false;
-    this.group.add(this.box, this.spring, this.hip, this.proxy, this.force, ...this.normals);
+    this.shadow.visible = false;
+    this.group.add(this.box, this.shadow, this.spring, this.hip, this.proxy, this.force, ...this.normals);
     for (const part of [this.spring, this.hip, this.proxy, this.force, ...this.normals])
       part.visible = false;
   }
@@ -117,12 +99,30 @@ export class Markers {
     );
     this.box.matrix.multiplyMatrices(T, boxOfUnit);
     this.box.matrixWorldNeedsUpdate = true;
+    this.down.set(-T.elements[4]!, -T.elements[5]!, -T.elements[6]!).normalize();
     this.scale = device.world_per_reported;
     this.size = Math.max(...max.sub(min).toArray()) * T.getMaxScaleOnAxis();
     this.peak_N = device.peak_force_N > 0 ? device.peak_force_N : 1;
     this.hip.scale.setScalar(0.6 * BALL * this.size);
     this.proxy.scale.setScalar(BALL * this.size);
   }
+
+  /** World units per newton of arrows. */
+  get perNewton(): number {
+    return (PEAK_FORCE * this.size) / this.peak_N;
+  }
+
+  /** Where the shadow of the HIP falls: a surface, or nowhere. */
+  setShadow(at: { point: Vector3; normal: Vector3 } | undefined): void {
+    this.shadow.visible = at !== undefined;
+    if (!at) return;
+    this.shadow.position.copy(at.point).addScaledVector(at.normal, 0.002 * this.size);
+    this.shadow.quaternion.setFromUnitVectors(FORWARD, at.normal);
+    this.shadow.scale.setScalar(0.8 * BALL * this.size);
+  }
+
+  /** Of the device, downwards, unit. */
+  readonly down = new Vector3(0, -1, 0);
 
   /** Converts a reported position to world units. */
   world(position: Vec3): Vector3 {

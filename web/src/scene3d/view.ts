@@ -1,9 +1,10 @@
-// The 3D view: scene, camera and lights. It draws only after a change.
+// The 3D view: scene, camera and lights. It draws only after a change, and draws what rests only when that changes.
 import {
   Box3,
   Color,
   DirectionalLight,
   HemisphereLight,
+  Matrix4,
   MOUSE,
   PerspectiveCamera,
   Plane,
@@ -20,34 +21,55 @@ import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { DeviceState } from "../state_types";
 import { Markers } from "./markers";
 import { Objects } from "./objects";
+import { Sources } from "./sources";
+import { drawsInSoftware, Still } from "./still";
 
 const MOST_PIXELS_PER_POINT = 2;
+/** After the last motion, all triangles are drawn again. */
+const SETTLE_MS = 250;
+/** Frames that take longer while something moves: fewer triangles from then on. */
+const SLOW_MS = 45;
 
 export class View {
   readonly objects: Objects;
   readonly markers = new Markers();
+  readonly sources = new Sources();
+  /** What rests, as a rule. */
   private readonly scene = new Scene();
+  /** What moves with the hand. */
+  private readonly live = new Scene();
+  private readonly liveLight = new DirectionalLight(0xffffff, 2.2);
   private readonly camera = new PerspectiveCamera(35, 1, 1, 1000);
   private readonly renderer: WebGLRenderer;
   private readonly controls: OrbitControls;
   private readonly raycaster = new Raycaster();
-  private dirty = true;
+  private readonly still: Still;
+  private stillDirty = true;
+  private liveDirty = true;
+  private movedAt_ms = -Infinity;
+  private drawnAt_ms = 0;
+  private slow: boolean;
+  private isCoarse = false;
+  private wasMoving = false;
   private framed = "";
   /** Position of the canvas on the page, cached: querying it in every frame would force a layout. */
   private at = new DOMRect();
   private device: DeviceState | undefined;
 
   constructor(readonly canvas: HTMLCanvasElement) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true });
+    this.slow = drawsInSoftware();
+    this.renderer = new WebGLRenderer({ canvas, antialias: !this.slow });
+    this.still = new Still(this.renderer, this.slow ? 0 : 4);
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, MOST_PIXELS_PER_POINT));
     this.objects = new Objects(new Color("#ff7a1a"));
-    this.scene.add(this.objects.group, this.markers.group, this.camera);
+    this.scene.add(this.objects.group, this.sources.group, this.camera);
+    this.live.add(this.markers.group, this.sources.live, this.liveLight, new HemisphereLight(0xffffff, 0x606878, 1.1));
     const key = new DirectionalLight(0xffffff, 2.2);
     key.position.set(-0.6, 1, 0.8);
     this.camera.add(key);
-    this.scene.add(new HemisphereLight(0xffffff, 0x8890a0, 1.5));
+    this.scene.add(new HemisphereLight(0xffffff, 0x606878, 1.1));
     this.controls = new OrbitControls(this.camera, canvas);
-    this.controls.addEventListener("change", () => this.invalidate());
+    this.controls.addEventListener("change", () => this.moved());
     this.handOnLeft(true);
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement!);
     document.addEventListener("scroll", () => (this.at = canvas.getBoundingClientRect()), {
@@ -57,8 +79,20 @@ export class View {
     this.resize();
   }
 
+  /** Something that rests has changed. */
   invalidate(): void {
-    this.dirty = true;
+    this.stillDirty = true;
+  }
+
+  /** Only the hand and what moves with it. */
+  invalidateLive(): void {
+    this.liveDirty = true;
+  }
+
+  /** The camera or an object moves. */
+  moved(): void {
+    this.movedAt_ms = performance.now();
+    this.stillDirty = true;
   }
 
   /** Whether the left mouse button (and one finger) moves the simulated hand or turns the camera. */
@@ -89,30 +123,48 @@ export class View {
   setDevice(device: DeviceState): void {
     this.device = device;
     this.markers.setDevice(device);
+    const box = new Box3().setFromObject(this.markers.group.children[0]!);
+    this.sources.setPlace(box.getCenter(new Vector3()), Math.max(...box.getSize(new Vector3()).toArray()));
     const place = device.name + device.T_world_device.join();
-    if (place !== this.framed) this.home();
+    if (place === this.framed) return;
+    this.home();
     this.framed = place;
-    this.invalidate();
   }
 
   /** Moves the camera to where the user of the device sits. */
   home(): void {
-    if (!this.device) return;
+    const { device } = this;
+    if (!device) return;
     const box = new Box3().setFromObject(this.markers.group.children[0]!);
     const centre = box.getCenter(new Vector3());
-    const T = this.device.T_world_device;
+    const T = device.T_world_device;
     const axis = (i: number): Vector3 => new Vector3(T[4 * i]!, T[4 * i + 1]!, T[4 * i + 2]!).normalize();
     const radius = 0.5 * box.getSize(new Vector3()).length();
     const narrow = Math.min(1, this.camera.aspect);
     const from = axis(2).add(axis(1).multiplyScalar(0.38)).add(axis(0).multiplyScalar(0.45)).normalize();
     this.camera.up.copy(axis(1));
-    this.camera.position.copy(centre).addScaledVector(from, (2.5 * radius) / narrow);
     this.camera.near = radius / 50;
     this.camera.far = radius * 50;
     this.camera.updateProjectionMatrix();
+    // As near as the whole workspace allows.
+    for (let away = (2 * radius) / narrow; away < 12 * radius; away *= 1.04) {
+      this.camera.position.copy(centre).addScaledVector(from, away);
+      this.camera.lookAt(centre);
+      this.camera.updateMatrixWorld();
+      if (this.cornersOf(device).every((p) => Math.max(Math.abs(p.x), Math.abs(p.y)) < 0.94)) break;
+    }
     this.controls.target.copy(centre);
     this.controls.update();
     this.invalidate();
+  }
+
+  /** The corners of the workspace on the screen, from -1 to 1. */
+  private cornersOf({ workspace_m: { min, max }, T_world_device }: DeviceState): Vector3[] {
+    const T = new Matrix4().fromArray(T_world_device);
+    return Array.from({ length: 8 }, (_, i) => {
+      const at = [0, 1, 2].map((k) => ((i >> k) & 1 ? max : min)[k]!);
+      return new Vector3().fromArray(at).applyMatrix4(T).project(this.camera);
+    });
   }
 
   /** The ray through a point on the page, in world units. */
@@ -143,9 +195,21 @@ export class View {
   }
 
   draw(): void {
-    if (!this.dirty) return;
-    this.dirty = false;
-    this.renderer.render(this.scene, this.camera);
+    const now_ms = performance.now();
+    const moving = now_ms - this.movedAt_ms < SETTLE_MS;
+    if (moving && this.stillDirty && now_ms - this.drawnAt_ms > SLOW_MS && this.wasMoving) this.slow = true;
+    this.wasMoving = moving;
+    this.drawnAt_ms = now_ms;
+    if (this.isCoarse !== (moving && this.slow)) {
+      this.objects.isCoarse = this.isCoarse = moving && this.slow;
+      this.stillDirty = true;
+    }
+    if (!this.stillDirty && !this.liveDirty) return;
+    if (this.stillDirty) this.still.take(this.scene, this.camera);
+    this.stillDirty = this.liveDirty = false;
+    this.liveLight.position.set(-0.6, 1, 0.8).transformDirection(this.camera.matrixWorld);
+    this.still.show();
+    this.renderer.render(this.live, this.camera);
   }
 
   private resize(): void {

@@ -953,6 +953,77 @@ export const HandState = /* @__PURE__ */ define<HandState>("hapticd Hand_State",
   ["contacts", "list", "i32", "f64", 128],
 ]);
 
+/** Presents a token for a role, and a random key that the connections of one program share. */
+export interface Identify {
+  token: string;
+  key: number;
+}
+export const Identify = /* @__PURE__ */ define<Identify>("hapticd Identify", [
+  ["token", "name", 128],
+  ["key", "u64"],
+]);
+
+/** Gives up the control that `control = "first"` gave to this client, for the next one to command. */
+export type ReleaseControl = Record<string, never>;
+export const ReleaseControl = /* @__PURE__ */ define<ReleaseControl>("hapticd Release_Control", []);
+
+/** Reports the objects that move, until 1 s after they rest: 13 numbers each, up to 256 in one tick. */
+export interface Poses {
+  tick: number;
+  /** ns */
+  time: number;
+  poses: ArrayLike<number>;
+}
+export const Poses = /* @__PURE__ */ define<Poses>("hapticd Poses", [
+  ["tick", "u64"],
+  ["time", "i64"],
+  ["poses", "list", "i32", "f64", 3328],
+]);
+
+/** Names an object, for the viewer and for recordings. */
+export interface SetObjectName {
+  object: number;
+  text: string;
+}
+export const SetObjectName = /* @__PURE__ */ define<SetObjectName>("hapticd Set_Object_Name", [
+  ["object", "i32"],
+  ["text", "name", 64],
+]);
+
+/** Marks a moment, such as "trial 3 begins": recorded, and reported to all clients with its time. */
+export interface Marker {
+  /** ns */
+  time: number;
+  text: string;
+}
+export const Marker = /* @__PURE__ */ define<Marker>("hapticd Marker", [
+  ["time", "i64"],
+  ["text", "text", 256],
+]);
+
+/** Pauses a replayed recording, changes its speed (0 keeps it), or seeks (a negative time does not). */
+export interface ReplayControl {
+  paused: number;
+  speed: number;
+  /** s */
+  position: number;
+}
+export const ReplayControl = /* @__PURE__ */ define<ReplayControl>("hapticd Replay_Control", [
+  ["paused", "i16"],
+  ["speed", "f64"],
+  ["position", "f64"],
+]);
+
+/** Begins or ends a recording on the server, in a file of this name; answered by a text. */
+export interface RecordingControl {
+  record: number;
+  name: string;
+}
+export const RecordingControl = /* @__PURE__ */ define<RecordingControl>("hapticd Recording_Control", [
+  ["record", "i16"],
+  ["name", "name", 128],
+]);
+
 /** Every message, in the order of the table. */
 export const ALL_MESSAGES = [
   Text,
@@ -1040,6 +1111,13 @@ export const ALL_MESSAGES = [
   RemoteContacts,
   HeldForce,
   HandState,
+  Identify,
+  ReleaseControl,
+  Poses,
+  SetObjectName,
+  Marker,
+  ReplayControl,
+  RecordingControl,
 ] as const;
 
 /** Vertices or triangles in one message at most. */
@@ -1056,6 +1134,7 @@ export const REPORT_CONTACT_POINT = 128;
 export const REPORT_TOUCH_BUTTON = 256;
 export const REPORT_CONTACT_ANALOG = 512;
 export const REPORT_HIP = 1024;
+export const REPORT_POSES = 2048;
 /** Bits of Capabilities.features. */
 export const FEATURE_BULK_MESH = 1;
 export const FEATURE_BATCH = 2;

@@ -3,7 +3,7 @@ import * as m from "./messages";
 import type { Vec3, Vec4 } from "./messages";
 import type { Outgoing } from "./peer";
 
-export { MOST_IN_ONE_MESSAGE, REPORT_BUTTON, REPORT_CONTACTS, REPORT_TICK } from "./messages";
+export { MOST_IN_ONE_MESSAGE, REPORT_BUTTON, REPORT_CONTACTS, REPORT_HAND, REPORT_POSES, REPORT_TICK } from "./messages";
 export type { Vec3 } from "./messages";
 
 export const PONG = m.Pong.name;
@@ -11,10 +11,14 @@ export const TEXT = m.Text.name;
 export const TICK = m.TickReport.name;
 export const CONTACTS = m.ContactList.name;
 export const GUARD_STATE = m.GuardState.name;
+export const POSES = m.Poses.name;
+export const HAND_STATE = m.HandState.name;
+export const MARKER = m.Marker.name;
 
 const flag = (value: boolean): number => (value ? 1 : 0);
 
 export const ping = (): Outgoing => m.Ping.encode({});
+export const identify = (token: string): Outgoing => m.Identify.encode({ token, key: 0 });
 export const stopForces = (): Outgoing => m.StopForces.encode({});
 export const rearmForces = (): Outgoing => m.RearmForces.encode({});
 export const batchBegin = (): Outgoing => m.BatchBegin.encode({});
@@ -102,3 +106,66 @@ export function decodeGuardState(payload: DataView): GuardState {
 /** Severity: 0 normal, 1 warning, 2 error. Level: a refusal code of the server, 0 in other texts. */
 export type ServerText = m.Text;
 export const decodeText = (payload: DataView): ServerText => m.Text.decode(payload);
+
+const NUMBERS_OF_A_POSE = 13;
+/** Column-major matrices of 16, T_world_mesh, by object. */
+export function decodePoses(payload: DataView): [object: number, matrix: number[]][] {
+  const numbers = m.Poses.decode(payload).poses;
+  const poses: [number, number[]][] = [];
+  for (let i = 0; i + NUMBERS_OF_A_POSE <= numbers.length; i += NUMBERS_OF_A_POSE) {
+    const n = (k: number): number => numbers[i + 1 + k]!;
+    poses.push([
+      numbers[i]!,
+      [n(0), n(1), n(2), 0, n(3), n(4), n(5), 0, n(6), n(7), n(8), 0, n(9), n(10), n(11), 1],
+    ]);
+  }
+  return poses;
+}
+
+const NUMBERS_OF_A_REMOTE_CONTACT = 8;
+export function decodeRemoteContacts(
+  payload: DataView,
+): { id: number; proxy: Vec3; force_N: Vec3; depth: number }[] {
+  const n = m.HandState.decode(payload).contacts;
+  const contacts = [];
+  for (let i = 0; i + NUMBERS_OF_A_REMOTE_CONTACT <= n.length; i += NUMBERS_OF_A_REMOTE_CONTACT) {
+    const proxy: Vec3 = [n[i + 1]!, n[i + 2]!, n[i + 3]!];
+    contacts.push({ id: n[i]!, proxy, force_N: [n[i + 4]!, n[i + 5]!, n[i + 6]!] as Vec3, depth: n[i + 7]! });
+  }
+  return contacts;
+}
+
+export const mark = (text: string): Outgoing => m.Marker.encode({ time: 0, text });
+export const decodeMarker = (payload: DataView): m.Marker => m.Marker.decode(payload);
+export const setObjectName = (object: number, text: string): Outgoing => m.SetObjectName.encode({ object, text });
+export const removeObject = (object: number): Outgoing => m.RemoveObject.encode({ object });
+
+/** Speed 0 keeps it; a negative position does not seek. */
+export const replayControl = (paused: boolean, speed = 0, position_s = -1): Outgoing =>
+  m.ReplayControl.encode({ paused: flag(paused), speed, position: position_s });
+
+/** An empty name: by the time. The server answers by a text. */
+export const recordingControl = (record: boolean, name = ""): Outgoing =>
+  m.RecordingControl.encode({ record: flag(record), name });
+
+/** Stock units: offset in metres, stiffness 1 is 1000 N/m, damping 0.001 is 1 N s/m. */
+export const setPlane = (
+  index: number,
+  plane: [number, number, number, number],
+  stiffness: number,
+  damping: number,
+  staticFriction: number,
+  dynamicFriction: number,
+): Outgoing =>
+  m.Plane.encode({
+    plane,
+    stiffness,
+    damping,
+    dynamicFriction,
+    staticFriction,
+    index,
+    recoveryCycles: 100,
+  });
+export const enableConstraint = (enable: boolean): Outgoing => m.ConstraintEnable.encode({ enable: flag(enable) });
+export const setForceField = (origin: Vec3, force: Vec3, jacobian: number[], radius: number): Outgoing =>
+  m.ForceField.encode({ origin, force, jacobian, radius });

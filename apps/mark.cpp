@@ -1,0 +1,73 @@
+// hapticd mark: marks a moment of an experiment in the server's recording and for all clients.
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include "client/link.h"
+#include "commands.h"
+#include "hapticd/client.h"
+#include "wire/codec.h"
+
+namespace hapticd::apps {
+namespace {
+
+using namespace std::chrono_literals;
+
+struct MarkOptions {
+  std::string text;
+  std::string server = "Phantom@localhost";
+};
+
+// The server sends every marker to all clients: its arrival confirms it.
+int run(const MarkOptions& options) {
+  constexpr auto kTimeout = 5s;
+  const client::DeviceAddress address = client::parseDevice(options.server);
+  client::Link link(address.server, {.reconnect = false, .adoptNames = true});
+  const wire::LocalSender device = link.addDevice(address.device);
+  if (!link.waitConnected(kTimeout)) throw ConnectError(address.device + ": " + link.whyNotConnected());
+  if (!link.waitHeard(device, kTimeout))
+    throw ConnectError("no device '" + address.device + "' answers at " + address.server.text());
+  link.sendNow(device, wire::Marker{.time = 0, .text = options.text});
+  bool confirmed = false;
+  std::string refusal;
+  const auto hear = [&](const client::Arrival& arrival) {
+    if (arrival.what != client::Arrival::What::message) return;
+    if (arrival.kind == wire::kindOf<wire::Marker>) {
+      const auto marker = wire::decode<wire::Marker>(arrival.bytes);
+      confirmed = confirmed || (marker && marker->text.text == options.text);
+    } else if (arrival.kind == wire::kindOf<wire::Text>) {
+      const auto text = wire::decode<wire::Text>(arrival.bytes);
+      if (text && text->severity == wire::kTextError) refusal = text->text.text;
+    }
+  };
+  const auto end = std::chrono::steady_clock::now() + kTimeout;
+  while (!confirmed && refusal.empty() && link.connected() && std::chrono::steady_clock::now() < end)
+    link.poll(20ms, hear);
+  if (!refusal.empty()) throw Error(options.server + " refused: " + refusal);
+  if (!confirmed)
+    throw Error(options.server + " did not confirm the marker within 5 s; only a hapticd takes markers");
+  std::printf("%s: marked \"%s\"\n", options.server.c_str(), options.text.c_str());
+  return 0;
+}
+
+}  // namespace
+
+void addMark(CLI::App& app) {
+  auto options = std::make_shared<MarkOptions>();
+  CLI::App* command =
+      app.add_subcommand("mark", "Mark a moment, such as \"trial 3 begins\", in the recording of a server");
+  command->add_option("text", options->text, "At most 255 bytes")
+      ->required()
+      ->check([](const std::string& t) {
+        return t.empty() || t.size() > 255 ? std::string("must have 1 to 255 bytes") : std::string();
+      });
+  command->add_option("--server", options->server, "NAME@host[:port] or NAME@tcp://host[:port]")
+      ->capture_default_str();
+  command->footer(
+      "The marker reaches all clients, too; the viewer shows it in its plots.\n"
+      "Example: hapticd mark \"trial 3 begins\" --server Phantom@lab7");
+  command->callback([options] { exitCode = run(*options); });
+}
+
+}  // namespace hapticd::apps

@@ -1,0 +1,205 @@
+// hapticd tunnel: a local port whose connections travel to a server on another machine through TLS.
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <list>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "client/server_address.h"
+#include "commands.h"
+#include "net/connection.h"
+#include "net/local_socket.h"
+#include "net/tcp_listener.h"
+#include "net/udp_socket.h"
+#include "tls/tls.h"
+#include "token_file.h"
+#include "wire/bytes.h"
+#include "wire/codec.h"
+#include "wire/cookie.h"
+#include "wire/frame.h"
+#include "wire/system.h"
+
+namespace hapticd::apps {
+namespace {
+
+using namespace std::chrono_literals;
+
+struct TunnelOptions {
+  std::string server;
+  int port = client::kDefaultPort;
+  std::string fingerprint;
+  std::string authorities;
+  std::string tokenFile;
+};
+
+// Numbers that a client describes last, if ever: the names of what the tunnel says itself.
+constexpr std::int32_t kOwnNumber = 1990;
+
+void appendFrame(net::Buffer& bytes, std::int32_t sender, std::int32_t type, wire::ByteView payload) {
+  const std::size_t at = bytes.size();
+  bytes.resize(at + wire::kHeaderBytes + wire::padded(payload.size()));
+  std::byte* const out = bytes.data() + at;
+  wire::storeBig(out, static_cast<std::int32_t>(wire::kHeaderBytes + payload.size()));
+  wire::storeBig(out + 12, sender);
+  wire::storeBig(out + 16, type);
+  std::copy(payload.begin(), payload.end(), out + wire::kHeaderBytes);
+}
+
+// Frames that present a token, for the place behind a client's cookie: stock clients cannot.
+net::Buffer identification(const std::string& token) {
+  net::Buffer bytes;
+  appendFrame(bytes, kOwnNumber, wire::kSenderDescription, wire::encodeDescription("VRPN Control"));
+  appendFrame(bytes, kOwnNumber, wire::kTypeDescription, wire::encodeDescription(wire::Identify::kInfo.name));
+  const wire::Identify identify{.token = std::string_view(token), .key = 0};
+  net::Buffer payload(wire::payloadSize(identify));
+  wire::encodePayload(identify, payload.data());
+  appendFrame(bytes, kOwnNumber, kOwnNumber, payload);
+  return bytes;
+}
+
+// One client and its connection to the server. Each side is read as fast as the other one takes it.
+class Carrier : public std::enable_shared_from_this<Carrier> {
+ public:
+  Carrier(net::Connection near, net::Connection far, net::Buffer afterCookie, std::function<void()> onGone)
+      : near_(std::move(near)),
+        far_(std::move(far)),
+        afterCookie_(std::move(afterCookie)),
+        onGone_(std::move(onGone)) {}
+
+  void start() {
+    join(near_, far_, true);
+    join(far_, near_, false);
+  }
+
+ private:
+  static constexpr std::size_t kMostQueued = std::size_t{1} << 19;
+
+  void join(net::Connection& from, net::Connection& to, bool ofClient) {
+    from.start({.onConnected = {},
+                .onBytes =
+                    [this, self = shared_from_this(), &from, &to, ofClient](auto bytes) {
+                      carry(from, to, ofClient ? withToken(bytes) : net::Buffer(bytes.begin(), bytes.end()));
+                    },
+                // The queue of this connection is empty: its feeder may go on.
+                .onDrained = [self = shared_from_this(), &to] { to.resumeReading(); },
+                .onPeerGone = [this, self = shared_from_this()](const std::string& why) { end(why); },
+                .onClosed = [this, self = shared_from_this()](const std::string& why) { end(why); }});
+  }
+
+  net::Buffer withToken(std::span<const std::byte> bytes) {
+    net::Buffer out;
+    const std::size_t left = wire::kCookieBytes - std::min(wire::kCookieBytes, seen_);
+    const std::size_t cookie = std::min(left, bytes.size());
+    seen_ += bytes.size();
+    out.insert(out.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(cookie));
+    if (left > 0 && seen_ >= wire::kCookieBytes)
+      out.insert(out.end(), afterCookie_.begin(), afterCookie_.end());
+    out.insert(out.end(), bytes.begin() + static_cast<std::ptrdiff_t>(cookie), bytes.end());
+    return out;
+  }
+
+  void carry(net::Connection& from, net::Connection& to, net::Buffer bytes) {
+    to.send(std::make_shared<const net::Buffer>(std::move(bytes)));
+    to.flush();
+    if (to.statistics().queuedBytes > kMostQueued) from.pauseReading();
+  }
+
+  void end(const std::string& why) {
+    if (!onGone_) return;
+    std::fprintf(stderr, "hapticd: client disconnected: %s\n", why.c_str());
+    near_.close(why);
+    far_.close(why);
+    std::exchange(onGone_, nullptr)();
+  }
+
+  net::Connection near_;
+  net::Connection far_;
+  const net::Buffer afterCookie_;
+  std::size_t seen_ = 0;
+  std::function<void()> onGone_;
+};
+
+tls::Context contextOf(const TunnelOptions& options, const std::string& host) {
+  if (!options.authorities.empty()) return tls::Context::clientThatTrusts(options.authorities, host);
+  if (!options.fingerprint.empty()) return tls::Context::clientThatKnows(options.fingerprint);
+  throw std::runtime_error(
+      "how should the tunnel know that " + host +
+      " is the right server? Give --fingerprint, which that server prints at its start, or "
+      "--ca with the authority that signed its certificate");
+}
+
+int run(const TunnelOptions& options) {
+  const client::ServerAddress server = client::parseServer(options.server);
+  net::Loop loop;
+  std::optional<tls::Context> context;
+  net::Endpoint address;
+  if (server.socket.empty()) {
+    context = contextOf(options, server.host);
+    address = {net::resolve(server.host), server.port};
+  }
+  const net::Buffer token =
+      options.tokenFile.empty() ? net::Buffer() : identification(readToken(options.tokenFile));
+  std::list<std::shared_ptr<Carrier>> carriers;
+  net::ConnectionOptions link;
+  link.keepAlive = 1s;
+  const net::Endpoint local{net::kLoopbackAddress, static_cast<std::uint16_t>(options.port)};
+  net::TcpListener listener(
+      loop, local,
+      [&](net::Connection near) {
+        net::Connection far = context ? tls::wrap(*context, net::Connection::connect(loop, address, 3s, link))
+                                      : net::connectLocal(loop, server.socket, link);
+        carriers.emplace_back();
+        const auto place = std::prev(carriers.end());
+        *place = std::make_shared<Carrier>(std::move(near), std::move(far), token, [&loop, &carriers, place] {
+          // After its last callback, and with time to send what is queued.
+          loop.post([&carriers, place] { carriers.erase(place); });
+        });
+        (*place)->start();
+      },
+      link, "--port");
+  net::UdpSocket requests(loop, listener.local());
+  const std::string at = listener.local().text();
+  bool told = false;
+  requests.start({.onDatagram =
+                      [&](auto, const net::Endpoint& from) {
+                        if (std::exchange(told, true)) return;
+                        std::fprintf(stderr,
+                                     "hapticd: %s asks for a call-back: the tunnel carries tcp:// only, open "
+                                     "NAME@tcp://%s\n",
+                                     from.text().c_str(), at.c_str());
+                      },
+                  .onRefused = {}});
+  std::printf("clients open NAME@tcp://%s; connections go to %s\n", at.c_str(), server.text().c_str());
+  std::fflush(stdout);
+  loop.run();
+  return 0;
+}
+
+}  // namespace
+
+void addTunnel(CLI::App& app) {
+  auto options = std::make_shared<TunnelOptions>();
+  CLI::App* command =
+      app.add_subcommand("tunnel", "Carry clients on this machine to a server on another one, through TLS");
+  command->add_option("server", options->server, "HOST[:PORT], or unix:/PATH on this machine")->required();
+  command->add_option("--port", options->port, "Local port [3883]; 0: any free one")
+      ->check(CLI::Range(0, 65535));
+  CLI::Option* const known =
+      command->add_option("--fingerprint", options->fingerprint,
+                          "SHA-256 of the server's certificate, which it prints at its start");
+  command->add_option("--ca", options->authorities, "PEM file of the authority that signed the certificate")
+      ->check(CLI::ExistingFile)
+      ->excludes(known);
+  command
+      ->add_option("--token-file", options->tokenFile,
+                   "Present the token in this file, mode 0600, for each client")
+      ->check(CLI::ExistingFile);
+  command->footer(
+      "For clients that know neither TLS nor tokens, such as those of stock VRPN: they open\n"
+      "NAME@tcp://127.0.0.1:3883. Everybody on this machine can use the tunnel while it runs.");
+  command->callback([options] { exitCode = run(*options); });
+}
+
+}  // namespace hapticd::apps

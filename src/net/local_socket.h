@@ -1,0 +1,58 @@
+// Unix-domain stream sockets: connections within this machine whose peer the kernel names.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "net/connection.h"
+
+namespace hapticd::net {
+
+/// The system's number of the user that holds the other end of a Unix-domain connection; nothing for all
+/// other connections and closed ones.
+std::optional<std::uint32_t> peerUser(const Connection& connection) noexcept;
+
+/// Accepts connections at a path of the file system; the destructor removes the socket. Every local user who
+/// may enter the folder can connect.
+class LocalListener {
+ public:
+  /// Creates the last folder of the path (mode 0700) when it is missing, and replaces a socket that nobody
+  /// listens at. Throws Error, also when the network has no such sockets.
+  LocalListener(Loop& loop, std::filesystem::path path, std::function<void(Connection)> onAccept,
+                const ConnectionOptions& options = {});
+  ~LocalListener();
+  LocalListener(const LocalListener&) = delete;
+  LocalListener& operator=(const LocalListener&) = delete;
+
+  const std::filesystem::path& path() const noexcept { return path_; }
+
+ private:
+  class Descriptor;
+  void acceptPending();
+
+  Loop& loop_;
+  std::filesystem::path path_;
+  std::function<void(Connection)> onAccept_;
+  ConnectionOptions options_;
+  std::unique_ptr<Descriptor> descriptor_;
+  Subscription watch_;
+  Subscription retry_;
+};
+
+/// A connection to a server at this path, open at once. Throws Error.
+Connection connectLocal(Loop& loop, const std::filesystem::path& path, const ConnectionOptions& options = {});
+
+/// Where the server that listens on this port has its Unix socket unless configured otherwise:
+/// hapticd/PORT.sock in $RUNTIME_DIRECTORY (without hapticd/), $XDG_RUNTIME_DIR, /run (root) or, in a folder
+/// of its own, /tmp.
+std::filesystem::path defaultSocketPath(std::uint16_t port);
+/// The socket of a server of this user on that port, or of the system's service; nothing when there is none,
+/// or when somebody else could have put it there. With `anyUser`, root also finds those of all users, whom it
+/// then trusts.
+std::optional<std::filesystem::path> findServerSocket(std::uint16_t port, bool anyUser = false);
+
+}  // namespace hapticd::net

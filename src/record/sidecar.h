@@ -1,0 +1,13 @@
+// What the columns of an exported recording do not say: the file beside it.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace hapticd::record {
+
+/// A JSON object: program, force law, start, configuration, devices, surfaces that were in the scene with the
+/// time of their first tick, markers. Reads the whole recording. Throws RecordingError.
+std::string sidecarOf(const std::filesystem::path& recording);
+
+}  // namespace hapticd::record

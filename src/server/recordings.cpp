@@ -1,0 +1,175 @@
+#include "server/recordings.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <ctime>
+#include <utility>
+
+#include "base/world.h"
+
+namespace hapticd::server {
+namespace {
+
+using base::Nanos;
+using record::RecordingError;
+
+// Before the begin of a recording, so that meshes need not wait for further edits and motions are over.
+constexpr Nanos kSettled = 500'000'000;
+
+std::filesystem::path withTime(const std::string& name) {
+  const auto now = static_cast<std::time_t>(base::wallNow() / 1'000'000'000);
+  std::tm local{};
+  localtime_r(&now, &local);
+  char path[4096] = {};
+  if (std::strftime(path, sizeof path, name.c_str(), &local) == 0)
+    throw RecordingError("record: '" + name + "' is too long for a file name");
+  return path;
+}
+
+// A client names a file, never a folder.
+void checkName(const std::string& name) {
+  const auto allowed = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
+           c == '_' || c == '.';
+  };
+  const bool plain = std::all_of(name.begin(), name.end(), allowed) && name.front() != '.';
+  if (!plain || name.size() > 100 || std::filesystem::path(name).extension() != ".haptics") {
+    throw RecordingError(
+        "refused: the name of a recording has letters, digits, '-', '_' and '.', at most 100, and ends with "
+        ".haptics");
+  }
+}
+
+std::string summary(const record::Recorder& recorder) {
+  const record::RecorderCounts& counts = recorder.counts();
+  return fmt::format("recorded {} ticks, {:.1f} MB, in {}{}", counts.ticks,
+                     static_cast<double>(counts.bytes) * 1e-6, recorder.path().string(),
+                     recorder.failed() ? ", which is incomplete" : "");
+}
+
+}  // namespace
+
+Recordings::Recordings(const Scenes& scenes, const Stations& stations, Post post, Options options)
+    : scenes_(scenes), stations_(stations), post_(std::move(post)), options_(std::move(options)) {}
+
+void Recordings::create(const std::string& name) {
+  record::RecorderOptions options;
+  options.fileBytes = options_.mostBytes;
+  recorder_ = std::make_unique<record::Recorder>(
+      withTime(name), [](const std::string& text) { spdlog::error("{}", text); }, options);
+}
+
+void Recordings::begin(Nanos wallOffset, std::string config) {
+  if (!recorder_) return;
+  for (const auto& station : stations_) recorder_->addDevice(station->recorded());
+  recorder_->start(wallOffset, std::move(config));
+  recorderOf_.resize(scenes_.size(), nullptr);
+  for (const auto& scene : scenes_) {
+    if (beginScene(*scene)) continue;
+    recorderOf_[scene->number()] = recorder_.get();
+    for (std::uint32_t i = 0; i < stations_.size(); ++i) {
+      if (&stations_[i]->scene() == scene.get()) stations_[i]->recordTo(recorder_.get(), i);
+    }
+  }
+  spdlog::info("recording to {}", recorder_->path().string());
+}
+
+// In the scene's thread, so that no command and no publication comes between what is described and what is
+// recorded. False: the scene has not started, so there is nothing to describe.
+bool Recordings::beginScene(SceneHost& scene) {
+  return scene.inspect([this, &scene, recorder = recorder_.get()](const auto& builders) {
+    const Nanos now = base::now();
+    for (const scene::ClientCommand& c : builders.front()->commands(now)) {
+      const bool ofObjects = scene::targetOf(c.command) == scene::Target::objects;
+      recorder->recordCommand(scene.number(), c.client, ofObjects ? now - kSettled : now, &c.command);
+    }
+    recorderOf_[scene.number()] = recorder;
+    std::size_t seat = 0;
+    for (std::uint32_t i = 0; i < stations_.size(); ++i) {
+      if (&stations_[i]->scene() != &scene) continue;
+      recorder->recordPublish(i, now, builders[seat++]->revision());
+      stations_[i]->recordTo(recorder, i);
+    }
+  });
+}
+
+void Recordings::start(const std::string& name, Nanos wallOffset, std::string config) {
+  if (!file().empty()) throw RecordingError("refused: this server records to " + file() + " already");
+  if (!name.empty()) checkName(name);
+  end({});  // one that could not be written further
+  create((options_.folder / (name.empty() ? "session-%Y%m%d-%H%M%S.haptics" : name)).string());
+  begin(wallOffset, std::move(config));
+}
+
+bool Recordings::end(std::function<void(const std::string&)> ended) {
+  if (!recorder_) return false;
+  record::Recorder* recorder = recorder_.get();
+  auto entry = std::make_unique<Ended>();
+  entry->recorder = std::move(recorder_);
+  entry->scenes = scenes_.size();
+  entry->reply = std::move(ended);
+  ended_.push_back(std::move(entry));
+  for (const auto& scene : scenes_) {
+    scene->inspect([this, host = scene.get(), recorder](const auto&) {
+      recorderOf_[host->number()] = nullptr;
+      for (const auto& station : stations_) {
+        if (&station->scene() == host) station->recordTo(nullptr, 0);
+      }
+      post_([this, recorder] { sceneEnded(recorder); });
+    });
+  }
+  return true;
+}
+
+void Recordings::sceneEnded(const record::Recorder* recorder) {
+  for (const auto& entry : ended_) {
+    if (entry->recorder.get() != recorder || --entry->scenes > 0) continue;
+    entry->at = base::now();
+    entry->recorder->end();
+  }
+}
+
+std::string Recordings::file() const {
+  return recorder_ && recorder_->writes() ? recorder_->path().string() : "";
+}
+
+void Recordings::marker(Nanos time, const std::string& text) {
+  if (recorder_) recorder_->recordMarker(time, text);
+}
+
+void Recordings::command(std::uint32_t scene, scene::ClientId client, Nanos now,
+                         const scene::SceneCommand* c) {
+  if (scene < recorderOf_.size() && recorderOf_[scene] != nullptr)
+    recorderOf_[scene]->recordCommand(scene, client, now, c);
+}
+
+// A tick that began before the end may still push into the rings: they live until a later one has finished,
+// or the servos have ended.
+void Recordings::poll() {
+  std::erase_if(ended_, [this](const std::unique_ptr<Ended>& entry) {
+    if (!entry->recorder->ended()) return false;
+    if (!std::exchange(entry->told, true)) {
+      const std::string text = summary(*entry->recorder);
+      spdlog::info("{}", text);
+      if (entry->reply) entry->reply(text);
+    }
+    constexpr Nanos kLongestTick = 100'000'000;
+    return std::all_of(stations_.begin(), stations_.end(),
+                       [&](const auto& station) { return station->finishedAt() > entry->at + kLongestTick; });
+  });
+}
+
+void Recordings::finish() {
+  for (const auto& entry : ended_) {
+    entry->recorder->finish();
+    if (!entry->told) spdlog::info("{}", summary(*entry->recorder));
+  }
+  ended_.clear();
+  if (!recorder_) return;
+  recorder_->finish();
+  spdlog::info("{}", summary(*recorder_));
+  recorder_.reset();
+}
+
+}  // namespace hapticd::server

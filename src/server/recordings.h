@@ -1,0 +1,76 @@
+// The recordings of a server: one at a time, from the start of the server or begun and ended at any time.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "record/recorder.h"
+#include "server/scene/scene_host.h"
+#include "server/station/station.h"
+
+namespace hapticd::server {
+
+/// Net thread, except command().
+class Recordings {
+ public:
+  using Scenes = std::vector<std::unique_ptr<SceneHost>>;
+  using Stations = std::vector<std::unique_ptr<Station>>;
+  using Post = std::function<void(std::function<void()>)>;
+
+  struct Options {
+    std::filesystem::path folder;          ///< takes recordings that clients begin
+    std::uint64_t mostBytes = UINT64_MAX;  ///< of one file
+  };
+
+  /// Both must outlive this object; `post` calls in the net thread.
+  Recordings(const Scenes& scenes, const Stations& stations, Post post, Options options);
+
+  /// Creates the file; strftime conversions in `name` get the local time. For a recording from the first tick
+  /// on: call begin() before the scenes start. Throws record::RecordingError.
+  void create(const std::string& name);
+  /// Records to the file that was created. The recording of a scene that runs begins with the commands that
+  /// make it, and its ticks follow.
+  void begin(base::Nanos wallOffset, std::string config);
+  /// The same for a client, which may name a file in the folder; empty: named by the time. Throws
+  /// record::RecordingError with a text for the client.
+  void start(const std::string& name, base::Nanos wallOffset, std::string config);
+  /// Ends the recording at hand; `ended` gets a text once the file is complete. False when there is none.
+  bool end(std::function<void(const std::string&)> ended);
+
+  /// The file of the recording at hand; empty when there is none, or it cannot be written further.
+  std::string file() const;
+  void marker(base::Nanos time, const std::string& text);
+  /// Scene threads: a command of this scene.
+  void command(std::uint32_t scene, scene::ClientId client, base::Nanos now, const scene::SceneCommand* c);
+
+  /// Frees what ended. Call a few times per second.
+  void poll();
+  /// After the servos and scenes have ended: completes all files.
+  void finish();
+
+ private:
+  struct Ended {
+    std::unique_ptr<record::Recorder> recorder;
+    std::size_t scenes = 0;  // that still write to it
+    base::Nanos at = 0;      // when none did any more
+    std::function<void(const std::string&)> reply;
+    bool told = false;
+  };
+
+  bool beginScene(SceneHost& scene);
+  void sceneEnded(const record::Recorder* recorder);
+
+  const Scenes& scenes_;
+  const Stations& stations_;
+  const Post post_;
+  const Options options_;
+  std::unique_ptr<record::Recorder> recorder_;
+  std::vector<std::unique_ptr<Ended>> ended_;
+  std::vector<record::Recorder*> recorderOf_;  // of each scene; touched by its thread once that runs
+};
+
+}  // namespace hapticd::server

@@ -1,0 +1,56 @@
+#!/usr/bin/env bash
+# What systemd learns: readiness once the server listens, and that it lives while its device is absent or disarmed. Needs Python.
+set -euo pipefail
+hapticd=$1
+command -v python3 >/dev/null || exit 77
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+python3 - "$hapticd" "$work" <<'PY'
+import os, socket, subprocess, sys
+hapticd, work = sys.argv[1:]
+manager = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+manager.bind(work + "/notify")
+manager.settimeout(60)
+port = None
+
+def start():
+    log = open(work + "/log", "w")
+    command = [hapticd, "serve", "--port", str(port or 0), "--http", "off", "--allow-no-rt"]
+    environment = {**os.environ, "NOTIFY_SOCKET": work + "/notify", "RUNTIME_DIRECTORY": work}
+    return subprocess.Popen(command, env=environment, stdout=log, stderr=subprocess.STDOUT)
+
+def await_state(state):
+    while manager.recv(100) != state:
+        pass
+
+def sockets():
+    return [name for name in os.listdir(work) if name.endswith(".sock")]
+
+server = start()
+try:
+    assert manager.recv(100) == b"READY=1"
+    assert len(sockets()) == 1, sockets()
+    port = int(sockets()[0].split(".")[0])
+    for _ in range(2):
+        await_state(b"WATCHDOG=1")
+    # After a crash forces are stopped, and the socket that is left is replaced.
+    server.kill()
+    server.wait()
+    assert len(sockets()) == 1
+    server = start()
+    await_state(b"READY=1")
+    stop = [hapticd, "stop", "--rearm", f"Phantom@unix:{work}/{port}.sock"]
+    assert "forces ramp in" in subprocess.run(stop, stdout=subprocess.PIPE, timeout=60, text=True).stdout
+    server.terminate()
+    await_state(b"STOPPING=1")
+    assert server.wait(60) == 0
+    assert "did not end in order" in open(work + "/log").read()
+    assert not sockets()
+    server = start()
+    await_state(b"READY=1")
+    server.terminate()
+    assert server.wait(60) == 0
+    assert "did not end in order" not in open(work + "/log").read()
+finally:
+    server.kill()
+PY

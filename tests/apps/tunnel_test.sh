@@ -1,0 +1,61 @@
+#!/usr/bin/env bash
+# A server that asks for TLS: a client without it is refused, one through the tunnel touches a scan, with the token that the
+# tunnel presents for it. No token appears in a log.
+set -euo pipefail
+hapticd=$1
+source_dir=$2
+work=$(mktemp -d)
+token=0123456789abcdef-secret
+(umask 077 && printf 'owner %s\n' "$token" >"$work/tokens" && printf '%s\n' "$token" >"$work/token")
+cat >"$work/server.toml" <<TOML
+listen = "127.0.0.1:0"
+http = "off"
+allow_no_rt = true
+tls = "generated"
+tls_loopback = true
+tokens = "$work/tokens"
+socket = "$work/server.sock"
+TOML
+"$hapticd" serve --config "$work/server.toml" >"$work/log" 2>&1 &
+server=$!
+tunnel=
+trap 'kill $server $tunnel 2>/dev/null || true; rm -rf "$work"' EXIT
+await() {  # FILE PATTERN: prints what the pattern captures
+  local found
+  for _ in $(seq 300); do
+    found=$(sed -nE "s/.*$2.*/\1/p" "$1" | head -1)
+    [ -n "$found" ] && { echo "$found"; return; }
+    sleep 0.1
+  done
+  cat "$1" >&2
+  return 1
+}
+address=$(await "$work/log" 'listening on ([0-9.]+:[0-9]+)')
+fingerprint=$(await "$work/log" 'SHA-256 ([0-9A-F:]{95})')
+refused() {
+  local status=0
+  "$@" >"$work/out" 2>&1 || status=$?
+  [ "$status" = 1 ] || { echo "status $status of $*"; cat "$work/out"; exit 1; }
+}
+refused "$hapticd" stop "Phantom@tcp://$address"
+refused "$hapticd" tunnel "$address"
+grep -q 'give --fingerprint' -i "$work/out"
+chmod 0644 "$work/token"
+refused "$hapticd" tunnel "$address" --fingerprint "$fingerprint" --token-file "$work/token"
+grep -q 'chmod 0600' "$work/out"
+chmod 0600 "$work/token"
+
+"$hapticd" tunnel "$address" --port 0 --fingerprint "$fingerprint" --token-file "$work/token" >"$work/tunnel" 2>&1 &
+tunnel=$!
+local=$(await "$work/tunnel" 'tcp:\/\/([0-9.]+:[0-9]+);')
+"$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --server "Phantom@tcp://$local" --seconds 4 >"$work/out"
+awk '/peak force/ { if ($3 > 0.1) force = 1 } END { exit !force }' "$work/out" || { cat "$work/out" "$work/log"; exit 1; }
+
+# A call-back client is refused in words.
+refused timeout 10 "$hapticd" stop "Phantom@$local"
+grep -q 'carries tcp:// only' "$work/tunnel" || { cat "$work/tunnel"; exit 1; }
+
+# Without the token, the Unix socket of this user is the owner's.
+"$hapticd" stop "Phantom@unix:$work/server.sock" | grep -q 'forces are off'
+"$hapticd" stop --rearm "Phantom@unix:$work/server.sock" | grep -q 'forces ramp in'
+! grep -q "$token" "$work/log" "$work/tunnel" || { echo "a token in a log"; exit 1; }

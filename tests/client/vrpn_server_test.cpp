@@ -1,0 +1,573 @@
+// Device programs written for VRPN's server classes, served by this library.
+#include <gtest/gtest.h>
+#include <unistd.h>
+#include <vrpn_Analog.h>
+#include <vrpn_Auxiliary_Logger.h>
+#include <vrpn_Button.h>
+#include <vrpn_Connection.h>
+#include <vrpn_FileConnection.h>
+#include <vrpn_FileController.h>
+#include <vrpn_Forwarder.h>
+#include <vrpn_ForwarderController.h>
+#include <vrpn_LamportClock.h>
+#include <vrpn_Mutex.h>
+#include <vrpn_RedundantTransmission.h>
+#include <vrpn_SharedObject.h>
+#include <vrpn_Tracker.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/client_tests.h"
+#include "client/vrpn_device.h"
+#include "server/scripted_peer.h"
+
+namespace hapticd {
+namespace {
+
+using test::kPatience;
+using test::ScriptedPeer;
+
+struct Release {
+  void operator()(vrpn_Connection* connection) const { connection->removeReference(); }
+};
+using ServedConnection = std::unique_ptr<vrpn_Connection, Release>;
+
+// A device program on a port that the system chose, in this thread.
+class VrpnServer : public ::testing::Test {
+ protected:
+  net::Endpoint address() const {
+    return {net::kLoopbackAddress, static_cast<std::uint16_t>(connection_->servedPort())};
+  }
+  template <class Condition>
+  bool runUntil(ScriptedPeer& peer, Condition&& condition) {
+    const auto end = std::chrono::steady_clock::now() + kPatience;
+    while (!condition()) {
+      if (std::chrono::steady_clock::now() > end) return false;
+      program_->mainloop();
+      peer.poll();
+      vrpn_SleepMsecs(0.2);
+    }
+    return true;
+  }
+
+  ServedConnection connection_{vrpn_create_server_connection(0, nullptr, nullptr, "127.0.0.1")};
+  std::unique_ptr<DeviceProgram> program_ = std::make_unique<DeviceProgram>(connection_.get());
+};
+
+std::vector<std::byte> contentsOf(const std::string& file) {
+  std::ifstream in(HAPTICD_TESTDATA "/vrpn_server/" + file, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  const auto* bytes = reinterpret_cast<const std::byte*>(text.data());
+  return {bytes, bytes + text.size()};
+}
+
+// What was said, by kind: texts up to their NUL, behind which is garbage; other payloads in hexadecimal
+// digits.
+using Said = std::map<std::string, std::vector<std::string>>;
+void add(Said& said, wire::MessageKind kind, wire::ByteView payload) {
+  std::string digits;
+  for (const std::byte byte : payload) {
+    for (const int shift : {4, 0}) digits += "0123456789abcdef"[std::to_integer<int>(byte) >> shift & 15];
+  }
+  said[std::string(wire::info(kind).name)].push_back(digits);
+}
+void add(Said& said, const wire::Text& text) {
+  said[std::string(wire::Text::kInfo.name)].push_back(std::to_string(text.severity) + ' ' +
+                                                      std::to_string(text.level) + ' ' + text.text.text);
+}
+
+// A client of VRPN 07.38 uses everything that the device offers. The answers are those of the same program
+// linked with VRPN.
+TEST_F(VrpnServer, AnswersARecordedClientAsVrpnDoes) {
+  Said expected;
+  std::size_t count = 0;
+  {
+    wire::LocalNames names;
+    names.addSender("Device0");
+    wire::Peer reader(names);
+    reader.feed({}, contentsOf("server.bin"), [&](const wire::Event& event) {
+      const auto* message = std::get_if<wire::MessageReceived>(&event);
+      if (message == nullptr || message->local_sender.value != 0) return;
+      ++count;
+      if (message->kind == wire::kindOf<wire::Text>) {
+        add(expected, *wire::decode<wire::Text>(message->payload));
+      } else {
+        add(expected, message->kind, message->payload);
+      }
+    });
+  }
+  ASSERT_GT(count, 60U);
+  ScriptedPeer client(address(), "Device0", ScriptedPeer::Mode::tcp, ScriptedPeer::Speech::raw);
+  client.sendBytes(contentsOf("client.bin"));
+  const auto received = [&] { return client.messages().size() + client.texts().size(); };
+  EXPECT_TRUE(runUntil(client, [&] { return received() >= count; })) << received() << " of " << count;
+  Said answered;
+  for (const auto& message : client.messages()) {
+    if (message.kind != wire::kindOf<wire::Text>) add(answered, message.kind, message.payload);
+  }
+  for (const wire::Text& text : client.texts()) add(answered, text);
+  // VRPN's handler passes stiffness, dynamic friction, static friction and damping in this order, although
+  // the function declares stiffness, damping, dynamic friction and static friction. Ours passes them as
+  // declared.
+  auto& texts = answered[std::string(wire::Text::kInfo.name)];
+  const auto declared =
+      std::find(texts.begin(), texts.end(), "0 0 updateTrimeshChanges 1 0.5 0.25 0.125 0.75");
+  ASSERT_NE(declared, texts.end());
+  *declared = "0 0 updateTrimeshChanges 1 0.5 0.125 0.75 0.25";
+  for (const auto& [kind, messages] : expected) EXPECT_EQ(answered[kind], messages) << kind;
+  EXPECT_EQ(answered.size(), expected.size());
+}
+
+TEST_F(VrpnServer, SendsLowLatencyReportsByDatagram) {
+  ScriptedPeer client(address(), "Device0", ScriptedPeer::Mode::udp);
+  ASSERT_TRUE(runUntil(client, [&] { return client.count<wire::ButtonStates>() > 0; }));
+  client.send(wire::Ping{});
+  ASSERT_TRUE(runUntil(client, [&] { return client.count<wire::Pong>() > 0; }));
+  client.send(wire::TrackerResetOrigin{});
+  ASSERT_TRUE(runUntil(client, [&] { return client.count<wire::ForceError>() > 0; }));
+  ASSERT_TRUE(runUntil(client, [&] { return client.count<wire::Force>() > 0; }));
+  EXPECT_GT(client.datagrams(), 0U);
+  EXPECT_EQ(client.all<wire::TrackerVelocity>().at(0).interval, 0.25);
+  for (const auto& message : client.messages()) {
+    EXPECT_FALSE(message.kind == wire::kindOf<wire::ButtonChange> && message.byDatagram);
+  }
+}
+
+TEST_F(VrpnServer, ReportsConnectionsToItsHandlers) {
+  struct Seen {
+    int firsts = 0, connections = 0, drops = 0, lasts = 0;
+    static int VRPN_CALLBACK count(void* number, vrpn_HANDLERPARAM) {
+      ++*static_cast<int*>(number);
+      return 0;
+    }
+  } seen;
+  const auto on = [&](const char* type, int* number) {
+    connection_->register_handler(connection_->register_message_type(type), Seen::count, number);
+  };
+  on(vrpn_got_first_connection, &seen.firsts);
+  on(vrpn_got_connection, &seen.connections);
+  on(vrpn_dropped_connection, &seen.drops);
+  on(vrpn_dropped_last_connection, &seen.lasts);
+  auto one = std::make_unique<ScriptedPeer>(address(), "Device0");
+  auto two = std::make_unique<ScriptedPeer>(address(), "Device0");
+  ASSERT_TRUE(runUntil(*one, [&] {
+    two->poll();
+    return seen.connections == 2;
+  }));
+  EXPECT_EQ(seen.firsts, 1);
+  EXPECT_TRUE(connection_->connected());
+  one.reset();
+  ASSERT_TRUE(runUntil(*two, [&] { return seen.drops == 1; }));
+  EXPECT_EQ(seen.lasts, 0);
+  two->close();
+  ASSERT_TRUE(runUntil(*two, [&] { return seen.drops == 2; }));
+  EXPECT_EQ(seen.lasts, 1);
+  EXPECT_FALSE(connection_->connected());
+}
+
+TEST_F(VrpnServer, ADamagedStreamEndsOnlyItsConnection) {
+  ScriptedPeer good(address(), "Device0");
+  ScriptedPeer bad(address(), "Device0", ScriptedPeer::Mode::tcp, ScriptedPeer::Speech::raw);
+  bad.sendBytes(std::vector<std::byte>(100, std::byte{0xff}));
+  ASSERT_TRUE(runUntil(good, [&] {
+    bad.poll();
+    return !bad.open();
+  }));
+  ASSERT_TRUE(runUntil(good, [&] { return good.count<wire::ButtonStates>() > 0; }));
+}
+
+TEST_F(VrpnServer, APortThatIsTakenIsReported) {
+  EXPECT_EQ(vrpn_create_server_connection(connection_->servedPort(), nullptr, nullptr, "127.0.0.1"), nullptr);
+}
+
+// One device of several classes, used by a remote in the same program.
+class Mixed : public vrpn_Tracker, public vrpn_Button_Filter, public vrpn_Analog {
+ public:
+  explicit Mixed(vrpn_Connection* connection)
+      : vrpn_Tracker("Mixed", connection),
+        vrpn_Button_Filter("Mixed", connection),
+        vrpn_Analog("Mixed", connection) {
+    num_buttons = 2;
+    num_channel = 1;
+  }
+  void mainloop() override {
+    server_mainloop();
+    buttons[1] = 1;
+    channel[0] = 0.25;
+    vrpn_Button_Filter::report_changes();
+    vrpn_Analog::report_changes();
+  }
+};
+
+TEST(VrpnLoopback, ServesRemotesOfTheSameProgram) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  ASSERT_TRUE(connection);
+  EXPECT_EQ(connection->servedPort(), 0);
+  Mixed device(connection.get());
+  vrpn_Button_Remote button("Mixed", connection.get());
+  vrpn_Analog_Remote analog("Mixed", connection.get());
+  std::vector<vrpn_BUTTONCB> changes;
+  std::vector<vrpn_ANALOGCB> channels;
+  button.register_change_handler(&changes, [](void* list, const vrpn_BUTTONCB report) {
+    static_cast<std::vector<vrpn_BUTTONCB>*>(list)->push_back(report);
+  });
+  analog.register_change_handler(&channels, [](void* list, const vrpn_ANALOGCB report) {
+    static_cast<std::vector<vrpn_ANALOGCB>*>(list)->push_back(report);
+  });
+  button.set_toggle(1, 0);
+  for (int i = 0; i < 3; ++i) {
+    device.mainloop();
+    button.mainloop();
+  }
+  ASSERT_EQ(changes.size(), 1U);
+  EXPECT_EQ(changes[0].button, 1);
+  EXPECT_EQ(changes[0].state, 1);
+  EXPECT_EQ(device.buttonstate[1], vrpn_BUTTON_TOGGLE_ON);
+  ASSERT_EQ(channels.size(), 1U);
+  EXPECT_EQ(channels[0].channel[0], 0.25);
+}
+
+// The conversation of a lock, on both sides in one program.
+TEST(VrpnLoopback, ALockIsGrantedToOneAtATime) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  const auto count = [](void* number) { return ++*static_cast<int*>(number); };
+  vrpn_Mutex_Server server("Lock", connection.get());
+  vrpn_Mutex_Remote one("Lock", connection.get());
+  vrpn_Mutex_Remote two("Lock", connection.get());
+  // No client connects to a loopback, so the remotes ask when they are told.
+  const vrpn_int32 connected = connection->register_message_type(vrpn_got_connection);
+  connection->pack_message(0, {}, connected, connection->register_sender(vrpn_CONTROL), nullptr,
+                           vrpn_CONNECTION_RELIABLE);
+  int granted = 0;
+  int denied = 0;
+  one.addRequestGrantedCallback(&granted, count);
+  two.addRequestDeniedCallback(&denied, count);
+  EXPECT_TRUE(one.isAvailable());
+  one.request();
+  EXPECT_EQ(granted, 1);
+  EXPECT_TRUE(one.isHeldLocally());
+  EXPECT_TRUE(two.isHeldRemotely());
+  two.request();
+  EXPECT_EQ(denied, 1);
+  two.release();
+  EXPECT_TRUE(one.isHeldLocally()) << "only its holder releases it";
+  one.release();
+  EXPECT_TRUE(two.isAvailable());
+  two.request();
+  EXPECT_TRUE(two.isHeldLocally());
+  EXPECT_TRUE(one.isHeldRemotely());
+}
+
+struct Arrived {
+  static int VRPN_CALLBACK keep(void* list, vrpn_HANDLERPARAM p) {
+    static_cast<std::vector<std::string>*>(list)->emplace_back(p.buffer,
+                                                               static_cast<std::size_t>(p.payload_len));
+    return 0;
+  }
+};
+
+TEST(VrpnLoopback, ForwardsUnderOtherNamesAndTakesRepetitionsOnce) {
+  const ServedConnection from(vrpn_create_server_connection("loopback:"));
+  const ServedConnection to(vrpn_create_server_connection("loopback:"));
+  vrpn_StreamForwarder forwarder(from.get(), "Device", to.get(), "Copy");
+  ASSERT_EQ(forwarder.forward("Sign", "Signal"), 0);
+  std::vector<std::string> all;
+  std::vector<std::string> once;
+  const vrpn_int32 signal = to->register_message_type("Signal");
+  to->register_handler(signal, Arrived::keep, &all, to->register_sender("Copy"));
+  vrpn_RedundantReceiver receiver(to.get());
+  receiver.register_handler(signal, Arrived::keep, &once);
+  vrpn_RedundantTransmission redundant(from.get());
+  redundant.enable(vrpn_true);
+  const vrpn_int32 type = from->register_message_type("Sign");
+  const vrpn_int32 sender = from->register_sender("Device");
+  const auto send = [&](const char* text, long second, int repeats) {
+    timeval interval = {0, 0};
+    redundant.pack_message(1, {second, 0}, static_cast<vrpn_uint32>(type), static_cast<vrpn_uint32>(sender),
+                           text, vrpn_CONNECTION_RELIABLE, repeats, &interval);
+  };
+  send("a", 1, 2);
+  send("b", 2, 0);
+  EXPECT_EQ(all, (std::vector<std::string>{"a", "a", "a", "b"}));
+  EXPECT_EQ(once, (std::vector<std::string>{"a", "b"}));
+  EXPECT_EQ(forwarder.unforward("Sign", "Signal"), 0);
+  EXPECT_EQ(forwarder.unforward("Sign", "Signal"), -1);
+  send("c", 3, 0);
+  EXPECT_EQ(all.size(), 4U);
+}
+
+TEST(VrpnLoopback, ARemoteSetsHowOftenMessagesAreRepeated) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  vrpn_RedundantTransmission redundant(connection.get());
+  const vrpn_RedundantController controller(&redundant, connection.get());
+  vrpn_RedundantRemote remote(connection.get());
+  remote.set(2, {0, 1500});
+  remote.enable(vrpn_true);
+  EXPECT_EQ(redundant.defaultRetransmissions(), 2U);
+  EXPECT_EQ(redundant.defaultInterval().tv_usec, 1500);
+  EXPECT_TRUE(redundant.isEnabled());
+  vrpn_RedundantReceiver receiver(connection.get());
+  std::vector<std::string> once;
+  const vrpn_int32 type = connection->register_message_type("Sign");
+  receiver.register_handler(type, Arrived::keep, &once);
+  receiver.record(vrpn_true);
+  timeval interval = {0, 0};
+  redundant.pack_message(1, {7, 8}, static_cast<vrpn_uint32>(type), 0, "a", vrpn_CONNECTION_RELIABLE, 2,
+                         &interval);
+  const std::string path =
+      std::filesystem::temp_directory_path() / ("vrpn_memory_" + std::to_string(getpid()));
+  receiver.writeMemory(path.c_str());
+  std::ifstream in(path);
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  std::remove(path.c_str());
+  EXPECT_EQ(text, "7.8 3\n");
+  EXPECT_EQ(once.size(), 1U);
+}
+
+// The names and bytes that VRPN 07.38 sends, and what is made of them.
+TEST(VrpnLoopback, AClientHasMessagesForwardedToAnotherPort) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  std::vector<std::string> requests;
+  connection->register_handler(connection->register_message_type("vrpn_Forwarder_Brain forward"),
+                               Arrived::keep, &requests, connection->register_sender("vrpn_Forwarder_Brain"));
+  vrpn_Forwarder_Server server(connection.get());
+  vrpn_Forwarder_Controller controller(connection.get());
+  EXPECT_TRUE(controller.start_remote_forwarding(0));  // the system chooses the port
+  ASSERT_NE(server.connectionAt(0), nullptr);
+  EXPECT_FALSE(server.start_remote_forwarding(0)) << "it is open";
+  controller.forward_message_type(0, "Device", "Sign");
+  EXPECT_EQ(requests, (std::vector<std::string>{std::string("\0\0\0\0\0\0\0\6\0\0\0\4", 12) + "DeviceSign"}));
+  std::vector<std::string> forwarded;
+  vrpn_Connection* const other = server.connectionAt(0);
+  other->register_handler(other->register_message_type("Sign"), Arrived::keep, &forwarded,
+                          other->register_sender("Device"));
+  const auto send = [&](const std::string& type, const std::string& from, const std::string& payload) {
+    connection->pack_message(
+        static_cast<vrpn_uint32>(payload.size()), {1, 0}, connection->register_message_type(type.c_str()),
+        connection->register_sender(from.c_str()), payload.data(), vrpn_CONNECTION_RELIABLE);
+  };
+  send("Sign", "Device", "a");
+  send("Sign", "Other", "b");
+  send("vrpn_Forwarder_Brain forward", "vrpn_Forwarder_Brain",
+       std::string("\0\0\0\0\x7f\xff\xff\xff\0\0\0\4", 12) + "DeviceSign");
+  EXPECT_EQ(forwarded, std::vector<std::string>{"a"});
+  server.mainloop();
+}
+
+struct SharedPair {
+  ServedConnection connection{vrpn_create_server_connection("loopback:")};
+  std::vector<std::string> updates;
+  vrpn_Shared_int32_Server server;
+  vrpn_Shared_int32_Remote remote;
+
+  explicit SharedPair(vrpn_int32 mode) : server("a", 0, mode), remote("a", 0, mode) {
+    connection->register_handler(connection->register_message_type("vrpn_Shared update"), Arrived::keep,
+                                 &updates);
+    server.bindConnection(connection.get());
+    remote.bindConnection(connection.get());
+  }
+};
+
+TEST(VrpnLoopback, ANumberIsShared) {
+  SharedPair pair(VRPN_SO_DEFAULT);
+  std::vector<std::pair<vrpn_int32, bool>> seen;
+  pair.remote.register_handler(
+      +[](void* list, vrpn_int32 value, vrpn_bool local) {
+        static_cast<std::vector<std::pair<vrpn_int32, bool>>*>(list)->emplace_back(value, local != 0);
+        return 0;
+      },
+      &seen);
+  pair.server.set(3, {5, 6});
+  EXPECT_EQ(pair.remote, 3);
+  pair.remote = -4;
+  EXPECT_EQ(pair.server, -4);
+  EXPECT_EQ(seen, (std::vector<std::pair<vrpn_int32, bool>>{{3, false}, {-4, true}}));
+  EXPECT_EQ(pair.updates.at(0), std::string("\0\0\0\3\0\0\0\5\0\0\0\6", 12));
+  EXPECT_EQ(pair.updates.size(), 2U);
+}
+
+TEST(VrpnLoopback, TheSerializerDecidesWhichValuesCount) {
+  SharedPair pair(VRPN_SO_DEFER_UPDATES);
+  EXPECT_TRUE(pair.server.isSerializer());
+  pair.remote = 7;
+  EXPECT_EQ(pair.server, 7);
+  EXPECT_EQ(pair.remote, 7) << "the serializer sends it back";
+  pair.server.setSerializerPolicy(vrpn_DENY_REMOTE);
+  int deferred = 0;
+  pair.remote.registerDeferredUpdateCallback(
+      +[](void* count) {
+        ++*static_cast<int*>(count);
+        return 0;
+      },
+      &deferred);
+  pair.remote = 8;
+  EXPECT_EQ(pair.remote, 7);
+  EXPECT_EQ(deferred, 1);
+  pair.remote.becomeSerializer();
+  EXPECT_TRUE(pair.remote.isSerializer());
+  EXPECT_FALSE(pair.server.isSerializer());
+  pair.remote = 9;
+  EXPECT_EQ(pair.server, 9);
+  pair.server = 10;
+  EXPECT_EQ(pair.server, 10) << "accepted by the new serializer, which has no policy against it";
+}
+
+TEST(VrpnLoopback, TextsAndFloatsAreShared) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  vrpn_Shared_String_Server server("b", "first", VRPN_SO_IGNORE_OLD);
+  vrpn_Shared_String_Remote remote("b", nullptr, VRPN_SO_IGNORE_OLD);
+  server.bindConnection(connection.get());
+  remote.bindConnection(connection.get());
+  EXPECT_STREQ(remote.value(), "");
+  server.set("a longer text", {2'000'000'000, 0});
+  EXPECT_STREQ(remote.value(), "a longer text");
+  server.set("older", {1'900'000'000, 0});
+  EXPECT_STREQ(remote.value(), "a longer text");
+  vrpn_Shared_float64_Server height("c", 1.5);
+  vrpn_Shared_float64_Remote seen("c");
+  height.bindConnection(connection.get());
+  seen.bindConnection(connection.get());
+  height = -2.25;
+  EXPECT_EQ(seen, -2.25);
+  seen.bindConnection(nullptr);
+  height = 1;
+  EXPECT_EQ(seen, -2.25);
+}
+
+TEST(VrpnLoopback, ARequestToLogIsAnswered) {
+  class Logger : public vrpn_Auxiliary_Logger_Server {
+   public:
+    explicit Logger(vrpn_Connection* connection) : vrpn_Auxiliary_Logger_Server("Logger", connection) {}
+
+   private:
+    void handle_request_logging(const char* in, const char* out, const char* far_in,
+                                const char* far_out) override {
+      send_report_logging(in, out, far_in, far_out);
+    }
+    void handle_request_logging_status() override { send_report_logging("", "", "", "none"); }
+  };
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  Logger logger(connection.get());
+  vrpn_Auxiliary_Logger_Remote remote("Logger", connection.get());
+  std::vector<std::string> reports;
+  remote.register_report_handler(&reports, [](void* list, const vrpn_AUXLOGGERCB r) {
+    static_cast<std::vector<std::string>*>(list)->push_back(
+        std::string(r.local_in_logfile_name) + ',' + r.local_out_logfile_name + ',' +
+        r.remote_in_logfile_name + ',' + r.remote_out_logfile_name);
+  });
+  EXPECT_TRUE(remote.send_logging_request("a", "", "bc", nullptr));
+  EXPECT_TRUE(remote.send_logging_status_request());
+  EXPECT_EQ(reports, (std::vector<std::string>{"a,,bc,", ",,,none"}));
+}
+
+TEST(VrpnLoopback, StampsOfSeveralHostsAreOrdered) {
+  vrpn_LamportClock one(2, 0);
+  vrpn_LamportClock two(2, 1);
+  const std::unique_ptr<vrpn_LamportTimestamp> first(one.getTimestampAndAdvance());
+  const std::unique_ptr<vrpn_LamportTimestamp> beside(two.getTimestampAndAdvance());
+  EXPECT_FALSE(*first < *beside);
+  EXPECT_FALSE(*beside < *first);
+  two.receive(*first);
+  const std::unique_ptr<vrpn_LamportTimestamp> after(two.getTimestampAndAdvance());
+  EXPECT_TRUE(*first < *after);
+  EXPECT_TRUE(*beside < *after);
+}
+
+// A log file of a conversation with VRPN: heads in memory order, payloads without padding.
+class VrpnFile : public ::testing::Test {
+ protected:
+  VrpnFile() {
+    put("vrpn: ver. 07.38  0");
+    bytes_.resize(24);
+    describe(-1, 3, "Device");
+    describe(-2, 5, "vrpn_Button Change");
+    for (int i = 0; i < 4; ++i) {
+      entry(5, 3, 100 + i, 8);
+      number(i);
+      number(1);
+    }
+    std::ofstream(path_, std::ios::binary) << bytes_;
+  }
+  ~VrpnFile() override { std::remove(path_.c_str()); }
+  void put(const std::string& text) { bytes_ += text; }
+  void number(std::int32_t value) {
+    for (const int shift : {24, 16, 8, 0}) bytes_ += static_cast<char>(value >> shift);
+  }
+  void entry(std::int32_t type, std::int32_t sender, std::int32_t second, std::size_t length) {
+    for (const std::int32_t value : {type, sender, second, 500000, static_cast<std::int32_t>(length), 0})
+      number(value);
+  }
+  void describe(std::int32_t kind, std::int32_t id, const std::string& name) {
+    entry(kind, id, 100, name.size() + 5);
+    number(static_cast<std::int32_t>(name.size()) + 1);
+    put(name + '\0');
+  }
+
+  std::string bytes_;
+  std::string path_ = ::testing::TempDir() + "vrpn_file_" + std::to_string(getpid()) + ".vrpn";
+};
+
+TEST_F(VrpnFile, IsPlayedToADeviceThatOpensIt) {
+  vrpn_Button_Remote button(("Device@file://" + path_).c_str());
+  vrpn_File_Connection* file = button.connectionPtr()->get_File_Connection();
+  ASSERT_NE(file, nullptr);
+  EXPECT_TRUE(file->doing_okay());
+  EXPECT_EQ(file->get_length_secs(), 3);
+  std::vector<vrpn_BUTTONCB> changes;
+  button.register_change_handler(&changes, [](void* list, const vrpn_BUTTONCB report) {
+    static_cast<std::vector<vrpn_BUTTONCB>*>(list)->push_back(report);
+  });
+  file->set_replay_rate(0);
+  button.mainloop();
+  button.mainloop();
+  ASSERT_EQ(changes.size(), 1U) << "the first message is due at once";
+  EXPECT_EQ(changes[0].msg_time.tv_sec, 100);
+  EXPECT_EQ(file->playone(), 0);
+  EXPECT_EQ(changes.back().button, 1);
+  file->play_to_time(3.0);
+  EXPECT_EQ(changes.size(), 4U);
+  EXPECT_TRUE(file->eof());
+  EXPECT_EQ(file->playone(), 1);
+  EXPECT_EQ(file->jump_to_time(2.0), 0);
+  EXPECT_EQ(file->playone(), 0);
+  EXPECT_EQ(changes.back().button, 2);
+  file->reset();
+  file->set_replay_rate(1e9F);
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  while (!file->eof() && std::chrono::steady_clock::now() < end) button.mainloop();
+  EXPECT_EQ(changes.size(), 9U);
+}
+
+TEST_F(VrpnFile, ADamagedEndIsLeftOut) {
+  std::ofstream(path_, std::ios::binary) << bytes_.substr(0, bytes_.size() - 3);
+  vrpn_File_Connection file(("file:" + path_).c_str());
+  EXPECT_TRUE(file.doing_okay());
+  EXPECT_EQ(file.get_length_secs(), 2);
+  vrpn_File_Connection absent("file:/nowhere/x.vrpn");
+  EXPECT_FALSE(absent.doing_okay());
+  EXPECT_EQ(absent.mainloop(), -1);
+}
+
+TEST(VrpnLoopback, ClippedChannelsAreMappedToUnits) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  vrpn_Clipping_Analog_Server analog("Stick", connection.get(), 1);
+  EXPECT_EQ(analog.setClipValues(0, 0, 40, 60, 100), 0);
+  EXPECT_EQ(analog.setClipValues(1, 0, 40, 60, 100), -1);
+  EXPECT_EQ(analog.setClipValues(0, 50, 40, 60, 100), -1);
+  const std::map<double, double> mapped{{-5, -1}, {0, -1}, {20, -0.5}, {50, 0}, {80, 0.5}, {200, 1}};
+  for (const auto& [value, expected] : mapped) {
+    analog.setChannelValue(0, value);
+    EXPECT_EQ(analog.channels()[0], expected) << value;
+  }
+}
+
+}  // namespace
+}  // namespace hapticd

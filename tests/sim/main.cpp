@@ -1,0 +1,206 @@
+// hapticd-sim: the whole server in one thread on a virtual clock, among clients and faults drawn from a seed.
+#include <sys/resource.h>
+
+#include <charconv>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+#include <string_view>
+
+#include "sim/simulation.h"
+
+namespace {
+
+using hapticd::sim::Action;
+using hapticd::sim::Outcome;
+using hapticd::sim::Script;
+
+constexpr char kHelp[] =
+    "Usage: hapticd-sim [--seeds A-B | --seed N] [--seconds S] [--cpu S] [--first] [--twice] [--shrink] "
+    "[--verbose]\n"
+    "Runs the whole server in one thread on a virtual clock, among clients and faults drawn from a seed.\n"
+    "  --seeds A-B    these seeds (1-20)\n"
+    "  --seed N       one seed\n"
+    "  --seconds S    virtual seconds of each run (20)\n"
+    "  --cpu S        ends after the run in which this much processor time was spent\n"
+    "  --first        ends after the first run with a finding\n"
+    "  --twice        runs each seed twice and requires the same hash\n"
+    "  --shrink       after a finding: removes what it does not need, and prints the rest\n"
+    "  --verbose      prints the log of the server with virtual times\n"
+    "Exit status: 0 without findings, 1 with, 2 for a wrong command line.\n";
+
+double cpuSeconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+         1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+}
+
+template <class T>
+bool parse(std::string_view text, T& value) {
+  const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
+  return result.ec == std::errc() && result.ptr == text.data() + text.size();
+}
+
+// The words of a finding before its numbers: what makes two findings the same.
+std::string kindOf(const Outcome& outcome) {
+  if (outcome.findings.empty()) return {};
+  std::string kind;
+  for (const char c : outcome.findings.front()) {
+    if (std::strchr("0123456789.-", c) == nullptr) kind += c;
+  }
+  return kind.substr(0, 60);
+}
+
+// Removes actions and faults for as long as a finding of the same kind remains.
+Script shrink(Script script, const Outcome& first) {
+  const std::string kind = kindOf(first);
+  const auto still = [&](const Script& candidate) { return kindOf(run(candidate)) == kind; };
+  Script shorter = script;
+  shorter.length = first.firstFinding + 50'000'000;
+  std::erase_if(shorter.actions, [&](const Action& action) { return action.at > shorter.length; });
+  if (shorter.length < script.length && still(shorter)) script = shorter;
+  const auto without = [&](auto member) {
+    Script candidate = script;
+    if (member(candidate) == 0) return;
+    member(candidate) = 0;
+    if (still(candidate)) script = candidate;
+  };
+  without([](Script& s) -> double& { return s.adversity.preempt; });
+  without([](Script& s) -> double& { return s.adversity.lateTick; });
+  without([](Script& s) -> double& { return s.adversity.netStall; });
+  without([](Script& s) -> double& { return s.adversity.sceneStall; });
+  without([](Script& s) -> double& { return s.adversity.freeze; });
+  for (double hapticd::sim::DeviceFaults::*fault :
+       {&hapticd::sim::DeviceFaults::noState, &hapticd::sim::DeviceFaults::notFinite,
+        &hapticd::sim::DeviceFaults::hold, &hapticd::sim::DeviceFaults::fault,
+        &hapticd::sim::DeviceFaults::leap, &hapticd::sim::DeviceFaults::refuse,
+        &hapticd::sim::DeviceFaults::hang, &hapticd::sim::DeviceFaults::lost})
+    without([fault](Script& s) -> double& { return s.faults.*fault; });
+  without([](Script& s) -> hapticd::base::Nanos& { return s.networkJitter; });
+  for (std::size_t part = std::max<std::size_t>(script.actions.size() / 2, 1); part > 0; part /= 2) {
+    for (std::size_t at = 0; at < script.actions.size();) {
+      Script candidate = script;
+      const auto begin = candidate.actions.begin() + static_cast<std::ptrdiff_t>(at);
+      const auto count = std::min(part, candidate.actions.size() - at);
+      candidate.actions.erase(begin, begin + static_cast<std::ptrdiff_t>(count));
+      if (still(candidate)) {
+        script = candidate;
+      } else {
+        at += part;
+      }
+    }
+  }
+  return script;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  // One thread only, also for the library that builds the index.
+  setenv("HAPTICD_EMBREE", "threads=1,user_threads=1", 0);
+  setenv("TZ", "UTC", 1);
+  std::uint64_t first = 1;
+  std::uint64_t last = 20;
+  double seconds = 20;
+  double cpu = 0;
+  bool twice = false;
+  bool stopsAtFirst = false;
+  bool wantsShrink = false;
+  bool verbose = false;
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view option = argv[i];
+    const std::string_view value = i + 1 < argc ? argv[i + 1] : "";
+    bool ok = true;
+    if (option == "--help") {
+      std::fputs(kHelp, stdout);
+      return 0;
+    }
+    if (option == "--seed") {
+      ok = parse(value, first);
+      last = first;
+      ++i;
+    } else if (option == "--seeds") {
+      const std::size_t dash = value.find('-');
+      ok = dash != std::string_view::npos && parse(value.substr(0, dash), first) &&
+           parse(value.substr(dash + 1), last);
+      ++i;
+    } else if (option == "--seconds") {
+      ok = parse(value, seconds) && seconds > 0 && seconds <= 86400;
+      ++i;
+    } else if (option == "--cpu") {
+      ok = parse(value, cpu);
+      ++i;
+    } else if (option == "--first") {
+      stopsAtFirst = true;
+    } else if (option == "--twice") {
+      twice = true;
+    } else if (option == "--shrink") {
+      wantsShrink = true;
+    } else if (option == "--verbose") {
+      verbose = true;
+    } else {
+      ok = false;
+    }
+    if (!ok) {
+      std::fprintf(stderr, "hapticd-sim: cannot use '%s %s'\n%s", std::string(option).c_str(),
+                   std::string(value).c_str(), kHelp);
+      return 2;
+    }
+  }
+
+  std::uint64_t runs = 0;
+  std::uint64_t failed = 0;
+  Outcome sum;
+  double simulated = 0;
+  for (std::uint64_t seed = first; seed <= last; ++seed) {
+    const Script script = hapticd::sim::drawScript(seed, seconds);
+    Outcome outcome = run(script, verbose);
+    if (twice) {
+      const Outcome again = run(script);
+      if (again.hash != outcome.hash)
+        outcome.findings.push_back("a second run of the seed differs from the first");
+    }
+    ++runs;
+    simulated += seconds;
+    std::printf("seed %llu: %016llx, %llu ticks, %llu with force, %llu faults\n",
+                static_cast<unsigned long long>(seed), static_cast<unsigned long long>(outcome.hash),
+                static_cast<unsigned long long>(outcome.ticks),
+                static_cast<unsigned long long>(outcome.ticksWithForce),
+                static_cast<unsigned long long>(outcome.faults));
+    for (const std::string& text : outcome.findings) std::printf("  finding: %s\n", text.c_str());
+    if (!outcome.findings.empty()) {
+      ++failed;
+      if (wantsShrink) {
+        std::printf("  what it needs:\n%s", describe(shrink(script, outcome)).c_str());
+      }
+    }
+    std::fflush(stdout);
+    sum.ticks += outcome.ticks;
+    sum.ticksWithForce += outcome.ticksWithForce;
+    sum.ticksInside += outcome.ticksInside;
+    sum.steps += outcome.steps;
+    sum.preemptions += outcome.preemptions;
+    sum.faults += outcome.faults;
+    sum.latches += outcome.latches;
+    sum.stops += outcome.stops;
+    sum.tickReports += outcome.tickReports;
+    sum.missedReports += outcome.missedReports;
+    sum.replayedTicks += outcome.replayedTicks;
+    sum.slowestStop = std::max(sum.slowestStop, outcome.slowestStop);
+    if ((stopsAtFirst && failed > 0) || (cpu > 0 && cpuSeconds() > cpu)) break;
+  }
+  const auto u = [](std::uint64_t n) { return static_cast<unsigned long long>(n); };
+  std::printf(
+      "%llu runs, %.0f s simulated, %llu ticks (%llu with force, %llu inside the cube), %llu steps, %llu "
+      "preemptions, %llu faults, %llu latches, %llu stops (slowest read %.3f ms), %llu tick reports (%llu "
+      "skipped), %llu ticks replayed; %llu with findings\n",
+      u(runs), simulated, u(sum.ticks), u(sum.ticksWithForce), u(sum.ticksInside), u(sum.steps),
+      u(sum.preemptions), u(sum.faults), u(sum.latches), u(sum.stops),
+      static_cast<double>(sum.slowestStop) * 1e-6, u(sum.tickReports), u(sum.missedReports),
+      u(sum.replayedTicks), u(failed));
+  std::fprintf(stderr, "%.1f s of processor time, %.1f x real time\n", cpuSeconds(),
+               simulated / cpuSeconds());
+  return failed == 0 ? 0 : 1;
+}

@@ -1,0 +1,145 @@
+#include "sim/sim_client.h"
+
+#include <algorithm>
+#include <chrono>
+
+namespace hapticd::sim {
+
+using namespace std::chrono_literals;
+
+SimClient::SimClient(Clients& all, std::string name) : all_(all), name_(std::move(name)) {
+  names_.addSender("VRPN Control");
+  device_ = names_.addSender("Phantom");
+}
+
+wire::Time SimClient::wallTime() const {
+  const Nanos wall = all_.clock.wallNow();
+  return {static_cast<std::uint32_t>(wall / 1'000'000'000),
+          static_cast<std::uint32_t>(wall % 1'000'000'000 / 1000)};
+}
+
+void SimClient::connect() {
+  net::ConnectionOptions options;
+  options.hardLimitBytes = std::size_t{256} << 20;
+  peer_.emplace(names_);
+  orders_.clear();
+  sent_ = 0;
+  lastTick = 0;
+  closed_ = false;
+  mayEnd_ = false;
+  guardReports = 0;
+  connection_ = net::Connection::connect(all_.loop, all_.server, 2s, options);
+  connection_.start(
+      {.onConnected = {},
+       .onBytes =
+           [this](auto bytes) {
+             peer_->feed(wallTime(), bytes, [this](const wire::Event& event) { onEvent(event); });
+             flush();
+           },
+       .onDrained = {},
+       .onPeerGone = {},
+       .onClosed =
+           [this](const std::string& reason) {
+             closed_ = true;
+             // While the machine stands still nobody answers.
+             if (mayEnd_ || reason.starts_with("cannot connect")) return;
+             all_.finding("client '" + name_ + "', which did nothing wrong, was disconnected: " + reason +
+                          (texts.empty() ? "" : "; last text: " + texts.back()));
+           }});
+  flush();
+}
+
+void SimClient::reset() {
+  mayEnd_ = closed_ = true;
+  connection_.abort("reset");
+}
+
+void SimClient::flush() {
+  std::vector<std::byte> bytes;
+  peer_->takeStream(bytes);
+  if (!bytes.empty()) sendBytes(bytes);
+}
+
+void SimClient::sendBytes(std::span<const std::byte> bytes) {
+  sent_ += bytes.size();
+  connection_.send(bytes);
+  connection_.flush();
+}
+
+void SimClient::stopForces() {
+  send(wire::StopForces{});
+  orders_.push_back({sent_, true, {}});
+  ++all_.stops;
+}
+
+void SimClient::rearmForces() {
+  send(wire::RearmForces{});
+  orders_.push_back({sent_, false, {}});
+}
+
+void SimClient::onArrived(std::uint64_t total) {
+  for (Order& order : orders_) {
+    if (order.arrived || order.end > total) continue;
+    order.arrived = all_.clock.now();
+    order.stalled = all_.netStalled();
+  }
+}
+
+void SimClient::onRead(std::uint64_t total) {
+  constexpr Nanos kLongest = 5'000'000;
+  while (!orders_.empty() && orders_.front().end <= total) {
+    const Order order = orders_.front();
+    orders_.pop_front();
+    const Nanos now = all_.clock.now();
+    if (!order.stop) {
+      all_.rearmRead(now);
+      continue;
+    }
+    all_.stopRead(now);
+    const Nanos took = now - order.arrived.value_or(now) - (all_.netStalled() - order.stalled);
+    if (sendsAhead) continue;
+    all_.slowestStop = std::max(all_.slowestStop, took);
+    if (took > kLongest)
+      all_.finding("the server read a stop of client '" + name_ + "' " + std::to_string(took / 1000) +
+                   " us after it arrived");
+  }
+}
+
+void SimClient::onEvent(const wire::Event& event) {
+  if (std::holds_alternative<wire::Connected>(event)) {
+    wire::Identify identify;
+    identify.token = Clients::kToken;
+    queue(identify);
+    onConnected();
+  } else if (const auto* message = std::get_if<wire::MessageReceived>(&event)) {
+    onMessage(*message);
+  } else if (const auto* error = std::get_if<wire::ProtocolError>(&event)) {
+    all_.finding("client '" + name_ + "' got bytes that break the protocol: " + std::string(error->reason));
+  }
+}
+
+void SimClient::onMessage(const wire::MessageReceived& message) {
+  if (message.kind == wire::kindOf<wire::TickReport>) {
+    const auto tick = wire::decode<wire::TickReport>(message.payload);
+    ++tickReports;
+    if (tick->tick < lastTick)  // the present state may repeat one
+      all_.finding("client '" + name_ + "' got tick " + std::to_string(tick->tick) + " after tick " +
+                   std::to_string(lastTick));
+    if (lastTick != 0) missedTicks += tick->tick - lastTick - 1;
+    lastTick = tick->tick;
+  } else if (message.kind == wire::kindOf<wire::GuardState>) {
+    guard = *wire::decode<wire::GuardState>(message.payload);
+    ++guardReports;
+  } else if (message.kind == wire::kindOf<wire::ButtonChange>) {
+    const auto change = wire::decode<wire::ButtonChange>(message.payload);
+    ++buttonReports;
+    const auto index = static_cast<std::size_t>(change->button);
+    if (index < buttons.size()) buttons[index] = static_cast<std::uint32_t>(change->state);
+  } else if (message.kind == wire::kindOf<wire::Text>) {
+    texts.push_back(wire::decode<wire::Text>(message.payload)->text.text);
+    all_.heard(name_, texts.back());
+    onText(texts.back());
+  }
+}
+
+}  // namespace hapticd::sim

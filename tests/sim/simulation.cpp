@@ -1,0 +1,740 @@
+#include "sim/simulation.h"
+
+#include <spdlog/sinks/base_sink.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdio>
+#include <deque>
+#include <map>
+#include <memory>
+
+#include "box.h"
+#include "record/difference.h"
+#include "record/rerender.h"
+#include "server/server.h"
+#include "sim/sim_client.h"
+
+namespace hapticd::sim {
+namespace {
+
+using namespace std::chrono_literals;
+using geometry::Vec3f;
+
+constexpr char kRecording[] = "/recording.haptics";
+constexpr double kHalf = 20;  // world units (mm) of the cube
+
+wire::F64x16 shifted(double x, double y, double z) {
+  return {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1};
+}
+
+// FNV-1a.
+class Hash {
+ public:
+  void add(std::uint64_t value) {
+    for (int i = 0; i < 8; ++i) byte(static_cast<unsigned char>(value >> (8 * i)));
+  }
+  void add(double value) { add(std::bit_cast<std::uint64_t>(value)); }
+  void add(const std::string& text) {
+    for (const char c : text) byte(static_cast<unsigned char>(c));
+  }
+  std::uint64_t value() const { return value_; }
+
+ private:
+  void byte(unsigned char b) {
+    value_ ^= b;
+    value_ *= 0x100000001B3U;
+  }
+  std::uint64_t value_ = 0xCBF29CE484222325U;
+};
+
+class LogSink final : public spdlog::sinks::base_sink<spdlog::details::null_mutex> {
+ public:
+  explicit LogSink(std::function<void(const std::string&)> line) : line_(std::move(line)) {}
+
+ private:
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    line_(std::string(message.payload.data(), message.payload.size()));
+  }
+  void flush_() override {}
+  const std::function<void(const std::string&)> line_;
+};
+
+// The log of the server goes to the simulation for as long as this lives.
+class ScopedLog {
+ public:
+  explicit ScopedLog(std::function<void(const std::string&)> line) : before_(spdlog::default_logger()) {
+    auto sink = std::make_shared<LogSink>(std::move(line));
+    spdlog::set_default_logger(std::make_shared<spdlog::logger>("sim", std::move(sink)));
+  }
+  ~ScopedLog() { spdlog::set_default_logger(before_); }
+  ScopedLog(const ScopedLog&) = delete;
+  ScopedLog& operator=(const ScopedLog&) = delete;
+
+ private:
+  const std::shared_ptr<spdlog::logger> before_;
+};
+
+// A client that is missed when it falls silent, and listens to every tick.
+class Listener : public SimClient {
+ public:
+  using SimClient::SimClient;
+  bool beats = true;
+  std::uint32_t kinds = wire::kReportDefault | wire::kReportTick;
+
+ protected:
+  void onConnected() override {
+    queue(wire::Subscribe{kinds, 1000});
+    queue(wire::QueryCapabilities{});
+    if (beats) queue(wire::Heartbeat{});
+    onReady();
+    flush();
+  }
+  virtual void onReady() {}
+};
+
+// Owns the cube under the hand.
+class CubeOwner final : public Listener {
+ public:
+  using Listener::Listener;
+  std::optional<Nanos> uploaded;
+
+ private:
+  void onReady() override {
+    std::int32_t number = 0;
+    for (const Vec3f& v : test::boxTriples(Vec3f::Constant(kHalf)))
+      queue(wire::SetVertex{0, number++, {v.x(), v.y(), v.z()}});
+    queue(wire::SetHapticProperty{0, "stiffness", 1.0F});
+    uploaded = all_.clock.now();
+  }
+};
+
+// Has two objects far from the hand that move together only.
+class Batcher final : public Listener {
+ public:
+  Batcher(Clients& all, std::string name, std::int32_t firstObject)
+      : Listener(all, std::move(name)), first(firstObject) {
+    kinds = wire::kReportButton;
+  }
+  const std::int32_t first;
+  std::int64_t sent = 0;
+
+  void batch() {
+    ++sent;
+    queue(wire::BatchBegin{});
+    for (const std::int32_t object : {first, first + 1}) {
+      queue(wire::SetTransformMatrix{object, shifted(500.0 * first, 0, 10.0 * static_cast<double>(sent))});
+    }
+    send(wire::BatchCommit{});
+  }
+
+ private:
+  void onReady() override {
+    queue(wire::SetObjectNumber{first + 2});
+    for (const std::int32_t object : {first, first + 1}) {
+      std::int32_t number = 0;
+      queue(wire::SetTransformMatrix{object, shifted(500.0 * first, 0, 0)});
+      for (const Vec3f& v : test::boxTriples(Vec3f::Constant(5)))
+        queue(wire::SetVertex{object, number++, {v.x(), v.y(), v.z()}});
+    }
+  }
+};
+
+// Comes, pushes the hand and goes.
+class Pusher final : public Listener {
+ public:
+  using Listener::Listener;
+  std::int32_t effect = 0;
+  std::uint64_t seed = 0;
+  bool heldForce = false;
+  bool gone = false;  // silent, and connected until the server ends that
+
+ private:
+  void onReady() override {
+    Dice dice(seed);
+    heldForce = dice.chance(0.2);
+    if (heldForce) {
+      queue(wire::HeldForce{.time = 1, .force = {0, 0.3, 0}, .torque = {}, .lifetime = 0.5});
+    }
+    if (dice.chance(0.2)) queue(wire::ForceField{{}, {0.2F, 0, -0.1F}, {}, 1});
+    queue(wire::Effect{.type = "constant",
+                       .index = effect,
+                       .gain = 0.1,
+                       .magnitude = dice.uniform(0.2, 1.0),
+                       .duration = 0,
+                       .frequency = 50,
+                       .position = {10, 0, 0},
+                       .direction = {dice.uniform(-1.0, 1.0), 1, 0}});
+    queue(wire::StartEffect{effect});
+  }
+};
+
+class Simulation {
+ public:
+  Simulation(const Script& script, bool verbose);
+  Outcome run();
+
+ private:
+  void finding(const std::string& text);
+  void line(const std::string& text);
+  void after(Nanos delay, std::function<void()> function);
+  void perform(const Action& action);
+  void move(Dice& dice);
+  void pose(double y);
+  void upload(Dice& dice);
+  void appear(Dice& dice);
+  void vanish(Dice& dice);
+  void nonsense(Dice& dice);
+  void beat();
+  void describe(bool last);
+  void compare(const scene::SceneDescription& description, bool last);
+  void checkEnd();
+  void checkRecording();
+  std::optional<Nanos> freeFrom();
+  std::optional<std::pair<double, double>> tops_m();
+  SimClient* clientAt(const net::Endpoint& endpoint);
+
+  const Script& script_;
+  const bool verbose_;
+  Outcome outcome_;
+  Hash hash_;
+  SimClock clock_{base::FakeWorld::kWallAtZero};
+  base::SeededRandom random_;
+  base::FakeFiles files_;
+  Scheduler scheduler_;
+  base::ScopedWorld world_;
+  net::ScopedNetwork network_;
+  ScopedLog log_;
+  Judge judge_;
+  Bench bench_;
+  ScopedBench scopedBench_;
+  Dice networkDice_;
+  std::optional<server::Server> server_;
+  std::optional<net::Loop> loop_;
+  std::optional<Clients> clients_;
+  std::deque<net::Subscription> timers_;
+
+  std::unique_ptr<CubeOwner> cubeOwner_;
+  std::vector<std::unique_ptr<Listener>> operators_;
+  std::vector<std::unique_ptr<Batcher>> batchers_;
+  std::unique_ptr<Listener> uploader_;
+  std::unique_ptr<Listener> reader_;  // that sometimes does not read
+  std::vector<std::unique_ptr<Pusher>> pushers_;
+  std::vector<std::unique_ptr<SimClient>> strangers_;
+  std::map<std::uint16_t, SimClient*> byPort_;
+
+  std::deque<std::pair<Nanos, double>> tops_;  // of the cube: when sent, world units
+  double y_ = 0;
+  std::uint64_t moving_ = 0;  // number of the newest stream of poses
+  Nanos endOfForces_ = 0;     // of clients that are gone
+  Nanos stalledThen_ = 0;
+  std::deque<std::pair<Nanos, std::uint32_t>> buttons_{{0, 0}};  // of the device: since when
+  bool over_ = false;
+  bool wasFull_ = false;
+  std::map<std::int32_t, std::int64_t> seen_;  // newest batch of each batcher that a description showed
+  bool compared_ = false;
+};
+
+Simulation::Simulation(const Script& script, bool verbose)
+    : script_(script),
+      verbose_(verbose),
+      random_(script.seed),
+      scheduler_(clock_, script.seed + 7, script.adversity, [this](const auto& text) { finding(text); }),
+      world_(base::World{clock_, scheduler_, files_, random_}),
+      network_(scheduler_),
+      log_([this](const auto& text) { line(text); }),
+      judge_({}, {.finding = [this](const auto& text) { finding(text); },
+                  .freeFrom = [this] { return freeFrom(); },
+                  .tops_m = [this] { return tops_m(); }}),
+      bench_{
+          .scheduler = scheduler_,
+          .clock = clock_,
+          .dice = Dice(script.seed + 11),
+          .judge = judge_,
+          .faults = script.faults,
+          .wrote =
+              [this](const Vec3& force_N) {
+                for (int i = 0; i < 3; ++i) hash_.add(force_N[i]);
+              },
+          .buttonsChanged = [this](std::uint32_t buttons) { buttons_.emplace_back(clock_.now(), buttons); },
+          .finding = [this](const auto& text) { finding(text); }},
+      scopedBench_(bench_),
+      networkDice_(script.seed + 13) {
+  scheduler_.onSuspended = [this] { judge_.onSuspended(clock_.now()); };
+  auto& network = scheduler_.options;
+  network.delay = script.networkDelay;
+  network.windowBytes = script.window;
+  network.jitter = [this] {
+    if (script_.networkJitter == 0 || over_) return Nanos{0};
+    return networkDice_.chance(0.1) ? networkDice_.between(Nanos{0}, script_.networkJitter) : Nanos{0};
+  };
+  network.readSize = [this](std::size_t available) -> std::size_t {
+    if (available < 2 || !networkDice_.chance(0.2)) return available;
+    return 1 + networkDice_.below(std::min<std::size_t>(available, 4096));
+  };
+  network.losesDatagram = [this](std::uint64_t) { return networkDice_.chance(0.05); };
+  const auto client = [this](const net::Endpoint& local, const net::Endpoint& remote) -> SimClient* {
+    if (!server_ || local.port != server_->address().port) return nullptr;
+    return clientAt(remote);
+  };
+  network.arrived = [client](const auto& local, const auto& remote, std::uint64_t total) {
+    if (SimClient* const c = client(local, remote)) c->onArrived(total);
+  };
+  network.reads = [this](const auto& local, const auto&, std::size_t size) {
+    constexpr Nanos kPerByte_ps = 8'000;
+    if (server_ && local.port == server_->address().port)
+      scheduler_.chargeNet(static_cast<Nanos>(size) * kPerByte_ps / 1000);
+  };
+  network.hasRead = [client](const auto& local, const auto& remote, std::uint64_t total) {
+    if (SimClient* const c = client(local, remote)) c->onRead(total);
+  };
+}
+
+SimClient* Simulation::clientAt(const net::Endpoint& endpoint) {
+  const auto known = byPort_.find(endpoint.port);
+  return known == byPort_.end() ? nullptr : known->second;
+}
+
+void Simulation::finding(const std::string& text) {
+  constexpr std::size_t kMost = 5;
+  if (over_) return;
+  hash_.add(text);
+  if (outcome_.findings.empty()) outcome_.firstFinding = clock_.now();
+  if (outcome_.findings.size() < kMost) outcome_.findings.push_back(text);
+  if (verbose_) std::printf("%12.6f FINDING %s\n", base::toSeconds(clock_.now()), text.c_str());
+}
+
+void Simulation::line(const std::string& text) {
+  hash_.add(static_cast<std::uint64_t>(clock_.now()));
+  hash_.add(text);
+  if (verbose_) std::printf("%12.6f %s\n", base::toSeconds(clock_.now()), text.c_str());
+}
+
+void Simulation::after(Nanos delay, std::function<void()> function) {
+  timers_.push_back(loop_->after(std::chrono::nanoseconds(delay), std::move(function)));
+}
+
+Outcome Simulation::run() {
+  files_.createFolder("/boxes");
+  files_.create("/tokens", base::Existing::refuse)->write("owner " + std::string(Clients::kToken) + "\n");
+  server::ServerConfig config;
+  config.listenAddress = "127.0.0.1";
+  config.port = 3883;
+  config.http = server::kHttpOff;
+  config.allowNoRealtime = true;
+  config.tokens = "/tokens";
+  if (script_.record) config.record = kRecording;
+  server::DeviceConfig& device = config.devices.front();
+  device.driver = "sim";
+  device.enableForces = true;
+  device.blackBoxDir = "/boxes";
+  device.blackBoxKeep = 3;
+
+  // The server's loop is the first one of the network.
+  server_.emplace(config);
+  loop_.emplace();
+  scheduler_.setServerLoop(0);
+  clients_.emplace(
+      Clients{.loop = *loop_,
+              .clock = clock_,
+              .server = server_->address(),
+              .finding = [this](const auto& text) { finding(text); },
+              .stopRead = [this](Nanos at) { judge_.onStop(at); },
+              .rearmRead = [this](Nanos at) { judge_.onRearm(at); },
+              .netStalled = [this] { return scheduler_.netStalled(); },
+              .heard = [this](const auto& name, const auto& text) { line(name + " hears: " + text); }});
+  const auto join = [this](SimClient& client) {
+    client.connect();
+    byPort_[client.local().port] = &client;
+  };
+  if (script_.cube) {
+    cubeOwner_ = std::make_unique<CubeOwner>(*clients_, "owner of the cube");
+    join(*cubeOwner_);
+  }
+  for (int i = 0; i < 2; ++i) {
+    operators_.push_back(std::make_unique<Listener>(*clients_, "operator " + std::to_string(i)));
+    if (i == 1) operators_.back()->kinds = wire::kReportButton;
+    join(*operators_.back());
+  }
+  for (int i = 0; i < 2; ++i) {
+    batchers_.push_back(std::make_unique<Batcher>(*clients_, "batcher " + std::to_string(i), 10 + 10 * i));
+    join(*batchers_.back());
+  }
+  uploader_ = std::make_unique<Listener>(*clients_, "uploader");
+  uploader_->kinds = wire::kReportButton;
+  uploader_->sendsAhead = true;
+  join(*uploader_);
+  reader_ = std::make_unique<Listener>(*clients_, "slow reader");
+  join(*reader_);
+
+  const net::Subscription beats = loop_->every(100ms, [this] { beat(); });
+  for (const Action& action : script_.actions) {
+    after(action.at, [this, &action] { perform(action); });
+  }
+  // The end: nothing more goes wrong, the operators re-arm, and everything that was sent is applied.
+  after(script_.length, [this] {
+    scheduler_.calm();
+    bench_.quiet = true;
+    if (reader_->open()) reader_->resumeReading();
+    files_.freeBytes.reset();
+    ++moving_;
+    if (script_.cube) pose(y_);
+  });
+  const Nanos settled = script_.length + 1'500 * kMs +
+                        (script_.adversity.sceneStall > 0 ? script_.adversity.longestSceneStall : 0) +
+                        (script_.adversity.freeze > 0 ? 3'000 * kMs : 0) +
+                        (script_.faults.lost > 0 ? 8'000 * kMs : 0);
+  after(settled - 200 * kMs, [this] {
+    if (operators_.front()->connected()) operators_.front()->rearmForces();
+  });
+  after(settled, [this] { describe(true); });
+  after(settled + 500 * kMs, [this] {
+    checkEnd();
+    over_ = true;
+    server_->stop();
+  });
+
+  server_->run();
+  if (script_.record) {
+    outcome_.ticks = 0;
+    over_ = false;
+  }
+  server_.reset();
+  timers_.clear();
+  if (script_.record) checkRecording();
+  outcome_.ticks = judge_.ticks();
+  outcome_.ticksWithForce = judge_.ticksWithForce();
+  outcome_.ticksInside = judge_.ticksInside();
+  outcome_.latches = judge_.latches();
+  outcome_.steps = scheduler_.steps();
+  outcome_.preemptions = scheduler_.preemptions();
+  outcome_.faults = scheduler_.faults() + bench_.injected;
+  outcome_.stops = clients_->stops;
+  outcome_.slowestStop = clients_->slowestStop;
+  for (const auto& op : operators_) {
+    outcome_.tickReports += op->tickReports;
+    outcome_.missedReports += op->missedTicks;
+  }
+  hash_.add(outcome_.ticks);
+  hash_.add(outcome_.tickReports);
+  outcome_.hash = hash_.value();
+  over_ = true;
+  return outcome_;
+}
+
+void Simulation::perform(const Action& action) {
+  Dice dice(action.seed);
+  // The uploader may stop, too, behind what it uploads.
+  const auto anOperator = [&](bool orUploader) -> Listener* {
+    const std::size_t index = dice.below(operators_.size() + (orUploader ? 1 : 0));
+    Listener& chosen = index < operators_.size() ? *operators_[index] : *uploader_;
+    return chosen.connected() ? &chosen : nullptr;
+  };
+  switch (action.kind) {
+    case Action::Kind::stop:
+      if (Listener* const op = anOperator(true)) op->stopForces();
+      break;
+    case Action::Kind::rearm:
+      if (Listener* const op = anOperator(false)) op->rearmForces();
+      break;
+    case Action::Kind::move:
+      move(dice);
+      break;
+    case Action::Kind::batch: {
+      Batcher& batcher = *batchers_[dice.below(batchers_.size())];
+      if (batcher.connected()) batcher.batch();
+      break;
+    }
+    case Action::Kind::upload:
+      upload(dice);
+      break;
+    case Action::Kind::appear:
+      appear(dice);
+      break;
+    case Action::Kind::vanish:
+      vanish(dice);
+      break;
+    case Action::Kind::pauseRead:
+      if (!reader_->open() || bench_.quiet) break;
+      reader_->pauseReading();
+      after(dice.between(100 * kMs, 4'000 * kMs), [this] {
+        if (reader_->open()) reader_->resumeReading();
+      });
+      break;
+    case Action::Kind::nonsense:
+      nonsense(dice);
+      break;
+    case Action::Kind::flood:
+      if (!reader_->connected()) break;
+      for (std::uint64_t i = dice.below(3000); i > 0; --i) reader_->queue(wire::Ping{});
+      reader_->flush();
+      break;
+    case Action::Kind::wallStep:
+      clock_.stepWall(dice.between(-3'600'000 * kMs, 3'600'000 * kMs));
+      break;
+    case Action::Kind::diskFull:
+      files_.freeBytes = dice.below(200'000);
+      wasFull_ = true;
+      after(dice.between(100 * kMs, 3'000 * kMs), [this] { files_.freeBytes.reset(); });
+      break;
+    case Action::Kind::describe:
+      describe(false);
+      break;
+  }
+}
+
+// A stream of poses begins with a step, as when a hand tracker finds its object again.
+void Simulation::move(Dice& dice) {
+  if (!cubeOwner_->connected() || !cubeOwner_->uploaded) return;
+  const std::uint64_t number = ++moving_;
+  const double goal = dice.uniform(-2.0, 10.0);
+  const auto poses = static_cast<int>(1 + dice.below(90));
+  const Nanos period = dice.between(8 * kMs, 34 * kMs);
+  const double frequency = dice.uniform(0.5, 3.0);
+  const double amplitude = dice.uniform(0.0, 3.0);
+  for (int i = 0; i < poses; ++i) {
+    const double y = goal + amplitude * std::sin(6.28 * frequency * base::toSeconds(period) * i);
+    after(i * period, [this, number, y] {
+      if (number == moving_ && cubeOwner_->connected()) pose(y);
+    });
+  }
+}
+
+void Simulation::pose(double y) {
+  if (!cubeOwner_->connected()) return;
+  y_ = y;
+  tops_.emplace_back(clock_.now(), y);
+  cubeOwner_->send(wire::SetTransformMatrix{0, shifted(0, y, 0)});
+}
+
+std::optional<std::pair<double, double>> Simulation::tops_m() {
+  constexpr Nanos kApplied = 1'000 * kMs;  // without stalls
+  if (!cubeOwner_ || !cubeOwner_->uploaded) return std::nullopt;
+  const Nanos since = clock_.now() - kApplied;
+  const bool stalls =
+      script_.adversity.sceneStall > 0 || script_.adversity.netStall > 0 || script_.adversity.freeze > 0;
+  if (stalls || *cubeOwner_->uploaded > since) return std::nullopt;
+  // The newest pose before the time still counts; before all poses the cube is at 0.
+  while (tops_.size() > 1 && tops_[1].first < since) tops_.pop_front();
+  double lowest = tops_.empty() || tops_.front().first >= since ? 0 : tops_.front().second;
+  double highest = lowest;
+  for (const auto& [at, y] : tops_) {
+    lowest = std::min(lowest, y);
+    highest = std::max(highest, y);
+  }
+  return std::pair(1e-3 * (kHalf + lowest), 1e-3 * (kHalf + highest));
+}
+
+void Simulation::upload(Dice& dice) {
+  if (!uploader_->connected()) return;
+  constexpr std::size_t kVertices = 5000;
+  const std::size_t messages = dice.chance(0.2) ? 150 + dice.below(150) : 1 + dice.below(20);
+  for (std::size_t i = 0; i < messages; ++i) {
+    wire::MeshVertices vertices;
+    vertices.object = 5;
+    vertices.first = static_cast<std::int32_t>(i % 20 * kVertices);
+    vertices.positions.values.assign(3 * kVertices, 1000.0F + static_cast<float>(i));
+    uploader_->queue(vertices);
+  }
+  uploader_->flush();
+}
+
+void Simulation::appear(Dice& dice) {
+  constexpr std::size_t kMost = 4;
+  std::size_t present = 0;
+  for (const auto& pusher : pushers_) present += pusher->open() ? 1 : 0;
+  if (present >= kMost) return;
+  auto pusher = std::make_unique<Pusher>(*clients_, "pusher " + std::to_string(pushers_.size()));
+  pusher->effect = static_cast<std::int32_t>(pushers_.size());
+  pusher->seed = dice.below(~std::uint64_t{0});
+  pusher->connect();
+  byPort_[pusher->local().port] = pusher.get();
+  pushers_.push_back(std::move(pusher));
+}
+
+// Its forces end 250 ms after the server can know.
+void Simulation::vanish(Dice& dice) {
+  std::vector<Pusher*> present;
+  for (const auto& pusher : pushers_) {
+    if (pusher->open() && !pusher->gone) present.push_back(pusher.get());
+  }
+  if (present.empty()) return;
+  Pusher& pusher = *present[dice.below(present.size())];
+  constexpr Nanos kRamp = 250 * kMs;
+  constexpr Nanos kMargin = 30 * kMs;
+  const Nanos travel = 3 * script_.networkDelay + 2 * script_.networkJitter + kMargin;
+  Nanos lasts = travel + kRamp;
+  // Every pause of the server begins the watch of a heartbeat anew: without one, the time is known.
+  const bool pauses = script_.adversity.netStall > 0 || script_.adversity.freeze > 0 ||
+                      script_.adversity.preempt > 0 || script_.faults.hang > 0;
+  pusher.expectEnd();
+  switch (dice.below(pauses ? 2 : 3)) {
+    case 0:
+      pusher.reset();
+      break;
+    case 2:
+      pusher.beats = false;  // the program hangs
+      pusher.gone = true;
+      lasts += 600 * kMs;
+      break;
+    default:
+      scheduler_.cut(pusher.local());
+      pusher.reset();
+      lasts += 1'600 * kMs;  // what is not acknowledged for 500 ms, or a probe after a second of silence
+      break;
+  }
+  const Nanos stalled = scheduler_.netStalled();
+  endOfForces_ =
+      std::max(endOfForces_ + stalled - std::exchange(stalledThen_, stalled), clock_.now() + lasts);
+}
+
+std::optional<Nanos> Simulation::freeFrom() {
+  if (script_.cube) return std::nullopt;
+  for (const auto& pusher : pushers_) {
+    if (pusher->open() && !pusher->gone) return std::nullopt;
+  }
+  return endOfForces_ + scheduler_.netStalled() - stalledThen_;
+}
+
+void Simulation::nonsense(Dice& dice) {
+  auto stranger = std::make_unique<SimClient>(*clients_, "stranger");
+  stranger->connect();
+  stranger->expectEnd();
+  std::vector<std::byte> bytes(1 + dice.below(3000));
+  for (std::byte& b : bytes) b = static_cast<std::byte>(dice.below(256));
+  if (dice.chance(0.3)) {  // a proper greeting first
+    static constexpr char kCookie[] = "vrpn: ver. 07.34  0\0\0\0\0";
+    const auto greeting = std::as_bytes(std::span(kCookie, 24));
+    stranger->sendBytes(greeting);
+  }
+  if (!dice.chance(0.2)) stranger->sendBytes(bytes);
+  SimClient* const raw = stranger.get();
+  if (dice.chance(0.5)) {
+    after(dice.between(0, 500 * kMs), [raw] {
+      if (raw->open()) raw->reset();
+    });
+  }
+  strangers_.push_back(std::move(stranger));
+}
+
+void Simulation::beat() {
+  const auto one = [](Listener& client) {
+    if (client.connected() && client.beats) client.send(wire::Heartbeat{});
+  };
+  if (cubeOwner_) one(*cubeOwner_);
+  for (const auto& client : operators_) one(*client);
+  for (const auto& client : batchers_) one(*client);
+  for (const auto& client : pushers_) one(*client);
+  one(*uploader_);
+  one(*reader_);
+}
+
+void Simulation::describe(bool last) {
+  server_->stations().front()->scene().describe(
+      [this, last](const auto& description) { compare(*description, last); });
+}
+
+// Both objects of a batcher are at the same batch, and at the last one in the end.
+void Simulation::compare(const scene::SceneDescription& description, bool last) {
+  compared_ = compared_ || last;
+  const auto find = [&](std::int32_t id) -> const scene::ObjectDescription* {
+    for (const auto& object : description.objects) {
+      if (object.id == id) return &object;
+    }
+    return nullptr;
+  };
+  for (const auto& batcher : batchers_) {
+    const auto* const a = find(batcher->first);
+    const auto* const b = find(batcher->first + 1);
+    if (a == nullptr || b == nullptr) {
+      if (last) finding("an object of '" + batcher->name() + "' is missing at the end");
+      continue;
+    }
+    const auto number = [](const scene::ObjectDescription& object) {
+      return static_cast<std::int64_t>(std::lround(object.T_world_object.translation().z() / 10));
+    };
+    std::int64_t& seen = seen_[batcher->first];
+    const bool together = number(*a) == number(*b) || batcher->sent == 0;
+    if (!together || number(*a) < seen || number(*a) > batcher->sent || (last && number(*a) != batcher->sent))
+      finding("objects of '" + batcher->name() + "' are at the batches " + std::to_string(number(*a)) +
+              " and " + std::to_string(number(*b)) + ", earlier " + std::to_string(seen) + ", sent " +
+              std::to_string(batcher->sent));
+    seen = number(*a);
+  }
+  if (!last || !cubeOwner_ || !cubeOwner_->uploaded) return;
+  const auto* const object = find(0);
+  if (object == nullptr || std::abs(object->T_world_object.translation().y() - y_) > 1e-9)
+    finding("the cube is not where its owner has moved it to last");
+}
+
+void Simulation::checkEnd() {
+  if (!compared_) finding("the scene thread has not described the scene within 500 ms");
+  const bool running = judge_.ticks() > 0;
+  const Listener& op = *operators_.front();
+  // What never comes back would fulfil every other promise.
+  if (bench_.lost ? op.tickReports == 0 : op.lastTick + 100 < judge_.ticks())
+    finding("the newest tick that was reported is " + std::to_string(op.lastTick) + " of " +
+            std::to_string(judge_.ticks()));
+  if (!bench_.lost && judge_.sinceRead(clock_.now()) > 100 * kMs)
+    finding("the servo does not tick at the end");
+  if (!bench_.lost && (op.guard.stopped != 0 || op.guard.latched != 0))
+    finding("the forces are still off after the last re-arm");
+  const auto check = [&](Listener& client) {
+    if (!client.connected()) {
+      finding("client '" + client.name() + "' is not connected at the end");
+      return;
+    }
+    for (std::size_t i = 0; i < client.buttons.size() && running; ++i) {
+      // The newest change may still be on its way.
+      const Nanos since = clock_.now() - 60 * kMs;
+      bool known = (client.kinds & wire::kReportButton) == 0;
+      for (auto state = buttons_.rbegin(); state != buttons_.rend() && !known; ++state) {
+        known = client.buttons[i] == ((state->second >> i) & 1U);
+        if (state->first < since) break;
+      }
+      if (!known)
+        finding("client '" + client.name() + "' does not know the last state of button " + std::to_string(i));
+    }
+    const bool stopped = (client.guard.stopped != 0);
+    if (client.guardReports > 0 && operators_.front()->guardReports > 0 &&
+        stopped != (operators_.front()->guard.stopped != 0))
+      finding("clients disagree whether forces are stopped");
+  };
+  if (cubeOwner_) check(*cubeOwner_);
+  for (const auto& client : operators_) check(*client);
+  for (const auto& client : batchers_) check(*client);
+  check(*uploader_);
+  check(*reader_);
+}
+
+void Simulation::checkRecording() {
+  if (wasFull_) return;
+  scheduler_.calm();
+  std::string remark;
+  std::string law;
+  try {
+    for (const record::Difference& device : record::compare(kRecording, {}, remark, law)) {
+      outcome_.replayedTicks += device.ticks();
+      // A servo that ramps out by itself, because the scene is busy, is not in the recording (decision 15).
+      const bool ownersLeave =
+          std::any_of(script_.actions.begin(), script_.actions.end(),
+                      [](const Action& action) { return action.kind == Action::Kind::vanish; });
+      if (!ownersLeave && device.lost() == 0 && device.same() != device.ticks())
+        finding("the recording replays " + std::to_string(device.same()) + " of " +
+                std::to_string(device.ticks()) + " ticks bit for bit");
+    }
+  } catch (const std::exception& error) {
+    finding(std::string("the recording cannot be replayed: ") + error.what());
+  }
+  if (!remark.empty()) finding("the recording ends early: " + remark);
+}
+
+}  // namespace
+
+Outcome run(const Script& script, bool verbose) {
+  return Simulation(script, verbose).run();
+}
+
+}  // namespace hapticd::sim

@@ -1,0 +1,75 @@
+// One run of the whole server with its clients, drawn from a seed.
+#pragma once
+
+#include <cstdint>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "sim/scheduler.h"
+#include "sim/sim_device.h"
+
+namespace hapticd::sim {
+
+/// What someone does at a time.
+struct Action {
+  enum class Kind {
+    stop,       ///< an operator stops the forces
+    rearm,      ///< an operator re-arms
+    move,       ///< the owner of the cube streams poses for a while
+    batch,      ///< a client moves two objects together
+    upload,     ///< a client uploads a large mesh
+    appear,     ///< a client comes and starts an effect
+    vanish,     ///< and goes, in one of four ways
+    pauseRead,  ///< a client stops reading for a while
+    nonsense,   ///< a stranger sends what breaks the protocol
+    flood,      ///< a client sends thousands of pings
+    wallStep,   ///< the wall clock is set
+    diskFull,   ///< the disk runs full, and has room again
+    describe,   ///< the scene is compared with what was sent
+  };
+  Nanos at = 0;
+  Kind kind = Kind::stop;
+  std::uint64_t seed = 0;  ///< of its details
+};
+const char* nameOf(Action::Kind kind);
+
+/// All of a run but the code of the server: the same script gives the same run.
+struct Script {
+  std::uint64_t seed = 1;
+  Nanos length = 20'000'000'000;
+  bool cube = true;  ///< a cube under the hand; else only forces of clients
+  bool record = false;
+  Nanos networkDelay = 50'000;
+  Nanos networkJitter = 0;
+  std::size_t window = std::size_t{256} * 1024;
+  Adversity adversity;
+  DeviceFaults faults;
+  std::vector<Action> actions;
+};
+Script drawScript(std::uint64_t seed, double seconds);
+/// As text, a line for each part.
+std::string describe(const Script& script);
+
+struct Outcome {
+  std::vector<std::string> findings;  ///< the first few
+  std::uint64_t hash = 0;             ///< of all forces, of the log and of the findings
+  Nanos firstFinding = 0;
+  std::uint64_t ticks = 0;
+  std::uint64_t ticksWithForce = 0;
+  std::uint64_t ticksInside = 0;
+  std::uint64_t steps = 0;
+  std::uint64_t preemptions = 0;
+  std::uint64_t faults = 0;
+  std::uint64_t latches = 0;
+  std::uint64_t stops = 0;
+  std::uint64_t tickReports = 0;
+  std::uint64_t missedReports = 0;
+  std::uint64_t replayedTicks = 0;
+  Nanos slowestStop = 0;
+};
+
+/// Runs a script in the calling thread. `verbose` prints the server's log with virtual times.
+Outcome run(const Script& script, bool verbose = false);
+
+}  // namespace hapticd::sim
