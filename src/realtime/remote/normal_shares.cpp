@@ -32,6 +32,7 @@ class Bearers {
     if (!start(fromLast)) return false;
     for (int i = 0; i < kExchanges; ++i) {
       if (!solveSystem()) return false;
+      if (count_ == 0) return mostMissing() == c_.count;  // no contact demands a push
       const std::size_t least = static_cast<std::size_t>(
           std::min_element(share_N_.begin(), share_N_.begin() + count_) - share_N_.begin());
       if (share_N_[least] < 0) {

@@ -279,8 +279,6 @@ TEST(RemoteContacts, SurfacesOnTopOfEachOtherAreAsStiffAsOne) {
   expectNear(rig.force, {0, 1.6, 0}, 1e-6);
 }
 
-// Each demands its spring force along its normal: the forces of a corner of 60 degrees are solved, not
-// summed.
 // Whatever the contacts, each adds what the others do not exert, to the solver's last digits. The shares of
 // the last tick are those of other contacts here.
 TEST(RemoteContacts, SharesMeetEveryDemandOnce) {
@@ -294,7 +292,7 @@ TEST(RemoteContacts, SharesMeetEveryDemandOnce) {
     for (int i = 0; i < count; ++i) {
       const bool same = i > 0 && unit(random) > 0.7;  // two points of one plane
       const Vec3 normal = Vec3(spread * unit(random), 1, spread * unit(random)).normalized();
-      contacts.add(same ? Vec3(contacts.x[0], contacts.y[0], contacts.z[0]) : normal, 2 + 2 * unit(random),
+      contacts.add(same ? Vec3(contacts.x[0], contacts.y[0], contacts.z[0]) : normal, 1.5 + 2.5 * unit(random),
                    std::max(0.0, unit(random)));
     }
     shareNormalForce(contacts);
@@ -315,6 +313,20 @@ TEST(RemoteContacts, SharesMeetEveryDemandOnce) {
   EXPECT_LT(inexact, 200) << "the sweeps that replace the solver end early";
 }
 
+// A contact that the hand leaves fast demands a pull, which is no force.
+TEST(RemoteContacts, ContactsThatBoreForceAndNowDemandAPullHaveNoShare) {
+  for (const int count : {1, 2, 9}) {
+    for (const double share_N : {0.0, 1.0}) {
+      PressingContacts contacts;
+      for (int i = 0; i < count; ++i) contacts.add(Vec3(0.1 * i, 1, 0).normalized(), -0.5 - 0.1 * i, share_N);
+      shareNormalForce(contacts);
+      for (std::size_t i = 0; i < contacts.count; ++i) EXPECT_EQ(contacts.share_N[i], 0) << i << " of " << count;
+    }
+  }
+}
+
+// Each demands its spring force along its normal: the forces of a corner of 60 degrees are solved, not
+// summed.
 TEST(RemoteContacts, CornersExertWhatEachFaceDemands) {
   Rig rig;
   RemoteContact a = floorAt(0);
