@@ -31,7 +31,7 @@ done
 [ "${#targets[@]}" -gt 0 ] || mapfile -t targets < <(all)
 seconds=$(awk -v h="${hours:-0}" -v j="$jobs" -v n="${#targets[@]}" 'BEGIN { s = 3600 * h * j / n; print s < 1 ? 1 : int(s) }')
 
-scripts/install_packages.sh build fuzz
+scripts/install_packages.sh build sanitizers
 [ -e build/fuzz/build.ninja ] || cmake --preset fuzz
 cmake --build build/fuzz -- -j "$jobs" fuzz/wire.dict "${targets[@]/%/_fuzz}"
 commit=$(git rev-parse --short=10 HEAD)
