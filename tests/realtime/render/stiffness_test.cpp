@@ -132,6 +132,7 @@ std::vector<bool> stepsOf(Hand& hand, const Path& path, int steps, double stiffe
 }
 
 constexpr int kSteps = reduced(100'000);
+constexpr double kQuadrature_J = kSteps < 100'000 ? 1e-8 : 1e-9;  // error of the trapezoidal rule
 
 // The review's groove: circles of 1 mm, 3 mm below the crease. A sum of K_i d_i n_i gave 4.9 and 10.6 mJ.
 TEST_F(StiffnessTest, unequal_groove_gives_no_energy) {
@@ -187,7 +188,7 @@ TEST_F(StiffnessTest, closed_paths_over_random_planes_do_no_work) {
     const std::vector<bool> fine = stepsOf(hand, path, kSteps, stiffest);
     EXPECT_LT(std::count(fine.begin(), fine.end(), true), 30) << "scene " << i;
     const Turn t = turn(hand, path, kSteps, fine);
-    EXPECT_LE(std::abs(t.work), 1e-9) << "scene " << i;
+    EXPECT_LE(std::abs(t.work), kQuadrature_J) << "scene " << i;
     EXPECT_LT(t.proxyMoved, 1e-8) << "scene " << i;
     EXPECT_LE(t.largestRatio, stiffest * (1 + 1e-9)) << "scene " << i;
     EXPECT_GT(t.touching, 0.3);
@@ -220,7 +221,7 @@ TEST_F(StiffnessTest, closed_paths_over_random_plates_do_no_work) {
     const std::vector<bool> fine = stepsOf(hand, path, kSteps, stiffest);
     EXPECT_LT(std::count(fine.begin(), fine.end(), true), 30) << "scene " << i;
     const Turn t = turn(hand, path, kSteps, fine);
-    EXPECT_LE(std::abs(t.work), 1e-9) << "scene " << i;
+    EXPECT_LE(std::abs(t.work), kQuadrature_J) << "scene " << i;
     EXPECT_LT(t.proxyMoved, 1e-8) << "scene " << i;
     EXPECT_LE(t.largestRatio, stiffest * (1 + 1e-9)) << "scene " << i;
     worst = std::max(worst, std::abs(t.work));
