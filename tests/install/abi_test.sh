@@ -17,7 +17,7 @@ symbols "$2" >"$work/libhapticd_vrpn.txt"
 bad=0
 # T, W, V, ...: kind of symbol. Nothing may be exported that is not of the interface.
 if grep -vE '^[A-Z] (typeinfo for |typeinfo name for |vtable for )?hapticd::' "$work/libhapticd.txt" ||
-   grep -vE '^[A-Z] (typeinfo for |typeinfo name for |vtable for |VTT for |construction vtable for )?vrpn_' "$work/libhapticd_vrpn.txt"; then
+   grep -vE '^[A-Z] (typeinfo for |typeinfo name for |vtable for |VTT for |construction vtable for |(non-)?virtual thunk to )?vrpn_' "$work/libhapticd_vrpn.txt"; then
   echo "the symbols above do not belong to the public interface: hide them (src/client/libhapticd.map)"
   bad=1
 fi

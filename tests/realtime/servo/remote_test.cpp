@@ -292,8 +292,8 @@ TEST(RemoteContacts, SharesMeetEveryDemandOnce) {
     for (int i = 0; i < count; ++i) {
       const bool same = i > 0 && unit(random) > 0.7;  // two points of one plane
       const Vec3 normal = Vec3(spread * unit(random), 1, spread * unit(random)).normalized();
-      contacts.add(same ? Vec3(contacts.x[0], contacts.y[0], contacts.z[0]) : normal, 1.5 + 2.5 * unit(random),
-                   std::max(0.0, unit(random)));
+      contacts.add(same ? Vec3(contacts.x[0], contacts.y[0], contacts.z[0]) : normal,
+                   1.5 + 2.5 * unit(random), std::max(0.0, unit(random)));
     }
     shareNormalForce(contacts);
     double worst_N = 0;
@@ -320,7 +320,8 @@ TEST(RemoteContacts, ContactsThatBoreForceAndNowDemandAPullHaveNoShare) {
       PressingContacts contacts;
       for (int i = 0; i < count; ++i) contacts.add(Vec3(0.1 * i, 1, 0).normalized(), -0.5 - 0.1 * i, share_N);
       shareNormalForce(contacts);
-      for (std::size_t i = 0; i < contacts.count; ++i) EXPECT_EQ(contacts.share_N[i], 0) << i << " of " << count;
+      for (std::size_t i = 0; i < contacts.count; ++i)
+        EXPECT_EQ(contacts.share_N[i], 0) << i << " of " << count;
     }
   }
 }
