@@ -17,6 +17,10 @@ class Error : public std::runtime_error {
 
 /// 127.0.0.1 in host byte order.
 inline constexpr std::uint32_t kLoopbackAddress = 0x7f000001;
+/// Whether an address (host byte order) is in 127.0.0.0/8.
+constexpr bool isLoopback(std::uint32_t address) {
+  return (address >> 24) == 127;
+}
 /// 0.0.0.0: when listening, every address of this machine.
 inline constexpr std::uint32_t kAnyAddress = 0;
 

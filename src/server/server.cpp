@@ -1,6 +1,5 @@
 #include "server/server.h"
 
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <spdlog/spdlog.h>
@@ -12,28 +11,12 @@
 #include "realtime/servo/thread_setup.h"
 #include "server/session/refusal_codes.h"
 #include "wire/text.h"
-#include "wire/udp_request.h"
 
 namespace hapticd::server {
 namespace {
 
 using namespace std::chrono_literals;
 using base::Nanos;
-
-constexpr Nanos kHandshakeLimit = 30'000'000'000;
-constexpr std::size_t kMostReverseConnections = 64;  // pending at once
-constexpr std::size_t kReserve = 16;                 // connections that may only stop forces
-constexpr std::uint64_t kOtherDescriptors = 192;     // devices, files, the web port, pending connections
-
-// The program may raise it: see docs/limits.md.
-std::size_t mostSessions(std::size_t configured) {
-  rlimit limit{};
-  getrlimit(RLIMIT_NOFILE, &limit);
-  const std::uint64_t present = limit.rlim_cur;
-  // In mode udp a client takes two.
-  const std::uint64_t possible = present > 2 * kOtherDescriptors ? (present - kOtherDescriptors) / 2 : 16;
-  return std::min<std::size_t>(configured, possible);
-}
 
 net::ConnectionOptions connectionOptions(const LimitsConfig& limits) {
   net::ConnectionOptions options;
@@ -45,21 +28,6 @@ net::ConnectionOptions connectionOptions(const LimitsConfig& limits) {
   return options;
 }
 
-bool isLoopback(std::uint32_t address) {
-  return (address >> 24) == 127;
-}
-
-// The way on which a client came: Unix socket, this machine, another machine.
-std::size_t wayOf(const Session& session) {
-  if (session.mode() == SessionMode::local) return 0;
-  return isLoopback(session.remote().address) ? 1 : 2;
-}
-
-// What counts as one address: on the Unix socket, a user.
-std::string sourceOf(const Session& session) {
-  return session.user() ? "user " + std::to_string(*session.user()) : session.address();
-}
-
 std::optional<tls::Context> openTls(const ServerConfig& config) {
   if (config.tls == kTlsOff) return std::nullopt;
   if (config.tls == kTlsGenerated) return tls::Context::serverWithNewKey();
@@ -67,12 +35,6 @@ std::optional<tls::Context> openTls(const ServerConfig& config) {
 }
 
 }  // namespace
-
-// A pending TCP connection to a client that requested it by datagram.
-struct Server::ReverseConnection {
-  net::Endpoint client;
-  net::Connection connection;
-};
 
 Server::Server(const ServerConfig& config) : Server(config, nullptr) {}
 
@@ -94,8 +56,6 @@ Server::Server(const ServerConfig& config, std::unique_ptr<Player> player)
   for (const DeviceConfig& device : config_.devices) openDevice(device);
 
   openPorts();
-  requests_->start(
-      {.onDatagram = [this](auto bytes, const auto& from) { onUdpRequest(bytes, from); }, .onRefused = {}});
   openSocket();
   openWeb();
   openHaply();
@@ -115,7 +75,12 @@ void Server::openPorts() {
         connectionOptions(config_.limits));
     local.port = listener_->local().port;
     try {
-      requests_ = std::make_unique<net::UdpSocket>(loop_, local);
+      requests_ = std::make_unique<ReverseConnections>(
+          loop_, local, connectionOptions(config_.limits), config_.callbackHosts,
+          [this](std::uint32_t address) { return config_.insecure || isNear(address); }, throttledLog_,
+          [this](net::Connection connection, std::unique_ptr<net::UdpSocket> udp) {
+            addSession(std::move(connection), std::move(udp), SessionMode::udp);
+          });
       return;
     } catch (const net::Error&) {
       if (config_.port != 0 || attempt == kMostAttempts) throw;
@@ -132,7 +97,7 @@ Server::~Server() {
 
 // Whether packets of this address travel without TLS.
 bool Server::isNear(std::uint32_t address) const {
-  if (isLoopback(address) && !config_.tlsLoopback) return true;
+  if (net::isLoopback(address) && !config_.tlsLoopback) return true;
   return std::any_of(trusted_.begin(), trusted_.end(), [&](const Subnet& s) { return s.has(address); });
 }
 
@@ -286,7 +251,7 @@ void Server::run() {
   subscriptions_.push_back(loop_.every(1s, [this] { everySecond(); }));
   subscriptions_.push_back(loop_.every(50ms, [this] {
     checkHeartbeats();
-    checkMemory();
+    admission_.checkMemory(waitingCommands());
     recordings_.poll();
     if (haply_) haply_->answer();  // a device that is gone has no ticks
     for (const auto& station : stations_) {
@@ -313,7 +278,11 @@ void Server::run() {
 void Server::everySecond() {
   if (alive_) alive_();
   clock_.refresh();
-  closeStaleHandshakes();
+  // A client that describes none of the devices listens to all of them.
+  for (Session* session : admission_.handshaken(base::now())) {
+    if (session->namesWanted() != 0) continue;
+    for (const auto& station : stations_) station->sendPresentState(*session);
+  }
   throttledLog_.reportSuppressed();
   markers_ = 0;
   if (web_) web_->everySecond();
@@ -338,7 +307,7 @@ void Server::onIdentify(Session& session, const wire::MessageReceived& message) 
 
 void Server::identify(Session& session, std::string_view token, wire::LocalSender name) {
   std::string error;
-  const auto identity = credentials_.check(token, sourceOf(session), base::now(), error);
+  const auto identity = credentials_.check(token, session.source(), base::now(), error);
   if (!identity) {
     session.logWarning("(" + session.description() + ") presented a token that is refused: " + error);
     session.send(name, wire::Text{.severity = wire::kTextError,
@@ -354,10 +323,10 @@ std::optional<Commander> Server::admitHaply(const net::Endpoint& remote, std::st
   const std::string address = remote.addressText();
   if (!isNear(remote.address) && !config_.insecure) {
     refusal = "this port is not encrypted, and " + address + " is not in trusted_networks";
-  } else if (!hasRoom(address)) {
+  } else if (!admission_.hasRoom(address)) {
     refusal = "the server is full";
   } else {
-    ++sessionsOf_[address];
+    admission_.enter(address);
     const scene::ClientId id = nextClient_++;
     throttledLog_.log(spdlog::level::info, address,
                       fmt::format("client {} connected from {}, haply", id, address));
@@ -371,7 +340,7 @@ void Server::onHaplyGone(const Commander& client, const std::string& reason) {
   throttledLog_.log(spdlog::level::info, client.address,
                     fmt::format("client {} ({}, haply) disconnected: {}", client.id, client.address, reason));
   for (const auto& station : stations_) station->clientGone(client.id);
-  forgetSource(client.address);
+  admission_.leave(client.address);
 }
 
 void Server::onHaplyWarning(scene::ClientId client, const std::string& text) {
@@ -438,172 +407,18 @@ Session& Server::addSession(net::Connection connection, std::unique_ptr<net::Udp
   Session& added = *session;
   added.setIdentity(credentials_.identityOf(added.remote().address, added.user()));
   added.setMostPerSecond(config_.limits.commandsPerSecond);
-  admit(added);
+  admission_.enter(added);
   sessions_.emplace(id, std::move(session));
-  unfinished_.insert(id);
-  handshakes_.emplace(id, base::now());
   added.start();
-  evictUnfinished();
   return added;
 }
 
-// Beyond the limits a client may still stop forces. The newest of each way have this chance: those that hold
-// on to theirs must not keep others from it.
-void Server::admit(Session& session) {
-  const std::string source = sourceOf(session);
-  const bool room = hasRoom(source);
-  ++sessionsOf_[source];
-  if (room) return;
-  auto& reserve = reserves_[wayOf(session)];
-  reserve.push_back(session.id());
-  if (reserve.size() <= kReserve) return;
-  const auto oldest = sessions_.find(reserve.front());
-  if (oldest != sessions_.end()) oldest->second->close("the server is full, and others wait to stop forces");
-}
-
-// The newest ones have the chance to greet: a stop must not wait for a flood of silent connections.
-void Server::evictUnfinished() {
-  if (unfinished_.size() <= static_cast<std::size_t>(config_.limits.unfinishedConnections)) return;
-  const auto oldest = sessions_.find(*unfinished_.begin());
-  unfinished_.erase(unfinished_.begin());
-  if (oldest != sessions_.end()) oldest->second->abort("no VRPN greeting so far, and others wait to greet");
-}
-
-// What waits beyond the limits: each client for itself, then the largest.
-void Server::checkMemory() {
-  const auto most = static_cast<std::size_t>(config_.limits.memory_MB) << 20;
-  const auto mostOfOne = static_cast<std::size_t>(config_.limits.clientMemory_MB) << 20;
-  std::map<scene::ClientId, std::size_t> waiting;
+std::map<scene::ClientId, std::size_t> Server::waitingCommands() const {
+  std::map<scene::ClientId, std::size_t> bytes;
   for (const auto& scene : scenes_) {
-    for (const auto& [client, bytes] : scene->waiting()) waiting[client] += bytes;
+    for (const auto& [client, waiting] : scene->waiting()) bytes[client] += waiting;
   }
-  constexpr std::size_t kUnread_bytes = 64 * 1024;
-  // What a client does not read is freed at once; it would not read the text either.
-  const auto end = [](Session& session, const std::string& reason) {
-    if (session.status().queuedBytes > kUnread_bytes) {
-      session.abort(reason);
-    } else {
-      session.refuse(reason);
-    }
-  };
-  std::size_t sum = 0;
-  std::vector<std::pair<std::size_t, Session*>> holders;
-  for (const auto& [id, session] : sessions_) {
-    const auto commands = waiting.find(id);
-    const std::size_t bytes = session->waitingBytes() + (commands == waiting.end() ? 0 : commands->second);
-    if (session->ending()) continue;
-    sum += bytes;
-    if (bytes > mostOfOne) {
-      end(*session, "this client uses more than " + std::to_string(config_.limits.clientMemory_MB) +
-                        " MiB of the server; send less at a time, and read");
-    } else {
-      holders.emplace_back(bytes, session.get());
-    }
-  }
-  if (sum <= most) return;
-  std::sort(holders.rbegin(), holders.rend());
-  for (const auto& [bytes, session] : holders) {
-    if (sum <= most) return;
-    sum -= bytes;
-    end(*session, "all clients together use more than " + std::to_string(config_.limits.memory_MB) +
-                      " MiB of the server, and this one uses most");
-  }
-}
-
-// For one client more.
-bool Server::hasRoom(const std::string& source) const {
-  std::size_t present = sessions_.size() + (haply_ ? haply_->clients() : 0);
-  for (const auto& reserve : reserves_) present -= reserve.size();
-  const auto ofSource = sessionsOf_.find(source);
-  return present < mostSessions(static_cast<std::size_t>(config_.limits.connections)) &&
-         (ofSource == sessionsOf_.end() ||
-          ofSource->second < static_cast<std::size_t>(config_.limits.connectionsPerAddress));
-}
-
-void Server::forgetSource(const std::string& source) {
-  const auto ofSource = sessionsOf_.find(source);
-  if (ofSource != sessionsOf_.end() && --ofSource->second == 0) sessionsOf_.erase(ofSource);
-}
-
-bool Server::mayOnlyStop(const Session& session) const noexcept {
-  const auto& reserve = reserves_[wayOf(session)];
-  return std::find(reserve.begin(), reserve.end(), session.id()) != reserve.end();
-}
-
-void Server::onUdpRequest(std::span<const std::byte> datagram, const net::Endpoint& from) {
-  const auto request = wire::parseUdpRequest(datagram);
-  if (!request) {
-    throttledLog_.warn("datagram from " + from.text() + " is not a connection request: " + request.error());
-    return;
-  }
-  net::Endpoint client;
-  try {
-    client = net::Endpoint::parse(request->host, request->port);
-  } catch (const net::Error& error) {
-    throttledLog_.warn("connection request from " + from.text() + " refused: " + error.what());
-    return;
-  }
-  // A forged request must not make this server connect to third parties.
-  const bool sameHost =
-      client.address == from.address || (isLoopback(client.address) && isLoopback(from.address));
-  const auto& allowed = config_.callbackHosts;
-  const bool listed = std::find(allowed.begin(), allowed.end(), request->host) != allowed.end();
-  if (!sameHost && !listed) {
-    throttledLog_.warn("connection request from " + from.text() + " names another host, " + client.text() +
-                       ": refused; allow it with callback_hosts");
-    return;
-  }
-  if (!isNear(client.address) && !listed && !config_.insecure) {
-    throttledLog_.warn("connection request from " + from.text() +
-                       " refused: datagrams cannot be encrypted; use 'hapticd tunnel' on that machine, "
-                       "trusted_networks or insecure");
-    return;
-  }
-  connectToClient(client);
-}
-
-void Server::connectToClient(const net::Endpoint& client) {
-  // Clients repeat their request until the server connects.
-  for (const auto& pending : reverseConnections_) {
-    if (pending->client == client) return;
-  }
-  if (reverseConnections_.size() >= kMostReverseConnections) {
-    throttledLog_.warn("connection request to " + client.text() +
-                       " ignored: " + std::to_string(kMostReverseConnections) + " others are pending");
-    return;
-  }
-  auto owned = std::make_unique<ReverseConnection>();
-  ReverseConnection* pending = owned.get();
-  pending->client = client;
-  pending->connection = net::Connection::connect(loop_, client, 2s, connectionOptions(config_.limits));
-  const auto forget = [this, pending] {
-    std::erase_if(reverseConnections_, [pending](const auto& entry) { return entry.get() == pending; });
-  };
-  pending->connection.start(
-      {.onConnected =
-           [this, pending, forget] {
-             net::Endpoint local = pending->connection.local();
-             local.port = 0;
-             auto udp = std::make_unique<net::UdpSocket>(loop_, local);
-             net::Connection connection = std::move(pending->connection);
-             forget();
-             // All of 127.0.0.0/8 is this machine; any other address of its own is its source address, too.
-             const net::Endpoint remote = connection.remote();
-             if (remote.port == address().port &&
-                 (isLoopback(remote.address) || remote.address == connection.local().address)) {
-               throttledLog_.warn("connection request names this server itself: refused");
-               return;
-             }
-             addSession(std::move(connection), std::move(udp), SessionMode::udp);
-           },
-       .onBytes = {},
-       .onDrained = {},
-       .onClosed =
-           [this, client, forget](const std::string& reason) {
-             throttledLog_.warn("reverse connection to " + client.text() + " failed: " + reason);
-             forget();
-           }});
-  reverseConnections_.push_back(std::move(owned));
+  return bytes;
 }
 
 void Server::onEnding(Session& session) {
@@ -618,28 +433,8 @@ void Server::onClosed(Session& session, const std::string& reason) {
   if (!session.ending()) {
     for (const auto& scene : scenes_) scene->clientGone(session.id());
   }
-  handshakes_.erase(session.id());
-  unfinished_.erase(session.id());
-  std::erase(reserves_[wayOf(session)], session.id());
-  forgetSource(sourceOf(session));
+  admission_.leave(session);
   sessions_.erase(session.id());
-}
-
-void Server::closeStaleHandshakes() {
-  const Nanos now = base::now();
-  for (auto entry = handshakes_.begin(); entry != handshakes_.end();) {
-    const auto session = sessions_.find(entry->first);
-    if (session == sessions_.end() || session->second->connected()) {
-      // A client that describes none of the devices listens to all of them.
-      if (session != sessions_.end() && session->second->namesWanted() == 0) {
-        for (const auto& station : stations_) station->sendPresentState(*session->second);
-      }
-      entry = handshakes_.erase(entry);
-      continue;
-    }
-    if (now - entry->second > kHandshakeLimit) session->second->close("no VRPN greeting within 30 s");
-    ++entry;
-  }
 }
 
 // Disconnect clients whose heartbeat expired. onClosed() destroys the session later.
@@ -687,7 +482,7 @@ Station* Server::stationOf(wire::LocalSender name) noexcept {
 }
 
 void Server::onConnected(Session& session) {
-  unfinished_.erase(session.id());
+  admission_.greeted(session);
   for (const auto& station : stations_) station->onConnected(session);
 }
 
@@ -813,7 +608,7 @@ void Server::onSceneMessage(Session& session, Station& station, const wire::Mess
 bool Server::mayCommand(Session& session, Station& station, const wire::MessageReceived& message) {
   std::string reason;
   if (message.kind == wire::kindOf<wire::StopForces>) return true;
-  if (mayOnlyStop(session)) {
+  if (admission_.mayOnlyStop(session)) {
     // A client library asks first whether the server knows a stop.
     for (const wire::MessageKind kind :
          {wire::kindOf<wire::Ping>, wire::kindOf<wire::Heartbeat>, wire::kindOf<wire::QueryCapabilities>,

@@ -17,13 +17,14 @@
 #include "net/local_socket.h"
 #include "net/loop.h"
 #include "net/tcp_listener.h"
-#include "net/udp_socket.h"
 #include "server/compat/haply_port.h"
 #include "server/config/config.h"
 #include "server/player.h"
 #include "server/recordings.h"
 #include "server/scene/scene_host.h"
+#include "server/session/admission.h"
 #include "server/session/credentials.h"
+#include "server/session/reverse_connections.h"
 #include "server/session/session.h"
 #include "server/session/throttled_log.h"
 #include "server/session/wall_clock.h"
@@ -67,8 +68,6 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   const std::vector<std::unique_ptr<Station>>& stations() const noexcept { return stations_; }
 
  private:
-  struct ReverseConnection;
-
   void onConnected(Session& session) override;
   void onCaughtUp(Session& session) override;
   void onSubscribed(Session& session, wire::LocalSender name) override;
@@ -91,20 +90,12 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   void openSocket();
   bool isNear(std::uint32_t address) const;
   net::Connection secured(net::Connection connection) override;
-  void admit(Session& session);
   void onIdentify(Session& session, const wire::MessageReceived& message);
   void identify(Session& session, std::string_view token, wire::LocalSender name);
-  bool mayOnlyStop(const Session& session) const noexcept;
   Session& addSession(net::Connection connection, std::unique_ptr<net::UdpSocket> udp, SessionMode mode);
-  void onUdpRequest(std::span<const std::byte> datagram, const net::Endpoint& from);
-  void connectToClient(const net::Endpoint& client);
   void openDevice(const DeviceConfig& device);
   void openWeb();
   void openHaply();
-  bool hasRoom(const std::string& source) const;
-  void evictUnfinished();
-  void checkMemory();
-  void forgetSource(const std::string& source);
   SceneHost& sceneFor(const DeviceConfig& device);
   void startScene(SceneHost& scene);
   void startPlaying();
@@ -118,7 +109,7 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   void onSceneMessage(Session& session, Station& station, const wire::MessageReceived& message);
   void onRelieved(scene::ClientId client);
   void releaseForces(scene::ClientId client);
-  void closeStaleHandshakes();
+  std::map<scene::ClientId, std::size_t> waitingCommands() const;
   void checkHeartbeats();
   bool mayCommand(Session& session, Station& station, const wire::MessageReceived& message);
   Station* stationOf(wire::LocalSender name) noexcept;
@@ -137,21 +128,15 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   Recordings recordings_;           ///< outlives scenes and stations
   std::vector<std::unique_ptr<SceneHost>> scenes_;
   std::vector<std::unique_ptr<Station>> stations_;
-  std::map<scene::ClientId, std::unique_ptr<Session>> sessions_;
-  std::map<std::string, std::size_t> sessionsOf_;  ///< number by address
-  // Clients beyond the limits, oldest first. Each kind of way has a reserve of its own: a flood on one must
-  // not keep a stop on another from its turn.
-  std::array<std::deque<scene::ClientId>, 3> reserves_;
-  std::map<scene::ClientId, base::Nanos> handshakes_;  ///< start times of unfinished handshakes
-  std::set<scene::ClientId> unfinished_;               ///< without a greeting, oldest first
-  std::set<Station*> unfinishedReports_;               ///< with clients that a pass has not reached yet
-  int markers_ = 0;                                    ///< in the present second
-  scene::ClientId refusalSentTo_ = 0;  ///< client already notified of a refusal during this read; 0: none
-  std::vector<std::unique_ptr<ReverseConnection>> reverseConnections_;
+  Sessions sessions_;
+  Admission admission_{config_.limits, sessions_};
+  std::set<Station*> unfinishedReports_;  ///< with clients that a pass has not reached yet
+  int markers_ = 0;                       ///< in the present second
+  scene::ClientId refusalSentTo_ = 0;     ///< client already notified of a refusal during this read; 0: none
   std::vector<net::Subscription> subscriptions_;
   std::unique_ptr<net::TcpListener> listener_;
   std::unique_ptr<net::LocalListener> localListener_;
-  std::unique_ptr<net::UdpSocket> requests_;
+  std::unique_ptr<ReverseConnections> requests_;
   std::unique_ptr<WebServer> web_;
   std::unique_ptr<HaplyPort> haply_;  ///< null unless configured
   scene::ClientId nextClient_ = 1;

@@ -52,9 +52,7 @@ void ServerLink::onRequest(wire::ByteView bytes, const net::Endpoint& from) {
   } catch (const net::Error&) {
     return;
   }
-  const auto loopback = [](const net::Endpoint& end) {
-    return end.address >> 24 == net::kLoopbackAddress >> 24;
-  };
+  const auto loopback = [](const net::Endpoint& end) { return net::isLoopback(end.address); };
   if (client.address != from.address && !(loopback(client) && loopback(from))) return;
   const auto known = [&](const net::Connection& connection) { return connection.remote() == client; };
   if (std::any_of(calling_.begin(), calling_.end(), known)) return;

@@ -163,7 +163,7 @@ void checkAccess(const Checker& check, const ServerConfig& config) {
 
 // Whether other machines can reach this address of ours.
 bool reachesOut(const std::string& address) {
-  return net::Endpoint::parse(address, 1).address >> 24 != 127;
+  return !net::isLoopback(net::Endpoint::parse(address, 1).address);
 }
 
 void checkTransport(const Checker& check, const ServerConfig& config) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <climits>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -82,6 +83,9 @@ class Session {
   const net::Endpoint& remote() const noexcept { return connection_.remote(); }
   /// The client's IPv4 address, without the port.
   std::string address() const { return connection_.remote().addressText(); }
+
+  /// What counts as one address: on the Unix socket, a user.
+  std::string source() const { return user_ ? "user " + std::to_string(*user_) : address(); }
 
   SessionMode mode() const noexcept { return mode_; }
   /// Most messages per second besides stops and those that fill meshes; beyond it the session ends.
@@ -209,5 +213,8 @@ class Session {
   std::array<wire::Time, wire::kMessageKinds>
       lastReliable_{};  // newest reliable message of each kind, client's clock
 };
+
+/// The clients of a server; those that came first come first.
+using Sessions = std::map<scene::ClientId, std::unique_ptr<Session>>;
 
 }  // namespace hapticd::server

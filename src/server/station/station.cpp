@@ -308,8 +308,7 @@ bool Station::Impl::takeTicks(const WallClock& wallClock) {
   return any;
 }
 
-bool Station::report(const WallClock& clock,
-                     const std::map<scene::ClientId, std::unique_ptr<Session>>& clients) {
+bool Station::report(const WallClock& clock, const Sessions& clients) {
   Impl& impl = *impl_;
   const bool newer = impl.takeTicks(clock);
   if (impl.passUpTo) {

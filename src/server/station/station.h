@@ -102,7 +102,7 @@ class Station {
   /// clients, for FreshTicks::kSlice at most. When the net thread is behind, only the newest ticks are
   /// reported, see FreshTicks. When newer ticks came half-way, the next pass sends them to the clients
   /// before, also without a new tick. Returns whether clients remain in this pass: call it again soon.
-  bool report(const WallClock& clock, const std::map<scene::ClientId, std::unique_ptr<Session>>& clients);
+  bool report(const WallClock& clock, const Sessions& clients);
 
  private:
   struct Impl;
