@@ -113,13 +113,16 @@ void Judge::onWrite(Nanos clock, const Vec3& force_N, bool accepted) {
   // After the ramp a hand that is inside must be pushed out; a few ticks belong to geometry on its way.
   constexpr double kDeep_m = 0.0015;
   constexpr int kMostTicks = 40;
-  const auto tops_m = knows_.tops_m();
-  const double lowest_m = tops_m ? tops_m->first : 0;
+  const std::optional<Top> top = knows_.top();
+  const double lowest_m = top ? top->lowest_m : 0;
   const bool ramped = tick_ - zeroAt_ > limits_.rampIn + 20'000'000;
-  // Without a force nothing keeps the hand from where an object may release it.
-  if (!tops_m || held() || gap_ > 3 * limits_.period) {
+  // Without a force nothing keeps the hand from where an object may release it. A hand that leaps beside the
+  // cube is held by its side when it comes back.
+  constexpr double kRim_m = 0.0005;
+  const double beside_m = std::max(std::abs(position_m_.x()), std::abs(position_m_.z()));
+  if (!top || held() || gap_ > 3 * limits_.period || beside_m > top->halfWidth_m - kRim_m) {
     outside_ = false;
-  } else if (position_m_.y() > tops_m->second + 0.002) {
+  } else if (position_m_.y() > top->highest_m + 0.002) {
     outside_ = true;
   }
   const bool deep = inTick && outside_ && position_m_.y() < lowest_m - kDeep_m;

@@ -32,13 +32,19 @@ class Judge {
     Nanos oldest = 3'000'000;    ///< a tick that takes longer until its write has no force
   };
 
+  /// The top of the cube of late, a square around the axis of height.
+  struct Top {
+    double lowest_m;
+    double highest_m;
+    double halfWidth_m;
+  };
+
   /// What the judge asks in every tick.
   struct Knowledge {
     std::function<void(const std::string&)> finding;
     /// Since when nobody has a right to a force; nothing when somebody has.
     std::function<std::optional<Nanos>()> freeFrom;
-    /// The lowest and the highest place of the top of the cube of late, metres; nothing while unknown.
-    std::function<std::optional<std::pair<double, double>>()> tops_m;
+    std::function<std::optional<Top>()> top;  ///< nothing while unknown
   };
 
   Judge(Limits limits, Knowledge knowledge) : limits_(limits), knows_(std::move(knowledge)) {}
@@ -70,7 +76,7 @@ class Judge {
 
   std::vector<Nanos> stops_;  // not yet seen by a tick
   std::optional<Nanos> suspended_;
-  bool outside_ = false;  // the hand was above the cube, and has not leapt since
+  bool outside_ = false;  // the hand was above the cube, and since then never beside it
   Nanos rearmed_ = -1;
   Nanos tick_ = 0;     // start of this one, as the servo calls it
   Nanos started_ = 0;  // the same on the clock

@@ -18,7 +18,7 @@ using hapticd::sim::Script;
 
 constexpr char kHelp[] =
     "Usage: hapticd-sim [--seeds A-B | --seed N] [--seconds S] [--cpu S] [--first] [--twice] [--shrink] "
-    "[--verbose]\n"
+    "[--shrink-cpu S] [--verbose]\n"
     "Runs the whole server in one thread on a virtual clock, among clients and faults drawn from a seed.\n"
     "  --seeds A-B    these seeds (1-20)\n"
     "  --seed N       one seed\n"
@@ -27,6 +27,7 @@ constexpr char kHelp[] =
     "  --first        ends after the first run with a finding\n"
     "  --twice        runs each seed twice and requires the same hash\n"
     "  --shrink       after a finding: removes what it does not need, and prints the rest\n"
+    "  --shrink-cpu S after this much processor time for each finding, the shortest so far (60)\n"
     "  --verbose      prints the log of the server with virtual times\n"
     "Exit status: 0 without findings, 1 with, 2 for a wrong command line.\n";
 
@@ -53,10 +54,20 @@ std::string kindOf(const Outcome& outcome) {
   return kind.substr(0, 60);
 }
 
-// Removes actions and faults for as long as a finding of the same kind remains.
-Script shrink(Script script, const Outcome& first) {
+// Removes actions and faults for as long as a finding of the same kind remains and time is left.
+Script shrink(Script script, const Outcome& first, double budget_s) {
   const std::string kind = kindOf(first);
-  const auto still = [&](const Script& candidate) { return kindOf(run(candidate)) == kind; };
+  const double begin_s = cpuSeconds();
+  const auto left = [&] { return cpuSeconds() - begin_s < budget_s; };
+  std::size_t tried = 0;
+  const auto still = [&](const Script& candidate) {
+    if (!left()) return false;
+    ++tried;
+    if (kindOf(run(candidate)) != kind) return false;
+    std::fprintf(stderr, "  %zu tried in %.1f s: %.3f s with %zu actions\n", tried, cpuSeconds() - begin_s,
+                 hapticd::base::toSeconds(candidate.length), candidate.actions.size());
+    return true;
+  };
   Script shorter = script;
   shorter.length = first.firstFinding + 50'000'000;
   std::erase_if(shorter.actions, [&](const Action& action) { return action.at > shorter.length; });
@@ -80,7 +91,7 @@ Script shrink(Script script, const Outcome& first) {
     without([fault](Script& s) -> double& { return s.faults.*fault; });
   without([](Script& s) -> hapticd::base::Nanos& { return s.networkJitter; });
   for (std::size_t part = std::max<std::size_t>(script.actions.size() / 2, 1); part > 0; part /= 2) {
-    for (std::size_t at = 0; at < script.actions.size();) {
+    for (std::size_t at = 0; at < script.actions.size() && left();) {
       Script candidate = script;
       const auto begin = candidate.actions.begin() + static_cast<std::ptrdiff_t>(at);
       const auto count = std::min(part, candidate.actions.size() - at);
@@ -92,6 +103,7 @@ Script shrink(Script script, const Outcome& first) {
       }
     }
   }
+  if (!left()) std::printf("  not all was tried in %.0f s\n", budget_s);
   return script;
 }
 
@@ -105,6 +117,7 @@ int main(int argc, char** argv) {
   std::uint64_t last = 20;
   double seconds = 20;
   double cpu = 0;
+  double shrinkCpu = 60;
   bool twice = false;
   bool stopsAtFirst = false;
   bool wantsShrink = false;
@@ -138,6 +151,9 @@ int main(int argc, char** argv) {
       twice = true;
     } else if (option == "--shrink") {
       wantsShrink = true;
+    } else if (option == "--shrink-cpu") {
+      ok = parse(value, shrinkCpu) && shrinkCpu > 0;
+      ++i;
     } else if (option == "--verbose") {
       verbose = true;
     } else {
@@ -173,7 +189,7 @@ int main(int argc, char** argv) {
     if (!outcome.findings.empty()) {
       ++failed;
       if (wantsShrink) {
-        std::printf("  what it needs:\n%s", describe(shrink(script, outcome)).c_str());
+        std::printf("  what it needs:\n%s", describe(shrink(script, outcome, shrinkCpu)).c_str());
       }
     }
     std::fflush(stdout);

@@ -193,7 +193,7 @@ class Simulation {
   void checkEnd();
   void checkRecording();
   std::optional<Nanos> freeFrom();
-  std::optional<std::pair<double, double>> tops_m();
+  std::optional<Judge::Top> top();
   SimClient* clientAt(const net::Endpoint& endpoint);
 
   const Script& script_;
@@ -247,7 +247,7 @@ Simulation::Simulation(const Script& script, bool verbose)
       log_([this](const auto& text) { line(text); }),
       judge_({}, {.finding = [this](const auto& text) { finding(text); },
                   .freeFrom = [this] { return freeFrom(); },
-                  .tops_m = [this] { return tops_m(); }}),
+                  .top = [this] { return top(); }}),
       bench_{
           .scheduler = scheduler_,
           .clock = clock_,
@@ -509,7 +509,7 @@ void Simulation::pose(double y) {
   cubeOwner_->send(wire::SetTransformMatrix{0, shifted(0, y, 0)});
 }
 
-std::optional<std::pair<double, double>> Simulation::tops_m() {
+std::optional<Judge::Top> Simulation::top() {
   constexpr Nanos kApplied = 1'000 * kMs;  // without stalls
   if (!cubeOwner_ || !cubeOwner_->uploaded) return std::nullopt;
   const Nanos since = clock_.now() - kApplied;
@@ -524,7 +524,7 @@ std::optional<std::pair<double, double>> Simulation::tops_m() {
     lowest = std::min(lowest, y);
     highest = std::max(highest, y);
   }
-  return std::pair(1e-3 * (kHalf + lowest), 1e-3 * (kHalf + highest));
+  return Judge::Top{1e-3 * (kHalf + lowest), 1e-3 * (kHalf + highest), 1e-3 * kHalf};
 }
 
 void Simulation::upload(Dice& dice) {

@@ -258,6 +258,10 @@ class Referee {
         (heightsBefore_ >= 0).select(Eigen::ArrayXd::Ones(sides.size()), -Eigen::ArrayXd::Ones(sides.size()));
     if (passageFound()) return;
     sides_ = sides;
+    byMemory_ = fromBehind_ = trial_.sides != Sides::both && trial_.toolRadius_m == 0;
+    const bool found = fromBehind_ && passageFound();
+    fromBehind_ = false;
+    if (found) return;
     const Face& f = reference_.face(suspects_.front());
     report("through", "from ", proxyBefore_.transpose(), " to ", rendering_.proxy_m.transpose(),
            " past face ", suspects_.front(), " of object ", f.object, ", force ",
@@ -268,11 +272,12 @@ class Referee {
   void rememberSides() {
     if (sides_.size() == 0) sides_ = seen_ = Eigen::ArrayXd::Zero(proxyHeights_.size());
     for (Eigen::Index i = 0; i < sides_.size(); ++i) {
-      const bool onPlane = std::abs(proxyHeights_[i]) <= kOnPlane * rounding_;
+      const bool on =
+          onPlane(reference_.face(static_cast<int>(i)), rendering_.proxy_m, std::abs(proxyHeights_[i]));
       const double side = proxyHeights_[i] >= 0 ? 1 : -1;
-      const bool keep = byMemory_ && sides_[i] != 0 && onPlane;
+      const bool keep = byMemory_ && sides_[i] != 0 && on;
       if (!keep) sides_[i] = side;
-      if (!onPlane || seen_[i] == 0) seen_[i] = side;
+      if (!on) seen_[i] = side;
     }
   }
 
@@ -304,8 +309,18 @@ class Referee {
   }
   Point lifted(int i, const Point& p) const {
     const Face& f = reference_.face(i);
-    if (std::abs(f.normal.dot(p - f.a)) > kOnPlane * rounding_) return p;
-    return p + 2 * kOnPlane * rounding_ * sides_[i] * f.normal;
+    const double height = std::abs(f.normal.dot(p - f.a));
+    if (!onPlane(f, p, height)) return p;
+    return p + std::max(2 * kOnPlane * rounding_, kOnPlane * rounding_ + height) * sides_[i] * f.normal;
+  }
+  // Within rounding. That of the corners tilts the plane of a narrow face: its height is known the less the
+  // farther a place is beyond the face, in widths.
+  bool onPlane(const Face& f, const Point& p, double height) const {
+    const double least = kOnPlane * rounding_;
+    if (height <= least || f.unbounded) return height <= least;
+    if (height > least * (1 + (p - f.a).norm() / f.width)) return false;
+    const double distance2 = (nearestOf(f, p) - p).squaredNorm();
+    return height <= least * (1 + std::sqrt(std::max(0.0, distance2 - height * height)) / f.width);
   }
 
   // The follower: from the proxy's place before, carried with each face, to its place now.
@@ -344,8 +359,9 @@ class Referee {
                                    std::initializer_list<double> widenings = {kSuspect_m, 0}) const {
     for (const double widening : widenings) {
       const auto visible = [&](const Point& q) {
-        return std::none_of(space.faces().begin(), space.faces().end(),
-                            [&](int i) { return reference_.pierces(i, previousPlace(i), q, widening); });
+        return std::none_of(space.faces().begin(), space.faces().end(), [&](int i) {
+          return reference_.pierces(i, previousPlace(i), q, widening) && !touchesFromBehind(i, q);
+        });
       };
       for (const int i : suspects_) {
         const Point base = previousPlace(i);
@@ -354,6 +370,16 @@ class Referee {
       }
     }
     return std::nullopt;
+  }
+
+  // The point tool touches as a ball, and its proxy is reported on the faces that hold it. A one-sided face
+  // between the two, which does not hold it, has let the ball's surface through from behind, and not yet the
+  // ball.
+  bool touchesFromBehind(int i, const Point& ball) const {
+    const Face& f = reference_.face(i);
+    const Point p = reference_.moved() ? reference_.carried(proxyBefore_, i) : proxyBefore_;
+    return fromBehind_ && !f.unbounded && !onPlane(f, p, std::abs(f.normal.dot(p - f.a))) &&
+           (ball - p).norm() <= 2.5 * kFollower_m && !reference_.touchableFrom(f, f.normal.dot(ball - f.a));
   }
 
   std::optional<Point> placeNow(FreeSpace& space) const {
@@ -612,7 +638,8 @@ class Referee {
   double rounding_ = 0;           // of float coordinates: no side is decided below it
   Eigen::ArrayXd heightsBefore_;  // of the proxy
   Eigen::ArrayXd sides_;          // of the faces, +-1, where the proxy was
-  Eigen::ArrayXd seen_;           // the same, where it was last off their planes
+  Eigen::ArrayXd seen_;           // the same, where it was last off their planes; 0: never
+  bool fromBehind_ = false;       // the ball of a point tool may be behind one-sided faces
   bool byMemory_ = false;         // on the plane of a face, the proxy counts as on the side where it was
   Eigen::ArrayXd proxyHeights_;
   Eigen::ArrayXd hipHeights_;

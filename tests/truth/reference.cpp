@@ -149,7 +149,10 @@ void Reference::place(std::size_t i, int tick) {
     const double longest = std::sqrt(
         std::max({(f.b - f.a).squaredNorm(), (f.c - f.b).squaredNorm(), (f.a - f.c).squaredNorm()}));
     f.thin = !(area2 > kThin * std::max(extent_, 1e-3) * longest);
-    if (area2 > 0 && std::isfinite(area2)) f.normal = cross / area2;
+    if (area2 > 0 && std::isfinite(area2)) {
+      f.normal = cross / area2;
+      f.width = area2 / longest;
+    }
     setHeights(firstFace_[i] + k);
   }
 }

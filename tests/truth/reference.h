@@ -17,6 +17,7 @@ struct Face {
   Point normal;            ///< unit, out of the front
   int object = 0;          ///< -1 - index for a plane of the scene
   bool unbounded = false;  ///< a plane: through a, solid below
+  double width = 0;        ///< smallest height of the triangle
   /// So thin that a renderer may leave it out, because its rounding hides it: it may be felt and it may be
   /// missed.
   bool thin = false;
