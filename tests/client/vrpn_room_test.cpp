@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <cstdio>
 #include <fstream>
 #include <map>
 #include <memory>
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "client/vrpn_room.h"
+#include "client/vrpn_values.h"
 #include "net/loopback.h"
 
 namespace hapticd {
@@ -187,6 +189,17 @@ TEST(VrpnRoom, ClientSaysToARecordedServerWhatVrpnDoes) {
   server.join();
   EXPECT_TRUE(done);
   expectSame(heard.said(), asMeant(expected.said()));
+}
+
+TEST(VrpnValues, AreThoseOfVrpn) {
+  FILE* const file = std::tmpfile();
+  ASSERT_NE(file, nullptr);
+  writeValues(file);
+  std::rewind(file);
+  std::string values(1 << 16, '\0');
+  values.resize(std::fread(values.data(), 1, values.size(), file));
+  std::fclose(file);
+  EXPECT_EQ(values, roomRecording("values.txt"));
 }
 
 }  // namespace
