@@ -459,13 +459,16 @@ TEST(VrpnLoopback, ARequestToLogIsAnswered) {
   vrpn_Auxiliary_Logger_Remote remote("Logger", connection.get());
   std::vector<std::string> reports;
   remote.register_report_handler(&reports, [](void* list, const vrpn_AUXLOGGERCB r) {
-    static_cast<std::vector<std::string>*>(list)->push_back(
-        std::string(r.local_in_logfile_name) + ',' + r.local_out_logfile_name + ',' +
-        r.remote_in_logfile_name + ',' + r.remote_out_logfile_name);
+    std::string report;
+    for (const char* file : {r.local_in_logfile_name, r.local_out_logfile_name, r.remote_in_logfile_name,
+                             r.remote_out_logfile_name}) {
+      report += file != nullptr ? std::string(file) + ',' : "NULL,";
+    }
+    static_cast<std::vector<std::string>*>(list)->push_back(report);
   });
   EXPECT_TRUE(remote.send_logging_request("a", "", "bc", nullptr));
   EXPECT_TRUE(remote.send_logging_status_request());
-  EXPECT_EQ(reports, (std::vector<std::string>{"a,,bc,", ",,,none"}));
+  EXPECT_EQ(reports, (std::vector<std::string>{"a,NULL,bc,NULL,", "NULL,NULL,NULL,none,"}));
 }
 
 TEST(VrpnLoopback, StampsOfSeveralHostsAreOrdered) {

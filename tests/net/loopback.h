@@ -54,10 +54,7 @@ inline std::shared_ptr<const Buffer> bufferOf(std::string_view text) {
 /// A plain blocking socket, with a time limit on each read that only a hang reaches.
 class RawSocket {
  public:
-  explicit RawSocket(int type = SOCK_STREAM) : fd_(::socket(AF_INET, type, 0)) {
-    const timeval limit{30, 0};
-    ::setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
-  }
+  explicit RawSocket(int type = SOCK_STREAM) : RawSocket(Taken{}, ::socket(AF_INET, type, 0)) {}
   RawSocket(RawSocket&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
   ~RawSocket() { close(); }
 
@@ -71,6 +68,10 @@ class RawSocket {
       throw std::runtime_error(std::string("connect: ") + std::strerror(errno));
     }
     return socket;
+  }
+
+  static RawSocket accepted(const RawSocket& listener) {
+    return RawSocket(Taken{}, ::accept(listener.fd_, nullptr, nullptr));
   }
 
   Endpoint bindToAnyPort() {
@@ -102,6 +103,14 @@ class RawSocket {
     return text;
   }
 
+  /// What is there, after waiting for it; nothing at the end.
+  std::string receiveSome() {
+    std::string text(4096, '\0');
+    const ssize_t got = ::recv(fd_, text.data(), text.size(), 0);
+    text.resize(got > 0 ? static_cast<std::size_t>(got) : 0);
+    return text;
+  }
+
   void shutdownSend() { ::shutdown(fd_, SHUT_WR); }
   void reset() {
     const linger now{1, 0};
@@ -124,6 +133,12 @@ class RawSocket {
   }
 
  private:
+  struct Taken {};
+  RawSocket(Taken, int fd) : fd_(fd) {
+    const timeval limit{30, 0};
+    ::setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
+  }
+
   int fd_;
 };
 

@@ -8,7 +8,7 @@
 
 #include "vrpn_BaseClass.h"
 
-/// The messages: four names of files. NULL and "" are no file.
+/// The messages: four names of files. NULL and "" are no file; handlers get NULL.
 class vrpn_Auxiliary_Logger : public vrpn_BaseClass {
  public:
   vrpn_Auxiliary_Logger(const char* name, vrpn_Connection* connection = NULL)
@@ -56,6 +56,8 @@ class vrpn_Auxiliary_Logger : public vrpn_BaseClass {
     return left == 0;
   }
 
+  static const char* nameOrNull(const std::string& file) { return file.empty() ? NULL : file.c_str(); }
+
   vrpn_int32 request_logging_m_id = -1;
   vrpn_int32 report_logging_m_id = -1;
   vrpn_int32 request_logging_status_m_id = -1;
@@ -89,7 +91,7 @@ class vrpn_Auxiliary_Logger_Server : public vrpn_Auxiliary_Logger {
     std::string files[4];
     if (!unpack(p, files)) return 0;
     static_cast<vrpn_Auxiliary_Logger_Server*>(self)->handle_request_logging(
-        files[0].c_str(), files[1].c_str(), files[2].c_str(), files[3].c_str());
+        nameOrNull(files[0]), nameOrNull(files[1]), nameOrNull(files[2]), nameOrNull(files[3]));
     return 0;
   }
   static int VRPN_CALLBACK onStatusRequest(void* self, vrpn_HANDLERPARAM) {
@@ -136,8 +138,8 @@ class vrpn_Auxiliary_Logger_Remote : public vrpn_Auxiliary_Logger {
   static int VRPN_CALLBACK onReport(void* self, vrpn_HANDLERPARAM p) {
     std::string files[4];
     if (!unpack(p, files)) return 0;
-    const vrpn_AUXLOGGERCB report = {p.msg_time, files[0].c_str(), files[1].c_str(), files[2].c_str(),
-                                     files[3].c_str()};
+    const vrpn_AUXLOGGERCB report = {p.msg_time, nameOrNull(files[0]), nameOrNull(files[1]),
+                                     nameOrNull(files[2]), nameOrNull(files[3])};
     static_cast<vrpn_Auxiliary_Logger_Remote*>(self)->reports_.call_handlers(report);
     return 0;
   }

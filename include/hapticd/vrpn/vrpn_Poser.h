@@ -9,7 +9,8 @@ class vrpn_Poser : public vrpn_BaseClass {
   vrpn_Poser(const char* name, vrpn_Connection* connection = NULL) : vrpn_BaseClass(name, connection) {}
 };
 
-/// Asks a device of another VRPN server for poses (metres, quaternions x y z w) and velocities.
+/// Asks a device of another VRPN server for poses (metres, quaternions x y z w) and velocities. Each request
+/// returns 1, or 0 when it could not be sent.
 class vrpn_Poser_Remote : public vrpn_Poser {
  public:
   vrpn_Poser_Remote(const char* name, vrpn_Connection* connection = NULL) : vrpn_Poser(name, connection) {}
@@ -34,7 +35,7 @@ class vrpn_Poser_Remote : public vrpn_Poser {
  private:
   int request(const char* type, const struct timeval& t, const vrpn_float64* vector,
               const vrpn_float64* quaternion, const vrpn_float64* interval) {
-    if (d_connection == NULL) return -1;
+    if (d_connection == NULL) return 0;
     char payload[8 * sizeof(vrpn_float64)];
     char* at = payload;
     vrpn_int32 left = sizeof payload;
@@ -43,7 +44,7 @@ class vrpn_Poser_Remote : public vrpn_Poser {
     if (interval != NULL) vrpn_buffer(&at, &left, *interval);
     return d_connection->pack_message(static_cast<vrpn_uint32>(at - payload), t,
                                       d_connection->register_message_type(type), d_sender_id, payload,
-                                      vrpn_CONNECTION_RELIABLE);
+                                      vrpn_CONNECTION_LOW_LATENCY) == 0;
   }
 };
 

@@ -89,7 +89,8 @@ vrpn_bool vrpn_Connection::doing_okay() const {
   return link_ || served_;
 }
 vrpn_bool vrpn_Connection::connected() const {
-  return served_ ? clients_ > 0 : link_ && link_->connected();
+  // A loopback has no clients: this program is connected to itself.
+  return served_ ? clients_ > 0 || servedPort() == 0 : link_ && link_->connected();
 }
 // The devices of a server are in this program.
 bool vrpn_Connection::heard(vrpn_int32 sender) const {
