@@ -81,4 +81,11 @@ void LiveTable::show(const std::vector<std::string>& lines) {
   height_ = shown;
 }
 
+void LiveTable::say(const std::string& line) {
+  if (height_ > 0) std::printf("\x1b[%zuA", height_);
+  std::printf("\x1b[J%s\n", line.c_str());
+  std::fflush(stdout);
+  height_ = 0;
+}
+
 }  // namespace hapticd::apps

@@ -31,6 +31,8 @@ class ProgressBar {
 class LiveTable {
  public:
   void show(const std::vector<std::string>& lines);
+  /// Replaces the table by a line that stays; the next table comes below it.
+  void say(const std::string& line);
 
  private:
   std::size_t height_ = 0;

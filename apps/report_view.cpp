@@ -74,13 +74,14 @@ std::vector<std::string> ReportView::table(const ReportSummary& summary) {
   add("  touching   %s  object %d  depth %.3f mm  angle %.1f deg  %.0f %% of time",
       latest.touching.touching ? "yes" : "no ", latest.touchedObject.object, latest.depth.depth_m * 1000,
       latest.angle.angle_deg, 100 * summary.contactFraction());
+  // Above the rates: a low terminal shows the first lines only.
+  if (!summary.texts().empty()) lines.push_back("  server: " + summary.texts().back().first);
   for (std::size_t i = 0; i < kReportKinds; ++i) {
     const auto kind = static_cast<ReportKind>(i);
     if (now[kind].count == 0) continue;
     add("  %-15s %8.0f /s  %llu", std::string(nameOf(kind)).c_str(), now.ratePerSecond(kind, before_),
         static_cast<unsigned long long>(summary.count(kind)));
   }
-  if (!summary.texts().empty()) lines.push_back("  server: " + summary.texts().back().first);
   before_ = now;
   return lines;
 }

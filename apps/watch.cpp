@@ -63,9 +63,14 @@ void printCsv(const record::Sample& sample) {
   std::fputs(row.c_str(), stdout);
 }
 
+void printError(const std::string& line) {
+  std::fprintf(stderr, "%s\n", line.c_str());
+}
+
 // Returns after `seconds` or at a stop signal. The client connects again when the server comes back.
-template <class OnInterval>
-void pollUntilEnd(Client& client, double seconds, std::chrono::nanoseconds interval, OnInterval onInterval) {
+template <class OnInterval, class OnConnection>
+void pollUntilEnd(Client& client, double seconds, std::chrono::nanoseconds interval, OnInterval onInterval,
+                  OnConnection onConnection) {
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
   auto next = start + interval;
@@ -80,9 +85,8 @@ void pollUntilEnd(Client& client, double seconds, std::chrono::nanoseconds inter
     const auto left = std::max(next - Clock::now(), Clock::duration::zero());
     client.poll(std::min<std::chrono::nanoseconds>(left, 20ms));  // short, so that signals take effect
     if (connected != client.connected())
-      std::fprintf(stderr,
-                   connected ? "the connection to %s was lost; waiting for it\n" : "connected to %s again\n",
-                   client.server().c_str());
+      onConnection(connected ? "the connection to " + client.server() + " was lost; waiting for it"
+                             : "connected to " + client.server() + " again");
     connected = client.connected();
   }
 }
@@ -99,11 +103,12 @@ void stream(Client& client, const WatchOptions& options) {
     client.subscribe(Reports::tick, rate_Hz);
   }
   const auto period = std::chrono::nanoseconds(std::llround(1e9 / rate_Hz));
-  pollUntilEnd(client, options.seconds, period, [&] {
+  const auto flush = [&] {
     if (!whole) print(sampleOf(client.device(), composed(client.latest())));
     std::fflush(stdout);
     if (std::ferror(stdout) != 0) throw Error("cannot write to standard output: the reader has closed it");
-  });
+  };
+  pollUntilEnd(client, options.seconds, period, flush, printError);
 }
 
 void show(Client& client, const WatchOptions& options) {
@@ -113,13 +118,21 @@ void show(Client& client, const WatchOptions& options) {
   LiveTable table;
   summary.restart();
   const bool live = onTerminal();
-  pollUntilEnd(client, options.seconds, live ? 100ms : 1000ms, [&] {
+  const auto print = [&] {
     if (live) {
       table.show(view.table(summary));
     } else {
       view.printLine(summary);
     }
-  });
+  };
+  const auto say = [&](const std::string& line) {
+    if (live) {
+      table.say(line);
+    } else {
+      printError(line);
+    }
+  };
+  pollUntilEnd(client, options.seconds, live ? 100ms : 1000ms, print, say);
   std::printf("%s", summary.text().c_str());
 }
 

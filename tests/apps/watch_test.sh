@@ -18,3 +18,16 @@ awk -F, 'NR == 1 { columns = NF; for (i = 1; i <= NF; i++) c[$i] = i; next }
 "$hapticd" watch "Phantom@tcp://$address" --json --seconds 1 >"$work/json"
 grep -qE '^\{"device":"Phantom","time_ns":"[0-9]{19}","tick":[0-9]+,.*"force_N":\[[^]]*\],.*\}$' "$work/json"
 "$hapticd" watch "Phantom@tcp://$address" --seconds 2 | grep -q 'reports total'
+
+# On a terminal of 80x24 each redraw fits: fewer lines than rows, fewer characters than columns.
+TERM=xterm LC_ALL=C.UTF-8 script -qec "stty rows 24 cols 80; '$hapticd' watch Phantom@$address --seconds 3" /dev/null \
+  </dev/null >"$work/terminal"
+python3 - "$work/terminal" <<'EOF'
+import re, sys
+frames = open(sys.argv[1], encoding="utf-8", newline="").read().replace("\r", "").split("\x1b[J")[:-1]
+assert len(frames) > 10, len(frames)
+for frame in frames:
+    lines = re.sub(r"\x1b\[K|\x1b\[\d+A", "", frame).split("\n")[:-1]
+    assert len(lines) < 24 and max(map(len, lines)) < 80, frame
+    assert all(any(word in line for line in lines) for word in ("force", "|F|", "depth", "touching")), frame
+EOF

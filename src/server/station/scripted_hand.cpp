@@ -1,11 +1,15 @@
 #include "server/station/scripted_hand.h"
 
+#include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <optional>
 
 #include "base/time.h"
+#include "device/simulated/simulated_device.h"
 #include "geometry/rotation.h"
+#include "realtime/render/renderer.h"
 
 namespace hapticd::server {
 namespace {
@@ -27,9 +31,12 @@ constexpr double kLongestStroke_m = 0.1;
 constexpr std::size_t kShortestStroke = 5;  // points; shorter ones are taken only for want of others
 constexpr double kSlideSpeed_m_per_s = 0.06;
 constexpr double kFreeSpeed_m_per_s = 0.15;
-constexpr double kSteepest = 0.5;         // lower bound of the cosine between surface normal and approach
-constexpr double kSharpest = 0.77;        // lower bound of the cosine between normals of neighbouring points
-constexpr double kCurl_rad = 0.05;        // turn of the heading from point to point
+constexpr double kSteepest = 0.5;  // lower bound of the cosine between surface normal and approach
+constexpr double kLag_m = 0.0035;  // of the hand behind the path: more, and something holds it back
+constexpr Nanos kRehearsedTick = 2'000'000;
+constexpr double kMargin_m = 0.004;  // of surface around each point: near a border the hand slips behind it
+constexpr double kSharpest = 0.77;   // lower bound of the cosine between normals of neighbouring points
+constexpr double kCurl_rad = 0.05;   // turn of the heading from point to point
 constexpr double kSmallObject_m = 0.06;   // diagonal below which steps and depths shrink with the object
 constexpr double kAboveSurface_m = 2e-5;  // start of a segment that must not hit the surface it starts from
 
@@ -98,16 +105,17 @@ class StrokePlanner {
 
   /// Where the surface is met from `start`, a point on the sphere around everything, on the way to `target`;
   /// nothing where it is too steep to press on, or where there is no way out.
-  std::optional<SurfacePoint> approach(const Vec3& start, const Vec3& target) const {
+  std::optional<SurfacePoint> approach(const Vec3& start, const Vec3& target, bool roomy) const {
     const Vec3 way = (target - start).normalized();
     const auto found = first(start, start + 2 * outside_ * way);
-    if (!found || found->normal.dot(-way) < kSteepest || !wayOut(*found)) return std::nullopt;
+    if (!found || found->normal.dot(-way) < kSteepest || (roomy && !goesOn(*found)) || !wayOut(*found))
+      return std::nullopt;
     return found;
   }
 
   /// Follows the surface like a finger: straight over it with a slow turn, and to another side in front of an
   /// edge, a wall or a place without a way out. Starts with `from`.
-  std::vector<SurfacePoint> stroke(const SurfacePoint& from, Vec3 heading) const {
+  std::vector<SurfacePoint> stroke(const SurfacePoint& from, Vec3 heading, bool roomy) const {
     static constexpr double kTurns_rad[] = {0, 0.9, -0.9, 1.8, -1.8};
     std::vector<SurfacePoint> points{from};
     const int most = static_cast<int>(kLongestStroke_m / kStep_m);
@@ -120,7 +128,7 @@ class StrokePlanner {
       Vec3 chosen;
       for (const double turn : kTurns_rad) {
         chosen = Eigen::AngleAxisd(turn + kCurl_rad, last.normal) * heading;
-        next = step(last, chosen);
+        next = step(last, chosen, roomy);
         if (next) break;
       }
       if (!next) break;
@@ -161,12 +169,25 @@ class StrokePlanner {
     return firstSurface(scene_, from, to, now_);
   }
 
-  std::optional<SurfacePoint> step(const SurfacePoint& from, const Vec3& heading) const {
+  // Whether the surface goes on around a point.
+  bool goesOn(const SurfacePoint& at) const {
+    const double margin = size_ * kMargin_m;
+    const Vec3 u = margin * at.normal.unitOrthogonal();
+    const Vec3 v = at.normal.cross(u);
+    for (const Vec3& side : {u, v, Vec3(-u), Vec3(-v)}) {
+      const Vec3 above = at.position + side + margin * at.normal;
+      if (!first(above, above - 2 * margin * at.normal)) return false;
+    }
+    return true;
+  }
+
+  std::optional<SurfacePoint> step(const SurfacePoint& from, const Vec3& heading, bool roomy) const {
     const double lift = size_ * kLift_m;
     const Vec3 above = from.position + size_ * kStep_m * heading + lift * from.normal;
     if (first(from.position + lift * from.normal, above)) return std::nullopt;
     auto next = first(above, above - 2 * lift * from.normal);
-    if (!next || next->normal.dot(from.normal) < kSharpest || !wayOut(*next)) return std::nullopt;
+    if (!next || next->normal.dot(from.normal) < kSharpest || (roomy && !goesOn(*next)) || !wayOut(*next))
+      return std::nullopt;
     return next;
   }
 
@@ -187,6 +208,12 @@ class PathBuilder {
     const double time = path_.back().time_s + std::max(distance / speed_m_per_s, 0.05);
     path_.push_back({time, position, orientation, press ? 1U : 0U});
   }
+  // Comes to rest: the hand would swing out of a sharp turn.
+  void rest() {
+    device::Waypoint still = path_.back();
+    still.time_s += 0.05;
+    path_.push_back(still);
+  }
   // On a great circle around the centre: a straight line could cross the objects.
   void arcTo(const Vec3& position, const Vec3& centre, const Quat& orientation) {
     const Vec3 from = path_.back().position_m - centre;
@@ -198,11 +225,41 @@ class PathBuilder {
       moveTo(centre + Quat::Identity().slerp(s, turn) * from, orientation, kFreeSpeed_m_per_s);
     }
   }
+  /// Waypoints from the present position on.
+  void append(const std::vector<device::Waypoint>& more) {
+    const double offset = path_.back().time_s - more.front().time_s;
+    for (auto waypoint = more.begin() + 1; waypoint != more.end(); ++waypoint) {
+      path_.push_back(*waypoint);
+      path_.back().time_s += offset;
+    }
+  }
   std::vector<device::Waypoint> take() { return std::move(path_); }
 
  private:
   std::vector<device::Waypoint> path_;
 };
+
+// Feels a path over the scene as the hand will, and returns the time at which it is held back from it, by a
+// rim, a gap or another part in front; nothing when it can follow.
+std::optional<double> heldBackAt(const std::vector<device::Waypoint>& path, const scene::SceneSnapshot& scene,
+                                 Nanos now) {
+  const auto way =
+      std::make_shared<device::WaypointPath>(path, device::WaypointPath::Repeat::no, kScriptedStrength_N);
+  device::SimulatedDevice hand;
+  hand.open();
+  hand.setPath(way);
+  realtime::Renderer renderer;
+  realtime::Rendering rendering;
+  device::DeviceState state;
+  for (Nanos t = 0; t < way->duration(); t += kRehearsedTick) {
+    hand.read(t, state);
+    if ((state.position_m - way->at(t).position_m).norm() > kLag_m)
+      return path.front().time_s + base::toSeconds(t);
+    renderer.step(scene, state, now, kRehearsedTick, rendering);
+    hand.write(rendering.force_N);
+  }
+  return std::nullopt;
+}
 
 std::vector<device::Waypoint> idleCircle(const Box& workspace) {
   constexpr int kSteps = 32;
@@ -216,6 +273,34 @@ std::vector<device::Waypoint> idleCircle(const Box& workspace) {
     const Quat turn(Eigen::AngleAxisd(0.3 * std::sin(angle), Vec3::UnitX()));
     path.moveTo(centre + radius * Vec3(std::cos(angle), 0, std::sin(angle)), turn, 0.05, i == kSteps / 2);
   }
+  return path.take();
+}
+
+bool turnsSharply(const Vec3& before, const Vec3& at, const Vec3& after) {
+  return (at - before).normalized().dot((after - at).normalized()) < 0.8;
+}
+
+// From `start` on the sphere around everything along the points and out to the sphere again.
+std::vector<device::Waypoint> strokePath(const StrokePlanner& planner, const Vec3& start,
+                                         const std::vector<SurfacePoint>& points, const Quat& stylus,
+                                         bool pressButton) {
+  std::vector<Vec3> targets;
+  for (const SurfacePoint& point : points)
+    targets.push_back(point.position - planner.pressDepth(point) * point.normal);
+  PathBuilder path(start);
+  const Vec3& first = points.front().position;
+  path.moveTo(first + planner.size() * kClearance_m * (start - first).normalized(), stylus,
+              kFreeSpeed_m_per_s);
+  path.rest();
+  for (std::size_t i = 0; i < targets.size(); ++i) {
+    path.moveTo(targets[i], stylus, kSlideSpeed_m_per_s, pressButton && i == 2);
+    if (i == 0 || i + 1 == targets.size() || turnsSharply(targets[i - 1], targets[i], targets[i + 1]))
+      path.rest();
+  }
+  const SurfacePoint& last = points.back();
+  path.moveTo(last.position + planner.size() * kLift_m * last.normal, stylus, kSlideSpeed_m_per_s);
+  path.rest();
+  path.moveTo(planner.wayOut(last).value_or(start), stylus, kFreeSpeed_m_per_s);
   return path.take();
 }
 
@@ -242,28 +327,32 @@ std::vector<device::Waypoint> planStrokes(const scene::SceneSnapshot& scene, con
   for (int stroke = 0; stroke < kStrokes; ++stroke) {
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
       const int number = stroke * kAttempts + attempt;
+      const bool roomy = attempt + 2 < kAttempts;  // then also narrow places, for want of others
       const Vec3 ray = direction(number, kStrokes * kAttempts);
       const Vec3 start = centre + outside * ray;
       // Not only towards the centre: flat and hollow things have their surface elsewhere.
       const Vec3 aside = 0.35 * bounds.extents().cwiseProduct(direction((7 * number) % 31, 31));
-      const auto first = planner.approach(start, attempt == 0 ? centre : Vec3(centre + aside));
+      const auto first = planner.approach(start, attempt == 0 ? centre : Vec3(centre + aside), roomy);
       if (!first) continue;
-      const auto points = planner.stroke(*first, ray.unitOrthogonal());
-      if (points.size() < kShortestStroke && attempt + 1 < kAttempts) continue;
-
+      std::vector<SurfacePoint> points = planner.stroke(*first, ray.unitOrthogonal(), roomy);
       const Vec3 along = ray.unitOrthogonal();
       const Quat stylus = geometry::rotationBetween(Vec3::UnitY(), (ray + 0.4 * along).normalized());
-      path.arcTo(start, centre, stylus);
-      path.moveTo(first->position + planner.size() * kClearance_m * (start - first->position).normalized(),
-                  stylus, kFreeSpeed_m_per_s);
-      for (std::size_t i = 0; i < points.size(); ++i) {
-        path.moveTo(points[i].position - planner.pressDepth(points[i]) * points[i].normal, stylus,
-                    kSlideSpeed_m_per_s, i == 2 && stroke % 3 == 0);
+      std::vector<device::Waypoint> found;
+      while (points.size() >= (roomy ? kShortestStroke : 1) && found.empty()) {
+        std::vector<device::Waypoint> tried = strokePath(planner, start, points, stylus, stroke % 3 == 0);
+        if (const auto heldBack = heldBackAt(tried, scene, now)) {
+          const auto reached = std::count_if(tried.begin() + 2, tried.end(),
+                                             [&](const auto& w) { return w.time_s < *heldBack; });
+          points.resize(std::min(points.size(), static_cast<std::size_t>(reached)) * 2 / 3);
+        } else {
+          found = std::move(tried);
+        }
       }
-      const SurfacePoint& last = points.back();
-      const Vec3 out = planner.wayOut(last).value_or(start);
-      path.moveTo(last.position + planner.size() * kLift_m * last.normal, stylus, kSlideSpeed_m_per_s);
-      path.moveTo(out, stylus, kFreeSpeed_m_per_s);
+      if (found.empty()) continue;
+      path.arcTo(start, centre, stylus);
+      path.rest();  // as felt: a path that passes a point in motion bends before and after it
+      path.append(found);
+      path.rest();
       break;
     }
   }

@@ -9,13 +9,15 @@
 
 namespace hapticd::server {
 
-/// The largest force of the scripted hand, N: a curious person presses no harder.
-inline constexpr double kScriptedStrength_N = 2;
+/// The largest force of the scripted hand's muscles, N. With its mass and what friction adds, it presses with
+/// at most 2 N, as a curious person does.
+inline constexpr double kScriptedStrength_N = 1.6;
 
 /// Plans strokes over the touchable objects of a scene: approach a point from outside, press a few
-/// millimetres in, follow the surface, lift where there is a free way out, go to the next. Deterministic; an
-/// empty scene gives a slow circle in the workspace. The path starts and ends at rest outside all objects, so
-/// it can be repeated. Metres, device frame; `now`: time of the objects' motion.
+/// millimetres in, follow the surface, lift where there is a free way out, go to the next. Each stroke is
+/// felt by a simulated hand first, and shortened or left out where something would hold the hand back.
+/// Deterministic; an empty scene gives a slow circle in the workspace. The path starts and ends at rest
+/// outside all objects, so it can be repeated. Metres, device frame; `now`: time of the objects' motion.
 std::vector<device::Waypoint> planStrokes(const scene::SceneSnapshot& scene, const geometry::Box& workspace_m,
                                           base::Nanos now);
 

@@ -8,7 +8,6 @@
 #include "device/simulated/simulated_device.h"
 #include "server/station/devices.h"
 #include "server/station/replies.h"
-#include "server/station/scripted_hand.h"
 #include "server/station/station_impl.h"
 
 namespace hapticd::server {
@@ -108,7 +107,10 @@ Station::Impl::Impl(const DeviceConfig& config_, std::vector<DeviceName> names_,
       roles(std::make_shared<Roles>(config.control, config.controlList)),
       modes(profile.buttons),
       outbox(config, profile.buttons, names),
-      recorder(config.names.front(), blackBoxFiles(config, scene_.limits()), tick.blackBox()) {}
+      recorder(config.names.front(), blackBoxFiles(config, scene_.limits()), tick.blackBox()) {
+  if (hand != nullptr && config.hand == "script")
+    explorer.emplace(*hand, workspaceOf(config, profile), config.names.front());
+}
 
 Station::Station(const DeviceConfig& config, std::vector<DeviceName> names, SceneHost& scene,
                  bool allowNoRealtime)
@@ -119,7 +121,7 @@ Station::Station(const DeviceConfig& config, std::vector<DeviceName> names, Scen
                           .published =
                               [&impl](const auto& snapshot) {
                                 impl.moving.published(*snapshot, base::now());
-                                impl.onPublished(*snapshot);
+                                impl.onPublished(snapshot);
                               },
                           .publishing =
                               [&impl](base::Nanos now, std::uint64_t revision) {
@@ -328,22 +330,13 @@ bool Station::report(const WallClock& clock, const Sessions& clients) {
   return impl.passUpTo.has_value();
 }
 
-void Station::Impl::onPublished(const scene::SceneSnapshot& snapshot) {
-  if (hand == nullptr || config.hand != "script") return;
+void Station::Impl::onPublished(const std::shared_ptr<const scene::SceneSnapshot>& snapshot) {
+  if (!explorer) return;
   std::vector<std::pair<std::int32_t, std::uint64_t>> now;
-  for (const auto& object : snapshot.objects) now.emplace_back(object->id, object->mesh->topology);
+  for (const auto& object : snapshot->objects) now.emplace_back(object->id, object->mesh->topology);
   if (now == plannedFor) return;
   plannedFor = std::move(now);
-  try {
-    hand->setPath(std::make_shared<const device::WaypointPath>(
-        planStrokes(snapshot, workspaceOf(config, profile), base::now()), device::WaypointPath::Repeat::yes,
-        kScriptedStrength_N));
-  } catch (const std::exception& error) {
-    // The scene is published all the same. Once for each change of its objects.
-    spdlog::warn(
-        "device '{}': the scripted hand finds no path over this scene and keeps the previous one: {}",
-        config.names.front(), error.what());
-  }
+  explorer->explore(snapshot);
 }
 
 DeviceStatus Station::status() const {

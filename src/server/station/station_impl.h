@@ -14,6 +14,7 @@
 #include "server/station/button_modes.h"
 #include "server/station/device_control.h"
 #include "server/station/device_keeper.h"
+#include "server/station/explorer.h"
 #include "server/station/station.h"
 #include "server/station/streamed_input.h"
 
@@ -31,7 +32,7 @@ struct Station::Impl {
   Impl(const DeviceConfig& config_, std::vector<DeviceName> names_, SceneHost& scene_,
        std::unique_ptr<device::Device> device_, bool allowNoRealtime);
 
-  void onPublished(const scene::SceneSnapshot& snapshot);
+  void onPublished(const std::shared_ptr<const scene::SceneSnapshot>& snapshot);
   bool takeTicks(const WallClock& wallClock);
   void choose(Session& session, wire::LocalSender name, ReportChoice choice, double rate_Hz,
               std::string_view call);
@@ -102,6 +103,7 @@ struct Station::Impl {
 
   // Scene thread: object ids and topologies for which the scripted hand was planned.
   std::vector<std::pair<std::int32_t, std::uint64_t>> plannedFor{{-1, 0}};
+  std::optional<Explorer> explorer;  // last: its thread steers the hand
 };
 
 }  // namespace hapticd::server

@@ -19,6 +19,7 @@
 #include "mesh_io/mesh_io.h"
 #include "realtime/servo/fakes.h"
 #include "realtime/servo/tick.h"
+#include "reduced.h"
 #include "scene/builder.h"
 #include "server/station/scripted_hand.h"
 
@@ -28,6 +29,8 @@ namespace {
 using base::Nanos;
 using geometry::TriangleMesh;
 using geometry::Vec3;
+
+constexpr int kTurns = reduced(3);
 
 // As `hapticd touch` sends it: at most 80 % of the workspace and 100 mm, centred.
 void fitIntoWorkspace(TriangleMesh& mesh) {
@@ -69,6 +72,13 @@ TriangleMesh sheet() {
   return mesh;
 }
 
+// A plate of 1 mm and 100 mm: thinner than a press is deep.
+TriangleMesh plate() {
+  TriangleMesh mesh = cube();
+  for (auto& vertex : mesh.vertices) vertex.y() *= 0.01F;
+  return mesh;
+}
+
 // A cup: a cube without its lid, with an inside that can be reached only from above.
 TriangleMesh cup() {
   TriangleMesh mesh = cube();
@@ -81,6 +91,8 @@ struct Exploration {
   int contact = 0;
   int atLimit = 0;
   int deep = 0;
+  int hard = 0;      // above what a curious person presses
+  int heldBack = 0;  // the hand is far from where the path wants it: the path went on behind something
   double deepest_m = 0;
   double slid_m = 0;
   std::set<std::tuple<int, int, int>> places;  // visited cells of 5 mm
@@ -89,13 +101,15 @@ struct Exploration {
   double part(int count) const { return contact > 0 ? static_cast<double>(count) / contact : 0; }
 };
 
-Exploration explore(const TriangleMesh& mesh, double seconds) {
+// For one round of the path.
+Exploration explore(const TriangleMesh& mesh) {
   const auto scene = sceneOf(mesh, 0.8);
   device::SimulatedDevice hand;
   hand.open();
   const auto path = planStrokes(*scene, hand.profile().workspace_m, 0);
-  hand.setPath(
-      std::make_shared<device::WaypointPath>(path, device::WaypointPath::Repeat::yes, kScriptedStrength_N));
+  const auto wanted =
+      std::make_shared<device::WaypointPath>(path, device::WaypointPath::Repeat::yes, kScriptedStrength_N);
+  hand.setPath(wanted);
   realtime::FakeClock clock;
   realtime::TickOptions options;
   options.guard = realtime::GuardOptions::of(hand.profile());
@@ -108,15 +122,17 @@ Exploration explore(const TriangleMesh& mesh, double seconds) {
   const double limit_N = 0.99 * hand.profile().peakForce_N;
   Vec3 before = Vec3::Zero();
   bool wasTouching = false;
-  for (Nanos now = 0; now < base::toNanos(seconds); now += 1'000'000) {
+  for (Nanos now = 0; now < wanted->duration(); now += 1'000'000) {
     tick(now);
     tick.reports().consume([](const realtime::TickReport&) {});
     const realtime::TickReport& report = tick.last();
     ++seen.ticks;
+    seen.heldBack += (wanted->at(now).position_m - report.device.position_m).norm() > 0.008 ? 1 : 0;
     const Vec3 point = report.rendering.scp_m;
     if (report.rendering.touching) {
       ++seen.contact;
       seen.atLimit += report.force_N.norm() >= limit_N ? 1 : 0;
+      seen.hard += report.force_N.norm() > 2 ? 1 : 0;
       seen.deep += report.rendering.depth_m > 0.006 ? 1 : 0;
       seen.deepest_m = std::max(seen.deepest_m, report.rendering.depth_m);
       if (wasTouching) seen.slid_m += (point - before).norm();
@@ -134,18 +150,24 @@ void print(const std::string& name, const Exploration& seen) {
   std::cout << name << ": path " << seen.planned_s << " s; in contact " << 100.0 * seen.contact / seen.ticks
             << " % of the time, slid " << seen.slid_m << " m over " << seen.places.size()
             << " cells of 5 mm; at the limit " << 100 * seen.part(seen.atLimit)
-            << " % of the contact, deeper than 6 mm " << 100 * seen.part(seen.deep) << " %, deepest "
-            << 1e3 * seen.deepest_m << " mm\n";
+            << " % of the contact, above 2 N " << 100 * seen.part(seen.hard) << " %, deeper than 6 mm "
+            << 100 * seen.part(seen.deep) << " %, deepest " << 1e3 * seen.deepest_m << " mm; held back "
+            << 100.0 * seen.heldBack / seen.ticks << " % of the time\n";
 }
 
 TriangleMesh shape(const std::string& name) {
   if (name == "cube") return cube();
   if (name == "sheet") return sheet();
+  if (name == "plate") return plate();
   return name == "cup" ? cup() : mesh_io::loadMesh(name);
 }
 
 std::vector<std::string> shapes() {
-  std::vector<std::string> names{"cube", "sheet", "cup", HAPTICD_TESTDATA "/meshes/bunny.obj",
+  std::vector<std::string> names{"cube",
+                                 "sheet",
+                                 "plate",
+                                 "cup",
+                                 HAPTICD_TESTDATA "/meshes/bunny.obj",
                                  HAPTICD_TESTDATA "/meshes/teapot.obj"};
   const char* files = std::getenv("HAPTICD_EXPLORE");
   std::stringstream list(files == nullptr ? "" : files);
@@ -158,15 +180,31 @@ INSTANTIATE_TEST_SUITE_P(, ScriptedHandClosedLoop, testing::ValuesIn(shapes()), 
   return std::to_string(test.index) + "_" + std::filesystem::path(test.param).stem().string();
 });
 
+// Turned, a shape meets other strokes, in another size.
+TriangleMesh turned(TriangleMesh mesh, int turn) {
+  const Eigen::Quaternionf by =
+      turn == 0 ? Eigen::Quaternionf::Identity()
+                : Eigen::Quaternionf(1, std::sin(2.3F * turn), std::sin(1.7F * turn), std::sin(3.1F * turn))
+                      .normalized();
+  for (auto& vertex : mesh.vertices) vertex = by * vertex;
+  return mesh;
+}
+
 TEST_P(ScriptedHandClosedLoop, follows_the_surface_below_the_limit_of_the_force) {
-  const Exploration seen = explore(shape(GetParam()), 40);
-  print(GetParam(), seen);
-  EXPECT_LT(seen.part(seen.atLimit), 0.01);
-  EXPECT_LT(seen.part(seen.deep), 0.01);
-  EXPECT_LT(seen.deepest_m, 0.012);
-  EXPECT_GT(seen.contact, seen.ticks / 5);
-  EXPECT_GT(seen.slid_m, 0.2);
-  EXPECT_GT(seen.places.size(), 40U);
+  const TriangleMesh mesh = shape(GetParam());
+  for (int turn = 0; turn < kTurns; ++turn) {
+    SCOPED_TRACE("turn " + std::to_string(turn));
+    const Exploration seen = explore(turned(mesh, turn));
+    print(GetParam(), seen);
+    EXPECT_EQ(seen.atLimit, 0);
+    EXPECT_LT(seen.part(seen.hard), 0.01);
+    EXPECT_LT(seen.part(seen.deep), 0.01);
+    EXPECT_LT(seen.deepest_m, 0.006);
+    EXPECT_LT(seen.heldBack, seen.ticks / 100);
+    EXPECT_GT(seen.contact, seen.ticks / 5);
+    EXPECT_GT(seen.slid_m, 0.2);
+    EXPECT_GT(seen.places.size(), 40U);
+  }
 }
 
 }  // namespace
