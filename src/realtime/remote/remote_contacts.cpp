@@ -17,6 +17,7 @@ constexpr double kShared_N_per_s = 0.45 * kRemoteRate_N_per_s;
 constexpr double kFade_N_per_s = 0.4 * kRemoteRate_N_per_s;
 constexpr double kBesideFade_N_per_s = 0.25 * kRemoteRate_N_per_s;
 constexpr double kOfAll_N_per_s = 0.75 * kRemoteRate_N_per_s;  // what corrections change in the sum
+constexpr double kLag_N_per_s = 0.2 * kRemoteRate_N_per_s;     // beside the sum
 constexpr int kTries = 4;
 constexpr double kFadeOfAll = 0.8;      // part of it that a fade may take
 constexpr double kLeast = 0.2;          // part of it for corrections, however much a fade takes
@@ -33,6 +34,11 @@ Vec3 rotationVector(const Vec3& from, const Vec3& to) noexcept {
   const double angle = std::atan2(sine, from.dot(to));
   if (sine > 1e-9) return angle / sine * cross;
   return angle < 1 ? Vec3(Vec3::Zero()) : Vec3(angle * from.unitOrthogonal());
+}
+
+Vec3 atMost(const Vec3& v, double limit) noexcept {
+  const double size = v.norm();
+  return size > limit ? Vec3(limit / size * v) : v;
 }
 
 // Brings `value` nearer to `goal`; a whole unit of change would change the force by `force_N`.
@@ -55,6 +61,7 @@ void RemoteContacts::reset() noexcept {
   top_ = 0;
   pressed_N = 0;
   force_N_.setZero();
+  lag_N_.setZero();
 }
 
 Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand, Nanos now, double step_s,
@@ -64,6 +71,7 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
   if (newest.number != taken_) take(newest, hand, now);
   if (top_ == 0) {
     force_N_.setZero();
+    lag_N_.setZero();
     return force_N_;
   }
   fadeOut(now, step_s);
@@ -80,12 +88,14 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
     leaving += slot.fading && slot.demand_N > 0;
     correcting = correcting || (!slot.fading && !isCorrected(slot));
   }
-  const bool fading = resumed || leaving > 0;
+  const bool lagging = !lag_N_.isZero(0);
+  if (lagging) lag_N_ -= atMost(lag_N_, kLag_N_per_s * step_s);
+  const bool fading = resumed || leaving > 0 || lagging;
   const double budget_N = (fading         ? kBesideFade_N_per_s
                            : changing > 1 ? kShared_N_per_s
                                           : kCorrection_N_per_s) *
                           step_s / std::max(changing, 1);
-  const bool mayRetry = (correcting || fading) && changing + leaving > 1;
+  const bool mayRetry = lagging || ((correcting || fading) && changing + leaving > 1);
   if (mayRetry) {
     std::copy_n(slots_.begin(), top_, before_.rendered.begin());
     before_.corrections = corrections_;
@@ -97,6 +107,7 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
   if (mayRetry && (force - force_N_).squaredNorm() > most_N * most_N)
     force = forceWithin(change, hand, step_s);
   force_N_ = force;
+  lag_N_ = atMost(lag_N_, pressed_N);
   for (const Slot& slot : inUse()) {
     if (!slot.used || slot.normal_N <= 0 || out.count == kMaxRemoteContacts) continue;
     out.contacts[out.count++] = {
@@ -104,8 +115,8 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
         (slot.normal_N * slot.normal + slot.friction_N).cast<float>(), static_cast<float>(slot.depth_m)};
   }
   if (held_) out.status |= kRemoteCorrectionsHeld;
-  out.contactForce_N = force;
-  return force;
+  out.contactForce_N = force + lag_N_;
+  return out.contactForce_N;
 }
 
 // Changes and solves.
@@ -153,6 +164,9 @@ Vec3 RemoteContacts::forceWithin(const Change& most, const RemoteHand& hand, dou
     change.correction_N *= 0.9 * left_N / (force - faded).norm();
     force = forceAgain(change, hand, step_s);
   }
+  // Other contacts may bear after the smallest change: then the rest of the jump comes in the next ticks.
+  const Vec3 jump = force - unchanged;
+  lag_N_ += atMost(jump, most_N) - jump;
   return force;
 }
 
@@ -385,7 +399,8 @@ Vec3 RemoteContacts::friction(Slot& slot, const RemoteHand& hand, double ofAll, 
   apart -= slot.normal.dot(apart) * slot.normal;
   const double stiffness = kLateral * slot.contact.stiffness_N_per_m * slot.normal_N / ofAll;
   const double pull = stiffness * apart.norm();
-  const double dynamic_N = slot.dynamicFriction * slot.normal_N;
+  // While the coefficients follow an update, the static one may be the smaller.
+  const double dynamic_N = std::min(slot.staticFriction, slot.dynamicFriction) * slot.normal_N;
   if (pull > (slot.sliding ? dynamic_N : slot.staticFriction * slot.normal_N)) {
     slot.sliding = true;
     apart *= dynamic_N / pull;

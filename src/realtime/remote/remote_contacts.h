@@ -97,7 +97,8 @@ class RemoteContacts {
   std::size_t top_ = 0;          // slots from here on are unused
   bool resumed_ = false;         // an update came during a fade
   Tried before_;                 // before this tick's corrections, where there are some
-  Vec3 force_N_ = Vec3::Zero();  // of the last tick
+  Vec3 force_N_ = Vec3::Zero();  // of the last tick, without the lag
+  Vec3 lag_N_ = Vec3::Zero();    // of the force on the hand, after a jump of the sum
   double pressed_N = 0;          // sum of the normal forces in the last tick
   EnergyTank corrections_{EnergyBudget{}};
   bool held_ = false;  // a correction waited for energy in this tick
