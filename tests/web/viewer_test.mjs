@@ -25,6 +25,7 @@ beforeEach(() => viewer.release());
 
 async function picture(name, of = viewer) {
   if (!pictures) return;
+  await of.until("the texts of the server are gone", () => of.ask("document.querySelector('#toasts').children.length === 0"));
   await of.settle(1500);
   await of.page.screenshot({ path: join(pictures, `viewer_${name}.png`) });
 }
