@@ -1,6 +1,7 @@
 #include "realtime/remote/held_force.h"
 
 #include "base/time.h"
+#include "realtime/remote/at_most.h"
 
 namespace hapticd::realtime {
 namespace {
@@ -9,11 +10,6 @@ constexpr double kCutTime_s = 0.008;  // an empty tank cuts within 10 ms
 constexpr double kResume_J = 0.002;   // a cut ends at this content, so that it does not chatter
 constexpr double kFadeShare = 0.9;    // of the slew rate: the fade ends before the life does
 constexpr double kStill_m_per_s = 1e-6;
-
-Vec3 atMost(const Vec3& v, double limit) noexcept {
-  const double size = v.norm();
-  return size > limit ? Vec3(limit / size * v) : v;
-}
 
 }  // namespace
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/time.h"
+#include "realtime/remote/at_most.h"
 #include "realtime/remote/normal_shares.h"
 
 namespace hapticd::realtime {
@@ -34,11 +35,6 @@ Vec3 rotationVector(const Vec3& from, const Vec3& to) noexcept {
   const double angle = std::atan2(sine, from.dot(to));
   if (sine > 1e-9) return angle / sine * cross;
   return angle < 1 ? Vec3(Vec3::Zero()) : Vec3(angle * from.unitOrthogonal());
-}
-
-Vec3 atMost(const Vec3& v, double limit) noexcept {
-  const double size = v.norm();
-  return size > limit ? Vec3(limit / size * v) : v;
 }
 
 // Brings `value` nearer to `goal`; a whole unit of change would change the force by `force_N`.
