@@ -150,6 +150,21 @@ TEST_P(Appearing, room_around_the_hand_is_felt_at_once) {
   EXPECT_NEAR(loop.out.force_N.y(), 1, 0.01);
 }
 
+// Its vertices travel until it has left the hand.
+TEST_P(Appearing, object_that_deforms_away_from_the_hand) {
+  const Vec3 inside(0.0011, 0.0007, 0.0013);
+  loop.rest(inside, toNanos(0.1));
+  addCube();
+  loop.rest(inside, toNanos(0.1));
+  for (int by_mm = 1; by_mm <= 40; ++by_mm) {
+    std::vector<Vec3f> vertices = boxTriples(Vec3::Constant(-10), Vec3::Constant(10));
+    for (Vec3f& v : vertices) v.x() += static_cast<float>(by_mm);
+    loop.send(scene::SetVertices{0, 0, vertices});
+    loop.rest(inside, 16 * kMs, [&] { EXPECT_EQ(loop.out.force_N.norm(), 0) << by_mm << " mm"; });
+  }
+  EXPECT_EQ(loop.out.status, 0U);
+}
+
 // Others are felt meanwhile: a floor inside the cube that appears.
 TEST_P(Appearing, other_objects_stay_felt) {
   loop.add(0, boxTriples(Vec3(-5, -5, -5), Vec3(5, 0, 5)));
