@@ -33,9 +33,9 @@ void Explorer::plan() {
   }
   if (!scene) return;
   try {
-    hand_.setPath(std::make_shared<const device::WaypointPath>(planStrokes(*scene, workspace_m_, base::now()),
-                                                               device::WaypointPath::Repeat::yes,
-                                                               kScriptedStrength_N));
+    hand_.setPath(
+        std::make_shared<const device::WaypointPath>(planStrokes(*scene, workspace_m_, base::now(), &ended_),
+                                                     device::WaypointPath::Repeat::yes, kScriptedStrength_N));
   } catch (const std::exception& error) {
     spdlog::warn(
         "device '{}': the scripted hand finds no path over this scene and keeps the previous one: {}",

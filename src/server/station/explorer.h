@@ -2,6 +2,7 @@
 // second.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -19,7 +20,10 @@ class Explorer {
   /// `hand` must outlive the explorer; `device`: its name, for the log.
   Explorer(device::SteeredHand& hand, const geometry::Box& workspace_m, std::string device)
       : hand_(hand), workspace_m_(workspace_m), device_(std::move(device)) {}
-  ~Explorer() { thread_.stop(); }
+  ~Explorer() {
+    ended_ = true;
+    thread_.stop();
+  }
 
   /// Explores this scene from now on; scenes that come while it plans are skipped but for the last. Scene
   /// thread.
@@ -31,6 +35,7 @@ class Explorer {
   device::SteeredHand& hand_;
   const geometry::Box workspace_m_;
   const std::string device_;
+  std::atomic<bool> ended_{false};
   std::mutex mutex_;
   std::shared_ptr<const scene::SceneSnapshot> next_;  // guarded by mutex_; null: planned
   base::Thread thread_;                               // last: its step uses the others

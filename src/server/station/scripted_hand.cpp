@@ -315,7 +315,7 @@ Vec3 direction(int i, int count) {
 }  // namespace
 
 std::vector<device::Waypoint> planStrokes(const scene::SceneSnapshot& scene, const Box& workspace_m,
-                                          Nanos now) {
+                                          Nanos now, const std::atomic<bool>* ended) {
   const Box bounds = boundsInDevice(scene, now);
   if (bounds.empty()) return idleCircle(workspace_m);
   const StrokePlanner planner(scene, bounds, now);
@@ -325,7 +325,7 @@ std::vector<device::Waypoint> planStrokes(const scene::SceneSnapshot& scene, con
   const Vec3 home = centre + outside * Vec3::UnitY();
   PathBuilder path(home);
   for (int stroke = 0; stroke < kStrokes; ++stroke) {
-    for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    for (int attempt = 0; attempt < kAttempts && (ended == nullptr || !*ended); ++attempt) {
       const int number = stroke * kAttempts + attempt;
       const bool roomy = attempt + 2 < kAttempts;  // then also narrow places, for want of others
       const Vec3 ray = direction(number, kStrokes * kAttempts);

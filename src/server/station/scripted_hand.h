@@ -1,6 +1,7 @@
 // Plans the path of the scripted hand over the objects of a scene.
 #pragma once
 
+#include <atomic>
 #include <vector>
 
 #include "base/time.h"
@@ -18,7 +19,8 @@ inline constexpr double kScriptedStrength_N = 1.6;
 /// felt by a simulated hand first, and shortened or left out where something would hold the hand back.
 /// Deterministic; an empty scene gives a slow circle in the workspace. The path starts and ends at rest
 /// outside all objects, so it can be repeated. Metres, device frame; `now`: time of the objects' motion.
+/// `ended`: once it is set, from any thread, no further stroke is planned; null: never.
 std::vector<device::Waypoint> planStrokes(const scene::SceneSnapshot& scene, const geometry::Box& workspace_m,
-                                          base::Nanos now);
+                                          base::Nanos now, const std::atomic<bool>* ended = nullptr);
 
 }  // namespace hapticd::server
