@@ -21,17 +21,8 @@ case "${1:-}" in
   *) sed -n '2,/^set/p' "$0" | sed '$d; s/^# \{0,1\}//'; exit 2 ;;
 esac
 
-if [ -n "${MUTATE_WORK:-}" ]; then
-  work=$MUTATE_WORK
-  mkdir -p "$work"
-else
-  work=$(mktemp -d)
-  trap 'rm -rf "$work"' EXIT
-fi
-tree=$work/tree
-[ -d "$tree" ] || git clone -q "$source_dir" "$tree"
-git -C "$tree" fetch -q "$source_dir" HEAD
-git -C "$tree" reset -q --hard FETCH_HEAD
+. scripts/mutations.sh
+prepare_clone "$source_dir"
 touch "$work/caught"
 
 names=() files=() olds=() news=() programs=() filters=() keys=() todo=()
@@ -52,22 +43,12 @@ while IFS= read -r name; do
 done <"$list"
 [ "${#names[@]}" != 0 ] || { echo "no entry of $list matches '$only'"; exit 2; }
 
-# Prints a file with the one place where OLD stands changed to NEW; fails with the number of places otherwise.
-change_once() {
-  OLD=$1 NEW=$2 awk '
-    { text = text $0 "\n" }
-    END { old = ENVIRON["OLD"]; at = index(text, old); rest = substr(text, at + length(old))
-          if (at == 0 || index(rest, old) != 0) exit 1
-          printf "%s%s%s", substr(text, 1, at - 1), ENVIRON["NEW"], rest }' "$3"
-}
-
-build() { ninja -C "$work/build" "${MUTATE_JOBS:--j2}" "$@" >"$work/build.log" 2>&1; }
 run() { (cd "$work" && timeout 300 "build/bin/$1" --gtest_filter="$2" >run.log 2>&1); }
 
 [ -e "$work/build/build.ninja" ] || cmake -G Ninja -S "$tree" -B "$work/build" -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" >/dev/null
 mapfile -t needed < <(for i in "${todo[@]}"; do echo "${programs[i]}"; done | sort -u)
 echo "${#names[@]} changes, ${#todo[@]} to try; building ${needed[*]} without any ..."
-[ "${#todo[@]}" = 0 ] || build "${needed[@]}" || { tail -20 "$work/build.log"; exit 2; }
+[ "${#todo[@]}" = 0 ] || build_clone "${needed[@]}" || { tail -20 "$work/build.log"; exit 2; }
 
 declare -A broken  # tests that say nothing
 for i in "${todo[@]}"; do
@@ -86,7 +67,7 @@ for i in "${todo[@]}"; do
     verdict="the old text does not stand in ${files[i]} exactly once"
   else
     cp "$work/changed" "$target"
-    if ! build "${programs[i]}"; then
+    if ! build_clone "${programs[i]}"; then
       verdict="does not build: $(grep -m1 'error' "$work/build.log" || tail -1 "$work/build.log")"
     elif run "${programs[i]}" "${filters[i]}"; then
       verdict="SURVIVED"

@@ -17,21 +17,11 @@ while [ $# -gt 0 ]; do
   esac
   shift
 done
-if [ -n "${MUTATE_WORK:-}" ]; then
-  work=$MUTATE_WORK
-  mkdir -p "$work"
-else
-  work=$(mktemp -d)
-  trap 'rm -rf "$work"' EXIT
-fi
-tree=$work/tree
-[ -d "$tree" ] || git clone -q "$source_dir" "$tree"
-git -C "$tree" fetch -q "$source_dir" HEAD
-git -C "$tree" reset -q --hard FETCH_HEAD
+. scripts/mutations.sh
+prepare_clone "$source_dir"
 
-build() { ninja -C "$work/build" "${MUTATE_JOBS:--j2}" hapticd-sim >"$work/build.log" 2>&1; }
 [ -e "$work/build/build.ninja" ] || cmake -G Ninja -S "$tree" -B "$work/build" -DCMAKE_BUILD_TYPE=Release >/dev/null
-build || { tail -20 "$work/build.log"; exit 2; }
+build_clone hapticd-sim || { tail -20 "$work/build.log"; exit 2; }
 
 found=0 missed=0
 while IFS= read -r name; do
@@ -41,14 +31,10 @@ while IFS= read -r name; do
   IFS= read -r new
   [[ $old == -* && $new == +* ]] || { echo "$list: '$name' is not an entry of four lines"; exit 2; }
   [[ -z $only || $name =~ $only ]] || continue
-  OLD=${old:1} NEW=${new:1} awk '
-    { text = text $0 "\n" }
-    END { old = ENVIRON["OLD"]; at = index(text, old); rest = substr(text, at + length(old))
-          if (at == 0 || index(rest, old) != 0) exit 1
-          printf "%s%s%s", substr(text, 1, at - 1), ENVIRON["NEW"], rest }' "$tree/$file" >"$work/changed" ||
+  change_once "${old:1}" "${new:1}" "$tree/$file" >"$work/changed" ||
     { echo "'$name': ${old:1} must stand in $file exactly once"; exit 2; }
   cp "$work/changed" "$tree/$file"
-  if ! build; then
+  if ! build_clone hapticd-sim; then
     result="does not compile"
     missed=$((missed + 1))
   else

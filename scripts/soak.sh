@@ -6,38 +6,15 @@
 # 'build/release/bin/hapticd-sim --seed SEED --seconds 60 --shrink'. Exit status 1 with findings.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+usage() { sed -n '2,6s/^# *//p' scripts/soak.sh; exit 2; }
+. scripts/ledger.sh
 
-usage() { sed -n '2,6s/^# *//p' "$0"; exit 2; }
-hours=
-jobs=$(nproc)
-while [ $# -gt 0 ]; do
-  case "$1" in
-    --hours) hours=${2:?"--hours needs a number"}; shift ;;
-    --jobs) jobs=${2:?"--jobs needs a number"}; shift ;;
-    *) usage ;;
-  esac
-  shift
-done
-[ -n "$hours" ] || usage
-seconds=$(awk -v h="$hours" 'BEGIN { printf "%.0f", 3600 * h }')
-
-[ -e build/release/build.ninja ] || cmake --preset release
-cmake --build build/release --target hapticd-sim -- -j "$jobs"
-commit=$(git rev-parse --short=10 HEAD)
-[ -z "$(git status --porcelain --untracked-files=no -- src tests)" ] || commit+="+changes"
-work=build/soak/$commit
-mkdir -p "$work"
-
-# Every run gets a block of 2^30 seeds of its own, and every job a sixteenth of it.
-base=$(date +%s)
-pids=()
-for ((job = 0; job < jobs; ++job)); do
-  first=$(((base << 30) + (job << 26)))
-  nice -n 10 build/release/bin/hapticd-sim --seeds "$first-$((first + (1 << 26) - 1))" --seconds 60 --cpu "$seconds" \
-    >"$work/$job.log" 2>&1 &
-  pids+=($!)
-done
-for pid in "${pids[@]}"; do wait "$pid" || true; done
+read_hours "$@"
+build_for_ledger hapticd-sim soak src tests
+simulate() {
+  nice -n 10 build/release/bin/hapticd-sim --seeds "$1-$(($1 + (1 << 26) - 1))" --seconds 60 --cpu "$seconds"
+}
+run_jobs simulate
 
 row=$(cat "$work"/*.log | awk '
   /^seed / { seed = $2; sub(":", "", seed); if (first == "") first = seed }
@@ -49,7 +26,4 @@ row=$(cat "$work"/*.log | awk '
   echo "no simulation came to its end; see $work/*.log" >&2
   exit 1
 }
-line="| $(date -u +%Y-%m-%d) | $commit | $row |"
-echo "$line"
-sed -i "s%^<!-- end of the ledger of simulations -->\$%${line//%/\\%}\n&%" docs/testing.md
-[ "${row##* }" = 0 ]
+append_row simulations "$row"

@@ -3,7 +3,7 @@
 // "World units" are the client's; "metres" are the unit of stock VRPN calls, world / 1000 whatever the
 // workspace. Values are unchecked: the builder checks them and answers with notices.
 //
-// To add a command: its struct with kInfo here, at the END of SceneCommand, and its handler: handle() in
+// To add a command: its struct with kInfo here, at the END of CommandVariant, and its handler: handle() in
 // object_commands.cpp or free_force_commands.cpp, apply() in builder.cpp, by its Target. The decoder converts
 // the message that kInfo names; recordings store the members as they are, so a command in use never changes
 // them.
@@ -12,6 +12,8 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <type_traits>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -375,7 +377,7 @@ struct CommitBatch {
 };
 
 /// Recordings store the position in this list as the number of a command: append, never reorder or remove.
-using SceneCommand =
+using CommandVariant =
     std::variant<SetObjectNumber, SetVertices, SetTriangles, SetNormal, RemoveTriangle, ClearMesh,
                  TransformMesh, SetTrimeshType, AddObject, AddObjectExScene, MoveToParent, RemoveObject,
                  SetTransform, SetObjectPosition, SetObjectOrientation, SetObjectScale, SetTouchable,
@@ -385,17 +387,32 @@ using SceneCommand =
                  SetConstraintVector, SetConstraintStiffness, StartCustomEffect, StopCustomEffect, ResetScene,
                  BeginBatch, CommitBatch, ReleaseForces, SetObjectName>;
 
-/// Which part of a scene executes the command.
-inline Target targetOf(const SceneCommand& command) {
-  return std::visit([]<class C>(const C&) { return C::kInfo.target; }, command);
-}
+/// Any one command; std::visit, std::get and their like work on it. Copying, moving and destroying are
+/// compiled once, in commands.cpp: a variant of so many structs costs every file that holds one several
+/// seconds of compile time.
+class SceneCommand : public CommandVariant {
+ public:
+  SceneCommand();
+  template <class Command>
+  requires requires { std::remove_cvref_t<Command>::kInfo; }
+  SceneCommand(Command&& command)
+      : CommandVariant(std::in_place_type<std::remove_cvref_t<Command>>, std::forward<Command>(command)) {}
+  SceneCommand(const SceneCommand& other);
+  SceneCommand(SceneCommand&& other) noexcept;
+  SceneCommand& operator=(const SceneCommand& other);
+  SceneCommand& operator=(SceneCommand&& other) noexcept;
+  ~SceneCommand();
+};
 
-/// Calls `visit.operator()<C>()` for each type of command, in the order of SceneCommand.
+/// Which part of a scene executes the command.
+Target targetOf(const SceneCommand& command);
+
+/// Calls `visit.operator()<C>()` for each type of command, in the order of CommandVariant.
 template <class Visit>
 constexpr void forEachCommand(Visit&& visit) {
   [&]<class... C>(const std::variant<C...>*) {
     (visit.template operator()<C>(), ...);
-  }(static_cast<const SceneCommand*>(nullptr));
+  }(static_cast<const CommandVariant*>(nullptr));
 }
 
 }  // namespace hapticd::scene

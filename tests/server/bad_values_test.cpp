@@ -11,10 +11,9 @@ constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr std::int32_t kLargest = std::numeric_limits<std::int32_t>::max();
 constexpr std::int32_t kSmallest = std::numeric_limits<std::int32_t>::min();
-constexpr wire::F64x16 kIdentity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
 constexpr std::array<float, 16> kIdentityRows{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
 
-wire::Effect effect(const char* type, std::int32_t index) {
+wire::Effect plainEffect(const char* type, std::int32_t index) {
   return {.type = type,
           .index = index,
           .gain = 0,
@@ -115,7 +114,7 @@ TEST_F(BadValues, VerticesTrianglesPlanesAndEffectsOutOfRangeAreRefused) {
   }
   bad_.send(wire::SetTriangle{0, 0, {0, -1, 2}, {-1, -1, -1}});
   EXPECT_TRUE(gotText("setTriangle object 0, triangle 0, vertices 0 -1 2: refused"));
-  bad_.send(effect("constant", -1));
+  bad_.send(plainEffect("constant", -1));
   EXPECT_TRUE(gotText("setEffect -1"));
   bad_.send(wire::StopEffect{kLargest});
   EXPECT_TRUE(gotText("stopEffect 2147483647: no such effect was defined"));
@@ -157,7 +156,7 @@ TEST_P(BadNumbers, OfWorldsAndForcesAreRefused) {
   EXPECT_TRUE(gotText("setHapticScale"));
   bad_.send(wire::SetSceneOrigin{{0, bad, 0}, {0, 0, 1}, 0});
   EXPECT_TRUE(gotText("setSceneOrigin"));
-  wire::Effect push = effect("constant", 0);
+  wire::Effect push = plainEffect("constant", 0);
   push.magnitude = bad;
   bad_.send(push);
   EXPECT_TRUE(gotText("setEffect 0, magnitude: refused"));
@@ -231,7 +230,7 @@ TEST_F(BadValues, VerticesForAMissingObjectAreRefusedAndDoNotAppearLater) {
 }
 
 TEST_F(BadValues, UnknownEffectsAndPropertiesAreNamed) {
-  bad_.send(effect("earthquake", 0));
+  bad_.send(plainEffect("earthquake", 0));
   EXPECT_TRUE(gotText("setEffect 0, 'earthquake': refused: unknown type; use constant, spring"));
   bad_.send(wire::StopEffect{12});
   EXPECT_TRUE(gotText("stopEffect 12: no such effect was defined"));
@@ -243,7 +242,7 @@ TEST_F(BadValues, UnknownEffectsAndPropertiesAreNamed) {
 TEST_F(BadValues, AnEffectMayBeStartedJustBeforeItIsDefined) {
   bad_.send(wire::StartEffect{5});
   ASSERT_TRUE(untilApplied(bad_));
-  bad_.send(effect("constant", 5));
+  bad_.send(plainEffect("constant", 5));
   EXPECT_TRUE(bad_.until([&] {
     const auto force = bad_.last<wire::Force>();
     return force && force->force[2] > 0.9;

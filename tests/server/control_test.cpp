@@ -19,7 +19,6 @@ namespace {
 using Config = server::ServerConfig;
 
 // A force field of 1 N upwards everywhere.
-const wire::ForceField kUp{.origin = {0, 0, 0}, .force = {0, 1, 0}, .jacobian = {}, .radius = 10};
 
 double lastForce(const ScriptedPeer& peer) {
   const auto forces = peer.all<wire::Force>();

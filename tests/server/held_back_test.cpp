@@ -13,7 +13,6 @@ namespace hapticd::test {
 namespace {
 
 constexpr std::size_t kMiB = 1U << 20;
-const wire::ForceField kUp{.origin = {0, 0, 0}, .force = {0, 1, 0}, .jacobian = {}, .radius = 10};
 
 class HeldBackTest : public ::testing::Test {
  protected:

@@ -10,8 +10,6 @@
 namespace hapticd::test {
 namespace {
 
-constexpr wire::F64x16 kIdentity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-
 class WorkspaceMessages : public testing::Test {
  protected:
   void SetUp() override { ASSERT_TRUE(untilHandAt(peer_, kPlace_m)); }

@@ -11,7 +11,6 @@
 namespace hapticd::test {
 namespace {
 
-constexpr wire::F64x16 kIdentity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
 const Vec3 kPush_N{1, 0, 0};
 const Vec3 kNothing_N = Vec3::Zero();
 

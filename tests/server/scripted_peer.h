@@ -20,6 +20,10 @@ namespace hapticd::test {
 
 using namespace std::chrono_literals;
 
+inline constexpr wire::F64x16 kIdentity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+/// 1 N upwards, wherever the hand is.
+inline const wire::ForceField kUp{.origin = {0, 0, 0}, .force = {0, 1, 0}, .jacobian = {}, .radius = 10};
+
 /// One connection to a server under test. Every wait has a limit.
 class ScriptedPeer {
  public:

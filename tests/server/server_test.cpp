@@ -9,31 +9,12 @@
 #include <deque>
 #include <random>
 
+#include "feeling.h"
 #include "running_server.h"
 #include "scripted_peer.h"
 
 namespace hapticd::test {
 namespace {
-
-using geometry::Vec3f;
-
-// A stiff cube of 40 mm around the origin, one setVertex for each vertex of each triangle.
-void sendCube(ScriptedPeer& peer, float half_mm = 20) {
-  std::int32_t vertex = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    for (const float side : {-half_mm, half_mm}) {
-      for (const auto& [u, v] : {std::pair{-1, -1}, {1, -1}, {1, 1}, {-1, -1}, {1, 1}, {-1, 1}}) {
-        wire::SetVertex message{0, vertex++, {}};
-        const auto at = [](int i) { return static_cast<std::size_t>(i % 3); };
-        message.position[at(axis)] = side;
-        message.position[at(axis + 1)] = half_mm * static_cast<float>(u);
-        message.position[at(axis + 2)] = half_mm * static_cast<float>(v);
-        peer.send(message);
-      }
-    }
-  }
-  peer.send(wire::SetHapticProperty{0, "stiffness", 1.0F});
-}
 
 bool untilTouched(ScriptedPeer& peer) {
   return peer.until([&] {

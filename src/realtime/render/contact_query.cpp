@@ -167,7 +167,6 @@ void ContactQuery::leaveOutEnclosing(const Vec3& tool) noexcept {
       enclosing_[static_cast<std::size_t>(enclosingCount_++)] = id;
       continue;
     }
-    // Its way out of the tool is no way over it.
     if (std::find(known.begin(), knownEnd, id) != knownEnd) placed->before = nullptr;
     PlacedObject& target = objects_[static_cast<std::size_t>(kept++)];
     if (&target != &*placed) target = *placed;

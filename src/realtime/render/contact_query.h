@@ -43,7 +43,9 @@ struct PlacedObject {
   std::uint64_t restGeneration = 0;  ///< generation in which it was found at rest
   bool mirrored = false;             ///< the placement contains a reflection, which reverses the winding
   // Compared with the previous tick:
-  const scene::ObjectState* before = nullptr;  ///< null when it did not exist
+  /// Null when there is nothing to compare with: it did not exist, or was not felt because it appeared around
+  /// the tool or beyond the room for near objects. Its way from there passes over nothing.
+  const scene::ObjectState* before = nullptr;
   Affine T_device_objectBefore = Affine::Identity();
   bool moved = false;     ///< the placement changed
   bool deformed = false;  ///< vertices changed under the same triangles
@@ -52,6 +54,8 @@ struct PlacedObject {
   /// Corners in device metres.
   scene::Corners corners(std::uint32_t triangle, Nanos now) const noexcept;
   scene::Corners cornersBefore(std::uint32_t triangle, Nanos then) const noexcept;
+  /// Whether its faces may have passed over the proxy by deforming.
+  bool sweptByDeforming() const noexcept { return deformed && before != nullptr; }
   /// The present position of a point that was fixed to the object in the previous tick.
   Vec3 carried(const Vec3& p) const noexcept;
 };

@@ -219,7 +219,7 @@ bool Proxy::pushByDeformingFaces(const Vec3& from, Pushers& pushers, std::uint32
   double reach = -1;
   for (int i = 0; i < query_.objectCount(); ++i) {
     const PlacedObject& object = query_.object(i);
-    if (object.deformed && object.before != nullptr)  // its way out of the tool is no way over it
+    if (object.sweptByDeforming())
       reach = std::max(reach, (object.carried(from) - position_).norm() + missedMove(object));
   }
   if (reach < 0) return false;
@@ -228,7 +228,7 @@ bool Proxy::pushByDeformingFaces(const Vec3& from, Pushers& pushers, std::uint32
   double height = 0;
   query_.forEachGathered(position_, std::numeric_limits<double>::infinity(), [&](const Facet& f) {
     const PlacedObject& object = query_.object(f.object);
-    if (!object.deformed || object.before == nullptr) return;
+    if (!object.sweptByDeforming()) return;
     const Vec3 start = carriedBy(object, f.triangle, from);
     ObjectHit hit;
     if (!query_.castAtFacet(f, start, position_, hit)) return;

@@ -31,7 +31,7 @@ void convert(const std::array<From, 3>& from, geometry::Vec3& to) {
 }
 
 // The position in SceneCommand of the command that names this message; kNone when there is none.
-constexpr std::size_t kNone = std::variant_size_v<scene::SceneCommand>;
+constexpr std::size_t kNone = std::variant_size_v<scene::CommandVariant>;
 constexpr std::size_t commandOf(std::string_view message) {
   std::size_t found = kNone;
   std::size_t next = 0;
@@ -49,7 +49,7 @@ concept SameMembers = commandOf(M::kInfo.name)
 
 template <SameMembers M>
 scene::SceneCommand toCommand(const M& message) {
-  using Command = std::variant_alternative_t<commandOf(M::kInfo.name), scene::SceneCommand>;
+  using Command = std::variant_alternative_t<commandOf(M::kInfo.name), scene::CommandVariant>;
   constexpr std::size_t kMembers = Command::kInfo.fields.size();
   Command command;
   scene::withMembers<kMembers>(message, [&](const auto&... from) {

@@ -6,6 +6,7 @@
 #include <random>
 #include <vector>
 
+#include "geometry/rotation.h"
 #include "meshes.h"
 #include "reduced.h"
 #include "scene_fixture.h"
@@ -207,7 +208,7 @@ TEST_F(StiffnessTest, closed_paths_over_random_plates_do_no_work) {
       const Vec3 n = Vec3(uniform(-0.7, 0.7), uniform(-0.7, 0.7), 1).normalized();
       const double stiff = stiffness();
       stiffest = std::max(stiffest, stiff);
-      Affine placed(Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), n));
+      Affine placed(geometry::rotationBetween(Vec3::UnitZ(), n));
       placed.pretranslate(uniform(-5e-4, 5e-4) * n);
       scene.add(plane(0.05, 7), surface(stiff), placed);
     }
@@ -351,7 +352,7 @@ TEST_F(StiffnessTest, force_never_exceeds_the_stiffest_spring) {
     };
     for (int k = 0; k < 5; ++k) {
       const Vec3 n = Vec3(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)).normalized();
-      Affine placed(Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), n));
+      Affine placed(geometry::rotationBetween(Vec3::UnitZ(), n));
       placed.pretranslate(Vec3(uniform(-4e-3, 4e-3), uniform(-4e-3, 4e-3), uniform(-4e-3, 4e-3)));
       if (k % 2 == 0) {
         scene.add(box(Vec3::Constant(-0.003), Vec3::Constant(0.003)), surface(any()), placed);
