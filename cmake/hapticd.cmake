@@ -141,10 +141,6 @@ endfunction()
 add_custom_target(all_tests)
 add_custom_target(threads_tests)
 
-# scripts/test.sh gives ctest two places for each processor: a test that computes, or runs whole servers with their realtime
-# threads, takes both; tests that mostly wait for threads and sockets take one each.
-set(HAPTICD_COMPUTES PROCESSORS 2)
-
 # Further flags for sources of tests. Three of UBSan's checks take half of their compile time; the libraries keep all checks.
 add_library(hapticd_test_flags INTERFACE)
 if(HAPTICD_SANITIZE MATCHES "undefined")
@@ -187,10 +183,10 @@ function(hapticd_compile_as_test target)
   endif()
 endfunction()
 
-# hapticd_test(NAME [COMPUTES] SOURCES ... DEPENDS rooms ... [SUPPORT ...] [LIBS ...] [LABELS ...])
-# One test program NAME_test; every TEST() in it becomes one ctest case. Those without the label `threads` compute.
+# hapticd_test(NAME SOURCES ... DEPENDS rooms ... [SUPPORT ...] [LIBS ...] [LABELS ...])
+# One test program NAME_test; every TEST() in it becomes one ctest case.
 function(hapticd_test name)
-  cmake_parse_arguments(A "COMPUTES" "" "SOURCES;DEPENDS;SUPPORT;LIBS;LABELS" ${ARGN})
+  cmake_parse_arguments(A "" "" "SOURCES;DEPENDS;SUPPORT;LIBS;LABELS" ${ARGN})
   set(deps ${A_DEPENDS})
   list(TRANSFORM deps PREPEND hapticd_)
   add_executable(${name}_test ${A_SOURCES})
@@ -200,9 +196,6 @@ function(hapticd_test name)
   set(properties TIMEOUT 300)
   if("threads" IN_LIST A_LABELS)
     add_dependencies(threads_tests ${name}_test)
-  endif()
-  if(A_COMPUTES OR NOT "threads" IN_LIST A_LABELS)
-    list(APPEND properties ${HAPTICD_COMPUTES})
   endif()
   if(A_LABELS)
     list(APPEND properties LABELS "${A_LABELS}")

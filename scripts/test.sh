@@ -168,7 +168,7 @@ for i in "${!presets[@]}"; do
   echo "== $preset: testing"
   test_start=$SECONDS
   status=0
-  run_ctest "$preset" "build/$preset/test.log" --parallel $((2 * jobs)) || status=$?
+  run_ctest "$preset" "build/$preset/test.log" --parallel "$([ "$preset" = release ] && echo $((jobs + 1)) || echo "$jobs")" || status=$?
   test_s=$((SECONDS - test_start))
   judge "$preset" "$status" "$build_s" "$test_s"
   if [ -n "$next" ]; then

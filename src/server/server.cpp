@@ -75,7 +75,7 @@ void Server::openPorts() {
         connectionOptions(config_.limits));
     local.port = listener_->local().port;
     try {
-      requests_ = std::make_unique<ReverseConnections>(
+      reverseConnections_ = std::make_unique<ReverseConnections>(
           loop_, local, connectionOptions(config_.limits), config_.callbackHosts,
           [this](std::uint32_t address) { return config_.insecure || isNear(address); }, throttledLog_,
           [this](net::Connection connection, std::unique_ptr<net::UdpSocket> udp) {
@@ -279,7 +279,7 @@ void Server::everySecond() {
   if (alive_) alive_();
   clock_.refresh();
   // A client that describes none of the devices listens to all of them.
-  for (Session* session : admission_.handshaken(base::now())) {
+  for (Session* session : admission_.completedHandshakes(base::now())) {
     if (session->namesWanted() != 0) continue;
     for (const auto& station : stations_) station->sendPresentState(*session);
   }

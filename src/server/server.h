@@ -136,7 +136,7 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   std::vector<net::Subscription> subscriptions_;
   std::unique_ptr<net::TcpListener> listener_;
   std::unique_ptr<net::LocalListener> localListener_;
-  std::unique_ptr<ReverseConnections> requests_;
+  std::unique_ptr<ReverseConnections> reverseConnections_;
   std::unique_ptr<WebServer> web_;
   std::unique_ptr<HaplyPort> haply_;  ///< null unless configured
   scene::ClientId nextClient_ = 1;

@@ -96,7 +96,7 @@ bool Admission::mayOnlyStop(const Session& session) const noexcept {
   return std::find(reserve.begin(), reserve.end(), session.id()) != reserve.end();
 }
 
-std::vector<Session*> Admission::handshaken(base::Nanos now) {
+std::vector<Session*> Admission::completedHandshakes(base::Nanos now) {
   std::vector<Session*> done;
   for (auto entry = handshakes_.begin(); entry != handshakes_.end();) {
     const auto session = sessions_.find(entry->first);

@@ -35,7 +35,7 @@ class Admission {
   bool mayOnlyStop(const Session& session) const noexcept;
   /// Ends the handshakes that take too long. Returns the sessions whose handshake was completed since the
   /// last call.
-  std::vector<Session*> handshaken(base::Nanos now);
+  std::vector<Session*> completedHandshakes(base::Nanos now);
   /// Ends clients for which too much memory waits: each beyond its own limit, then the largest.
   /// `commands`: bytes that wait for scenes, by client.
   void checkMemory(const std::map<scene::ClientId, std::size_t>& commands);

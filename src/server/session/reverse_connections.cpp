@@ -22,12 +22,12 @@ struct ReverseConnections::Pending {
 ReverseConnections::ReverseConnections(net::Loop& loop, const net::Endpoint& local,
                                        const net::ConnectionOptions& options,
                                        std::vector<std::string> allowedHosts,
-                                       std::function<bool(std::uint32_t)> mayBeRead, ThrottledLog& log,
+                                       std::function<bool(std::uint32_t)> allowsPlaintext, ThrottledLog& log,
                                        Accept accept)
     : loop_(loop),
       options_(options),
       allowedHosts_(std::move(allowedHosts)),
-      mayBeRead_(std::move(mayBeRead)),
+      allowsPlaintext_(std::move(allowsPlaintext)),
       log_(log),
       accept_(std::move(accept)),
       requests_(loop, local),
@@ -61,7 +61,7 @@ void ReverseConnections::onRequest(std::span<const std::byte> datagram, const ne
               ": refused; allow it with callback_hosts");
     return;
   }
-  if (!allowed && !mayBeRead_(client.address)) {
+  if (!allowed && !allowsPlaintext_(client.address)) {
     log_.warn("connection request from " + from.text() +
               " refused: datagrams cannot be encrypted; use 'hapticd tunnel' on that machine, "
               "trusted_networks or insecure");

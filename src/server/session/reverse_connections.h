@@ -20,11 +20,12 @@ class ReverseConnections {
   /// A connection to a client, and a socket for its datagrams.
   using Accept = std::function<void(net::Connection connection, std::unique_ptr<net::UdpSocket> udp)>;
 
-  /// `allowedHosts`: hosts that a request may name besides its source address. `mayBeRead`: whether packets
-  /// for an address may travel without encryption. Throws net::Error when the port is taken.
+  /// `allowedHosts`: hosts that a request may name besides its source address. `allowsPlaintext`: whether
+  /// packets for an address may travel without encryption. Throws net::Error when the port is taken.
   ReverseConnections(net::Loop& loop, const net::Endpoint& local, const net::ConnectionOptions& options,
                      std::vector<std::string> allowedHosts,
-                     std::function<bool(std::uint32_t address)> mayBeRead, ThrottledLog& log, Accept accept);
+                     std::function<bool(std::uint32_t address)> allowsPlaintext, ThrottledLog& log,
+                     Accept accept);
   ~ReverseConnections();
   ReverseConnections(const ReverseConnections&) = delete;
   ReverseConnections& operator=(const ReverseConnections&) = delete;
@@ -40,7 +41,7 @@ class ReverseConnections {
   net::Loop& loop_;
   net::ConnectionOptions options_;
   std::vector<std::string> allowedHosts_;
-  std::function<bool(std::uint32_t)> mayBeRead_;
+  std::function<bool(std::uint32_t)> allowsPlaintext_;
   ThrottledLog& log_;
   Accept accept_;
   std::vector<std::unique_ptr<Pending>> pending_;

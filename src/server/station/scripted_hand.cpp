@@ -34,6 +34,9 @@ constexpr double kFreeSpeed_m_per_s = 0.15;
 constexpr double kSteepest = 0.5;  // lower bound of the cosine between surface normal and approach
 constexpr double kLag_m = 0.0035;  // of the hand behind the path: more, and something holds it back
 constexpr Nanos kRehearsedTick = 2'000'000;
+// In all, three times what fourteen strokes take that succeed at once: about half a second, more where many
+// objects move.
+constexpr int kRehearsedTicks = 120'000;
 constexpr double kMargin_m = 0.004;  // of surface around each point: near a border the hand slips behind it
 constexpr double kSharpest = 0.77;   // lower bound of the cosine between normals of neighbouring points
 constexpr double kCurl_rad = 0.05;   // turn of the heading from point to point
@@ -240,9 +243,9 @@ class PathBuilder {
 };
 
 // Feels a path over the scene as the hand will, and returns the time at which it is held back from it, by a
-// rim, a gap or another part in front; nothing when it can follow.
+// rim, a gap or another part in front; nothing when it can follow. Counts its ticks down.
 std::optional<double> heldBackAt(const std::vector<device::Waypoint>& path, const scene::SceneSnapshot& scene,
-                                 Nanos now) {
+                                 Nanos now, int& ticks) {
   const auto way =
       std::make_shared<device::WaypointPath>(path, device::WaypointPath::Repeat::no, kScriptedStrength_N);
   device::SimulatedDevice hand;
@@ -251,7 +254,7 @@ std::optional<double> heldBackAt(const std::vector<device::Waypoint>& path, cons
   realtime::Renderer renderer;
   realtime::Rendering rendering;
   device::DeviceState state;
-  for (Nanos t = 0; t < way->duration(); t += kRehearsedTick) {
+  for (Nanos t = 0; t < way->duration(); t += kRehearsedTick, --ticks) {
     hand.read(t, state);
     if ((state.position_m - way->at(t).position_m).norm() > kLag_m)
       return path.front().time_s + base::toSeconds(t);
@@ -324,8 +327,10 @@ std::vector<device::Waypoint> planStrokes(const scene::SceneSnapshot& scene, con
 
   const Vec3 home = centre + outside * Vec3::UnitY();
   PathBuilder path(home);
+  int ticks = kRehearsedTicks;
+  const auto mayGoOn = [&] { return ticks > 0 && (ended == nullptr || !*ended); };
   for (int stroke = 0; stroke < kStrokes; ++stroke) {
-    for (int attempt = 0; attempt < kAttempts && (ended == nullptr || !*ended); ++attempt) {
+    for (int attempt = 0; attempt < kAttempts && mayGoOn(); ++attempt) {
       const int number = stroke * kAttempts + attempt;
       const bool roomy = attempt + 2 < kAttempts;  // then also narrow places, for want of others
       const Vec3 ray = direction(number, kStrokes * kAttempts);
@@ -340,7 +345,7 @@ std::vector<device::Waypoint> planStrokes(const scene::SceneSnapshot& scene, con
       std::vector<device::Waypoint> found;
       while (points.size() >= (roomy ? kShortestStroke : 1) && found.empty()) {
         std::vector<device::Waypoint> tried = strokePath(planner, start, points, stylus, stroke % 3 == 0);
-        if (const auto heldBack = heldBackAt(tried, scene, now)) {
+        if (const auto heldBack = heldBackAt(tried, scene, now, ticks)) {
           const auto reached = std::count_if(tried.begin() + 2, tried.end(),
                                              [&](const auto& w) { return w.time_s < *heldBack; });
           points.resize(std::min(points.size(), static_cast<std::size_t>(reached)) * 2 / 3);
