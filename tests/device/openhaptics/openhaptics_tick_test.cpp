@@ -10,7 +10,8 @@ TEST_F(SteppedHdTest, APlaneFeelsAsOnTheSimulatedDevice) {
   const std::vector<Vec3> places = plane_scene::places();
   const std::vector<Vec3> expected = plane_scene::referenceForces(places);
   device.open();
-  base::MonotonicClock clock;
+  base::SimulatedClock
+      clock;  // stands: a pause of the machine within a tick does not make its force too old to be written
   realtime::Tick tick(device, clock, plane_scene::raw());
   tick.snapshots().publish(plane_scene::snapshot());
   device.start([&](Nanos now) { tick(now); });
