@@ -1,6 +1,7 @@
 // Both sides of a room of shared objects as people write them for VRPN: numbers, a text, a lock, a logger,
-// redundant messages, and requests of poses, outputs, playback and forwarding. They compile with VRPN's own
-// headers, too; testdata/vrpn_room has what they said when they were linked with VRPN.
+// redundant messages, messages forwarded to another port, and requests of poses, outputs and playback. They
+// compile with VRPN's own headers, too; testdata/vrpn_room has what they said when they were linked with
+// VRPN.
 #pragma once
 
 #include <stdio.h>
@@ -16,6 +17,8 @@
 #include <vrpn_SharedObject.h>
 
 #include <string>
+
+enum { kRoomSteps = 7, kForwardedPort = 4500 };
 
 inline struct timeval roomTime(long seconds) {
   struct timeval time;
@@ -100,7 +103,8 @@ class RoomServer {
         lock_("Lock", connection),
         redundant_(connection),
         controller_(&redundant_, connection),
-        logger_(connection, &speaker_) {
+        logger_(connection, &speaker_),
+        forwarder_(connection) {
     number_.set(4, roomTime(10));
     length_.set(2.5, roomTime(10));
     text_.set("the first text of the server", roomTime(10));
@@ -121,8 +125,10 @@ class RoomServer {
     controller_.mainloop();
     logger_.mainloop();
     redundant_.mainloop();
+    forwarder_.mainloop();
     connection_->mainloop();
   }
+  vrpn_Forwarder_Server& forwarder() { return forwarder_; }
 
  private:
   static int VRPN_CALLBACK onStep(void* self, vrpn_HANDLERPARAM p) {
@@ -144,16 +150,20 @@ class RoomServer {
                static_cast<long>(redundant_.defaultInterval().tv_sec),
                static_cast<long>(redundant_.defaultInterval().tv_usec), redundant_.isEnabled() ? 1 : 0);
       speaker_.say(text);
-      struct timeval atOnce;
-      atOnce.tv_sec = atOnce.tv_usec = 0;
-      for (char c = 'a'; c < 'd'; ++c) {
-        redundant_.pack_message(1, roomTime(100 + c),
-                                static_cast<vrpn_uint32>(connection_->register_message_type("Room Sign")),
-                                static_cast<vrpn_uint32>(connection_->register_sender("Room Server")), &c,
-                                vrpn_CONNECTION_RELIABLE, c - 'a', &atOnce);
-      }
+      for (char c = 'a'; c < 'd'; ++c) sign(c, c - 'a');
+    }
+    if (number == kRoomSteps) {
+      for (char c = 'x'; c <= 'z'; ++c) sign(c, 0);
     }
     speaker_.step(number);
+  }
+  void sign(char c, vrpn_int32 repetitions) {
+    struct timeval atOnce;
+    atOnce.tv_sec = atOnce.tv_usec = 0;
+    redundant_.pack_message(1, roomTime(100 + c),
+                            static_cast<vrpn_uint32>(connection_->register_message_type("Room Sign")),
+                            static_cast<vrpn_uint32>(connection_->register_sender("Room Server")), &c,
+                            vrpn_CONNECTION_RELIABLE, repetitions, &atOnce);
   }
 
   vrpn_Connection* connection_;
@@ -165,6 +175,7 @@ class RoomServer {
   vrpn_RedundantTransmission redundant_;
   vrpn_RedundantController controller_;
   RoomLogger logger_;
+  vrpn_Forwarder_Server forwarder_;
 };
 
 /// Does its steps, each when the server has answered the one before.
@@ -178,6 +189,7 @@ class RoomClient {
         text_("text"),
         redundant_(connection),
         receiver_(connection),
+        lock_("Lock", connection),
         logger_("Logger", connection),
         poser_("Poser", connection),
         output_("Output", connection),
@@ -190,6 +202,10 @@ class RoomClient {
     number_.bindConnection(connection);
     length_.bindConnection(connection);
     text_.bindConnection(connection);
+    lock_.addRequestGrantedCallback(&speaker_, onGranted);
+    lock_.addRequestDeniedCallback(&speaker_, onDenied);
+    lock_.addTakeCallback(&speaker_, onTaken);
+    lock_.addReleaseCallback(&speaker_, onReleased);
     logger_.register_report_handler(this, onLog);
     receiver_.register_handler(connection->register_message_type("Room Sign"), onSign, this,
                                connection->register_sender("Room Server"));
@@ -201,15 +217,31 @@ class RoomClient {
                                     connection_->register_sender("Room Server"));
   }
   void begin() { act(1); }
-  bool done() const { return done_ == 6; }
+  /// The last step waits until another client listens to what is forwarded.
+  bool waits() const { return done_ == kRoomSteps - 1; }
+  void finish() { act(kRoomSteps); }
+  bool done() const { return done_ == kRoomSteps; }
   void mainloop() { connection_->mainloop(); }
 
  private:
   static int VRPN_CALLBACK onStep(void* self, vrpn_HANDLERPARAM p) {
     RoomClient* client = static_cast<RoomClient*>(self);
     client->done_ = p.buffer[0];
-    if (!client->done()) client->act(static_cast<char>(client->done_ + 1));
+    if (client->done_ + 1 < kRoomSteps) client->act(static_cast<char>(client->done_ + 1));
     return 0;
+  }
+  static int onGranted(void* speaker) { return told(speaker, "granted"); }
+  static int onDenied(void* speaker) { return told(speaker, "denied"); }
+  static int onTaken(void* speaker) { return told(speaker, "taken"); }
+  static int onReleased(void* speaker) { return told(speaker, "released"); }
+  static int told(void* speaker, const char* text) {
+    static_cast<RoomSpeaker*>(speaker)->say(text);
+    return 0;
+  }
+  void sayLock() {
+    speaker_.say(lock_.isAvailable()     ? "lock is free"
+                 : lock_.isHeldLocally() ? "lock is held here"
+                                         : "lock is held there");
   }
   static int VRPN_CALLBACK onSign(void* self, vrpn_HANDLERPARAM p) {
     const char text[] = {p.buffer[0], 0};
@@ -255,15 +287,16 @@ class RoomClient {
       case 4:
         logger_.send_logging_request("a", "bc", "", "def");
         logger_.send_logging_status_request();
-        // A remote identifies itself by its address, so the lock's conversation is written out.
+        // Two more that want the lock, written out; the remote was the first.
         send("Lock", "vrpn_Mutex Request Index", std::string("\0\0\0\7\0\0\1\2", 8));
         send("Lock", "vrpn_Mutex Request Index", std::string("\0\0\0\6\0\0\1\3", 8));
+        send("Lock", "vrpn_Mutex Request Mutex", std::string("\0\0\0\2", 4));
         send("Lock", "vrpn_Mutex Request Mutex", std::string("\0\0\0\1", 4));
-        send("Lock", "vrpn_Mutex Request Mutex", std::string("\0\0\0\0", 4));
-        send("Lock", "vrpn_Mutex Release", "");
-        send("Lock", "vrpn_Mutex Request Mutex", std::string("\0\0\0\0", 4));
         break;
       case 5:
+        sayLock();
+        lock_.request();
+        send("Lock", "vrpn_Mutex Release", "");
         speaker_.say("pose", poser_.request_pose(roomTime(50), position, quaternion), true);
         speaker_.say("relative", poser_.request_pose_relative(roomTime(50), position, quaternion), true);
         speaker_.say("velocity", poser_.request_pose_velocity(roomTime(50), position, quaternion, 0.5), true);
@@ -272,13 +305,21 @@ class RoomClient {
         speaker_.say("output", output_.request_change_channel_value(2, 0.75) ? 1 : 0, true);
         speaker_.say("outputs", output_.request_change_channels(3, values) ? 1 : 0, true);
         break;
-      default:
+      case 6:
+        sayLock();
+        lock_.request();
+        send("Lock", "vrpn_Mutex Request Mutex", std::string("\0\0\0\1", 4));
         files_.set_replay_rate(2.5F);
         files_.reset();
         files_.play_to_time(interval);
-        speaker_.say("forwards", forwards_.start_remote_forwarding(4500) ? 1 : 0, true);
-        forwards_.forward_message_type(4500, "Device", "vrpn_Button Change");
+        speaker_.say("forwards", forwards_.start_remote_forwarding(kForwardedPort) ? 1 : 0, true);
+        forwards_.forward_message_type(kForwardedPort, "Room Server", "Room Sign");
         redundant_.enable(vrpn_false);
+        break;
+      default:
+        sayLock();
+        lock_.release();
+        sayLock();
     }
     speaker_.step(number);
   }
@@ -295,6 +336,7 @@ class RoomClient {
   vrpn_Shared_String_Remote text_;
   vrpn_RedundantRemote redundant_;
   vrpn_RedundantReceiver receiver_;
+  vrpn_Mutex_Remote lock_;
   vrpn_Auxiliary_Logger_Remote logger_;
   vrpn_Poser_Remote poser_;
   vrpn_Analog_Output_Remote output_;

@@ -1,5 +1,4 @@
-// Both sides of vrpn_room.h against what the same sides said when they were linked with VRPN 07.38. The bytes
-// are read here by VRPN's format alone, not by this project's wire code.
+// Both sides of vrpn_room.h against what the same sides said when they were linked with VRPN 07.38.
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <vrpn_Connection.h>
@@ -8,14 +7,14 @@
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
-#include <fstream>
-#include <map>
+#include <functional>
 #include <memory>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "client/vrpn_room.h"
+#include "client/vrpn_stream.h"
 #include "client/vrpn_values.h"
 #include "net/loopback.h"
 
@@ -23,78 +22,21 @@ namespace hapticd {
 namespace {
 
 using net::RawSocket;
+using test::VrpnMessage;
+using test::VrpnStream;
 
-constexpr std::size_t kVrpnCookieBytes = 24;
-constexpr std::size_t kVrpnHeaderBytes = 24;
 constexpr auto kRoomPatience = std::chrono::seconds(30);
 
-struct RoomMessage {
-  std::string sender, type, payload;
-  bool operator==(const RoomMessage&) const = default;
-};
-std::ostream& operator<<(std::ostream& out, const RoomMessage& said) {
-  return out << said.sender << " | " << said.type << " | " << ::testing::PrintToString(said.payload);
-}
-
-// A stream of one side: cookie, descriptions of names, messages.
-class RoomStream {
- public:
-  void feed(const std::string& bytes) {
-    bytes_ += bytes;
-    if (at_ == 0 && bytes_.size() >= kVrpnCookieBytes) at_ = kVrpnCookieBytes;
-    while (at_ >= kVrpnCookieBytes && bytes_.size() >= at_ + kVrpnHeaderBytes) {
-      const std::size_t length = static_cast<std::size_t>(number(0));
-      const std::size_t next = at_ + kVrpnHeaderBytes + (length - kVrpnHeaderBytes + 7) / 8 * 8;
-      if (bytes_.size() < next) return;
-      take(number(12), number(16), bytes_.substr(at_ + kVrpnHeaderBytes, length - kVrpnHeaderBytes));
-      at_ = next;
-    }
-  }
-  const std::vector<RoomMessage>& said() const { return said_; }
-  /// How much had been said before anything but names, then at the end of each step.
-  const std::vector<std::size_t>& stepEnds() const { return ends_; }
-  std::size_t steps() const { return steps_; }
-
- private:
-  std::int32_t number(std::size_t offset) const {
-    std::uint32_t value = 0;
-    for (std::size_t i = 0; i < 4; ++i)
-      value = value << 8 | static_cast<unsigned char>(bytes_[at_ + offset + i]);
-    return static_cast<std::int32_t>(value);
-  }
-  void take(std::int32_t sender, std::int32_t type, const std::string& payload) {
-    if (type == -1 || type == -2) {
-      (type == -1 ? senders_ : types_)[sender] = payload.substr(4, payload.find('\0', 4) - 4);
-    }
-    if (type < 0) return;
-    const std::string& name = types_[type];
-    if (name == "vrpn_Base ping_message") return;  // how often is a matter of time
-    if (said_.empty()) ends_.push_back(at_);
-    said_.push_back({senders_[sender], name, payload});
-    if (name != "Room Step") return;
-    ++steps_;
-    ends_.push_back(at_ + kVrpnHeaderBytes + (payload.size() + 7) / 8 * 8);
-  }
-
-  std::string bytes_;
-  std::size_t at_ = 0;
-  std::map<std::int32_t, std::string> senders_, types_;
-  std::vector<RoomMessage> said_;
-  std::vector<std::size_t> ends_;
-  std::size_t steps_ = 0;
-};
-
-std::string roomRecording(const std::string& file) {
-  std::ifstream in(HAPTICD_TESTDATA "/vrpn_room/" + file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
+std::string roomRecording(const char* file) {
+  return test::recording(std::string("vrpn_room/") + file);
 }
 
 // What VRPN does otherwise than it means: its library cuts eight characters off a text that arrives, its
 // remote of the redundant transmission names another type, and its poser sends as a change of the pose the
 // sum of all changes, which the server adds again.
-std::vector<RoomMessage> asMeant(std::vector<RoomMessage> said) {
+std::vector<VrpnMessage> asMeant(std::vector<VrpnMessage> said) {
   std::string pose;
-  for (RoomMessage& s : said) {
+  for (VrpnMessage& s : said) {
     if (s.type == "vrpn_Poser Request Pos_Quat") pose = s.payload;
     if (s.type == "vrpn_Poser Request Relative Pos_Quat") s.payload = pose;  // the change is the same
     if (s.payload == "a text of the client, which i 0 there") {
@@ -108,13 +50,6 @@ std::vector<RoomMessage> asMeant(std::vector<RoomMessage> said) {
   return said;
 }
 
-void expectSame(const std::vector<RoomMessage>& said, const std::vector<RoomMessage>& expected) {
-  EXPECT_EQ(said.size(), expected.size());
-  for (std::size_t i = 0; i < std::min(said.size(), expected.size()); ++i) {
-    ASSERT_EQ(said[i], expected[i]) << "message " << i;
-  }
-}
-
 std::string arrived(RawSocket& socket) {
   char bytes[4096];
   const ssize_t count = ::recv(socket.fd(), bytes, sizeof bytes, MSG_DONTWAIT);
@@ -126,23 +61,76 @@ struct RemoveReference {
 };
 using Held = std::unique_ptr<vrpn_Connection, RemoveReference>;
 
+// VRPN's remote of a lock says who it is by its address and process, 8 bytes.
+std::string identityIn(const std::vector<VrpnMessage>& said) {
+  const auto request = std::find_if(said.begin(), said.end(),
+                                    [](const auto& s) { return s.type == "vrpn_Mutex Request Index"; });
+  return request != said.end() ? request->payload : "";
+}
+
+std::string replaced(std::string text, const std::string& what, const std::string& with) {
+  for (std::size_t at = 0; !what.empty() && (at = text.find(what, at)) != std::string::npos;
+       at += with.size())
+    text.replace(at, what.size(), with);
+  return text;
+}
+
+// Serves the room until the condition holds.
+bool serveUntil(RoomServer& server, const std::function<bool()>& condition) {
+  const auto end = std::chrono::steady_clock::now() + kRoomPatience;
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > end) return false;
+    server.mainloop();
+  }
+  return true;
+}
+
+RawSocket connectedTo(const vrpn_Connection& served) {
+  return RawSocket::connected({net::kLoopbackAddress, static_cast<std::uint16_t>(served.servedPort())});
+}
+
 TEST(VrpnRoom, ServerAnswersARecordedClientAsVrpnDoes) {
-  RoomStream expected;
+  VrpnStream expected;
   expected.feed(roomRecording("server.bin"));
-  ASSERT_EQ(expected.steps(), 6U);
+  ASSERT_EQ(expected.steps(), kRoomSteps);
+  VrpnStream expectedForwards;
+  expectedForwards.feed(roomRecording("forwarded.bin"));
+  ASSERT_EQ(expectedForwards.said().size(), 3U);
+  // The recorded port may be taken here; the system chooses another for port 0.
+  const std::string script =
+      replaced(roomRecording("client.bin"), {"\0\0\x11\x94", 4}, std::string("\0\0\0\0", 4));
+  VrpnStream scripted;
+  scripted.feed(script);
+  const std::size_t beforeLast = scripted.stepEnds().at(kRoomSteps - 1);
+
   const Held connection(vrpn_create_server_connection(0, nullptr, nullptr, "127.0.0.1"));
   ASSERT_TRUE(connection);
   RoomServer server(connection.get());
-  RawSocket client =
-      RawSocket::connected({net::kLoopbackAddress, static_cast<std::uint16_t>(connection->servedPort())});
-  ASSERT_TRUE(client.send(roomRecording("client.bin")));
-  RoomStream answers;
-  const auto end = std::chrono::steady_clock::now() + kRoomPatience;
-  while (answers.steps() < expected.steps() && std::chrono::steady_clock::now() < end) {
-    server.mainloop();
-    answers.feed(arrived(client));
-  }
-  std::vector<RoomMessage> said = answers.said();
+  RawSocket client = connectedTo(*connection);
+  VrpnStream answers;
+  const auto answered = [&](std::size_t steps) {
+    return serveUntil(server, [&] {
+      answers.feed(arrived(client));
+      return answers.steps() >= steps;
+    });
+  };
+  ASSERT_TRUE(client.send(script.substr(0, beforeLast)));
+  ASSERT_TRUE(answered(kRoomSteps - 1));
+  vrpn_Connection* const forwarding = server.forwarder().connectionAt(0);
+  ASSERT_NE(forwarding, nullptr);
+  RawSocket listener = connectedTo(*forwarding);
+  VrpnStream forwarded;
+  ASSERT_TRUE(listener.send(roomRecording("listener.bin")));
+  ASSERT_TRUE(serveUntil(server, [&] { return forwarding->connected() != 0; }));
+  ASSERT_TRUE(client.send(script.substr(beforeLast)));
+  ASSERT_TRUE(answered(kRoomSteps));
+  EXPECT_TRUE(serveUntil(server, [&] {
+    forwarded.feed(arrived(listener));
+    return forwarded.said().size() >= expectedForwards.said().size();
+  }));
+  expectSame(forwarded.said(), expectedForwards.said());
+
+  std::vector<VrpnMessage> said = answers.said();
   // VRPN means to tell a new client the present values but registers for it under the wrong sender.
   ASSERT_GE(said.size(), 3U);
   for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(said[i].type, "vrpn_Shared update");
@@ -152,17 +140,19 @@ TEST(VrpnRoom, ServerAnswersARecordedClientAsVrpnDoes) {
 
 TEST(VrpnRoom, ClientSaysToARecordedServerWhatVrpnDoes) {
   const std::string script = roomRecording("server.bin");
-  RoomStream expected;
+  VrpnStream expected;
   expected.feed(roomRecording("client.bin"));
-  RoomStream scripted;
+  const std::string recordedIdentity = identityIn(expected.said());
+  ASSERT_EQ(recordedIdentity.size(), 8U);
+  VrpnStream scripted;
   scripted.feed(script);
   const std::vector<std::size_t> ends = scripted.stepEnds();
-  ASSERT_EQ(ends.size(), 7U);
+  ASSERT_EQ(ends.size(), kRoomSteps + 1U);
 
   RawSocket listener;
   const net::Endpoint address = listener.bindToAnyPort();
   ASSERT_EQ(::listen(listener.fd(), 1), 0);
-  RoomStream heard;
+  VrpnStream heard;
   // Each step of the client is answered by the part of the recording that follows it.
   std::thread server([&] {
     RawSocket socket = RawSocket::accepted(listener);
@@ -171,7 +161,8 @@ TEST(VrpnRoom, ClientSaysToARecordedServerWhatVrpnDoes) {
       const std::size_t before = heard.steps();
       heard.feed(bytes);
       for (std::size_t step = before; step < heard.steps() && step + 1 < ends.size(); ++step) {
-        socket.send(std::string_view(script).substr(ends[step], ends[step + 1] - ends[step]));
+        socket.send(replaced(script.substr(ends[step], ends[step + 1] - ends[step]), recordedIdentity,
+                             identityIn(heard.said())));
       }
     }
   });
@@ -181,14 +172,21 @@ TEST(VrpnRoom, ClientSaysToARecordedServerWhatVrpnDoes) {
     const Held connection(vrpn_get_connection_by_name(name.c_str()));
     RoomClient client(connection.get());
     const auto end = std::chrono::steady_clock::now() + kRoomPatience;
-    while (!connection->connected() && std::chrono::steady_clock::now() < end) client.mainloop();
+    const auto run = [&](const auto& condition) {
+      while (!condition() && std::chrono::steady_clock::now() < end) client.mainloop();
+    };
+    run([&] { return connection->connected() != 0; });
     client.begin();
-    while (!client.done() && std::chrono::steady_clock::now() < end) client.mainloop();
+    run([&] { return client.waits(); });
+    client.finish();
+    run([&] { return client.done(); });
     done = client.done();
   }
   server.join();
   EXPECT_TRUE(done);
-  expectSame(heard.said(), asMeant(expected.said()));
+  std::vector<VrpnMessage> said = heard.said();
+  for (VrpnMessage& s : said) s.payload = replaced(s.payload, identityIn(heard.said()), recordedIdentity);
+  expectSame(said, asMeant(expected.said()));
 }
 
 TEST(VrpnValues, AreThoseOfVrpn) {

@@ -139,6 +139,7 @@ class vrpn_Mutex_Remote : public vrpn_Mutex {
     on(d_releaseNotification_type, onRelease, this, d_myId);
     on(d_initialize_type, onIndex, this, d_myId);
     on(d_connection->register_message_type(vrpn_got_connection), onConnected, this, vrpn_ANY_SENDER);
+    on(d_connection->register_message_type(vrpn_dropped_connection), onLost, this, vrpn_ANY_SENDER);
     if (d_connection->connected()) requestIndex();
   }
 
@@ -186,11 +187,19 @@ class vrpn_Mutex_Remote : public vrpn_Mutex {
   }
   // Distinguishes the remotes of a program, too.
   vrpn_int32 identity() const { return static_cast<vrpn_int32>(reinterpret_cast<size_t>(this) >> 4); }
-  void requestIndex() { send(d_requestIndex_type, {identity(), static_cast<vrpn_int32>(getpid())}); }
+  // Once for each connection: a remote that was made on a live one may be told of it afterwards.
+  void requestIndex() {
+    if (index_ >= 0 || asked_) return;
+    asked_ = true;
+    send(d_requestIndex_type, {identity(), static_cast<vrpn_int32>(getpid())});
+  }
 
   static int VRPN_CALLBACK onConnected(void* self, vrpn_HANDLERPARAM) {
-    vrpn_Mutex_Remote* remote = static_cast<vrpn_Mutex_Remote*>(self);
-    if (remote->index_ < 0) remote->requestIndex();
+    static_cast<vrpn_Mutex_Remote*>(self)->requestIndex();
+    return 0;
+  }
+  static int VRPN_CALLBACK onLost(void* self, vrpn_HANDLERPARAM) {
+    static_cast<vrpn_Mutex_Remote*>(self)->asked_ = false;
     return 0;
   }
   static int VRPN_CALLBACK onIndex(void* self, vrpn_HANDLERPARAM p) {
@@ -225,6 +234,7 @@ class vrpn_Mutex_Remote : public vrpn_Mutex {
 
   State state_ = AVAILABLE;
   vrpn_int32 index_ = -1;
+  bool asked_ = false;
   bool requestsLater_ = false;
   Callbacks granted_, denied_, taken_, released_;
 };
