@@ -1,10 +1,16 @@
 #include "announce.h"
 
 #include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <utility>
 
 namespace hapticd::apps {
 
-void announce(const server::Server& server, const server::ServerConfig& config, std::string_view driver) {
+void logAddresses(const server::Server& server, const server::ServerConfig& config, std::string_view driver) {
   const std::string at = server.address().text();
   spdlog::info("listening on {} (TCP and UDP)", at);
   if (!server.fingerprint().empty())
@@ -17,6 +23,26 @@ void announce(const server::Server& server, const server::ServerConfig& config, 
     const bool everywhere = web->address == net::kAnyAddress;
     spdlog::info("viewer: http://{}:{}/", everywhere ? "127.0.0.1" : web->addressText(), web->port);
   }
+}
+
+std::unique_ptr<zeroconf::Announcer> announceOnNetwork(const server::Server& server,
+                                                       const server::ServerConfig& config) {
+  const net::Endpoint address = server.address();
+  if (!config.announce || net::isLoopback(address.address)) return nullptr;
+  std::array<char, 65> host{};  // HOST_NAME_MAX and a NUL
+  ::gethostname(host.data(), host.size() - 1);
+  zeroconf::AnnouncedServer announced{
+      .name = std::string("hapticd on ") + host.data(),
+      .port = address.port,
+      .tls = !server.fingerprint().empty(),
+      .version = HAPTICD_VERSION,
+  };
+  announced.name.resize(std::min(announced.name.size(), zeroconf::kLongestName));
+  for (const server::DeviceConfig& device : config.devices)
+    announced.devices.insert(announced.devices.end(), device.names.begin(), device.names.end());
+  const auto web = server.webAddress();
+  if (web && !net::isLoopback(web->address)) announced.pagePort = web->port;
+  return std::make_unique<zeroconf::Announcer>(std::move(announced), address.address);
 }
 
 }  // namespace hapticd::apps

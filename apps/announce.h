@@ -1,13 +1,22 @@
-// Logs the addresses, device names and viewer URL of a server at its start.
+// What a server says of itself at its start: in the log and on the network.
 #pragma once
 
+#include <memory>
 #include <string_view>
 
 #include "server/server.h"
+#include "zeroconf/announcer.h"
 
 namespace hapticd::apps {
 
-/// `driver` replaces the drivers of the configuration in the log, if not empty.
-void announce(const server::Server& server, const server::ServerConfig& config, std::string_view driver = {});
+/// Logs addresses, device names and the viewer's URL. `driver` replaces the drivers of the configuration, if
+/// not empty.
+void logAddresses(const server::Server& server, const server::ServerConfig& config,
+                  std::string_view driver = {});
+
+/// Announces the server on the network until the result is destroyed. None for a server that other machines
+/// cannot reach or that shall not be announced.
+std::unique_ptr<zeroconf::Announcer> announceOnNetwork(const server::Server& server,
+                                                       const server::ServerConfig& config);
 
 }  // namespace hapticd::apps

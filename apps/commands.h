@@ -44,6 +44,7 @@ void addWatch(CLI::App& app);
 void addDeviceHost(CLI::App& app);
 void addExport(CLI::App& app);
 void addInfo(CLI::App& app);
+void addList(CLI::App& app);
 void addMark(CLI::App& app);
 void addPlot(CLI::App& app);
 void addRecord(CLI::App& app);

@@ -50,6 +50,7 @@ int main(int argc, char** argv) {
   addReplay(app);
   addDoctor(app);
   addDevices(app);
+  addList(app);
   addSelfTest(app);
   addBench(app);
   addManual(app);

@@ -35,7 +35,8 @@ int run(const ReplayOptions& options) {
   server::validate(config);
 
   server::Server server(config, std::move(player));
-  announce(server, config, "replay");
+  logAddresses(server, config, "replay");
+  const std::unique_ptr<zeroconf::Announcer> announcer = announceOnNetwork(server, config);
   stopper.watch(server);
   server.run();
   stopper.finish();

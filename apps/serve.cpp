@@ -168,7 +168,8 @@ int run(const ServeOptions& options) {
   spdlog::set_level(options.verbose ? spdlog::level::debug : spdlog::level::info);
   for (const std::string& remark : remarks) spdlog::warn("{}", remark);
   const std::unique_ptr<server::Server> server = openServer(config);
-  announce(*server, config);
+  logAddresses(*server, config);
+  const std::unique_ptr<zeroconf::Announcer> announcer = announceOnNetwork(*server, config);
   stopper.watch(*server);
   const CrashMark mark;
   if (mark.crashed()) {

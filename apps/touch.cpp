@@ -22,6 +22,7 @@
 #include "mesh_io/mesh_io.h"
 #include "report_summary.h"
 #include "report_view.h"
+#include "server_list.h"
 #include "stop_signals.h"
 
 namespace hapticd::apps {
@@ -33,6 +34,7 @@ using geometry::TriangleMesh;
 struct TouchOptions {
   std::string mesh;
   std::string server = "Phantom@localhost";
+  bool find = false;
   double seconds = 0;
   Surface surface{.stiffness = 0.8F, .damping = 0.1F, .staticFriction = 0.3F, .dynamicFriction = 0.2F};
   int object = 0;
@@ -119,7 +121,9 @@ void watch(Client& client, ReportSummary& summary, double seconds) {
 int run(const TouchOptions& options) {
   const StopSignals signals;
   const TriangleMesh mesh = load(options);
-  Client client(options.server, {.reconnect = false});
+  const std::string server = options.find ? onlyDeviceOfNetwork() : options.server;
+  if (options.find) std::printf("found %s\n", server.c_str());
+  Client client(server, {.reconnect = false});
   ReportSummary summary(client);
   send(client, mesh, options);
   std::string failure;
@@ -149,6 +153,8 @@ void addTouch(CLI::App& app) {
       ->add_option("--server", options->server,
                    "NAME@host[:port], or NAME@tcp://host[:port] for a single TCP connection (firewalls)")
       ->capture_default_str();
+  command->add_flag("--find", options->find, "Use the only server that 'hapticd list' finds on the network")
+      ->excludes("--server");
   command->add_option("--seconds", options->seconds, "How long to watch; 0: until Ctrl-C")
       ->check(within(0, kLongest_s))
       ->capture_default_str();

@@ -17,6 +17,8 @@ refused 2 "unknown command 'xyzzyx'; 'hapticd --help'" "$hapticd" xyzzyx
 refused 2 "nothing to render" "$hapticd" render
 refused 2 "excludes" "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --true-size --size-mm 3
 refused 1 "hapticd devices" "$hapticd" serve --device openhaptics --listen 127.0.0.1:0 --http off
+refused 1 "no system bus" env DBUS_SYSTEM_BUS_ADDRESS=unix:path=/nowhere "$hapticd" list
+refused 1 "no system bus" env DBUS_SYSTEM_BUS_ADDRESS=unix:path=/nowhere "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --find
 printf '{"asset":%0200000d' 0 | tr 0 '[' >"$work/deep.gltf"  # overflows the stack of the reader
 refused 1 "deep.gltf': its reader crashed" "$hapticd" touch "$work/deep.gltf"
 printf 'OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n' >"$work/three.off"

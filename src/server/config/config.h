@@ -177,6 +177,7 @@ struct ServerConfig {
   bool tlsLoopback = false;                  ///< TLS for clients on this machine, too
   bool insecure = false;                     ///< other machines may command without TLS
   std::vector<std::string> httpAllow;  ///< additional Host names accepted at the web port: HOST or HOST:PORT
+  bool announce = true;                ///< on the network by DNS-SD, when other machines may connect
   CompatConfig compat;
   LimitsConfig limits;
   std::vector<DeviceConfig> devices{DeviceConfig{}};

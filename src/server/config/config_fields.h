@@ -116,6 +116,7 @@ void visitFields(Visitor& visitor, Server& server) requires requires {
   visitor.field("record", server.record);
   visitor.field("http", server.http);
   visitor.field("http_allow", server.httpAllow);
+  visitor.field("announce", server.announce);
   visitor.field("socket", server.socket);
   visitor.field("tokens", server.tokens);
   visitor.field("owner_users", server.ownerUsers);

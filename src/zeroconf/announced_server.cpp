@@ -1,0 +1,59 @@
+#include "zeroconf/announced_server.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cstddef>
+#include <string_view>
+
+namespace hapticd::zeroconf {
+namespace {
+
+constexpr std::size_t kLongestEntry = 255;  // RFC 6763, 6.1
+constexpr std::uint16_t kVrpnPort = 3883;
+
+std::vector<std::string> splitAtCommas(std::string_view list) {
+  std::vector<std::string> parts;
+  while (!list.empty()) {
+    const std::size_t comma = std::min(list.find(','), list.size());
+    if (comma > 0) parts.emplace_back(list.substr(0, comma));
+    list.remove_prefix(std::min(comma + 1, list.size()));
+  }
+  return parts;
+}
+
+}  // namespace
+
+std::vector<std::string> AnnouncedServer::text() const {
+  std::string names = "devices=";
+  for (const std::string& device : devices) {
+    const std::string next = (names.back() == '=' ? "" : ",") + device;
+    if (names.size() + next.size() <= kLongestEntry) names += next;
+  }
+  std::vector<std::string> entries{"txtvers=1", names, "version=" + version};
+  if (pagePort != 0) entries.push_back("page=" + std::to_string(pagePort));
+  if (tls) entries.emplace_back("tls=1");
+  return entries;
+}
+
+void AnnouncedServer::read(const std::vector<std::string>& text) {
+  for (const std::string& entry : text) {
+    const std::size_t equals = entry.find('=');
+    if (equals == std::string::npos) continue;
+    const std::string_view key = std::string_view(entry).substr(0, equals);
+    const std::string_view value = std::string_view(entry).substr(equals + 1);
+    if (key == "devices") devices = splitAtCommas(value);
+    if (key == "version") version = value;
+    if (key == "tls") tls = value == "1";
+    if (key == "page") std::from_chars(value.data(), value.data() + value.size(), pagePort);
+  }
+}
+
+std::string AnnouncedServer::client(const std::string& device) const {
+  return device + '@' + address + (port == kVrpnPort ? "" : ':' + std::to_string(port));
+}
+
+std::string AnnouncedServer::page() const {
+  return pagePort == 0 ? "" : "http://" + address + ':' + std::to_string(pagePort) + '/';
+}
+
+}  // namespace hapticd::zeroconf

@@ -1,0 +1,157 @@
+#include "zeroconf/announcer.h"
+
+#include <arpa/inet.h>
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <netinet/in.h>
+#include <spdlog/spdlog.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <cstdint>
+#include <string_view>
+#include <utility>
+
+#include "net/endpoint.h"
+#include "zeroconf/avahi.h"
+
+namespace hapticd::zeroconf {
+namespace {
+
+// States of an entry group.
+constexpr int kEstablished = 2;
+constexpr int kCollision = 3;
+constexpr int kFailure = 4;
+
+/// The server's entry at one daemon, made again for each.
+class Entry {
+ public:
+  Entry(Avahi& avahi, AnnouncedServer server, int interface)
+      : avahi_(avahi), server_(std::move(server)), interface_(interface) {
+    avahi_.onSignal(kAvahiGroup, "StateChanged", onState, this);
+    avahi_.onOwnerChange(onOwner, this);
+  }
+
+  /// Does what the signals asked for. Not in their handlers, which must not call back.
+  void update() {
+    if (!std::exchange(due_, false)) return;
+    try {
+      if (std::exchange(renamed_, false)) rename();
+      publish();
+    } catch (const Unavailable& reason) {
+      group_.clear();
+      spdlog::info("not announced on the network: {}", reason.what());
+    }
+  }
+
+ private:
+  void publish() {
+    if (group_.empty()) {
+      const char* path = "";
+      sd_bus_message_read(avahi_.call("/", kAvahiServer, "EntryGroupNew", "").get(), "o", &path);
+      group_ = path;
+    } else {
+      avahi_.call(group_.c_str(), kAvahiGroup, "Reset", "");
+    }
+    while (!addService()) rename();
+    avahi_.call(group_.c_str(), kAvahiGroup, "Commit", "");
+  }
+
+  // False when the name is taken on this machine.
+  bool addService() {
+    sd_bus_message* raw = nullptr;
+    if (sd_bus_message_new_method_call(avahi_.bus(), &raw, kAvahi, group_.c_str(), kAvahiGroup,
+                                       "AddService") < 0)
+      throw Unavailable("no memory for a message");
+    const Message request(raw);
+    sd_bus_message_append(raw, "iiussssq", interface_, kIpv4, 0U, server_.name.c_str(), kServiceType, "", "",
+                          static_cast<unsigned>(server_.port));
+    sd_bus_message_open_container(raw, 'a', "ay");
+    for (const std::string& entry : server_.text())
+      sd_bus_message_append_array(raw, 'y', entry.data(), entry.size());
+    sd_bus_message_close_container(raw);
+    return avahi_.send(raw) != nullptr;
+  }
+
+  void rename() {
+    const Message answer =
+        avahi_.call("/", kAvahiServer, "GetAlternativeServiceName", "s", server_.name.c_str());
+    const char* name = "";
+    sd_bus_message_read(answer.get(), "s", &name);
+    spdlog::info("'{}' is taken on the network: announced as '{}'", server_.name, name);
+    server_.name = name;
+  }
+
+  static int onState(sd_bus_message* signal, void* self, sd_bus_error*) noexcept {
+    auto& entry = *static_cast<Entry*>(self);
+    if (entry.group_ != std::string_view(sd_bus_message_get_path(signal))) return 0;
+    int state = 0;
+    sd_bus_message_read(signal, "i", &state);
+    if (state == kEstablished) spdlog::info("announced on the network as '{}'", entry.server_.name);
+    if (state == kFailure) spdlog::warn("the Avahi daemon cannot announce '{}'", entry.server_.name);
+    if (state == kCollision) entry.due_ = entry.renamed_ = true;
+    return 0;
+  }
+  static int onOwner(sd_bus_message* signal, void* self, sd_bus_error*) noexcept {
+    auto& entry = *static_cast<Entry*>(self);
+    const char* owner = "";
+    sd_bus_message_skip(signal, "ss");
+    sd_bus_message_read(signal, "s", &owner);
+    entry.group_.clear();
+    entry.due_ = *owner != '\0';
+    return 0;
+  }
+
+  Avahi& avahi_;
+  AnnouncedServer server_;
+  int interface_;
+  std::string group_;  // its object path at the present daemon
+  bool due_ = true;
+  bool renamed_ = false;
+};
+
+// The index of the interface with this address; all interfaces when none has it alone.
+int interfaceWith(std::uint32_t address) {
+  int index = kAnyInterface;
+  ifaddrs* all = nullptr;
+  if (address == net::kAnyAddress || ::getifaddrs(&all) != 0) return index;
+  for (const ifaddrs* a = all; a != nullptr; a = a->ifa_next) {
+    if (a->ifa_addr == nullptr || a->ifa_addr->sa_family != AF_INET) continue;
+    if (ntohl(reinterpret_cast<const sockaddr_in*>(a->ifa_addr)->sin_addr.s_addr) == address)
+      index = static_cast<int>(::if_nametoindex(a->ifa_name));
+  }
+  ::freeifaddrs(all);
+  return index;
+}
+
+}  // namespace
+
+Announcer::Announcer(AnnouncedServer server, std::uint32_t address)
+    : server_(std::move(server)),
+      interface_(interfaceWith(address)),
+      stopFd_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+  thread_ = base::BlockingThread({.name = "announce", .niceness = 10}, [this] { run(); });
+}
+
+Announcer::~Announcer() {
+  ::eventfd_write(stopFd_, 1);
+  thread_.join();
+  ::close(stopFd_);
+}
+
+void Announcer::run() {
+  try {
+    Avahi avahi;
+    Entry entry(avahi, server_, interface_);
+    eventfd_t stop = 0;
+    while (::eventfd_read(stopFd_, &stop) != 0) {
+      avahi.process();
+      entry.update();
+      avahi.wait(stopFd_, -1);
+    }
+  } catch (const Unavailable& reason) {
+    spdlog::info("not announced on the network: {}", reason.what());
+  }
+}
+
+}  // namespace hapticd::zeroconf

@@ -1,0 +1,97 @@
+#include "zeroconf/find_servers.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+#include <utility>
+
+#include "zeroconf/avahi.h"
+
+namespace hapticd::zeroconf {
+namespace {
+
+// One search. Its handlers are called by sd-bus: what they learn stays here.
+class Search {
+ public:
+  Search() {
+    avahi_.onSignal(kAvahiBrowser, "ItemNew", onItem, this);
+    avahi_.onSignal(kAvahiBrowser, "AllForNow", onAll, this);
+    avahi_.onSignal(kAvahiBrowser, "Failure", onAll, this);
+    avahi_.call("/", kAvahiServer, "ServiceBrowserNew", "iissu", kAnyInterface, kIpv4, kServiceType, "", 0U);
+  }
+
+  bool finished() const { return heardAll_ && answers_ == requests_; }
+  void step(int timeout_ms) {
+    avahi_.process();
+    if (!finished()) avahi_.wait(-1, timeout_ms);
+  }
+  std::vector<AnnouncedServer> found() {
+    std::sort(found_.begin(), found_.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
+    // A server is heard on each interface.
+    const auto same = [](const auto& a, const auto& b) { return a.name == b.name && a.port == b.port; };
+    found_.erase(std::unique(found_.begin(), found_.end(), same), found_.end());
+    return std::move(found_);
+  }
+
+ private:
+  static int onItem(sd_bus_message* signal, void* self, sd_bus_error*) noexcept {
+    auto& search = *static_cast<Search*>(self);
+    int interface = 0;
+    int protocol = 0;
+    const char *name = "", *type = "", *domain = "";
+    sd_bus_message_read(signal, "iisss", &interface, &protocol, &name, &type, &domain);
+    const int asked = sd_bus_call_method_async(search.avahi_.bus(), nullptr, kAvahi, "/", kAvahiServer,
+                                               "ResolveService", onResolved, self, "iisssiu", interface,
+                                               protocol, name, type, domain, kIpv4, 0U);
+    if (asked >= 0) ++search.requests_;
+    return 0;
+  }
+  static int onAll(sd_bus_message*, void* self, sd_bus_error*) noexcept {
+    static_cast<Search*>(self)->heardAll_ = true;
+    return 0;
+  }
+  // One that has left meanwhile, or whose machine does not answer, is an error: it is left out.
+  static int onResolved(sd_bus_message* answer, void* self, sd_bus_error*) noexcept {
+    auto& search = *static_cast<Search*>(self);
+    ++search.answers_;
+    if (sd_bus_message_is_method_error(answer, nullptr) > 0) return 0;
+    AnnouncedServer server;
+    const char *name = "", *address = "";
+    sd_bus_message_skip(answer, "ii");
+    sd_bus_message_read(answer, "s", &name);
+    sd_bus_message_skip(answer, "sssi");
+    sd_bus_message_read(answer, "sq", &address, &server.port);
+    server.name = name;
+    server.address = address;
+    server.read(textOf(answer));
+    search.found_.push_back(server);
+    return 0;
+  }
+  static std::vector<std::string> textOf(sd_bus_message* answer) {
+    std::vector<std::string> text;
+    if (sd_bus_message_enter_container(answer, 'a', "ay") <= 0) return text;
+    const void* bytes = nullptr;
+    std::size_t size = 0;
+    while (sd_bus_message_read_array(answer, 'y', &bytes, &size) > 0)
+      text.emplace_back(static_cast<const char*>(bytes), size);
+    return text;
+  }
+
+  Avahi avahi_;
+  bool heardAll_ = false;
+  int requests_ = 0;
+  int answers_ = 0;
+  std::vector<AnnouncedServer> found_;
+};
+
+}  // namespace
+
+std::vector<AnnouncedServer> findServers(base::Clock& clock, base::Nanos patience) {
+  Search search;
+  const base::Nanos end = clock.now() + patience;
+  while (!search.finished() && clock.now() < end)
+    search.step(static_cast<int>(1e3 * base::toSeconds(end - clock.now())) + 1);
+  return search.found();
+}
+
+}  // namespace hapticd::zeroconf

@@ -1,0 +1,168 @@
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "base/clock.h"
+#include "net/endpoint.h"
+#include "zeroconf/announcer.h"
+#include "zeroconf/find_servers.h"
+#include "zeroconf/scripted_avahi.h"
+
+namespace hapticd::zeroconf {
+namespace {
+
+using test::AvahiEntry;
+using test::ScriptedAvahi;
+
+const std::vector<std::string> kLabText{"txtvers=1", "devices=Phantom,Left", "version=1.2.3", "page=8080",
+                                        "tls=1"};
+
+AnnouncedServer lab() {
+  return {.name = "hapticd on lab7",
+          .port = 3884,
+          .devices = {"Phantom", "Left"},
+          .pagePort = 8080,
+          .tls = true,
+          .version = "1.2.3"};
+}
+
+TEST(AnnouncedServer, SaysItsDevicesPageAndVersion) {
+  EXPECT_EQ(lab().text(), kLabText);
+}
+
+TEST(AnnouncedServer, IsReadFromItsText) {
+  AnnouncedServer read{.name = "hapticd on lab7", .port = 3884};
+  read.read(kLabText);
+  EXPECT_EQ(read, lab());
+  read.address = "10.0.0.7";
+  EXPECT_EQ(read.client("Left"), "Left@10.0.0.7:3884");
+  EXPECT_EQ(read.page(), "http://10.0.0.7:8080/");
+  read.port = 3883;
+  EXPECT_EQ(read.client("Left"), "Left@10.0.0.7");
+}
+
+TEST(AnnouncedServer, IgnoresWhatItDoesNotKnow) {
+  AnnouncedServer read;
+  read.read({"", "=", "devices", "devices=,,A,", "page=70000", "page=x", "version=a=b", "colour=red"});
+  EXPECT_EQ(read.devices, std::vector<std::string>{"A"});
+  EXPECT_EQ(read.pagePort, 0);
+  EXPECT_EQ(read.version, "a=b");
+  EXPECT_EQ(read.page(), "");
+}
+
+TEST(AnnouncedServer, LeavesOutDevicesThatDoNotFit) {
+  AnnouncedServer many = lab();
+  many.devices.assign(40, "ADeviceOfTenBytes");
+  for (const std::string& entry : many.text()) EXPECT_LE(entry.size(), 255U);
+  AnnouncedServer read;
+  read.read(many.text());
+  EXPECT_EQ(read.devices.size(), 13U);
+}
+
+class Zeroconf : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!bus_.runs()) GTEST_SKIP() << "dbus-daemon is missing (packages.txt, section test)";
+  }
+  std::vector<AnnouncedServer> find() { return findServers(clock_, base::toNanos(30)); }
+
+  test::PrivateBus bus_;
+  base::MonotonicClock clock_;
+};
+
+TEST_F(Zeroconf, AServerIsAnnouncedAsItIs) {
+  ScriptedAvahi avahi;
+  const Announcer announcer(lab(), net::kAnyAddress);
+  ASSERT_TRUE(avahi.waitCommitted(1));
+  const AvahiEntry entry = avahi.entry();
+  EXPECT_EQ(entry.name, "hapticd on lab7");
+  EXPECT_EQ(entry.type, "_hapticd._tcp");
+  EXPECT_EQ(entry.port, 3884);
+  EXPECT_EQ(entry.interface, -1);
+  EXPECT_EQ(entry.protocol, 0);
+  EXPECT_EQ(entry.text, kLabText);
+}
+
+TEST_F(Zeroconf, AServerOfOneAddressIsAnnouncedOnItsInterface) {
+  ScriptedAvahi avahi;
+  const Announcer announcer(lab(), net::kLoopbackAddress);
+  ASSERT_TRUE(avahi.waitCommitted(1));
+  EXPECT_EQ(avahi.entry().interface, 1) << "the loopback interface is the first of every Linux";
+}
+
+TEST_F(Zeroconf, AnotherNameIsTakenWhenTheMachineHasIt) {
+  ScriptedAvahi avahi({"hapticd on lab7", "hapticd on lab7 #2"});
+  const Announcer announcer(lab(), net::kAnyAddress);
+  ASSERT_TRUE(avahi.waitCommitted(1));
+  EXPECT_EQ(avahi.entry().name, "hapticd on lab7 #2 #2");
+}
+
+TEST_F(Zeroconf, AnotherNameIsTakenWhenAnotherMachineHasIt) {
+  ScriptedAvahi avahi;
+  const Announcer announcer(lab(), net::kAnyAddress);
+  ASSERT_TRUE(avahi.waitCommitted(1));
+  avahi.collide();
+  ASSERT_TRUE(avahi.waitCommitted(2));
+  EXPECT_EQ(avahi.entry().name, "hapticd on lab7 #2");
+}
+
+TEST_F(Zeroconf, AServerIsAnnouncedAgainWhenAvahiRestarts) {
+  const Announcer announcer(lab(), net::kAnyAddress);  // before any Avahi
+  for (int start = 0; start < 3; ++start) {
+    ScriptedAvahi avahi;
+    ASSERT_TRUE(avahi.waitCommitted(1)) << start;
+    EXPECT_EQ(avahi.entry().text, kLabText);
+  }
+}
+
+TEST_F(Zeroconf, ServersOfTheNetworkAreFoundOnce) {
+  ScriptedAvahi avahi;
+  const AvahiEntry labEntry{2, 0, "hapticd on lab7", "_hapticd._tcp", 3884, kLabText};
+  const AvahiEntry labAgain{3, 0, "hapticd on lab7", "_hapticd._tcp", 3884, kLabText};
+  const AvahiEntry attic{2, 0, "attic", "_hapticd._tcp", 3883, {"devices=Arm", "version=9"}};
+  const AvahiEntry gone{2, -1, "gone", "_hapticd._tcp", 1, {}};
+  const AvahiEntry printer{2, 0, "printer", "_ipp._tcp", 631, {}};
+  avahi.setOthers({{labEntry, "10.0.0.7"},
+                   {gone, ""},
+                   {printer, "10.0.0.3"},
+                   {labAgain, "10.0.0.7"},
+                   {attic, "10.0.0.9"}});
+  const std::vector<AnnouncedServer> found = find();
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_EQ(found[0].name, "attic");
+  EXPECT_EQ(found[0].client("Arm"), "Arm@10.0.0.9");
+  AnnouncedServer expected = lab();
+  expected.address = "10.0.0.7";
+  EXPECT_EQ(found[1], expected);
+}
+
+TEST_F(Zeroconf, NobodyIsFoundInAnEmptyNetwork) {
+  ScriptedAvahi avahi;
+  EXPECT_TRUE(find().empty());
+}
+
+TEST_F(Zeroconf, WithoutAvahiTheRemedyIsTold) {
+  try {
+    find();
+    FAIL() << "found without Avahi";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("apt install avahi-daemon"), std::string::npos) << error.what();
+  }
+}
+
+TEST(ZeroconfWithoutABus, ServesOnAndSaysSo) {
+  ::setenv("DBUS_SYSTEM_BUS_ADDRESS", "unix:path=/nowhere/bus", 1);
+  { const Announcer announcer(lab(), net::kAnyAddress); }
+  base::MonotonicClock clock;
+  EXPECT_THROW(findServers(clock, base::toNanos(1)), std::runtime_error);
+  ::unsetenv("DBUS_SYSTEM_BUS_ADDRESS");
+}
+
+}  // namespace
+}  // namespace hapticd::zeroconf
