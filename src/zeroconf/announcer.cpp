@@ -48,7 +48,8 @@ class Entry {
   void publish() {
     if (group_.empty()) {
       const char* path = "";
-      sd_bus_message_read(avahi_.call("/", kAvahiServer, "EntryGroupNew", "").get(), "o", &path);
+      const Message answer = avahi_.call("/", kAvahiServer, "EntryGroupNew", "");
+      sd_bus_message_read(answer.get(), "o", &path);
       group_ = path;
     } else {
       avahi_.call(group_.c_str(), kAvahiGroup, "Reset", "");

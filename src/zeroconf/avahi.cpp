@@ -16,7 +16,7 @@ namespace {
 }
 
 struct Error {
-  sd_bus_error error = SD_BUS_ERROR_NULL;
+  sd_bus_error error{};
   ~Error() { sd_bus_error_free(&error); }
 };
 

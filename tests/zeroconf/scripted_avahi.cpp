@@ -43,6 +43,9 @@ PrivateBus::PrivateBus() {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, ends[1], 3);
+  // Its complaint about limits of rights that it has not; and no pipe of ours outlives this program in it.
+  for (const int output : {1, 2})
+    posix_spawn_file_actions_addopen(&actions, output, "/dev/null", O_WRONLY, 0);
   std::array<const char*, 6> arguments{"dbus-daemon", "--session",         "--nofork",
                                        "--nopidfile", "--print-address=3", nullptr};
   if (::posix_spawnp(&pid_, arguments[0], &actions, nullptr, const_cast<char* const*>(arguments.data()),
