@@ -67,6 +67,7 @@ class Hand {
     static int count = 0;
     file_ = std::filesystem::temp_directory_path() /
             ("hapticd_hand_" + std::to_string(::getpid()) + '_' + std::to_string(++count) + ".csv");
+    std::remove(file_.c_str());  // of a program that had this number and was killed
   }
 
   std::string file_;
