@@ -17,7 +17,7 @@ from conftest import HAPTICD, ROOT, Server, feel_a_sphere
 from hapticd.session import _COMMANDS
 
 RECORDINGS = ROOT / "testdata/recordings"
-FILES = ["all_commands_law4", "all_commands_law3", "all_commands_law2", "all_commands_v1", "gripper_v2"]
+FILES = ["all_commands_law5", "all_commands_law4", "all_commands_law3", "all_commands_law2", "all_commands_v1", "gripper_v2"]
 
 
 def exported(file: pathlib.Path, to: pathlib.Path) -> List[Dict[str, str]]:

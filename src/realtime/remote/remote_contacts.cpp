@@ -127,13 +127,19 @@ Vec3 RemoteContacts::forceWith(const Change& change, const RemoteHand& hand, dou
     }
     demand(slot, hand);
   }
-  Vec3 force = share(hand);
+  const Vec3 normal_N = share(hand);
+  Vec3 friction_N = Vec3::Zero();
+  double energy_J = 0;  // of the friction springs
   for (Slot& slot : inUse()) {
     if (!slot.used) continue;
     slot.friction_N = friction(slot, hand, pressed_N, step_s);
-    force += slot.friction_N;
+    friction_N += slot.friction_N;
+    energy_J += 0.5 * slot.friction_N.dot(slot.anchor_m - hand.position_m);
   }
-  return force;
+  for (Slot& slot : inUse()) {
+    if (slot.used && slot.normal_N <= 0) takeHold(slot, hand, friction_N, energy_J);
+  }
+  return normal_N + friction_N;
 }
 
 Vec3 RemoteContacts::forceAgain(const Change& change, const RemoteHand& hand, double step_s) noexcept {
@@ -340,8 +346,13 @@ void RemoteContacts::correct(Slot& slot, const RemoteHand& hand, double budget_N
   const double leaving = slot.normal.dot(hand.velocity_m_per_s - slot.velocity);
   slot.damping = towards(slot.damping, c.damping_Ns_per_m,
                          force_N > 0 ? std::max(std::abs(leaving), kSlow_m_per_s) : 0, budget_N);
-  slot.staticFriction = towards(slot.staticFriction, c.staticFriction, slot.normal_N, budget_N);
-  slot.dynamicFriction = towards(slot.dynamicFriction, c.dynamicFriction, slot.normal_N, budget_N);
+  // Both coefficients by the same share: where the client states equal ones, a slip must not find them apart.
+  const double staticChange = c.staticFriction - slot.staticFriction;
+  const double dynamicChange = c.dynamicFriction - slot.dynamicFriction;
+  const double most = std::max(std::abs(staticChange), std::abs(dynamicChange));
+  const double share = towards(0, 1, most * slot.normal_N, budget_N);
+  slot.staticFriction = share < 1 ? slot.staticFriction + share * staticChange : c.staticFriction;
+  slot.dynamicFriction = share < 1 ? slot.dynamicFriction + share * dynamicChange : c.dynamicFriction;
 }
 
 // Spring and damper. The damper exerts no more than the spring, so that a touch begins without a step and the
@@ -385,11 +396,7 @@ Vec3 RemoteContacts::share(const RemoteHand& hand) noexcept {
 
 // A spring to a point of the surface, which slides when the spring exceeds the bound.
 Vec3 RemoteContacts::friction(Slot& slot, const RemoteHand& hand, double ofAll, double step_s) noexcept {
-  if (slot.normal_N <= 0 || slot.staticFriction <= 0) {
-    slot.anchor_m = hand.position_m;
-    slot.sliding = false;
-    return Vec3::Zero();
-  }
+  if (slot.normal_N <= 0) return Vec3::Zero();
   slot.anchor_m += step_s * slot.velocity;
   Vec3 apart = hand.position_m - slot.anchor_m;
   apart -= slot.normal.dot(apart) * slot.normal;
@@ -405,6 +412,17 @@ Vec3 RemoteContacts::friction(Slot& slot, const RemoteHand& hand, double ofAll, 
     slot.sliding = false;
   }
   return -stiffness * apart;
+}
+
+// A contact that bears nothing yet holds the tool as those that bear: when it comes to bear, the friction of
+// all goes on. A softer spring would store more energy at the same force, so it takes over what holds the
+// same.
+void RemoteContacts::takeHold(Slot& slot, const RemoteHand& hand, const Vec3& friction_N,
+                              double energy_J) noexcept {
+  const double stiffness = kLateral * slot.contact.stiffness_N_per_m;
+  const double most_N = std::sqrt(2 * stiffness * std::max(0.0, energy_J));
+  slot.anchor_m = hand.position_m + atMost(friction_N, most_N) / stiffness;
+  slot.sliding = false;
 }
 
 }  // namespace hapticd::realtime

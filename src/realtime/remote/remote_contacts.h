@@ -91,6 +91,7 @@ class RemoteContacts {
   static void demand(Slot& slot, const RemoteHand& hand) noexcept;
   Vec3 share(const RemoteHand& hand) noexcept;
   static Vec3 friction(Slot& slot, const RemoteHand& hand, double ofAll, double step_s) noexcept;
+  static void takeHold(Slot& slot, const RemoteHand& hand, const Vec3& friction_N, double energy_J) noexcept;
 
   std::array<Slot, kSlots> slots_;
   std::uint64_t taken_ = 0;

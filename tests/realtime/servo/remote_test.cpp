@@ -162,13 +162,16 @@ class Draw {
   std::uniform_real_distribution<double> unit_{-1, 1};
 };
 
-// The largest change of the force in a tick, with the hand at rest and an update every 17 ms.
-double largestStep(int ticks, const std::function<std::vector<RemoteContact>()>& contacts) {
+// The largest change of the force in a tick, with an update every 17 ms and the hand at rest or along x.
+double largestStep(int ticks, const std::function<std::vector<RemoteContact>()>& contacts,
+                   double speed_m_per_s = 0) {
   Rig rig;
   Vec3 last = Vec3::Zero();
   double largest = 0;
   for (int ms = 0; ms < ticks; ++ms) {
     if (ms % 17 == 0) rig.state(contacts());
+    rig.hand.velocity_m_per_s.x() = speed_m_per_s;
+    rig.hand.position_m.x() += 1e-3 * speed_m_per_s;
     const Vec3 force = rig.step();
     largest = std::max(largest, (force - last).norm());
     last = force;
@@ -227,6 +230,87 @@ TEST(RemoteContacts, FallingFrictionLetsTheToolSlipSlowly) {
     last_N = friction_N;
   }
   EXPECT_NEAR(last_N, 0.05 * 3.2, 1e-6);
+}
+
+// A face that comes to bear goes on with the friction of the one that bore before; a softer one with what
+// holds the same energy.
+TEST(RemoteContacts, AnotherBearerTakesTheFrictionOver) {
+  for (const double stiffness : {800.0, 1600.0, 200.0}) {
+    Rig rig;
+    RemoteContact lower = floorAt(0);
+    lower.staticFriction = lower.dynamicFriction = 0.5;
+    RemoteContact rising = lower;
+    rising.id = 1;
+    rising.stiffness_N_per_m = stiffness;
+    rising.point_m.y() = -0.001;
+    rising.velocity_m_per_s.y() = 0.5;
+    rising.yields = true;
+    rig.approach({lower}, {0, 0.001, 0}, {0, -0.003, 0});
+    for (int i = 0; i < 8; ++i) {
+      rig.hand.position_m.x() += 5e-5;
+      rig.step();
+    }
+    const double friction_N = -0.5 * 800 * 4e-4;
+    rig.state({lower, rising});
+    std::int32_t bearer = 0;
+    for (int ms = 0; ms < 40; ++ms) {
+      rig.step();
+      ASSERT_EQ(rig.out.count, 1U) << ms;
+      bearer = rig.out.contacts[0].id;
+      const double kept = bearer == 1 ? std::min(1.0, std::sqrt(stiffness / 800)) : 1;
+      EXPECT_NEAR(rig.force.x(), kept * friction_N, 1e-9) << ms;
+    }
+    EXPECT_EQ(bearer, 1) << "it has risen past the other";
+  }
+}
+
+// Where the client states equal coefficients, no slip finds them apart while they follow an update.
+TEST(RemoteContacts, EqualCoefficientsStayEqual) {
+  for (const unsigned seed : {1U, 4U, 345U}) {
+    Draw draw(seed);
+    const double largest = largestStep(
+        3000,
+        [&] {
+          std::vector<RemoteContact> contacts;
+          const double friction = 0.3 + 0.3 * draw();
+          if (draw() > 0.6) return contacts;
+          const double height_m = 0.002 * draw();
+          RemoteContact c = floorAt(height_m, 300 + 250 * draw());
+          c.normal = draw.nearlyUp(0.3);
+          c.velocity_m_per_s = 0.02 * draw.vector();
+          c.damping_Ns_per_m = 1 + draw();
+          c.staticFriction = c.dynamicFriction = friction;
+          c.yields = true;
+          contacts.push_back(c);
+          return contacts;
+        },
+        0.05);
+    EXPECT_LT(largest, kRate_N_per_ms) << "seed " << seed;
+  }
+}
+
+// Faces with friction that nearly coincide. Seeds in which the friction of one that no longer bore was lost.
+TEST(RemoteContacts, OtherBearersWithFrictionMakeNoStep) {
+  for (const unsigned seed : {51U, 67U, 82U}) {
+    Draw draw(seed);
+    const double largest = largestStep(3000, [&] {
+      std::vector<RemoteContact> contacts;
+      for (int id = 0; id < 5; ++id) {
+        if (draw() > 0.6) continue;
+        const double height_m = 0.002 * draw();
+        RemoteContact c = floorAt(height_m, 300 + 250 * draw());
+        c.id = id;
+        c.normal = draw.nearlyUp(0.3);
+        c.velocity_m_per_s = 0.02 * draw.vector();
+        c.damping_Ns_per_m = 1 + draw();
+        c.staticFriction = c.dynamicFriction = 0.3 + 0.3 * draw();
+        c.yields = true;
+        contacts.push_back(c);
+      }
+      return contacts;
+    });
+    EXPECT_LT(largest, kRate_N_per_ms) << "seed " << seed;
+  }
 }
 
 // Four faces of which three touch in a row make the demands' system indefinite: from one tick to the next

@@ -234,6 +234,7 @@ ServerConfig unusual() {
   config.record = "session.haptics";
   config.http = "10.0.0.1:9000";
   config.httpAllow = {"lab7"};
+  config.announce = false;
   config.socket = "/run/lab.sock";
   config.tokens = "/etc/tokens";
   config.ownerUsers = {"0"};
