@@ -9,6 +9,9 @@
 namespace hapticd::zeroconf {
 
 inline constexpr const char* kServiceType = "_hapticd._tcp";
+/// Text of another machine as a terminal may show it: '?' for control characters.
+std::string printable(std::string text);
+
 /// Bytes of a name (RFC 6763, 4.1.1).
 inline constexpr std::size_t kLongestName = 63;
 
@@ -23,7 +26,7 @@ struct AnnouncedServer {
 
   /// The TXT record: "key=value" of at most 255 bytes each. Devices that do not fit are left out.
   std::vector<std::string> text() const;
-  /// Reads the TXT record of another server; what it does not know it ignores.
+  /// Reads the TXT record of another server, as printable(); what it does not know it ignores.
   void read(const std::vector<std::string>& text);
 
   /// What a client opens: "Phantom@192.168.1.7", with the port unless it is VRPN's.

@@ -61,7 +61,7 @@ class Search {
     sd_bus_message_read(answer, "s", &name);
     sd_bus_message_skip(answer, "sssi");
     sd_bus_message_read(answer, "sq", &address, &server.port);
-    server.name = name;
+    server.name = printable(name);
     server.address = address;
     server.read(textOf(answer));
     search.found_.push_back(server);

@@ -56,6 +56,17 @@ TEST(AnnouncedServer, IgnoresWhatItDoesNotKnow) {
   EXPECT_EQ(read.page(), "");
 }
 
+// A machine of the network chooses these bytes, and a terminal obeys some.
+TEST(AnnouncedServer, HasNoControlCharacters) {
+  AnnouncedServer read;
+  read.read({"devices=A\x1b[2J,B\r\n",
+             "version=1\xc2\x9b"
+             "2\x7f"});
+  EXPECT_EQ(read.devices, (std::vector<std::string>{"A?[2J", "B??"}));
+  EXPECT_EQ(read.version, "1??2?");
+  EXPECT_EQ(printable("Böhm's \xc2\xb5m"), "Böhm's \xc2\xb5m");
+}
+
 TEST(AnnouncedServer, LeavesOutDevicesThatDoNotFit) {
   AnnouncedServer many = lab();
   many.devices.assign(40, "ADeviceOfTenBytes");
