@@ -29,6 +29,7 @@ class Entry {
   Entry(Avahi& avahi, AnnouncedServer server, int interface)
       : avahi_(avahi), server_(std::move(server)), interface_(interface) {
     avahi_.onSignal(kAvahiGroup, "StateChanged", onState, this);
+    avahi_.onSignal(kAvahiServer, "StateChanged", onServer, this);
     avahi_.onOwnerChange(onOwner, this);
   }
 
@@ -91,6 +92,14 @@ class Entry {
     if (state == kEstablished) spdlog::info("announced on the network as '{}'", entry.server_.name);
     if (state == kFailure) spdlog::warn("the Avahi daemon cannot announce '{}'", entry.server_.name);
     if (state == kCollision) entry.due_ = entry.renamed_ = true;
+    return 0;
+  }
+  // After a new host name the daemon runs again, without its entries.
+  static int onServer(sd_bus_message* signal, void* self, sd_bus_error*) noexcept {
+    constexpr int kRunning = 2;
+    int state = 0;
+    sd_bus_message_read(signal, "i", &state);
+    if (state == kRunning) static_cast<Entry*>(self)->due_ = true;
     return 0;
   }
   static int onOwner(sd_bus_message* signal, void* self, sd_bus_error*) noexcept {

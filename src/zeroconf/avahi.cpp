@@ -42,7 +42,7 @@ Message Avahi::call(const char* path, const char* interface, const char* method,
 }
 
 Message Avahi::send(sd_bus_message* request) {
-  constexpr std::uint64_t kPatience_us = 5'000'000;
+  constexpr std::uint64_t kPatience_us = 2'000'000;
   Error failure;
   sd_bus_message* answer = nullptr;
   const int result = sd_bus_call(bus(), request, kPatience_us, &failure.error, &answer);

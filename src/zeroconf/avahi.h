@@ -38,7 +38,7 @@ class Avahi {
   Avahi();
 
   sd_bus* bus() const noexcept { return bus_.get(); }
-  /// Calls a method of Avahi and waits for its answer, 5 s at most. Throws Unavailable; a name that is taken
+  /// Calls a method of Avahi and waits for its answer, 2 s at most. Throws Unavailable; a name that is taken
   /// is returned as an empty answer.
   Message call(const char* path, const char* interface, const char* method, const char* types, ...);
   /// As call(), with a message.

@@ -114,6 +114,14 @@ void ScriptedAvahi::collide() {
   });
 }
 
+void ScriptedAvahi::renameHost() {
+  constexpr int kRunning = 2;
+  const std::lock_guard lock(mutex_);
+  orders_.emplace_back([this] {
+    sd_bus_emit_signal(bus_, "/", "org.freedesktop.Avahi.Server", "StateChanged", "is", kRunning, "");
+  });
+}
+
 void ScriptedAvahi::setOthers(std::vector<std::pair<AvahiEntry, std::string>> others) {
   const std::lock_guard lock(mutex_);
   others_ = std::move(others);

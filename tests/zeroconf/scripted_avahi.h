@@ -48,6 +48,8 @@ class ScriptedAvahi {
   AvahiEntry entry();
   /// Tells the announcer that another machine has the name.
   void collide();
+  /// Tells that the daemon runs under another host name; it has dropped all entries.
+  void renameHost();
   /// What browsers are told, from then on: each entry once, with an address; those of protocol -1 cannot be
   /// resolved.
   void setOthers(std::vector<std::pair<AvahiEntry, std::string>> others);

@@ -123,6 +123,15 @@ TEST_F(Zeroconf, AnotherNameIsTakenWhenAnotherMachineHasIt) {
   EXPECT_EQ(avahi.entry().name, "hapticd on lab7 #2");
 }
 
+TEST_F(Zeroconf, AServerIsAnnouncedAgainWhenItsHostIsRenamed) {
+  ScriptedAvahi avahi;
+  const Announcer announcer(lab(), net::kAnyAddress);
+  ASSERT_TRUE(avahi.waitCommitted(1));
+  avahi.renameHost();
+  ASSERT_TRUE(avahi.waitCommitted(2));
+  EXPECT_EQ(avahi.entry().name, "hapticd on lab7");
+}
+
 TEST_F(Zeroconf, AServerIsAnnouncedAgainWhenAvahiRestarts) {
   const Announcer announcer(lab(), net::kAnyAddress);  // before any Avahi
   for (int start = 0; start < 3; ++start) {
