@@ -10,7 +10,7 @@ namespace hapticd::zeroconf {
 
 /// Keeps an announcement at the Avahi daemon, over restarts of the daemon and under another name ("... #2")
 /// when the name is taken. A thread of its own waits for the daemon; nothing waits for that thread but the
-/// destructor, 5 s at most when the daemon hangs.
+/// destructor, some seconds when the daemon hangs.
 class Announcer {
  public:
   /// `address`: the one that the server listens on, in host byte order, or net::kAnyAddress. It is announced
