@@ -87,11 +87,9 @@ void addList(CLI::App& app) {
       ->capture_default_str();
   command->add_flag("--json", options->json, kJsonText);
   command->footer(
-      "Servers that listen on the network announce themselves by DNS-SD (Avahi), unless their configuration "
-      "says\n"
-      "'announce = false'. The exit status is 1 when none is found. 'hapticd devices' lists the devices of "
-      "this\n"
-      "machine.\n"
+      "Servers that listen on the network announce themselves by DNS-SD (Avahi), unless their\n"
+      "configuration says 'announce = false'. The exit status is 1 when none is found.\n"
+      "'hapticd devices' lists the devices of this machine.\n"
       "Example:\n"
       "  hapticd list --json | jq -r '.[].devices[0]'");
   command->callback([options] { exitCode = run(*options); });

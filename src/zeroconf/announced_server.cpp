@@ -9,7 +9,6 @@ namespace hapticd::zeroconf {
 namespace {
 
 constexpr std::size_t kLongestEntry = 255;  // RFC 6763, 6.1
-constexpr std::uint16_t kVrpnPort = 3883;
 
 std::vector<std::string> splitAtCommas(std::string_view list) {
   std::vector<std::string> parts;
@@ -60,7 +59,7 @@ void AnnouncedServer::read(const std::vector<std::string>& text) {
 }
 
 std::string AnnouncedServer::client(const std::string& device) const {
-  return device + '@' + address + (port == kVrpnPort ? "" : ':' + std::to_string(port));
+  return device + '@' + address + ':' + std::to_string(port);
 }
 
 std::string AnnouncedServer::page() const {

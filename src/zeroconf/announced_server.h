@@ -9,11 +9,11 @@
 namespace hapticd::zeroconf {
 
 inline constexpr const char* kServiceType = "_hapticd._tcp";
-/// Text of another machine as a terminal may show it: '?' for control characters.
-std::string printable(std::string text);
-
 /// Bytes of a name (RFC 6763, 4.1.1).
 inline constexpr std::size_t kLongestName = 63;
+
+/// Text of another machine as a terminal may show it: '?' for control characters.
+std::string printable(std::string text);
 
 struct AnnouncedServer {
   std::string name{};     ///< for people: "hapticd on lab7"
@@ -29,7 +29,7 @@ struct AnnouncedServer {
   /// Reads the TXT record of another server, as printable(); what it does not know it ignores.
   void read(const std::vector<std::string>& text);
 
-  /// What a client opens: "Phantom@192.168.1.7", with the port unless it is VRPN's.
+  /// What a client opens: "Phantom@192.168.1.7:3883".
   std::string client(const std::string& device) const;
   /// "http://192.168.1.7:8080/", or empty.
   std::string page() const;

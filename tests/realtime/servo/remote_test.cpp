@@ -162,6 +162,16 @@ class Draw {
   std::uniform_real_distribution<double> unit_{-1, 1};
 };
 
+RemoteContact movingFloor(Draw& draw) {
+  const double height_m = 0.002 * draw();
+  RemoteContact c = floorAt(height_m, 300 + 250 * draw());
+  c.normal = draw.nearlyUp(0.3);
+  c.velocity_m_per_s = 0.02 * draw.vector();  // 0.01 N/ms, which is no step of an update
+  c.damping_Ns_per_m = 1 + draw();
+  c.yields = true;
+  return c;
+}
+
 // The largest change of the force in a tick, with an update every 17 ms and the hand at rest or along x.
 double largestStep(int ticks, const std::function<std::vector<RemoteContact>()>& contacts,
                    double speed_m_per_s = 0) {
@@ -190,14 +200,9 @@ TEST(RemoteContacts, NoUpdateMakesAStep) {
         std::vector<RemoteContact> contacts;
         for (int id = 0; id < most; ++id) {
           if (draw() > 0.5) continue;
-          const double height_m = 0.002 * draw();
-          RemoteContact c = floorAt(height_m, 300 + 250 * draw());
+          RemoteContact c = movingFloor(draw);
           c.id = id;
-          c.normal = draw.nearlyUp(0.3);
-          c.velocity_m_per_s = 0.02 * draw.vector();  // 0.01 N/ms, which is no step of an update
-          c.damping_Ns_per_m = 1 + draw();
           if (most == 1) c.staticFriction = c.dynamicFriction = 0.3 + 0.3 * draw();
-          c.yields = true;
           c.lifetime = 40 * kMs;
           contacts.push_back(c);
         }
@@ -274,13 +279,8 @@ TEST(RemoteContacts, EqualCoefficientsStayEqual) {
           std::vector<RemoteContact> contacts;
           const double friction = 0.3 + 0.3 * draw();
           if (draw() > 0.6) return contacts;
-          const double height_m = 0.002 * draw();
-          RemoteContact c = floorAt(height_m, 300 + 250 * draw());
-          c.normal = draw.nearlyUp(0.3);
-          c.velocity_m_per_s = 0.02 * draw.vector();
-          c.damping_Ns_per_m = 1 + draw();
+          RemoteContact c = movingFloor(draw);
           c.staticFriction = c.dynamicFriction = friction;
-          c.yields = true;
           contacts.push_back(c);
           return contacts;
         },
@@ -297,14 +297,9 @@ TEST(RemoteContacts, OtherBearersWithFrictionMakeNoStep) {
       std::vector<RemoteContact> contacts;
       for (int id = 0; id < 5; ++id) {
         if (draw() > 0.6) continue;
-        const double height_m = 0.002 * draw();
-        RemoteContact c = floorAt(height_m, 300 + 250 * draw());
+        RemoteContact c = movingFloor(draw);
         c.id = id;
-        c.normal = draw.nearlyUp(0.3);
-        c.velocity_m_per_s = 0.02 * draw.vector();
-        c.damping_Ns_per_m = 1 + draw();
         c.staticFriction = c.dynamicFriction = 0.3 + 0.3 * draw();
-        c.yields = true;
         contacts.push_back(c);
       }
       return contacts;
