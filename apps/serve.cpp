@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 
 #include "announce.h"
@@ -18,6 +19,7 @@
 #include "server/station/devices.h"
 #include "service_manager.h"
 #include "stop_on_signal.h"
+#include "system_bus/sleep_guard.h"
 
 namespace hapticd::apps {
 namespace {
@@ -102,6 +104,11 @@ server::ServerConfig configOf(const ServeOptions& options, std::vector<std::stri
   return config;
 }
 
+bool hasRealDevice(const server::ServerConfig& config) {
+  return std::any_of(config.devices.begin(), config.devices.end(),
+                     [](const server::DeviceConfig& device) { return device.driver != "simulated"; });
+}
+
 // A driver knows what its device or library answered; 'hapticd devices' knows the remedy.
 std::unique_ptr<server::Server> openServer(const server::ServerConfig& config) {
   try {
@@ -109,9 +116,7 @@ std::unique_ptr<server::Server> openServer(const server::ServerConfig& config) {
   } catch (const net::Error&) {
     throw;
   } catch (const std::runtime_error& error) {
-    bool real = false;
-    for (const server::DeviceConfig& device : config.devices) real = real || device.driver != "simulated";
-    if (!real) throw;
+    if (!hasRealDevice(config)) throw;
     throw std::runtime_error(
         std::string(error.what()) +
         "\nhapticd: 'hapticd devices' lists what was found, and the remedy for each driver");
@@ -171,6 +176,10 @@ int run(const ServeOptions& options) {
   logAddresses(*server, config);
   const std::unique_ptr<zeroconf::Announcer> announcer = announceOnNetwork(*server, config);
   stopper.watch(*server);
+  std::optional<system_bus::SleepGuard> sleepGuard;
+  if (hasRealDevice(config)) {
+    sleepGuard.emplace([&] { return server->armed(); }, [&] { server->stopForces(); });
+  }
   const CrashMark mark;
   if (mark.crashed()) {
     server->stopForces();

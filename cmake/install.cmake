@@ -42,6 +42,7 @@ install(FILES testdata/meshes/bunny.obj DESTINATION ${CMAKE_INSTALL_DATADIR}/hap
 # What an operator copies into the system; the Debian package does it (scripts/package.sh).
 install(FILES packaging/systemd/hapticd.service packaging/systemd/hapticd-loopback.service packaging/sysusers/hapticd.conf packaging/udev/70-hapticd.rules packaging/hapticd.toml
         DESTINATION ${CMAKE_INSTALL_DATADIR}/hapticd/system)
+install(FILES packaging/polkit/50-hapticd.rules DESTINATION ${CMAKE_INSTALL_DATADIR}/hapticd/system RENAME polkit.rules)
 install(FILES packaging/limits/hapticd.conf DESTINATION ${CMAKE_INSTALL_DATADIR}/hapticd/system RENAME limits.conf)
 install(FILES packaging/desktop/hapticd.desktop DESTINATION ${CMAKE_INSTALL_DATADIR}/applications)
 install(FILES packaging/desktop/io.hapticd.viewer.metainfo.xml DESTINATION ${CMAKE_INSTALL_DATADIR}/metainfo)

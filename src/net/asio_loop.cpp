@@ -164,6 +164,23 @@ void AsioLoop::post(std::function<void()> function) {
   asio::post(context, [this, f = std::move(function)] { guard(f); });
 }
 
+void AsioLoop::readLater(std::function<void()> function) {
+  readTurns_.push_back(std::move(function));
+  if (readTurns_.size() == 1) asio::post(context, [this] { readTurns(); });
+}
+
+void AsioLoop::readTurns() {
+  constexpr base::Nanos kSlice = 500'000;
+  const base::Nanos begin = base::now();
+  while (!readTurns_.empty() && base::now() - begin < kSlice) {
+    const std::function<void()> turn = std::move(readTurns_.front());
+    readTurns_.front() = nullptr;  // still there: a turn that asks for another posts nothing
+    guard(turn);
+    readTurns_.pop_front();
+  }
+  if (!readTurns_.empty()) asio::post(context, [this] { readTurns(); });
+}
+
 std::shared_ptr<Subscription::State> AsioLoop::after(Loop::Duration delay, std::function<void()> function) {
   auto state = std::make_shared<TimerState>(*this, std::move(function), Loop::Duration::zero());
   state->startAfter(delay);

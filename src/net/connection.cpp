@@ -61,6 +61,10 @@ const Endpoint& Connection::local() const noexcept {
 const Endpoint& Connection::remote() const noexcept {
   return impl_->remote();
 }
+std::size_t Connection::queuedBytes() const {
+  return impl_->queuedBytes();
+}
+
 ConnectionStatistics Connection::statistics() const {
   return impl_->statistics();
 }

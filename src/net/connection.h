@@ -119,6 +119,8 @@ class Connection {
   const Endpoint& local() const noexcept;
   const Endpoint& remote() const noexcept;
   ConnectionStatistics statistics() const;
+  /// As in statistics(), without asking the system: cheap for very many connections.
+  std::size_t queuedBytes() const;
   /// The socket, for options that this class does not cover; -1 when closed or simulated.
   int nativeHandle() const noexcept;
 

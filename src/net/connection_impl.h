@@ -25,6 +25,7 @@ class Connection::Impl {
   virtual const Endpoint& local() const = 0;
   virtual const Endpoint& remote() const = 0;
   virtual ConnectionStatistics statistics() = 0;
+  virtual std::size_t queuedBytes() { return statistics().queuedBytes; }
   virtual int nativeHandle() = 0;
 };
 

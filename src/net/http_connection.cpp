@@ -165,8 +165,7 @@ void HttpConnection::sendBody() {
     connection_.flush();
     // Reading is paused, so this is the only place that notices a client that is gone.
     if (!connection_.isOpen()) return connection_.abort("the client is gone");
-    if (connection_.statistics().queuedBytes > 0)
-      return limit(options_.answerTimeout, "the answer is not read");
+    if (connection_.queuedBytes() > 0) return limit(options_.answerTimeout, "the answer is not read");
     if (bodySent_ == body_->size()) answered();
   }
 }

@@ -35,7 +35,6 @@ TcpConnection::TcpConnection(AsioLoop& loop, const ConnectionOptions& options)
       options_(options),
       socket_(loop.context),
       timer_(loop.context),
-      watchTimer_(loop.context),
       peerCheckTimer_(loop.context),
       queue_(options.lowMarkBytes) {}
 
@@ -116,22 +115,22 @@ void TcpConnection::setLossDetection(std::chrono::milliseconds lossTimeout, std:
 }
 
 void TcpConnection::armWatch() {
-  watchTimer_.cancel();
-  if (!watch_.active()) {
-    return;
+  ++watchSeries_;
+  if (watch_.active()) {
+    loop_.lossChecks.add(weak_from_this(), watchSeries_, watch_.interval());
   }
-  watchTimer_.expires_after(watch_.interval());
-  watchTimer_.async_wait([this, self = shared_from_this()](const ErrorCode& error) {
-    if (error || state_ != State::open || !failure_.empty()) {
-      return;
-    }
-    const auto link = linkState(socket_.native_handle());
-    if (link && watch_.isLost(*link, base::now())) {
-      writeFailed(asio::error::timed_out);
-    } else {
-      armWatch();
-    }
-  });
+}
+
+std::optional<std::chrono::milliseconds> TcpConnection::checkLoss(std::uint32_t series) {
+  if (series != watchSeries_ || state_ != State::open || !failure_.empty()) {
+    return std::nullopt;
+  }
+  const auto link = linkState(socket_.native_handle());
+  if (link && watch_.isLost(*link, base::now())) {
+    writeFailed(asio::error::timed_out);
+    return std::nullopt;
+  }
+  return watch_.interval();
 }
 
 void TcpConnection::start(ConnectionHandlers handlers) {
@@ -165,12 +164,17 @@ void TcpConnection::armRead() {
     return;
   }
   readArmed_ = true;
-  socket_.async_wait(Socket::wait_read, [this, self = shared_from_this()](const ErrorCode&) {
+  const auto read = [this, self = shared_from_this()] {
     readArmed_ = false;
     if (state_ != State::closed && !(state_ == State::open && paused_)) {
       readable();
     }
-  });
+  };
+  if (busy_) {
+    loop_.readLater(read);
+  } else {
+    socket_.async_wait(Socket::wait_read, [read](const ErrorCode&) { read(); });
+  }
 }
 
 // One read per wake-up, so that a fast sender does not starve the others.
@@ -355,7 +359,6 @@ void TcpConnection::finish(std::string reason) {
   setBusy(false);
   queue_.clear();
   timer_.cancel();
-  watchTimer_.cancel();
   peerCheckTimer_.cancel();
   ErrorCode ignored;
   socket_.close(ignored);
@@ -375,7 +378,6 @@ void TcpConnection::release() noexcept {
     setBusy(false);
     queue_.clear();
     timer_.cancel();
-    watchTimer_.cancel();
     peerCheckTimer_.cancel();
     ErrorCode ignored;
     socket_.close(ignored);

@@ -13,7 +13,9 @@ namespace hapticd::net {
 
 // connecting -> open -> flushing (close() was called) -> draining (our end is shut) -> closed.
 // Any state may go to closed directly. Pending operations keep the object alive after its owner is gone.
-class TcpConnection final : public Connection::Impl, public std::enable_shared_from_this<TcpConnection> {
+class TcpConnection final : public Connection::Impl,
+                            public LossChecked,
+                            public std::enable_shared_from_this<TcpConnection> {
  public:
   using Socket = boost::asio::ip::tcp::socket;
   using ErrorCode = boost::system::error_code;
@@ -37,10 +39,12 @@ class TcpConnection final : public Connection::Impl, public std::enable_shared_f
   void release() noexcept override;
   void setPaused(bool paused) override;
   void setLossDetection(std::chrono::milliseconds lossTimeout, std::chrono::seconds keepAlive) override;
+  std::optional<std::chrono::milliseconds> checkLoss(std::uint32_t series) override;
 
   const Endpoint& local() const override { return local_; }
   const Endpoint& remote() const override { return remote_; }
   ConnectionStatistics statistics() override;
+  std::size_t queuedBytes() override { return queue_.bytes(); }
   int nativeHandle() override { return socket_.is_open() ? socket_.native_handle() : -1; }
 
  private:
@@ -70,9 +74,9 @@ class TcpConnection final : public Connection::Impl, public std::enable_shared_f
   ConnectionOptions options_;
   Socket socket_;
   boost::asio::steady_timer timer_;  // of connect(), then of close()
-  boost::asio::steady_timer watchTimer_;
   boost::asio::steady_timer peerCheckTimer_;
   LossWatch watch_{options_.lossTimeout};
+  std::uint32_t watchSeries_ = 0;
   // Shared, so that the captures of a callback outlive a connection that it destroys.
   std::shared_ptr<ConnectionHandlers> handlers_;
   SendQueue queue_;

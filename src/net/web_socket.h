@@ -31,6 +31,7 @@ class WebSocket final : public Connection::Impl, public std::enable_shared_from_
   const Endpoint& local() const override { return stream_.local(); }
   const Endpoint& remote() const override { return stream_.remote(); }
   ConnectionStatistics statistics() override { return stream_.statistics(); }
+  std::size_t queuedBytes() override { return stream_.queuedBytes(); }
   int nativeHandle() override { return stream_.nativeHandle(); }
 
  private:

@@ -397,6 +397,11 @@ bool Server::stopForces() noexcept {
   return false;
 }
 
+bool Server::armed() const noexcept {
+  return std::any_of(stations_.begin(), stations_.end(),
+                     [](const auto& station) { return station->armed(); });
+}
+
 Session& Server::addSession(net::Connection connection, std::unique_ptr<net::UdpSocket> udp,
                             SessionMode mode) {
   const scene::ClientId id = nextClient_++;

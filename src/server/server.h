@@ -51,6 +51,8 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   /// From any thread, without the help of any other: stops the forces of all devices until a re-arm. Waits
   /// until the servos have written zero; false when one has not for 40 ms (the watchdog then ends the force).
   bool stopForces() noexcept;
+  /// From any thread: a person may feel a force of one of the devices.
+  bool armed() const noexcept;
   /// Called in the net thread once per second from run() on: this process does not hang. Before run().
   void onAlive(std::function<void()> function) { alive_ = std::move(function); }
   /// From any thread: run() has ended the forces and closed all devices.

@@ -223,8 +223,7 @@ class TlsConnection final : public net::Connection::Impl, public std::enable_sha
       return;
     }
     // What is encrypted must be sent: decide before.
-    if (delivery == net::Delivery::lowLatency && stream_.statistics().queuedBytes > 0)
-      return drop(buffer->size());
+    if (delivery == net::Delivery::lowLatency && stream_.queuedBytes() > 0) return drop(buffer->size());
     encrypt(*buffer);
   }
 
@@ -258,6 +257,7 @@ class TlsConnection final : public net::Connection::Impl, public std::enable_sha
   }
   const net::Endpoint& local() const override { return stream_.local(); }
   const net::Endpoint& remote() const override { return stream_.remote(); }
+  std::size_t queuedBytes() override { return stream_.queuedBytes(); }
   net::ConnectionStatistics statistics() override {
     net::ConnectionStatistics statistics = stream_.statistics();
     statistics.droppedBuffers += droppedBuffers_;

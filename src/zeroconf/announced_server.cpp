@@ -10,11 +10,25 @@ namespace {
 
 constexpr std::size_t kLongestEntry = 255;  // RFC 6763, 6.1
 
+std::string replaced(std::string text, std::string_view what, std::string_view with) {
+  for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += with.size())
+    text.replace(at, what.size(), with);
+  return text;
+}
+
+// A device's name may contain what separates the names.
+std::string escaped(const std::string& name) {
+  return replaced(replaced(name, "%", "%25"), ",", "%2C");
+}
+std::string unescaped(std::string_view part) {
+  return replaced(replaced(std::string(part), "%2C", ","), "%25", "%");
+}
+
 std::vector<std::string> splitAtCommas(std::string_view list) {
   std::vector<std::string> parts;
   while (!list.empty()) {
     const std::size_t comma = std::min(list.find(','), list.size());
-    if (comma > 0) parts.emplace_back(list.substr(0, comma));
+    if (comma > 0) parts.push_back(unescaped(list.substr(0, comma)));
     list.remove_prefix(std::min(comma + 1, list.size()));
   }
   return parts;
@@ -36,7 +50,7 @@ std::string printable(std::string text) {
 std::vector<std::string> AnnouncedServer::text() const {
   std::string names = "devices=";
   for (const std::string& device : devices) {
-    const std::string next = (names.back() == '=' ? "" : ",") + device;
+    const std::string next = (names.back() == '=' ? "" : ",") + escaped(device);
     if (names.size() + next.size() <= kLongestEntry) names += next;
   }
   std::vector<std::string> entries{"txtvers=1", names, "version=" + version};

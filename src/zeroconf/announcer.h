@@ -8,9 +8,10 @@
 
 namespace hapticd::zeroconf {
 
-/// Keeps an announcement at the Avahi daemon, over restarts of the daemon and under another name ("... #2")
-/// when the name is taken. A thread of its own waits for the daemon; nothing waits for that thread but the
-/// destructor, some seconds when the daemon hangs.
+/// Keeps an announcement at the Avahi daemon, over restarts of the daemon and of the system's bus, and under
+/// another name ("... #2") when the name is taken. What fails is tried again. A thread of its own
+/// waits for the daemon; nothing waits for that thread but the destructor, some seconds when the daemon
+/// hangs.
 class Announcer {
  public:
   /// `address`: the one that the server listens on, in host byte order, or net::kAnyAddress. It is announced

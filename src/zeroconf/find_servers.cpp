@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstddef>
 #include <string>
+#include <string_view>
+#include <tuple>
 #include <utility>
 
 #include "zeroconf/avahi.h"
@@ -22,25 +24,33 @@ class Search {
 
   bool finished() const { return heardAll_ && answers_ == requests_; }
   void step(int timeout_ms) {
-    avahi_.process();
-    if (!finished()) avahi_.wait(-1, timeout_ms);
+    bus_.process();
+    if (!finished()) bus_.wait(system_bus::kNoFd, timeout_ms);
   }
   std::vector<AnnouncedServer> found() {
-    std::sort(found_.begin(), found_.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
-    // A server is heard on each interface.
+    // A server is heard on each interface; those of this machine also by an address that only it can reach.
+    const auto order = [](const AnnouncedServer& server) {
+      return std::tuple(std::string_view(server.name), server.port, server.address.rfind("127.", 0) == 0,
+                        std::string_view(server.address));
+    };
+    std::sort(found_.begin(), found_.end(),
+              [&](const auto& a, const auto& b) { return order(a) < order(b); });
     const auto same = [](const auto& a, const auto& b) { return a.name == b.name && a.port == b.port; };
     found_.erase(std::unique(found_.begin(), found_.end(), same), found_.end());
     return std::move(found_);
   }
 
  private:
+  static constexpr int kMost = 1000;  // more are not servers
+
   static int onItem(sd_bus_message* signal, void* self, sd_bus_error*) noexcept {
     auto& search = *static_cast<Search*>(self);
+    if (search.requests_ == kMost) return 0;
     int interface = 0;
     int protocol = 0;
     const char *name = "", *type = "", *domain = "";
     sd_bus_message_read(signal, "iisss", &interface, &protocol, &name, &type, &domain);
-    const int asked = sd_bus_call_method_async(search.avahi_.bus(), nullptr, kAvahi, "/", kAvahiServer,
+    const int asked = sd_bus_call_method_async(search.bus_.get(), nullptr, kAvahi, "/", kAvahiServer,
                                                "ResolveService", onResolved, self, "iisssiu", interface,
                                                protocol, name, type, domain, kIpv4, 0U);
     if (asked >= 0) ++search.requests_;
@@ -77,7 +87,8 @@ class Search {
     return text;
   }
 
-  Avahi avahi_;
+  system_bus::Bus bus_{system_bus::kNoFd};
+  Avahi avahi_{bus_};
   bool heardAll_ = false;
   int requests_ = 0;
   int answers_ = 0;

@@ -12,6 +12,7 @@
 #include "device/whole_server/in_contact.h"
 #include "net/endpoint.h"
 #include "server/scripted_peer.h"
+#include "system_bus/scripted_logind.h"
 
 namespace hapticd::whole_server {
 namespace {
@@ -87,6 +88,27 @@ TEST_F(Signals, OfTheTerminalStopTheForcesBeforeTheProcess) {
     if (visitor->latched()) visitor->client().rearmForces();
     return right(arm->ticks - 1);
   })) << server->log();
+  endInOrder();
+}
+
+TEST_F(Signals, OfLogindBeforeASleepLeaveNoForce) {
+  const test::PrivateBus bus;
+  if (!bus.runs()) GTEST_SKIP() << "dbus-daemon is missing (packages.txt, section test)";
+  test::ScriptedLogind logind;
+  serve(kInProcess, kMock);
+  ASSERT_TRUE(logind.waitHeld({"block", "delay"})) << server->log();
+  logind.announceSleep(true);
+  ASSERT_TRUE(logind.waitHeld({})) << server->log();
+  EXPECT_TRUE(arm.left().isZero()) << "before the machine sleeps";
+  logind.announceSleep(false);
+  EXPECT_TRUE(visitor->until([&] { return visitor->client().latest().guard.stopped; })) << server->log();
+  EXPECT_FALSE(forceWithin(50)) << "stopped until a re-arm";
+  visitor->client().rearmForces();
+  EXPECT_TRUE(visitor->until([&] {
+    if (visitor->latched()) visitor->client().rearmForces();
+    return right(arm->ticks - 1);
+  })) << server->log();
+  ASSERT_TRUE(logind.waitHeld({"block", "delay"})) << server->log();
   endInOrder();
 }
 

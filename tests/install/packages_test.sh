@@ -64,7 +64,7 @@ in_root hapticd --version | grep -q "^hapticd $version "
 in_root getent passwd hapticd
 in_root getent group hapticd
 in_root grep -q '@hapticd - rtprio 80' /etc/security/limits.d/hapticd.conf
-for file in /lib/systemd/system/hapticd.service /lib/udev/rules.d/70-hapticd.rules /usr/share/man/man1/hapticd-serve.1.gz \
+for file in /lib/systemd/system/hapticd.service /usr/share/polkit-1/rules.d/50-hapticd.rules /lib/udev/rules.d/70-hapticd.rules /usr/share/man/man1/hapticd-serve.1.gz \
   /usr/share/bash-completion/completions/hapticd /usr/share/applications/hapticd.desktop /usr/share/hapticd/grafana/hapticd.json \
   /usr/share/doc/hapticd/copyright /usr/share/doc/hapticd-doc/configuration.md; do
   [ -e "$root$file" ] || fail "$file is not installed"

@@ -186,5 +186,18 @@ TEST(Recorder, AFullDiskEndsTheRecordingAndNothingElse) {
   EXPECT_NE(reader.remark().find("cut"), std::string::npos) << reader.remark();
 }
 
+TEST(Recorder, EndsBeforeTheFileExceedsItsLimit) {
+  constexpr std::uint64_t kMost = 200'000;
+  RecordingFile file;
+  Problems problems;
+  Recorder recorder(file.path(), problems.listener(), {.fileBytes = kMost});
+  recorder.addDevice(phantom());
+  recorder.start(0, "");
+  for (int i = 0; i < 1000; ++i) recorder.recordMarker(i, std::string(1000, 'm'));
+  EXPECT_TRUE(problems.until("has stopped: File too large")) << problems.all();
+  recorder.finish();
+  EXPECT_LE(std::filesystem::file_size(file.path()), kMost);
+}
+
 }  // namespace
 }  // namespace hapticd::record

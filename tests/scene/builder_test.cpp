@@ -315,5 +315,30 @@ TEST_F(Builder, BatchThatIsTooLongIsRefusedAsAWhole) {
   EXPECT_NE(builder.publish(now_, notices_), nullptr);
 }
 
+TEST_F(Builder, BatchesOfAllClientsTogetherAreLimited) {
+  SceneConfig config = simulated({});
+  config.limits.batch_bytes = 1'000'000;
+  SceneBuilder builder(config);
+  builder.publish(now_, notices_);
+  const auto fill = [&](ClientId client) {
+    builder.apply(client, BeginBatch{}, now_, notices_);
+    for (int i = 0; i < 2000; ++i) builder.apply(client, SetTouchableFaces{0}, now_, notices_);
+  };
+  // Each alone has room.
+  ClientId last = 0;
+  while (notices_.empty() && last < 100) fill(++last);
+  ASSERT_FALSE(notices_.empty());
+  EXPECT_GT(last, 1U);
+  EXPECT_EQ(notices_[0].client, last) << "those that came before keep theirs";
+  EXPECT_THAT(notices_[0].text, HasSubstr("refused as a whole: too long"));
+  builder.apply(1, CommitBatch{}, now_, notices_);
+  EXPECT_NE(builder.publish(now_, notices_), nullptr);
+  // What a commit, a refusal or the end of a client gave back is there for others.
+  for (ClientId client = 2; client < last; ++client) builder.clientGone(client, now_);
+  notices_.clear();
+  fill(last + 1);
+  EXPECT_TRUE(notices_.empty());
+}
+
 }  // namespace
 }  // namespace hapticd::scene

@@ -1,16 +1,7 @@
 #include "zeroconf/scripted_avahi.h"
 
-#include <fcntl.h>
-#include <signal.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <array>
 #include <chrono>
-#include <cstdlib>
-#include <stdexcept>
 #include <string_view>
 #include <utility>
 
@@ -20,10 +11,6 @@ namespace {
 constexpr const char* kName = "org.freedesktop.Avahi";
 constexpr const char* kGroup = "/Client0/EntryGroup1";
 constexpr const char* kBrowser = "/Client0/ServiceBrowser1";
-
-void check(int result, const char* what) {
-  if (result < 0) throw std::runtime_error(std::string(what) + ": " + std::strerror(-result));
-}
 
 std::vector<std::string> readText(sd_bus_message* call) {
   std::vector<std::string> text;
@@ -37,62 +24,13 @@ std::vector<std::string> readText(sd_bus_message* call) {
 
 }  // namespace
 
-PrivateBus::PrivateBus() {
-  std::array<int, 2> ends{};
-  if (::pipe2(ends.data(), O_CLOEXEC) != 0) return;
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, ends[1], 3);
-  // Its complaint about limits of rights that it has not; and no pipe of ours outlives this program in it.
-  for (const int output : {1, 2})
-    posix_spawn_file_actions_addopen(&actions, output, "/dev/null", O_WRONLY, 0);
-  std::array<const char*, 6> arguments{"dbus-daemon", "--session",         "--nofork",
-                                       "--nopidfile", "--print-address=3", nullptr};
-  if (::posix_spawnp(&pid_, arguments[0], &actions, nullptr, const_cast<char* const*>(arguments.data()),
-                     environ) != 0)
-    pid_ = -1;
-  posix_spawn_file_actions_destroy(&actions);
-  ::close(ends[1]);
-  std::string address;
-  for (char c = 0; ::read(ends[0], &c, 1) == 1 && c != '\n';) address += c;
-  ::close(ends[0]);
-  if (runs()) ::setenv("DBUS_SYSTEM_BUS_ADDRESS", address.c_str(), 1);
-}
-
-PrivateBus::~PrivateBus() {
-  if (!runs()) return;
-  ::unsetenv("DBUS_SYSTEM_BUS_ADDRESS");
-  ::kill(pid_, SIGTERM);
-  ::waitpid(pid_, nullptr, 0);
-}
-
-ScriptedAvahi::ScriptedAvahi(std::vector<std::string> taken) : taken_(std::move(taken)) {
-  check(sd_bus_open_system(&bus_), "bus");
-  for (const char* path : {"/", kGroup}) check(sd_bus_add_object(bus_, nullptr, path, onCall, this), path);
-  check(sd_bus_request_name(bus_, kName, 0), kName);
-  thread_ = std::thread([this] { run(); });
+ScriptedAvahi::ScriptedAvahi(std::vector<std::string> taken)
+    : ScriptedService(kName, {"/", kGroup}), taken_(std::move(taken)) {
+  begin();
 }
 
 ScriptedAvahi::~ScriptedAvahi() {
-  {
-    const std::lock_guard lock(mutex_);
-    ending_ = true;
-  }
-  thread_.join();
-  sd_bus_flush_close_unref(bus_);
-}
-
-void ScriptedAvahi::run() {
-  while (true) {
-    {
-      const std::lock_guard lock(mutex_);
-      if (ending_) return;
-      for (const auto& order : std::exchange(orders_, {})) order();
-    }
-    if (sd_bus_process(bus_, nullptr) > 0) continue;
-    constexpr std::uint64_t kTurn_us = 5'000;
-    sd_bus_wait(bus_, kTurn_us);
-  }
+  finish();
 }
 
 bool ScriptedAvahi::waitCommitted(std::size_t count) {
@@ -107,8 +45,7 @@ AvahiEntry ScriptedAvahi::entry() {
 
 void ScriptedAvahi::collide() {
   constexpr int kCollision = 3;
-  const std::lock_guard lock(mutex_);
-  orders_.emplace_back([this] {
+  order([this] {
     sd_bus_emit_signal(bus_, kGroup, "org.freedesktop.Avahi.EntryGroup", "StateChanged", "is", kCollision,
                        "");
   });
@@ -116,8 +53,7 @@ void ScriptedAvahi::collide() {
 
 void ScriptedAvahi::renameHost() {
   constexpr int kRunning = 2;
-  const std::lock_guard lock(mutex_);
-  orders_.emplace_back([this] {
+  order([this] {
     sd_bus_emit_signal(bus_, "/", "org.freedesktop.Avahi.Server", "StateChanged", "is", kRunning, "");
   });
 }
@@ -125,12 +61,6 @@ void ScriptedAvahi::renameHost() {
 void ScriptedAvahi::setOthers(std::vector<std::pair<AvahiEntry, std::string>> others) {
   const std::lock_guard lock(mutex_);
   others_ = std::move(others);
-}
-
-int ScriptedAvahi::onCall(sd_bus_message* call, void* self, sd_bus_error*) {
-  auto& avahi = *static_cast<ScriptedAvahi*>(self);
-  const std::lock_guard lock(avahi.mutex_);
-  return avahi.answer(call);
 }
 
 int ScriptedAvahi::answer(sd_bus_message* call) {
@@ -193,7 +123,7 @@ int ScriptedAvahi::resolve(sd_bus_message* call) {
   const char* name = "";
   sd_bus_message_read(call, "iis", &interface, &protocol, &name);
   for (const auto& [entry, address] : others_) {
-    if (entry.name != name || entry.protocol < 0) continue;
+    if (entry.name != name || entry.interface != interface || entry.protocol < 0) continue;
     sd_bus_message* reply = nullptr;
     sd_bus_message_new_method_return(call, &reply);
     sd_bus_message_append(reply, "iissssisq", interface, protocol, name, entry.type.c_str(), "local",

@@ -1,31 +1,14 @@
-// A message bus with an Avahi daemon that does what a test tells it.
+// An Avahi daemon that does what a test tells it.
 #pragma once
 
-#include <sys/types.h>
-#include <systemd/sd-bus.h>
-
-#include <condition_variable>
 #include <cstdint>
-#include <functional>
-#include <map>
-#include <mutex>
 #include <string>
-#include <thread>
+#include <utility>
 #include <vector>
 
+#include "system_bus/scripted_service.h"
+
 namespace hapticd::test {
-
-/// A dbus-daemon of its own, at which DBUS_SYSTEM_BUS_ADDRESS points while it exists.
-class PrivateBus {
- public:
-  PrivateBus();
-  ~PrivateBus();
-  /// False without a dbus-daemon.
-  bool runs() const { return pid_ > 0; }
-
- private:
-  pid_t pid_ = -1;
-};
 
 struct AvahiEntry {
   int interface, protocol;
@@ -34,12 +17,11 @@ struct AvahiEntry {
   std::vector<std::string> text;
 };
 
-/// Owns org.freedesktop.Avahi on the bus while it exists. Its methods may be called from the test's thread.
-class ScriptedAvahi {
+class ScriptedAvahi : public ScriptedService {
  public:
   /// `taken`: names that it refuses at once, as those of another program of the same machine.
   explicit ScriptedAvahi(std::vector<std::string> taken = {});
-  ~ScriptedAvahi();
+  ~ScriptedAvahi() override;
 
   /// Waits until this number of entry groups has been committed; false after a time that only a hang can
   /// take.
@@ -55,23 +37,16 @@ class ScriptedAvahi {
   void setOthers(std::vector<std::pair<AvahiEntry, std::string>> others);
 
  private:
-  static int onCall(sd_bus_message* call, void* self, sd_bus_error* error);
-  int answer(sd_bus_message* call);
+  int answer(sd_bus_message* call) override;
   int addService(sd_bus_message* call);
   int browse(sd_bus_message* call);
   int resolve(sd_bus_message* call);
-  void run();
 
-  sd_bus* bus_ = nullptr;
   std::vector<std::string> taken_;
-  std::mutex mutex_;  // all below
-  std::condition_variable changed_;
-  std::vector<std::function<void()>> orders_;
+  // With the mutex.
   AvahiEntry added_{}, committed_{};
   std::size_t commits_ = 0;
   std::vector<std::pair<AvahiEntry, std::string>> others_;
-  bool ending_ = false;
-  std::thread thread_;
 };
 
 }  // namespace hapticd::test

@@ -54,6 +54,14 @@ TEST(AnnouncedServer, IgnoresWhatItDoesNotKnow) {
   EXPECT_EQ(read.page(), "");
 }
 
+TEST(AnnouncedServer, ItsDevicesMayHaveCommasInTheirNames) {
+  AnnouncedServer named = lab();
+  named.devices = {"Arm, left", "100%", "%2C", ","};
+  AnnouncedServer read;
+  read.read(named.text());
+  EXPECT_EQ(read.devices, named.devices);
+}
+
 // A machine of the network chooses these bytes, and a terminal obeys some.
 TEST(AnnouncedServer, HasNoControlCharacters) {
   AnnouncedServer read;
@@ -139,14 +147,29 @@ TEST_F(Zeroconf, AServerIsAnnouncedAgainWhenAvahiRestarts) {
   }
 }
 
+TEST_F(Zeroconf, AServerIsAnnouncedAgainWhenTheBusRestarts) {
+  const Announcer announcer(lab(), net::kAnyAddress);
+  {
+    ScriptedAvahi avahi;
+    ASSERT_TRUE(avahi.waitCommitted(1));
+  }
+  bus_.restart();
+  ScriptedAvahi avahi;
+  ASSERT_TRUE(avahi.waitCommitted(1));
+  EXPECT_EQ(avahi.entry().text, kLabText);
+}
+
 TEST_F(Zeroconf, ServersOfTheNetworkAreFoundOnce) {
   ScriptedAvahi avahi;
   const AvahiEntry labEntry{2, 0, "hapticd on lab7", "_hapticd._tcp", 3884, kLabText};
   const AvahiEntry labAgain{3, 0, "hapticd on lab7", "_hapticd._tcp", 3884, kLabText};
+  // Avahi tells the machine itself of its servers by this address, too, which no other machine can use.
+  const AvahiEntry labHere{1, 0, "hapticd on lab7", "_hapticd._tcp", 3884, kLabText};
   const AvahiEntry attic{2, 0, "attic", "_hapticd._tcp", 3883, {"devices=Arm", "version=9"}};
   const AvahiEntry gone{2, -1, "gone", "_hapticd._tcp", 1, {}};
   const AvahiEntry printer{2, 0, "printer", "_ipp._tcp", 631, {}};
-  avahi.setOthers({{labEntry, "10.0.0.7"},
+  avahi.setOthers({{labHere, "127.0.0.1"},
+                   {labEntry, "10.0.0.7"},
                    {gone, ""},
                    {printer, "10.0.0.3"},
                    {labAgain, "10.0.0.7"},

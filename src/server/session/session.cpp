@@ -84,7 +84,7 @@ ClientStatus Session::status() const {
 }
 
 std::size_t Session::waitingBytes() const {
-  return connection_.statistics().queuedBytes + backlog_.size();
+  return connection_.queuedBytes() + backlog_.size();
 }
 
 void Session::start() {

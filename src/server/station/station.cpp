@@ -95,12 +95,13 @@ Station::Impl::Impl(const DeviceConfig& config_, std::vector<DeviceName> names_,
       device(std::move(device_)),
       hand(device->steered()),
       profile(device->profile()),
+      canHurt(device->traits().needsRearm),
       tick(*device, clock, tickOptions(config, *device)),
       keeper(*device, tick, clock,
              {.name = config.names.front(),
               .rate_Hz = config.servoRate_Hz,
               // A device without a person at it cannot hurt: realtime rights are wanted, not demanded.
-              .requireRealtime = !allowNoRealtime && device->traits().needsRearm,
+              .requireRealtime = !allowNoRealtime && canHurt,
               .vendorThread = device->traits().ticksInVendorThread}),
       control(tick.control(), hand, workspaceOf(config, profile)),
       streamed(tick.remote(), sceneConfig(config, profile), energyBudget(config), profile.outputDof > 3),
@@ -221,6 +222,11 @@ void Station::stopForces() noexcept {
   impl_->tick.control().stop();
 }
 
+bool Station::armed() const noexcept {
+  const realtime::GuardControl& control = impl_->tick.control();
+  return impl_->canHurt && control.armed() && !control.stopped();
+}
+
 bool Station::isStoppedAtZero() const noexcept {
   return impl_->tick.finishedAt() == 0 || impl_->tick.stoppedAtZero();
 }
@@ -311,6 +317,7 @@ bool Station::Impl::takeTicks(const WallClock& wallClock) {
 }
 
 bool Station::report(const WallClock& clock, const Sessions& clients) {
+  constexpr std::size_t kFirstClients = 32;
   Impl& impl = *impl_;
   const bool newer = impl.takeTicks(clock);
   if (impl.passUpTo) {
@@ -320,11 +327,20 @@ bool Station::report(const WallClock& clock, const Sessions& clients) {
     impl.clientsBehind = false;
     impl.outbox.beginPass();
   }
-  const auto next = serveSlice(
-      impl.passUpTo ? clients.upper_bound(*impl.passUpTo) : clients.begin(), clients.end(), clients.size(),
-      impl.freshTicks,
-      [&](const auto& entry, std::size_t most) { return impl.outbox.send(*entry.second, most); },
-      [](const auto& entry) { entry.second->flush(); });
+  const auto send = [&](const auto& entry, std::size_t most) {
+    return impl.outbox.send(*entry.second, most);
+  };
+  const auto flush = [](const auto& entry) { entry.second->flush(); };
+  // Those that connected first do not wait until all of a crowd got their reports.
+  if (newer && clients.size() > kFirstClients) {
+    const auto end = std::next(clients.begin(), kFirstClients);
+    std::for_each(clients.begin(), end, [&](const auto& entry) {
+      send(entry, impl.freshTicks.affordable());
+      flush(entry);
+    });
+  }
+  const auto next = serveSlice(impl.passUpTo ? clients.upper_bound(*impl.passUpTo) : clients.begin(),
+                               clients.end(), clients.size(), impl.freshTicks, send, flush);
   impl.passUpTo.reset();
   if (next != clients.end()) impl.passUpTo = std::prev(next)->first;
   return impl.passUpTo.has_value();

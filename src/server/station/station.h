@@ -37,6 +37,8 @@ class Station {
 
   /// Any thread: stops the forces until a re-arm.
   void stopForces() noexcept;
+  /// Any thread: forces are enabled and not stopped, and there is a person to feel them.
+  bool armed() const noexcept;
   /// Any thread: the servo has written zero since stopForces(), or has not run.
   bool isStoppedAtZero() const noexcept;
 

@@ -72,6 +72,7 @@ struct Station::Impl {
   std::unique_ptr<device::Device> device;
   device::SteeredHand* const hand;      // null for real devices
   const device::DeviceProfile profile;  // as after the first open()
+  const bool canHurt;                   // somebody
   realtime::Tick tick;
   DeviceKeeper keeper;
   bool running = false;
