@@ -57,7 +57,7 @@ class AsioListener final : public TcpListener::Impl, public std::enable_shared_f
 
  private:
   static constexpr int kBacklog = 4096;
-  static constexpr int kMostPerWake = 256;
+  static constexpr int kMostPerWake = 8;  // others have their turn in between
   static constexpr std::chrono::milliseconds kRetry{100};
 
   void acceptPending() {

@@ -161,24 +161,29 @@ void AsioLoop::stop() {
 }
 
 void AsioLoop::post(std::function<void()> function) {
-  asio::post(context, [this, f = std::move(function)] { guard(f); });
+  const std::lock_guard lock(mutex_);
+  posted_.push_back(std::move(function));
+  if (!std::exchange(posting_, true)) asio::post(context, [this] { callPosted(); });
 }
 
-void AsioLoop::readLater(std::function<void()> function) {
-  readTurns_.push_back(std::move(function));
-  if (readTurns_.size() == 1) asio::post(context, [this] { readTurns(); });
-}
-
-void AsioLoop::readTurns() {
-  constexpr base::Nanos kSlice = 500'000;
-  const base::Nanos begin = base::now();
-  while (!readTurns_.empty() && base::now() - begin < kSlice) {
-    const std::function<void()> turn = std::move(readTurns_.front());
-    readTurns_.front() = nullptr;  // still there: a turn that asks for another posts nothing
-    guard(turn);
-    readTurns_.pop_front();
-  }
-  if (!readTurns_.empty()) asio::post(context, [this] { readTurns(); });
+// Asio calls all that was posted before it looks at the sockets again.
+void AsioLoop::callPosted() {
+  constexpr base::Nanos kSlice = 200'000;
+  const base::Nanos end = base::now() + kSlice;
+  do {
+    std::function<void()> function;
+    {
+      const std::lock_guard lock(mutex_);
+      if (posted_.empty()) {
+        posting_ = false;
+        return;
+      }
+      function = std::move(posted_.front());
+      posted_.pop_front();
+    }
+    guard(function);
+  } while (base::now() < end && !context.stopped());
+  asio::post(context, [this] { callPosted(); });
 }
 
 std::shared_ptr<Subscription::State> AsioLoop::after(Loop::Duration delay, std::function<void()> function) {

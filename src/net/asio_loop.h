@@ -11,6 +11,7 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <mutex>
 
 #include "net/loop_impl.h"
 #include "net/loss_checks.h"
@@ -44,10 +45,6 @@ class AsioLoop final : public Loop::Impl {
     return std::max(kSmallestRead, kReadBufferBytes / std::max<std::size_t>(1, busyReaders));
   }
   std::size_t busyReaders = 0;  // connections whose last read left something behind
-  /// Reads on later: the function is called in its turn, of which several come in one pass of the loop and
-  /// only for a short time, so that a message of another connection waits for little of what these send.
-  void readLater(std::function<void()> function);
-
   // One buffer for all sockets: each read is consumed before the next, so memory does not grow with clients.
   std::unique_ptr<std::byte[]> readBuffer = std::make_unique_for_overwrite<std::byte[]>(kReadBufferBytes);
   boost::asio::io_context context{1};  // one thread runs it; posting from others stays safe
@@ -55,9 +52,11 @@ class AsioLoop final : public Loop::Impl {
   LossChecks lossChecks{context};
 
  private:
-  void readTurns();
+  void callPosted();
 
-  std::deque<std::function<void()>> readTurns_;
+  std::mutex mutex_;  // of the rest
+  std::deque<std::function<void()>> posted_;
+  bool posting_ = false;  // callPosted() is due
 };
 
 template <class AsioEndpoint>

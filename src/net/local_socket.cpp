@@ -123,7 +123,7 @@ LocalListener::~LocalListener() {
 }
 
 void LocalListener::acceptPending() {
-  constexpr int kMostPerWake = 64;
+  constexpr int kMostPerWake = 8;  // others have their turn in between
   for (int i = 0; i < kMostPerWake; ++i) {
     const int fd = ::accept4(descriptor_->fd(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
     if (fd >= 0) {

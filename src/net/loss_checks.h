@@ -38,7 +38,7 @@ class LossChecks {
   }
 
  private:
-  static constexpr base::Nanos kSlice = 500'000;
+  static constexpr base::Nanos kSlice = 200'000;
   static constexpr base::Nanos kPause = 2'000'000;
   static constexpr base::Nanos kNever = INT64_MAX;
 

@@ -15,6 +15,9 @@ using asio::ip::tcp;
 
 namespace {
 
+// Beyond it, writing takes long enough for others to have their turn in between.
+constexpr std::size_t kTurn_bytes = 64 * 1024;
+
 constexpr char kClosed[] = "closed by the peer";
 constexpr char kReset[] = "connection reset by the peer";
 
@@ -171,7 +174,7 @@ void TcpConnection::armRead() {
     }
   };
   if (busy_) {
-    loop_.readLater(read);
+    loop_.post(read);  // in turn with the other busy ones, so that a short message of another need not wait
   } else {
     socket_.async_wait(Socket::wait_read, [read](const ErrorCode&) { read(); });
   }
@@ -274,9 +277,16 @@ void TcpConnection::write() {
 
 void TcpConnection::armWrite() {
   writeArmed_ = true;
-  socket_.async_wait(Socket::wait_write, [this, self = shared_from_this()](const ErrorCode&) {
+  const auto writeOn = [this, self = shared_from_this()] {
     if (state_ == State::open || state_ == State::flushing) {
       write();
+    }
+  };
+  socket_.async_wait(Socket::wait_write, [this, writeOn](const ErrorCode&) {
+    if (queue_.bytes() > kTurn_bytes) {
+      loop_.post(writeOn);  // in turn with other large answers
+    } else {
+      writeOn();
     }
   });
 }

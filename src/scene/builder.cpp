@@ -1,30 +1,17 @@
 #include "scene/builder.h"
 
-#ifdef __linux__
-#include <malloc.h>
-#endif
-
 #include <algorithm>
-#include <deque>
 #include <map>
 #include <utility>
 
 #include "scene/free_forces.h"
+#include "scene/held_commands.h"
 #include "scene/notice_board.h"
 #include "scene/object_table.h"
 #include "scene/workspace_fit.h"
 
 namespace hapticd::scene {
 namespace {
-
-constexpr std::size_t kLargeBatch_bytes = std::size_t{16} << 20;
-
-// The C library keeps the memory of many small commands for itself, and it may be locked.
-void releaseFreedMemory() {
-#ifdef __GLIBC__
-  malloc_trim(0);
-#endif
-}
 
 std::size_t bytesOf(const SceneCommand& command) {
   std::size_t bytes = sizeof(SceneCommand);
@@ -55,23 +42,19 @@ class SceneBuilder::State {
     batch.bytes += bytes;
     if (batch.bytes > config_.limits.batch_bytes || heldInBatches_ + bytes > config_.limits.batch_bytes) {
       batch.bytes = config_.limits.batch_bytes + 1;  // refused as a whole
-      batch.commands = {};
+      batch.commands.clear();
       heldInBatches_ -= std::exchange(batch.held, 0);
-      releaseFreedMemory();
       call.refuse("batch", "refused as a whole: too long; commit more often", ", limit ",
                   config_.limits.batch_bytes, " bytes");
       return;
     }
     batch.held += bytes;
     heldInBatches_ += bytes;
-    batch.commands.push_back(std::move(command));
+    batch.commands.push(std::move(command));
   }
 
   void clientGone(ClientId client, Nanos now) {
-    std::size_t held = 0;
-    if (auto batch = batches_.extract(client)) held = batch.mapped().held;
-    heldInBatches_ -= held;
-    if (held > kLargeBatch_bytes) releaseFreedMemory();
+    if (const auto batch = batches_.extract(client)) heldInBatches_ -= batch.mapped().held;
     board_.forget(client);
     forces_.clientGone(client, now);
   }
@@ -123,7 +106,7 @@ class SceneBuilder::State {
     forces_.appendCommands(now, commands);
     for (const auto& [client, batch] : batches_) {
       commands.push_back({client, BeginBatch{}});
-      for (const SceneCommand& command : batch.commands) commands.push_back({client, command});
+      batch.commands.forEach([&](const SceneCommand& command) { commands.push_back({client, command}); });
     }
     return commands;
   }
@@ -133,9 +116,9 @@ class SceneBuilder::State {
 
  private:
   struct Batch {
-    std::deque<SceneCommand> commands;  // grows without a copy
-    std::size_t bytes = 0;              ///< of all commands, also of a batch that is too long
-    std::size_t held = 0;               ///< of those in memory
+    HeldCommands commands;
+    std::size_t bytes = 0;  ///< of all commands, also of a batch that is too long
+    std::size_t held = 0;   ///< of those in memory
   };
 
   void dispatch(SceneCommand& command, const Call& call) {
@@ -242,7 +225,7 @@ class SceneBuilder::State {
     heldInBatches_ -= batch.mapped().held;
     if (batch.mapped().bytes > config_.limits.batch_bytes) return;
     const Call inside{call.client, call.now, true, call.board, call.out};
-    for (SceneCommand& command : batch.mapped().commands) dispatch(command, inside);
+    batch.mapped().commands.forEach([&](SceneCommand& command) { dispatch(command, inside); });
   }
 
   const SceneConfig config_;

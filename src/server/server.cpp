@@ -250,8 +250,7 @@ void Server::run() {
   }
   subscriptions_.push_back(loop_.every(1s, [this] { everySecond(); }));
   subscriptions_.push_back(loop_.every(50ms, [this] {
-    checkHeartbeats();
-    admission_.checkMemory(waitingCommands());
+    checkClients();
     recordings_.poll();
     if (haply_) haply_->answer();  // a device that is gone has no ticks
     for (const auto& station : stations_) {
@@ -278,14 +277,26 @@ void Server::run() {
 void Server::everySecond() {
   if (alive_) alive_();
   clock_.refresh();
-  // A client that describes none of the devices listens to all of them.
-  for (Session* session : admission_.completedHandshakes(base::now())) {
-    if (session->namesWanted() != 0) continue;
-    for (const auto& station : stations_) station->sendPresentState(*session);
+  const bool sending = !describedNothing_.empty();
+  for (const Session* session : admission_.completedHandshakes(base::now())) {
+    if (session->namesWanted() == 0) describedNothing_.push_back(session->id());
   }
+  if (!sending) sendPresentStates();
   throttledLog_.reportSuppressed();
   markers_ = 0;
   if (web_) web_->everySecond();
+}
+
+// A client that describes none of the devices listens to all of them. A few at a time, as with reports.
+void Server::sendPresentStates() {
+  constexpr int kSlice = 20;
+  for (int i = 0; i < kSlice && !describedNothing_.empty(); ++i) {
+    const auto session = sessions_.find(describedNothing_.front());
+    describedNothing_.pop_front();
+    if (session == sessions_.end() || session->second->namesWanted() != 0) continue;
+    for (const auto& station : stations_) station->sendPresentState(*session->second);
+  }
+  if (!describedNothing_.empty()) loop_.post([this] { sendPresentStates(); });
 }
 
 void Server::onWebClient(net::Connection connection, std::string_view token, bool ofPage) {
@@ -359,18 +370,26 @@ ServerStatus Server::status() const {
     while (scenes_[device.scene].get() != &station->scene()) ++device.scene;
     status.scenes[device.scene].push_back(device.names.front());
   }
-  for (const auto& [id, session] : sessions_) {
-    ClientStatus& client = status.clients.emplace_back(session->status());
+  return status;
+}
+
+bool Server::addClients(ServerStatus& status) const {
+  constexpr int kSlice = 100;
+  auto next = status.clients.empty() ? sessions_.begin() : sessions_.upper_bound(status.clients.back().id);
+  for (int i = 0; i < kSlice && next != sessions_.end(); ++i, ++next) {
+    const Session& session = *next->second;
+    ClientStatus& client = status.clients.emplace_back(session.status());
     for (const auto& station : stations_) {
-      const bool listens = session->wants(station->nameFor(*session));
-      if (listens && client.rate_Hz == 0) client.rate_Hz = station->rateOf(*session);
-      client.commands = client.commands || station->couldCommand(session->commander());
+      const bool listens = session.wants(station->nameFor(session));
+      if (listens && client.rate_Hz == 0) client.rate_Hz = station->rateOf(session);
+      client.commands = client.commands || station->couldCommand(session.commander());
     }
   }
+  if (next != sessions_.end()) return true;
   if (haply_) {
     for (ClientStatus& client : haply_->status()) status.clients.push_back(std::move(client));
   }
-  return status;
+  return false;
 }
 
 // Sends a text to all clients of this device.
@@ -442,28 +461,49 @@ void Server::onClosed(Session& session, const std::string& reason) {
   sessions_.erase(session.id());
 }
 
-// Disconnect clients whose heartbeat expired. onClosed() destroys the session later.
-void Server::checkHeartbeats() {
-  constexpr Nanos kStall = 150'000'000;  // between two checks; 50 ms are usual
+// Every 50 ms: heartbeats and memory, of a few clients at a time, between which others have their turn.
+void Server::checkClients() {
+  constexpr Nanos kStall = 150'000'000;  // between two checks
   const Nanos now = base::now();
-  const bool stalled = now - std::exchange(heartbeatsCheckedAt_, now) > kStall;
-  if (stalled) {  // this thread has not read what the clients sent
+  // This thread has not read what the clients sent.
+  if (now - std::exchange(checkedAt_, now) > kStall) {
     for (const auto& [id, session] : sessions_) session->excuseStall(now);
+  }
+  if (!checkedUpTo_) checkNextClients(0);
+}
+
+void Server::checkNextClients(scene::ClientId last) {
+  constexpr int kSlice = 500;
+  const Nanos now = base::now();
+  const std::map<scene::ClientId, std::size_t> waiting = waitingCommands();
+  auto next = sessions_.upper_bound(last);
+  for (int i = 0; i < kSlice && next != sessions_.end(); ++i, ++next) {
+    const auto commands = waiting.find(next->first);
+    checkHeartbeat(*next->second, now);
+    admission_.countMemory(*next->second, commands == waiting.end() ? 0 : commands->second);
+  }
+  if (next == sessions_.end()) {
+    checkedUpTo_.reset();
+    admission_.judgeMemory();
     return;
   }
-  for (const auto& [id, session] : sessions_) {
-    switch (session->checkHeartbeat(now)) {
-      case HeartbeatWatch::Verdict::alive:
-        break;
-      case HeartbeatWatch::Verdict::lost:
-        session->abort("no heartbeat for 500 ms");
-        break;
-      case HeartbeatWatch::Verdict::excused:
-        spdlog::warn("client {}: read no heartbeat for 5 s because the scene is behind; its forces ramp out",
-                     id);
-        releaseForces(id);
-        break;
-    }
+  checkedUpTo_ = std::prev(next)->first;
+  loop_.post([this] { checkNextClients(*checkedUpTo_); });
+}
+
+// onClosed() destroys the session later.
+void Server::checkHeartbeat(Session& session, Nanos now) {
+  switch (session.checkHeartbeat(now)) {
+    case HeartbeatWatch::Verdict::alive:
+      break;
+    case HeartbeatWatch::Verdict::lost:
+      session.abort("no heartbeat for 500 ms");
+      break;
+    case HeartbeatWatch::Verdict::excused:
+      spdlog::warn("client {}: read no heartbeat for 5 s because the scene is behind; its forces ramp out",
+                   session.id());
+      releaseForces(session.id());
+      break;
   }
 }
 
@@ -667,9 +707,10 @@ void Server::onRelieved(scene::ClientId client) {
 }
 
 void Server::report(Station& station) {
+  if (unfinishedReports_.count(&station) != 0) return station.reportToFirst(clock_, sessions_);
   if (!station.report(clock_, sessions_)) return;
   // The rest after what else waits: a stop does not wait until very many clients got their reports.
-  if (!unfinishedReports_.insert(&station).second) return;
+  unfinishedReports_.insert(&station);
   loop_.post([this, &station] {
     unfinishedReports_.erase(&station);
     report(station);

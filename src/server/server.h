@@ -83,6 +83,7 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   void onClosed(Session& session, const std::string& reason) override;
 
   ServerStatus status() const override;
+  bool addClients(ServerStatus& status) const override;
   void onWebClient(net::Connection connection, std::string_view token, bool ofPage) override;
   std::optional<Commander> admitHaply(const net::Endpoint& remote, std::string& refusal) override;
   void onHaplyGone(const Commander& client, const std::string& reason) override;
@@ -103,6 +104,7 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   void startPlaying();
   void onRecordingControl(Session& session, const wire::MessageReceived& message);
   void everySecond();
+  void sendPresentStates();
   void report(Station& station);
   void sendText(const Station& station, const wire::Text& text);
   void onMarker(Session& session, const wire::MessageReceived& message, base::Nanos received);
@@ -112,7 +114,9 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   void onRelieved(scene::ClientId client);
   void releaseForces(scene::ClientId client);
   std::map<scene::ClientId, std::size_t> waitingCommands() const;
-  void checkHeartbeats();
+  void checkClients();
+  void checkNextClients(scene::ClientId last);
+  void checkHeartbeat(Session& session, base::Nanos now);
   bool mayCommand(Session& session, Station& station, const wire::MessageReceived& message);
   Station* stationOf(wire::LocalSender name) noexcept;
   wire::LocalSender nameFor(const Session& session, const SceneHost& scene) const noexcept;
@@ -142,7 +146,9 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   std::unique_ptr<WebServer> web_;
   std::unique_ptr<HaplyPort> haply_;  ///< null unless configured
   scene::ClientId nextClient_ = 1;
-  base::Nanos heartbeatsCheckedAt_ = base::now();
+  std::deque<scene::ClientId> describedNothing_;  ///< before the handshake was over
+  base::Nanos checkedAt_ = base::now();           ///< the clients
+  std::optional<scene::ClientId> checkedUpTo_;    ///< in the round at hand
   std::function<void()> alive_;
   std::atomic<bool> devicesClosed_{false};
   const base::Nanos started_ = base::now();

@@ -17,7 +17,7 @@ class FreshTicks {
  public:
   static constexpr base::Nanos kMaxAge = 12'000'000;
   static constexpr base::Nanos kCatchUp = 3'000'000;
-  static constexpr base::Nanos kSlice = 1'000'000;  ///< of a pass, before other events have their turn
+  static constexpr base::Nanos kSlice = 300'000;  ///< of a pass, before other events have their turn
 
   explicit FreshTicks(double rate_Hz) : period_(std::max<base::Nanos>(base::toNanos(1 / rate_Hz), 1)) {}
 

@@ -111,31 +111,31 @@ std::vector<Session*> Admission::completedHandshakes(base::Nanos now) {
   return done;
 }
 
-void Admission::checkMemory(const std::map<scene::ClientId, std::size_t>& commands) {
+void Admission::countMemory(Session& session, std::size_t commands) {
+  if (session.ending()) return;
+  const std::size_t bytes = session.waitingBytes() + commands;
+  if (bytes > static_cast<std::size_t>(limits_.clientMemory_MB) << 20) {
+    end(session, "this client uses more than " + std::to_string(limits_.clientMemory_MB) +
+                     " MiB of the server; send less at a time, and read");
+  } else if (bytes > 0) {
+    counted_.emplace_back(bytes, session.id());
+  }
+}
+
+void Admission::judgeMemory() {
   const auto most = static_cast<std::size_t>(limits_.memory_MB) << 20;
-  const auto mostOfOne = static_cast<std::size_t>(limits_.clientMemory_MB) << 20;
   std::size_t sum = 0;
-  std::vector<std::pair<std::size_t, Session*>> holders;
-  for (const auto& [id, session] : sessions_) {
-    if (session->ending()) continue;
-    const auto waiting = commands.find(id);
-    const std::size_t bytes = session->waitingBytes() + (waiting == commands.end() ? 0 : waiting->second);
-    sum += bytes;
-    if (bytes > mostOfOne) {
-      end(*session, "this client uses more than " + std::to_string(limits_.clientMemory_MB) +
-                        " MiB of the server; send less at a time, and read");
-    } else {
-      holders.emplace_back(bytes, session.get());
-    }
-  }
-  if (sum <= most) return;
-  std::sort(holders.rbegin(), holders.rend());
-  for (const auto& [bytes, session] : holders) {
-    if (sum <= most) return;
+  for (const auto& [bytes, client] : counted_) sum += bytes;
+  std::sort(counted_.rbegin(), counted_.rend());
+  for (const auto& [bytes, client] : counted_) {
+    if (sum <= most) break;
     sum -= bytes;
-    end(*session, "all clients together use more than " + std::to_string(limits_.memory_MB) +
-                      " MiB of the server, and this one uses most");
+    const auto session = sessions_.find(client);
+    if (session == sessions_.end()) continue;
+    end(*session->second, "all clients together use more than " + std::to_string(limits_.memory_MB) +
+                              " MiB of the server, and this one uses most");
   }
+  counted_.clear();
 }
 
 }  // namespace hapticd::server

@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/time.h"
@@ -36,9 +37,11 @@ class Admission {
   /// Ends the handshakes that take too long. Returns the sessions whose handshake was completed since the
   /// last call.
   std::vector<Session*> completedHandshakes(base::Nanos now);
-  /// Ends clients for which too much memory waits: each beyond its own limit, then the largest.
-  /// `commands`: bytes that wait for scenes, by client.
-  void checkMemory(const std::map<scene::ClientId, std::size_t>& commands);
+  /// Counts the memory that waits for a client, and `commands`, bytes of it that wait for scenes. Ends the
+  /// client beyond its own limit.
+  void countMemory(Session& session, std::size_t commands);
+  /// All clients were counted once since the last call: ends the largest, until the rest is within the limit.
+  void judgeMemory();
 
  private:
   const LimitsConfig& limits_;
@@ -48,8 +51,9 @@ class Admission {
   // Clients beyond the limits, oldest first. Each kind of way has a reserve of its own: a flood on one must
   // not keep a stop on another from its turn.
   std::array<std::deque<scene::ClientId>, 3> reserves_;
-  std::map<scene::ClientId, base::Nanos> handshakes_;  // start times of unfinished handshakes
-  std::set<scene::ClientId> unfinished_;               // without a greeting, oldest first
+  std::map<scene::ClientId, base::Nanos> handshakes_;             // start times of unfinished handshakes
+  std::set<scene::ClientId> unfinished_;                          // without a greeting, oldest first
+  std::vector<std::pair<std::size_t, scene::ClientId>> counted_;  // memory and client
 };
 
 }  // namespace hapticd::server

@@ -210,7 +210,10 @@ void Session::sendLastText(const std::string& reason) {
 void Session::drainPeer() {
   net::Buffer bytes;
   peer_.takeStream(bytes);
-  if (!bytes.empty()) connection_.send(std::make_shared<const net::Buffer>(std::move(bytes)));
+  if (!bytes.empty()) {
+    bytes.shrink_to_fit();  // they may wait: a client that does not read must not cost twice what is counted
+    connection_.send(std::make_shared<const net::Buffer>(std::move(bytes)));
+  }
   if (udp_) {
     peer_.takeDatagrams([this](wire::ByteView datagram) { udp_->sendTo(datagram, datagramPeer_); });
   }

@@ -317,7 +317,6 @@ bool Station::Impl::takeTicks(const WallClock& wallClock) {
 }
 
 bool Station::report(const WallClock& clock, const Sessions& clients) {
-  constexpr std::size_t kFirstClients = 32;
   Impl& impl = *impl_;
   const bool newer = impl.takeTicks(clock);
   if (impl.passUpTo) {
@@ -327,23 +326,31 @@ bool Station::report(const WallClock& clock, const Sessions& clients) {
     impl.clientsBehind = false;
     impl.outbox.beginPass();
   }
-  const auto send = [&](const auto& entry, std::size_t most) {
-    return impl.outbox.send(*entry.second, most);
-  };
-  const auto flush = [](const auto& entry) { entry.second->flush(); };
-  // Those that connected first do not wait until all of a crowd got their reports.
-  if (newer && clients.size() > kFirstClients) {
-    const auto end = std::next(clients.begin(), kFirstClients);
-    std::for_each(clients.begin(), end, [&](const auto& entry) {
-      send(entry, impl.freshTicks.affordable());
-      flush(entry);
-    });
-  }
-  const auto next = serveSlice(impl.passUpTo ? clients.upper_bound(*impl.passUpTo) : clients.begin(),
-                               clients.end(), clients.size(), impl.freshTicks, send, flush);
+  if (newer) impl.serveFirst(clients);
+  const auto next = serveSlice(
+      impl.passUpTo ? clients.upper_bound(*impl.passUpTo) : clients.begin(), clients.end(), clients.size(),
+      impl.freshTicks,
+      [&](const auto& entry, std::size_t most) { return impl.outbox.send(*entry.second, most); },
+      [](const auto& entry) { entry.second->flush(); });
   impl.passUpTo.reset();
   if (next != clients.end()) impl.passUpTo = std::prev(next)->first;
   return impl.passUpTo.has_value();
+}
+
+void Station::reportToFirst(const WallClock& clock, const Sessions& clients) {
+  if (!impl_->takeTicks(clock)) return;
+  impl_->clientsBehind = true;
+  impl_->serveFirst(clients);
+}
+
+void Station::Impl::serveFirst(const Sessions& clients) {
+  constexpr std::size_t kFirst = 32;
+  if (clients.size() <= kFirst) return;  // a slice serves them all
+  const auto end = std::next(clients.begin(), kFirst);
+  std::for_each(clients.begin(), end, [&](const auto& entry) {
+    outbox.send(*entry.second, freshTicks.affordable());
+    entry.second->flush();
+  });
 }
 
 void Station::Impl::onPublished(const std::shared_ptr<const scene::SceneSnapshot>& snapshot) {

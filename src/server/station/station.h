@@ -100,6 +100,9 @@ class Station {
 
   /// Descriptor that is readable when reports wait.
   int wakeFd() const noexcept;
+  /// While report() is to be called again: encodes the pending ticks and sends them to those that connected
+  /// first, who do not wait until all of a crowd got theirs.
+  void reportToFirst(const WallClock& clock, const Sessions& clients);
   /// Encodes the pending ticks, once for all clients with the same subscription, and sends them to all
   /// clients, for FreshTicks::kSlice at most. When the net thread is behind, only the newest ticks are
   /// reported, see FreshTicks. When newer ticks came half-way, the next pass sends them to the clients

@@ -34,6 +34,7 @@ struct Station::Impl {
 
   void onPublished(const std::shared_ptr<const scene::SceneSnapshot>& snapshot);
   bool takeTicks(const WallClock& wallClock);
+  void serveFirst(const Sessions& clients);
   void choose(Session& session, wire::LocalSender name, ReportChoice choice, double rate_Hz,
               std::string_view call);
 

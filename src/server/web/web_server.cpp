@@ -141,17 +141,13 @@ void WebServer::route(const net::HttpRequest& request, const net::HttpReply& rep
   }
 }
 
-StateReport WebServer::report() {
-  StateReport report;
-  report.version = HAPTICD_VERSION;
-  report.server = owner_.status();
+void WebServer::addScenes() {
   for (std::size_t i = 0; i < watch_.latest().size(); ++i) {
     const auto& observed = watch_.latest()[i];
     if (observed) meshes_.prune(i, *observed);
-    report.scenes.push_back(
+    report_.scenes.push_back(
         {observed, observed ? meshes_.displayTriangles(i, *observed) : std::vector<std::size_t>()});
   }
-  return report;
 }
 
 void WebServer::sendState(const net::HttpReply& reply, Format format, const char* contentType) {
@@ -165,23 +161,42 @@ void WebServer::nextReport() {
   if (reporting_ || askers_.empty()) return;
   reporting_ = true;
   const base::Nanos wait = nextReport_ - base::now();
-  const auto make = [this] { watch_.refresh([this] { answer(std::exchange(askers_, {})); }); };
+  const auto make = [this] {
+    watch_.refresh([this] {
+      report_ = {.version = HAPTICD_VERSION, .server = owner_.status(), .scenes = {}};
+      answering_ = std::exchange(askers_, {});
+      cost_ = 0;
+      gather();
+    });
+  };
   if (wait <= 0) return make();
   reportTimer_ = loop_.after(std::chrono::nanoseconds(wait), make);
 }
 
-void WebServer::answer(const std::vector<Asker>& askers) {
+// A stop does not wait until all of very many clients are listed.
+void WebServer::gather() {
   const base::Nanos start = base::now();
-  auto made = report();
-  const base::Nanos end = base::now();
-  nextReport_ = end + 9 * (end - start);
-  textWorker_.post([this, askers, report = std::move(made)] {
+  const bool more = owner_.addClients(report_.server);
+  if (!more) addScenes();
+  cost_ += base::now() - start;
+  if (more) return loop_.post([this] { gather(); });
+  nextReport_ = base::now() + 9 * cost_;
+  answer();
+}
+
+void WebServer::answer() {
+  textWorker_.post([this, askers = std::exchange(answering_, {}), report = std::exchange(report_, {})] {
     std::map<Format, std::string> texts;
     for (const Asker& asker : askers) texts.try_emplace(asker.format);
     for (auto& [format, text] : texts) text = format(report);
-    loop_.post([this, askers, texts = std::move(texts)] {
-      for (const Asker& asker : askers)
-        respond(asker.reply, net::HttpResponse::of(200, texts.at(asker.format), asker.contentType));
+    for (const Asker& asker : askers) {
+      loop_.post(
+          [this, reply = asker.reply,
+           response = net::HttpResponse::of(200, texts.at(asker.format), asker.contentType)]() mutable {
+            respond(reply, std::move(response));
+          });
+    }
+    loop_.post([this] {
       reporting_ = false;
       nextReport();
     });

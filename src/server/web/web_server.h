@@ -20,7 +20,11 @@ namespace hapticd::server {
 class WebOwner {
  public:
   virtual ~WebOwner() = default;
+  /// Without clients.
   virtual ServerStatus status() const = 0;
+  /// Appends the next clients, at most 100, to a status; false when none is left. Others have their turn
+  /// between two calls.
+  virtual bool addClients(ServerStatus& status) const = 0;
   /// Somebody opened a WebSocket for a VRPN stream: with the token of its header `Authorization: Bearer`, or
   /// an empty one; `ofPage`: from a browser, which names the origin of its page.
   virtual void onWebClient(net::Connection connection, std::string_view token, bool ofPage) = 0;
@@ -54,18 +58,22 @@ class WebServer {
   void route(const net::HttpRequest& request, const net::HttpReply& reply);
   void sendState(const net::HttpReply& reply, Format format, const char* contentType);
   void nextReport();
-  void answer(const std::vector<Asker>& askers);
+  void gather();
+  void answer();
   void sendMesh(const net::HttpRequest& request, const net::HttpReply& reply);
   bool findMesh(std::size_t scene, std::int64_t object, std::uint64_t geometry, const net::HttpReply& reply,
                 std::string& error);
-  StateReport report();
+  void addScenes();
   void respond(const net::HttpReply& reply, net::HttpResponse response) const;
 
   net::Loop& loop_;
   WebOwner& owner_;
   int idleSeconds_ = 0;
-  std::vector<Asker> askers_;  // for the next report
+  std::vector<Asker> askers_;     // for the next report
+  std::vector<Asker> answering_;  // with the present one
   bool reporting_ = false;
+  StateReport report_;    // being made
+  base::Nanos cost_ = 0;  // of this thread, for it
   base::Nanos nextReport_ = 0;
   net::Subscription reportTimer_;
   Worker textWorker_{"web-text"};
