@@ -102,13 +102,15 @@ void encodeTick(std::int64_t time_ns, std::uint64_t tick, wire::FrameEncoder& en
   encoder.add({}, sender, report);
 }
 
-// The messages of one tick for a client that did not choose, stamped in their headers.
-void encodeDefaultTick(wire::FrameEncoder& encoder) {
-  const wire::LocalSender sender{1};
+wire::Time presentTime() {
   timespec now{};
   clock_gettime(CLOCK_REALTIME, &now);
-  const wire::Time stamp{static_cast<std::uint32_t>(now.tv_sec),
-                         static_cast<std::uint32_t>(now.tv_nsec / 1000)};
+  return {static_cast<std::uint32_t>(now.tv_sec), static_cast<std::uint32_t>(now.tv_nsec / 1000)};
+}
+
+// The messages of one tick for a client that did not choose, stamped in their headers.
+void encodeDefaultTick(const wire::Time& stamp, wire::FrameEncoder& encoder) {
+  const wire::LocalSender sender{1};
   encoder.clear();
   encoder.add(stamp, sender, wire::TrackerPosQuat{});
   encoder.add(stamp, sender, wire::TrackerVelocity{});
@@ -117,6 +119,7 @@ void encodeDefaultTick(wire::FrameEncoder& encoder) {
 
 enum class Messages { five, byDefault };
 
+// By default messages go, as a server's, through a thread of normal priority, which a servo wakes.
 int blaster(std::size_t clients, Messages messages) {
   raiseDescriptorLimit();
   Listener listener;
@@ -125,20 +128,40 @@ int blaster(std::size_t clients, Messages messages) {
   std::vector<Socket> sockets;
   while (sockets.size() < clients) sockets.push_back(listener.accept());
   wire::FrameEncoder encoder;
-  std::uint64_t tick = 0;
-  pace([&](std::int64_t time) {
-    if (messages == Messages::five) {
-      encodeTick(time, ++tick, encoder);
-    } else {
-      encodeDefaultTick(encoder);
-    }
+  const auto sendToAll = [&] {
     const wire::ByteView bytes = encoder.bytes();
     for (const Socket& socket : sockets) {
       // Who has no room for a whole tick misses it.
       if (::send(socket.fd(), bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL) >= 0) continue;
       if (errno != EAGAIN && errno != EWOULDBLOCK) _exit(0);
     }
+  };
+  std::uint64_t tick = 0;
+  if (messages == Messages::five) {
+    pace([&](std::int64_t time) {
+      encodeTick(time, ++tick, encoder);
+      sendToAll();
+    });
+  }
+  const int wake = eventfd(0, EFD_NONBLOCK);
+  handoff::SpscRing<wire::Time> stamps(4096);
+  std::thread servo([&] {
+    pace([&](std::int64_t) {
+      stamps.push(presentTime());
+      eventfd_write(wake, 1);
+    });
   });
+  servo.detach();
+  for (;;) {
+    pollfd waiting{wake, POLLIN, 0};
+    poll(&waiting, 1, -1);
+    eventfd_t count = 0;
+    eventfd_read(wake, &count);
+    stamps.consume([&](const wire::Time& stamp) {
+      encodeDefaultTick(stamp, encoder);
+      sendToAll();
+    });
+  }
 }
 
 // The policy of a stock server: one thread of normal priority, which sleeps, takes the present state and
