@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "announce.h"
 #include "bunny.h"
 #include "commands.h"
 #include "fit_mesh.h"
@@ -29,12 +30,11 @@ struct DemoOptions {
 };
 
 // The usual ports; others where another program has them.
-std::unique_ptr<server::Server> startServer(const DemoOptions& options) {
+std::unique_ptr<server::Server> startServer(const DemoOptions& options, server::ServerConfig& config) {
   struct Ports {
     std::uint16_t vrpn;
     const char* http;
   };
-  server::ServerConfig config;
   config.insecure = true;  // a simulated hand hurts nobody
   if (!options.listen.empty()) server::parseListen(options.listen, config.listenAddress, config.port);
   if (options.seconds > 0) config.seconds = options.seconds;
@@ -88,7 +88,9 @@ int run(const DemoOptions& options) {
   spdlog::set_pattern("%H:%M:%S.%e %^%l%$ %v");
   spdlog::set_level(spdlog::level::warn);
   StopOnSignal stopper;
-  const std::unique_ptr<server::Server> server = startServer(options);
+  server::ServerConfig config;
+  const std::unique_ptr<server::Server> server = startServer(options, config);
+  const std::unique_ptr<zeroconf::Announcer> announcer = announceOnNetwork(*server, config);
   stopper.watch(*server);
   const auto web = server->webAddress();
   const std::string page = web ? "http://" + web->text() + "/" : "(no page: --http off)";

@@ -70,7 +70,12 @@ std::string onlyDeviceOfNetwork() {
   std::vector<std::string> devices;
   for (const zeroconf::AnnouncedServer& server : servers) {
     // Several names may belong to one device: the first is its own.
-    if (!server.devices.empty()) devices.push_back(server.client(server.devices.front()));
+    if (server.devices.empty()) continue;
+    devices.push_back(server.client(server.devices.front()));
+    if (server.tls) devices.back() += ", by TLS only ('hapticd tunnel')";
+    if (!server.tls || servers.size() > 1) continue;
+    throw std::runtime_error("the only server on the network, " + server.client(server.devices.front()) +
+                             ", requires TLS: start 'hapticd tunnel', and name its local end by --server");
   }
   if (devices.empty()) throw std::runtime_error(kNoneFound);
   if (devices.size() == 1) return devices.front();
