@@ -119,6 +119,10 @@ void Thread::stop() {
   impl_.reset();
 }
 
+unsigned processors() noexcept {
+  return std::max(1U, std::thread::hardware_concurrency());
+}
+
 BlockingThread::BlockingThread(ThreadOptions options, std::function<void()> body)
     : impl_(world().threads.startBlocking(std::move(options), std::move(body))) {}
 

@@ -12,6 +12,9 @@
 
 namespace hapticd::base {
 
+/// Processors that this process may use; at least 1.
+unsigned processors() noexcept;
+
 /// What the operating system sees of a thread.
 struct ThreadOptions {
   std::string name;  ///< as in `top -H`; cut to 15 bytes

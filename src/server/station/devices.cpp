@@ -1,5 +1,11 @@
 #include "server/station/devices.h"
 
+#include <spdlog/spdlog.h>
+
+#include <utility>
+
+#include "base/thread.h"
+
 #include "device/drivers/drivers.h"
 #include "device/isolation/isolated_device.h"
 
@@ -8,11 +14,18 @@ namespace {
 
 // The isolation host runs this program for one device.
 std::unique_ptr<device::Device> isolated(DeviceConfig config) {
+  constexpr unsigned kFewest = 4;  // the servo takes up to a third of one
+  bool watches = std::exchange(config.isolateWatch, false);
+  if (watches && base::processors() < kFewest) {
+    spdlog::warn("device '{}': isolate_watch has no effect with fewer than {} processors; there are {}",
+                 config.names.front(), kFewest, base::processors());
+    watches = false;
+  }
   config.isolate = false;
   ServerConfig all;
   all.devices = {std::move(config)};
-  return std::make_unique<device::IsolatedDevice>(
-      device::IsolatedOptions{.command = {"/proc/self/exe", kDeviceHostCommand, toToml(all)}});
+  return std::make_unique<device::IsolatedDevice>(device::IsolatedOptions{
+      .command = {"/proc/self/exe", kDeviceHostCommand, toToml(all)}, .watches = watches});
 }
 
 }  // namespace

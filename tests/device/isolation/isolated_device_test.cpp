@@ -64,7 +64,11 @@ class IsolationTest : public testing::TestWithParam<const char*> {
     munmap(hand, sizeof(ObservedHand));
     unlink(path_.c_str());
   }
-  IsolatedOptions host(const std::string& mode) const { return {{TEST_HOST, mode, path_}}; }
+  // "watched": as "selfpaced", and the loop watches for each post.
+  IsolatedOptions host(const std::string& mode) const {
+    const bool watches = mode == "watched";
+    return {.command = {TEST_HOST, watches ? "selfpaced" : mode, path_}, .watches = watches};
+  }
   Vec3 force() const { return {hand->fx, hand->fy, hand->fz}; }
   // Pushes with one force in every tick and keeps the state.
   void push(IsolatedDevice& device, const Vec3& force_N) {
@@ -217,11 +221,11 @@ TEST_P(IsolationTest, TellsTheTimeFromPostToTick) {
   EXPECT_GE(times.front(), 0);
 }
 
-INSTANTIATE_TEST_SUITE_P(Paced, IsolationTest, testing::Values("selfpaced", "polled"),
+INSTANTIATE_TEST_SUITE_P(Paced, IsolationTest, testing::Values("selfpaced", "polled", "watched"),
                          [](const auto& test) { return std::string(test.param); });
 
 TEST(Isolation, SaysWhyADriverDoesNotOpen) {
-  IsolatedDevice failing({{TEST_HOST, "failing"}});
+  IsolatedDevice failing({.command = {TEST_HOST, "failing"}});
   EXPECT_EQ(refusal(failing), "no such arm");
   EXPECT_EQ(failing.process(), -1);
   IsolatedDevice missing({{"/nowhere/host"}});
@@ -231,14 +235,14 @@ TEST(Isolation, SaysWhyADriverDoesNotOpen) {
   IsolatedDevice stranger({{"/bin/true"}});
   EXPECT_THAT(refusal(stranger), HasSubstr("status 0"));
 #ifndef HAPTICD_SANITIZED  // which turn the signal into an exit
-  IsolatedDevice crashing({{TEST_HOST, "crash"}});
+  IsolatedDevice crashing({.command = {TEST_HOST, "crash"}});
   EXPECT_THAT(refusal(crashing), HasSubstr("signal 11"));
 #endif
 }
 
 TEST(Isolation, CarriesAVendorsLibrary) {
   setenv("HAPTICD_HDAPI_LIB", MOCK_HD, 1);
-  IsolatedDevice device({{TEST_HOST, "openhaptics"}});
+  IsolatedDevice device({.command = {TEST_HOST, "openhaptics"}});
   device.open();
   EXPECT_EQ(device.profile().model, "Touch");
   EXPECT_DOUBLE_EQ(device.profile().continuousForce_N, 0.88);

@@ -268,6 +268,7 @@ ServerConfig unusual() {
   device.calibrate = true;
   device.enableForces = true;
   device.isolate = true;
+  device.isolateWatch = true;
   device.hand = "hand.csv";
   device.servoRate_Hz = 4000;
   device.reportRate_Hz = 1.0 / 3;
