@@ -21,6 +21,7 @@ export async function until(what, ask, deadline_ms = 30_000) {
 }
 
 export class Server {
+  static running = new Set();
   log = "";
 
   /** `hapticd serve`, or `hapticd replay` of a recording. */
@@ -31,7 +32,8 @@ export class Server {
     server.process = spawn(hapticd, [...what, "--listen", "127.0.0.1:0", "--http", http, ...more]);
     for (const stream of [server.process.stdout, server.process.stderr])
       stream.on("data", (text) => (server.log += text));
-    server.ended = new Promise((resolve) => server.process.on("exit", resolve));
+    Server.running.add(server);
+    server.ended = new Promise((resolve) => server.process.on("exit", resolve)).then(() => Server.running.delete(server));
     const found = (pattern) =>
       until(`${pattern} in the server's log:\n${server.log}`, () => pattern.exec(server.log)?.[1], START_MS);
     server.vrpn = await found(/listening on ([0-9.]+:[0-9]+)/);
@@ -42,6 +44,11 @@ export class Server {
   async stop() {
     this.process.kill("SIGTERM");
     await this.ended;
+  }
+
+  /** Also those of a test that failed: one that runs keeps the test program alive. */
+  static async stopAll() {
+    await Promise.all([...Server.running].map((server) => server.stop()));
   }
 
   /** Sends a mesh with `hapticd touch`; replaces the scene. */

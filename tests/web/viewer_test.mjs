@@ -18,7 +18,7 @@ const browser = await launch();
 const viewer = await Viewer.open(browser.context, server.url);
 after(async () => {
   await browser.close();
-  await server.stop();
+  await Server.stopAll();
 });
 
 beforeEach(() => viewer.release());
@@ -438,8 +438,8 @@ test("markers, trips and a recording that the page begins and that is replayed",
   for (const id of ["#stop", "#load-mesh", "#mark", "#record", "#hand-bar"])
     assert.equal(await replay.page.isVisible(id), false, `${id} can do nothing here`);
   const [from, to] = line.contacts[0];
-  const during = (from + to) / 2;
-  await replay.page.getByLabel("Position in the recording, seconds").fill(during.toFixed(2));
+  const during = Math.round(50 * (from + to)) / 100;
+  await replay.page.getByLabel("Position in the recording, seconds").fill(String(during));
   await replay.page.locator("#replay button").click();
   await until("paused or ended", async () => (await state()).paused || (await state()).ended);
   const client = await replayed.client();
