@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <csignal>
@@ -211,8 +212,9 @@ bool IsolatedDevice::read(Nanos now, DeviceState& state) noexcept {
   if (!memory_) return false;
   const Posted posted = (*memory_)->state.read();
   if (posted.valid == 0 && !silent_) return false;
-  // The difference of any two numbers, without overflow.
-  postToTick_ = static_cast<Nanos>(static_cast<std::uint64_t>(now) - static_cast<std::uint64_t>(posted.time));
+  // The difference of any two numbers, without overflow; a state can have come after the tick began.
+  const auto passed = static_cast<std::uint64_t>(now) - static_cast<std::uint64_t>(posted.time);
+  postToTick_ = std::max<Nanos>(0, static_cast<Nanos>(passed));
   lostThere_.store(posted.lost != 0, std::memory_order_relaxed);
   state = posted.toState();
   if (silent_) state.hold |= kHoldFault;

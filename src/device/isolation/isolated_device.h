@@ -52,7 +52,8 @@ class IsolatedDevice final : public Device {
   void start(std::function<void(Nanos)> onTick) override;
   void stop() noexcept override;
 
-  /// From the post of the state of this tick until the tick began. In the tick only.
+  /// From the post of the state of this tick until the tick began; 0 for one that came later. In the tick
+  /// only.
   Nanos postToTick() const noexcept { return postToTick_; }
   /// Of the driver's process; -1 when there is none.
   pid_t process() const noexcept { return process_; }

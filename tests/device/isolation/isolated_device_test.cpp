@@ -221,6 +221,20 @@ TEST_P(IsolationTest, TellsTheTimeFromPostToTick) {
   EXPECT_GE(times.front(), 0);
 }
 
+// A tick that waits for the processor can find a state that was posted since it began.
+TEST_P(IsolationTest, AStateThatCameAfterTheTickBeganIsNotNegativelyOld) {
+  IsolatedDevice device(host(GetParam()));
+  device.open();
+  std::atomic<Nanos> time{-1};
+  device.start([&](Nanos now) {
+    DeviceState state;
+    if (device.read(now - 1'000'000'000, state)) time = device.postToTick();
+  });
+  ASSERT_TRUE(eventually([&] { return time != -1; }));
+  device.stop();
+  EXPECT_EQ(time, 0);
+}
+
 INSTANTIATE_TEST_SUITE_P(Paced, IsolationTest, testing::Values("selfpaced", "polled", "watched"),
                          [](const auto& test) { return std::string(test.param); });
 
