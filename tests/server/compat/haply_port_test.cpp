@@ -173,8 +173,9 @@ TEST_F(Haply, AForceExpiresWithoutMessages) {
   HaplyClient client(port());
   ASSERT_FALSE(untilFrame([&] { return client.forced({1, 0, 0}); }, isPushed).is_null());
   ASSERT_FALSE(untilFrame([&] { return watcher.probed(); }, isFree).is_null());
-  client.probe();
-  EXPECT_TRUE(isFree(client.receive())) << "a message without a force holds none";
+  // A stall of the machine, too, ends the force for a moment, and gives it back.
+  EXPECT_FALSE(untilFrame([&] { return client.probed(); }, isFree).is_null())
+      << "a message without a force holds none";
 }
 
 TEST_F(Haply, OneClientPushesAtATime) {
