@@ -14,6 +14,7 @@
 #include <cstring>
 #include <stdexcept>
 #include <system_error>
+#include <utility>
 
 #include "base/world.h"
 
@@ -43,6 +44,7 @@ void IsolatedDevice::open() {
     throw std::system_error(errno, std::generic_category(), "socket to a driver's process");
   }
   socket_ = ends[0];
+  late_.clear();
   try {
     spawn(ends[1]);
     ::close(ends[1]);
@@ -116,12 +118,15 @@ std::string IsolatedDevice::ask(const std::string& request, int most_ms) const {
   const std::unique_lock lock(socketMutex_, std::try_to_lock);
   if (!lock) throw std::runtime_error("the driver's process is busy with another request");
   if (socket_ < 0) throw std::runtime_error("the device is not open");
-  char late[16];
-  while (recv(socket_, late, sizeof late, MSG_DONTWAIT) > 0) {
-    // A late answer to a request that timed out.
+  // Late answers to requests that timed out. A driver tells of some faults once, so their text is kept.
+  std::array<char, 4096> late;
+  for (long size; (size = recv(socket_, late.data(), late.size(), MSG_DONTWAIT)) > 0;) {
+    if (size > 1 && late[0] == '+') late_.assign(late.data() + 1, static_cast<std::size_t>(size) - 1);
   }
   send(socket_, request.data(), request.size(), MSG_NOSIGNAL);
-  return receive(most_ms);
+  std::string text = receive(most_ms);
+  if (request != "fault") return text;
+  return text.empty() ? std::exchange(late_, {}) : text;
 }
 
 std::string IsolatedDevice::howItEnded(int most_ms) const {

@@ -74,6 +74,7 @@ class IsolatedDevice final : public Device {
   std::atomic<pid_t> process_{-1};
   int socket_ = -1;
   mutable std::mutex socketMutex_;
+  mutable std::string late_;  // text of a fault whose answer came too late
 
   std::function<void(Nanos)> onTick_;
   base::BlockingThread thread_;
