@@ -68,16 +68,18 @@ std::string onlyDeviceOfNetwork() {
   base::MonotonicClock clock;
   const Servers servers = zeroconf::findServers(clock, base::toNanos(ListOptions{}.timeout_s));
   std::vector<std::string> devices;
+  bool byTlsOnly = false;
   for (const zeroconf::AnnouncedServer& server : servers) {
     // Several names may belong to one device: the first is its own.
     if (server.devices.empty()) continue;
     devices.push_back(server.client(server.devices.front()));
-    if (server.tls) devices.back() += ", by TLS only ('hapticd tunnel')";
-    if (!server.tls || servers.size() > 1) continue;
-    throw std::runtime_error("the only server on the network, " + server.client(server.devices.front()) +
-                             ", requires TLS: start 'hapticd tunnel', and name its local end by --server");
+    byTlsOnly = server.tls;
+    if (byTlsOnly) devices.back() += ", by TLS only ('hapticd tunnel')";
   }
   if (devices.empty()) throw std::runtime_error(kNoneFound);
+  if (devices.size() == 1 && byTlsOnly)
+    throw std::runtime_error("the only device on the network, " + devices.front() +
+                             ": start the tunnel, and name its local end by --server");
   if (devices.size() == 1) return devices.front();
   std::string text = "several servers announce themselves; choose one by --server:";
   for (const std::string& device : devices) text += "\n  " + device;

@@ -47,26 +47,33 @@ template <class Tick>
   }
 }
 
-// Thread, wake, thread, TCP: what is between a servo and its client, and nothing else. As there, every tick
-// is sent, however late the thread between was.
-int pipeline(std::uint16_t port) {
-  Socket socket = Socket::connect(port);
+// A realtime thread stamps each tick and wakes this one, of normal priority, which sends it: what is between
+// a servo and its clients. As there, every tick is sent, however late the thread between was.
+template <class Stamp, class Send>
+[[noreturn]] void paceAndSend(Stamp stamp, Send send) {
   const int wake = eventfd(0, EFD_NONBLOCK);
-  handoff::SpscRing<std::int64_t> stamps(4096);
-  std::thread producer([&] {
+  handoff::SpscRing<decltype(stamp(std::int64_t{}))> stamps(4096);
+  std::thread servo([&] {
     pace([&](std::int64_t time) {
-      stamps.push(time);
+      stamps.push(stamp(time));
       eventfd_write(wake, 1);
     });
   });
-  producer.detach();
+  servo.detach();
   for (;;) {
     pollfd waiting{wake, POLLIN, 0};
     poll(&waiting, 1, -1);
     eventfd_t count = 0;
     eventfd_read(wake, &count);
-    stamps.consume([&](std::int64_t stamp) { socket.sendAll(stamped(stamp)); });
+    stamps.consume(send);
   }
+}
+
+// Thread, wake, thread, TCP, and nothing else.
+int pipeline(std::uint16_t port) {
+  Socket socket = Socket::connect(port);
+  paceAndSend([](std::int64_t time) { return time; },
+              [&](std::int64_t stamp) { socket.sendAll(stamped(stamp)); });
 }
 
 int plain(std::uint16_t port) {
@@ -143,25 +150,11 @@ int blaster(std::size_t clients, Messages messages) {
       sendToAll();
     });
   }
-  const int wake = eventfd(0, EFD_NONBLOCK);
-  handoff::SpscRing<wire::Time> stamps(4096);
-  std::thread servo([&] {
-    pace([&](std::int64_t) {
-      stamps.push(presentTime());
-      eventfd_write(wake, 1);
-    });
-  });
-  servo.detach();
-  for (;;) {
-    pollfd waiting{wake, POLLIN, 0};
-    poll(&waiting, 1, -1);
-    eventfd_t count = 0;
-    eventfd_read(wake, &count);
-    stamps.consume([&](const wire::Time& stamp) {
-      encodeDefaultTick(stamp, encoder);
-      sendToAll();
-    });
-  }
+  paceAndSend([](std::int64_t) { return presentTime(); },
+              [&](const wire::Time& stamp) {
+                encodeDefaultTick(stamp, encoder);
+                sendToAll();
+              });
 }
 
 // The policy of a stock server: one thread of normal priority, which sleeps, takes the present state and

@@ -172,6 +172,8 @@ wait_for_build() {
   return "$status"
 }
 
+builder=""
+trap '[ -z "$builder" ] || kill -- "-$builder" 2>/dev/null || true' EXIT
 echo "== release: building"
 SECONDS=0
 build release
@@ -181,8 +183,10 @@ for i in "${!presets[@]}"; do
   next=${presets[i + 1]:-}
   builder=""
   if [ -n "$next" ]; then
+    set -m  # a process group of its own, which the trap below ends with the script
     build_beside_tests "$next" >"build/$next.build.log" 2>&1 &
     builder=$!
+    set +m
   fi
   echo "== $preset: testing"
   test_start=$SECONDS
@@ -193,6 +197,7 @@ for i in "${!presets[@]}"; do
   if [ -n "$builder" ]; then
     build_start=$SECONDS
     wait_for_build "$next" "$builder"
+    builder=""
     build_s=$((SECONDS - build_start))
   fi
 done

@@ -70,6 +70,13 @@ TEST(Loop, RunForSleepsForItsWholeTimeAndHandlesWhatCame) {
   EXPECT_TRUE(ran);
 }
 
+TEST(Loop, APostedFunctionIsOneEventHoweverLongItTakes) {
+  Loop loop;
+  loop.post([] { std::this_thread::sleep_for(milliseconds(2)); });
+  EXPECT_EQ(loop.runOnce(milliseconds(0)), 1u);
+  EXPECT_EQ(loop.runOnce(milliseconds(0)), 0u);
+}
+
 TEST(Loop, RefusesToRunInsideItsOwnCallback) {
   Loop loop;
   std::string error;

@@ -34,6 +34,12 @@ constexpr Nanos kSilence = 20'000'000;
 constexpr Nanos kSilentTick = 10'000'000;
 constexpr double kOneTick_s = 0.001;
 
+// The text of an answer; throws it when it is a refusal.
+std::string textOf(const std::string& answer) {
+  if (!answer.starts_with('+')) throw std::runtime_error(answer.substr(1));
+  return answer.substr(1);
+}
+
 }  // namespace
 
 void IsolatedDevice::open() {
@@ -44,12 +50,13 @@ void IsolatedDevice::open() {
     throw std::system_error(errno, std::generic_category(), "socket to a driver's process");
   }
   socket_ = ends[0];
+  unanswered_ = 0;
   late_.clear();
   try {
     spawn(ends[1]);
     ::close(ends[1]);
     ends[1] = -1;
-    receive(kOpen_ms);
+    textOf(receive(base::now() + kOpen_ms * kMillisecond));
   } catch (...) {
     if (ends[1] >= 0) ::close(ends[1]);
     close();
@@ -98,35 +105,37 @@ void IsolatedDevice::spawn(int socketOfChild) {
   process_ = process;
 }
 
-// The text of an answer; throws it when it is a refusal.
-std::string IsolatedDevice::receive(int most_ms) const {
+std::string IsolatedDevice::receive(Nanos end) const {
+  const auto left_ms = std::max<Nanos>(0, (end - base::now()) / kMillisecond);
   pollfd wanted{socket_, POLLIN, 0};
-  if (poll(&wanted, 1, most_ms) == 0) {
-    throw std::runtime_error("the driver's process does not answer for " + std::to_string(most_ms) + " ms");
-  }
+  if (poll(&wanted, 1, static_cast<int>(left_ms)) == 0)
+    throw std::runtime_error("the driver's process does not answer");
   std::array<char, 4096> text;
   const long size = recv(socket_, text.data(), text.size(), 0);
   if (size <= 0)
     throw std::runtime_error("the driver's process ended" + howItEnded(kEnding_ms) +
                              "; open the device anew");
-  const std::string words(text.data() + 1, static_cast<std::size_t>(size) - 1);
-  if (text[0] != '+') throw std::runtime_error(words);
-  return words;
+  return {text.data(), static_cast<std::size_t>(size)};
 }
 
 std::string IsolatedDevice::ask(const std::string& request, int most_ms) const {
   const std::unique_lock lock(socketMutex_, std::try_to_lock);
   if (!lock) throw std::runtime_error("the driver's process is busy with another request");
   if (socket_ < 0) throw std::runtime_error("the device is not open");
-  // Late answers to requests that timed out. A driver tells of some faults once, so their text is kept.
-  std::array<char, 4096> late;
-  for (long size; (size = recv(socket_, late.data(), late.size(), MSG_DONTWAIT)) > 0;) {
-    if (size > 1 && late[0] == '+') late_.assign(late.data() + 1, static_cast<std::size_t>(size) - 1);
-  }
   send(socket_, request.data(), request.size(), MSG_NOSIGNAL);
-  std::string text = receive(most_ms);
+  ++unanswered_;
+  const Nanos end = base::now() + most_ms * kMillisecond;
+  // Answers come in the order of the requests, and those to requests that timed out come first. A driver
+  // tells of some faults once, so the text of such an answer is kept.
+  std::string answer = receive(end);
+  while (--unanswered_ > 0) {
+    if (answer.size() > 1 && answer.starts_with('+')) late_ = answer.substr(1);
+    answer = receive(end);
+  }
+  std::string text = textOf(answer);
   if (request != "fault") return text;
-  return text.empty() ? std::exchange(late_, {}) : text;
+  const std::string late = std::exchange(late_, {});
+  return text.empty() ? late : text;
 }
 
 std::string IsolatedDevice::howItEnded(int most_ms) const {

@@ -60,7 +60,7 @@ class IsolatedDevice final : public Device {
 
  private:
   void spawn(int socketOfChild);
-  std::string receive(int most_ms) const;
+  std::string receive(Nanos end) const;
   std::string ask(const std::string& request, int most_ms) const;
   std::string howItEnded(int most_ms) const;
   void run() noexcept;
@@ -74,6 +74,7 @@ class IsolatedDevice final : public Device {
   std::atomic<pid_t> process_{-1};
   int socket_ = -1;
   mutable std::mutex socketMutex_;
+  mutable int unanswered_ = 0;
   mutable std::string late_;  // text of a fault whose answer came too late
 
   std::function<void(Nanos)> onTick_;

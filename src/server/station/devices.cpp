@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "base/thread.h"
-
 #include "device/drivers/drivers.h"
 #include "device/isolation/isolated_device.h"
 

@@ -154,6 +154,16 @@ TEST_P(IsolationTest, WhatTheDriverSaysTooLateIsNotLost) {
   EXPECT_TRUE(eventually([&] { return device.faultText().empty(); }));
 }
 
+TEST_P(IsolationTest, ALateAnswerIsNotTakenForThatOfTheNextRequest) {
+  IsolatedDevice device(host(GetParam()));
+  device.open();
+  hand->calibrations = 1;  // the next one is refused
+  hand->fault = 3;
+  EXPECT_THAT(device.faultText(), HasSubstr("does not answer"));
+  EXPECT_THROW(device.calibrate(), std::runtime_error);
+  EXPECT_EQ(hand->calibrations, 2);
+}
+
 TEST_P(IsolationTest, AHangIsAFault) {
   IsolatedDevice device(host(GetParam()));
   device.open();
@@ -228,7 +238,7 @@ TEST_P(IsolationTest, TellsTheTimeFromPostToTick) {
   std::sort(times.begin(), times.end());
   std::printf("post to tick: median %.1f us, p99 %.1f us\n", 1e-3 * static_cast<double>(times[1000]),
               1e-3 * static_cast<double>(times[1980]));
-  EXPECT_GE(times.front(), 0);
+  EXPECT_GT(times[1000], 0);
 }
 
 // A tick that waits for the processor can find a state that was posted since it began.
