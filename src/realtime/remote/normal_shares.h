@@ -13,22 +13,27 @@ struct PressingContacts {
   static constexpr std::size_t kMost = 2 * kMaxRemoteContacts;
 
   std::size_t count = 0;
-  std::array<double, kMost> x, y, z;   ///< normals, unit
-  std::array<double, kMost> demand_N;  ///< normal force that each would exert alone
-  std::array<double, kMost> share_N;   ///< in: of the last tick; out: of this one
+  std::array<double, kMost> x, y, z;             ///< normals, unit
+  std::array<double, kMost> compliance_m_per_N;  ///< positive
+  std::array<double, kMost> depth_m;  ///< at which it alone would exert the normal force it demands
+  std::array<double, kMost> share_N;  ///< in: of the last tick; out: of this one
 
-  void add(const Vec3& normal, double demand, double share) noexcept {
+  void add(const Vec3& normal, double stiffness_N_per_m, double demand_N, double share) noexcept {
     x[count] = normal.x();
     y[count] = normal.y();
     z[count] = normal.z();
-    demand_N[count] = demand;
+    compliance_m_per_N[count] = 1 / stiffness_N_per_m;
+    depth_m[count] = demand_N * compliance_m_per_N[count];
     share_N[count++] = share;
   }
 };
 
 /// Finds shares so that each contact adds what the others do not already exert along its normal:
-/// share = max(0, demand - sum over the others of max(0, cosine between the normals) x their share).
-/// Surfaces on top of each other are then as stiff as one, and surfaces across each other add up.
+/// share = max(0, demand - sum over the others of w x max(0, cosine between the normals) x their share),
+/// where w is 1, or its own stiffness by that of the other, if the other is stiffer.
+/// Surfaces on top of each other are then as stiff as the stiffest, and surfaces across each other add up.
+/// The weights make the system symmetric, so that the forces have a potential, whatever the stiffness of
+/// each.
 void shareNormalForce(PressingContacts& contacts) noexcept;
 
 }  // namespace hapticd::realtime

@@ -18,14 +18,15 @@ constexpr double kShared_N_per_s = 0.45 * kRemoteRate_N_per_s;
 constexpr double kFade_N_per_s = 0.4 * kRemoteRate_N_per_s;
 constexpr double kBesideFade_N_per_s = 0.25 * kRemoteRate_N_per_s;
 constexpr double kOfAll_N_per_s = 0.75 * kRemoteRate_N_per_s;  // what corrections change in the sum
-constexpr double kLag_N_per_s = 0.2 * kRemoteRate_N_per_s;     // beside the sum
 constexpr int kTries = 4;
-constexpr double kFadeOfAll = 0.8;      // part of it that a fade may take
-constexpr double kLeast = 0.2;          // part of it for corrections, however much a fade takes
-constexpr double kEarly = 1.5;          // several contacts begin to fade earlier: their fade may be held up
-constexpr double kLongestAge_s = 0.2;   // a surface moves on no longer than this without an update
-constexpr double kLateral = 0.5;        // share of the stiffness that holds a sticking point
-constexpr double kStick = 0.9;          // of the dynamic bound: sliding ends below it
+constexpr double kFadeOfAll = 0.8;     // part of it that a fade may take
+constexpr double kLeast = 0.2;         // part of it for corrections, however much a fade takes
+constexpr double kEarly = 1.5;         // several contacts begin to fade earlier: their fade may be held up
+constexpr double kLongestAge_s = 0.2;  // a surface moves on no longer than this without an update
+constexpr double kLateral = 0.5;       // share of the stiffness that holds a sticking point
+constexpr double kStick = 0.9;         // of the dynamic bound: sliding ends below it
+constexpr double kUnlimited_J = 1e9;
+constexpr double kLent_J = 2e-4;        // to the springs of friction, at the first touch
 constexpr double kSlow_m_per_s = 0.01;  // below it the damping coefficient may change as at this speed
 
 // The shortest rotation between unit vectors; for opposite ones half a turn about any axis across.
@@ -56,8 +57,8 @@ void RemoteContacts::reset() noexcept {
   for (Slot& slot : slots_) slot.used = false;
   top_ = 0;
   pressed_N = 0;
+  frictionEnergy_J_ = kLent_J;
   force_N_.setZero();
-  lag_N_.setZero();
 }
 
 Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand, Nanos now, double step_s,
@@ -66,8 +67,9 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
   corrections_.refill(step_s);
   if (newest.number != taken_) take(newest, hand, now);
   if (top_ == 0) {
+    hand_m_ = hand.position_m;
+    frictionEnergy_J_ = kLent_J;
     force_N_.setZero();
-    lag_N_.setZero();
     return force_N_;
   }
   fadeOut(now, step_s);
@@ -84,26 +86,26 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
     leaving += slot.fading && slot.demand_N > 0;
     correcting = correcting || (!slot.fading && !isCorrected(slot));
   }
-  const bool lagging = !lag_N_.isZero(0);
-  if (lagging) lag_N_ -= atMost(lag_N_, kLag_N_per_s * step_s);
-  const bool fading = resumed || leaving > 0 || lagging;
+  const bool fading = resumed || leaving > 0;
   const double budget_N = (fading         ? kBesideFade_N_per_s
                            : changing > 1 ? kShared_N_per_s
                                           : kCorrection_N_per_s) *
                           step_s / std::max(changing, 1);
-  const bool mayRetry = lagging || ((correcting || fading) && changing + leaving > 1);
+  const bool mayRetry = (correcting || fading) && changing + leaving > 1;
   if (mayRetry) {
     std::copy_n(slots_.begin(), top_, before_.rendered.begin());
     before_.corrections = corrections_;
   }
   const Change change{budget_N, 1};
+  late_N_.setZero();
   Vec3 force = forceWith(change, hand, step_s);
   // In a corner the sum changes faster than what each face demands.
   const double most_N = kOfAll_N_per_s * step_s;
   if (mayRetry && (force - force_N_).squaredNorm() > most_N * most_N)
     force = forceWithin(change, hand, step_s);
   force_N_ = force;
-  lag_N_ = atMost(lag_N_, pressed_N);
+  hand_m_ = hand.position_m;
+  frictionEnergy_J_ = frictionNow_J_;
   for (const Slot& slot : inUse()) {
     if (!slot.used || slot.normal_N <= 0 || out.count == kMaxRemoteContacts) continue;
     out.contacts[out.count++] = {
@@ -111,7 +113,7 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
         (slot.normal_N * slot.normal + slot.friction_N).cast<float>(), static_cast<float>(slot.depth_m)};
   }
   if (held_) out.status |= kRemoteCorrectionsHeld;
-  out.contactForce_N = force + lag_N_;
+  out.contactForce_N = force - late_N_;
   return out.contactForce_N;
 }
 
@@ -128,18 +130,43 @@ Vec3 RemoteContacts::forceWith(const Change& change, const RemoteHand& hand, dou
     demand(slot, hand);
   }
   const Vec3 normal_N = share(hand);
-  Vec3 friction_N = Vec3::Zero();
-  double energy_J = 0;  // of the friction springs
+  const Vec3 moved_m = hand.position_m - hand_m_;
+  double given_J = 0;  // by the hand to friction, since the last tick
   for (Slot& slot : inUse()) {
     if (!slot.used) continue;
+    const Vec3 before_N = slot.friction_N;
     slot.friction_N = friction(slot, hand, pressed_N, step_s);
+    given_J -= 0.5 * (before_N + slot.friction_N).dot(moved_m - step_s * slot.velocity);
+  }
+  return normal_N + limitFriction(hand, given_J);
+}
+
+// The springs of friction hold no more than the hand gave them. Where several contacts share the normal
+// force, their springs change with the shares, and on a round surface with the normal: on some closed ways
+// that gives energy. What they are lent keeps a tremor in a corner from wearing friction out.
+Vec3 RemoteContacts::limitFriction(const RemoteHand& hand, double given_J) noexcept {
+  Vec3 friction_N = Vec3::Zero();
+  double energy_J = 0;
+  for (const Slot& slot : inUse()) {
+    if (!slot.used || slot.normal_N <= 0) continue;
     friction_N += slot.friction_N;
     energy_J += 0.5 * slot.friction_N.dot(slot.anchor_m - hand.position_m);
+  }
+  frictionNow_J_ = std::clamp(frictionEnergy_J_ + given_J, 0.0, energy_J + kLent_J);
+  if (energy_J > frictionNow_J_) {
+    const double share = std::sqrt(frictionNow_J_ / energy_J);
+    for (Slot& slot : inUse()) {
+      if (!slot.used || slot.normal_N <= 0) continue;
+      slot.friction_N *= share;
+      slot.anchor_m = hand.position_m + share * (slot.anchor_m - hand.position_m);
+    }
+    friction_N *= share;
+    energy_J = frictionNow_J_;
   }
   for (Slot& slot : inUse()) {
     if (slot.used && slot.normal_N <= 0) takeHold(slot, hand, friction_N, energy_J);
   }
-  return normal_N + friction_N;
+  return friction_N;
 }
 
 Vec3 RemoteContacts::forceAgain(const Change& change, const RemoteHand& hand, double step_s) noexcept {
@@ -166,9 +193,8 @@ Vec3 RemoteContacts::forceWithin(const Change& most, const RemoteHand& hand, dou
     change.correction_N *= 0.9 * left_N / (force - faded).norm();
     force = forceAgain(change, hand, step_s);
   }
-  // Other contacts may bear after the smallest change: then the rest of the jump comes in the next ticks.
-  const Vec3 jump = force - unchanged;
-  lag_N_ += atMost(jump, most_N) - jump;
+  // Other contacts may bear after the smallest change: then the rest of the jump comes in the next tick.
+  late_N_ = force - unchanged - atMost(force - unchanged, most_N);
   return force;
 }
 
@@ -217,6 +243,7 @@ void RemoteContacts::replace(Slot& slot, const RemoteContact& contact, const Rem
   } else {
     slot = Slot{};
     slot.used = true;
+    slot.stiffness_N_per_m = contact.stiffness_N_per_m;
     slot.damping = contact.damping_Ns_per_m;
     slot.staticFriction = contact.staticFriction;
     slot.dynamicFriction = contact.dynamicFriction;
@@ -237,8 +264,16 @@ void RemoteContacts::replace(Slot& slot, const RemoteContact& contact, const Rem
     slot.shift_m = std::min(0.0, -slot.depth_m);
   } else {
     slot.shift_m = spring_N / contact.stiffness_N_per_m - slot.depth_m;
-    slot.anchor_m =
-        hand.position_m + stiffness / contact.stiffness_N_per_m * (slot.anchor_m - hand.position_m);
+    // The same friction from a softer spring holds more energy.
+    const double softer = stiffness / contact.stiffness_N_per_m;
+    const Vec3 apart_m = slot.anchor_m - hand.position_m;
+    const double more_J = std::min(0.5 * (softer - 1) * slot.friction_N.dot(apart_m),
+                                   contact.yields ? kUnlimited_J : corrections_.energy_J());
+    if (more_J > 0) {
+      frictionEnergy_J_ += more_J;
+      if (!contact.yields) corrections_.give(more_J);
+    }
+    slot.anchor_m = hand.position_m + softer * apart_m;
     slot.turn = rotationVector(slot.normal, normal);
   }
 }
@@ -284,8 +319,8 @@ void RemoteContacts::locate(Slot& slot, const RemoteHand& hand, Nanos now) noexc
 bool RemoteContacts::isCorrected(const Slot& slot) noexcept {
   const RemoteContact& c = slot.contact;
   return slot.shift_m == 0 && slot.turn.isZero(0) && slot.drift_m_per_s.isZero(0) &&
-         slot.damping == c.damping_Ns_per_m && slot.staticFriction == c.staticFriction &&
-         slot.dynamicFriction == c.dynamicFriction;
+         slot.stiffness_N_per_m == c.stiffness_N_per_m && slot.damping == c.damping_Ns_per_m &&
+         slot.staticFriction == c.staticFriction && slot.dynamicFriction == c.dynamicFriction;
 }
 
 // Takes back shift and turn and lets velocity, damping and friction follow, together within the budget. A
@@ -298,6 +333,7 @@ void RemoteContacts::correct(Slot& slot, const RemoteHand& hand, double budget_N
     slot.turn.setZero();
     slot.velocity -= slot.drift_m_per_s;
     slot.drift_m_per_s.setZero();
+    slot.stiffness_N_per_m = c.stiffness_N_per_m;
     slot.damping = c.damping_Ns_per_m;
     slot.staticFriction = c.staticFriction;
     slot.dynamicFriction = c.dynamicFriction;
@@ -343,6 +379,12 @@ void RemoteContacts::correct(Slot& slot, const RemoteHand& hand, double budget_N
   } else {
     slot.drift_m_per_s.setZero();  // the norm of the smallest numbers is 0, although they are not
   }
+  if (slot.stiffness_N_per_m != c.stiffness_N_per_m) {
+    const double ratio = std::log(c.stiffness_N_per_m / slot.stiffness_N_per_m);
+    const double share = towards(0, 1, std::abs(ratio) * force_N, budget_N);
+    slot.stiffness_N_per_m =
+        share < 1 ? slot.stiffness_N_per_m * std::exp(share * ratio) : c.stiffness_N_per_m;
+  }
   const double leaving = slot.normal.dot(hand.velocity_m_per_s - slot.velocity);
   slot.damping = towards(slot.damping, c.damping_Ns_per_m,
                          force_N > 0 ? std::max(std::abs(leaving), kSlow_m_per_s) : 0, budget_N);
@@ -377,7 +419,7 @@ Vec3 RemoteContacts::share(const RemoteHand& hand) noexcept {
     if (slot.used && slot.demand_N > 0) {
       slots[pressing.count] = &slot;
       const double scene_N = std::max(0.0, slot.normal.dot(hand.sceneForce_N));
-      pressing.add(slot.normal, slot.demand_N - scene_N, slot.normal_N);
+      pressing.add(slot.normal, slot.stiffness_N_per_m, slot.demand_N - scene_N, slot.normal_N);
     } else {
       slot.normal_N = 0;
     }

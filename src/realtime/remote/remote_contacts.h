@@ -39,6 +39,7 @@ class RemoteContacts {
     double shift_m = 0;                 // of the rendered surface, out of the material
     Vec3 turn = Vec3::Zero();           // rotation vector from the stated to the rendered normal
     Vec3 drift_m_per_s = Vec3::Zero();  // rendered velocity of the surface less the stated one
+    double stiffness_N_per_m = 0;       // in its share beside the other contacts
     double damping = 0;
     double staticFriction = 0;
     double dynamicFriction = 0;
@@ -91,6 +92,7 @@ class RemoteContacts {
   static void demand(Slot& slot, const RemoteHand& hand) noexcept;
   Vec3 share(const RemoteHand& hand) noexcept;
   static Vec3 friction(Slot& slot, const RemoteHand& hand, double ofAll, double step_s) noexcept;
+  Vec3 limitFriction(const RemoteHand& hand, double given_J) noexcept;
   static void takeHold(Slot& slot, const RemoteHand& hand, const Vec3& friction_N, double energy_J) noexcept;
 
   std::array<Slot, kSlots> slots_;
@@ -98,9 +100,12 @@ class RemoteContacts {
   std::size_t top_ = 0;          // slots from here on are unused
   bool resumed_ = false;         // an update came during a fade
   Tried before_;                 // before this tick's corrections, where there are some
-  Vec3 force_N_ = Vec3::Zero();  // of the last tick, without the lag
-  Vec3 lag_N_ = Vec3::Zero();    // of the force on the hand, after a jump of the sum
+  Vec3 force_N_ = Vec3::Zero();  // of the last tick, with all of a jump
+  Vec3 late_N_ = Vec3::Zero();   // part of a jump that is felt in the next tick
   double pressed_N = 0;          // sum of the normal forces in the last tick
+  Vec3 hand_m_ = Vec3::Zero();   // in the last tick
+  double frictionEnergy_J_ = 0;  // which the hand gave to the springs of friction, at the last tick
+  double frictionNow_J_ = 0;     // at this one
   EnergyTank corrections_{EnergyBudget{}};
   bool held_ = false;  // a correction waited for energy in this tick
 };
