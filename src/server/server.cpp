@@ -500,8 +500,10 @@ void Server::checkHeartbeat(Session& session, Nanos now) {
       session.abort("no heartbeat for 500 ms");
       break;
     case HeartbeatWatch::Verdict::excused:
-      spdlog::warn("client {}: read no heartbeat for 5 s because the scene is behind; its forces ramp out",
-                   session.id());
+      throttledLog_.log(spdlog::level::warn, session.address(),
+                        fmt::format("client {}: no heartbeat came through for 5 s, behind its own data or "
+                                    "because the scene is behind; its forces ramp out",
+                                    session.id()));
       releaseForces(session.id());
       break;
   }

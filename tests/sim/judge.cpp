@@ -33,6 +33,7 @@ void Judge::onRead(Nanos now, Nanos clock, bool delivered, const device::DeviceS
   const Nanos late = first_ ? 0 : now - tick_ - limits_.period;
   first_ = false;
   gap_ = late + limits_.period;
+  if (late > limits_.late) stalled_ += late;
   tick_ = now;
   started_ = clock;
   pending_ = true;

@@ -62,6 +62,8 @@ class Judge {
   std::uint64_t ticks() const noexcept { return ticks_; }
   /// Since the last tick began.
   Nanos sinceRead(Nanos clock) const noexcept { return clock - started_; }
+  /// Total time by which ticks were late.
+  Nanos stalled() const noexcept { return stalled_; }
   std::uint64_t ticksWithForce() const noexcept { return withForce_; }
   std::uint64_t ticksInside() const noexcept { return inside_; }
   std::uint64_t latches() const noexcept { return latches_; }
@@ -80,7 +82,8 @@ class Judge {
   Nanos rearmed_ = -1;
   Nanos tick_ = 0;     // start of this one, as the servo calls it
   Nanos started_ = 0;  // the same on the clock
-  Nanos gap_ = 0;      // since the tick before
+  Nanos stalled_ = 0;
+  Nanos gap_ = 0;  // since the tick before
   bool first_ = true;
   bool pending_ = false;  // read, not written
   bool stopped_ = false;

@@ -193,6 +193,7 @@ class Simulation {
   void checkEnd();
   void checkRecording();
   std::optional<Nanos> freeFrom();
+  Nanos serverStalled();
   std::optional<Judge::Top> top();
   SimClient* clientAt(const net::Endpoint& endpoint);
 
@@ -585,7 +586,7 @@ void Simulation::vanish(Dice& dice) {
       lasts += 1'600 * kMs;  // what is not acknowledged for 500 ms, or a probe after a second of silence
       break;
   }
-  const Nanos stalled = scheduler_.netStalled();
+  const Nanos stalled = serverStalled();
   endOfForces_ =
       std::max(endOfForces_ + stalled - std::exchange(stalledThen_, stalled), clock_.now() + lasts);
 }
@@ -595,7 +596,12 @@ std::optional<Nanos> Simulation::freeFrom() {
   for (const auto& pusher : pushers_) {
     if (pusher->open() && !pusher->gone) return std::nullopt;
   }
-  return endOfForces_ + scheduler_.netStalled() - stalledThen_;
+  return endOfForces_ + serverStalled() - stalledThen_;
+}
+
+// A servo that stands still begins the ramp with its next tick; until then the guard writes zero.
+Nanos Simulation::serverStalled() {
+  return scheduler_.netStalled() + judge_.stalled();
 }
 
 void Simulation::nonsense(Dice& dice) {

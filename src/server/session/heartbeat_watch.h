@@ -14,20 +14,20 @@ class HeartbeatWatch {
   /// Silence after which the client is lost.
   static constexpr base::Nanos kLimit = 500'000'000;
   /// Total length of pauses, and of other data, without a heartbeat in between after which the client's
-  /// forces end, or the client is lost after kLimit.
+  /// forces end. Its connection stays while data arrives.
   static constexpr base::Nanos kExcuse = 5'000'000'000;
 
   enum class Verdict {
     alive,
     lost,     ///< silent for kLimit: end the connection
-    excused,  ///< paused for kExcuse: end its forces; returned once
+    excused,  ///< without a heartbeat for kExcuse: end its forces; returned again every kLimit
   };
 
   /// A heartbeat was received: starts or continues the watch.
   void beat(base::Nanos now) noexcept {
     last_ = now;
     excuse_ = kExcuse;
-    excuseReported_ = false;
+    ended_.reset();
   }
   /// The client opted out of heartbeats.
   void disable() noexcept { last_.reset(); }
@@ -48,9 +48,7 @@ class HeartbeatWatch {
   /// client.
   void receive(base::Nanos now) noexcept {
     if (!last_ || paused_) return;
-    const base::Nanos silence = now - *last_;
-    if (silence > excuse_) return;
-    excuse_ -= silence;
+    excuse_ -= now - *last_;
     last_ = now;
   }
 
@@ -61,9 +59,10 @@ class HeartbeatWatch {
 
   Verdict check(base::Nanos now) noexcept {
     if (!last_) return Verdict::alive;
-    if (!paused_) return now - *last_ > kLimit ? Verdict::lost : Verdict::alive;
-    if (excuseReported_ || now - *paused_ <= excuse_) return Verdict::alive;
-    excuseReported_ = true;
+    if (!paused_ && now - *last_ > kLimit) return Verdict::lost;
+    const base::Nanos left = paused_ ? excuse_ - (now - *paused_) : excuse_;
+    if (left >= 0 || (ended_ && now - *ended_ <= kLimit)) return Verdict::alive;
+    ended_ = now;
     return Verdict::excused;
   }
 
@@ -71,7 +70,7 @@ class HeartbeatWatch {
   std::optional<base::Nanos> last_;    // empty: not watched
   std::optional<base::Nanos> paused_;  // since when the server does not read
   base::Nanos excuse_ = kExcuse;       // the remaining part
-  bool excuseReported_ = false;        // Verdict::excused was returned
+  std::optional<base::Nanos> ended_;   // when its forces were ended last, without a heartbeat since
 };
 
 }  // namespace hapticd::server

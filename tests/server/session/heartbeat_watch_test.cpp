@@ -30,12 +30,26 @@ TEST(HeartbeatWatchTest, OtherDataExcusesFiveSecondsInTotal) {
     watch.receive(now);
     ASSERT_EQ(watch.check(now), Verdict::alive) << now;
   }
-  for (; now <= 5500 * kMillisecond; now += 100 * kMillisecond) {
+  watch.receive(now);
+  EXPECT_EQ(watch.check(now), Verdict::excused);
+  EXPECT_EQ(watch.check(now + 500 * kMillisecond), Verdict::alive) << "the connection stays";
+  EXPECT_EQ(watch.check(now + 501 * kMillisecond), Verdict::lost) << "unless it is silent";
+}
+
+// A client that sends data and no heartbeat may begin new effects: they end, too.
+TEST(HeartbeatWatchTest, WithoutAHeartbeatForcesEndAgainAndAgain) {
+  HeartbeatWatch watch;
+  watch.beat(0);
+  int ended = 0;
+  for (base::Nanos now = 0; now <= 10'000 * kMillisecond; now += 50 * kMillisecond) {
     watch.receive(now);
-    ASSERT_EQ(watch.check(now), Verdict::alive) << now;
+    const Verdict verdict = watch.check(now);
+    ASSERT_NE(verdict, Verdict::lost) << now;
+    ended += verdict == Verdict::excused ? 1 : 0;
   }
-  watch.receive(5501 * kMillisecond);
-  EXPECT_EQ(watch.check(5501 * kMillisecond), Verdict::lost);
+  EXPECT_EQ(ended, 10) << "every 550 ms from 5050 ms on";
+  watch.beat(10'000 * kMillisecond);
+  EXPECT_EQ(watch.check(10'500 * kMillisecond), Verdict::alive);
 }
 
 TEST(HeartbeatWatchTest, AHeartbeatRenewsTheExcuseOfOtherData) {
@@ -65,7 +79,7 @@ TEST(HeartbeatWatchTest, APauseOfTheServerIsNotSilenceAndTheLimitCountsFromItsEn
   EXPECT_EQ(watch.check(3501 * kMillisecond), Verdict::lost);
 }
 
-TEST(HeartbeatWatchTest, PausesExcuseFiveSecondsInTotalAndThatIsReportedOnce) {
+TEST(HeartbeatWatchTest, PausesExcuseFiveSecondsInTotal) {
   HeartbeatWatch watch;
   watch.beat(0);
   watch.pause(0);
