@@ -237,9 +237,9 @@ class HAPTICD_EXPORT Client {
   void releaseHand();
 
   // --- Streamed state, for simulations that run in the client. Each call is sent at once, even inside
-  // batch() and ahead of everything collected, by datagram where the connection has them: the newest value
-  // wins, and a lost one is not repeated, so call at a steady rate of 30 to 1000 Hz. Dropped without a
-  // connection. One client streams each kind to a device at a time; the server refuses others with a text.
+  // batch() and ahead of everything collected, by TCP: datagrams can be forged. The newest value wins; call
+  // at a steady rate of 30 to 1000 Hz. Dropped without a connection. One client streams each kind to a device
+  // at a time; the server refuses others with a text.
 
   /// Replaces this client's contacts, at most 16. The server renders them at its servo rate, moves them by
   /// their velocities, and takes over changes within 0.3 N/ms. Contacts that are not repeated end at the end

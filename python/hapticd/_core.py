@@ -563,16 +563,6 @@ class Core(Commands):
 
     # --- streamed state
 
-    def _put_fast(self, message: Any) -> None:
-        """Appends a message ahead of a batch that is held, by datagram where there are any; dropped and counted
-        without a connection. The face sends it."""
-        if not self.connected:
-            self._counts.messages_dropped += 1
-            return
-        assert self._peer is not None
-        self._peer.send_fast(self._frame(message))
-        self._counts.messages_out += 1
-
     def _put_contacts(self, contacts: Sequence[RemoteContact]) -> None:
         if len(contacts) > 16:
             raise ValueError(f"{len(contacts)} remote contacts: give the 16 nearest to the hand")
@@ -583,10 +573,10 @@ class Core(Commands):
             numbers += (c.dynamic_friction, c.lifetime_s, c.yields)
         if len(numbers) != 24 * len(contacts):
             raise ValueError("remote contacts: give three numbers for each vector")
-        self._put_fast(m.RemoteContacts(time.monotonic_ns(), self.latest.hand.tick_time_ns, numbers))
+        self._put_now(m.RemoteContacts(time.monotonic_ns(), self.latest.hand.tick_time_ns, numbers))
 
     def _put_force(self, force_N: Numbers, torque_Nm: Numbers, lifetime_s: float) -> None:
-        self._put_fast(m.HeldForce(time.monotonic_ns(), force_N, torque_Nm, lifetime_s))
+        self._put_now(m.HeldForce(time.monotonic_ns(), force_N, torque_Nm, lifetime_s))
 
     # --- batches and meshes
 

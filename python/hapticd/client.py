@@ -602,12 +602,11 @@ class Client(Core):
 
     def set_remote_contacts(self, contacts: Sequence[RemoteContact]) -> None:
         """Replaces this client's contacts, at most 16, for simulations that run in the client. Sent at once, even inside
-        batch(), by datagram where the connection has them: the newest value wins, and a lost one is not repeated, so call
-        at a steady rate of 30 to 1000 Hz. The server renders them at its servo rate, moves them by their velocities, and
-        takes over changes within 0.3 N/ms. Contacts that are not repeated end at the end of their lifetime, contacts that
-        are absent from a later call fade out at once, all of them when the client leaves. Dropped without a connection.
-        One client streams to a device at a time; the server refuses others with a text. HandReport has the force of
-        each."""
+        batch(), by TCP: datagrams can be forged. The newest value wins; call at a steady rate of 30 to 1000 Hz. The
+        server renders them at its servo rate, moves them by their velocities, and takes over changes within 0.3 N/ms.
+        Contacts that are not repeated end at the end of their lifetime, contacts that are absent from a later call
+        fade out at once, all of them when the client leaves. Dropped without a connection. One client streams to a
+        device at a time; the server refuses others with a text. HandReport has the force of each."""
         if self.connected:
             self._require(m.FEATURE_REMOTE_CONTACTS, "stream contacts")
         self._put_contacts(contacts)

@@ -51,6 +51,34 @@ def test_a_sphere_is_felt(server: Server, way: str) -> None:
         assert statistics.reports["tick"].latency.count == statistics.reports["tick"].count
 
 
+@pytest.mark.parametrize("way", ["tcp", "udp"])
+def test_remote_contacts_and_held_forces_are_felt(server: Server, way: str) -> None:
+    with hapticd.connect(getattr(server, way)) as hand:
+        hand.subscribe(Reports.TRACKER | Reports.HAND, 200)
+        hand.hold_hand((0, 35, 0))
+        until(hand, lambda: 1 in hand.latest.pose and hand.latest.pose[1].position_m[1] > 0.034)
+        floor = hapticd.RemoteContact(3, point_m=(0, 0.03, 0), normal=(0, 1, 0), stiffness_N_per_m=500)
+
+        def pressed() -> bool:
+            hand.set_remote_contacts([floor])
+            return any(c.id == 3 and c.force_N[1] > 0.3 for c in hand.latest.hand.contacts)
+
+        height_mm = 35.0
+        while not pressed() and height_mm > 20:
+            height_mm -= 0.1
+            hand.hold_hand((0, height_mm, 0))
+            hand.poll(0.01)
+        assert pressed(), f"felt nothing: {hand.latest.hand}"
+        hand.hold_hand((0, 35, 0))
+
+        def pushed() -> bool:
+            hand.set_force((0, 0, 0.5))
+            return bool(hand.latest.hand.held_force_N[2] > 0.4)
+
+        until(hand, pushed)
+        hand.release_hand()
+
+
 def test_rows_are_structured_arrays(server: Server) -> None:
     with hapticd.connect(server.tcp) as hand:
         hand.subscribe(Reports.TICK | Reports.TRACKER, 500)

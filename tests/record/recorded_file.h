@@ -49,6 +49,21 @@ inline server::ServerConfig recordingConfig(const Hand& hand, const std::filesys
   return config;
 }
 
+/// Leads the hand from above into the cube. A stall of the machine can make the first contact too deep to be
+/// felt: then again.
+inline bool pressFromAbove(ScriptedPeer& peer) {
+  for (int attempt = 0; attempt < 5; ++attempt) {
+    for (double height = 30; height >= 18; height -= 1) {
+      peer.send(wire::HoldHand{.hold = 1, .position = {5, height, 5}});
+      untilTicks(peer, 5);
+    }
+    untilTicks(peer, 50);
+    const auto touched = peer.last<wire::TouchedObject>();
+    if (touched && touched->object == 0) return true;
+  }
+  return false;
+}
+
 /// Plays everything; false when an expected contact or report did not occur.
 inline bool playSession(RunningServer& server) {
   ScriptedPeer peer(server.address());
@@ -74,13 +89,7 @@ inline bool playSession(RunningServer& server) {
   if (!peer.untilNext<wire::GuardState>()) return false;
 
   // The other hand is held, and then led by a stream of poses.
-  second.send(wire::HoldHand{.hold = 1, .position = {5, 18, 5}});
-  if (!second.until([&] {
-        const auto touched = second.last<wire::TouchedObject>();
-        return touched && touched->object == 0;
-      })) {
-    return false;
-  }
+  if (!pressFromAbove(second)) return false;
   for (int i = 0; i < 60; ++i) {
     const double turn = 0.1 * i;
     second.send(wire::HoldHand{.hold = 1, .position = {8 * std::cos(turn), 18, 8 * std::sin(turn)}});

@@ -82,6 +82,7 @@ class Listener : public SimClient {
  public:
   using SimClient::SimClient;
   bool beats = true;
+  bool watched = false;  // it sent a heartbeat: the server knows when they end
   std::uint32_t kinds = wire::kReportDefault | wire::kReportTick;
 
  protected:
@@ -571,7 +572,7 @@ void Simulation::vanish(Dice& dice) {
   const bool pauses = script_.adversity.netStall > 0 || script_.adversity.freeze > 0 ||
                       script_.adversity.preempt > 0 || script_.faults.hang > 0;
   pusher.expectEnd();
-  switch (dice.below(pauses ? 2 : 3)) {
+  switch (dice.below(pauses || !pusher.watched ? 2 : 3)) {
     case 0:
       pusher.reset();
       break;
@@ -627,7 +628,9 @@ void Simulation::nonsense(Dice& dice) {
 
 void Simulation::beat() {
   const auto one = [](Listener& client) {
-    if (client.connected() && client.beats) client.send(wire::Heartbeat{});
+    if (!client.connected() || !client.beats) return;
+    client.send(wire::Heartbeat{});
+    client.watched = true;
   };
   if (cubeOwner_) one(*cubeOwner_);
   for (const auto& client : operators_) one(*client);

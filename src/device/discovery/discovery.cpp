@@ -71,8 +71,10 @@ DriverReport findOpenHaptics(const DiscoveryOptions& options) {
       return report;
     }
     for (const UsbDevice& device : usb.devices) report.devices.push_back(device.text());
-    if (usb.devices.empty())
-      report.reason = "the library is there; only opening a device shows whether one is connected";
+    if (usb.devices.empty()) {
+      report.reason = "no device on USB; for others only opening shows whether one is connected";
+      report.remedy = "hapticd devices --open";
+    }
     return report;
   }
   try {

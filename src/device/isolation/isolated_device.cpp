@@ -226,9 +226,10 @@ bool IsolatedDevice::read(Nanos now, DeviceState& state) noexcept {
   if (!memory_) return false;
   const Posted posted = (*memory_)->state.read();
   if (posted.valid == 0 && !silent_) return false;
-  // The difference of any two numbers, without overflow; a state can have come after the tick began.
+  // The difference of any two numbers, without overflow; a state can have come after the tick began, or
+  // never.
   const auto passed = static_cast<std::uint64_t>(now) - static_cast<std::uint64_t>(posted.time);
-  postToTick_ = std::max<Nanos>(0, static_cast<Nanos>(passed));
+  postToTick_ = posted.valid == 0 ? 0 : std::max<Nanos>(0, static_cast<Nanos>(passed));
   lostThere_.store(posted.lost != 0, std::memory_order_relaxed);
   state = posted.toState();
   if (silent_) state.hold |= kHoldFault;

@@ -172,7 +172,7 @@ TEST_F(DiscoveryTest, ConnectedArmsAreCounted) {
 
 TEST_F(DiscoveryTest, OpenHapticsTellsAfterOpening) {
   setenv("HAPTICD_HDAPI_LIB", MOCK_HD, 1);
-  EXPECT_THAT(of("openhaptics").reason, HasSubstr("only opening"));
+  EXPECT_THAT(of("openhaptics").reason, HasSubstr("only opening shows"));
   options.openThem = true;
   EXPECT_THAT(of("openhaptics").devices, ElementsAre(HasSubstr("MOCK-0001")));
 }

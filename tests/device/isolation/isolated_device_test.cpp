@@ -255,6 +255,24 @@ TEST_P(IsolationTest, AStateThatCameAfterTheTickBeganIsNotNegativelyOld) {
   EXPECT_EQ(time, 0);
 }
 
+TEST_P(IsolationTest, AStateThatNeverCameHasNoAge) {
+  IsolatedDevice device(host(GetParam()));
+  device.open();
+  hand->fault = 2;
+  std::atomic<bool> fault{false};
+  std::atomic<Nanos> age{0};
+  device.start([&](Nanos now) {
+    DeviceState state;
+    if (fault || !device.read(now, state) || state.hold != kHoldFault) return;
+    age = device.postToTick();
+    fault = true;
+  });
+  EXPECT_TRUE(eventually([&] { return fault.load(); }));
+  hand->fault = 0;
+  device.stop();
+  EXPECT_EQ(age, 0) << "and not the time since the machine started";
+}
+
 INSTANTIATE_TEST_SUITE_P(Paced, IsolationTest, testing::Values("selfpaced", "polled", "watched"),
                          [](const auto& test) { return std::string(test.param); });
 

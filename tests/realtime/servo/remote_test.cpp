@@ -9,6 +9,7 @@
 #include "realtime/remote/held_force.h"
 #include "realtime/remote/normal_shares.h"
 #include "realtime/remote/remote_contacts.h"
+#include "reduced.h"
 
 namespace hapticd::realtime {
 namespace {
@@ -145,7 +146,7 @@ TEST(RemoteContacts, SurfacesMoveByTheirVelocities) {
 // Draws in the order of the calls, whatever the compiler.
 class Draw {
  public:
-  explicit Draw(unsigned seed) : random_(seed) {}
+  explicit Draw(int seed) : random_(static_cast<unsigned>(seed)) {}
   double operator()() { return unit_(random_); }
   Vec3 vector() {
     const double x = unit_(random_);
@@ -194,7 +195,7 @@ double largestStep(int ticks, const std::function<std::vector<RemoteContact>()>&
 // the other is no update.
 TEST(RemoteContacts, NoUpdateMakesAStep) {
   for (const int most : {1, 3, 16}) {
-    for (unsigned seed = 0; seed < (most == 1 ? 200U : 20U); ++seed) {
+    for (int seed = 0; seed < (most == 1 ? 200 : 20); ++seed) {
       Draw draw(seed);
       const double largest = largestStep(3000, [&] {
         std::vector<RemoteContact> contacts;
@@ -273,7 +274,7 @@ TEST(RemoteContacts, AnotherBearerTakesTheFrictionOver) {
 
 // Where the client states equal coefficients, no slip finds them apart while they follow an update.
 TEST(RemoteContacts, EqualCoefficientsStayEqual) {
-  for (const unsigned seed : {1U, 4U, 345U}) {
+  for (const int seed : {1, 4, 345}) {
     Draw draw(seed);
     const double largest = largestStep(
         3000,
@@ -293,7 +294,7 @@ TEST(RemoteContacts, EqualCoefficientsStayEqual) {
 
 // Faces with friction that nearly coincide. Seeds in which the friction of one that no longer bore was lost.
 TEST(RemoteContacts, OtherBearersWithFrictionMakeNoStep) {
-  for (const unsigned seed : {51U, 67U, 82U}) {
+  for (const int seed : {51, 67, 82}) {
     Draw draw(seed);
     const double largest = largestStep(3000, [&] {
       std::vector<RemoteContact> contacts;
@@ -330,7 +331,7 @@ std::vector<RemoteContact> facesAnywhere(Draw& draw) {
 // Four faces of which three touch in a row make the demands' system indefinite: from one tick to the next
 // others bear. Seeds of arbitrary normals in which the sum jumped by up to 0.8 N.
 TEST(RemoteContacts, OtherBearersMakeNoStep) {
-  for (const unsigned seed : {197U, 471U, 647U, 1173U, 1427U, 1949U}) {
+  for (const int seed : {197, 471, 647, 1173, 1427, 1949}) {
     Draw draw(seed);
     EXPECT_LT(largestStep(3000, [&] { return facesAnywhere(draw); }), kRate_N_per_ms) << "seed " << seed;
   }
@@ -340,7 +341,7 @@ TEST(RemoteContacts, OtherBearersMakeNoStep) {
 TEST(RemoteContacts, NoUpdateOfACornerMakesAStep) {
   for (const bool comeAndGo : {false, true}) {
     for (const int faces : {2, 3, 5}) {
-      for (unsigned seed = 0; seed < 60; ++seed) {
+      for (int seed = 0; seed < reduced(60); ++seed) {
         Draw draw(seed);
         const double largest = largestStep(3000, [&] {
           std::vector<RemoteContact> contacts;
@@ -540,7 +541,7 @@ struct Hollow {
 
 TEST(RemoteContacts, UnequalStiffnessMakesNoEnergy) {
   for (const int faces : {2, 3, 5}) {
-    for (unsigned seed = 0; seed < 10; ++seed) {
+    for (int seed = 0; seed < reduced(10); ++seed) {
       for (const double direction : {1.0, -1.0}) {
         Draw draw(seed);
         Hollow hollow(faces, 2, 0, draw);
@@ -558,7 +559,7 @@ TEST(RemoteContacts, UnequalStiffnessMakesNoEnergy) {
 TEST(RemoteContacts, FrictionOfSeveralFacesGivesNoEnergy) {
   constexpr double kLent_J = 2e-4;
   for (const int faces : {2, 3, 5, 8}) {
-    for (unsigned seed = 0; seed < 10; ++seed) {
+    for (int seed = 0; seed < reduced(10); ++seed) {
       for (const double friction : {0.2, 0.5, 1.0}) {
         for (const double direction : {1.0, -1.0}) {
           Draw draw(seed);
@@ -574,7 +575,7 @@ TEST(RemoteContacts, FrictionOfSeveralFacesGivesNoEnergy) {
 }
 
 TEST(RemoteContacts, TremorInACornerDoesNotWearFrictionOut) {
-  for (unsigned seed = 0; seed < 4; ++seed) {
+  for (int seed = 0; seed < 4; ++seed) {
     Draw draw(seed);
     Hollow hollow(3, 0, 0.5, draw);
     hollow.line({0, -0.003, 0}, 300);
