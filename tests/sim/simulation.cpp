@@ -600,7 +600,7 @@ std::optional<Nanos> Simulation::freeFrom() {
   return endOfForces_ + serverStalled() - stalledThen_;
 }
 
-// A servo that stands still begins the ramp with its next tick; until then the guard writes zero.
+// A servo that stands still begins the ramp with its next tick.
 Nanos Simulation::serverStalled() {
   return scheduler_.netStalled() + judge_.stalled();
 }

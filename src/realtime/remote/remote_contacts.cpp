@@ -243,10 +243,7 @@ void RemoteContacts::replace(Slot& slot, const RemoteContact& contact, const Rem
   } else {
     slot = Slot{};
     slot.used = true;
-    slot.stiffness_N_per_m = contact.stiffness_N_per_m;
-    slot.damping = contact.damping_Ns_per_m;
-    slot.staticFriction = contact.staticFriction;
-    slot.dynamicFriction = contact.dynamicFriction;
+    follow(slot, contact);
     slot.anchor_m = hand.position_m;
   }
   slot.stated = true;
@@ -323,8 +320,8 @@ bool RemoteContacts::isCorrected(const Slot& slot) noexcept {
          slot.staticFriction == c.staticFriction && slot.dynamicFriction == c.dynamicFriction;
 }
 
-// Takes back shift and turn and lets velocity, damping and friction follow, together within the budget. A
-// surface that rises against the hand does work on it: unless it yields, that work comes from the tank.
+// Takes back shift and turn and lets velocity, stiffness, damping and friction follow, together within the
+// budget.
 void RemoteContacts::correct(Slot& slot, const RemoteHand& hand, double budget_N, double step_s) noexcept {
   const RemoteContact& c = slot.contact;
   if (slot.depth_m - slot.shift_m <= 0 && slot.depth_m <= 0) {  // untouched: nothing can be felt
@@ -333,10 +330,7 @@ void RemoteContacts::correct(Slot& slot, const RemoteHand& hand, double budget_N
     slot.turn.setZero();
     slot.velocity -= slot.drift_m_per_s;
     slot.drift_m_per_s.setZero();
-    slot.stiffness_N_per_m = c.stiffness_N_per_m;
-    slot.damping = c.damping_Ns_per_m;
-    slot.staticFriction = c.staticFriction;
-    slot.dynamicFriction = c.dynamicFriction;
+    follow(slot, c);
     return;
   }
   if (isCorrected(slot)) return;
@@ -346,23 +340,7 @@ void RemoteContacts::correct(Slot& slot, const RemoteHand& hand, double budget_N
     slot.shift_m = std::min(0.0, -stated_m);
     slot.depth_m = stated_m + slot.shift_m;
   }
-  if (slot.shift_m != 0) {
-    const double before_N = c.stiffness_N_per_m * slot.depth_m;
-    double most_m =
-        std::min({std::abs(slot.shift_m), kRemoteSpeed_m_per_s * step_s, budget_N / c.stiffness_N_per_m});
-    const bool pays = slot.shift_m < 0 && !c.yields;
-    const double push_N = before_N + 0.5 * c.stiffness_N_per_m * most_m;
-    if (pays && push_N * most_m > corrections_.energy_J()) {
-      held_ = true;
-      most_m = corrections_.energy_J() / push_N;
-    }
-    const double moved_m = std::clamp(-slot.shift_m, -most_m, most_m);
-    slot.shift_m += moved_m;
-    slot.depth_m += moved_m;
-    const double after_N = c.stiffness_N_per_m * std::max(0.0, slot.depth_m);
-    if (!c.yields) corrections_.give(0.5 * (before_N + after_N) * moved_m);
-    budget_N = std::max(0.0, budget_N - std::abs(after_N - before_N));
-  }
+  if (slot.shift_m != 0) budget_N = takeBackShift(slot, budget_N, step_s);
   const double force_N = slot.demand_N;
   if (const double angle = slot.turn.norm(); angle > 0) {
     const double left = towards(angle, 0, force_N, budget_N);
@@ -395,6 +373,35 @@ void RemoteContacts::correct(Slot& slot, const RemoteHand& hand, double budget_N
   const double share = towards(0, 1, most * slot.normal_N, budget_N);
   slot.staticFriction = share < 1 ? slot.staticFriction + share * staticChange : c.staticFriction;
   slot.dynamicFriction = share < 1 ? slot.dynamicFriction + share * dynamicChange : c.dynamicFriction;
+}
+
+// Returns what is left of the budget. A surface that rises against the hand does work on it: unless it
+// yields, that work comes from the tank.
+double RemoteContacts::takeBackShift(Slot& slot, double budget_N, double step_s) noexcept {
+  const RemoteContact& c = slot.contact;
+  const double before_N = c.stiffness_N_per_m * slot.depth_m;
+  double most_m =
+      std::min({std::abs(slot.shift_m), kRemoteSpeed_m_per_s * step_s, budget_N / c.stiffness_N_per_m});
+  const bool pays = slot.shift_m < 0 && !c.yields;
+  const double push_N = before_N + 0.5 * c.stiffness_N_per_m * most_m;
+  if (pays && push_N * most_m > corrections_.energy_J()) {
+    held_ = true;
+    most_m = corrections_.energy_J() / push_N;
+  }
+  const double moved_m = std::clamp(-slot.shift_m, -most_m, most_m);
+  slot.shift_m += moved_m;
+  slot.depth_m += moved_m;
+  const double after_N = c.stiffness_N_per_m * std::max(0.0, slot.depth_m);
+  if (!c.yields) corrections_.give(0.5 * (before_N + after_N) * moved_m);
+  return std::max(0.0, budget_N - std::abs(after_N - before_N));
+}
+
+// All at once: nothing is felt of it.
+void RemoteContacts::follow(Slot& slot, const RemoteContact& contact) noexcept {
+  slot.stiffness_N_per_m = contact.stiffness_N_per_m;
+  slot.damping = contact.damping_Ns_per_m;
+  slot.staticFriction = contact.staticFriction;
+  slot.dynamicFriction = contact.dynamicFriction;
 }
 
 // Spring and damper. The damper exerts no more than the spring, so that a touch begins without a step and the

@@ -89,6 +89,8 @@ class RemoteContacts {
   static void locate(Slot& slot, const RemoteHand& hand, Nanos now) noexcept;
   static bool isCorrected(const Slot& slot) noexcept;
   void correct(Slot& slot, const RemoteHand& hand, double budget_N, double step_s) noexcept;
+  double takeBackShift(Slot& slot, double budget_N, double step_s) noexcept;
+  static void follow(Slot& slot, const RemoteContact& contact) noexcept;
   static void demand(Slot& slot, const RemoteHand& hand) noexcept;
   Vec3 share(const RemoteHand& hand) noexcept;
   static Vec3 friction(Slot& slot, const RemoteHand& hand, double ofAll, double step_s) noexcept;
@@ -100,8 +102,8 @@ class RemoteContacts {
   std::size_t top_ = 0;          // slots from here on are unused
   bool resumed_ = false;         // an update came during a fade
   Tried before_;                 // before this tick's corrections, where there are some
-  Vec3 force_N_ = Vec3::Zero();  // of the last tick, with all of a jump
-  Vec3 late_N_ = Vec3::Zero();   // part of a jump that is felt in the next tick
+  Vec3 force_N_ = Vec3::Zero();  // of the last tick, with what it left
+  Vec3 late_N_ = Vec3::Zero();   // part of a jump that this tick leaves to the next
   double pressed_N = 0;          // sum of the normal forces in the last tick
   Vec3 hand_m_ = Vec3::Zero();   // in the last tick
   double frictionEnergy_J_ = 0;  // which the hand gave to the springs of friction, at the last tick

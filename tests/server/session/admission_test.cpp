@@ -9,6 +9,7 @@
 
 #include "net/loop.h"
 #include "net/tcp_listener.h"
+#include "server/session/quiet_owner.h"
 
 namespace hapticd::server {
 namespace {
@@ -16,18 +17,8 @@ namespace {
 using namespace std::chrono_literals;
 
 // Remembers why sessions ended.
-class Ends final : public SessionOwner {
+class Ends final : public QuietOwner {
  public:
-  void onConnected(Session& /*session*/) override {}
-  void onCaughtUp(Session& /*session*/) override {}
-  void onSubscribed(Session& /*session*/, wire::LocalSender /*name*/) override {}
-  void onMessage(Session& /*session*/, const wire::MessageReceived& /*message*/, base::Nanos) override {}
-  void onWarning(const Session& /*session*/, const std::string& /*text*/) override {}
-  void onNote(const Session& /*session*/, const std::string& /*text*/) override {}
-  void onReadSlice() override {}
-  void onReadEnd(Session& /*session*/) override {}
-  void onPeerGone(Session& /*session*/, const std::string& /*reason*/) override {}
-  void onEnding(Session& /*session*/) override {}
   void onClosed(Session& session, const std::string& reason) override { reasons[session.id()] = reason; }
 
   std::map<scene::ClientId, std::string> reasons;

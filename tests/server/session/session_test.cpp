@@ -9,6 +9,7 @@
 
 #include "net/loop.h"
 #include "net/tcp_listener.h"
+#include "server/session/quiet_owner.h"
 #include "wire/cookie.h"
 #include "wire/frame_encoder.h"
 
@@ -17,16 +18,11 @@ namespace {
 
 using namespace std::chrono_literals;
 
-class CountingOwner final : public SessionOwner {
+class CountingOwner final : public QuietOwner {
  public:
-  void onConnected(Session& /*session*/) override {}
-  void onCaughtUp(Session& /*session*/) override {}
-  void onSubscribed(Session& /*session*/, wire::LocalSender /*name*/) override {}
   void onMessage(Session& /*session*/, const wire::MessageReceived& /*message*/, base::Nanos) override {
     ++messages;
   }
-  void onWarning(const Session& /*session*/, const std::string& /*text*/) override {}
-  void onNote(const Session& /*session*/, const std::string& /*text*/) override {}
   void onReadSlice() override {
     mostBetween = std::max(mostBetween, messages - last);
     last = messages;
@@ -36,7 +32,6 @@ class CountingOwner final : public SessionOwner {
     mostBetween = std::max(mostBetween, messages - last);
     last = messages;
   }
-  void onPeerGone(Session& /*session*/, const std::string& /*reason*/) override {}
   void onEnding(Session& /*session*/) override { ++endings; }
   void onClosed(Session& /*session*/, const std::string& reason) override { closed = reason; }
 
