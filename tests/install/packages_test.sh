@@ -25,10 +25,12 @@ fi
 work=$HAPTICD_PACKAGES_WORK
 mount -t tmpfs tmpfs "$work"
 root=$work/root
+written=$root  # where the root's own files are, and nobody else's
 mkdir -p "$root" "$work/upper" "$work/work"
 if [ "$kind" = overlay ]; then
   ! dpkg-query -W hapticd >/dev/null 2>&1 || skip "hapticd is installed on this machine"
   mount -t overlay overlay -o "lowerdir=/,upperdir=$work/upper,workdir=$work/work" "$root" 2>/dev/null || skip "no overlay file system"
+  written=$work/upper
   install="dpkg -i"
   dpkg-query -W python3-numpy >/dev/null 2>&1 || without=python3-hapticd  # it would miss its dependency
 else
@@ -52,9 +54,13 @@ in_root() { env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 DEBIAN_FRON
 as_user() { in_root setpriv --reuid=65534 --regid=65534 --clear-groups env HOME=/home/someone "$@"; }
 fail() { echo "FAILED: $1"; exit 1; }
 
-# What was there before, but for caches and logs.
-list() { in_root find / -xdev \( -path /proc -o -path /run -o -path /dev -o -path /packages -o -path /tmp -o -path /var/cache -o -path /var/log -o -path /var/lib/apt \
-  -o -path /var/lib/dpkg -o -path /work -o -path /var/lib/systemd -o -path /home \) -prune -o -path '*hapticd*' -print 2>/dev/null | sort; }
+# What was written in this root, but for caches and logs. Below an overlay the machine goes on: a build beside this test makes files
+# of the same name. A character device stands for a file that was removed.
+list() {
+  local place places=()
+  for place in proc run dev packages tmp var/cache var/log var/lib/apt var/lib/dpkg var/lib/systemd home; do places+=(-path "$written/$place" -o); done
+  find "$written" -xdev \( "${places[@]}" -false \) -prune -o -path "$written/*hapticd*" ! -type c -print | sed "s|^$written||" | sort
+}
 list >"$work/before"
 
 echo "-- install"
