@@ -57,6 +57,10 @@ Options parsed(int count, char** words) {
   Options o;
   for (int i = 1; i < count; ++i) {
     const std::string word = words[i];
+    if (word == "--help" || word == "-h") {
+      std::fputs(kUsage, stdout);
+      std::exit(0);
+    }
     const auto value = [&]() -> std::string {
       if (i + 1 == count) throw std::invalid_argument(word + " needs a value");
       return words[++i];

@@ -5,15 +5,17 @@
 // | finite | force and proxy are finite |
 // | status | no jump and no release: trials contain neither |
 // | fields | touching, depth, contact count and the sum of the contacts agree |
-// | force | |F| <= largest K * |proxy - HIP|, plus damping and friction |
-// | through | the proxy did not get where a ball of 4.9 µm can not follow: never through a face or a gap
-// below 10 µm | | escaped | the proxy is within the walls of the trial | | lost | without contact the proxy
-// is at the HIP | | free | no force while the straight way from the proxy to the HIP is free | | climbed |
-// frictionless, static: the proxy never moves away from the HIP | | stuck | frictionless, static: no place
-// nearer to the HIP by more than 10 µm can be reached in small moves | | direction | the normal force is a
-// non-negative sum of the normals of the faces at the proxy | | law | one surface alone: F = (K depth - B v)
-// normal | | overlap | a ball overlaps no face | | energy | static: the hand gains no energy over any
-// contact, from free motion on |
+// | force | F <= largest K * distance of proxy and HIP, plus damping and friction |
+// | through | the proxy did not get where a ball of 4.9 µm can not follow: no face, no gap below 10 µm |
+// | escaped | the proxy is within the walls of the trial |
+// | lost | without contact the proxy is at the HIP |
+// | free | no force while the straight way from the proxy to the HIP is free |
+// | climbed | frictionless, static: the proxy never moves away from the HIP |
+// | stuck | frictionless, static: small moves reach no place that is nearer to the HIP by 10 µm |
+// | direction | the normal force is a non-negative sum of the normals of the faces at the proxy |
+// | law | one surface alone: F = (K depth - B v) normal |
+// | overlap | a ball overlaps no face |
+// | energy | static: the hand gains no energy over any contact, from free motion on |
 #pragma once
 
 #include <cstdint>
