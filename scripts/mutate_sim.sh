@@ -20,7 +20,7 @@ done
 . scripts/mutations.sh
 prepare_clone "$source_dir"
 
-[ -e "$work/build/build.ninja" ] || cmake -G Ninja -S "$tree" -B "$work/build" -DCMAKE_BUILD_TYPE=Release >/dev/null
+[ -e "$work/build/build.ninja" ] || (cd "$tree" && cmake --preset release -B "$work/build" -DHAPTICD_WEB=OFF >/dev/null)
 build_clone hapticd-sim || { tail -20 "$work/build.log"; exit 2; }
 
 found=0 missed=0
