@@ -192,6 +192,8 @@ std::shared_ptr<MeshGeometry> MeshDraft::build(std::uint64_t topology) {
   mesh->index = SpatialIndex::build(static_cast<std::uint32_t>(triangles.size()), [&](std::uint32_t id) {
     return !repeated.empty() && repeated[id] ? Box{} : boxOfTriangle(triangles[id], vertices);
   });
+  auto fans = std::make_shared<const geometry::Fans>(vertices, triangles, repeated);
+  if (!fans->empty()) mesh->fans = std::move(fans);
   return mesh;
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/time.h"
+#include "geometry/fans.h"
 #include "geometry/triangle_mesh.h"
 #include "scene/spatial_index.h"
 
@@ -34,13 +35,17 @@ struct MeshGeometry {
   /// Upper bound of the way of a vertex during the shapes of the last 100 ms, object units. The index does
   /// not cover it: a late tick that missed a shape adds it to its reach.
   double recentMove = 0;
-  SpatialIndex index;  ///< over triangle ids, in object units
+  SpatialIndex index;                          ///< over triangle ids, in object units
+  std::shared_ptr<const geometry::Fans> fans;  ///< null without any, and once a vertex has moved
 
   bool deformingAfter(Nanos now) const noexcept { return target && now < morphEnd; }
 
   /// Corners of a triangle at `now`, object units. noexcept, allocation-free.
   Corners corners(std::uint32_t triangle, Nanos now) const noexcept {
-    const Triangle& t = (*triangles)[triangle];
+    return corners((*triangles)[triangle], now);
+  }
+  /// The same for a triangle between any three vertices.
+  Corners corners(const Triangle& t, Nanos now) const noexcept {
     return {vertex(t[0], now), vertex(t[1], now), vertex(t[2], now)};
   }
 

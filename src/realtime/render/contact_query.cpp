@@ -3,6 +3,7 @@
 #include "realtime/render/enclosure.h"
 
 #include <algorithm>
+#include <bitset>
 #include <cmath>
 #include <limits>
 #include <tuple>
@@ -21,6 +22,10 @@ constexpr double kSmallestObject_m = 1e-3;  // below this size the HIP's coordin
 constexpr double kWiden = 1 + 1e-6;         // covers the rounding of queries that change frames
 constexpr double kReserveShare = 0.2;       // share of the tool radius that is gathered in reserve
 constexpr int kNoReserve = 50;              // ticks without one, after one that did not fit
+// By how much joined triangles may be off (see geometry/fans.h), and more by a share of the tool radius: far
+// less than the gap tolerance, and than anybody feels.
+constexpr double kFanError_m = 1e-7;
+constexpr double kFanErrorShare = 5e-4;
 constexpr int kReuseLimit = 32;  // reuse the cached facets up to this count instead of querying again
 
 scene::Corners mapped(const Affine& t, const scene::Corners& c, bool mirrored) {
@@ -43,6 +48,10 @@ double exitOf(const Vec3& p, const Vec3& d, const Vec3& centre, double radius) {
 }  // namespace
 
 scene::Corners PlacedObject::corners(std::uint32_t triangle, Nanos now) const noexcept {
+  return mapped(T_device_object, state->mesh->corners(triangle, now), mirrored);
+}
+
+scene::Corners PlacedObject::corners(const geometry::Triangle& triangle, Nanos now) const noexcept {
   return mapped(T_device_object, state->mesh->corners(triangle, now), mirrored);
 }
 
@@ -264,58 +273,131 @@ bool ContactQuery::mayReach(const PlacedObject& placed, std::uint32_t triangle, 
   const Vec3 high = k.a.cwiseMax(k.b).cwiseMax(k.c);
   const Vec3 beyond = (low - inObject).cwiseMax(inObject - high);
   if (!(beyond.array() > reach_m * kWiden * placed.stretchAlong.array()).any()) return true;
-  ++work_;
+  work_ += kBoxVisit;
   return false;
+}
+
+// The levels of the fans of one object within a ball.
+class ContactQuery::JoinedFans {
+ public:
+  JoinedFans(const PlacedObject& placed, Nanos now, const Vec3& centre, double reach_m,
+             double toolRadius_m) noexcept
+      : mesh_(*placed.state->mesh),
+        now_(now),
+        centre_(centre),
+        reach_(reach_m * placed.stretch),
+        error_((kFanError_m + kFanErrorShare * toolRadius_m) /
+               std::max(stretchOf(placed.T_device_object.linear()), 1e-300)) {}
+
+  /// Replaces a triangle of a fan by the one that it is joined to, or does nothing. False when that is here
+  /// already, or else it may be, too.
+  bool join(FacetCache::TriangleId& id) noexcept {
+    const int fan = mesh_.fans->fanOf(id.triangle);
+    if (fan != fan_) start(fan);
+    if (level_ == 0) return true;
+    const geometry::Fans::First first = mesh_.fans->firstOf(level_, id.triangle);
+    id.triangle = first.triangle;
+    id.level = static_cast<std::int16_t>(level_);
+    if (first.place >= here_.size()) return true;
+    const bool fresh = !here_[first.place];
+    here_[first.place] = true;
+    return fresh;
+  }
+
+  /// Whether any were joined.
+  bool any() const noexcept { return any_; }
+
+ private:
+  void start(int fan) noexcept {
+    fan_ = fan;
+    level_ = 0;
+    if (fan < 0) return;
+    const double distance = (mesh_.vertex(mesh_.fans->apexOf(fan), now_) - centre_).norm();
+    level_ = mesh_.fans->levelFor(fan, distance + reach_, error_);
+    if (level_ > 0) here_.reset();
+    any_ = any_ || level_ > 0;
+  }
+
+  const scene::MeshGeometry& mesh_;
+  Nanos now_;
+  Vec3 centre_;
+  double reach_;
+  double error_;
+  int fan_ = -1;
+  int level_ = 0;
+  bool any_ = false;
+  std::bitset<FacetCache::kMaxTriangles> here_;  // by their places
+};
+
+scene::Corners ContactQuery::cornersOf(const FacetCache::TriangleId& id) const noexcept {
+  const PlacedObject& placed = object(id.object);
+  if (id.level == 0) return placed.corners(id.triangle, now_.time);
+  return placed.corners(placed.state->mesh->fans->joined(id.level, id.triangle), now_.time);
 }
 
 // Facets of objects at rest stay the same from tick to tick. Null for a degenerate triangle; valid until the
 // next call.
-const Facet* ContactQuery::facetOf(int i, std::uint32_t triangle) const noexcept {
-  const PlacedObject& placed = object(i);
-  MemoFacet& memo = facetMemo_[(triangle * 0x9E3779B1U) >> (32 - kMemoBits)];
-  if (memo.generation != generation_ || memo.state != placed.state || memo.facet.triangle != triangle) {
+const Facet* ContactQuery::facetOf(const FacetCache::TriangleId& id) const noexcept {
+  const PlacedObject& placed = object(id.object);
+  MemoFacet& memo = facetMemo_[(id.triangle * 0x9E3779B1U) >> (32 - kMemoBits)];
+  if (memo.generation != generation_ || memo.state != placed.state || memo.facet.triangle != id.triangle ||
+      memo.level != id.level) {
     memo.generation = 0;
-    if (!makeFacet(placed.corners(triangle, now_.time), placed.skin, memo.facet)) return nullptr;
-    memo.facet.triangle = triangle;
+    if (!makeFacet(cornersOf(id), placed.skin, memo.facet)) return nullptr;
+    memo.facet.triangle = id.triangle;
     memo.facet.radius = placed.radius;
     memo.state = placed.state;
+    memo.level = id.level;
     if (placed.atRest) memo.generation = generation_;
   }
-  memo.facet.object = i;
+  memo.facet.object = id.object;
   return &memo.facet;
 }
 
 bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
   cache_.restart(centre, radius);
+  joinedFans_ = false;
   bool reusable = true;
-  for (int i = 0; i < objectCount_; ++i) {
+  for (int i = 0; i < objectCount_ && cache_.complete(); ++i) {
     const PlacedObject& placed = object(i);
     gatheredFrom_[static_cast<std::size_t>(i)] = placed.state;
     reusable = reusable && placed.atRest && !placed.deformed;
+    const scene::MeshGeometry& mesh = *placed.state->mesh;
     const Vec3 inObject = placed.T_object_device * centre;
     const double reach = radius + placed.radius + 4 * placed.skin;
-    // Deforming facets count at any distance: they may have come from farther away.
-    const auto visit = [&](std::uint32_t triangle) noexcept -> bool {
-      if (!placed.deformed && !mayReach(placed, triangle, inObject, reach)) {
-        if (workSpent()) cache_.invalidate();
-        return cache_.complete();
-      }
-      work_ += kVisit;
-      if (!keepsFacets_) {
-        const double distance = distanceBound(placed.state->mesh->corners(triangle, now_.time), inObject);
-        cache_.add({triangle, i}, distance / (kWiden * placed.stretch), placed.skin, placed.deformed);
-      } else if (const Facet* const facet = facetOf(i, triangle)) {
-        cache_.add(*facet, placed.deformed);
+    const bool hasFans = mesh.fans && !placed.deformed;
+    JoinedFans fans(placed, now_.time, inObject, reach, toolRadius_);
+    mesh.index.visitNear(inObject, reach * kWiden * placed.stretch, [&](std::uint32_t triangle) noexcept {
+      FacetCache::TriangleId id{triangle, static_cast<std::int16_t>(i), 0};
+      if (hasFans && !fans.join(id)) {
+        ++work_;
+      } else if (placed.deformed || id.level > 0 || mayReach(placed, triangle, inObject, reach)) {
+        addToCache(id, inObject);
       }
       if (workSpent()) cache_.invalidate();
       return cache_.complete();
-    };
-    placed.state->mesh->index.visitNear(inObject, reach * kWiden * placed.stretch, visit);
-    if (!cache_.complete()) break;
+    });
+    joinedFans_ = joinedFans_ || fans.any();
   }
   gatheredCount_ = objectCount_;
   gatheredGeneration_ = reusable ? generation_ : 0;
   return cache_.complete();
+}
+
+// Deforming facets count at any distance: they may have come from farther away.
+void ContactQuery::addToCache(const FacetCache::TriangleId& id, const Vec3& inObject) noexcept {
+  const PlacedObject& placed = object(id.object);
+  work_ += kVisit;
+  if (keepsFacets_) {
+    if (const Facet* const facet = facetOf(id)) cache_.add(*facet, placed.deformed);
+    return;
+  }
+  const scene::MeshGeometry& mesh = *placed.state->mesh;
+  const scene::Corners corners = id.level == 0
+                                     ? mesh.corners(id.triangle, now_.time)
+                                     : mesh.corners(mesh.fans->joined(id.level, id.triangle), now_.time);
+  const double distance = distanceBound(corners, inObject);
+  cache_.add(id, distance / (kWiden * placed.stretch), placed.skin, placed.deformed);
 }
 
 bool ContactQuery::ensureGathered(const Vec3& centre, double radius) noexcept {
@@ -327,6 +409,8 @@ bool ContactQuery::ensureGathered(const Vec3& centre, double radius) noexcept {
     if (gather(centre, reserve)) return true;
     noReserve_ = kNoReserve;
   }
+  // Where fans are joined, a reserve saves the visits to their triangles in the next ticks.
+  if (joinedFans_ && gather(centre, 2 * radius)) return true;
   return gather(centre, radius);
 }
 
@@ -368,9 +452,9 @@ bool ContactQuery::castGathered(const Path& path, int only, ObjectHit& hit) noex
 }
 
 bool ContactQuery::castAtFacets(const Path& path, int only, ObjectHit& hit) noexcept {
-  std::array<const Facet*, FacetCache::kMaxFacets> candidates;
-  const int count = cache_.facetsNearPath(path.p + path.begin * path.d, (path.end - path.begin) * path.d,
-                                          candidates.data());
+  FacetCache::Candidates candidates;
+  const int count =
+      cache_.facetsNearPath(path.p + path.begin * path.d, (path.end - path.begin) * path.d, candidates);
   bool found = false;
   if (only < 0 && planes_ != nullptr) {
     for (const PlacedPlane& plane : *planes_) considerFacet(plane.facet, path, hit, found);
@@ -381,21 +465,23 @@ bool ContactQuery::castAtFacets(const Path& path, int only, ObjectHit& hit) noex
     if (only < 0 || f.object == only) considerFacet(f, path, hit, found);
   };
   const auto last = candidates.begin() + count;
-  if (std::find(candidates.begin(), last, first) != last) consider(*first);
-  for (auto f = candidates.begin(); f != last; ++f) {
-    if (*f == first) continue;
+  if (std::any_of(candidates.begin(), last, [&](const auto& c) { return c.facet == first; }))
+    consider(*first);
+  for (auto c = candidates.begin(); c != last; ++c) {
+    if (c->facet == first) continue;
     const double before = found ? hit.stop : path.end;
-    consider(**f);
-    if (found && hit.stop < before) lastBlocker_ = static_cast<int>(*f - cache_.begin());
+    if (path.begin + c->earliest * (path.end - path.begin) > before) continue;
+    consider(*c->facet);
+    if (found && hit.stop < before) lastBlocker_ = static_cast<int>(c->facet - cache_.begin());
   }
   return found;
 }
 
 double ContactQuery::freeOfFaces(const Vec3& p, const Vec3& g, bool closesGaps) noexcept {
-  std::array<const Facet*, FacetCache::kMaxFacets> candidates;
+  FacetCache::Candidates candidates;
   const Vec3 d = g - p;
   if (!ensureGathered(p, d.norm())) return 0;
-  const int count = cache_.facetsNearPath(p, d, candidates.data());
+  const int count = cache_.facetsNearPath(p, d, candidates);
   double free = 1;
   const auto meet = [&](Facet facet) {
     double stop = 1;
@@ -404,7 +490,7 @@ double ContactQuery::freeOfFaces(const Vec3& p, const Vec3& g, bool closesGaps) 
     CastHit hit;
     if (castBall(facet, faces(), p, d, 1, free, hit)) free = std::min(free, hit.stop);
   };
-  for (int i = 0; i < count; ++i) meet(*candidates[static_cast<std::size_t>(i)]);
+  for (int i = 0; i < count; ++i) meet(*candidates[static_cast<std::size_t>(i)].facet);
   if (planes_ == nullptr) return free;
   for (const PlacedPlane& plane : *planes_) meet(plane.facet);
   return free;
@@ -436,7 +522,7 @@ void ContactQuery::considerGathered(int i, const Path& path, int only, ObjectHit
   const double latest = found ? best.stop : path.end;
   const Vec3 ahead = (latest - path.begin) * path.d;
   if (cache_.lowerBound(i, ahead) > touching) return;
-  const Facet* const f = facetOf(id.object, id.triangle);
+  const Facet* const f = facetOf(id);
   if (f == nullptr) return cache_.exclude(i);
   if (cache_.refine(i, nearestPointOf(*f, path.p + path.begin * path.d), ahead) > touching) return;
   considerFacet(*f, path, best, found);
@@ -456,15 +542,15 @@ bool ContactQuery::castAtEach(const Path& path, int only, ObjectHit& hit) noexce
     const PlacedObject& placed = object(i);
     const double reach_m = reach + placed.radius + 4 * placed.skin;
     const Vec3 inObject = placed.T_object_device * middle;
-    placed.state->mesh->index.visitNear(inObject, reach_m * kWiden * placed.stretch,
-                                        [&](std::uint32_t triangle) noexcept -> bool {
-                                          if (workSpent()) return false;
-                                          if (!mayReach(placed, triangle, inObject, reach_m)) return true;
-                                          work_ += kVisit;
-                                          const Facet* const f = facetOf(i, triangle);
-                                          if (f != nullptr) considerFacet(*f, path, hit, found);
-                                          return true;
-                                        });
+    placed.state->mesh->index.visitNear(
+        inObject, reach_m * kWiden * placed.stretch, [&](std::uint32_t triangle) noexcept -> bool {
+          if (workSpent()) return false;
+          if (!mayReach(placed, triangle, inObject, reach_m)) return true;
+          work_ += kVisit;
+          const Facet* const f = facetOf({triangle, static_cast<std::int16_t>(i), 0});
+          if (f != nullptr) considerFacet(*f, path, hit, found);
+          return true;
+        });
   }
   if (!workSpent()) return found;
   hit = ObjectHit{};

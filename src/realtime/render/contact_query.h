@@ -53,6 +53,8 @@ struct PlacedObject {
 
   /// Corners in device metres.
   scene::Corners corners(std::uint32_t triangle, Nanos now) const noexcept;
+  /// The same for a triangle between any three vertices.
+  scene::Corners corners(const geometry::Triangle& triangle, Nanos now) const noexcept;
   scene::Corners cornersBefore(std::uint32_t triangle, Nanos then) const noexcept;
   /// Whether its faces may have passed over the proxy by deforming.
   bool sweptByDeforming() const noexcept { return deformed && before != nullptr; }
@@ -157,12 +159,16 @@ class ContactQuery {
  private:
   static constexpr int kMaxObjects = 64;
   static constexpr int kMemoBits = 8;
-  static constexpr int kVisit = 4;
+  static constexpr int kVisit = 16;
+  static constexpr int kBoxVisit = 4;
+
+  class JoinedFans;
 
   // The result of makeFacet(); generation 0: not valid in the next tick.
   struct MemoFacet {
     std::uint64_t generation = 0;
     const scene::ObjectState* state = nullptr;
+    int level = 0;
     Facet facet;
   };
 
@@ -185,7 +191,9 @@ class ContactQuery {
   void compareWithBefore(PlacedObject& placed) const noexcept;
   bool mayReach(const PlacedObject& object, std::uint32_t triangle, const Vec3& inObject,
                 double reach_m) noexcept;
-  const Facet* facetOf(int object, std::uint32_t triangle) const noexcept;
+  scene::Corners cornersOf(const FacetCache::TriangleId& id) const noexcept;
+  const Facet* facetOf(const FacetCache::TriangleId& id) const noexcept;
+  void addToCache(const FacetCache::TriangleId& id, const Vec3& inObject) noexcept;
   void considerFacet(const Facet& f, const Path& path, ObjectHit& best, bool& found) const noexcept;
   bool castGathered(const Path& path, int only, ObjectHit& hit) noexcept;
   bool castAtFacets(const Path& path, int only, ObjectHit& hit) noexcept;
@@ -214,8 +222,9 @@ class ContactQuery {
   Vec3 freeFrom_ = Vec3::Zero();
   double minSkin_ = 0;
   FacetCache cache_;
-  int noReserve_ = 0;    // ticks in which none is gathered: there were too many triangles for it
-  int lastBlocker_ = 0;  // the gathered facet that blocked the last cast of a ball
+  bool joinedFans_ = false;  // in the last gather()
+  int noReserve_ = 0;        // ticks in which none is gathered: there were too many triangles for it
+  int lastBlocker_ = 0;      // the gathered facet that blocked the last cast of a ball
   // Generation and objects of the last gather(); 0: not reusable in another tick.
   std::uint64_t gatheredGeneration_ = 0;
   int gatheredCount_ = 0;
@@ -223,7 +232,8 @@ class ContactQuery {
   std::uint64_t generation_ = 1;  // of all that is kept from tick to tick
   mutable std::array<MemoFacet, 1U << kMemoBits> facetMemo_;
   bool overflowed_ = false;
-  int work_ = 0;                // of this tick: kVisit for a triangle, 1 for one that its box rules out
+  int work_ = 0;  // of this tick: kVisit for a triangle, kBoxVisit for one that its box rules out,
+                  // 1 for one that is joined to another
   std::uint64_t passable_ = 0;  // objects that the present cast does not meet
 };
 
@@ -235,7 +245,7 @@ void ContactQuery::forEachGathered(const Vec3& p, double distance, Visit&& visit
   }
   cache_.moveTo(p);
   for (int i = 0; (i = cache_.nextWithin(distance, i)) < cache_.size(); ++i) {
-    const Facet* const f = facetOf(cache_.triangle(i).object, cache_.triangle(i).triangle);
+    const Facet* const f = facetOf(cache_.triangle(i));
     if (f != nullptr) visit(*f);
   }
 }

@@ -9,7 +9,7 @@ namespace hapticd::realtime {
 /// Visits to triangles that the tests of one tick may make. An object whose test exceeds it counts as
 /// enclosing, which exerts no force.
 struct EnclosureBudget {
-  int visits = 4096;
+  int visits = 16384;
 };
 
 /// True when the tool at p (device metres) is inside a closed surface of the object, or its ball intersects

@@ -22,7 +22,8 @@ class FacetCache {
   /// A triangle of a near object, both by index.
   struct TriangleId {
     std::uint32_t triangle = 0;
-    int object = 0;
+    std::int16_t object = 0;
+    std::int16_t level = 0;  ///< of its fan; 0: the triangle itself
   };
 
   explicit FacetCache(double toolRadius_m) noexcept : toolRadius_(toolRadius_m) {}
@@ -62,9 +63,14 @@ class FacetCache {
   double refine(int i, const Vec3& foot, const Vec3& d) noexcept;
   /// Marks entry i as unreachable.
   void exclude(int i) noexcept;
-  /// Point tool: all facets that the path from p to p + d may reach. `found` has room for kMaxFacets. Returns
-  /// how many.
-  int facetsNearPath(const Vec3& p, const Vec3& d, const Facet** found) const noexcept;
+  /// A facet near a path from p to p + d: it blocks p + t d from t = `earliest` on, if it does.
+  struct Candidate {
+    const Facet* facet;
+    double earliest;
+  };
+  using Candidates = std::array<Candidate, kMaxFacets>;
+  /// Point tool: all facets that the path from p to p + d may reach. Returns how many.
+  int facetsNearPath(const Vec3& p, const Vec3& d, Candidates& found) const noexcept;
 
  private:
   // normal . x = offset: the plane of the face (point tool), or a plane with the face on its back (ball

@@ -124,7 +124,8 @@ class Proxy {
   void collectTouchedFaces(DescentDirections& descent) noexcept;
   void findDescentDirections(const Vec3& pull, const ActiveSet& active,
                              DescentDirections& descent) const noexcept;
-  double freeShare(const DescentDirections& descent, const Vec3& from, const Vec3& to) const noexcept;
+  double freeShare(DescentDirections& descent, const Vec3& from, const Vec3& to,
+                   double enough) const noexcept;
   void findConstraints(const Vec3& hip, ActiveSet& active) noexcept;
   bool frictionless() const noexcept;
   static double frictionConeOf(const ContactSet& contactSet) noexcept;

@@ -17,6 +17,19 @@ constexpr double kSmallBall_m =
 constexpr double kMinDescent = 1e-3;  // share of the pull; flatter directions lead nowhere
 constexpr double kClimb = 1e-3;       // share of the tool radius
 
+// The smallest t, at least 0, for which t d comes within `distance` of x, or a little less; more than 1 when
+// none in [0, 1] does.
+double shareWithin(double distance, const Vec3& x, const Vec3& d) {
+  const double a = d.squaredNorm();
+  const double b = d.dot(x);
+  const double c = x.squaredNorm() - distance * distance;
+  constexpr double kRounding = 1e-9;
+  if (c <= kRounding * x.squaredNorm()) return 0;
+  const double discriminant = b * b - a * c;
+  if (b <= 0 || discriminant < -kRounding * b * b) return 2;
+  return (1 - 1e-3) * (b - std::sqrt(std::max(0.0, discriminant))) / a;
+}
+
 }  // namespace
 
 // The faces that the proxy touches, and the directions in which it could come nearer to its target.
@@ -26,6 +39,7 @@ struct Proxy::DescentDirections {
 
   std::array<Facet, kMaxFaces> faces;  // copies: later casts may gather others
   int faceCount = 0;
+  int lastBlocker = 0;
   std::array<Vec3, kMaxDirections> directions;
   int count = 0;
   Vec3 outward = Vec3::Zero();  // sum of the normals
@@ -100,13 +114,22 @@ void Proxy::findDescentDirections(const Vec3& pull, const ActiveSet& active,
             });
 }
 
-// The share, 0 … 1, of the path that the touched faces leave free.
-double Proxy::freeShare(const DescentDirections& descent, const Vec3& from, const Vec3& to) const noexcept {
+// The share, 0 … 1, of the path that the touched faces leave free; 0 when it is less than `enough`.
+double Proxy::freeShare(DescentDirections& descent, const Vec3& from, const Vec3& to,
+                        double enough) const noexcept {
   double free = 1;
   ObjectHit hit;
+  const auto meet = [&](int i) {
+    if (!query_.castAtFacet(descent.faces[static_cast<std::size_t>(i)], from, to, hit)) return true;
+    free = std::min(free, hit.stop);
+    if (free >= enough) return true;
+    descent.lastBlocker = i;
+    return false;
+  };
+  // The face that ended the last path often ends this one.
+  if (descent.lastBlocker < descent.faceCount && !meet(descent.lastBlocker)) return 0;
   for (int i = 0; i < descent.faceCount; ++i) {
-    if (query_.castAtFacet(descent.faces[static_cast<std::size_t>(i)], from, to, hit))
-      free = std::min(free, hit.stop);
+    if (i != descent.lastBlocker && !meet(i)) return 0;
   }
   return free;
 }
@@ -129,10 +152,12 @@ bool Proxy::escapeCorner(const Vec3& target, const ActiveSet& active) noexcept {
   const double first = query_.radius() <= kSmallBall_m ? kLiftShare * query_.radius() : kLifts[0] * skin;
   for (const double lift : {first, kLifts[1] * skin}) {
     const Vec3 start = position_ + lift * descent.outward.normalized();
-    if (freeShare(descent, position_, start) < 1) continue;
+    if (freeShare(descent, position_, start, 1) < 1) continue;
     for (int i = 0; i < descent.count && casts_ < kMaxCasts; ++i) {
       const Vec3& direction = descent.directions[static_cast<std::size_t>(i)];
-      const double free = freeShare(descent, start, start + direction);
+      const double needed = shareWithin(enough, target - start, direction);
+      if (needed > 1) continue;
+      const double free = freeShare(descent, start, start + direction, needed);
       if (!((target - start - free * direction).norm() < enough)) continue;
       ObjectHit hit;
       ++casts_;

@@ -52,6 +52,9 @@ inline std::shared_ptr<scene::MeshGeometry> geometryOf(const TriangleMesh& mesh,
     }
     return box;
   });
+  if (g->target) return g;
+  auto fans = std::make_shared<const geometry::Fans>(*g->vertices, triangles, std::vector<bool>());
+  if (!fans->empty()) g->fans = std::move(fans);
   return g;
 }
 

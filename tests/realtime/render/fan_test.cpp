@@ -1,0 +1,99 @@
+// Vertices with thousands of triangles: the middle of a disc, the tip of a cone, the bottom of a pit. They
+// are felt like any other place, and no tick spends its work on them.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "scene_fixture.h"
+
+namespace hapticd::realtime::fixture {
+namespace {
+
+constexpr double kRim_m = 0.02;
+
+struct Shape {
+  const char* name;
+  double height_m;  // of the middle above the rim
+};
+
+// Triangles from a middle to a circle, front side up. In millimetres.
+TriangleMesh fanOf(const Shape& shape, int count) {
+  TriangleMesh mesh;
+  mesh.vertices.push_back(Vec3f(0, 0, static_cast<float>(1000 * shape.height_m)));
+  for (int i = 0; i < count; ++i) {
+    const double a = 2 * M_PI * i / count;
+    mesh.vertices.push_back(Vec3(1000 * kRim_m * std::cos(a), 1000 * kRim_m * std::sin(a), 0).cast<float>());
+  }
+  for (int i = 0; i < count; ++i) {
+    mesh.triangles.push_back(
+        {0, static_cast<std::uint32_t>(1 + i), static_cast<std::uint32_t>(1 + (i + 1) % count)});
+  }
+  return mesh;
+}
+
+class FanTest : public testing::TestWithParam<std::tuple<Shape, int, double>> {
+ protected:
+  FanTest() {
+    const auto& [shape, count, radius] = GetParam();
+    shape_ = shape;
+    radius_ = radius;
+    scene_.setWorldUnitsPerMetre(1000);
+    scene_.add(fanOf(shape, count), surface(1000));
+  }
+
+  // The depth of p below the round surface that the triangles stand for: within a micrometre of theirs.
+  double depth(const Vec3& p) const {
+    const double rho = std::hypot(p.x(), p.y());
+    const double slope = shape_.height_m / kRim_m;
+    return (shape_.height_m - slope * rho - p.z()) / std::sqrt(1 + slope * slope);
+  }
+
+  Shape shape_{};
+  double radius_ = 0;
+  SceneFixture scene_;
+};
+INSTANTIATE_TEST_SUITE_P(, FanTest,
+                         testing::Combine(testing::Values(Shape{"disc", 0}, Shape{"cone", 0.008},
+                                                          Shape{"pit", -0.008}),
+                                          testing::Values(300, 1000, 5000), testing::Values(0.0, 0.002)),
+                         [](const auto& p) {
+                           return std::string(std::get<0>(p.param).name) +
+                                  std::to_string(std::get<1>(p.param)) +
+                                  (std::get<2>(p.param) > 0 ? "_ball" : "_point");
+                         });
+
+TEST_P(FanTest, is_felt_as_the_round_surface_and_spends_no_tick) {
+  constexpr double kDeep_m = 0.0015;
+#ifdef HAPTICD_SANITIZED
+  constexpr int kTicks = 120;
+#else
+  constexpr int kTicks = 1500;
+#endif
+  Hand hand(scene_.snapshot(), {.toolRadius_m = radius_});
+  std::mt19937 random(5);
+  std::normal_distribution<double> tremor(0, 2e-6);
+  const double above = shape_.height_m + 1.2 * radius_ + 0.003;
+  hand.at({0, 0, above});
+  hand.to({1e-6, -2e-6, shape_.height_m - kDeep_m}, 0.05);
+  int spent = 0;
+  int lost = 0;
+  for (int i = 0; i < kTicks; ++i) {
+    // A tremor at the middle, and slow strokes through it.
+    const double reach = i < kTicks / 2 ? 20e-6 : 1e-3;
+    const double a = 2 * M_PI * i / 400;
+    const Rendering& r = hand.at({reach * std::sin(a) + tremor(random),
+                                  0.3 * reach * std::sin(3 * a) + tremor(random), shape_.height_m - kDeep_m});
+    spent += (r.status & kRenderWorkLimit) != 0 ? 1 : 0;
+    lost += r.touching ? 0 : 1;
+    // The ball of a point tool has 5 um, and its proxy is on the surface.
+    EXPECT_LE(depth(r.proxy_m) + radius_, 3e-6) << "tick " << i;
+    if (shape_.height_m == 0) {
+      EXPECT_NEAR(r.force_N.z(), 1000 * (kDeep_m + radius_), 0.003) << "tick " << i;
+    }
+  }
+  EXPECT_EQ(spent, 0);
+  EXPECT_EQ(lost, 0);
+}
+
+}  // namespace
+}  // namespace hapticd::realtime::fixture
