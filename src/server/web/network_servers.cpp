@@ -1,6 +1,7 @@
 #include "server/web/network_servers.h"
 
 #include <algorithm>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <string_view>
 #include <utility>
@@ -43,8 +44,9 @@ Json json(const NetworkServer& server) {
 
 std::string serversJson(NetworkSearch search) {
   // This server first, so that no crowd displaces it.
-  std::stable_partition(search.servers.begin(), search.servers.end(),
-                        [](const NetworkServer& server) { return server.thisServer; });
+  const auto ours = std::find_if(search.servers.begin(), search.servers.end(),
+                                 [](const NetworkServer& server) { return server.thisServer; });
+  if (ours != search.servers.end()) std::rotate(search.servers.begin(), ours, std::next(ours));
   Json servers = Json::array();
   for (const NetworkServer& server : search.servers) {
     if (servers.size() < kMostServers) servers.push_back(json(server));
