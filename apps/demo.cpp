@@ -15,6 +15,7 @@
 #include "commands.h"
 #include "fit_mesh.h"
 #include "hapticd/client.h"
+#include "network_finder.h"
 #include "server/server.h"
 #include "stop_on_signal.h"
 
@@ -91,6 +92,7 @@ int run(const DemoOptions& options) {
   server::ServerConfig config;
   const std::unique_ptr<server::Server> server = startServer(options, config);
   const std::unique_ptr<zeroconf::Announcer> announcer = announceOnNetwork(*server, config);
+  listNetworkOnPage(*server);
   stopper.watch(*server);
   const auto web = server->webAddress();
   const std::string page = web ? "http://" + web->text() + "/" : "(no page: --http off)";

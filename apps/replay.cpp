@@ -7,6 +7,7 @@
 #include "announce.h"
 #include "commands.h"
 #include "log_writer.h"
+#include "network_finder.h"
 #include "server/player.h"
 #include "server/server.h"
 #include "stop_on_signal.h"
@@ -37,6 +38,7 @@ int run(const ReplayOptions& options) {
   server::Server server(config, std::move(player));
   logAddresses(server, config, "replay");
   const std::unique_ptr<zeroconf::Announcer> announcer = announceOnNetwork(server, config);
+  listNetworkOnPage(server);
   stopper.watch(server);
   server.run();
   stopper.finish();

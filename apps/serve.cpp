@@ -15,6 +15,7 @@
 #include "commands.h"
 #include "device/drivers/drivers.h"
 #include "log_writer.h"
+#include "network_finder.h"
 #include "server/server.h"
 #include "server/station/devices.h"
 #include "service_manager.h"
@@ -175,6 +176,7 @@ int run(const ServeOptions& options) {
   const std::unique_ptr<server::Server> server = openServer(config);
   logAddresses(*server, config);
   const std::unique_ptr<zeroconf::Announcer> announcer = announceOnNetwork(*server, config);
+  listNetworkOnPage(*server);
   stopper.watch(*server);
   std::optional<system_bus::SleepGuard> sleepGuard;
   if (hasRealDevice(config)) {

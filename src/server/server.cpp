@@ -157,6 +157,10 @@ void Server::openHaply() {
                                        connectionOptions(config_.limits), *this, stations_);
 }
 
+void Server::searchNetworkBy(std::unique_ptr<ServerFinder> finder) {
+  if (web_) web_->searchNetworkBy(std::move(finder));
+}
+
 std::optional<net::Endpoint> Server::haplyAddress() const {
   return haply_ ? std::optional(haply_->local()) : std::nullopt;
 }

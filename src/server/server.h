@@ -55,6 +55,8 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   bool armed() const noexcept;
   /// Called in the net thread once per second from run() on: this process does not hang. Before run().
   void onAlive(std::function<void()> function) { alive_ = std::move(function); }
+  /// Lets the page list the servers that `finder` finds. Before run().
+  void searchNetworkBy(std::unique_ptr<ServerFinder> finder);
   /// From any thread: run() has ended the forces and closed all devices.
   bool devicesClosed() const noexcept { return devicesClosed_.load(std::memory_order_acquire); }
 

@@ -77,7 +77,8 @@ std::string AnnouncedServer::client(const std::string& device) const {
 }
 
 std::string AnnouncedServer::page() const {
-  return pagePort == 0 ? "" : "http://" + address + ':' + std::to_string(pagePort) + '/';
+  if (pagePort == 0) return "";
+  return (tls ? "https://" : "http://") + address + ':' + std::to_string(pagePort) + '/';
 }
 
 }  // namespace hapticd::zeroconf

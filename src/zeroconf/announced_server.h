@@ -31,7 +31,7 @@ struct AnnouncedServer {
 
   /// What a client opens: "Phantom@192.168.1.7:3883".
   std::string client(const std::string& device) const;
-  /// "http://192.168.1.7:8080/", or empty.
+  /// "http://192.168.1.7:8080/", by https where the port requires TLS, or empty.
   std::string page() const;
 
   friend bool operator==(const AnnouncedServer&, const AnnouncedServer&) = default;

@@ -1,9 +1,5 @@
 #include "zeroconf/announcer.h"
 
-#include <arpa/inet.h>
-#include <ifaddrs.h>
-#include <net/if.h>
-#include <netinet/in.h>
 #include <poll.h>
 #include <spdlog/spdlog.h>
 #include <sys/eventfd.h>
@@ -15,8 +11,8 @@
 #include <utility>
 
 #include "base/world.h"
-#include "net/endpoint.h"
 #include "zeroconf/avahi.h"
+#include "zeroconf/interfaces.h"
 
 namespace hapticd::zeroconf {
 namespace {
@@ -141,20 +137,6 @@ class Entry {
   bool reported_ = false;    // that it is not announced
   base::Nanos retryAt_ = 0;  // 0: not needed
 };
-
-// The index of the interface with this address; all interfaces when none has it alone.
-int interfaceWith(std::uint32_t address) {
-  int index = kAnyInterface;
-  ifaddrs* all = nullptr;
-  if (address == net::kAnyAddress || ::getifaddrs(&all) != 0) return index;
-  for (const ifaddrs* a = all; a != nullptr; a = a->ifa_next) {
-    if (a->ifa_addr == nullptr || a->ifa_addr->sa_family != AF_INET) continue;
-    if (ntohl(reinterpret_cast<const sockaddr_in*>(a->ifa_addr)->sin_addr.s_addr) == address)
-      index = static_cast<int>(::if_nametoindex(a->ifa_name));
-  }
-  ::freeifaddrs(all);
-  return index;
-}
 
 }  // namespace
 

@@ -1,5 +1,8 @@
 #include "zeroconf/find_servers.h"
 
+#include <arpa/inet.h>
+#include <poll.h>
+
 #include <algorithm>
 #include <cstddef>
 #include <string>
@@ -8,6 +11,7 @@
 #include <utility>
 
 #include "zeroconf/avahi.h"
+#include "zeroconf/interfaces.h"
 
 namespace hapticd::zeroconf {
 namespace {
@@ -15,7 +19,7 @@ namespace {
 // One search. Its handlers are called by sd-bus: what they learn stays here.
 class Search {
  public:
-  Search() {
+  explicit Search(int stopFd) : stopFd_(stopFd) {
     avahi_.onSignal(kAvahiBrowser, "ItemNew", onItem, this);
     avahi_.onSignal(kAvahiBrowser, "AllForNow", onAll, this);
     avahi_.onSignal(kAvahiBrowser, "Failure", onAll, this);
@@ -25,7 +29,11 @@ class Search {
   bool finished() const { return heardAll_ && answers_ == requests_; }
   void step(int timeout_ms) {
     bus_.process();
-    if (!finished()) bus_.wait(system_bus::kNoFd, timeout_ms);
+    if (!finished()) bus_.wait(stopFd_, timeout_ms);
+  }
+  bool stopped() const {
+    pollfd stop{stopFd_, POLLIN, 0};
+    return ::poll(&stop, 1, 0) > 0;
   }
   std::vector<AnnouncedServer> found() {
     // A server is heard on each interface; those of this machine also by an address that only it can reach.
@@ -87,7 +95,8 @@ class Search {
     return text;
   }
 
-  system_bus::Bus bus_{system_bus::kNoFd};
+  int stopFd_;
+  system_bus::Bus bus_{stopFd_};
   Avahi avahi_{bus_};
   bool heardAll_ = false;
   int requests_ = 0;
@@ -97,12 +106,21 @@ class Search {
 
 }  // namespace
 
-std::vector<AnnouncedServer> findServers(base::Clock& clock, base::Nanos patience) {
-  Search search;
+std::vector<AnnouncedServer> findServers(base::Clock& clock, base::Nanos patience, int stopFd) {
+  Search search(stopFd);
   const base::Nanos end = clock.now() + patience;
-  while (!search.finished() && clock.now() < end)
+  while (!search.finished() && !search.stopped() && clock.now() < end)
     search.step(static_cast<int>(1e3 * base::toSeconds(end - clock.now())) + 1);
   return search.found();
+}
+
+bool listensAt(const net::Endpoint& listening, const AnnouncedServer& found) {
+  in_addr address{};
+  if (found.port != listening.port || ::inet_pton(AF_INET, found.address.c_str(), &address) != 1)
+    return false;
+  const std::uint32_t foundAt = ntohl(address.s_addr);
+  return listening.address == net::kAnyAddress ? interfaceWith(foundAt) != kAnyInterface
+                                               : foundAt == listening.address;
 }
 
 }  // namespace hapticd::zeroconf

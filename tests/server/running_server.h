@@ -3,7 +3,9 @@
 
 #include <spdlog/spdlog.h>
 
+#include <memory>
 #include <thread>
+#include <utility>
 
 #include "server/server.h"
 
@@ -11,7 +13,10 @@ namespace hapticd::test {
 
 class RunningServer {
  public:
-  explicit RunningServer(const server::ServerConfig& config = anyPort()) : server_(config) {
+  explicit RunningServer(const server::ServerConfig& config = anyPort(),
+                         std::unique_ptr<server::ServerFinder> finder = nullptr)
+      : server_(config) {
+    if (finder) server_.searchNetworkBy(std::move(finder));
     // Creates the log while there is one thread: the thread sanitizer does not see the locks in its library.
     spdlog::default_logger();
     thread_ = std::thread([this] { server_.run(); });

@@ -29,7 +29,9 @@ export class Server {
     const server = new Server();
     server.hapticd = hapticd;
     const what = replay ? ["replay", replay] : ["serve", "--allow-no-rt"];
-    server.process = spawn(hapticd, [...what, "--listen", "127.0.0.1:0", "--http", http, ...more]);
+    // No bus, so that no test finds the servers of a real network.
+    const env = { ...process.env, DBUS_SYSTEM_BUS_ADDRESS: "unix:path=/nowhere/bus" };
+    server.process = spawn(hapticd, [...what, "--listen", "127.0.0.1:0", "--http", http, ...more], { env });
     for (const stream of [server.process.stdout, server.process.stderr])
       stream.on("data", (text) => (server.log += text));
     Server.running.add(server);

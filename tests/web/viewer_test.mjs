@@ -462,6 +462,35 @@ test("markers, trips and a recording that the page begins and that is replayed",
   await rm(folder, { recursive: true });
 });
 
+/** Announced by machines of the network; the second wants to be more than text. */
+const SERVERS = [
+  { name: "hapticd on lab7", address: "10.0.0.7", port: 3883, devices: ["Phantom@10.0.0.7:3883"], page: "http://10.0.0.7:8080/", tls: false, version: "1.2.3", this_server: true },
+  { name: "<img src=x onerror=alert(1)>\u202e", address: "10.0.0.8", port: 3883, devices: ["<b>Arm</b>@10.0.0.8:3883"], page: "javascript:alert(1)", tls: false, version: "<i>", this_server: false },
+  { name: "attic " + "x".repeat(57), address: "10.0.0.9", port: 3884, devices: [], page: "http://10.0.0.9:8080/", tls: true, version: "9", this_server: false },
+];
+
+test("the servers of the network are listed, with links to their pages", async () => {
+  const found = await (await fetch(`${server.url}/api/servers`)).json();
+  assert.deepEqual(found.servers, []);
+  assert.match(found.reason, /D-Bus/);
+  assert.equal(await viewer.page.isVisible("#servers"), false, "nothing to show");
+  await viewer.page.route("**/api/servers", (route) => route.fulfill({ json: { servers: SERVERS, reason: "" } }));
+  await viewer.page.reload();
+  await viewer.connected();
+  await viewer.until("three servers", async () => (await viewer.page.locator("#servers li").count()) === 3);
+  const row = (i) => viewer.page.locator("#servers li").nth(i);
+  assert.match(await row(0).innerText(), /^hapticd on lab7\s+this server\s+Phantom@10\.0\.0\.7:3883; version 1\.2\.3$/);
+  assert.equal(await row(0).getAttribute("aria-current"), "true");
+  assert.equal(await row(0).locator("a").count(), 0, "no link to itself");
+  assert.equal(await row(1).locator("strong").innerText(), SERVERS[1].name);
+  assert.match(await row(1).innerText(), /<b>Arm<\/b>@10\.0\.0\.8:3883; version <i>/);
+  assert.equal(await row(1).locator("a, b, i, img").count(), 0, "texts of the network are text, and links lead to pages");
+  const link = row(2).getByRole("link", { name: SERVERS[2].name });
+  assert.equal(await link.getAttribute("href"), "http://10.0.0.9:8080/");
+  assert.match(await link.getAttribute("rel"), /noopener/);
+  assert.match(await row(2).innerText(), /10\.0\.0\.9:3884; version 9; TLS/);
+});
+
 /** What axe finds against WCAG 2 A and AA. */
 async function axeFindings(of) {
   await of.page.evaluate(packageNamed("axe-core").source);

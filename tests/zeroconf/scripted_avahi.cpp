@@ -63,6 +63,16 @@ void ScriptedAvahi::setOthers(std::vector<std::pair<AvahiEntry, std::string>> ot
   others_ = std::move(others);
 }
 
+bool ScriptedAvahi::waitBrowsed() {
+  std::unique_lock lock(mutex_);
+  return changed_.wait_for(lock, std::chrono::seconds(30), [&] { return browsed_; });
+}
+
+void ScriptedAvahi::neverFinish() {
+  const std::lock_guard lock(mutex_);
+  neverFinishes_ = true;
+}
+
 int ScriptedAvahi::answer(sd_bus_message* call) {
   const char* const name = sd_bus_message_get_member(call);
   const std::string_view method = name != nullptr ? name : "";
@@ -105,6 +115,8 @@ int ScriptedAvahi::browse(sd_bus_message* call) {
   const char* type = "";
   sd_bus_message_read(call, "iis", &interface, &protocol, &type);
   const std::string wanted = type;
+  browsed_ = true;
+  changed_.notify_all();
   // As Avahi does, some are told before the answer that names the browser.
   const char* const from = "org.freedesktop.Avahi.ServiceBrowser";
   for (const auto& [entry, address] : others_) {
@@ -113,7 +125,7 @@ int ScriptedAvahi::browse(sd_bus_message* call) {
                        entry.name.c_str(), entry.type.c_str(), "local", 0U);
   }
   const int result = sd_bus_reply_method_return(call, "o", kBrowser);
-  sd_bus_emit_signal(bus_, kBrowser, from, "AllForNow", "");
+  if (!neverFinishes_) sd_bus_emit_signal(bus_, kBrowser, from, "AllForNow", "");
   return result;
 }
 

@@ -35,6 +35,10 @@ class ScriptedAvahi : public ScriptedService {
   /// What browsers are told, from then on: each entry once, with an address; those of protocol -1 cannot be
   /// resolved.
   void setOthers(std::vector<std::pair<AvahiEntry, std::string>> others);
+  /// Waits until somebody has browsed; false as waitCommitted().
+  bool waitBrowsed();
+  /// Browsers never learn that they have been told all.
+  void neverFinish();
 
  private:
   int answer(sd_bus_message* call) override;
@@ -47,6 +51,8 @@ class ScriptedAvahi : public ScriptedService {
   AvahiEntry added_{}, committed_{};
   std::size_t commits_ = 0;
   std::vector<std::pair<AvahiEntry, std::string>> others_;
+  bool neverFinishes_ = false;
+  bool browsed_ = false;
 };
 
 }  // namespace hapticd::test

@@ -1,16 +1,21 @@
 #include <gtest/gtest.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <cstdlib>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "base/clock.h"
 #include "net/endpoint.h"
 #include "zeroconf/announcer.h"
+#include "zeroconf/background_search.h"
 #include "zeroconf/find_servers.h"
 #include "zeroconf/scripted_avahi.h"
 
@@ -42,7 +47,27 @@ TEST(AnnouncedServer, IsReadFromItsText) {
   EXPECT_EQ(read, lab());
   read.address = "10.0.0.7";
   EXPECT_EQ(read.client("Left"), "Left@10.0.0.7:3884");
+  EXPECT_EQ(read.page(), "https://10.0.0.7:8080/") << "both ports require TLS";
+  read.tls = false;
   EXPECT_EQ(read.page(), "http://10.0.0.7:8080/");
+}
+
+TEST(AnnouncedServer, IsRecognizedByTheServerThatAnnouncedIt) {
+  const net::Endpoint everywhere{net::kAnyAddress, 3884};
+  const net::Endpoint here{net::kLoopbackAddress, 3884};
+  AnnouncedServer found = lab();
+  found.address = "127.0.0.1";
+  EXPECT_TRUE(listensAt(everywhere, found));
+  EXPECT_TRUE(listensAt(here, found));
+  found.address = "203.0.113.7";  // of no machine (RFC 5737)
+  EXPECT_FALSE(listensAt(everywhere, found));
+  EXPECT_FALSE(listensAt(here, found));
+  EXPECT_TRUE(listensAt(net::Endpoint::parse("203.0.113.7", 3884), found));
+  EXPECT_FALSE(listensAt(net::Endpoint::parse("203.0.113.7", 3885), found)) << "another server of it";
+  for (const char* nowhere : {"", "0.0.0.0", "lab7", "127.0.0.1 "}) {
+    found.address = nowhere;
+    EXPECT_FALSE(listensAt(everywhere, found)) << nowhere;
+  }
 }
 
 TEST(AnnouncedServer, IgnoresWhatItDoesNotKnow) {
@@ -195,6 +220,49 @@ TEST_F(Zeroconf, WithoutAvahiTheRemedyIsTold) {
   } catch (const std::runtime_error& error) {
     EXPECT_NE(std::string(error.what()).find("apt install avahi-daemon"), std::string::npos) << error.what();
   }
+}
+
+// What a search in the background reports.
+using Report = std::pair<std::vector<AnnouncedServer>, std::string>;
+
+Report searched(BackgroundSearch& search) {
+  std::promise<Report> report;
+  search.start([&](std::vector<AnnouncedServer> servers, std::string reason) {
+    report.set_value({std::move(servers), std::move(reason)});
+  });
+  return report.get_future().get();
+}
+
+TEST_F(Zeroconf, ASearchInTheBackgroundFindsServersAgainAndAgain) {
+  ScriptedAvahi avahi;
+  BackgroundSearch search;
+  EXPECT_EQ(searched(search), Report());
+  avahi.setOthers({{{2, 0, "attic", "_hapticd._tcp", 3883, {"devices=Arm"}}, "10.0.0.9"}});
+  const auto [servers, reason] = searched(search);
+  EXPECT_EQ(reason, "");
+  ASSERT_EQ(servers.size(), 1U);
+  EXPECT_EQ(servers[0].client("Arm"), "Arm@10.0.0.9:3883");
+}
+
+TEST_F(Zeroconf, ASearchInTheBackgroundReportsWhyItFailed) {
+  BackgroundSearch search;
+  const auto [servers, reason] = searched(search);
+  EXPECT_TRUE(servers.empty());
+  EXPECT_NE(reason.find("apt install avahi-daemon"), std::string::npos) << reason;
+}
+
+TEST_F(Zeroconf, ASearchCanBeStopped) {
+  ScriptedAvahi avahi;
+  avahi.neverFinish();
+  base::SimulatedClock stillStanding;  // the search never runs out of patience
+  const int stopFd = ::eventfd(0, EFD_CLOEXEC);
+  std::thread stopper([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    ::eventfd_write(stopFd, 1);
+  });
+  EXPECT_TRUE(findServers(stillStanding, base::toNanos(3600), stopFd).empty());
+  stopper.join();
+  ::close(stopFd);
 }
 
 TEST(ZeroconfWithoutABus, ServesOnAndSaysSo) {

@@ -13,11 +13,13 @@ import { EffectsPanel } from "./panels/effects";
 import { GuardPanel } from "./panels/guard";
 import { ObjectsPanel } from "./panels/objects";
 import { ReplayBar } from "./panels/replay";
+import { ServersPanel } from "./panels/servers";
 import { SourcesPanel } from "./panels/sources";
 import { css } from "./plots/plot";
 import { type Quantity, rampCss, rangeOf } from "./scene3d/colours";
 import { View } from "./scene3d/view";
 import { REFUSAL, TRIPS } from "./server_tables";
+import { pollServers } from "./servers";
 import { Meshes, pollState } from "./state";
 import type { DeviceState, ObjectState, SceneState, ServerState } from "./state_types";
 import { effectNames, feltForces, nameOfObject, type RemoteContact } from "./sources";
@@ -94,6 +96,8 @@ class Page {
     this.bindControls();
     this.showNotice();
     pollState((state) => this.onState(state));
+    const servers = new ServersPanel(byId("servers"));
+    pollServers((found) => servers.update(found));
     const frame = (time_ms: number): void => {
       this.frame(time_ms);
       requestAnimationFrame(frame);

@@ -142,5 +142,19 @@ export interface ServerState {
   scenes: SceneState[];
 }
 
+/** One server of the response of GET /api/servers. */
+export interface NetworkServer {
+  name: string;
+  address: string;
+  port: number;
+  /** As a client opens them: "Phantom@192.168.1.7:3883". */
+  devices: string[];
+  /** Empty: none. */
+  page: string;
+  tls: boolean;
+  version: string;
+  this_server: boolean;
+}
+
 /** Whether the object can exert a force: it is touchable, has a stiffness and a mesh. */
 export const isFelt = (o: ObjectState): boolean => o.touchable && o.stiffness_N_per_m > 0 && o.triangles > 0;

@@ -70,6 +70,7 @@ WebServer::WebServer(net::Loop& loop, const net::Endpoint& local, const std::vec
                if (old) textWorker_.post([old = std::move(old)] {});
              }),
       meshes_(loop, meshWorker_),
+      servers_([&loop](std::function<void()> function) { loop.post(std::move(function)); }),
       http_(
           loop, local, [this](const auto& request, const auto& reply) { onRequest(request, reply); },
           httpOptions(connection, owner)),
@@ -134,6 +135,8 @@ void WebServer::route(const net::HttpRequest& request, const net::HttpReply& rep
     sendState(reply, &metricsText, "text/plain; version=0.0.4; charset=utf-8");
   } else if (path == "/api/mesh") {
     sendMesh(request, reply);
+  } else if (path == "/api/servers") {
+    sendServers(reply);
   } else if (path == "/api/messages") {
     respond(reply, net::HttpResponse::of(200, messagesJson(), "application/json"));
   } else {
@@ -200,6 +203,12 @@ void WebServer::answer() {
       reporting_ = false;
       nextReport();
     });
+  });
+}
+
+void WebServer::sendServers(const net::HttpReply& reply) {
+  servers_.get([this, reply](const std::string& json) {
+    respond(reply, net::HttpResponse::of(200, json, "application/json"));
   });
 }
 

@@ -10,6 +10,7 @@
 #include "server/web/access.h"
 #include "server/web/mesh_store.h"
 #include "server/web/scene_watch.h"
+#include "server/web/server_list.h"
 #include "server/web/server_status.h"
 #include "server/web/state_report.h"
 #include "server/web/worker.h"
@@ -43,6 +44,8 @@ class WebServer {
 
   /// The listening address, with the port that the system chose for port 0.
   const net::Endpoint& local() const noexcept { return http_.local(); }
+  /// From now on /api/servers lists what `finder` finds. Before the loop runs.
+  void searchNetworkBy(std::unique_ptr<ServerFinder> finder) { servers_.searchBy(std::move(finder)); }
   /// Frees scene descriptions after 10 s without a request. Call it about once a second.
   void everySecond();
 
@@ -63,6 +66,7 @@ class WebServer {
   void sendMesh(const net::HttpRequest& request, const net::HttpReply& reply);
   bool findMesh(std::size_t scene, std::int64_t object, std::uint64_t geometry, const net::HttpReply& reply,
                 std::string& error);
+  void sendServers(const net::HttpReply& reply);
   void addScenes();
   void respond(const net::HttpReply& reply, net::HttpResponse response) const;
 
@@ -80,6 +84,7 @@ class WebServer {
   Worker meshWorker_{"web-mesh"};
   SceneWatch watch_;
   MeshStore meshes_;
+  ServerList servers_;
   net::HttpServer http_;
   WebAccess access_;
 };

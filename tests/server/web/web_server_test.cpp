@@ -6,6 +6,7 @@
 
 #include <cstring>
 #include <filesystem>
+#include <future>
 
 #include "exposition.h"
 #include "feeling.h"
@@ -311,7 +312,7 @@ TEST_F(Web, SimplifiesAMillionTrianglesToAHundredThousandWithoutDelayingOtherReq
 
 TEST_F(Web, RefusesForeignNamesAndOriginsOnEveryPath) {
   for (const char* target : {"/", "/viewer.js", "/api/state", "/api/mesh?scene=0&object=0&geometry=1",
-                             "/metrics", "/api/messages", "/vrpn", "/nothing"}) {
+                             "/metrics", "/api/messages", "/api/servers", "/vrpn", "/nothing"}) {
     EXPECT_EQ(get(web(), target, "Host: evil.example\r\n").status, 403) << target;
     EXPECT_EQ(get(web(), target, "Origin: http://evil.example\r\n").status, 403) << target;
     EXPECT_EQ(get(web(), target, "Origin: null\r\n").status, 403) << target;
@@ -450,6 +451,68 @@ TEST(WebPort, ADefaultPortThatIsInUseIsNotAnError) {
   config.http = server::kHttpAuto;
   RunningServer server(config);
   EXPECT_EQ(server.server().webAddress(), std::nullopt);
+}
+
+/// Finds one server when the test allows it, or at its own end.
+class SlowFinder final : public server::ServerFinder {
+ public:
+  explicit SlowFinder(std::shared_future<void> allowed) : allowed_(std::move(allowed)) {}
+  ~SlowFinder() override {
+    ending_ = true;
+    if (thread_.joinable()) thread_.join();
+  }
+  void find(Done done) override {
+    if (thread_.joinable()) thread_.join();
+    thread_ = std::thread([this, done = std::move(done)] {
+      while (!ending_ && allowed_.wait_for(std::chrono::milliseconds(1)) != std::future_status::ready) {
+      }
+      done({.servers = {{.name = "attic", .page = "http://10.0.0.9:8080/"}}});
+    });
+  }
+
+ private:
+  std::shared_future<void> allowed_;
+  std::atomic<bool> ending_{false};
+  std::thread thread_;
+};
+
+TEST(WebPort, ListsTheServersOfTheNetworkAndAnswersOtherRequestsMeanwhile) {
+  std::promise<void> allow;
+  RunningServer server(withWeb(), std::make_unique<SlowFinder>(allow.get_future().share()));
+  const net::Endpoint web = *server.server().webAddress();
+  std::vector<std::future<Answer>> askers;
+  for (int i = 0; i < 10; ++i)
+    askers.push_back(std::async(std::launch::async, [web] { return get(web, "/api/servers"); }));
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(get(web, "/api/state").status, 200);
+  for (const auto& asker : askers)
+    EXPECT_EQ(asker.wait_for(std::chrono::seconds(0)), std::future_status::timeout);
+  allow.set_value();
+  for (auto& asker : askers) {
+    const Answer answer = asker.get();
+    EXPECT_EQ(answer.status, 200);
+    EXPECT_EQ(answer.header("Content-Type"), "application/json");
+    EXPECT_EQ(answer.json()["servers"].at(0)["name"], "attic");
+  }
+}
+
+TEST(WebPort, AServerEndsWhileItSearchesTheNetwork) {
+  std::promise<void> never;
+  std::optional<net::RawSocket> asker;
+  {
+    RunningServer server(withWeb(), std::make_unique<SlowFinder>(never.get_future().share()));
+    const net::Endpoint web = *server.server().webAddress();
+    asker.emplace(net::RawSocket::connected(web));
+    asker->send("GET /api/servers HTTP/1.1\r\nHost: " + web.text() + "\r\n\r\n");
+    EXPECT_EQ(get(web, "/api/state").status, 200);
+  }
+  EXPECT_EQ(asker->receiveSome(), "") << "closed";
+}
+
+TEST(WebPort, AServerThatCannotSearchGivesTheReason) {
+  RunningServer server(withWeb());
+  const json found = get(*server.server().webAddress(), "/api/servers").json();
+  EXPECT_EQ(found["servers"], json::array());
+  EXPECT_NE(found["reason"], "");
 }
 
 TEST(WebPort, CanBeDisabled) {
