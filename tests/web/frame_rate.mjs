@@ -1,6 +1,8 @@
 // Frames per second of the page at 100,000 triangles, with software rendering: while only the hand moves, while an object moves,
-// and while the camera turns. A measurement, not a test.
+// and while the camera turns; and the processor time of the browser for each, which depends less on what else runs. A
+// measurement, not a test.
 //   node tests/web/frame_rate.mjs HAPTICD [SECONDS]
+import { readdirSync, readFileSync } from "node:fs";
 import { launch, Viewer } from "./browser.mjs";
 import { Server, until } from "./server.mjs";
 
@@ -26,6 +28,21 @@ function ball() {
   return { positions, triangles };
 }
 
+/** Processor time of all processes of the browser, which is the leader of their session. */
+function cpu_ms() {
+  const TICK_MS = 10;
+  const processes = readdirSync("/proc").flatMap((id) => {
+    try {
+      const [, parent, , session, ...rest] = readFileSync(`/proc/${Number(id)}/stat`, "utf8").split(") ").at(-1).split(" ");
+      return [{ id, parent, session, ms: TICK_MS * (Number(rest[7]) + Number(rest[8])) }];
+    } catch {
+      return []; // no process, or it has ended
+    }
+  });
+  const browser = processes.find((p) => p.parent === String(process.pid) && p.session === p.id);
+  return processes.filter((p) => p.session === browser.id).reduce((sum, p) => sum + p.ms, 0);
+}
+
 const server = await Server.start(hapticd);
 const browser = await launch();
 try {
@@ -43,8 +60,9 @@ try {
   await until("the ball", () => viewer.ask("viewer.view.objects.triangles > 0"), 120_000);
   console.log(`${await viewer.ask("viewer.view.objects.triangles")} triangles, 1366 x 768`);
   // Median of the frames in each second.
-  const measure = (each) =>
-    viewer.ask(`new Promise((resolve) => {
+  const measure = async (what, each = "() => {}") => {
+    const [frames, ms] = [await viewer.ask("viewer.frames"), cpu_ms()];
+    const perSecond = await viewer.ask(`new Promise((resolve) => {
       const counts = [];
       let frames = 0, next = performance.now() + 1000;
       const frame = (now) => {
@@ -55,7 +73,10 @@ try {
       };
       requestAnimationFrame(frame);
     })`);
-  console.log(`only the hand moves: ${await measure("() => {}")} frames/s`);
+    const perFrame_ms = (cpu_ms() - ms) / ((await viewer.ask("viewer.frames")) - frames);
+    console.log(`${what}: ${perSecond} frames/s, ${perFrame_ms.toFixed(0)} ms of processor time each`);
+  };
+  await measure("only the hand moves");
   let moving = true;
   const motion = (async () => {
     for (let i = 0; moving; ++i) {
@@ -63,11 +84,11 @@ try {
       await new Promise((resolve) => setTimeout(resolve, 16));
     }
   })();
-  console.log(`the object moves: ${await measure("() => {}")} frames/s`);
+  await measure("the object moves");
   moving = false;
   await motion;
   const turn = "(now) => { const c = viewer.view.controls; c.autoRotate = true; c.autoRotateSpeed = 8; c.update(); }";
-  console.log(`the camera turns: ${await measure(turn)} frames/s`);
+  await measure("the camera turns", turn);
 } finally {
   await browser.close();
   await server.stop();

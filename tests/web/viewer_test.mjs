@@ -200,6 +200,58 @@ test("moving objects are drawn where each tick has them", async () => {
   close();
 });
 
+/** In the page: how many pixels of the canvas differ by more than rounding when it is drawn in two ways. */
+const DIFFERING = `
+  const { view } = viewer;
+  const copy = new OffscreenCanvas(view.canvas.width, view.canvas.height);
+  const context = copy.getContext("2d", { willReadFrequently: true });
+  const read = () => {
+    context.drawImage(view.canvas, 0, 0);
+    return context.getImageData(0, 0, copy.width, copy.height).data;
+  };
+  const differing = (one, other) => {
+    one();
+    const a = read();
+    other();
+    const b = read();
+    let count = 0;
+    for (let i = 0; i < a.length; ++i) if (Math.abs(a[i] - b[i]) > 2) ++count;
+    return count;
+  };`;
+
+test("with software rendering, what only the hand changed looks as drawn anew", async () => {
+  const rounds = await viewer.ask(`(async () => {${DIFFERING}
+    const frame = () => new Promise((resolve) => requestAnimationFrame(resolve));
+    const rounds = [];
+    while (rounds.length < 8) {
+      let takes = 0;
+      view.still.take = function (...all) { ++takes; Object.getPrototypeOf(this).take.apply(this, all); };
+      const before = viewer.tick.hand;
+      for (let i = 0; i < 12; ++i) await frame();
+      const moved_mm = 1000 * Math.hypot(...viewer.tick.hand.map((x, k) => x - before[k]));
+      const pixels = differing(() => (view.invalidateLive(), view.draw()), () => (view.invalidate(), view.draw()));
+      delete view.still.take;
+      if (takes === 1) rounds.push({ moved_mm, pixels });
+    }
+    return rounds;
+  })()`);
+  assert.ok(await viewer.ask("viewer.view.software"), "the test's browser has no graphics card");
+  assert.ok(Math.max(...rounds.map((r) => r.moved_mm)) > 1, `the hand moves: ${JSON.stringify(rounds)}`);
+  assert.deepEqual(rounds.map((r) => r.pixels), rounds.map(() => 0));
+});
+
+test("the picture does not change when a motion begins, nor when it ends", async () => {
+  const touchable = viewer.page.getByLabel("Object 0 is touchable");
+  await touchable.uncheck(); // it is transparent then
+  await until("untouchable", async () => (await server.state()).scenes[0].objects[0].touchable === false);
+  await viewer.settle();
+  const pixels = await viewer.ask(`(() => {${DIFFERING}
+    return differing(() => view.drawAll(), () => { view.stillDirty = true; view.drawStill(); });
+  })()`);
+  assert.equal(pixels, 0);
+  await touchable.check();
+});
+
 test("planes, fields and constraints are listed, drawn and switched", async () => {
   const { wire, send, close } = await server.client();
   await viewer.holdInAir();

@@ -1,7 +1,7 @@
 // A picture of everything that rests, with its depth: while only the hand moves, a frame costs a copy of it and the markers.
+// Its colours are encoded as those of the canvas, so that a copy converts nothing and blending is the same in both.
 import {
   DepthTexture,
-  HalfFloatType,
   LinearFilter,
   Mesh,
   NearestFilter,
@@ -10,6 +10,7 @@ import {
   PlaneGeometry,
   Scene,
   ShaderMaterial,
+  SRGBColorSpace,
   UnsignedIntType,
   Vector2,
   type WebGLRenderer,
@@ -23,7 +24,6 @@ varying vec2 at;
 void main() {
   gl_FragColor = texture2D(colour, at);
   gl_FragDepth = texture2D(depth, at).r;
-  #include <colorspace_fragment>
 }`;
 
 export class Still {
@@ -36,12 +36,15 @@ export class Still {
     samples: number,
   ) {
     this.target = new WebGLRenderTarget(1, 1, {
-      type: HalfFloatType,
+      colorSpace: SRGBColorSpace,
+      internalFormat: "RGBA8",
       minFilter: LinearFilter,
       magFilter: NearestFilter,
       depthTexture: new DepthTexture(1, 1, UnsignedIntType),
       samples,
     });
+    // three.js encodes colours for the canvas and for such a target only.
+    Object.assign(this.target, { isXRRenderTarget: true });
     const material = new ShaderMaterial({
       uniforms: { colour: { value: this.target.texture }, depth: { value: this.target.depthTexture } },
       vertexShader: "varying vec2 at; void main() { at = uv; gl_Position = vec4(position.xy, 0.0, 1.0); }",

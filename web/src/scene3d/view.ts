@@ -1,10 +1,12 @@
 // The 3D view: scene, camera and lights. It draws only after a change, and draws what rests only when that changes.
 import {
+  Box2,
   Box3,
   Color,
   DirectionalLight,
   HemisphereLight,
   Matrix4,
+  Mesh,
   MOUSE,
   PerspectiveCamera,
   Plane,
@@ -15,6 +17,7 @@ import {
   Vector2,
   Vector3,
   WebGLRenderer,
+  type BufferGeometry,
   type Object3D,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
@@ -29,6 +32,8 @@ const MOST_PIXELS_PER_POINT = 2;
 const SETTLE_MS = 250;
 /** Frames that take longer while something moves: fewer triangles from then on. */
 const SLOW_MS = 45;
+/** Around what moves with the hand, for the width of lines and rounding. */
+const MARGIN_PX = 3;
 
 export class View {
   readonly objects: Objects;
@@ -44,7 +49,12 @@ export class View {
   private readonly controls: OrbitControls;
   private readonly raycaster = new Raycaster();
   private readonly still: Still;
+  /** Then every pixel costs: only those that change are drawn, and what moves is drawn without a copy. */
+  private readonly software = drawsInSoftware();
+  /** What rests has changed since it was drawn. */
   private stillDirty = true;
+  /** Where the canvas shows what moves with the hand. */
+  private liveAt = new Box2();
   private liveDirty = true;
   private movedAt_ms = -Infinity;
   private drawnAt_ms = 0;
@@ -52,14 +62,16 @@ export class View {
   private isCoarse = false;
   private wasMoving = false;
   private framed = "";
+  /** The workspace as its box is drawn. */
+  private boxed = "";
   /** Position of the canvas on the page, cached: querying it in every frame would force a layout. */
   private at = new DOMRect();
   private device: DeviceState | undefined;
 
   constructor(readonly canvas: HTMLCanvasElement) {
-    this.slow = drawsInSoftware();
-    this.renderer = new WebGLRenderer({ canvas, antialias: !this.slow });
-    this.still = new Still(this.renderer, this.slow ? 0 : 4);
+    this.slow = this.software;
+    this.renderer = new WebGLRenderer({ canvas, antialias: !this.software, preserveDrawingBuffer: this.software });
+    this.still = new Still(this.renderer, this.software ? 0 : 4);
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, MOST_PIXELS_PER_POINT));
     this.objects = new Objects(new Color("#ff7a1a"));
     this.scene.add(this.objects.group, this.sources.group, this.camera);
@@ -125,6 +137,9 @@ export class View {
     this.markers.setDevice(device);
     const box = new Box3().setFromObject(this.markers.group.children[0]!);
     this.sources.setPlace(box.getCenter(new Vector3()), Math.max(...box.getSize(new Vector3()).toArray()));
+    const boxed = JSON.stringify([device.workspace_m, device.T_world_device]);
+    if (boxed !== this.boxed) this.invalidate();
+    this.boxed = boxed;
     const place = device.name + device.T_world_device.join();
     if (place === this.framed) return;
     this.home();
@@ -205,11 +220,69 @@ export class View {
       this.stillDirty = true;
     }
     if (!this.stillDirty && !this.liveDirty) return;
-    if (this.stillDirty) this.still.take(this.scene, this.camera);
-    this.stillDirty = this.liveDirty = false;
     this.liveLight.position.set(-0.6, 1, 0.8).transformDirection(this.camera.matrixWorld);
+    // After a motion the coarse meshes go, and the picture is taken.
+    if (this.software && moving) this.drawAll();
+    else if (this.stillDirty || !this.software) this.drawStill();
+    else this.drawLive();
+    this.stillDirty = this.liveDirty = false;
+  }
+
+  private drawAll(): void {
+    this.renderer.autoClear = true;
+    this.renderer.render(this.scene, this.camera);
+    this.renderer.autoClear = false;
+    this.renderer.render(this.live, this.camera);
+  }
+
+  private drawStill(): void {
+    if (this.stillDirty) this.still.take(this.scene, this.camera);
     this.still.show();
     this.renderer.render(this.live, this.camera);
+    if (this.software) this.liveAt = this.liveRegion();
+  }
+
+  // Only where the live parts were and are.
+  private drawLive(): void {
+    const now = this.liveRegion();
+    const { min, max } = this.liveAt.union(now);
+    this.liveAt = now;
+    if (max.x <= min.x || max.y <= min.y) return;
+    this.renderer.setScissor(min.x, min.y, max.x - min.x, max.y - min.y);
+    this.renderer.setScissorTest(true);
+    this.still.show();
+    this.renderer.render(this.live, this.camera);
+    this.renderer.setScissorTest(false);
+  }
+
+  /** Bounds on the canvas of what moves with the hand, in points from its lower left corner. Lines are excluded: the box rests,
+   * and the spring is between HIP and proxy. */
+  private liveRegion(): Box2 {
+    const { camera } = this;
+    const size = this.renderer.getSize(new Vector2());
+    const all = new Box2(new Vector2(), size);
+    const box = new Box3();
+    const part = new Box3();
+    this.live.updateMatrixWorld();
+    this.live.traverseVisible((node) => {
+      if (!(node instanceof Mesh)) return;
+      const geometry = node.geometry as BufferGeometry;
+      if (!geometry.boundingBox) geometry.computeBoundingBox();
+      box.union(part.copy(geometry.boundingBox!).applyMatrix4(node.matrixWorld));
+    });
+    const region = new Box2();
+    if (box.isEmpty()) return region;
+    for (let i = 0; i < 8; ++i) {
+      const corner = new Vector3(...([0, 1, 2] as const).map((k) => ((i >> k) & 1 ? box.max : box.min).getComponent(k)));
+      corner.applyMatrix4(camera.matrixWorldInverse);
+      if (corner.z > -camera.near) return all; // beside or behind the camera
+      corner.applyMatrix4(camera.projectionMatrix);
+      region.expandByPoint(new Vector2((corner.x + 1) / 2, (corner.y + 1) / 2).multiply(size));
+    }
+    region.expandByScalar(MARGIN_PX);
+    region.min.floor();
+    region.max.ceil();
+    return region.intersect(all);
   }
 
   private resize(): void {
