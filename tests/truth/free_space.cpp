@@ -75,15 +75,25 @@ std::vector<Point> FreeSpace::outward(const Point& p) const {
 
 std::optional<Point> FreeSpace::placeNear(const Point& p, const std::function<bool(const Point&)>& visible) {
   if (clear(p, p)) return p;
+  const std::vector<Point> found = placesNear(p, visible, 1);
+  return found.empty() ? std::nullopt : std::optional(found.front());
+}
+
+std::vector<Point> FreeSpace::placesNear(const Point& p, const std::function<bool(const Point&)>& visible,
+                                         std::size_t most) {
+  if (clear(p, p) && visible(p)) return {p};
+  std::vector<Point> found;
   std::vector<Point> directions = outward(p);
   for (int i = 0; i < 60; ++i) directions.push_back(direction());
   for (double distance = 1.1 * radius_; distance <= reach_; distance *= 2) {
     for (const Point& d : directions) {
       const Point q = p + distance * d;
-      if (clear(q, q) && visible(q)) return q;
+      if (!clear(q, q) || !visible(q)) continue;
+      found.push_back(q);
+      if (found.size() == most) return found;
     }
   }
-  return std::nullopt;
+  return found;
 }
 
 bool FreeSpace::connectsByOneBend(const Point& p, const Point& q) {
@@ -138,10 +148,6 @@ bool FreeSpace::connectsByTrees(const Point& p, const Point& q) {
     if (free(tree, x, nearestIn(1 - tree, x))) return true;
   }
   return false;
-}
-
-bool FreeSpace::connects(const Point& p, const Point& q) {
-  return clear(p, q) || connectsByOneBend(p, q) || connectsByTrees(p, q);
 }
 
 }  // namespace hapticd::truth

@@ -22,8 +22,13 @@ class FreeSpace {
   bool clear(const Point& p, const Point& q) const;
   /// A place for the ball near p, to which `visible(place)` holds.
   std::optional<Point> placeNear(const Point& p, const std::function<bool(const Point&)>& visible);
+  /// Up to `most` of those, the nearest first. p itself must be visible, too.
+  std::vector<Point> placesNear(const Point& p, const std::function<bool(const Point&)>& visible,
+                                std::size_t most);
   /// Whether a path leads from p to q, both places for the ball.
-  bool connects(const Point& p, const Point& q);
+  bool connects(const Point& p, const Point& q) { return connectsSimply(p, q) || connectsByTrees(p, q); }
+  /// The same for a path with one bend at most.
+  bool connectsSimply(const Point& p, const Point& q) { return clear(p, q) || connectsByOneBend(p, q); }
 
   const std::vector<int>& faces() const { return faces_; }
 
