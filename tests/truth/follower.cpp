@@ -8,9 +8,10 @@
 namespace hapticd::truth {
 namespace {
 
-constexpr double kFree = 4;            // radii around a proxy without faces: its place is that of the ball
-constexpr std::size_t kEnds = 6;       // tried around the proxy, for each widening
-constexpr std::size_t kFollowers = 4;  // where the place is not known
+constexpr double kFree = 4;        // radii around a proxy without faces: its place is that of the ball
+constexpr std::size_t kEnds = 12;  // tried around the proxy, for each widening
+constexpr double kFarthestEnd_m = 500e-6;
+constexpr std::size_t kFollowers = 4;                          // where the place is not known
 constexpr std::array<double, 3> kWidenings_m{30e-6, 5e-6, 0};  // of the faces between ball and proxy
 
 void addOther(const Point& p, std::vector<Point>& places) {
@@ -37,6 +38,8 @@ class Follower {
       }
       if (reference_.moved()) carry(p);
       arrived = moveTo(p);
+      // A way that only the first opinion found.
+      if (!arrived && tick + 1 < proxies_.size()) places_ = around(p);
     }
     return arrived;
   }
@@ -65,7 +68,11 @@ class Follower {
   // The followers where the proxy may be anywhere around its reported place.
   std::vector<Point> around(const Point& p) {
     FreeSpace space(reference_, p, 400e-6, radius_, seed_);
-    return space.placesNear(p, seesProxy(space, p, 0), kFollowers);
+    for (const double widening : kWidenings_m) {
+      const std::vector<Point> found = space.placesNear(p, seesProxy(space, p, widening), kFollowers);
+      if (!found.empty()) return found;
+    }
+    return {};
   }
 
   // Each face takes along what it would pass. Where it finds no room, the place is not known.
@@ -90,7 +97,7 @@ class Follower {
     places_ = carried.empty() ? around(p) : carried;
   }
 
-  // False when no way leads to the proxy; the follower then waits for the next tick.
+  // False when no way leads to the proxy.
   bool moveTo(const Point& p) {
     bool decided = false;
     std::vector<Point> arrived;
@@ -105,13 +112,14 @@ class Follower {
 
   std::optional<Point> endOf(const Point& ball, const Point& p, bool& decided) {
     const double way = (p - ball).norm();
-    std::vector<Point> ends;
+    std::vector<Point> ends;  // from none of which others are seen
     for (const double reach : {1.0 * way + 100e-6, 5 * way + 400e-6}) {
       FreeSpace space(reference_, 0.5 * (p + ball), reach, radius_, ++seed_);
       for (const double widening : kWidenings_m) {
-        for (const Point& q : space.placesNear(p, seesProxy(space, p, widening), kEnds)) {
+        for (const Point& q : endsNear(space, ball, p, widening)) {
           if (space.connectsSimply(ball, q)) return q;
-          addOther(q, ends);
+          const auto sees = [&](const Point& end) { return space.clear(end, q) && space.clear(q, end); };
+          if (std::none_of(ends.begin(), ends.end(), sees)) ends.push_back(q);
         }
       }
     }
@@ -121,6 +129,25 @@ class Follower {
       if (space.connects(ball, q)) return q;
     }
     return std::nullopt;
+  }
+
+  // First those away from the faces at the proxy, on the sides where the ball is: in the corner of a crossing
+  // that others may not be in.
+  std::vector<Point> endsNear(FreeSpace& space, const Point& ball, const Point& p, double widening) const {
+    const auto sees = seesProxy(space, p, widening);
+    std::vector<Point> ends;
+    Point away = Point::Zero();
+    for (const int i : space.faces()) {
+      const Face& f = reference_.face(i);
+      if ((nearestOf(f, p) - p).norm() > 3 * radius_) continue;
+      away += f.normal.dot(ball - f.a) < 0 ? Point(-f.normal) : f.normal;
+    }
+    for (double distance = 1.1 * radius_; distance < kFarthestEnd_m; distance *= 1.4) {
+      const Point q = p + distance * away.stableNormalized();
+      if (space.clear(q, q) && sees(q)) ends.push_back(q);
+    }
+    for (const Point& q : space.placesNear(p, sees, kEnds)) ends.push_back(q);
+    return ends;
   }
 
   const Trial& trial_;
