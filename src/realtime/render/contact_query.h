@@ -139,7 +139,13 @@ class ContactQuery {
   /// The share of the path from p to g on which a point, rather than a ball, meets no face. For a point tool.
   /// With `closesGaps` it passes none that the ball does not pass.
   double freeOfFaces(const Vec3& p, const Vec3& g, bool closesGaps = false) noexcept;
-  /// The same against one facet.
+  /// From now on, casts move a point tool instead of the tool: with a ball, its centre.
+  void castPointTool(bool point) noexcept { pointTool_ = point; }
+  /// Of the ball that casts move against a facet.
+  double radiusAt(const Facet& f) const noexcept {
+    return pointTool_ ? std::min(f.radius, 0.5 * kGapTolerance_m) : f.radius;
+  }
+  /// Casts the tool against one facet.
   bool castAtFacet(const Facet& f, const Vec3& p, const Vec3& g, ObjectHit& hit) const noexcept;
 
   /// Smallest skin of the near objects. Lengths below a fraction of it are rounding.
@@ -186,6 +192,7 @@ class ContactQuery {
   bool mayReach(const PlacedObject& object, std::uint32_t triangle, const Vec3& inObject,
                 double reach_m) noexcept;
   const Facet* facetOf(int object, std::uint32_t triangle) const noexcept;
+  bool castTool(const Facet& f, const Path& path, double latest, CastHit& hit) const noexcept;
   void considerFacet(const Facet& f, const Path& path, ObjectHit& best, bool& found) const noexcept;
   bool castGathered(const Path& path, int only, ObjectHit& hit) noexcept;
   bool castAtFacets(const Path& path, int only, ObjectHit& hit) noexcept;
@@ -225,6 +232,7 @@ class ContactQuery {
   bool overflowed_ = false;
   int work_ = 0;                // of this tick: kVisit for a triangle, 1 for one that its box rules out
   std::uint64_t passable_ = 0;  // objects that the present cast does not meet
+  bool pointTool_ = false;      // casts move the centre of the tool
 };
 
 template <class Visit>
