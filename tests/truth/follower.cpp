@@ -111,10 +111,16 @@ class Follower {
   }
 
   std::optional<Point> endOf(const Point& ball, const Point& p, bool& decided) {
+    const auto end = endOf(ball, p, false, decided);
+    return end || trial_.sides == Sides::both ? end : endOf(ball, p, true, decided);
+  }
+
+  std::optional<Point> endOf(const Point& ball, const Point& p, bool overlapping, bool& decided) {
     const double way = (p - ball).norm();
+    const Point middle = 0.5 * (p + ball);
     std::vector<Point> ends;  // from none of which others are seen
     for (const double reach : {1.0 * way + 100e-6, 5 * way + 400e-6}) {
-      FreeSpace space(reference_, 0.5 * (p + ball), reach, radius_, ++seed_);
+      FreeSpace space(reference_, middle, reach, radius_, ++seed_, overlapping);
       for (const double widening : kWidenings_m) {
         for (const Point& q : endsNear(space, ball, p, widening)) {
           if (space.connectsSimply(ball, q)) return q;
@@ -124,7 +130,7 @@ class Follower {
       }
     }
     decided = decided || !ends.empty();
-    FreeSpace space(reference_, 0.5 * (p + ball), 5 * way + 400e-6, radius_, ++seed_);
+    FreeSpace space(reference_, middle, 5 * way + 400e-6, radius_, ++seed_, overlapping);
     for (const Point& q : ends) {
       if (space.connects(ball, q)) return q;
     }

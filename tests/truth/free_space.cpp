@@ -12,8 +12,13 @@ constexpr int kTreeNodes = 8000;
 }  // namespace
 
 FreeSpace::FreeSpace(const Reference& reference, const Point& centre, double reach, double ballRadius,
-                     std::uint64_t seed)
-    : reference_(reference), centre_(centre), reach_(reach), radius_(ballRadius), random_(seed) {
+                     std::uint64_t seed, bool overlapping)
+    : reference_(reference),
+      centre_(centre),
+      reach_(reach),
+      radius_(ballRadius),
+      overlapping_(overlapping),
+      random_(seed) {
   for (const int i : reference.near(centre, 2 * reach + 2 * ballRadius)) {
     if (!reference.faces()[static_cast<std::size_t>(i)].thin) faces_.push_back(i);
   }
@@ -27,8 +32,16 @@ bool FreeSpace::clear(const Point& p, const Point& q) const {
     if (std::min(start, end) > radius_ || std::max(start, end) < -radius_ ||
         !reference_.touchableFrom(f, start))
       return true;
-    return distanceOf(f, p, q) >= radius_;
+    return distanceOf(f, p, q) >= radius_ || risesFrom(f, p, start, end);
   });
+}
+
+// Off a one-sided face that it overlaps, because it came from behind.
+bool FreeSpace::risesFrom(const Face& f, const Point& p, double start, double end) const {
+  if (!overlapping_ || f.unbounded || reference_.touchableFrom(f, -1) == reference_.touchableFrom(f, 1))
+    return false;
+  const bool rises = reference_.touchableFrom(f, 1) ? end >= start : end <= start;
+  return rises && (nearestOf(f, p) - p).norm() < radius_;
 }
 
 Point FreeSpace::direction() {
@@ -81,7 +94,7 @@ std::optional<Point> FreeSpace::placeNear(const Point& p, const std::function<bo
 
 std::vector<Point> FreeSpace::placesNear(const Point& p, const std::function<bool(const Point&)>& visible,
                                          std::size_t most) {
-  if (clear(p, p) && visible(p)) return {p};
+  if (!overlapping_ && clear(p, p) && visible(p)) return {p};
   std::vector<Point> found;
   std::vector<Point> directions = outward(p);
   for (int i = 0; i < 60; ++i) directions.push_back(direction());

@@ -14,9 +14,10 @@ namespace hapticd::truth {
 /// The free space of a ball around one place.
 class FreeSpace {
  public:
-  /// `reach`: of all paths, around `centre`.
+  /// `reach`: of all paths, around `centre`. With `overlapping`, a ball that came from behind a one-sided
+  /// face may overlap it, as long as it does not go back.
   FreeSpace(const Reference& reference, const Point& centre, double reach, double ballRadius,
-            std::uint64_t seed);
+            std::uint64_t seed, bool overlapping = false);
 
   /// A path free of faces, as far from each as the ball's radius.
   bool clear(const Point& p, const Point& q) const;
@@ -37,6 +38,7 @@ class FreeSpace {
     Point at;
     int tree;  // 0: of the start, 1: of the end
   };
+  bool risesFrom(const Face& f, const Point& p, double start, double end) const;
   Point sample();
   Point direction();
   std::vector<Point> outward(const Point& p) const;
@@ -47,6 +49,7 @@ class FreeSpace {
   Point centre_;
   double reach_;
   double radius_;
+  bool overlapping_;
   std::vector<int> faces_;
   std::mt19937_64 random_;
 };
