@@ -115,7 +115,7 @@ Vec3 Proxy::carriedBy(const PlacedObject& object, std::uint32_t triangle, const 
 }
 
 // Geometry that passed over the proxy takes it along. Where it leaves a ball no room, the ball overlaps it,
-// and its centre is pushed as a point is: it never gets behind a face.
+// and its centre is pushed as a point is, so that it gets behind none.
 void Proxy::push(const Vec3& from, std::uint32_t& status) noexcept {
   const Vec3 carried = position_;
   const double travel = expectedTravel_m_;
