@@ -56,11 +56,18 @@ class Follower {
     return last;
   }
 
-  // A place that sees the proxy. On the plane of a face, within rounding, it may be on either side.
+  // A place that sees the proxy. On several faces, within rounding, it may be on either side of each; on one
+  // alone it is where the renderer has put it.
   auto seesProxy(const FreeSpace& space, const Point& p, double widening) const {
-    return [&space, &p, widening, this](const Point& q) {
+    const auto holds = [&](int i) {
+      const Face& f = reference_.face(i);
+      return reference_.onPlane(f, p) && (nearestOf(f, p) - p).norm() < 2 * radius_;
+    };
+    const bool onSeveral = std::count_if(space.faces().begin(), space.faces().end(), holds) > 1;
+    return [&space, &p, widening, onSeveral, this](const Point& q) {
       return std::none_of(space.faces().begin(), space.faces().end(), [&](int i) {
-        return reference_.pierces(i, q, p, widening) && !reference_.onPlane(reference_.face(i), p);
+        return reference_.pierces(i, q, p, widening) &&
+               !(onSeveral && reference_.onPlane(reference_.face(i), p));
       });
     };
   }
