@@ -12,8 +12,13 @@ constexpr int kTreeNodes = 8000;
 }  // namespace
 
 FreeSpace::FreeSpace(const Reference& reference, const Point& centre, double reach, double ballRadius,
-                     std::uint64_t seed)
-    : reference_(reference), centre_(centre), reach_(reach), radius_(ballRadius), random_(seed) {
+                     std::uint64_t seed, bool overlapping)
+    : reference_(reference),
+      centre_(centre),
+      reach_(reach),
+      radius_(ballRadius),
+      overlapping_(overlapping),
+      random_(seed) {
   for (const int i : reference.near(centre, 2 * reach + 2 * ballRadius)) {
     if (!reference.faces()[static_cast<std::size_t>(i)].thin) faces_.push_back(i);
   }
@@ -27,8 +32,16 @@ bool FreeSpace::clear(const Point& p, const Point& q) const {
     if (std::min(start, end) > radius_ || std::max(start, end) < -radius_ ||
         !reference_.touchableFrom(f, start))
       return true;
-    return distanceOf(f, p, q) >= radius_;
+    return distanceOf(f, p, q) >= radius_ || risesFrom(f, p, start, end);
   });
+}
+
+// Off a one-sided face that it overlaps, because it came from behind.
+bool FreeSpace::risesFrom(const Face& f, const Point& p, double start, double end) const {
+  if (!overlapping_ || f.unbounded || reference_.touchableFrom(f, -1) == reference_.touchableFrom(f, 1))
+    return false;
+  const bool rises = reference_.touchableFrom(f, 1) ? end >= start : end <= start;
+  return rises && (nearestOf(f, p) - p).norm() < radius_;
 }
 
 Point FreeSpace::direction() {
@@ -75,15 +88,25 @@ std::vector<Point> FreeSpace::outward(const Point& p) const {
 
 std::optional<Point> FreeSpace::placeNear(const Point& p, const std::function<bool(const Point&)>& visible) {
   if (clear(p, p)) return p;
+  const std::vector<Point> found = placesNear(p, visible, 1);
+  return found.empty() ? std::nullopt : std::optional(found.front());
+}
+
+std::vector<Point> FreeSpace::placesNear(const Point& p, const std::function<bool(const Point&)>& visible,
+                                         std::size_t most) {
+  if (!overlapping_ && clear(p, p) && visible(p)) return {p};
+  std::vector<Point> found;
   std::vector<Point> directions = outward(p);
   for (int i = 0; i < 60; ++i) directions.push_back(direction());
   for (double distance = 1.1 * radius_; distance <= reach_; distance *= 2) {
     for (const Point& d : directions) {
       const Point q = p + distance * d;
-      if (clear(q, q) && visible(q)) return q;
+      if (!clear(q, q) || !visible(q)) continue;
+      found.push_back(q);
+      if (found.size() == most) return found;
     }
   }
-  return std::nullopt;
+  return found;
 }
 
 bool FreeSpace::connectsByOneBend(const Point& p, const Point& q) {
@@ -138,10 +161,6 @@ bool FreeSpace::connectsByTrees(const Point& p, const Point& q) {
     if (free(tree, x, nearestIn(1 - tree, x))) return true;
   }
   return false;
-}
-
-bool FreeSpace::connects(const Point& p, const Point& q) {
-  return clear(p, q) || connectsByOneBend(p, q) || connectsByTrees(p, q);
 }
 
 }  // namespace hapticd::truth

@@ -9,6 +9,7 @@
 
 #include "realtime/render/renderer.h"
 #include "truth/descent.h"
+#include "truth/follower.h"
 #include "truth/free_space.h"
 #include "truth/reference.h"
 #include "truth/stage.h"
@@ -21,10 +22,9 @@ using realtime::Rendering;
 constexpr double kGap_m = 10e-6;               // narrower gaps are closed
 constexpr double kFollower_m = 0.49 * kGap_m;  // radius of the ball that follows the proxy
 constexpr double kSuspect_m = 30e-6;           // beside a face: a move there is searched for a path
-constexpr double kOnPlane = 4;               // roundings: corners of neighbours are rounded each on their own
-constexpr double kForceTolerance_m = 20e-6;  // times stiffness; twice the gap
-constexpr double kWedge_m = 60e-6;           // the reported proxy is at most 50 um from the ball that touches
-constexpr double kTouch_m = 25e-6;           // faces within this of the tool may hold it
+constexpr double kForceTolerance_m = 20e-6;    // times stiffness; twice the gap
+constexpr double kWedge_m = 60e-6;  // the reported proxy is at most 50 um from the ball that touches
+constexpr double kTouch_m = 25e-6;  // faces within this of the tool may hold it
 constexpr double kStuck_m = 10e-6;
 constexpr double kDescentReach_m = 1e-3;
 constexpr unsigned kUnexpected =
@@ -195,7 +195,8 @@ class Referee {
 
   void judgePlaces() {
     const Point& p = rendering_.proxy_m;
-    rounding_ = 1e-9 + 8e-9 * std::max(reference_.extent(), 1e-3);
+    reported_.push_back({p, (rendering_.status & realtime::kRenderPopthrough) != 0});
+    rounding_ = reference_.rounding();
     if (beyondWalls(p) > kGap_m)
       return report("escaped", beyondWalls(p), " m beyond a wall, proxy ", p.transpose());
     const double spring = (p - hip_).norm();
@@ -262,6 +263,7 @@ class Referee {
     const bool found = fromBehind_ && passageFound();
     fromBehind_ = false;
     if (found) return;
+    if (follows(trial_, reported_, kFollower_m)) return;
     const Face& f = reference_.face(suspects_.front());
     report("through", "from ", proxyBefore_.transpose(), " to ", rendering_.proxy_m.transpose(),
            " past face ", suspects_.front(), " of object ", f.object, ", force ",
@@ -272,8 +274,7 @@ class Referee {
   void rememberSides() {
     if (sides_.size() == 0) sides_ = seen_ = Eigen::ArrayXd::Zero(proxyHeights_.size());
     for (Eigen::Index i = 0; i < sides_.size(); ++i) {
-      const bool on =
-          onPlane(reference_.face(static_cast<int>(i)), rendering_.proxy_m, std::abs(proxyHeights_[i]));
+      const bool on = reference_.onPlane(reference_.face(static_cast<int>(i)), rendering_.proxy_m);
       const double side = proxyHeights_[i] >= 0 ? 1 : -1;
       const bool keep = byMemory_ && sides_[i] != 0 && on;
       if (!keep) sides_[i] = side;
@@ -309,20 +310,10 @@ class Referee {
   }
   Point lifted(int i, const Point& p) const {
     const Face& f = reference_.face(i);
+    if (!reference_.onPlane(f, p)) return p;
     const double height = std::abs(f.normal.dot(p - f.a));
-    if (!onPlane(f, p, height)) return p;
     return p + std::max(2 * kOnPlane * rounding_, kOnPlane * rounding_ + height) * sides_[i] * f.normal;
   }
-  // Within rounding. That of the corners tilts the plane of a narrow face: its height is known the less the
-  // farther a place is beyond the face, in widths.
-  bool onPlane(const Face& f, const Point& p, double height) const {
-    const double least = kOnPlane * rounding_;
-    if (height <= least || f.unbounded) return height <= least;
-    if (height > least * (1 + (p - f.a).norm() / f.width)) return false;
-    const double distance2 = (nearestOf(f, p) - p).squaredNorm();
-    return height <= least * (1 + std::sqrt(std::max(0.0, distance2 - height * height)) / f.width);
-  }
-
   // The follower: from the proxy's place before, carried with each face, to its place now.
   bool passageFound() {
     const Point& p = rendering_.proxy_m;
@@ -378,7 +369,7 @@ class Referee {
   bool touchesFromBehind(int i, const Point& ball) const {
     const Face& f = reference_.face(i);
     const Point p = reference_.moved() ? reference_.carried(proxyBefore_, i) : proxyBefore_;
-    return fromBehind_ && !f.unbounded && !onPlane(f, p, std::abs(f.normal.dot(p - f.a))) &&
+    return fromBehind_ && !f.unbounded && !reference_.onPlane(f, p) &&
            (ball - p).norm() <= 2.5 * kFollower_m && !reference_.touchableFrom(f, f.normal.dot(ball - f.a));
   }
 
@@ -644,6 +635,7 @@ class Referee {
   Eigen::ArrayXd proxyHeights_;
   Eigen::ArrayXd hipHeights_;
   std::vector<int> suspects_;
+  std::vector<ReportedProxy> reported_;  // in each tick
 };
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "truth/follower.h"
 #include "truth/free_space.h"
 #include "truth/meshes.h"
 #include "truth/random_trial.h"
@@ -58,6 +59,33 @@ TEST(FreeSpace, a_face_that_is_touchable_from_the_front_lets_through_what_comes_
   trial.sides = Sides::front;
   EXPECT_FALSE(joined(trial, {0, 0, 1e-4}, {0, 0, -1e-4}, 1e-3));
   EXPECT_TRUE(joined(trial, {0, 0, -1e-4}, {0, 0, 1e-4}, 1e-3));
+}
+
+TEST(FreeSpace, a_ball_that_came_from_behind_may_overlap_a_one_sided_face_and_not_go_back) {
+  Trial trial = plate();
+  trial.sides = Sides::front;
+  Reference reference(trial);
+  reference.moveTo(0);
+  FreeSpace space(reference, {0, 0, 0}, 1e-3, 4.9e-6, 1, true);
+  EXPECT_TRUE(space.connects({0, 0, -1e-4}, {0, 0, 2e-6}));
+  EXPECT_TRUE(space.connects({0, 0, 2e-6}, {0, 0, 1e-4}));
+  EXPECT_FALSE(space.connects({0, 0, 1e-4}, {0, 0, 2e-6}));
+  EXPECT_FALSE(space.connects({0, 0, 2e-6}, {0, 0, -1e-4}));
+}
+
+// On the plate, within rounding, the proxy may be on either side: where it came from decides.
+TEST(Follower, follows_around_a_rim_and_not_through_a_plate) {
+  const ReportedProxy above{{0.0195, 0, 1e-4}, false};
+  const ReportedProxy on{{0.0195, 0, -1e-12}, false};
+  const ReportedProxy slid{{0.0198, 0, 1e-12}, false};
+  const ReportedProxy beside{{0.0201, 0, 0}, false};
+  const ReportedProxy below{{0.0198, 0, -1e-4}, false};
+  EXPECT_TRUE(follows(plate(), {above, on, slid, above}, 4.9e-6));
+  EXPECT_TRUE(follows(plate(), {above, on, beside, below}, 4.9e-6));
+  EXPECT_FALSE(
+      follows(plate(0, 8e-6), {{{0, 0, 1e-4}, false}, {{0, 0, 0}, false}, {{0, 0, -1e-4}, false}}, 4.9e-6));
+  EXPECT_TRUE(
+      follows(plate(0, 14e-6), {{{0, 0, 1e-4}, false}, {{0, 0, 0}, false}, {{0, 0, -1e-4}, false}}, 4.9e-6));
 }
 
 TEST(Reference, distance_of_a_segment_from_a_triangle) {
@@ -115,7 +143,7 @@ TEST(Referee, mended_findings_stay_mended) {
                                   << verdict.finding->text;
     ++count;
   }
-  EXPECT_GE(count, 37);
+  EXPECT_GE(count, 44);
 }
 
 // A hand that presses on a plate: nothing to find. With a false wall in front of the plate, the referee finds

@@ -226,6 +226,21 @@ Point Reference::carried(const Point& p, int face) const {
   return now.a + local.x() * (now.b - now.a) + local.y() * (now.c - now.a) + local.z() * now.normal;
 }
 
+double Reference::rounding() const {
+  return 1e-9 + 8e-9 * std::max(extent_, 1e-3);
+}
+
+// The rounding of its corners tilts the plane of a narrow face: its height is known the less the farther a
+// place is beyond the face, in widths.
+bool Reference::onPlane(const Face& f, const Point& p) const {
+  const double height = std::abs(f.normal.dot(p - f.a));
+  const double least = kOnPlane * rounding();
+  if (height <= least || f.unbounded) return height <= least;
+  if (height > least * (1 + (p - f.a).norm() / f.width)) return false;
+  const double distance2 = (nearestOf(f, p) - p).squaredNorm();
+  return height <= least * (1 + std::sqrt(std::max(0.0, distance2 - height * height)) / f.width);
+}
+
 bool Reference::pierces(int i, const Point& p, const Point& q, double widening) const {
   const Face& f = face(i);
   const double start = f.normal.dot(p - f.a);

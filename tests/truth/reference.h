@@ -11,6 +11,9 @@
 
 namespace hapticd::truth {
 
+/// In roundings: on a plane within these. Corners of neighbours are rounded each on their own.
+inline constexpr double kOnPlane = 4;
+
 /// One triangle at one tick, device metres.
 struct Face {
   Point a, b, c;
@@ -58,6 +61,10 @@ class Reference {
     if (f.unbounded) return height >= 0;
     return trial_.sides == Sides::both || (trial_.sides == Sides::front) == (height >= 0);
   }
+  /// Whether a point is on the plane of a face, within rounding: its side is not known.
+  bool onPlane(const Face& f, const Point& p) const;
+  /// Of coordinates, which are floats: no side is decided below it.
+  double rounding() const;
   /// Largest coordinate of all geometry.
   double extent() const { return extent_; }
 

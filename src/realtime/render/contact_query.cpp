@@ -422,9 +422,16 @@ bool ContactQuery::sameObjects() const noexcept {
   return true;
 }
 
+bool ContactQuery::castTool(const Facet& f, const Path& path, double latest, CastHit& hit) const noexcept {
+  if (!pointTool_) return castBall(f, faces(), path.p, path.d, 1, latest, hit);
+  Facet touched = f;
+  touched.radius = radiusAt(f);
+  return castBall(touched, faces(), path.p, path.d, 1, latest, hit);
+}
+
 bool ContactQuery::castAtFacet(const Facet& f, const Vec3& p, const Vec3& g, ObjectHit& hit) const noexcept {
   const Vec3 d = g - p;
-  const bool found = castBall(f, faces(), p, d, 1, 1, hit);
+  const bool found = castTool(f, {p, d, 0, 1}, 1, hit);
   hit.object = f.object;
   hit.triangle = f.triangle;
   return found;
@@ -436,7 +443,7 @@ void ContactQuery::considerFacet(const Facet& f, const Path& path, ObjectHit& be
   if (f.object >= 0 && (passable_ >> static_cast<unsigned>(f.object) & 1U) != 0) return;
   ObjectHit hit;
   const double latest = found ? best.stop : path.end;
-  if (!castBall(f, faces(), path.p, path.d, 1, latest, hit) || hit.stop > latest) return;
+  if (!castTool(f, path, latest, hit) || hit.stop > latest) return;
   hit.object = f.object;
   hit.triangle = f.triangle;
   const auto rank = [this](const ObjectHit& h) {

@@ -141,7 +141,13 @@ class ContactQuery {
   /// The share of the path from p to g on which a point, rather than a ball, meets no face. For a point tool.
   /// With `closesGaps` it passes none that the ball does not pass.
   double freeOfFaces(const Vec3& p, const Vec3& g, bool closesGaps = false) noexcept;
-  /// The same against one facet.
+  /// From now on, casts move a point tool instead of the tool: with a ball, its centre.
+  void castPointTool(bool point) noexcept { pointTool_ = point; }
+  /// Of the ball that casts move against a facet.
+  double radiusAt(const Facet& f) const noexcept {
+    return pointTool_ ? std::min(f.radius, 0.5 * kGapTolerance_m) : f.radius;
+  }
+  /// Casts the tool against one facet.
   bool castAtFacet(const Facet& f, const Vec3& p, const Vec3& g, ObjectHit& hit) const noexcept;
 
   /// Smallest skin of the near objects. Lengths below a fraction of it are rounding.
@@ -194,6 +200,7 @@ class ContactQuery {
   scene::Corners cornersOf(const FacetCache::TriangleId& id) const noexcept;
   const Facet* facetOf(const FacetCache::TriangleId& id) const noexcept;
   void addToCache(const FacetCache::TriangleId& id, const Vec3& inObject) noexcept;
+  bool castTool(const Facet& f, const Path& path, double latest, CastHit& hit) const noexcept;
   void considerFacet(const Facet& f, const Path& path, ObjectHit& best, bool& found) const noexcept;
   bool castGathered(const Path& path, int only, ObjectHit& hit) noexcept;
   bool castAtFacets(const Path& path, int only, ObjectHit& hit) noexcept;
@@ -235,6 +242,7 @@ class ContactQuery {
   int work_ = 0;  // of this tick: kVisit for a triangle, kBoxVisit for one that its box rules out,
                   // 1 for one that is joined to another
   std::uint64_t passable_ = 0;  // objects that the present cast does not meet
+  bool pointTool_ = false;      // casts move the centre of the tool
 };
 
 template <class Visit>

@@ -349,10 +349,18 @@ Vec3 Proxy::onFaces(const Vec3& hip, const ActiveSet& active) noexcept {
   if (way.norm() > kLargestGapTolerance_m) place = position_ + kLargestGapTolerance_m * way.normalized();
   // Nothing that rests is nearer to the proxy than the one face that it touches.
   if (count == 1 && query_.allAtRest()) return place;
-  // Beside an edge the half-space touches the ball and not the face: where two meet may be past a gap.
-  const bool atEdge = count > 1 && std::any_of(active.hits.begin(), active.hits.begin() + count,
-                                               [](const ObjectHit& h) { return h.atEdge; });
-  return position_ + query_.freeOfFaces(position_, place, atEdge) * (place - position_);
+  // Beyond the face or the edge that touches the ball, a half-space goes on: where two meet may be past a
+  // gap. The reported place stays where it is nearest to an edge, and passes no face nearer than the ball
+  // does.
+  const Vec3 closer = place - position_;
+  double share = 1;
+  for (int i = 0; i < count && count > 1; ++i) {
+    const ObjectHit& h = active.hits[static_cast<std::size_t>(i)];
+    const double nearest = (h.halfSpace.anchor - position_).dot(closer);
+    if (h.atEdge) share = std::min(share, std::max(0.0, nearest / closer.squaredNorm()));
+  }
+  place = position_ + share * closer;
+  return position_ + query_.freeOfFaces(position_, place, count > 1) * (place - position_);
 }
 
 // Above the popthrough force, the proxy steps through the faces that give way and moves on to the HIP. Other

@@ -104,6 +104,7 @@ class Proxy {
   void carry(const Vec3& hip, std::uint32_t& status) noexcept;
   Vec3 carriedBy(const PlacedObject& object, std::uint32_t triangle, const Vec3& p) const noexcept;
   void push(const Vec3& from, std::uint32_t& status) noexcept;
+  bool pushUntilFree(const Vec3& from, std::uint32_t& status) noexcept;
   bool pushByObjects(const Vec3& from, Pushers& pushers, std::uint32_t& status) noexcept;
   bool pushByDeformingFaces(const Vec3& from, Pushers& pushers, std::uint32_t& status) noexcept;
   bool pushByPlanes(Pushers& pushers, std::uint32_t& status) noexcept;

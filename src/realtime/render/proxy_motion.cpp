@@ -114,17 +114,33 @@ Vec3 Proxy::carriedBy(const PlacedObject& object, std::uint32_t triangle, const 
   return n.a + local.x() * (n.b - n.a) + local.y() * (n.c - n.a) + local.z() * now.normal;
 }
 
-// Geometry that passed over the proxy takes it along. The way on which one face pushes it is a way relative
-// to all others, so this goes on until no face passes the proxy any more.
+// Geometry that passed over the proxy takes it along. Where it leaves a ball no room, the ball overlaps it,
+// and its centre is pushed as a point is, so that it gets behind none.
 void Proxy::push(const Vec3& from, std::uint32_t& status) noexcept {
+  const Vec3 carried = position_;
+  const double travel = expectedTravel_m_;
+  if (pushUntilFree(from, status)) return;
+  if (toolRadius_ > 0.5 * kGapTolerance_m) {
+    position_ = carried;
+    expectedTravel_m_ = travel;
+    query_.castPointTool(true);
+    pushUntilFree(from, status);
+    query_.castPointTool(false);
+  }
+  holdPlanesBack();
+}
+
+// The way on which one face pushes the proxy is a way relative to all others, so this goes on until no face
+// passes the proxy any more. False where they leave it no room.
+bool Proxy::pushUntilFree(const Vec3& from, std::uint32_t& status) noexcept {
   Pushers pushers;
   for (int k = 0; k < kMaxPushes && !pushers.jammed; ++k) {
     bool pushed = pushByObjects(from, pushers, status);
     pushed = (!pushers.jammed && pushByDeformingFaces(from, pushers, status)) || pushed;
     pushed = (!pushers.jammed && pushByPlanes(pushers, status)) || pushed;
-    if (!pushed) return;
+    if (!pushed) return true;
   }
-  holdPlanesBack();
+  return false;
 }
 
 // Moves the proxy to where a face pushes it, and above those that pushed it before. Without room for that,
@@ -187,7 +203,7 @@ double Proxy::missedMove(const PlacedObject& object) noexcept {
 bool Proxy::pushByPlanes(Pushers& pushers, std::uint32_t& status) noexcept {
   bool pushed = false;
   for (const PlacedPlane& plane : planes_) {
-    const HalfSpace face{plane.facet.normal, plane.facet.a, plane.facet.radius + plane.facet.skin};
+    const HalfSpace face{plane.facet.normal, plane.facet.a, query_.radiusAt(plane.facet) + plane.facet.skin};
     const double below = -face.height(position_);
     if (below <= 0.5 * plane.facet.skin || pushers.jammed) continue;
     const Vec3 displacement = below * face.normal;
