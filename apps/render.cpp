@@ -29,29 +29,10 @@ void addMeshOptions(CLI::App& command, MeshRenderOptions& options) {
                   "Scale the mesh to this largest extent and centre it [unchanged]")
       ->check(within(1e-6, 1e6));
   command
-      .add_option("--hand", options.hand,
-                  "CSV: t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons] in device metres, or any CSV that hapticd "
-                  "wrote; or a "
-                  "trajectory: NAME.traj")
+      .add_option(
+          "--hand", options.hand,
+          "CSV: t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons] in device metres, or any CSV that hapticd wrote")
       ->check(CLI::ExistingFile);
-  command
-      .add_option("--compare", options.compare,
-                  "Trajectory with measured forces: print how far the rendered ones are from them")
-      ->check(CLI::ExistingFile);
-  command.add_flag("--reversed", options.reversed,
-                   "The forces of --compare are those of the hand on the surface");
-  command
-      .add_option("--traj-columns", options.trajectory.columns, "Columns of trajectories; - for one to skip")
-      ->capture_default_str();
-  command
-      .add_option("--traj-units-per-m", options.trajectory.unitsPerMetre,
-                  "1000: positions are in millimetres")
-      ->check(within(1e-9, 1e9))
-      ->capture_default_str();
-  command
-      .add_option("--traj-units-per-s", options.trajectory.unitsPerSecond, "1000: times are in milliseconds")
-      ->check(within(1e-9, 1e9))
-      ->capture_default_str();
   command
       .add_option("--faces", options.faces,
                   "Sides that can be touched; seen from the front, corners run counter-clockwise")
@@ -94,9 +75,7 @@ int run(const CLI::App& command, const RenderCommandOptions& options) {
   keepFile(options.mesh.out, options.force);
   keepFile(options.report, options.force);
   if (!options.session.empty()) {
-    for (const char* name :
-         {"--mesh", "--hand", "--mesh-unit", "--size-mm", "--faces", "--timing", "--compare", "--reversed",
-          "--traj-columns", "--traj-units-per-m", "--traj-units-per-s"}) {
+    for (const char* name : {"--mesh", "--hand", "--mesh-unit", "--size-mm", "--faces", "--timing"}) {
       if (command.count(name) == 0) continue;
       throw std::runtime_error(std::string(name) +
                                " belongs to --mesh; --session has its own scene and "
@@ -138,8 +117,6 @@ void addRender(CLI::App& app) {
       "recorded. Without changes the forces equal the recorded ones bit for bit, or the exit status is 1.\n"
       "Examples:\n"
       "  hapticd render --mesh bunny.obj --hand stroke.csv --out felt.csv --raw\n"
-      "  hapticd render --mesh plane.obj --hand in.traj --stiffness 500 --raw --out felt.csv --compare "
-      "probe.traj\n"
       "  hapticd render --session my.haptics\n"
       "  hapticd render --session my.haptics --stiffness 300 --report softer.html");
   command->callback([options, command] { exitCode = run(*command, *options); });

@@ -16,7 +16,6 @@
 #include "realtime/render/renderer.h"
 #include "realtime/servo/guard.h"
 #include "record/export.h"
-#include "record/force_errors.h"
 #include "scene/builder.h"
 
 namespace hapticd::apps {
@@ -58,7 +57,6 @@ std::shared_ptr<const scene::SceneSnapshot> makeScene(const MeshRenderOptions& o
 
 struct Summary {
   std::vector<double> step_us;
-  std::vector<record::TimedForce> forces;
   double peakForce_N = 0;
   double deepest_m = 0;
   std::size_t touching = 0;
@@ -111,7 +109,6 @@ Summary follow(const MeshRenderOptions& options, const device::HandFile& hand,
     if (options.timing) sample.compute_ns = step_ns;
     out.add(sample);
 
-    summary.forces.push_back({t, force_N});
     summary.step_us.push_back(static_cast<double>(step_ns) * 1e-3);
     summary.peakForce_N = std::max(summary.peakForce_N, force_N.norm());
     summary.deepest_m = std::max(summary.deepest_m, rendering.touching ? rendering.depth_m : 0.0);
@@ -130,30 +127,6 @@ void fit(geometry::TriangleMesh& mesh, const MeshRenderOptions& options) {
   geometry::scaleAndMove(mesh, scale, -scale * bounds.centre());
 }
 
-// CSV has names of its own; every other file is a trajectory.
-std::shared_ptr<const device::HandFile> loadHand(const MeshRenderOptions& options) {
-  if (!options.hand.ends_with(".traj")) return device::HandFile::load(options.hand);
-  return device::HandFile::along(device::loadTrajectory(options.hand, options.trajectory));
-}
-
-// Prints how far the forces are from those of --compare.
-void compare(const MeshRenderOptions& options, const std::vector<record::TimedForce>& forces) {
-  std::vector<record::TimedForce> reference;
-  for (const device::TrajectorySample& sample : device::loadTrajectory(options.compare, options.trajectory)) {
-    reference.push_back({sample.time, options.reversed ? geometry::Vec3(-sample.force_N) : sample.force_N});
-  }
-  const auto errors = record::forceErrors(forces, reference);
-  if (!errors) throw std::runtime_error("'" + options.compare + "' has no sample at a time of the hand");
-  std::printf("compared    %zu samples of %s: contact in %zu, in both %zu\n", errors->samples,
-              options.compare.c_str(), errors->either, errors->both);
-  std::printf("force       off by %.4f N RMS, at most %.4f N; its magnitude by %.4f N RMS\n", errors->rms_N,
-              errors->largest_N, errors->magnitudeRms_N);
-  std::printf("direction   off by %.2f degrees RMS\n", errors->rmsDirection_deg);
-  if (errors->both > 0 && errors->meanCosine < -0.5)
-    std::printf("            the forces are opposite: with%s --reversed they would agree better\n",
-                options.reversed ? "out" : "");
-}
-
 double quantile(std::vector<double>& values, double share) {
   const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), values.begin() + at, values.end());
@@ -163,7 +136,7 @@ double quantile(std::vector<double>& values, double share) {
 }  // namespace
 
 int renderMesh(const MeshRenderOptions& options) {
-  const auto hand = loadHand(options);
+  const auto hand = device::HandFile::load(options.hand);
   if (!hand->remark().empty())
     std::fprintf(stderr, "hapticd: %s: %s\n", options.hand.c_str(), hand->remark().c_str());
   geometry::TriangleMesh mesh = mesh_io::loadMesh(options.mesh);
@@ -186,7 +159,6 @@ int renderMesh(const MeshRenderOptions& options) {
               summary.deepest_m * 1e3, options.raw ? " (raw: without the guard)" : "");
   std::printf("step time   p50 %.2f us, p99 %.2f us, max %.2f us\n", quantile(summary.step_us, 0.5),
               quantile(summary.step_us, 0.99), quantile(summary.step_us, 1.0));
-  if (!options.compare.empty()) compare(options, summary.forces);
   std::printf("peak memory %.1f MiB\n", static_cast<double>(usage.ru_maxrss) / 1024);
   return 0;
 }

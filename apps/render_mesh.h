@@ -3,8 +3,6 @@
 
 #include <string>
 
-#include "device/simulated/trajectory.h"
-
 namespace hapticd::apps {
 
 struct MeshRenderOptions {
@@ -12,10 +10,6 @@ struct MeshRenderOptions {
   std::string meshUnit = "mm";
   double size_mm = 0;
   std::string hand;
-  /// Of --hand and --compare where they are trajectories, not CSV.
-  device::TrajectoryFormat trajectory;
-  std::string compare;    ///< trajectory with the forces that should be felt; empty: none
-  bool reversed = false;  ///< its forces are those of the hand on the surface
   std::string out;
   double stiffness_N_per_m = 500;
   double damping_Ns_per_m = 0;

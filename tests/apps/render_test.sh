@@ -49,21 +49,3 @@ if "$hapticd" render --mesh "$source_dir/testdata/meshes/bunny.obj" --hand bad.c
   exit 1
 fi
 grep -q 'bad.csv:2' error.txt
-
-# A trajectory is a hand, and its forces are what should be felt: those of a plane, by a formula.
-along() {
-  "$hapticd" render --mesh "$source_dir/testdata/trajectories/plane.obj" --hand "$source_dir/testdata/trajectories/plane_probe.traj" \
-    --stiffness 500 --raw --out plane.csv --force "$@"
-}
-along --compare "$source_dir/testdata/trajectories/plane_probe.traj" >compared.txt
-grep -q 'compared    401 samples' compared.txt
-grep -qE 'force       off by 0\.000[0-9] N RMS, at most 0\.00[0-9]+ N' compared.txt
-grep -qE 'direction   off by 0\.0[0-9] degrees RMS' compared.txt
-along --compare "$source_dir/testdata/trajectories/plane_probe.traj" --reversed >compared.txt
-grep -qE 'direction   off by 180\.00 degrees RMS' compared.txt
-grep -q 'without --reversed' compared.txt
-if along --traj-columns t,x,y,z 2>error.txt; then
-  echo "seven columns were taken for four"
-  exit 1
-fi
-grep -q "plane_probe.traj:3: 7 numbers where 't,x,y,z' has 4" error.txt

@@ -8,13 +8,29 @@
 #include <system_error>
 
 #include "base/time.h"
-#include "device/simulated/text_line.h"
+#include "base/world.h"
 
 namespace hapticd::device {
 namespace {
 
 constexpr double kLongest_s = 1e8;
 constexpr std::size_t kAbsent = static_cast<std::size_t>(-1);
+
+struct Line {
+  const std::string& source;
+  std::size_t number;
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw HandFileError(source + ":" + std::to_string(number) + ": " + what);
+  }
+};
+
+std::string_view trimmed(std::string_view text) {
+  const auto isSpace = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
+  while (!text.empty() && isSpace(text.front())) text.remove_prefix(1);
+  while (!text.empty() && isSpace(text.back())) text.remove_suffix(1);
+  return text;
+}
 
 bool startsLikeANumber(std::string_view text) {
   return !text.empty() && std::string_view("+-.0123456789").find(text.front()) != std::string_view::npos;
@@ -47,7 +63,7 @@ struct Columns {
 };
 
 // t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons] without a header.
-Columns unnamed(std::size_t count, const TextLine& line) {
+Columns unnamed(std::size_t count, const Line& line) {
   if (count > 9) line.fail("more than 9 columns");
   if (count != 4 && count != 5 && count != 8 && count != 9)
     line.fail(std::to_string(count) + " columns where 4, 5, 8 or 9 are expected");
@@ -72,7 +88,7 @@ std::size_t findAll(const std::vector<std::string_view>& names, const std::array
   return at == names.end() ? kAbsent : static_cast<std::size_t>(at - names.begin());
 }
 
-Columns named(const std::vector<std::string_view>& names, std::string_view text, const TextLine& line) {
+Columns named(const std::vector<std::string_view>& names, std::string_view text, const Line& line) {
   Columns columns;
   columns.count = names.size();
   std::string time;
@@ -104,7 +120,17 @@ Columns named(const std::vector<std::string_view>& names, std::string_view text,
   return columns;
 }
 
-Nanos readNanos(std::string_view text, std::size_t column, const TextLine& line) {
+double readNumber(std::string_view text, std::size_t column, const Line& line) {
+  std::string_view digits = text;
+  if (!digits.empty() && digits.front() == '+') digits.remove_prefix(1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  if (error != std::errc{} || end != digits.data() + digits.size() || !std::isfinite(value))
+    line.fail("column " + std::to_string(column + 1) + " '" + std::string(text) + "' is not a finite number");
+  return value;
+}
+
+Nanos readNanos(std::string_view text, std::size_t column, const Line& line) {
   Nanos value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size())
@@ -112,23 +138,23 @@ Nanos readNanos(std::string_view text, std::size_t column, const TextLine& line)
   return value;
 }
 
-Nanos readTime(std::string_view text, const Columns& columns, const TextLine& line) {
+Nanos readTime(std::string_view text, const Columns& columns, const Line& line) {
   if (columns.nanoseconds) return readNanos(text, columns.time, line);
-  const double time_s = line.readNumber(text, columns.time);
+  const double time_s = readNumber(text, columns.time, line);
   if (!columns.fromFirstRow && (time_s < 0 || time_s > kLongest_s))
     line.fail("time " + std::to_string(time_s) + " s is out of range");
   if (std::abs(time_s) > 9e9) line.fail("time " + std::to_string(time_s) + " s is out of range");
   return base::toNanos(time_s);
 }
 
-Quat readOrientation(const Quat& quaternion, const TextLine& line) {
+Quat readOrientation(const Quat& quaternion, const Line& line) {
   const double length = quaternion.norm();
   if (std::abs(length - 1) > 0.01)
     line.fail("quaternion of length " + std::to_string(length) + " is not a rotation");
   return quaternion.normalized();
 }
 
-std::uint32_t readButtons(double buttons, const TextLine& line) {
+std::uint32_t readButtons(double buttons, const Line& line) {
   if (buttons != std::floor(buttons) || buttons < 0 || buttons > 4294967295.0)
     line.fail("buttons " + std::to_string(buttons) + " is not a set of bits");
   return static_cast<std::uint32_t>(buttons);
@@ -139,9 +165,10 @@ std::uint32_t readButtons(double buttons, const TextLine& line) {
 // Row by row into a HandFile.
 class HandFile::Parser {
  public:
-  explicit Parser(HandFile& hand) : hand_(hand) {}
+  Parser(HandFile& hand, const std::string& source) : hand_(hand), source_(source) {}
 
-  void add(const TextLine& line, std::string_view content) {
+  void add(std::string_view content, std::size_t number) {
+    const Line line{source_, number};
     split(content, cells_);
     if (columns_.count == 0 && !startsLikeANumber(content)) {
       columns_ = named(cells_, content, line);
@@ -173,11 +200,11 @@ class HandFile::Parser {
     return device == device_;
   }
 
-  double number(std::size_t column, const TextLine& line) const {
-    return line.readNumber(cells_[column], column);
+  double number(std::size_t column, const Line& line) const {
+    return readNumber(cells_[column], column, line);
   }
 
-  void addRow(const TextLine& line) {
+  void addRow(const Line& line) {
     Nanos time = readTime(cells_[columns_.time], columns_, line);
     if (hand_.rows_.empty() && columns_.fromFirstRow) begin_ = time;
     time -= begin_;
@@ -196,6 +223,7 @@ class HandFile::Parser {
   }
 
   HandFile& hand_;
+  const std::string& source_;
   Columns columns_;
   std::vector<std::string_view> cells_;
   std::string device_;
@@ -204,23 +232,26 @@ class HandFile::Parser {
 };
 
 std::shared_ptr<const HandFile> HandFile::load(const std::filesystem::path& file) {
-  return parse(readHandFile(file), file.string());
+  try {
+    const std::vector<std::byte> content = base::world().files.read(file);
+    return parse({reinterpret_cast<const char*>(content.data()), content.size()}, file.string());
+  } catch (const std::system_error& error) {
+    throw HandFileError(file.string() + ": cannot be read as a hand file: " + error.code().message());
+  }
 }
 
 std::shared_ptr<const HandFile> HandFile::parse(std::string_view text, const std::string& source) {
   std::shared_ptr<HandFile> hand(new HandFile);
-  Parser parser(*hand);
-  forEachLine(text, source,
-              [&](const TextLine& line, std::string_view content) { parser.add(line, content); });
+  Parser parser(*hand, source);
+  for (std::size_t number = 1; !text.empty(); ++number) {
+    const std::size_t end = text.find('\n');
+    const std::string_view content = trimmed(text.substr(0, end));
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+    if (content.empty() || content.front() == '#') continue;
+    parser.add(content, number);
+  }
   if (hand->rows_.empty()) throw HandFileError(source + ": no row with a hand in it");
   hand->remark_ = parser.remark();
-  return hand;
-}
-
-std::shared_ptr<const HandFile> HandFile::along(const Trajectory& trajectory) {
-  std::shared_ptr<HandFile> hand(new HandFile);
-  for (const TrajectorySample& sample : trajectory)
-    hand->rows_.push_back({sample.time, sample.position_m, Quat::Identity(), 0});
   return hand;
 }
 

@@ -4,15 +4,20 @@
 
 #include <filesystem>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "device/simulated/hand_path.h"
-#include "device/simulated/text_line.h"
-#include "device/simulated/trajectory.h"
 
 namespace hapticd::device {
+
+/// The file cannot be read as a hand; the text names file, line and value.
+class HandFileError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 /// Interpolates positions linearly and orientations by slerp; buttons stay until the next row. Before the
 /// first row and after the last one the hand rests. With time_ns the hand begins at the first row, and rows
@@ -23,9 +28,6 @@ class HandFile final : public HandPath {
   static std::shared_ptr<const HandFile> load(const std::filesystem::path& file);
   /// The same from text; `source` names it in errors.
   static std::shared_ptr<const HandFile> parse(std::string_view text, const std::string& source);
-
-  /// Along a trajectory, which is not empty.
-  static std::shared_ptr<const HandFile> along(const Trajectory& trajectory);
 
   HandPose at(Nanos sinceStart) const noexcept override;
   Nanos duration() const noexcept override { return rows_.back().time; }
