@@ -37,6 +37,10 @@ expect 'direction   RMS angle 36.87 deg, mean 36.87 deg, over 155 samples' frict
 expect 'both 155, only rendered 0, only in the file 0, neither 46' friction.txt
 expect 'proxy       RMS distance 0.2 mm from' friction.txt
 
+# With that friction nothing differs.
+feel --hand in.traj --compare probe.traj --static-friction 0.75 --dynamic-friction 0.75 >fitted.txt
+awk '/^force / { if ($4 > 1e-6) bad = 1; seen++ } END { exit bad || seen != 1 }' fitted.txt || { cat fitted.txt; exit 1; }
+
 # Half the stiffness: half the force is missing, in the same direction.
 feel --hand in.traj --compare proxy.traj --stiffness 250 >soft.txt
 expect '(50 % of the RMS force' soft.txt
