@@ -49,6 +49,7 @@ std::vector<record::ForceSample> loadReference(const std::string& file,
   if (!trajectory.remark.empty())
     std::fprintf(stderr, "hapticd: %s: %s\n", file.c_str(), trajectory.remark.c_str());
   std::vector<record::ForceSample> samples;
+  samples.reserve(trajectory.samples.size());
   for (const device::TrajectorySample& sample : trajectory.samples)
     samples.push_back(
         {.time = sample.time - origin, .force_N = sample.force_N, .point_m = sample.position_m});

@@ -45,6 +45,12 @@ awk '/^force / { if ($4 > 1e-6) bad = 1; seen++ } END { exit bad || seen != 1 }'
 feel --hand in.traj --compare proxy.traj --stiffness 250 >soft.txt
 expect '(50 % of the RMS force' soft.txt
 
+# What is compared is the force on the hand: the guard, which --raw leaves out, takes a part of it.
+feel --hand in.traj --compare proxy.traj --stiffness 1000 >raw.txt
+expect 'at most 0.76 N' raw.txt
+"$hapticd" render --mesh "$data/plane.obj" --force --out felt.csv --hand in.traj --compare proxy.traj --stiffness 1000 >guarded.txt
+awk '/^force / { sub(/.*at most /, ""); seen += $0 + 0 > 0 && $0 + 0 < 0.7 } END { exit seen != 1 }' guarded.txt || { cat guarded.txt; exit 1; }
+
 # The same data in other columns, units and signs, with hand and reference on a clock of their own.
 awk '!/^#/ { print $1 * 1000 ";" (-$5) ";" (-$6) ";" (-$7) ";0;" $2 / 1000 ";" $3 / 1000 ";" $4 / 1000 }' OFMT=%.9g CONVFMT=%.9g probe.traj >other.TRAJ
 awk '!/^#/ { print $1 * 1000 ";0;0;0;0;" $2 / 1000 ";" $3 / 1000 ";" $4 / 1000 }' OFMT=%.9g CONVFMT=%.9g in.traj >other_in.traj
