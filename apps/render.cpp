@@ -29,9 +29,14 @@ void addMeshOptions(CLI::App& command, MeshRenderOptions& options) {
                   "Scale the mesh to this largest extent and centre it [unchanged]")
       ->check(within(1e-6, 1e6));
   command
-      .add_option(
-          "--hand", options.hand,
-          "CSV: t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons] in device metres, or any CSV that hapticd wrote")
+      .add_option("--hand", options.hand,
+                  "CSV: t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons] in device metres, or any CSV that hapticd "
+                  "wrote; or a "
+                  ".traj file")
+      ->check(CLI::ExistingFile);
+  command
+      .add_option("--compare", options.compare,
+                  ".traj file with measured forces: print how far the rendered ones are from them")
       ->check(CLI::ExistingFile);
   command
       .add_option("--faces", options.faces,
@@ -40,6 +45,32 @@ void addMeshOptions(CLI::App& command, MeshRenderOptions& options) {
       ->capture_default_str();
   command.add_flag("--timing", options.timing,
                    "Fill the column compute_ns (the only one that differs from run to run)");
+}
+
+void addTrajectoryOptions(CLI::App& command, device::TrajectoryFormat& format) {
+  const auto columns = [&format](const std::string& names) {
+    try {
+      format.columns = device::TrajectoryColumns::parse(names);
+    } catch (const std::invalid_argument& error) {
+      throw CLI::ValidationError("--traj-columns", error.what());
+    }
+  };
+  const auto choice = [&](const char* name, const char* text, std::vector<std::string> values, auto&& use) {
+    command.add_option_function<std::string>(name, use, text)
+        ->check(CLI::IsMember(values))
+        ->default_str(values.front());
+  };
+  command
+      .add_option_function<std::string>(
+          "--traj-columns", columns,
+          "Columns of .traj files in order: t, x, y, z, fx, fy, fz, or - to skip one")
+      ->default_str("t,x,y,z[,fx,fy,fz]");
+  choice("--traj-unit", "Length unit of .traj files", {"mm", "m"},
+         [&format](const std::string& unit) { format.unit_m = unit == "m" ? 1 : 1e-3; });
+  choice("--traj-time-unit", "Time unit of .traj files", {"s", "ms"},
+         [&format](const std::string& unit) { format.unit_s = unit == "ms" ? 1e-3 : 1; });
+  choice("--traj-force", "What the forces of .traj files act on", {"probe", "surface"},
+         [&format](const std::string& on) { format.forceOnSurface = on == "surface"; });
 }
 
 void addSurfaceOptions(CLI::App& command, MeshRenderOptions& options) {
@@ -71,11 +102,29 @@ record::RerenderChanges changesOf(const CLI::App& command, const MeshRenderOptio
   return changes;
 }
 
+// Mesh, hand and reference fit together.
+void checkTrajectories(const CLI::App& command, const MeshRenderOptions& options) {
+  const bool handIsTrajectory = device::Trajectory::isNameOf(options.hand);
+  if (!options.compare.empty() && !device::Trajectory::isNameOf(options.compare))
+    throw std::runtime_error("--compare needs a .traj file, got " + options.compare);
+  if (handIsTrajectory && options.size_mm > 0)
+    throw std::runtime_error(
+        "--size-mm scales and moves the mesh, and a .traj file stays where it was measured: leave it out, or "
+        "set "
+        "--mesh-unit");
+  if (handIsTrajectory || !options.compare.empty()) return;
+  for (const char* name : {"--traj-columns", "--traj-unit", "--traj-time-unit", "--traj-force"}) {
+    if (command.count(name) > 0)
+      throw std::runtime_error(std::string(name) + " needs a .traj file at --hand or --compare");
+  }
+}
+
 int run(const CLI::App& command, const RenderCommandOptions& options) {
   keepFile(options.mesh.out, options.force);
   keepFile(options.report, options.force);
   if (!options.session.empty()) {
-    for (const char* name : {"--mesh", "--hand", "--mesh-unit", "--size-mm", "--faces", "--timing"}) {
+    for (const char* name :
+         {"--mesh", "--hand", "--compare", "--mesh-unit", "--size-mm", "--faces", "--timing"}) {
       if (command.count(name) == 0) continue;
       throw std::runtime_error(std::string(name) +
                                " belongs to --mesh; --session has its own scene and "
@@ -91,6 +140,7 @@ int run(const CLI::App& command, const RenderCommandOptions& options) {
     return 2;
   }
   if (!options.report.empty()) throw std::runtime_error("--report needs a --session to compare with");
+  checkTrajectories(command, options.mesh);
   return renderMesh(options.mesh);
 }
 
@@ -101,6 +151,7 @@ void addRender(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "render", "Render a mesh along a recorded hand, or re-render a recording; offline and deterministic");
   addMeshOptions(*command, options->mesh);
+  addTrajectoryOptions(*command, options->mesh.trajectory);
   command->add_option("--session", options->session, "Recording of 'hapticd serve --record' to re-render")
       ->check(CLI::ExistingFile);
   command->add_option("--out", options->mesh.out, "CSV to write, one row for each tick");
@@ -112,11 +163,17 @@ void addRender(CLI::App& app) {
       "With --mesh, --out has the columns of 'hapticd export --to csv' (docs/recording.md): hip_[xyz]_m, "
       "proxy_[xyz]_m,\n"
       "force_[xyz]_N (on the hand), depth_m, ... Device frame: +x right, +y up, +z to the user.\n"
+      "A .traj file is text with one sample on each line: t x y z [fx fy fz], in s, mm and N unless "
+      "--traj-...\n"
+      "options say otherwise, in the frame of the mesh. --compare prints the RMS error of the force, the "
+      "angle\n"
+      "between the forces, and the distance of the proxy. Data and formulas: docs/measured-trajectories.md.\n"
       "With --session, options change surfaces (of all objects and planes), tool radius and guard; all else "
       "stays as\n"
       "recorded. Without changes the forces equal the recorded ones bit for bit, or the exit status is 1.\n"
       "Examples:\n"
       "  hapticd render --mesh bunny.obj --hand stroke.csv --out felt.csv --raw\n"
+      "  hapticd render --mesh plane.obj --hand in.traj --raw --out felt.csv --compare probe.traj\n"
       "  hapticd render --session my.haptics\n"
       "  hapticd render --session my.haptics --stiffness 300 --report softer.html");
   command->callback([options, command] { exitCode = run(*command, *options); });

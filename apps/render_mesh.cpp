@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/world.h"
+#include "compare_trajectory.h"
 #include "device/profiles.h"
 #include "device/simulated/hand_file.h"
 #include "mesh_io/mesh_io.h"
@@ -60,6 +61,7 @@ struct Summary {
   double peakForce_N = 0;
   double deepest_m = 0;
   std::size_t touching = 0;
+  std::vector<record::ForceSample> forces;  ///< only with --compare
 };
 
 Summary follow(const MeshRenderOptions& options, const device::HandFile& hand,
@@ -113,6 +115,8 @@ Summary follow(const MeshRenderOptions& options, const device::HandFile& hand,
     summary.peakForce_N = std::max(summary.peakForce_N, force_N.norm());
     summary.deepest_m = std::max(summary.deepest_m, rendering.touching ? rendering.depth_m : 0.0);
     summary.touching += rendering.touching ? 1 : 0;
+    if (!options.compare.empty())
+      summary.forces.push_back({t, force_N, rendering.proxy_m, rendering.touching});
   }
   return summary;
 }
@@ -136,9 +140,12 @@ double quantile(std::vector<double>& values, double share) {
 }  // namespace
 
 int renderMesh(const MeshRenderOptions& options) {
-  const auto hand = device::HandFile::load(options.hand);
+  const auto hand = device::HandFile::load(options.hand, options.trajectory);
   if (!hand->remark().empty())
     std::fprintf(stderr, "hapticd: %s: %s\n", options.hand.c_str(), hand->remark().c_str());
+  std::vector<record::ForceSample> reference;
+  if (!options.compare.empty())
+    reference = loadReference(options.compare, options.trajectory, hand->origin());
   geometry::TriangleMesh mesh = mesh_io::loadMesh(options.mesh);
   const std::size_t triangles = mesh.triangles.size();
   if (options.size_mm > 0) fit(mesh, options);
@@ -160,6 +167,7 @@ int renderMesh(const MeshRenderOptions& options) {
   std::printf("step time   p50 %.2f us, p99 %.2f us, max %.2f us\n", quantile(summary.step_us, 0.5),
               quantile(summary.step_us, 0.99), quantile(summary.step_us, 1.0));
   std::printf("peak memory %.1f MiB\n", static_cast<double>(usage.ru_maxrss) / 1024);
+  if (!options.compare.empty()) printComparison(options.compare, summary.forces, reference);
   return 0;
 }
 

@@ -3,6 +3,8 @@
 
 #include <string>
 
+#include "device/simulated/trajectory_file.h"
+
 namespace hapticd::apps {
 
 struct MeshRenderOptions {
@@ -10,6 +12,8 @@ struct MeshRenderOptions {
   std::string meshUnit = "mm";
   double size_mm = 0;
   std::string hand;
+  std::string compare;  ///< trajectory whose forces the rendered ones are compared with; or empty
+  device::TrajectoryFormat trajectory;  ///< of `hand` and `compare`
   std::string out;
   double stiffness_N_per_m = 500;
   double damping_Ns_per_m = 0;

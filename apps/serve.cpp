@@ -236,7 +236,7 @@ void addServe(CLI::App& app) {
   command->add_option(
       "--hand", options->hand,
       "Simulated device: 'script' strokes the objects of the scene [script], FILE.csv follows the path\n"
-      "t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons]");
+      "t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons], FILE.traj a measured one");
   command->add_option("--report-rate", options->reportRate_Hz, "Reports per second [1000]")
       ->check(within(0.1, 4000));
   command->add_option("--seconds", options->seconds, "Stop after this time [until a signal]")

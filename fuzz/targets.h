@@ -23,6 +23,7 @@ void vrpn_cfg(Input input);         // the configuration of a stock server
 void toml_config(Input input);      // our configuration
 void recording(Input input);        // session files: as they are, and as blocks with valid checksums
 void hand_csv(Input input);         // the path of a simulated hand
+void hand_traj(Input input);        // a measured trajectory
 void haply_json(Input input);       // states of the Inverse Service
 void isolation_block(Input input);  // memory shared with the process of a driver
 void mesh_bytes(Input input);       // the mesh that the confined reader of a foreign file sends

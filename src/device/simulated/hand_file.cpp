@@ -4,37 +4,17 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <optional>
 #include <system_error>
 
 #include "base/time.h"
-#include "base/world.h"
 
 namespace hapticd::device {
 namespace {
 
+// Beyond these, differences would leave 64 bits or a double.
 constexpr double kLongest_s = 1e8;
+constexpr double kFarthest_m = 1e6;
 constexpr std::size_t kAbsent = static_cast<std::size_t>(-1);
-
-struct Line {
-  const std::string& source;
-  std::size_t number;
-
-  [[noreturn]] void fail(const std::string& what) const {
-    throw HandFileError(source + ":" + std::to_string(number) + ": " + what);
-  }
-};
-
-std::string_view trimmed(std::string_view text) {
-  const auto isSpace = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
-  while (!text.empty() && isSpace(text.front())) text.remove_prefix(1);
-  while (!text.empty() && isSpace(text.back())) text.remove_suffix(1);
-  return text;
-}
-
-bool startsLikeANumber(std::string_view text) {
-  return !text.empty() && std::string_view("+-.0123456789").find(text.front()) != std::string_view::npos;
-}
 
 // The cells of a row, trimmed. Commas in quotes do not separate; quotes stay.
 void split(std::string_view text, std::vector<std::string_view>& cells) {
@@ -63,7 +43,7 @@ struct Columns {
 };
 
 // t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons] without a header.
-Columns unnamed(std::size_t count, const Line& line) {
+Columns unnamed(std::size_t count, const TextLine& line) {
   if (count > 9) line.fail("more than 9 columns");
   if (count != 4 && count != 5 && count != 8 && count != 9)
     line.fail(std::to_string(count) + " columns where 4, 5, 8 or 9 are expected");
@@ -88,7 +68,7 @@ std::size_t findAll(const std::vector<std::string_view>& names, const std::array
   return at == names.end() ? kAbsent : static_cast<std::size_t>(at - names.begin());
 }
 
-Columns named(const std::vector<std::string_view>& names, std::string_view text, const Line& line) {
+Columns named(const std::vector<std::string_view>& names, std::string_view text, const TextLine& line) {
   Columns columns;
   columns.count = names.size();
   std::string time;
@@ -120,17 +100,7 @@ Columns named(const std::vector<std::string_view>& names, std::string_view text,
   return columns;
 }
 
-double readNumber(std::string_view text, std::size_t column, const Line& line) {
-  std::string_view digits = text;
-  if (!digits.empty() && digits.front() == '+') digits.remove_prefix(1);
-  double value = 0;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  if (error != std::errc{} || end != digits.data() + digits.size() || !std::isfinite(value))
-    line.fail("column " + std::to_string(column + 1) + " '" + std::string(text) + "' is not a finite number");
-  return value;
-}
-
-Nanos readNanos(std::string_view text, std::size_t column, const Line& line) {
+Nanos readNanos(std::string_view text, std::size_t column, const TextLine& line) {
   Nanos value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size())
@@ -138,7 +108,7 @@ Nanos readNanos(std::string_view text, std::size_t column, const Line& line) {
   return value;
 }
 
-Nanos readTime(std::string_view text, const Columns& columns, const Line& line) {
+Nanos readTime(std::string_view text, const Columns& columns, const TextLine& line) {
   if (columns.nanoseconds) return readNanos(text, columns.time, line);
   const double time_s = readNumber(text, columns.time, line);
   if (!columns.fromFirstRow && (time_s < 0 || time_s > kLongest_s))
@@ -147,14 +117,14 @@ Nanos readTime(std::string_view text, const Columns& columns, const Line& line) 
   return base::toNanos(time_s);
 }
 
-Quat readOrientation(const Quat& quaternion, const Line& line) {
+Quat readOrientation(const Quat& quaternion, const TextLine& line) {
   const double length = quaternion.norm();
   if (std::abs(length - 1) > 0.01)
     line.fail("quaternion of length " + std::to_string(length) + " is not a rotation");
   return quaternion.normalized();
 }
 
-std::uint32_t readButtons(double buttons, const Line& line) {
+std::uint32_t readButtons(double buttons, const TextLine& line) {
   if (buttons != std::floor(buttons) || buttons < 0 || buttons > 4294967295.0)
     line.fail("buttons " + std::to_string(buttons) + " is not a set of bits");
   return static_cast<std::uint32_t>(buttons);
@@ -168,7 +138,7 @@ class HandFile::Parser {
   Parser(HandFile& hand, const std::string& source) : hand_(hand), source_(source) {}
 
   void add(std::string_view content, std::size_t number) {
-    const Line line{source_, number};
+    const TextLine line{source_, number};
     split(content, cells_);
     if (columns_.count == 0 && !startsLikeANumber(content)) {
       columns_ = named(cells_, content, line);
@@ -200,20 +170,35 @@ class HandFile::Parser {
     return device == device_;
   }
 
-  double number(std::size_t column, const Line& line) const {
+  double number(std::size_t column, const TextLine& line) const {
     return readNumber(cells_[column], column, line);
   }
 
-  void addRow(const Line& line) {
+  double coordinate(std::size_t column, const TextLine& line) const {
+    const double value_m = number(column, line);
+    if (std::abs(value_m) > kFarthest_m) {
+      line.fail("column " + std::to_string(column + 1) + " '" + std::string(cells_[column]) +
+                "' is a position beyond 1e6 m");
+    }
+    return value_m;
+  }
+
+  void addRow(const TextLine& line) {
     Nanos time = readTime(cells_[columns_.time], columns_, line);
-    if (hand_.rows_.empty() && columns_.fromFirstRow) begin_ = time;
-    time -= begin_;
+    if (hand_.rows_.empty() && columns_.fromFirstRow) hand_.origin_ = time;
+    const double duration_s = base::toSeconds(time) - base::toSeconds(hand_.origin_);
+    if (duration_s > kLongest_s)
+      line.fail("time " + std::to_string(base::toSeconds(time)) +
+                " s is more than 1e8 s after the first row");
+    if (duration_s < -kLongest_s) return;
+    time -= hand_.origin_;
     // A client may write a report twice, or a late one after its successor.
     if (columns_.fromFirstRow && !hand_.rows_.empty() && time <= hand_.rows_.back().time) return;
     if (!hand_.rows_.empty() && time <= hand_.rows_.back().time)
       line.fail("time " + std::to_string(base::toSeconds(time)) + " s is not after the row before");
     const std::size_t x = columns_.position;
-    Row row{time, Vec3(number(x, line), number(x + 1, line), number(x + 2, line)), Quat::Identity(), 0};
+    Row row{time, Vec3(coordinate(x, line), coordinate(x + 1, line), coordinate(x + 2, line)),
+            Quat::Identity(), 0};
     if (const std::size_t q = columns_.orientation; q != kAbsent) {
       row.orientation = readOrientation(
           Quat(number(q + 3, line), number(q, line), number(q + 1, line), number(q + 2, line)), line);
@@ -228,30 +213,31 @@ class HandFile::Parser {
   std::vector<std::string_view> cells_;
   std::string device_;
   bool otherDevices_ = false;
-  Nanos begin_ = 0;
 };
 
-std::shared_ptr<const HandFile> HandFile::load(const std::filesystem::path& file) {
-  try {
-    const std::vector<std::byte> content = base::world().files.read(file);
-    return parse({reinterpret_cast<const char*>(content.data()), content.size()}, file.string());
-  } catch (const std::system_error& error) {
-    throw HandFileError(file.string() + ": cannot be read as a hand file: " + error.code().message());
-  }
+std::shared_ptr<const HandFile> HandFile::load(const std::filesystem::path& file,
+                                               const TrajectoryFormat& format) {
+  if (Trajectory::isNameOf(file)) return of(Trajectory::load(file, format));
+  return parse(readText(file), file.string());
 }
 
 std::shared_ptr<const HandFile> HandFile::parse(std::string_view text, const std::string& source) {
   std::shared_ptr<HandFile> hand(new HandFile);
   Parser parser(*hand, source);
-  for (std::size_t number = 1; !text.empty(); ++number) {
-    const std::size_t end = text.find('\n');
-    const std::string_view content = trimmed(text.substr(0, end));
-    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
-    if (content.empty() || content.front() == '#') continue;
-    parser.add(content, number);
-  }
+  forEachLine(text, [&](std::string_view content, std::size_t number) {
+    if (content.front() != '#') parser.add(content, number);
+  });
   if (hand->rows_.empty()) throw HandFileError(source + ": no row with a hand in it");
   hand->remark_ = parser.remark();
+  return hand;
+}
+
+std::shared_ptr<const HandFile> HandFile::of(const Trajectory& trajectory) {
+  std::shared_ptr<HandFile> hand(new HandFile);
+  hand->origin_ = trajectory.samples.front().time;
+  for (const TrajectorySample& sample : trajectory.samples)
+    hand->rows_.push_back({sample.time - hand->origin_, sample.position_m, Quat::Identity(), 0});
+  hand->remark_ = trajectory.remark;
   return hand;
 }
 

@@ -86,6 +86,18 @@ TEST(HandFile, NamesFileLineAndValueOfAnError) {
   EXPECT_EQ(errorOf("t_s,x_m,y_m,z_m\n"), "hand.csv: no row with a hand in it");
 }
 
+// Sums and differences of what was read stay finite: times fit into 64 bits, interpolated positions into a
+// double.
+TEST(HandFile, RefusesTimesAndPositionsThatCannotBeSubtracted) {
+  EXPECT_EQ(
+      errorOf("time_ns,hip_x_m,hip_y_m,hip_z_m\n-9000000000000000000,0,0,0\n9000000000000000000,0,0,0\n"),
+      "hand.csv:3: time 9000000000.000000 s is more than 1e8 s after the first row");
+  EXPECT_EQ(errorOf("time_s,x_m,y_m,z_m\n-9e9,0,0,0\n9e9,0,0,0\n"),
+            "hand.csv:3: time 9000000000.000000 s is more than 1e8 s after the first row");
+  EXPECT_EQ(errorOf("0,0,1e308,0\n1,0,-1e308,0\n"),
+            "hand.csv:1: column 3 '1e308' is a position beyond 1e6 m");
+}
+
 TEST(HandFile, ReadsWhatHapticdWrites) {
   const auto hand = HandFile::parse(
       "device,time_ns,tick,revision,hip_x_m,hip_y_m,hip_z_m,proxy_x_m,qx,qy,qz,qw,buttons,guard_active,"

@@ -1,0 +1,48 @@
+// What the readers of hand files share: text with one row of values on each line.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+namespace hapticd::device {
+
+/// The file cannot be read as a hand; the text names file, line and value.
+class HandFileError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// The place of a row, for errors.
+struct TextLine {
+  const std::string& source;
+  std::size_t number;
+
+  [[noreturn]] void fail(const std::string& what) const;
+};
+
+/// Without spaces, tabs and carriage returns at both ends.
+std::string_view trimmed(std::string_view text) noexcept;
+
+bool startsLikeANumber(std::string_view text) noexcept;
+
+/// `column` counts from 0 and is only for the error. Throws HandFileError.
+double readNumber(std::string_view text, std::size_t column, const TextLine& line);
+
+/// Throws HandFileError.
+std::string readText(const std::filesystem::path& file);
+
+/// Calls use(content, number) for each line that is not empty.
+template <class Use>
+void forEachLine(std::string_view text, Use&& use) {
+  for (std::size_t number = 1; !text.empty(); ++number) {
+    const std::size_t end = text.find('\n');
+    const std::string_view content = trimmed(text.substr(0, end));
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+    if (!content.empty()) use(content, number);
+  }
+}
+
+}  // namespace hapticd::device
