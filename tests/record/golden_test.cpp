@@ -282,8 +282,7 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(GoldenName{"all_commands_v1.haptics", 1}, GoldenName{"gripper_v2.haptics", 1},
                     GoldenName{"all_commands_law2.haptics", 2}, GoldenName{"all_commands_law3.haptics", 3},
                     GoldenName{"all_commands_law4.haptics", 4}, GoldenName{"all_commands_law5.haptics", 5},
-                    GoldenName{"all_commands_law6.haptics", 6},
-                    GoldenName{"all_commands_law7.haptics", 7}),
+                    GoldenName{"all_commands_law6.haptics", 6}, GoldenName{"all_commands_law7.haptics", 7}),
     [](const auto& file) {
       const std::string name = file.param.file;
       return name.substr(0, name.find('.'));
