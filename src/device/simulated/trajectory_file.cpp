@@ -8,10 +8,10 @@ namespace hapticd::device {
 namespace {
 
 // Beyond these a unit is wrong, or the arithmetic of a renderer would overflow.
-constexpr double kFarthest_m = 1e3;
+constexpr double kFarthestSample_m = 1e3;
 constexpr double kStrongest_N = 1e6;
 constexpr double kLatest_s = 9e9;
-constexpr double kLongest_s = 1e8;
+constexpr double kLongestTrajectory_s = 1e8;
 // Slower files exist, but times in milliseconds are likelier.
 constexpr double kSlowest_Hz = 10;
 
@@ -109,7 +109,8 @@ class Parser {
     const double time_s = number(columns_->time, format_.unit_s, kLatest_s, "a time in s", line);
     TrajectorySample sample;
     sample.time = base::toNanos(time_s);
-    sample.position_m = vector(columns_->position, format_.unit_m, kFarthest_m, "a position in m", line);
+    sample.position_m =
+        vector(columns_->position, format_.unit_m, kFarthestSample_m, "a position in m", line);
     if (columns_->force) {
       const double sign = format_.forceOnSurface ? -1 : 1;
       sample.force_N = vector(*columns_->force, sign, kStrongest_N, "a force in N", line);
@@ -132,8 +133,8 @@ class Parser {
       line.fail("time " + numberOf(time_s) + " s is before that of the sample before, " +
                 numberOf(base::toSeconds(before)) + " s");
     }
-    if (time_s - first_s_ > kLongest_s)
-      line.fail("time " + numberOf(time_s) + " s is more than " + numberOf(kLongest_s) +
+    if (time_s - first_s_ > kLongestTrajectory_s)
+      line.fail("time " + numberOf(time_s) + " s is more than " + numberOf(kLongestTrajectory_s) +
                 " s after the first one");
     return true;
   }
@@ -168,9 +169,9 @@ class Parser {
 
 TrajectoryColumns TrajectoryColumns::parse(std::string_view names) {
   constexpr std::array<std::string_view, 7> kNames{"t", "x", "y", "z", "fx", "fy", "fz"};
-  constexpr std::size_t kAbsent = static_cast<std::size_t>(-1);
+  constexpr std::size_t kNoColumn = static_cast<std::size_t>(-1);
   std::array<std::size_t, kNames.size()> at{};
-  at.fill(kAbsent);
+  at.fill(kNoColumn);
   TrajectoryColumns columns;
   for (std::size_t begin = 0; begin <= names.size(); ++columns.count) {
     const std::size_t end = std::min(names.find(',', begin), names.size());
@@ -181,15 +182,15 @@ TrajectoryColumns TrajectoryColumns::parse(std::string_view names) {
     if (known == kNames.end())
       throw std::invalid_argument("'" + std::string(name) + "' is none of t, x, y, z, fx, fy, fz and -");
     std::size_t& column = at[static_cast<std::size_t>(known - kNames.begin())];
-    if (column != kAbsent) throw std::invalid_argument("'" + std::string(name) + "' is there twice");
+    if (column != kNoColumn) throw std::invalid_argument("'" + std::string(name) + "' is there twice");
     column = columns.count;
   }
   for (std::size_t i = 0; i < 4; ++i) {
-    if (at[i] == kAbsent) throw std::invalid_argument("'" + std::string(kNames[i]) + "' is missing");
+    if (at[i] == kNoColumn) throw std::invalid_argument("'" + std::string(kNames[i]) + "' is missing");
   }
   columns.time = at[0];
   columns.position = {at[1], at[2], at[3]};
-  const auto forces = std::count(at.begin() + 4, at.end(), kAbsent);
+  const auto forces = std::count(at.begin() + 4, at.end(), kNoColumn);
   if (forces != 0 && forces != 3) throw std::invalid_argument("fx, fy and fz come together");
   if (forces == 0) columns.force = {at[4], at[5], at[6]};
   return columns;

@@ -6,6 +6,7 @@
 #include <bitset>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -365,11 +366,11 @@ bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
     const scene::MeshGeometry& mesh = *placed.state->mesh;
     const Vec3 inObject = placed.T_object_device * centre;
     const double reach = radius + placed.radius + 4 * placed.skin;
-    const bool hasFans = mesh.fans && !placed.deformed;
-    JoinedFans fans(placed, now_.time, inObject, reach, toolRadius_);
+    std::optional<JoinedFans> fans;
+    if (mesh.fans && !placed.deformed) fans.emplace(placed, now_.time, inObject, reach, toolRadius_);
     mesh.index.visitNear(inObject, reach * kWiden * placed.stretch, [&](std::uint32_t triangle) noexcept {
       FacetCache::TriangleId id{triangle, static_cast<std::int16_t>(i), 0};
-      if (hasFans && !fans.join(id)) {
+      if (fans && !fans->join(id)) {
         ++work_;
       } else if (placed.deformed || id.level > 0 || mayReach(placed, triangle, inObject, reach)) {
         addToCache(id, inObject);
@@ -377,7 +378,7 @@ bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
       if (workSpent()) cache_.invalidate();
       return cache_.complete();
     });
-    joinedFans_ = joinedFans_ || fans.any();
+    joinedFans_ = joinedFans_ || (fans && fans->any());
   }
   gatheredCount_ = objectCount_;
   gatheredGeneration_ = reusable ? generation_ : 0;
