@@ -460,9 +460,9 @@ bool ContactQuery::castGathered(const Path& path, int only, ObjectHit& hit) noex
 }
 
 bool ContactQuery::castAtFacets(const Path& path, int only, ObjectHit& hit) noexcept {
-  FacetCache::Candidates candidates;
-  const int count =
-      cache_.facetsNearPath(path.p + path.begin * path.d, (path.end - path.begin) * path.d, candidates);
+  std::array<const Facet*, FacetCache::kMaxFacets> candidates;
+  const int count = cache_.facetsNearPath(path.p + path.begin * path.d, (path.end - path.begin) * path.d,
+                                          candidates.data());
   bool found = false;
   if (only < 0 && planes_ != nullptr) {
     for (const PlacedPlane& plane : *planes_) considerFacet(plane.facet, path, hit, found);
@@ -473,23 +473,21 @@ bool ContactQuery::castAtFacets(const Path& path, int only, ObjectHit& hit) noex
     if (only < 0 || f.object == only) considerFacet(f, path, hit, found);
   };
   const auto last = candidates.begin() + count;
-  if (std::any_of(candidates.begin(), last, [&](const auto& c) { return c.facet == first; }))
-    consider(*first);
-  for (auto c = candidates.begin(); c != last; ++c) {
-    if (c->facet == first) continue;
+  if (std::find(candidates.begin(), last, first) != last) consider(*first);
+  for (auto f = candidates.begin(); f != last; ++f) {
+    if (*f == first) continue;
     const double before = found ? hit.stop : path.end;
-    if (path.begin + c->earliest * (path.end - path.begin) > before) continue;
-    consider(*c->facet);
-    if (found && hit.stop < before) lastBlocker_ = static_cast<int>(c->facet - cache_.begin());
+    consider(**f);
+    if (found && hit.stop < before) lastBlocker_ = static_cast<int>(*f - cache_.begin());
   }
   return found;
 }
 
 double ContactQuery::freeOfFaces(const Vec3& p, const Vec3& g, bool closesGaps) noexcept {
-  FacetCache::Candidates candidates;
+  std::array<const Facet*, FacetCache::kMaxFacets> candidates;
   const Vec3 d = g - p;
   if (!ensureGathered(p, d.norm())) return 0;
-  const int count = cache_.facetsNearPath(p, d, candidates);
+  const int count = cache_.facetsNearPath(p, d, candidates.data());
   double free = 1;
   const auto meet = [&](Facet facet) {
     double stop = 1;
@@ -498,7 +496,7 @@ double ContactQuery::freeOfFaces(const Vec3& p, const Vec3& g, bool closesGaps) 
     CastHit hit;
     if (castBall(facet, faces(), p, d, 1, free, hit)) free = std::min(free, hit.stop);
   };
-  for (int i = 0; i < count; ++i) meet(*candidates[static_cast<std::size_t>(i)].facet);
+  for (int i = 0; i < count; ++i) meet(*candidates[static_cast<std::size_t>(i)]);
   if (planes_ == nullptr) return free;
   for (const PlacedPlane& plane : *planes_) meet(plane.facet);
   return free;

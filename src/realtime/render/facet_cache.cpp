@@ -45,24 +45,24 @@ void FacetCache::add(const TriangleId& id, double distance, double skin, bool de
   maxSkin_ = std::max(maxSkin_, skin);
 }
 
-int FacetCache::facetsNearPath(const Vec3& p, const Vec3& d, Candidates& found) const noexcept {
+int FacetCache::facetsNearPath(const Vec3& p, const Vec3& d, const Facet** found) const noexcept {
   const double height = maxRadius_ + kClear * maxSkin_;
   const Vec3 middle = p + 0.5 * d;
   const double reach = 0.5 * d.norm() + height;
-  std::size_t n = 0;
+  int n = 0;
   for (int i = 0; i < count_; ++i) {
     const SupportPlane& plane = supportPlanes_[static_cast<std::size_t>(i)];
     const double start = plane.normal.dot(p) - plane.offset;
     const double end = start + plane.normal.dot(d);
+    found[n] = &facets_[static_cast<std::size_t>(i)];
     const Bound& bound = bounds_[static_cast<std::size_t>(i)];
     const double farthest = bound.radius + reach;
-    const bool near = std::min(start, end) < height && std::max(start, end) > -height &&
-                      (bound.centre - middle).squaredNorm() <= farthest * farthest;
-    const double above = std::abs(start) - height;
-    found[n] = {&facets_[static_cast<std::size_t>(i)], above > 0 ? above / std::abs(end - start) : 0};
-    n += near ? 1 : 0;
+    n += std::min(start, end) < height && std::max(start, end) > -height &&
+                 (bound.centre - middle).squaredNorm() <= farthest * farthest
+             ? 1
+             : 0;
   }
-  return static_cast<int>(n);
+  return n;
 }
 
 void FacetCache::moveTo(const Vec3& p) noexcept {

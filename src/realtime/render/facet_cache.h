@@ -63,14 +63,9 @@ class FacetCache {
   double refine(int i, const Vec3& foot, const Vec3& d) noexcept;
   /// Marks entry i as unreachable.
   void exclude(int i) noexcept;
-  /// A facet near a path from p to p + d: it blocks p + t d from t = `earliest` on, if it does.
-  struct Candidate {
-    const Facet* facet;
-    double earliest;
-  };
-  using Candidates = std::array<Candidate, kMaxFacets>;
-  /// Point tool: all facets that the path from p to p + d may reach. Returns how many.
-  int facetsNearPath(const Vec3& p, const Vec3& d, Candidates& found) const noexcept;
+  /// Point tool: all facets that the path from p to p + d may reach. `found` has room for kMaxFacets. Returns
+  /// how many.
+  int facetsNearPath(const Vec3& p, const Vec3& d, const Facet** found) const noexcept;
 
  private:
   // normal . x = offset: the plane of the face (point tool), or a plane with the face on its back (ball
