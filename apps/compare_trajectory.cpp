@@ -1,5 +1,6 @@
 #include "compare_trajectory.h"
 
+#include <cmath>
 #include <cstdio>
 #include <stdexcept>
 
@@ -7,6 +8,18 @@ namespace hapticd::apps {
 namespace {
 
 using record::ForceErrors;
+
+// Longer than any trajectory; nanoseconds between clocks further apart may not fit into Nanos.
+constexpr double kFarApart_s = 1e9;
+
+void requireNearClocks(const std::string& file, base::Nanos first, base::Nanos origin) {
+  const double after_s = base::toSeconds(first) - base::toSeconds(origin);
+  if (std::abs(after_s) <= kFarApart_s) return;
+  char text[64];
+  std::snprintf(text, sizeof text, " begins %.1f s %s the hand", std::abs(after_s),
+                after_s > 0 ? "after" : "before");
+  throw std::runtime_error(file + text + ": both need the same clock");
+}
 
 void print(const ForceErrors& errors) {
   std::printf("force       RMS error %.4g N", errors.rms_N);
@@ -48,6 +61,7 @@ std::vector<record::ForceSample> loadReference(const std::string& file,
     throw std::runtime_error(file + " has no forces to compare with: it has no columns fx, fy and fz");
   if (!trajectory.remark.empty())
     std::fprintf(stderr, "hapticd: %s: %s\n", file.c_str(), trajectory.remark.c_str());
+  requireNearClocks(file, trajectory.samples.front().time, origin);
   std::vector<record::ForceSample> samples;
   samples.reserve(trajectory.samples.size());
   for (const device::TrajectorySample& sample : trajectory.samples)

@@ -73,6 +73,11 @@ measures() { grep -E '^(force|magnitude|direction|contact|proxy) ' "$1" | sed 's
 diff <(measures friction.txt) <(measures csv.txt)
 awk -F, 'NR > 1 { $1 -= 12 } 1' OFS=, OFMT=%.9g CONVFMT=%.9g in.csv >shifted.csv
 refused 'both need the same clock' --hand shifted.csv --compare proxy.traj
+# Clocks so far apart that nanoseconds between them do not fit into 64 bits.
+printf '%s\n' '-8999999990.2 0 0 0 0 0 0' '-8999999990.1 0 0 0 0 0 0' >early.traj
+printf '%s\n' '8999999990.1 0 0 0 0 0 0' '8999999990.2 0 0 0 0 0 0' >late.traj
+refused 'late.traj begins 17999999980.3 s after the hand: both need the same clock' --hand early.traj --compare late.traj
+refused 'early.traj begins 17999999980.3 s before the hand: both need the same clock' --hand late.traj --compare early.traj
 
 awk 'NR == 5 { $3 = "zero" } 1' in.traj >bad.traj
 refused "bad.traj:5: column 3 'zero' is not a finite number" --hand bad.traj
