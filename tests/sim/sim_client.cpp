@@ -23,7 +23,7 @@ void SimClient::connect() {
   options.hardLimitBytes = std::size_t{256} << 20;
   peer_.emplace(names_);
   orders_.clear();
-  sent_ = 0;
+  sent_ = read_ = 0;
   lastTick = 0;
   closed_ = false;
   mayEnd_ = false;
@@ -87,6 +87,7 @@ void SimClient::onArrived(std::uint64_t total) {
 
 void SimClient::onRead(std::uint64_t total) {
   constexpr Nanos kLongest = 5'000'000;
+  read_ = total;
   while (!orders_.empty() && orders_.front().end <= total) {
     const Order order = orders_.front();
     orders_.pop_front();

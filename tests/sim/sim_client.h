@@ -70,6 +70,7 @@ class SimClient {
   // The network, on the server's side.
   void onArrived(std::uint64_t total);
   void onRead(std::uint64_t total);
+  std::uint64_t unread() const { return sent_ - read_; }
 
   /// May send more than the server reads ahead: then TCP keeps its stops waiting.
   bool sendsAhead = false;
@@ -106,6 +107,7 @@ class SimClient {
   net::Connection connection_;
   std::deque<Order> orders_;
   std::uint64_t sent_ = 0;
+  std::uint64_t read_ = 0;  // by the server
   bool closed_ = true;
   bool mayEnd_ = false;
 };

@@ -25,6 +25,8 @@ using geometry::Vec3f;
 
 constexpr char kRecording[] = "/recording.haptics";
 constexpr double kHalf = 20;  // world units (mm) of the cube
+constexpr std::int32_t kUploaded = 5;
+constexpr double kPlace = 777;  // where the object of the uploads is at the end
 
 wire::F64x16 shifted(double x, double y, double z) {
   return {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1};
@@ -237,6 +239,8 @@ class Simulation {
   bool wasFull_ = false;
   std::map<std::int32_t, std::int64_t> seen_;  // newest batch of each batcher that a description showed
   bool compared_ = false;
+  bool uploaded_ = false;
+  bool wallSteps_ = false;
 };
 
 Simulation::Simulation(const Script& script, bool verbose)
@@ -379,19 +383,35 @@ Outcome Simulation::run() {
   after(script_.length, [this] {
     scheduler_.calm();
     bench_.quiet = true;
-    if (reader_->open()) reader_->resumeReading();
+    after(500 * kMs, [this] {
+      if (reader_->open()) reader_->resumeReading();
+    });
     files_.freeBytes.reset();
     ++moving_;
     if (script_.cube) pose(y_);
+    // Behind all that it uploaded: shows at the end whether that was carried out.
+    if (uploaded_ && uploader_->connected())
+      uploader_->send(wire::SetTransformMatrix{kUploaded, shifted(kPlace, 0, 0)});
+  });
+  // What the reader misses last, it is told when it reads again.
+  after(script_.length - 1'000 * kMs, [this] {
+    if (reader_->open()) reader_->pauseReading();
   });
   const Nanos settled = script_.length + 1'500 * kMs +
                         (script_.adversity.sceneStall > 0 ? script_.adversity.longestSceneStall : 0) +
                         (script_.adversity.freeze > 0 ? 3'000 * kMs : 0) +
                         (script_.faults.lost > 0 ? 8'000 * kMs : 0);
   after(settled - 200 * kMs, [this] {
+    if (wallSteps_) clock_.stepWall(-3'600'000 * kMs);
     if (operators_.front()->connected()) operators_.front()->rearmForces();
   });
   after(settled, [this] { describe(true); });
+  // Between two heartbeats: nothing else wakes the server.
+  after(settled + 490 * kMs, [this] {
+    const Nanos late = (judge_.ticks() - operators_.front()->lastTick) * kMs;
+    if (!bench_.lost && operators_.front()->connected() && late > 30 * kMs + 2 * script_.networkDelay)
+      finding("the newest report of a tick is " + std::to_string(late / kMs) + " ms old");
+  });
   after(settled + 500 * kMs, [this] {
     checkEnd();
     over_ = true;
@@ -462,7 +482,7 @@ void Simulation::perform(const Action& action) {
       if (!reader_->open() || bench_.quiet) break;
       reader_->pauseReading();
       after(dice.between(100 * kMs, 4'000 * kMs), [this] {
-        if (reader_->open()) reader_->resumeReading();
+        if (reader_->open() && clock_.now() < script_.length - 1'000 * kMs) reader_->resumeReading();
       });
       break;
     case Action::Kind::nonsense:
@@ -474,7 +494,10 @@ void Simulation::perform(const Action& action) {
       reader_->flush();
       break;
     case Action::Kind::wallStep:
-      clock_.stepWall(dice.between(-3'600'000 * kMs, 3'600'000 * kMs));
+      // Within its longest travel the server cannot tell an order that was overtaken from a clock that was
+      // set.
+      clock_.stepWall((dice.chance(0.5) ? 1 : -1) * dice.between(11'000 * kMs, 3'600'000 * kMs));
+      wallSteps_ = true;
       break;
     case Action::Kind::diskFull:
       files_.freeBytes = dice.below(200'000);
@@ -533,14 +556,25 @@ void Simulation::upload(Dice& dice) {
   if (!uploader_->connected()) return;
   constexpr std::size_t kVertices = 5000;
   const std::size_t messages = dice.chance(0.2) ? 150 + dice.below(150) : 1 + dice.below(20);
+  // At the end the slowest network has carried it all.
+  const std::uint64_t bytes = uploader_->unread() + messages * kVertices * sizeof(Vec3f);
+  const Nanos roundTrip = 2 * (script_.networkDelay + script_.networkJitter);
+  const Nanos travel = static_cast<Nanos>(bytes / script_.window + 1) * roundTrip;
+  if (clock_.now() + travel > script_.length) return;
   for (std::size_t i = 0; i < messages; ++i) {
     wire::MeshVertices vertices;
-    vertices.object = 5;
+    vertices.object = kUploaded;
     vertices.first = static_cast<std::int32_t>(i % 20 * kVertices);
     vertices.positions.values.assign(3 * kVertices, 1000.0F + static_cast<float>(i));
     uploader_->queue(vertices);
   }
   uploader_->flush();
+  uploaded_ = true;
+  // Its stop does not wait for what it sent before.
+  if (!dice.chance(0.2)) return;
+  after(dice.between(0, 300 * kMs), [this] {
+    if (uploader_->connected() && !bench_.quiet) uploader_->stopForces();
+  });
 }
 
 void Simulation::appear(Dice& dice) {
@@ -671,6 +705,11 @@ void Simulation::compare(const scene::SceneDescription& description, bool last) 
               " and " + std::to_string(number(*b)) + ", earlier " + std::to_string(seen) + ", sent " +
               std::to_string(batcher->sent));
     seen = number(*a);
+  }
+  if (last && uploaded_) {
+    const auto* const object = find(kUploaded);
+    if (object == nullptr || std::abs(object->T_world_object.translation().x() - kPlace) > 1e-9)
+      finding("what the uploader sent last has not been carried out");
   }
   if (!last || !cubeOwner_ || !cubeOwner_->uploaded) return;
   const auto* const object = find(0);

@@ -45,9 +45,8 @@ class DeviceControl {
   void stopForces(const Order& order, const Sender& sender);
   /// Re-arms. Returns false, with the reason, when
   /// - a stop is later than the re-arm: it was received at the same time or later, or the same machine sent
-  /// it
-  ///   later on another connection (a stamp that is earlier by more than kLongestTravel proves nothing: the
-  ///   clock of that machine was set);
+  ///   it later on another connection (a stamp that is earlier by more than kLongestTravel proves nothing:
+  ///   the clock of that machine was set);
   /// - a stop of another program stands. Each program may undo its own; operators undo all; where there are
   ///   none, a page in a browser does, once all those programs are gone;
   /// - the sender may not command, and there is more to re-arm than its own stop (`faults`: latched trips).
