@@ -1,0 +1,50 @@
+// Meshes that spend the work of every tick: the proxy gets through nothing, and the force fades out.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "scene_fixture.h"
+
+namespace hapticd::realtime::fixture {
+namespace {
+
+// Large triangles in almost one place, so that all of them are around the tool wherever it touches.
+TriangleMesh copies(int count, double jitter_m) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> jitter(-jitter_m, jitter_m);
+  TriangleMesh mesh;
+  for (int i = 0; i < count; ++i) {
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    for (const Vec3& corner : {Vec3(-0.1, 0, -0.1), Vec3(0, 0, 0.1), Vec3(0.1, 0, -0.1)})
+      mesh.vertices.push_back((corner + Vec3(jitter(random), jitter(random), jitter(random))).cast<float>());
+    mesh.triangles.push_back({first, first + 1, first + 2});
+  }
+  return mesh;
+}
+
+TEST(WorkLimit, force_fades_out_after_20_ticks_and_returns_when_the_hand_has_left) {
+  constexpr double kJitter_m = 1e-6;
+  SceneFixture fixture;
+  fixture.add(copies(3000, kJitter_m), surface(1000));
+  Hand hand(fixture.snapshot());
+  const Vec3 above(0, 0.005, 0);
+  const Vec3 pressed(0, -0.001, 0);
+  for (int touch = 0; touch < 2; ++touch) {
+    hand.at(above);
+    EXPECT_EQ(hand.at(above).status & kRenderWorkLimit, 0U) << "nothing to examine";
+    int spent = 0;
+    for (int tick = 1; tick <= 100; ++tick) {
+      const Rendering& r = hand.at(tick < 10 ? Vec3(above + tick / 10.0 * (pressed - above)) : pressed);
+      EXPECT_GE(r.proxy_m.y(), -kJitter_m - 1e-9) << tick;
+      if ((r.status & kRenderWorkLimit) != 0) ++spent;
+      if (tick < 10) continue;
+      const double share = std::clamp(1 - (spent - 20) / 50.0, 0.0, 1.0);
+      EXPECT_NEAR(r.force_N.norm(), share * 1.0, 0.01) << tick << ", " << spent << " spent";
+    }
+    EXPECT_GT(spent, 80);
+  }
+}
+
+}  // namespace
+}  // namespace hapticd::realtime::fixture
