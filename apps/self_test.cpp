@@ -62,7 +62,7 @@ Outcome goldenForces() {
   realtime::Renderer renderer;
   realtime::Rendering rendering;
   std::vector<std::array<double, 3>> forces;
-  constexpr base::Nanos kPeriod = 1'000'000;
+  constexpr base::Nanos kTickPeriod = 1'000'000;
   int touching = 0;
   for (int i = 0; i < 4000; ++i) {
     // A spiral down a sphere whose radius swings through the surface.
@@ -72,9 +72,9 @@ Outcome goldenForces() {
     const double height = 0.9 - 1.8 * share;
     const double ring = std::sqrt(1 - height * height);
     device::DeviceState state;
-    state.time = i * kPeriod;
+    state.time = i * kTickPeriod;
     state.position_m = radius_m * Vec3(ring * std::cos(turn), height, ring * std::sin(turn));
-    renderer.step(*snapshot, state, state.time, kPeriod, rendering);
+    renderer.step(*snapshot, state, state.time, kTickPeriod, rendering);
     touching += rendering.touching ? 1 : 0;
     const Vec3& f = rendering.force_N;
     forces.push_back({f.x(), f.y(), f.z()});

@@ -23,7 +23,7 @@
 namespace hapticd::bench {
 namespace {
 
-constexpr std::int64_t kPeriod_ns = 1'000'000;
+constexpr std::int64_t kPost_ns = 1'000'000;  // from one count to the next
 
 struct Word {
   std::atomic<std::uint32_t> count{0};
@@ -39,7 +39,7 @@ Samples bareFutex(double seconds) {
   if (poster == 0) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     becomeRealtime();
-    for (std::int64_t due = nowNs() + kPeriod_ns;; due = std::max(due + kPeriod_ns, nowNs())) {
+    for (std::int64_t due = nowNs() + kPost_ns;; due = std::max(due + kPost_ns, nowNs())) {
       sleepUntilNs(due);
       word.time_ns = nowNs();
       word.count.fetch_add(1, std::memory_order_release);
