@@ -4,9 +4,11 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <memory>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "base/world.h"
@@ -61,6 +63,7 @@ struct Summary {
   double peakForce_N = 0;
   double deepest_m = 0;
   std::size_t touching = 0;
+  geometry::Box hips_m;
   std::vector<record::ForceSample> forces;  ///< only with --compare
 };
 
@@ -115,6 +118,7 @@ Summary follow(const MeshRenderOptions& options, const device::HandFile& hand,
     summary.peakForce_N = std::max(summary.peakForce_N, force_N.norm());
     summary.deepest_m = std::max(summary.deepest_m, rendering.touching ? rendering.depth_m : 0.0);
     summary.touching += rendering.touching ? 1 : 0;
+    summary.hips_m.extend(pose.position_m);
     if (!options.compare.empty())
       summary.forces.push_back({t, force_N, rendering.proxy_m, rendering.touching});
   }
@@ -129,6 +133,15 @@ void fit(geometry::TriangleMesh& mesh, const MeshRenderOptions& options) {
   const double unitsPerMm = options.meshUnit == "m" ? 1e-3 : 1.0;
   const double scale = options.size_mm * unitsPerMm / bounds.extents().maxCoeff();
   geometry::scaleAndMove(mesh, scale, -scale * bounds.centre());
+}
+
+std::string millimetres(const geometry::Box& box_m) {
+  std::array<char, 160> text{};
+  const geometry::Vec3 min = 1e3 * box_m.min;
+  const geometry::Vec3 max = 1e3 * box_m.max;
+  std::snprintf(text.data(), text.size(), "x %.4g to %.4g, y %.4g to %.4g, z %.4g to %.4g mm", min.x(),
+                max.x(), min.y(), max.y(), min.z(), max.z());
+  return text.data();
 }
 
 double quantile(std::vector<double>& values, double share) {
@@ -149,6 +162,10 @@ int renderMesh(const MeshRenderOptions& options) {
   geometry::TriangleMesh mesh = mesh_io::loadMesh(options.mesh);
   const std::size_t triangles = mesh.triangles.size();
   if (options.size_mm > 0) fit(mesh, options);
+  geometry::Box bounds_m = geometry::boundsOf(mesh);
+  const double metres = options.meshUnit == "m" ? 1.0 : 1e-3;
+  bounds_m.min *= metres;
+  bounds_m.max *= metres;
 
   const Nanos before = base::now();
   const auto snapshot = makeScene(options, std::move(mesh));
@@ -157,6 +174,12 @@ int renderMesh(const MeshRenderOptions& options) {
   record::CsvFile out(options.out);
   Summary summary = follow(options, *hand, *snapshot, out);
   out.close();
+  if (summary.touching == 0) {
+    std::fprintf(stderr,
+                 "hapticd: the hand never touched the mesh: the hand is at %s; the mesh at %s. "
+                 "--size-mm scales and centres the mesh\n",
+                 millimetres(summary.hips_m).c_str(), millimetres(bounds_m).c_str());
+  }
 
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);

@@ -38,6 +38,11 @@ sed '1s/hip_\([xyz]\)_m/hand_\1_m/g' a.csv >old.csv
 grep -q 'older version' remark.txt
 cmp again.csv from_old.csv
 
+# A hand beside the mesh is no error, and probably a mistake.
+printf 't_s,x_m,y_m,z_m\n0,1,1,1\n0.1,1,1,1.1\n' >far.csv
+"$hapticd" render --mesh "$source_dir/testdata/meshes/bunny.obj" --hand far.csv --out far_felt.csv >/dev/null 2>remark.txt
+grep -q 'never touched the mesh: the hand is at x 1000 to 1000, y 1000 to 1000, z 1000 to 1100 mm; the mesh at x -' remark.txt
+
 if "$hapticd" render --mesh "$source_dir/README.md" --hand "$source_dir/examples/hands/bunny_outline.csv" --out c.csv 2>error.txt; then
   echo "a text file was taken for a mesh"
   exit 1

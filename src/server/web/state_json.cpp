@@ -252,6 +252,14 @@ std::string messagesJson() {
   return textOf({{"messages", std::move(messages)}});
 }
 
+std::string faultsOf(const ServerStatus& status) {
+  std::string faults;
+  for (const DeviceStatus& device : status.devices) {
+    if (!device.fault.empty()) faults += "device '" + device.names.front() + "': " + device.fault + '\n';
+  }
+  return faults;
+}
+
 std::string errorJson(std::string_view text) {
   return textOf({{"error", text}}) + '\n';
 }

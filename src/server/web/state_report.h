@@ -31,6 +31,9 @@ std::string metricsText(const StateReport& report);
 /// Body of /api/messages: the names of all wire messages, with direction and meaning.
 std::string messagesJson();
 
+/// Why the server is of no use now, a line for each device that does not work; empty when all work.
+std::string faultsOf(const ServerStatus& status);
+
 /// Body of an HTTP error: {"error": text}. The text may contain any bytes; what is not UTF-8 is replaced by
 /// U+FFFD.
 std::string errorJson(std::string_view text);

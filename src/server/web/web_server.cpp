@@ -133,6 +133,9 @@ void WebServer::route(const net::HttpRequest& request, const net::HttpReply& rep
     sendState(reply, &stateJson, "application/json");
   } else if (path == "/metrics") {
     sendState(reply, &metricsText, "text/plain; version=0.0.4; charset=utf-8");
+  } else if (path == "/healthz") {
+    const std::string faults = faultsOf(owner_.status());
+    respond(reply, faults.empty() ? net::HttpResponse::of(200, "ok\n") : net::HttpResponse::of(503, faults));
   } else if (path == "/api/mesh") {
     sendMesh(request, reply);
   } else if (path == "/api/servers") {

@@ -20,6 +20,16 @@ TEST(StateJson, NamesOfAnyBytesGiveValidJson) {
   EXPECT_EQ(state["devices"][0]["name"], "\uFFFD\uFFFD \x01");
 }
 
+TEST(Faults, NameEveryDeviceThatDoesNotWork) {
+  ServerStatus status;
+  status.devices.resize(3);
+  for (std::size_t i = 0; i < 3; ++i) status.devices[i].names = {"Arm" + std::to_string(i)};
+  EXPECT_EQ(faultsOf(status), "");
+  status.devices[0].fault = "the cable is unplugged";
+  status.devices[2].fault = "not calibrated";
+  EXPECT_EQ(faultsOf(status), "device 'Arm0': the cable is unplugged\ndevice 'Arm2': not calibrated\n");
+}
+
 TEST(ErrorJson, IsValidForAnyBytes) {
   for (const std::string text : {"plain", "a \"quoted\" \\ name", "line\nbreak \x01\x1f", ""}) {
     EXPECT_EQ(json::parse(errorJson(text))["error"], text);

@@ -363,6 +363,12 @@ TEST_F(Web, ServesThePageWithSecurityHeaders) {
   EXPECT_EQ(get(web(), "/vrpn").status, 426);
 }
 
+TEST_F(Web, HealthIsOkWhileAllDevicesWork) {
+  const Answer answer = get(web(), "/healthz");
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_EQ(answer.body, "ok\n");
+}
+
 TEST_F(Web, ListsTheMessagesOfTheWire) {
   const json messages = get(web(), "/api/messages").json()["messages"];
   ASSERT_EQ(messages.size(), wire::kMessageKinds);
