@@ -45,7 +45,7 @@ done <"$list"
 
 run() { (cd "$work" && timeout 300 "build/bin/$1" --gtest_filter="$2" >run.log 2>&1); }
 
-[ -e "$work/build/build.ninja" ] || cmake -G Ninja -S "$tree" -B "$work/build" -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" >/dev/null
+[ -e "$work/build/build.ninja" ] || cmake -G Ninja -S "$tree" -B "$work/build" -DCMAKE_BUILD_TYPE=Release -DHAPTICD_WERROR=OFF -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" >/dev/null
 mapfile -t needed < <(for i in "${todo[@]}"; do echo "${programs[i]}"; done | sort -u)
 echo "${#names[@]} changes, ${#todo[@]} to try; building ${needed[*]} without any ..."
 [ "${#todo[@]}" = 0 ] || build_clone "${needed[@]}" || { tail -20 "$work/build.log"; exit 2; }

@@ -113,7 +113,7 @@ class CsvHeader {
   }
   template <class S>
   void put(const std::string& name, const std::optional<Eigen::Matrix<S, 3, 1>>&) {
-    put(name, Eigen::Matrix<S, 3, 1>());
+    put(name, Eigen::Matrix<S, 3, 1>::Zero().eval());
   }
   template <class S>
   void put(const std::string& name, const Eigen::Matrix<S, 3, 1>&) {
