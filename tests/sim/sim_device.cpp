@@ -132,7 +132,10 @@ class SimDevice final : public device::Device {
     if (drawn(f.notFinite)) notFinite_ = ticks(20);
     if (drawn(f.hold)) hold_ = ticks(400);
     if (drawn(f.fault)) fault_ = ticks(100);
-    if (drawn(f.leap)) leap_ = ticks(6);
+    if (drawn(f.leap)) {
+      leap_ = ticks(6);
+      if (bench->dice.chance(0.5)) shaking_ = ticks(1500);
+    }
     if (drawn(f.refuse)) refuse_ = ticks(30);
     if (drawn(f.hang)) hang_ = bench->dice.between(2 * kMs, 300 * kMs);
     if (drawn(f.lost)) {
@@ -159,11 +162,14 @@ class SimDevice final : public device::Device {
     if (leap_ > 0) {
       state.position_m.x() += 0.02;
       state.velocity_m_per_s.x() = 3;
+    } else if (shaking_ > 0) {
+      state.velocity_m_per_s.x() = 0.6;  // not too fast any more, and not calm
     }
     count(notFinite_);
     count(hold_);
     count(fault_);
     count(leap_);
+    count(shaking_);
   }
 
   device::SimulatedDevice hand_;
@@ -175,6 +181,7 @@ class SimDevice final : public device::Device {
   int hold_ = 0;
   int fault_ = 0;
   int leap_ = 0;
+  int shaking_ = 0;
   int refuse_ = 0;
   Nanos hang_ = 0;
   std::uint64_t overtaken_ = 0;
