@@ -175,6 +175,7 @@ class Page {
 
   private onState(state: ServerState | undefined): void {
     this.serverResponds = state !== undefined;
+    this.showLink();
     if (!state && this.state) this.clearReadout();
     if (state) {
       this.state = state;
@@ -259,19 +260,19 @@ class Page {
     if (this.link.state === "lost" || (!this.serverResponds && this.state)) return showNotice("lost");
     if (noDevice) return showNotice("no device");
     if (!this.device || this.link.state === "connecting") return showNotice("connecting");
+    const loading = !byId("drop-panel").hidden; // its picture is under the notice
     showNotice(
-      this.objects().some((o) => o.triangles > 0) || (this.scene?.planes.length ?? 0) > 0 ? "" : "empty",
+      loading ||
+        this.objects().some((o) => o.triangles > 0) || (this.scene?.planes.length ?? 0) > 0 ? "" : "empty",
     );
   }
 
   // The connection.
 
   private onLinkState(): void {
-    const label = byId("link");
-    document.body.classList.toggle("lost", this.link.state === "lost");
     const { state } = this.link;
-    setText(label, state === "open" ? "connected" : state);
-    label.dataset["level"] = state === "open" ? "good" : state === "lost" ? "bad" : "";
+    document.body.classList.toggle("lost", state === "lost");
+    this.showLink();
     if (state === "open") this.subscribe();
     if (state === "lost") {
       this.hand.onLost();
@@ -279,6 +280,14 @@ class Page {
       this.meshes.clear(); // another server numbers its shapes from 1, too
     }
     this.showNotice();
+  }
+
+  private showLink(): void {
+    const { state } = this.link;
+    const silent = state === "open" && !this.serverResponds;
+    const label = byId("link");
+    setText(label, silent ? "no answer" : state === "open" ? "connected" : state);
+    label.dataset["level"] = silent || state === "lost" ? "bad" : state === "open" ? "good" : "";
   }
 
   // What is not known is a dash, not a number of before.
@@ -377,8 +386,9 @@ class Page {
     const usable = device?.simulated === true && hand.enabled;
     this.view.canvas.dataset["hand"] = String(usable);
     byId("let-go").hidden = !hand.held;
-    byId("hand-bar").hidden = !device || !hand.enabled;
-    setText(byId("hand-status"), this.handText());
+    const text = this.handText();
+    byId("hand-bar").hidden = !hand.enabled || text === "";
+    setText(byId("hand-status"), text);
   }
 
   private handText(): string {

@@ -106,4 +106,4 @@ function roundTimes(min: number, max: number): number[] {
 
 const timeText = (us: number): string =>
   us < 999 ? `${Number(us.toPrecision(2))} µs` : `${Number((us / 1000).toPrecision(2))} ms`;
-const powerText = (power: number): string => (power < 4 ? String(10 ** power) : `10^${power}`);
+const powerText = (power: number): string => (power < 4 ? String(10 ** power) : `10${"⁰¹²³⁴⁵⁶⁷⁸⁹"[power]}`);
