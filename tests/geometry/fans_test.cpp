@@ -91,9 +91,9 @@ TEST(Fans, EveryLevelCoversAllTrianglesOnceInTheirWinding) {
 TEST(Fans, JoinedTrianglesAreWithinTheErrorThatWasAskedFor) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> share(0, 1);
-  for (const double wave : {0.0, 0.05, 0.3}) {
-    const TriangleMesh mesh =
-        fanOf(2000, [&](int i) { return -0.4 + wave * std::sin(2 * M_PI * 3 * i / 2000); });
+  for (const auto& [rim, wave] : {std::pair{-0.4, 0.0}, {0.4, 0.0}, {-0.4, 0.05}, {-0.4, 0.3}}) {
+    const TriangleMesh mesh = fanOf(
+        2000, [&, rim = rim, wave = wave](int i) { return rim + wave * std::sin(2 * M_PI * 3 * i / 2000); });
     const Fans fans = fansOf(mesh);
     for (const double error : {1e-6, 1e-4, 1e-3}) {
       for (const double radius : {0.003, 0.1, 0.8}) {
@@ -127,6 +127,19 @@ TEST(Fans, ASmallerErrorAndALargerRadiusTakeAFinerLevel) {
 
 TEST(Fans, AZigzagIsNotJoined) {
   const Fans fans = fansOf(fanOf(2000, [](int i) { return i % 2 == 0 ? 0.0 : 0.2; }));
+  EXPECT_TRUE(fans.empty() || fans.levelFor(0, 0.01, 1e-4) == 0);
+}
+
+// A rim that goes four steps on and two back is covered three times by its triangles.
+TEST(Fans, ATwistedFanIsNotJoined) {
+  constexpr int kCount = 1000;
+  TriangleMesh mesh = fanOf(kCount, [](int) { return 0.0; });
+  for (int i = 0; i < kCount; ++i) {
+    const double a = 2 * M_PI * (i + (i % 2 == 0 ? 0 : 3)) / kCount;
+    mesh.vertices[static_cast<std::size_t>(1 + i)] =
+        Vec3(std::cos(a), (1 + 0.1 * (i % 2)) * std::sin(a), 0).cast<float>();
+  }
+  const Fans fans = fansOf(mesh);
   EXPECT_TRUE(fans.empty() || fans.levelFor(0, 0.01, 1e-4) == 0);
 }
 

@@ -172,7 +172,11 @@ TEST_F(Objects, WayOfAnObjectThatCannotBeFeltIsAJump) {
 // A late tick looks for an object where it was.
 TEST_F(Objects, IndexFindsAnObjectWhereItWasATenthOfASecondAgo) {
   makeTouchable(0);
-  makeTouchable(1);
+  // Others, so that not all are in one leaf.
+  for (int id = 1; id < 60; ++id) {
+    makeTouchable(id);
+    say(SetTransform{id, columns(at(0, 20 * id, 0))});
+  }
   for (int i = 0; i < 100; ++i) {
     wait(16 * kMillisecond);
     say(SetTransform{0, columns(at(3 * i, 0, 0))});

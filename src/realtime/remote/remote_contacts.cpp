@@ -451,8 +451,7 @@ Vec3 RemoteContacts::friction(Slot& slot, const RemoteHand& hand, double ofAll, 
   apart -= slot.normal.dot(apart) * slot.normal;
   const double stiffness = kLateral * slot.contact.stiffness_N_per_m * slot.normal_N / ofAll;
   const double pull = stiffness * apart.norm();
-  // While the coefficients follow an update, the static one may be the smaller.
-  const double dynamic_N = std::min(slot.staticFriction, slot.dynamicFriction) * slot.normal_N;
+  const double dynamic_N = slot.dynamicFriction * slot.normal_N;
   if (pull > (slot.sliding ? dynamic_N : slot.staticFriction * slot.normal_N)) {
     slot.sliding = true;
     apart *= dynamic_N / pull;

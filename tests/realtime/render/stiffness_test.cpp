@@ -374,6 +374,22 @@ TEST_F(StiffnessTest, force_never_exceeds_the_stiffest_spring) {
   }
 }
 
+// Three soft plates beside a stiff one have three times the weight of one.
+TEST_F(StiffnessTest, several_soft_neighbours_do_not_add_up) {
+  constexpr double kStiff = 1000;
+  addPlate(Vec3::Zero(), -Vec3::UnitX(), Vec3::UnitZ(), kStiff);
+  for (const double soft : {10.0, 11.0, 12.0}) addPlate(Vec3::Zero(), Vec3::UnitX(), Vec3::UnitZ(), soft);
+  Hand hand(scene.snapshot());
+  hand.at({-0.01, 0, 0.001});
+  double largest = 0;
+  for (double x = -0.01; x < 0.002; x += 2e-5) {
+    const Rendering& r = hand.at({x, 0, -0.002});
+    largest = std::max(largest, r.force_N.norm() / r.depth_m);
+    EXPECT_LE(r.force_N.norm(), kStiff * r.depth_m * (1 + 1e-9)) << x;
+  }
+  EXPECT_GT(largest, 0.99 * kStiff);
+}
+
 // Millimetres and other transforms of the same scene give the same force.
 TEST_F(StiffnessTest, blend_does_not_depend_on_the_unit) {
   std::array<Vec3, 2> force;
