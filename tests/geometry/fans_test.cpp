@@ -91,9 +91,13 @@ TEST(Fans, EveryLevelCoversAllTrianglesOnceInTheirWinding) {
 TEST(Fans, JoinedTrianglesAreWithinTheErrorThatWasAskedFor) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> share(0, 1);
-  for (const auto& [rim, wave] : {std::pair{-0.4, 0.0}, {0.4, 0.0}, {-0.4, 0.05}, {-0.4, 0.3}}) {
-    const TriangleMesh mesh = fanOf(
-        2000, [&, rim = rim, wave = wave](int i) { return rim + wave * std::sin(2 * M_PI * 3 * i / 2000); });
+  struct Rim {
+    double height;
+    double wave;
+  };
+  for (const Rim& rim : {Rim{-0.4, 0}, {0.4, 0}, {-0.4, 0.05}, {-0.4, 0.3}}) {
+    const TriangleMesh mesh =
+        fanOf(2000, [&](int i) { return rim.height + rim.wave * std::sin(2 * M_PI * 3 * i / 2000); });
     const Fans fans = fansOf(mesh);
     for (const double error : {1e-6, 1e-4, 1e-3}) {
       for (const double radius : {0.003, 0.1, 0.8}) {
@@ -110,7 +114,7 @@ TEST(Fans, JoinedTrianglesAreWithinTheErrorThatWasAskedFor) {
               (1 - s) * mesh.vertices[fine[1]].cast<double>() + s * mesh.vertices[fine[2]].cast<double>();
           const Vec3 p = share(random) * radius * way.normalized();
           const Triangle joined = fans.joined(level, fans.firstOf(level, t).triangle);
-          EXPECT_LE(distanceFrom(mesh, joined, p), 1.05 * error) << wave << " level " << level;
+          EXPECT_LE(distanceFrom(mesh, joined, p), 1.05 * error) << rim.wave << " level " << level;
         }
       }
     }
