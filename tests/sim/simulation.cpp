@@ -402,10 +402,10 @@ Outcome Simulation::run() {
                         (script_.adversity.freeze > 0 ? 3'000 * kMs : 0) +
                         (script_.faults.lost > 0 ? 8'000 * kMs : 0);
   after(settled - 300 * kMs, [this] {
-    if (wallSteps_ && operators_.back()->connected()) operators_.back()->stopForces();
+    if (wallSteps_ && operators_.front()->connected()) operators_.front()->stopForces();
   });
   after(settled - 200 * kMs, [this] {
-    if (wallSteps_) clock_.stepWall(-3'600'000 * kMs);
+    if (wallSteps_) clock_.stepWall(-5'000 * kMs);
     if (operators_.front()->connected()) operators_.front()->rearmForces();
   });
   after(settled, [this] { describe(true); });
