@@ -19,7 +19,7 @@ for argument in "$@"; do
 done
 
 scripts/install_packages.sh build viewer bench
-cmake --preset release >/dev/null
+scripts/configure_programs.sh >/dev/null
 cmake --build build/release --parallel "$(nproc)" --target hapticd hapticd-bench | awk 'NR % 10 == 1 || !/^\[[0-9]+\/[0-9]+\] (Building|Linking)/'
 out=build/bench
 rm -rf "$out"

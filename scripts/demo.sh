@@ -16,14 +16,12 @@ for argument in "$@"; do
   esac
 done
 
-# cached NAME ELSE: what build/release is configured with, so that this script does not rebuild what is there.
-cached() { [ ! -e build/release/CMakeCache.txt ] && echo "$2" || sed -n "s/^$1:.*=//p" build/release/CMakeCache.txt; }
-# The page needs Node.js and packages from the npm registry; only --keep shows it.
-web=$(cached HAPTICD_WEB OFF)
-[ -z "$keep" ] || web=ON
+# The page needs Node.js and packages from the npm registry; only --keep shows it. A build that has it keeps it.
+web=OFF
+if [ -n "$keep" ] || grep -qs '^HAPTICD_WEB:.*=ON' build/release/CMakeCache.txt; then web=ON; fi
 scripts/install_packages.sh build $([ "$web" = OFF ] || echo viewer)
 SECONDS=0
-cmake --preset release -DHAPTICD_WEB="$web" -DHAPTICD_UNITY="$(cached HAPTICD_UNITY ALL)" >/dev/null
+scripts/configure_programs.sh -DHAPTICD_WEB="$web" >/dev/null
 cmake --build build/release --parallel "$(nproc)" --target hapticd
 echo "the build took $SECONDS s"
 

@@ -21,7 +21,7 @@ read_hours() {
 build_for_ledger() {
   local target=$1 name=$2
   shift 2
-  [ -e build/release/build.ninja ] || cmake --preset release
+  cmake --preset release >/dev/null
   cmake --build build/release --target "$target" -- -j "$jobs"
   commit=$(git rev-parse --short=10 HEAD)
   [ -z "$(git status --porcelain --untracked-files=no -- "$@")" ] || commit+="+changes"

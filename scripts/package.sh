@@ -91,7 +91,7 @@ d}" "$debian/copyright.in" >"$debian/copyright"
 }
 
 build=$source/build/release
-[ -e "$build/build.ninja" ] || cmake --preset release >/dev/null
+[ -e "$build/build.ninja" ] || { scripts/install_packages.sh build viewer; scripts/configure_programs.sh >/dev/null; }
 cmake --build "$build" --target "${targets[@]}" >build/package.log 2>&1 || { tail -30 build/package.log; exit 1; }
 out=$source/build/package
 package "$build" "$out"
@@ -133,7 +133,7 @@ fi
 if [ -n "$long" ]; then
   # In a place of its own, with the same path inside: copies of the sources below build/.
   status=0
-  cmake --preset release -B "$source/build/release2" >/dev/null
+  scripts/configure_programs.sh -B "$source/build/release2" >/dev/null
   CCACHE_DISABLE=1 cmake --build "$source/build/release2" --target "${targets[@]}" >build/package2.log 2>&1 || status=1
   [ "$status" != 0 ] || package "$source/build/release2" "$out/second"
   for file in "$out"/*.deb "$out"/*.tar.gz; do
