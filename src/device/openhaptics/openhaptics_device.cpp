@@ -52,7 +52,7 @@ void OpenHapticsDevice::open() {
   written_N_.setZero();
   frames_ = 0;
   calibrated_ = hot_ = false;
-  lost_ = silent_ = false;
+  lost_ = silent_ = unreported_ = false;
   sameFrames_ = 0;
   settling_ = 0;
   hotUntil_ = faultUntil_ = 0;
@@ -285,6 +285,7 @@ void OpenHapticsDevice::onError(hd::Enum code) noexcept {
     lost_ = true;
   } else {
     faultUntil_ = now_ + kForceErrorHold;
+    unreported_ = true;
   }
 }
 
@@ -307,7 +308,8 @@ std::string OpenHapticsDevice::faultText() const {
   const std::uint32_t hold = hold_;
   std::string words;
   const auto say = [&](const std::string& sentence) { words += (words.empty() ? "" : "; ") + sentence; };
-  if ((hold & kHoldFault) != 0) {
+  // A force error holds for a moment only: who asks later still learns of it.
+  if (unreported_.exchange(false) || (hold & kHoldFault) != 0) {
     const hd::Enum code = lastError_;
     if (silent_) {
       say("the driver gave one and the same position for half a second under a force, and it tells a lost "

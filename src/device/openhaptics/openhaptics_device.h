@@ -78,8 +78,9 @@ class OpenHapticsDevice final : public Device, private hd::Participant {
   std::atomic<bool> consent_{false};
   std::atomic<std::uint32_t> hold_{kHoldNone};
   std::atomic<hd::Enum> lastError_{hd::kSuccess};
-  std::atomic<bool> lost_{false};    // until reopened
-  std::atomic<bool> silent_{false};  // lost without an error
+  mutable std::atomic<bool> unreported_{false};  // a force error since faultText() was last called
+  std::atomic<bool> lost_{false};                // until reopened
+  std::atomic<bool> silent_{false};              // lost without an error
 
   // Scheduler thread only, from here on.
   ThermalDerating derating_{0, 0};

@@ -34,6 +34,10 @@ bool depthsOf(const ObjectHit* hits, int count, double toolRadius_m, const Vec3&
   return false;
 }
 
+bool rests(const PlacedObject& object) {
+  return object.before != nullptr && !object.moved && !object.deformed && !object.jumped;
+}
+
 }  // namespace
 
 const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double period_s,
@@ -65,6 +69,7 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   if (query_.overflowed() || !contactSet_.spring.complete) status |= kRenderCandidateLimit;
   if (query_.isEnclosed()) status |= kRenderEnclosed;
   fadeWhenOverworked(status);
+  rememberConstraints();
   before_ = now;
   positionBefore_ = position_;
   hipBefore_ = hip;
@@ -85,6 +90,7 @@ void Proxy::startAt(const SceneAtTime& now, const Vec3& hip) noexcept {
   share_ = 1;
   position_ = positionBefore_ = hipBefore_ = hip;
   contactSet_ = ContactSet{};
+  lastCount_ = 0;
   query_.restart();
   before_ = now;
   touchedObject_ = -1;
@@ -140,6 +146,7 @@ void Proxy::updateProxy(const Vec3& hip) noexcept {
   ActiveSet active;
   if (frictionless()) {
     moveFrictionless(hip, active);
+    if (active.count == 0) restoreConstraints(hip, active);
     updateContactSet(hip, position_, active);
     slide_ = Slide{};
     return;
@@ -211,7 +218,46 @@ void Proxy::findConstraints(const Vec3& hip, ActiveSet& active) noexcept {
   active.count = 0;
   Vec3 goal = hip;
   approach(hip, true, active, goal);
+  if (active.count == 0 && restoreConstraints(hip, active)) goal = nearestTo(hip, active).point;
   updateContactSet(hip, goal, active);
+}
+
+Projection Proxy::nearestTo(const Vec3& target, const ActiveSet& active) const noexcept {
+  std::array<HalfSpace, kMaxHalfSpaces> halfSpaces;
+  for (int i = 0; i < active.count; ++i) {
+    halfSpaces[static_cast<std::size_t>(i)] = active.hits[static_cast<std::size_t>(i)].halfSpace;
+  }
+  return projectOntoActiveSet(halfSpaces.data(), active.count, target, position_, query_.minSkin() / 16);
+}
+
+// The work of a tick may be spent before the faces that hold the proxy are found again. Those of the last
+// tick hold it then: the force fades out (fadeWhenOverworked) and does not end at once.
+bool Proxy::restoreConstraints(const Vec3& hip, ActiveSet& active) const noexcept {
+  if (!query_.workSpent()) return false;
+  for (int i = 0; i < lastCount_; ++i) {
+    const LastConstraint& last = lastConstraints_[static_cast<std::size_t>(i)];
+    const HalfSpace& face = last.halfSpace;
+    const bool below = face.normal.dot(hip - face.anchor) < toolRadius_;
+    if (!below || std::abs(face.height(position_)) > kLargestGapTolerance_m) continue;
+    for (int k = 0; k < query_.objectCount(); ++k) {
+      const PlacedObject& object = query_.object(k);
+      if (object.state->id != last.object || !rests(object)) continue;
+      ObjectHit& hit = active.hits[static_cast<std::size_t>(active.count++)];
+      hit = ObjectHit{};
+      hit.object = k;
+      hit.triangle = last.triangle;
+      hit.halfSpace = face;
+    }
+  }
+  return active.count > 0;
+}
+
+void Proxy::rememberConstraints() noexcept {
+  lastCount_ = contactSet_.count;
+  for (int i = 0; i < lastCount_; ++i) {
+    const ContactConstraint& c = contactSet_.constraints[static_cast<std::size_t>(i)];
+    lastConstraints_[static_cast<std::size_t>(i)] = {c.object, c.triangle, c.halfSpace};
+  }
 }
 
 // One approach: collects half-spaces on the path. `goal` becomes the point nearest to the target above them.
@@ -223,13 +269,8 @@ bool Proxy::approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Ve
   // A face that the tool overlaps moves it out, by its own way in at most. Faces that leave it no room would
   // move it far: their planes may meet anywhere.
   const double farthest = (position_ - target).norm() + 2 * query_.radius() + 4 * skin;
-  std::array<HalfSpace, kMaxHalfSpaces> halfSpaces;
   while (casts_ < limit) {
-    for (int i = 0; i < active.count; ++i) {
-      halfSpaces[static_cast<std::size_t>(i)] = active.hits[static_cast<std::size_t>(i)].halfSpace;
-    }
-    const Projection nearest =
-        projectOntoActiveSet(halfSpaces.data(), active.count, target, position_, skin / 16);
+    const Projection nearest = nearestTo(target, active);
     goal = nearest.point;
     jammed_ = !nearest.found || (goal - target).norm() > farthest;
     if (jammed_) {
@@ -300,7 +341,7 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
       const PlacedObject& object = query_.object(hit.object);
       constraint.object = object.state->id;
       constraint.surface = object.state->surface;
-      constraint.rests = object.before != nullptr && !object.moved && !object.deformed && !object.jumped;
+      constraint.rests = rests(object);
       if (!object.jumped) {
         const Vec3 carried = carriedBy(object, hit.triangle, positionBefore_);
         constraint.surfaceVelocity_m_per_s = (carried - positionBefore_) / period_s_;

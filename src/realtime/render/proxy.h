@@ -92,6 +92,13 @@ class Proxy {
     bool jammed = false;  // they leave the proxy no room
   };
 
+  // A face that held the proxy at the end of the last tick.
+  struct LastConstraint {
+    std::int32_t object = -1;  // id; -1: a plane of the scene
+    std::uint32_t triangle = 0;
+    HalfSpace halfSpace;
+  };
+
   // A slide, from the breakaway to a reversal or to a pause.
   struct Slide {
     bool active = false;
@@ -128,6 +135,9 @@ class Proxy {
   double freeShare(DescentDirections& descent, const Vec3& from, const Vec3& to,
                    double enough) const noexcept;
   void findConstraints(const Vec3& hip, ActiveSet& active) noexcept;
+  Projection nearestTo(const Vec3& target, const ActiveSet& active) const noexcept;
+  bool restoreConstraints(const Vec3& hip, ActiveSet& active) const noexcept;
+  void rememberConstraints() noexcept;
   bool frictionless() const noexcept;
   static double frictionConeOf(const ContactSet& contactSet) noexcept;
   double slidingShare() const noexcept;
@@ -162,6 +172,8 @@ class Proxy {
   Vec3 hipBefore_ = Vec3::Zero();
   Slide slide_;
   ContactSet contactSet_;
+  std::array<LastConstraint, kMaxActive> lastConstraints_;
+  int lastCount_ = 0;
   std::int32_t touchedObject_ = -1;
   std::uint32_t touchedTriangle_ = 0;
 };

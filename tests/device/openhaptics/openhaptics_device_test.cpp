@@ -12,6 +12,7 @@ namespace {
 
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::IsEmpty;
 
 std::string refusal(Device& device) {
   try {
@@ -233,6 +234,21 @@ TEST_F(SteppedHdTest, WarmMotorsGetLessAndHotOnesNothing) {
   EXPECT_NEAR(force().norm(), 3.3, 1e-9);
 }
 
+TEST_F(SteppedHdTest, AForceErrorThatIsOverIsStillReportedOnce) {
+  start();
+  wanted_N = Vec3(0, 1, 0);
+  step();
+  mock->fail(0, 0x201);
+  step(2);
+  EXPECT_EQ(state.hold, kHoldFault);
+  EXPECT_TRUE(eventually([&] {
+    step();
+    return state.hold == kHoldNone;
+  }));
+  EXPECT_THAT(device.faultText(), HasSubstr("HD_EXCEEDED_MAX_FORCE"));
+  EXPECT_THAT(device.faultText(), IsEmpty());
+}
+
 TEST_F(SteppedHdTest, AForceErrorHoldsForAMomentAndADeviceFaultUntilReopened) {
   start();
   wanted_N = Vec3(0, 1, 0);
@@ -247,6 +263,7 @@ TEST_F(SteppedHdTest, AForceErrorHoldsForAMomentAndADeviceFaultUntilReopened) {
     return state.hold == kHoldNone;
   }));
   EXPECT_TRUE(force().isApprox(wanted_N));
+  EXPECT_THAT(device.faultText(), IsEmpty());
 
   mock->unplug(0);
   step(2);

@@ -23,27 +23,54 @@ TriangleMesh copies(int count, double jitter_m) {
   return mesh;
 }
 
-TEST(WorkLimit, force_fades_out_after_20_ticks_and_returns_when_the_hand_has_left) {
+double shareAfter(int spentInARow) {
+  return std::clamp(1 - (spentInARow - 20) / 50.0, 0.0, 1.0);
+}
+
+class WorkLimit : public testing::TestWithParam<int> {};
+
+// Fewer copies spend the work after they are gathered, more before.
+INSTANTIATE_TEST_SUITE_P(Copies, WorkLimit, testing::Values(1500, 2000, 2500, 3000));
+
+TEST_P(WorkLimit, force_fades_out_after_20_ticks_and_returns_when_the_hand_has_left) {
   constexpr double kJitter_m = 1e-6;
   SceneFixture fixture;
-  fixture.add(copies(3000, kJitter_m), surface(1000));
+  fixture.add(copies(GetParam(), kJitter_m), surface(1000));
   Hand hand(fixture.snapshot());
   const Vec3 above(0, 0.005, 0);
   const Vec3 pressed(0, -0.001, 0);
   for (int touch = 0; touch < 2; ++touch) {
     hand.at(above);
     EXPECT_EQ(hand.at(above).status & kRenderWorkLimit, 0U) << "nothing to examine";
-    int spent = 0;
+    int spent = 0;  // in a row
     for (int tick = 1; tick <= 100; ++tick) {
       const Rendering& r = hand.at(tick < 10 ? Vec3(above + tick / 10.0 * (pressed - above)) : pressed);
       EXPECT_GE(r.proxy_m.y(), -kJitter_m - 1e-9) << tick;
-      if ((r.status & kRenderWorkLimit) != 0) ++spent;
+      spent = (r.status & kRenderWorkLimit) != 0 ? spent + 1 : 0;
       if (tick < 10) continue;
-      const double share = std::clamp(1 - (spent - 20) / 50.0, 0.0, 1.0);
-      EXPECT_NEAR(r.force_N.norm(), share * 1.0, 0.01) << tick << ", " << spent << " spent";
+      EXPECT_NEAR(r.force_N.norm(), shareAfter(spent) * 1.0, 0.01) << tick << ", " << spent << " spent";
     }
     EXPECT_GT(spent, 80);
   }
+}
+
+TEST_P(WorkLimit, friction_fades_out_with_the_force) {
+  constexpr double kFriction = 0.5;
+  SceneFixture fixture;
+  fixture.add(copies(GetParam(), 1e-6), surface(1000, kFriction, kFriction));
+  Hand hand(fixture.snapshot());
+  int spent = 0;  // in a row
+  const auto count = [&](const Rendering& r) { spent = (r.status & kRenderWorkLimit) != 0 ? spent + 1 : 0; };
+  hand.at(Vec3(-0.005, 0.005, 0));
+  hand.to(Vec3(-0.005, -0.001, 0), 0.6, count);
+  hand.to(Vec3(0.005, -0.001, 0), 0.1, [&](const Rendering& r) {
+    count(r);
+    if (hand.hip().x() < -0.004) return;  // it still sticks
+    const double share = shareAfter(spent);
+    EXPECT_NEAR(r.force_N.y(), share, 0.01) << hand.hip().x() << ", " << spent << " spent";
+    EXPECT_NEAR(r.force_N.x(), -share * kFriction, 0.01) << hand.hip().x() << ", " << spent << " spent";
+  });
+  EXPECT_GT(spent, 80);
 }
 
 }  // namespace
