@@ -9,14 +9,14 @@
 
 static int forces = 0;
 
-void VRPN_CALLBACK handle_force(void* userdata, const vrpn_FORCECB f) {
+void VRPN_CALLBACK handleForce(void* userdata, const vrpn_FORCECB f) {
   if (++forces % 500 == 1) {
     printf("%s: force %6.3f %6.3f %6.3f N\n", static_cast<const char*>(userdata), f.force[0], f.force[1],
            f.force[2]);
   }
 }
 
-void VRPN_CALLBACK handle_touched(void*, const vrpn_TOUCHEDOBJECTCB o) {
+void VRPN_CALLBACK handleTouched(void*, const vrpn_TOUCHEDOBJECTCB o) {
   printf("object %d is touched\n", o.ObjectNum);
 }
 
@@ -27,8 +27,8 @@ int main(int argc, char* argv[]) {
   vrpn_ForceDevice_Remote* device = new vrpn_ForceDevice_Remote(name);
   vrpn_Connection* connection = device->connectionPtr();
   static char who[] = "device";
-  device->register_force_change_handler(who, handle_force);
-  device->register_touchedObject_handler(NULL, handle_touched);
+  device->register_force_change_handler(who, handleForce);
+  device->register_touchedObject_handler(NULL, handleTouched);
 
   for (int i = 0; i < 500 && !connection->connected(); ++i) {
     device->mainloop();

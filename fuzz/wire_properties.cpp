@@ -69,8 +69,8 @@ struct Digest {
     mix(digest, e.type.value);
     mix(digest, e.sender.value);
     mix(digest, e.local_sender.value);
-    mix(digest, e.type_name);
-    mix(digest, e.sender_name);
+    mix(digest, e.typeName);
+    mix(digest, e.senderName);
     mix(digest, std::size_t{e.time.seconds} << 32U | e.time.microseconds);
     mix(digest, asText(e.payload));
   }
@@ -80,8 +80,8 @@ struct Digest {
   }
   void operator()(const LogRequested& e) const {
     mix(digest, e.request.mode);
-    mix(digest, e.request.in_name);
-    mix(digest, e.request.out_name);
+    mix(digest, e.request.inName);
+    mix(digest, e.request.outName);
   }
   void operator()(const Ignored& e) const {
     mix(digest, e.reason);

@@ -75,9 +75,9 @@ std::optional<Capabilities> Client::capabilities() const {
                       impl_->has(wire::kFeatureStop),
                       impl_->has(wire::kFeatureHeartbeat),
                       impl_->has(wire::kFeatureHoldHand),
-                      c.servo_rate,
-                      c.report_rate,
-                      c.peak_force,
+                      c.servoRate,
+                      c.reportRate,
+                      c.peakForce,
                       c.buttons,
                       {w[0], w[1], w[2]},
                       {w[3], w[4], w[5]},
@@ -213,7 +213,7 @@ void Client::setRemoteContacts(std::span<const RemoteContact> contacts) {
   }
   if (connected()) impl_->require(wire::kFeatureRemoteContacts, "stream contacts");
   wire::RemoteContacts message{
-      .time = base::now(), .state_time = impl_->latest.hand.tickTime.count(), .contacts = {}};
+      .time = base::now(), .stateTime = impl_->latest.hand.tickTime.count(), .contacts = {}};
   std::vector<double>& numbers = message.contacts.values;
   numbers.reserve(contacts.size() * wire::RemoteContacts::kNumbers);
   for (const RemoteContact& c : contacts) {

@@ -81,8 +81,8 @@ TickReport toReport(const wire::TickReport& m) {
           m.depth,
           m.object,
           m.buttons,
-          Trips(m.guard_active),
-          Trips(m.guard_latched)};
+          Trips(m.guardActive),
+          Trips(m.guardLatched)};
 }
 
 // Ignores numbers at the end that do not make a complete contact.
@@ -103,20 +103,20 @@ HandReport toReport(const wire::HandState& m) {
   HandReport report{{},
                     m.tick,
                     std::chrono::nanoseconds(m.time),
-                    std::chrono::nanoseconds(m.contacts_time),
-                    std::chrono::nanoseconds(m.force_time),
+                    std::chrono::nanoseconds(m.contactsTime),
+                    std::chrono::nanoseconds(m.forceTime),
                     m.position,
                     m.orientation,
                     m.velocity,
-                    m.angular_velocity,
+                    m.angularVelocity,
                     m.force,
-                    m.held_force,
+                    m.heldForce,
                     m.energy,
                     std::nullopt,
                     m.buttons,
                     (m.flags & wire::kHandEnergySpent) != 0,
                     (m.flags & wire::kHandCorrectionsHeld) != 0,
-                    Trips(m.guard_active),
+                    Trips(m.guardActive),
                     {}};
   if ((m.flags & wire::kHandHasGripper) != 0) report.gripper_rad = m.gripper;
   constexpr std::size_t kNumbers = wire::HandState::kNumbers;

@@ -73,7 +73,7 @@ void Link::onUdpDescribed(const wire::UdpAddress& address) {
 void Link::onMessage(const wire::MessageReceived& message) {
   ++statistics_.messagesIn;
   wire::LocalSender sender = message.local_sender;
-  if (sender.value < 0) sender = names_.findSender(message.sender_name).value_or(wire::LocalSender{});
+  if (sender.value < 0) sender = names_.findSender(message.senderName).value_or(wire::LocalSender{});
   if (sender.value >= 0) {
     if (heard_.size() < names_.senders().size()) heard_.resize(names_.senders().size());
     heard_[static_cast<std::size_t>(sender.value)] = true;
@@ -84,7 +84,7 @@ void Link::onMessage(const wire::MessageReceived& message) {
     type = wire::localType(message.kind);
   } else {
     const auto& types = names_.types();
-    const auto known = std::find(types.begin(), types.end(), message.type_name);
+    const auto known = std::find(types.begin(), types.end(), message.typeName);
     if (known != types.end()) type.value = static_cast<std::int32_t>(known - types.begin());
   }
   inbox_.push({.what = Arrival::What::message,

@@ -9,9 +9,9 @@ namespace hapticd::record {
 void ChangedSurfaces::change(scene::Surface& surface) const {
   surface.stiffness_N_per_m = changes_.stiffness_N_per_m.value_or(surface.stiffness_N_per_m);
   surface.damping_Ns_per_m = changes_.damping_Ns_per_m.value_or(surface.damping_Ns_per_m);
-  surface.static_friction = changes_.staticFriction.value_or(surface.static_friction);
-  surface.dynamic_friction = changes_.dynamicFriction.value_or(surface.dynamic_friction);
-  surface.dynamic_friction = std::min(surface.dynamic_friction, surface.static_friction);
+  surface.staticFriction = changes_.staticFriction.value_or(surface.staticFriction);
+  surface.dynamicFriction = changes_.dynamicFriction.value_or(surface.dynamicFriction);
+  surface.dynamicFriction = std::min(surface.dynamicFriction, surface.staticFriction);
   std::string remark;
   scene::keepPassive(surface, bound_, remark);
 }

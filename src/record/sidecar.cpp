@@ -50,7 +50,7 @@ class SurfaceList {
       const scene::Surface& s = object.surface;
       const auto key =
           std::tuple(object.name, object.touchable, object.triangles->size(), s.stiffness_N_per_m,
-                     s.damping_Ns_per_m, s.static_friction, s.dynamic_friction, s.popthrough_N);
+                     s.damping_Ns_per_m, s.staticFriction, s.dynamicFriction, s.popthrough_N);
       const auto known = last_.find(object.id);
       if (known != last_.end() && known->second == key) continue;
       last_.insert_or_assign(object.id, key);
@@ -61,8 +61,8 @@ class SurfaceList {
                        {"triangles", object.triangles->size()},
                        {"stiffness_N_per_m", s.stiffness_N_per_m},
                        {"damping_Ns_per_m", s.damping_Ns_per_m},
-                       {"static_friction", s.static_friction},
-                       {"dynamic_friction", s.dynamic_friction},
+                       {"static_friction", s.staticFriction},
+                       {"dynamic_friction", s.dynamicFriction},
                        {"popthrough_N", s.popthrough_N}});
     }
   }

@@ -177,7 +177,7 @@ void FreeForces::handle(SetPlane& c, const Call& call) {
                                         call, "sendSurface plane", c.index);
   if (!surface) return;
   plane.surface = *surface;
-  plane.surface.dynamic_friction = std::min(plane.surface.dynamic_friction, plane.surface.static_friction);
+  plane.surface.dynamicFriction = std::min(plane.surface.dynamicFriction, plane.surface.staticFriction);
   std::string remark;
   keepPassive(plane.surface, bound_, remark);
   if (!remark.empty()) {

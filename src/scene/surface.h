@@ -8,9 +8,9 @@ namespace hapticd::scene {
 struct Surface {
   double stiffness_N_per_m = 0;
   double damping_Ns_per_m = 0;
-  double static_friction = 0;   ///< Coulomb coefficient while sticking
-  double dynamic_friction = 0;  ///< Coulomb coefficient while sliding, at most the static one
-  double popthrough_N = 0;      ///< normal spring force that lets the proxy through; 0 is off
+  double staticFriction = 0;   ///< Coulomb coefficient while sticking
+  double dynamicFriction = 0;  ///< Coulomb coefficient while sliding, at most the static one
+  double popthrough_N = 0;     ///< normal spring force that lets the proxy through; 0 is off
   double mass_kg = 0;
 
   friend bool operator==(const Surface&, const Surface&) = default;

@@ -57,8 +57,8 @@ bool SurfaceSettings::set(const SetSurfaceProperty& command, const SceneConfig& 
       {"stiffness", &Surface::stiffness_N_per_m,
        ofDevice ? config.nominalStiffness_N_per_m : kReferenceStiffness_N_per_m, one},
       {"damping", &Surface::damping_Ns_per_m, kReferenceDamping_Ns_per_m, one},
-      {"static friction", &Surface::static_friction, 1, one},
-      {"dynamic friction", &Surface::dynamic_friction, 1, one},
+      {"static friction", &Surface::staticFriction, 1, one},
+      {"dynamic friction", &Surface::dynamicFriction, 1, one},
       {"popthrough", &Surface::popthrough_N, ofDevice ? config.nominalForce_N : kReferenceForce_N, one},
       {"mass", &Surface::mass_kg, 1, infinity},
   };
@@ -81,7 +81,7 @@ bool SurfaceSettings::set(const SetSurfaceProperty& command, const SceneConfig& 
     call.warn(kName, "out of range, clamped", " object ", command.object, ", ", command.name, " ",
               command.value, " becomes ", value);
   }
-  if (row->member == &Surface::static_friction) staticGiven_ = true;
+  if (row->member == &Surface::staticFriction) staticGiven_ = true;
   const double before = asked_.*row->member;
   asked_.*row->member = value * row->scale;
   return asked_.*row->member != before;
@@ -94,20 +94,20 @@ bool SurfaceSettings::set(const SetSurface& command, const SceneConfig& config, 
   if (!stock) return false;
   asked_.stiffness_N_per_m = stock->stiffness_N_per_m;
   asked_.damping_Ns_per_m = stock->damping_Ns_per_m;
-  asked_.static_friction = stock->static_friction;
-  asked_.dynamic_friction = stock->dynamic_friction;
+  asked_.staticFriction = stock->staticFriction;
+  asked_.dynamicFriction = stock->dynamicFriction;
   staticGiven_ = true;
   return true;
 }
 
 Surface SurfaceSettings::resolve(const PassivityBound& bound, std::string& remark) const {
   Surface surface = asked_;
-  if (surface.dynamic_friction > surface.static_friction) {
+  if (surface.dynamicFriction > surface.staticFriction) {
     if (staticGiven_) {
-      remark += "dynamic friction " + number(surface.dynamic_friction) + " is above static friction " +
-                number(surface.static_friction) + " and is lowered to it; ";
+      remark += "dynamic friction " + number(surface.dynamicFriction) + " is above static friction " +
+                number(surface.staticFriction) + " and is lowered to it; ";
     }
-    surface.dynamic_friction = surface.static_friction;
+    surface.dynamicFriction = surface.staticFriction;
   }
   keepPassive(surface, bound, remark);
   return surface;
@@ -127,8 +127,8 @@ std::optional<Surface> surfaceFromStock(double stiffness, double damping, double
   Surface surface;
   surface.stiffness_N_per_m = kStockStiffness_N_per_m * clamp(stiffness, 1, "stiffness");
   surface.damping_Ns_per_m = kStockDamping_Ns_per_m * clamp(damping, kStockMaxDamping, "damping");
-  surface.static_friction = clamp(staticFriction, 1, "static friction");
-  surface.dynamic_friction = clamp(dynamicFriction, 1, "dynamic friction");
+  surface.staticFriction = clamp(staticFriction, 1, "static friction");
+  surface.dynamicFriction = clamp(dynamicFriction, 1, "dynamic friction");
   return surface;
 }
 

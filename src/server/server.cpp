@@ -40,7 +40,7 @@ Server::Server(const ServerConfig& config) : Server(config, nullptr) {}
 
 Server::Server(const ServerConfig& config, std::unique_ptr<Player> player)
     : config_((validate(config), config)),
-      throttledLog_(static_cast<std::size_t>(config_.limits.log_kB_per_second) * 1000),
+      throttledLog_(static_cast<std::size_t>(config_.limits.log_kB_per_s) * 1000),
       credentials_(config, geteuid()),
       tls_(openTls(config)),
       trusted_(parseSubnets(config.trustedNetworks)),

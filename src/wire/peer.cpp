@@ -181,24 +181,24 @@ void Peer::fail(const std::string& reason, EventSink sink) {
 bool Peer::announce(Time now) {
   if (!connected()) return false;
   const auto& senders = names_->senders();
-  if (announced_senders_ < senders.size()) {
-    for (; announced_senders_ < senders.size(); ++announced_senders_) {
-      addDescription(stream_, now, announced_senders_, kSenderDescription, senders[announced_senders_]);
+  if (announcedSenders_ < senders.size()) {
+    for (; announcedSenders_ < senders.size(); ++announcedSenders_) {
+      addDescription(stream_, now, announcedSenders_, kSenderDescription, senders[announcedSenders_]);
     }
     for (SenderEntry& entry : senders_) {
       if (entry.described) entry.local = names_->findSender(entry.name).value_or(LocalSender{});
     }
   }
   const auto& types = names_->types();
-  for (; announced_types_ < types.size(); ++announced_types_) {
-    addDescription(stream_, now, announced_types_, kTypeDescription, types[announced_types_]);
+  for (; announcedTypes_ < types.size(); ++announcedTypes_) {
+    addDescription(stream_, now, announcedTypes_, kTypeDescription, types[announcedTypes_]);
   }
   return true;
 }
 
 FrameEncoder& Peer::route(Reliability reliability, std::size_t frame_bytes) noexcept {
   const bool fits = padded(frame_bytes) <= kMaxDatagramBytes;
-  return use_datagrams_ && fits && reliability == Reliability::kLowLatency ? datagrams_ : stream_;
+  return useDatagrams_ && fits && reliability == Reliability::kLowLatency ? datagrams_ : stream_;
 }
 
 bool Peer::send(Time time, LocalSender sender, const Message& message, Reliability reliability) {
@@ -215,7 +215,7 @@ bool Peer::sendRaw(Time time, LocalSender sender, LocalType type, ByteView paylo
 
 bool Peer::sendFrames(Time now, ByteView frames, Reliability reliability) {
   if (!announce(now)) return false;
-  if (!use_datagrams_ || reliability == Reliability::kReliable) {
+  if (!useDatagrams_ || reliability == Reliability::kReliable) {
     stream_.append(frames);
     return true;
   }

@@ -40,8 +40,8 @@ struct MessageReceived {
   RemoteType type;
   RemoteSender sender;
   LocalSender local_sender;  ///< our sender of the same name; value -1 when there is none
-  std::string_view type_name;
-  std::string_view sender_name;
+  std::string_view typeName;
+  std::string_view senderName;
   Time time;
   ByteView payload;
 };
@@ -103,8 +103,8 @@ class Peer {
   bool failed() const noexcept { return state_ == State::kFailed; }
 
   /// From now on low-latency messages leave as datagrams; before, everything leaves by TCP.
-  void useDatagrams() noexcept { use_datagrams_ = true; }
-  bool usesDatagrams() const noexcept { return use_datagrams_; }
+  void useDatagrams() noexcept { useDatagrams_ = true; }
+  bool usesDatagrams() const noexcept { return useDatagrams_; }
 
   /// Sends a message; false, and nothing happens, when not connected. std::length_error as FrameEncoder::add.
   template <WireMessage M>
@@ -175,9 +175,9 @@ class Peer {
   const LocalNames* names_;
   PeerOptions options_;
   State state_ = State::kAwaitingCookie;
-  bool use_datagrams_ = false;
-  std::size_t announced_senders_ = 0;
-  std::size_t announced_types_ = 0;
+  bool useDatagrams_ = false;
+  std::size_t announcedSenders_ = 0;
+  std::size_t announcedTypes_ = 0;
   std::vector<std::byte> partial_;    // the start of a cookie or frame that is still incomplete
   std::vector<SenderEntry> senders_;  // by the peer's number
   std::vector<TypeEntry> types_;

@@ -80,10 +80,10 @@ Result<LogRequest> decodeLogDescription(std::int32_t mode, ByteView payload) {
 
 std::vector<std::byte> encodeLogDescription(const LogRequest& request) {
   std::vector<std::byte> out;
-  put(out, static_cast<std::int32_t>(request.in_name.size()));
-  put(out, static_cast<std::int32_t>(request.out_name.size()));
-  putWithNul(out, request.in_name);
-  putWithNul(out, request.out_name);
+  put(out, static_cast<std::int32_t>(request.inName.size()));
+  put(out, static_cast<std::int32_t>(request.outName.size()));
+  putWithNul(out, request.inName);
+  putWithNul(out, request.outName);
   return out;
 }
 

@@ -30,8 +30,8 @@ struct UdpAddress {
 /// Log files a client asks its server to write.
 struct LogRequest {
   int mode = 0;  ///< bit 0 messages the server receives, bit 1 messages it sends
-  std::string in_name;
-  std::string out_name;
+  std::string inName;
+  std::string outName;
 };
 
 /// The name in the payload of a sender or type description, in place.

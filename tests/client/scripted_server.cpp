@@ -108,11 +108,11 @@ void ScriptedServer::onEvent(Session& session, const wire::Event& event, bool by
   const std::lock_guard lock(mutex_);
   if (!decoded) {
     received_.push_back(
-        {wire::Text{2, 0, decoded.error()}, std::string(message->sender_name), message->time, byDatagram});
+        {wire::Text{2, 0, decoded.error()}, std::string(message->senderName), message->time, byDatagram});
   } else if (const auto* vertex = decoded->as<wire::SetVertex>()) {
     vertices_.push_back(*vertex);
   } else {
-    received_.push_back({*decoded, std::string(message->sender_name), message->time, byDatagram});
+    received_.push_back({*decoded, std::string(message->senderName), message->time, byDatagram});
   }
   changed_.notify_all();
 }

@@ -33,7 +33,7 @@ std::array<double, 3> arrayOf(const Vec3& v) {
 wire::RemoteContacts messageOf(const std::vector<RemoteContact>& surfaces, Nanos stateTime) {
   wire::RemoteContacts message;
   message.time = stateTime + 1;
-  message.state_time = stateTime;
+  message.stateTime = stateTime;
   std::vector<double>& n = message.contacts.values;
   for (const RemoteContact& c : surfaces) {
     n.insert(n.end(), {static_cast<double>(c.id), static_cast<double>(c.shape), c.radius_m});

@@ -98,7 +98,7 @@ inline bool playSession(RunningServer& server) {
   // A client streams a sphere that moves, and a force.
   for (int i = 0; i < 40; ++i) {
     const double angle = 0.05 * i;
-    wire::RemoteContacts contacts{.time = 1'000'000LL * i + 1, .state_time = 0, .contacts = {}};
+    wire::RemoteContacts contacts{.time = 1'000'000LL * i + 1, .stateTime = 0, .contacts = {}};
     contacts.contacts.values = {
         3,   1, 0.02, 0,   0.014, 0, std::sin(angle), std::cos(angle), 0, 0, 0, 1, 0.01, 0, 0, 0, 0, 0.5,
         400, 1, 0.3,  0.2, 0.1,   0};

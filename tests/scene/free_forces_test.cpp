@@ -234,7 +234,7 @@ TEST_F(Forces, PlanesAreInWorldUnitsWithStockSurfaces) {
   EXPECT_DOUBLE_EQ(p.offset, 10);
   EXPECT_DOUBLE_EQ(p.surface.stiffness_N_per_m, 800);
   EXPECT_DOUBLE_EQ(p.surface.damping_Ns_per_m, 1);
-  EXPECT_DOUBLE_EQ(p.surface.dynamic_friction, 0.2);
+  EXPECT_DOUBLE_EQ(p.surface.dynamicFriction, 0.2);
   EXPECT_EQ(p.recovery, 10 * kMillisecond);
   EXPECT_DOUBLE_EQ(p.textureAmplitude, 1);
   EXPECT_DOUBLE_EQ(p.textureWavelength, 0.06) << "the shortest";

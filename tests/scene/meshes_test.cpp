@@ -164,8 +164,8 @@ TEST_F(Meshes, FinishedByUpdateTrimeshChanges) {
   EXPECT_EQ(triangles(), 1U);
   EXPECT_DOUBLE_EQ(object(0)->surface.stiffness_N_per_m, 500);
   EXPECT_DOUBLE_EQ(object(0)->surface.damping_Ns_per_m, 1);
-  EXPECT_DOUBLE_EQ(object(0)->surface.static_friction, 0.4);
-  EXPECT_DOUBLE_EQ(object(0)->surface.dynamic_friction, 0.3);
+  EXPECT_DOUBLE_EQ(object(0)->surface.staticFriction, 0.4);
+  EXPECT_DOUBLE_EQ(object(0)->surface.dynamicFriction, 0.3);
 }
 
 TEST_F(Meshes, LimitsHoldForOneObjectAndForAll) {

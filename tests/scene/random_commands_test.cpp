@@ -123,7 +123,7 @@ void checkObject(const SceneSnapshot& scene, std::uint32_t position, Nanos now) 
   const ObjectState& o = *scene.objects[position];
   RC_ASSERT(o.surface.stiffness_N_per_m > 0);
   RC_ASSERT(o.surface.stiffness_N_per_m * 0.0005 + o.surface.damping_Ns_per_m < 5);
-  RC_ASSERT(o.surface.dynamic_friction <= o.surface.static_friction);
+  RC_ASSERT(o.surface.dynamicFriction <= o.surface.staticFriction);
   const MeshGeometry& mesh = *o.mesh;
   RC_ASSERT(mesh.index.size() == mesh.triangles->size());
   for (const Triangle& t : *mesh.triangles) {
@@ -214,8 +214,8 @@ void checkSame(const SceneDescription& a, const SceneDescription& b) {
     RC_ASSERT(x.T_object_mesh.matrix() == y.T_object_mesh.matrix());
     RC_ASSERT(x.surface.stiffness_N_per_m == y.surface.stiffness_N_per_m);
     RC_ASSERT(x.surface.damping_Ns_per_m == y.surface.damping_Ns_per_m);
-    RC_ASSERT(x.surface.static_friction == y.surface.static_friction);
-    RC_ASSERT(x.surface.dynamic_friction == y.surface.dynamic_friction);
+    RC_ASSERT(x.surface.staticFriction == y.surface.staticFriction);
+    RC_ASSERT(x.surface.dynamicFriction == y.surface.dynamicFriction);
     RC_ASSERT(same(x.vertices, y.vertices));
     RC_ASSERT(!x.triangles == !y.triangles);
     if (x.triangles) RC_ASSERT(*x.triangles == *y.triangles);

@@ -189,8 +189,8 @@ TEST_F(Surfaces, ReferenceScale) {
   publish();
   EXPECT_DOUBLE_EQ(surface().stiffness_N_per_m, 500);
   EXPECT_DOUBLE_EQ(surface().damping_Ns_per_m, 1);
-  EXPECT_DOUBLE_EQ(surface().static_friction, 0.8);
-  EXPECT_DOUBLE_EQ(surface().dynamic_friction, 0.3);
+  EXPECT_DOUBLE_EQ(surface().staticFriction, 0.8);
+  EXPECT_DOUBLE_EQ(surface().dynamicFriction, 0.3);
   EXPECT_DOUBLE_EQ(surface().popthrough_N, 1.65);
   EXPECT_DOUBLE_EQ(surface().mass_kg, 2.5);
   EXPECT_TRUE(notices_.empty());
@@ -212,15 +212,15 @@ TEST_F(Surfaces, OutOfRangeIsClampedAndUnknownNamesAreNamed) {
 TEST_F(Surfaces, DynamicFrictionIsAtMostTheStaticOneWhateverComesFirst) {
   set("dynamic friction", 0.3);
   publish();
-  EXPECT_DOUBLE_EQ(surface().dynamic_friction, 0);
+  EXPECT_DOUBLE_EQ(surface().dynamicFriction, 0);
   EXPECT_TRUE(notices_.empty()) << "the static one has not come yet";
   set("static friction", 0.5);
   publish();
-  EXPECT_DOUBLE_EQ(surface().dynamic_friction, 0.3);
+  EXPECT_DOUBLE_EQ(surface().dynamicFriction, 0.3);
   EXPECT_TRUE(notices_.empty());
   set("static friction", 0.2);
   publish();
-  EXPECT_DOUBLE_EQ(surface().dynamic_friction, 0.2);
+  EXPECT_DOUBLE_EQ(surface().dynamicFriction, 0.2);
   EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("dynamic friction 0.3 is above static friction 0.2"));
 }
 
@@ -296,7 +296,7 @@ TEST_F(RawSurfaces, HaveNoLimitsButStayNumbers) {
   publish();
   EXPECT_DOUBLE_EQ(surface().stiffness_N_per_m, 50'000);
   EXPECT_DOUBLE_EQ(surface().damping_Ns_per_m, 100);
-  EXPECT_DOUBLE_EQ(surface().static_friction, 2);
+  EXPECT_DOUBLE_EQ(surface().staticFriction, 2);
   EXPECT_TRUE(notices_.empty());
   say(SetSurface{0, 1, INFINITY, 0, 0});
   publish();

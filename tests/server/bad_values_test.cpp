@@ -28,10 +28,10 @@ wire::Plane plane(std::int32_t index, float distance, float stiffness) {
   return {.plane = {0, 1, 0, distance},
           .stiffness = stiffness,
           .damping = 0,
-          .dynamic_friction = 0,
-          .static_friction = 0,
+          .dynamicFriction = 0,
+          .staticFriction = 0,
           .index = index,
-          .recovery_cycles = 1};
+          .recoveryCycles = 1};
 }
 
 class BadValues : public BadInput {};

@@ -61,8 +61,8 @@ TEST_F(ControlTest, CapabilitiesDescribeTheDevice) {
   const auto answer = client->all<wire::Capabilities>().at(0);
   EXPECT_EQ(answer.version, 1);
   EXPECT_EQ(answer.features, 127U);
-  EXPECT_EQ(answer.servo_rate, 1000);
-  EXPECT_NEAR(answer.peak_force, 3.3, 1e-12);
+  EXPECT_EQ(answer.servoRate, 1000);
+  EXPECT_NEAR(answer.peakForce, 3.3, 1e-12);
   EXPECT_NEAR(answer.workspace[3], 0.08, 1e-12);
 }
 

@@ -114,7 +114,7 @@ TEST_F(HeldBackTest, StreamedStateOvertakesTheClientsSceneCommands) {
     client->send(wire::HeldForce{.time = 0, .force = {0, 0.5, 0}, .torque = {}, .lifetime = 0.1});
     client->poll();
     const auto hand = watcher_->last<wire::HandState>();
-    return hand && hand->held_force[1] > 0.3;
+    return hand && hand->heldForce[1] > 0.3;
   }));
   EXPECT_EQ(client->count<wire::Capabilities>(), 0U);
   openScene();

@@ -69,10 +69,10 @@ TEST_F(ForceMessages, PlanePushesOutUntilItsNormalIsZero) {
   wire::Plane plane{.plane = {0, 1, 0, -0.020F},
                     .stiffness = 0.3F,
                     .damping = 0,
-                    .dynamic_friction = 0,
-                    .static_friction = 0,
+                    .dynamicFriction = 0,
+                    .staticFriction = 0,
                     .index = 0,
-                    .recovery_cycles = 1};
+                    .recoveryCycles = 1};
   peer_.send(plane);
   // As stiff as the hand: each deflects by 2.5 mm.
   ASSERT_TRUE(untilForce(peer_, {0, 0.0025 * kHandStiffness_N_per_m, 0}));
@@ -87,15 +87,15 @@ TEST_F(ForceMessages, Plane2MakesThePlaneBuzz) {
   peer_.send(wire::Plane{.plane = {0, 1, 0, -0.020F},
                          .stiffness = 0.3F,
                          .damping = 0,
-                         .dynamic_friction = 0,
-                         .static_friction = 0,
+                         .dynamicFriction = 0,
+                         .staticFriction = 0,
                          .index = 0,
-                         .recovery_cycles = 1});
+                         .recoveryCycles = 1});
   ASSERT_TRUE(untilForce(peer_, {0, 0.75, 0}));
   ASSERT_TRUE(catchUp(peer_));
   wire::Plane2 detail;
-  detail.buzz_amplitude = 0.001F;
-  detail.buzz_frequency = 40;
+  detail.buzzAmplitude = 0.001F;
+  detail.buzzFrequency = 40;
   peer_.send(detail);
   EXPECT_TRUE(peer_.until([&] { return oscillates(peer_, 1); }));
 }
@@ -108,12 +108,12 @@ TEST(ForceMessagesInMotion, Plane2AdhesionHoldsTheHand) {
   peer.send(wire::Plane{.plane = {0, 1, 0, -0.020F},
                         .stiffness = 0.3F,
                         .damping = 0,
-                        .dynamic_friction = 0,
-                        .static_friction = 0,
+                        .dynamicFriction = 0,
+                        .staticFriction = 0,
                         .index = 0,
-                        .recovery_cycles = 1});
+                        .recoveryCycles = 1});
   wire::Plane2 detail;
-  detail.normal_adhesion = 1;
+  detail.normalAdhesion = 1;
   peer.send(detail);
   EXPECT_TRUE(peer.until([&] {
     const auto force = peer.last<wire::Force>();

@@ -23,7 +23,7 @@ class ObjectMessages : public testing::Test {
     peer_.send(kStiff(object));
   }
   static wire::UpdateTrimeshChanges kStiff(std::int32_t object) {
-    return {.object = object, .stiffness = 0.5F, .damping = 0, .static_friction = 0, .dynamic_friction = 0};
+    return {.object = object, .stiffness = 0.5F, .damping = 0, .staticFriction = 0, .dynamicFriction = 0};
   }
 
   const Hand hand_ = Hand::stroking();

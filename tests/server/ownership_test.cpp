@@ -30,10 +30,10 @@ void sendPlane(ScriptedPeer& peer) {
   peer.send(wire::Plane{.plane = {1, 0, 0, -0.0066667F},
                         .stiffness = 0.3F,
                         .damping = 0,
-                        .dynamic_friction = 0,
-                        .static_friction = 0,
+                        .dynamicFriction = 0,
+                        .staticFriction = 0,
                         .index = 0,
-                        .recovery_cycles = 1});
+                        .recoveryCycles = 1});
 }
 
 void sendConstraint(ScriptedPeer& peer) {

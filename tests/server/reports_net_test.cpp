@@ -19,8 +19,8 @@ class ReportsTest : public ::testing::Test {
   // A floor, with the hand steered into it.
   static void touchFloor(ScriptedPeer& peer) {
     peer.send(wire::HoldHand{.hold = 1, .position = {0, 10, 0}});
-    peer.send(wire::Plane{
-        .plane = {0, 1, 0, 0}, .stiffness = 0.5F, .damping = 0, .index = 0, .recovery_cycles = 1});
+    peer.send(
+        wire::Plane{.plane = {0, 1, 0, 0}, .stiffness = 0.5F, .damping = 0, .index = 0, .recoveryCycles = 1});
     peer.send(wire::HoldHand{.hold = 1, .position = {0, -3, 0}});
   }
   // Mean number of ticks between two tick reports.

@@ -20,7 +20,7 @@ struct EventText {
            std::to_string(static_cast<int>(e.kind));
   }
   std::string operator()(const MessageReceived& e) const {
-    return "message " + std::string(e.type_name) + " from " + std::string(e.sender_name) + " kind " +
+    return "message " + std::string(e.typeName) + " from " + std::string(e.senderName) + " kind " +
            std::to_string(static_cast<int>(e.kind)) + " local " + std::to_string(e.local_sender.value) +
            " at " + std::to_string(e.time.seconds) + '.' + std::to_string(e.time.microseconds) + ' ' +
            std::string(asText(e.payload));
@@ -29,8 +29,8 @@ struct EventText {
     return "udp " + e.address.host + ' ' + std::to_string(e.address.port);
   }
   std::string operator()(const LogRequested& e) const {
-    return "log " + std::to_string(e.request.mode) + ' ' + inQuotes(e.request.in_name) + ' ' +
-           inQuotes(e.request.out_name);
+    return "log " + std::to_string(e.request.mode) + ' ' + inQuotes(e.request.inName) + ' ' +
+           inQuotes(e.request.outName);
   }
   std::string operator()(const Ignored& e) const {
     return "ignored: " + std::string(e.reason) + ' ' + std::to_string(e.value);

@@ -35,12 +35,12 @@ class Listener {
  private:
   void note(const Event& event) {
     if (const auto* message = std::get_if<MessageReceived>(&event)) {
-      ++counts_[std::string(message->type_name)];
+      ++counts_[std::string(message->typeName)];
       types_[message->type.value] = message->kind;
-      ASSERT_NE(message->kind, kUnknownKind) << message->type_name;
+      ASSERT_NE(message->kind, kUnknownKind) << message->typeName;
       const Result<Message> decoded = decode(message->kind, message->payload);
       ASSERT_TRUE(decoded) << decoded.error();
-      EXPECT_EQ(encoded(*decoded), withoutStrayMemory(*decoded, message->payload)) << message->type_name;
+      EXPECT_EQ(encoded(*decoded), withoutStrayMemory(*decoded, message->payload)) << message->typeName;
     } else if (std::holds_alternative<SenderDescribed>(event)) {
       ++counts_["SENDER_DESCRIPTION"];
     } else if (std::holds_alternative<TypeDescribed>(event)) {

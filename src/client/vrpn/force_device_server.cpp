@@ -60,28 +60,28 @@ vrpn_int32 vrpn_ForceDevice::decode_error(const char* buffer, vrpn_int32 length,
 vrpn_int32 vrpn_ForceDevice::decode_plane(const char* buffer, vrpn_int32 length, vrpn_float32* plane,
                                           vrpn_float32* kspring, vrpn_float32* kdamp, vrpn_float32* fdyn,
                                           vrpn_float32* fstat, vrpn_int32* index,
-                                          vrpn_int32* recovery_cycles) {
+                                          vrpn_int32* recoveryCycles) {
   return decoded<wire::Plane>(buffer, length, [&](const auto& m) {
     std::copy(m.plane.begin(), m.plane.end(), plane);
     *kspring = m.stiffness;
     *kdamp = m.damping;
-    *fdyn = m.dynamic_friction;
-    *fstat = m.static_friction;
+    *fdyn = m.dynamicFriction;
+    *fstat = m.staticFriction;
     *index = m.index;
-    *recovery_cycles = m.recovery_cycles;
+    *recoveryCycles = m.recoveryCycles;
   });
 }
 vrpn_int32 vrpn_ForceDevice::decode_surface_effects(
     const char* buffer, vrpn_int32 length, vrpn_float32* adhesion_normal, vrpn_float32* adhesion_lateral,
-    vrpn_float32* texture_amplitude, vrpn_float32* texture_wavelength, vrpn_float32* buzz_amplitude,
-    vrpn_float32* buzz_frequency) {
+    vrpn_float32* textureAmplitude, vrpn_float32* textureWavelength, vrpn_float32* buzzAmplitude,
+    vrpn_float32* buzzFrequency) {
   return decoded<wire::Plane2>(buffer, length, [&](const auto& m) {
-    *adhesion_normal = m.normal_adhesion;
-    *adhesion_lateral = m.lateral_adhesion;
-    *texture_amplitude = m.texture_amplitude;
-    *texture_wavelength = m.texture_wavelength;
-    *buzz_amplitude = m.buzz_amplitude;
-    *buzz_frequency = m.buzz_frequency;
+    *adhesion_normal = m.normalAdhesion;
+    *adhesion_lateral = m.lateralAdhesion;
+    *textureAmplitude = m.textureAmplitude;
+    *textureWavelength = m.textureWavelength;
+    *buzzAmplitude = m.buzzAmplitude;
+    *buzzFrequency = m.buzzFrequency;
   });
 }
 vrpn_int32 vrpn_ForceDevice::decode_forcefield(const char* buffer, vrpn_int32 length, vrpn_float32 origin[3],
@@ -134,7 +134,7 @@ struct vrpn_ForceDeviceServer::Calls {
   }
   // As declared. VRPN's own library passes the last three in another order.
   static bool call(Server& s, const wire::UpdateTrimeshChanges& m) {
-    return s.updateTrimeshChanges(m.object, m.stiffness, m.damping, m.dynamic_friction, m.static_friction);
+    return s.updateTrimeshChanges(m.object, m.stiffness, m.damping, m.dynamicFriction, m.staticFriction);
   }
   static bool call(Server& s, wire::TransformTrimesh m) {
     return s.setTrimeshTransform(m.object, m.matrix.data());

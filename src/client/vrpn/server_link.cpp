@@ -118,13 +118,13 @@ void ServerLink::onEvent(Client& client, const wire::Event& event) {
     }
   } else if (const auto* message = std::get_if<wire::MessageReceived>(&event)) {
     wire::LocalSender from = message->local_sender;
-    if (from.value < 0) from = names_.findSender(message->sender_name).value_or(wire::LocalSender{});
-    if (from.value < 0 || message->type_name.empty()) return;
+    if (from.value < 0) from = names_.findSender(message->senderName).value_or(wire::LocalSender{});
+    if (from.value < 0 || message->typeName.empty()) return;
     inbox_.push({.what = Arrival::What::message,
                  .kind = message->kind,
                  .sender = from,
                  .type = message->kind != wire::kUnknownKind ? wire::localType(message->kind)
-                                                             : names_.addType(message->type_name),
+                                                             : names_.addType(message->typeName),
                  .time = message->time,
                  .arrived = wallTimePoint(),
                  .bytes = message->payload});

@@ -56,7 +56,7 @@ double towards(double value, double goal, double force_N, double& budget_N) noex
 void RemoteContacts::reset() noexcept {
   for (Slot& slot : slots_) slot.used = false;
   top_ = 0;
-  pressed_N = 0;
+  pressed_N_ = 0;
   frictionEnergy_J_ = kLent_J;
   force_N_.setZero();
 }
@@ -135,7 +135,7 @@ Vec3 RemoteContacts::forceWith(const Change& change, const RemoteHand& hand, dou
   for (Slot& slot : inUse()) {
     if (!slot.used) continue;
     const Vec3 before_N = slot.friction_N;
-    slot.friction_N = friction(slot, hand, pressed_N, step_s);
+    slot.friction_N = friction(slot, hand, pressed_N_, step_s);
     given_J -= 0.5 * (before_N + slot.friction_N).dot(moved_m - step_s * slot.velocity);
   }
   return normal_N + limitFriction(hand, given_J);
@@ -279,7 +279,7 @@ void RemoteContacts::replace(Slot& slot, const RemoteContact& contact, const Rem
 void RemoteContacts::fadeOut(Nanos now, double step_s) noexcept {
   const auto pressing =
       std::ranges::count_if(inUse(), [](const Slot& s) { return s.used && s.normal_N > 0; });
-  const Nanos needed = base::toNanos((pressing > 1 ? kEarly : 1) * pressed_N / kFade_N_per_s + step_s);
+  const Nanos needed = base::toNanos((pressing > 1 ? kEarly : 1) * pressed_N_ / kFade_N_per_s + step_s);
   std::size_t top = 0;
   for (Slot& slot : inUse()) {
     if (!slot.used) continue;
@@ -432,13 +432,13 @@ Vec3 RemoteContacts::share(const RemoteHand& hand) noexcept {
     }
   }
   shareNormalForce(pressing);
-  pressed_N = 0;
+  pressed_N_ = 0;
   Vec3 force = Vec3::Zero();
   for (std::size_t i = 0; i < pressing.count; ++i) {
     Slot& slot = *slots[i];
     slot.normal_N = pressing.share_N[i];
     force += slot.normal_N * slot.normal;
-    pressed_N += slot.normal_N;
+    pressed_N_ += slot.normal_N;
   }
   return force;
 }

@@ -104,7 +104,7 @@ class RemoteContacts {
   Tried before_;                 // before this tick's corrections, where there are some
   Vec3 force_N_ = Vec3::Zero();  // of the last tick, with what it left
   Vec3 late_N_ = Vec3::Zero();   // part of a jump that this tick leaves to the next
-  double pressed_N = 0;          // sum of the normal forces in the last tick
+  double pressed_N_ = 0;         // sum of the normal forces in the last tick
   Vec3 hand_m_ = Vec3::Zero();   // in the last tick
   double frictionEnergy_J_ = 0;  // which the hand gave to the springs of friction, at the last tick
   double frictionNow_J_ = 0;     // at this one

@@ -98,10 +98,10 @@ void Proxy::startAt(const SceneAtTime& now, const Vec3& hip) noexcept {
 
 bool Proxy::frictionless() const noexcept {
   for (int i = 0; i < query_.objectCount(); ++i) {
-    if (query_.object(i).state->surface.static_friction > 0) return false;
+    if (query_.object(i).state->surface.staticFriction > 0) return false;
   }
   for (const PlacedPlane& plane : planes_) {
-    if (plane.surface.static_friction > 0 || plane.state->adhesionLateral_N > 0) return false;
+    if (plane.surface.staticFriction > 0 || plane.state->adhesionLateral_N > 0) return false;
   }
   return true;
 }

@@ -49,8 +49,8 @@ struct ContactSet {
   BlendedSpring spring;
 
   double frictionOf(const scene::Surface& surface) const noexcept {
-    const double dynamic = std::min(surface.dynamic_friction, surface.static_friction);
-    return dynamic + staticShare * (surface.static_friction - dynamic);
+    const double dynamic = std::min(surface.dynamicFriction, surface.staticFriction);
+    return dynamic + staticShare * (surface.staticFriction - dynamic);
   }
 };
 

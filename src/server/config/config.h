@@ -155,7 +155,7 @@ struct LimitsConfig {
   int commandsPerSecond = 1'000'000;  ///< of one client, without those that fill meshes
   int recording_MB = 100'000;         ///< of one recording
   int blackBoxes_MB = 100;            ///< of all black boxes of one device
-  int log_kB_per_second = 256;        ///< of log lines that clients cause
+  int log_kB_per_s = 256;             ///< of log lines that clients cause
 
   bool operator==(const LimitsConfig&) const = default;
 };

@@ -282,7 +282,7 @@ void checkLimits(const Checker& check, const LimitsConfig& limits) {
   check.range("commands_per_second", limits.commandsPerSecond, 1000, 1e9);
   check.range("recording_MB", limits.recording_MB, 1, 1e9);
   check.range("black_boxes_MB", limits.blackBoxes_MB, 1, 1'000'000);
-  check.range("log_kB_per_second", limits.log_kB_per_second, 1, 1'000'000);
+  check.range("log_kB_per_second", limits.log_kB_per_s, 1, 1'000'000);
 }
 
 void checkRecord(const Checker& check, const std::string& file) {

@@ -101,7 +101,7 @@ void visitFields(Visitor& visitor, Limits& limits) requires requires {
   visitor.field("commands_per_second", limits.commandsPerSecond);
   visitor.field("recording_MB", limits.recording_MB);
   visitor.field("black_boxes_MB", limits.blackBoxes_MB);
-  visitor.field("log_kB_per_second", limits.log_kB_per_second);
+  visitor.field("log_kB_per_second", limits.log_kB_per_s);
 }
 
 /// The same for the keys of the server itself, without its devices, [compat] and [limits].

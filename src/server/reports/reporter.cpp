@@ -64,19 +64,19 @@ wire::HandState handState(const TickReport& tick, const ClientTick& clientTick, 
   const geometry::Mat3 rotation = rotationOf(tick);
   wire::HandState state{.tick = tick.tick,
                         .time = tick.time,
-                        .contacts_time = remote.contactsTime,
-                        .force_time = remote.forceTime,
+                        .contactsTime = remote.contactsTime,
+                        .forceTime = remote.forceTime,
                         .position = array(clientTick.hip),
                         .orientation = xyzw(clientTick.orientation),
                         .velocity = array(clientTick.velocity),
-                        .angular_velocity = array(clientTick.angularVelocity),
+                        .angularVelocity = array(clientTick.angularVelocity),
                         .force = array(rotation * tick.force_N),
-                        .held_force = array(rotation * remote.heldForce_N),
+                        .heldForce = array(rotation * remote.heldForce_N),
                         .energy = remote.energy_J,
                         .gripper = clientTick.gripper_rad.value_or(0),
                         .buttons = buttons,
                         .flags = 0,
-                        .guard_active = tick.guard.active,
+                        .guardActive = tick.guard.active,
                         .contacts = {}};
   if (clientTick.gripper_rad) state.flags |= wire::kHandHasGripper;
   if ((remote.status & realtime::kRemoteEnergySpent) != 0) state.flags |= wire::kHandEnergySpent;
@@ -356,8 +356,8 @@ void Reporter::tickReport(const TickReport& tick, const ClientTick& clientTick, 
                                     .depth = clientTick.depth,
                                     .object = clientTick.object,
                                     .buttons = buttons_,
-                                    .guard_active = tick.guard.active,
-                                    .guard_latched = tick.guard.latched},
+                                    .guardActive = tick.guard.active,
+                                    .guardLatched = tick.guard.latched},
                    false});
   }
   if (wants(wire::kReportHand))

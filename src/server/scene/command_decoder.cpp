@@ -73,9 +73,9 @@ scene::SceneCommand toCommand(const wire::Plane& m) {
                           .plane = {},
                           .stiffness = m.stiffness,
                           .damping = m.damping,
-                          .staticFriction = m.static_friction,
-                          .dynamicFriction = m.dynamic_friction,
-                          .recoveryCycles = m.recovery_cycles};
+                          .staticFriction = m.staticFriction,
+                          .dynamicFriction = m.dynamicFriction,
+                          .recoveryCycles = m.recoveryCycles};
   convert(m.plane, command.plane);
   return command;
 }

@@ -383,8 +383,8 @@ void Session::onUdp(const wire::UdpAddress& address) {
 
 // Never write to a path that a client chose.
 void Session::onLogRequest(const wire::LogRequest& request) {
-  logWarning("requested log files " + wire::inQuotes(request.in_name) + ", " +
-             wire::inQuotes(request.out_name) + ": refused");
+  logWarning("requested log files " + wire::inQuotes(request.inName) + ", " +
+             wire::inQuotes(request.outName) + ": refused");
   // Stock clients print only texts of devices that they use, and describe those later.
   logsRefused_ = subscriptions_.empty();
   refuseLogs(logsRefused_ ? wire::LocalSender{0} : *subscriptions_.begin());

@@ -35,9 +35,9 @@ wire::Capabilities capabilities(const DeviceConfig& config, const device::Device
           .features = wire::kFeatureBulkMesh | wire::kFeatureBatch | wire::kFeatureSubscribe |
                       wire::kFeatureStop | wire::kFeatureHeartbeat | wire::kFeatureRemoteContacts |
                       (canBeHeld ? wire::kFeatureHoldHand : 0U),
-          .servo_rate = config.servoRate_Hz,
-          .report_rate = config.reportRate_Hz,
-          .peak_force = profile.peakForce_N,
+          .servoRate = config.servoRate_Hz,
+          .reportRate = config.reportRate_Hz,
+          .peakForce = profile.peakForce_N,
           .buttons = profile.buttons,
           .workspace = {box.min.x(), box.min.y(), box.min.z(), box.max.x(), box.max.y(), box.max.z()}};
 }

@@ -191,8 +191,8 @@ StreamedInput::Answer StreamedInput::on(scene::ClientId client, const wire::Remo
         fmt::format("Remote_Contacts refused: {} numbers are no multiple of {}", numbers.size(), kNumbers)};
     return answer(client, Kind::contacts, received, false, std::move(text));
   }
-  const Nanos measured = message.state_time > 0
-                             ? std::clamp<Nanos>(received - message.state_time, 0, kLongestRoundTrip)
+  const Nanos measured = message.stateTime > 0
+                             ? std::clamp<Nanos>(received - message.stateTime, 0, kLongestRoundTrip)
                              : kUnknownRoundTrip;
   contacts_.roundTrip =
       std::max(measured, static_cast<Nanos>(kRoundTripDecay * static_cast<double>(contacts_.roundTrip)));

@@ -124,8 +124,8 @@ Json json(const scene::ObjectDescription& object, std::uint64_t geometry, std::s
           {"T_object_mesh", json(object.T_object_mesh)},
           {"stiffness_N_per_m", object.surface.stiffness_N_per_m},
           {"damping_Ns_per_m", object.surface.damping_Ns_per_m},
-          {"static_friction", object.surface.static_friction},
-          {"dynamic_friction", object.surface.dynamic_friction},
+          {"static_friction", object.surface.staticFriction},
+          {"dynamic_friction", object.surface.dynamicFriction},
           {"popthrough", object.surface.popthrough_N},
           {"mass_kg", object.surface.mass_kg}};
 }
@@ -148,8 +148,8 @@ Json json(const scene::Plane& plane) {
           {"plane", {plane.normal.x(), plane.normal.y(), plane.normal.z(), plane.offset}},
           {"stiffness_N_per_m", plane.surface.stiffness_N_per_m},
           {"damping_Ns_per_m", plane.surface.damping_Ns_per_m},
-          {"static_friction", plane.surface.static_friction},
-          {"dynamic_friction", plane.surface.dynamic_friction}};
+          {"static_friction", plane.surface.staticFriction},
+          {"dynamic_friction", plane.surface.dynamicFriction}};
 }
 
 Json json(const scene::ForceField& field) {

@@ -53,9 +53,9 @@ struct Capabilities {
       "Answers Query_Capabilities: version of the extensions, feature bits, facts of the device."};
   std::int32_t version = kExtensionVersion;
   std::uint32_t features = 0;
-  double servo_rate = 0;
-  double report_rate = 0;
-  double peak_force = 0;
+  double servoRate = 0;
+  double reportRate = 0;
+  double peakForce = 0;
   std::int32_t buttons = 0;
   std::array<double, 6> workspace{};
 
@@ -63,9 +63,9 @@ struct Capabilities {
   static constexpr void fields(M& m, V&& v) {
     v("version", m.version);
     v("features", m.features);
-    v("servo_rate", m.servo_rate, "Hz");
-    v("report_rate", m.report_rate, "Hz");
-    v("peak_force", m.peak_force, "N");
+    v("servo_rate", m.servoRate, "Hz");
+    v("report_rate", m.reportRate, "Hz");
+    v("peak_force", m.peakForce, "N");
     v("buttons", m.buttons);
     v("workspace", m.workspace, "m");
   }
@@ -153,8 +153,8 @@ struct TickReport {
   double depth = 0;
   std::int32_t object = -1;
   std::uint32_t buttons = 0;
-  std::uint32_t guard_active = 0;
-  std::uint32_t guard_latched = 0;
+  std::uint32_t guardActive = 0;
+  std::uint32_t guardLatched = 0;
 
   template <class M, class V>
   static constexpr void fields(M& m, V&& v) {
@@ -169,8 +169,8 @@ struct TickReport {
     v("depth", m.depth, "m");
     v("object", m.object);
     v("buttons", m.buttons);
-    v("guard_active", m.guard_active);
-    v("guard_latched", m.guard_latched);
+    v("guard_active", m.guardActive);
+    v("guard_latched", m.guardLatched);
   }
 };
 
@@ -298,14 +298,14 @@ struct RemoteContacts {
       "Replaces the client's contacts near the hand, up to 16 (24 numbers each): felt until they expire.",
       Access::command,
       Order::overtaking};
-  std::int64_t time = 0;        ///< on the client's clock; older messages than the newest are ignored
-  std::int64_t state_time = 0;  ///< `time` of the Hand_State that the contacts follow from; 0: none
+  std::int64_t time = 0;       ///< on the client's clock; older messages than the newest are ignored
+  std::int64_t stateTime = 0;  ///< `time` of the Hand_State that the contacts follow from; 0: none
   Counted<std::int32_t, double, kMost * kNumbers> contacts;
 
   template <class M, class V>
   static constexpr void fields(M& m, V&& v) {
     v("time", m.time, "ns");
-    v("state_time", m.state_time, "ns");
+    v("state_time", m.stateTime, "ns");
     v("contacts", m.contacts);
   }
 };
@@ -350,38 +350,38 @@ struct HandState {
       "Reports the newest tick: pose, velocity, buttons, force written, remote contacts (8 numbers each)."};
   std::uint64_t tick = 0;
   std::int64_t time = 0;
-  std::int64_t contacts_time = 0;  ///< `time` of the newest Remote_Contacts that this tick knows, 0: none
-  std::int64_t force_time = 0;     ///< `time` of the newest Held_Force that this tick knows, 0: none
+  std::int64_t contactsTime = 0;  ///< `time` of the newest Remote_Contacts that this tick knows, 0: none
+  std::int64_t forceTime = 0;     ///< `time` of the newest Held_Force that this tick knows, 0: none
   F64x3 position{};
   F64x4 orientation{0, 0, 0, 1};
   F64x3 velocity{};
-  F64x3 angular_velocity{};
+  F64x3 angularVelocity{};
   F64x3 force{};
-  F64x3 held_force{};
+  F64x3 heldForce{};
   double energy = 0;
   double gripper = 0;
   std::uint32_t buttons = 0;
   std::uint32_t flags = 0;
-  std::uint32_t guard_active = 0;
+  std::uint32_t guardActive = 0;
   Counted<std::int32_t, double, RemoteContacts::kMost * kNumbers> contacts;
 
   template <class M, class V>
   static constexpr void fields(M& m, V&& v) {
     v("tick", m.tick);
     v("time", m.time, "ns");
-    v("contacts_time", m.contacts_time, "ns");
-    v("force_time", m.force_time, "ns");
+    v("contacts_time", m.contactsTime, "ns");
+    v("force_time", m.forceTime, "ns");
     v("position", m.position, "m");
     v("orientation", m.orientation);
     v("velocity", m.velocity, "m/s");
-    v("angular_velocity", m.angular_velocity, "rad/s");
+    v("angular_velocity", m.angularVelocity, "rad/s");
     v("force", m.force, "N");
-    v("held_force", m.held_force, "N");
+    v("held_force", m.heldForce, "N");
     v("energy", m.energy, "J");
     v("gripper", m.gripper, "rad");
     v("buttons", m.buttons);
     v("flags", m.flags);
-    v("guard_active", m.guard_active);
+    v("guard_active", m.guardActive);
     v("contacts", m.contacts);
   }
 };

@@ -73,20 +73,20 @@ struct Plane {
   std::array<float, 4> plane{};
   float stiffness = 0;
   float damping = 0;
-  float dynamic_friction = 0;
-  float static_friction = 0;
+  float dynamicFriction = 0;
+  float staticFriction = 0;
   std::int32_t index = 0;
-  std::int32_t recovery_cycles = 0;
+  std::int32_t recoveryCycles = 0;
 
   template <class M, class V>
   static constexpr void fields(M& m, V&& v) {
     v("plane", m.plane);
     v("stiffness", m.stiffness);
     v("damping", m.damping);
-    v("dynamic_friction", m.dynamic_friction);
-    v("static_friction", m.static_friction);
+    v("dynamic_friction", m.dynamicFriction);
+    v("static_friction", m.staticFriction);
     v("index", m.index);
-    v("recovery_cycles", m.recovery_cycles);
+    v("recovery_cycles", m.recoveryCycles);
   }
 };
 
@@ -94,21 +94,21 @@ struct Plane2 {
   static constexpr MessageInfo kInfo{"vrpn_ForceDevice Plane2", Direction::kToServer,
                                      Reliability::kLowLatency, Role::scene,
                                      "Sets the texture, the buzz and the adhesion of the plane."};
-  float normal_adhesion = 0;
-  float lateral_adhesion = 0;
-  float texture_amplitude = 0;
-  float texture_wavelength = 0;
-  float buzz_amplitude = 0;
-  float buzz_frequency = 0;
+  float normalAdhesion = 0;
+  float lateralAdhesion = 0;
+  float textureAmplitude = 0;
+  float textureWavelength = 0;
+  float buzzAmplitude = 0;
+  float buzzFrequency = 0;
 
   template <class M, class V>
   static constexpr void fields(M& m, V&& v) {
-    v("normal_adhesion", m.normal_adhesion);
-    v("lateral_adhesion", m.lateral_adhesion);
-    v("texture_amplitude", m.texture_amplitude);
-    v("texture_wavelength", m.texture_wavelength);
-    v("buzz_amplitude", m.buzz_amplitude);
-    v("buzz_frequency", m.buzz_frequency, "Hz");
+    v("normal_adhesion", m.normalAdhesion);
+    v("lateral_adhesion", m.lateralAdhesion);
+    v("texture_amplitude", m.textureAmplitude);
+    v("texture_wavelength", m.textureWavelength);
+    v("buzz_amplitude", m.buzzAmplitude);
+    v("buzz_frequency", m.buzzFrequency, "Hz");
   }
 };
 

@@ -172,16 +172,16 @@ struct UpdateTrimeshChanges {
   std::int32_t object = 0;
   float stiffness = 0;
   float damping = 0;
-  float static_friction = 0;
-  float dynamic_friction = 0;
+  float staticFriction = 0;
+  float dynamicFriction = 0;
 
   template <class M, class V>
   static constexpr void fields(M& m, V&& v) {
     v("object", m.object);
     v("stiffness", m.stiffness);
     v("damping", m.damping);
-    v("static_friction", m.static_friction);
-    v("dynamic_friction", m.dynamic_friction);
+    v("static_friction", m.staticFriction);
+    v("dynamic_friction", m.dynamicFriction);
   }
 };
 

@@ -31,7 +31,7 @@ TriangleMesh randomSoup(int triangles) {
 
 scene::Surface randomSurface() {
   scene::Surface s = surface(random(100, 3000), random(0, 2), 0);
-  s.dynamic_friction = random(0, 1) * s.static_friction;
+  s.dynamicFriction = random(0, 1) * s.staticFriction;
   s.damping_Ns_per_m = random(0, 3);
   s.popthrough_N = *rc::gen::element(0.0, 1.0);
   return s;
@@ -42,7 +42,7 @@ void expectSane(const Rendering& r, const Vec3& hip, const Vec3& velocity, const
   RC_ASSERT(r.force_N.allFinite());
   RC_ASSERT(r.proxy_m.allFinite());
   RC_ASSERT((r.status & kRenderNotFinite) == 0U);
-  const double damping = 3 * s.damping_Ns_per_m * velocity.norm() * (1 + s.static_friction);
+  const double damping = 3 * s.damping_Ns_per_m * velocity.norm() * (1 + s.staticFriction);
   RC_ASSERT(r.force_N.norm() <= s.stiffness_N_per_m * (hip - r.proxy_m).norm() * (1 + 1e-6) + damping + 1e-6);
 }
 

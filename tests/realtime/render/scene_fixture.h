@@ -26,8 +26,8 @@ inline constexpr Nanos kTick = 1'000'000;
 inline scene::Surface surface(double stiffness = 1000, double mu_s = 0, double mu_d = 0) {
   scene::Surface s;
   s.stiffness_N_per_m = stiffness;
-  s.static_friction = mu_s;
-  s.dynamic_friction = mu_d;
+  s.staticFriction = mu_s;
+  s.dynamicFriction = mu_d;
   return s;
 }
 

@@ -374,8 +374,8 @@ constexpr double kBall_m = 0.030;
 scene::Surface ballSurface() {
   scene::Surface surface;
   surface.stiffness_N_per_m = 500;
-  surface.static_friction = 0.2;
-  surface.dynamic_friction = 0.1;
+  surface.staticFriction = 0.2;
+  surface.dynamicFriction = 0.1;
   return surface;
 }
 
@@ -388,8 +388,8 @@ RemoteContact ballContact(const Vec3& hand_m) {
   contact.normal = hand_m.normalized();
   contact.point_m = kBall_m * contact.normal;
   contact.stiffness_N_per_m = surface.stiffness_N_per_m;
-  contact.staticFriction = surface.static_friction;
-  contact.dynamicFriction = surface.dynamic_friction;
+  contact.staticFriction = surface.staticFriction;
+  contact.dynamicFriction = surface.dynamicFriction;
   return contact;
 }
 

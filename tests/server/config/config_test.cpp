@@ -259,7 +259,7 @@ ServerConfig unusual() {
                    .commandsPerSecond = 5000,
                    .recording_MB = 9,
                    .blackBoxes_MB = 3,
-                   .log_kB_per_second = 11};
+                   .log_kB_per_s = 11};
   DeviceConfig device;
   device.names = {"Left \"hand\" \\", "Tracker0"};
   device.driver = "evdev";

@@ -462,11 +462,11 @@ TEST_F(ReporterTest, TheHandsStateHasTheRemoteContacts) {
   ASSERT_EQ(out_.size(), 1U);
   const wire::HandState state = reported<wire::HandState>().at(0);
   EXPECT_EQ(state.tick, 1U);
-  EXPECT_EQ(state.contacts_time, 11);
-  EXPECT_EQ(state.force_time, 12);
+  EXPECT_EQ(state.contactsTime, 11);
+  EXPECT_EQ(state.forceTime, 12);
   EXPECT_NEAR(state.position[1], 0.04, 1e-12);
   EXPECT_NEAR(state.force[1], 3, 1e-12);
-  EXPECT_NEAR(state.held_force[1], 1, 1e-12);
+  EXPECT_NEAR(state.heldForce[1], 1, 1e-12);
   EXPECT_EQ(state.energy, 0.01);
   EXPECT_EQ(state.gripper, 0.4);
   EXPECT_EQ(state.buttons, 1U);

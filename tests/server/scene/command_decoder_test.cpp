@@ -175,10 +175,10 @@ TEST_F(CommandDecoderTest, APlaneKeepsEachOfItsValues) {
   give(wire::Plane{.plane = {1, 2, 3, 4},
                    .stiffness = 5,
                    .damping = 6,
-                   .dynamic_friction = 7,
-                   .static_friction = 8,
+                   .dynamicFriction = 7,
+                   .staticFriction = 8,
                    .index = 9,
-                   .recovery_cycles = 10});
+                   .recoveryCycles = 10});
   const auto& plane = only<scene::SetPlane>();
   EXPECT_EQ(plane.plane, (std::array<double, 4>{1, 2, 3, 4}));
   EXPECT_EQ(plane.stiffness, 5);

@@ -25,7 +25,7 @@ class StreamedInputTest : public testing::Test {
   }
   StreamedInput::Answer send(std::vector<double> numbers, scene::ClientId client = 1, std::int64_t time = 0,
                              std::int64_t stateTime = 0) {
-    wire::RemoteContacts message{.time = time, .state_time = stateTime, .contacts = {}};
+    wire::RemoteContacts message{.time = time, .stateTime = stateTime, .contacts = {}};
     message.contacts.values = std::move(numbers);
     return streamed_.on(client, message, last_, now_);
   }

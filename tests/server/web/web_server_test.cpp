@@ -82,10 +82,10 @@ TEST_F(Web, TheStateHasEveryFieldThePageReads) {
   peer.send(wire::Plane{.plane = {0, 1, 0, 0.05F},
                         .stiffness = 0.5F,
                         .damping = 0,
-                        .dynamic_friction = 0,
-                        .static_friction = 0,
+                        .dynamicFriction = 0,
+                        .staticFriction = 0,
                         .index = 0,
-                        .recovery_cycles = 1});
+                        .recoveryCycles = 1});
   peer.send(wire::ConstraintMode{1});
   peer.send(wire::ConstraintPoint{{0.01F, 0, 0}});
   peer.send(wire::ConstraintStiffness{100});
