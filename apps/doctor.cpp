@@ -156,7 +156,11 @@ int run(double seconds, std::uint16_t port, bool json) {
   };
   const auto title = [&](const char* format, auto... arguments) {
     if (json) return;
-    std::printf(format, arguments...);
+    if constexpr (sizeof...(arguments) == 0) {
+      std::fputs(format, stdout);
+    } else {
+      std::printf(format, arguments...);
+    }
     std::fflush(stdout);
   };
   title("realtime\n");

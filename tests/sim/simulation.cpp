@@ -602,7 +602,7 @@ void Simulation::vanish(Dice& dice) {
   if (present.empty()) return;
   Pusher& pusher = *present[dice.below(present.size())];
   constexpr Nanos kRamp = 250 * kMs;
-  constexpr Nanos kMargin = 30 * kMs;
+  constexpr Nanos kMargin = 60 * kMs;  // the servo begins the ramp when the scene thread has not for 50 ms
   const Nanos travel = 3 * script_.networkDelay + 2 * script_.networkJitter + kMargin;
   Nanos lasts = travel + kRamp;
   // Every pause of the server begins the watch of a heartbeat anew: without one, the time is known.

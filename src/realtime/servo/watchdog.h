@@ -30,7 +30,8 @@ class Watchdog {
 
   /// Before the loop starts.
   void start();
-  /// Before the loop ends: when this returns, the watchdog no longer calls the device. Idempotent.
+  /// After the loop has ended and before the device is closed: when this returns, the watchdog no longer
+  /// calls the device. Idempotent.
   void stop() noexcept;
 
   /// Any thread: how long no tick of this loop has ended; 0 before the first one and without a loop.

@@ -58,13 +58,14 @@ void DeviceKeeper::startLoop() {
   spdlog::info("servo loop of '{}': paced by the device", options_.name);
 }
 
+// The watchdog last: until then the last tick may hang.
 void DeviceKeeper::stopLoop() noexcept {
-  watchdog_.stop();
   if (device_.traits().selfPaced) {
     device_.stop();
   } else {
     servo_.reset();
   }
+  watchdog_.stop();
 }
 
 std::string DeviceKeeper::poll(Nanos now) {

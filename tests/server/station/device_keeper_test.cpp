@@ -33,7 +33,7 @@ bool eventually(const std::function<bool()>& condition) {
   return true;
 }
 
-// Counts the calls, and reads while it is closed.
+// Counts the calls, and those while it is closed.
 class ScriptedDevice final : public device::Device {
  public:
   explicit ScriptedDevice(bool selfPaced) : selfPaced_(selfPaced) {}
@@ -54,7 +54,7 @@ class ScriptedDevice final : public device::Device {
   }
   const device::DeviceProfile& profile() const noexcept override { return profile_; }
   bool read(Nanos now, device::DeviceState& state) noexcept override {
-    if (!isOpen) ++readsWhileClosed;
+    if (!isOpen) ++callsWhileClosed;
     while (readBlocks) std::this_thread::sleep_for(1ms);
     ++reads;
     state.time = now;
@@ -62,6 +62,7 @@ class ScriptedDevice final : public device::Device {
   }
   bool write(const Vec3& /*force_N*/) noexcept override { return true; }
   bool zeroFromOtherThread() noexcept override {
+    if (!isOpen) ++callsWhileClosed;
     ++zeroes;
     return true;
   }
@@ -97,7 +98,7 @@ class ScriptedDevice final : public device::Device {
     openError_ = reason;
   }
 
-  std::atomic<int> opens{0}, closes{0}, reads{0}, readsWhileClosed{0};
+  std::atomic<int> opens{0}, closes{0}, reads{0}, callsWhileClosed{0};
   std::atomic<bool> isOpen{false}, isLost{false}, openBlocks{false}, startFails{false};
   std::atomic<int> zeroes{0};
   std::atomic<bool> readBlocks{false};
@@ -119,7 +120,7 @@ class KeeperTest : public testing::TestWithParam<bool> {
     device_.open();
     device_.opens = 0;
   }
-  ~KeeperTest() override { EXPECT_EQ(device_.readsWhileClosed, 0); }
+  ~KeeperTest() override { EXPECT_EQ(device_.callsWhileClosed, 0); }
 
   bool loopRuns() {
     const int before = device_.reads;
@@ -207,6 +208,21 @@ TEST_P(KeeperTest, AHangingLoopGivesNoForceAndIsReported) {
   device_.readBlocks = false;
   EXPECT_TRUE(eventually([&] { return keeper_.poll(clock_.now()).empty(); }));
   EXPECT_TRUE(loopRuns());
+}
+
+TEST_P(KeeperTest, ALoopThatHangsWhileItIsEndedGivesNoForce) {
+  keeper_.start();
+  EXPECT_TRUE(loopRuns());
+  device_.readBlocks = true;
+  EXPECT_TRUE(eventually([&] { return device_.zeroes > 0; }));
+  std::thread other([&] { keeper_.stop(); });
+  int zeroes = device_.zeroes;
+  EXPECT_TRUE(eventually([&] { return device_.zeroes > zeroes + 20; }));
+  device_.readBlocks = false;
+  other.join();
+  zeroes = device_.zeroes;
+  std::this_thread::sleep_for(40ms);
+  EXPECT_EQ(device_.zeroes, zeroes) << "the watchdog has stopped";
 }
 
 TEST_P(KeeperTest, AShortLossIsReportedWithoutReopening) {
