@@ -7,8 +7,8 @@
 // HAPTICD_BUNNY is the path of testdata/meshes/bunny.obj.
 asm(".section .rodata\n.balign 16\nhapticd_bunny:\n.incbin \"" HAPTICD_BUNNY
     "\"\nhapticd_bunny_end:\n.previous\n");
-extern "C" const char hapticd_bunny[];
-extern "C" const char hapticd_bunny_end[];
+extern "C" const char hapticd_bunny[];      // NOLINT(readability-identifier-naming)
+extern "C" const char hapticd_bunny_end[];  // NOLINT(readability-identifier-naming)
 
 namespace hapticd::apps {
 
