@@ -6,9 +6,9 @@
 namespace hapticd::sim {
 
 const char* nameOf(Action::Kind kind) {
-  static constexpr const char* kNames[] = {"stop",      "rearm",     "move",    "batch",    "upload",
-                                           "appear",    "vanish",    "pause",   "nonsense", "flood",
-                                           "wall step", "disk full", "describe"};
+  static constexpr const char* kNames[] = {"stop",      "rearm",     "move",     "batch",    "upload",
+                                           "appear",    "vanish",    "pause",    "nonsense", "flood",
+                                           "wall step", "disk full", "describe", "stream"};
   return kNames[static_cast<int>(kind)];
 }
 
@@ -58,6 +58,13 @@ Script drawScript(std::uint64_t seed, double seconds) {
   if (dice.chance(0.3)) every(Kind::wallStep, 5.0);
   if (script.record && dice.chance(0.3)) every(Kind::diskFull, 8.0);
   every(Kind::describe, 2.0);
+  if (dice.chance(0.4)) {
+    every(Kind::stream, dice.uniform(1.0, 4.0));
+    // Where nobody else pushes, each end of a stream is an end of force.
+    if (dice.chance(0.5))
+      std::erase_if(script.actions,
+                    [](const Action& a) { return a.kind == Kind::appear || a.kind == Kind::vanish; });
+  }
   std::stable_sort(script.actions.begin(), script.actions.end(),
                    [](const Action& a, const Action& b) { return a.at < b.at; });
   return script;

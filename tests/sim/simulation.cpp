@@ -174,6 +174,92 @@ class Pusher final : public Listener {
   }
 };
 
+// Streams surfaces near the hand, or forces, as a simulation of its own would. They never push down: the
+// judge of the cube takes a hand that is not pushed up for a swallowed one.
+class Streamer final : public Listener {
+ public:
+  static constexpr Nanos kLongestLife = 100 * kMs;  // of what was sent
+
+  Streamer(Clients& all, std::string name, std::uint64_t seed)
+      : Listener(all, std::move(name)), dice_(seed), contacts_(1 + dice_.below(3)) {
+    beats = false;
+    kinds = wire::kReportHand;
+    forces_ = dice_.chance(0.3);
+    stamps_ = dice_.chance(0.7);
+    for (Contact& contact : contacts_) contact = draw();
+  }
+  bool ready = false;
+  bool over = false;  // it sends no more
+
+  void next() {
+    const Nanos now = all_.clock.now();
+    const Nanos late =
+        dice_.chance(0.05) ? dice_.between(0, 100 * kMs) : 0;  // ignored when older than the newest
+    const std::int64_t stamp = stamps_ ? 1 + now - late : 0;
+    if (forces_) {
+      send(wire::HeldForce{.time = stamp,
+                           .force = {dice_.uniform(-1.0, 1.0), dice_.uniform(0.0, 1.0), 0},
+                           .torque = {},
+                           .lifetime = dice_.uniform(0.0, 0.2)});
+      return;
+    }
+    wire::RemoteContacts message{.time = stamp, .stateTime = dice_.chance(0.5) ? now : 0, .contacts = {}};
+    for (std::size_t i = 0; i < contacts_.size(); ++i) {
+      if (dice_.chance(0.05)) continue;                    // missing in this set
+      if (dice_.chance(0.02)) contacts_[i] = draw();       // elsewhere at once
+      std::vector<double> numbers = contacts_[i].numbers;  // moves as stated
+      for (int axis = 0; axis < 3; ++axis)
+        numbers[3 + axis] += numbers[12 + axis] * base::toSeconds(now - contacts_[i].since);
+      numbers[0] = static_cast<double>(i);
+      if (dice_.chance(0.005))
+        numbers[dice_.below(numbers.size())] = std::numeric_limits<double>::quiet_NaN();
+      message.contacts.values.insert(message.contacts.values.end(), numbers.begin(), numbers.end());
+    }
+    send(message);
+  }
+
+ private:
+  struct Contact {
+    Nanos since = 0;
+    std::vector<double> numbers;
+  };
+  Contact draw() {
+    const auto side = [this](double most) { return dice_.uniform(-most, most); };
+    const double turn = side(0.7);
+    return {all_.clock.now(),
+            {0,
+             static_cast<double>(dice_.below(3)),
+             dice_.uniform(0.02, 0.1),  // id, shape, radius
+             side(0.005),
+             dice_.uniform(0.018, 0.03),
+             side(0.005),  // point
+             std::sin(turn),
+             std::cos(turn),
+             0,  // normal
+             0,
+             0,
+             1,  // axis
+             side(0.05),
+             side(0.1),
+             side(0.05),  // velocity
+             side(1),
+             0,
+             side(1),  // angular velocity
+             dice_.uniform(50, 1500),
+             dice_.uniform(0, 3),
+             side(1) + 0.5,
+             side(1),  // stiffness to friction
+             dice_.uniform(0.02, 0.2),
+             dice_.chance(0.3) ? 1.0 : 0.0}};  // lifetime, yields
+  }
+  void onReady() override { ready = true; }
+
+  Dice dice_;
+  std::vector<Contact> contacts_;
+  bool forces_ = false;
+  bool stamps_ = true;
+};
+
 class Simulation {
  public:
   Simulation(const Script& script, bool verbose);
@@ -189,6 +275,9 @@ class Simulation {
   void upload(Dice& dice);
   void appear(Dice& dice);
   void vanish(Dice& dice);
+  void stream(Dice& dice);
+  void endStream(Streamer& streamer, Dice& dice);
+  void endForcesWithin(Nanos lasts);
   void nonsense(Dice& dice);
   void beat();
   void describe(bool last);
@@ -226,6 +315,7 @@ class Simulation {
   std::unique_ptr<Listener> uploader_;
   std::unique_ptr<Listener> reader_;  // that sometimes does not read
   std::vector<std::unique_ptr<Pusher>> pushers_;
+  std::vector<std::unique_ptr<Streamer>> streamers_;
   std::vector<std::unique_ptr<SimClient>> strangers_;
   std::map<std::uint16_t, SimClient*> byPort_;
 
@@ -510,6 +600,9 @@ void Simulation::perform(const Action& action) {
     case Action::Kind::describe:
       describe(false);
       break;
+    case Action::Kind::stream:
+      stream(dice);
+      break;
   }
 }
 
@@ -624,13 +717,62 @@ void Simulation::vanish(Dice& dice) {
       lasts += 1'600 * kMs;  // what is not acknowledged for 500 ms, or a probe after a second of silence
       break;
   }
+  endForcesWithin(lasts);
+}
+
+void Simulation::endForcesWithin(Nanos lasts) {
   const Nanos stalled = serverStalled();
   endOfForces_ =
       std::max(endOfForces_ + stalled - std::exchange(stalledThen_, stalled), clock_.now() + lasts);
 }
 
+void Simulation::stream(Dice& dice) {
+  constexpr std::ptrdiff_t kMost = 2;
+  const auto streams = [](const auto& streamer) { return !streamer->over; };
+  if (std::count_if(streamers_.begin(), streamers_.end(), streams) >= kMost) return;
+  streamers_.push_back(std::make_unique<Streamer>(*clients_, "streamer " + std::to_string(streamers_.size()),
+                                                  dice.below(~std::uint64_t{0})));
+  Streamer* const streamer = streamers_.back().get();
+  streamer->connect();
+  byPort_[streamer->local().port] = streamer;
+  const Nanos end = clock_.now() + dice.between(50 * kMs, 3'000 * kMs);
+  const Nanos period = dice.between(5 * kMs, 60 * kMs);
+  for (Nanos at = period; clock_.now() + at < end; at += dice.between(period / 2, 2 * period)) {
+    after(at, [this, streamer] {
+      if (streamer->ready && streamer->connected() && !bench_.quiet) streamer->next();
+    });
+  }
+  const std::uint64_t seed = dice.below(~std::uint64_t{0});
+  after(end - clock_.now(), [this, streamer, seed] {
+    Dice ending(seed);
+    endStream(*streamer, ending);
+  });
+}
+
+// However it ends, what it sent lives for 100 ms at most.
+void Simulation::endStream(Streamer& streamer, Dice& dice) {
+  streamer.over = true;
+  streamer.expectEnd();
+  switch (dice.below(3)) {
+    case 0:
+      if (streamer.open()) streamer.reset();
+      break;
+    case 1:
+      scheduler_.cut(streamer.local());
+      if (streamer.open()) streamer.reset();
+      break;
+    default:
+      break;  // connected and silent
+  }
+  constexpr Nanos kMargin = 10 * kMs;
+  endForcesWithin(3 * script_.networkDelay + 2 * script_.networkJitter + Streamer::kLongestLife + kMargin);
+}
+
 std::optional<Nanos> Simulation::freeFrom() {
   if (script_.cube) return std::nullopt;
+  for (const auto& streamer : streamers_) {
+    if (!streamer->over) return std::nullopt;
+  }
   for (const auto& pusher : pushers_) {
     if (pusher->open() && !pusher->gone) return std::nullopt;
   }

@@ -27,6 +27,7 @@ struct Action {
     wallStep,   ///< the wall clock is set
     diskFull,   ///< the disk runs full, and has room again
     describe,   ///< the scene is compared with what was sent
+    stream,     ///< a client comes, streams remote contacts or held forces for a while, and goes
   };
   Nanos at = 0;
   Kind kind = Kind::stop;
