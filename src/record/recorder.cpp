@@ -155,14 +155,14 @@ void Recorder::drain() {
   reportLosses();
 }
 
-// A file that was removed can be written and is lost.
+// A file that was removed can be written and is lost. Other errors say nothing about it.
 void Recorder::lookForFile() {
   if (!file_ || base::now() < nextLook_) return;
   nextLook_ = base::now() + kBetweenLooks;
   try {
     base::world().files.open(path_);
   } catch (const std::system_error& error) {
-    fail(error.code());
+    if (error.code() == std::errc::no_such_file_or_directory) fail(error.code());
   }
 }
 

@@ -6,12 +6,14 @@
 #include <sys/resource.h>
 
 #include <atomic>
+#include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <fstream>
 #include <mutex>
 #include <thread>
 
+#include "base/fake_world.h"
 #include "record/recording_file.h"
 #include "record/recording_reader.h"
 
@@ -143,6 +145,25 @@ TEST(Recorder, AFileThatIsRemovedEndsTheRecording) {
   recorder.ring(0).push(realtime::TickRecord());
   recorder.finish();
   EXPECT_EQ(recorder.counts().ticks, 0U) << "lost ticks were not recorded";
+}
+
+TEST(Recorder, AMachineOutOfDescriptorsDoesNotEndTheRecording) {
+  base::FakeWorld world;
+  Problems problems;
+  Recorder recorder("/session.haptics", problems.listener());
+  recorder.addDevice(phantom());
+  recorder.start(0, "");
+  world.files.failures.open = EMFILE;
+  for (std::uint64_t i = 1; i <= 5; ++i) {
+    realtime::TickRecord tick;
+    tick.report.tick = i;
+    recorder.ring(0).push(tick);
+    world.threads.runUntil(world.clock.now() + 1'000'000'000);
+  }
+  EXPECT_TRUE(recorder.writes());
+  recorder.finish();
+  EXPECT_EQ(recorder.counts().ticks, 5U);
+  EXPECT_EQ(problems.all(), "");
 }
 
 TEST(Recorder, AFullDiskEndsTheRecordingAndNothingElse) {

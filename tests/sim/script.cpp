@@ -6,9 +6,9 @@
 namespace hapticd::sim {
 
 const char* nameOf(Action::Kind kind) {
-  static constexpr const char* kNames[] = {"stop",      "rearm",     "move",     "batch",    "upload",
-                                           "appear",    "vanish",    "pause",    "nonsense", "flood",
-                                           "wall step", "disk full", "describe", "stream"};
+  static constexpr const char* kNames[] = {"stop",      "rearm",      "move",     "batch",    "upload",
+                                           "appear",    "vanish",     "pause",    "nonsense", "flood",
+                                           "wall step", "disk fails", "describe", "stream"};
   return kNames[static_cast<int>(kind)];
 }
 
@@ -56,8 +56,9 @@ Script drawScript(std::uint64_t seed, double seconds) {
   if (dice.chance(0.4)) every(Kind::nonsense, 0.5);
   if (dice.chance(0.3)) every(Kind::flood, 2.0);
   if (dice.chance(0.3)) every(Kind::wallStep, 5.0);
-  if (script.record && dice.chance(0.3)) every(Kind::diskFull, 8.0);
+  if (script.record && dice.chance(0.3)) every(Kind::diskFails, 8.0);
   every(Kind::describe, 2.0);
+  if (!script.record && dice.chance(0.3)) every(Kind::diskFails, 8.0);  // black boxes are written as well
   if (dice.chance(0.4)) {
     every(Kind::stream, dice.uniform(1.0, 4.0));
     // Where nobody else pushes, each end of a stream is an end of force.

@@ -61,6 +61,7 @@ class SimDevice final : public device::Device {
     if (!opened_) hand_.open();
     opened_ = true;
     lost_ = bench->lost = false;
+    wrote_ = false;
   }
   void close() noexcept override { pause(5 * kMs); }
   const device::DeviceProfile& profile() const noexcept override { return hand_.profile(); }
@@ -91,6 +92,7 @@ class SimDevice final : public device::Device {
 
   bool write(const Vec3& force_N) noexcept override {
     bench->scheduler.handOver();
+    wrote_ = true;
     const bool accepted = !lost_ && refuse_ == 0 && hand_.write(force_N);
     if (!accepted) hand_.write(Vec3::Zero());
     count(refuse_);
@@ -144,13 +146,14 @@ class SimDevice final : public device::Device {
     }
   }
 
-  // The watchdog looks every 5 ms for 20 ms of silence, if the process runs.
+  // The watchdog looks every 5 ms for 20 ms of silence, if the process runs. A loop that has not yet written
+  // left no force.
   void hangFor(Nanos length) noexcept {
     constexpr Nanos kSurely = 60 * kMs;
     const std::uint64_t before = overtaken_;
     const Nanos stalled = bench->scheduler.netStalled();
     bench->scheduler.runUntil(bench->clock.now() + length);
-    if (length > kSurely && overtaken_ == before && bench->scheduler.netStalled() == stalled)
+    if (wrote_ && length > kSurely && overtaken_ == before && bench->scheduler.netStalled() == stalled)
       bench->finding("the watchdog has not ended the force of a servo that hung for " +
                      std::to_string(length / kMs) + " ms");
   }
@@ -175,6 +178,7 @@ class SimDevice final : public device::Device {
   device::SimulatedDevice hand_;
   bool opened_ = false;
   bool lost_ = false;
+  bool wrote_ = false;  // since it was opened
   int openFailures_ = 0;
   int noState_ = 0;
   int notFinite_ = 0;

@@ -278,6 +278,8 @@ class Simulation {
   void stream(Dice& dice);
   void endStream(Streamer& streamer, Dice& dice);
   void endForcesWithin(Nanos lasts);
+  void failDisk(Dice& dice);
+  void healDisk();
   void nonsense(Dice& dice);
   void beat();
   void describe(bool last);
@@ -326,7 +328,7 @@ class Simulation {
   Nanos stalledThen_ = 0;
   std::deque<std::pair<Nanos, std::uint32_t>> buttons_{{0, 0}};  // of the device: since when
   bool over_ = false;
-  bool wasFull_ = false;
+  bool writesFailed_ = false;
   std::map<std::int32_t, std::int64_t> seen_;  // newest batch of each batcher that a description showed
   bool compared_ = false;
   bool uploaded_ = false;
@@ -476,7 +478,7 @@ Outcome Simulation::run() {
     after(500 * kMs, [this] {
       if (reader_->open()) reader_->resumeReading();
     });
-    files_.freeBytes.reset();
+    healDisk();
     ++moving_;
     if (script_.cube) pose(y_);
     // Behind all that it uploaded: shows at the end whether that was carried out.
@@ -592,10 +594,8 @@ void Simulation::perform(const Action& action) {
       clock_.stepWall((dice.chance(0.5) ? 1 : -1) * dice.between(11'000 * kMs, 3'600'000 * kMs));
       wallSteps_ = true;
       break;
-    case Action::Kind::diskFull:
-      files_.freeBytes = dice.below(200'000);
-      wasFull_ = true;
-      after(dice.between(100 * kMs, 3'000 * kMs), [this] { files_.freeBytes.reset(); });
+    case Action::Kind::diskFails:
+      failDisk(dice);
       break;
     case Action::Kind::describe:
       describe(false);
@@ -724,6 +724,31 @@ void Simulation::endForcesWithin(Nanos lasts) {
   const Nanos stalled = serverStalled();
   endOfForces_ =
       std::max(endOfForces_ + stalled - std::exchange(stalledThen_, stalled), clock_.now() + lasts);
+}
+
+void Simulation::failDisk(Dice& dice) {
+  switch (dice.below(5)) {
+    case 0:
+      files_.failures.sync = EIO;
+      break;
+    case 1:
+      files_.failures.open = EMFILE;
+      break;
+    case 2:
+      files_.failures.write = EIO;
+      writesFailed_ = true;
+      break;
+    default:
+      files_.freeBytes = dice.below(200'000);
+      writesFailed_ = true;
+      break;
+  }
+  after(dice.between(100 * kMs, 3'000 * kMs), [this] { healDisk(); });
+}
+
+void Simulation::healDisk() {
+  files_.failures = {};
+  files_.freeBytes.reset();
 }
 
 void Simulation::stream(Dice& dice) {
@@ -903,7 +928,7 @@ void Simulation::checkEnd() {
 }
 
 void Simulation::checkRecording() {
-  if (wasFull_) return;
+  if (writesFailed_) return;
   scheduler_.calm();
   std::string remark;
   std::string law;

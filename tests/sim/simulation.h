@@ -25,7 +25,7 @@ struct Action {
     nonsense,   ///< a stranger sends what breaks the protocol
     flood,      ///< a client sends thousands of pings
     wallStep,   ///< the wall clock is set
-    diskFull,   ///< the disk runs full, and has room again
+    diskFails,  ///< the disk is full, refuses writes or syncs, or no file can be opened, for a while
     describe,   ///< the scene is compared with what was sent
     stream,     ///< a client comes, streams remote contacts or held forces for a while, and goes
   };
