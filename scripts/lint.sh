@@ -29,6 +29,7 @@ write_database() {
       command = $0
       gsub(/ -Winvalid-pch| -include [^ ]*cmake_pch\.hxx/, "", command)
       gsub(/ -Wno-(restrict|stringop-overflow|subobject-linkage)| --param=[^ ]*/, "", command)  # of GCC
+      sub(/ -Wall/, " -Wno-deprecated-declarations&", command)  # which the library of GCC uses
     }
     /^  "file"/ {
       file = $0; sub(/^  "file": "/, "", file); sub(/",?$/, "", file)
