@@ -56,7 +56,7 @@ void addReports(ReportedDevice& device, const realtime::TickReport& tick, wire::
 void exportVrpn(const ExportOptions& options, std::string& remark) {
   record::RecordingReader reader(options.recording);
   const record::RecordingHeader& header = reader.header();
-  const server::ServerConfig config = server::parseConfig(header.config, options.recording);
+  const server::ServerConfig config = server::parseRecordedConfig(header.config, options.recording);
   record::VrpnLog log(options.out);
   std::vector<ReportedDevice> devices;
   for (std::size_t i = 0; i < header.devices.size(); ++i) {

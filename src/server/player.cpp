@@ -40,21 +40,12 @@ Player::Player(ReplayOptions options)
 }
 
 ServerConfig Player::config() const {
-  ServerConfig config = parseConfig(header_.config, options_.file.string());
+  ServerConfig config = parseRecordedConfig(header_.config, options_.file.string());
   if (config.devices.size() != header_.devices.size()) {
     throw ConfigError("'" + options_.file.string() + "' names " + std::to_string(config.devices.size()) +
                       " devices in its configuration but contains " + std::to_string(header_.devices.size()) +
                       "; the recording is damaged");
   }
-  const ServerConfig defaults;
-  config.listenAddress = defaults.listenAddress;
-  config.port = defaults.port;
-  config.http = defaults.http;
-  config.httpAllow.clear();
-  config.seconds = defaults.seconds;
-  config.record.clear();
-  for (DeviceConfig& device : config.devices)
-    device.hand = DeviceConfig().hand;  // the hand file may not exist here
   return config;
 }
 

@@ -69,6 +69,31 @@ TEST_F(Replay, ClientsReceiveTheRecordedTicks) {
   EXPECT_GT(touching, 50U);
 }
 
+TEST(ReplayConfig, NeedsNothingOfTheMachineThatRecorded) {
+  server::ServerConfig there;
+  there.tokens = "/etc/hapticd/tokens";
+  there.tls = "/etc/hapticd/certificate.pem";
+  there.tlsKey = "/etc/hapticd/key.pem";
+  there.socket = "/run/user/1234/hapticd.socket";
+  there.ownerUsers = {"somebody"};
+  there.callbackHosts = {"there.example"};
+  there.devices.front().hand = "/home/somebody/hand.csv";
+  there.devices.front().blackBoxDir = "/var/lib/hapticd";
+  there.limits.objects = 5;
+  const RecordingFile file;
+  {
+    record::Recorder recorder(file.path(), [](const std::string&) {});
+    record::RecordedDevice device;
+    device.names = {"Phantom"};
+    recorder.addDevice(device);
+    recorder.start(0, server::toToml(there));
+    recorder.finish();
+  }
+  server::ServerConfig here;
+  here.limits = there.limits;
+  EXPECT_EQ(server::toToml(server::Player({.file = file.path()}).config()), server::toToml(here));
+}
+
 TEST_F(Replay, CommandsAreRefused) {
   ScriptedPeer peer(server_->address());
   ASSERT_TRUE(peer.untilConnected());

@@ -1,12 +1,17 @@
 // hapticd-sim: the whole server in one thread on a virtual clock, among clients and faults drawn from a seed.
 #include <sys/resource.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <charconv>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "sim/simulation.h"
 
@@ -19,6 +24,7 @@ using hapticd::sim::Script;
 constexpr char kHelp[] =
     "Usage: hapticd-sim [--seeds A-B | --seed N] [--seconds S] [--cpu S] [--first] [--twice] [--shrink] "
     "[--shrink-cpu S] [--verbose]\n"
+    "       hapticd-sim --watch SEED [--seconds S] [-- OPTIONS]\n"
     "Runs the whole server in one thread on a virtual clock, among clients and faults drawn from a seed.\n"
     "  --seeds A-B    these seeds (1-20)\n"
     "  --seed N       one seed\n"
@@ -29,7 +35,41 @@ constexpr char kHelp[] =
     "  --shrink       after a finding: removes what it does not need, and prints the rest\n"
     "  --shrink-cpu S after this much processor time for each finding, the shortest so far (60)\n"
     "  --verbose      prints the log of the server with virtual times\n"
+    "  --watch SEED   runs one seed with a recorder and serves the recording to the viewer; OPTIONS are "
+    "those of "
+    "'hapticd replay'\n"
     "Exit status: 0 without findings, 1 with, 2 for a wrong command line.\n";
+
+// Becomes 'hapticd replay', which lies beside this program. Returns only when that fails.
+int watch(std::uint64_t seed, double seconds, char** replayOptions) {
+  Script script = hapticd::sim::drawScript(seed, seconds);
+  if (!script.record)
+    std::printf("this seed has no recorder: with one, threads take turns in another order\n");
+  script.record = true;
+  std::vector<std::byte> recording;
+  const Outcome outcome = run(script, false, &recording);
+  for (const std::string& text : outcome.findings) std::printf("finding: %s\n", text.c_str());
+  const auto file =
+      std::filesystem::temp_directory_path() / ("hapticd-sim-" + std::to_string(seed) + ".haptics");
+  std::ofstream out(file, std::ios::binary);
+  out.write(reinterpret_cast<const char*>(recording.data()), static_cast<std::streamsize>(recording.size()));
+  out.close();
+  if (!out) {
+    std::fprintf(stderr, "hapticd-sim: cannot write '%s'\n", file.c_str());
+    return 1;
+  }
+  std::printf("%s: %.1f s\n", file.c_str(), seconds);
+  std::fflush(stdout);
+  const std::string program = std::filesystem::read_symlink("/proc/self/exe").replace_filename("hapticd");
+  std::string replay = "replay";
+  std::string name = file;
+  std::vector<char*> arguments{replay.data(), replay.data(), name.data()};
+  while (*replayOptions != nullptr) arguments.push_back(*replayOptions++);
+  arguments.push_back(nullptr);
+  execv(program.c_str(), arguments.data());
+  std::fprintf(stderr, "hapticd-sim: cannot run '%s': %s\n", program.c_str(), std::strerror(errno));
+  return 1;
+}
 
 double cpuSeconds() {
   rusage usage{};
@@ -122,6 +162,8 @@ int main(int argc, char** argv) {
   bool stopsAtFirst = false;
   bool wantsShrink = false;
   bool verbose = false;
+  bool watches = false;
+  char** replayOptions = argv + argc;
   for (int i = 1; i < argc; ++i) {
     const std::string_view option = argv[i];
     const std::string_view value = i + 1 < argc ? argv[i + 1] : "";
@@ -130,9 +172,14 @@ int main(int argc, char** argv) {
       std::fputs(kHelp, stdout);
       return 0;
     }
-    if (option == "--seed") {
+    if (option == "--") {
+      replayOptions = argv + i + 1;
+      break;
+    }
+    if (option == "--seed" || option == "--watch") {
       ok = parse(value, first);
       last = first;
+      watches = option == "--watch";
       ++i;
     } else if (option == "--seeds") {
       const std::size_t dash = value.find('-');
@@ -165,6 +212,8 @@ int main(int argc, char** argv) {
       return 2;
     }
   }
+
+  if (watches) return watch(first, seconds, replayOptions);
 
   std::uint64_t runs = 0;
   std::uint64_t failed = 0;

@@ -197,7 +197,7 @@ std::unique_ptr<device::Device> makeDevice(const device::DriverOptions&) {
 }
 
 constexpr device::Driver kDriver{
-    .name = "sim",
+    .name = "simulated",  // in recordings, which 'hapticd replay' then knows
     .help = "the device of the simulator",
     .keys = {},
     .canBeIsolated = false,

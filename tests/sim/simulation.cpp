@@ -264,6 +264,7 @@ class Simulation {
  public:
   Simulation(const Script& script, bool verbose);
   Outcome run();
+  std::vector<std::byte> recording() { return files_.read(kRecording); }
 
  private:
   void finding(const std::string& text);
@@ -425,7 +426,6 @@ Outcome Simulation::run() {
   config.tokens = "/tokens";
   if (script_.record) config.record = kRecording;
   server::DeviceConfig& device = config.devices.front();
-  device.driver = "sim";
   device.enableForces = true;
   device.blackBoxDir = "/boxes";
   device.blackBoxKeep = 3;
@@ -951,8 +951,11 @@ void Simulation::checkRecording() {
 
 }  // namespace
 
-Outcome run(const Script& script, bool verbose) {
-  return Simulation(script, verbose).run();
+Outcome run(const Script& script, bool verbose, std::vector<std::byte>* recording) {
+  Simulation simulation(script, verbose);
+  Outcome outcome = simulation.run();
+  if (recording != nullptr && script.record) *recording = simulation.recording();
+  return outcome;
 }
 
 }  // namespace hapticd::sim

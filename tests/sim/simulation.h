@@ -1,6 +1,7 @@
 // One run of the whole server with its clients, drawn from a seed.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <set>
 #include <string>
@@ -70,7 +71,8 @@ struct Outcome {
   Nanos slowestStop = 0;
 };
 
-/// Runs a script in the calling thread. `verbose` prints the server's log with virtual times.
-Outcome run(const Script& script, bool verbose = false);
+/// Runs a script in the calling thread. `verbose` prints the server's log with virtual times. `recording`
+/// gets the file of a script that records.
+Outcome run(const Script& script, bool verbose = false, std::vector<std::byte>* recording = nullptr);
 
 }  // namespace hapticd::sim

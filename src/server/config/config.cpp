@@ -230,6 +230,37 @@ const toml::node& nodeOf(const InvalidValue& error, const toml::table& root) {
   return node == nullptr ? *table : *node;
 }
 
+toml::table tableOf(const std::string& text, const std::string& source) {
+  try {
+    return toml::parse(text, source);
+  } catch (const toml::parse_error& error) {
+    std::ostringstream message;
+    message << source << ":" << error.source().begin.line << ": " << error.description();
+    throw ConfigError(message.str());
+  }
+}
+
+ServerConfig read(const toml::table& root, const std::string& source) {
+  ServerConfig config;
+  Reader reader(root, source);
+  visitFields(reader, config);
+  if (const toml::node* node = reader.find("device")) config.devices = readDevices(*node, source);
+  if (const toml::node* node = reader.find("compat"))
+    config.compat = readTable<CompatConfig>(*node, "compat", source);
+  if (const toml::node* node = reader.find("limits"))
+    config.limits = readTable<LimitsConfig>(*node, "limits", source);
+  reader.finish({{keysOf<DeviceConfig>(), "in a [[device]]"}, {keysOf<LimitsConfig>(), "in [limits]"}});
+  return config;
+}
+
+void check(const ServerConfig& config, const toml::table& root, const std::string& source) {
+  try {
+    validate(config);
+  } catch (const InvalidValue& error) {
+    throw ConfigError(location(source, nodeOf(error, root)) + error.what());
+  }
+}
+
 }  // namespace
 
 ServerConfig loadConfig(const std::filesystem::path& file, std::vector<std::string>& warnings) {
@@ -246,28 +277,25 @@ ServerConfig loadConfig(const std::filesystem::path& file, std::vector<std::stri
 }
 
 ServerConfig parseConfig(const std::string& text, const std::string& source) {
-  toml::table root;
-  try {
-    root = toml::parse(text, source);
-  } catch (const toml::parse_error& error) {
-    std::ostringstream message;
-    message << source << ":" << error.source().begin.line << ": " << error.description();
-    throw ConfigError(message.str());
-  }
+  const toml::table root = tableOf(text, source);
+  ServerConfig config = read(root, source);
+  check(config, root, source);
+  return config;
+}
+
+ServerConfig parseRecordedConfig(const std::string& text, const std::string& source) {
+  const toml::table root = tableOf(text, source);
+  const ServerConfig recorded = read(root, source);
   ServerConfig config;
-  Reader reader(root, source);
-  visitFields(reader, config);
-  if (const toml::node* node = reader.find("device")) config.devices = readDevices(*node, source);
-  if (const toml::node* node = reader.find("compat"))
-    config.compat = readTable<CompatConfig>(*node, "compat", source);
-  if (const toml::node* node = reader.find("limits"))
-    config.limits = readTable<LimitsConfig>(*node, "limits", source);
-  reader.finish({{keysOf<DeviceConfig>(), "in a [[device]]"}, {keysOf<LimitsConfig>(), "in [limits]"}});
-  try {
-    validate(config);
-  } catch (const InvalidValue& error) {
-    throw ConfigError(location(source, nodeOf(error, root)) + error.what());
+  config.announce = recorded.announce;
+  config.compat = recorded.compat;
+  config.limits = recorded.limits;
+  config.devices = recorded.devices;
+  for (DeviceConfig& device : config.devices) {
+    device.hand = DeviceConfig().hand;
+    device.blackBoxDir = DeviceConfig().blackBoxDir;
   }
+  check(config, root, source);
   return config;
 }
 

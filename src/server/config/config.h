@@ -194,6 +194,10 @@ ServerConfig loadConfig(const std::filesystem::path& file, std::vector<std::stri
 /// Parses the text of a TOML configuration; `source` names it in errors.
 ServerConfig parseConfig(const std::string& text, const std::string& source);
 
+/// The configuration in a recording, without what belongs to the machine that recorded: addresses, users,
+/// paths.
+ServerConfig parseRecordedConfig(const std::string& text, const std::string& source);
+
 /// The configuration as TOML with every key; parseConfig() of it returns an equal configuration.
 std::string toToml(const ServerConfig& config);
 
