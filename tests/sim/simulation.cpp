@@ -6,31 +6,25 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cerrno>
 #include <cstdio>
 #include <deque>
 #include <map>
 #include <memory>
 
-#include "box.h"
 #include "record/difference.h"
 #include "record/rerender.h"
 #include "server/server.h"
-#include "sim/sim_client.h"
+#include "sim/clients.h"
 
 namespace hapticd::sim {
 namespace {
 
 using namespace std::chrono_literals;
-using geometry::Vec3f;
 
 constexpr char kRecording[] = "/recording.haptics";
-constexpr double kHalf = 20;  // world units (mm) of the cube
 constexpr std::int32_t kUploaded = 5;
 constexpr double kPlace = 777;  // where the object of the uploads is at the end
-
-wire::F64x16 shifted(double x, double y, double z) {
-  return {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1};
-}
 
 // FNV-1a.
 class Hash {
@@ -77,187 +71,6 @@ class ScopedLog {
 
  private:
   const std::shared_ptr<spdlog::logger> before_;
-};
-
-// A client that is missed when it falls silent, and listens to every tick.
-class Listener : public SimClient {
- public:
-  using SimClient::SimClient;
-  bool beats = true;
-  bool watched = false;  // it sent a heartbeat: the server knows when they end
-  std::uint32_t kinds = wire::kReportDefault | wire::kReportTick;
-
- protected:
-  void onConnected() override {
-    queue(wire::Subscribe{kinds, 1000});
-    queue(wire::QueryCapabilities{});
-    if (beats) queue(wire::Heartbeat{});
-    onReady();
-    flush();
-  }
-  virtual void onReady() {}
-};
-
-// Owns the cube under the hand.
-class CubeOwner final : public Listener {
- public:
-  using Listener::Listener;
-  std::optional<Nanos> uploaded;
-
- private:
-  void onReady() override {
-    std::int32_t number = 0;
-    for (const Vec3f& v : test::boxTriples(Vec3f::Constant(kHalf)))
-      queue(wire::SetVertex{0, number++, {v.x(), v.y(), v.z()}});
-    queue(wire::SetHapticProperty{0, "stiffness", 1.0F});
-    uploaded = all_.clock.now();
-  }
-};
-
-// Has two objects far from the hand that move together only.
-class Batcher final : public Listener {
- public:
-  Batcher(Clients& all, std::string name, std::int32_t firstObject)
-      : Listener(all, std::move(name)), first(firstObject) {
-    kinds = wire::kReportButton;
-  }
-  const std::int32_t first;
-  std::int64_t sent = 0;
-
-  void batch() {
-    ++sent;
-    queue(wire::BatchBegin{});
-    for (const std::int32_t object : {first, first + 1}) {
-      queue(wire::SetTransformMatrix{object, shifted(500.0 * first, 0, 10.0 * static_cast<double>(sent))});
-    }
-    send(wire::BatchCommit{});
-  }
-
- private:
-  void onReady() override {
-    queue(wire::SetObjectNumber{first + 2});
-    for (const std::int32_t object : {first, first + 1}) {
-      std::int32_t number = 0;
-      queue(wire::SetTransformMatrix{object, shifted(500.0 * first, 0, 0)});
-      for (const Vec3f& v : test::boxTriples(Vec3f::Constant(5)))
-        queue(wire::SetVertex{object, number++, {v.x(), v.y(), v.z()}});
-    }
-  }
-};
-
-// Comes, pushes the hand and goes.
-class Pusher final : public Listener {
- public:
-  using Listener::Listener;
-  std::int32_t effect = 0;
-  std::uint64_t seed = 0;
-  bool heldForce = false;
-  bool gone = false;  // silent, and connected until the server ends that
-
- private:
-  void onReady() override {
-    Dice dice(seed);
-    heldForce = dice.chance(0.2);
-    if (heldForce) {
-      queue(wire::HeldForce{.time = 1, .force = {0, 0.3, 0}, .torque = {}, .lifetime = 0.5});
-    }
-    if (dice.chance(0.2)) queue(wire::ForceField{{}, {0.2F, 0, -0.1F}, {}, 1});
-    queue(wire::Effect{.type = "constant",
-                       .index = effect,
-                       .gain = 0.1,
-                       .magnitude = dice.uniform(0.2, 1.0),
-                       .duration = 0,
-                       .frequency = 50,
-                       .position = {10, 0, 0},
-                       .direction = {dice.uniform(-1.0, 1.0), 1, 0}});
-    queue(wire::StartEffect{effect});
-  }
-};
-
-// Streams surfaces near the hand, or forces, as a simulation of its own would. They never push down: the
-// judge of the cube takes a hand that is not pushed up for a swallowed one.
-class Streamer final : public Listener {
- public:
-  static constexpr Nanos kLongestLife = 100 * kMs;  // of what was sent
-
-  Streamer(Clients& all, std::string name, std::uint64_t seed)
-      : Listener(all, std::move(name)), dice_(seed), contacts_(1 + dice_.below(3)) {
-    beats = false;
-    kinds = wire::kReportHand;
-    forces_ = dice_.chance(0.3);
-    stamps_ = dice_.chance(0.7);
-    for (Contact& contact : contacts_) contact = draw();
-  }
-  bool ready = false;
-  bool over = false;  // it sends no more
-
-  void next() {
-    const Nanos now = all_.clock.now();
-    const Nanos late =
-        dice_.chance(0.05) ? dice_.between(0, 100 * kMs) : 0;  // ignored when older than the newest
-    const std::int64_t stamp = stamps_ ? 1 + now - late : 0;
-    if (forces_) {
-      send(wire::HeldForce{.time = stamp,
-                           .force = {dice_.uniform(-1.0, 1.0), dice_.uniform(0.0, 1.0), 0},
-                           .torque = {},
-                           .lifetime = dice_.uniform(0.0, 0.2)});
-      return;
-    }
-    wire::RemoteContacts message{.time = stamp, .stateTime = dice_.chance(0.5) ? now : 0, .contacts = {}};
-    for (std::size_t i = 0; i < contacts_.size(); ++i) {
-      if (dice_.chance(0.05)) continue;                    // missing in this set
-      if (dice_.chance(0.02)) contacts_[i] = draw();       // elsewhere at once
-      std::vector<double> numbers = contacts_[i].numbers;  // moves as stated
-      for (int axis = 0; axis < 3; ++axis)
-        numbers[3 + axis] += numbers[12 + axis] * base::toSeconds(now - contacts_[i].since);
-      numbers[0] = static_cast<double>(i);
-      if (dice_.chance(0.005))
-        numbers[dice_.below(numbers.size())] = std::numeric_limits<double>::quiet_NaN();
-      message.contacts.values.insert(message.contacts.values.end(), numbers.begin(), numbers.end());
-    }
-    send(message);
-  }
-
- private:
-  struct Contact {
-    Nanos since = 0;
-    std::vector<double> numbers;
-  };
-  Contact draw() {
-    const auto side = [this](double most) { return dice_.uniform(-most, most); };
-    const double turn = side(0.7);
-    return {all_.clock.now(),
-            {0,
-             static_cast<double>(dice_.below(3)),
-             dice_.uniform(0.02, 0.1),  // id, shape, radius
-             side(0.005),
-             dice_.uniform(0.018, 0.03),
-             side(0.005),  // point
-             std::sin(turn),
-             std::cos(turn),
-             0,  // normal
-             0,
-             0,
-             1,  // axis
-             side(0.05),
-             side(0.1),
-             side(0.05),  // velocity
-             side(1),
-             0,
-             side(1),  // angular velocity
-             dice_.uniform(50, 1500),
-             dice_.uniform(0, 3),
-             side(1) + 0.5,
-             side(1),  // stiffness to friction
-             dice_.uniform(0.02, 0.2),
-             dice_.chance(0.3) ? 1.0 : 0.0}};  // lifetime, yields
-  }
-  void onReady() override { ready = true; }
-
-  Dice dice_;
-  std::vector<Contact> contacts_;
-  bool forces_ = false;
-  bool stamps_ = true;
 };
 
 class Simulation {
