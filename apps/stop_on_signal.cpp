@@ -34,6 +34,7 @@ StopOnSignal::StopOnSignal() {
   for (int signal = SIGRTMIN; signal <= SIGRTMAX; ++signal) sigaddset(&signals_, signal);
   sigaddset(&signals_, SIGTSTP);
   pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
+  thread_ = std::thread([this] { run(); });
 }
 
 void StopOnSignal::finish() {
@@ -44,14 +45,24 @@ void StopOnSignal::finish() {
 }
 
 void StopOnSignal::watch(server::Server& server) {
-  thread_ = std::thread([this, &server] { run(server); });
+  const std::lock_guard lock(mutex_);
+  server_ = &server;
 }
 
-void StopOnSignal::run(server::Server& server) {
+void StopOnSignal::run() {
   for (;;) {
     int signal = 0;
     sigwait(&signals_, &signal);
     if (leaving_) return;
+    std::unique_lock lock(mutex_);
+    if (server_ == nullptr) {
+      // No loop runs, so no force is on; a driver may block in its library, or move the arm to calibrate it.
+      if (signal != SIGTSTP) _exit(0);
+      kill(getpid(), SIGSTOP);
+      continue;
+    }
+    server::Server& server = *server_;
+    lock.unlock();
     const bool atZero = server.stopForces();
     if (signal != SIGTSTP) return end(server, signal);
     spdlog::warn("{}: forces are stopped{}; the process stops", strsignal(signal),

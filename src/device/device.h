@@ -111,6 +111,9 @@ class Device {
   /// explains what is needed. May block for seconds; forces are held meanwhile. Throws std::runtime_error on
   /// failure. Not in the servo thread.
   virtual void calibrate() {}
+  /// The device is about to be closed for good: where the driver can, an open() or calibrate() that runs in
+  /// another thread, or begins later, throws soon. Any thread; non-blocking.
+  virtual void interrupt() noexcept {}
 
   /// Self-paced, after open(): calls `onTick` with the time of CLOCK_MONOTONIC once per period, in a thread
   /// of the device; only that call may use read() and write(). Throws std::runtime_error.

@@ -31,6 +31,7 @@ enum Fault : int {
   kForceExceeded,   ///< the device's own limit, which also switches its amplifiers off where it has such
   kLibraryCrashes,  ///< in the thread that calls it
   kLibraryHangs,
+  kOpeningHangs,
 };
 
 struct ArmTick {

@@ -30,6 +30,8 @@ constexpr int kCalibrate_ms = 60000;
 constexpr int kAnswer_ms = 2000;
 constexpr int kWords_ms = 200;
 constexpr int kEnding_ms = 100;
+constexpr int kInterrupt_ms = 50;
+constexpr Nanos kInOrder = 2'000'000'000;
 constexpr Nanos kSilence = 20'000'000;
 constexpr Nanos kSilentTick = 10'000'000;
 constexpr double kOneTick_s = 0.001;
@@ -56,7 +58,7 @@ void IsolatedDevice::open() {
     spawn(ends[1]);
     ::close(ends[1]);
     ends[1] = -1;
-    textOf(receive(base::now() + kOpen_ms * kMillisecond));
+    textOf(receive(base::now() + kOpen_ms * kMillisecond, Wait::untilInterrupted));
   } catch (...) {
     if (ends[1] >= 0) ::close(ends[1]);
     close();
@@ -105,11 +107,15 @@ void IsolatedDevice::spawn(int socketOfChild) {
   process_ = process;
 }
 
-std::string IsolatedDevice::receive(Nanos end) const {
-  const auto left_ms = std::max<Nanos>(0, (end - base::now()) / kMillisecond);
+std::string IsolatedDevice::receive(Nanos end, Wait wait) const {
   pollfd wanted{socket_, POLLIN, 0};
-  if (poll(&wanted, 1, static_cast<int>(left_ms)) == 0)
-    throw std::runtime_error("the driver's process does not answer");
+  for (;;) {
+    if (wait == Wait::untilInterrupted && interrupted_)
+      throw std::runtime_error("the device is being closed for good");
+    const Nanos left_ms = std::clamp<Nanos>((end - base::now()) / kMillisecond, 0, kInterrupt_ms);
+    if (poll(&wanted, 1, static_cast<int>(left_ms)) != 0) break;
+    if (left_ms == 0) throw std::runtime_error("the driver's process does not answer");
+  }
   std::array<char, 4096> text;
   const long size = recv(socket_, text.data(), text.size(), 0);
   if (size <= 0)
@@ -118,7 +124,7 @@ std::string IsolatedDevice::receive(Nanos end) const {
   return {text.data(), static_cast<std::size_t>(size)};
 }
 
-std::string IsolatedDevice::ask(const std::string& request, int most_ms) const {
+std::string IsolatedDevice::ask(const std::string& request, int most_ms, Wait wait) const {
   const std::unique_lock lock(socketMutex_, std::try_to_lock);
   if (!lock) throw std::runtime_error("the driver's process is busy with another request");
   if (socket_ < 0) throw std::runtime_error("the device is not open");
@@ -127,10 +133,10 @@ std::string IsolatedDevice::ask(const std::string& request, int most_ms) const {
   const Nanos end = base::now() + most_ms * kMillisecond;
   // Answers come in the order of the requests, and those to requests that timed out come first. A driver
   // tells of some faults once, so the text of such an answer is kept.
-  std::string answer = receive(end);
+  std::string answer = receive(end, wait);
   while (--unanswered_ > 0) {
     if (answer.size() > 1 && answer.starts_with('+')) late_ = answer.substr(1);
-    answer = receive(end);
+    answer = receive(end, wait);
   }
   std::string text = textOf(answer);
   if (request != "fault") return text;
@@ -164,10 +170,11 @@ void IsolatedDevice::close() noexcept {
 void IsolatedDevice::endProcess() noexcept {
   const pid_t process = process_.exchange(-1);
   if (process < 0) return;
-  for (int i = 0; i < 2000; ++i) {
+  const Nanos end = base::now() + kInOrder;
+  do {
     if (waitpid(process, nullptr, WNOHANG) != 0) return;
     base::sleepFor(kMillisecond);
-  }
+  } while (base::now() < end);
   kill(process, SIGKILL);
   waitpid(process, nullptr, 0);
 }
@@ -186,7 +193,7 @@ void IsolatedDevice::stop() noexcept {
   stopping_ = true;
   thread_.join();
   try {
-    ask("stop", kAnswer_ms);
+    ask("stop", silent_ ? kWords_ms : kAnswer_ms);
   } catch (const std::exception&) {
     // A process that is gone has stopped.
   }
@@ -263,7 +270,7 @@ std::string IsolatedDevice::faultText() const {
 }
 
 void IsolatedDevice::calibrate() {
-  ask("calibrate", kCalibrate_ms);
+  ask("calibrate", kCalibrate_ms, Wait::untilInterrupted);
 }
 
 }  // namespace hapticd::device

@@ -48,6 +48,7 @@ class IsolatedDevice final : public Device {
   std::string faultText() const override;
   bool lost() const noexcept override { return silent_ || lostThere_; }
   void calibrate() override;
+  void interrupt() noexcept override { interrupted_ = true; }
 
   void start(std::function<void(Nanos)> onTick) override;
   void stop() noexcept override;
@@ -60,8 +61,9 @@ class IsolatedDevice final : public Device {
 
  private:
   void spawn(int socketOfChild);
-  std::string receive(Nanos end) const;
-  std::string ask(const std::string& request, int most_ms) const;
+  enum class Wait { toTheEnd, untilInterrupted };
+  std::string receive(Nanos end, Wait wait) const;
+  std::string ask(const std::string& request, int most_ms, Wait wait = Wait::toTheEnd) const;
   std::string howItEnded(int most_ms) const;
   void run() noexcept;
   void waitForPost(std::uint32_t seen) const noexcept;
@@ -80,6 +82,7 @@ class IsolatedDevice final : public Device {
   std::function<void(Nanos)> onTick_;
   base::BlockingThread thread_;
   std::atomic<bool> stopping_{false};
+  std::atomic<bool> interrupted_{false};
   std::atomic<bool> silent_{false};
   std::atomic<bool> lostThere_{false};
 

@@ -27,6 +27,8 @@ void DeviceKeeper::start() {
 }
 
 void DeviceKeeper::stop() noexcept {
+  ending_ = true;
+  device_.interrupt();
   if (attempt_.running()) attempt_.stop();
   stopLoop();
 }
@@ -136,6 +138,7 @@ void DeviceKeeper::reopen() noexcept {
   try {
     stopLoop();
     device_.close();
+    if (ending_) return;
     device_.open();
     startLoop();
   } catch (const std::exception& error) {

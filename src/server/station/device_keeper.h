@@ -32,7 +32,7 @@ class DeviceKeeper {
 
   /// Starts the loop. Throws std::runtime_error when realtime scheduling is required and refused.
   void start();
-  /// Waits for a running attempt and ends the loop.
+  /// For good: interrupts the device, waits for a running attempt and ends the loop.
   void stop() noexcept;
   /// Call several times per second. Returns why the device gives no force, empty when it works. Closes and
   /// reopens a device that has been lost for 0.5 s; retries every 2 s until it opens.
@@ -74,6 +74,7 @@ class DeviceKeeper {
   base::Nanos nextAttempt_ = 0;
   std::string attemptText_;  // reported while the attempt runs
   base::Thread attempt_;
+  std::atomic<bool> ending_{false};
   std::atomic<bool> attemptDone_{false};
   // Errors of the last attempts to open and to calibrate; empty after success. Owned by the attempt until
   // attemptDone_.

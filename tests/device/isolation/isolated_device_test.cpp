@@ -164,6 +164,37 @@ TEST_P(IsolationTest, ALateAnswerIsNotTakenForThatOfTheNextRequest) {
   EXPECT_EQ(hand->calibrations, 2);
 }
 
+TEST_P(IsolationTest, AnOpeningThatHangsIsInterrupted) {
+  IsolatedDevice device(host(GetParam()));
+  hand->fault = 5;
+  std::thread other([&] {
+    EXPECT_TRUE(eventually([&] { return device.process() >= 0; }));
+    device.interrupt();
+  });
+  EXPECT_EQ(refusal(device), "the device is being closed for good");
+  EXPECT_EQ(device.process(), -1);
+  other.join();
+  EXPECT_EQ(refusal(device), "the device is being closed for good");
+}
+
+TEST_P(IsolationTest, ACalibrationThatHangsIsInterrupted) {
+  IsolatedDevice device(host(GetParam()));
+  device.open();
+  push(device, Vec3(0, 1, 0));
+  ASSERT_TRUE(eventually([&] { return force().y() == 1; }));
+  hand->fault = 5;
+  std::thread other([&] {
+    EXPECT_TRUE(eventually([&] { return hand->calibrations == 1; }));
+    device.interrupt();
+  });
+  EXPECT_THROW(device.calibrate(), std::runtime_error);
+  other.join();
+  hand->fault = 0;
+  device.close();
+  EXPECT_TRUE(force().isZero());
+  EXPECT_EQ(hand->closed, 1) << "the device is closed in order all the same";
+}
+
 TEST_P(IsolationTest, AHangIsAFault) {
   IsolatedDevice device(host(GetParam()));
   device.open();
@@ -195,9 +226,10 @@ TEST_P(IsolationTest, AServerThatStopsTickingLosesItsForce) {
 TEST_P(IsolationTest, APlaneFeelsAsOnTheSimulatedDevice) {
   const std::vector<Vec3> places = plane_scene::places(40);
   const std::vector<Vec3> expected = plane_scene::referenceForces(places);
+  std::atomic<double> seenZ{1};
+  base::MonotonicClock clock;
   IsolatedDevice device(host(GetParam()));
   device.open();
-  base::MonotonicClock clock;
   realtime::Tick servo(device, clock, plane_scene::raw());
   servo.snapshots().publish(plane_scene::snapshot());
   const auto moveTo = [&](const Vec3& place) {
@@ -205,14 +237,13 @@ TEST_P(IsolationTest, APlaneFeelsAsOnTheSimulatedDevice) {
     hand->z = place.z();
   };
   moveTo(places.front());
-  std::atomic<double> seenZ{1};
   device.start([&](Nanos now) {
     servo(now);
     seenZ = servo.last().device.position_m.z();
   });
-  for (std::size_t i = 0; i < places.size(); ++i) {
+  for (std::size_t i = 0; i < places.size() && !HasFailure(); ++i) {
     moveTo(places[i]);
-    ASSERT_TRUE(eventually([&] {
+    EXPECT_TRUE(eventually([&] {
       return seenZ == places[i].z() && (force() - expected[i]).norm() <= 0.01 * expected[i].norm() + 1e-9;
     })) << "place "
         << i << ": " << force().transpose() << " instead of " << expected[i].transpose();
@@ -222,10 +253,10 @@ TEST_P(IsolationTest, APlaneFeelsAsOnTheSimulatedDevice) {
 
 // Told, not tested: it is the machine's.
 TEST_P(IsolationTest, TellsTheTimeFromPostToTick) {
+  std::vector<Nanos> times(200);  // what the device's thread uses outlives the device
+  std::atomic<std::size_t> count{0};
   IsolatedDevice device(host(GetParam()));
   device.open();
-  std::vector<Nanos> times(2000);
-  std::atomic<std::size_t> count{0};
   device.start([&](Nanos now) {
     DeviceState read;
     device.read(now, read);
@@ -236,16 +267,16 @@ TEST_P(IsolationTest, TellsTheTimeFromPostToTick) {
   ASSERT_TRUE(eventually([&] { return count >= times.size(); }));
   device.stop();
   std::sort(times.begin(), times.end());
-  std::printf("post to tick: median %.1f us, p99 %.1f us\n", 1e-3 * static_cast<double>(times[1000]),
-              1e-3 * static_cast<double>(times[1980]));
-  EXPECT_GT(times[1000], 0);
+  std::printf("post to tick: median %.1f us, p99 %.1f us\n", 1e-3 * static_cast<double>(times[100]),
+              1e-3 * static_cast<double>(times[198]));
+  EXPECT_GT(times[100], 0);
 }
 
 // A tick that waits for the processor can find a state that was posted since it began.
 TEST_P(IsolationTest, AStateThatCameAfterTheTickBeganIsNotNegativelyOld) {
+  std::atomic<Nanos> time{-1};
   IsolatedDevice device(host(GetParam()));
   device.open();
-  std::atomic<Nanos> time{-1};
   device.start([&](Nanos now) {
     DeviceState state;
     if (device.read(now - 1'000'000'000, state)) time = device.postToTick();
@@ -256,11 +287,11 @@ TEST_P(IsolationTest, AStateThatCameAfterTheTickBeganIsNotNegativelyOld) {
 }
 
 TEST_P(IsolationTest, AStateThatNeverCameHasNoAge) {
+  std::atomic<bool> fault{false};
+  std::atomic<Nanos> age{0};
   IsolatedDevice device(host(GetParam()));
   device.open();
   hand->fault = 2;
-  std::atomic<bool> fault{false};
-  std::atomic<Nanos> age{0};
   device.start([&](Nanos now) {
     DeviceState state;
     if (fault || !device.read(now, state) || state.hold != kHoldFault) return;

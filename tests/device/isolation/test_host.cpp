@@ -25,7 +25,9 @@ class ObservedDevice final : public Device {
   }
   ~ObservedDevice() override { close(); }
 
-  void open() override {}
+  void open() override {
+    while (hand_.fault == 5) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
   void close() noexcept override {
     stop();
     hand_.closed = 1;
@@ -53,7 +55,9 @@ class ObservedDevice final : public Device {
     return "told once";
   }
   void calibrate() override {
-    if (++hand_.calibrations > 1) throw std::runtime_error("once is enough");
+    ++hand_.calibrations;
+    while (hand_.fault == 5) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    if (hand_.calibrations > 1) throw std::runtime_error("once is enough");
   }
 
   DeviceTraits traits() const noexcept override {

@@ -351,11 +351,11 @@ TEST_F(SteppedHdTest, AutomaticCalibrationHappensUnderZeroForce) {
 
 TEST_F(HdTest, AnInkwellCalibrationWaitsForTheStylusAndForNothingElse) {
   mock->calibration(0, 0x5002);
+  std::atomic<std::uint32_t> hold{0};
+  std::atomic<int> ticks{0};
   OpenHapticsDevice device;
   EXPECT_THROW(device.calibrate(), std::runtime_error);
   device.open();
-  std::atomic<std::uint32_t> hold{0};
-  std::atomic<int> ticks{0};
   device.start([&](Nanos now) {
     DeviceState state;
     device.read(now, state);

@@ -41,15 +41,15 @@ TEST_F(HdTest, TheGuardOfTheTickHoldsUntilArmedAndLatchesADisconnectInContact) {
     const int from = mock->frames(0);
     return eventually([&] { return mock->frames(0) >= from + more; });
   };
-  ASSERT_TRUE(ticks(5));
+  EXPECT_TRUE(ticks(5));
   hand(Vec3(0, 0, -0.003));
-  ASSERT_TRUE(ticks(5));
+  EXPECT_TRUE(ticks(5));
   EXPECT_TRUE(force().isZero()) << "real devices start disarmed";
   tick.control().arm();
   EXPECT_TRUE(eventually([&] { return force().norm() > 1.4; })) << force().transpose();
 
   mock->unplug(0);
-  ASSERT_TRUE(ticks(3));
+  EXPECT_TRUE(ticks(3));
   EXPECT_TRUE(force().isZero());
   device.stop();
   EXPECT_NE(tick.last().guard.latched & bit(realtime::Trip::deviceFault), 0U);

@@ -197,6 +197,24 @@ TEST_F(OpenHapticsIsolatedFault, AHangOfTheLibraryIsAFaultAndANewProcessBringsTh
   endInOrder();
 }
 
+TEST_F(OpenHapticsIsolatedFault, TheServerEndsWhileAHungDeviceIsReopened) {
+  serve();
+  arm->fault = mock::kLibraryHangs;
+  expectWords("being reopened");
+  server->signal(SIGTERM);
+  EXPECT_EQ(server->end(), 0) << server->log();
+}
+
+TEST_F(OpenHapticsIsolatedFault, TheServerEndsWhileADeviceHangsInItsOpening) {
+  serve();
+  arm->fault = mock::kUnplugged;
+  expectWords("the device gives no force");
+  const int opened = arm->opened;
+  arm->fault = mock::kOpeningHangs;
+  EXPECT_TRUE(visitor->until([&] { return arm->opened > opened; })) << server->log();
+  endInOrder();
+}
+
 TEST_F(OpenHapticsIsolatedFault, AnUnpluggedDeviceIsReopenedInANewProcessEachTime) {
   serve();
   strike(mock::kUnplugged, 1);

@@ -71,13 +71,12 @@ class InContact : public testing::Test {
       while (first < arm->ticks && arm.at(first).fault != fault) ++first;
       return first < arm->ticks && arm->ticks > first + ticksWithForce + kWatched;
     })) << server->log();
-    std::int64_t last = first - 1;
+    int withForce = 0;  // between them the guard of a stalled machine may have ended it for a while
     for (std::int64_t tick = first; tick < first + ticksWithForce + kWatched; ++tick) {
-      if (arm.force(tick).norm() > kNothing_N) last = tick;
+      if (arm.force(tick).norm() > kNothing_N) ++withForce;
     }
-    EXPECT_LE(last - first + 1, ticksWithForce) << server->log();
-    std::printf("fault %d: %ld ticks with force, %d promised\n", fault, static_cast<long>(last - first + 1),
-                ticksWithForce);
+    EXPECT_LE(withForce, ticksWithForce) << server->log();
+    std::printf("fault %d: %d ticks with force, %d promised\n", fault, withForce, ticksWithForce);
   }
   void expectWords(const std::string& words) {
     EXPECT_TRUE(visitor->until([&] { return visitor->heard(words); })) << words << " is not in\n"

@@ -88,6 +88,21 @@ TEST_P(AfterTheServer, Evdev) {
   EXPECT_TRUE(eventually([&] { return joystick.isIdle(); })) << "the kernel ends the effects with their file";
 }
 
+// A vendor's library may wait for a person there, and a calibration may move the arm.
+TEST(WhileADeviceOpens, ASignalEndsTheProcess) {
+  for (const char* where : {"--isolate", "--in-process"}) {
+    const WorkDirectory work;
+    const SharedArm arm(work.file("arm"));
+    arm->fault = mock::kOpeningHangs;
+    ServerProcess server(work, {"--device", "openhaptics", where},
+                         {"HAPTICD_HDAPI_LIB=" MOCK_HD, "HAPTICD_MOCK_ARM=" + work.file("arm")});
+    EXPECT_TRUE(eventually([&] { return arm->opened == 1; })) << server.log();
+    server.signal(SIGTERM);
+    EXPECT_EQ(server.end(), 0) << server.log();
+    arm->fault = mock::kHealthy;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(By, AfterTheServer,
                          testing::Values(End{"SIGTERM", SIGTERM, true}, End{"SIGSEGV", SIGSEGV, false},
                                          End{"SIGKILL", SIGKILL, false}),

@@ -209,6 +209,8 @@ EXPORT unsigned hdInitDevice(const char* name) {
   const int device = asked == "second" ? 1 : 0;
   m.arms[device].open = true;
   if (m.shared) ++m.shared->opened;
+  while (m.shared.fault() == hapticd::mock::kOpeningHangs)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
   m.current = device;
   return static_cast<unsigned>(device);
 }

@@ -41,7 +41,8 @@ class ScriptedDevice final : public device::Device {
 
   void open() override {
     ++opens;
-    while (openBlocks) std::this_thread::sleep_for(1ms);
+    while (openBlocks && !isInterrupted) std::this_thread::sleep_for(1ms);
+    if (isInterrupted) throw std::runtime_error("interrupted");
     const std::lock_guard lock(mutex_);
     if (!openError_.empty()) throw std::runtime_error(openError_);
     isOpen = true;
@@ -50,6 +51,7 @@ class ScriptedDevice final : public device::Device {
   void close() noexcept override {
     stop();
     ++closes;
+    while (closeBlocks) std::this_thread::sleep_for(1ms);
     isOpen = false;
   }
   const device::DeviceProfile& profile() const noexcept override { return profile_; }
@@ -68,7 +70,7 @@ class ScriptedDevice final : public device::Device {
   }
   void calibrate() override {
     ++calibrations;
-    while (calibrationBlocks) std::this_thread::sleep_for(1ms);
+    while (calibrationBlocks && !isInterrupted) std::this_thread::sleep_for(1ms);
     if (calibrationFails) throw std::runtime_error("a hand was in the way");
     isCalibrated = true;
   }
@@ -93,6 +95,8 @@ class ScriptedDevice final : public device::Device {
     if (thread_.joinable()) thread_.join();
   }
 
+  void interrupt() noexcept override { isInterrupted = canBeInterrupted.load(); }
+
   void refuse(const std::string& reason) {
     const std::lock_guard lock(mutex_);
     openError_ = reason;
@@ -100,6 +104,7 @@ class ScriptedDevice final : public device::Device {
 
   std::atomic<int> opens{0}, closes{0}, reads{0}, callsWhileClosed{0};
   std::atomic<bool> isOpen{false}, isLost{false}, openBlocks{false}, startFails{false};
+  std::atomic<bool> canBeInterrupted{true}, isInterrupted{false}, closeBlocks{false};
   std::atomic<int> zeroes{0};
   std::atomic<bool> readBlocks{false};
   std::atomic<int> calibrations{0};
@@ -300,8 +305,9 @@ TEST_P(KeeperTest, ReopensRepeatedly) {
   }
 }
 
-TEST_P(KeeperTest, StopWaitsForAnAttemptAndEndsItsLoop) {
+TEST_P(KeeperTest, StopWaitsForADriverThatCannotBeInterruptedAndEndsItsLoop) {
   keeper_.start();
+  device_.canBeInterrupted = false;
   device_.openBlocks = true;
   loseAt(1000 * kMs);
   EXPECT_TRUE(eventually([&] { return device_.opens == 1; }));
@@ -328,6 +334,38 @@ TEST_P(KeeperTest, StopLeavesADeviceThatFailedToOpenClosed) {
   EXPECT_FALSE(device_.isOpen);
   EXPECT_EQ(device_.opens, 1);
   expectNoLoop();
+}
+
+TEST_P(KeeperTest, EndingInterruptsAnOpening) {
+  keeper_.start();
+  device_.openBlocks = true;
+  loseAt(1000 * kMs);
+  EXPECT_TRUE(eventually([&] { return device_.opens == 1; }));
+  keeper_.stop();
+  EXPECT_FALSE(device_.isOpen);
+  expectNoLoop();
+}
+
+TEST_P(KeeperTest, EndingInterruptsACalibration) {
+  keeper_.start();
+  device_.calibrationBlocks = true;
+  keeper_.calibrate();
+  EXPECT_TRUE(eventually([&] { return device_.calibrations == 1; }));
+  keeper_.stop();
+  expectNoLoop();
+}
+
+TEST_P(KeeperTest, NoDeviceIsOpenedAfterTheEndHasBegun) {
+  keeper_.start();
+  device_.closeBlocks = true;
+  loseAt(1000 * kMs);
+  EXPECT_TRUE(eventually([&] { return device_.closes == 1; }));
+  std::thread ending([&] { keeper_.stop(); });
+  EXPECT_TRUE(eventually([&] { return device_.isInterrupted.load(); }));
+  device_.closeBlocks = false;
+  ending.join();
+  EXPECT_EQ(device_.opens, 0);
+  EXPECT_FALSE(device_.isOpen);
 }
 
 INSTANTIATE_TEST_SUITE_P(Loop, KeeperTest, testing::Bool(), [](const auto& instance) {
