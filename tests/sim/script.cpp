@@ -8,7 +8,7 @@ namespace hapticd::sim {
 const char* nameOf(Action::Kind kind) {
   static constexpr const char* kNames[] = {"stop",      "rearm",      "move",     "batch",    "upload",
                                            "appear",    "vanish",     "pause",    "nonsense", "flood",
-                                           "wall step", "disk fails", "describe", "stream"};
+                                           "wall step", "disk fails", "describe", "stream",   "visit"};
   return kNames[static_cast<int>(kind)];
 }
 
@@ -66,6 +66,9 @@ Script drawScript(std::uint64_t seed, double seconds) {
       std::erase_if(script.actions,
                     [](const Action& a) { return a.kind == Kind::appear || a.kind == Kind::vanish; });
   }
+  script.web = dice.chance(0.5);
+  if (script.web) every(Kind::visit, dice.uniform(0.2, 3.0));
+  script.datagrams = dice.chance(0.5);
   std::stable_sort(script.actions.begin(), script.actions.end(),
                    [](const Action& a, const Action& b) { return a.at < b.at; });
   return script;
@@ -81,6 +84,8 @@ std::string describe(const Script& script) {
   line("seconds", base::toSeconds(script.length));
   line("cube", script.cube);
   line("record", script.record);
+  line("web", script.web);
+  line("datagrams", script.datagrams);
   line("delay, ms", static_cast<double>(script.networkDelay) * 1e-6);
   line("jitter, ms", static_cast<double>(script.networkJitter) * 1e-6);
   line("window, bytes", static_cast<double>(script.window));

@@ -3,6 +3,10 @@
 #include <algorithm>
 #include <chrono>
 
+#include "net/client_frames.h"
+#include "wire/text.h"
+#include "wire/udp_request.h"
+
 namespace hapticd::sim {
 
 using namespace std::chrono_literals;
@@ -19,33 +23,76 @@ wire::Time SimClient::wallTime() const {
 }
 
 void SimClient::connect() {
-  net::ConnectionOptions options;
-  options.hardLimitBytes = std::size_t{256} << 20;
-  peer_.emplace(names_);
   orders_.clear();
   sent_ = read_ = 0;
   lastTick = 0;
   closed_ = false;
   mayEnd_ = false;
   guardReports = 0;
-  connection_ = net::Connection::connect(all_.loop, all_.server, 2s, options);
-  connection_.start(
-      {.onConnected = {},
-       .onBytes =
-           [this](auto bytes) {
-             peer_->feed(wallTime(), bytes, [this](const wire::Event& event) { onEvent(event); });
-             flush();
-           },
-       .onDrained = {},
-       .onPeerGone = {},
-       .onClosed =
-           [this](const std::string& reason) {
-             closed_ = true;
-             // While the machine stands still nobody answers.
-             if (mayEnd_ || reason.starts_with("cannot connect")) return;
-             all_.finding("client '" + name_ + "', which did nothing wrong, was disconnected: " + reason +
-                          (texts.empty() ? "" : "; last text: " + texts.back()));
-           }});
+  web_ = {};
+  wire::PeerOptions options;
+  if (way == Way::datagrams) {
+    const net::Endpoint here{net::kLoopbackAddress, 0};
+    listener_.emplace(all_.loop, here, [this](net::Connection connection) { adopt(std::move(connection)); });
+    udp_.emplace(all_.loop, here);
+    udp_->start({.onDatagram =
+                     [this](auto bytes, const net::Endpoint&) {
+                       peer_->feedDatagram(bytes, [this](const wire::Event& event) { onEvent(event); });
+                     },
+                 .onRefused = {}});
+    options.udp = {here.addressText(), udp_->local().port};
+    peer_.emplace(names_, options);
+    asking_ = all_.loop.every(1s, [this] { askToConnect(); });
+    return askToConnect();
+  }
+  peer_.emplace(names_, options);
+  net::ConnectionOptions connection;
+  connection.hardLimitBytes = std::size_t{256} << 20;
+  adopt(net::Connection::connect(all_.loop, way == Way::web ? all_.web : all_.server, 2s, connection));
+}
+
+// A datagram may be lost.
+void SimClient::askToConnect() {
+  if (connection_ || closed_) return;
+  const std::string request =
+      wire::formatUdpRequest({listener_->local().addressText(), listener_->local().port});
+  udp_->sendTo(wire::asBytes(request), all_.server);
+}
+
+void SimClient::adopt(net::Connection connection) {
+  if (connection_ && way == Way::datagrams) return;  // an answer to each request
+  connection_ = std::move(connection);
+  connection_.start({.onConnected = {},
+                     .onBytes = [this](auto bytes) { receive(bytes); },
+                     .onDrained = {},
+                     .onPeerGone = {},
+                     .onClosed =
+                         [this](const std::string& reason) {
+                           closed_ = true;
+                           // While the machine stands still nobody answers.
+                           if (mayEnd_ || reason.starts_with("cannot connect")) return;
+                           all_.finding("client '" + name_ +
+                                        "', which did nothing wrong, was disconnected: " + reason +
+                                        (texts.empty() ? "" : "; last text: " + texts.back()));
+                         }});
+  if (way == Way::web) {
+    const std::string greeting = webGreeting(all_.web.text());
+    sendRaw(std::as_bytes(std::span(greeting)));
+  }
+  flush();
+}
+
+void SimClient::receive(std::span<const std::byte> bytes) {
+  std::vector<std::byte> payload;
+  if (way == Way::web) {
+    try {
+      payload = web_.take(bytes);
+    } catch (const std::exception& error) {
+      return all_.finding("client '" + name_ + "': " + error.what());
+    }
+    bytes = payload;
+  }
+  peer_->feed(wallTime(), bytes, [this](const wire::Event& event) { onEvent(event); });
   flush();
 }
 
@@ -58,9 +105,19 @@ void SimClient::flush() {
   std::vector<std::byte> bytes;
   peer_->takeStream(bytes);
   if (!bytes.empty()) sendBytes(bytes);
+  peer_->takeDatagrams([this](wire::ByteView datagram) {
+    if (udpPeer_) udp_->sendTo(datagram, *udpPeer_);
+  });
 }
 
 void SimClient::sendBytes(std::span<const std::byte> bytes) {
+  if (way != Way::web) return sendRaw(bytes);
+  const std::string frame =
+      net::clientFrame(net::kBinary, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  sendRaw(std::as_bytes(std::span(frame)));
+}
+
+void SimClient::sendRaw(std::span<const std::byte> bytes) {
   sent_ += bytes.size();
   connection_.send(bytes);
   connection_.flush();
@@ -114,6 +171,9 @@ void SimClient::onEvent(const wire::Event& event) {
     onConnected();
   } else if (const auto* message = std::get_if<wire::MessageReceived>(&event)) {
     onMessage(*message);
+  } else if (const auto* udp = std::get_if<wire::UdpDescribed>(&event)) {
+    udpPeer_ = net::Endpoint::parse(udp->address.host, udp->address.port);
+    peer_->useDatagrams();
   } else if (const auto* error = std::get_if<wire::ProtocolError>(&event)) {
     all_.finding("client '" + name_ + "' got bytes that break the protocol: " + std::string(error->reason));
   }
@@ -123,7 +183,8 @@ void SimClient::onMessage(const wire::MessageReceived& message) {
   if (message.kind == wire::kindOf<wire::TickReport>) {
     const auto tick = wire::decode<wire::TickReport>(message.payload);
     ++tickReports;
-    if (tick->tick < lastTick)  // the present state may repeat one
+    if (way == Way::datagrams && tick->tick < lastTick) return;  // overtaken
+    if (tick->tick < lastTick)                                   // the present state may repeat one
       all_.finding("client '" + name_ + "' got tick " + std::to_string(tick->tick) + " after tick " +
                    std::to_string(lastTick));
     if (lastTick != 0) missedTicks += tick->tick - lastTick - 1;

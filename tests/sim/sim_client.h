@@ -11,7 +11,10 @@
 
 #include "net/connection.h"
 #include "net/loop.h"
+#include "net/tcp_listener.h"
+#include "net/udp_socket.h"
 #include "sim/scheduler.h"
+#include "sim/web_stream.h"
 #include "wire/messages.h"
 #include "wire/peer.h"
 
@@ -25,6 +28,7 @@ struct Clients {
   net::Loop& loop;
   SimClock& clock;
   net::Endpoint server;
+  net::Endpoint web;
   std::function<void(const std::string&)> finding;
   std::function<void(Nanos)> stopRead;   ///< the server has read the last byte of a stop
   std::function<void(Nanos)> rearmRead;  ///< the same of a re-arm
@@ -49,7 +53,7 @@ class SimClient {
   /// Its connection may end: it is hostile, or it went away.
   void expectEnd() { mayEnd_ = true; }
   const std::string& name() const { return name_; }
-  net::Endpoint local() const { return connection_.local(); }
+  net::Endpoint local() const { return listener_ ? listener_->local() : connection_.local(); }
 
   template <wire::WireMessage M>
   void queue(const M& message) {
@@ -74,6 +78,12 @@ class SimClient {
 
   /// May send more than the server reads ahead: then TCP keeps its stops waiting.
   bool sendsAhead = false;
+  enum class Way {
+    tcp,        ///< it connects to the server
+    datagrams,  ///< as a stock client: the server connects to it, and some messages are datagrams
+    web,        ///< as a page: a WebSocket of the web port
+  };
+  Way way = Way::tcp;
   wire::GuardState guard{};  ///< as last reported
   std::uint64_t guardReports = 0;
   std::uint64_t tickReports = 0;
@@ -97,6 +107,10 @@ class SimClient {
   };
 
   wire::Time wallTime() const;
+  void askToConnect();
+  void adopt(net::Connection connection);
+  void sendRaw(std::span<const std::byte> bytes);
+  void receive(std::span<const std::byte> bytes);
   void onEvent(const wire::Event& event);
   void onMessage(const wire::MessageReceived& message);
 
@@ -104,7 +118,12 @@ class SimClient {
   wire::LocalNames names_;
   wire::LocalSender device_;
   std::optional<wire::Peer> peer_;
+  std::optional<net::TcpListener> listener_;
+  std::optional<net::UdpSocket> udp_;
+  std::optional<net::Endpoint> udpPeer_;
+  net::Subscription asking_;
   net::Connection connection_;
+  WebStream web_;
   std::deque<Order> orders_;
   std::uint64_t sent_ = 0;
   std::uint64_t read_ = 0;  // by the server

@@ -11,11 +11,13 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "record/difference.h"
 #include "record/rerender.h"
 #include "server/server.h"
 #include "sim/clients.h"
+#include "sim/visit.h"
 
 namespace hapticd::sim {
 namespace {
@@ -95,6 +97,10 @@ class Simulation {
   void failDisk(Dice& dice);
   void healDisk();
   void nonsense(Dice& dice);
+  void visit(Dice& dice);
+  void ask(const std::string& target, Visit::Manner manner, Dice& dice);
+  void onAnswer(const std::string& target, Nanos asked, const Visit::Answer& answer, std::uint64_t seed);
+  void checkVisits();
   void beat();
   void describe(bool last);
   void compare(const scene::SceneDescription& description, bool last);
@@ -130,9 +136,14 @@ class Simulation {
   std::vector<std::unique_ptr<Batcher>> batchers_;
   std::unique_ptr<Listener> uploader_;
   std::unique_ptr<Listener> reader_;  // that sometimes does not read
+  std::unique_ptr<Listener> page_;    // as a browser
+  std::unique_ptr<Listener> stock_;   // with datagrams
   std::vector<std::unique_ptr<Pusher>> pushers_;
   std::vector<std::unique_ptr<Streamer>> streamers_;
   std::vector<std::unique_ptr<SimClient>> strangers_;
+  std::vector<std::unique_ptr<Visit>> visits_;
+  Nanos stateKnownAt_ = 0;       // when the newest state of the web port came
+  std::uint64_t stateTick_ = 0;  // its tick
   std::map<std::uint16_t, SimClient*> byPort_;
 
   std::deque<std::pair<Nanos, double>> tops_;  // of the cube: when sent, world units
@@ -187,20 +198,20 @@ Simulation::Simulation(const Script& script, bool verbose)
     return 1 + networkDice_.below(std::min<std::size_t>(available, 4096));
   };
   network.losesDatagram = [this](std::uint64_t) { return networkDice_.chance(0.05); };
-  const auto client = [this](const net::Endpoint& local, const net::Endpoint& remote) -> SimClient* {
-    if (!server_ || local.port != server_->address().port) return nullptr;
-    return clientAt(remote);
+  const auto ofServer = [this](const net::Endpoint& local) {
+    return clients_ && (local.port == clients_->server.port || local.port == clients_->web.port);
   };
-  network.arrived = [client](const auto& local, const auto& remote, std::uint64_t total) {
-    if (SimClient* const c = client(local, remote)) c->onArrived(total);
+  // The end of a client is at the other side only for the server.
+  network.arrived = [this](const auto&, const auto& remote, std::uint64_t total) {
+    if (SimClient* const client = clientAt(remote)) client->onArrived(total);
   };
-  network.reads = [this](const auto& local, const auto&, std::size_t size) {
+  network.reads = [this, ofServer](const auto& local, const auto& remote, std::size_t size) {
     constexpr Nanos kPerByte_ps = 8'000;
-    if (server_ && local.port == server_->address().port)
+    if (ofServer(local) || clientAt(remote) != nullptr)
       scheduler_.chargeNet(static_cast<Nanos>(size) * kPerByte_ps / 1000);
   };
-  network.hasRead = [client](const auto& local, const auto& remote, std::uint64_t total) {
-    if (SimClient* const c = client(local, remote)) c->onRead(total);
+  network.hasRead = [this](const auto&, const auto& remote, std::uint64_t total) {
+    if (SimClient* const client = clientAt(remote)) client->onRead(total);
   };
 }
 
@@ -234,7 +245,7 @@ Outcome Simulation::run() {
   server::ServerConfig config;
   config.listenAddress = "127.0.0.1";
   config.port = 3883;
-  config.http = server::kHttpOff;
+  config.http = script_.web ? "127.0.0.1:8080" : server::kHttpOff;
   config.allowNoRealtime = true;
   config.tokens = "/tokens";
   if (script_.record) config.record = kRecording;
@@ -251,6 +262,7 @@ Outcome Simulation::run() {
       Clients{.loop = *loop_,
               .clock = clock_,
               .server = server_->address(),
+              .web = server_->webAddress().value_or(net::Endpoint{}),
               .finding = [this](const auto& text) { finding(text); },
               .stopRead = [this](Nanos at) { judge_.onStop(at); },
               .rearmRead = [this](Nanos at) { judge_.onRearm(at); },
@@ -279,6 +291,17 @@ Outcome Simulation::run() {
   join(*uploader_);
   reader_ = std::make_unique<Listener>(*clients_, "slow reader");
   join(*reader_);
+
+  if (script_.web) {
+    page_ = std::make_unique<Listener>(*clients_, "page");
+    page_->way = SimClient::Way::web;
+    join(*page_);
+  }
+  if (script_.datagrams) {
+    stock_ = std::make_unique<Listener>(*clients_, "client with datagrams");
+    stock_->way = SimClient::Way::datagrams;
+    join(*stock_);
+  }
 
   const net::Subscription beats = loop_->every(100ms, [this] { beat(); });
   for (const Action& action : script_.actions) {
@@ -357,10 +380,14 @@ Outcome Simulation::run() {
 void Simulation::perform(const Action& action) {
   Dice dice(action.seed);
   // The uploader may stop, too, behind what it uploads.
-  const auto anOperator = [&](bool orUploader) -> Listener* {
-    const std::size_t index = dice.below(operators_.size() + (orUploader ? 1 : 0));
-    Listener& chosen = index < operators_.size() ? *operators_[index] : *uploader_;
-    return chosen.connected() ? &chosen : nullptr;
+  const auto anOperator = [&](bool orAnother) -> Listener* {
+    std::vector<Listener*> candidates;
+    for (const auto& op : operators_) candidates.push_back(op.get());
+    for (Listener* const other : {uploader_.get(), page_.get(), stock_.get()}) {
+      if (orAnother && other != nullptr) candidates.push_back(other);
+    }
+    Listener* const chosen = candidates[dice.below(candidates.size())];
+    return chosen->connected() ? chosen : nullptr;
   };
   switch (action.kind) {
     case Action::Kind::stop:
@@ -415,6 +442,9 @@ void Simulation::perform(const Action& action) {
       break;
     case Action::Kind::stream:
       stream(dice);
+      break;
+    case Action::Kind::visit:
+      visit(dice);
       break;
   }
 }
@@ -643,6 +673,64 @@ void Simulation::nonsense(Dice& dice) {
   strangers_.push_back(std::move(stranger));
 }
 
+void Simulation::visit(Dice& dice) {
+  static constexpr const char* kTargets[] = {"/api/state", "/metrics",      "/healthz", "/api/servers",
+                                             "/",          "/api/messages", "/vrpn",    "/nothing"};
+  checkVisits();
+  const std::size_t which = dice.below(2 * std::size(kTargets));
+  const auto manner =
+      dice.chance(0.7) ? Visit::Manner::reads : static_cast<Visit::Manner>(dice.below(Visit::kManners));
+  ask(kTargets[which < std::size(kTargets) ? which : 0], manner, dice);
+}
+
+void Simulation::ask(const std::string& target, Visit::Manner manner, Dice& dice) {
+  visits_.push_back(
+      std::make_unique<Visit>(*clients_, target, manner, dice.below(~std::uint64_t{0}),
+                              [this, target, asked = clock_.now(), seed = dice.below(~std::uint64_t{0})](
+                                  const Visit::Answer& answer) { onAnswer(target, asked, answer, seed); }));
+}
+
+void Simulation::onAnswer(const std::string& target, Nanos asked, const Visit::Answer& answer,
+                          std::uint64_t seed) {
+  hash_.add(answer.body);
+  const bool expected = target == "/healthz"               ? answer.status == 200 || answer.status == 503
+                        : target == "/vrpn"                ? answer.status == 426
+                        : target == "/nothing"             ? answer.status == 404
+                        : target.starts_with("/api/mesh?") ? answer.status == 200 || answer.status == 404
+                                                           : answer.status == 200;
+  if (!expected || answer.body.empty())
+    finding("the web port answers " + target + " with status " + std::to_string(answer.status) + " and " +
+            std::to_string(answer.body.size()) + " bytes");
+  if (target != "/api/state" || !expected) return;
+  const auto state = nlohmann::json::parse(answer.body, nullptr, false);
+  if (state.is_discarded()) return finding("the state of the web port is not JSON");
+  const auto tick = state["devices"][0]["loop"]["ticks"].get<std::uint64_t>();
+  if (tick > judge_.ticks() || (asked > stateKnownAt_ && tick < stateTick_))
+    finding("the web port tells of tick " + std::to_string(tick) + " of " + std::to_string(judge_.ticks()) +
+            " after tick " + std::to_string(stateTick_));
+  if (tick > stateTick_) {
+    stateTick_ = tick;
+    stateKnownAt_ = clock_.now();
+  }
+  // As the viewer does, which shows all objects.
+  Dice dice(seed);
+  const auto& objects = state["scenes"][0]["objects"];
+  if (objects.empty()) return;
+  const auto& object = objects[dice.below(objects.size())];
+  ask("/api/mesh?scene=0&object=" + std::to_string(object["id"].get<std::int64_t>()) +
+          "&geometry=" + std::to_string(object["geometry"].get<std::uint64_t>()),
+      Visit::Manner::reads, dice);
+}
+
+void Simulation::checkVisits() {
+  const Nanos longest = 10'000 * kMs + 2 * script_.adversity.longestSceneStall;
+  for (const auto& visit : visits_) {
+    if (visit->waits() && clock_.now() - visit->asked() > longest + serverStalled())
+      finding("the web port has not answered a request of " + visit->target() + " for " +
+              std::to_string((clock_.now() - visit->asked()) / kMs) + " ms");
+  }
+}
+
 void Simulation::beat() {
   const auto one = [](Listener& client) {
     if (!client.connected() || !client.beats) return;
@@ -655,6 +743,8 @@ void Simulation::beat() {
   for (const auto& client : pushers_) one(*client);
   one(*uploader_);
   one(*reader_);
+  if (page_) one(*page_);
+  if (stock_) one(*stock_);
 }
 
 void Simulation::describe(bool last) {
@@ -738,6 +828,9 @@ void Simulation::checkEnd() {
   for (const auto& client : batchers_) check(*client);
   check(*uploader_);
   check(*reader_);
+  if (page_) check(*page_);
+  if (stock_) check(*stock_);
+  checkVisits();
 }
 
 void Simulation::checkRecording() {

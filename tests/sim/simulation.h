@@ -29,6 +29,7 @@ struct Action {
     diskFails,  ///< the disk is full, refuses writes or syncs, or no file can be opened, for a while
     describe,   ///< the scene is compared with what was sent
     stream,     ///< a client comes, streams remote contacts or held forces for a while, and goes
+    visit,      ///< somebody asks the web port something
   };
   Nanos at = 0;
   Kind kind = Kind::stop;
@@ -42,6 +43,8 @@ struct Script {
   Nanos length = 20'000'000'000;
   bool cube = true;  ///< a cube under the hand; else only forces of clients
   bool record = false;
+  bool web = false;        ///< with a web port, and a page that takes part
+  bool datagrams = false;  ///< with a client that uses them
   Nanos networkDelay = 50'000;
   Nanos networkJitter = 0;
   std::size_t window = std::size_t{256} * 1024;
