@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <new>
 #include <utility>
 
 #include "scene/free_forces.h"
@@ -38,23 +39,27 @@ class SceneBuilder::State {
       return;
     }
     Batch& batch = open->second;
+    if (batch.refused) return;
     const std::size_t bytes = bytesOf(command);
-    batch.bytes += bytes;
-    if (batch.bytes > config_.limits.batch_bytes || heldInBatches_ + bytes > config_.limits.batch_bytes) {
-      batch.bytes = config_.limits.batch_bytes + 1;  // refused as a whole
-      batch.commands.clear();
-      heldInBatches_ -= std::exchange(batch.held, 0);
+    if (heldInBatches_ + bytes > config_.limits.batch_bytes) {
+      refuse(batch);
       call.refuse("batch", "refused as a whole: too long; commit more often", ", limit ",
                   config_.limits.batch_bytes, " bytes");
       return;
     }
-    batch.held += bytes;
+    try {
+      batch.commands.push(std::move(command));
+    } catch (const std::bad_alloc&) {
+      refuse(batch);
+      call.refuse("batch", "refused as a whole: the server is out of memory");
+      return;
+    }
+    batch.bytes += bytes;
     heldInBatches_ += bytes;
-    batch.commands.push(std::move(command));
   }
 
   void clientGone(ClientId client, Nanos now) {
-    if (const auto batch = batches_.extract(client)) heldInBatches_ -= batch.mapped().held;
+    if (const auto batch = batches_.extract(client)) heldInBatches_ -= batch.mapped().bytes;
     board_.forget(client);
     forces_.clientGone(client, now);
   }
@@ -117,9 +122,15 @@ class SceneBuilder::State {
  private:
   struct Batch {
     HeldCommands commands;
-    std::size_t bytes = 0;  ///< of all commands, also of a batch that is too long
-    std::size_t held = 0;   ///< of those in memory
+    std::size_t bytes = 0;
+    bool refused = false;  ///< with all that follows until the commit
   };
+
+  void refuse(Batch& batch) {
+    batch.refused = true;
+    batch.commands.clear();
+    heldInBatches_ -= std::exchange(batch.bytes, 0);
+  }
 
   void dispatch(SceneCommand& command, const Call& call) {
     std::visit(
@@ -222,10 +233,15 @@ class SceneBuilder::State {
       call.warn("commit of batch", "ignored: no batch was begun");
       return;
     }
-    heldInBatches_ -= batch.mapped().held;
-    if (batch.mapped().bytes > config_.limits.batch_bytes) return;
+    heldInBatches_ -= batch.mapped().bytes;
     const Call inside{call.client, call.now, true, call.board, call.out};
-    batch.mapped().commands.forEach([&](SceneCommand& command) { dispatch(command, inside); });
+    batch.mapped().commands.forEach([&](SceneCommand& command) {
+      try {
+        dispatch(command, inside);
+      } catch (const std::bad_alloc&) {
+        call.refuse("batch", "carried out in part: the server is out of memory; send the scene again");
+      }
+    });
   }
 
   const SceneConfig config_;

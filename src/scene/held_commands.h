@@ -14,7 +14,11 @@ namespace hapticd::scene {
 class HeldCommands {
  public:
   void push(SceneCommand&& command) {
-    if (chunks_.empty() || chunks_.back().size() == kChunk) chunks_.emplace_back().reserve(kChunk);
+    if (chunks_.empty() || chunks_.back().size() == kChunk) {
+      Chunk chunk;
+      chunk.reserve(kChunk);
+      chunks_.push_back(std::move(chunk));
+    }
     chunks_.back().push_back(std::move(command));
   }
   void clear() { chunks_ = {}; }

@@ -148,8 +148,11 @@ class Streamer final : public Listener {
     }
     wire::RemoteContacts message{.time = stamp, .stateTime = dice_.chance(0.5) ? now : 0, .contacts = {}};
     for (std::size_t i = 0; i < contacts_.size(); ++i) {
-      if (dice_.chance(0.05)) continue;               // missing in this set
-      if (dice_.chance(0.02)) contacts_[i] = draw();  // elsewhere at once
+      if (dice_.chance(0.05)) continue;  // missing in this set
+      // A contact that has passed the hand on its way up would push down.
+      constexpr double kRise_m = 0.004;
+      const double rise_m = contacts_[i].numbers[13] * base::toSeconds(now - contacts_[i].since);
+      if (rise_m > kRise_m || dice_.chance(0.02)) contacts_[i] = draw();  // elsewhere at once
       std::vector<double> numbers = contacts_[i].numbers;
       for (int axis = 0; axis < 3; ++axis)
         numbers[3 + axis] += numbers[12 + axis] * base::toSeconds(now - contacts_[i].since);

@@ -116,7 +116,8 @@ void Judge::onWrite(Nanos clock, const Vec3& force_N, bool accepted) {
   constexpr int kMostTicks = 40;
   const std::optional<Top> top = knows_.top();
   const double lowest_m = top ? top->lowest_m : 0;
-  const bool ramped = tick_ - zeroAt_ > limits_.rampIn + 20'000'000;
+  // A re-arm begins a ramp, also when nothing was off.
+  const bool ramped = tick_ - std::max(zeroAt_, rearmed_) > limits_.rampIn + 20'000'000;
   // Without a force nothing keeps the hand from where an object may release it. A hand that leaps beside the
   // cube is held by its side when it comes back.
   constexpr double kRim_m = 0.0005;

@@ -1,4 +1,5 @@
 // hapticd-sim: the whole server in one thread on a virtual clock, among clients and faults drawn from a seed.
+#include <malloc.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -153,6 +154,9 @@ int main(int argc, char** argv) {
   // One thread only, also for the library that builds the index.
   setenv("HAPTICD_EMBREE", "threads=1,user_threads=1", 0);
   setenv("TZ", "UTC", 1);
+  // The meshes of uploads are kept for the next ones, instead of new pages for each.
+  mallopt(M_MMAP_THRESHOLD, 1 << 30);
+  mallopt(M_TRIM_THRESHOLD, 1 << 30);
   std::uint64_t first = 1;
   std::uint64_t last = 20;
   double seconds = 20;

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "sim/memory.h"
+
 namespace hapticd::sim {
 namespace {
 
@@ -47,6 +49,7 @@ class Scheduler::Task {
       }
       Task& task;
     } const scope(*this);
+    const LimitedMemory memory(large ? scheduler_.memoryLimit_ : 0);
     hasRun = true;
     woken = false;
     ++scheduler_.steps_;
@@ -60,6 +63,7 @@ class Scheduler::Task {
   }
 
   const std::string name;
+  const bool large = name == "scene" || name.starts_with("web");  // allocates much
   const base::Step step;
   std::optional<Nanos> due;  // nothing: waits for a wake
   Nanos busyUntil = 0;
@@ -165,6 +169,8 @@ bool Scheduler::runNext(Nanos limit) {
   }
   const std::size_t chosen = ready_[dice_.below(ready_.size())];
   clock_.now_ = at;
+  // A step that is preempted may be short of memory; what runs inside it is not.
+  const LimitedMemory memory(0);
   if (chosen >= loopCount) {
     run(*tasks_[chosen - loopCount]);
   } else if (chosen == serverLoop_) {

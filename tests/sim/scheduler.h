@@ -22,10 +22,11 @@ using base::Nanos;
 
 inline constexpr Nanos kMs = 1'000'000;
 
-/// Random numbers of one purpose, the same for the same seed.
+/// Random numbers of one purpose, the same for the same seed. Seeds are mixed: the states of the generator
+/// form one sequence, on which neighbours must not be near each other.
 class Dice {
  public:
-  explicit Dice(std::uint64_t seed) : random_(seed) {}
+  explicit Dice(std::uint64_t seed) : random_(base::SeededRandom(seed).next()) {}
   std::uint64_t below(std::uint64_t end) { return end == 0 ? 0 : random_.next() % end; }
   Nanos between(Nanos least, Nanos most) {
     return least + static_cast<Nanos>(below(static_cast<std::uint64_t>(most - least + 1)));
@@ -101,6 +102,9 @@ class Scheduler final : public base::Threads, public net::FakeNetwork {
   void chargeNet(Nanos cost) { netCost_ += cost; }
   /// Time up to now in which the net thread could not run, for reasons that are not the server's.
   Nanos netStalled() const noexcept;
+  /// From now on allocations of this size and more fail in the steps of the scene and of the web port's
+  /// workers; with 0, none.
+  void limitMemory(std::size_t fromBytes) { memoryLimit_ = fromBytes; }
   /// Called when the machine was suspended.
   std::function<void()> onSuspended;
   /// Ends preemption and stalls: what follows is the end of the server.
@@ -137,6 +141,7 @@ class Scheduler final : public base::Threads, public net::FakeNetwork {
   bool clientRuns_ = false;
   int depth_ = 0;  // of steps of tasks
   bool calm_ = false;
+  std::size_t memoryLimit_ = 0;
   Nanos stalledSum_ = 0;
   Nanos stalledUntil_ = 0;
   std::uint64_t steps_ = 0;

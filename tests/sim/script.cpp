@@ -13,7 +13,7 @@ const char* nameOf(Action::Kind kind) {
 }
 
 Script drawScript(std::uint64_t seed, double seconds) {
-  Dice dice(seed * 0x9E3779B97F4A7C15U + 1);
+  Dice dice(seed);
   Script script;
   script.seed = seed;
   script.length = base::toNanos(seconds);
@@ -69,6 +69,7 @@ Script drawScript(std::uint64_t seed, double seconds) {
   script.web = dice.chance(0.5);
   if (script.web) every(Kind::visit, dice.uniform(0.2, 3.0));
   script.datagrams = dice.chance(0.5);
+  if (dice.chance(0.3)) every(Kind::noMemory, 5.0);
   std::stable_sort(script.actions.begin(), script.actions.end(),
                    [](const Action& a, const Action& b) { return a.at < b.at; });
   return script;

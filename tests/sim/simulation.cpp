@@ -96,6 +96,7 @@ class Simulation {
   void endForcesWithin(Nanos lasts);
   void failDisk(Dice& dice);
   void healDisk();
+  void runOutOfMemory(Dice& dice);
   void nonsense(Dice& dice);
   void visit(Dice& dice);
   void ask(const std::string& target, Visit::Manner manner, Dice& dice);
@@ -154,6 +155,7 @@ class Simulation {
   std::deque<std::pair<Nanos, std::uint32_t>> buttons_{{0, 0}};  // of the device: since when
   bool over_ = false;
   bool writesFailed_ = false;
+  bool memoryFailed_ = false;
   std::map<std::int32_t, std::int64_t> seen_;  // newest batch of each batcher that a description showed
   bool compared_ = false;
   bool uploaded_ = false;
@@ -315,8 +317,13 @@ Outcome Simulation::run() {
       if (reader_->open()) reader_->resumeReading();
     });
     healDisk();
+    scheduler_.limitMemory(0);
     ++moving_;
     if (script_.cube) pose(y_);
+    // The batch before may have failed for want of memory.
+    for (const auto& batcher : batchers_) {
+      if (batcher->connected()) batcher->batch();
+    }
     // Behind all that it uploaded: shows at the end whether that was carried out.
     if (uploaded_ && uploader_->connected())
       uploader_->send(wire::SetTransformMatrix{kUploaded, shifted(kPlace, 0, 0)});
@@ -445,6 +452,9 @@ void Simulation::perform(const Action& action) {
       break;
     case Action::Kind::visit:
       visit(dice);
+      break;
+    case Action::Kind::noMemory:
+      runOutOfMemory(dice);
       break;
   }
 }
@@ -594,6 +604,14 @@ void Simulation::healDisk() {
   files_.freeBytes.reset();
 }
 
+// Small allocations come from memory that the process has.
+void Simulation::runOutOfMemory(Dice& dice) {
+  scheduler_.limitMemory(std::size_t{4096} << dice.below(10));
+  memoryFailed_ = true;
+  ++bench_.injected;
+  after(dice.between(10 * kMs, 3'000 * kMs), [this] { scheduler_.limitMemory(0); });
+}
+
 void Simulation::stream(Dice& dice) {
   constexpr std::ptrdiff_t kMost = 2;
   const auto streams = [](const auto& streamer) { return !streamer->over; };
@@ -698,6 +716,8 @@ void Simulation::onAnswer(const std::string& target, Nanos asked, const Visit::A
                         : target == "/nothing"             ? answer.status == 404
                         : target.starts_with("/api/mesh?") ? answer.status == 200 || answer.status == 404
                                                            : answer.status == 200;
+  // The mesh is still being made, or memory ran out.
+  if (answer.status == 503 && (memoryFailed_ || target.starts_with("/api/mesh?"))) return;
   if (!expected || answer.body.empty())
     finding("the web port answers " + target + " with status " + std::to_string(answer.status) + " and " +
             std::to_string(answer.body.size()) + " bytes");
@@ -748,8 +768,9 @@ void Simulation::beat() {
 }
 
 void Simulation::describe(bool last) {
-  server_->stations().front()->scene().describe(
-      [this, last](const auto& description) { compare(*description, last); });
+  server_->stations().front()->scene().describe([this, last](const auto& description) {
+    if (description || !memoryFailed_) compare(*description, last);
+  });
 }
 
 // Both objects of a batcher are at the same batch, and at the last one in the end.
@@ -834,7 +855,7 @@ void Simulation::checkEnd() {
 }
 
 void Simulation::checkRecording() {
-  if (writesFailed_) return;
+  if (writesFailed_ || memoryFailed_) return;  // a command that failed is in the recording
   scheduler_.calm();
   std::string remark;
   std::string law;

@@ -30,6 +30,7 @@ struct Action {
     describe,   ///< the scene is compared with what was sent
     stream,     ///< a client comes, streams remote contacts or held forces for a while, and goes
     visit,      ///< somebody asks the web port something
+    noMemory,   ///< large allocations of the server's threads fail for a while
   };
   Nanos at = 0;
   Kind kind = Kind::stop;

@@ -16,7 +16,8 @@ namespace hapticd::server {
 /// The client disconnected: the forces that it owns ramp out.
 struct ClientGone {};
 
-/// Requests a description of the scene after the preceding tasks. `reply` is called in the scene thread.
+/// Requests a description of the scene after the preceding tasks. `reply` is called in the scene thread; with
+/// null when memory ran out.
 struct DescribeScene {
   std::function<void(std::shared_ptr<const scene::SceneDescription>)> reply;
 };

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "base/world.h"
 
@@ -170,14 +171,13 @@ void SceneThread::publish() {
 // One description serves all devices: their scenes differ only in the passivity bounds.
 void SceneThread::describeScene() {
   if (descriptionRequests_.empty()) return;
+  std::shared_ptr<const scene::SceneDescription> description;
   try {
-    const auto description =
-        std::make_shared<const scene::SceneDescription>(seats_.front().builder.describe());
-    for (const DescribeScene& request : descriptionRequests_) request.reply(description);
+    description = std::make_shared<const scene::SceneDescription>(seats_.front().builder.describe());
   } catch (const std::exception& error) {
     spdlog::error("the scene could not be described: {}", error.what());
   }
-  descriptionRequests_.clear();
+  for (const DescribeScene& request : std::exchange(descriptionRequests_, {})) request.reply(description);
 }
 
 void SceneThread::publishTo(Seat& seat) {

@@ -72,13 +72,27 @@ void MeshStore::get(std::size_t scene, const ObservedScene& observed, std::size_
 // The job owns a reference to the shape: if it is the last one, the worker frees the shape, not the net
 // thread.
 void MeshStore::build(const Key& key, Entry& entry, const scene::ObjectDescription& object) {
-  worker_.post([this, key, geometry = entry.geometry, share = entry.share, cancelled = entry.cancelled,
-                vertices = object.vertices, triangles = object.triangles] {
-    if (*cancelled) return;
-    auto bytes = std::make_shared<net::Buffer>(displayMesh(*vertices, *triangles, share, *cancelled));
-    if (*cancelled) return;
-    loop_.post([this, key, geometry, share, bytes] { onBuilt(key, geometry, share, std::move(*bytes)); });
-  });
+  worker_.post(
+      [this, key, geometry = entry.geometry, share = entry.share, cancelled = entry.cancelled,
+       vertices = object.vertices, triangles = object.triangles] {
+        if (*cancelled) return;
+        auto bytes = std::make_shared<net::Buffer>(displayMesh(*vertices, *triangles, share, *cancelled));
+        if (*cancelled) return;
+        loop_.post([this, key, geometry, share, bytes] { onBuilt(key, geometry, share, std::move(*bytes)); });
+      },
+      [this, key, cancelled = entry.cancelled] {
+        if (*cancelled) return;
+        loop_.post([this, key, cancelled] {
+          if (!*cancelled) forget(key);
+        });
+      });
+}
+
+// The next request builds it again.
+void MeshStore::forget(const Key& key) {
+  const auto entry = entries_.extract(key);
+  if (!entry) return;
+  for (const Respond& waiting : entry.mapped().waiting) waiting(busyResponse());
 }
 
 void MeshStore::onBuilt(const Key& key, std::uint64_t geometry, std::size_t share, net::Buffer&& bytes) {

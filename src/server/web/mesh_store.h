@@ -46,6 +46,7 @@ class MeshStore {
   };
 
   void build(const Key& key, Entry& entry, const scene::ObjectDescription& object);
+  void forget(const Key& key);
   void onBuilt(const Key& key, std::uint64_t geometry, std::size_t share, net::Buffer&& bytes);
 
   net::Loop& loop_;

@@ -35,10 +35,12 @@ void SceneWatch::beginRound() {
 
 void SceneWatch::onReply(std::size_t scene, std::shared_ptr<const scene::SceneDescription> description) {
   pending_[scene] = 0;
-  auto observed = std::make_shared<ObservedScene>();
-  observed->geometry = shapeNumbers(*description, latest_[scene].get());
-  observed->description = std::move(description);
-  dispose_(std::exchange(latest_[scene], std::move(observed)));
+  if (description) {
+    auto observed = std::make_shared<ObservedScene>();
+    observed->geometry = shapeNumbers(*description, latest_[scene].get());
+    observed->description = std::move(description);
+    dispose_(std::exchange(latest_[scene], std::move(observed)));
+  }
   if (std::none_of(pending_.begin(), pending_.end(), [](char pending) { return pending != 0; })) endRound();
 }
 

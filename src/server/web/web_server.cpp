@@ -14,6 +14,8 @@ namespace {
 
 constexpr int kForgetAfter_s = 10;
 
+constexpr std::string_view kNoMemory = "the server is out of memory; retry later";
+
 net::HttpResponse errorResponse(int status, std::string_view text) {
   return net::HttpResponse::of(status, errorJson(text), "application/json");
 }
@@ -191,22 +193,32 @@ void WebServer::gather() {
 }
 
 void WebServer::answer() {
-  textWorker_.post([this, askers = std::exchange(answering_, {}), report = std::exchange(report_, {})] {
-    std::map<Format, std::string> texts;
-    for (const Asker& asker : askers) texts.try_emplace(asker.format);
-    for (auto& [format, text] : texts) text = format(report);
-    for (const Asker& asker : askers) {
-      loop_.post(
-          [this, reply = asker.reply,
-           response = net::HttpResponse::of(200, texts.at(asker.format), asker.contentType)]() mutable {
-            respond(reply, std::move(response));
-          });
-    }
+  const auto askers = std::make_shared<const std::vector<Asker>>(std::exchange(answering_, {}));
+  const auto send = [this](const Asker& asker, net::HttpResponse response) {
+    loop_.post([this, reply = asker.reply, response = std::move(response)]() mutable {
+      respond(reply, std::move(response));
+    });
+  };
+  const auto next = [this] {
     loop_.post([this] {
       reporting_ = false;
       nextReport();
     });
-  });
+  };
+  textWorker_.post(
+      [askers, send, next, report = std::exchange(report_, {})] {
+        std::map<Format, net::HttpResponse> responses;
+        for (const Asker& asker : *askers) {
+          if (!responses.contains(asker.format))
+            responses[asker.format] = net::HttpResponse::of(200, asker.format(report), asker.contentType);
+        }
+        for (const Asker& asker : *askers) send(asker, responses.at(asker.format));
+        next();
+      },
+      [askers, send, next] {
+        for (const Asker& asker : *askers) send(asker, errorResponse(503, kNoMemory));
+        next();
+      });
 }
 
 void WebServer::sendServers(const net::HttpReply& reply) {

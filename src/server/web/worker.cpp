@@ -14,10 +14,10 @@ Worker::~Worker() {
   thread_.stop();
 }
 
-void Worker::post(std::function<void()> job) {
+void Worker::post(std::function<void()> job, std::function<void()> failed) {
   {
     const std::lock_guard lock(mutex_);
-    jobs_.push_back(std::move(job));
+    jobs_.push_back({std::move(job), std::move(failed)});
   }
   if (thread_.running()) {
     thread_.wake();
@@ -28,7 +28,7 @@ void Worker::post(std::function<void()> job) {
 
 std::optional<base::Nanos> Worker::step() {
   for (;;) {
-    std::function<void()> job;
+    Job job;
     {
       const std::lock_guard lock(mutex_);
       if (stopping_ || jobs_.empty()) return std::nullopt;
@@ -36,9 +36,10 @@ std::optional<base::Nanos> Worker::step() {
       jobs_.pop_front();
     }
     try {
-      job();
+      job.run();
     } catch (const std::exception& error) {
       spdlog::error("web: {}", error.what());
+      if (job.failed) job.failed();
     }
   }
 }

@@ -21,15 +21,19 @@ class Worker {
   Worker& operator=(const Worker&) = delete;
 
   /// Always from the same thread; the first call starts the worker. An exception that leaves the job is
-  /// logged.
-  void post(std::function<void()> job);
+  /// logged; then `failed` is called in the worker's thread.
+  void post(std::function<void()> job, std::function<void()> failed = {});
 
  private:
   std::optional<base::Nanos> step();
 
   const std::string name_;
   std::mutex mutex_;
-  std::deque<std::function<void()>> jobs_;
+  struct Job {
+    std::function<void()> run;
+    std::function<void()> failed;
+  };
+  std::deque<Job> jobs_;
   bool stopping_ = false;
   base::Thread thread_;  // last: its step uses the others
 };

@@ -36,12 +36,17 @@ TEST(Worker, RunsAJobThatIsPostedAfterAnIdleTime) {
   EXPECT_EQ(runs, 3);
 }
 
-TEST(Worker, SurvivesAJobThatThrows) {
+TEST(Worker, ReportsAJobThatThrowsAndGoesOn) {
   Worker worker("test");
   std::promise<void> done;
-  worker.post([] { throw std::runtime_error("on purpose"); });
+  bool failed = false;
+  bool failedToo = false;
+  worker.post([] { throw std::runtime_error("on purpose"); }, [&failed] { failed = true; });
+  worker.post([] {}, [&failedToo] { failedToo = true; });
   worker.post([&done] { done.set_value(); });
-  EXPECT_EQ(done.get_future().wait_for(std::chrono::seconds(60)), std::future_status::ready);
+  ASSERT_EQ(done.get_future().wait_for(std::chrono::seconds(60)), std::future_status::ready);
+  EXPECT_TRUE(failed);
+  EXPECT_FALSE(failedToo);
 }
 
 /// Threads that run a step only when they are stopped.
