@@ -29,6 +29,7 @@ void isolation_block(Input input);  // memory shared with the process of a drive
 void mesh_bytes(Input input);       // the mesh that the confined reader of a foreign file sends
 void mesh_file(Input input);        // foreign mesh files, in that confined reader
 void remote_input(Input input);     // remote contacts and held forces, up to the force on the hand
+void whole_server(Input input);     // messages of several clients, through a simulated server to the hand
 
 inline void require(bool holds, const char* what) {
   if (holds) return;

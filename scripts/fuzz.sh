@@ -61,7 +61,7 @@ pack() {
   rm -rf "$small"
   mkdir -p "$small"
   "build/fuzz/bin/${1}_fuzz" -merge=1 -max_len="$(longest "$1")" "$small" "build/fuzz/corpus/$1" >"build/fuzz/logs/$1.merge" 2>&1
-  python3 - "$small" "testdata/fuzz/$1.corpus" "$([ "$1" = mesh_file ] && echo 60 || echo 100000)" <<'PYTHON'
+  python3 - "$small" "testdata/fuzz/$1.corpus" "$([[ $1 == mesh_file || $1 == whole_server ]] && echo 60 || echo 100000)" <<'PYTHON'
 import pathlib, sys
 inputs = sorted((p.read_bytes() for p in pathlib.Path(sys.argv[1]).iterdir()), key=lambda b: (len(b), b))
 packed = b""

@@ -30,7 +30,8 @@ const Target kTargets[] = {{"wire_message", wire_message},
                            {"isolation_block", isolation_block},
                            {"mesh_bytes", mesh_bytes},
                            {"mesh_file", mesh_file},
-                           {"remote_input", remote_input}};
+                           {"remote_input", remote_input},
+                           {"whole_server", whole_server}};
 
 // Each input with its length before it, four bytes, as scripts/fuzz.sh packs them.
 std::vector<std::vector<std::byte>> corpusOf(const std::string& target) {
@@ -69,7 +70,8 @@ TEST_P(Corpus, HoldsTheUnguidedProperties) {
     state = state * 1664525U + 1013904223U;
     return n == 0 ? 0 : (state >> 8U) % n;
   };
-  const bool slow = std::string_view(target.name) == "mesh_file";  // a process each
+  const std::string_view name = target.name;
+  const bool slow = name == "mesh_file" || name == "whole_server";  // a process or a server each
   for (std::size_t i = 0; i < (slow ? 20U : 300U); ++i) {
     const std::vector<std::byte>& first = inputs[below(inputs.size())];
     const std::vector<std::byte>& second = inputs[below(inputs.size())];

@@ -1,6 +1,8 @@
 // Commands, snapshots, sharing and batches.
 #include <gmock/gmock.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <string>
@@ -299,6 +301,40 @@ TEST_F(Builder, BatchOfAClientThatLeavesKeepsNoMemory) {
   builder_.clientGone(2, now_);
   EXPECT_LT(resident_MB(), before + (during - before) / 2) << (locked ? "locked" : "not locked");
   if (locked) ::munlockall();
+}
+
+// The address space that the process has is all that it gets.
+class NoFurtherMemory {
+ public:
+  NoFurtherMemory() {
+    std::size_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    getrlimit(RLIMIT_AS, &before_);
+    rlimit now = before_;
+    now.rlim_cur = pages * static_cast<std::size_t>(getpagesize());
+    EXPECT_EQ(setrlimit(RLIMIT_AS, &now), 0);
+  }
+  ~NoFurtherMemory() { setrlimit(RLIMIT_AS, &before_); }
+
+ private:
+  rlimit before_{};
+};
+
+TEST_F(Builder, BatchThatFindsNoMemoryIsRefusedAsAWhole) {
+  builder_.apply(1, BeginBatch{}, now_, notices_);
+  {
+    const NoFurtherMemory limit;
+    builder_.apply(1, SetTouchableFaces{0}, now_, notices_);
+  }
+  builder_.apply(1, SetTouchableFaces{1}, now_, notices_);
+  builder_.apply(1, CommitBatch{}, now_, notices_);
+  ASSERT_EQ(notices_.size(), 1U);
+  EXPECT_THAT(notices_[0].text, HasSubstr("out of memory"));
+  EXPECT_FALSE(publish()) << "nothing of it is carried out";
+  say(BeginBatch{});
+  say(SetTouchableFaces{1});
+  say(CommitBatch{});
+  EXPECT_TRUE(publish());
 }
 #endif
 

@@ -8,21 +8,10 @@
 #include <cstdlib>
 #include <new>
 
-namespace hapticd::sim {
 namespace {
 
-// Everything runs in one thread. Constant initialisation: memory is allocated before main().
-constinit std::size_t limit = 0;
-constinit std::size_t failed = 0;
-
-bool fails(std::size_t size) noexcept {
-  if (limit == 0 || size < limit) return false;
-  ++failed;
-  return true;
-}
-
 void* allocate(std::size_t size, std::size_t alignment = 0) {
-  if (!fails(size)) {
+  if (!hapticd::sim::LimitedMemory::refuses(size)) {
     void* memory = nullptr;
     if (alignment == 0) {
       memory = std::malloc(size == 0 ? 1 : size);
@@ -36,26 +25,12 @@ void* allocate(std::size_t size, std::size_t alignment = 0) {
 
 }  // namespace
 
-LimitedMemory::LimitedMemory(std::size_t fromBytes) noexcept : before_(limit) {
-  limit = fromBytes;
-}
-
-LimitedMemory::~LimitedMemory() {
-  limit = before_;
-}
-
-std::size_t LimitedMemory::failures() noexcept {
-  return failed;
-}
-
-}  // namespace hapticd::sim
-
 // The other forms call these two.
 void* operator new(std::size_t size) {
-  return hapticd::sim::allocate(size);
+  return allocate(size);
 }
 void* operator new(std::size_t size, std::align_val_t alignment) {
-  return hapticd::sim::allocate(size, static_cast<std::size_t>(alignment));
+  return allocate(size, static_cast<std::size_t>(alignment));
 }
 void operator delete(void* memory) noexcept {
   std::free(memory);
@@ -73,7 +48,7 @@ void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
 // The library's own allocator does not come through here.
 extern "C" void* mmap(void* address, std::size_t size, int protection, int flags, int file,
                       off_t offset) noexcept {
-  if (file == -1 && hapticd::sim::fails(size)) {
+  if (file == -1 && hapticd::sim::LimitedMemory::refuses(size)) {
     errno = ENOMEM;
     return MAP_FAILED;
   }

@@ -165,9 +165,11 @@ void SimClient::onRead(std::uint64_t total) {
 
 void SimClient::onEvent(const wire::Event& event) {
   if (std::holds_alternative<wire::Connected>(event)) {
-    wire::Identify identify;
-    identify.token = Clients::kToken;
-    queue(identify);
+    if (identifies) {
+      wire::Identify identify;
+      identify.token = Clients::kToken;
+      queue(identify);
+    }
     onConnected();
   } else if (const auto* message = std::get_if<wire::MessageReceived>(&event)) {
     onMessage(*message);

@@ -59,6 +59,7 @@ class SimClient {
   void queue(const M& message) {
     peer_->send(wallTime(), device_, message);
   }
+  void queue(const wire::Message& message) { peer_->send(wallTime(), device_, message); }
   template <wire::WireMessage M>
   void send(const M& message) {
     queue(message);
@@ -76,6 +77,8 @@ class SimClient {
   void onRead(std::uint64_t total);
   std::uint64_t unread() const { return sent_ - read_; }
 
+  /// Sends the token of owners.
+  bool identifies = true;
   /// May send more than the server reads ahead: then TCP keeps its stops waiting.
   bool sendsAhead = false;
   enum class Way {
