@@ -17,7 +17,7 @@ namespace hapticd::geometry {
 class Fans {
  public:
   /// Vertices with fewer triangles are not kept.
-  static constexpr std::uint32_t kFewest = 64;
+  static constexpr std::uint32_t kFewest = 256;
 
   /// The fans of a mesh. Corners at the same place are one vertex. `leftOut`: triangles that do not count, or
   /// empty. Linear time; about 20 ms for a million triangles without a fan.

@@ -131,7 +131,7 @@ TEST_P(Pit, takes_few_casts) {
   }
   EXPECT_GT(proxy->contactSet().count, 0);
   EXPECT_LE(casts, 30);
-  EXPECT_LE(facetCasts, 2500);
+  EXPECT_LE(facetCasts, 6000);
 }
 
 }  // namespace
