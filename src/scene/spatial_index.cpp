@@ -85,16 +85,25 @@ void runNear(RTCScene scene, RTCPointQuery& point, NearQuery& query) noexcept {
   if (setjmp(query.end) == 0) rtcPointQuery(scene, &point, &context, nullptr, &query);
 }
 
+// What lies in a convex set and within `radius` of a point that is `beyond` outside the set, is within this
+// of the nearest point of the set. The pad covers rounding.
+double radiusInside(double radius, double beyond, double pad) noexcept {
+  const double padded = radius + pad;
+  return std::min(radius, std::sqrt(std::max(0.0, (padded - beyond) * (padded + beyond))));
+}
+
 // A query with a shrinking radius: passes the caller's radius on to Embree.
 struct NearestQuery {
   double (*thunk)(void*, std::uint32_t) noexcept;
   void* visitor;
   double scale;
+  double pad;
+  double beyond;
   RTCPointQuery* point;
   static bool call(void* self, std::uint32_t id) noexcept {
     const auto* query = static_cast<const NearestQuery*>(self);
     const double wanted = query->thunk(query->visitor, id);
-    const double radius = wanted * query->scale * (1 + kRelativePad);
+    const double radius = radiusInside(wanted, query->beyond, query->pad) * query->scale * (1 + kRelativePad);
     query->point->radius = std::min(query->point->radius, static_cast<float>(std::max(radius, 0.0)));
     return wanted >= 0;  // at 0 there may be ties
   }
@@ -312,9 +321,10 @@ void SpatialIndex::visitNearestImpl(const Vec3& centre, double radius, SegmentTh
                                     void* visitor) const noexcept {
   if (!tree_) return;
   const Vec3 inside = centre.cwiseMax(bounds_.min).cwiseMin(bounds_.max);  // see visitNearImpl()
-  if (!((inside - centre).norm() <= radius + pad_)) return;
-  RTCPointQuery point = tree_->pointQuery(inside, radius);
-  NearestQuery query{thunk, visitor, tree_->scale, &point};
+  const double beyond = (inside - centre).norm();
+  if (!(beyond <= radius + pad_)) return;
+  RTCPointQuery point = tree_->pointQuery(inside, radiusInside(radius, beyond, pad_));
+  NearestQuery query{thunk, visitor, tree_->scale, pad_, beyond, &point};
   NearQuery adapter{&NearestQuery::call, &query};
   runNear(tree_->scene, point, adapter);
 }
@@ -323,11 +333,13 @@ void SpatialIndex::visitNearImpl(const Vec3& centre, double radius, NearThunk th
                                  void* visitor) const noexcept {
   if (!tree_) return;
   // Outside the bounds the float error of the centre could exceed the pad, so the sphere is centred on its
-  // clamped point: every box within reach of the centre is within the same reach of the clamped one.
+  // clamped point. Its radius is that of the part within the bounds: a ball of 10 mm on a flat mesh would
+  // otherwise visit a disc of 10 mm.
   const Vec3 inside = centre.cwiseMax(bounds_.min).cwiseMin(bounds_.max);
-  if (!((inside - centre).norm() <= radius + pad_)) return;
+  const double beyond = (inside - centre).norm();
+  if (!(beyond <= radius + pad_)) return;
   NearQuery query{thunk, visitor};
-  RTCPointQuery point = tree_->pointQuery(inside, radius);
+  RTCPointQuery point = tree_->pointQuery(inside, radiusInside(radius, beyond, pad_));
   runNear(tree_->scene, point, query);
 }
 

@@ -269,6 +269,32 @@ TEST(SpatialIndex, VisitsFewBoxesThatAreFarOff) {
   EXPECT_LE(along(index, Vec3(50.5, 50.5, 1), Vec3(50.5, 50.5, -1)).size(), 16U);
 }
 
+// A ball outside the bounds reaches little of them.
+TEST(SpatialIndex, ABallOnASurfaceVisitsWhatItReaches) {
+  std::vector<Box> boxes;
+  for (int i = 0; i < 10'000; ++i) {
+    const Vec3 corner(i % 100, i / 100, 0);
+    boxes.push_back({corner, corner + Vec3(1, 1, 0)});
+  }
+  const SpatialIndex index = SpatialIndex::build(10'000, [&](std::uint32_t i) { return boxes[i]; });
+  for (const Vec3& centre : {Vec3(50, 50, 40), Vec3(50, 50, -40), Vec3(-40, 50, 0), Vec3(-25, -31, 3)}) {
+    const double radius = std::max(distance({Vec3(0, 0, 0), Vec3(100, 100, 0)}, centre), 39.8) + 0.2;
+    const auto reached = static_cast<std::size_t>(std::count_if(
+        boxes.begin(), boxes.end(), [&](const Box& box) { return distance(box, centre) <= radius; }));
+    ASSERT_GT(reached, 0U);
+    const std::set<std::uint32_t> visited = near(index, centre, radius);
+    EXPECT_LE(visited.size(), 4 * reached + 64) << centre.transpose();
+    for (std::uint32_t i = 0; i < boxes.size(); ++i)
+      EXPECT_TRUE(distance(boxes[i], centre) > radius || visited.contains(i)) << i;
+    int asked = 0;
+    index.visitNearest(centre, radius, [&](std::uint32_t) {
+      ++asked;
+      return radius;
+    });
+    EXPECT_LE(asked, 4 * static_cast<int>(reached) + 64) << centre.transpose();
+  }
+}
+
 TEST(SpatialIndex, SegmentIsCutAtTheAnswerAndTiesAreStillVisited) {
   std::vector<Box> boxes;
   for (int i = 0; i < 200; ++i) boxes.push_back({Vec3(i / 2, -1, -1), Vec3(i / 2, 1, 1)});  // in pairs

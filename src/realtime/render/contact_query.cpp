@@ -78,6 +78,7 @@ void ContactQuery::beginTick(const SceneAtTime& now, const SceneAtTime& before,
   radius_ = toolRadius_;
   overflowed_ = false;
   work_ = 0;
+  facetCasts_ = 0;
   noReserve_ = std::max(0, noReserve_ - 1);
   if (now.scene == before.scene) return;
   ++generation_;
@@ -424,10 +425,25 @@ bool ContactQuery::sameObjects() const noexcept {
 }
 
 bool ContactQuery::castTool(const Facet& f, const Path& path, double latest, CastHit& hit) const noexcept {
+  ++facetCasts_;
   if (!pointTool_) return castBall(f, faces(), path.p, path.d, 1, latest, hit);
   Facet touched = f;
   touched.radius = radiusAt(f);
   return castBall(touched, faces(), path.p, path.d, 1, latest, hit);
+}
+
+const Facet* ContactQuery::gatheredFacet(int object, std::uint32_t triangle) const noexcept {
+  if (keepsFacets_) {
+    const Facet* const found = std::find_if(cache_.begin(), cache_.end(), [&](const Facet& f) {
+      return f.object == object && f.triangle == triangle;
+    });
+    return found != cache_.end() ? found : nullptr;
+  }
+  for (int i = 0; i < cache_.size(); ++i) {
+    const FacetCache::TriangleId& id = cache_.triangle(i);
+    if (id.object == object && id.triangle == triangle) return facetOf(id);
+  }
+  return nullptr;
 }
 
 bool ContactQuery::castAtFacet(const Facet& f, const Vec3& p, const Vec3& g, ObjectHit& hit) const noexcept {
@@ -461,8 +477,9 @@ bool ContactQuery::castGathered(const Path& path, int only, ObjectHit& hit) noex
 
 bool ContactQuery::castAtFacets(const Path& path, int only, ObjectHit& hit) noexcept {
   std::array<const Facet*, FacetCache::kMaxFacets> candidates;
-  const int count = cache_.facetsNearPath(path.p + path.begin * path.d, (path.end - path.begin) * path.d,
-                                          candidates.data());
+  const Vec3 start = path.p + path.begin * path.d;
+  const int count = cache_.facetsNearPath(start, (path.end - path.begin) * path.d, candidates.data());
+  cache_.moveTo(start);
   bool found = false;
   if (only < 0 && planes_ != nullptr) {
     for (const PlacedPlane& plane : *planes_) considerFacet(plane.facet, path, hit, found);
@@ -474,11 +491,15 @@ bool ContactQuery::castAtFacets(const Path& path, int only, ObjectHit& hit) noex
   };
   const auto last = candidates.begin() + count;
   if (std::find(candidates.begin(), last, first) != last) consider(*first);
+  const double length = path.d.norm();
   for (auto f = candidates.begin(); f != last; ++f) {
     if (*f == first) continue;
-    const double before = found ? hit.stop : path.end;
+    const int i = static_cast<int>(*f - cache_.begin());
+    const double latest = found ? hit.stop : path.end;
+    const double touching = (*f)->radius + 2 * (*f)->skin;
+    if (!cache_.isWithin(touching + (latest - path.begin) * length, i)) continue;
     consider(**f);
-    if (found && hit.stop < before) lastBlocker_ = static_cast<int>(*f - cache_.begin());
+    if (found && hit.stop < latest) lastBlocker_ = i;
   }
   return found;
 }
@@ -486,7 +507,8 @@ bool ContactQuery::castAtFacets(const Path& path, int only, ObjectHit& hit) noex
 double ContactQuery::freeOfFaces(const Vec3& p, const Vec3& g, bool closesGaps) noexcept {
   std::array<const Facet*, FacetCache::kMaxFacets> candidates;
   const Vec3 d = g - p;
-  if (!ensureGathered(p, d.norm())) return 0;
+  // Another gather would cost more than a path that examines too many.
+  if (!cache_.covers(p, d.norm()) && !ensureGathered(p, d.norm())) return 0;
   const int count = cache_.facetsNearPath(p, d, candidates.data());
   double free = 1;
   const auto meet = [&](Facet facet) {
@@ -565,15 +587,15 @@ bool ContactQuery::castAtEach(const Path& path, int only, ObjectHit& hit) noexce
   return true;
 }
 
-// The index has no query for a swept ball: gathers along the path from `begin` on, in steps that grow while
-// the path is free and shrink when the storage overflows.
-bool ContactQuery::castInSteps(const Vec3& p, const Vec3& d, double begin, int only,
+// The index has no query for a swept ball: gathers along the path from `begin` to `end`, in steps that grow
+// while the path is free and shrink when the storage overflows.
+bool ContactQuery::castInSteps(const Vec3& p, const Vec3& d, double begin, double end, int only,
                                ObjectHit& hit) noexcept {
   constexpr double kSmallestStep = 1.0 / 64;
   const double length = d.norm();
   double step = keepsFacets_ ? 1.0 : std::min(1.0, std::max(0.125 * radius_ / length, kSmallestStep));
-  while (begin < 1) {
-    step = std::min(step, 1 - begin);
+  while (begin < end) {
+    step = std::min(step, end - begin);
     const double middle = begin + 0.5 * step;
     ensureGathered(p + middle * d, 0.5 * step * length * kWiden);
     if (!cache_.complete() && step > kSmallestStep && !workSpent()) {
@@ -588,15 +610,15 @@ bool ContactQuery::castInSteps(const Vec3& p, const Vec3& d, double begin, int o
   return false;
 }
 
-bool ContactQuery::cast(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept {
+bool ContactQuery::castUpTo(double share, const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept {
   const Vec3 d = g - p;
   double free = 0;
   if (cache_.covers(p, 0)) {
-    free = exitOf(p, d, cache_.centre(), cache_.reach());
+    free = std::min(share, exitOf(p, d, cache_.centre(), cache_.reach()));
     if (castGathered({p, d, 0, free}, -1, hit)) return true;
-    if (free == 1) return false;
+    if (free == share) return false;
   }
-  return castInSteps(p, d, free, -1, hit);
+  return castInSteps(p, d, free, share, -1, hit);
 }
 
 bool ContactQuery::castPast(std::uint64_t passable, const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept {
@@ -613,7 +635,7 @@ bool ContactQuery::castWithinGathered(const Vec3& p, const Vec3& g, ObjectHit& h
 }
 
 bool ContactQuery::castAtObject(int object, const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept {
-  return castInSteps(p, g - p, 0, object, hit);
+  return castInSteps(p, g - p, 0, 1, object, hit);
 }
 
 }  // namespace hapticd::realtime

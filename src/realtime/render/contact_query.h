@@ -130,7 +130,9 @@ class ContactQuery {
 
   /// The first obstacle on the path from p to g, or the end of what was examined; false when the path is
   /// free.
-  bool cast(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept;
+  bool cast(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept { return castUpTo(1, p, g, hit); }
+  /// The same for the first `share` of the path.
+  bool castUpTo(double share, const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept;
   /// The same for the start of the path only: as far as the gathered facets reach.
   bool castWithinGathered(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept;
   /// As cast(), through the objects whose bits are set in `passable`.
@@ -147,6 +149,8 @@ class ContactQuery {
   double radiusAt(const Facet& f) const noexcept {
     return pointTool_ ? std::min(f.radius, 0.5 * kGapTolerance_m) : f.radius;
   }
+  /// The gathered facet of a hit; null when it is not gathered. Valid until the next visit or cast.
+  const Facet* gatheredFacet(int object, std::uint32_t triangle) const noexcept;
   /// Casts the tool against one facet.
   bool castAtFacet(const Facet& f, const Vec3& p, const Vec3& g, ObjectHit& hit) const noexcept;
 
@@ -159,12 +163,14 @@ class ContactQuery {
   scene::TouchableFaces faces() const noexcept { return now_.scene->faces; }
   /// True when objects or facets had to be left out in this tick.
   bool overflowed() const noexcept { return overflowed_; }
+  /// How often the tool was cast against one facet in this tick.
+  int facetCasts() const noexcept { return facetCasts_; }
   /// True when this tick examined kMaxVisits triangles.
   bool workSpent() const noexcept { return work_ >= kMaxVisits * kVisit; }
 
  private:
   static constexpr int kMaxObjects = 64;
-  static constexpr int kMemoBits = 8;
+  static constexpr int kMemoBits = 10;
   static constexpr int kVisit = 16;
   static constexpr int kBoxVisit = 4;
 
@@ -207,7 +213,7 @@ class ContactQuery {
   bool castAtTriangles(const Path& path, int only, ObjectHit& hit) noexcept;
   void considerGathered(int i, const Path& path, int only, ObjectHit& best, bool& found) noexcept;
   bool castAtEach(const Path& path, int only, ObjectHit& hit) noexcept;
-  bool castInSteps(const Vec3& p, const Vec3& d, double begin, int only, ObjectHit& hit) noexcept;
+  bool castInSteps(const Vec3& p, const Vec3& d, double begin, double end, int only, ObjectHit& hit) noexcept;
 
   double toolRadius_;
   bool keepsFacets_;  // see facet_cache.h
@@ -241,6 +247,7 @@ class ContactQuery {
   bool overflowed_ = false;
   int work_ = 0;  // of this tick: kVisit for a triangle, kBoxVisit for one that its box rules out,
                   // 1 for one that is joined to another
+  mutable int facetCasts_ = 0;
   std::uint64_t passable_ = 0;  // objects that the present cast does not meet
   bool pointTool_ = false;      // casts move the centre of the tool
 };

@@ -154,6 +154,11 @@ Vec3 nearestPointOf(const Facet& f, const Vec3& x) noexcept {
   return x - f.normal * f.normal.dot(ax);
 }
 
+bool isTouchable(const Facet& f, TouchableFaces faces, const Vec3& p) noexcept {
+  Heights h;
+  return touchableSide(f, faces, p, Vec3::Zero(), 0, h);
+}
+
 bool castBall(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d, double limit, double latest,
               CastHit& out) noexcept {
   const double standoff = f.radius + f.skin;

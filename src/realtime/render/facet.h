@@ -38,6 +38,9 @@ struct CastHit {
 /// is wide.
 bool makeFacet(const scene::Corners& corners, double skin, Facet& facet) noexcept;
 
+/// Whether the facet may block paths that begin at p: not from behind a side that can not be touched.
+bool isTouchable(const Facet& f, scene::TouchableFaces faces, const Vec3& p) noexcept;
+
 /// Where the facet blocks the centre's path p + t d, t in [0, limit]. False when it does not, or only beyond
 /// `latest`.
 bool castBall(const Facet& f, scene::TouchableFaces faces, const Vec3& p, const Vec3& d, double limit,

@@ -29,6 +29,8 @@ void FacetCache::add(const Facet& facet, bool deforming) noexcept {
   facets_[i] = facet;
   supportPlanes_[i] = {facet.normal, facet.normal.dot(facet.a)};
   const Vec3 middle = 0.5 * (facet.a + facet.b);  // of the longest edge
+  distances_[i] = 0;
+  measured_[i] = -std::numeric_limits<double>::infinity();
   bounds_[i] = {middle,
                 std::sqrt(std::max((facet.a - middle).squaredNorm(), (facet.c - middle).squaredNorm()))};
   maxSkin_ = std::max(maxSkin_, facet.skin);
@@ -63,6 +65,16 @@ int FacetCache::facetsNearPath(const Vec3& p, const Vec3& d, const Facet** found
              : 0;
   }
   return n;
+}
+
+bool FacetCache::isWithin(double distance, int k) noexcept {
+  const auto i = static_cast<std::size_t>(k);
+  if (distances_[i] > distance + travel_) return false;
+  if (distances_[i] - 2 * measured_[i] <= distance - travel_) return true;
+  const double here = (toolPosition_ - nearestPointOf(facets_[i], toolPosition_)).norm();
+  distances_[i] = here + travel_;
+  measured_[i] = travel_;
+  return here <= distance;
 }
 
 void FacetCache::moveTo(const Vec3& p) noexcept {

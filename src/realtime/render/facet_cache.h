@@ -51,7 +51,7 @@ class FacetCache {
   const Facet* begin() const noexcept { return facets_.data(); }
   const Facet* end() const noexcept { return facets_.data() + count_; }
 
-  /// Ball tool: its present position.
+  /// The present position of the tool.
   void moveTo(const Vec3& p) noexcept;
   const TriangleId& triangle(int i) const noexcept { return triangles_[static_cast<std::size_t>(i)]; }
   /// The next triangle from i on whose lower bound is within `distance` of the tool; size() when there is
@@ -63,6 +63,8 @@ class FacetCache {
   double refine(int i, const Vec3& foot, const Vec3& d) noexcept;
   /// Marks entry i as unreachable.
   void exclude(int i) noexcept;
+  /// Point tool: whether facet i may be within `distance` of the present position. Keeps how far it is.
+  bool isWithin(double distance, int i) noexcept;
   /// Point tool: all facets that the path from p to p + d may reach. `found` has room for kMaxFacets. Returns
   /// how many.
   int facetsNearPath(const Vec3& p, const Vec3& d, const Facet** found) const noexcept;
@@ -91,6 +93,7 @@ class FacetCache {
   std::array<SupportPlane, kMaxTriangles> supportPlanes_;
   std::array<Facet, kMaxFacets> facets_;
   std::array<Bound, kMaxFacets> bounds_;
+  std::array<double, kMaxFacets> measured_;  // the travel when the distance was
   Vec3 toolPosition_ = Vec3::Zero();
   double travel_ = 0;                            // of the tool since restart()
   std::array<double, kMaxTriangles> distances_;  // lower bounds, plus the travel at that time

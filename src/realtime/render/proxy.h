@@ -76,6 +76,9 @@ class Proxy {
   /// Share of the contact force that is felt, 1 … 0: less than 1 where the work of a tick does not suffice.
   double feltShare() const noexcept { return share_; }
   PlacedPlanes& planes() noexcept { return planes_; }
+  /// What the last tick did: casts, and how often they tried one facet.
+  int casts() const noexcept { return casts_; }
+  int facetCasts() const noexcept { return query_.facetCasts(); }
 
  private:
   struct ActiveSet {
@@ -83,6 +86,7 @@ class Proxy {
     int count = 0;
   };
 
+  struct TouchedFace;
   struct DescentDirections;
 
   // The faces that pushed the proxy in this tick.
@@ -132,8 +136,12 @@ class Proxy {
   void collectTouchedFaces(DescentDirections& descent) noexcept;
   void findDescentDirections(const Vec3& pull, const ActiveSet& active,
                              DescentDirections& descent) const noexcept;
+  void prepareStart(TouchedFace& touched, const Vec3& start) const noexcept;
+  static bool isSurelyBlocked(DescentDirections& descent, const Vec3& direction, const Vec3& end) noexcept;
   double freeShare(DescentDirections& descent, const Vec3& from, const Vec3& to,
                    double enough) const noexcept;
+  bool isFree(DescentDirections& descent, const Vec3& from, const Vec3& to, double share,
+              const Vec3& start) noexcept;
   void findConstraints(const Vec3& hip, ActiveSet& active) noexcept;
   Projection nearestTo(const Vec3& target, const ActiveSet& active) const noexcept;
   bool restoreConstraints(const Vec3& hip, ActiveSet& active) const noexcept;

@@ -32,18 +32,48 @@ double shareWithin(double distance, const Vec3& x, const Vec3& d) {
 
 }  // namespace
 
+// A face, and the place where the proxy touches it.
+struct Proxy::TouchedFace {
+  Facet face;  // a copy: later casts may gather others
+  Vec3 foot = Vec3::Zero();
+  Vec3 away = Vec3::Zero();  // unit, from the foot to the proxy
+  double blocked2 = 0;       // see prepareStart()
+
+  /// Whether the face surely stops a path to `end`: the distance from it is convex along the path.
+  bool surelyBlocks(const Vec3& end) const {
+    return (end - nearestPointOf(face, end)).squaredNorm() < blocked2;
+  }
+};
+
 // The faces that the proxy touches, and the directions in which it could come nearer to its target.
 struct Proxy::DescentDirections {
   static constexpr int kMaxFaces = 32;
+  static constexpr int kMaxLearned = 16;
   static constexpr int kMaxDirections = 4 * kMaxFaces + 9;
 
-  std::array<Facet, kMaxFaces> faces;  // copies: later casts may gather others
+  std::array<TouchedFace, kMaxFaces + kMaxLearned> faces;
+  std::array<std::uint8_t, kMaxFaces + kMaxLearned> order{};  // of the faces
   int faceCount = 0;
   int lastBlocker = 0;
+  int learned = 0;  // faces after those, which blocked a path and are not among them
   std::array<Vec3, kMaxDirections> directions;
   int count = 0;
   Vec3 outward = Vec3::Zero();  // sum of the normals
 
+  int blockers() const { return faceCount + learned; }
+  TouchedFace& operator[](int i) { return faces[order[static_cast<std::size_t>(i)]]; }
+  TouchedFace& insert(int i) {
+    const bool full = faceCount == kMaxFaces;
+    const std::uint8_t place = full ? order[kMaxFaces - 1] : static_cast<std::uint8_t>(faceCount++);
+    std::copy_backward(order.begin() + i, order.begin() + faceCount - 1, order.begin() + faceCount);
+    order[static_cast<std::size_t>(i)] = place;
+    return faces[place];
+  }
+  TouchedFace& learn() {
+    const int place = kMaxFaces + learned++;
+    order[static_cast<std::size_t>(blockers() - 1)] = static_cast<std::uint8_t>(place);
+    return faces[static_cast<std::size_t>(place)];
+  }
   void add(const Vec3& direction, double shortest) {
     if (count < kMaxDirections && direction.norm() > shortest) {
       directions[static_cast<std::size_t>(count++)] = direction;
@@ -68,14 +98,13 @@ void Proxy::collectTouchedFaces(DescentDirections& descent) noexcept {
   query_.forEachGathered(position_, farthest, [&](const Facet& f) {
     const double touching = f.radius + slack;
     if (std::abs(f.normal.dot(position_ - f.a)) > touching) return;
-    if ((position_ - nearestPointOf(f, position_)).norm() > touching) return;
-    if (descent.faceCount == DescentDirections::kMaxFaces && before(descent.faces.back(), f)) return;
-    int k = descent.faceCount < DescentDirections::kMaxFaces ? descent.faceCount++
-                                                             : DescentDirections::kMaxFaces - 1;
-    for (; k > 0 && before(f, descent.faces[static_cast<std::size_t>(k - 1)]); --k) {
-      descent.faces[static_cast<std::size_t>(k)] = descent.faces[static_cast<std::size_t>(k - 1)];
-    }
-    descent.faces[static_cast<std::size_t>(k)] = f;
+    const bool full = descent.faceCount == DescentDirections::kMaxFaces;
+    if (full && before(descent[descent.faceCount - 1].face, f)) return;
+    const Vec3 foot = nearestPointOf(f, position_);
+    if ((position_ - foot).norm() > touching) return;
+    int k = full ? DescentDirections::kMaxFaces - 1 : descent.faceCount;
+    while (k > 0 && before(f, descent[k - 1].face)) --k;
+    descent.insert(k) = {f, foot, (position_ - foot).normalized(), 0};
   });
 }
 
@@ -84,11 +113,10 @@ void Proxy::collectTouchedFaces(DescentDirections& descent) noexcept {
 void Proxy::findDescentDirections(const Vec3& pull, const ActiveSet& active,
                                   DescentDirections& descent) const noexcept {
   const double shortest = kMinDescent * pull.norm();
-  const Vec3 p = position_;
   for (int i = 0; i < descent.faceCount; ++i) {
-    const Facet& f = descent.faces[static_cast<std::size_t>(i)];
-    const Vec3 foot = nearestPointOf(f, p);
-    const Vec3 n = (p - foot).normalized();
+    const Facet& f = descent[i].face;
+    const Vec3& foot = descent[i].foot;
+    const Vec3& n = descent[i].away;
     descent.outward += n;
     descent.add(pull - n * n.dot(pull), shortest);
     const std::array<Vec3, 3> corners{f.a, f.b, f.c};
@@ -107,11 +135,48 @@ void Proxy::findDescentDirections(const Vec3& pull, const ActiveSet& active,
       if (along.norm() > 0) descent.add(along * (along.dot(pull) / along.squaredNorm()), shortest);
     }
   }
-  std::sort(descent.directions.begin(), descent.directions.begin() + descent.count,
-            [](const Vec3& a, const Vec3& b) {
-              return std::tuple(-a.squaredNorm(), a.x(), a.y(), a.z()) <
-                     std::tuple(-b.squaredNorm(), b.x(), b.y(), b.z());
-            });
+  const auto end = descent.directions.begin() + descent.count;
+  std::sort(descent.directions.begin(), end, [](const Vec3& a, const Vec3& b) {
+    return std::tuple(-a.squaredNorm(), a.x(), a.y(), a.z()) <
+           std::tuple(-b.squaredNorm(), b.x(), b.y(), b.z());
+  });
+  // Two faces share an edge.
+  descent.count = static_cast<int>(std::unique(descent.directions.begin(), end) - descent.directions.begin());
+}
+
+// Paths from `start` that end nearer to the face than a radius are not free. This holds only where the tool
+// does not overlap the face at the start, and is not behind it.
+void Proxy::prepareStart(TouchedFace& touched, const Vec3& start) const noexcept {
+  const Facet& f = touched.face;
+  const double height = touched.away.dot(start - touched.foot);
+  const double blocked = std::max(0.0, f.radius - 0.5 * f.skin);
+  const bool holds = height > f.radius + 0.75 * f.skin && isTouchable(f, query_.faces(), start);
+  touched.blocked2 = holds ? blocked * blocked : 0;
+}
+
+// Whether a touched face surely stops a path from the prepared start on its way to `end`.
+bool Proxy::isSurelyBlocked(DescentDirections& descent, const Vec3& direction, const Vec3& end) noexcept {
+  // The face that the path enters most steeply often stops it, and the one that stopped the last path.
+  int steepest = 0;
+  double slope = 0;
+  for (int i = 0; i < descent.blockers(); ++i) {
+    const TouchedFace& touched = descent[i];
+    if ((end - touched.foot).squaredNorm() < touched.blocked2) return true;
+    const double s = touched.away.dot(direction);
+    if (s >= slope) continue;
+    slope = s;
+    steepest = i;
+  }
+  const auto blocks = [&](int i) {
+    if (i >= descent.blockers() || !descent[i].surelyBlocks(end)) return false;
+    descent.lastBlocker = i;
+    return true;
+  };
+  if (blocks(steepest) || blocks(descent.lastBlocker)) return true;
+  for (int i = 0; i < descent.blockers(); ++i) {
+    if (blocks(i)) return true;
+  }
+  return false;
 }
 
 // The share, 0 … 1, of the path that the touched faces leave free; 0 when it is less than `enough`.
@@ -119,19 +184,28 @@ double Proxy::freeShare(DescentDirections& descent, const Vec3& from, const Vec3
                         double enough) const noexcept {
   double free = 1;
   ObjectHit hit;
-  const auto meet = [&](int i) {
-    if (!query_.castAtFacet(descent.faces[static_cast<std::size_t>(i)], from, to, hit)) return true;
-    free = std::min(free, hit.stop);
-    if (free >= enough) return true;
-    descent.lastBlocker = i;
-    return false;
-  };
-  // The face that ended the last path often ends this one.
-  if (descent.lastBlocker < descent.faceCount && !meet(descent.lastBlocker)) return 0;
-  for (int i = 0; i < descent.faceCount; ++i) {
-    if (i != descent.lastBlocker && !meet(i)) return 0;
+  for (int i = 0; i < descent.blockers(); ++i) {
+    if (query_.castAtFacet(descent[i].face, from, to, hit)) free = std::min(free, hit.stop);
+    if (free < enough) return 0;
   }
   return free;
+}
+
+// Whether the tool can take the first `share` of the path. A face that is in the way and is not among the
+// touched ones joins them: it often ends the next paths, too.
+bool Proxy::isFree(DescentDirections& descent, const Vec3& from, const Vec3& to, double share,
+                   const Vec3& start) noexcept {
+  ObjectHit hit;
+  ++casts_;
+  if (!query_.castUpTo(share, from, to, hit)) return true;
+  if (hit.unexamined || descent.learned == DescentDirections::kMaxLearned) return false;
+  const Facet* const blocker = query_.gatheredFacet(hit.object, hit.triangle);
+  if (blocker == nullptr) return false;
+  const Vec3 foot = nearestPointOf(*blocker, position_);
+  TouchedFace& touched = descent.learn();
+  touched = {*blocker, foot, (position_ - foot).normalized(), 0};
+  prepareStart(touched, start);
+  return false;
 }
 
 // The half-spaces hold the proxy, but some of their faces may end at this corner, with free space beyond.
@@ -153,15 +227,18 @@ bool Proxy::escapeCorner(const Vec3& target, const ActiveSet& active) noexcept {
   for (const double lift : {first, kLifts[1] * skin}) {
     const Vec3 start = position_ + lift * descent.outward.normalized();
     if (freeShare(descent, position_, start, 1) < 1) continue;
+    for (int i = 0; i < descent.blockers(); ++i) prepareStart(descent[i], start);
+    bool lifted = false;
     for (int i = 0; i < descent.count && casts_ < kMaxCasts; ++i) {
       const Vec3& direction = descent.directions[static_cast<std::size_t>(i)];
       const double needed = shareWithin(enough, target - start, direction);
-      if (needed > 1) continue;
+      if (needed > 1 || isSurelyBlocked(descent, direction, start + needed * direction)) continue;
       const double free = freeShare(descent, start, start + direction, needed);
       if (!((target - start - free * direction).norm() < enough)) continue;
+      if (!lifted && !isFree(descent, position_, start, 1, start)) break;
+      lifted = true;
+      if (needed > 0 && !isFree(descent, start, start + direction, needed, start)) continue;
       ObjectHit hit;
-      ++casts_;
-      if (query_.cast(position_, start, hit)) break;
       ++casts_;
       const Vec3 end = start + (query_.cast(start, start + direction, hit) ? hit.stop : 1.0) * direction;
       if (!((target - end).norm() < enough)) continue;

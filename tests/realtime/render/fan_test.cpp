@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include "realtime/render/proxy.h"
 #include "scene_fixture.h"
 
 namespace hapticd::realtime::fixture {
@@ -93,6 +94,44 @@ TEST_P(FanTest, is_felt_as_the_round_surface_and_spends_no_tick) {
   }
   EXPECT_EQ(spent, 0);
   EXPECT_EQ(lost, 0);
+}
+
+class Pit : public testing::TestWithParam<std::tuple<int, double>> {};
+INSTANTIATE_TEST_SUITE_P(, Pit,
+                         testing::Combine(testing::Values(32, 63, 100, 255, 1000),
+                                          testing::Values(0.0, 0.0005, 0.002)));
+
+// The proxy rests on all faces at once, and none of them lets it out.
+TEST_P(Pit, takes_few_casts) {
+  const auto& [count, radius] = GetParam();
+  const Shape pit{"pit", -0.008};
+  SceneFixture scene;
+  scene.setWorldUnitsPerMetre(1000);
+  scene.add(fanOf(pit, count), surface(1000));
+  const auto snapshot = scene.snapshot();
+  const auto proxy = std::make_unique<Proxy>(RenderOptions{.toolRadius_m = radius});
+  Nanos now = 0;
+  int casts = 0;
+  int facetCasts = 0;
+  const auto at = [&](const Vec3& hip) {
+    std::uint32_t status = 0;
+    proxy->follow({snapshot.get(), now += kTick}, hip, 1e-3, status);
+    casts = std::max(casts, proxy->casts());
+    facetCasts = std::max(facetCasts, proxy->facetCasts());
+  };
+  std::mt19937 random(5);
+  std::normal_distribution<double> tremor(0, 2e-6);
+  for (double above = 0.003 + radius; above > -0.0015; above -= 50e-6)
+    at({1e-6, -2e-6, pit.height_m + above});
+  for (int i = 0; i < 800; ++i) {
+    const double a = 2 * M_PI * i / 400;
+    const double reach = i < 200 ? 20e-6 : 1e-3;
+    at({reach * std::sin(a) + tremor(random), 0.3 * reach * std::sin(3 * a) + tremor(random),
+        pit.height_m - 0.0015});
+  }
+  EXPECT_GT(proxy->contactSet().count, 0);
+  EXPECT_LE(casts, 30);
+  EXPECT_LE(facetCasts, 6000);
 }
 
 }  // namespace

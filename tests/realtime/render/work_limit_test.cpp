@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <random>
 
+#include "meshes.h"
 #include "scene_fixture.h"
 
 namespace hapticd::realtime::fixture {
@@ -71,6 +72,21 @@ TEST_P(WorkLimit, friction_fades_out_with_the_force) {
     EXPECT_NEAR(r.force_N.x(), -share * kFriction, 0.01) << hand.hip().x() << ", " << spent << " spent";
   });
   EXPECT_GT(spent, 80);
+}
+
+// Most of the mesh is as far from the centre of the ball as the part that it touches, within a share.
+TEST(WorkLimitOfABall, is_not_spent_on_a_fine_flat_mesh) {
+  SceneFixture fixture;
+  fixture.add(heightField(0.015, 300, [](double, double) { return 0.0; }), surface(1000));
+  constexpr double kRadius_m = 0.01;
+  Hand hand(fixture.snapshot(), {.toolRadius_m = kRadius_m});
+  int spent = 0;
+  hand.at(Vec3(1e-5, 2e-5, kRadius_m + 0.001));
+  const Rendering& r = hand.to(Vec3(1e-5, 2e-5, kRadius_m - 0.001), 0.05, [&](const Rendering& now) {
+    spent += (now.status & kRenderWorkLimit) != 0 ? 1 : 0;
+  });
+  EXPECT_LE(spent, 2);
+  EXPECT_NEAR(r.force_N.z(), 1.0, 1e-3);
 }
 
 }  // namespace
