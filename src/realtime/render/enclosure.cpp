@@ -30,7 +30,7 @@ int crossing(const scene::Corners& t, const Vec3& p, const Vec3& d) noexcept {
   return determinant < 0 ? 1 : -1;
 }
 
-// A test in the frame of the object.
+// A test in the frame of the object, where a mirrored placement does not reverse the winding.
 class Test {
  public:
   Test(const PlacedObject& object, scene::TouchableFaces faces, Nanos now, const Vec3& p,
@@ -57,7 +57,6 @@ class Test {
       sum += crossing(mesh_.corners(triangle, now_), p_, d);
       return 1.0;
     });
-    if (object_.mirrored) sum = -sum;
     const bool behind = faces_ == scene::TouchableFaces::front  ? sum > 0
                         : faces_ == scene::TouchableFaces::back ? sum < 0
                                                                 : sum != 0;
