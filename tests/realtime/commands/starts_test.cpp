@@ -216,6 +216,32 @@ TEST_P(Starts, mesh_that_starts_to_deform_takes_the_hand_along) {
   }
 }
 
+// Vertices that leap under a hand in contact.
+TEST_P(Starts, touched_mesh_that_leaps_lets_the_hand_go) {
+  const auto shifted = [&](const Vec3& by_mm) {
+    std::vector<Vec3f> vertices = plate(std::get<0>(GetParam()));
+    for (Vec3f& v : vertices) v += by_mm.cast<float>();
+    return vertices;
+  };
+  for (const Vec3& by_mm : {Vec3(0, 200, 0), Vec3(300, 100, 0), Vec3(0, 2000, 0)}) {
+    loop.send(scene::SetVertices{0, 0, shifted(Vec3(0, -30, 0))});
+    loop.rest(hip, toNanos(0.5));
+    loop.send(scene::SetVertices{0, 0, shifted(Vec3(0, -10, 0))});
+    loop.rest(hip, toNanos(0.3));
+    loop.send(scene::SetVertices{0, 0, shifted(Vec3(0, 3, 0))});
+    loop.rest(hip, toNanos(0.3));
+    ASSERT_TRUE(feels(0.003 - gap_m)) << by_mm.transpose();
+    loop.send(scene::SetVertices{0, 0, shifted(by_mm)});
+    std::uint32_t status = 0;
+    loop.rest(hip, 100 * kMs, [&] {
+      status |= loop.out.status;
+      EXPECT_LE(loop.out.force_N.norm(), 0.030 * kStiffness_N_per_m + 0.01) << by_mm.transpose();
+    });
+    EXPECT_EQ(loop.out.force_N.norm(), 0) << by_mm.transpose();
+    EXPECT_NE(status & (kRenderReleased | kRenderGeometryJump), 0U) << by_mm.transpose();
+  }
+}
+
 // Frames in quick succession: a frame's way takes at least its distance at 1 m/s.
 TEST_P(Starts, quick_frames_of_a_mesh_do_not_swallow_the_hand) {
   const auto shifted = [&](double by_mm) {
