@@ -216,6 +216,34 @@ TEST_P(Starts, mesh_that_starts_to_deform_takes_the_hand_along) {
   }
 }
 
+// A stream of shapes whose face passes the hand between two ticks, in one of which a new shape arrives.
+TEST_P(Starts, shape_that_follows_another_passes_the_hand) {
+  const auto shifted = [&](double by_mm) {
+    std::vector<Vec3f> vertices = plate(std::get<0>(GetParam()));
+    for (Vec3f& v : vertices) v.y() += static_cast<float>(by_mm);
+    return vertices;
+  };
+  constexpr double kSpeed_m_per_s = 0.4;
+  constexpr double kAbove_m = 0.003;
+  for (int meeting = 0; meeting < 30; ++meeting) {
+    // The face is that far below the tool when the second shape arrives, and meets it before the next tick.
+    const double below = kSpeed_m_per_s * 1e-3 * (meeting + 0.5) / 30;
+    loop.send(scene::SetVertices{0, 0, shifted(-30)});
+    loop.rest(hip, toNanos(0.3));
+    loop.send(scene::SetVertices{0, 0, shifted(1e3 * (gap_m - below - kSpeed_m_per_s * 0.015))});
+    loop.rest(hip, toNanos(0.3));
+    loop.send(scene::SetVertices{0, 0, shifted(1e3 * (gap_m - below + kSpeed_m_per_s * 0.001))});
+    loop.rest(hip, 15 * kMs);
+    ASSERT_EQ(loop.out.force_N.norm(), 0);
+    loop.now += kMs;
+    loop.send(scene::SetVertices{0, 0, shifted(1e3 * (gap_m + kAbove_m))});
+    loop.publish();
+    loop.render(hip, kMs);
+    loop.rest(hip, 100 * kMs);
+    EXPECT_TRUE(feels(kAbove_m)) << meeting;
+  }
+}
+
 // Vertices that leap under a hand in contact.
 TEST_P(Starts, touched_mesh_that_leaps_lets_the_hand_go) {
   const auto shifted = [&](const Vec3& by_mm) {
