@@ -216,6 +216,51 @@ TEST_P(Starts, mesh_that_starts_to_deform_takes_the_hand_along) {
   }
 }
 
+// A floor of two plates that turns about their seam, where the hand presses. Each plate has an origin and a
+// size of its own.
+TEST(Assembly, parts_that_turn_together_leave_no_gap) {
+  for (const double radius : {0.0, 0.002}) {
+    for (const double angle : {0.03, 0.1, -0.2, 0.3}) {
+      Loop loop({.toolRadius_m = radius});
+      const Vec3 origins_mm[] = {{60, 30, 10}, {-50, -40, -20}};
+      const float ends_mm[] = {-10, 45};
+      for (int id = 0; id < 2; ++id) {
+        std::vector<Vec3f> plate = sheetTriples(40);
+        for (Vec3f& v : plate) v.x() = v.x() * ends_mm[id] < 0 ? 0 : ends_mm[id];
+        for (Vec3f& v : plate) v -= origins_mm[id].cast<float>();
+        loop.add(id, plate);
+      }
+      const auto place = [&](double turn, double up_mm) {
+        geometry::Mat3 rotation(Eigen::AngleAxisd(turn, Vec3::UnitZ()));
+        loop.send(scene::BeginBatch{});
+        for (int id = 0; id < 2; ++id) {
+          const Vec3 at = rotation * origins_mm[id] + Vec3(0, up_mm, 0);
+          scene::SetTransform pose{id, {}};
+          Eigen::Map<geometry::Mat4> matrix(pose.matrix.data());
+          matrix.setIdentity();
+          matrix.topLeftCorner<3, 3>() = rotation;
+          matrix.topRightCorner<3, 1>() = at;
+          loop.send(pose);
+        }
+        loop.send(scene::CommitBatch{});
+        loop.publish();
+      };
+      place(0, 0);
+      const Vec3 above(0, 0.003 + radius, 0.003);
+      loop.rest(above, toNanos(0.5));
+      const Vec3 pressed = above - Vec3(0, 0.006, 0);
+      loop.to(pressed);
+      loop.rest(pressed, toNanos(0.2));
+      ASSERT_NEAR(loop.out.force_N.norm(), 0.003 * kStiffness_N_per_m, 0.01);
+      place(angle, 2);
+      loop.rest(pressed, toNanos(0.2));
+      EXPECT_NEAR(loop.out.force_N.norm(), kStiffness_N_per_m * (radius + (0.005 - radius) * std::cos(angle)),
+                  0.03)
+          << angle << ' ' << radius;
+    }
+  }
+}
+
 // A stream of shapes whose face passes the hand between two ticks, in one of which a new shape arrives.
 TEST_P(Starts, shape_that_follows_another_passes_the_hand) {
   const auto shifted = [&](double by_mm) {
