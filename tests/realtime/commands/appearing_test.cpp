@@ -1,5 +1,6 @@
 // Objects that appear around a HIP never grip it: they are felt once the HIP has left them.
 #include <cmath>
+#include <random>
 
 #include "loop.h"
 
@@ -219,6 +220,30 @@ TEST_P(Appearing, open_surfaces_are_felt_at_once) {
   EXPECT_EQ(loop.out.status, 0U);
   loop.to({0.001, -0.012 + GetParam(), 0.002});
   EXPECT_NEAR(loop.out.force_N.y(), 1, 0.01) << "on the bottom of the cup";
+}
+
+// A pocket is open on one side only, which is 7 % of what the hand in it sees.
+TEST_P(Appearing, pockets_in_any_position_are_felt_at_once) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  for (int k = 0; k < 200; ++k) {
+    const geometry::Mat3 turn = geometry::Quat(normal(random), normal(random), normal(random), normal(random))
+                                    .normalized()
+                                    .toRotationMatrix();
+    std::vector<Vec3f> pocket = boxTriples(Vec3(-10, -18, -10), Vec3(10, 18, 10));
+    pocket.erase(pocket.begin() + 18, pocket.begin() + 24);  // without its top
+    for (Vec3f& v : pocket) v = (turn * v.cast<double>()).cast<float>();
+    loop.send(scene::ResetScene{});
+    loop.send(scene::SetObjectNumber{1});
+    const Vec3 inside(0.0001, 0.0007, 0.0003);
+    loop.rest(inside, toNanos(0.1));
+    loop.add(0, pocket);
+    loop.rest(inside, toNanos(0.1));
+    EXPECT_EQ(loop.out.status, 0U) << k;
+    loop.to(turn * Vec3(0.001, -0.020 + GetParam(), 0.002));
+    EXPECT_NEAR((turn.transpose() * loop.out.force_N).y(), 1, 0.01) << k;
+    loop.to(inside);
+  }
 }
 
 // New triangles of a touched mesh: the proxy is outside, although the HIP is inside.
