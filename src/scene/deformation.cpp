@@ -70,7 +70,7 @@ void Deformation::restart() {
   *this = {};
 }
 
-// Boxes cover the rest of the old trajectory and all of the new one.
+// The rest of the old trajectory and all of the new one.
 void Deformation::sweep(const MeshGeometry& old, const std::vector<Vec3f>& target, Nanos now) {
   const auto count = static_cast<Eigen::Index>(3 * target.size());
   sweep_.lower.resize(3 * target.size() + 1);
@@ -87,10 +87,26 @@ void Deformation::sweep(const MeshGeometry& old, const std::vector<Vec3f>& targe
     lower = a.min(b);
     upper = a.max(b);
   }
+  leaveOutLoneVertices();
+}
+
+void Deformation::leaveOutLoneVertices() {
   for (const std::uint32_t i : lone_) {
-    lower.segment<3>(3 * Eigen::Index{i}).setConstant(std::numeric_limits<float>::max());
-    upper.segment<3>(3 * Eigen::Index{i}).setConstant(std::numeric_limits<float>::lowest());
+    std::fill_n(sweep_.lower.begin() + 3 * std::ptrdiff_t{i}, 3, std::numeric_limits<float>::max());
+    std::fill_n(sweep_.upper.begin() + 3 * std::ptrdiff_t{i}, 3, std::numeric_limits<float>::lowest());
   }
+}
+
+// The tick before saw the old shape at any place of its trajectory: boxes cover all of that, too.
+void Deformation::coverTrajectory(const MeshGeometry& old) {
+  if (!old.target) return;
+  const auto count = static_cast<Eigen::Index>(sweep_.lower.size() - 1);
+  Eigen::Map<Eigen::ArrayXf> lower(sweep_.lower.data(), count);
+  Eigen::Map<Eigen::ArrayXf> upper(sweep_.upper.data(), count);
+  const Eigen::Map<const Eigen::ArrayXf> from(flat(*old.vertices), count);
+  lower = lower.min(from);
+  upper = upper.max(from);
+  leaveOutLoneVertices();
 }
 
 double Deformation::Moves::add(double move, Nanos now) {
@@ -149,6 +165,8 @@ std::shared_ptr<MeshGeometry> Deformation::next(std::shared_ptr<MeshGeometry> ol
   mesh->topology = old->topology;
   mesh->triangles = old->triangles;
   sweep(*old, *target, clock());
+  const double move = longestMove();
+  coverTrajectory(*old);
   mesh->index = indexOver(triangles);
   mesh->target = std::move(target);
   mesh->before = old->target ? old->target : old->vertices;
@@ -162,7 +180,6 @@ std::shared_ptr<MeshGeometry> Deformation::next(std::shared_ptr<MeshGeometry> ol
     mesh->vertices = mesh->before;
   }
   mesh->morphBegin = begin;
-  const double move = longestMove();
   mesh->shape = old->shape + 1;
   mesh->recentMove = moves_.add(move, begin);
   const Nanos shortest = std::max<Nanos>(1'000'000, pace.shortest(move));

@@ -64,6 +64,8 @@ class Deformation {
 
   void sweep(const MeshGeometry& old, const std::vector<Vec3f>& target, Nanos now);
   double longestMove() const;
+  void coverTrajectory(const MeshGeometry& old);
+  void leaveOutLoneVertices();
   bool spareIsFree() const;
   SpatialIndex indexOver(const std::shared_ptr<const std::vector<Triangle>>& triangles);
 

@@ -68,11 +68,24 @@ Motion Motion::between(const Affine& from, const Affine& to, Nanos begin, Nanos 
   if (!sameLinear(from, to)) {
     motion.fromFactors_ = factorise(from);
     motion.toFactors_ = factorise(to);
+    motion.frameFrom_ = from.translation();
+    motion.frameTo_ = to.translation();
   }
   motion.begin_ = begin;
   motion.end_ = end;
   motion.jumps_ = jumps;
   return motion;
+}
+
+Motion& Motion::with(const Motion& leader) noexcept {
+  if (sameLinear(from_, to_) || sameLinear(leader.from_, leader.to_)) return *this;
+  led_ = true;
+  T_leader_object_ = leader.from_.inverse() * from_;
+  fromFactors_ = leader.fromFactors_;
+  toFactors_ = leader.toFactors_;
+  frameFrom_ = leader.frameFrom_;
+  frameTo_ = leader.frameTo_;
+  return *this;
 }
 
 Affine Motion::at(Nanos now) const noexcept {
@@ -85,12 +98,13 @@ Affine Motion::atShare(double s) const noexcept {
   Affine t;
   if (sameLinear(from_, to_)) {
     t.linear() = from_.linear();
-  } else {
-    const geometry::Mat3 stretch = (1 - s) * fromFactors_.stretch + s * toFactors_.stretch;
-    t.linear() = fromFactors_.rotation.slerp(s, toFactors_.rotation).toRotationMatrix() * stretch;
+    t.translation() = (1 - s) * from_.translation() + s * to_.translation();
+    return t;
   }
-  t.translation() = (1 - s) * from_.translation() + s * to_.translation();
-  return t;
+  const geometry::Mat3 stretch = (1 - s) * fromFactors_.stretch + s * toFactors_.stretch;
+  t.linear() = fromFactors_.rotation.slerp(s, toFactors_.rotation).toRotationMatrix() * stretch;
+  t.translation() = (1 - s) * frameFrom_ + s * frameTo_;
+  return led_ ? t * T_leader_object_ : t;
 }
 
 // The difference of two placements is affine in the point, so that its length is largest at a corner.
@@ -135,8 +149,9 @@ geometry::Box Motion::sweep(const geometry::Box& box) const {
   for (int i = 0; i < 8; ++i) {
     const geometry::Vec3 p((i & 1) != 0 ? box.max.x() : box.min.x(), (i & 2) != 0 ? box.max.y() : box.min.y(),
                            (i & 4) != 0 ? box.max.z() : box.min.z());
-    const geometry::Vec3 a = fromFactors_.stretch * p;
-    const geometry::Vec3 b = toFactors_.stretch * p;
+    const geometry::Vec3 inFrame = T_leader_object_ * p;
+    const geometry::Vec3 a = fromFactors_.stretch * inFrame;
+    const geometry::Vec3 b = toFactors_.stretch * inFrame;
     leave = std::max(leave, angle * angle * std::max(a.norm(), b.norm()) + 2 * angle * (b - a).norm());
   }
   swept.min.array() -= leave / 8;

@@ -26,6 +26,10 @@ class Motion {
     return *this;
   }
 
+  /// What a leader moves in the same time from where this starts to where it ends, this moves as one with it:
+  /// the distances between both stay, or scale, all the way.
+  Motion& with(const Motion& leader) noexcept;
+
   /// World from object (world units) at time `now`.
   Affine at(Nanos now) const noexcept;
   /// True while the placement still changes after `now`.
@@ -53,8 +57,13 @@ class Motion {
   Affine before_ = Affine::Identity();  // the pose before: the origin, or farther on the old way
   Affine from_ = Affine::Identity();
   Affine to_ = Affine::Identity();
+  // Of the frame that turns and stretches: the object's own or its leader's.
   Factors fromFactors_;
   Factors toFactors_;
+  geometry::Vec3 frameFrom_ = geometry::Vec3::Zero();
+  geometry::Vec3 frameTo_ = geometry::Vec3::Zero();
+  bool led_ = false;
+  Affine T_leader_object_ = Affine::Identity();
   Nanos begin_ = 0;
   Nanos end_ = 0;
   std::uint32_t jumps_ = 0;

@@ -1,5 +1,6 @@
 // From edited objects to the list and the index that a snapshot shows.
 #include <algorithm>
+#include <utility>
 
 #include "base/time.h"
 #include "scene/object_table.h"
@@ -136,31 +137,65 @@ void ObjectTable::checkMeshes(Nanos now, NoticeBoard& board, std::vector<Notice>
   if (taken > kCheckSlice) rebuildNotBefore_ = now + 4 * taken;
 }
 
-void ObjectTable::updateMotion(Object& object, Nanos now) {
+// Null where it stays, or moves without a sweep.
+std::optional<ObjectTable::Move> ObjectTable::moveOf(Object& object, Nanos now) {
   Affine T_world_object = frameOf(object) * Eigen::UniformScaling<double>(object.worldUnits());
   T_world_object = T_world_object * object.T_object_mesh;
   const Affine& present = object.motion.destination();
   const bool first = object.motion.jumps() == 0;
-  if (!isInvertible(T_world_object)) return;  // a chain of parents out of range: stay
-  if (!first && T_world_object.matrix() == present.matrix()) return;
+  if (!isInvertible(T_world_object)) return {};  // a chain of parents out of range: stay
+  if (!first && T_world_object.matrix() == present.matrix()) return {};
   const bool sameHand = T_world_object.linear().determinant() * present.linear().determinant() > 0;
   object.stateChanged = true;
   // The way of an object that cannot be felt matters to nobody.
   if (first || !sameHand || object.travel == 0 || object.position < 0) {
     object.motion = Motion::fixed(T_world_object, ++jumps_);
     object.trail.clear();
-    return;
+    return {};
   }
   const Affine begin = object.motion.at(now);
   const Box bounds = object.geometry ? object.geometry->index.bounds() : Box{};
   const auto sweep = [&](const Affine& from, const Affine& to) {
     return bounds.empty() ? 0 : shortestSweep(longestMove(from, to, bounds) / worldUnitsPerMetre_);
   };
-  const Affine before = present;
-  const Nanos travel = std::max(object.travel, sweep(begin, before) + sweep(before, T_world_object));
-  object.motion = Motion::between(begin, T_world_object, now,
-                                  now + std::min(travel, PoseStream::kLongestBlend), object.motion.jumps())
-                      .after(before);
+  const Nanos travel = std::max(object.travel, sweep(begin, present) + sweep(present, T_world_object));
+  return Move{&object, begin, T_world_object, bounds, std::min(travel, PoseStream::kLongestBlend), 0};
+}
+
+// Objects that a client moves together, by one map of the world, arrive together and stay together on the
+// way: no gap opens between the parts of what turns.
+void ObjectTable::updateMotions(Nanos now) {
+  constexpr double kTogether_m = 0.5e-6;
+  constexpr std::size_t kRecentLeaders = 4;
+  std::vector<Move> moves;
+  std::vector<std::size_t> leaders;
+  for (const std::int32_t id : changed_) {
+    Object* object = find(id);
+    if (object == nullptr || !std::exchange(object->moved, false)) continue;
+    std::optional<Move> move = moveOf(*object, now);
+    if (!move) continue;
+    move->leader = moves.size();
+    const auto asOne = [&](std::size_t k) {
+      const Affine led = moves[k].to * (moves[k].from.inverse() * move->from);
+      return longestMove(led, move->to, move->bounds) <= kTogether_m * worldUnitsPerMetre_;
+    };
+    const auto oldest = leaders.end() - static_cast<std::ptrdiff_t>(std::min(leaders.size(), kRecentLeaders));
+    const auto leader = std::find_if(oldest, leaders.end(), asOne);
+    if (leader == leaders.end()) {
+      leaders.push_back(move->leader);
+    } else {
+      move->leader = *leader;
+      moves[*leader].travel = std::max(moves[*leader].travel, move->travel);
+    }
+    moves.push_back(*move);
+  }
+  for (const Move& move : moves) {
+    Motion& motion = move.object->motion;
+    const Affine before = motion.destination();
+    const Move& leader = moves[move.leader];
+    motion = Motion::between(move.from, move.to, now, now + leader.travel, motion.jumps()).after(before);
+    if (&leader != &move) motion.with(leader.object->motion);
+  }
 }
 
 void ObjectTable::updateSurface(Object& object, Nanos now, NoticeBoard& board, std::vector<Notice>& out) {
@@ -186,15 +221,14 @@ bool ObjectTable::publish(Nanos now, double worldUnitsPerMetre, NoticeBoard& boa
 
 bool ObjectTable::updatePublished(Nanos now, NoticeBoard& board, std::vector<Notice>& out) {
   spreadMoves();
+  updateMotions(now);
   bool changed = false;
   for (const std::int32_t id : changed_) {
     Object* object = find(id);
     if (object == nullptr || !object->queued) continue;
     object->queued = false;
     if (object->surfaceChanged) updateSurface(*object, now, board, out);
-    if (object->moved) updateMotion(*object, now);
     object->surfaceChanged = false;
-    object->moved = false;
     const bool listed = object->position >= 0;
     if (listed != object->isTouchable()) {
       listChanged_ = true;

@@ -164,7 +164,16 @@ class ObjectTable {
   double metresPerUnit(const Object& object) const;
   void commitMesh(Object& object, Nanos now, const std::function<Nanos()>& clock);
   void checkMeshes(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
-  void updateMotion(Object& object, Nanos now);
+  struct Move {
+    Object* object = nullptr;
+    Affine from;
+    Affine to;
+    Box bounds;  // of its mesh
+    Nanos travel = 0;
+    std::size_t leader = 0;  // number of the move that it follows, or its own
+  };
+  std::optional<Move> moveOf(Object& object, Nanos now);
+  void updateMotions(Nanos now);
   void updateSurface(Object& object, Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   bool updatePublished(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   void replaceState(Object& object, Nanos now);

@@ -104,6 +104,27 @@ TEST(Motion, ScaleShearAndReflectionJoinWithoutAStepAndStayRegular) {
   EXPECT_GT(reflected, 100);
 }
 
+// Two parts of one body, turned, scaled and carried by one map.
+TEST(Motion, WhatFollowsALeaderKeepsItsPlaceBesideIt) {
+  const Affine map = placement(1.2 * turn(0.4, Vec3(1, 0.3, -2)), Vec3(5, -3, 7));
+  const Affine a = placement(0.7 * turn(1, Vec3(1, 2, 3)), Vec3(10, 20, 30));
+  const Affine b = placement(turn(2, Vec3(3, 1, 0)) * Vec3(2, 3, -4).asDiagonal(), Vec3(-40, 20, 5));
+  const Motion leader = Motion::between(a, map * a, 100, 300);
+  const Motion led = Motion::between(b, map * b, 100, 300).with(leader);
+  const geometry::Box box{Vec3(-1, -2, -3), Vec3(4, 3, 2)};
+  const geometry::Box swept = led.sweep(box);
+  for (Nanos t = 100; t <= 300; t += 10) {
+    EXPECT_TRUE((leader.at(t).inverse() * led.at(t)).isApprox(a.inverse() * b, 1e-12)) << t;
+    for (const Vec3& p : {box.min, box.max, Vec3(-1, 3, 2), Vec3(4, -2, -3)}) {
+      EXPECT_TRUE(((led.at(t) * p - swept.min).array() > -1e-9).all() &&
+                  ((swept.max - led.at(t) * p).array() > -1e-9).all());
+    }
+  }
+  EXPECT_EQ(led.at(300).matrix(), (map * b).matrix());
+  const Motion alone = Motion::between(b, map * b, 100, 300);
+  EXPECT_GT((alone.at(200).translation() - led.at(200).translation()).norm(), 0.1) << "it takes another way";
+}
+
 TEST(Motion, VeryUnevenScaleIsFactorisedAccurately) {
   const Mat3 m = turn(1, Vec3(1, 1, 0)) * Vec3(1e-4, 1, 1e4).asDiagonal() * turn(0.5, Vec3(0, 1, 2));
   const Motion motion = Motion::between(placement(m, Vec3::Zero()), placement(m, Vec3(1, 0, 0)), 0, 1000);

@@ -80,14 +80,8 @@ Vec3 Effects::forceOf(const Effect& effect, Running& r, const Affine& T_device_w
   return Vec3::Zero();
 }
 
-// All contact vibrations together. A surface that vibrates lets go at most; it does not pull.
-Vec3 Effects::contactVibration(double force_N, const Rendering& contact) const noexcept {
-  const double pressed = contact.normalForce_N.dot(contact.normal);
-  return (contactVibrationPulls_ ? force_N : std::max(force_N, -std::max(0.0, pressed))) * contact.normal;
-}
-
 Vec3 Effects::force(const scene::SceneSnapshot& scene, const device::DeviceState& device,
-                    const Rendering& contact, Nanos now) noexcept {
+                    const Rendering& contact, double pressed_N, Nanos now) noexcept {
   for (int i = 0; i < count_; ++i) running_[static_cast<std::size_t>(i)].seen = false;
   const Affine& T_device_world = scene.workspace.T_device_world;
   Vec3 sum = Vec3::Zero();
@@ -107,7 +101,9 @@ Vec3 Effects::force(const scene::SceneSnapshot& scene, const device::DeviceState
     }
   }
   forgetUnseen();
-  return sum + contactVibration(alongNormal, contact);
+  // A surface that vibrates lets go at most; it does not pull.
+  if (!contactVibrationPulls_) alongNormal = std::max(alongNormal, -std::max(0.0, pressed_N));
+  return sum + alongNormal * contact.normal;
 }
 
 }  // namespace hapticd::realtime

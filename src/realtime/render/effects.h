@@ -14,9 +14,9 @@ class Effects {
   explicit Effects(bool contactVibrationPulls) noexcept : contactVibrationPulls_(contactVibrationPulls) {}
 
   /// Sum of the forces of all running effects at `now`, device frame, newtons. `contact` holds the proxy and
-  /// the surface normal of this tick.
+  /// the surface normal of this tick, `pressed_N` is the force of surface and brake along the normal.
   Vec3 force(const scene::SceneSnapshot& scene, const device::DeviceState& device, const Rendering& contact,
-             Nanos now) noexcept;
+             double pressed_N, Nanos now) noexcept;
 
   void reset() noexcept { count_ = 0; }
 
@@ -47,7 +47,6 @@ class Effects {
 
   static Vec3 forceOf(const scene::Effect& effect, Running& r, const Affine& T_device_world,
                       const device::DeviceState& device, const Rendering& contact, Nanos now) noexcept;
-  Vec3 contactVibration(double force_N, const Rendering& contact) const noexcept;
   Running* running(const scene::Effect& effect, Nanos now, const Vec3& proxy) noexcept;
   void forgetUnseen() noexcept;
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace hapticd::realtime {
 namespace {
@@ -10,6 +11,18 @@ namespace {
 const std::array<Vec3, 3> kLines{Vec3(0.7312, 0.4419, 0.5196), Vec3(-0.4871, 0.8163, 0.3103),
                                  Vec3(0.2957, -0.4217, 0.8572)};
 constexpr int kRays = 2 * static_cast<int>(kLines.size());
+// More, all around, so that the way out of a cup or a pocket is not missed: an opening of 5 % of what is seen
+// from the point is found in 24 of 25 cases.
+constexpr int kMoreRays = 58;
+
+Vec3 rayAlong(int ray) noexcept {
+  if (ray < kRays) return (ray % 2 == 0 ? 1.0 : -1.0) * kLines[static_cast<std::size_t>(ray / 2)];
+  // Points of a spiral on the sphere, each a golden angle farther.
+  const double height = 1 - (2.0 * (ray - kRays) + 1) / kMoreRays;
+  const double angle = (3 - std::sqrt(5.0)) * M_PI * ray;
+  const double away = std::sqrt(1 - height * height);
+  return {away * std::cos(angle), away * std::sin(angle), height};
+}
 
 // Whether the segment from p to p + d crosses the triangle: 1 when it leaves through the front, -1 when it
 // enters, 0 when it misses (Moeller and Trumbore 1997).
@@ -30,7 +43,7 @@ int crossing(const scene::Corners& t, const Vec3& p, const Vec3& d) noexcept {
   return determinant < 0 ? 1 : -1;
 }
 
-// A test in the frame of the object.
+// A test in the frame of the object, where a mirrored placement does not reverse the winding.
 class Test {
  public:
   Test(const PlacedObject& object, scene::TouchableFaces faces, Nanos now, const Vec3& p,
@@ -50,14 +63,13 @@ class Test {
   bool isSpent() const noexcept { return budget_.visits <= 0; }
 
   bool enclosedAlong(int ray) noexcept {
-    const Vec3 d = (ray % 2 == 0 ? reach_ : -reach_) * kLines[static_cast<std::size_t>(ray / 2)];
+    const Vec3 d = reach_ * rayAlong(ray);
     int sum = 0;
     mesh_.index.visitSegment(p_, p_ + d, [&](std::uint32_t triangle) noexcept {
       if (--budget_.visits <= 0) return -1.0;
       sum += crossing(mesh_.corners(triangle, now_), p_, d);
       return 1.0;
     });
-    if (object_.mirrored) sum = -sum;
     const bool behind = faces_ == scene::TouchableFaces::front  ? sum > 0
                         : faces_ == scene::TouchableFaces::back ? sum < 0
                                                                 : sum != 0;
@@ -95,7 +107,7 @@ bool encloses(const PlacedObject& object, scene::TouchableFaces faces, Nanos now
               double toolRadius_m, EnclosureBudget& budget) noexcept {
   Test test(object, faces, now, p, budget);
   bool inside = test.isInBox();
-  for (int ray = 0; ray < kRays && inside; ++ray) inside = test.enclosedAlong(ray);
+  for (int ray = 0; ray < kRays + kMoreRays && inside; ++ray) inside = test.enclosedAlong(ray);
   return inside || test.isWithin(toolRadius_m);
 }
 

@@ -27,8 +27,8 @@ Vec3 PassivityController::step(const SpringState& spring, const Vec3& hip_m, dou
     // More than K T would drive the arm instead of braking it.
     const double damping = std::min(-account_J_ * period_s / squared, spring.stiffness_N_per_m * period_s);
     brake = -damping / period_s * move;
-    const double pressed = spring.contact_N.norm();
-    const double lifted = pressed > 0 ? -brake.dot(spring.contact_N) / pressed : 0;
+    const double pressed = std::max(0.0, spring.pressed_N);
+    const double lifted = -brake.dot(spring.normal);
     if (lifted > pressed) brake *= pressed / lifted;
     if (pressed == 0) brake.setZero();
   }

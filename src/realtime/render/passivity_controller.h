@@ -14,8 +14,9 @@ using geometry::Vec3;
 
 /// What holds the HIP in a tick.
 struct SpringState {
-  Vec3 force_N = Vec3::Zero();    ///< of the springs and their friction, without dampers
-  Vec3 contact_N = Vec3::Zero();  ///< the whole contact force
+  Vec3 force_N = Vec3::Zero();  ///< of the springs and their friction, without dampers
+  Vec3 normal = Vec3::Zero();   ///< of the contact, unit
+  double pressed_N = 0;         ///< the contact force along it
   double stored_J = 0;
   double stiffness_N_per_m = 0;  ///< 0: nothing holds it, or something that moves
 };

@@ -49,6 +49,7 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   planes_.place(*now.scene, now.time, hip, position_, toolRadius_, query_.radius());
   query_.beginTick(now, before_, &planes_);
   const bool wasFree = contactSet_.count == 0;
+  const BlendedSpring springBefore = contactSet_.spring;
   if (contactChangedByCommand()) status |= kRenderGeometryJump;
   const Vec3 from = position_;
   carry(hip, status);
@@ -57,6 +58,7 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   if (contactSet_.count > 0) query_.ensureGathered(position_, 1.5 * expectedTravel_m_ + kGatherMargin_m);
   updateProxy(hip);
   popThrough(hip, status);
+  if (!wasFree && neighboursChangedByCommand(springBefore)) status |= kRenderGeometryJump;
   releaseWhenDeep(wasFree, status);
   if (forceShading_) applyForceShading();
   unsigned touched = 0;

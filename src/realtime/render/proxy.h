@@ -124,6 +124,7 @@ class Proxy {
   bool isJump(const PlacedObject& object) const noexcept;
   static bool isJump(const PlacedObject& object, std::uint32_t triangle) noexcept;
   bool contactChangedByCommand() const noexcept;
+  bool neighboursChangedByCommand(const BlendedSpring& before) const noexcept;
   void liftOutOf(const PlacedObject& object) noexcept;
   void releaseByJump(std::uint32_t& status) noexcept;
   static double missedMove(const PlacedObject& object) noexcept;

@@ -1,5 +1,6 @@
 // How the proxy follows geometry that moves, deforms, disappears or appears.
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <tuple>
 
@@ -57,6 +58,17 @@ bool Proxy::contactChangedByCommand() const noexcept {
   return false;
 }
 
+// What is near takes part in the spring although it is not touched. A hand changes that gradually, a command
+// at once.
+bool Proxy::neighboursChangedByCommand(const BlendedSpring& before) const noexcept {
+  constexpr double kStep_N = 0.1;
+  if (contactSet_.count == 0 || now_.scene == before_.scene) return false;
+  const BlendedSpring& now = contactSet_.spring;
+  const double spring_m = (contactSet_.normal_m + contactSet_.lateral_m).norm();
+  return std::abs(now.stiffness_N_per_m - before.stiffness_N_per_m) * spring_m > kStep_N ||
+         (now.slope_N + now.turn_N - before.slope_N - before.turn_N).norm() > kStep_N;
+}
+
 // The proxy stays at its place on the touched object, however that moved or deformed.
 void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
   carriedByJump_ = false;
@@ -69,7 +81,8 @@ void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
     } else {
       const PlacedObject& object = query_.object(touched);
       const Vec3 carried = carriedBy(object, touchedTriangle_, position_);
-      carriedByJump_ = object.jumped || (carried != position_ && isJump(object));
+      const bool deformedFar = object.deformed && isJump(object, touchedTriangle_);
+      carriedByJump_ = object.jumped || (carried != position_ && (isJump(object) || deformedFar));
       if (carriedByJump_) status |= kRenderGeometryJump;
       if (!object.jumped || (carried - position_).norm() <= kJump_m) {
         position_ = carried;

@@ -36,7 +36,8 @@ SpringState restingSprings(const ContactSet& contactSet, const Rendering& out) {
   }
   const double stiffness = spring.stiffness_N_per_m;
   state.force_N = out.contactForce_N - out.normalForce_N + stiffness * contactSet.normal_m;
-  state.contact_N = out.contactForce_N;
+  state.normal = out.normal;
+  state.pressed_N = out.contactForce_N.dot(out.normal);
   state.stored_J = 0.5 * stiffness * (contactSet.normal_m + contactSet.lateral_m).squaredNorm();
   state.stiffness_N_per_m = stiffness;
   return state;
@@ -89,7 +90,7 @@ void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState
     applyAdhesion(s.proxy.planes().adhesion(hip, radius), out);
   }
   out.force_N = out.contactForce_N + brake;
-  out.force_N += s.effects.force(scene, device, out, now);
+  out.force_N += s.effects.force(scene, device, out, (out.normalForce_N + brake).dot(out.normal), now);
   out.force_N += s.fields.force(scene, hip, now);
   if (!out.force_N.allFinite()) {
     out = Rendering{};

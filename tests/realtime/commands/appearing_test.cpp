@@ -1,5 +1,6 @@
 // Objects that appear around a HIP never grip it: they are felt once the HIP has left them.
 #include <cmath>
+#include <random>
 
 #include "loop.h"
 
@@ -136,18 +137,39 @@ TEST_P(Appearing, object_that_moves_away_from_the_hand_does_not_take_it_along) {
   EXPECT_NEAR(loop.out.force_N.y(), 0.0023 * kStiffness_N_per_m, 0.01);
 }
 
-// A room whose walls face inwards, touchable from the front: the hand is not behind its walls.
+// A room whose walls face inwards, touchable from the front: the hand is not behind its walls. A mirrored
+// placement turns the winding over and not the walls.
 TEST_P(Appearing, room_around_the_hand_is_felt_at_once) {
-  loop.send(scene::SetTouchableFaces{0});
   std::vector<Vec3f> room = boxTriples(Vec3::Constant(-10), Vec3::Constant(10));
   for (std::size_t i = 0; i < room.size(); i += 3) std::swap(room[i], room[i + 1]);
   const Vec3 inside(0.0011, 0.0007, 0.0013);
-  loop.rest(inside, toNanos(0.1));
-  loop.add(0, room);
-  loop.rest(inside, toNanos(0.1));
-  EXPECT_EQ(loop.out.status, 0U);
-  loop.to({0.001, -0.012 + GetParam(), 0.002});
-  EXPECT_NEAR(loop.out.force_N.y(), 1, 0.01);
+  for (const double side : {1.0, -1.0}) {
+    loop.send(scene::ResetScene{});
+    loop.send(scene::SetTouchableFaces{0});
+    loop.rest(inside, toNanos(0.1));
+    loop.send(scene::SetObjectNumber{1});
+    loop.send(scene::SetTransform{0, {side, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}});
+    loop.add(0, room);
+    loop.rest(inside, toNanos(0.1));
+    EXPECT_EQ(loop.out.status, 0U) << side;
+    loop.to({0.001, -0.012 + GetParam(), 0.002});
+    EXPECT_NEAR(loop.out.force_N.y(), 1, 0.01) << side;
+    loop.to(inside);
+  }
+}
+
+TEST_P(Appearing, mirrored_object_whose_fronts_are_touchable) {
+  for (const Vec3& way : kWays) {
+    loop.send(scene::ResetScene{});
+    loop.send(scene::SetTouchableFaces{0});
+    const Vec3 inside = 0.003 * way + Vec3(0.0011, 0.0007, 0.0013);
+    loop.rest(inside, toNanos(0.1));
+    loop.send(scene::SetObjectNumber{1});
+    loop.send(scene::SetTransform{0, {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}});
+    addCube();
+    loop.rest(inside, toNanos(0.1));
+    expectFeltOnlyFromOutside(inside, way);
+  }
 }
 
 // Its vertices travel until it has left the hand.
@@ -198,6 +220,30 @@ TEST_P(Appearing, open_surfaces_are_felt_at_once) {
   EXPECT_EQ(loop.out.status, 0U);
   loop.to({0.001, -0.012 + GetParam(), 0.002});
   EXPECT_NEAR(loop.out.force_N.y(), 1, 0.01) << "on the bottom of the cup";
+}
+
+// A pocket is open on one side only, which is 7 % of what the hand in it sees.
+TEST_P(Appearing, pockets_in_any_position_are_felt_at_once) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  for (int k = 0; k < 200; ++k) {
+    const geometry::Mat3 turn = geometry::Quat(normal(random), normal(random), normal(random), normal(random))
+                                    .normalized()
+                                    .toRotationMatrix();
+    std::vector<Vec3f> pocket = boxTriples(Vec3(-10, -18, -10), Vec3(10, 18, 10));
+    pocket.erase(pocket.begin() + 18, pocket.begin() + 24);  // without its top
+    for (Vec3f& v : pocket) v = (turn * v.cast<double>()).cast<float>();
+    loop.send(scene::ResetScene{});
+    loop.send(scene::SetObjectNumber{1});
+    const Vec3 inside(0.0001, 0.0007, 0.0003);
+    loop.rest(inside, toNanos(0.1));
+    loop.add(0, pocket);
+    loop.rest(inside, toNanos(0.1));
+    EXPECT_EQ(loop.out.status, 0U) << k;
+    loop.to(turn * Vec3(0.001, -0.020 + GetParam(), 0.002));
+    EXPECT_NEAR((turn.transpose() * loop.out.force_N).y(), 1, 0.01) << k;
+    loop.to(inside);
+  }
 }
 
 // New triangles of a touched mesh: the proxy is outside, although the HIP is inside.

@@ -58,7 +58,13 @@ class Kicks : public testing::Test {
   }
   void addPlate(std::int32_t id = 0) { loop.add(id, boxTriples(Vec3(-40, -30, -40), Vec3(40, 0, 40))); }
 
-  Loop loop;
+  static scene::SceneConfig raw() {
+    scene::SceneConfig config;
+    config.raw = true;
+    return config;
+  }
+
+  Loop loop{{}, raw()};
   GuardControl control{true};
   Guard guard{armed(), control, kMs};
   Vec3 force_N = Vec3::Zero();
@@ -139,6 +145,49 @@ TEST_F(Kicks, second_object_in_contact_that_vanishes) {
   rest(pressed, toNanos(0.1));
   EXPECT_LE(step_N, 1 + kRounding_N);
   EXPECT_NEAR(force_N.x(), 0, 0.01);
+}
+
+// A wall beside the touched plate takes part in the stiffness without being touched.
+TEST_F(Kicks, surface_near_the_contact_that_changes) {
+  struct Row {
+    const char* name;
+    std::function<void()> command;
+  };
+  const Row rows[] = {
+      {"softer",
+       [&] {
+         loop.send(scene::SetSurfaceProperty{1, "stiffness", 0.1});
+       }},
+      {"stiffer",
+       [&] {
+         loop.send(scene::SetSurfaceProperty{1, "stiffness", 4});
+       }},
+      {"untouchable",
+       [&] {
+         loop.send(scene::SetTouchable{1, false});
+       }},
+      {"touchable",
+       [&] {
+         loop.send(scene::SetTouchable{1, true});
+       }},
+      {"removed", [&] { loop.send(scene::RemoveObject{1}); }},
+  };
+  addPlate();
+  loop.add(1, boxTriples(Vec3(-40, 0, -40), Vec3(0.5, 5, 40)));
+  loop.send(scene::SetSurfaceProperty{1, "stiffness", 4});
+  press(0.003);
+  ASSERT_GT(force_N.y(), 2.5) << "the plate alone has 1.5 N";
+  ASSERT_EQ(loop.out.contactCount, 1U);
+  double changes_N = 0;
+  for (const Row& row : rows) {
+    const Vec3 before = force_N;
+    row.command();
+    rest(pressed, toNanos(0.1));
+    EXPECT_LE(step_N, 0.15) << row.name;
+    changes_N += (force_N - before).norm();
+    step_N = 0;
+  }
+  EXPECT_GT(changes_N, 5);
 }
 
 TEST_F(Kicks, plane_of_the_scene_that_changes) {

@@ -216,6 +216,105 @@ TEST_P(Starts, mesh_that_starts_to_deform_takes_the_hand_along) {
   }
 }
 
+// A floor of two plates that turns about their seam, where the hand presses. Each plate has an origin and a
+// size of its own.
+TEST(Assembly, parts_that_turn_together_leave_no_gap) {
+  for (const double radius : {0.0, 0.002}) {
+    for (const double angle : {0.03, 0.1, -0.2, 0.3}) {
+      Loop loop({.toolRadius_m = radius});
+      const Vec3 origins_mm[] = {{60, 30, 10}, {-50, -40, -20}};
+      const float ends_mm[] = {-10, 45};
+      for (int id = 0; id < 2; ++id) {
+        std::vector<Vec3f> plate = sheetTriples(40);
+        for (Vec3f& v : plate) v.x() = v.x() * ends_mm[id] < 0 ? 0 : ends_mm[id];
+        for (Vec3f& v : plate) v -= origins_mm[id].cast<float>();
+        loop.add(id, plate);
+      }
+      const auto place = [&](double turn, double up_mm) {
+        geometry::Mat3 rotation(Eigen::AngleAxisd(turn, Vec3::UnitZ()));
+        loop.send(scene::BeginBatch{});
+        for (int id = 0; id < 2; ++id) {
+          const Vec3 at = rotation * origins_mm[id] + Vec3(0, up_mm, 0);
+          scene::SetTransform pose{id, {}};
+          Eigen::Map<geometry::Mat4> matrix(pose.matrix.data());
+          matrix.setIdentity();
+          matrix.topLeftCorner<3, 3>() = rotation;
+          matrix.topRightCorner<3, 1>() = at;
+          loop.send(pose);
+        }
+        loop.send(scene::CommitBatch{});
+        loop.publish();
+      };
+      place(0, 0);
+      const Vec3 above(0, 0.003 + radius, 0.003);
+      loop.rest(above, toNanos(0.5));
+      const Vec3 pressed = above - Vec3(0, 0.006, 0);
+      loop.to(pressed);
+      loop.rest(pressed, toNanos(0.2));
+      ASSERT_NEAR(loop.out.force_N.norm(), 0.003 * kStiffness_N_per_m, 0.01);
+      place(angle, 2);
+      loop.rest(pressed, toNanos(0.2));
+      EXPECT_NEAR(loop.out.force_N.norm(), kStiffness_N_per_m * (radius + (0.005 - radius) * std::cos(angle)),
+                  0.03)
+          << angle << ' ' << radius;
+    }
+  }
+}
+
+// A stream of shapes whose face passes the hand between two ticks, in one of which a new shape arrives.
+TEST_P(Starts, shape_that_follows_another_passes_the_hand) {
+  const auto shifted = [&](double by_mm) {
+    std::vector<Vec3f> vertices = plate(std::get<0>(GetParam()));
+    for (Vec3f& v : vertices) v.y() += static_cast<float>(by_mm);
+    return vertices;
+  };
+  constexpr double kSpeed_m_per_s = 0.4;
+  constexpr double kAbove_m = 0.003;
+  for (int meeting = 0; meeting < 30; ++meeting) {
+    // The face is that far below the tool when the second shape arrives, and meets it before the next tick.
+    const double below = kSpeed_m_per_s * 1e-3 * (meeting + 0.5) / 30;
+    loop.send(scene::SetVertices{0, 0, shifted(-30)});
+    loop.rest(hip, toNanos(0.3));
+    loop.send(scene::SetVertices{0, 0, shifted(1e3 * (gap_m - below - kSpeed_m_per_s * 0.015))});
+    loop.rest(hip, toNanos(0.3));
+    loop.send(scene::SetVertices{0, 0, shifted(1e3 * (gap_m - below + kSpeed_m_per_s * 0.001))});
+    loop.rest(hip, 15 * kMs);
+    ASSERT_EQ(loop.out.force_N.norm(), 0);
+    loop.now += kMs;
+    loop.send(scene::SetVertices{0, 0, shifted(1e3 * (gap_m + kAbove_m))});
+    loop.publish();
+    loop.render(hip, kMs);
+    loop.rest(hip, 100 * kMs);
+    EXPECT_TRUE(feels(kAbove_m)) << meeting;
+  }
+}
+
+// Vertices that leap under a hand in contact.
+TEST_P(Starts, touched_mesh_that_leaps_lets_the_hand_go) {
+  const auto shifted = [&](const Vec3& by_mm) {
+    std::vector<Vec3f> vertices = plate(std::get<0>(GetParam()));
+    for (Vec3f& v : vertices) v += by_mm.cast<float>();
+    return vertices;
+  };
+  for (const Vec3& by_mm : {Vec3(0, 200, 0), Vec3(300, 100, 0), Vec3(0, 2000, 0)}) {
+    loop.send(scene::SetVertices{0, 0, shifted(Vec3(0, -30, 0))});
+    loop.rest(hip, toNanos(0.5));
+    loop.send(scene::SetVertices{0, 0, shifted(Vec3(0, -10, 0))});
+    loop.rest(hip, toNanos(0.3));
+    loop.send(scene::SetVertices{0, 0, shifted(Vec3(0, 3, 0))});
+    loop.rest(hip, toNanos(0.3));
+    ASSERT_TRUE(feels(0.003 - gap_m)) << by_mm.transpose();
+    loop.send(scene::SetVertices{0, 0, shifted(by_mm)});
+    std::uint32_t status = 0;
+    loop.rest(hip, 100 * kMs, [&] {
+      status |= loop.out.status;
+      EXPECT_LE(loop.out.force_N.norm(), 0.030 * kStiffness_N_per_m + 0.01) << by_mm.transpose();
+    });
+    EXPECT_EQ(loop.out.force_N.norm(), 0) << by_mm.transpose();
+    EXPECT_NE(status & (kRenderReleased | kRenderGeometryJump), 0U) << by_mm.transpose();
+  }
+}
+
 // Frames in quick succession: a frame's way takes at least its distance at 1 m/s.
 TEST_P(Starts, quick_frames_of_a_mesh_do_not_swallow_the_hand) {
   const auto shifted = [&](double by_mm) {

@@ -340,6 +340,37 @@ TEST(PassivityControl, leaves_vibrations_and_fields_alone) {
   }
 }
 
+// A hand that bounces in and out and to and fro, without an arm that yields.
+TEST(PassivityControl, never_makes_a_surface_pull) {
+  for (const double friction : {0.0, 0.6}) {
+    for (const double vibration_N : {0.0, 2.0}) {
+      fixture::SceneFixture built;
+      built.add(fixture::sphere(0.03, 24), fixture::surface(4000, friction, friction));
+      scene::Effect vibration;
+      vibration.type = scene::EffectType::contactVibration;
+      vibration.magnitude_N = vibration_N;
+      vibration.angularFrequency_rad_per_s = 900;
+      vibration.start = 1;
+      built.effects = {vibration};
+      fixture::Hand hand(built.snapshot(), {.bareDamping_Ns_per_m = 0});
+      double lowest_N = 0;
+      double brake_N = 0;
+      for (int i = 0; i < 3000; ++i) {
+        const double t = 1e-3 * i;
+        const Rendering& r =
+            hand.at({0.004 * std::sin(53 * t), 0.002 * std::sin(31 * t), 0.0296 + 0.001 * std::cos(611 * t)});
+        if (!r.touching) continue;
+        lowest_N = std::min(lowest_N, r.force_N.dot(r.normal));
+        if (vibration_N == 0) brake_N = std::max(brake_N, (r.force_N - r.contactForce_N).norm());
+      }
+      EXPECT_GE(lowest_N, -1e-12) << friction << ' ' << vibration_N;
+      if (vibration_N == 0) {
+        EXPECT_GT(brake_N, 0.5);
+      }
+    }
+  }
+}
+
 // --- surfaces that a client renders across a network of 20 ms each way
 
 bench::RemoteLoop badLine(bench::WallBy by) {
