@@ -13,7 +13,7 @@ struct EnclosureBudget {
 };
 
 /// True when the tool at p (device metres) is inside a closed surface of the object, or its ball intersects
-/// the surface. Open surfaces do not enclose: each of six rays must cross the surface more often in one
+/// the surface. Open surfaces do not enclose: each of 64 rays must cross the surface more often in one
 /// direction than in the other. When one side of the faces can be touched, the point must be behind them: a
 /// room whose walls face inwards does not enclose a tool in it.
 bool encloses(const PlacedObject& object, scene::TouchableFaces faces, Nanos now, const Vec3& p,

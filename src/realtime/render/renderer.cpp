@@ -21,25 +21,23 @@ void scaleContact(double share, Rendering& out) {
   for (std::uint32_t i = 0; i < out.contactCount; ++i) out.contacts[i].force_N *= share;
 }
 
-// The springs of surfaces at rest. Nothing where something moves, where the surface changes, or where the
-// blend of unequal stiffness adds its slope.
+// The springs of surfaces at rest. Nothing where something moves or where the surface changes.
 SpringState restingSprings(const ContactSet& contactSet, const Rendering& out) {
   constexpr std::uint32_t kChanged =
       kRenderGeometryJump | kRenderReleased | kRenderPopthrough | kRenderWorkLimit | kRenderEnclosed;
   SpringState state;
   const BlendedSpring& spring = contactSet.spring;
-  if (!out.touching || (out.status & kChanged) != 0 || !spring.slope_N.isZero(0) || !spring.turn_N.isZero(0))
-    return state;
+  if (!out.touching || (out.status & kChanged) != 0) return state;
   for (int i = 0; i < contactSet.count; ++i) {
     const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
     if (!constraint.rests || constraint.presence != 1) return state;
   }
-  const double stiffness = spring.stiffness_N_per_m;
-  state.force_N = out.contactForce_N - out.normalForce_N + stiffness * contactSet.normal_m;
+  const double kappa = spring.kappa_N_per_m;
+  state.force_N = out.contactForce_N - out.normalForce_N + spring.stiffness_N_per_m * contactSet.normal_m;
   state.normal = out.normal;
   state.pressed_N = out.contactForce_N.dot(out.normal);
-  state.stored_J = 0.5 * stiffness * (contactSet.normal_m + contactSet.lateral_m).squaredNorm();
-  state.stiffness_N_per_m = stiffness;
+  state.stored_J = 0.5 * kappa * (contactSet.normal_m + contactSet.lateral_m).squaredNorm();
+  state.stiffness_N_per_m = kappa;
   return state;
 }
 

@@ -349,6 +349,7 @@ void combine(const NeighbourSearch& search, const Gauge& gauge, const Width& wid
     byDirection += slope * turn * (n.offset - gauge.up * gauge.up.dot(n.offset));
   }
   const double half = 0.5 * distance * distance;
+  out.kappa_N_per_m = kappa;
   out.stiffness_N_per_m = kappa + 0.5 * distance * byDistance;
   out.slope_N = -half * alongContactSet(contactSet, byPosition);
   out.turn_N = half * (byDirection - alongContactSet(contactSet, byDirection));
@@ -364,6 +365,7 @@ BlendedSpring blendedSpring(const SceneAtTime& now, const PlacedPlanes& planes, 
   const ContactConstraint& first = contactSet.constraints[0];
   out.stiffness_N_per_m = first.source < 0 ? planes[-1 - first.source].state->surface.stiffness_N_per_m
                                            : first.surface.stiffness_N_per_m;
+  out.kappa_N_per_m = out.stiffness_N_per_m;
   const double depth = contactSet.normal_m.norm();
   if (!(depth > 0)) return out;
   const Gauge gauge{contactSet.normal_m / depth, toolRadius_m};

@@ -15,6 +15,7 @@ struct ContactSet;
 /// The spring at a proxy: force = stiffness * (proxy - HIP) + slope + turn.
 struct BlendedSpring {
   double stiffness_N_per_m = 0;  ///< kappa, and its growth with the depth
+  double kappa_N_per_m = 0;      ///< kappa: the spring stores 1/2 kappa |p - h|^2
   Vec3 slope_N = Vec3::Zero();   ///< along the contact set, towards softer places
   Vec3 turn_N = Vec3::Zero();    ///< across an edge: from a surface that the touched faces hide partly
   bool complete = true;          ///< false: more surfaces or triangles near the proxy than are searched

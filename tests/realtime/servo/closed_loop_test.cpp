@@ -263,6 +263,49 @@ TEST(BareArmTest, soft_walls_are_no_worse_than_without_the_controller) {
   }
 }
 
+// An arm without Coulomb friction falls into a groove between two surfaces; their stiffness is one field.
+double leftInGroove(double angle, double left_N_per_m, double right_N_per_m, double mass_kg) {
+  fixture::SceneFixture built;
+  built.faces = scene::TouchableFaces::both;
+  for (const double side : {-1.0, 1.0}) {
+    const Vec3 up = 0.04 * Vec3(side * std::cos(angle), std::sin(angle), 0);
+    geometry::TriangleMesh wall;
+    for (const Vec3& corner :
+         {Vec3(0, 0, -0.03), Vec3(Vec3(0, 0, -0.03) + up), Vec3(0, 0, 0.03), Vec3(Vec3(0, 0, 0.03) + up)})
+      wall.vertices.push_back(corner.cast<float>());
+    wall.triangles = {{0, 1, 2}, {1, 3, 2}};
+    built.add(wall, fixture::surface(side < 0 ? left_N_per_m : right_N_per_m));
+  }
+  constexpr double kDamping = 0.2;
+  const BareArm still{.mass_kg = mass_kg, .damping_Ns_per_m = kDamping, .coulomb_N = 0, .encoder_m = 5e-6};
+  BareArm x = still;
+  BareArm y = still;
+  x.pull_N = 0;
+  x.y = 0.002;
+  y.y = 0.010;
+  fixture::Hand hand(built.snapshot(), {.bareDamping_Ns_per_m = kDamping});
+  double lowest = 1;
+  double highest = -1;
+  for (int i = 0; i < 16'000; ++i) {
+    const Vec3 force = hand.at({x.measured(), y.measured(), 0.001}).force_N;
+    x.move(force.x(), 1e-3);
+    y.move(force.y(), 1e-3);
+    if (i < 15'000) continue;
+    lowest = std::min(lowest, x.y);
+    highest = std::max(highest, x.y);
+  }
+  return highest - lowest;
+}
+
+TEST(BareArmTest, comes_to_rest_between_surfaces_of_unequal_stiffness) {
+  for (const double angle : {0.3, 0.5}) {
+    for (const double stiff : {1100.0, 3000.0}) {
+      for (const double mass : {0.06, 0.09})
+        EXPECT_LT(leftInGroove(angle, 500, stiff, mass), 1e-3) << angle << ' ' << stiff << ' ' << mass;
+    }
+  }
+}
+
 // A profile that credits less damping than the arm has is safe.
 TEST(BareArmTest, a_cautious_profile_suffices) {
   for (const double stiffness : {500.0, 2000.0, 5000.0})
