@@ -9,7 +9,9 @@ namespace {
 
 constexpr double kShortest_m = 2e-8;  // a shorter way leads nowhere
 constexpr double kSlack_m = 2e-9;     // by which a ball may overlap a face
+constexpr double kClimb_m = 1e-9;     // by which a rolling ball may climb
 constexpr int kSteps = 40;
+constexpr int kRollSteps = 64;
 
 }  // namespace
 
@@ -102,6 +104,20 @@ bool Descent::pushedOut(Point& x) const {
   return false;
 }
 
+// Whether the ball gets from x to `end` without a climb: three edges may hold it that a straight step jumps
+// over.
+bool Descent::rolls(const Point& x, const Point& end, const Point& goal) const {
+  Point before = x;
+  for (int k = 1; k <= kRollSteps; ++k) {
+    Point next = x + static_cast<double>(k) / kRollSteps * (end - x);
+    if (!pushedOut(next) || freeShare(before, next - before) < 1) return false;
+    if ((next - before).norm() > 4 * (end - x).norm() / kRollSteps) return false;
+    if ((goal - next).norm() > (goal - x).norm() + kClimb_m) return false;
+    before = next;
+  }
+  return true;
+}
+
 // The free space of a ball has round faces: a step along them, then out of them.
 Point Descent::stepOfBall(const Point& x, const Point& goal, double length) {
   const Point pull = goal - x;
@@ -117,8 +133,8 @@ Point Descent::stepOfBall(const Point& x, const Point& goal, double length) {
   for (const Point& way : ways) {
     if (way.norm() < kShortest_m || way.dot(pull) <= 0) continue;
     Point end = x + way * std::min(1.0, length / way.norm());
-    if (!pushedOut(end) || freeShare(x, end - x) < 1) continue;
-    if ((goal - end).norm() < (goal - x).norm() - 1e-9) return end;
+    if (!pushedOut(end) || !((goal - end).norm() < (goal - x).norm() - 1e-9)) continue;
+    if (rolls(x, end, goal)) return end;
   }
   return x;
 }

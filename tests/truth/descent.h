@@ -21,6 +21,7 @@ class Descent {
  private:
   Point stepOfPoint(const Point& x, const Point& goal);
   Point stepOfBall(const Point& x, const Point& goal, double length);
+  bool rolls(const Point& x, const Point& end, const Point& goal) const;
   double freeShare(const Point& p, const Point& way) const;
   bool pushedOut(Point& x) const;
   Point normalAt(const Face& f, const Point& x) const;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <initializer_list>
 #include <limits>
+#include <random>
 #include <sstream>
 
 #include "realtime/render/renderer.h"
@@ -27,6 +28,8 @@ constexpr double kWedge_m = 60e-6;  // the reported proxy is at most 50 um from 
 constexpr double kTouch_m = 25e-6;  // faces within this of the tool may hold it
 constexpr double kStuck_m = 10e-6;
 constexpr double kDescentReach_m = 1e-3;
+constexpr double kTremor_m = 1e-6;
+constexpr int kTremorTicks = 10;
 constexpr unsigned kUnexpected =
     realtime::kRenderNotFinite | realtime::kRenderGeometryJump | realtime::kRenderReleased;
 constexpr unsigned kUnfinished = realtime::kRenderIterationLimit | realtime::kRenderCandidateLimit;
@@ -564,24 +567,12 @@ class Referee {
     }
   }
 
-  // A ball may balance on an edge, with the HIP exactly behind: no small move brings it nearer.
-  bool balances() const {
-    const Point& p = rendering_.proxy_m;
-    if (trial_.toolRadius_m == 0) return false;
-    const Point pull = (hip_ - p).stableNormalized();
-    const std::vector<int> near = reference_.near(p, trial_.toolRadius_m + 1e-6);
-    return std::any_of(near.begin(), near.end(), [&](int i) {
-      const Point in = nearestOf(reference_.face(i), p) - p;
-      return in.stableNormalized().cross(pull).norm() < 1e-4 && (hip_ - p).norm() > in.norm();
-    });
-  }
-
   void judgeRest() {
     if (!static_ || friction_ > 0 || (rendering_.status & realtime::kRenderPopthrough) != 0) return;
     const Point& p = rendering_.proxy_m;
     const double radius = trial_.toolRadius_m;
     const double spring = (p - hip_).norm();
-    if (spring < kStuck_m || balances()) return;
+    if (spring < kStuck_m) return;
     // A ball converges on edges over several ticks: judged once it rests.
     if (radius > 0 && (p - proxyBefore_).norm() > kGap_m) return;
     Descent descent(reference_, p, kDescentReach_m, radius, radius > 0 ? 0.0 : 1.2 * kFollower_m,
@@ -589,15 +580,43 @@ class Referee {
     const Point better = descent.from(p, hip_);
     const double gain = spring - (better - hip_).norm();
     if (gain <= kStuck_m + 2e-3 * radius) return;
-    // Only where a ball as wide as the gap fits: within a slit, edges hold a point on purpose.
-    FreeSpace space(reference_, better, 200e-6, 1.2 * kFollower_m, trial_.seed);
-    const auto visible = [&](const Point& q) {
-      return std::none_of(space.faces().begin(), space.faces().end(),
-                          [&](int i) { return reference_.pierces(i, better, q, 0); });
-    };
-    if (radius == 0 && !space.placeNear(better, visible)) return;
+    if ((radius == 0 && !ballReaches(better)) || balances()) return;
     report("stuck", "at ", p.transpose(), ", ", spring, " m from the HIP ", hip_.transpose(), "; ",
            better.transpose(), " is nearer by ", gain);
+  }
+
+  // Whether a ball as wide as the gap gets there from the proxy, and is nearer to the HIP then: within a slit
+  // or a wedge, faces and edges hold a point on purpose.
+  bool ballReaches(const Point& better) {
+    const Point& p = rendering_.proxy_m;
+    FreeSpace space(reference_, 0.5 * (p + better), (better - p).norm() + 200e-6, 1.2 * kFollower_m,
+                    trial_.seed);
+    const auto nearer = [&](const Point& q) {
+      return (q - hip_).norm() < (p - hip_).norm() && (q - better).norm() < 200e-6 &&
+             std::none_of(space.faces().begin(), space.faces().end(),
+                          [&](int i) { return reference_.pierces(i, better, q, 0); });
+    };
+    const std::optional<Point> start = placeNow(space);
+    const std::optional<Point> end = space.placeNear(better, nearer);
+    return start && end && space.connects(*start, *end);
+  }
+
+  // With the HIP exactly behind an edge that touches it, a proxy rests there, until the hand trembles.
+  bool balances() const {
+    std::mt19937_64 random(trial_.seed);
+    std::normal_distribution<double> normal;
+    Stage stage(trial_);
+    realtime::Renderer renderer({trial_.toolRadius_m, false});
+    Rendering r;
+    device::DeviceState state;
+    for (int i = 0; i <= tick_ + kTremorTicks; ++i) {
+      const Point& hip = trial_.hips[static_cast<std::size_t>(std::min(i, tick_))];
+      const Point way(normal(random), normal(random), normal(random));
+      state.time = i * realtime::fixture::kTick;
+      state.position_m = i > tick_ ? Point(hip + kTremor_m * way.normalized()) : hip;
+      renderer.step(stage.at(i), state, state.time, realtime::fixture::kTick, r);
+    }
+    return (r.proxy_m - hip_).norm() < (rendering_.proxy_m - hip_).norm() - kStuck_m;
   }
 
   const Trial& trial_;
