@@ -28,7 +28,9 @@ constexpr double kWedge_m = 60e-6;  // the reported proxy is at most 50 um from 
 constexpr double kTouch_m = 25e-6;  // faces within this of the tool may hold it
 constexpr double kStuck_m = 10e-6;
 constexpr double kDescentReach_m = 1e-3;
+constexpr double kRolling_m = 0.505 * kGap_m;  // of the ball of a point tool, a little wider
 constexpr double kTremor_m = 1e-6;
+constexpr double kFlat = 2e-3;  // share of the pull: flatter directions lead nowhere
 constexpr int kTremorTicks = 10;
 constexpr unsigned kUnexpected =
     realtime::kRenderNotFinite | realtime::kRenderGeometryJump | realtime::kRenderReleased;
@@ -571,37 +573,40 @@ class Referee {
     if (!static_ || friction_ > 0 || (rendering_.status & realtime::kRenderPopthrough) != 0) return;
     const Point& p = rendering_.proxy_m;
     const double radius = trial_.toolRadius_m;
-    const double spring = (p - hip_).norm();
-    if (spring < kStuck_m) return;
+    if ((p - hip_).norm() < kStuck_m) return;
     // A ball converges on edges over several ticks: judged once it rests.
     if (radius > 0 && (p - proxyBefore_).norm() > kGap_m) return;
-    Descent descent(reference_, p, kDescentReach_m, radius, radius > 0 ? 0.0 : 1.2 * kFollower_m,
+    Point better = p;
+    if (radius > 0) {
+      if (!nearerByRolling(p, radius, better)) return;
+    } else {
+      FreeSpace space(reference_, p, 200e-6, kFollower_m, trial_.seed);
+      const std::optional<Point> ball = placeNow(space);
+      if (!ball || !nearerByRolling(*ball, kRolling_m, better)) return;
+      // One tick does not tell on which side of a gap the ball is.
+      if (secondOpinions_-- <= 0) return;
+      const std::vector<Point> balls = followers(trial_, reported_, kFollower_m);
+      if (balls.empty() || !std::all_of(balls.begin(), balls.end(), [&](const Point& q) {
+            return nearerByRolling(q, kRolling_m, better);
+          }))
+        return;
+    }
+    if (balances()) return;
+    report("stuck", "at ", p.transpose(), ", ", (p - hip_).norm(), " m from the HIP ", hip_.transpose(), "; ",
+           better.transpose(), " is nearer");
+  }
+
+  // Whether a ball could come nearer to the HIP from where it is nearest to the proxy.
+  bool nearerByRolling(const Point& ball, double radius, Point& better) const {
+    Descent descent(reference_, ball, kDescentReach_m, radius,
                     trial_.seed + static_cast<std::uint64_t>(tick_));
-    const Point better = descent.from(p, hip_);
-    const double gain = spring - (better - hip_).norm();
-    if (gain <= kStuck_m + 2e-3 * radius) return;
-    if ((radius == 0 && !ballReaches(better)) || balances()) return;
-    report("stuck", "at ", p.transpose(), ", ", spring, " m from the HIP ", hip_.transpose(), "; ",
-           better.transpose(), " is nearer by ", gain);
+    const Point place = descent.from(ball, rendering_.proxy_m);
+    better = descent.from(place, hip_);
+    return (place - hip_).norm() - (better - hip_).norm() > kStuck_m + 2e-3 * radius;
   }
 
-  // Whether a ball as wide as the gap gets there from the proxy, and is nearer to the HIP then: within a slit
-  // or a wedge, faces and edges hold a point on purpose.
-  bool ballReaches(const Point& better) {
-    const Point& p = rendering_.proxy_m;
-    FreeSpace space(reference_, 0.5 * (p + better), (better - p).norm() + 200e-6, 1.2 * kFollower_m,
-                    trial_.seed);
-    const auto nearer = [&](const Point& q) {
-      return (q - hip_).norm() < (p - hip_).norm() && (q - better).norm() < 200e-6 &&
-             std::none_of(space.faces().begin(), space.faces().end(),
-                          [&](int i) { return reference_.pierces(i, better, q, 0); });
-    };
-    const std::optional<Point> start = placeNow(space);
-    const std::optional<Point> end = space.placeNear(better, nearer);
-    return start && end && space.connects(*start, *end);
-  }
-
-  // With the HIP exactly behind an edge that touches it, a proxy rests there, until the hand trembles.
+  // With the HIP behind an edge that touches it, or in a cage that a small turn of the pull opens, a proxy
+  // rests until the hand trembles.
   bool balances() const {
     std::mt19937_64 random(trial_.seed);
     std::normal_distribution<double> normal;
@@ -609,14 +614,15 @@ class Referee {
     realtime::Renderer renderer({trial_.toolRadius_m, false});
     Rendering r;
     device::DeviceState state;
+    const double tremor = kTremor_m + kFlat * (rendering_.proxy_m - hip_).norm();
     for (int i = 0; i <= tick_ + kTremorTicks; ++i) {
       const Point& hip = trial_.hips[static_cast<std::size_t>(std::min(i, tick_))];
       const Point way(normal(random), normal(random), normal(random));
       state.time = i * realtime::fixture::kTick;
-      state.position_m = i > tick_ ? Point(hip + kTremor_m * way.normalized()) : hip;
+      state.position_m = i > tick_ ? Point(hip + tremor * way.normalized()) : hip;
       renderer.step(stage.at(i), state, state.time, realtime::fixture::kTick, r);
     }
-    return (r.proxy_m - hip_).norm() < (rendering_.proxy_m - hip_).norm() - kStuck_m;
+    return (r.proxy_m - rendering_.proxy_m).norm() > kStuck_m + 3 * tremor;
   }
 
   const Trial& trial_;
@@ -635,6 +641,8 @@ class Referee {
   double stiffest_ = 0;
   double damping_ = 0;
   double friction_ = 0;
+
+  int secondOpinions_ = 5;  // they take long
 
   int tick_ = 0;
   Rendering rendering_;
