@@ -269,14 +269,16 @@ bool Proxy::approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Ve
   // A face that the tool overlaps moves it out, by its own way in at most. Faces that leave it no room would
   // move it far: their planes may meet anywhere.
   const double farthest = (position_ - target).norm() + 2 * query_.radius() + 4 * skin;
+  jammed_ = false;
   while (casts_ < limit) {
-    const Projection nearest = nearestTo(target, active);
-    goal = nearest.point;
-    jammed_ = !nearest.found || (goal - target).norm() > farthest;
-    if (jammed_) {
-      goal = position_;
-      break;
+    Projection nearest = nearestTo(target, active);
+    if (!nearest.found || (nearest.point - target).norm() > farthest) {
+      jammed_ = true;
+      acceptOverlaps(active);
+      nearest = nearestTo(target, active);
     }
+    goal = nearest.found ? nearest.point : position_;
+    if (!nearest.found) break;
     const ActiveSet all = active;
     active.count = nearest.count;
     for (int i = 0; i < nearest.count; ++i) {
@@ -311,6 +313,15 @@ bool Proxy::approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Ve
   // No solution for all of them: keep the set before the newest one.
   active.count = std::clamp(active.count - 1, std::min(active.count, 1), kMaxActive);
   return false;
+}
+
+// Faces that leave the tool no room hold it no deeper than it is, so that it still slides along them.
+void Proxy::acceptOverlaps(ActiveSet& active) const noexcept {
+  constexpr double kRise = 0.25;  // of the skin, so that rounding does not make a way along them lead inwards
+  for (int i = 0; i < active.count; ++i) {
+    HalfSpace& face = active.hits[static_cast<std::size_t>(i)].halfSpace;
+    face.standoff += std::min(0.0, face.height(position_) + kRise * query_.minSkin());
+  }
 }
 
 void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet& active) noexcept {
