@@ -230,15 +230,15 @@ Projection Proxy::nearestTo(const Vec3& target, const ActiveSet& active) const n
   return projectOntoActiveSet(halfSpaces.data(), active.count, target, position_, query_.minSkin() / 16);
 }
 
-// The work of a tick may be spent before the faces that hold the proxy are found again. Those of the last
-// tick hold it then: the force fades out (fadeWhenOverworked) and does not end at once.
+// The work of a tick may be spent before the faces that hold the proxy are found again, or on its way to
+// others. Those of the last tick hold it then, no farther than the proxy is from the HIP: the force fades out
+// (fadeWhenOverworked) and does not end for a tick.
 bool Proxy::restoreConstraints(const Vec3& hip, ActiveSet& active) const noexcept {
   if (!query_.workSpent()) return false;
   for (int i = 0; i < lastCount_; ++i) {
     const LastConstraint& last = lastConstraints_[static_cast<std::size_t>(i)];
     const HalfSpace& face = last.halfSpace;
-    const bool below = face.normal.dot(hip - face.anchor) < toolRadius_;
-    if (!below || std::abs(face.height(position_)) > kLargestGapTolerance_m) continue;
+    if (face.normal.dot(hip - face.anchor) >= toolRadius_) continue;
     for (int k = 0; k < query_.objectCount(); ++k) {
       const PlacedObject& object = query_.object(k);
       if (object.state->id != last.object || !rests(object)) continue;
