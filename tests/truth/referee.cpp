@@ -540,7 +540,7 @@ class Referee {
     // With unequal neighbours near, the stiffness is blended.
     if (mixedStiffness() && othersNear(f.object)) return;
     const auto hasRim = [&](int i) { return !rimsOf(reference_.face(i), near).empty(); };
-    if (friction_ > 0 && std::any_of(near.begin(), near.end(), hasRim)) return;
+    if (std::any_of(near.begin(), near.end(), hasRim)) return;
     const Material& m = reference_.materialOf(near[0]);
     const double depth = trial_.toolRadius_m - n.dot(hip_ - nearestOf(f, rendering_.proxy_m));
     const Point expected =

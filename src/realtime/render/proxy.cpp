@@ -152,6 +152,7 @@ void Proxy::updateProxy(const Vec3& hip) noexcept {
     return;
   }
   findConstraints(hip, active);
+  if (liftOut(active)) findConstraints(hip, active);
   if (contactSet_.count == 0) {
     slide_ = Slide{};
     return;
@@ -313,6 +314,21 @@ bool Proxy::approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Ve
   // No solution for all of them: keep the set before the newest one.
   active.count = std::clamp(active.count - 1, std::min(active.count, 1), kMaxActive);
   return false;
+}
+
+// Out of faces that overlap the tool: they deformed while friction held it, or it popped through others. True
+// when it moved.
+bool Proxy::liftOut(const ActiveSet& active) noexcept {
+  const auto overlaps = [&](const ObjectHit& hit) {
+    return hit.halfSpace.height(position_) < -4 * std::max(query_.minSkin(), query_.maxSkin());
+  };
+  if (std::none_of(active.hits.begin(), active.hits.begin() + active.count, overlaps)) return false;
+  const Vec3 way = nearestTo(position_, active).point - position_;
+  if (!(way.norm() <= 2 * query_.radius())) return false;
+  ObjectHit hit;
+  ++casts_;
+  position_ += (query_.cast(position_, position_ + way, hit) ? hit.stop : 1.0) * way;
+  return true;
 }
 
 // Faces that leave the tool no room hold it no deeper than it is, so that it still slides along them.

@@ -126,6 +126,7 @@ class Proxy {
   void updateProxy(const Vec3& hip) noexcept;
   void moveFrictionless(const Vec3& target, ActiveSet& active) noexcept;
   bool approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Vec3& goal) noexcept;
+  bool liftOut(const ActiveSet& active) noexcept;
   void acceptOverlaps(ActiveSet& active) const noexcept;
   bool escapeCorner(const Vec3& target, const ActiveSet& active) noexcept;
   void extrapolateStep(const Vec3& step, const Vec3& target) noexcept;
