@@ -393,15 +393,22 @@ class Referee {
     const Point& p = rendering_.proxy_m;
     const Point way = hip_ - p;
     if (way.norm() < 60e-6) return;
-    // Cheap: a face on the way.
+    // In a wedge, the ball of a point tool is farther from the faces that hold it, and the proxy on their
+    // planes.
     const double radius = trial_.toolRadius_m;
+    const bool wedge = radius == 0 && reference_.near(p, kWedge_m).size() > 1;
+    const Point start_m = wedge ? Point(p - 0.5 * kGap_m * way.normalized()) : p;
+    // Cheap: a face on the way.
     reference_.heights(hip_, hipHeights_);
     const double margin = radius + 1.5e-6;
     for (Eigen::Index i = 0; i < hipHeights_.size(); ++i) {
       const double start = heightsBefore_[i];  // of the proxy: swapped above
       const double end = hipHeights_[i];
+      // An object may keep the proxy behind a plane.
+      if (reference_.face(static_cast<int>(i)).unbounded && end < 0) return;
       if (std::min(start, end) > margin || std::max(start, end) < -margin) continue;
-      if (radius == 0 && reference_.crosses(static_cast<int>(i), p, hip_, 1.2 * kGap_m)) return;
+      if (radius == 0 && reference_.crosses(static_cast<int>(i), start_m, hip_, wedge ? kWedge_m : 1.2 * kGap_m))
+        return;
       if (radius > 0 && distanceOf(reference_.face(static_cast<int>(i)), p, hip_) < radius + 1e-6) {
         if (leavesFace(static_cast<int>(i), p)) continue;
         return;
@@ -415,6 +422,7 @@ class Referee {
         continue;
       if (distanceOf(reference_.face(static_cast<int>(i)), off, hip_) < kTouch_m) return;
     }
+    if (static_ && balances()) return;
     report("free", rendering_.contactForce_N.norm(), " N, and the way from the proxy ", p.transpose(),
            " to the HIP ", hip_.transpose(), " is free");
   }
