@@ -415,6 +415,7 @@ Vec3 Proxy::onFaces(const Vec3& hip, const ActiveSet& active) noexcept {
   // The same where they meet at a very acute angle: the faces may end before.
   const Vec3 way = place - position_;
   if (way.norm() > kLargestGapTolerance_m) place = position_ + kLargestGapTolerance_m * way.normalized();
+  if (count > 1 && way.norm() > 2 * query_.radius()) place = onFacesThatGoOn(place, active);
   // Nothing that rests is nearer to the proxy than the one face that it touches.
   if (count == 1 && query_.allAtRest()) return place;
   // Beyond the face or the edge that touches the ball, a half-space goes on: where two meet may be past a
@@ -429,6 +430,34 @@ Vec3 Proxy::onFaces(const Vec3& hip, const ActiveSet& active) noexcept {
   }
   place = position_ + share * closer;
   return position_ + query_.freeOfFaces(position_, place, count > 1) * (place - position_);
+}
+
+// In an acute wedge, faces may end before their planes meet: between them is a gap that the ball does not
+// pass. The nearest place on the way to `place` that all of them still reach.
+Vec3 Proxy::onFacesThatGoOn(const Vec3& place, const ActiveSet& active) noexcept {
+  const Vec3 way = place - position_;
+  if (!query_.ensureGathered(position_, way.norm())) return position_;
+  const auto reached = [&](const Vec3& x) {
+    unsigned holding = 0;
+    query_.forEachGathered(x, query_.radius(), [&](const Facet& f) {
+      if ((nearestPointOf(f, x) - x).norm() > f.radius + 4 * f.skin) return;
+      const double side = f.normal.dot(position_ - f.a) < 0 && !f.unbounded ? -1 : 1;
+      for (int i = 0; i < active.count; ++i) {
+        if (side * f.normal.dot(active.hits[static_cast<std::size_t>(i)].halfSpace.normal) > 0.5)
+          holding |= 1U << static_cast<unsigned>(i);
+      }
+    });
+    for (int i = 0; i < active.count; ++i) {
+      if (active.hits[static_cast<std::size_t>(i)].object < 0) holding |= 1U << static_cast<unsigned>(i);
+    }
+    return holding + 1 == 1U << static_cast<unsigned>(active.count);
+  };
+  if (reached(place)) return place;
+  double share = 0;
+  for (double step = 0.5; step > 1e-3; step *= 0.5) {
+    if (reached(position_ + (share + step) * way)) share += step;
+  }
+  return position_ + share * way;
 }
 
 // Above the popthrough force, the proxy steps through the faces that give way and moves on to the HIP. Other

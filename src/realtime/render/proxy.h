@@ -145,6 +145,7 @@ class Proxy {
   double slidingShare() const noexcept;
   void advanceSlide(double slip_m) noexcept;
   Vec3 onFaces(const Vec3& hip, const ActiveSet& active) noexcept;
+  Vec3 onFacesThatGoOn(const Vec3& place, const ActiveSet& active) noexcept;
   void updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet& active) noexcept;
   void popThrough(const Vec3& hip, std::uint32_t& status) noexcept;
   void applyForceShading() noexcept;
