@@ -206,7 +206,7 @@ class Referee {
       return report("escaped", beyondWalls(p), " m beyond a wall, proxy ", p.transpose());
     const double spring = (p - hip_).norm();
     const bool unfinished = (rendering_.status & kUnfinished) != 0;
-    if (!rendering_.touching && !unfinished && spring > rounding_) {
+    if (!rendering_.touching && spring > rounding_ && (touchedBefore_ || !unfinished)) {
       return report("lost", "no contact, and the proxy is ", spring, " m from the HIP");
     }
     // Frictionless, the place of the tick before was free and nearer.

@@ -231,11 +231,11 @@ Projection Proxy::nearestTo(const Vec3& target, const ActiveSet& active) const n
   return projectOntoActiveSet(halfSpaces.data(), active.count, target, position_, query_.minSkin() / 16);
 }
 
-// The work of a tick may be spent before the faces that hold the proxy are found again, or on its way to
+// The work or the casts of a tick may be spent before the faces that hold the proxy are found again, or on its way to
 // others. Those of the last tick hold it then, no farther than the proxy is from the HIP: the force fades out
 // (fadeWhenOverworked) and does not end for a tick.
 bool Proxy::restoreConstraints(const Vec3& hip, ActiveSet& active) const noexcept {
-  if (!query_.workSpent()) return false;
+  if (!query_.workSpent() && casts_ < kMaxCasts) return false;
   for (int i = 0; i < lastCount_; ++i) {
     const LastConstraint& last = lastConstraints_[static_cast<std::size_t>(i)];
     const HalfSpace& face = last.halfSpace;
