@@ -407,7 +407,8 @@ class Referee {
       // An object may keep the proxy behind a plane.
       if (reference_.face(static_cast<int>(i)).unbounded && end < 0) return;
       if (std::min(start, end) > margin || std::max(start, end) < -margin) continue;
-      if (radius == 0 && reference_.crosses(static_cast<int>(i), start_m, hip_, wedge ? kWedge_m : 1.2 * kGap_m))
+      if (radius == 0 &&
+          reference_.crosses(static_cast<int>(i), start_m, hip_, wedge ? kWedge_m : 1.2 * kGap_m))
         return;
       if (radius > 0 && distanceOf(reference_.face(static_cast<int>(i)), p, hip_) < radius + 1e-6) {
         if (leavesFace(static_cast<int>(i), p)) continue;
@@ -588,12 +589,13 @@ class Referee {
     if (radius > 0) {
       if (!nearerByRolling(p, radius, better)) return;
     } else {
-      FreeSpace space(reference_, p, 200e-6, kFollower_m, trial_.seed);
-      const std::optional<Point> ball = placeNow(space);
-      if (!ball || !nearerByRolling(*ball, kRolling_m, better)) return;
-      // One tick does not tell on which side of a gap the ball is.
+      const Point push = rendering_.normalForce_N.stableNormalized();
+      if (!nearerByRolling(p + kRolling_m * push, kRolling_m, better)) return;
+      // One tick does not tell on which side of a gap the ball is, nor does its follower on coincident faces:
+      // it is where the force pushes.
       if (secondOpinions_-- <= 0) return;
-      const std::vector<Point> balls = followers(trial_, reported_, kFollower_m);
+      std::vector<Point> balls = followers(trial_, reported_, kFollower_m);
+      std::erase_if(balls, [&](const Point& q) { return push.dot(q - p) < 0; });
       if (balls.empty() || !std::all_of(balls.begin(), balls.end(), [&](const Point& q) {
             return nearerByRolling(q, kRolling_m, better);
           }))

@@ -231,9 +231,9 @@ Projection Proxy::nearestTo(const Vec3& target, const ActiveSet& active) const n
   return projectOntoActiveSet(halfSpaces.data(), active.count, target, position_, query_.minSkin() / 16);
 }
 
-// The work or the casts of a tick may be spent before the faces that hold the proxy are found again, or on its way to
-// others. Those of the last tick hold it then, no farther than the proxy is from the HIP: the force fades out
-// (fadeWhenOverworked) and does not end for a tick.
+// The work or the casts of a tick may be spent before the faces that hold the proxy are found again, or on
+// its way to others. Those of the last tick hold it then, no farther than the proxy is from the HIP: the
+// force fades out (fadeWhenOverworked) and does not end for a tick.
 bool Proxy::restoreConstraints(const Vec3& hip, ActiveSet& active) const noexcept {
   if (!query_.workSpent() && casts_ < kMaxCasts) return false;
   for (int i = 0; i < lastCount_; ++i) {
@@ -435,12 +435,17 @@ Vec3 Proxy::onFaces(const Vec3& hip, const ActiveSet& active) noexcept {
 // In an acute wedge, faces may end before their planes meet: between them is a gap that the ball does not
 // pass. The nearest place on the way to `place` that all of them still reach.
 Vec3 Proxy::onFacesThatGoOn(const Vec3& place, const ActiveSet& active) noexcept {
+  constexpr double kOverhang = 0.25;  // share of the radius
   const Vec3 way = place - position_;
   if (!query_.ensureGathered(position_, way.norm())) return position_;
   const auto reached = [&](const Vec3& x) {
     unsigned holding = 0;
     query_.forEachGathered(x, query_.radius(), [&](const Facet& f) {
-      if ((nearestPointOf(f, x) - x).norm() > f.radius + 4 * f.skin) return;
+      const double height = f.normal.dot(x - f.a);
+      const double distance2 = (nearestPointOf(f, x) - x).squaredNorm();
+      const double overhang = kOverhang * f.radius;
+      if (std::abs(height) > f.radius + 4 * f.skin || distance2 > height * height + overhang * overhang)
+        return;
       const double side = f.normal.dot(position_ - f.a) < 0 && !f.unbounded ? -1 : 1;
       for (int i = 0; i < active.count; ++i) {
         if (side * f.normal.dot(active.hits[static_cast<std::size_t>(i)].halfSpace.normal) > 0.5)
