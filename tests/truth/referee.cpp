@@ -470,6 +470,12 @@ class Referee {
            std::any_of(trial_.planes.begin(), trial_.planes.end(), other);
   }
 
+  // A one-sided face does not hold a ball that is behind it: it is on the side to which the force pushes.
+  bool passedFromBehind(const Face& f) const {
+    const Point ball = rendering_.proxy_m + 0.5 * kGap_m * rendering_.normalForce_N.stableNormalized();
+    return !f.unbounded && !reference_.touchableFrom(f, f.normal.dot(ball - f.a));
+  }
+
   // A point is a ball of the gap's radius, and friction holds it on the round of a rim. There the surface
   // turns from the normal of the face to the outward direction in its plane. A rim: no other face goes on
   // beyond it.
@@ -484,7 +490,7 @@ class Referee {
       const Point beyond = p + 2 * kGap_m * outward;
       const auto goesOn = [&](int i) {
         const Face& other = reference_.face(i);
-        if (other.a == f.a && other.b == f.b && other.c == f.c) return false;
+        if ((other.a == f.a && other.b == f.b && other.c == f.c) || passedFromBehind(other)) return false;
         return outward.dot(normalAt(other)) < -1e-6 ||
                (nearestOf(other, beyond) - beyond).norm() < 1.5 * kGap_m;
       };
@@ -506,7 +512,8 @@ class Referee {
       const Point way = std::cos(angle) * u + std::sin(angle) * v;
       const Point beyond = p + 2 * kGap_m * way;
       const auto covers = [&](int i) {
-        return (nearestOf(reference_.face(i), beyond) - beyond).norm() < 0.3 * kGap_m;
+        return !passedFromBehind(reference_.face(i)) &&
+               (nearestOf(reference_.face(i), beyond) - beyond).norm() < 0.3 * kGap_m;
       };
       if (std::none_of(near.begin(), near.end(), covers)) open.push_back(way);
     }
