@@ -602,7 +602,7 @@ class Referee {
       // it is where the force pushes.
       if (secondOpinions_-- <= 0) return;
       std::vector<Point> balls = followers(trial_, reported_, kFollower_m);
-      std::erase_if(balls, [&](const Point& q) { return push.dot(q - p) < 0; });
+      std::erase_if(balls, [&](const Point& q) { return push.dot(q - p) < 0 || behindPlane(q); });
       if (balls.empty() || !std::all_of(balls.begin(), balls.end(), [&](const Point& q) {
             return nearerByRolling(q, kRolling_m, better);
           }))
@@ -613,13 +613,20 @@ class Referee {
            better.transpose(), " is nearer");
   }
 
-  // Whether a ball could come nearer to the HIP from where it is nearest to the proxy.
+  bool behindPlane(const Point& q) const {
+    return std::any_of(trial_.planes.begin(), trial_.planes.end(),
+                       [&](const TrialPlane& plane) { return plane.normal.dot(q) + plane.offset_m < 0; });
+  }
+
+  // Whether a ball could come nearer to the HIP from where it is nearest to the proxy, by more than is known
+  // of its place.
   bool nearerByRolling(const Point& ball, double radius, Point& better) const {
     Descent descent(reference_, ball, kDescentReach_m, radius,
                     trial_.seed + static_cast<std::uint64_t>(tick_));
     const Point place = descent.from(ball, rendering_.proxy_m);
     better = descent.from(place, hip_);
-    return (place - hip_).norm() - (better - hip_).norm() > kStuck_m + 2e-3 * radius;
+    const double unknown = trial_.toolRadius_m > 0 ? 2e-3 * radius : kGap_m;
+    return (place - hip_).norm() - (better - hip_).norm() > kStuck_m + unknown;
   }
 
   // With the HIP behind an edge that touches it, or in a cage that a small turn of the pull opens, a proxy
