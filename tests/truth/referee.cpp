@@ -602,7 +602,7 @@ class Referee {
       // it is where the force pushes.
       if (secondOpinions_-- <= 0) return;
       std::vector<Point> balls = followers(trial_, reported_, kFollower_m);
-      std::erase_if(balls, [&](const Point& q) { return push.dot(q - p) < 0 || behindPlane(q); });
+      std::erase_if(balls, [&](const Point& q) { return push.dot(q - p) < 0 || behindContact(q); });
       if (balls.empty() || !std::all_of(balls.begin(), balls.end(), [&](const Point& q) {
             return nearerByRolling(q, kRolling_m, better);
           }))
@@ -613,9 +613,12 @@ class Referee {
            better.transpose(), " is nearer");
   }
 
-  bool behindPlane(const Point& q) const {
+  bool behindContact(const Point& q) const {
+    const Rendering& r = rendering_;
     return std::any_of(trial_.planes.begin(), trial_.planes.end(),
-                       [&](const TrialPlane& plane) { return plane.normal.dot(q) + plane.offset_m < 0; });
+                       [&](const TrialPlane& f) { return f.normal.dot(q) + f.offset_m < 0; }) ||
+           std::any_of(r.contacts.begin(), r.contacts.begin() + r.contactCount,
+                       [&](const auto& contact) { return contact.normal.dot(q - r.proxy_m) < 0; });
   }
 
   // Whether a ball could come nearer to the HIP from where it is nearest to the proxy, by more than is known
