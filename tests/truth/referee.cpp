@@ -29,6 +29,7 @@ constexpr double kTouch_m = 25e-6;  // faces within this of the tool may hold it
 constexpr double kStuck_m = 10e-6;
 constexpr double kDescentReach_m = 1e-3;
 constexpr double kRolling_m = 0.505 * kGap_m;  // of the ball of a point tool, a little wider
+constexpr double kWider_m = 1.2 * kFollower_m;
 constexpr double kTremor_m = 1e-6;
 constexpr double kFlat = 2e-3;  // share of the pull: flatter directions lead nowhere
 constexpr int kTremorTicks = 10;
@@ -603,10 +604,11 @@ class Referee {
       if (secondOpinions_-- <= 0) return;
       std::vector<Point> balls = followers(trial_, reported_, kFollower_m);
       std::erase_if(balls, [&](const Point& q) { return push.dot(q - p) < 0 || behindContact(q); });
-      if (balls.empty() || !std::all_of(balls.begin(), balls.end(), [&](const Point& q) {
-            return nearerByRolling(q, kRolling_m, better);
-          }))
-        return;
+      // A wider ball is not held by the same cages.
+      const auto stuck = [&](const Point& q) {
+        return nearerByRolling(q, kRolling_m, better) && nearerByRolling(q, kWider_m, better);
+      };
+      if (balls.empty() || !std::all_of(balls.begin(), balls.end(), stuck)) return;
     }
     if (balances()) return;
     report("stuck", "at ", p.transpose(), ", ", (p - hip_).norm(), " m from the HIP ", hip_.transpose(), "; ",

@@ -275,8 +275,9 @@ bool Proxy::approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Ve
     Projection nearest = nearestTo(target, active);
     if (!nearest.found || (nearest.point - target).norm() > farthest) {
       jammed_ = true;
-      acceptOverlaps(active);
-      nearest = nearestTo(target, active);
+      // A ball that came from behind overlaps faces by as much as its radius.
+      if (toolRadius_ == 0) acceptOverlaps(active);
+      nearest = toolRadius_ == 0 ? nearestTo(target, active) : Projection{};
     }
     goal = nearest.found ? nearest.point : position_;
     if (!nearest.found) break;
