@@ -591,6 +591,8 @@ class Referee {
     const Point& p = rendering_.proxy_m;
     const double radius = trial_.toolRadius_m;
     if ((p - hip_).norm() < kStuck_m) return;
+    // One that popped through may overlap faces that leave it no room.
+    if (pops_) return;
     // A ball converges on edges over several ticks: judged once it rests.
     if (radius > 0 && (p - proxyBefore_).norm() > kGap_m) return;
     Point better = p;
@@ -599,11 +601,11 @@ class Referee {
     } else {
       const Point push = rendering_.normalForce_N.stableNormalized();
       if (!nearerByRolling(p + kRolling_m * push, kRolling_m, better)) return;
-      // One tick does not tell on which side of a gap the ball is, nor does its follower on coincident faces:
-      // it is where the force pushes.
+      // One tick does not tell on which side of a gap the ball is, nor does its follower on faces that cross
+      // or coincide: it is where the force pushes.
       if (secondOpinions_-- <= 0) return;
       std::vector<Point> balls = followers(trial_, reported_, kFollower_m);
-      std::erase_if(balls, [&](const Point& q) { return push.dot(q - p) < 0 || behindContact(q); });
+      std::erase_if(balls, [&](const Point& q) { return !isPushedTo(q); });
       // A wider ball is not held by the same cages.
       const auto stuck = [&](const Point& q) {
         return nearerByRolling(q, kRolling_m, better) && nearerByRolling(q, kWider_m, better);
@@ -615,12 +617,17 @@ class Referee {
            better.transpose(), " is nearer");
   }
 
-  bool behindContact(const Point& q) const {
-    const Rendering& r = rendering_;
-    return std::any_of(trial_.planes.begin(), trial_.planes.end(),
-                       [&](const TrialPlane& f) { return f.normal.dot(q) + f.offset_m < 0; }) ||
-           std::any_of(r.contacts.begin(), r.contacts.begin() + r.contactCount,
-                       [&](const auto& contact) { return contact.normal.dot(q - r.proxy_m) < 0; });
+  // Whether the faces at the proxy give this force to a ball there.
+  bool isPushedTo(const Point& ball) const {
+    std::vector<Point> normals;
+    for (const int i : reference_.near(rendering_.proxy_m, kTouch_m)) {
+      const Face& f = reference_.face(i);
+      const bool behind = f.normal.dot(ball - f.a) < 0;
+      if (behind && f.unbounded) return false;
+      normals.emplace_back(behind ? Point(-f.normal) : f.normal);
+    }
+    const Point& force = rendering_.normalForce_N;
+    return distanceFromCone(force, normals) <= 2e-3 * force.norm() + stiffest_ * kForceTolerance_m;
   }
 
   // Whether a ball could come nearer to the HIP from where it is nearest to the proxy, by more than is known
