@@ -261,5 +261,35 @@ TEST(HoleTest, a_point_enters_holes_wider_than_the_tolerance) {
   }
 }
 
+// Two walls of an acute wedge that end before they meet: the gap between them is 6 um wide, and their planes
+// meet behind it. A point rests on the walls in front of the gap; without a gap, where they meet.
+TEST(WedgeTest, the_reported_place_is_in_front_of_the_gap) {
+  constexpr double kHalfAngle = 0.26;
+  for (const double end : {0.0, 12e-6}) {
+    Dice dice(3);
+    Trial trial;
+    for (const double side : {-1.0, 1.0}) {
+      const Point up(side * std::sin(kHalfAngle), 0, std::cos(kHalfAngle));
+      const Point along(0, side * 2 * kHalf_m, 0);
+      trial.objects.push_back(
+          bake(patch(end * up - 0.5 * along, kHalf_m * up, along, 2, 3, 0, dice), Pose{}));
+    }
+    for (int k = 0; k <= 40; ++k) trial.hips.emplace_back(0, 0, 0.002 - 1e-4 * k);
+    Stage stage(trial);
+    realtime::Renderer renderer;
+    realtime::Rendering rendering;
+    for (std::size_t k = 0; k < trial.hips.size(); ++k) {
+      device::DeviceState state;
+      state.time = static_cast<base::Nanos>(k) * realtime::fixture::kTick;
+      state.position_m = trial.hips[k];
+      renderer.step(stage.at(static_cast<int>(k)), state, state.time, realtime::fixture::kTick, rendering);
+    }
+    EXPECT_TRUE(rendering.touching);
+    const double gap = end * std::cos(kHalfAngle);
+    EXPECT_GT(rendering.proxy_m.z(), gap - 2e-6);
+    EXPECT_LT(rendering.proxy_m.z(), gap + 1e-6);
+  }
+}
+
 }  // namespace
 }  // namespace hapticd::truth

@@ -43,6 +43,7 @@ class Follower {
     }
     return arrived;
   }
+  const std::vector<Point>& places() const { return places_; }
 
  private:
   // Before the last one. The first tick of a trial is free.
@@ -175,6 +176,12 @@ class Follower {
 
 bool follows(const Trial& trial, const std::vector<ReportedProxy>& proxies, double ballRadius) {
   return Follower(trial, proxies, ballRadius).arrives();
+}
+
+std::vector<Point> followers(const Trial& trial, const std::vector<ReportedProxy>& proxies,
+                             double ballRadius) {
+  Follower follower(trial, proxies, ballRadius);
+  return follower.arrives() ? follower.places() : std::vector<Point>{};
 }
 
 }  // namespace hapticd::truth

@@ -23,4 +23,8 @@ struct ReportedProxy {
 /// the last of them.
 bool follows(const Trial& trial, const std::vector<ReportedProxy>& proxies, double ballRadius);
 
+/// The places where that ball may be in the end; empty where there is no room for it.
+std::vector<Point> followers(const Trial& trial, const std::vector<ReportedProxy>& proxies,
+                             double ballRadius);
+
 }  // namespace hapticd::truth

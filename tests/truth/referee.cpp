@@ -5,6 +5,7 @@
 #include <cmath>
 #include <initializer_list>
 #include <limits>
+#include <random>
 #include <sstream>
 
 #include "realtime/render/renderer.h"
@@ -27,6 +28,11 @@ constexpr double kWedge_m = 60e-6;  // the reported proxy is at most 50 um from 
 constexpr double kTouch_m = 25e-6;  // faces within this of the tool may hold it
 constexpr double kStuck_m = 10e-6;
 constexpr double kDescentReach_m = 1e-3;
+constexpr double kRolling_m = 0.505 * kGap_m;  // of the ball of a point tool, a little wider
+constexpr double kWider_m = 1.2 * kFollower_m;
+constexpr double kTremor_m = 1e-6;
+constexpr double kFlat = 2e-3;  // share of the pull: flatter directions lead nowhere
+constexpr int kTremorTicks = 10;
 constexpr unsigned kUnexpected =
     realtime::kRenderNotFinite | realtime::kRenderGeometryJump | realtime::kRenderReleased;
 constexpr unsigned kUnfinished = realtime::kRenderIterationLimit | realtime::kRenderCandidateLimit;
@@ -201,7 +207,7 @@ class Referee {
       return report("escaped", beyondWalls(p), " m beyond a wall, proxy ", p.transpose());
     const double spring = (p - hip_).norm();
     const bool unfinished = (rendering_.status & kUnfinished) != 0;
-    if (!rendering_.touching && !unfinished && spring > rounding_) {
+    if (!rendering_.touching && spring > rounding_ && (touchedBefore_ || !unfinished)) {
       return report("lost", "no contact, and the proxy is ", spring, " m from the HIP");
     }
     // Frictionless, the place of the tick before was free and nearer.
@@ -388,15 +394,23 @@ class Referee {
     const Point& p = rendering_.proxy_m;
     const Point way = hip_ - p;
     if (way.norm() < 60e-6) return;
-    // Cheap: a face on the way.
+    // In a wedge, the ball of a point tool is farther from the faces that hold it, and the proxy on their
+    // planes.
     const double radius = trial_.toolRadius_m;
+    const bool wedge = radius == 0 && reference_.near(p, kWedge_m).size() > 1;
+    const Point start_m = wedge ? Point(p - 0.5 * kGap_m * way.normalized()) : p;
+    // Cheap: a face on the way.
     reference_.heights(hip_, hipHeights_);
     const double margin = radius + 1.5e-6;
     for (Eigen::Index i = 0; i < hipHeights_.size(); ++i) {
       const double start = heightsBefore_[i];  // of the proxy: swapped above
       const double end = hipHeights_[i];
+      // An object may keep the proxy behind a plane.
+      if (reference_.face(static_cast<int>(i)).unbounded && end < 0) return;
       if (std::min(start, end) > margin || std::max(start, end) < -margin) continue;
-      if (radius == 0 && reference_.crosses(static_cast<int>(i), p, hip_, 1.2 * kGap_m)) return;
+      if (radius == 0 &&
+          reference_.crosses(static_cast<int>(i), start_m, hip_, wedge ? kWedge_m : 1.2 * kGap_m))
+        return;
       if (radius > 0 && distanceOf(reference_.face(static_cast<int>(i)), p, hip_) < radius + 1e-6) {
         if (leavesFace(static_cast<int>(i), p)) continue;
         return;
@@ -410,6 +424,7 @@ class Referee {
         continue;
       if (distanceOf(reference_.face(static_cast<int>(i)), off, hip_) < kTouch_m) return;
     }
+    if (static_ && balances()) return;
     report("free", rendering_.contactForce_N.norm(), " N, and the way from the proxy ", p.transpose(),
            " to the HIP ", hip_.transpose(), " is free");
   }
@@ -456,6 +471,12 @@ class Referee {
            std::any_of(trial_.planes.begin(), trial_.planes.end(), other);
   }
 
+  // A one-sided face does not hold a ball that is behind it: it is on the side to which the force pushes.
+  bool passedFromBehind(const Face& f) const {
+    const Point ball = rendering_.proxy_m + 0.5 * kGap_m * rendering_.normalForce_N.stableNormalized();
+    return !f.unbounded && !reference_.touchableFrom(f, f.normal.dot(ball - f.a));
+  }
+
   // A point is a ball of the gap's radius, and friction holds it on the round of a rim. There the surface
   // turns from the normal of the face to the outward direction in its plane. A rim: no other face goes on
   // beyond it.
@@ -470,7 +491,7 @@ class Referee {
       const Point beyond = p + 2 * kGap_m * outward;
       const auto goesOn = [&](int i) {
         const Face& other = reference_.face(i);
-        if (other.a == f.a && other.b == f.b && other.c == f.c) return false;
+        if ((other.a == f.a && other.b == f.b && other.c == f.c) || passedFromBehind(other)) return false;
         return outward.dot(normalAt(other)) < -1e-6 ||
                (nearestOf(other, beyond) - beyond).norm() < 1.5 * kGap_m;
       };
@@ -492,7 +513,8 @@ class Referee {
       const Point way = std::cos(angle) * u + std::sin(angle) * v;
       const Point beyond = p + 2 * kGap_m * way;
       const auto covers = [&](int i) {
-        return (nearestOf(reference_.face(i), beyond) - beyond).norm() < 0.3 * kGap_m;
+        return !passedFromBehind(reference_.face(i)) &&
+               (nearestOf(reference_.face(i), beyond) - beyond).norm() < 0.3 * kGap_m;
       };
       if (std::none_of(near.begin(), near.end(), covers)) open.push_back(way);
     }
@@ -535,7 +557,7 @@ class Referee {
     // With unequal neighbours near, the stiffness is blended.
     if (mixedStiffness() && othersNear(f.object)) return;
     const auto hasRim = [&](int i) { return !rimsOf(reference_.face(i), near).empty(); };
-    if (friction_ > 0 && std::any_of(near.begin(), near.end(), hasRim)) return;
+    if (std::any_of(near.begin(), near.end(), hasRim)) return;
     const Material& m = reference_.materialOf(near[0]);
     const double depth = trial_.toolRadius_m - n.dot(hip_ - nearestOf(f, rendering_.proxy_m));
     const Point expected =
@@ -564,40 +586,79 @@ class Referee {
     }
   }
 
-  // A ball may balance on an edge, with the HIP exactly behind: no small move brings it nearer.
-  bool balances() const {
-    const Point& p = rendering_.proxy_m;
-    if (trial_.toolRadius_m == 0) return false;
-    const Point pull = (hip_ - p).stableNormalized();
-    const std::vector<int> near = reference_.near(p, trial_.toolRadius_m + 1e-6);
-    return std::any_of(near.begin(), near.end(), [&](int i) {
-      const Point in = nearestOf(reference_.face(i), p) - p;
-      return in.stableNormalized().cross(pull).norm() < 1e-4 && (hip_ - p).norm() > in.norm();
-    });
-  }
-
   void judgeRest() {
     if (!static_ || friction_ > 0 || (rendering_.status & realtime::kRenderPopthrough) != 0) return;
     const Point& p = rendering_.proxy_m;
     const double radius = trial_.toolRadius_m;
-    const double spring = (p - hip_).norm();
-    if (spring < kStuck_m || balances()) return;
+    if ((p - hip_).norm() < kStuck_m) return;
+    // One that popped through may overlap faces that leave it no room.
+    if (pops_) return;
     // A ball converges on edges over several ticks: judged once it rests.
     if (radius > 0 && (p - proxyBefore_).norm() > kGap_m) return;
-    Descent descent(reference_, p, kDescentReach_m, radius, radius > 0 ? 0.0 : 1.2 * kFollower_m,
+    Point better = p;
+    if (radius > 0) {
+      if (!nearerByRolling(p, radius, better)) return;
+    } else {
+      const Point push = rendering_.normalForce_N.stableNormalized();
+      if (!nearerByRolling(p + kRolling_m * push, kRolling_m, better)) return;
+      // One tick does not tell on which side of a gap the ball is, nor does its follower on faces that cross
+      // or coincide: it is where the force pushes.
+      if (secondOpinions_-- <= 0) return;
+      std::vector<Point> balls = followers(trial_, reported_, kFollower_m);
+      std::erase_if(balls, [&](const Point& q) { return !isPushedTo(q); });
+      // A wider ball is not held by the same cages.
+      const auto stuck = [&](const Point& q) {
+        return nearerByRolling(q, kRolling_m, better) && nearerByRolling(q, kWider_m, better);
+      };
+      if (balls.empty() || !std::all_of(balls.begin(), balls.end(), stuck)) return;
+    }
+    if (balances()) return;
+    report("stuck", "at ", p.transpose(), ", ", (p - hip_).norm(), " m from the HIP ", hip_.transpose(), "; ",
+           better.transpose(), " is nearer");
+  }
+
+  // Whether the faces at the proxy give this force to a ball there.
+  bool isPushedTo(const Point& ball) const {
+    std::vector<Point> normals;
+    for (const int i : reference_.near(rendering_.proxy_m, kTouch_m)) {
+      const Face& f = reference_.face(i);
+      const bool behind = f.normal.dot(ball - f.a) < 0;
+      if (behind && f.unbounded) return false;
+      normals.emplace_back(behind ? Point(-f.normal) : f.normal);
+    }
+    const Point& force = rendering_.normalForce_N;
+    return distanceFromCone(force, normals) <= 2e-3 * force.norm() + stiffest_ * kForceTolerance_m;
+  }
+
+  // Whether a ball could come nearer to the HIP from where it is nearest to the proxy, by more than is known
+  // of its place.
+  bool nearerByRolling(const Point& ball, double radius, Point& better) const {
+    Descent descent(reference_, ball, kDescentReach_m, radius,
                     trial_.seed + static_cast<std::uint64_t>(tick_));
-    const Point better = descent.from(p, hip_);
-    const double gain = spring - (better - hip_).norm();
-    if (gain <= kStuck_m + 2e-3 * radius) return;
-    // Only where a ball as wide as the gap fits: within a slit, edges hold a point on purpose.
-    FreeSpace space(reference_, better, 200e-6, 1.2 * kFollower_m, trial_.seed);
-    const auto visible = [&](const Point& q) {
-      return std::none_of(space.faces().begin(), space.faces().end(),
-                          [&](int i) { return reference_.pierces(i, better, q, 0); });
-    };
-    if (radius == 0 && !space.placeNear(better, visible)) return;
-    report("stuck", "at ", p.transpose(), ", ", spring, " m from the HIP ", hip_.transpose(), "; ",
-           better.transpose(), " is nearer by ", gain);
+    const Point place = descent.from(ball, rendering_.proxy_m);
+    better = descent.from(place, hip_);
+    const double unknown = trial_.toolRadius_m > 0 ? 2e-3 * radius : kGap_m;
+    return (place - hip_).norm() - (better - hip_).norm() > kStuck_m + unknown;
+  }
+
+  // With the HIP behind an edge that touches it, or in a cage that a small turn of the pull opens, a proxy
+  // rests until the hand trembles.
+  bool balances() const {
+    std::mt19937_64 random(trial_.seed);
+    std::normal_distribution<double> normal;
+    Stage stage(trial_);
+    realtime::Renderer renderer({trial_.toolRadius_m, false});
+    Rendering r;
+    device::DeviceState state;
+    const double tremor = kTremor_m + kFlat * (rendering_.proxy_m - hip_).norm();
+    for (int i = 0; i <= tick_ + kTremorTicks; ++i) {
+      const Point& hip = trial_.hips[static_cast<std::size_t>(std::min(i, tick_))];
+      const Point way(normal(random), normal(random), normal(random));
+      state.time = i * realtime::fixture::kTick;
+      state.position_m = i > tick_ ? Point(hip + tremor * way.normalized()) : hip;
+      renderer.step(stage.at(i), state, state.time, realtime::fixture::kTick, r);
+    }
+    return (r.proxy_m - rendering_.proxy_m).norm() > kStuck_m + 3 * tremor;
   }
 
   const Trial& trial_;
@@ -616,6 +677,8 @@ class Referee {
   double stiffest_ = 0;
   double damping_ = 0;
   double friction_ = 0;
+
+  int secondOpinions_ = 5;  // they take long
 
   int tick_ = 0;
   Rendering rendering_;

@@ -143,7 +143,7 @@ TEST(Referee, mended_findings_stay_mended) {
                                   << verdict.finding->text;
     ++count;
   }
-  EXPECT_GE(count, 44);
+  EXPECT_GE(count, 55);
 }
 
 // A hand that presses on a plate: nothing to find. With a false wall in front of the plate, the referee finds

@@ -154,6 +154,7 @@ void Proxy::updateProxy(const Vec3& hip) noexcept {
     return;
   }
   findConstraints(hip, active);
+  if (liftOut(active)) findConstraints(hip, active);
   if (contactSet_.count == 0) {
     slide_ = Slide{};
     return;
@@ -232,15 +233,15 @@ Projection Proxy::nearestTo(const Vec3& target, const ActiveSet& active) const n
   return projectOntoActiveSet(halfSpaces.data(), active.count, target, position_, query_.minSkin() / 16);
 }
 
-// The work of a tick may be spent before the faces that hold the proxy are found again. Those of the last
-// tick hold it then: the force fades out (fadeWhenOverworked) and does not end at once.
+// The work or the casts of a tick may be spent before the faces that hold the proxy are found again, or on
+// its way to others. Those of the last tick hold it then, no farther than the proxy is from the HIP: the
+// force fades out (fadeWhenOverworked) and does not end for a tick.
 bool Proxy::restoreConstraints(const Vec3& hip, ActiveSet& active) const noexcept {
-  if (!query_.workSpent()) return false;
+  if (!query_.workSpent() && casts_ < kMaxCasts) return false;
   for (int i = 0; i < lastCount_; ++i) {
     const LastConstraint& last = lastConstraints_[static_cast<std::size_t>(i)];
     const HalfSpace& face = last.halfSpace;
-    const bool below = face.normal.dot(hip - face.anchor) < toolRadius_;
-    if (!below || std::abs(face.height(position_)) > kLargestGapTolerance_m) continue;
+    if (face.normal.dot(hip - face.anchor) >= toolRadius_) continue;
     for (int k = 0; k < query_.objectCount(); ++k) {
       const PlacedObject& object = query_.object(k);
       if (object.state->id != last.object || !rests(object)) continue;
@@ -271,14 +272,17 @@ bool Proxy::approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Ve
   // A face that the tool overlaps moves it out, by its own way in at most. Faces that leave it no room would
   // move it far: their planes may meet anywhere.
   const double farthest = (position_ - target).norm() + 2 * query_.radius() + 4 * skin;
+  jammed_ = false;
   while (casts_ < limit) {
-    const Projection nearest = nearestTo(target, active);
-    goal = nearest.point;
-    jammed_ = !nearest.found || (goal - target).norm() > farthest;
-    if (jammed_) {
-      goal = position_;
-      break;
+    Projection nearest = nearestTo(target, active);
+    if (!nearest.found || (nearest.point - target).norm() > farthest) {
+      jammed_ = true;
+      // A ball that came from behind overlaps faces by as much as its radius.
+      if (toolRadius_ == 0) acceptOverlaps(active);
+      nearest = toolRadius_ == 0 ? nearestTo(target, active) : Projection{};
     }
+    goal = nearest.found ? nearest.point : position_;
+    if (!nearest.found) break;
     const ActiveSet all = active;
     active.count = nearest.count;
     for (int i = 0; i < nearest.count; ++i) {
@@ -313,6 +317,30 @@ bool Proxy::approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Ve
   // No solution for all of them: keep the set before the newest one.
   active.count = std::clamp(active.count - 1, std::min(active.count, 1), kMaxActive);
   return false;
+}
+
+// Out of faces that overlap the tool: they deformed while friction held it, or it popped through others. True
+// when it moved.
+bool Proxy::liftOut(const ActiveSet& active) noexcept {
+  const auto overlaps = [&](const ObjectHit& hit) {
+    return hit.halfSpace.height(position_) < -4 * std::max(query_.minSkin(), query_.maxSkin());
+  };
+  if (std::none_of(active.hits.begin(), active.hits.begin() + active.count, overlaps)) return false;
+  const Vec3 way = nearestTo(position_, active).point - position_;
+  if (!(way.norm() <= 2 * query_.radius())) return false;
+  ObjectHit hit;
+  ++casts_;
+  position_ += (query_.cast(position_, position_ + way, hit) ? hit.stop : 1.0) * way;
+  return true;
+}
+
+// Faces that leave the tool no room hold it no deeper than it is, so that it still slides along them.
+void Proxy::acceptOverlaps(ActiveSet& active) const noexcept {
+  constexpr double kRise = 0.25;  // of the skin, so that rounding does not make a way along them lead inwards
+  for (int i = 0; i < active.count; ++i) {
+    HalfSpace& face = active.hits[static_cast<std::size_t>(i)].halfSpace;
+    face.standoff += std::min(0.0, face.height(position_) + kRise * query_.minSkin());
+  }
 }
 
 void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet& active) noexcept {
@@ -390,6 +418,7 @@ Vec3 Proxy::onFaces(const Vec3& hip, const ActiveSet& active) noexcept {
   // The same where they meet at a very acute angle: the faces may end before.
   const Vec3 way = place - position_;
   if (way.norm() > kLargestGapTolerance_m) place = position_ + kLargestGapTolerance_m * way.normalized();
+  if (count > 1 && way.norm() > 2 * query_.radius()) place = onFacesThatGoOn(place, active);
   // Nothing that rests is nearer to the proxy than the one face that it touches.
   if (count == 1 && query_.allAtRest()) return place;
   // Beyond the face or the edge that touches the ball, a half-space goes on: where two meet may be past a
@@ -404,6 +433,39 @@ Vec3 Proxy::onFaces(const Vec3& hip, const ActiveSet& active) noexcept {
   }
   place = position_ + share * closer;
   return position_ + query_.freeOfFaces(position_, place, count > 1) * (place - position_);
+}
+
+// In an acute wedge, faces may end before their planes meet: between them is a gap that the ball does not
+// pass. The nearest place on the way to `place` that all of them still reach.
+Vec3 Proxy::onFacesThatGoOn(const Vec3& place, const ActiveSet& active) noexcept {
+  constexpr double kOverhang = 0.25;  // share of the radius
+  const Vec3 way = place - position_;
+  if (!query_.ensureGathered(position_, way.norm())) return position_;
+  const auto reached = [&](const Vec3& x) {
+    unsigned holding = 0;
+    query_.forEachGathered(x, query_.radius(), [&](const Facet& f) {
+      const double height = f.normal.dot(x - f.a);
+      const double distance2 = (nearestPointOf(f, x) - x).squaredNorm();
+      const double overhang = kOverhang * f.radius;
+      if (std::abs(height) > f.radius + 4 * f.skin || distance2 > height * height + overhang * overhang)
+        return;
+      const double side = f.normal.dot(position_ - f.a) < 0 && !f.unbounded ? -1 : 1;
+      for (int i = 0; i < active.count; ++i) {
+        if (side * f.normal.dot(active.hits[static_cast<std::size_t>(i)].halfSpace.normal) > 0.5)
+          holding |= 1U << static_cast<unsigned>(i);
+      }
+    });
+    for (int i = 0; i < active.count; ++i) {
+      if (active.hits[static_cast<std::size_t>(i)].object < 0) holding |= 1U << static_cast<unsigned>(i);
+    }
+    return holding + 1 == 1U << static_cast<unsigned>(active.count);
+  };
+  if (reached(place)) return place;
+  double share = 0;
+  for (double step = 0.5; step > 1e-3; step *= 0.5) {
+    if (reached(position_ + (share + step) * way)) share += step;
+  }
+  return position_ + share * way;
 }
 
 // Above the popthrough force, the proxy steps through the faces that give way and moves on to the HIP. Other

@@ -131,6 +131,8 @@ class Proxy {
   void updateProxy(const Vec3& hip) noexcept;
   void moveFrictionless(const Vec3& target, ActiveSet& active) noexcept;
   bool approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Vec3& goal) noexcept;
+  bool liftOut(const ActiveSet& active) noexcept;
+  void acceptOverlaps(ActiveSet& active) const noexcept;
   bool escapeCorner(const Vec3& target, const ActiveSet& active) noexcept;
   void extrapolateStep(const Vec3& step, const Vec3& target) noexcept;
   double cornerSlack() const noexcept;
@@ -152,6 +154,7 @@ class Proxy {
   double slidingShare() const noexcept;
   void advanceSlide(double slip_m) noexcept;
   Vec3 onFaces(const Vec3& hip, const ActiveSet& active) noexcept;
+  Vec3 onFacesThatGoOn(const Vec3& place, const ActiveSet& active) noexcept;
   void updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet& active) noexcept;
   void popThrough(const Vec3& hip, std::uint32_t& status) noexcept;
   void applyForceShading() noexcept;
