@@ -125,6 +125,7 @@ class Proxy {
   static bool isJump(const PlacedObject& object, std::uint32_t triangle) noexcept;
   bool contactChangedByCommand() const noexcept;
   bool neighboursChangedByCommand(const BlendedSpring& before) const noexcept;
+  bool surfacesNearChanged() const noexcept;
   void liftOutOf(const PlacedObject& object) noexcept;
   void releaseByJump(std::uint32_t& status) noexcept;
   static double missedMove(const PlacedObject& object) noexcept;

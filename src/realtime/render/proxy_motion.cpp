@@ -58,15 +58,36 @@ bool Proxy::contactChangedByCommand() const noexcept {
   return false;
 }
 
-// What is near takes part in the spring although it is not touched. A hand changes that gradually, a command
-// at once.
+// What is near takes part in the spring although it is not touched. The hand and motions change that
+// gradually, a command at once.
 bool Proxy::neighboursChangedByCommand(const BlendedSpring& before) const noexcept {
   constexpr double kStep_N = 0.1;
   if (contactSet_.count == 0 || now_.scene == before_.scene) return false;
   const BlendedSpring& now = contactSet_.spring;
   const double spring_m = (contactSet_.normal_m + contactSet_.lateral_m).norm();
-  return std::abs(now.stiffness_N_per_m - before.stiffness_N_per_m) * spring_m > kStep_N ||
-         (now.slope_N + now.turn_N - before.slope_N - before.turn_N).norm() > kStep_N;
+  const bool steps = std::abs(now.stiffness_N_per_m - before.stiffness_N_per_m) * spring_m > kStep_N ||
+                     (now.slope_N + now.turn_N - before.slope_N - before.turn_N).norm() > kStep_N;
+  return steps && surfacesNearChanged();
+}
+
+bool Proxy::surfacesNearChanged() const noexcept {
+  const scene::SceneSnapshot& now = *now_.scene;
+  const scene::SceneSnapshot& before = *before_.scene;
+  const auto samePlane = [](const scene::Plane& a, const scene::Plane& b) {
+    return a.surface == b.surface && a.placement == b.placement;
+  };
+  if (now.objects.size() != before.objects.size() ||
+      !std::equal(now.planes.begin(), now.planes.end(), before.planes.begin(), before.planes.end(),
+                  samePlane))
+    return true;
+  for (int i = 0; i < query_.objectCount(); ++i) {
+    const scene::ObjectState* const present = query_.object(i).state;
+    const scene::ObjectState* const past = before.find(present->id);
+    if (past == nullptr || !(past->surface == present->surface) ||
+        past->mesh->topology != present->mesh->topology || past->motion.jumps() != present->motion.jumps())
+      return true;
+  }
+  return false;
 }
 
 // The proxy stays at its place on the touched object, however that moved or deformed.
