@@ -84,6 +84,7 @@ class Simulation {
  private:
   void finding(const std::string& text);
   void line(const std::string& text);
+  void logged(const std::string& text);
   void after(Nanos delay, std::function<void()> function);
   void perform(const Action& action);
   void move(Dice& dice);
@@ -145,6 +146,8 @@ class Simulation {
   std::vector<std::unique_ptr<Visit>> visits_;
   Nanos stateKnownAt_ = 0;       // when the newest state of the web port came
   std::uint64_t stateTick_ = 0;  // its tick
+  Nanos logSecond_ = 0;          // when the present second of the log began
+  std::size_t logBytes_ = 0;     // in it
   std::map<std::uint16_t, SimClient*> byPort_;
 
   std::deque<std::pair<Nanos, double>> tops_;  // of the cube: when sent, world units
@@ -169,7 +172,7 @@ Simulation::Simulation(const Script& script, bool verbose)
       scheduler_(clock_, script.seed + 7, script.adversity, [this](const auto& text) { finding(text); }),
       world_(base::World{clock_, scheduler_, files_, random_}),
       network_(scheduler_),
-      log_([this](const auto& text) { line(text); }),
+      log_([this](const auto& text) { logged(text); }),
       judge_({}, {.finding = [this](const auto& text) { finding(text); },
                   .freeFrom = [this] { return freeFrom(); },
                   .top = [this] { return top(); }}),
@@ -235,6 +238,18 @@ void Simulation::line(const std::string& text) {
   hash_.add(static_cast<std::uint64_t>(clock_.now()));
   hash_.add(text);
   if (verbose_) std::printf("%12.6f %s\n", base::toSeconds(clock_.now()), text.c_str());
+}
+
+// Within the limits of docs/limits.md, to which what the server itself reports is added.
+void Simulation::logged(const std::string& text) {
+  constexpr std::size_t kMost = 300'000;  // in a second
+  line(text);
+  if (clock_.now() - logSecond_ >= 1'000 * kMs) {
+    logSecond_ = clock_.now();
+    logBytes_ = 0;
+  }
+  logBytes_ += text.size();
+  if (logBytes_ > kMost) finding("the log has more than 300 kB in a second");
 }
 
 void Simulation::after(Nanos delay, std::function<void()> function) {
@@ -731,6 +746,11 @@ void Simulation::onAnswer(const std::string& target, Nanos asked, const Visit::A
   if (tick > stateTick_) {
     stateTick_ = tick;
     stateKnownAt_ = clock_.now();
+  }
+  constexpr std::uint64_t kMostQueued = (std::uint64_t{8} << 20) + 65'536;
+  for (const auto& client : state["clients"]) {
+    if (client["queued_bytes"].get<std::uint64_t>() > kMostQueued)
+      finding("a queue of " + client["queued_bytes"].dump() + " bytes");
   }
   // As the viewer does, which shows all objects.
   Dice dice(seed);
