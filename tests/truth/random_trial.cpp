@@ -49,6 +49,7 @@ class Maker {
     if (kind == "groove") makeGroove();
     if (kind == "needles") makeNeedles();
     if (kind == "fan") makeFan();
+    if (kind == "joined") makeJoinedFan();
     if (kind == "sheets") makeSheets();
     if (kind == "nested") makeNested();
     if (kind == "bumps")
@@ -141,6 +142,12 @@ class Maker {
     shapes_.push_back(fan(dice_.integer(3, 150), kHalf_m, dice_.uniform(-0.02, 0.02)));
     if (dice_.chance(0.3))
       shapes_.push_back(fan(dice_.integer(3, 40), 0.5 * kHalf_m, dice_.uniform(-0.02, 0.02)));
+  }
+
+  // So many triangles around one vertex that the renderer takes several as one (geometry/fans.h). Slow to
+  // judge: only on request.
+  void makeJoinedFan() {
+    shapes_.push_back(fan(dice_.integer(256, 1200), kHalf_m, dice_.uniform(-0.02, 0.02)));
   }
 
   // Copies of one sheet, at most a little apart, and a sheet that crosses them.
