@@ -191,6 +191,7 @@ void SimClient::onMessage(const wire::MessageReceived& message) {
                    std::to_string(lastTick));
     if (lastTick != 0) missedTicks += tick->tick - lastTick - 1;
     lastTick = tick->tick;
+    lastRevision = tick->revision;
   } else if (message.kind == wire::kindOf<wire::GuardState>) {
     guard = *wire::decode<wire::GuardState>(message.payload);
     ++guardReports;

@@ -91,6 +91,7 @@ class SimClient {
   std::uint64_t guardReports = 0;
   std::uint64_t tickReports = 0;
   std::uint64_t lastTick = 0;
+  std::uint64_t lastRevision = 0;  ///< of the scene that it felt
   std::uint64_t missedTicks = 0;
   std::vector<std::uint32_t> buttons{0, 0};  ///< as last reported
   std::uint64_t buttonReports = 0;

@@ -144,10 +144,11 @@ class Simulation {
   std::vector<std::unique_ptr<Streamer>> streamers_;
   std::vector<std::unique_ptr<SimClient>> strangers_;
   std::vector<std::unique_ptr<Visit>> visits_;
-  Nanos stateKnownAt_ = 0;       // when the newest state of the web port came
-  std::uint64_t stateTick_ = 0;  // its tick
-  Nanos logSecond_ = 0;          // when the present second of the log began
-  std::size_t logBytes_ = 0;     // in it
+  Nanos stateKnownAt_ = 0;                                 // when the newest state of the web port came
+  std::uint64_t stateTick_ = 0;                            // its tick
+  Nanos logSecond_ = 0;                                    // when the present second of the log began
+  std::size_t logBytes_ = 0;                               // in it
+  std::deque<std::pair<Nanos, std::uint64_t>> revisions_;  // of the scene in the servo: when known
   std::map<std::uint16_t, SimClient*> byPort_;
 
   std::deque<std::pair<Nanos, double>> tops_;  // of the cube: when sent, world units
@@ -159,6 +160,7 @@ class Simulation {
   bool over_ = false;
   bool writesFailed_ = false;
   bool memoryFailed_ = false;
+  bool memoryShort_ = false;                   // or was until a moment ago
   std::map<std::int32_t, std::int64_t> seen_;  // newest batch of each batcher that a description showed
   bool compared_ = false;
   bool uploaded_ = false;
@@ -622,9 +624,12 @@ void Simulation::healDisk() {
 // Small allocations come from memory that the process has.
 void Simulation::runOutOfMemory(Dice& dice) {
   scheduler_.limitMemory(std::size_t{4096} << dice.below(10));
-  memoryFailed_ = true;
+  memoryFailed_ = memoryShort_ = true;
   ++bench_.injected;
-  after(dice.between(10 * kMs, 3'000 * kMs), [this] { scheduler_.limitMemory(0); });
+  after(dice.between(10 * kMs, 3'000 * kMs), [this] {
+    scheduler_.limitMemory(0);
+    after(5'000 * kMs, [this] { memoryShort_ = false; });
+  });
 }
 
 void Simulation::stream(Dice& dice) {
@@ -752,6 +757,14 @@ void Simulation::onAnswer(const std::string& target, Nanos asked, const Visit::A
     if (client["queued_bytes"].get<std::uint64_t>() > kMostQueued)
       finding("a queue of " + client["queued_bytes"].dump() + " bytes");
   }
+  // The web port does not wait long for a scene thread that is busy or finds no memory, but asks it again.
+  const Nanos old = asked - 5'000 * kMs - 2 * script_.adversity.longestSceneStall - serverStalled();
+  while (revisions_.size() > 1 && revisions_[1].first < old) revisions_.pop_front();
+  const auto& scene = state["scenes"][0];
+  if (!memoryShort_ && !revisions_.empty() && revisions_.front().first < old && scene.contains("revision") &&
+      scene["revision"].get<std::uint64_t>() < revisions_.front().second)
+    finding("the web port shows the scene of revision " + scene["revision"].dump() + ", long after " +
+            std::to_string(revisions_.front().second));
   // As the viewer does, which shows all objects.
   Dice dice(seed);
   const auto& objects = state["scenes"][0]["objects"];
@@ -772,6 +785,7 @@ void Simulation::checkVisits() {
 }
 
 void Simulation::beat() {
+  revisions_.emplace_back(clock_.now(), operators_.front()->lastRevision);
   const auto one = [](Listener& client) {
     if (!client.connected() || !client.beats) return;
     client.send(wire::Heartbeat{});
