@@ -49,11 +49,19 @@ class Scheduler::Task {
       }
       Task& task;
     } const scope(*this);
-    const LimitedMemory memory(large ? scheduler_.memoryLimit_ : 0);
+    const LimitedMemory memory(memoryLimit());
     hasRun = true;
     woken = false;
     ++scheduler_.steps_;
     return step();
+  }
+  // Only of threads that allocate much. The JSON library allocates in destructors, in which nothing may fail:
+  // some bytes for each child of a value.
+  std::size_t memoryLimit() const {
+    constexpr std::size_t kLeastOfTexts = 16'384;
+    const std::size_t limit = scheduler_.memoryLimit_;
+    if (name == "web-text" && limit != 0) return std::max(limit, kLeastOfTexts);
+    return name == "scene" || name == "web-mesh" ? limit : 0;
   }
   // What a thread that waits for this one would see: true when it need not wait.
   bool joinable(const char* what) const {
@@ -63,7 +71,6 @@ class Scheduler::Task {
   }
 
   const std::string name;
-  const bool large = name == "scene" || name.starts_with("web");  // allocates much
   const base::Step step;
   std::optional<Nanos> due;  // nothing: waits for a wake
   Nanos busyUntil = 0;

@@ -97,9 +97,19 @@ void SceneThread::apply(SceneParcel& parcel) {
     try {
       apply(std::move(task));
     } catch (const std::exception& error) {
-      notices_.push_back(
-          {task.client, scene::Notice::Severity::error, std::string("the command failed: ") + error.what()});
+      noteFailure(task.client, error.what());
     }
+  }
+}
+
+// Where memory has run out, the text may find none either.
+void SceneThread::noteFailure(scene::ClientId client, const char* reason) noexcept {
+  try {
+    notices_.push_back(
+        {client, scene::Notice::Severity::error, std::string("the command failed: ") + reason});
+  } catch (const std::exception&) {
+    notices_.clear();
+    spdlog::error("a command of client {} failed, and so did its text: {}", client, reason);
   }
 }
 

@@ -72,6 +72,7 @@ class SceneThread {
   void applySlice();
   void apply(SceneParcel& parcel);
   void apply(SceneTask&& task);
+  void noteFailure(scene::ClientId client, const char* reason) noexcept;
   void publish();
   void publishTo(Seat& seat);
   void describeScene();
