@@ -64,7 +64,8 @@ class Maker {
     if (dice_.chance(0.5)) trial_.sides = Sides::both;
     // A room with both sides touchable that appears around the hand is not felt until the hand has left it.
     if (enclosed_) trial_.sides = Sides::front;
-    if (!enclosed_ && dice_.chance(0.15)) mixWinding();
+    // Of mixed winding, no triangles are joined, and the work of a tick does not suffice for them.
+    if (!enclosed_ && kind != "joined" && dice_.chance(0.15)) mixWinding();
   }
 
   void makeSoup() {
@@ -288,7 +289,8 @@ class Maker {
   }
 
   void makePlanes() {
-    if (enclosed_ || !dice_.chance(0.12)) return;
+    // In a corner with a plane, the spring does not tell the side of joined triangles that the proxy is on.
+    if (enclosed_ || trial_.kind == "joined" || !dice_.chance(0.12)) return;
     for (int i = dice_.integer(1, 3); i > 0; --i) {
       TrialPlane plane;
       plane.normal = dice_.direction();

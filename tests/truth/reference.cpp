@@ -226,12 +226,8 @@ Point Reference::carried(const Point& p, int face) const {
   return now.a + local.x() * (now.b - now.a) + local.y() * (now.c - now.a) + local.z() * now.normal;
 }
 
-// Where very many triangles meet, the renderer may move the surface by up to 0.1 µm (decision 29), in two
-// neighbouring gathers by different amounts.
 double Reference::rounding() const {
-  constexpr double kJoined_m = 0.1e-6 / kOnPlane;
-  const double rounding = 1e-9 + 8e-9 * std::max(extent_, 1e-3);
-  return trial_.kind == "joined" ? rounding + kJoined_m : rounding;
+  return 1e-9 + 8e-9 * std::max(extent_, 1e-3);
 }
 
 // The rounding of its corners tilts the plane of a narrow face: its height is known the less the farther a

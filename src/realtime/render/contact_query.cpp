@@ -27,6 +27,7 @@ constexpr int kNoReserve = 50;              // ticks without one, after one that
 // less than the gap tolerance, and than anybody feels.
 constexpr double kFanError_m = 1e-7;
 constexpr double kFanErrorShare = 5e-4;
+constexpr double kSmallestGather_m = 10e-6;
 constexpr int kReuseLimit = 32;  // reuse the cached facets up to this count instead of querying again
 
 scene::Corners mapped(const Affine& t, const scene::Corners& c, bool mirrored) {
@@ -79,6 +80,8 @@ void ContactQuery::beginTick(const SceneAtTime& now, const SceneAtTime& before,
   overflowed_ = false;
   work_ = 0;
   facetCasts_ = 0;
+  unfitCount_ = 0;
+  longestStep_m_ = std::numeric_limits<double>::infinity();
   noReserve_ = std::max(0, noReserve_ - 1);
   if (now.scene == before.scene) return;
   ++generation_;
@@ -356,9 +359,22 @@ const Facet* ContactQuery::facetOf(const FacetCache::TriangleId& id) const noexc
   return &memo.facet;
 }
 
+// A ball around one that did not fit in this tick does not fit either. A little less than around counts, too:
+// the casts of a tick begin within micrometres of each other.
+bool ContactQuery::isUnfit(const Vec3& centre, double radius) const noexcept {
+  constexpr double kAround = 0.9;
+  return std::any_of(unfit_.begin(), unfit_.begin() + unfitCount_, [&](const Ball& ball) {
+    return (ball.centre - centre).norm() + kAround * ball.radius <= radius;
+  });
+}
+
 bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
   cache_.restart(centre, radius);
   joinedFans_ = false;
+  if (isUnfit(centre, radius)) {
+    cache_.invalidate();
+    return false;
+  }
   bool reusable = true;
   for (int i = 0; i < objectCount_ && cache_.complete(); ++i) {
     const PlacedObject& placed = object(i);
@@ -383,6 +399,8 @@ bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
   }
   gatheredCount_ = objectCount_;
   gatheredGeneration_ = reusable ? generation_ : 0;
+  if (!cache_.complete() && unfitCount_ < kMaxUnfit)
+    unfit_[static_cast<std::size_t>(unfitCount_++)] = {centre, radius};
   return cache_.complete();
 }
 
@@ -414,6 +432,14 @@ bool ContactQuery::ensureGathered(const Vec3& centre, double radius) noexcept {
   // Where fans are joined, a reserve saves the visits to their triangles in the next ticks.
   if (joinedFans_ && gather(centre, 2 * radius)) return true;
   return gather(centre, radius);
+}
+
+void ContactQuery::gatherAround(const Vec3& centre, double radius) noexcept {
+  bool fits = ensureGathered(centre, radius);
+  for (double smaller = 0.25 * radius; !fits && smaller > kSmallestGather_m && !workSpent();
+       smaller *= 0.25) {
+    fits = gather(centre, smaller);
+  }
 }
 
 bool ContactQuery::sameObjects() const noexcept {
@@ -595,15 +621,16 @@ bool ContactQuery::castInSteps(const Vec3& p, const Vec3& d, double begin, doubl
   const double length = d.norm();
   double step = keepsFacets_ ? 1.0 : std::min(1.0, std::max(0.125 * radius_ / length, kSmallestStep));
   while (begin < end) {
-    step = std::min(step, end - begin);
+    step = std::min({step, end - begin, std::max(longestStep_m_ / length, kSmallestStep)});
     const double middle = begin + 0.5 * step;
-    ensureGathered(p + middle * d, 0.5 * step * length * kWiden);
-    if (!cache_.complete() && step > kSmallestStep && !workSpent()) {
+    const bool fits = ensureGathered(p + middle * d, 0.5 * step * length * kWiden);
+    if (!fits && step > kSmallestStep && !workSpent()) {
       step *= 0.25;
+      longestStep_m_ = step * length;
       continue;
     }
     const Path path{p, d, begin, begin + step};
-    if (cache_.complete() ? castGathered(path, only, hit) : castAtEach(path, only, hit)) return true;
+    if (fits ? castGathered(path, only, hit) : castAtEach(path, only, hit)) return true;
     begin += step;
     step *= 2;
   }

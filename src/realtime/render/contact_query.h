@@ -120,6 +120,8 @@ class ContactQuery {
   /// As gather(), but reuses facets gathered before, also in an earlier tick, if they cover the ball. A ball
   /// tool gathers a reserve for that.
   bool ensureGathered(const Vec3& centre, double radius) noexcept;
+  /// The same, or a smaller ball where that does not fit: casts from there begin in it.
+  void gatherAround(const Vec3& centre, double radius) noexcept;
   bool isGathered(const Vec3& p) const noexcept {
     return cache_.complete() && (p - cache_.centre()).squaredNorm() < 0.64 * cache_.reach() * cache_.reach();
   }
@@ -174,7 +176,14 @@ class ContactQuery {
   static constexpr int kVisit = 16;
   static constexpr int kBoxVisit = 4;
 
+  static constexpr int kMaxUnfit = 8;
+
   class JoinedFans;
+
+  struct Ball {
+    Vec3 centre;
+    double radius;
+  };
 
   // The result of makeFacet(); generation 0: not valid in the next tick.
   struct MemoFacet {
@@ -200,6 +209,7 @@ class ContactQuery {
   void leaveOutEnclosing(const Vec3& tool) noexcept;
   bool place(const scene::ObjectState& state, PlacedObject& placed) const noexcept;
   bool sameObjects() const noexcept;
+  bool isUnfit(const Vec3& centre, double radius) const noexcept;
   void compareWithBefore(PlacedObject& placed) const noexcept;
   bool mayReach(const PlacedObject& object, std::uint32_t triangle, const Vec3& inObject,
                 double reach_m) noexcept;
@@ -236,8 +246,12 @@ class ContactQuery {
   double minSkin_ = 0;
   FacetCache cache_;
   bool joinedFans_ = false;  // in the last gather()
-  int noReserve_ = 0;        // ticks in which none is gathered: there were too many triangles for it
-  int lastBlocker_ = 0;      // the gathered facet that blocked the last cast of a ball
+  // Balls whose triangles did not fit in this tick, and the steps of casts that shrank for that.
+  std::array<Ball, kMaxUnfit> unfit_;
+  int unfitCount_ = 0;
+  double longestStep_m_ = 0;
+  int noReserve_ = 0;    // ticks in which none is gathered: there were too many triangles for it
+  int lastBlocker_ = 0;  // the gathered facet that blocked the last cast of a ball
   // Generation and objects of the last gather(); 0: not reusable in another tick.
   std::uint64_t gatheredGeneration_ = 0;
   int gatheredCount_ = 0;

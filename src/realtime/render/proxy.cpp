@@ -55,7 +55,7 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   carry(hip, status);
   expectedTravel_m_ = (hip - hipBefore_).norm() + (position_ - from).norm();
   push(from, status);
-  if (contactSet_.count > 0) query_.ensureGathered(position_, 1.5 * expectedTravel_m_ + kGatherMargin_m);
+  if (contactSet_.count > 0) query_.gatherAround(position_, 1.5 * expectedTravel_m_ + kGatherMargin_m);
   updateProxy(hip);
   popThrough(hip, status);
   if (!wasFree && neighboursChangedByCommand(springBefore)) status |= kRenderGeometryJump;
@@ -310,7 +310,7 @@ bool Proxy::approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Ve
     if (held && move > skin) return false;
     if (!stopAtFirst || move > skin) position_ += hit.stop * displacement;
     if (!query_.isGathered(position_)) {
-      query_.ensureGathered(position_, 1.5 * expectedTravel_m_ + kGatherMargin_m);
+      query_.gatherAround(position_, 1.5 * expectedTravel_m_ + kGatherMargin_m);
     }
     active.hits[static_cast<std::size_t>(active.count++)] = hit;
   }

@@ -30,8 +30,8 @@ double shareAfter(int spentInARow) {
 
 class WorkLimit : public testing::TestWithParam<int> {};
 
-// Fewer copies spend the work after they are gathered, more before.
-INSTANTIATE_TEST_SUITE_P(Copies, WorkLimit, testing::Values(1500, 2000, 2500, 3000));
+// Fewer copies do not spend the work; more than about 8000 spend it before one of them is felt.
+INSTANTIATE_TEST_SUITE_P(Copies, WorkLimit, testing::Values(3000, 4000, 5000, 6000));
 
 TEST_P(WorkLimit, force_fades_out_after_20_ticks_and_returns_when_the_hand_has_left) {
   constexpr double kJitter_m = 1e-6;
