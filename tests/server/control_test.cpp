@@ -258,6 +258,7 @@ TEST_F(DatagramTest, CarryOnlyWhatStockClientsSendSo) {
   settle();
   ASSERT_TRUE(untilTicks(*client_, 100));
   EXPECT_TRUE(untilForce(*client_, 1));
+  for (const wire::Force& force : client_->all<wire::Force>()) ASSERT_GT(force.force[1], -0.1) << "held";
   client_->send(wire::StopForces{});
   ASSERT_TRUE(client_->until([&] { return lastGuard(*client_).stopped == 1; }));
   client_->sendDatagram(datagramOf(*client_, wire::RearmForces{}));
