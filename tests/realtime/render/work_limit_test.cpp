@@ -33,6 +33,22 @@ class WorkLimit : public testing::TestWithParam<int> {};
 // Fewer copies do not spend the work; more than about 8000 spend it before one of them is felt.
 INSTANTIATE_TEST_SUITE_P(Copies, WorkLimit, testing::Values(3000, 4000, 5000, 6000));
 
+// What does not fit is not gathered again with each cast.
+TEST(Copies, are_felt_up_to_2000) {
+  for (const int count : {600, 1500, 2000}) {
+    SceneFixture fixture;
+    fixture.add(copies(count, 1e-6), surface(1000));
+    Hand hand(fixture.snapshot());
+    hand.at({0, 0.005, 0});
+    for (int tick = 0; tick < 40; ++tick) {
+      const Rendering& r = hand.at({0, 0.005 - 0.0006 * std::min(tick, 10), 0});
+      EXPECT_EQ(r.status & kRenderWorkLimit, 0U) << count << " copies, tick " << tick;
+      if (tick < 10) continue;
+      EXPECT_NEAR(r.force_N.norm(), 1, 0.01) << count << " copies, tick " << tick;
+    }
+  }
+}
+
 TEST_P(WorkLimit, force_fades_out_after_20_ticks_and_returns_when_the_hand_has_left) {
   constexpr double kJitter_m = 1e-6;
   SceneFixture fixture;
