@@ -125,8 +125,8 @@ class Referee {
     state.position_m = hip_;
     state.velocity_m_per_s = velocity_;
     renderer_.step(stage_.at(i), state, state.time, realtime::fixture::kTick, rendering_);
-    if (reference_.mayBeJoined()) bringInFrontOfFaces();
     if (i > 0) reference_.moveTo(i);
+    if (trial_.kind == "joined" && rendering_.touching) bringInFrontOfFaces();
     ++verdict_.ticks;
     verdict_.touching += rendering_.touching ? 1 : 0;
     judgeNumbers();
@@ -150,7 +150,6 @@ class Referee {
     const double farthest = 2 * (0.1e-6 + 5e-4 * trial_.toolRadius_m);
     const Point p = rendering_.proxy_m;
     const Point spring = p - hip_;
-    if (!rendering_.touching) return;
     std::vector<Point> normals;
     for (const int i : reference_.near(p, trial_.toolRadius_m + 5 * farthest)) {
       const Face& f = reference_.face(i);
@@ -485,16 +484,10 @@ class Referee {
     judgeRest();
   }
 
-  Point normalAt(int i) const {
-    const Face& f = reference_.face(i);
+  Point normalAt(const Face& f) const {
     const Point& p = rendering_.proxy_m;
     if (trial_.toolRadius_m > 0) return (p - nearestOf(f, p)).stableNormalized();
-    if (f.unbounded) return f.normal;
-    // Joined triangles are beside the faces of the mesh, and the proxy may be behind a face by that much. Its
-    // side is then that of the force: whether it passed the face is for the rule of passage.
-    const bool beside = trial_.kind == "joined" && reference_.onPlane(f, p);
-    const double side = f.normal.dot(beside ? rendering_.normalForce_N : Point(p - f.a));
-    return side < 0 ? Point(-f.normal) : f.normal;
+    return f.normal.dot(p - f.a) < 0 && !f.unbounded ? Point(-f.normal) : f.normal;
   }
 
   bool mixedStiffness() const {
@@ -524,7 +517,8 @@ class Referee {
       const auto goesOn = [&](int i) {
         const Face& other = reference_.face(i);
         if ((other.a == f.a && other.b == f.b && other.c == f.c) || passedFromBehind(other)) return false;
-        return outward.dot(normalAt(i)) < -1e-6 || (nearestOf(other, beyond) - beyond).norm() < 1.5 * kGap_m;
+        return outward.dot(normalAt(other)) < -1e-6 ||
+               (nearestOf(other, beyond) - beyond).norm() < 1.5 * kGap_m;
       };
       if (std::none_of(near.begin(), near.end(), goesOn)) rims.push_back(outward);
     }
@@ -557,7 +551,7 @@ class Referee {
     const Point& force = rendering_.normalForce_N;
     std::vector<Point> normals;
     for (const int i : near) {
-      const Point n = normalAt(i);
+      const Point n = normalAt(reference_.face(i));
       const auto same = [&](const Point& m) { return (m - n).squaredNorm() < 1e-18; };
       if (std::none_of(normals.begin(), normals.end(), same)) normals.push_back(n);
       const std::vector<Point> open = openDirections(reference_.face(i), near);
@@ -580,10 +574,10 @@ class Referee {
 
   void judgeLaw(const std::vector<int>& near) {
     if (near.empty() || (damping_ > 0 && !static_)) return;
-    const Point n = normalAt(near[0]);
+    const Point n = normalAt(reference_.face(near[0]));
     const Face& f = reference_.face(near[0]);
     for (const int i : near) {
-      if (reference_.face(i).object != f.object || (normalAt(i) - n).norm() > 1e-9) return;
+      if (reference_.face(i).object != f.object || (normalAt(reference_.face(i)) - n).norm() > 1e-9) return;
     }
     // With unequal neighbours near, the stiffness is blended.
     if (mixedStiffness() && othersNear(f.object)) return;

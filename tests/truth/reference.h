@@ -65,9 +65,6 @@ class Reference {
   bool onPlane(const Face& f, const Point& p) const;
   /// Of coordinates, which are floats: no side is decided below it.
   double rounding() const;
-
-  /// Whether so many triangles meet in the scene that the renderer may join some of them.
-  bool mayBeJoined() const { return trial_.kind == "joined"; }
   /// Largest coordinate of all geometry.
   double extent() const { return extent_; }
 

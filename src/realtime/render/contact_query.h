@@ -175,7 +175,6 @@ class ContactQuery {
   static constexpr int kMemoBits = 10;
   static constexpr int kVisit = 16;
   static constexpr int kBoxVisit = 4;
-
   static constexpr int kMaxUnfit = 8;
 
   class JoinedFans;
