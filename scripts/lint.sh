@@ -2,13 +2,13 @@
 # Checks the sources without running them. Needs a configured build/release.
 #   scripts/lint.sh            the format of all files, and --changed
 #   scripts/lint.sh --changed  clang 19 and clang-tidy (.clang-tidy) on the sources changed since the last tag (or 20 commits), without
-#                              precompiled headers; only the last 4 changed, so that it ends in a minute
+#                              precompiled headers; only the last 2 changed, so that it ends in half a minute
 #   scripts/lint.sh --names    the names of all sources, in three minutes; needs a configured build/asan
 #   scripts/lint.sh --tidy     clang-tidy on all sources; takes most of an hour
 #   scripts/lint.sh --clang    compiles everything with clang 19, one source at a time
 set -euo pipefail
 cd "$(dirname "$0")/.."
-kMostChanged=4
+kMostChanged=2
 database=build/lint
 jobs=${HAPTICD_LINT_JOBS:-$(nproc)}
 

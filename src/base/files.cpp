@@ -67,23 +67,6 @@ std::size_t readFully(const Descriptor& file, std::span<std::byte> into) {
   return done;
 }
 
-class ContentInMemory final : public InputFile {
- public:
-  explicit ContentInMemory(std::vector<std::byte> content) : content_(std::move(content)) {}
-
-  std::uint64_t size() const override { return content_.size(); }
-  std::size_t read(std::span<std::byte> into) override {
-    const std::size_t count = std::min(into.size(), content_.size() - at_);
-    std::copy_n(content_.begin() + static_cast<std::ptrdiff_t>(at_), count, into.begin());
-    at_ += count;
-    return count;
-  }
-
- private:
-  const std::vector<std::byte> content_;
-  std::size_t at_ = 0;
-};
-
 class SystemInputFile final : public InputFile {
  public:
   explicit SystemInputFile(const std::filesystem::path& path)
@@ -98,10 +81,6 @@ class SystemInputFile final : public InputFile {
 };
 
 }  // namespace
-
-std::unique_ptr<InputFile> Files::open(const std::filesystem::path& path) {
-  return std::make_unique<ContentInMemory>(read(path));
-}
 
 std::unique_ptr<InputFile> SystemFiles::open(const std::filesystem::path& path) {
   return std::make_unique<SystemInputFile>(path);

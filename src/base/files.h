@@ -45,8 +45,8 @@ class Files {
   virtual ~Files() = default;
   /// Creates a file (mode 0644) for writing. Its folder must exist.
   virtual std::unique_ptr<OutputFile> create(const std::filesystem::path& path, Existing existing) = 0;
-  /// Opens a file for reading from its start. Unless overridden, holds the whole content in memory.
-  virtual std::unique_ptr<InputFile> open(const std::filesystem::path& path);
+  /// Opens a file for reading from its start.
+  virtual std::unique_ptr<InputFile> open(const std::filesystem::path& path) = 0;
   /// The whole content.
   virtual std::vector<std::byte> read(const std::filesystem::path& path) = 0;
   /// Replaces `to`; atomic. Both must be in one file system.

@@ -15,7 +15,7 @@ constexpr char kMagic[kMagicBytes + 1] = "HAPTICS\n";
 
 // Of kind, length and content.
 std::uint32_t checksum(const std::byte* head, ByteView content) {
-  return crc32(ByteView(head, 8), content);
+  return crc32(content, crc32(ByteView(head, 8)));
 }
 
 }  // namespace

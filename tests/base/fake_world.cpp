@@ -205,6 +205,27 @@ class FakeFiles::FakeFile final : public OutputFile {
   const std::shared_ptr<Content> content_;  // as an inode: survives rename and remove
 };
 
+class FakeFiles::FakeInput final : public InputFile {
+ public:
+  explicit FakeInput(std::shared_ptr<const Content> content)
+      : content_(std::move(content)), size_(content_->bytes.size()) {}
+
+  std::uint64_t size() const override { return size_; }
+  std::size_t read(std::span<std::byte> into) override {
+    const std::size_t end = content_->bytes.size();
+    const std::size_t from = std::min(at_, end);  // it may have been cut since
+    const std::size_t count = std::min(into.size(), end - from);
+    std::copy_n(content_->bytes.begin() + static_cast<std::ptrdiff_t>(from), count, into.begin());
+    at_ = from + count;
+    return count;
+  }
+
+ private:
+  const std::shared_ptr<const Content> content_;
+  const std::size_t size_;
+  std::size_t at_ = 0;
+};
+
 std::string FakeFiles::keyOf(const std::filesystem::path& path) {
   std::string key = path.lexically_normal().string();
   while (key.size() > 1 && key.back() == '/') key.pop_back();
@@ -229,12 +250,20 @@ std::unique_ptr<OutputFile> FakeFiles::create(const std::filesystem::path& path,
   return std::make_unique<FakeFile>(*this, path, content);
 }
 
-std::vector<std::byte> FakeFiles::read(const std::filesystem::path& path) {
+std::shared_ptr<const FakeFiles::Content> FakeFiles::opened(const std::filesystem::path& path) const {
   if (failures.open != 0) fail(failures.open, "cannot open", path);
   if (folders_.contains(keyOf(path))) fail(EISDIR, "cannot read", path);
-  const Content* const content = find(path);
-  if (content == nullptr) fail(ENOENT, "cannot open", path);
-  return content->bytes;
+  const auto it = files_.find(keyOf(path));
+  if (it == files_.end()) fail(ENOENT, "cannot open", path);
+  return it->second;
+}
+
+std::unique_ptr<InputFile> FakeFiles::open(const std::filesystem::path& path) {
+  return std::make_unique<FakeInput>(opened(path));
+}
+
+std::vector<std::byte> FakeFiles::read(const std::filesystem::path& path) {
+  return opened(path)->bytes;
 }
 
 void FakeFiles::rename(const std::filesystem::path& from, const std::filesystem::path& to) {

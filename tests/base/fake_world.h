@@ -84,7 +84,7 @@ class FakeFiles final : public Files {
  public:
   /// An errno value makes every such call fail with it until it is 0 again.
   struct Failures {
-    int open = 0;  ///< create() and read()
+    int open = 0;  ///< create(), open() and read()
     int write = 0;
     int sync = 0;
     int rename = 0;
@@ -95,6 +95,7 @@ class FakeFiles final : public Files {
   std::optional<std::size_t> freeBytes;
 
   std::unique_ptr<OutputFile> create(const std::filesystem::path& path, Existing existing) override;
+  std::unique_ptr<InputFile> open(const std::filesystem::path& path) override;
   std::vector<std::byte> read(const std::filesystem::path& path) override;
   void rename(const std::filesystem::path& from, const std::filesystem::path& to) override;
   void remove(const std::filesystem::path& path) override;
@@ -117,9 +118,11 @@ class FakeFiles final : public Files {
     int syncs = 0;
   };
   class FakeFile;
+  class FakeInput;
 
   static std::string keyOf(const std::filesystem::path& path);
   const Content* find(const std::filesystem::path& path) const;
+  std::shared_ptr<const Content> opened(const std::filesystem::path& path) const;
 
   std::map<std::string, std::shared_ptr<Content>> files_;
   std::set<std::string> folders_{"/", "."};

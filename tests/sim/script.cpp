@@ -1,14 +1,16 @@
 #include <algorithm>
 #include <cstdio>
+#include <iterator>
 
 #include "sim/simulation.h"
 
 namespace hapticd::sim {
 
 const char* nameOf(Action::Kind kind) {
-  static constexpr const char* kNames[] = {"stop",      "rearm",      "move",     "batch",    "upload",
-                                           "appear",    "vanish",     "pause",    "nonsense", "flood",
-                                           "wall step", "disk fails", "describe", "stream",   "visit"};
+  static constexpr const char* kNames[] = {
+      "stop",     "rearm", "move",      "batch",      "upload",   "appear", "vanish", "pause",
+      "nonsense", "flood", "wall step", "disk fails", "describe", "stream", "visit",  "no memory"};
+  static_assert(std::size(kNames) == static_cast<std::size_t>(Action::Kind::noMemory) + 1);
   return kNames[static_cast<int>(kind)];
 }
 

@@ -160,7 +160,7 @@ class Simulation {
   bool over_ = false;
   bool writesFailed_ = false;
   bool memoryFailed_ = false;
-  bool memoryShort_ = false;                   // or was until a moment ago
+  Nanos memoryShortUntil_ = 0;                 // and what that delayed is made up for
   std::map<std::int32_t, std::int64_t> seen_;  // newest batch of each batcher that a description showed
   bool compared_ = false;
   bool uploaded_ = false;
@@ -624,12 +624,11 @@ void Simulation::healDisk() {
 // Small allocations come from memory that the process has.
 void Simulation::runOutOfMemory(Dice& dice) {
   scheduler_.limitMemory(std::size_t{4096} << dice.below(10));
-  memoryFailed_ = memoryShort_ = true;
+  memoryFailed_ = true;
   ++bench_.injected;
-  after(dice.between(10 * kMs, 3'000 * kMs), [this] {
-    scheduler_.limitMemory(0);
-    after(5'000 * kMs, [this] { memoryShort_ = false; });
-  });
+  const Nanos length = dice.between(10 * kMs, 3'000 * kMs);
+  memoryShortUntil_ = std::max(memoryShortUntil_, clock_.now() + length + 5'000 * kMs);
+  after(length, [this] { scheduler_.limitMemory(0); });
 }
 
 void Simulation::stream(Dice& dice) {
@@ -761,8 +760,8 @@ void Simulation::onAnswer(const std::string& target, Nanos asked, const Visit::A
   const Nanos old = asked - 5'000 * kMs - 2 * script_.adversity.longestSceneStall - serverStalled();
   while (revisions_.size() > 1 && revisions_[1].first < old) revisions_.pop_front();
   const auto& scene = state["scenes"][0];
-  if (!memoryShort_ && !revisions_.empty() && revisions_.front().first < old && scene.contains("revision") &&
-      scene["revision"].get<std::uint64_t>() < revisions_.front().second)
+  if (clock_.now() >= memoryShortUntil_ && !revisions_.empty() && revisions_.front().first < old &&
+      scene.contains("revision") && scene["revision"].get<std::uint64_t>() < revisions_.front().second)
     finding("the web port shows the scene of revision " + scene["revision"].dump() + ", long after " +
             std::to_string(revisions_.front().second));
   // As the viewer does, which shows all objects.
@@ -828,7 +827,7 @@ void Simulation::compare(const scene::SceneDescription& description, bool last) 
     };
     std::int64_t& seen = seen_[batcher->first];
     // A commit that finds no memory is carried out in part, with a text.
-    const bool together = number(*a) == number(*b) || batcher->sent == 0 || memoryShort_;
+    const bool together = number(*a) == number(*b) || batcher->sent == 0 || clock_.now() < memoryShortUntil_;
     if (!together || number(*a) < seen || number(*a) > batcher->sent || (last && number(*a) != batcher->sent))
       finding("objects of '" + batcher->name() + "' are at the batches " + std::to_string(number(*a)) +
               " and " + std::to_string(number(*b)) + ", earlier " + std::to_string(seen) + ", sent " +
