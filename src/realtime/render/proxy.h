@@ -93,7 +93,8 @@ class Proxy {
   struct Pushers {
     std::array<HalfSpace, kMaxHalfSpaces> faces;
     int count = 0;
-    bool jammed = false;  // they leave the proxy no room
+    bool circling = false;  // those that do not hold the proxy stay, too
+    bool jammed = false;    // they leave the proxy no room
   };
 
   // A face that held the proxy at the end of the last tick.

@@ -169,6 +169,7 @@ void Proxy::push(const Vec3& from, std::uint32_t& status) noexcept {
 bool Proxy::pushUntilFree(const Vec3& from, std::uint32_t& status) noexcept {
   Pushers pushers;
   for (int k = 0; k < kMaxPushes && !pushers.jammed; ++k) {
+    pushers.circling = k >= kMaxPushes / 4;
     bool pushed = pushByObjects(from, pushers, status);
     pushed = (!pushers.jammed && pushByDeformingFaces(from, pushers, status)) || pushed;
     pushed = (!pushers.jammed && pushByPlanes(pushers, status)) || pushed;
@@ -180,7 +181,12 @@ bool Proxy::pushUntilFree(const Vec3& from, std::uint32_t& status) noexcept {
 // Moves the proxy to where a face pushes it, and above those that pushed it before. Without room for that,
 // the newest face has its way.
 void Proxy::pushTo(const Vec3& place, const HalfSpace& face, Pushers& pushers) noexcept {
-  pushers.faces[static_cast<std::size_t>(pushers.count++)] = face;
+  const auto known =
+      std::find_if(pushers.faces.begin(), pushers.faces.begin() + pushers.count, [&](const HalfSpace& f) {
+        return pushers.circling && f.normal == face.normal && f.anchor == face.anchor;
+      });
+  if (known == pushers.faces.begin() + pushers.count) ++pushers.count;
+  *known = face;
   expectedTravel_m_ += (place - position_).norm();
   position_ = place;
   if (pushers.count == 1) return;
@@ -191,12 +197,21 @@ void Proxy::pushTo(const Vec3& place, const HalfSpace& face, Pushers& pushers) n
   if (pushers.jammed) return;
   expectedTravel_m_ += move;
   position_ = nearest.point;
-  // At most three hold it; the others push again if it meets them.
+  // At most three hold it; the others push again if it meets them. Where they push in turn without end, they
+  // stay as long as there is room for the next.
   const auto faces = pushers.faces;
+  const int all = pushers.count;
   pushers.count = nearest.count;
+  std::array<bool, kMaxHalfSpaces> holds{};
   for (int i = 0; i < nearest.count; ++i) {
     const auto k = static_cast<std::size_t>(i);
-    pushers.faces[k] = faces[static_cast<std::size_t>(nearest.active[k])];
+    const auto active = static_cast<std::size_t>(nearest.active[k]);
+    pushers.faces[k] = faces[active];
+    holds[active] = true;
+  }
+  for (int i = all - 1; i >= 0 && pushers.circling && pushers.count < kMaxHalfSpaces - 1; --i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (!holds[k]) pushers.faces[static_cast<std::size_t>(pushers.count++)] = faces[k];
   }
 }
 
