@@ -364,10 +364,20 @@ class Referee {
     return !decided;
   }
 
+  // An object may keep the proxy behind a plane, which then holds it where it is.
+  static bool isBehind(const TrialPlane& plane, const Point& p) {
+    return plane.normal.dot(p) + plane.offset_m < -kSuspect_m;
+  }
+
   // Where the proxy's room is narrower than the way of its walls in this tick: nothing keeps a proxy in a
-  // room that closes.
+  // room that closes. It has closed where objects have pushed the proxy into the solid of a plane.
   bool roomCloses() {
     if (!reference_.moved()) return false;
+    if (std::any_of(trial_.planes.begin(), trial_.planes.end(),
+                    [&](const TrialPlane& plane) { return isBehind(plane, proxyBefore_); })) {
+      ++verdict_.undecided;
+      return true;
+    }
     double way = 0;
     for (const int i : suspects_) way = std::max(way, (proxyBefore_ - previousPlace(i)).norm());
     FreeSpace space(reference_, proxyBefore_, 5 * way + 400e-6, kFollower_m + way,
@@ -564,6 +574,9 @@ class Referee {
         if (trial_.sides == Sides::both) normals.push_back(-n);
       }
       if (normals.size() >= 24) return;  // the set is not worth its time
+    }
+    for (const TrialPlane& plane : trial_.planes) {
+      if (isBehind(plane, rendering_.proxy_m)) normals.push_back(plane.normal);
     }
     const double off = distanceFromCone(force, normals);
     if (off > 2e-3 * force.norm() + stiffest_ * kForceTolerance_m) {
