@@ -10,6 +10,8 @@
 namespace hapticd::bench {
 namespace {
 
+using geometry::Vec3;
+
 struct Line {
   const char* what;
   double rate_Hz;
