@@ -5,7 +5,7 @@
 namespace hapticd::record {
 
 std::uint32_t crc32(wire::ByteView bytes, std::uint32_t before) {
-  // It takes no bytes at a null pointer for the question where to begin.
+  // zlib answers a null pointer with the value to begin with.
   if (bytes.empty()) return before;
   return static_cast<std::uint32_t>(
       ::crc32_z(before, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));

@@ -232,9 +232,9 @@ std::string FakeFiles::keyOf(const std::filesystem::path& path) {
   return key.empty() ? "." : key;
 }
 
-const FakeFiles::Content* FakeFiles::find(const std::filesystem::path& path) const {
+std::shared_ptr<const FakeFiles::Content> FakeFiles::find(const std::filesystem::path& path) const {
   const auto it = files_.find(keyOf(path));
-  return it == files_.end() ? nullptr : it->second.get();
+  return it == files_.end() ? nullptr : it->second;
 }
 
 std::unique_ptr<OutputFile> FakeFiles::create(const std::filesystem::path& path, Existing existing) {
@@ -250,20 +250,20 @@ std::unique_ptr<OutputFile> FakeFiles::create(const std::filesystem::path& path,
   return std::make_unique<FakeFile>(*this, path, content);
 }
 
-std::shared_ptr<const FakeFiles::Content> FakeFiles::opened(const std::filesystem::path& path) const {
+std::shared_ptr<const FakeFiles::Content> FakeFiles::findToRead(const std::filesystem::path& path) const {
   if (failures.open != 0) fail(failures.open, "cannot open", path);
   if (folders_.contains(keyOf(path))) fail(EISDIR, "cannot read", path);
-  const auto it = files_.find(keyOf(path));
-  if (it == files_.end()) fail(ENOENT, "cannot open", path);
-  return it->second;
+  std::shared_ptr<const Content> content = find(path);
+  if (content == nullptr) fail(ENOENT, "cannot open", path);
+  return content;
 }
 
 std::unique_ptr<InputFile> FakeFiles::open(const std::filesystem::path& path) {
-  return std::make_unique<FakeInput>(opened(path));
+  return std::make_unique<FakeInput>(findToRead(path));
 }
 
 std::vector<std::byte> FakeFiles::read(const std::filesystem::path& path) {
-  return opened(path)->bytes;
+  return findToRead(path)->bytes;
 }
 
 void FakeFiles::rename(const std::filesystem::path& from, const std::filesystem::path& to) {
@@ -309,14 +309,14 @@ bool FakeFiles::exists(const std::filesystem::path& path) const {
 
 std::string FakeFiles::text(const std::filesystem::path& path) const {
   std::string text;
-  if (const Content* const content = find(path)) {
+  if (const auto content = find(path)) {
     for (const std::byte b : content->bytes) text += static_cast<char>(b);
   }
   return text;
 }
 
 int FakeFiles::syncs(const std::filesystem::path& path) const {
-  const Content* const content = find(path);
+  const auto content = find(path);
   return content == nullptr ? 0 : content->syncs;
 }
 

@@ -121,8 +121,8 @@ class FakeFiles final : public Files {
   class FakeInput;
 
   static std::string keyOf(const std::filesystem::path& path);
-  const Content* find(const std::filesystem::path& path) const;
-  std::shared_ptr<const Content> opened(const std::filesystem::path& path) const;
+  std::shared_ptr<const Content> find(const std::filesystem::path& path) const;
+  std::shared_ptr<const Content> findToRead(const std::filesystem::path& path) const;
 
   std::map<std::string, std::shared_ptr<Content>> files_;
   std::set<std::string> folders_{"/", "."};

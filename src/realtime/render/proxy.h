@@ -93,8 +93,11 @@ class Proxy {
   struct Pushers {
     std::array<HalfSpace, kMaxHalfSpaces> faces;
     int count = 0;
-    bool circling = false;  // those that do not hold the proxy stay, too
+    bool circling = false;  // they push in turn: those that do not hold the proxy stay, too
     bool jammed = false;    // they leave the proxy no room
+
+    void add(const HalfSpace& face) noexcept;
+    void keep(const Projection& nearest) noexcept;
   };
 
   // A face that held the proxy at the end of the last tick.

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <tuple>
+#include <utility>
 
 #include "realtime/render/enclosure.h"
 #include "realtime/render/proxy.h"
@@ -178,15 +179,38 @@ bool Proxy::pushUntilFree(const Vec3& from, std::uint32_t& status) noexcept {
   return false;
 }
 
+void Proxy::Pushers::add(const HalfSpace& face) noexcept {
+  const auto end = faces.begin() + count;
+  const auto known = std::find_if(faces.begin(), end, [&](const HalfSpace& f) {
+    return circling && f.normal == face.normal && f.anchor == face.anchor;
+  });
+  if (known == end) ++count;
+  *known = face;
+}
+
+// At most three hold the proxy; the others push again if it meets them. Where they do so in turn without end,
+// they stay as long as there is room for the next.
+void Proxy::Pushers::keep(const Projection& nearest) noexcept {
+  const auto all = faces;
+  std::array<bool, kMaxHalfSpaces> holds{};
+  const int allCount = std::exchange(count, 0);
+  const auto take = [&](int i) {
+    faces[static_cast<std::size_t>(count++)] = all[static_cast<std::size_t>(i)];
+  };
+  for (int i = 0; i < nearest.count; ++i) {
+    const int active = nearest.active[static_cast<std::size_t>(i)];
+    holds[static_cast<std::size_t>(active)] = true;
+    take(active);
+  }
+  for (int i = allCount - 1; circling && i >= 0 && count < kMaxHalfSpaces - 1; --i) {
+    if (!holds[static_cast<std::size_t>(i)]) take(i);
+  }
+}
+
 // Moves the proxy to where a face pushes it, and above those that pushed it before. Without room for that,
 // the newest face has its way.
 void Proxy::pushTo(const Vec3& place, const HalfSpace& face, Pushers& pushers) noexcept {
-  const auto known =
-      std::find_if(pushers.faces.begin(), pushers.faces.begin() + pushers.count, [&](const HalfSpace& f) {
-        return pushers.circling && f.normal == face.normal && f.anchor == face.anchor;
-      });
-  if (known == pushers.faces.begin() + pushers.count) ++pushers.count;
-  *known = face;
+  pushers.add(face);
   expectedTravel_m_ += (place - position_).norm();
   position_ = place;
   if (pushers.count == 1) return;
@@ -197,22 +221,7 @@ void Proxy::pushTo(const Vec3& place, const HalfSpace& face, Pushers& pushers) n
   if (pushers.jammed) return;
   expectedTravel_m_ += move;
   position_ = nearest.point;
-  // At most three hold it; the others push again if it meets them. Where they push in turn without end, they
-  // stay as long as there is room for the next.
-  const auto faces = pushers.faces;
-  const int all = pushers.count;
-  pushers.count = nearest.count;
-  std::array<bool, kMaxHalfSpaces> holds{};
-  for (int i = 0; i < nearest.count; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    const auto active = static_cast<std::size_t>(nearest.active[k]);
-    pushers.faces[k] = faces[active];
-    holds[active] = true;
-  }
-  for (int i = all - 1; i >= 0 && pushers.circling && pushers.count < kMaxHalfSpaces - 1; --i) {
-    const auto k = static_cast<std::size_t>(i);
-    if (!holds[k]) pushers.faces[static_cast<std::size_t>(pushers.count++)] = faces[k];
-  }
+  pushers.keep(nearest);
 }
 
 // A cast in the frame of each object, from the previous place of the proxy in that frame to the present one.
