@@ -54,8 +54,10 @@ if(HAPTICD_SANITIZE MATCHES "thread")
 endif()
 
 # For the rooms that a tick runs through. A tenth fewer instructions, and 5 % of its time. Nobody replaces our functions or
-# reads errno after our roots.
-set(HAPTICD_TICK_OPTIONS $<$<CONFIG:Release>:-O3> -fno-semantic-interposition -fno-math-errno)
+# reads errno after our roots. GCC inlines less in large sources: without the last option, rooms that are one source each are
+# 5 % slower.
+set(HAPTICD_TICK_OPTIONS $<$<CONFIG:Release>:-O3> -fno-semantic-interposition -fno-math-errno
+  $<$<CXX_COMPILER_ID:GNU>:--param=inline-unit-growth=300>)
 
 # Asio and Beast. They are compiled into each source that includes them, so all sources must see the same options.
 find_package(Boost 1.74 REQUIRED)

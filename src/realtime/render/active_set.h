@@ -28,7 +28,7 @@ struct Projection {
   bool found = false;  ///< false: the intersection is empty, or its faces are too nearly parallel
   Vec3 point = Vec3::Zero();
   int count = 0;
-  std::array<int, kMaxActive> active{};
+  std::array<int, kMaxActive> active{};  ///< ascending
   std::array<double, kMaxActive> multiplier{};
 };
 

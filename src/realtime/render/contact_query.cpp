@@ -233,6 +233,7 @@ bool ContactQuery::place(const ObjectState& state, PlacedObject& placed) const n
   placed.mirrored = determinant < 0;
   placed.T_object_device = placed.T_device_object.inverse();
   placed.stretch = stretchOf(placed.T_object_device.linear());
+  placed.metresPerUnit = stretchOf(linear);
   placed.stretchAlong = placed.T_object_device.linear().rowwise().norm();
   if (!std::isfinite(placed.stretch) || determinant == 0) return false;  // flattened by its placement
   const Vec3 farthest =
@@ -291,8 +292,7 @@ class ContactQuery::JoinedFans {
         now_(now),
         centre_(centre),
         reach_(reach_m * placed.stretch),
-        error_((kFanError_m + kFanErrorShare * toolRadius_m) /
-               std::max(stretchOf(placed.T_device_object.linear()), 1e-300)) {}
+        error_((kFanError_m + kFanErrorShare * toolRadius_m) / std::max(placed.metresPerUnit, 1e-300)) {}
 
   /// Replaces a triangle of a fan by the one that it is joined to, or does nothing. False when that is here
   /// already, or else it may be, too.
@@ -502,36 +502,36 @@ bool ContactQuery::castGathered(const Path& path, int only, ObjectHit& hit) noex
 }
 
 bool ContactQuery::castAtFacets(const Path& path, int only, ObjectHit& hit) noexcept {
-  std::array<const Facet*, FacetCache::kMaxFacets> candidates;
   const Vec3 start = path.p + path.begin * path.d;
-  const int count = cache_.facetsNearPath(start, (path.end - path.begin) * path.d, candidates.data());
   cache_.moveTo(start);
   bool found = false;
   if (only < 0 && planes_ != nullptr) {
     for (const PlacedPlane& plane : *planes_) considerFacet(plane.facet, path, hit, found);
   }
-  // The facet that blocked the last cast often blocks this one: then the others are soon known to be farther.
-  const Facet* const first = cache_.begin() + lastBlocker_;
   const auto consider = [&](const Facet& f) {
     if (only < 0 || f.object == only) considerFacet(f, path, hit, found);
   };
-  const auto last = candidates.begin() + count;
-  if (std::find(candidates.begin(), last, first) != last) consider(*first);
+  const auto latest = [&] { return found ? hit.stop : path.end; };
+  // The facet that blocked the last cast often blocks this one: then few others are near the path before it.
+  const int first = lastBlocker_;
+  if (first < cache_.size()) consider(cache_.begin()[first]);
+  std::array<std::uint16_t, FacetCache::kMaxFacets> candidates;
+  const int count = cache_.facetsNearPath(start, (latest() - path.begin) * path.d, candidates.data());
   const double length = path.d.norm();
-  for (auto f = candidates.begin(); f != last; ++f) {
-    if (*f == first) continue;
-    const int i = static_cast<int>(*f - cache_.begin());
-    const double latest = found ? hit.stop : path.end;
-    const double touching = (*f)->radius + 2 * (*f)->skin;
-    if (!cache_.isWithin(touching + (latest - path.begin) * length, i)) continue;
-    consider(**f);
-    if (found && hit.stop < latest) lastBlocker_ = i;
+  for (int k = 0; k < count; ++k) {
+    const int i = candidates[static_cast<std::size_t>(k)];
+    if (i == first) continue;
+    const Facet& f = cache_.begin()[i];
+    const double before = latest();
+    if (!cache_.isWithin(f.radius + 2 * f.skin + (before - path.begin) * length, i)) continue;
+    consider(f);
+    if (found && hit.stop < before) lastBlocker_ = i;
   }
   return found;
 }
 
 double ContactQuery::freeOfFaces(const Vec3& p, const Vec3& g, bool closesGaps) noexcept {
-  std::array<const Facet*, FacetCache::kMaxFacets> candidates;
+  std::array<std::uint16_t, FacetCache::kMaxFacets> candidates;
   const Vec3 d = g - p;
   // Another gather would cost more than a path that examines too many.
   if (!cache_.covers(p, d.norm()) && !ensureGathered(p, d.norm())) return 0;
@@ -544,7 +544,7 @@ double ContactQuery::freeOfFaces(const Vec3& p, const Vec3& g, bool closesGaps) 
     CastHit hit;
     if (castBall(facet, faces(), p, d, 1, free, hit)) free = std::min(free, hit.stop);
   };
-  for (int i = 0; i < count; ++i) meet(*candidates[static_cast<std::size_t>(i)]);
+  for (int i = 0; i < count; ++i) meet(cache_.begin()[candidates[static_cast<std::size_t>(i)]]);
   if (planes_ == nullptr) return free;
   for (const PlacedPlane& plane : *planes_) meet(plane.facet);
   return free;

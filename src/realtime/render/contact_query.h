@@ -34,7 +34,8 @@ struct PlacedObject {
   const scene::ObjectState* state = nullptr;
   Affine T_device_object = Affine::Identity();
   Affine T_object_device = Affine::Identity();
-  double stretch = 1;  ///< largest number of object units per metre, over all directions
+  double stretch = 1;        ///< largest number of object units per metre, over all directions
+  double metresPerUnit = 1;  ///< largest, over all directions
   /// Largest number of object units per metre along each axis of the object.
   Vec3 stretchAlong = Vec3::Ones();
   double skin = 0;                   ///< see facet.h

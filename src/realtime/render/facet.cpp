@@ -108,6 +108,7 @@ bool makeFacet(const scene::Corners& corners, double skin, Facet& f) noexcept {
     n.normalize();
   }
   f.normal = n;
+  f.extent = std::sqrt(std::max(0.25 * longest2, (f.c - 0.5 * (f.a + f.b)).squaredNorm()));
   f.skin = skin;
   return true;
 }

@@ -19,6 +19,7 @@ struct Facet {
   Vec3 b = Vec3::Zero();
   Vec3 c = Vec3::Zero();
   Vec3 normal = Vec3::Zero();  ///< unit, out of the front
+  double extent = 0;           ///< greatest distance of a corner from the middle of a-b
   double skin = 0;
   double radius = 0;  ///< of the ball that touches it
   std::uint32_t triangle = 0;

@@ -27,12 +27,15 @@ void FacetCache::add(const Facet& facet, bool deforming) noexcept {
   if (count_ == kMaxFacets) return invalidate();
   const auto i = static_cast<std::size_t>(count_++);
   facets_[i] = facet;
-  supportPlanes_[i] = {facet.normal, facet.normal.dot(facet.a)};
   const Vec3 middle = 0.5 * (facet.a + facet.b);  // of the longest edge
   distances_[i] = 0;
   measured_[i] = -std::numeric_limits<double>::infinity();
-  bounds_[i] = {middle,
-                std::sqrt(std::max((facet.a - middle).squaredNorm(), (facet.c - middle).squaredNorm()))};
+  for (std::size_t k = 0; k < 3; ++k) {
+    filter_.normal[k][i] = facet.normal[static_cast<int>(k)];
+    filter_.centre[k][i] = middle[static_cast<int>(k)];
+  }
+  filter_.offset[i] = facet.normal.dot(facet.a);
+  filter_.radius[i] = facet.extent;
   maxSkin_ = std::max(maxSkin_, facet.skin);
   maxRadius_ = std::max(maxRadius_, facet.radius);
 }
@@ -47,22 +50,31 @@ void FacetCache::add(const TriangleId& id, double distance, double skin, bool de
   maxSkin_ = std::max(maxSkin_, skin);
 }
 
-int FacetCache::facetsNearPath(const Vec3& p, const Vec3& d, const Facet** found) const noexcept {
+int FacetCache::facetsNearPath(const Vec3& p, const Vec3& d, std::uint16_t* found) const noexcept {
   const double height = maxRadius_ + kClear * maxSkin_;
-  const Vec3 middle = p + 0.5 * d;
-  const double reach = 0.5 * d.norm() + height;
+  const Vec3 half = 0.5 * d;
+  const Vec3 middle = p + half;
+  const double reach = half.norm() + height;
+  const auto& [normal, offset, centre, radius] = filter_;
+  // By how much the path misses the plane of a face (metres) and the ball around it (square metres). Without
+  // branches, so that the compiler computes several at once.
+  std::array<double, kMaxFacets> missesPlane;
+  std::array<double, kMaxFacets> missesBall;
+  const auto count = static_cast<std::size_t>(count_);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double above = normal[0][i] * middle.x() + normal[1][i] * middle.y() + normal[2][i] * middle.z();
+    const double along = normal[0][i] * half.x() + normal[1][i] * half.y() + normal[2][i] * half.z();
+    missesPlane[i] = std::abs(above - offset[i]) - std::abs(along) - height;
+    const double x = centre[0][i] - middle.x();
+    const double y = centre[1][i] - middle.y();
+    const double z = centre[2][i] - middle.z();
+    const double farthest = radius[i] + reach;
+    missesBall[i] = x * x + y * y + z * z - farthest * farthest;
+  }
   int n = 0;
-  for (int i = 0; i < count_; ++i) {
-    const SupportPlane& plane = supportPlanes_[static_cast<std::size_t>(i)];
-    const double start = plane.normal.dot(p) - plane.offset;
-    const double end = start + plane.normal.dot(d);
-    found[n] = &facets_[static_cast<std::size_t>(i)];
-    const Bound& bound = bounds_[static_cast<std::size_t>(i)];
-    const double farthest = bound.radius + reach;
-    n += std::min(start, end) < height && std::max(start, end) > -height &&
-                 (bound.centre - middle).squaredNorm() <= farthest * farthest
-             ? 1
-             : 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    found[n] = static_cast<std::uint16_t>(i);
+    n += (missesPlane[i] < 0) & (missesBall[i] <= 0) ? 1 : 0;
   }
   return n;
 }
@@ -78,6 +90,7 @@ bool FacetCache::isWithin(double distance, int k) noexcept {
 }
 
 void FacetCache::moveTo(const Vec3& p) noexcept {
+  if (p == toolPosition_) return;
   travel_ += (p - toolPosition_).norm();
   toolPosition_ = p;
 }

@@ -67,20 +67,23 @@ class FacetCache {
   bool isWithin(double distance, int i) noexcept;
   /// Point tool: all facets that the path from p to p + d may reach. `found` has room for kMaxFacets. Returns
   /// how many.
-  int facetsNearPath(const Vec3& p, const Vec3& d, const Facet** found) const noexcept;
+  int facetsNearPath(const Vec3& p, const Vec3& d, std::uint16_t* found) const noexcept;
 
  private:
-  // normal . x = offset: the plane of the face (point tool), or a plane with the face on its back (ball
-  // tool).
+  // Ball tool. normal . x = offset: a plane with the face on its back.
   struct SupportPlane {
     Vec3 normal;
     double offset;
   };
 
-  // A ball around a facet.
-  struct Bound {
-    Vec3 centre;
-    double radius;
+  // Of facets for a point tool, one array for each number, so that the compiler computes several at once.
+  struct Filter {
+    template <class T>
+    using Column = std::array<T, kMaxFacets>;
+    std::array<Column<double>, 3> normal;  // of the plane of the face
+    Column<double> offset;                 // normal . x = offset
+    std::array<Column<double>, 3> centre;  // of a ball around it
+    Column<double> radius;
   };
 
   double toolRadius_;
@@ -92,7 +95,7 @@ class FacetCache {
   double maxRadius_ = 0;  // of the ball that touches them
   std::array<SupportPlane, kMaxTriangles> supportPlanes_;
   std::array<Facet, kMaxFacets> facets_;
-  std::array<Bound, kMaxFacets> bounds_;
+  Filter filter_;
   std::array<double, kMaxFacets> measured_;  // the travel when the distance was
   Vec3 toolPosition_ = Vec3::Zero();
   double travel_ = 0;                            // of the tool since restart()

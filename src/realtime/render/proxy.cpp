@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "realtime/render/force_shading.h"
@@ -195,16 +196,19 @@ void Proxy::moveFrictionless(const Vec3& target, ActiveSet& active) noexcept {
   Vec3 step = Vec3::Zero();
   while (casts_ < kMaxCasts && !query_.workSpent()) {
     const Vec3 from = position_;
-    const ActiveSet held = active;
-    if (!step.isZero(0)) extrapolateStep(step, target);
+    std::optional<ActiveSet> held;
+    if (!step.isZero(0)) {
+      held = active;
+      extrapolateStep(step, target);
+    }
     active.count = 0;
     Vec3 goal;
     if (approach(target, false, active, goal)) return;
     double distance = (position_ - target).norm();
     if (!(distance < nearest - gain)) {
-      if (!step.isZero(0)) {
+      if (held) {
         position_ = from;
-        active = held;
+        active = *held;
         step.setZero();
         continue;
       }
@@ -283,12 +287,7 @@ bool Proxy::approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Ve
     }
     goal = nearest.found ? nearest.point : position_;
     if (!nearest.found) break;
-    const ActiveSet all = active;
-    active.count = nearest.count;
-    for (int i = 0; i < nearest.count; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      active.hits[k] = all.hits[static_cast<std::size_t>(nearest.active[k])];
-    }
+    active.keep(nearest);
     Vec3 end = goal;
     const bool shortened = query_.shorten(position_, end);
     const Vec3 displacement = end - position_;

@@ -84,6 +84,15 @@ class Proxy {
   struct ActiveSet {
     std::array<ObjectHit, kMaxHalfSpaces> hits;
     int count = 0;
+
+    /// Leaves only the hits that hold the proxy at this place.
+    void keep(const Projection& nearest) noexcept {
+      count = nearest.count;
+      for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+        const auto active = static_cast<std::size_t>(nearest.active[i]);
+        if (active != i) hits[i] = hits[active];
+      }
+    }
   };
 
   struct TouchedFace;
