@@ -22,6 +22,12 @@ using Bytes = std::vector<std::byte>;
 template <class T>
 concept IsEnum = std::is_enum_v<T>;
 
+/// A vertex or a triangle: nothing but scalars. A mesh has millions of them.
+template <class T>
+concept Row = std::is_trivially_destructible_v<T> && requires(const T& row) {
+  requires Scalar<std::remove_cvref_t<decltype(*row.begin())>>;
+};
+
 /// Appends values to bytes.
 class Packer {
  public:
@@ -34,9 +40,7 @@ class Packer {
 
   template <Scalar T>
   void put(T value) {
-    const std::size_t at = out_.size();
-    out_.resize(at + sizeof(T));
-    wire::storeBig(out_.data() + at, value);
+    wire::storeBig(grow(sizeof(T)), value);
   }
   void put(bool value) { put(std::uint8_t{value}); }
   template <IsEnum T>
@@ -52,6 +56,18 @@ class Packer {
   void put(const std::vector<T>& list) {
     put(static_cast<std::uint32_t>(list.size()));
     for (const T& item : list) put(item);
+  }
+  template <Row T>
+  void put(const std::vector<T>& list) {
+    put(static_cast<std::uint32_t>(list.size()));
+    if (list.empty()) return;
+    std::byte* to = grow(list.size() * static_cast<std::size_t>(list[0].size()) * sizeof(*list[0].begin()));
+    for (const T& row : list) {
+      for (const auto value : row) {
+        wire::storeBig(to, value);
+        to += sizeof(value);
+      }
+    }
   }
   template <class T, std::size_t N>
   void put(const std::array<T, N>& list) {
@@ -74,6 +90,12 @@ class Packer {
   }
 
  private:
+  std::byte* grow(std::size_t bytes) {
+    const std::size_t at = out_.size();
+    out_.resize(at + bytes);
+    return out_.data() + at;
+  }
+
   Bytes& out_;
 };
 

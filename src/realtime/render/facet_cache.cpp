@@ -74,7 +74,7 @@ int FacetCache::facetsNearPath(const Vec3& p, const Vec3& d, std::uint16_t* foun
   int n = 0;
   for (std::size_t i = 0; i < count; ++i) {
     found[n] = static_cast<std::uint16_t>(i);
-    n += (missesPlane[i] < 0) & (missesBall[i] <= 0) ? 1 : 0;
+    n += missesPlane[i] < 0 && missesBall[i] <= 0 ? 1 : 0;
   }
   return n;
 }

@@ -88,8 +88,13 @@ struct Turn {
   double touching = 0;  // share of the ticks
 };
 
+constexpr int kSteps = reduced(100'000);
+constexpr int kParts = reduced(1'000);
+// Error of the trapezoidal rule: in proportion to both.
+constexpr double kQuadrature_J = kSteps < 100'000 ? 1e-7 : 1e-9;
+
 // One turn of the hand, with the trapezoidal rule. A third unequal surface gives the potential a kink where
-// an edge is reached: ticks with `fine` are divided by a thousand, so that a step of the force costs no
+// an edge is reached: ticks with `fine` are divided into kParts, so that a step of the force costs no
 // accuracy.
 template <class Path>
 Turn turn(Hand& hand, const Path& path, int steps, const std::vector<bool>& fine = {}) {
@@ -99,7 +104,7 @@ Turn turn(Hand& hand, const Path& path, int steps, const std::vector<bool>& fine
   Vec3 lastForce = hand.now().force_N;
   const Vec3 proxy = hand.now().proxy_m;
   for (int i = 1; i <= steps; ++i) {
-    const int parts = !fine.empty() && fine[static_cast<std::size_t>(i)] ? 1000 : 1;
+    const int parts = !fine.empty() && fine[static_cast<std::size_t>(i)] ? kParts : 1;
     for (int k = 1; k <= parts; ++k) {
       const Vec3 p =
           i == steps && k == parts ? path(0.0) : path((i - 1 + static_cast<double>(k) / parts) / steps);
@@ -131,9 +136,6 @@ std::vector<bool> stepsOf(Hand& hand, const Path& path, int steps, double stiffe
   }
   return fine;
 }
-
-constexpr int kSteps = reduced(100'000);
-constexpr double kQuadrature_J = kSteps < 100'000 ? 1e-8 : 1e-9;  // error of the trapezoidal rule
 
 // The review's groove: circles of 1 mm, 3 mm below the crease. A sum of K_i d_i n_i gave 4.9 and 10.6 mJ.
 TEST_F(StiffnessTest, unequal_groove_gives_no_energy) {
