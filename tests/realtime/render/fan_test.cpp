@@ -124,10 +124,11 @@ TEST_P(Pit, takes_few_casts) {
   std::normal_distribution<double> tremor(0, 2e-6);
   for (double above = 0.003 + radius; above > -0.0015; above -= 50e-6)
     at({1e-6, -2e-6, pit.height_m + above});
-  constexpr int kTicksInPit = reduced(800);
-  for (int i = 0; i < kTicksInPit; ++i) {
-    const double a = 4 * M_PI * i / kTicksInPit;
-    const double reach = i < kTicksInPit / 4 ? 20e-6 : 1e-3;
+  // A tremor at the bottom, then slow strokes through it.
+  constexpr int kTremor = 200;
+  for (int i = kTremor - reduced(200); i < kTremor + reduced(600); ++i) {
+    const double a = 2 * M_PI * i / 400;
+    const double reach = i < kTremor ? 20e-6 : 1e-3;
     at({reach * std::sin(a) + tremor(random), 0.3 * reach * std::sin(3 * a) + tremor(random),
         pit.height_m - 0.0015});
   }
