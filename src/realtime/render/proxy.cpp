@@ -390,7 +390,8 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
   }
   if (onAll) contactSet_.lateral_m = position_ - goal;
   const bool arrived = casts_ < kMaxCasts && !query_.workSpent();
-  if (toolRadius_ == 0 && onAll && arrived) reported_ = onFaces(hip, active);
+  const bool free = contactSet_.normal_m.isZero(0);  // then only the report is left to find
+  if (toolRadius_ == 0 && onAll && (arrived || free)) reported_ = onFaces(hip, active);
   contactSet_.spring = blendedSpring(now_, planes_, toolRadius_, reported_, contactSet_);
 }
 
