@@ -166,13 +166,14 @@ bool Scheduler::runNext(Nanos limit) {
     return std::max(*task.due, task.busyUntil);
   };
   const std::size_t count = loopCount + tasks_.size();
-  Nanos earliest = kNever;
-  for (std::size_t i = 0; i < count; ++i) earliest = std::min(earliest, whenOf(i));
+  whens_.resize(count);
+  for (std::size_t i = 0; i < count; ++i) whens_[i] = whenOf(i);
+  const Nanos earliest = whens_.empty() ? kNever : *std::min_element(whens_.begin(), whens_.end());
   if (earliest == kNever || earliest > limit) return false;
   const Nanos at = std::max(earliest, clock_.now_);
   ready_.clear();
   for (std::size_t i = 0; i < count; ++i) {
-    if (whenOf(i) <= at) ready_.push_back(i);
+    if (whens_[i] <= at) ready_.push_back(i);
   }
   const std::size_t chosen = ready_[dice_.below(ready_.size())];
   clock_.now_ = at;

@@ -134,6 +134,7 @@ class Scheduler final : public base::Threads, public net::FakeNetwork {
   const std::function<void(const std::string&)> finding_;
   std::vector<Task*> tasks_;
   std::vector<std::size_t> ready_;  // scratch
+  std::vector<Nanos> whens_;        // of loops and tasks, in the present step
   std::size_t serverLoop_ = 0;
   Nanos netBusyUntil_ = 0;
   Nanos netCost_ = 0;
