@@ -149,6 +149,12 @@ void Proxy::updateProxy(const Vec3& hip) noexcept {
   ActiveSet active;
   if (frictionless()) {
     moveFrictionless(hip, active);
+    // The casts ended on the way: perhaps before any was made where the proxy is now.
+    if (casts_ >= kMaxCasts) {
+      Vec3 goal;
+      active.count = 0;
+      approach(hip, true, active, goal);
+    }
     if (active.count == 0) restoreConstraints(hip, active);
     updateContactSet(hip, position_, active);
     slide_ = Slide{};
