@@ -149,7 +149,7 @@ void Proxy::updateProxy(const Vec3& hip) noexcept {
   ActiveSet active;
   if (frictionless()) {
     moveFrictionless(hip, active);
-    // The casts ended on the way: perhaps before any was made where the proxy is now.
+    // The casts ended on the way, perhaps before any found a face at the place where the proxy is now.
     if (casts_ >= kMaxCasts) {
       Vec3 goal;
       active.count = 0;
