@@ -90,7 +90,7 @@ struct Turn {
 
 constexpr int kSteps = reduced(100'000);
 constexpr int kParts = reduced(1'000);
-// Error of the trapezoidal rule: in proportion to both.
+// Error of the trapezoidal rule: it grows with the length of a step, and with that of a part of one.
 constexpr double kQuadrature_J = kSteps < 100'000 ? 1e-7 : 1e-9;
 
 // One turn of the hand, with the trapezoidal rule. A third unequal surface gives the potential a kink where
