@@ -13,7 +13,7 @@
 
 namespace hapticd::test {
 
-constexpr auto kPatience = std::chrono::seconds(20);
+constexpr auto kPatience = std::chrono::seconds(60);
 
 /// Polls until the condition holds; false after kPatience.
 template <class Condition>

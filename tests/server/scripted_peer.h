@@ -46,7 +46,7 @@ class ScriptedPeer {
   }
 
   /// Handles events until the condition holds; returns false after the limit.
-  bool until(const std::function<bool()>& condition, std::chrono::seconds limit = 20s) {
+  bool until(const std::function<bool()>& condition, std::chrono::seconds limit = 60s) {
     const auto end = std::chrono::steady_clock::now() + limit;
     while (!condition()) {
       if (std::chrono::steady_clock::now() > end) return false;
