@@ -129,9 +129,11 @@ _DTYPES = {"B": "u1", "h": "i2", "i": "i4", "I": "u4", "q": "i8", "Q": "u8", "f"
 def _text(value: str, field: _Field) -> bytes:
     encoded = value.encode("utf-8")
     most = field.count - 1 if field.form == "text" else field.count
-    if field.form == "name" and len(encoded) > most:
+    if len(encoded) > most:
         raise ValueError(f"{field.name} {value!r} has {len(encoded)} bytes, at most {most}")
-    return encoded[:most]
+    if b"\0" in encoded:  # the receiver would take it for the end
+        raise ValueError(f"{field.name} {value!r} has a NUL character")
+    return encoded
 
 
 def define(cls: Type[M], name: str, rows: Tuple[Tuple[Any, ...], ...]) -> Layout[M]:

@@ -155,7 +155,7 @@ class Commands:
         self._send(m.SetTrimeshType(object, type))
 
     def set_object_name(self, object: int, name: str) -> None:
-        """Names an object for people, in the viewer and in recordings: at most 64 bytes."""
+        """Names an object for people, in the viewer and in recordings. Raises ValueError for more than 64 bytes."""
         self._send(m.SetObjectName(object, name))
 
     def clear_mesh(self, object: int) -> None:
@@ -260,5 +260,6 @@ class Commands:
         self._send(m.ButtonAdmin(button, int(mode)))
 
     def send_text(self, text: str, severity: Severity = Severity.NORMAL) -> None:
-        """Sends a text, which servers of this project write to their log."""
+        """Sends a text, which servers of this project write to their log. Raises ValueError for more than 1023
+        bytes."""
         self._send(m.Text(int(severity), 0, text))

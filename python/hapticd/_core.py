@@ -215,6 +215,7 @@ class Core(Commands):
         self._first_error = ""
         self._last_failure = ""
         self._dispatching = False
+        self._finished = False  # close() was called
         self._udp_target: Optional[Tuple[str, int]] = None
         self._counts = Statistics()
         self._ping_at = 0.0
@@ -433,7 +434,8 @@ class Core(Commands):
 
     def _send_frames(self, frames: List[bytes], messages: int) -> None:
         """Whole frames of commands, in this order: into the batch, to the peer, or kept for the first connection;
-        dropped and counted while a later connection is lost."""
+        dropped and counted while a later connection is lost. Raises ConnectionLost after close()."""
+        self._check_open()
         size = sum(map(len, frames))
         if self._held is not None:
             self._held.extend(frames)
@@ -459,8 +461,10 @@ class Core(Commands):
         """Called with each command that was collected; a face may send, and sleep."""
 
     def _put_now(self, message: Any) -> bool:
-        """Appends a message ahead of a batch that is held; false without a connection. The face sends it."""
+        """Appends a message ahead of a batch that is held; false without a connection. The face sends it. Raises
+        ConnectionLost after close()."""
         if not self.connected:
+            self._check_open()
             self._counts.messages_dropped += 1
             return False
         assert self._peer is not None
@@ -470,8 +474,14 @@ class Core(Commands):
 
     @property
     def connected(self) -> bool:
-        """Whether commands reach a server now."""
+        """Whether commands reach a server, as far as the client knows: it sees the end of a connection when it receives
+        or sends. False after close()."""
         return self._peer is not None and self._peer.connected
+
+    def _check_open(self) -> None:
+        """Raises ConnectionLost after close()."""
+        if self._finished:
+            raise ConnectionLost(f"this client of {self.device}@{self.server} is closed")
 
     def _why_not_connected(self) -> str:
         server, failure = self.server, self._last_failure
@@ -541,11 +551,13 @@ class Core(Commands):
     def _set_token(self, token: str) -> None:
         if token and not 16 <= len(token.encode()) <= 128:
             raise ValueError(f"present_token(): {len(token.encode())} characters; a token has 16 to 128")
+        self._check_open()
         self._token = token
         if self.connected and token:
             self._put_now(self._identity())
 
     def _set_subscription(self, kinds: Reports, rate_Hz: float) -> None:
+        self._check_open()
         self._subscription = m.Subscribe(int(kinds), rate_Hz)
         if self.connected:
             self._put_now(self._subscription)
@@ -556,6 +568,7 @@ class Core(Commands):
             raise ValueError(f"a report rate of {rate_Hz} Hz: give 0 (as it is) or more")
 
     def _set_heartbeats(self, enable: bool) -> None:
+        self._check_open()
         self._heartbeats = enable
         if self.connected:
             self._heartbeat_at = time.monotonic() + HEARTBEAT_S

@@ -25,7 +25,7 @@ from ._address import local_towards, parse, resolve
 from ._codec import Numbers
 from ._core import BATCH_BYTES, RETRY_S, STOP_BACKLOG_BYTES, Core, Options, UploadProgress, as_triangles, as_vertices
 from ._peer import ProtocolError
-from .client import unacknowledged
+from .client import has_ended, unacknowledged
 from .errors import ConnectError, ConnectionLost
 from .scene import Capabilities, RemoteContact, Reports
 
@@ -87,7 +87,6 @@ class Client(Core):
         self._soon: Optional[asyncio.Handle] = None
         self._adopted: Optional["asyncio.Future[None]"] = None
         self._task: Optional["asyncio.Task[None]"] = None
-        self._finished = False
 
     async def _start(self) -> None:
         self._target = await self._loop.run_in_executor(None, resolve, self._address)
@@ -100,12 +99,18 @@ class Client(Core):
                 raise
 
     async def close(self) -> None:
-        """Sends what is collected, and closes all sockets. Does nothing the second time."""
+        """Sends what is collected, and closes all sockets. From its first step on every command, and everything that
+        waits, raises ConnectionLost; `latest` is empty. Does nothing the second time."""
         if self._finished:
             return
-        self._finished = True
         if self.connected:
             self._push()
+        self._finished = True
+        transport = self._transport
+        if transport is not None:
+            transport.close()
+            self._gone("closed")
+        self._deliver_all()  # ends waits that began before the first connection
         if self._task is not None:
             self._task.cancel()
             try:
@@ -115,10 +120,7 @@ class Client(Core):
         for handle in (self._timer, self._soon):
             if handle is not None:
                 handle.cancel()
-        transport = self._transport
         if transport is not None:
-            transport.close()
-            self._gone("closed")
             await asyncio.sleep(0)  # the transport closes its socket in the next turn
 
     async def __aenter__(self) -> "Client":
@@ -283,8 +285,10 @@ class Client(Core):
         self._loop.call_soon(self._turn)
 
     async def _wait(self, condition: Callable[[], bool], timeout: float) -> bool:
+        """Waits until the condition holds; false after the timeout. Raises ConnectionLost after close()."""
         deadline = self._loop.time() + timeout
         while not condition():
+            self._check_open()
             left = deadline - self._loop.time()
             if left <= 0:
                 return False
@@ -297,7 +301,8 @@ class Client(Core):
     # --- waiting, receiving
 
     async def wait_connected(self, timeout: float) -> None:
-        """Waits for a connection and for an answer of the device, so many seconds. Raises ConnectError."""
+        """Waits for a connection and for an answer of the device, so many seconds. Raises ConnectError, and
+        ConnectionLost after close()."""
         start = self._loop.time()
         if not await self._wait(lambda: self.connected, timeout):
             raise ConnectError(f"{self.device}: {self._why_not_connected()}")
@@ -322,7 +327,7 @@ class Client(Core):
 
     async def poll(self, timeout: float) -> int:
         """Waits up to `timeout` seconds for the next reports, and returns how many arrived. Raises ServerError
-        (Options.throw_on_error)."""
+        (Options.throw_on_error), and ConnectionLost after close()."""
         before = self._counts.messages_in
         await self._wait(lambda: self._counts.messages_in != before, timeout)
         self._raise_first_error()
@@ -368,6 +373,7 @@ class Client(Core):
     async def flush_all(self) -> None:
         """Sends what is collected and waits until the system has accepted nearly all of it (64 KiB may wait). Raises
         ConnectionLost."""
+        self._check_open()
         self._push()
         transport, connection = self._transport, self._counts.connections
         if transport is not None:
@@ -461,7 +467,8 @@ class Client(Core):
 
     async def stop_forces(self) -> None:
         """Brings the force of the device to zero within one tick of its arrival, until rearm_forces(); on a second
-        connection, too, while more than 64 KiB of this one may be ahead of it."""
+        connection, too, while more than 64 KiB of this one may be ahead of it. Raises as
+        hapticd.Client.stop_forces()."""
         backlog = self._peer.stream_bytes if self._peer is not None else 0
         if self._transport is not None:
             backlog += self._transport.get_write_buffer_size()
@@ -476,7 +483,25 @@ class Client(Core):
         self._push()
         if behind:
             await self._stop_beside(backlog)
+        else:
+            self._check_arrival("forces not stopped")
         await self._require(m.FEATURE_STOP, "stop the forces")
+
+    def _send_at_once(self, message: Any, failure: str) -> None:
+        if not self._put_now(message):
+            raise ConnectionLost(f"{failure}: {self._why_not_connected()}")
+        self._push()
+        self._check_arrival(failure)
+
+    def _check_arrival(self, failure: str) -> None:
+        """As in hapticd.Client. The event loop, too, tells of an end only in its next turn."""
+        transport = self._transport
+        if transport is not None:
+            sock = transport.get_extra_info("socket")
+            if transport.is_closing() or (sock is not None and has_ended(sock)):
+                self._abort("the server closed the connection")
+        if not self.connected:
+            raise ConnectionLost(f"{failure}: {self._why_not_connected()}")
 
     async def _stop_beside(self, backlog: int) -> None:
         timeout = max(self.options.connect_timeout, 1.0)
@@ -497,15 +522,14 @@ class Client(Core):
                 )
 
     async def rearm_forces(self) -> None:
-        """Ends a stop and clears latched trips; the force ramps in over half a second."""
+        """Ends a stop and clears latched trips; the force ramps in over half a second. Raises as
+        hapticd.Client.rearm_forces()."""
         await self._require(m.FEATURE_STOP, "re-arm the forces")
-        self._put_now(m.RearmForces())
-        self._push()
+        self._send_at_once(m.RearmForces(), "forces not re-armed")
 
     async def mark(self, text: str) -> None:
         """Marks a moment, such as "trial 3 begins"; see hapticd.Client.mark()."""
-        self._put_now(m.Marker(0, text))
-        self._push()
+        self._send_at_once(m.Marker(0, text), "not marked")
 
     def present_token(self, token: str) -> None:
         """Presents a token for a role, on every connection from now on: 16 to 128 characters, or empty for none. Without

@@ -8,6 +8,7 @@
 """
 
 import os
+import select
 import selectors
 import socket
 import sys
@@ -53,6 +54,16 @@ def unacknowledged(sock: socket.socket) -> int:
     return int.from_bytes(answer, sys.byteorder)
 
 
+def has_ended(sock: socket.socket) -> bool:
+    """Whether the peer has ended a TCP connection, even while data that it sent before waits to be read; false where
+    the system does not say."""
+    if sys.platform != "linux":
+        return False
+    waiting = select.poll()
+    waiting.register(sock.fileno(), select.POLLRDHUP)  # errors are reported in any case
+    return bool(waiting.poll(0))
+
+
 class Client(Core):
     """One device of one server: hapticd's own, or any other that speaks VRPN.
 
@@ -64,18 +75,17 @@ class Client(Core):
 
     Commands are collected and sent by the next poll(), flush(), or when 64 KiB have accumulated. Every command may
     therefore sleep, while more than Options.queue_limit_bytes wait for a slow server; raise ConnectionLost, when the
-    server accepts no data for Options.send_timeout or the connection ends during that sleep; and raise ConnectError,
-    when more than queue_limit_bytes wait for the first connection. Commands before the first connection are kept for
-    it. Commands while a later connection is lost are dropped and counted: a restarted server has an empty scene, so
-    rebuild it when on_connection() reports a connection. A refusal arrives as a text of severity error, see
-    on_text(). A command of an extension raises Unsupported when the server or its device does not have it, and may
-    wait for the server's answer to that question.
+    server accepts no data for Options.send_timeout or the connection ends during that sleep, and after close(); and
+    raise ConnectError, when more than queue_limit_bytes wait for the first connection. Commands before the first
+    connection are kept for it. Commands while a later connection is lost are dropped and counted: a restarted server
+    has an empty scene, so rebuild it when on_connection() reports a connection. A refusal arrives as a text of severity
+    error, see on_text(). A command of an extension raises Unsupported when the server or its device does not have it,
+    and may wait for the server's answer to that question.
     """
 
     def __init__(self, device: str, options: Options = Options()) -> None:
         address = parse(device)
         super().__init__(address, options)
-        self._closed_by_user = False
         self._target = resolve(address)
         self._selector = selectors.DefaultSelector()
         self._sock: Optional[socket.socket] = None
@@ -100,13 +110,15 @@ class Client(Core):
 
     def close(self) -> None:
         """Sends what is collected as far as the system accepts it, and closes all sockets. The server ends the
-        client's forces. Does nothing the second time."""
-        if self._closed_by_user:
+        client's forces. From then on every command, and everything that waits, raises ConnectionLost; `latest` and
+        statistics() stay. Does nothing the second time."""
+        if self._finished:
             return
         if self.connected:
             self._push()
-        self._closed_by_user = True
+        self._finished = True
         self._drop_sockets()
+        self._closed("closed")
         self._selector.close()
 
     def __enter__(self) -> "Client":
@@ -288,8 +300,7 @@ class Client(Core):
 
     def _step(self, timeout: float) -> None:
         """Sends, sleeps up to the timeout until something arrives or is due, receives. Runs no callbacks."""
-        if self._closed_by_user:
-            raise ConnectionLost(f"this client of {self.device}@{self.server} is closed")
+        self._check_open()
         at = time.monotonic()
         until = at + min(timeout, 3600.0)  # select() refuses longer times
         if self._sock is None and self._listener is None:
@@ -371,7 +382,9 @@ class Client(Core):
     def poll(self, timeout: float = 0.0) -> int:
         """Sends what is collected, sleeps up to `timeout` seconds until something arrives, runs the callbacks for it,
         and returns the number of reports that arrived. 0 does not sleep. Called from a callback, it runs no
-        callbacks. Raises what callbacks raise, and ServerError (Options.throw_on_error)."""
+        callbacks. Raises what callbacks raise, ServerError (Options.throw_on_error), and ConnectionLost after
+        close()."""
+        self._check_open()
         count = self._dispatch()
         deadline = time.monotonic() + timeout
         while True:
@@ -431,10 +444,13 @@ class Client(Core):
 
     def flush_all(self) -> None:
         """Sends what is collected and waits until the system has accepted all of it. Raises ConnectionLost."""
+        self._check_open()
         self._drain_to(0)
 
     def wait_connected(self, timeout: float) -> None:
-        """Waits for a connection and for an answer of the device, so many seconds. Raises ConnectError."""
+        """Waits for a connection and for an answer of the device, so many seconds. Raises ConnectError, and
+        ConnectionLost after close()."""
+        self._check_open()
         start = time.monotonic()
         if not self._wait(lambda: self.connected, timeout):
             raise ConnectError(f"{self.device}: {self._why_not_connected()}")
@@ -538,7 +554,8 @@ class Client(Core):
         ahead of everything collected, even inside batch(). While more than 64 KiB of this connection are unsent or
         unacknowledged, the stop may wait behind them, so the client also opens a second TCP connection to the server,
         sends the stop there and waits for the server's confirmation. Heartbeats continue meanwhile. Raises
-        ConnectionLost without a connection, and ConnectError when the second connection is not confirmed within
+        ConnectionLost without a connection, also when the server has ended it and nothing has been polled since
+        (where the system says so: on Linux), and ConnectError when the second connection is not confirmed within
         Options.connect_timeout (at least 1 s)."""
         backlog = self._out_bytes + (self._peer.stream_bytes if self._peer is not None else 0)
         if self._sock is not None and not self._connecting:
@@ -551,7 +568,25 @@ class Client(Core):
         self._push()
         if behind:
             self._stop_beside(backlog)
+        else:
+            self._check_arrival("forces not stopped")
         self._require(m.FEATURE_STOP, "stop the forces")
+
+    def _send_at_once(self, message: Any, failure: str) -> None:
+        """Sends a message ahead of a batch that is held. Raises ConnectionLost as stop_forces() does; its text begins
+        with what has failed."""
+        if not self._put_now(message):
+            raise ConnectionLost(f"{failure}: {self._why_not_connected()}")
+        self._push()
+        self._check_arrival(failure)
+
+    def _check_arrival(self, failure: str) -> None:
+        """After sending: raises ConnectionLost when nothing receives at the other end. The system accepts the first
+        bytes for a server that is gone, so only the state of the connection tells."""
+        if self._sock is not None and has_ended(self._sock):
+            self._fail("the server closed the connection")
+        if not self.connected:
+            raise ConnectionLost(f"{failure}: {self._why_not_connected()}")
 
     def _stop_beside(self, backlog: int) -> None:
         """The server handles the messages of a connection in order, so the pong confirms the stop."""
@@ -574,16 +609,16 @@ class Client(Core):
 
     def rearm_forces(self) -> None:
         """Ends a stop and clears latched trips; the force ramps in over half a second. It keeps its place behind the
-        commands sent before it, and never undoes a stop that is sent after it."""
+        commands sent before it, and never undoes a stop that is sent after it. Waits for a connection up to
+        Options.connect_timeout (ConnectError); raises ConnectionLost when the connection turns out to have ended."""
         self._require(m.FEATURE_STOP, "re-arm the forces")
-        self._put_now(m.RearmForces())
-        self._push()
+        self._send_at_once(m.RearmForces(), "forces not re-armed")
 
     def mark(self, text: str) -> None:
-        """Marks a moment, such as "trial 3 begins": the server records it and reports it to all clients. At most 255
-        bytes."""
-        self._put_now(m.Marker(0, text))
-        self._push()
+        """Marks a moment, such as "trial 3 begins": the server records it and reports it to all clients. Sent at once,
+        even inside batch(). Raises ValueError for more than 255 bytes of UTF-8, and ConnectionLost as
+        stop_forces()."""
+        self._send_at_once(m.Marker(0, text), "not marked")
 
     def present_token(self, token: str) -> None:
         """Presents a token for a role, on every connection from now on: 16 to 128 characters, or empty for none. Without

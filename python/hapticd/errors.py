@@ -10,7 +10,8 @@ class ConnectError(Error, ConnectionError):
 
 
 class ConnectionLost(Error, ConnectionError):
-    """The connection ended while data was being sent, or the server accepted no data for send_timeout."""
+    """The connection ended while data was being sent, or the server accepted no data for send_timeout; there is none
+    for a call that needs it; or the client is closed."""
 
 
 class Unsupported(Error):

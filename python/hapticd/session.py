@@ -21,8 +21,7 @@ from .reports import Trips
 _MAGIC: Final = b"HAPTICS\n"
 _HEAD: Final = struct.Struct(">III")
 _VERSION: Final = 2
-_HEADER, _SCENE, _PUBLISH, _TICKS, _LOST, _END, _LAW = range(1, 8)
-_MARKER = 9
+_HEADER, _SCENE, _PUBLISH, _TICKS, _LOST, _END, _LAW, _STREAM, _PASSIVITY, _MARKER = range(1, 11)  # kinds of blocks
 _MAX_CONTACTS: Final = 1024
 
 _FIXED: Final = np.dtype(
@@ -201,10 +200,11 @@ class Lost(NamedTuple):
 class Ticks:
     """The ticks of one device, column by column: ticks["force_N"] is an array of n rows, read from the file at the
     first use and kept. Lengths in metres, forces in newtons, in the device's frame. `columns` names all columns; those
-    of `hapticd export --to csv` have the same names here (vectors as one column)."""
+    of `hapticd export --to csv` have the same names here (vectors as one column), and NaN where the CSV is empty. A
+    column that was not read before the session was closed raises ValueError."""
 
-    _DERIVED = ("time_ns", "depth_m", "object", "normal", "gripper_rad", "have_state", "written", "T_world_device",
-                "guard_counts")  # fmt: skip
+    _DERIVED = ("time_ns", "depth_m", "object", "normal", "contact_point_m", "gripper_rad", "have_state", "written",
+                "T_world_device", "guard_counts")  # fmt: skip
 
     def __init__(self, session: "Session", offsets: "npt.NDArray[np.int64]") -> None:
         self._session = session
@@ -248,7 +248,7 @@ class Ticks:
         return np.asarray(values[np.maximum(np.cumsum(has) - 1, 0)])
 
     def _derive(self, column: str) -> "npt.NDArray[Any]":
-        touching = self["touching"] if column in ("depth_m", "object", "normal") else None
+        touching = self["touching"] if column in ("depth_m", "object", "normal", "contact_point_m") else None
         if column == "time_ns":
             return np.asarray(self["servo_time_ns"] + self._session.wall_offset_ns)
         if column == "depth_m":
@@ -257,6 +257,8 @@ class Ticks:
             return np.where(touching, self["touched_object"], np.int32(-1))  # type: ignore[arg-type]
         if column == "normal":
             return np.where(touching[:, None], self["surface_normal"], 0.0)  # type: ignore[index]
+        if column == "contact_point_m":
+            return np.where(touching[:, None], self["scp_m"], np.nan)  # type: ignore[index]
         if column == "have_state":
             return self._has(_HAVE_STATE)
         if column == "written":
@@ -342,6 +344,7 @@ class Session:
         self._data: npt.NDArray[np.uint8] = np.frombuffer(self._map, dtype=np.uint8)
         self._ticks: Dict[int, Ticks] = {}
         self._ended = False
+        self._closed = False
         self._damage = ""
         try:
             self._index(verify)
@@ -352,7 +355,8 @@ class Session:
             raise
 
     def close(self) -> None:
-        """Releases the file; columns that were read stay valid."""
+        """Releases the file. Columns that were read stay valid; what would read the file raises ValueError."""
+        self._closed = True
         self._data = np.empty(0, dtype=np.uint8)
         self._bytes.release()
         try:
@@ -386,6 +390,14 @@ class Session:
             append((kind, start, length))
             at = start + length
 
+    def _check_open(self) -> None:
+        if self._closed:
+            raise ValueError(f"the session of '{self.path}' is closed")
+
+    def _content(self, start: int, length: int) -> _Unpacker:
+        self._check_open()
+        return _Unpacker(self._bytes[start : start + length])
+
     def _fail(self, at: int, what: str) -> RecordingError:
         return RecordingError(f"'{self.path}', block at byte {at - _HEAD.size}: {what}")
 
@@ -393,7 +405,7 @@ class Session:
         if not self._blocks or self._blocks[0][0] != _HEADER:
             raise RecordingError(f"'{self.path}' has no whole header{': ' + self._damage if self._damage else ''}")
         _, start, length = self._blocks[0]
-        unpack = _Unpacker(self._bytes[start : start + length])
+        unpack = self._content(start, length)
         try:
             #: Version of the format.
             self.version = int(unpack.one("I"))
@@ -442,7 +454,11 @@ class Session:
         #: Number of the force law.
         self.law = 1
         if len(self._blocks) > 1 and self._blocks[1][0] == _LAW:
-            self.law = int(_HEAD.unpack_from(self._bytes, self._blocks[1][1])[0])
+            _, start, length = self._blocks[1]
+            try:
+                self.law = int(self._content(start, length).one("I"))
+            except _Cut:
+                raise self._fail(start, "the force law is truncated") from None
         self._ended = any(kind == _END for kind, _, _ in self._blocks[-4:])
 
     @property
@@ -472,6 +488,7 @@ class Session:
 
     def ticks_of(self, device: Union[int, str]) -> Ticks:
         """The ticks of a device by its number or one of its names."""
+        self._check_open()
         number = self._device(device)
         if number not in self._ticks:
             self._ticks[number] = Ticks(self, self._find_ticks(number))
@@ -510,6 +527,7 @@ class Session:
 
     def _gather(self, at: "npt.NDArray[np.int64]", dtype: "np.dtype[Any]") -> "npt.NDArray[Any]":
         """Values at these bytes of the file, in the machine's order."""
+        self._check_open()
         base, shape = (dtype.subdtype or (dtype, ()))[:2]
         if not len(at):
             return np.empty((0, *shape), base.newbyteorder("="))
@@ -523,7 +541,7 @@ class Session:
         for kind, start, length in self._blocks:
             if kind != _SCENE:
                 continue
-            unpack = _Unpacker(self._bytes[start : start + length])
+            unpack = self._content(start, length)
             try:
                 scene, client, time, number = unpack.one("I"), unpack.one("I"), unpack.one("q"), unpack.one("H")
                 if number not in _COMMANDS:
@@ -536,25 +554,34 @@ class Session:
 
     @property
     def markers(self) -> Tuple[Marker, ...]:
-        """The moments that clients marked, such as "trial 3 begins"."""
+        """The moments that clients marked, such as "trial 3 begins", in the order in which the server received them.
+        Raises RecordingError for a damaged one."""
+        self._check_open()
         found = []
         for kind, start, length in self._blocks:
             if kind != _MARKER:
                 continue
-            unpack = _Unpacker(self._bytes[start : start + length])
+            unpack = self._content(start, length)
             try:
-                found.append(Marker(unpack.one("q") + self.wall_offset_ns, str(unpack.value("text"))))
+                found.append(Marker(unpack.one("q") + self.wall_offset_ns, unpack.text()))
             except _Cut:
                 raise self._fail(start, "a marker is truncated") from None
+            if unpack.at != length:
+                raise self._fail(start, "a marker is longer than its content")
         return tuple(found)
 
     @property
     def lost(self) -> Tuple[Lost, ...]:
-        """Where data is missing; empty in most recordings."""
+        """Where data is missing; empty in most recordings. Raises RecordingError for a damaged statement."""
+        self._check_open()
         found = []
         for kind, start, length in self._blocks:
-            if kind == _LOST and length == 16:
-                what, device, count = struct.unpack_from(">iIQ", self._bytes, start)
+            if kind == _LOST:
+                unpack = self._content(start, length)
+                try:
+                    what, device, count = unpack.one("i"), unpack.one("I"), unpack.one("Q")
+                except _Cut:
+                    raise self._fail(start, "a loss is truncated") from None
                 found.append(Lost({0: "ticks", 1: "scene events"}.get(what, "streamed values"), device, count))
         return tuple(found)
 

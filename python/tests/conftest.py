@@ -7,8 +7,9 @@ import socket
 import subprocess
 import threading
 import time
-from typing import Any, Iterator, List, Tuple
+from typing import Any, Dict, Iterator, List, Tuple
 
+import numpy as np
 import pytest
 
 import hapticd
@@ -19,6 +20,81 @@ from hapticd._peer import Peer, TYPE_NAMES, now
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 HAPTICD = os.environ.get("HAPTICD", str(ROOT / "build/release/bin/hapticd"))
+
+
+#: Every call of a client that commands, with arguments that are right.
+COMMANDS: Dict[str, Tuple[Any, ...]] = {
+    "add_object": (1,),
+    "add_object_outside_scene": (1,),
+    "clear_mesh": (0,),
+    "constrain_to_line": ((0, 0, 0), (0, 0, 1), 100),
+    "constrain_to_plane": ((0, 0, 0), (0, 0, 1), 100),
+    "constrain_to_point": ((0, 0, 0), 100),
+    "enable_heartbeat": (),
+    "hold_hand": ((0, 0, 0),),
+    "mark": ("trial 3 begins",),
+    "move_to_parent": (1, 0),
+    "present_token": ("0123456789abcdef",),
+    "rearm_forces": (),
+    "release_constraint": (),
+    "release_hand": (),
+    "remove_object": (1,),
+    "remove_triangle": (0, 0),
+    "request_to_room": (),
+    "request_unit_to_sensor": (),
+    "request_workspace": (),
+    "reset_origin": (),
+    "reset_scene": (),
+    "send_text": ("text",),
+    "set_button_mode": (0, hapticd.ButtonMode.MOMENTARY),
+    "set_effect": (0, hapticd.Effect.constant((1, 0, 0), 1)),
+    "set_force": ((0, 0, 1),),
+    "set_force_field": (hapticd.ForceField((0, 0, 0), (0, 0, 1), np.zeros((3, 3)), 1),),
+    "set_haptic_origin": ((0, 0, 0), (0, 0, 1), 0),
+    "set_haptic_scale": (1,),
+    "set_mesh_type": (0, 0),
+    "set_normal": (0, 0, 0, 0, 1),
+    "set_object_count": (2,),
+    "set_object_name": (0, "part"),
+    "set_object_orientation": (0, (0, 0, 1), 0),
+    "set_object_position": (0, (0, 0, 0)),
+    "set_object_scale": (0, (1, 1, 1)),
+    "set_plane": (hapticd.Plane((0, 1, 0, 0), 0.4),),
+    "set_plane_texture": (hapticd.PlaneTexture(),),
+    "set_remote_contacts": ([],),
+    "set_scene_origin": ((0, 0, 0), (0, 0, 1), 0),
+    "set_surface": (0, hapticd.Surface(0.8)),
+    "set_surface_property": (0, "stiffness", 0.8),
+    "set_touchable": (0, True),
+    "set_touchable_faces": (hapticd.Faces.BOTH,),
+    "set_transform": (0, hapticd.IDENTITY),
+    "set_triangle": (0, 0, (0, 1, 2)),
+    "set_update_rate": (100,),
+    "set_vertex": (0, 0, 1, 2, 3),
+    "set_vertices": (0, 0, [[1, 2, 3]]),
+    "set_workspace_box": ((0, 0, 0), (1, 1, 1)),
+    "set_workspace_projection": (hapticd.IDENTITY, hapticd.IDENTITY),
+    "start_custom_effect": (0,),
+    "start_effect": (0,),
+    "stop_custom_effect": (),
+    "stop_effect": (0,),
+    "stop_force_field": (),
+    "stop_forces": (),
+    "stop_plane": (),
+    "subscribe": (hapticd.Reports.ALL,),
+    "transform_mesh": (0, hapticd.IDENTITY),
+    "update_mesh": (0, hapticd.Surface(0.8)),
+    "upload_corners": (0, np.eye(3)),
+    "upload_mesh": (0, np.eye(3), [[0, 1, 2]]),
+}
+#: Calls that wait for the server, in the same way.
+WAITS: Dict[str, Tuple[Any, ...]] = {
+    "collect": ("force", 60),
+    "flush_all": (),
+    "poll": (60,),
+    "wait_capabilities": (),
+    "wait_connected": (60,),
+}
 
 
 class Server:

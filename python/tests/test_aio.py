@@ -1,6 +1,7 @@
 """The asyncio client against a real server with the simulated hand."""
 
 import asyncio
+import inspect
 import socket
 import threading
 import time
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 import hapticd
-from conftest import ROOT, ScriptedServer, Server
+from conftest import COMMANDS, ROOT, WAITS, ScriptedServer, Server
 from hapticd import Reports, Surface
 
 
@@ -103,6 +104,74 @@ def test_a_lost_connection_comes_back(server: Server) -> None:
             hand._transport.abort()
             await until(hand, lambda: events[-2:] == [False, True])
             await until(hand, lambda: hand.latest.pose)
+
+    run(main())
+
+
+@pytest.mark.parametrize("way", ["tcp", "udp"])
+def test_a_closed_client_is_not_connected_and_every_command_raises(server: Server, way: str) -> None:
+    async def consume(reports: Any) -> None:
+        async for _ in reports:
+            pass
+
+    async def main() -> None:
+        async with hapticd.aio.connect(getattr(server, way)) as hand:
+            await until(hand, lambda: hand.latest.pose)
+            consumers = [asyncio.ensure_future(consume(stream("tick"))) for stream in (hand.reports, hand.rows)]
+            await asyncio.sleep(0)
+            closing = asyncio.ensure_future(hand.close())
+            await asyncio.sleep(0)
+            assert not hand.connected
+            await closing
+        assert not hand.connected and hand.capabilities is None
+        for result in await asyncio.wait_for(asyncio.gather(*consumers, return_exceptions=True), 60):
+            assert isinstance(result, hapticd.ConnectionLost) and "is closed" in str(result)
+        for name, arguments in {**COMMANDS, **WAITS}.items():
+            with pytest.raises(hapticd.ConnectionLost, match="this client of Phantom@127.0.0.1:[0-9]+ is closed"):
+                result = getattr(hand, name)(*arguments)
+                if inspect.isawaitable(result):
+                    await result
+                pytest.fail(f"{name}() returned")
+        with pytest.raises(hapticd.ConnectionLost, match="is closed"):
+            async with hand.batch():
+                pass
+        hand.flush()
+        await hand.close()
+        assert hand.statistics().messages_dropped == 0
+
+    run(main())
+
+
+def test_close_ends_a_wait_for_the_first_connection() -> None:
+    async def main() -> None:
+        hand = await hapticd.aio.connect("Phantom@127.0.0.1:1", connect_timeout=0)
+        waiting = asyncio.ensure_future(hand.wait_connected(3600))
+        await asyncio.sleep(0.05)
+        await hand.close()
+        with pytest.raises(hapticd.ConnectionLost, match="is closed"):
+            await asyncio.wait_for(waiting, 60)
+
+    run(main())
+
+
+@pytest.mark.parametrize("way", ["tcp", "udp"])
+def test_a_stop_that_nothing_receives_raises(way: str) -> None:
+    async def main() -> None:
+        calls = {"stop_forces": "forces not stopped", "mark": "not marked", "rearm_forces": "forces not re-armed"}
+        for name, what in calls.items():
+            server = Server()
+            async with hapticd.aio.connect(getattr(server, way), connect_timeout=60) as hand:
+                await hand.wait_capabilities()
+                server.process.kill()
+                server.process.wait(30)
+                time.sleep(0.1)  # until the end of the connection has arrived; the event loop does not run meanwhile
+                with pytest.raises(hapticd.ConnectionLost, match=f"{what}: .*{server.port}"):
+                    await getattr(hand, name)(*COMMANDS[name])
+                assert not hand.connected
+                for again in ("stop_forces", "mark"):
+                    with pytest.raises(hapticd.ConnectionLost, match=f"{calls[again]}: .*{server.port}"):
+                        await getattr(hand, again)(*COMMANDS[again])
+            server.reader.join(30)
 
     run(main())
 

@@ -8,13 +8,13 @@ import sys
 import textwrap
 import threading
 import time
-from typing import Any, List
+from typing import Any, Callable, Dict, List, Tuple
 
 import numpy as np
 import pytest
 
 import hapticd
-from conftest import Listener, ScriptedServer, Server, feel_a_sphere
+from conftest import COMMANDS, WAITS, Listener, ScriptedServer, Server, feel_a_sphere
 from hapticd import Effect, Plane, Reports
 from hapticd import _messages as m
 from hapticd._codec import frame
@@ -221,6 +221,87 @@ def test_a_restarted_server_is_found_again() -> None:
         server.start(f"127.0.0.1:{server.port}")
         until(hand, lambda: events == [False, True] and hand.latest.tick.tick > 0)
     server.stop()
+
+
+@pytest.mark.parametrize("way", ["tcp", "udp"])
+def test_a_closed_client_is_not_connected_and_every_command_raises(server: Server, way: str) -> None:
+    others = {
+        "batch", "capabilities", "close", "connected", "device", "flush", "latest", "on", "options", "reports", "rows",
+        "run_for", "server", "statistics",
+    }  # fmt: skip
+    with hapticd.connect(getattr(server, way)) as hand:
+        public = {name for name in dir(hand) if not name.startswith(("_", "on_", "peer_"))}
+        assert public == {*COMMANDS, *WAITS, *others}
+        hand.run_for(0.1)
+        with pytest.raises(hapticd.ConnectionLost, match="nothing of it was sent"):
+            with hand.batch():
+                hand.set_object_count(2)
+                hand.close()
+                with pytest.raises(hapticd.ConnectionLost, match="is closed"):
+                    hand.set_object_count(3)
+    assert not hand.connected and hand.capabilities is None
+    pose = hand.latest.pose
+    assert pose  # the newest state stays
+    waits: Dict[str, Tuple[Any, ...]] = {**WAITS, "run_for": (60,)}
+    for name, arguments in {**COMMANDS, **waits}.items():
+        with pytest.raises(hapticd.ConnectionLost, match="this client of Phantom@127.0.0.1:[0-9]+ is closed"):
+            getattr(hand, name)(*arguments)
+            pytest.fail(f"{name}() returned")
+    for generator in (hand.reports("force"), hand.rows("force")):
+        with pytest.raises(hapticd.ConnectionLost, match="is closed"):
+            next(generator)
+    with pytest.raises(hapticd.ConnectionLost, match="is closed"):
+        with hand.batch():
+            pass
+    hand.flush()
+    hand.close()
+    assert hand.latest.pose is pose and hand.statistics().messages_dropped == 0
+
+
+@pytest.mark.parametrize("way", ["tcp", "udp"])
+def test_a_stop_that_nothing_receives_raises(way: str) -> None:
+    calls = {"stop_forces": "forces not stopped", "mark": "not marked", "rearm_forces": "forces not re-armed"}
+    for name, what in calls.items():
+        server = Server()
+        with hapticd.connect(getattr(server, way), connect_timeout=60) as hand:
+            hand.wait_capabilities()
+            server.process.kill()
+            server.process.wait(30)
+            time.sleep(0.1)  # until the end of the connection has arrived; nothing polls meanwhile
+            with pytest.raises(hapticd.ConnectionLost, match=f"{what}: .*{server.port}"):
+                getattr(hand, name)(*COMMANDS[name])
+            assert not hand.connected
+            for again in ("stop_forces", "mark"):
+                with pytest.raises(hapticd.ConnectionLost, match=f"{calls[again]}: .*{server.port}"):
+                    getattr(hand, again)(*COMMANDS[again])
+        server.reader.join(30)
+
+
+def test_a_stop_before_the_first_connection_raises() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+    with hapticd.connect(f"Phantom@tcp://127.0.0.1:{port}", connect_timeout=0) as hand:
+        with pytest.raises(hapticd.ConnectionLost, match="forces not stopped: "):
+            hand.stop_forces()
+        with pytest.raises(hapticd.ConnectionLost, match="not marked: "):
+            hand.mark("trial 3 begins")
+
+
+def test_texts_that_are_too_long_are_refused(server: Server) -> None:
+    with hapticd.connect(server.tcp) as hand:
+        sent = hand.statistics().messages_out
+        limits: List[Tuple[Callable[[str], None], int]] = [
+            (hand.mark, 255),
+            (hand.send_text, 1023),
+            (lambda name: hand.set_object_name(0, name), 64),
+        ]
+        for call, most in limits:
+            for text in ("x" * (most + 1), "x" * most + "ä", "ä" * (most // 2 + 1)):
+                with pytest.raises(ValueError, match=f"has {len(text.encode())} bytes, at most {most}"):
+                    call(text)
+        assert hand.statistics().messages_out == sent
+        hand.mark("x" * 255)
+        hand.send_text("ä" * 511)
 
 
 def test_what_is_wrong_with_a_connection_is_named(server: Server) -> None:

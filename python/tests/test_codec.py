@@ -63,6 +63,10 @@ def test_values_that_do_not_fit_name_the_field() -> None:
         LAYOUTS["vrpn_ForceDevice setVertex"].encode(m.SetVertex(0, 0, (1, 2)))
     with pytest.raises(ValueError, match="property 'x{21}' has 21 bytes, at most 20"):
         LAYOUTS["vrpn_ForceDevice setHapticProperty"].encode(m.SetHapticProperty(0, "x" * 21, 0))
+    with pytest.raises(ValueError, match="text 'x{256}' has 256 bytes, at most 255"):
+        LAYOUTS["hapticd Marker"].encode(m.Marker(0, "x" * 256))
+    with pytest.raises(ValueError, match="text '.*' has a NUL character"):
+        LAYOUTS["hapticd Marker"].encode(m.Marker(0, "trial\x003"))
     with pytest.raises(ValueError, match="setObjectNumber"):
         LAYOUTS["vrpn_ForceDevice setObjectNumber"].encode(m.SetObjectNumber(1 << 40))
 

@@ -6,18 +6,21 @@ import pathlib
 import re
 import struct
 import subprocess
+import time
 import zlib
-from typing import Any, Dict, List
+from typing import Any, Callable, Dict, List
 
 import numpy as np
 import pytest
 
 import hapticd
 from conftest import HAPTICD, ROOT, Server, feel_a_sphere
+from hapticd import session as module
 from hapticd.session import _COMMANDS
 
 RECORDINGS = ROOT / "testdata/recordings"
-FILES = ["all_commands_law5", "all_commands_law4", "all_commands_law3", "all_commands_law2", "all_commands_v1", "gripper_v2"]
+FILES = ["all_commands_law11", "all_commands_law5", "all_commands_law4", "all_commands_law3", "all_commands_law2",
+         "all_commands_v1", "gripper_v2"]  # fmt: skip
 
 
 def exported(file: pathlib.Path, to: pathlib.Path) -> List[Dict[str, str]]:
@@ -33,10 +36,12 @@ def columns_of(ticks: hapticd.session.Ticks) -> Dict[str, Any]:
         table[name] = ticks[name]
     for name, pattern in (("hip_m", "hip_{}_m"), ("proxy_m", "proxy_{}_m"), ("velocity_m_per_s", "velocity_{}_m_per_s"),
                           ("force_N", "force_{}_N"), ("rendered_force_N", "rendered_force_{}_N"),
-                          ("normal", "normal_{}"), ("orientation_xyzw", "q{}")):  # fmt: skip
+                          ("normal", "normal_{}"), ("contact_point_m", "contact_point_{}_m"),
+                          ("orientation_xyzw", "q{}")):  # fmt: skip
         array = ticks[name]
         for i in range(array.shape[1]):
             table[pattern.format("xyzw"[i])] = array[:, i]
+    table["gripper_rad"] = ticks["gripper_rad"]
     return table
 
 
@@ -45,10 +50,11 @@ def check_against_export(file: pathlib.Path, tmp_path: pathlib.Path) -> None:
     with hapticd.Session(file) as session:
         ticks = session.ticks
         assert len(rows) == len(ticks) > 0
-        for name, column in columns_of(ticks).items():
-            assert np.array_equal(np.array([float(row[name]) for row in rows]), column.astype(float)), name
-        gripper = np.array([float(row["gripper_rad"] or "nan") for row in rows])
-        assert np.array_equal(gripper, ticks["gripper_rad"], equal_nan=True)
+        columns = columns_of(ticks)
+        assert set(rows[0]) == {*columns, "device", "guard_active", "guard_latched"}
+        for name, column in columns.items():
+            theirs = np.array([float(row[name] or "nan") for row in rows])
+            assert np.array_equal(theirs, column.astype(float), equal_nan=True), name
         for column, name in (("guard_active", "guard_active"), ("guard_latched", "guard_latched")):
             assert ["+".join(session.trips(bits).names) for bits in ticks[name]] == [row[column] for row in rows]
 
@@ -74,6 +80,9 @@ def test_a_fresh_recording(tmp_path: pathlib.Path) -> None:
         assert session.lost == () or session.lost[0].count > 0
         contacts = ticks.contacts()
         assert len(contacts) == ticks["contact_count"].sum() > 0
+        touching = ticks["touching"]
+        assert np.array_equal(np.isfinite(ticks["contact_point_m"]).all(axis=1), touching)
+        assert np.allclose(np.linalg.norm(ticks["contact_point_m"][touching], axis=1), 0.025, atol=3e-4)
         last = contacts[contacts["tick"] == contacts["tick"][-1]]
         total = last["force_N"].sum(axis=0)
         assert np.allclose(total, ticks["contact_force_N"][np.searchsorted(ticks["tick"], contacts["tick"][-1])])
@@ -87,6 +96,114 @@ def test_a_fresh_recording(tmp_path: pathlib.Path) -> None:
             ticks["forces"]
         with pytest.raises(KeyError, match="no device 'Omni'.*there is Phantom"):
             session.ticks_of("Omni")
+
+
+MARKS = ["first", "trial 3 beginnt: Größe µ", "x" * 255, ""]
+
+
+def record_marks(file: pathlib.Path) -> None:
+    server = Server("--record", str(file))
+    with hapticd.connect(server.tcp) as hand:
+        for text in MARKS:
+            hand.mark(text)
+            hand.run_for(0.05)
+    server.stop()
+
+
+def markers_by_info(file: pathlib.Path) -> List[Any]:
+    said = subprocess.run([HAPTICD, "info", "--json", str(file)], check=True, capture_output=True, text=True).stdout
+    return [(int(marker["time_ns"]), marker["text"]) for marker in json.loads(said)["markers"]]
+
+
+def test_markers_are_those_that_clients_set(tmp_path: pathlib.Path) -> None:
+    file = tmp_path / "marks.haptics"
+    before = time.time_ns()
+    record_marks(file)
+    with hapticd.Session(file) as session:
+        assert [marker.text for marker in session.markers] == MARKS
+        times = [marker.time_ns for marker in session.markers]
+        assert before < times[0] and times == sorted(times) and times[-1] < time.time_ns()
+        assert list(session.markers) == markers_by_info(file)
+
+
+def blocks_of(data: bytes) -> List[Any]:
+    """Kind and content of each block."""
+    found, at = [], 8
+    while at < len(data):
+        kind, length, _ = struct.unpack_from(">III", data, at)
+        found.append((kind, data[at + 12 : at + 12 + length]))
+        at += 12 + length
+    return found
+
+
+def written(blocks: List[Any]) -> bytes:
+    out = b"HAPTICS\n"
+    for kind, content in blocks:
+        head = struct.pack(">II", kind, len(content))
+        out += head + struct.pack(">I", zlib.crc32(head + content)) + content
+    return out
+
+
+@pytest.mark.parametrize("damping", [0.1, float("inf"), 0.0])
+def test_a_passivity_controller_is_no_marker(tmp_path: pathlib.Path, damping: float) -> None:
+    """As a server with such a device writes it: the simulated hand has no controller."""
+    file, with_passivity = tmp_path / "marks.haptics", tmp_path / "passivity.haptics"
+    record_marks(file)
+    blocks = blocks_of(file.read_bytes())
+    assert [kind for kind, _ in blocks[:2]] == [1, 7]
+    blocks.insert(2, (9, struct.pack(">Id", 1, damping)))
+    with_passivity.write_bytes(written(blocks))
+    with hapticd.Session(file) as session, hapticd.Session(with_passivity) as other:
+        assert list(other.markers) == list(session.markers) == markers_by_info(with_passivity)
+        assert [marker.text for marker in other.markers] == MARKS
+        assert other.remark == "" and other.law == session.law
+        assert np.array_equal(other.ticks["time_ns"], session.ticks["time_ns"])
+        assert [c.name for c in other.commands()] == [c.name for c in session.commands()]
+
+
+def test_a_block_with_another_layout_is_named(tmp_path: pathlib.Path) -> None:
+    blocks = blocks_of((RECORDINGS / "gripper_v2.haptics").read_bytes())
+    at = 8 + 12 + len(blocks[0][1])
+    file = tmp_path / "damaged.haptics"
+
+    def write(kind: int, content: bytes) -> None:
+        file.write_bytes(written([*blocks[:1], (kind, content), *blocks[1:]]))
+
+    for content in (struct.pack(">qI", 0, 3) + b"ab", struct.pack(">qI", 0, 1) + b"ab", b""):
+        write(10, content)
+        with hapticd.Session(file) as session:
+            assert len(list(session.commands())) > 0
+            with pytest.raises(hapticd.RecordingError, match=f"block at byte {at}: a marker is "):
+                session.markers
+    write(5, struct.pack(">iI", 0, 0))
+    with hapticd.Session(file) as session:
+        with pytest.raises(hapticd.RecordingError, match=f"block at byte {at}: a loss is truncated"):
+            session.lost
+    write(7, b"\0\0")
+    with pytest.raises(hapticd.RecordingError, match=f"block at byte {at}: the force law is truncated"):
+        hapticd.Session(file)
+
+
+def test_losses_are_told_apart(tmp_path: pathlib.Path) -> None:
+    blocks = blocks_of((RECORDINGS / "gripper_v2.haptics").read_bytes())
+    lost = [(0, 0, 3), (1, 0, 4), (2, 0, 1 << 40)]
+    blocks[-1:-1] = [(5, struct.pack(">iIQ", *numbers)) for numbers in lost]
+    file = tmp_path / "lost.haptics"
+    file.write_bytes(written(blocks))
+    with hapticd.Session(file) as session:
+        assert session.lost == (("ticks", 0, 3), ("scene events", 0, 4), ("streamed values", 0, 1 << 40))
+        assert session.markers == () and session.remark == ""
+
+
+def test_the_kinds_of_blocks_are_those_of_the_documents() -> None:
+    text = (ROOT / "docs/recording-format.md").read_text()
+    documented = {name: int(number) for number, name in re.findall(r"^\| (\d+) ([a-z]+) \|", text, re.M)}
+    assert len(documented) == 10
+    header = (ROOT / "src/record/block_file.h").read_text()
+    listed = re.search(r"enum class BlockKind[^{]*\{([^}]*)\}", header)
+    assert listed is not None
+    assert documented == {name: int(number) for name, number in re.findall(r"(\w+) = (\d+)", listed[1])}
+    assert documented == {name: getattr(module, f"_{name.upper()}") for name in documented}
 
 
 def test_commands_are_those_of_the_committed_list() -> None:
@@ -152,7 +269,20 @@ def test_damage_is_named_and_everything_before_it_is_read(tmp_path: pathlib.Path
 
 def test_columns_outlive_the_session() -> None:
     with hapticd.Session(RECORDINGS / "gripper_v2.haptics") as session:
-        opening = session.ticks["gripper_rad"]
+        ticks, opening = session.ticks, session.ticks["gripper_rad"]
     assert np.all(np.isfinite(opening))
     with pytest.raises(ValueError):
         opening[0] = 1
+    assert ticks["gripper_rad"] is opening
+    reads: List[Callable[[], Any]] = [
+        lambda: ticks["force_N"],
+        lambda: ticks["touching"],
+        lambda: ticks.contacts(),
+        lambda: list(session.commands()),
+        lambda: session.markers,
+        lambda: session.lost,
+        lambda: session.ticks_of(0),
+    ]
+    for read in reads:
+        with pytest.raises(ValueError, match="the session of '.*gripper_v2.haptics' is closed"):
+            read()
