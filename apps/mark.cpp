@@ -31,6 +31,7 @@ int run(const MarkOptions& options) {
   link.sendNow(device, wire::Marker{.time = 0, .text = options.text});
   bool confirmed = false;
   std::string refusal;
+  std::string remark;
   const auto hear = [&](const client::Arrival& arrival) {
     if (arrival.what != client::Arrival::What::message) return;
     if (arrival.kind == wire::kindOf<wire::Marker>) {
@@ -39,6 +40,7 @@ int run(const MarkOptions& options) {
     } else if (arrival.kind == wire::kindOf<wire::Text>) {
       const auto text = wire::decode<wire::Text>(arrival.bytes);
       if (text && text->severity == wire::kTextError) refusal = text->text.text;
+      if (text && text->severity == wire::kTextNormal) remark = text->text.text;
     }
   };
   const auto end = std::chrono::steady_clock::now() + kTimeout;
@@ -48,6 +50,7 @@ int run(const MarkOptions& options) {
   if (!confirmed)
     throw Error(options.server + " did not confirm the marker within 5 s; only a hapticd takes markers");
   std::printf("%s: marked \"%s\"\n", options.server.c_str(), options.text.c_str());
+  if (!remark.empty()) std::printf("%s: %s\n", options.server.c_str(), remark.c_str());
   return 0;
 }
 

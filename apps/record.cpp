@@ -92,9 +92,12 @@ std::size_t recordTicks(record::SampleFile& file, const RecordOptions& options) 
                              " is not a hapticd and reports no ticks; record to a file called *.vrpn");
   }
   std::size_t count = 0;
+  std::uint64_t first = 0;
+  std::uint64_t last = 0;
   client.onTick([&](const TickReport& tick) {
     file.add(sampleOf(client.device(), tick));
-    ++count;
+    if (count++ == 0) first = tick.tick;
+    last = tick.tick;
   });
   client.subscribe(Reports::tick, options.rate_Hz);
   try {
@@ -107,6 +110,15 @@ std::size_t recordTicks(record::SampleFile& file, const RecordOptions& options) 
     throw;
   }
   file.close();
+  // At a lower rate than the servo's, others are left out on purpose.
+  if (const std::uint64_t all = last - first + 1;
+      options.rate_Hz >= capabilities->servoRate_Hz && count < all) {
+    std::fprintf(
+        stderr,
+        "hapticd record: %llu ticks between the first and the last are missing: this program or the network "
+        "was too slow for them. The server itself loses none: --server\n",
+        static_cast<unsigned long long>(all - count));
+  }
   return count;
 }
 
@@ -130,10 +142,14 @@ class ServerRecording {
     const auto end = std::chrono::steady_clock::now() + kTimeout;
     while (link_.connected() && std::chrono::steady_clock::now() < end) {
       poll();
-      if (!refusal_.empty()) throw Error(server_ + ": " + refusal_);
+      check();
       if (last_.starts_with(answer)) return last_;
     }
     throw Error(server_ + " did not answer within 5 s; only a hapticd records by itself");
+  }
+  /// Throws when the server refused, or could not write the recording further.
+  void check() const {
+    if (!refusal_.empty()) throw Error(server_ + ": " + refusal_);
   }
   bool poll() {
     link_.poll(20ms, [this](const client::Arrival& arrival) {
@@ -165,7 +181,11 @@ int recordOnServer(const RecordOptions& options) {
                 recording.ask(true, options.file, "recording to").c_str());
     std::fflush(stdout);
     if (options.detach) return 0;
-    pollUntilEnd(options.server, options.seconds, [&] { return recording.poll(); });
+    pollUntilEnd(options.server, options.seconds, [&] {
+      const bool connected = recording.poll();
+      recording.check();
+      return connected;
+    });
   }
   std::printf("%s: %s\n", options.server.c_str(), recording.ask(false, "", "recorded").c_str());
   return 0;

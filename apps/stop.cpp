@@ -28,10 +28,14 @@ struct StopOptions {
 // the user who re-arms. Empty: none, or another machine.
 std::string socketOf(const StopOptions& options) {
   const client::DeviceAddress address = client::parseDevice(options.server);
-  const std::string& host = address.server.host;
-  if (host != "localhost" && !host.starts_with("127.")) return "";
-  const auto path = net::findServerSocket(address.server.port, options.rearm);
-  return path ? address.device + "@unix:" + path->string() : "";
+  const std::string host = address.server.host == "localhost" ? "127.0.0.1" : address.server.host;
+  try {
+    const net::Endpoint server = net::Endpoint::parse(host, address.server.port);
+    const auto path = net::findServerSocket(server, options.rearm);
+    return path ? address.device + "@unix:" + path->string() : "";
+  } catch (const net::Error&) {
+    return "";  // the name of a machine
+  }
 }
 
 Client openClient(const StopOptions& options) {

@@ -135,6 +135,7 @@ int run(const TouchOptions& options) {
   std::printf("%s", summary.text().c_str());
   if (options.json) std::printf("%s\n", summary.json().c_str());
   if (failure.empty() && summary.reports() == 0) failure = client.server() + " sent no reports";
+  if (failure.empty() && !summary.lastError().empty()) failure = client.server() + ": " + summary.lastError();
   if (failure.empty()) return 0;
   std::fflush(stdout);
   std::fprintf(stderr, "hapticd touch: %s\n", failure.c_str());
@@ -183,7 +184,9 @@ void addTouch(CLI::App& app) {
   command->add_flag("--keep-scene", options->keepScene)->group("");  // the default since 0.1
   command->add_flag("--json", options->json, "Also print the summary as one line of JSON, at the end");
   command->footer(
-      "Exit status: 0 when done, 1 when the server cannot be reached, disconnects or sends no reports.");
+      "Exit status: 0 when done, 1 when the server cannot be reached, refuses something, disconnects or "
+      "sends no\n"
+      "reports.");
   command->callback([options] { exitCode = run(*options); });
 }
 

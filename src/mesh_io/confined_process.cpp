@@ -56,6 +56,7 @@ constexpr std::uint32_t kAllowedCalls[] = {
     __NR_newfstatat,
     __NR_statx,
     __NR_faccessat,
+    __NR_faccessat2,
     __NR_readlinkat,
     __NR_getdents64,
     __NR_getcwd,

@@ -61,6 +61,11 @@ bool isTrusted(const fs::path& socket, bool anyUser) {
   return anyUser || *folder == geteuid() || socket.parent_path() == kServiceFolder;
 }
 
+std::string socketName(const Endpoint& listening) {
+  const bool here = listening.address == kAnyAddress || listening.address == kLoopbackAddress;
+  return (here ? "" : listening.addressText() + "-") + std::to_string(listening.port) + ".sock";
+}
+
 fs::path temporaryFolder(std::uint32_t user) {
   return "/tmp/hapticd-" + std::to_string(user);
 }
@@ -149,8 +154,8 @@ Connection connectLocal(Loop& loop, const fs::path& path, const ConnectionOption
   return Connection(loop.impl().adopt(fd, options));
 }
 
-fs::path defaultSocketPath(std::uint16_t port) {
-  const std::string name = std::to_string(port) + ".sock";
+fs::path defaultSocketPath(const Endpoint& listening) {
+  const std::string name = socketName(listening);
   const char* service = secure_getenv("RUNTIME_DIRECTORY");
   if (service != nullptr && *service == '/') return fs::path(service) / name;
   const char* runtime = secure_getenv("XDG_RUNTIME_DIR");
@@ -159,9 +164,9 @@ fs::path defaultSocketPath(std::uint16_t port) {
   return temporaryFolder(geteuid()) / name;
 }
 
-std::optional<fs::path> findServerSocket(std::uint16_t port, bool anyUser) {
-  const std::string name = std::to_string(port) + ".sock";
-  std::vector<fs::path> candidates{defaultSocketPath(port), fs::path(kServiceFolder) / name,
+std::optional<fs::path> findServerSocket(const Endpoint& server, bool anyUser) {
+  const std::string name = socketName(server);
+  std::vector<fs::path> candidates{defaultSocketPath(server), fs::path(kServiceFolder) / name,
                                    temporaryFolder(geteuid()) / name};
   if (anyUser && geteuid() == 0) {
     std::error_code none;

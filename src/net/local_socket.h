@@ -9,6 +9,7 @@
 #include <string>
 
 #include "net/connection.h"
+#include "net/endpoint.h"
 
 namespace hapticd::net {
 
@@ -46,13 +47,14 @@ class LocalListener {
 /// A connection to a server at this path, open at once. Throws Error.
 Connection connectLocal(Loop& loop, const std::filesystem::path& path, const ConnectionOptions& options = {});
 
-/// Where the server that listens on this port has its Unix socket unless configured otherwise:
-/// hapticd/PORT.sock in $RUNTIME_DIRECTORY (without hapticd/), $XDG_RUNTIME_DIR, /run (root) or, in a folder
-/// of its own, /tmp.
-std::filesystem::path defaultSocketPath(std::uint16_t port);
-/// The socket of a server of this user on that port, or of the system's service; nothing when there is none,
-/// or when somebody else could have put it there. With `anyUser`, root also finds those of all users, whom it
-/// then trusts.
-std::optional<std::filesystem::path> findServerSocket(std::uint16_t port, bool anyUser = false);
+/// Where the server that listens here has its Unix socket unless configured otherwise: hapticd/PORT.sock in
+/// $RUNTIME_DIRECTORY (without hapticd/), $XDG_RUNTIME_DIR, /run (root) or, in a folder of its own, /tmp. Of
+/// a server that does not listen on 127.0.0.1 the name is ADDRESS-PORT.sock: others, a tunnel for example,
+/// may have the port there.
+std::filesystem::path defaultSocketPath(const Endpoint& listening);
+/// The socket of a server of this user that listens on that address, or of the system's service; nothing when
+/// there is none, or when somebody else could have put it there. With `anyUser`, root also finds those of all
+/// users, whom it then trusts.
+std::optional<std::filesystem::path> findServerSocket(const Endpoint& server, bool anyUser = false);
 
 }  // namespace hapticd::net

@@ -117,6 +117,7 @@ class SceneBuilder::State {
   }
 
   std::uint64_t revision() const noexcept { return revision_; }
+  std::uint64_t resets() const noexcept { return resets_; }
   NoticeBoard& board() { return board_; }
 
  private:
@@ -221,6 +222,7 @@ class SceneBuilder::State {
     resetWorkspace();
     objects_.reset();
     forces_.reset(call.now);
+    ++resets_;
   }
 
   void apply(BeginBatch&, const Call& call) {
@@ -257,6 +259,7 @@ class SceneBuilder::State {
   std::map<ClientId, Batch> batches_;
   std::size_t heldInBatches_ = 0;  // bytes, of all open batches
   std::uint64_t revision_ = 0;
+  std::uint64_t resets_ = 0;
   bool changed_ = true;
 };
 
@@ -295,6 +298,10 @@ std::vector<ClientCommand> SceneBuilder::commands(Nanos now) const {
 
 std::uint64_t SceneBuilder::revision() const noexcept {
   return state_->revision();
+}
+
+std::uint64_t SceneBuilder::resets() const noexcept {
+  return state_->resets();
 }
 
 }  // namespace hapticd::scene

@@ -26,6 +26,18 @@ double lowered(double value, double max, std::string_view what, const DefineEffe
   return max;
 }
 
+// From half of the servo's rate on, the samples of a vibration are those of a slower one, at the rate itself
+// of a constant force.
+template <class... Which>
+double renderable(double frequency, double unit_Hz, const SceneConfig& config, const Call& call,
+                  std::string_view command, const Which&... which) {
+  const double highest = 0.45 / config.servoPeriod_s / unit_Hz;
+  if (frequency <= highest) return frequency;
+  call.warn(command, "a vibration above what the servo renders is lowered", which..., "frequency ", frequency,
+            " to ", highest);
+  return highest;
+}
+
 std::optional<std::string_view> firstUnusable(const EffectKind& kind, const DefineEffect& c) {
   if (!isUsable(c.magnitude_N)) return "magnitude";
   if (kind.gain && !isUsable(c.gain)) return "gain";
@@ -47,11 +59,15 @@ Effect effectFrom(const EffectKind& kind, const DefineEffect& c, const SceneConf
         kind.type == EffectType::viscous ? bound.maxDamping_Ns_per_m(0) : bound.maxStiffness_N_per_m();
     e.gain = lowered(1000 * atLeastZero(c.gain, "gain", c, call), max, "gain", c, call);
   }
-  if (kind.duration) e.duration = base::toNanos(std::clamp(c.duration_ms, 0.0, kLongest_ms) / 1000);
+  if (kind.duration && atLeastZero(c.duration_ms, "duration", c, call) > 0)
+    e.duration = std::max<Nanos>(1, base::toNanos(std::min(c.duration_ms, kLongest_ms) / 1000));
   if (kind.frequency) {
     const bool inRadians = kind.type == EffectType::contactVibration &&
                            config.contactVibrationUnit == VibrationUnit::radPerSecond;
-    e.angularFrequency_rad_per_s = (inRadians ? 1 : kTau) * atLeastZero(c.frequency, "frequency", c, call);
+    const double asked = atLeastZero(c.frequency, "frequency", c, call);
+    e.angularFrequency_rad_per_s =
+        (inRadians ? 1 : kTau) *
+        renderable(asked, inRadians ? 1 / kTau : 1, config, call, "setEffect", " ", c.index, ", ");
   }
   if (kind.position) e.position = c.position;
   if (kind.direction) {
@@ -207,15 +223,18 @@ void FreeForces::handle(SetPlaneDetail& c, const Call& call) {
     return;
   }
   asked_.keep(c, call.client);
-  planeDetail_.adhesionNormal_N = c.adhesionNormal_N;
-  planeDetail_.adhesionLateral_N = c.adhesionLateral_N;
-  planeDetail_.textureAmplitude = kWorldUnitsPerStockMetre * c.textureAmplitude_m;
-  planeDetail_.textureWavelength =
+  Plane detail;
+  detail.adhesionNormal_N = c.adhesionNormal_N;
+  detail.adhesionLateral_N = c.adhesionLateral_N;
+  detail.textureAmplitude = kWorldUnitsPerStockMetre * c.textureAmplitude_m;
+  detail.textureWavelength =
       c.textureWavelength_m == 0
           ? 0
           : kWorldUnitsPerStockMetre * std::max(kShortestWave_m, c.textureWavelength_m);
-  planeDetail_.buzzAmplitude = kWorldUnitsPerStockMetre * c.buzzAmplitude_m;
-  planeDetail_.buzzAngularFrequency_rad_per_s = kTau * c.buzzFrequency_Hz;
+  detail.buzzAmplitude = kWorldUnitsPerStockMetre * c.buzzAmplitude_m;
+  detail.buzzAngularFrequency_rad_per_s =
+      kTau * renderable(c.buzzFrequency_Hz, 1, config_, call, kName, " plane 0, buzz ");
+  planeDetail_ = {call.client, detail, kNever};
   changed_ = true;
 }
 
@@ -239,6 +258,8 @@ void FreeForces::handle(SetForceField& c, const Call& call) {
   if (field.force_N.isZero(0) && field.jacobian_N_per_unit.isZero(0)) {
     field_.reset();
   } else {
+    if (!(field.radius > 0))
+      call.warn(kName, "the radius is not above zero, there will be no force", " ", c.radius_m);
     field.owner = ownerOf(call.client);
     field_ = {call.client, field, kNever};
     asked_.keep(c, call.client);
@@ -338,7 +359,7 @@ void FreeForces::handle(StartCustomEffect& c, const Call& call) {
   }
   Buzz buzz;
   buzz.force_N = p[0] * Vec3(p[3], p[4], p[5]);
-  buzz.angularFrequency_rad_per_s = kTau * p[1];
+  buzz.angularFrequency_rad_per_s = kTau * renderable(p[1], 1, config_, call, kName, " 0, ");
   buzz.duration = base::toNanos(std::min(p[2], kLongest_ms / 1000));
   buzz.start = ++starts_;
   buzz.owner = ownerOf(call.client);

@@ -54,13 +54,15 @@ PublishedForces FreeForces::publish(double worldUnitsPerMetre) const {
   }
   for (const auto& [index, entry] : planes_) {
     Plane plane = entry.value;
-    if (index == 0) {
-      plane.adhesionNormal_N = planeDetail_.adhesionNormal_N;
-      plane.adhesionLateral_N = planeDetail_.adhesionLateral_N;
-      plane.textureAmplitude = planeDetail_.textureAmplitude;
-      plane.textureWavelength = planeDetail_.textureWavelength;
-      plane.buzzAmplitude = planeDetail_.buzzAmplitude;
-      plane.buzzAngularFrequency_rad_per_s = planeDetail_.buzzAngularFrequency_rad_per_s;
+    // While it ramps out it belongs to the plane that does, and not to one that another client has set since.
+    if (index == 0 && planeDetail_ && (plane.releasing || !planeDetail_->value.releasing)) {
+      const Plane& detail = planeDetail_->value;
+      plane.adhesionNormal_N = detail.adhesionNormal_N;
+      plane.adhesionLateral_N = detail.adhesionLateral_N;
+      plane.textureAmplitude = detail.textureAmplitude;
+      plane.textureWavelength = detail.textureWavelength;
+      plane.buzzAmplitude = detail.buzzAmplitude;
+      plane.buzzAngularFrequency_rad_per_s = detail.buzzAngularFrequency_rad_per_s;
     }
     forces.planes.push_back(plane);
   }
@@ -84,7 +86,7 @@ void FreeForces::appendCommands(Nanos now, std::vector<ClientCommand>& out) cons
     if (entry.value.running) out.push_back({entry.owner, StartEffect{index}});
   }
   for (const auto& [index, entry] : waitingStarts_) out.push_back({entry.owner, StartEffect{index}});
-  add(0, asked_.find<SetPlaneDetail>());
+  if (planeDetail_ && !planeDetail_->value.releasing) add(planeDetail_->owner, asked_.find<SetPlaneDetail>());
   for (const auto& [index, entry] : planes_) {
     if (!entry.value.releasing) add(entry.owner, asked_.find<SetPlane>(index));
   }
@@ -111,6 +113,7 @@ void FreeForces::release(const F& whose, Nanos now) {
   std::erase_if(waitingStarts_, [&](const auto& e) { return whose(e.second.owner); });
   for (auto& [index, entry] : effects_) letGo(entry, entry.value.effect.releasing);
   for (auto& [index, entry] : planes_) letGo(entry, entry.value.releasing);
+  if (planeDetail_) letGo(*planeDetail_, planeDetail_->value.releasing);
   if (field_) letGo(*field_, field_->value.releasing);
   if (constraint_) letGo(*constraint_, constraint_->value.releasing);
   if (buzz_) letGo(*buzz_, buzz_->value.releasing);
@@ -122,8 +125,6 @@ void FreeForces::clientGone(ClientId client, Nanos now) {
 
 void FreeForces::reset(Nanos now) {
   release([](ClientId) { return true; }, now);
-  planeDetail_ = {};
-  asked_.drop<SetPlaneDetail>();
 }
 
 template <class F>
@@ -131,6 +132,7 @@ void FreeForces::forEachDeadline(const F& f) const {
   for (const auto& [index, entry] : effects_) f(entry.goneAt);
   for (const auto& [index, entry] : waitingStarts_) f(entry.goneAt);
   for (const auto& [index, entry] : planes_) f(entry.goneAt);
+  if (planeDetail_) f(planeDetail_->goneAt);
   if (field_) f(field_->goneAt);
   if (constraint_) f(constraint_->goneAt);
   if (buzz_) f(buzz_->goneAt);
@@ -171,6 +173,7 @@ bool FreeForces::update(Nanos now, NoticeBoard& board, std::vector<Notice>& out)
     optional.reset();
     changed_ = true;
   };
+  drop(planeDetail_);
   drop(field_);
   drop(constraint_);
   drop(buzz_);

@@ -113,7 +113,7 @@ class FreeForces {
   std::map<std::int32_t, Owned<RunningEffect>> effects_;
   std::map<std::int32_t, Owned<char>> waitingStarts_;
   std::map<std::int32_t, Owned<Plane>> planes_;
-  Plane planeDetail_;  // of plane 0, even while that does not exist
+  std::optional<Owned<Plane>> planeDetail_;  // of plane 0, even while that does not exist
   std::optional<Owned<ForceField>> field_;
   std::optional<Owned<Constraint>> constraint_;
   std::optional<Owned<Buzz>> buzz_;

@@ -1,10 +1,12 @@
 #include "scene/matrices.h"
 
 #include <cmath>
+#include <limits>
 
 namespace hapticd::scene {
 
 double lengthOf(const Vec3& v) {
+  if (v.hasNaN()) return std::numeric_limits<double>::quiet_NaN();  // maxCoeff() may pass over it
   const double largest = v.cwiseAbs().maxCoeff();
   return largest > 0 ? largest * (v / largest).norm() : largest;
 }

@@ -57,7 +57,12 @@ void Recordings::create(const std::string& name) {
   record::RecorderOptions options;
   options.fileBytes = options_.mostBytes;
   recorder_ = std::make_unique<record::Recorder>(
-      withTime(name), [](const std::string& text) { spdlog::error("{}", text); }, options);
+      withTime(name),
+      [this](const std::string& text) {
+        spdlog::error("{}", text);
+        post_([this, text] { options_.failed(text); });
+      },
+      options);
 }
 
 void Recordings::begin(Nanos wallOffset, std::string config) {

@@ -24,6 +24,8 @@ class Recordings {
   struct Options {
     std::filesystem::path folder;          ///< takes recordings that clients begin
     std::uint64_t mostBytes = UINT64_MAX;  ///< of one file
+    /// Net thread: a recording cannot be written further, for this reason.
+    std::function<void(const std::string&)> failed;
   };
 
   /// Both must outlive this object; `post` calls in the net thread.

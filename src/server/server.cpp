@@ -48,7 +48,12 @@ Server::Server(const ServerConfig& config, std::unique_ptr<Player> player)
       recordings_(scenes_, stations_,
                   [this](std::function<void()> function) { loop_.post(std::move(function)); },
                   {.folder = std::filesystem::path(config.record).parent_path(),
-                   .mostBytes = static_cast<std::uint64_t>(config.limits.recording_MB) * 1'000'000}) {
+                   .mostBytes = static_cast<std::uint64_t>(config.limits.recording_MB) * 1'000'000,
+                   .failed = [this](const std::string& reason) {
+                     const std::string text = "Recording_Control ended: " + reason;
+                     for (const auto& station : stations_)
+                       sendText(*station, {.severity = wire::kTextError, .level = 0, .text = text});
+                   }}) {
   loop_.setErrorHandler([](std::string_view text) { spdlog::error("{}", text); });
   names_.addSender("VRPN Control");  // must be sender 0, as in stock VRPN
   if (!config_.record.empty()) recordings_.create(config_.record);
@@ -116,7 +121,7 @@ void Server::openSocket() {
   if (config_.socket == kSocketOff) return;
   const bool configured = config_.socket != kSocketAuto;
   const std::filesystem::path path =
-      configured ? std::filesystem::path(config_.socket) : net::defaultSocketPath(listener_->local().port);
+      configured ? std::filesystem::path(config_.socket) : net::defaultSocketPath(listener_->local());
   try {
     localListener_ = std::make_unique<net::LocalListener>(
         loop_, path,
@@ -236,7 +241,18 @@ void Server::startScene(SceneHost& scene) {
        .relieved = [this](scene::ClientId client) { loop_.post([this, client] { onRelieved(client); }); },
        .applying = [this, number = scene.number()](
                        auto client, Nanos now,
-                       const auto* command) { recordings_.command(number, client, now, command); }},
+                       const auto* command) { recordings_.command(number, client, now, command); },
+       .wasReset =
+           [this, &scene] {
+             for (const auto& station : stations_) {
+               if (&station->scene() == &scene) station->rampIn();
+             }
+             loop_.post([this, &scene] {
+               for (const auto& station : stations_) {
+                 if (&station->scene() == &scene) station->onReset();
+               }
+             });
+           }},
       [this](std::function<void()> function) { loop_.post(std::move(function)); });
 }
 
@@ -287,7 +303,7 @@ void Server::everySecond() {
   }
   if (!sending) sendPresentStates();
   throttledLog_.reportSuppressed();
-  markers_ = 0;
+  markers_.clear();
   if (web_) web_->everySecond();
 }
 
@@ -575,12 +591,19 @@ void Server::onMarker(Session& session, const wire::MessageReceived& message, Na
   constexpr int kMostPerSecond = 100;
   const auto marker = wire::decode<wire::Marker>(message.payload);
   if (!marker) return session.refuse("malformed message: " + marker.error());
-  if (++markers_ > kMostPerSecond) {
-    session.send(message.local_sender, wire::Text{.severity = wire::kTextError,
-                                                  .level = 0,
-                                                  .text = "Marker refused: the server takes " +
-                                                          std::to_string(kMostPerSecond) + " in a second"});
+  if (++markers_[session.id()] > kMostPerSecond) {
+    session.send(message.local_sender,
+                 wire::Text{.severity = wire::kTextError,
+                            .level = 0,
+                            .text = "Marker refused: the server takes " + std::to_string(kMostPerSecond) +
+                                    " in a second from each client"});
     return;
+  }
+  if (recordings_.file().empty()) {
+    session.send(message.local_sender,
+                 wire::Text{.severity = wire::kTextNormal,
+                            .level = 0,
+                            .text = "marked for all clients; this server records nothing"});
   }
   recordings_.marker(received, marker->text.text);
   throttledLog_.log(spdlog::level::info, session.address(),
@@ -646,14 +669,7 @@ void Server::onRecordingControl(Session& session, const wire::MessageReceived& m
 
 void Server::onSceneMessage(Session& session, Station& station, const wire::MessageReceived& message) {
   std::string error;
-  if (!station.scene().take(session.id(), message, error)) {
-    session.refuse("malformed message: " + error);
-    return;
-  }
-  if (message.kind != wire::kindOf<wire::ResetScene>) return;
-  for (const auto& other : stations_) {
-    if (&other->scene() == &station.scene()) other->onReset();
-  }
+  if (!station.scene().take(session.id(), message, error)) session.refuse("malformed message: " + error);
 }
 
 bool Server::mayCommand(Session& session, Station& station, const wire::MessageReceived& message) {

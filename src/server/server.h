@@ -138,9 +138,9 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   std::vector<std::unique_ptr<Station>> stations_;
   Sessions sessions_;
   Admission admission_{config_.limits, sessions_};
-  std::set<Station*> unfinishedReports_;  ///< with clients that a pass has not reached yet
-  int markers_ = 0;                       ///< in the present second
-  scene::ClientId refusalSentTo_ = 0;     ///< client already notified of a refusal during this read; 0: none
+  std::set<Station*> unfinishedReports_;    ///< with clients that a pass has not reached yet
+  std::map<scene::ClientId, int> markers_;  ///< of each client in the present second
+  scene::ClientId refusalSentTo_ = 0;  ///< client already notified of a refusal during this read; 0: none
   std::vector<net::Subscription> subscriptions_;
   std::unique_ptr<net::TcpListener> listener_;
   std::unique_ptr<net::LocalListener> localListener_;

@@ -16,3 +16,21 @@ grep -q 'stops the forces' "$work/log"
 status=0
 "$hapticd" stop "Phantom@127.0.0.1:1" >"$work/out" 2>&1 || status=$?
 [ "$status" = 1 ]
+
+# Another server has the same port on another address: each stop and re-arm acts on the one that it names.
+port=${address##*:}
+"$hapticd" serve --listen "127.0.0.2:$port" --http off --allow-no-rt >"$work/other.log" 2>&1 &
+other=$!
+trap 'kill "$server" "$other" 2>/dev/null || true; rm -rf "$work"' EXIT
+for _ in $(seq 300); do
+  if grep -q 'listening on' "$work/other.log"; then break; fi
+  sleep 0.1
+done
+stops() { grep -c 'stops the forces' "$work/$1" || true; }
+before=$(stops log)
+"$hapticd" stop "Phantom@127.0.0.2:$port" | grep -q 'forces are off'
+[ "$(stops log)" = "$before" ]
+[ "$(stops other.log)" = 1 ]
+"$hapticd" stop "Phantom@127.0.0.1:$port" | grep -q 'forces are off'
+[ "$(stops log)" = $((before + 1)) ]
+[ "$(stops other.log)" = 1 ]

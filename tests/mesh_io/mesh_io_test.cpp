@@ -254,6 +254,12 @@ TEST_F(MeshFiles, AnotherFormatUnderTheNameOfAMeshIsNotRead) {
               HasSubstr("disguised.ply"));
 }
 
+TEST_F(MeshFiles, APathMayGoUp) {
+  std::filesystem::create_directories(directory_ / "inner");
+  write("one.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  EXPECT_EQ(loadMesh(directory_ / "inner" / ".." / "one.obj").triangles.size(), 1U);
+}
+
 TEST_F(MeshFiles, AGltfReadsNoBufferOfAnotherFolder) {
   std::filesystem::create_directories(directory_ / "inner");
   write("cube.bin", gltfData());

@@ -121,15 +121,23 @@ TEST(Recorder, MarkersAreKept) {
   recorder.addDevice(phantom());
   recorder.start(0, "");
   recorder.recordMarker(77, "trial 3 begins");
+  // For terminals, XML and JSON: no control characters, and nothing that is not UTF-8.
+  recorder.recordMarker(78, "20 \xe2\x84\x83, \xf0\x9f\x98\x80");
+  recorder.recordMarker(79,
+                        "a\x1b[2Jb\nc\xe9"
+                        "d\xe2\x84\xed\xa0\x80\xc0\x80");
   recorder.finish();
   RecordingReader reader(file.path());
   std::vector<MarkerEvent> markers;
   for (RecordingEvent event; reader.next(event);) {
     if (const auto* marker = std::get_if<MarkerEvent>(&event)) markers.push_back(*marker);
   }
-  ASSERT_EQ(markers.size(), 1U);
+  ASSERT_EQ(markers.size(), 3U);
   EXPECT_EQ(markers[0].time, 77);
   EXPECT_EQ(markers[0].text, "trial 3 begins");
+  EXPECT_EQ(markers[1].text, "20 \xe2\x84\x83, \xf0\x9f\x98\x80");
+  const std::string no = "\xef\xbf\xbd";
+  EXPECT_EQ(markers[2].text, "a" + no + "[2Jb" + no + "c" + no + "d" + no + no + no + no + no + no + no);
 }
 
 TEST(Recorder, AFileThatIsRemovedEndsTheRecording) {

@@ -97,6 +97,43 @@ TEST_F(Forces, TimedEffectsLeaveAfterTheirTimeAndCanBeStoppedBefore) {
   EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("stopEffect 9"));
 }
 
+// 0 lasts until the effect is stopped: neither less nor almost nothing may become it unnoticed.
+TEST_F(Forces, DurationsBelowZeroAreToldAndShortOnesEnd) {
+  say(constant(1, -5));
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("setEffect 1, duration -5: negative, 0 is used"));
+  say(constant(2, 1e-7));
+  say(StartEffect{1});
+  say(StartEffect{2});
+  publish();
+  ASSERT_EQ(scene_->effects.size(), 2U);
+  EXPECT_EQ(scene_->effects[0].duration, 0);
+  EXPECT_EQ(scene_->effects[1].duration, 1);
+  run(100 * kMillisecond);
+  EXPECT_EQ(scene_->effects.size(), 1U);
+  EXPECT_TRUE(notices_.empty());
+}
+
+// Samples of a vibration above half the servo's rate are those of a slower one, or of a constant force.
+TEST_F(Forces, VibrationsThatTheServoCannotRenderAreLowered) {
+  say(DefineEffect{.type = "vibrationMotor", .index = 1, .magnitude_N = 1, .frequency = 1000});
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("frequency 1000 to 450"));
+  say(DefineEffect{.type = "vibrationContact", .index = 2, .magnitude_N = 1, .frequency = 6283});
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("frequency 6283 to 2827.43"));
+  say(StartEffect{1});
+  say(StartEffect{2});
+  say(StartCustomEffect{0, {1, 2000}});
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("frequency 2000 to 450"));
+  say(SetPlane{.index = 0, .plane = {0, 1, 0, 0}, .stiffness = 0.5});
+  say(SetPlaneDetail{.buzzAmplitude_m = 0.001, .buzzFrequency_Hz = 451});
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("frequency 451 to 450"));
+  publish();
+  const double highest = 900 * EIGEN_PI;
+  EXPECT_DOUBLE_EQ(scene_->effects.at(0).angularFrequency_rad_per_s, highest);
+  EXPECT_DOUBLE_EQ(scene_->effects.at(1).angularFrequency_rad_per_s, highest);
+  EXPECT_DOUBLE_EQ(scene_->buzz->angularFrequency_rad_per_s, highest);
+  EXPECT_DOUBLE_EQ(scene_->planes.at(0).buzzAngularFrequency_rad_per_s, highest);
+}
+
 TEST_F(Forces, StartMayComeBeforeItsDefinition) {
   say(StartEffect{4});
   wait(999 * kMillisecond);
@@ -252,6 +289,41 @@ TEST_F(Forces, PlanesAreInWorldUnitsWithStockSurfaces) {
   EXPECT_TRUE(notices_.empty());
 }
 
+TEST_F(Forces, APlaneWhoseNormalIsNotANumberIsRefused) {
+  const double nan = std::nan("");
+  const SetPlane plane{.index = 0, .plane = {0, 2, 0, 0.02}, .stiffness = 0.8};
+  say(plane);
+  for (std::size_t i = 0; i < 4; ++i) {
+    SetPlane broken = plane;
+    broken.plane = {0, 0, 0, 0};
+    broken.plane[i] = nan;
+    if (i == 3) broken.plane[0] = 1;
+    say(broken);
+    EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("not finite")) << i;
+  }
+  publish();
+  EXPECT_EQ(scene_->planes.size(), 1U) << "the one before stays";
+}
+
+TEST_F(Forces, TextureAndBuzzEndWithTheirClient) {
+  const SetPlane plane{.index = 0, .plane = {0, 1, 0, 0}, .stiffness = 0.5};
+  say(plane);
+  say(SetPlaneDetail{.buzzAmplitude_m = 0.0005, .buzzFrequency_Hz = 40});
+  builder_.clientGone(kClient, now_);
+  publish();
+  EXPECT_DOUBLE_EQ(scene_->planes.at(0).buzzAmplitude, 0.5) << "while the plane ramps out";
+  say(plane, kOther);
+  publish();
+  EXPECT_EQ(scene_->planes.at(0).buzzAmplitude, 0);
+  run(1'000 * kMillisecond);
+  say(plane, kOther);
+  publish();
+  EXPECT_EQ(scene_->planes.at(0).buzzAmplitude, 0);
+  say(SetPlaneDetail{.buzzAmplitude_m = 0.001, .buzzFrequency_Hz = 40}, kOther);
+  publish();
+  EXPECT_DOUBLE_EQ(scene_->planes.at(0).buzzAmplitude, 1);
+}
+
 TEST_F(Forces, FieldIsInWorldUnitsAndAllZeroStopsIt) {
   say(SetForceField{.origin_m = Vec3(0.01, 0, 0),
                     .force_N = Vec3(0, 1, 0),
@@ -262,6 +334,9 @@ TEST_F(Forces, FieldIsInWorldUnitsAndAllZeroStopsIt) {
   EXPECT_EQ(scene_->fields[0].origin, Vec3(10, 0, 0));
   EXPECT_DOUBLE_EQ(scene_->fields[0].radius, 50);
   EXPECT_DOUBLE_EQ(scene_->fields[0].jacobian_N_per_unit(0, 1), -0.1) << "row by row";
+  EXPECT_TRUE(notices_.empty());
+  say(SetForceField{.force_N = Vec3(0, 1, 0), .radius_m = -0.05});
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("there will be no force"));
   say(SetForceField{});
   publish();
   EXPECT_TRUE(scene_->fields.empty());

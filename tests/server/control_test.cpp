@@ -401,6 +401,48 @@ TEST_F(ControlTest, ABatchActsInOneTickOrNotAtAll) {
   EXPECT_TRUE(watcher->untilText("no batch was begun"));
 }
 
+// The force ramps in after a reset, but only if there is one.
+TEST_F(ControlTest, AResetInABatchActsWithItsCommit) {
+  serve();
+  const auto watcher = peer();
+  hold(*watcher, 0, 0, 0);
+  watcher->send(wire::Subscribe{.kinds = wire::kReportDefault | wire::kReportTick, .rate = 0});
+  watcher->send(kUp);
+  const auto untilFull = [&] {
+    return watcher->until([&] {
+      const auto tick = watcher->last<wire::TickReport>();
+      return tick && std::abs(tick->force[1] - 1) < 1e-9;
+    });
+  };
+  // Forgets the past, calls, and says whether the force was full in all of the next ticks.
+  const auto staysFull = [&](const std::function<void()>& call) {
+    EXPECT_TRUE(untilFull());
+    watcher->forget();
+    call();
+    EXPECT_TRUE(watcher->until([&] { return watcher->count<wire::TickReport>() > 200; }));
+    return std::ranges::all_of(watcher->all<wire::TickReport>(),
+                               [](const auto& tick) { return std::abs(tick.force[1] - 1) < 1e-9; });
+  };
+  const auto withoutCommit = [&] {
+    const auto client = peer();
+    client->send(wire::BatchBegin{});
+    client->send(wire::ResetScene{});
+    client->send(wire::Ping{});
+    EXPECT_TRUE(client->untilNext<wire::Pong>());
+  };
+  // On a busy machine a late tick ramps the force, too.
+  bool stays = false;
+  for (int i = 0; i < 10 && !stays; ++i) stays = staysFull(withoutCommit);
+  EXPECT_TRUE(stays);
+  EXPECT_FALSE(staysFull([&] {
+    watcher->send(wire::BatchBegin{});
+    watcher->send(wire::ResetScene{});
+    watcher->send(kUp);
+    watcher->send(wire::BatchCommit{});
+  }));
+  EXPECT_TRUE(untilFull());
+}
+
 TEST_F(ControlTest, ABulkMeshIsRenderedInItsOwnUnit) {
   serve();
   const auto client = peer();

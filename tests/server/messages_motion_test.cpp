@@ -101,8 +101,11 @@ TEST_F(MotionMessages, MarkersReachAllClients) {
   ASSERT_TRUE(other.until([&] { return other.last<wire::Marker>().has_value(); }));
   EXPECT_EQ(other.last<wire::Marker>()->text.text, "trial 3 begins");
   EXPECT_GT(other.last<wire::Marker>()->time, 0) << "the time of the server";
+  EXPECT_TRUE(peer_.untilText("this server records nothing"));
   for (int i = 0; i < 300; ++i) peer_.send(wire::Marker{.time = 0, .text = "again"});
-  EXPECT_TRUE(peer_.untilText("Marker refused: the server takes 100 in a second"));
+  EXPECT_TRUE(peer_.untilText("Marker refused: the server takes 100 in a second from each client"));
+  other.send(wire::Marker{.time = 0, .text = "of another"});
+  EXPECT_TRUE(other.until([&] { return other.last<wire::Marker>()->text.text == "of another"; }));
   peer_.send(wire::ReplayControl{});
   EXPECT_TRUE(peer_.untilText("Replay_Control refused: this server replays no recording"));
 }

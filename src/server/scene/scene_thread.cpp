@@ -132,6 +132,7 @@ void SceneThread::apply(SceneTask&& task) {
   auto* command = std::get_if<scene::SceneCommand>(&task.what);
   const bool released = command == nullptr || std::holds_alternative<scene::ReleaseForces>(*command);
   if (callbacks_.applying) callbacks_.applying(task.client, now, command);
+  const std::uint64_t resets = seats_.front().builder.resets();
   std::vector<scene::Notice> repeated;
   for (std::size_t i = seats_.size(); i-- > 0;) {
     scene::SceneBuilder& builder = seats_[i].builder;
@@ -144,6 +145,7 @@ void SceneThread::apply(SceneTask&& task) {
     }
   }
   mergeNotices(std::move(repeated), notices_);
+  if (seats_.front().builder.resets() != resets && callbacks_.wasReset) callbacks_.wasReset();
   const scene::SceneConfig& config = seats_.front().device.config;
   if (released && config.owners) config.owners->forget(task.client);
 }

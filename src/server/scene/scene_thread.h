@@ -35,6 +35,8 @@ class SceneThread {
     std::function<void(scene::ClientId)> relieved;              ///< the client is no longer full
     /// Called before the builders get a command; null: the client disconnected. May be empty.
     std::function<void(scene::ClientId, base::Nanos, const scene::SceneCommand*)> applying;
+    /// The scene was reset; called before that is published. May be empty.
+    std::function<void()> wasReset;
   };
 
   /// The thread applies about this many bytes of commands between publications.

@@ -51,8 +51,6 @@ class DeviceControl {
   ///   none, a page in a browser does, once all those programs are gone;
   /// - the sender may not command, and there is more to re-arm than its own stop (`faults`: latched trips).
   bool rearmForces(const Order& order, const Sender& sender, bool faults, Refusal& refusal);
-  /// Ramps the force in from zero, as after a reset of the scene.
-  void rampIn() { guard_.rampIn(); }
 
   bool canBeHeld() const noexcept { return hand_ != nullptr; }
   /// The client that holds the hand.

@@ -222,6 +222,10 @@ void Station::stopForces() noexcept {
   impl_->tick.control().stop();
 }
 
+void Station::rampIn() noexcept {
+  impl_->tick.control().rampIn();
+}
+
 bool Station::armed() const noexcept {
   const realtime::GuardControl& control = impl_->tick.control();
   return impl_->canHurt && control.armed() && !control.stopped();

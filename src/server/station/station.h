@@ -37,6 +37,8 @@ class Station {
 
   /// Any thread: stops the forces until a re-arm.
   void stopForces() noexcept;
+  /// Any thread: ramps the force in from zero, as after a reset of the scene.
+  void rampIn() noexcept;
   /// Any thread: forces are enabled and not stopped, and there is a person to feel them.
   bool armed() const noexcept;
   /// Any thread: the servo has written zero since stopForces(), or has not run.
@@ -74,7 +76,7 @@ class Station {
   /// Credentials.
   void onControl(Session& session, const wire::MessageReceived& message, base::Nanos received,
                  bool hasOperators);
-  /// The scene of this device was reset.
+  /// The scene of this device was reset: trackers are reported in the device frame again.
   void onReset();
   /// The client is connected and has described no name yet.
   void onConnected(Session& session);

@@ -208,7 +208,6 @@ template void Station::Impl::onStreamed(const Request&, const wire::RemoteContac
 template void Station::Impl::onStreamed(const Request&, const wire::HeldForce&);
 
 void Station::onReset() {
-  impl_->control.rampIn();
   impl_->frame.origin.setZero();
   impl_->frame.rotation.setIdentity();
 }

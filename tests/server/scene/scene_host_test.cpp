@@ -60,7 +60,8 @@ class SceneHostTest : public ::testing::Test {
              },
          .relieved =
              [this](scene::ClientId client) { net_.post([this, client] { relieved_.push_back(client); }); },
-         .applying = {}},
+         .applying = {},
+         .wasReset = {}},
         [this](std::function<void()> function) { net_.post(std::move(function)); });
   }
   void TearDown() override {
