@@ -69,7 +69,7 @@ void ReportSummary::onForce(const ForceReport& report) {
 }
 
 void ReportSummary::onText(const TextReport& report) {
-  if (report.severity == Severity::error) lastError_ = report.text;
+  if (report.severity == Severity::error && firstError_.empty()) firstError_ = report.text;
   const std::string text = std::string(nameOf(report.severity)) + ": " + report.text;
   const auto known =
       std::find_if(texts_.begin(), texts_.end(), [&](const auto& t) { return t.first == text; });

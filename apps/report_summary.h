@@ -33,8 +33,8 @@ class ReportSummary {
   LatencyHistogram latency() const;
   /// Texts of the server with their counts, in order of first appearance.
   const std::vector<std::pair<std::string, std::uint64_t>>& texts() const { return texts_; }
-  /// The last text of an error, also from before restart(); empty: none.
-  const std::string& lastError() const { return lastError_; }
+  /// The first text of an error, also from before restart(); empty: none.
+  const std::string& firstError() const { return firstError_; }
   std::uint64_t forceErrors() const { return count(ReportKind::forceError); }
 
   /// For people: several lines, one figure per line.
@@ -59,7 +59,7 @@ class ReportSummary {
   std::uint64_t forceCount_ = 0;
   double deepest_m_ = 0;
   std::vector<std::pair<std::string, std::uint64_t>> texts_;
-  std::string lastError_;
+  std::string firstError_;
 };
 
 }  // namespace hapticd::apps

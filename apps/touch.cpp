@@ -135,7 +135,8 @@ int run(const TouchOptions& options) {
   std::printf("%s", summary.text().c_str());
   if (options.json) std::printf("%s\n", summary.json().c_str());
   if (failure.empty() && summary.reports() == 0) failure = client.server() + " sent no reports";
-  if (failure.empty() && !summary.lastError().empty()) failure = client.server() + ": " + summary.lastError();
+  if (failure.empty() && !summary.firstError().empty())
+    failure = client.server() + ": " + summary.firstError();
   if (failure.empty()) return 0;
   std::fflush(stdout);
   std::fprintf(stderr, "hapticd touch: %s\n", failure.c_str());

@@ -147,13 +147,16 @@ void Reporter::update(const TickReport& tick, const ReportFrame& frame, std::vec
   const bool contactChanged = touching_ != touching;
   if (tick.time < due_ && !contactEnded) return;
   due_ = std::max(due_ + period_, tick.time - period_ / 2);
+  now_ = tick.time;
   const ClientTick clientTick = toClientTick(tick, config_.forceReport);
   tracker(clientTick, frame, out);
   if (contactEnded) {
     contactEnd(clientTick, out);
   } else {
-    const bool changed = contact(clientTick, out) && wants(wire::kReportContactAnalog);
-    if (changed || gripperMoved(clientTick)) analog(clientTick, false, out);
+    bool changed = contact(clientTick, out) && wants(wire::kReportContactAnalog);
+    changed |= gripperMoved(clientTick);
+    if (changed) analogChange_.changed(now_);
+    if (changed || analogChange_.settles(now_)) analog(clientTick, !changed, out);
   }
   touching_ = clientTick.touching;
   if (wants(wire::kReportForce)) out.push_back({wire::IsTouching{flag(clientTick.touching)}, contactChanged});
@@ -233,7 +236,9 @@ bool Reporter::moved(std::int32_t sensor, const Vec3& position, const Quat& orie
       sent.orientation.angularDistance(orientation) <= config_.angularTolerance_rad) {
     return false;
   }
-  sent = {position, orientation};
+  sent.position = position;
+  sent.orientation = orientation;
+  sent.last.changed(now_);
   return true;
 }
 
@@ -244,15 +249,16 @@ void Reporter::tracker(const ClientTick& clientTick, const ReportFrame& frame, s
   const Quat orientation = toFrame * clientTick.orientation;
   const auto pose = [&](std::uint32_t kind, std::int32_t sensor, const Vec3& world) {
     const Vec3 position = toFrame * (world - frame.origin);
-    if (!moved(sensor, position, orientation)) return false;
-    if (!wants(kind)) return true;
+    const bool changed = moved(sensor, position, orientation);
+    if (!changed && !sensors_[static_cast<std::size_t>(sensor)].last.settles(now_)) return false;
+    if (!wants(kind)) return changed;
     const std::int32_t number = view_ == View::device ? sensor : 0;
     out.push_back({wire::TrackerPosQuat{.sensor = number,
                                         .filler = number,
                                         .position = array(position),
                                         .orientation = quaternion(orientation)},
-                   false});
-    return true;
+                   !changed});
+    return changed;
   };
   pose(wire::kReportTracker, kSensorProxy, clientTick.proxy);
   // A client without sensor 1 gets the velocity of the HIP as that of sensor 0, as from a stock server.
@@ -288,26 +294,25 @@ bool Reporter::contact(const ClientTick& clientTick, std::vector<Outgoing>& out)
   const std::size_t before = out.size();
   // Always report the transition to exactly zero force, even below the threshold.
   const bool ended = clientTick.force_N.isZero(0) && !force_N_.isZero(0);
-  if (ended || (clientTick.force_N - force_N_).norm() > kForceStep_N) {
-    force_N_ = clientTick.force_N;
-    out.push_back({wire::Force{array(clientTick.force_N)}, false});
-  }
-  if (std::abs(clientTick.depth - depth_) > kDepthStep_m) {
-    depth_ = clientTick.depth;
-    out.push_back({wire::Dop{clientTick.depth}, false});
-  }
-  if (clientTick.object != object_) {
-    object_ = clientTick.object;
-    out.push_back({wire::TouchedObject{clientTick.object}, false});
-  }
-  if (clientTick.touching && (clientTick.angle_deg != angle_deg_ || !touching_)) {
-    angle_deg_ = clientTick.angle_deg;
-    out.push_back({wire::Angle{clientTick.angle_deg, 1}, false});
-  }
-  const bool changed = out.size() > before;
-  if (clientTick.touching && clientTick.scp != scp_) {
+  const auto report = [&](bool changed, LastChange& last, const auto& message) {
+    if (changed) last.changed(now_);
+    if (changed || last.settles(now_)) out.push_back({message, !changed});
+    return changed;
+  };
+  const bool pushed = ended || (clientTick.force_N - force_N_).norm() > kForceStep_N;
+  if (pushed) force_N_ = clientTick.force_N;
+  const bool sunk = std::abs(clientTick.depth - depth_) > kDepthStep_m;
+  if (sunk) depth_ = clientTick.depth;
+  const bool other = std::exchange(object_, clientTick.object) != clientTick.object;
+  bool changed = report(pushed, forceChange_, wire::Force{array(clientTick.force_N)});
+  changed |= report(sunk, depthChange_, wire::Dop{clientTick.depth});
+  changed |= report(other, objectChange_, wire::TouchedObject{clientTick.object});
+  if (clientTick.touching) {
+    const bool turned = std::exchange(angle_deg_, clientTick.angle_deg) != clientTick.angle_deg || !touching_;
+    changed |= report(turned, angleChange_, wire::Angle{clientTick.angle_deg, 1});
+    const bool moved = scp_ != clientTick.scp;
     scp_ = clientTick.scp;
-    out.push_back({wire::Scp{array(clientTick.scp), quaternion(clientTick.orientation)}, false});
+    report(moved, scpChange_, wire::Scp{array(clientTick.scp), quaternion(clientTick.orientation)});
   }
   if (!wants(wire::kReportForce)) out.erase(out.begin() + static_cast<std::ptrdiff_t>(before), out.end());
   return changed;

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -46,6 +47,24 @@ inline constexpr std::int32_t kSensorHip = 1;
 inline constexpr std::int32_t kSensorContact = 2;
 inline constexpr std::int32_t kSensorCount = 3;
 
+/// Whether the last change of a value is to be sent once more, reliably: as a datagram it may have been lost,
+/// and no further change would tell the client.
+class LastChange {
+ public:
+  void changed(base::Nanos now) noexcept { due_ = now + kPause; }
+  /// True once, when the value has not changed for a while.
+  bool settles(base::Nanos now) noexcept {
+    if (now < due_) return false;
+    due_ = kNever;
+    return true;
+  }
+
+ private:
+  static constexpr base::Nanos kPause = 300'000'000;
+  static constexpr base::Nanos kNever = std::numeric_limits<base::Nanos>::max();
+  base::Nanos due_ = kNever;
+};
+
 /// Origin of the reported tracker poses, and the state of the buttons: both can be changed by clients.
 struct ReportFrame {
   geometry::Vec3 origin = geometry::Vec3::Zero();  ///< reported metres
@@ -54,10 +73,11 @@ struct ReportFrame {
   MovingObjects* moving = nullptr;  ///< null: nothing moves
 };
 
-/// Keeps the last reported values and reports changes. One for each ReportChoice; net thread; no clock and no
-/// socket. Contact can be mirrored for clients without a force device: the button after the device's own is
-/// "touching", and the analog channels are force x y z, depth, angle, touched object and, if the device has a
-/// gripper, its opening in radians. Without the mirror the opening is the only analog channel.
+/// Keeps the last reported values and reports changes, and the last one of a value once more. One for each
+/// ReportChoice; net thread; no clock and no socket. Contact can be mirrored for clients without a force
+/// device: the button after the device's own is "touching", and the analog channels are force x y z, depth,
+/// angle, touched object and, if the device has a gripper, its opening in radians. Without the mirror the
+/// opening is the only analog channel.
 class Reporter {
  public:
   Reporter(const DeviceConfig& config, int buttonCount, const ReportChoice& choice, View view = View::device);
@@ -109,10 +129,12 @@ class Reporter {
   const ReportChoice choice_;
   base::Nanos period_;
   base::Nanos due_ = 0;
+  base::Nanos now_ = 0;  ///< of the present tick
 
   struct Sent {
     geometry::Vec3 position = geometry::Vec3::Constant(1e300);
     geometry::Quat orientation = geometry::Quat::Identity();
+    LastChange last;
   };
   std::array<Sent, kSensorCount> sensors_;
   std::uint32_t buttons_ = 0;
@@ -124,6 +146,12 @@ class Reporter {
   geometry::Vec3 force_N_ = geometry::Vec3::Zero();
   double depth_ = 0;
   double angle_deg_ = 0;
+  LastChange forceChange_;
+  LastChange depthChange_;
+  LastChange objectChange_;
+  LastChange angleChange_;
+  LastChange scpChange_;
+  LastChange analogChange_;
   std::optional<double> gripper_rad_;
   geometry::Vec3 scp_ = geometry::Vec3::Constant(1e300);
   std::uint32_t reportedTrips_ = 0;  ///< bits of the trips that removed the force

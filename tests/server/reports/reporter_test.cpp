@@ -171,6 +171,33 @@ TEST_F(ReporterTest, ContactIsReportedOnChange) {
   EXPECT_EQ(reported<wire::Dop>().size(), 1U);
 }
 
+// As a datagram it may have been lost, and nothing else would tell the client.
+TEST_F(ReporterTest, TheLastChangeOfAValueIsSentOnceMoreAndReliably) {
+  step();
+  touch();
+  step();
+  EXPECT_FALSE(isReliable<wire::Force>());
+  std::map<wire::MessageKind, int> reliable;
+  for (int i = 0; i < 2000; ++i) {
+    step();
+    for (const Outgoing& out : out_) reliable[out.message.kind()] += out.reliable ? 1 : 0;
+    EXPECT_TRUE(i >= 298 || reported<wire::Force>().empty()) << i;
+  }
+  EXPECT_EQ(reliable[wire::kindOf<wire::Force>], 1);
+  EXPECT_EQ(reliable[wire::kindOf<wire::Dop>], 1);
+  EXPECT_EQ(reliable[wire::kindOf<wire::TouchedObject>], 1);
+  EXPECT_EQ(reliable[wire::kindOf<wire::Angle>], 1);
+  EXPECT_EQ(reliable[wire::kindOf<wire::Scp>], 1);
+  EXPECT_EQ(reliable[wire::kindOf<wire::TrackerPosQuat>], 3) << "of each sensor";
+  EXPECT_EQ(reliable[wire::kindOf<wire::AnalogChannels>], 1);
+  // A force that varies is told all the time.
+  for (int i = 0; i < 1000; ++i) {
+    tick_.force_N.x() += 0.01;
+    step();
+    EXPECT_FALSE(isReliable<wire::Force>());
+  }
+}
+
 TEST_F(ReporterTest, TheTransitionToZeroForceIsReported) {
   tick_.force_N = Vec3(0.0015, 0, 0);
   step();
