@@ -22,7 +22,8 @@ enum class BlockKind : std::uint32_t {
   law = 7,
   stream = 8,
   passivity = 9,
-  marker = 10
+  marker = 10,
+  memory = 11
 };
 
 inline constexpr std::size_t kMagicBytes = 8;

@@ -84,6 +84,7 @@ std::vector<Difference> compare(const std::filesystem::path& session, const Rere
                " scene events: from there on the scene is another. ";
     }
   }
+  for (std::uint32_t i = 0; i < devices.size(); ++i) devices[i].setKnowsPast(again.knowsPast(i));
   remark += reader.remark();
   return devices;
 }

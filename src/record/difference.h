@@ -28,6 +28,7 @@ class Difference {
   void addLost(std::uint64_t ticks) { lost_ += ticks; }
   /// A tick before the recording can be compared.
   void skip() { ++skipped_; }
+  void setKnowsPast(bool known) { knowsPast_ = known; }
 
   const std::string& device() const noexcept { return device_; }
   std::uint64_t ticks() const noexcept { return points_.size(); }
@@ -37,6 +38,8 @@ class Difference {
   std::uint64_t lost() const noexcept { return lost_; }
   /// Ticks before a recording that began while the server ran can be compared.
   std::uint64_t skipped() const noexcept { return skipped_; }
+  /// False: the recording began while the server ran, without what its servo knew.
+  bool knowsPast() const noexcept { return knowsPast_; }
   std::uint64_t touching() const noexcept { return touching_; }  ///< in either of the two
   /// The norm of the largest difference of the two forces.
   double largest_N() const noexcept { return largest_N_; }
@@ -56,6 +59,7 @@ class Difference {
   std::uint64_t same_ = 0;
   std::uint64_t lost_ = 0;
   std::uint64_t skipped_ = 0;
+  bool knowsPast_ = true;
   std::uint64_t touching_ = 0;
   double largest_N_ = 0;
   double largestAt_s_ = 0;

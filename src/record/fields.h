@@ -245,6 +245,43 @@ void fields(T& seen, V&& v) {
   v("ramps", ramps);
 }
 
+template <Is<realtime::EffectMemory> T, class V>
+void fields(T& memory, V&& v) {
+  auto& [index, begin, anchor, frequency_rad_per_s, angle_rad, since] = memory;
+  v("index", index);
+  v("begin_ns", begin);
+  v("anchor_m", anchor);
+  v("frequency_rad_per_s", frequency_rad_per_s);
+  v("angle_rad", angle_rad);
+  v("since_ns", since);
+}
+
+template <Is<realtime::PlaneMemory> T, class V>
+void fields(T& memory, V&& v) {
+  auto& [index, placed, depth_m, raised_m] = memory;
+  v("index", index);
+  v("placed_ns", placed);
+  v("depth_m", depth_m);
+  v("raised_m", raised_m);
+}
+
+template <Is<realtime::ThermalMemory> T, class V>
+void fields(T& memory, V&& v) {
+  auto& [impulse_Ns, newest, filled, derated] = memory;
+  v("impulse_Ns", impulse_Ns);
+  v("newest", newest);
+  v("filled_ns", filled);
+  v("derated", derated);
+}
+
+template <Is<realtime::GuardMemory> T, class V>
+void fields(T& memory, V&& v) {
+  auto& [shaped_N, waitForCalm, thermal] = memory;
+  v("shaped_N", shaped_N);
+  v("wait_for_calm", waitForCalm);
+  v("thermal", thermal);
+}
+
 template <Is<realtime::RemoteContact> T, class V>
 void fields(T& contact, V&& v) {
   auto& [id, shape, yields, radius_m, point_m, normal, axis, velocity_m_per_s, angularVelocity_rad_per_s,

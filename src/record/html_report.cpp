@@ -133,11 +133,13 @@ void figures(std::ostream& out, const Difference& d) {
   };
   out << "<table>\n";
   row("ticks", std::to_string(d.ticks()) + ", touching then or now " + std::to_string(d.touching()));
-  row("same in every bit", std::to_string(d.same()) + (d.same() == d.ticks() ? ": all" : ""));
+  row("same in every bit",
+      std::to_string(d.same()) + (d.same() == d.ticks() && d.ticks() > 0 ? ": all" : ""));
   row("largest difference of force", number(d.largest_N()) + " N, at " + number(d.largestAt_s()) + " s");
   row("mean difference of force", number(d.mean_N()) + " N while touching");
   row("largest difference of depth", number(d.largestDepth_m() * 1e3) + " mm");
   row("mean difference of depth", number(d.meanDepth_m() * 1e3) + " mm while touching");
+  if (d.skipped() > 0) row("ticks that could not be compared", std::to_string(d.skipped()));
   if (d.lost() > 0) row("ticks that were not recorded", std::to_string(d.lost()));
   out << "</table>\n";
 }

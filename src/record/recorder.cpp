@@ -147,7 +147,9 @@ void Recorder::drain() {
   }
   appendLost(LostEvent::What::sceneEvents, 0, lostEvents, counts_.lostSceneEvents);
   for (std::uint32_t i = 0; i < devices_.size(); ++i) {
-    appendStreamed(i, *devices_[i]);  // after the rings of ticks for the same reason as the events
+    // After the rings of ticks for the same reason as the events.
+    appendMemories(i, *devices_[i]);
+    appendStreamed(i, *devices_[i]);
     appendTicks(i, *devices_[i]);
   }
   write();
@@ -175,6 +177,15 @@ void Recorder::reportLosses() {
              std::to_string(counts_.lostSceneEvents) + " scene events and " +
              std::to_string(counts_.lostStreamed) +
              " streamed values lost so far because the disk is too slow; record to a faster one");
+}
+
+void Recorder::appendMemories(std::uint32_t number, Device& device) {
+  device.memories.consume([&](const realtime::ServoMemory& memory) {
+    Bytes content;
+    Packer(content).put(number);
+    packMemory(memory, content);
+    appendBlock(out_, BlockKind::memory, content);
+  });
 }
 
 void Recorder::appendStreamed(std::uint32_t number, Device& device) {

@@ -58,6 +58,8 @@ class Recorder {
   realtime::RecordRing& ring(std::uint32_t device) { return devices_[device]->ring; }
   /// The same for what clients stream.
   realtime::StreamRing& streamRing(std::uint32_t device) { return devices_[device]->streams; }
+  /// The same for what a servo knows, of a recording that begins while it runs.
+  realtime::MemoryRing& memoryRing(std::uint32_t device) { return devices_[device]->memories; }
   /// For SceneConfig::stopwatch of a device: keeps its readings for the next recordPublish() of the device.
   /// The scene thread calls it.
   std::function<Nanos()> stopwatch(std::uint32_t device);
@@ -95,6 +97,7 @@ class Recorder {
     Device(std::size_t ticks, std::size_t streamed) : ring(ticks), streams(streamed) {}
     realtime::RecordRing ring;
     realtime::StreamRing streams;
+    realtime::MemoryRing memories{2};
     std::vector<Nanos> readings;  // of the stopwatch; scene thread
     TickPacker packer;            // from here on: recorder thread
     Bytes run;
@@ -108,6 +111,7 @@ class Recorder {
   void close();
   void appendEvent(BlockKind kind, Bytes&& content);
   void appendTicks(std::uint32_t number, Device& device);
+  void appendMemories(std::uint32_t number, Device& device);
   void appendStreamed(std::uint32_t number, Device& device);
   void appendLost(LostEvent::What what, std::uint32_t device, std::uint64_t total, std::uint64_t& known);
   void write();

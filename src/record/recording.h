@@ -87,6 +87,12 @@ struct StreamEvent {
   realtime::StreamRecord stream;
 };
 
+/// What a servo knew of the ticks before the recording; precedes the tick after which it knew it.
+struct MemoryEvent {
+  std::uint32_t device = 0;
+  realtime::ServoMemory memory;
+};
+
 /// One tick of a device.
 struct TickEvent {
   std::uint32_t device = 0;
@@ -112,7 +118,7 @@ struct EndEvent {
   Nanos time = 0;
 };
 
-using RecordingEvent =
-    std::variant<SceneEvent, PublishEvent, StreamEvent, TickEvent, LostEvent, EndEvent, MarkerEvent>;
+using RecordingEvent = std::variant<SceneEvent, PublishEvent, StreamEvent, TickEvent, LostEvent, EndEvent,
+                                    MarkerEvent, MemoryEvent>;
 
 }  // namespace hapticd::record

@@ -153,6 +153,13 @@ bool RecordingReader::readBlock(RecordingEvent& event) {
       if (!unpackStream(in, stream.stream) || !in.rest().empty()) fail("a damaged streamed value");
       break;
     }
+    case BlockKind::memory: {
+      Unpacker in(block_.content);
+      MemoryEvent& memory = event.emplace<MemoryEvent>();
+      device = memory.device = in.next<std::uint32_t>();
+      if (!unpackMemory(in, memory.memory) || !in.rest().empty()) fail("a damaged memory of a servo");
+      break;
+    }
     case BlockKind::lost:
       takeWhole<LostEvent>(event);
       device = std::get<LostEvent>(event).device;

@@ -1,5 +1,7 @@
 #include "record/rerender.h"
 
+#include <utility>
+
 #include "base/clock.h"
 #include "record/archive.h"
 #include "record/changed_surfaces.h"
@@ -111,16 +113,23 @@ struct Rerenderer::Seat {
   }
 
   // A recording that began while the server ran starts between two ticks: the state of its first tick is the
-  // recorded one, and until both are free of contact the proxy is not that of the recording.
+  // recorded one, as far as that tells, until a tick whose whole state is in the file. Older files have no
+  // such tick: there, both are taken to be the same once both are free of contact.
   void follow(const TickReport& recorded) {
-    if (!begun && recorded.tick > 1) {
+    const bool first = !std::exchange(begun, true);
+    if (first && recorded.tick > 1) {
       tick.resume(recorded);
       settled = false;
-    } else if (!settled) {
-      settled = !recorded.rendering.touching && !tick.last().rendering.touching;
-      if (settled) tick.resume(recorded);  // without the trips of a contact that began here only
     }
-    begun = true;
+    if (settled) return;
+    if (memory) {
+      settled = memory->whole && recorded.tick >= memory->tick;
+      if (settled) tick.resume(recorded, *memory);
+    } else if (!first && !recorded.rendering.touching && !tick.last().rendering.touching) {
+      settled = true;
+      guessed = true;
+      tick.resume(recorded);  // without the trips of a contact that began here only
+    }
   }
 
   void publish(std::uint64_t revision) {
@@ -145,6 +154,8 @@ struct Rerenderer::Seat {
 
   bool begun = false;
   bool settled = true;
+  bool guessed = false;  // what the servo knew when the recording began
+  std::optional<realtime::ServoMemory> memory;
 
   base::SimulatedClock clock;
   RecordedHand device{clock};
@@ -163,6 +174,7 @@ const TickReport* Rerenderer::feed(const RecordingEvent& event) {
   if (const auto* command = std::get_if<SceneEvent>(&event)) on(*command);
   if (const auto* published = std::get_if<PublishEvent>(&event)) on(*published);
   if (const auto* streamed = std::get_if<StreamEvent>(&event)) on(*streamed);
+  if (const auto* remembered = std::get_if<MemoryEvent>(&event)) on(*remembered);
   if (const auto* tick = std::get_if<TickEvent>(&event)) return on(*tick);
   return nullptr;
 }
@@ -208,6 +220,10 @@ void Rerenderer::on(const StreamEvent& event) {
   seats_.at(event.device)->streamed.push_back(event.stream);
 }
 
+void Rerenderer::on(const MemoryEvent& event) {
+  seats_.at(event.device)->memory = event.memory;
+}
+
 const TickReport* Rerenderer::on(const TickEvent& event) {
   Seat& seat = *seats_.at(event.device);
   const TickReport& recorded = event.tick.report;
@@ -224,6 +240,10 @@ const TickReport* Rerenderer::on(const TickEvent& event) {
 
 bool Rerenderer::comparable(std::uint32_t device) const {
   return seats_.at(device)->settled;
+}
+
+bool Rerenderer::knowsPast(std::uint32_t device) const {
+  return !seats_.at(device)->guessed;
 }
 
 }  // namespace hapticd::record

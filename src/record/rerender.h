@@ -42,9 +42,12 @@ class Rerenderer {
 
   /// For a tick, the re-rendered one, valid until the next call; null for all other events.
   const realtime::TickReport* feed(const RecordingEvent& event);
-  /// False for the first ticks of a device whose recording began while it touched something, or while the
-  /// server ran: what the proxy did before is not in the file.
+  /// False for the first ticks of a device whose recording began while the server ran: until it was free of
+  /// contact, and nothing ramped, faded or was streamed any more.
   bool comparable(std::uint32_t device) const;
+  /// False for a device whose recording began while the server ran, without what its servo knew: an older
+  /// version wrote it.
+  bool knowsPast(std::uint32_t device) const;
 
  private:
   struct Seat;
@@ -52,6 +55,7 @@ class Rerenderer {
   void on(const SceneEvent& event);
   void on(const PublishEvent& event);
   void on(const StreamEvent& event);
+  void on(const MemoryEvent& event);
   const realtime::TickReport* on(const TickEvent& event);
 
   std::vector<std::unique_ptr<Seat>> seats_;

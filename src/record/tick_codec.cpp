@@ -76,6 +76,44 @@ bool unpackStream(Unpacker& in, realtime::StreamRecord& stream) {
   return in.ok();
 }
 
+void packMemory(const realtime::ServoMemory& memory, Bytes& out) {
+  const realtime::RenderMemory& render = memory.render;
+  Packer pack(out);
+  pack.put(memory.tick);
+  pack.put(memory.whole);
+  pack.put(render.effectCount);
+  for (std::uint32_t i = 0; i < render.effectCount; ++i) pack.put(render.effects[i]);
+  pack.put(render.planeCount);
+  for (std::uint32_t i = 0; i < render.planeCount; ++i) pack.put(render.planes[i]);
+  pack.put(render.buzzBegin);
+  pack.put(memory.guard);
+}
+
+bool unpackMemory(Unpacker& in, realtime::ServoMemory& memory) {
+  memory = realtime::ServoMemory();
+  realtime::RenderMemory& render = memory.render;
+  in.take(memory.tick);
+  in.take(memory.whole);
+  in.take(render.effectCount);
+  if (render.effectCount > render.effects.size()) return false;
+  for (std::uint32_t i = 0; i < render.effectCount; ++i) {
+    in.take(render.effects[i]);
+    if (render.effects[i].begin < 0 || render.effects[i].since < -1) return false;
+  }
+  in.take(render.planeCount);
+  if (render.planeCount > render.planes.size()) return false;
+  for (std::uint32_t i = 0; i < render.planeCount; ++i) {
+    in.take(render.planes[i]);
+    if (render.planes[i].placed < 0) return false;
+  }
+  in.take(render.buzzBegin);
+  in.take(memory.guard);
+  const realtime::ThermalMemory& thermal = memory.guard.thermal;
+  return in.ok() && render.buzzBegin >= 0 && thermal.newest >= 0 &&
+         thermal.newest <= realtime::ThermalMemory::kBuckets && thermal.filled >= 0 &&
+         thermal.filled < realtime::ThermalMemory::kBucket;
+}
+
 bool TickUnpacker::next(TickRecord& tick) {
   if (!ok_ || in_.rest().empty()) return false;
   tick = TickRecord();

@@ -24,6 +24,11 @@ void packStream(const realtime::StreamRecord& stream, Bytes& out);
 /// Takes one; false when it is damaged.
 bool unpackStream(Unpacker& in, realtime::StreamRecord& stream);
 
+/// Appends what a servo knew.
+void packMemory(const realtime::ServoMemory& memory, Bytes& out);
+/// Takes one; false when it is damaged.
+bool unpackMemory(Unpacker& in, realtime::ServoMemory& memory);
+
 /// Takes the ticks of one run.
 class TickUnpacker {
  public:

@@ -93,8 +93,9 @@ bool Recordings::beginScene(SceneHost& scene) {
     std::size_t seat = 0;
     for (std::uint32_t i = 0; i < stations_.size(); ++i) {
       if (&stations_[i]->scene() != &scene) continue;
-      recorder->recordPublish(i, now, builders[seat++]->revision());
-      stations_[i]->recordTo(recorder, i);
+      const std::uint64_t revision = builders[seat++]->revision();
+      recorder->recordPublish(i, now, revision);
+      stations_[i]->recordTo(recorder, i, revision);
     }
   });
 }

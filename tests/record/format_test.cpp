@@ -225,6 +225,81 @@ RC_GTEST_PROP(Ticks, AreReadAsTheyWereWritten, (std::uint64_t seed)) {
   RC_ASSERT(unpacker.ok());
 }
 
+realtime::ServoMemory anyMemory(Filler& filler) {
+  realtime::ServoMemory memory;
+  memory.tick = 7;
+  memory.whole = true;
+  memory.render.effectCount = 3;
+  for (realtime::EffectMemory& effect : memory.render.effects) {
+    filler.fill(effect);
+    effect.begin &= INT64_MAX;
+    effect.since = -1;
+  }
+  memory.render.planeCount = 2;
+  for (realtime::PlaneMemory& plane : memory.render.planes) {
+    filler.fill(plane);
+    plane.placed &= INT64_MAX;
+  }
+  memory.render.buzzBegin = 5;
+  filler.fill(memory.guard);
+  memory.guard.thermal.newest &= 31;
+  memory.guard.thermal.filled &= 0xFFFF;
+  return memory;
+}
+
+Bytes allOf(const realtime::ServoMemory& memory) {
+  Bytes bytes;
+  packMemory(memory, bytes);
+  return bytes;
+}
+
+bool isTaken(const realtime::ServoMemory& memory) {
+  const Bytes bytes = allOf(memory);
+  Unpacker in(bytes);
+  realtime::ServoMemory back;
+  return unpackMemory(in, back) && in.rest().empty() && allOf(back) == bytes;
+}
+
+RC_GTEST_PROP(Memories, AreReadAsTheyWereWritten, (std::uint64_t seed)) {
+  Filler filler(seed);
+  const realtime::ServoMemory memory = anyMemory(filler);
+  RC_ASSERT(isTaken(memory));
+  const Bytes bytes = allOf(memory);
+  for (std::size_t size = 0; size < bytes.size(); ++size) {
+    Unpacker in(ByteView(bytes).first(size));
+    realtime::ServoMemory back;
+    RC_ASSERT(!unpackMemory(in, back));
+  }
+}
+
+TEST(Memories, ImpossibleOnesAreRefused) {
+  Filler filler(1);
+  const realtime::ServoMemory possible = anyMemory(filler);
+  const auto isTakenWith = [&](auto&& change) {
+    realtime::ServoMemory memory = possible;
+    change(memory);
+    return isTaken(memory);
+  };
+  EXPECT_TRUE(isTakenWith([](auto&) {}));
+  EXPECT_FALSE(isTakenWith([](auto& m) { m.render.effects[0].begin = -1; }));
+  EXPECT_FALSE(isTakenWith([](auto& m) { m.render.effects[0].since = -2; }));
+  EXPECT_FALSE(isTakenWith([](auto& m) { m.render.planes[1].placed = -1; }));
+  EXPECT_FALSE(isTakenWith([](auto& m) { m.render.buzzBegin = -1; }));
+  EXPECT_FALSE(isTakenWith([](auto& m) { m.guard.thermal.newest = 51; }));
+  EXPECT_FALSE(isTakenWith([](auto& m) { m.guard.thermal.newest = -1; }));
+  EXPECT_FALSE(isTakenWith([](auto& m) { m.guard.thermal.filled = 100'000'000; }));
+  EXPECT_FALSE(isTakenWith([](auto& m) { m.guard.thermal.filled = -1; }));
+  for (const std::size_t countAt : {9U, 9U + 4U}) {  // without effects: the count of planes
+    realtime::ServoMemory none = possible;
+    none.render.effectCount = 0;
+    Bytes bytes = allOf(none);
+    wire::storeBig(bytes.data() + countAt, std::uint32_t{65});
+    Unpacker in(bytes);
+    realtime::ServoMemory back;
+    EXPECT_FALSE(unpackMemory(in, back));
+  }
+}
+
 RC_GTEST_PROP(Header, IsReadAsItWasWritten, (std::uint64_t seed)) {
   Filler filler(seed);
   RecordingHeader header;
@@ -270,6 +345,7 @@ class SmallSession : public testing::Test {
     recorder.recordPublish(0, 110, 1);
     recorder.recordCommand(0, 9, 120, nullptr);
     Filler filler(1);
+    recorder.memoryRing(0).push(anyMemory(filler));
     for (std::uint64_t i = 1; i <= 3; ++i) recorder.ring(0).push(anyTick(filler, i));
     recorder.finish();
     std::ifstream in(file_.path(), std::ios::binary);
@@ -308,6 +384,8 @@ TEST_F(SmallSession, HasWhatWasRecorded) {
   EXPECT_EQ(std::get<PublishEvent>(event).stopwatch[0], first_);
   ASSERT_TRUE(reader.next(event));
   EXPECT_FALSE(std::get<SceneEvent>(event).command);
+  ASSERT_TRUE(reader.next(event));
+  EXPECT_EQ(std::get<MemoryEvent>(event).memory.tick, 7U);
   for (std::uint64_t i = 1; i <= 3; ++i) {
     ASSERT_TRUE(reader.next(event));
     EXPECT_EQ(std::get<TickEvent>(event).tick.report.tick, i);

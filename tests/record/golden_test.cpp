@@ -150,7 +150,7 @@ void writeRecording(const std::filesystem::path& file, bool gripper, int ticks) 
   config.stopwatch = recorder.stopwatch(0);
   scene::SceneBuilder builder(config);
   realtime::Tick tick(hand, clock, device.tick);
-  tick.recordTo(&recorder.ring(0), nullptr);
+  tick.recordTo({.ticks = &recorder.ring(0)});
   recorder.start(1'700'000'000'000'000'000, "");
   std::vector<scene::Notice> notices;
   for (int i = 0; i < ticks; ++i) {

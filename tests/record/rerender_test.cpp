@@ -1,11 +1,18 @@
 // Re-rendering a recording gives the recorded forces bit for bit.
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <fstream>
+#include <functional>
 #include <map>
 #include <set>
 #include <sstream>
 
+#include "base/clock.h"
+#include "record/block_file.h"
+#include "record/difference.h"
 #include "record/recorded_file.h"
+#include "record/recorder.h"
 #include "record/rerender.h"
 #include "record/scene_event_codec.h"
 
@@ -132,7 +139,7 @@ TEST_F(Rerender, AllCommandsAreInTheFile) {
 }
 
 // A client ends the recording of the start and begins another: while one hand is held in a touched cube, an
-// effect runs and a force field pulls.
+// effect vibrates and a force field pulls.
 TEST_F(Rerender, RecordingBegunWhileTheServerRunsReplaysItsScene) {
   const RecordingFile first;
   const std::filesystem::path folder = std::filesystem::path(first.path()).parent_path();
@@ -153,6 +160,8 @@ TEST_F(Rerender, RecordingBegunWhileTheServerRunsReplaysItsScene) {
     ASSERT_TRUE(untilApplied(peer));
     peer.send(wire::SetSceneOrigin{{0, 0.001F, 0}, {0, 0, 1}, 0.1F});
     peer.send(wire::ForceField{.origin = {0, 0, 0}, .force = {0.3F, 0.2F, 0}, .jacobian = {}, .radius = 10});
+    peer.send(wire::Effect{"vibrationMotor", 3, 0, 0.2, 0, 33.3, {}, {1, 0, 0}});
+    peer.send(wire::StartEffect{3});
     const auto hold = [&](double height, bool touches) {
       second.send(wire::HoldHand{.hold = 1, .position = {5, height, 5}});
       return second.until([&] {
@@ -220,6 +229,309 @@ TEST_F(Rerender, StreamedContactsAndForcesAreInTheFile) {
   EXPECT_NEAR(held_N, 0.2, 1e-9);
   EXPECT_GT(other, 50U);
 }
+
+// A servo with its scene, tick by tick, and a recording that begins when it has run for a while, as the
+// server begins it.
+class LateRecording {
+ public:
+  using Vec3 = geometry::Vec3;
+  static constexpr base::Nanos kTick = 1'000'000;
+
+  LateRecording() {
+    // A box from 0 to 20 mm; an object without a placement is in metres.
+    send(scene::SetVertices{0, 0, boxPoints()});
+    send(scene::SetTriangles{0, 0, boxTriangles(), false});
+    send(scene::SetSurface{0, 0.8, 0.001, 0.4, 0.3});
+  }
+
+  void send(scene::SceneCommand command, scene::ClientId client = 1) {
+    if (recorder_) recorder_->recordCommand(0, client, now_, &command);
+    builder_.apply(client, std::move(command), now_, notices_);
+    changed_ = true;
+  }
+  void leave(scene::ClientId client) {
+    if (recorder_) recorder_->recordCommand(0, client, now_, nullptr);
+    builder_.clientGone(client, now_);
+    changed_ = true;
+  }
+  void stream(const realtime::RemoteInput& input) { tick_.remote().write(input); }
+  realtime::GuardControl& control() { return tick_.control(); }
+  base::Nanos now() const { return now_; }
+  const realtime::TickReport& last() const { return tick_.last(); }
+
+  /// The hand glides to a place, ever more slowly.
+  void glide(const Vec3& place_mm, int ticks) {
+    const Vec3 way = hand_.position_m - 1e-3 * place_mm;
+    for (int i = 1; i <= ticks; ++i) {
+      const double left = std::exp(-0.02 * i);
+      hand_.position_m = 1e-3 * place_mm + left * way;
+      hand_.velocity_m_per_s = -20 * left * way;
+      step();
+    }
+  }
+
+  void record(const std::filesystem::path& file) {
+    record::RecorderOptions options;
+    options.ticks = 1U << 13U;
+    auto recorder = std::make_unique<record::Recorder>(
+        file, [](const std::string& text) { ADD_FAILURE() << text; }, options);
+    recorder->addDevice(device_);
+    recorder->start(0, "");
+    stopwatch_ = recorder->stopwatch(0);
+    for (const scene::ClientCommand& c : builder_.commands(now_)) {
+      const bool ofObjects = scene::targetOf(c.command) == scene::Target::objects;
+      recorder->recordCommand(0, c.client, ofObjects ? now_ - 500 * kTick : now_, &c.command);
+    }
+    recorder->recordPublish(0, now_, builder_.revision());
+    tick_.recordTo({.ticks = &recorder->ring(0),
+                    .streams = &recorder->streamRing(0),
+                    .memories = &recorder->memoryRing(0),
+                    .revision = builder_.revision()});
+    recorder_ = std::move(recorder);
+  }
+  void end() {
+    tick_.recordTo({});
+    stopwatch_ = nullptr;
+    recorder_->finish();
+    recorder_.reset();
+  }
+
+ private:
+  class GlidingHand final : public device::Device {
+   public:
+    void open() override {}
+    void close() noexcept override {}
+    const device::DeviceProfile& profile() const noexcept override { return profile_; }
+    bool read(base::Nanos now, device::DeviceState& state) noexcept override {
+      state.time = now;
+      state.position_m = position_m;
+      state.velocity_m_per_s = velocity_m_per_s;
+      return true;
+    }
+    bool write(const Vec3&) noexcept override { return true; }
+
+    Vec3 position_m{0.001, 0.030, 0.002};
+    Vec3 velocity_m_per_s = Vec3::Zero();
+
+   private:
+    const device::DeviceProfile profile_;
+  };
+
+  static std::vector<geometry::Vec3f> boxPoints() {
+    constexpr float kHalf = 0.015F;
+    constexpr float kTop = 0.020F;
+    return {{-kHalf, 0, -kHalf},    {kHalf, 0, -kHalf},    {kHalf, 0, kHalf},    {-kHalf, 0, kHalf},
+            {-kHalf, kTop, -kHalf}, {kHalf, kTop, -kHalf}, {kHalf, kTop, kHalf}, {-kHalf, kTop, kHalf}};
+  }
+
+  static std::vector<geometry::Triangle> boxTriangles() {
+    return {{0, 1, 2}, {0, 2, 3}, {4, 6, 5}, {4, 7, 6}, {0, 5, 1}, {0, 4, 5},
+            {1, 6, 2}, {1, 5, 6}, {2, 7, 3}, {2, 6, 7}, {3, 4, 0}, {3, 7, 4}};
+  }
+
+  static record::RecordedDevice describedDevice() {
+    record::RecordedDevice device;
+    device.names = {"Phantom"};
+    device.driver = "simulated";
+    device.tick.guard.armed = true;
+    device.tick.guard.peakForce_N = 4;
+    device.tick.guard.continuousForce_N = 1;
+    return device;
+  }
+
+  scene::SceneConfig withStopwatch() {
+    scene::SceneConfig config = device_.sceneConfig;
+    config.stopwatch = [this] { return stopwatch_ ? stopwatch_() : base::now(); };
+    return config;
+  }
+
+  void step() {
+    now_ += kTick;
+    const auto due = builder_.nextDeadline();
+    if (std::exchange(changed_, false) || (due && *due <= now_)) {
+      const auto snapshot = builder_.publish(now_, notices_);
+      if (recorder_) recorder_->recordPublish(0, now_, snapshot ? snapshot->revision : 0);
+      if (snapshot) tick_.snapshots().publish(snapshot);
+    }
+    clock_.sleepUntil(now_);
+    tick_(now_);
+  }
+
+  const record::RecordedDevice device_ = describedDevice();
+  base::Nanos now_ = 1'000'000'000;
+  std::function<base::Nanos()> stopwatch_;
+  std::vector<scene::Notice> notices_;
+  bool changed_ = false;
+  scene::SceneBuilder builder_{withStopwatch()};
+  base::SimulatedClock clock_;
+  GlidingHand hand_;
+  realtime::Tick tick_{hand_, clock_, device_.tick};
+  std::unique_ptr<record::Recorder> recorder_;
+};
+
+// What goes on when the recording begins.
+struct GoesOn {
+  const char* name;
+  std::function<void(LateRecording&)> begin;
+  bool touching = false;  // the hand is in the box
+};
+
+void PrintTo(const GoesOn& what, std::ostream* out) {
+  *out << what.name;
+}
+
+realtime::RemoteInput streamed(const LateRecording& r, std::uint64_t number) {
+  realtime::RemoteInput input;
+  realtime::RemoteContactSet& set = input.contacts;
+  set.number = number;
+  set.received = set.stated = r.now();
+  set.count = 1;
+  set.contacts[0].point_m = {0, 0.031, 0};
+  set.contacts[0].stiffness_N_per_m = 300;
+  return input;
+}
+
+const geometry::Vec3 kAbove{1, 30, 2};
+
+const GoesOn kGoesOn[] = {
+    {"nothing", [](LateRecording& r) { r.glide(kAbove, 700); }},
+    // So near to its place that the proxy does not follow any more.
+    {"rest", [](LateRecording& r) { r.glide(kAbove, 1400); }},
+    {"contact",
+     [](LateRecording& r) {
+       r.glide({1, 19, 2}, 700);
+     },
+     true},
+    {"effect",
+     [](LateRecording& r) {
+       r.send(scene::DefineEffect{"constant", 1, 0, 0.4, 0, 0, geometry::Vec3::Zero(), {1, 0, 0}});
+       r.send(scene::StartEffect{1});
+       r.glide(kAbove, 700);
+     }},
+    {"timedEffect",
+     [](LateRecording& r) {
+       r.send(scene::DefineEffect{"constant", 1, 0, 0.4, 900, 0, geometry::Vec3::Zero(), {1, 0, 0}});
+       r.send(scene::StartEffect{1});
+       r.glide(kAbove, 700);
+     }},
+    {"vibrationInContact",
+     [](LateRecording& r) {
+       r.send(scene::DefineEffect{"vibrationMotor", 3, 0, 0.4, 0, 33.3, geometry::Vec3::Zero(), {1, 0, 0}});
+       r.send(scene::StartEffect{3});
+       r.glide({1, 19, 2}, 313);
+       r.send(scene::DefineEffect{"vibrationMotor", 3, 0, 0.4, 0, 47.1, geometry::Vec3::Zero(), {1, 0, 0}});
+       r.glide({1, 19, 2}, 400);
+     },
+     true},
+    {"frictionInContact",
+     [](LateRecording& r) {
+       r.send(scene::DefineEffect{"friction", 2, 0.3, 0.5, 0, 0, geometry::Vec3::Zero(),
+                                  geometry::Vec3::Zero()});
+       r.send(scene::StartEffect{2});
+       r.glide({6, 19, 2}, 700);
+     },
+     true},
+    {"buzz",
+     [](LateRecording& r) {
+       r.send(scene::StartCustomEffect{0, {0.5F, 33.3F, 100, 1, 0, 0}});
+       r.glide(kAbove, 700);
+     }},
+    {"plane",
+     [](LateRecording& r) {
+       r.send(scene::SetPlane{0, {0, 1, 0, -0.0195}, 0.3, 0.001, 0.2, 0.1, 10});
+       r.send(scene::SetPlaneDetail{0, 0, 0.0002, 0.002, 0.0005, 33.3});
+       r.glide({1, 19, 2}, 300);
+       r.glide(kAbove, 400);
+     }},
+    {"heat",
+     [](LateRecording& r) {
+       r.glide({1, 15, 2}, 3037);
+       r.glide(kAbove, 700);
+     }},
+    {"ramp",
+     [](LateRecording& r) {
+       r.glide(kAbove, 500);
+       r.control().rampIn();
+       r.glide(kAbove, 1);
+     }},
+    {"ownerGone",
+     [](LateRecording& r) {
+       r.send(scene::DefineEffect{"constant", 1, 0, 0.4, 0, 0, geometry::Vec3::Zero(), {1, 0, 0}}, 2);
+       r.send(scene::StartEffect{1}, 2);
+       r.send(scene::SetForceField{geometry::Vec3::Zero(), {0, 0, 0.3}, {}, 1}, 2);
+       r.glide(kAbove, 500);
+       r.leave(2);
+       r.glide(kAbove, 50);
+     }},
+    {"stream",
+     [](LateRecording& r) {
+       r.glide(kAbove, 500);
+       for (std::uint64_t i = 1; i < 10; ++i) {
+         r.stream(streamed(r, i));
+         r.glide(kAbove, 10);
+       }
+     }},
+};
+
+bool knowsPast(const std::filesystem::path& file) {
+  std::string remark;
+  std::string law;
+  return record::compare(file, {}, remark, law).front().knowsPast();
+}
+
+class RecordingBegunLate : public testing::TestWithParam<GoesOn> {};
+
+TEST_P(RecordingBegunLate, GivesTheRecordedForcesBitForBit) {
+  const RecordingFile file;
+  LateRecording r;
+  r.glide({1, 18, 2}, 700);
+  r.glide(kAbove, 300);
+  GetParam().begin(r);
+  ASSERT_EQ(r.last().rendering.touching, GetParam().touching);
+  r.record(file.path());
+  r.glide(GetParam().touching ? geometry::Vec3{1.5, 18.9, 2} : kAbove, 100);
+  r.glide({2, 30, 1}, 800);
+  r.glide({-2, 16, 1}, 900);
+  r.glide({3, 16.5, 1}, 300);
+  r.send(scene::SetSurfaceProperty{0, "static friction", 0.1});
+  r.glide({3, 24, 1}, 200);
+  r.stream(streamed(r, 100));
+  r.glide({3, 19.5, 3}, 300);
+  r.end();
+  const Compared compared = rerender(file.path()).front();
+  EXPECT_EQ(compared.same, compared.ticks) << compared.firstDifference;
+  EXPECT_EQ(compared.largest_N, 0);
+  EXPECT_GT(compared.ticks, 1700U);
+  EXPECT_EQ(compared.ticks + compared.skipped, 2600U);
+  EXPECT_GT(compared.touching, 800U);
+}
+
+// Older versions wrote the same without the memory of the servo.
+TEST(RecordingBegunLateByAnOlderVersion, IsReadAndSaysWhatIsMissing) {
+  const RecordingFile file;
+  LateRecording r;
+  r.send(scene::DefineEffect{"vibrationMotor", 3, 0, 0.4, 0, 33.3, geometry::Vec3::Zero(), {1, 0, 0}});
+  r.send(scene::StartEffect{3});
+  r.glide(kAbove, 713);
+  r.record(file.path());
+  r.glide(kAbove, 300);
+  r.end();
+  EXPECT_TRUE(knowsPast(file.path()));
+  record::Bytes old(record::magic().begin(), record::magic().end());
+  record::BlockReader blocks(file.path());
+  for (record::BlockReader::Block block; blocks.next(block);) {
+    if (block.kind != record::BlockKind::memory) record::appendBlock(old, block.kind, block.content);
+  }
+  std::ofstream(file.path(), std::ios::binary)
+      .write(reinterpret_cast<const char*>(old.data()), static_cast<std::streamsize>(old.size()));
+  EXPECT_FALSE(knowsPast(file.path()));
+  const Compared compared = rerender(file.path()).front();
+  EXPECT_EQ(compared.ticks, 299U);
+  EXPECT_LT(compared.same, compared.ticks) << "the vibration began anew";
+}
+
+INSTANTIATE_TEST_SUITE_P(All, RecordingBegunLate, testing::ValuesIn(kGoesOn),
+                         [](const auto& param) { return std::string(param.param.name); });
 
 }  // namespace
 }  // namespace hapticd::test

@@ -99,7 +99,7 @@ bool writeSession(const Trial& trial, const std::filesystem::path& file) {
   TrialHand hand(trial);
   base::SimulatedClock clock;
   realtime::Tick tick(hand, clock, device.tick);
-  tick.recordTo(&recorder.ring(0), nullptr);
+  tick.recordTo({.ticks = &recorder.ring(0)});
   recorder.start(0, "");
 
   std::vector<scene::Notice> notices;

@@ -92,6 +92,8 @@ class ContactQuery {
     crowd_ = 0;
     distances_.restart();
   }
+  /// The tool has left all that appeared around it.
+  void leaveAll() noexcept { enclosingCount_ = 0; }
   /// Starts a tick without objects. `planes` take part in every cast and must live until the next
   /// beginTick().
   void beginTick(const SceneAtTime& now, const SceneAtTime& before,

@@ -40,6 +40,45 @@ double Effects::Phase::at(Nanos now, Nanos start, double angularFrequency_rad_pe
   return angle_ + frequency_ * base::toSeconds(now - since_);
 }
 
+void Effects::Phase::remember(EffectMemory& out) const noexcept {
+  out.frequency_rad_per_s = frequency_;
+  out.angle_rad = angle_;
+  out.since = since_;
+}
+
+void Effects::Phase::resume(const EffectMemory& memory) noexcept {
+  frequency_ = memory.frequency_rad_per_s;
+  angle_ = memory.angle_rad;
+  since_ = memory.since;
+}
+
+bool Effects::remember(RenderMemory& out) const noexcept {
+  out.effectCount = static_cast<std::uint32_t>(count_);
+  for (std::size_t i = 0; i < out.effectCount; ++i) {
+    const Running& r = running_[i];
+    if (r.releaseBegin >= 0) return false;
+    out.effects[i].index = r.index;
+    out.effects[i].begin = r.begin;
+    out.effects[i].anchor = r.anchor;
+    r.phase.remember(out.effects[i]);
+  }
+  return true;
+}
+
+// By the index: the numbers of the starts are those of this scene.
+void Effects::resume(const RenderMemory& memory) noexcept {
+  for (int i = 0; i < count_; ++i) {
+    Running& r = running_[static_cast<std::size_t>(i)];
+    const auto end = memory.effects.begin() + memory.effectCount;
+    const auto known =
+        std::find_if(memory.effects.begin(), end, [&](const EffectMemory& m) { return m.index == r.index; });
+    if (known == end) continue;
+    r.begin = known->begin;
+    r.anchor = known->anchor;
+    r.phase.resume(*known);
+  }
+}
+
 Effects::Running* Effects::running(const Effect& effect, Nanos now, const Vec3& proxy) noexcept {
   for (int i = 0; i < count_; ++i) {
     Running& r = running_[static_cast<std::size_t>(i)];

@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "realtime/render/memory.h"
 #include "realtime/render/renderer.h"
 
 namespace hapticd::realtime {
@@ -19,12 +20,19 @@ class Effects {
              double pressed_N, Nanos now) noexcept;
 
   void reset() noexcept { count_ = 0; }
+  /// False while one ramps out: its share is not part of the memory.
+  bool remember(RenderMemory& out) const noexcept;
+  /// Continues those of the running effects that the memory has.
+  void resume(const RenderMemory& memory) noexcept;
 
   /// The angle of a vibration whose frequency may change while it runs: the frequency over time, integrated.
   class Phase {
    public:
     /// At `now`, radians; `start` is the time of phase zero.
     double at(Nanos now, Nanos start, double angularFrequency_rad_per_s) noexcept;
+
+    void remember(EffectMemory& out) const noexcept;
+    void resume(const EffectMemory& memory) noexcept;
 
    private:
     double frequency_ = 0;  // rad/s, since since_
@@ -33,8 +41,6 @@ class Effects {
   };
 
  private:
-  static constexpr int kMaxEffects = 64;
-
   struct Running {
     std::int32_t index = 0;
     std::uint32_t start = 0;

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "base/time.h"
+#include "realtime/render/memory.h"
 #include "scene/snapshot.h"
 
 namespace hapticd::realtime {
@@ -17,6 +18,13 @@ class Fields {
   /// Sum of all forces at the HIP (device metres), device frame, newtons.
   Vec3 force(const scene::SceneSnapshot& scene, const Vec3& hip, Nanos now) noexcept;
   void reset() noexcept { *this = Fields{}; }
+  /// False while one ramps out: its share is not part of the memory.
+  bool remember(RenderMemory& out) const noexcept {
+    out.buzzBegin = buzzBegin_;
+    return releasingCount_ == 0 && !(buzzing_ && buzzReleaseBegin_ >= 0);
+  }
+  /// Continues the buzz, if one runs.
+  void resume(const RenderMemory& memory) noexcept { buzzBegin_ = memory.buzzBegin; }
 
  private:
   static constexpr int kMaxReleasing = 16;

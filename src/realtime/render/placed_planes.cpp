@@ -127,6 +127,31 @@ void PlacedPlanes::remember(unsigned touched, const Vec3& proxy) noexcept {
   }
 }
 
+bool PlacedPlanes::remember(RenderMemory& out) const noexcept {
+  out.planeCount = static_cast<std::uint32_t>(memoryCount_);
+  for (std::size_t i = 0; i < out.planeCount; ++i) {
+    const Memory& m = memory_[i];
+    if (m.touched || m.adheres || m.releaseBegin >= 0) return false;
+    out.planes[i] = {m.index, m.placed, m.depth_m, m.raised_m};
+  }
+  return true;
+}
+
+// By the index: the numbers of the placements are those of this scene.
+void PlacedPlanes::resume(const RenderMemory& memory) noexcept {
+  for (int i = 0; i < memoryCount_; ++i) {
+    Memory& m = memory_[static_cast<std::size_t>(i)];
+    m.touched = m.adheres = false;
+    const auto end = memory.planes.begin() + memory.planeCount;
+    const auto known =
+        std::find_if(memory.planes.begin(), end, [&](const PlaneMemory& p) { return p.index == m.index; });
+    if (known == end) continue;
+    m.placed = known->placed;
+    m.depth_m = known->depth_m;
+    m.raised_m = known->raised_m;
+  }
+}
+
 Vec3 PlacedPlanes::adhesion(const Vec3& hip, double toolRadius_m) noexcept {
   Vec3 force = Vec3::Zero();
   for (int i = 0; i < count_; ++i) {

@@ -8,6 +8,7 @@
 
 #include "base/time.h"
 #include "realtime/render/facet.h"
+#include "realtime/render/memory.h"
 #include "scene/snapshot.h"
 
 namespace hapticd::realtime {
@@ -39,6 +40,10 @@ class PlacedPlanes {
   /// Ends a tick: bit i of `touched` is set when plane i holds the proxy.
   void remember(unsigned touched, const Vec3& proxy) noexcept;
   void reset() noexcept { memoryCount_ = 0; }
+  /// False while one is touched, adheres or ramps out: that is not part of the memory.
+  bool remember(RenderMemory& out) const noexcept;
+  /// Continues those of the planes that the memory has; nothing touches them.
+  void resume(const RenderMemory& memory) noexcept;
   /// In this tick a touched plane vanished, got another placement or another surface.
   bool changedInContact() const noexcept { return changedInContact_; }
 

@@ -86,16 +86,27 @@ void Proxy::reset() noexcept {
 
 void Proxy::startAt(const SceneAtTime& now, const Vec3& hip) noexcept {
   started_ = true;
+  position_ = positionBefore_ = hipBefore_ = hip;
+  beFree();
+  query_.restart();
+  before_ = now;
+}
+
+// A free proxy may be a share of the skin away from the HIP: shorter ways are not worth a cast.
+void Proxy::resume(const Vec3& position) noexcept {
+  position_ = positionBefore_ = reported_ = position;
+  beFree();
+  query_.leaveAll();
+}
+
+void Proxy::beFree() noexcept {
   slide_ = Slide{};
   popthroughArmed_ = true;
   released_ = carriedByJump_ = false;
   overworked_ = 0;
   share_ = 1;
-  position_ = positionBefore_ = hipBefore_ = hip;
   contactSet_ = ContactSet{};
   lastCount_ = 0;
-  query_.restart();
-  before_ = now;
   touchedObject_ = -1;
 }
 

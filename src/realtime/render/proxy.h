@@ -64,6 +64,8 @@ class Proxy {
         stribeckSpeed_m_per_s_(options.stribeckSpeed_m_per_s) {}
 
   void reset() noexcept;
+  /// Continues between two ticks, free of contact, at the place where it was then.
+  void resume(const Vec3& position) noexcept;
 
   /// One tick: moves the proxy with the geometry, then towards the HIP, and returns what holds it. Adds
   /// RenderStatus bits to `status`.
@@ -125,6 +127,7 @@ class Proxy {
   };
 
   void startAt(const SceneAtTime& now, const Vec3& hip) noexcept;
+  void beFree() noexcept;
   void carry(const Vec3& hip, std::uint32_t& status) noexcept;
   Vec3 carriedBy(const PlacedObject& object, std::uint32_t triangle, const Vec3& p) const noexcept;
   void push(const Vec3& from, std::uint32_t& status) noexcept;

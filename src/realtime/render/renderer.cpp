@@ -64,6 +64,24 @@ void Renderer::reset() noexcept {
   state_->passivity.reset();
 }
 
+bool Renderer::remember(const Rendering& last, RenderMemory& out) const noexcept {
+  const bool effects = state_->effects.remember(out);
+  const bool fields = state_->fields.remember(out);
+  const bool planes = state_->proxy.planes().remember(out);
+  return effects && fields && planes && !last.touching && last.status == 0;
+}
+
+void Renderer::resume(const Rendering& last) noexcept {
+  state_->proxy.resume(last.proxy_m);
+  state_->passivity.reset();
+}
+
+void Renderer::resume(const RenderMemory& memory) noexcept {
+  state_->effects.resume(memory);
+  state_->fields.resume(memory);
+  state_->proxy.planes().resume(memory);
+}
+
 void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState& device, Nanos now,
                     Nanos period, Rendering& out) noexcept {
   State& s = *state_;

@@ -8,6 +8,7 @@
 
 #include "base/time.h"
 #include "device/device.h"
+#include "realtime/render/memory.h"
 #include "scene/snapshot.h"
 
 namespace hapticd::realtime {
@@ -87,6 +88,12 @@ class Renderer {
 
   /// Discards the proxy: the next step() starts without contact at the HIP.
   void reset() noexcept;
+  /// What resume() needs after a step that had this result; false where more than that is needed: in contact,
+  /// and while a force ramps out.
+  bool remember(const Rendering& last, RenderMemory& out) const noexcept;
+  /// Continues after a step that had this result, free of contact, in the scene of the last step().
+  void resume(const Rendering& last) noexcept;
+  void resume(const RenderMemory& memory) noexcept;
 
  private:
   struct State;

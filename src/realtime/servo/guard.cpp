@@ -73,6 +73,20 @@ void Guard::resume(const GuardReport& report, const Vec3& written_N) noexcept {
   waitForCalm_ = (report.active & bit(Trip::speed)) != 0;
 }
 
+bool Guard::remember(GuardMemory& out) const noexcept {
+  out = {shaped_, waitForCalm_, budget_.memory()};
+  const bool steady = phase_ == Phase::zero || (phase_ == Phase::rampIn && report_.gain == 1);
+  return !options_.enabled || (steady && blended_ >= blendTime_ && fastTicks_ == 0);
+}
+
+void Guard::resume(const GuardMemory& memory) noexcept {
+  shaped_ = memory.shaped_N;
+  waitForCalm_ = memory.waitForCalm;
+  budget_.resume(memory.thermal);
+  blended_ = blendTime_;
+  fastTicks_ = 0;
+}
+
 void Guard::obeyControl() noexcept {
   const GuardControl::Seen seen = control_.read();
   restart_ = seen.ramps != seen_.ramps || seen.rearms != seen_.rearms;

@@ -66,6 +66,14 @@ struct GuardInput {
   bool deepContact = false;
 };
 
+/// What a guard at rest knows of earlier ticks, besides its report and the force that it wrote. A plain
+/// value.
+struct GuardMemory {
+  Vec3 shaped_N = Vec3::Zero();  ///< the force before the gain
+  bool waitForCalm = false;      ///< a speed trip acts until the device is slow
+  ThermalMemory thermal;
+};
+
 /// One per servo, called by its thread: noexcept, no allocation, no lock.
 class Guard {
  public:
@@ -80,6 +88,9 @@ class Guard {
   const GuardReport& report() const noexcept { return report_; }
   /// Continues after a step that reported this and wrote this force, as far as that tells.
   void resume(const GuardReport& report, const Vec3& written_N) noexcept;
+  /// What resume() needs as well; false while the guard is not at rest: in a ramp, a decay or a blend.
+  bool remember(GuardMemory& out) const noexcept;
+  void resume(const GuardMemory& memory) noexcept;
   /// The state of the control in the last step.
   const GuardControl::Seen& seen() const noexcept { return seen_; }
 

@@ -22,15 +22,15 @@ ThermalBudget::ThermalBudget(double peak_N, double continuous_N) noexcept
 
 void ThermalBudget::add(double force_N, Nanos duration) noexcept {
   if (continuous_ >= peak_) return;
-  impulse_[static_cast<std::size_t>(newest_)] += force_N * base::toSeconds(duration);
+  memory_.impulse_Ns[static_cast<std::size_t>(memory_.newest)] += force_N * base::toSeconds(duration);
   advance(duration);
 
   constexpr double kWindow_s = base::toSeconds(kBuckets * kBucket);
   limit_ = std::clamp(floor_ + margin() / kSpending_s, 0.0, peak_);
-  if (limit_ < continuous_) derated_ = true;
-  const double used = std::accumulate(impulse_.begin(), impulse_.end(), 0.0);
-  if (used < kRestedShare * kWindow_s * continuous_) derated_ = false;
-  if (derated_) {
+  if (limit_ < continuous_) memory_.derated = true;
+  const double used = std::accumulate(memory_.impulse_Ns.begin(), memory_.impulse_Ns.end(), 0.0);
+  if (used < kRestedShare * kWindow_s * continuous_) memory_.derated = false;
+  if (memory_.derated) {
     // The largest constant force that the margin sustains; without it the limit would ripple.
     constexpr double kAccount_s = base::toSeconds((kBuckets + 1) * kBucket);
     const double steady = (kWindow_s * continuous_ + kSpending_s * floor_) / (kAccount_s + kSpending_s);
@@ -39,13 +39,13 @@ void ThermalBudget::add(double force_N, Nanos duration) noexcept {
 }
 
 void ThermalBudget::advance(Nanos duration) noexcept {
-  filled_ += duration;
-  for (int i = 0; i <= kBuckets && filled_ >= kBucket; ++i) {
-    filled_ -= kBucket;
-    newest_ = (newest_ + 1) % (kBuckets + 1);
-    impulse_[static_cast<std::size_t>(newest_)] = 0;
+  memory_.filled += duration;
+  for (int i = 0; i <= kBuckets && memory_.filled >= kBucket; ++i) {
+    memory_.filled -= kBucket;
+    memory_.newest = (memory_.newest + 1) % (kBuckets + 1);
+    memory_.impulse_Ns[static_cast<std::size_t>(memory_.newest)] = 0;
   }
-  filled_ %= kBucket;
+  memory_.filled %= kBucket;
 }
 
 // The rest of the budget, N·s, if only the floor is written from now on. The window is fullest just before
@@ -53,9 +53,10 @@ void ThermalBudget::advance(Nanos duration) noexcept {
 double ThermalBudget::margin() const noexcept {
   double kept = 0;
   double fullest = 0;
-  double ahead_s = base::toSeconds((kBuckets + 1) * kBucket - filled_);
+  double ahead_s = base::toSeconds((kBuckets + 1) * kBucket - memory_.filled);
   for (int age = 0; age <= kBuckets; ++age) {  // newest first: the sum without all older ones
-    kept += impulse_[static_cast<std::size_t>((newest_ + kBuckets + 1 - age) % (kBuckets + 1))];
+    kept +=
+        memory_.impulse_Ns[static_cast<std::size_t>((memory_.newest + kBuckets + 1 - age) % (kBuckets + 1))];
     fullest = std::max(fullest, kept + floor_ * ahead_s);
     ahead_s -= base::toSeconds(kBucket);
   }

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 
 #include "base/time.h"
 #include "geometry/types.h"
@@ -13,6 +14,17 @@
 namespace hapticd::realtime {
 
 using base::Nanos;
+
+/// What a budget knows of earlier ticks. A plain value.
+struct ThermalMemory {
+  static constexpr int kBuckets = 50;
+  static constexpr Nanos kBucket = 100'000'000;
+
+  std::array<double, kBuckets + 1> impulse_Ns{};  ///< a ring with one bucket more than the window
+  std::int32_t newest = 0;
+  Nanos filled = 0;  ///< time in the newest bucket
+  bool derated = false;
+};
 
 /// Running account of |force| over the last 5 s. One thread; noexcept, allocation-free.
 class ThermalBudget {
@@ -24,9 +36,12 @@ class ThermalBudget {
   /// Accounts for `force_N` during `duration` and updates the limit.
   void add(double force_N, Nanos duration) noexcept;
 
+  const ThermalMemory& memory() const noexcept { return memory_; }
+  void resume(const ThermalMemory& memory) noexcept { memory_ = memory; }
+
  private:
-  static constexpr int kBuckets = 50;
-  static constexpr Nanos kBucket = 100'000'000;
+  static constexpr int kBuckets = ThermalMemory::kBuckets;
+  static constexpr Nanos kBucket = ThermalMemory::kBucket;
 
   void advance(Nanos duration) noexcept;
   double margin() const noexcept;
@@ -35,10 +50,7 @@ class ThermalBudget {
   double continuous_;
   double floor_;
   double limit_;
-  bool derated_ = false;
-  std::array<double, kBuckets + 1> impulse_{};  // N·s; a ring with one bucket more than the window
-  int newest_ = 0;
-  Nanos filled_ = 0;  // time in the newest bucket
+  ThermalMemory memory_;
 };
 
 }  // namespace hapticd::realtime

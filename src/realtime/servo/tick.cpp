@@ -1,6 +1,7 @@
 #include "realtime/servo/tick.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "base/clock.h"
 #include "realtime/servo/flush_denormals.h"
@@ -114,7 +115,35 @@ GuardInput Tick::guardInput() const noexcept {
 
 void Tick::resume(const TickReport& last) noexcept {
   report_ = last;
+  renderer_.resume(last.rendering);
   guard_.resume(last.guard, last.force_N);
+}
+
+void Tick::resume(const TickReport& last, const ServoMemory& memory) noexcept {
+  resume(last);
+  renderer_.resume(memory.render);
+  guard_.resume(memory.guard);
+}
+
+// Once whole, nothing more is remembered until the next recording.
+void Tick::remember(MemoryRing* ring) noexcept {
+  const bool first = std::exchange(rememberedTo_, ring) != ring;
+  if (first) memory_.whole = false;
+  if (ring == nullptr || memory_.whole) return;
+  memory_.tick = report_.tick;
+  const bool rendering = renderer_.remember(report_.rendering, memory_.render);
+  const bool guard = guard_.remember(memory_.guard);
+  memory_.whole = rendering && guard && nothingStreamed() &&
+                  report_.revision >= rememberFrom_.load(std::memory_order_acquire);
+  if (first || memory_.whole) ring->push(memory_);
+}
+
+// What was streamed longer ago has ended and faded.
+bool Tick::nothingStreamed() noexcept {
+  const RemoteInput& input = remoteInput_.read();
+  const Nanos ended =
+      std::max(input.contacts.received + kLongestRemoteLife, input.force.received + input.force.lifetime);
+  return (input.contacts.number == 0 && input.force.number == 0) || report_.time > ended + kLongestRemoteLife;
 }
 
 void Tick::publish() noexcept {
@@ -127,8 +156,12 @@ void Tick::publish() noexcept {
 
   blackBox_.record(report_);
   if ((report_.guard.latched & ~latchedBefore) != 0) blackBox_.freeze();
-  if (RecordRing* ring = recordTo_.load(std::memory_order_acquire))
+  if (RecordRing* ring = recordTo_.load(std::memory_order_acquire)) {
+    remember(rememberTo_.load(std::memory_order_acquire));
     ring->push({report_, guard_.seen(), haveState_, written_, discarded_});
+  } else {
+    remember(nullptr);
+  }
   reports_.push(report_);
   wake_.notify();
 }

@@ -60,15 +60,26 @@ class Tick {
   /// After the last tick, from any thread: writes zero force.
   void finish() noexcept { device_.write(Vec3::Zero()); }
 
-  /// From any thread: records every tick from the next one on, and what clients stream, to the rings as well;
-  /// null: no longer. Rings that were given must live until a tick that began later has finished.
-  void recordTo(RecordRing* ticks, StreamRing* streams) noexcept {
-    if (ticks == nullptr) recordTo_.store(nullptr, std::memory_order_release);
-    recordStreamTo_.store(streams, std::memory_order_release);
-    if (ticks != nullptr) recordTo_.store(ticks, std::memory_order_release);
+  /// Where to record. Rings that were given must live until a tick that began after their end has finished.
+  struct Rings {
+    RecordRing* ticks = nullptr;  ///< null: nowhere
+    StreamRing* streams = nullptr;
+    MemoryRing* memories = nullptr;  ///< null: the recording begins with the first tick
+    std::uint64_t revision = 0;      ///< of the scene in the recording: a memory belongs to no older one
+  };
+  /// From any thread: records every tick from the next one on, and what clients stream, to the rings as well.
+  void recordTo(const Rings& rings) noexcept {
+    recordTo_.store(nullptr, std::memory_order_release);
+    recordStreamTo_.store(rings.streams, std::memory_order_release);
+    rememberTo_.store(rings.memories, std::memory_order_release);
+    rememberFrom_.store(rings.revision, std::memory_order_release);
+    recordTo_.store(rings.ticks, std::memory_order_release);
   }
-  /// For a replay that begins between two ticks: the next one follows this one, which was the last.
+  /// For a replay that begins between two ticks: the next one follows this one, which was the last and free
+  /// of contact.
   void resume(const TickReport& last) noexcept;
+  /// The same with all that the servo knew then.
+  void resume(const TickReport& last, const ServoMemory& memory) noexcept;
 
   /// Scene thread: publishes snapshots and collects old ones.
   scene::SnapshotSlot& snapshots() noexcept { return snapshots_; }
@@ -104,6 +115,8 @@ class Tick {
   void write(Nanos started, std::uint32_t overtakes) noexcept;
   void discardForce() noexcept;
   void publish() noexcept;
+  void remember(MemoryRing* ring) noexcept;
+  bool nothingStreamed() noexcept;
 
   device::Device& device_;
   base::Clock& clock_;
@@ -125,6 +138,10 @@ class Tick {
   TickReport report_;
   std::atomic<RecordRing*> recordTo_{nullptr};
   std::atomic<StreamRing*> recordStreamTo_{nullptr};
+  std::atomic<MemoryRing*> rememberTo_{nullptr};
+  std::atomic<std::uint64_t> rememberFrom_{0};
+  MemoryRing* rememberedTo_ = nullptr;
+  ServoMemory memory_;      // for that ring
   bool haveState_ = false;  // the device delivered a state in this tick
   bool written_ = true;     // the device accepted the last force
   bool discarded_ = false;  // the force of this tick was too old: zero was written

@@ -21,6 +21,19 @@ struct TickRecord {
 /// From the servo to a recorder. A full ring counts the records that it refuses.
 using RecordRing = handoff::SpscRing<TickRecord>;
 
+/// What the servo knows of the ticks before a recording that begins while it runs: enough to render on after
+/// a tick.
+struct ServoMemory {
+  std::uint64_t tick = 0;  ///< after this tick
+  bool whole = false;      ///< false: more is needed to render on, as in contact; another follows
+  RenderMemory render;
+  GuardMemory guard;
+};
+
+/// From the servo to a recorder: the memory of the first recorded tick and, unless that is whole, of the
+/// first tick after which it is. In this ring before the tick is in its own.
+using MemoryRing = handoff::SpscRing<ServoMemory>;
+
 /// What clients streamed, in the first tick that knew it.
 struct StreamRecord {
   std::uint64_t tick = 0;

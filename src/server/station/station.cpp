@@ -163,16 +163,20 @@ record::RecordedDevice Station::recorded() const {
           .tick = impl.recordedOptions};
 }
 
-void Station::recordTo(record::Recorder* recording, std::uint32_t number) {
+void Station::recordTo(record::Recorder* recording, std::uint32_t number,
+                       std::optional<std::uint64_t> revision) {
   Impl& impl = *impl_;
   impl.recording = recording;
   impl.recordedAs = number;
   impl.stopwatch = recording != nullptr ? recording->stopwatch(number) : nullptr;
+  realtime::Tick::Rings rings;
   if (recording != nullptr) {
-    impl.tick.recordTo(&recording->ring(number), &recording->streamRing(number));
-  } else {
-    impl.tick.recordTo(nullptr, nullptr);
+    rings.ticks = &recording->ring(number);
+    rings.streams = &recording->streamRing(number);
+    if (revision) rings.memories = &recording->memoryRing(number);
   }
+  rings.revision = revision.value_or(0);
+  impl.tick.recordTo(rings);
 }
 
 base::Nanos Station::finishedAt() const noexcept {

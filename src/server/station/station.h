@@ -54,7 +54,9 @@ class Station {
   record::RecordedDevice recorded() const;
   /// Scene thread, or before it starts: records the scene and the ticks as the device of this number; null:
   /// ends. The recorder must live until finishedAt() is later than the end, or the servo has ended.
-  void recordTo(record::Recorder* recording, std::uint32_t number);
+  /// `revision`: of the scene in a recording that begins while the servo runs.
+  void recordTo(record::Recorder* recording, std::uint32_t number,
+                std::optional<std::uint64_t> revision = {});
   /// Any thread: when the last tick ended; 0 before the first.
   base::Nanos finishedAt() const noexcept;
 

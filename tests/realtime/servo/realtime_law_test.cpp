@@ -208,7 +208,7 @@ TEST_F(RealtimeLaw, HoldsInSimulatedTime) {
   base::SimulatedClock clock;
   Tick tick(device, clock, simulatedHand());
   RecordRing recorded(64);
-  tick.recordTo(&recorded, nullptr);
+  tick.recordTo({.ticks = &recorded});
   Scenery scenery;
   std::uint64_t touching = 0;
   std::uint64_t forces = 0;
@@ -239,7 +239,7 @@ TEST_F(RealtimeLaw, HoldsInTheServoThreadWhileScenesAreSwapped) {
   base::MonotonicClock clock;
   Tick tick(device, clock, simulatedHand());
   RecordRing recorded(1024);
-  tick.recordTo(&recorded, nullptr);
+  tick.recordTo({.ticks = &recorded});
   ServoThread thread(
       [&](const Pacing& pacing) {
         law::enter();
