@@ -91,10 +91,45 @@ bool Proxy::surfacesNearChanged() const noexcept {
   return false;
 }
 
+bool Proxy::surfacesInContactMove() const noexcept {
+  return std::any_of(contactSet_.constraints.begin(), contactSet_.constraints.begin() + contactSet_.count,
+                     [this](const ContactConstraint& c) {
+                       if (c.object < 0) {
+                         return std::any_of(planes_.begin(), planes_.end(),
+                                            [](const PlacedPlane& plane) { return !plane.rests; });
+                       }
+                       for (int i = 0; i < query_.objectCount(); ++i) {
+                         if (query_.object(i).state->id == c.object) return !query_.object(i).rests();
+                       }
+                       return true;
+                     });
+}
+
+// Of several surfaces, the one whose friction holds the proxy most firmly carries it, and the one without
+// friction does not. One that jumps takes it along in any case.
+void Proxy::chooseCarrier() noexcept {
+  if (contactSet_.count < 2 || !(contactSet_.spring.stiffness_N_per_m > 0)) return;
+  double firmest = 0;
+  const ContactConstraint* carrier = nullptr;
+  for (int i = 0; i < contactSet_.count; ++i) {
+    const ContactConstraint& constraint = contactSet_.constraints[static_cast<std::size_t>(i)];
+    const double bound = contactSet_.boundOf(constraint);
+    if (!(bound > firmest)) continue;
+    firmest = bound;
+    carrier = &constraint;
+  }
+  if (carrier == nullptr || carrier->object == touchedObject_) return;
+  const int touched = touchedObject_ < 0 ? -1 : query_.addObject(touchedObject_);
+  if (touchedObject_ >= 0 && (touched < 0 || query_.object(touched).jumped)) return;
+  touchedObject_ = carrier->object;
+  touchedTriangle_ = carrier->triangle;
+}
+
 // The proxy stays at its place on the touched object, however that moved or deformed.
 void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
   carriedByJump_ = false;
   if (contactSet_.count > 0) {
+    chooseCarrier();
     const int touched = query_.addObject(touchedObject_);
     if (touchedObject_ < 0) {
       // Planes do not move along themselves.
