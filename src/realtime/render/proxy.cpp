@@ -53,7 +53,6 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   expectedTravel_m_ = (hip - hipBefore_).norm() + (position_ - from).norm();
   push(from, status);
   wasHeld_ = contactSet_.count > 0;
-  displaced_ = wasHeld_ && (position_ != from || surfacesInContactMove());
   if (contactSet_.count > 0) query_.gatherAround(position_, 1.5 * expectedTravel_m_ + kGatherMargin_m);
   updateProxy(hip);
   popThrough(hip, status);
@@ -157,17 +156,15 @@ void Proxy::updateProxy(const Vec3& hip) noexcept {
     slide_ = Slide{};
     return;
   }
+  const bool displaced = wasHeld_ && (position_ != positionBefore_ || surfacesInContactMove());
   findConstraints(hip, active);
   if (liftOut(active)) findConstraints(hip, active);
-  if (displaced_) pressBack(hip, active);
+  if (displaced) pressBack(hip, active);
   if (contactSet_.count == 0) {
     slide_ = Slide{};
     return;
   }
-  if (const std::optional<Groove> groove = movingGroove()) {
-    slideInGroove(*groove, hip, active);
-    return;
-  }
+  if (displaced && slideInMovingGroove(hip, active)) return;
   const Vec3 held = heldBySlope();
   const Vec3 borne = contactSet_.lateral_m - held;
   const double lateral = borne.norm();
@@ -379,8 +376,7 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
       constraint.rests = object.rests();
       if (!object.jumped) {
         const Vec3 carried = carriedBy(object, hit.triangle, positionBefore_);
-        constraint.surfaceTravel_m = carried - positionBefore_;
-        constraint.surfaceVelocity_m_per_s = constraint.surfaceTravel_m / period_s_;
+        constraint.surfaceVelocity_m_per_s = (carried - positionBefore_) / period_s_;
       }
     }
     const double force = constraint.surface.stiffness_N_per_m * constraint.depth_m;
@@ -521,7 +517,7 @@ void Proxy::popThrough(const Vec3& hip, std::uint32_t& status) noexcept {
   if (query_.castPast(passable, position_, position_ + step * direction, hit)) return;
   position_ += step * direction;
   status |= kRenderPopthrough;
-  wasHeld_ = displaced_ = false;
+  wasHeld_ = false;
   updateProxy(hip);
   popthroughArmed_ = contactSet_.count == 0;
 }

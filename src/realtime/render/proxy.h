@@ -36,7 +36,6 @@ struct ContactConstraint {
   HalfSpace halfSpace;
   double depth_m = 0;                           ///< of the HIP below the surface, along the normal, >= 0
   Vec3 surfaceVelocity_m_per_s = Vec3::Zero();  ///< at the proxy
-  Vec3 surfaceTravel_m = Vec3::Zero();          ///< in this tick, at the proxy
   bool rests = true;                            ///< the surface neither moves nor deforms in this tick
 };
 
@@ -144,6 +143,7 @@ class Proxy {
   void startAt(const SceneAtTime& now, const Vec3& hip) noexcept;
   void carry(const Vec3& hip, std::uint32_t& status) noexcept;
   void chooseCarrier() noexcept;
+  bool jumps(std::int32_t id, std::uint32_t triangle) noexcept;
   bool surfacesInContactMove() const noexcept;
   Vec3 carriedBy(const PlacedObject& object, std::uint32_t triangle, const Vec3& p) const noexcept;
   void push(const Vec3& from, std::uint32_t& status) noexcept;
@@ -187,10 +187,11 @@ class Proxy {
   Vec3 heldBySlope() const noexcept;
   bool slips() noexcept;
   void pressBack(const Vec3& hip, ActiveSet& active) noexcept;
-  bool pressOnNextFace(const Vec3& hip, const ActiveSet& active) noexcept;
+  bool pressOnLostFace(const Vec3& hip, const ActiveSet& active) noexcept;
+  static Vec3 alongNormals(const ActiveSet& active, const Vec3& way) noexcept;
   bool isLost(const ObjectHit& face) const noexcept;
   std::optional<Groove> movingGroove() noexcept;
-  void slideInGroove(const Groove& groove, const Vec3& hip, ActiveSet& active) noexcept;
+  bool slideInMovingGroove(const Vec3& hip, ActiveSet& active) noexcept;
   void shareOut(const Groove& groove) noexcept;
   double slidingShare() const noexcept;
   void advanceSlide(double slip_m) noexcept;
@@ -219,7 +220,6 @@ class Proxy {
   bool released_ = false;       // contact released until the HIP leaves the surface
   bool carriedByJump_ = false;  // in this tick
   bool wasHeld_ = false;        // the contact is that of the tick before
-  bool displaced_ = false;      // in this tick, geometry moved the proxy or moved under it
   bool jammed_ = false;         // the last approach found faces that leave the tool no room
   Vec3 position_ = Vec3::Zero();
   Vec3 reported_ = Vec3::Zero();

@@ -38,14 +38,14 @@ bool Proxy::slips() noexcept {
 // spring would count as a lateral part, which friction cannot bear.
 void Proxy::pressBack(const Vec3& hip, ActiveSet& active) noexcept {
   for (int i = 0; i < kMaxActive - 1 && contactSet_.count > 0 && slips(); ++i) {
-    if (!pressOnNextFace(hip, active)) return;
+    if (!pressOnLostFace(hip, active)) return;
     findConstraints(hip, active);
   }
 }
 
-// The face that a slide would meet in this tick, if one of its object held the proxy in the last tick and
-// does not now. The proxy moves there along the normals alone: along the faces, friction holds it.
-bool Proxy::pressOnNextFace(const Vec3& hip, const ActiveSet& active) noexcept {
+// True when the proxy moved on to a face that it lost. It moves along the normals alone: along the faces,
+// friction holds it.
+bool Proxy::pressOnLostFace(const Vec3& hip, const ActiveSet& active) noexcept {
   if (casts_ >= kMaxCasts || query_.workSpent()) return false;
   const Vec3 held = heldBySlope();
   const Vec3 pull = (contactSet_.lateral_m - held).normalized();
@@ -59,18 +59,10 @@ bool Proxy::pressOnNextFace(const Vec3& hip, const ActiveSet& active) noexcept {
   ActiveSet all = active;
   all.hits[static_cast<std::size_t>(all.count++)] = face;
   const Projection nearest = nearestTo(hip, all);
-  const auto nearestEnd = nearest.active.begin() + nearest.count;
-  if (!nearest.found || std::find(nearest.active.begin(), nearestEnd, all.count - 1) == nearestEnd)
-    return false;
+  const auto last = nearest.active.begin() + nearest.count;
+  if (!nearest.found || std::find(nearest.active.begin(), last, all.count - 1) == last) return false;
   all.keep(nearest);
-  Vec3 way = nearest.point - position_;
-  const Vec3& first = all.hits[0].halfSpace.normal;
-  if (all.count == 1) {
-    way = first * first.dot(way);
-  } else if (all.count == 2) {
-    const Vec3 along = first.cross(all.hits[1].halfSpace.normal).normalized();
-    way -= along * along.dot(way);
-  }
+  const Vec3 way = alongNormals(all, nearest.point - position_);
   if (!(way.norm() <= (end - position_).norm() + 4 * query_.minSkin())) return false;
   ObjectHit stop;
   ++casts_;
@@ -78,6 +70,15 @@ bool Proxy::pressOnNextFace(const Vec3& hip, const ActiveSet& active) noexcept {
   return true;
 }
 
+Vec3 Proxy::alongNormals(const ActiveSet& active, const Vec3& way) noexcept {
+  const Vec3& first = active.hits[0].halfSpace.normal;
+  if (active.count == 1) return first * first.dot(way);
+  if (active.count > 2) return way;
+  const Vec3 along = first.cross(active.hits[1].halfSpace.normal).normalized();
+  return way - along * along.dot(way);
+}
+
+// One face more of its object held the proxy in the last tick.
 bool Proxy::isLost(const ObjectHit& face) const noexcept {
   const std::int32_t object = face.object < 0 ? -1 : query_.object(face.object).state->id;
   const auto ofObject = [object](const auto& c) { return c.object == object; };
@@ -89,14 +90,15 @@ bool Proxy::isLost(const ObjectHit& face) const noexcept {
 // Along a groove the proxy has one way to go, and each wall its own place where it would have taken it.
 std::optional<Proxy::Groove> Proxy::movingGroove() noexcept {
   const auto& walls = contactSet_.constraints;
-  if (!wasHeld_ || contactSet_.count != 2 || (walls[0].rests && walls[1].rests)) return std::nullopt;
+  if (contactSet_.count != 2 || (walls[0].rests && walls[1].rests)) return std::nullopt;
   if (!(contactSet_.spring.stiffness_N_per_m > 0)) return std::nullopt;
   contactSet_.staticShare = slidingShare();
   Groove groove;
   groove.along = walls[0].halfSpace.normal.cross(walls[1].halfSpace.normal).normalized();
   bool slipped = false;
   for (std::size_t i = 0; i < 2; ++i) {
-    groove.carried[i] = groove.along.dot(positionBefore_ + walls[i].surfaceTravel_m - position_);
+    groove.carried[i] =
+        groove.along.dot(positionBefore_ + period_s_ * walls[i].surfaceVelocity_m_per_s - position_);
     groove.bound[i] = contactSet_.boundOf(walls[i]);
     slipped = slipped || (groove.bound[i] > 0 && std::abs(groove.carried[i]) > query_.minSkin());
   }
@@ -106,24 +108,28 @@ std::optional<Proxy::Groove> Proxy::movingGroove() noexcept {
 
 // Each wall pulls the proxy to where it carried it, with its bound at most; the proxy goes where they balance
 // the spring.
-void Proxy::slideInGroove(const Groove& groove, const Vec3& hip, ActiveSet& active) noexcept {
+bool Proxy::slideInMovingGroove(const Vec3& hip, ActiveSet& active) noexcept {
+  const std::optional<Groove> groove = movingGroove();
+  if (!groove) return false;
   const Vec3 held = heldBySlope();
   const Vec3 borne = contactSet_.lateral_m - held;
   if (!borne.isZero(0)) slide_.direction = borne.normalized();
-  const auto& [first, second] = groove.carried;
-  const double place = balanceOf(-groove.along.dot(borne), first, groove.bound[0], second, groove.bound[1]);
+  const auto& [first, second] = groove->carried;
+  const double place =
+      balanceOf(-groove->along.dot(borne), first, groove->bound[0], second, groove->bound[1]);
   // Over the walls on average, by what they bear.
   const double slip =
-      (groove.bound[0] * std::abs(place - first) + groove.bound[1] * std::abs(place - second)) /
-      (groove.bound[0] + groove.bound[1]);
+      (groove->bound[0] * std::abs(place - first) + groove->bound[1] * std::abs(place - second)) /
+      (groove->bound[0] + groove->bound[1]);
   if (place != 0) {
-    const Vec3 way = position_ + place * groove.along - hip - held;
-    moveFrictionless(hip + held + groove.along * groove.along.dot(way), active);
+    const Vec3 way = position_ + place * groove->along - hip - held;
+    moveFrictionless(hip + held + groove->along * groove->along.dot(way), active);
     findConstraints(hip, active);
   }
   advanceSlide(slip);
   contactSet_.staticShare = slidingShare();
   if (const std::optional<Groove> now = movingGroove()) shareOut(*now);
+  return true;
 }
 
 // The wall that the proxy slipped over farther bears its bound, the other one the rest.
