@@ -45,12 +45,12 @@ struct ContactSet {
   std::array<ContactConstraint, kMaxActive> constraints;
   Vec3 normal_m = Vec3::Zero();   ///< sum of depth times normal over the constraints
   Vec3 lateral_m = Vec3::Zero();  ///< the tangential part, which friction bears
-  /// Of the lateral part, where two surfaces pull in different directions; else both bear it by their bounds.
-  std::optional<Vec3> borneByFirst_m;
   bool sliding = false;
+  bool borneApart = false;  ///< by two surfaces that move differently: the first bears borneByFirst_m of it
   double staticShare = 1;  ///< of static friction in the coefficient, the rest is dynamic; see slidingShare()
   /// The spring between HIP and proxy, one for all constraints; see stiffness_blend.h.
   BlendedSpring spring;
+  Vec3 borneByFirst_m = Vec3::Zero();
 
   double frictionOf(const scene::Surface& surface) const noexcept {
     const double dynamic = std::min(surface.dynamicFriction, surface.staticFriction);

@@ -137,6 +137,7 @@ void Proxy::shareOut(const Groove& groove) noexcept {
   const std::size_t farther = std::abs(groove.carried[1]) > std::abs(groove.carried[0]) ? 1 : 0;
   const Vec3 friction = std::copysign(groove.bound[farther], groove.carried[farther]) * groove.along;
   const Vec3 borne = contactSet_.lateral_m - heldBySlope();
+  contactSet_.borneApart = true;
   contactSet_.borneByFirst_m = farther == 0 ? friction : Vec3(borne - friction);
 }
 

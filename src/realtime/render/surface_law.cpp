@@ -106,8 +106,8 @@ void addTangentialForces(const ContactSet& contactSet, const ContactShares& shar
   const double share = std::min(1.0, bound / force);
   const Vec3 friction = share * lateral;
   out.contactForce_N += friction;
-  if (contactSet.borneByFirst_m) {
-    const Vec3 first = share * stiffness * *contactSet.borneByFirst_m;
+  if (contactSet.borneApart) {
+    const Vec3 first = share * stiffness * contactSet.borneByFirst_m;
     shares[0].contact->force_N += first;
     shares[1].contact->force_N += friction - first;
     return;
