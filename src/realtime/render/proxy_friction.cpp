@@ -78,13 +78,16 @@ Vec3 Proxy::alongNormals(const ActiveSet& active, const Vec3& way) noexcept {
   return way - along * along.dot(way);
 }
 
-// One face more of its object held the proxy in the last tick.
+// More faces like it held the proxy in the last tick.
 bool Proxy::isLost(const ObjectHit& face) const noexcept {
+  constexpr double kTurned = 0.99;  // cosine; a face that slides or deforms may be another triangle
   const std::int32_t object = face.object < 0 ? -1 : query_.object(face.object).state->id;
-  const auto ofObject = [object](const auto& c) { return c.object == object; };
-  return std::count_if(lastConstraints_.begin(), lastConstraints_.begin() + lastCount_, ofObject) >
-         std::count_if(contactSet_.constraints.begin(), contactSet_.constraints.begin() + contactSet_.count,
-                       ofObject);
+  const auto alike = [&](const auto& c) {
+    return c.object == object && c.halfSpace.normal.dot(face.halfSpace.normal) > kTurned;
+  };
+  const auto& now = contactSet_.constraints;
+  return std::count_if(lastConstraints_.begin(), lastConstraints_.begin() + lastCount_, alike) >
+         std::count_if(now.begin(), now.begin() + contactSet_.count, alike);
 }
 
 // Along a groove the proxy has one way to go, and each wall its own place where it would have taken it.
