@@ -57,6 +57,8 @@ struct PlacedObject {
   /// The same for a triangle between any three vertices.
   scene::Corners corners(const geometry::Triangle& triangle, Nanos now) const noexcept;
   scene::Corners cornersBefore(std::uint32_t triangle, Nanos then) const noexcept;
+  /// Whether it is where and as it was in the previous tick.
+  bool rests() const noexcept { return before != nullptr && !moved && !deformed && !jumped; }
   /// Whether its faces may have passed over the proxy by deforming.
   bool sweptByDeforming() const noexcept { return deformed && before != nullptr; }
   /// The present position of a point that was fixed to the object in the previous tick.

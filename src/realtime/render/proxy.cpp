@@ -35,10 +35,6 @@ bool depthsOf(const ObjectHit* hits, int count, double toolRadius_m, const Vec3&
   return false;
 }
 
-bool rests(const PlacedObject& object) {
-  return object.before != nullptr && !object.moved && !object.deformed && !object.jumped;
-}
-
 }  // namespace
 
 const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double period_s,
@@ -56,6 +52,7 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   carry(hip, status);
   expectedTravel_m_ = (hip - hipBefore_).norm() + (position_ - from).norm();
   push(from, status);
+  wasHeld_ = contactSet_.count > 0;
   if (contactSet_.count > 0) query_.gatherAround(position_, 1.5 * expectedTravel_m_ + kGatherMargin_m);
   updateProxy(hip);
   popThrough(hip, status);
@@ -127,8 +124,7 @@ double Proxy::frictionConeOf(const ContactSet& contactSet) noexcept {
   double cone = 0;
   for (int i = 0; i < contactSet.count; ++i) {
     const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
-    cone += contactSet.frictionOf(constraint.surface) * constraint.presence * constraint.depth_m +
-            constraint.adhesion_N / stiffness;
+    cone += contactSet.boundOf(constraint);
   }
   return cone;
 }
@@ -171,15 +167,16 @@ void Proxy::updateProxy(const Vec3& hip) noexcept {
     slide_ = Slide{};
     return;
   }
+  const bool displaced = wasHeld_ && (position_ != positionBefore_ || surfacesInContactMove());
   findConstraints(hip, active);
   if (liftOut(active)) findConstraints(hip, active);
+  if (displaced) pressBack(hip, active);
   if (contactSet_.count == 0) {
     slide_ = Slide{};
     return;
   }
-  const BlendedSpring& spring = contactSet_.spring;
-  const Vec3 held =
-      spring.stiffness_N_per_m > 0 ? Vec3(spring.slope_N / spring.stiffness_N_per_m) : Vec3(Vec3::Zero());
+  if (displaced && slideInMovingGroove(hip, active)) return;
+  const Vec3 held = heldBySlope();
   const Vec3 borne = contactSet_.lateral_m - held;
   const double lateral = borne.norm();
   contactSet_.staticShare = slidingShare();
@@ -265,7 +262,7 @@ bool Proxy::restoreConstraints(const Vec3& hip, ActiveSet& active) const noexcep
     if (face.normal.dot(hip - face.anchor) >= toolRadius_) continue;
     for (int k = 0; k < query_.objectCount(); ++k) {
       const PlacedObject& object = query_.object(k);
-      if (object.state->id != last.object || !rests(object)) continue;
+      if (object.state->id != last.object || !object.rests()) continue;
       ObjectHit& hit = active.hits[static_cast<std::size_t>(active.count++)];
       hit = ObjectHit{};
       hit.object = k;
@@ -387,7 +384,7 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
       const PlacedObject& object = query_.object(hit.object);
       constraint.object = object.state->id;
       constraint.surface = object.state->surface;
-      constraint.rests = rests(object);
+      constraint.rests = object.rests();
       if (!object.jumped) {
         const Vec3 carried = carriedBy(object, hit.triangle, positionBefore_);
         constraint.surfaceVelocity_m_per_s = (carried - positionBefore_) / period_s_;
@@ -531,6 +528,7 @@ void Proxy::popThrough(const Vec3& hip, std::uint32_t& status) noexcept {
   if (query_.castPast(passable, position_, position_ + step * direction, hit)) return;
   position_ += step * direction;
   status |= kRenderPopthrough;
+  wasHeld_ = false;
   updateProxy(hip);
   popthroughArmed_ = contactSet_.count == 0;
 }

@@ -4,10 +4,12 @@
 // proxy moves to the point nearest to the HIP that up to three half-spaces allow. At each intermediate goal
 // the active set is emptied, and only the faces that block the next path enter it again; a half-space
 // therefore never holds the proxy longer than one tick. With Coulomb friction the proxy sticks, or it slides
-// towards a target that the friction cone draws back.
+// towards a target that the friction cone draws back. In a groove whose walls move differently, each wall
+// bears what it can against the slip over itself; see proxy_friction.cpp.
 #pragma once
 
 #include <algorithm>
+#include <optional>
 
 #include "realtime/render/contact_query.h"
 #include "realtime/render/renderer.h"
@@ -44,13 +46,20 @@ struct ContactSet {
   Vec3 normal_m = Vec3::Zero();   ///< sum of depth times normal over the constraints
   Vec3 lateral_m = Vec3::Zero();  ///< the tangential part, which friction bears
   bool sliding = false;
+  bool borneApart = false;  ///< by two surfaces that move differently: the first bears borneByFirst_m of it
   double staticShare = 1;  ///< of static friction in the coefficient, the rest is dynamic; see slidingShare()
   /// The spring between HIP and proxy, one for all constraints; see stiffness_blend.h.
   BlendedSpring spring;
+  Vec3 borneByFirst_m = Vec3::Zero();
 
   double frictionOf(const scene::Surface& surface) const noexcept {
     const double dynamic = std::min(surface.dynamicFriction, surface.staticFriction);
     return dynamic + staticShare * (surface.staticFriction - dynamic);
+  }
+  /// The bound of friction and adhesion of one constraint, as a length of the spring.
+  double boundOf(const ContactConstraint& constraint) const noexcept {
+    return frictionOf(constraint.surface) * constraint.presence * constraint.depth_m +
+           constraint.adhesion_N / spring.stiffness_N_per_m;
   }
 };
 
@@ -126,9 +135,19 @@ class Proxy {
     double pause_s = 0;             // since the proxy last slipped
   };
 
+  // A groove whose walls moved differently along it in this tick. Lengths along the groove, from the proxy.
+  struct Groove {
+    Vec3 along = Vec3::Zero();
+    std::array<double, 2> carried{};  // where each wall alone would have carried the proxy
+    std::array<double, 2> bound{};    // of its friction
+  };
+
   void startAt(const SceneAtTime& now, const Vec3& hip) noexcept;
   void beFree() noexcept;
   void carry(const Vec3& hip, std::uint32_t& status) noexcept;
+  void chooseCarrier() noexcept;
+  bool jumps(std::int32_t id, std::uint32_t triangle) noexcept;
+  bool surfacesInContactMove() const noexcept;
   Vec3 carriedBy(const PlacedObject& object, std::uint32_t triangle, const Vec3& p) const noexcept;
   void push(const Vec3& from, std::uint32_t& status) noexcept;
   bool pushUntilFree(const Vec3& from, std::uint32_t& status) noexcept;
@@ -168,6 +187,15 @@ class Proxy {
   void rememberConstraints() noexcept;
   bool frictionless() const noexcept;
   static double frictionConeOf(const ContactSet& contactSet) noexcept;
+  Vec3 heldBySlope() const noexcept;
+  bool slips() noexcept;
+  void pressBack(const Vec3& hip, ActiveSet& active) noexcept;
+  bool pressOnLostFace(const Vec3& hip, const ActiveSet& active) noexcept;
+  static Vec3 alongNormals(const ActiveSet& active, const Vec3& way) noexcept;
+  bool isLost(const ObjectHit& face) const noexcept;
+  std::optional<Groove> movingGroove() noexcept;
+  bool slideInMovingGroove(const Vec3& hip, ActiveSet& active) noexcept;
+  void shareOut(const Groove& groove) noexcept;
   double slidingShare() const noexcept;
   void advanceSlide(double slip_m) noexcept;
   Vec3 onFaces(const Vec3& hip, const ActiveSet& active) noexcept;
@@ -194,6 +222,7 @@ class Proxy {
   double share_ = 1;
   bool released_ = false;       // contact released until the HIP leaves the surface
   bool carriedByJump_ = false;  // in this tick
+  bool wasHeld_ = false;        // the contact is that of the tick before
   bool jammed_ = false;         // the last approach found faces that leave the tool no room
   Vec3 position_ = Vec3::Zero();
   Vec3 reported_ = Vec3::Zero();

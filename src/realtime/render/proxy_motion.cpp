@@ -91,10 +91,49 @@ bool Proxy::surfacesNearChanged() const noexcept {
   return false;
 }
 
+bool Proxy::surfacesInContactMove() const noexcept {
+  const bool planesRest =
+      std::all_of(planes_.begin(), planes_.end(), [](const PlacedPlane& plane) { return plane.rests; });
+  if (planesRest && query_.allAtRest()) return false;
+  const auto moves = [&](const ContactConstraint& c) {
+    if (c.object < 0) return !planesRest;
+    for (int i = 0; i < query_.objectCount(); ++i) {
+      if (query_.object(i).state->id == c.object) return !query_.object(i).rests();
+    }
+    return true;
+  };
+  return std::any_of(contactSet_.constraints.begin(), contactSet_.constraints.begin() + contactSet_.count,
+                     moves);
+}
+
+// Of several surfaces, the one whose friction holds the proxy most firmly carries it, and the one
+// without friction does not. Where one of the two jumps, the hardest pressed one carries it.
+void Proxy::chooseCarrier() noexcept {
+  const auto end = contactSet_.constraints.begin() + contactSet_.count;
+  if (contactSet_.count < 2 || !(contactSet_.spring.stiffness_N_per_m > 0)) return;
+  const auto firmest = std::max_element(contactSet_.constraints.begin(), end,
+                                        [this](const ContactConstraint& a, const ContactConstraint& b) {
+                                          return contactSet_.boundOf(a) < contactSet_.boundOf(b);
+                                        });
+  if (!(contactSet_.boundOf(*firmest) > 0) || firmest->object == touchedObject_) return;
+  if (jumps(touchedObject_, touchedTriangle_) || jumps(firmest->object, firmest->triangle)) return;
+  touchedObject_ = firmest->object;
+  touchedTriangle_ = firmest->triangle;
+}
+
+bool Proxy::jumps(std::int32_t id, std::uint32_t triangle) noexcept {
+  if (id < 0) return false;
+  const int i = query_.addObject(id);
+  if (i < 0) return true;
+  const PlacedObject& object = query_.object(i);
+  return object.jumped || (object.moved && isJump(object)) || (object.deformed && isJump(object, triangle));
+}
+
 // The proxy stays at its place on the touched object, however that moved or deformed.
 void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
   carriedByJump_ = false;
   if (contactSet_.count > 0) {
+    chooseCarrier();
     const int touched = query_.addObject(touchedObject_);
     if (touchedObject_ < 0) {
       // Planes do not move along themselves.

@@ -103,8 +103,15 @@ void addTangentialForces(const ContactSet& contactSet, const ContactShares& shar
   const Vec3 lateral = stiffness * contactSet.lateral_m - contactSet.spring.slope_N;
   const double force = lateral.norm();
   if (!(force > 0)) return;
-  const Vec3 friction = std::min(1.0, bound / force) * lateral;
+  const double share = std::min(1.0, bound / force);
+  const Vec3 friction = share * lateral;
   out.contactForce_N += friction;
+  if (contactSet.borneApart) {
+    const Vec3 first = share * stiffness * contactSet.borneByFirst_m;
+    shares[0].contact->force_N += first;
+    shares[1].contact->force_N += friction - first;
+    return;
+  }
   distribute(friction, shares, contactSet.count, [](const ContactShare& s) { return s.friction_N; });
 }
 
