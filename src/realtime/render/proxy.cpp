@@ -155,9 +155,9 @@ void Proxy::advanceSlide(double slip_m) noexcept {
 void Proxy::updateProxy(const Vec3& hip) noexcept {
   ActiveSet active;
   if (frictionless()) {
-    moveFrictionless(hip, active);
+    const bool turned = moveFrictionless(hip, active);
     // The casts ended on the way, perhaps before any found a face at the place where the proxy is now.
-    if (casts_ >= kMaxCasts) {
+    if (casts_ >= kMaxCasts && !turned) {
       Vec3 goal;
       active.count = 0;
       approach(hip, true, active, goal);
@@ -200,7 +200,12 @@ void Proxy::updateProxy(const Vec3& hip) noexcept {
 
 // Moves as near to the target as the surfaces allow. Each approach starts with an empty active set, so that
 // only faces that block the path hold the proxy; the move ends when an approach brings it no nearer.
-void Proxy::moveFrictionless(const Vec3& target, ActiveSet& active) noexcept {
+//
+// A face that overlaps a squeezed ball moves it out, away from the target, and its way back may lead into the
+// same face: round and round until the casts are spent. Then the proxy rests at the nearest place from which
+// no approach came nearer, held by the faces that it met there, and not where the last cast happened to end.
+// True when it does.
+bool Proxy::moveFrictionless(const Vec3& target, ActiveSet& active) noexcept {
   const double skin = query_.minSkin();
   // A point comes to rest on planes after finitely many approaches; a ball on edges and corners only
   // converges.
@@ -208,6 +213,11 @@ void Proxy::moveFrictionless(const Vec3& target, ActiveSet& active) noexcept {
   // Allows for a proxy within the skin, which the first approach moves outwards.
   double nearest = (position_ - target).norm() + 4 * skin;
   Vec3 step = Vec3::Zero();
+  bool escaped = false;      // the last step was out of a corner
+  Vec3 turn = Vec3::Zero();  // the nearest place from which no approach came nearer
+  std::optional<ActiveSet> turnHeld;
+  double turnDistance = 0;
+  bool climbed = false;  // away from it
   while (casts_ < kMaxCasts && !query_.workSpent()) {
     const Vec3 from = position_;
     std::optional<ActiveSet> held;
@@ -217,21 +227,35 @@ void Proxy::moveFrictionless(const Vec3& target, ActiveSet& active) noexcept {
     }
     active.count = 0;
     Vec3 goal;
-    if (approach(target, false, active, goal)) return;
+    if (approach(target, false, active, goal)) return false;
     double distance = (position_ - target).norm();
     if (!(distance < nearest - gain)) {
       if (held) {
         position_ = from;
         active = *held;
         step.setZero();
+        if (!escaped && (!turnHeld || nearest < turnDistance)) {
+          turn = from;
+          turnHeld = active;
+          turnDistance = nearest;
+        }
         continue;
       }
-      if (active.count < 2 || !escapeCorner(target, active)) return;
+      if (active.count < 2 || !escapeCorner(target, active)) break;
       distance = (position_ - target).norm();
+      escaped = true;
+      climbed = climbed || (turnHeld && distance > turnDistance);
+    } else {
+      escaped = false;
     }
     nearest = distance;
     if (toolRadius_ > 0) step = position_ - from;
   }
+  // With friction, the faces are found again in any case.
+  if (casts_ < kMaxCasts || !climbed || !frictionless()) return false;
+  position_ = turn;
+  active = *turnHeld;
+  return true;
 }
 
 // Finds the constraints at the proxy; moves it only while there is none.

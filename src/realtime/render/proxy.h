@@ -165,7 +165,7 @@ class Proxy {
   void releaseByJump(std::uint32_t& status) noexcept;
   static double missedMove(const PlacedObject& object) noexcept;
   void updateProxy(const Vec3& hip) noexcept;
-  void moveFrictionless(const Vec3& target, ActiveSet& active) noexcept;
+  bool moveFrictionless(const Vec3& target, ActiveSet& active) noexcept;
   bool approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Vec3& goal) noexcept;
   bool liftOut(const ActiveSet& active) noexcept;
   void acceptOverlaps(ActiveSet& active) const noexcept;

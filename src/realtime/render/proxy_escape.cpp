@@ -222,7 +222,10 @@ bool Proxy::escapeCorner(const Vec3& target, const ActiveSet& active) noexcept {
   const Vec3 pull = target - position_;
   const double enough = pull.norm() - 2 * kLifts[0] * skin;
   if (!query_.isGathered(position_)) {
-    query_.gatherAround(position_, 1.5 * expectedTravel_m_ + kGatherMargin_m);
+    const double reach = 1.5 * expectedTravel_m_ + kGatherMargin_m;
+    query_.gatherAround(position_, reach);
+    // What was gathered before may cover that with the proxy at its rim.
+    if (!query_.isGathered(position_)) query_.gather(position_, reach);
   }
   if (!query_.isGathered(position_)) return false;
   DescentDirections descent;

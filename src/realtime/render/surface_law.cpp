@@ -1,6 +1,7 @@
 #include "realtime/render/surface_law.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace hapticd::realtime {
 namespace {
@@ -13,10 +14,25 @@ struct ContactShare {
   double friction_N = 0;  // bound of friction and adhesion
 };
 
+// Share of its damping that a face exerts beside the others: all of it where they are at right angles, and
+// about one in all where they are nearly parallel, so that a seam feels as the flat surface that it divides.
+// In no direction do the faces together damp more than the most damped of them: with these weights the rows
+// of the matrix of the products |n_i n_j| sum up to 1, and no eigenvalue is larger than that.
+double dampingShare(const ContactSet& contactSet, int face) {
+  const ContactConstraint& own = contactSet.constraints[static_cast<std::size_t>(face)];
+  double sum = own.depth_m;
+  for (int i = 0; i < contactSet.count; ++i) {
+    const ContactConstraint& other = contactSet.constraints[static_cast<std::size_t>(i)];
+    if (i != face) sum += std::abs(own.halfSpace.normal.dot(other.halfSpace.normal)) * other.depth_m;
+  }
+  return sum > 0 ? own.depth_m / sum : 1;
+}
+
 // Spring and damper along the normal. The damper may reduce the force, but the surface never pulls.
-double normalForce(const ContactConstraint& constraint, double spring_N, const Vec3& hipVelocity) {
+double normalForce(const ContactConstraint& constraint, double spring_N, double dampingShare,
+                   const Vec3& hipVelocity) {
   const double leaving = constraint.halfSpace.normal.dot(hipVelocity - constraint.surfaceVelocity_m_per_s);
-  return std::max(0.0, spring_N - constraint.surface.damping_Ns_per_m * leaving);
+  return std::max(0.0, spring_N - dampingShare * constraint.surface.damping_Ns_per_m * leaving);
 }
 
 // All faces of one object make one contact.
@@ -43,7 +59,7 @@ void addNormalForces(const ContactSet& contactSet, const Vec3& proxy_m, const Ve
     ContactShare& share = shares[static_cast<std::size_t>(i)];
     share.contact = &contactWith(constraint.object, out);
     share.spring_N = contactSet.spring.stiffness_N_per_m * (constraint.presence * constraint.depth_m);
-    share.normal_N = normalForce(constraint, share.spring_N, hipVelocity);
+    share.normal_N = normalForce(constraint, share.spring_N, dampingShare(contactSet, i), hipVelocity);
     share.friction_N = contactSet.frictionOf(constraint.surface) * share.normal_N + constraint.adhesion_N;
     share.contact->force_N += share.normal_N * constraint.forceDirection;
     out.normalForce_N += share.normal_N * constraint.forceDirection;

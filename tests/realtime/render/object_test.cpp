@@ -112,6 +112,38 @@ TEST_P(ObjectTest, damping_never_pulls) {
   EXPECT_EQ(at({0.0013, 0.0021, -0.0002}).force_N.z(), 0);
 }
 
+// A shallow pit of so many faces around `centre`, open upwards; of two faces: a seam along y.
+TriangleMesh pit(int faces, double slope, const Vec3& centre) {
+  constexpr double kRadius_m = 0.05;
+  const int sides = std::max(faces, 4);
+  TriangleMesh mesh;
+  mesh.vertices.push_back(centre.cast<float>());
+  for (int i = 0; i < sides; ++i) {
+    const double turn = 2 * EIGEN_PI * i / sides;
+    const Vec3 out(std::cos(turn), std::sin(turn), 0);
+    const double rise = faces == 2 ? std::abs(out.x()) : 1;
+    mesh.vertices.push_back((centre + kRadius_m * (out + slope * rise * Vec3::UnitZ())).cast<float>());
+  }
+  for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(sides); ++i)
+    mesh.triangles.push_back({0, 1 + i, 1 + (i + 1) % static_cast<std::uint32_t>(sides)});
+  return mesh;
+}
+
+// However many faces a nearly flat surface has, it damps as a plane does.
+TEST_P(ObjectTest, shallow_seams_and_pits_damp_as_a_plane) {
+  scene::Surface s = surface();
+  s.damping_Ns_per_m = 2;
+  const int faces[] = {2, 4, 6, 7};
+  for (int i = 0; i < 4; ++i) add(pit(faces[i], 0.02, Vec3(0.2 * i, 0, 0)), s);
+  for (int i = 0; i < 4; ++i) {
+    const Vec3 lowest(0.2 * i, 0, 0);
+    start(lowest + Vec3(0, 0, 0.001));
+    to(lowest - Vec3(0, 0, 0.001), 0.05);
+    EXPECT_NEAR(hand->now().force_N.z(), 1.0 + 0.1, 2e-3) << faces[i] << " faces";
+    EXPECT_NEAR(at(lowest - Vec3(0, 0, 0.001)).force_N.z(), 1.0, 2e-3);
+  }
+}
+
 // A HIP that is not finite gives no force; the next finite one restarts the proxy.
 TEST_P(ObjectTest, hand_that_is_not_finite_gives_no_force) {
   add(plane(0.05, 10), surface());
