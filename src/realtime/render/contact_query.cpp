@@ -95,7 +95,10 @@ void ContactQuery::addObjectsNear(const Vec3& centre, double reach, const Vec3& 
   } else {
     addObjectsByIndex(scene, centre, reach, tool);
   }
-  leaveOutEnclosing(tool);
+}
+
+void ContactQuery::leaveOutEnclosing(const Vec3& tool) noexcept {
+  findEnclosing(tool);
   if (gatheredGeneration_ != generation_ || !sameObjects()) cache_.invalidate();
 }
 
@@ -152,7 +155,7 @@ bool ContactQuery::shorten(const Vec3& p, Vec3& g) const noexcept {
 }
 
 // An object that appears around the tool would hold it inside: it cannot be felt until the tool has left it.
-void ContactQuery::leaveOutEnclosing(const Vec3& tool) noexcept {
+void ContactQuery::findEnclosing(const Vec3& tool) noexcept {
   const auto appeared = [all = std::exchange(allAppeared_, false)](const PlacedObject& placed) {
     return all || placed.before == nullptr || placed.jumped;
   };
