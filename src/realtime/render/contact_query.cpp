@@ -105,7 +105,8 @@ void ContactQuery::leaveOutEnclosing(const Vec3& tool) noexcept {
 void ContactQuery::addObjectsByIndex(const scene::SceneSnapshot& scene, const Vec3& centre, double reach,
                                      const Vec3& tool) noexcept {
   if (crowd_ == scene.objects.size()) return addNearestObjects(scene, (centre - tool).norm() + reach, tool);
-  if (std::exchange(crowd_, 0) != 0) distances_.restart();
+  // Once there is a crowd, one object more or less does not end it: all others would count as appeared.
+  const std::size_t room = crowd_ > 0 ? ObjectDistances::kRoom / 2 : ObjectDistances::kRoom;
   const Affine& T_world_device = scene.workspace.T_world_device;
   const double largestRadius = std::max(toolRadius_, 0.5 * kLargestGapTolerance_m);
   const double worldReach = (reach + largestRadius) * kWiden * stretchOf(T_world_device.linear());
@@ -115,10 +116,11 @@ void ContactQuery::addObjectsByIndex(const scene::SceneSnapshot& scene, const Ve
     if (count < found.size()) found[count] = i;
     ++count;
   });
-  if (count > ObjectDistances::kRoom) {
+  if (count > room) {
     crowd_ = scene.objects.size();
     return addNearestObjects(scene, (centre - tool).norm() + reach, tool);
   }
+  if (std::exchange(crowd_, 0) != 0) distances_.restart();
   // By id, so that the proxy does not depend on the order of visits.
   std::sort(found.begin(), found.begin() + count);
   for (std::size_t k = 0; k < count; ++k) add(*scene.objects[found[k]]);

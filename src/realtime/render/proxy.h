@@ -141,6 +141,7 @@ class Proxy {
   bool contactChangedByCommand() const noexcept;
   bool neighboursChangedByCommand(const BlendedSpring& before) const noexcept;
   bool surfacesNearChanged() const noexcept;
+  double reachAround(const Vec3& hip) const noexcept;
   void addTouchedWithNewTriangles() noexcept;
   void liftOutOfNewTriangles() noexcept;
   void liftOutOf(int object, EnclosureBudget& budget) noexcept;

@@ -117,11 +117,21 @@ void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
   }
   const bool changed = contactSet_.count > 0 && now_.scene != before_.scene;
   if (changed) addTouchedWithNewTriangles();
-  // The proxy stays within this distance of the HIP during the tick.
-  query_.addObjectsNear(
-      hip, std::max((position_ - hip).norm(), (positionBefore_ - hip).norm()) + kGatherMargin_m, position_);
+  query_.addObjectsNear(hip, reachAround(hip) + kGatherMargin_m, position_);
   if (changed) liftOutOfNewTriangles();
   query_.leaveOutEnclosing(position_);
+}
+
+// The proxy stays within this distance of the HIP during the tick, as seen from all objects: a workspace that
+// moves takes it past them.
+double Proxy::reachAround(const Vec3& hip) const noexcept {
+  const double reach = std::max((position_ - hip).norm(), (positionBefore_ - hip).norm());
+  if (now_.scene == before_.scene) return reach;
+  const Affine& T_device_world = now_.scene->workspace.T_device_world;
+  const scene::Workspace& before = before_.scene->workspace;
+  if (T_device_world.matrix() == before.T_device_world.matrix()) return reach;
+  const double moved = (T_device_world * (before.T_world_device * positionBefore_) - hip).norm();
+  return moved <= reach + kLongestMotion_m ? std::max(reach, moved) : reach;
 }
 
 // In a crowd, new triangles count as those of an object that appeared. Here they are known to be touched.
