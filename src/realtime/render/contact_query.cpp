@@ -95,10 +95,15 @@ void ContactQuery::addObjectsNear(const Vec3& centre, double reach, const Vec3& 
   } else {
     addObjectsByIndex(scene, centre, reach, tool);
   }
+  dropStaleFacets();
 }
 
 void ContactQuery::leaveOutEnclosing(const Vec3& tool) noexcept {
   findEnclosing(tool);
+  dropStaleFacets();
+}
+
+void ContactQuery::dropStaleFacets() noexcept {
   if (gatheredGeneration_ != generation_ || !sameObjects()) cache_.invalidate();
 }
 

@@ -96,10 +96,9 @@ class ContactQuery {
   /// beginTick().
   void beginTick(const SceneAtTime& now, const SceneAtTime& before,
                  const PlacedPlanes* planes = nullptr) noexcept;
-  /// Adds the objects within `reach` of `centre`.
+  /// Adds the objects within `reach` of `centre`; drops gathered facets that are out of date.
   void addObjectsNear(const Vec3& centre, double reach, const Vec3& tool) noexcept;
-  /// Leaves out those that appeared around `tool` and that it has not left since; drops gathered facets that
-  /// are out of date.
+  /// Leaves out those that appeared around `tool` and that it has not left since.
   void leaveOutEnclosing(const Vec3& tool) noexcept;
   /// True when this object was left out in the tick before.
   bool wasLeftOut(std::int32_t id) const noexcept {
@@ -214,6 +213,7 @@ class ContactQuery {
   void addNearestObjects(const scene::SceneSnapshot& scene, double reach, const Vec3& tool) noexcept;
   void add(const scene::ObjectState& state) noexcept;
   void findEnclosing(const Vec3& tool) noexcept;
+  void dropStaleFacets() noexcept;
   bool place(const scene::ObjectState& state, PlacedObject& placed) const noexcept;
   bool sameObjects() const noexcept;
   bool isUnfit(const Vec3& centre, double radius) const noexcept;

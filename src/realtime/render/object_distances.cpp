@@ -69,7 +69,9 @@ double ObjectDistances::examine(const scene::ObjectState& state, const Affine& T
 
 float ObjectDistances::boundAfterMove(const scene::ObjectState& before, const scene::ObjectState& now,
                                       float bound) const noexcept {
-  if (before.mesh->topology != now.mesh->topology || before.motion.jumps() != now.motion.jumps())
+  const bool deformed = before.mesh != now.mesh;
+  if ((deformed && before.mesh->topology != now.mesh->topology) ||
+      before.motion.jumps() != now.motion.jumps())
     return kUnknown;
   const geometry::Box& box = now.mesh->index.bounds();
   const Vec3 centre = box.centre();
@@ -79,7 +81,7 @@ float ObjectDistances::boundAfterMove(const scene::ObjectState& before, const sc
   double way = moveBound(from, now.motion.origin(), centre, radius) +
                moveBound(now.motion.origin(), now.motion.destination(), centre, radius) +
                now.motion.detour(centre, radius);
-  if (before.mesh != now.mesh) way += now.mesh->recentMove * from.linear().norm();
+  if (deformed) way += now.mesh->recentMove * from.linear().norm();
   return std::max(0.0F, bound - static_cast<float>(way * metresPerUnit_) - kRounding_m);
 }
 
@@ -128,6 +130,12 @@ void ObjectDistances::followObjects(const scene::SceneSnapshot& scene) noexcept 
     const scene::ObjectState* const state = scene.objects[k].get();
     states_[k] = state;
     bounds_[k] = kUnknown;
+    // Lists in step up to here most probably go on so; to read the ids of thousands takes too long.
+    if (followed >= kChangesFollowed && count - i == count_ - from) {
+      const auto f = static_cast<std::size_t>(from++);
+      if (statesBefore_[f] == state) bounds_[k] = boundsBefore_[f];
+      continue;
+    }
     while (from < count_ && statesBefore_[static_cast<std::size_t>(from)] != state &&
            statesBefore_[static_cast<std::size_t>(from)]->id < state->id)
       ++from;
@@ -137,7 +145,7 @@ void ObjectDistances::followObjects(const scene::SceneSnapshot& scene) noexcept 
       bounds_[k] = boundsBefore_[f];
       ++from;
     } else if (statesBefore_[f]->id == state->id) {
-      if (boundsBefore_[f] != kUnknown && ++followed <= kChangesFollowed)
+      if (followed++ < kChangesFollowed && boundsBefore_[f] != kUnknown)
         bounds_[k] = boundAfterMove(*statesBefore_[f], *state, boundsBefore_[f]);
       ++from;
     }

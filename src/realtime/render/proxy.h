@@ -143,8 +143,8 @@ class Proxy {
   bool surfacesNearChanged() const noexcept;
   double reachAround(const Vec3& hip) const noexcept;
   void addTouchedWithNewTriangles() noexcept;
-  void liftOutOfNewTriangles() noexcept;
-  void liftOutOf(int object, EnclosureBudget& budget) noexcept;
+  bool liftOutOfNewTriangles() noexcept;
+  bool liftOutOf(int object, std::uint64_t changed, EnclosureBudget& budget) noexcept;
   Vec3 pressOf(std::int32_t object) const noexcept;
   void releaseByJump(std::uint32_t& status) noexcept;
   static double missedMove(const PlacedObject& object) noexcept;

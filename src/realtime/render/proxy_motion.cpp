@@ -118,7 +118,10 @@ void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
   const bool changed = contactSet_.count > 0 && now_.scene != before_.scene;
   if (changed) addTouchedWithNewTriangles();
   query_.addObjectsNear(hip, reachAround(hip) + kGatherMargin_m, position_);
-  if (changed) liftOutOfNewTriangles();
+  if (changed && liftOutOfNewTriangles()) {
+    status |= kRenderGeometryJump;
+    query_.addObjectsNear(hip, reachAround(hip) + kGatherMargin_m, position_);
+  }
   query_.leaveOutEnclosing(position_);
 }
 
@@ -145,17 +148,23 @@ void Proxy::addTouchedWithNewTriangles() noexcept {
   }
 }
 
-// New triangles may rise a little above a proxy that was outside, also those beside the touched ones.
-void Proxy::liftOutOfNewTriangles() noexcept {
-  EnclosureBudget budget;
+// New triangles may rise a little above a proxy that was outside, also those beside the touched ones. True
+// when it moved.
+bool Proxy::liftOutOfNewTriangles() noexcept {
+  std::uint64_t changed = 0;
   for (int i = 0; i < query_.objectCount(); ++i) {
     const PlacedObject& object = query_.object(i);
     if (!object.jumped || object.before == nullptr) continue;
     const std::int32_t id = object.state->id;
-    const bool touched = !pressOf(id).isZero(0);
     const bool inPlace = object.before->motion.jumps() == object.state->motion.jumps();
-    if (touched || (inPlace && !query_.wasLeftOut(id))) liftOutOf(i, budget);
+    if (!pressOf(id).isZero(0) || (inPlace && !query_.wasLeftOut(id))) changed |= std::uint64_t{1} << i;
   }
+  EnclosureBudget budget;
+  bool lifted = false;
+  for (int i = 0; changed >> i != 0 && i < query_.objectCount(); ++i) {
+    if ((changed >> i & 1U) != 0) lifted = liftOutOf(i, changed, budget) || lifted;
+  }
+  return lifted;
 }
 
 // The direction in which an object pressed the tool, weighted by depths.
@@ -168,19 +177,22 @@ Vec3 Proxy::pressOf(std::int32_t object) const noexcept {
   return press;
 }
 
-// As far as needed: friction of others would keep the proxy where it is lifted to.
-void Proxy::liftOutOf(int i, EnclosureBudget& budget) noexcept {
+// As far as needed: friction of others would keep the proxy where it is lifted to. What did not change stops
+// it.
+bool Proxy::liftOutOf(int i, std::uint64_t changed, EnclosureBudget& budget) noexcept {
   constexpr double kLift_m = 0.5e-3;
   const PlacedObject& object = query_.object(i);
   const Vec3 press = pressOf(object.state->id);
   const Vec3 out = (press.isZero(0) ? contactSet_.normal_m : press).normalized();
   const Vec3 lifted = position_ + kLift_m * out;
-  if (!encloses(object, query_.faces(), now_.time, position_, toolRadius_, budget) ||
-      encloses(object, query_.faces(), now_.time, lifted, toolRadius_, budget))
-    return;
   ObjectHit hit;
+  if (!encloses(object, query_.faces(), now_.time, position_, toolRadius_, budget) ||
+      encloses(object, query_.faces(), now_.time, lifted, toolRadius_, budget) ||
+      query_.castPast(changed, position_, lifted, hit))
+    return false;
   const double share = query_.castAtObject(i, lifted, position_, hit) ? hit.stop : 0;
   position_ = lifted + share * (position_ - lifted);
+  return true;
 }
 
 Vec3 Proxy::carriedBy(const PlacedObject& object, std::uint32_t triangle, const Vec3& p) const noexcept {
@@ -282,12 +294,13 @@ void Proxy::pushTo(const Vec3& place, const HalfSpace& face, Pushers& pushers) n
 
 // Each sweep gathers what is around it, of all objects: among many, one gather for all of them.
 void Proxy::gatherSweeps(const Vec3& from) noexcept {
-  constexpr int kMany = 16;  // more gathers of a full storage would spend the work of a tick
+  constexpr int kMany = 16;             // more gathers of a full storage would spend the work of a tick
+  constexpr double kFarthest_m = 1e-3;  // a tick of 1 m/s; a faster one casts in steps
   if (query_.objectCount() <= kMany) return;
   double reach = 0;
   for (int i = 0; i < query_.objectCount(); ++i)
     reach = std::max(reach, (query_.object(i).carried(from) - position_).norm());
-  if (reach > 0) query_.ensureGathered(position_, reach + kGatherMargin_m);
+  if (reach > 0) query_.ensureGathered(position_, std::min(reach, kFarthest_m) + kGatherMargin_m);
 }
 
 // A cast in the frame of each object, from the previous place of the proxy in that frame to the present one.
