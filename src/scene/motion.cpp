@@ -159,4 +159,15 @@ geometry::Box Motion::sweep(const geometry::Box& box) const {
   return swept;
 }
 
+// As in sweep(); each term is convex in the point.
+double Motion::detour(const geometry::Vec3& centre, double radius) const noexcept {
+  if (end_ <= begin_ || sameLinear(from_, to_)) return 0;
+  const double angle = fromFactors_.rotation.angularDistance(toFactors_.rotation);
+  const geometry::Vec3 inFrame = T_leader_object_ * centre;
+  const double reach = radius * T_leader_object_.linear().norm();
+  const auto longest = [&](const Mat3& m) { return (m * inFrame).norm() + m.norm() * reach; };
+  const double stretched = std::max(longest(fromFactors_.stretch), longest(toFactors_.stretch));
+  return (angle * angle * stretched + 2 * angle * longest(toFactors_.stretch - fromFactors_.stretch)) / 8;
+}
+
 }  // namespace hapticd::scene

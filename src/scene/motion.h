@@ -34,6 +34,9 @@ class Motion {
   Affine at(Nanos now) const noexcept;
   /// True while the placement still changes after `now`.
   bool movingAfter(Nanos now) const noexcept { return end_ > begin_ && now < end_; }
+  /// How far a point of a ball (object frame) leaves the straight line between its places at both ends, at
+  /// most. World units.
+  double detour(const geometry::Vec3& centre, double radius) const noexcept;
   /// Box in the world around all that a box of the object's frame sweeps on the way. Empty stays empty.
   geometry::Box sweep(const geometry::Box& box) const;
   /// Upper bound of the distance between the pose before and the destination of any point of `box` (object

@@ -125,6 +125,33 @@ TEST(Motion, WhatFollowsALeaderKeepsItsPlaceBesideIt) {
   EXPECT_GT((alone.at(200).translation() - led.at(200).translation()).norm(), 0.1) << "it takes another way";
 }
 
+// A turn about a pivot far from the origin of the object, alone and behind a leader.
+TEST(Motion, PointsLeaveTheStraightLineByAtMostTheDetour) {
+  const Vec3 pivot(30, -20, 10);
+  const Affine map =
+      placement(1.1 * turn(0.7, Vec3(1, 0.3, -2)), pivot - turn(0.7, Vec3(1, 0.3, -2)) * pivot);
+  const Affine a = placement(0.7 * turn(1, Vec3(1, 2, 3)), Vec3(10, 20, 30));
+  const Affine b = placement(turn(2, Vec3(3, 1, 0)) * Vec3(2, 3, -4).asDiagonal(), Vec3(-40, 20, 5));
+  const Motion leader = Motion::between(a, map * a, 0, 1000);
+  const Motion alone = Motion::between(b, map * b, 0, 1000);
+  const Motion led = Motion::between(b, map * b, 0, 1000).with(leader);
+  const Vec3 centre(4, -3, 2);
+  for (const Motion& motion : {leader, alone, led}) {
+    double farthest = 0;
+    for (const Vec3& side : {Vec3(1, 0, 0), Vec3(0, -1, 0), Vec3(0.6, 0, 0.8), Vec3(0, 0, 0)}) {
+      const Vec3 p = centre + 2 * side;
+      for (Nanos t = 0; t <= 1000; t += 50) {
+        const double share = static_cast<double>(t) / 1000;
+        const Vec3 straight = (1 - share) * (motion.origin() * p) + share * (motion.destination() * p);
+        farthest = std::max(farthest, (motion.at(t) * p - straight).norm());
+      }
+    }
+    EXPECT_GT(farthest, 0.1);
+    EXPECT_LE(farthest, motion.detour(centre, 2));
+  }
+  EXPECT_EQ(Motion::between(a, placement(a.linear(), Vec3::Zero()), 0, 1000).detour(centre, 2), 0);
+}
+
 TEST(Motion, VeryUnevenScaleIsFactorisedAccurately) {
   const Mat3 m = turn(1, Vec3(1, 1, 0)) * Vec3(1e-4, 1, 1e4).asDiagonal() * turn(0.5, Vec3(0, 1, 2));
   const Motion motion = Motion::between(placement(m, Vec3::Zero()), placement(m, Vec3(1, 0, 0)), 0, 1000);

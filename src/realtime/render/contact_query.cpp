@@ -95,14 +95,23 @@ void ContactQuery::addObjectsNear(const Vec3& centre, double reach, const Vec3& 
   } else {
     addObjectsByIndex(scene, centre, reach, tool);
   }
-  leaveOutEnclosing(tool);
+  dropStaleFacets();
+}
+
+void ContactQuery::leaveOutEnclosing(const Vec3& tool) noexcept {
+  findEnclosing(tool);
+  dropStaleFacets();
+}
+
+void ContactQuery::dropStaleFacets() noexcept {
   if (gatheredGeneration_ != generation_ || !sameObjects()) cache_.invalidate();
 }
 
 void ContactQuery::addObjectsByIndex(const scene::SceneSnapshot& scene, const Vec3& centre, double reach,
                                      const Vec3& tool) noexcept {
   if (crowd_ == scene.objects.size()) return addNearestObjects(scene, (centre - tool).norm() + reach, tool);
-  if (std::exchange(crowd_, 0) != 0) distances_.restart();
+  // Once there is a crowd, one object more or less does not end it: all others would count as appeared.
+  const std::size_t room = crowd_ > 0 ? ObjectDistances::kRoom / 2 : ObjectDistances::kRoom;
   const Affine& T_world_device = scene.workspace.T_world_device;
   const double largestRadius = std::max(toolRadius_, 0.5 * kLargestGapTolerance_m);
   const double worldReach = (reach + largestRadius) * kWiden * stretchOf(T_world_device.linear());
@@ -112,10 +121,11 @@ void ContactQuery::addObjectsByIndex(const scene::SceneSnapshot& scene, const Ve
     if (count < found.size()) found[count] = i;
     ++count;
   });
-  if (count > ObjectDistances::kRoom) {
+  if (count > room) {
     crowd_ = scene.objects.size();
     return addNearestObjects(scene, (centre - tool).norm() + reach, tool);
   }
+  if (std::exchange(crowd_, 0) != 0) distances_.restart();
   // By id, so that the proxy does not depend on the order of visits.
   std::sort(found.begin(), found.begin() + count);
   for (std::size_t k = 0; k < count; ++k) add(*scene.objects[found[k]]);
@@ -152,7 +162,7 @@ bool ContactQuery::shorten(const Vec3& p, Vec3& g) const noexcept {
 }
 
 // An object that appears around the tool would hold it inside: it cannot be felt until the tool has left it.
-void ContactQuery::leaveOutEnclosing(const Vec3& tool) noexcept {
+void ContactQuery::findEnclosing(const Vec3& tool) noexcept {
   const auto appeared = [all = std::exchange(allAppeared_, false)](const PlacedObject& placed) {
     return all || placed.before == nullptr || placed.jumped;
   };

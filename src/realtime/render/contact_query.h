@@ -100,9 +100,15 @@ class ContactQuery {
   /// beginTick().
   void beginTick(const SceneAtTime& now, const SceneAtTime& before,
                  const PlacedPlanes* planes = nullptr) noexcept;
-  /// Adds the objects within `reach` of `centre`, except those that appeared around `tool` and that it has
-  /// not left since; drops gathered facets that are out of date.
+  /// Adds the objects within `reach` of `centre`; drops gathered facets that are out of date.
   void addObjectsNear(const Vec3& centre, double reach, const Vec3& tool) noexcept;
+  /// Leaves out those that appeared around `tool` and that it has not left since.
+  void leaveOutEnclosing(const Vec3& tool) noexcept;
+  /// True when this object was left out in the tick before.
+  bool wasLeftOut(std::int32_t id) const noexcept {
+    return std::find(enclosing_.begin(), enclosing_.begin() + enclosingCount_, id) !=
+           enclosing_.begin() + enclosingCount_;
+  }
   /// Adds one object by its id and returns its index; -1 when the scene does not contain it.
   int addObject(std::int32_t id) noexcept;
 
@@ -210,7 +216,8 @@ class ContactQuery {
                          const Vec3& tool) noexcept;
   void addNearestObjects(const scene::SceneSnapshot& scene, double reach, const Vec3& tool) noexcept;
   void add(const scene::ObjectState& state) noexcept;
-  void leaveOutEnclosing(const Vec3& tool) noexcept;
+  void findEnclosing(const Vec3& tool) noexcept;
+  void dropStaleFacets() noexcept;
   bool place(const scene::ObjectState& state, PlacedObject& placed) const noexcept;
   bool sameObjects() const noexcept;
   bool isUnfit(const Vec3& centre, double radius) const noexcept;

@@ -9,15 +9,23 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr double kFarthest_m = 0.2;       // of a search for the surface
-constexpr float kRounding_m = 2e-6F;      // of a bound with its travel, in floats
-constexpr double kLongestTravel_m = 4;    // beyond, floats would be too coarse
-constexpr int kExaminations = 64;         // in a tick, of bounds that have run out
-constexpr int kUnknownExaminations = 32;  // in a tick, of objects without a bound
-constexpr int kTurns = 2;                 // in a tick, of others
-constexpr int kMovesFollowed = 64;        // in a tick: the bounds of further objects that moved are lost
-constexpr int kMostTriangles = 2048;      // in one examination; beyond, the object counts as touching
-constexpr int kLookAhead = 64;            // when objects were added or removed
+using geometry::Affine;
+
+constexpr double kFarthest_m = 0.2;                // of a search for the surface
+constexpr float kRounding_m = 2e-6F;               // of a bound with its travel, in floats
+constexpr double kLongestTravel_m = 4;             // beyond, floats would be too coarse
+constexpr double kLongestWorkspaceStep_m = 0.020;  // of the tool in the world; beyond, it counts as a jump
+constexpr int kExaminations = 64;                  // in a tick, of bounds that have run out
+constexpr int kUnknownExaminations = 32;           // in a tick, of objects without a bound
+constexpr int kTurns = 2;                          // in a tick, of others
+constexpr int kChangesFollowed = 1024;  // in a tick: the bounds of further objects that moved are lost
+constexpr int kMostTriangles = 2048;    // in one examination; beyond, the object counts as touching
+
+// How far a point of a ball is from where it was under another placement, at most. Cheaper than
+// scene::longestMove(), because thousands of objects may move in one tick.
+double moveBound(const Affine& from, const Affine& to, const Vec3& centre, double radius) noexcept {
+  return (to * centre - from * centre).norm() + (to.linear() - from.linear()).norm() * radius;
+}
 
 }  // namespace
 
@@ -26,12 +34,12 @@ double stretchOf(const geometry::Mat3& m) noexcept {
 }
 
 // The distance now, at least, and the least on the rest of its motion.
-double ObjectDistances::examine(const scene::ObjectState& state, const geometry::Affine& T_device_world,
-                                Nanos now, const Vec3& tool, double& later_m) const noexcept {
+double ObjectDistances::examine(const scene::ObjectState& state, const Affine& T_device_world, Nanos now,
+                                const Vec3& tool, double& later_m) const noexcept {
   const scene::MeshGeometry& mesh = *state.mesh;
   const geometry::Box& box = mesh.index.bounds();
-  const geometry::Affine placed = state.motion.at(now);
-  const geometry::Affine T_object_device = (T_device_world * placed).inverse();
+  const Affine placed = state.motion.at(now);
+  const Affine T_object_device = (T_device_world * placed).inverse();
   const double stretch = stretchOf(T_object_device.linear());
   later_m = std::numeric_limits<double>::infinity();
   if (!std::isfinite(stretch) || box.empty()) return later_m;
@@ -51,85 +59,97 @@ double ObjectDistances::examine(const scene::ObjectState& state, const geometry:
   }
   const double distance_m = std::max(outside, nearest) / stretch;
   later_m = distance_m;
-  if (state.motion.movingAfter(now))
-    later_m -= scene::longestMove(placed, state.motion.destination(), box) * metresPerUnit_;
+  if (state.motion.movingAfter(now)) {
+    const double detour = state.motion.detour(box.centre(), 0.5 * box.extents().norm());
+    later_m -= (scene::longestMove(placed, state.motion.destination(), box) + detour) * metresPerUnit_;
+  }
   if (mesh.deformingAfter(now)) later_m -= mesh.recentMove * (T_device_world * placed).linear().norm();
   return distance_m;
 }
 
 float ObjectDistances::boundAfterMove(const scene::ObjectState& before, const scene::ObjectState& now,
                                       float bound) const noexcept {
-  if (before.id != now.id || before.mesh != now.mesh || before.motion.jumps() != now.motion.jumps())
+  const bool deformed = before.mesh != now.mesh;
+  if ((deformed && before.mesh->topology != now.mesh->topology) ||
+      before.motion.jumps() != now.motion.jumps())
     return kUnknown;
   const geometry::Box& box = now.mesh->index.bounds();
+  const Vec3 centre = box.centre();
+  const double radius = 0.5 * box.extents().norm();
+  const Affine& from = before.motion.destination();
   // The bound holds up to the destination before; motions between may have been missed.
-  const double way = (scene::longestMove(before.motion.destination(), now.motion.origin(), box) +
-                      scene::longestMove(now.motion.origin(), now.motion.destination(), box)) *
-                     metresPerUnit_;
-  return std::max(0.0F, bound - static_cast<float>(way) - kRounding_m);
+  double way = moveBound(from, now.motion.origin(), centre, radius) +
+               moveBound(now.motion.origin(), now.motion.destination(), centre, radius) +
+               now.motion.detour(centre, radius);
+  if (deformed) way += now.mesh->recentMove * from.linear().norm();
+  return std::max(0.0F, bound - static_cast<float>(way * metresPerUnit_) - kRounding_m);
 }
 
-// The bounds of unchanged objects stay. States are compared by address: the previous snapshot still lives.
+// A workspace that keeps its scale moves the tool in the world. False when the distances are others now, or
+// the tool arrives far away, where it may be inside of objects.
+bool ObjectDistances::followWorkspace(const scene::SceneSnapshot& scene) noexcept {
+  const Affine& then = scene_->workspace.T_device_world;
+  const Affine& now = scene.workspace.T_device_world;
+  workspaceMoved_ = then.matrix() != now.matrix();
+  if (!workspaceMoved_) return true;
+  constexpr double kSameScale = 1e-9;
+  const geometry::Mat3 square = now.linear().transpose() * now.linear();
+  const geometry::Mat3 squareThen = then.linear().transpose() * then.linear();
+  const double way = (now * (then.inverse() * tool_) - tool_).norm();
+  if (!((square - squareThen).norm() <= kSameScale * square.norm()) || !(way <= kLongestWorkspaceStep_m))
+    return false;
+  travel_ += way;
+  return true;
+}
+
+// States are compared by address: the previous snapshot still lives.
 void ObjectDistances::follow(const scene::SceneSnapshot& scene) noexcept {
   const int count = static_cast<int>(std::min<std::size_t>(scene.objects.size(), kMaxTracked));
-  const double metresPerUnit = 1 / scene.workspace.worldUnitsPerMetre;
-  const bool sameWorkspace = scene_ != nullptr && scene_->workspace.T_device_world.matrix() ==
-                                                      scene.workspace.T_device_world.matrix();
-  metresPerUnit_ = metresPerUnit;
-  if (count_ == 0 || !sameWorkspace) {
+  metresPerUnit_ = 1 / scene.workspace.worldUnitsPerMetre;
+  if (count_ > 0 && scene_ != nullptr && followWorkspace(scene)) {
+    followObjects(scene);
+  } else {
     std::fill_n(bounds_.begin(), count, kUnknown);
     for (int i = 0; i < count; ++i)
       states_[static_cast<std::size_t>(i)] = scene.objects[static_cast<std::size_t>(i)].get();
-    count_ = count;
-    scene_ = &scene;
-    return;
   }
-  const auto object = [&](int i) { return scene.objects[static_cast<std::size_t>(i)].get(); };
-  int followed = 0;
-  if (count == count_) {
-    for (int i = 0; i < count; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      if (states_[k] == object(i)) continue;
-      if (bounds_[k] != kUnknown) {
-        bounds_[k] =
-            ++followed <= kMovesFollowed ? boundAfterMove(*states_[k], *object(i), bounds_[k]) : kUnknown;
-      }
-      states_[k] = object(i);
-    }
-  } else {
-    // Shifted places: looks for each state near the shift of the one before.
-    const int shift = count - count_;
-    if (shift > 0) {
-      // From the end, so that no bound is overwritten before it is read.
-      int from = count_ - 1;
-      for (int i = count - 1; i >= 0; --i) {
-        const auto k = static_cast<std::size_t>(i);
-        if (from >= 0 && states_[static_cast<std::size_t>(from)] == object(i)) {
-          bounds_[k] = bounds_[static_cast<std::size_t>(from)];
-          --from;
-        } else {
-          bounds_[k] = kUnknown;
-          if (from >= i) --from;
-        }
-        states_[k] = object(i);
-      }
-    } else {
-      int from = 0;
-      for (int i = 0; i < count; ++i) {
-        const auto k = static_cast<std::size_t>(i);
-        int ahead = from;
-        while (ahead < count_ && ahead - from < kLookAhead &&
-               states_[static_cast<std::size_t>(ahead)] != object(i))
-          ++ahead;
-        const bool found = ahead < count_ && states_[static_cast<std::size_t>(ahead)] == object(i);
-        bounds_[k] = found ? bounds_[static_cast<std::size_t>(ahead)] : kUnknown;
-        if (found) from = ahead + 1;
-        states_[k] = object(i);
-      }
-    }
-    count_ = count;
-  }
+  count_ = count;
   scene_ = &scene;
+}
+
+// The bounds of unchanged objects stay, those of objects that moved or deformed fall by their ways. Both
+// lists are in the order of ids.
+void ObjectDistances::followObjects(const scene::SceneSnapshot& scene) noexcept {
+  const int count = static_cast<int>(std::min<std::size_t>(scene.objects.size(), kMaxTracked));
+  std::copy_n(bounds_.begin(), count_, boundsBefore_.begin());
+  std::copy_n(states_.begin(), count_, statesBefore_.begin());
+  int from = 0;
+  int followed = 0;
+  for (int i = 0; i < count; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const scene::ObjectState* const state = scene.objects[k].get();
+    states_[k] = state;
+    bounds_[k] = kUnknown;
+    // Lists in step up to here most probably go on so; to read the ids of thousands takes too long.
+    if (followed >= kChangesFollowed && count - i == count_ - from) {
+      const auto f = static_cast<std::size_t>(from++);
+      if (statesBefore_[f] == state) bounds_[k] = boundsBefore_[f];
+      continue;
+    }
+    while (from < count_ && statesBefore_[static_cast<std::size_t>(from)] != state &&
+           statesBefore_[static_cast<std::size_t>(from)]->id < state->id)
+      ++from;
+    if (from == count_) continue;
+    const auto f = static_cast<std::size_t>(from);
+    if (statesBefore_[f] == state) {
+      bounds_[k] = boundsBefore_[f];
+      ++from;
+    } else if (statesBefore_[f]->id == state->id) {
+      if (followed++ < kChangesFollowed && boundsBefore_[f] != kUnknown)
+        bounds_[k] = boundAfterMove(*statesBefore_[f], *state, boundsBefore_[f]);
+      ++from;
+    }
+  }
 }
 
 // Most bounds are far beyond the limit: a loop without branches finds that out.
@@ -169,6 +189,7 @@ void ObjectDistances::findNearest(const scene::SceneSnapshot& scene, Nanos now, 
   nearest.free_m = std::numeric_limits<double>::infinity();
   nearest.complete = scene.objects.size() <= kMaxTracked;
   if (count_ == 0) tool_ = tool;
+  workspaceMoved_ = false;
   if (&scene != scene_ || count_ == 0) follow(scene);
   travel_ += (tool - tool_).norm();
   tool_ = tool;
@@ -190,7 +211,9 @@ void ObjectDistances::findNearest(const scene::SceneSnapshot& scene, Nanos now, 
     bounds_[k] = static_cast<float>(travel_ + std::clamp(later_m, 0.0, 2 * kFarthest_m)) - kRounding_m;
     bounds_[k] = std::max(0.0F, bounds_[k]);
     // One that moved may have passed over the tool, and one that appeared may be around it.
-    if (fresh || distance_m <= reach_m || states_[k]->motion.movingAfter(before))
+    const bool moved =
+        workspaceMoved_ || states_[k]->motion.movingAfter(before) || states_[k]->mesh->deformingAfter(before);
+    if (fresh || distance_m <= reach_m || moved)
       consider(nearest, {distance_m, static_cast<std::uint32_t>(i), fresh});
   };
   for (int i = 0; i < count_; ++i) {

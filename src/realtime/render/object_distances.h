@@ -52,6 +52,8 @@ class ObjectDistances {
   static constexpr int kBlock = 64;
 
   void follow(const scene::SceneSnapshot& scene) noexcept;
+  void followObjects(const scene::SceneSnapshot& scene) noexcept;
+  bool followWorkspace(const scene::SceneSnapshot& scene) noexcept;
   float boundAfterMove(const scene::ObjectState& before, const scene::ObjectState& now,
                        float bound) const noexcept;
   double examine(const scene::ObjectState& state, const geometry::Affine& T_device_world, Nanos now,
@@ -60,8 +62,11 @@ class ObjectDistances {
   void consider(Nearest& nearest, const Candidate& candidate) const noexcept;
 
   std::array<float, kMaxTracked> bounds_{};  // lower bound of the distance plus the travel until then
+  std::array<float, kMaxTracked> boundsBefore_{};
   std::array<const scene::ObjectState*, kMaxTracked> states_{};
+  std::array<const scene::ObjectState*, kMaxTracked> statesBefore_{};
   int count_ = 0;
+  bool workspaceMoved_ = false;  // in this tick
   const scene::SceneSnapshot* scene_ = nullptr;
   double metresPerUnit_ = 0;
   double travel_ = 0;

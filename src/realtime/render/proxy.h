@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "realtime/render/contact_query.h"
+#include "realtime/render/enclosure.h"
 #include "realtime/render/renderer.h"
 #include "realtime/render/stiffness_blend.h"
 
@@ -151,6 +152,7 @@ class Proxy {
   Vec3 carriedBy(const PlacedObject& object, std::uint32_t triangle, const Vec3& p) const noexcept;
   void push(const Vec3& from, std::uint32_t& status) noexcept;
   bool pushUntilFree(const Vec3& from, std::uint32_t& status) noexcept;
+  void gatherSweeps(const Vec3& from) noexcept;
   bool pushByObjects(const Vec3& from, Pushers& pushers, std::uint32_t& status) noexcept;
   bool pushByDeformingFaces(const Vec3& from, Pushers& pushers, std::uint32_t& status) noexcept;
   bool pushByPlanes(Pushers& pushers, std::uint32_t& status) noexcept;
@@ -161,7 +163,11 @@ class Proxy {
   bool contactChangedByCommand() const noexcept;
   bool neighboursChangedByCommand(const BlendedSpring& before) const noexcept;
   bool surfacesNearChanged() const noexcept;
-  void liftOutOf(const PlacedObject& object) noexcept;
+  double reachAround(const Vec3& hip) const noexcept;
+  void addTouchedWithNewTriangles() noexcept;
+  bool liftOutOfNewTriangles() noexcept;
+  bool liftOutOf(int object, std::uint64_t changed, EnclosureBudget& budget) noexcept;
+  Vec3 pressOf(std::int32_t object) const noexcept;
   void releaseByJump(std::uint32_t& status) noexcept;
   static double missedMove(const PlacedObject& object) noexcept;
   void updateProxy(const Vec3& hip) noexcept;

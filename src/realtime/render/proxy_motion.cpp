@@ -147,7 +147,6 @@ void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
       if (carriedByJump_) status |= kRenderGeometryJump;
       if (!object.jumped || (carried - position_).norm() <= kJump_m) {
         position_ = carried;
-        if (object.jumped) liftOutOf(object);
       } else {
         status |= kRenderGeometryJump;
         position_ = hip;
@@ -155,19 +154,84 @@ void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
       }
     }
   }
-  // The proxy stays within this distance of the HIP during the tick.
-  query_.addObjectsNear(
-      hip, std::max((position_ - hip).norm(), (positionBefore_ - hip).norm()) + kGatherMargin_m, position_);
+  const bool changed = contactSet_.count > 0 && now_.scene != before_.scene;
+  if (changed) addTouchedWithNewTriangles();
+  query_.addObjectsNear(hip, reachAround(hip) + kGatherMargin_m, position_);
+  if (changed && liftOutOfNewTriangles()) {
+    status |= kRenderGeometryJump;
+    query_.addObjectsNear(hip, reachAround(hip) + kGatherMargin_m, position_);
+  }
+  query_.leaveOutEnclosing(position_);
 }
 
-// New triangles of a touched mesh may rise a little above the proxy, which was outside.
-void Proxy::liftOutOf(const PlacedObject& object) noexcept {
-  constexpr double kLift_m = 0.5e-3;
+// The proxy stays within this distance of the HIP during the tick, as seen from all objects: a workspace that
+// moves takes it past them.
+double Proxy::reachAround(const Vec3& hip) const noexcept {
+  const double reach = std::max((position_ - hip).norm(), (positionBefore_ - hip).norm());
+  if (now_.scene == before_.scene) return reach;
+  const Affine& T_device_world = now_.scene->workspace.T_device_world;
+  const scene::Workspace& before = before_.scene->workspace;
+  if (T_device_world.matrix() == before.T_device_world.matrix()) return reach;
+  const double moved = (T_device_world * (before.T_world_device * positionBefore_) - hip).norm();
+  return moved <= reach + kLongestMotion_m ? std::max(reach, moved) : reach;
+}
+
+// In a crowd, new triangles count as those of an object that appeared. Here they are known to be touched.
+void Proxy::addTouchedWithNewTriangles() noexcept {
+  for (int i = 0; i < contactSet_.count; ++i) {
+    const std::int32_t id = contactSet_.constraints[static_cast<std::size_t>(i)].object;
+    const scene::ObjectState* const present = now_.scene->find(id);
+    const scene::ObjectState* const past = before_.scene->find(id);
+    if (present != nullptr && past != nullptr && present->mesh->topology != past->mesh->topology)
+      query_.addObject(id);
+  }
+}
+
+// New triangles may rise a little above a proxy that was outside, also those beside the touched ones. True
+// when it moved.
+bool Proxy::liftOutOfNewTriangles() noexcept {
+  std::uint64_t changed = 0;
+  for (int i = 0; i < query_.objectCount(); ++i) {
+    const PlacedObject& object = query_.object(i);
+    if (!object.jumped || object.before == nullptr) continue;
+    const std::int32_t id = object.state->id;
+    const bool inPlace = object.before->motion.jumps() == object.state->motion.jumps();
+    if (!pressOf(id).isZero(0) || (inPlace && !query_.wasLeftOut(id))) changed |= std::uint64_t{1} << i;
+  }
   EnclosureBudget budget;
-  const Vec3 lifted = position_ + kLift_m * contactSet_.normal_m.normalized();
-  if (encloses(object, query_.faces(), now_.time, position_, toolRadius_, budget) &&
-      !encloses(object, query_.faces(), now_.time, lifted, toolRadius_, budget))
-    position_ = lifted;
+  bool lifted = false;
+  for (int i = 0; changed >> i != 0 && i < query_.objectCount(); ++i) {
+    if ((changed >> i & 1U) != 0) lifted = liftOutOf(i, changed, budget) || lifted;
+  }
+  return lifted;
+}
+
+// The direction in which an object pressed the tool, weighted by depths.
+Vec3 Proxy::pressOf(std::int32_t object) const noexcept {
+  Vec3 press = Vec3::Zero();
+  for (int i = 0; i < contactSet_.count; ++i) {
+    const ContactConstraint& constraint = contactSet_.constraints[static_cast<std::size_t>(i)];
+    if (constraint.object == object) press += constraint.depth_m * constraint.halfSpace.normal;
+  }
+  return press;
+}
+
+// As far as needed: friction of others would keep the proxy where it is lifted to. What did not change stops
+// it.
+bool Proxy::liftOutOf(int i, std::uint64_t changed, EnclosureBudget& budget) noexcept {
+  constexpr double kLift_m = 0.5e-3;
+  const PlacedObject& object = query_.object(i);
+  const Vec3 press = pressOf(object.state->id);
+  const Vec3 out = (press.isZero(0) ? contactSet_.normal_m : press).normalized();
+  const Vec3 lifted = position_ + kLift_m * out;
+  ObjectHit hit;
+  if (!encloses(object, query_.faces(), now_.time, position_, toolRadius_, budget) ||
+      encloses(object, query_.faces(), now_.time, lifted, toolRadius_, budget) ||
+      query_.castPast(changed, position_, lifted, hit))
+    return false;
+  const double share = query_.castAtObject(i, lifted, position_, hit) ? hit.stop : 0;
+  position_ = lifted + share * (position_ - lifted);
+  return true;
 }
 
 Vec3 Proxy::carriedBy(const PlacedObject& object, std::uint32_t triangle, const Vec3& p) const noexcept {
@@ -193,7 +257,11 @@ Vec3 Proxy::carriedBy(const PlacedObject& object, std::uint32_t triangle, const 
 void Proxy::push(const Vec3& from, std::uint32_t& status) noexcept {
   const Vec3 carried = position_;
   const double travel = expectedTravel_m_;
-  if (pushUntilFree(from, status)) return;
+  gatherSweeps(from);
+  if (pushUntilFree(from, status)) {
+    if (query_.workSpent()) holdPlanesBack();
+    return;
+  }
   if (toolRadius_ > 0.5 * kGapTolerance_m) {
     position_ = carried;
     expectedTravel_m_ = travel;
@@ -263,8 +331,20 @@ void Proxy::pushTo(const Vec3& place, const HalfSpace& face, Pushers& pushers) n
   pushers.keep(nearest);
 }
 
+// Each sweep gathers what is around it, of all objects: among many, one gather for all of them.
+void Proxy::gatherSweeps(const Vec3& from) noexcept {
+  constexpr int kMany = 16;             // more gathers of a full storage would spend the work of a tick
+  constexpr double kFarthest_m = 1e-3;  // a tick of 1 m/s; a faster one casts in steps
+  if (query_.objectCount() <= kMany) return;
+  double reach = 0;
+  for (int i = 0; i < query_.objectCount(); ++i)
+    reach = std::max(reach, (query_.object(i).carried(from) - position_).norm());
+  if (reach > 0) query_.ensureGathered(position_, std::min(reach, kFarthest_m) + kGatherMargin_m);
+}
+
 // A cast in the frame of each object, from the previous place of the proxy in that frame to the present one.
-// An object that jumps over the proxy takes it along without a force.
+// An object that jumps over the proxy takes it along without a force. One whose sweep could not be examined
+// does not take it along: others might be in between.
 bool Proxy::pushByObjects(const Vec3& from, Pushers& pushers, std::uint32_t& status) noexcept {
   bool pushed = false;
   for (int i = 0; i < query_.objectCount() && !pushers.jammed; ++i) {
@@ -274,7 +354,7 @@ bool Proxy::pushByObjects(const Vec3& from, Pushers& pushers, std::uint32_t& sta
     const Vec3 start = object.carried(from);
     const Vec3 displacement = position_ - start;
     ObjectHit hit;
-    if (displacement.squaredNorm() > 0 && query_.castAtObject(i, start, position_, hit)) {
+    if (displacement.squaredNorm() > 0 && query_.castAtObject(i, start, position_, hit) && !hit.unexamined) {
       pushTo(start + hit.stop * displacement, hit.halfSpace, pushers);
       pushed = true;
       touchedObject_ = object.state->id;
@@ -306,6 +386,10 @@ bool Proxy::pushByPlanes(Pushers& pushers, std::uint32_t& status) noexcept {
     const Vec3 displacement = below * face.normal;
     ObjectHit hit;
     if (query_.cast(position_, position_ + displacement, hit)) {
+      if (hit.unexamined) {
+        position_ += hit.stop * displacement;
+        continue;
+      }
       pushTo(position_ + hit.stop * displacement, hit.halfSpace, pushers);
       if (!pushers.jammed) pushTo(position_, face, pushers);
     } else {

@@ -265,5 +265,100 @@ TEST_P(Appearing, touched_mesh_with_new_triangles_stays_felt) {
   }
 }
 
+// A corner of a floor and a wall; each in turn gets new triangles that reach farther into the hand, and each
+// in turn is pressed harder.
+class NewTriangles : public Appearing {
+ protected:
+  static constexpr double kHarder_mm = 2;
+  static constexpr double kSofter_mm = 1.4;
+
+  std::vector<Vec3f> floorTriples(double rise_mm) const {
+    return boxTriples(Vec3(-30, -30, -30), Vec3(30, rise_mm, 30));
+  }
+  std::vector<Vec3f> wallTriples(double rise_mm) const {
+    return boxTriples(Vec3(-rise_mm, -20, -30), Vec3(30, 30, 30));
+  }
+  void upload(std::int32_t id, std::vector<Vec3f> triples) {
+    loop.send(scene::ClearMesh{id});
+    loop.send(scene::SetVertices{id, 0, std::move(triples)});
+  }
+};
+INSTANTIATE_TEST_SUITE_P(, NewTriangles, testing::Values(0.0, 0.002),
+                         [](const auto& test) { return test.param > 0 ? "ball" : "point"; });
+
+TEST_P(NewTriangles, of_any_touched_mesh_are_felt_at_once) {
+  const double radius_mm = 1e3 * GetParam();
+  for (const bool wallIsNew : {true, false}) {
+    for (const bool wallIsHarder : {true, false}) {
+      for (const double step_mm : {0.0, 0.001, 0.02, 0.2, 0.45}) {
+        loop.send(scene::ResetScene{});
+        loop.send(scene::SetObjectNumber{2});
+        loop.send(scene::SetTouchableFaces{0});
+        loop.add(0, floorTriples(0));
+        loop.add(1, wallTriples(0));
+        const double depth_mm = wallIsHarder ? kSofter_mm : kHarder_mm;  // of the hand below the floor
+        const double into_mm = wallIsHarder ? kHarder_mm : kSofter_mm;   // and behind the wall
+        const Vec3 pressed = 1e-3 * Vec3(into_mm - radius_mm, radius_mm - depth_mm, 2);
+        loop.rest(pressed + Vec3(-0.010, 0.010, 0), toNanos(0.5));
+        loop.to(pressed);
+        loop.rest(pressed, toNanos(0.1));
+        for (int k = 1; k <= 3; ++k) {
+          const double rise_mm = k * step_mm;
+          upload(wallIsNew ? 1 : 0, wallIsNew ? wallTriples(rise_mm) : floorTriples(rise_mm));
+          loop.rest(pressed, toNanos(0.1));
+          const Vec3 depths(-into_mm - (wallIsNew ? rise_mm : 0), depth_mm + (wallIsNew ? 0 : rise_mm), 0);
+          EXPECT_NEAR((loop.out.force_N - 1e-3 * kStiffness_N_per_m * depths).norm(), 0, 1e-3)
+              << (wallIsNew ? "wall " : "floor ") << k << " x " << step_mm
+              << " mm: " << loop.out.force_N.transpose();
+          EXPECT_EQ(loop.out.status, 0U);
+        }
+      }
+    }
+  }
+}
+
+// A floor of two objects; the hand rests on one and the other gets new triangles.
+TEST_P(NewTriangles, beside_the_touched_mesh_hold_the_hand_that_comes) {
+  const double radius_mm = 1e3 * GetParam();
+  for (const double rise_mm : {0.0, 0.001, 0.2}) {
+    loop.send(scene::ResetScene{});
+    loop.send(scene::SetObjectNumber{2});
+    loop.send(scene::SetTouchableFaces{0});
+    loop.add(0, boxTriples(Vec3(-30, -30, -30), Vec3(0, 0, 30)));
+    loop.add(1, boxTriples(Vec3(0, -30, -30), Vec3(30, 0, 30)));
+    const Vec3 pressed = 1e-3 * Vec3(-0.5, radius_mm - 1, 2);
+    loop.rest(pressed + Vec3(0, 0.010, 0), toNanos(0.5));
+    loop.to(pressed);
+    upload(1, boxTriples(Vec3(0, -30, -30), Vec3(30, rise_mm, 30)));
+    loop.rest(pressed, toNanos(0.1));
+    loop.to(pressed + Vec3(0.010, 0, 0));
+    const double depth_mm = 1 + rise_mm;
+    // A point stops at a step; the ball rolls over it.
+    if (GetParam() == 0 && rise_mm > 0.1) continue;
+    EXPECT_NEAR(loop.out.force_N.y(), 1e-3 * depth_mm * kStiffness_N_per_m, 2e-3) << rise_mm;
+    EXPECT_EQ(loop.out.status, 0U) << rise_mm;
+  }
+}
+
+// While friction of the floor holds the proxy, the wall that comes nearer takes it along by just that way.
+TEST_P(NewTriangles, leave_friction_of_others_as_it_is) {
+  const double radius_mm = 1e3 * GetParam();
+  loop.send(scene::SetTouchableFaces{0});
+  loop.add(0, floorTriples(0));
+  loop.add(1, wallTriples(0));
+  loop.send(scene::SetSurfaceProperty{0, "static friction", 1});
+  loop.send(scene::SetSurfaceProperty{0, "dynamic friction", 1});
+  const Vec3 pressed = 1e-3 * Vec3(0.3 - radius_mm, radius_mm - 3, 2);
+  loop.rest(pressed + Vec3(-0.001, 0.010, 0), toNanos(0.5));
+  loop.to(pressed + Vec3(-0.001, 0, 0));
+  loop.to(pressed);
+  loop.rest(pressed, toNanos(0.1));
+  upload(1, wallTriples(0.1));
+  loop.rest(pressed, toNanos(0.1));
+  EXPECT_LE(1e3 * (loop.out.proxy_m.x() - pressed.x()), -0.3);
+  EXPECT_GE(1e3 * (loop.out.proxy_m.x() - pressed.x()), -1.01);
+  EXPECT_NEAR(loop.out.force_N.y(), 3e-3 * kStiffness_N_per_m, 1e-2);
+}
+
 }  // namespace
 }  // namespace hapticd::realtime::commands

@@ -133,7 +133,7 @@ TEST_P(Crowd, floor_among_tilted_sheets_is_felt) {
 
 // A tenth of the objects move at 60 Hz, and one of them is a sheet that rises under the hand.
 TEST_P(Crowd, moving_sheet_in_a_crowd_takes_the_hand_along) {
-  if (GetParam() > 1'000) GTEST_SKIP() << "moves of more than 64 objects in a tick are found out in turn";
+  if (GetParam() > 1'000) GTEST_SKIP() << "thousands of snapshots of all objects";
   loop.send(scene::SetObjectNumber{GetParam() + 1});
   for (int i = 0; i < GetParam(); ++i) {
     const Vec3 corner(uniform(50, 70), uniform(50, 70), uniform(50, 70));

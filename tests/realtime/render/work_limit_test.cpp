@@ -90,6 +90,55 @@ TEST_P(WorkLimit, friction_fades_out_with_the_force) {
   EXPECT_GT(spent, 80);
 }
 
+// A floor rises through the hand; others whose boxes are around it move elsewhere and spend the work. They do
+// not take the proxy along where their ways were not examined.
+TEST(WorkLimitOfMotions, proxy_follows_none_that_was_not_examined) {
+  constexpr int kOthers = 15;
+  constexpr int kSheets = 60;
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> distance(0.04, 0.06);
+  const auto rise = [](double height) {
+    Affine t = Affine::Identity();
+    t.translation().y() = height;
+    return t;
+  };
+  SceneFixture fixture;
+  TriangleMesh floor;
+  floor.vertices = {Vec3f(-0.1F, 0, -0.1F), Vec3f(0, 0, 0.1F), Vec3f(0.1F, 0, -0.1F)};
+  floor.triangles = {{0, 1, 2}};
+  constexpr double kStart_m = -0.002;
+  constexpr double kSpeed_m_per_s = 0.05;
+  constexpr int kDuration = 160;
+  fixture.add(geometryOf(floor, 1), surface(1000),
+              scene::Motion::between(rise(kStart_m), rise(kStart_m + 1e-3 * kDuration * kSpeed_m_per_s), 0,
+                                     kDuration * kTick));
+  for (int i = 0; i < kOthers; ++i) {
+    TriangleMesh sheets;
+    for (int k = 0; k < kSheets; ++k) {
+      const Vec3 n = Vec3(normal(random), -2, normal(random)).normalized();
+      const Vec3 u = 0.2 * n.unitOrthogonal();
+      const Vec3 centre = -distance(random) * n;
+      const auto first = static_cast<std::uint32_t>(sheets.vertices.size());
+      for (const Vec3& corner : {Vec3(-u - n.cross(u)), Vec3(u - n.cross(u)), Vec3(n.cross(u))})
+        sheets.vertices.push_back((centre + corner).cast<float>());
+      sheets.triangles.push_back({first, first + 1, first + 2});
+    }
+    const Affine away = rise(-0.0016 * (1 + i));
+    fixture.add(geometryOf(sheets, 2 + static_cast<std::uint64_t>(i)), surface(1000),
+                scene::Motion::between(Affine::Identity(), away, 0, kDuration * kTick));
+  }
+  Hand hand(fixture.snapshot());
+  int spent = 0;
+  for (int tick = 0; tick < kDuration; ++tick) {
+    const double top = kStart_m + 1e-3 * tick * kSpeed_m_per_s;
+    const Rendering& r = hand.at({0.001, 0, 0.002});
+    spent += (r.status & kRenderWorkLimit) != 0 ? 1 : 0;
+    ASSERT_GE(r.proxy_m.y(), top - 1e-8) << tick;
+  }
+  EXPECT_GT(spent, 20);
+}
+
 // Most of the mesh is as far from the centre of the ball as the part that it touches, within a share.
 TEST(WorkLimitOfABall, is_not_spent_on_a_fine_flat_mesh) {
   SceneFixture fixture;
