@@ -21,7 +21,8 @@ from .reports import Trips
 _MAGIC: Final = b"HAPTICS\n"
 _HEAD: Final = struct.Struct(">III")
 _VERSION: Final = 2
-_HEADER, _SCENE, _PUBLISH, _TICKS, _LOST, _END, _LAW, _STREAM, _PASSIVITY, _MARKER = range(1, 11)  # kinds of blocks
+# Kinds of blocks.
+_HEADER, _SCENE, _PUBLISH, _TICKS, _LOST, _END, _LAW, _STREAM, _PASSIVITY, _MARKER, _MEMORY = range(1, 12)
 _MAX_CONTACTS: Final = 1024
 
 _FIXED: Final = np.dtype(

@@ -333,13 +333,13 @@ void Proxy::pushTo(const Vec3& place, const HalfSpace& face, Pushers& pushers) n
 
 // Each sweep gathers what is around it, of all objects: among many, one gather for all of them.
 void Proxy::gatherSweeps(const Vec3& from) noexcept {
-  constexpr int kMany = 16;             // more gathers of a full storage would spend the work of a tick
-  constexpr double kFarthest_m = 1e-3;  // a tick of 1 m/s; a faster one casts in steps
+  constexpr int kMany = 16;                // more gathers of a full storage would spend the work of a tick
+  constexpr double kLongestSweep_m = 1e-3;  // a tick of 1 m/s; a faster one casts in steps
   if (query_.objectCount() <= kMany) return;
   double reach = 0;
   for (int i = 0; i < query_.objectCount(); ++i)
     reach = std::max(reach, (query_.object(i).carried(from) - position_).norm());
-  if (reach > 0) query_.ensureGathered(position_, std::min(reach, kFarthest_m) + kGatherMargin_m);
+  if (reach > 0) query_.ensureGathered(position_, std::min(reach, kLongestSweep_m) + kGatherMargin_m);
 }
 
 // A cast in the frame of each object, from the previous place of the proxy in that frame to the present one.
