@@ -333,7 +333,7 @@ void Proxy::pushTo(const Vec3& place, const HalfSpace& face, Pushers& pushers) n
 
 // Each sweep gathers what is around it, of all objects: among many, one gather for all of them.
 void Proxy::gatherSweeps(const Vec3& from) noexcept {
-  constexpr int kMany = 16;                // more gathers of a full storage would spend the work of a tick
+  constexpr int kMany = 16;                 // more gathers of a full storage would spend the work of a tick
   constexpr double kLongestSweep_m = 1e-3;  // a tick of 1 m/s; a faster one casts in steps
   if (query_.objectCount() <= kMany) return;
   double reach = 0;
