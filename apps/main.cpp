@@ -72,5 +72,11 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "hapticd: %s\n", error.what());
     return 1;
   }
+  // What did not reach a full disk must not look like a success.
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+    std::fprintf(stderr,
+                 "hapticd: cannot write to standard output: the disk is full, or its reader has gone\n");
+    return exitCode == 0 ? 1 : exitCode;
+  }
   return exitCode;
 }

@@ -12,6 +12,7 @@
 #include "client/link.h"
 #include "commands.h"
 #include "hapticd/client.h"
+#include "missing_ticks.h"
 #include "record/export.h"
 #include "record/vrpn_log.h"
 #include "sample_of.h"
@@ -92,12 +93,11 @@ std::size_t recordTicks(record::SampleFile& file, const RecordOptions& options) 
                              " is not a hapticd and reports no ticks; record to a file called *.vrpn");
   }
   std::size_t count = 0;
-  std::uint64_t first = 0;
-  std::uint64_t last = 0;
+  MissingTicks missing;
   client.onTick([&](const TickReport& tick) {
     file.add(sampleOf(client.device(), tick));
-    if (count++ == 0) first = tick.tick;
-    last = tick.tick;
+    missing.add(tick.tick);
+    ++count;
   });
   client.subscribe(Reports::tick, options.rate_Hz);
   try {
@@ -110,15 +110,7 @@ std::size_t recordTicks(record::SampleFile& file, const RecordOptions& options) 
     throw;
   }
   file.close();
-  // At a lower rate than the servo's, others are left out on purpose.
-  if (const std::uint64_t all = last - first + 1;
-      options.rate_Hz >= capabilities->servoRate_Hz && count < all) {
-    std::fprintf(
-        stderr,
-        "hapticd record: %llu ticks between the first and the last are missing: this program or the network "
-        "was too slow for them. The server itself loses none: --server\n",
-        static_cast<unsigned long long>(all - count));
-  }
+  missing.print("hapticd record", options.rate_Hz, capabilities->servoRate_Hz);
   return count;
 }
 

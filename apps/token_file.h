@@ -6,9 +6,11 @@
 #include <stdexcept>
 #include <string>
 
+#include "wire/messages/extension.h"
+
 namespace hapticd::apps {
 
-/// The first word of the file. Throws std::runtime_error when others may use the file, or it is empty.
+/// The first word of the file. Throws std::runtime_error when others may use the file, or it holds no token.
 inline std::string readToken(const std::string& file) {
   namespace fs = std::filesystem;
   const fs::perms mode = fs::status(file).permissions();
@@ -17,6 +19,10 @@ inline std::string readToken(const std::string& file) {
   std::ifstream in(file);
   std::string token;
   if (!(in >> token)) throw std::runtime_error("cannot read a token from '" + file + "'");
+  constexpr std::size_t kShortest = 16;
+  if (token.size() < kShortest || token.size() > wire::Identify::kLongestToken)
+    throw std::runtime_error("the token in '" + file + "' has " + std::to_string(token.size()) +
+                             " characters; a token has 16 to 128");
   return token;
 }
 

@@ -31,6 +31,8 @@ namespace {
 using namespace std::chrono_literals;
 using geometry::TriangleMesh;
 
+constexpr std::size_t kLongestName = 64;  // of an object
+
 struct TouchOptions {
   std::string mesh;
   std::string server = "Phantom@localhost";
@@ -85,7 +87,8 @@ void send(Client& client, const TriangleMesh& mesh, const TouchOptions& options)
   client.clearMesh(options.object);
   client.setTransform(options.object, kIdentity);
   client.setTouchable(options.object, true);
-  client.setObjectName(options.object, std::filesystem::path(options.mesh).filename().string());
+  client.setObjectName(options.object,
+                       std::filesystem::path(options.mesh).filename().string().substr(0, kLongestName));
   client.setSurface(options.object, options.surface);
   ProgressBar bar("sending");
   const auto start = std::chrono::steady_clock::now();

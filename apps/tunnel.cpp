@@ -130,6 +130,24 @@ tls::Context contextOf(const TunnelOptions& options, const std::string& host) {
       "--ca with the authority that signed its certificate");
 }
 
+// A connection to the server, from behind the tunnel.
+using Connect = std::function<net::Connection()>;
+
+// A wrong fingerprint is told here and not to the first client. Throws when the server does not answer.
+void tryOnce(net::Loop& loop, const Connect& connect, const std::string& server) {
+  bool answered = false;
+  std::optional<std::string> failure;
+  net::Connection connection = connect();
+  connection.start({.onConnected = [&] { answered = true; },
+                    .onBytes = [](auto) {},
+                    .onDrained = {},
+                    .onPeerGone = {},
+                    .onClosed = [&](const std::string& why) { failure = why; }});
+  const auto end = std::chrono::steady_clock::now() + 5s;
+  while (!answered && !failure && std::chrono::steady_clock::now() < end) loop.runOnce(100ms);
+  if (!answered) throw ConnectError(server + ": " + failure.value_or("no TLS handshake within 5 s"));
+}
+
 int run(const TunnelOptions& options) {
   const client::ServerAddress server = client::parseServer(options.server);
   net::Loop loop;
@@ -145,11 +163,15 @@ int run(const TunnelOptions& options) {
   net::ConnectionOptions link;
   link.keepAlive = 1s;
   const net::Endpoint local{net::kLoopbackAddress, static_cast<std::uint16_t>(options.port)};
+  const Connect connect = [&] {
+    return context ? tls::wrap(*context, net::Connection::connect(loop, address, 3s, link))
+                   : net::connectLocal(loop, server.socket, link);
+  };
+  if (context) tryOnce(loop, connect, server.text());
   net::TcpListener listener(
       loop, local,
       [&](net::Connection near) {
-        net::Connection far = context ? tls::wrap(*context, net::Connection::connect(loop, address, 3s, link))
-                                      : net::connectLocal(loop, server.socket, link);
+        net::Connection far = connect();
         carriers.emplace_back();
         const auto place = std::prev(carriers.end());
         *place = std::make_shared<Carrier>(std::move(near), std::move(far), token, [&loop, &carriers, place] {
@@ -198,7 +220,8 @@ void addTunnel(CLI::App& app) {
       ->check(CLI::ExistingFile);
   command->footer(
       "For clients that know neither TLS nor tokens, such as those of stock VRPN: they open\n"
-      "NAME@tcp://127.0.0.1:3883. Everybody on this machine can use the tunnel while it runs.");
+      "NAME@tcp://127.0.0.1:3883. Everybody on this machine can use the tunnel while it runs. It ends with\n"
+      "status 1 when the server does not answer at its start.");
   command->callback([options] { exitCode = run(*options); });
 }
 

@@ -10,6 +10,7 @@
 #include "commands.h"
 #include "hapticd/client.h"
 #include "live_table.h"
+#include "missing_ticks.h"
 #include "record/text_fields.h"
 #include "report_summary.h"
 #include "report_view.h"
@@ -98,8 +99,12 @@ void stream(Client& client, const WatchOptions& options) {
   const double rate_Hz = options.rate_Hz > 0 ? options.rate_Hz : 10;
   const auto capabilities = client.waitCapabilities();
   const bool whole = capabilities && capabilities->subscribe;
+  MissingTicks missing;
   if (whole) {
-    client.onTick([&](const TickReport& tick) { print(sampleOf(client.device(), tick)); });
+    client.onTick([&](const TickReport& tick) {
+      print(sampleOf(client.device(), tick));
+      missing.add(tick.tick);
+    });
     client.subscribe(Reports::tick, rate_Hz);
   }
   const auto period = std::chrono::nanoseconds(std::llround(1e9 / rate_Hz));
@@ -108,7 +113,11 @@ void stream(Client& client, const WatchOptions& options) {
     std::fflush(stdout);
     if (std::ferror(stdout) != 0) throw Error("cannot write to standard output: the reader has closed it");
   };
-  pollUntilEnd(client, options.seconds, period, flush, printError);
+  pollUntilEnd(client, options.seconds, period, flush, [&](const std::string& line) {
+    printError(line);
+    missing.restart();
+  });
+  if (whole) missing.print("hapticd watch", rate_Hz, capabilities->servoRate_Hz);
 }
 
 void show(Client& client, const WatchOptions& options) {

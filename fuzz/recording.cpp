@@ -44,7 +44,7 @@ Bytes withChecksums(ByteView data) {
   Bytes file(record::magic().begin(), record::magic().end());
   record::appendBlock(file, BlockKind::header, header());
   while (data.size() >= 3) {
-    const auto kind = static_cast<BlockKind>(static_cast<std::uint32_t>(data[0]) % 8);
+    const auto kind = static_cast<BlockKind>(static_cast<std::uint32_t>(data[0]) % 12);
     const std::size_t length =
         std::min<std::size_t>(wire::loadBig<std::uint16_t>(data.data() + 1), data.size() - 3);
     record::appendBlock(file, kind, data.subspan(3, length));

@@ -162,8 +162,8 @@ class HAPTICD_EXPORT Client {
   void setSurfaceProperty(int object, std::string_view property, float value);
   /// Places an object in the world. It may be called at any rate: the hand feels the object move.
   void setTransform(int object, const Matrix4& T_world_object);
-  /// Names an object for people, in the viewer and in recordings: at most 64 bytes. Servers without
-  /// extensions ignore it.
+  /// Names an object for people, in the viewer and in recordings: at most 64 bytes (std::invalid_argument).
+  /// Servers without extensions ignore it.
   void setObjectName(int object, std::string_view name);
   /// Starts or stops rendering an object.
   void setTouchable(int object, bool touchable);
@@ -216,7 +216,7 @@ class HAPTICD_EXPORT Client {
   /// still takes effect when the server reads it.
   void stopForces();
   /// Marks a moment, such as "trial 3 begins": the server records it and reports it to all clients. At most
-  /// 255 bytes. Sends at once. Throws ConnectionLost without a connection.
+  /// 255 bytes (std::invalid_argument). Sends at once. Throws ConnectionLost without a connection.
   void mark(std::string_view text);
   /// Ends a stop and clears latched trips; the force ramps in over half a second. It keeps its place behind
   /// the commands sent before it, and never undoes a stop that is sent after it. The server refuses it, by a
@@ -338,7 +338,8 @@ class HAPTICD_EXPORT Client {
   /// Makes a button, or all (kAllButtons), momentary or a toggle.
   void setButtonMode(int button, ButtonMode mode);
   static constexpr int kAllButtons = -99;
-  /// Sends a text, which servers of this project write to their log.
+  /// Sends a text, which servers of this project write to their log: at most 1023 bytes
+  /// (std::invalid_argument).
   void sendText(std::string_view text, Severity severity = Severity::normal);
 
  private:

@@ -133,12 +133,20 @@ void Client::stopForces() {
   impl_->require(wire::kFeatureStop, "stop the forces");
 }
 
+void Client::Impl::requireLength(std::string_view call, std::string_view text, std::size_t most) {
+  if (text.size() > most)
+    throw std::invalid_argument(std::string(call) + ": " + std::to_string(text.size()) +
+                                " bytes of text; at most " + std::to_string(most));
+}
+
 void Client::mark(std::string_view text) {
+  Impl::requireLength("mark()", text, decltype(wire::Marker::text)::kMost);
   if (!impl_->link.sendNow(impl_->sender, wire::Marker{.time = 0, .text = std::string(text)}))
     throw ConnectionLost("not marked: " + impl_->link.whyNotConnected());
 }
 
 void Client::setObjectName(int object, std::string_view name) {
+  Impl::requireLength("setObjectName()", name, decltype(wire::SetObjectName::text)::kMost);
   impl_->send(wire::SetObjectName{object, name});
 }
 

@@ -47,6 +47,9 @@ ServerAddress parseServer(std::string_view text) {
   server.tcpOnly = dropPrefix(rest, "tcp:");
   if (!server.tcpOnly) dropPrefix(rest, "x-vrpn:");
   dropPrefix(rest, "//");
+  if (rest.starts_with('[') || std::count(rest.begin(), rest.end(), ':') > 1)
+    throw std::invalid_argument("server " + wire::inQuotes(text) +
+                                ": IPv6 addresses are not supported; use a name or an IPv4 address");
   if (const std::size_t colon = rest.find(':'); colon != std::string_view::npos) {
     server.port = parsePort(rest.substr(colon + 1), text);
     rest = rest.substr(0, colon);

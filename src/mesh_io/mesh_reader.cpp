@@ -8,7 +8,10 @@
 
 #include <algorithm>
 #include <array>
+#include <assimp/IOStream.hpp>
 #include <assimp/Importer.hpp>
+#include <charconv>
+#include <memory>
 #include <new>
 #include <stdexcept>
 #include <string_view>
@@ -32,27 +35,92 @@ std::string formatOf(const std::filesystem::path& file) {
   return extension;
 }
 
+// A part of another stream, which it owns.
+class StreamPart final : public Assimp::IOStream {
+ public:
+  StreamPart(Assimp::IOStream* whole, std::size_t begin, std::size_t size)
+      : whole_(whole), begin_(begin), size_(size) {
+    whole_->Seek(begin, aiOrigin_SET);
+  }
+
+  std::size_t Read(void* out, std::size_t size, std::size_t count) override {
+    return size == 0 ? 0 : whole_->Read(out, size, std::min(count, (size_ - Tell()) / size));
+  }
+  std::size_t Write(const void*, std::size_t, std::size_t) override { return 0; }
+  aiReturn Seek(std::size_t offset, aiOrigin origin) override {
+    const std::size_t from = origin == aiOrigin_SET ? 0 : origin == aiOrigin_CUR ? Tell() : size_;
+    const std::size_t to = from + offset;  // an offset back wraps around
+    return to > size_ ? aiReturn_FAILURE : whole_->Seek(begin_ + to, aiOrigin_SET);
+  }
+  std::size_t Tell() const override { return whole_->Tell() - begin_; }
+  std::size_t FileSize() const override { return size_; }
+  void Flush() override {}
+
+ private:
+  const std::unique_ptr<Assimp::IOStream> whole_;
+  const std::size_t begin_;
+  const std::size_t size_;
+};
+
+// Without what Assimp does not expect and other programs write: a byte order mark before a text, and bytes
+// after the last triangle of a binary STL. A text is never taken for one: its characters would be a number of
+// triangles that needs gigabytes.
+std::unique_ptr<Assimp::IOStream> withoutSurplus(std::unique_ptr<Assimp::IOStream> file,
+                                                 const std::string& format) {
+  constexpr std::size_t kStlHeader = 84;
+  constexpr std::size_t kStlTriangle = 50;
+  const std::size_t size = file->FileSize();
+  std::array<unsigned char, kStlHeader> head{};
+  const std::size_t known = file->Read(head.data(), 1, head.size());
+  file->Seek(0, aiOrigin_SET);
+  constexpr std::size_t kMark = 3;
+  if (known >= kMark && head[0] == 0xEF && head[1] == 0xBB && head[2] == 0xBF)
+    return std::make_unique<StreamPart>(file.release(), kMark, size - kMark);
+  if (format != "stl" || known < kStlHeader) return file;
+  std::size_t triangles = 0;
+  for (std::size_t i = kStlHeader; i > kStlHeader - 4; --i) triangles = triangles << 8U | head[i - 1];
+  const std::size_t end = kStlHeader + kStlTriangle * triangles;
+  if (triangles == 0 || end >= size) return file;
+  return std::make_unique<StreamPart>(file.release(), 0, end);
+}
+
+// The bytes that a URI means: %20 is a space.
+std::string decoded(std::string_view uri) {
+  std::string text;
+  for (std::size_t i = 0; i < uri.size(); ++i) {
+    unsigned char value = 0;
+    const bool hex = uri[i] == '%' && i + 2 < uri.size() &&
+                     std::from_chars(&uri[i + 1], &uri[i + 1] + 2, value, 16).ptr == &uri[i + 1] + 2;
+    text += hex ? static_cast<char>(value) : uri[i];
+    if (hex) i += 2;
+  }
+  return text;
+}
+
 // Materials, textures and files of other folders do not exist.
 class OnlyGeometry final : public Assimp::DefaultIOSystem {
  public:
   explicit OnlyGeometry(const std::filesystem::path& file)
-      : file_(std::filesystem::canonical(file)), withBuffers_(formatOf(file) == "gltf") {}
+      : file_(std::filesystem::canonical(file)), format_(formatOf(file)) {}
 
-  bool Exists(const char* name) const override { return allowed(name); }
+  bool Exists(const char* name) const override { return allowed(name) || allowed(decoded(name)); }
   Assimp::IOStream* Open(const char* name, const char* mode) override {
-    return allowed(name) ? DefaultIOSystem::Open(name, mode) : nullptr;
+    const std::string path = allowed(name) ? name : decoded(name);
+    if (!allowed(path)) return nullptr;
+    std::unique_ptr<Assimp::IOStream> file(DefaultIOSystem::Open(path.c_str(), mode));
+    return file ? withoutSurplus(std::move(file), format_).release() : nullptr;
   }
 
  private:
-  bool allowed(const char* name) const {
+  bool allowed(const std::string& name) const {
     std::error_code error;
     const std::filesystem::path path = std::filesystem::canonical(name, error);
     if (error || !std::filesystem::is_regular_file(path, error)) return false;
-    return path == file_ || (withBuffers_ && path.parent_path() == file_.parent_path());
+    return path == file_ || (format_ == "gltf" && path.parent_path() == file_.parent_path());
   }
 
   const std::filesystem::path file_;
-  const bool withBuffers_;
+  const std::string format_;
 };
 
 // Assimp tries readers by content, too; those of other formats are removed.

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "base/world.h"
 #include "realtime/servo/thread_setup.h"
@@ -633,6 +634,16 @@ void Server::onReplayControl(Session& session, const wire::MessageReceived& mess
                             .level = 0,
                             .text = "Replay_Control refused: this server replays no recording; start one by "
                                     "'hapticd replay FILE'"});
+    return;
+  }
+  if (!std::isfinite(wanted->speed) || wanted->speed < 0 || std::isnan(wanted->position)) {
+    session.send(
+        message.local_sender,
+        wire::Text{.severity = wire::kTextError,
+                   .level = 0,
+                   .text = fmt::format("Replay_Control refused: speed {}, position {} s: use a speed of 0 "
+                                       "to keep it or a positive one, and a negative position to stay",
+                                       wanted->speed, wanted->position)});
     return;
   }
   ReplayOrder order{.paused = wanted->paused != 0, .speed = wanted->speed, .position_s = {}};

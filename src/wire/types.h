@@ -68,7 +68,8 @@ using Bool16 = std::int16_t;
 /// memory) or full without one.
 template <std::size_t N>
 struct NameBuffer {
-  std::array<char, N> bytes{};  ///< zero behind the text
+  static constexpr std::size_t kMost = N;  ///< bytes of text
+  std::array<char, N> bytes{};             ///< zero behind the text
 
   constexpr NameBuffer() = default;
   /// Longer text is cut to N bytes.
@@ -86,6 +87,7 @@ struct NameBuffer {
 /// Text that always fills N bytes on the wire: cut to N-1 bytes, then NUL and zeros.
 template <std::size_t N>
 struct TextBuffer {
+  static constexpr std::size_t kMost = N - 1;  ///< bytes of text
   std::string text;
 
   TextBuffer() = default;

@@ -37,6 +37,10 @@ refused 1 "--force" "$hapticd" export "$recording" --to csv -o "$work/out.csv"
 grep -q '^device      ' "$work/info" && grep -q '^  force     at most [0-9.]* N' "$work/info" && grep -q '^command     SetVertices, 4 times' "$work/info" ||
   { cat "$work/info"; exit 1; }
 
+status=0
+"$hapticd" info "$recording" >/dev/full 2>"$work/said" || status=$?
+[ "$status" = 1 ] && grep -q "cannot write to standard output" "$work/said" || { cat "$work/said"; echo "status $status"; exit 1; }
+
 # What columns do not say stands beside them, for programs and people.
 grep -q '"program": "hapticd' "$work/out.csv.json" && grep -q '"stiffness_N_per_m"' "$work/out.csv.json" || { cat "$work/out.csv.json"; exit 1; }
 "$hapticd" info "$recording" --json | grep -q '"driver": "simulated"'

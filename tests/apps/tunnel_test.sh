@@ -44,6 +44,14 @@ chmod 0644 "$work/token"
 refused "$hapticd" tunnel "$address" --fingerprint "$fingerprint" --token-file "$work/token"
 grep -q 'chmod 0600' "$work/out"
 chmod 0600 "$work/token"
+refused timeout 20 "$hapticd" tunnel "$address" --port 0 --fingerprint "$(tr 0-9A-F 1-9A-F0 <<<"$fingerprint")"
+grep -q "another certificate, with the fingerprint $fingerprint" "$work/out" || { cat "$work/out"; exit 1; }
+refused timeout 20 "$hapticd" tunnel 127.0.0.1:1 --port 0 --fingerprint "$fingerprint"
+grep -q 'cannot connect' "$work/out" || { cat "$work/out"; exit 1; }
+printf 'eightabc\n' >"$work/short"
+chmod 0600 "$work/short"
+refused "$hapticd" tunnel "$address" --fingerprint "$fingerprint" --token-file "$work/short"
+grep -q "the token in '$work/short' has 8 characters" "$work/out" || { cat "$work/out"; exit 1; }
 
 "$hapticd" tunnel "$address" --port 0 --fingerprint "$fingerprint" --token-file "$work/token" >"$work/tunnel" 2>&1 &
 tunnel=$!

@@ -88,6 +88,8 @@ TEST(Client, WrongNamesAreQuoted) {
   EXPECT_THAT(textOf<std::invalid_argument>([] { Client("Phantom@"); }), HasSubstr("expected host"));
   EXPECT_THAT(textOf<std::invalid_argument>([] { Client("Phantom@host:70000"); }), HasSubstr("\"70000\""));
   EXPECT_THAT(textOf<std::invalid_argument>([] { Client("Phantom@tcp://host:0"); }), HasSubstr("1 to 65535"));
+  EXPECT_THAT(textOf<std::invalid_argument>([] { Client("Phantom@tcp://[::1]:3883"); }), HasSubstr("IPv6"));
+  EXPECT_THAT(textOf<std::invalid_argument>([] { Client("Phantom@::1"); }), HasSubstr("IPv6"));
   EXPECT_THAT(textOf<ConnectError>([] { Client("Phantom@nowhere.invalid"); }), HasSubstr("nowhere.invalid"));
 }
 

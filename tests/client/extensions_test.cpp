@@ -300,6 +300,25 @@ TEST(Extensions, MarkersAndNamesAreSent) {
   EXPECT_TRUE(is(received[1], wire::SetObjectName{2, "part.stl"}));
 }
 
+TEST(Extensions, TextsThatTheWireWouldCutAreRefused) {
+  ScriptedServer server(able());
+  Client client(server.tcpName());
+  EXPECT_THAT(textOf<std::invalid_argument>([&] { client.mark(std::string(256, 'm')); }), HasSubstr("255"));
+  EXPECT_THAT(textOf<std::invalid_argument>([&] { client.setObjectName(0, std::string(65, 'n')); }),
+              HasSubstr("64"));
+  EXPECT_THAT(textOf<std::invalid_argument>([&] { client.sendText(std::string(1024, 't')); }),
+              HasSubstr("1023"));
+  EXPECT_THAT(textOf<std::invalid_argument>([&] { client.setSurfaceProperty(0, std::string(21, 's'), 1); }),
+              HasSubstr("20"));
+  client.mark(std::string(255, 'm'));
+  client.setObjectName(0, std::string(64, 'n'));
+  client.flushAll();
+  const auto received = server.waitReceived(2);
+  ASSERT_EQ(received.size(), 2U);
+  EXPECT_TRUE(is(received[0], wire::Marker{0, std::string(255, 'm')}));
+  EXPECT_TRUE(is(received[1], wire::SetObjectName{0, std::string_view(std::string(64, 'n'))}));
+}
+
 TEST(Extensions, AStopOvertakesABatchAndNeedsAConnection) {
   ScriptedServer server(able());
   Client client(server.tcpName());

@@ -195,6 +195,37 @@ TEST_F(MeshFiles, GlbNodesPlaceAndMirrorTheirMeshes) {
   EXPECT_NEAR(volume(two), 16, 1e-5) << "also the mirrored one has its fronts outside";
 }
 
+std::string cubeObj() {
+  std::string obj;
+  for (const Vec3f& v : kCorners)
+    obj += "v " + std::to_string(v.x()) + " " + std::to_string(v.y()) + " " + std::to_string(v.z()) + "\n";
+  for (const auto& q : kQuads) {
+    obj += "f";
+    for (const int c : q) obj += " " + std::to_string(c + 1);
+    obj += "\n";
+  }
+  return obj;
+}
+
+// The first vertex, which a reader that skips the line would miss.
+TEST_F(MeshFiles, AByteOrderMarkBeforeTheText) {
+  expectUnitCube(loadMesh(write("mark.obj", "\xEF\xBB\xBF" + cubeObj())));
+}
+
+TEST_F(MeshFiles, BytesAfterTheLastTriangleOfABinaryStl) {
+  std::string binary(80, ' ');
+  binary += bytes<std::uint32_t>({1}) + bytes<float>({0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0}) +
+            bytes<std::uint16_t>({0});
+  EXPECT_EQ(loadMesh(write("padded.stl", binary + std::string(7, '\0'))).triangles.size(), 1U);
+}
+
+TEST_F(MeshFiles, AGltfWhoseBufferHasASpaceInItsName) {
+  write("my cube%.bin", gltfData());
+  expectUnitCube(loadMesh(write("cube.gltf", gltfJson(R"("uri":"my%20cube%25.bin",)", R"([{"mesh":0}])"))));
+  write("raw%20.bin", gltfData());
+  expectUnitCube(loadMesh(write("raw.gltf", gltfJson(R"("uri":"raw%20.bin",)", R"([{"mesh":0}])"))));
+}
+
 TEST_F(MeshFiles, ErrorsNameTheFileAndTheReason) {
   EXPECT_THAT(errorOf(directory_ / "none.obj"), AllOf(HasSubstr("none.obj"), HasSubstr("No such file")));
   EXPECT_THAT(errorOf(directory_), HasSubstr("not a regular file"));

@@ -1,7 +1,9 @@
 // A replay over the network: clients receive the recorded reports and cannot change the scene.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "record/recorded_file.h"
@@ -120,6 +122,14 @@ TEST_F(Replay, ClientsPauseAndSeek) {
   EXPECT_TRUE(showsAbout(0.2)) << "backwards";
   peer.send(wire::ReplayControl{.paused = 1, .speed = 0, .position = 0.8});
   EXPECT_TRUE(showsAbout(0.8)) << "forwards";
+  for (const double odd : {std::numeric_limits<double>::quiet_NaN(), -2.0})
+    peer.send(wire::ReplayControl{.paused = 0, .speed = odd, .position = -1});
+  EXPECT_TRUE(peer.until([&] {
+    const auto texts = peer.all<wire::Text>();
+    return std::count_if(texts.begin(), texts.end(), [](const wire::Text& text) {
+             return text.text.text.find("Replay_Control refused: speed") != std::string::npos;
+           }) == 2;
+  }));
   const std::uint64_t paused = peer.last<wire::TickReport>()->tick;
   peer.send(wire::ReplayControl{.paused = 0, .speed = 1, .position = -1});
   ASSERT_TRUE(peer.until([&] { return peer.last<wire::TickReport>()->tick > paused + 50; }));

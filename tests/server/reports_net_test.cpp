@@ -128,6 +128,15 @@ TEST_F(ReportsTest, AClientThatAsksForCapabilitiesGetsAllSensorsUnlessItChooses)
   EXPECT_EQ(other->count<wire::TrackerUnitToSensor>(), 1U);
 }
 
+TEST_F(ReportsTest, ARateChoosesNoKinds) {
+  const auto client = peer();
+  client->send(wire::TrackerSetUpdateRate{100});
+  client->send(wire::QueryCapabilities{});
+  ASSERT_TRUE(client->untilNext<wire::Capabilities>());
+  client->send(wire::TrackerRequestUnitToSensor{});
+  EXPECT_TRUE(client->until([&] { return client->count<wire::TrackerUnitToSensor>() == 3; }));
+}
+
 // Waits until these clients saw contact as channels and as this button, and then its end.
 void expectContactMirrored(ScriptedPeer& mirror, ScriptedPeer& hand, std::int32_t button) {
   ASSERT_TRUE(mirror.until([&] {

@@ -34,9 +34,12 @@ double readNumber(std::string_view text, std::size_t column, const TextLine& lin
 /// Throws HandFileError.
 std::string readText(const std::filesystem::path& file);
 
-/// Calls use(content, number) for each line that is not empty.
+/// Calls use(content, number) for each line that is not empty. A byte order mark before the text is no part
+/// of it.
 template <class Use>
 void forEachLine(std::string_view text, Use&& use) {
+  constexpr std::string_view kMark = "\xEF\xBB\xBF";
+  if (text.starts_with(kMark)) text.remove_prefix(kMark.size());
   for (std::size_t number = 1; !text.empty(); ++number) {
     const std::size_t end = text.find('\n');
     const std::string_view content = trimmed(text.substr(0, end));

@@ -39,11 +39,18 @@ void Outbox::choose(Session& session, const ReportChoice& choice) {
   sendPresentState(session);
 }
 
+void Outbox::setRate(Session& session, double rate_Hz) {
+  listener(session).choice.rate_Hz = rate_Hz;
+  sendPresentState(session);
+}
+
 void Outbox::extend(Session& session) {
-  if (listener(session).chosen) return;
-  ReportChoice choice = choiceOf(session.id());
-  choice.kinds |= wire::kReportHip | wire::kReportContactPoint;
-  choose(session, choice);
+  Listener& entry = listener(session);
+  constexpr std::uint32_t kSensors = wire::kReportHip | wire::kReportContactPoint;
+  if (entry.chosen || (entry.choice.kinds & kSensors) == kSensors) return;
+  entry.choice.kinds |= kSensors;
+  entry.choice = withMirrors(config_, entry.choice);
+  sendPresentState(session);
 }
 
 void Outbox::clientGone(scene::ClientId client) {

@@ -25,6 +25,8 @@ class Outbox {
   /// The subscription of the client, the same for all names; the default until choose().
   ReportChoice choiceOf(scene::ClientId client) const;
   void choose(Session& session, const ReportChoice& choice);
+  /// The kinds stay as they are.
+  void setRate(Session& session, double rate_Hz);
   /// The client knows the extensions: unless it chooses, it gets all tracker sensors.
   void extend(Session& session);
   void clientGone(scene::ClientId client);
@@ -54,7 +56,7 @@ class Outbox {
   };
   struct Listener {
     ReportChoice choice;
-    bool chosen = false;    // by choose() or extend()
+    bool chosen = false;    // by choose()
     std::size_t names = 0;  // Session::namesWanted() when the groups were chosen
     std::vector<Member> groups;
   };

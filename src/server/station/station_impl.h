@@ -35,8 +35,9 @@ struct Station::Impl {
   void onPublished(const std::shared_ptr<const scene::SceneSnapshot>& snapshot);
   bool takeTicks(const WallClock& wallClock);
   void serveFirst(const Sessions& clients);
-  void choose(Session& session, wire::LocalSender name, ReportChoice choice, double rate_Hz,
-              std::string_view call);
+  /// The rate that a client gets; none, with a text to it, when it asks for one that is no rate.
+  std::optional<double> chosenRate(const Request& request, double wanted_Hz, double present_Hz,
+                                   std::string_view call);
 
   // Handlers of control messages; a refusal is sent as a text.
   void on(const Request& request, const wire::Ping&);

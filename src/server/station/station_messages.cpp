@@ -103,31 +103,36 @@ void Station::Impl::on(const Request& request, const wire::TrackerRequestWorkspa
 }
 
 void Station::Impl::on(const Request& request, const wire::TrackerSetUpdateRate& wanted) {
-  choose(request.session, request.name, outbox.choiceOf(request.session.id()), wanted.rate,
-         "set_update_rate");
+  const double present_Hz = outbox.choiceOf(request.session.id()).rate_Hz;
+  if (const auto rate_Hz = chosenRate(request, wanted.rate, present_Hz, "set_update_rate"))
+    outbox.setRate(request.session, *rate_Hz);
 }
 
 void Station::Impl::on(const Request& request, const wire::Subscribe& wanted) {
   ReportChoice choice = outbox.choiceOf(request.session.id());
   choice.kinds = wanted.kinds & wire::kReportAll;
-  choose(request.session, request.name, choice, wanted.rate, "Subscribe");
+  const auto rate_Hz = chosenRate(request, wanted.rate, choice.rate_Hz, "Subscribe");
+  if (!rate_Hz) return;
+  choice.rate_Hz = *rate_Hz;
+  outbox.choose(request.session, choice);
 }
 
-void Station::Impl::choose(Session& session, wire::LocalSender name, ReportChoice choice, double rate_Hz,
-                           std::string_view call) {
-  if (!std::isfinite(rate_Hz) || rate_Hz < 0) {
-    sendText(session, name, wire::kTextError,
-             fmt::format("{}: rate {} Hz refused: use 0 to keep the rate or a positive rate", call, rate_Hz));
-    return;
+std::optional<double> Station::Impl::chosenRate(const Request& request, double wanted_Hz, double present_Hz,
+                                                std::string_view call) {
+  if (!std::isfinite(wanted_Hz) || wanted_Hz < 0) {
+    sendText(
+        request.session, request.name, wire::kTextError,
+        fmt::format("{}: rate {} Hz refused: use 0 to keep the rate or a positive rate", call, wanted_Hz));
+    return std::nullopt;
   }
+  if (wanted_Hz == 0) return present_Hz;
   constexpr double kSlowest_Hz = 0.01;
-  if (rate_Hz > 0 && rate_Hz < kSlowest_Hz) {
-    sendText(session, name, wire::kTextWarning,
-             fmt::format("{}: rate {} Hz is below the slowest, {} Hz, which is used instead", call, rate_Hz,
+  if (wanted_Hz < kSlowest_Hz) {
+    sendText(request.session, request.name, wire::kTextWarning,
+             fmt::format("{}: rate {} Hz is below the slowest, {} Hz, which is used instead", call, wanted_Hz,
                          kSlowest_Hz));
   }
-  if (rate_Hz > 0) choice.rate_Hz = std::clamp(rate_Hz, kSlowest_Hz, config.servoRate_Hz);
-  outbox.choose(session, choice);
+  return std::clamp(wanted_Hz, kSlowest_Hz, config.servoRate_Hz);
 }
 
 // The pose of the proxy becomes the origin of the tracker reports.

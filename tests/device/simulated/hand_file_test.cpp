@@ -35,6 +35,15 @@ TEST(HandFile, InterpolatesPositionsBetweenRows) {
   EXPECT_EQ(middle.buttons, 0U);
 }
 
+TEST(HandFile, MayBeginWithAByteOrderMark) {
+  EXPECT_EQ(HandFile::parse("\xEF\xBB\xBFt_s,x_m,y_m,z_m\n0,1,2,3\n", "h")->at(0).position_m, Vec3(1, 2, 3));
+  EXPECT_EQ(HandFile::parse("\xEF\xBB\xBF"
+                            "0,1,2,3\n1,4,5,6\n",
+                            "h")
+                ->rows(),
+            2U);
+}
+
 TEST(HandFile, RestsBeforeTheFirstAndAfterTheLastRow) {
   const auto hand = HandFile::parse("0.01,1,2,3\n0.02,4,5,6", "h");
   EXPECT_EQ(hand->at(0).position_m, Vec3(1, 2, 3));
