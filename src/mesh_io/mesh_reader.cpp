@@ -8,9 +8,7 @@
 
 #include <algorithm>
 #include <array>
-#include <assimp/IOStream.hpp>
 #include <assimp/Importer.hpp>
-#include <charconv>
 #include <memory>
 #include <new>
 #include <stdexcept>
@@ -18,6 +16,8 @@
 #include <utility>
 
 #include "geometry/weld.h"
+#include "mesh_io/assimp_gaps.h"
+#include "mesh_io/ply_file.h"
 
 namespace hapticd::mesh_io {
 namespace {
@@ -35,80 +35,18 @@ std::string formatOf(const std::filesystem::path& file) {
   return extension;
 }
 
-// A part of another stream, which it owns.
-class StreamPart final : public Assimp::IOStream {
- public:
-  StreamPart(Assimp::IOStream* whole, std::size_t begin, std::size_t size)
-      : whole_(whole), begin_(begin), size_(size) {
-    whole_->Seek(begin, aiOrigin_SET);
-  }
-
-  std::size_t Read(void* out, std::size_t size, std::size_t count) override {
-    return size == 0 ? 0 : whole_->Read(out, size, std::min(count, (size_ - Tell()) / size));
-  }
-  std::size_t Write(const void*, std::size_t, std::size_t) override { return 0; }
-  aiReturn Seek(std::size_t offset, aiOrigin origin) override {
-    const std::size_t from = origin == aiOrigin_SET ? 0 : origin == aiOrigin_CUR ? Tell() : size_;
-    const std::size_t to = from + offset;  // an offset back wraps around
-    return to > size_ ? aiReturn_FAILURE : whole_->Seek(begin_ + to, aiOrigin_SET);
-  }
-  std::size_t Tell() const override { return whole_->Tell() - begin_; }
-  std::size_t FileSize() const override { return size_; }
-  void Flush() override {}
-
- private:
-  const std::unique_ptr<Assimp::IOStream> whole_;
-  const std::size_t begin_;
-  const std::size_t size_;
-};
-
-// Without what Assimp does not expect and other programs write: a byte order mark before a text, and bytes
-// after the last triangle of a binary STL. A text is never taken for one: its characters would be a number of
-// triangles that needs gigabytes.
-std::unique_ptr<Assimp::IOStream> withoutSurplus(std::unique_ptr<Assimp::IOStream> file,
-                                                 const std::string& format) {
-  constexpr std::size_t kStlHeader = 84;
-  constexpr std::size_t kStlTriangle = 50;
-  const std::size_t size = file->FileSize();
-  std::array<unsigned char, kStlHeader> head{};
-  const std::size_t known = file->Read(head.data(), 1, head.size());
-  file->Seek(0, aiOrigin_SET);
-  constexpr std::size_t kMark = 3;
-  if (known >= kMark && head[0] == 0xEF && head[1] == 0xBB && head[2] == 0xBF)
-    return std::make_unique<StreamPart>(file.release(), kMark, size - kMark);
-  if (format != "stl" || known < kStlHeader) return file;
-  std::size_t triangles = 0;
-  for (std::size_t i = kStlHeader; i > kStlHeader - 4; --i) triangles = triangles << 8U | head[i - 1];
-  const std::size_t end = kStlHeader + kStlTriangle * triangles;
-  if (triangles == 0 || end >= size) return file;
-  return std::make_unique<StreamPart>(file.release(), 0, end);
-}
-
-// The bytes that a URI means: %20 is a space.
-std::string decoded(std::string_view uri) {
-  std::string text;
-  for (std::size_t i = 0; i < uri.size(); ++i) {
-    unsigned char value = 0;
-    const bool hex = uri[i] == '%' && i + 2 < uri.size() &&
-                     std::from_chars(&uri[i + 1], &uri[i + 1] + 2, value, 16).ptr == &uri[i + 1] + 2;
-    text += hex ? static_cast<char>(value) : uri[i];
-    if (hex) i += 2;
-  }
-  return text;
-}
-
 // Materials, textures and files of other folders do not exist.
 class OnlyGeometry final : public Assimp::DefaultIOSystem {
  public:
   explicit OnlyGeometry(const std::filesystem::path& file)
       : file_(std::filesystem::canonical(file)), format_(formatOf(file)) {}
 
-  bool Exists(const char* name) const override { return allowed(name) || allowed(decoded(name)); }
+  bool Exists(const char* name) const override { return allowed(name) || allowed(decodedUri(name)); }
   Assimp::IOStream* Open(const char* name, const char* mode) override {
-    const std::string path = allowed(name) ? name : decoded(name);
+    const std::string path = allowed(name) ? name : decodedUri(name);
     if (!allowed(path)) return nullptr;
     std::unique_ptr<Assimp::IOStream> file(DefaultIOSystem::Open(path.c_str(), mode));
-    return file ? withoutSurplus(std::move(file), format_).release() : nullptr;
+    return file ? asAssimpReadsIt(std::move(file), format_).release() : nullptr;
   }
 
  private:
@@ -123,15 +61,58 @@ class OnlyGeometry final : public Assimp::DefaultIOSystem {
   const std::string format_;
 };
 
+// Assimp's own reader of PLY crashes, and loses or invents triangles. Polygons are for Assimp to divide.
+class PlyImporter final : public Assimp::BaseImporter {
+ public:
+  bool CanRead(const std::string&, Assimp::IOSystem*, bool) const override { return true; }
+
+ protected:
+  const aiImporterDesc* GetInfo() const override {
+    static const aiImporterDesc info{"PLY", "", "", "", 0, 0, 0, 0, 0, "ply"};
+    return &info;
+  }
+  void InternReadFile(const std::string& name, aiScene* scene, Assimp::IOSystem* files) override {
+    const std::unique_ptr<Assimp::IOStream> file(files->Open(name));
+    if (!file) throw std::runtime_error("it cannot be read");
+    std::string bytes(file->FileSize(), '\0');
+    bytes.resize(file->Read(bytes.data(), 1, bytes.size()));
+    const PlyMesh ply = parsePly(bytes);
+    auto mesh = std::make_unique<aiMesh>();
+    mesh->mNumVertices = static_cast<unsigned>(ply.vertices.size());
+    mesh->mVertices = new aiVector3D[ply.vertices.size()];
+    for (std::size_t i = 0; i < ply.vertices.size(); ++i)
+      mesh->mVertices[i] = {ply.vertices[i].x(), ply.vertices[i].y(), ply.vertices[i].z()};
+    mesh->mFaces = new aiFace[ply.sizes.size()];
+    mesh->mNumFaces = static_cast<unsigned>(ply.sizes.size());
+    const std::uint32_t* corner = ply.corners.data();
+    for (std::size_t i = 0; i < ply.sizes.size(); ++i) {
+      aiFace& face = mesh->mFaces[i];
+      face.mIndices = new unsigned[ply.sizes[i]];
+      face.mNumIndices = ply.sizes[i];
+      std::copy_n(corner, ply.sizes[i], face.mIndices);
+      corner += ply.sizes[i];
+    }
+    if (ply.sizes.empty()) throw std::runtime_error("it holds no triangles");
+    scene->mRootNode = new aiNode;
+    scene->mRootNode->mMeshes = new unsigned[1]{0};
+    scene->mRootNode->mNumMeshes = 1;
+    scene->mMeshes = new aiMesh* [1] { mesh.release() };
+    scene->mNumMeshes = 1;
+    scene->mMaterials = new aiMaterial* [1] { new aiMaterial };
+    scene->mNumMaterials = 1;
+  }
+};
+
 // Assimp tries readers by content, too; those of other formats are removed.
 void keepOnly(Assimp::Importer& importer, const std::string& format) {
   for (std::size_t i = importer.GetImporterCount(); i-- > 0;) {
     Assimp::BaseImporter* reader = importer.GetImporter(i);
     const std::string extensions = ' ' + std::string(importer.GetImporterInfo(i)->mFileExtensions) + ' ';
-    if (extensions.find(' ' + format + ' ') != std::string::npos) continue;
+    if (format != "ply" && extensions.find(' ' + format + ' ') != std::string::npos) continue;
     importer.UnregisterLoader(reader);
     delete reader;
   }
+  if (format == "ply") importer.RegisterLoader(new PlyImporter);
 }
 
 void append(TriangleMesh& all, const aiMesh& part, const aiMatrix4x4& T_file_node) {
@@ -180,8 +161,10 @@ bool isSupported(const std::filesystem::path& file) {
 }
 
 TriangleMesh readMesh(const std::filesystem::path& file) {
+  const std::string format = formatOf(file);
+  if (format == "gltf" || format == "glb") refuseUnknownMeshes(file, format);
   Assimp::Importer importer;
-  keepOnly(importer, formatOf(file));
+  keepOnly(importer, format);
   importer.SetIOHandler(new OnlyGeometry(file));  // which the importer deletes
   // Only positions matter; points and lines go.
   importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS,

@@ -219,6 +219,38 @@ TEST_F(MeshFiles, BytesAfterTheLastTriangleOfABinaryStl) {
   EXPECT_EQ(loadMesh(write("padded.stl", binary + std::string(7, '\0'))).triangles.size(), 1U);
 }
 
+TEST_F(MeshFiles, ObjWithIndentedLinesCommentsAndContinuedOnes) {
+  std::string obj = cubeObj();
+  for (std::size_t at = obj.find("\nf"); at != std::string::npos; at = obj.find("\nf", at + 3))
+    obj.replace(at, 2, " # 1 2\n \tf");
+  const std::size_t last = obj.rfind(' ');
+  obj.insert(last, " \\\r\n  ");
+  expectUnitCube(loadMesh(write("indented.obj", "  # part\n   " + obj)));
+}
+
+TEST_F(MeshFiles, StlInUpperCase) {
+  EXPECT_EQ(loadMesh(write("upper.stl",
+                           "SOLID PART OF A MACHINE\nFACET NORMAL 0 0 1\nOUTER LOOP\nVERTEX 0 0 0\n"
+                           "VERTEX 1.0E+00 0 0\nVERTEX 0 1 0\nENDLOOP\nENDFACET\nENDSOLID\n"))
+                .triangles.size(),
+            1U);
+}
+
+TEST_F(MeshFiles, AGltfThatRequiresUnknownMeshesIsRefused) {
+  const auto requiring = [](std::string json, const std::string& names) {
+    return json.insert(json.find('{') + 1, R"("extensionsRequired" : [ )" + names + " ],");
+  };
+  const std::string json = gltfJson("", R"([{"mesh":0}])");
+  EXPECT_THAT(errorOf(write("whole_numbers.glb",
+                            glb(requiring(json, R"("KHR_texture_basisu", "KHR_mesh_quantization")")))),
+              HasSubstr("KHR_mesh_quantization"));
+  write("cube.bin", gltfData());
+  EXPECT_THAT(errorOf(write("packed.gltf", requiring(gltfJson(R"("uri":"cube.bin",)", R"([{"mesh":0}])"),
+                                                     R"("EXT_meshopt_compression")"))),
+              HasSubstr("EXT_meshopt_compression"));
+  expectUnitCube(loadMesh(write("textures.glb", glb(requiring(json, R"("KHR_texture_basisu")")))));
+}
+
 TEST_F(MeshFiles, AGltfWhoseBufferHasASpaceInItsName) {
   write("my cube%.bin", gltfData());
   expectUnitCube(loadMesh(write("cube.gltf", gltfJson(R"("uri":"my%20cube%25.bin",)", R"([{"mesh":0}])"))));
@@ -377,16 +409,16 @@ TEST_F(MeshFiles, AFileThatTakesForEverIsAnError) {
 
 #ifndef HAPTICD_SANITIZED  // sanitizers map more than any limit
 TEST_F(MeshFiles, AFileThatTakesAllMemoryIsAnError) {
+  constexpr std::uint32_t kTriangles = 10'000'000;
   const std::filesystem::path file =
-      write("faces.ply",
-            "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
-            "property float z\nelement face 200000000\nproperty list uchar int vertex_indices\nend_header\n" +
-                bytes<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}));
+      write("large.stl", std::string(80, ' ') + bytes<std::uint32_t>({kTriangles}));
+  std::filesystem::resize_file(file,
+                               84 + std::uintmax_t{50} * kTriangles);  // a hole takes no room on the disk
   try {
     loadMesh(file, {.memory_bytes = 256U << 20U});
     ADD_FAILURE() << "it was read";
   } catch (const MeshError& error) {
-    EXPECT_THAT(error.what(), AllOf(HasSubstr("faces.ply"), HasSubstr("more than 256 MiB of memory")));
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("large.stl"), HasSubstr("more than 256 MiB of memory")));
   }
 }
 #endif

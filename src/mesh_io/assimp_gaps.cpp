@@ -1,0 +1,147 @@
+#include "mesh_io/assimp_gaps.h"
+
+#include <algorithm>
+#include <assimp/IOStream.hpp>
+#include <charconv>
+#include <fstream>
+#include <limits>
+#include <span>
+#include <stdexcept>
+#include <utility>
+
+namespace hapticd::mesh_io {
+namespace {
+
+// What is changed in the bytes of a file; no change moves them.
+enum class Edit { none, lowerCase, objLines };
+
+// A part of another stream, which it owns.
+class StreamPart final : public Assimp::IOStream {
+ public:
+  StreamPart(std::unique_ptr<Assimp::IOStream> whole, std::size_t begin, std::size_t size, Edit edit)
+      : whole_(std::move(whole)), begin_(begin), size_(size), edit_(edit) {
+    whole_->Seek(begin, aiOrigin_SET);
+  }
+
+  std::size_t Read(void* out, std::size_t size, std::size_t count) override {
+    if (size == 0) return 0;
+    const std::size_t read = whole_->Read(out, size, std::min(count, (size_ - Tell()) / size));
+    for (char& c : std::span(static_cast<char*>(out), read * size)) c = edited(c);
+    return read;
+  }
+  std::size_t Write(const void*, std::size_t, std::size_t) override { return 0; }
+  aiReturn Seek(std::size_t offset, aiOrigin origin) override {
+    const std::size_t from = origin == aiOrigin_SET ? 0 : origin == aiOrigin_CUR ? Tell() : size_;
+    const std::size_t to = from + offset;  // an offset back wraps around
+    first_ = last_ = '\n';
+    comment_ = false;
+    return to > size_ ? aiReturn_FAILURE : whole_->Seek(begin_ + to, aiOrigin_SET);
+  }
+  std::size_t Tell() const override { return whole_->Tell() - begin_; }
+  std::size_t FileSize() const override { return size_; }
+  void Flush() override {}
+
+ private:
+  char edited(char c) {
+    if (edit_ == Edit::lowerCase) return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    if (edit_ == Edit::none || c == '\r') return c;
+    // An indented line begins anew, and a comment behind numbers is blank.
+    if (c == '\n') {
+      if (last_ != '\\') first_ = '\n';
+      comment_ = false;
+    } else if (first_ == '\n') {
+      if (c == ' ' || c == '\t') return '\n';
+      first_ = c;
+    } else if (c == '#' && (first_ == 'v' || first_ == 'f')) {
+      comment_ = true;
+    }
+    last_ = c;
+    return comment_ ? ' ' : c;
+  }
+
+  const std::unique_ptr<Assimp::IOStream> whole_;
+  const std::size_t begin_;
+  const std::size_t size_;
+  const Edit edit_;
+  char first_ = '\n';  // of the line; a line that goes on after a backslash is one
+  char last_ = '\n';
+  bool comment_ = false;
+};
+
+// At most so many bytes from there on.
+std::string readPart(const std::filesystem::path& file, std::size_t from, std::size_t most) {
+  std::ifstream in(file, std::ios::binary);
+  in.seekg(static_cast<std::streamoff>(from));
+  std::string text(std::min<std::uintmax_t>(most, std::filesystem::file_size(file)), '\0');
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  return text;
+}
+
+}  // namespace
+
+// Assimp takes whole numbers for the bits of floats where an extension says that they are none.
+void refuseUnknownMeshes(const std::filesystem::path& file, const std::string& format) {
+  constexpr std::size_t kGlbHeader = 20;
+  const bool binary = format == "glb";
+  std::size_t size = std::numeric_limits<std::size_t>::max();
+  if (binary) {
+    const std::string header = readPart(file, 0, kGlbHeader);
+    size = 0;
+    for (std::size_t i = 16; i > 12 && header.size() == kGlbHeader; --i)
+      size = size << 8U | static_cast<unsigned char>(header[i - 1]);
+  }
+  const std::string json = readPart(file, binary ? kGlbHeader : 0, size);
+  const std::size_t list = json.find("\"extensionsRequired\"");
+  if (list == std::string::npos) return;
+  std::string_view names = std::string_view(json).substr(list);
+  names = names.substr(0, names.find(']'));
+  names.remove_prefix(std::min(names.size(), names.find('[')));
+  for (std::size_t open = names.find('"'); open != std::string_view::npos; open = names.find('"')) {
+    names.remove_prefix(open + 1);
+    const std::string_view name = names.substr(0, names.find('"'));
+    names.remove_prefix(std::min(names.size(), name.size() + 1));
+    if (name.find("mesh") != std::string_view::npos && name != "KHR_draco_mesh_compression")
+      throw std::runtime_error("it requires the extension " + std::string(name) +
+                               ", which is not supported: save it without");
+  }
+}
+
+// A text is never taken for a binary STL: its characters would be a number of triangles that needs gigabytes.
+std::unique_ptr<Assimp::IOStream> asAssimpReadsIt(std::unique_ptr<Assimp::IOStream> file,
+                                                  const std::string& format) {
+  constexpr std::string_view kMark = "\xEF\xBB\xBF";
+  constexpr std::size_t kStlHeader = 84;
+  constexpr std::size_t kStlTriangle = 50;
+  std::string head(kStlHeader, '\0');
+  head.resize(file->Read(head.data(), 1, head.size()));
+  file->Seek(0, aiOrigin_SET);
+  const std::size_t begin = head.starts_with(kMark) ? kMark.size() : 0;
+  std::size_t end = file->FileSize();
+  Edit edit = format == "obj" ? Edit::objLines : Edit::none;
+  if (format == "stl" && head.size() == kStlHeader) {
+    std::size_t triangles = 0;
+    for (std::size_t i = kStlHeader; i > kStlHeader - 4; --i)
+      triangles = triangles << 8U | static_cast<unsigned char>(head[i - 1]);
+    if (triangles > 0 && kStlHeader + kStlTriangle * triangles <= end) {
+      end = kStlHeader + kStlTriangle * triangles;
+    } else if (head.find("SOLID") == begin) {
+      edit = Edit::lowerCase;
+    }
+  }
+  return std::make_unique<StreamPart>(std::move(file), begin, end - begin, edit);
+}
+
+std::string decodedUri(std::string_view uri) {
+  std::string text;
+  for (std::size_t i = 0; i < uri.size(); ++i) {
+    unsigned char value = 0;
+    const bool hex = uri[i] == '%' && i + 2 < uri.size() &&
+                     std::from_chars(&uri[i + 1], &uri[i + 1] + 2, value, 16).ptr == &uri[i + 1] + 2;
+    text += hex ? static_cast<char>(value) : uri[i];
+    if (hex) i += 2;
+  }
+  return text;
+}
+
+}  // namespace hapticd::mesh_io

@@ -1,0 +1,24 @@
+// What other programs write and Assimp does not read, or reads as something else.
+#pragma once
+
+#include <assimp/IOStream.hpp>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace hapticd::mesh_io {
+
+/// Throws std::runtime_error for a glTF file that requires an extension of meshes which Assimp ignores.
+/// `format`: gltf or glb.
+void refuseUnknownMeshes(const std::filesystem::path& file, const std::string& format);
+
+/// The file without a byte order mark before its text, without bytes after the last triangle of a binary STL,
+/// without indentation and comments behind numbers in OBJ, and in lower case where an STL is in upper case.
+std::unique_ptr<Assimp::IOStream> asAssimpReadsIt(std::unique_ptr<Assimp::IOStream> file,
+                                                  const std::string& format);
+
+/// The bytes that a URI means: %20 is a space.
+std::string decodedUri(std::string_view uri);
+
+}  // namespace hapticd::mesh_io
