@@ -117,13 +117,13 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
                 c.index, ", at most ", config_.limits.effects, " effects");
     return;
   }
-  asked_.keep(c, call.client, c.index);
   const Effect effect = effectFrom(*kind, c, config_, bound_, call);
   Owned<RunningEffect>& entry = effects_[c.index];
   // An effect whose owner left ramps out until it is started again.
   if (entry.value.effect.releasing) entry.value.running = false;
   const std::uint32_t started = entry.value.effect.start;
   entry.value.effect = effect;
+  entry.value.asked = c;
   entry.value.effect.owner = ownerOf(call.client);
   entry.value.effect.start = started;
   entry.owner = call.client;

@@ -82,7 +82,7 @@ void FreeForces::appendCommands(Nanos now, std::vector<ClientCommand>& out) cons
   };
   for (const auto& [index, entry] : effects_) {
     if (entry.value.effect.releasing) continue;
-    add(entry.owner, asked_.find<DefineEffect>(index));
+    add(entry.owner, &entry.value.asked);
     if (entry.value.running) out.push_back({entry.owner, StartEffect{index}});
   }
   for (const auto& [index, entry] : waitingStarts_) out.push_back({entry.owner, StartEffect{index}});

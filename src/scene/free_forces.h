@@ -41,6 +41,7 @@ struct OwnedForce {
 
 struct RunningEffect {
   Effect effect;
+  DefineEffect asked;  ///< what defined it
   bool running = false;
   Nanos startedAt = 0;
 };
@@ -119,7 +120,7 @@ class FreeForces {
   std::optional<Owned<Buzz>> buzz_;
   std::uint32_t starts_ = 0;      // one counter for all: no number is used twice
   std::uint32_t placements_ = 0;  // the same for planes
-  LastCommands asked_;            // also of forces that are gone
+  LastCommands asked_;            // of all but effects, also of forces that are gone
   LastCommands askedOfConstraint_;
   bool changed_ = false;
 };

@@ -88,6 +88,7 @@ void ObjectTable::handle(SetVertices& c, const Call& call) {
   if (object == nullptr || c.positions.empty()) return;
   const std::size_t before = object->mesh.vertexCount();
   const std::size_t trianglesBefore = object->mesh.triangleCount();
+  const std::size_t gap = object->gap;
   if (!hasRoom(*object, c.first, c.positions.size(), before, config_.limits.verticesPerObject,
                config_.limits.verticesInAll, vertices_, kName, "vertex", call)) {
     return;
@@ -98,6 +99,7 @@ void ObjectTable::handle(SetVertices& c, const Call& call) {
     call.refuse(kName, "refused: a coordinate is not finite or too large; the vertex stays as it was",
                 " object ", c.object, ", ", refused, " of the vertices from ", c.first, " on");
   }
+  if (object->mesh.vertexCount() == before && object->gap > gap) closeGap(*object, object->gap - gap);
   vertices_ += object->mesh.vertexCount() - before;
   triangles_ += object->mesh.triangleCount() - trianglesBefore;
   meshEdited(*object, call);
@@ -109,10 +111,6 @@ void ObjectTable::handle(SetTriangles& c, const Call& call) {
   Object* object = find(c.object, kName, call);
   if (object == nullptr || c.triangles.empty()) return;
   const std::size_t before = object->mesh.triangleCount();
-  if (!hasRoom(*object, c.first, c.triangles.size(), before, config_.limits.trianglesPerObject,
-               config_.limits.trianglesInAll, triangles_, kName, "triangle", call)) {
-    return;
-  }
   const auto outside = std::find_if(c.triangles.begin(), c.triangles.end(), [this](const Triangle& t) {
     return *std::max_element(t.begin(), t.end()) >= config_.limits.verticesPerObject;
   });
@@ -121,6 +119,10 @@ void ObjectTable::handle(SetTriangles& c, const Call& call) {
                 c.first + (outside - c.triangles.begin()), ", vertices ",
                 static_cast<std::int32_t>((*outside)[0]), " ", static_cast<std::int32_t>((*outside)[1]), " ",
                 static_cast<std::int32_t>((*outside)[2]));
+    return;
+  }
+  if (!hasRoom(*object, c.first, c.triangles.size(), before, config_.limits.trianglesPerObject,
+               config_.limits.trianglesInAll, triangles_, kName, "triangle", call)) {
     return;
   }
   if (c.makesMetres) becomeStock(*object);

@@ -683,20 +683,29 @@ void Server::onSceneMessage(Session& session, Station& station, const wire::Mess
   if (!station.scene().take(session.id(), message, error)) session.refuse("malformed message: " + error);
 }
 
+bool Server::isPermitted(Session& session, Station& station, wire::MessageKind kind, std::string& reason) {
+  if (kind == wire::kindOf<wire::StopForces>) return true;
+  if (!admission_.mayOnlyStop(session))
+    return !wire::needsControl(kind) || station.mayCommand(session.commander(), kind, reason);
+  // A client library asks first whether the server knows a stop.
+  for (const wire::MessageKind free :
+       {wire::kindOf<wire::Ping>, wire::kindOf<wire::Heartbeat>, wire::kindOf<wire::QueryCapabilities>,
+        wire::kindOf<wire::RearmForces>})
+    if (kind == free) return true;
+  reason = "the server is full: this connection may only stop and re-arm forces";
+  return false;
+}
+
+// A batch is whole: what its client may do when it begins holds until its commit.
 bool Server::mayCommand(Session& session, Station& station, const wire::MessageReceived& message) {
-  std::string reason;
-  if (message.kind == wire::kindOf<wire::StopForces>) return true;
-  if (admission_.mayOnlyStop(session)) {
-    // A client library asks first whether the server knows a stop.
-    for (const wire::MessageKind kind :
-         {wire::kindOf<wire::Ping>, wire::kindOf<wire::Heartbeat>, wire::kindOf<wire::QueryCapabilities>,
-          wire::kindOf<wire::RearmForces>})
-      if (message.kind == kind) return true;
-    reason = "the server is full: this connection may only stop and re-arm forces";
-  } else if (!wire::needsControl(message.kind) ||
-             station.mayCommand(session.commander(), message.kind, reason)) {
-    return true;
-  }
+  SceneHost& scene = station.scene();
+  std::string reason = "it belongs to a batch that was refused";
+  const std::optional<bool> batch =
+      wire::role(message.kind) == wire::Role::scene ? scene.batchOf(session.id()) : std::nullopt;
+  const bool permitted = batch ? *batch : isPermitted(session, station, message.kind, reason);
+  if (message.kind == wire::kindOf<wire::BatchBegin>) scene.beginBatch(session.id(), permitted);
+  if (message.kind == wire::kindOf<wire::BatchCommit>) scene.endBatch(session.id());
+  if (permitted) return true;
   // Send one text for each read: a refused upload has thousands of messages.
   if (std::exchange(refusalSentTo_, session.id()) != session.id()) {
     session.send(message.local_sender,

@@ -3,6 +3,8 @@
 
 #include <set>
 
+#include <limits>
+
 #include "scene/mesh_draft.h"
 #include "scene_fixture.h"
 
@@ -220,6 +222,17 @@ TEST_F(Meshes, VerticesFarBeyondTheOthersShareABoundedNumberOfGaps) {
   say(SetVertices{2, 0, std::vector<Vec3f>(10'000, Vec3f::Zero())});
   say(SetVertices{2, 85'536, soup(1)});
   EXPECT_TRUE(notices_.empty()) << "a large mesh has room for a larger gap";
+}
+
+TEST_F(Meshes, WhatIsRefusedTakesNoGap) {
+  say(SetObjectNumber{3});
+  const Vec3f nowhere = Vec3f::Constant(std::numeric_limits<float>::quiet_NaN());
+  say(SetVertices{0, 999'999, {nowhere}});
+  EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("not finite"));
+  say(SetTriangles{1, 999'999, {{0, 1, 0x7FFFFFFF}}});
+  EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("no such vertex"));
+  say(SetVertices{2, 999'999, soup(1)});
+  EXPECT_TRUE(notices_.empty());
 }
 
 // As clients do that number from the end, or that reserve numbers.

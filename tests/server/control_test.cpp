@@ -164,6 +164,40 @@ TEST_F(ControlTest, OnlyTheFirstClientCommandsUntilItDisconnects) {
   }));
 }
 
+// A client that gets control in the middle of its batch does not get the rest of it.
+TEST_F(ControlTest, ABatchIsTakenOrRefusedAsAWhole) {
+  Config config = RunningServer::anyPort();
+  config.devices[0].control = server::Control::first;
+  serve(config);
+  auto first = peer();
+  const auto second = peer();
+  hold(*first, 0, 0, 0);
+  first->send(wire::SetObjectNumber{1});
+  first->send(wire::Ping{});
+  ASSERT_TRUE(first->untilNext<wire::Pong>());
+  second->send(wire::BatchBegin{});
+  ASSERT_TRUE(second->untilText("hapticd Batch_Begin refused: client"));
+  first->send(wire::ReleaseControl{});
+  first->send(wire::Ping{});
+  ASSERT_TRUE(first->untilNext<wire::Pong>());
+  second->send(kUp);
+  ASSERT_TRUE(second->untilText("Force_Field refused: it belongs to a batch that was refused"));
+  second->send(wire::BatchCommit{});
+  ASSERT_TRUE(second->untilText("Batch_Commit refused: it belongs to a batch that was refused"));
+  // The next one is its own, and keeps control until its commit.
+  second->send(wire::BatchBegin{});
+  second->send(kUp);
+  second->send(wire::ReleaseControl{});
+  ASSERT_TRUE(second->untilText("Release_Control refused: a batch is open"));
+  second->send(wire::BatchCommit{});
+  EXPECT_TRUE(untilForce(*first, 1));
+  second->send(wire::ReleaseControl{});
+  second->send(wire::Ping{});
+  ASSERT_TRUE(second->untilNext<wire::Pong>());
+  first->send(wire::ForceField{});
+  EXPECT_TRUE(untilForce(*first, 0));
+}
+
 TEST_F(ControlTest, OnlyASceneCommandTakesControl) {
   Config config = RunningServer::anyPort();
   config.devices[0].control = server::Control::first;
@@ -201,9 +235,9 @@ TEST_F(ControlTest, DevicesOfOneSceneShareItsControl) {
 
 // The frames of a message, as the client would send them by datagram.
 template <wire::WireMessage M>
-std::vector<std::byte> datagramOf(ScriptedPeer& peer, const M& message) {
+std::vector<std::byte> datagramOf(ScriptedPeer& peer, const M& message, wire::Time time = {1, 2}) {
   std::vector<std::byte> bytes;
-  peer.endpoint().send({1, 2}, peer.device(), wire::Message(message), wire::Reliability::kLowLatency);
+  peer.endpoint().send(time, peer.device(), wire::Message(message), wire::Reliability::kLowLatency);
   peer.endpoint().takeDatagrams(
       [&](wire::ByteView datagram) { bytes.assign(datagram.begin(), datagram.end()); });
   return bytes;
@@ -242,6 +276,23 @@ TEST_F(DatagramTest, CountFromTheSourceOfTheFirstOneOnly) {
   // After a late tick the force is on its ramp again.
   EXPECT_TRUE(untilForce(*client_, 1)) << "the stranger ended it";
   EXPECT_EQ(lastGuard(*client_).stopped, 0);
+}
+
+TEST_F(DatagramTest, DoNotOutliveTheResetThatOvertookThem) {
+  const auto sendAt = [&](wire::Time time, const auto& message) {
+    client_->endpoint().send(time, client_->device(), wire::Message(message), wire::Reliability::kReliable);
+    settle();
+  };
+  client_->sendDatagram(datagramOf(*client_, kUp, {100, 0}));
+  ASSERT_TRUE(untilForce(*client_, 1));
+  sendAt({100, 500'000}, wire::ResetScene{});
+  client_->sendDatagram(datagramOf(*client_, kUp, {100, 400'000}));
+  settle();
+  ASSERT_TRUE(untilTicks(*client_, 100));
+  EXPECT_TRUE(untilForce(*client_, 0));
+  // A clock that was set back a minute.
+  client_->sendDatagram(datagramOf(*client_, kUp, {40, 0}));
+  EXPECT_TRUE(untilForce(*client_, 1));
 }
 
 TEST_F(DatagramTest, CarryOnlyWhatStockClientsSendSo) {

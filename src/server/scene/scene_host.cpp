@@ -49,6 +49,7 @@ void SceneHost::releaseForces(scene::ClientId client) {
 }
 
 void SceneHost::clientGone(scene::ClientId client) {
+  endBatch(client);
   if (!thread_) return;
   flush(client);
   if (commandingClients_.count(client) != 0) owners_->leave(client, base::now());

@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -42,6 +43,13 @@ class SceneHost {
   /// Decodes a scene message and keeps its command until flush(). False, with the reason, when it is
   /// malformed.
   bool take(scene::ClientId client, const wire::MessageReceived& message, std::string& error);
+  /// Whether the open batch of the client was admitted when it began; none: it has no open batch.
+  std::optional<bool> batchOf(scene::ClientId client) const {
+    const auto open = batches_.find(client);
+    return open == batches_.end() ? std::nullopt : std::optional(open->second);
+  }
+  void beginBatch(scene::ClientId client, bool admitted) { batches_.try_emplace(client, admitted); }
+  void endBatch(scene::ClientId client) { batches_.erase(client); }
   /// Queues the commands that take() kept; all of them are from this client.
   void flush(scene::ClientId client);
   /// Whether the client is too far ahead of the scene: its session must hold back further commands.
@@ -79,6 +87,7 @@ class SceneHost {
   CommandDecoder decoder_;
   const std::shared_ptr<scene::ForceOwners> owners_ = std::make_shared<scene::ForceOwners>();
   std::set<scene::ClientId> commandingClients_;  // connected clients that have commanded the scene
+  std::map<scene::ClientId, bool> batches_;      // whether it was admitted; the builder has its content
 };
 
 }  // namespace hapticd::server

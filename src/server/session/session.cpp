@@ -290,8 +290,8 @@ void Session::onReceived(const wire::MessageReceived& message) {
   const wire::MessageInfo& info = wire::info(message.kind);
   if (inDatagram_ && (info.reliability != wire::Reliability::kLowLatency || info.role != wire::Role::scene))
     return;
-  if (inDatagram_) datagramCounts_ = true;
   if (isStale(message)) return;
+  if (inDatagram_) datagramCounts_ = true;
   const base::Nanos received = base::now();
   if (isOneTooMany(message.kind, received)) {
     refuse("more than " + std::to_string(mostPerSecond_) + " messages in a second; send fewer");
@@ -326,16 +326,22 @@ void Session::onHeartbeat(const wire::MessageReceived& message, base::Nanos rece
   }
 }
 
-// A client ends a force field or a plane by TCP. A datagram that it sent earlier may arrive later and must
-// not start it again.
+// A client ends a force field or a plane by TCP, or resets the scene. A datagram that it sent earlier may
+// arrive later and must not start it again. One that seems older by more than any travel tells of a clock
+// that was set.
 bool Session::isStale(const wire::MessageReceived& message) {
-  wire::Time& last = lastReliable_[static_cast<std::size_t>(message.kind)];
-  const auto before = [](const wire::Time& a, const wire::Time& b) {
-    return a.seconds != b.seconds ? a.seconds < b.seconds : a.microseconds < b.microseconds;
+  constexpr std::int64_t kLongestTravel_us = 10'000'000;
+  const auto microseconds = [](const wire::Time& time) {
+    return std::int64_t{time.seconds} * 1'000'000 + time.microseconds;
   };
-  if (inDatagram_) return before(message.time, last);
-  last = message.time;
-  return false;
+  wire::Time& last = lastReliable_[static_cast<std::size_t>(message.kind)];
+  if (!inDatagram_) {
+    last = message.time;
+    if (message.kind == wire::kindOf<wire::ResetScene>) lastReliable_.fill(message.time);
+    return false;
+  }
+  const std::int64_t older_us = microseconds(last) - microseconds(message.time);
+  return older_us > 0 && older_us <= kLongestTravel_us;
 }
 
 // The number of messages that fill meshes is bounded by the meshes, and their bytes by the queue.

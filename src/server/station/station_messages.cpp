@@ -188,6 +188,12 @@ void Station::Impl::rearm(Session& session, wire::LocalSender name, const Device
 }
 
 void Station::Impl::on(const Request& request, const wire::ReleaseControl&) {
+  // Its commit would change a scene that another client has.
+  if (scene.batchOf(request.session.id()) == true) {
+    sendText(request.session, request.name, wire::kTextError,
+             "Release_Control refused: a batch is open; commit it first");
+    return;
+  }
   roles->release(request.session.id());
 }
 

@@ -124,7 +124,11 @@ bool StreamedInput::begin(Stream& stream, scene::ClientId client, std::int64_t t
     }
     stream = {};
   }
-  if (stream.client && time != 0 && time < stream.newest) return false;
+  // The clock of a simulation that starts again begins anew.
+  if (stream.client && time != 0 && time < stream.newest) {
+    if (received < stream.until) return false;
+    stream = {};
+  }
   if (!stream.client) stream.offset = received - time;
   stream.client = client;
   stream.newest = time;

@@ -177,5 +177,15 @@ TEST_F(StreamedInputTest, OrdersByTheStampsOfTheClient) {
   EXPECT_NEAR(base::toSeconds(now_ - slot_.read().contacts.stated), 0.007, 0.0003) << "it was 7 ms late";
 }
 
+TEST_F(StreamedInputTest, ASimulationThatStartsAgainMaySetItsClockBack) {
+  constexpr std::int64_t kFar = 77'000 * kStreamMillisecond;
+  send(floorAt(0.01), 1, kFar);
+  EXPECT_FALSE(send(floorAt(0.02), 1, kStreamMillisecond).taken);
+  now_ += 500 * kStreamMillisecond;
+  EXPECT_TRUE(send(floorAt(0.03), 1, kStreamMillisecond).taken) << "the last value has expired";
+  EXPECT_NEAR(first().point_m.y(), 0.03, 1e-12);
+  EXPECT_EQ(slot_.read().contacts.stated, now_);
+}
+
 }  // namespace
 }  // namespace hapticd::server
