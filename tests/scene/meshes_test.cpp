@@ -1,9 +1,8 @@
 // Uploads, commits, deformation.
 #include <gmock/gmock.h>
 
-#include <set>
-
 #include <limits>
+#include <set>
 
 #include "scene/mesh_draft.h"
 #include "scene_fixture.h"

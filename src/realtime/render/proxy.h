@@ -167,6 +167,7 @@ class Proxy {
   void addTouchedWithNewTriangles() noexcept;
   bool liftOutOfNewTriangles() noexcept;
   bool liftOutOf(int object, std::uint64_t changed, EnclosureBudget& budget) noexcept;
+  bool isBelowOpen(int object, const Vec3& out, Vec3& lifted) noexcept;
   Vec3 pressOf(std::int32_t object) const noexcept;
   void releaseByJump(std::uint32_t& status) noexcept;
   static double missedMove(const PlacedObject& object) noexcept;

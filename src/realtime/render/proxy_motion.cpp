@@ -223,15 +223,30 @@ bool Proxy::liftOutOf(int i, std::uint64_t changed, EnclosureBudget& budget) noe
   const PlacedObject& object = query_.object(i);
   const Vec3 press = pressOf(object.state->id);
   const Vec3 out = (press.isZero(0) ? contactSet_.normal_m : press).normalized();
-  const Vec3 lifted = position_ + kLift_m * out;
+  Vec3 lifted = position_ + kLift_m * out;
   ObjectHit hit;
-  if (!encloses(object, query_.faces(), now_.time, position_, toolRadius_, budget) ||
-      encloses(object, query_.faces(), now_.time, lifted, toolRadius_, budget) ||
-      query_.castPast(changed, position_, lifted, hit))
-    return false;
+  const bool inside = encloses(object, query_.faces(), now_.time, position_, toolRadius_, budget) &&
+                      !encloses(object, query_.faces(), now_.time, lifted, toolRadius_, budget);
+  if (!inside && (press.isZero(0) || !isBelowOpen(i, out, lifted))) return false;
+  if (query_.castPast(changed, position_, lifted, hit)) return false;
   const double share = query_.castAtObject(i, lifted, position_, hit) ? hit.stop : 0;
   position_ = lifted + share * (position_ - lifted);
   return true;
+}
+
+// An open surface is around nothing. Where it held the point and nothing of it does so now, but something of
+// it that looks the same way is above, it rose. `lifted` moves nearer when another face of it is between. A
+// ball overlaps what rose, and needs no lift.
+bool Proxy::isBelowOpen(int i, const Vec3& out, Vec3& lifted) noexcept {
+  constexpr double kThickness_m = 20e-6;  // faces of one object that are nearer to each other count as one
+  if (toolRadius_ > 0) return false;
+  const Vec3 up = lifted - position_;
+  ObjectHit hit;
+  if (query_.castAtObject(i, position_, position_ - up, hit)) return false;
+  if (query_.castAtObject(i, position_, lifted, hit))
+    lifted = position_ + std::min(1.0, hit.stop + kThickness_m / up.norm()) * up;
+  return query_.castAtObject(i, lifted, position_, hit) && !hit.unexamined &&
+         hit.halfSpace.normal.dot(out) > 0;
 }
 
 Vec3 Proxy::carriedBy(const PlacedObject& object, std::uint32_t triangle, const Vec3& p) const noexcept {

@@ -317,6 +317,39 @@ TEST_P(NewTriangles, of_any_touched_mesh_are_felt_at_once) {
   }
 }
 
+// Sheets: around nothing, so only what held the tool tells which side it was on.
+TEST_P(NewTriangles, of_open_surfaces_rise_and_sink_under_the_hand) {
+  const auto sheet = [](double y_mm) {
+    std::vector<Vec3f> triples = boxTriples(Vec3(-30, -30, -30), Vec3(30, y_mm, 30));
+    std::vector<Vec3f> top;
+    for (std::size_t t = 0; t + 2 < triples.size(); t += 3) {
+      if (std::all_of(&triples[t], &triples[t] + 3, [&](const Vec3f& v) { return v.y() == float(y_mm); }))
+        top.insert(top.end(), &triples[t], &triples[t] + 3);
+    }
+    return top;
+  };
+  const double radius_mm = 1e3 * GetParam();
+  for (const std::int32_t sides : {0, 2}) {  // front, both
+    for (const double step_mm : {0.0, 0.001, 0.01, 0.2, 0.45, -0.2}) {
+      loop.send(scene::ResetScene{});
+      loop.send(scene::SetObjectNumber{1});
+      loop.send(scene::SetTouchableFaces{sides});
+      const Vec3 pressed = 1e-3 * Vec3(1, radius_mm - 1.7, 2);
+      loop.rest(pressed + Vec3(0, 0.010, 0), toNanos(0.5));
+      loop.add(0, sheet(0));
+      loop.to(pressed);
+      for (int k = 0; k <= 3; ++k) {
+        upload(0, sheet(k * step_mm));
+        loop.rest(pressed, toNanos(0.1));
+        EXPECT_NEAR((loop.out.force_N - 1e-3 * kStiffness_N_per_m * Vec3(0, 1.7 + k * step_mm, 0)).norm(), 0,
+                    1e-3)
+            << "sides " << sides << ", " << k << " x " << step_mm << " mm: " << loop.out.force_N.transpose();
+        EXPECT_EQ(loop.out.status, 0U);
+      }
+    }
+  }
+}
+
 // A floor of two objects; the hand rests on one and the other gets new triangles.
 TEST_P(NewTriangles, beside_the_touched_mesh_hold_the_hand_that_comes) {
   const double radius_mm = 1e3 * GetParam();
