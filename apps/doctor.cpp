@@ -237,7 +237,9 @@ void addDoctor(CLI::App& app) {
   command->add_option("--seconds", options->seconds, "Duration of the loop measurement")
       ->check(within(0.1, 3600))
       ->capture_default_str();
-  command->add_option("--port", options->port, "TCP and UDP port to check")->capture_default_str();
+  command->add_option("--port", options->port, "TCP and UDP port to check")
+      ->check(CLI::Range(1, 65535))
+      ->capture_default_str();
   command->footer("Exit status: 0 when ready, 1 when a problem must be fixed first.");
   command->add_flag("--json", options->json, kJsonText);
   command->callback([options] { exitCode = run(options->seconds, options->port, options->json); });

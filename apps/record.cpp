@@ -149,14 +149,19 @@ class ServerRecording {
       const auto text = wire::decode<wire::Text>(arrival.bytes);
       if (!text) return;
       const std::string heard(text->text.text);
-      (text->severity == wire::kTextError && heard.starts_with("Recording_Control") ? refusal_ : last_) =
-          heard;
+      (text->severity == wire::kTextError && isAboutRecording(heard) ? refusal_ : last_) = heard;
     });
     return link_.connected();
   }
 
  private:
   static constexpr auto kTimeout = 5s;
+
+  // A refusal for the role of the client begins with the name of the message.
+  static bool isAboutRecording(std::string_view text) {
+    return text.starts_with("Recording_Control") || text.starts_with(wire::RecordingControl::kInfo.name);
+  }
+
   const std::string server_;
   const client::DeviceAddress address_;
   client::Link link_;

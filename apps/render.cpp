@@ -127,8 +127,8 @@ int run(const CLI::App& command, const RenderCommandOptions& options) {
          {"--mesh", "--hand", "--compare", "--mesh-unit", "--size-mm", "--faces", "--timing"}) {
       if (command.count(name) == 0) continue;
       throw std::runtime_error(std::string(name) +
-                               " belongs to --mesh; --session has its own scene and "
-                               "hand, leave one of them out");
+                               " does not go with --session, which has its own scene and hand: leave one of "
+                               "them out");
     }
     return renderSession({.session = options.session,
                           .out = options.mesh.out,

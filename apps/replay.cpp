@@ -61,8 +61,8 @@ void addReplay(CLI::App& app) {
   command->add_option("--port", options->port, "Only the port; 0: any free one")->check(CLI::Range(0, 65535));
   command->add_option("--http", options->http,
                       "ADDR:PORT of the viewer's page, or 'off' [127.0.0.1:8080, if free]");
-  command->add_option("--seconds", options->seconds, "Stop after this time [until a signal]")
-      ->check(within(0.001, kLongest_s));
+  command->add_option("--seconds", options->seconds, "Stop after this time; 0: run until a signal [0]")
+      ->check(within(0, kLongest_s));
   command->footer(
       "Clients connect as to the live server and receive the recorded reports, stamped with the present "
       "time, and the\n"

@@ -14,6 +14,7 @@
 #include "announce.h"
 #include "commands.h"
 #include "device/drivers/drivers.h"
+#include "device/simulated/text_rows.h"
 #include "log_writer.h"
 #include "network_finder.h"
 #include "server/server.h"
@@ -39,7 +40,7 @@ struct ServeOptions {
   bool isolate = false;
   bool inProcess = false;
   double reportRate_Hz = 0;
-  double seconds = 0;
+  std::optional<double> seconds;
   std::string record;
   bool allowNoRealtime = false;
   bool insecure = false;
@@ -51,10 +52,12 @@ void applyFlags(const ServeOptions& options, server::DeviceConfig& device) {
   if (!options.driver.empty()) {
     const std::size_t colon = options.driver.find(':');
     const std::string driver = options.driver.substr(0, colon);
-    // The hardware name and the keys of one driver mean nothing to another.
+    // The hardware name, the keys and the isolation of one driver mean nothing to another.
     if (driver != device.driver) {
       device.hardware.clear();
       device.driverKeys.clear();
+      device.isolate.reset();
+      device.isolateWatch = false;
     }
     device.driver = driver;
     if (colon != std::string::npos) device.hardware = options.driver.substr(colon + 1);
@@ -69,15 +72,35 @@ void applyFlags(const ServeOptions& options, server::DeviceConfig& device) {
 
 // Makes each driver, without opening it: files and hardware names that only the driver understands.
 void checkDrivers(const server::ServerConfig& config) {
-  for (server::DeviceConfig device : config.devices) {
+  for (std::size_t i = 0; i < config.devices.size(); ++i) {
+    server::DeviceConfig device = config.devices[i];
     device.isolate = false;
+    const std::string place = "device '" + device.names.front() + "': ";
     try {
       server::makeDevice(device);
     } catch (const server::ConfigError&) {
       throw;
+    } catch (const device::HandFileError& error) {
+      throw server::InvalidValue(i, "hand", place + "hand: " + error.what());
     } catch (const std::exception& error) {
-      throw server::ConfigError("device '" + device.names.front() + "': " + error.what());
+      throw server::ConfigError(place + error.what());
     }
+  }
+}
+
+// The files that the configuration names.
+void checkFiles(const server::ServerConfig& config, const ServeOptions& options) {
+  try {
+    checkDrivers(config);
+  } catch (const server::InvalidValue& error) {
+    if (!options.hand.empty()) throw;
+    throw server::ConfigError(server::placeOf(error, options.configFile) + error.what());
+  }
+  try {
+    server::Credentials(config, geteuid());
+  } catch (const server::ConfigError& error) {
+    const server::InvalidValue located({}, "tokens", error.what());
+    throw server::ConfigError(server::placeOf(located, options.configFile) + error.what());
   }
 }
 
@@ -91,8 +114,11 @@ server::ServerConfig configOf(const ServeOptions& options, std::vector<std::stri
   config.httpAllow.insert(config.httpAllow.end(), options.httpAllow.begin(), options.httpAllow.end());
   if (options.insecure) config.insecure = true;
   if (options.allowNoRealtime) config.allowNoRealtime = true;
-  if (options.seconds > 0) config.seconds = options.seconds;
+  if (options.seconds) config.seconds = *options.seconds;
   if (!options.record.empty()) config.record = options.record;
+  for (const std::string& name : options.names) {
+    if (name.starts_with("--")) throw server::ConfigError("--name needs a name, got the option " + name);
+  }
   if (!options.names.empty()) config.devices.front().names = options.names;
   applyFlags(options, config.devices.front());
   // vrpn.cfg has no fields for most flags, so they apply to all of its devices.
@@ -100,8 +126,7 @@ server::ServerConfig configOf(const ServeOptions& options, std::vector<std::stri
     for (server::DeviceConfig& device : config.devices) applyFlags(options, device);
   }
   server::validate(config);
-  checkDrivers(config);
-  server::Credentials(config, geteuid());
+  checkFiles(config, options);
   return config;
 }
 
@@ -165,6 +190,10 @@ int run(const ServeOptions& options) {
   }
   if (options.checkConfig) {
     for (const std::string& remark : remarks) std::printf("# %s\n", remark.c_str());
+    for (server::DeviceConfig& device : config.devices) {
+      const device::Driver* const driver = device::findDriver(device.driver);
+      if (driver->canBeIsolated) device.isolate = device.isolate.value_or(driver->isolatedByDefault);
+    }
     std::printf("%s", server::toToml(config).c_str());
     return 0;
   }
@@ -239,8 +268,8 @@ void addServe(CLI::App& app) {
       "t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons], FILE.traj a measured one");
   command->add_option("--report-rate", options->reportRate_Hz, "Reports per second [1000]")
       ->check(within(0.1, 4000));
-  command->add_option("--seconds", options->seconds, "Stop after this time [until a signal]")
-      ->check(within(0.001, kLongest_s));
+  command->add_option("--seconds", options->seconds, "Stop after this time; 0: run until a signal [0]")
+      ->check(within(0, kLongest_s));
   command->add_option(
       "--record", options->record,
       "Write a recording (all scene commands and ticks) for replay, render and export; %Y%m%d-%H%M%S\n"

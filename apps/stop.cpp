@@ -3,11 +3,13 @@
 #include <cstdio>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 
 #include "client/server_address.h"
 #include "commands.h"
 #include "hapticd/client.h"
+#include "net/endpoint.h"
 #include "net/local_socket.h"
 #include "print_json.h"
 #include "token_file.h"
@@ -38,6 +40,18 @@ std::string socketOf(const StopOptions& options) {
   }
 }
 
+// A token must not cross a network in clear text.
+std::string readTokenFor(const StopOptions& options) {
+  const client::ServerAddress server = client::parseDevice(options.server).server;
+  const bool here = !server.socket.empty() ||
+                    net::isLoopback(net::Endpoint{net::resolve(server.host), server.port}.address);
+  if (!here)
+    throw std::runtime_error("the token would cross the network to " + server.text() +
+                             " unencrypted: leave --token-file to 'hapticd tunnel', and open "
+                             "NAME@tcp://127.0.0.1:PORT of that tunnel");
+  return readToken(options.tokenFile);
+}
+
 Client openClient(const StopOptions& options) {
   if (const std::string local = socketOf(options); !local.empty()) {
     try {
@@ -50,8 +64,9 @@ Client openClient(const StopOptions& options) {
 }
 
 int run(const StopOptions& options) {
+  const std::string token = options.tokenFile.empty() ? "" : readTokenFor(options);
   Client client = openClient(options);
-  if (!options.tokenFile.empty()) client.presentToken(readToken(options.tokenFile));
+  if (!token.empty()) client.presentToken(token);
   std::optional<GuardReport> guard;
   std::string refusal;
   client.onGuard([&](const GuardReport& report) { guard = report; });
@@ -67,8 +82,13 @@ int run(const StopOptions& options) {
   const auto isDone = [&] { return guard && guard->stopped != options.rearm; };
   const auto end = std::chrono::steady_clock::now() + 3s;
   while (!isDone() && refusal.empty() && std::chrono::steady_clock::now() < end) client.poll(50ms);
-  if (!refusal.empty()) throw Error(client.server() + " refused: " + refusal);
-  if (!isDone()) throw Error(client.server() + " sent no confirmation within 3 s");
+  if (!refusal.empty()) throw Error(options.server + " refused: " + refusal);
+  if (!isDone()) {
+    throw Error(
+        options.server +
+        " sent no confirmation within 3 s; a replay has no force to stop, and for a device use its own "
+        "switch");
+  }
   if (options.json) {
     printJson({{"server", options.server}, {"stopped", guard->stopped}, {"armed", guard->armed}});
     return 0;
@@ -92,12 +112,16 @@ void addStop(CLI::App& app) {
   command->add_flag("--rearm", options->rearm, "End a stop and clear latched faults");
   command
       ->add_option("--token-file", options->tokenFile,
-                   "File with the token of an operator, mode 0600, for a server on another machine")
+                   "File with the token of an operator, mode 0600; only for a server on this machine")
       ->check(CLI::ExistingFile);
   command->add_flag("--json", options->json, kJsonText);
   command->footer(
       "Any client may stop a device. Re-arming after it takes the server's user or root on its machine, or\n"
       "the token of an operator.\n"
+      "A server on another machine that asks for TLS is reached through a tunnel, which can present the "
+      "token:\n"
+      "  hapticd tunnel HOST --port 4000 --fingerprint ... --token-file FILE\n"
+      "  hapticd stop NAME@tcp://127.0.0.1:4000\n"
       "Exit status: 0 when the server has confirmed it, 1 when it cannot be reached or refuses.");
   command->callback([options] { exitCode = run(*options); });
 }

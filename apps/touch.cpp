@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -31,7 +32,8 @@ namespace {
 using namespace std::chrono_literals;
 using geometry::TriangleMesh;
 
-constexpr std::size_t kLongestName = 64;  // of an object
+constexpr std::size_t kLongestName = 64;                          // of an object
+constexpr int kLastObject = std::numeric_limits<int>::max() - 1;  // their number must fit, too
 
 struct TouchOptions {
   std::string mesh;
@@ -174,7 +176,7 @@ void addTouch(CLI::App& app) {
       ->check(share)
       ->capture_default_str();
   command->add_option("--object", options->object, "Number of the object that gets the mesh")
-      ->check(CLI::NonNegativeNumber)
+      ->check(CLI::Range(0, kLastObject))
       ->capture_default_str();
   command
       ->add_option("--size-mm", options->size_mm, "Largest extent on the device in mm; 0: fit a small device")

@@ -28,6 +28,8 @@ HEARTBEAT_S: Final = 0.1
 BATCH_BYTES: Final = 64 * 1024
 #: A stop on the first connection waits behind no more than this; beyond it, it also takes a second connection.
 STOP_BACKLOG_BYTES: Final = 64 * 1024
+#: Why a connection ended, where the server ended it.
+CLOSED_BY_SERVER: Final = "the server closed the connection"
 MAX_COMMAND_BATCH_BYTES: Final = 256 * 1024 * 1024
 #: Reports that may wait for dispatch; beyond it the client stops reading.
 MAX_WAITING_BYTES: Final = 64 * 1024 * 1024
@@ -246,6 +248,9 @@ class Core(Commands):
         """The connection is gone; the reason must not be empty."""
         was_connected = self.connected
         self._last_failure = reason
+        ended = reason == CLOSED_BY_SERVER or "reset by peer" in reason
+        if ended and self._peer is not None and not was_connected:
+            self._last_failure += " before it answered; a server that asks for TLS needs 'hapticd tunnel'"
         self._peer = None
         self._udp_target = None
         self._heard = self._answered = False

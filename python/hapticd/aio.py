@@ -23,7 +23,17 @@ from . import _messages as m
 from . import reports as r
 from ._address import local_towards, parse, resolve
 from ._codec import Numbers
-from ._core import BATCH_BYTES, RETRY_S, STOP_BACKLOG_BYTES, Core, Options, UploadProgress, as_triangles, as_vertices
+from ._core import (
+    BATCH_BYTES,
+    CLOSED_BY_SERVER,
+    RETRY_S,
+    STOP_BACKLOG_BYTES,
+    Core,
+    Options,
+    UploadProgress,
+    as_triangles,
+    as_vertices,
+)
 from ._peer import ProtocolError
 from .client import has_ended, unacknowledged
 from .errors import ConnectError, ConnectionLost
@@ -49,7 +59,7 @@ class _Stream(asyncio.Protocol):
         self.client._writable.set()
 
     def connection_lost(self, error: Optional[Exception]) -> None:
-        self.client._gone(str(error) if error is not None else "the server closed the connection")
+        self.client._gone(str(error) if error is not None else CLOSED_BY_SERVER)
 
 
 class _Datagrams(asyncio.DatagramProtocol):
@@ -499,7 +509,7 @@ class Client(Core):
         if transport is not None:
             sock = transport.get_extra_info("socket")
             if transport.is_closing() or (sock is not None and has_ended(sock)):
-                self._abort("the server closed the connection")
+                self._abort(CLOSED_BY_SERVER)
         if not self.connected:
             raise ConnectionLost(f"{failure}: {self._why_not_connected()}")
 

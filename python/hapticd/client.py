@@ -26,6 +26,7 @@ from ._address import Address, local_towards, parse, resolve
 from ._codec import Numbers
 from ._core import (
     BATCH_BYTES,
+    CLOSED_BY_SERVER,
     MAX_WAITING_BYTES,
     RETRY_S,
     STOP_BACKLOG_BYTES,
@@ -240,7 +241,7 @@ class Client(Core):
             try:
                 data = sock.recv(_RECEIVE_BYTES)
                 if not data:
-                    return self._fail("the server closed the connection")
+                    return self._fail(CLOSED_BY_SERVER)
                 self._received(data)
             except BlockingIOError:
                 pass
@@ -584,7 +585,7 @@ class Client(Core):
         """After sending: raises ConnectionLost when nothing receives at the other end. The system accepts the first
         bytes for a server that is gone, so only the state of the connection tells."""
         if self._sock is not None and has_ended(self._sock):
-            self._fail("the server closed the connection")
+            self._fail(CLOSED_BY_SERVER)
         if not self.connected:
             raise ConnectionLost(f"{failure}: {self._why_not_connected()}")
 

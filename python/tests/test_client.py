@@ -1,5 +1,6 @@
 """The synchronous client against a real server with the simulated hand, and against scripted VRPN servers."""
 
+import contextlib
 import pathlib
 import signal
 import socket
@@ -319,6 +320,24 @@ def test_what_is_wrong_with_a_connection_is_named(server: Server) -> None:
         hapticd.connect(f"Phantom@127.0.0.1:{port}", connect_timeout=0.3)
     with pytest.raises(hapticd.ConnectError, match="no server at no.such.host.invalid"):
         hapticd.connect("Phantom@no.such.host.invalid")
+
+
+def test_a_server_that_closes_without_an_answer_may_ask_for_tls() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+
+        def close_all() -> None:
+            with contextlib.suppress(OSError):
+                while True:
+                    connection = listener.accept()[0]
+                    connection.recv(4096)
+                    connection.close()
+
+        closer = threading.Thread(target=close_all, daemon=True)
+        closer.start()
+        with pytest.raises(hapticd.ConnectError, match="before it answered; a server that asks for TLS needs"):
+            hapticd.connect(f"Phantom@tcp://127.0.0.1:{listener.getsockname()[1]}", connect_timeout=0.3)
+        listener.shutdown(socket.SHUT_RDWR)
+        closer.join()
 
 
 def test_a_vrpn_server_without_extensions() -> None:

@@ -145,6 +145,8 @@ void Link::pingUnheard() {
 void Link::onClosed(const std::string& reason) {
   const bool wasConnected = handshakeDone();
   lastFailure_ = reason;
+  if (!wasConnected && server_.socket.empty() && reason.ends_with("by the peer"))
+    lastFailure_ += " before it answered; a server that asks for TLS needs 'hapticd tunnel'";
   addTraffic(statistics_);
   if (wasConnected) {
     inbox_.push({.what = Arrival::What::lost, .arrived = wallTimePoint(), .bytes = wire::asBytes(reason)});

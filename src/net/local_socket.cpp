@@ -29,7 +29,8 @@ constexpr const char* kServiceFolder = "/run/hapticd";  // only root can make it
 sockaddr_un addressOf(const fs::path& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
-  if (path.native().size() >= sizeof address.sun_path) fail(path, ENAMETOOLONG);
+  static_assert(kLongestSocketPath < sizeof address.sun_path);  // and the zero behind it
+  if (path.native().size() > kLongestSocketPath) fail(path, ENAMETOOLONG);
   std::memcpy(address.sun_path, path.c_str(), path.native().size());
   return address;
 }

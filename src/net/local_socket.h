@@ -1,6 +1,7 @@
 // Unix-domain stream sockets: connections within this machine whose peer the kernel names.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -16,6 +17,9 @@ namespace hapticd::net {
 /// The system's number of the user that holds the other end of a Unix-domain connection; nothing for all
 /// other connections and closed ones.
 std::optional<std::uint32_t> peerUser(const Connection& connection) noexcept;
+
+/// Bytes of the path of a Unix socket, at most.
+inline constexpr std::size_t kLongestSocketPath = 107;
 
 /// Accepts connections at a path of the file system; the destructor removes the socket. Every local user who
 /// may enter the folder can connect.

@@ -40,5 +40,22 @@ fails_with "unknown driver 'hal'" --device hal
 fails_with "device 'Phantom': " --hand nosuch.csv
 fails_with "nosuch.csv" --hand nosuch.csv
 fails_with "device 'Phantom': " --hand .
+printf '\n[[device]]\nhand = "nosuch.csv"\n' >hand.toml
+fails_with "hand.toml:3: device 'Phantom': hand: nosuch.csv: cannot be read" --config hand.toml
+printf '\ntokens = "nosuch"\n' >tokens.toml
+fails_with "tokens.toml:2: tokens: cannot read 'nosuch'" --config tokens.toml
 fails_with "hardware is 'x', expected the number" --device forcedimension:x
 fails_with "is the port of listen" --listen 127.0.0.1:4000 --http 127.0.0.1:4000
+fails_with 'replay needs a recorded hand: hand = "FILE.csv"' --device replay
+fails_with "--name needs a name, got the option --check-config" --name --check-config
+
+# The isolation in effect, as the driver decides it; another driver decides anew.
+"$hapticd" serve --device openhaptics --check-config >effective.toml
+grep -qx 'isolate = true' effective.toml
+"$hapticd" serve --config effective.toml --check-config | cmp effective.toml -
+"$hapticd" serve --config effective.toml --device simulated --check-config >simulated.toml
+! grep -q '^isolate = ' simulated.toml || exit 1
+"$hapticd" serve --device evdev --check-config | grep -qx 'isolate = false'
+
+printf 'seconds = 5\n' >seconds.toml
+"$hapticd" serve --config seconds.toml --seconds 0 --check-config | grep -qx 'seconds = 0'

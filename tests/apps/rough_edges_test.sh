@@ -16,6 +16,9 @@ refused 2 "did you mean 'serve'?" "$hapticd" serv
 refused 2 "unknown command 'xyzzyx'; 'hapticd --help'" "$hapticd" xyzzyx
 refused 2 "nothing to render" "$hapticd" render
 refused 2 "excludes" "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --true-size --size-mm 3
+refused 2 "not in range 0 to 2147483646" "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --object 2147483647
+refused 2 "not in range 1 to 65535" "$hapticd" doctor --port 70000
+refused 1 "--mesh does not go with --session" "$hapticd" render --mesh "$source_dir/testdata/meshes/bunny.obj" --session "$source_dir/testdata/recordings/all_commands_law2.haptics"
 refused 1 "hapticd devices" "$hapticd" serve --device openhaptics --listen 127.0.0.1:0 --http off
 refused 1 "no system bus" env DBUS_SYSTEM_BUS_ADDRESS=unix:path=/nowhere "$hapticd" list
 refused 1 "no system bus" env DBUS_SYSTEM_BUS_ADDRESS=unix:path=/nowhere "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --find

@@ -34,3 +34,16 @@ before=$(stops log)
 "$hapticd" stop "Phantom@127.0.0.1:$port" | grep -q 'forces are off'
 [ "$(stops log)" = $((before + 1)) ]
 [ "$(stops other.log)" = 1 ]
+
+# A replay has no force to stop. At this speed it does not reach the end of the recording, where the forces were stopped.
+"$hapticd" serve --listen 127.0.0.3:0 --http off --allow-no-rt --record "$work/own.haptics" --seconds 2 >"$work/recorded.log" 2>&1
+"$hapticd" replay "$work/own.haptics" --speed 0.05 --listen "127.0.0.3:$port" --http off >"$work/replay.log" 2>&1 &
+replay=$!
+trap 'kill "$server" "$other" "$replay" 2>/dev/null || true; rm -rf "$work"' EXIT
+for _ in $(seq 300); do
+  if grep -q 'listening on' "$work/replay.log"; then break; fi
+  sleep 0.1
+done
+status=0
+"$hapticd" stop "Phantom@127.0.0.3:$port" >"$work/out" 2>&1 || status=$?
+[ "$status" = 1 ] && grep -q "Phantom@127.0.0.3:$port sent no confirmation within 3 s; a replay has no force to stop" "$work/out" || { cat "$work/out"; exit 1; }

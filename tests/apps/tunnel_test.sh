@@ -19,7 +19,8 @@ TOML
 "$hapticd" serve --config "$work/server.toml" >"$work/log" 2>&1 &
 server=$!
 tunnel=
-trap 'kill $server $tunnel 2>/dev/null || true; rm -rf "$work"' EXIT
+observers=
+trap 'kill $server $tunnel $observers 2>/dev/null || true; rm -rf "$work"' EXIT
 await() {  # FILE PATTERN: prints what the pattern captures
   local found
   for _ in $(seq 300); do
@@ -38,6 +39,10 @@ refused() {
   [ "$status" = 1 ] || { echo "status $status of $*"; cat "$work/out"; exit 1; }
 }
 refused "$hapticd" stop "Phantom@tcp://$address"
+grep -q "before it answered; a server that asks for TLS needs 'hapticd tunnel'" "$work/out" || { cat "$work/out"; exit 1; }
+# A token crosses no network in clear text; this address is nobody's.
+refused timeout 5 "$hapticd" stop "Phantom@tcp://192.0.2.1" --token-file "$work/token"
+grep -q 'would cross the network to 192.0.2.1:3883 unencrypted' "$work/out" || { cat "$work/out"; exit 1; }
 refused "$hapticd" tunnel "$address"
 grep -q 'give --fingerprint' -i "$work/out"
 chmod 0644 "$work/token"
@@ -58,6 +63,12 @@ tunnel=$!
 local=$(await "$work/tunnel" 'tcp:\/\/([0-9.]+:[0-9]+);')
 "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --server "Phantom@tcp://$local" --seconds 4 >"$work/out"
 awk '/peak force/ { if ($3 > 0.1) force = 1 } END { exit !force }' "$work/out" || { cat "$work/out" "$work/log"; exit 1; }
+
+# A client without a role hears why.
+"$hapticd" tunnel "$address" --port 0 --fingerprint "$fingerprint" >"$work/observers" 2>&1 &
+observers=$!
+refused "$hapticd" record "Phantom@$(await "$work/observers" '(tcp:\/\/[0-9.]+:[0-9]+);')" --server --detach
+grep -q 'Recording_Control refused: ' "$work/out" || { cat "$work/out"; exit 1; }
 
 # A call-back client is refused in words.
 refused timeout 10 "$hapticd" stop "Phantom@$local"

@@ -5,7 +5,8 @@ namespace hapticd::device::drivers_in_this_build {
 namespace {
 
 std::unique_ptr<Device> make(const DriverOptions& options) {
-  if (options.hand == "script") throw InvalidDriverOption("replay needs a recorded hand: --hand FILE.csv");
+  if (options.hand == "script")
+    throw InvalidDriverOption(R"(replay needs a recorded hand: hand = "FILE.csv", or --hand FILE.csv)");
   ReplayOptions own;
   own.file = options.hand;
   own.repeat = true;

@@ -1,6 +1,7 @@
 #include "server/config/config.h"
 
 #include <toml++/toml.h>
+#include <algorithm>
 #include <limits>
 #include <optional>
 #include <set>
@@ -186,6 +187,8 @@ DeviceConfig readDevice(const toml::table& table, const std::string& source) {
   DeviceConfig device;
   Reader reader(table, source);
   visitFields(reader, device);
+  if (table.get("report_rate_Hz") == nullptr)
+    device.reportRate_Hz = std::min(device.reportRate_Hz, device.servoRate_Hz);
   reader.finish({{keysOf<ServerConfig>(), "above the first [[device]]"},
                  {keysOf<LimitsConfig>(), "in [limits], which belongs above the first [[device]]"}});
   return device;
@@ -253,6 +256,16 @@ ServerConfig read(const toml::table& root, const std::string& source) {
   return config;
 }
 
+std::string textOf(const std::filesystem::path& file) {
+  try {
+    const std::vector<std::byte> bytes = base::world().files.read(file);
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+  } catch (const std::system_error& error) {
+    throw ConfigError("cannot read the configuration file '" + file.string() +
+                      "': " + error.code().message());
+  }
+}
+
 void check(const ServerConfig& config, const toml::table& root, const std::string& source) {
   try {
     validate(config);
@@ -264,16 +277,15 @@ void check(const ServerConfig& config, const toml::table& root, const std::strin
 }  // namespace
 
 ServerConfig loadConfig(const std::filesystem::path& file, std::vector<std::string>& warnings) {
-  std::vector<std::byte> bytes;
-  try {
-    bytes = base::world().files.read(file);
-  } catch (const std::system_error& error) {
-    throw ConfigError("cannot read the configuration file '" + file.string() +
-                      "': " + error.code().message());
-  }
-  const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const std::string text = textOf(file);
   if (file.extension() == ".cfg") return parseVrpnCfg(text, file.string(), warnings);
   return parseConfig(text, file.string());
+}
+
+std::string placeOf(const InvalidValue& error, const std::filesystem::path& file) {
+  if (file.empty() || file.extension() == ".cfg") return "";
+  const toml::table root = tableOf(textOf(file), file.string());
+  return location(file.string(), nodeOf(error, root));
 }
 
 ServerConfig parseConfig(const std::string& text, const std::string& source) {
@@ -288,12 +300,12 @@ ServerConfig parseRecordedConfig(const std::string& text, const std::string& sou
   const ServerConfig recorded = read(root, source);
   ServerConfig config;
   config.announce = recorded.announce;
-  config.compat = recorded.compat;
   config.limits = recorded.limits;
   config.devices = recorded.devices;
   for (DeviceConfig& device : config.devices) {
     device.hand = DeviceConfig().hand;
     device.blackBoxDir = DeviceConfig().blackBoxDir;
+    device.isolateWatch = DeviceConfig().isolateWatch;
   }
   check(config, root, source);
   return config;

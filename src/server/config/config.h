@@ -191,11 +191,14 @@ struct ServerConfig {
 /// `warnings`.
 ServerConfig loadConfig(const std::filesystem::path& file, std::vector<std::string>& warnings);
 
+/// "FILE:LINE: " of a value that only its user found invalid; empty without a TOML file.
+std::string placeOf(const InvalidValue& error, const std::filesystem::path& file);
+
 /// Parses the text of a TOML configuration; `source` names it in errors.
 ServerConfig parseConfig(const std::string& text, const std::string& source);
 
-/// The configuration in a recording, without what belongs to the machine that recorded: addresses, users,
-/// paths.
+/// The configuration in a recording, without what belongs to the machine that recorded: addresses, ports,
+/// users, paths.
 ServerConfig parseRecordedConfig(const std::string& text, const std::string& source);
 
 /// The configuration as TOML with every key; parseConfig() of it returns an equal configuration.

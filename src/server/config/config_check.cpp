@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <pwd.h>
 
 #include <algorithm>
@@ -9,6 +10,7 @@
 
 #include "device/drivers/drivers.h"
 #include "net/endpoint.h"
+#include "net/local_socket.h"
 #include "server/config/config.h"
 #include "wire/text.h"
 
@@ -28,9 +30,8 @@ class Checker {
 
   void range(const std::string& key, double value, double low, double high) const {
     if (value >= low && value <= high) return;
-    std::ostringstream text;
-    text << key << " must be between " << low << " and " << high << ", got " << value;
-    fail(key, text.str());
+    // Enough digits to tell the value from the end of the range.
+    fail(key, fmt::format("{} must be between {:.15g} and {:.15g}, got {:.15g}", key, low, high, value));
   }
 
   void address(const std::string& key, const std::string& value, const char* example) const {
@@ -72,6 +73,12 @@ void checkDriver(const Checker& check, const DeviceConfig& device) {
     check.fail("isolate", "the driver '" + device.driver +
                               "' loads no vendor library and cannot be isolated; remove isolate");
   }
+  if (device.isolateWatch && !driver->canBeIsolated) {
+    check.fail("isolate_watch",
+               "the driver '" + device.driver +
+                   "' cannot be isolated, so there is nothing to watch; remove isolate_watch");
+  }
+  if (device.hand.empty()) check.fail("hand", R"(hand is empty; use "script", or the name of a file)");
   for (const auto& [key, value] : device.driverKeys) {
     if (std::find(driver->keys.begin(), driver->keys.end(), key) != driver->keys.end()) continue;
     check.fail(key, "the driver '" + device.driver + "' has no key " + key + "; remove it");
@@ -107,6 +114,10 @@ void checkControl(const Checker& check, const DeviceConfig& device) {
 
 // `http` must be ADDR:PORT; `http_allow` holds names that a browser can send as Host.
 void checkHttp(const Checker& check, const ServerConfig& config) {
+  if (config.http.empty()) {
+    check.fail("http", "http: " + wire::inQuotes(config.http) +
+                           " is not ADDR:PORT such as 127.0.0.1:8080, auto or off");
+  }
   if (config.http != kHttpAuto && config.http != kHttpOff) {
     const std::string kAny = "0.0.0.0";
     bool clash = false;
@@ -158,6 +169,10 @@ void checkAccess(const Checker& check, const ServerConfig& config) {
   if (!path && config.socket != kSocketAuto && config.socket != kSocketOff) {
     check.fail("socket", "socket: " + wire::inQuotes(config.socket) +
                              " is not an absolute path such as /run/hapticd/lab.sock, auto or off");
+  }
+  if (config.socket.size() > net::kLongestSocketPath) {
+    check.fail("socket", fmt::format("socket: the path has {} bytes, and that of a Unix socket at most {}",
+                                     config.socket.size(), net::kLongestSocketPath));
   }
 }
 
@@ -329,9 +344,15 @@ std::vector<Subnet> parseSubnets(const std::vector<std::string>& texts) {
       good = false;
     }
     subnet.mask = bits == 0 || bits > 32 ? 0 : ~std::uint32_t{0} << (32 - bits);
-    if (!good || (subnet.network & ~subnet.mask) != 0) {
+    if (!good) {
       throw ConfigError("trusted_networks: " + wire::inQuotes(text) +
                         " is not a network such as 10.0.0.0/24, or an address");
+    }
+    if ((subnet.network & ~subnet.mask) != 0) {
+      const net::Endpoint network{subnet.network & subnet.mask, 0};
+      throw ConfigError(
+          fmt::format("trusted_networks: the bits of {} after the first {} must be 0: use {}/{}",
+                      wire::inQuotes(text), bits, network.addressText(), bits));
     }
     subnets.push_back(subnet);
   }

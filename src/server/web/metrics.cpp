@@ -34,7 +34,7 @@ void loops(Text& out, const StateReport& report) {
   ofDevices(out, report, "hapticd_ticks_total", "counter", "Ticks of the servo loop.",
             [](const auto& d) { return d.last.tick; });
   ofDevices(out, report, "hapticd_tick_overruns_total", "counter",
-            "Ticks that had not finished when the next one was due.",
+            "Ticks more than 0.5 ms late, or lost to a long tick before.",
             [](const auto& d) { return d.last.timing.overruns; });
   ofDevices(out, report, "hapticd_tick_skipped_periods_total", "counter",
             "Periods without a tick because an earlier tick took too long.",

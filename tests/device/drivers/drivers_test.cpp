@@ -57,7 +57,8 @@ TEST(Drivers, ValuesThatADriverDoesNotAcceptAreNamed) {
   EXPECT_EQ(refusalOf("forcedimension", {.hardware = "first"}),
             "hardware is 'first', expected the number of the Force Dimension device, 0 for the first");
   EXPECT_EQ(refusalOf("forcedimension", {.hardware = "1"}), "");
-  EXPECT_EQ(refusalOf("replay", {}), "replay needs a recorded hand: --hand FILE.csv");
+  EXPECT_EQ(refusalOf("replay", {}),
+            R"(replay needs a recorded hand: hand = "FILE.csv", or --hand FILE.csv)");
   EXPECT_EQ(refusalOf("replay", {.hand = "hand.csv"}), "");
 }
 

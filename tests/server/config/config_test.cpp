@@ -152,15 +152,18 @@ TEST(Config, InvalidValuesAreNamed) {
 }
 
 TEST(Config, ValuesOutOfRangeAreNamedWithTheirLine) {
-  EXPECT_EQ(errorOf("\nseconds = -5"), "test.toml:2: seconds must be between 0 and 1e+09, got -5");
+  EXPECT_EQ(errorOf("\nseconds = -5"), "test.toml:2: seconds must be between 0 and 1000000000, got -5");
+  EXPECT_EQ(errorOf("[[device]]\nlinear_tolerance_mm = 1000.0001"),
+            "test.toml:2: device 'Phantom': linear_tolerance_mm must be between 0 and 1000, got 1000.0001");
   EXPECT_EQ(errorOf("listen = \"localhost:1\""),
             "test.toml:1: listen: \"localhost\" is not an IPv4 address such as 127.0.0.1");
   EXPECT_EQ(errorOf("[[device]]\nname=\"A\"\n[[device]]\nname=\"B\"\n\ndriver=\"hal\""),
             "test.toml:6: device 'B': unknown driver 'hal'; available: simulated, openhaptics, "
             "forcedimension, haply, evdev, replay");
-  // The report rate is a default, so the error names the line of its device.
-  EXPECT_EQ(errorOf("\n\n[[device]]\nservo_rate_Hz=500"),
+  EXPECT_EQ(errorOf("[[device]]\nservo_rate_Hz=500\nreport_rate_Hz=1000"),
             "test.toml:3: device 'Phantom': report_rate_Hz must be between 0.1 and 500, got 1000");
+  EXPECT_EQ(errorOf("[[device]]\nhand=\"\""),
+            "test.toml:2: device 'Phantom': hand is empty; use \"script\", or the name of a file");
   EXPECT_EQ(errorOf("record=\"x.mcap\""),
             "test.toml:1: record: the server writes *.haptics recordings only, got 'x.mcap'; convert the "
             "recording afterwards with 'hapticd export FILE.haptics --to mcap'");
@@ -171,6 +174,11 @@ TEST(Config, ValuesOutOfRangeAreNamedWithTheirLine) {
   EXPECT_NE(errorOf("[[device]]\nblack_box_keep=99999999999").find("99999999999"), std::string::npos);
   EXPECT_EQ(errorOf("[[device]]\nname=\"A\"\nnames=[\"B\"]"),
             "test.toml:2: 'name' is 'A', expected either 'name' or 'names', not both");
+}
+
+TEST(Config, ReportsFollowASlowServoUnlessTheirRateIsSet) {
+  EXPECT_EQ(parseConfig("[[device]]\nservo_rate_Hz = 500\n", "test").devices.front().reportRate_Hz, 500);
+  EXPECT_EQ(parseConfig("[[device]]\nservo_rate_Hz = 4000\n", "test").devices.front().reportRate_Hz, 1000);
 }
 
 TEST(Config, ErrorsOfControlNameTheRemedy) {
@@ -210,17 +218,23 @@ TEST(Config, ListeningForOtherMachinesNeedsTlsTrustOrAPlainWord) {
 
 TEST(Config, RefusesMalformedAccess) {
   const std::pair<const char*, const char*> bad[]{
-      {"trusted_networks = [\"10.0.0.1/24\"]\n", "is not a network such as 10.0.0.0/24"},
+      {"trusted_networks = [\"10.0.0.1/24\"]\n",
+       "the bits of \"10.0.0.1/24\" after the first 24 must be 0: use 10.0.0.0/24"},
       {"trusted_networks = [\"10.0.0.0/33\"]\n", "is not a network"},
       {"trusted_networks = [\"lab\"]\n", "is not a network"},
       {"owner_users = [\"no such user\"]\n", "there is no user"},
       {"socket = \"relative.sock\"\n", "is not an absolute path"},
+      {"http = \"\"\n", "test.toml:1: http: \"\" is not ADDR:PORT"},
       {"tls = \"on\"\n", "is not off, generated, or the absolute path"},
       {"tls = \"/c.pem\"\n", "needs its key"},
       {"tls_key = \"/k.pem\"\n", "has no effect without a certificate"},
       {"tls_loopback = true\n", "needs a certificate"},
   };
   for (const auto& [text, error] : bad) EXPECT_THAT(errorOf(text), testing::HasSubstr(error)) << text;
+  const auto socket = [](std::size_t bytes) { return "socket = \"/" + std::string(bytes - 1, 's') + "\"\n"; };
+  EXPECT_EQ(errorOf(socket(107)), "");
+  EXPECT_EQ(errorOf(socket(108)),
+            "test.toml:1: socket: the path has 108 bytes, and that of a Unix socket at most 107");
 }
 
 // Every key differs from its default, so that a key that is not written or not read is noticed.
@@ -344,6 +358,20 @@ TEST(Config, ADriverWithoutAVendorLibraryCannotBeIsolated) {
       errorOf("[[device]]\nisolate = true\n"),
       "test.toml:2: device 'Phantom': the driver 'simulated' loads no vendor library and cannot be isolated; "
       "remove isolate");
+  EXPECT_EQ(
+      errorOf("[[device]]\nisolate_watch = true\n"),
+      "test.toml:2: device 'Phantom': the driver 'simulated' cannot be isolated, so there is nothing to "
+      "watch; remove isolate_watch");
+}
+
+TEST(Config, ARecordingBringsNoPortOfTheServerThatWroteIt) {
+  ServerConfig there;
+  there.listenAddress = "127.0.0.2";
+  there.compat.haply = "127.0.0.1:10001";
+  there.limits.objects = 5;
+  ServerConfig here;
+  here.limits = there.limits;
+  EXPECT_EQ(parseRecordedConfig(toToml(there), "test"), here);
 }
 
 TEST(Config, IsolationIsTheDriversChoiceUnlessConfigured) {
