@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <assimp/IOStream.hpp>
 #include <charconv>
-#include <fstream>
-#include <limits>
 #include <span>
 #include <stdexcept>
 #include <utility>
@@ -68,30 +66,26 @@ class StreamPart final : public Assimp::IOStream {
   bool comment_ = false;
 };
 
-// At most so many bytes from there on.
-std::string readPart(const std::filesystem::path& file, std::size_t from, std::size_t most) {
-  std::ifstream in(file, std::ios::binary);
-  in.seekg(static_cast<std::streamoff>(from));
-  std::string text(std::min<std::uintmax_t>(most, std::filesystem::file_size(file)), '\0');
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(in.gcount()));
+// At most so many of the next bytes.
+std::string readNext(Assimp::IOStream& file, std::size_t most) {
+  std::string text(std::min(most, file.FileSize() - file.Tell()), '\0');
+  text.resize(file.Read(text.data(), 1, text.size()));
   return text;
 }
 
 }  // namespace
 
 // Assimp takes whole numbers for the bits of floats where an extension says that they are none.
-void refuseUnknownMeshes(const std::filesystem::path& file, const std::string& format) {
+void refuseUnknownMeshes(Assimp::IOStream& file, const std::string& format) {
   constexpr std::size_t kGlbHeader = 20;
-  const bool binary = format == "glb";
-  std::size_t size = std::numeric_limits<std::size_t>::max();
-  if (binary) {
-    const std::string header = readPart(file, 0, kGlbHeader);
+  std::size_t size = file.FileSize();
+  if (format == "glb") {
+    const std::string header = readNext(file, kGlbHeader);
     size = 0;
     for (std::size_t i = 16; i > 12 && header.size() == kGlbHeader; --i)
       size = size << 8U | static_cast<unsigned char>(header[i - 1]);
   }
-  const std::string json = readPart(file, binary ? kGlbHeader : 0, size);
+  const std::string json = readNext(file, size);
   const std::size_t list = json.find("\"extensionsRequired\"");
   if (list == std::string::npos) return;
   std::string_view names = std::string_view(json).substr(list);

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <assimp/IOStream.hpp>
-#include <filesystem>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -11,7 +10,7 @@ namespace hapticd::mesh_io {
 
 /// Throws std::runtime_error for a glTF file that requires an extension of meshes which Assimp ignores.
 /// `format`: gltf or glb.
-void refuseUnknownMeshes(const std::filesystem::path& file, const std::string& format);
+void refuseUnknownMeshes(Assimp::IOStream& file, const std::string& format);
 
 /// The file without a byte order mark before its text, without bytes after the last triangle of a binary STL,
 /// without indentation and comments behind numbers in OBJ, and in lower case where an STL is in upper case.

@@ -162,7 +162,11 @@ bool isSupported(const std::filesystem::path& file) {
 
 TriangleMesh readMesh(const std::filesystem::path& file) {
   const std::string format = formatOf(file);
-  if (format == "gltf" || format == "glb") refuseUnknownMeshes(file, format);
+  if (format == "gltf" || format == "glb") {
+    OnlyGeometry files(file);
+    const std::unique_ptr<Assimp::IOStream> content(files.Open(file.c_str(), "rb"));
+    if (content) refuseUnknownMeshes(*content, format);
+  }
   Assimp::Importer importer;
   keepOnly(importer, format);
   importer.SetIOHandler(new OnlyGeometry(file));  // which the importer deletes
