@@ -1,6 +1,8 @@
 // Effects, planes, fields, constraints, the buzz, and who owns them.
 #include <gmock/gmock.h>
 
+#include <malloc.h>
+
 #include "scene_fixture.h"
 
 namespace hapticd::scene {
@@ -22,6 +24,20 @@ class Forces : public SceneTest {
   }
   using SceneTest::SceneTest;
 };
+
+// Each of 50,000 numbers, of which no more than 64 exist at a time.
+TEST_F(Forces, EffectsThatAreGoneKeepNoMemory) {
+  const auto held = [] { return mallinfo2().uordblks; };  // 0 under sanitizers
+  const auto define = [this](std::int32_t first) {
+    for (std::int32_t i = first; i < first + 64; ++i) say(constant(i));
+    say(ResetScene{});
+  };
+  define(0);
+  const std::size_t before = held();
+  for (std::int32_t first = 64; first < 50'000; first += 64) define(first);
+  EXPECT_TRUE(notices_.empty());
+  EXPECT_LT(held(), before + (std::size_t{1} << 20));
+}
 
 TEST_F(Forces, EffectsAreInSiAndKeepOnlyWhatTheirTypeUses) {
   const double nan = std::nan("");
