@@ -19,8 +19,7 @@ inline std::string readToken(const std::string& file) {
   std::ifstream in(file);
   std::string token;
   if (!(in >> token)) throw std::runtime_error("cannot read a token from '" + file + "'");
-  constexpr std::size_t kShortest = 16;
-  if (token.size() < kShortest || token.size() > wire::Identify::kLongestToken)
+  if (token.size() < wire::Identify::kShortestToken || token.size() > wire::Identify::kLongestToken)
     throw std::runtime_error("the token in '" + file + "' has " + std::to_string(token.size()) +
                              " characters; a token has 16 to 128");
   return token;

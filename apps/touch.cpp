@@ -25,6 +25,7 @@
 #include "report_view.h"
 #include "server_list.h"
 #include "stop_signals.h"
+#include "wire/messages/extension.h"
 
 namespace hapticd::apps {
 namespace {
@@ -32,7 +33,7 @@ namespace {
 using namespace std::chrono_literals;
 using geometry::TriangleMesh;
 
-constexpr std::size_t kLongestName = 64;                          // of an object
+constexpr std::size_t kLongestName = decltype(wire::SetObjectName::text)::kMost;
 constexpr int kLastObject = std::numeric_limits<int>::max() - 1;  // their number must fit, too
 
 struct TouchOptions {

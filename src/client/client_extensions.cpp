@@ -184,8 +184,8 @@ void Client::rearmForces() {
 }
 
 void Client::presentToken(std::string_view token) {
-  constexpr std::size_t kShortest = 16;
-  if (!token.empty() && (token.size() < kShortest || token.size() > wire::Identify::kLongestToken)) {
+  if (!token.empty() &&
+      (token.size() < wire::Identify::kShortestToken || token.size() > wire::Identify::kLongestToken)) {
     throw std::invalid_argument("presentToken(): " + std::to_string(token.size()) +
                                 " characters; a token has 16 to 128");
   }

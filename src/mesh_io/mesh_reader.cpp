@@ -162,14 +162,13 @@ bool isSupported(const std::filesystem::path& file) {
 
 TriangleMesh readMesh(const std::filesystem::path& file) {
   const std::string format = formatOf(file);
-  if (format == "gltf" || format == "glb") {
-    OnlyGeometry files(file);
-    const std::unique_ptr<Assimp::IOStream> content(files.Open(file.c_str(), "rb"));
-    if (content) refuseUnknownMeshes(*content, format);
-  }
   Assimp::Importer importer;
   keepOnly(importer, format);
   importer.SetIOHandler(new OnlyGeometry(file));  // which the importer deletes
+  if (format == "gltf" || format == "glb") {
+    const std::unique_ptr<Assimp::IOStream> content(importer.GetIOHandler()->Open(file.c_str(), "rb"));
+    if (content) refuseUnknownMeshes(*content, format);
+  }
   // Only positions matter; points and lines go.
   importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS,
                               aiComponent_NORMALS | aiComponent_TANGENTS_AND_BITANGENTS | aiComponent_COLORS |

@@ -13,7 +13,7 @@
 namespace hapticd::server {
 namespace {
 
-constexpr std::size_t kShortest = 16;
+constexpr std::size_t kShortest = wire::Identify::kShortestToken;
 constexpr std::size_t kLongest = wire::Identify::kLongestToken;
 constexpr std::size_t kMostSources = 4096;
 constexpr std::uint32_t kRoot = 0;

@@ -388,6 +388,7 @@ struct HandState {
 
 /// Who a connection belongs to. A token is a secret: it must not be logged or recorded.
 struct Identify {
+  static constexpr std::size_t kShortestToken = 16;
   static constexpr std::size_t kLongestToken = 128;
   static constexpr MessageInfo kInfo{
       "hapticd Identify",
