@@ -157,6 +157,12 @@ endif()
 # Each test runs once: optimising it takes longer than it saves, but for tests that compute, and a third of the compile time.
 set(HAPTICD_TEST_OPTIONS -O0)
 set(HAPTICD_COMPUTING_TEST_OPTIONS $<$<CONFIG:Release>:-O1>)
+# Here the collector of GCC (see above) takes a tenth of the time.
+list(APPEND HAPTICD_TEST_OPTIONS $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=2000000>)
+if(HAPTICD_SANITIZE MATCHES "address" AND CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+  # The checks of ASan as calls: a fifth less to compile.
+  list(APPEND HAPTICD_TEST_OPTIONS "SHELL:-mllvm -asan-instrumentation-with-call-threshold=0")
+endif()
 
 # hapticd_test_support(NAME SOURCES ... [DEPENDS rooms ...] [LIBS ...]): sources that several test programs share, compiled
 # once; the programs name it in SUPPORT.

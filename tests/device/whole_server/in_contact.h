@@ -80,7 +80,8 @@ class InContact : public testing::Test {
   }
   void expectWords(const std::string& words) {
     EXPECT_TRUE(visitor->until([&] { return visitor->heard(words); })) << words << " is not in\n"
-                                                                       << visitor->texts();
+                                                                       << visitor->texts() << "the log:\n"
+                                                                       << server->log();
   }
   // The fault is over: forces come back, after a re-arm where the guard latched one.
   void heal(bool reopens) {

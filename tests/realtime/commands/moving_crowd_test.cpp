@@ -5,6 +5,7 @@
 #include <random>
 
 #include "loop.h"
+#include "reduced.h"
 
 namespace hapticd::realtime::commands {
 namespace {
@@ -121,7 +122,7 @@ INSTANTIATE_TEST_SUITE_P(, MovingCrowd,
 TEST_P(MovingCrowd, rising_floor_takes_the_hand_along) {
   constexpr double kDepth_mm = 4;
   const Vec3 hip(0.001, 1e-3 * radius_mm(), 0.002);
-  const int runs = others() > 200 ? 2 : 8;
+  const int runs = reduced(others() > 200 ? 2 : 8);
   for (int run = 0; run < runs; ++run) {
     Loop loop({.toolRadius_m = std::get<1>(GetParam())}, roomy());
     loop.send(scene::SetTouchableFaces{0});
