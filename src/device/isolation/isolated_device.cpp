@@ -28,13 +28,20 @@ constexpr Nanos kMillisecond = 1'000'000;
 constexpr int kOpen_ms = 30000;
 constexpr int kCalibrate_ms = 60000;
 constexpr int kAnswer_ms = 2000;
-constexpr int kWords_ms = 200;
+constexpr int kGoodbye_ms = 200;  // of a silent process
 constexpr int kEnding_ms = 100;
+constexpr int kGlance_ms = 5;  // the thread that asks for a fault has other things to do
+constexpr Nanos kNoAnswer = 2'000'000'000;
 constexpr int kInterrupt_ms = 50;
 constexpr Nanos kInOrder = 2'000'000'000;
 constexpr Nanos kSilence = 20'000'000;
 constexpr Nanos kSilentTick = 10'000'000;
 constexpr double kOneTick_s = 0.001;
+constexpr const char* kFault = "fault";  // the request for faultText()
+
+struct NoAnswer : std::runtime_error {
+  NoAnswer() : std::runtime_error("the driver's process does not answer") {}
+};
 
 // The text of an answer; throws it when it is a refusal.
 std::string textOf(const std::string& answer) {
@@ -54,6 +61,7 @@ void IsolatedDevice::open() {
   socket_ = ends[0];
   unanswered_ = 0;
   late_.clear();
+  fault_.reset();
   try {
     spawn(ends[1]);
     ::close(ends[1]);
@@ -114,7 +122,7 @@ std::string IsolatedDevice::receive(Nanos end, Wait wait) const {
       throw std::runtime_error("the device is being closed for good");
     const Nanos left_ms = std::clamp<Nanos>((end - base::now()) / kMillisecond, 0, kInterrupt_ms);
     if (poll(&wanted, 1, static_cast<int>(left_ms)) != 0) break;
-    if (left_ms == 0) throw std::runtime_error("the driver's process does not answer");
+    if (left_ms == 0) throw NoAnswer();
   }
   std::array<char, 4096> text;
   const long size = recv(socket_, text.data(), text.size(), 0);
@@ -128,20 +136,26 @@ std::string IsolatedDevice::ask(const std::string& request, int most_ms, Wait wa
   const std::unique_lock lock(socketMutex_, std::try_to_lock);
   if (!lock) throw std::runtime_error("the driver's process is busy with another request");
   if (socket_ < 0) throw std::runtime_error("the device is not open");
-  send(socket_, request.data(), request.size(), MSG_NOSIGNAL);
+  send(request);
+  return takeAnswers(base::now() + most_ms * kMillisecond, wait);
+}
+
+void IsolatedDevice::send(const std::string& request) const {
+  ::send(socket_, request.data(), request.size(), MSG_NOSIGNAL);
   ++unanswered_;
-  const Nanos end = base::now() + most_ms * kMillisecond;
-  // Answers come in the order of the requests, and those to requests that timed out come first. A driver
-  // tells of some faults once, so the text of such an answer is kept.
+  asked_ = base::now();
+  faultAsked_ = request == kFault;
+}
+
+// Answers come in the order of the requests, and those to requests that timed out come first. A driver tells
+// of some faults once, so the text of such an answer is kept.
+std::string IsolatedDevice::takeAnswers(Nanos end, Wait wait) const {
   std::string answer = receive(end, wait);
   while (--unanswered_ > 0) {
     if (answer.size() > 1 && answer.starts_with('+')) late_ = answer.substr(1);
     answer = receive(end, wait);
   }
-  std::string text = textOf(answer);
-  if (request != "fault") return text;
-  const std::string late = std::exchange(late_, {});
-  return text.empty() ? late : text;
+  return textOf(answer);
 }
 
 std::string IsolatedDevice::howItEnded(int most_ms) const {
@@ -193,7 +207,7 @@ void IsolatedDevice::stop() noexcept {
   stopping_ = true;
   thread_.join();
   try {
-    ask("stop", silent_ ? kWords_ms : kAnswer_ms);
+    ask("stop", silent_ ? kGoodbye_ms : kAnswer_ms);
   } catch (const std::exception&) {
     // A process that is gone has stopped.
   }
@@ -262,11 +276,21 @@ std::string IsolatedDevice::faultText() const {
     if (!ended.empty()) return "the driver's process ended" + ended + "; open the device anew";
     return "the driver's process posts no states; open the device anew";
   }
+  const std::unique_lock lock(socketMutex_, std::try_to_lock);
+  if (!lock) return "the driver's process is busy with another request";
+  if (socket_ < 0) return "the device is not open";
+  if (unanswered_ == 0 || !faultAsked_) send(kFault);
   try {
-    return ask("fault", kWords_ms);
+    fault_ = takeAnswers(base::now() + kGlance_ms * kMillisecond, Wait::toTheEnd);
+    const std::string late = std::exchange(late_, {});
+    if (fault_->empty()) fault_ = late;
+  } catch (const NoAnswer& error) {
+    if (base::now() - asked_ > kNoAnswer) return error.what();
+    if (!fault_) return "the driver's process has not answered yet";
   } catch (const std::exception& error) {
     return error.what();
   }
+  return *fault_;
 }
 
 void IsolatedDevice::calibrate() {

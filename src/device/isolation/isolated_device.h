@@ -11,6 +11,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,7 @@ class IsolatedDevice final : public Device {
   bool write(const Vec3& force_N) noexcept override;
   bool zeroFromOtherThread() noexcept override;
 
+  /// Waits 5 ms at most for the driver's process, and tells what that said last where it takes longer.
   std::string faultText() const override;
   bool lost() const noexcept override { return silent_ || lostThere_; }
   void calibrate() override;
@@ -64,6 +66,8 @@ class IsolatedDevice final : public Device {
   enum class Wait { toTheEnd, untilInterrupted };
   std::string receive(Nanos end, Wait wait) const;
   std::string ask(const std::string& request, int most_ms, Wait wait = Wait::toTheEnd) const;
+  void send(const std::string& request) const;
+  std::string takeAnswers(Nanos end, Wait wait) const;
   std::string howItEnded(int most_ms) const;
   void run() noexcept;
   void waitForPost(std::uint32_t seen) const noexcept;
@@ -77,7 +81,10 @@ class IsolatedDevice final : public Device {
   int socket_ = -1;
   mutable std::mutex socketMutex_;
   mutable int unanswered_ = 0;
-  mutable std::string late_;  // text of a fault whose answer came too late
+  mutable Nanos asked_ = 0;                   // the last request
+  mutable bool faultAsked_ = false;           // by that request
+  mutable std::string late_;                  // text of a fault that the answer to a later request follows
+  mutable std::optional<std::string> fault_;  // the last answer
 
   std::function<void(Nanos)> onTick_;
   base::BlockingThread thread_;

@@ -148,9 +148,27 @@ TEST_P(IsolationTest, WhatTheDriverSaysTooLateIsNotLost) {
   IsolatedDevice device(host(GetParam()));
   device.open();
   hand->fault = 3;
-  EXPECT_THAT(device.faultText(), HasSubstr("does not answer"));
+  EXPECT_THAT(device.faultText(), HasSubstr("has not answered yet"));
   std::this_thread::sleep_for(400ms);  // until the answer is there; the test passes also when it is not
   EXPECT_TRUE(eventually([&] { return device.faultText() == "told once"; }));
+  EXPECT_TRUE(eventually([&] { return device.faultText().empty(); }));
+}
+
+// The server's network thread asks, and a stop must not wait for the answer.
+TEST_P(IsolationTest, AProcessThatDoesNotAnswerDelaysNobody) {
+  IsolatedDevice device(host(GetParam()));
+  device.open();
+  EXPECT_TRUE(eventually([&] { return device.faultText() == "words of the driver"; }));
+  hand->fault = 6;
+  auto fastest = std::chrono::steady_clock::duration::max();  // a stall may delay some
+  for (int i = 0; i < 10; ++i) {
+    const auto begin = std::chrono::steady_clock::now();
+    EXPECT_EQ(device.faultText(), "words of the driver") << "what it said last";
+    fastest = std::min(fastest, std::chrono::steady_clock::now() - begin);
+  }
+  EXPECT_LT(fastest, 100ms);
+  EXPECT_TRUE(eventually([&] { return device.faultText() == "the driver's process does not answer"; }));
+  hand->fault = 4;
   EXPECT_TRUE(eventually([&] { return device.faultText().empty(); }));
 }
 
@@ -159,7 +177,7 @@ TEST_P(IsolationTest, ALateAnswerIsNotTakenForThatOfTheNextRequest) {
   device.open();
   hand->calibrations = 1;  // the next one is refused
   hand->fault = 3;
-  EXPECT_THAT(device.faultText(), HasSubstr("does not answer"));
+  EXPECT_THAT(device.faultText(), HasSubstr("has not answered yet"));
   EXPECT_THROW(device.calibrate(), std::runtime_error);
   EXPECT_EQ(hand->calibrations, 2);
 }

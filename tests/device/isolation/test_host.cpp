@@ -48,6 +48,7 @@ class ObservedDevice final : public Device {
     return true;
   }
   std::string faultText() const override {
+    while (hand_.fault == 6) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     if (hand_.fault == 4) return {};
     if (hand_.fault != 3) return "words of the driver";
     hand_.fault = 4;

@@ -86,6 +86,7 @@ class InContact : public testing::Test {
   // The fault is over: forces come back, after a re-arm where the guard latched one.
   void heal(bool reopens) {
     const int opened = arm->opened;
+    visitor->forget();  // a stall before may have made the device work again, too
     arm->fault = mock::kHealthy;
     if (reopens) {
       EXPECT_TRUE(visitor->until([&] { return arm->opened > opened; })) << server->log();
