@@ -14,7 +14,7 @@ using base::Nanos;
 
 constexpr Nanos kReopenAfter = 500'000'000;  // devices recover from shorter losses themselves
 // A driver in another process may not have told yet why its device is lost, and a new process does not know.
-constexpr Nanos kReopenUnexplainedAfter = 3'000'000'000;
+constexpr Nanos kReopenUnexplainedAfter = 6'000'000'000;
 constexpr Nanos kRetryInterval = 2'000'000'000;
 constexpr Nanos kHang = 1'000'000'000;  // a loop without a tick for so long is reported
 

@@ -251,17 +251,17 @@ TEST_P(KeeperTest, ALossThatIsNotExplainedYetIsReopenedOnlyAfterAWhile) {
   device_.isExplained = false;
   device_.isLost = true;
   EXPECT_EQ(keeper_.poll(1000 * kMs), "");
-  EXPECT_EQ(keeper_.poll(3900 * kMs), "");
+  EXPECT_EQ(keeper_.poll(6900 * kMs), "");
   EXPECT_EQ(device_.opens + device_.closes, 0);
   device_.isExplained = true;
-  EXPECT_EQ(keeper_.poll(3950 * kMs), "the cable is out");
-  EXPECT_EQ(faultAt(4000 * kMs), "");
+  EXPECT_EQ(keeper_.poll(6950 * kMs), "the cable is out");
+  EXPECT_EQ(faultAt(7000 * kMs), "");
   EXPECT_EQ(device_.opens, 1);
   device_.isExplained = false;
   device_.isLost = true;
   EXPECT_EQ(keeper_.poll(10'000 * kMs), "");
-  EXPECT_EQ(keeper_.poll(13'001 * kMs), "");
-  EXPECT_EQ(faultAt(13'100 * kMs), "");
+  EXPECT_EQ(keeper_.poll(16'001 * kMs), "");
+  EXPECT_EQ(faultAt(16'100 * kMs), "");
   EXPECT_EQ(device_.opens, 2);
 }
 
