@@ -203,13 +203,17 @@ class Attacks : public InContact {
     peers_.clear();
     sockets_.clear();
     EXPECT_TRUE(visitor->until([&] {
-      if (visitor->latched() || visitor->client().latest().guard.stopped) {
+      const GuardReport& guard = visitor->client().latest().guard;
+      if (visitor->latched() || guard.stopped) {
         visitor->client().rearmForces();
         visitor->client().runFor(20ms);
+        return false;
       }
-      return rests();
+      return rests() || arm.left().norm() < kNothing_N;
     })) << "after: "
         << server->log();
+    if (!rests())
+      touch();  // a stall of the machine may have released a contact, which the hand must leave then
     rows_.push_back(row_);
   }
 
