@@ -1,7 +1,8 @@
 #include "net/asio_listener.h"
 
-#include <cerrno>
+#include <unistd.h>
 
+#include "net/acceptor.h"
 #include "net/socket_options.h"
 #include "net/tcp_connection.h"
 //
@@ -15,15 +16,16 @@ using boost::system::error_code;
 
 namespace {
 
-class AsioListener final : public TcpListener::Impl, public std::enable_shared_from_this<AsioListener> {
+class AsioListener final : public Acceptor {
  public:
-  AsioListener(AsioLoop& loop, const Endpoint& local, std::function<void(Connection)> onAccept,
-               const ConnectionOptions& options, const char* option)
-      : loop_(loop),
+  AsioListener(AsioLoop& loop, std::function<void(Connection)> onAccept, const ConnectionOptions& options)
+      : Acceptor(loop),
+        loop_(loop),
         acceptor_(loop.context),
-        retry_(loop.context),
         onAccept_(std::move(onAccept)),
-        options_(options) {
+        options_(options) {}
+
+  void listen(const Endpoint& local, const char* option) {
     try {
       acceptor_.open(tcp::v4());
       setCloseOnExec(acceptor_.native_handle());
@@ -32,79 +34,71 @@ class AsioListener final : public TcpListener::Impl, public std::enable_shared_f
       acceptor_.listen(kBacklog);
       acceptor_.non_blocking(true);
       local_ = fromAsio(acceptor_.local_endpoint());
+      address_ = local_.text();
     } catch (const boost::system::system_error& error) {
       throw Error(bindErrorText("TCP", local, error.code().value(), option));
     }
+    start();
   }
 
-  void arm() {
-    acceptor_.async_wait(tcp::acceptor::wait_read, [this, self = shared_from_this()](const error_code&) {
-      if (acceptor_.is_open()) {
-        acceptPending();
-      }
-    });
-  }
-
-  void close() noexcept override {
-    loop_.guard([this] {
-      error_code ignored;
-      acceptor_.close(ignored);
-      retry_.cancel();
-    });
+  void listenLocally(int fd, std::string address) {
+    address_ = std::move(address);
+    local_ = {kLoopbackAddress, 0};
+    isLocal_ = true;
+    error_code error;
+    acceptor_.assign(tcp::v4(), fd, error);  // Asio does not look at the kind
+    if (error) {
+      ::close(fd);
+      throw Error("cannot watch the Unix socket " + address_ + ": " + error.message());
+    }
+    acceptor_.non_blocking(true);
+    start();
   }
 
   const Endpoint& local() const override { return local_; }
 
  private:
   static constexpr int kBacklog = 4096;
-  static constexpr int kMostPerWake = 8;  // others have their turn in between
-  static constexpr std::chrono::milliseconds kRetry{100};
 
-  void acceptPending() {
-    for (int i = 0; i < kMostPerWake && acceptor_.is_open(); ++i) {
-      tcp::socket socket(loop_.context);
-      error_code error;
-      acceptor_.accept(socket, error);
-      if (!error) {
-        handOver(std::move(socket));
-      } else if (error == asio::error::would_block) {
-        break;
-      } else if (error == asio::error::no_descriptors || error == asio::error::no_memory ||
-                 error == asio::error::no_buffer_space || error.value() == ENFILE) {
-        retryLater(error);
-        return;
-      }  // any other error belongs to a connection that ended in the queue
-    }
-    if (acceptor_.is_open()) {
-      arm();
-    }
-  }
-
-  void handOver(tcp::socket socket) {
+  int acceptOne() override {
+    tcp::socket socket(loop_.context);
+    error_code error;
+    acceptor_.accept(socket, error);
+    if (error) return error.value();
     loop_.guard([&] {
       auto impl = std::make_shared<TcpConnection>(loop_, options_);
-      impl->adopt(std::move(socket));
+      if (isLocal_) {
+        impl->adoptLocal(std::move(socket));
+      } else {
+        impl->adopt(std::move(socket));
+      }
       onAccept_(Connection(std::move(impl)));
+    });
+    return 0;
+  }
+
+  void waitForConnection() override {
+    acceptor_.async_wait(tcp::acceptor::wait_read, [this, self = shared_from_this()](const error_code&) {
+      if (isOpen()) acceptPending();
     });
   }
 
-  // The connection stays pending, so waiting for readiness would spin.
-  void retryLater(const error_code& error) {
-    loop_.report("cannot accept a connection on " + local_.text() + ": " + error.message());
-    retry_.expires_after(kRetry);
-    retry_.async_wait([this, self = shared_from_this()](const error_code&) {
-      if (acceptor_.is_open()) {
-        acceptPending();
-      }
-    });
+  bool connectionWaits() noexcept override { return isReadable(acceptor_.native_handle()); }
+
+  void closeSocket() noexcept override {
+    error_code ignored;
+    acceptor_.close(ignored);
   }
+
+  std::string address() const override { return address_; }
 
   AsioLoop& loop_;
   tcp::acceptor acceptor_;
-  asio::steady_timer retry_;
   std::function<void(Connection)> onAccept_;
   ConnectionOptions options_;
   Endpoint local_;
+  std::string address_;
+  bool isLocal_ = false;  // a Unix socket
 };
 
 }  // namespace
@@ -112,8 +106,16 @@ class AsioListener final : public TcpListener::Impl, public std::enable_shared_f
 std::shared_ptr<TcpListener::Impl> listenWithAsio(AsioLoop& loop, const Endpoint& local,
                                                   std::function<void(Connection)> onAccept,
                                                   const ConnectionOptions& options, const char* option) {
-  auto listener = std::make_shared<AsioListener>(loop, local, std::move(onAccept), options, option);
-  listener->arm();
+  auto listener = std::make_shared<AsioListener>(loop, std::move(onAccept), options);
+  listener->listen(local, option);
+  return listener;
+}
+
+std::shared_ptr<TcpListener::Impl> listenLocallyWithAsio(AsioLoop& loop, int fd, std::string address,
+                                                         std::function<void(Connection)> onAccept,
+                                                         const ConnectionOptions& options) {
+  auto listener = std::make_shared<AsioListener>(loop, std::move(onAccept), options);
+  listener->listenLocally(fd, std::move(address));
   return listener;
 }
 

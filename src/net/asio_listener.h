@@ -9,5 +9,9 @@ namespace hapticd::net {
 std::shared_ptr<TcpListener::Impl> listenWithAsio(AsioLoop& loop, const Endpoint& local,
                                                   std::function<void(Connection)> onAccept,
                                                   const ConnectionOptions& options, const char* option);
+/// See Loop::Impl::listenLocal().
+std::shared_ptr<TcpListener::Impl> listenLocallyWithAsio(AsioLoop& loop, int fd, std::string address,
+                                                         std::function<void(Connection)> onAccept,
+                                                         const ConnectionOptions& options);
 
 }  // namespace hapticd::net

@@ -226,6 +226,12 @@ std::shared_ptr<Connection::Impl> AsioLoop::adopt(int fd, const ConnectionOption
   return connection;
 }
 
+std::shared_ptr<TcpListener::Impl> AsioLoop::listenLocal(int fd, std::string address,
+                                                         std::function<void(Connection)> onAccept,
+                                                         const ConnectionOptions& options) {
+  return listenLocallyWithAsio(*this, fd, std::move(address), std::move(onAccept), options);
+}
+
 std::shared_ptr<UdpSocket::Impl> AsioLoop::bind(const Endpoint& local) {
   return bindWithAsio(*this, local);
 }

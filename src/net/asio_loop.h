@@ -37,6 +37,9 @@ class AsioLoop final : public Loop::Impl {
                                             const ConnectionOptions& options, const char* option) override;
   std::shared_ptr<UdpSocket::Impl> bind(const Endpoint& local) override;
   std::shared_ptr<Connection::Impl> adopt(int fd, const ConnectionOptions& options) override;
+  std::shared_ptr<TcpListener::Impl> listenLocal(int fd, std::string address,
+                                                 std::function<void(Connection)> onAccept,
+                                                 const ConnectionOptions& options) override;
   bool hasLocalSockets() const noexcept override { return true; }
 
   /// How much one connection may read in its turn: the connections that send faster than they are read share

@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "net/loop_impl.h"
@@ -71,19 +72,22 @@ fs::path temporaryFolder(std::uint32_t user) {
   return "/tmp/hapticd-" + std::to_string(user);
 }
 
-}  // namespace
-
-class LocalListener::Descriptor {
+class Descriptor {
  public:
   explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() { ::close(fd_); }
+  ~Descriptor() {
+    if (fd_ >= 0) ::close(fd_);
+  }
   Descriptor(const Descriptor&) = delete;
   Descriptor& operator=(const Descriptor&) = delete;
   int fd() const { return fd_; }
+  int release() { return std::exchange(fd_, -1); }
 
  private:
   int fd_;
 };
+
+}  // namespace
 
 std::optional<std::uint32_t> peerUser(const Connection& connection) noexcept {
   const int fd = connection.nativeHandle();
@@ -99,17 +103,17 @@ std::optional<std::uint32_t> peerUser(const Connection& connection) noexcept {
 
 LocalListener::LocalListener(Loop& loop, fs::path path, std::function<void(Connection)> onAccept,
                              const ConnectionOptions& options)
-    : loop_(loop), path_(std::move(path)), onAccept_(std::move(onAccept)), options_(options) {
+    : path_(std::move(path)) {
   constexpr int kBacklog = 256;
   if (!loop.impl().hasLocalSockets()) throw Error("this network has no Unix sockets");
   if (::mkdir(path_.parent_path().c_str(), 0700) != 0 && errno != EEXIST) fail(path_.parent_path(), errno);
   // Whoever owns the folder can put another server in this one's place.
   const auto owner = ownerOf(path_.parent_path());
   if (owner && *owner != geteuid() && *owner != 0) fail(path_.parent_path(), EPERM);
-  descriptor_ = std::make_unique<Descriptor>(openSocket(path_));
+  Descriptor descriptor(openSocket(path_));
   const sockaddr_un address = addressOf(path_);
   const auto bind = [&] {
-    return ::bind(descriptor_->fd(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+    return ::bind(descriptor.fd(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
   };
   if (!bind()) {
     if (errno != EADDRINUSE) fail(path_, errno);
@@ -119,30 +123,13 @@ LocalListener::LocalListener(Loop& loop, fs::path path, std::function<void(Conne
     if (!bind()) fail(path_, errno);
   }
   ::chmod(path_.c_str(), 0666);
-  if (::listen(descriptor_->fd(), kBacklog) != 0) fail(path_, errno);
-  watch_ = loop_.watchFd(descriptor_->fd(), [this] { acceptPending(); });
+  if (::listen(descriptor.fd(), kBacklog) != 0) fail(path_, errno);
+  impl_ = loop.impl().listenLocal(descriptor.release(), path_, std::move(onAccept), options);
 }
 
 LocalListener::~LocalListener() {
-  watch_.cancel();
+  impl_->close();
   ::unlink(path_.c_str());
-}
-
-void LocalListener::acceptPending() {
-  constexpr int kMostPerWake = 8;  // others have their turn in between
-  for (int i = 0; i < kMostPerWake; ++i) {
-    const int fd = ::accept4(descriptor_->fd(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
-    if (fd >= 0) {
-      onAccept_(Connection(loop_.impl().adopt(fd, options_)));
-      continue;
-    }
-    if (errno != EMFILE && errno != ENFILE && errno != ENOMEM && errno != ENOBUFS) return;
-    // The connection stays pending, so waiting for readiness would spin.
-    watch_.cancel();
-    retry_ = loop_.after(std::chrono::milliseconds(100),
-                         [this] { watch_ = loop_.watchFd(descriptor_->fd(), [this] { acceptPending(); }); });
-    return;
-  }
 }
 
 Connection connectLocal(Loop& loop, const fs::path& path, const ConnectionOptions& options) {

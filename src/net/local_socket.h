@@ -11,6 +11,7 @@
 
 #include "net/connection.h"
 #include "net/endpoint.h"
+#include "net/tcp_listener.h"
 
 namespace hapticd::net {
 
@@ -22,7 +23,7 @@ std::optional<std::uint32_t> peerUser(const Connection& connection) noexcept;
 inline constexpr std::size_t kLongestSocketPath = 107;
 
 /// Accepts connections at a path of the file system; the destructor removes the socket. Every local user who
-/// may enter the folder can connect.
+/// may enter the folder can connect. Without a file descriptor left it does as TcpListener.
 class LocalListener {
  public:
   /// Creates the last folder of the path (mode 0700) when it is missing, and replaces a socket that nobody
@@ -36,16 +37,8 @@ class LocalListener {
   const std::filesystem::path& path() const noexcept { return path_; }
 
  private:
-  class Descriptor;
-  void acceptPending();
-
-  Loop& loop_;
   std::filesystem::path path_;
-  std::function<void(Connection)> onAccept_;
-  ConnectionOptions options_;
-  std::unique_ptr<Descriptor> descriptor_;
-  Subscription watch_;
-  Subscription retry_;
+  std::shared_ptr<TcpListener::Impl> impl_;
 };
 
 /// A connection to a server at this path, open at once. Throws Error.

@@ -54,6 +54,10 @@ class Loop::Impl {
   virtual std::shared_ptr<UdpSocket::Impl> bind(const Endpoint& local) = 0;
   /// Takes over a connected stream socket that is no TCP socket; only where hasLocalSockets().
   virtual std::shared_ptr<Connection::Impl> adopt(int fd, const ConnectionOptions& options);
+  /// Takes over a Unix socket that listens at this address; only where hasLocalSockets().
+  virtual std::shared_ptr<TcpListener::Impl> listenLocal(int fd, std::string address,
+                                                         std::function<void(Connection)> onAccept,
+                                                         const ConnectionOptions& options);
   virtual bool hasLocalSockets() const noexcept { return false; }
 
   /// Hands a text to the error handler.

@@ -67,6 +67,11 @@ PeerEnd peerEnd(int fd) noexcept {
   return (request.revents & POLLRDHUP) != 0 ? PeerEnd::closed : PeerEnd::none;
 }
 
+bool isReadable(int fd) noexcept {
+  pollfd request{fd, POLLIN, 0};
+  return ::poll(&request, 1, 0) > 0;
+}
+
 // SO_RCVBUF is limited to net.core.rmem_max (208 KiB) and ends the automatic growth. The low-water mark
 // enlarges the buffer as a side effect, up to tcp_rmem's maximum, and can be set back.
 void widenReceiveBuffer(int fd) noexcept {

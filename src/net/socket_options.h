@@ -26,6 +26,8 @@ std::optional<LinkState> linkState(int fd) noexcept;
 enum class PeerEnd { none, closed, reset };
 /// Sees an end also behind unread bytes; consumes neither bytes nor the pending error.
 PeerEnd peerEnd(int fd) noexcept;
+/// Of a listening socket: a connection waits.
+bool isReadable(int fd) noexcept;
 /// Lets the system take in as much as its limits allow (half of tcp_rmem's maximum) while nobody reads, so
 /// that the end of the peer can arrive. Otherwise the receive buffer grows only with reading.
 void widenReceiveBuffer(int fd) noexcept;

@@ -73,11 +73,19 @@ void TcpConnection::adopt(Socket socket) {
 }
 
 void TcpConnection::adoptLocal(int fd) {
-  ErrorCode error;
-  socket_.assign(tcp::v4(), fd, error);  // Asio does not look at the kind
-  socket_.non_blocking(true, error);
+  Socket socket(loop_.context);
+  ErrorCode ignored;                      // the next call on the socket fails, too
+  socket.assign(tcp::v4(), fd, ignored);  // Asio does not look at the kind
+  adoptLocal(std::move(socket));
+}
+
+void TcpConnection::adoptLocal(Socket socket) {
+  socket_ = std::move(socket);
   local_ = remote_ = {kLoopbackAddress, 0};
   state_ = State::open;
+  setCloseOnExec(socket_.native_handle());
+  ErrorCode error;
+  socket_.non_blocking(true, error);
   if (error) finish("cannot watch the connection: " + error.message());
 }
 

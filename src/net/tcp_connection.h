@@ -26,6 +26,7 @@ class TcpConnection final : public Connection::Impl,
   /// Takes over an accepted socket; its reading waits for start().
   void adopt(Socket socket);
   /// The same for a Unix-domain stream socket, which behaves as one of TCP without addresses.
+  void adoptLocal(Socket socket);
   void adoptLocal(int fd);
 
   void start(ConnectionHandlers handlers) override;

@@ -9,8 +9,8 @@
 namespace hapticd::net {
 
 /// Listens from construction to destruction and hands each new connection, not yet started, to its callback.
-/// When the process has no file descriptor left, it reports to the loop's error handler and tries again
-/// later.
+/// While the process has no file descriptor left, it reports that to the loop's error handler once a second,
+/// and new connections wait.
 class TcpListener {
  public:
   class Impl;

@@ -7,9 +7,12 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <deque>
 #include <limits>
 #include <stdexcept>
 #include <system_error>
+
+#include "net/acceptor.h"
 
 namespace hapticd::net {
 
@@ -37,7 +40,7 @@ bool matches(const Endpoint& bound, const Endpoint& wanted) {
 class FakeLoop final : public Loop::Impl {
  public:
   explicit FakeLoop(FakeNetwork& network) : network_(network), number_(network.queues_.size()) {
-    network.queues_.push_back({this, {}});
+    network.queues_.push_back({.loop = this, .events = {}});
   }
   // What the events hold may send as it goes.
   ~FakeLoop() override {
@@ -101,12 +104,38 @@ class FakeLoop final : public Loop::Impl {
     at(network_.time() + network_.options.delay, std::move(function));
   }
   FakeNetwork& network() { return network_; }
+  std::size_t number() const { return number_; }
 
  private:
   FakeNetwork& network_;
   const std::size_t number_;
   bool stopped_ = false;
   std::size_t handled_ = 0;
+};
+
+// That of a socket, from open() or accept() to close().
+class FakeDescriptor {
+ public:
+  static bool available(const FakeLoop& loop, const FakeNetwork& network) {
+    const auto& program = network.queues_[loop.number()];
+    return !program.most || program.sockets < *program.most;
+  }
+  /// 0 or EMFILE.
+  int open(FakeLoop& loop) {
+    if (!available(loop, loop.network())) return EMFILE;
+    network_ = &loop.network();
+    number_ = loop.number();
+    ++network_->queues_[number_].sockets;
+    return 0;
+  }
+  void close() noexcept {
+    if (network_ != nullptr) --network_->queues_[number_].sockets;
+    network_ = nullptr;
+  }
+
+ private:
+  FakeNetwork* network_ = nullptr;
+  std::size_t number_ = 0;
 };
 
 namespace {
@@ -181,8 +210,13 @@ class FakeConnection final : public Connection::Impl, public std::enable_shared_
         local_(local),
         remote_(remote) {}
 
+  /// 0 or EMFILE.
+  int openDescriptor() { return descriptor_.open(loop_); }
+
   void connect(milliseconds timeout) {
     const std::string what = "cannot connect to " + remote_.text() + ": ";
+    if (const int error = openDescriptor(); error != 0)
+      return finish(what + std::system_category().message(error));
     armTimer(timeout, what + "no answer within " + std::to_string(timeout.count()) + " ms");
     const auto self = shared_from_this();
     FakeListener* const listener = network_.listenerAt(remote_);
@@ -221,7 +255,7 @@ class FakeConnection final : public Connection::Impl, public std::enable_shared_
   }
   void send(std::shared_ptr<const Buffer> buffer, Delivery delivery) override {
     if (!sendable()) return;
-    queue_.push(std::move(buffer), delivery);
+    queue_.push(std::move(buffer), delivery, blocked_ && options_.unsentLimitBytes > 0);
     if (queue_.cost() <= options_.hardLimitBytes) return;
     flush();
     if (sendable() && queue_.cost() > options_.hardLimitBytes) {
@@ -484,6 +518,7 @@ class FakeConnection final : public Connection::Impl, public std::enable_shared_
     if (state_ == State::closed) return;
     const bool resets = aborted_ || !unread_.empty();
     state_ = State::closed;
+    descriptor_.close();
     ++timerNumber_;
     queue_.clear();
     blocked_ = false;
@@ -505,6 +540,7 @@ class FakeConnection final : public Connection::Impl, public std::enable_shared_
   Endpoint local_;
   Endpoint remote_;
   std::weak_ptr<FakeConnection> other_;
+  FakeDescriptor descriptor_;
   State state_ = State::connecting;
   Buffer unread_;             // arrived
   std::size_t inFlight_ = 0;  // sent, not yet arrived
@@ -525,31 +561,62 @@ class FakeConnection final : public Connection::Impl, public std::enable_shared_
   std::uint64_t bytesOut_ = 0;
 };
 
-class FakeListener final : public TcpListener::Impl {
+class FakeListener final : public Acceptor {
  public:
   FakeListener(FakeLoop& loop, const Endpoint& local, std::function<void(Connection)> onAccept,
                const ConnectionOptions& options)
-      : loop_(loop), local_(local), onAccept_(std::move(onAccept)), options_(options) {
+      : Acceptor(loop), loop_(loop), local_(local), onAccept_(std::move(onAccept)), options_(options) {
     loop_.network().listeners_.push_back(this);
   }
 
-  void close() noexcept override { std::erase(loop_.network().listeners_, this); }
   const Endpoint& local() const override { return local_; }
 
   FakeLoop& loop() { return loop_; }
-  void accept(const std::shared_ptr<FakeConnection>& client) {
+  // The system establishes the connection, whether or not the program accepts it.
+  void arrive(const std::shared_ptr<FakeConnection>& client) {
+    const auto self = shared_from_this();
     auto here = std::make_shared<FakeConnection>(loop_, options_, client->remote(), client->local());
     loop_.network().connections_.push_back(here);
     here->establish(client);
     client->establish(here);
-    loop_.guard([&] { onAccept_(Connection(here)); });
+    pending_.push_back(std::move(here));
+    if (std::exchange(waits_, false)) acceptPending();
   }
 
  private:
+  // As Linux does it: the descriptor first.
+  int acceptOne() override {
+    FakeNetwork& network = loop_.network();
+    if (!FakeDescriptor::available(loop_, network)) {
+      if (network.options.refusedAccept) network.options.refusedAccept(local_, pending_.size());
+      return EMFILE;
+    }
+    if (pending_.empty()) return EAGAIN;
+    const auto here = std::move(pending_.front());
+    pending_.pop_front();
+    here->openDescriptor();
+    loop_.guard([&] { onAccept_(Connection(here)); });
+    return 0;
+  }
+  void waitForConnection() override {
+    waits_ = pending_.empty();
+    if (waits_) return;
+    loop_.at(loop_.network().time(), [this, self = shared_from_this()] {
+      if (isOpen()) acceptPending();
+    });
+  }
+  bool connectionWaits() noexcept override { return !pending_.empty(); }
+  void closeSocket() noexcept override {
+    std::erase(loop_.network().listeners_, this);
+    for (const auto& here : std::exchange(pending_, {})) here->abort("");
+  }
+
   FakeLoop& loop_;
   const Endpoint local_;
   const std::function<void(Connection)> onAccept_;
   const ConnectionOptions options_;
+  std::deque<std::shared_ptr<FakeConnection>> pending_;  // established, not accepted
+  bool waits_ = false;                                   // for one to arrive
 };
 
 // The listener accepts after one delay, the client learns of it after two.
@@ -557,7 +624,7 @@ void FakeConnection::announce() {
   const auto self = shared_from_this();
   network_.listenerAt(remote_)->loop().arriving([self] {
     FakeListener* const listener = self->network_.listenerAt(self->remote_);
-    if (listener != nullptr && self->state_ == State::connecting && !self->cut_) listener->accept(self);
+    if (listener != nullptr && self->state_ == State::connecting && !self->cut_) listener->arrive(self);
     self->loop_.arriving([self] {
       if (self->state_ == State::connecting && !self->cut_) {
         self->finish("cannot connect to " + self->remote_.text() + ": Connection refused");
@@ -572,6 +639,7 @@ void FakeConnection::announce() {
 class FakeUdpSocket final : public UdpSocket::Impl, public std::enable_shared_from_this<FakeUdpSocket> {
  public:
   FakeUdpSocket(FakeLoop& loop, const Endpoint& local) : loop_(loop), local_(local) {
+    if (const int error = descriptor_.open(loop); error != 0) throw Error(bindErrorText("UDP", local, error));
     loop_.network().udpSockets_.push_back(this);
   }
 
@@ -618,6 +686,7 @@ class FakeUdpSocket final : public UdpSocket::Impl, public std::enable_shared_fr
   void close() noexcept override {
     handlers_.reset();
     std::erase(loop_.network().udpSockets_, this);
+    descriptor_.close();
     open_ = false;
   }
   const Endpoint& local() const override { return local_; }
@@ -643,6 +712,7 @@ class FakeUdpSocket final : public UdpSocket::Impl, public std::enable_shared_fr
 
   FakeLoop& loop_;
   Endpoint local_;
+  FakeDescriptor descriptor_;
   std::optional<Endpoint> peer_;
   std::shared_ptr<UdpHandlers> handlers_;
   std::vector<std::pair<Buffer, Endpoint>> waiting_;  // before start()
@@ -685,7 +755,9 @@ std::shared_ptr<TcpListener::Impl> FakeLoop::listen(const Endpoint& local,
   std::vector<Endpoint> used;
   for (const FakeListener* listener : network_.listeners_) used.push_back(listener->local());
   const Endpoint bound = network_.freeEndpoint(local, used, "TCP", option);
-  return std::make_shared<FakeListener>(*this, bound, std::move(onAccept), options);
+  auto listener = std::make_shared<FakeListener>(*this, bound, std::move(onAccept), options);
+  listener->start();
+  return listener;
 }
 
 std::shared_ptr<UdpSocket::Impl> FakeLoop::bind(const Endpoint& local) {

@@ -26,6 +26,7 @@ class FakeListener;
 class FakeUdpSocket;
 class FakeConnection;
 class FakeWatch;
+class FakeDescriptor;
 
 /// How bytes and datagrams travel; a change holds for what is sent or read afterwards.
 struct FakeNetworkOptions {
@@ -43,6 +44,9 @@ struct FakeNetworkOptions {
   std::function<void(const Endpoint& local, const Endpoint& remote, std::uint64_t total)> arrived = {};
   std::function<void(const Endpoint& local, const Endpoint& remote, std::size_t size)> reads = {};
   std::function<void(const Endpoint& local, const Endpoint& remote, std::uint64_t total)> hasRead = {};
+  /// A listener tried to accept, and its program had no descriptor left; `pending` connections waited. Empty:
+  /// nobody watches.
+  std::function<void(const Endpoint& local, std::size_t pending)> refusedAccept = {};
 };
 
 class FakeNetwork : public Network {
@@ -63,6 +67,13 @@ class FakeNetwork : public Network {
   /// A reset reaches both ends after the delay.
   void reset(const Endpoint& oneEnd);
 
+  /// Sockets that the program of this loop has open, without its listeners. Loops are numbered from 0 in the
+  /// order of their making.
+  std::size_t sockets(std::size_t loop) const noexcept { return queues_[loop].sockets; }
+  /// From now on this program gets EMFILE for a further socket when it has `most`; nothing: no limit. Those
+  /// beyond the limit stay.
+  void limitSockets(std::size_t loop, std::optional<std::size_t> most) { queues_[loop].most = most; }
+
   base::Nanos time() const noexcept { return clock_.now(); }
   /// When the next event is due; nothing when there is none. For simulators that have further sources of
   /// events.
@@ -73,7 +84,7 @@ class FakeNetwork : public Network {
   std::uint64_t events() const noexcept { return events_; }
 
  protected:
-  // For a simulator that decides which loop runs: loops are numbered from 0 in the order of their making.
+  // For a simulator that decides which loop runs.
   std::size_t loops() const noexcept { return queues_.size(); }
   std::optional<base::Nanos> nextOf(std::size_t loop) const;
   /// Handles the next event of the loop, which must have one; the clock must have reached it.
@@ -88,10 +99,13 @@ class FakeNetwork : public Network {
   friend class FakeUdpSocket;
   friend class FakeConnection;
   friend class FakeWatch;
+  friend class FakeDescriptor;
 
   struct Queue {
     FakeLoop* loop;  // null when it is gone
     std::map<std::pair<base::Nanos, std::uint64_t>, std::function<void()>> events;
+    std::size_t sockets = 0;
+    std::optional<std::size_t> most = {};
   };
 
   void schedule(base::Nanos when, std::size_t loop, std::function<void()> function);

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <deque>
+
 #include "net/loopback.h"
 
 namespace hapticd::net {
@@ -95,6 +97,107 @@ TEST_F(FakeNetworkTest, ChosenDatagramsAreLost) {
   for (const char* text : {"a", "b", "c", "d", "e"}) EXPECT_TRUE(from.sendTo(bytesOf(text), to.local()));
   loop_.runFor(milliseconds(1));
   EXPECT_EQ(received, "acd");
+}
+
+// The same rules as over the system's sockets: they are those of Acceptor.
+class OutOfDescriptors : public FakeNetworkTest {
+ protected:
+  OutOfDescriptors() {
+    loop_.setErrorHandler([this](std::string_view text) { errors_.emplace_back(text); });
+    network_.options.refusedAccept = [this](const Endpoint&, std::size_t pending) {
+      refused_.emplace_back(clock_.now(), pending);
+    };
+    listener_.emplace(loop_, kAnyPort, [this](Connection c) { accepted_.push_back(std::move(c)); });
+  }
+  // A client has its own program.
+  Connection& call() {
+    clients_.push_back(Connection::connect(clientLoop_, listener_->local(), milliseconds(1000)));
+    clients_.back().start({.onConnected = [this] { ++connected_; },
+                           .onClosed = [this](const std::string& reason) { closedHere_ = reason; }});
+    return clients_.back();
+  }
+  void leave(std::size_t sockets) { network_.limitSockets(0, network_.sockets(0) + sockets); }
+
+  Loop clientLoop_;
+  int connected_ = 0;
+  std::vector<std::string> errors_;
+  std::vector<std::pair<base::Nanos, std::size_t>> refused_;
+  std::vector<Connection> accepted_;
+  std::deque<Connection> clients_;
+};
+
+TEST_F(OutOfDescriptors, ConnectionsWaitAndAreAcceptedSoonAfterwards) {
+  leave(0);
+  for (int i = 0; i < 3; ++i) call().send(bytesOf("hello"));
+  for (auto& client : clients_) client.flush();
+  loop_.runFor(milliseconds(1000));
+  EXPECT_EQ(connected_, 3) << "the system does that";
+  EXPECT_TRUE(accepted_.empty());
+  network_.limitSockets(0, std::nullopt);
+  loop_.runFor(milliseconds(110));
+  EXPECT_EQ(accepted_.size(), 3U);
+  EXPECT_EQ(network_.sockets(0), 3U);
+}
+
+TEST_F(OutOfDescriptors, ItTriesTenTimesASecondAndReportsOnce) {
+  leave(0);
+  call();
+  loop_.runFor(milliseconds(3050));
+  EXPECT_EQ(refused_.size(), 31U);
+  const std::string text =
+      "cannot accept a connection on " + listener_->local().text() + ": Too many open files";
+  EXPECT_EQ(errors_, std::vector<std::string>(4, text));
+}
+
+TEST_F(OutOfDescriptors, TheLastOneIsUsedAndNobodyIsSaidToWait) {
+  leave(1);
+  call();
+  loop_.runFor(milliseconds(500));
+  EXPECT_EQ(accepted_.size(), 1U);
+  EXPECT_EQ(refused_.size(), 1U);
+  EXPECT_EQ(refused_[0].second, 0U);
+  EXPECT_TRUE(errors_.empty());
+  call();
+  loop_.runFor(milliseconds(500));
+  EXPECT_EQ(accepted_.size(), 1U);
+  EXPECT_EQ(errors_.size(), 1U);
+  accepted_.clear();
+  loop_.runFor(milliseconds(110));
+  EXPECT_EQ(accepted_.size(), 1U) << "a connection that ends makes room";
+}
+
+TEST_F(OutOfDescriptors, AWaitingConnectionThatWasResetEndsAfterItIsAccepted) {
+  leave(0);
+  call();
+  loop_.runFor(milliseconds(50));
+  clients_.back().abort("gone");
+  loop_.runFor(milliseconds(50));
+  network_.limitSockets(0, std::nullopt);
+  loop_.runFor(milliseconds(110));
+  ASSERT_EQ(accepted_.size(), 1U);
+  std::string reason;
+  accepted_[0].start({.onClosed = [&](const std::string& why) { reason = why; }});
+  loop_.runFor(milliseconds(1));
+  EXPECT_EQ(reason, "connection reset by the peer");
+}
+
+TEST_F(OutOfDescriptors, AListenerThatGoesEndsThoseThatWait) {
+  leave(0);
+  call();
+  loop_.runFor(milliseconds(50));
+  listener_.reset();
+  loop_.runFor(milliseconds(500));
+  EXPECT_EQ(closedHere_, "connection reset by the peer");
+}
+
+TEST_F(OutOfDescriptors, OtherSocketsAreRefused) {
+  leave(0);
+  Connection out = Connection::connect(loop_, listener_->local(), milliseconds(1000));
+  out.start({.onClosed = [this](const std::string& reason) { closedHere_ = reason; }});
+  loop_.runFor(milliseconds(1));
+  EXPECT_EQ(closedHere_, "cannot connect to " + listener_->local().text() + ": Too many open files");
+  EXPECT_THROW(UdpSocket(loop_, kAnyPort), Error);
+  EXPECT_EQ(network_.sockets(0), 0U);
 }
 
 TEST_F(FakeNetworkTest, ACutConnectionIsLostAfterItsTimeoutAndNotBefore) {

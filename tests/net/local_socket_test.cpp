@@ -1,0 +1,76 @@
+#include "net/local_socket.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "net/loopback.h"
+
+namespace hapticd::net {
+namespace {
+
+class LocalSocket : public testing::Test {
+ protected:
+  ~LocalSocket() override { std::filesystem::remove_all(folder_); }
+
+  static std::filesystem::path makeFolder() {
+    std::string name = std::filesystem::temp_directory_path() / "hapticd-local-XXXXXX";
+    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp");
+    return name;
+  }
+
+  const std::filesystem::path folder_ = makeFolder();
+  const std::filesystem::path path_ = folder_ / "server.sock";
+  Loop loop_;
+};
+
+TEST_F(LocalSocket, AcceptsAndNamesTheUser) {
+  std::vector<Connection> accepted;
+  const LocalListener listener(loop_, path_, [&](Connection c) { accepted.push_back(std::move(c)); });
+  const Connection client = connectLocal(loop_, path_);
+  ASSERT_TRUE(pumpUntil(loop_, [&] { return accepted.size() == 1; }));
+  EXPECT_EQ(peerUser(accepted[0]), geteuid());
+}
+
+TEST_F(LocalSocket, ThePathIsFreeAfterDestructionAlsoWithinItsCallback) {
+  std::unique_ptr<LocalListener> listener;
+  listener = std::make_unique<LocalListener>(loop_, path_, [&](Connection) { listener.reset(); });
+  const Connection first = connectLocal(loop_, path_);
+  const Connection second = connectLocal(loop_, path_);
+  ASSERT_TRUE(pumpUntil(loop_, [&] { return listener == nullptr; }));
+  EXPECT_FALSE(std::filesystem::exists(path_));
+  const LocalListener again(loop_, path_, [](Connection) {});
+}
+
+// Not under sanitizers: see TcpListener.
+#ifndef HAPTICD_SANITIZED
+// Another listener takes each descriptor that becomes free.
+TEST_F(LocalSocket, OutOfDescriptorsItTellsAndAcceptsLater) {
+  std::vector<std::string> errors;
+  loop_.setErrorHandler([&](std::string_view text) { errors.emplace_back(text); });
+  std::vector<Connection> accepted;
+  const LocalListener listener(loop_, path_, [&](Connection c) { accepted.push_back(std::move(c)); });
+  Server server(loop_);
+  const Connection client = connectLocal(loop_, path_);
+  const RawSocket peer = RawSocket::connected(server.listener.local());
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  const int lowestFree = ::dup(0);
+  ::close(lowestFree);
+  const rlimit none{static_cast<rlim_t>(lowestFree), before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
+  loop_.runFor(std::chrono::milliseconds(500));
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
+  EXPECT_TRUE(accepted.empty());
+  const std::string text = "cannot accept a connection on " + path_.string() + ": Too many open files";
+  EXPECT_EQ(std::count(errors.begin(), errors.end(), text), 1);
+  loop_.runFor(std::chrono::milliseconds(500));
+  EXPECT_EQ(accepted.size(), 1U);
+  EXPECT_EQ(server.sessions.size(), 1U);
+}
+#endif
+
+}  // namespace
+}  // namespace hapticd::net
