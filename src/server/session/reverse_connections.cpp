@@ -105,7 +105,15 @@ void ReverseConnections::onConnected(Pending& pending) {
     return;
   }
   local.port = 0;
-  accept_(std::move(connection), std::make_unique<net::UdpSocket>(loop_, local));
+  std::unique_ptr<net::UdpSocket> datagrams;
+  try {
+    datagrams = std::make_unique<net::UdpSocket>(loop_, local);
+  } catch (
+      const net::Error& error) {  // no descriptor is left: the connection ends, and the client asks again
+    log_.warn("reverse connection to " + remote.text() + " failed: " + error.what());
+    return;
+  }
+  accept_(std::move(connection), std::move(datagrams));
 }
 
 void ReverseConnections::forget(const Pending& pending) {

@@ -1,0 +1,90 @@
+#include "server/session/reverse_connections.h"
+
+#include <gtest/gtest.h>
+
+#include "net/fake_network.h"
+#include "net/loopback.h"
+#include "net/tcp_listener.h"
+#include "server/log_lines.h"
+#include "wire/text.h"
+#include "wire/udp_request.h"
+
+namespace hapticd::server {
+namespace {
+
+using std::chrono::milliseconds;
+
+class ReverseConnectionsTest : public testing::Test {
+ protected:
+  // Asks as a client whose program is another one.
+  void ask() {
+    const std::string request =
+        wire::formatUdpRequest({listener_.local().addressText(), listener_.local().port});
+    requests_.sendTo(wire::asBytes(request), kServer);
+    loop_.runFor(milliseconds(10));
+  }
+  void leave(std::size_t sockets) { network_.limitSockets(0, network_.sockets(0) + sockets); }
+
+  const net::Endpoint kServer{net::kLoopbackAddress, 3883};
+  test::LogLines lines_;
+  base::SimulatedClock clock_;
+  net::FakeNetwork network_{clock_};
+  net::ScopedNetwork scope_{network_};
+  net::Loop loop_;
+  net::Loop clientLoop_;
+  ThrottledLog log_;
+  std::vector<net::Connection> accepted_;
+  std::vector<std::unique_ptr<net::UdpSocket>> datagrams_;
+  ReverseConnections connections_{loop_,
+                                  kServer,
+                                  {},
+                                  {},
+                                  [](std::uint32_t) { return true; },
+                                  log_,
+                                  [this](net::Connection c, std::unique_ptr<net::UdpSocket> udp) {
+                                    accepted_.push_back(std::move(c));
+                                    datagrams_.push_back(std::move(udp));
+                                  }};
+  net::UdpSocket requests_{clientLoop_, net::kAnyPort};
+  std::vector<net::Connection> called_;  // at the client
+  net::TcpListener listener_{clientLoop_, net::kAnyPort,
+                             [this](net::Connection c) { called_.push_back(std::move(c)); }};
+};
+
+TEST_F(ReverseConnectionsTest, ConnectsToAClientThatAsks) {
+  ask();
+  EXPECT_EQ(accepted_.size(), 1U);
+  EXPECT_EQ(called_.size(), 1U);
+}
+
+TEST_F(ReverseConnectionsTest, WithoutADescriptorItReportsAndConnectsAtALaterRequest) {
+  leave(0);
+  ask();
+  EXPECT_TRUE(accepted_.empty());
+  EXPECT_EQ(lines_.count("failed: cannot connect to " + listener_.local().text() + ": Too many open files"),
+            1U)
+      << lines_.text();
+  network_.limitSockets(0, std::nullopt);
+  ask();
+  EXPECT_EQ(accepted_.size(), 1U);
+}
+
+TEST_F(ReverseConnectionsTest, WithoutADescriptorForDatagramsItReportsAndEndsTheConnection) {
+  leave(1);
+  ask();
+  EXPECT_TRUE(accepted_.empty());
+  EXPECT_EQ(lines_.count("reverse connection to " + listener_.local().text() + " failed: "), 1U)
+      << lines_.text();
+  EXPECT_EQ(lines_.count("Too many open files"), 1U) << lines_.text();
+  ASSERT_EQ(called_.size(), 1U);
+  std::string reason;
+  called_[0].start({.onClosed = [&](const std::string& why) { reason = why; }});
+  loop_.runFor(milliseconds(10));
+  EXPECT_EQ(reason, "closed by the peer");
+  network_.limitSockets(0, std::nullopt);
+  ask();
+  EXPECT_EQ(accepted_.size(), 1U);
+}
+
+}  // namespace
+}  // namespace hapticd::server
