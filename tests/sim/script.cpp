@@ -7,10 +7,11 @@
 namespace hapticd::sim {
 
 const char* nameOf(Action::Kind kind) {
-  static constexpr const char* kNames[] = {
-      "stop",     "rearm", "move",      "batch",      "upload",   "appear", "vanish", "pause",
-      "nonsense", "flood", "wall step", "disk fails", "describe", "stream", "visit",  "no memory"};
-  static_assert(std::size(kNames) == static_cast<std::size_t>(Action::Kind::noMemory) + 1);
+  static constexpr const char* kNames[] = {"stop",      "rearm",         "move",     "batch",    "upload",
+                                           "appear",    "vanish",        "pause",    "nonsense", "flood",
+                                           "wall step", "disk fails",    "describe", "stream",   "visit",
+                                           "no memory", "no descriptors"};
+  static_assert(std::size(kNames) == static_cast<std::size_t>(Action::Kind::noDescriptors) + 1);
   return kNames[static_cast<int>(kind)];
 }
 
@@ -72,6 +73,7 @@ Script drawScript(std::uint64_t seed, double seconds) {
   if (script.web) every(Kind::visit, dice.uniform(0.2, 3.0));
   script.datagrams = dice.chance(0.5);
   if (dice.chance(0.3)) every(Kind::noMemory, 5.0);
+  if (dice.chance(0.3)) every(Kind::noDescriptors, 5.0);
   std::stable_sort(script.actions.begin(), script.actions.end(),
                    [](const Action& a, const Action& b) { return a.at < b.at; });
   return script;

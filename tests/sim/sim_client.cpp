@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "net/client_frames.h"
 #include "wire/text.h"
@@ -26,11 +27,13 @@ void SimClient::connect() {
   orders_.clear();
   sent_ = read_ = 0;
   lastTick = 0;
+  asked_ = all_.clock.now();
   closed_ = false;
   mayEnd_ = false;
+  touched_.reset();
+  disagreesSince_.reset();
   guardReports = 0;
   web_ = {};
-  wire::PeerOptions options;
   if (way == Way::datagrams) {
     const net::Endpoint here{net::kLoopbackAddress, 0};
     listener_.emplace(all_.loop, here, [this](net::Connection connection) { adopt(std::move(connection)); });
@@ -40,12 +43,12 @@ void SimClient::connect() {
                        peer_->feedDatagram(bytes, [this](const wire::Event& event) { onEvent(event); });
                      },
                  .onRefused = {}});
-    options.udp = {here.addressText(), udp_->local().port};
-    peer_.emplace(names_, options);
-    asking_ = all_.loop.every(1s, [this] { askToConnect(); });
+    options_.udp = {here.addressText(), udp_->local().port};
+    peer_.emplace(names_, options_);
+    asking_ = all_.loop.every(std::chrono::nanoseconds(askPeriod), [this] { askToConnect(); });
     return askToConnect();
   }
-  peer_.emplace(names_, options);
+  peer_.emplace(names_, options_);
   net::ConnectionOptions connection;
   connection.hardLimitBytes = std::size_t{256} << 20;
   adopt(net::Connection::connect(all_.loop, way == Way::web ? all_.web : all_.server, 2s, connection));
@@ -60,7 +63,7 @@ void SimClient::askToConnect() {
 }
 
 void SimClient::adopt(net::Connection connection) {
-  if (connection_ && way == Way::datagrams) return;  // an answer to each request
+  if (closed_ || (connection_ && way == Way::datagrams)) return;  // an answer to each request
   connection_ = std::move(connection);
   connection_.start({.onConnected = {},
                      .onBytes = [this](auto bytes) { receive(bytes); },
@@ -68,6 +71,12 @@ void SimClient::adopt(net::Connection connection) {
                      .onPeerGone = {},
                      .onClosed =
                          [this](const std::string& reason) {
+                           // It had a descriptor for the connection and none for the datagrams.
+                           if (way == Way::datagrams && !connected() && all_.shortOfDescriptors()) {
+                             peer_.emplace(names_, options_);
+                             connection_ = {};  // and asks again
+                             return;
+                           }
                            closed_ = true;
                            // While the machine stands still nobody answers.
                            if (mayEnd_ || reason.starts_with("cannot connect")) return;
@@ -98,7 +107,7 @@ void SimClient::receive(std::span<const std::byte> bytes) {
 
 void SimClient::reset() {
   mayEnd_ = closed_ = true;
-  connection_.abort("reset");
+  if (connection_) connection_.abort("reset");
 }
 
 void SimClient::flush() {
@@ -192,6 +201,12 @@ void SimClient::onMessage(const wire::MessageReceived& message) {
     if (lastTick != 0) missedTicks += tick->tick - lastTick - 1;
     lastTick = tick->tick;
     lastRevision = tick->revision;
+    compare(*tick);
+  } else if (message.kind == wire::kindOf<wire::TouchedObject>) {
+    touched_ = wire::decode<wire::TouchedObject>(message.payload)->object;
+    if (onTouched) onTouched();
+  } else if (message.kind == wire::kindOf<wire::Dop>) {
+    depth_ = wire::decode<wire::Dop>(message.payload)->depth;
   } else if (message.kind == wire::kindOf<wire::GuardState>) {
     guard = *wire::decode<wire::GuardState>(message.payload);
     ++guardReports;
@@ -205,6 +220,25 @@ void SimClient::onMessage(const wire::MessageReceived& message) {
     all_.heard(name_, texts.back());
     onText(texts.back());
   }
+}
+
+// One that was behind gets the present state when it has caught up: it does not wait for further changes.
+void SimClient::compare(const wire::TickReport& tick) {
+  constexpr Nanos kLongest = 100 * kMs;
+  constexpr double kSmallest_m = 2e-5;  // twice the change of a depth that is reported
+  if (!touched_ || way == Way::datagrams) return;
+  if (*touched_ == tick.object && std::abs(depth_ - tick.depth) <= kSmallest_m) {
+    disagreesSince_.reset();
+    return;
+  }
+  const Nanos now = all_.clock.now();
+  if (!disagreesSince_) disagreesSince_ = now;
+  if (now - *disagreesSince_ <= kLongest) return;
+  all_.finding("client '" + name_ + "' has known for " + std::to_string((now - *disagreesSince_) / kMs) +
+               " ms that the hand touches object " + std::to_string(*touched_) + " at a depth of " +
+               std::to_string(depth_) + ", and tick " + std::to_string(tick.tick) + " has object " +
+               std::to_string(tick.object) + " and " + std::to_string(tick.depth));
+  touched_.reset();
 }
 
 }  // namespace hapticd::sim

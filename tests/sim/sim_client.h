@@ -33,6 +33,7 @@ struct Clients {
   std::function<void(Nanos)> stopRead;   ///< the server has read the last byte of a stop
   std::function<void(Nanos)> rearmRead;  ///< the same of a re-arm
   std::function<Nanos()> netStalled;
+  std::function<bool()> shortOfDescriptors;  ///< the server is, or was a moment ago
   std::function<void(const std::string& name, const std::string& text)> heard;  ///< a text of the server
   std::uint64_t stops = 0;
   Nanos slowestStop = 0;  ///< from arrival to reading, without stalls of the machine
@@ -48,11 +49,16 @@ class SimClient {
   void connect();
   /// A reset; the server learns of it after the delay of the network.
   void reset();
+  /// The server has greeted it.
   bool connected() const { return peer_ && peer_->connected() && !closed_; }
   bool open() const { return connection_ && !closed_; }
+  /// It is connected, or still tries.
+  bool present() const { return !closed_; }
   /// Its connection may end: it is hostile, or it went away.
   void expectEnd() { mayEnd_ = true; }
   const std::string& name() const { return name_; }
+  /// When it began to connect.
+  Nanos asked() const { return asked_; }
   net::Endpoint local() const { return listener_ ? listener_->local() : connection_.local(); }
 
   template <wire::WireMessage M>
@@ -70,13 +76,18 @@ class SimClient {
   void rearmForces();
   void flush();
   void pauseReading() { connection_.pauseReading(); }
-  void resumeReading() { connection_.resumeReading(); }
+  void resumeReading() {
+    disagreesSince_.reset();
+    connection_.resumeReading();
+  }
 
   // The network, on the server's side.
   void onArrived(std::uint64_t total);
   void onRead(std::uint64_t total);
   std::uint64_t unread() const { return sent_ - read_; }
 
+  /// How often a client with datagrams asks to be connected.
+  Nanos askPeriod = 1'000 * kMs;
   /// Sends the token of owners.
   bool identifies = true;
   /// May send more than the server reads ahead: then TCP keeps its stops waiting.
@@ -96,6 +107,7 @@ class SimClient {
   std::vector<std::uint32_t> buttons{0, 0};  ///< as last reported
   std::uint64_t buttonReports = 0;
   std::vector<std::string> texts;
+  std::function<void()> onTouched;  ///< it learned of another object that the hand touches
 
  protected:
   virtual void onConnected() {}
@@ -117,9 +129,11 @@ class SimClient {
   void receive(std::span<const std::byte> bytes);
   void onEvent(const wire::Event& event);
   void onMessage(const wire::MessageReceived& message);
+  void compare(const wire::TickReport& tick);
 
   const std::string name_;
   wire::LocalNames names_;
+  wire::PeerOptions options_;
   wire::LocalSender device_;
   std::optional<wire::Peer> peer_;
   std::optional<net::TcpListener> listener_;
@@ -131,8 +145,13 @@ class SimClient {
   std::deque<Order> orders_;
   std::uint64_t sent_ = 0;
   std::uint64_t read_ = 0;  // by the server
+  Nanos asked_ = 0;
   bool closed_ = true;
   bool mayEnd_ = false;
+  // As the reports of changes say.
+  std::optional<std::int32_t> touched_;
+  double depth_ = 0;
+  std::optional<Nanos> disagreesSince_;  // with the reports of ticks
 };
 
 }  // namespace hapticd::sim

@@ -26,6 +26,8 @@ using namespace std::chrono_literals;
 
 constexpr char kRecording[] = "/recording.haptics";
 constexpr std::int32_t kUploaded = 5;
+constexpr std::size_t kServerLoop = 0;  // of the network: the first that is made
+constexpr char kAcceptError[] = "cannot accept a connection on ";
 constexpr double kPlace = 777;  // where the object of the uploads is at the end
 
 // FNV-1a.
@@ -98,6 +100,15 @@ class Simulation {
   void failDisk(Dice& dice);
   void healDisk();
   void runOutOfMemory(Dice& dice);
+  void pauseReader(Dice& dice);
+  void resumeReader();
+  void runOutOfDescriptors(Dice& dice);
+  void visitWithoutDescriptors(Dice& dice);
+  void returnDescriptors();
+  bool shortOfDescriptors();
+  void onRefusedAccept(const net::Endpoint& local, std::size_t pending);
+  void onAcceptError(const std::string& where);
+  void checkGreeted(Nanos back, Nanos stalled);
   void nonsense(Dice& dice);
   void visit(Dice& dice);
   void ask(const std::string& target, Visit::Manner manner, Dice& dice);
@@ -143,6 +154,7 @@ class Simulation {
   std::vector<std::unique_ptr<Pusher>> pushers_;
   std::vector<std::unique_ptr<Streamer>> streamers_;
   std::vector<std::unique_ptr<SimClient>> strangers_;
+  std::vector<std::unique_ptr<Listener>> newcomers_;  // while descriptors are short
   std::vector<std::unique_ptr<Visit>> visits_;
   Nanos stateKnownAt_ = 0;                                 // when the newest state of the web port came
   std::uint64_t stateTick_ = 0;                            // its tick
@@ -162,6 +174,18 @@ class Simulation {
   bool memoryFailed_ = false;
   Nanos memoryShortUntil_ = 0;                 // and what that delayed is made up for
   std::map<std::int32_t, std::int64_t> seen_;  // newest batch of each batcher that a description showed
+  // What a listener of the server does without descriptors.
+  struct Refused {
+    Nanos second = 0;                      // when the present second of `count` began
+    int count = 0;                         // attempts to accept in it
+    std::optional<Nanos> waitsSince = {};  // without stalls of the server
+    std::optional<Nanos> loggedAt = {};
+    std::optional<Nanos> logged = {};  // the same without stalls
+  };
+  std::map<std::string, Refused> refused_;  // by address
+  bool noDescriptors_ = false;
+  std::optional<Nanos> descriptorsBack_;  // when they were back last
+  bool wakesReader_ = false;              // with the next object that is touched
   bool compared_ = false;
   bool uploaded_ = false;
   bool wallSteps_ = false;
@@ -204,6 +228,7 @@ Simulation::Simulation(const Script& script, bool verbose)
     if (available < 2 || !networkDice_.chance(0.2)) return available;
     return 1 + networkDice_.below(std::min<std::size_t>(available, 4096));
   };
+  network.refusedAccept = [this](const auto& local, std::size_t pending) { onRefusedAccept(local, pending); };
   network.losesDatagram = [this](std::uint64_t) { return networkDice_.chance(0.05); };
   const auto ofServer = [this](const net::Endpoint& local) {
     return clients_ && (local.port == clients_->server.port || local.port == clients_->web.port);
@@ -252,6 +277,10 @@ void Simulation::logged(const std::string& text) {
   }
   logBytes_ += text.size();
   if (logBytes_ > kMost) finding("the log has more than 300 kB in a second");
+  if (text.starts_with(kAcceptError)) {
+    const std::size_t begin = std::size(kAcceptError) - 1;
+    onAcceptError(text.substr(begin, text.rfind(": ") - begin));
+  }
 }
 
 void Simulation::after(Nanos delay, std::function<void()> function) {
@@ -273,10 +302,9 @@ Outcome Simulation::run() {
   device.blackBoxDir = "/boxes";
   device.blackBoxKeep = 3;
 
-  // The server's loop is the first one of the network.
   server_.emplace(config);
   loop_.emplace();
-  scheduler_.setServerLoop(0);
+  scheduler_.setServerLoop(kServerLoop);
   clients_.emplace(
       Clients{.loop = *loop_,
               .clock = clock_,
@@ -286,6 +314,7 @@ Outcome Simulation::run() {
               .stopRead = [this](Nanos at) { judge_.onStop(at); },
               .rearmRead = [this](Nanos at) { judge_.onRearm(at); },
               .netStalled = [this] { return scheduler_.netStalled(); },
+              .shortOfDescriptors = [this] { return shortOfDescriptors(); },
               .heard = [this](const auto& name, const auto& text) { line(name + " hears: " + text); }});
   const auto join = [this](SimClient& client) {
     client.connect();
@@ -310,6 +339,10 @@ Outcome Simulation::run() {
   join(*uploader_);
   reader_ = std::make_unique<Listener>(*clients_, "slow reader");
   join(*reader_);
+  operators_.front()->onTouched = [this] {
+    constexpr Nanos kSoon = 50 * kMs;
+    if (std::exchange(wakesReader_, false)) after(kSoon, [this] { resumeReader(); });
+  };
 
   if (script_.web) {
     page_ = std::make_unique<Listener>(*clients_, "page");
@@ -335,6 +368,7 @@ Outcome Simulation::run() {
     });
     healDisk();
     scheduler_.limitMemory(0);
+    returnDescriptors();
     ++moving_;
     if (script_.cube) pose(y_);
     // The batch before may have failed for want of memory.
@@ -438,11 +472,7 @@ void Simulation::perform(const Action& action) {
       vanish(dice);
       break;
     case Action::Kind::pauseRead:
-      if (!reader_->open() || bench_.quiet) break;
-      reader_->pauseReading();
-      after(dice.between(100 * kMs, 4'000 * kMs), [this] {
-        if (reader_->open() && clock_.now() < script_.length - 1'000 * kMs) reader_->resumeReading();
-      });
+      pauseReader(dice);
       break;
     case Action::Kind::nonsense:
       nonsense(dice);
@@ -473,7 +503,25 @@ void Simulation::perform(const Action& action) {
     case Action::Kind::noMemory:
       runOutOfMemory(dice);
       break;
+    case Action::Kind::noDescriptors:
+      runOutOfDescriptors(dice);
+      break;
   }
+}
+
+// Some read again soon after the hand touched something: the change was a report among those that were
+// dropped, and those after it do not repeat it at once.
+void Simulation::pauseReader(Dice& dice) {
+  constexpr Nanos kPerByte = 5'000;  // of the reports that fill the window
+  if (!reader_->open() || bench_.quiet) return;
+  reader_->pauseReading();
+  after(dice.between(100 * kMs, 4'000 * kMs), [this] { resumeReader(); });
+  if (dice.chance(0.5)) after(static_cast<Nanos>(script_.window) * kPerByte, [this] { wakesReader_ = true; });
+}
+
+void Simulation::resumeReader() {
+  wakesReader_ = false;
+  if (reader_->open() && clock_.now() < script_.length - 1'000 * kMs) reader_->resumeReading();
 }
 
 // A stream of poses begins with a step, as when a hand tracker finds its object again.
@@ -629,6 +677,109 @@ void Simulation::runOutOfMemory(Dice& dice) {
   const Nanos length = dice.between(10 * kMs, 3'000 * kMs);
   memoryShortUntil_ = std::max(memoryShortUntil_, clock_.now() + length + 5'000 * kMs);
   after(length, [this] { scheduler_.limitMemory(0); });
+}
+
+// The sockets that the server has stay.
+void Simulation::runOutOfDescriptors(Dice& dice) {
+  constexpr Nanos kApart = 4'000 * kMs;  // so that those who came are connected in between
+  if (noDescriptors_ || (descriptorsBack_ && clock_.now() - *descriptorsBack_ < kApart)) return;
+  noDescriptors_ = true;
+  ++bench_.injected;
+  const std::size_t left = dice.below(3);
+  scheduler_.limitSockets(kServerLoop, scheduler_.sockets(kServerLoop) + left);
+  if (left == 0) files_.failures.open = EMFILE;
+  const Nanos length = dice.between(10 * kMs, 3'000 * kMs);
+  for (std::uint64_t i = 1 + dice.below(4); i > 0; --i) {
+    after(dice.between(0, length), [this, seed = dice.below(~std::uint64_t{0})] {
+      Dice visitor(seed);
+      visitWithoutDescriptors(visitor);
+    });
+  }
+  // As before, also for those who are connected.
+  after(dice.between(0, length), [this] {
+    if (operators_.front()->connected() && !bench_.quiet) operators_.front()->stopForces();
+  });
+  after(length, [this] { returnDescriptors(); });
+}
+
+void Simulation::visitWithoutDescriptors(Dice& dice) {
+  if (bench_.quiet) return;
+  newcomers_.push_back(
+      std::make_unique<Listener>(*clients_, "newcomer " + std::to_string(newcomers_.size())));
+  Listener* const newcomer = newcomers_.back().get();
+  newcomer->kinds = wire::kReportButton;
+  std::vector<SimClient::Way> ways{SimClient::Way::tcp};
+  if (script_.web) ways.push_back(SimClient::Way::web);
+  if (script_.datagrams) ways.push_back(SimClient::Way::datagrams);
+  newcomer->way = ways[dice.below(ways.size())];
+  newcomer->askPeriod = 200 * kMs;  // all of its requests will not be lost
+  newcomer->connect();
+  byPort_[newcomer->local().port] = newcomer;
+  if (!dice.chance(0.2)) return;  // those that stay leave later
+  after(dice.between(0, 500 * kMs), [newcomer] { newcomer->reset(); });
+}
+
+void Simulation::returnDescriptors() {
+  if (!std::exchange(noDescriptors_, false)) return;
+  scheduler_.limitSockets(kServerLoop, std::nullopt);
+  if (files_.failures.open == EMFILE) files_.failures.open = 0;
+  const Nanos back = clock_.now();
+  descriptorsBack_ = back;
+  for (auto& [where, refused] : refused_) {
+    const auto since = std::exchange(refused.waitsSince, std::nullopt);
+    if (since && (!refused.logged || *refused.logged < *since - 1'000 * kMs))
+      finding("connections have waited at " + where + " for a descriptor, and the log does not report it");
+  }
+  checkGreeted(back, scheduler_.netStalled());
+}
+
+bool Simulation::shortOfDescriptors() {
+  return noDescriptors_ || (descriptorsBack_ && clock_.now() - *descriptorsBack_ < 500 * kMs);
+}
+
+// Ten times a second, and once after each connection that was accepted.
+void Simulation::onRefusedAccept(const net::Endpoint& local, std::size_t pending) {
+  constexpr int kMost = 20;
+  const Nanos now = clock_.now();
+  Refused& refused = refused_[local.text()];
+  if (now - refused.second >= 1'000 * kMs) {
+    refused.second = now;
+    refused.count = 0;
+  }
+  if (++refused.count == kMost + 1)
+    finding("without descriptors the server tries to accept more than " + std::to_string(kMost) +
+            " times in a second at " + local.text());
+  if (pending > 0 && !refused.waitsSince) refused.waitsSince = now - scheduler_.netStalled();
+}
+
+void Simulation::onAcceptError(const std::string& where) {
+  Refused& refused = refused_[where];
+  if (refused.loggedAt && clock_.now() - *refused.loggedAt < 900 * kMs)
+    finding("the log reports twice in a second that no connection can be accepted on " + where);
+  refused.loggedAt = clock_.now();
+  refused.logged = clock_.now() - scheduler_.netStalled();
+}
+
+// Whoever came before is greeted soon after descriptors are back; one with datagrams after its next request.
+void Simulation::checkGreeted(Nanos back, Nanos stalled) {
+  constexpr Nanos kDatagrams = 3'000 * kMs;
+  if (noDescriptors_ || descriptorsBack_ != back) return;
+  const Nanos soon = 300 * kMs + 10 * script_.networkDelay + 5 * script_.networkJitter;
+  const Nanos passed = clock_.now() - back - (scheduler_.netStalled() - stalled);
+  const auto check = [&](SimClient& client, Nanos limit) {
+    if (passed >= limit && client.present() && !client.connected() && client.asked() < back)
+      finding("client '" + client.name() + "' came while the server was short of descriptors, and " +
+              std::to_string(passed / kMs) + " ms later the server has not greeted it");
+  };
+  for (const auto& client : pushers_) check(*client, soon);
+  for (const auto& client : streamers_) check(*client, soon);
+  for (const auto& client : newcomers_) {
+    const bool datagrams = client->way == SimClient::Way::datagrams;
+    check(*client, datagrams ? kDatagrams : soon);
+    if (passed >= kDatagrams && client->present()) client->reset();
+  }
+  const Nanos next = passed < soon ? soon : kDatagrams;
+  if (passed < kDatagrams) after(next - passed, [this, back, stalled] { checkGreeted(back, stalled); });
 }
 
 void Simulation::stream(Dice& dice) {
@@ -798,6 +949,7 @@ void Simulation::beat() {
   one(*reader_);
   if (page_) one(*page_);
   if (stock_) one(*stock_);
+  for (const auto& client : newcomers_) one(*client);
 }
 
 void Simulation::describe(bool last) {

@@ -15,22 +15,23 @@ namespace hapticd::sim {
 /// What someone does at a time.
 struct Action {
   enum class Kind {
-    stop,       ///< an operator stops the forces
-    rearm,      ///< an operator re-arms
-    move,       ///< the owner of the cube streams poses for a while
-    batch,      ///< a client moves two objects together
-    upload,     ///< a client uploads a large mesh
-    appear,     ///< a client comes and starts an effect
-    vanish,     ///< and goes, in one of four ways
-    pauseRead,  ///< a client stops reading for a while
-    nonsense,   ///< a stranger sends what breaks the protocol
-    flood,      ///< a client sends thousands of pings
-    wallStep,   ///< the wall clock is set
-    diskFails,  ///< the disk is full, refuses writes or syncs, or no file can be opened, for a while
-    describe,   ///< the scene is compared with what was sent
-    stream,     ///< a client comes, streams remote contacts or held forces for a while, and goes
-    visit,      ///< somebody asks the web port something
-    noMemory,   ///< large allocations of the server's threads fail for a while
+    stop,           ///< an operator stops the forces
+    rearm,          ///< an operator re-arms
+    move,           ///< the owner of the cube streams poses for a while
+    batch,          ///< a client moves two objects together
+    upload,         ///< a client uploads a large mesh
+    appear,         ///< a client comes and starts an effect
+    vanish,         ///< and goes, in one of four ways
+    pauseRead,      ///< a client stops reading for a while
+    nonsense,       ///< a stranger sends what breaks the protocol
+    flood,          ///< a client sends thousands of pings
+    wallStep,       ///< the wall clock is set
+    diskFails,      ///< the disk is full, refuses writes or syncs, or no file can be opened, for a while
+    describe,       ///< the scene is compared with what was sent
+    stream,         ///< a client comes, streams remote contacts or held forces for a while, and goes
+    visit,          ///< somebody asks the web port something
+    noMemory,       ///< large allocations of the server's threads fail for a while
+    noDescriptors,  ///< the server is out of descriptors for a while, in which clients come
   };
   Nanos at = 0;
   Kind kind = Kind::stop;
