@@ -81,6 +81,7 @@ class Session {
                               .stopRead = [this](Nanos at) { judge_.onStop(at); },
                               .rearmRead = [this](Nanos at) { judge_.onRearm(at); },
                               .netStalled = [this] { return scheduler_.netStalled(); },
+                              .shortOfDescriptors = [] { return false; },
                               .heard = [](const auto&, const auto&) {}});
     witness_.emplace(*all_, "witness");
     witness_->connect();
