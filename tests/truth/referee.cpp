@@ -126,7 +126,7 @@ class Referee {
     state.velocity_m_per_s = velocity_;
     renderer_.step(stage_.at(i), state, state.time, realtime::fixture::kTick, rendering_);
     if (i > 0) reference_.moveTo(i);
-    if (trial_.kind == "joined" && rendering_.touching) bringInFrontOfFaces();
+    bringInFrontOfFaces();
     ++verdict_.ticks;
     verdict_.touching += rendering_.touching ? 1 : 0;
     judgeNumbers();
@@ -141,26 +141,63 @@ class Referee {
       judgeRest();
   }
 
-  // Where very many triangles meet, the renderer may move the surface by up to 0.1 µm, for a ball by 0.05 %
-  // of its radius more (decision 29), in two neighbouring gathers by different amounts. The proxy, which may
-  // be behind a face by that much, is judged in front of the faces that it is on, on the side to which its
-  // spring pushes the hand.
+  // Where very many triangles meet, the renderer may move the surface by this much (decision 29), in two
+  // neighbouring gathers by different amounts. A point tool is a ball of half the gap tolerance.
+  double joinedError() const {
+    return trial_.kind == "joined" ? 0.1e-6 + 5e-4 * std::max(trial_.toolRadius_m, 0.5 * kGap_m) : 0.0;
+  }
+
+  // The proxy of a point tool may be behind a face by that much, and by no more. It is judged in front of the
+  // faces that it is on: on the side to which its spring pushes the hand, and without a spring on the side
+  // where it was. A ball's proxy is its centre, far from the faces that hold it; a centre beside a face came
+  // from behind.
   void bringInFrontOfFaces() {
     constexpr int kRounds = 20;
-    const double farthest = 2 * (0.1e-6 + 5e-4 * trial_.toolRadius_m);
-    const Point p = rendering_.proxy_m;
+    broughtBy_ = Point::Zero();
+    if (joinedError() == 0 || trial_.toolRadius_m > 0) return;
+    const Point& p = rendering_.proxy_m;
+    const double farthest = 2 * joinedError();
     const Point spring = p - hip_;
+    const bool pushed = rendering_.touching && spring.norm() > reference_.rounding();
+    const int nearest = nearestFace(p, 5 * farthest);
+    const double before = nearest >= 0 && !pushed ? sideBefore() : 0.0;
+    if (nearest < 0 || (!pushed && before == 0)) return;
+    const auto towardsFront = [&](const Face& f) {
+      return (pushed ? f.normal.dot(spring) : before) < 0 ? Point(-f.normal) : f.normal;
+    };
+    const Face& f = reference_.face(nearest);
+    const bool behind = towardsFront(f).dot(p - f.a) < 0;
+    if (behind && (nearestOf(f, p) - p).norm() > joinedError()) return;
+    if (!behind && !rendering_.touching) return;
     std::vector<Point> normals;
-    for (const int i : reference_.near(p, trial_.toolRadius_m + 5 * farthest)) {
-      const Face& f = reference_.face(i);
-      const Point n = trial_.toolRadius_m > 0 ? Point((p - nearestOf(f, p)).stableNormalized()) : f.normal;
-      normals.push_back(n.dot(spring) < 0 && !f.unbounded ? Point(-n) : n);
-    }
-    Point shift = Point::Zero();
+    for (const int i : reference_.near(p, 5 * farthest)) normals.push_back(towardsFront(reference_.face(i)));
     for (int round = 0; round < kRounds; ++round) {
-      for (const Point& n : normals) shift += std::max(0.0, farthest - n.dot(shift)) * n;
+      for (const Point& n : normals) broughtBy_ += std::max(0.0, farthest - n.dot(broughtBy_)) * n;
     }
-    rendering_.proxy_m += shift;
+    rendering_.proxy_m += broughtBy_;
+  }
+
+  // -1: none within this distance.
+  int nearestFace(const Point& p, double distance) const {
+    int nearest = -1;
+    for (const int i : reference_.near(p, distance)) {
+      const double d = (nearestOf(reference_.face(i), p) - p).norm();
+      if (d > distance) continue;
+      distance = d;
+      nearest = i;
+    }
+    return nearest;
+  }
+
+  // The side of the faces where the proxy was in the tick before, 1 in front, -1 behind; 0 beside their rim.
+  // Faces that are joined have the same winding.
+  double sideBefore() const {
+    const int i = nearestFace(proxyBefore_, (rendering_.proxy_m - proxyBefore_).norm() + joinedError());
+    if (i < 0) return 0;
+    const Face& f = reference_.face(i);
+    const double height = f.normal.dot(proxyBefore_ - f.a);
+    if (std::abs(height) < 0.5 * (nearestOf(f, proxyBefore_) - proxyBefore_).norm()) return 0;
+    return height < 0 ? -1 : 1;
   }
 
   // At random, with this probability; the same in every run of the trial.
@@ -232,8 +269,9 @@ class Referee {
       return report("escaped", beyondWalls(p), " m beyond a wall, proxy ", p.transpose());
     const double spring = (p - hip_).norm();
     const bool unfinished = (rendering_.status & kUnfinished) != 0;
-    if (!rendering_.touching && spring > rounding_ && (touchedBefore_ || !unfinished)) {
-      return report("lost", "no contact, and the proxy is ", spring, " m from the HIP");
+    const double away = (p - broughtBy_ - hip_).norm();
+    if (!rendering_.touching && away > rounding_ && (touchedBefore_ || !unfinished)) {
+      return report("lost", "no contact, and the proxy is ", away, " m from the HIP");
     }
     // Frictionless, the place of the tick before was free and nearer.
     const double now = spring;
@@ -601,10 +639,24 @@ class Referee {
     const Point expected =
         std::max(0.0, m.stiffness_N_per_m * std::max(0.0, depth) - m.damping_Ns_per_m * n.dot(velocity_)) * n;
     const double off = (rendering_.normalForce_N - expected).norm();
-    if (off > 1e-6 * expected.norm() + m.stiffness_N_per_m * kForceTolerance_m) {
+    if (off > (1e-6 + joinedTilt(f)) * expected.norm() + m.stiffness_N_per_m * kForceTolerance_m) {
       report("law", "the force ", rendering_.normalForce_N.transpose(), " on one surface, expected ",
              expected.transpose());
     }
+  }
+
+  // By how much a triangle that is joined from this face and its neighbours may be turned. On a round
+  // surface, the planes at the ends of a chord are four times as far from each other as the chord is from the
+  // surface, and turned twice as far as one of them is against it.
+  double joinedTilt(const Face& f) const {
+    if (joinedError() == 0) return 0;
+    double farthest = 0;
+    for (const Face& other : reference_.faces()) {
+      const double height = other.normal.dot(rendering_.proxy_m - other.a);
+      if (other.object == f.object && std::abs(height) <= 4 * joinedError())
+        farthest = std::max(farthest, (other.normal - f.normal).norm());
+    }
+    return 0.5 * farthest;
   }
 
   bool othersNear(int object) const {
@@ -614,7 +666,7 @@ class Referee {
   }
 
   void judgeOverlap(const std::vector<int>& near) {
-    const double slack = 2e-6 + (static_ ? 0.0 : 1e-5);
+    const double slack = 2e-6 + (static_ ? 0.0 : 1e-5) + joinedError();
     for (const int i : near) {
       const Face& f = reference_.face(i);
       const double distance = (rendering_.proxy_m - nearestOf(f, rendering_.proxy_m)).norm();
@@ -720,6 +772,7 @@ class Referee {
 
   int tick_ = 0;
   Rendering rendering_;
+  Point broughtBy_ = Point::Zero();  // the proxy of this tick, in front of the faces
   Point hip_ = Point::Zero();
   Point hipBefore_ = Point::Zero();
   Point velocity_ = Point::Zero();
