@@ -7,12 +7,14 @@
 #include <fstream>
 #include <sstream>
 
+#include "realtime/render/renderer.h"
 #include "truth/follower.h"
 #include "truth/free_space.h"
 #include "truth/meshes.h"
 #include "truth/random_trial.h"
 #include "truth/reference.h"
 #include "truth/shrink.h"
+#include "truth/stage.h"
 
 namespace hapticd::truth {
 namespace {
@@ -144,6 +146,27 @@ TEST(Referee, mended_findings_stay_mended) {
     ++count;
   }
   EXPECT_GE(count, 55);
+}
+
+// A ball goes past an edge to the other side of a strip, 7 mm in the last tick, and the casts of the tick end
+// there. Without friction the force is the stiffness times the depth, and the hand moves by 0.26 mm.
+TEST(SpentCasts, what_holds_the_ball_is_found_where_they_end) {
+  std::ifstream file(HAPTICD_TESTDATA "/truth/casts-103777.trial");
+  const Trial trial = read(file);
+  Stage stage(trial);
+  realtime::Renderer renderer({trial.toolRadius_m, false});
+  realtime::Rendering rendering;
+  device::DeviceState state;
+  double before = 0;
+  for (std::size_t i = 0; i < trial.hips.size(); ++i) {
+    state.time = static_cast<int>(i) * realtime::fixture::kTick;
+    state.position_m = trial.hips[i];
+    before = rendering.contactForce_N.norm();
+    renderer.step(stage.at(static_cast<int>(i)), state, state.time, realtime::fixture::kTick, rendering);
+  }
+  EXPECT_NE(rendering.status & realtime::kRenderIterationLimit, 0U);
+  const double way = (trial.hips.back() - trial.hips[trial.hips.size() - 2]).norm();
+  EXPECT_NEAR(rendering.contactForce_N.norm(), before, trial.objects[0].material.stiffness_N_per_m * way);
 }
 
 // Where the renderer joins triangles, the proxy may be behind a face by 0.1 um and the force may be turned as
