@@ -108,8 +108,8 @@ void ReverseConnections::onConnected(Pending& pending) {
   std::unique_ptr<net::UdpSocket> datagrams;
   try {
     datagrams = std::make_unique<net::UdpSocket>(loop_, local);
-  } catch (
-      const net::Error& error) {  // no descriptor is left: the connection ends, and the client asks again
+  } catch (const net::Error& error) {
+    // No descriptor is left. The connection ends, and the client asks again.
     log_.warn("reverse connection to " + remote.text() + " failed: " + error.what());
     return;
   }
