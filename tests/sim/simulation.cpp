@@ -186,6 +186,7 @@ class Simulation {
   bool noDescriptors_ = false;
   std::optional<Nanos> descriptorsBack_;  // when they were back last
   bool wakesReader_ = false;              // with the next object that is touched
+  int unanswered_ = 0;                    // requests for a description of the scene
   bool compared_ = false;
   bool uploaded_ = false;
   bool wallSteps_ = false;
@@ -953,7 +954,9 @@ void Simulation::beat() {
 }
 
 void Simulation::describe(bool last) {
+  ++unanswered_;
   server_->stations().front()->scene().describe([this, last](const auto& description) {
+    --unanswered_;
     if (description || !memoryFailed_) compare(*description, last);
   });
 }
@@ -999,6 +1002,9 @@ void Simulation::compare(const scene::SceneDescription& description, bool last) 
 
 void Simulation::checkEnd() {
   if (!compared_) finding("the scene thread has not described the scene within 500 ms");
+  if (compared_ && unanswered_ > 0)
+    finding("the scene thread has not answered " + std::to_string(unanswered_) +
+            " requests for a description that are older than one that it has answered");
   const bool running = judge_.ticks() > 0;
   const Listener& op = *operators_.front();
   // What never comes back would fulfil every other promise.
