@@ -32,7 +32,7 @@ class AsioListener final : public Acceptor {
       acceptor_.set_option(tcp::acceptor::reuse_address(true));
       acceptor_.bind(toAsio<tcp::endpoint>(local));
       acceptor_.listen(kBacklog);
-      acceptor_.non_blocking(true);
+      neverBlock();
       local_ = fromAsio(acceptor_.local_endpoint());
       address_ = local_.text();
     } catch (const boost::system::system_error& error) {
@@ -51,7 +51,7 @@ class AsioListener final : public Acceptor {
       ::close(fd);
       throw Error("cannot watch the Unix socket " + address_ + ": " + error.message());
     }
-    acceptor_.non_blocking(true);
+    neverBlock();
     start();
   }
 
@@ -75,6 +75,13 @@ class AsioListener final : public Acceptor {
       onAccept_(Connection(std::move(impl)));
     });
     return 0;
+  }
+
+  // Asio waits for the next connection when one was aborted, also where nothing should block, unless it is
+  // asked for the error.
+  void neverBlock() {
+    acceptor_.non_blocking(true);
+    acceptor_.set_option(tcp::acceptor::enable_connection_aborted(true));
   }
 
   void waitForConnection() override {

