@@ -126,9 +126,11 @@ std::string IsolatedDevice::receive(Nanos end, Wait wait) const {
   }
   std::array<char, 4096> text;
   const long size = recv(socket_, text.data(), text.size(), 0);
-  if (size <= 0)
-    throw std::runtime_error("the driver's process ended" + howItEnded(kEnding_ms) +
+  if (size <= 0) {
+    const Nanos left_ms = std::clamp<Nanos>((end - base::now()) / kMillisecond, 0, kEnding_ms);
+    throw std::runtime_error("the driver's process ended" + howItEnded(static_cast<int>(left_ms)) +
                              "; open the device anew");
+  }
   return {text.data(), static_cast<std::size_t>(size)};
 }
 
