@@ -42,7 +42,7 @@ constexpr std::int64_t kRampOut_ticks = 250 + 50 + 20;
 
 struct Row {
   std::string name;
-  std::int64_t forceLeft_ticks = -1;  // -1: the force had to stay
+  std::int64_t forceLeftTicks = -1;  // -1: the force had to stay
   double stop_ms = 0;
   double gap_ms = 0;
   double memory_MB = 0;
@@ -168,7 +168,7 @@ class Attacks : public InContact {
       }
       std::int64_t tick = arm->ticks - 1;
       while (tick > before && (arm.force(tick) - resting).dot(added) < 0.1 * added.squaredNorm()) --tick;
-      row_.forceLeft_ticks = tick - before;
+      row_.forceLeftTicks = tick - before;
     });
   }
 
@@ -337,8 +337,8 @@ class Attacks : public InContact {
     for (const Row& row : rows_) {
       char line[256];
       char force[32] = "as before";
-      if (row.forceLeft_ticks >= 0)
-        std::snprintf(force, sizeof force, "%ld", static_cast<long>(row.forceLeft_ticks));
+      if (row.forceLeftTicks >= 0)
+        std::snprintf(force, sizeof force, "%ld", static_cast<long>(row.forceLeftTicks));
       std::snprintf(line, sizeof line, "| %s | %s | %.0f | %.0f | %.0f |\n", row.name.c_str(), force,
                     row.stop_ms, row.gap_ms, row.memory_MB);
       out << line;
