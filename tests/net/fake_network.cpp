@@ -8,6 +8,7 @@
 #include <array>
 #include <cerrno>
 #include <deque>
+#include <functional>
 #include <limits>
 #include <stdexcept>
 #include <system_error>
@@ -45,7 +46,8 @@ class FakeLoop final : public Loop::Impl {
   // What the events hold may send as it goes.
   ~FakeLoop() override {
     network_.queues_[number_].loop = nullptr;
-    const auto events = std::exchange(network_.queues_[number_].events, {});
+    network_.queues_[number_].events.clear();
+    const auto functions = std::exchange(network_.queues_[number_].functions, {});
   }
 
   void run() override {
@@ -80,7 +82,7 @@ class FakeLoop final : public Loop::Impl {
   void stop() override { stopped_ = true; }
 
   void post(std::function<void()> function) override {
-    at(network_.time(), [this, f = std::move(function)] { guard(f); });
+    at(network_.time(), std::move(function));
     network_.posted();
   }
 
@@ -94,10 +96,11 @@ class FakeLoop final : public Loop::Impl {
   std::shared_ptr<UdpSocket::Impl> bind(const Endpoint& local) override;
 
   void at(Nanos when, std::function<void()> function) {
-    network_.schedule(when, number_, [this, f = std::move(function)] {
-      ++handled_;
-      f();
-    });
+    network_.schedule(when, number_, std::move(function));
+  }
+  void handle(const std::function<void()>& function) {
+    ++handled_;
+    guard(function);
   }
   /// After the delay of the network.
   void arriving(std::function<void()> function) {
@@ -340,6 +343,7 @@ class FakeConnection final : public Connection::Impl, public std::enable_shared_
       Buffer bytes;
       std::array<std::span<const std::byte>, kMostParts> parts;
       const std::size_t count = queue_.gather(parts);
+      bytes.reserve(std::min(room, queue_.bytes()));
       for (std::size_t i = 0; i < count && room > 0; ++i) {
         const auto part = parts[i].first(std::min(room, parts[i].size()));
         bytes.insert(bytes.end(), part.begin(), part.end());
@@ -357,7 +361,7 @@ class FakeConnection final : public Connection::Impl, public std::enable_shared_
         continue;
       }
       const std::weak_ptr<FakeConnection> self = weak_from_this();
-      toOther([self, bytes = std::move(bytes)](FakeConnection& receiver) {
+      toOther([self, bytes = std::move(bytes)](FakeConnection& receiver) mutable {
         const auto sender = self.lock();
         if (sender) sender->inFlight_ -= bytes.size();
         if (receiver.cut_) return;
@@ -365,7 +369,11 @@ class FakeConnection final : public Connection::Impl, public std::enable_shared_
           if (sender) sender->beReset();
           return;
         }
-        receiver.unread_.insert(receiver.unread_.end(), bytes.begin(), bytes.end());
+        if (receiver.unread_.empty()) {
+          receiver.unread_ = std::move(bytes);
+        } else {
+          receiver.unread_.insert(receiver.unread_.end(), bytes.begin(), bytes.end());
+        }
         if (const auto& arrived = receiver.network_.options.arrived)
           arrived(receiver.local_, receiver.remote_, receiver.bytesIn_ + receiver.unread_.size());
         receiver.armRead();
@@ -380,7 +388,7 @@ class FakeConnection final : public Connection::Impl, public std::enable_shared_
     if (const auto other = other_.lock()) {
       const Nanos jitter = network_.options.jitter ? network_.options.jitter() : 0;
       latest_ = std::max(latest_, network_.time() + network_.options.delay + jitter);
-      other->loop_.at(latest_, [other, function = std::move(function)] { function(*other); });
+      other->loop_.at(latest_, [other, function = std::move(function)]() mutable { function(*other); });
     } else {
       beReset();
     }
@@ -465,8 +473,14 @@ class FakeConnection final : public Connection::Impl, public std::enable_shared_
     if (network_.options.readSize) {
       size = std::clamp<std::size_t>(network_.options.readSize(unread_.size()), 1, size);
     }
-    const Buffer bytes(unread_.begin(), unread_.begin() + static_cast<std::ptrdiff_t>(size));
-    unread_.erase(unread_.begin(), unread_.begin() + static_cast<std::ptrdiff_t>(size));
+    Buffer bytes;
+    if (size == unread_.size()) {
+      bytes.swap(unread_);
+    } else {
+      const auto end = unread_.begin() + static_cast<std::ptrdiff_t>(size);
+      bytes.assign(unread_.begin(), end);
+      unread_.erase(unread_.begin(), end);
+    }
     bytesIn_ += size;
     const auto other = other_.lock();
     if (other && other->blocked_ && !cut_) {
@@ -803,7 +817,17 @@ void FakeNetwork::reset(const Endpoint& oneEnd) {
 }
 
 void FakeNetwork::schedule(Nanos when, std::size_t loop, std::function<void()> function) {
-  queues_[loop].events.emplace(std::pair(std::max(when, time()), sequence_++), std::move(function));
+  Queue& queue = queues_[loop];
+  if (queue.loop == nullptr) return;
+  if (queue.free.empty()) {
+    queue.free.push_back(queue.functions.size());
+    queue.functions.emplace_back();
+  }
+  const std::size_t place = queue.free.back();
+  queue.free.pop_back();
+  queue.functions[place] = std::move(function);
+  queue.events.push_back({std::max(when, time()), sequence_++, place});
+  std::ranges::push_heap(queue.events, std::greater());
 }
 
 void FakeNetwork::pollWatches() {
@@ -825,16 +849,18 @@ std::optional<Nanos> FakeNetwork::next() {
 
 std::optional<Nanos> FakeNetwork::nextOf(std::size_t loop) const {
   const auto& events = queues_[loop].events;
-  return events.empty() || queues_[loop].loop == nullptr ? std::nullopt
-                                                         : std::optional(events.begin()->first.first);
+  return events.empty() || queues_[loop].loop == nullptr ? std::nullopt : std::optional(events.front().when);
 }
 
 void FakeNetwork::runNextOf(std::size_t loop) {
-  auto& events = queues_[loop].events;
-  const std::function<void()> function = std::move(events.begin()->second);
-  events.erase(events.begin());
+  Queue& queue = queues_[loop];
+  std::ranges::pop_heap(queue.events, std::greater());
+  const std::size_t place = queue.events.back().function;
+  queue.events.pop_back();
+  const auto function = std::exchange(queue.functions[place], {});
+  queue.free.push_back(place);
   ++events_;
-  queues_[loop].loop->guard(function);
+  queue.loop->handle(function);
 }
 
 bool FakeNetwork::runNext(Nanos limit) {
@@ -845,7 +871,7 @@ bool FakeNetwork::runNext(Nanos limit) {
   for (std::size_t i = 0; i < queues_.size(); ++i) {
     const auto& events = queues_[i].events;
     if (!nextOf(i)) continue;
-    if (first == queues_.size() || events.begin()->first < queues_[first].events.begin()->first) first = i;
+    if (first == queues_.size() || queues_[first].events.front() > events.front()) first = i;
   }
   runNextOf(first);
   return true;

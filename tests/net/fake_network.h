@@ -101,9 +101,21 @@ class FakeNetwork : public Network {
   friend class FakeWatch;
   friend class FakeDescriptor;
 
+  struct Event {
+    base::Nanos when;
+    std::uint64_t sequence;
+    std::size_t function;
+
+    bool operator>(const Event& other) const noexcept {
+      return when != other.when ? when > other.when : sequence > other.sequence;
+    }
+  };
+
   struct Queue {
-    FakeLoop* loop;  // null when it is gone
-    std::map<std::pair<base::Nanos, std::uint64_t>, std::function<void()>> events;
+    FakeLoop* loop;             // null when it is gone
+    std::vector<Event> events;  // a heap, the next event first
+    std::vector<std::function<void()>> functions = {};
+    std::vector<std::size_t> free = {};  // of the functions
     std::size_t sockets = 0;
     std::optional<std::size_t> most = {};
   };

@@ -21,7 +21,7 @@ class WebStream {
  public:
   /// What the frames carry that are complete now. Throws std::runtime_error for what no server may send.
   std::vector<std::byte> take(std::span<const std::byte> bytes) {
-    for (const std::byte b : bytes) input_ += static_cast<char>(b);
+    input_.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     std::vector<std::byte> payload;
     if (!greeted_ && !takeAnswer()) return payload;
     while (takeFrame(payload)) {
@@ -55,8 +55,10 @@ class WebStream {
     constexpr std::uint8_t kClose = 0x88;
     if (at(0) != kBinary && at(0) != kClose)
       throw std::runtime_error("the web port sends a frame that begins with " + std::to_string(at(0)));
-    for (std::size_t i = 0; i < size && at(0) == kBinary; ++i)
-      payload.push_back(static_cast<std::byte>(at(header + i)));
+    if (at(0) == kBinary) {
+      const auto bytes = std::as_bytes(std::span(input_)).subspan(header, size);
+      payload.insert(payload.end(), bytes.begin(), bytes.end());
+    }
     input_.erase(0, header + size);
     return true;
   }
