@@ -52,6 +52,7 @@ geometry::TriangleMesh DemoScene::mesh(int object) const {
 
 void DemoScene::upload(Client& client) const {
   client.batch([&] {
+    client.resetScene();
     client.setObjectCount(kObjects);
     for (int object = 0; object < kObjects; ++object) {
       const geometry::TriangleMesh sheet = mesh(object);

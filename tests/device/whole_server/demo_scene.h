@@ -21,7 +21,7 @@ struct DemoScene {
   bool friction = true;
 
   geometry::TriangleMesh mesh(int object) const;
-  /// Sends everything in one batch.
+  /// Sends everything in one batch, instead of what was there.
   void upload(Client& client) const;
   /// Down from free air, aslant through both sheets, and up again: as often as one likes.
   std::vector<Vec3> stroke() const;
