@@ -34,11 +34,12 @@ constexpr Nanos kPeriod = 1'000'000;
 // Strokes along x, just below the top of the box at 20 mm.
 class StrokingHand final : public device::Device {
  public:
-  explicit StrokingHand(bool gripper) : gripper_(gripper) {}
+  StrokingHand(bool gripper, Nanos lost, Nanos found) : gripper_(gripper), lost_(lost), found_(found) {}
   void open() override {}
   void close() noexcept override {}
   const device::DeviceProfile& profile() const noexcept override { return profile_; }
   bool read(Nanos now, device::DeviceState& state) noexcept override {
+    if (now >= lost_ && now < found_) return false;
     const double t_s = 1e-9 * static_cast<double>(now);
     state.time = now;
     state.position_m = {0.004 * std::sin(20 * t_s), 0.0195 - 0.0005 * std::cos(11 * t_s), 0.001 * t_s};
@@ -53,6 +54,8 @@ class StrokingHand final : public device::Device {
  private:
   const device::DeviceProfile profile_;
   const bool gripper_;
+  const Nanos lost_;
+  const Nanos found_;
 };
 
 std::vector<Vec3f> boxVertices(float half, float top) {
@@ -136,9 +139,14 @@ std::vector<std::pair<scene::ClientId, std::optional<scene::SceneCommand>>> comm
   }
 }
 
-void writeRecording(const std::filesystem::path& file, bool gripper, int ticks) {
+Nanos timeOf(int tick) {
+  return 1'000'000'000 + tick * kPeriod;
+}
+
+// The device gives no state from the tick `lost` to that before `found`.
+void writeRecording(const std::filesystem::path& file, bool gripper, int ticks, int lost = 0, int found = 0) {
   base::SimulatedClock clock;
-  StrokingHand hand(gripper);
+  StrokingHand hand(gripper, timeOf(lost), timeOf(found));
   RecordedDevice device;
   device.names = {"Phantom"};
   device.driver = "simulated";
@@ -154,7 +162,7 @@ void writeRecording(const std::filesystem::path& file, bool gripper, int ticks) 
   recorder.start(1'700'000'000'000'000'000, "");
   std::vector<scene::Notice> notices;
   for (int i = 0; i < ticks; ++i) {
-    const Nanos now = 1'000'000'000 + i * kPeriod;
+    const Nanos now = timeOf(i);
     const auto commands = commandsAt(i);
     for (const auto& [client, command] : commands) {
       recorder.recordCommand(0, client, now, command ? &*command : nullptr);
@@ -219,7 +227,7 @@ TEST(Golden, DISABLED_WritesTheFiles) {
   markAsVersion1WithoutLaw(folder / "all_commands_v1.haptics");
   std::ofstream(folder / "all_commands.jsonl") << commandsOf(folder / "all_commands_v1.haptics");
   writeRecording(folder / "gripper_v2.haptics", true, 130);
-  writeRecording(folder / "all_commands_law12.haptics", false, 230);
+  writeRecording(folder / "all_commands_law13.haptics", false, 300, 210, 275);
 }
 
 const std::filesystem::path kFolder = std::filesystem::path(HAPTICD_TESTDATA) / "recordings";
@@ -244,7 +252,7 @@ TEST_P(GoldenFile, GivesTheRecordedForcesBitForBit) {
   EXPECT_EQ(lawDifference(reader.header()),
             sameLaw
                 ? ""
-                : "the recording has force law " + std::to_string(GetParam().law) + ", this program law 12");
+                : "the recording has force law " + std::to_string(GetParam().law) + ", this program law 13");
   Rerenderer again(reader.header());
   std::uint64_t same = 0;
   double largest_N = 0;
@@ -286,7 +294,8 @@ INSTANTIATE_TEST_SUITE_P(
                     GoldenName{"all_commands_law8.haptics", 8}, GoldenName{"all_commands_law9.haptics", 9},
                     GoldenName{"all_commands_law10.haptics", 10},
                     GoldenName{"all_commands_law11.haptics", 11},
-                    GoldenName{"all_commands_law12.haptics", 12}),
+                    GoldenName{"all_commands_law12.haptics", 12},
+                    GoldenName{"all_commands_law13.haptics", 13}),
     [](const auto& file) {
       const std::string name = file.param.file;
       return name.substr(0, name.find('.'));

@@ -254,7 +254,7 @@ bool IsolatedDevice::read(Nanos now, DeviceState& state) noexcept {
   const auto passed = static_cast<std::uint64_t>(now) - static_cast<std::uint64_t>(posted.time);
   postToTick_ = posted.valid == 0 ? 0 : std::max<Nanos>(0, static_cast<Nanos>(passed));
   lostThere_.store(posted.lost != 0, std::memory_order_relaxed);
-  state = posted.toState();
+  if (posted.valid != 0) state = posted.toState();
   if (silent_) state.hold |= kHoldFault;
   return true;
 }

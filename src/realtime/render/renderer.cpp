@@ -64,6 +64,11 @@ void Renderer::reset() noexcept {
   state_->passivity.reset();
 }
 
+void Renderer::restart() noexcept {
+  state_->proxy.reset();
+  state_->passivity.reset();
+}
+
 bool Renderer::remember(const Rendering& last, RenderMemory& out) const noexcept {
   const bool effects = state_->effects.remember(out);
   const bool fields = state_->fields.remember(out);
@@ -89,8 +94,7 @@ void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState
   out = Rendering{};
   if (!hip.allFinite() || !device.velocity_m_per_s.allFinite() || !device.orientation.coeffs().allFinite()) {
     out.status = kRenderNotFinite;
-    s.proxy.reset();
-    s.passivity.reset();
+    restart();
     return;
   }
   const double radius = s.options.toolRadius_m;

@@ -70,7 +70,7 @@ struct RenderOptions {
 
 /// Number of the laws from contact to force. It changes when the same ticks give other forces on purpose, so
 /// that a re-rendering can name the reason (docs/decisions/0009-stiffness-and-friction.md).
-inline constexpr std::uint32_t kForceLaw = 12;
+inline constexpr std::uint32_t kForceLaw = 13;
 
 /// Keeps the proxy from tick to tick. Construct it outside the loop; step() is realtime: noexcept, no
 /// allocation, no lock. One per servo; not thread-safe.
@@ -86,8 +86,10 @@ class Renderer {
   void step(const scene::SceneSnapshot& scene, const device::DeviceState& device, Nanos now, Nanos period,
             Rendering& out) noexcept;
 
-  /// Discards the proxy: the next step() starts without contact at the HIP.
+  /// Forgets everything: the next step() is a first one.
   void reset() noexcept;
+  /// Discards the proxy, for a hand that may be anywhere: the next step() starts without contact at the HIP.
+  void restart() noexcept;
   /// What resume() needs after a step that had this result; false where more than that is needed: in contact,
   /// and while a force ramps out.
   bool remember(const Rendering& last, RenderMemory& out) const noexcept;

@@ -26,8 +26,9 @@ void Tick::operator()(const Pacing& pacing) noexcept {
   const scene::SceneSnapshot& scene = takeSnapshot();
 
   haveState_ = device_.read(report_.time, report_.device);
+  lookForHand();
   const Nanos period = report_.tick == 1 ? period_ : report_.timing.period;
-  renderer_.step(scene, report_.device, report_.time, period, report_.rendering);
+  if (everSeen_) renderer_.step(scene, report_.device, report_.time, period, report_.rendering);
   addRemote(period);
   report_.force_N = guard_.step(guardInput());
   write(started, overtakes);
@@ -70,6 +71,18 @@ const scene::SceneSnapshot& Tick::takeSnapshot() noexcept {
   report_.revision = scene.revision;
   report_.T_world_device = scene.workspace.T_world_device;
   return scene;
+}
+
+// A late tick is no gap: the hand was where the device would have said.
+void Tick::lookForHand() noexcept {
+  const bool seen = haveState_ && (report_.device.hold & device::kHoldFault) == 0;
+  if (!seen) {
+    if (!lostAt_) lostAt_ = report_.time;
+    return;
+  }
+  if (lostAt_ && report_.time - *lostAt_ > kOutOfSight) renderer_.restart();
+  lostAt_.reset();
+  everSeen_ = true;
 }
 
 // Nothing streamed so far, and nothing left of it, costs two comparisons.
@@ -115,6 +128,10 @@ GuardInput Tick::guardInput() const noexcept {
 
 void Tick::resume(const TickReport& last) noexcept {
   report_ = last;
+  everSeen_ = last.device.time != 0;
+  const bool seen =
+      (last.guard.active & bit(Trip::noState)) == 0 && (last.device.hold & device::kHoldFault) == 0;
+  lostAt_ = seen ? std::nullopt : std::optional(last.device.time);
   renderer_.resume(last.rendering);
   guard_.resume(last.guard, last.force_N);
 }

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "base/clock.h"
 #include "base/histogram.h"
@@ -35,6 +36,10 @@ struct TickOptions {
 
 /// A tick that takes longer than this until its write commands zero instead: its force belongs to the past.
 inline constexpr Nanos kOldestForce = 3'000'000;
+
+/// A hand of which the device gave no position for longer than this may be anywhere: the proxy starts anew at
+/// it.
+inline constexpr Nanos kOutOfSight = 50'000'000;
 
 /// Periods, wake-up errors and compute times of all ticks. Any thread may read.
 struct TickHistograms {
@@ -110,6 +115,7 @@ class Tick {
  private:
   void begin(const Pacing& pacing) noexcept;
   const scene::SceneSnapshot& takeSnapshot() noexcept;
+  void lookForHand() noexcept;
   void addRemote(Nanos period) noexcept;
   GuardInput guardInput() const noexcept;
   void write(Nanos started, std::uint32_t overtakes) noexcept;
@@ -141,10 +147,12 @@ class Tick {
   std::atomic<MemoryRing*> rememberTo_{nullptr};
   std::atomic<std::uint64_t> rememberFrom_{0};
   MemoryRing* rememberedTo_ = nullptr;
-  ServoMemory memory_;      // for that ring
-  bool haveState_ = false;  // the device delivered a state in this tick
-  bool written_ = true;     // the device accepted the last force
-  bool discarded_ = false;  // the force of this tick was too old: zero was written
+  ServoMemory memory_;                // for that ring
+  bool haveState_ = false;            // the device delivered a state in this tick
+  bool everSeen_ = false;             // the hand
+  std::optional<Nanos> lostAt_ = {};  // the tick since which it is out of sight
+  bool written_ = true;               // the device accepted the last force
+  bool discarded_ = false;            // the force of this tick was too old: zero was written
   std::atomic<Nanos> finishedAt_{0};
   std::atomic<std::uint32_t> overtakes_{0};
   std::atomic<bool> stoppedAtZero_{false};

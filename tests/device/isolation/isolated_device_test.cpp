@@ -304,22 +304,26 @@ TEST_P(IsolationTest, AStateThatCameAfterTheTickBeganIsNotNegativelyOld) {
   EXPECT_EQ(time, 0);
 }
 
-TEST_P(IsolationTest, AStateThatNeverCameHasNoAge) {
+TEST_P(IsolationTest, AStateThatNeverCameHasNoAgeAndNoPlace) {
   std::atomic<bool> fault{false};
   std::atomic<Nanos> age{0};
+  std::atomic<double> place_m{0};
   IsolatedDevice device(host(GetParam()));
   device.open();
   hand->fault = 2;
   device.start([&](Nanos now) {
     DeviceState state;
+    state.position_m.x() = 7;
     if (fault || !device.read(now, state) || state.hold != kHoldFault) return;
     age = device.postToTick();
+    place_m = state.position_m.x();
     fault = true;
   });
   EXPECT_TRUE(eventually([&] { return fault.load(); }));
   hand->fault = 0;
   device.stop();
   EXPECT_EQ(age, 0) << "and not the time since the machine started";
+  EXPECT_EQ(place_m, 7) << "and not the origin";
 }
 
 INSTANTIATE_TEST_SUITE_P(Paced, IsolationTest, testing::Values("selfpaced", "polled", "watched"),

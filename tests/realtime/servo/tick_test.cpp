@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "base/fake_world.h"
+#include "realtime/render/meshes.h"
+#include "realtime/render/scene_fixture.h"
 #include "realtime/servo/fakes.h"
 #include "realtime/servo/watchdog.h"
 #include "support/milliseconds.h"
@@ -262,6 +264,84 @@ TEST_F(OldForceTest, ReportsThatAStopHasReachedTheMotors) {
   EXPECT_FALSE(tick.stoppedAtZero());
   run(kMs);
   EXPECT_TRUE(tick.stoppedAtZero());
+}
+
+// A sheet 1 mm above the origin, 1000 N/m from both sides.
+class LostHandTest : public TickTest {
+ protected:
+  LostHandTest() {
+    fixture::SceneFixture scene;
+    scene.faces = scene::TouchableFaces::both;
+    scene.add(fixture::heightField(0.5, 1, [](double, double) { return kSheet_m; }), fixture::surface(1000));
+    tick.snapshots().publish(scene.snapshot());
+  }
+  void put(double height_m) { device.state.position_m = Vec3(0.01, 0.02, kSheet_m + height_m); }
+  double rendered_N() const { return tick.last().rendering.force_N.z(); }
+
+  static constexpr double kSheet_m = 0.001;
+};
+
+TEST_F(LostHandTest, IsNotAtTheOriginBeforeItsFirstState) {
+  device.gives = false;
+  put(0.002);
+  run(100 * kMs);
+  EXPECT_FALSE(tick.last().rendering.touching);
+  device.gives = true;
+  run(1000 * kMs);
+  EXPECT_EQ(rendered_N(), 0) << "it never was at the origin, below the sheet";
+  put(-0.001);
+  run(1000 * kMs);
+  EXPECT_NEAR(rendered_N(), 1, 1e-6) << "it came from above";
+}
+
+TEST_F(LostHandTest, StartsAnewWhereItIsFoundAgain) {
+  put(0.002);
+  run(10 * kMs);
+  put(-0.001);
+  run(1000 * kMs);
+  ASSERT_NEAR(tick.last().force_N.z(), 1, 1e-6);
+  device.gives = false;
+  run(kOutOfSight + kMs);
+  put(-0.1);
+  device.gives = true;
+  run(kMs);
+  EXPECT_FALSE(tick.last().rendering.touching) << "nothing pulls it back through the sheet";
+  run(1000 * kMs);
+  EXPECT_EQ(rendered_N(), 0);
+  put(0.001);
+  run(kMs);
+  EXPECT_NEAR(rendered_N(), -1, 1e-6) << "the sheet is between it and the way back";
+}
+
+TEST_F(LostHandTest, AFaultOfTheDeviceLosesIt) {
+  put(0.002);
+  run(10 * kMs);
+  put(-0.001);
+  run(1000 * kMs);
+  device.state.hold = device::kHoldFault;
+  run(kOutOfSight + kMs);
+  put(-0.1);
+  device.state.hold = 0;
+  run(kMs);
+  EXPECT_FALSE(tick.last().rendering.touching);
+}
+
+TEST_F(LostHandTest, AShortSilenceDoesNotLoseIt) {
+  put(0.002);
+  run(10 * kMs);
+  put(-0.001);
+  run(1000 * kMs);
+  device.gives = false;
+  run(kOutOfSight - kMs);
+  put(-0.003);
+  device.gives = true;
+  run(kMs);
+  EXPECT_NEAR(rendered_N(), 3, 1e-6);
+  device.state.hold = device::kHoldDeadMan;
+  run(1000 * kMs);
+  device.state.hold = 0;
+  run(kMs);
+  EXPECT_NEAR(rendered_N(), 3, 1e-6) << "a switch does not hide the hand";
 }
 
 class WatchdogTest : public OldForceTest {
