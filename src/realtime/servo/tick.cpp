@@ -73,15 +73,18 @@ const scene::SceneSnapshot& Tick::takeSnapshot() noexcept {
   return scene;
 }
 
-// A late tick is no gap: the hand was where the device would have said.
+// A late tick is no gap: the hand was where the device would have said. A calibration moves the positions,
+// not the hand.
 void Tick::lookForHand() noexcept {
-  const bool seen = haveState_ && (report_.device.hold & device::kHoldFault) == 0;
-  if (!seen) {
+  if (!haveState_ || (report_.device.hold & device::kHoldFault) != 0) {
     if (!lostAt_) lostAt_ = report_.time;
     return;
   }
-  if (lostAt_ && report_.time - *lostAt_ > kOutOfSight) renderer_.restart();
+  const bool calibrated = (report_.device.hold & device::kHoldNotCalibrated) == 0;
+  const bool lost = lostAt_ && report_.time - *lostAt_ > kOutOfSight;
+  if (lost || calibrated != calibrated_) renderer_.restart();
   lostAt_.reset();
+  calibrated_ = calibrated;
   everSeen_ = true;
 }
 
@@ -132,6 +135,7 @@ void Tick::resume(const TickReport& last) noexcept {
   const bool seen =
       (last.guard.active & bit(Trip::noState)) == 0 && (last.device.hold & device::kHoldFault) == 0;
   lostAt_ = seen ? std::nullopt : std::optional(last.device.time);
+  calibrated_ = (last.device.hold & device::kHoldNotCalibrated) == 0;
   renderer_.resume(last.rendering);
   guard_.resume(last.guard, last.force_N);
 }

@@ -150,6 +150,7 @@ class Tick {
   ServoMemory memory_;                // for that ring
   bool haveState_ = false;            // the device delivered a state in this tick
   bool everSeen_ = false;             // the hand
+  bool calibrated_ = true;            // when it was last seen
   std::optional<Nanos> lostAt_ = {};  // the tick since which it is out of sight
   bool written_ = true;               // the device accepted the last force
   bool discarded_ = false;            // the force of this tick was too old: zero was written

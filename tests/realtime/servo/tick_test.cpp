@@ -325,6 +325,23 @@ TEST_F(LostHandTest, AFaultOfTheDeviceLosesIt) {
   EXPECT_FALSE(tick.last().rendering.touching);
 }
 
+TEST_F(LostHandTest, StartsAnewWhereACalibrationPutsIt) {
+  device.state.hold = device::kHoldNotCalibrated;
+  put(0.002);
+  run(10 * kMs);
+  device.state.hold = 0;
+  put(-0.001);
+  run(kMs);
+  EXPECT_FALSE(tick.last().rendering.touching);
+  device.state.hold = device::kHoldNotCalibrated;
+  put(0.002);
+  run(kMs);
+  EXPECT_FALSE(tick.last().rendering.touching);
+  put(-0.001);
+  run(10 * kMs);
+  EXPECT_NEAR(rendered_N(), 1, 1e-6) << "it moves though nobody knows where";
+}
+
 TEST_F(LostHandTest, AShortSilenceDoesNotLoseIt) {
   put(0.002);
   run(10 * kMs);
