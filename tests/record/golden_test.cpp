@@ -227,7 +227,7 @@ TEST(Golden, DISABLED_WritesTheFiles) {
   markAsVersion1WithoutLaw(folder / "all_commands_v1.haptics");
   std::ofstream(folder / "all_commands.jsonl") << commandsOf(folder / "all_commands_v1.haptics");
   writeRecording(folder / "gripper_v2.haptics", true, 130);
-  writeRecording(folder / "all_commands_law13.haptics", false, 300, 210, 275);
+  writeRecording(folder / "all_commands_law13.haptics", false, 370, 210, 340);
 }
 
 const std::filesystem::path kFolder = std::filesystem::path(HAPTICD_TESTDATA) / "recordings";

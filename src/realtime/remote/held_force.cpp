@@ -18,6 +18,11 @@ void HeldForceLaw::reset() noexcept {
   cut_ = 0;
 }
 
+void HeldForceLaw::restart(const Vec3& hip_m) noexcept {
+  reset();
+  lastHip_m_ = hip_m;
+}
+
 // Falls early enough to be zero at the end at the allowed rate.
 Vec3 HeldForceLaw::target(const HeldForce& wanted, Nanos now) const noexcept {
   const Nanos left = wanted.number == 0 ? 0 : wanted.received + wanted.lifetime - now;

@@ -15,6 +15,8 @@ class HeldForceLaw {
   void step(const HeldForce& wanted, const Vec3& hip_m, const Vec3& velocity_m_per_s, Nanos now,
             double step_s, double guardGain, RemoteRendering& out) noexcept;
   void reset() noexcept;
+  /// The hand may be anywhere, now here: no force pushed it there, and a force ramps in.
+  void restart(const Vec3& hip_m) noexcept;
 
  private:
   Vec3 target(const HeldForce& wanted, Nanos now) const noexcept;

@@ -61,6 +61,11 @@ void RemoteContacts::reset() noexcept {
   force_N_.setZero();
 }
 
+void RemoteContacts::restart(std::uint64_t number) noexcept {
+  reset();
+  taken_ = number;
+}
+
 Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand, Nanos now, double step_s,
                           RemoteRendering& out) noexcept {
   out.contactsTime = newest.clientTime;

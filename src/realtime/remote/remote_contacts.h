@@ -29,6 +29,8 @@ class RemoteContacts {
             RemoteRendering& out) noexcept;
   /// Forgets all contacts at once.
   void reset() noexcept;
+  /// The hand may be anywhere: the same, and what was stated up to the set `number` does not count any more.
+  void restart(std::uint64_t number) noexcept;
 
  private:
   // Those of the newest set, and as many that fade out.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/time.h"
 #include "realtime/render/release.h"
@@ -121,7 +122,12 @@ Vec3 Effects::forceOf(const Effect& effect, Running& r, const Affine& T_device_w
 
 Vec3 Effects::force(const scene::SceneSnapshot& scene, const device::DeviceState& device,
                     const Rendering& contact, double pressed_N, Nanos now) noexcept {
-  for (int i = 0; i < count_; ++i) running_[static_cast<std::size_t>(i)].seen = false;
+  const bool anew = std::exchange(anew_, false);
+  for (int i = 0; i < count_; ++i) {
+    Running& running = running_[static_cast<std::size_t>(i)];
+    running.seen = false;
+    if (anew) running.anchor = contact.proxy_m;
+  }
   const Affine& T_device_world = scene.workspace.T_device_world;
   Vec3 sum = Vec3::Zero();
   double alongNormal = 0;

@@ -20,6 +20,8 @@ class Effects {
              double pressed_N, Nanos now) noexcept;
 
   void reset() noexcept { count_ = 0; }
+  /// The hand may be anywhere: what is anchored where it was is anchored at the next proxy.
+  void restart() noexcept { anew_ = true; }
   /// False while one ramps out: its share is not part of the memory.
   bool remember(RenderMemory& out) const noexcept;
   /// Continues those of the running effects that the memory has.
@@ -57,6 +59,7 @@ class Effects {
   void forgetUnseen() noexcept;
 
   bool contactVibrationPulls_;
+  bool anew_ = false;
   std::array<Running, kMaxEffects> running_;
   int count_ = 0;
 };

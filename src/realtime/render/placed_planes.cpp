@@ -74,8 +74,9 @@ void PlacedPlanes::place(const scene::SceneSnapshot& scene, Nanos now, const Vec
   changedInContact_ = changesInContact(scene);
   forgetAllExcept(scene);
   count_ = 0;
+  leavesOut_ = false;
   for (const scene::Plane& plane : scene.planes) {
-    if (count_ == scene::kMaxPlanes) return;
+    if (count_ == scene::kMaxPlanes) break;
     PlacedPlane& placed = planes_[static_cast<std::size_t>(count_)];
     placed = PlacedPlane{};
     placed.state = &plane;
@@ -83,6 +84,7 @@ void PlacedPlanes::place(const scene::SceneSnapshot& scene, Nanos now, const Vec
     placed.facet.radius = radius_m;
     if (placeOne(T_world_device, now, hip, proxy, toolRadius_m, placed)) ++count_;
   }
+  anew_ = false;
 }
 
 bool PlacedPlanes::placeOne(const geometry::Affine& T_world_device, Nanos now, const Vec3& hip,
@@ -96,11 +98,14 @@ bool PlacedPlanes::placeOne(const geometry::Affine& T_world_device, Nanos now, c
   bool fresh = false;
   Memory& memory = memoryOf(plane, now, toolRadius_m - hipHeight, fresh);
   if (fresh) placed.insertionDepth_m = memory.depth_m;
+  if (anew_) memory.touched = memory.adheres = false;
+  memory.leftOut = (anew_ || memory.leftOut) && hipHeight < toolRadius_m;
+  leavesOut_ |= memory.leftOut;
 
   memory.surface = placed.surface = plane.surface;
   if (plane.releasing && memory.releaseBegin < 0) memory.releaseBegin = now;
   const double left = remainingShare(memory.releaseBegin, plane.owner.get(), now);
-  if (left == 0) return false;
+  if (left == 0 || memory.leftOut) return false;
   if (left < 1) {
     placed.surface.stiffness_N_per_m *= left;
     placed.surface.damping_Ns_per_m *= left;
@@ -131,7 +136,7 @@ bool PlacedPlanes::remember(RenderMemory& out) const noexcept {
   out.planeCount = static_cast<std::uint32_t>(memoryCount_);
   for (std::size_t i = 0; i < out.planeCount; ++i) {
     const Memory& m = memory_[i];
-    if (m.touched || m.adheres || m.releaseBegin >= 0) return false;
+    if (m.touched || m.adheres || m.leftOut || m.releaseBegin >= 0) return false;
     out.planes[i] = {m.index, m.placed, m.depth_m, m.raised_m};
   }
   return true;

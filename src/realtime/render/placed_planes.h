@@ -39,8 +39,11 @@ class PlacedPlanes {
              double toolRadius_m, double radius_m) noexcept;
   /// Ends a tick: bit i of `touched` is set when plane i holds the proxy.
   void remember(unsigned touched, const Vec3& proxy) noexcept;
-  void reset() noexcept { memoryCount_ = 0; }
-  /// False while one is touched, adheres or ramps out: that is not part of the memory.
+  /// The hand may be anywhere: planes that are above it in the next tick are left out until it has left them.
+  void restart() noexcept { anew_ = true; }
+  /// Of this tick: a plane is left out.
+  bool leavesOut() const noexcept { return leavesOut_; }
+  /// False while one is touched, adheres, is left out or ramps out: that is not part of the memory.
   bool remember(RenderMemory& out) const noexcept;
   /// Continues those of the planes that the memory has; nothing touches them.
   void resume(const RenderMemory& memory) noexcept;
@@ -70,6 +73,7 @@ class PlacedPlanes {
     double raised_m = 0;  ///< of the surface above the plane, in the last tick
     bool touched = false;
     bool adheres = false;
+    bool leftOut = false;  ///< the hand was found below it, and did not leave it yet
     Vec3 firstContact = Vec3::Zero();
   };
 
@@ -86,6 +90,8 @@ class PlacedPlanes {
   std::array<Memory, scene::kMaxPlanes> memory_;
   int memoryCount_ = 0;
   bool changedInContact_ = false;
+  bool anew_ = false;
+  bool leavesOut_ = false;
 };
 
 }  // namespace hapticd::realtime

@@ -67,7 +67,7 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   planes_.remember(touched, position_);
   if (casts_ >= kMaxCasts) status |= kRenderIterationLimit;
   if (query_.overflowed() || !contactSet_.spring.complete) status |= kRenderCandidateLimit;
-  if (query_.isEnclosed()) status |= kRenderEnclosed;
+  if (query_.isEnclosed() || planes_.leavesOut()) status |= kRenderEnclosed;
   fadeWhenOverworked(status);
   rememberConstraints();
   before_ = now;
@@ -78,7 +78,7 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
 
 void Proxy::reset() noexcept {
   started_ = false;
-  planes_.reset();
+  planes_.restart();
 }
 
 void Proxy::startAt(const SceneAtTime& now, const Vec3& hip) noexcept {

@@ -65,6 +65,7 @@ void Renderer::reset() noexcept {
 }
 
 void Renderer::restart() noexcept {
+  state_->effects.restart();
   state_->proxy.reset();
   state_->passivity.reset();
 }

@@ -28,8 +28,11 @@ void Tick::operator()(const Pacing& pacing) noexcept {
   haveState_ = device_.read(report_.time, report_.device);
   lookForHand();
   const Nanos period = report_.tick == 1 ? period_ : report_.timing.period;
-  if (everSeen_) renderer_.step(scene, report_.device, report_.time, period, report_.rendering);
-  addRemote(period);
+  if (sight_.ever) {
+    renderer_.step(scene, report_.device, report_.time, period, report_.rendering);
+    addRemote(period);
+  }
+  if (handIsLost()) showNothing();
   report_.force_N = guard_.step(guardInput());
   write(started, overtakes);
 
@@ -73,19 +76,34 @@ const scene::SceneSnapshot& Tick::takeSnapshot() noexcept {
   return scene;
 }
 
-// A late tick is no gap: the hand was where the device would have said. A calibration moves the positions,
-// not the hand.
+// A hand that comes on a way that nobody saw starts anew: while it was out of sight, also for a loop that did
+// not run, or by a calibration, which moves the positions and not the hand.
 void Tick::lookForHand() noexcept {
-  if (!haveState_ || (report_.device.hold & device::kHoldFault) != 0) {
-    if (!lostAt_) lostAt_ = report_.time;
-    return;
+  const device::DeviceState& hand = report_.device;
+  if (!haveState_ || (hand.hold & device::kHoldFault) != 0) return;
+  const bool calibrated = (hand.hold & device::kHoldNotCalibrated) == 0;
+  const bool unseen = handIsLost() || calibrated != sight_.calibrated;
+  const bool elsewhere = (hand.position_m - sight_.place_m).norm() > kElsewhere_m;
+  if (!sight_.ever || (unseen && elsewhere)) {
+    renderer_.restart();
+    remoteContacts_.restart(remoteInput_.read().contacts.number);
+    heldForce_.restart(hand.position_m);
   }
-  const bool calibrated = (report_.device.hold & device::kHoldNotCalibrated) == 0;
-  const bool lost = lostAt_ && report_.time - *lostAt_ > kOutOfSight;
-  if (lost || calibrated != calibrated_) renderer_.restart();
-  lostAt_.reset();
-  calibrated_ = calibrated;
-  everSeen_ = true;
+  sight_ = {true, calibrated, report_.time, hand.position_m};
+}
+
+bool Tick::handIsLost() const noexcept {
+  return !sight_.ever || report_.time - sight_.time > kOutOfSight;
+}
+
+// The renderer goes on where the hand was last seen. Nobody is told that it touches, moves or presses there.
+void Tick::showNothing() noexcept {
+  report_.rendering = Rendering{};
+  report_.rendering.proxy_m = report_.rendering.scp_m = report_.device.position_m;
+  report_.remote = RemoteRendering{};
+  report_.device.velocity_m_per_s.setZero();
+  report_.device.angularVelocity_rad_per_s.setZero();
+  report_.device.buttons = 0;
 }
 
 // Nothing streamed so far, and nothing left of it, costs two comparisons.
@@ -131,11 +149,7 @@ GuardInput Tick::guardInput() const noexcept {
 
 void Tick::resume(const TickReport& last) noexcept {
   report_ = last;
-  everSeen_ = last.device.time != 0;
-  const bool seen =
-      (last.guard.active & bit(Trip::noState)) == 0 && (last.device.hold & device::kHoldFault) == 0;
-  lostAt_ = seen ? std::nullopt : std::optional(last.device.time);
-  calibrated_ = (last.device.hold & device::kHoldNotCalibrated) == 0;
+  sight_ = {true, (last.device.hold & device::kHoldNotCalibrated) == 0, last.time, last.device.position_m};
   renderer_.resume(last.rendering);
   guard_.resume(last.guard, last.force_N);
 }
@@ -154,7 +168,7 @@ void Tick::remember(MemoryRing* ring) noexcept {
   memory_.tick = report_.tick;
   const bool rendering = renderer_.remember(report_.rendering, memory_.render);
   const bool guard = guard_.remember(memory_.guard);
-  memory_.whole = rendering && guard && nothingStreamed() &&
+  memory_.whole = rendering && guard && nothingStreamed() && sight_.ever && sight_.time == report_.time &&
                   report_.revision >= rememberFrom_.load(std::memory_order_acquire);
   if (first || memory_.whole) ring->push(memory_);
 }

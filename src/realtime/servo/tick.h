@@ -7,7 +7,6 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 
 #include "base/clock.h"
 #include "base/histogram.h"
@@ -37,9 +36,10 @@ struct TickOptions {
 /// A tick that takes longer than this until its write commands zero instead: its force belongs to the past.
 inline constexpr Nanos kOldestForce = 3'000'000;
 
-/// A hand of which the device gave no position for longer than this may be anywhere: the proxy starts anew at
-/// it.
+/// A hand of which no tick knew the position for longer than this, and which is then found farther away than
+/// that, came on a way that nobody saw: nothing holds it that it did not touch since.
 inline constexpr Nanos kOutOfSight = 50'000'000;
+inline constexpr double kElsewhere_m = 0.005;
 
 /// Periods, wake-up errors and compute times of all ticks. Any thread may read.
 struct TickHistograms {
@@ -116,6 +116,8 @@ class Tick {
   void begin(const Pacing& pacing) noexcept;
   const scene::SceneSnapshot& takeSnapshot() noexcept;
   void lookForHand() noexcept;
+  bool handIsLost() const noexcept;
+  void showNothing() noexcept;
   void addRemote(Nanos period) noexcept;
   GuardInput guardInput() const noexcept;
   void write(Nanos started, std::uint32_t overtakes) noexcept;
@@ -123,6 +125,14 @@ class Tick {
   void publish() noexcept;
   void remember(MemoryRing* ring) noexcept;
   bool nothingStreamed() noexcept;
+
+  // When a device last told a position, and which.
+  struct Sight {
+    bool ever = false;
+    bool calibrated = true;
+    Nanos time = 0;  // of the tick
+    Vec3 place_m = Vec3::Zero();
+  };
 
   device::Device& device_;
   base::Clock& clock_;
@@ -133,6 +143,7 @@ class Tick {
   handoff::LatestValue<RemoteInput> remoteInput_;
   RemoteContacts remoteContacts_;
   HeldForceLaw heldForce_;
+  Sight sight_;
   std::uint64_t contactsSeen_ = 0;
   std::uint64_t forceSeen_ = 0;
   GuardControl control_;
@@ -147,13 +158,10 @@ class Tick {
   std::atomic<MemoryRing*> rememberTo_{nullptr};
   std::atomic<std::uint64_t> rememberFrom_{0};
   MemoryRing* rememberedTo_ = nullptr;
-  ServoMemory memory_;                // for that ring
-  bool haveState_ = false;            // the device delivered a state in this tick
-  bool everSeen_ = false;             // the hand
-  bool calibrated_ = true;            // when it was last seen
-  std::optional<Nanos> lostAt_ = {};  // the tick since which it is out of sight
-  bool written_ = true;               // the device accepted the last force
-  bool discarded_ = false;            // the force of this tick was too old: zero was written
+  ServoMemory memory_;      // for that ring
+  bool haveState_ = false;  // the device delivered a state in this tick
+  bool written_ = true;     // the device accepted the last force
+  bool discarded_ = false;  // the force of this tick was too old: zero was written
   std::atomic<Nanos> finishedAt_{0};
   std::atomic<std::uint32_t> overtakes_{0};
   std::atomic<bool> stoppedAtZero_{false};

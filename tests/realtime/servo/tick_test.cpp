@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -277,8 +278,14 @@ class LostHandTest : public TickTest {
   }
   void put(double height_m) { device.state.position_m = Vec3(0.01, 0.02, kSheet_m + height_m); }
   double rendered_N() const { return tick.last().rendering.force_N.z(); }
+  void lose() {
+    device.gives = false;
+    run(kOutOfSight + kMs);
+    device.gives = true;
+  }
 
   static constexpr double kSheet_m = 0.001;
+  int placements_ = 0;
 };
 
 TEST_F(LostHandTest, IsNotAtTheOriginBeforeItsFirstState) {
@@ -312,6 +319,19 @@ TEST_F(LostHandTest, StartsAnewWhereItIsFoundAgain) {
   EXPECT_NEAR(rendered_N(), -1, 1e-6) << "the sheet is between it and the way back";
 }
 
+TEST_F(LostHandTest, KeepsItsContactWhereItWasLost) {
+  put(0.002);
+  run(10 * kMs);
+  put(-0.001);
+  run(1000 * kMs);
+  device.gives = false;
+  run(1000 * kMs);
+  put(0.001 - kElsewhere_m);
+  device.gives = true;
+  run(kMs);
+  EXPECT_NEAR(rendered_N(), 4, 1e-6);
+}
+
 TEST_F(LostHandTest, AFaultOfTheDeviceLosesIt) {
   put(0.002);
   run(10 * kMs);
@@ -330,7 +350,7 @@ TEST_F(LostHandTest, StartsAnewWhereACalibrationPutsIt) {
   put(0.002);
   run(10 * kMs);
   device.state.hold = 0;
-  put(-0.001);
+  put(-0.004);
   run(kMs);
   EXPECT_FALSE(tick.last().rendering.touching);
   device.state.hold = device::kHoldNotCalibrated;
@@ -340,6 +360,135 @@ TEST_F(LostHandTest, StartsAnewWhereACalibrationPutsIt) {
   put(-0.001);
   run(10 * kMs);
   EXPECT_NEAR(rendered_N(), 1, 1e-6) << "it moves though nobody knows where";
+  device.state.hold = 0;
+  put(-0.002);
+  run(kMs);
+  EXPECT_NEAR(rendered_N(), 2, 1e-6) << "one that changes little loses nothing";
+}
+
+TEST_F(LostHandTest, ALoopThatDidNotRunLosesIt) {
+  put(0.002);
+  run(10 * kMs);
+  put(-0.001);
+  run(1000 * kMs);
+  put(-0.1);
+  runLate(3000 * kMs);
+  EXPECT_FALSE(tick.last().rendering.touching);
+}
+
+TEST_F(LostHandTest, NobodyIsToldThatItTouchesMovesOrPresses) {
+  put(0.002);
+  run(10 * kMs);
+  put(-0.001);
+  device.state.velocity_m_per_s = Vec3(0.1, 0, 0);
+  device.state.buttons = 1;
+  run(100 * kMs);
+  ASSERT_TRUE(tick.last().rendering.touching);
+  device.state.hold = device::kHoldFault;
+  run(kOutOfSight);
+  EXPECT_TRUE(tick.last().rendering.touching) << "a short silence is not told";
+  run(kMs);
+  EXPECT_FALSE(tick.last().rendering.touching);
+  EXPECT_EQ(tick.last().rendering.proxy_m, device.state.position_m);
+  EXPECT_TRUE(tick.last().device.velocity_m_per_s.isZero(0));
+  EXPECT_EQ(tick.last().device.buttons, 0U);
+  device.state.hold = 0;
+  run(kMs);
+  EXPECT_NEAR(rendered_N(), 1, 1e-6);
+  EXPECT_EQ(tick.last().device.buttons, 1U);
+}
+
+TEST_F(LostHandTest, PlanesAboveItAreLeftOutUntilItLeavesThem) {
+  for (const Nanos recovery : {Nanos{0}, 100 * kMs}) {
+    fixture::SceneFixture scene;
+    scene.planes.emplace_back();
+    scene.planes[0].normal = Vec3::UnitZ();
+    scene.planes[0].surface = fixture::surface(1000);
+    scene.planes[0].recovery = recovery;
+    scene.planes[0].placement = static_cast<std::uint32_t>(++placements_);
+    tick.snapshots().publish(scene.snapshot());
+    device.state.position_m = Vec3(0, 0, 0.01);
+    run(1000 * kMs);
+    device.state.position_m = Vec3(0, 0, -0.001);
+    run(1000 * kMs);
+    ASSERT_NEAR(tick.last().force_N.z(), 1, 1e-6);
+    lose();
+    device.state.position_m = Vec3(0, 0, -0.02);
+    run(1000 * kMs);
+    EXPECT_EQ(tick.last().force_N.norm(), 0);
+    EXPECT_NE(tick.last().rendering.status & kRenderEnclosed, 0U);
+    device.state.position_m = Vec3(0, 0, 0.001);
+    run(kMs);
+    EXPECT_EQ(tick.last().rendering.status, 0U);
+    device.state.position_m = Vec3(0, 0, -0.001);
+    run(1000 * kMs);
+    EXPECT_NEAR(tick.last().force_N.z(), 1, 1e-6);
+  }
+}
+
+TEST_F(LostHandTest, FrictionInTheAirDoesNotPullItBack) {
+  fixture::SceneFixture scene;
+  scene.effects.emplace_back();
+  scene.effects[0].type = scene::EffectType::friction;
+  scene.effects[0].gain = 1000;
+  scene.effects[0].magnitude_N = 2;
+  tick.snapshots().publish(scene.snapshot());
+  device.state.position_m = Vec3::Zero();
+  run(1000 * kMs);
+  lose();
+  device.state.position_m = Vec3(0, 0, -0.1);
+  run(1000 * kMs);
+  EXPECT_EQ(tick.last().force_N.norm(), 0);
+  device.state.position_m = Vec3(0, 0, -0.099);
+  run(kMs);
+  EXPECT_NEAR(tick.last().force_N.z(), -1, 1e-6);
+}
+
+// A surface that a client streams sixty times a second.
+TEST_F(LostHandTest, RemoteContactsStatedBeforeDoNotPullItBack) {
+  tick.snapshots().publish(fixture::SceneFixture().snapshot());
+  RemoteInput input;
+  const auto state = [&](double height_m) {
+    RemoteContact& contact = input.contacts.contacts[0];
+    contact.id = 1;
+    contact.point_m = Vec3(0, 0, height_m);
+    contact.normal = Vec3::UnitZ();
+    contact.stiffness_N_per_m = 800;
+    input.contacts.count = 1;
+    input.contacts.received = input.contacts.stated = now_;
+    ++input.contacts.number;
+    tick.remote().write(input);
+    double most = 0;
+    for (int i = 0; i < 16; ++i) most = std::max(most, run(kMs).force_N.norm());
+    return most;
+  };
+  device.state.position_m = Vec3(0, 0, 0.005);
+  state(0);
+  device.state.position_m = Vec3(0, 0, -0.001);
+  for (int i = 0; i < 60; ++i) state(0);
+  ASSERT_NEAR(tick.last().force_N.z(), 0.8, 1e-3);
+  device.gives = false;
+  for (int i = 0; i < 4; ++i) state(0);
+  device.gives = true;
+  device.state.position_m = Vec3(0, 0, -0.1);
+  for (int i = 0; i < 16; ++i) EXPECT_EQ(run(kMs).force_N.norm(), 0) << i;
+  for (int i = 0; i < 60; ++i) EXPECT_EQ(state(-0.15), 0) << i;
+}
+
+TEST_F(LostHandTest, HeldForcesDoNotAddUpBeforeItsFirstState) {
+  device.gives = false;
+  RemoteInput input;
+  input.force.number = 1;
+  input.force.lifetime = 10'000 * kMs;
+  input.force.force_N = Vec3(0, 0, 1);
+  tick.remote().write(input);
+  run(1000 * kMs);
+  EXPECT_TRUE(tick.last().rendering.force_N.isZero(0));
+  EXPECT_EQ(tick.last().guard.counts[static_cast<std::size_t>(Trip::peakForce)], 0U);
+  device.gives = true;
+  device.state.position_m = Vec3(0, 0, 0.1);
+  run(20 * kMs);
+  EXPECT_EQ(tick.last().remote.status, 0U) << "the way to where it is did not use its energy";
 }
 
 TEST_F(LostHandTest, AShortSilenceDoesNotLoseIt) {
