@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 
 #include "base/time.h"
@@ -122,6 +123,8 @@ class ContactQuery {
 
   /// Ends a path from p to g where objects that were left out begin; true when it did.
   bool shorten(const Vec3& p, Vec3& g) const noexcept;
+  /// Objects were left out: shorten() may end a path.
+  bool limitsTravel() const noexcept { return std::isfinite(freeTravel_); }
   /// True when an object is left out because it appeared around the tool.
   bool isEnclosed() const noexcept { return enclosingCount_ > 0; }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <tuple>
+#include <utility>
 
 #include "realtime/render/facet.h"
 
@@ -12,12 +13,14 @@ namespace {
 using geometry::Affine;
 
 constexpr double kFarthest_m = 0.2;                // of a search for the surface
+constexpr double kIndexWiden = 1 + 1e-6;           // of a query that changes frames
 constexpr float kRounding_m = 2e-6F;               // of a bound with its travel, in floats
 constexpr double kLongestTravel_m = 4;             // beyond, floats would be too coarse
 constexpr double kLongestWorkspaceStep_m = 0.020;  // of the tool in the world; beyond, it counts as a jump
 constexpr int kExaminations = 64;                  // in a tick, of bounds that have run out
 constexpr int kUnknownExaminations = 32;           // in a tick, of objects without a bound
-constexpr int kTurns = 2;                          // in a tick, of others
+constexpr int kUnknownBoxes = 512;      // of these, whose boxes are looked at; beyond, they may be anywhere
+constexpr int kTurns = 2;               // in a tick, of others
 constexpr int kChangesFollowed = 1024;  // in a tick: the bounds of further objects that moved are lost
 constexpr int kMostTriangles = 2048;    // in one examination; beyond, the object counts as touching
 
@@ -67,6 +70,18 @@ double ObjectDistances::examine(const scene::ObjectState& state, const Affine& T
   return distance_m;
 }
 
+// Of the box of the object from the tool, at least, also on the rest of its motion: 0 while it moves.
+double ObjectDistances::boxDistance(const scene::ObjectState& state, const Affine& T_device_world, Nanos now,
+                                    const Vec3& tool) const noexcept {
+  const geometry::Box& box = state.mesh->index.bounds();
+  if (state.motion.movingAfter(now) || state.mesh->deformingAfter(now)) return 0;
+  const Affine T_object_device = (T_device_world * state.motion.at(now)).inverse();
+  const double stretch = stretchOf(T_object_device.linear());
+  if (!std::isfinite(stretch) || box.empty()) return std::numeric_limits<double>::infinity();
+  const Vec3 p = T_object_device * tool;
+  return (p - p.cwiseMax(box.min).cwiseMin(box.max)).norm() / stretch;
+}
+
 float ObjectDistances::boundAfterMove(const scene::ObjectState& before, const scene::ObjectState& now,
                                       float bound) const noexcept {
   const bool deformed = before.mesh != now.mesh;
@@ -102,16 +117,27 @@ bool ObjectDistances::followWorkspace(const scene::SceneSnapshot& scene) noexcep
   return true;
 }
 
-// States are compared by address: the previous snapshot still lives.
-void ObjectDistances::follow(const scene::SceneSnapshot& scene) noexcept {
+float ObjectDistances::boundOf(double distance_m) const noexcept {
+  const double within = std::clamp(distance_m, 0.0, 2 * kFarthest_m);
+  return std::max(0.0F, static_cast<float>(travel_ + within) - kRounding_m);
+}
+
+// States are compared by address: the previous snapshot still lives. When nothing is known, the index says
+// which objects are within the reach of the tool.
+void ObjectDistances::follow(const scene::SceneSnapshot& scene, double reach_m) noexcept {
   const int count = static_cast<int>(std::min<std::size_t>(scene.objects.size(), kMaxTracked));
   metresPerUnit_ = 1 / scene.workspace.worldUnitsPerMetre;
   if (count_ > 0 && scene_ != nullptr && followWorkspace(scene)) {
     followObjects(scene);
   } else {
-    std::fill_n(bounds_.begin(), count, kUnknown);
+    std::fill_n(bounds_.begin(), count, boundOf(reach_m));
     for (int i = 0; i < count; ++i)
       states_[static_cast<std::size_t>(i)] = scene.objects[static_cast<std::size_t>(i)].get();
+    const Affine& T_world_device = scene.workspace.T_world_device;
+    const double reach = kIndexWiden * reach_m * stretchOf(T_world_device.linear());
+    scene.objectIndex->visitNear(T_world_device * tool_, reach, [&](std::uint32_t i) noexcept {
+      if (i < static_cast<std::uint32_t>(count)) bounds_[i] = kUnknown;
+    });
   }
   count_ = count;
   scene_ = &scene;
@@ -163,10 +189,11 @@ bool ObjectDistances::isBlockBeyond(int first, float limit) const noexcept {
   return least > limit;
 }
 
-// Keeps the nearest; a candidate without room limits how far the tool may move.
+// Keeps the nearest, first of those that were examined: what the tool touches is among them. A candidate
+// without room limits how far the tool may move.
 void ObjectDistances::consider(Nearest& nearest, const Candidate& candidate) const noexcept {
   const auto before = [](const Candidate& a, const Candidate& b) {
-    return std::tie(a.distance_m, a.object) < std::tie(b.distance_m, b.object);
+    return std::tie(a.isBound, a.distance_m, a.object) < std::tie(b.isBound, b.distance_m, b.object);
   };
   const auto begin = nearest.candidates.begin();
   auto end = begin + nearest.count;
@@ -183,6 +210,19 @@ void ObjectDistances::consider(Nearest& nearest, const Candidate& candidate) con
   *place = candidate;
 }
 
+// Those with the least bounds come first, for they limit the way of the tool; of equal ones, another in each
+// tick.
+int ObjectDistances::chooseDue(int due) noexcept {
+  if (due <= kExaminations) return due;
+  const auto fromTurn = [&](std::uint16_t i) { return i > turn_ ? i - turn_ : i - turn_ + count_; };
+  const auto before = [&](std::uint16_t a, std::uint16_t b) {
+    return std::pair(bounds_[a], fromTurn(a)) < std::pair(bounds_[b], fromTurn(b));
+  };
+  const auto begin = due_.begin();
+  std::nth_element(begin, begin + kExaminations, begin + due, before);
+  return kExaminations;
+}
+
 void ObjectDistances::findNearest(const scene::SceneSnapshot& scene, Nanos now, Nanos before,
                                   const Vec3& tool, double reach_m, Nearest& nearest) noexcept {
   nearest.count = 0;
@@ -190,7 +230,7 @@ void ObjectDistances::findNearest(const scene::SceneSnapshot& scene, Nanos now, 
   nearest.complete = scene.objects.size() <= kMaxTracked;
   if (count_ == 0) tool_ = tool;
   workspaceMoved_ = false;
-  if (&scene != scene_ || count_ == 0) follow(scene);
+  if (&scene != scene_ || count_ == 0) follow(scene, reach_m);
   travel_ += (tool - tool_).norm();
   tool_ = tool;
   if (travel_ > kLongestTravel_m) {
@@ -201,20 +241,19 @@ void ObjectDistances::findNearest(const scene::SceneSnapshot& scene, Nanos now, 
     travel_ = 0;
   }
   const auto limit = static_cast<float>(travel_ + reach_m) + kRounding_m;
-  int examinations = 0;
+  int due = 0;
   int unknown = 0;
   const auto examineAt = [&](int i) {
     const auto k = static_cast<std::size_t>(i);
     const bool fresh = bounds_[k] == kUnknown;
     double later_m = 0;
     const double distance_m = examine(*states_[k], scene.workspace.T_device_world, now, tool, later_m);
-    bounds_[k] = static_cast<float>(travel_ + std::clamp(later_m, 0.0, 2 * kFarthest_m)) - kRounding_m;
-    bounds_[k] = std::max(0.0F, bounds_[k]);
+    bounds_[k] = boundOf(later_m);
     // One that moved may have passed over the tool, and one that appeared may be around it.
     const bool moved =
         workspaceMoved_ || states_[k]->motion.movingAfter(before) || states_[k]->mesh->deformingAfter(before);
     if (fresh || distance_m <= reach_m || moved)
-      consider(nearest, {distance_m, static_cast<std::uint32_t>(i), fresh});
+      consider(nearest, {distance_m, static_cast<std::uint32_t>(i), fresh, false});
   };
   for (int i = 0; i < count_; ++i) {
     if (i % kBlock == 0 && isBlockBeyond(i, limit)) {
@@ -226,14 +265,26 @@ void ObjectDistances::findNearest(const scene::SceneSnapshot& scene, Nanos now, 
     if (bounds_[k] == kUnknown) {
       if (++unknown <= kUnknownExaminations) {
         examineAt(i);
+      } else if (unknown <= kUnknownBoxes) {
+        // One whose box is around the tool may be around it, too, and stays unknown.
+        const double box_m = boxDistance(*states_[k], scene.workspace.T_device_world, now, tool);
+        if (box_m > 0) bounds_[k] = boundOf(box_m);
+        if (box_m <= reach_m) consider(nearest, {box_m, static_cast<std::uint32_t>(i), true, true});
       } else {
-        nearest.complete = false;
+        nearest.free_m = 0;
       }
-    } else if (++examinations <= kExaminations) {
+    } else {
+      due_[static_cast<std::size_t>(due++)] = static_cast<std::uint16_t>(i);
+    }
+  }
+  const int examined = chooseDue(due);
+  for (int n = 0; n < due; ++n) {
+    const int i = due_[static_cast<std::size_t>(n)];
+    if (n < examined) {
       examineAt(i);
     } else {
-      consider(nearest, {std::max(0.0, static_cast<double>(bounds_[k]) - travel_),
-                         static_cast<std::uint32_t>(i), false});
+      const double bound_m = bounds_[static_cast<std::size_t>(i)] - travel_;
+      consider(nearest, {std::max(0.0, bound_m), static_cast<std::uint32_t>(i), false, true});
     }
   }
   // Bounds of objects that rest around the tool would otherwise run out at the same time.

@@ -32,6 +32,7 @@ class ObjectDistances {
     double distance_m = 0;     ///< of the surface from the tool, at least
     std::uint32_t object = 0;  ///< position in SceneSnapshot::objects
     bool fresh = false;        ///< found for the first time: it appeared
+    bool isBound = false;      ///< not examined in this tick: it may be farther
   };
   struct Nearest {
     std::array<Candidate, kRoom> candidates;
@@ -51,20 +52,25 @@ class ObjectDistances {
   static constexpr float kUnknown = -1;
   static constexpr int kBlock = 64;
 
-  void follow(const scene::SceneSnapshot& scene) noexcept;
+  float boundOf(double distance_m) const noexcept;
+  void follow(const scene::SceneSnapshot& scene, double reach_m) noexcept;
   void followObjects(const scene::SceneSnapshot& scene) noexcept;
   bool followWorkspace(const scene::SceneSnapshot& scene) noexcept;
   float boundAfterMove(const scene::ObjectState& before, const scene::ObjectState& now,
                        float bound) const noexcept;
   double examine(const scene::ObjectState& state, const geometry::Affine& T_device_world, Nanos now,
                  const Vec3& tool, double& later_m) const noexcept;
+  double boxDistance(const scene::ObjectState& state, const geometry::Affine& T_device_world, Nanos now,
+                     const Vec3& tool) const noexcept;
   bool isBlockBeyond(int first, float limit) const noexcept;
   void consider(Nearest& nearest, const Candidate& candidate) const noexcept;
+  int chooseDue(int due) noexcept;
 
   std::array<float, kMaxTracked> bounds_{};  // lower bound of the distance plus the travel until then
   std::array<float, kMaxTracked> boundsBefore_{};
   std::array<const scene::ObjectState*, kMaxTracked> states_{};
   std::array<const scene::ObjectState*, kMaxTracked> statesBefore_{};
+  std::array<std::uint16_t, kMaxTracked> due_{};  // in this tick: objects whose bound has run out
   int count_ = 0;
   bool workspaceMoved_ = false;  // in this tick
   const scene::SceneSnapshot* scene_ = nullptr;

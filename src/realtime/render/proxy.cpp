@@ -276,10 +276,11 @@ Projection Proxy::nearestTo(const Vec3& target, const ActiveSet& active) const n
 }
 
 // The work or the casts of a tick may be spent before the faces that hold the proxy are found again, or on
-// its way to others. Those of the last tick hold it then, no farther than the proxy is from the HIP: the
-// force fades out (fadeWhenOverworked) and does not end for a tick.
+// its way to others, or among many objects it stops on that way. Those of the last tick hold it then, no
+// farther than the proxy is from the HIP: the force fades out (fadeWhenOverworked) and does not end for a
+// tick.
 bool Proxy::restoreConstraints(const Vec3& hip, ActiveSet& active) const noexcept {
-  if (!query_.workSpent() && casts_ < kMaxCasts) return false;
+  if (!query_.workSpent() && casts_ < kMaxCasts && !query_.limitsTravel()) return false;
   for (int i = 0; i < lastCount_; ++i) {
     const LastConstraint& last = lastConstraints_[static_cast<std::size_t>(i)];
     const HalfSpace& face = last.halfSpace;

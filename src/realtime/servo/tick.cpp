@@ -85,7 +85,7 @@ void Tick::lookForHand() noexcept {
   const bool unseen = handIsLost() || calibrated != sight_.calibrated;
   const bool elsewhere = (hand.position_m - sight_.place_m).norm() > kElsewhere_m;
   if (!sight_.ever || (unseen && elsewhere)) {
-    renderer_.restart();
+    if (sight_.ever) renderer_.restart();
     remoteContacts_.restart(remoteInput_.read().contacts.number);
     heldForce_.restart(hand.position_m);
   }

@@ -157,6 +157,38 @@ TEST_P(Crowd, moving_sheet_in_a_crowd_takes_the_hand_along) {
   EXPECT_EQ(status, 0U);
 }
 
+// A floor of 400 boxes: more of them are near the hand than a tick examines, also when none moves.
+TEST(Tiles, are_a_floor) {
+  for (const double size_mm : {0.5, 1.0}) {
+    Loop loop;
+    loop.send(scene::SetObjectNumber{400});
+    for (int i = 0; i < 400; ++i) {
+      const Vec3 corner((i % 20 - 10) * size_mm, -size_mm, (i / 20 - 10) * size_mm);
+      loop.add(i, boxTriples(corner, corner + Vec3::Constant(size_mm)));
+    }
+    const auto slide = [&](const Vec3& from, const Vec3& to) {
+      const int ticks = static_cast<int>((to - from).norm() / 2e-5);
+      for (int i = 1; i <= ticks; ++i) {
+        loop.now += kMs;
+        const Vec3 hip = from + (to - from) * (static_cast<double>(i) / ticks);
+        loop.render(hip, kMs);
+        if (hip.y() > -0.001) continue;
+        ASSERT_NEAR(loop.out.force_N.y(), -hip.y() * kStiffness_N_per_m, 1e-3)
+            << size_mm << " mm, " << hip.transpose();
+      }
+    };
+    const Vec3 above(0.00031, 0.002, 0.00022);
+    const Vec3 pressed(0.00031, -0.005, 0.00022);
+    const Vec3 aside(0.0041, -0.005, 0.0027);
+    loop.rest(above, toNanos(0.5));
+    slide(above, pressed);
+    slide(pressed, aside);
+    slide(aside, pressed);
+    slide(pressed, above);
+    EXPECT_EQ(loop.out.force_N.norm(), 0);
+  }
+}
+
 // More copies of one face than a tick examines: the index has it once.
 TEST(Copies, of_one_face_are_felt_as_one) {
   Loop loop;
