@@ -32,7 +32,7 @@ void Tick::operator()(const Pacing& pacing) noexcept {
     renderer_.step(scene, report_.device, report_.time, period, report_.rendering);
     addRemote(period);
   }
-  if (handIsLost()) showNothing();
+  if (handIsLost()) feelNothing();
   report_.force_N = guard_.step(guardInput());
   write(started, overtakes);
 
@@ -79,16 +79,20 @@ const scene::SceneSnapshot& Tick::takeSnapshot() noexcept {
 // A hand that comes on a way that nobody saw starts anew: while it was out of sight, also for a loop that did
 // not run, or by a calibration, which moves the positions and not the hand.
 void Tick::lookForHand() noexcept {
-  const device::DeviceState& hand = report_.device;
-  if (!haveState_ || (hand.hold & device::kHoldFault) != 0) return;
+  device::DeviceState& hand = report_.device;
+  if (!haveState_ || (hand.hold & device::kHoldFault) != 0) {
+    if (!handIsLost()) return;
+    // Nobody knows that it moves, or presses.
+    hand.velocity_m_per_s.setZero();
+    hand.angularVelocity_rad_per_s.setZero();
+    hand.buttons = 0;
+    return;
+  }
   const bool calibrated = (hand.hold & device::kHoldNotCalibrated) == 0;
   const bool unseen = handIsLost() || calibrated != sight_.calibrated;
   const bool elsewhere = (hand.position_m - sight_.place_m).norm() > kElsewhere_m;
-  if (!sight_.ever || (unseen && elsewhere)) {
-    if (sight_.ever) renderer_.restart();
-    remoteContacts_.restart(remoteInput_.read().contacts.number);
-    heldForce_.restart(hand.position_m);
-  }
+  foundAnew_ = !sight_.ever || (unseen && elsewhere);
+  if (sight_.ever && foundAnew_) renderer_.restart();
   sight_ = {true, calibrated, report_.time, hand.position_m};
 }
 
@@ -96,14 +100,11 @@ bool Tick::handIsLost() const noexcept {
   return !sight_.ever || report_.time - sight_.time > kOutOfSight;
 }
 
-// The renderer goes on where the hand was last seen. Nobody is told that it touches, moves or presses there.
-void Tick::showNothing() noexcept {
+// The renderer goes on where the hand was last seen, and nobody is told that it touches there.
+void Tick::feelNothing() noexcept {
   report_.rendering = Rendering{};
   report_.rendering.proxy_m = report_.rendering.scp_m = report_.device.position_m;
   report_.remote = RemoteRendering{};
-  report_.device.velocity_m_per_s.setZero();
-  report_.device.angularVelocity_rad_per_s.setZero();
-  report_.device.buttons = 0;
 }
 
 // Nothing streamed so far, and nothing left of it, costs two comparisons.
@@ -114,6 +115,10 @@ void Tick::addRemote(Nanos period) noexcept {
   }
   contactsSeen_ = input.contacts.number;
   forceSeen_ = input.force.number;
+  if (std::exchange(foundAnew_, false)) {
+    remoteContacts_.restart(contactsSeen_);
+    heldForce_.restart(report_.device.position_m);
+  }
   RemoteRendering& out = report_.remote;
   out.status = 0;
   out.count = 0;

@@ -117,7 +117,7 @@ class Tick {
   const scene::SceneSnapshot& takeSnapshot() noexcept;
   void lookForHand() noexcept;
   bool handIsLost() const noexcept;
-  void showNothing() noexcept;
+  void feelNothing() noexcept;
   void addRemote(Nanos period) noexcept;
   GuardInput guardInput() const noexcept;
   void write(Nanos started, std::uint32_t overtakes) noexcept;
@@ -144,6 +144,7 @@ class Tick {
   RemoteContacts remoteContacts_;
   HeldForceLaw heldForce_;
   Sight sight_;
+  bool foundAnew_ = false;  // in this tick
   std::uint64_t contactsSeen_ = 0;
   std::uint64_t forceSeen_ = 0;
   GuardControl control_;
