@@ -13,7 +13,6 @@ namespace {
 using geometry::Affine;
 
 constexpr double kFarthest_m = 0.2;                // of a search for the surface
-constexpr double kIndexWiden = 1 + 1e-6;           // of a query that changes frames
 constexpr float kRounding_m = 2e-6F;               // of a bound with its travel, in floats
 constexpr double kLongestTravel_m = 4;             // beyond, floats would be too coarse
 constexpr double kLongestWorkspaceStep_m = 0.020;  // of the tool in the world; beyond, it counts as a jump
@@ -36,50 +35,49 @@ double stretchOf(const geometry::Mat3& m) noexcept {
   return std::sqrt((m.transpose() * m).cwiseAbs().rowwise().sum().maxCoeff());
 }
 
+// The tool in the frame of an object.
+ObjectDistances::ToolInObject ObjectDistances::toolIn(const scene::ObjectState& state,
+                                                      const Query& query) noexcept {
+  const geometry::Box& box = state.mesh->index.bounds();
+  const Affine T_object_device = (query.T_device_world * state.motion.at(query.now)).inverse();
+  ToolInObject in;
+  in.stretch = stretchOf(T_object_device.linear());
+  in.exists = std::isfinite(in.stretch) && !box.empty();
+  if (!in.exists) return in;
+  in.position = T_object_device * query.tool;
+  in.outside = (in.position - in.position.cwiseMax(box.min).cwiseMin(box.max)).norm();
+  return in;
+}
+
 // The distance now, at least, and the least on the rest of its motion.
-double ObjectDistances::examine(const scene::ObjectState& state, const Affine& T_device_world, Nanos now,
-                                const Vec3& tool, double& later_m) const noexcept {
+double ObjectDistances::examine(const scene::ObjectState& state, const Query& query,
+                                double& later_m) const noexcept {
   const scene::MeshGeometry& mesh = *state.mesh;
-  const geometry::Box& box = mesh.index.bounds();
-  const Affine placed = state.motion.at(now);
-  const Affine T_object_device = (T_device_world * placed).inverse();
-  const double stretch = stretchOf(T_object_device.linear());
+  const ToolInObject in = toolIn(state, query);
   later_m = std::numeric_limits<double>::infinity();
-  if (!std::isfinite(stretch) || box.empty()) return later_m;
-  const Vec3 p = T_object_device * tool;
-  const double outside = (p - p.cwiseMax(box.min).cwiseMin(box.max)).norm();
-  double nearest = kFarthest_m * stretch;
-  if (outside < nearest) {
+  if (!in.exists) return later_m;
+  double nearest = kFarthest_m * in.stretch;
+  if (in.outside < nearest) {
     int visits = 0;
-    mesh.index.visitNearest(p, nearest, [&](std::uint32_t triangle) noexcept {
+    mesh.index.visitNearest(in.position, nearest, [&](std::uint32_t triangle) noexcept {
       if (++visits > kMostTriangles) {
         nearest = 0;
         return -1.0;
       }
-      const scene::Corners now_ = mesh.corners(triangle, now);
-      return nearest = std::min(nearest, distanceBound(now_, p));
+      return nearest = std::min(nearest, distanceBound(mesh.corners(triangle, query.now), in.position));
     });
   }
-  const double distance_m = std::max(outside, nearest) / stretch;
+  const double distance_m = std::max(in.outside, nearest) / in.stretch;
   later_m = distance_m;
-  if (state.motion.movingAfter(now)) {
+  const Affine placed = state.motion.at(query.now);
+  if (state.motion.movingAfter(query.now)) {
+    const geometry::Box& box = mesh.index.bounds();
     const double detour = state.motion.detour(box.centre(), 0.5 * box.extents().norm());
     later_m -= (scene::longestMove(placed, state.motion.destination(), box) + detour) * metresPerUnit_;
   }
-  if (mesh.deformingAfter(now)) later_m -= mesh.recentMove * (T_device_world * placed).linear().norm();
+  if (mesh.deformingAfter(query.now))
+    later_m -= mesh.recentMove * (query.T_device_world * placed).linear().norm();
   return distance_m;
-}
-
-// Of the box of the object from the tool, at least, also on the rest of its motion: 0 while it moves.
-double ObjectDistances::boxDistance(const scene::ObjectState& state, const Affine& T_device_world, Nanos now,
-                                    const Vec3& tool) const noexcept {
-  const geometry::Box& box = state.mesh->index.bounds();
-  if (state.motion.movingAfter(now) || state.mesh->deformingAfter(now)) return 0;
-  const Affine T_object_device = (T_device_world * state.motion.at(now)).inverse();
-  const double stretch = stretchOf(T_object_device.linear());
-  if (!std::isfinite(stretch) || box.empty()) return std::numeric_limits<double>::infinity();
-  const Vec3 p = T_object_device * tool;
-  return (p - p.cwiseMax(box.min).cwiseMin(box.max)).norm() / stretch;
 }
 
 float ObjectDistances::boundAfterMove(const scene::ObjectState& before, const scene::ObjectState& now,
@@ -134,8 +132,8 @@ void ObjectDistances::follow(const scene::SceneSnapshot& scene, double reach_m) 
     for (int i = 0; i < count; ++i)
       states_[static_cast<std::size_t>(i)] = scene.objects[static_cast<std::size_t>(i)].get();
     const Affine& T_world_device = scene.workspace.T_world_device;
-    const double reach = kIndexWiden * reach_m * stretchOf(T_world_device.linear());
-    scene.objectIndex->visitNear(T_world_device * tool_, reach, [&](std::uint32_t i) noexcept {
+    const double worldReach = reach_m * stretchOf(T_world_device.linear());
+    scene.objectIndex->visitNear(T_world_device * tool_, worldReach, [&](std::uint32_t i) noexcept {
       if (i < static_cast<std::uint32_t>(count)) bounds_[i] = kUnknown;
     });
   }
@@ -223,6 +221,63 @@ int ObjectDistances::chooseDue(int due) noexcept {
   return kExaminations;
 }
 
+void ObjectDistances::examineAt(int i, const Query& query, Nearest& nearest) noexcept {
+  const auto k = static_cast<std::size_t>(i);
+  const bool fresh = bounds_[k] == kUnknown;
+  double later_m = 0;
+  const double distance_m = examine(*states_[k], query, later_m);
+  bounds_[k] = boundOf(later_m);
+  // One that moved may have passed over the tool, and one that appeared may be around it.
+  const bool moved = workspaceMoved_ || states_[k]->motion.movingAfter(query.before) ||
+                     states_[k]->mesh->deformingAfter(query.before);
+  if (fresh || distance_m <= query.reach_m || moved)
+    consider(nearest, {distance_m, static_cast<std::uint32_t>(i), fresh, false});
+}
+
+// The `number`th object without a bound, from 0. One whose box is around the tool may be around it, too, and
+// stays unknown; of one that moves, the box is not enough.
+void ObjectDistances::meetUnknown(int i, int number, const Query& query, Nearest& nearest) noexcept {
+  if (number < kUnknownExaminations) return examineAt(i, query, nearest);
+  if (number >= kUnknownBoxes) {
+    nearest.free_m = 0;
+    return;
+  }
+  const auto k = static_cast<std::size_t>(i);
+  const scene::ObjectState& state = *states_[k];
+  double box_m = 0;
+  if (!state.motion.movingAfter(query.now) && !state.mesh->deformingAfter(query.now)) {
+    const ToolInObject in = toolIn(state, query);
+    box_m = in.exists ? in.outside / in.stretch : std::numeric_limits<double>::infinity();
+  }
+  if (box_m > 0) bounds_[k] = boundOf(box_m);
+  if (box_m <= query.reach_m) consider(nearest, {box_m, static_cast<std::uint32_t>(i), true, true});
+}
+
+// Those whose bounds have run out.
+void ObjectDistances::examineDue(int due, const Query& query, Nearest& nearest) noexcept {
+  const int examined = chooseDue(due);
+  for (int n = 0; n < due; ++n) {
+    const int i = due_[static_cast<std::size_t>(n)];
+    if (n < examined) {
+      examineAt(i, query, nearest);
+    } else {
+      const double bound_m = bounds_[static_cast<std::size_t>(i)] - travel_;
+      consider(nearest, {std::max(0.0, bound_m), static_cast<std::uint32_t>(i), false, true});
+    }
+  }
+}
+
+void ObjectDistances::followTool(const Vec3& tool) noexcept {
+  travel_ += (tool - tool_).norm();
+  tool_ = tool;
+  if (travel_ <= kLongestTravel_m) return;
+  for (int i = 0; i < count_; ++i) {
+    float& bound = bounds_[static_cast<std::size_t>(i)];
+    if (bound != kUnknown) bound = std::max(0.0F, bound - static_cast<float>(travel_) - kRounding_m);
+  }
+  travel_ = 0;
+}
+
 void ObjectDistances::findNearest(const scene::SceneSnapshot& scene, Nanos now, Nanos before,
                                   const Vec3& tool, double reach_m, Nearest& nearest) noexcept {
   nearest.count = 0;
@@ -231,67 +286,29 @@ void ObjectDistances::findNearest(const scene::SceneSnapshot& scene, Nanos now, 
   if (count_ == 0) tool_ = tool;
   workspaceMoved_ = false;
   if (&scene != scene_ || count_ == 0) follow(scene, reach_m);
-  travel_ += (tool - tool_).norm();
-  tool_ = tool;
-  if (travel_ > kLongestTravel_m) {
-    for (int i = 0; i < count_; ++i) {
-      float& bound = bounds_[static_cast<std::size_t>(i)];
-      if (bound != kUnknown) bound = std::max(0.0F, bound - static_cast<float>(travel_) - kRounding_m);
-    }
-    travel_ = 0;
-  }
+  followTool(tool);
+  const Query query{scene.workspace.T_device_world, now, before, tool, reach_m};
   const auto limit = static_cast<float>(travel_ + reach_m) + kRounding_m;
   int due = 0;
   int unknown = 0;
-  const auto examineAt = [&](int i) {
-    const auto k = static_cast<std::size_t>(i);
-    const bool fresh = bounds_[k] == kUnknown;
-    double later_m = 0;
-    const double distance_m = examine(*states_[k], scene.workspace.T_device_world, now, tool, later_m);
-    bounds_[k] = boundOf(later_m);
-    // One that moved may have passed over the tool, and one that appeared may be around it.
-    const bool moved =
-        workspaceMoved_ || states_[k]->motion.movingAfter(before) || states_[k]->mesh->deformingAfter(before);
-    if (fresh || distance_m <= reach_m || moved)
-      consider(nearest, {distance_m, static_cast<std::uint32_t>(i), fresh, false});
-  };
   for (int i = 0; i < count_; ++i) {
     if (i % kBlock == 0 && isBlockBeyond(i, limit)) {
       i += kBlock - 1;
       continue;
     }
-    const auto k = static_cast<std::size_t>(i);
-    if (bounds_[k] > limit) continue;
-    if (bounds_[k] == kUnknown) {
-      if (++unknown <= kUnknownExaminations) {
-        examineAt(i);
-      } else if (unknown <= kUnknownBoxes) {
-        // One whose box is around the tool may be around it, too, and stays unknown.
-        const double box_m = boxDistance(*states_[k], scene.workspace.T_device_world, now, tool);
-        if (box_m > 0) bounds_[k] = boundOf(box_m);
-        if (box_m <= reach_m) consider(nearest, {box_m, static_cast<std::uint32_t>(i), true, true});
-      } else {
-        nearest.free_m = 0;
-      }
+    const float bound = bounds_[static_cast<std::size_t>(i)];
+    if (bound > limit) continue;
+    if (bound == kUnknown) {
+      meetUnknown(i, unknown++, query, nearest);
     } else {
       due_[static_cast<std::size_t>(due++)] = static_cast<std::uint16_t>(i);
     }
   }
-  const int examined = chooseDue(due);
-  for (int n = 0; n < due; ++n) {
-    const int i = due_[static_cast<std::size_t>(n)];
-    if (n < examined) {
-      examineAt(i);
-    } else {
-      const double bound_m = bounds_[static_cast<std::size_t>(i)] - travel_;
-      consider(nearest, {std::max(0.0, bound_m), static_cast<std::uint32_t>(i), false, true});
-    }
-  }
+  examineDue(due, query, nearest);
   // Bounds of objects that rest around the tool would otherwise run out at the same time.
   for (int i = 0; i < kTurns && unknown == 0 && count_ > 0; ++i) {
     turn_ = (turn_ + 1) % count_;
-    const auto k = static_cast<std::size_t>(turn_);
-    if (bounds_[k] > limit) examineAt(turn_);
+    if (bounds_[static_cast<std::size_t>(turn_)] > limit) examineAt(turn_, query, nearest);
   }
 }
 

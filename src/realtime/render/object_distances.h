@@ -38,7 +38,7 @@ class ObjectDistances {
     std::array<Candidate, kRoom> candidates;
     int count = 0;
     double free_m = std::numeric_limits<double>::infinity();  ///< no other known object is nearer
-    bool complete = true;                                     ///< every object is known
+    bool complete = true;                                     ///< every object is tracked
   };
 
   /// The objects whose surface may be within `reach` of the tool, nearest first. `before` is the time of the
@@ -52,16 +52,33 @@ class ObjectDistances {
   static constexpr float kUnknown = -1;
   static constexpr int kBlock = 64;
 
+  // Of one call of findNearest().
+  struct Query {
+    const geometry::Affine& T_device_world;
+    Nanos now;
+    Nanos before;
+    const Vec3& tool;
+    double reach_m;
+  };
+  struct ToolInObject {
+    Vec3 position = Vec3::Zero();
+    double stretch = 0;   // units of the object in a metre, at most
+    double outside = 0;   // of the box
+    bool exists = false;  // the object has an extent
+  };
+
   float boundOf(double distance_m) const noexcept;
   void follow(const scene::SceneSnapshot& scene, double reach_m) noexcept;
   void followObjects(const scene::SceneSnapshot& scene) noexcept;
   bool followWorkspace(const scene::SceneSnapshot& scene) noexcept;
   float boundAfterMove(const scene::ObjectState& before, const scene::ObjectState& now,
                        float bound) const noexcept;
-  double examine(const scene::ObjectState& state, const geometry::Affine& T_device_world, Nanos now,
-                 const Vec3& tool, double& later_m) const noexcept;
-  double boxDistance(const scene::ObjectState& state, const geometry::Affine& T_device_world, Nanos now,
-                     const Vec3& tool) const noexcept;
+  static ToolInObject toolIn(const scene::ObjectState& state, const Query& query) noexcept;
+  double examine(const scene::ObjectState& state, const Query& query, double& later_m) const noexcept;
+  void examineAt(int i, const Query& query, Nearest& nearest) noexcept;
+  void meetUnknown(int i, int number, const Query& query, Nearest& nearest) noexcept;
+  void examineDue(int due, const Query& query, Nearest& nearest) noexcept;
+  void followTool(const Vec3& tool) noexcept;
   bool isBlockBeyond(int first, float limit) const noexcept;
   void consider(Nearest& nearest, const Candidate& candidate) const noexcept;
   int chooseDue(int due) noexcept;

@@ -58,10 +58,9 @@ Renderer::Renderer(const RenderOptions& options) : state_(std::make_unique<State
 Renderer::~Renderer() = default;
 
 void Renderer::reset() noexcept {
-  state_->proxy.reset();
+  restart();
   state_->effects.reset();
   state_->fields.reset();
-  state_->passivity.reset();
 }
 
 void Renderer::restart() noexcept {

@@ -86,10 +86,10 @@ class Renderer {
   void step(const scene::SceneSnapshot& scene, const device::DeviceState& device, Nanos now, Nanos period,
             Rendering& out) noexcept;
 
-  /// Forgets everything: the next step() is a first one.
-  void reset() noexcept;
-  /// Discards the proxy, for a hand that may be anywhere: the next step() starts without contact at the HIP.
+  /// For a hand that may be anywhere: the next step() starts without contact at the HIP. Effects go on.
   void restart() noexcept;
+  /// The same, and effects and fields begin anew.
+  void reset() noexcept;
   /// What resume() needs after a step that had this result; false where more than that is needed: in contact,
   /// and while a force ramps out.
   bool remember(const Rendering& last, RenderMemory& out) const noexcept;

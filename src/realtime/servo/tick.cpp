@@ -26,11 +26,11 @@ void Tick::operator()(const Pacing& pacing) noexcept {
   const scene::SceneSnapshot& scene = takeSnapshot();
 
   haveState_ = device_.read(report_.time, report_.device);
-  lookForHand();
+  const bool foundAnew = lookForHand();
   const Nanos period = report_.tick == 1 ? period_ : report_.timing.period;
   if (sight_.ever) {
     renderer_.step(scene, report_.device, report_.time, period, report_.rendering);
-    addRemote(period);
+    addRemote(period, foundAnew);
   }
   if (handIsLost()) feelNothing();
   report_.force_N = guard_.step(guardInput());
@@ -76,24 +76,28 @@ const scene::SceneSnapshot& Tick::takeSnapshot() noexcept {
   return scene;
 }
 
-// A hand that comes on a way that nobody saw starts anew: while it was out of sight, also for a loop that did
-// not run, or by a calibration, which moves the positions and not the hand.
-void Tick::lookForHand() noexcept {
+// True for a hand that is seen for the first time, or starts anew because it came on a way that nobody saw:
+// while it was out of sight, also for a loop that did not run, or by a calibration, which moves the positions
+// and not the hand.
+bool Tick::lookForHand() noexcept {
   device::DeviceState& hand = report_.device;
   if (!haveState_ || (hand.hold & device::kHoldFault) != 0) {
-    if (!handIsLost()) return;
+    if (!handIsLost()) return false;
     // Nobody knows that it moves, or presses.
     hand.velocity_m_per_s.setZero();
     hand.angularVelocity_rad_per_s.setZero();
     hand.buttons = 0;
-    return;
+    return false;
   }
   const bool calibrated = (hand.hold & device::kHoldNotCalibrated) == 0;
   const bool unseen = handIsLost() || calibrated != sight_.calibrated;
   const bool elsewhere = (hand.position_m - sight_.place_m).norm() > kElsewhere_m;
-  foundAnew_ = !sight_.ever || (unseen && elsewhere);
-  if (sight_.ever && foundAnew_) renderer_.restart();
+  const bool first = !sight_.ever;
   sight_ = {true, calibrated, report_.time, hand.position_m};
+  if (first) return true;
+  if (!unseen || !elsewhere) return false;
+  renderer_.restart();
+  return true;
 }
 
 bool Tick::handIsLost() const noexcept {
@@ -108,14 +112,14 @@ void Tick::feelNothing() noexcept {
 }
 
 // Nothing streamed so far, and nothing left of it, costs two comparisons.
-void Tick::addRemote(Nanos period) noexcept {
+void Tick::addRemote(Nanos period, bool foundAnew) noexcept {
   const RemoteInput& input = remoteInput_.read();
   if (input.contacts.number != contactsSeen_ || input.force.number != forceSeen_) {
     if (StreamRing* ring = recordStreamTo_.load(std::memory_order_acquire)) ring->push({report_.tick, input});
   }
   contactsSeen_ = input.contacts.number;
   forceSeen_ = input.force.number;
-  if (std::exchange(foundAnew_, false)) {
+  if (foundAnew) {
     remoteContacts_.restart(contactsSeen_);
     heldForce_.restart(report_.device.position_m);
   }

@@ -115,10 +115,10 @@ class Tick {
  private:
   void begin(const Pacing& pacing) noexcept;
   const scene::SceneSnapshot& takeSnapshot() noexcept;
-  void lookForHand() noexcept;
+  bool lookForHand() noexcept;
   bool handIsLost() const noexcept;
   void feelNothing() noexcept;
-  void addRemote(Nanos period) noexcept;
+  void addRemote(Nanos period, bool foundAnew) noexcept;
   GuardInput guardInput() const noexcept;
   void write(Nanos started, std::uint32_t overtakes) noexcept;
   void discardForce() noexcept;
@@ -144,7 +144,6 @@ class Tick {
   RemoteContacts remoteContacts_;
   HeldForceLaw heldForce_;
   Sight sight_;
-  bool foundAnew_ = false;  // in this tick
   std::uint64_t contactsSeen_ = 0;
   std::uint64_t forceSeen_ = 0;
   GuardControl control_;
