@@ -157,34 +157,53 @@ TEST_P(Crowd, moving_sheet_in_a_crowd_takes_the_hand_along) {
   EXPECT_EQ(status, 0U);
 }
 
-// A floor of 400 boxes: more of them are near the hand than a tick examines, also when none moves.
+// Floors of square boxes, each an object of its own: more of them are near the hand than a tick examines.
+struct TiledFloor {
+  int rows;
+  double size_mm;
+  double radius_m;
+  double speed_m_per_s;
+  double depth_m;
+};
+
 TEST(Tiles, are_a_floor) {
-  for (const double size_mm : {0.5, 1.0}) {
-    Loop loop;
-    loop.send(scene::SetObjectNumber{400});
-    for (int i = 0; i < 400; ++i) {
-      const Vec3 corner((i % 20 - 10) * size_mm, -size_mm, (i / 20 - 10) * size_mm);
-      loop.add(i, boxTriples(corner, corner + Vec3::Constant(size_mm)));
+  for (const TiledFloor& floor : {TiledFloor{20, 0.5, 0, 0.02, 0.005},
+                                  {40, 0.5, 0, 0.1, 0.002},
+                                  {40, 1, 0.001, 0.1, 0.003},
+                                  {12, 2, 0.001, 0.02, 0.005},
+                                  {40, 2, 0, 0.1, 0.008}}) {
+    RenderOptions options;
+    options.toolRadius_m = floor.radius_m;
+    Loop loop{options};
+    const int count = floor.rows * floor.rows;
+    loop.send(scene::SetObjectNumber{count});
+    for (int i = 0; i < count; ++i) {
+      const Vec3 place(i % floor.rows - floor.rows / 2, -1, i / floor.rows - floor.rows / 2);
+      loop.add(i, boxTriples(floor.size_mm * place, floor.size_mm * (place + Vec3::Ones())));
     }
-    const auto slide = [&](const Vec3& from, const Vec3& to) {
-      const int ticks = static_cast<int>((to - from).norm() / 2e-5);
+    Vec3 hip(0.31e-3 * floor.size_mm, floor.radius_m + 0.003, 0.22e-3 * floor.size_mm);
+    const auto slide = [&](const Vec3& to) {
+      const Vec3 from = hip;
+      const int ticks = static_cast<int>((to - from).norm() / (1e-3 * floor.speed_m_per_s));
       for (int i = 1; i <= ticks; ++i) {
         loop.now += kMs;
-        const Vec3 hip = from + (to - from) * (static_cast<double>(i) / ticks);
+        hip = from + (to - from) * (static_cast<double>(i) / ticks);
         loop.render(hip, kMs);
-        if (hip.y() > -0.001) continue;
-        ASSERT_NEAR(loop.out.force_N.y(), -hip.y() * kStiffness_N_per_m, 1e-3)
-            << size_mm << " mm, " << hip.transpose();
+        const double depth_m = floor.radius_m - hip.y();
+        if (depth_m < 0.001) continue;
+        ASSERT_NEAR(loop.out.force_N.y(), depth_m * kStiffness_N_per_m, 1e-3)
+            << floor.rows << " rows of " << floor.size_mm << " mm, " << hip.transpose();
       }
     };
-    const Vec3 above(0.00031, 0.002, 0.00022);
-    const Vec3 pressed(0.00031, -0.005, 0.00022);
-    const Vec3 aside(0.0041, -0.005, 0.0027);
-    loop.rest(above, toNanos(0.5));
-    slide(above, pressed);
-    slide(pressed, aside);
-    slide(aside, pressed);
-    slide(pressed, above);
+    loop.rest(hip, toNanos(0.3));
+    const Vec3 above = hip;
+    const Vec3 pressed(hip.x(), -floor.depth_m, hip.z());
+    const double way_m = 0.35e-3 * floor.rows * floor.size_mm;
+    for (const Vec3& to : {pressed, Vec3(pressed + Vec3(way_m, 0, 0.6 * way_m)),
+                           Vec3(pressed - Vec3(way_m, 0, 0.3 * way_m)), pressed, above}) {
+      slide(to);
+      if (HasFatalFailure()) return;
+    }
     EXPECT_EQ(loop.out.force_N.norm(), 0);
   }
 }
