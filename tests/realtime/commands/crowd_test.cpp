@@ -6,6 +6,7 @@
 #include <random>
 
 #include "loop.h"
+#include "realtime/render/meshes.h"
 #include "reduced.h"
 
 namespace hapticd::realtime::commands {
@@ -178,8 +179,8 @@ TEST(Tiles, are_a_floor) {
     const int count = floor.rows * floor.rows;
     loop.send(scene::SetObjectNumber{count});
     for (int i = 0; i < count; ++i) {
-      const Vec3 place(i % floor.rows - floor.rows / 2, -1, i / floor.rows - floor.rows / 2);
-      loop.add(i, boxTriples(floor.size_mm * place, floor.size_mm * (place + Vec3::Ones())));
+      const Vec3 lower(i / floor.rows - floor.rows / 2 - 0.5, -1, i % floor.rows - floor.rows / 2 - 0.5);
+      loop.add(i, boxTriples(floor.size_mm * lower, floor.size_mm * (lower + Vec3::Ones())));
     }
     Vec3 hip(0.31e-3 * floor.size_mm, floor.radius_m + 0.003, 0.22e-3 * floor.size_mm);
     const auto slide = [&](const Vec3& to) {
@@ -205,6 +206,41 @@ TEST(Tiles, are_a_floor) {
       if (HasFatalFailure()) return;
     }
     EXPECT_EQ(loop.out.force_N.norm(), 0);
+  }
+}
+
+// The triangles of a sphere, each in any of the objects: all of their boxes are around the hand.
+TEST(Scattered, triangles_are_one_surface) {
+  constexpr double kRadius_m = 0.015;
+  const geometry::TriangleMesh sphere = fixture::sphere(kRadius_m, 30);
+  const auto corner = [&](std::uint32_t id) { return Vec3f(1e3F * sphere.vertices[id]); };
+  for (const int objects : {70, 100, 300}) {
+    std::mt19937 random(7);
+    std::vector<std::vector<Vec3f>> parts(static_cast<std::size_t>(objects));
+    std::vector<Vec3f> all;
+    for (const auto& triangle : sphere.triangles) {
+      auto& part = parts[random() % parts.size()];
+      for (const std::uint32_t id : triangle) part.push_back(corner(id)), all.push_back(corner(id));
+    }
+    Loop whole;
+    whole.add(0, all);
+    Loop scattered;
+    scattered.send(scene::SetObjectNumber{objects});
+    for (int i = 0; i < objects; ++i) scattered.add(i, std::move(parts[static_cast<std::size_t>(i)]));
+    for (Loop* loop : {&whole, &scattered}) loop->rest(Vec3(kRadius_m + 0.002, 0, 0), toNanos(0.3));
+    for (int i = 0; i < 3000; ++i) {
+      const double angle = 0.004 * i;
+      const double height_m = std::max(0.002 - 1e-5 * i, -0.002);
+      const Vec3 hip = (kRadius_m + height_m) *
+                       Vec3(std::cos(angle), std::sin(angle), 0.3 * std::sin(2 * angle)).normalized();
+      for (Loop* loop : {&whole, &scattered}) {
+        loop->now += kMs;
+        loop->render(hip, kMs);
+      }
+      ASSERT_NEAR((whole.out.force_N - scattered.out.force_N).norm(), 0, 0.02)
+          << objects << " objects, tick " << i;
+    }
+    EXPECT_GT(whole.out.force_N.norm(), 0.9);
   }
 }
 
