@@ -177,6 +177,9 @@ class Proxy {
   bool liftOut(const ActiveSet& active) noexcept;
   void acceptOverlaps(ActiveSet& active) const noexcept;
   bool escapeCorner(const Vec3& target, const ActiveSet& active) noexcept;
+  bool descendFrom(const Vec3& start, int first, int last, const Vec3& target, double enough,
+                   DescentDirections& descent) noexcept;
+  bool passVertex(const Vec3& target, double enough, DescentDirections& descent) noexcept;
   void extrapolateStep(const Vec3& step, const Vec3& target) noexcept;
   double cornerSlack() const noexcept;
   void collectTouchedFaces(DescentDirections& descent) noexcept;

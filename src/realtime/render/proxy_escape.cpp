@@ -15,7 +15,11 @@ constexpr double kTouching = 256;  // in skins: planes at their skins meet that 
 constexpr double kLifts[] = {4, 4 * kTouching};
 constexpr double kLiftShare = 0.25;  // of the radius of a small ball
 constexpr double kSmallBall_m =
-    kLargestGapTolerance_m;           // its rounding is smaller than the places where faces end
+    kLargestGapTolerance_m;              // its rounding is smaller than the places where faces end
+constexpr double kVertexLift = 4;        // of the radius of a small ball: valleys of 90 degrees need that
+constexpr double kSamePlane = 1 - 1e-6;  // cosine of normals
+constexpr double kOnPlane = 0.9;         // of the radius: a ball at this height lies on the face
+constexpr double kInPlane = 1e-2;     // of a direction: its share along the normal of a face that it lies in
 constexpr double kMinDescent = 1e-3;  // share of the pull; flatter directions lead nowhere
 constexpr double kClimb = 1e-3;       // share of the tool radius
 
@@ -214,11 +218,38 @@ bool Proxy::isFree(DescentDirections& descent, const Vec3& from, const Vec3& to,
   return false;
 }
 
+// Moves to `start` and on in the first of the directions from `first` on whose way is free and ends nearer to
+// the target than `enough`.
+bool Proxy::descendFrom(const Vec3& start, int first, int last, const Vec3& target, double enough,
+                        DescentDirections& descent) noexcept {
+  if (freeShare(descent, position_, start, 1) < 1) return false;
+  for (int i = 0; i < descent.blockers(); ++i) prepareStart(descent[i], start);
+  bool lifted = false;
+  for (int i = first; i < last && casts_ < kMaxCasts; ++i) {
+    const Vec3& direction = descent.directions[static_cast<std::size_t>(i)];
+    const double needed = shareWithin(enough, target - start, direction);
+    if (needed > 1 || isSurelyBlocked(descent, direction, start + needed * direction)) continue;
+    const double free = freeShare(descent, start, start + direction, needed);
+    if (!((target - start - free * direction).norm() < enough)) continue;
+    if (!lifted && !isFree(descent, position_, start, 1, start)) return false;
+    lifted = true;
+    if (needed > 0 && !isFree(descent, start, start + direction, needed, start)) continue;
+    ObjectHit hit;
+    ++casts_;
+    const Vec3 end = start + (query_.cast(start, start + direction, hit) ? hit.stop : 1.0) * direction;
+    if (!((target - end).norm() < enough)) continue;
+    position_ = end;
+    return true;
+  }
+  return false;
+}
+
 // The half-spaces hold the proxy, but some of their faces may end at this corner, with free space beyond.
 // Searches the touched faces for a free direction that brings the proxy nearer to the target, and moves along
 // it.
 bool Proxy::escapeCorner(const Vec3& target, const ActiveSet& active) noexcept {
   const double skin = query_.minSkin();
+  const double radius = query_.radius();
   const Vec3 pull = target - position_;
   const double enough = pull.norm() - 2 * kLifts[0] * skin;
   if (!query_.isGathered(position_)) {
@@ -232,27 +263,41 @@ bool Proxy::escapeCorner(const Vec3& target, const ActiveSet& active) noexcept {
   collectTouchedFaces(descent);
   findDescentDirections(pull, active, descent);
   if (!(descent.outward.norm() > 0)) return false;
-  const double first = query_.radius() <= kSmallBall_m ? kLiftShare * query_.radius() : kLifts[0] * skin;
-  for (const double lift : {first, kLifts[1] * skin}) {
-    const Vec3 start = position_ + lift * descent.outward.normalized();
-    if (freeShare(descent, position_, start, 1) < 1) continue;
-    for (int i = 0; i < descent.blockers(); ++i) prepareStart(descent[i], start);
-    bool lifted = false;
-    for (int i = 0; i < descent.count && casts_ < kMaxCasts; ++i) {
-      const Vec3& direction = descent.directions[static_cast<std::size_t>(i)];
-      const double needed = shareWithin(enough, target - start, direction);
-      if (needed > 1 || isSurelyBlocked(descent, direction, start + needed * direction)) continue;
-      const double free = freeShare(descent, start, start + direction, needed);
-      if (!((target - start - free * direction).norm() < enough)) continue;
-      if (!lifted && !isFree(descent, position_, start, 1, start)) break;
-      lifted = true;
-      if (needed > 0 && !isFree(descent, start, start + direction, needed, start)) continue;
-      ObjectHit hit;
-      ++casts_;
-      const Vec3 end = start + (query_.cast(start, start + direction, hit) ? hit.stop : 1.0) * direction;
-      if (!((target - end).norm() < enough)) continue;
-      position_ = end;
-      return true;
+  const Vec3 outward = descent.outward.normalized();
+  for (const double lift :
+       {radius <= kSmallBall_m ? kLiftShare * radius : kLifts[0] * skin, kLifts[1] * skin}) {
+    if (descendFrom(position_ + lift * outward, 0, descent.count, target, enough, descent)) return true;
+  }
+  return radius <= kSmallBall_m && active.count == kMaxActive && passVertex(target, enough, descent);
+}
+
+// A ball that three planes hold may have to climb by about its own size to a way on which the point that it
+// stands for slides: along a face that begins at a vertex of theirs, or along an edge between two. It is
+// lifted away from all faces, or off those of the way, to either side of them.
+bool Proxy::passVertex(const Vec3& target, double enough, DescentDirections& descent) noexcept {
+  const double radius = query_.radius();
+  bool begins = false;
+  for (int i = 0; i < descent.faceCount && !begins; ++i) {
+    const Facet& f = descent[i].face;
+    begins = std::abs(f.normal.dot(position_ - f.a)) < kOnPlane * radius;
+  }
+  if (!begins) return false;
+  const Vec3 away = position_ + radius * descent.outward.normalized();
+  if (descendFrom(away, 0, descent.count, target, enough, descent)) return true;
+  for (int i = 0; i < descent.count; ++i) {
+    const Vec3 direction = descent.directions[static_cast<std::size_t>(i)].normalized();
+    std::array<Vec3, 2> normals{};
+    int count = 0;
+    for (int k = 0; k < descent.faceCount && count < 2; ++k) {
+      const Vec3& n = descent[k].face.normal;
+      if (std::abs(n.dot(direction)) > kInPlane) continue;
+      if (count > 0 && std::abs(n.dot(normals[0])) > kSamePlane) continue;
+      normals[static_cast<std::size_t>(count++)] = n;
+    }
+    for (int side = 0; count > 0 && side < 1 << count; ++side) {
+      const Vec3 up = ((side & 1) != 0 ? -1 : 1) * normals[0] + ((side & 2) != 0 ? -1 : 1) * normals[1];
+      const Vec3 start = position_ + kVertexLift * radius * up.normalized();
+      if (descendFrom(start, i, i + 1, target, enough, descent)) return true;
     }
   }
   return false;

@@ -1,5 +1,6 @@
 // Statics of a frictionless contact: T1, T2, T4, T5, T6, T8, T10, T11 of the ground truth.
 #include <algorithm>
+#include <random>
 
 #include "variants.h"
 
@@ -86,6 +87,60 @@ TEST_P(ContactTest, corner_holds_with_three_planes) {
   EXPECT_NEAR((first - Vec3(1, 1.5, 2)).norm(), 0, 1e-5);
   EXPECT_NEAR(proxy().norm(), 0, 1e-6);
   for (int i = 0; i < 100; ++i) EXPECT_EQ(at({-0.001, -0.0015, -0.002}).force_N, first);
+}
+
+// Vertices between ridges and valleys, under a point that is pulled across. The faces are a cone: a point at
+// its tip rests there only if no ray of a face leads down along the pull.
+TEST_P(ContactTest, point_slides_over_vertices_between_ridges_and_valleys) {
+  constexpr double kRim_m = 0.01;
+  constexpr double kAt_m = 1e-6;
+  constexpr double kSlope = 0.1;
+  constexpr double kTremor_m = 1e-6;  // of a hand that is not exactly above an edge
+  std::mt19937 random(17);
+  std::uniform_real_distribution<double> share(0, 1);
+  int crossed = 0;
+  int stuck = 0;
+  for (int trial = 0; trial < 1000; ++trial) {
+    TriangleMesh fan;
+    fan.vertices.push_back(Vec3f::Zero());
+    const int count = 4 + static_cast<int>(5 * share(random));
+    for (int i = 0; i < count; ++i) {
+      const double a = 2 * M_PI * (i + 0.6 * share(random)) / count;
+      fan.vertices.push_back(
+          Vec3f(kRim_m * Vec3(std::cos(a), std::sin(a), 1.6 * share(random) - 0.8).cast<float>()));
+      fan.triangles.push_back(
+          {0, static_cast<std::uint32_t>(1 + i), static_cast<std::uint32_t>(1 + (i + 1) % count)});
+    }
+    const auto slope = [&](const Vec3& pull) {
+      double steepest = -1;
+      for (const auto& t : fan.triangles) {
+        const Vec3 b = fan.vertices[t[1]].cast<double>();
+        const Vec3 c = fan.vertices[t[2]].cast<double>();
+        for (int i = 0; i <= 100; ++i)
+          steepest = std::max(steepest, pull.dot((b + 0.01 * i * (c - b)).normalized()));
+      }
+      return steepest / pull.norm();
+    };
+    scene = SceneFixture();
+    scene.setWorldUnitsPerMetre(GetParam().worldUnitsPerMetre);
+    add(fan, surface());
+    const double a = 2 * M_PI * share(random);
+    const Vec3 away(std::cos(a), std::sin(a), 0);
+    start(0.004 * Vec3::UnitZ() - 1e-4 * away);
+    to(-0.001 * Vec3::UnitZ() - 1e-4 * away);
+    to(-0.001 * Vec3::UnitZ() + 0.001 * away, 0.02, [&](const Rendering&) {
+      if (proxy().norm() > kAt_m) return;
+      ++crossed;
+      const Vec3 h = hip();
+      if (slope(h) < kSlope) return;
+      for (int i = 0; i < 3; ++i) at(h + kTremor_m * Vec3(share(random) - 0.5, share(random) - 0.5, 0));
+      if (proxy().norm() > kAt_m) return;
+      ++stuck;
+    });
+  }
+  std::printf("%d of %d ticks at a vertex stuck\n", stuck, crossed);
+  EXPECT_GT(crossed, 800);
+  EXPECT_LT(100 * stuck, crossed) << "the ball does not fit into the narrowest valleys";
 }
 
 // T5b  two planes at 0.0003 ... 0.3 rad: sliding from one to the other at 50 mm/s, the proxy never lags
