@@ -23,11 +23,14 @@ constexpr double kVelocityFilter_s = 0.005;
 constexpr int kFailuresToFault = 5;
 constexpr double kHeight_m = 0.02;  // of the workspace; the hand does not move there
 
-// A set of bits as EVIOCGBIT fills it.
+// A set of bits as the kernel fills it.
 template <int kBits>
 class Bits {
  public:
   Bits(EventDevice& file, int type) noexcept { file.control(EVIOCGBIT(type, sizeof words_), words_); }
+  Bits() = default;
+  static constexpr std::size_t size() noexcept { return sizeof words_; }
+  void* data() noexcept { return words_; }
   bool operator[](int bit) const noexcept {
     constexpr int kWord = 8 * sizeof words_[0];
     return ((words_[bit / kWord] >> (bit % kWord)) & 1UL) != 0;
@@ -69,10 +72,14 @@ void EvdevDevice::open() {
   readCapabilities();
   sample_.write({});
   error_ = failures_ = 0;
-  if (!effects_->begin()) {
+  eventsAreMissing_ = false;
+  const bool told = readPresentState();
+  if (!told || !effects_->begin()) {
     const int error = errno;
     close();
-    throw std::system_error(error, std::generic_category(), profile_.model + " does not take a force effect");
+    throw std::system_error(
+        error, std::generic_category(),
+        profile_.model + (told ? " does not take a force effect" : " does not tell its state"));
   }
   if (!ownThread_) return;
   stopping_ = false;
@@ -143,6 +150,23 @@ EvdevDevice::Axis EvdevDevice::readAxis(int code, double travel_m) {
   return axis;
 }
 
+// What events no longer tell: before the opening, and where the kernel dropped some.
+bool EvdevDevice::readPresentState() noexcept {
+  for (int i = 0; i < axisCount_; ++i) {
+    Axis& axis = axes_[static_cast<std::size_t>(i)];
+    input_absinfo info{};
+    if (!file_->control(EVIOCGABS(static_cast<unsigned>(axis.code)), &info)) return false;
+    axis.place(info.value);
+  }
+  Bits<KEY_MAX> pressed;
+  if (!file_->control(EVIOCGKEY(pressed.size()), pressed.data())) return false;
+  buttons_ = 0;
+  for (int i = 0; i < profile_.buttons; ++i) {
+    if (pressed[firstButton_ + i]) buttons_ |= 1U << i;
+  }
+  return true;
+}
+
 void EvdevDevice::close() noexcept {
   stopping_ = true;
   thread_.join();
@@ -203,6 +227,13 @@ bool EvdevDevice::readEvents() noexcept {
     const auto count = static_cast<std::size_t>(bytes) / sizeof events[0];
     for (std::size_t i = 0; i < count; ++i) {
       const input_event& event = events[i];
+      if (event.type == EV_SYN && event.code == SYN_DROPPED) eventsAreMissing_ = true;
+      if (eventsAreMissing_) {
+        // The rest of a packet whose beginning is lost.
+        if (event.type != EV_SYN || event.code != SYN_REPORT) continue;
+        if (!readPresentState()) return false;
+        eventsAreMissing_ = false;
+      }
       const int button = event.code - firstButton_;
       if (event.type == EV_ABS && event.code == axes_[0].code) axes_[0].place(event.value);
       if (event.type == EV_ABS && axisCount_ == 2 && event.code == axes_[1].code) axes_[1].place(event.value);

@@ -81,6 +81,7 @@ class EvdevDevice final : public Device {
   void findFile();
   void readCapabilities();
   Axis readAxis(int code, double travel_m);
+  bool readPresentState() noexcept;
   bool readEvents() noexcept;
   void run() noexcept;
 
@@ -104,6 +105,7 @@ class EvdevDevice final : public Device {
   int axisCount_ = 1;
   std::uint32_t buttons_ = 0;
   int firstButton_ = 0;
+  bool eventsAreMissing_ = false;  // the kernel dropped some
   std::uint64_t lastCommand_ = 0;
   Nanos commandTime_ = 0;
   Nanos before_ = 0;

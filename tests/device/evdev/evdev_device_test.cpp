@@ -173,6 +173,38 @@ TEST_F(EvdevTest, NothingIsLeftAfterClose) {
   expectForce(1, 0);
 }
 
+TEST_F(EvdevTest, WhatHappenedWhileItWasUnpluggedIsSeen) {
+  const auto device = make();
+  device->open();
+  joystick.send(EV_KEY, BTN_THUMB, 1);
+  EXPECT_EQ(tick(*device, Vec3::Zero()).buttons, 2U);
+  joystick.error = ENODEV;
+  tick(*device, Vec3::Zero());
+  device->close();
+  joystick.send(EV_KEY, BTN_THUMB, 0);
+  joystick.send(EV_KEY, BTN_TRIGGER, 1);
+  joystick.events.clear();
+  joystick.error = 0;
+  device->open();
+  EXPECT_EQ(tick(*device, Vec3::Zero()).buttons, 1U);
+}
+
+TEST_F(EvdevTest, EventsThatTheKernelDroppedAreNotMissed) {
+  const auto device = make();
+  device->open();
+  joystick.send(EV_KEY, BTN_THUMB, 1);
+  joystick.move(0.5, 0.5);
+  EXPECT_EQ(tick(*device, Vec3::Zero()).buttons, 2U);
+  joystick.send(EV_KEY, BTN_THUMB, 0);
+  joystick.move(-0.5, 0.5);
+  joystick.move(-0.5, -1);
+  joystick.overflow();
+  const DeviceState state = tick(*device, Vec3::Zero());
+  EXPECT_EQ(state.buttons, 0U);
+  EXPECT_NEAR(state.position_m.x(), -0.025, 1e-5);
+  EXPECT_NEAR(state.position_m.z(), -0.05, 1e-5);
+}
+
 TEST_F(EvdevTest, ItsOwnThreadDoesTheExchange) {
   const auto device = make(true);
   device->open();

@@ -28,6 +28,8 @@ struct FakeJoystick {
   int maximum = 32767;
   int error = 0;  // errno of all calls from now on
   std::vector<input_event> events;
+  std::set<int> pressed;    // keys
+  std::map<int, int> axes;  // counts; in the middle until moved
   std::map<int, ff_effect> effects;
   std::set<int> playing;
   std::map<int, int> settings;  // FF_GAIN, FF_AUTOCENTER
@@ -45,6 +47,21 @@ struct FakeJoystick {
     event.code = static_cast<__u16>(code);
     event.value = value;
     events.push_back(event);
+    if (type == EV_ABS) axes[code] = value;
+    if (type == EV_KEY && value != 0) pressed.insert(code);
+    if (type == EV_KEY && value == 0) pressed.erase(code);
+  }
+  /// The reader was too slow: what it has not read is gone but for the end of the newest packet.
+  void overflow() {
+    input_event last{};
+    {
+      const std::lock_guard lock(mutex);
+      if (!events.empty()) last = events.back();
+      events.clear();
+    }
+    send(EV_SYN, SYN_DROPPED, 0);
+    if (last.type != EV_SYN) send(last.type, last.code, last.value);
+    send(EV_SYN, SYN_REPORT, 0);
   }
   void move(double x, double y) {  // -1 … 1
     send(EV_ABS, ABS_X, count(x));
@@ -102,7 +119,14 @@ class FakeEventDevice final : public EventDevice {
       auto& info = *static_cast<input_absinfo*>(argument);
       info.minimum = joystick_.minimum;
       info.maximum = joystick_.maximum;
-      info.value = (joystick_.minimum + joystick_.maximum) / 2;
+      const auto moved = joystick_.axes.find(static_cast<int>(number - _IOC_NR(EVIOCGABS(0))));
+      info.value =
+          moved != joystick_.axes.end() ? moved->second : (joystick_.minimum + joystick_.maximum) / 2;
+      return true;
+    }
+    if (number == _IOC_NR(EVIOCGKEY(0))) {
+      std::memset(argument, 0, size);
+      for (const int key : joystick_.pressed) setBit(static_cast<unsigned char*>(argument), key);
       return true;
     }
     errno = EINVAL;
@@ -147,10 +171,11 @@ class FakeEventDevice final : public EventDevice {
     ++joystick_.uploads;
     return true;
   }
+  static void setBit(unsigned char* out, int bit) noexcept {
+    out[bit / 8] = static_cast<unsigned char>(out[bit / 8] | (1 << bit % 8));
+  }
   void bits(int type, unsigned char* out) const noexcept {
-    const auto set = [&](int bit) {
-      out[bit / 8] = static_cast<unsigned char>(out[bit / 8] | (1 << bit % 8));
-    };
+    const auto set = [&](int bit) { setBit(out, bit); };
     if (type == EV_FF && joystick_.hasForce) {
       set(FF_CONSTANT);
       set(FF_DAMPER);
