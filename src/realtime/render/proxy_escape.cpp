@@ -15,13 +15,16 @@ constexpr double kTouching = 256;  // in skins: planes at their skins meet that 
 constexpr double kLifts[] = {4, 4 * kTouching};
 constexpr double kLiftShare = 0.25;  // of the radius of a small ball
 constexpr double kSmallBall_m =
-    kLargestGapTolerance_m;              // its rounding is smaller than the places where faces end
-constexpr double kVertexLift = 4;        // of the radius of a small ball: valleys of 90 degrees need that
-constexpr double kSamePlane = 1 - 1e-6;  // cosine of normals
-constexpr double kOnPlane = 0.9;         // of the radius: a ball at this height lies on the face
-constexpr double kInPlane = 1e-2;     // of a direction: its share along the normal of a face that it lies in
+    kLargestGapTolerance_m;           // its rounding is smaller than the places where faces end
 constexpr double kMinDescent = 1e-3;  // share of the pull; flatter directions lead nowhere
 constexpr double kClimb = 1e-3;       // share of the tool radius
+
+// Beside a vertex; lengths in radii of the small ball.
+constexpr double kVertexLift = 4;        // valleys of 90 degrees need that
+constexpr double kOnPlane = 0.9;         // a ball at this height lies on the face
+constexpr double kInPlane = 1e-2;        // share of a direction along the normal of a face that it lies in
+constexpr double kAlong = 0.1;           // how far a way may be from the face that it runs along
+constexpr double kSamePlane = 1 - 1e-6;  // cosine between normals
 
 // The smallest t, at least 0, for which t d comes within `distance` of x, or a little less; more than 1 when
 // none in [0, 1] does.
@@ -272,8 +275,8 @@ bool Proxy::escapeCorner(const Vec3& target, const ActiveSet& active) noexcept {
 }
 
 // A ball that three planes hold may have to climb by about its own size to a way on which the point that it
-// stands for slides: along a face that begins at a vertex of theirs, or along an edge between two. It is
-// lifted away from all faces, or off those of the way, to either side of them.
+// stands for slides: along a face that begins at a vertex of theirs, or along an edge between two. For each
+// such way it is lifted away from all faces, or off those of the way, to either side of them.
 bool Proxy::passVertex(const Vec3& target, double enough, DescentDirections& descent) noexcept {
   const double radius = query_.radius();
   bool begins = false;
@@ -282,19 +285,28 @@ bool Proxy::passVertex(const Vec3& target, double enough, DescentDirections& des
     begins = std::abs(f.normal.dot(position_ - f.a)) < kOnPlane * radius;
   }
   if (!begins) return false;
+  // The ball touches the vertex: down the faces themselves, not along what is square to the way to it.
+  const Vec3 pull = target - position_;
+  for (int i = 0; i < descent.faceCount; ++i) {
+    const Vec3& n = descent[i].face.normal;
+    descent.add(pull - n * n.dot(pull), kMinDescent * pull.norm());
+  }
   const Vec3 away = position_ + radius * descent.outward.normalized();
-  if (descendFrom(away, 0, descent.count, target, enough, descent)) return true;
   for (int i = 0; i < descent.count; ++i) {
     const Vec3 direction = descent.directions[static_cast<std::size_t>(i)].normalized();
     std::array<Vec3, 2> normals{};
     int count = 0;
     for (int k = 0; k < descent.faceCount && count < 2; ++k) {
-      const Vec3& n = descent[k].face.normal;
-      if (std::abs(n.dot(direction)) > kInPlane) continue;
-      if (count > 0 && std::abs(n.dot(normals[0])) > kSamePlane) continue;
-      normals[static_cast<std::size_t>(count++)] = n;
+      const Facet& f = descent[k].face;
+      if (std::abs(f.normal.dot(direction)) > kInPlane) continue;
+      if (count > 0 && std::abs(f.normal.dot(normals[0])) > kSamePlane) continue;
+      const Vec3 along = descent[k].foot + radius * direction;
+      if ((along - nearestPointOf(f, along)).norm() > kAlong * radius) continue;
+      normals[static_cast<std::size_t>(count++)] = f.normal;
     }
-    for (int side = 0; count > 0 && side < 1 << count; ++side) {
+    if (count == 0) continue;
+    if (descendFrom(away, i, i + 1, target, enough, descent)) return true;
+    for (int side = 0; side < 1 << count; ++side) {
       const Vec3 up = ((side & 1) != 0 ? -1 : 1) * normals[0] + ((side & 2) != 0 ? -1 : 1) * normals[1];
       const Vec3 start = position_ + kVertexLift * radius * up.normalized();
       if (descendFrom(start, i, i + 1, target, enough, descent)) return true;

@@ -110,6 +110,7 @@ TEST_P(ContactTest, point_slides_over_vertices_between_ridges_and_valleys) {
           Vec3f(kRim_m * Vec3(std::cos(a), std::sin(a), 1.6 * share(random) - 0.8).cast<float>()));
       fan.triangles.push_back(
           {0, static_cast<std::uint32_t>(1 + i), static_cast<std::uint32_t>(1 + (i + 1) % count)});
+      if (trial % 2 == 1 && share(random) < 0.5) std::swap(fan.triangles.back()[1], fan.triangles.back()[2]);
     }
     const auto slope = [&](const Vec3& pull) {
       double steepest = -1;
@@ -123,6 +124,7 @@ TEST_P(ContactTest, point_slides_over_vertices_between_ridges_and_valleys) {
     };
     scene = SceneFixture();
     scene.setWorldUnitsPerMetre(GetParam().worldUnitsPerMetre);
+    if (trial % 2 == 1) scene.faces = scene::TouchableFaces::both;
     add(fan, surface());
     const double a = 2 * M_PI * share(random);
     const Vec3 away(std::cos(a), std::sin(a), 0);
@@ -138,9 +140,8 @@ TEST_P(ContactTest, point_slides_over_vertices_between_ridges_and_valleys) {
       ++stuck;
     });
   }
-  std::printf("%d of %d ticks at a vertex stuck\n", stuck, crossed);
-  EXPECT_GT(crossed, 800);
-  EXPECT_LT(100 * stuck, crossed) << "the ball does not fit into the narrowest valleys";
+  EXPECT_GT(crossed, 600);
+  EXPECT_LT(100 * stuck, crossed) << "in the narrowest valleys";
 }
 
 // T5b  two planes at 0.0003 ... 0.3 rad: sliding from one to the other at 50 mm/s, the proxy never lags
