@@ -34,12 +34,16 @@ void SceneHost::whenPublished(scene::ClientId client, std::function<void()> reac
   push({client, WhenPublished{[post = post_, reached = std::move(reached)] { post(reached); }}});
 }
 
+// The queue is fair to clients and keeps the order of each. Of what is replayed it keeps the order of all.
 void SceneHost::play(scene::ClientId client, const scene::SceneCommand* command) {
+  constexpr scene::ClientId kReplay = 0;
+  SceneParcel parcel{.client = kReplay, .tasks = {}, .bytes = 0};
   if (command != nullptr) {
-    push({client, *command});
+    parcel.tasks.push_back({client, *command});
   } else {
-    push({client, ClientGone{}});
+    parcel.tasks.push_back({client, ClientGone{}});
   }
+  thread_->push(std::move(parcel));
 }
 
 void SceneHost::releaseForces(scene::ClientId client) {

@@ -215,6 +215,29 @@ TEST_F(SceneHostTest, AClientThatStaysExertsForceAgainAfterARelease) {
   EXPECT_TRUE(felt());
 }
 
+// A seek resets the scene in no client's name; so do two of them.
+TEST_F(SceneHostTest, WhatIsReplayedKeepsItsOrderAcrossClients) {
+  close();
+  const std::vector<geometry::Vec3f> corners{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  const scene::SceneCommand reset = scene::ResetScene{};
+  const scene::SceneCommand vertices = scene::SetVertices{0, 0, corners};
+  const scene::SceneCommand triangle = scene::SetTriangles{0, 0, {{0, 1, 2}}, false};
+  host_.play(0, &reset);
+  host_.play(0, &reset);
+  host_.play(7, &vertices);
+  host_.play(7, &triangle);
+  open();
+  std::shared_ptr<const scene::SceneDescription> seen;
+  const auto hasTriangles = [&] { return seen && !seen->objects.empty() && seen->objects[0].triangles; };
+  while (!hasTriangles()) {
+    seen = nullptr;
+    host_.describe([&](const auto& description) { net_.post([&seen, description] { seen = description; }); });
+    net_.until([&] { return seen != nullptr; });
+  }
+  ASSERT_TRUE(seen->objects[0].vertices);
+  EXPECT_EQ(seen->objects[0].vertices->size(), 3U);
+}
+
 TEST_F(SceneHostTest, AMalformedMessageIsNamedAndChangesNothing) {
   wire::MessageReceived received;
   received.kind = wire::kindOf<wire::SetVertex>;
