@@ -215,7 +215,7 @@ TEST_F(SceneHostTest, AClientThatStaysExertsForceAgainAfterARelease) {
   EXPECT_TRUE(felt());
 }
 
-// A seek resets the scene in no client's name; so do two of them.
+// Each seek resets the scene in the name of no client. The second reset must not follow what a client sent.
 TEST_F(SceneHostTest, WhatIsReplayedKeepsItsOrderAcrossClients) {
   close();
   const std::vector<geometry::Vec3f> corners{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
