@@ -68,7 +68,7 @@ class Difference {
   double sumDepth_m_ = 0;
 };
 
-/// "the recording has force law 1, this program law 14"; empty when they agree.
+/// "the recording has force law 1, this program law 15"; empty when they agree.
 std::string lawDifference(const RecordingHeader& header);
 
 /// Re-renders a whole recording. `remark` says why the file ends early, if it does. Throws RecordingError.

@@ -80,7 +80,6 @@ void ContactQuery::beginTick(const SceneAtTime& now, const SceneAtTime& before,
   overflowed_ = false;
   work_ = 0;
   facetCasts_ = 0;
-  unfitCount_ = 0;
   longestStep_m_ = std::numeric_limits<double>::infinity();
   noReserve_ = std::max(0, noReserve_ - 1);
   if (now.scene == before.scene) return;
@@ -104,7 +103,9 @@ void ContactQuery::leaveOutEnclosing(const Vec3& tool) noexcept {
 }
 
 void ContactQuery::dropStaleFacets() noexcept {
-  if (gatheredGeneration_ != generation_ || !sameObjects()) cache_.invalidate();
+  if (gatheredGeneration_ == generation_ && sameObjects()) return;
+  cache_.invalidate();
+  unfitCount_ = 0;
 }
 
 void ContactQuery::addObjectsByIndex(const scene::SceneSnapshot& scene, const Vec3& centre, double reach,
@@ -369,13 +370,13 @@ const Facet* ContactQuery::facetOf(const FacetCache::TriangleId& id) const noexc
   return &memo.facet;
 }
 
-// A ball around one that did not fit in this tick does not fit either. A little less than around counts, too:
-// the casts of a tick begin within micrometres of each other.
+// A ball around one that did not fit does not fit either. A little less than around counts, too: the casts of
+// a tick begin within micrometres of each other.
 bool ContactQuery::isUnfit(const Vec3& centre, double radius) const noexcept {
   constexpr double kAround = 0.9;
-  return std::any_of(unfit_.begin(), unfit_.begin() + unfitCount_, [&](const Ball& ball) {
-    return (ball.centre - centre).norm() + kAround * ball.radius <= radius;
-  });
+  return std::any_of(
+      unfit_.begin(), unfit_.begin() + std::min(unfitCount_, kMaxUnfit),
+      [&](const Ball& ball) { return (ball.centre - centre).norm() + kAround * ball.radius <= radius; });
 }
 
 bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
@@ -409,8 +410,8 @@ bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
   }
   gatheredCount_ = objectCount_;
   gatheredGeneration_ = reusable ? generation_ : 0;
-  if (!cache_.complete() && unfitCount_ < kMaxUnfit)
-    unfit_[static_cast<std::size_t>(unfitCount_++)] = {centre, radius};
+  if (!cache_.complete() && !workSpent())
+    unfit_[static_cast<std::size_t>(unfitCount_++ % kMaxUnfit)] = {centre, radius};
   return cache_.complete();
 }
 
@@ -457,6 +458,14 @@ bool ContactQuery::sameObjects() const noexcept {
   for (int i = 0; i < objectCount_; ++i) {
     if (gatheredFrom_[static_cast<std::size_t>(i)] != object(i).state) return false;
   }
+  return true;
+}
+
+// Of a path that is examined up to its begin.
+bool ContactQuery::endUnexamined(const Path& path, ObjectHit& hit) noexcept {
+  hit = ObjectHit{};
+  hit.stop = path.begin;
+  hit.unexamined = true;
   return true;
 }
 
@@ -531,6 +540,7 @@ bool ContactQuery::castAtFacets(const Path& path, int only, ObjectHit& hit) noex
   for (int k = 0; k < count; ++k) {
     const int i = candidates[static_cast<std::size_t>(k)];
     if (i == first) continue;
+    if (workSpent()) return endUnexamined(path, hit);
     const Facet& f = cache_.begin()[i];
     const double before = latest();
     if (!cache_.isWithin(f.radius + 2 * f.skin + (before - path.begin) * length, i)) continue;
@@ -554,6 +564,7 @@ double ContactQuery::freeOfFaces(const Vec3& p, const Vec3& g, bool closesGaps) 
     CastHit hit;
     if (castBall(facet, faces(), p, d, 1, free, hit)) free = std::min(free, hit.stop);
   };
+  facetCasts_ += count;
   for (int i = 0; i < count; ++i) meet(cache_.begin()[candidates[static_cast<std::size_t>(i)]]);
   if (planes_ == nullptr) return free;
   for (const PlacedPlane& plane : *planes_) meet(plane.facet);
@@ -574,6 +585,7 @@ bool ContactQuery::castAtTriangles(const Path& path, int only, ObjectHit& hit) n
   for (int i = 0;; ++i) {
     i = cache_.nextWithin(touching + ((found ? hit.stop : path.end) - path.begin) * length, i);
     if (i == cache_.size()) return found;
+    if (workSpent()) return endUnexamined(path, hit);
     if (i != first) considerGathered(i, path, only, hit, found);
   }
 }
@@ -588,7 +600,10 @@ void ContactQuery::considerGathered(int i, const Path& path, int only, ObjectHit
   if (cache_.lowerBound(i, ahead) > touching) return;
   const Facet* const f = facetOf(id);
   if (f == nullptr) return cache_.exclude(i);
-  if (cache_.refine(i, nearestPointOf(*f, path.p + path.begin * path.d), ahead) > touching) return;
+  if (cache_.refine(i, nearestPointOf(*f, path.p + path.begin * path.d), ahead) > touching) {
+    work_ += kBoxVisit;
+    return;
+  }
   considerFacet(*f, path, best, found);
   if (found && best.stop < latest) lastBlocker_ = i;
 }
@@ -610,17 +625,16 @@ bool ContactQuery::castAtEach(const Path& path, int only, ObjectHit& hit) noexce
         inObject, reach_m * kWiden * placed.stretch, [&](std::uint32_t triangle) noexcept -> bool {
           if (workSpent()) return false;
           if (!mayReach(placed, triangle, inObject, reach_m)) return true;
-          work_ += kVisit;
           const Facet* const f = facetOf({triangle, static_cast<std::int16_t>(i), 0});
-          if (f != nullptr) considerFacet(*f, path, hit, found);
+          if (f == nullptr) {
+            work_ += kVisit;
+          } else {
+            considerFacet(*f, path, hit, found);
+          }
           return true;
         });
   }
-  if (!workSpent()) return found;
-  hit = ObjectHit{};
-  hit.stop = path.begin;
-  hit.unexamined = true;
-  return true;
+  return workSpent() ? endUnexamined(path, hit) : found;
 }
 
 // The index has no query for a swept ball: gathers along the path from `begin` to `end`, in steps that grow

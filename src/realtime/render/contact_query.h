@@ -181,8 +181,12 @@ class ContactQuery {
   bool overflowed() const noexcept { return overflowed_; }
   /// How often the tool was cast against one facet in this tick.
   int facetCasts() const noexcept { return facetCasts_; }
-  /// True when this tick examined kMaxVisits triangles.
-  bool workSpent() const noexcept { return work_ >= kMaxVisits * kVisit; }
+  /// How many triangles this tick examined: looked at in a gather, or cast at.
+  int visits() const noexcept { return facetCasts_ + work_ / kVisit; }
+  /// True when these are kMaxVisits. Casts then examine nothing more.
+  bool workSpent() const noexcept { return visits() >= kMaxVisits; }
+  /// Counts what the caller examined itself: `tests` that take a quarter of a visit each.
+  void countTests(int tests) noexcept { work_ += tests * kBoxVisit; }
 
  private:
   static constexpr int kMaxObjects = 64;
@@ -230,6 +234,7 @@ class ContactQuery {
   scene::Corners cornersOf(const FacetCache::TriangleId& id) const noexcept;
   const Facet* facetOf(const FacetCache::TriangleId& id) const noexcept;
   void addToCache(const FacetCache::TriangleId& id, const Vec3& inObject) noexcept;
+  static bool endUnexamined(const Path& path, ObjectHit& hit) noexcept;
   bool castTool(const Facet& f, const Path& path, double latest, CastHit& hit) const noexcept;
   void considerFacet(const Facet& f, const Path& path, ObjectHit& best, bool& found) const noexcept;
   bool castGathered(const Path& path, int only, ObjectHit& hit) noexcept;
@@ -260,7 +265,7 @@ class ContactQuery {
   double minSkin_ = 0;
   FacetCache cache_;
   bool joinedFans_ = false;  // in the last gather()
-  // Balls whose triangles did not fit in this tick, and the steps of casts that shrank for that.
+  // The last balls whose triangles did not fit, and the steps of casts of this tick that shrank for that.
   std::array<Ball, kMaxUnfit> unfit_;
   int unfitCount_ = 0;
   double longestStep_m_ = 0;
@@ -273,8 +278,8 @@ class ContactQuery {
   std::uint64_t generation_ = 1;  // of all that is kept from tick to tick
   mutable std::array<MemoFacet, 1U << kMemoBits> facetMemo_;
   bool overflowed_ = false;
-  int work_ = 0;  // of this tick: kVisit for a triangle, kBoxVisit for one that its box rules out,
-                  // 1 for one that is joined to another
+  int work_ = 0;  // of this tick, besides casts: kVisit for a triangle, kBoxVisit for one that its box rules
+                  // out, 1 for one that is joined to another
   mutable int facetCasts_ = 0;
   std::uint64_t passable_ = 0;  // objects that the present cast does not meet
   bool pointTool_ = false;      // casts move the centre of the tool

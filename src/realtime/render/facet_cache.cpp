@@ -23,7 +23,12 @@ void FacetCache::restart(const Vec3& centre, double reach) noexcept {
 
 void FacetCache::add(const Facet& facet, bool deforming) noexcept {
   const double limit = reach_ + facet.radius + 4 * facet.skin;
-  if (std::abs(facet.normal.dot(centre_ - facet.a)) > limit && !deforming) return;
+  // Of thin triangles, many have their planes near the tool and not themselves.
+  const auto isBeyond = [&] {
+    return std::abs(facet.normal.dot(centre_ - facet.a)) > limit ||
+           (centre_ - nearestPointOf(facet, centre_)).squaredNorm() > limit * limit;
+  };
+  if (!deforming && isBeyond()) return;
   if (count_ == kMaxFacets) return invalidate();
   const auto i = static_cast<std::size_t>(count_++);
   facets_[i] = facet;

@@ -15,6 +15,7 @@ constexpr int kReservedCasts = 32;         // per tick, reserved for finding the
 constexpr double kUnloaded = 0.5;          // of the bound: a slide that bears less has ended
 constexpr double kPause_s = 0.2;           // a slide that pauses longer has ended: static friction returns
 constexpr double kSpeedMemory_s = 0.02;    // over which the speed of a slide is averaged
+constexpr double kAtRest = 1e-3;           // share of the skin
 constexpr double kBallConvergence = 1e-8;  // share of the tool radius, in distance to the target
 
 // Depths of the HIP below the faces themselves, without the skin that keeps the proxy off them. False when
@@ -42,6 +43,7 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   now_ = now;
   period_s_ = period_s;
   casts_ = 0;
+  search_.visits = 0;
   if (!started_) startAt(now, hip);
   planes_.place(*now.scene, now.time, hip, position_, toolRadius_, query_.radius());
   query_.beginTick(now, before_, &planes_);
@@ -98,6 +100,7 @@ void Proxy::resume(const Vec3& position) noexcept {
 
 void Proxy::beFree() noexcept {
   slide_ = Slide{};
+  search_ = Search{};
   popthroughArmed_ = true;
   released_ = carriedByJump_ = false;
   overworked_ = 0;
@@ -229,7 +232,8 @@ bool Proxy::moveFrictionless(const Vec3& target, ActiveSet& active) noexcept {
     Vec3 goal;
     if (approach(target, false, active, goal)) return false;
     double distance = (position_ - target).norm();
-    if (!(distance < nearest - gain)) {
+    // Where it did not move, the next approach would be the same.
+    if (!(distance < nearest - gain) || (position_ - from).norm() <= kAtRest * skin) {
       if (held) {
         position_ = from;
         active = *held;
@@ -425,6 +429,7 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
   reported_ = position_;
   if (count == 0) {
     popthroughArmed_ = true;
+    search_.stage = search_.direction = 0;
     return;
   }
   if (onAll) contactSet_.lateral_m = position_ - goal;

@@ -88,9 +88,10 @@ class Proxy {
   /// Share of the contact force that is felt, 1 … 0: less than 1 where the work of a tick does not suffice.
   double feltShare() const noexcept { return share_; }
   PlacedPlanes& planes() noexcept { return planes_; }
-  /// What the last tick did: casts, and how often they tried one facet.
+  /// What the last tick did: casts, how often they tried one facet, and triangles that it examined in all.
   int casts() const noexcept { return casts_; }
   int facetCasts() const noexcept { return query_.facetCasts(); }
+  int visits() const noexcept { return query_.visits(); }
 
  private:
   struct ActiveSet {
@@ -143,6 +144,14 @@ class Proxy {
     std::array<double, 2> bound{};    // of its friction
   };
 
+  // The search out of corners: where that of the last tick ended, for it may take several.
+  struct Search {
+    int stage = 0;  // which lift; 2: past a vertex
+    int direction = 0;
+    int visits = 0;  // of this tick, before the present search
+    int begin = 0;   // visits of the tick when that began
+  };
+
   void startAt(const SceneAtTime& now, const Vec3& hip) noexcept;
   void beFree() noexcept;
   void carry(const Vec3& hip, std::uint32_t& status) noexcept;
@@ -177,6 +186,8 @@ class Proxy {
   bool liftOut(const ActiveSet& active) noexcept;
   void acceptOverlaps(ActiveSet& active) const noexcept;
   bool escapeCorner(const Vec3& target, const ActiveSet& active) noexcept;
+  bool searchDescent(const Vec3& target, const ActiveSet& active) noexcept;
+  bool searchSpent() const noexcept;
   bool descendFrom(const Vec3& start, int first, int last, const Vec3& target, double enough,
                    DescentDirections& descent) noexcept;
   bool passVertex(const Vec3& target, double enough, DescentDirections& descent) noexcept;
@@ -186,7 +197,7 @@ class Proxy {
   void findDescentDirections(const Vec3& pull, const ActiveSet& active,
                              DescentDirections& descent) const noexcept;
   void prepareStart(TouchedFace& touched, const Vec3& start) const noexcept;
-  static bool isSurelyBlocked(DescentDirections& descent, const Vec3& direction, const Vec3& end) noexcept;
+  bool isSurelyBlocked(DescentDirections& descent, const Vec3& direction, const Vec3& end) noexcept;
   double freeShare(DescentDirections& descent, const Vec3& from, const Vec3& to,
                    double enough) const noexcept;
   bool isFree(DescentDirections& descent, const Vec3& from, const Vec3& to, double share,
@@ -239,6 +250,7 @@ class Proxy {
   Vec3 positionBefore_ = Vec3::Zero();
   Vec3 hipBefore_ = Vec3::Zero();
   Slide slide_;
+  Search search_;
   ContactSet contactSet_;
   std::array<LastConstraint, kMaxActive> lastConstraints_;
   int lastCount_ = 0;

@@ -18,6 +18,8 @@ constexpr double kSmallBall_m =
     kLargestGapTolerance_m;           // its rounding is smaller than the places where faces end
 constexpr double kMinDescent = 1e-3;  // share of the pull; flatter directions lead nowhere
 constexpr double kClimb = 1e-3;       // share of the tool radius
+// Of a tick, for the search out of corners. At a vertex of very many faces it takes several ticks.
+constexpr int kMaxSearchVisits = 512;
 
 // Beside a vertex; lengths in radii of the small ball.
 constexpr double kVertexLift = 4;        // valleys of 90 degrees need that
@@ -66,6 +68,7 @@ struct Proxy::DescentDirections {
   int faceCount = 0;
   int lastBlocker = 0;
   int learned = 0;  // faces after those, which blocked a path and are not among them
+  int next = 0;     // the direction at which descendFrom() ended
   std::array<Vec3, kMaxDirections> directions;
   int count = 0;
   Vec3 outward = Vec3::Zero();  // sum of the normals
@@ -181,7 +184,9 @@ bool Proxy::isSurelyBlocked(DescentDirections& descent, const Vec3& direction, c
     steepest = i;
   }
   const auto blocks = [&](int i) {
-    if (i >= descent.blockers() || !descent[i].surelyBlocks(end)) return false;
+    if (i >= descent.blockers()) return false;
+    query_.countTests(1);
+    if (!descent[i].surelyBlocks(end)) return false;
     descent.lastBlocker = i;
     return true;
   };
@@ -228,7 +233,7 @@ bool Proxy::descendFrom(const Vec3& start, int first, int last, const Vec3& targ
   if (freeShare(descent, position_, start, 1) < 1) return false;
   for (int i = 0; i < descent.blockers(); ++i) prepareStart(descent[i], start);
   bool lifted = false;
-  for (int i = first; i < last && casts_ < kMaxCasts; ++i) {
+  for (int& i = descent.next = first; i < last && casts_ < kMaxCasts && !searchSpent(); ++i) {
     const Vec3& direction = descent.directions[static_cast<std::size_t>(i)];
     const double needed = shareWithin(enough, target - start, direction);
     if (needed > 1 || isSurelyBlocked(descent, direction, start + needed * direction)) continue;
@@ -247,10 +252,23 @@ bool Proxy::descendFrom(const Vec3& start, int first, int last, const Vec3& targ
   return false;
 }
 
+// The search of this tick has used its share of the work.
+bool Proxy::searchSpent() const noexcept {
+  return search_.visits + query_.visits() - search_.begin >= kMaxSearchVisits;
+}
+
 // The half-spaces hold the proxy, but some of their faces may end at this corner, with free space beyond.
 // Searches the touched faces for a free direction that brings the proxy nearer to the target, and moves along
 // it.
 bool Proxy::escapeCorner(const Vec3& target, const ActiveSet& active) noexcept {
+  search_.begin = query_.visits();
+  const bool found = searchDescent(target, active);
+  if (found || !searchSpent()) search_.stage = search_.direction = 0;
+  search_.visits += query_.visits() - search_.begin;
+  return found;
+}
+
+bool Proxy::searchDescent(const Vec3& target, const ActiveSet& active) noexcept {
   const double skin = query_.minSkin();
   const double radius = query_.radius();
   const Vec3 pull = target - position_;
@@ -267,9 +285,12 @@ bool Proxy::escapeCorner(const Vec3& target, const ActiveSet& active) noexcept {
   findDescentDirections(pull, active, descent);
   if (!(descent.outward.norm() > 0)) return false;
   const Vec3 outward = descent.outward.normalized();
-  for (const double lift :
-       {radius <= kSmallBall_m ? kLiftShare * radius : kLifts[0] * skin, kLifts[1] * skin}) {
-    if (descendFrom(position_ + lift * outward, 0, descent.count, target, enough, descent)) return true;
+  const std::array lifts{radius <= kSmallBall_m ? kLiftShare * radius : kLifts[0] * skin, kLifts[1] * skin};
+  for (; search_.stage < 2; ++search_.stage, search_.direction = 0) {
+    const Vec3 start = position_ + lifts[static_cast<std::size_t>(search_.stage)] * outward;
+    if (descendFrom(start, search_.direction, descent.count, target, enough, descent)) return true;
+    search_.direction = descent.next;
+    if (searchSpent()) return false;
   }
   return radius <= kSmallBall_m && active.count == kMaxActive && passVertex(target, enough, descent);
 }
@@ -292,7 +313,7 @@ bool Proxy::passVertex(const Vec3& target, double enough, DescentDirections& des
     descent.add(pull - n * n.dot(pull), kMinDescent * pull.norm());
   }
   const Vec3 away = position_ + radius * descent.outward.normalized();
-  for (int i = 0; i < descent.count; ++i) {
+  for (int& i = search_.direction; i < descent.count && !searchSpent(); ++i) {
     const Vec3 direction = descent.directions[static_cast<std::size_t>(i)].normalized();
     std::array<Vec3, 2> normals{};
     int count = 0;

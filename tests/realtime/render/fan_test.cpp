@@ -137,5 +137,90 @@ TEST_P(Pit, takes_few_casts) {
   EXPECT_LE(facetCasts, 6000);
 }
 
+// Neighbours that differ are not joined: a tick meets all of them.
+//
+//     rim of the star:  .'\/'.   every second corner farther in
+class Star : public testing::TestWithParam<std::tuple<int, double>> {};
+INSTANTIATE_TEST_SUITE_P(, Star,
+                         testing::Combine(testing::Values(200, 1000, 5000),
+                                          testing::Values(0.0, 0.0005, 0.002)));
+
+TEST_P(Star, takes_no_more_work_than_a_tick_has) {
+  const auto& [count, radius] = GetParam();
+  const Shape pit{"pit", -0.008};
+  TriangleMesh star = fanOf(pit, count);
+  for (std::size_t i = 1; i < star.vertices.size(); i += 2) star.vertices[i].head<2>() *= 0.6F;
+  SceneFixture scene;
+  scene.setWorldUnitsPerMetre(1000);
+  scene.add(star, surface(1000));
+  const auto snapshot = scene.snapshot();
+  const auto proxy = std::make_unique<Proxy>(RenderOptions{.toolRadius_m = radius});
+  Nanos now = 0;
+  int visits = 0;
+  int facetCasts = 0;
+  int lost = 0;
+  const auto at = [&](const Vec3& hip) {
+    std::uint32_t status = 0;
+    const ContactSet& contact = proxy->follow({snapshot.get(), now += kTick}, hip, 1e-3, status);
+    visits = std::max(visits, proxy->visits());
+    facetCasts = std::max(facetCasts, proxy->facetCasts());
+    return contact.count > 0 && proxy->feltShare() == 1;
+  };
+  std::mt19937 random(5);
+  std::normal_distribution<double> tremor(0, 2e-6);
+  for (double above = 0.003 + radius; above > -0.0015; above -= 50e-6)
+    at({1e-6, -2e-6, pit.height_m + above});
+  for (int i = 0; i < reduced(300); ++i) {
+    const double reach = i < reduced(300) / 2 ? 20e-6 : 1e-3;
+    const double a = 2 * M_PI * i / 100;
+    const Vec3 hip(reach * std::sin(a) + tremor(random), 0.3 * reach * std::sin(3 * a) + tremor(random),
+                   pit.height_m - 0.0015);
+    lost += at(hip) ? 0 : 1;
+  }
+  // What seeks the place of a point on the faces, or the way out of a corner, ends what it has begun.
+  EXPECT_LE(visits, kMaxVisits + FacetCache::kMaxFacets);
+  EXPECT_LE(facetCasts, kMaxVisits + FacetCache::kMaxFacets);
+  if (count == 200 || (count == 1000 && radius > 0)) {
+    EXPECT_EQ(lost, 0);
+  }
+}
+
+// Where a search out of a corner needs more work than one tick has for it, the next ticks go on from there.
+TEST(RoughPit, goes_on_searching_in_the_next_ticks) {
+  constexpr double kBall_m = 5e-6;  // within it, the faces are not what holds the point
+  std::mt19937 random(9);
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  int later = 0;
+  for (int trial = 0; trial < reduced(200); ++trial) {
+    TriangleMesh fan = fanOf({"pit", -0.008}, static_cast<int>(uniform(60, 400)));
+    const double tilt_mm = uniform(-10, 10);
+    for (std::size_t i = 1; i < fan.vertices.size(); ++i) {
+      Vec3f& v = fan.vertices[i];
+      v.z() = static_cast<float>(uniform(-4, 4) + tilt_mm * v.x() / (1000 * kRim_m));
+      v.head<2>() *= static_cast<float>(uniform(0.4, 1));
+    }
+    SceneFixture scene;
+    scene.setWorldUnitsPerMetre(1000);
+    scene.add(fan, surface(1000));
+    Hand hand(scene.snapshot(), {});
+    const Vec3 bottom(0, 0, -0.0095);
+    const Vec3 aside = bottom + Vec3(uniform(-0.002, 0.002), uniform(-0.002, 0.002), 0);
+    hand.at({0, 0, -0.004});
+    hand.to(bottom, 0.1);
+    hand.to(aside, 0.1);
+    const double first = (hand.at(aside).proxy_m - aside).norm();
+    double last = first;
+    for (int tick = 0; tick < 60; ++tick) {
+      const double now = (hand.at(aside).proxy_m - aside).norm();
+      EXPECT_LE(now, last + kBall_m);
+      last = now;
+    }
+    later += last < first - 2 * kBall_m ? 1 : 0;
+  }
+  EXPECT_GE(later, reduced(200) / 50);
+}
+
 }  // namespace
 }  // namespace hapticd::realtime::fixture
