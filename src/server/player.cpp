@@ -114,6 +114,8 @@ std::optional<Nanos> Player::step() {
         setPresent(*skipTo_);
         skipTo_.reset();
       }
+      // A device that has no tick soon shows none.
+      if (!skips && next->first > firstRecorded_ + kReadAhead) toShow_.clear();
       const bool shows = std::find(toShow_.begin(), toShow_.end(), 1) != toShow_.end();
       if (!skips) {
         if (paused_ && !shows) return std::nullopt;
@@ -162,8 +164,9 @@ void Player::readAhead() {
   }
 }
 
-// To the beginning of the file.
+// To the beginning of the file. The recorded clients leave, so that no batch of theirs stays open.
 void Player::rewind() {
+  for (const auto& [scene, client] : std::exchange(clients_, {})) callbacks_.command(scene, client, nullptr);
   callbacks_.restart();
   reader_.reset();
   buffer_.clear();
@@ -209,8 +212,13 @@ void Player::play(RecordingEvent& event) {
     tick->tick.report.device.time = tick->tick.report.time;
     callbacks_.tick(tick->device, tick->tick.report);
   } else if (const auto* scene = std::get_if<SceneEvent>(&event)) {
-    callbacks_.command(scene->scene, kRecordedClients + scene->client,
-                       scene->command ? &*scene->command : nullptr);
+    const scene::ClientId client = kRecordedClients + scene->client;
+    if (scene->command) {
+      clients_.emplace(scene->scene, client);
+    } else {
+      clients_.erase({scene->scene, client});
+    }
+    callbacks_.command(scene->scene, client, scene->command ? &*scene->command : nullptr);
   } else if (const auto* marker = std::get_if<record::MarkerEvent>(&event)) {
     if (callbacks_.marker) callbacks_.marker(liveTime(marker->time), marker->text);
   }

@@ -9,6 +9,8 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
+#include <utility>
 
 #include "base/thread.h"
 #include "record/recording_reader.h"
@@ -89,8 +91,9 @@ class Player {
   // Used by the thread only.
   std::unique_ptr<record::RecordingReader> reader_;  // null between passes through the file
   std::multimap<base::Nanos, record::RecordingEvent> buffer_;
-  bool atEnd_ = false;    // the reader reached the end of the file
-  bool started_ = false;  // an event of this pass was played
+  std::set<std::pair<std::uint32_t, scene::ClientId>> clients_;  // recorded ones that are present, by scene
+  bool atEnd_ = false;                                           // the reader reached the end of the file
+  bool started_ = false;                                         // an event of this pass was played
   bool ended_ = false;
   bool paused_ = false;
   double speed_ = 1;

@@ -96,6 +96,65 @@ TEST(ReplayConfig, NeedsNothingOfTheMachineThatRecorded) {
   EXPECT_EQ(server::toToml(server::Player({.file = file.path()}).config()), server::toToml(here));
 }
 
+// A client says which faces can be touched: first at once, then in a batch. A seek from the middle of the
+// batch to the beginning must not put what it sends first into that batch.
+TEST(ReplaySeek, ABatchThatIsOpenDoesNotStayOpen) {
+  constexpr base::Nanos kSecond = 1'000'000'000;
+  const RecordingFile file;
+  {
+    record::Recorder recorder(file.path(), [](const std::string&) {});
+    record::RecordedDevice device;
+    device.names = {"Phantom"};
+    recorder.addDevice(device);
+    recorder.start(0, server::toToml(server::ServerConfig{}));
+    const auto send = [&](base::Nanos at, const scene::SceneCommand& command) {
+      recorder.recordCommand(0, 1, at, &command);
+    };
+    send(1 * kSecond, scene::SetObjectNumber{1});
+    send(2 * kSecond, scene::SetTouchableFaces{1});
+    send(3 * kSecond, scene::BeginBatch{});
+    send(4 * kSecond, scene::SetTouchableFaces{0});
+    send(5 * kSecond, scene::CommitBatch{});
+    recorder.finish();
+  }
+  scene::SceneBuilder builder{scene::SceneConfig{}};
+  std::shared_ptr<const scene::SceneSnapshot> scene;
+  std::vector<scene::Notice> notices;
+  std::mutex mutex;
+  server::Player player({.file = file.path()});
+  player.start({.tick = [](std::uint32_t, const realtime::TickReport&) {},
+                .command =
+                    [&](std::uint32_t, scene::ClientId client, const scene::SceneCommand* command) {
+                      const std::lock_guard lock(mutex);
+                      if (command != nullptr) {
+                        builder.apply(client, scene::SceneCommand(*command), 0, notices);
+                      } else {
+                        builder.clientGone(client, 0);
+                      }
+                    },
+                .marker = nullptr,
+                .restart =
+                    [&] {
+                      const std::lock_guard lock(mutex);
+                      builder.apply(0, scene::ResetScene{}, 0, notices);
+                    },
+                .ended = [](const std::string&) {}});
+  // Where commands come last, the position is that of the last one before.
+  const auto facesAt = [&](double position_s) {
+    player.order({.paused = true, .speed = 0, .position_s = position_s});
+    while (std::abs(player.status().position_s - std::floor(position_s)) > 0.01)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    const std::lock_guard lock(mutex);
+    if (const auto changed = builder.publish(0, notices)) scene = changed;
+    return scene ? scene->faces : scene::TouchableFaces::both;
+  };
+  EXPECT_EQ(facesAt(1.5), scene::TouchableFaces::back);
+  EXPECT_EQ(facesAt(3.5), scene::TouchableFaces::back) << "the batch is not yet complete";
+  EXPECT_EQ(facesAt(1.6), scene::TouchableFaces::back);
+  player.stop();
+  EXPECT_TRUE(notices.empty()) << notices.front().text;
+}
+
 TEST_F(Replay, CommandsAreRefused) {
   ScriptedPeer peer(server_->address());
   ASSERT_TRUE(peer.untilConnected());

@@ -46,7 +46,7 @@ export class Viewer {
     viewer.page = await context.newPage();
     viewer.page.on(
       "console",
-      (m) => ["error", "warning"].includes(m.type()) && viewer.complaints.push(m.text()),
+      (m) => ["error", "warning"].includes(m.type()) && viewer.complaints.push(`${m.text()} ${m.location().url}`),
     );
     viewer.page.on("pageerror", (error) => viewer.complaints.push(String(error)));
     viewer.page.on("request", (r) => new URL(r.url()).origin !== url && viewer.foreign.push(r.url()));

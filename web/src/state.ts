@@ -37,8 +37,11 @@ export function pollState(onState: (state: ServerState | undefined) => void): vo
     } catch {
       // The server does not respond: undefined.
     }
-    onState(state);
-    window.setTimeout(() => void poll(), state ? EVERY_MS : EVERY_LOST_MS);
+    try {
+      onState(state);
+    } finally {
+      window.setTimeout(() => void poll(), state ? EVERY_MS : EVERY_LOST_MS);
+    }
   };
   void poll();
 }

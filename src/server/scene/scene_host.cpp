@@ -37,13 +37,7 @@ void SceneHost::whenPublished(scene::ClientId client, std::function<void()> reac
 // The queue is fair to clients and keeps the order of each. Of what is replayed it keeps the order of all.
 void SceneHost::play(scene::ClientId client, const scene::SceneCommand* command) {
   constexpr scene::ClientId kReplay = 0;
-  SceneParcel parcel{.client = kReplay, .tasks = {}, .bytes = 0};
-  if (command != nullptr) {
-    parcel.tasks.push_back({client, *command});
-  } else {
-    parcel.tasks.push_back({client, ClientGone{}});
-  }
-  thread_->push(std::move(parcel));
+  pushAs(kReplay, command != nullptr ? SceneTask{client, *command} : SceneTask{client, ClientGone{}}, 0);
 }
 
 void SceneHost::releaseForces(scene::ClientId client) {
@@ -74,7 +68,12 @@ bool SceneHost::inspect(std::function<void(const std::vector<const scene::SceneB
 }
 
 void SceneHost::push(SceneTask&& task, std::size_t bytes) {
-  SceneParcel parcel{.client = task.client, .tasks = {}, .bytes = bytes};
+  const scene::ClientId client = task.client;
+  pushAs(client, std::move(task), bytes);
+}
+
+void SceneHost::pushAs(scene::ClientId client, SceneTask&& task, std::size_t bytes) {
+  SceneParcel parcel{.client = client, .tasks = {}, .bytes = bytes};
   parcel.tasks.push_back(std::move(task));
   thread_->push(std::move(parcel));
 }

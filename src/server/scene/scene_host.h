@@ -76,6 +76,7 @@ class SceneHost {
 
  private:
   void push(SceneTask&& task, std::size_t bytes = sizeof(SceneTask));
+  void pushAs(scene::ClientId client, SceneTask&& task, std::size_t bytes);
 
   std::uint32_t number_;
   std::string name_;
