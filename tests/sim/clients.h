@@ -67,16 +67,29 @@ class Batcher final : public Listener {
   const std::int32_t first;
   std::int64_t sent = 0;
 
-  void batch() {
+  /// Sends the first of its objects; commit() the second. Much may happen in between.
+  void begin() {
+    if (open_) commit();
+    open_ = true;
     ++sent;
     queue(wire::BatchBegin{});
-    for (const std::int32_t object : {first, first + 1}) {
-      queue(wire::SetTransformMatrix{object, shifted(500.0 * first, 0, 10.0 * static_cast<double>(sent))});
-    }
+    send(pose(first));
+  }
+  void commit() {
+    if (!open_ || !connected()) return;
+    open_ = false;
+    queue(pose(first + 1));
     send(wire::BatchCommit{});
+  }
+  void batch() {
+    begin();
+    commit();
   }
 
  private:
+  wire::SetTransformMatrix pose(std::int32_t object) const {
+    return {object, shifted(500.0 * first, 0, 10.0 * static_cast<double>(sent))};
+  }
   void onReady() override {
     queue(wire::SetObjectNumber{first + 2});
     for (const std::int32_t object : {first, first + 1}) {
@@ -86,6 +99,8 @@ class Batcher final : public Listener {
         queue(wire::SetVertex{object, number++, {v.x(), v.y(), v.z()}});
     }
   }
+
+  bool open_ = false;
 };
 
 // Comes, pushes the hand and goes.

@@ -257,6 +257,7 @@ int main(int argc, char** argv) {
     sum.tickReports += outcome.tickReports;
     sum.missedReports += outcome.missedReports;
     sum.replayedTicks += outcome.replayedTicks;
+    sum.seeks += outcome.seeks;
     sum.slowestStop = std::max(sum.slowestStop, outcome.slowestStop);
     if ((stopsAtFirst && failed > 0) || (cpu > 0 && cpuSeconds() > cpu)) break;
   }
@@ -264,11 +265,11 @@ int main(int argc, char** argv) {
   std::printf(
       "%llu runs, %.0f s simulated, %llu ticks (%llu with force, %llu inside the cube), %llu steps, %llu "
       "preemptions, %llu faults, %llu latches, %llu stops (slowest read %.3f ms), %llu tick reports (%llu "
-      "skipped), %llu ticks replayed; %llu with findings\n",
+      "skipped), %llu ticks replayed, %llu seeks; %llu with findings\n",
       u(runs), simulated, u(sum.ticks), u(sum.ticksWithForce), u(sum.ticksInside), u(sum.steps),
       u(sum.preemptions), u(sum.faults), u(sum.latches), u(sum.stops),
       static_cast<double>(sum.slowestStop) * 1e-6, u(sum.tickReports), u(sum.missedReports),
-      u(sum.replayedTicks), u(failed));
+      u(sum.replayedTicks), u(sum.seeks), u(failed));
   std::fprintf(stderr, "%.1f s of processor time, %.1f x real time\n", cpuSeconds(),
                simulated / cpuSeconds());
   return failed == 0 ? 0 : 1;

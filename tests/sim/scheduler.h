@@ -94,6 +94,7 @@ class Scheduler final : public base::Threads, public net::FakeNetwork {
 
   /// The loop with this number is the server's: its events cost the time of the net thread.
   void setServerLoop(std::size_t number) { serverLoop_ = number; }
+  using FakeNetwork::loops;
   /// A hand-over: may let others run before it returns.
   void handOver() noexcept;
   /// Lets the others run until then.
@@ -107,8 +108,8 @@ class Scheduler final : public base::Threads, public net::FakeNetwork {
   void limitMemory(std::size_t fromBytes) { memoryLimit_ = fromBytes; }
   /// Called when the machine was suspended.
   std::function<void()> onSuspended;
-  /// Ends preemption and stalls: what follows is the end of the server.
-  void calm() { calm_ = true; }
+  /// Ends preemption and stalls, as before the end of a server; or lets them begin again.
+  void calm(bool calm = true) { calm_ = calm; }
 
   std::uint64_t steps() const noexcept { return steps_; }
   std::uint64_t faults() const noexcept { return faults_; }

@@ -17,6 +17,7 @@
 #include "record/rerender.h"
 #include "server/server.h"
 #include "sim/clients.h"
+#include "sim/replayed_scene.h"
 #include "sim/visit.h"
 
 namespace hapticd::sim {
@@ -119,6 +120,7 @@ class Simulation {
   void compare(const scene::SceneDescription& description, bool last);
   void checkEnd();
   void checkRecording();
+  void checkReplay();
   std::optional<Nanos> freeFrom();
   Nanos serverStalled();
   std::optional<Judge::Top> top();
@@ -416,6 +418,7 @@ Outcome Simulation::run() {
   server_.reset();
   timers_.clear();
   if (script_.record) checkRecording();
+  if (script_.record) checkReplay();
   outcome_.ticks = judge_.ticks();
   outcome_.ticksWithForce = judge_.ticksWithForce();
   outcome_.ticksInside = judge_.ticksInside();
@@ -460,7 +463,9 @@ void Simulation::perform(const Action& action) {
       break;
     case Action::Kind::batch: {
       Batcher& batcher = *batchers_[dice.below(batchers_.size())];
-      if (batcher.connected()) batcher.batch();
+      if (!batcher.connected()) break;
+      batcher.begin();
+      after(dice.chance(0.5) ? 0 : dice.between(0, 300 * kMs), [&batcher] { batcher.commit(); });
       break;
     }
     case Action::Kind::upload:
@@ -1066,6 +1071,65 @@ void Simulation::checkRecording() {
     finding(std::string("the recording cannot be replayed: ") + error.what());
   }
   if (!remark.empty()) finding("the recording ends early: " + remark);
+}
+
+// A server replays the recording, and somebody seeks in it, sometimes again before the scene of the seek
+// before is complete: each time it shows the scene of then.
+void Simulation::checkReplay() {
+  constexpr int kChecks = 3;
+  constexpr Nanos kShown = 200 * kMs;  // how far a paused replay goes on to show a tick
+  if (writesFailed_ || memoryFailed_) return;
+  // The clients learn that their server ended.
+  over_ = true;
+  scheduler_.runUntil(clock_.now() + 2'000 * kMs);
+  over_ = false;
+  const ReplayedScene scene(kRecording);
+  auto player = std::make_unique<server::Player>(server::ReplayOptions{.file = kRecording});
+  server::ServerConfig config = player->config();
+  config.http = server::kHttpOff;
+  ++config.port;
+  scheduler_.setServerLoop(scheduler_.loops());
+  server_.emplace(config, std::move(player));
+  clients_->server = server_->address();
+  SimClient seeker(*clients_, "seeker");
+  seeker.identifies = false;
+  seeker.connect();
+  Dice dice(script_.seed + 17);
+  const Nanos settles = 1'000 * kMs + script_.adversity.longestSceneStall + 3'000 * kMs;
+  Nanos at = 100 * kMs;
+  for (int i = 0; i < kChecks; ++i) {
+    after(at, [this] { scheduler_.calm(false); });
+    Nanos moment = scene.drawTime(dice);
+    const auto seek = [&] {
+      after(at, [&seeker, moment] {
+        seeker.send(wire::ReplayControl{.paused = 1, .speed = 0, .position = base::toSeconds(moment)});
+      });
+    };
+    seek();
+    if (dice.chance(0.75)) {
+      at += dice.between(kMs, 20 * kMs);
+      // Of what came first, most is sent outside batches.
+      moment = dice.chance(0.5) ? scene.drawTime(dice) : dice.between(0, 2'000 * kMs);
+      seek();
+    }
+    after(at, [this] { scheduler_.calm(); });
+    at += settles;
+    after(at, [this, &scene, moment] {
+      server_->stations().front()->scene().describe([this, &scene, moment](const auto& description) {
+        ++outcome_.seeks;
+        const std::string text = scene.difference(*description, moment, moment + kShown);
+        if (!text.empty())
+          finding("after a seek to " + std::to_string(base::toSeconds(moment)) + " s in the recording, " +
+                  text);
+      });
+    });
+    at += 100 * kMs;
+  }
+  after(at, [this] { server_->stop(); });
+  server_->run();
+  if (outcome_.seeks != kChecks) finding("a replay has not described its scene");
+  server_.reset();
+  timers_.clear();
 }
 
 }  // namespace

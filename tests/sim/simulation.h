@@ -73,6 +73,7 @@ struct Outcome {
   std::uint64_t tickReports = 0;
   std::uint64_t missedReports = 0;
   std::uint64_t replayedTicks = 0;
+  std::uint64_t seeks = 0;  ///< in a replay of the recording
   Nanos slowestStop = 0;
 };
 

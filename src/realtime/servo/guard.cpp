@@ -118,7 +118,9 @@ void Guard::checkSpeed(const device::DeviceState& state) noexcept {
     latch(Trip::speed);
     waitForCalm_ = true;
   }
-  if (speed < options_.calmSpeed_m_per_s && waitForCalm_) {
+  // Nobody knows how a faulty device moves; a hand that is out of sight counts as at rest.
+  const bool known = (state.hold & device::kHoldFault) == 0;
+  if (known && speed < options_.calmSpeed_m_per_s && waitForCalm_) {
     waitForCalm_ = false;
     if (options_.selfRecover) report_.latched &= ~bit(Trip::speed);
   }

@@ -279,6 +279,25 @@ TEST(Guard, ARearmWaitsUntilTheHandIsCalm) {
   EXPECT_NEAR(bench.step().y(), 2, kTiny);
 }
 
+// A cable that is unplugged while the hand is fast: the first states after it have a fault and no speed.
+TEST(Guard, AHandThatIsOutOfSightIsNotCalm) {
+  Bench bench;
+  bench.settle(Vec3(0, 2, 0));
+  bench.state.velocity_m_per_s = Vec3(2, 0, 0);
+  bench.steps(3 * kMs);
+  bench.state.velocity_m_per_s = Vec3::Zero();
+  bench.state.hold = device::kHoldFault;
+  bench.steps(100 * kMs);
+  bench.state.hold = device::kHoldNone;
+  bench.state.velocity_m_per_s = Vec3(0.5, 0, 0);
+  bench.control.rearm();
+  EXPECT_EQ(bench.steps(1000 * kMs), Vec3::Zero());
+  EXPECT_TRUE(bench.active(Trip::speed));
+  bench.state.velocity_m_per_s = Vec3(0.2, 0, 0);
+  bench.steps(600 * kMs);
+  EXPECT_NEAR(bench.step().y(), 2, kTiny);
+}
+
 TEST(Guard, ASimulatedHandRecoversByItselfWhenCalm) {
   GuardOptions options = armedOptions();
   options.selfRecover = true;
