@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <sys/wait.h>
 
+#include <cstdlib>
 #include <string>
 
 #include "device/haply/mock_service.h"
@@ -24,6 +25,12 @@ void PrintTo(const End& end, std::ostream* out) {
 
 class AfterTheServer : public InContact, public testing::WithParamInterface<End> {
  protected:
+  AfterTheServer() {
+    // The server inherits it. ThreadSanitizer's own handler of a crash may wait for ever for a lock that the
+    // interrupted thread holds.
+    const char* const options = std::getenv("TSAN_OPTIONS");
+    setenv("TSAN_OPTIONS", ((options == nullptr ? "" : options) + std::string(":handle_segv=0")).c_str(), 1);
+  }
   // The mock's tick at which the server was gone for certain.
   std::int64_t endServer() {
     server->signal(GetParam().signal);
