@@ -417,8 +417,11 @@ Outcome Simulation::run() {
   }
   server_.reset();
   timers_.clear();
-  if (script_.record) checkRecording();
-  if (script_.record) checkReplay();
+  // A command that failed is in the recording.
+  if (script_.record && !writesFailed_ && !memoryFailed_) {
+    checkRecording();
+    checkReplay();
+  }
   outcome_.ticks = judge_.ticks();
   outcome_.ticksWithForce = judge_.ticksWithForce();
   outcome_.ticksInside = judge_.ticksInside();
@@ -1052,7 +1055,6 @@ void Simulation::checkEnd() {
 }
 
 void Simulation::checkRecording() {
-  if (writesFailed_ || memoryFailed_) return;  // a command that failed is in the recording
   scheduler_.calm();
   std::string remark;
   std::string law;
@@ -1078,7 +1080,6 @@ void Simulation::checkRecording() {
 void Simulation::checkReplay() {
   constexpr int kChecks = 3;
   constexpr Nanos kShown = 200 * kMs;  // how far a paused replay goes on to show a tick
-  if (writesFailed_ || memoryFailed_) return;
   // The clients learn that their server ended.
   over_ = true;
   scheduler_.runUntil(clock_.now() + 2'000 * kMs);
@@ -1095,7 +1096,7 @@ void Simulation::checkReplay() {
   seeker.identifies = false;
   seeker.connect();
   Dice dice(script_.seed + 17);
-  const Nanos settles = 1'000 * kMs + script_.adversity.longestSceneStall + 3'000 * kMs;
+  const Nanos settles = 1'000 * kMs + script_.adversity.longestSceneStall;
   Nanos at = 100 * kMs;
   for (int i = 0; i < kChecks; ++i) {
     after(at, [this] { scheduler_.calm(false); });
