@@ -57,13 +57,14 @@ class CubeOwner final : public Listener {
   }
 };
 
-// Has two objects far from the hand that move together only.
+// Has two objects far from the hand that move together only, and one that all batchers move.
 class Batcher final : public Listener {
  public:
   Batcher(Clients& all, std::string name, std::int32_t firstObject)
       : Listener(all, std::move(name)), first(firstObject) {
     kinds = wire::kReportButton;
   }
+  static constexpr std::int32_t kShared = 9;
   const std::int32_t first;
   std::int64_t sent = 0;
 
@@ -85,6 +86,7 @@ class Batcher final : public Listener {
     begin();
     commit();
   }
+  void moveShared() { send(wire::SetTransformMatrix{kShared, shifted(500.0 * first, 0, ++moved_)}); }
 
  private:
   wire::SetTransformMatrix pose(std::int32_t object) const {
@@ -101,6 +103,7 @@ class Batcher final : public Listener {
   }
 
   bool open_ = false;
+  int moved_ = 0;
 };
 
 // Comes, pushes the hand and goes.

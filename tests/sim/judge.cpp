@@ -122,7 +122,7 @@ void Judge::onWrite(Nanos clock, const Vec3& force_N, bool accepted) {
   // cube is held by its side when it comes back.
   constexpr double kRim_m = 0.0005;
   const double beside_m = std::max(std::abs(position_m_.x()), std::abs(position_m_.z()));
-  if (!top || held() || gap_ > 3 * limits_.period || beside_m > top->halfWidth_m - kRim_m) {
+  if (!top || held() || suspended_ || gap_ > 3 * limits_.period || beside_m > top->halfWidth_m - kRim_m) {
     outside_ = false;
   } else if (position_m_.y() > top->highest_m + 0.002) {
     outside_ = true;

@@ -14,6 +14,11 @@ constexpr int kDeepest = 4;
 
 }  // namespace
 
+Nanos SimClock::now() noexcept {
+  if (scheduler_ != nullptr) scheduler_->timeAsked();
+  return now_;
+}
+
 void SimClock::sleepUntil(Nanos deadline) noexcept {
   if (deadline > now_) scheduler_->runUntil(deadline);
 }
@@ -42,10 +47,12 @@ class Scheduler::Task {
       explicit Running(Task& of) : task(of) {
         task.running = true;
         ++task.scheduler_.depth_;
+        task.scheduler_.innermost_ = &task;
       }
       ~Running() {
         task.running = false;
         --task.scheduler_.depth_;
+        task.scheduler_.innermost_ = nullptr;
       }
       Task& task;
     } const scope(*this);
@@ -179,6 +186,7 @@ bool Scheduler::runNext(Nanos limit) {
   clock_.now_ = at;
   // A step that is preempted may be short of memory; what runs inside it is not.
   const LimitedMemory memory(0);
+  const Task* const preempted = std::exchange(innermost_, nullptr);
   if (chosen >= loopCount) {
     run(*tasks_[chosen - loopCount]);
   } else if (chosen == serverLoop_) {
@@ -188,6 +196,7 @@ bool Scheduler::runNext(Nanos limit) {
     runNextOf(chosen);
     clientRuns_ = false;
   }
+  innermost_ = preempted;
   return true;
 }
 
@@ -217,7 +226,7 @@ void Scheduler::runNet() {
   if (!calm_ && dice_.chance(adversity_.netStall)) {
     ++faults_;
     const Nanos end = netBusyUntil_ + dice_.between(kMs, 140 * kMs);
-    stallNet(netBusyUntil_, end);
+    netStalls_.add(netBusyUntil_, end);
     netBusyUntil_ = end;
   }
 }
@@ -232,7 +241,9 @@ Nanos Scheduler::costOf(Task& task) {
   if (task.name == "scene") {
     if (!dice_.chance(adversity_.sceneStall)) return dice_.between(20'000, 300'000);
     ++faults_;
-    return dice_.between(kMs, adversity_.longestSceneStall);
+    const Nanos length = dice_.between(kMs, adversity_.longestSceneStall);
+    sceneStalls_.add(clock_.now_, clock_.now_ + length);
+    return length;
   }
   if (task.name == "watchdog") return dice_.between(2'000, 20'000);
   return dice_.between(10'000, 500'000);
@@ -249,19 +260,9 @@ void Scheduler::maybeFreeze() {
   }
   const Nanos end = clock_.now_ + length;
   for (Task* task : tasks_) task->busyUntil = std::max(task->busyUntil, end);
-  stallNet(std::max(clock_.now_, netBusyUntil_), end);
+  netStalls_.add(std::max(clock_.now_, netBusyUntil_), end);
+  sceneStalls_.add(clock_.now_, end);
   netBusyUntil_ = std::max(netBusyUntil_, end);
-}
-
-void Scheduler::stallNet(Nanos from, Nanos until) {
-  from = std::max(from, stalledUntil_);
-  if (until <= from) return;
-  stalledSum_ += until - from;
-  stalledUntil_ = until;
-}
-
-Nanos Scheduler::netStalled() const noexcept {
-  return stalledSum_ - std::max<Nanos>(stalledUntil_ - clock_.now_, 0);
 }
 
 void Scheduler::posted() {
@@ -275,12 +276,17 @@ void Scheduler::handOver() noexcept {
   runUntil(clock_.now_ + dice_.between(0, 300'000));
 }
 
+// The scene thread holds no lock when it looks at the clock.
+void Scheduler::timeAsked() noexcept {
+  if (innermost_ != nullptr && innermost_->name == "scene") handOver();
+}
+
 void Scheduler::runUntil(Nanos end) noexcept {
   const Nanos begin = clock_.now_;
   while (runNext(end)) {
   }
   clock_.now_ = std::max(clock_.now_, end);
-  if (netRuns_) stallNet(begin, clock_.now_);
+  if (netRuns_) netStalls_.add(begin, clock_.now_);
 }
 
 }  // namespace hapticd::sim

@@ -2,10 +2,12 @@
 // seed.
 //
 // Steps take virtual time: after each one its thread is busy, and others run meanwhile. At hand-overs (a
-// wake, a post, a call of the device) a step may be preempted: others run inside it before it goes on. So a
-// step that blocks, such as a driver that hangs, lets all others run until its end.
+// wake, a post, a call of the device, in the scene thread also a look at the clock: before each command) a
+// step may be preempted: others run inside it before it goes on. So a step that blocks, such as a driver that
+// hangs, lets all others run until its end.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -50,13 +52,30 @@ struct Adversity {
   Nanos longestSceneStall = 300'000'000;
 };
 
+/// Time in which somebody stood still.
+class Stalls {
+ public:
+  void add(Nanos from, Nanos until) noexcept {
+    from = std::max(from, until_);
+    if (until <= from) return;
+    sum_ += until - from;
+    until_ = until;
+  }
+  /// Sum up to `now`.
+  Nanos before(Nanos now) const noexcept { return sum_ - std::max<Nanos>(until_ - now, 0); }
+
+ private:
+  Nanos sum_ = 0;
+  Nanos until_ = 0;
+};
+
 class Scheduler;
 
 /// The clock of the world. sleepUntil() lets the others run until then.
 class SimClock final : public base::Clock {
  public:
   explicit SimClock(Nanos wallAtZero) : wallOffset_(wallAtZero) {}
-  Nanos now() noexcept override { return now_; }
+  Nanos now() noexcept override;
   void sleepUntil(Nanos deadline) noexcept override;
   Nanos wallNow() noexcept override { return now_ + wallOffset_; }
   Nanos suspendedTime() noexcept override { return suspended_; }
@@ -97,12 +116,16 @@ class Scheduler final : public base::Threads, public net::FakeNetwork {
   using FakeNetwork::loops;
   /// A hand-over: may let others run before it returns.
   void handOver() noexcept;
+  /// The running step has asked for the time.
+  void timeAsked() noexcept;
   /// Lets the others run until then.
   void runUntil(Nanos end) noexcept;
   /// Charges the running event of the net thread.
   void chargeNet(Nanos cost) { netCost_ += cost; }
   /// Time up to now in which the net thread could not run, for reasons that are not the server's.
-  Nanos netStalled() const noexcept;
+  Nanos netStalled() const noexcept { return netStalls_.before(clock_.now_); }
+  /// The same of the scene threads.
+  Nanos sceneStalled() const noexcept { return sceneStalls_.before(clock_.now_); }
   /// From now on allocations of this size and more fail in the steps of the scene and of the web port's
   /// workers; with 0, none.
   void limitMemory(std::size_t fromBytes) { memoryLimit_ = fromBytes; }
@@ -126,7 +149,6 @@ class Scheduler final : public base::Threads, public net::FakeNetwork {
   void run(Task& task);
   void runNet();
   Nanos costOf(Task& task);
-  void stallNet(Nanos from, Nanos until);
   void maybeFreeze();
 
   SimClock& clock_;
@@ -142,10 +164,11 @@ class Scheduler final : public base::Threads, public net::FakeNetwork {
   bool netRuns_ = false;
   bool clientRuns_ = false;
   int depth_ = 0;  // of steps of tasks
+  const Task* innermost_ = nullptr;  // unless a loop runs inside
   bool calm_ = false;
   std::size_t memoryLimit_ = 0;
-  Nanos stalledSum_ = 0;
-  Nanos stalledUntil_ = 0;
+  Stalls netStalls_;
+  Stalls sceneStalls_;
   std::uint64_t steps_ = 0;
   std::uint64_t faults_ = 0;
   std::uint64_t preemptions_ = 0;

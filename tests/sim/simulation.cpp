@@ -123,6 +123,7 @@ class Simulation {
   void checkReplay();
   std::optional<Nanos> freeFrom();
   Nanos serverStalled();
+  Nanos sceneTime();
   std::optional<Judge::Top> top();
   SimClient* clientAt(const net::Endpoint& endpoint);
 
@@ -165,7 +166,11 @@ class Simulation {
   std::deque<std::pair<Nanos, std::uint64_t>> revisions_;  // of the scene in the servo: when known
   std::map<std::uint16_t, SimClient*> byPort_;
 
-  std::deque<std::pair<Nanos, double>> tops_;  // of the cube: when sent, world units
+  struct Moved {
+    Nanos sent;  // of the time in which the server does not stand still
+    double y;    // world units
+  };
+  std::deque<Moved> poses_;  // of the cube
   double y_ = 0;
   std::uint64_t moving_ = 0;  // number of the newest stream of poses
   Nanos endOfForces_ = 0;     // of clients that are gone
@@ -459,7 +464,10 @@ void Simulation::perform(const Action& action) {
       if (Listener* const op = anOperator(true)) op->stopForces();
       break;
     case Action::Kind::rearm:
-      if (Listener* const op = anOperator(false)) op->rearmForces();
+      // Without need a re-arm only begins a ramp.
+      if (Listener* const op = anOperator(false)) {
+        if (op->guard.stopped != 0 || op->guard.latched != 0 || dice.chance(0.3)) op->rearmForces();
+      }
       break;
     case Action::Kind::move:
       move(dice);
@@ -467,6 +475,7 @@ void Simulation::perform(const Action& action) {
     case Action::Kind::batch: {
       Batcher& batcher = *batchers_[dice.below(batchers_.size())];
       if (!batcher.connected()) break;
+      if (dice.chance(0.5)) batcher.moveShared();
       batcher.begin();
       after(dice.chance(0.5) ? 0 : dice.between(0, 300 * kMs), [&batcher] { batcher.commit(); });
       break;
@@ -538,7 +547,7 @@ void Simulation::move(Dice& dice) {
   if (!cubeOwner_->connected() || !cubeOwner_->uploaded) return;
   const std::uint64_t number = ++moving_;
   const double goal = dice.uniform(-2.0, 10.0);
-  const auto poses = static_cast<int>(1 + dice.below(90));
+  const auto poses = static_cast<int>(1 + dice.below(dice.chance(0.5) ? 10 : 90));
   const Nanos period = dice.between(8 * kMs, 34 * kMs);
   const double frequency = dice.uniform(0.5, 3.0);
   const double amplitude = dice.uniform(0.0, 3.0);
@@ -553,26 +562,32 @@ void Simulation::move(Dice& dice) {
 void Simulation::pose(double y) {
   if (!cubeOwner_->connected()) return;
   y_ = y;
-  tops_.emplace_back(clock_.now(), y);
+  poses_.push_back({sceneTime(), y});
   cubeOwner_->send(wire::SetTransformMatrix{0, shifted(0, y, 0)});
 }
 
 std::optional<Judge::Top> Simulation::top() {
-  constexpr Nanos kApplied = 1'000 * kMs;                                          // without stalls
+  constexpr Nanos kApplied = 300 * kMs;
   if (!cubeOwner_ || !cubeOwner_->uploaded || memoryFailed_) return std::nullopt;  // a pose may have failed
-  const Nanos since = clock_.now() - kApplied;
-  const bool stalls =
-      script_.adversity.sceneStall > 0 || script_.adversity.netStall > 0 || script_.adversity.freeze > 0;
-  if (stalls || *cubeOwner_->uploaded > since) return std::nullopt;
+  // Re-arms that were sent before a stop are ignored.
+  const wire::GuardState& guard = operators_.front()->guard;
+  if (guard.stopped != 0 || guard.latched != 0) return std::nullopt;
+  const Nanos since = sceneTime() - kApplied;
+  if (*cubeOwner_->uploaded > since) return std::nullopt;
   // The newest pose before the time still counts; before all poses the cube is at 0.
-  while (tops_.size() > 1 && tops_[1].first < since) tops_.pop_front();
-  double lowest = tops_.empty() || tops_.front().first >= since ? 0 : tops_.front().second;
+  while (poses_.size() > 1 && poses_[1].sent < since) poses_.pop_front();
+  double lowest = poses_.empty() || poses_.front().sent >= since ? 0 : poses_.front().y;
   double highest = lowest;
-  for (const auto& [at, y] : tops_) {
-    lowest = std::min(lowest, y);
-    highest = std::max(highest, y);
+  for (const Moved& pose : poses_) {
+    lowest = std::min(lowest, pose.y);
+    highest = std::max(highest, pose.y);
   }
   return Judge::Top{1e-3 * (kHalf + lowest), 1e-3 * (kHalf + highest), 1e-3 * kHalf};
+}
+
+// Grows while the server can carry out commands.
+Nanos Simulation::sceneTime() {
+  return clock_.now() - scheduler_.netStalled() - scheduler_.sceneStalled();
 }
 
 void Simulation::upload(Dice& dice) {
@@ -594,7 +609,7 @@ void Simulation::upload(Dice& dice) {
   uploader_->flush();
   uploaded_ = true;
   // Its stop does not wait for what it sent before.
-  if (!dice.chance(0.2)) return;
+  if (!dice.chance(messages < 150 ? 0.2 : 0.8)) return;
   after(dice.between(0, 300 * kMs), [this] {
     if (uploader_->connected() && !bench_.quiet) uploader_->stopForces();
   });
