@@ -17,7 +17,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-
 double secondsSince(std::int64_t begin) {
   return static_cast<double>(nowNs() - begin) * 1e-9;
 }

@@ -76,6 +76,8 @@ class SimClock final : public base::Clock {
  public:
   explicit SimClock(Nanos wallAtZero) : wallOffset_(wallAtZero) {}
   Nanos now() noexcept override;
+  /// The same for the simulation itself: no hand-over.
+  Nanos time() const noexcept { return now_; }
   void sleepUntil(Nanos deadline) noexcept override;
   Nanos wallNow() noexcept override { return now_ + wallOffset_; }
   Nanos suspendedTime() noexcept override { return suspended_; }
@@ -163,7 +165,7 @@ class Scheduler final : public base::Threads, public net::FakeNetwork {
   Nanos netCost_ = 0;
   bool netRuns_ = false;
   bool clientRuns_ = false;
-  int depth_ = 0;  // of steps of tasks
+  int depth_ = 0;                    // of steps of tasks
   const Task* innermost_ = nullptr;  // unless a loop runs inside
   bool calm_ = false;
   std::size_t memoryLimit_ = 0;

@@ -1,11 +1,7 @@
 #include "sim/simulation.h"
 
-#include <spdlog/sinks/base_sink.h>
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cerrno>
 #include <cstdio>
 #include <deque>
@@ -17,7 +13,10 @@
 #include "record/rerender.h"
 #include "server/server.h"
 #include "sim/clients.h"
+#include "sim/hash.h"
+#include "sim/listener_judge.h"
 #include "sim/replayed_scene.h"
+#include "sim/scoped_log.h"
 #include "sim/visit.h"
 
 namespace hapticd::sim {
@@ -28,55 +27,7 @@ using namespace std::chrono_literals;
 constexpr char kRecording[] = "/recording.haptics";
 constexpr std::int32_t kUploaded = 5;
 constexpr std::size_t kServerLoop = 0;  // of the network: the first that is made
-constexpr char kAcceptError[] = "cannot accept a connection on ";
-constexpr double kPlace = 777;  // where the object of the uploads is at the end
-
-// FNV-1a.
-class Hash {
- public:
-  void add(std::uint64_t value) {
-    for (int i = 0; i < 8; ++i) byte(static_cast<unsigned char>(value >> (8 * i)));
-  }
-  void add(double value) { add(std::bit_cast<std::uint64_t>(value)); }
-  void add(const std::string& text) {
-    for (const char c : text) byte(static_cast<unsigned char>(c));
-  }
-  std::uint64_t value() const { return value_; }
-
- private:
-  void byte(unsigned char b) {
-    value_ ^= b;
-    value_ *= 0x100000001B3U;
-  }
-  std::uint64_t value_ = 0xCBF29CE484222325U;
-};
-
-class LogSink final : public spdlog::sinks::base_sink<spdlog::details::null_mutex> {
- public:
-  explicit LogSink(std::function<void(const std::string&)> line) : line_(std::move(line)) {}
-
- private:
-  void sink_it_(const spdlog::details::log_msg& message) override {
-    line_(std::string(message.payload.data(), message.payload.size()));
-  }
-  void flush_() override {}
-  const std::function<void(const std::string&)> line_;
-};
-
-// The log of the server goes to the simulation for as long as this lives.
-class ScopedLog {
- public:
-  explicit ScopedLog(std::function<void(const std::string&)> line) : before_(spdlog::default_logger()) {
-    auto sink = std::make_shared<LogSink>(std::move(line));
-    spdlog::set_default_logger(std::make_shared<spdlog::logger>("sim", std::move(sink)));
-  }
-  ~ScopedLog() { spdlog::set_default_logger(before_); }
-  ScopedLog(const ScopedLog&) = delete;
-  ScopedLog& operator=(const ScopedLog&) = delete;
-
- private:
-  const std::shared_ptr<spdlog::logger> before_;
-};
+constexpr double kPlace = 777;          // where the object of the uploads is at the end
 
 class Simulation {
  public:
@@ -107,8 +58,6 @@ class Simulation {
   void visitWithoutDescriptors(Dice& dice);
   void returnDescriptors();
   bool shortOfDescriptors();
-  void onRefusedAccept(const net::Endpoint& local, std::size_t pending);
-  void onAcceptError(const std::string& where);
   void checkGreeted(Nanos back, Nanos stalled);
   void nonsense(Dice& dice);
   void visit(Dice& dice);
@@ -181,15 +130,7 @@ class Simulation {
   bool memoryFailed_ = false;
   Nanos memoryShortUntil_ = 0;                 // and what that delayed is made up for
   std::map<std::int32_t, std::int64_t> seen_;  // newest batch of each batcher that a description showed
-  // What a listener of the server does without descriptors.
-  struct Refused {
-    Nanos second = 0;                      // when the present second of `count` began
-    int count = 0;                         // attempts to accept in it
-    std::optional<Nanos> waitsSince = {};  // without stalls of the server
-    std::optional<Nanos> loggedAt = {};
-    std::optional<Nanos> logged = {};  // the same without stalls
-  };
-  std::map<std::string, Refused> refused_;  // by address
+  ListenerJudge listeners_;
   bool noDescriptors_ = false;
   std::optional<Nanos> descriptorsBack_;  // when they were back last
   bool wakesReader_ = false;              // with the next object that is touched
@@ -223,7 +164,8 @@ Simulation::Simulation(const Script& script, bool verbose)
           .buttonsChanged = [this](std::uint32_t buttons) { buttons_.emplace_back(clock_.now(), buttons); },
           .finding = [this](const auto& text) { finding(text); }},
       scopedBench_(bench_),
-      networkDice_(script.seed + 13) {
+      networkDice_(script.seed + 13),
+      listeners_(scheduler_, clock_, [this](const auto& text) { finding(text); }) {
   scheduler_.onSuspended = [this] { judge_.onSuspended(clock_.now()); };
   auto& network = scheduler_.options;
   network.delay = script.networkDelay;
@@ -236,7 +178,9 @@ Simulation::Simulation(const Script& script, bool verbose)
     if (available < 2 || !networkDice_.chance(0.2)) return available;
     return 1 + networkDice_.below(std::min<std::size_t>(available, 4096));
   };
-  network.refusedAccept = [this](const auto& local, std::size_t pending) { onRefusedAccept(local, pending); };
+  network.refusedAccept = [this](const auto& local, std::size_t pending) {
+    listeners_.onRefused(local, pending);
+  };
   network.losesDatagram = [this](std::uint64_t) { return networkDice_.chance(0.05); };
   const auto ofServer = [this](const net::Endpoint& local) {
     return clients_ && (local.port == clients_->server.port || local.port == clients_->web.port);
@@ -285,10 +229,7 @@ void Simulation::logged(const std::string& text) {
   }
   logBytes_ += text.size();
   if (logBytes_ > kMost) finding("the log has more than 300 kB in a second");
-  if (text.starts_with(kAcceptError)) {
-    const std::size_t begin = std::size(kAcceptError) - 1;
-    onAcceptError(text.substr(begin, text.rfind(": ") - begin));
-  }
+  listeners_.onLogged(text);
 }
 
 void Simulation::after(Nanos delay, std::function<void()> function) {
@@ -749,39 +690,12 @@ void Simulation::returnDescriptors() {
   if (files_.failures.open == EMFILE) files_.failures.open = 0;
   const Nanos back = clock_.now();
   descriptorsBack_ = back;
-  for (auto& [where, refused] : refused_) {
-    const auto since = std::exchange(refused.waitsSince, std::nullopt);
-    if (since && (!refused.logged || *refused.logged < *since - 1'000 * kMs))
-      finding("connections have waited at " + where + " for a descriptor, and the log does not report it");
-  }
+  listeners_.onDescriptorsBack();
   checkGreeted(back, scheduler_.netStalled());
 }
 
 bool Simulation::shortOfDescriptors() {
   return noDescriptors_ || (descriptorsBack_ && clock_.now() - *descriptorsBack_ < 500 * kMs);
-}
-
-// Ten times a second, and once after each connection that was accepted.
-void Simulation::onRefusedAccept(const net::Endpoint& local, std::size_t pending) {
-  constexpr int kMost = 20;
-  const Nanos now = clock_.now();
-  Refused& refused = refused_[local.text()];
-  if (now - refused.second >= 1'000 * kMs) {
-    refused.second = now;
-    refused.count = 0;
-  }
-  if (++refused.count == kMost + 1)
-    finding("without descriptors the server tries to accept more than " + std::to_string(kMost) +
-            " times in a second at " + local.text());
-  if (pending > 0 && !refused.waitsSince) refused.waitsSince = now - scheduler_.netStalled();
-}
-
-void Simulation::onAcceptError(const std::string& where) {
-  Refused& refused = refused_[where];
-  if (refused.loggedAt && clock_.now() - *refused.loggedAt < 900 * kMs)
-    finding("the log reports twice in a second that no connection can be accepted on " + where);
-  refused.loggedAt = clock_.now();
-  refused.logged = clock_.now() - scheduler_.netStalled();
 }
 
 // Whoever came before is greeted soon after descriptors are back; one with datagrams after its next request.
