@@ -16,6 +16,7 @@ struct ForceField {
   geometry::Vec3 force_N = geometry::Vec3::Zero();
   geometry::Mat3 jacobian_N_per_unit = geometry::Mat3::Zero();  ///< newtons per world unit
   double radius = 0;                                            ///< world units; may be infinite
+  std::uint32_t number = 0;                                     ///< of this field only
   bool releasing = false;                                       ///< its owner is gone: ramp out in 250 ms
   std::shared_ptr<const ForceOwner> owner;                      ///< null: of no client
 };

@@ -80,6 +80,14 @@ Effect effectFrom(const EffectKind& kind, const DefineEffect& c, const SceneConf
   return e;
 }
 
+// The servo follows some that ramp out, of each kind.
+template <class Force>
+void addLeaving(OwnedForce<Force>&& force, std::vector<OwnedForce<Force>>& leaving) {
+  constexpr std::size_t kMost = 8;
+  if (leaving.size() == kMost) leaving.erase(leaving.begin());
+  leaving.push_back(std::move(force));
+}
+
 }  // namespace
 
 std::string_view nameOf(EffectType type) {
@@ -118,9 +126,11 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
     return;
   }
   const Effect effect = effectFrom(*kind, c, config_, bound_, call);
+  if (known != effects_.end() && known->second.value.effect.releasing) {
+    addLeaving({known->second.owner, known->second.value.effect, known->second.goneAt}, leavingEffects_);
+    effects_.erase(known);
+  }
   Owned<RunningEffect>& entry = effects_[c.index];
-  // An effect whose owner left ramps out until it is started again.
-  if (entry.value.effect.releasing) entry.value.running = false;
   const std::uint32_t started = entry.value.effect.start;
   entry.value.effect = effect;
   entry.value.asked = c;
@@ -201,8 +211,8 @@ void FreeForces::handle(SetPlane& c, const Call& call) {
               "sendSurface plane " + std::to_string(c.index) + ": " + remark.substr(0, remark.size() - 2));
   }
   const auto known = planes_.find(c.index);
-  const bool stays = known != planes_.end() && known->second.value.normal == plane.normal &&
-                     known->second.value.offset == plane.offset;
+  const bool stays = known != planes_.end() && !known->second.value.releasing &&
+                     known->second.value.normal == plane.normal && known->second.value.offset == plane.offset;
   plane.placement = stays ? known->second.value.placement : ++placements_;
   plane.owner = ownerOf(call.client);
   planes_[c.index] = {call.client, plane, kNever};
@@ -255,25 +265,38 @@ void FreeForces::handle(SetForceField& c, const Call& call) {
     return;
   }
   changed_ = true;
+  letFieldLeave();
   if (field.force_N.isZero(0) && field.jacobian_N_per_unit.isZero(0)) {
     field_.reset();
   } else {
     if (!(field.radius > 0))
       call.warn(kName, "the radius is not above zero, there will be no force", " ", c.radius_m);
+    field.number = ++fieldNumbers_;
     field.owner = ownerOf(call.client);
     field_ = {call.client, field, kNever};
     asked_.keep(c, call.client);
   }
 }
 
+void FreeForces::letFieldLeave() {
+  if (!field_ || !field_->value.releasing) return;
+  addLeaving(std::move(*field_), leavingFields_);
+  field_.reset();
+}
+
+// What a client that left asked for is nothing that the next one asks for.
 FreeForces::Constraint& FreeForces::constraintFor(const Call& call) {
+  if (constraint_ && constraint_->value.releasing) {
+    if (const auto field = fieldOf(constraint_->value))
+      addLeaving({constraint_->owner, *field, constraint_->goneAt}, leavingFields_);
+    constraint_.reset();
+  }
   if (!constraint_) {
     constraint_ = Owned<Constraint>{};
+    constraint_->value.number = ++fieldNumbers_;
     askedOfConstraint_.clear();
   }
   constraint_->owner = call.client;
-  constraint_->goneAt = kNever;
-  constraint_->value.releasing = false;
   constraint_->value.owner = ownerOf(call.client);
   changed_ = true;
   return constraint_->value;

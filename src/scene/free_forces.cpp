@@ -34,6 +34,7 @@ std::optional<ForceField> FreeForces::fieldOf(const Constraint& c) const {
                                                            : c.planePoint_m);
   field.jacobian_N_per_unit = -c.stiffness_N_per_m / kWorldUnitsPerStockMetre * outer;
   field.radius = std::numeric_limits<double>::infinity();
+  field.number = c.number;
   field.releasing = c.releasing;
   field.owner = c.owner;
   return field;
@@ -52,6 +53,7 @@ PublishedForces FreeForces::publish(double worldUnitsPerMetre) const {
   for (const auto& [index, entry] : effects_) {
     if (entry.value.running) forces.effects.push_back(entry.value.effect);
   }
+  for (const auto& entry : leavingEffects_) forces.effects.push_back(entry.value);
   for (const auto& [index, entry] : planes_) {
     Plane plane = entry.value;
     // While it ramps out it belongs to the plane that does, and not to one that another client has set since.
@@ -71,6 +73,7 @@ PublishedForces FreeForces::publish(double worldUnitsPerMetre) const {
     if (const auto field = fieldOf(constraint_->value))
       forces.fields.push_back(passive(*field, worldUnitsPerMetre));
   }
+  for (const auto& entry : leavingFields_) forces.fields.push_back(passive(entry.value, worldUnitsPerMetre));
   if (buzz_) forces.buzz = buzz_->value;
   return forces;
 }
@@ -136,6 +139,8 @@ void FreeForces::forEachDeadline(const F& f) const {
   if (field_) f(field_->goneAt);
   if (constraint_) f(constraint_->goneAt);
   if (buzz_) f(buzz_->goneAt);
+  for (const auto& entry : leavingEffects_) f(entry.goneAt);
+  for (const auto& entry : leavingFields_) f(entry.goneAt);
 }
 
 std::optional<Nanos> FreeForces::nextDeadline() const {
@@ -168,6 +173,8 @@ bool FreeForces::update(Nanos now, NoticeBoard& board, std::vector<Notice>& out)
     it = entry.value.effect.releasing ? effects_.erase(it) : std::next(it);
   }
   changed_ |= std::erase_if(planes_, [&](const auto& e) { return gone(e.second); }) != 0;
+  changed_ |= std::erase_if(leavingEffects_, gone) != 0;
+  changed_ |= std::erase_if(leavingFields_, gone) != 0;
   const auto drop = [&](auto& optional) {
     if (!optional || !gone(*optional)) return;
     optional.reset();

@@ -1,5 +1,6 @@
 // Forces that belong to no object: effects, planes, force fields, constraints, the buzz. Each is owned by the
-// client that last set or started it and ramps out when that client leaves.
+// client that last set or started it and ramps out when that client leaves. What somebody sets meanwhile
+// replaces nothing of it.
 #pragma once
 
 #include <limits>
@@ -55,6 +56,7 @@ struct ForceConstraint {
   Vec3 planePoint_m = Vec3::Zero();
   Vec3 planeNormal = Vec3::UnitY();
   double stiffness_N_per_m = 1000;
+  std::uint32_t number = 0;  // of the field that it becomes
   bool releasing = false;
   std::shared_ptr<const ForceOwner> owner;
 };
@@ -108,6 +110,7 @@ class FreeForces {
   std::optional<ForceField> fieldOf(const Constraint& constraint) const;
   ForceField passive(ForceField field, double worldUnitsPerMetre) const;
   Constraint& constraintFor(const Call& call);
+  void letFieldLeave();
 
   const SceneConfig& config_;
   PassivityBound bound_;
@@ -118,9 +121,13 @@ class FreeForces {
   std::optional<Owned<ForceField>> field_;
   std::optional<Owned<Constraint>> constraint_;
   std::optional<Owned<Buzz>> buzz_;
-  std::uint32_t starts_ = 0;      // one counter for all: no number is used twice
-  std::uint32_t placements_ = 0;  // the same for planes
-  LastCommands asked_;            // of all but effects, also of forces that are gone
+  // What still ramped out when somebody set another in its place.
+  std::vector<Owned<Effect>> leavingEffects_;
+  std::vector<Owned<ForceField>> leavingFields_;
+  std::uint32_t starts_ = 0;        // one counter for all: no number is used twice
+  std::uint32_t placements_ = 0;    // the same for planes
+  std::uint32_t fieldNumbers_ = 0;  // the same for fields
+  LastCommands asked_;              // of all but effects, also of forces that are gone
   LastCommands askedOfConstraint_;
   bool changed_ = false;
 };

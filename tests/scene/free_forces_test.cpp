@@ -268,6 +268,41 @@ TEST_F(Forces, ResetRampsAllOutWhoeverOwnsIt) {
   EXPECT_TRUE(scene_->fields.empty());
 }
 
+// A client that comes while the forces of another ramp out gets none of them, and ends none at once.
+TEST_F(Forces, WhatIsSetWhileAnotherRampsOutIsItsOwn) {
+  say(SetConstraintMode{2});
+  say(SetConstraintStiffness{500});
+  say(SetConstraintEnabled{true});
+  say(SetForceField{.force_N = Vec3(1, 0, 0), .radius_m = 1});
+  say(constant(0));
+  say(StartEffect{0});
+  say(SetPlane{.index = 3, .plane = {0, 1, 0, 0}, .stiffness = 0.5});
+  publish();
+  const std::uint32_t placement = scene_->planes.at(0).placement;
+  builder_.clientGone(kClient, now_);
+  wait(100 * kMillisecond);
+  say(SetConstraintVector{ConstraintVector::linePoint, Vec3(0.001, 0, 0)}, kOther);
+  say(SetForceField{.force_N = Vec3(0, 2, 0), .radius_m = 1}, kOther);
+  say(constant(0), kOther);
+  say(SetPlane{.index = 3, .plane = {0, 1, 0, 0}, .stiffness = 0.5}, kOther);
+  ASSERT_TRUE(publish());
+  ASSERT_EQ(scene_->effects.size(), 1U) << "defined, not started";
+  EXPECT_TRUE(scene_->effects[0].releasing);
+  ASSERT_EQ(scene_->fields.size(), 3U);
+  for (const ForceField& field : scene_->fields) EXPECT_EQ(field.releasing, field.force_N.y() == 0);
+  EXPECT_NE(scene_->fields[1].number, scene_->fields[2].number);
+  EXPECT_FALSE(scene_->planes.at(0).releasing);
+  EXPECT_NE(scene_->planes[0].placement, placement) << "the servo has to place it anew";
+  run(300 * kMillisecond);
+  EXPECT_TRUE(scene_->effects.empty());
+  ASSERT_EQ(scene_->fields.size(), 1U);
+  EXPECT_EQ(scene_->fields[0].force_N.y(), 2);
+  EXPECT_EQ(scene_->planes.size(), 1U);
+  say(SetConstraintEnabled{true}, kOther);
+  publish();
+  EXPECT_EQ(scene_->fields.size(), 1U) << "its mode is none";
+}
+
 TEST_F(Forces, PlanesAreInWorldUnitsWithStockSurfaces) {
   say(SetPlane{.index = 0,
                .plane = {0, 2, 0, 0.02},

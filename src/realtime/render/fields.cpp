@@ -24,17 +24,16 @@ Vec3 forceOf(const scene::ForceField& field, const Vec3& hip) noexcept {
 
 }  // namespace
 
-// Fields have no id: one that ramps out is identified by its origin.
 double Fields::left(const scene::ForceField& field, Nanos now) noexcept {
   if (!field.releasing) return remainingShare(-1, field.owner.get(), now);
   for (int i = 0; i < releasingCount_; ++i) {
     Releasing& r = releasing_[static_cast<std::size_t>(i)];
-    if (r.origin != field.origin) continue;
+    if (r.number != field.number) continue;
     r.seen = true;
     return remainingShare(r.begin, field.owner.get(), now);
   }
   if (releasingCount_ == kMaxReleasing) return 0;
-  releasing_[static_cast<std::size_t>(releasingCount_++)] = {field.origin, now, true};
+  releasing_[static_cast<std::size_t>(releasingCount_++)] = {field.number, now, true};
   return remainingShare(now, field.owner.get(), now);
 }
 

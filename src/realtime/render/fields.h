@@ -30,7 +30,7 @@ class Fields {
   static constexpr int kMaxReleasing = 16;
 
   struct Releasing {
-    Vec3 origin = Vec3::Zero();
+    std::uint32_t number = 0;
     Nanos begin = 0;
     bool seen = false;
   };
