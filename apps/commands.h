@@ -25,8 +25,12 @@ inline CLI::Validator within(double least, double most) {
       },
       range.str());
 }
-/// Throws std::runtime_error when the file exists and `force` is not given. Pipes and devices may be written.
-inline void keepFile(const std::string& file, bool force) {
+/// Throws std::runtime_error when the file exists and `force` is not given, or is `input`, which is still to
+/// be read. Pipes and devices may be written.
+inline void keepFile(const std::string& file, bool force, const std::string& input = {}) {
+  std::error_code none;
+  if (!file.empty() && !input.empty() && std::filesystem::equivalent(file, input, none))
+    throw std::runtime_error("'" + file + "' is the file to read: choose another name for what is written");
   if (force || file.empty() || !std::filesystem::is_regular_file(file)) return;
   throw std::runtime_error("'" + file + "' exists: choose another name, or overwrite it by --force");
 }

@@ -77,9 +77,9 @@ void exportVrpn(const ExportOptions& options, std::string& remark) {
 }
 
 int run(const ExportOptions& options) {
-  keepFile(options.out, options.force);
+  keepFile(options.out, options.force, options.recording);
   const std::string beside = options.to == "vrpn" ? "" : options.out + ".json";
-  keepFile(beside, options.force);
+  keepFile(beside, options.force, options.recording);
   std::string remark;
   if (options.to == "vrpn") {
     exportVrpn(options, remark);

@@ -120,8 +120,11 @@ void checkTrajectories(const CLI::App& command, const MeshRenderOptions& options
 }
 
 int run(const CLI::App& command, const RenderCommandOptions& options) {
-  keepFile(options.mesh.out, options.force);
-  keepFile(options.report, options.force);
+  for (const std::string& input :
+       {options.session, options.mesh.mesh, options.mesh.hand, options.mesh.compare}) {
+    keepFile(options.mesh.out, options.force, input);
+    keepFile(options.report, options.force, input);
+  }
   if (!options.session.empty()) {
     for (const char* name :
          {"--mesh", "--hand", "--compare", "--mesh-unit", "--size-mm", "--faces", "--timing"}) {

@@ -19,6 +19,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
+constexpr char kFaultOfDevice[] = "the device gives no force";  // the begin of the server's text
+
 struct StopOptions {
   std::string server = "Phantom@localhost";
   bool rearm = false;
@@ -69,26 +71,39 @@ int run(const StopOptions& options) {
   if (!token.empty()) client.presentToken(token);
   std::optional<GuardReport> guard;
   std::string refusal;
+  std::string remark;
+  bool answered = false;
   client.onGuard([&](const GuardReport& report) { guard = report; });
   client.onText([&](const TextReport& text) {
-    if (text.severity == Severity::error) refusal = text.text;
+    if (text.severity != Severity::error) return;
+    // A fault of the device is no answer, but the reason to stop.
+    (text.text.starts_with(kFaultOfDevice) ? remark : refusal) = text.text;
   });
+  client.onToRoom([&](const ToRoomReport&) { answered = true; });
   if (options.rearm) {
     client.rearmForces();
   } else {
     client.stopForces();
   }
-  // Success means that the server confirmed the new state, not that the message was sent.
-  const auto isDone = [&] { return guard && guard->stopped != options.rearm; };
+  // Success means that the server confirmed the new state, not that the message was sent. A refusal would
+  // come before the answer to this question.
+  client.requestToRoom();
+  const auto isDone = [&] {
+    return answered && guard && guard->stopped != options.rearm && (!options.rearm || guard->latched.empty());
+  };
   const auto end = std::chrono::steady_clock::now() + 3s;
   while (!isDone() && refusal.empty() && std::chrono::steady_clock::now() < end) client.poll(50ms);
   if (!refusal.empty()) throw Error(options.server + " refused: " + refusal);
+  if (options.rearm && guard && !guard->latched.empty())
+    throw Error(options.server + " is not re-armed: " + namesOf(guard->latched) + " is latched again" +
+                (remark.empty() ? "" : "; " + remark));
   if (!isDone()) {
     throw Error(
         options.server +
         " sent no confirmation within 3 s; a replay has no force to stop, and for a device use its own "
         "switch");
   }
+  if (!remark.empty()) std::fprintf(stderr, "hapticd: %s\n", remark.c_str());
   if (options.json) {
     printJson({{"server", options.server}, {"stopped", guard->stopped}, {"armed", guard->armed}});
     return 0;

@@ -167,7 +167,11 @@ int run(const TunnelOptions& options) {
     return context ? tls::wrap(*context, net::Connection::connect(loop, address, 3s, link))
                    : net::connectLocal(loop, server.socket, link);
   };
-  if (context) tryOnce(loop, connect, server.text());
+  if (context) {
+    tryOnce(loop, connect, server.text());
+  } else {
+    net::connectLocal(loop, server.socket, link);  // throws
+  }
   net::TcpListener listener(
       loop, local,
       [&](net::Connection near) {

@@ -43,6 +43,7 @@ stage() {
   install -Dm644 "$system/hapticd.toml" "$root/etc/hapticd/hapticd.toml"
   install -Dm644 "$system/limits.conf" "$root/etc/security/limits.d/hapticd.conf"
   install -Dm644 "$system/70-hapticd.rules" "$root/lib/udev/rules.d/70-hapticd.rules"
+  install -Dm644 "$system/hapticd-loopback.service" "$root/lib/systemd/system/hapticd-loopback.service"
   install -Dm644 "$system/polkit.rules" "$root/usr/share/polkit-1/rules.d/50-hapticd.rules"
   mkdir -p "$root/usr/share/doc/hapticd-doc"
   cp -r docs/. "$root/usr/share/doc/hapticd-doc/"

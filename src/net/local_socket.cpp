@@ -117,6 +117,10 @@ LocalListener::LocalListener(Loop& loop, fs::path path, std::function<void(Conne
   };
   if (!bind()) {
     if (errno != EADDRINUSE) fail(path_, errno);
+    struct stat there {};
+    if (::lstat(path_.c_str(), &there) == 0 && !S_ISSOCK(there.st_mode))
+      throw Error(path_.string() +
+                  " exists and is no socket: choose another path by socket in the configuration");
     const Descriptor probe(openSocket(path_));
     if (connectTo(probe.fd(), path_) != ECONNREFUSED) fail(path_, EADDRINUSE);
     ::unlink(path_.c_str());  // of a server that was killed

@@ -245,8 +245,8 @@ void Recorder::fail(const std::error_code& error) {
   const char* remedy = "";
   if (error == std::errc::no_space_on_device) remedy = "; make room on the disk and start a new recording";
   if (error == std::errc::file_too_large) remedy = "; start a new one, or raise recording_MB in [limits]";
-  onProblem_("recording to '" + path_.string() + "' has stopped: " + error.message() +
-             "; what was written before stays readable" + remedy);
+  const char* const kept = counts_.bytes > 0 ? "; what was written before stays readable" : "";
+  onProblem_("recording to '" + path_.string() + "' has stopped: " + error.message() + kept + remedy);
 }
 
 void Recorder::finish() {

@@ -130,7 +130,7 @@ std::string sidecarOf(const std::filesystem::path& recording) {
   const Json all = {{"recording", recording.filename().string()},
                     {"program", header.program},
                     {"force_law", header.law.number},
-                    {"began", dateOf(first + header.wallOffset)},
+                    {"began", first == 0 ? Json() : Json(dateOf(first + header.wallOffset))},
                     {"devices", devicesOf(header)},
                     {"surfaces_of_scene", std::move(surfaces)},
                     {"markers", std::move(markers)},

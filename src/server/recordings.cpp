@@ -16,6 +16,8 @@ using record::RecordingError;
 
 // Before the begin of a recording, so that meshes need not wait for further edits and motions are over.
 constexpr Nanos kSettled = 500'000'000;
+// Of recordings whose memory, 8 MB for each device, a tick may still use.
+constexpr std::size_t kMostEnded = 4;
 
 std::filesystem::path withTime(const std::string& name) {
   const auto now = static_cast<std::time_t>(base::wallNow() / 1'000'000'000);
@@ -67,8 +69,16 @@ void Recordings::create(const std::string& name) {
 
 void Recordings::begin(Nanos wallOffset, std::string config) {
   if (!recorder_) return;
+  startRecorder(wallOffset, std::move(config));
+  attach();
+}
+
+void Recordings::startRecorder(Nanos wallOffset, std::string config) {
   for (const auto& station : stations_) recorder_->addDevice(station->recorded());
   recorder_->start(wallOffset, std::move(config));
+}
+
+void Recordings::attach() {
   recorderOf_.resize(scenes_.size(), nullptr);
   for (const auto& scene : scenes_) {
     if (beginScene(*scene)) continue;
@@ -104,8 +114,23 @@ void Recordings::start(const std::string& name, Nanos wallOffset, std::string co
   if (!file().empty()) throw RecordingError("refused: this server records to " + file() + " already");
   if (!name.empty()) checkName(name);
   end({});  // one that could not be written further
-  create((options_.folder / (name.empty() ? "session-%Y%m%d-%H%M%S.haptics" : name)).string());
-  begin(wallOffset, std::move(config));
+  if (ended_.size() >= kMostEnded)
+    throw RecordingError(
+        "refused: the last " + std::to_string(kMostEnded) +
+        " recordings have not ended yet; try again in a second, or when the devices are back");
+  try {
+    create((options_.folder / (name.empty() ? "session-%Y%m%d-%H%M%S.haptics" : name)).string());
+    startRecorder(wallOffset, std::move(config));
+    if (!recorder_->writes())
+      throw RecordingError("refused: '" + recorder_->path().string() + "' cannot be written");
+  } catch (const RecordingError&) {
+    recorder_.reset();
+    throw;
+  } catch (const std::exception& error) {
+    recorder_.reset();
+    throw RecordingError(std::string("refused: the recording cannot begin: ") + error.what());
+  }
+  attach();
 }
 
 bool Recordings::end(std::function<void(const std::string&)> ended) {

@@ -63,6 +63,8 @@ class Recordings {
     bool told = false;
   };
 
+  void startRecorder(base::Nanos wallOffset, std::string config);
+  void attach();
   bool beginScene(SceneHost& scene);
   void sceneEnded(const record::Recorder* recorder);
 

@@ -70,15 +70,20 @@ in_root hapticd --version | grep -q "^hapticd $version "
 in_root getent passwd hapticd
 in_root getent group hapticd
 in_root grep -q '@hapticd - rtprio 80' /etc/security/limits.d/hapticd.conf
-for file in /lib/systemd/system/hapticd.service /usr/share/polkit-1/rules.d/50-hapticd.rules /lib/udev/rules.d/70-hapticd.rules /usr/share/man/man1/hapticd-serve.1.gz \
+for file in /lib/systemd/system/hapticd.service /lib/systemd/system/hapticd-loopback.service /usr/share/polkit-1/rules.d/50-hapticd.rules /lib/udev/rules.d/70-hapticd.rules /usr/share/man/man1/hapticd-serve.1.gz \
   /usr/share/bash-completion/completions/hapticd /usr/share/applications/hapticd.desktop /usr/share/hapticd/grafana/hapticd.json \
   /usr/share/doc/hapticd/copyright /usr/share/doc/hapticd-doc/configuration.md; do
   [ -e "$root$file" ] || fail "$file is not installed"
 done
 ! in_root test -e /etc/systemd/system/multi-user.target.wants/hapticd.service || fail "the service is enabled without consent"
+! in_root test -e /etc/systemd/system/multi-user.target.wants/hapticd-loopback.service || fail "the loopback service is enabled without consent"
 
 echo "-- use, as a user without rights"
 as_user hapticd serve --config /etc/hapticd/hapticd.toml --check-config | grep -q 'name'
+in_root sed 's/^driver = "simulated"/driver = "openhaptics"/' /etc/hapticd/hapticd.toml >"$root/packages/arm.toml"
+as_user hapticd serve --config /packages/arm.toml --check-config >"$root/packages/arm.effective"
+grep -qx 'driver = "openhaptics"' "$root/packages/arm.effective" || fail "the driver in the installed configuration was not changed"
+grep -qx 'isolate = true' "$root/packages/arm.effective" || fail "the installed configuration switches off the isolation of openhaptics"
 as_user hapticd self-test --seconds 0.3
 as_user hapticd serve --listen 127.0.0.1:0 --http off --seconds 0.2
 if in_root sh -c 'command -v g++ && command -v pkg-config' >/dev/null; then

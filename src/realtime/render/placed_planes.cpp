@@ -12,8 +12,17 @@ namespace {
 
 constexpr double kPlaneSkin = 1e-9;  // of the largest coordinate of the HIP
 constexpr double kTau = 2 * M_PI;
+constexpr double kDeepest_m = 0.020;  // below a plane that a command brings there, as with objects
+constexpr double kFastest_m_per_s = 1;
+
+std::array<double, 6> detailOf(const scene::Plane& plane) noexcept {
+  return {plane.adhesionNormal_N,  plane.adhesionLateral_N, plane.textureAmplitude,
+          plane.textureWavelength, plane.buzzAmplitude,     plane.buzzAngularFrequency_rad_per_s};
+}
 
 }  // namespace
+
+// A plane that moves while it is felt rises from where the HIP is below it already.
 
 PlacedPlanes::Memory& PlacedPlanes::memoryOf(const scene::Plane& plane, Nanos now, double depth_m,
                                              bool& fresh) noexcept {
@@ -22,12 +31,19 @@ PlacedPlanes::Memory& PlacedPlanes::memoryOf(const scene::Plane& plane, Nanos no
       std::find_if(memory_.begin(), end, [&](const Memory& m) { return m.index == plane.index; });
   if (known == end) ++memoryCount_;
   fresh = known == end || known->placement != plane.placement;
-  if (fresh) {
-    *known = Memory{};
-    known->index = plane.index;
-    known->placement = plane.placement;
-    known->placed = now;
-    known->depth_m = std::max(0.0, depth_m);
+  if (!fresh) return *known;
+  const Memory before = known == end ? Memory{} : *known;
+  *known = Memory{};
+  known->index = plane.index;
+  known->placement = plane.placement;
+  known->placed = now;
+  known->detail = detailOf(plane);
+  known->depth_m = std::max(0.0, depth_m - before.under_m);
+  known->leftOut = before.leftOut;
+  if (before.touched && before.releaseBegin < 0) {
+    known->touched = true;
+    known->adheres = before.adheres;
+    known->firstContact = before.firstContact;
   }
   return *known;
 }
@@ -36,7 +52,7 @@ PlacedPlanes::Memory& PlacedPlanes::memoryOf(const scene::Plane& plane, Nanos no
 double PlacedPlanes::heightOf(const scene::Plane& plane, const Memory& memory, Nanos now, const Vec3& normal,
                               const Vec3& proxy, double metresPerUnit) noexcept {
   const double age = base::toSeconds(now - memory.placed);
-  const double recovery = base::toSeconds(plane.recovery);
+  const double recovery = std::max(base::toSeconds(plane.recovery), memory.depth_m / kFastest_m_per_s);
   double height = 0;
   if (age < recovery) height -= memory.depth_m * (1 - age / recovery);
   if (plane.textureWavelength > 0) {
@@ -63,18 +79,19 @@ bool PlacedPlanes::changesInContact(const scene::SceneSnapshot& scene) const noe
   return std::any_of(memory_.begin(), memory_.begin() + memoryCount_, [&](const Memory& m) {
     const auto now = std::find_if(scene.planes.begin(), scene.planes.end(),
                                   [&](const scene::Plane& p) { return p.index == m.index; });
-    return m.touched &&
-           (now == scene.planes.end() || now->placement != m.placement || !(now->surface == m.surface));
+    return m.touched && (now == scene.planes.end() || now->placement != m.placement ||
+                         !(now->surface == m.surface) || detailOf(*now) != m.detail);
   });
 }
 
 void PlacedPlanes::place(const scene::SceneSnapshot& scene, Nanos now, const Vec3& hip, const Vec3& proxy,
-                         double toolRadius_m, double radius_m) noexcept {
+                         double toolRadius_m, double radius_m, bool viewMoved) noexcept {
   const geometry::Affine& T_world_device = scene.workspace.T_world_device;
   changedInContact_ = changesInContact(scene);
   forgetAllExcept(scene);
   count_ = 0;
   leavesOut_ = false;
+  viewMoved_ = viewMoved;
   for (const scene::Plane& plane : scene.planes) {
     if (count_ == scene::kMaxPlanes) break;
     PlacedPlane& placed = planes_[static_cast<std::size_t>(count_)];
@@ -96,13 +113,18 @@ bool PlacedPlanes::placeOne(const geometry::Affine& T_world_device, Nanos now, c
   const Vec3 normal = slope / unitsPerMetre;
   const double hipHeight = (plane.normal.dot(T_world_device * hip) + plane.offset) / unitsPerMetre;
   bool fresh = false;
-  Memory& memory = memoryOf(plane, now, toolRadius_m - hipHeight, fresh);
-  if (fresh) placed.insertionDepth_m = memory.depth_m;
+  const double depth_m = toolRadius_m - hipHeight;
+  Memory& memory = memoryOf(plane, now, depth_m, fresh);
   if (anew_) memory.touched = memory.adheres = false;
-  memory.leftOut = (anew_ || memory.leftOut) && hipHeight < toolRadius_m;
+  // As with objects, the hand is not lifted out of what came around it.
+  const bool cameDeep =
+      fresh ? memory.depth_m > kDeepest_m : viewMoved_ && memory.under_m == 0 && depth_m > kDeepest_m;
+  memory.leftOut = (anew_ || cameDeep || memory.leftOut) && depth_m > 0;
   leavesOut_ |= memory.leftOut;
+  memory.under_m = 0;
 
   memory.surface = placed.surface = plane.surface;
+  memory.detail = detailOf(plane);
   if (plane.releasing && memory.releaseBegin < 0) memory.releaseBegin = now;
   const double left = remainingShare(memory.releaseBegin, plane.owner.get(), now);
   if (left == 0 || memory.leftOut) return false;
@@ -111,6 +133,7 @@ bool PlacedPlanes::placeOne(const geometry::Affine& T_world_device, Nanos now, c
     placed.surface.damping_Ns_per_m *= left;
   }
   const double raised = heightOf(plane, memory, now, normal, proxy, 1 / unitsPerMetre);
+  memory.under_m = std::max(0.0, depth_m + raised);
   placed.rests = !fresh && raised == std::exchange(memory.raised_m, raised);
   placed.facet.unbounded = true;
   placed.facet.normal = normal;

@@ -18,10 +18,9 @@ using base::Nanos;
 /// One plane of the scene in this tick.
 struct PlacedPlane {
   const scene::Plane* state = nullptr;
-  Facet facet;                  ///< unbounded, device metres; facet.object is -1 - index
-  scene::Surface surface;       ///< weaker while the plane ramps out
-  double insertionDepth_m = 0;  ///< depth of the HIP at the placement; 0 unless placed in this tick
-  bool rests = false;           ///< its surface is where it was in the tick before
+  Facet facet;             ///< unbounded, device metres; facet.object is -1 - index
+  scene::Surface surface;  ///< weaker while the plane ramps out
+  bool rests = false;      ///< its surface is where it was in the tick before
 
   /// The share of its stiffness that is left, 1 … 0; 0 also without stiffness.
   double presence() const noexcept {
@@ -34,9 +33,9 @@ struct PlacedPlane {
 class PlacedPlanes {
  public:
   /// Starts a tick: places the planes of `scene`. `hip` and `proxy` in device metres;
-  /// `radius_m` is that of the ball that touches the planes.
+  /// `radius_m` is that of the ball that touches the planes. `viewMoved`: the workspace changed.
   void place(const scene::SceneSnapshot& scene, Nanos now, const Vec3& hip, const Vec3& proxy,
-             double toolRadius_m, double radius_m) noexcept;
+             double toolRadius_m, double radius_m, bool viewMoved) noexcept;
   /// Ends a tick: bit i of `touched` is set when plane i holds the proxy.
   void remember(unsigned touched, const Vec3& proxy) noexcept;
   /// The hand may be anywhere: planes that are above it in the next tick are left out until it has left them.
@@ -47,7 +46,7 @@ class PlacedPlanes {
   bool remember(RenderMemory& out) const noexcept;
   /// Continues those of the planes that the memory has; nothing touches them.
   void resume(const RenderMemory& memory) noexcept;
-  /// In this tick a touched plane vanished, got another placement or another surface.
+  /// In this tick a touched plane vanished, got another placement, another surface or other details.
   bool changedInContact() const noexcept { return changedInContact_; }
 
   const PlacedPlane* begin() const noexcept { return planes_.data(); }
@@ -68,9 +67,11 @@ class PlacedPlanes {
     std::uint32_t placement = 0;
     Nanos placed = 0;
     Nanos releaseBegin = -1;
-    double depth_m = 0;  ///< of the HIP at the placement
+    double depth_m = 0;  ///< by which the placement brought the HIP below it
+    double under_m = 0;  ///< of the HIP below the surface, in the last tick
     scene::Surface surface;
-    double raised_m = 0;  ///< of the surface above the plane, in the last tick
+    std::array<double, 6> detail{};  ///< adhesion, texture, buzz
+    double raised_m = 0;             ///< of the surface above the plane, in the last tick
     bool touched = false;
     bool adheres = false;
     bool leftOut = false;  ///< the hand was found below it, and did not leave it yet
@@ -91,6 +92,7 @@ class PlacedPlanes {
   int memoryCount_ = 0;
   bool changedInContact_ = false;
   bool anew_ = false;
+  bool viewMoved_ = false;
   bool leavesOut_ = false;
 };
 

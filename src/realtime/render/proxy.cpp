@@ -45,11 +45,11 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   casts_ = 0;
   search_.visits = 0;
   if (!started_) startAt(now, hip);
-  planes_.place(*now.scene, now.time, hip, position_, toolRadius_, query_.radius());
+  planes_.place(*now.scene, now.time, hip, position_, toolRadius_, query_.radius(), viewMoved());
   query_.beginTick(now, before_, &planes_);
   const bool wasFree = contactSet_.count == 0;
   const BlendedSpring springBefore = contactSet_.spring;
-  if (contactChangedByCommand()) status |= kRenderGeometryJump;
+  commandChanged_ = contactChangedByCommand();
   const Vec3 from = position_;
   carry(hip, status);
   expectedTravel_m_ = (hip - hipBefore_).norm() + (position_ - from).norm();

@@ -87,6 +87,8 @@ class Proxy {
   const ContactSet& contactSet() const noexcept { return contactSet_; }
   /// Share of the contact force that is felt, 1 … 0: less than 1 where the work of a tick does not suffice.
   double feltShare() const noexcept { return share_; }
+  /// In this tick a command changed what is in contact: surfaces, planes, the workspace.
+  bool commandChanged() const noexcept { return commandChanged_; }
   PlacedPlanes& planes() noexcept { return planes_; }
   /// What the last tick did: casts, how often they tried one facet, and triangles that it examined in all.
   int casts() const noexcept { return casts_; }
@@ -164,11 +166,12 @@ class Proxy {
   void gatherSweeps(const Vec3& from) noexcept;
   bool pushByObjects(const Vec3& from, Pushers& pushers, std::uint32_t& status) noexcept;
   bool pushByDeformingFaces(const Vec3& from, Pushers& pushers, std::uint32_t& status) noexcept;
-  bool pushByPlanes(Pushers& pushers, std::uint32_t& status) noexcept;
+  bool pushByPlanes(Pushers& pushers) noexcept;
   void pushTo(const Vec3& place, const HalfSpace& face, Pushers& pushers) noexcept;
   void holdPlanesBack() noexcept;
   bool isJump(const PlacedObject& object) const noexcept;
   static bool isJump(const PlacedObject& object, std::uint32_t triangle) noexcept;
+  bool viewMoved() const noexcept;
   bool contactChangedByCommand() const noexcept;
   bool neighboursChangedByCommand(const BlendedSpring& before) const noexcept;
   bool surfacesNearChanged() const noexcept;
@@ -240,6 +243,7 @@ class Proxy {
   bool started_ = false;         // false until the first tick after a reset
   bool popthroughArmed_ = true;
   int overworked_ = 0;  // ticks in a row whose work was spent
+  bool commandChanged_ = false;
   double share_ = 1;
   bool released_ = false;       // contact released until the HIP leaves the surface
   bool carriedByJump_ = false;  // in this tick

@@ -38,14 +38,19 @@ bool Proxy::isJump(const PlacedObject& object, std::uint32_t triangle) noexcept 
   return longest > kLongestMotion_m;
 }
 
+bool Proxy::viewMoved() const noexcept {
+  return now_.scene != before_.scene &&
+         now_.scene->workspace.T_device_world.matrix() != before_.scene->workspace.T_device_world.matrix();
+}
+
 // The hand did not cause such a change of the force.
 bool Proxy::contactChangedByCommand() const noexcept {
-  if (contactSet_.count == 0 || now_.scene == before_.scene) return false;
+  if (now_.scene == before_.scene) return false;
+  if (planes_.changedInContact()) return true;
+  if (contactSet_.count == 0) return false;
   const scene::SceneSnapshot& now = *now_.scene;
   const scene::SceneSnapshot& before = *before_.scene;
-  if (now.faces != before.faces || planes_.changedInContact() ||
-      now.workspace.T_device_world.matrix() != before.workspace.T_device_world.matrix())
-    return true;
+  if (now.faces != before.faces || viewMoved()) return true;
   for (int i = 0; i < contactSet_.count; ++i) {
     const ContactConstraint& constraint = contactSet_.constraints[static_cast<std::size_t>(i)];
     if (constraint.object < 0) continue;
@@ -295,7 +300,7 @@ bool Proxy::pushUntilFree(const Vec3& from, std::uint32_t& status) noexcept {
     pushers.circling = k >= kMaxPushes / 4;
     bool pushed = pushByObjects(from, pushers, status);
     pushed = (!pushers.jammed && pushByDeformingFaces(from, pushers, status)) || pushed;
-    pushed = (!pushers.jammed && pushByPlanes(pushers, status)) || pushed;
+    pushed = (!pushers.jammed && pushByPlanes(pushers)) || pushed;
     if (!pushed) return true;
   }
   return false;
@@ -392,7 +397,7 @@ double Proxy::missedMove(const PlacedObject& object) noexcept {
 }
 
 // The back of a plane is solid without end: move the proxy to the front.
-bool Proxy::pushByPlanes(Pushers& pushers, std::uint32_t& status) noexcept {
+bool Proxy::pushByPlanes(Pushers& pushers) noexcept {
   bool pushed = false;
   for (const PlacedPlane& plane : planes_) {
     const HalfSpace face{plane.facet.normal, plane.facet.a, query_.radiusAt(plane.facet) + plane.facet.skin};
@@ -411,7 +416,6 @@ bool Proxy::pushByPlanes(Pushers& pushers, std::uint32_t& status) noexcept {
       pushTo(position_ + displacement, face, pushers);
     }
     pushed = true;
-    if (plane.insertionDepth_m > 0 && plane.state->recovery == 0) status |= kRenderGeometryJump;
   }
   return pushed;
 }

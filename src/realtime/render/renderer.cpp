@@ -1,6 +1,7 @@
 #include "realtime/render/renderer.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "base/time.h"
 #include "realtime/render/effects.h"
@@ -22,12 +23,12 @@ void scaleContact(double share, Rendering& out) {
 }
 
 // The springs of surfaces at rest. Nothing where something moves or where the surface changes.
-SpringState restingSprings(const ContactSet& contactSet, const Rendering& out) {
+SpringState restingSprings(const ContactSet& contactSet, bool commandChanged, const Rendering& out) {
   constexpr std::uint32_t kChanged =
       kRenderGeometryJump | kRenderReleased | kRenderPopthrough | kRenderWorkLimit | kRenderEnclosed;
   SpringState state;
   const BlendedSpring& spring = contactSet.spring;
-  if (!out.touching || (out.status & kChanged) != 0) return state;
+  if (!out.touching || commandChanged || (out.status & kChanged) != 0) return state;
   for (int i = 0; i < contactSet.count; ++i) {
     const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
     if (!constraint.rests || constraint.presence != 1) return state;
@@ -43,6 +44,21 @@ SpringState restingSprings(const ContactSet& contactSet, const Rendering& out) {
 
 }  // namespace
 
+// The contact force of the tick before.
+struct LastForce {
+  Vec3 force_N = Vec3::Zero();
+  double stiffness_N_per_m = 0;
+  Vec3 hip = Vec3::Zero();
+
+  // Keeps this one. True where it differs by more than the way of the hand explains.
+  bool stepped(const Vec3& force, double stiffness, const Vec3& place) noexcept {
+    constexpr double kStep_N = 0.1;
+    const LastForce before = std::exchange(*this, {force, stiffness, place});
+    const double byHand_N = std::max(stiffness, before.stiffness_N_per_m) * (place - before.hip).norm();
+    return (force - before.force_N).norm() > kStep_N + byHand_N;
+  }
+};
+
 struct Renderer::State {
   explicit State(const RenderOptions& o)
       : options(o), proxy(o), effects(o.contactVibrationPulls), passivity(o.bareDamping_Ns_per_m) {}
@@ -52,6 +68,7 @@ struct Renderer::State {
   Effects effects;
   Fields fields;
   PassivityController passivity;
+  LastForce last;
 };
 
 Renderer::Renderer(const RenderOptions& options) : state_(std::make_unique<State>(options)) {}
@@ -105,10 +122,13 @@ void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState
     applySurfaceLaw(contactSet, out.proxy_m, device.velocity_m_per_s, radius, out);
     scaleContact(s.proxy.feltShare(), out);
   }
-  const Vec3 brake = s.passivity.step(restingSprings(contactSet, out), hip, period_s);
+  const Vec3 brake =
+      s.passivity.step(restingSprings(contactSet, s.proxy.commandChanged(), out), hip, period_s);
   if ((out.status & kRenderReleased) == 0) {
     applyAdhesion(s.proxy.planes().adhesion(hip, radius), out);
   }
+  if (s.last.stepped(out.contactForce_N, contactSet.spring.kappa_N_per_m, hip) && s.proxy.commandChanged())
+    out.status |= kRenderGeometryJump;
   out.force_N = out.contactForce_N + brake;
   out.force_N += s.effects.force(scene, device, out, (out.normalForce_N + brake).dot(out.normal), now);
   out.force_N += s.fields.force(scene, hip, now);

@@ -143,19 +143,22 @@ Vec3 Guard::finite(const Vec3& force) noexcept {
   return Vec3::Zero();
 }
 
-// From the force before the jump to the one after it, within the slew rate also when the device is strong.
+// The step fades, within the slew rate also when the device is strong, and the force goes on: one that was
+// held back would be late, as in a loop with a delay, which shakes. It may return by itself meanwhile.
 // The blend advances in its first tick, so that the force still follows geometry that jumps in every tick.
 Vec3 Guard::blended(const Vec3& force, bool jump, Nanos dt) noexcept {
   if (jump) {
-    blendFrom_ = shaped_;
+    blendStep_ = shaped_ - force;
+    blendMost_N_ = shaped_.norm();
     blended_ = 0;
-    const double change_N = std::min((force - shaped_).norm(), 2 * options_.peakForce_N);
+    const double change_N = std::min(blendStep_.norm(), 2 * options_.peakForce_N);
     blendTime_ = std::max(options_.blend, base::toNanos(change_N / options_.slew_N_per_s));
     note(Trip::geometryJump);
   }
   if (blended_ >= blendTime_) return force;
   blended_ += dt;
-  return blendFrom_ + share(blended_, blendTime_) * (force - blendFrom_);
+  const Vec3 faded = force + (1 - share(blended_, blendTime_)) * blendStep_;
+  return faded * std::min(1.0, std::max(force.norm(), blendMost_N_) / std::max(faded.norm(), 1e-300));
 }
 
 Vec3 Guard::clamped(const Vec3& force) noexcept {

@@ -123,11 +123,12 @@ class Guard {
   int fastTicks_ = 0;
   bool waitForCalm_ = false;
 
-  Vec3 shaped_ = Vec3::Zero();   // force before the gain
-  Vec3 written_ = Vec3::Zero();  // by the last step
-  Vec3 blendFrom_ = Vec3::Zero();
-  Nanos blended_;    // since the last jump
-  Nanos blendTime_;  // of that jump
+  Vec3 shaped_ = Vec3::Zero();     // force before the gain
+  Vec3 written_ = Vec3::Zero();    // by the last step
+  Vec3 blendStep_ = Vec3::Zero();  // from the force after the last jump to the one before it
+  double blendMost_N_ = 0;         // the size of the one before it
+  Nanos blended_;                  // since the last jump
+  Nanos blendTime_;                // of that jump
   Phase phase_ = Phase::zero;
   Nanos inPhase_ = 0;
   double decayFrom_ = 0;

@@ -13,10 +13,10 @@ constexpr std::string_view kNoViewer = R"(<!doctype html>
 <meta charset="utf-8">
 <title>hapticd</title>
 <h1>hapticd is running</h1>
-<p>This program was built without its viewer. To include it, install Node.js 18 or later with npm, then run in the
-source folder:</p>
-<pre>cmake --preset release -DHAPTICD_WEB=ON
-cmake --build --preset release</pre>
+<p>This program was built without its viewer. To include it, run in the source folder:</p>
+<pre>scripts/install_packages.sh build viewer
+scripts/configure_programs.sh -DHAPTICD_WEB=ON
+cmake --build build/release --target hapticd</pre>
 <p>The data that the viewer shows is available without it: <a href="/api/state">/api/state</a> (JSON),
 <a href="/metrics">/metrics</a> (Prometheus).</p>
 </html>

@@ -246,5 +246,65 @@ TEST_F(Kicks, large_force_of_a_strong_device_ramps_as_slowly) {
   EXPECT_NEAR(last.y(), 2, 1e-6);
 }
 
+// A hand of 0.1 kg, held by 300 N/m and 2.5 N s/m, pressed into a wall of 1000 N/m: at rest, whatever small
+// change a client sends, and however often. A blend that held the force back would shake it by 6 mm.
+TEST_F(Kicks, a_hand_rests_while_a_client_sends_small_changes) {
+  enum Change { friction, view, sameMesh, plane };
+  constexpr double kStep_s = 1e-3 / 20;
+  for (const Change change : {friction, view, sameMesh, plane}) {
+    for (const int every : {4, 16, 33}) {
+      Loop world;
+      Guard protection{armed(), control, kMs};
+      const auto place = [&](double offset_m) {
+        world.send(
+            scene::SetPlane{.index = 0, .plane = {0, 1, 0, offset_m}, .stiffness = 1, .recoveryCycles = 1});
+      };
+      if (change == plane) {
+        place(0);
+      } else {
+        world.add(0, boxTriples(Vec3(-40, -30, -40), Vec3(40, 0, 40)));
+        world.send(scene::SetSurface{0, 1, 0, 0.3, 0.3});
+      }
+      Vec3 at(0.001, 0.003, 0.002);
+      Vec3 velocity = Vec3::Zero();
+      double lowest = 1;
+      double highest = -1;
+      for (int i = 0; i < 3000; ++i) {
+        const bool odd = i / every % 2 == 1;
+        if (i > 1500 && i % every == 0) {
+          if (change == friction) world.send(scene::SetSurface{0, 1, 0, odd ? 0.31 : 0.3, 0.3});
+          if (change == view)
+            world.send(scene::SetHapticOrigin{Vec3(odd ? 1e-5 : 0, 0, 0), Vec3::UnitZ(), 0});
+          if (change == plane) place(odd ? 1e-6 : 0);
+          if (change == sameMesh) {
+            world.send(scene::BeginBatch{});
+            world.send(scene::ClearMesh{0});
+            world.send(scene::SetVertices{0, 0, boxTriples(Vec3(-40, -30, -40), Vec3(40, 0, 40))});
+            world.send(scene::CommitBatch{});
+          }
+          world.publish();
+        }
+        world.tick(at);
+        GuardInput in;
+        in.force_N = world.out.force_N;
+        in.state = &world.state;
+        in.period = kMs;
+        in.geometryJump = (world.out.status & kRenderGeometryJump) != 0;
+        const Vec3 force = protection.step(in);
+        const Vec3 target(0.001, std::max(-0.006, 0.003 - 3e-5 * std::max(0, i - 700)), 0.002);
+        for (int k = 0; k < 20; ++k) {
+          velocity += kStep_s / 0.1 * (force + 300 * (target - at) - 2.5 * velocity);
+          at += kStep_s * velocity;
+        }
+        if (i < 2500) continue;
+        lowest = std::min(lowest, at.y());
+        highest = std::max(highest, at.y());
+      }
+      EXPECT_LT(lowest, -0.001) << "it presses";
+      EXPECT_LT(highest - lowest, 5e-5) << "change " << change << " every " << every << " ms";
+    }
+  }
+}
+
 }  // namespace
 }  // namespace hapticd::realtime::commands

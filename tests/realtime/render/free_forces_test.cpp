@@ -269,9 +269,42 @@ TEST_P(FreeForcesTest, new_plane_comes_in_under_the_hand) {
   scene.planes[0].recovery = 0;
   scene.planes[0].offset -= units() * 0.001;
   hand->show(scene.snapshot());
-  EXPECT_NEAR(at({0, 0, -0.002}).force_N.z(), 3.0, 1e-4);
-  EXPECT_NE(hand->now().status & kRenderGeometryJump, 0U);
-  EXPECT_EQ(at({0, 0, -0.002}).status, 0U);
+  EXPECT_NEAR(at({0, 0, -0.002}).force_N.z(), 2.0, 1e-4) << "what was felt before stays";
+  EXPECT_NEAR(at({0, 0, -0.002}).force_N.z(), 3.0, 1e-4) << "and the rest rises at 1 m/s";
+  EXPECT_EQ(hand->now().status, 0U);
+}
+
+// As with solids, a hand that a plane was put around by a command is not thrown out of it.
+TEST_P(FreeForcesTest, plane_placed_far_above_the_hand_is_left_out_until_the_hand_has_left_it) {
+  for (const double depth_m : {0.019, 0.021}) {
+    scene.planes.clear();
+    start({0, 0, 0});
+    scene.planes = {floor(depth_m)};
+    hand->show(scene.snapshot());
+    for (int i = 0; i < 30; ++i) at({0, 0, 0});
+    EXPECT_EQ(hand->now().force_N.z() > 0, depth_m < 0.02) << depth_m;
+    EXPECT_EQ(hand->now().status & kRenderEnclosed, depth_m < 0.02 ? 0U : kRenderEnclosed);
+    to({0, 0, 0.03}, 0.1);
+    EXPECT_GT(to({0, 0, depth_m - 0.001}, 0.1).force_N.z(), 0.5) << depth_m;
+  }
+}
+
+// adhesion  goes on holding while the plane moves, and ends with a report when it is switched off
+TEST_P(FreeForcesTest, adhesion_outlives_a_new_placement) {
+  scene.planes = {floor(0)};
+  scene.planes[0].adhesionNormal_N = 1.5;
+  start({0, 0, 0.001});
+  to({0, 0, -0.001});
+  const double pull_N = to({0, 0, 0.001}).force_N.z();
+  EXPECT_LT(pull_N, -0.5);
+  scene.planes[0].placement = 2;
+  scene.planes[0].offset += units() * 1e-6;
+  hand->show(scene.snapshot());
+  EXPECT_NEAR(at({0, 0, 0.001}).force_N.z(), pull_N, 0.01);
+  scene.planes[0].adhesionNormal_N = 0;
+  hand->show(scene.snapshot());
+  EXPECT_NEAR(at({0, 0, 0.001}).force_N.z(), 0, 1e-9);
+  EXPECT_NE(hand->now().status & kRenderGeometryJump, 0U) << "blended by the guard";
 }
 
 TEST_P(FreeForcesTest, plane_holds_on_up_to_its_adhesion) {
