@@ -44,8 +44,8 @@ void addDevices(CLI::App& app) {
   command->add_option("--haply-port", options->haplyPort, "Port of the Haply service")->capture_default_str();
   command->add_flag("--json", *json, kJsonText);
   command->footer(
-      "'hapticd serve --device DRIVER' uses a device. The package installs the udev rules; a build from source\n"
-      "has them in packaging/udev.");
+      "'hapticd serve --device DRIVER' uses a device. The package installs the udev rules;\n"
+      "a build from source has them in packaging/udev.");
   command->callback([options, json] {
     const std::vector<device::DriverReport> reports = device::findDevices(*options);
     if (*json) {
