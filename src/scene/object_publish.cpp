@@ -166,7 +166,9 @@ std::optional<ObjectTable::Move> ObjectTable::moveOf(Object& object, Nanos now) 
 // way: no gap opens between the parts of what turns.
 void ObjectTable::updateMotions(Nanos now) {
   constexpr double kTogether_m = 0.5e-6;
-  constexpr std::size_t kRecentLeaders = 4;
+  // Of those of one batch, so that thousands that move by themselves take no longer.
+  const std::size_t mostLeaders =
+      std::clamp<std::size_t>(65'536 / std::max<std::size_t>(changed_.size(), 1), 4, 64);
   std::vector<Move> moves;
   std::vector<std::size_t> leaders;
   for (const std::int32_t id : changed_) {
@@ -179,7 +181,7 @@ void ObjectTable::updateMotions(Nanos now) {
       const Affine led = moves[k].to * (moves[k].from.inverse() * move->from);
       return longestMove(led, move->to, move->bounds) <= kTogether_m * worldUnitsPerMetre_;
     };
-    const auto oldest = leaders.end() - static_cast<std::ptrdiff_t>(std::min(leaders.size(), kRecentLeaders));
+    const auto oldest = leaders.end() - static_cast<std::ptrdiff_t>(std::min(leaders.size(), mostLeaders));
     const auto leader = std::find_if(oldest, leaders.end(), asOne);
     if (leader == leaders.end()) {
       leaders.push_back(move->leader);

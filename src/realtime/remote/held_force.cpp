@@ -41,7 +41,7 @@ Vec3 HeldForceLaw::withinEnergy(const Vec3& force_N, const Vec3& velocity_m_per_
 }
 
 void HeldForceLaw::step(const HeldForce& wanted, const Vec3& hip_m, const Vec3& velocity_m_per_s, Nanos now,
-                        double step_s, double guardGain, RemoteRendering& out) noexcept {
+                        double step_s, double passedShare, RemoteRendering& out) noexcept {
   if (wanted.number != 0) {
     if (!started_) tank_ = EnergyTank(wanted.budget);
     started_ = true;
@@ -49,7 +49,7 @@ void HeldForceLaw::step(const HeldForce& wanted, const Vec3& hip_m, const Vec3& 
   }
   const double work = force_N_.dot(hip_m - lastHip_m_);
   lastHip_m_ = hip_m;
-  tank_.give(work > 0 ? work : work * guardGain);
+  tank_.give(work > 0 ? work : work * passedShare);
   if (tank_.energy_J() <= 0) spent_ = true;
   tank_.refill(step_s);
 

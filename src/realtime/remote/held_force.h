@@ -10,10 +10,10 @@ namespace hapticd::realtime {
 /// One per servo, called in its thread: noexcept, no allocation.
 class HeldForceLaw {
  public:
-  /// The force of this tick, also in `out`. `guardGain`: 0 … 1, the guard's in the last tick: a force that
-  /// was not written returns no energy.
+  /// The force of this tick, also in `out`. `passedShare`: 0 … 1, of the force of the last tick, by the
+  /// guard: a force that was not written returns no energy.
   void step(const HeldForce& wanted, const Vec3& hip_m, const Vec3& velocity_m_per_s, Nanos now,
-            double step_s, double guardGain, RemoteRendering& out) noexcept;
+            double step_s, double passedShare, RemoteRendering& out) noexcept;
   void reset() noexcept;
   /// The hand may be anywhere, now here: no force pushed it there, and a force ramps in.
   void restart(const Vec3& hip_m) noexcept;

@@ -556,10 +556,18 @@ void Proxy::popThrough(const Vec3& hip, std::uint32_t& status) noexcept {
   ObjectHit hit;
   ++casts_;
   if (query_.castPast(passable, position_, position_ + step * direction, hit)) return;
+  const Vec3 before = position_;
+  const bool wasHeld = std::exchange(wasHeld_, false);
   position_ += step * direction;
-  status |= kRenderPopthrough;
-  wasHeld_ = false;
   updateProxy(hip);
+  // The other side of a body that is thinner than the ball may throw it out: that would give the hand energy.
+  if ((position_ - hip).norm() > (before - hip).norm()) {
+    position_ = before;
+    wasHeld_ = wasHeld;
+    updateProxy(hip);
+    return;
+  }
+  status |= kRenderPopthrough;
   popthroughArmed_ = contactSet_.count == 0;
 }
 

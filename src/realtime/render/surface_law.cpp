@@ -73,8 +73,12 @@ void addNormalForces(const ContactSet& contactSet, const Vec3& proxy_m, const Ve
       share.contact->normal = constraint.halfSpace.normal;
       share.contact->point_m = proxy_m - toolRadius_m * constraint.halfSpace.normal;
     }
-    if (std::none_of(shares.data(), &share, harder)) out.touchedObject = constraint.object;
   }
+  const auto weaker = [](const Contact& a, const Contact& b) { return a.force_N.norm() < b.force_N.norm(); };
+  const Contact* const first = out.contacts.data();
+  const Contact* const last = first + out.contactCount;
+  if (const Contact* const hardest = std::max_element(first, last, weaker); hardest != last)
+    out.touchedObject = hardest->object;
   // Force shading turns the force and keeps its magnitude.
   const double shaded = out.normalForce_N.norm();
   if (!(shaded > 0)) return;

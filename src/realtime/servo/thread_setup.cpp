@@ -151,8 +151,8 @@ std::string realtimeRemedy() {
   std::vector<char> buffer(16384);
   getgrnam_r(kGroup, &entry, buffer.data(), buffer.size(), &found);
   if (found == nullptr)
-    return "install the package hapticd, or run 'sudo scripts/setup_group.sh' of its sources, and log in "
-           "again";
+    return "install the package hapticd and run 'sudo usermod -aG hapticd $USER', or run 'sudo "
+           "scripts/setup_group.sh' of its sources; then log in again";
   return "sudo usermod -aG hapticd $USER, and log in again";
 }
 

@@ -7,6 +7,15 @@
 #include "realtime/servo/flush_denormals.h"
 
 namespace hapticd::realtime {
+namespace {
+
+// How much of the force of a tick the guard let through.
+double passedShareOf(const TickReport& report) noexcept {
+  const double rendered_N = report.rendering.force_N.norm();
+  return rendered_N > 0 ? std::min(1.0, report.force_N.norm() / rendered_N) : report.guard.gain;
+}
+
+}  // namespace
 
 Tick::Tick(device::Device& device, base::Clock& clock, const TickOptions& options)
     : device_(device),
@@ -28,6 +37,7 @@ void Tick::operator()(const Pacing& pacing) noexcept {
   haveState_ = device_.read(report_.time, report_.device);
   const bool foundAnew = lookForHand();
   const Nanos period = report_.tick == 1 ? period_ : report_.timing.period;
+  passedShare_ = passedShareOf(report_);
   if (sight_.ever) {
     renderer_.step(scene, report_.device, report_.time, period, report_.rendering);
     addRemote(period, foundAnew);
@@ -104,7 +114,7 @@ bool Tick::handIsLost() const noexcept {
   return !sight_.ever || report_.time - sight_.time > kOutOfSight;
 }
 
-// The renderer goes on where the hand was last seen, and nobody is told that it touches there.
+// The renderer goes on where the hand was last seen, and no contact is reported.
 void Tick::feelNothing() noexcept {
   report_.rendering = Rendering{};
   report_.rendering.proxy_m = report_.rendering.scp_m = report_.device.position_m;
@@ -138,8 +148,8 @@ void Tick::addRemote(Nanos period, bool foundAnew) noexcept {
   const double step_s = base::toSeconds(std::min(period, 2 * period_));  // a late tick changes no more
   const RemoteHand hand{report_.device.position_m, report_.device.velocity_m_per_s, rendering.normalForce_N};
   rendering.force_N += remoteContacts_.step(input.contacts, hand, report_.time, step_s, out);
-  heldForce_.step(input.force, hand.position_m, hand.velocity_m_per_s, report_.time, step_s,
-                  report_.guard.gain, out);
+  heldForce_.step(input.force, hand.position_m, hand.velocity_m_per_s, report_.time, step_s, passedShare_,
+                  out);
   rendering.force_N += out.heldForce_N;
 }
 

@@ -126,7 +126,7 @@ class Tick {
   void remember(MemoryRing* ring) noexcept;
   bool nothingStreamed() noexcept;
 
-  // When a device last told a position, and which.
+  // Time and place of the last position that the device reported.
   struct Sight {
     bool ever = false;
     bool calibrated = true;
@@ -159,6 +159,7 @@ class Tick {
   std::atomic<std::uint64_t> rememberFrom_{0};
   MemoryRing* rememberedTo_ = nullptr;
   ServoMemory memory_;      // for that ring
+  double passedShare_ = 0;  // of the force of the last tick
   bool haveState_ = false;  // the device delivered a state in this tick
   bool written_ = true;     // the device accepted the last force
   bool discarded_ = false;  // the force of this tick was too old: zero was written
