@@ -36,6 +36,15 @@ recording=$source_dir/testdata/recordings/all_commands_law2.haptics
 refused 1 "--force" "$hapticd" export "$recording" --to csv -o "$work/out.csv"
 "$hapticd" export "$recording" --to csv -o "$work/out.csv" --force
 
+# Nor is what is still to be read, also with it.
+cp "$recording" "$work/kept.haptics"
+ln -s kept.haptics "$work/link"
+for out in kept.haptics link; do
+  refused 1 "is the file to read" "$hapticd" export "$work/kept.haptics" --to vrpn -o "$work/$out" --force
+  refused 1 "is the file to read" "$hapticd" render --session "$work/kept.haptics" --out "$work/$out" --force
+done
+cmp "$recording" "$work/kept.haptics"
+
 "$hapticd" info "$recording" >"$work/info"
 grep -q '^device      ' "$work/info" && grep -q '^  force     at most [0-9.]* N' "$work/info" && grep -q '^command     SetVertices, 4 times' "$work/info" ||
   { cat "$work/info"; exit 1; }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <fstream>
 
 #include "net/loopback.h"
 
@@ -41,6 +42,12 @@ TEST_F(LocalSocket, ThePathIsFreeAfterDestructionAlsoWithinItsCallback) {
   ASSERT_TRUE(pumpUntil(loop_, [&] { return listener == nullptr; }));
   EXPECT_FALSE(std::filesystem::exists(path_));
   const LocalListener again(loop_, path_, [](Connection) {});
+}
+
+TEST_F(LocalSocket, AFileAtItsPathStays) {
+  std::ofstream(path_) << "notes";
+  EXPECT_THROW(LocalListener(loop_, path_, [](Connection) {}), Error);
+  EXPECT_EQ(std::filesystem::file_size(path_), 5U);
 }
 
 #ifndef HAPTICD_SANITIZED
