@@ -158,6 +158,30 @@ TEST_P(ObjectTest, hand_that_is_not_finite_gives_no_force) {
   EXPECT_NEAR(at({0.001, 0.002, -0.001}).force_N.z(), 1, 1e-3);
 }
 
+// Two walls of one object press with 1.0 N each, 1.41 N in all, and a floor of another one with 1.2 N.
+TEST_P(ObjectTest, touched_is_the_object_that_presses_hardest) {
+  const auto wall = [](int axis) {
+    TriangleMesh mesh = plane(0.05, 2);
+    for (auto& v : mesh.vertices)
+      v = axis == 0 ? geometry::Vec3f(v.z(), v.x(), v.y()) : geometry::Vec3f(v.y(), v.z(), v.x());
+    return mesh;
+  };
+  add(plane(0.05, 2), surface());
+  TriangleMesh corner = wall(0);
+  const TriangleMesh other = wall(1);
+  const auto first = static_cast<std::uint32_t>(corner.vertices.size());
+  corner.vertices.insert(corner.vertices.end(), other.vertices.begin(), other.vertices.end());
+  for (const auto& t : other.triangles)
+    corner.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  add(corner, surface());
+  start({0.003, 0.003, 0.003});
+  const Rendering& r = to({-0.001, -0.001, -0.0012});
+  ASSERT_EQ(r.contactCount, 2U);
+  for (std::uint32_t i = 0; i < r.contactCount; ++i)
+    EXPECT_NEAR(r.contacts[i].force_N.norm(), r.contacts[i].object == 0 ? 1.2 : std::sqrt(2.0), 1e-2);
+  EXPECT_EQ(r.touchedObject, 1);
+}
+
 // Many small objects around the HIP; only the touched one exerts a force.
 TEST_P(ObjectTest, one_of_many_objects_is_felt) {
   const double units = GetParam().worldUnitsPerMetre;
