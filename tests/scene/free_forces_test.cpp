@@ -301,6 +301,10 @@ TEST_F(Forces, WhatIsSetWhileAnotherRampsOutIsItsOwn) {
   say(SetConstraintEnabled{true}, kOther);
   publish();
   EXPECT_EQ(scene_->fields.size(), 1U) << "its mode is none";
+  say(SetConstraintMode{2}, kOther);
+  publish();
+  ASSERT_EQ(scene_->fields.size(), 2U);
+  EXPECT_EQ(scene_->fields[1].origin, Vec3(1, 0, 0)) << "what it set meanwhile";
 }
 
 TEST_F(Forces, PlanesAreInWorldUnitsWithStockSurfaces) {
