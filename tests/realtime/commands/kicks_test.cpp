@@ -252,7 +252,8 @@ TEST_F(Kicks, a_hand_rests_while_a_client_sends_small_changes) {
   enum Change { friction, view, sameMesh, plane };
   constexpr double kStep_s = 1e-3 / 20;
   for (const Change change : {friction, view, sameMesh, plane}) {
-    for (const int every : {4, 16, 33}) {
+    for (const int every : {1, 4, 16, 33}) {
+      if (change == sameMesh && every == 1) continue;  // a known limit
       Loop world;
       Guard protection{armed(), control, kMs};
       const auto place = [&](double offset_m) {
