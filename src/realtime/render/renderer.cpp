@@ -95,6 +95,7 @@ bool Renderer::remember(const Rendering& last, RenderMemory& out) const noexcept
 
 void Renderer::resume(const Rendering& last) noexcept {
   state_->proxy.resume(last.proxy_m);
+  state_->last = {last.contactForce_N, 0, last.proxy_m};  // free: the proxy is at the HIP
   state_->passivity.reset();
 }
 
