@@ -13,13 +13,12 @@
 #include "net/local_socket.h"
 #include "print_json.h"
 #include "token_file.h"
+#include "wire/messages.h"
 
 namespace hapticd::apps {
 namespace {
 
 using namespace std::chrono_literals;
-
-constexpr char kFaultOfDevice[] = "the device gives no force";  // the begin of the server's text
 
 struct StopOptions {
   std::string server = "Phantom@localhost";
@@ -77,7 +76,7 @@ int run(const StopOptions& options) {
   client.onText([&](const TextReport& text) {
     if (text.severity != Severity::error) return;
     // A fault of the device is no answer, but the reason to stop.
-    (text.text.starts_with(kFaultOfDevice) ? remark : refusal) = text.text;
+    (text.text.starts_with(wire::kNoForceText) ? remark : refusal) = text.text;
   });
   client.onToRoom([&](const ToRoomReport&) { answered = true; });
   if (options.rearm) {

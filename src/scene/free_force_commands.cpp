@@ -80,7 +80,7 @@ Effect effectFrom(const EffectKind& kind, const DefineEffect& c, const SceneConf
   return e;
 }
 
-// The servo follows some that ramp out, of each kind.
+// The oldest goes first: the servo follows 16 fields that ramp out.
 template <class Force>
 void addLeaving(OwnedForce<Force>&& force, std::vector<OwnedForce<Force>>& leaving) {
   constexpr std::size_t kMost = 8;

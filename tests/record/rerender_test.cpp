@@ -164,7 +164,7 @@ TEST_F(Rerender, RecordingsWithoutPauseAreRefused) {
     peer.forget();
     peer.send(wire::RecordingControl{
         .record = 1, .name = std::string_view(stem + "last-" + std::to_string(i) + ".haptics")});
-    ASSERT_TRUE(peer.untilText("reco"));
+    ASSERT_TRUE(peer.until([&] { return !peer.texts().empty(); }));
     begun = std::any_of(peer.texts().begin(), peer.texts().end(), [](const wire::Text& text) {
       return text.text.text.find("recording to") != std::string::npos;
     });

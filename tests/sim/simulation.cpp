@@ -161,12 +161,12 @@ Simulation::Simulation(const Script& script, bool verbose)
               [this](const Vec3& force_N) {
                 for (int i = 0; i < 3; ++i) hash_.add(force_N[i]);
               },
-          .buttonsChanged = [this](std::uint32_t buttons) { buttons_.emplace_back(clock_.now(), buttons); },
+          .buttonsChanged = [this](std::uint32_t buttons) { buttons_.emplace_back(clock_.time(), buttons); },
           .finding = [this](const auto& text) { finding(text); }},
       scopedBench_(bench_),
       networkDice_(script.seed + 13),
       listeners_(scheduler_, clock_, [this](const auto& text) { finding(text); }) {
-  scheduler_.onSuspended = [this] { judge_.onSuspended(clock_.now()); };
+  scheduler_.onSuspended = [this] { judge_.onSuspended(clock_.time()); };
   auto& network = scheduler_.options;
   network.delay = script.networkDelay;
   network.windowBytes = script.window;
@@ -208,23 +208,23 @@ void Simulation::finding(const std::string& text) {
   constexpr std::size_t kMost = 5;
   if (over_) return;
   hash_.add(text);
-  if (outcome_.findings.empty()) outcome_.firstFinding = clock_.now();
+  if (outcome_.findings.empty()) outcome_.firstFinding = clock_.time();
   if (outcome_.findings.size() < kMost) outcome_.findings.push_back(text);
-  if (verbose_) std::printf("%12.6f FINDING %s\n", base::toSeconds(clock_.now()), text.c_str());
+  if (verbose_) std::printf("%12.6f FINDING %s\n", base::toSeconds(clock_.time()), text.c_str());
 }
 
 void Simulation::line(const std::string& text) {
-  hash_.add(static_cast<std::uint64_t>(clock_.now()));
+  hash_.add(static_cast<std::uint64_t>(clock_.time()));
   hash_.add(text);
-  if (verbose_) std::printf("%12.6f %s\n", base::toSeconds(clock_.now()), text.c_str());
+  if (verbose_) std::printf("%12.6f %s\n", base::toSeconds(clock_.time()), text.c_str());
 }
 
 // Within the limits of docs/limits.md, to which what the server itself reports is added.
 void Simulation::logged(const std::string& text) {
   constexpr std::size_t kMost = 300'000;  // in a second
   line(text);
-  if (clock_.now() - logSecond_ >= 1'000 * kMs) {
-    logSecond_ = clock_.now();
+  if (clock_.time() - logSecond_ >= 1'000 * kMs) {
+    logSecond_ = clock_.time();
     logBytes_ = 0;
   }
   logBytes_ += text.size();
@@ -480,7 +480,7 @@ void Simulation::pauseReader(Dice& dice) {
 
 void Simulation::resumeReader() {
   wakesReader_ = false;
-  if (reader_->open() && clock_.now() < script_.length - 1'000 * kMs) reader_->resumeReading();
+  if (reader_->open() && clock_.time() < script_.length - 1'000 * kMs) reader_->resumeReading();
 }
 
 // A stream of poses begins with a step, as when a hand tracker finds its object again.
@@ -528,7 +528,7 @@ std::optional<Judge::Top> Simulation::top() {
 
 // Grows while the server can carry out commands.
 Nanos Simulation::sceneTime() {
-  return clock_.now() - scheduler_.netStalled() - scheduler_.sceneStalled();
+  return clock_.time() - scheduler_.netStalled() - scheduler_.sceneStalled();
 }
 
 void Simulation::upload(Dice& dice) {
@@ -539,7 +539,7 @@ void Simulation::upload(Dice& dice) {
   const std::uint64_t bytes = uploader_->unread() + messages * kVertices * sizeof(Vec3f);
   const Nanos roundTrip = 2 * (script_.networkDelay + script_.networkJitter);
   const Nanos travel = static_cast<Nanos>(bytes / script_.window + 1) * roundTrip;
-  if (clock_.now() + travel > script_.length) return;
+  if (clock_.time() + travel > script_.length) return;
   for (std::size_t i = 0; i < messages; ++i) {
     wire::MeshVertices vertices;
     vertices.object = kUploaded;
@@ -606,7 +606,7 @@ void Simulation::vanish(Dice& dice) {
 void Simulation::endForcesWithin(Nanos lasts) {
   const Nanos stalled = serverStalled();
   endOfForces_ =
-      std::max(endOfForces_ + stalled - std::exchange(stalledThen_, stalled), clock_.now() + lasts);
+      std::max(endOfForces_ + stalled - std::exchange(stalledThen_, stalled), clock_.time() + lasts);
 }
 
 void Simulation::failDisk(Dice& dice) {
@@ -640,14 +640,14 @@ void Simulation::runOutOfMemory(Dice& dice) {
   memoryFailed_ = true;
   ++bench_.injected;
   const Nanos length = dice.between(10 * kMs, 3'000 * kMs);
-  memoryShortUntil_ = std::max(memoryShortUntil_, clock_.now() + length + 5'000 * kMs);
+  memoryShortUntil_ = std::max(memoryShortUntil_, clock_.time() + length + 5'000 * kMs);
   after(length, [this] { scheduler_.limitMemory(0); });
 }
 
 // The sockets that the server has stay.
 void Simulation::runOutOfDescriptors(Dice& dice) {
   constexpr Nanos kApart = 4'000 * kMs;  // so that those who came are connected in between
-  if (noDescriptors_ || (descriptorsBack_ && clock_.now() - *descriptorsBack_ < kApart)) return;
+  if (noDescriptors_ || (descriptorsBack_ && clock_.time() - *descriptorsBack_ < kApart)) return;
   noDescriptors_ = true;
   ++bench_.injected;
   const std::size_t left = dice.below(3);
@@ -688,14 +688,14 @@ void Simulation::returnDescriptors() {
   if (!std::exchange(noDescriptors_, false)) return;
   scheduler_.limitSockets(kServerLoop, std::nullopt);
   if (files_.failures.open == EMFILE) files_.failures.open = 0;
-  const Nanos back = clock_.now();
+  const Nanos back = clock_.time();
   descriptorsBack_ = back;
   listeners_.onDescriptorsBack();
   checkGreeted(back, scheduler_.netStalled());
 }
 
 bool Simulation::shortOfDescriptors() {
-  return noDescriptors_ || (descriptorsBack_ && clock_.now() - *descriptorsBack_ < 500 * kMs);
+  return noDescriptors_ || (descriptorsBack_ && clock_.time() - *descriptorsBack_ < 500 * kMs);
 }
 
 // Whoever came before is greeted soon after descriptors are back; one with datagrams after its next request.
@@ -703,7 +703,7 @@ void Simulation::checkGreeted(Nanos back, Nanos stalled) {
   constexpr Nanos kDatagrams = 3'000 * kMs;
   if (noDescriptors_ || descriptorsBack_ != back) return;
   const Nanos soon = 300 * kMs + 10 * script_.networkDelay + 5 * script_.networkJitter;
-  const Nanos passed = clock_.now() - back - (scheduler_.netStalled() - stalled);
+  const Nanos passed = clock_.time() - back - (scheduler_.netStalled() - stalled);
   const auto check = [&](SimClient& client, Nanos limit) {
     if (passed >= limit && client.present() && !client.connected() && client.asked() < back)
       finding("client '" + client.name() + "' came while the server was short of descriptors, and " +
@@ -729,15 +729,15 @@ void Simulation::stream(Dice& dice) {
   Streamer* const streamer = streamers_.back().get();
   streamer->connect();
   byPort_[streamer->local().port] = streamer;
-  const Nanos end = clock_.now() + dice.between(50 * kMs, 3'000 * kMs);
+  const Nanos end = clock_.time() + dice.between(50 * kMs, 3'000 * kMs);
   const Nanos period = dice.between(5 * kMs, 60 * kMs);
-  for (Nanos at = period; clock_.now() + at < end; at += dice.between(period / 2, 2 * period)) {
+  for (Nanos at = period; clock_.time() + at < end; at += dice.between(period / 2, 2 * period)) {
     after(at, [this, streamer] {
       if (streamer->ready && streamer->connected() && !bench_.quiet) streamer->next();
     });
   }
   const std::uint64_t seed = dice.below(~std::uint64_t{0});
-  after(end - clock_.now(), [this, streamer, seed] {
+  after(end - clock_.time(), [this, streamer, seed] {
     Dice ending(seed);
     endStream(*streamer, ending);
   });
@@ -812,7 +812,7 @@ void Simulation::visit(Dice& dice) {
 void Simulation::ask(const std::string& target, Visit::Manner manner, Dice& dice) {
   visits_.push_back(
       std::make_unique<Visit>(*clients_, target, manner, dice.below(~std::uint64_t{0}),
-                              [this, target, asked = clock_.now(), seed = dice.below(~std::uint64_t{0})](
+                              [this, target, asked = clock_.time(), seed = dice.below(~std::uint64_t{0})](
                                   const Visit::Answer& answer) { onAnswer(target, asked, answer, seed); }));
 }
 
@@ -838,7 +838,7 @@ void Simulation::onAnswer(const std::string& target, Nanos asked, const Visit::A
             " after tick " + std::to_string(stateTick_));
   if (tick > stateTick_) {
     stateTick_ = tick;
-    stateKnownAt_ = clock_.now();
+    stateKnownAt_ = clock_.time();
   }
   constexpr std::uint64_t kMostQueued = (std::uint64_t{8} << 20) + 65'536;
   for (const auto& client : state["clients"]) {
@@ -849,7 +849,7 @@ void Simulation::onAnswer(const std::string& target, Nanos asked, const Visit::A
   const Nanos old = asked - 5'000 * kMs - 2 * script_.adversity.longestSceneStall - serverStalled();
   while (revisions_.size() > 1 && revisions_[1].first < old) revisions_.pop_front();
   const auto& scene = state["scenes"][0];
-  if (clock_.now() >= memoryShortUntil_ && !revisions_.empty() && revisions_.front().first < old &&
+  if (clock_.time() >= memoryShortUntil_ && !revisions_.empty() && revisions_.front().first < old &&
       scene.contains("revision") && scene["revision"].get<std::uint64_t>() < revisions_.front().second)
     finding("the web port shows the scene of revision " + scene["revision"].dump() + ", long after " +
             std::to_string(revisions_.front().second));
@@ -866,14 +866,14 @@ void Simulation::onAnswer(const std::string& target, Nanos asked, const Visit::A
 void Simulation::checkVisits() {
   const Nanos longest = 10'000 * kMs + 2 * script_.adversity.longestSceneStall;
   for (const auto& visit : visits_) {
-    if (visit->waits() && clock_.now() - visit->asked() > longest + serverStalled())
+    if (visit->waits() && clock_.time() - visit->asked() > longest + serverStalled())
       finding("the web port has not answered a request of " + visit->target() + " for " +
-              std::to_string((clock_.now() - visit->asked()) / kMs) + " ms");
+              std::to_string((clock_.time() - visit->asked()) / kMs) + " ms");
   }
 }
 
 void Simulation::beat() {
-  revisions_.emplace_back(clock_.now(), operators_.front()->lastRevision);
+  revisions_.emplace_back(clock_.time(), operators_.front()->lastRevision);
   const auto one = [](Listener& client) {
     if (!client.connected() || !client.beats) return;
     client.send(wire::Heartbeat{});
@@ -919,7 +919,7 @@ void Simulation::compare(const scene::SceneDescription& description, bool last) 
     };
     std::int64_t& seen = seen_[batcher->first];
     // A commit that finds no memory is carried out in part, with a text.
-    const bool together = number(*a) == number(*b) || batcher->sent == 0 || clock_.now() < memoryShortUntil_;
+    const bool together = number(*a) == number(*b) || batcher->sent == 0 || clock_.time() < memoryShortUntil_;
     if (!together || number(*a) < seen || number(*a) > batcher->sent || (last && number(*a) != batcher->sent))
       finding("objects of '" + batcher->name() + "' are at the batches " + std::to_string(number(*a)) +
               " and " + std::to_string(number(*b)) + ", earlier " + std::to_string(seen) + ", sent " +
@@ -948,7 +948,7 @@ void Simulation::checkEnd() {
   if (bench_.lost ? op.tickReports == 0 : op.lastTick + 100 < judge_.ticks())
     finding("the newest tick that was reported is " + std::to_string(op.lastTick) + " of " +
             std::to_string(judge_.ticks()));
-  if (!bench_.lost && judge_.sinceRead(clock_.now()) > 100 * kMs)
+  if (!bench_.lost && judge_.sinceRead(clock_.time()) > 100 * kMs)
     finding("the servo does not tick at the end");
   if (!bench_.lost && (op.guard.stopped != 0 || op.guard.latched != 0))
     finding("the forces are still off after the last re-arm");
@@ -959,7 +959,7 @@ void Simulation::checkEnd() {
     }
     for (std::size_t i = 0; i < client.buttons.size() && running; ++i) {
       // The newest change may still be on its way.
-      const Nanos since = clock_.now() - 60 * kMs;
+      const Nanos since = clock_.time() - 60 * kMs;
       bool known = (client.kinds & wire::kReportButton) == 0;
       for (auto state = buttons_.rbegin(); state != buttons_.rend() && !known; ++state) {
         known = client.buttons[i] == ((state->second >> i) & 1U);
@@ -1011,7 +1011,7 @@ void Simulation::checkReplay() {
   constexpr Nanos kShown = 200 * kMs;  // how far a paused replay goes on to show a tick
   // The clients learn that their server ended.
   over_ = true;
-  scheduler_.runUntil(clock_.now() + 2'000 * kMs);
+  scheduler_.runUntil(clock_.time() + 2'000 * kMs);
   over_ = false;
   const ReplayedScene scene(kRecording);
   auto player = std::make_unique<server::Player>(server::ReplayOptions{.file = kRecording});

@@ -27,8 +27,6 @@ using geometry::Affine;
 inline constexpr int kMaxVisits = 8192;
 using geometry::kGapTolerance_m;
 using geometry::kLargestGapTolerance_m;
-/// A pose that moves a part near the proxy farther is a jump.
-inline constexpr double kLongestMotion_m = 0.020;
 
 /// An object in this tick and, if it existed, in the previous one.
 struct PlacedObject {

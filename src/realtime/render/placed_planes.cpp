@@ -12,7 +12,6 @@ namespace {
 
 constexpr double kPlaneSkin = 1e-9;  // of the largest coordinate of the HIP
 constexpr double kTau = 2 * M_PI;
-constexpr double kDeepest_m = 0.020;  // below a plane that a command brings there, as with objects
 constexpr double kFastest_m_per_s = 1;
 
 std::array<double, 6> detailOf(const scene::Plane& plane) noexcept {
@@ -117,8 +116,8 @@ bool PlacedPlanes::placeOne(const geometry::Affine& T_world_device, Nanos now, c
   Memory& memory = memoryOf(plane, now, depth_m, fresh);
   if (anew_) memory.touched = memory.adheres = false;
   // As with objects, the hand is not lifted out of what came around it.
-  const bool cameDeep =
-      fresh ? memory.depth_m > kDeepest_m : viewMoved_ && memory.under_m == 0 && depth_m > kDeepest_m;
+  const bool cameDeep = fresh ? memory.depth_m > kLongestMotion_m
+                              : viewMoved_ && memory.under_m == 0 && depth_m > kLongestMotion_m;
   memory.leftOut = (anew_ || cameDeep || memory.leftOut) && depth_m > 0;
   leavesOut_ |= memory.leftOut;
   memory.under_m = 0;

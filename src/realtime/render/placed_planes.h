@@ -13,6 +13,9 @@
 
 namespace hapticd::realtime {
 
+/// A command that moves a part near the proxy farther is a jump.
+inline constexpr double kLongestMotion_m = 0.020;
+
 using base::Nanos;
 
 /// One plane of the scene in this tick.

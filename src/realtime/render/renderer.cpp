@@ -128,8 +128,8 @@ void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState
   if ((out.status & kRenderReleased) == 0) {
     applyAdhesion(s.proxy.planes().adhesion(hip, radius), out);
   }
-  if (s.last.stepped(out.contactForce_N, contactSet.spring.kappa_N_per_m, hip) && s.proxy.commandChanged())
-    out.status |= kRenderGeometryJump;
+  const bool stepped = s.last.stepped(out.contactForce_N, contactSet.spring.kappa_N_per_m, hip);
+  if (stepped && s.proxy.commandChanged()) out.status |= kRenderGeometryJump;
   out.force_N = out.contactForce_N + brake;
   out.force_N += s.effects.force(scene, device, out, (out.normalForce_N + brake).dot(out.normal), now);
   out.force_N += s.fields.force(scene, hip, now);

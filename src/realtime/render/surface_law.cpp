@@ -64,11 +64,10 @@ void addNormalForces(const ContactSet& contactSet, const Vec3& proxy_m, const Ve
     share.contact->force_N += share.normal_N * constraint.forceDirection;
     out.normalForce_N += share.normal_N * constraint.forceDirection;
     unshaded += share.normal_N * constraint.halfSpace.normal;
-    const auto harder = [&](const ContactShare& other) { return other.normal_N >= share.normal_N; };
-    const auto firstOfObject = [&](const ContactShare& other) {
-      return other.contact == share.contact && harder(other);
+    const auto harder = [&](const ContactShare& other) {
+      return other.contact == share.contact && other.normal_N >= share.normal_N;
     };
-    if (std::none_of(shares.data(), &share, firstOfObject)) {
+    if (std::none_of(shares.data(), &share, harder)) {
       share.contact->triangle = constraint.triangle;
       share.contact->normal = constraint.halfSpace.normal;
       share.contact->point_m = proxy_m - toolRadius_m * constraint.halfSpace.normal;

@@ -37,10 +37,10 @@ void Tick::operator()(const Pacing& pacing) noexcept {
   haveState_ = device_.read(report_.time, report_.device);
   const bool foundAnew = lookForHand();
   const Nanos period = report_.tick == 1 ? period_ : report_.timing.period;
-  passedShare_ = passedShareOf(report_);
+  const double passedShare = passedShareOf(report_);
   if (sight_.ever) {
     renderer_.step(scene, report_.device, report_.time, period, report_.rendering);
-    addRemote(period, foundAnew);
+    addRemote(period, foundAnew, passedShare);
   }
   if (handIsLost()) feelNothing();
   report_.force_N = guard_.step(guardInput());
@@ -122,7 +122,7 @@ void Tick::feelNothing() noexcept {
 }
 
 // Nothing streamed so far, and nothing left of it, costs two comparisons.
-void Tick::addRemote(Nanos period, bool foundAnew) noexcept {
+void Tick::addRemote(Nanos period, bool foundAnew, double passedShare) noexcept {
   const RemoteInput& input = remoteInput_.read();
   if (input.contacts.number != contactsSeen_ || input.force.number != forceSeen_) {
     if (StreamRing* ring = recordStreamTo_.load(std::memory_order_acquire)) ring->push({report_.tick, input});
@@ -148,7 +148,7 @@ void Tick::addRemote(Nanos period, bool foundAnew) noexcept {
   const double step_s = base::toSeconds(std::min(period, 2 * period_));  // a late tick changes no more
   const RemoteHand hand{report_.device.position_m, report_.device.velocity_m_per_s, rendering.normalForce_N};
   rendering.force_N += remoteContacts_.step(input.contacts, hand, report_.time, step_s, out);
-  heldForce_.step(input.force, hand.position_m, hand.velocity_m_per_s, report_.time, step_s, passedShare_,
+  heldForce_.step(input.force, hand.position_m, hand.velocity_m_per_s, report_.time, step_s, passedShare,
                   out);
   rendering.force_N += out.heldForce_N;
 }

@@ -118,7 +118,7 @@ class Tick {
   bool lookForHand() noexcept;
   bool handIsLost() const noexcept;
   void feelNothing() noexcept;
-  void addRemote(Nanos period, bool foundAnew) noexcept;
+  void addRemote(Nanos period, bool foundAnew, double passedShare) noexcept;
   GuardInput guardInput() const noexcept;
   void write(Nanos started, std::uint32_t overtakes) noexcept;
   void discardForce() noexcept;
@@ -159,7 +159,6 @@ class Tick {
   std::atomic<std::uint64_t> rememberFrom_{0};
   MemoryRing* rememberedTo_ = nullptr;
   ServoMemory memory_;      // for that ring
-  double passedShare_ = 0;  // of the force of the last tick
   bool haveState_ = false;  // the device delivered a state in this tick
   bool written_ = true;     // the device accepted the last force
   bool discarded_ = false;  // the force of this tick was too old: zero was written

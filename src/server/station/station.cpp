@@ -82,7 +82,7 @@ BlackBoxFiles blackBoxFiles(const DeviceConfig& config, const LimitsConfig& limi
 }
 
 wire::Text healthText(const std::string& fault) {
-  return {.severity = wire::kTextError, .level = 0, .text = "the device gives no force: " + fault};
+  return {.severity = wire::kTextError, .level = 0, .text = std::string(wire::kNoForceText) + ": " + fault};
 }
 
 }  // namespace

@@ -9,6 +9,8 @@ namespace hapticd::wire {
 inline constexpr std::uint32_t kTextNormal = 0;
 inline constexpr std::uint32_t kTextWarning = 1;
 inline constexpr std::uint32_t kTextError = 2;
+/// The begin of the text about a device with a fault, which each client gets as it subscribes.
+inline constexpr std::string_view kNoForceText = "the device gives no force";
 
 struct Ping {
   static constexpr MessageInfo kInfo{"vrpn_Base ping_message",
