@@ -93,8 +93,11 @@ int run(const DemoOptions& options) {
   const std::unique_ptr<server::Server> server = startServer(options, config);
   const std::unique_ptr<zeroconf::Announcer> announcer = announceOnNetwork(*server, config);
   listNetworkOnPage(*server);
-  stopper.watch(*server);
   const auto web = server->webAddress();
+  if (!net::isLoopback(server->address().address) || (web && !net::isLoopback(web->address)))
+    std::fprintf(stderr,
+                 "hapticd: everybody who reaches this machine may lead the demo; its hand hurts nobody\n");
+  stopper.watch(*server);
   const std::string page = web ? "http://" + web->text() + "/" : "(no page: --http off)";
   std::atomic<bool> ending{false};
   std::exception_ptr failure;

@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "base/printable.h"
 #include "client/link.h"
 #include "commands.h"
 #include "hapticd/client.h"
@@ -39,8 +40,8 @@ int run(const MarkOptions& options) {
       confirmed = confirmed || (marker && marker->text.text == options.text);
     } else if (arrival.kind == wire::kindOf<wire::Text>) {
       const auto text = wire::decode<wire::Text>(arrival.bytes);
-      if (text && text->severity == wire::kTextError) refusal = text->text.text;
-      if (text && text->severity == wire::kTextNormal) remark = text->text.text;
+      if (text && text->severity == wire::kTextError) refusal = base::printable(text->text.text);
+      if (text && text->severity == wire::kTextNormal) remark = base::printable(text->text.text);
     }
   };
   const auto end = std::chrono::steady_clock::now() + kTimeout;

@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 
+#include "base/printable.h"
 #include "client/link.h"
 #include "commands.h"
 #include "hapticd/client.h"
@@ -17,6 +18,7 @@
 #include "record/vrpn_log.h"
 #include "sample_of.h"
 #include "stop_signals.h"
+#include "token_file.h"
 
 namespace hapticd::apps {
 namespace {
@@ -29,6 +31,7 @@ struct RecordOptions {
   bool end = false;
   std::string server;
   std::string file;
+  std::string tokenFile;
   double seconds = 0;
   double rate_Hz = 1000;
   bool force = false;
@@ -117,7 +120,7 @@ std::size_t recordTicks(record::SampleFile& file, const RecordOptions& options) 
 // Begins and ends a recording of the server itself; it answers by texts.
 class ServerRecording {
  public:
-  explicit ServerRecording(const std::string& server)
+  ServerRecording(const std::string& server, const std::string& token)
       : server_(server),
         address_(client::parseDevice(server)),
         link_(address_.server, {.reconnect = false, .adoptNames = true}),
@@ -125,6 +128,7 @@ class ServerRecording {
     if (!link_.waitConnected(kTimeout)) throw ConnectError(address_.device + ": " + link_.whyNotConnected());
     if (!link_.waitHeard(device_, kTimeout))
       throw ConnectError("no device '" + address_.device + "' answers at " + address_.server.text());
+    if (!token.empty()) link_.sendNow(device_, wire::Identify{.token = std::string_view(token)});
   }
 
   /// The answer, which begins like this.
@@ -148,7 +152,7 @@ class ServerRecording {
       if (arrival.what != client::Arrival::What::message || arrival.kind != wire::kindOf<wire::Text>) return;
       const auto text = wire::decode<wire::Text>(arrival.bytes);
       if (!text) return;
-      const std::string heard(text->text.text);
+      const std::string heard = base::printable(text->text.text);
       (text->severity == wire::kTextError && isAboutRecording(heard) ? refusal_ : last_) = heard;
     });
     return link_.connected();
@@ -171,7 +175,7 @@ class ServerRecording {
 };
 
 int recordOnServer(const RecordOptions& options) {
-  ServerRecording recording(options.server);
+  ServerRecording recording(options.server, tokenFor(options.server, options.tokenFile));
   const StopSignals signals;
   if (!options.end) {
     std::printf("%s: %s\n", options.server.c_str(),
@@ -230,6 +234,7 @@ void addRecord(CLI::App& app) {
   command->add_flag("--detach", options->detach, "With --server: begin the recording and return")
       ->needs(onServer);
   command->add_flag("--end", options->end, "With --server: end the recording at hand")->needs(onServer);
+  addTokenFile(*command, options->tokenFile);
   command->add_option("--seconds", options->seconds, "Duration; 0: until Ctrl-C")
       ->check(within(0, kLongest_s))
       ->capture_default_str();

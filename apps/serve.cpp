@@ -96,12 +96,18 @@ void checkFiles(const server::ServerConfig& config, const ServeOptions& options)
     if (!options.hand.empty()) throw;
     throw server::ConfigError(server::placeOf(error, options.configFile) + error.what());
   }
-  try {
-    server::Credentials(config, geteuid());
-  } catch (const server::ConfigError& error) {
-    const server::InvalidValue located({}, "tokens", error.what());
-    throw server::ConfigError(server::placeOf(located, options.configFile) + error.what());
-  }
+  const auto check = [&](const char* key, const auto& read) {
+    try {
+      read();
+    } catch (const std::runtime_error& error) {
+      const server::InvalidValue located({}, key, error.what());
+      throw server::ConfigError(server::placeOf(located, options.configFile) + error.what());
+    }
+  };
+  check("tokens", [&] { server::Credentials(config, geteuid()); });
+  check("tls", [&] {
+    if (!config.tlsKey.empty()) tls::Context::server(config.tls, config.tlsKey);
+  });
 }
 
 server::ServerConfig configOf(const ServeOptions& options, std::vector<std::string>& remarks) {

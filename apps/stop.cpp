@@ -3,7 +3,6 @@
 #include <cstdio>
 #include <memory>
 #include <optional>
-#include <stdexcept>
 #include <string>
 
 #include "client/server_address.h"
@@ -41,18 +40,6 @@ std::string socketOf(const StopOptions& options) {
   }
 }
 
-// A token must not cross a network in clear text.
-std::string readTokenFor(const StopOptions& options) {
-  const client::ServerAddress server = client::parseDevice(options.server).server;
-  const bool here = !server.socket.empty() ||
-                    net::isLoopback(net::Endpoint{net::resolve(server.host), server.port}.address);
-  if (!here)
-    throw std::runtime_error("the token would cross the network to " + server.text() +
-                             " unencrypted: leave --token-file to 'hapticd tunnel', and open "
-                             "NAME@tcp://127.0.0.1:PORT of that tunnel");
-  return readToken(options.tokenFile);
-}
-
 Client openClient(const StopOptions& options) {
   if (const std::string local = socketOf(options); !local.empty()) {
     try {
@@ -65,7 +52,7 @@ Client openClient(const StopOptions& options) {
 }
 
 int run(const StopOptions& options) {
-  const std::string token = options.tokenFile.empty() ? "" : readTokenFor(options);
+  const std::string token = tokenFor(options.server, options.tokenFile);
   Client client = openClient(options);
   if (!token.empty()) client.presentToken(token);
   std::optional<GuardReport> guard;
@@ -124,10 +111,7 @@ void addStop(CLI::App& app) {
   command->add_option("server", options->server, "NAME@host[:port] or NAME@tcp://host[:port]")
       ->capture_default_str();
   command->add_flag("--rearm", options->rearm, "End a stop and clear latched faults");
-  command
-      ->add_option("--token-file", options->tokenFile,
-                   "File with the token of an operator, mode 0600; only for a server on this machine")
-      ->check(CLI::ExistingFile);
+  addTokenFile(*command, options->tokenFile);
   command->add_flag("--json", options->json, kJsonText);
   command->footer(
       "Any client may stop a device. Re-arming after it takes the server's user or root on its machine, or\n"

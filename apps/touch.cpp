@@ -25,6 +25,7 @@
 #include "report_view.h"
 #include "server_list.h"
 #include "stop_signals.h"
+#include "token_file.h"
 #include "wire/messages/extension.h"
 
 namespace hapticd::apps {
@@ -39,6 +40,7 @@ constexpr int kLastObject = std::numeric_limits<int>::max() - 1;  // their numbe
 struct TouchOptions {
   std::string mesh;
   std::string server = "Phantom@localhost";
+  std::string tokenFile;
   bool find = false;
   double seconds = 0;
   Surface surface{.stiffness = 0.8F, .damping = 0.1F, .staticFriction = 0.3F, .dynamicFriction = 0.2F};
@@ -104,6 +106,20 @@ void send(Client& client, const TriangleMesh& mesh, const TouchOptions& options)
               client.device().c_str(), client.server().c_str());
 }
 
+// A refusal of what was sent comes before the answer to this question; without it, only the summary at the
+// end would tell.
+void awaitAnswer(Client& client, const ReportSummary& summary) {
+  bool answered = false;
+  client.onToRoom([&](const ToRoomReport&) { answered = true; });
+  client.requestToRoom();
+  const auto end = std::chrono::steady_clock::now() + 3s;
+  while (!answered && !stopRequested() && client.connected() && std::chrono::steady_clock::now() < end)
+    client.poll(20ms);
+  client.onToRoom(nullptr);
+  if (!summary.firstError().empty())
+    std::fprintf(stderr, "hapticd touch: %s: %s\n", client.server().c_str(), summary.firstError().c_str());
+}
+
 void watch(Client& client, ReportSummary& summary, double seconds) {
   const bool live = onTerminal();
   const auto interval = live ? 250ms : 1000ms;
@@ -129,9 +145,12 @@ int run(const TouchOptions& options) {
   const TriangleMesh mesh = load(options);
   const std::string server = options.find ? onlyDeviceOfNetwork() : options.server;
   if (options.find) std::printf("found %s\n", server.c_str());
+  const std::string token = tokenFor(server, options.tokenFile);
   Client client(server, {.reconnect = false});
+  if (!token.empty()) client.presentToken(token);
   ReportSummary summary(client);
   send(client, mesh, options);
+  awaitAnswer(client, summary);
   std::string failure;
   try {
     watch(client, summary, options.seconds);
@@ -163,6 +182,7 @@ void addTouch(CLI::App& app) {
       ->capture_default_str();
   command->add_flag("--find", options->find, "Use the only server that 'hapticd list' finds on the network")
       ->excludes("--server");
+  addTokenFile(*command, options->tokenFile);
   command->add_option("--seconds", options->seconds, "How long to watch; 0: until Ctrl-C")
       ->check(within(0, kLongest_s))
       ->capture_default_str();

@@ -115,7 +115,8 @@ struct ForceErrorReport {
 /// Severity of a text message; the numbers are VRPN's.
 enum class Severity { normal = 0, warning = 1, error = 2 };
 
-/// A text message of the server for a person; refusals of commands arrive as Severity::error.
+/// A text message of the server for a person, one line of UTF-8: the server's control characters arrive as
+/// U+FFFD. Refusals of commands arrive as Severity::error.
 struct TextReport {
   Time time;
   Severity severity = Severity::normal;

@@ -1,6 +1,7 @@
 #include "base/files.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,6 +11,10 @@
 
 namespace hapticd::base {
 namespace {
+
+// Of what is read whole. A device such as /dev/zero has no end.
+constexpr std::uint64_t kMostOfAFile = 1U << 30U;
+constexpr std::uint64_t kMostOfAStream = 1U << 26U;
 
 [[noreturn]] void fail(int error, const std::string& what, const std::filesystem::path& path) {
   throw std::system_error(error, std::generic_category(), what + " " + path.string());
@@ -92,11 +97,16 @@ std::unique_ptr<OutputFile> SystemFiles::create(const std::filesystem::path& pat
 
 std::vector<std::byte> SystemFiles::read(const std::filesystem::path& path) {
   const Descriptor file(path, O_RDONLY);
+  struct stat status {};
+  if (::fstat(file.fd(), &status) != 0) fail(errno, "cannot read", path);
+  const std::uint64_t most = S_ISREG(status.st_mode) ? kMostOfAFile : kMostOfAStream;
+  if (static_cast<std::uint64_t>(status.st_size) > most) fail(EFBIG, "cannot read", path);
   std::vector<std::byte> content;
   std::array<std::byte, 64 * 1024> piece;
   for (;;) {
     const std::size_t got = readFully(file, piece);
     content.insert(content.end(), piece.begin(), piece.begin() + static_cast<std::ptrdiff_t>(got));
+    if (content.size() > most) fail(EFBIG, "cannot read", path);
     if (got < piece.size()) return content;
   }
 }

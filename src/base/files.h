@@ -47,7 +47,7 @@ class Files {
   virtual std::unique_ptr<OutputFile> create(const std::filesystem::path& path, Existing existing) = 0;
   /// Opens a file for reading from its start.
   virtual std::unique_ptr<InputFile> open(const std::filesystem::path& path) = 0;
-  /// The whole content.
+  /// The whole content, at most 1 GiB of a file and 64 MiB of a pipe or a device (std::errc::file_too_large).
   virtual std::vector<std::byte> read(const std::filesystem::path& path) = 0;
   /// Replaces `to`; atomic. Both must be in one file system.
   virtual void rename(const std::filesystem::path& from, const std::filesystem::path& to) = 0;

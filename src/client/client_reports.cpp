@@ -1,6 +1,7 @@
 // From arrivals to reports: decodes, counts, stores and delivers them.
 #include <algorithm>
 
+#include "base/printable.h"
 #include "client/client_impl.h"
 #include "wire/codec.h"
 #include "wire/text.h"
@@ -222,9 +223,9 @@ void Client::Impl::dispatchMessage(const Arrival& a) {
       });
     case wire::kindOf<wire::Text>:
       return decode<wire::Text>(a, [&](const auto& m) {
-        if (m.severity >= wire::kTextError && firstError.empty()) firstError = m.text.text;
-        deliver(a,
-                TextReport{{}, static_cast<Severity>(std::min(m.severity, wire::kTextError)), m.text.text});
+        const std::string text = base::printable(m.text.text);
+        if (m.severity >= wire::kTextError && firstError.empty()) firstError = text;
+        deliver(a, TextReport{{}, static_cast<Severity>(std::min(m.severity, wire::kTextError)), text});
       });
     case wire::kindOf<wire::TrackerToRoom>:
       return decode<wire::TrackerToRoom>(a, [&](const auto& m) {

@@ -1,45 +1,10 @@
 #include "record/recording_reader.h"
 
-#include <algorithm>
-#include <string_view>
-
+#include "base/printable.h"
 #include "record/fields.h"
 #include "record/scene_event_codec.h"
 
 namespace hapticd::record {
-namespace {
-
-// Bytes of the character of UTF-8 that begins the text; 0: none does.
-std::size_t characterBytes(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
-  const unsigned lead = byte(0);
-  if (lead < 0x80) return 1;
-  const std::size_t bytes = lead >= 0xc2 && lead <= 0xdf   ? 2
-                            : (lead & 0xf0U) == 0xe0       ? 3
-                            : lead >= 0xf0 && lead <= 0xf4 ? 4
-                                                           : 0;
-  for (std::size_t i = 1; i < bytes; ++i) {
-    if ((byte(i) & 0xc0U) != 0x80) return 0;
-  }
-  const unsigned second = byte(1);
-  const bool overlong = (lead == 0xe0 && second < 0xa0) || (lead == 0xf0 && second < 0x90);
-  const bool noCharacter = (lead == 0xed && second > 0x9f) || (lead == 0xf4 && second > 0x8f);
-  return overlong || noCharacter ? 0 : bytes;
-}
-
-// A client's text as one line that terminals, XML and JSON take: other bytes become U+FFFD.
-std::string printable(std::string_view text) {
-  std::string line;
-  while (!text.empty()) {
-    const std::size_t bytes = characterBytes(text);
-    const auto lead = static_cast<unsigned char>(text.front());
-    line += bytes == 0 || lead < 0x20 || lead == 0x7f ? "\xef\xbf\xbd" : text.substr(0, bytes);
-    text.remove_prefix(std::max<std::size_t>(bytes, 1));
-  }
-  return line;
-}
-
-}  // namespace
 
 RecordingReader::RecordingReader(const std::filesystem::path& file) : path_(file), blocks_(file) {
   readHeader();
@@ -166,7 +131,7 @@ bool RecordingReader::readBlock(RecordingEvent& event) {
       break;
     case BlockKind::marker:
       takeWhole<MarkerEvent>(event);
-      std::get<MarkerEvent>(event).text = printable(std::get<MarkerEvent>(event).text);
+      std::get<MarkerEvent>(event).text = base::printable(std::get<MarkerEvent>(event).text);
       return true;
     case BlockKind::end:
       takeWhole<EndEvent>(event);

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <string_view>
 
+#include "base/printable.h"
+
 namespace hapticd::zeroconf {
 namespace {
 
@@ -36,17 +38,6 @@ std::vector<std::string> splitAtCommas(std::string_view list) {
 
 }  // namespace
 
-std::string printable(std::string text) {
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const auto byte = static_cast<unsigned char>(text[i]);
-    const auto next = i + 1 < text.size() ? static_cast<unsigned char>(text[i + 1]) : 0;
-    const bool c1 = byte == 0xC2 && next >= 0x80 && next < 0xA0;  // U+0080 to U+009F
-    if (byte < 0x20 || byte == 0x7F || c1) text[i] = '?';
-    if (c1) text[i + 1] = '?';
-  }
-  return text;
-}
-
 std::vector<std::string> AnnouncedServer::text() const {
   std::string names = "devices=";
   for (const std::string& device : devices) {
@@ -64,7 +55,7 @@ void AnnouncedServer::read(const std::vector<std::string>& text) {
     const std::size_t equals = entry.find('=');
     if (equals == std::string::npos) continue;
     const std::string_view key = std::string_view(entry).substr(0, equals);
-    const std::string value = printable(entry.substr(equals + 1));
+    const std::string value = base::printable(entry.substr(equals + 1));
     if (key == "devices") devices = splitAtCommas(value);
     if (key == "version") version = value;
     if (key == "tls") tls = value == "1";

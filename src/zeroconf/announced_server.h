@@ -12,9 +12,6 @@ inline constexpr const char* kServiceType = "_hapticd._tcp";
 /// Bytes of a name (RFC 6763, 4.1.1).
 inline constexpr std::size_t kLongestName = 63;
 
-/// Text of another machine as a terminal may show it: '?' for control characters.
-std::string printable(std::string text);
-
 struct AnnouncedServer {
   std::string name{};     ///< for people: "hapticd on lab7"
   std::string address{};  ///< dotted IPv4; empty in an announcement: the machine's own
@@ -26,7 +23,7 @@ struct AnnouncedServer {
 
   /// The TXT record: "key=value" of at most 255 bytes each. Devices that do not fit are left out.
   std::vector<std::string> text() const;
-  /// Reads the TXT record of another server, as printable(); what it does not know it ignores.
+  /// Reads the TXT record of another server, made printable; what it does not know it ignores.
   void read(const std::vector<std::string>& text);
 
   /// What a client opens: "Phantom@192.168.1.7:3883".

@@ -10,6 +10,7 @@
 #include <tuple>
 #include <utility>
 
+#include "base/printable.h"
 #include "zeroconf/avahi.h"
 #include "zeroconf/interfaces.h"
 
@@ -79,7 +80,7 @@ class Search {
     sd_bus_message_read(answer, "s", &name);
     sd_bus_message_skip(answer, "sssi");
     sd_bus_message_read(answer, "sq", &address, &server.port);
-    server.name = printable(name);
+    server.name = base::printable(name);
     server.address = address;
     server.read(textOf(answer));
     search.found_.push_back(server);

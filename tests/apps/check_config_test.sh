@@ -44,6 +44,9 @@ printf '\n[[device]]\nhand = "nosuch.csv"\n' >hand.toml
 fails_with "hand.toml:3: device 'Phantom': hand: nosuch.csv: cannot be read" --config hand.toml
 printf '\ntokens = "nosuch"\n' >tokens.toml
 fails_with "tokens.toml:2: tokens: cannot read 'nosuch'" --config tokens.toml
+printf '\ntls = "%s/nosuch.pem"\ntls_key = "%s/nosuch.key"\n' "$work" "$work" >tls.toml
+fails_with "tls.toml:2: " --config tls.toml
+fails_with "nosuch" --config tls.toml
 fails_with "hardware is 'x', expected the number" --device forcedimension:x
 fails_with "is the port of listen" --listen 127.0.0.1:4000 --http 127.0.0.1:4000
 fails_with 'replay needs a recorded hand: hand = "FILE.csv"' --device replay

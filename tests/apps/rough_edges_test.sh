@@ -3,7 +3,7 @@
 set -euo pipefail
 hapticd=$1
 source_dir=$2
-http=127.0.0.1:0
+serve_options=(--http 127.0.0.1:0)
 . "$(dirname "$0")/server.sh"
 
 refused() { # refused STATUS TEXT COMMAND...: the status, and the text in what it prints

@@ -1,9 +1,10 @@
-# For shell tests: starts a server with the simulated hand on a free port and ends it with the test. Source it with
-# $hapticd set, and $http to serve the page. Sets $work (a directory that is removed at the end; an existing $work is used), $server (the process id)
-# and $address.
+# For shell tests: a server with the simulated hand on a free port, until the test ends. Source it with $hapticd set, and
+# $serve_options for more than a server without a page. Sets $work (a directory that is removed at the end; an existing $work is
+# used), $server (the process id) and $address.
+[ -v serve_options ] || serve_options=(--http off)
 work=${work:-$(mktemp -d)}
 : >"$work/log" # so that it exists before the server writes to it
-"$hapticd" serve --listen 127.0.0.1:0 --http "${http:-off}" --allow-no-rt >"$work/log" 2>&1 &
+"$hapticd" serve --listen 127.0.0.1:0 --allow-no-rt "${serve_options[@]}" >"$work/log" 2>&1 &
 server=$!
 trap 'kill "$server" 2>/dev/null || true; rm -rf "$work"' EXIT
 address=""

@@ -182,6 +182,18 @@ TEST(SystemFiles, NamesThePathOfAFullDisk) {
   expectError([&] { file->sync(); }, EINVAL, "/dev/full");
 }
 
+// As somebody who mistypes a path, or means the server ill, may name them: reading them whole takes all
+// memory.
+TEST(SystemFiles, DoesNotReadWithoutEnd) {
+  SystemFiles files;
+  expectError([&] { files.read("/dev/zero"); }, EFBIG, "/dev/zero");
+  const OnDisk disk;
+  const std::filesystem::path large = disk.folder() / "large";
+  files.create(large, Existing::refuse);
+  std::filesystem::resize_file(large, (std::uintmax_t{1} << 30U) + 1);  // takes no room on the disk
+  expectError([&] { files.read(large); }, EFBIG, large);
+}
+
 TEST(FakeFiles, AFullDiskTakesWhatFits) {
   FakeFiles files;
   files.freeBytes = 5;

@@ -67,7 +67,7 @@ TEST_P(BothWays, ReportsReachTheirCallbacks) {
   client.onText([&](const TextReport& r) {
     check(r);
     EXPECT_EQ(r.severity, Severity::warning);
-    EXPECT_EQ(r.text, "stiffness 2 of object 0 clamped to 1");
+    EXPECT_EQ(r.text, "stiffness 2 of object 0 clamped to 1\xef\xbf\xbd[2J") << "a terminal would obey";
   });
   client.onToRoom([&](const ToRoomReport& r) {
     check(r);
@@ -92,7 +92,7 @@ TEST_P(BothWays, ReportsReachTheirCallbacks) {
   server.send(wire::TouchedObject{5});
   server.send(wire::Angle{45, 1});
   server.send(wire::ForceError{2});
-  server.send(wire::Text{1, 0, "stiffness 2 of object 0 clamped to 1"});
+  server.send(wire::Text{1, 0, "stiffness 2 of object 0 clamped to 1\x1b[2J"});
   server.send(wire::TrackerToRoom{{1, 1, 1}, {0, 0, 0, 1}});
   server.send(wire::TrackerUnitToSensor{2, 0, {}, {0, 0, 0, 1}});
   server.send(wire::TrackerWorkspace{{1, 2, 3}, {4, 5, 6}});

@@ -34,6 +34,7 @@ class Replay : public testing::Test {
     thread_ = std::thread([this] { server_->run(); });
   }
   void TearDown() override {
+    if (!server_) return;
     server_->stop();
     thread_.join();
   }

@@ -6,7 +6,7 @@ source_dir=$2
 work=$(mktemp -d)
 stock=${VRPN_CLIENTS:-} # where VRPN's own client programs are
 serve_options=(--http off --record "$work/my.haptics")
-source "$source_dir/tests/record/server.sh"
+source "$source_dir/tests/apps/server.sh"
 
 "$hapticd" record "Phantom@tcp://$address" "$work/heard.vrpn" --seconds 3 >/dev/null &
 heard=$!

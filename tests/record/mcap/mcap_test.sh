@@ -17,7 +17,7 @@ if ! (cd "$work" && npm ci --no-audit --no-fund --ignore-scripts >npm.log 2>&1);
   exit 77
 fi
 serve_options=(--http off --record "$work/my.haptics")
-source "$source_dir/tests/record/server.sh"
+source "$source_dir/tests/apps/server.sh"
 "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --server "Phantom@tcp://$address" --seconds 3 >"$work/touch.txt"
 kill -INT "$server"
 wait "$server" || true
