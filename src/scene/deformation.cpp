@@ -157,37 +157,33 @@ SpatialIndex Deformation::indexOver(const std::shared_ptr<const std::vector<Tria
 
 std::shared_ptr<MeshGeometry> Deformation::next(std::shared_ptr<MeshGeometry> old,
                                                 std::shared_ptr<const std::vector<Triangle>> triangles,
-                                                std::shared_ptr<const std::vector<Vec3f>> target,
-                                                const std::function<Nanos()>& clock, const Pace& pace) {
+                                                std::shared_ptr<const std::vector<Vec3f>> target, Nanos now) {
   if (!begun_) lone_ = loneOf(*triangles, target->size());
   begun_ = true;
   auto mesh = std::make_shared<MeshGeometry>();
   mesh->topology = old->topology;
   mesh->triangles = old->triangles;
-  sweep(*old, *target, clock());
-  const double move = longestMove();
+  sweep(*old, *target, now);
+  way_ = longestMove();
   coverTrajectory(*old);
   mesh->index = indexOver(triangles);
   mesh->target = std::move(target);
   mesh->before = old->target ? old->target : old->vertices;
-
-  const Nanos begin = clock();
-  if (old->deformingAfter(begin)) {
-    auto from = std::make_shared<std::vector<Vec3f>>(mesh->target->size());
-    placesOf(*old, begin, from->data()->data());
-    mesh->vertices = std::move(from);
-  } else {
-    mesh->vertices = mesh->before;
-  }
-  mesh->morphBegin = begin;
+  mesh->vertices = mesh->before;
   mesh->shape = old->shape + 1;
-  mesh->recentMove = moves_.add(move, begin);
-  const Nanos shortest = std::max<Nanos>(1'000'000, pace.shortest(move));
-  const Nanos gap = begin - pace.before;
-  const Nanos interval = gap > pace.longestGap ? pace.unmeasured : gap;
-  mesh->morphEnd = begin + std::clamp(interval, std::min(shortest, pace.longest), pace.longest);
+  from_ = old->deformingAfter(now) ? std::make_shared<std::vector<Vec3f>>(mesh->target->size()) : nullptr;
   spare_ = std::move(old);
   return mesh;
+}
+
+void Deformation::begin(MeshGeometry& mesh, Nanos begin, Nanos end) {
+  if (from_) {
+    placesOf(*spare_, begin, from_->data()->data());
+    mesh.vertices = std::move(from_);
+  }
+  mesh.morphBegin = begin;
+  mesh.morphEnd = end;
+  mesh.recentMove = moves_.add(way_, begin);
 }
 
 }  // namespace hapticd::scene

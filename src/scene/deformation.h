@@ -40,21 +40,15 @@ class Deformation {
   /// Forgets the shapes so far: the triangles changed, or there are none.
   void restart();
 
-  /// What determines the duration of a morph.
-  struct Pace {
-    Nanos before = 0;                       ///< time of the previous shape
-    Nanos longestGap = 0;                   ///< beyond, no interval is measured
-    Nanos unmeasured = 0;                   ///< the duration without an interval
-    Nanos longest = 0;                      ///< at most
-    std::function<Nanos(double)> shortest;  ///< at least, for a distance in object units
-  };
-
-  /// The next shape: its surface travels from where the servo renders `old` to `target`. `triangles` are
-  /// those of `old`, of which some may lack corners; `clock` is the time.
+  /// The next shape, which rests until begin(). `triangles` are those of `old`, of which some may lack
+  /// corners.
   std::shared_ptr<MeshGeometry> next(std::shared_ptr<MeshGeometry> old,
                                      std::shared_ptr<const std::vector<Triangle>> triangles,
-                                     std::shared_ptr<const std::vector<Vec3f>> target,
-                                     const std::function<Nanos()>& clock, const Pace& pace);
+                                     std::shared_ptr<const std::vector<Vec3f>> target, Nanos now);
+  /// Upper bound of the way of a vertex to that shape, object units.
+  double way() const noexcept { return way_; }
+  /// The surface of `mesh`, of next(), travels from where the servo renders the shape before it.
+  void begin(MeshGeometry& mesh, Nanos begin, Nanos end);
 
  private:
   // A box for each vertex, as in BoxedTriangles.
@@ -79,6 +73,9 @@ class Deformation {
 
   bool begun_ = false;
   Moves moves_;
+  double way_ = 0;
+  std::shared_ptr<std::vector<Vec3f>>
+      from_;                         // room for where the next shape begins; null: where the last ended
   std::vector<std::uint32_t> lone_;  // vertices of no triangle
   Sweep sweep_;
   std::shared_ptr<MeshGeometry>

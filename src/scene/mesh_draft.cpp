@@ -197,26 +197,31 @@ std::shared_ptr<MeshGeometry> MeshDraft::build(std::uint64_t topology) {
   return mesh;
 }
 
-std::shared_ptr<const MeshGeometry> MeshDraft::commit(const std::function<Nanos()>& clock,
-                                                      std::uint64_t topology,
-                                                      const std::function<Nanos(double)>& shortestMorph) {
+std::shared_ptr<const MeshGeometry> MeshDraft::commit(Nanos now, std::uint64_t topology) {
   if (triangleCount() == 0 || !current_ || shapeChanged_) {
     deformation_.restart();
     current_ = triangleCount() > 0 ? build(topology) : nullptr;
   } else {
     auto asSent = indexed_ ? triangles_.share() : current_->triangles;
-    current_ = deformation_.next(current_, std::move(asSent), vertices_.share(), clock,
-                                 {.before = lastCommit_,
-                                  .longestGap = kLongestGap,
-                                  .unmeasured = kUnmeasured,
-                                  .longest = kLongestMorph,
-                                  .shortest = shortestMorph});
+    current_ = deformation_.next(current_, std::move(asSent), vertices_.share(), now);
   }
   dirty_ = false;
   shapeChanged_ = false;
   finished_ = false;
-  lastCommit_ = clock();
   return current_;
+}
+
+Nanos MeshDraft::travel(Nanos begin, const std::function<Nanos(double)>& shortest) const {
+  if (!current_ || !current_->target) return 0;
+  const Nanos least = std::max<Nanos>(1'000'000, shortest(deformation_.way()));
+  const Nanos gap = begin - lastCommit_;
+  const Nanos interval = gap > kLongestGap ? kUnmeasured : gap;
+  return std::clamp(interval, std::min(least, kLongestMorph), kLongestMorph);
+}
+
+void MeshDraft::begin(Nanos begin, Nanos travel) {
+  lastCommit_ = begin;
+  if (current_ && current_->target) deformation_.begin(*current_, begin, begin + travel);
 }
 
 }  // namespace hapticd::scene

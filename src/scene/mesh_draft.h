@@ -87,12 +87,14 @@ class MeshDraft {
   std::optional<Nanos> oldestEdit() const { return dirty_ ? std::optional(firstEdit_) : std::nullopt; }
   bool hasBeenPublished() const { return current_ != nullptr; }
 
-  /// Builds the mesh with all edits; null when it has no triangles. `clock` is read again after the work, so
-  /// that a morph starts from the surface that is rendered then. `topology` numbers a new list of triangles;
-  /// no other mesh has it. `shortestMorph` gives the least duration of a morph over a distance in object
-  /// units.
-  std::shared_ptr<const MeshGeometry> commit(const std::function<Nanos()>& clock, std::uint64_t topology,
-                                             const std::function<Nanos(double)>& shortestMorph);
+  /// Builds the mesh with all edits; null when it has no triangles. `topology` numbers a new list of
+  /// triangles; no other mesh has it. begin() must follow.
+  std::shared_ptr<const MeshGeometry> commit(Nanos now, std::uint64_t topology);
+  /// How long the surface of commit() should travel to its shape from `begin` on, when it travels
+  /// `shortest(distance in object units)` at least; 0: it is a new one.
+  Nanos travel(Nanos begin, const std::function<Nanos(double)>& shortest) const;
+  /// After commit(), not before the servo may see it: it travels from what is rendered at `begin`.
+  void begin(Nanos begin, Nanos travel);
 
  private:
   void edited(Nanos now);

@@ -1,6 +1,7 @@
 #include "scene/motion.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace hapticd::scene {
@@ -118,21 +119,31 @@ double longestMove(const Affine& from, const Affine& to, const geometry::Box& bo
   return std::sqrt(longest2);
 }
 
-// Seen from the object, the centre travels. It does so on a straight line when the linear part stays;
-// otherwise the box around a few of its places covers the curve between them.
-double Motion::longestMoveNear(const geometry::Box& box, const geometry::Vec3& centre,
-                               double reach) const noexcept {
-  if (box.empty()) return 0;
-  const int samples = sameLinear(from_, to_) ? 2 : 5;
+// Seen from the object, the centre travels.
+geometry::Box partNear(const geometry::Box& box, std::span<const Affine> placements,
+                       const geometry::Vec3& centre, double reach) noexcept {
   geometry::Box near;
-  for (int i = 0; i < samples; ++i) {
-    const Affine toObject = atShare(static_cast<double>(i) / (samples - 1)).inverse();
+  for (const Affine& placement : placements) {
+    const Affine toObject = placement.inverse();
     const geometry::Vec3 half = reach * toObject.linear().rowwise().norm();
     const geometry::Vec3 middle = toObject * centre;
     near.extend(geometry::Box{middle - half, middle + half});
   }
   near.min = near.min.cwiseMax(box.min);
   near.max = near.max.cwiseMin(box.max);
+  return near;
+}
+
+// The centre travels on a straight line when the linear part stays; otherwise the box around a few of its
+// places covers the curve between them.
+double Motion::longestMoveNear(const geometry::Box& box, const geometry::Vec3& centre,
+                               double reach) const noexcept {
+  if (box.empty()) return 0;
+  std::array<Affine, 5> places;
+  const std::size_t samples = sameLinear(from_, to_) ? 2 : places.size();
+  for (std::size_t i = 0; i < samples; ++i)
+    places[i] = atShare(static_cast<double>(i) / static_cast<double>(samples - 1));
+  const geometry::Box near = partNear(box, std::span(places.data(), samples), centre, reach);
   return near.empty() ? 0 : longestMove(before_, to_, near);
 }
 

@@ -1,6 +1,8 @@
 // Where an object is at a moment: fixed, or on its way between two poses that a client sent.
 #pragma once
 
+#include <span>
+
 #include "base/time.h"
 #include "geometry/types.h"
 
@@ -74,5 +76,9 @@ class Motion {
 
 /// The largest distance between the places of a point of `box` under two placements.
 double longestMove(const Affine& from, const Affine& to, const geometry::Box& box) noexcept;
+/// The part of `box` that is within `reach` of `centre` under any of these placements, or between two of
+/// them.
+geometry::Box partNear(const geometry::Box& box, std::span<const Affine> placements,
+                       const geometry::Vec3& centre, double reach) noexcept;
 
 }  // namespace hapticd::scene

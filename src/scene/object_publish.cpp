@@ -1,5 +1,6 @@
 // From edited objects to the list and the index that a snapshot shows.
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include "base/time.h"
@@ -78,6 +79,7 @@ void ObjectTable::commitMeshes(Nanos now, NoticeBoard& board, std::vector<Notice
   const Nanos started = stopwatch_();
   const auto clock = [&] { return now + (stopwatch_() - started); };
   std::vector<std::int32_t> later;
+  std::vector<Object*> committed;
   for (const std::int32_t id : edited_) {
     Object* object = find(id);
     if (object == nullptr) continue;
@@ -91,7 +93,8 @@ void ObjectTable::commitMeshes(Nanos now, NoticeBoard& board, std::vector<Notice
     if (!due) continue;
     const Nanos begin = clock();
     try {
-      commitMesh(*object, now, clock);
+      commitMesh(*object, now, clock());
+      committed.push_back(object);
     } catch (const std::exception& error) {
       object->mesh.giveUp();
       const Call call{object->meshSetBy, now, false, board, out};
@@ -101,18 +104,29 @@ void ObjectTable::commitMeshes(Nanos now, NoticeBoard& board, std::vector<Notice
     if (rebuild) rebuildNotBefore_ = clock() + 3 * (clock() - begin);
   }
   edited_ = std::move(later);
+  beginMorphs(committed, clock());
+}
+
+// Meshes that a client deforms together arrive together: no seam between them opens on the way.
+void ObjectTable::beginMorphs(const std::vector<Object*>& committed, Nanos begin) {
+  std::map<ClientId, Nanos> travel;
+  for (const Object* object : committed) {
+    const auto shortest = [scale = metresPerUnit(*object)](double distance) {
+      return shortestSweep(distance * scale);
+    };
+    Nanos& longest = travel[object->meshSetBy];
+    longest = std::max(longest, object->mesh.travel(begin, shortest));
+  }
+  for (Object* object : committed) object->mesh.begin(begin, travel[object->meshSetBy]);
 }
 
 double ObjectTable::metresPerUnit(const Object& object) const {
   return object.motion.destination().linear().colwise().norm().maxCoeff() / worldUnitsPerMetre_;
 }
 
-void ObjectTable::commitMesh(Object& object, Nanos now, const std::function<Nanos()>& clock) {
+void ObjectTable::commitMesh(Object& object, Nanos now, Nanos clock) {
   const std::uint64_t topology = object.geometry ? object.geometry->topology : 0;
-  const auto shortest = [scale = metresPerUnit(object)](double distance) {
-    return shortestSweep(distance * scale);
-  };
-  object.geometry = object.mesh.commit(clock, ++lastTopology_, shortest);
+  object.geometry = object.mesh.commit(clock, ++lastTopology_);
   object.stateChanged = true;
   queue(object);
   if (!config_.checkMeshes || !object.geometry || object.geometry->topology == topology) return;

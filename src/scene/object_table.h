@@ -162,7 +162,8 @@ class ObjectTable {
   Affine frameOf(const Object& object) const;
   void commitMeshes(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   double metresPerUnit(const Object& object) const;
-  void commitMesh(Object& object, Nanos now, const std::function<Nanos()>& clock);
+  void commitMesh(Object& object, Nanos now, Nanos clock);
+  void beginMorphs(const std::vector<Object*>& committed, Nanos begin);
   void checkMeshes(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   struct Move {
     Object* object = nullptr;

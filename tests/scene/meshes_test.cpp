@@ -353,6 +353,41 @@ TEST_F(Deforming, LoneDeformationTakesSixteenMillisecondsOrItsDistanceAtOneMetre
   EXPECT_LE(far.morphEnd - far.morphBegin, 20 * kMillisecond);
 }
 
+// Two sheets with a common edge: the far side of one goes farther, and takes longer by itself.
+TEST_F(Deforming, MeshesOfABatchArriveTogether) {
+  makeTouchable(1, soup(50));
+  run(1'000 * kMillisecond);
+  for (int frame = 0; frame < 3; ++frame) {  // the third begins before the second has ended
+    const float z = frame % 2 == 0 ? 1 : 0;
+    auto rising = soup(50, 30 * z);
+    std::fill_n(rising.begin(), 3, Vec3f(1, 0, z));
+    auto seam = soup(50);
+    std::fill_n(seam.begin(), 3, Vec3f(1, 0, z));
+    say(BeginBatch{});
+    say(SetVertices{0, 0, std::move(rising)});
+    say(SetVertices{1, 0, std::move(seam)});
+    say(CommitBatch{});
+    wait(8 * kMillisecond);
+    ASSERT_TRUE(publish());
+    for (int ms = 0; ms < 50; ++ms)
+      ASSERT_EQ(object(0)->mesh->vertex(0, now_ + ms * kMillisecond).z(),
+                object(1)->mesh->vertex(0, now_ + ms * kMillisecond).z())
+          << "frame " << frame << ", " << ms << " ms";
+    if (frame == 0) wait(200 * kMillisecond);
+  }
+}
+
+// Others do not wait for them.
+TEST_F(Deforming, MeshesOfAnotherClientKeepTheirPace) {
+  makeTouchable(1, soup(50));
+  run(1'000 * kMillisecond);
+  say(SetVertices{0, 0, soup(50, 1)});
+  say(SetVertices{1, 0, soup(50, 40)}, kClient + 1);
+  run(MeshDraft::kPause);
+  EXPECT_EQ(object(0)->mesh->morphEnd - object(0)->mesh->morphBegin, 16 * kMillisecond);
+  EXPECT_GE(object(1)->mesh->morphEnd - object(1)->mesh->morphBegin, 20 * kMillisecond);
+}
+
 // Two halves of a frame 2 ms apart, frames at 60 Hz: each is felt whole, before the next one comes.
 TEST_F(Deforming, FramesOfAStreamAreFeltOneByOneAndWhole) {
   for (int frame = 1; frame < 30; ++frame) {

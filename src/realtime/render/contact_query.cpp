@@ -66,9 +66,10 @@ Vec3 PlacedObject::carried(const Vec3& p) const noexcept {
   return T_device_object * (T_device_objectBefore.inverse() * p);
 }
 
-void ContactQuery::beginTick(const SceneAtTime& now, const SceneAtTime& before,
+void ContactQuery::beginTick(const SceneAtTime& now, const SceneAtTime& before, const Vec3& tool,
                              const PlacedPlanes* planes) noexcept {
   now_ = now;
+  tool_ = tool;
   planes_ = planes;
   before_ = before;
   sameWorkspace_ = before.scene != nullptr && before.scene->workspace.T_device_world.matrix() ==
@@ -272,11 +273,15 @@ void ContactQuery::compareWithBefore(PlacedObject& placed) const noexcept {
   }
   const bool sameTriangles = before.mesh->topology == state.mesh->topology;
   placed.deformed = sameTriangles && (before.mesh != state.mesh || state.mesh->deformingAfter(before_.time));
-  // A workspace is not interpolated: a small change is a motion within this tick.
-  const bool farWorkspace =
-      !sameWorkspace_ && scene::longestMove(placed.T_device_objectBefore, placed.T_device_object,
-                                            state.mesh->index.bounds()) > kLongestMotion_m;
-  placed.jumped = !sameTriangles || before.motion.jumps() != state.motion.jumps() || farWorkspace;
+  placed.jumped = !sameTriangles || before.motion.jumps() != state.motion.jumps() || viewJumped(placed);
+}
+
+// A workspace is not interpolated: what moves a little near the tool is a motion within this tick.
+bool ContactQuery::viewJumped(const PlacedObject& placed) const noexcept {
+  if (sameWorkspace_) return false;
+  const std::array<Affine, 2> places{placed.T_device_objectBefore, placed.T_device_object};
+  const geometry::Box near = scene::partNear(placed.state->mesh->index.bounds(), places, tool_, kNear_m);
+  return !near.empty() && scene::longestMove(places[0], places[1], near) > kLongestMotion_m;
 }
 
 // The index is asked for a ball in the object's frame, which is an ellipsoid in the device frame. Of the

@@ -23,6 +23,8 @@ namespace hapticd::realtime {
 using base::Nanos;
 using geometry::Affine;
 
+/// Parts of an object this near to the tool decide whether its move is a jump.
+inline constexpr double kNear_m = 0.050;
 /// Triangles that a tick examines. A count and not a time, so that the clock never changes a force.
 inline constexpr int kMaxVisits = 8192;
 using geometry::kGapTolerance_m;
@@ -95,9 +97,9 @@ class ContactQuery {
   }
   /// The tool has left all that appeared around it.
   void leaveAll() noexcept { enclosingCount_ = 0; }
-  /// Starts a tick without objects. `planes` take part in every cast and must live until the next
-  /// beginTick().
-  void beginTick(const SceneAtTime& now, const SceneAtTime& before,
+  /// Starts a tick without objects, with the tool where the tick before left it. `planes` take part in every
+  /// cast and must live until the next beginTick().
+  void beginTick(const SceneAtTime& now, const SceneAtTime& before, const Vec3& tool,
                  const PlacedPlanes* planes = nullptr) noexcept;
   /// Adds the objects within `reach` of `centre`; drops gathered facets that are out of date.
   void addObjectsNear(const Vec3& centre, double reach, const Vec3& tool) noexcept;
@@ -227,6 +229,7 @@ class ContactQuery {
   bool sameObjects() const noexcept;
   bool isUnfit(const Vec3& centre, double radius) const noexcept;
   void compareWithBefore(PlacedObject& placed) const noexcept;
+  bool viewJumped(const PlacedObject& placed) const noexcept;
   bool mayReach(const PlacedObject& object, std::uint32_t triangle, const Vec3& inObject,
                 double reach_m) noexcept;
   scene::Corners cornersOf(const FacetCache::TriangleId& id) const noexcept;
@@ -249,6 +252,7 @@ class ContactQuery {
   SceneAtTime before_;
   const PlacedPlanes* planes_ = nullptr;
   bool sameWorkspace_ = true;
+  Vec3 tool_ = Vec3::Zero();
   std::array<PlacedObject, kMaxObjects> objects_;
   int objectCount_ = 0;
   // Ids of the objects that appeared around the tool.

@@ -46,7 +46,7 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   search_.visits = 0;
   if (!started_) startAt(now, hip);
   planes_.place(*now.scene, now.time, hip, position_, toolRadius_, query_.radius(), viewMoved());
-  query_.beginTick(now, before_, &planes_);
+  query_.beginTick(now, before_, position_, &planes_);
   const bool wasFree = contactSet_.count == 0;
   const BlendedSpring springBefore = contactSet_.spring;
   commandChanged_ = contactChangedByCommand();

@@ -20,7 +20,6 @@ namespace hapticd::realtime {
 
 inline constexpr int kMaxCasts = 128;     ///< per tick; a path over 0.2 mm cells at 1 m/s needs about 20
 inline constexpr double kJump_m = 0.030;  ///< a longer move in one tick is a jump
-inline constexpr double kNear_m = 0.050;  ///< parts of an object this near decide whether its pose is a jump
 inline constexpr double kFastestHip_m_per_s = 1.2;  ///< a late tick allows a first contact this much deeper
 inline constexpr double kLongestTick_s = 0.050;
 inline constexpr double kGatherMargin_m = 10e-6;  ///< tremor of the HIP
@@ -170,7 +169,7 @@ class Proxy {
   void pushTo(const Vec3& place, const HalfSpace& face, Pushers& pushers) noexcept;
   void holdPlanesBack() noexcept;
   bool isJump(const PlacedObject& object) const noexcept;
-  static bool isJump(const PlacedObject& object, std::uint32_t triangle) noexcept;
+  bool isJump(const PlacedObject& object, std::uint32_t triangle) const noexcept;
   bool viewMoved() const noexcept;
   bool contactChangedByCommand() const noexcept;
   bool neighboursChangedByCommand(const BlendedSpring& before) const noexcept;

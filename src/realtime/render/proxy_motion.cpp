@@ -26,16 +26,28 @@ bool Proxy::isJump(const PlacedObject& object) const noexcept {
                                               kNear_m * units) > kLongestMotion_m * units;
 }
 
-// The same for the shape that a mesh is taking, at the triangle that meets the proxy.
-bool Proxy::isJump(const PlacedObject& object, std::uint32_t triangle) noexcept {
+// The same for the shape that a mesh is taking, at the triangle that meets the proxy. The move is affine over
+// it; where it is so large that its corners are far from the proxy, they do not count.
+bool Proxy::isJump(const PlacedObject& object, std::uint32_t triangle) const noexcept {
   const scene::MeshGeometry& mesh = *object.state->mesh;
   if (!mesh.target || !mesh.before) return false;
-  double longest = 0;
-  for (const std::uint32_t v : (*mesh.triangles)[triangle]) {
-    const Vec3 move = ((*mesh.target)[v] - (*mesh.before)[v]).cast<double>();
-    longest = std::max(longest, (object.T_device_object.linear() * move).norm());
+  geometry::Mat3 corners;
+  geometry::Mat3 moves;
+  for (int i = 0; i < 3; ++i) {
+    const std::uint32_t v = (*mesh.triangles)[triangle][static_cast<std::size_t>(i)];
+    corners.col(i) = object.T_device_object * mesh.vertex(v, now_.time);
+    moves.col(i) = object.T_device_object.linear() * ((*mesh.target)[v] - (*mesh.before)[v]).cast<double>();
   }
-  return longest > kLongestMotion_m;
+  if (moves.colwise().norm().maxCoeff() <= kLongestMotion_m) return false;
+  const Vec3 b = corners.col(1) - corners.col(0);
+  const Vec3 c = corners.col(2) - corners.col(0);
+  geometry::Mat3 frame;
+  frame << b, c, b.cross(c).normalized();
+  geometry::Mat3 moveAlong;
+  moveAlong << moves.col(1) - moves.col(0), moves.col(2) - moves.col(0), Vec3::Zero();
+  const geometry::Mat3 gradient = moveAlong * frame.inverse();
+  const Vec3 here = moves.col(0) + gradient * (position_ - corners.col(0));
+  return !(here.norm() + kNear_m * gradient.norm() <= kLongestMotion_m);  // not a number: degenerate
 }
 
 bool Proxy::viewMoved() const noexcept {

@@ -138,6 +138,28 @@ TEST_P(MovingTest, deforming_surface_is_felt_like_a_moving_one) {
   }
 }
 
+// Triangles of metres: their far corners move by centimetres, what is near the hand by half a millimetre.
+TEST_P(MovingTest, large_triangles_that_deform_lift_the_hand) {
+  for (const double radius : {0.0, 0.002}) {
+    scene = SceneFixture();
+    scene.setWorldUnitsPerMetre(units());
+    TriangleMesh mesh = plane(1.5);
+    geometry::scaleAndMove(mesh, units(), Vec3::Zero());
+    std::vector<geometry::Vec3f> tilted = mesh.vertices;
+    for (auto& v : tilted) v.z() += static_cast<float>(0.02) * v.x();
+    const auto placed = scene::Motion::fixed(Affine(Eigen::Translation3d(units() * offset())));
+    scene::ObjectState& object = scene.add(geometryOf(mesh, 5), surface(), placed);
+    start({0.05, 0.0002, radius + 0.0005}, {.toolRadius_m = radius});
+    const Nanos begin = hand->time();
+    const auto morph = geometryOf(mesh, 5, &tilted, begin, begin + toNanos(0.016));
+    morph->before = morph->vertices;
+    object.mesh = morph;
+    hand->show(scene.snapshot());
+    for (int i = 0; i < 30; ++i) at({0.05, 0.0002, radius + 0.0005});
+    EXPECT_NEAR(hand->now().force_N.z(), 0.5, 0.01) << "ball " << radius;
+  }
+}
+
 // The renderer reuses facets of objects at rest while the scene is the same. With a new snapshot of the same
 // scene in every tick it can reuse nothing: the forces must be equal to the last bit.
 TEST_P(MovingTest, facets_that_are_kept_change_no_byte) {
@@ -181,6 +203,32 @@ TEST_P(MovingTest, turning_object_carries_a_sticking_proxy) {
   const Vec3 held = proxy();
   while (hand->time() < toNanos(0.22)) at({0.0003, 0.0002, 0.029});
   EXPECT_NEAR((proxy() - Eigen::AngleAxisd(0.05, Vec3::UnitY()) * held).norm(), 0, 1e-7);
+}
+
+// The view turns about the hand, as a client walks through a landscape: the rim of an open floor of metres
+// moves by centimetres in a tick, what is near the hand by what it rises.
+TEST_P(MovingTest, view_that_turns_lifts_the_hand_above_a_large_floor) {
+  for (const auto faces : {scene::TouchableFaces::front, scene::TouchableFaces::both}) {
+    for (const double radius : {0.0, 0.002}) {
+      scene = SceneFixture();
+      scene.setWorldUnitsPerMetre(units());
+      scene.faces = faces;
+      add(plane(3, 4), surface());
+      start({0.0003, 0.0002, radius + 0.0005}, {.toolRadius_m = radius});
+      const Affine first = scene.workspace.T_device_world;
+      for (int frame = 1; frame <= 20; ++frame) {
+        const double rise = 0.0002 * frame;
+        const Eigen::AngleAxisd turn(0.02 * frame, Vec3::UnitZ());
+        scene.workspace.T_device_world = Eigen::Translation3d(offset() + Vec3(0, 0, rise)) * turn *
+                                         Eigen::Translation3d(-offset()) * first;
+        scene.workspace.T_world_device = scene.workspace.T_device_world.inverse();
+        hand->show(scene.snapshot());
+        for (int i = 0; i < 16; ++i) at({0.0003, 0.0002, radius + 0.0005});
+        EXPECT_NEAR(hand->now().force_N.z(), 1000 * std::max(0.0, rise - 0.0005), 0.02)
+            << "frame " << frame << " ball " << radius;
+      }
+    }
+  }
 }
 
 // A small jump of the touched object takes the proxy along and sets the status bit; a large one ends the

@@ -74,7 +74,7 @@ TEST_P(SegmentsTest, every_segment_into_a_closed_mesh_hits) {
     const auto snapshot = scene.snapshot();
     ContactQuery query(0);
     const auto newTick = [&] {
-      query.beginTick({snapshot.get(), 0}, {snapshot.get(), 0});
+      query.beginTick({snapshot.get(), 0}, {snapshot.get(), 0}, Vec3::Zero());
       query.addObjectsNear(offset(), 1, offset() + Vec3(1, 0, 0));
     };
     newTick();
