@@ -94,8 +94,9 @@ int run(const StopOptions& options) {
     printJson({{"server", options.server}, {"stopped", guard->stopped}, {"armed", guard->armed}});
     return 0;
   }
-  std::printf(options.rearm ? "%s: re-armed; forces ramp in over half a second\n"
-                            : "%s: forces are off; 'hapticd stop --rearm' re-arms\n",
+  std::printf(!options.rearm   ? "%s: forces are off; 'hapticd stop --rearm' re-arms\n"
+              : remark.empty() ? "%s: re-armed; forces ramp in over half a second\n"
+                               : "%s: re-armed; forces come back once the device gives them\n",
               options.server.c_str());
   if (options.rearm && !guard->armed)
     std::printf("forces are not enabled on this device: start the server with --enable-forces\n");

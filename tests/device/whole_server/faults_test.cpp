@@ -3,8 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <sys/wait.h>
+
+#include <cstdio>
 #include <optional>
 #include <string>
+#include <tuple>
+#include <utility>
 
 #include "device/haply/mock_service.h"
 #include "device/whole_server/event_kernel.h"
@@ -90,6 +95,41 @@ TEST_F(InContact, ASecondPullOfTheCableIsNoticedWithoutAnError) {
   heal(true);
   endInOrder();
 }
+
+#ifndef HAPTICD_SANITIZED  // the program of sanitized builds only serves
+
+// Its status, and what it printed.
+std::pair<int, std::string> commandOf(const std::string& arguments) {
+  std::string text;
+  FILE* const output = popen((std::string(HAPTICD) + " " + arguments + " 2>&1").c_str(), "r");
+  for (int c = std::fgetc(output); c != EOF; c = std::fgetc(output)) text += static_cast<char>(c);
+  return {WEXITSTATUS(pclose(output)), text};
+}
+
+// A fault is the reason to stop, and no refusal.
+TEST_F(InContact, TheStopCommandTellsAFaultFromARefusal) {
+  serve({"--device", "openhaptics", "--in-process"}, {"HAPTICD_HDAPI_LIB=" MOCK_HD});
+  const std::string device = "Phantom@" + server->address();
+  strike(mock::kWarmMotors, 1);
+  expectWords("too hot");
+  auto [status, text] = commandOf("stop " + device);
+  EXPECT_EQ(status, 0) << text;
+  EXPECT_THAT(text, HasSubstr("forces are off"));
+  std::tie(status, text) = commandOf("stop --rearm " + device);
+  EXPECT_EQ(status, 0) << text;
+  EXPECT_THAT(text, HasSubstr("too hot"));
+  EXPECT_THAT(text, HasSubstr("forces come back once the device gives them"));
+  heal(false);
+  std::tie(status, text) = commandOf("stop " + device);
+  EXPECT_EQ(status, 0) << text;
+  std::tie(status, text) = commandOf("stop --rearm " + device);
+  EXPECT_EQ(status, 0) << text;
+  EXPECT_THAT(text, HasSubstr("forces ramp in"));
+  touch();
+  endInOrder();
+}
+
+#endif
 
 class ForceDimensionFault : public DeviceFault {};
 
