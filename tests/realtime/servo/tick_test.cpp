@@ -491,6 +491,37 @@ TEST_F(LostHandTest, HeldForcesDoNotAddUpBeforeItsFirstState) {
   EXPECT_EQ(tick.last().remote.status, 0U) << "the way to where it is did not use its energy";
 }
 
+// The guard lets a third of 10 N through. A client that resists with them, and pushes along with what the
+// guard takes, would get the rest as a gift.
+TEST_F(LostHandTest, HeldForcesGiveNoMoreThanTheHandPutIn) {
+  tick.snapshots().publish(fixture::SceneFixture().snapshot());
+  put(0);
+  run(10 * kMs);
+  RemoteInput input;
+  input.force.lifetime = 10'000 * kMs;
+  double given_J = 0;
+  const auto move = [&](double way_m, double force_N) {
+    ++input.force.number;
+    input.force.received = now_;
+    input.force.force_N = Vec3(0, 0, force_N);
+    tick.remote().write(input);
+    const double step_m = std::copysign(0.05e-3, way_m);
+    for (int i = 0; i < std::lround(way_m / step_m); ++i) {
+      given_J += device.written_N.z() * step_m;
+      device.state.position_m.z() += step_m;
+      device.state.velocity_m_per_s = Vec3(0, 0, step_m / 1e-3);
+      run(kMs);
+    }
+  };
+  for (int round = 0; round < 50; ++round) {
+    move(0.005, -10);
+    move(-0.015, -3.3);
+    move(0.010, 0);
+  }
+  EXPECT_LT(given_J, 0.020 + 30 * 0.020 + 0.02) << "the start, the refill of 30 s, and rounding";
+  EXPECT_GT(given_J, 0.05) << "and that it gives";
+}
+
 TEST_F(LostHandTest, AShortSilenceDoesNotLoseIt) {
   put(0.002);
   run(10 * kMs);
