@@ -5,6 +5,7 @@
 #include "net/acceptor.h"
 #include "net/socket_options.h"
 #include "net/tcp_connection.h"
+#include "net/unix_socket.h"
 //
 #include <boost/asio/error.hpp>
 
@@ -41,8 +42,9 @@ class AsioListener final : public Acceptor {
     start();
   }
 
-  void listenLocally(int fd, std::string address) {
-    address_ = std::move(address);
+  void listenLocally(const std::filesystem::path& path) {
+    const int fd = listenAt(path);
+    address_ = path.string();
     local_ = {kLoopbackAddress, 0};
     isLocal_ = true;
     error_code error;
@@ -95,6 +97,7 @@ class AsioListener final : public Acceptor {
   void closeSocket() noexcept override {
     error_code ignored;
     acceptor_.close(ignored);
+    if (isLocal_) ::unlink(address_.c_str());
   }
 
   std::string address() const override { return address_; }
@@ -118,11 +121,11 @@ std::shared_ptr<TcpListener::Impl> listenWithAsio(AsioLoop& loop, const Endpoint
   return listener;
 }
 
-std::shared_ptr<TcpListener::Impl> listenLocallyWithAsio(AsioLoop& loop, int fd, std::string address,
+std::shared_ptr<TcpListener::Impl> listenLocallyWithAsio(AsioLoop& loop, const std::filesystem::path& path,
                                                          std::function<void(Connection)> onAccept,
                                                          const ConnectionOptions& options) {
   auto listener = std::make_shared<AsioListener>(loop, std::move(onAccept), options);
-  listener->listenLocally(fd, std::move(address));
+  listener->listenLocally(path);
   return listener;
 }
 

@@ -10,7 +10,7 @@ std::shared_ptr<TcpListener::Impl> listenWithAsio(AsioLoop& loop, const Endpoint
                                                   std::function<void(Connection)> onAccept,
                                                   const ConnectionOptions& options, const char* option);
 /// See Loop::Impl::listenLocal().
-std::shared_ptr<TcpListener::Impl> listenLocallyWithAsio(AsioLoop& loop, int fd, std::string address,
+std::shared_ptr<TcpListener::Impl> listenLocallyWithAsio(AsioLoop& loop, const std::filesystem::path& path,
                                                          std::function<void(Connection)> onAccept,
                                                          const ConnectionOptions& options);
 

@@ -6,6 +6,7 @@
 #include "net/asio_listener.h"
 #include "net/asio_udp_socket.h"
 #include "net/tcp_connection.h"
+#include "net/unix_socket.h"
 //
 #include <boost/asio/posix/stream_descriptor.hpp>
 #include <boost/asio/post.hpp>
@@ -220,16 +221,18 @@ std::shared_ptr<TcpListener::Impl> AsioLoop::listen(const Endpoint& local,
   return listenWithAsio(*this, local, std::move(onAccept), options, option);
 }
 
-std::shared_ptr<Connection::Impl> AsioLoop::adopt(int fd, const ConnectionOptions& options) {
+std::shared_ptr<TcpListener::Impl> AsioLoop::listenLocal(const std::filesystem::path& path,
+                                                         std::function<void(Connection)> onAccept,
+                                                         const ConnectionOptions& options) {
+  return listenLocallyWithAsio(*this, path, std::move(onAccept), options);
+}
+
+std::shared_ptr<Connection::Impl> AsioLoop::connectLocal(const std::filesystem::path& path,
+                                                         const ConnectionOptions& options) {
+  const int fd = connectTo(path);
   auto connection = std::make_shared<TcpConnection>(*this, options);
   connection->adoptLocal(fd);
   return connection;
-}
-
-std::shared_ptr<TcpListener::Impl> AsioLoop::listenLocal(int fd, std::string address,
-                                                         std::function<void(Connection)> onAccept,
-                                                         const ConnectionOptions& options) {
-  return listenLocallyWithAsio(*this, fd, std::move(address), std::move(onAccept), options);
 }
 
 std::shared_ptr<UdpSocket::Impl> AsioLoop::bind(const Endpoint& local) {

@@ -36,11 +36,11 @@ class AsioLoop final : public Loop::Impl {
   std::shared_ptr<TcpListener::Impl> listen(const Endpoint& local, std::function<void(Connection)> onAccept,
                                             const ConnectionOptions& options, const char* option) override;
   std::shared_ptr<UdpSocket::Impl> bind(const Endpoint& local) override;
-  std::shared_ptr<Connection::Impl> adopt(int fd, const ConnectionOptions& options) override;
-  std::shared_ptr<TcpListener::Impl> listenLocal(int fd, std::string address,
+  std::shared_ptr<TcpListener::Impl> listenLocal(const std::filesystem::path& path,
                                                  std::function<void(Connection)> onAccept,
                                                  const ConnectionOptions& options) override;
-  bool hasLocalSockets() const noexcept override { return true; }
+  std::shared_ptr<Connection::Impl> connectLocal(const std::filesystem::path& path,
+                                                 const ConnectionOptions& options) override;
 
   /// How much one connection may read in its turn: the connections that send faster than they are read share
   /// the buffer, so that a short message waits for about one buffer, however many of them there are.

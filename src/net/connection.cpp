@@ -72,4 +72,8 @@ int Connection::nativeHandle() const noexcept {
   return impl_->nativeHandle();
 }
 
+std::optional<std::uint32_t> Connection::peerUser() const noexcept {
+  return impl_->peerUser();
+}
+
 }  // namespace hapticd::net

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -123,6 +124,9 @@ class Connection {
   std::size_t queuedBytes() const;
   /// The socket, for options that this class does not cover; -1 when closed or simulated.
   int nativeHandle() const noexcept;
+  /// The system's number of the user that holds the other end of a Unix socket; nothing for all other
+  /// connections and closed ones.
+  std::optional<std::uint32_t> peerUser() const noexcept;
 
  private:
   std::shared_ptr<Impl> impl_;

@@ -27,6 +27,7 @@ class Connection::Impl {
   virtual ConnectionStatistics statistics() = 0;
   virtual std::size_t queuedBytes() { return statistics().queuedBytes; }
   virtual int nativeHandle() = 0;
+  virtual std::optional<std::uint32_t> peerUser() noexcept { return std::nullopt; }
 };
 
 }  // namespace hapticd::net

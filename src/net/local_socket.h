@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -15,10 +14,6 @@
 
 namespace hapticd::net {
 
-/// The system's number of the user that holds the other end of a Unix-domain connection; nothing for all
-/// other connections and closed ones.
-std::optional<std::uint32_t> peerUser(const Connection& connection) noexcept;
-
 /// Bytes of the path of a Unix socket, at most.
 inline constexpr std::size_t kLongestSocketPath = 107;
 
@@ -27,7 +22,7 @@ inline constexpr std::size_t kLongestSocketPath = 107;
 class LocalListener {
  public:
   /// Creates the last folder of the path (mode 0700) when it is missing, and replaces a socket that nobody
-  /// listens at. Throws Error, also when the network has no such sockets.
+  /// listens at. Throws Error.
   LocalListener(Loop& loop, std::filesystem::path path, std::function<void(Connection)> onAccept,
                 const ConnectionOptions& options = {});
   ~LocalListener();

@@ -36,16 +36,6 @@ bool Subscription::active() const noexcept {
   return state_ && state_->active();
 }
 
-std::shared_ptr<Connection::Impl> Loop::Impl::adopt(int /*fd*/, const ConnectionOptions& /*options*/) {
-  throw Error("this network has no Unix sockets");
-}
-
-std::shared_ptr<TcpListener::Impl> Loop::Impl::listenLocal(int /*fd*/, std::string /*address*/,
-                                                           std::function<void(Connection)> /*onAccept*/,
-                                                           const ConnectionOptions& /*options*/) {
-  throw Error("this network has no Unix sockets");
-}
-
 void Loop::Impl::report(std::string_view text) noexcept {
   try {
     if (onError) {

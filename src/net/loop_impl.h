@@ -3,6 +3,7 @@
 #pragma once
 
 #include <exception>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -52,13 +53,12 @@ class Loop::Impl {
                                                     std::function<void(Connection)> onAccept,
                                                     const ConnectionOptions& options, const char* option) = 0;
   virtual std::shared_ptr<UdpSocket::Impl> bind(const Endpoint& local) = 0;
-  /// Takes over a connected stream socket that is no TCP socket; only where hasLocalSockets().
-  virtual std::shared_ptr<Connection::Impl> adopt(int fd, const ConnectionOptions& options);
-  /// Takes over a Unix socket that listens at this address; only where hasLocalSockets().
-  virtual std::shared_ptr<TcpListener::Impl> listenLocal(int fd, std::string address,
+  /// See LocalListener and connectLocal().
+  virtual std::shared_ptr<TcpListener::Impl> listenLocal(const std::filesystem::path& path,
                                                          std::function<void(Connection)> onAccept,
-                                                         const ConnectionOptions& options);
-  virtual bool hasLocalSockets() const noexcept { return false; }
+                                                         const ConnectionOptions& options) = 0;
+  virtual std::shared_ptr<Connection::Impl> connectLocal(const std::filesystem::path& path,
+                                                         const ConnectionOptions& options) = 0;
 
   /// Hands a text to the error handler.
   void report(std::string_view text) noexcept;

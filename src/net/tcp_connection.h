@@ -8,6 +8,7 @@
 
 #include "net/connection_impl.h"
 #include "net/loss_watch.h"
+#include "net/unix_socket.h"
 
 namespace hapticd::net {
 
@@ -47,6 +48,7 @@ class TcpConnection final : public Connection::Impl,
   ConnectionStatistics statistics() override;
   std::size_t queuedBytes() override { return queue_.bytes(); }
   int nativeHandle() override { return socket_.is_open() ? socket_.native_handle() : -1; }
+  std::optional<std::uint32_t> peerUser() noexcept override { return userBehind(nativeHandle()); }
 
  private:
   enum class State { connecting, open, flushing, draining, closed };

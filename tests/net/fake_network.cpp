@@ -94,6 +94,11 @@ class FakeLoop final : public Loop::Impl {
   std::shared_ptr<TcpListener::Impl> listen(const Endpoint& local, std::function<void(Connection)> onAccept,
                                             const ConnectionOptions& options, const char* option) override;
   std::shared_ptr<UdpSocket::Impl> bind(const Endpoint& local) override;
+  std::shared_ptr<TcpListener::Impl> listenLocal(const std::filesystem::path& path,
+                                                 std::function<void(Connection)> onAccept,
+                                                 const ConnectionOptions& options) override;
+  std::shared_ptr<Connection::Impl> connectLocal(const std::filesystem::path& path,
+                                                 const ConnectionOptions& options) override;
 
   void at(Nanos when, std::function<void()> function) {
     network_.schedule(when, number_, std::move(function));
@@ -308,6 +313,8 @@ class FakeConnection final : public Connection::Impl, public std::enable_shared_
     return {bytesIn_, bytesOut_, queue_.droppedBuffers(), queue_.droppedBytes(), queue_.bytes(), inFlight_};
   }
   int nativeHandle() override { return -1; }
+  std::optional<std::uint32_t> peerUser() noexcept override { return user_; }
+  void belongsTo(std::uint32_t user) { user_ = user; }
 
   void beCut() {
     cut_ = true;
@@ -556,8 +563,9 @@ class FakeConnection final : public Connection::Impl, public std::enable_shared_
   std::weak_ptr<FakeConnection> other_;
   FakeDescriptor descriptor_;
   State state_ = State::connecting;
-  Buffer unread_;             // arrived
-  std::size_t inFlight_ = 0;  // sent, not yet arrived
+  std::optional<std::uint32_t> user_;  // of a Unix socket
+  Buffer unread_;                      // arrived
+  std::size_t inFlight_ = 0;           // sent, not yet arrived
   bool blocked_ = false;
   bool readArmed_ = false;
   bool paused_ = false;
@@ -577,13 +585,20 @@ class FakeConnection final : public Connection::Impl, public std::enable_shared_
 
 class FakeListener final : public Acceptor {
  public:
+  /// `path`: of a Unix socket, which the network knows by an endpoint, too.
   FakeListener(FakeLoop& loop, const Endpoint& local, std::function<void(Connection)> onAccept,
-               const ConnectionOptions& options)
-      : Acceptor(loop), loop_(loop), local_(local), onAccept_(std::move(onAccept)), options_(options) {
+               const ConnectionOptions& options, std::string path = {})
+      : Acceptor(loop),
+        loop_(loop),
+        local_(local),
+        path_(std::move(path)),
+        onAccept_(std::move(onAccept)),
+        options_(options) {
     loop_.network().listeners_.push_back(this);
   }
 
   const Endpoint& local() const override { return local_; }
+  const std::string& path() const { return path_; }
 
   FakeLoop& loop() { return loop_; }
   // The system establishes the connection, whether or not the program accepts it.
@@ -591,6 +606,7 @@ class FakeListener final : public Acceptor {
     const auto self = shared_from_this();
     auto here = std::make_shared<FakeConnection>(loop_, options_, client->remote(), client->local());
     loop_.network().connections_.push_back(here);
+    if (!path_.empty()) here->belongsTo(loop_.network().localUser);
     here->establish(client);
     client->establish(here);
     pending_.push_back(std::move(here));
@@ -627,6 +643,7 @@ class FakeListener final : public Acceptor {
 
   FakeLoop& loop_;
   const Endpoint local_;
+  const std::string path_;
   const std::function<void(Connection)> onAccept_;
   const ConnectionOptions options_;
   std::deque<std::shared_ptr<FakeConnection>> pending_;  // established, not accepted
@@ -780,6 +797,25 @@ std::shared_ptr<UdpSocket::Impl> FakeLoop::bind(const Endpoint& local) {
   return std::make_shared<FakeUdpSocket>(*this, network_.freeEndpoint(local, used, "UDP", "--listen"));
 }
 
+std::shared_ptr<TcpListener::Impl> FakeLoop::listenLocal(const std::filesystem::path& path,
+                                                         std::function<void(Connection)> onAccept,
+                                                         const ConnectionOptions& options) {
+  if (network_.listenerAt(path.string()) != nullptr)
+    throw Error("cannot use the Unix socket " + path.string() + ": Address already in use");
+  const Endpoint local = network_.freeEndpoint({kLoopbackAddress, 0}, {}, "Unix", "");
+  auto listener = std::make_shared<FakeListener>(*this, local, std::move(onAccept), options, path.string());
+  listener->start();
+  return listener;
+}
+
+std::shared_ptr<Connection::Impl> FakeLoop::connectLocal(const std::filesystem::path& path,
+                                                         const ConnectionOptions& options) {
+  const FakeListener* const listener = network_.listenerAt(path.string());
+  if (listener == nullptr)
+    throw Error("cannot use the Unix socket " + path.string() + ": Connection refused");
+  return connect(listener->local(), milliseconds(1000), options);
+}
+
 // --- the network
 
 std::unique_ptr<Loop::Impl> FakeNetwork::makeLoop() {
@@ -897,6 +933,12 @@ FakeListener* FakeNetwork::listenerAt(const Endpoint& endpoint) const {
     if (matches(listener->local(), endpoint)) return listener;
   }
   return nullptr;
+}
+
+FakeListener* FakeNetwork::listenerAt(const std::string& path) const {
+  const auto found = std::find_if(listeners_.begin(), listeners_.end(),
+                                  [&](const FakeListener* listener) { return listener->path() == path; });
+  return found == listeners_.end() ? nullptr : *found;
 }
 
 FakeUdpSocket* FakeNetwork::udpSocketAt(const Endpoint& endpoint) const {

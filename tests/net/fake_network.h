@@ -61,6 +61,7 @@ class FakeNetwork : public Network {
 
   FakeNetworkOptions options;
   std::map<std::string, std::uint32_t> hosts;
+  std::uint32_t localUser = 1000;  ///< who connects to Unix sockets
 
   /// From now on nothing of this connection arrives, either way, as if the cable were cut.
   void cut(const Endpoint& oneEnd);
@@ -124,6 +125,7 @@ class FakeNetwork : public Network {
   Endpoint freeEndpoint(const Endpoint& wanted, const std::vector<Endpoint>& used, const char* kind,
                         const std::string& option);
   FakeListener* listenerAt(const Endpoint& endpoint) const;
+  FakeListener* listenerAt(const std::string& path) const;
   FakeUdpSocket* udpSocketAt(const Endpoint& endpoint) const;
 
   base::Clock& clock_;

@@ -31,7 +31,7 @@ TEST_F(LocalSocket, AcceptsAndNamesTheUser) {
   const LocalListener listener(loop_, path_, [&](Connection c) { accepted.push_back(std::move(c)); });
   const Connection client = connectLocal(loop_, path_);
   ASSERT_TRUE(pumpUntil(loop_, [&] { return accepted.size() == 1; }));
-  EXPECT_EQ(peerUser(accepted[0]), geteuid());
+  EXPECT_EQ(accepted[0].peerUser(), geteuid());
 }
 
 TEST_F(LocalSocket, ThePathIsFreeAfterDestructionAlsoWithinItsCallback) {

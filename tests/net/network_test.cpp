@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 #include <sys/eventfd.h>
+#include <unistd.h>
 
 #include "net/fake_network.h"
+#include "net/local_socket.h"
 #include "net/loopback.h"
 
 namespace hapticd::net {
@@ -72,6 +74,24 @@ struct NameOfNetwork {
   }
 };
 TYPED_TEST_SUITE(NetworkTest, Networks, NameOfNetwork);
+
+TYPED_TEST(NetworkTest, AUnixSocketNamesTheUserOfItsClient) {
+  const std::string path = testing::TempDir() + "hapticd_network_" + std::to_string(getpid()) + ".sock";
+  if constexpr (std::is_same_v<TypeParam, SimulatedNetwork>) this->net.network.localUser = geteuid();
+  EXPECT_THROW(connectLocal(this->loop(), path), Error);
+  std::optional<LocalListener> local;
+  local.emplace(this->loop(), path, [this](Connection c) { this->server.take(std::move(c)); });
+  EXPECT_THROW(LocalListener(this->loop(), path, [](Connection) {}), Error) << "somebody listens there";
+  this->client.take(connectLocal(this->loop(), path));
+  this->client.send("hello");
+  ASSERT_TRUE(this->until([this] { return this->server.received == "hello"; }));
+  EXPECT_EQ(this->server.connection.peerUser(), geteuid());
+  local.reset();
+  EXPECT_THROW(connectLocal(this->loop(), path), Error);
+  this->server.send("goodbye");
+  EXPECT_TRUE(this->until([this] { return this->client.received == "goodbye"; })) << "the connection stays";
+  const LocalListener again(this->loop(), path, [](Connection) {});
+}
 
 /// Frames with a length before each, in pieces of any size.
 class Frames {

@@ -74,6 +74,8 @@ Script drawScript(std::uint64_t seed, double seconds) {
   script.datagrams = dice.chance(0.5);
   if (dice.chance(0.3)) every(Kind::noMemory, 5.0);
   if (dice.chance(0.3)) every(Kind::noDescriptors, 5.0);
+  script.local = dice.chance(0.5);
+  script.ownLoop = dice.chance(0.3);
   std::stable_sort(script.actions.begin(), script.actions.end(),
                    [](const Action& a, const Action& b) { return a.at < b.at; });
   return script;
@@ -91,6 +93,8 @@ std::string describe(const Script& script) {
   line("record", script.record);
   line("web", script.web);
   line("datagrams", script.datagrams);
+  line("local", script.local);
+  line("own loop", script.ownLoop);
   line("delay, ms", static_cast<double>(script.networkDelay) * 1e-6);
   line("jitter, ms", static_cast<double>(script.networkJitter) * 1e-6);
   line("window, bytes", static_cast<double>(script.window));

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "net/client_frames.h"
+#include "net/local_socket.h"
 #include "wire/text.h"
 #include "wire/udp_request.h"
 
@@ -51,6 +52,7 @@ void SimClient::connect() {
   peer_.emplace(names_, options_);
   net::ConnectionOptions connection;
   connection.hardLimitBytes = std::size_t{256} << 20;
+  if (way == Way::local) return adopt(net::connectLocal(all_.loop, all_.socket, connection));
   adopt(net::Connection::connect(all_.loop, way == Way::web ? all_.web : all_.server, 2s, connection));
 }
 
@@ -174,7 +176,7 @@ void SimClient::onRead(std::uint64_t total) {
 
 void SimClient::onEvent(const wire::Event& event) {
   if (std::holds_alternative<wire::Connected>(event)) {
-    if (identifies) {
+    if (identifies && way != Way::local) {
       wire::Identify identify;
       identify.token = Clients::kToken;
       queue(identify);
@@ -218,6 +220,8 @@ void SimClient::onMessage(const wire::MessageReceived& message) {
   } else if (message.kind == wire::kindOf<wire::Text>) {
     texts.push_back(wire::decode<wire::Text>(message.payload)->text.text);
     all_.heard(name_, texts.back());
+    if (texts.back().starts_with("Rearm_Forces refused") && identifies)
+      all_.finding("client '" + name_ + "' proved that it is an owner and is refused: " + texts.back());
     onText(texts.back());
   }
 }

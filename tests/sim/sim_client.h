@@ -29,6 +29,7 @@ struct Clients {
   SimClock& clock;
   net::Endpoint server;
   net::Endpoint web;
+  std::string socket;
   std::function<void(const std::string&)> finding;
   std::function<void(Nanos)> stopRead;   ///< the server has read the last byte of a stop
   std::function<void(Nanos)> rearmRead;  ///< the same of a re-arm
@@ -96,6 +97,7 @@ class SimClient {
     tcp,        ///< it connects to the server
     datagrams,  ///< as a stock client: the server connects to it, and some messages are datagrams
     web,        ///< as a page: a WebSocket of the web port
+    local,      ///< by the Unix socket, which names its user, who needs no token
   };
   Way way = Way::tcp;
   wire::GuardState guard{};  ///< as last reported

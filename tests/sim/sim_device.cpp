@@ -1,8 +1,11 @@
 #include "sim/sim_device.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "device/drivers/drivers.h"
 #include "device/simulated/waypoint_path.h"
@@ -63,9 +66,30 @@ class SimDevice final : public device::Device {
     lost_ = bench->lost = false;
     wrote_ = false;
   }
-  void close() noexcept override { pause(5 * kMs); }
+  void close() noexcept override {
+    stop();
+    pause(5 * kMs);
+  }
   const device::DeviceProfile& profile() const noexcept override { return hand_.profile(); }
-  device::DeviceTraits traits() const noexcept override { return {.needsRearm = true}; }
+  device::DeviceTraits traits() const noexcept override {
+    return {.selfPaced = bench->ownLoop, .ticksInVendorThread = bench->ownLoop, .needsRearm = true};
+  }
+  // A vendor's loop calls when it has time, and makes up for nothing.
+  void start(std::function<void(Nanos)> onTick) override {
+    leaves_ = false;
+    loop_ = base::PacedThread({"servo"}, bench->clock,
+                              [this, onTick = std::move(onTick)]() -> std::optional<Nanos> {
+                                if (leaves_) return std::nullopt;
+                                const Nanos now = bench->clock.now();
+                                onTick(now);
+                                return std::max(now + kMs, bench->clock.now());
+                              });
+  }
+  void stop() noexcept override {
+    leaves_ = true;
+    loop_.join();
+    if (bench->ownLoop && opened_) hand_.write(Vec3::Zero());
+  }
 
   bool read(Nanos now, device::DeviceState& state) noexcept override {
     const Nanos started = bench->clock.now();
@@ -176,6 +200,8 @@ class SimDevice final : public device::Device {
   }
 
   device::SimulatedDevice hand_;
+  base::PacedThread loop_;
+  bool leaves_ = false;
   bool opened_ = false;
   bool lost_ = false;
   bool wrote_ = false;  // since it was opened

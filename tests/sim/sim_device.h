@@ -29,6 +29,7 @@ struct Bench {
   Dice dice;
   Judge& judge;
   DeviceFaults faults;
+  bool ownLoop = false;                               ///< it calls the servo, as a vendor's library does
   std::function<void(const Vec3&)> wrote;             ///< every write, for the hash
   std::function<void(std::uint32_t)> buttonsChanged;  ///< as delivered
   std::function<void(const std::string&)> finding;

@@ -1,5 +1,7 @@
 #include "sim/simulation.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <cerrno>
@@ -25,6 +27,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr char kRecording[] = "/recording.haptics";
+constexpr char kSocket[] = "/run/hapticd.sock";
 constexpr std::int32_t kUploaded = 5;
 constexpr std::size_t kServerLoop = 0;  // of the network: the first that is made
 constexpr double kPlace = 777;          // where the object of the uploads is at the end
@@ -157,6 +160,7 @@ Simulation::Simulation(const Script& script, bool verbose)
           .dice = Dice(script.seed + 11),
           .judge = judge_,
           .faults = script.faults,
+          .ownLoop = script.ownLoop,
           .wrote =
               [this](const Vec3& force_N) {
                 for (int i = 0; i < 3; ++i) hash_.add(force_N[i]);
@@ -245,6 +249,8 @@ Outcome Simulation::run() {
   config.http = script_.web ? "127.0.0.1:8080" : server::kHttpOff;
   config.allowNoRealtime = true;
   config.tokens = "/tokens";
+  config.socket = script_.local ? kSocket : server::kSocketOff;
+  scheduler_.localUser = geteuid();  // who runs the server
   if (script_.record) config.record = kRecording;
   server::DeviceConfig& device = config.devices.front();
   device.enableForces = true;
@@ -259,6 +265,7 @@ Outcome Simulation::run() {
               .clock = clock_,
               .server = server_->address(),
               .web = server_->webAddress().value_or(net::Endpoint{}),
+              .socket = kSocket,
               .finding = [this](const auto& text) { finding(text); },
               .stopRead = [this](Nanos at) { judge_.onStop(at); },
               .rearmRead = [this](Nanos at) { judge_.onRearm(at); },
@@ -276,6 +283,7 @@ Outcome Simulation::run() {
   for (int i = 0; i < 2; ++i) {
     operators_.push_back(std::make_unique<Listener>(*clients_, "operator " + std::to_string(i)));
     if (i == 1) operators_.back()->kinds = wire::kReportButton;
+    if (i == 1 && script_.local) operators_.back()->way = SimClient::Way::local;
     join(*operators_.back());
   }
   for (int i = 0; i < 2; ++i) {
@@ -676,6 +684,7 @@ void Simulation::visitWithoutDescriptors(Dice& dice) {
   std::vector<SimClient::Way> ways{SimClient::Way::tcp};
   if (script_.web) ways.push_back(SimClient::Way::web);
   if (script_.datagrams) ways.push_back(SimClient::Way::datagrams);
+  if (script_.local) ways.push_back(SimClient::Way::local);
   newcomer->way = ways[dice.below(ways.size())];
   newcomer->askPeriod = 200 * kMs;  // all of its requests will not be lost
   newcomer->connect();
@@ -1017,6 +1026,7 @@ void Simulation::checkReplay() {
   auto player = std::make_unique<server::Player>(server::ReplayOptions{.file = kRecording});
   server::ServerConfig config = player->config();
   config.http = server::kHttpOff;
+  config.socket = server::kSocketOff;
   ++config.port;
   scheduler_.setServerLoop(scheduler_.loops());
   server_.emplace(config, std::move(player));

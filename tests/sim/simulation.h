@@ -47,6 +47,8 @@ struct Script {
   bool record = false;
   bool web = false;        ///< with a web port, and a page that takes part
   bool datagrams = false;  ///< with a client that uses them
+  bool ownLoop = false;    ///< the device calls the servo
+  bool local = false;      ///< with a Unix socket, and an operator who uses it
   Nanos networkDelay = 50'000;
   Nanos networkJitter = 0;
   std::size_t window = std::size_t{256} * 1024;

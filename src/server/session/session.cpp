@@ -52,7 +52,7 @@ Session::Session(scene::ClientId id, SessionOwner& owner, const wire::LocalNames
       udp_(std::move(udp)),
       peer_(names, peerOptions(udp_.get())),
       mode_(mode),
-      user_(net::peerUser(connection_)) {
+      user_(connection_.peerUser()) {
   description_ = user_ ? "user " + std::to_string(*user_) : connection_.remote().text();
   description_ += ", " + std::string(nameOf(mode));
 }
