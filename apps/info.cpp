@@ -25,7 +25,7 @@ struct DeviceFacts {
   std::uint64_t lost = 0;
   double peakForce_N = 0;
   double deepest_m = 0;
-  std::uint32_t trips = 0;  // bits of realtime::Trip that acted
+  std::map<realtime::Trip, base::Nanos> trips;  // that acted, and when each began to
 };
 
 struct RecordingFacts {
@@ -45,7 +45,10 @@ void add(RecordingFacts& facts, const record::TickEvent& event) {
   device.inContact += report.rendering.touching ? 1 : 0;
   device.peakForce_N = std::max(device.peakForce_N, report.force_N.norm());
   if (report.rendering.touching) device.deepest_m = std::max(device.deepest_m, report.rendering.depth_m);
-  device.trips |= report.guard.active;
+  for (const realtime::TripInfo& trip : realtime::kTrips) {
+    if ((report.guard.active >> static_cast<unsigned>(trip.trip) & 1U) != 0)
+      device.trips.try_emplace(trip.trip, report.time);
+  }
 }
 
 void add(RecordingFacts& facts, const record::SceneEvent& event) {
@@ -78,7 +81,7 @@ std::string dateText(base::Nanos wall) {
   return text;
 }
 
-void print(const DeviceFacts& facts, const record::RecordedDevice& device) {
+void print(const DeviceFacts& facts, const record::RecordedDevice& device, base::Nanos first) {
   std::string names;
   for (const std::string& name : device.names) names += (names.empty() ? "" : ", ") + name;
   std::printf("device      %s: %s (%s), scene %u, %g ticks per second\n", names.c_str(), device.model.c_str(),
@@ -92,8 +95,11 @@ void print(const DeviceFacts& facts, const record::RecordedDevice& device) {
               1e3 * facts.deepest_m);
   std::string trips;
   for (const realtime::TripInfo& trip : realtime::kTrips) {
-    if ((facts.trips >> static_cast<unsigned>(trip.trip) & 1U) != 0)
-      trips += (trips.empty() ? "" : ", ") + std::string(trip.name);
+    const auto acted = facts.trips.find(trip.trip);
+    if (acted == facts.trips.end()) continue;
+    char text[64];
+    std::snprintf(text, sizeof text, " from %.3f s on", base::toSeconds(acted->second - first));
+    trips += (trips.empty() ? "" : ", ") + std::string(trip.name) + text;
   }
   std::printf("  guard     %s\n", trips.empty() ? "never acted" : trips.c_str());
 }
@@ -111,7 +117,8 @@ int run(const std::string& file, bool config, bool json) {
   std::printf("began       %s\n",
               facts.first == 0 ? "without a tick" : dateText(facts.first + header.wallOffset).c_str());
   std::printf("lasts       %.3f s\n", base::toSeconds(facts.last - facts.first));
-  for (std::size_t i = 0; i < facts.devices.size(); ++i) print(facts.devices[i], header.devices[i]);
+  for (std::size_t i = 0; i < facts.devices.size(); ++i)
+    print(facts.devices[i], header.devices[i], facts.first);
   for (const auto& [name, count] : facts.commands)
     std::printf("command     %s, %llu times\n", name.c_str(), static_cast<unsigned long long>(count));
   for (const record::MarkerEvent& marker : facts.markers)
