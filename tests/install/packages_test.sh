@@ -75,6 +75,7 @@ for file in /lib/systemd/system/hapticd.service /lib/systemd/system/hapticd-loop
   /usr/share/doc/hapticd/copyright /usr/share/doc/hapticd-doc/configuration.md; do
   [ -e "$root$file" ] || fail "$file is not installed"
 done
+grep -q 'stop hapticd.service' "$root/var/lib/dpkg/info/hapticd.prerm" || fail "a removal leaves the service running"
 ! in_root test -e /etc/systemd/system/multi-user.target.wants/hapticd.service || fail "the service is enabled without consent"
 ! in_root test -e /etc/systemd/system/multi-user.target.wants/hapticd-loopback.service || fail "the loopback service is enabled without consent"
 
