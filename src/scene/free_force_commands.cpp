@@ -145,6 +145,22 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
     start(entry, waiting->second.owner, call.now);
     waitingStarts_.erase(waiting);
   }
+  if (entry.value.running) tellOfSum(call);
+}
+
+// Whoever makes them too many is told.
+void FreeForces::tellOfSum(const Call& call) const {
+  double stiffness_N_per_m = 0;
+  double damping_Ns_per_m = 0;
+  for (const auto& [index, entry] : effects_) {
+    const Effect& effect = entry.value.effect;
+    if (entry.value.running && !effect.releasing)
+      (effect.type == EffectType::viscous ? damping_Ns_per_m : stiffness_N_per_m) += effect.gain;
+  }
+  const double share = bound_.shareOf(stiffness_N_per_m, damping_Ns_per_m);
+  if (share < 1)
+    call.warn("startEffect", "all effects together would be unstable on this device: their gains are lowered",
+              " to ", std::lround(100 * share), " %");
 }
 
 // The definition may travel by UDP and arrive after the start.
@@ -153,6 +169,7 @@ void FreeForces::handle(StartEffect& c, const Call& call) {
   const auto known = effects_.find(c.index);
   if (known != effects_.end() && !known->second.value.effect.releasing) {
     start(known->second, call.client, call.now);
+    tellOfSum(call);
     return;
   }
   if (waitingStarts_.size() < config_.limits.effects || waitingStarts_.count(c.index) != 0) {

@@ -8,6 +8,14 @@ namespace hapticd::scene {
 
 using geometry::Mat3;
 
+namespace {
+
+double stiffnessOf(const ForceField& field, double worldUnitsPerMetre) {
+  return Eigen::JacobiSVD<Mat3>(field.jacobian_N_per_unit).singularValues()[0] * worldUnitsPerMetre;
+}
+
+}  // namespace
+
 FreeForces::FreeForces(const SceneConfig& config) : config_(config), bound_(config) {}
 
 void FreeForces::start(Owned<RunningEffect>& entry, ClientId client, Nanos now) {
@@ -41,11 +49,27 @@ std::optional<ForceField> FreeForces::fieldOf(const Constraint& c) const {
 }
 
 ForceField FreeForces::passive(ForceField field, double worldUnitsPerMetre) const {
-  const double stiffest =
-      Eigen::JacobiSVD<Mat3>(field.jacobian_N_per_unit).singularValues()[0] * worldUnitsPerMetre;
+  const double stiffest = stiffnessOf(field, worldUnitsPerMetre);
   const double max = bound_.maxStiffness_N_per_m();
   if (stiffest > max) field.jacobian_N_per_unit *= max / stiffest;
   return field;
+}
+
+// Each alone is within the bound, together they may not be. What ramps out is gone too soon to shake a hand.
+void FreeForces::keepPassiveTogether(PublishedForces& forces, double worldUnitsPerMetre) const {
+  double stiffness_N_per_m = 0;
+  double damping_Ns_per_m = 0;
+  for (const Effect& effect : forces.effects) {
+    if (!effect.releasing)
+      (effect.type == EffectType::viscous ? damping_Ns_per_m : stiffness_N_per_m) += effect.gain;
+  }
+  for (const ForceField& field : forces.fields) {
+    if (!field.releasing) stiffness_N_per_m += stiffnessOf(field, worldUnitsPerMetre);
+  }
+  const double share = bound_.shareOf(stiffness_N_per_m, damping_Ns_per_m);
+  if (share == 1) return;
+  for (Effect& effect : forces.effects) effect.gain *= share;
+  for (ForceField& field : forces.fields) field.jacobian_N_per_unit *= share;
 }
 
 PublishedForces FreeForces::publish(double worldUnitsPerMetre) const {
@@ -74,6 +98,7 @@ PublishedForces FreeForces::publish(double worldUnitsPerMetre) const {
       forces.fields.push_back(passive(*field, worldUnitsPerMetre));
   }
   for (const auto& entry : leavingFields_) forces.fields.push_back(passive(entry.value, worldUnitsPerMetre));
+  keepPassiveTogether(forces, worldUnitsPerMetre);
   if (buzz_) forces.buzz = buzz_->value;
   return forces;
 }

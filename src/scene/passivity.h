@@ -16,6 +16,12 @@ class PassivityBound {
                                      : kMargin * config.ownDamping_Ns_per_m) {}
 
   double maxStiffness_N_per_m() const { return damping_Ns_per_m_ / delay_s_; }
+  /// The factor, at most 1, by which stiffnesses and dampings that act together, and sum up to these, stay
+  /// within the bound.
+  double shareOf(double stiffness_N_per_m, double damping_Ns_per_m) const {
+    const double load = stiffness_N_per_m * delay_s_ + damping_Ns_per_m;
+    return load > damping_Ns_per_m_ ? damping_Ns_per_m_ / load : 1;
+  }
   /// What damping is left beside a stiffness.
   double maxDamping_Ns_per_m(double stiffness_N_per_m) const {
     return damping_Ns_per_m_ - stiffness_N_per_m * delay_s_;

@@ -173,6 +173,46 @@ TEST_F(Forces, StartMayComeBeforeItsDefinition) {
   EXPECT_TRUE(notices_.empty());
 }
 
+// Each may have all of the bound, and all together no more.
+TEST_F(Forces, EffectsTogetherStayWithinTheBound) {
+  const auto load = [this] {
+    double stiffness_N_per_m = 0;
+    double damping_Ns_per_m = 0;
+    for (const Effect& e : scene_->effects) {
+      if (!e.releasing) (e.type == EffectType::viscous ? damping_Ns_per_m : stiffness_N_per_m) += e.gain;
+    }
+    for (const ForceField& f : scene_->fields) {
+      if (!f.releasing) stiffness_N_per_m += 1000 * f.jacobian_N_per_unit.cwiseAbs().maxCoeff();
+    }
+    return 0.5e-3 * stiffness_N_per_m + damping_Ns_per_m;
+  };
+  say(DefineEffect{.type = "spring", .index = 1, .gain = 9, .magnitude_N = 1});
+  say(StartEffect{1});
+  ASSERT_TRUE(publish());
+  EXPECT_TRUE(notices_.empty());
+  EXPECT_DOUBLE_EQ(scene_->effects[0].gain, 9000);
+  say(DefineEffect{.type = "viscous", .index = 2, .gain = 0.004, .magnitude_N = 1});
+  say(StartEffect{2});
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("all effects together"));
+  ASSERT_TRUE(publish());
+  EXPECT_NEAR(load(), 4.995, 1e-9);
+  EXPECT_NEAR(scene_->effects[0].gain / scene_->effects[1].gain, 9000 / 4.0, 1e-6)
+      << "as they were asked for";
+  say(SetForceField{.jacobian_N_per_m = {-5000, 0, 0, 0, -5000, 0, 0, 0, -5000}, .radius_m = 1});
+  ASSERT_TRUE(publish());
+  EXPECT_NEAR(load(), 4.995, 1e-9);
+  say(StopEffect{1});
+  say(SetForceField{});
+  ASSERT_TRUE(publish());
+  EXPECT_NEAR(scene_->effects[0].gain, 4, 1e-12) << "alone again";
+  say(DefineEffect{.type = "spring", .index = 3, .gain = 9, .magnitude_N = 1}, kOther);
+  say(StartEffect{3}, kOther);
+  notices_.clear();
+  builder_.clientGone(kOther, now_);
+  ASSERT_TRUE(publish());
+  EXPECT_NEAR(scene_->effects[0].gain, 4, 1e-12) << "what ramps out does not count";
+}
+
 TEST_F(Forces, NegativeAndUnstableParametersAreLowered) {
   say(DefineEffect{.type = "spring", .index = 1, .gain = -1, .magnitude_N = 1});
   EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("gain -1"));
@@ -182,11 +222,14 @@ TEST_F(Forces, NegativeAndUnstableParametersAreLowered) {
   EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("unstable"));
   say(DefineEffect{.type = "constant", .index = 3, .magnitude_N = 1, .duration_ms = -5});
   EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("direction is zero"));
-  for (const int i : {1, 2, 3}) say(StartEffect{i});
+  say(StartEffect{1});
   publish();
   EXPECT_NEAR(scene_->effects[0].gain, 10'000, 20) << "5 N s/m / 0.5 ms";
-  EXPECT_NEAR(scene_->effects[1].gain, 5, 0.01);
-  EXPECT_EQ(scene_->effects[2].duration, 0);
+  say(StopEffect{1});
+  for (const int i : {2, 3}) say(StartEffect{i});
+  publish();
+  EXPECT_NEAR(scene_->effects[0].gain, 5, 0.01);
+  EXPECT_EQ(scene_->effects[1].duration, 0);
 }
 
 TEST_F(Forces, AtMostAsManyEffectsAsTheLimit) {
