@@ -10,12 +10,16 @@
 
 namespace hapticd::scene {
 
-/// F = force + jacobian (x - origin) while |x - origin| <= radius. World frame and units, newtons.
+/// F = force + jacobian (x - origin), which fades to zero over the rim inside the radius, so that its edge is
+/// no step. World frame and units, newtons.
 struct ForceField {
+  static constexpr double kLargest_N = 10;  ///< the limit of VRPN's own server
+
   geometry::Vec3 origin = geometry::Vec3::Zero();
   geometry::Vec3 force_N = geometry::Vec3::Zero();
   geometry::Mat3 jacobian_N_per_unit = geometry::Mat3::Zero();  ///< newtons per world unit
   double radius = 0;                                            ///< world units; may be infinite
+  double rim = 0.1;                                             ///< share of the radius
   std::uint32_t number = 0;                                     ///< of this field only
   bool releasing = false;                                       ///< its owner is gone: ramp out in 250 ms
   std::shared_ptr<const ForceOwner> owner;                      ///< null: of no client

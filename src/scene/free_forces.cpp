@@ -2,6 +2,7 @@
 
 #include <Eigen/SVD>
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace hapticd::scene {
@@ -52,6 +53,18 @@ ForceField FreeForces::passive(ForceField field, double worldUnitsPerMetre) cons
   const double stiffest = stiffnessOf(field, worldUnitsPerMetre);
   const double max = bound_.maxStiffness_N_per_m();
   if (stiffest > max) field.jacobian_N_per_unit *= max / stiffest;
+  // The rim is a spring, too: it becomes wider, and where the radius leaves no room for that, the field
+  // weaker.
+  const double radius_m = field.radius / worldUnitsPerMetre;
+  if (!std::isfinite(radius_m) || !(radius_m > 0)) return field;
+  const double most_N = field.force_N.norm() + std::min(stiffest, max) * radius_m;
+  const double wanted = std::min(most_N, ForceField::kLargest_N) / (max * radius_m);
+  field.rim = std::clamp(wanted, field.rim, 1.0);
+  if (wanted > 1) {
+    const double share = max * radius_m / most_N;
+    field.force_N *= share;
+    field.jacobian_N_per_unit *= share;
+  }
   return field;
 }
 

@@ -213,6 +213,27 @@ TEST_F(Forces, EffectsTogetherStayWithinTheBound) {
   EXPECT_NEAR(scene_->effects[0].gain, 4, 1e-12) << "what ramps out does not count";
 }
 
+// Its slope there is a stiffness as any other.
+TEST_F(Forces, RimOfAFieldIsNoStifferThanTheBound) {
+  constexpr double kBound_N_per_m = 9990;
+  for (const double radius_mm : {0.2, 2.0, 20.0}) {
+    for (const double force_N : {1.0, 3.0, 40.0}) {
+      say(SetForceField{.force_N = Vec3(0, 0, force_N), .radius_m = 1e-3 * radius_mm});
+      ASSERT_TRUE(publish());
+      const ForceField& field = scene_->fields[0];
+      const double most_N = std::min(10.0, field.force_N.norm());
+      EXPECT_LE(most_N / (field.rim * field.radius * 1e-3), kBound_N_per_m * (1 + 1e-9));
+      const double narrow = most_N / (0.1e-3 * radius_mm);
+      if (narrow < kBound_N_per_m) {
+        EXPECT_EQ(field.rim, 0.1);
+        EXPECT_EQ(field.force_N.z(), force_N);
+      }
+      EXPECT_LE(field.rim, 1);
+    }
+  }
+  EXPECT_EQ(scene_->fields[0].radius, 20) << "world units";
+}
+
 TEST_F(Forces, NegativeAndUnstableParametersAreLowered) {
   say(DefineEffect{.type = "spring", .index = 1, .gain = -1, .magnitude_N = 1});
   EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("gain -1"));

@@ -9,16 +9,13 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr double kLargest_N = 10;  // the limit of VRPN's own server
-constexpr double kRim = 0.1;  // share of the radius over which a field fades, so that its edge is no step
-
 Vec3 forceOf(const scene::ForceField& field, const Vec3& hip) noexcept {
   const Vec3 offset = hip - field.origin;
   const double distance = offset.norm();
   if (!(distance < field.radius)) return Vec3::Zero();
   const Vec3 force = field.force_N + field.jacobian_N_per_unit * offset;
-  const double clamp = std::min(1.0, kLargest_N / std::max(force.norm(), 1e-300));
-  const double fade = std::min(1.0, (field.radius - distance) / (kRim * field.radius));
+  const double clamp = std::min(1.0, scene::ForceField::kLargest_N / std::max(force.norm(), 1e-300));
+  const double fade = std::min(1.0, (field.radius - distance) / (field.rim * field.radius));
   return clamp * fade * force;
 }
 
