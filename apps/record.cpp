@@ -234,7 +234,7 @@ void addRecord(CLI::App& app) {
   command->add_flag("--detach", options->detach, "With --server: begin the recording and return")
       ->needs(onServer);
   command->add_flag("--end", options->end, "With --server: end the recording at hand")->needs(onServer);
-  addTokenFile(*command, options->tokenFile);
+  addTokenFile(*command, options->tokenFile)->needs(onServer);
   command->add_option("--seconds", options->seconds, "Duration; 0: until Ctrl-C")
       ->check(within(0, kLongest_s))
       ->capture_default_str();

@@ -24,8 +24,8 @@ std::string readToken(const std::string& file) {
   return token;
 }
 
-void addTokenFile(CLI::App& command, std::string& file) {
-  command
+CLI::Option* addTokenFile(CLI::App& command, std::string& file) {
+  return command
       .add_option("--token-file", file,
                   "File with your token, mode 0600; only for a server on this machine, or through a tunnel")
       ->check(CLI::ExistingFile);

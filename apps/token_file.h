@@ -10,7 +10,7 @@ namespace hapticd::apps {
 std::string readToken(const std::string& file);
 
 /// --token-file of a command that opens the device `server`, NAME@host.
-void addTokenFile(CLI::App& command, std::string& file);
+CLI::Option* addTokenFile(CLI::App& command, std::string& file);
 /// The token for that device; empty for no file. Throws std::runtime_error as readToken(), and when the token
 /// would cross a network in clear text.
 std::string tokenFor(const std::string& server, const std::string& file);

@@ -106,9 +106,10 @@ void send(Client& client, const TriangleMesh& mesh, const TouchOptions& options)
               client.device().c_str(), client.server().c_str());
 }
 
-// A refusal of what was sent comes before the answer to this question; without it, only the summary at the
-// end would tell.
+// A refusal of what was sent comes before the answer to this question, which other servers may not give;
+// without it, only the summary at the end would tell.
 void awaitAnswer(Client& client, const ReportSummary& summary) {
+  if (!client.waitCapabilities()) return;
   bool answered = false;
   client.onToRoom([&](const ToRoomReport&) { answered = true; });
   client.requestToRoom();

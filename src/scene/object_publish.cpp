@@ -80,6 +80,7 @@ void ObjectTable::commitMeshes(Nanos now, NoticeBoard& board, std::vector<Notice
   const auto clock = [&] { return now + (stopwatch_() - started); };
   std::vector<std::int32_t> later;
   std::vector<Object*> committed;
+  committed.reserve(edited_.size());
   for (const std::int32_t id : edited_) {
     Object* object = find(id);
     if (object == nullptr) continue;
@@ -93,8 +94,7 @@ void ObjectTable::commitMeshes(Nanos now, NoticeBoard& board, std::vector<Notice
     if (!due) continue;
     const Nanos begin = clock();
     try {
-      commitMesh(*object, now, clock());
-      committed.push_back(object);
+      commitMesh(*object, now, clock(), committed);
     } catch (const std::exception& error) {
       object->mesh.giveUp();
       const Call call{object->meshSetBy, now, false, board, out};
@@ -124,9 +124,10 @@ double ObjectTable::metresPerUnit(const Object& object) const {
   return object.motion.destination().linear().colwise().norm().maxCoeff() / worldUnitsPerMetre_;
 }
 
-void ObjectTable::commitMesh(Object& object, Nanos now, Nanos clock) {
+void ObjectTable::commitMesh(Object& object, Nanos now, Nanos clock, std::vector<Object*>& committed) {
   const std::uint64_t topology = object.geometry ? object.geometry->topology : 0;
   object.geometry = object.mesh.commit(clock, ++lastTopology_);
+  committed.push_back(&object);  // before anything that may fail: it must begin
   object.stateChanged = true;
   queue(object);
   if (!config_.checkMeshes || !object.geometry || object.geometry->topology == topology) return;

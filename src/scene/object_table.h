@@ -162,7 +162,7 @@ class ObjectTable {
   Affine frameOf(const Object& object) const;
   void commitMeshes(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   double metresPerUnit(const Object& object) const;
-  void commitMesh(Object& object, Nanos now, Nanos clock);
+  void commitMesh(Object& object, Nanos now, Nanos clock, std::vector<Object*>& committed);
   void beginMorphs(const std::vector<Object*>& committed, Nanos begin);
   void checkMeshes(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   struct Move {
