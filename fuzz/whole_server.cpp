@@ -61,6 +61,7 @@ class Session {
     config.listenAddress = "127.0.0.1";
     config.port = 3883;
     config.http = "127.0.0.1:8080";
+    config.socket = server::kSocketOff;
     config.allowNoRealtime = true;
     config.tokens = "/tokens";
     config.devices.front().enableForces = true;

@@ -29,7 +29,7 @@ struct Clients {
   SimClock& clock;
   net::Endpoint server;
   net::Endpoint web;
-  std::string socket;
+  std::string socket{};
   std::function<void(const std::string&)> finding;
   std::function<void(Nanos)> stopRead;   ///< the server has read the last byte of a stop
   std::function<void(Nanos)> rearmRead;  ///< the same of a re-arm
