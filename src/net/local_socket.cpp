@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "net/loop_impl.h"
-#include "net/unix_socket.h"
 
 namespace hapticd::net {
 

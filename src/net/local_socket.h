@@ -1,7 +1,6 @@
 // Unix-domain stream sockets: connections within this machine whose peer the kernel names.
 #pragma once
 
-#include <cstddef>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -11,11 +10,9 @@
 #include "net/connection.h"
 #include "net/endpoint.h"
 #include "net/tcp_listener.h"
+#include "net/unix_socket.h"
 
 namespace hapticd::net {
-
-/// Bytes of the path of a Unix socket, at most.
-inline constexpr std::size_t kLongestSocketPath = 107;
 
 /// Accepts connections at a path of the file system; the destructor removes the socket. Every local user who
 /// may enter the folder can connect. Without a file descriptor left it does as TcpListener.

@@ -12,7 +12,6 @@
 #include <utility>
 
 #include "net/endpoint.h"
-#include "net/local_socket.h"
 
 namespace hapticd::net {
 

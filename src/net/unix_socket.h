@@ -1,11 +1,15 @@
 // Unix sockets of the operating system.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 
 namespace hapticd::net {
+
+/// Bytes of the path of a Unix socket, at most.
+inline constexpr std::size_t kLongestSocketPath = 107;
 
 /// A socket that listens at this path, see LocalListener. Throws Error.
 int listenAt(const std::filesystem::path& path);

@@ -150,14 +150,7 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
 
 // Whoever makes them too many is told.
 void FreeForces::tellOfSum(const Call& call) const {
-  double stiffness_N_per_m = 0;
-  double damping_Ns_per_m = 0;
-  for (const auto& [index, entry] : effects_) {
-    const Effect& effect = entry.value.effect;
-    if (entry.value.running && !effect.releasing)
-      (effect.type == EffectType::viscous ? damping_Ns_per_m : stiffness_N_per_m) += effect.gain;
-  }
-  const double share = bound_.shareOf(stiffness_N_per_m, damping_Ns_per_m);
+  const double share = bound_.shareOf(sumOfEffects());
   if (share < 1)
     call.warn("startEffect", "all effects together would be unstable on this device: their gains are lowered",
               " to ", std::lround(100 * share), " %");

@@ -68,18 +68,24 @@ ForceField FreeForces::passive(ForceField field, double worldUnitsPerMetre) cons
   return field;
 }
 
-// Each alone is within the bound, together they may not be. What ramps out is gone too soon to shake a hand.
+// What ramps out is gone too soon to shake a hand.
+SpringSum FreeForces::sumOfEffects() const {
+  SpringSum sum;
+  for (const auto& [index, entry] : effects_) {
+    const Effect& effect = entry.value.effect;
+    if (!entry.value.running || effect.releasing) continue;
+    (effect.type == EffectType::viscous ? sum.damping_Ns_per_m : sum.stiffness_N_per_m) += effect.gain;
+  }
+  return sum;
+}
+
+// Each alone is within the bound, together they may not be.
 void FreeForces::keepPassiveTogether(PublishedForces& forces, double worldUnitsPerMetre) const {
-  double stiffness_N_per_m = 0;
-  double damping_Ns_per_m = 0;
-  for (const Effect& effect : forces.effects) {
-    if (!effect.releasing)
-      (effect.type == EffectType::viscous ? damping_Ns_per_m : stiffness_N_per_m) += effect.gain;
-  }
+  SpringSum sum = sumOfEffects();
   for (const ForceField& field : forces.fields) {
-    if (!field.releasing) stiffness_N_per_m += stiffnessOf(field, worldUnitsPerMetre);
+    if (!field.releasing) sum.stiffness_N_per_m += stiffnessOf(field, worldUnitsPerMetre);
   }
-  const double share = bound_.shareOf(stiffness_N_per_m, damping_Ns_per_m);
+  const double share = bound_.shareOf(sum);
   if (share == 1) return;
   for (Effect& effect : forces.effects) effect.gain *= share;
   for (ForceField& field : forces.fields) field.jacobian_N_per_unit *= share;

@@ -109,6 +109,7 @@ class FreeForces {
   void forEachDeadline(const F& f) const;
   std::optional<ForceField> fieldOf(const Constraint& constraint) const;
   ForceField passive(ForceField field, double worldUnitsPerMetre) const;
+  SpringSum sumOfEffects() const;
   void tellOfSum(const Call& call) const;
   void keepPassiveTogether(PublishedForces& forces, double worldUnitsPerMetre) const;
   Constraint& constraintFor(const Call& call);

@@ -93,7 +93,7 @@ class MeshDraft {
   /// How long the surface of commit() should travel to its shape from `begin` on, when it travels
   /// `shortest(distance in object units)` at least; 0: it is a new one.
   Nanos travel(Nanos begin, const std::function<Nanos(double)>& shortest) const;
-  /// After commit(), not before the servo may see it: it travels from what is rendered at `begin`.
+  /// After commit(), and before the servo may see it: it travels from what is rendered at `begin`.
   void begin(Nanos begin, Nanos travel);
 
  private:

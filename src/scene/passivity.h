@@ -7,6 +7,12 @@
 
 namespace hapticd::scene {
 
+/// Of springs and dampers that act at the same time.
+struct SpringSum {
+  double stiffness_N_per_m = 0;
+  double damping_Ns_per_m = 0;
+};
+
 /// K (T/2 + t_d) + B < b (Colgate and Schenkel 1997, with the transport delay added to half a period).
 class PassivityBound {
  public:
@@ -16,10 +22,9 @@ class PassivityBound {
                                      : kMargin * config.ownDamping_Ns_per_m) {}
 
   double maxStiffness_N_per_m() const { return damping_Ns_per_m_ / delay_s_; }
-  /// The factor, at most 1, by which stiffnesses and dampings that act together, and sum up to these, stay
-  /// within the bound.
-  double shareOf(double stiffness_N_per_m, double damping_Ns_per_m) const {
-    const double load = stiffness_N_per_m * delay_s_ + damping_Ns_per_m;
+  /// The factor, at most 1, that keeps all of them together within the bound.
+  double shareOf(const SpringSum& sum) const {
+    const double load = sum.stiffness_N_per_m * delay_s_ + sum.damping_Ns_per_m;
     return load > damping_Ns_per_m_ ? damping_Ns_per_m_ / load : 1;
   }
   /// What damping is left beside a stiffness.
