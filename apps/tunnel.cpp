@@ -9,6 +9,7 @@
 
 #include "client/server_address.h"
 #include "commands.h"
+#include "hapticd/error.h"
 #include "net/connection.h"
 #include "net/local_socket.h"
 #include "net/tcp_listener.h"
