@@ -24,6 +24,7 @@
 #include "net/endpoint.h"
 #include "wire/cookie.h"
 #include "wire/frame_encoder.h"
+#include "wire/peer.h"
 
 namespace hapticd::whole_server {
 namespace {
