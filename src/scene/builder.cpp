@@ -86,7 +86,7 @@ class SceneBuilder::State {
     snapshot->faces = faces_;
     snapshot->objects = objects_.published().objects;
     snapshot->objectIndex = objects_.published().index;
-    PublishedForces published = forces_.publish(workspace_.worldUnitsPerMetre);
+    PublishedForces published = forces_.publish(now, workspace_.worldUnitsPerMetre, board_, out);
     snapshot->effects = std::move(published.effects);
     snapshot->planes = std::move(published.planes);
     snapshot->fields = std::move(published.fields);

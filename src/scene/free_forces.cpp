@@ -91,7 +91,35 @@ void FreeForces::keepPassiveTogether(PublishedForces& forces, double worldUnitsP
   for (ForceField& field : forces.fields) field.jacobian_N_per_unit *= share;
 }
 
-PublishedForces FreeForces::publish(double worldUnitsPerMetre) const {
+// Once for each field and share: its owner learns why it feels less than it asked for.
+void FreeForces::tellOfFields(const PublishedForces& forces, double worldUnitsPerMetre, Nanos now,
+                              NoticeBoard& board, std::vector<Notice>& out) {
+  const auto tell = [&](std::string_view name, const ForceField& asked, ClientId owner, FieldShare& told) {
+    const auto given = std::find_if(forces.fields.begin(), forces.fields.end(),
+                                    [&](const ForceField& f) { return f.number == asked.number; });
+    if (asked.releasing || given == forces.fields.end()) return;
+    const double stiffness = stiffnessOf(asked, worldUnitsPerMetre);
+    const double left = stiffnessOf(*given, worldUnitsPerMetre);
+    const double force_N = asked.force_N.norm();
+    const FieldShare share{asked.number, stiffness > 0 ? std::lround(100 * left / stiffness) : 100,
+                           force_N > 0 ? std::lround(100 * given->force_N.norm() / force_N) : 100};
+    if (std::exchange(told, share) == share) return;
+    const Call call{owner, now, false, board, out};
+    constexpr std::string_view kReason =
+        "would be unstable on this device, alone or with the effects that run, and is lowered";
+    if (share.stiffness_percent < 100)
+      call.warn(name, kReason, ", stiffness ", stiffness, " to ", left, " N/m");
+    if (share.force_percent < 100)
+      call.warn(name, kReason, ", force ", force_N, " to ", given->force_N.norm(), " N");
+  };
+  if (field_) tell("sendForceField", field_->value, field_->owner, fieldTold_);
+  if (!constraint_) return;
+  if (const auto asked = fieldOf(constraint_->value))
+    tell("constraint_KSpring", *asked, constraint_->owner, constraintTold_);
+}
+
+PublishedForces FreeForces::publish(Nanos now, double worldUnitsPerMetre, NoticeBoard& board,
+                                    std::vector<Notice>& out) {
   PublishedForces forces;
   for (const auto& [index, entry] : effects_) {
     if (entry.value.running) forces.effects.push_back(entry.value.effect);
@@ -118,6 +146,7 @@ PublishedForces FreeForces::publish(double worldUnitsPerMetre) const {
   }
   for (const auto& entry : leavingFields_) forces.fields.push_back(passive(entry.value, worldUnitsPerMetre));
   keepPassiveTogether(forces, worldUnitsPerMetre);
+  tellOfFields(forces, worldUnitsPerMetre, now, board, out);
   if (buzz_) forces.buzz = buzz_->value;
   return forces;
 }

@@ -61,6 +61,15 @@ struct ForceConstraint {
   std::shared_ptr<const ForceOwner> owner;
 };
 
+/// To what share a field was lowered, as its owner was told.
+struct FieldShare {
+  std::uint32_t number = 0;  ///< of the field
+  long stiffness_percent = 100;
+  long force_percent = 100;
+
+  bool operator==(const FieldShare&) const = default;
+};
+
 /// All of them, by index. A command checks all of its values before it changes anything.
 class FreeForces {
  public:
@@ -78,8 +87,9 @@ class FreeForces {
   /// Removes ended forces and reports startEffect calls whose definition never arrived. True when something
   /// changed since the last call.
   bool update(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
-  /// Force fields depend on the workspace: a stiff one is kept passive in device metres.
-  PublishedForces publish(double worldUnitsPerMetre) const;
+  /// Force fields depend on the workspace: a stiff one is kept passive in device metres, and its owner is
+  /// told.
+  PublishedForces publish(Nanos now, double worldUnitsPerMetre, NoticeBoard& board, std::vector<Notice>& out);
   /// Appends all of them, running or not.
   void describe(SceneDescription& out) const;
   /// Appends commands that set and start all but those that ramp out; effects start anew.
@@ -112,6 +122,8 @@ class FreeForces {
   SpringSum sumOfEffects() const;
   void tellOfSum(const Call& call) const;
   void keepPassiveTogether(PublishedForces& forces, double worldUnitsPerMetre) const;
+  void tellOfFields(const PublishedForces& forces, double worldUnitsPerMetre, Nanos now, NoticeBoard& board,
+                    std::vector<Notice>& out);
   Constraint& constraintFor(const Call& call);
   void letFieldLeave();
 
@@ -132,6 +144,8 @@ class FreeForces {
   std::uint32_t fieldNumbers_ = 0;  // the same for fields
   LastCommands asked_;              // of all but effects, also of forces that are gone
   LastCommands askedOfConstraint_;
+  FieldShare fieldTold_;
+  FieldShare constraintTold_;
   bool changed_ = false;
 };
 

@@ -234,6 +234,36 @@ TEST_F(Forces, RimOfAFieldIsNoStifferThanTheBound) {
   EXPECT_EQ(scene_->fields[0].radius, 20) << "world units";
 }
 
+// By which call, from what to what; once for each field and share.
+TEST_F(Forces, OwnersOfLoweredFieldsAreTold) {
+  const SetForceField stiff{.jacobian_N_per_m = {-20'000, 0, 0, 0, -20'000, 0, 0, 0, 0}, .radius_m = 1};
+  say(stiff);
+  publish();
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("sendForceField, stiffness 20000 to 9990 N/m"));
+  say(constant(0));
+  say(StartEffect{0});
+  publish();
+  EXPECT_TRUE(notices_.empty()) << "the same field";
+  say(SetForceField{.force_N = Vec3(0, 0, 4), .radius_m = 0.2e-3});
+  publish();
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("sendForceField, force 4 to 1.998 N"));
+  say(SetForceField{.force_N = Vec3(0, 0, 4), .radius_m = 0.2});
+  publish();
+  EXPECT_TRUE(notices_.empty()) << "within the bound";
+  say(SetForceField{});
+  say(SetConstraintStiffness{6000}, kOther);
+  say(SetConstraintMode{1}, kOther);
+  say(SetConstraintEnabled{true}, kOther);
+  publish();
+  EXPECT_TRUE(notices_.empty());
+  say(DefineEffect{.type = "spring", .index = 1, .gain = 9, .magnitude_N = 1});
+  say(StartEffect{1});
+  publish();
+  ASSERT_EQ(notices_.size(), 1U);
+  EXPECT_EQ(notices_[0].client, kOther);
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("constraint_KSpring, stiffness 6000 to 3996 N/m"));
+}
+
 TEST_F(Forces, NegativeAndUnstableParametersAreLowered) {
   say(DefineEffect{.type = "spring", .index = 1, .gain = -1, .magnitude_N = 1});
   EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("gain -1"));
