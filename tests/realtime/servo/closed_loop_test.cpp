@@ -22,6 +22,7 @@
 #include "realtime/render/scene_fixture.h"
 #include "realtime/servo/fakes.h"
 #include "realtime/servo/tick.h"
+#include "scene/builder.h"
 #include "scene/passivity.h"
 #include "scene/surface_settings.h"
 
@@ -62,7 +63,7 @@ struct Pressing {
   double force_N = 0;       // at the end
 };
 
-Pressing pressOn(const scene::Surface& surface, double rate_Hz, bool guarded) {
+Pressing pressOn(std::shared_ptr<const scene::SceneSnapshot> scene, double rate_Hz, bool guarded) {
   device::SimulatedOptions handOptions;
   handOptions.handDamping_Ns_per_m = kHandDamping;
   device::SimulatedDevice hand(handOptions);
@@ -74,7 +75,7 @@ Pressing pressOn(const scene::Surface& surface, double rate_Hz, bool guarded) {
   options.guard = GuardOptions::of(hand.profile());
   options.guard.enabled = guarded;
   Tick tick(hand, clock, options);
-  tick.snapshots().publish(wall(surface));
+  tick.snapshots().publish(std::move(scene));
 
   Pressing result;
   const auto period = static_cast<Nanos>(1e9 / rate_Hz);
@@ -101,6 +102,10 @@ Pressing pressOn(const scene::Surface& surface, double rate_Hz, bool guarded) {
   result.peakToPeak_m = highest - lowest;
   result.force_N = force;
   return result;
+}
+
+Pressing pressOn(const scene::Surface& surface, double rate_Hz, bool guarded) {
+  return pressOn(wall(surface), rate_Hz, guarded);
 }
 
 bool settles(double stiffness_N_per_m, double rate_Hz) {
@@ -148,6 +153,31 @@ TEST_P(ClosedLoop, clamped_material_gives_no_energy) {
             << " N s/m: peak to peak " << p.peakToPeak_m * 1e6 << " um, gained " << p.gained_J << " J, "
             << p.force_N << " N\n";
   EXPECT_LT(p.gained_J, kRounding_J);
+}
+
+// Each within the bound, and together far beyond it.
+TEST_P(ClosedLoop, springs_that_act_together_do_not_shake_the_hand) {
+  constexpr int kSprings = 4;
+  scene::SceneConfig config;
+  config.servoPeriod_s = 1 / GetParam();
+  config.ownDamping_Ns_per_m = kHandDamping;
+  const double gain = 0.9e-3 * passiveStiffness(GetParam());  // N/mm
+  scene::SceneBuilder builder(config);
+  std::vector<scene::Notice> notices;
+  for (int i = 0; i < kSprings; ++i) {
+    builder.apply(1, scene::DefineEffect{.type = "spring", .index = i, .gain = gain, .magnitude_N = 30}, 1,
+                  notices);
+    builder.apply(1, scene::StartEffect{i}, 1, notices);
+  }
+  const auto lowered = builder.publish(1, notices);
+  ASSERT_EQ(lowered->effects.size(), kSprings);
+  const Pressing held = pressOn(lowered, GetParam(), true);
+  EXPECT_LT(held.peakToPeak_m, kSettled_m);
+  EXPECT_GT(held.force_N, 0.5);
+
+  auto asked = std::make_shared<scene::SceneSnapshot>(*lowered);
+  for (scene::Effect& effect : asked->effects) effect.gain = 1000 * gain;
+  EXPECT_GT(pressOn(asked, GetParam(), true).peakToPeak_m, 10 * kSettled_m);
 }
 
 // The stiffest wall that settles, by bisection; never below the bound.
