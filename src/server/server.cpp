@@ -6,12 +6,9 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 
 #include "base/world.h"
 #include "realtime/servo/thread_setup.h"
-#include "server/session/refusal_codes.h"
-#include "wire/text.h"
 
 namespace hapticd::server {
 namespace {
@@ -326,31 +323,6 @@ void Server::onWebClient(net::Connection connection, std::string_view token, boo
   if (!token.empty()) identify(session, token, wire::LocalSender{0});
 }
 
-void Server::onIdentify(Session& session, const wire::MessageReceived& message) {
-  const auto decoded = wire::decode<wire::Identify>(message.payload);
-  if (!decoded) {
-    session.refuse("malformed message: " + decoded.error());
-    return;
-  }
-  if (decoded->key != 0) session.setKey(decoded->key);
-  const std::string_view token = decoded->token.view();
-  if (!token.empty()) identify(session, token, message.local_sender);
-}
-
-void Server::identify(Session& session, std::string_view token, wire::LocalSender name) {
-  std::string error;
-  const auto identity = credentials_.check(token, session.source(), base::now(), error);
-  if (!identity) {
-    session.logWarning("(" + session.description() + ") presented a token that is refused: " + error);
-    session.send(name, wire::Text{.severity = wire::kTextError,
-                                  .level = static_cast<std::uint32_t>(RefusalCode::tokenRefused),
-                                  .text = "Identify refused: " + error});
-    return;
-  }
-  session.setIdentity(*identity);
-  onNote(session, "is " + std::string(nameOf(identity->role)) + " by a token");
-}
-
 std::optional<Commander> Server::admitHaply(const net::Endpoint& remote, std::string& refusal) {
   const std::string address = remote.addressText();
   if (!isNear(remote.address) && !config_.insecure) {
@@ -560,160 +532,6 @@ void Server::onCaughtUp(Session& session) {
 
 void Server::onSubscribed(Session& session, wire::LocalSender name) {
   if (Station* station = stationOf(name)) station->onSubscribed(session, name);
-}
-
-// Dispatch by role: control messages never wait for the scene.
-void Server::onMessage(Session& session, const wire::MessageReceived& message, Nanos received) {
-  Station* station = stationOf(message.local_sender);
-  // Of any sender: it concerns the connection.
-  if (message.kind == wire::kindOf<wire::Identify>) return onIdentify(session, message);
-  if (station == nullptr) return;
-  if (!mayCommand(session, *station, message)) return;
-  switch (wire::role(message.kind)) {
-    case wire::Role::control:
-      if (message.kind == wire::kindOf<wire::Marker>) return onMarker(session, message, received);
-      if (message.kind == wire::kindOf<wire::ReplayControl>) return onReplayControl(session, message);
-      if (message.kind == wire::kindOf<wire::RecordingControl>) return onRecordingControl(session, message);
-      station->onControl(session, message, received, credentials_.hasOperators());
-      return;
-    case wire::Role::scene:
-      onSceneMessage(session, *station, message);
-      return;
-    case wire::Role::report:  // no effect, but a malformed one is refused like every other message
-      if (const auto decoded = wire::decode(message.kind, message.payload); !decoded)
-        session.refuse("malformed message: " + decoded.error());
-      return;
-    case wire::Role::unknown:
-      return;
-  }
-}
-
-void Server::onMarker(Session& session, const wire::MessageReceived& message, Nanos received) {
-  constexpr int kMostPerSecond = 100;
-  const auto marker = wire::decode<wire::Marker>(message.payload);
-  if (!marker) return session.refuse("malformed message: " + marker.error());
-  if (++markers_[session.id()] > kMostPerSecond) {
-    session.send(message.local_sender,
-                 wire::Text{.severity = wire::kTextError,
-                            .level = 0,
-                            .text = "Marker refused: the server takes " + std::to_string(kMostPerSecond) +
-                                    " in a second from each client"});
-    return;
-  }
-  if (recordings_.file().empty()) {
-    session.send(message.local_sender,
-                 wire::Text{.severity = wire::kTextNormal,
-                            .level = 0,
-                            .text = "marked for all clients; this server records nothing"});
-  }
-  recordings_.marker(received, marker->text.text);
-  throttledLog_.log(spdlog::level::info, session.address(),
-                    fmt::format("client {} marks {}", session.id(), wire::inQuotes(marker->text.text)));
-  sendMarker(received, marker->text.text);
-}
-
-// Every client once, under a name that it knows.
-void Server::sendMarker(Nanos time, const std::string& text) {
-  for (const auto& [id, session] : sessions_) {
-    for (const auto& station : stations_) {
-      const wire::LocalSender name = station->nameFor(*session);
-      if (!session->wants(name)) continue;
-      session->send(name, wire::Marker{.time = time, .text = text});
-      session->flush();
-      break;
-    }
-  }
-}
-
-void Server::onReplayControl(Session& session, const wire::MessageReceived& message) {
-  const auto wanted = wire::decode<wire::ReplayControl>(message.payload);
-  if (!wanted) return session.refuse("malformed message: " + wanted.error());
-  if (!player_) {
-    session.send(message.local_sender,
-                 wire::Text{.severity = wire::kTextError,
-                            .level = 0,
-                            .text = "Replay_Control refused: this server replays no recording; start one by "
-                                    "'hapticd replay FILE'"});
-    return;
-  }
-  if (!std::isfinite(wanted->speed) || wanted->speed < 0 || std::isnan(wanted->position)) {
-    session.send(
-        message.local_sender,
-        wire::Text{.severity = wire::kTextError,
-                   .level = 0,
-                   .text = fmt::format("Replay_Control refused: speed {}, position {} s: use a speed of 0 "
-                                       "to keep it or a positive one, and a negative position to stay",
-                                       wanted->speed, wanted->position)});
-    return;
-  }
-  ReplayOrder order{.paused = wanted->paused != 0, .speed = wanted->speed, .position_s = {}};
-  if (wanted->position >= 0) order.position_s = wanted->position;
-  player_->order(order);
-}
-
-// Both outcomes are a text: the client that asked for a recording wants to know the file.
-void Server::onRecordingControl(Session& session, const wire::MessageReceived& message) {
-  const auto wanted = wire::decode<wire::RecordingControl>(message.payload);
-  if (!wanted) return session.refuse("malformed message: " + wanted.error());
-  const auto answer = [this, id = session.id(), name = message.local_sender](std::uint32_t severity,
-                                                                             const std::string& text) {
-    const auto client = sessions_.find(id);
-    if (client == sessions_.end()) return;
-    client->second->send(name, wire::Text{.severity = severity, .level = 0, .text = text});
-    client->second->flush();
-  };
-  const auto refuse = [&](const std::string& why) { answer(wire::kTextError, "Recording_Control " + why); };
-  if (player_) return refuse("refused: this server replays a recording");
-  if (wanted->record != 0) {
-    try {
-      recordings_.start(std::string(wanted->name.view()), clock_.offset(), toToml(config_));
-      spdlog::info("client {} began it", session.id());
-      answer(wire::kTextNormal, "recording to " + recordings_.file());
-    } catch (const record::RecordingError& error) {
-      refuse(error.what());
-    }
-    return;
-  }
-  if (!recordings_.end([answer](const std::string& text) { answer(wire::kTextNormal, text); }))
-    refuse("refused: nothing is recorded");
-}
-
-void Server::onSceneMessage(Session& session, Station& station, const wire::MessageReceived& message) {
-  std::string error;
-  if (!station.scene().take(session.id(), message, error)) session.refuse("malformed message: " + error);
-}
-
-bool Server::isPermitted(Session& session, Station& station, wire::MessageKind kind, std::string& reason) {
-  if (kind == wire::kindOf<wire::StopForces>) return true;
-  if (!admission_.mayOnlyStop(session))
-    return !wire::needsControl(kind) || station.mayCommand(session.commander(), kind, reason);
-  // A client library asks first whether the server knows a stop.
-  for (const wire::MessageKind free :
-       {wire::kindOf<wire::Ping>, wire::kindOf<wire::Heartbeat>, wire::kindOf<wire::QueryCapabilities>,
-        wire::kindOf<wire::RearmForces>})
-    if (kind == free) return true;
-  reason = "the server is full: this connection may only stop and re-arm forces";
-  return false;
-}
-
-// A batch is whole: what its client may do when it begins holds until its commit.
-bool Server::mayCommand(Session& session, Station& station, const wire::MessageReceived& message) {
-  SceneHost& scene = station.scene();
-  std::string reason = "it belongs to a batch that was refused";
-  const std::optional<bool> batch =
-      wire::role(message.kind) == wire::Role::scene ? scene.batchOf(session.id()) : std::nullopt;
-  const bool permitted = batch ? *batch : isPermitted(session, station, message.kind, reason);
-  if (message.kind == wire::kindOf<wire::BatchBegin>) scene.beginBatch(session.id(), permitted);
-  if (message.kind == wire::kindOf<wire::BatchCommit>) scene.endBatch(session.id());
-  if (permitted) return true;
-  // Send one text for each read: a refused upload has thousands of messages.
-  if (std::exchange(refusalSentTo_, session.id()) != session.id()) {
-    session.send(message.local_sender,
-                 wire::Text{.severity = wire::kTextError,
-                            .level = static_cast<std::uint32_t>(RefusalCode::notPermitted),
-                            .text = std::string(wire::info(message.kind).name) + " refused: " + reason});
-  }
-  return false;
 }
 
 void Server::onWarning(const Session& session, const std::string& text) {
