@@ -1,5 +1,5 @@
-// What the server does with messages of its clients: those of a device go to its station, those of a scene to the
-// scene; what concerns the whole server is handled here.
+// What the server does with messages of its clients: those of a device go to its station, those of a scene to
+// the scene; what concerns the whole server is handled here.
 #include <spdlog/spdlog.h>
 
 #include <cmath>
