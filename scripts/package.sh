@@ -45,10 +45,14 @@ stage() {
   install -Dm644 "$system/70-hapticd.rules" "$root/lib/udev/rules.d/70-hapticd.rules"
   install -Dm644 "$system/hapticd-loopback.service" "$root/lib/systemd/system/hapticd-loopback.service"
   install -Dm644 "$system/polkit.rules" "$root/usr/share/polkit-1/rules.d/50-hapticd.rules"
-  mkdir -p "$root/usr/share/doc/hapticd-doc"
-  cp -r docs/. "$root/usr/share/doc/hapticd-doc/"
-  cp CHANGELOG.md "$root/usr/share/doc/hapticd-doc/releases.md"
-  cp -r examples "$root/usr/share/doc/hapticd-doc/"
+  local doc=$root/usr/share/doc/hapticd-doc
+  mkdir -p "$doc"
+  cp -r docs/. examples "$doc/"
+  cp CHANGELOG.md "$doc/releases.md"
+  # Links to what has another place there, or is in the sources only.
+  sed -i 's#](docs/#](#g' "$doc/releases.md"
+  sed -i -E 's#\]\(\.\./CHANGELOG\.md#](releases.md#g; s#\]\(\.\./examples#](examples#g; s#\[([^]]*)\]\(\.\./[^)]*\)#\1#g' "$doc"/*.md
+  sed -i -E 's#\[([^]]*)\]\(\.\./\.\./[^)]*\)#\1#g' "$doc"/decisions/*.md
 }
 
 # package BUILD OUT: all packages of a build into OUT.

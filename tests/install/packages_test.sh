@@ -75,6 +75,14 @@ for file in /lib/systemd/system/hapticd.service /lib/systemd/system/hapticd-loop
   /usr/share/doc/hapticd/copyright /usr/share/doc/hapticd-doc/configuration.md; do
   [ -e "$root$file" ] || fail "$file is not installed"
 done
+python3 - "$root/usr/share/doc/hapticd-doc" <<'PYTHON' || fail "links of the documentation lead nowhere"
+import pathlib, re, sys
+lost = [(page.name, link) for page in pathlib.Path(sys.argv[1]).rglob("*.md")
+        for link in re.findall(r"\]\(([^)\s#]+)(?:#[^)\s]*)?\)", page.read_text())
+        if not re.match("[a-z]+:", link) and not (page.parent / link).exists()]
+print(*lost, sep="\n")
+sys.exit(bool(lost))
+PYTHON
 grep -q 'stop hapticd.service' "$root/var/lib/dpkg/info/hapticd.prerm" || fail "a removal leaves the service running"
 ! in_root test -e /etc/systemd/system/multi-user.target.wants/hapticd.service || fail "the service is enabled without consent"
 ! in_root test -e /etc/systemd/system/multi-user.target.wants/hapticd-loopback.service || fail "the loopback service is enabled without consent"
