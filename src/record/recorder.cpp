@@ -176,7 +176,7 @@ void Recorder::reportLosses() {
   onProblem_("recording to '" + path_.string() + "': " + std::to_string(counts_.lostTicks) + " ticks, " +
              std::to_string(counts_.lostSceneEvents) + " scene events and " +
              std::to_string(counts_.lostStreamed) +
-             " streamed values lost so far because the disk is too slow; record to a faster one");
+             " streamed values lost so far: the disk is too slow, or the machine too busy");
 }
 
 void Recorder::appendMemories(std::uint32_t number, Device& device) {

@@ -20,7 +20,8 @@ namespace hapticd::device {
 namespace {
 
 constexpr const char* kUdev =
-    "sudo cp packaging/udev/70-hapticd.rules /etc/udev/rules.d/ && sudo udevadm control --reload && "
+    "the Debian package installs the udev rules; from the sources: sudo cp packaging/udev/70-hapticd.rules "
+    "/etc/udev/rules.d/ && sudo udevadm control --reload && "
     "sudo udevadm trigger";
 
 // The devices of one driver as the kernel lists them, without the driver's library.
