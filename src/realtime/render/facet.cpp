@@ -34,8 +34,7 @@ inline bool touchableSide(const Facet& f, TouchableFaces faces, const Vec3& p, c
 // `outward` has the length of the side.
 template <class Visit>
 inline bool forEachSide(const Facet& f, Visit&& visit) {
-  return f.unbounded || (visit((f.b - f.a).cross(f.normal), f.a) && visit((f.c - f.b).cross(f.normal), f.b) &&
-                         visit((f.a - f.c).cross(f.normal), f.c));
+  return f.unbounded || (visit(f.outward[0], f.a) && visit(f.outward[1], f.b) && visit(f.outward[2], f.c));
 }
 
 // Whether the path from x to x + d passes outside one of the sides by more than the margin.
@@ -53,6 +52,35 @@ inline bool overFacet(const Facet& f, const Vec3& x, const Vec3& d) {
   });
 }
 
+// Whether the path from p to p + limit d stays farther than `clearance` from the half of the plane that ends
+// at the side which p is beyond most, or from the whole plane. The facet is part of it.
+inline bool staysClear(const Facet& f, const Vec3& p, const Vec3& d, double limit, double clearance) {
+  double beyond2 = 0;
+  double approach = 0;  // along that side's outward normal, for each unit of the parameter
+  forEachSide(f, [&](const Vec3& outward, const Vec3& corner) {
+    const double out = outward.dot(p - corner);
+    const double length2 = outward.squaredNorm();
+    if (!(out > 0 && out * out > beyond2 * length2)) return true;
+    beyond2 = out * out / length2;
+    approach = -outward.dot(d) / std::sqrt(length2);
+    return true;
+  });
+  const double beyond = std::sqrt(beyond2);
+  const double height = f.normal.dot(p - f.a);
+  const double rise = f.normal.dot(d);
+  // Beside the half-plane up to `over`, above it from there on.
+  double over = beyond > 0 ? limit : 0;
+  if (approach * limit > beyond) over = beyond / approach;
+  const double speed2 = rise * rise + approach * approach;
+  const double nearest = speed2 > 0 ? std::clamp((beyond * approach - height * rise) / speed2, 0.0, over) : 0;
+  const double aside = beyond - nearest * approach;
+  const double up = height + nearest * rise;
+  if (!(aside * aside + up * up > clearance * clearance)) return false;
+  const double begin = height + over * rise;
+  const double end = height + limit * rise;
+  return over == limit || (std::min(std::abs(begin), std::abs(end)) > clearance && begin * end > 0);
+}
+
 // The distance to a convex set is convex along a line: Newton's steps from the start never pass the first
 // root, and without a negative slope there is none.
 bool castBallAtEdges(const Facet& f, const Vec3& up, const Vec3& p, const Vec3& d, double limit,
@@ -63,6 +91,8 @@ bool castBallAtEdges(const Facet& f, const Vec3& up, const Vec3& p, const Vec3& 
   double t = 0;
   bool stopped = false;
   for (int i = 0; i < 32 && t <= (stopped ? limit : latest); ++i) {
+    // Where the path grazes an edge, the steps become ever shorter.
+    if (i == 1 && staysClear(f, p, d, limit, contact + 4 * fine)) return false;
     const Vec3 x = p + t * d;
     const Vec3 foot = nearestPointOf(f, x);
     const Vec3 away = x - foot;
@@ -108,6 +138,7 @@ bool makeFacet(const scene::Corners& corners, double skin, Facet& f) noexcept {
     n.normalize();
   }
   f.normal = n;
+  f.outward = {(f.b - f.a).cross(n), (f.c - f.b).cross(n), (f.a - f.c).cross(n)};
   f.extent = std::sqrt(std::max(0.25 * longest2, (f.c - 0.5 * (f.a + f.b)).squaredNorm()));
   f.skin = skin;
   return true;

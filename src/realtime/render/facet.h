@@ -5,6 +5,7 @@
 // error.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "realtime/render/active_set.h"
@@ -19,7 +20,10 @@ struct Facet {
   Vec3 b = Vec3::Zero();
   Vec3 c = Vec3::Zero();
   Vec3 normal = Vec3::Zero();  ///< unit, out of the front
-  double extent = 0;           ///< greatest distance of a corner from the middle of a-b
+  std::array<Vec3, 3> outward{
+      Vec3::Zero(), Vec3::Zero(),
+      Vec3::Zero()};  ///< of the sides a-b, b-c and c-a, in the plane, each as long as its side
+  double extent = 0;  ///< greatest distance of a corner from the middle of a-b
   double skin = 0;
   double radius = 0;  ///< of the ball that touches it
   std::uint32_t triangle = 0;
