@@ -89,7 +89,7 @@ run() {
   before=$(find build/fuzz/findings -name "$target-*" | wc -l)
   TIMEFORMAT='cpu %U %S'
   { time nice -n 19 "build/fuzz/bin/${target}_fuzz" -dict=build/fuzz/fuzz/wire.dict -max_len="$(longest "$target")" \
-      -max_total_time="$seconds" -timeout=25 -rss_limit_mb=3000 -print_final_stats=1 \
+      -max_total_time="$seconds" -timeout=25 -report_slow_units=25 -rss_limit_mb=3000 -print_final_stats=1 \
       -artifact_prefix="build/fuzz/findings/$target-" "build/fuzz/corpus/$target" >"$log" 2>&1 || true; } 2>"$log.time"
   after=$(find build/fuzz/findings -name "$target-*" | wc -l)
   executions=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log")

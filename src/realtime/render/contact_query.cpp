@@ -169,6 +169,7 @@ void ContactQuery::findEnclosing(const Vec3& tool) noexcept {
     return all || placed.before == nullptr || placed.jumped;
   };
   const auto end = objects_.begin() + objectCount_;
+  leftOutChanged_ = false;
   if (enclosingCount_ == 0 && std::none_of(objects_.begin(), end, appeared)) return;
   const auto known = enclosing_;
   const auto knownEnd = known.begin() + enclosingCount_;
@@ -198,6 +199,8 @@ void ContactQuery::findEnclosing(const Vec3& tool) noexcept {
     if (&target != &*placed) target = *placed;
   }
   objectCount_ = kept;
+  leftOutChanged_ =
+      !std::equal(known.begin(), knownEnd, enclosing_.begin(), enclosing_.begin() + enclosingCount_);
 }
 
 int ContactQuery::addObject(std::int32_t id) noexcept {

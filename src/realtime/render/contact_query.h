@@ -61,7 +61,7 @@ struct PlacedObject {
   /// Whether it is where and as it was in the previous tick.
   bool rests() const noexcept { return before != nullptr && !moved && !deformed && !jumped; }
   /// Whether its faces may have passed over the proxy by deforming.
-  bool sweptByDeforming() const noexcept { return deformed && before != nullptr; }
+  bool sweptByDeforming() const noexcept { return deformed && !jumped && before != nullptr; }
   /// The present position of a point that was fixed to the object in the previous tick.
   Vec3 carried(const Vec3& p) const noexcept;
 };
@@ -105,11 +105,13 @@ class ContactQuery {
   void addObjectsNear(const Vec3& centre, double reach, const Vec3& tool) noexcept;
   /// Leaves out those that appeared around `tool` and that it has not left since.
   void leaveOutEnclosing(const Vec3& tool) noexcept;
-  /// True when this object was left out in the tick before.
-  bool wasLeftOut(std::int32_t id) const noexcept {
+  /// True when the last leaveOutEnclosing() left this object out.
+  bool isLeftOut(std::int32_t id) const noexcept {
     return std::find(enclosing_.begin(), enclosing_.begin() + enclosingCount_, id) !=
            enclosing_.begin() + enclosingCount_;
   }
+  /// True when it left out others than the one before.
+  bool leftOutChanged() const noexcept { return leftOutChanged_; }
   /// Adds one object by its id and returns its index; -1 when the scene does not contain it.
   int addObject(std::int32_t id) noexcept;
 
@@ -258,6 +260,7 @@ class ContactQuery {
   // Ids of the objects that appeared around the tool.
   std::array<std::int32_t, kMaxObjects> enclosing_{};
   int enclosingCount_ = 0;
+  bool leftOutChanged_ = false;
   bool allAppeared_ = true;  // in this tick
   std::size_t crowd_ = 0;    // number of objects in a scene with more boxes around the tool than fit, or 0
   ObjectDistances distances_;

@@ -74,19 +74,27 @@ void PlacedPlanes::forgetAllExcept(const scene::SceneSnapshot& scene) noexcept {
   memoryCount_ = static_cast<int>(end - memory_.begin());
 }
 
-bool PlacedPlanes::changesInContact(const scene::SceneSnapshot& scene) const noexcept {
-  return std::any_of(memory_.begin(), memory_.begin() + memoryCount_, [&](const Memory& m) {
-    const auto now = std::find_if(scene.planes.begin(), scene.planes.end(),
-                                  [&](const scene::Plane& p) { return p.index == m.index; });
-    return m.touched && (now == scene.planes.end() || now->placement != m.placement ||
-                         !(now->surface == m.surface) || detailOf(*now) != m.detail);
-  });
+// A plane that is placed anew may lie across what is touched, and a texture rises above its plane.
+bool PlacedPlanes::changes(const scene::SceneSnapshot& scene) const noexcept {
+  const auto end = memory_.begin() + memoryCount_;
+  const auto isNew = [&](const scene::Plane& p) {
+    const auto known =
+        std::find_if(memory_.begin(), end, [&](const Memory& m) { return m.index == p.index; });
+    return known == end || p.placement != known->placement || detailOf(p) != known->detail ||
+           (known->touched && !(p.surface == known->surface));
+  };
+  const auto isGone = [&](const Memory& m) {
+    return m.touched && std::none_of(scene.planes.begin(), scene.planes.end(),
+                                     [&](const scene::Plane& p) { return p.index == m.index; });
+  };
+  return std::any_of(scene.planes.begin(), scene.planes.end(), isNew) ||
+         std::any_of(memory_.begin(), end, isGone);
 }
 
 void PlacedPlanes::place(const scene::SceneSnapshot& scene, Nanos now, const Vec3& hip, const Vec3& proxy,
                          double toolRadius_m, double radius_m, bool viewMoved) noexcept {
   const geometry::Affine& T_world_device = scene.workspace.T_world_device;
-  changedInContact_ = changesInContact(scene);
+  changed_ = changes(scene);
   forgetAllExcept(scene);
   count_ = 0;
   leavesOut_ = false;
@@ -126,14 +134,15 @@ bool PlacedPlanes::placeOne(const geometry::Affine& T_world_device, Nanos now, c
   memory.detail = detailOf(plane);
   if (plane.releasing && memory.releaseBegin < 0) memory.releaseBegin = now;
   const double left = remainingShare(memory.releaseBegin, plane.owner.get(), now);
+  memory.belowCrest = plane.textureWavelength > 0 && -depth_m * unitsPerMetre < plane.textureAmplitude;
   if (left == 0 || memory.leftOut) return false;
-  if (left < 1) {
-    placed.surface.stiffness_N_per_m *= left;
-    placed.surface.damping_Ns_per_m *= left;
-  }
-  const double raised = heightOf(plane, memory, now, normal, proxy, 1 / unitsPerMetre);
-  memory.under_m = std::max(0.0, depth_m + raised);
-  placed.rests = !fresh && raised == std::exchange(memory.raised_m, raised);
+  placed.share = left;
+  placed.surface.damping_Ns_per_m *= left;
+  const double whole = heightOf(plane, memory, now, normal, proxy, 1 / unitsPerMetre);
+  // It sinks instead of becoming softer, so that what is below it holds the hand in time.
+  memory.under_m = left * std::max(0.0, depth_m + whole);
+  const double raised = left == 1 ? whole : std::min(whole, memory.under_m - depth_m);
+  placed.rests = !fresh && left == 1 && raised == std::exchange(memory.raised_m, raised);
   placed.facet.unbounded = true;
   placed.facet.normal = normal;
   placed.facet.a = hip - normal * (hipHeight - raised);
@@ -149,7 +158,8 @@ void PlacedPlanes::remember(unsigned touched, const Vec3& proxy) noexcept {
       const bool now = (touched >> i & 1U) != 0;
       if (now && !memory.touched) memory.firstContact = proxy;
       memory.adheres = now || memory.adheres;
-      memory.touched = now || memory.adheres;
+      // A hand that leaves a trough meets no crest in its place.
+      memory.touched = now || memory.adheres || (memory.touched && memory.belowCrest);
     }
   }
 }
@@ -189,9 +199,10 @@ Vec3 PlacedPlanes::adhesion(const Vec3& hip, double toolRadius_m) noexcept {
       const double height = plane.facet.normal.dot(hip - plane.facet.a) - toolRadius_m;
       const double pull = plane.surface.stiffness_N_per_m * std::max(0.0, height);
       if (pull > plane.state->adhesionNormal_N) {
-        memory.adheres = memory.touched = false;
+        memory.adheres = false;
+        memory.touched = memory.belowCrest;
       } else {
-        force -= pull * plane.facet.normal;
+        force -= plane.share * pull * plane.facet.normal;
       }
     }
   }

@@ -1,7 +1,8 @@
 // The planes of the scene that belong to no object, as they are placed in this tick.
 //
 // A plane is a facet without edges that every cast tests. This file adds the rest: a new placement rises
-// under the HIP, texture and buzz change its height, and adhesion pulls on a HIP that leaves.
+// under the HIP, one that ramps out sinks below it, texture and buzz change its height, and adhesion pulls on
+// a HIP that leaves.
 #pragma once
 
 #include <array>
@@ -22,14 +23,10 @@ using base::Nanos;
 struct PlacedPlane {
   const scene::Plane* state = nullptr;
   Facet facet;             ///< unbounded, device metres; facet.object is -1 - index
-  scene::Surface surface;  ///< weaker while the plane ramps out
+  scene::Surface surface;  ///< less damped while the plane ramps out
   bool rests = false;      ///< its surface is where it was in the tick before
-
-  /// The share of its stiffness that is left, 1 … 0; 0 also without stiffness.
-  double presence() const noexcept {
-    const double whole = state->surface.stiffness_N_per_m;
-    return whole > 0 ? surface.stiffness_N_per_m / whole : 0;
-  }
+  /// What is left of its adhesion, and of its weight among unequal surfaces, while it ramps out: 1 … 0.
+  double share = 1;
 };
 
 /// All planes, with their state from tick to tick. Servo thread: noexcept, no allocation.
@@ -49,8 +46,9 @@ class PlacedPlanes {
   bool remember(RenderMemory& out) const noexcept;
   /// Continues those of the planes that the memory has; nothing touches them.
   void resume(const RenderMemory& memory) noexcept;
-  /// In this tick a touched plane vanished, got another placement, another surface or other details.
-  bool changedInContact() const noexcept { return changedInContact_; }
+  /// In this tick one was placed anew or got other details, or one that is touched vanished or got another
+  /// surface.
+  bool changed() const noexcept { return changed_; }
 
   const PlacedPlane* begin() const noexcept { return planes_.data(); }
   const PlacedPlane* end() const noexcept { return planes_.data() + count_; }
@@ -75,7 +73,8 @@ class PlacedPlanes {
     scene::Surface surface;
     std::array<double, 6> detail{};  ///< adhesion, texture, buzz
     double raised_m = 0;             ///< of the surface above the plane, in the last tick
-    bool touched = false;
+    bool belowCrest = false;         ///< the HIP is below the crests of the texture
+    bool touched = false;            ///< and the tool has not left it since
     bool adheres = false;
     bool leftOut = false;  ///< the hand was found below it, and did not leave it yet
     Vec3 firstContact = Vec3::Zero();
@@ -83,7 +82,7 @@ class PlacedPlanes {
 
   Memory& memoryOf(const scene::Plane& plane, Nanos now, double depth_m, bool& fresh) noexcept;
   void forgetAllExcept(const scene::SceneSnapshot& scene) noexcept;
-  bool changesInContact(const scene::SceneSnapshot& scene) const noexcept;
+  bool changes(const scene::SceneSnapshot& scene) const noexcept;
   bool placeOne(const geometry::Affine& T_world_device, Nanos now, const Vec3& hip, const Vec3& proxy,
                 double toolRadius_m, PlacedPlane& placed) noexcept;
   static double heightOf(const scene::Plane& plane, const Memory& memory, Nanos now, const Vec3& normal,
@@ -93,7 +92,7 @@ class PlacedPlanes {
   int count_ = 0;
   std::array<Memory, scene::kMaxPlanes> memory_;
   int memoryCount_ = 0;
-  bool changedInContact_ = false;
+  bool changed_ = false;
   bool anew_ = false;
   bool viewMoved_ = false;
   bool leavesOut_ = false;

@@ -406,9 +406,8 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
     if (hit.object < 0) {
       const PlacedPlane& plane = planes_[-1 - hit.object];
       constraint.surface = plane.surface;
-      constraint.presence = plane.presence();
       constraint.rests = plane.rests;
-      constraint.adhesion_N = plane.state->adhesionLateral_N;
+      constraint.adhesion_N = plane.share * plane.state->adhesionLateral_N;
     } else {
       const PlacedObject& object = query_.object(hit.object);
       constraint.object = object.state->id;
@@ -436,7 +435,7 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
   const bool arrived = casts_ < kMaxCasts && !query_.workSpent();
   const bool free = contactSet_.normal_m.isZero(0);  // then only the report is left to find
   if (toolRadius_ == 0 && onAll && (arrived || free)) reported_ = onFaces(hip, active);
-  contactSet_.spring = blendedSpring(now_, planes_, toolRadius_, reported_, contactSet_);
+  contactSet_.spring = blendedSpring(now_, query_, planes_, toolRadius_, reported_, contactSet_);
 }
 
 // The proxy on the faces that hold it, at their skins so that rounding does not put it behind one of them.

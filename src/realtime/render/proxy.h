@@ -30,7 +30,6 @@ struct ContactConstraint {
   int source = 0;            ///< index of the near object; -1 - index for a plane of the scene
   std::uint32_t triangle = 0;
   scene::Surface surface;
-  double presence = 1;                 ///< less while a plane ramps out: share of its force and of its weight
   Vec3 forceDirection = Vec3::Zero();  ///< unit; the normal of the half-space unless force shading turns it
   double adhesion_N = 0;               ///< tangential force that it bears besides friction
   HalfSpace halfSpace;
@@ -58,7 +57,7 @@ struct ContactSet {
   }
   /// The bound of friction and adhesion of one constraint, as a length of the spring.
   double boundOf(const ContactConstraint& constraint) const noexcept {
-    return frictionOf(constraint.surface) * constraint.presence * constraint.depth_m +
+    return frictionOf(constraint.surface) * constraint.depth_m +
            constraint.adhesion_N / spring.stiffness_N_per_m;
   }
 };
@@ -157,6 +156,7 @@ class Proxy {
   void beFree() noexcept;
   void carry(const Vec3& hip, std::uint32_t& status) noexcept;
   void chooseCarrier() noexcept;
+  bool turnsAway(const PlacedObject& object) const noexcept;
   bool jumps(std::int32_t id, std::uint32_t triangle) noexcept;
   bool surfacesInContactMove() const noexcept;
   Vec3 carriedBy(const PlacedObject& object, std::uint32_t triangle, const Vec3& p) const noexcept;

@@ -12,6 +12,8 @@
 namespace hapticd::realtime {
 namespace {
 
+using geometry::Mat3;
+
 constexpr int kMaxPushes = 16;
 
 }  // namespace
@@ -31,8 +33,8 @@ bool Proxy::isJump(const PlacedObject& object) const noexcept {
 bool Proxy::isJump(const PlacedObject& object, std::uint32_t triangle) const noexcept {
   const scene::MeshGeometry& mesh = *object.state->mesh;
   if (!mesh.target || !mesh.before) return false;
-  geometry::Mat3 corners;
-  geometry::Mat3 moves;
+  Mat3 corners;
+  Mat3 moves;
   for (int i = 0; i < 3; ++i) {
     const std::uint32_t v = (*mesh.triangles)[triangle][static_cast<std::size_t>(i)];
     corners.col(i) = object.T_device_object * mesh.vertex(v, now_.time);
@@ -41,11 +43,11 @@ bool Proxy::isJump(const PlacedObject& object, std::uint32_t triangle) const noe
   if (moves.colwise().norm().maxCoeff() <= kLongestMotion_m) return false;
   const Vec3 b = corners.col(1) - corners.col(0);
   const Vec3 c = corners.col(2) - corners.col(0);
-  geometry::Mat3 frame;
+  Mat3 frame;
   frame << b, c, b.cross(c).normalized();
-  geometry::Mat3 moveAlong;
+  Mat3 moveAlong;
   moveAlong << moves.col(1) - moves.col(0), moves.col(2) - moves.col(0), Vec3::Zero();
-  const geometry::Mat3 gradient = moveAlong * frame.inverse();
+  const Mat3 gradient = moveAlong * frame.inverse();
   const Vec3 here = moves.col(0) + gradient * (position_ - corners.col(0));
   return !(here.norm() + kNear_m * gradient.norm() <= kLongestMotion_m);  // not a number: degenerate
 }
@@ -58,11 +60,12 @@ bool Proxy::viewMoved() const noexcept {
 // The hand did not cause such a change of the force.
 bool Proxy::contactChangedByCommand() const noexcept {
   if (now_.scene == before_.scene) return false;
-  if (planes_.changedInContact()) return true;
+  // A view may move into a hand that is free.
+  if (planes_.changed() || viewMoved()) return true;
   if (contactSet_.count == 0) return false;
   const scene::SceneSnapshot& now = *now_.scene;
   const scene::SceneSnapshot& before = *before_.scene;
-  if (now.faces != before.faces || viewMoved()) return true;
+  if (now.faces != before.faces) return true;
   for (int i = 0; i < contactSet_.count; ++i) {
     const ContactConstraint& constraint = contactSet_.constraints[static_cast<std::size_t>(i)];
     if (constraint.object < 0) continue;
@@ -80,12 +83,12 @@ bool Proxy::contactChangedByCommand() const noexcept {
 // gradually, a command at once.
 bool Proxy::neighboursChangedByCommand(const BlendedSpring& before) const noexcept {
   constexpr double kStep_N = 0.1;
-  if (contactSet_.count == 0 || now_.scene == before_.scene) return false;
+  if (contactSet_.count == 0 || (now_.scene == before_.scene && !query_.leftOutChanged())) return false;
   const BlendedSpring& now = contactSet_.spring;
   const double spring_m = (contactSet_.normal_m + contactSet_.lateral_m).norm();
   const bool steps = std::abs(now.stiffness_N_per_m - before.stiffness_N_per_m) * spring_m > kStep_N ||
                      (now.slope_N + now.turn_N - before.slope_N - before.turn_N).norm() > kStep_N;
-  return steps && surfacesNearChanged();
+  return steps && (query_.leftOutChanged() || surfacesNearChanged());
 }
 
 bool Proxy::surfacesNearChanged() const noexcept {
@@ -146,6 +149,21 @@ bool Proxy::jumps(std::int32_t id, std::uint32_t triangle) noexcept {
   return object.jumped || (object.moved && isJump(object)) || (object.deformed && isJump(object, triangle));
 }
 
+// A placement that turns or mirrors an object takes the touched face to its other side: the proxy would go
+// with it, and the force would turn round.
+bool Proxy::turnsAway(const PlacedObject& object) const noexcept {
+  constexpr double kTurned = 0.5;  // cosine
+  if (object.before == nullptr) return false;
+  const Mat3 change = object.T_device_object.linear() * object.T_device_objectBefore.linear().inverse();
+  for (int i = 0; i < contactSet_.count; ++i) {
+    const ContactConstraint& constraint = contactSet_.constraints[static_cast<std::size_t>(i)];
+    if (constraint.object != object.state->id || constraint.triangle != touchedTriangle_) continue;
+    const Vec3& normal = constraint.halfSpace.normal;
+    return !((change.inverse().transpose() * normal).normalized().dot(normal) > kTurned);
+  }
+  return false;
+}
+
 // The proxy stays at its place on the touched object, however that moved or deformed.
 void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
   carriedByJump_ = false;
@@ -162,7 +180,7 @@ void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
       const bool deformedFar = object.deformed && isJump(object, touchedTriangle_);
       carriedByJump_ = object.jumped || (carried != position_ && (isJump(object) || deformedFar));
       if (carriedByJump_) status |= kRenderGeometryJump;
-      if (!object.jumped || (carried - position_).norm() <= kJump_m) {
+      if (!object.jumped || ((carried - position_).norm() <= kJump_m && !turnsAway(object))) {
         position_ = carried;
       } else {
         status |= kRenderGeometryJump;
@@ -213,7 +231,7 @@ bool Proxy::liftOutOfNewTriangles() noexcept {
     if (!object.jumped || object.before == nullptr) continue;
     const std::int32_t id = object.state->id;
     const bool inPlace = object.before->motion.jumps() == object.state->motion.jumps();
-    if (!pressOf(id).isZero(0) || (inPlace && !query_.wasLeftOut(id))) changed |= std::uint64_t{1} << i;
+    if (!pressOf(id).isZero(0) || (inPlace && !query_.isLeftOut(id))) changed |= std::uint64_t{1} << i;
   }
   EnclosureBudget budget;
   bool lifted = false;
@@ -278,7 +296,7 @@ Vec3 Proxy::carriedBy(const PlacedObject& object, std::uint32_t triangle, const 
   // order.
   const scene::Corners t = object.cornersBefore(triangle, before_.time);
   const scene::Corners n = object.corners(triangle, now_.time);
-  geometry::Mat3 frame;
+  Mat3 frame;
   frame << t.b - t.a, t.c - t.a, then.normal;
   const Vec3 local = frame.inverse() * (p - t.a);
   return n.a + local.x() * (n.b - n.a) + local.y() * (n.c - n.a) + local.z() * now.normal;

@@ -31,7 +31,7 @@ SpringState restingSprings(const ContactSet& contactSet, bool commandChanged, co
   if (!out.touching || commandChanged || (out.status & kChanged) != 0) return state;
   for (int i = 0; i < contactSet.count; ++i) {
     const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
-    if (!constraint.rests || constraint.presence != 1) return state;
+    if (!constraint.rests) return state;
   }
   const double kappa = spring.kappa_N_per_m;
   state.force_N = out.contactForce_N - out.normalForce_N + spring.stiffness_N_per_m * contactSet.normal_m;

@@ -29,7 +29,7 @@ constexpr std::size_t kFewObjects = 4;  // fewer than a query of the index would
 struct Neighbour {
   double stiffness = 0;
   double distance = 0;
-  double presence = 1;         // less for a plane that ramps out
+  double share = 1;            // less for a plane that ramps out
   Vec3 offset = Vec3::Zero();  // of its point from the proxy
 };
 
@@ -154,23 +154,22 @@ Vec3 alongContactSet(const ContactSet& contactSet, const Vec3& v) {
 
 class NeighbourSearch {
  public:
-  NeighbourSearch(const SceneAtTime& now, double width, const Gauge& gauge, const Vec3& proxy)
-      : now_(now), width_(width), gauge_(gauge), proxy_(proxy) {}
+  NeighbourSearch(const SceneAtTime& now, const ContactQuery& query, double width, const Gauge& gauge,
+                  const Vec3& proxy)
+      : now_(now), query_(query), width_(width), gauge_(gauge), proxy_(proxy) {}
 
   void addTouched(const PlacedPlanes& planes, const ContactConstraint& constraint) {
-    const double stiffness = constraint.source < 0
-                                 ? planes[-1 - constraint.source].state->surface.stiffness_N_per_m
-                                 : constraint.surface.stiffness_N_per_m;
-    Neighbour* const n = neighbourOf(stiffness);
+    Neighbour* const n = neighbourOf(constraint.surface.stiffness_N_per_m);
     if (n == nullptr) return;
-    n->presence = n->distance > 0 ? constraint.presence : std::max(n->presence, constraint.presence);
+    const double share = constraint.source < 0 ? planes[-1 - constraint.source].share : 1;
+    n->share = n->distance > 0 ? share : std::max(n->share, share);
     n->distance = 0;
   }
   void addPlanes(const PlacedPlanes& planes) {
     for (const PlacedPlane& plane : planes) {
       Neighbour* const n = neighbourOf(plane.state->surface.stiffness_N_per_m);
       if (n == nullptr || !(n->distance > 0)) continue;
-      consider(*n, nearestInGauge(gauge_, plane.facet, proxy_), plane.presence());
+      consider(*n, nearestInGauge(gauge_, plane.facet, proxy_), plane.share);
     }
   }
   void addObjects();
@@ -199,12 +198,15 @@ class NeighbourSearch {
       return n.stiffness == stiffness && n.distance == 0;
     });
   }
-  void consider(Neighbour& n, const Vec3& offset, double presence = 1) const {
+  bool mayTakePart(const scene::ObjectState& state) const {
+    return !isTouched(state.surface.stiffness_N_per_m) && !query_.isLeftOut(state.id);
+  }
+  void consider(Neighbour& n, const Vec3& offset, double share = 1) const {
     const double distance = std::max(0.0, gauge_(offset));
     if (!(distance < n.distance)) return;
     n.distance = distance;
     n.offset = offset;
-    n.presence = presence;
+    n.share = share;
   }
   // A face that is turned away counts below the tangent plane: it may begin at a ridge.
   bool facesProxy(const Facet& f) const {
@@ -215,6 +217,7 @@ class NeighbourSearch {
   void addObject(const scene::ObjectState& state);
 
   const SceneAtTime& now_;
+  const ContactQuery& query_;
   double width_;
   Gauge gauge_;
   const Vec3& proxy_;
@@ -228,7 +231,7 @@ void NeighbourSearch::addObjects() {
   const scene::SceneSnapshot& scene = *now_.scene;
   if (!scene.objectIndex || scene.objects.size() <= kFewObjects) {
     for (const auto& object : scene.objects) {
-      if (!isTouched(object->surface.stiffness_N_per_m)) addObject(*object);
+      if (mayTakePart(*object)) addObject(*object);
     }
     return;
   }
@@ -238,7 +241,7 @@ void NeighbourSearch::addObjects() {
   const double reach =
       (width_ + gauge_.radius) * kQueryMargin * std::sqrt(T_world_device.linear().squaredNorm());
   scene.objectIndex->visitNear(T_world_device * proxy_, reach, [&](std::uint32_t i) noexcept {
-    if (isTouched(scene.objects[i]->surface.stiffness_N_per_m)) return;
+    if (!mayTakePart(*scene.objects[i])) return;
     if (count == found.size()) {
       complete_ = false;
     } else {
@@ -325,7 +328,7 @@ void combine(const NeighbourSearch& search, const Gauge& gauge, const Width& wid
   double weights = 0;
   double stiffest = 0;
   for (const Neighbour& n : search) {
-    const double weight = n.presence * Weight(n.distance / width.value).value;
+    const double weight = n.share * Weight(n.distance / width.value).value;
     sum += weight * n.stiffness;
     weights += weight;
     if (weight > 0) stiffest = std::max(stiffest, n.stiffness);
@@ -341,7 +344,7 @@ void combine(const NeighbourSearch& search, const Gauge& gauge, const Width& wid
   for (const Neighbour& n : search) {
     const double t = n.distance / width.value;
     if (!(t > 0 && t < 1)) continue;
-    const double slope = n.presence * (n.stiffness - kappa) / weights * Weight(t).slope / width.value;
+    const double slope = n.share * (n.stiffness - kappa) / weights * Weight(t).slope / width.value;
     const double length = gauge.length(n.offset);
     byPosition -= slope / length * gauge.rise(n.offset);
     byDistance -= slope * t * width.growth;
@@ -359,18 +362,17 @@ void combine(const NeighbourSearch& search, const Gauge& gauge, const Width& wid
 
 }  // namespace
 
-BlendedSpring blendedSpring(const SceneAtTime& now, const PlacedPlanes& planes, double toolRadius_m,
-                            const Vec3& proxy, const ContactSet& contactSet) noexcept {
+BlendedSpring blendedSpring(const SceneAtTime& now, const ContactQuery& query, const PlacedPlanes& planes,
+                            double toolRadius_m, const Vec3& proxy, const ContactSet& contactSet) noexcept {
   BlendedSpring out;
   const ContactConstraint& first = contactSet.constraints[0];
-  out.stiffness_N_per_m = first.source < 0 ? planes[-1 - first.source].state->surface.stiffness_N_per_m
-                                           : first.surface.stiffness_N_per_m;
+  out.stiffness_N_per_m = first.surface.stiffness_N_per_m;
   out.kappa_N_per_m = out.stiffness_N_per_m;
   const double depth = contactSet.normal_m.norm();
   if (!(depth > 0)) return out;
   const Gauge gauge{contactSet.normal_m / depth, toolRadius_m};
   const Width width((contactSet.normal_m + contactSet.lateral_m).norm());
-  NeighbourSearch search(now, width.value, gauge, proxy);
+  NeighbourSearch search(now, query, width.value, gauge, proxy);
   for (int i = 0; i < contactSet.count; ++i) {
     search.addTouched(planes, contactSet.constraints[static_cast<std::size_t>(i)]);
   }

@@ -22,8 +22,9 @@ struct BlendedSpring {
 };
 
 /// The spring of a contact set that touches something. With one stiffness within the width it is that
-/// stiffness, to the bit. |force| <= largest stiffness * depth. noexcept, no allocation; bounded by counts.
-BlendedSpring blendedSpring(const SceneAtTime& now, const PlacedPlanes& planes, double toolRadius_m,
-                            const Vec3& proxy, const ContactSet& contactSet) noexcept;
+/// stiffness, to the bit. What the query leaves out takes no part. |force| <= largest stiffness * depth.
+/// noexcept, no allocation; bounded by counts.
+BlendedSpring blendedSpring(const SceneAtTime& now, const ContactQuery& query, const PlacedPlanes& planes,
+                            double toolRadius_m, const Vec3& proxy, const ContactSet& contactSet) noexcept;
 
 }  // namespace hapticd::realtime

@@ -58,7 +58,7 @@ void addNormalForces(const ContactSet& contactSet, const Vec3& proxy_m, const Ve
     const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
     ContactShare& share = shares[static_cast<std::size_t>(i)];
     share.contact = &contactWith(constraint.object, out);
-    share.spring_N = contactSet.spring.stiffness_N_per_m * (constraint.presence * constraint.depth_m);
+    share.spring_N = contactSet.spring.stiffness_N_per_m * constraint.depth_m;
     share.normal_N = normalForce(constraint, share.spring_N, dampingShare(contactSet, i), hipVelocity);
     share.friction_N = contactSet.frictionOf(constraint.surface) * share.normal_N + constraint.adhesion_N;
     share.contact->force_N += share.normal_N * constraint.forceDirection;
@@ -73,11 +73,6 @@ void addNormalForces(const ContactSet& contactSet, const Vec3& proxy_m, const Ve
       share.contact->point_m = proxy_m - toolRadius_m * constraint.halfSpace.normal;
     }
   }
-  const auto weaker = [](const Contact& a, const Contact& b) { return a.force_N.norm() < b.force_N.norm(); };
-  const Contact* const first = out.contacts.data();
-  const Contact* const last = first + out.contactCount;
-  if (const Contact* const hardest = std::max_element(first, last, weaker); hardest != last)
-    out.touchedObject = hardest->object;
   // Force shading turns the force and keeps its magnitude.
   const double shaded = out.normalForce_N.norm();
   if (!(shaded > 0)) return;
@@ -151,6 +146,9 @@ void applySurfaceLaw(const ContactSet& contactSet, const Vec3& proxy_m, const Ve
   out.scp_m = proxy_m - toolRadius_m * out.normal;
   out.contactForce_N = out.normalForce_N;
   addTangentialForces(contactSet, shares, out);
+  const auto weaker = [](const Contact& a, const Contact& b) { return a.force_N.norm() < b.force_N.norm(); };
+  const Contact* const first = out.contacts.data();
+  out.touchedObject = std::max_element(first, first + out.contactCount, weaker)->object;
 }
 
 void applyAdhesion(const Vec3& force_N, Rendering& out) noexcept {

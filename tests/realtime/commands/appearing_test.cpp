@@ -410,5 +410,44 @@ TEST_P(NewTriangles, leave_friction_of_others_as_it_is) {
   EXPECT_NEAR(loop.out.force_N.y(), 3e-3 * kStiffness_N_per_m, 1e-2);
 }
 
+// What exerts no force makes nothing else stiffer either.
+TEST_P(Appearing, object_around_the_hand_leaves_what_it_touches_as_it_is) {
+  loop.add(0, boxTriples(Vec3(-40, -30, -40), Vec3(40, 0, 40)));
+  const Vec3 pressed(0.001, GetParam() - 0.003, 0.002);
+  loop.rest({0.001, 0.010, 0.002}, toNanos(0.1));
+  loop.to(pressed);
+  ASSERT_NEAR(loop.out.force_N.y(), 1.5, 0.01);
+  loop.send(scene::SetObjectNumber{2});
+  loop.add(1, boxTriples(Vec3(-20, -20, -20), Vec3(20, 8, 20)));
+  for (const double stiffness : {4.0, 1.0, 4.0, 0.2}) {
+    loop.send(scene::SetSurfaceProperty{1, "stiffness", stiffness});
+    loop.rest(pressed, toNanos(0.02), [&] { EXPECT_NEAR(loop.out.force_N.y(), 1.5, 0.01) << stiffness; });
+    EXPECT_NE(loop.out.status & kRenderEnclosed, 0U);
+  }
+}
+
+// The touched face is on the other side then, and the hand inside.
+TEST_P(Appearing, object_that_is_mirrored_or_turned_over_under_the_hand) {
+  const std::array<double, 16> mirrored{1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  const std::array<double, 16> turned{1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1};
+  for (const auto& pose : {mirrored, turned}) {
+    loop.send(scene::ResetScene{});
+    loop.rest({0.003, 0.014, 0.002}, toNanos(0.3));
+    loop.add(0, boxTriples(Vec3(-20, -8, -20), Vec3(20, 8, 20)));
+    // A new parent: a placement that is not interpolated.
+    loop.send(scene::SetObjectNumber{2});
+    loop.send(scene::SetTransform{1, pose});
+    loop.rest({0.003, 0.014, 0.002}, toNanos(0.1));
+    const Vec3 pressed(0.003, 0.006 + GetParam(), 0.002);
+    loop.to(pressed);
+    ASSERT_NEAR(loop.out.force_N.y(), 1, 0.01);
+    loop.send(scene::MoveToParent{0, 1});
+    loop.tick(pressed);
+    EXPECT_NE(loop.out.status & kRenderGeometryJump, 0U);
+    loop.rest(pressed, toNanos(0.1), [&] { EXPECT_EQ(loop.out.force_N.norm(), 0); });
+    EXPECT_NE(loop.out.status & kRenderEnclosed, 0U);
+  }
+}
+
 }  // namespace
 }  // namespace hapticd::realtime::commands

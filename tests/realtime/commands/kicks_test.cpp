@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <random>
 #include <string>
 
 #include "loop.h"
@@ -330,6 +331,89 @@ TEST_P(PressedHandEvery, rests_while_the_same_mesh_comes_again) {
                       loop.send(scene::CommitBatch{});
                     }),
             kRest_m);
+}
+
+// A plane whose owner left hands the hand over to what lies below it.
+TEST_F(Kicks, plane_that_ramps_out_above_a_solid) {
+  for (const double below_mm : {0.5, 1.0, 2.5}) {
+    loop.send(scene::ResetScene{});
+    rest({0.001, 0.002, 0.002}, toNanos(0.5));
+    loop.send(scene::SetPlane{.plane = {0, 1, 0, 0}, .stiffness = 1});
+    loop.send(scene::SetObjectNumber{1}, 2);
+    loop.send(scene::SetVertices{0, 0, boxTriples(Vec3(-40, -30, -40), Vec3(40, -below_mm, 40))}, 2);
+    loop.send(scene::SetSurface{0, 1, 0, 0, 0}, 2);
+    loop.send(scene::SetObjectScale{0, Vec3::Constant(0.001)}, 2);
+    press(0.003);
+    ASSERT_NEAR(force_N.y(), 3, 0.02);
+    const double left_N = 3 - below_mm;
+    double least_N = 10;
+    double most_N = 0;  // of steps before the guard
+    loop.leave(1);
+    for (int i = 0; i < 300; ++i) {
+      const Vec3 before = loop.out.force_N;
+      tick(pressed);
+      least_N = std::min(least_N, loop.out.force_N.y());
+      most_N = std::max(most_N, (loop.out.force_N - before).norm());
+    }
+    EXPECT_NEAR(least_N, left_N, 0.01) << below_mm;
+    EXPECT_LT(most_N, 0.05) << below_mm;
+    EXPECT_NEAR(force_N.y(), left_N, 0.01) << below_mm;
+  }
+}
+
+// As much as the surface comes up, which the guard ramps in as it does a change of what is touched.
+TEST_F(Kicks, view_that_moves_into_a_free_hand) {
+  addPlate();
+  for (const double way_m : {0.001, 0.005, 0.015}) {
+    const Vec3 near(0.001, 0.0001, 0.002);
+    loop.send(scene::SetHapticOrigin{Vec3::Zero(), Vec3::UnitZ(), 0});
+    rest({0.001, 0.002, 0.002}, toNanos(0.6));
+    rest(near, toNanos(0.1));
+    ASSERT_EQ(force_N.norm(), 0);
+    step_N = 0;
+    loop.send(scene::SetHapticOrigin{Vec3(0, -way_m, 0), Vec3::UnitZ(), 0});
+    tick(near);
+    EXPECT_NE(loop.out.status & kRenderGeometryJump, 0U) << way_m;
+    rest(near, toNanos(0.1));
+    EXPECT_LE(step_N, 0.5) << way_m;
+    EXPECT_NEAR(loop.out.force_N.y(), kStiffness_N_per_m * (way_m - 0.0001), 0.01) << way_m;
+  }
+}
+
+// Across what is touched, from any side: the force may turn, and then it does so as by a command.
+TEST_F(Kicks, plane_that_is_placed_across_what_is_touched) {
+  addPlate();
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> draw(-1, 1);
+  int turned = 0;
+  for (int i = 0; i < 200; ++i) {
+    loop.send(scene::ResetScene{});
+    loop.send(scene::SetObjectNumber{1});
+    addPlate();
+    press(0.005);
+    const Vec3 before = loop.out.force_N;
+    const Vec3 normal = Vec3(draw(random), draw(random), draw(random)).normalized();
+    const double offset_m = 0.004 * draw(random) - normal.dot(Vec3(0.001, 0, 0.002));
+    loop.send(scene::SetPlane{.plane = {normal.x(), normal.y(), normal.z(), offset_m}, .stiffness = 1});
+    tick(pressed);
+    if ((loop.out.force_N - before).norm() < 0.2) continue;
+    ++turned;
+    EXPECT_NE(loop.out.status & (kRenderGeometryJump | kRenderReleased), 0U) << i;
+    EXPECT_LE(step_N, 0.5) << i;
+  }
+  EXPECT_GT(turned, 5);
+}
+
+TEST_F(Kicks, texture_that_rises_under_a_free_hand) {
+  loop.send(scene::SetPlane{.plane = {0, 1, 0, 0}, .stiffness = 1});
+  rest({0.001, 0.002, 0.002}, toNanos(0.6));
+  const Vec3 near(0.001, 0.0002, 0.002);
+  rest(near, toNanos(0.1));
+  step_N = 0;
+  loop.send(scene::SetPlaneDetail{.textureAmplitude_m = 0.002, .textureWavelength_m = 0.01});
+  rest(near, toNanos(0.1));
+  EXPECT_NEAR(force_N.y(), 1.8, 0.01);
+  EXPECT_LE(step_N, 0.5);
 }
 
 }  // namespace

@@ -56,9 +56,10 @@ class Loop {
   }
 
   template <class Command>
-  void send(Command command) {
-    builder_.apply(1, std::move(command), now, notices);
+  void send(Command command, scene::ClientId client = 1) {
+    builder_.apply(client, std::move(command), now, notices);
   }
+  void leave(scene::ClientId client) { builder_.clientGone(client, now); }
   /// Publishes what is due; the scene thread does so after each command.
   void publish() {
     if (auto next = builder_.publish(now, notices)) scenes_.push_back(std::move(next));

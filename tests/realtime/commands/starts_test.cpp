@@ -353,5 +353,23 @@ TEST_P(Starts, late_ticks_during_a_deformation_do_not_swallow_the_hand) {
   }
 }
 
+// A jump is not swept, whether the mesh deforms meanwhile or not.
+TEST(Jumps, view_that_jumps_over_a_free_hand_while_the_mesh_deforms) {
+  for (const double radius_m : {0.0, 0.002}) {
+    Loop loop({.toolRadius_m = radius_m});
+    const Vec3 hip(0.001, 0.004, 0.002);
+    loop.add(0, sheetTriples(60));
+    loop.rest(hip, toNanos(0.4));
+    for (int i = 0; i < 20; ++i) {
+      loop.send(scene::SetVertices{0, 0, sheetTriples(60, i % 2 == 0 ? 0.05 : 0)});
+      loop.rest(hip, toNanos(0.016));
+    }
+    loop.send(scene::SetVertices{0, 0, sheetTriples(60, 0.05)});
+    loop.tick(hip);
+    loop.send(scene::SetHapticOrigin{Vec3(0, -0.028, 0), Vec3::UnitZ(), 0});
+    loop.rest(hip, toNanos(0.1), [&] { EXPECT_EQ(loop.out.force_N.norm(), 0) << radius_m; });
+  }
+}
+
 }  // namespace
 }  // namespace hapticd::realtime::commands

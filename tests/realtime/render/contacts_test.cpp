@@ -81,6 +81,23 @@ TEST_P(ContactsTest, friction_belongs_to_the_object_that_rubs) {
   }
 }
 
+// Of the wall, friction included, and not of the floor whose normal force is larger.
+TEST_P(ContactsTest, touched_object_exerts_the_largest_force) {
+  addWall(surface(1000, 1, 1));
+  add(plane(0.05, 7), surface(1000));
+  start({0.003, 0.003, 0.003});
+  at({-0.002, 0.003, 0.003});
+  at({-0.002, 0.001, -0.0021});
+  const Rendering& r = at({-0.002, -0.002, -0.0021});
+  ASSERT_EQ(r.contactCount, 2U);
+  const auto& [first, second] = std::tie(r.contacts[0], r.contacts[1]);
+  const Contact& wall = first.normal.x() > 0.9 ? first : second;
+  const Contact& floor = first.normal.x() > 0.9 ? second : first;
+  ASSERT_GT(floor.force_N.dot(floor.normal), wall.force_N.dot(wall.normal));
+  ASSERT_GT(wall.force_N.norm(), floor.force_N.norm());
+  EXPECT_EQ(r.touchedObject, wall.object);
+}
+
 // An adhesive plane is a contact that pulls.
 TEST_P(ContactsTest, adhesion_is_a_contact) {
   scene::Plane floor;

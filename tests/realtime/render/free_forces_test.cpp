@@ -319,6 +319,23 @@ TEST_P(FreeForcesTest, plane_holds_on_up_to_its_adhesion) {
   EXPECT_EQ(to({0, 0, 0.0003}).force_N.norm(), 0);
 }
 
+// The wave stays where the first contact put it until the hand is above its crests.
+TEST_P(FreeForcesTest, texture_waits_below_a_hand_that_leaves_a_trough) {
+  scene::Plane p = floor(0);
+  p.textureAmplitude = units() * 0.0005;
+  p.textureWavelength = units() * 0.010;
+  scene.planes = {p};
+  start({0, 0, 0.002});
+  to({0, 0, -0.001}, 0.05);
+  ASSERT_NEAR(to({0.005, 0, -0.001}, 0.05).force_N.z(), 0.5, 0.01);
+  for (double z = -0.001; z < 0.0004; z += 2e-5) {
+    const double depth_m = std::max(0.0, -0.0005 - z);
+    EXPECT_NEAR(at({0.005, 0, z}).force_N.z(), 1000 * depth_m, 0.01) << z;
+  }
+  to({0.005, 0, 0.001}, 0.05);
+  EXPECT_NEAR(to({0.005, 0, 0.0003}, 0.05).force_N.z(), 0.2, 0.01) << "met anew, a crest";
+}
+
 TEST_P(FreeForcesTest, texture_and_buzz_move_the_plane) {
   scene::Plane p = floor(0);
   p.textureAmplitude = units() * 0.0002;
