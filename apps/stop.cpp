@@ -56,14 +56,19 @@ int run(const StopOptions& options) {
   Client client = openClient(options);
   if (!token.empty()) client.presentToken(token);
   std::optional<GuardReport> guard;
+  const char* const refused = options.rearm ? "Rearm_Forces refused" : "Stop_Forces refused";
   std::string refusal;
+  std::string fault;
   std::string remark;
   bool answered = false;
   client.onGuard([&](const GuardReport& report) { guard = report; });
   client.onText([&](const TextReport& text) {
     if (text.severity != Severity::error) return;
-    // A fault of the device is no answer, but the reason to stop.
-    (text.text.starts_with(wire::kNoForceText) ? remark : refusal) = text.text;
+    // A fault of the device is no answer, but the reason to stop. Nor is what the server says of a token or
+    // of a recording: what became of the forces, the guard tells.
+    (text.text.find(refused) != std::string::npos ? refusal
+     : text.text.starts_with(wire::kNoForceText)  ? fault
+                                                  : remark) = text.text;
   });
   client.onToRoom([&](const ToRoomReport&) { answered = true; });
   if (options.rearm) {
@@ -82,21 +87,23 @@ int run(const StopOptions& options) {
   if (!refusal.empty()) throw Error(options.server + " refused: " + refusal);
   if (options.rearm && guard && !guard->latched.empty())
     throw Error(options.server + " is not re-armed: " + namesOf(guard->latched) + " is latched again" +
-                (remark.empty() ? "" : "; " + remark));
+                (fault.empty() ? "" : "; " + fault));
   if (!isDone()) {
     throw Error(
         options.server +
         " sent no confirmation within 3 s; a replay has no force to stop, and for a device use its own "
-        "switch");
+        "switch" +
+        (remark.empty() ? "" : "; it said: " + remark));
   }
-  if (!remark.empty()) std::fprintf(stderr, "hapticd: %s\n", remark.c_str());
+  for (const std::string& text : {fault, remark})
+    if (!text.empty()) std::fprintf(stderr, "hapticd: %s\n", text.c_str());
   if (options.json) {
     printJson({{"server", options.server}, {"stopped", guard->stopped}, {"armed", guard->armed}});
     return 0;
   }
-  std::printf(!options.rearm   ? "%s: forces are off; 'hapticd stop --rearm' re-arms\n"
-              : remark.empty() ? "%s: re-armed; forces ramp in over half a second\n"
-                               : "%s: re-armed; forces come back once the device gives them\n",
+  std::printf(!options.rearm  ? "%s: forces are off; 'hapticd stop --rearm' re-arms\n"
+              : fault.empty() ? "%s: re-armed; forces ramp in over half a second\n"
+                              : "%s: re-armed; forces come back once the device gives them\n",
               options.server.c_str());
   if (options.rearm && !guard->armed)
     std::printf("forces are not enabled on this device: start the server with --enable-forces\n");

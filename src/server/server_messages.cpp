@@ -162,10 +162,11 @@ bool Server::isPermitted(Session& session, Station& station, wire::MessageKind k
   if (kind == wire::kindOf<wire::StopForces>) return true;
   if (!admission_.mayOnlyStop(session))
     return !wire::needsControl(kind) || station.mayCommand(session.commander(), kind, reason);
-  // A client library asks first whether the server knows a stop.
+  // A client library asks first whether the server knows a stop, and 'hapticd stop' whether it was carried
+  // out.
   for (const wire::MessageKind free :
        {wire::kindOf<wire::Ping>, wire::kindOf<wire::Heartbeat>, wire::kindOf<wire::QueryCapabilities>,
-        wire::kindOf<wire::RearmForces>})
+        wire::kindOf<wire::RearmForces>, wire::kindOf<wire::TrackerRequestToRoom>})
     if (kind == free) return true;
   reason = "the server is full: this connection may only stop and re-arm forces";
   return false;

@@ -47,3 +47,31 @@ done
 status=0
 "$hapticd" stop "Phantom@127.0.0.3:$port" >"$work/out" 2>&1 || status=$?
 [ "$status" = 1 ] && grep -q "Phantom@127.0.0.3:$port sent no confirmation within 3 s; a replay has no force to stop" "$work/out" || { cat "$work/out"; exit 1; }
+
+# On a full server, and with a token that is wrong: what is told is what became of the forces. Here the user of the server
+# stops it, who needs no token.
+printf '[limits]\nconnections = 1\n' >"$work/full.toml"
+"$hapticd" serve --config "$work/full.toml" --listen 127.0.0.4:0 --http off --allow-no-rt >"$work/full.log" 2>&1 &
+full=$!
+trap 'kill "$server" "$other" "$replay" "$full" 2>/dev/null || true; rm -rf "$work"' EXIT
+for _ in $(seq 300); do
+  if grep -q 'listening on' "$work/full.log"; then break; fi
+  sleep 0.1
+done
+port=$(sed -nE 's/.*listening on 127.0.0.4:([0-9]+).*/\1/p' "$work/full.log" | head -1)
+"$hapticd" watch "Phantom@tcp://127.0.0.4:$port" --seconds 30 >"$work/watched" 2>&1 &
+watch=$!
+trap 'kill "$server" "$other" "$replay" "$full" "$watch" 2>/dev/null || true; rm -rf "$work"' EXIT
+for _ in $(seq 100); do
+  if grep -q 'connected from' "$work/full.log"; then break; fi
+  sleep 0.1
+done
+"$hapticd" stop "Phantom@tcp://127.0.0.4:$port" >"$work/out" 2>&1 || { cat "$work/out" "$work/full.log"; exit 1; }
+grep -q 'forces are off' "$work/out"
+"$hapticd" stop --rearm "Phantom@127.0.0.4:$port" >"$work/out" 2>&1 || { cat "$work/out" "$work/full.log"; exit 1; }
+grep -q 're-armed' "$work/out"
+echo 0123456789abcdef0123456789abcdef >"$work/wrong"
+chmod 600 "$work/wrong"
+"$hapticd" stop "Phantom@127.0.0.4:$port" --token-file "$work/wrong" >"$work/out" 2>&1 || { cat "$work/out" "$work/full.log"; exit 1; }
+grep -q 'forces are off' "$work/out"
+grep -q 'Identify refused' "$work/out"

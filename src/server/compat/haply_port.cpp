@@ -107,7 +107,7 @@ void HaplyPort::onMessage(Client& client, std::string_view text) {
   try {
     client.unanswered.push_back(obey(client, text));
   } catch (const haply::MessageError& error) {
-    client.connection.close("no message of this protocol: " + std::string(error.what()));
+    client.connection.close("no message of this protocol: " + wire::inQuotes(error.what()));
     return;
   }
   if (client.unanswered.size() < kMostUnanswered || client.paused) return;

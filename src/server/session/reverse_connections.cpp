@@ -99,8 +99,11 @@ void ReverseConnections::onConnected(Pending& pending) {
   forget(pending);
   const net::Endpoint remote = connection.remote();
   net::Endpoint local = connection.local();
-  // All of 127.0.0.0/8 is this machine; any other address of its own is its source address, too.
-  if (remote.port == port_ && (net::isLoopback(remote.address) || remote.address == local.address)) {
+  // All of 127.0.0.0/8 is this machine; any other address of its own is its source address, too. Of a port at
+  // which nobody listens, the kernel may choose the same as the source, and the connection meets itself.
+  const bool itself = remote.address == local.address && remote.port == local.port;
+  if (itself ||
+      (remote.port == port_ && (net::isLoopback(remote.address) || remote.address == local.address))) {
     log_.warn("connection request names this server itself: refused");
     return;
   }
