@@ -45,4 +45,9 @@ std::unique_ptr<zeroconf::Announcer> announceOnNetwork(const server::Server& ser
   return std::make_unique<zeroconf::Announcer>(std::move(announced), address.address);
 }
 
+bool isReachedFromHereOnly(const server::Server& server) {
+  const auto web = server.webAddress();
+  return net::isLoopback(server.address().address) && (!web || net::isLoopback(web->address));
+}
+
 }  // namespace hapticd::apps

@@ -19,4 +19,7 @@ void logAddresses(const server::Server& server, const server::ServerConfig& conf
 std::unique_ptr<zeroconf::Announcer> announceOnNetwork(const server::Server& server,
                                                        const server::ServerConfig& config);
 
+/// Whether neither its port nor its page can be reached from other machines.
+bool isReachedFromHereOnly(const server::Server& server);
+
 }  // namespace hapticd::apps

@@ -94,7 +94,7 @@ int run(const DemoOptions& options) {
   const std::unique_ptr<zeroconf::Announcer> announcer = announceOnNetwork(*server, config);
   listNetworkOnPage(*server);
   const auto web = server->webAddress();
-  if (!net::isLoopback(server->address().address) || (web && !net::isLoopback(web->address)))
+  if (!isReachedFromHereOnly(*server))
     std::fprintf(stderr,
                  "hapticd: everybody who reaches this machine may lead the demo; its hand hurts nobody\n");
   stopper.watch(*server);

@@ -41,7 +41,9 @@ void addDevices(CLI::App& app) {
       "--open", options->openThem,
       "Also open devices that can be detected in no other way, without force (occupies the device briefly)");
   command->add_option("--haply-host", options->haplyHost, "Host of the Haply service")->capture_default_str();
-  command->add_option("--haply-port", options->haplyPort, "Port of the Haply service")->capture_default_str();
+  command->add_option("--haply-port", options->haplyPort, "Port of the Haply service")
+      ->check(CLI::Range(1, 65535))
+      ->capture_default_str();
   command->add_flag("--json", *json, kJsonText);
   command->footer(
       "'hapticd serve --device DRIVER' uses a device. The package installs the udev rules;\n"

@@ -226,22 +226,29 @@ void addRecord(CLI::App& app) {
   auto options = std::make_shared<RecordOptions>();
   CLI::App* command = app.add_subcommand("record", "Record the reports of a server as a client");
   command->add_option("server", options->server, "NAME@host[:port] or NAME@tcp://host[:port]")->required();
-  command->add_option("file", options->file,
-                      "*.vrpn, *.csv or *.mcap; with --server a name that ends with .haptics, or none");
+  CLI::Option* const file =
+      command->add_option("file", options->file,
+                          "*.vrpn, *.csv or *.mcap; with --server a name that ends with .haptics, or none");
   CLI::Option* const onServer = command->add_flag(
       "--server", options->onServer,
       "The server itself records, scene included, on its own disk, until --seconds or Ctrl-C");
-  command->add_flag("--detach", options->detach, "With --server: begin the recording and return")
-      ->needs(onServer);
-  command->add_flag("--end", options->end, "With --server: end the recording at hand")->needs(onServer);
+  CLI::Option* const detach =
+      command->add_flag("--detach", options->detach, "With --server: begin the recording and return")
+          ->needs(onServer);
+  command->add_flag("--end", options->end, "With --server: end the recording at hand")
+      ->needs(onServer)
+      ->excludes(file)
+      ->excludes(detach);
   addTokenFile(*command, options->tokenFile)->needs(onServer);
   command->add_option("--seconds", options->seconds, "Duration; 0: until Ctrl-C")
       ->check(within(0, kLongest_s))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->excludes(detach);
   command->add_option("--rate", options->rate_Hz, "At most this many ticks per second, for csv and mcap")
       ->check(within(0.1, 4000))
-      ->capture_default_str();
-  command->add_flag("--force", options->force, kForceText);
+      ->capture_default_str()
+      ->excludes(onServer);
+  command->add_flag("--force", options->force, kForceText)->excludes(onServer);
   command->footer(
       "Records what a client receives: reports, in the frame that the server reports, without the scene. The "
       "server\n"

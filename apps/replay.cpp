@@ -39,6 +39,8 @@ int run(const ReplayOptions& options) {
   logAddresses(server, config, "replay");
   const std::unique_ptr<zeroconf::Announcer> announcer = announceOnNetwork(server, config);
   listNetworkOnPage(server);
+  if (!isReachedFromHereOnly(server))
+    spdlog::warn("everybody who reaches this machine may see the replay: it asks for neither TLS nor tokens");
   stopper.watch(server);
   server.run();
   stopper.finish();

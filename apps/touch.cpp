@@ -106,8 +106,8 @@ void send(Client& client, const TriangleMesh& mesh, const TouchOptions& options)
               client.device().c_str(), client.server().c_str());
 }
 
-// A refusal of what was sent comes before the answer to this question, which other servers may not give;
-// without it, only the summary at the end would tell.
+// A refusal of what was sent comes before the answer to this question, which other servers may not give. Then
+// there is nothing to touch; a token that is refused, or a device without a force, leaves the mesh there.
 void awaitAnswer(Client& client, const ReportSummary& summary) {
   if (!client.waitCapabilities()) return;
   bool answered = false;
@@ -117,8 +117,10 @@ void awaitAnswer(Client& client, const ReportSummary& summary) {
   while (!answered && !stopRequested() && client.connected() && std::chrono::steady_clock::now() < end)
     client.poll(20ms);
   client.onToRoom(nullptr);
-  if (!summary.firstError().empty())
-    std::fprintf(stderr, "hapticd touch: %s: %s\n", client.server().c_str(), summary.firstError().c_str());
+  const std::string& error = summary.firstError();
+  if (error.find("refused") != std::string::npos && !error.starts_with("Identify"))
+    throw Error(client.server() + ": " + error);
+  if (!error.empty()) std::fprintf(stderr, "hapticd touch: %s: %s\n", client.server().c_str(), error.c_str());
 }
 
 void watch(Client& client, ReportSummary& summary, double seconds) {

@@ -78,6 +78,8 @@ void checkDriver(const Checker& check, const DeviceConfig& device) {
                "the driver '" + device.driver +
                    "' cannot be isolated, so there is nothing to watch; remove isolate_watch");
   }
+  if (device.isolateWatch && !device.isolate.value_or(true))
+    check.fail("isolate_watch", "isolate is false, so there is nothing to watch; remove one of them");
   if (device.hand.empty()) check.fail("hand", R"(hand is empty; use "script", or the name of a file)");
   for (const auto& [key, value] : device.driverKeys) {
     if (std::find(driver->keys.begin(), driver->keys.end(), key) != driver->keys.end()) continue;

@@ -146,7 +146,8 @@ void Reporter::update(const TickReport& tick, const ReportFrame& frame, std::vec
   const bool contactEnded = touching_ && !touching;
   const bool contactChanged = touching_ != touching;
   if (tick.time < due_ && !contactEnded) return;
-  due_ = std::max(due_ + period_, tick.time - period_ / 2);
+  const base::Nanos due = due_ == 0 ? tick.time : due_;  // the first tick begins the intervals
+  due_ = std::max(due + period_, tick.time - period_ / 2);
   now_ = tick.time;
   const ClientTick clientTick = toClientTick(tick, config_.forceReport);
   tracker(clientTick, frame, out);

@@ -37,6 +37,7 @@ bool equalInConstantTime(std::string_view a, std::string_view b) {
 std::string readPrivate(const std::string& file) {
   namespace fs = std::filesystem;
   std::error_code error;
+  if (fs::is_directory(file, error)) throw ConfigError("tokens: '" + file + "' is a directory; name a file");
   const fs::perms mode = fs::status(file, error).permissions();
   if (!error && (mode & (fs::perms::group_all | fs::perms::others_all)) != fs::perms::none) {
     throw ConfigError("tokens: others than its owner may use '" + file + "': chmod 0600 " + file);
@@ -77,6 +78,8 @@ Credentials::Credentials(const ServerConfig& config, std::uint32_t serverUser)
       throw ConfigError(place + "a token must have 16 to 128 characters, got " +
                         std::to_string(token.size()) + "; 'openssl rand -hex 32' makes one");
     }
+    if (std::any_of(tokens_.begin(), tokens_.end(), [&](const Token& each) { return each.text == token; }))
+      throw ConfigError(place + "the same token as on a line before; each role needs one of its own");
     tokens_.push_back({token, named(ClientRole::owner)       ? ClientRole::owner
                               : named(ClientRole::operating) ? ClientRole::operating
                                                              : ClientRole::observer});

@@ -362,6 +362,8 @@ TEST(Config, ADriverWithoutAVendorLibraryCannotBeIsolated) {
       errorOf("[[device]]\nisolate_watch = true\n"),
       "test.toml:2: device 'Phantom': the driver 'simulated' cannot be isolated, so there is nothing to "
       "watch; remove isolate_watch");
+  EXPECT_THAT(errorOf("[[device]]\ndriver = \"openhaptics\"\nisolate = false\nisolate_watch = true\n"),
+              HasSubstr("isolate is false, so there is nothing to watch"));
 }
 
 TEST(Config, ARecordingBringsNoPortOfTheServerThatWroteIt) {

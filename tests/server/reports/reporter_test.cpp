@@ -247,6 +247,16 @@ TEST_F(ReporterTest, TheReportRateIsKeptAndButtonsAreReportedAtOnce) {
   EXPECT_EQ(reported<wire::ButtonChange>()[0].state, 1);
 }
 
+TEST_F(ReporterTest, TheFirstReportBeginsTheIntervals) {
+  config_.reportRate_Hz = 100;
+  std::vector<int> at;
+  for (int i = 0; i < 45; ++i) {
+    step();
+    if (!reported<wire::IsTouching>().empty()) at.push_back(i);
+  }
+  EXPECT_EQ(at, (std::vector<int>{0, 10, 20, 30, 40}));
+}
+
 TEST_F(ReporterTest, OptionsSelectForceAndQuaternionOrder) {
   config_.forceReport = ForceReport::normal;
   config_.quaternionOrder = QuaternionOrder::wxyz;

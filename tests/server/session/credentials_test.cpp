@@ -99,11 +99,15 @@ TEST_F(CredentialsTest, ClientsOfTrustedNetworksOwnWithoutATokenAndProveNothing)
 TEST_F(CredentialsTest, AFileThatOthersMayReadIsRefused) {
   fs::permissions(file_, fs::perms::group_read, fs::perm_options::add);
   EXPECT_NE(errorOf().find("chmod 0600"), std::string::npos) << errorOf();
+  fs::remove(file_);
+  fs::create_directory(file_);
+  EXPECT_NE(errorOf().find("is a directory"), std::string::npos) << errorOf();
 }
 
 TEST_F(CredentialsTest, MalformedFilesAreRefusedWithoutTheirTokens) {
   for (const std::string text :
-       {"", "owner", "owner short", "king 0123456789abcdef", "owner 0123456789abcdef secondsecondsecond"}) {
+       {"", "owner", "owner short", "king 0123456789abcdef", "owner 0123456789abcdef secondsecondsecond",
+        "owner 0123456789abcdef\nobserver 0123456789abcdef"}) {
     write(text);
     EXPECT_NE(errorOf(), "") << text;
     EXPECT_EQ(errorOf().find("0123456789abcdef"), std::string::npos);
