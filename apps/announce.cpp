@@ -14,7 +14,8 @@ void logAddresses(const server::Server& server, const server::ServerConfig& conf
   const std::string at = server.address().text();
   spdlog::info("listening on {} (TCP and UDP)", at);
   if (!server.fingerprint().empty())
-    spdlog::info("TLS for other machines; certificate SHA-256 {}", server.fingerprint());
+    spdlog::info("TLS{}; certificate SHA-256 {}", config.tlsLoopback ? "" : " for other machines",
+                 server.fingerprint());
   for (const server::DeviceConfig& device : config.devices) {
     const std::string_view kind = driver.empty() ? device.driver : driver;
     for (const std::string& name : device.names) spdlog::info("device {}@{} ({})", name, at, kind);

@@ -47,6 +47,10 @@ ServerAddress parseServer(std::string_view text) {
   server.tcpOnly = dropPrefix(rest, "tcp:");
   if (!server.tcpOnly) dropPrefix(rest, "x-vrpn:");
   dropPrefix(rest, "//");
+  if (const std::size_t scheme = rest.find("://"); scheme != std::string_view::npos)
+    throw std::invalid_argument(
+        "server " + wire::inQuotes(text) +
+        ": expected host, host:port or tcp://host:port; without tcp:// it is reached by UDP");
   if (rest.starts_with('[') || std::count(rest.begin(), rest.end(), ':') > 1)
     throw std::invalid_argument("server " + wire::inQuotes(text) +
                                 ": IPv6 addresses are not supported; use a name or an IPv4 address");
