@@ -36,7 +36,7 @@ class ReplayedScene {
     geometry::Vec3 place;
   };
   struct State {
-    std::int32_t objectNumber = 1;  // object 0 is always there
+    std::int32_t objectNumber = 1;   // object 0 is always there
     std::set<std::int32_t> objects;  // of further ones
     std::set<std::int32_t> meshes;   // objects that have vertices
     std::map<std::int32_t, geometry::Vec3> poses;
