@@ -5,6 +5,13 @@ hapticd=$1
 source_dir=$2
 . "$(dirname "$0")/server.sh"
 
+await() {  # TEXT LOG: until the log has the text, at most 30 s
+  for _ in $(seq 300); do
+    if grep -q "$1" "$work/$2"; then return; fi
+    sleep 0.1
+  done
+}
+
 "$hapticd" stop "Phantom@$address" | grep -q 'forces are off'
 "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --server "Phantom@$address" --seconds 4 >"$work/stopped"
 awk '/peak force/ { if ($3 != 0) force = 1 } END { exit force }' "$work/stopped" || { cat "$work/stopped"; exit 1; }
@@ -22,10 +29,7 @@ port=${address##*:}
 "$hapticd" serve --listen "127.0.0.2:$port" --http off --allow-no-rt >"$work/other.log" 2>&1 &
 other=$!
 trap 'kill "$server" "$other" 2>/dev/null || true; rm -rf "$work"' EXIT
-for _ in $(seq 300); do
-  if grep -q 'listening on' "$work/other.log"; then break; fi
-  sleep 0.1
-done
+await 'listening on' other.log
 stops() { grep -c 'stops the forces' "$work/$1" || true; }
 before=$(stops log)
 "$hapticd" stop "Phantom@127.0.0.2:$port" | grep -q 'forces are off'
@@ -40,10 +44,7 @@ before=$(stops log)
 "$hapticd" replay "$work/own.haptics" --speed 0.05 --listen "127.0.0.3:$port" --http off >"$work/replay.log" 2>&1 &
 replay=$!
 trap 'kill "$server" "$other" "$replay" 2>/dev/null || true; rm -rf "$work"' EXIT
-for _ in $(seq 300); do
-  if grep -q 'listening on' "$work/replay.log"; then break; fi
-  sleep 0.1
-done
+await 'listening on' replay.log
 status=0
 "$hapticd" stop "Phantom@127.0.0.3:$port" >"$work/out" 2>&1 || status=$?
 [ "$status" = 1 ] && grep -q "Phantom@127.0.0.3:$port sent no confirmation within 3 s; a replay has no force to stop" "$work/out" || { cat "$work/out"; exit 1; }
@@ -54,18 +55,12 @@ printf '[limits]\nconnections = 1\n' >"$work/full.toml"
 "$hapticd" serve --config "$work/full.toml" --listen 127.0.0.4:0 --http off --allow-no-rt >"$work/full.log" 2>&1 &
 full=$!
 trap 'kill "$server" "$other" "$replay" "$full" 2>/dev/null || true; rm -rf "$work"' EXIT
-for _ in $(seq 300); do
-  if grep -q 'listening on' "$work/full.log"; then break; fi
-  sleep 0.1
-done
+await 'listening on' full.log
 port=$(sed -nE 's/.*listening on 127.0.0.4:([0-9]+).*/\1/p' "$work/full.log" | head -1)
 "$hapticd" watch "Phantom@tcp://127.0.0.4:$port" --seconds 30 >"$work/watched" 2>&1 &
 watch=$!
 trap 'kill "$server" "$other" "$replay" "$full" "$watch" 2>/dev/null || true; rm -rf "$work"' EXIT
-for _ in $(seq 100); do
-  if grep -q 'connected from' "$work/full.log"; then break; fi
-  sleep 0.1
-done
+await 'connected from' full.log
 "$hapticd" stop "Phantom@tcp://127.0.0.4:$port" >"$work/out" 2>&1 || { cat "$work/out" "$work/full.log"; exit 1; }
 grep -q 'forces are off' "$work/out"
 "$hapticd" stop --rearm "Phantom@127.0.0.4:$port" >"$work/out" 2>&1 || { cat "$work/out" "$work/full.log"; exit 1; }

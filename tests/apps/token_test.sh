@@ -9,8 +9,8 @@ token=0123456789abcdef-secret
 (umask 077 && printf 'owner %s\n' "$token" >"$work/tokens" && printf '%s\n' "$token" >"$work/token")
 printf 'tokens = "%s"\nhttp = "off"\n' "$work/tokens" >"$work/config.toml"
 serve_options=(--config "$work/config.toml")
+cd "$work"  # the server records there
 . "$source_dir/tests/apps/server.sh"
-cd "$work"
 
 refused() {  # ARGUMENT...
   local status=0
