@@ -25,6 +25,10 @@ inline CLI::Validator within(double least, double most) {
       },
       range.str());
 }
+/// Refuses a text without characters, which would otherwise mean what a missing option means.
+inline CLI::Validator notEmpty() {
+  return CLI::Validator([](std::string& text) { return text.empty() ? "is empty" : ""; }, "");
+}
 /// Throws std::runtime_error when the file exists and `force` is not given, or is `input`, which is still to
 /// be read. Pipes and devices may be written.
 inline void keepFile(const std::string& file, bool force, const std::string& input = {}) {

@@ -123,10 +123,13 @@ void addDemo(CLI::App& app) {
   auto options = std::make_shared<DemoOptions>();
   CLI::App* command = app.add_subcommand(
       "demo", "Start a server with a simulated hand that explores a scan; prints the address of its page");
-  command->add_option("--listen", options->listen,
-                      "ADDR:PORT for TCP and UDP [127.0.0.1:3883, or a free port]");
-  command->add_option("--http", options->http,
-                      "ADDR:PORT of the page, or 'off' [127.0.0.1:8080, or a free port]");
+  command
+      ->add_option("--listen", options->listen, "ADDR:PORT for TCP and UDP [127.0.0.1:3883, or a free port]")
+      ->check(notEmpty());
+  command
+      ->add_option("--http", options->http,
+                   "ADDR:PORT of the page, or 'off' [127.0.0.1:8080, or a free port]")
+      ->check(notEmpty());
   command->add_option("--seconds", options->seconds, "Stop after this time [until Ctrl-C]")
       ->check(within(0.001, kLongest_s));
   command->footer("It needs no hardware, no file and no rights.");

@@ -40,7 +40,9 @@ void addDevices(CLI::App& app) {
   command->add_flag(
       "--open", options->openThem,
       "Also open devices that can be detected in no other way, without force (occupies the device briefly)");
-  command->add_option("--haply-host", options->haplyHost, "Host of the Haply service")->capture_default_str();
+  command->add_option("--haply-host", options->haplyHost, "Host of the Haply service")
+      ->check(notEmpty())
+      ->capture_default_str();
   command->add_option("--haply-port", options->haplyPort, "Port of the Haply service")
       ->check(CLI::Range(1, 65535))
       ->capture_default_str();

@@ -99,6 +99,8 @@ int run(const ExportOptions& options) {
                {"to", options.to},
                {"beside", beside.empty() ? nlohmann::json() : nlohmann::json(beside)},
                {"remark", remark}});
+  } else {
+    std::printf("wrote %s%s\n", options.out.c_str(), beside.empty() ? "" : (" and " + beside).c_str());
   }
   return 0;
 }

@@ -7,6 +7,7 @@
 
 #include "base/nearest_name.h"
 #include "commands.h"
+#include "server/config/config.h"
 #include "version.h"
 
 namespace {
@@ -68,6 +69,9 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : 2;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
+  } catch (const hapticd::server::ConfigError& error) {
+    std::fprintf(stderr, "hapticd: %s\n", error.what());
+    return 2;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "hapticd: %s\n", error.what());
     return 1;

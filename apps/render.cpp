@@ -127,7 +127,8 @@ int run(const CLI::App& command, const RenderCommandOptions& options) {
   }
   if (!options.session.empty()) {
     for (const char* name :
-         {"--mesh", "--hand", "--compare", "--mesh-unit", "--size-mm", "--faces", "--timing"}) {
+         {"--mesh", "--hand", "--compare", "--mesh-unit", "--size-mm", "--faces", "--timing",
+          "--traj-columns", "--traj-unit", "--traj-time-unit", "--traj-force"}) {
       if (command.count(name) == 0) continue;
       throw std::runtime_error(std::string(name) +
                                " does not go with --session, which has its own scene and hand: leave one of "

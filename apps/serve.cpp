@@ -52,8 +52,10 @@ void applyFlags(const ServeOptions& options, server::DeviceConfig& device) {
   if (!options.driver.empty()) {
     const std::size_t colon = options.driver.find(':');
     const std::string driver = options.driver.substr(0, colon);
-    // The hardware name, the keys and the isolation of one driver mean nothing to another.
+    // The hardware name, the keys, the hand and the isolation of one driver mean nothing to another.
     if (driver != device.driver) {
+      const device::Driver* const next = device::findDriver(driver);
+      if (next == nullptr || !next->hasHand) device.hand = server::DeviceConfig().hand;
       device.hardware.clear();
       device.driverKeys.clear();
       device.isolate.reset();
@@ -187,13 +189,7 @@ class CrashMark {
 
 int run(const ServeOptions& options) {
   std::vector<std::string> remarks;
-  server::ServerConfig config;
-  try {
-    config = configOf(options, remarks);
-  } catch (const server::ConfigError& error) {
-    std::fprintf(stderr, "hapticd: %s\n", error.what());
-    return 2;
-  }
+  server::ServerConfig config = configOf(options, remarks);
   if (options.checkConfig) {
     for (const std::string& remark : remarks) std::printf("# %s\n", remark.c_str());
     for (server::DeviceConfig& device : config.devices) {
@@ -241,20 +237,26 @@ void addServe(CLI::App& app) {
       ->check(CLI::ExistingFile);
   command->add_flag("--check-config", options->checkConfig,
                     "Print the configuration in effect as TOML, or the error in it, and exit");
-  command->add_option("--listen", options->listen,
-                      "ADDR:PORT for TCP and UDP [127.0.0.1:3883]; 0.0.0.0 for all networks");
+  command
+      ->add_option("--listen", options->listen,
+                   "ADDR:PORT for TCP and UDP [127.0.0.1:3883]; 0.0.0.0 for all networks")
+      ->check(notEmpty());
   command->add_option("--port", options->port, "Only the port; 0: any free one")->check(CLI::Range(0, 65535));
-  command->add_option("--http", options->http,
-                      "ADDR:PORT of the viewer, its data and the metrics [127.0.0.1:8080 if free, otherwise\n"
-                      "none]; 'off' for none; 0.0.0.0:8080 for all networks");
+  command
+      ->add_option("--http", options->http,
+                   "ADDR:PORT of the viewer, its data and the metrics [127.0.0.1:8080 if free, otherwise\n"
+                   "none]; 'off' for none; 0.0.0.0:8080 for all networks")
+      ->check(notEmpty());
   command->add_option("--http-allow", options->httpAllow,
                       "HOST or HOST:PORT by which browsers may open the viewer; repeat it for more.\n"
                       "IP addresses and localhost are always allowed");
   command->add_option("--name", options->names,
                       "Device name that clients open [Phantom]; repeat it for more names");
-  command->add_option("--device", options->driver,
-                      "Driver [simulated]: " + device::driverNames() +
-                          "\nDRIVER:WHICH selects one of several devices, e.g. evdev:/dev/input/event5");
+  command
+      ->add_option("--device", options->driver,
+                   "Driver [simulated]: " + device::driverNames() +
+                       "\nDRIVER:WHICH selects one of several devices, e.g. evdev:/dev/input/event5")
+      ->check(notEmpty());
   command->add_flag("--enable-forces", options->enableForces,
                     "Enable forces on a real device; without this flag it starts disarmed");
   command->add_flag(
@@ -268,18 +270,22 @@ void addServe(CLI::App& app) {
       ->add_flag("--in-process", options->inProcess,
                  "Run the driver in the server's process: saves one tick of delay and that protection")
       ->excludes(isolate);
-  command->add_option(
-      "--hand", options->hand,
-      "Simulated device: 'script' strokes the objects of the scene [script], FILE.csv follows the path\n"
-      "t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons], FILE.traj a measured one");
+  command
+      ->add_option(
+          "--hand", options->hand,
+          "Simulated device: 'script' strokes the objects of the scene [script], FILE.csv follows the path\n"
+          "t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons], FILE.traj a measured one")
+      ->check(notEmpty());
   command->add_option("--report-rate", options->reportRate_Hz, "Reports per second [1000]")
       ->check(within(0.1, 4000));
   command->add_option("--seconds", options->seconds, "Stop after this time; 0: run until a signal [0]")
       ->check(within(0, kLongest_s));
-  command->add_option(
-      "--record", options->record,
-      "Write a recording (all scene commands and ticks) for replay, render and export; %Y%m%d-%H%M%S\n"
-      "in the name becomes the time");
+  command
+      ->add_option(
+          "--record", options->record,
+          "Write a recording (all scene commands and ticks) for replay, render and export; %Y%m%d-%H%M%S\n"
+          "in the name becomes the time")
+      ->check(notEmpty());
   command->add_flag(
       "--allow-no-rt", options->allowNoRealtime,
       "Run a real device even if the system refuses realtime rights; the simulated hand always runs");

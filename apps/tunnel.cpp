@@ -154,6 +154,9 @@ int run(const TunnelOptions& options) {
   net::Loop loop;
   std::optional<tls::Context> context;
   net::Endpoint address;
+  if (!server.socket.empty() && !(options.fingerprint + options.authorities).empty())
+    throw std::runtime_error(server.text() + " is a socket of this machine, without TLS: leave out " +
+                             (options.fingerprint.empty() ? "--ca" : "--fingerprint"));
   if (server.socket.empty()) {
     context = contextOf(options, server.host);
     address = {net::resolve(server.host), server.port};

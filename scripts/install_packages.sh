@@ -4,6 +4,10 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 [ $# -gt 0 ] || { sed -n '2,3s/^# *//p' "$0"; exit 2; }
+sections=$(sed -n 's/^\[\(.*\)\]$/\1/p' packages.txt)
+for wanted in "$@"; do
+  grep -qxF -- "$wanted" <<<"$sections" || { echo "packages.txt has no section '$wanted', but" $sections >&2; exit 2; }
+done
 missing=()
 section=""
 while read -r package instead; do

@@ -32,6 +32,8 @@ struct Driver {
   const char* help;  ///< one line: which devices it runs
   std::span<const char* const>
       keys;                   ///< keys of a [[device]] that only this driver reads; their values are texts
+  bool hasHardware = true;    ///< reads DriverOptions::hardware
+  bool hasHand = false;       ///< reads DriverOptions::hand
   bool canBeIsolated = true;  ///< may run in a process of its own
   /// Does so unless configured otherwise: a vendor's library whose last force nothing ends when the process
   /// hangs or dies.

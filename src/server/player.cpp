@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <stdexcept>
 
 #include "base/world.h"
 #include "server/session/wall_clock.h"
@@ -42,9 +43,10 @@ Player::Player(ReplayOptions options)
 ServerConfig Player::config() const {
   ServerConfig config = parseRecordedConfig(header_.config, options_.file.string());
   if (config.devices.size() != header_.devices.size()) {
-    throw ConfigError("'" + options_.file.string() + "' names " + std::to_string(config.devices.size()) +
-                      " devices in its configuration but contains " + std::to_string(header_.devices.size()) +
-                      "; the recording is damaged");
+    throw std::runtime_error("'" + options_.file.string() + "' names " +
+                             std::to_string(config.devices.size()) +
+                             " devices in its configuration but contains " +
+                             std::to_string(header_.devices.size()) + "; the recording is damaged");
   }
   return config;
 }

@@ -48,9 +48,14 @@ printf '\ntls = "%s/nosuch.pem"\ntls_key = "%s/nosuch.key"\n' "$work" "$work" >t
 fails_with "tls.toml:2: " --config tls.toml
 fails_with "nosuch" --config tls.toml
 fails_with "hardware is 'x', expected the number" --device forcedimension:x
+fails_with "has no hardware to choose from" --device simulated:left
+fails_with "the driver 'evdev' is led by its own hand" --device evdev --hand script.csv
+fails_with "--device: is empty" --device ''
 fails_with "is the port of listen" --listen 127.0.0.1:4000 --http 127.0.0.1:4000
 fails_with 'replay needs a recorded hand: hand = "FILE.csv"' --device replay
 fails_with "--name needs a name, got the option --check-config" --name --check-config
+
+"$hapticd" serve --config hand.toml --device evdev --check-config | grep -qx 'hand = "script"'
 
 # The isolation in effect, as the driver decides it; another driver decides anew.
 "$hapticd" serve --device openhaptics --check-config >effective.toml

@@ -22,6 +22,13 @@ refused 1 "--mesh does not go with --session" "$hapticd" render --mesh "$source_
 refused 1 "hapticd devices" "$hapticd" serve --device openhaptics --listen 127.0.0.1:0 --http off
 refused 1 "no system bus" env DBUS_SYSTEM_BUS_ADDRESS=unix:path=/nowhere "$hapticd" list
 refused 1 "no system bus" env DBUS_SYSTEM_BUS_ADDRESS=unix:path=/nowhere "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --find
+refused 1 "--traj-unit does not go with --session" "$hapticd" render --session "$source_dir/testdata/recordings/all_commands_law2.haptics" --traj-unit m
+refused 1 "without TLS: leave out --fingerprint" "$hapticd" tunnel unix:/nowhere --fingerprint 00
+refused 2 "--haply-host: is empty" "$hapticd" devices --haply-host ''
+for command in "demo" "replay $source_dir/testdata/recordings/all_commands_law2.haptics" "serve"; do
+  refused 2 "is not an IPv4 address" "$hapticd" $command --listen x
+done
+refused 2 "packages.txt has no section 'nosuch', but build" "$source_dir/scripts/install_packages.sh" nosuch
 printf '{"asset":%0200000d' 0 | tr 0 '[' >"$work/deep.gltf"  # overflows the stack of the reader
 refused 1 "deep.gltf': its reader crashed" "$hapticd" touch "$work/deep.gltf"
 printf 'OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n' >"$work/three.off"
@@ -32,7 +39,7 @@ refused 1 "three.off': the format '.off' is not supported" "$hapticd" touch "$wo
 refused 1 "exists: choose another name, or overwrite it by --force" "$hapticd" record "Phantom@tcp://$address" "$work/own.csv" --seconds 0.3
 "$hapticd" record "Phantom@tcp://$address" "$work/own.csv" --seconds 0.3 --force
 recording=$source_dir/testdata/recordings/all_commands_law2.haptics
-"$hapticd" export "$recording" --to csv -o "$work/out.csv"
+"$hapticd" export "$recording" --to csv -o "$work/out.csv" | grep -qx "wrote $work/out.csv and $work/out.csv.json"
 refused 1 "--force" "$hapticd" export "$recording" --to csv -o "$work/out.csv"
 "$hapticd" export "$recording" --to csv -o "$work/out.csv" --force
 

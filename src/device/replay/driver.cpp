@@ -16,6 +16,11 @@ std::unique_ptr<Device> make(const DriverOptions& options) {
 }  // namespace
 
 extern const Driver replay;
-const Driver replay{.name = "replay", .help = "a recorded hand, again and again", .keys = {}, .make = make};
+const Driver replay{.name = "replay",
+                    .help = "a recorded hand, again and again",
+                    .keys = {},
+                    .hasHardware = false,
+                    .hasHand = true,
+                    .make = make};
 
 }  // namespace hapticd::device::drivers_in_this_build

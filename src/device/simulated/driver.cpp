@@ -10,6 +10,8 @@ extern const Driver simulated;
 const Driver simulated{.name = "simulated",
                        .help = "a simulated hand: no hardware needed",
                        .keys = {},
+                       .hasHardware = false,
+                       .hasHand = true,
                        .canBeIsolated = false,
                        .make = [](const DriverOptions& options) -> std::unique_ptr<Device> {
                          auto device = std::make_unique<SimulatedDevice>();

@@ -296,19 +296,24 @@ ServerConfig parseConfig(const std::string& text, const std::string& source) {
 }
 
 ServerConfig parseRecordedConfig(const std::string& text, const std::string& source) {
-  const toml::table root = tableOf(text, source);
-  const ServerConfig recorded = read(root, source);
-  ServerConfig config;
-  config.announce = recorded.announce;
-  config.limits = recorded.limits;
-  config.devices = recorded.devices;
-  for (DeviceConfig& device : config.devices) {
-    device.hand = DeviceConfig().hand;
-    device.blackBoxDir = DeviceConfig().blackBoxDir;
-    device.isolateWatch = DeviceConfig().isolateWatch;
+  try {
+    const toml::table root = tableOf(text, source);
+    const ServerConfig recorded = read(root, source);
+    ServerConfig config;
+    config.announce = recorded.announce;
+    config.limits = recorded.limits;
+    config.devices = recorded.devices;
+    for (DeviceConfig& device : config.devices) {
+      device.hand = DeviceConfig().hand;
+      device.hardware = DeviceConfig().hardware;
+      device.blackBoxDir = DeviceConfig().blackBoxDir;
+      device.isolateWatch = DeviceConfig().isolateWatch;
+    }
+    check(config, root, source);
+    return config;
+  } catch (const ConfigError& error) {
+    throw std::runtime_error(std::string(error.what()) + "; the recording is damaged, or of a newer version");
   }
-  check(config, root, source);
-  return config;
 }
 
 }  // namespace hapticd::server

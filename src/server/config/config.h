@@ -198,7 +198,7 @@ std::string placeOf(const InvalidValue& error, const std::filesystem::path& file
 ServerConfig parseConfig(const std::string& text, const std::string& source);
 
 /// The configuration in a recording, without what belongs to the machine that recorded: addresses, ports,
-/// users, paths.
+/// users, paths, hardware. Throws std::runtime_error: a recording is nobody's configuration to mend.
 ServerConfig parseRecordedConfig(const std::string& text, const std::string& source);
 
 /// The configuration as TOML with every key; parseConfig() of it returns an equal configuration.

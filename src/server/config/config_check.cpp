@@ -80,6 +80,13 @@ void checkDriver(const Checker& check, const DeviceConfig& device) {
   }
   if (device.isolateWatch && !device.isolate.value_or(true))
     check.fail("isolate_watch", "isolate is false, so there is nothing to watch; remove one of them");
+  if (!driver->hasHardware && !device.hardware.empty()) {
+    check.fail("hardware", "the driver '" + device.driver + "' has no hardware to choose from; remove " +
+                               wire::inQuotes(device.hardware));
+  }
+  if (!driver->hasHand && device.hand != DeviceConfig().hand)
+    check.fail("hand", "the driver '" + device.driver + "' is led by its own hand; remove " +
+                           wire::inQuotes(device.hand));
   if (device.hand.empty()) check.fail("hand", R"(hand is empty; use "script", or the name of a file)");
   for (const auto& [key, value] : device.driverKeys) {
     if (std::find(driver->keys.begin(), driver->keys.end(), key) != driver->keys.end()) continue;

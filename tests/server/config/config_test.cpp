@@ -283,7 +283,6 @@ ServerConfig unusual() {
   device.enableForces = true;
   device.isolate = true;
   device.isolateWatch = true;
-  device.hand = "hand.csv";
   device.servoRate_Hz = 4000;
   device.reportRate_Hz = 1.0 / 3;
   device.linearTolerance_m = 0.3e-3;
@@ -310,6 +309,7 @@ ServerConfig unusual() {
   device.blackBoxKeep = 3;
   config.devices = {device, DeviceConfig{}};
   config.devices[1].names = {"Right"};
+  config.devices[1].hand = "hand.csv";
   config.devices[1].workspace_mm.assign(kPaperWorkspace_mm.begin(), kPaperWorkspace_mm.end());
   config.devices[1].control = Control::first;
   return config;
@@ -345,6 +345,11 @@ TEST(Config, KeysOfOtherDriversAreRefused) {
   EXPECT_EQ(errorOf("[[device]]\nwheel_profile = \"wheel.toml\"\n"),
             "test.toml:2: device 'Phantom': the driver 'simulated' has no key wheel_profile; remove it");
   EXPECT_EQ(errorOf("[[device]]\nwheel_profile = \"\"\n"), "") << "as toToml() writes it";
+  EXPECT_EQ(errorOf("[[device]]\ndriver = \"evdev\"\nhand = \"h.csv\"\n"),
+            "test.toml:3: device 'Phantom': the driver 'evdev' is led by its own hand; remove \"h.csv\"");
+  EXPECT_EQ(errorOf("[[device]]\nhardware = \"left\"\n"),
+            "test.toml:2: device 'Phantom': the driver 'simulated' has no hardware to choose from; remove "
+            "\"left\"");
 }
 
 TEST(Config, NamesOfMirrorsMustBeFree) {
@@ -370,6 +375,7 @@ TEST(Config, ARecordingBringsNoPortOfTheServerThatWroteIt) {
   ServerConfig there;
   there.listenAddress = "127.0.0.2";
   there.compat.haply = "127.0.0.1:10001";
+  there.devices.front().hardware = "left";  // old versions let the simulated hand have one
   there.limits.objects = 5;
   ServerConfig here;
   here.limits = there.limits;
