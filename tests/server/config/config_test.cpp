@@ -444,7 +444,8 @@ TEST(Config, EveryKeyOfTheUnusualConfigurationDiffersFromItsDefault) {
   unusualText.resize(unusualText.rfind("[[device]]"));
   int keys = 0;
   for (std::string line; std::getline(usual, line);) {
-    if (line.find(" = ") == std::string::npos) continue;
+    // The second device has an unusual hand: no driver reads hardware and hand.
+    if (line.find(" = ") == std::string::npos || line.starts_with("hand = ")) continue;
     ++keys;
     EXPECT_EQ(unusualText.find(line + "\n"), std::string::npos) << line;
   }
