@@ -57,12 +57,13 @@ void fields(T& config, V&& v) {
 
 template <Is<realtime::RenderOptions> T, class V>
 void fields(T& options, V&& v) {
-  auto& [toolRadius_m, forceShading, stribeckSpeed_m_per_s, contactVibrationPulls, bareDamping_Ns_per_m] =
-      options;
+  auto& [toolRadius_m, forceShading, stribeckSpeed_m_per_s, contactVibrationPulls, contactRise_N_per_s,
+         bareDamping_Ns_per_m] = options;
   v("tool_radius_m", toolRadius_m);
   v("force_shading", forceShading);
   static_cast<void>(stribeckSpeed_m_per_s);  // in the block of the law
   static_cast<void>(contactVibrationPulls);
+  static_cast<void>(contactRise_N_per_s);   // the guard's
   static_cast<void>(bareDamping_Ns_per_m);  // in a block of its own
 }
 

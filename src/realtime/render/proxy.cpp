@@ -550,17 +550,21 @@ void Proxy::popThrough(const Vec3& hip, std::uint32_t& status) noexcept {
       step = std::max(step, (face.height(position_) + 2 * face.standoff) / fall);
   }
   if (step == 0) return;
-  // A ball gives way once its centre is beyond the face: before, the face would push it on from behind.
-  if ((position_ + step * direction - hip).norm() > (position_ - hip).norm()) return;
-  ObjectHit hit;
-  ++casts_;
-  if (query_.castPast(passable, position_, position_ + step * direction, hit)) return;
+  // A ball gets through once there is room for it behind the face: before, the face would push it on from
+  // behind. Where what gives way leaves no room between its sides, the ball passes all of them at once.
+  const double deepest = (hip - position_).dot(direction);
+  if (deepest < step) return;
+  if (!hasWay(passable, position_ + step * direction)) {
+    step = deepest;
+    if (!hasWay(passable, position_ + step * direction)) return;
+  }
   const Vec3 before = position_;
   const bool wasHeld = std::exchange(wasHeld_, false);
   position_ += step * direction;
   updateProxy(hip);
-  // The other side of a body that is thinner than the ball may throw it out: that would give the hand energy.
-  if ((position_ - hip).norm() > (before - hip).norm()) {
+  // The other side of a thin body may push it on: then it waits until it has room behind that, too.
+  if ((position_ - hip).norm() > (before - hip).norm() ||
+      (position_ - hip).dot(direction) > kGapTolerance_m) {
     position_ = before;
     wasHeld_ = wasHeld;
     updateProxy(hip);
@@ -568,6 +572,20 @@ void Proxy::popThrough(const Vec3& hip, std::uint32_t& status) noexcept {
   }
   status |= kRenderPopthrough;
   popthroughArmed_ = contactSet_.count == 0;
+}
+
+// Nothing else is in the way to `place`, and what is `passable` does not overlap the ball there.
+bool Proxy::hasWay(std::uint64_t passable, const Vec3& place) noexcept {
+  ObjectHit hit;
+  ++casts_;
+  if (query_.castPast(passable, position_, place, hit)) return false;
+  if (!query_.ensureGathered(place, query_.radius())) return true;
+  bool overlaps = false;
+  query_.forEachGathered(place, query_.radius(), [&](const Facet& f) {
+    if (overlaps || f.object < 0 || (passable >> static_cast<unsigned>(f.object) & 1U) == 0) return;
+    overlaps = isTouchable(f, query_.faces(), place) && (nearestPointOf(f, place) - place).norm() < f.radius;
+  });
+  return !overlaps;
 }
 
 void Proxy::applyForceShading() noexcept {

@@ -225,6 +225,7 @@ class Proxy {
   Vec3 onFacesThatGoOn(const Vec3& place, const ActiveSet& active) noexcept;
   void updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet& active) noexcept;
   void popThrough(const Vec3& hip, std::uint32_t& status) noexcept;
+  bool hasWay(std::uint64_t passable, const Vec3& place) noexcept;
   void applyForceShading() noexcept;
   void fadeWhenOverworked(std::uint32_t& status) noexcept;
   void releaseWhenDeep(bool wasFree, std::uint32_t& status) noexcept;

@@ -8,6 +8,7 @@
 #include "realtime/render/fields.h"
 #include "realtime/render/passivity_controller.h"
 #include "realtime/render/proxy.h"
+#include "realtime/render/rise_limit.h"
 #include "realtime/render/surface_law.h"
 
 namespace hapticd::realtime {
@@ -22,19 +23,35 @@ void scaleContact(double share, Rendering& out) {
   for (std::uint32_t i = 0; i < out.contactCount; ++i) out.contacts[i].force_N *= share;
 }
 
-// The springs of surfaces at rest. Nothing where something moves or where the surface changes.
-SpringState restingSprings(const ContactSet& contactSet, bool commandChanged, const Rendering& out) {
+// The springs alone, as force shading turns them.
+Vec3 shadedSprings(const ContactSet& contactSet) {
+  Vec3 shaded = Vec3::Zero();
+  for (int i = 0; i < contactSet.count; ++i) {
+    const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
+    shaded += constraint.depth_m * constraint.forceDirection;
+  }
+  const double stiffness = contactSet.spring.stiffness_N_per_m;
+  const double length = shaded.norm();
+  return length > 0 ? Vec3(stiffness * contactSet.normal_m.norm() / length * shaded)
+                    : Vec3(stiffness * contactSet.normal_m);
+}
+
+// The springs of surfaces at rest. Unknown where something moves, or where the surface changes or yields.
+SpringState restingSprings(const ContactSet& contactSet, bool commandChanged, double toolRadius_m,
+                           const Rendering& out) {
   constexpr std::uint32_t kChanged =
       kRenderGeometryJump | kRenderReleased | kRenderPopthrough | kRenderWorkLimit | kRenderEnclosed;
   SpringState state;
   const BlendedSpring& spring = contactSet.spring;
-  if (!out.touching || commandChanged || (out.status & kChanged) != 0) return state;
+  state.known = !commandChanged && (out.status & kChanged) == 0;
   for (int i = 0; i < contactSet.count; ++i) {
     const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
-    if (!constraint.rests) return state;
+    state.known =
+        state.known && constraint.rests && !isYielding(constraint, spring.stiffness_N_per_m, toolRadius_m);
   }
+  if (!out.touching || !state.known) return state;
   const double kappa = spring.kappa_N_per_m;
-  state.force_N = out.contactForce_N - out.normalForce_N + spring.stiffness_N_per_m * contactSet.normal_m;
+  state.force_N = out.contactForce_N - out.normalForce_N + shadedSprings(contactSet);
   state.normal = out.normal;
   state.pressed_N = out.contactForce_N.dot(out.normal);
   state.stored_J = 0.5 * kappa * (contactSet.normal_m + contactSet.lateral_m).squaredNorm();
@@ -61,12 +78,17 @@ struct LastForce {
 
 struct Renderer::State {
   explicit State(const RenderOptions& o)
-      : options(o), proxy(o), effects(o.contactVibrationPulls), passivity(o.bareDamping_Ns_per_m) {}
+      : options(o),
+        proxy(o),
+        effects(o.contactVibrationPulls),
+        rise(o.contactRise_N_per_s),
+        passivity(o.bareDamping_Ns_per_m) {}
 
   RenderOptions options;
   Proxy proxy;
   Effects effects;
   Fields fields;
+  RiseLimit rise;
   PassivityController passivity;
   LastForce last;
 };
@@ -83,6 +105,7 @@ void Renderer::reset() noexcept {
 void Renderer::restart() noexcept {
   state_->effects.restart();
   state_->proxy.reset();
+  state_->rise.reset();
   state_->passivity.reset();
 }
 
@@ -90,13 +113,14 @@ bool Renderer::remember(const Rendering& last, RenderMemory& out) const noexcept
   const bool effects = state_->effects.remember(out);
   const bool fields = state_->fields.remember(out);
   const bool planes = state_->proxy.planes().remember(out);
-  return effects && fields && planes && !last.touching && last.status == 0;
+  return effects && fields && planes && state_->passivity.isEven() && !last.touching && last.status == 0;
 }
 
 void Renderer::resume(const Rendering& last) noexcept {
   state_->proxy.resume(last.proxy_m);
   state_->last = {last.contactForce_N, 0, last.proxy_m};  // free: the proxy is at the HIP
-  state_->passivity.reset();
+  state_->rise.resume(last.proxy_m);
+  state_->passivity.resume(last.proxy_m);
 }
 
 void Renderer::resume(const RenderMemory& memory) noexcept {
@@ -119,12 +143,15 @@ void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState
   const double period_s = std::max(base::toSeconds(period), kShortestPeriod_s);
   const ContactSet& contactSet = s.proxy.follow({&scene, now}, hip, period_s, out.status);
   out.proxy_m = out.scp_m = s.proxy.position();
-  if ((out.status & kRenderReleased) == 0) {
+  if ((out.status & kRenderReleased) == 0)
     applySurfaceLaw(contactSet, out.proxy_m, device.velocity_m_per_s, radius, out);
-    scaleContact(s.proxy.feltShare(), out);
-  }
-  const Vec3 brake =
-      s.passivity.step(restingSprings(contactSet, s.proxy.commandChanged(), out), hip, period_s);
+  SpringState springs = restingSprings(contactSet, s.proxy.commandChanged(), radius, out);
+  const double share = s.proxy.feltShare() * s.rise.step(springs, out.contactForce_N, hip, period_s);
+  scaleContact(share, out);
+  springs.scale(share);
+  springs.most_N = s.rise.most_N();
+  const Vec3 brake = s.passivity.step(springs, hip, period_s);
+  s.rise.acts(out.contactForce_N + brake);
   if ((out.status & kRenderReleased) == 0) {
     applyAdhesion(s.proxy.planes().adhesion(hip, radius), out);
   }

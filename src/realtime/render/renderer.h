@@ -64,13 +64,16 @@ struct RenderOptions {
   bool forceShading = false;
   double stribeckSpeed_m_per_s = 0;    ///< 0: friction falls to the dynamic one as soon as the proxy slides
   bool contactVibrationPulls = false;  ///< a contact vibration may exceed the normal force and pull
+  /// By how much the force of a contact may grow; the guard's limit, before which nothing is late. Infinity:
+  /// without it.
+  double contactRise_N_per_s = std::numeric_limits<double>::infinity();
   /// Of the arm without a hand, for the passivity controller; infinity: without it.
   double bareDamping_Ns_per_m = std::numeric_limits<double>::infinity();
 };
 
 /// Number of the laws from contact to force. It changes when the same ticks give other forces on purpose, so
 /// that a re-rendering can name the reason (docs/decisions/0009-stiffness-and-friction.md).
-inline constexpr std::uint32_t kForceLaw = 18;
+inline constexpr std::uint32_t kForceLaw = 19;
 
 /// Keeps the proxy from tick to tick. Construct it outside the loop; step() is realtime: noexcept, no
 /// allocation, no lock. One per servo; not thread-safe.

@@ -14,6 +14,33 @@ struct ContactShare {
   double friction_N = 0;  // bound of friction and adhesion
 };
 
+// The springs of the faces, newtons. Where a face yields, its force stays the popthrough force over the
+// length that the ball needs to get behind the face; if there is no room for it, the spring goes on from
+// there. A function of the depth alone, so that it gives no more than it took.
+std::array<double, kMaxActive> springForces(const ContactSet& contactSet, double toolRadius_m) {
+  std::array<double, kMaxActive> forces{};
+  const double stiffness = contactSet.spring.stiffness_N_per_m;
+  Vec3 sum = Vec3::Zero();
+  bool yields = false;
+  for (int i = 0; i < contactSet.count; ++i) {
+    const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
+    double& force = forces[static_cast<std::size_t>(i)];
+    force = stiffness * constraint.depth_m;
+    if (isYielding(constraint, stiffness, toolRadius_m)) {
+      const double limit = constraint.surface.popthrough_N;
+      force = std::max(limit, limit + stiffness * (constraint.depth_m - 2 * toolRadius_m));
+      yields = true;
+    }
+    sum += force * constraint.halfSpace.normal;
+  }
+  // Faces at an acute angle push against each other: less of one must not be more of both.
+  const double most = stiffness * contactSet.normal_m.norm();
+  if (yields && sum.norm() > most) {
+    for (double& force : forces) force *= most / sum.norm();
+  }
+  return forces;
+}
+
 // Share of its damping that a face exerts beside the others: all of it where they are at right angles, and
 // about one in all where they are nearly parallel, so that a seam feels as the flat surface that it divides.
 // In no direction do the faces together damp more than the most damped of them: with these weights the rows
@@ -53,12 +80,13 @@ using ContactShares = std::array<ContactShare, kMaxActive>;
 // The face with the largest force gives point and normal of its object's contact.
 void addNormalForces(const ContactSet& contactSet, const Vec3& proxy_m, const Vec3& hipVelocity,
                      double toolRadius_m, ContactShares& shares, Rendering& out) {
+  const std::array<double, kMaxActive> springs = springForces(contactSet, toolRadius_m);
   Vec3 unshaded = Vec3::Zero();
   for (int i = 0; i < contactSet.count; ++i) {
     const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
     ContactShare& share = shares[static_cast<std::size_t>(i)];
     share.contact = &contactWith(constraint.object, out);
-    share.spring_N = contactSet.spring.stiffness_N_per_m * constraint.depth_m;
+    share.spring_N = springs[static_cast<std::size_t>(i)];
     share.normal_N = normalForce(constraint, share.spring_N, dampingShare(contactSet, i), hipVelocity);
     share.friction_N = contactSet.frictionOf(constraint.surface) * share.normal_N + constraint.adhesion_N;
     share.contact->force_N += share.normal_N * constraint.forceDirection;
@@ -149,6 +177,12 @@ void applySurfaceLaw(const ContactSet& contactSet, const Vec3& proxy_m, const Ve
   const auto weaker = [](const Contact& a, const Contact& b) { return a.force_N.norm() < b.force_N.norm(); };
   const Contact* const first = out.contacts.data();
   out.touchedObject = std::max_element(first, first + out.contactCount, weaker)->object;
+}
+
+bool isYielding(const ContactConstraint& constraint, double stiffness_N_per_m, double toolRadius_m) noexcept {
+  const double limit = constraint.surface.popthrough_N;
+  return constraint.source >= 0 && limit > 0 && stiffness_N_per_m * constraint.depth_m > limit &&
+         2 * stiffness_N_per_m * toolRadius_m > limit;
 }
 
 void applyAdhesion(const Vec3& force_N, Rendering& out) noexcept {

@@ -11,6 +11,10 @@ namespace hapticd::realtime {
 void applySurfaceLaw(const ContactSet& contactSet, const Vec3& proxy_m, const Vec3& hipVelocity_m_per_s,
                      double toolRadius_m, Rendering& out) noexcept;
 
+/// A ball that overlaps a face whose popthrough force is exceeded: the face pushes with that force until the
+/// ball has room behind it.
+bool isYielding(const ContactConstraint& constraint, double stiffness_N_per_m, double toolRadius_m) noexcept;
+
 /// Adds the adhesive force of planes. Call it after applySurfaceLaw().
 void applyAdhesion(const Vec3& force_N, Rendering& out) noexcept;
 

@@ -15,13 +15,20 @@ double passedShareOf(const TickReport& report) noexcept {
   return rendered_N > 0 ? std::min(1.0, report.force_N.norm() / rendered_N) : report.guard.gain;
 }
 
+// Where the guard acts, a contact keeps to its rate.
+RenderOptions renderOptionsOf(const TickOptions& options) {
+  RenderOptions render = options.render;
+  if (options.guard.enabled) render.contactRise_N_per_s = options.guard.slew_N_per_s;
+  return render;
+}
+
 }  // namespace
 
 Tick::Tick(device::Device& device, base::Clock& clock, const TickOptions& options)
     : device_(device),
       clock_(clock),
       period_(servoPeriod(options.rate_Hz)),
-      renderer_(options.render),
+      renderer_(renderOptionsOf(options)),
       control_(options.guard.armed),
       guard_(options.guard, control_, period_),
       reports_(options.reports),

@@ -233,33 +233,52 @@ struct BareArm {
   }
 };
 
+constexpr double kNeverHelps = std::numeric_limits<double>::infinity();
+
 struct LetGo {
   double peakToPeak_m = 0;  // one second after it was let go, for 0.3 s
   double rest_m = 0;
 };
 
-LetGo letGo(BareArm arm, double stiffness_N_per_m, double bareDamping_Ns_per_m) {
+struct Loop {
+  double rate_Hz = 1000;
+  int repeat = 1;  // ticks for each measurement of the device
+  double drop_m = 0;
+  double settle_s = 1;
+  RenderOptions render;
+};
+
+// The same arm against a wall, without guard.
+LetGo letGo(BareArm arm, double stiffness_N_per_m, const Loop& loop) {
   const auto scene = wall(stiff(stiffness_N_per_m));
-  Renderer renderer({.bareDamping_Ns_per_m = bareDamping_Ns_per_m});
+  Renderer renderer(loop.render);
   Rendering rendering;
   device::DeviceState state;
+  const double period_s = 1 / loop.rate_Hz;
+  const Nanos period = base::toNanos(period_s);
+  const int end = static_cast<int>((loop.settle_s + 0.3) * loop.rate_Hz);
   double lowest = 1;
   double highest = -1;
-  for (int i = 0; i < 1300; ++i) {
-    const Vec3 before = state.position_m;
-    state.time = i * fixture::kTick;
-    state.position_m.y() = arm.measured();
-    state.velocity_m_per_s = (state.position_m - before) / 1e-3;
-    renderer.step(*scene, state, state.time, fixture::kTick, rendering);
-    arm.move(rendering.force_N.y(), 1e-3);
-    if (i < 1000) continue;
+  arm.y = loop.drop_m;
+  for (int i = 0; i < end; ++i) {
+    if (i % loop.repeat == 0) {
+      const Vec3 before = state.position_m;
+      state.position_m.y() = arm.measured();
+      state.velocity_m_per_s = (state.position_m - before) / (loop.repeat * period_s);
+    }
+    state.time = i * period;
+    renderer.step(*scene, state, state.time, period, rendering);
+    arm.move(rendering.force_N.y(), period_s);
+    if (i < loop.settle_s * loop.rate_Hz) continue;
     lowest = std::min(lowest, arm.y);
     highest = std::max(highest, arm.y);
   }
   return {highest - lowest, arm.y};
 }
 
-constexpr double kNeverHelps = std::numeric_limits<double>::infinity();
+LetGo letGo(BareArm arm, double stiffness_N_per_m, double bareDamping_Ns_per_m) {
+  return letGo(arm, stiffness_N_per_m, Loop{.render = {.bareDamping_Ns_per_m = bareDamping_Ns_per_m}});
+}
 
 TEST(BareArmTest, bounces_on_a_stiff_wall_without_the_controller) {
   EXPECT_GT(letGo({}, 3500, kNeverHelps).peakToPeak_m, 1e-3);
@@ -291,6 +310,127 @@ TEST(BareArmTest, soft_walls_are_no_worse_than_without_the_controller) {
                 letGo(arm, stiffness, kNeverHelps).peakToPeak_m + 1e-6);
     }
   }
+}
+
+// Drivers may deliver each position for several ticks: the account is that of a loop at their own rate.
+TEST(BareArmTest, comes_to_rest_when_the_device_repeats_its_positions) {
+  for (const int repeat : {2, 3, 4, 5}) {
+    for (const double stiffness : {500.0, 1000.0}) {
+      for (const double mass : {0.05, 0.1}) {
+        Loop loop{.repeat = repeat, .drop_m = 0.001, .settle_s = 5, .render = {.bareDamping_Ns_per_m = 0.1}};
+        EXPECT_LT(letGo({.mass_kg = mass}, stiffness, loop).peakToPeak_m, 100e-6)
+            << repeat << " ticks, " << stiffness << " N/m, " << mass << " kg";
+        loop.render.bareDamping_Ns_per_m = kNeverHelps;
+        EXPECT_GT(letGo({.mass_kg = mass}, stiffness, loop).peakToPeak_m, repeat > 2 ? 0.02 : 0) << repeat;
+      }
+    }
+  }
+}
+
+// A slow loop sees the first and the last part of a contact a tick late: both are booked.
+TEST(BareArmTest, comes_to_rest_after_a_drop_at_any_rate) {
+  for (const double rate : {250.0, 500.0, 1000.0, 4000.0}) {
+    for (const double stiffness : {500.0, 1000.0}) {
+      for (const double damping : {0.05, 0.1}) {
+        for (const double drop : {0.001, 0.003}) {
+          const BareArm arm{.mass_kg = 0.05, .damping_Ns_per_m = damping, .pull_N = 2};
+          const Loop loop{
+              .rate_Hz = rate, .drop_m = drop, .settle_s = 5, .render = {.bareDamping_Ns_per_m = damping}};
+          EXPECT_LT(letGo(arm, stiffness, loop).peakToPeak_m, 100e-6)
+              << rate << " Hz, " << stiffness << " N/m, " << damping << " N s/m, " << drop << " m";
+        }
+      }
+    }
+  }
+}
+
+// An arm that flies onto a wall through the whole servo: how much faster it leaves than it came.
+struct Tap {
+  double speedRatio = 0;
+  double most_N = 0;
+};
+
+Tap tap(double stiffness_N_per_m, double speed_m_per_s, double damping_Ns_per_m, bool guarded) {
+  FakeDevice device;
+  FakeClock clock;
+  TickOptions options;
+  options.render.bareDamping_Ns_per_m = 0.3;
+  options.guard.enabled = guarded;
+  options.guard.armed = true;
+  options.guard.peakForce_N = options.guard.continuousForce_N = 20;
+  Tick tick(device, clock, options);
+  tick.snapshots().publish(wall(stiff(stiffness_N_per_m)));
+  BareArm arm{.mass_kg = 0.1, .damping_Ns_per_m = damping_Ns_per_m, .coulomb_N = 0, .encoder_m = 20e-6};
+  arm.pull_N = 0;
+  arm.y = 0.002;
+  Nanos now = 0;
+  const auto step = [&] {
+    const double before = device.state.position_m.y();
+    device.state.position_m.y() = arm.measured();
+    device.state.velocity_m_per_s.y() = (arm.measured() - before) / 1e-3;
+    tick(now += fixture::kTick);
+    tick.reports().consume([](const TickReport&) {});
+  };
+  for (int i = 0; i < 600; ++i) step();  // the guard ramps in
+  Tap result;
+  arm.speed = -speed_m_per_s;
+  double in = 0;
+  for (int i = 0; i < 400; ++i) {
+    step();
+    if (tick.last().rendering.touching && in == 0) in = -arm.speed;
+    if (in > 0 && arm.speed > 0 && !tick.last().rendering.touching) break;
+    result.most_N = std::max(result.most_N, device.written_N.norm());
+    arm.move(device.written_N.y(), 1e-3);
+  }
+  result.speedRatio = arm.speed / in;
+  return result;
+}
+
+// The guard lets a force grow by 1 N/ms and fall at once. A hit that outruns it must not be late: the wall
+// would take little and give all of its spring.
+TEST(BareArmTest, no_hit_is_thrown_back_by_the_slew_limit) {
+  for (const double stiffness : {2000.0, 5000.0, 8000.0}) {
+    for (const double damping : {0.3, 3.0}) {
+      for (const double speed : {0.1, 0.2, 0.5, 1.0}) {
+        const Tap guarded = tap(stiffness, speed, damping, true);
+        EXPECT_LE(guarded.speedRatio, std::max(1.02, tap(stiffness, speed, damping, false).speedRatio + 0.02))
+            << stiffness << " N/m, " << speed << " m/s, " << damping << " N s/m";
+        EXPECT_GT(guarded.most_N, 0.3 * std::min(20.0, speed * std::sqrt(0.1 * stiffness)))
+            << "a wall all the same";
+      }
+    }
+  }
+}
+
+// What was lowered for a hit returns while the hand presses.
+TEST(BareArmTest, a_wall_that_was_hit_is_as_stiff_as_ever_after_a_second) {
+  FakeDevice device;
+  FakeClock clock;
+  TickOptions options;
+  options.guard.armed = true;
+  options.guard.peakForce_N = options.guard.continuousForce_N = 30;
+  Tick tick(device, clock, options);
+  tick.snapshots().publish(wall(stiff(5000)));
+  Nanos now = 0;
+  const auto to = [&](double y, int ticks) {
+    const double from = device.state.position_m.y();
+    for (int i = 1; i <= ticks; ++i) {
+      device.state.position_m.y() = from + (y - from) * i / ticks;
+      tick(now += fixture::kTick);
+      tick.reports().consume([](const TickReport&) {});
+    }
+    return device.written_N.y();
+  };
+  to(0.004, 600);
+  EXPECT_NEAR(to(-0.004, 16), 8, 1) << "0.5 m/s: a spring of 2000 N/m";
+  double last = device.written_N.y();
+  for (int i = 0; i < 1000; ++i) {
+    const double force = to(-0.004, 1);
+    EXPECT_GE(force, last - 1e-9);
+    EXPECT_LE(force, last + 0.021) << "a thousandth of the whole force each tick";
+    last = force;
+  }
+  EXPECT_NEAR(last, 20, 1e-6);
 }
 
 // An arm without Coulomb friction falls into a groove between two surfaces; their stiffness is one field.
