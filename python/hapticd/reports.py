@@ -99,8 +99,10 @@ class ButtonReport(NamedTuple):
 
 
 class AnalogReport(NamedTuple):
-    """The value of every analog channel. Channels of servers of this project: force x y z (N), depth (m), angle
-    (degrees), touched object (-1: none), and the opening of the gripper (rad) where there is one."""
+    """The value of every analog channel. Channels of servers of this project: the opening of the gripper (rad) alone,
+    and no report without a gripper; with Reports.CONTACT_ANALOG, under the name NAME.touch, and with `compat_mirrors` of
+    the server: force x y z (N), depth (m), angle (degrees), touched object (-1: none), then the opening, where there is
+    a gripper."""
 
     time: float
     channels: Array  # (n,)

@@ -18,7 +18,6 @@ _CONTACT = (
 )  # fmt: skip
 _EFFECT = 63  # the last of the server's 64 effects: a program beside this one starts from 0
 _PLANE = 7  # likewise
-_GRIPPER_CHANNEL = 6
 _SENSORS = {"proxy": 0, "hand": 1}
 
 
@@ -50,6 +49,7 @@ class HapticdTeleop(Teleoperator):
         self._feedback_at = 0.0
         self._force = False
         self._contact = False
+        self._reports_hand = False
 
     @property
     def action_features(self) -> Dict[str, type]:
@@ -73,7 +73,7 @@ class HapticdTeleop(Teleoperator):
         try:
             self.configure()
             deadline = time.monotonic() + max(self.config.connect_timeout, 1.0)
-            while _SENSORS[self.config.point] not in self._hand.latest.pose:
+            while not self._reported(self._hand.latest):
                 if time.monotonic() > deadline:
                     raise ConnectionError(f"{self.config.device} reports no pose")
                 self._hand.poll(0.1)
@@ -90,10 +90,18 @@ class HapticdTeleop(Teleoperator):
 
     def configure(self) -> None:
         hand = self._connected()
-        if hand.wait_capabilities() is not None:
-            kinds = hapticd.Reports.TRACKER | hapticd.Reports.BUTTON | hapticd.Reports.ANALOG
+        self._reports_hand = hand.wait_capabilities() is not None
+        if self._reports_hand:
+            # The gripper comes with the hand's reports: they say in each whether there is one. The place of its analog
+            # channel depends on the subscription and on the server's configuration.
+            kinds = hapticd.Reports.TRACKER | hapticd.Reports.BUTTON | hapticd.Reports.HAND
             hand.subscribe(kinds, self.config.rate_Hz)
             hand.enable_heartbeat()
+
+    def _reported(self, latest: hapticd.LatestReports) -> bool:
+        """Whether an action is known. Without the first report of the hand, a closed gripper would be taken for none,
+        and the robot's would open."""
+        return _SENSORS[self.config.point] in latest.pose and (not self._reports_hand or latest.hand.time > 0)
 
     def _connected(self) -> hapticd.Client:
         if self._hand is None:
@@ -107,18 +115,18 @@ class HapticdTeleop(Teleoperator):
         if (self._force or self._contact) and time.monotonic() - self._feedback_at > self.config.feedback_hold_s:
             self._end_feedback(hand)
         latest = hand.latest
-        pose = latest.pose.get(_SENSORS[self.config.point])
-        if not hand.connected or pose is None:
+        if not hand.connected or not self._reported(latest):
             raise ConnectionError(f"{self}: connection to {self.config.device} lost")
+        pose = latest.pose[_SENSORS[self.config.point]]
         position = self.config.scale * pose.position_m + self._offset
         values = [*position, *pose.orientation, self._gripper(latest)]
         values += [float(latest.pressed.get(i, False)) for i in range(self.config.buttons)]
         return dict(zip(self.action_features, map(float, values)))
 
     def _gripper(self, latest: hapticd.LatestReports) -> float:
-        channels = latest.analog.channels
-        if len(channels) > _GRIPPER_CHANNEL:
-            return float(np.clip(channels[_GRIPPER_CHANNEL] / self.config.gripper_open_rad, 0.0, 1.0))
+        opening_rad = latest.hand.gripper_rad
+        if not math.isnan(opening_rad):
+            return float(np.clip(opening_rad / self.config.gripper_open_rad, 0.0, 1.0))
         return 0.0 if latest.pressed.get(self.config.gripper_button, False) else 1.0
 
     def send_feedback(self, feedback: Dict[str, Any]) -> None:

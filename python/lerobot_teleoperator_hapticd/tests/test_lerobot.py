@@ -6,7 +6,9 @@ LeRobot is no Debian package, so the abstract class and the registry stand here 
 import abc
 import importlib
 import importlib.metadata
+import os
 import pathlib
+import struct
 import sys
 import time
 import types
@@ -19,7 +21,7 @@ import pytest
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tests"))
 
 import hapticd  # noqa: E402
-from conftest import Server  # noqa: E402
+from conftest import HAPTICD, Server  # noqa: E402
 
 
 def lerobot_double() -> Dict[str, types.ModuleType]:
@@ -121,6 +123,38 @@ def test_actions_follow_the_hand(server: Server) -> None:
         person.hold_hand((20, 10, 5), buttons=1)
         until(lambda: teleop.get_action()["gripper"] == 0.0)
     assert not teleop.is_connected
+
+
+def test_a_gripper_is_measured_under_every_subscription(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A device with a gripper: its library is the mock, to which ArmBlock of tests/mocks/arm_block.h gives the opening."""
+    arm = tmp_path / "arm"
+
+    def open_to(angle_rad: float) -> None:
+        with arm.open("r+b") as file:
+            file.seek(8)
+            file.write(struct.pack("=i", 1))  # one place, the origin
+            file.seek(24600)
+            file.write(struct.pack("=d", angle_rad))
+
+    with arm.open("wb") as file:
+        file.truncate(32 << 20)
+    open_to(0.25)
+    mocks = pathlib.Path(HAPTICD).parents[1] / "mocks"
+    monkeypatch.setenv("HAPTICD_MOCK_ARM", str(arm))
+    monkeypatch.setenv("HAPTICD_DHD_LIB", os.environ.get("HAPTICD_MOCK_DRD", str(mocks / "libmock_drd.so")))
+    gripping = Server("--device", "forcedimension")
+    with make(gripping) as teleop:
+        assert teleop.get_action()["gripper"] == pytest.approx(0.5)  # from the first action on
+        open_to(0.1)
+        until(lambda: teleop.get_action()["gripper"] == pytest.approx(0.2))
+        open_to(0.9)
+        until(lambda: teleop.get_action()["gripper"] == 1.0)
+        open_to(0.4)
+        analog = hapticd.Reports.ANALOG | hapticd.Reports.CONTACT_ANALOG
+        teleop._hand.subscribe(hapticd.Reports.TRACKER | hapticd.Reports.HAND | analog)
+        until(lambda: teleop.get_action() and len(teleop._hand.latest.analog.channels) == 7)
+        until(lambda: teleop.get_action()["gripper"] == pytest.approx(0.8))
+    gripping.stop()
 
 
 def test_scale_and_offset_place_the_action(server: Server) -> None:
