@@ -3,6 +3,7 @@
 import copy
 import secrets
 import time
+import weakref
 from collections import deque
 from dataclasses import dataclass
 from typing import Any, Callable, Deque, Dict, Final, Generic, List, NamedTuple, Optional, Sequence, Tuple, TypeVar
@@ -228,7 +229,8 @@ class Core(Commands):
 
     def _opened(self, udp: Optional[Tuple[str, int]]) -> None:
         """The TCP connection is up."""
-        self._peer = Peer(self, [self.device], udp)
+        # Weakly, so that a client without a name ends at once: the server then ends its forces.
+        self._peer = Peer(weakref.proxy(self), [self.device], udp)
         self._handshake_at = time.monotonic() + HANDSHAKE_S
 
     def _received(self, data: bytes) -> None:

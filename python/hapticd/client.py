@@ -112,7 +112,8 @@ class Client(Core):
     def close(self) -> None:
         """Sends what is collected as far as the system accepts it, and closes all sockets. The server ends the
         client's forces. From then on every command, and everything that waits, raises ConnectionLost; `latest` and
-        statistics() stay. Does nothing the second time."""
+        statistics() stay. Does nothing the second time. A client whose last name is gone closes, too; a callback that
+        uses the client is such a name, until the garbage collector runs."""
         if self._finished:
             return
         if self.connected:
@@ -135,7 +136,9 @@ class Client(Core):
 
     # --- connecting
 
-    def _watch(self, sock: socket.socket, events: int, call: Callable[[int], None]) -> None:
+    def _watch(self, sock: socket.socket, events: int, call: "Callable[[Client, int], None]") -> None:
+        """The call is a plain function: a bound method would refer to the client, which could then not end with its
+        last name."""
         sock.setblocking(False)
         self._selector.register(sock, events, call)
 
@@ -159,7 +162,7 @@ class Client(Core):
             if self._address.tcp_only:
                 self._sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
                 self._connecting = True
-                self._watch(self._sock, selectors.EVENT_WRITE, self._on_stream)
+                self._watch(self._sock, selectors.EVENT_WRITE, Client._on_stream)
                 status = self._sock.connect_ex(self._target)
                 if status != 0 and status not in _CONNECT_PROGRESS:
                     raise OSError(status, "connect")
@@ -174,11 +177,11 @@ class Client(Core):
         self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         self._listener.bind((local, 0))
         self._listener.listen(1)
-        self._watch(self._listener, selectors.EVENT_READ, self._on_accept)
+        self._watch(self._listener, selectors.EVENT_READ, Client._on_accept)
         self._request = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._request.bind((local, 0))
         self._request.connect(self._target)
-        self._watch(self._request, selectors.EVENT_READ, self._on_request_answer)
+        self._watch(self._request, selectors.EVENT_READ, Client._on_request_answer)
         self._request_text = f"{local} {self._listener.getsockname()[1]}\0".encode()
         self._request_at = 0.0
 
@@ -206,9 +209,9 @@ class Client(Core):
         self._udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._udp.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
         self._udp.bind((local, 0))
-        self._watch(self._udp, selectors.EVENT_READ, self._on_datagrams)
+        self._watch(self._udp, selectors.EVENT_READ, Client._on_datagrams)
         self._sock = sock
-        self._watch(sock, selectors.EVENT_READ, self._on_stream)
+        self._watch(sock, selectors.EVENT_READ, Client._on_stream)
         self._adopt((local, self._udp.getsockname()[1]))
 
     def _adopt(self, udp: Optional[Tuple[str, int]]) -> None:
@@ -297,7 +300,7 @@ class Client(Core):
         if self._out:
             events |= selectors.EVENT_WRITE
         if events and self._selector.get_key(sock).events != events:
-            self._selector.modify(sock, events, self._on_stream)
+            self._selector.modify(sock, events, Client._on_stream)
 
     def _step(self, timeout: float) -> None:
         """Sends, sleeps up to the timeout until something arrives or is due, receives. Runs no callbacks."""
@@ -329,7 +332,7 @@ class Client(Core):
             until = min(until, self._run_timers())
         self._push()
         for key, events in self._select(max(0.0, until - time.monotonic())):
-            key.data(events)
+            key.data(self, events)
 
     def _select(self, timeout: float) -> "List[Tuple[selectors.SelectorKey, int]]":
         if not self._selector.get_map():

@@ -1,6 +1,7 @@
 """The synchronous client against a real server with the simulated hand, and against scripted VRPN servers."""
 
 import contextlib
+import gc
 import pathlib
 import signal
 import socket
@@ -9,6 +10,7 @@ import sys
 import textwrap
 import threading
 import time
+import weakref
 from typing import Any, Callable, Dict, List, Tuple
 
 import numpy as np
@@ -466,6 +468,28 @@ def test_ctrl_c_ends_a_wait_and_nothing_is_left(server: Server) -> None:
         _, errors = child.communicate(timeout=60)
         assert child.returncode != 0 and errors.rstrip().endswith("KeyboardInterrupt")
         until(hand, lambda: hand.latest.force.force_N[0] == 0)
+
+
+@pytest.mark.parametrize("way", ["tcp", "udp"])
+def test_a_client_ends_with_its_last_name(server: Server, way: str) -> None:
+    """Also where the garbage collector does not run: what is left of the client would go on pushing the hand."""
+    with hapticd.connect(server.tcp) as watching:
+
+        def push() -> "weakref.ref[hapticd.Client]":
+            hand = hapticd.connect(getattr(server, way))
+            hand.set_effect(0, Effect.constant((1, 0, 0), 1))
+            hand.start_effect(0)
+            hand.flush_all()
+            until(watching, lambda: hand.poll() is not None and watching.latest.force.force_N[0] > 0.5)
+            return weakref.ref(hand)
+
+        gc.collect()
+        gc.disable()
+        try:
+            assert push()() is None
+            until(watching, lambda: watching.latest.force.force_N[0] == 0)
+        finally:
+            gc.enable()
 
 
 def test_waiting_takes_no_processor_time(server: Server) -> None:
