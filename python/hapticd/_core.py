@@ -103,6 +103,8 @@ def _contacts(t: float, c: m.ContactList) -> r.ContactsReport:
 
 def _hand(t: float, h: m.HandState) -> r.HandReport:
     n = _array(h.contacts[: len(h.contacts) // 8 * 8], dtype=np.float64).reshape(-1, 8)
+    if not np.isfinite(n[:, 0]).all():
+        raise DecodeError("a contact whose number is none")
     contacts = [r.RemoteContactForce(int(row[0]), row[1:4], row[4:7], float(row[7])) for row in n]
     return r.HandReport(
         t, h.tick, h.time, h.contacts_time, h.force_time, _array(h.position), _array(h.orientation),
@@ -373,12 +375,13 @@ class Core(Commands):
             decode, name, convert = entry
             try:
                 message = decode(payload)
+                report = convert(stamp, message)
             except DecodeError:
                 self._counts.messages_damaged += 1
                 return
             if kind == _TEXT and message.severity >= 2 and not self._first_error:
                 self._first_error = message.text
-            self._deliver(name, convert(stamp, message), arrived - stamp)
+            self._deliver(name, report, arrived - stamp)
         elif kind == _STATES:
             self._handle_states(payload, stamp, arrived)
         elif kind in (_CONNECTED, _LOST):

@@ -527,4 +527,11 @@ def test_streamed_state_is_reported_back() -> None:
         assert not report.corrections_held and list(report.force_N) == [1, 2, 3]
         assert report.contacts[0].id == 3 and list(report.contacts[0].force_N) == [4, 5, 6]
         assert hapticd.reports.rows_of("hand", [report])["energy_J"][0] == 0.02
+        for tick, contact in enumerate((float("nan"), float("inf"), float("-inf"), 4.0), 10):  # the last is right
+            state = m.HandState(tick, contacts=(contact, *numbers[1:]))
+            scripted.answer = frame(5, 0, 0, number, layout.encode(state))
+            pongs = hand._pongs
+            hand._ping()
+            until(hand, lambda: hand._pongs > pongs and (tick < 13 or hand.latest.hand.tick == 13))
+        assert hand.statistics().messages_damaged == 3 and hand.latest.hand.contacts[0].id == 4
     scripted.close()

@@ -1,5 +1,6 @@
 // From arrivals to reports: decodes, counts, stores and delivers them.
 #include <algorithm>
+#include <cmath>
 
 #include "base/printable.h"
 #include "client/client_impl.h"
@@ -98,6 +99,16 @@ ContactsReport toReport(const wire::ContactList& m) {
                                {n[i + 7], n[i + 8], n[i + 9]}});
   }
   return report;
+}
+
+// A contact whose number is none makes a message damaged.
+bool numbersEveryContact(const wire::HandState& m) {
+  constexpr std::size_t kNumbers = wire::HandState::kNumbers;
+  const std::vector<double>& n = m.contacts.values;
+  for (std::size_t i = 0; i + kNumbers <= n.size(); i += kNumbers) {
+    if (!std::isfinite(n[i])) return false;
+  }
+  return true;
 }
 
 HandReport toReport(const wire::HandState& m) {
@@ -244,7 +255,10 @@ void Client::Impl::dispatchMessage(const Arrival& a) {
     case wire::kindOf<wire::ContactList>:
       return decode<wire::ContactList>(a, [&](const auto& m) { deliver(a, toReport(m)); });
     case wire::kindOf<wire::HandState>:
-      return decode<wire::HandState>(a, [&](const auto& m) { deliver(a, toReport(m)); });
+      return decode<wire::HandState>(a, [&](const auto& m) {
+        if (!numbersEveryContact(m)) return void(++damaged);
+        deliver(a, toReport(m));
+      });
     case wire::kindOf<wire::GuardState>:
       return decode<wire::GuardState>(a, [&](const auto& m) {
         deliver(a, GuardReport{{}, Trips(m.active), Trips(m.latched), m.armed != 0, m.stopped != 0});

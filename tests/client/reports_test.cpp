@@ -1,4 +1,6 @@
 // Every report reaches its callback; what callbacks may do.
+#include <limits>
+
 #include "client/client_tests.h"
 
 namespace hapticd::test {
@@ -214,6 +216,11 @@ TEST(Client, DamagedReportsAreCounted) {
   wire::storeHeader(bytes, {32, {}, 1, wire::kLocalType<wire::Force>.value, 0});
   server.sendRawBytes(frame);
   ASSERT_TRUE(pollUntil(client, [&] { return client.statistics().messagesDamaged == 1; }));
+  wire::HandState hand;
+  hand.contacts.values.assign(wire::HandState::kNumbers, std::numeric_limits<double>::quiet_NaN());
+  server.send(hand);
+  ASSERT_TRUE(pollUntil(client, [&] { return client.statistics().messagesDamaged == 2; }));
+  EXPECT_EQ(client.latest().hand.time, Time{});
   EXPECT_TRUE(client.connected());
 }
 
