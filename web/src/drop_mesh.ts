@@ -126,7 +126,7 @@ export class DropMesh {
     this.bar.hidden = false;
     this.show(`Sending ${name} …`);
     try {
-      await upload(this.context.link, mesh, placement, (share) => (this.bar.value = share));
+      await upload(this.context.link.channel(), mesh, placement, (share) => (this.bar.value = share));
       this.show(`${name} is sent; the server is processing it …`);
       this.awaited = { object: placement.object, geometry: before, name };
     } catch (error) {

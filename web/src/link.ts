@@ -36,6 +36,15 @@ class ServerClock {
   }
 }
 
+/** Sends to the device and over the connection of one moment, and to no other. */
+export interface Channel {
+  /** Whether the messages were sent; false once the connection has ended. */
+  send(...messages: Outgoing[]): boolean;
+  readonly open: boolean;
+  /** Bytes queued in the browser. */
+  readonly waiting: number;
+}
+
 export class Link {
   state: LinkState = "connecting";
   private socket: WebSocket | undefined;
@@ -71,19 +80,32 @@ export class Link {
     this.clock = clock;
     socket.onopen = () => peer.open();
     socket.onmessage = (event: MessageEvent<ArrayBuffer>) => this.feed(peer, new Uint8Array(event.data));
-    socket.onclose = () => this.lost();
+    socket.onclose = () => this.lost(peer);
   }
 
   /** Whether the messages were sent; false while not connected. */
   send(...messages: Outgoing[]): boolean {
-    if (this.state !== "open" || !this.peer) return false;
-    for (const message of messages) this.peer.send(this.device, message);
-    return true;
+    return this.channel().send(...messages);
   }
 
-  /** Bytes queued in the browser. */
-  get waiting(): number {
-    return this.socket?.bufferedAmount ?? 0;
+  /** For what takes several turns: another device or a new connection does not get the rest of it. */
+  channel(): Channel {
+    const link = this;
+    const { socket, peer, device } = this;
+    return {
+      send(...messages) {
+        if (!this.open) return false;
+        for (const message of messages) peer!.send(device, message);
+        return true;
+      },
+      // A socket that is closing discards what it is given, without an error.
+      get open() {
+        return link.state === "open" && peer !== undefined && peer === link.peer && socket!.readyState === WebSocket.OPEN;
+      },
+      get waiting() {
+        return socket?.bufferedAmount ?? 0;
+      },
+    };
   }
 
   /** Switches to another device of the same server. */
@@ -92,12 +114,13 @@ export class Link {
   }
 
   private feed(peer: Endpoint, bytes: Uint8Array): void {
+    if (peer !== this.peer) return;
     try {
       peer.feed(bytes);
     } catch (error) {
       console.warn(`connection ended: ${String(error)}`);
       this.socket?.close();
-      return;
+      return this.lost(peer); // the browser says so only when the server has agreed
     }
     if (this.state !== "open" && peer.connected) this.opened();
   }
@@ -114,7 +137,9 @@ export class Link {
     this.pingTimer = window.setInterval(sendPing, PING_EVERY_MS);
   }
 
-  private lost(): void {
+  private lost(peer: Endpoint): void {
+    if (peer !== this.peer) return;
+    this.peer = undefined;
     window.clearInterval(this.pingTimer);
     this.setState("lost");
     window.setTimeout(() => this.connect(this.device), this.retry_ms);

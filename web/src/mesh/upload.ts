@@ -1,6 +1,6 @@
 // Sends a mesh to the server in a batch, so that it appears in one tick or not at all.
 import * as wire from "../wire";
-import type { Link } from "../link";
+import type { Channel } from "../link";
 import type { FileMesh } from "./weld";
 
 const MAX_QUEUED_BYTES = 1_000_000;
@@ -15,17 +15,26 @@ export interface Placement {
   surface: [wire.SurfaceProperty, number][];
 }
 
+const pause = (ms: number): Promise<void> => new Promise((resolve) => setTimeout(resolve, ms));
+
 /** Sends the mesh; calls back with the sent share from 0 to 1. Throws when the connection is lost. */
 export async function upload(
-  link: Link,
+  channel: Channel,
   mesh: FileMesh,
   to: Placement,
   onShare: (share: number) => void,
 ): Promise<void> {
   const { object } = to;
+  const lost = "the connection was lost; the server discarded the mesh";
   const send = (...messages: wire.Outgoing[]): void => {
-    if (!link.send(...messages))
-      throw new Error("the connection was lost; the server discarded the mesh");
+    if (!channel.send(...messages)) throw new Error(lost);
+  };
+  // What waits in a socket that has ended waits for ever.
+  const drain = async (most: number, every_ms: number): Promise<void> => {
+    while (channel.waiting > most) {
+      if (!channel.open) throw new Error(lost);
+      await pause(every_ms);
+    }
   };
   send(wire.batchBegin(), ...(to.isNew ? [wire.setObjectNumber(object + 1)] : [wire.clearTrimesh(object)]));
   send(wire.setObjectName(object, to.name));
@@ -35,10 +44,10 @@ export async function upload(
   const all = mesh.positions.length + mesh.triangles.length;
   const part = async (first: number, message: wire.Outgoing, sent: number): Promise<void> => {
     send(message);
-    while (link.waiting > MAX_QUEUED_BYTES) await new Promise((resolve) => setTimeout(resolve, 5));
+    await drain(MAX_QUEUED_BYTES, 5);
     if (first % (8 * step) === 0) {
       onShare(sent / all);
-      await new Promise((resolve) => setTimeout(resolve, 0)); // lets the page respond to the user
+      await pause(0); // lets the page respond to the user
     }
   };
   for (let i = 0; i < mesh.positions.length; i += step)
@@ -51,6 +60,6 @@ export async function upload(
     );
   }
   send(wire.batchCommit());
-  while (link.waiting > 0) await new Promise((resolve) => setTimeout(resolve, 20));
+  await drain(0, 20);
   onShare(1);
 }

@@ -1,0 +1,153 @@
+// The connection of the page and what is sent over it, on sockets of the test.
+import assert from "node:assert/strict";
+import { afterEach, mock, test } from "node:test";
+import { bundled } from "../bundled.mjs";
+
+const { Link } = await bundled("link.ts");
+const { upload } = await bundled("mesh/upload.ts");
+const { Endpoint, stopForces, startEffect } = await bundled("wire/index.ts");
+
+/** A browser's socket, and the server at its other end. */
+class Socket {
+  static OPEN = 1;
+  static all = [];
+  readyState = 0;
+  bufferedAmount = 0;
+  received = [];
+  answers = [];
+
+  constructor() {
+    Socket.all.push(this);
+    this.server = new Endpoint(
+      (bytes) => this.answers.push(Uint8Array.from(bytes).buffer),
+      ({ device, name }) => this.received.push(`${device} ${name}`),
+    );
+  }
+  send(bytes) {
+    assert.notEqual(this.readyState, 0, "a browser throws");
+    if (this.readyState === 1) this.server.feed(bytes);
+  }
+  /** The closing handshake goes on until the server answers. */
+  close() {
+    this.readyState = 2;
+  }
+
+  // The server's.
+  accept() {
+    this.readyState = 1;
+    this.onopen();
+    this.server.open();
+    this.answer();
+  }
+  answer(...more) {
+    for (const data of this.answers.splice(0).concat(more)) this.onmessage({ data });
+  }
+  end() {
+    this.readyState = 3;
+    this.onclose();
+  }
+}
+
+Object.assign(globalThis, { window: globalThis, location: { protocol: "http:", host: "test" }, WebSocket: Socket });
+const timers = [];
+const { setTimeout: realTimeout, setInterval: realInterval } = globalThis;
+globalThis.setInterval = (...args) => {
+  timers.push(realInterval(...args));
+  return timers.at(-1);
+};
+afterEach(() => {
+  timers.splice(0).forEach(clearInterval);
+  Socket.all = [];
+});
+
+const until = async (ask) => {
+  while (!ask()) await new Promise((resolve) => realTimeout(resolve, 5));
+};
+
+function connected(device = "Arm") {
+  const states = [];
+  const link = new Link((state) => states.push(state), () => undefined);
+  link.connect(device);
+  Socket.all[0].accept();
+  assert.equal(link.state, "open");
+  return { link, states, socket: Socket.all[0] };
+}
+
+test("a socket that is closing has not sent a stop", () => {
+  const { link, socket } = connected();
+  assert.equal(link.send(stopForces()), true);
+  assert.equal(socket.received.at(-1), "Arm hapticd Stop_Forces");
+  socket.close();
+  assert.equal(link.send(stopForces()), false);
+});
+
+test("bytes that are no VRPN end the connection at once, and a new one is made", async () => {
+  const warn = mock.method(console, "warn", () => undefined);
+  const { link, states, socket } = connected();
+  socket.answer(new Uint8Array(64).fill(0xff).buffer);
+  assert.equal(warn.mock.callCount(), 1);
+  assert.deepEqual(states, ["open", "lost"]);
+  assert.equal(link.send(stopForces()), false);
+  await until(() => Socket.all.length === 2);
+  Socket.all[1].accept();
+  assert.equal(link.state, "open");
+  socket.end(); // the old one's end, and what it still brings, are of no concern
+  socket.answer(new Uint8Array(64).fill(0xff).buffer);
+  assert.deepEqual(states, ["open", "lost", "open"]);
+  assert.equal(link.send(stopForces()), true);
+  assert.equal(Socket.all.length, 2);
+});
+
+/** So large that the upload waits for the socket between its parts. */
+const mesh = () => ({ positions: new Float32Array(3 * 400_000), triangles: new Uint32Array(3 * 400_000) });
+const placement = {
+  object: 1,
+  name: "part.stl",
+  isNew: true,
+  T_world_mesh: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
+  surface: [],
+};
+
+test("an upload ends with its connection, and the next one gets nothing of it", async () => {
+  const { link, socket } = connected();
+  socket.bufferedAmount = 2_000_000;
+  const sending = assert.rejects(
+    upload(link.channel(), mesh(), placement, () => undefined),
+    /the connection was lost; the server discarded the mesh/,
+  );
+  await until(() => socket.received.some((name) => name.endsWith("Mesh_Vertices")));
+  socket.end();
+  await until(() => Socket.all.length === 2);
+  Socket.all[1].accept();
+  await sending;
+  assert.deepEqual(Socket.all[1].received, ["Arm vrpn_Base ping_message"]);
+});
+
+test("an upload whose last bytes wait when the connection ends has failed", async () => {
+  const { link, socket } = connected();
+  socket.bufferedAmount = 1000;
+  const small = { positions: new Float32Array(9), triangles: Uint32Array.of(0, 1, 2) };
+  const shares = [];
+  const sending = assert.rejects(
+    upload(link.channel(), small, placement, (share) => shares.push(share)),
+    /the connection was lost/,
+  );
+  await until(() => socket.received.at(-1).endsWith("Batch_Commit"));
+  socket.end();
+  await sending;
+  assert.ok(!shares.includes(1), `${shares}`);
+});
+
+test("an upload goes to the device that was chosen when it began", async () => {
+  const { link, socket } = connected();
+  socket.bufferedAmount = 2_000_000;
+  const sending = upload(link.channel(), mesh(), placement, () => undefined);
+  await until(() => socket.received.some((name) => name.endsWith("Mesh_Vertices")));
+  link.use("Wheel");
+  link.send(startEffect(0));
+  socket.bufferedAmount = 0;
+  await sending;
+  const others = socket.received.filter((name) => !name.startsWith("Arm "));
+  assert.deepEqual(others, ["Wheel vrpn_ForceDevice startEffect"]);
+  assert.ok(socket.received.includes("Arm hapticd Batch_Commit"));
+});
