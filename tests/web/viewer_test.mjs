@@ -389,6 +389,40 @@ test("one viewer holds the hand, another one watches", async () => {
   await viewer.page.bringToFront();
 });
 
+test("of two files that are dropped at once, the second is placed", async () => {
+  await viewer.drop({ "one.obj": CUBE });
+  await viewer.drop({ "two.obj": CUBE });
+  await viewer.until("the form", async () => (await viewer.text("#drop-panel")).includes("two.obj 8 vertices"));
+  await viewer.settle();
+  assert.equal(await viewer.page.locator("#drop-panel form").count(), 1);
+  await viewer.page.getByRole("button", { name: "Cancel" }).click();
+});
+
+test("a second mesh waits for the first, and each becomes an object of its own", async () => {
+  const browserHolds = (bytes) =>
+    viewer.ask(`Object.defineProperty(viewer.link.socket, "bufferedAmount", { configurable: true, get: () => ${bytes} }) && 0`);
+  const load = async (name) => {
+    await viewer.drop({ [name]: CUBE });
+    await viewer.page.getByRole("button", { name: "Load into the scene" }).click();
+  };
+  const says = (text) => viewer.until(text, async () => (await viewer.text("#drop-panel")).includes(text));
+  const first = (await server.state()).scenes[0].objects.length;
+  await browserHolds(2_000_000);
+  await load("one.obj");
+  await says("Sending one.obj");
+  await load("two.obj");
+  await says("two.obj waits until one.obj is sent");
+  await viewer.page.getByLabel("Object 0 is touchable").uncheck();
+  await viewer.until("a text", async () => (await viewer.text("#toasts")).includes("takes effect when one.obj is complete"));
+  await browserHolds(0);
+  await says(`two.obj is now object ${first + 1} with 12 triangles`);
+  const objects = (await server.state()).scenes[0].objects.slice(first);
+  assert.deepEqual(objects.map((o) => [o.name, o.triangles]), [["one.obj", 12], ["two.obj", 12]]);
+  await viewer.ask("delete viewer.link.socket.bufferedAmount");
+  await viewer.page.getByLabel("Object 0 is touchable").check();
+  await viewer.page.getByRole("button", { name: "Close" }).click();
+});
+
 test("light, dark, and by keyboard alone", async () => {
   await viewer.page.click("#theme");
   assert.equal(await viewer.ask("document.documentElement.dataset.theme"), "dark");

@@ -1,11 +1,13 @@
 // Loads a mesh file that the user drops onto the page or chooses: reads, places and sends it, then waits for the server.
 import { byId, countText, el, setText } from "./panels/dom";
-import type { Link } from "./link";
+import type { Channel, Link } from "./link";
 import { readMeshBeside } from "./mesh/read_beside";
 import { isMeshFile } from "./mesh/mesh_files";
 import { Placing } from "./mesh/placing";
+import { Targets } from "./mesh/targets";
 import { upload } from "./mesh/upload";
 import type { FileMesh } from "./mesh/weld";
+import { toast } from "./notice";
 import type { View } from "./scene3d/view";
 import type { DeviceState, ObjectState } from "./state_types";
 
@@ -22,7 +24,13 @@ export class DropMesh {
   private readonly close = el("button", { type: "button", className: "small" }, "Close");
   private readonly bar = el("progress", { max: 1, value: 0, hidden: true });
   private placing: Placing | undefined;
-  private awaited: { object: number; geometry: number; name: string } | undefined;
+  private readonly targets = new Targets();
+  /** The newest choice of a file: one that is still being read is given up for it. */
+  private choice = 0;
+  /** Ends with the upload that was asked for last. */
+  private uploads: Promise<void> = Promise.resolve();
+  /** The mesh that is being sent; empty: none. */
+  sending = "";
 
   constructor(private readonly context: DropContext) {
     this.close.addEventListener("click", () => (this.panel.hidden = true));
@@ -48,19 +56,15 @@ export class DropMesh {
     });
   }
 
-  /** Looks for the sent mesh in a new state. */
+  /** Looks for the sent meshes in a new state. */
   update(objects: ObjectState[]): void {
-    const loaded =
-      this.awaited &&
-      objects.find(
-        (o) => o.id === this.awaited!.object && o.triangles > 0 && o.geometry !== this.awaited!.geometry,
-      );
-    if (!loaded) return;
-    this.show(
-      `${this.awaited!.name} is now object ${loaded.id} with ${countText(loaded.triangles)} triangles.`,
-      "good",
-    );
-    this.awaited = undefined;
+    for (const { name, object, triangles } of this.targets.arrived(objects))
+      this.show(`${name} is now object ${object} with ${countText(triangles)} triangles.`, "good");
+  }
+
+  /** The states that follow are of another scene. */
+  clear(): void {
+    this.targets.clear();
   }
 
   private async open(files: File[]): Promise<void> {
@@ -69,16 +73,18 @@ export class DropMesh {
     this.panel.hidden = false;
     if (!device) return this.show("No device is connected yet: try again in a moment.", "bad");
     this.placing?.end();
+    const choice = ++this.choice;
     this.show(`Reading ${files[0]!.name} …`);
     await new Promise((resolve) => setTimeout(resolve, 30)); // lets the browser show the text first
     try {
       const { name, mesh } = await readMeshBeside(files);
+      if (choice !== this.choice) return;
       this.place(name, mesh, device);
       const others = files.filter((f) => f.name !== name && isMeshFile(f.name));
       if (others.length > 0)
         this.show(`One file at a time: ${others.map((f) => f.name).join(", ")} not loaded.`, "bad");
     } catch (error) {
-      this.show((error as Error).message, "bad");
+      if (choice === this.choice) this.show((error as Error).message, "bad");
     }
   }
 
@@ -88,20 +94,26 @@ export class DropMesh {
     if (!device) return;
     this.panel.hidden = false;
     this.placing?.end();
+    const choice = ++this.choice;
     try {
       const response = await fetch("bunny.obj");
       if (!response.ok) throw new Error(`the server has no bunny (status ${response.status})`);
       const { mesh } = await readMeshBeside([new File([await response.blob()], "bunny.obj")]);
-      const placing = new Placing("bunny.obj", mesh, this.context.view, device, this.context.objects());
-      this.placing = placing;
-      await this.load("bunny.obj", mesh, placing);
+      if (choice !== this.choice) return;
+      this.load("bunny.obj", mesh, this.newPlacing("bunny.obj", mesh, device));
     } catch (error) {
-      this.show((error as Error).message, "bad");
+      if (choice === this.choice) this.show((error as Error).message, "bad");
     }
   }
 
+  private newPlacing(name: string, mesh: FileMesh, device: DeviceState): Placing {
+    const objects = this.context.objects();
+    const { object } = this.targets.next(objects);
+    return (this.placing = new Placing(name, mesh, this.context.view, device, objects, object));
+  }
+
   private place(name: string, mesh: FileMesh, device: DeviceState): void {
-    const placing = new Placing(name, mesh, this.context.view, device, this.context.objects());
+    const placing = this.newPlacing(name, mesh, device);
     const load = el("button", { type: "submit", className: "primary" }, "Load into the scene");
     const cancel = el("button", { type: "button" }, "Cancel");
     cancel.addEventListener("click", () => {
@@ -111,33 +123,48 @@ export class DropMesh {
     placing.root.append(el("div", { className: "row" }, load, cancel));
     placing.root.addEventListener("submit", (e) => {
       e.preventDefault();
-      void this.load(name, mesh, placing);
+      this.load(name, mesh, placing);
     });
-    this.placing = placing;
     this.show("");
     this.panel.append(placing.root);
     load.focus();
   }
 
-  private async load(name: string, mesh: FileMesh, placing: Placing): Promise<void> {
-    const placement = placing.placement();
-    const before = this.context.objects().find((o) => o.id === placement.object)?.geometry ?? -1;
+  // One mesh after the other: within a connection the server takes everything between begin and commit of a batch as one.
+  private load(name: string, mesh: FileMesh, placing: Placing): void {
     placing.end();
+    const channel = this.context.link.channel();
+    const device = this.context.device()?.name;
+    if (this.sending !== "") this.show(`${name} waits until ${this.sending} is sent …`);
+    this.uploads = this.uploads.then(() => this.send(name, mesh, placing, channel, device));
+  }
+
+  private async send(name: string, mesh: FileMesh, placing: Placing, channel: Channel, device?: string): Promise<void> {
+    const objects = this.context.objects();
+    const placement = placing.placement(this.targets.next(objects));
+    const takeBack = this.targets.begin(placement.object, name, objects);
+    this.sending = name;
+    this.bar.value = 0;
     this.bar.hidden = false;
     this.show(`Sending ${name} …`);
     try {
-      await upload(this.context.link.channel(), mesh, placement, (share) => (this.bar.value = share));
+      if (this.context.device()?.name !== device) throw new Error("another device was chosen before it could be sent");
+      await upload(channel, mesh, placement, (share) => (this.bar.value = share));
       this.show(`${name} is sent; the server is processing it …`);
-      this.awaited = { object: placement.object, geometry: before, name };
     } catch (error) {
-      this.show(`${name}: ${(error as Error).message}`, "bad");
+      takeBack();
+      const text = `${name}: ${(error as Error).message}`;
+      this.show(text, "bad");
+      toast(text, 2); // the text of the next upload replaces the other
     }
     this.bar.hidden = true;
+    this.sending = "";
   }
 
   private show(text: string, level = ""): void {
     setText(this.message, text);
     this.message.dataset["level"] = level;
     this.close.hidden = level === "";
+    if (level === "bad") this.panel.hidden = false;
   }
 }

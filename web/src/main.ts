@@ -81,12 +81,12 @@ class Page {
   private readonly clients = new ClientsPanel(byId("clients"));
   private readonly objectsPanel = new ObjectsPanel(
     byId("objects"),
-    (...m) => this.send(...m),
+    (...m) => this.command(...m),
     (id) => this.view.objects.centreOf(id),
   );
-  private readonly sourcesPanel = new SourcesPanel(byId("sources"), (...m) => this.send(...m));
+  private readonly sourcesPanel = new SourcesPanel(byId("sources"), (...m) => this.command(...m));
   private readonly replay = new ReplayBar((...m) => this.send(...m));
-  private readonly effects = new EffectsPanel(byId("effects"), (...m) => this.send(...m));
+  private readonly effects = new EffectsPanel(byId("effects"), (...m) => this.command(...m));
   private readonly deviceChoice = byId<HTMLSelectElement>("device");
   private readonly quantity = byId<HTMLSelectElement>("quantity");
 
@@ -148,6 +148,14 @@ class Page {
 
   private send(...messages: wire.Outgoing[]): void {
     if (!this.link.send(...messages)) toast("Not connected: the command was not sent.", 2);
+  }
+
+  // A command of the scene belongs to the batch of a mesh that is being sent. A second connection for the mesh would be
+  // another client, which the server may not let command.
+  private command(...messages: wire.Outgoing[]): void {
+    this.send(...messages);
+    if (this.drop.sending !== "")
+      toast(`This takes effect when ${this.drop.sending} is complete. STOP acts at once.`, 1);
   }
 
   private chooseDrag(value: string): void {
@@ -250,6 +258,7 @@ class Page {
     this.hand.letGo();
     this.link.use(name);
     this.meshes.clear();
+    this.drop.clear();
     this.sourcesPanel.clear();
     this.tick = undefined;
     this.subscribe();
@@ -277,6 +286,7 @@ class Page {
     if (state === "lost") {
       this.hand.onLost();
       this.clearReadout();
+      this.drop.clear();
       this.meshes.clear(); // another server numbers its shapes from 1, too
     }
     this.showNotice();

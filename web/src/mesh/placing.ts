@@ -19,6 +19,7 @@ import type { Placement } from "./upload";
 import type { FileMesh } from "./weld";
 
 const FILL = 0.8;
+const NEW_OBJECT = "new";
 const NEW_SURFACE = {
   stiffness: 0.8,
   damping: 0.1,
@@ -36,7 +37,6 @@ export class Placing {
   private readonly preview: Mesh;
   private readonly centre = new Vector3();
   private readonly extent: number;
-  private readonly isNew = new Set<number>();
 
   constructor(
     private readonly name: string,
@@ -44,6 +44,7 @@ export class Placing {
     private readonly view: View,
     device: DeviceState,
     objects: ObjectState[],
+    next: number,
   ) {
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new BufferAttribute(mesh.positions, 3));
@@ -70,7 +71,7 @@ export class Placing {
     this.position = centre.toArray().map((x, i) => numberInput(`Position ${"xyz"[i]!}`, tidy(x)));
     this.rotation = [0, 1, 2].map((i) => numberInput(`Rotation about ${"xyz"[i]!}, degrees`, 0));
     this.surface.set(NEW_SURFACE);
-    this.fillTargets(objects);
+    this.fillTargets(objects, next);
     this.root.append(
       el(
         "p",
@@ -89,12 +90,12 @@ export class Placing {
     this.show();
   }
 
-  placement(): Placement {
-    const object = Number(this.target.value);
+  /** Where it goes; a new object is the next one at the time of sending. */
+  placement(next: { object: number; isNew: boolean }): Placement {
+    const to = this.target.value === NEW_OBJECT ? next : { object: Number(this.target.value), isNew: false };
     return {
-      object,
+      ...to,
       name: this.name,
-      isNew: this.isNew.has(object),
       T_world_mesh: this.matrix().toArray(),
       surface: this.surface.values(),
     };
@@ -107,13 +108,9 @@ export class Placing {
     this.root.remove();
   }
 
-  // Empty objects first: every scene starts with one, which the first mesh should use.
-  private fillTargets(objects: ObjectState[]): void {
+  private fillTargets(objects: ObjectState[], next: number): void {
     const used = objects.filter((o) => o.triangles > 0);
-    const free = objects.filter((o) => o.triangles === 0).map((o) => o.id);
-    const next = free[0] ?? Math.max(-1, ...objects.map((o) => o.id)) + 1;
-    if (free.length === 0) this.isNew.add(next);
-    this.target.append(el("option", { value: String(next) }, `new object ${next}`));
+    this.target.append(el("option", { value: NEW_OBJECT }, `new object ${next}`));
     this.target.append(
       ...used.map((o) => el("option", { value: String(o.id) }, `replace object ${o.id}${o.name ? ` (${o.name})` : ""}`)),
     );

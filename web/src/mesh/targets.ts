@@ -1,0 +1,52 @@
+// Which objects the meshes of the page become, while some of them are on their way.
+import type { ObjectState } from "../state_types";
+
+type Known = Pick<ObjectState, "id" | "triangles" | "geometry">;
+
+interface Sent {
+  object: number;
+  /** Of the object before. */
+  geometry: number;
+  name: string;
+}
+
+export class Targets {
+  /** What is being sent, or was sent and is not yet in the server's state; in this order. */
+  private readonly underWay: Sent[] = [];
+
+  /** The object that a new mesh becomes: an empty one, which every scene starts with, or one more. */
+  next(objects: Known[]): { object: number; isNew: boolean } {
+    const taken = this.underWay.map((sent) => sent.object);
+    const empty = objects.find((o) => o.triangles === 0 && !taken.includes(o.id));
+    if (empty) return { object: empty.id, isNew: false };
+    return { object: Math.max(-1, ...objects.map((o) => o.id), ...taken) + 1, isNew: true };
+  }
+
+  /** A mesh is being sent: its object is no place for another new one. The result takes that back. */
+  begin(object: number, name: string, objects: Known[]): () => void {
+    const sent = { object, name, geometry: objects.find((o) => o.id === object)?.geometry ?? -1 };
+    this.underWay.push(sent);
+    return () => this.end(sent);
+  }
+
+  /** The meshes that are new in the server's state. */
+  arrived(objects: Known[]): { name: string; object: number; triangles: number }[] {
+    return [...this.underWay].flatMap((sent) => {
+      const found = objects.find((o) => o.id === sent.object && o.triangles > 0 && o.geometry !== sent.geometry);
+      if (!found) return [];
+      this.end(sent);
+      for (const later of this.underWay) if (later.object === found.id) later.geometry = found.geometry;
+      return { name: sent.name, object: found.id, triangles: found.triangles };
+    });
+  }
+
+  /** After the connection or the scene has changed, nothing of it arrives. */
+  clear(): void {
+    this.underWay.length = 0;
+  }
+
+  private end(sent: Sent): void {
+    const at = this.underWay.indexOf(sent);
+    if (at >= 0) this.underWay.splice(at, 1);
+  }
+}
