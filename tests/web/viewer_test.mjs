@@ -623,4 +623,15 @@ test("the page reconnects to a restarted server", async () => {
     async () => (await viewer.ask("document.querySelector('#notice').dataset.notice")) === "empty",
   );
   await again.stop();
+  const renamed = await Server.start(hapticd, { http: new URL(server.url).host, more: ["--name", "Left"] });
+  await viewer.until("connected again", () => viewer.ask("viewer.link.state === 'open'"));
+  await viewer.until("reports of the device that is there", () => viewer.ask("viewer.tick !== undefined"));
+  await viewer.page.click("#stop");
+  await until("the stop", async () => (await renamed.state()).devices[0].guard.stopped);
+  renamed.process.kill("SIGSTOP");
+  await viewer.until("no answer", async () => (await viewer.text("#link")) === "no answer");
+  await viewer.page.click("#stop");
+  await viewer.until("the warning", async () => /does not answer: the stop may not/.test(await viewer.text("#toasts")));
+  renamed.process.kill("SIGCONT");
+  await renamed.stop();
 });

@@ -47,10 +47,11 @@ export interface Channel {
 
 export class Link {
   state: LinkState = "connecting";
+  /** To which everything is sent; empty before the first connection. */
+  device = "";
   private socket: WebSocket | undefined;
   private peer: Endpoint | undefined;
   private clock = new ServerClock();
-  private device = "";
   private pingTimer = 0;
   private retry_ms = RETRY_FIRST_MS;
 

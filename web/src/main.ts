@@ -144,6 +144,8 @@ class Page {
   private stop(): void {
     if (!this.link.send(wire.stopForces()))
       toast("Not connected: the stop did not reach the server. Use the switch on the device.", 2);
+    else if (!this.serverResponds)
+      toast("The server does not answer: the stop may not have reached it. Use the switch on the device.", 2);
   }
 
   private send(...messages: wire.Outgoing[]): void {
@@ -189,7 +191,9 @@ class Page {
       this.state = state;
       this.showDevices(state.devices);
       const device = state.devices.find((d) => d.name === this.deviceChoice.value) ?? state.devices[0];
-      if (device && !this.device) this.link.connect(device.name);
+      if (device && this.link.device === "") this.link.connect(device.name);
+      // A restarted server may have other devices: commands, and a stop, to one that is gone would reach nothing.
+      else if (device && device.name !== this.link.device) this.chooseDevice(device.name);
       this.device = device;
       this.scene = device && state.scenes[device.scene];
       if (device) this.show(device, state);

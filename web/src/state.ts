@@ -49,10 +49,8 @@ export function pollState(onState: (state: ServerState | undefined) => void): vo
 /** The display meshes of one scene: fetches them one at a time when their shape has changed. */
 export class Meshes {
   private readonly have = new Map<number, string>();
-  private busy = false;
+  private request: AbortController | undefined;
   private notBefore_ms = 0;
-  /** Changes with the scene: a response to a request of an earlier generation is discarded. */
-  private generation = 0;
 
   constructor(
     private readonly onMesh: (object: number, mesh: DisplayMesh) => void,
@@ -62,7 +60,9 @@ export class Meshes {
   clear(): void {
     for (const id of this.have.keys()) this.onGone(id);
     this.have.clear();
-    ++this.generation;
+    // Its answer would be of another scene, and over a network that is gone it may never come.
+    this.request?.abort();
+    this.request = undefined;
   }
 
   update(scene: number, objects: ObjectState[]): void {
@@ -73,28 +73,29 @@ export class Meshes {
     }
     const detailLevel = detailLevelOf(objects);
     const missing = objects.find((o) => o.triangles > 0 && this.have.get(o.id) !== keyOf(o, detailLevel));
-    if (missing && !this.busy && performance.now() > this.notBefore_ms)
+    if (missing && !this.request && performance.now() > this.notBefore_ms)
       void this.fetch(scene, missing, detailLevel);
   }
 
   // 503: still being simplified; 404: no longer there. A later state triggers the next attempt.
   private async fetch(scene: number, object: ObjectState, detailLevel: number): Promise<void> {
-    this.busy = true;
-    const { generation } = this;
+    const request = (this.request = new AbortController());
+    const { signal } = request;
     try {
-      const response = await fetch(`/api/mesh?scene=${scene}&object=${object.id}&geometry=${object.geometry}`);
+      const url = `/api/mesh?scene=${scene}&object=${object.id}&geometry=${object.geometry}`;
+      const response = await fetch(url, { signal });
       if (response.status !== 200) {
         this.notBefore_ms = performance.now() + RETRY_MS;
         return;
       }
       const mesh = decodeMesh(await response.arrayBuffer());
-      if (generation !== this.generation) return;
+      if (signal.aborted) return;
       this.have.set(object.id, keyOf(object, detailLevel));
       this.onMesh(object.id, mesh);
     } catch {
       // pollState() reports that the server does not respond.
     } finally {
-      this.busy = false;
+      if (this.request === request) this.request = undefined;
     }
   }
 }
