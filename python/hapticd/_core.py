@@ -1,6 +1,7 @@
 """The client without sockets: what both faces share. A face moves bytes, keeps time and waits."""
 
 import copy
+import os
 import secrets
 import time
 import weakref
@@ -187,6 +188,25 @@ def as_triangles(triangles: "npt.ArrayLike", vertices: int) -> "npt.NDArray[Any]
     return np.ascontiguousarray(given, dtype=">i4")
 
 
+#: The clients of this process.
+_CLIENTS: "weakref.WeakSet[Core]" = weakref.WeakSet()
+
+
+def _forked() -> None:
+    """A forked process has copies of the sockets. They would keep a connection, and its forces, beyond the end of the
+    process that made it, and two programs would write into one stream."""
+    for client in tuple(_CLIENTS):
+        if not client._finished:
+            client._over = "belongs to the process that made it: connect after the fork"
+            client._leave_to_parent()
+            client._finished = True
+            client._closed(client._over)
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forked)
+
+
 class Core(Commands):
     """Commands in, bytes out; bytes in, callbacks and latest reports out."""
 
@@ -221,13 +241,18 @@ class Core(Commands):
         self._last_failure = ""
         self._dispatching = False
         self._finished = False  # close() was called
+        self._over = "is closed"
         self._udp_target: Optional[Tuple[str, int]] = None
         self._counts = Statistics()
         self._ping_at = 0.0
         self._heartbeat_at = 0.0
         self._handshake_at = 0.0
+        _CLIENTS.add(self)
 
     # --- the face moves bytes
+
+    def _leave_to_parent(self) -> None:
+        """In a forked process: closes its copies of the sockets, and sends nothing."""
 
     def _opened(self, udp: Optional[Tuple[str, int]]) -> None:
         """The TCP connection is up."""
@@ -491,7 +516,7 @@ class Core(Commands):
     def _check_open(self) -> None:
         """Raises ConnectionLost after close()."""
         if self._finished:
-            raise ConnectionLost(f"this client of {self.device}@{self.server} is closed")
+            raise ConnectionLost(f"this client of {self.device}@{self.server} {self._over}")
 
     def _why_not_connected(self) -> str:
         server, failure = self.server, self._last_failure

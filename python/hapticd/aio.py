@@ -11,6 +11,7 @@ program that sends much awaits flush_all() from time to time. What must wait for
 """
 
 import asyncio
+import os
 import time
 from collections import deque
 from contextlib import asynccontextmanager
@@ -138,6 +139,17 @@ class Client(Core):
 
     async def __aexit__(self, *_: object) -> None:
         await self.close()
+
+    def _leave_to_parent(self) -> None:
+        """The transports cannot close their sockets without the event loop, which is the parent's: other files take
+        the places of the sockets."""
+        nowhere = os.open(os.devnull, os.O_RDWR)
+        for transport in (self._transport, self._udp):
+            sock = transport.get_extra_info("socket") if transport is not None else None
+            if sock is not None and sock.fileno() >= 0:
+                os.dup2(nowhere, sock.fileno(), inheritable=False)
+        os.close(nowhere)
+        self._transport = self._udp = None
 
     # --- connecting
 

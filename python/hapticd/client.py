@@ -147,6 +147,12 @@ class Client(Core):
             self._selector.unregister(sock)
             sock.close()
 
+    def _leave_to_parent(self) -> None:
+        for sock in (self._sock, self._udp, self._listener, self._request):
+            if sock is not None:
+                sock.close()  # without unregister(): on Linux the selector's registrations are the parent's, too
+        self._selector.close()
+
     def _drop_sockets(self) -> None:
         for sock in (self._sock, self._udp, self._listener, self._request):
             self._unwatch(sock)

@@ -2,6 +2,8 @@
 
 import asyncio
 import inspect
+import os
+import signal
 import socket
 import threading
 import time
@@ -12,7 +14,7 @@ import pytest
 
 import hapticd
 from conftest import COMMANDS, ROOT, WAITS, ScriptedServer, Server
-from hapticd import Reports, Surface
+from hapticd import Effect, Reports, Surface
 
 
 def run(main: Coroutine[Any, Any, None]) -> None:
@@ -54,6 +56,41 @@ def test_a_sphere_is_felt(server: Server, way: str) -> None:
             await hand.rearm_forces()
             await hand.release_hand()
             assert (hand.statistics().udp_bytes_in > 0) == (way == "udp")
+
+    run(main())
+
+
+@pytest.mark.parametrize("way", ["tcp", "udp"])
+def test_a_forked_process_does_not_keep_a_connection(server: Server, way: str) -> None:
+    """As the workers of a ProcessPoolExecutor."""
+
+    async def main() -> None:
+        async with hapticd.aio.connect(server.tcp) as watching, hapticd.aio.connect(getattr(server, way)) as hand:
+            hand.set_effect(0, Effect.constant((1, 0, 0), 1))
+            hand.start_effect(0)
+            await until(watching, lambda: watching.latest.force.force_N[0] > 0.5)
+            out, into = os.pipe()
+            child = os.fork()
+            if child == 0:
+                answer = b"it may use the connection"
+                try:
+                    hand.stop_effect(0)
+                except hapticd.ConnectionLost as error:
+                    answer = str(error).encode()
+                os.write(into, answer)
+                time.sleep(60)
+                os._exit(0)
+            try:
+                assert "belongs to the process that made it" in os.read(out, 1000).decode()
+                time_of_pose = hand.latest.pose[1].time
+                await until(hand, lambda: hand.connected and hand.latest.pose[1].time > time_of_pose)
+                await hand.close()
+                assert await wait(watching, lambda: watching.latest.force.force_N[0] == 0, 10)
+            finally:
+                os.kill(child, signal.SIGKILL)
+                os.waitpid(child, 0)
+                os.close(out)
+                os.close(into)
 
     run(main())
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import gc
+import os
 import pathlib
 import signal
 import socket
@@ -490,6 +491,40 @@ def test_a_client_ends_with_its_last_name(server: Server, way: str) -> None:
             until(watching, lambda: watching.latest.force.force_N[0] == 0)
         finally:
             gc.enable()
+
+
+@pytest.mark.parametrize("way", ["tcp", "udp"])
+def test_a_forked_process_neither_uses_nor_keeps_a_connection(server: Server, way: str) -> None:
+    """A worker that was forked, as multiprocessing does it, outlives the client of its parent."""
+    with hapticd.connect(server.tcp) as watching, hapticd.connect(getattr(server, way)) as hand:
+        hand.set_effect(0, Effect.constant((1, 0, 0), 1))
+        hand.start_effect(0)
+        hand.flush_all()
+        until(watching, lambda: hand.poll() is not None and watching.latest.force.force_N[0] > 0.5)
+        hand.stop_effect(7)  # collected, and not sent yet
+        out, into = os.pipe()
+        child = os.fork()
+        if child == 0:
+            answer = b"it may use the connection"
+            try:
+                hand.poll()
+            except hapticd.ConnectionLost as error:
+                answer = str(error).encode()
+            hand.close()
+            os.write(into, answer)
+            time.sleep(60)
+            os._exit(0)
+        try:
+            assert "belongs to the process that made it" in os.read(out, 1000).decode()
+            tick = hand.latest.pose[1].time
+            until(hand, lambda: hand.connected and hand.latest.pose[1].time > tick, seconds=10)
+            hand.close()
+            until(watching, lambda: watching.latest.force.force_N[0] == 0, seconds=10)
+        finally:
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+            os.close(out)
+            os.close(into)
 
 
 def test_waiting_takes_no_processor_time(server: Server) -> None:
