@@ -13,8 +13,9 @@ program that sends much awaits flush_all() from time to time. What must wait for
 import asyncio
 import os
 import time
+import weakref
 from collections import deque
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from typing import Any, AsyncIterator, Callable, Deque, Generator, List, Optional, Sequence, Set, Tuple
 
 import numpy as np
@@ -42,41 +43,90 @@ from .scene import Capabilities, RemoteContact, Reports
 
 
 class _Stream(asyncio.Protocol):
-    def __init__(self, client: "Client", reverse: bool) -> None:
-        self.client = client
-        self.reverse = reverse
+    # The event loop refers to its protocols, and they to their client weakly: it ends with its last name.
+
+    def __init__(self, client: "weakref.ref[Client]", reverse: bool) -> None:
+        self._client = client
+        self._reverse = reverse
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
-        self.client._adopt(transport, self.reverse)
+        client = self._client()
+        if client is None:
+            transport.abort()
+        else:
+            client._adopt(transport, self._reverse)
 
     def data_received(self, data: bytes) -> None:
-        self.client._data(data)
+        client = self._client()
+        if client is not None:
+            client._data(data)
 
     def pause_writing(self) -> None:
-        self.client._writable.clear()
+        client = self._client()
+        if client is not None:
+            client._writable.clear()
 
     def resume_writing(self) -> None:
-        self.client._writable.set()
+        client = self._client()
+        if client is not None:
+            client._writable.set()
 
     def connection_lost(self, error: Optional[Exception]) -> None:
-        self.client._gone(str(error) if error is not None else CLOSED_BY_SERVER)
+        client = self._client()
+        if client is not None:
+            client._gone(str(error) if error is not None else CLOSED_BY_SERVER)
 
 
 class _Datagrams(asyncio.DatagramProtocol):
     def __init__(self, client: "Client") -> None:
-        self.client = client
+        self._client = weakref.ref(client)
 
     def datagram_received(self, data: bytes, sender: Tuple[Any, ...]) -> None:
-        self.client._datagram(data, str(sender[0]))
+        client = self._client()
+        if client is not None:
+            client._datagram(data, str(sender[0]))
 
 
 class _Requests(asyncio.DatagramProtocol):
     def __init__(self, client: "Client") -> None:
-        self.client = client
+        self._client = weakref.ref(client)
 
     def error_received(self, error: Exception) -> None:
-        self.client._last_failure = f"UDP request: {error}"
+        client = self._client()
+        if client is not None:
+            client._last_failure = f"UDP request: {error}"
+
+
+async def _stay_connected(reference: "weakref.ref[Client]") -> None:
+    """Connects again and again, as long as the client has a name."""
+    while True:
+        client = reference()
+        if client is None:
+            return
+        lost = await client._attempt()
+        del client
+        if lost is not None:
+            await lost.wait()
+        client = reference()
+        if client is None or (client._counts.connections and not client.options.reconnect):
+            return
+        del client
+        await asyncio.sleep(RETRY_S)
+
+
+def _turn_of(reference: "weakref.ref[Client]") -> None:
+    client = reference()
+    if client is not None:
+        client._turn()
+
+
+def _end(*what: Any) -> None:
+    for one in what:
+        if isinstance(one, asyncio.BaseTransport):
+            one.close()
+        elif one is not None:
+            one.cancel()
 
 
 class Client(Core):
@@ -101,7 +151,7 @@ class Client(Core):
 
     async def _start(self) -> None:
         self._target = await self._loop.run_in_executor(None, resolve, self._address)
-        self._task = self._loop.create_task(self._stay_connected())
+        self._task = self._loop.create_task(_stay_connected(weakref.ref(self)))
         if self.options.connect_timeout > 0:
             try:
                 await self.wait_connected(self.options.connect_timeout)
@@ -111,7 +161,8 @@ class Client(Core):
 
     async def close(self) -> None:
         """Sends what is collected, and closes all sockets. From its first step on every command, and everything that
-        waits, raises ConnectionLost; `latest` is empty. Does nothing the second time."""
+        waits, raises ConnectionLost; `latest` is empty. Does nothing the second time. A client whose last name is gone
+        closes, too, as hapticd.Client."""
         if self._finished:
             return
         if self.connected:
@@ -140,6 +191,11 @@ class Client(Core):
     async def __aexit__(self, *_: object) -> None:
         await self.close()
 
+    def __del__(self) -> None:
+        if hasattr(self, "_task") and not self._finished:
+            with suppress(RuntimeError):  # the event loop has been closed, and its sockets with it
+                self._loop.call_soon_threadsafe(_end, self._transport, self._udp, self._timer, self._task)
+
     def _leave_to_parent(self) -> None:
         """The transports cannot close their sockets without the event loop, which is the parent's: other files take
         the places of the sockets."""
@@ -153,30 +209,30 @@ class Client(Core):
 
     # --- connecting
 
-    async def _stay_connected(self) -> None:
-        while True:
-            self._lost.clear()
-            try:
-                if self._address.tcp_only:
-                    attempt = self._loop.create_connection(lambda: _Stream(self, False), *self._target)
-                    await asyncio.wait_for(attempt, 3.0)
-                else:
-                    await self._ask_for_connection()
-                await self._lost.wait()
-            except asyncio.TimeoutError:
-                self._last_failure = "no answer to the connection attempt"
-            except ConnectionRefusedError:
-                self._last_failure = "Connection refused"
-            except OSError as error:
-                self._last_failure = str(error)
-            if self._counts.connections and not self.options.reconnect:
-                return
-            await asyncio.sleep(RETRY_S)
+    async def _attempt(self) -> Optional[asyncio.Event]:
+        """One attempt to connect; the result is set when the connection ends."""
+        self._lost.clear()
+        try:
+            if self._address.tcp_only:
+                reference = weakref.ref(self)
+                attempt = self._loop.create_connection(lambda: _Stream(reference, False), *self._target)
+                await asyncio.wait_for(attempt, 3.0)
+            else:
+                await self._ask_for_connection()
+            return self._lost
+        except asyncio.TimeoutError:
+            self._last_failure = "no answer to the connection attempt"
+        except ConnectionRefusedError:
+            self._last_failure = "Connection refused"
+        except OSError as error:
+            self._last_failure = str(error)
+        return None
 
     async def _ask_for_connection(self) -> None:
         local = local_towards(self._target)
         self._adopted = self._loop.create_future()
-        server = await self._loop.create_server(lambda: _Stream(self, True), local, 0)
+        reference = weakref.ref(self)  # the transport of an accepted connection keeps the call that makes its protocol
+        server = await self._loop.create_server(lambda: _Stream(reference, True), local, 0)
         request: Optional[asyncio.DatagramTransport] = None
         try:
             request, _ = await self._loop.create_datagram_endpoint(
@@ -300,7 +356,7 @@ class Client(Core):
             return
         at = self._run_timers()
         self._push()
-        self._timer = self._loop.call_later(max(0.0, at - time.monotonic()), self._turn)
+        self._timer = self._loop.call_later(max(0.0, at - time.monotonic()), _turn_of, weakref.ref(self))
 
     def peer_connected(self) -> None:
         super().peer_connected()

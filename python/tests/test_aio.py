@@ -1,12 +1,14 @@
 """The asyncio client against a real server with the simulated hand."""
 
 import asyncio
+import gc
 import inspect
 import os
 import signal
 import socket
 import threading
 import time
+import weakref
 from typing import Any, Callable, Coroutine, List
 
 import numpy as np
@@ -58,6 +60,36 @@ def test_a_sphere_is_felt(server: Server, way: str) -> None:
             assert (hand.statistics().udp_bytes_in > 0) == (way == "udp")
 
     run(main())
+
+
+@pytest.mark.parametrize("way", ["tcp", "udp"])
+def test_a_client_ends_with_its_last_name(server: Server, way: str, caplog: pytest.LogCaptureFixture) -> None:
+    """Although the event loop goes on: what is left of the client would go on pushing the hand."""
+
+    async def main() -> None:
+        async with hapticd.aio.connect(server.tcp) as watching:
+
+            async def push() -> "weakref.ref[hapticd.aio.Client]":
+                hand = await hapticd.aio.connect(getattr(server, way))
+                hand.set_effect(0, Effect.constant((1, 0, 0), 1))
+                hand.start_effect(0)
+                await until(watching, lambda: watching.latest.force.force_N[0] > 0.5)
+                return weakref.ref(hand)
+
+            gone = await push()
+            await watching.poll(0.1)
+            assert gone() is None
+            await until(watching, lambda: watching.latest.force.force_N[0] == 0)
+        tasks = asyncio.all_tasks() - {asyncio.current_task()}
+        assert [task for task in tasks if "stay_connected" in repr(task)] == []
+
+    gc.collect()
+    gc.disable()
+    try:
+        run(main())
+    finally:
+        gc.enable()
+    assert caplog.records == []
 
 
 @pytest.mark.parametrize("way", ["tcp", "udp"])
