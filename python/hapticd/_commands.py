@@ -70,6 +70,8 @@ class Commands:
 
     def set_workspace_box(self, min: Numbers, max: Numbers, model: "npt.ArrayLike" = IDENTITY) -> None:
         """Fits the device's workspace to a box of the world, seen through a model matrix (world to eye)."""
+        if len(min) != 3 or len(max) != 3:
+            raise ValueError(f"corners of {len(min)} and {len(max)} numbers: give 3 numbers each")
         self._send(m.SetWorkspaceBoundingBox(_column_major(model), (*min, *max)))
 
     def set_workspace_projection(self, model: "npt.ArrayLike", projection: "npt.ArrayLike") -> None:

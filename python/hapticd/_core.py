@@ -619,8 +619,8 @@ class Core(Commands):
             numbers += (c.id, c.shape, c.radius_m, *c.point_m, *c.normal, *c.axis, *c.velocity_m_per_s)
             numbers += (*c.angular_velocity_rad_per_s, c.stiffness_N_per_m, c.damping_Ns_per_m, c.static_friction)
             numbers += (c.dynamic_friction, c.lifetime_s, c.yields)
-        if len(numbers) != 24 * len(contacts):
-            raise ValueError("remote contacts: give three numbers for each vector")
+            if any(len(v) != 3 for v in (c.point_m, c.normal, c.axis, c.velocity_m_per_s, c.angular_velocity_rad_per_s)):
+                raise ValueError("remote contacts: give three numbers for each vector")
         self._put_now(m.RemoteContacts(time.monotonic_ns(), self.latest.hand.tick_time_ns, numbers))
 
     def _put_force(self, force_N: Numbers, torque_Nm: Numbers, lifetime_s: float) -> None:

@@ -550,6 +550,10 @@ def test_streamed_state_is_reported_back() -> None:
             hand.set_remote_contacts([hapticd.RemoteContact(i, (0, 0, 0), (0, 1, 0)) for i in range(17)])
         with pytest.raises(ValueError, match="give three numbers for each vector"):
             hand.set_remote_contacts([hapticd.RemoteContact(0, (0, 0), (0, 1, 0))])
+        with pytest.raises(ValueError, match="give three numbers for each vector"):
+            hand.set_remote_contacts([hapticd.RemoteContact(0, (0, 0), (0, 0, 1, 0))])
+        with pytest.raises(ValueError, match="3 numbers"):
+            hand.set_workspace_box((0, 0), (1, 1, 1, 1))
         number, layout = _NUMBERS[m.HandState]
         numbers = (3.0, 1, 2, 3, 4, 5, 6, 0.5)
         state = m.HandState(9, 8, 7, 6, force=(1, 2, 3), energy=0.02, flags=3, gripper=0.25, contacts=numbers)
