@@ -144,6 +144,7 @@ class Client(Core):
         self._writable = asyncio.Event()
         self._writable.set()
         self._changed: Set["asyncio.Future[None]"] = set()
+        self._batches = asyncio.Lock()  # one after the other: they do not nest
         self._timer: Optional[asyncio.TimerHandle] = None
         self._soon: Optional[asyncio.Handle] = None
         self._adopted: Optional["asyncio.Future[None]"] = None
@@ -413,14 +414,14 @@ class Client(Core):
 
     async def reports(self, kind: str, seconds: float = float("inf")) -> AsyncIterator[Any]:
         """Iterates over the reports of one kind, as they arrive, for so many seconds."""
-        async for batch in self._batches(kind, seconds):
+        async for batch in self._reports_in_batches(kind, seconds):
             for report in batch:
                 yield report
 
     async def rows(self, kind: str, seconds: float = float("inf")) -> "AsyncIterator[npt.NDArray[Any]]":
         """Iterates over structured arrays with the reports of one kind, as they arrive, for so many seconds."""
         r.dtype_of(kind)
-        async for batch in self._batches(kind, seconds):
+        async for batch in self._reports_in_batches(kind, seconds):
             yield r.rows_of(kind, batch)
 
     async def collect(self, kind: str, seconds: float) -> "npt.NDArray[Any]":
@@ -428,7 +429,7 @@ class Client(Core):
         parts = [rows async for rows in self.rows(kind, seconds)]
         return np.concatenate([np.empty(0, dtype=r.dtype_of(kind)), *parts])
 
-    async def _batches(self, kind: str, seconds: float) -> "AsyncIterator[List[Any]]":
+    async def _reports_in_batches(self, kind: str, seconds: float) -> "AsyncIterator[List[Any]]":
         waiting: Deque[Any] = deque()
         with self.on(kind, waiting.append):
             deadline = self._loop.time() + seconds
@@ -479,7 +480,8 @@ class Client(Core):
         triangles: "npt.ArrayLike",
         progress: Optional[Callable[[UploadProgress], object]] = None,
     ) -> None:
-        """Sends a mesh; see hapticd.Client.upload_mesh()."""
+        """Sends a mesh; see hapticd.Client.upload_mesh(). Cancelled before its first byte, it sends nothing; later,
+        the event loop sends the rest. Uploads and batches of several tasks follow each other."""
         rows = as_vertices(vertices)
         await self._upload(object, rows, as_triangles(triangles, len(rows)), progress)
 
@@ -502,21 +504,33 @@ class Client(Core):
             self._send_frames(frames, messages)
             return
         frames = self._batched(frames)
-        total = sum(map(len, frames))
+        async with self._batches:
+            await self._send_upload(frames, messages, progress)
+
+    async def _send_upload(
+        self, frames: List[bytes], messages: int, progress: Optional[Callable[[UploadProgress], object]]
+    ) -> None:
+        peer, total = self._peer, sum(map(len, frames))
         self._counts.messages_out += messages
-        sent = 0
-        step: List[bytes] = []
-        for one in frames:
-            step.append(one)
-            sent += len(one)
-            if sum(map(len, step)) >= 16 * BATCH_BYTES or sent == total:
-                if self._peer is None:
+        at = sent = 0
+        try:
+            while at < len(frames):
+                if peer is None or peer is not self._peer:
                     raise ConnectionLost(f"connection to {self.server} lost during an upload: {self._last_failure}")
-                self._peer.stream.extend(step)
-                step = []
+                first, before = at, sent
+                while at < len(frames) and sent - before < 16 * BATCH_BYTES:
+                    sent += len(frames[at])
+                    at += 1
+                peer.stream.extend(frames[first:at])
                 await self.flush_all()
                 if progress is not None:
                     progress(UploadProgress(sent, total))
+        except BaseException:
+            # Cancelled, or ended by the callback. A batch without its end would keep every later command.
+            if peer is not None and peer is self._peer:
+                peer.stream.extend(frames[at:])
+                self._push()
+            raise
 
     @asynccontextmanager
     async def batch(self) -> AsyncIterator[None]:
@@ -528,10 +542,14 @@ class Client(Core):
         connection = self._counts.connections
         try:
             yield
+            await self._batches.acquire()
         except BaseException:
             self._end_batch(connection, send=False)
             raise
-        self._end_batch(connection, send=True)
+        try:
+            self._end_batch(connection, send=True)
+        finally:
+            self._batches.release()
 
     # --- extensions; see hapticd.Client
 

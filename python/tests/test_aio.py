@@ -127,6 +127,57 @@ def test_a_forked_process_does_not_keep_a_connection(server: Server, way: str) -
     run(main())
 
 
+def test_uploads_and_batches_of_several_tasks_follow_each_other() -> None:
+    """Their batches must not be one inside the other: batches do not nest."""
+    vertices, triangles = hapticd.sphere(25, rings=600)
+    scripted = ScriptedServer()
+
+    async def main() -> None:
+        async with hapticd.aio.connect(scripted.name) as hand:
+            await hand.wait_capabilities()
+
+            async def rename() -> None:
+                await asyncio.sleep(0)  # after the uploads have begun
+                async with hand.batch():
+                    hand.set_object_name(0, "part")
+
+            await asyncio.gather(*(hand.upload_mesh(i, vertices, triangles) for i in range(3)), rename())
+            hand.send_text("end")
+            await hand.flush_all()
+            await asyncio.get_running_loop().run_in_executor(None, scripted.wait_for, "vrpn_Base text_message")
+
+    run(main())
+    edges = [name.rpartition("_")[2] for name, _ in scripted.received if name.startswith("hapticd Batch_")]
+    assert edges == ["Begin", "Commit"] * 4
+    scripted.close()
+
+
+def test_an_upload_that_is_cut_short_leaves_no_open_batch() -> None:
+    """A server keeps every command that follows, until the batch ends."""
+    vertices, triangles = hapticd.sphere(25, rings=600)
+    scripted = ScriptedServer()
+
+    async def main() -> None:
+        async with hapticd.aio.connect(scripted.name) as hand:
+            steps: List[hapticd.UploadProgress] = []
+            upload = asyncio.ensure_future(hand.upload_mesh(0, vertices, triangles, steps.append))
+            await until(hand, lambda: steps)
+            upload.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await upload
+            assert steps[-1].bytes_sent < steps[-1].bytes_total
+            with pytest.raises(ZeroDivisionError):
+                await hand.upload_mesh(0, vertices, triangles, lambda _: 1 / 0)
+            hand.send_text("end")
+            await hand.flush_all()
+            await asyncio.get_running_loop().run_in_executor(None, scripted.wait_for, "vrpn_Base text_message")
+
+    run(main())
+    edges = [name.rpartition("_")[2] for name, _ in scripted.received if name.startswith("hapticd Batch_")]
+    assert edges == ["Begin", "Commit"] * 2
+    scripted.close()
+
+
 def test_many_clients_share_one_loop(server: Server) -> None:
     async def main() -> None:
         hands = await asyncio.gather(*(hapticd.aio.connect(server.tcp) for _ in range(4)))
