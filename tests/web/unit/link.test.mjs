@@ -5,6 +5,7 @@ import { bundled } from "../bundled.mjs";
 
 const { Link } = await bundled("link.ts");
 const { upload } = await bundled("mesh/upload.ts");
+const { credentials } = await bundled("token.ts");
 const { Endpoint, stopForces, startEffect } = await bundled("wire/index.ts");
 
 /** A browser's socket, and the server at its other end. */
@@ -150,4 +151,24 @@ test("an upload goes to the device that was chosen when it began", async () => {
   const others = socket.received.filter((name) => !name.startsWith("Arm "));
   assert.deepEqual(others, ["Wheel vrpn_ForceDevice startEffect"]);
   assert.ok(socket.received.includes("Arm hapticd Batch_Commit"));
+});
+
+test("a file with a long name leaves no open batch", async () => {
+  const { link, socket } = connected();
+  const small = { positions: new Float32Array(9), triangles: Uint32Array.of(0, 1, 2) };
+  await upload(link.channel(), small, { ...placement, name: `${"scan of a part ".repeat(9)}.stl` }, () => undefined);
+  const edges = socket.received.filter((name) => name.includes("Batch_"));
+  assert.deepEqual(edges, ["Arm hapticd Batch_Begin", "Arm hapticd Batch_Commit"]);
+});
+
+test("a token that cannot be one keeps no page from connecting", () => {
+  const stored = new Map();
+  globalThis.sessionStorage = { getItem: (key) => stored.get(key) ?? null };
+  stored.set("hapticd token", "ü".repeat(100));
+  const link = new Link(() => undefined, () => undefined, credentials);
+  link.connect("Arm");
+  Socket.all[0].accept();
+  assert.equal(link.state, "open");
+  stored.set("hapticd token", "0123456789abcdef");
+  assert.deepEqual(credentials().map((m) => m.name), ["hapticd Identify"]);
 });

@@ -251,6 +251,17 @@ const viewOf = (text) => {
   return new DataView(bytes.buffer);
 };
 
+test("of names and marks that are too long, the beginning is sent, in whole characters", () => {
+  const { SetObjectName, Marker } = wire.messages;
+  const view = ({ payload }) => new DataView(payload.buffer);
+  const nameOf = (text) => SetObjectName.decode(view(wire.setObjectName(3, text))).text;
+  assert.equal(nameOf("x".repeat(64)), "x".repeat(64));
+  assert.equal(nameOf(`${"x".repeat(80)}.stl`), "x".repeat(64));
+  assert.equal(nameOf(`x${"ä".repeat(40)}`), `x${"ä".repeat(31)}`);
+  assert.equal(nameOf("🦾".repeat(40)), "🦾".repeat(16));
+  assert.equal(Marker.decode(view(wire.mark("ö".repeat(200)))).text, "ö".repeat(127));
+});
+
 test("every message of the table has vectors, and the same name on the wire", () => {
   assert.deepEqual(
     new Set(vectors.map((v) => v.name)),

@@ -135,9 +135,24 @@ export function decodeRemoteContacts(
   return contacts;
 }
 
-export const mark = (text: string): Outgoing => m.Marker.encode({ time: 0, text });
+/** The beginning of a text that fits in so many bytes; people write longer ones, and in all scripts. */
+function beginning(text: string, bytes: number): string {
+  const encoder = new TextEncoder();
+  if (encoder.encode(text).length <= bytes) return text;
+  let fits = "";
+  for (const character of text) {
+    if (encoder.encode(fits + character).length > bytes) break;
+    fits += character;
+  }
+  return fits;
+}
+
+const NAME_BYTES = 64;
+const MARK_BYTES = 255;
+export const mark = (text: string): Outgoing => m.Marker.encode({ time: 0, text: beginning(text, MARK_BYTES) });
 export const decodeMarker = (payload: DataView): m.Marker => m.Marker.decode(payload);
-export const setObjectName = (object: number, text: string): Outgoing => m.SetObjectName.encode({ object, text });
+export const setObjectName = (object: number, text: string): Outgoing =>
+  m.SetObjectName.encode({ object, text: beginning(text, NAME_BYTES) });
 export const removeObject = (object: number): Outgoing => m.RemoveObject.encode({ object });
 
 /** Speed 0 keeps it; a negative position does not seek. */
