@@ -144,7 +144,8 @@ class Client(Core):
 
     def _unwatch(self, sock: Optional[socket.socket]) -> None:
         if sock is not None:
-            self._selector.unregister(sock)
+            with suppress(KeyError):  # of an attempt that failed before it was watched
+                self._selector.unregister(sock)
             sock.close()
 
     def _leave_to_parent(self) -> None:
@@ -205,26 +206,31 @@ class Client(Core):
         if self._listener is None:
             return
         try:
-            sock = self._listener.accept()[0]
+            self._sock = self._listener.accept()[0]
         except OSError:
             return
         self._unwatch(self._listener)
         self._unwatch(self._request)
         self._listener = self._request = None
-        local = sock.getsockname()[0]
-        self._udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._udp.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
-        self._udp.bind((local, 0))
-        self._watch(self._udp, selectors.EVENT_READ, Client._on_datagrams)
-        self._sock = sock
-        self._watch(sock, selectors.EVENT_READ, Client._on_stream)
+        try:
+            local = self._sock.getsockname()[0]
+            self._udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+            self._udp.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
+            self._udp.bind((local, 0))
+            self._watch(self._udp, selectors.EVENT_READ, Client._on_datagrams)
+            self._watch(self._sock, selectors.EVENT_READ, Client._on_stream)
+        except OSError as error:
+            return self._fail(str(error))
         self._adopt((local, self._udp.getsockname()[1]))
 
     def _adopt(self, udp: Optional[Tuple[str, int]]) -> None:
         assert self._sock is not None
-        self._remote = str(self._sock.getpeername()[0])
-        self._sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        try:
+            self._remote = str(self._sock.getpeername()[0])
+            self._sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        except OSError as error:  # the server has ended it already
+            return self._fail(str(error))
         self._connecting = False
         self._opened(udp)
         self._push()

@@ -4,8 +4,10 @@ import contextlib
 import gc
 import os
 import pathlib
+import select
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import textwrap
@@ -323,6 +325,24 @@ def test_what_is_wrong_with_a_connection_is_named(server: Server) -> None:
         hapticd.connect(f"Phantom@127.0.0.1:{port}", connect_timeout=0.3)
     with pytest.raises(hapticd.ConnectError, match="no server at no.such.host.invalid"):
         hapticd.connect("Phantom@no.such.host.invalid")
+
+
+def test_a_connection_that_is_reset_before_it_is_used_is_tried_again() -> None:
+    """By a server that connects, as VRPN's do, and is gone before the client polls."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asked:
+        asked.bind(("127.0.0.1", 0))
+        asked.settimeout(60)
+        with hapticd.connect(f"Phantom@127.0.0.1:{asked.getsockname()[1]}", connect_timeout=0) as hand:
+            for _ in range(2):
+                hand.run_for(0.5)
+                host, port = asked.recv(100).rstrip(b"\0").decode().split()
+                with socket.create_connection((host, int(port))) as server:
+                    server.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+                while select.select([asked], [], [], 0)[0]:
+                    asked.recv(100)
+                time.sleep(0.1)
+            hand.poll()
+            assert not hand.connected and hand._last_failure
 
 
 def test_a_server_that_closes_without_an_answer_may_ask_for_tls() -> None:
