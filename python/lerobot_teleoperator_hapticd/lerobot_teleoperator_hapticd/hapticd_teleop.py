@@ -2,7 +2,8 @@
 
 import math
 import time
-from typing import Any, Dict, Optional
+from collections import deque
+from typing import Any, Deque, Dict, Optional
 
 import numpy as np
 from lerobot.teleoperators.teleoperator import Teleoperator
@@ -47,6 +48,8 @@ class HapticdTeleop(Teleoperator):
         self.config = config
         self._offset = np.array([config.offset_x, config.offset_y, config.offset_z])
         self._feedback_at = 0.0
+        # The newest one that began or ended since the last feedback.
+        self._connections: "Deque[hapticd.reports.ConnectionReport]" = deque(maxlen=1)
         self._force = False
         self._contact = False
         self._reports_hand = False
@@ -70,6 +73,7 @@ class HapticdTeleop(Teleoperator):
             raise ConnectionError(f"{self} is connected already")
         self.disconnect()
         self._hand = hapticd.connect(self.config.device, connect_timeout=self.config.connect_timeout)
+        self._hand.on_connection(self._connections.append)
         try:
             self.configure()
             deadline = time.monotonic() + max(self.config.connect_timeout, 1.0)
@@ -137,6 +141,9 @@ class HapticdTeleop(Teleoperator):
         if not all(math.isfinite(float(value)) for value in feedback.values()):
             raise ValueError(f"feedback with a value that is not finite: {feedback}")
         self._feedback_at = time.monotonic()
+        if self._connections:  # nothing of what was felt through another one goes on
+            self._connections.clear()
+            self._force = self._contact = False
         if any(name in feedback for name in _FORCE):
             self._send_force(hand, np.array([float(feedback.get(name, 0.0)) for name in _FORCE]))
         if "contact_stiffness" in feedback:

@@ -4,6 +4,7 @@ LeRobot is no Debian package, so the abstract class and the registry stand here 
 """
 
 import abc
+import contextlib
 import importlib
 import importlib.metadata
 import os
@@ -205,6 +206,28 @@ def test_a_force_is_limited_and_ends(server: Server) -> None:
         assert max(force[0] for force in felt) < 1.01
         teleop.send_feedback({"force_x": 0.0})
         until(lambda: person.poll(0.01) is not None and felt[-1][0] == 0)
+
+
+def test_feedback_is_felt_again_after_a_restart_of_the_server() -> None:
+    restarted = Server()
+    with make(restarted) as teleop, hapticd.connect(restarted.tcp) as person:
+
+        def feel() -> bool:
+            with contextlib.suppress(ConnectionError):
+                teleop.get_action()
+            teleop.send_feedback({"force_x": 1.0, "contact_y": 0.004, "contact_ny": 1.0, "contact_stiffness": 400.0})
+            person.poll(0.01)
+            if person.connected:
+                person.hold_hand((0, 0, 0))
+            force_N = person.latest.force.force_N
+            return bool(force_N[0] > 0.5 and force_N[1] > 0.3)
+
+        until(feel)
+        restarted.stop()
+        until(lambda: not feel())
+        restarted.start(f"127.0.0.1:{restarted.port}")
+        until(feel)
+    restarted.stop()
 
 
 def test_what_is_wrong_is_named(server: Server) -> None:
