@@ -16,6 +16,10 @@ class ServerClock {
   private best_s = Infinity;
   private ahead_s = 0;
 
+  /** A pong does not say which ping it answers: one ping at a time. */
+  get waits(): boolean {
+    return this.sent_s !== 0;
+  }
   sent(): void {
     this.sent_s = wall_s();
   }
@@ -53,6 +57,8 @@ export class Link {
   private peer: Endpoint | undefined;
   private clock = new ServerClock();
   private pingTimer = 0;
+  /** Names of messages that could not be read, and of which the console has been told. */
+  private readonly unreadable = new Set<string>();
   private retry_ms = RETRY_FIRST_MS;
 
   constructor(
@@ -73,7 +79,7 @@ export class Link {
       (bytes) => socket.send(bytes as Uint8Array<ArrayBuffer>),
       (message) => {
         if (message.name === PONG) clock.onPong(message.time_s);
-        this.onMessage(message, clock.age_s(message.time_s));
+        this.read(message, clock.age_s(message.time_s));
       },
     );
     this.socket = socket;
@@ -114,6 +120,16 @@ export class Link {
     this.device = device;
   }
 
+  // A message of another version, say. The connection stays, and with it the stop.
+  private read(message: Incoming, age_s: number): void {
+    try {
+      this.onMessage(message, age_s);
+    } catch (error) {
+      if (!this.unreadable.has(message.name)) console.warn(`left out ${message.name}: ${String(error)}`);
+      this.unreadable.add(message.name);
+    }
+  }
+
   private feed(peer: Endpoint, bytes: Uint8Array): void {
     if (peer !== this.peer) return;
     try {
@@ -131,6 +147,7 @@ export class Link {
     for (const message of this.greeting()) this.peer?.send(this.device, message);
     this.setState("open");
     const sendPing = (): void => {
+      if (this.clock.waits) return;
       this.clock.sent();
       this.send(ping());
     };

@@ -99,6 +99,57 @@ test("bytes that are no VRPN end the connection at once, and a new one is made",
   assert.equal(Socket.all.length, 2);
 });
 
+test("a message that cannot be read does not end the connection that carries the stop", () => {
+  const warn = mock.method(console, "warn", () => undefined);
+  const read = [];
+  const link = new Link(
+    () => undefined,
+    ({ name }) => {
+      if (name === "newer") throw new Error("newer: payload of 9 bytes, expected 8");
+      read.push(name);
+    },
+  );
+  link.connect("Arm");
+  const [socket] = Socket.all;
+  socket.accept();
+  for (const name of ["newer", "newer", "known"]) socket.server.send("Arm", { name, payload: new Uint8Array(9) });
+  socket.answer();
+  assert.deepEqual(read, ["known"]);
+  assert.equal(warn.mock.callCount(), 1);
+  assert.match(warn.mock.calls[0].arguments[0], /newer: payload of 9 bytes/);
+  assert.equal(link.send(stopForces()), true);
+  assert.equal(socket.received.at(-1), "Arm hapticd Stop_Forces");
+});
+
+test("the server's clock is estimated from a ping and its own answer, however late", (t) => {
+  t.mock.timers.enable({ apis: ["setInterval"] });
+  let now_ms = 0;
+  t.mock.method(performance, "now", () => now_ms);
+  const ages = [];
+  const link = new Link(() => undefined, (_, age_s) => ages.push(age_s));
+  link.connect("Arm");
+  const [socket] = Socket.all;
+  socket.accept();
+  // The server has the clock of the page; every answer takes 1.6 s: 0.8 s there and 0.8 s back.
+  const server = new Endpoint((bytes) => socket.answers.push(Uint8Array.from(bytes).buffer), () => undefined, () =>
+    performance.timeOrigin / 1000 + now_ms / 1000 - 0.8);
+  server.open();
+  socket.answers.length = 0; // its cookie
+  const asked = [0];
+  for (; now_ms < 12_000; now_ms += 100) {
+    const before = socket.received.length;
+    if (now_ms > 0 && now_ms % 1000 === 0) t.mock.timers.tick(1000);
+    if (socket.received.length > before) asked.push(now_ms);
+    if (asked[0] + 1600 === now_ms) {
+      asked.shift();
+      server.send("Arm", { name: "vrpn_Base pong_message", payload: new Uint8Array(0) });
+      socket.answer();
+    }
+  }
+  assert.ok(ages.length >= 4, `${ages}`);
+  for (const age of ages.slice(1)) assert.ok(Math.abs(age - 0.8) < 0.01, `${ages}`);
+});
+
 /** So large that the upload waits for the socket between its parts. */
 const mesh = () => ({ positions: new Float32Array(3 * 400_000), triangles: new Uint32Array(3 * 400_000) });
 const placement = {
