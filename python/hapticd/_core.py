@@ -518,6 +518,11 @@ class Core(Commands):
         if self._finished:
             raise ConnectionLost(f"this client of {self.device}@{self.server} {self._over}")
 
+    def _check_renewed(self) -> None:
+        """Raises ConnectionLost when the connection has ended and no other will follow."""
+        if not self.connected and self._counts.connections and not self.options.reconnect:
+            raise ConnectionLost(f"connection to {self.server} lost: {self._why_not_connected()}")
+
     def _why_not_connected(self) -> str:
         server, failure = self.server, self._last_failure
         if "refused" in failure.lower():

@@ -413,7 +413,9 @@ class Client(Core):
         return self._counts.messages_in - before
 
     async def reports(self, kind: str, seconds: float = float("inf")) -> AsyncIterator[Any]:
-        """Iterates over the reports of one kind, as they arrive, for so many seconds."""
+        """Iterates over the reports of one kind, as they arrive, for so many seconds. Raises ConnectionLost when the
+        connection ends and Options.reconnect is false, ServerError (Options.throw_on_error), and ConnectionLost after
+        close()."""
         async for batch in self._reports_in_batches(kind, seconds):
             for report in batch:
                 yield report
@@ -431,10 +433,16 @@ class Client(Core):
 
     async def _reports_in_batches(self, kind: str, seconds: float) -> "AsyncIterator[List[Any]]":
         waiting: Deque[Any] = deque()
+
+        def arrived() -> bool:
+            if not waiting:
+                self._check_renewed()
+            return bool(waiting)
+
         with self.on(kind, waiting.append):
             deadline = self._loop.time() + seconds
             while True:
-                await self._wait(lambda: bool(waiting), min(deadline - self._loop.time(), 3600.0))
+                await self._wait(arrived, min(deadline - self._loop.time(), 3600.0))
                 if waiting:
                     batch = list(waiting)
                     waiting.clear()

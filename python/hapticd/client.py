@@ -422,7 +422,8 @@ class Client(Core):
 
     def reports(self, kind: str, seconds: float = float("inf")) -> Iterator[Any]:
         """Iterates over the reports of one kind, as they arrive, for so many seconds: "pose", "force", "tick" and so
-        on, see hapticd.reports.KINDS."""
+        on, see hapticd.reports.KINDS. Raises as poll(), and ConnectionLost when the connection ends and
+        Options.reconnect is false."""
         waiting: Deque[Any] = deque()
         with self.on(kind, waiting.append):
             deadline = time.monotonic() + seconds
@@ -432,17 +433,19 @@ class Client(Core):
                 left = deadline - time.monotonic()
                 if left <= 0:
                     return
+                self._check_renewed()
                 self.poll(min(left, 3600.0))
 
     def rows(self, kind: str, seconds: float = float("inf")) -> "Iterator[npt.NDArray[Any]]":
         """Iterates over structured arrays with the reports of one kind, one for each poll that brought some, for so
-        many seconds. Columns are the fields of the report (contacts: one row for each contact)."""
+        many seconds. Columns are the fields of the report (contacts: one row for each contact). Raises as reports()."""
         r.dtype_of(kind)
         waiting: List[Any] = []
         with self.on(kind, waiting.append):
             deadline = time.monotonic() + seconds
             left = seconds
             while left > 0:
+                self._check_renewed()
                 self.poll(min(left, 3600.0))
                 if waiting:
                     rows = r.rows_of(kind, waiting)

@@ -189,6 +189,8 @@ class ScriptedServer:
         self.device = device
         self.received: List[Tuple[str, bytes]] = []
         self.answer = b""  # sent behind each pong
+        self.reads = threading.Event()  # clear: it takes nothing more
+        self.reads.set()
         self.listener = socket.create_server(("127.0.0.1", 0))
         self.port = self.listener.getsockname()[1]
         self.name = f"{device}@tcp://127.0.0.1:{self.port}"
@@ -228,6 +230,7 @@ class ScriptedServer:
                 while True:
                     if self.peer.stream:
                         connection.sendall(self.peer.take_stream())
+                    self.reads.wait()
                     try:
                         data = connection.recv(1 << 16)
                     except OSError:

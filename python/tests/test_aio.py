@@ -159,6 +159,8 @@ def test_an_upload_that_is_cut_short_leaves_no_open_batch() -> None:
 
     async def main() -> None:
         async with hapticd.aio.connect(scripted.name) as hand:
+            await hand.wait_capabilities()
+            scripted.reads.clear()  # the system takes only a part of the mesh
             steps: List[hapticd.UploadProgress] = []
             upload = asyncio.ensure_future(hand.upload_mesh(0, vertices, triangles, steps.append))
             await until(hand, lambda: steps)
@@ -166,6 +168,7 @@ def test_an_upload_that_is_cut_short_leaves_no_open_batch() -> None:
             with pytest.raises(asyncio.CancelledError):
                 await upload
             assert steps[-1].bytes_sent < steps[-1].bytes_total
+            scripted.reads.set()
             with pytest.raises(ZeroDivisionError):
                 await hand.upload_mesh(0, vertices, triangles, lambda _: 1 / 0)
             hand.send_text("end")
@@ -176,6 +179,19 @@ def test_an_upload_that_is_cut_short_leaves_no_open_batch() -> None:
     edges = [name.rpartition("_")[2] for name, _ in scripted.received if name.startswith("hapticd Batch_")]
     assert edges == ["Begin", "Commit"] * 2
     scripted.close()
+
+
+def test_reports_of_a_connection_that_nobody_renews_end() -> None:
+    server = Server()
+
+    async def main() -> None:
+        async with hapticd.aio.connect(server.tcp, reconnect=False) as hand:
+            with pytest.raises(hapticd.ConnectionLost, match=f"connection to 127.0.0.1:{server.port} lost"):
+                async for _ in hand.reports("pose", 20):
+                    if server.process.poll() is None:
+                        server.stop()
+
+    run(main())
 
 
 def test_many_clients_share_one_loop(server: Server) -> None:

@@ -229,6 +229,22 @@ def test_a_restarted_server_is_found_again() -> None:
     server.stop()
 
 
+def test_reports_of_a_connection_that_nobody_renews_end() -> None:
+    server = Server()
+    with hapticd.connect(server.tcp, reconnect=False) as hand:
+        waits = [hand.reports("pose", 20), hand.rows("pose", 20)]
+        for reports in waits:
+            next(reports)
+        server.stop()
+        for reports in waits:
+            with pytest.raises(hapticd.ConnectionLost, match=f"connection to 127.0.0.1:{server.port} lost"):
+                for _ in reports:
+                    pass
+        with pytest.raises(hapticd.ConnectionLost, match="lost"):
+            hand.collect("pose", 20)
+        hand.run_for(0.01)
+
+
 @pytest.mark.parametrize("way", ["tcp", "udp"])
 def test_a_closed_client_is_not_connected_and_every_command_raises(server: Server, way: str) -> None:
     others = {
