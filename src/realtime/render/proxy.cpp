@@ -558,18 +558,9 @@ void Proxy::popThrough(const Vec3& hip, std::uint32_t& status) noexcept {
     step = deepest;
     if (!hasWay(passable, position_ + step * direction)) return;
   }
-  const Vec3 before = position_;
-  const bool wasHeld = std::exchange(wasHeld_, false);
+  wasHeld_ = false;
   position_ += step * direction;
   updateProxy(hip);
-  // The other side of a thin body may push it on: then it waits until it has room behind that, too.
-  if ((position_ - hip).norm() > (before - hip).norm() ||
-      (position_ - hip).dot(direction) > kGapTolerance_m) {
-    position_ = before;
-    wasHeld_ = wasHeld;
-    updateProxy(hip);
-    return;
-  }
   status |= kRenderPopthrough;
   popthroughArmed_ = contactSet_.count == 0;
 }
