@@ -119,7 +119,7 @@ bool Renderer::remember(const Rendering& last, RenderMemory& out) const noexcept
 void Renderer::resume(const Rendering& last) noexcept {
   state_->proxy.resume(last.proxy_m);
   state_->last = {last.contactForce_N, 0, last.proxy_m};  // free: the proxy is at the HIP
-  state_->rise.resume(last.proxy_m);
+  state_->rise.reset();
   state_->passivity.resume(last.proxy_m);
 }
 
@@ -146,7 +146,7 @@ void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState
   if ((out.status & kRenderReleased) == 0)
     applySurfaceLaw(contactSet, out.proxy_m, device.velocity_m_per_s, radius, out);
   SpringState springs = restingSprings(contactSet, s.proxy.commandChanged(), radius, out);
-  const double share = s.proxy.feltShare() * s.rise.step(springs, out.contactForce_N, hip, period_s);
+  const double share = s.proxy.feltShare() * s.rise.step(out.contactForce_N, springs.known, period_s);
   scaleContact(share, out);
   springs.scale(share);
   springs.most_N = s.rise.most_N();
