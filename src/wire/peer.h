@@ -102,8 +102,8 @@ class Peer {
   /// Whether a ProtocolError was reported.
   bool failed() const noexcept { return state_ == State::kFailed; }
 
-  /// From now on low-latency messages leave as datagrams; before, everything leaves by TCP.
-  void useDatagrams() noexcept { useDatagrams_ = true; }
+  /// From now on low-latency messages leave as datagrams, or everything by TCP, as at first.
+  void useDatagrams(bool use = true) noexcept { useDatagrams_ = use; }
   bool usesDatagrams() const noexcept { return useDatagrams_; }
 
   /// Sends a message; false, and nothing happens, when not connected. std::length_error as FrameEncoder::add.

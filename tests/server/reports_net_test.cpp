@@ -1,6 +1,7 @@
 // Reports to each client over real sockets: rates, kinds, mirrored contact, toggles, origins.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "running_server.h"
@@ -53,6 +54,26 @@ TEST_F(ReportsTest, EachClientHasItsOwnRate) {
   slow->forget();
   slow->send(wire::Subscribe{.kinds = wire::kReportDefault, .rate = 0});
   ASSERT_TRUE(slow->untilNext<wire::IsTouching>());
+}
+
+// An address that is not its own would make the server send to somebody who did not ask.
+TEST_F(ReportsTest, ADescriptionOfAnotherMachinesUdpPortEndsTheDatagrams) {
+  const auto client = peer(ScriptedPeer::Mode::udp);
+  client->send(wire::Subscribe{.kinds = wire::kReportTick, .rate = 0});
+  const auto last = [&](bool byDatagram) {
+    return client->until([&] {
+      const auto& all = client->messages();
+      return std::any_of(all.begin(), all.end(), [&](const auto& message) {
+        return message.kind == wire::kindOf<wire::TickReport> && message.byDatagram == byDatagram;
+      });
+    });
+  };
+  ASSERT_TRUE(last(true));
+  client->forget();
+  wire::FrameEncoder description;
+  description.addRaw({1, 2}, 9, wire::kUdpDescription, wire::encodeUdpDescription({"127.0.0.99", 9}));
+  client->sendBytes(description.bytes());
+  EXPECT_TRUE(last(false));
 }
 
 TEST_F(ReportsTest, InvalidRatesAreRefusedByName) {

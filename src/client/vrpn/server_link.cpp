@@ -109,13 +109,7 @@ void ServerLink::onEvent(Client& client, const wire::Event& event) {
   } else if (const auto* type = std::get_if<wire::TypeDescribed>(&event)) {
     adopt(type->name, &wire::LocalNames::addType);
   } else if (const auto* udp = std::get_if<wire::UdpDescribed>(&event)) {
-    if (!client.udp) return;
-    try {
-      client.udpPeer = net::Endpoint::parse(udp->address.host, udp->address.port);
-      if (client.udpPeer->address == client.connection.remote().address) client.peer->useDatagrams();
-    } catch (const net::Error&) {
-      // Not a numeric address: everything is sent by TCP.
-    }
+    onUdpDescribed(client, udp->address);
   } else if (const auto* message = std::get_if<wire::MessageReceived>(&event)) {
     wire::LocalSender from = message->local_sender;
     if (from.value < 0) from = names_.findSender(message->senderName).value_or(wire::LocalSender{});
@@ -132,6 +126,21 @@ void ServerLink::onEvent(Client& client, const wire::Event& event) {
     std::fprintf(stderr, "VRPN: %s broke the protocol: %.*s\n", client.connection.remote().text().c_str(),
                  static_cast<int>(error->reason.size()), error->reason.data());
     client.connection.abort("it broke the VRPN protocol");
+  }
+}
+
+// The description replaces an earlier one. A client may name its own address only: others did not ask.
+void ServerLink::onUdpDescribed(Client& client, const wire::UdpAddress& address) {
+  client.udpPeer.reset();
+  client.peer->useDatagrams(false);
+  if (!client.udp) return;
+  try {
+    const net::Endpoint described = net::Endpoint::parse(address.host, address.port);
+    if (described.address != client.connection.remote().address) return;
+    client.udpPeer = described;
+    client.peer->useDatagrams();
+  } catch (const net::Error&) {
+    // Not a numeric address: everything is sent by TCP.
   }
 }
 

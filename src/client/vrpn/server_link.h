@@ -49,6 +49,7 @@ class ServerLink {
   void onRequest(wire::ByteView bytes, const net::Endpoint& from);
   void add(net::Connection connection, bool datagrams);
   void onEvent(Client& client, const wire::Event& event);
+  void onUdpDescribed(Client& client, const wire::UdpAddress& address);
   void onClosed(Client& client, const std::string& reason);
   template <class Id>
   void adopt(std::string_view name, Id (wire::LocalNames::*addName)(std::string_view));

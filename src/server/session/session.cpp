@@ -373,18 +373,21 @@ void Session::onSender(std::string_view name) {
 }
 
 void Session::onUdp(const wire::UdpAddress& address) {
+  peer_.useDatagrams(false);  // the description replaces an earlier one, even when it is refused
+  net::Endpoint described;
   try {
-    datagramPeer_ = net::Endpoint::parse(address.host, address.port);
+    described = net::Endpoint::parse(address.host, address.port);
   } catch (const net::Error& error) {
     logWarning(std::string("UDP address refused: ") + error.what());
     return;
   }
-  if (datagramPeer_.address != connection_.remote().address) {
-    logWarning("requested datagrams to " + datagramPeer_.text() +
+  if (described.address != connection_.remote().address) {
+    logWarning("requested datagrams to " + described.text() +
                ", which is not its own address; using TCP only");
     return;
   }
-  if (udp_) peer_.useDatagrams();
+  datagramPeer_ = described;
+  peer_.useDatagrams(udp_ != nullptr);
 }
 
 // Never write to a path that a client chose.
