@@ -47,4 +47,9 @@ std::optional<LocalSender> LocalNames::findSender(std::string_view name) const n
   return found ? std::optional(LocalSender{*found}) : std::nullopt;
 }
 
+std::optional<LocalType> LocalNames::findType(std::string_view name) const noexcept {
+  const auto found = find(types_, name);
+  return found ? std::optional(LocalType{*found}) : std::nullopt;
+}
+
 }  // namespace hapticd::wire

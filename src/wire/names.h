@@ -51,6 +51,7 @@ class LocalNames {
   LocalType addType(std::string_view name);
 
   std::optional<LocalSender> findSender(std::string_view name) const noexcept;
+  std::optional<LocalType> findType(std::string_view name) const noexcept;
 
   /// Names by number.
   const std::vector<std::string>& senders() const noexcept { return senders_; }

@@ -141,6 +141,45 @@ TEST_F(VrpnServer, SendsLowLatencyReportsByDatagram) {
   }
 }
 
+TEST_F(VrpnServer, SendsByTcpToAClientThatDescribesAnotherMachinesUdpPort) {
+  ScriptedPeer client(address(), "Device0", ScriptedPeer::Mode::udp);
+  ASSERT_TRUE(runUntil(client, [&] { return client.count<wire::ButtonStates>() > 0; }));
+  const auto askForForce = [&] {
+    client.forget();
+    client.send(wire::TrackerResetOrigin{});
+    return runUntil(client, [&] { return client.count<wire::Force>() > 0; });
+  };
+  const auto byDatagram = [&] {
+    const auto& all = client.messages();
+    return std::find_if(all.begin(), all.end(),
+                        [](const auto& message) { return message.kind == wire::kindOf<wire::Force>; })
+        ->byDatagram;
+  };
+  ASSERT_TRUE(askForForce());
+  EXPECT_TRUE(byDatagram());
+  wire::FrameEncoder description;
+  description.addRaw({1, 2}, 9, wire::kUdpDescription, wire::encodeUdpDescription({"127.0.0.99", 9}));
+  client.sendBytes(description.bytes());
+  ASSERT_TRUE(askForForce());
+  EXPECT_FALSE(byDatagram());
+}
+
+// The table of names is one for all clients, and has room for 2000.
+TEST_F(VrpnServer, AClientThatDescribesVeryManyTypesHarmsNobody) {
+  ScriptedPeer greedy(address(), "Device0");
+  ScriptedPeer other(address(), "Device0");
+  ASSERT_TRUE(runUntil(greedy, [&] { return greedy.count<wire::ButtonStates>() > 0; }));
+  ASSERT_TRUE(runUntil(other, [&] { return other.count<wire::ButtonStates>() > 0; }));
+  for (int i = 0; i < 1500; ++i) greedy.sendForeign("type " + std::to_string(i), {});
+  greedy.send(wire::Ping{});
+  ASSERT_TRUE(runUntil(greedy, [&] { return greedy.count<wire::Pong>() > 0; }));
+  for (int i = 0; i < 1500; ++i) other.sendForeign("another type " + std::to_string(i), {});
+  other.send(wire::Ping{});
+  EXPECT_TRUE(runUntil(other, [&] { return other.count<wire::Pong>() > 0; }));
+  EXPECT_TRUE(other.open()) << other.closeReason();
+  EXPECT_GE(connection_->register_message_type("a type of the program"), 0);
+}
+
 TEST_F(VrpnServer, ReportsConnectionsToItsHandlers) {
   struct Seen {
     int firsts = 0, connections = 0, drops = 0, lasts = 0;

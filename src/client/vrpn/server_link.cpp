@@ -14,6 +14,8 @@ using namespace std::chrono_literals;
 constexpr std::size_t kFlush_bytes = 64 * 1024;
 constexpr std::size_t kMostCalling = 64;
 constexpr int kPortAttempts = 20;
+constexpr std::size_t kMostNamesOfClient = 200;
+constexpr std::size_t kMostNamesOfClients = 1000;
 
 }  // namespace
 
@@ -105,20 +107,22 @@ void ServerLink::onEvent(Client& client, const wire::Event& event) {
   if (std::get_if<wire::Connected>(&event) != nullptr) {
     inbox_.push({.what = Arrival::What::connected, .arrived = wallTimePoint()});
   } else if (const auto* sender = std::get_if<wire::SenderDescribed>(&event)) {
-    adopt(sender->name, &wire::LocalNames::addSender);
+    adoptSender(client, sender->name);
   } else if (const auto* type = std::get_if<wire::TypeDescribed>(&event)) {
-    adopt(type->name, &wire::LocalNames::addType);
+    adoptType(client, type->name);
   } else if (const auto* udp = std::get_if<wire::UdpDescribed>(&event)) {
     onUdpDescribed(client, udp->address);
   } else if (const auto* message = std::get_if<wire::MessageReceived>(&event)) {
     wire::LocalSender from = message->local_sender;
     if (from.value < 0) from = names_.findSender(message->senderName).value_or(wire::LocalSender{});
-    if (from.value < 0 || message->typeName.empty()) return;
+    const auto local = message->kind != wire::kUnknownKind
+                           ? wire::localType(message->kind)
+                           : names_.findType(message->typeName).value_or(wire::LocalType{});
+    if (from.value < 0 || local.value < 0) return;
     inbox_.push({.what = Arrival::What::message,
                  .kind = message->kind,
                  .sender = from,
-                 .type = message->kind != wire::kUnknownKind ? wire::localType(message->kind)
-                                                             : names_.addType(message->typeName),
+                 .type = local,
                  .time = message->time,
                  .arrived = wallTimePoint(),
                  .bytes = message->payload});
@@ -151,12 +155,29 @@ void ServerLink::onClosed(Client& client, const std::string& reason) {
   clients_.remove_if([&](const Client& entry) { return &entry == &client; });
 }
 
-template <class Id>
-void ServerLink::adopt(std::string_view name, Id (wire::LocalNames::*addName)(std::string_view)) {
+// The names of all clients are in one table, which is announced to all of them and never shrinks. The names
+// of the program itself, and those that the next client describes, need room, too.
+bool ServerLink::mayAdopt(Client& client) {
+  if (client.adopted >= kMostNamesOfClient || adopted_ >= kMostNamesOfClients) return false;
+  ++client.adopted;
+  ++adopted_;
+  return true;
+}
+
+// One that is left out stays unmapped, and so do its messages.
+void ServerLink::adoptSender(Client& client, std::string_view name) {
   try {
-    (names_.*addName)(name);
+    if (!names_.findSender(name) && mayAdopt(client)) names_.addSender(name);
   } catch (const std::logic_error&) {
-    // An invalid name, or one too many: its messages stay unmapped.
+    // An invalid name, or one too many.
+  }
+}
+
+void ServerLink::adoptType(Client& client, std::string_view name) {
+  try {
+    if (!names_.findType(name) && mayAdopt(client)) names_.addType(name);
+  } catch (const std::logic_error&) {
+    // An invalid name, or one too many.
   }
 }
 

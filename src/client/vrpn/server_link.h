@@ -43,6 +43,7 @@ class ServerLink {
     std::optional<net::UdpSocket> udp;
     std::optional<net::Endpoint> udpPeer;
     std::optional<wire::Peer> peer;
+    std::size_t adopted = 0;  // names that only it has described so far
   };
 
   void listen(const net::Endpoint& local);
@@ -51,8 +52,9 @@ class ServerLink {
   void onEvent(Client& client, const wire::Event& event);
   void onUdpDescribed(Client& client, const wire::UdpAddress& address);
   void onClosed(Client& client, const std::string& reason);
-  template <class Id>
-  void adopt(std::string_view name, Id (wire::LocalNames::*addName)(std::string_view));
+  void adoptSender(Client& client, std::string_view name);
+  void adoptType(Client& client, std::string_view name);
+  bool mayAdopt(Client& client);
   void flush(Client& client);
 
   net::Loop loop_;
@@ -62,6 +64,7 @@ class ServerLink {
   std::optional<net::UdpSocket> requests_;
   std::list<Client> clients_;
   std::list<net::Connection> calling_;  // reverse connections that are not established yet
+  std::size_t adopted_ = 0;             // names that the program did not name itself
   std::size_t uncounted_ = 0;           // bytes collected since the last flush()
   bool dispatching_ = false;
 };
