@@ -1,11 +1,11 @@
 #include "server/station/button_modes.h"
 
 #include <string>
+#include <utility>
 
 namespace hapticd::server {
 
-bool ButtonModes::setMode(const wire::ButtonAdmin& admin, std::vector<wire::ButtonAlert>& alerts,
-                          std::string& error) {
+bool ButtonModes::setMode(const wire::ButtonAdmin& admin, std::string& error) {
   const bool momentary = admin.event == wire::kButtonMomentary;
   const bool on = admin.event == wire::kButtonToggleOn;
   if (!momentary && !on && admin.event != wire::kButtonToggleOff) {
@@ -21,9 +21,11 @@ bool ButtonModes::setMode(const wire::ButtonAdmin& admin, std::vector<wire::Butt
   }
   for (std::int32_t i = all ? 0 : admin.button; i < (all ? count_ : admin.button + 1); ++i) {
     const std::uint32_t bit = 1U << i;
-    toggles_ = momentary ? toggles_ & ~bit : toggles_ | bit;
-    on_ = on ? on_ | bit : on_ & ~bit;
-    alerts.push_back({i, on ? wire::kButtonToggleOn : wire::kButtonToggleOff});
+    const std::uint32_t toggles = momentary ? toggles_ & ~bit : toggles_ | bit;
+    const std::uint32_t nowOn = on ? on_ | bit : on_ & ~bit;
+    changed_ |= (toggles_ ^ toggles) | (on_ ^ nowOn);
+    toggles_ = toggles;
+    on_ = nowOn;
   }
   return true;
 }
@@ -32,8 +34,9 @@ std::uint32_t ButtonModes::apply(std::uint32_t pressed, std::vector<wire::Button
   const std::uint32_t toggled = pressed & ~before_ & toggles_;
   before_ = pressed;
   on_ ^= toggled;
-  for (std::int32_t i = 0; i < count_; ++i) {
-    if ((toggled >> i & 1U) == 0) continue;
+  const std::uint32_t changed = std::exchange(changed_, 0) | toggled;
+  for (std::int32_t i = 0; changed != 0 && i < count_; ++i) {
+    if ((changed >> i & 1U) == 0) continue;
     alerts.push_back({i, (on_ >> i & 1U) != 0 ? wire::kButtonToggleOn : wire::kButtonToggleOff});
   }
   return (pressed & ~toggles_) | (on_ & toggles_);

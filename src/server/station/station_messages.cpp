@@ -144,7 +144,7 @@ void Station::Impl::on(const Request&, const wire::TrackerResetOrigin&) {
 
 void Station::Impl::on(const Request& request, const wire::ButtonAdmin& admin) {
   std::string error;
-  if (!modes.setMode(admin, alerts, error)) sendText(request.session, request.name, wire::kTextError, error);
+  if (!modes.setMode(admin, error)) sendText(request.session, request.name, wire::kTextError, error);
 }
 
 void Station::Impl::on(const Request& request, const wire::QueryCapabilities&) {

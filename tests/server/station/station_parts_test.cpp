@@ -27,7 +27,8 @@ TEST(ButtonModes, AToggleChangesWhenItsButtonIsPressed) {
   EXPECT_EQ(modes.apply(0, alerts), 0U);
   EXPECT_TRUE(alerts.empty());
 
-  ASSERT_TRUE(modes.setMode({0, wire::kButtonToggleOff}, alerts, error));
+  ASSERT_TRUE(modes.setMode({0, wire::kButtonToggleOff}, error));
+  EXPECT_EQ(modes.apply(0, alerts), 0U);
   EXPECT_EQ(alerts.size(), 1U);
   alerts.clear();
   EXPECT_EQ(modes.apply(1, alerts), 1U);
@@ -44,21 +45,45 @@ TEST(ButtonModes, SetsAllButtonsAndTogglesThatAreInitiallyOn) {
   ButtonModes modes(2);
   std::vector<wire::ButtonAlert> alerts;
   std::string error;
-  ASSERT_TRUE(modes.setMode({wire::kAllButtons, wire::kButtonToggleOn}, alerts, error));
+  ASSERT_TRUE(modes.setMode({wire::kAllButtons, wire::kButtonToggleOn}, error));
   EXPECT_EQ(modes.apply(0, alerts), 3U);
-  ASSERT_TRUE(modes.setMode({1, wire::kButtonMomentary}, alerts, error));
+  ASSERT_TRUE(modes.setMode({1, wire::kButtonMomentary}, error));
   EXPECT_EQ(modes.apply(0, alerts), 1U);
+}
+
+// However many Admin messages come between two ticks, and with as many buttons as there can be.
+TEST(ButtonModes, OneTickTellsTheLastStateOfEachButtonThatChanged) {
+  ButtonModes modes(32);
+  std::vector<wire::ButtonAlert> alerts;
+  std::string error;
+  for (int i = 0; i < 1000; ++i) {
+    ASSERT_TRUE(modes.setMode({wire::kAllButtons, wire::kButtonMomentary}, error));
+    modes.apply(0, alerts);
+  }
+  EXPECT_TRUE(alerts.empty()) << "nothing changed";
+  for (int i = 0; i < 1000; ++i) {
+    ASSERT_TRUE(modes.setMode({31, wire::kButtonToggleOff}, error));
+    ASSERT_TRUE(modes.setMode({31, wire::kButtonToggleOn}, error));
+  }
+  EXPECT_EQ(modes.apply(0, alerts), 1U << 31U);
+  ASSERT_EQ(alerts.size(), 1U);
+  EXPECT_EQ(alerts[0].button, 31);
+  EXPECT_EQ(alerts[0].event, wire::kButtonToggleOn);
+  modes.apply(0, alerts);
+  EXPECT_EQ(alerts.size(), 1U) << "told once";
+  ASSERT_TRUE(modes.setMode({31, wire::kButtonMomentary}, error));
+  EXPECT_EQ(modes.apply(0, alerts), 0U);
+  ASSERT_EQ(alerts.size(), 2U);
+  EXPECT_EQ(alerts[1].event, wire::kButtonToggleOff);
 }
 
 TEST(ButtonModes, RefusesUnknownButtonsAndModes) {
   ButtonModes modes(2);
-  std::vector<wire::ButtonAlert> alerts;
   std::string error;
-  EXPECT_FALSE(modes.setMode({2, wire::kButtonToggleOn}, alerts, error));
+  EXPECT_FALSE(modes.setMode({2, wire::kButtonToggleOn}, error));
   EXPECT_NE(error.find("button 2 refused"), std::string::npos);
-  EXPECT_FALSE(modes.setMode({0, 11}, alerts, error));
+  EXPECT_FALSE(modes.setMode({0, 11}, error));
   EXPECT_NE(error.find("mode 11 refused"), std::string::npos);
-  EXPECT_TRUE(alerts.empty());
 }
 
 TEST(Roles, PermitsAnyTheFirstOrListedClients) {
