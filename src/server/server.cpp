@@ -325,12 +325,13 @@ void Server::onWebClient(net::Connection connection, std::string_view token, boo
 
 std::optional<Commander> Server::admitHaply(const net::Endpoint& remote, std::string& refusal) {
   const std::string address = remote.addressText();
+  const std::string source = sourceOf(address);
   if (!isNear(remote.address) && !config_.insecure) {
     refusal = "this port is not encrypted, and " + address + " is not in trusted_networks";
-  } else if (!admission_.hasRoom(address)) {
+  } else if (!admission_.hasRoom(source)) {
     refusal = "the server is full";
   } else {
-    admission_.enter(address);
+    admission_.enter(source);
     const scene::ClientId id = nextClient_++;
     throttledLog_.log(spdlog::level::info, address,
                       fmt::format("client {} connected from {}, haply", id, address));
@@ -344,7 +345,7 @@ void Server::onHaplyGone(const Commander& client, const std::string& reason) {
   throttledLog_.log(spdlog::level::info, client.address,
                     fmt::format("client {} ({}, haply) disconnected: {}", client.id, client.address, reason));
   for (const auto& station : stations_) station->clientGone(client.id);
-  admission_.leave(client.address);
+  admission_.leave(sourceOf(client.address));
 }
 
 void Server::onHaplyWarning(scene::ClientId client, const std::string& text) {

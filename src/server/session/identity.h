@@ -20,6 +20,11 @@ constexpr std::string_view nameOf(ClientRole role) {
   return role == ClientRole::owner ? "owner" : role == ClientRole::operating ? "operator" : "observer";
 }
 
+/// What counts as one address: every address of this machine's loopback is the same.
+inline std::string sourceOf(std::string_view address) {
+  return std::string(address.starts_with("127.") ? "127.0.0.1" : address);
+}
+
 struct Identity {
   ClientRole role = ClientRole::owner;
   /// By a token or a user id, not by the address alone.

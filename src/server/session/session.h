@@ -85,7 +85,7 @@ class Session {
   std::string address() const { return connection_.remote().addressText(); }
 
   /// What counts as one address: on the Unix socket, a user.
-  std::string source() const { return user_ ? "user " + std::to_string(*user_) : address(); }
+  std::string source() const { return user_ ? "user " + std::to_string(*user_) : sourceOf(address()); }
 
   SessionMode mode() const noexcept { return mode_; }
   /// Most messages per second besides stops and those that fill meshes; beyond it the session ends.

@@ -76,6 +76,23 @@ TEST_F(CredentialsTest, TenWrongTokensAMinuteBlockTheirAddressAlone) {
   EXPECT_TRUE(some.check(kOwner, "10.0.0.1", 61 * kSecond, error_));
 }
 
+TEST_F(CredentialsTest, VeryManySourcesWithWrongTokensLeaveOthersTheirs) {
+  Credentials some(config_, kUser);
+  constexpr int kSources = 5000;
+  for (int i = 0; i < kSources; ++i)
+    EXPECT_FALSE(some.check("0123456789abcdef-wrong", std::to_string(i), i, error_));
+  EXPECT_TRUE(some.check(kOwner, "another", kSources, error_)) << error_;
+  for (int i = 0; i < Credentials::kMostFailures; ++i)
+    EXPECT_FALSE(some.check("0123456789abcdef-wrong", "another", kSources, error_));
+  EXPECT_FALSE(some.check(kOwner, "another", kSources, error_)) << "it counts among many, too";
+}
+
+TEST_F(CredentialsTest, AllAddressesOfTheLoopbackAreOneSource) {
+  EXPECT_EQ(sourceOf("127.8.9.10"), sourceOf("127.0.0.1"));
+  EXPECT_NE(sourceOf("10.0.0.1"), sourceOf("10.0.0.2"));
+  EXPECT_NE(sourceOf("12.7.0.1"), sourceOf("127.0.0.1"));
+}
+
 TEST_F(CredentialsTest, UsersOfTheSocketHaveTheirRoles) {
   config_.tokens.clear();
   config_.ownerUsers = {"5000"};
