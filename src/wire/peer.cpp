@@ -17,11 +17,25 @@ const Entry* described(const std::vector<Entry>& table, std::int32_t id) noexcep
   return &table[static_cast<std::size_t>(id)];
 }
 
+// Not twice as large at each growth: very many peers may describe very many names.
 template <class Entry>
 Entry& entryFor(std::vector<Entry>& table, std::int32_t id) {
   const auto index = static_cast<std::size_t>(id);
-  if (index >= table.size()) table.resize(index + 1);
+  if (index >= table.size()) {
+    if (index >= table.capacity()) table.reserve(std::min<std::size_t>(kMaxNames, index + 1 + index / 4));
+    table.resize(index + 1);
+  }
   return table[index];
+}
+
+template <class Entry>
+std::size_t bytesOf(const std::vector<Entry>& table) {
+  return table.capacity() * sizeof(Entry);
+}
+
+// What a string has in addition to its object.
+std::size_t bytesOf(const std::string& text) {
+  return text.capacity() > std::string().capacity() ? text.capacity() + 1 : 0;
 }
 
 // As encodeDescription(), without its allocation: a new connection describes every message of the table.
@@ -130,13 +144,21 @@ void Peer::handleDescription(const FrameView& frame, EventSink sink) {
   }
   const Result<std::string_view> name = decodeDescription(frame.payload);
   if (!name) return fail(name.error(), sink);
+  const auto counted = [this](auto& table, auto& entry, auto&& described, std::size_t before) {
+    namesBytes_ -= before + bytesOf(entry.name);
+    entry = std::move(described);
+    namesBytes_ += bytesOf(table) + bytesOf(entry.name);
+  };
   if (frame.header.type == kSenderDescription) {
+    const std::size_t before = bytesOf(senders_);
     SenderEntry& entry = entryFor(senders_, id);
-    entry = {std::string(*name), names_->findSender(*name).value_or(LocalSender{}), true};
+    counted(senders_, entry,
+            SenderEntry{std::string(*name), names_->findSender(*name).value_or(LocalSender{}), true}, before);
     sink(SenderDescribed{{id}, entry.name});
   } else {
+    const std::size_t before = bytesOf(types_);
     TypeEntry& entry = entryFor(types_, id);
-    entry = {std::string(*name), kindNamed(*name), true};
+    counted(types_, entry, TypeEntry{std::string(*name), kindNamed(*name), true}, before);
     sink(TypeDescribed{{id}, entry.name, entry.kind});
   }
 }

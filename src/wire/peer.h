@@ -106,6 +106,9 @@ class Peer {
   void useDatagrams(bool use = true) noexcept { useDatagrams_ = use; }
   bool usesDatagrams() const noexcept { return useDatagrams_; }
 
+  /// Memory that the names take which the peer described.
+  std::size_t namesBytes() const noexcept { return namesBytes_; }
+
   /// Sends a message; false, and nothing happens, when not connected. std::length_error as FrameEncoder::add.
   template <WireMessage M>
   bool send(Time time, LocalSender sender, const M& message, Reliability reliability = M::kInfo.reliability) {
@@ -181,6 +184,7 @@ class Peer {
   std::vector<std::byte> partial_;    // the start of a cookie or frame that is still incomplete
   std::vector<SenderEntry> senders_;  // by the peer's number
   std::vector<TypeEntry> types_;
+  std::size_t namesBytes_ = 0;
   FrameEncoder stream_;
   FrameEncoder datagrams_;
 };

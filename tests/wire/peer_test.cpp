@@ -233,6 +233,25 @@ TEST(Messages, EncodedOnceServeEveryClient) {
   }
 }
 
+TEST(Names, CountTheirMemory) {
+  Side side;
+  side.feed(encodeCookie(0));
+  EXPECT_EQ(side.endpoint.namesBytes(), 0U);
+  constexpr std::size_t kNameLength = 90;
+  const auto describe = [&](std::int32_t id, std::size_t length) {
+    FrameEncoder frames;
+    frames.addRaw(kNow, id, kTypeDescription, encodeDescription(std::string(length, 'x')));
+    frames.addRaw(kNow, id, kSenderDescription, encodeDescription(std::string(length, 'x')));
+    side.feed(frames.bytes());
+  };
+  for (std::int32_t id = 0; id < kMaxNames; ++id) describe(id, kNameLength);
+  const std::size_t all = side.endpoint.namesBytes();
+  EXPECT_GE(all, 2 * std::size_t{kMaxNames} * (kNameLength + sizeof(std::string)));
+  EXPECT_LE(all, 4 * std::size_t{kMaxNames} * (kNameLength + sizeof(std::string)));
+  for (std::int32_t id = 0; id < kMaxNames; ++id) describe(id, kNameLength);
+  EXPECT_EQ(side.endpoint.namesBytes(), all) << "they replace the others";
+}
+
 TEST(Messages, OfTypesOrSendersNotDescribedAreIgnored) {
   Stranger peer;
   peer.says(0, 5, {});

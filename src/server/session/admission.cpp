@@ -113,7 +113,7 @@ std::vector<Session*> Admission::completedHandshakes(base::Nanos now) {
 
 void Admission::countMemory(Session& session, std::size_t commands) {
   if (session.ending()) return;
-  const std::size_t bytes = session.waitingBytes() + commands;
+  const std::size_t bytes = session.memory() + commands;
   if (bytes > static_cast<std::size_t>(limits_.clientMemory_MB) << 20) {
     end(session, "this client uses more than " + std::to_string(limits_.clientMemory_MB) +
                      " MiB of the server; send less at a time, and read");
@@ -126,7 +126,7 @@ void Admission::judgeMemory() {
   const auto most = static_cast<std::size_t>(limits_.memory_MB) << 20;
   std::size_t sum = 0;
   for (const auto& [bytes, client] : counted_) sum += bytes;
-  std::sort(counted_.rbegin(), counted_.rend());
+  if (sum > most) std::sort(counted_.rbegin(), counted_.rend());
   for (const auto& [bytes, client] : counted_) {
     if (sum <= most) break;
     sum -= bytes;

@@ -83,8 +83,8 @@ ClientStatus Session::status() const {
   return status;
 }
 
-std::size_t Session::waitingBytes() const {
-  return connection_.queuedBytes() + backlog_.size();
+std::size_t Session::memory() const {
+  return connection_.queuedBytes() + backlog_.size() + peer_.namesBytes();
 }
 
 void Session::start() {

@@ -90,8 +90,9 @@ class Session {
   SessionMode mode() const noexcept { return mode_; }
   /// Most messages per second besides stops and those that fill meshes; beyond it the session ends.
   void setMostPerSecond(int count) noexcept { mostPerSecond_ = count; }
-  /// Memory that waits for the client or for the server to handle what it sent.
-  std::size_t waitingBytes() const;
+  /// Memory that waits for the client or for the server to handle what it sent, and that of the names which
+  /// it described.
+  std::size_t memory() const;
   /// Whether onEnding() was called.
   bool ending() const noexcept { return ending_; }
   /// What the client may do; the owner sets it.
