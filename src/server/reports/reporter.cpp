@@ -366,8 +366,10 @@ void Reporter::tickReport(const TickReport& tick, const ClientTick& clientTick, 
                                     .guardLatched = tick.guard.latched},
                    false});
   }
-  if (wants(wire::kReportHand))
-    out.push_back({handState(tick, clientTick, buttons_ & ~(1U << buttonCount_)), false});
+  if (wants(wire::kReportHand)) {
+    const std::uint32_t own = buttonCount_ < 32 ? ~(1U << buttonCount_) : ~0U;
+    out.push_back({handState(tick, clientTick, buttons_ & own), false});
+  }
   if (wants(wire::kReportContacts) && (clientTick.touching || contactEnded))
     out.push_back({contactList(tick), contactEnded});
 }

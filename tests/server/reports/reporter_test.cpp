@@ -480,6 +480,15 @@ TEST_F(ReporterTest, EveryContactOfATickIsListedAndTheEndIsAnEmptyList) {
   EXPECT_TRUE(out_.empty());
 }
 
+TEST_F(ReporterTest, AllOf32ButtonsAreReported) {
+  choice_.kinds = wire::kReportHand;
+  choice_.rate_Hz = config_.reportRate_Hz;
+  reporter_ = std::make_unique<Reporter>(config_, 32, choice_);
+  tick_.device.buttons = 0x80000001U;
+  step();
+  EXPECT_EQ(reported<wire::HandState>().at(0).buttons, 0x80000001U);
+}
+
 TEST_F(ReporterTest, TheHandsStateHasTheRemoteContacts) {
   choice_.kinds = wire::kReportHand;
   tick_.T_world_device = Affine(Eigen::UniformScaling<double>(2000.0));
