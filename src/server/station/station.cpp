@@ -300,7 +300,7 @@ void Station::clientGone(scene::ClientId client) {
   impl_->control.clientGone(client);
   impl_->streamed.clientGone(client);
   impl_->roles->release(client);
-  std::erase_if(impl_->pendingRearms, [client](const Session* session) { return session->id() == client; });
+  std::erase_if(impl_->pendingRearms, [client](const auto& entry) { return entry.second->id() == client; });
   impl_->outbox.clientGone(client);
 }
 

@@ -1,8 +1,8 @@
 // Members of a station, for station.cpp (lifetime and reports) and station_messages.cpp (control messages).
 #pragma once
 
+#include <map>
 #include <optional>
-#include <set>
 
 #include "base/world.h"
 #include "device/simulated/steered_hand.h"
@@ -96,8 +96,10 @@ struct Station::Impl {
   std::optional<scene::ClientId> passUpTo;  // the last client that the present pass has served
   BlackBoxRecorder recorder;
   std::uint64_t droppedReports = 0;
-  std::string fault;                 // as last reported
-  std::set<Session*> pendingRearms;  // clients whose re-arm waits for the scene
+  std::string fault;  // as last reported
+  // Clients whose re-arm waits for the scene, by the number of the re-arm; without those that are gone.
+  std::map<std::uint64_t, Session*> pendingRearms;
+  std::uint64_t rearms = 0;
 
   // The recording at hand, null for none, and the number of this device in it. Scene thread.
   record::Recorder* recording = nullptr;

@@ -159,11 +159,13 @@ void Station::Impl::on(const Request& request, const wire::StopForces&) {
 }
 
 void Station::Impl::on(const Request& request, const wire::RearmForces&) {
-  pendingRearms.insert(&request.session);
-  scene.whenPublished(request.session.id(), [this, session = &request.session, name = request.name,
-                                             order = request.order, sender = request.sender] {
-    if (pendingRearms.count(session) != 0) rearm(*session, name, order, sender);
-  });
+  const std::uint64_t number = ++rearms;
+  pendingRearms.emplace(number, &request.session);
+  scene.whenPublished(request.session.id(),
+                      [this, number, name = request.name, order = request.order, sender = request.sender] {
+                        if (const auto pending = pendingRearms.extract(number))
+                          rearm(*pending.mapped(), name, order, sender);
+                      });
 }
 
 // Called after the earlier commands of the client are published, so that they act from the first tick with
