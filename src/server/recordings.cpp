@@ -68,6 +68,7 @@ void Recordings::create(const std::string& name) {
 }
 
 void Recordings::begin(Nanos wallOffset, std::string config) {
+  recorderOf_.resize(scenes_.size(), nullptr);  // now: later the threads of the scenes read it
   if (!recorder_) return;
   startRecorder(wallOffset, std::move(config));
   attach();
@@ -79,7 +80,6 @@ void Recordings::startRecorder(Nanos wallOffset, std::string config) {
 }
 
 void Recordings::attach() {
-  recorderOf_.resize(scenes_.size(), nullptr);
   for (const auto& scene : scenes_) {
     if (beginScene(*scene)) continue;
     recorderOf_[scene->number()] = recorder_.get();

@@ -34,8 +34,8 @@ class Recordings {
   /// Creates the file; strftime conversions in `name` get the local time. For a recording from the first tick
   /// on: call begin() before the scenes start. Throws record::RecordingError.
   void create(const std::string& name);
-  /// Records to the file that was created. The recording of a scene that runs begins with the commands that
-  /// make it, and its ticks follow.
+  /// Before the scenes start. Records to the file that was created, if there is one. The recording of a scene
+  /// that runs begins with the commands that make it, and its ticks follow.
   void begin(base::Nanos wallOffset, std::string config);
   /// The same for a client, which may name a file in the folder; empty: named by the time. Throws
   /// record::RecordingError with a text for the client.
