@@ -916,7 +916,7 @@ bool FakeNetwork::runNext(Nanos limit) {
 Endpoint FakeNetwork::freeEndpoint(const Endpoint& wanted, const std::vector<Endpoint>& used,
                                    const char* kind, const std::string& option) {
   constexpr std::uint32_t kLoopbackNet = 127;
-  if (wanted.address != kAnyAddress && wanted.address >> 24 != kLoopbackNet) {
+  if (!options.otherMachines && wanted.address != kAnyAddress && wanted.address >> 24 != kLoopbackNet) {
     throw Error(bindErrorText(kind, wanted, EADDRNOTAVAIL, option));
   }
   if (wanted.port == 0) return {wanted.address, nextPort_++};

@@ -31,6 +31,7 @@ class FakeDescriptor;
 /// How bytes and datagrams travel; a change holds for what is sent or read afterwards.
 struct FakeNetworkOptions {
   base::Nanos delay = 50'000;                         ///< one way
+  bool otherMachines = false;                         ///< programs may be at any address
   std::size_t windowBytes = std::size_t{256} * 1024;  ///< sent but not yet read by the peer's program
   /// How many of the bytes that have arrived one read returns (clamped to 1 ... available); empty: up to 64
   /// KiB.

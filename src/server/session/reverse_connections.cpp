@@ -11,10 +11,17 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::size_t kMostPending = 64;
+constexpr std::size_t kMostOfOne = kMostPending / 4;
+
+// One machine counts once, whatever it calls itself: all of 127.0.0.0/8 is this one.
+std::uint32_t sourceOf(std::uint32_t address) {
+  return net::isLoopback(address) ? net::kLoopbackAddress : address;
+}
 
 }  // namespace
 
 struct ReverseConnections::Pending {
+  std::uint32_t asked = 0;  // which source
   net::Endpoint client;
   net::Connection connection;
 };
@@ -67,13 +74,23 @@ void ReverseConnections::onRequest(std::span<const std::byte> datagram, const ne
               "trusted_networks or insecure");
     return;
   }
-  connectTo(client);
+  connectTo(client, sourceOf(from.address));
 }
 
-void ReverseConnections::connectTo(const net::Endpoint& client) {
+void ReverseConnections::connectTo(const net::Endpoint& client, std::uint32_t asked) {
   // Clients repeat their request until the server connects.
   for (const auto& pending : pending_) {
     if (pending->client == client) return;
+  }
+  // Those that answer nobody must leave room for others.
+  const auto called = sourceOf(client.address);
+  const auto ofOne = [&](const auto& pending) {
+    return pending->asked == asked || sourceOf(pending->client.address) == called;
+  };
+  if (std::count_if(pending_.begin(), pending_.end(), ofOne) >= std::ptrdiff_t{kMostOfOne}) {
+    log_.warn("connection request to " + client.text() + " ignored: " + std::to_string(kMostOfOne) +
+              " others of its address are pending");
+    return;
   }
   if (pending_.size() >= kMostPending) {
     log_.warn("connection request to " + client.text() + " ignored: " + std::to_string(kMostPending) +
@@ -81,6 +98,7 @@ void ReverseConnections::connectTo(const net::Endpoint& client) {
     return;
   }
   Pending& pending = *pending_.emplace_back(std::make_unique<Pending>());
+  pending.asked = asked;
   pending.client = client;
   pending.connection = net::Connection::connect(loop_, client, 2s, options_);
   pending.connection.start({.onConnected = [this, &pending] { onConnected(pending); },

@@ -86,5 +86,29 @@ TEST_F(ReverseConnectionsTest, WithoutADescriptorForDatagramsItReportsAndEndsThe
   EXPECT_EQ(accepted_.size(), 1U);
 }
 
+// Connections that are not answered yet: one machine may have a quarter of them, whatever it calls itself.
+TEST_F(ReverseConnectionsTest, OneAddressLeavesRoomForOthers) {
+  network_.options.delay = 500'000'000;
+  network_.options.otherMachines = true;
+  const auto before = network_.sockets(0);
+  net::UdpSocket far(clientLoop_, {0x0a000001, 0});
+  const auto request = [&](net::UdpSocket& from, const net::Endpoint& client) {
+    from.sendTo(wire::asBytes(wire::formatUdpRequest({client.addressText(), client.port})), kServer);
+  };
+  for (std::uint16_t port = 5000; port < 5100; ++port) request(far, {0x0a000001, port});
+  request(requests_, listener_.local());
+  for (std::uint16_t port = 5000; port < 5100; ++port)
+    request(requests_, {net::kLoopbackAddress + port % 200U, port});
+  loop_.runFor(milliseconds(600));
+  EXPECT_EQ(network_.sockets(0) - before, 16U + 16U) << "all of 127.0.0.0/8 is one machine";
+  EXPECT_GE(lines_.count("16 others of its address are pending"), 1U) << lines_.text();
+  loop_.runFor(milliseconds(3000));
+  EXPECT_EQ(accepted_.size(), 1U);
+  EXPECT_EQ(network_.sockets(0) - before, 2U) << "the connection and its datagrams";
+  request(far, {0x0a000001, 6000});
+  loop_.runFor(milliseconds(600));
+  EXPECT_EQ(network_.sockets(0) - before, 3U) << "those that have failed make room";
+}
+
 }  // namespace
 }  // namespace hapticd::server
