@@ -5,6 +5,11 @@
 #include "record/scene_event_codec.h"
 
 namespace hapticd::record {
+namespace {
+
+constexpr int kMostButtons = 32;  // a tick has one bit for each
+
+}  // namespace
 
 RecordingReader::RecordingReader(const std::filesystem::path& file) : path_(file), blocks_(file) {
   readHeader();
@@ -35,6 +40,10 @@ void RecordingReader::readHeader() {
   if (!in.ok() || !in.rest().empty()) fail("the length of the header does not match its content");
   for (const RecordedDevice& device : header_.devices) {
     if (device.names.empty()) fail("a device without a name");
+    if (device.buttons < 0 || device.buttons > kMostButtons) {
+      fail("a device with " + std::to_string(device.buttons) + " buttons, there are 0 to " +
+           std::to_string(kMostButtons));
+    }
   }
 }
 

@@ -437,6 +437,27 @@ TEST_F(SmallSession, NewerVersionsAndOtherFilesAreRefused) {
   EXPECT_THROW(RecordingReader("/nowhere/x.haptics"), RecordingError);
 }
 
+TEST_F(SmallSession, DevicesHaveAtMost32Buttons) {
+  const auto readWith = [&](int buttons) {
+    std::filesystem::remove(file_.path());
+    {
+      Recorder recorder(file_.path(), [](const std::string& text) { ADD_FAILURE() << text; });
+      RecordedDevice device;
+      device.names = {"Phantom"};
+      device.buttons = buttons;
+      recorder.addDevice(device);
+      recorder.start(77, "config");
+      recorder.finish();
+    }
+    std::ifstream in(file_.path(), std::ios::binary);
+    return read({std::istreambuf_iterator<char>(in), {}}).second;
+  };
+  EXPECT_EQ(readWith(32), "");
+  EXPECT_NE(readWith(33).find("a device with 33 buttons"), std::string::npos);
+  EXPECT_NE(readWith(2'000'000'000).find("a device with 2000000000 buttons"), std::string::npos);
+  EXPECT_NE(readWith(-1).find("a device with -1 buttons"), std::string::npos);
+}
+
 // Version 2 differs only in ticks with a gripper, and these have none.
 TEST_F(SmallSession, AFileOfVersion1IsReadAsBefore) {
   const auto now = read(bytes_);
