@@ -18,6 +18,9 @@ using record::SceneEvent;
 using record::TickEvent;
 
 constexpr Nanos kReadAhead = 200'000'000;
+// After a stalled disk, a recording has the ticks of one device for seconds, then those of the next.
+constexpr Nanos kFarthestAhead = 10'000'000'000;
+constexpr std::size_t kMostAhead = 32'768;
 // Offset that keeps the ids of recorded clients apart from those of connected clients.
 constexpr scene::ClientId kRecordedClients = 1U << 30U;
 
@@ -34,6 +37,7 @@ std::optional<Nanos> timeOf(const RecordingEvent& event) {
 Player::Player(ReplayOptions options)
     : options_(std::move(options)),
       header_(record::RecordingReader(options_.file).header()),
+      newestRead_(header_.devices.size()),
       speed_(options_.speed) {
   status_.file = options_.file.filename().string();
   status_.speed = options_.speed;
@@ -158,12 +162,26 @@ void Player::takeOrder() {
 }
 
 void Player::readAhead() {
-  while (!atEnd_ && (buffer_.empty() || buffer_.rbegin()->first - buffer_.begin()->first < kReadAhead)) {
+  while (!atEnd_ && !isAhead()) {
     RecordingEvent event;
     atEnd_ = !reader_->next(event);
     if (atEnd_) return;
-    if (const auto time = timeOf(event)) buffer_.emplace(*time, std::move(event));
+    const auto time = timeOf(event);
+    if (!time) continue;
+    if (const auto* tick = std::get_if<TickEvent>(&event)) newestRead_[tick->device] = *time;
+    buffer_.emplace(*time, std::move(event));
   }
+}
+
+// Whether nothing that is still to be read comes before what is due soon. A device that has no more ticks is
+// not waited for.
+bool Player::isAhead() const {
+  if (buffer_.empty()) return false;
+  const Nanos first = buffer_.begin()->first;
+  if (buffer_.rbegin()->first - first < kReadAhead) return false;
+  const auto [behind, before] = std::minmax_element(newestRead_.begin(), newestRead_.end());
+  return newestRead_.empty() || *behind - kReadAhead >= first || *before - kFarthestAhead >= first ||
+         buffer_.size() >= kMostAhead;
 }
 
 // To the beginning of the file. The recorded clients leave, so that no batch of theirs stays open.
@@ -172,6 +190,7 @@ void Player::rewind() {
   callbacks_.restart();
   reader_.reset();
   buffer_.clear();
+  std::fill(newestRead_.begin(), newestRead_.end(), 0);
   atEnd_ = false;
   started_ = false;
   skipTo_.reset();
@@ -187,6 +206,7 @@ void Player::endPass(const std::string& remark) {
   callbacks_.ended(remark);
   reader_.reset();
   buffer_.clear();
+  std::fill(newestRead_.begin(), newestRead_.end(), 0);
   skipTo_.reset();
   atEnd_ = false;
   started_ = false;

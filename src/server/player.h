@@ -77,6 +77,7 @@ class Player {
   std::optional<base::Nanos> step();
   void takeOrder();
   void readAhead();
+  bool isAhead() const;
   void rewind();
   void endPass(const std::string& remark);
   void setPresent(base::Nanos recorded);
@@ -92,6 +93,7 @@ class Player {
   std::unique_ptr<record::RecordingReader> reader_;  // null between passes through the file
   std::multimap<base::Nanos, record::RecordingEvent> buffer_;
   std::set<std::pair<std::uint32_t, scene::ClientId>> clients_;  // recorded ones that are present, by scene
+  std::vector<base::Nanos> newestRead_;                          // tick of each device, recorded time
   bool atEnd_ = false;                                           // the reader reached the end of the file
   bool started_ = false;                                         // an event of this pass was played
   bool ended_ = false;

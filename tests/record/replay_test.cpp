@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -154,6 +155,44 @@ TEST(ReplaySeek, ABatchThatIsOpenDoesNotStayOpen) {
   EXPECT_EQ(facesAt(1.6), scene::TouchableFaces::back);
   player.stop();
   EXPECT_TRUE(notices.empty()) << notices.front().text;
+}
+
+// As after a disk that stood still for three seconds, while a third device gives no ticks.
+TEST(ReplayOrder, TicksOfAllDevicesComeAtTheirTimesHoweverLateTheyWereWritten) {
+  constexpr std::uint64_t kTicks = 3000;
+  const RecordingFile file;
+  {
+    record::Recorder recorder(file.path(), [](const std::string&) {});
+    server::ServerConfig config;
+    config.devices.resize(3, config.devices.front());
+    for (const char* name : {"A", "B", "C"}) {
+      config.devices[static_cast<std::size_t>(*name - 'A')].names = {name};
+      record::RecordedDevice device;
+      device.names = {name};
+      recorder.addDevice(device);
+    }
+    recorder.start(0, server::toToml(config));
+    for (std::uint64_t i = 1; i <= kTicks; ++i) {
+      realtime::TickRecord tick;
+      tick.report.tick = i;
+      tick.report.time = static_cast<base::Nanos>(i) * 1'000'000;
+      recorder.ring(0).push(tick);
+      recorder.ring(1).push(tick);
+    }
+    recorder.finish();
+  }
+  std::vector<std::uint64_t> played;
+  std::atomic<bool> ended{false};
+  server::Player player({.file = file.path(), .speed = 100});
+  player.start({.tick = [&](std::uint32_t, const realtime::TickReport& tick) { played.push_back(tick.tick); },
+                .command = [](std::uint32_t, scene::ClientId, const scene::SceneCommand*) {},
+                .marker = nullptr,
+                .restart = [] {},
+                .ended = [&](const std::string&) { ended = true; }});
+  while (!ended) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  player.stop();
+  EXPECT_EQ(played.size(), 2 * kTicks);
+  EXPECT_TRUE(std::is_sorted(played.begin(), played.end()));
 }
 
 TEST_F(Replay, CommandsAreRefused) {
