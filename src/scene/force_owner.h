@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstdint>
 #include <limits>
 #include <map>
 #include <memory>
@@ -41,26 +42,54 @@ class ForceOwner {
 /// The owners of one scene, by client. Any thread but a servo's.
 class ForceOwners {
  public:
-  std::shared_ptr<const ForceOwner> of(ClientId client) { return find(client); }
-  /// The client left, or its forces must end: those that it has commanded until now, also in commands that
-  /// still wait.
-  void leave(ClientId client, base::Nanos now) { find(client)->leave(now); }
-  /// The scene thread has released the client's forces: later commands of this client exert force again.
+  std::shared_ptr<const ForceOwner> of(ClientId client) {
+    const std::lock_guard lock(mutex_);
+    return entryOf(client).owner;
+  }
+  /// The client's forces must end, also those of commands that are applied until comeBack().
+  void leave(ClientId client, base::Nanos now) {
+    const std::lock_guard lock(mutex_);
+    Entry& entry = entryOf(client);
+    ++entry.leaves;
+    entry.owner->leave(now);
+  }
+  /// The same for a client that is gone: no command of it exerts force any more.
+  void leaveForGood(ClientId client, base::Nanos now) {
+    const std::lock_guard lock(mutex_);
+    Entry& entry = entryOf(client);
+    entry.gone = true;
+    entry.owner->leave(now);
+  }
+  /// How often leave() was called for the client.
+  std::uint64_t leaves(ClientId client) {
+    const std::lock_guard lock(mutex_);
+    return entryOf(client).leaves;
+  }
+  /// Commands of the client that are applied from here on exert force again, unless it is gone or leave() was
+  /// called more than `leaves` times.
+  void comeBack(ClientId client, std::uint64_t leaves) {
+    const std::lock_guard lock(mutex_);
+    const auto known = owners_.find(client);
+    if (known == owners_.end() || known->second.gone || known->second.leaves != leaves) return;
+    known->second.owner = std::make_shared<ForceOwner>();
+  }
+  /// The last command of the client was applied.
   void forget(ClientId client) {
     const std::lock_guard lock(mutex_);
     owners_.erase(client);
   }
 
  private:
-  std::shared_ptr<ForceOwner> find(ClientId client) {
-    const std::lock_guard lock(mutex_);
-    auto& owner = owners_[client];
-    if (!owner) owner = std::make_shared<ForceOwner>();
-    return owner;
-  }
+  struct Entry {
+    std::shared_ptr<ForceOwner> owner = std::make_shared<ForceOwner>();
+    std::uint64_t leaves = 0;
+    bool gone = false;
+  };
+
+  Entry& entryOf(ClientId client) { return owners_[client]; }
 
   std::mutex mutex_;
-  std::map<ClientId, std::shared_ptr<ForceOwner>> owners_;
+  std::map<ClientId, Entry> owners_;
 };
 
 }  // namespace hapticd::scene

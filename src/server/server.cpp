@@ -494,11 +494,12 @@ void Server::checkHeartbeat(Session& session, Nanos now) {
       session.abort("no heartbeat for 500 ms");
       break;
     case HeartbeatWatch::Verdict::excused:
+      if (session.ending()) break;
       throttledLog_.log(spdlog::level::warn, session.address(),
                         fmt::format("client {}: no heartbeat came through for 5 s, behind its own data or "
                                     "because the scene is behind; its forces ramp out",
                                     session.id()));
-      releaseForces(session.id());
+      for (const auto& scene : scenes_) scene->releaseForces(session.id());
       break;
   }
 }
@@ -508,11 +509,13 @@ void Server::onPeerGone(Session& session, const std::string& reason) {
   throttledLog_.log(spdlog::level::info, session.address(),
                     fmt::format("client {} ({}) disconnected while its commands wait for the scene: {}",
                                 session.id(), session.description(), reason));
-  releaseForces(session.id());
+  for (const auto& station : stations_) station->endStreams(session.id());
+  if (session.ending()) return;  // the scenes know
+  for (const auto& scene : scenes_) scene->peerGone(session.id());
 }
 
-void Server::releaseForces(scene::ClientId client) {
-  for (const auto& scene : scenes_) scene->releaseForces(client);
+void Server::onHeartbeatAgain(Session& session) {
+  for (const auto& scene : scenes_) scene->restoreForces(session.id());
 }
 
 Station* Server::stationOf(wire::LocalSender name) noexcept {

@@ -81,6 +81,7 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   void onReadSlice() override;
   void onReadEnd(Session& session) override;
   void onPeerGone(Session& session, const std::string& reason) override;
+  void onHeartbeatAgain(Session& session) override;
   void onEnding(Session& session) override;
   void onClosed(Session& session, const std::string& reason) override;
 
@@ -114,7 +115,6 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   void sendMarker(base::Nanos time, const std::string& text);
   void onSceneMessage(Session& session, Station& station, const wire::MessageReceived& message);
   void onRelieved(scene::ClientId client);
-  void releaseForces(scene::ClientId client);
   std::map<scene::ClientId, std::size_t> waitingCommands() const;
   void checkClients();
   void checkNextClients(scene::ClientId last);

@@ -18,6 +18,10 @@ void Server::onMessage(Session& session, const wire::MessageReceived& message, N
   // Of any sender: it concerns the connection.
   if (message.kind == wire::kindOf<wire::Identify>) return onIdentify(session, message);
   if (station == nullptr) return;
+  // They act for a moment after their receipt, however late the server reads them.
+  if (session.peerGone() &&
+      (message.kind == wire::kindOf<wire::RemoteContacts> || message.kind == wire::kindOf<wire::HeldForce>))
+    return;
   if (!mayCommand(session, *station, message)) return;
   switch (wire::role(message.kind)) {
     case wire::Role::control:

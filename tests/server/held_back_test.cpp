@@ -3,6 +3,7 @@
 // as a test needs.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <latch>
 
@@ -237,6 +238,36 @@ TEST_F(HeldBackTest, TheForcesOfADisconnectedClientEndBeforeItsQueuedCommands) {
   client.reset();
   openScene();
   EXPECT_TRUE(watcher_->until([&] { return force() < 1e-9; }));
+}
+
+// Some of what it sent waits in the scene's queue, some in the session, some in the socket.
+TEST_F(HeldBackTest, NothingThatADisconnectedClientSentIsFeltLater) {
+  auto client = peer();
+  watcher_->send(wire::HoldHand{.hold = 1, .position = {0, 0, 0}});
+  watcher_->send(wire::Subscribe{.kinds = wire::kReportDefault | wire::kReportTick, .rate = 0});
+  const auto sendForces = [&] {
+    client->queue(wire::Effect{.type = "constant", .index = 0, .magnitude = 1, .direction = {1, 0, 0}});
+    client->queue(wire::StartEffect{0});
+    client->queue(kUp);
+  };
+  closeScene();
+  flood(*client, 1 * kMiB);
+  sendForces();
+  flood(*client, 8 * kMiB);
+  sendForces();
+  flood(*client, 5 * kMiB);
+  client->send(wire::HeldForce{.time = 0, .force = {0, 1, 0}, .torque = {}, .lifetime = 0.1});
+  ASSERT_TRUE(client->until([&] { return client->delivered(); }, 60s));
+  client->end();
+  ASSERT_TRUE(pass(*client, 500));
+  client.reset();
+  openScene();
+  watcher_->forget();
+  ASSERT_TRUE(watcher_->until([&] { return watcher_->count<wire::TickReport>() > 1000; }));
+  double most = 0;
+  for (const auto& tick : watcher_->all<wire::TickReport>())
+    most = std::max(most, std::hypot(tick.force[0], tick.force[1], tick.force[2]));
+  EXPECT_LT(most, 1e-9);
 }
 
 }  // namespace

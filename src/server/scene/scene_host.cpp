@@ -41,16 +41,33 @@ void SceneHost::play(scene::ClientId client, const scene::SceneCommand* command)
 }
 
 void SceneHost::releaseForces(scene::ClientId client) {
-  if (!thread_ || commandingClients_.count(client) == 0) return;
+  if (!thread_) return;
   owners_->leave(client, base::now());
-  thread_->pushUrgent({client, scene::SceneCommand{scene::ReleaseForces{}}});
+  releaseUrgently(client);
+}
+
+void SceneHost::restoreForces(scene::ClientId client) {
+  if (!thread_) return;
+  flush(client);
+  push({client, ForcesReturn{owners_->leaves(client)}});
+}
+
+void SceneHost::peerGone(scene::ClientId client) {
+  if (!thread_) return;
+  owners_->leaveForGood(client, base::now());
+  releaseUrgently(client);
+}
+
+void SceneHost::releaseUrgently(scene::ClientId client) {
+  if (commandingClients_.count(client) != 0)
+    thread_->pushUrgent({client, scene::SceneCommand{scene::ReleaseForces{}}});
 }
 
 void SceneHost::clientGone(scene::ClientId client) {
   endBatch(client);
   if (!thread_) return;
   flush(client);
-  if (commandingClients_.count(client) != 0) owners_->leave(client, base::now());
+  owners_->leaveForGood(client, base::now());
   push({client, ClientGone{}});
   const bool lastToCommand = commandingClients_.erase(client) == 1 && commandingClients_.empty();
   if (lastToCommand && onDisconnect_ == SceneOnDisconnect::clear)

@@ -63,8 +63,14 @@ class SceneHost {
   void whenPublished(scene::ClientId client, std::function<void()> reached);
   /// Applies a command of a recorded client; null: it disconnected. Any thread, between start() and stop().
   void play(scene::ClientId client, const scene::SceneCommand* command);
-  /// Ramps out the forces that the client owns, however busy the scene is; the client may stay.
+  /// Ramps out the forces that the client owns, however busy the scene is. The client stays; what it commands
+  /// before restoreForces() is not felt.
   void releaseForces(scene::ClientId client);
+  /// What the client commands from now on is felt again.
+  void restoreForces(scene::ClientId client);
+  /// Ramps out the forces that the client owns, however busy the scene is. What it sent before is still
+  /// applied until clientGone(), but no force of it is felt.
+  void peerGone(scene::ClientId client);
   /// Ramps out the forces that the client owns, however busy the scene is. When the last client that
   /// commanded the scene disconnects, clears the scene if configured so.
   void clientGone(scene::ClientId client);
@@ -75,6 +81,7 @@ class SceneHost {
   bool inspect(std::function<void(const std::vector<const scene::SceneBuilder*>&)> call);
 
  private:
+  void releaseUrgently(scene::ClientId client);
   void push(SceneTask&& task, std::size_t bytes = sizeof(SceneTask));
   void pushAs(scene::ClientId client, SceneTask&& task, std::size_t bytes);
 

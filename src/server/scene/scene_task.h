@@ -16,6 +16,11 @@ namespace hapticd::server {
 /// The client disconnected: the forces that it owns ramp out.
 struct ClientGone {};
 
+/// The client's forces were released while it stayed: those of its commands after this one are felt again.
+struct ForcesReturn {
+  std::uint64_t leaves = 0;  ///< that the client asks to undo
+};
+
 /// Requests a description of the scene after the preceding tasks. `reply` is called in the scene thread; with
 /// null when memory ran out.
 struct DescribeScene {
@@ -37,7 +42,7 @@ struct Inspect {
 /// One task of one client.
 struct SceneTask {
   scene::ClientId client = 0;
-  std::variant<scene::SceneCommand, ClientGone, DescribeScene, WhenPublished, Inspect> what;
+  std::variant<scene::SceneCommand, ClientGone, ForcesReturn, DescribeScene, WhenPublished, Inspect> what;
 };
 
 }  // namespace hapticd::server

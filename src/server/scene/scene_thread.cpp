@@ -128,9 +128,13 @@ void SceneThread::apply(SceneTask&& task) {
     inspect->call(builders);
     return;
   }
+  const std::shared_ptr<scene::ForceOwners>& owners = seats_.front().device.config.owners;
+  if (const auto* back = std::get_if<ForcesReturn>(&task.what)) {
+    if (owners) owners->comeBack(task.client, back->leaves);
+    return;
+  }
   const base::Nanos now = base::now();
   auto* command = std::get_if<scene::SceneCommand>(&task.what);
-  const bool released = command == nullptr || std::holds_alternative<scene::ReleaseForces>(*command);
   if (callbacks_.applying) callbacks_.applying(task.client, now, command);
   const std::uint64_t resets = seats_.front().builder.resets();
   std::vector<scene::Notice> repeated;
@@ -146,8 +150,8 @@ void SceneThread::apply(SceneTask&& task) {
   }
   mergeNotices(std::move(repeated), notices_);
   if (seats_.front().builder.resets() != resets && callbacks_.wasReset) callbacks_.wasReset();
-  const scene::SceneConfig& config = seats_.front().device.config;
-  if (released && config.owners) config.owners->forget(task.client);
+  // Not after ReleaseForces, which overtakes: what the client sent before it must not be felt.
+  if (command == nullptr && owners) owners->forget(task.client);
 }
 
 // Builders delay the publication of a mesh until its edits have paused.

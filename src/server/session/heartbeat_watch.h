@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <utility>
 
 #include "base/time.h"
 
@@ -20,17 +21,22 @@ class HeartbeatWatch {
   enum class Verdict {
     alive,
     lost,     ///< silent for kLimit: end the connection
-    excused,  ///< without a heartbeat for kExcuse: end its forces; returned again every kLimit
+    excused,  ///< without a heartbeat for kExcuse: end its forces until one arrives; returned again every
+              ///< kLimit
   };
 
-  /// A heartbeat was received: starts or continues the watch.
-  void beat(base::Nanos now) noexcept {
+  /// A heartbeat was received: starts or continues the watch. True when the client's forces were ended
+  /// before.
+  bool beat(base::Nanos now) noexcept {
     last_ = now;
     excuse_ = kExcuse;
-    ended_.reset();
+    return std::exchange(ended_, std::nullopt).has_value();
   }
-  /// The client opted out of heartbeats.
-  void disable() noexcept { last_.reset(); }
+  /// The client opted out of heartbeats. True when its forces were ended before.
+  bool disable() noexcept {
+    last_.reset();
+    return std::exchange(ended_, std::nullopt).has_value();
+  }
 
   /// The server stops reading from the client.
   void pause(base::Nanos now) noexcept {

@@ -95,7 +95,7 @@ void Session::start() {
   connection_.start({.onConnected = {},
                      .onBytes = [this](auto bytes) { onBytes(bytes); },
                      .onDrained = [this] { onDrained(); },
-                     .onPeerGone = [this](const auto& reason) { owner_.onPeerGone(*this, reason); },
+                     .onPeerGone = [this](const auto& reason) { peerIsGone(reason); },
                      .onClosed = [this](const auto& reason) { onEnd(reason); }});
   flush();
 }
@@ -152,6 +152,11 @@ void Session::onEnd(const std::string& reason) {
     return;
   }
   closeReason_ = reason;
+  peerIsGone(reason);
+}
+
+void Session::peerIsGone(const std::string& reason) {
+  peerGone_ = true;
   owner_.onPeerGone(*this, reason);
 }
 
@@ -319,10 +324,8 @@ void Session::onHeartbeat(const wire::MessageReceived& message, base::Nanos rece
   const auto heartbeat = wire::decode<wire::Heartbeat>(message.payload);
   if (!heartbeat) {
     refuse("malformed message: " + heartbeat.error());
-  } else if (heartbeat->watch != 0) {
-    heartbeats_.beat(received);
-  } else {
-    heartbeats_.disable();
+  } else if (heartbeat->watch != 0 ? heartbeats_.beat(received) : heartbeats_.disable()) {
+    owner_.onHeartbeatAgain(*this);
   }
 }
 

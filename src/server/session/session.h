@@ -53,6 +53,8 @@ class SessionOwner {
   /// The client disconnected while the server does not read from it: end its forces now. Messages that it
   /// sent before are still passed on until onClosed().
   virtual void onPeerGone(Session& session, const std::string& reason) = 0;
+  /// A heartbeat arrived after the client's forces were ended for want of one.
+  virtual void onHeartbeatAgain(Session& session) = 0;
   /// The server begins to close the connection, which may take 2 s while the client does not read: end its
   /// forces now. Called at most once; after it only stops are passed on, until onClosed().
   virtual void onEnding(Session& session) = 0;
@@ -95,6 +97,8 @@ class Session {
   std::size_t memory() const;
   /// Whether onEnding() was called.
   bool ending() const noexcept { return ending_; }
+  /// Whether onPeerGone() was called: what is still passed on was sent by a client that is gone.
+  bool peerGone() const noexcept { return peerGone_; }
   /// What the client may do; the owner sets it.
   const Identity& identity() const noexcept { return identity_; }
   Commander commander() const { return {id_, address(), identity_}; }
@@ -167,6 +171,7 @@ class Session {
   void pauseReading(bool pause);
   void onDrained();
   void onEnd(const std::string& reason);
+  void peerIsGone(const std::string& reason);
   void onSender(std::string_view name);
   void onUdp(const wire::UdpAddress& address);
   void onLogRequest(const wire::LogRequest& request);
@@ -203,6 +208,7 @@ class Session {
   int inThisSecond_ = 0;
   base::Nanos secondBegan_ = 0;
   bool ending_ = false;
+  bool peerGone_ = false;
   bool greeted_ = false;
   bool logsRefused_ = false;  // the client has not been notified yet
   bool inDatagram_ = false;

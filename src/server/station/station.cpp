@@ -296,6 +296,10 @@ void Station::onSubscribed(Session& session, wire::LocalSender name) {
   if (!impl_->fault.empty()) session.send(name, healthText(impl_->fault));
 }
 
+void Station::endStreams(scene::ClientId client) {
+  impl_->streamed.clientGone(client);
+}
+
 void Station::clientGone(scene::ClientId client) {
   impl_->control.clientGone(client);
   impl_->streamed.clientGone(client);

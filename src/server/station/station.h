@@ -86,6 +86,8 @@ class Station {
   void sendPresentState(Session& session);
   /// The client subscribed to this name.
   void onSubscribed(Session& session, wire::LocalSender name);
+  /// The client is gone: its remote contacts and its held force fade.
+  void endStreams(scene::ClientId client);
   void clientGone(scene::ClientId client);
 
   /// The newest tick that the net thread has; its number is 0 before the first.

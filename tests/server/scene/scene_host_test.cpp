@@ -212,7 +212,71 @@ TEST_F(SceneHostTest, AClientThatStaysExertsForceAgainAfterARelease) {
   };
   EXPECT_TRUE(felt());
   host_.releaseForces(1);
+  EXPECT_FALSE(felt());
+  host_.restoreForces(1);
   EXPECT_TRUE(felt());
+  close();
+  host_.releaseForces(1);
+  host_.restoreForces(1);
+  host_.releaseForces(1);  // before the scene came to the return
+  open();
+  EXPECT_FALSE(felt());
+}
+
+// All kinds of forces that belong to no object, whether the scene had the commands already when their client
+// left, or the session held them back.
+TEST_F(SceneHostTest, WhatAClientSentBeforeItLeftIsAppliedButNotFelt) {
+  const auto sendForces = [&] {
+    EXPECT_TRUE(
+        give(1, wire::Effect{.type = "constant", .index = 0, .magnitude = 1, .direction = {0, 1, 0}}));
+    EXPECT_TRUE(give(1, wire::StartEffect{0}));
+    EXPECT_TRUE(give(1, wire::ForceField{.origin = {}, .force = {0, 1, 0}, .jacobian = {}, .radius = 10}));
+    EXPECT_TRUE(give(1, wire::ConstraintMode{1}));
+    EXPECT_TRUE(give(1, wire::ConstraintEnable{1}));
+    EXPECT_TRUE(give(1, wire::Plane{.plane = {0, 1, 0, 0}, .stiffness = 1, .index = 0}));
+    EXPECT_TRUE(give(1, wire::CustomEffect{.effect = 0, .parameters = {}}));
+  };
+  bool reached = false;
+  const auto untilApplied = [&] {
+    reached = false;
+    host_.whenPublished(1, [&] { reached = true; });
+    net_.until([&] { return reached; });
+  };
+  const base::Nanos later = base::now() + 1'000'000'000'000;
+  const auto expectNothingFelt = [&] {
+    const scene::SceneSnapshot* now = slot_.take();
+    ASSERT_NE(now, nullptr);
+    ASSERT_EQ(now->effects.size(), 1U);
+    ASSERT_EQ(now->fields.size(), 2U) << "the field and the constraint";
+    ASSERT_EQ(now->planes.size(), 1U);
+    ASSERT_TRUE(now->buzz);
+    EXPECT_EQ(now->effects[0].owner->share(-1, later), 0);
+    for (const auto& field : now->fields) EXPECT_EQ(field.owner->share(-1, later), 0);
+    EXPECT_EQ(now->planes[0].owner->share(-1, later), 0);
+    EXPECT_EQ(now->buzz->owner->share(-1, later), 0);
+  };
+  close();
+  ASSERT_TRUE(give(1, wire::SetObjectNumber{1}));
+  sendForces();
+  host_.flush(1);
+  host_.restoreForces(1);  // heartbeats returned shortly before the end
+  host_.peerGone(1);
+  open();
+  untilApplied();
+  expectNothingFelt();
+  sendForces();
+  untilApplied();
+  expectNothingFelt();
+}
+
+// The scene of another device, which the client has not commanded when it leaves.
+TEST_F(SceneHostTest, AFirstCommandOfAClientThatIsGoneIsNotFelt) {
+  host_.peerGone(1);
+  ASSERT_TRUE(give(1, wire::ForceField{.origin = {}, .force = {0, 1, 0}, .jacobian = {}, .radius = 10}));
+  bool reached = false;
+  host_.whenPublished(1, [&] { reached = true; });
+  net_.until([&] { return reached; });
+  EXPECT_EQ(slot_.take()->fields[0].owner->share(-1, base::now() + 1'000'000'000), 0);
 }
 
 // Each seek resets the scene in the name of no client. The second reset must not follow what a client sent.

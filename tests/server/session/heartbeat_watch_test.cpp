@@ -48,7 +48,8 @@ TEST(HeartbeatWatchTest, WithoutAHeartbeatForcesEndAgainAndAgain) {
     ended += verdict == Verdict::excused ? 1 : 0;
   }
   EXPECT_EQ(ended, 10) << "every 550 ms from 5050 ms on";
-  watch.beat(10'000 * kMillisecond);
+  EXPECT_TRUE(watch.beat(10'000 * kMillisecond)) << "they may return";
+  EXPECT_FALSE(watch.beat(10'000 * kMillisecond));
   EXPECT_EQ(watch.check(10'500 * kMillisecond), Verdict::alive);
 }
 

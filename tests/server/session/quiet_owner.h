@@ -18,6 +18,7 @@ class QuietOwner : public SessionOwner {
   void onReadSlice() override {}
   void onReadEnd(Session& /*session*/) override {}
   void onPeerGone(Session& /*session*/, const std::string& /*reason*/) override {}
+  void onHeartbeatAgain(Session& /*session*/) override {}
   void onEnding(Session& /*session*/) override {}
   void onClosed(Session& /*session*/, const std::string& /*reason*/) override {}
 };
