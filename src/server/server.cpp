@@ -213,9 +213,12 @@ void Server::startPlaying() {
            [this](std::uint32_t scene, scene::ClientId client, const auto* command) {
              if (scene < scenes_.size()) scenes_[scene]->play(client, command);
            },
-       .marker = [this](
-                     Nanos time,
-                     const std::string& text) { loop_.post([this, time, text] { sendMarker(time, text); }); },
+       .marker =
+           [this](Nanos time, const std::string& text) {
+             loop_.post([this, time, text] {
+               if (!markers_.add(time, text)) throttledLog_.warn("replay: too many markers at one time");
+             });
+           },
        .restart =
            [this] {
              const scene::SceneCommand reset = scene::ResetScene{};
@@ -301,7 +304,7 @@ void Server::everySecond() {
   }
   if (!sending) sendPresentStates();
   throttledLog_.reportSuppressed();
-  markers_.clear();
+  markers_.nextSecond();
   if (web_) web_->everySecond();
 }
 
@@ -455,7 +458,8 @@ void Server::onClosed(Session& session, const std::string& reason) {
   sessions_.erase(session.id());
 }
 
-// Every 50 ms: heartbeats and memory, of a few clients at a time, between which others have their turn.
+// Every 50 ms: heartbeats, memory and markers, of a few clients at a time, between which others have their
+// turn.
 void Server::checkClients() {
   constexpr Nanos kStall = 150'000'000;  // between two checks
   const Nanos now = base::now();
@@ -463,7 +467,9 @@ void Server::checkClients() {
   if (now - std::exchange(checkedAt_, now) > kStall) {
     for (const auto& [id, session] : sessions_) session->excuseStall(now);
   }
-  if (!checkedUpTo_) checkNextClients(0);
+  if (checkedUpTo_) return;
+  markers_.beginPass();
+  checkNextClients(0);
 }
 
 void Server::checkNextClients(scene::ClientId last) {
@@ -473,6 +479,7 @@ void Server::checkNextClients(scene::ClientId last) {
   auto next = sessions_.upper_bound(last);
   for (int i = 0; i < kSlice && next != sessions_.end(); ++i, ++next) {
     const auto commands = waiting.find(next->first);
+    if (markers_.passing()) sendMarkers(*next->second);
     checkHeartbeat(*next->second, now);
     admission_.countMemory(*next->second, commands == waiting.end() ? 0 : commands->second);
   }

@@ -24,6 +24,7 @@
 #include "server/scene/scene_host.h"
 #include "server/session/admission.h"
 #include "server/session/credentials.h"
+#include "server/session/markers.h"
 #include "server/session/reverse_connections.h"
 #include "server/session/session.h"
 #include "server/session/throttled_log.h"
@@ -112,7 +113,7 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   void sendText(const Station& station, const wire::Text& text);
   void onMarker(Session& session, const wire::MessageReceived& message, base::Nanos received);
   void onReplayControl(Session& session, const wire::MessageReceived& message);
-  void sendMarker(base::Nanos time, const std::string& text);
+  void sendMarkers(Session& session);
   void onSceneMessage(Session& session, Station& station, const wire::MessageReceived& message);
   void onRelieved(scene::ClientId client);
   std::map<scene::ClientId, std::size_t> waitingCommands() const;
@@ -139,8 +140,8 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   std::vector<std::unique_ptr<Station>> stations_;
   Sessions sessions_;
   Admission admission_{config_.limits, sessions_};
-  std::set<Station*> unfinishedReports_;    ///< with clients that a pass has not reached yet
-  std::map<scene::ClientId, int> markers_;  ///< of each client in the present second
+  std::set<Station*> unfinishedReports_;  ///< with clients that a pass has not reached yet
+  Markers markers_;
   scene::ClientId refusalSentTo_ = 0;  ///< client already notified of a refusal during this read; 0: none
   std::vector<net::Subscription> subscriptions_;
   std::unique_ptr<net::TcpListener> listener_;

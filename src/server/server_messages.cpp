@@ -68,15 +68,18 @@ void Server::identify(Session& session, std::string_view token, wire::LocalSende
 }
 
 void Server::onMarker(Session& session, const wire::MessageReceived& message, Nanos received) {
-  constexpr int kMostPerSecond = 100;
   const auto marker = wire::decode<wire::Marker>(message.payload);
   if (!marker) return session.refuse("malformed message: " + marker.error());
-  if (++markers_[session.id()] > kMostPerSecond) {
-    session.send(message.local_sender,
-                 wire::Text{.severity = wire::kTextError,
-                            .level = 0,
-                            .text = "Marker refused: the server takes " + std::to_string(kMostPerSecond) +
-                                    " in a second from each client"});
+  const Markers::Answer answer = markers_.count(session.id());
+  if (answer != Markers::Answer::taken || !markers_.add(received, marker->text.text)) {
+    const bool ofClient = answer == Markers::Answer::tooManyOfClient;
+    session.send(
+        message.local_sender,
+        wire::Text{.severity = wire::kTextError,
+                   .level = 0,
+                   .text = "Marker refused: the server takes " +
+                           std::to_string(ofClient ? Markers::kMostOfOne : Markers::kMost) +
+                           " in a second from " + (ofClient ? "each client" : "all clients together")});
     return;
   }
   if (recordings_.file().empty()) {
@@ -88,19 +91,16 @@ void Server::onMarker(Session& session, const wire::MessageReceived& message, Na
   recordings_.marker(received, marker->text.text);
   throttledLog_.log(spdlog::level::info, session.address(),
                     fmt::format("client {} marks {}", session.id(), wire::inQuotes(marker->text.text)));
-  sendMarker(received, marker->text.text);
 }
 
-// Every client once, under a name that it knows.
-void Server::sendMarker(Nanos time, const std::string& text) {
-  for (const auto& [id, session] : sessions_) {
-    for (const auto& station : stations_) {
-      const wire::LocalSender name = station->nameFor(*session);
-      if (!session->wants(name)) continue;
-      session->send(name, wire::Marker{.time = time, .text = text});
-      session->flush();
-      break;
-    }
+// Those of the pass at hand, once, under a name that the client knows.
+void Server::sendMarkers(Session& session) {
+  for (const auto& station : stations_) {
+    const wire::LocalSender name = station->nameFor(session);
+    if (!session.wants(name)) continue;
+    session.sendShared(markers_.frames(name, clock_.now()), net::Delivery::reliable);
+    session.flush();
+    return;
   }
 }
 
