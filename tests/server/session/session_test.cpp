@@ -32,10 +32,12 @@ class CountingOwner final : public QuietOwner {
     mostBetween = std::max(mostBetween, messages - last);
     last = messages;
   }
+  void onHeartbeatAgain(Session& /*session*/) override { ++returns; }
   void onEnding(Session& /*session*/) override { ++endings; }
   void onClosed(Session& /*session*/, const std::string& reason) override { closed = reason; }
 
   std::size_t endings = 0;
+  std::size_t returns = 0;
   std::size_t messages = 0;
   std::size_t last = 0;
   std::size_t slices = 0;
@@ -117,6 +119,46 @@ TEST(Session, ReadsHeartbeatsAheadOfWhatIsHeldBack) {
   EXPECT_FALSE(session->release());
   EXPECT_EQ(owner.messages, 2U) << "the effect follows";
   EXPECT_FALSE(session->holding());
+}
+
+// A client whose heartbeats wait behind its own data: its forces end, until a heartbeat is read.
+TEST(Session, TellsThatHeartbeatsReturn) {
+  net::Loop loop;
+  wire::LocalNames names;
+  names.addSender("Phantom");
+  WallClock clock;
+  CountingOwner owner;
+  std::optional<Session> session;
+  net::TcpListener listener(loop, net::Endpoint::parse("127.0.0.1", 0), [&](net::Connection connection) {
+    session.emplace(1, owner, names, clock, std::move(connection), nullptr, SessionMode::tcp);
+    session->hold();
+    session->start();
+  });
+  net::ConnectionOptions options;
+  options.hardLimitBytes = std::size_t{64} << 20;
+  net::Connection client = net::Connection::connect(loop, listener.local(), 20s, options);
+  client.start({});
+  client.send(bytesWith([](wire::Peer& peer, wire::LocalSender sender) {
+    peer.send({}, sender, wire::Heartbeat{1});
+    const wire::MeshVertices run{0, 0, {std::vector<float>(15'000)}};
+    for (std::size_t sent = 0; sent < 2 * Session::kReadAhead_bytes; sent += 60'000)
+      peer.send({}, sender, run);
+    peer.send({}, sender, wire::Heartbeat{1});
+    peer.send({}, sender, wire::Heartbeat{1});
+  }));
+  const auto pauses = [&] { return session && session->memory() >= Session::kReadAhead_bytes; };
+  for (int i = 0; i < 2000 && !pauses(); ++i) loop.runOnce(10ms);
+  ASSERT_TRUE(pauses());
+  const base::Nanos later = base::now() + 2 * HeartbeatWatch::kExcuse;
+  EXPECT_EQ(session->checkHeartbeat(later), HeartbeatWatch::Verdict::excused);
+  EXPECT_EQ(owner.returns, 0U);
+  for (int i = 0; i < 2000 && owner.returns == 0; ++i) {
+    while (session->release()) {
+    }
+    loop.runOnce(10ms);
+  }
+  for (int i = 0; i < 10; ++i) loop.runOnce(1ms);
+  EXPECT_EQ(owner.returns, 1U) << "once";
 }
 
 }  // namespace
