@@ -66,6 +66,9 @@ struct DeviceTraits {
   /// A person must re-arm forces after a trip. False where there is no person to protect: the guard recovers
   /// by itself.
   bool needsRearm = true;
+  /// The driver or the device ends a force by itself that no write followed for this long; 0: never. After
+  /// such a pause the guard starts again from zero, as the motors do.
+  Nanos forceLife = 0;
 };
 
 class SteeredHand;

@@ -109,12 +109,13 @@ void fields(T& options, V&& v) {
 
 template <Is<realtime::TickOptions> T, class V>
 void fields(T& options, V&& v) {
-  auto& [rate_Hz, render, guard, reports, blackBox_s] = options;
+  auto& [rate_Hz, render, guard, reports, blackBox_s, forceLife] = options;
   v("rate_Hz", rate_Hz);
   v("render", render);
   v("guard", guard);
   static_cast<void>(reports);  // sizes of memory
   static_cast<void>(blackBox_s);
+  static_cast<void>(forceLife);  // each tick that it concerned says so
 }
 
 template <Is<RecordedDevice> T, class V>

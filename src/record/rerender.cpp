@@ -14,6 +14,9 @@ namespace {
 using realtime::GuardControl;
 using realtime::TickReport;
 
+// A recorded force lives until a tick says that it does not: longer than from write to write otherwise.
+constexpr Nanos kForceLife = 10 * realtime::kOldestForce;
+
 // Its states and the results of its writes are the recorded ones; it takes the time that made a recorded
 // force too old.
 class RecordedHand final : public device::Device {
@@ -61,6 +64,7 @@ realtime::TickOptions changed(realtime::TickOptions options, const RerenderChang
   options.render.toolRadius_m = changes.toolRadius_m.value_or(options.render.toolRadius_m);
   options.render.forceShading = changes.forceShading.value_or(options.render.forceShading);
   if (changes.raw) options.guard.enabled = false;
+  options.forceLife = kForceLife;
   options.reports = 1;
   options.blackBox_s = 0;
   return options;
@@ -232,6 +236,7 @@ const TickReport* Rerenderer::on(const TickEvent& event) {
   for (; !seat.streamed.empty() && seat.streamed.front().tick <= recorded.tick; seat.streamed.pop_front())
     seat.tick.remote().write(seat.streamed.front().input);
   seat.device.use(event.tick);
+  if (event.tick.expired) seat.clock.sleepUntil(seat.clock.now() + kForceLife + 1);
   seat.tick(
       {recorded.time, recorded.timing.wakeupError, recorded.timing.overruns, recorded.timing.skippedPeriods});
   seat.follow(recorded);

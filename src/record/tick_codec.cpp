@@ -14,6 +14,7 @@ enum Has : std::uint8_t {
   kCounts = 1U << 3,
   kGripper = 1U << 4,
   kDiscarded = 1U << 5,
+  kExpired = 1U << 6,
 };
 
 // The fields of every tick, in this order. `Record` may be const.
@@ -46,7 +47,7 @@ void TickPacker::add(const TickRecord& tick, Bytes& out) {
   pack.put(static_cast<std::uint8_t>((tick.haveState ? kHaveState : 0) | (tick.written ? kWritten : 0) |
                                      (placement ? kPlacement : 0) | (counts ? kCounts : 0) |
                                      (report.device.gripper_rad ? kGripper : 0) |
-                                     (tick.discarded ? kDiscarded : 0)));
+                                     (tick.discarded ? kDiscarded : 0) | (tick.expired ? kExpired : 0)));
   always(tick, pack);
   for (std::uint32_t i = 0; i < report.rendering.contactCount; ++i) pack.put(report.rendering.contacts[i]);
   if (placement) pack.put(report.T_world_device);
@@ -121,6 +122,7 @@ bool TickUnpacker::next(TickRecord& tick) {
   tick.haveState = (has & kHaveState) != 0;
   tick.written = (has & kWritten) != 0;
   tick.discarded = (has & kDiscarded) != 0;
+  tick.expired = (has & kExpired) != 0;
   always(tick, in_);
   realtime::Rendering& rendering = tick.report.rendering;
   ok_ = in_.ok() && rendering.contactCount <= rendering.contacts.size();

@@ -190,6 +190,8 @@ realtime::TickRecord anyTick(Filler& filler, std::uint64_t number) {
   filler.fill(tick.control);
   filler.fill(tick.haveState);
   filler.fill(tick.written);
+  filler.fill(tick.discarded);
+  filler.fill(tick.expired);
   tick.report.tick = number;
   tick.report.rendering.contactCount = static_cast<std::uint32_t>(number % 5);
   for (std::uint32_t i = 0; i < number % 5; ++i) filler.fill(tick.report.rendering.contacts[i]);

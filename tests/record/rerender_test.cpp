@@ -18,6 +18,7 @@
 #include "record/recorder.h"
 #include "record/rerender.h"
 #include "record/scene_event_codec.h"
+#include "record/tick_codec.h"
 
 namespace hapticd::test {
 namespace {
@@ -98,6 +99,51 @@ TEST_F(Rerender, GivesTheRecordedForcesBitForBit) {
     EXPECT_GT(device.revisions.size(), 10U);
   }
   EXPECT_GT(devices[0].stopped, 10U);
+}
+
+// Stands still, and takes every force.
+class Table final : public device::Device {
+ public:
+  void open() override {}
+  void close() noexcept override {}
+  const device::DeviceProfile& profile() const noexcept override { return profile_; }
+  bool read(base::Nanos /*now*/, device::DeviceState& /*state*/) noexcept override { return true; }
+  bool write(const geometry::Vec3& /*force_N*/) noexcept override { return true; }
+
+ private:
+  const device::DeviceProfile profile_;
+};
+
+TEST(RerenderOfADevice, ThatEndsForcesByItselfGivesWhatTheGuardDid) {
+  constexpr base::Nanos kMs = 1'000'000;
+  record::RecordedDevice device{.names = {"table"}, .driver = {}, .model = {}, .sceneConfig = {}, .tick = {}};
+  device.tick.guard.armed = true;
+  device.tick.forceLife = 3 * kMs;
+  Table table;
+  base::SimulatedClock clock;
+  realtime::Tick tick(table, clock, device.tick);
+  realtime::RecordRing ring(1024);
+  tick.recordTo({.ticks = &ring});
+  for (int i = 0; i < 1000; ++i) {
+    const bool pause = i == 600 || i == 990;
+    clock.sleepUntil(clock.now() + (pause ? 4 * kMs : kMs));
+    tick(clock.now());
+  }
+  record::Rerenderer again({.program = {}, .config = {}, .devices = {device}, .law = {}}, {});
+  int expired = 0;
+  int same = 0;
+  ring.consume([&](const realtime::TickRecord& recorded) {
+    record::Bytes bytes;
+    record::TickPacker().add(recorded, bytes);
+    record::TickEvent event;
+    record::TickUnpacker(bytes).next(event.tick);
+    expired += event.tick.expired ? 1 : 0;
+    const realtime::TickReport* now = again.feed(event);
+    same += record::sameOutcome(*now, recorded.report) ? 1 : 0;
+  });
+  EXPECT_EQ(expired, 2);
+  EXPECT_EQ(same, 1000);
+  EXPECT_LT(tick.last().guard.gain, 0.1) << "after the pause";
 }
 
 TEST_F(Rerender, IsTheSameEveryTime) {

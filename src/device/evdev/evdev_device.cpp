@@ -17,7 +17,6 @@ namespace {
 
 constexpr Nanos kMillisecond = 1'000'000;
 constexpr Nanos kForcePeriod = 2'000'000;  // 500 Hz: more than a USB poll can use
-constexpr Nanos kCommandLife = 20'000'000;
 constexpr Nanos kStateLife = 100'000'000;
 constexpr double kVelocityFilter_s = 0.005;
 constexpr int kFailuresToFault = 5;

@@ -43,6 +43,7 @@ class EvdevDevice final : public Device {
   void open() override;
   void close() noexcept override;
   const DeviceProfile& profile() const noexcept override { return profile_; }
+  DeviceTraits traits() const noexcept override { return {.forceLife = kCommandLife}; }
 
   bool read(Nanos now, DeviceState& state) noexcept override;
   bool write(const Vec3& force_N) noexcept override;
@@ -57,6 +58,9 @@ class EvdevDevice final : public Device {
   static std::string probe(const std::string& path);
 
  private:
+  /// The driver's thread zeroes a force that is older than this.
+  static constexpr Nanos kCommandLife = 20'000'000;
+
   struct Axis {
     int code = 0;
     double centre = 0;

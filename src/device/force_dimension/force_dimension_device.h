@@ -5,6 +5,7 @@
 // 20 ms.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <memory>
 #include <string>
@@ -30,6 +31,9 @@ class ForceDimensionDevice final : public Device {
   void open() override;
   void close() noexcept override;
   const DeviceProfile& profile() const noexcept override { return profile_; }
+  DeviceTraits traits() const noexcept override {
+    return {.forceLife = base::toNanos(std::max(options_.watchdog_s, 0.0))};
+  }
 
   /// Button 0 is the device's own; button 1 is a closed gripper, whose opening is in the state, too.
   bool read(Nanos now, DeviceState& state) noexcept override;

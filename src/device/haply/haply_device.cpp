@@ -24,7 +24,6 @@ constexpr auto kConnectTime = 1000ms;
 constexpr auto kReplyTime = 20ms;
 constexpr int kReconnect_ms = 200;
 constexpr int kIdle_ms = 3;  // between messages without a new force, which keep the state fresh
-constexpr Nanos kCommandLife = 20'000'000;
 constexpr Nanos kStateLife = 20'000'000;
 
 }  // namespace

@@ -33,12 +33,16 @@ class HaplyDevice final : public Device {
   void open() override;
   void close() noexcept override;
   const DeviceProfile& profile() const noexcept override { return profile_; }
+  DeviceTraits traits() const noexcept override { return {.forceLife = kCommandLife}; }
 
   bool read(Nanos now, DeviceState& state) noexcept override;
   bool write(const Vec3& force_N) noexcept override;
   std::string faultText() const override;
 
  private:
+  /// The driver's thread zeroes a force that is older than this.
+  static constexpr Nanos kCommandLife = 20'000'000;
+
   struct Command {
     Vec3 force_N = Vec3::Zero();
     std::uint64_t number = 0;

@@ -3,6 +3,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <csignal>
@@ -26,6 +27,7 @@ class Exchange {
       : device_(device),
         block_(block),
         period_(base::toNanos(1 / options.rate_Hz)),
+        commandLife_(commandLife(period_)),
         beforeFirstTick_(options.beforeFirstTick) {}
   ~Exchange() { stop(); }
 
@@ -66,7 +68,7 @@ class Exchange {
       commandTime_ = now;
     }
     const bool ended = command.number <= block_.endedUpTo.load(std::memory_order_acquire);
-    const bool fresh = !ended && now - commandTime_ <= kCommandLife && command.force_N.allFinite();
+    const bool fresh = !ended && now - commandTime_ <= commandLife_ && command.force_N.allFinite();
     device_.write(fresh ? command.force_N : Vec3(Vec3::Zero()));
   }
 
@@ -83,6 +85,7 @@ class Exchange {
   Device& device_;
   SharedBlock& block_;
   const Nanos period_;
+  const Nanos commandLife_;
   const std::function<void()> beforeFirstTick_;
   base::BlockingThread thread_;
   std::atomic<bool> leave_{false};
@@ -130,7 +133,10 @@ int runDeviceHost(Device& device, const DeviceHostOptions& options) {
       send(std::string("-") + error.what());
       return 1;
     }
-    memory->profile = SharedProfile::of(device.profile(), device.traits());
+    DeviceTraits traits = device.traits();
+    const Nanos life = commandLife(base::toNanos(1 / options.rate_Hz));
+    traits.forceLife = traits.forceLife > 0 ? std::min(traits.forceLife, life) : life;
+    memory->profile = SharedProfile::of(device.profile(), traits);
     {
       Exchange exchange(device, *memory, options);
       send("+");

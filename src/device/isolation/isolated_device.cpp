@@ -74,12 +74,12 @@ void IsolatedDevice::open() {
   }
   try {
     profile_ = (*memory_)->profile.toProfile();
+    traits_ = (*memory_)->profile.toTraits();
   } catch (...) {
     close();
     throw;
   }
   profile_.transportDelay_s += kOneTick_s;
-  traits_ = (*memory_)->profile.toTraits();
   silent_ = lostThere_ = false;
 }
 

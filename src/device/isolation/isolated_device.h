@@ -2,7 +2,7 @@
 // the server.
 //
 // The driver's process posts each state and writes the newest force, one tick late; without a fresh force for
-// 3 ms it writes zero. Here, each post wakes the loop.
+// 3 ms (at rates below 500 Hz one and a half periods) it writes zero. Here, each post wakes the loop.
 #pragma once
 
 #include <sys/types.h>

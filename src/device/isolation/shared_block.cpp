@@ -90,6 +90,7 @@ SharedProfile SharedProfile::of(const DeviceProfile& profile, const DeviceTraits
   shared.startsArmed = profile.startsArmed ? 1 : 0;
   shared.calibratesInLoop = traits.calibratesInLoop ? 1 : 0;
   shared.needsRearm = traits.needsRearm ? 1 : 0;
+  shared.forceLife = traits.forceLife;
   return shared;
 }
 
@@ -121,6 +122,7 @@ DeviceTraits SharedProfile::toTraits() const {
   traits.selfPaced = true;
   traits.calibratesInLoop = calibratesInLoop != 0;
   traits.needsRearm = needsRearm != 0;
+  traits.forceLife = within<Nanos>("life of a force", forceLife, 0, 1'000'000'000);
   return traits;
 }
 

@@ -4,6 +4,7 @@
 // a write. Each post of a state counts up a futex word that the server's loop sleeps on.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -17,8 +18,10 @@ namespace hapticd::device::isolation {
 inline constexpr int kMemoryDescriptor = 3;  // in the driver's process
 inline constexpr int kSocketDescriptor = 4;
 
-/// The driver's process zeroes a force that is older than this.
-inline constexpr Nanos kCommandLife = 3'000'000;
+/// The driver's process zeroes a force that is older than this, in ticks of this period.
+constexpr Nanos commandLife(Nanos period) {
+  return std::max<Nanos>(3'000'000, period + period / 2);
+}
 
 /// A state without types that some bytes are no value of: the driver's process may leave anything here.
 struct Posted {
@@ -63,11 +66,12 @@ struct SharedProfile {
   std::uint32_t startsArmed = 0;
   std::uint32_t calibratesInLoop = 0;
   std::uint32_t needsRearm = 1;
+  Nanos forceLife = 0;
 
   static SharedProfile of(const DeviceProfile& profile, const DeviceTraits& traits);
   /// Throws std::runtime_error, naming the value, when no device has such a profile.
   DeviceProfile toProfile() const;
-  /// Those of an isolated device: self-paced in a thread of ours.
+  /// Those of an isolated device: self-paced in a thread of ours. Throws as toProfile().
   DeviceTraits toTraits() const;
 };
 

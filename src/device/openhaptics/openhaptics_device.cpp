@@ -51,7 +51,7 @@ void OpenHapticsDevice::open() {
   state_ = DeviceState();
   written_N_.setZero();
   frames_ = 0;
-  calibrated_ = hot_ = false;
+  calibrated_ = hot_ = refuses_ = false;
   lost_ = silent_ = unreported_ = false;
   sameFrames_ = 0;
   settling_ = 0;
@@ -139,6 +139,10 @@ bool OpenHapticsDevice::read(Nanos /*now*/, DeviceState& state) noexcept {
 
 bool OpenHapticsDevice::write(const Vec3& force_N) noexcept {
   if (!inTick_ || !force_N.allFinite()) return false;
+  // A refusal tells the guard that the motors get zero: when the arm is slow again, it ramps the force in.
+  const bool fast = state_.velocity_m_per_s.norm() > velocityLimit_m_per_s_;
+  refuses_ = fast && (refuses_ || !force_N.isZero());
+  if (refuses_) return false;
   command_N_ = force_N;
   return true;
 }
@@ -262,8 +266,7 @@ void OpenHapticsDevice::updateCalibration(hd::Enum status) noexcept {
 
 Vec3 OpenHapticsDevice::limited(const Vec3& force_N) noexcept {
   const double limit = derating_.step(state_.motorTemperature);
-  if (state_.hold != kHoldNone || state_.velocity_m_per_s.norm() > velocityLimit_m_per_s_)
-    return Vec3::Zero();
+  if (state_.hold != kHoldNone) return Vec3::Zero();
   const double wanted = force_N.norm();
   Vec3 force = wanted > limit ? Vec3(limit / wanted * force_N) : force_N;
   // The force rises in steps and falls at once: less force is always safe.

@@ -88,6 +88,7 @@ class OpenHapticsDevice final : public Device, private hd::Participant {
   DeviceState before_;  // of the frame before
   int sameFrames_ = 0;  // with a force, since the state last changed
   bool inTick_ = false;
+  bool refuses_ = false;  // forces, until the arm is slow again
   Vec3 command_N_ = Vec3::Zero();
   Vec3 written_N_ = Vec3::Zero();
   Nanos now_ = 0;

@@ -39,6 +39,7 @@ Vec3 Guard::step(const GuardInput& in) noexcept {
   // A late tick may raise a force or a ramp by no more than two ticks on time.
   const Nanos dt = std::clamp<Nanos>(in.period, 0, longestStep_);
   budget_.add(written_.norm(), in.period);
+  if (in.forceEnded) written_.setZero();
 
   obeyControl();
   checkDevice(in);
@@ -128,8 +129,8 @@ void Guard::checkSpeed(const device::DeviceState& state) noexcept {
 }
 
 void Guard::checkTime(const GuardInput& in) noexcept {
-  note(Trip::late, in.late > options_.late);
-  overdue_ = in.late > options_.lateDecay;  // the decay would have ended by now
+  note(Trip::late, in.late > options_.late || in.forceEnded);
+  overdue_ = in.late > options_.lateDecay || in.forceEnded;  // the decay would have ended by now
   if (in.late > options_.stalled) {
     latch(Trip::stalled);
   } else if (options_.selfRecover && in.late <= options_.late) {

@@ -62,6 +62,7 @@ struct GuardInput {
   Nanos period = 0;                            ///< since the previous tick; 0 in the first
   Nanos late = 0;                              ///< start of this tick minus its deadline
   bool writeFailed = false;                    ///< the device refused the previous force
+  bool forceEnded = false;                     ///< the device ended the previous force by itself
   bool geometryJump = false;                   ///< geometry or surface in contact changed at once
   bool deepContact = false;
 };
@@ -118,7 +119,7 @@ class Guard {
   std::uint32_t now_ = 0;  // trips of this tick
   GuardControl::Seen seen_;
   bool restart_ = false;  // the ramp starts again
-  bool overdue_ = false;  // the tick is later than a decay takes
+  bool overdue_ = false;  // nothing is left to decay from
 
   int fastTicks_ = 0;
   bool waitForCalm_ = false;

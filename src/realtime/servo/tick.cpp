@@ -28,6 +28,7 @@ Tick::Tick(device::Device& device, base::Clock& clock, const TickOptions& option
     : device_(device),
       clock_(clock),
       period_(servoPeriod(options.rate_Hz)),
+      forceLife_(options.forceLife),
       renderer_(renderOptionsOf(options)),
       control_(options.guard.armed),
       guard_(options.guard, control_, period_),
@@ -40,6 +41,7 @@ void Tick::operator()(const Pacing& pacing) noexcept {
   const Nanos started = clock_.now();
   const std::uint32_t overtakes = overtakes_.load(std::memory_order_acquire);
   const scene::SceneSnapshot& scene = takeSnapshot();
+  expired_ = forceOutlived();
 
   haveState_ = device_.read(report_.time, report_.device);
   const bool foundAnew = lookForHand();
@@ -59,16 +61,28 @@ void Tick::operator()(const Pacing& pacing) noexcept {
   finishedAt_.store(clock_.now(), std::memory_order_release);
 }
 
-// Between the check and the end of the write the watchdog may overtake this tick: then zero follows at once.
+// Between the check and the end of the write the watchdog may overtake this tick, or the device may end the
+// last force, which this one would bring back at once: then zero follows.
 void Tick::write(Nanos started, std::uint32_t overtakes) noexcept {
-  const auto overtaken = [&] { return overtakes_.load(std::memory_order_acquire) != overtakes; };
-  discarded_ = overtaken() || clock_.now() - started > kOldestForce;
+  const auto interrupted = [&] {
+    return overtakes_.load(std::memory_order_acquire) != overtakes || (!expired_ && forceOutlived());
+  };
+  const Nanos now = clock_.now();
+  discarded_ = interrupted() || now - started > kOldestForce;
   if (discarded_) discardForce();
   written_ = device_.write(report_.force_N);
-  if (discarded_ || !overtaken()) return;
+  const bool late = !discarded_ && interrupted();
+  wrote_ = now;
+  if (!late) return;
   discarded_ = true;
   discardForce();
   written_ = device_.write(report_.force_N);
+}
+
+// The device counts from a later moment than the beginning of the write: it has not ended a force of which
+// this is false.
+bool Tick::forceOutlived() noexcept {
+  return forceLife_ > 0 && wrote_ >= 0 && clock_.now() - wrote_ > forceLife_;
 }
 
 void Tick::discardForce() noexcept {
@@ -168,6 +182,7 @@ GuardInput Tick::guardInput() const noexcept {
   // A callback has no deadline: there, the excess of the period counts as lateness.
   in.late = std::max(report_.timing.wakeupError, report_.timing.period - period_);
   in.writeFailed = !written_;
+  in.forceEnded = expired_;
   in.geometryJump = (report_.rendering.status & kRenderGeometryJump) != 0;
   in.deepContact = (report_.rendering.status & (kRenderReleased | kRenderEnclosed)) != 0;
   return in;
@@ -219,7 +234,7 @@ void Tick::publish() noexcept {
   if ((report_.guard.latched & ~latchedBefore) != 0) blackBox_.freeze();
   if (RecordRing* ring = recordTo_.load(std::memory_order_acquire)) {
     remember(rememberTo_.load(std::memory_order_acquire));
-    ring->push({report_, guard_.seen(), haveState_, written_, discarded_});
+    ring->push({report_, guard_.seen(), haveState_, written_, discarded_, expired_});
   } else {
     remember(nullptr);
   }

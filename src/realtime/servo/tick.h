@@ -31,6 +31,7 @@ struct TickOptions {
   GuardOptions guard;
   std::size_t reports = 1024;  ///< capacity of the ring
   double blackBox_s = 2;
+  Nanos forceLife = 0;  ///< of the device: DeviceTraits::forceLife
 };
 
 /// A tick that takes longer than this until its write commands zero instead: its force belongs to the past.
@@ -120,6 +121,7 @@ class Tick {
   void feelNothing() noexcept;
   void addRemote(Nanos period, bool foundAnew, double passedShare) noexcept;
   GuardInput guardInput() const noexcept;
+  bool forceOutlived() noexcept;
   void write(Nanos started, std::uint32_t overtakes) noexcept;
   void discardForce() noexcept;
   void publish() noexcept;
@@ -137,6 +139,7 @@ class Tick {
   device::Device& device_;
   base::Clock& clock_;
   const Nanos period_;
+  const Nanos forceLife_;
   const scene::SceneSnapshot nothing_;  // before the first snapshot
   scene::SnapshotSlot snapshots_;
   Renderer renderer_;
@@ -161,7 +164,9 @@ class Tick {
   ServoMemory memory_;      // for that ring
   bool haveState_ = false;  // the device delivered a state in this tick
   bool written_ = true;     // the device accepted the last force
+  bool expired_ = false;    // the device ended the last force before this tick
   bool discarded_ = false;  // the force of this tick was too old: zero was written
+  Nanos wrote_ = -1;        // shortly before the last write; -1: nothing written yet
   std::atomic<Nanos> finishedAt_{0};
   std::atomic<std::uint32_t> overtakes_{0};
   std::atomic<bool> stoppedAtZero_{false};

@@ -16,6 +16,7 @@ struct TickRecord {
   bool haveState = false;        ///< the device delivered a state
   bool written = false;          ///< the device accepted the force
   bool discarded = false;        ///< the rendered force was too old; zero was written
+  bool expired = false;          ///< the device had ended the force of the tick before by itself
 };
 
 /// From the servo to a recorder. A full ring counts the records that it refuses.

@@ -64,6 +64,7 @@ realtime::TickOptions tickOptions(const DeviceConfig& config, const device::Devi
   options.render.bareDamping_Ns_per_m = device::bareDampingOf(device.profile().model);
   options.guard = realtime::GuardOptions::of(device.profile());
   options.guard.selfRecover = !device.traits().needsRearm;
+  options.forceLife = device.traits().forceLife;
   return options;
 }
 

@@ -107,6 +107,7 @@ TEST_P(IsolationTest, StateAndForceCrossTheBoundary) {
   EXPECT_FALSE(device.traits().ticksInVendorThread);
   EXPECT_TRUE(device.traits().calibratesInLoop) << "as the driver says";
   EXPECT_FALSE(device.traits().needsRearm) << "as the driver says";
+  EXPECT_EQ(device.traits().forceLife, 3'000'000) << "the process of the driver ends what nobody renews";
   hand->x = 0.01;
   push(device, Vec3(1, 2, 3));
   EXPECT_TRUE(eventually([&] { return state().position_m.x() == 0.01 && force() == Vec3(1, 2, 3); }));

@@ -50,7 +50,7 @@ class SteppedHdTest : public HdTest {
     device.open();
     device.start([this](Nanos now) {
       stateRead = device.read(now, state);
-      device.write(wanted_N);
+      taken = device.write(wanted_N);
     });
   }
   void step(int ticks = 1) const { mock->step(ticks); }
@@ -58,6 +58,7 @@ class SteppedHdTest : public HdTest {
   OpenHapticsDevice device;
   DeviceState state;
   bool stateRead = false;
+  bool taken = false;  // the last force
   Vec3 wanted_N = Vec3::Zero();
 };
 

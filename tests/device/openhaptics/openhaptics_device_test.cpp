@@ -6,6 +6,7 @@
 #include <string>
 
 #include "device/openhaptics/hd_fixture.h"
+#include "device/plane_scene.h"
 
 namespace hapticd::device {
 namespace {
@@ -144,6 +145,43 @@ TEST_F(SteppedHdTest, NoForceAboveTheDriversOwnSpeedLimit) {
   step();
   EXPECT_TRUE(force().isZero());
   EXPECT_EQ(state.hold, kHoldNone) << "the driver was not provoked";
+  EXPECT_FALSE(taken) << "the guard learns of it";
+  wanted_N = Vec3::Zero();
+  step();
+  EXPECT_FALSE(taken) << "one refusal until the arm is slow";
+  hand(Vec3::Zero(), Vec3(0.1, 0, 0));
+  step();
+  EXPECT_TRUE(taken);
+  hand(Vec3::Zero(), Vec3(1.3, 0, 0));
+  step();
+  EXPECT_TRUE(taken) << "nothing is withheld from a hand that is free";
+}
+
+// Quick taps within a contact: the motors get zero, and no step when the arm is slow again.
+TEST_F(SteppedHdTest, AForceThatWasWithheldFromAQuickArmRampsIn) {
+  device.open();
+  base::SimulatedClock clock;
+  realtime::TickOptions options;
+  options.guard = realtime::GuardOptions::of(device.profile());
+  options.guard.armed = true;
+  options.guard.late = options.guard.lateDecay = options.guard.stalled = 1'000'000'000'000;
+  realtime::Tick tick(device, clock, options);
+  tick.snapshots().publish(plane_scene::snapshot());
+  Nanos now = 0;
+  device.start([&](Nanos) { tick(now += 1'000'000); });
+  hand(Vec3(0, 0, 0.002));
+  step();
+  hand(Vec3(0, 0, -0.003));
+  step(1000);
+  ASSERT_NEAR(force().norm(), 1.5, 0.1);
+  hand(Vec3(0, 0, -0.003), Vec3(1.3, 0, 0));
+  step(2);
+  ASSERT_TRUE(force().isZero());
+  hand(Vec3(0, 0, -0.003));
+  for (double before = 0; force().norm() < 1.4; before = force().norm()) {
+    step();
+    ASSERT_LT(force().norm(), before + 0.01);
+  }
 }
 
 TEST_F(SteppedHdTest, ForceThatIsNotANumberIsRefused) {

@@ -267,6 +267,83 @@ TEST_F(OldForceTest, ReportsThatAStopHasReachedTheMotors) {
   EXPECT_TRUE(tick.stoppedAtZero());
 }
 
+// A device that ends forces by itself which are not renewed for 3 ms. Renders 2 N along y.
+class ForceLifeTest : public testing::Test {
+ protected:
+  ForceLifeTest() {
+    tick.snapshots().publish(constantForce(1, Vec3(0, 2, 0)));
+    run(1000);
+    EXPECT_NEAR(device.written_N.y(), 2, 1e-9);
+  }
+  static TickOptions options() {
+    TickOptions options = armed();
+    options.forceLife = kLife;
+    return options;
+  }
+  void pass(Nanos time) {
+    clock.advance(time);
+    tick(clock.now());
+  }
+  void run(int ticks) {
+    for (int i = 0; i < ticks; ++i) pass(kMs);
+  }
+
+  static constexpr Nanos kLife = 3 * kMs;
+  FakeDevice device;
+  FakeClock clock;
+  Tick tick{device, clock, options()};
+};
+
+TEST_F(ForceLifeTest, AfterAPauseThatEndedItTheForceStartsFromZero) {
+  for (const Nanos pause : {kLife + 1, 4 * kMs, 8 * kMs, 19 * kMs, 40 * kMs}) {
+    pass(pause);
+    EXPECT_TRUE(device.written_N.isZero(0)) << pause;
+    EXPECT_NE(tick.last().guard.active & bit(Trip::late), 0U);
+    EXPECT_TRUE(tick.last().force_N.isZero(0));
+    for (double before = 0; device.written_N.y() < 2 - 1e-9; before = device.written_N.y()) {
+      run(1);
+      ASSERT_LT(device.written_N.y(), before + 0.0041) << "it ramps over half a second";
+    }
+  }
+}
+
+TEST_F(ForceLifeTest, APauseThatItOutlivesChangesNothing) {
+  pass(kLife);
+  EXPECT_NEAR(device.written_N.y(), 2, 1e-9);
+  EXPECT_EQ(tick.last().guard.counts[static_cast<std::size_t>(Trip::late)], 0U);
+}
+
+TEST_F(ForceLifeTest, AForceThatEndsDuringTheTickIsNotBroughtBackByIt) {
+  device.onRead = [&] { clock.advance(2 * kMs); };
+  pass(2 * kMs);
+  EXPECT_TRUE(device.written_N.isZero(0));
+  device.onRead = nullptr;
+  run(2);
+  EXPECT_LT(device.written_N.y(), 0.01);
+}
+
+TEST_F(ForceLifeTest, AForceThatEndsDuringTheWriteIsFollowedByZero) {
+  device.context = &clock;
+  device.onWrite = [](void* context) { static_cast<FakeClock*>(context)->advance(2 * kMs); };
+  run(1);
+  const int before = device.writes;
+  pass(kMs);
+  EXPECT_EQ(device.writes, before + 2) << "2 ms between the writes, and 2 ms for this one";
+  EXPECT_TRUE(device.written_N.isZero(0));
+}
+
+TEST_F(ForceLifeTest, ADeviceWithoutSuchALifeKeepsItsForce) {
+  Tick other{device, clock, armed()};
+  other.snapshots().publish(constantForce(1, Vec3(0, 2, 0)));
+  for (int i = 0; i < 1000; ++i) {
+    clock.advance(kMs);
+    other(clock.now());
+  }
+  clock.advance(8 * kMs);
+  other(clock.now());
+  EXPECT_NEAR(device.written_N.y(), 2, 1e-9) << "it decays from there";
+}
+
 // A sheet 1 mm above the origin, 1000 N/m from both sides.
 class LostHandTest : public TickTest {
  protected:
