@@ -99,6 +99,10 @@ class Device {
   /// Commands a force in the device frame, in effect until the next write. While `hold` is set, the driver
   /// itself keeps the force at zero.
   virtual bool write(const Vec3& force_N) noexcept = 0;
+  /// In the servo thread, after a write of zero: none that was written before it can act any more, also if
+  /// all threads of this process stop now. A driver that sends in a thread of its own tells when that has
+  /// sent.
+  virtual bool zeroSent() const noexcept { return true; }
   /// Ends the force while the servo thread may be stuck in, or run, read() and write(); no force that was
   /// written before this call acts after it. False where the driver cannot: such a device ends forces that
   /// nobody renews by itself, or its driver runs isolated. Between start and stop of the loop, from one

@@ -196,6 +196,7 @@ void EvdevDevice::exchange(Nanos now) noexcept {
     const bool fresh = now - commandTime_ <= kCommandLife;
     good = effects_->set(fresh ? command.x_N : 0, fresh ? command.z_N : 0);
     nextForce_ = now + kForcePeriod;
+    if (good) sentZero_.sent(lastCommand_);
   }
   if (good) {
     failures_ = 0;
@@ -264,6 +265,7 @@ bool EvdevDevice::write(const Vec3& force_N) noexcept {
   const double size = force_N.norm();
   const Vec3 f = size > profile_.peakForce_N ? Vec3(profile_.peakForce_N / size * force_N) : force_N;
   command_.write({f.x(), f.z(), ++commands_});
+  sentZero_.wrote(commands_, f.isZero(0));
   return true;
 }
 

@@ -18,6 +18,7 @@
 #include "device/evdev/event_device.h"
 #include "device/evdev/force_effects.h"
 #include "device/evdev/wheel_profile.h"
+#include "device/sent_zero.h"
 #include "handoff/latest_value.h"
 
 namespace hapticd::device {
@@ -47,6 +48,7 @@ class EvdevDevice final : public Device {
 
   bool read(Nanos now, DeviceState& state) noexcept override;
   bool write(const Vec3& force_N) noexcept override;
+  bool zeroSent() const noexcept override { return sentZero_.isSent(); }
   std::string faultText() const override;
   bool lost() const noexcept override { return error_ != 0; }
 
@@ -103,6 +105,7 @@ class EvdevDevice final : public Device {
   handoff::LatestValue<Command> command_;
   handoff::LatestValue<Sample> sample_;
   std::uint64_t commands_ = 0;  // servo thread only
+  SentZero sentZero_;
 
   // Exchanging thread only.
   std::array<Axis, 2> axes_;

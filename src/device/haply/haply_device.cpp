@@ -89,6 +89,7 @@ void HaplyDevice::serve(haply::ServiceConnection& service) {
     last = stopping_;
     service.send(haply::forceMessage(deviceId_, last ? Vec3(Vec3::Zero()) : newestForce()), kReplyTime);
     take(service.receive(kReplyTime));
+    sentZero_.sent(lastCommand_);
   }
 }
 
@@ -136,6 +137,7 @@ bool HaplyDevice::write(const Vec3& force_N) noexcept {
   const double size = force_N.norm();
   const double most = profile_.peakForce_N;
   command_.write({size > most ? Vec3(most / size * force_N) : force_N, ++commands_});
+  sentZero_.wrote(commands_, force_N.isZero(0));
   const std::uint64_t one = 1;
   [[maybe_unused]] const auto written = ::write(wake_, &one, sizeof one);
   return true;

@@ -10,6 +10,7 @@
 
 #include "base/thread.h"
 #include "device/device.h"
+#include "device/sent_zero.h"
 #include "handoff/latest_value.h"
 
 namespace hapticd::device {
@@ -37,6 +38,8 @@ class HaplyDevice final : public Device {
 
   bool read(Nanos now, DeviceState& state) noexcept override;
   bool write(const Vec3& force_N) noexcept override;
+  /// The service has answered the message with the zero.
+  bool zeroSent() const noexcept override { return sentZero_.isSent(); }
   std::string faultText() const override;
 
  private:
@@ -75,6 +78,7 @@ class HaplyDevice final : public Device {
 
   // Servo thread only.
   std::uint64_t commands_ = 0;
+  SentZero sentZero_;  // and the driver's thread
 
   // Driver's thread only.
   std::string deviceId_;

@@ -70,6 +70,7 @@ class Exchange {
     const bool ended = command.number <= block_.endedUpTo.load(std::memory_order_acquire);
     const bool fresh = !ended && now - commandTime_ <= commandLife_ && command.force_N.allFinite();
     device_.write(fresh ? command.force_N : Vec3(Vec3::Zero()));
+    if (device_.zeroSent()) block_.sentUpTo.store(lastCommand_, std::memory_order_release);
   }
 
   void run() noexcept {

@@ -261,8 +261,19 @@ bool IsolatedDevice::read(Nanos now, DeviceState& state) noexcept {
 
 bool IsolatedDevice::write(const Vec3& force_N) noexcept {
   if (!memory_ || !force_N.allFinite()) return false;
-  (*memory_)->command.write({silent_ ? Vec3(Vec3::Zero()) : force_N, ++commands_});
+  const Vec3 wanted_N = silent_ ? Vec3(Vec3::Zero()) : force_N;
+  (*memory_)->command.write({wanted_N, ++commands_});
+  if (!wanted_N.isZero(0)) {
+    firstZero_ = 0;
+  } else if (firstZero_ == 0) {
+    firstZero_ = commands_;
+  }
   return true;
+}
+
+// The newest force may be left out when its process takes a later one.
+bool IsolatedDevice::zeroSent() const noexcept {
+  return memory_ && firstZero_ != 0 && (*memory_)->sentUpTo.load(std::memory_order_acquire) >= firstZero_;
 }
 
 // A command that is being written now has the next number at most.

@@ -44,6 +44,7 @@ class IsolatedDevice final : public Device {
 
   bool read(Nanos now, DeviceState& state) noexcept override;
   bool write(const Vec3& force_N) noexcept override;
+  bool zeroSent() const noexcept override;
   bool zeroFromOtherThread() noexcept override;
 
   /// Waits 5 ms at most for the driver's process, and tells what that said last where it takes longer.
@@ -99,6 +100,7 @@ class IsolatedDevice final : public Device {
   Nanos lastPost_ = 0;
   Nanos period_ = 0;  // between the last two posts
   Nanos postToTick_ = 0;
+  std::uint64_t firstZero_ = 0;  // of the commands since the last force; 0: the newest is a force
 };
 
 }  // namespace hapticd::device

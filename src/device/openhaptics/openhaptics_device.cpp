@@ -142,6 +142,7 @@ bool OpenHapticsDevice::write(const Vec3& force_N) noexcept {
   // A refusal tells the guard that the motors get zero: when the arm is slow again, it ramps the force in.
   const bool fast = state_.velocity_m_per_s.norm() > velocityLimit_m_per_s_;
   refuses_ = fast && (refuses_ || !force_N.isZero());
+  sentZero_.wrote(++commands_, refuses_ || force_N.isZero(0));
   if (refuses_) return false;
   command_N_ = force_N;
   return true;
@@ -172,6 +173,7 @@ void OpenHapticsDevice::onFrame() noexcept {
     api.setDoublev(hd::kCurrentGimbalTorque, kNoTorque);
   }
   api.endFrame(handle_);
+  sentZero_.sent(commands_);
 
   if (!calibrated_) updateCalibration(calibration);
   scheduler_->drainErrors();

@@ -12,6 +12,7 @@
 #include "device/device.h"
 #include "device/openhaptics/hd_scheduler.h"
 #include "device/openhaptics/thermal_derating.h"
+#include "device/sent_zero.h"
 
 namespace hapticd::device {
 
@@ -33,6 +34,8 @@ class OpenHapticsDevice final : public Device, private hd::Participant {
 
   bool read(Nanos now, DeviceState& state) noexcept override;
   bool write(const Vec3& force_N) noexcept override;
+  /// The frame of the zero has ended: one tick later.
+  bool zeroSent() const noexcept override { return sentZero_.isSent(); }
 
   std::string faultText() const override;
   bool lost() const noexcept override { return lost_; }
@@ -88,6 +91,8 @@ class OpenHapticsDevice final : public Device, private hd::Participant {
   DeviceState before_;  // of the frame before
   int sameFrames_ = 0;  // with a force, since the state last changed
   bool inTick_ = false;
+  std::uint64_t commands_ = 0;
+  SentZero sentZero_;
   bool refuses_ = false;  // forces, until the arm is slow again
   Vec3 command_N_ = Vec3::Zero();
   Vec3 written_N_ = Vec3::Zero();

@@ -57,7 +57,8 @@ void Tick::operator()(const Pacing& pacing) noexcept {
 
   report_.timing.compute = clock_.now() - started;
   publish();
-  stoppedAtZero_.store(guard_.seen().stopped && report_.force_N.isZero(0), std::memory_order_release);
+  stoppedAtZero_.store(guard_.seen().stopped && report_.force_N.isZero(0) && device_.zeroSent(),
+                       std::memory_order_release);
   finishedAt_.store(clock_.now(), std::memory_order_release);
 }
 

@@ -100,7 +100,7 @@ class Tick {
     overtakes_.fetch_add(1, std::memory_order_acq_rel);
     return device_.zeroFromOtherThread();
   }
-  /// Any thread: the last tick saw stop() and commanded zero.
+  /// Any thread: the last tick saw stop(), and the device has its zero.
   bool stoppedAtZero() const noexcept { return stoppedAtZero_.load(std::memory_order_acquire); }
   /// For the one consumer of reports.
   ReportRing& reports() noexcept { return reports_; }

@@ -41,7 +41,7 @@ class Station {
   void rampIn() noexcept;
   /// Any thread: forces are enabled and not stopped, and there is a person to feel them.
   bool armed() const noexcept;
-  /// Any thread: the servo has written zero since stopForces(), or has not run.
+  /// Any thread: the device has had a zero since stopForces(), or the servo has not run.
   bool isStoppedAtZero() const noexcept;
 
   /// Reopens a lost device; logs changes of its fault and returns the text for the clients. Call several

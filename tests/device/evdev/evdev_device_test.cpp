@@ -71,6 +71,37 @@ TEST_F(EvdevTest, PositionAndButtonsInTheDeviceFrame) {
   EXPECT_EQ(tick(*device, Vec3::Zero()).buttons, 0U);
 }
 
+TEST_F(EvdevTest, TellsWhenAZeroHasLeft) {
+  const auto device = make();
+  device->open();
+  for (int i = 0; i < 4; ++i) tick(*device, Vec3(1, 0, 0));
+  EXPECT_FALSE(device->zeroSent());
+  tick(*device, Vec3::Zero());
+  EXPECT_FALSE(device->zeroSent()) << "it waits for the exchange";
+  device->write(Vec3::Zero());
+  for (int i = 0; i < 2; ++i) device->exchange(now += kMs);
+  expectForce(0, 0);
+  EXPECT_TRUE(device->zeroSent());
+  device->write(Vec3::Zero());
+  EXPECT_TRUE(device->zeroSent()) << "a further zero changes nothing";
+  device->write(Vec3(1, 0, 0));
+  EXPECT_FALSE(device->zeroSent());
+  device->write(Vec3::Zero());
+  EXPECT_FALSE(device->zeroSent()) << "the force between may be on its way";
+  for (int i = 0; i < 2; ++i) device->exchange(now += kMs);
+  EXPECT_TRUE(device->zeroSent());
+}
+
+TEST_F(EvdevTest, AZeroThatTheKernelRefusesHasNotLeft) {
+  const auto device = make();
+  device->open();
+  for (int i = 0; i < 4; ++i) tick(*device, Vec3(1, 0, 0));
+  device->write(Vec3::Zero());
+  joystick.error = EIO;
+  for (int i = 0; i < 4; ++i) device->exchange(now += kMs);
+  EXPECT_FALSE(device->zeroSent());
+}
+
 TEST_F(EvdevTest, VelocityFollowsASteadyHand) {
   const auto device = make();
   device->open();

@@ -128,6 +128,28 @@ TEST_P(IsolationTest, StateAndForceCrossTheBoundary) {
   device.close();
 }
 
+TEST_P(IsolationTest, TellsWhenAZeroHasReachedTheDriver) {
+  IsolatedDevice device(host(GetParam()));
+  device.open();
+  std::atomic<bool> pushes{true};
+  std::atomic<bool> sent{false};
+  std::atomic<int> tooEarly{0};
+  device.start([&](Nanos) {
+    device.write(pushes ? Vec3(0, 1, 0) : Vec3(0, 0, 0));
+    sent = device.zeroSent();
+    if (sent && !force().isZero()) ++tooEarly;
+  });
+  for (int round = 0; round < 20; ++round) {
+    pushes = true;
+    ASSERT_TRUE(eventually([&] { return force().y() == 1; }));
+    EXPECT_FALSE(sent);
+    pushes = false;
+    EXPECT_TRUE(eventually([&] { return sent.load(); }));
+  }
+  device.stop();
+  EXPECT_EQ(tooEarly, 0);
+}
+
 TEST_P(IsolationTest, ACrashIsAFaultAndTheServerGoesOn) {
   IsolatedDevice device(host(GetParam()));
   device.open();

@@ -184,6 +184,25 @@ TEST_F(SteppedHdTest, AForceThatWasWithheldFromAQuickArmRampsIn) {
   }
 }
 
+TEST_F(SteppedHdTest, AZeroHasLeftWithItsFrame) {
+  device.open();
+  bool sent = false;
+  device.start([&](Nanos) {
+    device.write(wanted_N);
+    sent = device.zeroSent();
+  });
+  step(2);
+  EXPECT_TRUE(sent);
+  wanted_N = Vec3(0, 1, 0);
+  step();
+  EXPECT_FALSE(sent);
+  wanted_N = Vec3::Zero();
+  step();
+  EXPECT_FALSE(sent) << "in the tick, the motors still have the force of the last frame";
+  step();
+  EXPECT_TRUE(sent);
+}
+
 TEST_F(SteppedHdTest, ForceThatIsNotANumberIsRefused) {
   start();
   wanted_N = Vec3(0, std::nan(""), 0);

@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <sys/wait.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <string>
 
@@ -93,6 +94,46 @@ TEST_P(AfterTheServer, Evdev) {
   ASSERT_TRUE(pressJoystick(kernel, joystick)) << server->log();
   endServer();
   EXPECT_TRUE(eventually([&] { return joystick.isIdle(); })) << "the kernel ends the effects with their file";
+}
+
+class StoppedByItsTerminal : public InContact {
+ protected:
+  // SIGTSTP, until the kernel has stopped all of the server's threads.
+  void stopServer() {
+    server->signal(SIGTSTP);
+    siginfo_t info{};
+    ASSERT_EQ(waitid(P_PID, static_cast<id_t>(server->id()), &info, WSTOPPED | WNOWAIT), 0);
+    ASSERT_EQ(info.si_code, CLD_STOPPED) << server->log();
+  }
+  void endServer() {
+    server->signal(SIGCONT);
+    server->signal(SIGTERM);
+    server->end();
+  }
+};
+
+// A thread of the driver sends the force; it is stopped, too, and must have sent the zero.
+TEST_F(StoppedByItsTerminal, LeavesNoForceOnEvdev) {
+  scene.stiffness = 0.15F;  // less than the joystick's full force
+  device::FakeJoystick joystick;
+  EventKernel kernel(work.file("event0"), joystick);
+  serveJoystick();
+  ASSERT_TRUE(pressJoystick(kernel, joystick)) << server->log();
+  stopServer();
+  EXPECT_TRUE(eventually([&] {
+    const auto [x, z] = joystick.force();
+    return std::abs(x) + std::abs(z) == 0;
+  })) << "what the server sent before it was stopped arrives";
+  endServer();
+}
+
+TEST_F(StoppedByItsTerminal, LeavesNoForceOnHaply) {
+  device::MockService service;
+  service.follow(*arm);
+  serve({"--device", "haply:127.0.0.1:" + service.port()}, {});
+  stopServer();
+  EXPECT_TRUE(eventually([&] { return arm.left().isZero(); }));
+  endServer();
 }
 
 // A vendor's library may wait for a person there, and a calibration may move the arm.

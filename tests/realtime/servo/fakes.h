@@ -42,7 +42,10 @@ class FakeDevice final : public device::Device {
     return true;
   }
 
+  bool zeroSent() const noexcept override { return sends; }
+
   std::function<void()> onRead;
+  bool sends = true;
   int zeroes = 0;
   device::DeviceState state;
   bool gives = true;

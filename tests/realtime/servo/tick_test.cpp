@@ -267,6 +267,16 @@ TEST_F(OldForceTest, ReportsThatAStopHasReachedTheMotors) {
   EXPECT_TRUE(tick.stoppedAtZero());
 }
 
+TEST_F(OldForceTest, AStopHasNotReachedTheMotorsWhileTheDriverHasItsZero) {
+  device.sends = false;
+  tick.control().stop();
+  run(10 * kMs);
+  EXPECT_FALSE(tick.stoppedAtZero());
+  device.sends = true;
+  run(kMs);
+  EXPECT_TRUE(tick.stoppedAtZero());
+}
+
 // A device that ends forces by itself which are not renewed for 3 ms. Renders 2 N along y.
 class ForceLifeTest : public testing::Test {
  protected:
