@@ -115,11 +115,17 @@ class Device {
   /// True while nothing but close() and open() can bring the device back. Any thread but the servo's.
   virtual bool lost() const noexcept { return false; }
   /// A person consents to calibrate now, which may move the arm or require a certain pose; faultText()
-  /// explains what is needed. May block for seconds; forces are held meanwhile. Throws std::runtime_error on
-  /// failure. Not in the servo thread.
-  virtual void calibrate() {}
-  /// The device is about to be closed for good: where the driver can, an open() or calibrate() that runs in
-  /// another thread, or begins later, throws soon. Any thread; non-blocking.
+  /// explains what is needed. May block for seconds; forces are held meanwhile. `stopped` becomes true when a
+  /// person stops the forces, or did so before, or the device is about to be closed: the calibration then
+  /// ends within some milliseconds or does not begin. Throws std::runtime_error when it did not succeed, and
+  /// the arm is without force then. Not in the servo thread.
+  virtual void calibrate(const std::function<bool()>& /*stopped*/) {}
+  /// The same where nobody can stop it.
+  void calibrate() {
+    calibrate([] { return false; });
+  }
+  /// The device is about to be closed for good: where the driver can, an open() that runs in another thread,
+  /// or begins later, throws soon. Any thread; non-blocking.
   virtual void interrupt() noexcept {}
 
   /// Self-paced, after open(): calls `onTick` with the time of CLOCK_MONOTONIC once per period, in a thread

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "base/thread.h"
 #include "base/world.h"
 #include "device/profiles.h"
 
@@ -13,6 +14,7 @@ namespace {
 constexpr Nanos kMillisecond = 1'000'000;
 constexpr Nanos kStatusPeriod = 10'000'000;
 constexpr int kFailuresToFault = 3;
+constexpr const char* kStopped = "the calibration was stopped";
 constexpr double kWatchdogStep_s = 125e-6;
 constexpr double kGripClosed_rad = 0.05;
 constexpr double kGripOpen_rad = 0.10;
@@ -236,30 +238,62 @@ bool ForceDimensionDevice::switchOn() noexcept {
   return true;
 }
 
-void ForceDimensionDevice::calibrate() {
+void ForceDimensionDevice::calibrate(const std::function<bool()>& stopped) {
   if (id_ < 0) throw std::runtime_error("the Force Dimension device is not open");
   for (int i = 0; i < 1000; ++i) {
+    if (stopped()) throw std::runtime_error(kStopped);
     const Turn turn(busy_);
     if (!turn) {
       base::sleepFor(kMillisecond);
       continue;
     }
-    const auto id = static_cast<char>(id_);
     if (!calibrated_) {
       if (!api_->canCalibrate()) {
         throw std::runtime_error(
             "libdhd alone cannot calibrate: install libdrd, or calibrate with the vendor's tool");
       }
-      if (api_->autoInit(id) < 0) fail("the calibration failed");
-      if (api_->stopRegulation(true, id) < 0) fail("the calibration does not end");
-      calibrated_ = api_->isInitialized(id);
+      moveToCalibrate(stopped);
     }
     // The next force switches them on again.
-    if (api_->enableForce(0, id) < 0) fail("the amplifiers do not switch off");
     amplifiersOn_ = false;
+    if (api_->enableForce(0, static_cast<char>(id_)) < 0) fail("the amplifiers do not switch off");
     return;
   }
   throw std::runtime_error("the Force Dimension device is busy with another calibration");
+}
+
+// The library's call returns when the arm has moved, or when another thread ends its regulation. It may begin
+// to regulate after that thread has ended nothing, so the thread repeats that until the call has returned.
+void ForceDimensionDevice::moveToCalibrate(const std::function<bool()>& stopped) {
+  const auto id = static_cast<char>(id_);
+  std::atomic<bool> returned{false};
+  std::atomic<bool> ended{false};
+  base::BlockingThread person({.name = "calibration"}, [&] {
+    while (!returned) {
+      if (!ended && stopped()) ended = true;
+      if (ended) endRegulation();
+      base::sleepFor(kMillisecond);
+    }
+  });
+  const int result = api_->autoInit(id);
+  const char* words = result < 0 ? api_->errorGetLastStr() : nullptr;
+  const std::string reason = words != nullptr ? words : "no reason given";
+  returned = true;
+  person.join();
+  // Also after a failure, which leaves the arm where it was, with its motors on.
+  const bool over = endRegulation();
+  calibrated_ = api_->isInitialized(id);
+  if (ended) throw std::runtime_error(kStopped);
+  if (result < 0) throw std::runtime_error("the calibration failed: " + reason);
+  if (!over) fail("the calibration does not end");
+}
+
+bool ForceDimensionDevice::endRegulation() noexcept {
+  const auto id = static_cast<char>(id_);
+  const bool ended = api_->stopRegulation(false, id) >= 0;
+  const bool off = api_->enableForce(0, id) >= 0;
+  amplifiersOn_ = false;
+  return ended && off;
 }
 
 std::string ForceDimensionDevice::faultText() const {

@@ -38,12 +38,15 @@ class ForceDimensionDevice final : public Device {
   /// Button 0 is the device's own; button 1 is a closed gripper, whose opening is in the state, too.
   bool read(Nanos now, DeviceState& state) noexcept override;
   bool write(const Vec3& force_N) noexcept override;
+  /// A calibration drives the motors by itself.
+  bool zeroSent() const noexcept override { return !busy_; }
 
   std::string faultText() const override;
   bool lost() const noexcept override { return unreadable_; }
   /// MOVES THE ARM through its workspace when it is not calibrated. The next force switches on the amplifiers
   /// that the device switched off.
-  void calibrate() override;
+  void calibrate(const std::function<bool()>& stopped) override;
+  using Device::calibrate;
 
   /// Model and serial number. Valid after open().
   const std::string& description() const noexcept { return description_; }
@@ -58,6 +61,8 @@ class ForceDimensionDevice final : public Device {
   void sampleGripper() noexcept;
   void checkStatus(Nanos now) noexcept;
   bool switchOn() noexcept;
+  void moveToCalibrate(const std::function<bool()>& stopped);
+  bool endRegulation() noexcept;
 
   const ForceDimensionOptions options_;
   std::unique_ptr<const dhd::Api> api_;

@@ -1,5 +1,6 @@
 #include "device/isolation/device_host.h"
 
+#include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -94,11 +95,19 @@ class Exchange {
   Nanos commandTime_ = 0;
 };
 
-std::string answer(const std::string& request, Device& device, Exchange& exchange) {
+bool serverIsGone() {
+  pollfd server{kSocketDescriptor, 0, 0};
+  return poll(&server, 1, 0) > 0 && (server.revents & (POLLHUP | POLLERR)) != 0;
+}
+
+std::string answer(const std::string& request, Device& device, SharedBlock& block, Exchange& exchange) {
+  const auto stopped = [&] {
+    return block.stopsCalibration.load(std::memory_order_acquire) != 0 || serverIsGone();
+  };
   try {
     if (request == "start") exchange.start();
     if (request == "stop") exchange.stop();
-    if (request == "calibrate") device.calibrate();
+    if (request == "calibrate") device.calibrate(stopped);
     return "+" + (request == "fault" ? device.faultText() : std::string());
   } catch (const std::exception& error) {
     return std::string("-") + error.what();
@@ -142,7 +151,7 @@ int runDeviceHost(Device& device, const DeviceHostOptions& options) {
       Exchange exchange(device, *memory, options);
       send("+");
       for (std::string request = receive(); !request.empty(); request = receive()) {
-        send(answer(request, device, exchange));
+        send(answer(request, device, *memory, exchange));
       }
     }
     device.close();

@@ -33,6 +33,7 @@ constexpr int kEnding_ms = 100;
 constexpr int kGlance_ms = 5;               // the thread that asks for a fault has other things to do
 constexpr Nanos kNoAnswer = 5'000'000'000;  // less may be a busy machine
 constexpr int kInterrupt_ms = 50;
+constexpr int kStop_ms = 2;
 constexpr Nanos kInOrder = 2'000'000'000;
 constexpr Nanos kSilence = 20'000'000;
 constexpr Nanos kSilentTick = 10'000'000;
@@ -115,12 +116,14 @@ void IsolatedDevice::spawn(int socketOfChild) {
   process_ = process;
 }
 
-std::string IsolatedDevice::receive(Nanos end, Wait wait) const {
+std::string IsolatedDevice::receive(Nanos end, Wait wait, const Meanwhile& meanwhile) const {
   pollfd wanted{socket_, POLLIN, 0};
   for (;;) {
+    if (meanwhile) meanwhile(end);
     if (wait == Wait::untilInterrupted && interrupted_)
       throw std::runtime_error("the device is being closed for good");
-    const Nanos left_ms = std::clamp<Nanos>((end - base::now()) / kMillisecond, 0, kInterrupt_ms);
+    const Nanos left_ms =
+        std::clamp<Nanos>((end - base::now()) / kMillisecond, 0, meanwhile ? kStop_ms : kInterrupt_ms);
     if (poll(&wanted, 1, static_cast<int>(left_ms)) != 0) break;
     if (left_ms == 0) throw NoAnswer();
   }
@@ -134,12 +137,12 @@ std::string IsolatedDevice::receive(Nanos end, Wait wait) const {
   return {text.data(), static_cast<std::size_t>(size)};
 }
 
-std::string IsolatedDevice::ask(const std::string& request, int most_ms, Wait wait) const {
+std::string IsolatedDevice::ask(const std::string& request, int most_ms) const {
   const std::unique_lock lock(socketMutex_, std::try_to_lock);
   if (!lock) throw std::runtime_error("the driver's process is busy with another request");
   if (socket_ < 0) throw std::runtime_error("the device is not open");
   send(request);
-  return takeAnswers(base::now() + most_ms * kMillisecond, wait);
+  return takeAnswers(base::now() + most_ms * kMillisecond, Wait::toTheEnd);
 }
 
 void IsolatedDevice::send(const std::string& request) const {
@@ -151,11 +154,11 @@ void IsolatedDevice::send(const std::string& request) const {
 
 // Answers come in the order of the requests, and those to requests that timed out come first. A driver tells
 // of some faults once, so the text of such an answer is kept.
-std::string IsolatedDevice::takeAnswers(Nanos end, Wait wait) const {
-  std::string answer = receive(end, wait);
+std::string IsolatedDevice::takeAnswers(Nanos end, Wait wait, const Meanwhile& meanwhile) const {
+  std::string answer = receive(end, wait, meanwhile);
   while (--unanswered_ > 0) {
     if (answer.size() > 1 && answer.starts_with('+')) late_ = answer.substr(1);
-    answer = receive(end, wait);
+    answer = receive(end, wait, meanwhile);
   }
   return textOf(answer);
 }
@@ -306,8 +309,25 @@ std::string IsolatedDevice::faultText() const {
   return *fault_;
 }
 
-void IsolatedDevice::calibrate() {
-  ask("calibrate", kCalibrate_ms, Wait::untilInterrupted);
+// After a stop the arm may move until the answer comes; a driver that gives none does not delay the end.
+void IsolatedDevice::calibrate(const std::function<bool()>& stopped) {
+  const std::unique_lock lock(socketMutex_, std::try_to_lock);
+  if (!lock) throw std::runtime_error("the driver's process is busy with another request");
+  if (socket_ < 0) throw std::runtime_error("the device is not open");
+  std::atomic<std::uint32_t>& stops = (*memory_)->stopsCalibration;
+  stops = 0;
+  send("calibrate");
+  const auto passOn = [&](Nanos& end) {
+    if (stops != 0 || (!interrupted_ && !stopped())) return;
+    stops = 1;
+    end = base::now() + kAnswer_ms * kMillisecond;
+  };
+  try {
+    takeAnswers(base::now() + kCalibrate_ms * kMillisecond, Wait::toTheEnd, passOn);
+  } catch (...) {
+    stops = 1;
+    throw;
+  }
 }
 
 }  // namespace hapticd::device

@@ -50,7 +50,8 @@ class IsolatedDevice final : public Device {
   /// Waits 5 ms at most for the driver's process, and tells what that said last where it takes longer.
   std::string faultText() const override;
   bool lost() const noexcept override { return silent_ || lostThere_; }
-  void calibrate() override;
+  void calibrate(const std::function<bool()>& stopped) override;
+  using Device::calibrate;
   void interrupt() noexcept override { interrupted_ = true; }
 
   void start(std::function<void(Nanos)> onTick) override;
@@ -65,10 +66,11 @@ class IsolatedDevice final : public Device {
  private:
   void spawn(int socketOfChild);
   enum class Wait { toTheEnd, untilInterrupted };
-  std::string receive(Nanos end, Wait wait) const;
-  std::string ask(const std::string& request, int most_ms, Wait wait = Wait::toTheEnd) const;
+  using Meanwhile = std::function<void(Nanos& end)>;  // often while an answer is waited for
+  std::string receive(Nanos end, Wait wait, const Meanwhile& meanwhile = {}) const;
+  std::string ask(const std::string& request, int most_ms) const;
   void send(const std::string& request) const;
-  std::string takeAnswers(Nanos end, Wait wait) const;
+  std::string takeAnswers(Nanos end, Wait wait, const Meanwhile& meanwhile = {}) const;
   std::string howItEnded(int most_ms) const;
   void run() noexcept;
   void waitForPost(std::uint32_t seen) const noexcept;

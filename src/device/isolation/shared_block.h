@@ -82,8 +82,9 @@ struct SharedBlock {
   std::atomic<std::uint32_t> posts{0};
   handoff::LatestValue<Posted> state;
   handoff::LatestValue<Command> command;
-  std::atomic<std::uint64_t> sentUpTo{0};   ///< the driver has sent its command, or a zero after it
-  std::atomic<std::uint64_t> endedUpTo{0};  ///< commands up to this number exert no force any more
+  std::atomic<std::uint32_t> stopsCalibration{0};  ///< 1: one that runs ends
+  std::atomic<std::uint64_t> sentUpTo{0};          ///< the driver has sent its command, or a zero after it
+  std::atomic<std::uint64_t> endedUpTo{0};         ///< commands up to this number exert no force any more
 };
 static_assert(std::atomic<std::uint32_t>::is_always_lock_free &&
               std::atomic<std::uint8_t>::is_always_lock_free);

@@ -294,7 +294,7 @@ void OpenHapticsDevice::onError(hd::Enum code) noexcept {
   }
 }
 
-void OpenHapticsDevice::calibrate() {
+void OpenHapticsDevice::calibrate(const std::function<bool()>& stopped) {
   if (!started_)
     throw std::runtime_error("calibration needs the servo loop of the OpenHaptics device to run");
   consent_ = true;
@@ -302,6 +302,10 @@ void OpenHapticsDevice::calibrate() {
     if ((hold_ & kHoldNotCalibrated) == 0) {
       consent_ = false;
       return;
+    }
+    if (stopped()) {
+      consent_ = false;
+      throw std::runtime_error("the calibration was stopped");
     }
     base::sleepFor(10 * kMillisecond);
   }

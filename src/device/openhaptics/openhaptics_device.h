@@ -41,7 +41,8 @@ class OpenHapticsDevice final : public Device, private hd::Participant {
   bool lost() const noexcept override { return lost_; }
   /// Encoder reset: the arm must be in its reset position. Inkwell: the stylus must be docked, which counts
   /// as consent where the device has the switch. The loop must run.
-  void calibrate() override;
+  void calibrate(const std::function<bool()>& stopped) override;
+  using Device::calibrate;
 
   DeviceTraits traits() const noexcept override {
     return {.selfPaced = true, .ticksInVendorThread = true, .calibratesInLoop = true};

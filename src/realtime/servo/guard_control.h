@@ -15,11 +15,15 @@ class GuardControl {
   GuardControl& operator=(const GuardControl&) = delete;
 
   /// Zero force until rearm().
-  void stop() noexcept { word_.fetch_or(kStopped, std::memory_order_acq_rel); }
+  void stop() noexcept {
+    std::uint64_t old = word_.load(std::memory_order_relaxed);
+    while (!word_.compare_exchange_weak(old, (old + kStop) | kStopped, std::memory_order_acq_rel)) {
+    }
+  }
   /// Ends a stop and clears latched trips; the force ramps in. Does not arm a disarmed device.
   void rearm() noexcept {
     std::uint64_t old = word_.load(std::memory_order_relaxed);
-    while (!word_.compare_exchange_weak(old, (old + kRearm) & ~kStopped, std::memory_order_acq_rel)) {
+    while (!word_.compare_exchange_weak(old, rearmed(old), std::memory_order_acq_rel)) {
     }
   }
   /// Allows forces; for a real device the operator decides.
@@ -28,6 +32,8 @@ class GuardControl {
   /// Lets the force ramp in from zero again, as after a reset of the scene.
   void rampIn() noexcept { ramps_.fetch_add(1, std::memory_order_acq_rel); }
 
+  /// Counts calls of stop().
+  std::uint32_t stops() const noexcept { return stopsOf(word_.load(std::memory_order_acquire)); }
   bool stopped() const noexcept { return (word_.load(std::memory_order_acquire) & kStopped) != 0; }
   bool armed() const noexcept { return (word_.load(std::memory_order_acquire) & kDisarmed) == 0; }
 
@@ -40,7 +46,7 @@ class GuardControl {
   };
   Seen read() const noexcept {
     const std::uint64_t word = word_.load(std::memory_order_acquire);
-    return {(word & kStopped) != 0, (word & kDisarmed) == 0, word / kRearm,
+    return {(word & kStopped) != 0, (word & kDisarmed) == 0, (word & kRearms) / kRearm,
             ramps_.load(std::memory_order_acquire)};
   }
 
@@ -48,6 +54,15 @@ class GuardControl {
   static constexpr std::uint64_t kStopped = 1;
   static constexpr std::uint64_t kDisarmed = 2;
   static constexpr std::uint64_t kRearm = 4;
+  static constexpr std::uint64_t kStop = 1ULL << 32;
+  static constexpr std::uint64_t kRearms = kStop - kRearm;  // the bits that count them
+
+  static constexpr std::uint32_t stopsOf(std::uint64_t word) noexcept {
+    return static_cast<std::uint32_t>(word / kStop);
+  }
+  static constexpr std::uint64_t rearmed(std::uint64_t word) noexcept {
+    return ((word & ~kRearms) | ((word + kRearm) & kRearms)) & ~kStopped;
+  }
 
   std::atomic<std::uint64_t> word_;
   std::atomic<std::uint32_t> ramps_{0};

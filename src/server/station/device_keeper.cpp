@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <exception>
+#include <stdexcept>
 #include <utility>
 
 #include "base/clock.h"
@@ -109,7 +110,8 @@ std::string DeviceKeeper::poll(Nanos now) {
 
 void DeviceKeeper::calibrate() {
   if (attempt_.running() || !openError_.empty()) return;
-  startAttempt("the device is being calibrated: keep hands off", [this] { runCalibration(); });
+  startAttempt("the device is being calibrated: keep hands off",
+               [this, stops = tick_.control().stops()] { runCalibration(stops); });
 }
 
 void DeviceKeeper::startAttempt(std::string text, std::function<void()> attempt) {
@@ -125,10 +127,14 @@ void DeviceKeeper::startAttempt(std::string text, std::function<void()> attempt)
                           });
 }
 
-void DeviceKeeper::runCalibration() noexcept {
+void DeviceKeeper::runCalibration(std::uint32_t stops) noexcept {
+  const auto stopped = [&] {
+    return ending_ || tick_.control().stopped() || tick_.control().stops() != stops;
+  };
   calibrationError_.clear();
   try {
-    device_.calibrate();
+    if (stopped()) throw std::runtime_error("the forces were stopped before it began");
+    device_.calibrate(stopped);
   } catch (const std::exception& error) {
     calibrationError_ = error.what();
   }

@@ -38,7 +38,8 @@ class DeviceKeeper {
   /// reopens a device that has been lost for 0.5 s; retries every 2 s until it opens.
   std::string poll(base::Nanos now);
   /// Starts a calibration, which may move the arm: call only with the operator's consent. The loop keeps
-  /// running; poll() returns the result. No effect while the device is being reopened or calibrated.
+  /// running; poll() returns the result. A stop of the forces ends it, and one that stands prevents it. No
+  /// effect while the device is being reopened or calibrated.
   void calibrate();
 
   /// How long no tick has ended; 0 without a loop. Any thread.
@@ -55,7 +56,7 @@ class DeviceKeeper {
   void stopLoop() noexcept;
   void startAttempt(std::string text, std::function<void()> attempt);
   void reopen() noexcept;
-  void runCalibration() noexcept;
+  void runCalibration(std::uint32_t stops) noexcept;
   void logSetup(const realtime::ThreadSetup& setup) const;
   void logPacedSetup();
 

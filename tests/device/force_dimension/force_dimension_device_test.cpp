@@ -10,7 +10,9 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <functional>
 #include <stdexcept>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -231,6 +233,57 @@ TEST_F(DhdTest, TheLoopGoesOnDuringACalibrationAndKeepsOutOfIt) {
   EXPECT_GT(held, 0);
   now += 10'000'000;
   EXPECT_EQ(tick(Vec3::Zero()).hold, kHoldNone);
+}
+
+std::string calibration(Device& device, const std::function<bool()>& stopped) {
+  try {
+    device.calibrate(stopped);
+    return "calibrated";
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+}
+
+TEST_F(DhdTest, AStopEndsACalibrationAndLeavesTheMotorsOff) {
+  mock->calibrated(0);
+  mock->calibrationTime(600);
+  device.open();
+  tick(Vec3::Zero());
+  std::atomic<bool> stopped{false};
+  std::string words;
+  std::thread person([&] { words = calibration(device, [&] { return stopped.load(); }); });
+  while (mock->calibrations() == 0) std::this_thread::yield();
+  EXPECT_EQ(tick(Vec3::Zero()).hold, kHoldNotCalibrated);
+  EXPECT_FALSE(device.zeroSent()) << "the calibration drives the motors";
+  stopped = true;
+  person.join();
+  EXPECT_THAT(words, HasSubstr("stopped"));
+  EXPECT_EQ(mock->regulating(), 0);
+  EXPECT_EQ(mock->amplifiersOn(), 0);
+  EXPECT_TRUE(device.zeroSent());
+  now += 10'000'000;
+  EXPECT_EQ(tick(Vec3::Zero()).hold, kHoldNotCalibrated);
+  mock->calibrationTime(0);
+  device.calibrate();
+  now += 10'000'000;
+  EXPECT_EQ(tick(Vec3::Zero()).hold, kHoldNone) << "when a person consents again";
+}
+
+TEST_F(DhdTest, AStopBeforeACalibrationPreventsIt) {
+  mock->calibrated(0);
+  device.open();
+  EXPECT_THAT(calibration(device, [] { return true; }), HasSubstr("stopped"));
+  EXPECT_EQ(mock->calibrations(), 0);
+}
+
+TEST_F(DhdTest, ACalibrationThatFailsLeavesTheMotorsOff) {
+  mock->calibrated(0);
+  mock->calibrationTime(-1);
+  device.open();
+  EXPECT_THAT(calibration(device, [] { return false; }), AllOf(HasSubstr("failed"), HasSubstr("mock error")));
+  EXPECT_EQ(mock->regulating(), 0);
+  EXPECT_EQ(mock->amplifiersOn(), 0);
+  EXPECT_EQ(tick(Vec3::Zero()).hold, kHoldNotCalibrated);
 }
 
 TEST_F(DhdTest, WithoutDrdThereIsNoCalibration) {

@@ -218,6 +218,21 @@ TEST_P(IsolationTest, AnOpeningThatHangsIsInterrupted) {
   EXPECT_EQ(refusal(device), "the device is being closed for good");
 }
 
+TEST_P(IsolationTest, AStopReachesACalibration) {
+  IsolatedDevice device(host(GetParam()));
+  device.open();
+  hand->fault = 5;
+  try {
+    device.calibrate([&] { return hand->calibrations == 1; });
+    ADD_FAILURE() << "it was stopped";
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "a person stopped it") << "the driver itself says so";
+  }
+  hand->fault = 0;
+  hand->calibrations = 0;
+  device.calibrate();
+}
+
 TEST_P(IsolationTest, ACalibrationThatHangsIsInterrupted) {
   IsolatedDevice device(host(GetParam()));
   device.open();

@@ -55,9 +55,10 @@ class ObservedDevice final : public Device {
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
     return "told once";
   }
-  void calibrate() override {
+  void calibrate(const std::function<bool()>& stopped) override {
     ++hand_.calibrations;
-    while (hand_.fault == 5) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    while (hand_.fault == 5 && !stopped()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    if (stopped()) throw std::runtime_error("a person stopped it");
     if (hand_.calibrations > 1) throw std::runtime_error("once is enough");
   }
 

@@ -25,6 +25,7 @@ struct Mock {
   bool open = false;
   bool calibrated = true;
   int calibrations = 0;
+  bool regulating = false;  // a thread of the library drives the motors
   double calibrationTime = 0;
   double position[3] = {};
   double velocity[3] = {};
@@ -63,8 +64,8 @@ std::atomic<bool> calibrating{false};
 using Lock = std::lock_guard<std::mutex>;
 
 // Every call on a device passes here.
-Mock& device(char id) {
-  if (calibrating) crash("a call in the middle of a calibration");
+Mock& device(char id, bool endsCalibration = false) {
+  if (calibrating && !endsCalibration) crash("a call in the middle of a calibration");
   if (!mock().open || id != 0) crash("a call without a device");
   return mock();
 }
@@ -137,6 +138,7 @@ EXPORT int dhdClose(char id) {
   const Lock lock(mock().mutex);
   Mock& m = device(id);
   if (m.amplifiers) crash("closed with the amplifiers on");
+  if (m.regulating) crash("closed in the middle of a regulation");
   if (m.shared) ++m.shared->closed;
   m.open = false;
   return 0;
@@ -222,7 +224,7 @@ EXPORT int dhdSetForceAndTorqueAndGripperForce(double fx, double fy, double fz, 
 
 EXPORT int dhdEnableForce(unsigned char on, char id) {
   const Lock lock(mock().mutex);
-  Mock& m = device(id);
+  Mock& m = device(id, on == 0);
   if (on != 0 && m.gravity < 0) crash("amplifiers on before gravity compensation was chosen");
   m.amplifiers = on != 0;
   m.sinceCommand = 0;
@@ -293,20 +295,28 @@ EXPORT int drdAutoInit(char id) {
     Mock& m = device(id);
     ++m.calibrations;
     seconds = m.calibrationTime;
-    m.amplifiers = true;
+    m.amplifiers = m.regulating = true;
     calibrating = true;
   }
-  std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+  const auto goesOn = [] {
+    const Lock lock(mock().mutex);
+    return mock().regulating;
+  };
+  while (goesOn() && std::chrono::steady_clock::now() < end)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
   const Lock lock(mock().mutex);
   calibrating = false;
-  if (seconds < 0) return -1;
+  if (seconds < 0 || !mock().regulating) return -1;
   mock().calibrated = true;
   return 0;
 }
 
 EXPORT int drdStop(bool forceOn, char id) {
   const Lock lock(mock().mutex);
-  device(id).amplifiers = forceOn;
+  Mock& m = device(id, true);
+  m.regulating = false;
+  m.amplifiers = forceOn;
   return 0;
 }
 
@@ -328,6 +338,7 @@ const MockDhd kControl = {
       m.name = "omega.3";
       m.open = m.amplifiers = m.hasGripper = false;
       m.calibrated = true;
+      m.regulating = false;
       m.calibrations = m.buttons = m.failReads = m.watchdog = 0;
       m.calibrationTime = m.sinceCommand = 0;
       m.gravity = m.timeGuard = -1;
@@ -403,6 +414,7 @@ const MockDhd kControl = {
     [] { return get<int>([](Mock& m) { return m.timeGuard; }); },
     [] { return get<int>([](Mock& m) { return m.watchdog; }); },
     [] { return get<double>([](Mock& m) { return m.maxForce; }); },
+    [] { return get<int>([](Mock& m) { return m.regulating ? 1 : 0; }); },
 };
 
 }  // namespace

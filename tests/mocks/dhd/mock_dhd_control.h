@@ -18,7 +18,7 @@ struct MockDhd {
   void (*status)(int index, int value);
   /// Time passes for the device: its watchdog may fire.
   void (*elapse)(double seconds);
-  /// Seconds that a calibration takes.
+  /// Seconds that a calibration takes; below 0: it fails at once.
   void (*calibrationTime)(double seconds);
 
   /// What the motors give: zero with the amplifiers off.
@@ -32,6 +32,8 @@ struct MockDhd {
   int (*timeGuard)();
   int (*watchdog)();
   double (*maxForce)();
+  /// A thread of the library drives the motors.
+  int (*regulating)();
 };
 
 const MockDhd* mockDhd();

@@ -68,9 +68,10 @@ class ScriptedDevice final : public device::Device {
     ++zeroes;
     return true;
   }
-  void calibrate() override {
+  void calibrate(const std::function<bool()>& stopped) override {
     ++calibrations;
-    while (calibrationBlocks && !isInterrupted) std::this_thread::sleep_for(1ms);
+    while (calibrationBlocks && !stopped()) std::this_thread::sleep_for(1ms);
+    if (stopped()) throw std::runtime_error("a person stopped it");
     if (calibrationFails) throw std::runtime_error("a hand was in the way");
     isCalibrated = true;
   }
@@ -199,6 +200,31 @@ TEST_P(KeeperTest, ReportsAFailedCalibrationUntilOneSucceeds) {
   EXPECT_TRUE(eventually([&] { return keeper_.poll(1100 * kMs).empty(); }));
   device_.isCalibrated = false;
   EXPECT_EQ(keeper_.poll(1200 * kMs), "not calibrated");
+}
+
+TEST_P(KeeperTest, AStopEndsACalibration) {
+  keeper_.start();
+  device_.isCalibrated = false;
+  device_.calibrationBlocks = true;
+  keeper_.calibrate();
+  EXPECT_TRUE(eventually([&] { return device_.calibrations == 1; }));
+  tick_.control().stop();
+  tick_.control().rearm();  // another person, at once
+  EXPECT_TRUE(eventually([&] {
+    return keeper_.poll(1000 * kMs) == "not calibrated; the last calibration failed: a person stopped it";
+  }));
+}
+
+TEST_P(KeeperTest, AStopThatStandsPreventsACalibration) {
+  keeper_.start();
+  device_.isCalibrated = false;
+  tick_.control().stop();
+  keeper_.calibrate();
+  EXPECT_TRUE(eventually([&] {
+    return keeper_.poll(1000 * kMs) ==
+           "not calibrated; the last calibration failed: the forces were stopped before it began";
+  }));
+  EXPECT_EQ(device_.calibrations, 0);
 }
 
 TEST_P(KeeperTest, AHangingLoopGivesNoForceAndIsReported) {
