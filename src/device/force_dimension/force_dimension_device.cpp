@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
+#include <set>
 #include <stdexcept>
 
 #include "base/thread.h"
@@ -53,6 +55,25 @@ DeviceProfile nearestProfile(const std::string& name) {
 
 }  // namespace
 
+// The arms of this process. The library gives an arm that is open already to whoever opens it once more, and
+// its numbers change when an arm is removed.
+class ForceDimensionDevice::Arms {
+ public:
+  /// One at a time opens and closes.
+  static std::unique_lock<std::mutex> lock() { return std::unique_lock(arms().mutex_); }
+  static bool isHeld(int id) { return arms().held_.count(id) != 0; }
+  static void hold(int id) { arms().held_.insert(id); }
+  static void release(int id) { arms().held_.erase(id); }
+
+ private:
+  static Arms& arms() {
+    static Arms all;
+    return all;
+  }
+  std::mutex mutex_;
+  std::set<int> held_;
+};
+
 // Grants access to the library to either a calibration or the servo. The servo never waits for it.
 class ForceDimensionDevice::Turn {
  public:
@@ -79,14 +100,16 @@ void ForceDimensionDevice::open() {
   if (id_ >= 0) return;
   api_ = std::make_unique<const dhd::Api>(DynamicLibrary(dhd::libraryNames()));
   const int count = api_->getDeviceCount();
-  if (count <= options_.index) {
+  if (count <= (serial_ ? 0 : options_.index)) {
     throw std::runtime_error("Force Dimension device " + std::to_string(options_.index) +
                              " is not there: " + std::to_string(std::max(count, 0)) +
                              " found; check power, cable and the udev rule for vendor 1451");
   }
-  const auto openID = api_->canCalibrate() ? api_->openForCalibration : api_->openID;
-  id_ = openID(static_cast<char>(options_.index));
-  if (id_ < 0) fail("Force Dimension device " + std::to_string(options_.index) + " does not open");
+  {
+    const auto lock = Arms::lock();
+    id_ = openArm(count);
+    Arms::hold(id_);
+  }
   try {
     configure();
   } catch (...) {
@@ -101,16 +124,55 @@ void ForceDimensionDevice::open() {
   hold_ = calibrated_ ? kHoldNone : kHoldNotCalibrated;
 }
 
+// The one of the configured number; later the same arm again, whatever its number is then.
+int ForceDimensionDevice::openArm(int count) {
+  const auto openID = api_->canCalibrate() ? api_->openForCalibration : api_->openID;
+  const int first = serial_ ? 0 : options_.index;
+  const int last = serial_ ? count - 1 : options_.index;
+  std::string others;
+  for (int index = first; index <= last; ++index) {
+    const int id = openID(static_cast<char>(index));
+    if (id < 0) {
+      if (!serial_) fail("Force Dimension device " + std::to_string(index) + " does not open");
+      continue;
+    }
+    if (Arms::isHeld(id)) {  // not closed: it is another's
+      others += (others.empty() ? "" : ", ") + std::to_string(index) + " is open already";
+      continue;
+    }
+    const std::optional<int> serial = serialOf(id);
+    if (!serial_ || serial == serial_) {
+      serial_ = serial;
+      return id;
+    }
+    others += (others.empty() ? "" : ", ") + std::to_string(index) + " has the serial number " +
+              (serial ? std::to_string(*serial) : "?");
+    closeArm(id);
+  }
+  throw std::runtime_error(
+      "the Force Dimension device " +
+      (serial_ ? "with the serial number " + std::to_string(*serial_) : std::to_string(options_.index)) +
+      " is not there" + (others.empty() ? "" : ": device " + others) + "; check power and cable");
+}
+
+std::optional<int> ForceDimensionDevice::serialOf(int id) const {
+  unsigned short serial = 0;
+  if (api_->getSerialNumber == nullptr || api_->getSerialNumber(&serial, static_cast<char>(id)) < 0)
+    return {};
+  return serial;
+}
+
+void ForceDimensionDevice::closeArm(int id) const noexcept {
+  (api_->canCalibrate() ? api_->closeForCalibration : api_->close)(static_cast<char>(id));
+}
+
 // Set everything explicitly: a device keeps the settings of the last program.
 void ForceDimensionDevice::configure() {
   const auto id = static_cast<char>(id_);
   const char* name = api_->getSystemName(id);
   profile_ = nearestProfile(name != nullptr ? name : "");
   description_ = profile_.model;
-  unsigned short serial = 0;
-  if (api_->getSerialNumber != nullptr && api_->getSerialNumber(&serial, id) >= 0) {
-    description_ += ", serial number " + std::to_string(serial);
-  }
+  if (serial_) description_ += ", serial number " + std::to_string(*serial_);
   profile_.hasGripper =
       api_->getGripperAngleRad != nullptr && api_->hasGripper != nullptr && api_->hasGripper(id);
   profile_.buttons = profile_.hasGripper ? 2 : 1;
@@ -138,7 +200,11 @@ void ForceDimensionDevice::close() noexcept {
   api_->setForceAndTorqueAndGripperForce(0, 0, 0, 0, 0, 0, 0, id);
   api_->enableForce(0, id);
   api_->stop(id);
-  (api_->canCalibrate() ? api_->closeForCalibration : api_->close)(id);
+  {
+    const auto lock = Arms::lock();
+    closeArm(id_);
+    Arms::release(id_);
+  }
   amplifiersOn_ = false;
   id_ = -1;
 }

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <atomic>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "device/device.h"
@@ -53,7 +54,11 @@ class ForceDimensionDevice final : public Device {
 
  private:
   class Turn;
+  class Arms;
 
+  int openArm(int count);
+  std::optional<int> serialOf(int id) const;
+  void closeArm(int id) const noexcept;
   void configure();
   [[noreturn]] void fail(const std::string& what) const;
   bool sample(Nanos now) noexcept;
@@ -67,6 +72,7 @@ class ForceDimensionDevice final : public Device {
   const ForceDimensionOptions options_;
   std::unique_ptr<const dhd::Api> api_;
   int id_ = -1;
+  std::optional<int> serial_;  // since the first opening: another arm is never taken for this one
   DeviceProfile profile_;
   std::string description_;
   std::atomic<std::uint32_t> hold_{kHoldNone};

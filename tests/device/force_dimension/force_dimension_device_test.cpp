@@ -365,6 +365,80 @@ TEST_F(DhdTest, APlaneFeelsAsOnTheSimulatedDevice) {
   EXPECT_TRUE(force().isZero());
 }
 
+class TwoArmsTest : public DhdTest {
+ protected:
+  void SetUp() override {
+    DhdTest::SetUp();
+    mock->devices(2, "omega.3");
+    left.open();
+    right.open();
+  }
+  void push(ForceDimensionDevice& arm, double up_N) {
+    now += 1'000'000;
+    DeviceState state;
+    arm.read(now, state);
+    arm.write(Vec3(0, up_N, 0));
+  }
+  double force(int arm) const {
+    double f[3];
+    mock->forceOf(arm, f);
+    return f[2];
+  }
+
+  ForceDimensionDevice left{{.index = 0}};
+  ForceDimensionDevice right{{.index = 1}};
+};
+
+TEST_F(TwoArmsTest, EachHasItsOwn) {
+  push(left, 1);
+  push(right, 2);
+  EXPECT_EQ(force(0), 1);
+  EXPECT_EQ(force(1), 2);
+  EXPECT_THAT(left.description(), HasSubstr("4711"));
+  EXPECT_THAT(right.description(), HasSubstr("4712"));
+}
+
+// The other one gets the number of the arm that lost its power.
+TEST_F(TwoArmsTest, OneThatIsLostIsNotReopenedAsTheOther) {
+  push(right, 2);
+  mock->power(0, 0);
+  for (int i = 0; i < 5; ++i) push(left, 0);
+  EXPECT_TRUE(left.lost());
+  left.close();
+  EXPECT_THAT(refusal(left), AllOf(HasSubstr("4711"), HasSubstr("open already")));
+  push(right, 2);
+  EXPECT_EQ(force(1), 2) << "nothing has happened to it";
+  EXPECT_EQ(mock->isOpenArm(1), 1);
+  mock->power(0, 1);
+  left.open();
+  push(left, 1);
+  EXPECT_EQ(force(0), 1);
+  EXPECT_EQ(force(1), 2);
+}
+
+TEST_F(TwoArmsTest, OneThatIsLostIsNotReopenedAsOneThatNobodyUses) {
+  right.close();
+  mock->power(0, 0);
+  left.close();
+  EXPECT_THAT(refusal(left), AllOf(HasSubstr("4711"), HasSubstr("4712")));
+  EXPECT_EQ(mock->isOpenArm(1), 0);
+}
+
+TEST_F(TwoArmsTest, AnArmIsFoundAgainUnderAnotherNumber) {
+  left.close();
+  mock->power(0, 0);
+  right.close();
+  right.open();
+  push(right, 2);
+  EXPECT_EQ(force(1), 2);
+}
+
+TEST_F(TwoArmsTest, OneArmIsNotOpenedTwice) {
+  ForceDimensionDevice again{{.index = 1}};
+  EXPECT_THAT(refusal(again), HasSubstr("open already"));
+  EXPECT_EQ(mock->isOpenArm(1), 1);
+}
+
 TEST_F(DhdTest, TheMockAbortsOnACallWithoutADevice) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   const auto stop = reinterpret_cast<int (*)(char)>(dlsym(dlopen(MOCK_DRD, RTLD_NOW), "dhdStop"));

@@ -1,4 +1,5 @@
-// A stand-in for libdrd.so and, without the drd functions, for libdhd.so: one simulated arm. Where a caller
+// A stand-in for libdrd.so and, without the drd functions, for libdhd.so: two simulated arms, of which the
+// environment's block drives the first. Where a caller
 // would do harm on a real one, this one says why and aborts.
 #include <atomic>
 #include <chrono>
@@ -45,13 +46,25 @@ struct Mock {
   int watchdog = 0;
   double sinceCommand = 0;
   double maxForce = -1;
-  hapticd::mock::Arm shared = hapticd::mock::Arm::ofEnvironment();
+  bool plugged = true;
+  hapticd::mock::Arm shared = {};
   int fault = hapticd::mock::kHealthy;
 };
 
+constexpr int kArms = 2;
+
+Mock* arms() {
+  static Mock* const all = [] {
+    auto* made = new Mock[kArms];
+    made[0].shared = hapticd::mock::Arm::ofEnvironment();
+    return made;
+  }();
+  return all;
+}
+
+// The first one. Its mutex guards all.
 Mock& mock() {
-  static Mock* one = new Mock;
-  return *one;
+  return arms()[0];
 }
 
 std::atomic<bool> calibrating{false};
@@ -66,8 +79,16 @@ using Lock = std::lock_guard<std::mutex>;
 // Every call on a device passes here.
 Mock& device(char id, bool endsCalibration = false) {
   if (calibrating && !endsCalibration) crash("a call in the middle of a calibration");
-  if (!mock().open || id != 0) crash("a call without a device");
-  return mock();
+  if (id < 0 || id >= kArms || !arms()[static_cast<int>(id)].open) crash("a call without a device");
+  return arms()[static_cast<int>(id)];
+}
+
+// An index counts the arms that are plugged in; -1: none has it.
+int armOf(int index) {
+  for (int arm = 0; arm < mock().devices && arm < kArms; ++arm) {
+    if (arms()[arm].plugged && index-- == 0) return arm;
+  }
+  return -1;
 }
 
 constexpr double kSharedTick_s = 0.001;  // the loop of the test runs at 1 kHz
@@ -112,6 +133,7 @@ void tellShared(Mock& m, bool tickEnds) {
 }
 
 int reading(Mock& m) {
+  if (!m.plugged) return -1;
   if (m.failReads == 0) return 0;
   if (m.failReads > 0) --m.failReads;
   return -1;
@@ -121,17 +143,22 @@ int reading(Mock& m) {
 
 EXPORT int dhdGetDeviceCount() {
   const Lock lock(mock().mutex);
-  return mock().devices;
+  int count = mock().devices;
+  for (int arm = 0; arm < mock().devices && arm < kArms; ++arm) count -= arms()[arm].plugged ? 0 : 1;
+  return count;
 }
 
 EXPORT int dhdOpenID(char index) {
   const Lock lock(mock().mutex);
-  if (mock().open) crash("opened twice");
-  if (index >= mock().devices || !mock().shared.canOpen()) return -1;
-  if (mock().shared) ++mock().shared->opened;
-  if (mock().shared && mock().shared->gripper_rad >= 0) mock().name = "sigma.7", mock().hasGripper = true;
-  mock().open = true;
-  return 0;
+  const int arm = armOf(index);
+  if (arm < 0) return -1;
+  Mock& m = arms()[arm];
+  if (m.open) return arm;  // as the vendor's, whoever has it
+  if (!m.shared.canOpen()) return -1;
+  if (m.shared) ++m.shared->opened;
+  if (m.shared && m.shared->gripper_rad >= 0) m.name = "sigma.7", m.hasGripper = true;
+  m.open = true;
+  return arm;
 }
 
 EXPORT int dhdClose(char id) {
@@ -152,7 +179,7 @@ EXPORT const char* dhdGetSystemName(char id) {
 EXPORT int dhdGetSerialNumber(unsigned short* out, char id) {
   const Lock lock(mock().mutex);
   device(id);
-  *out = 4711;
+  *out = static_cast<unsigned short>(4711 + id);
   return 0;
 }
 
@@ -182,7 +209,7 @@ EXPORT int dhdGetLinearVelocity(double* x, double* y, double* z, char id) {
 
 EXPORT int dhdGetOrientationFrame(double (*out)[3], char id) {
   const Lock lock(mock().mutex);
-  std::memcpy(out, device(id).rotation, sizeof mock().rotation);
+  std::memcpy(out, device(id).rotation, sizeof(Mock::rotation));
   return 0;
 }
 
@@ -198,9 +225,10 @@ EXPORT bool dhdHasGripper(char id) {
 
 EXPORT int dhdGetGripperAngleRad(double* out, char id) {
   const Lock lock(mock().mutex);
-  if (!device(id).hasGripper) crash("the gripper of a device without one");
-  if (mock().gripperFails) return -1;
-  *out = mock().gripper;
+  Mock& m = device(id);
+  if (!m.hasGripper) crash("the gripper of a device without one");
+  if (m.gripperFails) return -1;
+  *out = m.gripper;
   return 0;
 }
 
@@ -211,7 +239,7 @@ EXPORT int dhdSetForceAndTorqueAndGripperForce(double fx, double fy, double fz, 
   if (!std::isfinite(fx + fy + fz)) crash("a force that is not a number");
   if (tx != 0 || ty != 0 || tz != 0 || grip != 0) crash("a torque that nobody asked for");
   if (!m.calibrated && !m.shared && (fx != 0 || fy != 0 || fz != 0)) crash("a force without calibration");
-  const bool arrives = m.fault != hapticd::mock::kUnplugged;
+  const bool arrives = m.plugged && m.fault != hapticd::mock::kUnplugged;
   if (arrives) {
     m.force[0] = fx, m.force[1] = fy, m.force[2] = fz;
     m.torque[0] = tx, m.torque[1] = ty, m.torque[2] = tz;
@@ -264,8 +292,9 @@ EXPORT int dhdSetWatchdog(unsigned char steps, char id) {
 
 EXPORT int dhdStop(char id) {
   const Lock lock(mock().mutex);
-  device(id).amplifiers = false;
-  tellShared(mock(), false);
+  Mock& m = device(id);
+  m.amplifiers = false;
+  tellShared(m, false);
   return 0;
 }
 
@@ -333,9 +362,14 @@ Value get(Value (*of)(Mock&)) {
 const MockDhd kControl = {
     [] {
       const Lock lock(mock().mutex);
+      arms()[1].plugged = true;
+      arms()[1].open = arms()[1].amplifiers = false;
+      arms()[1].gravity = -1;
+      for (double& f : arms()[1].force) f = 0;
       Mock& m = mock();
       m.devices = 1;
       m.name = "omega.3";
+      m.plugged = true;
       m.open = m.amplifiers = m.hasGripper = false;
       m.calibrated = true;
       m.regulating = false;
@@ -415,6 +449,19 @@ const MockDhd kControl = {
     [] { return get<int>([](Mock& m) { return m.watchdog; }); },
     [] { return get<double>([](Mock& m) { return m.maxForce; }); },
     [] { return get<int>([](Mock& m) { return m.regulating ? 1 : 0; }); },
+    [](int arm, int yes) {
+      const Lock lock(mock().mutex);
+      arms()[arm].plugged = yes != 0;
+    },
+    [](int arm, double* out) {
+      const Lock lock(mock().mutex);
+      const Mock& m = arms()[arm];
+      for (int i = 0; i < 3; ++i) out[i] = m.amplifiers ? m.force[i] : 0;
+    },
+    [](int arm) {
+      const Lock lock(mock().mutex);
+      return arms()[arm].open ? 1 : 0;
+    },
 };
 
 }  // namespace

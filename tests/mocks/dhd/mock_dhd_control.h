@@ -34,6 +34,11 @@ struct MockDhd {
   double (*maxForce)();
   /// A thread of the library drives the motors.
   int (*regulating)();
+  /// Two arms, 0 and 1, have the serial numbers 4711 and 4712. One without power is out of the order of
+  /// numbers.
+  void (*power)(int arm, int on);
+  void (*forceOf)(int arm, double force_N[3]);
+  int (*isOpenArm)(int arm);
 };
 
 const MockDhd* mockDhd();
