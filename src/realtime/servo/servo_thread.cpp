@@ -20,9 +20,7 @@ const ThreadSetup& ServoThread::start() {
   isSetUp_.wait(false, std::memory_order_acquire);
   if (refused()) {
     thread_.join();
-    throw std::runtime_error("the system refused what the servo thread of a real device requires\n" +
-                             setup_.complaints() +
-                             "; --allow-no-rt starts without: late ticks then make the force rough");
+    throw std::runtime_error(refusalOf(setup_));
   }
   return setup_;
 }

@@ -144,6 +144,11 @@ std::string ThreadSetup::complaints() const {
   return text.empty() ? text : text + "remedy: " + remedies;
 }
 
+std::string refusalOf(const ThreadSetup& setup) {
+  return "the system refused what the servo thread of a real device requires\n" + setup.complaints() +
+         "; --allow-no-rt starts without: late ticks then make the force rough";
+}
+
 std::string realtimeRemedy() {
   static constexpr const char* kGroup = "hapticd";
   group entry{};

@@ -47,6 +47,9 @@ struct ThreadSetup {
   std::string complaints() const;
 };
 
+/// Why a loop that requires realtime rights does not start.
+std::string refusalOf(const ThreadSetup& setup);
+
 /// The one way to realtime rights and locked memory for the calling user: the group that the package creates.
 std::string realtimeRemedy();
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/clock.h"
+#include "base/world.h"
 
 namespace hapticd::server {
 namespace {
@@ -47,6 +48,7 @@ void DeviceKeeper::startLoop() {
     logSetup(setup);
     return;
   }
+  if (options_.requireRealtime && !options_.vendorThread) demandRealtime();
   realtime::ThreadSetup memory;  // locks the memory of the process before the first tick
   memory.memory = realtime::setUpThread({.realtime = false}).memory;
   logSetup(memory);
@@ -61,6 +63,15 @@ void DeviceKeeper::startLoop() {
     tick_(now);
   });
   spdlog::info("servo loop of '{}': paced by the device", options_.name);
+}
+
+// What a thread gets now, that of the loop will get, too: it begins with a tick, which is too late to refuse.
+void DeviceKeeper::demandRealtime() const {
+  if (base::world().threads.simulated()) return;
+  realtime::ThreadSetup setup;
+  base::BlockingThread({.name = "servo"}, [&] { setup = realtime::setUpThread({}); }).join();
+  if (setup.scheduling.granted && setup.memory.granted) return;
+  throw std::runtime_error(realtime::refusalOf(setup));
 }
 
 // The watchdog last: until then the last tick may hang.

@@ -16,8 +16,8 @@ namespace hapticd::server {
 struct DeviceKeeperOptions {
   std::string name;  ///< for the log
   double rate_Hz = 1000;
-  bool requireRealtime = false;
-  bool vendorThread = false;  ///< the tick of a self-paced device runs in a thread of its vendor's library
+  bool requireRealtime = false;  ///< not of a vendor's thread, whose scheduling is the library's
+  bool vendorThread = false;     ///< the tick of a self-paced device runs in a thread of its vendor's library
 };
 
 /// Net thread. Opening and calibrating, which may take seconds, run in a separate thread.
@@ -53,6 +53,7 @@ class DeviceKeeper {
 
  private:
   void startLoop();
+  void demandRealtime() const;
   void stopLoop() noexcept;
   void startAttempt(std::string text, std::function<void()> attempt);
   void reopen() noexcept;

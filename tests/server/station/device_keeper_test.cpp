@@ -5,9 +5,14 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <linux/capability.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <chrono>
+#include <cstdlib>
 #include <mutex>
 #include <stdexcept>
 #include <string>
@@ -227,6 +232,40 @@ TEST_P(KeeperTest, AStopThatStandsPreventsACalibration) {
   EXPECT_EQ(device_.calibrations, 0);
 }
 
+// In a process without rights, whichever this one has.
+class WithoutRights : public KeeperTest {
+ protected:
+  static void giveUpRights() {
+    const rlimit none{0, 0};
+    setrlimit(RLIMIT_RTPRIO, &none);
+    setrlimit(RLIMIT_MEMLOCK, &none);
+    __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
+    const __user_cap_data_struct data[_LINUX_CAPABILITY_U32S_3]{};
+    syscall(SYS_capset, &header, data);
+  }
+  // Ends the process: 0 when the loop starts, 1 when it is refused with the remedy.
+  void start(const DeviceKeeperOptions& options) {
+    giveUpRights();
+    DeviceKeeper keeper(device_, tick_, clock_, options);
+    int result = 0;
+    try {
+      keeper.start();
+      keeper.stop();
+    } catch (const std::runtime_error& error) {
+      result =
+          std::string(error.what()).find("--allow-no-rt") != std::string::npos && device_.reads == 0 ? 1 : 2;
+    }
+    keeper.stop();
+    std::_Exit(result);
+  }
+};
+
+TEST_P(WithoutRights, ALoopThatRequiresThemDoesNotStartWhoeverPacesIt) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(start({.name = "Phantom", .requireRealtime = true}), testing::ExitedWithCode(1), "");
+  EXPECT_EXIT(start({.name = "Phantom"}), testing::ExitedWithCode(0), "");
+}
+
 TEST_P(KeeperTest, AHangingLoopGivesNoForceAndIsReported) {
   keeper_.start();
   EXPECT_TRUE(loopRuns());
@@ -415,6 +454,8 @@ TEST_P(KeeperTest, NoDeviceIsOpenedAfterTheEndHasBegun) {
   EXPECT_FALSE(device_.isOpen);
 }
 
+INSTANTIATE_TEST_SUITE_P(Loop, WithoutRights, testing::Bool(),
+                         [](const auto& instance) { return instance.param ? "SelfPaced" : "Paced"; });
 INSTANTIATE_TEST_SUITE_P(Loop, KeeperTest, testing::Bool(), [](const auto& instance) {
   return std::string(instance.param ? "OfTheDevice" : "OfTheServer");
 });
