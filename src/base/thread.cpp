@@ -1,6 +1,7 @@
 #include "base/thread.h"
 
 #include <pthread.h>
+#include <sched.h>
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -18,6 +19,10 @@ void applyOptions(const ThreadOptions& options) noexcept {
   if (!options.name.empty()) pthread_setname_np(pthread_self(), options.name.substr(0, 15).c_str());
   // On Linux each thread has its own niceness. A refusal is harmless.
   if (options.niceness != 0) setpriority(PRIO_PROCESS, 0, options.niceness);
+  if (options.priority == 0) return;
+  sched_param parameters{};
+  parameters.sched_priority = options.priority;
+  pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
 }
 
 class SystemThread final : public Thread::Impl {

@@ -19,6 +19,7 @@ unsigned processors() noexcept;
 struct ThreadOptions {
   std::string name;  ///< as in `top -H`; cut to 15 bytes
   int niceness = 0;  ///< 0 to 19; higher values yield the processor to other threads
+  int priority = 0;  ///< 1 to 99: SCHED_FIFO where the system grants it; 0: normal scheduling
 };
 
 /// One pass of a thread: does the work that is due and returns the deadline of the next pass on the servo

@@ -71,6 +71,10 @@ struct DeviceTraits {
   Nanos forceLife = 0;
 };
 
+/// Of a driver's own thread that carries forces: just below the servo's, which must not wait for it. Without
+/// realtime rights the thread has normal scheduling.
+inline constexpr int kDriverPriority = 79;
+
 class SteeredHand;
 
 /// One haptic device. open/close block and may throw; read/write run in the servo thread: noexcept,

@@ -82,7 +82,7 @@ void EvdevDevice::open() {
   }
   if (!ownThread_) return;
   stopping_ = false;
-  thread_ = base::BlockingThread({.name = "evdev"}, [this] { run(); });
+  thread_ = base::BlockingThread({.name = "evdev", .priority = kDriverPriority}, [this] { run(); });
 }
 
 void EvdevDevice::findFile() {

@@ -45,7 +45,7 @@ void HaplyDevice::open() {
   stopping_ = false;
   connected_ = failed_ = false;
   sample_.write({});
-  thread_ = base::BlockingThread({.name = "haply"}, [this] { run(); });
+  thread_ = base::BlockingThread({.name = "haply", .priority = kDriverPriority}, [this] { run(); });
   while (!connected_ && !failed_) base::sleepFor(kMillisecond);
   if (!failed_) return;
   const std::string words = faultText();

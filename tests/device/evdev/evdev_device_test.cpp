@@ -1,12 +1,20 @@
 // A force-feedback joystick on a fake of its file.
 #include "device/evdev/evdev_device.h"
 #include "base/clock.h"
+#include "base/world.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <pthread.h>
+#include <sched.h>
+
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <functional>
+#include <string>
+#include <thread>
 
 #include "device/evdev/fake_event_device.h"
 #include "device/plane_scene.h"
@@ -100,6 +108,29 @@ TEST_F(EvdevTest, AZeroThatTheKernelRefusesHasNotLeft) {
   joystick.error = EIO;
   for (int i = 0; i < 4; ++i) device->exchange(now += kMs);
   EXPECT_FALSE(device->zeroSent());
+}
+
+// Threads of others that compute must not keep a stop from the joystick.
+TEST_F(EvdevTest, ItsThreadHasRealtimePriorityWhereTheSystemGrantsIt) {
+  bool granted = false;
+  std::thread([&] {
+    sched_param parameters{};
+    parameters.sched_priority = kDriverPriority;
+    granted = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters) == 0;
+  }).join();
+  const auto device = make(true);
+  device->open();
+  int policy = -1;
+  while (policy < 0) {  // until the thread has its name
+    for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
+      std::string name;
+      std::getline(std::ifstream(task.path() / "comm"), name);
+      DeviceState state;
+      if (name == "evdev" && device->read(base::now(), state))
+        policy = sched_getscheduler(std::stoi(task.path().filename().string()));
+    }
+  }
+  EXPECT_EQ(policy & ~SCHED_RESET_ON_FORK, granted ? SCHED_FIFO : SCHED_OTHER);
 }
 
 TEST_F(EvdevTest, VelocityFollowsASteadyHand) {
