@@ -71,7 +71,7 @@ fs::path BlackBoxRecorder::nextFile(const std::string& fault) const {
 }
 
 void BlackBoxRecorder::poll() {
-  if (!box_.frozen()) return;
+  if (!box_.frozen() || writes_.load(std::memory_order_acquire)) return;
   std::vector<TickReport> ticks = box_.take();
   if (ticks.empty()) return;
   const std::string fault = namesOf(Trips(ticks.back().guard.latched));
@@ -82,7 +82,7 @@ void BlackBoxRecorder::poll() {
   const fs::path file = nextFile(fault);
   spdlog::warn("device '{}': forces are off: {}; writing the last {} ticks to {}", name_, fault, ticks.size(),
                file.string());
-  finish();
+  writes_.store(true, std::memory_order_release);
   writer_ = base::Thread(
       {.name = "black box"}, [this, file, ticks = std::move(ticks)]() mutable -> std::optional<base::Nanos> {
         const std::vector<TickReport> box = std::exchange(ticks, {});
@@ -95,11 +95,14 @@ void BlackBoxRecorder::poll() {
           spdlog::error("device '{}': {}; set black_box_dir to a directory that can be written", name_,
                         error.what());
         }
+        writes_.store(false, std::memory_order_release);
         return std::nullopt;
       });
 }
 
 void BlackBoxRecorder::finish() {
+  writer_.stop();
+  poll();
   writer_.stop();
 }
 

@@ -1,6 +1,7 @@
 // Writes black boxes to files: the ticks before a fault that latched.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -34,9 +35,9 @@ class BlackBoxRecorder {
   BlackBoxRecorder& operator=(const BlackBoxRecorder&) = delete;
 
   /// Logs a fault that latched since the last call and starts writing its ticks. Call several times per
-  /// second.
+  /// second. While a slow disk still takes the file before, the box stays frozen and waits.
   void poll();
-  /// Waits until a started file is written.
+  /// Waits until the files of all faults are written.
   void finish();
 
  private:
@@ -45,7 +46,8 @@ class BlackBoxRecorder {
   std::string name_;
   BlackBoxFiles files_;
   realtime::BlackBox& box_;
-  base::Thread writer_;
+  std::atomic<bool> writes_{false};
+  base::Thread writer_;  // last: it uses the others
 };
 
 }  // namespace hapticd::server

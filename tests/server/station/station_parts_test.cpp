@@ -380,6 +380,47 @@ TEST_F(BlackBoxFilesTest, KeepsTheNewestWithinTheirBytes) {
   }
 }
 
+// A disk that answers when the test says so.
+class HangingFiles final : public base::Files {
+ public:
+  std::unique_ptr<base::OutputFile> create(const fs::path& path, base::Existing existing) override {
+    hangs_.wait(true);
+    return real_.create(path, existing);
+  }
+  std::unique_ptr<base::InputFile> open(const fs::path& path) override { return real_.open(path); }
+  std::vector<std::byte> read(const fs::path& path) override { return real_.read(path); }
+  void rename(const fs::path& from, const fs::path& to) override { real_.rename(from, to); }
+  void remove(const fs::path& path) override { real_.remove(path); }
+  void createFolder(const fs::path& path) override { real_.createFolder(path); }
+  std::vector<std::string> list(const fs::path& path) override { return real_.list(path); }
+  void answer() {
+    hangs_ = false;
+    hangs_.notify_all();
+  }
+
+ private:
+  base::SystemFiles real_;
+  std::atomic<bool> hangs_{true};
+};
+
+TEST_F(BlackBoxFilesTest, ADiskThatHangsHoldsNobodyUp) {
+  HangingFiles files_;
+  const base::World& world = base::world();
+  const base::ScopedWorld scoped({world.clock, world.threads, files_, world.random});
+  realtime::BlackBox box(5);
+  BlackBoxRecorder recorder("Phantom/1", {directory_, 3}, box);
+  fail(box, 2);
+  recorder.poll();
+  std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  fail(box, 2);
+  recorder.poll();
+  EXPECT_TRUE(box.frozen()) << "it waits for its turn";
+  files_.answer();
+  recorder.finish();
+  EXPECT_FALSE(box.frozen());
+  EXPECT_EQ(files().size(), 2U);
+}
+
 std::string_view effectOn(TripAction action) {
   switch (action) {
     case TripAction::clamp:
