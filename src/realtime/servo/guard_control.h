@@ -4,6 +4,8 @@
 #include <atomic>
 #include <cstdint>
 
+#include "base/time.h"
+
 namespace hapticd::realtime {
 
 /// One atomic word of state: the last call wins, and the guard sees calls in order. Every call is lock-free,
@@ -14,8 +16,11 @@ class GuardControl {
   GuardControl(const GuardControl&) = delete;
   GuardControl& operator=(const GuardControl&) = delete;
 
-  /// Zero force until rearm().
-  void stop() noexcept {
+  /// Zero force until rearm(). `now`: on the servo clock, for those who compare it with a re-arm.
+  void stop(base::Nanos now = 0) noexcept {
+    base::Nanos before = stoppedAt_.load(std::memory_order_relaxed);
+    while (before < now && !stoppedAt_.compare_exchange_weak(before, now, std::memory_order_acq_rel)) {
+    }
     std::uint64_t old = word_.load(std::memory_order_relaxed);
     while (!word_.compare_exchange_weak(old, (old + kStop) | kStopped, std::memory_order_acq_rel)) {
     }
@@ -26,12 +31,22 @@ class GuardControl {
     while (!word_.compare_exchange_weak(old, rearmed(old), std::memory_order_acq_rel)) {
     }
   }
+  /// The same unless forces were stopped since stops() was this number; false then.
+  bool rearm(std::uint32_t stops) noexcept {
+    std::uint64_t old = word_.load(std::memory_order_acquire);
+    do {
+      if (stopsOf(old) != stops) return false;
+    } while (!word_.compare_exchange_weak(old, rearmed(old), std::memory_order_acq_rel));
+    return true;
+  }
   /// Allows forces; for a real device the operator decides.
   void arm() noexcept { word_.fetch_and(~kDisarmed, std::memory_order_acq_rel); }
   void disarm() noexcept { word_.fetch_or(kDisarmed, std::memory_order_acq_rel); }
   /// Lets the force ramp in from zero again, as after a reset of the scene.
   void rampIn() noexcept { ramps_.fetch_add(1, std::memory_order_acq_rel); }
 
+  /// The latest time of a stop; of all stops that stops() counted before.
+  base::Nanos stoppedAt() const noexcept { return stoppedAt_.load(std::memory_order_acquire); }
   /// Counts calls of stop().
   std::uint32_t stops() const noexcept { return stopsOf(word_.load(std::memory_order_acquire)); }
   bool stopped() const noexcept { return (word_.load(std::memory_order_acquire) & kStopped) != 0; }
@@ -66,6 +81,7 @@ class GuardControl {
 
   std::atomic<std::uint64_t> word_;
   std::atomic<std::uint32_t> ramps_{0};
+  std::atomic<base::Nanos> stoppedAt_{0};
 };
 
 }  // namespace hapticd::realtime

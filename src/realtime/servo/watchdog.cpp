@@ -44,7 +44,7 @@ std::optional<Nanos> Watchdog::step() noexcept {
   }
   if (const Nanos suspended = suspended_(); suspended - suspendedBefore_ > kSuspension) {
     suspendedBefore_ = suspended;
-    tick_.control().stop();
+    tick_.control().stop(clock_.now());
     resumed_.store(true, std::memory_order_release);
   }
   const bool silent = silence() > kSilence;

@@ -28,7 +28,7 @@ bool DeviceControl::Stop::isOf(const Sender& sender) const noexcept {
 void DeviceControl::stopForces(const Order& order, const Sender& sender) {
   constexpr std::size_t kMostGone = 32;
   stop_ = order;
-  guard_.stop();
+  guard_.stop(order.received);
   const auto own = std::find_if(stops_.begin(), stops_.end(), [&](const Stop& s) { return s.isOf(sender); });
   if (own != stops_.end()) {
     if (std::find(own->clients.begin(), own->clients.end(), sender.client) == own->clients.end())
@@ -50,13 +50,16 @@ bool DeviceControl::rearmForces(const Order& order, const Sender& sender, bool f
   const bool otherConnection = order.address == stop_.address && order.client != stop_.client;
   const bool sentEarlier =
       otherConnection && order.sent < stop_.sent && stop_.sent - order.sent <= kLongestTravel;
-  if (order.received <= stop_.received || sentEarlier) {
-    refusal = {RefusalCode::none, "Rearm_Forces ignored: the forces were stopped after it was sent"};
+  const Refusal later{RefusalCode::none, "Rearm_Forces ignored: the forces were stopped after it was sent"};
+  const std::uint32_t stops = guard_.stops();  // before the time: a stop sets that first
+  if (order.received <= std::max(stop_.received, guard_.stoppedAt()) || sentEarlier) {
+    refusal = later;
     return false;
   }
   const auto gone = [](const Stop& stop) { return stop.clients.empty(); };
-  if (sender.isOperator ||
-      (sender.isPage && !sender.hasOperators && std::all_of(stops_.begin(), stops_.end(), gone))) {
+  const std::vector<Stop> before = stops_;
+  if (sender.isOperator || (sender.isPage && sender.mayCommand && !sender.hasOperators &&
+                            std::all_of(stops_.begin(), stops_.end(), gone))) {
     stops_.clear();
   }
   const bool undoes = std::erase_if(stops_, [&](const Stop& stop) { return stop.isOf(sender); }) > 0;
@@ -69,12 +72,17 @@ bool DeviceControl::rearmForces(const Order& order, const Sender& sender, bool f
     return false;
   }
   if (!sender.mayCommand && (!undoes || faults)) {
+    stops_ = before;
     refusal = {RefusalCode::notPermitted,
                "Rearm_Forces refused: this client may undo its own stop only, not " +
                    std::string(faults ? "faults" : "others'")};
     return false;
   }
-  guard_.rearm();
+  if (!guard_.rearm(stops)) {
+    stops_ = before;
+    refusal = later;
+    return false;
+  }
   return true;
 }
 

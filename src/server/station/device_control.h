@@ -44,7 +44,8 @@ class DeviceControl {
   /// Zero force until a later re-arm. Any client may.
   void stopForces(const Order& order, const Sender& sender);
   /// Re-arms. Returns false, with the reason, when
-  /// - a stop is later than the re-arm: it was received at the same time or later, or the same machine sent
+  /// - a stop is later than the re-arm, also one that no client sent (a signal, a suspension): it was
+  /// received at the same time or later, or the same machine sent
   ///   it later on another connection (a stamp that is earlier by more than kLongestTravel proves nothing:
   ///   the clock of that machine was set);
   /// - a stop of another program stands. Each program may undo its own; operators undo all; where there are

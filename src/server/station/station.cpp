@@ -224,7 +224,7 @@ void Station::stop() {
 }
 
 void Station::stopForces() noexcept {
-  impl_->tick.control().stop();
+  impl_->tick.control().stop(base::now());
 }
 
 void Station::rampIn() noexcept {

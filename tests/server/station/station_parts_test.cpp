@@ -231,6 +231,49 @@ TEST_F(RearmTest, OneThatMayNotCommandUndoesItsStopButNoFault) {
   EXPECT_TRUE(rearms(observer));
 }
 
+TEST_F(RearmTest, ARefusalKeepsTheStop) {
+  Sender observer = client(1);
+  observer.mayCommand = false;
+  stop(observer);
+  EXPECT_FALSE(rearms(observer, true));
+  EXPECT_TRUE(rearms(observer)) << "when the fault is gone";
+  stop(client(2));
+  control_.clientGone(2);
+  Sender page = client(3);
+  page.isPage = true;
+  page.mayCommand = false;
+  EXPECT_FALSE(rearms(page));
+  EXPECT_FALSE(rearms(client(4))) << "the stop of the one that left stands";
+  EXPECT_EQ(refusal_.code, RefusalCode::stoppedByOther);
+}
+
+// A re-arm waits until what its client sent before is published.
+TEST_F(RearmTest, AnOlderOneDoesNotUndoAStopThatNoClientSent) {
+  const Sender person = client(1);
+  guard_.stop(100);
+  EXPECT_FALSE(control_.rearmForces({100, 1, "10.0.0.1", 1}, person, false, refusal_));
+  EXPECT_EQ(refusal_.code, RefusalCode::none);
+  EXPECT_NE(refusal_.text.find("stopped after it was sent"), std::string::npos);
+  EXPECT_TRUE(guard_.stopped());
+  EXPECT_TRUE(control_.rearmForces({101, 2, "10.0.0.1", 1}, person, false, refusal_));
+  EXPECT_FALSE(guard_.stopped());
+}
+
+TEST(GuardControl, ARearmDoesNotUndoAStopThatItDoesNotKnow) {
+  realtime::GuardControl control(true);
+  control.stop(5);
+  const std::uint32_t known = control.stops();
+  EXPECT_EQ(control.stoppedAt(), 5);
+  control.stop(3);
+  EXPECT_EQ(control.stoppedAt(), 5) << "the latest";
+  EXPECT_FALSE(control.rearm(known));
+  EXPECT_TRUE(control.stopped());
+  EXPECT_TRUE(control.rearm(control.stops()));
+  EXPECT_FALSE(control.stopped());
+  EXPECT_TRUE(control.armed());
+  EXPECT_EQ(control.read().rearms, 1U);
+}
+
 // Stops that nobody can undo do not grow without bound, and are not forgotten.
 TEST_F(RearmTest, ManyStopsOfClientsThatLeftStand) {
   for (scene::ClientId id = 1; id <= 100'000; ++id) {
