@@ -187,6 +187,12 @@ class CrashMark {
   bool crashed_ = false;
 };
 
+// The thread of the signals uses the server: it ends before the server does, also after an exception.
+struct SignalsEndFirst {
+  StopOnSignal& stopper;
+  ~SignalsEndFirst() { stopper.finish(); }
+};
+
 int run(const ServeOptions& options) {
   std::vector<std::string> remarks;
   server::ServerConfig config = configOf(options, remarks);
@@ -205,6 +211,7 @@ int run(const ServeOptions& options) {
   spdlog::set_level(options.verbose ? spdlog::level::debug : spdlog::level::info);
   for (const std::string& remark : remarks) spdlog::warn("{}", remark);
   const std::unique_ptr<server::Server> server = openServer(config);
+  const SignalsEndFirst signals{stopper};
   logAddresses(*server, config);
   const std::unique_ptr<zeroconf::Announcer> announcer = announceOnNetwork(*server, config);
   listNetworkOnPage(*server);

@@ -289,6 +289,7 @@ void Server::run() {
   realtime::requestShortTimeSlice();  // reports must not wait for other processes
   loop_.run();
   if (player_) player_->stop();
+  for (const auto& station : stations_) station->stopForces();  // one that ends slowly delays no other's stop
   for (const auto& station : stations_) station->stop();
   devicesClosed_.store(true, std::memory_order_release);
   for (const auto& scene : scenes_) scene->stop();
