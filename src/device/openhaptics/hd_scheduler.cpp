@@ -79,10 +79,9 @@ Scheduler::Scheduler() : api_(DynamicLibrary(libraryNames())) {
 Handle Scheduler::open(const std::string& name, std::string& nameThatWorked) {
   const Pause pause(*this);
   const NoKeyboard noKeyboard;
-  // Some vendor drivers know a device only by its configured name, some only without a name.
-  std::vector<const char*> names;
-  if (!name.empty()) names.push_back(name.c_str());
-  names.insert(names.end(), {nullptr, "Default Device", "Default PHANToM"});
+  // Without a configured name: some vendor drivers know the default device by none, some by one of these.
+  std::vector<const char*> names{nullptr, "Default Device", "Default PHANToM"};
+  if (!name.empty()) names = {name.c_str()};
 
   std::string words;
   for (const char* candidate : names) {
@@ -138,6 +137,10 @@ void Scheduler::join(Handle device, Participant& participant, double rate_Hz) {
                                std::to_string(static_cast<int>(rate_Hz)) + " Hz: " + words);
     }
     const SchedulerHandle scheduled = api_.scheduleAsynchronous(&runFrame, &participant, kFirstPriority);
+    const std::string unscheduled = takeErrors();
+    if (!unscheduled.empty()) {
+      throw std::runtime_error("the OpenHaptics library does not schedule the servo loop: " + unscheduled);
+    }
     members_.push_back({device, &participant, scheduled});
   }
 }

@@ -43,23 +43,37 @@ TEST_F(HdTest, HandleZeroIsADeviceAndTheDriversNumbersWin) {
 }
 
 TEST_F(HdTest, TriesTheNamesInOrder) {
-  const char* const answering[] = {"mine", nullptr, "Default Device", "Default PHANToM"};
+  const char* const answering[] = {nullptr, "Default Device", "Default PHANToM"};
   for (const char* name : answering) {
     mock->reset();
     mock->onlyName(name);
-    OpenHapticsDevice device({"mine"});
+    OpenHapticsDevice device;
     EXPECT_EQ(refusal(device), "opened");
     EXPECT_THAT(device.description(), HasSubstr(name == nullptr ? "the default device" : name));
   }
 }
 
+// The default device may be another arm, at which nobody sits.
+TEST_F(HdTest, AConfiguredNameIsTheOnlyOneTried) {
+  for (const char* name : {static_cast<const char*>(nullptr), "Default Device", "Default PHANToM"}) {
+    mock->reset();
+    mock->onlyName(name);
+    OpenHapticsDevice device({"mine"});
+    EXPECT_THAT(refusal(device), HasSubstr("'mine'"));
+  }
+  mock->reset();
+  mock->onlyName("mine");
+  OpenHapticsDevice device({"mine"});
+  EXPECT_EQ(refusal(device), "opened");
+}
+
 TEST_F(HdTest, TellsEveryErrorAlsoWhenTheLibraryRepeatsNone) {
   mock->onlyName("somebody else's");
-  OpenHapticsDevice device({"mine"});
+  OpenHapticsDevice device;
   const std::string first = refusal(device);
-  EXPECT_THAT(first,
-              AllOf(HasSubstr("'mine': HD_DEVICE_FAULT"), HasSubstr("'Default PHANToM': fails as before")));
-  EXPECT_THAT(refusal(device), HasSubstr("'mine': fails as before"));
+  EXPECT_THAT(first, AllOf(HasSubstr("the default device: HD_DEVICE_FAULT"),
+                           HasSubstr("'Default PHANToM': fails as before")));
+  EXPECT_THAT(refusal(device), HasSubstr("the default device: fails as before"));
 }
 
 TEST_F(HdTest, AWrongLibraryIsToldByItsMissingFunctions) {
