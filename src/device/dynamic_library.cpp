@@ -45,6 +45,10 @@ std::string objectionTo(const std::string& file) {
   if (stat(file.c_str(), &found) != 0) return {};  // the loader has the words
   if (found.st_uid != 0 && found.st_uid != geteuid())
     return file + ": belongs to another user; make root its owner";
+  // The private group of the user has no other members.
+  const bool ownGroup = found.st_gid == 0 || (found.st_gid == getegid() && found.st_gid == geteuid());
+  if ((found.st_mode & S_IWGRP) != 0 && !ownGroup)
+    return file + ": all of its group may change it; chmod g-w";
   if ((found.st_mode & S_IWOTH) != 0) return file + ": every user may change it; chmod o-w";
   return {};
 }

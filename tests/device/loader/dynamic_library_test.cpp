@@ -63,6 +63,11 @@ TEST_F(DynamicLibraryTest, AFileThatOthersCanChangeIsRefused) {
   EXPECT_THAT(refusal({kVariable, {}, {}}), HasSubstr("every user may change it"));
   chmod(copy.c_str(), 0755);
   if (geteuid() == 0) {
+    ASSERT_EQ(chown(copy.c_str(), 0, 65534), 0);
+    chmod(copy.c_str(), 0775);
+    EXPECT_THAT(refusal({kVariable, {}, {}}), HasSubstr("all of its group may change it"));
+    chmod(copy.c_str(), 0755);
+    EXPECT_EQ(refusal({kVariable, {}, {}}), "loaded " + copy);
     ASSERT_EQ(chown(copy.c_str(), 65534, 65534), 0);
     EXPECT_THAT(refusal({kVariable, {}, {}}), HasSubstr("belongs to another user"));
   }
