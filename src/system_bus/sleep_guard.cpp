@@ -11,6 +11,7 @@
 #include <string>
 #include <utility>
 
+#include "base/world.h"
 #include "system_bus/bus.h"
 
 namespace hapticd::system_bus {
@@ -70,17 +71,24 @@ class Locks {
     if (!armed) {
       delay_.release();
       block_.release();
-    } else if (!std::exchange(asked_, true)) {
-      const std::string delayed = delay_.take(bus_, "delay", "the forces on a hand must end first");
-      if (!delayed.empty()) spdlog::info("logind does not wait for the end of forces: {}", delayed);
-      const std::string blocked = block_.take(bus_, "block", "a hand feels forces");
-      if (!blocked.empty())
-        spdlog::info("logind does not keep the machine awake for the forces: {}", blocked);
+    } else if (!asked_ || base::now() >= askAgain_) {
+      ask(!asked_);
     }
     asked_ = armed;
   }
 
  private:
+  // For what is not held. A refusal may end: polkit's rules change, and other locks are given back.
+  void ask(bool tells) {
+    constexpr base::Nanos kAskAgain = 10'000'000'000;
+    askAgain_ = base::now() + kAskAgain;
+    const std::string delayed =
+        delay_.held() ? "" : delay_.take(bus_, "delay", "the forces on a hand must end first");
+    if (!delayed.empty() && tells) spdlog::info("logind does not wait for the end of forces: {}", delayed);
+    const std::string blocked = block_.held() ? "" : block_.take(bus_, "block", "a hand feels forces");
+    if (!blocked.empty() && tells)
+      spdlog::info("logind does not keep the machine awake for the forces: {}", blocked);
+  }
   static int onSleep(sd_bus_message* signal, void* self, sd_bus_error*) noexcept {
     auto& locks = *static_cast<Locks*>(self);
     int begins = 0;
@@ -104,6 +112,7 @@ class Locks {
   std::function<void()>& stopForces_;
   Lock delay_, block_;
   bool asked_ = false;  // for locks, since forces were armed
+  base::Nanos askAgain_ = 0;
   bool asleep_ = false;
   bool sleepAnnounced_ = false;
 };

@@ -36,6 +36,23 @@ bool ScriptedLogind::waitHeld(const std::set<std::string>& modes) {
   return true;
 }
 
+void ScriptedLogind::refuseNothing() {
+  const std::lock_guard lock(mutex_);
+  refused_.clear();
+}
+
+bool ScriptedLogind::waitRefusals(int count) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  for (;;) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (refusals_ >= count) return true;
+    }
+    if (std::chrono::steady_clock::now() > end) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+}
+
 void ScriptedLogind::announceSleep(bool begins) {
   order([this, begins] {
     sd_bus_emit_signal(bus_, kPath, kManager, "PrepareForSleep", "b", static_cast<int>(begins));
@@ -62,8 +79,10 @@ int ScriptedLogind::answer(sd_bus_message* call) {
   const char *what = "", *who = "", *why = "", *mode = "";
   sd_bus_message_read(call, "ssss", &what, &who, &why, &mode);
   lastRequest_ = std::string(what) + ' ' + who;
-  if (refused_.count(mode) != 0)
+  if (refused_.count(mode) != 0) {
+    ++refusals_;
     return sd_bus_reply_method_errorf(call, "org.freedesktop.DBus.Error.AccessDenied", "Permission denied");
+  }
   std::array<int, 2> ends{};
   if (::pipe2(ends.data(), O_CLOEXEC) != 0) return -1;
   locks_.push_back({mode, ends[0]});

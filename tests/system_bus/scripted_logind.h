@@ -16,6 +16,10 @@ class ScriptedLogind : public ScriptedService {
 
   /// Waits until just the locks of these modes are held; false after a time that only a hang can take.
   bool waitHeld(const std::set<std::string>& modes);
+  /// Gives all locks from now on.
+  void refuseNothing();
+  /// Waits until it has refused so many requests; false as above.
+  bool waitRefusals(int count);
   /// Tells all that the machine goes to sleep, or that it woke.
   void announceSleep(bool begins);
   /// What was asked for last: "sleep hapticd".
@@ -32,6 +36,7 @@ class ScriptedLogind : public ScriptedService {
   std::set<std::string> refused_;
   std::vector<Lock> locks_;  // ends of pipes; of those that were given back, the other end is closed
   std::string lastRequest_;
+  int refusals_ = 0;
 };
 
 }  // namespace hapticd::test

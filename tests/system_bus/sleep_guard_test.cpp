@@ -16,6 +16,7 @@
 #include <string>
 #include <thread>
 
+#include "base/world.h"
 #include "system_bus/bus.h"
 #include "system_bus/scripted_logind.h"
 
@@ -73,6 +74,35 @@ TEST_F(SleepGuardTest, ForcesEndBeforeASleepThatItMustLetHappen) {
     EXPECT_EQ(stops_, night) << "before the lock was given back";
     logind.announceSleep(false);
   }
+}
+
+// Moves when the test moves it.
+class MovedClock final : public base::Clock {
+ public:
+  base::Nanos now() noexcept override { return now_; }
+  void sleepUntil(base::Nanos deadline) noexcept override { base::MonotonicClock().sleepUntil(deadline); }
+  base::Nanos wallNow() noexcept override { return now_; }
+  void advance(base::Nanos by) noexcept { now_ += by; }
+
+ private:
+  std::atomic<base::Nanos> now_{1};
+};
+
+// A person allows it while forces are armed.
+TEST_F(SleepGuardTest, AsksAgainForALockThatWasRefused) {
+  MovedClock clock;
+  const base::World& world = base::world();
+  const base::ScopedWorld scoped({clock, world.threads, world.files, world.random});
+  ScriptedLogind logind({"block"});
+  guard();
+  ASSERT_TRUE(logind.waitHeld({"delay"}));
+  ASSERT_TRUE(logind.waitRefusals(1));
+  clock.advance(10'000'000'001);
+  ASSERT_TRUE(logind.waitRefusals(2));
+  logind.refuseNothing();
+  clock.advance(10'000'000'001);
+  EXPECT_TRUE(logind.waitHeld({"block", "delay"}));
+  guard_.reset();
 }
 
 TEST_F(SleepGuardTest, NothingIsHeldWhileTheMachineSleeps) {
