@@ -1,11 +1,16 @@
 // Small parts between clients and a device: buttons, roles, steering the hand, stop and re-arm, black boxes.
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <chrono>
 #include <fstream>
+#include <memory>
 #include <sstream>
 #include <string_view>
+#include <thread>
 
 #include "base/time.h"
+#include "base/world.h"
 #include "device/simulated/simulated_device.h"
 #include "hapticd/trips.h"
 #include "server/session/roles.h"
