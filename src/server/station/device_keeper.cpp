@@ -39,6 +39,8 @@ void DeviceKeeper::stop() noexcept {
 
 void DeviceKeeper::startLoop() {
   watchdog_.start();
+  ended_ = tick_.finishedAt();
+  begun_ = clock_.now();
   if (!device_.traits().selfPaced) {
     const realtime::ServoThreadOptions options{
         .rate_Hz = options_.rate_Hz, .request = {}, .requireRealtime = options_.requireRealtime};
@@ -105,6 +107,8 @@ std::string DeviceKeeper::poll(Nanos now) {
     return std::string("the servo loop hangs: no tick has ended for more than 1 s; ") + force +
            "; restart the server if this lasts";
   }
+  if (begun_ != 0 && tick_.finishedAt() == ended_ && clock_.now() - begun_ > kHang)
+    return "the servo loop does not run: no tick has come since it began; restart the server";
   std::string fault = device_.faultText();
   if (!device_.lost()) {
     lostSince_ = 0;

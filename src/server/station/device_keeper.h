@@ -72,6 +72,8 @@ class DeviceKeeper {
   std::atomic<bool> isPacedSetUp_{false};
   std::atomic<bool> realtime_{false};
 
+  base::Nanos begun_ = 0;      // the present loop; 0: none
+  base::Nanos ended_ = 0;      // the last tick before it
   base::Nanos lostSince_ = 0;  // 0: not lost
   base::Nanos nextAttempt_ = 0;
   std::string attemptText_;  // reported while the attempt runs

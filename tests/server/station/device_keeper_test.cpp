@@ -92,7 +92,7 @@ class ScriptedDevice final : public device::Device {
     leave_ = false;
     thread_ = std::thread([this, onTick = std::move(onTick)] {
       for (Nanos now = kMs; !leave_; now += kMs) {
-        onTick(now);
+        if (!ticksNever) onTick(now);
         std::this_thread::sleep_for(1ms);
       }
     });
@@ -113,7 +113,7 @@ class ScriptedDevice final : public device::Device {
   std::atomic<bool> isOpen{false}, isLost{false}, isExplained{true}, openBlocks{false}, startFails{false};
   std::atomic<bool> canBeInterrupted{true}, isInterrupted{false}, closeBlocks{false};
   std::atomic<int> zeroes{0};
-  std::atomic<bool> readBlocks{false};
+  std::atomic<bool> readBlocks{false}, ticksNever{false};
   std::atomic<int> calibrations{0};
   std::atomic<bool> isCalibrated{true}, calibrationBlocks{false}, calibrationFails{false};
 
@@ -461,6 +461,15 @@ INSTANTIATE_TEST_SUITE_P(Loop, KeeperTest, testing::Bool(), [](const auto& insta
 });
 
 class SelfPacedKeeperTest : public KeeperTest {};
+
+TEST_P(SelfPacedKeeperTest, ALoopThatNeverTicksIsReported) {
+  device_.ticksNever = true;
+  keeper_.start();
+  EXPECT_TRUE(eventually(
+      [&] { return keeper_.poll(0).find("no tick has come since it began") != std::string::npos; }));
+  device_.ticksNever = false;
+  EXPECT_TRUE(eventually([&] { return keeper_.poll(0).empty(); }));
+}
 
 TEST_P(SelfPacedKeeperTest, ALoopThatDoesNotStartIsAFailureToOpen) {
   keeper_.start();
