@@ -132,7 +132,8 @@ Reporter::Reporter(const DeviceConfig& config, int buttonCount, const ReportChoi
       buttonCount_(view == View::device ? buttonCount : 0),
       view_(view),
       choice_(choiceFor(view, choice)),
-      period_(base::toNanos(1.0 / choice.rate_Hz)) {}
+      period_(base::toNanos(1.0 / choice.rate_Hz)),
+      slack_(std::min(period_, base::toNanos(1.0 / config.servoRate_Hz)) / 2) {}
 
 wire::F64x4 Reporter::quaternion(const Quat& q) const {
   if (config_.quaternionOrder == QuaternionOrder::wxyz) return {q.w(), q.x(), q.y(), q.z()};
@@ -146,7 +147,8 @@ void Reporter::update(const TickReport& tick, const ReportFrame& frame, std::vec
   const bool contactEnded = touching_ && !touching;
   const bool contactChanged = touching_ != touching;
   if (tick.time < due_ && !contactEnded) return;
-  const base::Nanos due = due_ == 0 ? tick.time : due_;  // the first tick begins the intervals
+  // The first tick begins the intervals. A later one may be early by half a servo period and still be due.
+  const base::Nanos due = due_ == 0 ? tick.time - slack_ : due_;
   due_ = std::max(due + period_, tick.time - period_ / 2);
   now_ = tick.time;
   const ClientTick clientTick = toClientTick(tick, config_.forceReport);

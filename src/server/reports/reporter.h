@@ -128,6 +128,7 @@ class Reporter {
   const View view_;
   const ReportChoice choice_;
   base::Nanos period_;
+  base::Nanos slack_;  ///< by which a tick may come before its report is due
   base::Nanos due_ = 0;
   base::Nanos now_ = 0;  ///< of the present tick
 

@@ -257,6 +257,31 @@ TEST_F(ReporterTest, TheFirstReportBeginsTheIntervals) {
   EXPECT_EQ(at, (std::vector<int>{0, 10, 20, 30, 40}));
 }
 
+// Ticks begin some microseconds early or late.
+TEST_F(ReporterTest, EveryTickIsReportedAtTheServoRate) {
+  for (const Nanos first : {Nanos{0}, kMs}) {
+    reporter_.reset();
+    step(first + kMs);
+    ASSERT_EQ(reported<wire::IsTouching>().size(), 1U);
+    Nanos late = 0;
+    for (const Nanos next : {-5'000, -5'000, 20'000, -200'000, 300'000, 0, -300'000, -5'000, 0}) {
+      step(kMs + next - late);
+      late = next;
+      EXPECT_EQ(reported<wire::IsTouching>().size(), 1U) << next << " ns late";
+    }
+  }
+}
+
+TEST_F(ReporterTest, SlowIntervalsDoNotDriftWithEarlyTicks) {
+  config_.reportRate_Hz = 100;
+  std::vector<int> at;
+  for (int i = 0; i < 45; ++i) {
+    step(i % 10 == 1 ? kMs + 5'000 : i % 10 == 0 && i > 0 ? kMs - 5'000 : kMs);
+    if (!reported<wire::IsTouching>().empty()) at.push_back(i);
+  }
+  EXPECT_EQ(at, (std::vector<int>{0, 10, 20, 30, 40}));
+}
+
 TEST_F(ReporterTest, OptionsSelectForceAndQuaternionOrder) {
   config_.forceReport = ForceReport::normal;
   config_.quaternionOrder = QuaternionOrder::wxyz;
