@@ -376,14 +376,15 @@ class Core(Commands):
     # --- from arrivals to reports
 
     def _dispatch(self) -> int:
-        """Runs the callbacks for everything that waits. An exception of a callback leaves; the rest waits on."""
+        """Runs the callbacks for everything that waits. An exception of a callback leaves; the rest waits on, and so does
+        what a poll() in a callback brings: each might bring more."""
         if self._dispatching:
             return 0
         self._dispatching = True
         count = 0
         inbox = self._inbox
         try:
-            while inbox:
+            for _ in range(len(inbox)):
                 arrival = inbox.popleft()
                 self._inbox_bytes -= len(arrival[4])
                 count += 1

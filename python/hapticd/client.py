@@ -403,7 +403,7 @@ class Client(Core):
         self._check_open()
         count = self._dispatch()
         deadline = time.monotonic() + timeout
-        while True:
+        while not (count and self._inbox):  # else callbacks polled, and the rest waits for the next call
             self._step(0.0 if count else max(0.0, deadline - time.monotonic()))
             count += self._dispatch()
             if count or time.monotonic() >= deadline:

@@ -487,6 +487,33 @@ def test_a_stock_server_of_several_devices() -> None:
             assert seen["analog"].channels.tolist() == [1.5, -2.5]
 
 
+def test_a_poll_in_a_callback_does_not_keep_the_outer_poll() -> None:
+    scripted = ScriptedServer()
+    many = 50
+    with hapticd.connect(scripted.name) as hand:
+        seen: List[int] = []
+
+        def arrives(touched: int) -> None:  # as a poll() does it
+            number, layout = _NUMBERS[m.TouchedObject]
+            hand._peer.feed(frame(1, 0, 0, number, layout.encode(m.TouchedObject(touched))))
+
+        def answer(report: hapticd.TouchedObjectReport) -> None:
+            seen.append(report.object)
+            hand.poll()
+            if report.object < many:
+                arrives(report.object + 1)
+
+        hand.on("touched_object", answer)
+        arrives(1)
+        hand.poll()
+        assert seen == [1]
+        hand.poll()
+        assert seen == [1, 2], "nothing is lost"
+        until(hand, lambda: len(seen) == many)
+        assert seen == list(range(1, many + 1))
+    scripted.close()
+
+
 def test_ctrl_c_ends_a_wait_and_nothing_is_left(server: Server) -> None:
     program = textwrap.dedent(
         f"""

@@ -48,6 +48,11 @@ class Inbox {
     return true;
   }
 
+  /// Number of arrivals that wait.
+  std::size_t waiting() const noexcept {
+    return half_[filling_].arrivals.size() + half_[1 - filling_].arrivals.size() - next_;
+  }
+
   /// Payload bytes in the half being filled.
   std::size_t waitingBytes() const noexcept { return half_[filling_].bytes.size(); }
 

@@ -107,8 +107,13 @@ std::size_t Link::dispatch(const Handler& handler) {
     explicit Scope(bool& f) : flag(f) { flag = true; }
     ~Scope() { flag = false; }
   } scope(dispatching_);
+  // A poll() in a callback may bring more each time; they wait for the next dispatch, so that this one ends.
   std::size_t count = 0;
-  for (Arrival arrival; inbox_.pop(arrival); ++count) handler(arrival);
+  for (std::size_t left = inbox_.waiting(); left > 0; --left, ++count) {
+    Arrival arrival;
+    inbox_.pop(arrival);
+    handler(arrival);
+  }
   if (paused_) {
     paused_ = false;
     connection_.resumeReading();
@@ -119,6 +124,10 @@ std::size_t Link::dispatch(const Handler& handler) {
 std::size_t Link::poll(Duration timeout, const Handler& handler) {
   flush();
   std::size_t count = dispatch(handler);
+  if (count > 0 && inbox_.waiting() > 0) {  // callbacks polled: the rest waits for the next call
+    flush();
+    return count;
+  }
   const base::Nanos deadline = base::now() + std::min(timeout, kLongestWait).count();
   do {
     const Duration left(count > 0 ? 0 : deadline - base::now());

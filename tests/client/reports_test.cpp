@@ -181,6 +181,31 @@ TEST(Client, CallbacksMayCommandUploadAndPoll) {
   EXPECT_TRUE(is(received.at(1), wire::StartEffect{9}));
 }
 
+// Each callback waits for the next report: poll() returns all the same, and nothing is lost.
+TEST(Client, PollInACallbackDoesNotKeepTheOuterPoll) {
+  ScriptedServer server;
+  Client client(server.tcpName());
+  constexpr int kMany = 50;
+  std::vector<int> order;
+  client.onTouchedObject([&](const TouchedObjectReport& r) {
+    order.push_back(r.object);
+    if (r.object == kMany) return;
+    const auto before = client.statistics().messagesIn;
+    server.send(wire::TouchedObject{r.object + 1});
+    const auto deadline = std::chrono::steady_clock::now() + 60s;
+    while (client.statistics().messagesIn == before && std::chrono::steady_clock::now() < deadline)
+      client.poll(1ms);
+  });
+  server.send(wire::TouchedObject{1});
+  while (order.empty()) client.poll(1s);
+  EXPECT_LE(order.size(), 2U) << "what waited, and what arrived before the callback";
+  const std::size_t before = order.size();
+  client.poll(1s);
+  EXPECT_EQ(order.size(), before + 1);
+  ASSERT_TRUE(pollUntil(client, [&] { return order.size() == kMany; }));
+  for (int i = 0; i < kMany; ++i) EXPECT_EQ(order[static_cast<std::size_t>(i)], i + 1);
+}
+
 TEST(Client, CallbacksKeepTheirStateAndMayAddOthers) {
   ScriptedServer server;
   Client client(server.tcpName());
