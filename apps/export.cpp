@@ -4,9 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "base/files.h"
 #include "base/time.h"
-#include "base/world.h"
 #include "commands.h"
 #include "print_json.h"
 #include "record/export.h"
@@ -57,7 +55,7 @@ void exportVrpn(const ExportOptions& options, std::string& remark) {
   record::RecordingReader reader(options.recording);
   const record::RecordingHeader& header = reader.header();
   const server::ServerConfig config = server::parseRecordedConfig(header.config, options.recording);
-  record::VrpnLog log(options.out);
+  record::VrpnLog log(options.out, record::Unfinished::dropped);
   std::vector<ReportedDevice> devices;
   for (std::size_t i = 0; i < header.devices.size(); ++i) {
     const server::DeviceConfig& device = config.devices.at(i);
@@ -80,18 +78,24 @@ int run(const ExportOptions& options) {
   keepFile(options.out, options.force, options.recording);
   const std::string beside = options.to == "vrpn" ? "" : options.out + ".json";
   keepFile(beside, options.force, options.recording);
+  constexpr auto kDropped = record::Unfinished::dropped;
   std::string remark;
   if (options.to == "vrpn") {
     exportVrpn(options, remark);
-  } else if (options.to == "csv") {
-    record::CsvFile file(options.out);
-    record::exportRecording(options.recording, file, remark);
   } else {
-    record::McapFile file(options.out);
-    record::exportRecording(options.recording, file, remark);
+    const std::string sidecar = record::sidecarOf(options.recording);
+    record::ExportFile besideFile(beside, kDropped);
+    besideFile.write(sidecar);
+    besideFile.flush();
+    if (options.to == "csv") {
+      record::CsvFile file(options.out, kDropped);
+      record::exportRecording(options.recording, file, remark);
+    } else {
+      record::McapFile file(options.out, kDropped);
+      record::exportRecording(options.recording, file, remark);
+    }
+    besideFile.close();
   }
-  if (!beside.empty())
-    base::world().files.create(beside, base::Existing::replace)->write(record::sidecarOf(options.recording));
   if (!remark.empty()) std::fprintf(stderr, "hapticd: %s\n", remark.c_str());
   if (options.json) {
     printJson({{"recording", options.recording},

@@ -9,11 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "base/files.h"
 #include "base/time.h"
-#include "base/world.h"
 #include "commands.h"
 #include "figure.h"
+#include "record/export_file.h"
 #include "record/recording_reader.h"
 
 namespace hapticd::apps {
@@ -277,8 +276,9 @@ int run(const PlotOptions& options) {
   const Data data = read(options);
   const Figure figure = draw(data);
   const std::string text = pdf ? figure.pdf(data.title) : figure.svg(data.title);
-  const auto file = base::world().files.create(options.out, base::Existing::replace);
-  file->write(std::as_bytes(std::span(text)));
+  record::ExportFile file(options.out, record::Unfinished::dropped);
+  file.write(text);
+  file.close();
   std::printf("%s: %zu ticks of '%s' from %.3f s to %.3f s\n", options.out.c_str(), data.rows.size(),
               data.device.c_str(), data.rows.front().time_s, data.rows.back().time_s);
   return 0;

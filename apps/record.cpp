@@ -37,11 +37,11 @@ struct RecordOptions {
   bool force = false;
 };
 
+// Made when the first report arrives: a server that reports nothing leaves an older file as it is.
 std::unique_ptr<record::SampleFile> sampleFile(const std::string& file) {
   const std::string extension = std::filesystem::path(file).extension();
   if (extension == ".csv") return std::make_unique<record::CsvFile>(file);
-  if (extension == ".mcap") return std::make_unique<record::McapFile>(file);
-  return nullptr;
+  return std::make_unique<record::McapFile>(file);
 }
 
 // Calls poll(20 ms), short so that signals take effect, until the end; it returns whether still connected.
@@ -58,7 +58,7 @@ void pollUntilEnd(const std::string& server, double seconds, const std::function
 
 // Every message of the device as it came, also of types that this project does not know. Returns their
 // number.
-std::size_t recordMessages(const RecordOptions& options, record::VrpnLog& log) {
+std::size_t recordMessages(const RecordOptions& options) {
   constexpr auto kTimeout = 5s;
   const client::DeviceAddress address = client::parseDevice(options.server);
   client::Link link(address.server, {.reconnect = false, .adoptNames = true});
@@ -71,34 +71,39 @@ std::size_t recordMessages(const RecordOptions& options, record::VrpnLog& log) {
   if (!link.waitHeard(device, kTimeout)) {
     throw ConnectError("no device '" + address.device + "' answers at " + address.server.text());
   }
-  const wire::LocalSender sender = log.addSender(address.device);
+  std::optional<record::VrpnLog> log;
+  wire::LocalSender sender;
   std::size_t count = 0;
   const auto add = [&](const client::Arrival& arrival) {
     const bool report = arrival.kind != wire::kindOf<wire::Pong>;
     if (arrival.what != client::Arrival::What::message || arrival.sender != device || !report) return;
     if (arrival.type.value < 0) return;
     const std::string& type = link.names().types()[static_cast<std::size_t>(arrival.type.value)];
-    log.addRaw(arrival.time, sender, type, arrival.bytes);
+    if (!log) sender = log.emplace(options.file).addSender(address.device);
+    log->addRaw(arrival.time, sender, type, arrival.bytes);
     ++count;
   };
   pollUntilEnd(address.server.text(), options.seconds, [&] {
     link.poll(20ms, add);
     return link.connected();
   });
+  if (log) log->close();
   return count;
 }
 
-std::size_t recordTicks(record::SampleFile& file, const RecordOptions& options) {
+std::size_t recordTicks(const RecordOptions& options) {
   Client client(options.server, {.reconnect = false});
   const auto capabilities = client.waitCapabilities();
   if (!capabilities || !capabilities->subscribe) {
     throw std::runtime_error(client.server() +
                              " is not a hapticd and reports no ticks; record to a file called *.vrpn");
   }
+  std::unique_ptr<record::SampleFile> file;
   std::size_t count = 0;
   MissingTicks missing;
   client.onTick([&](const TickReport& tick) {
-    file.add(sampleOf(client.device(), tick));
+    if (!file) file = sampleFile(options.file);
+    file->add(sampleOf(client.device(), tick));
     missing.add(tick.tick);
     ++count;
   });
@@ -109,10 +114,10 @@ std::size_t recordTicks(record::SampleFile& file, const RecordOptions& options) 
       return client.connected();
     });
   } catch (const ConnectionLost&) {
-    file.close();
+    if (file) file->close();
     throw;
   }
-  file.close();
+  if (file) file->close();
   missing.print("hapticd record", options.rate_Hz, capabilities->servoRate_Hz);
   return count;
 }
@@ -195,25 +200,19 @@ int recordOnServer(const RecordOptions& options) {
 int run(const RecordOptions& options) {
   if (options.onServer) return recordOnServer(options);
   keepFile(options.file, options.force);
-  const auto samples = sampleFile(options.file);
-  if (!samples && std::filesystem::path(options.file).extension() != ".vrpn") {
+  const std::string extension = std::filesystem::path(options.file).extension();
+  const bool samples = extension == ".csv" || extension == ".mcap";
+  if (!samples && extension != ".vrpn") {
     throw std::runtime_error("'" + options.file +
                              "': a client records to a file called *.vrpn, *.csv or *.mcap; the server "
                              "itself writes recordings that can be "
                              "replayed: hapticd serve --record FILE.haptics");
   }
   const StopSignals signals;
-  std::size_t count = 0;
-  if (samples) {
-    count = recordTicks(*samples, options);
-  } else {
-    record::VrpnLog log(options.file);
-    count = recordMessages(options, log);
-    log.close();
-  }
+  const std::size_t count = samples ? recordTicks(options) : recordMessages(options);
   if (count == 0) {
     throw std::runtime_error("nothing to record: " + options.server + " reported nothing within the time; " +
-                             options.file + " is empty");
+                             options.file + " is not written");
   }
   std::printf("recorded %zu %s of %s to %s\n", count, samples ? "ticks" : "messages", options.server.c_str(),
               options.file.c_str());

@@ -171,7 +171,7 @@ int renderMesh(const MeshRenderOptions& options) {
   const auto snapshot = makeScene(options, std::move(mesh));
   const double build_s = base::toSeconds(base::now() - before);
 
-  record::CsvFile out(options.out);
+  record::CsvFile out(options.out, record::Unfinished::dropped);
   Summary summary = follow(options, *hand, *snapshot, out);
   out.close();
   if (summary.touching == 0) {

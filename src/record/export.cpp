@@ -47,7 +47,7 @@ void appendCoordinates(std::string& out, const double* values, const char* names
 
 }  // namespace
 
-CsvFile::CsvFile(const std::filesystem::path& file) : file_(file) {
+CsvFile::CsvFile(const std::filesystem::path& file, Unfinished unfinished) : file_(file, unfinished) {
   file_.write(csvHeader<Sample>());
 }
 
@@ -57,8 +57,8 @@ void CsvFile::add(const Sample& sample) {
   file_.write(row_);
 }
 
-McapFile::McapFile(const std::filesystem::path& file)
-    : writer_(file),
+McapFile::McapFile(const std::filesystem::path& file, Unfinished unfinished)
+    : writer_(file, unfinished),
       tickSchema_(writer_.addSchema("hapticd.Tick", schemaOf<Sample>())),
       poseSchema_(writer_.addSchema("foxglove.PoseInFrame", kPoseSchema)),
       guardSchema_(writer_.addSchema("hapticd.Guard", kGuardSchema)),

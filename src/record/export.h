@@ -30,7 +30,7 @@ class SampleFile {
 /// One row for each tick of each device, below a row with the names of the columns.
 class CsvFile final : public SampleFile {
  public:
-  explicit CsvFile(const std::filesystem::path& file);
+  explicit CsvFile(const std::filesystem::path& file, Unfinished unfinished = Unfinished::kept);
   void add(const Sample& sample) override;
   void close() override { file_.close(); }
 
@@ -43,7 +43,7 @@ class CsvFile final : public SampleFile {
 /// scenes, their commands.
 class McapFile final : public SampleFile {
  public:
-  explicit McapFile(const std::filesystem::path& file);
+  explicit McapFile(const std::filesystem::path& file, Unfinished unfinished = Unfinished::kept);
   void add(const Sample& sample) override;
   void addCommand(const SceneEvent& event, Nanos wall_ns) override;
   void close() override { writer_.close(); }

@@ -12,19 +12,38 @@ constexpr std::size_t kFlushAt = 64 * 1024;
 
 }  // namespace
 
-ExportFile::ExportFile(const std::filesystem::path& path) : path_(path) {
+ExportFile::ExportFile(const std::filesystem::path& path, Unfinished unfinished)
+    : path_(path), target_(path), written_(path) {
+  namespace fs = std::filesystem;
+  std::error_code none;
+  const fs::file_status status = fs::status(path, none);
+  if (unfinished == Unfinished::dropped && (fs::is_regular_file(status) || !fs::exists(status))) {
+    if (fs::is_symlink(path, none)) target_ = fs::weakly_canonical(path, none);
+    written_ = target_;
+    written_ += ".part";
+  }
   try {
-    file_ = base::world().files.create(path, base::Existing::replace);
+    file_ = base::world().files.create(written_, base::Existing::replace);
   } catch (const std::system_error& error) {
-    throw RecordingError("cannot write '" + path_.string() + "': " + error.code().message() +
-                         "; name a file in a directory that can be written");
+    failToCreate(error.code());
   }
 }
 
+void ExportFile::failToCreate(const std::error_code& why) const {
+  throw RecordingError("cannot write '" + path_.string() + "': " + why.message() +
+                       "; name a file in a directory that can be written");
+}
+
 ExportFile::~ExportFile() {
+  if (!file_) return;
   try {
-    close();
-  } catch (const RecordingError&) {
+    if (written_ == target_) {
+      close();
+    } else {
+      file_.reset();
+      base::world().files.remove(written_);
+    }
+  } catch (const std::exception&) {
     // Whoever needs the file whole calls close().
   }
 }
@@ -47,6 +66,11 @@ void ExportFile::flush() {
 void ExportFile::close() {
   if (!file_) return;
   flush();
+  try {
+    if (written_ != target_) base::world().files.rename(written_, target_);
+  } catch (const std::system_error& error) {
+    failToCreate(error.code());
+  }
   file_.reset();
 }
 

@@ -10,25 +10,35 @@
 
 namespace hapticd::record {
 
+/// What becomes of a file that is not closed, because an error came first.
+enum class Unfinished {
+  kept,    ///< the file has what was written: for what cannot be made again
+  dropped  ///< there is none, and a file that it would have replaced stays as it was
+};
+
 /// Collects small writes. Every call throws RecordingError when the file cannot be written.
 class ExportFile {
  public:
-  /// Creates the file or replaces it.
-  explicit ExportFile(const std::filesystem::path& path);
-  /// Writes what close() did not write, and ignores errors.
+  /// Creates the file or replaces it: with Unfinished::dropped, in close(). A pipe or device is written.
+  explicit ExportFile(const std::filesystem::path& path, Unfinished unfinished = Unfinished::kept);
+  /// Does with a file that was not closed what was chosen, and ignores errors.
   ~ExportFile();
   ExportFile(const ExportFile&) = delete;
   ExportFile& operator=(const ExportFile&) = delete;
 
   void write(ByteView bytes);
   void write(std::string_view text) { write(std::as_bytes(std::span(text))); }
-  /// Writes what is left and closes the file. Idempotent.
+  /// Writes what is left.
+  void flush();
+  /// The same, and closes the file, which then has its name. Idempotent.
   void close();
 
  private:
-  void flush();
+  [[noreturn]] void failToCreate(const std::error_code& why) const;
 
   const std::filesystem::path path_;
+  std::filesystem::path target_;   // without a symbolic link, which a renaming would replace
+  std::filesystem::path written_;  // beside it until the file is whole, or the same
   std::unique_ptr<base::OutputFile> file_;
   Bytes pending_;
 };

@@ -55,7 +55,7 @@ ByteView magicBytes() {
 
 }  // namespace
 
-McapWriter::McapWriter(const std::filesystem::path& file) : file_(file) {
+McapWriter::McapWriter(const std::filesystem::path& file, Unfinished unfinished) : file_(file, unfinished) {
   write(Out().raw(magicBytes()).record(kHeader, Out().text("").text("hapticd " HAPTICD_VERSION)).bytes);
 }
 

@@ -20,7 +20,7 @@ class McapWriter {
   using Nanos = base::Nanos;
 
   /// Throws RecordingError when the file cannot be written.
-  explicit McapWriter(const std::filesystem::path& file);
+  explicit McapWriter(const std::filesystem::path& file, Unfinished unfinished = Unfinished::kept);
 
   /// Adds a kind of message with its JSON schema; returns its number.
   std::uint16_t addSchema(std::string_view name, std::string_view jsonSchema);

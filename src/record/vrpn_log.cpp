@@ -6,7 +6,7 @@
 
 namespace hapticd::record {
 
-VrpnLog::VrpnLog(const std::filesystem::path& file) : file_(file) {
+VrpnLog::VrpnLog(const std::filesystem::path& file, Unfinished unfinished) : file_(file, unfinished) {
   names_.addSender("VRPN Control");  // the stock library's sender 0
   file_.write(wire::encodeCookie(0));
 }

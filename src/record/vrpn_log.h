@@ -16,7 +16,7 @@ namespace hapticd::record {
 class VrpnLog {
  public:
   /// Throws RecordingError when the file cannot be written.
-  explicit VrpnLog(const std::filesystem::path& file);
+  explicit VrpnLog(const std::filesystem::path& file, Unfinished unfinished = Unfinished::kept);
 
   wire::LocalSender addSender(std::string_view name);
   void add(wire::Time time, wire::LocalSender sender, const wire::Message& message);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "base/fake_world.h"
 #include "record/recording_file.h"
 #include "record/text_fields.h"
 #include "record/vrpn_log.h"
@@ -62,6 +63,54 @@ TEST(Csv, AFileThatCannotBeCreatedIsRefused) {
   EXPECT_THROW(CsvFile("/nowhere/x.csv"), RecordingError);
   EXPECT_THROW(McapFile("/nowhere/x.mcap"), RecordingError);
   EXPECT_THROW(VrpnLog("/nowhere/x.vrpn"), RecordingError);
+}
+
+TEST(ExportFile, WhatIsNotClosedMayLeaveNoTrace) {
+  RecordingFile file;
+  const std::filesystem::path part = file.path().string() + ".part";
+  { CsvFile csv(file.path(), Unfinished::dropped); }
+  EXPECT_FALSE(std::filesystem::exists(file.path()));
+  EXPECT_FALSE(std::filesystem::exists(part));
+  std::ofstream(file.path()) << "good";
+  {
+    McapFile mcap(file.path(), Unfinished::dropped);
+    VrpnLog log(file.path(), Unfinished::dropped);
+    EXPECT_EQ(textOf(file.path()), "good");
+  }
+  EXPECT_EQ(textOf(file.path()), "good");
+  ExportFile whole(file.path(), Unfinished::dropped);
+  whole.write("better");
+  whole.flush();
+  EXPECT_EQ(textOf(file.path()), "good");
+  whole.close();
+  EXPECT_EQ(textOf(file.path()), "better");
+  EXPECT_FALSE(std::filesystem::exists(part));
+  { ExportFile("/dev/null", Unfinished::dropped).write("a device is written as it is"); }
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
+}
+
+TEST(ExportFile, ALinkStaysOne) {
+  RecordingFile file;
+  RecordingFile link;
+  std::ofstream(file.path()) << "good";
+  std::filesystem::create_symlink(file.path(), link.path());
+  ExportFile whole(link.path(), Unfinished::dropped);
+  whole.write("better");
+  whole.close();
+  EXPECT_TRUE(std::filesystem::is_symlink(link.path()));
+  EXPECT_EQ(textOf(file.path()), "better");
+}
+
+TEST(ExportFile, AFullDiskKeepsTheFileThatWasToBeReplaced) {
+  base::FakeWorld world;
+  world.files.create("/my.csv", base::Existing::refuse)->write("good");
+  world.files.freeBytes = 0;
+  {
+    ExportFile whole("/my.csv", Unfinished::dropped);
+    whole.write("better");
+    EXPECT_THROW(whole.close(), RecordingError);
+  }
+  EXPECT_EQ(world.files.list("/"), std::vector<std::string>{"my.csv"});
 }
 
 TEST(Json, NumbersThatAreNotFiniteAreNullAndLongListsAreTheirLength) {

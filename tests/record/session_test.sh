@@ -78,3 +78,34 @@ if "$hapticd" render --session "$source_dir/README.md" 2>"$work/error.txt"; then
 grep -q 'is not a recording' "$work/error.txt"
 if "$hapticd" record "Phantom@tcp://$address" "$work/x.haptics" 2>"$work/error.txt"; then exit 1; fi
 grep -q 'hapticd serve --record' "$work/error.txt"
+
+# A recording without ticks shows nothing.
+header=$((12 + $(od -An -tu4 --endian=big -j12 -N4 "$work/my.haptics")))
+head -c $((8 + header)) "$work/my.haptics" >"$work/none.haptics"
+status=0
+"$hapticd" render --session "$work/none.haptics" >/dev/null 2>"$work/error.txt" || status=$?
+[ "$status" = 1 ]
+grep -q 'no tick could be compared: the recording has none' "$work/error.txt"
+
+# What fails leaves no file, and keeps one that it would have replaced.
+mkdir "$work/kept"
+kept=$work/kept/file
+fails() {
+  if "$hapticd" "$@" >/dev/null 2>"$work/error.txt"; then echo "did not fail: $*"; exit 1; fi
+}
+all_fail() {
+  for to in csv mcap vrpn; do fails export "$source_dir/README.md" --to "$to" -o "$kept.$to" "$@"; done
+  fails plot "$source_dir/README.md" -o "$kept.svg" "$@"
+  fails plot "$work/none.haptics" -o "$kept.svg" "$@"
+  fails render --session "$source_dir/README.md" --out "$kept.csv" --report "$kept.html" "$@"
+  for type in csv mcap vrpn; do fails record Phantom@tcp://127.0.0.1:1 "$kept.$type" --seconds 1 "$@"; done
+}
+all_fail
+[ -z "$(ls "$work/kept")" ] || { echo "left over:"; ls "$work/kept"; exit 1; }
+for type in csv csv.json mcap mcap.json vrpn svg html; do echo good >"$kept.$type"; done
+all_fail --force
+[ "$(cat "$kept".* | sort | uniq -c | tr -s ' ')" = ' 7 good' ] || { echo "destroyed:"; grep -L '^good$' "$kept".*; exit 1; }
+"$hapticd" export "$work/my.haptics" --to csv -o "$kept.csv" --force >/dev/null
+cmp "$work/my.csv" "$kept.csv"
+cmp "$work/my.csv.json" "$kept.csv.json"
+[ -z "$(ls "$work/kept" | grep part)" ]
