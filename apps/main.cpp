@@ -72,6 +72,9 @@ int main(int argc, char** argv) {
   } catch (const hapticd::server::ConfigError& error) {
     std::fprintf(stderr, "hapticd: %s\n", error.what());
     return 2;
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "hapticd: out of memory\n");
+    return 1;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "hapticd: %s\n", error.what());
     return 1;

@@ -23,10 +23,9 @@ Recorder::Recorder(std::filesystem::path file, OnProblem onProblem, const Record
   try {
     file_ = base::world().files.create(path_, base::Existing::refuse);
   } catch (const std::system_error& error) {
-    throw RecordingError("cannot record to '" + path_.string() + "': " + error.code().message() +
-                         (error.code() == std::errc::file_exists
-                              ? "; name another, or put the time into the name: session-%Y%m%d-%H%M%S.haptics"
-                              : "; name a file in a directory that can be written"));
+    const std::string what = "cannot record to '" + path_.string() + "': " + error.code().message();
+    if (error.code() == std::errc::file_exists) throw RecordingExists(what + "; name another");
+    throw RecordingError(what + "; name a file in a directory that can be written");
   }
 }
 
@@ -136,7 +135,7 @@ void Recorder::drain() {
     device->ring.consume([&](const realtime::TickRecord& tick) {
       device->packer.add(tick, device->run);
       device->newest = tick.report.time;
-      if (file_) ++counts_.ticks;
+      ++unwrittenTicks_;
     });
   }
   std::uint64_t lostEvents = 0;
@@ -223,12 +222,14 @@ void Recorder::appendLost(LostEvent::What what, std::uint32_t device, std::uint6
 
 void Recorder::write() {
   const Bytes bytes = std::exchange(out_, {});
+  const std::uint64_t ticks = std::exchange(unwrittenTicks_, 0);
   if (!file_ || bytes.empty()) return;
   if (counts_.bytes + bytes.size() > options_.fileBytes)
     return fail(std::make_error_code(std::errc::file_too_large));
   try {
     file_->write(bytes);
     counts_.bytes += bytes.size();
+    counts_.ticks += ticks;
   } catch (const std::system_error& error) {
     fail(error.code());
   }

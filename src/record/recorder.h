@@ -30,10 +30,16 @@ struct RecorderOptions {
 /// What was written and what was lost so far.
 struct RecorderCounts {
   std::uint64_t bytes = 0;  ///< of what was written without an error
-  std::uint64_t ticks = 0;
+  std::uint64_t ticks = 0;  ///< the same
   std::uint64_t lostTicks = 0;
   std::uint64_t lostSceneEvents = 0;
   std::uint64_t lostStreamed = 0;
+};
+
+/// The file of a new recording exists.
+class RecordingExists : public RecordingError {
+ public:
+  using RecordingError::RecordingError;
 };
 
 class Recorder {
@@ -42,7 +48,7 @@ class Recorder {
   /// most once a second when something was lost.
   using OnProblem = std::function<void(const std::string&)>;
 
-  /// Creates the file. Throws RecordingError when that fails or the file exists.
+  /// Creates the file. Throws RecordingExists when it exists, and RecordingError when it cannot be created.
   Recorder(std::filesystem::path file, OnProblem onProblem, const RecorderOptions& options = {});
   ~Recorder() { finish(); }
   Recorder(const Recorder&) = delete;
@@ -126,7 +132,8 @@ class Recorder {
   std::vector<RecordedDevice> header_;
   std::vector<std::unique_ptr<Device>> devices_;
   RecorderCounts counts_;
-  Bytes out_;  // whole blocks on their way to the file
+  Bytes out_;                         // whole blocks on their way to the file
+  std::uint64_t unwrittenTicks_ = 0;  // in them
   std::uint64_t reportedLosses_ = 0;
   Nanos nextLossReport_ = 0;
   Nanos nextLook_ = 0;

@@ -1,5 +1,7 @@
 #include "record/rerender.h"
 
+#include <new>
+#include <string>
 #include <utility>
 
 #include "base/clock.h"
@@ -41,6 +43,17 @@ class RecordedHand final : public device::Device {
   const device::DeviceProfile profile_;
   const realtime::TickRecord* tick_ = nullptr;
 };
+
+[[noreturn]] void failToRebuild(const std::string& why) {
+  throw RecordingError("the recorded scene cannot be rebuilt on this machine: " + why);
+}
+
+// The builder refuses what finds no memory, and continues: the recorded server went on with the whole scene.
+void requireMemory(const std::vector<scene::Notice>& notices) {
+  for (const scene::Notice& notice : notices) {
+    if (notice.text.find("out of memory") != std::string::npos) failToRebuild(notice.text);
+  }
+}
 
 Bytes outcome(const TickReport& report) {
   Bytes bytes;
@@ -193,6 +206,9 @@ void Rerenderer::on(const SceneEvent& event) {
       } else {
         seat->builder.clientGone(event.client, event.time);
       }
+      requireMemory(notices);
+    } catch (const std::bad_alloc&) {
+      failToRebuild("out of memory");
     } catch (const std::exception&) {
       // The scene thread, too, reported it and continued.
     }
@@ -207,8 +223,9 @@ void Rerenderer::on(const PublishEvent& event) {
     if (auto snapshot = seat.builder.publish(event.time, notices)) {
       seat.newest = seat.surfaces.of(std::move(snapshot));
     }
-  } catch (const std::exception&) {
-    // The published scene stays as it is, as in the recording.
+  } catch (const std::exception& error) {
+    // In the recording, too, the published scene stays as it is; otherwise the reason is in this machine.
+    if (event.revision != 0) failToRebuild(error.what());
   }
   // Other surfaces may make another number of revisions: pair the recorded one with the newest snapshot.
   if (event.revision == 0 || !seat.newest) return;

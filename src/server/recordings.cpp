@@ -19,7 +19,9 @@ constexpr Nanos kSettled = 500'000'000;
 // Of recordings whose memory, 8 MB for each device, a tick may still use.
 constexpr std::size_t kMostEnded = 4;
 
-std::filesystem::path withTime(const std::string& name) {
+constexpr int kMostOfASecond = 1000;
+
+std::string withTime(const std::string& name) {
   const auto now = static_cast<std::time_t>(base::wallNow() / 1'000'000'000);
   std::tm local{};
   localtime_r(&now, &local);
@@ -56,10 +58,31 @@ Recordings::Recordings(const Scenes& scenes, const Stations& stations, Post post
     : scenes_(scenes), stations_(stations), post_(std::move(post)), options_(std::move(options)) {}
 
 void Recordings::create(const std::string& name) {
+  try {
+    createFile(withTime(name));
+  } catch (const record::RecordingExists& error) {
+    throw RecordingError(std::string(error.what()) +
+                         ", or put the time into the name: session-%Y%m%d-%H%M%S.haptics");
+  }
+}
+
+// Several may begin in one second.
+void Recordings::createNamedByTime() {
+  const std::string stem = withTime((options_.folder / "session-%Y%m%d-%H%M%S").string());
+  for (int number = 1;; ++number) {
+    try {
+      return createFile(stem + (number > 1 ? "-" + std::to_string(number) : "") + ".haptics");
+    } catch (const record::RecordingExists&) {
+      if (number == kMostOfASecond) throw;
+    }
+  }
+}
+
+void Recordings::createFile(const std::filesystem::path& path) {
   record::RecorderOptions options;
   options.fileBytes = options_.mostBytes;
   recorder_ = std::make_unique<record::Recorder>(
-      withTime(name),
+      path,
       [this](const std::string& text) {
         spdlog::error("{}", text);
         post_([this, text] { options_.failed(text); });
@@ -119,7 +142,11 @@ void Recordings::start(const std::string& name, Nanos wallOffset, std::string co
         "refused: the last " + std::to_string(kMostEnded) +
         " recordings have not ended yet; try again in a second, or when the devices are back");
   try {
-    create((options_.folder / (name.empty() ? "session-%Y%m%d-%H%M%S.haptics" : name)).string());
+    if (name.empty()) {
+      createNamedByTime();
+    } else {
+      createFile(withTime((options_.folder / name).string()));
+    }
     startRecorder(wallOffset, std::move(config));
     if (!recorder_->writes())
       throw RecordingError("refused: '" + recorder_->path().string() + "' cannot be written");

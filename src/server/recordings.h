@@ -63,6 +63,8 @@ class Recordings {
     bool told = false;
   };
 
+  void createNamedByTime();
+  void createFile(const std::filesystem::path& path);
   void startRecorder(base::Nanos wallOffset, std::string config);
   void attach();
   bool beginScene(SceneHost& scene);

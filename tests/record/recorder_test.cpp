@@ -228,5 +228,32 @@ TEST(Recorder, EndsBeforeTheFileExceedsItsLimit) {
   EXPECT_LE(std::filesystem::file_size(file.path()), kMost);
 }
 
+std::uint64_t ticksIn(const std::filesystem::path& file) {
+  std::uint64_t ticks = 0;
+  RecordingReader reader(file);
+  for (RecordingEvent event; reader.next(event);) ticks += std::holds_alternative<TickEvent>(event) ? 1 : 0;
+  return ticks;
+}
+
+TEST(Recorder, CountsTheTicksOfTheFile) {
+  const std::filesystem::path file = "/session.haptics";
+  base::FakeWorld world;
+  Problems problems;
+  Recorder recorder(file, problems.listener(), {.fileBytes = 200'000});
+  recorder.addDevice(phantom());
+  recorder.start(0, "");
+  for (std::uint64_t i = 1; i <= 1000; ++i) {
+    realtime::TickRecord tick;
+    tick.report.tick = i;
+    recorder.ring(0).push(tick);
+    if (i % 10 == 0) world.threads.runUntil(world.clock.now() + 20'000'000);
+  }
+  recorder.finish();
+  EXPECT_NE(problems.all(), "") << "the file is full";
+  EXPECT_GT(recorder.counts().ticks, 0U);
+  EXPECT_LT(recorder.counts().ticks, 1000U);
+  EXPECT_EQ(recorder.counts().ticks, ticksIn(file));
+}
+
 }  // namespace
 }  // namespace hapticd::record

@@ -1,9 +1,13 @@
 // Re-rendering a recording gives the recorded forces bit for bit.
 #include <gtest/gtest.h>
 
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <ctime>
 #include <fstream>
 #include <functional>
 #include <map>
@@ -286,6 +290,36 @@ TEST_F(Rerender, RecordingBegunWhileTheServerRunsReplaysItsScene) {
   EXPECT_GT(devices[1].skipped, 0U) << "until the hand was free";
   EXPECT_GT(devices[1].touching, 100U);
   EXPECT_EQ(devices[1].largest_N, 0);
+}
+
+// The time in the name is one of these seconds.
+TEST_F(Rerender, RecordingsThatBeginInOneSecondHaveNamesOfTheirOwn) {
+  const RecordingFile first;
+  const std::filesystem::path folder = first.path().string() + ".d";
+  std::filesystem::create_directory(folder);
+  const std::time_t now = std::time(nullptr);
+  for (std::time_t second = now; second < now + 300; ++second) {
+    std::tm local{};
+    localtime_r(&second, &local);
+    char name[64] = {};
+    std::strftime(name, sizeof name, "session-%Y%m%d-%H%M%S.haptics", &local);
+    std::ofstream(folder / name) << "kept";
+  }
+  std::string answer;
+  {
+    const Hand hand = Hand::stroking();
+    RunningServer server(recordingConfig(hand, folder / "first.haptics"));
+    ScriptedPeer peer(server.address());
+    ASSERT_TRUE(peer.untilConnected());
+    peer.send(wire::RecordingControl{.record = 0, .name = {}});
+    ASSERT_TRUE(peer.untilText("recorded "));
+    peer.send(wire::RecordingControl{.record = 1, .name = {}});
+    EXPECT_TRUE(peer.untilText("-2.haptics"));
+    peer.forget();
+    peer.send(wire::RecordingControl{.record = 0, .name = {}});
+    ASSERT_TRUE(peer.untilText("recorded "));
+  }
+  std::filesystem::remove_all(folder);
 }
 
 // Without what was streamed the same ticks give other forces: so the file has it, and it counts.
@@ -612,6 +646,44 @@ TEST(RecordingBegunLateByAnOlderVersion, IsReadAndSaysWhatIsMissing) {
   EXPECT_EQ(compared.ticks, 299U);
   EXPECT_LT(compared.same, compared.ticks) << "the vibration began anew";
 }
+
+#ifndef HAPTICD_SANITIZED
+// Address space in use, and little more.
+class LittleMemory {
+ public:
+  LittleMemory() {
+    std::size_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    getrlimit(RLIMIT_AS, &before_);
+    rlimit little = before_;
+    little.rlim_cur = pages * static_cast<std::size_t>(getpagesize()) + (1U << 24U);
+    setrlimit(RLIMIT_AS, &little);
+  }
+  ~LittleMemory() { setrlimit(RLIMIT_AS, &before_); }
+
+ private:
+  rlimit before_{};
+};
+
+TEST(Rerendering, WithoutMemoryForTheSceneSaysSo) {
+  record::RecordingHeader header;
+  header.devices.emplace_back();
+  record::Rerenderer again(header);
+  constexpr std::size_t kMany = 16U << 20U;  // 192 MiB
+  const record::RecordingEvent event = record::SceneEvent{
+      .client = 1, .command = scene::SetVertices{0, 0, std::vector<geometry::Vec3f>(kMany)}};
+  std::string text;
+  {
+    const LittleMemory little;
+    try {
+      again.feed(event);
+    } catch (const record::RecordingError& error) {
+      text = error.what();
+    }
+  }
+  EXPECT_EQ(text, "the recorded scene cannot be rebuilt on this machine: out of memory");
+}
+#endif
 
 INSTANTIATE_TEST_SUITE_P(All, RecordingBegunLate, testing::ValuesIn(kGoesOn),
                          [](const auto& param) { return std::string(param.param.name); });
