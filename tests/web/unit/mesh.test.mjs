@@ -113,6 +113,48 @@ test("errors name the file and the reason", async () => {
   for (const [files, message] of wrong) await assert.rejects(readMesh(files), { message });
 });
 
+/** A pentagon and a quad beside vertices with a list of their own. */
+function polygons(format, corners) {
+  const lists = [corners, 4].map((n) => [...Array(n).keys()]);
+  const header = `ply\nformat ${format} 1.0\ncomment made by hand\nelement vertex 6\nproperty float x\nproperty float y\nproperty double z\nproperty list ushort char more\nelement face 2\nproperty uchar red\nproperty list uchar int vertex_indices\nelement edge 1\nproperty int a\nend_header\n`;
+  const vertices = [...Array(6).keys()].map((i) => [Math.cos(i), Math.sin(i), 0]);
+  if (format === "ascii") {
+    const rows = vertices.map((v) => `${v.join(" ")} 2 7 8`);
+    const faces = lists.map((l) => `9 ${l.length} ${l.join(" ")}`);
+    return `${header}${[...rows, ...faces, "5"].join("\n")}\n`;
+  }
+  const little = format.includes("little");
+  const number = (method, size, value) => {
+    const bytes = Buffer.alloc(size);
+    bytes[`write${method}${size > 1 ? (little ? "LE" : "BE") : ""}`](value);
+    return bytes;
+  };
+  return Buffer.concat([
+    Buffer.from(header),
+    ...vertices.flatMap(([x, y, z]) => [
+      number("Float", 4, x),
+      number("Float", 4, y),
+      number("Double", 8, z),
+      number("UInt16", 2, 2),
+      Buffer.from([7, 8]),
+    ]),
+    ...lists.flatMap((l) => [Buffer.from([9, l.length]), ...l.map((v) => number("Int32", 4, v))]),
+    number("Int32", 4, 5),
+  ]);
+}
+
+test("a PLY file with polygons is refused instead of losing them; quads are read", async () => {
+  for (const format of ["ascii", "binary_little_endian", "binary_big_endian"]) {
+    await assert.rejects(
+      readMesh([file("pentagon.ply", polygons(format, 5))]),
+      { message: /pentagon\.ply: 1 of its faces have more than 4 corners: split them/ },
+      format,
+    );
+    const { mesh } = await readMesh([file("quads.ply", polygons(format, 4))]);
+    assert.equal(mesh.triangles.length, 12, format);
+  }
+});
+
 test("decodes the server's mesh; a truncated one is an error", () => {
   const bytes = Buffer.alloc(16 + 36 + 12);
   bytes.write("HDM1");

@@ -6,6 +6,7 @@ import { PLYLoader } from "three/examples/jsm/loaders/PLYLoader.js";
 import { STLLoader } from "three/examples/jsm/loaders/STLLoader.js";
 import { shapeOf } from "./gltf_shape";
 import { isMeshFile, kindOf } from "./mesh_files";
+import { largePolygons } from "./ply_polygons";
 import { type FileMesh, weld } from "./weld";
 
 /** The limit of one batch in the server. */
@@ -41,6 +42,11 @@ async function cornersOf(file: File, files: File[]): Promise<Float32Array> {
       return cornersIn(new Mesh(new STLLoader().parse(bytes)));
     case "ply": {
       const geometry = new PLYLoader().parse(bytes);
+      const large = largePolygons(bytes);
+      if (large > 0)
+        throw new Error(
+          `${large} of its faces have more than 4 corners: split them into triangles first, or load the file with 'hapticd touch'`,
+        );
       // Without faces it is a point cloud, not a list of corners.
       return geometry.index ? cornersIn(new Mesh(geometry)) : new Float32Array(0);
     }
