@@ -23,7 +23,9 @@ enum class BlockKind : std::uint32_t {
   stream = 8,
   passivity = 9,
   marker = 10,
-  memory = 11
+  memory = 11,
+  remoteMemory = 12,
+  left = 13
 };
 
 inline constexpr std::size_t kMagicBytes = 8;

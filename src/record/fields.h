@@ -335,4 +335,25 @@ void fields(T& force, V&& v) {
   v("budget", budget);
 }
 
+template <Is<realtime::RemoteMemory> T, class V>
+void fields(T& memory, V&& v) {
+  auto& [contacts, force, corrections_J, started, budget, energy_J, spent, cut] = memory;
+  v("contacts", contacts);
+  v("force", force);
+  v("corrections_J", corrections_J);
+  v("started", started);
+  v("budget", budget);
+  v("energy_J", energy_J);
+  v("spent", spent);
+  v("cut", cut);
+}
+
+template <Is<LeftEvent> T, class V>
+void fields(T& event, V&& v) {
+  auto& [scene, client, time] = event;
+  v("scene", scene);
+  v("client", client);
+  v("time_ns", time);
+}
+
 }  // namespace hapticd::record

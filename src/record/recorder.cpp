@@ -102,6 +102,12 @@ void Recorder::recordCommand(std::uint32_t scene, scene::ClientId client, Nanos 
   appendEvent(BlockKind::scene, std::move(content));
 }
 
+void Recorder::recordLeft(std::uint32_t scene, scene::ClientId client, Nanos time) {
+  Bytes content;
+  Packer(content).put(LeftEvent{scene, client, time});
+  appendEvent(BlockKind::left, std::move(content));
+}
+
 void Recorder::recordPublish(std::uint32_t device, Nanos time, std::uint64_t revision) {
   PublishEvent event{device, time, revision, {}};
   event.stopwatch.swap(devices_[device]->readings);
@@ -181,6 +187,12 @@ void Recorder::reportLosses() {
 void Recorder::appendMemories(std::uint32_t number, Device& device) {
   device.memories.consume([&](const realtime::ServoMemory& memory) {
     Bytes content;
+    if (memory.remote.contacts != 0 || memory.remote.force != 0) {
+      Packer(content).put(number);
+      packRemoteMemory(memory, content);
+      appendBlock(out_, BlockKind::remoteMemory, content);
+      content.clear();
+    }
     Packer(content).put(number);
     packMemory(memory, content);
     appendBlock(out_, BlockKind::memory, content);

@@ -73,6 +73,14 @@ struct SceneEvent {
   std::optional<scene::SceneCommand> command;
 };
 
+/// The forces of a client must end: it left, or they were stopped. The servos ramp them out from then on when
+/// the scene is too busy to do it; the event of the scene follows when it has.
+struct LeftEvent {
+  std::uint32_t scene = 0;
+  scene::ClientId client = 0;
+  Nanos time = 0;  ///< 0: what the client commands from here on is felt again
+};
+
 /// The builder of a device was asked for a snapshot.
 struct PublishEvent {
   std::uint32_t device = 0;
@@ -119,6 +127,6 @@ struct EndEvent {
 };
 
 using RecordingEvent = std::variant<SceneEvent, PublishEvent, StreamEvent, TickEvent, LostEvent, EndEvent,
-                                    MarkerEvent, MemoryEvent>;
+                                    MarkerEvent, MemoryEvent, LeftEvent>;
 
 }  // namespace hapticd::record

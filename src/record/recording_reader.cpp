@@ -1,5 +1,7 @@
 #include "record/recording_reader.h"
 
+#include <limits>
+
 #include "base/printable.h"
 #include "record/fields.h"
 #include "record/scene_event_codec.h"
@@ -8,6 +10,7 @@ namespace hapticd::record {
 namespace {
 
 constexpr int kMostButtons = 32;  // a tick has one bit for each
+constexpr Nanos kLatest = std::numeric_limits<Nanos>::max() / 2;  // sums with it do not overflow
 
 }  // namespace
 
@@ -132,8 +135,24 @@ bool RecordingReader::readBlock(RecordingEvent& event) {
       MemoryEvent& memory = event.emplace<MemoryEvent>();
       device = memory.device = in.next<std::uint32_t>();
       if (!unpackMemory(in, memory.memory) || !in.rest().empty()) fail("a damaged memory of a servo");
+      if (const auto part = remote_.find(device); part != remote_.end()) {
+        if (part->second.tick == memory.memory.tick) memory.memory.remote = part->second.remote;
+        remote_.erase(part);
+      }
       break;
     }
+    case BlockKind::remoteMemory: {
+      Unpacker in(block_.content);
+      device = in.next<std::uint32_t>();
+      if (device >= header_.devices.size() || !unpackRemoteMemory(in, remote_[device]) || !in.rest().empty())
+        fail("a damaged memory of a servo");
+      return false;
+    }
+    case BlockKind::left:
+      takeWhole<LeftEvent>(event);
+      if (std::get<LeftEvent>(event).time < 0 || std::get<LeftEvent>(event).time > kLatest)
+        fail("a client left at an impossible time");
+      return true;
     case BlockKind::lost:
       takeWhole<LostEvent>(event);
       device = std::get<LostEvent>(event).device;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 
@@ -42,6 +43,7 @@ class RecordingReader {
   bool pending_ = false;               // block_ was read and not used
   std::optional<TickUnpacker> ticks_;  // of the present block
   std::uint32_t ticksOf_ = 0;
+  std::map<std::uint32_t, realtime::ServoMemory> remote_;  // parts of memories that follow, by device
   bool ended_ = false;
 };
 

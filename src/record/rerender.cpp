@@ -103,10 +103,11 @@ struct Rerenderer::Seat {
       : scene(recorded.scene),
         control{false, recorded.tick.guard.armed, 0, 0},
         surfaces(changes, changed(recorded.sceneConfig, changes)),
-        builder(withStopwatch(changed(recorded.sceneConfig, changes))),
+        builder(withSeams(changed(recorded.sceneConfig, changes))),
         tick(device, clock, changed(recorded.tick, changes)) {}
 
-  scene::SceneConfig withStopwatch(scene::SceneConfig config) {
+  scene::SceneConfig withSeams(scene::SceneConfig config) {
+    config.owners = owners;
     config.stopwatch = [this] {
       if (readings.empty()) return lastReading;
       lastReading = readings.front();
@@ -163,6 +164,7 @@ struct Rerenderer::Seat {
   std::deque<Nanos> readings;  // of the stopwatch, in the publish at hand
   Nanos lastReading = 0;
   ChangedSurfaces surfaces;
+  const std::shared_ptr<scene::ForceOwners> owners = std::make_shared<scene::ForceOwners>();
   scene::SceneBuilder builder;
   std::shared_ptr<const scene::SceneSnapshot> newest;
   std::deque<std::pair<std::uint64_t, std::shared_ptr<const scene::SceneSnapshot>>> unseen;
@@ -192,6 +194,7 @@ const TickReport* Rerenderer::feed(const RecordingEvent& event) {
   if (const auto* published = std::get_if<PublishEvent>(&event)) on(*published);
   if (const auto* streamed = std::get_if<StreamEvent>(&event)) on(*streamed);
   if (const auto* remembered = std::get_if<MemoryEvent>(&event)) on(*remembered);
+  if (const auto* left = std::get_if<LeftEvent>(&event)) on(*left);
   if (const auto* tick = std::get_if<TickEvent>(&event)) return on(*tick);
   return nullptr;
 }
@@ -211,6 +214,18 @@ void Rerenderer::on(const SceneEvent& event) {
       failToRebuild("out of memory");
     } catch (const std::exception&) {
       // The scene thread, too, reported it and continued.
+    }
+    if (!event.command) seat->owners->forget(event.client);
+  }
+}
+
+void Rerenderer::on(const LeftEvent& event) {
+  for (const auto& seat : seats_) {
+    if (seat->scene != event.scene) continue;
+    if (event.time > 0) {
+      seat->owners->leave(event.client, event.time);
+    } else {
+      seat->owners->comeBack(event.client, seat->owners->leaves(event.client));
     }
   }
 }

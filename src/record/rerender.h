@@ -56,6 +56,7 @@ class Rerenderer {
   void on(const PublishEvent& event);
   void on(const StreamEvent& event);
   void on(const MemoryEvent& event);
+  void on(const LeftEvent& event);
   const realtime::TickReport* on(const TickEvent& event);
 
   std::vector<std::unique_ptr<Seat>> seats_;

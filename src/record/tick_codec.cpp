@@ -1,5 +1,7 @@
 #include "record/tick_codec.h"
 
+#include <cmath>
+
 #include "record/fields.h"
 
 namespace hapticd::record {
@@ -113,6 +115,24 @@ bool unpackMemory(Unpacker& in, realtime::ServoMemory& memory) {
   return in.ok() && render.buzzBegin >= 0 && thermal.newest >= 0 &&
          thermal.newest <= realtime::ThermalMemory::kBuckets && thermal.filled >= 0 &&
          thermal.filled < realtime::ThermalMemory::kBucket;
+}
+
+void packRemoteMemory(const realtime::ServoMemory& memory, Bytes& out) {
+  Packer pack(out);
+  pack.put(memory.tick);
+  pack.put(memory.remote);
+}
+
+bool unpackRemoteMemory(Unpacker& in, realtime::ServoMemory& memory) {
+  in.take(memory.tick);
+  in.take(memory.remote);
+  const realtime::RemoteMemory& remote = memory.remote;
+  const auto holds = [](const realtime::EnergyBudget& budget, double energy_J) {
+    return std::isfinite(budget.capacity_J) && std::abs(energy_J) <= budget.capacity_J;
+  };
+  return in.ok() && holds({}, remote.corrections_J) && holds(remote.budget, remote.energy_J) &&
+         std::isfinite(remote.budget.start_J) && std::isfinite(remote.budget.refill_W) && remote.cut >= 0 &&
+         remote.cut <= 1;
 }
 
 bool TickUnpacker::next(TickRecord& tick) {

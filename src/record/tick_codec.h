@@ -28,6 +28,10 @@ bool unpackStream(Unpacker& in, realtime::StreamRecord& stream);
 void packMemory(const realtime::ServoMemory& memory, Bytes& out);
 /// Takes one; false when it is damaged.
 bool unpackMemory(Unpacker& in, realtime::ServoMemory& memory);
+/// The part of it that has a block of its own.
+void packRemoteMemory(const realtime::ServoMemory& memory, Bytes& out);
+/// Sets `tick` and `remote`; false for a damaged one.
+bool unpackRemoteMemory(Unpacker& in, realtime::ServoMemory& memory);
 
 /// Takes the ticks of one run.
 class TickUnpacker {

@@ -118,6 +118,7 @@ class SceneBuilder::State {
 
   std::uint64_t revision() const noexcept { return revision_; }
   std::uint64_t resets() const noexcept { return resets_; }
+  const std::shared_ptr<ForceOwners>& owners() const noexcept { return config_.owners; }
   NoticeBoard& board() { return board_; }
 
  private:
@@ -298,6 +299,10 @@ std::vector<ClientCommand> SceneBuilder::commands(Nanos now) const {
 
 std::uint64_t SceneBuilder::revision() const noexcept {
   return state_->revision();
+}
+
+const std::shared_ptr<ForceOwners>& SceneBuilder::owners() const noexcept {
+  return state_->owners();
 }
 
 std::uint64_t SceneBuilder::resets() const noexcept {

@@ -53,6 +53,8 @@ class SceneBuilder {
   std::vector<ClientCommand> commands(Nanos now) const;
   /// Of the last snapshot.
   std::uint64_t revision() const noexcept;
+  /// Those of its configuration; may be null.
+  const std::shared_ptr<ForceOwners>& owners() const noexcept;
   /// How often the scene was reset; a reset in a batch counts when the batch is committed.
   std::uint64_t resets() const noexcept;
 

@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <utility>
 
 #include "base/time.h"
 #include "scene/notice.h"
@@ -21,6 +24,11 @@ class ForceOwner {
   void leave(base::Nanos now) noexcept {
     base::Nanos here = kHere;
     leftAt_.compare_exchange_strong(here, now, std::memory_order_acq_rel);
+  }
+  /// When it left; empty while it is here.
+  std::optional<base::Nanos> leftAt() const noexcept {
+    const base::Nanos left = leftAt_.load(std::memory_order_acquire);
+    return left == kHere ? std::nullopt : std::optional(left);
   }
   /// The share of its forces that is left: 1 while it is here and for kGrace, in which the scene thread
   /// usually releases them itself, then down to 0 within kRampOut. `releasedAt` is when the scene thread
@@ -42,23 +50,35 @@ class ForceOwner {
 /// The owners of one scene, by client. Any thread but a servo's.
 class ForceOwners {
  public:
+  /// Learns of a client before any servo can see that it left; no time: its commands exert force again. Called
+  /// under a lock: it must not call back.
+  using Listener = std::function<void(ClientId, std::optional<base::Nanos> left)>;
+
   std::shared_ptr<const ForceOwner> of(ClientId client) {
     const std::lock_guard lock(mutex_);
     return entryOf(client).owner;
   }
+  /// Calls `listener` for the clients that left and still own forces, and for each that leaves or comes back
+  /// from now on. Null: nobody.
+  void watch(Listener listener) {
+    const std::lock_guard lock(mutex_);
+    listener_ = std::move(listener);
+    if (!listener_) return;
+    for (const auto& [client, entry] : owners_) {
+      if (const auto left = entry.owner->leftAt()) listener_(client, left);
+    }
+  }
   /// The client's forces must end, also those of commands that are applied until comeBack().
   void leave(ClientId client, base::Nanos now) {
     const std::lock_guard lock(mutex_);
-    Entry& entry = entryOf(client);
-    ++entry.leaves;
-    entry.owner->leave(now);
+    ++entryOf(client).leaves;
+    endForces(client, now);
   }
   /// The same for a client that is gone: no command of it exerts force any more.
   void leaveForGood(ClientId client, base::Nanos now) {
     const std::lock_guard lock(mutex_);
-    Entry& entry = entryOf(client);
-    entry.gone = true;
-    entry.owner->leave(now);
+    entryOf(client).gone = true;
+    endForces(client, now);
   }
   /// How often leave() was called for the client.
   std::uint64_t leaves(ClientId client) {
@@ -71,6 +91,7 @@ class ForceOwners {
     const std::lock_guard lock(mutex_);
     const auto known = owners_.find(client);
     if (known == owners_.end() || known->second.gone || known->second.leaves != leaves) return;
+    if (listener_) listener_(client, std::nullopt);
     known->second.owner = std::make_shared<ForceOwner>();
   }
   /// The last command of the client was applied.
@@ -87,8 +108,13 @@ class ForceOwners {
   };
 
   Entry& entryOf(ClientId client) { return owners_[client]; }
+  void endForces(ClientId client, base::Nanos now) {
+    if (listener_) listener_(client, now);
+    entryOf(client).owner->leave(now);
+  }
 
   std::mutex mutex_;
+  Listener listener_;
   std::map<ClientId, Entry> owners_;
 };
 

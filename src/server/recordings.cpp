@@ -92,6 +92,7 @@ void Recordings::createFile(const std::filesystem::path& path) {
 
 void Recordings::begin(Nanos wallOffset, std::string config) {
   recorderOf_.resize(scenes_.size(), nullptr);  // now: later the threads of the scenes read it
+  owners_.resize(scenes_.size());
   if (!recorder_) return;
   startRecorder(wallOffset, std::move(config));
   attach();
@@ -113,11 +114,31 @@ void Recordings::attach() {
   spdlog::info("recording to {}", recorder_->path().string());
 }
 
+// In the scene's thread. The forces of a client that leaves end at that time, however busy this thread is.
+void Recordings::watch(std::uint32_t scene, const scene::SceneBuilder& builder, record::Recorder* recorder) {
+  owners_[scene] = builder.owners();
+  if (!owners_[scene]) return;
+  owners_[scene]->watch(
+      [scene, recorder](scene::ClientId client, std::optional<Nanos> left) {
+        recorder->recordLeft(scene, client, left.value_or(0));
+      });
+}
+
+void Recordings::scenesStarted() {
+  if (!recorder_) return;
+  for (const auto& scene : scenes_) {
+    scene->inspect([this, number = scene->number(), recorder = recorder_.get()](const auto& builders) {
+      watch(number, *builders.front(), recorder);
+    });
+  }
+}
+
 // In the scene's thread, so that no command and no publication comes between what is described and what is
 // recorded. False: the scene has not started, so there is nothing to describe.
 bool Recordings::beginScene(SceneHost& scene) {
   return scene.inspect([this, &scene, recorder = recorder_.get()](const auto& builders) {
     const Nanos now = base::now();
+    watch(scene.number(), *builders.front(), recorder);
     for (const scene::ClientCommand& c : builders.front()->commands(now)) {
       const bool ofObjects = scene::targetOf(c.command) == scene::Target::objects;
       recorder->recordCommand(scene.number(), c.client, ofObjects ? now - kSettled : now, &c.command);
@@ -171,6 +192,7 @@ bool Recordings::end(std::function<void(const std::string&)> ended) {
   for (const auto& scene : scenes_) {
     scene->inspect([this, host = scene.get(), recorder](const auto&) {
       recorderOf_[host->number()] = nullptr;
+      if (owners_[host->number()]) owners_[host->number()]->watch(nullptr);
       for (const auto& station : stations_) {
         if (&station->scene() == host) station->recordTo(nullptr, 0);
       }
@@ -219,6 +241,9 @@ void Recordings::poll() {
 }
 
 void Recordings::finish() {
+  for (const auto& owners : owners_) {
+    if (owners) owners->watch(nullptr);  // clients leave the server that ends, too
+  }
   for (const auto& entry : ended_) {
     entry->recorder->finish();
     if (!entry->told) spdlog::info("{}", summary(*entry->recorder));

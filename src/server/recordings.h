@@ -40,6 +40,8 @@ class Recordings {
   /// The same for a client, which may name a file in the folder; empty: named by the time. Throws
   /// record::RecordingError with a text for the client.
   void start(const std::string& name, base::Nanos wallOffset, std::string config);
+  /// Call once after begin(), when the scenes have started.
+  void scenesStarted();
   /// Ends the recording at hand; `ended` gets a text once the file is complete. False when there is none.
   bool end(std::function<void(const std::string&)> ended);
 
@@ -68,6 +70,7 @@ class Recordings {
   void startRecorder(base::Nanos wallOffset, std::string config);
   void attach();
   bool beginScene(SceneHost& scene);
+  void watch(std::uint32_t scene, const scene::SceneBuilder& builder, record::Recorder* recorder);
   void sceneEnded(const record::Recorder* recorder);
 
   const Scenes& scenes_;
@@ -76,7 +79,9 @@ class Recordings {
   const Options options_;
   std::unique_ptr<record::Recorder> recorder_;
   std::vector<std::unique_ptr<Ended>> ended_;
-  std::vector<record::Recorder*> recorderOf_;  // of each scene; touched by its thread once that runs
+  // Of each scene; touched by its thread once that runs.
+  std::vector<record::Recorder*> recorderOf_;
+  std::vector<std::shared_ptr<scene::ForceOwners>> owners_;
 };
 
 }  // namespace hapticd::server

@@ -260,6 +260,7 @@ void Server::startScene(SceneHost& scene) {
 void Server::run() {
   recordings_.begin(clock_.offset(), toToml(config_));
   for (const auto& scene : scenes_) startScene(*scene);
+  recordings_.scenesStarted();
   for (const auto& owned : stations_) {
     Station* station = owned.get();
     subscriptions_.push_back(loop_.watchFd(station->wakeFd(), [this, station] {

@@ -274,6 +274,29 @@ RC_GTEST_PROP(Memories, AreReadAsTheyWereWritten, (std::uint64_t seed)) {
   }
 }
 
+TEST(Memories, ImpossibleStoresOfEnergyAreRefused) {
+  const auto isTakenWith = [](auto&& change) {
+    realtime::ServoMemory memory;
+    memory.remote.force = 1;
+    change(memory.remote);
+    Bytes bytes;
+    packRemoteMemory(memory, bytes);
+    Unpacker in(bytes);
+    realtime::ServoMemory back;
+    return unpackRemoteMemory(in, back);
+  };
+  using realtime::RemoteMemory;
+  const double nan = std::nan("");
+  EXPECT_TRUE(isTakenWith([](RemoteMemory&) {}));
+  EXPECT_FALSE(isTakenWith([](RemoteMemory& m) { m.energy_J = 1; })) << "more than the store holds";
+  EXPECT_FALSE(isTakenWith([](RemoteMemory& m) { m.budget.capacity_J = -1; }));
+  EXPECT_FALSE(isTakenWith([&](RemoteMemory& m) { m.budget.capacity_J = nan; }));
+  EXPECT_FALSE(isTakenWith([&](RemoteMemory& m) { m.budget.refill_W = nan; }));
+  EXPECT_FALSE(isTakenWith([&](RemoteMemory& m) { m.energy_J = nan; }));
+  EXPECT_FALSE(isTakenWith([&](RemoteMemory& m) { m.corrections_J = nan; }));
+  EXPECT_FALSE(isTakenWith([](RemoteMemory& m) { m.cut = 1.1; }));
+}
+
 TEST(Memories, ImpossibleOnesAreRefused) {
   Filler filler(1);
   const realtime::ServoMemory possible = anyMemory(filler);
@@ -345,9 +368,19 @@ class SmallSession : public testing::Test {
     first_ = stopwatch();
     stopwatch();
     recorder.recordPublish(0, 110, 1);
+    recorder.recordLeft(0, 9, 115);
     recorder.recordCommand(0, 9, 120, nullptr);
     Filler filler(1);
-    recorder.memoryRing(0).push(anyMemory(filler));
+    realtime::ServoMemory memory = anyMemory(filler);
+    memory.remote = {.contacts = 3,
+                     .force = 4,
+                     .corrections_J = 0.01,
+                     .started = true,
+                     .budget = {0.01, 0.03, 0.02},
+                     .energy_J = -0.02,
+                     .spent = true,
+                     .cut = 0.5};
+    recorder.memoryRing(0).push(memory);
     for (std::uint64_t i = 1; i <= 3; ++i) recorder.ring(0).push(anyTick(filler, i));
     recorder.finish();
     std::ifstream in(file_.path(), std::ios::binary);
@@ -385,9 +418,20 @@ TEST_F(SmallSession, HasWhatWasRecorded) {
   ASSERT_EQ(std::get<PublishEvent>(event).stopwatch.size(), 2U);
   EXPECT_EQ(std::get<PublishEvent>(event).stopwatch[0], first_);
   ASSERT_TRUE(reader.next(event));
+  EXPECT_EQ(std::get<LeftEvent>(event).client, 9U);
+  EXPECT_EQ(std::get<LeftEvent>(event).time, 115);
+  ASSERT_TRUE(reader.next(event));
   EXPECT_FALSE(std::get<SceneEvent>(event).command);
   ASSERT_TRUE(reader.next(event));
   EXPECT_EQ(std::get<MemoryEvent>(event).memory.tick, 7U);
+  const realtime::RemoteMemory& remote = std::get<MemoryEvent>(event).memory.remote;
+  EXPECT_EQ(remote.contacts, 3U);
+  EXPECT_EQ(remote.force, 4U);
+  EXPECT_EQ(remote.corrections_J, 0.01);
+  EXPECT_TRUE(remote.started && remote.spent);
+  EXPECT_EQ(remote.budget.capacity_J, 0.03);
+  EXPECT_EQ(remote.energy_J, -0.02);
+  EXPECT_EQ(remote.cut, 0.5);
   for (std::uint64_t i = 1; i <= 3; ++i) {
     ASSERT_TRUE(reader.next(event));
     EXPECT_EQ(std::get<TickEvent>(event).tick.report.tick, i);

@@ -173,17 +173,26 @@ TEST_F(Rerender, ChangesChangeForces) {
 
 TEST_F(Rerender, AllCommandsAreInTheFile) {
   std::map<std::string, int> commands;
+  std::map<scene::ClientId, base::Nanos> left;
   int gone = 0;
+  int owners = 0;
   for (const record::RecordingEvent& event : eventsOf(file_->path())) {
+    if (const auto* leaves = std::get_if<record::LeftEvent>(&event)) left[leaves->client] = leaves->time;
     const auto* command = std::get_if<record::SceneEvent>(&event);
     if (command == nullptr) continue;
     if (command->command) {
       ++commands[record::nameOf(*command->command)];
     } else {
       ++gone;
+      const auto before = left.find(command->client);
+      if (before == left.end()) continue;  // it has commanded nothing
+      EXPECT_LE(before->second, command->time) << "the servo knows first";
+      left.erase(before);
+      ++owners;
     }
   }
   EXPECT_GE(gone, 1);
+  EXPECT_GE(owners, 1);
   for (const char* name :
        {"SetVertices", "SetSurfaceProperty", "SetTransform", "DefineEffect", "StartEffect", "SetForceField",
         "BeginBatch", "CommitBatch", "AddObject", "SetSceneOrigin", "ResetScene"}) {
@@ -369,8 +378,11 @@ class LateRecording {
   void leave(scene::ClientId client) {
     if (recorder_) recorder_->recordCommand(0, client, now_, nullptr);
     builder_.clientGone(client, now_);
+    owners_->forget(client);
     changed_ = true;
   }
+  /// The same as far as the servo knows; leave() follows when the scene is less busy.
+  void leaveBusyScene(scene::ClientId client) { owners_->leave(client, now_); }
   void stream(const realtime::RemoteInput& input) { tick_.remote().write(input); }
   realtime::GuardControl& control() { return tick_.control(); }
   base::Nanos now() const { return now_; }
@@ -395,6 +407,8 @@ class LateRecording {
     recorder->addDevice(device_);
     recorder->start(0, "");
     stopwatch_ = recorder->stopwatch(0);
+    owners_->watch(
+        [r = recorder.get()](scene::ClientId client, base::Nanos time) { r->recordLeft(0, client, time); });
     for (const scene::ClientCommand& c : builder_.commands(now_)) {
       const bool ofObjects = scene::targetOf(c.command) == scene::Target::objects;
       recorder->recordCommand(0, c.client, ofObjects ? now_ - 500 * kTick : now_, &c.command);
@@ -408,6 +422,7 @@ class LateRecording {
   }
   void end() {
     tick_.recordTo({});
+    owners_->watch(nullptr);
     stopwatch_ = nullptr;
     recorder_->finish();
     recorder_.reset();
@@ -459,6 +474,7 @@ class LateRecording {
   scene::SceneConfig withStopwatch() {
     scene::SceneConfig config = device_.sceneConfig;
     config.stopwatch = [this] { return stopwatch_ ? stopwatch_() : base::now(); };
+    config.owners = owners_;
     return config;
   }
 
@@ -479,6 +495,7 @@ class LateRecording {
   std::function<base::Nanos()> stopwatch_;
   std::vector<scene::Notice> notices_;
   bool changed_ = false;
+  const std::shared_ptr<scene::ForceOwners> owners_ = std::make_shared<scene::ForceOwners>();
   scene::SceneBuilder builder_{withStopwatch()};
   base::SimulatedClock clock_;
   GlidingHand hand_;
@@ -623,6 +640,85 @@ TEST_P(RecordingBegunLate, GivesTheRecordedForcesBitForBit) {
   EXPECT_GT(compared.touching, 800U);
 }
 
+// As a version wrote the file that did not know this kind of block.
+void removeBlocks(const std::filesystem::path& file, record::BlockKind kind) {
+  record::Bytes kept(record::magic().begin(), record::magic().end());
+  record::BlockReader blocks(file);
+  for (record::BlockReader::Block block; blocks.next(block);) {
+    if (block.kind != kind) record::appendBlock(kept, block.kind, block.content);
+  }
+  std::ofstream(file, std::ios::binary)
+      .write(reinterpret_cast<const char*>(kept.data()), static_cast<std::streamsize>(kept.size()));
+}
+
+void pullAndPush(LateRecording& r, scene::ClientId client) {
+  r.send(scene::DefineEffect{"constant", 1, 0, 0.4, 0, 0, geometry::Vec3::Zero(), {1, 0, 0}}, client);
+  r.send(scene::StartEffect{1}, client);
+  r.send(scene::SetForceField{geometry::Vec3::Zero(), {0, 0, 0.3}, {}, 1}, client);
+}
+
+// The servo ramps out the forces of a client that left, before the scene does.
+TEST(RecordingOfABusyScene, HasTheTimeAtWhichAClientLeft) {
+  for (const bool late : {false, true}) {
+    const RecordingFile file;
+    LateRecording r;
+    r.glide(kAbove, 700);
+    if (!late) r.record(file.path());
+    pullAndPush(r, 2);
+    r.glide(kAbove, 300);
+    r.leaveBusyScene(2);
+    r.glide(kAbove, 20);
+    if (late) r.record(file.path());
+    r.glide(kAbove, 150);
+    r.leave(2);
+    pullAndPush(r, 2);  // another client of this number would not be ramped out
+    r.glide(kAbove, 400);
+    r.end();
+    const Compared compared = rerender(file.path()).front();
+    EXPECT_GT(compared.ticks, 500U);
+    EXPECT_EQ(compared.same, compared.ticks) << compared.firstDifference;
+    EXPECT_EQ(compared.largest_N, 0);
+    removeBlocks(file.path(), record::BlockKind::left);
+    EXPECT_GT(rerender(file.path()).front().largest_N, 0.1) << "without it";
+  }
+}
+
+// Energy that streamed forces and contacts spent before the recording is missing in it, too.
+TEST(RecordingBegunLate, HasTheTanksOfStreamedForces) {
+  const RecordingFile file;
+  LateRecording r;
+  std::uint64_t number = 0;
+  const auto streamFor = [&](int rounds, const geometry::Vec3& to_mm) {
+    for (int i = 0; i < rounds; ++i) {
+      realtime::RemoteInput input = streamed(r, ++number);
+      input.contacts.contacts[0].point_m.y() = i % 2 == 0 ? 0.031 : 0.036;
+      input.force.number = number;
+      input.force.received = r.now();
+      input.force.lifetime = 100'000'000;
+      input.force.force_N = {1.5, 0, 0};
+      r.stream(input);
+      r.glide(to_mm, 10);
+    }
+  };
+  r.glide(kAbove, 500);
+  streamFor(40, {60, 30, 2});
+  EXPECT_LT(r.last().remote.energy_J, 0.012) << "it was spent";
+  r.glide({60, 30, 2}, 350);
+  r.record(file.path());
+  r.glide({60, 30, 2}, 50);
+  EXPECT_LT(r.last().remote.energy_J, 0.019) << "less than a new one starts with";
+  streamFor(40, {120, 30, 2});
+  r.glide({120, 30, 2}, 300);
+  streamFor(20, {180, 30, 2});
+  r.end();
+  const Compared compared = rerender(file.path()).front();
+  EXPECT_GT(compared.ticks, 900U);
+  EXPECT_EQ(compared.same, compared.ticks) << compared.firstDifference;
+  EXPECT_EQ(compared.largest_N, 0);
+  removeBlocks(file.path(), record::BlockKind::remoteMemory);
+  EXPECT_GT(rerender(file.path()).front().largest_N, 0.01) << "without it";
+}
+
 // Older versions wrote the same without the memory of the servo.
 TEST(RecordingBegunLateByAnOlderVersion, IsReadAndSaysWhatIsMissing) {
   const RecordingFile file;
@@ -634,13 +730,7 @@ TEST(RecordingBegunLateByAnOlderVersion, IsReadAndSaysWhatIsMissing) {
   r.glide(kAbove, 300);
   r.end();
   EXPECT_TRUE(knowsPast(file.path()));
-  record::Bytes old(record::magic().begin(), record::magic().end());
-  record::BlockReader blocks(file.path());
-  for (record::BlockReader::Block block; blocks.next(block);) {
-    if (block.kind != record::BlockKind::memory) record::appendBlock(old, block.kind, block.content);
-  }
-  std::ofstream(file.path(), std::ios::binary)
-      .write(reinterpret_cast<const char*>(old.data()), static_cast<std::streamsize>(old.size()));
+  removeBlocks(file.path(), record::BlockKind::memory);
   EXPECT_FALSE(knowsPast(file.path()));
   const Compared compared = rerender(file.path()).front();
   EXPECT_EQ(compared.ticks, 299U);

@@ -13,7 +13,11 @@ class EnergyTank {
  public:
   explicit EnergyTank(const EnergyBudget& budget) noexcept : budget_(budget), energy_J_(budget.start_J) {}
 
+  EnergyTank(const EnergyBudget& budget, double balance_J) noexcept : budget_(budget), energy_J_(balance_J) {}
+
   double energy_J() const noexcept { return std::max(0.0, energy_J_); }
+  /// The same, below zero for a debt.
+  double balance_J() const noexcept { return energy_J_; }
   /// Takes work that was done on the hand; negative work fills the tank. What an empty tank gives while its
   /// user still falls to zero is a debt, repaid first.
   void give(double work_J) noexcept {

@@ -23,6 +23,23 @@ void HeldForceLaw::restart(const Vec3& hip_m) noexcept {
   lastHip_m_ = hip_m;
 }
 
+bool HeldForceLaw::remember(RemoteMemory& out) const noexcept {
+  out.started = started_;
+  out.budget = tank_.budget();
+  out.energy_J = tank_.balance_J();
+  out.spent = spent_;
+  out.cut = cut_;
+  return force_N_.isZero(0);
+}
+
+void HeldForceLaw::resume(const RemoteMemory& memory, const Vec3& hip_m) noexcept {
+  restart(hip_m);
+  tank_ = EnergyTank(memory.budget, memory.energy_J);
+  started_ = memory.started;
+  spent_ = memory.spent;
+  cut_ = memory.cut;
+}
+
 // Falls early enough to be zero at the end at the allowed rate.
 Vec3 HeldForceLaw::target(const HeldForce& wanted, Nanos now) const noexcept {
   const Nanos left = wanted.number == 0 ? 0 : wanted.received + wanted.lifetime - now;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "realtime/remote/energy_tank.h"
+#include "realtime/remote/remote_memory.h"
 #include "realtime/remote/remote_report.h"
 
 namespace hapticd::realtime {
@@ -17,6 +18,10 @@ class HeldForceLaw {
   void reset() noexcept;
   /// The hand may be anywhere, now here: no force pushed it there, and a force ramps in.
   void restart(const Vec3& hip_m) noexcept;
+  /// What a later force depends on, unless a force acts: then false.
+  bool remember(RemoteMemory& out) const noexcept;
+  /// Continues from a tick without a force, with the hand at `hip_m`.
+  void resume(const RemoteMemory& memory, const Vec3& hip_m) noexcept;
 
  private:
   Vec3 target(const HeldForce& wanted, Nanos now) const noexcept;

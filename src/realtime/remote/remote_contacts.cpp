@@ -66,6 +66,18 @@ void RemoteContacts::restart(std::uint64_t number) noexcept {
   taken_ = number;
 }
 
+bool RemoteContacts::remember(RemoteMemory& out) const noexcept {
+  out.corrections_J = corrections_.balance_J();
+  return top_ == 0;
+}
+
+void RemoteContacts::resume(const RemoteMemory& memory, const Vec3& hip_m) noexcept {
+  restart(memory.contacts);
+  resumed_ = false;
+  hand_m_ = hip_m;
+  corrections_ = EnergyTank(EnergyBudget{}, memory.corrections_J);
+}
+
 Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand, Nanos now, double step_s,
                           RemoteRendering& out) noexcept {
   out.contactsTime = newest.clientTime;

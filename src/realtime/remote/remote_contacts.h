@@ -8,6 +8,7 @@
 #include <span>
 
 #include "realtime/remote/energy_tank.h"
+#include "realtime/remote/remote_memory.h"
 #include "realtime/remote/remote_report.h"
 #include "realtime/remote/remote_shape.h"
 
@@ -31,6 +32,10 @@ class RemoteContacts {
   void reset() noexcept;
   /// The hand may be anywhere: the same, and what was stated up to the set `number` does not count any more.
   void restart(std::uint64_t number) noexcept;
+  /// What later contacts depend on, unless there are some: then false.
+  bool remember(RemoteMemory& out) const noexcept;
+  /// Continues from a tick without contacts, with the hand at `hip_m`.
+  void resume(const RemoteMemory& memory, const Vec3& hip_m) noexcept;
 
  private:
   // Those of the newest set, and as many that fade out.

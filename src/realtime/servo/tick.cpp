@@ -200,6 +200,15 @@ void Tick::resume(const TickReport& last, const ServoMemory& memory) noexcept {
   resume(last);
   renderer_.resume(memory.render);
   guard_.resume(memory.guard);
+  if (memory.remote.contacts == 0 && memory.remote.force == 0) return;
+  // As if what was streamed before had been: it has ended, but the tanks go on.
+  RemoteInput ended;
+  ended.contacts.number = contactsSeen_ = memory.remote.contacts;
+  ended.force.number = forceSeen_ = memory.remote.force;
+  ended.force.budget = memory.remote.budget;
+  remoteInput_.write(ended);
+  remoteContacts_.resume(memory.remote, last.device.position_m);
+  heldForce_.resume(memory.remote, last.device.position_m);
 }
 
 // Once whole, nothing more is remembered until the next recording.
@@ -210,17 +219,24 @@ void Tick::remember(MemoryRing* ring) noexcept {
   memory_.tick = report_.tick;
   const bool rendering = renderer_.remember(report_.rendering, memory_.render);
   const bool guard = guard_.remember(memory_.guard);
-  memory_.whole = rendering && guard && nothingStreamed() && sight_.ever && sight_.time == report_.time &&
+  const bool remote = rememberRemote();
+  memory_.whole = rendering && guard && remote && sight_.ever && sight_.time == report_.time &&
                   report_.revision >= rememberFrom_.load(std::memory_order_acquire);
   if (first || memory_.whole) ring->push(memory_);
 }
 
-// What was streamed longer ago has ended and faded.
-bool Tick::nothingStreamed() noexcept {
+// False while something that was streamed acts, or may still fade.
+bool Tick::rememberRemote() noexcept {
+  RemoteMemory& memory = memory_.remote;
+  memory.contacts = contactsSeen_;
+  memory.force = forceSeen_;
+  const bool contacts = remoteContacts_.remember(memory);
+  const bool force = heldForce_.remember(memory);
+  if (contactsSeen_ == 0 && forceSeen_ == 0) return true;
   const RemoteInput& input = remoteInput_.read();
   const Nanos ended =
       std::max(input.contacts.received + kLongestRemoteLife, input.force.received + input.force.lifetime);
-  return (input.contacts.number == 0 && input.force.number == 0) || report_.time > ended + kLongestRemoteLife;
+  return contacts && force && report_.time > ended + kLongestRemoteLife;
 }
 
 void Tick::publish() noexcept {

@@ -126,7 +126,7 @@ class Tick {
   void discardForce() noexcept;
   void publish() noexcept;
   void remember(MemoryRing* ring) noexcept;
-  bool nothingStreamed() noexcept;
+  bool rememberRemote() noexcept;
 
   // Time and place of the last position that the device reported.
   struct Sight {

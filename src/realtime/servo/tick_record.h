@@ -3,6 +3,7 @@
 
 #include "handoff/spsc_ring.h"
 #include "realtime/remote/remote_input.h"
+#include "realtime/remote/remote_memory.h"
 #include "realtime/servo/guard_control.h"
 #include "realtime/servo/report.h"
 
@@ -29,6 +30,7 @@ struct ServoMemory {
   bool whole = false;      ///< false: more is needed to render on, as in contact; another follows
   RenderMemory render;
   GuardMemory guard;
+  RemoteMemory remote;
 };
 
 /// From the servo to a recorder: the memory of the first recorded tick and, unless that is whole, of the
