@@ -999,11 +999,7 @@ void Simulation::checkRecording() {
   try {
     for (const record::Difference& device : record::compare(kRecording, {}, remark, law)) {
       outcome_.replayedTicks += device.ticks();
-      // A servo that ramps out by itself, because the scene is busy, is not in the recording (decision 15).
-      const bool ownersLeave =
-          std::any_of(script_.actions.begin(), script_.actions.end(),
-                      [](const Action& action) { return action.kind == Action::Kind::vanish; });
-      if (!ownersLeave && device.lost() == 0 && device.same() != device.ticks())
+      if (device.lost() == 0 && device.same() != device.ticks())
         finding("the recording replays " + std::to_string(device.same()) + " of " +
                 std::to_string(device.ticks()) + " ticks bit for bit");
     }
