@@ -81,8 +81,8 @@ class Recorder {
   /// changed.
   void recordPublish(std::uint32_t device, Nanos time, std::uint64_t revision);
 
-  /// From any thread, before a servo can see it: the forces of a client must end from this time on; 0: what it
-  /// commands from here on is felt again.
+  /// From any thread, before a servo can see it: the forces of a client must end from this time on; 0: what
+  /// it commands from here on is felt again.
   void recordLeft(std::uint32_t scene, scene::ClientId client, Nanos time);
   /// From any thread: a client marked a moment.
   void recordMarker(Nanos time, const std::string& text);

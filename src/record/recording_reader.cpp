@@ -9,7 +9,7 @@
 namespace hapticd::record {
 namespace {
 
-constexpr int kMostButtons = 32;  // a tick has one bit for each
+constexpr int kMostButtons = 32;                                  // a tick has one bit for each
 constexpr Nanos kLatest = std::numeric_limits<Nanos>::max() / 2;  // sums with it do not overflow
 
 }  // namespace

@@ -50,8 +50,8 @@ class ForceOwner {
 /// The owners of one scene, by client. Any thread but a servo's.
 class ForceOwners {
  public:
-  /// Learns of a client before any servo can see that it left; no time: its commands exert force again. Called
-  /// under a lock: it must not call back.
+  /// Learns of a client before any servo can see that it left; no time: its commands exert force again.
+  /// Called under a lock: it must not call back.
   using Listener = std::function<void(ClientId, std::optional<base::Nanos> left)>;
 
   std::shared_ptr<const ForceOwner> of(ClientId client) {

@@ -118,10 +118,9 @@ void Recordings::attach() {
 void Recordings::watch(std::uint32_t scene, const scene::SceneBuilder& builder, record::Recorder* recorder) {
   owners_[scene] = builder.owners();
   if (!owners_[scene]) return;
-  owners_[scene]->watch(
-      [scene, recorder](scene::ClientId client, std::optional<Nanos> left) {
-        recorder->recordLeft(scene, client, left.value_or(0));
-      });
+  owners_[scene]->watch([scene, recorder](scene::ClientId client, std::optional<Nanos> left) {
+    recorder->recordLeft(scene, client, left.value_or(0));
+  });
 }
 
 void Recordings::scenesStarted() {

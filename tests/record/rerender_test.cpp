@@ -407,10 +407,9 @@ class LateRecording {
     recorder->addDevice(device_);
     recorder->start(0, "");
     stopwatch_ = recorder->stopwatch(0);
-    owners_->watch(
-        [r = recorder.get()](scene::ClientId client, std::optional<base::Nanos> left) {
-          r->recordLeft(0, client, left.value_or(0));
-        });
+    owners_->watch([r = recorder.get()](scene::ClientId client, std::optional<base::Nanos> left) {
+      r->recordLeft(0, client, left.value_or(0));
+    });
     for (const scene::ClientCommand& c : builder_.commands(now_)) {
       const bool ofObjects = scene::targetOf(c.command) == scene::Target::objects;
       recorder->recordCommand(0, c.client, ofObjects ? now_ - 500 * kTick : now_, &c.command);
