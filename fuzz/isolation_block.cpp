@@ -19,10 +19,10 @@ void isolation_block(Input input) {
   try {
     const device::DeviceProfile profile = block->profile.toProfile();
     require(profile.peakForce_N >= 0 && profile.model.size() <= 128, "a possible profile");
+    require(block->profile.toTraits().forceLife >= 0, "a possible life of a force");
   } catch (const std::runtime_error& error) {
     require(*error.what() != '\0', "a refusal has a reason");
   }
-  static_cast<void>(block->profile.toTraits());
   for (int i = 0; i < 3; ++i) {
     const device::DeviceState state = block->state.read().toState();
     require(isolation::Posted::of(state).buttons == state.buttons, "a state survives");

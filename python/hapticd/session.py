@@ -23,6 +23,7 @@ _HEAD: Final = struct.Struct(">III")
 _VERSION: Final = 2
 # Kinds of blocks.
 _HEADER, _SCENE, _PUBLISH, _TICKS, _LOST, _END, _LAW, _STREAM, _PASSIVITY, _MARKER, _MEMORY = range(1, 12)
+_REMOTE_MEMORY, _LEFT = 12, 13
 _MAX_CONTACTS: Final = 1024
 
 _FIXED: Final = np.dtype(

@@ -636,8 +636,12 @@ class Referee {
     if (std::any_of(near.begin(), near.end(), hasRim)) return;
     const Material& m = reference_.materialOf(near[0]);
     const double depth = trial_.toolRadius_m - n.dot(hip_ - nearestOf(f, rendering_.proxy_m));
-    const Point expected =
-        std::max(0.0, m.stiffness_N_per_m * std::max(0.0, depth) - m.damping_Ns_per_m * n.dot(velocity_)) * n;
+    // A face whose popthrough force is exceeded yields to a ball until that has room behind it.
+    const double toRoom_N = m.stiffness_N_per_m * 2 * trial_.toolRadius_m;
+    double spring_N = m.stiffness_N_per_m * std::max(0.0, depth);
+    if (m.popthrough_N > 0 && m.popthrough_N < toRoom_N && spring_N > m.popthrough_N)
+      spring_N = m.popthrough_N + std::max(0.0, spring_N - toRoom_N);
+    const Point expected = std::max(0.0, spring_N - m.damping_Ns_per_m * n.dot(velocity_)) * n;
     const double off = (rendering_.normalForce_N - expected).norm();
     if (off > (1e-6 + joinedTilt(f)) * expected.norm() + m.stiffness_N_per_m * kForceTolerance_m) {
       report("law", "the force ", rendering_.normalForce_N.transpose(), " on one surface, expected ",
