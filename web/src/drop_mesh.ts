@@ -142,7 +142,7 @@ export class DropMesh {
   private async send(name: string, mesh: FileMesh, placing: Placing, channel: Channel, device?: string): Promise<void> {
     const objects = this.context.objects();
     const placement = placing.placement(this.targets.next(objects));
-    const takeBack = this.targets.begin(placement.object, name, objects);
+    const sent = this.targets.begin(placement.object, name, objects);
     this.sending = name;
     this.bar.value = 0;
     this.bar.hidden = false;
@@ -150,9 +150,10 @@ export class DropMesh {
     try {
       if (this.context.device()?.name !== device) throw new Error("another device was chosen before it could be sent");
       await upload(channel, mesh, placement, (share) => (this.bar.value = share));
-      this.show(`${name} is sent; the server is processing it …`);
+      // A small mesh may be in the server's state before its last bytes are known to have left.
+      if (sent.isUnderWay()) this.show(`${name} is sent; the server is processing it …`, "waiting");
     } catch (error) {
-      takeBack();
+      sent.takeBack();
       const text = `${name}: ${(error as Error).message}`;
       this.show(text, "bad");
       toast(text, 2); // the text of the next upload replaces the other

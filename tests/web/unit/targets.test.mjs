@@ -17,15 +17,17 @@ test("a new mesh becomes the first empty object, or one more", () => {
 test("a mesh under way keeps its object, until it is there or was not sent", () => {
   const targets = new Targets();
   const scene = [object(0, 0, 1)];
-  const takeBack = targets.begin(0, "one.obj", scene);
+  const first = targets.begin(0, "one.obj", scene);
   assert.deepEqual(targets.next(scene), { object: 1, isNew: true });
-  targets.begin(1, "two.obj", scene);
+  const second = targets.begin(1, "two.obj", scene);
+  assert.ok(second.isUnderWay());
   assert.deepEqual(targets.next(scene), { object: 2, isNew: true });
-  takeBack();
+  first.takeBack();
   assert.deepEqual(targets.next(scene), { object: 0, isNew: false });
   assert.deepEqual(targets.arrived(scene), []);
   const after = [object(0, 0, 1), object(1, 20, 4)];
   assert.deepEqual(targets.arrived(after), [{ name: "two.obj", object: 1, triangles: 20 }]);
+  assert.ok(!second.isUnderWay(), "the text of its arrival stays");
   assert.deepEqual(targets.arrived(after), []);
   targets.begin(0, "three.obj", after);
   targets.clear();

@@ -10,6 +10,12 @@ interface Sent {
   name: string;
 }
 
+export interface UnderWay {
+  /** It is not yet in the server's state. */
+  isUnderWay(): boolean;
+  takeBack(): void;
+}
+
 export class Targets {
   /** What is being sent, or was sent and is not yet in the server's state; in this order. */
   private readonly underWay: Sent[] = [];
@@ -22,11 +28,11 @@ export class Targets {
     return { object: Math.max(-1, ...objects.map((o) => o.id), ...taken) + 1, isNew: true };
   }
 
-  /** A mesh is being sent: its object is no place for another new one. The result takes that back. */
-  begin(object: number, name: string, objects: Known[]): () => void {
+  /** A mesh is being sent: its object is no place for another new one. */
+  begin(object: number, name: string, objects: Known[]): UnderWay {
     const sent = { object, name, geometry: objects.find((o) => o.id === object)?.geometry ?? -1 };
     this.underWay.push(sent);
-    return () => this.end(sent);
+    return { isUnderWay: () => this.underWay.includes(sent), takeBack: () => this.end(sent) };
   }
 
   /** The meshes that are new in the server's state. */
