@@ -22,7 +22,9 @@ class SentZero {
   /// The one sender: this command, or zero instead of it, has left.
   void sent(std::uint64_t number) noexcept { sent_.store(number, std::memory_order_release); }
   /// Servo thread: the newest command is zero, and one of its run has left.
-  bool isSent() const noexcept { return first_ != kNone && sent_.load(std::memory_order_acquire) >= first_; }
+  bool isSent() const noexcept { return isSent(sent_.load(std::memory_order_acquire)); }
+  /// The same where the sender counts elsewhere: in another process.
+  bool isSent(std::uint64_t sent) const noexcept { return first_ != kNone && sent >= first_; }
 
  private:
   static constexpr std::uint64_t kNone = std::numeric_limits<std::uint64_t>::max();

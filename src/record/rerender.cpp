@@ -51,7 +51,7 @@ class RecordedHand final : public device::Device {
 // The builder refuses what finds no memory, and continues: the recorded server went on with the whole scene.
 void requireMemory(const std::vector<scene::Notice>& notices) {
   for (const scene::Notice& notice : notices) {
-    if (notice.text.find("out of memory") != std::string::npos) failToRebuild(notice.text);
+    if (notice.text.find(scene::kOutOfMemory) != std::string::npos) failToRebuild(notice.text);
   }
 }
 

@@ -51,7 +51,7 @@ class SceneBuilder::State {
       batch.commands.push(std::move(command));
     } catch (const std::bad_alloc&) {
       refuse(batch);
-      call.refuse("batch", "refused as a whole: the server is out of memory");
+      call.refuse("batch", "refused as a whole: ", kOutOfMemory);
       return;
     }
     batch.bytes += bytes;
@@ -242,7 +242,7 @@ class SceneBuilder::State {
       try {
         dispatch(command, inside);
       } catch (const std::bad_alloc&) {
-        call.refuse("batch", "carried out in part: the server is out of memory; send the scene again");
+        call.refuse("batch", "carried out in part: ", kOutOfMemory, "; send the scene again");
       }
     });
   }

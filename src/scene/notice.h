@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 namespace hapticd::scene {
 
@@ -16,5 +17,8 @@ struct Notice {
   Severity severity = Severity::warning;
   std::string text;
 };
+
+/// In the text of what was refused for want of memory, and not for what the client sent.
+inline constexpr std::string_view kOutOfMemory = "the server is out of memory";
 
 }  // namespace hapticd::scene

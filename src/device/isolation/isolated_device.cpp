@@ -266,17 +266,12 @@ bool IsolatedDevice::write(const Vec3& force_N) noexcept {
   if (!memory_ || !force_N.allFinite()) return false;
   const Vec3 wanted_N = silent_ ? Vec3(Vec3::Zero()) : force_N;
   (*memory_)->command.write({wanted_N, ++commands_});
-  if (!wanted_N.isZero(0)) {
-    firstZero_ = 0;
-  } else if (firstZero_ == 0) {
-    firstZero_ = commands_;
-  }
+  sentZero_.wrote(commands_, wanted_N.isZero(0));
   return true;
 }
 
-// The newest force may be left out when its process takes a later one.
 bool IsolatedDevice::zeroSent() const noexcept {
-  return memory_ && firstZero_ != 0 && (*memory_)->sentUpTo.load(std::memory_order_acquire) >= firstZero_;
+  return memory_ && sentZero_.isSent((*memory_)->sentUpTo.load(std::memory_order_acquire));
 }
 
 // A command that is being written now has the next number at most.

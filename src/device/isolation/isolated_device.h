@@ -18,6 +18,7 @@
 #include "base/thread.h"
 #include "device/device.h"
 #include "device/isolation/shared_block.h"
+#include "device/sent_zero.h"
 
 namespace hapticd::device {
 
@@ -102,7 +103,7 @@ class IsolatedDevice final : public Device {
   Nanos lastPost_ = 0;
   Nanos period_ = 0;  // between the last two posts
   Nanos postToTick_ = 0;
-  std::uint64_t firstZero_ = 0;  // of the commands since the last force; 0: the newest is a force
+  SentZero sentZero_;
 };
 
 }  // namespace hapticd::device

@@ -3,13 +3,9 @@
 #include <algorithm>
 
 namespace hapticd::realtime {
-namespace {
-
-constexpr double kForgotten_s = 1;
-
-}  // namespace
 
 Vec3 PassivityController::step(const SpringState& spring, const Vec3& hip_m, double period_s) noexcept {
+  constexpr double kForgotten_s = 1;
   if (!helps()) return Vec3::Zero();
   if (!spring.known) {
     open_ = false;
@@ -53,7 +49,7 @@ void PassivityController::book(const SpringState& spring, const Vec3& move) noex
   account_J_ = std::min(0.0, account_J_ + taken + bareDamping_Ns_per_m_ * move.squaredNorm() / elapsed_s_);
 }
 
-Vec3 PassivityController::brakeFor(const SpringState& spring, const Vec3& move) noexcept {
+Vec3 PassivityController::brakeFor(const SpringState& spring, const Vec3& move) const noexcept {
   const double squared = move.squaredNorm();
   // Rounding of the stored energy is no debt.
   const double rounding = 1e-12 * (spring.stored_J + spring.stiffness_N_per_m * squared);

@@ -55,7 +55,7 @@ class PassivityController {
  private:
   bool helps() const noexcept { return std::isfinite(bareDamping_Ns_per_m_); }
   void book(const SpringState& spring, const Vec3& move) noexcept;
-  Vec3 brakeFor(const SpringState& spring, const Vec3& move) noexcept;
+  Vec3 brakeFor(const SpringState& spring, const Vec3& move) const noexcept;
 
   double bareDamping_Ns_per_m_;
   bool open_ = false;

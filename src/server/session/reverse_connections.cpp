@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "server/session/identity.h"
 #include "wire/udp_request.h"
 
 namespace hapticd::server {
@@ -13,15 +14,10 @@ using namespace std::chrono_literals;
 constexpr std::size_t kMostPending = 64;
 constexpr std::size_t kMostOfOne = kMostPending / 4;
 
-// One machine counts once, whatever it calls itself: all of 127.0.0.0/8 is this one.
-std::uint32_t sourceOf(std::uint32_t address) {
-  return net::isLoopback(address) ? net::kLoopbackAddress : address;
-}
-
 }  // namespace
 
 struct ReverseConnections::Pending {
-  std::uint32_t asked = 0;  // which source
+  std::string asked;  // by which source
   net::Endpoint client;
   net::Connection connection;
 };
@@ -74,18 +70,18 @@ void ReverseConnections::onRequest(std::span<const std::byte> datagram, const ne
               "trusted_networks or insecure");
     return;
   }
-  connectTo(client, sourceOf(from.address));
+  connectTo(client, sourceOf(from.addressText()));
 }
 
-void ReverseConnections::connectTo(const net::Endpoint& client, std::uint32_t asked) {
+void ReverseConnections::connectTo(const net::Endpoint& client, const std::string& asked) {
   // Clients repeat their request until the server connects.
   for (const auto& pending : pending_) {
     if (pending->client == client) return;
   }
   // Those that answer nobody must leave room for others.
-  const auto called = sourceOf(client.address);
+  const std::string called = sourceOf(client.addressText());
   const auto ofOne = [&](const auto& pending) {
-    return pending->asked == asked || sourceOf(pending->client.address) == called;
+    return pending->asked == asked || sourceOf(pending->client.addressText()) == called;
   };
   if (std::count_if(pending_.begin(), pending_.end(), ofOne) >= std::ptrdiff_t{kMostOfOne}) {
     log_.warn("connection request to " + client.text() + " ignored: " + std::to_string(kMostOfOne) +

@@ -34,7 +34,7 @@ class ReverseConnections {
   struct Pending;
 
   void onRequest(std::span<const std::byte> datagram, const net::Endpoint& from);
-  void connectTo(const net::Endpoint& client, std::uint32_t asked);
+  void connectTo(const net::Endpoint& client, const std::string& asked);
   void onConnected(Pending& pending);
   void forget(const Pending& pending);
 

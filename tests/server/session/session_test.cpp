@@ -91,20 +91,30 @@ TEST(Session, ReportsSlicesOfALongRead) {
   EXPECT_LE(owner.mostBetween, 8 * 1024 / wire::kHeaderBytes + 1);  // one frame spans the boundary
 }
 
-// The promise to send heartbeats is seen although everything else is held back: later silence counts.
-TEST(Session, ReadsHeartbeatsAheadOfWhatIsHeldBack) {
+// The server reads what a client sent and holds it back.
+struct HeldSession {
+  HeldSession() { names.addSender("Phantom"); }
+
   net::Loop loop;
   wire::LocalNames names;
-  names.addSender("Phantom");
   WallClock clock;
   CountingOwner owner;
   std::optional<Session> session;
-  net::TcpListener listener(loop, net::Endpoint::parse("127.0.0.1", 0), [&](net::Connection connection) {
-    session.emplace(1, owner, names, clock, std::move(connection), nullptr, SessionMode::tcp);
-    session->hold();
-    session->start();
-  });
-  net::Connection client = net::Connection::connect(loop, listener.local(), 20s);
+  net::TcpListener listener{loop, net::Endpoint::parse("127.0.0.1", 0), [this](net::Connection connection) {
+                              session.emplace(1, owner, names, clock, std::move(connection), nullptr,
+                                              SessionMode::tcp);
+                              session->hold();
+                              session->start();
+                            }};
+};
+
+// The promise to send heartbeats is seen although everything else is held back: later silence counts.
+TEST(Session, ReadsHeartbeatsAheadOfWhatIsHeldBack) {
+  HeldSession held;
+  net::Loop& loop = held.loop;
+  CountingOwner& owner = held.owner;
+  std::optional<Session>& session = held.session;
+  net::Connection client = net::Connection::connect(loop, held.listener.local(), 20s);
   client.start({});
   client.send(bytesWith([](wire::Peer& peer, wire::LocalSender sender) {
     peer.send({}, sender, wire::StartEffect{1});
@@ -123,20 +133,13 @@ TEST(Session, ReadsHeartbeatsAheadOfWhatIsHeldBack) {
 
 // A client whose heartbeats wait behind its own data: its forces end, until a heartbeat is read.
 TEST(Session, TellsThatHeartbeatsReturn) {
-  net::Loop loop;
-  wire::LocalNames names;
-  names.addSender("Phantom");
-  WallClock clock;
-  CountingOwner owner;
-  std::optional<Session> session;
-  net::TcpListener listener(loop, net::Endpoint::parse("127.0.0.1", 0), [&](net::Connection connection) {
-    session.emplace(1, owner, names, clock, std::move(connection), nullptr, SessionMode::tcp);
-    session->hold();
-    session->start();
-  });
+  HeldSession held;
+  net::Loop& loop = held.loop;
+  CountingOwner& owner = held.owner;
+  std::optional<Session>& session = held.session;
   net::ConnectionOptions options;
   options.hardLimitBytes = std::size_t{64} << 20;
-  net::Connection client = net::Connection::connect(loop, listener.local(), 20s, options);
+  net::Connection client = net::Connection::connect(loop, held.listener.local(), 20s, options);
   client.start({});
   client.send(bytesWith([](wire::Peer& peer, wire::LocalSender sender) {
     peer.send({}, sender, wire::Heartbeat{1});
