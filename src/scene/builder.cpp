@@ -77,7 +77,8 @@ class SceneBuilder::State {
   std::shared_ptr<const SceneSnapshot> publish(Nanos now, std::vector<Notice>& out) {
     board_.flush(now, out);
     const bool forces = forces_.update(now, board_, out);
-    const bool objects = objects_.publish(now, workspace_.worldUnitsPerMetre, board_, out);
+    const double units = workspace_.worldUnitsPerMetre;
+    const bool objects = objects_.publish(now, units, forces_.load_Ns_per_m(units), board_, out);
     if (!forces && !objects && !changed_) return nullptr;
     changed_ = false;
     auto snapshot = std::make_shared<SceneSnapshot>();
@@ -86,7 +87,8 @@ class SceneBuilder::State {
     snapshot->faces = faces_;
     snapshot->objects = objects_.published().objects;
     snapshot->objectIndex = objects_.published().index;
-    PublishedForces published = forces_.publish(now, workspace_.worldUnitsPerMetre, board_, out);
+    PublishedForces published =
+        forces_.publish(now, units, objects_.heaviestSurface_Ns_per_m(), board_, out);
     snapshot->effects = std::move(published.effects);
     snapshot->planes = std::move(published.planes);
     snapshot->fields = std::move(published.fields);

@@ -150,10 +150,13 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
 
 // Whoever makes them too many is told.
 void FreeForces::tellOfSum(const Call& call) const {
-  const double share = bound_.shareOf(sumOfEffects());
-  if (share < 1)
-    call.warn("startEffect", "all effects together would be unstable on this device: their gains are lowered",
-              " to ", std::lround(100 * share), " %");
+  const double load = bound_.loadOf(sumOfEffects());
+  if (load == 0) return;
+  const long percent = std::lround(100 * bound_.shareOf(load + heaviestSurface_Ns_per_m_));
+  if (percent < 100)
+    call.warn("startEffect",
+              "all effects together, with the surfaces, would be unstable on this device: their gains are lowered",
+              " to ", percent, " %");
 }
 
 // The definition may travel by UDP and arrive after the start.

@@ -79,13 +79,35 @@ SpringSum FreeForces::sumOfEffects() const {
   return sum;
 }
 
-// Each alone is within the bound, together they may not be.
-void FreeForces::keepPassiveTogether(PublishedForces& forces, double worldUnitsPerMetre) const {
+std::vector<ForceField> FreeForces::passiveFields(double worldUnitsPerMetre) const {
+  std::vector<ForceField> fields;
+  if (field_) fields.push_back(passive(field_->value, worldUnitsPerMetre));
+  if (constraint_) {
+    if (const auto field = fieldOf(constraint_->value)) fields.push_back(passive(*field, worldUnitsPerMetre));
+  }
+  for (const auto& entry : leavingFields_) fields.push_back(passive(entry.value, worldUnitsPerMetre));
+  return fields;
+}
+
+double FreeForces::load_Ns_per_m(double worldUnitsPerMetre) const {
   SpringSum sum = sumOfEffects();
-  for (const ForceField& field : forces.fields) {
+  for (const ForceField& field : passiveFields(worldUnitsPerMetre)) {
     if (!field.releasing) sum.stiffness_N_per_m += stiffnessOf(field, worldUnitsPerMetre);
   }
-  const double share = bound_.shareOf(sum);
+  return bound_.loadOf(sum);
+}
+
+// Each alone is within the bound, together they may not be. A contact is one surface: between two it is no
+// stiffer than the stiffer one.
+void FreeForces::keepPassiveTogether(PublishedForces& forces, double worldUnitsPerMetre) const {
+  const double load = load_Ns_per_m(worldUnitsPerMetre);
+  if (load == 0) return;
+  double heaviest = heaviestSurface_Ns_per_m_;
+  for (Plane& plane : forces.planes) {
+    if (!plane.releasing) heaviest = std::max(heaviest, loadOf(plane.surface, bound_));
+    keepPassiveBeside(plane.surface, load, bound_);
+  }
+  const double share = bound_.shareOf(load + heaviest);
   if (share == 1) return;
   for (Effect& effect : forces.effects) effect.gain *= share;
   for (ForceField& field : forces.fields) field.jacobian_N_per_unit *= share;
@@ -106,7 +128,7 @@ void FreeForces::tellOfFields(const PublishedForces& forces, double worldUnitsPe
     if (std::exchange(told, share) == share) return;
     const Call call{owner, now, false, board, out};
     constexpr std::string_view kReason =
-        "would be unstable on this device, alone or with the effects that run, and is lowered";
+        "would be unstable on this device, alone or with the effects and surfaces, and is lowered";
     if (share.stiffness_percent < 100)
       call.warn(name, kReason, ", stiffness ", stiffness, " to ", left, " N/m");
     if (share.force_percent < 100)
@@ -118,8 +140,9 @@ void FreeForces::tellOfFields(const PublishedForces& forces, double worldUnitsPe
     tell("constraint_KSpring", *asked, constraint_->owner, constraintTold_);
 }
 
-PublishedForces FreeForces::publish(Nanos now, double worldUnitsPerMetre, NoticeBoard& board,
-                                    std::vector<Notice>& out) {
+PublishedForces FreeForces::publish(Nanos now, double worldUnitsPerMetre, double heaviestSurface_Ns_per_m,
+                                    NoticeBoard& board, std::vector<Notice>& out) {
+  heaviestSurface_Ns_per_m_ = heaviestSurface_Ns_per_m;
   PublishedForces forces;
   for (const auto& [index, entry] : effects_) {
     if (entry.value.running) forces.effects.push_back(entry.value.effect);
@@ -139,12 +162,7 @@ PublishedForces FreeForces::publish(Nanos now, double worldUnitsPerMetre, Notice
     }
     forces.planes.push_back(plane);
   }
-  if (field_) forces.fields.push_back(passive(field_->value, worldUnitsPerMetre));
-  if (constraint_) {
-    if (const auto field = fieldOf(constraint_->value))
-      forces.fields.push_back(passive(*field, worldUnitsPerMetre));
-  }
-  for (const auto& entry : leavingFields_) forces.fields.push_back(passive(entry.value, worldUnitsPerMetre));
+  forces.fields = passiveFields(worldUnitsPerMetre);
   keepPassiveTogether(forces, worldUnitsPerMetre);
   tellOfFields(forces, worldUnitsPerMetre, now, board, out);
   if (buzz_) forces.buzz = buzz_->value;

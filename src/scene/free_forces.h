@@ -87,9 +87,13 @@ class FreeForces {
   /// Removes ended forces and reports startEffect calls whose definition never arrived. True when something
   /// changed since the last call.
   bool update(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
+  /// What the effects and fields take of the passivity bound, in N s/m.
+  double load_Ns_per_m(double worldUnitsPerMetre) const;
   /// Force fields depend on the workspace: a stiff one is kept passive in device metres, and its owner is
-  /// told.
-  PublishedForces publish(Nanos now, double worldUnitsPerMetre, NoticeBoard& board, std::vector<Notice>& out);
+  /// told. Effects and fields are lowered to stay within the passivity bound together with the planes and with
+  /// the surfaces of objects, of which the largest load is given.
+  PublishedForces publish(Nanos now, double worldUnitsPerMetre, double heaviestSurface_Ns_per_m,
+                          NoticeBoard& board, std::vector<Notice>& out);
   /// Appends all of them, running or not.
   void describe(SceneDescription& out) const;
   /// Appends commands that set and start all but those that ramp out; effects start anew.
@@ -119,6 +123,7 @@ class FreeForces {
   void forEachDeadline(const F& f) const;
   std::optional<ForceField> fieldOf(const Constraint& constraint) const;
   ForceField passive(ForceField field, double worldUnitsPerMetre) const;
+  std::vector<ForceField> passiveFields(double worldUnitsPerMetre) const;
   SpringSum sumOfEffects() const;
   void tellOfSum(const Call& call) const;
   void keepPassiveTogether(PublishedForces& forces, double worldUnitsPerMetre) const;
@@ -144,6 +149,7 @@ class FreeForces {
   std::uint32_t fieldNumbers_ = 0;  // the same for fields
   LastCommands asked_;              // of all but effects, also of forces that are gone
   LastCommands askedOfConstraint_;
+  double heaviestSurface_Ns_per_m_ = 0;  // of objects, when last published
   FieldShare fieldTold_;
   FieldShare constraintTold_;
   bool changed_ = false;

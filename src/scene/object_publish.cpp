@@ -1,5 +1,6 @@
 // From edited objects to the list and the index that a snapshot shows.
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <utility>
 
@@ -217,20 +218,47 @@ void ObjectTable::updateMotions(Nanos now) {
 
 void ObjectTable::updateSurface(Object& object, Nanos now, NoticeBoard& board, std::vector<Notice>& out) {
   std::string remark;
-  const Surface surface = object.settings.resolve(bound_, remark);
+  Surface surface = object.settings.resolve(bound_, remark);
+  object.surfaceLoad_Ns_per_m = loadOf(surface, bound_);
+  const double share = keepPassiveBeside(surface, freeLoad_Ns_per_m_, bound_);
   if (!remark.empty() && remark != object.surfaceRemark) {
     const Call call{object.surfaceSetBy, now, false, board, out};
     call.post(Notice::Severity::warning, "surface",
               "surface of object " + std::to_string(object.id) + ": " + remark.substr(0, remark.size() - 2));
+  }
+  if (const long percent = std::lround(100 * share); percent < 100) {
+    const Call call{object.surfaceSetBy, now, false, board, out};
+    call.warn("surface", "would be unstable on this device beside the effects and fields that run, and is lowered",
+              " of object ", object.id, " to ", percent, " %");
   }
   object.surfaceRemark = remark;
   object.surface = surface;
   object.stateChanged = true;
 }
 
-bool ObjectTable::publish(Nanos now, double worldUnitsPerMetre, NoticeBoard& board,
+// Only surfaces that it does or did lower are worked out anew.
+void ObjectTable::spreadFreeLoad(double load_Ns_per_m) {
+  const double before = std::exchange(freeLoad_Ns_per_m_, load_Ns_per_m);
+  if (before == load_Ns_per_m) return;
+  const double most = std::max(before, load_Ns_per_m);
+  for (const auto& object : objects_) {
+    if (!object || object->surfaceLoad_Ns_per_m == 0) continue;
+    if (bound_.shareOf(object->surfaceLoad_Ns_per_m + most) == 1) continue;
+    object->surfaceChanged = true;
+    queue(*object);
+  }
+}
+
+void ObjectTable::updateHeaviest() {
+  heaviestSurface_Ns_per_m_ = 0;
+  for (const auto& state : published_.objects)
+    heaviestSurface_Ns_per_m_ = std::max(heaviestSurface_Ns_per_m_, find(state->id)->surfaceLoad_Ns_per_m);
+}
+
+bool ObjectTable::publish(Nanos now, double worldUnitsPerMetre, double freeLoad_Ns_per_m, NoticeBoard& board,
                           std::vector<Notice>& out) {
   worldUnitsPerMetre_ = worldUnitsPerMetre;
+  spreadFreeLoad(freeLoad_Ns_per_m);
   commitMeshes(now, board, out);
   if (checks_.due().value_or(now + 1) <= now && rebuildNotBefore_ <= now) checkMeshes(now, board, out);
   return updatePublished(now, board, out);
@@ -240,11 +268,15 @@ bool ObjectTable::updatePublished(Nanos now, NoticeBoard& board, std::vector<Not
   spreadMoves();
   updateMotions(now);
   bool changed = false;
+  bool loadsChanged = false;
   for (const std::int32_t id : changed_) {
     Object* object = find(id);
     if (object == nullptr || !object->queued) continue;
     object->queued = false;
-    if (object->surfaceChanged) updateSurface(*object, now, board, out);
+    if (object->surfaceChanged) {
+      updateSurface(*object, now, board, out);
+      loadsChanged = true;
+    }
     object->surfaceChanged = false;
     const bool listed = object->position >= 0;
     if (listed != object->isTouchable()) {
@@ -257,8 +289,9 @@ bool ObjectTable::updatePublished(Nanos now, NoticeBoard& board, std::vector<Not
   changed_.clear();
   if (listChanged_) {
     rebuildList(now);
-    changed = true;
+    changed = loadsChanged = true;
   }
+  if (loadsChanged) updateHeaviest();
   if (indexStale_) rebuildIndex();
   return changed;
 }

@@ -79,6 +79,7 @@ struct Object {
   // The published part, and what of it is out of date.
   std::shared_ptr<const MeshGeometry> geometry;
   Surface surface;
+  double surfaceLoad_Ns_per_m = 0;  ///< of the passivity bound, alone
   std::string surfaceRemark;
   Motion motion;
   Trail trail;
@@ -121,9 +122,13 @@ class ObjectTable {
   /// The oldest edit of a mesh that is not published yet.
   std::optional<Nanos> oldestEdit() const;
   /// Brings `published` up to date; false when nothing changed. Remarks on a surface go to the client that
-  /// set it. The scale of the workspace gives speeds in metres.
-  bool publish(Nanos now, double worldUnitsPerMetre, NoticeBoard& board, std::vector<Notice>& out);
+  /// set it. The scale of the workspace gives speeds in metres. Surfaces are lowered to stay within the passivity
+  /// bound together with the free forces, whose load is given.
+  bool publish(Nanos now, double worldUnitsPerMetre, double freeLoad_Ns_per_m, NoticeBoard& board,
+               std::vector<Notice>& out);
   const PublishedObjects& published() const { return published_; }
+  /// The largest load of the passivity bound among the published surfaces, each alone.
+  double heaviestSurface_Ns_per_m() const { return heaviestSurface_Ns_per_m_; }
   /// Appends every object, whether it exerts force or not.
   void describe(SceneDescription& out) const;
   /// Appends commands that make an empty table this one.
@@ -175,6 +180,8 @@ class ObjectTable {
   };
   std::optional<Move> moveOf(Object& object, Nanos now);
   void updateMotions(Nanos now);
+  void spreadFreeLoad(double load_Ns_per_m);
+  void updateHeaviest();
   void updateSurface(Object& object, Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   bool updatePublished(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   void replaceState(Object& object, Nanos now);
@@ -189,6 +196,7 @@ class ObjectTable {
   LastCommands asked_;  // of the scene's origin
   PoseStream scenePoses_;
   double worldUnitsPerMetre_ = 1000;
+  double freeLoad_Ns_per_m_ = 0;  // of the forces that belong to no object
   std::uint64_t vertices_ = 0;
   std::size_t gaps_ = 0;  // numbers below large gaps that were not sent yet, of all objects
   std::uint64_t triangles_ = 0;
@@ -202,6 +210,7 @@ class ObjectTable {
   Nanos rebuildNotBefore_ = 0;
   MeshChecks checks_;  // of new shapes
   bool listChanged_ = true;
+  double heaviestSurface_Ns_per_m_ = 0;
   bool indexStale_ = true;
 
   PublishedObjects published_;

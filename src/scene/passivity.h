@@ -22,10 +22,13 @@ class PassivityBound {
                                      : kMargin * config.ownDamping_Ns_per_m) {}
 
   double maxStiffness_N_per_m() const { return damping_Ns_per_m_ / delay_s_; }
-  /// The factor, at most 1, that keeps all of them together within the bound.
-  double shareOf(const SpringSum& sum) const {
-    const double load = sum.stiffness_N_per_m * delay_s_ + sum.damping_Ns_per_m;
-    return load > damping_Ns_per_m_ ? damping_Ns_per_m_ / load : 1;
+  /// What they take of the bound, in N s/m.
+  double loadOf(const SpringSum& sum) const {
+    return sum.stiffness_N_per_m * delay_s_ + sum.damping_Ns_per_m;
+  }
+  /// The factor, at most 1, that keeps all that makes up the load together within the bound.
+  double shareOf(double load_Ns_per_m) const {
+    return load_Ns_per_m > damping_Ns_per_m_ ? damping_Ns_per_m_ / load_Ns_per_m : 1;
   }
   /// What damping is left beside a stiffness.
   double maxDamping_Ns_per_m(double stiffness_N_per_m) const {

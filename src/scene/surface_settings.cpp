@@ -149,4 +149,17 @@ void keepPassive(Surface& surface, const PassivityBound& bound, std::string& rem
   }
 }
 
+double loadOf(const Surface& surface, const PassivityBound& bound) {
+  return bound.loadOf({surface.stiffness_N_per_m, surface.damping_Ns_per_m});
+}
+
+double keepPassiveBeside(Surface& surface, double others_Ns_per_m, const PassivityBound& bound) {
+  const double load = loadOf(surface, bound);
+  if (load == 0 || others_Ns_per_m == 0) return 1;
+  const double share = bound.shareOf(load + others_Ns_per_m);
+  surface.stiffness_N_per_m *= share;
+  surface.damping_Ns_per_m *= share;
+  return share;
+}
+
 }  // namespace hapticd::scene

@@ -24,7 +24,8 @@ class SurfaceSettings {
   /// All but popthrough and mass, in stock units. False when refused.
   bool set(const SetSurface& command, const SceneConfig& config, const Call& call);
 
-  /// The surface within the passivity bound, friction in order; `remark` names the values that were lowered.
+  /// The surface alone within the passivity bound, friction in order; `remark` names the values that were
+  /// lowered.
   Surface resolve(const PassivityBound& bound, std::string& remark) const;
 
  private:
@@ -40,5 +41,11 @@ std::optional<Surface> surfaceFromStock(double stiffness, double damping, double
 
 /// Lowers damping, then stiffness, to the bound; appends what was done to `remark`.
 void keepPassive(Surface& surface, const PassivityBound& bound, std::string& remark);
+
+/// What the surface takes of the bound, in N s/m.
+double loadOf(const Surface& surface, const PassivityBound& bound);
+/// Lowers stiffness and damping by one factor, which it returns: with what acts beside the surface they are
+/// within the bound.
+double keepPassiveBeside(Surface& surface, double others_Ns_per_m, const PassivityBound& bound);
 
 }  // namespace hapticd::scene

@@ -213,6 +213,60 @@ TEST_F(Forces, EffectsTogetherStayWithinTheBound) {
   EXPECT_NEAR(scene_->effects[0].gain, 4, 1e-12) << "what ramps out does not count";
 }
 
+// A hand that touches feels both: each surface beside all effects and fields.
+TEST_F(Forces, SurfacesEffectsAndFieldsTogetherStayWithinTheBound) {
+  constexpr double kBound_Ns_per_m = 4.995;
+  const auto free = [this] {
+    double load = 0;
+    for (const Effect& e : scene_->effects) load += e.type == EffectType::viscous ? e.gain : 0.5e-3 * e.gain;
+    for (const ForceField& f : scene_->fields) load += 0.5 * f.jacobian_N_per_unit.cwiseAbs().maxCoeff();
+    return load;
+  };
+  const auto loadOf = [](const Surface& s) { return 0.5e-3 * s.stiffness_N_per_m + s.damping_Ns_per_m; };
+  say(SetObjectNumber{3}, kOther);
+  for (std::int32_t i = 0; i < 3; ++i) {
+    say(SetVertices{i, 0, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}, kOther);
+    say(SetSurface{i, i == 2 ? 0.1F : 1.0F, i == 1 ? 0.003F : 0.0F}, kOther);
+  }
+  say(SetPlane{.plane = {0, 0, 1, 0}, .stiffness = 1, .damping = 0.004F});
+  run(1'000 * kMillisecond);
+  ASSERT_EQ(scene_->objects.size(), 3U);
+  notices_.clear();
+  const auto alone = [this] {
+    return std::array{scene_->objects[0]->surface, scene_->objects[1]->surface, scene_->objects[2]->surface,
+                      scene_->planes[0].surface};
+  };
+  const auto asked = alone();
+  say(DefineEffect{.type = "spring", .index = 1, .gain = 2, .magnitude_N = 1});
+  say(StartEffect{1});
+  ASSERT_TRUE(publish());
+  EXPECT_NEAR(scene_->effects[0].gain, 2000 * kBound_Ns_per_m / (1 + 4.5), 1e-3) << "beside the plane";
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(alone()[i], asked[i]) << i << " has room beside it";
+  EXPECT_NEAR(loadOf(alone()[3]), 4.5 * kBound_Ns_per_m / 5.5, 1e-6);
+  EXPECT_LE(loadOf(alone()[3]) + free(), kBound_Ns_per_m * (1 + 1e-12));
+
+  notices_.clear();
+  say(SetForceField{.jacobian_N_per_m = {-4000, 0, 0, 0, -4000, 0, 0, 0, -4000}, .radius_m = 1});
+  ASSERT_TRUE(publish());
+  for (const Surface& surface : alone()) EXPECT_LE(loadOf(surface) + free(), kBound_Ns_per_m * (1 + 1e-12));
+  EXPECT_NEAR(loadOf(alone()[1]), 3.5 * kBound_Ns_per_m / (3 + 3.5), 1e-6);
+  EXPECT_NEAR(alone()[1].stiffness_N_per_m / alone()[1].damping_Ns_per_m, 1000 / 3.0, 1e-3)
+      << "both by one factor";
+  EXPECT_EQ(alone()[0], asked[0]) << "0.5 beside 3";
+  EXPECT_EQ(alone()[2], asked[2]);
+  std::vector<ClientId> told;
+  for (const Notice& notice : notices_) {
+    told.push_back(notice.client);
+    EXPECT_THAT(notice.text, HasSubstr(notice.client == kOther ? "surface of object 1 to 77 %" : "sendForceField"));
+  }
+  EXPECT_THAT(told, ::testing::UnorderedElementsAre(7, kOther));
+
+  say(StopEffect{1});
+  say(SetForceField{});
+  ASSERT_TRUE(publish());
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(alone()[i], asked[i]) << i << " as before";
+}
+
 // Its slope there is a stiffness as any other.
 TEST_F(Forces, RimOfAFieldIsNoStifferThanTheBound) {
   constexpr double kBound_N_per_m = 9990;
@@ -234,7 +288,7 @@ TEST_F(Forces, RimOfAFieldIsNoStifferThanTheBound) {
   EXPECT_EQ(scene_->fields[0].radius, 20) << "world units";
 }
 
-// By which call, from what to what; once for each field and share.
+// By which call, from what to what; once for each field and share. The surface of an empty object is none.
 TEST_F(Forces, OwnersOfLoweredFieldsAreTold) {
   const SetForceField stiff{.jacobian_N_per_m = {-20'000, 0, 0, 0, -20'000, 0, 0, 0, 0}, .radius_m = 1};
   say(stiff);

@@ -180,6 +180,43 @@ TEST_P(ClosedLoop, springs_that_act_together_do_not_shake_the_hand) {
   EXPECT_GT(pressOn(asked, GetParam(), true).peakToPeak_m, 10 * kSettled_m);
 }
 
+// A constraint that draws the hand into a floor: each has 0.9 of the bound.
+TEST_P(ClosedLoop, surface_and_constraint_together_do_not_shake_the_hand) {
+  const double stiffness = 0.9 * passiveStiffness(GetParam());
+  scene::SceneConfig config;
+  config.servoPeriod_s = 1 / GetParam();
+  config.ownDamping_Ns_per_m = kHandDamping;
+  config.materialScale = scene::MaterialScale::device;
+  config.nominalStiffness_N_per_m = stiffness;
+  scene::SceneBuilder builder(config);
+  std::vector<scene::Notice> notices;
+  const scene::SceneCommand commands[] = {
+      scene::SetVertices{0, 0, {{-100, 0, -100}, {-100, 0, 100}, {100, 0, 100}, {100, 0, -100}}},
+      scene::SetTriangles{0, 0, {{0, 1, 2}, {0, 2, 3}}, false},
+      scene::SetSurfaceProperty{0, "stiffness", 1},
+      scene::SetConstraintMode{1},
+      scene::SetConstraintVector{scene::ConstraintVector::point, {0, -0.002, 0}},
+      scene::SetConstraintStiffness{stiffness},
+      scene::SetConstraintEnabled{true}};
+  builder.apply(1, scene::BeginBatch{}, 1, notices);
+  for (scene::SceneCommand command : commands) builder.apply(1, std::move(command), 1, notices);
+  builder.apply(1, scene::CommitBatch{}, 1, notices);
+  const auto lowered = builder.publish(1, notices);
+  ASSERT_EQ(lowered->objects.size(), 1U);
+  ASSERT_EQ(lowered->fields.size(), 1U);
+  const Pressing held = pressOn(lowered, GetParam(), true);
+  EXPECT_LT(held.peakToPeak_m, 2 * kSettled_m) << "at the bound it settles slowly";
+  EXPECT_GT(held.force_N, 0.5);
+
+  if (GetParam() > 1000) return;  // what is asked for shakes only a hand that is softer than it
+  auto asked = std::make_shared<scene::SceneSnapshot>(*lowered);
+  auto object = std::make_shared<scene::ObjectState>(*lowered->objects[0]);
+  object->surface.stiffness_N_per_m = stiffness;
+  asked->objects[0] = object;
+  asked->fields[0].jacobian_N_per_unit = -1e-3 * stiffness * geometry::Mat3::Identity();
+  EXPECT_GT(pressOn(asked, GetParam(), true).peakToPeak_m, 10 * kSettled_m) << "it would";
+}
+
 // The stiffest wall that settles, by bisection; never below the bound.
 TEST(ClosedLoopLimit, stiffest_wall_grows_with_the_rate) {
   const char* path = std::getenv("HAPTICD_STIFFNESS_CSV");
