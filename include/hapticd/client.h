@@ -147,7 +147,8 @@ class HAPTICD_EXPORT Client {
   /// Throws std::invalid_argument for a triangle with an index outside the vertices, ConnectError without a
   /// connection, and ConnectionLost.
   void uploadMesh(int object, const MeshView& mesh, const Callback<UploadProgress>& progress = {});
-  /// The same for a list of corners: three consecutive ones are a triangle. Object units.
+  /// The same for a list of corners: three consecutive ones are a triangle. Object units. Throws
+  /// std::invalid_argument when their number is no multiple of three, and what uploadMesh() throws.
   void uploadCorners(int object, std::span<const std::array<float, 3>> corners,
                      const Callback<UploadProgress>& progress = {});
   /// Sets one vertex of a mesh. Object units, object frame. Without setTriangle(), consecutive triples are

@@ -177,6 +177,14 @@ def as_vertices(vertices: "npt.ArrayLike") -> "npt.NDArray[Any]":
     return array
 
 
+def as_corners(corners: "npt.ArrayLike") -> "npt.NDArray[Any]":
+    """(n, 3) positions in wire order, three for each triangle. Raises ValueError for another shape."""
+    array = as_vertices(corners)
+    if len(array) % 3:
+        raise ValueError(f"corners of shape {array.shape}: give three rows for each triangle")
+    return array
+
+
 def as_triangles(triangles: "npt.ArrayLike", vertices: int) -> "npt.NDArray[Any]":
     """(m, 3) vertex numbers in wire order. Raises ValueError for another shape, or a vertex that is not there."""
     given = np.asarray(triangles)

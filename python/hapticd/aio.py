@@ -33,6 +33,7 @@ from ._core import (
     Core,
     Options,
     UploadProgress,
+    as_corners,
     as_triangles,
     as_vertices,
 )
@@ -496,8 +497,9 @@ class Client(Core):
     async def upload_corners(
         self, object: int, corners: "npt.ArrayLike", progress: Optional[Callable[[UploadProgress], object]] = None
     ) -> None:
-        """The same for a list of corners, (n, 3): three consecutive ones are a triangle. Object units."""
-        await self._upload(object, as_vertices(corners), None, progress)
+        """The same for a list of corners, (n, 3): three consecutive ones are a triangle. Object units. Raises
+        ValueError for another shape or a number of corners that is no multiple of three."""
+        await self._upload(object, as_corners(corners), None, progress)
 
     async def _upload(
         self,

@@ -176,6 +176,8 @@ def test_a_large_mesh_reports_its_progress(server: Server) -> None:
             hand.upload_mesh(0, np.zeros((3, 3)), [[0, 1, 2], [0, 7, 1]])
         with pytest.raises(ValueError, match=r"vertices of shape \(3, 2\): give \(n, 3\)"):
             hand.upload_mesh(0, np.zeros((3, 2)), [[0, 1, 2]])
+        with pytest.raises(ValueError, match=r"corners of shape \(4, 3\): give three rows for each triangle"):
+            hand.upload_corners(0, np.zeros((4, 3)))
 
 
 def test_a_stop_passes_a_large_upload(server: Server) -> None:

@@ -175,6 +175,9 @@ void Client::uploadMesh(int object, const MeshView& mesh, const Callback<UploadP
 
 void Client::uploadCorners(int object, std::span<const std::array<float, 3>> corners,
                            const Callback<UploadProgress>& progress) {
+  if (corners.size() % 3 != 0)
+    throw std::invalid_argument("uploadCorners: " + std::to_string(corners.size()) +
+                                " corners, give three for each triangle");
   if (!connected()) waitConnected(impl_->options.connectTimeout);
   impl_->waitAnswered();
   if (impl_->has(wire::kFeatureBulkMesh)) {

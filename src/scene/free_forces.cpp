@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "scene/surface_settings.h"
+
 namespace hapticd::scene {
 
 using geometry::Mat3;

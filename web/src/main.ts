@@ -132,7 +132,7 @@ class Page {
       e.target instanceof HTMLElement && e.target.matches("input[type=number], input[type=text], input[type=password], select");
     if (typing || e.ctrlKey || e.metaKey || e.altKey) return;
     if (e.key.toLowerCase() === "l") this.hand.letGo();
-    if (e.key.toLowerCase() === "m") this.mark();
+    if (e.key.toLowerCase() === "m" && !e.repeat) this.mark();
   }
 
   /** Marks the moment, in the recording and for all clients. */
