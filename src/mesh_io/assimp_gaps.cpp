@@ -31,8 +31,10 @@ class StreamPart final : public Assimp::IOStream {
   aiReturn Seek(std::size_t offset, aiOrigin origin) override {
     const std::size_t from = origin == aiOrigin_SET ? 0 : origin == aiOrigin_CUR ? Tell() : size_;
     const std::size_t to = from + offset;  // an offset back wraps around
-    first_ = last_ = '\n';
-    comment_ = false;
+    if (to != Tell()) {                    // before each block of a text Assimp seeks to where it is
+      first_ = last_ = '\n';
+      comment_ = false;
+    }
     return to > size_ ? aiReturn_FAILURE : whole_->Seek(begin_ + to, aiOrigin_SET);
   }
   std::size_t Tell() const override { return whole_->Tell() - begin_; }
@@ -43,7 +45,8 @@ class StreamPart final : public Assimp::IOStream {
   char edited(char c) {
     if (edit_ == Edit::lowerCase) return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
     if (edit_ == Edit::none || c == '\r') return c;
-    // An indented line begins anew, and a comment behind numbers is blank.
+    // An indented line begins anew, a comment behind numbers is blank, and no comment goes on in the next
+    // line.
     if (c == '\n') {
       if (last_ != '\\') first_ = '\n';
       comment_ = false;
@@ -53,8 +56,8 @@ class StreamPart final : public Assimp::IOStream {
     } else if (c == '#' && (first_ == 'v' || first_ == 'f')) {
       comment_ = true;
     }
-    last_ = c;
-    return comment_ ? ' ' : c;
+    if (comment_ || (c == '\\' && first_ == '#')) c = ' ';
+    return last_ = c;
   }
 
   const std::unique_ptr<Assimp::IOStream> whole_;

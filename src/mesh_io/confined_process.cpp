@@ -60,8 +60,6 @@ constexpr std::uint32_t kAllowedCalls[] = {
     __NR_readlinkat,
     __NR_getdents64,
     __NR_getcwd,
-    __NR_fcntl,
-    __NR_ioctl,
     __NR_fadvise64,
     __NR_mmap,
     __NR_munmap,
@@ -121,7 +119,10 @@ class Filter {
 #if defined(__x86_64__)
     allowReading(__NR_open, 1);
 #endif
-    allowFirst(__NR_tgkill, static_cast<std::uint32_t>(getpid()));  // abort()
+    // Not those that let a descriptor send signals; and no ioctl(), which can type into a terminal.
+    for (const std::uint32_t command : {F_DUPFD, F_DUPFD_CLOEXEC, F_GETFD, F_SETFD, F_GETFL})
+      allowWith(__NR_fcntl, 1, command);
+    allowWith(__NR_tgkill, 0, static_cast<std::uint32_t>(getpid()));  // abort()
     end(SECCOMP_RET_ERRNO | EPERM);
   }
 
@@ -152,11 +153,13 @@ class Filter {
     end(SECCOMP_RET_ALLOW);
     end(SECCOMP_RET_ERRNO | EACCES);
   }
-  void allowFirst(std::uint32_t call, std::uint32_t value) {
-    add(BPF_JMP | BPF_JEQ | BPF_K, call, 0, 3);
-    loadArgument(0);
+  // With this value of an argument.
+  void allowWith(std::uint32_t call, std::size_t argument, std::uint32_t value) {
+    add(BPF_JMP | BPF_JEQ | BPF_K, call, 0, 4);
+    loadArgument(argument);
     add(BPF_JMP | BPF_JEQ | BPF_K, value, 0, 1);
     end(SECCOMP_RET_ALLOW);
+    load(offsetof(seccomp_data, nr));
   }
 
   std::vector<sock_filter> steps_;
@@ -190,6 +193,7 @@ void confine(const ConfinedLimits& limits, std::uint64_t mapped_bytes, int& outp
   for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) std::signal(signal, SIG_DFL);
   std::signal(SIGPIPE, SIG_IGN);
   closeEverythingExcept(output);
+  setsid();  // no terminal
   prctl(PR_SET_DUMPABLE, 0);
   prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
 

@@ -23,6 +23,10 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   /// Answers the request with that number if it is the pending one.
   void answer(std::uint64_t request, HttpResponse response);
 
+  /// Between two requests, or before the first.
+  bool isIdle() const noexcept { return state_ == State::idle; }
+  bool isAnswering() const noexcept { return state_ == State::answering; }
+
  private:
   using Parser = boost::beast::http::request_parser<boost::beast::http::string_body>;
   enum class State { idle, receiving, answering, closing };

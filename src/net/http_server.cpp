@@ -1,6 +1,9 @@
 #include "net/http_server.h"
 
+#include <algorithm>
 #include <map>
+#include <tuple>
+#include <vector>
 
 #include "net/http_connection.h"
 #include "net/tcp_listener.h"
@@ -18,28 +21,56 @@ class HttpServer::Impl {
             option) {}
 
   const Endpoint& local() const { return listener_.local(); }
-  std::size_t connections() const { return connections_.size(); }
+  std::size_t connections() const { return clients_.size(); }
 
  private:
+  struct Client {
+    std::uint32_t address;
+    std::shared_ptr<HttpConnection> connection;
+  };
+
   // One too many is closed at once: the others are bounded in time, so there will be room again.
   void accept(Connection connection) {
-    if (connections_.size() >= options_.connections) {
+    const std::uint32_t address = connection.remote().address;
+    if (!hasRoomFor(address)) {
       connection.abort("too many connections");
       return;
     }
     if (options_.secured) connection = options_.secured(std::move(connection));
     if (!connection) return;
-    auto client =
-        std::make_shared<HttpConnection>(loop_, std::move(connection), options_, onRequest_,
-                                         [this](HttpConnection* gone) { connections_.erase(gone); });
-    connections_.emplace(client.get(), client);
+    auto client = std::make_shared<HttpConnection>(
+        loop_, std::move(connection), options_, onRequest_, [this](HttpConnection* gone) {
+          std::erase_if(clients_, [&](const Client& c) { return c.connection.get() == gone; });
+        });
+    clients_.push_back({address, client});
     client->start();
+  }
+
+  // Whoever waits for no answer makes room: of the address that holds the most connections, and not for one
+  // that holds more; first the oldest that has not begun a request.
+  bool hasRoomFor(std::uint32_t address) {
+    if (clients_.size() < options_.connections) return true;
+    std::map<std::uint32_t, std::size_t> held;
+    for (const Client& client : clients_) ++held[client.address];
+    const auto mayStay = [&](const Client& c) {
+      return c.connection->isAnswering() || held[c.address] < held[address];
+    };
+    const auto goesLater = [&](const Client& a, const Client& b) {
+      const auto key = [&](const Client& c) {
+        return std::tuple(!mayStay(c), held[c.address], c.connection->isIdle());
+      };
+      return key(a) < key(b);
+    };
+    const auto first = std::max_element(clients_.begin(), clients_.end(), goesLater);
+    if (first == clients_.end() || mayStay(*first)) return false;
+    clients_.erase(first);
+    return true;
   }
 
   Loop& loop_;
   const HttpOptions options_;
   const Handler onRequest_;
-  std::map<HttpConnection*, std::shared_ptr<HttpConnection>> connections_;
+  std::vector<Client> clients_;  // in the order in which they came
   TcpListener listener_;
 };
 

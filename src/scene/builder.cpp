@@ -87,8 +87,7 @@ class SceneBuilder::State {
     snapshot->faces = faces_;
     snapshot->objects = objects_.published().objects;
     snapshot->objectIndex = objects_.published().index;
-    PublishedForces published =
-        forces_.publish(now, units, objects_.heaviestSurface_Ns_per_m(), board_, out);
+    PublishedForces published = forces_.publish(now, units, objects_.heaviestSurface_Ns_per_m(), board_, out);
     snapshot->effects = std::move(published.effects);
     snapshot->planes = std::move(published.planes);
     snapshot->fields = std::move(published.fields);

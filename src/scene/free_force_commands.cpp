@@ -154,9 +154,10 @@ void FreeForces::tellOfSum(const Call& call) const {
   if (load == 0) return;
   const long percent = std::lround(100 * bound_.shareOf(load + heaviestSurface_Ns_per_m_));
   if (percent < 100)
-    call.warn("startEffect",
-              "all effects together, with the surfaces, would be unstable on this device: their gains are lowered",
-              " to ", percent, " %");
+    call.warn(
+        "startEffect",
+        "all effects together, with the surfaces, would be unstable on this device: their gains are lowered",
+        " to ", percent, " %");
 }
 
 // The definition may travel by UDP and arrive after the start.

@@ -90,8 +90,8 @@ class FreeForces {
   /// What the effects and fields take of the passivity bound, in N s/m.
   double load_Ns_per_m(double worldUnitsPerMetre) const;
   /// Force fields depend on the workspace: a stiff one is kept passive in device metres, and its owner is
-  /// told. Effects and fields are lowered to stay within the passivity bound together with the planes and with
-  /// the surfaces of objects, of which the largest load is given.
+  /// told. Effects and fields are lowered to stay within the passivity bound together with the planes and
+  /// with the surfaces of objects, of which the largest load is given.
   PublishedForces publish(Nanos now, double worldUnitsPerMetre, double heaviestSurface_Ns_per_m,
                           NoticeBoard& board, std::vector<Notice>& out);
   /// Appends all of them, running or not.

@@ -228,7 +228,8 @@ void ObjectTable::updateSurface(Object& object, Nanos now, NoticeBoard& board, s
   }
   if (const long percent = std::lround(100 * share); percent < 100) {
     const Call call{object.surfaceSetBy, now, false, board, out};
-    call.warn("surface", "would be unstable on this device beside the effects and fields that run, and is lowered",
+    call.warn("surface",
+              "would be unstable on this device beside the effects and fields that run, and is lowered",
               " of object ", object.id, " to ", percent, " %");
   }
   object.surfaceRemark = remark;

@@ -122,8 +122,8 @@ class ObjectTable {
   /// The oldest edit of a mesh that is not published yet.
   std::optional<Nanos> oldestEdit() const;
   /// Brings `published` up to date; false when nothing changed. Remarks on a surface go to the client that
-  /// set it. The scale of the workspace gives speeds in metres. Surfaces are lowered to stay within the passivity
-  /// bound together with the free forces, whose load is given.
+  /// set it. The scale of the workspace gives speeds in metres. Surfaces are lowered to stay within the
+  /// passivity bound together with the free forces, whose load is given.
   bool publish(Nanos now, double worldUnitsPerMetre, double freeLoad_Ns_per_m, NoticeBoard& board,
                std::vector<Notice>& out);
   const PublishedObjects& published() const { return published_; }

@@ -93,7 +93,8 @@ TEST(Client, AServerThatReadsLaterReceivesEverything) {
     std::this_thread::sleep_for(50ms);  // so that the upload usually waits; the result does not depend on it
     server.startReading();
   });
-  EXPECT_THROW(client.uploadCorners(0, std::span(corners).first(4)), std::invalid_argument) << "and sends nothing";
+  EXPECT_THROW(client.uploadCorners(0, std::span(corners).first(4)), std::invalid_argument)
+      << "and sends nothing";
   client.uploadCorners(0, corners);
   later.join();
   EXPECT_EQ(server.waitVertices(corners.size()).size(), corners.size());

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -162,6 +163,8 @@ TEST(ConfinedProcess, NoInheritedDescriptorsNoFilesNoProcesses) {
       can += "fork ";
     }
     if (kill(getppid(), 0) == 0) can += "signal ";
+    if (fcntl(STDIN_FILENO, F_SETOWN, getppid()) == 0) can += "signal-by-a-descriptor ";
+    if (int waiting = 0; ioctl(STDIN_FILENO, FIONREAD, &waiting) == 0) can += "type-into-a-terminal ";
     sendText(send, "{" + can + "}");
   });
   EXPECT_THAT(seen, AnyOf(HasSubstr("output: {}"), HasSubstr("neither a network namespace nor")));

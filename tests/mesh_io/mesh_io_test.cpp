@@ -228,6 +228,26 @@ TEST_F(MeshFiles, ObjWithIndentedLinesCommentsAndContinuedOnes) {
   expectUnitCube(loadMesh(write("indented.obj", "  # part\n   " + obj)));
 }
 
+// Assimp reads 16 MiB at a time, and seeks to where it is before each block.
+TEST_F(MeshFiles, ObjWhoseLineGoesOnInTheNextBlock) {
+  constexpr std::size_t kBlock = std::size_t{16} << 20U;
+  const std::string obj = cubeObj();
+  const std::size_t face = obj.find("\nf") + 1;
+  for (const std::size_t inLine : {obj.find(' ', face) - face, std::size_t{0}}) {
+    std::string large = obj.substr(0, face);
+    large += "#" + std::string(kBlock - large.size() - inLine - 2, 'x') + "\n" + obj.substr(face);
+    ASSERT_TRUE(inLine == 0 || large[kBlock] == ' ');
+    expectUnitCube(loadMesh(write("large.obj", large)));
+  }
+}
+
+TEST_F(MeshFiles, ObjWhoseCommentEndsInABackslash) {
+  std::string obj = cubeObj();
+  for (std::size_t at = obj.find("\nf"); at != std::string::npos; at = obj.find("\nf", at + 3))
+    obj.replace(at, 2, " # base \\\n# 1 \\\n  f");
+  expectUnitCube(loadMesh(write("backslash.obj", obj)));
+}
+
 TEST_F(MeshFiles, StlInUpperCase) {
   EXPECT_EQ(loadMesh(write("upper.stl",
                            "SOLID PART OF A MACHINE\nFACET NORMAL 0 0 1\nOUTER LOOP\nVERTEX 0 0 0\n"

@@ -257,16 +257,43 @@ TEST(HttpServer, TooManyConnectionsAreRefusedAndRoomComesBack) {
   options.connections = 3;
   Http http(options);
   std::vector<RawSocket> peers;
-  for (int i = 0; i < 3; ++i) {
+  for (std::size_t i = 0; i < 3; ++i) {
     peers.push_back(http.join());
-    ASSERT_TRUE(peers.back().send(kGet));
-    EXPECT_EQ(http.receive(peers.back(), kAnswer.size()), kAnswer);
+    ASSERT_TRUE(peers.back().send("GET /later HTTP/1.1\r\nHost: here\r\n\r\n"));
+    ASSERT_TRUE(pumpUntil(http.loop, [&] { return http.later.size() == i + 1; }));
   }
   RawSocket more = http.join();
-  EXPECT_EQ(http.receiveAll(more), "");
+  EXPECT_EQ(http.receiveAll(more), "") << "those that wait for an answer stay";
   peers.pop_back();
+  http.later.back()(HttpResponse::of(200, "late"));
   ASSERT_TRUE(pumpUntil(http.loop, [&] { return http.server.connections() == 2; }));
   EXPECT_THAT(http.ask(kGetLast), StartsWith("HTTP/1.1 200 OK"));
+}
+
+// Whoever holds connections open and asks nothing, or asks for ever, keeps nobody out.
+TEST(HttpServer, SilentConnectionsGiveWayToNewOnes) {
+  HttpOptions options;
+  options.connections = 4;
+  Http http(options);
+  std::vector<RawSocket> peers;
+  for (int i = 0; i < 4; ++i) {
+    peers.push_back(http.join());
+    if (i == 0) {
+      ASSERT_TRUE(peers[0].send("GET / HTT"));
+    }
+    ASSERT_TRUE(
+        pumpUntil(http.loop, [&] { return http.server.connections() == static_cast<std::size_t>(i) + 1; }));
+  }
+  for (int i = 0; i < 3; ++i) {
+    RawSocket page = http.join();
+    ASSERT_TRUE(page.send(kGet));
+    EXPECT_EQ(http.receive(page, kAnswer.size()), kAnswer);
+    peers.push_back(std::move(page));
+    EXPECT_EQ(http.server.connections(), 4U);
+  }
+  ASSERT_TRUE(peers[0].send("P/1.1\r\n\r\n"));
+  EXPECT_THAT(http.receive(peers[0], 15), StartsWith("HTTP/1.1 200 OK")) << "silent ones first";
+  EXPECT_EQ(http.receiveAll(peers[1]), "");
 }
 
 TEST(HttpServer, ThousandsOfRequestsLeaveNothingBehind) {

@@ -257,7 +257,8 @@ TEST_F(Forces, SurfacesEffectsAndFieldsTogetherStayWithinTheBound) {
   std::vector<ClientId> told;
   for (const Notice& notice : notices_) {
     told.push_back(notice.client);
-    EXPECT_THAT(notice.text, HasSubstr(notice.client == kOther ? "surface of object 1 to 77 %" : "sendForceField"));
+    EXPECT_THAT(notice.text,
+                HasSubstr(notice.client == kOther ? "surface of object 1 to 77 %" : "sendForceField"));
   }
   EXPECT_THAT(told, ::testing::UnorderedElementsAre(7, kOther));
 

@@ -29,7 +29,7 @@ constexpr Nanos kStateLife = 20'000'000;
 }  // namespace
 
 HaplyDevice::HaplyDevice(HaplyOptions options)
-    : options_(std::move(options)), profile_(*findProfile("Inverse3")) {
+    : options_(std::move(options)), profile_(*findProfile("Inverse3")), deviceId_(options_.deviceId) {
   profile_.transportDelay_s = 0.001;
   wake_ = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
   if (wake_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
@@ -65,7 +65,6 @@ void HaplyDevice::run() noexcept {
   while (!stopping_) {
     try {
       haply::ServiceConnection service(options_.host, options_.port, kConnectTime);
-      deviceId_ = options_.deviceId;
       take(service.receive(kConnectTime));
       serve(service);
     } catch (const std::exception& error) {

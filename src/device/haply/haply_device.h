@@ -81,7 +81,7 @@ class HaplyDevice final : public Device {
   SentZero sentZero_;  // and the driver's thread
 
   // Driver's thread only.
-  std::string deviceId_;
+  std::string deviceId_;  // once an arm was found, never that of another one
   DeviceState state_;
   std::uint64_t lastCommand_ = 0;
   Nanos commandTime_ = 0;

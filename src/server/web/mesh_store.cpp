@@ -62,6 +62,7 @@ void MeshStore::get(std::size_t scene, const ObservedScene& observed, std::size_
   }
   if (entry.bytes) return respond(meshResponse(entry.bytes));
   entry.waiting.push_back(respond);
+  if (entry.waiting.size() > 1) return;  // the first one's time is that of all
   entry.timeout = loop_.after(500ms, [this, key] {
     const auto found = entries_.find(key);
     if (found == entries_.end()) return;

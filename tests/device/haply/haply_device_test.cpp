@@ -126,6 +126,27 @@ TEST_F(HaplyTest, ALostConnectionAndNonsenseAreFaultsAndHeal) {
   EXPECT_TRUE(eventually([&] { return state.hold == kHoldNone; }));
 }
 
+// Nobody is at the other one.
+TEST_F(HaplyTest, AnArmIsNeverReplacedByAnother) {
+  device.open();
+  ASSERT_TRUE(eventually([&] { return state.hold == kHoldNone; }));
+  service.another(true);
+  service.hangUp();
+  EXPECT_TRUE(eventually([&] { return service.connections() == 2 && state.hold == kHoldNone; }));
+  EXPECT_TRUE(eventually([&] { return force().norm() > 0.9; }, Vec3(1, 0, 0))) << "the same arm";
+  service.withoutDevice(true);
+  EXPECT_TRUE(eventually([&] { return device.faultText().find("'MOCK1'") != std::string::npos; }))
+      << device.faultText();
+  EXPECT_NE(state.hold & kHoldFault, 0U);
+  device.close();
+  EXPECT_THAT(refusal(device), HasSubstr("'MOCK1'")) << "also when it is opened again";
+  EXPECT_EQ(service.toAnother(), 0);
+  HaplyDevice first({"127.0.0.1", service.port(), ""});
+  first.open();
+  for (int i = 0; i < 5000 && service.toAnother() == 0; ++i) std::this_thread::sleep_for(1ms);
+  EXPECT_GT(service.toAnother(), 0) << "another server takes what is there";
+}
+
 TEST_F(HaplyTest, TheServicesStatusHoldsTheForce) {
   service.status(R"({"calibrated": false, "ready": true})");
   device.open();

@@ -29,6 +29,8 @@ struct MockService::Impl {
   std::atomic<bool> muted{false};
   std::atomic<bool> babbling{false};
   std::atomic<bool> refusing{false};
+  std::atomic<bool> another{false};
+  std::atomic<int> toAnother{0};
   mutable std::mutex mutex;
   int open = -1;  // descriptor of the present connection
   Vec3 position = Vec3::Zero();
@@ -54,10 +56,13 @@ struct MockService::Impl {
                     {"state",
                      {{"orientation", {{"x", 0}, {"y", 0}, {"z", std::sqrt(0.5)}, {"w", std::sqrt(0.5)}}},
                       {"buttons", {{"a", false}, {"b", pressed}, {"c", false}}}}}};
-    return Json{{"session_id", 1},
-                {"inverse3", noDevice ? Json::array() : Json::array({device})},
-                {"verse_grip", Json::array({grip})}}
-        .dump();
+    Json devices = Json::array();
+    if (another) {
+      devices.push_back(device);
+      devices.back()["device_id"] = "MOCK2";
+    }
+    if (!noDevice) devices.push_back(device);
+    return Json{{"session_id", 1}, {"inverse3", devices}, {"verse_grip", Json::array({grip})}}.dump();
   }
 
   // Right, away from the user, up.
@@ -72,8 +77,12 @@ struct MockService::Impl {
   }
 
   void obey(const std::string& text) {
-    const Json values =
-        Json::parse(text).at("inverse3").at(0).at("commands").at("set_cursor_force").at("values");
+    const Json command = Json::parse(text).at("inverse3").at(0);
+    if (command.at("device_id") == "MOCK2") {
+      ++toAnother;
+      return;
+    }
+    const Json values = command.at("commands").at("set_cursor_force").at("values");
     const std::lock_guard lock(mutex);
     force = Vec3(values.at("x").get<double>(), values.at("y").get<double>(), values.at("z").get<double>());
     ++messages;
@@ -173,6 +182,12 @@ void MockService::basis(const std::string& permutation) {
 void MockService::withoutDevice(bool yes) {
   const std::lock_guard lock(impl_->mutex);
   impl_->noDevice = yes;
+}
+void MockService::another(bool yes) {
+  impl_->another = yes;
+}
+int MockService::toAnother() const {
+  return impl_->toAnother;
 }
 void MockService::mute(bool yes) {
   impl_->muted = yes;

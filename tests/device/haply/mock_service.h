@@ -32,6 +32,10 @@ class MockService {
   void status(const std::string& json);
   void basis(const std::string& permutation);
   void withoutDevice(bool yes);
+  /// Another Inverse3, "MOCK2", is listed before "MOCK1"; force() is that on "MOCK1" still.
+  void another(bool yes);
+  /// Messages with a command for "MOCK2".
+  int toAnother() const;
   /// Takes messages and does not answer.
   void mute(bool yes);
   /// Answers with something that is not JSON.
