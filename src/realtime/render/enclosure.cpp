@@ -111,6 +111,14 @@ bool encloses(const PlacedObject& object, scene::TouchableFaces faces, Nanos now
   return inside || test.isWithin(toolRadius_m);
 }
 
+bool isClear(const PlacedObject& object, Nanos now, const Vec3& p, double toolRadius_m,
+             EnclosureBudget& budget) noexcept {
+  Test test(object, scene::TouchableFaces::both, now, p, budget);
+  int unequal = 0;  // one ray may meet an edge, and both of its faces or none
+  for (int ray = 0; ray < kRays + kMoreRays && unequal <= 1; ++ray) unequal += test.enclosedAlong(ray) ? 1 : 0;
+  return unequal <= 1 && !test.isWithin(toolRadius_m) && !test.isSpent();
+}
+
 bool hasLeft(const PlacedObject& object, scene::TouchableFaces faces, Nanos now, const Vec3& p,
              double toolRadius_m, EnclosureBudget& budget) noexcept {
   Test test(object, faces, now, p, budget);

@@ -19,6 +19,11 @@ struct EnclosureBudget {
 bool encloses(const PlacedObject& object, scene::TouchableFaces faces, Nanos now, const Vec3& p,
               double toolRadius_m, EnclosureBudget& budget) noexcept;
 
+/// True when the tool at p touches nothing of the object and is neither inside it nor on one side of an open surface: on all
+/// but one of 64 rays as many fronts as backs are met, or nothing.
+bool isClear(const PlacedObject& object, Nanos now, const Vec3& p, double toolRadius_m,
+             EnclosureBudget& budget) noexcept;
+
 /// True when the tool has left an object that enclosed it: most of the rays agree, and the ball is free.
 bool hasLeft(const PlacedObject& object, scene::TouchableFaces faces, Nanos now, const Vec3& p,
              double toolRadius_m, EnclosureBudget& budget) noexcept;

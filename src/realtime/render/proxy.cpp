@@ -60,6 +60,7 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   popThrough(hip, status);
   if (!wasFree && neighboursChangedByCommand(springBefore)) status |= kRenderGeometryJump;
   releaseWhenDeep(wasFree, status);
+  if (returnFromJump()) status |= kRenderGeometryJump;
   if (forceShading_) applyForceShading();
   unsigned touched = 0;
   for (int i = 0; i < contactSet_.count; ++i) {
@@ -103,6 +104,7 @@ void Proxy::beFree() noexcept {
   search_ = Search{};
   popthroughArmed_ = true;
   released_ = carriedByJump_ = false;
+  jumper_ = -1;
   overworked_ = 0;
   share_ = 1;
   contactSet_ = ContactSet{};
@@ -413,7 +415,7 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
       constraint.object = object.state->id;
       constraint.surface = object.state->surface;
       constraint.rests = object.rests();
-      if (!object.jumped) {
+      if (!object.jumped && !viewMoved()) {
         const Vec3 carried = carriedBy(object, hit.triangle, positionBefore_);
         constraint.surfaceVelocity_m_per_s = (carried - positionBefore_) / period_s_;
       }
@@ -605,11 +607,16 @@ void Proxy::fadeWhenOverworked(std::uint32_t& status) noexcept {
 void Proxy::releaseWhenDeep(bool wasFree, std::uint32_t& status) noexcept {
   if (contactSet_.count == 0) {
     released_ = false;
+    jumper_ = -1;
     return;
   }
   const double deepest = std::max(kJump_m, kFastestHip_m_per_s * std::min(period_s_, kLongestTick_s));
   if ((wasFree || carriedByJump_) && contactSet_.normal_m.norm() > deepest) released_ = true;
-  if (released_) status |= kRenderReleased;
+  if (released_) {
+    status |= kRenderReleased;
+  } else {
+    jumper_ = -1;
+  }
 }
 
 }  // namespace hapticd::realtime

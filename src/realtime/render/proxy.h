@@ -180,7 +180,9 @@ class Proxy {
   bool liftOutOf(int object, std::uint64_t changed, EnclosureBudget& budget) noexcept;
   bool isBelowOpen(int object, const Vec3& out, Vec3& lifted) noexcept;
   Vec3 pressOf(std::int32_t object) const noexcept;
-  void releaseByJump(std::uint32_t& status) noexcept;
+  void releaseByJump(const PlacedObject& object, std::uint32_t& status) noexcept;
+  void takenByJump(const PlacedObject& object, const Vec3& place) noexcept;
+  bool returnFromJump() noexcept;
   static double missedMove(const PlacedObject& object) noexcept;
   void updateProxy(const Vec3& hip) noexcept;
   bool moveFrictionless(const Vec3& target, ActiveSet& active) noexcept;
@@ -246,6 +248,8 @@ class Proxy {
   bool commandChanged_ = false;
   double share_ = 1;
   bool released_ = false;       // contact released until the HIP leaves the surface
+  std::int32_t jumper_ = -1;    // id of the object that jumped and took the proxy along; -1: none since it was free
+  Vec3 beforeJump_ = Vec3::Zero();  // where that found the proxy
   bool carriedByJump_ = false;  // in this tick
   bool wasHeld_ = false;        // the contact is that of the tick before
   bool jammed_ = false;         // the last approach found faces that leave the tool no room

@@ -179,7 +179,10 @@ void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
       const Vec3 carried = carriedBy(object, touchedTriangle_, position_);
       const bool deformedFar = object.deformed && isJump(object, touchedTriangle_);
       carriedByJump_ = object.jumped || (carried != position_ && (isJump(object) || deformedFar));
-      if (carriedByJump_) status |= kRenderGeometryJump;
+      if (carriedByJump_) {
+        takenByJump(object, position_);
+        status |= kRenderGeometryJump;
+      }
       if (!object.jumped || ((carried - position_).norm() <= kJump_m && !turnsAway(object))) {
         position_ = carried;
       } else {
@@ -408,15 +411,39 @@ bool Proxy::pushByObjects(const Vec3& from, Pushers& pushers, std::uint32_t& sta
       pushTo(start + hit.stop * displacement, hit.halfSpace, pushers);
       pushed = true;
       touchedObject_ = object.state->id;
-      if (object.moved && isJump(object)) releaseByJump(status);
+      if (object.moved && isJump(object)) releaseByJump(object, status);
     }
   }
   return pushed;
 }
 
-void Proxy::releaseByJump(std::uint32_t& status) noexcept {
+void Proxy::releaseByJump(const PlacedObject& object, std::uint32_t& status) noexcept {
+  takenByJump(object, positionBefore_);
   released_ = true;
   status |= kRenderGeometryJump;
+}
+
+void Proxy::takenByJump(const PlacedObject& object, const Vec3& place) noexcept {
+  if (jumper_ < 0) beforeJump_ = place;
+  jumper_ = object.state->id;
+}
+
+// A closed surface that jumped has gone past the hand, and holds the proxy on its far side: the proxy returns to where the jump
+// found it. An open one may have risen over the hand, and keeps the proxy on the side where it was. True when it returned.
+bool Proxy::returnFromJump() noexcept {
+  if (jumper_ < 0 || !released_) return false;
+  const int jumper = query_.addObject(jumper_);
+  if (jumper < 0) return false;
+  EnclosureBudget budget;
+  if (!isClear(query_.object(jumper), now_.time, position_, 0, budget)) return false;
+  if (!isClear(query_.object(jumper), now_.time, beforeJump_, toolRadius_, budget)) return false;
+  for (int i = 0; i < query_.objectCount(); ++i) {
+    if (i != jumper && encloses(query_.object(i), query_.faces(), now_.time, beforeJump_, toolRadius_, budget))
+      return false;
+  }
+  position_ = reported_ = beforeJump_;
+  beFree();
+  return true;
 }
 
 // How far a vertex may have moved in shapes that this servo did not see, metres.
@@ -487,7 +514,8 @@ bool Proxy::pushByDeformingFaces(const Vec3& from, Pushers& pushers, std::uint32
     }
   });
   if (height == 0) return false;
-  if (isJump(query_.object(farthest.object), farthest.triangle)) releaseByJump(status);
+  const PlacedObject& pusher = query_.object(farthest.object);
+  if (isJump(pusher, farthest.triangle)) releaseByJump(pusher, status);
   pushTo(position_ - height * farthest.halfSpace.normal, farthest.halfSpace, pushers);
   return true;
 }
