@@ -115,7 +115,8 @@ bool isClear(const PlacedObject& object, Nanos now, const Vec3& p, double toolRa
              EnclosureBudget& budget) noexcept {
   Test test(object, scene::TouchableFaces::both, now, p, budget);
   int unequal = 0;  // one ray may meet an edge, and both of its faces or none
-  for (int ray = 0; ray < kRays + kMoreRays && unequal <= 1; ++ray) unequal += test.enclosedAlong(ray) ? 1 : 0;
+  for (int ray = 0; ray < kRays + kMoreRays && unequal <= 1; ++ray)
+    unequal += test.enclosedAlong(ray) ? 1 : 0;
   return unequal <= 1 && !test.isWithin(toolRadius_m) && !test.isSpent();
 }
 

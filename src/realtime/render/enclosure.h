@@ -19,8 +19,8 @@ struct EnclosureBudget {
 bool encloses(const PlacedObject& object, scene::TouchableFaces faces, Nanos now, const Vec3& p,
               double toolRadius_m, EnclosureBudget& budget) noexcept;
 
-/// True when the tool at p touches nothing of the object and is neither inside it nor on one side of an open surface: on all
-/// but one of 64 rays as many fronts as backs are met, or nothing.
+/// True when the tool at p touches nothing of the object and is neither inside it nor on one side of an open
+/// surface: on all but one of 64 rays as many fronts as backs are met, or nothing.
 bool isClear(const PlacedObject& object, Nanos now, const Vec3& p, double toolRadius_m,
              EnclosureBudget& budget) noexcept;
 

@@ -36,6 +36,15 @@ bool depthsOf(const ObjectHit* hits, int count, double toolRadius_m, const Vec3&
   return false;
 }
 
+// Along a surface without friction it may go as fast as it likes.
+bool creeps(const Vec3& velocity_m_per_s, const ContactConstraint& constraint) {
+  constexpr double kCreep_m_per_s = 2e-3;
+  const double speed = constraint.surface.staticFriction > 0
+                           ? velocity_m_per_s.norm()
+                           : std::abs(velocity_m_per_s.dot(constraint.halfSpace.normal));
+  return speed <= kCreep_m_per_s;
+}
+
 }  // namespace
 
 const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double period_s,
@@ -415,9 +424,11 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
       constraint.object = object.state->id;
       constraint.surface = object.state->surface;
       constraint.rests = object.rests();
-      if (!object.jumped && !viewMoved()) {
-        const Vec3 carried = carriedBy(object, hit.triangle, positionBefore_);
-        constraint.surfaceVelocity_m_per_s = (carried - positionBefore_) / period_s_;
+      if (!object.jumped) {
+        const Vec3 velocity =
+            (carriedBy(object, hit.triangle, positionBefore_) - positionBefore_) / period_s_;
+        constraint.creeps = creeps(velocity, constraint);
+        if (!viewMoved()) constraint.surfaceVelocity_m_per_s = velocity;
       }
     }
     const double force = constraint.surface.stiffness_N_per_m * constraint.depth_m;

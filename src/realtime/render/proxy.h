@@ -36,6 +36,7 @@ struct ContactConstraint {
   double depth_m = 0;                           ///< of the HIP below the surface, along the normal, >= 0
   Vec3 surfaceVelocity_m_per_s = Vec3::Zero();  ///< at the proxy
   bool rests = true;                            ///< the surface neither moves nor deforms in this tick
+  bool creeps = false;                          ///< or so slowly that its work is negligible
 };
 
 /// The faces in contact: proxy - HIP = normal_m + lateral_m.
@@ -247,12 +248,13 @@ class Proxy {
   int overworked_ = 0;  // ticks in a row whose work was spent
   bool commandChanged_ = false;
   double share_ = 1;
-  bool released_ = false;       // contact released until the HIP leaves the surface
-  std::int32_t jumper_ = -1;    // id of the object that jumped and took the proxy along; -1: none since it was free
+  bool released_ = false;  // contact released until the HIP leaves the surface
+  std::int32_t jumper_ =
+      -1;  // id of the object that jumped and took the proxy along; -1: none since it was free
   Vec3 beforeJump_ = Vec3::Zero();  // where that found the proxy
-  bool carriedByJump_ = false;  // in this tick
-  bool wasHeld_ = false;        // the contact is that of the tick before
-  bool jammed_ = false;         // the last approach found faces that leave the tool no room
+  bool carriedByJump_ = false;      // in this tick
+  bool wasHeld_ = false;            // the contact is that of the tick before
+  bool jammed_ = false;             // the last approach found faces that leave the tool no room
   Vec3 position_ = Vec3::Zero();
   Vec3 reported_ = Vec3::Zero();
   Vec3 positionBefore_ = Vec3::Zero();

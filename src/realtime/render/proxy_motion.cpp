@@ -428,8 +428,9 @@ void Proxy::takenByJump(const PlacedObject& object, const Vec3& place) noexcept 
   jumper_ = object.state->id;
 }
 
-// A closed surface that jumped has gone past the hand, and holds the proxy on its far side: the proxy returns to where the jump
-// found it. An open one may have risen over the hand, and keeps the proxy on the side where it was. True when it returned.
+// A closed surface that jumped has gone past the hand, and holds the proxy on its far side: the proxy returns
+// to where the jump found it. An open one may have risen over the hand, and keeps the proxy on the side where
+// it was. True when it returned.
 bool Proxy::returnFromJump() noexcept {
   if (jumper_ < 0 || !released_) return false;
   const int jumper = query_.addObject(jumper_);
@@ -438,7 +439,8 @@ bool Proxy::returnFromJump() noexcept {
   if (!isClear(query_.object(jumper), now_.time, position_, 0, budget)) return false;
   if (!isClear(query_.object(jumper), now_.time, beforeJump_, toolRadius_, budget)) return false;
   for (int i = 0; i < query_.objectCount(); ++i) {
-    if (i != jumper && encloses(query_.object(i), query_.faces(), now_.time, beforeJump_, toolRadius_, budget))
+    if (i != jumper &&
+        encloses(query_.object(i), query_.faces(), now_.time, beforeJump_, toolRadius_, budget))
       return false;
   }
   position_ = reported_ = beforeJump_;

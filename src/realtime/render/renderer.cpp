@@ -37,17 +37,17 @@ Vec3 shadedSprings(const ContactSet& contactSet) {
 }
 
 // The springs of surfaces at rest. Unknown where something moves, or where the surface changes or yields.
-SpringState restingSprings(const ContactSet& contactSet, bool commandChanged, double toolRadius_m,
+SpringState restingSprings(const ContactSet& contactSet, bool changed, double toolRadius_m,
                            const Rendering& out) {
   constexpr std::uint32_t kChanged =
       kRenderGeometryJump | kRenderReleased | kRenderPopthrough | kRenderWorkLimit | kRenderEnclosed;
   SpringState state;
   const BlendedSpring& spring = contactSet.spring;
-  state.known = !commandChanged && (out.status & kChanged) == 0;
+  state.known = !changed && (out.status & kChanged) == 0;
   for (int i = 0; i < contactSet.count; ++i) {
     const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
-    state.known =
-        state.known && constraint.rests && !isYielding(constraint, spring.stiffness_N_per_m, toolRadius_m);
+    state.known = state.known && (constraint.rests || constraint.creeps) &&
+                  !isYielding(constraint, spring.stiffness_N_per_m, toolRadius_m);
   }
   if (!out.touching || !state.known) return state;
   const double kappa = spring.kappa_N_per_m;
@@ -67,12 +67,11 @@ struct LastForce {
   double stiffness_N_per_m = 0;
   Vec3 hip = Vec3::Zero();
 
-  // Keeps this one. True where it differs by more than the way of the hand explains.
-  bool stepped(const Vec3& force, double stiffness, const Vec3& place) noexcept {
+  // True where the next one differs by more than the way of the hand explains.
+  bool stepsTo(const LastForce& next) const noexcept {
     constexpr double kStep_N = 0.1;
-    const LastForce before = std::exchange(*this, {force, stiffness, place});
-    const double byHand_N = std::max(stiffness, before.stiffness_N_per_m) * (place - before.hip).norm();
-    return (force - before.force_N).norm() > kStep_N + byHand_N;
+    const double byHand_N = std::max(next.stiffness_N_per_m, stiffness_N_per_m) * (next.hip - hip).norm();
+    return (next.force_N - force_N).norm() > kStep_N + byHand_N;
   }
 };
 
@@ -145,7 +144,12 @@ void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState
   out.proxy_m = out.scp_m = s.proxy.position();
   if ((out.status & kRenderReleased) == 0)
     applySurfaceLaw(contactSet, out.proxy_m, device.velocity_m_per_s, radius, out);
-  SpringState springs = restingSprings(contactSet, s.proxy.commandChanged(), radius, out);
+  // A command that changes nothing that is felt, as of a surface elsewhere, is none here.
+  const auto steps = [&] {
+    return s.proxy.commandChanged() &&
+           s.last.stepsTo({out.contactForce_N, contactSet.spring.kappa_N_per_m, hip});
+  };
+  SpringState springs = restingSprings(contactSet, steps(), radius, out);
   const double share = s.proxy.feltShare() * s.rise.step(out.contactForce_N, springs.known, period_s);
   scaleContact(share, out);
   springs.scale(share);
@@ -155,8 +159,8 @@ void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState
   if ((out.status & kRenderReleased) == 0) {
     applyAdhesion(s.proxy.planes().adhesion(hip, radius), out);
   }
-  const bool stepped = s.last.stepped(out.contactForce_N, contactSet.spring.kappa_N_per_m, hip);
-  if (stepped && s.proxy.commandChanged()) out.status |= kRenderGeometryJump;
+  if (steps()) out.status |= kRenderGeometryJump;
+  s.last = {out.contactForce_N, contactSet.spring.kappa_N_per_m, hip};
   out.force_N = out.contactForce_N + brake;
   out.force_N += s.effects.force(scene, device, out, (out.normalForce_N + brake).dot(out.normal), now);
   out.force_N += s.fields.force(scene, hip, now);

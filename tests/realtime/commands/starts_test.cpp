@@ -372,8 +372,8 @@ TEST(Jumps, view_that_jumps_over_a_free_hand_while_the_mesh_deforms) {
   }
 }
 
-// What jumps past a hand leaves it to what else it touches. Boxes of all sizes and heights above a floor, with one pose and
-// with streams at 60 Hz.
+// What jumps past a hand leaves it to what else it touches. Boxes of all sizes and heights above a floor,
+// with one pose and with streams at 60 Hz.
 TEST(Jumps, box_that_goes_past_the_hand_leaves_it_to_the_floor) {
   constexpr double kPress_m = 0.002;
   int past = 0;
@@ -398,7 +398,8 @@ TEST(Jumps, box_that_goes_past_the_hand_leaves_it_to_the_floor) {
         }
         loop.rest(pressed, toNanos(0.3));
         EXPECT_NEAR(loop.out.force_N.y(), kStiffness_N_per_m * kPress_m, 1e-3)
-            << speed_m_per_s << " m/s, half a box of " << half_mm << " mm, proxy at " << loop.out.proxy_m.transpose();
+            << speed_m_per_s << " m/s, half a box of " << half_mm << " mm, proxy at "
+            << loop.out.proxy_m.transpose();
         EXPECT_EQ(loop.out.status, 0U);
         const Vec3 deeper = pressed - Vec3(0, 0.005, 0);
         EXPECT_NEAR(loop.to(deeper).force_N.y(), kStiffness_N_per_m * (kPress_m + 0.005), 1e-3);
