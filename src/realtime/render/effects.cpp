@@ -19,10 +19,9 @@ Vec3 atMost(const Vec3& force, double limit) {
 }
 
 // The friction effect is a spring to its anchor; at the force limit it drags the anchor along.
-Vec3 frictionForce(const Effect& effect, const Vec3& proxy, Vec3& anchor) {
-  const Vec3 pull = effect.gain * (anchor - proxy);
-  const Vec3 force = atMost(pull, effect.magnitude_N);
-  if (effect.gain > 0) anchor = proxy + force / effect.gain;
+Vec3 frictionForce(double gain, double limit_N, const Vec3& proxy, Vec3& anchor) {
+  const Vec3 force = atMost(gain * (anchor - proxy), limit_N);
+  if (gain > 0) anchor = proxy + force / gain;
   return force;
 }
 
@@ -80,6 +79,15 @@ void Effects::resume(const RenderMemory& memory) noexcept {
   }
 }
 
+// With the new gain the anchor exerts the force that it did.
+void Effects::Running::changeFriction(double gain, double limit_N, const Vec3& proxy) noexcept {
+  if (gain != frictionGain && gain > 0 && frictionGain > 0)
+    anchor = proxy + frictionForce(frictionGain, frictionLimit_N, proxy, anchor) / gain;
+  if (!(gain > 0)) return anchorAt(proxy);
+  frictionGain = gain;
+  frictionLimit_N = limit_N;
+}
+
 Effects::Running* Effects::running(const Effect& effect, Nanos now, const Vec3& proxy) noexcept {
   for (int i = 0; i < count_; ++i) {
     Running& r = running_[static_cast<std::size_t>(i)];
@@ -87,7 +95,7 @@ Effects::Running* Effects::running(const Effect& effect, Nanos now, const Vec3& 
   }
   if (count_ == kMaxEffects) return nullptr;
   Running& fresh = running_[static_cast<std::size_t>(count_++)];
-  fresh = {effect.index, effect.start, now, -1, proxy, true, {}};
+  fresh = {effect.index, effect.start, now, -1, proxy, true, {}, 0, 0};
   return &fresh;
 }
 
@@ -107,7 +115,8 @@ Vec3 Effects::forceOf(const Effect& effect, Running& r, const Affine& T_device_w
     case EffectType::viscous:
       return atMost(-effect.gain * device.velocity_m_per_s, effect.magnitude_N);
     case EffectType::friction:
-      return frictionForce(effect, contact.proxy_m, r.anchor);
+      r.changeFriction(effect.gain, effect.magnitude_N, contact.proxy_m);
+      return frictionForce(effect.gain, effect.magnitude_N, contact.proxy_m, r.anchor);
     case EffectType::motorVibration: {
       const double phase = r.phase.at(now, r.begin, effect.angularFrequency_rad_per_s);
       const Vec3 force = effect.magnitude_N * Vec3(std::cos(phase), std::sin(phase), 0);
@@ -135,7 +144,9 @@ Vec3 Effects::force(const scene::SceneSnapshot& scene, const device::DeviceState
     Running* r = running(effect, now, contact.proxy_m);
     if (r == nullptr) continue;
     r->seen = true;
-    if (effect.duration > 0 && now - r->begin >= effect.duration) continue;
+    const bool ended = effect.duration > 0 && now - r->begin >= effect.duration;
+    if (ended || effect.type != EffectType::friction) r->anchorAt(contact.proxy_m);
+    if (ended) continue;
     Vec3 force = forceOf(effect, *r, T_device_world, device, contact, now);
     if (effect.releasing && r->releaseBegin < 0) r->releaseBegin = now;
     force *= remainingShare(r->releaseBegin, effect.owner.get(), now);

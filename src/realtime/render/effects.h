@@ -51,6 +51,14 @@ class Effects {
     Vec3 anchor = Vec3::Zero();
     bool seen = false;
     Phase phase;
+    double frictionGain = 0;  ///< of the last tick; 0: it did not rub
+    double frictionLimit_N = 0;
+
+    void changeFriction(double gain, double limit_N, const Vec3& proxy) noexcept;
+    void anchorAt(const Vec3& proxy) noexcept {
+      anchor = proxy;
+      frictionGain = 0;
+    }
   };
 
   static Vec3 forceOf(const scene::Effect& effect, Running& r, const Affine& T_device_world,

@@ -135,11 +135,16 @@ bool Proxy::slideInMovingGroove(const Vec3& hip, ActiveSet& active) noexcept {
   return true;
 }
 
-// The wall that the proxy slipped over farther bears its bound, the other one the rest.
+// The wall that the proxy slipped over farther bears its bound, or as much as the other one leaves, and that
+// the rest.
 void Proxy::shareOut(const Groove& groove) noexcept {
   const std::size_t farther = std::abs(groove.carried[1]) > std::abs(groove.carried[0]) ? 1 : 0;
-  const Vec3 friction = std::copysign(groove.bound[farther], groove.carried[farther]) * groove.along;
   const Vec3 borne = contactSet_.lateral_m - heldBySlope();
+  const double bound = groove.bound[farther];
+  const double rest = groove.bound[1 - farther];
+  const double all = borne.dot(groove.along);
+  const double part = std::clamp(std::copysign(bound, groove.carried[farther]), all - rest, all + rest);
+  const Vec3 friction = std::clamp(part, -bound, bound) * groove.along;
   contactSet_.borneApart = true;
   contactSet_.borneByFirst_m = farther == 0 ? friction : Vec3(borne - friction);
 }

@@ -418,5 +418,33 @@ TEST_F(Kicks, texture_that_rises_under_a_free_hand) {
   EXPECT_LE(step_N, 0.5);
 }
 
+// Its anchor is where it begins to rub, and a new gain changes no force that it exerts.
+TEST(FrictionEffect, begins_without_a_force_wherever_the_hand_is) {
+  const auto define = [](const char* type, double gain) {
+    return scene::DefineEffect{
+        .type = type, .index = 0, .gain = gain, .magnitude_N = 2, .direction = Vec3::UnitX()};
+  };
+  const Vec3 far(0.040, 0.010, 0);
+  for (const auto& before : {define("viscous", 0.001), define("friction", 0)}) {
+    Loop loop;
+    loop.rest(Vec3(0, 0.010, 0), 20 * kMs);
+    loop.send(before);
+    loop.send(scene::StartEffect{0});
+    loop.rest(Vec3(0, 0.010, 0), 50 * kMs);
+    loop.to(far);
+    loop.rest(far, 50 * kMs);
+    ASSERT_LT(loop.out.force_N.norm(), 1e-6);
+    loop.send(define("friction", 0.5));
+    loop.rest(far, 50 * kMs, [&] { EXPECT_LT(loop.out.force_N.norm(), 1e-3) << before.type; });
+    loop.to(far + Vec3(0.002, 0, 0));
+    EXPECT_NEAR(loop.out.force_N.x(), -1, 1e-6) << before.type << ": rubs from there on";
+    for (const double gain : {0.9, 0.3, 2.0}) {
+      loop.send(define("friction", gain));
+      loop.rest(far + Vec3(0.002, 0, 0), 20 * kMs,
+                [&] { EXPECT_NEAR(loop.out.force_N.x(), -1, 1e-6) << gain; });
+    }
+  }
+}
+
 }  // namespace
 }  // namespace hapticd::realtime::commands
