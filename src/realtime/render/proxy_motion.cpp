@@ -179,10 +179,8 @@ void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
       const Vec3 carried = carriedBy(object, touchedTriangle_, position_);
       const bool deformedFar = object.deformed && isJump(object, touchedTriangle_);
       carriedByJump_ = object.jumped || (carried != position_ && (isJump(object) || deformedFar));
-      if (carriedByJump_) {
-        takenByJump(object, position_);
-        status |= kRenderGeometryJump;
-      }
+      if (carriedByJump_) status |= kRenderGeometryJump;
+      if (carriedByJump_) takenByJump(object, position_);
       if (!object.jumped || ((carried - position_).norm() <= kJump_m && !turnsAway(object))) {
         position_ = carried;
       } else {
