@@ -35,7 +35,7 @@ inline void keepFile(const std::string& file, bool force, const std::string& inp
   std::error_code none;
   if (!file.empty() && !input.empty() && std::filesystem::equivalent(file, input, none))
     throw std::runtime_error("'" + file + "' is the file to read: choose another name for what is written");
-  if (force || file.empty() || !std::filesystem::is_regular_file(file)) return;
+  if (force || file.empty() || !std::filesystem::is_regular_file(file, none)) return;
   throw std::runtime_error("'" + file + "' exists: choose another name, or overwrite it by --force");
 }
 inline constexpr const char* kForceText = "Overwrite an existing file";

@@ -98,7 +98,7 @@ void print(const DeviceFacts& facts, const record::RecordedDevice& device, base:
     const auto acted = facts.trips.find(trip.trip);
     if (acted == facts.trips.end()) continue;
     char text[64];
-    std::snprintf(text, sizeof text, " from %.3f s on", base::toSeconds(acted->second - first));
+    std::snprintf(text, sizeof text, " first at %.3f s", base::toSeconds(acted->second - first));
     trips += (trips.empty() ? "" : ", ") + std::string(trip.name) + text;
   }
   std::printf("  guard     %s\n", trips.empty() ? "never acted" : trips.c_str());

@@ -1,4 +1,5 @@
 // hapticd: a haptics server that speaks VRPN, and the tools around it.
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <optional>
@@ -18,6 +19,29 @@ std::optional<std::string> nearestCommand(const CLI::App& app, const std::string
        app.get_subcommands([](const CLI::App* each) { return !each->get_group().empty(); }))
     names.push_back(command->get_name());
   return hapticd::base::nearestName(typed, names);
+}
+
+// Names the option that was typed wrong, of the innermost command. False when there was none.
+bool explainUnknownOption(const CLI::App& app) {
+  const CLI::App* command = &app;
+  std::string name = "hapticd";
+  while (!command->get_subcommands().empty()) {
+    command = command->get_subcommands().front();
+    name += ' ' + command->get_name();
+  }
+  const std::vector<std::string> rest = app.remaining(true);
+  const auto typed =
+      std::find_if(rest.begin(), rest.end(), [](const std::string& text) { return text.starts_with("-"); });
+  if (typed == rest.end()) return false;
+  std::vector<std::string> names;
+  for (const CLI::Option* option : command->get_options()) {
+    for (const std::string& each : option->get_lnames()) names.push_back("--" + each);
+  }
+  const std::optional<std::string> nearest =
+      hapticd::base::nearestName(typed->substr(0, typed->find('=')), names);
+  std::fprintf(stderr, "%s: unknown option '%s';%s '%s --help' lists the options\n", name.c_str(),
+               typed->c_str(), nearest ? (" did you mean '" + *nearest + "'?").c_str() : "", name.c_str());
+  return true;
 }
 
 }  // namespace
@@ -66,6 +90,9 @@ int main(int argc, char** argv) {
                    rest[0].c_str(), nearest ? (" did you mean '" + *nearest + "'?").c_str() : "");
       return 2;
     }
+    return app.exit(error) == 0 ? 0 : 2;
+  } catch (const CLI::ExtrasError& error) {
+    if (explainUnknownOption(app)) return 2;
     return app.exit(error) == 0 ? 0 : 2;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;

@@ -5,6 +5,7 @@
 namespace hapticd::apps {
 namespace {
 
+constexpr int kHandled[] = {SIGINT, SIGTERM, SIGQUIT, SIGHUP};
 volatile std::sig_atomic_t requested = 0;
 
 void request(int) {
@@ -13,12 +14,15 @@ void request(int) {
 
 }  // namespace
 
-StopSignals::StopSignals()
-    : interrupt_(std::signal(SIGINT, request)), terminate_(std::signal(SIGTERM, request)) {}
+StopSignals::StopSignals() {
+  for (std::size_t i = 0; i < before_.size(); ++i) {
+    before_[i] = std::signal(kHandled[i], request);
+    if (before_[i] == SIG_IGN) std::signal(kHandled[i], SIG_IGN);
+  }
+}
 
 StopSignals::~StopSignals() {
-  std::signal(SIGINT, interrupt_);
-  std::signal(SIGTERM, terminate_);
+  for (std::size_t i = 0; i < before_.size(); ++i) std::signal(kHandled[i], before_[i]);
 }
 
 bool stopRequested() {

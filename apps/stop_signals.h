@@ -1,9 +1,12 @@
-// SIGINT (Ctrl-C) and SIGTERM as a flag.
+// The signals that ask a program to end, as a flag.
 #pragma once
+
+#include <array>
 
 namespace hapticd::apps {
 
-/// While it lives, SIGINT and SIGTERM set a flag instead of ending the process. One instance at a time.
+/// While it lives, SIGINT (Ctrl-C), SIGTERM, SIGQUIT and SIGHUP (a closed terminal) set a flag instead of
+/// ending the process; one that is ignored stays so, as by nohup. One instance at a time.
 class StopSignals {
  public:
   StopSignals();
@@ -13,11 +16,10 @@ class StopSignals {
 
  private:
   using Handler = void (*)(int);
-  Handler interrupt_;
-  Handler terminate_;
+  std::array<Handler, 4> before_{};
 };
 
-/// Whether one of the two signals arrived.
+/// Whether one of them arrived.
 bool stopRequested();
 
 }  // namespace hapticd::apps

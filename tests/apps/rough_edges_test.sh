@@ -14,6 +14,8 @@ refused() { # refused STATUS TEXT COMMAND...: the status, and the text in what i
 }
 refused 2 "did you mean 'serve'?" "$hapticd" serv
 refused 2 "unknown command 'xyzzyx'; 'hapticd --help'" "$hapticd" xyzzyx
+refused 2 "hapticd serve: unknown option '--recrod'; did you mean '--record'?" "$hapticd" serve --recrod x
+refused 2 "hapticd record: unknown option '--nothing-alike'; 'hapticd record --help'" "$hapticd" record Phantom@localhost --nothing-alike=3
 refused 2 "nothing to render" "$hapticd" render
 refused 2 "excludes" "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --true-size --size-mm 3
 refused 2 "not in range 0 to 2147483646" "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --object 2147483647
@@ -38,6 +40,16 @@ refused 1 "three.off': the format '.off' is not supported" "$hapticd" touch "$wo
 "$hapticd" record "Phantom@tcp://$address" "$work/own.csv" --seconds 0.3
 refused 1 "exists: choose another name, or overwrite it by --force" "$hapticd" record "Phantom@tcp://$address" "$work/own.csv" --seconds 0.3
 "$hapticd" record "Phantom@tcp://$address" "$work/own.csv" --seconds 0.3 --force
+# A terminal that closes ends a recording as Ctrl-C does: the file is whole.
+"$hapticd" record "Phantom@tcp://$address" "$work/closed.mcap" >"$work/closed.log" 2>&1 &
+recorder=$!
+for _ in $(seq 600); do [ ! -e "$work/closed.mcap" ] || break; sleep 0.05; done
+sleep 0.3
+kill -HUP "$recorder"
+wait "$recorder"
+grep -q "^recorded [0-9]* ticks" "$work/closed.log" || { cat "$work/closed.log"; exit 1; }
+[ "$(tail -c 8 "$work/closed.mcap" | od -An -tx1 | tr -d ' \n')" = 894d434150300d0a ]
+
 recording=$source_dir/testdata/recordings/all_commands_law2.haptics
 "$hapticd" export "$recording" --to csv -o "$work/out.csv" | grep -qx "wrote $work/out.csv and $work/out.csv.json"
 refused 1 "--force" "$hapticd" export "$recording" --to csv -o "$work/out.csv"
