@@ -37,10 +37,10 @@ bool explainUnknownOption(const CLI::App& app) {
   for (const CLI::Option* option : command->get_options()) {
     for (const std::string& each : option->get_lnames()) names.push_back("--" + each);
   }
-  const std::optional<std::string> nearest =
-      hapticd::base::nearestName(typed->substr(0, typed->find('=')), names);
+  const std::string option = typed->substr(0, typed->find('='));
+  const std::optional<std::string> nearest = hapticd::base::nearestName(option, names);
   std::fprintf(stderr, "%s: unknown option '%s';%s '%s --help' lists the options\n", name.c_str(),
-               typed->c_str(), nearest ? (" did you mean '" + *nearest + "'?").c_str() : "", name.c_str());
+               option.c_str(), nearest ? (" did you mean '" + *nearest + "'?").c_str() : "", name.c_str());
   return true;
 }
 
