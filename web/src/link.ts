@@ -4,6 +4,12 @@ import { Endpoint, type Incoming, type Outgoing, PONG, ping } from "./wire";
 export type LinkState = "connecting" | "open" | "lost";
 
 const PING_EVERY_MS = 1000;
+/** Intervals of the ping without a byte from the server, after which the connection counts as lost. */
+const MOST_SILENT = 3;
+/** Intervals until a pong is overdue. */
+const PONG_LATE = 3;
+/** Intervals until a missing pong alone ends the connection: on a slow network a ping waits behind an upload. */
+const MOST_UNANSWERED = 20;
 const RETRY_FIRST_MS = 500;
 const RETRY_MAX_MS = 4000;
 
@@ -57,6 +63,9 @@ export class Link {
   private peer: Endpoint | undefined;
   private clock = new ServerClock();
   private pingTimer = 0;
+  // Counted in ticks of the timer, which a page that was busy or asleep misses: then the answers are only unread.
+  private silentTicks = 0;
+  private unansweredTicks = 0;
   /** Names of messages that could not be read, and of which the console has been told. */
   private readonly unreadable = new Set<string>();
   private retry_ms = RETRY_FIRST_MS;
@@ -78,7 +87,10 @@ export class Link {
     const peer = new Endpoint(
       (bytes) => socket.send(bytes as Uint8Array<ArrayBuffer>),
       (message) => {
-        if (message.name === PONG) clock.onPong(message.time_s);
+        if (message.name === PONG) {
+          clock.onPong(message.time_s);
+          this.unansweredTicks = 0;
+        }
         this.read(message, clock.age_s(message.time_s));
       },
     );
@@ -88,6 +100,11 @@ export class Link {
     socket.onopen = () => peer.open();
     socket.onmessage = (event: MessageEvent<ArrayBuffer>) => this.feed(peer, new Uint8Array(event.data));
     socket.onclose = () => this.lost(peer);
+  }
+
+  /** The server has not answered for seconds: what is sent may not reach it. */
+  get unanswered(): boolean {
+    return this.state === "open" && this.unansweredTicks >= PONG_LATE;
   }
 
   /** Whether the messages were sent; false while not connected. */
@@ -132,27 +149,40 @@ export class Link {
 
   private feed(peer: Endpoint, bytes: Uint8Array): void {
     if (peer !== this.peer) return;
+    this.silentTicks = 0;
     try {
       peer.feed(bytes);
     } catch (error) {
-      console.warn(`connection ended: ${String(error)}`);
-      this.socket?.close();
-      return this.lost(peer); // the browser says so only when the server has agreed
+      return this.end(peer, String(error));
     }
-    if (this.state !== "open" && peer.connected) this.opened();
+    if (this.state !== "open" && peer.connected) this.opened(peer);
   }
 
-  private opened(): void {
+  private end(peer: Endpoint, why: string): void {
+    console.warn(`connection ended: ${why}`);
+    this.socket?.close();
+    this.lost(peer); // the browser reports the end only when the server has agreed
+  }
+
+  private opened(peer: Endpoint): void {
     this.retry_ms = RETRY_FIRST_MS;
     for (const message of this.greeting()) this.peer?.send(this.device, message);
     this.setState("open");
     const sendPing = (): void => {
-      if (this.clock.waits) return;
+      this.unansweredTicks = 0;
       this.clock.sent();
       this.send(ping());
     };
+    this.silentTicks = 0;
     sendPing();
-    this.pingTimer = window.setInterval(sendPing, PING_EVERY_MS);
+    this.pingTimer = window.setInterval(() => {
+      if (!this.clock.waits) return sendPing();
+      ++this.silentTicks;
+      ++this.unansweredTicks;
+      // A network may drop a connection without an end, for example behind a NAT or a VPN.
+      if (this.silentTicks >= MOST_SILENT || this.unansweredTicks >= MOST_UNANSWERED)
+        this.end(peer, "the server does not answer");
+    }, PING_EVERY_MS);
   }
 
   private lost(peer: Endpoint): void {

@@ -51,6 +51,8 @@ class Page {
   private tickIsNew = false;
   private readoutAt_ms = 0;
   private serverResponds = true;
+  /** A stop was sent, and the server has not reported it yet. */
+  private stopUnconfirmed = false;
   /** Number of drawn frames. */
   frames = 0;
 
@@ -142,10 +144,15 @@ class Page {
   }
 
   private stop(): void {
-    if (!this.link.send(wire.stopForces()))
+    this.stopUnconfirmed = this.link.send(wire.stopForces());
+    if (!this.stopUnconfirmed)
       toast("Not connected: the stop did not reach the server. Use the switch on the device.", 2);
-    else if (!this.serverResponds)
-      toast("The server does not answer: the stop may not have reached it. Use the switch on the device.", 2);
+    else if (!this.serverResponds || this.link.unanswered)
+      this.warnOfStop();
+  }
+
+  private warnOfStop(): void {
+    toast("The server does not answer: the stop may not have reached it. Use the switch on the device.", 2);
   }
 
   private send(...messages: wire.Outgoing[]): void {
@@ -288,6 +295,8 @@ class Page {
     this.showLink();
     if (state === "open") this.subscribe();
     if (state === "lost") {
+      if (this.stopUnconfirmed) this.warnOfStop();
+      this.stopUnconfirmed = false;
       this.hand.onLost();
       this.clearReadout();
       this.drop.clear();
@@ -298,7 +307,7 @@ class Page {
 
   private showLink(): void {
     const { state } = this.link;
-    const silent = state === "open" && !this.serverResponds;
+    const silent = state === "open" && (!this.serverResponds || this.link.unanswered);
     const label = byId("link");
     setText(label, silent ? "no answer" : state === "open" ? "connected" : state);
     label.dataset["level"] = silent || state === "lost" ? "bad" : state === "open" ? "good" : "";
@@ -418,6 +427,7 @@ class Page {
   }
 
   private showArmed(stopped: boolean, tripped: boolean): void {
+    if (stopped) this.stopUnconfirmed = false;
     byId<HTMLButtonElement>("rearm").disabled = !stopped && !tripped;
     document.body.classList.toggle("stopped", stopped || tripped);
     this.showHeld(stopped ? "STOPPED" : tripped ? "TRIPPED" : "");

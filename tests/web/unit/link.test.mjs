@@ -150,6 +150,37 @@ test("the server's clock is estimated from a ping and its own answer, however la
   for (const age of ages.slice(1)) assert.ok(Math.abs(age - 0.8) < 0.01, `${ages}`);
 });
 
+test("a connection without an answer is lost after 3 s, and a new one is made", (t) => {
+  t.mock.method(console, "warn", () => undefined);
+  t.mock.timers.enable({ apis: ["setInterval", "setTimeout"] });
+  const { link, states } = connected();
+  t.mock.timers.tick(2000);
+  assert.deepEqual(states, ["open"]);
+  t.mock.timers.tick(1000);
+  assert.deepEqual(states, ["open", "lost"]);
+  assert.equal(link.send(stopForces()), false);
+  t.mock.timers.tick(1000);
+  assert.equal(Socket.all.length, 2);
+  Socket.all[1].accept();
+  assert.equal(link.state, "open");
+});
+
+test("reports without a pong keep the connection for a while, but a stop may not arrive", (t) => {
+  t.mock.method(console, "warn", () => undefined);
+  t.mock.timers.enable({ apis: ["setInterval", "setTimeout"] });
+  const { link, states, socket } = connected();
+  for (let s = 1; s < 20; ++s) {
+    socket.server.send("Arm", { name: "report", payload: new Uint8Array(8) });
+    socket.answer();
+    t.mock.timers.tick(1000);
+    assert.equal(link.unanswered, s >= 3, `after ${s} s`);
+  }
+  assert.deepEqual(states, ["open"]);
+  socket.server.send("Arm", { name: "vrpn_Base pong_message", payload: new Uint8Array(0) });
+  socket.answer();
+  assert.equal(link.unanswered, false);
+});
+
 /** So large that the upload waits for the socket between its parts. */
 const mesh = () => ({ positions: new Float32Array(3 * 400_000), triangles: new Uint32Array(3 * 400_000) });
 const placement = {
