@@ -609,6 +609,48 @@ test("accessible on a phone, a laptop and a projector, light and dark", async ()
   await viewer.page.setViewportSize(size);
 });
 
+test("without WebGL the page names the remedy, and STOP works", async () => {
+  const page = await browser.context.newPage();
+  await page.addInitScript(() => {
+    const { getContext } = HTMLCanvasElement.prototype;
+    HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+      return kind.startsWith("webgl") ? null : getContext.call(this, kind, ...more);
+    };
+  });
+  await page.goto(server.url);
+  await until("the notice", async () => /WebGL.*hardware acceleration/.test(await page.locator("#notice-text").innerText()));
+  const stopped = async () => (await server.state()).devices[0].guard.stopped;
+  await page.click("#stop");
+  await until("the stop", stopped);
+  await page.click("#rearm");
+  await until("the re-arm", async () => !(await stopped()));
+  await page.keyboard.press("Escape");
+  await until("the stop by Escape", stopped);
+  await page.click("#rearm");
+  await until("the re-arm", async () => !(await stopped()));
+  await page.close();
+  await viewer.page.bringToFront();
+});
+
+test("a connection that the network dropped is noticed, and a stop before that warns", async () => {
+  const { page } = viewer;
+  // Nothing arrives any more in either direction, and nothing ends.
+  await viewer.ask(`(() => {
+    const { socket } = viewer.link;
+    socket.send = () => undefined;
+    socket.onmessage = null;
+    socket.close = () => undefined;
+  })()`);
+  await page.click("#stop");
+  await viewer.until("the warning", async () => /does not answer: the stop may not/.test(await viewer.text("#toasts")));
+  await viewer.until("connected again", async () => (await viewer.text("#link")) === "connected");
+  await page.click("#stop");
+  const stopped = async () => (await server.state()).devices[0].guard.stopped;
+  await until("the stop", stopped);
+  await page.click("#rearm");
+  await until("the re-arm", async () => !(await stopped()));
+});
+
 test("the page reconnects to a restarted server", async () => {
   await server.stop();
   await viewer.until(

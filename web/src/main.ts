@@ -280,6 +280,7 @@ class Page {
     if (this.link.state === "lost" || (!this.serverResponds && this.state)) return showNotice("lost");
     if (noDevice) return showNotice("no device");
     if (!this.device || this.link.state === "connecting") return showNotice("connecting");
+    if (!this.view.hasPicture) return showNotice("no WebGL");
     const loading = !byId("drop-panel").hidden; // its picture is under the notice
     showNotice(
       loading ||

@@ -1,7 +1,7 @@
 // Notices over the view while there is nothing to see, and the texts of the server as toasts.
 import { byId, el, setText } from "./panels/dom";
 
-export type Notice = "connecting" | "lost" | "no device" | "empty" | "";
+export type Notice = "connecting" | "lost" | "no device" | "no WebGL" | "empty" | "";
 
 const TEXTS: Record<Exclude<Notice, "">, [title: string, text: string]> = {
   connecting: ["Connecting …", "Waiting for the server."],
@@ -12,6 +12,10 @@ const TEXTS: Record<Exclude<Notice, "">, [title: string, text: string]> = {
   "no device": [
     "No device",
     "The server has no device. Start it with one, for example “hapticd serve --device simulated”.",
+  ],
+  "no WebGL": [
+    "No 3D view",
+    "This browser offers no WebGL 2. Turn on hardware acceleration in its settings, update the graphics driver, or use another browser. STOP and everything else on this page work without it.",
   ],
   empty: [
     "The scene is empty",

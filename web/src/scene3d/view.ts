@@ -45,10 +45,12 @@ export class View {
   private readonly live = new Scene();
   private readonly liveLight = new DirectionalLight(0xffffff, 2.2);
   private readonly camera = new PerspectiveCamera(35, 1, 1, 1000);
-  private readonly renderer: WebGLRenderer;
+  /** False where the browser has no WebGL: then nothing is drawn, and the rest of the page works. */
+  readonly hasPicture: boolean;
+  private readonly renderer!: WebGLRenderer;
   private readonly controls: OrbitControls;
   private readonly raycaster = new Raycaster();
-  private readonly still: Still;
+  private readonly still!: Still;
   /** Then every pixel costs: only those that change are drawn, and what moves is drawn without a copy. */
   private readonly software = drawsInSoftware();
   /** What rests has changed since it was drawn. */
@@ -70,9 +72,14 @@ export class View {
 
   constructor(readonly canvas: HTMLCanvasElement) {
     this.slow = this.software;
-    this.renderer = new WebGLRenderer({ canvas, antialias: !this.software, preserveDrawingBuffer: this.software });
-    this.still = new Still(this.renderer, this.software ? 0 : 4);
-    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, MOST_PIXELS_PER_POINT));
+    try {
+      this.renderer = new WebGLRenderer({ canvas, antialias: !this.software, preserveDrawingBuffer: this.software });
+      this.still = new Still(this.renderer, this.software ? 0 : 4);
+      this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, MOST_PIXELS_PER_POINT));
+    } catch (error) {
+      console.warn(`no picture: ${String(error)}`);
+    }
+    this.hasPicture = this.still !== undefined;
     this.objects = new Objects(new Color("#ff7a1a"));
     this.scene.add(this.objects.group, this.sources.group, this.camera);
     this.live.add(this.markers.group, this.sources.live, this.liveLight, new HemisphereLight(0xffffff, 0x606878, 1.1));
@@ -210,6 +217,7 @@ export class View {
   }
 
   draw(): void {
+    if (!this.hasPicture) return;
     const now_ms = performance.now();
     const moving = now_ms - this.movedAt_ms < SETTLE_MS;
     if (moving && this.stillDirty && now_ms - this.drawnAt_ms > SLOW_MS && this.wasMoving) this.slow = true;
@@ -288,7 +296,7 @@ export class View {
   private resize(): void {
     const { clientWidth: width, clientHeight: height } = this.canvas.parentElement!;
     if (width === 0 || height === 0) return;
-    this.renderer.setSize(width, height, false);
+    if (this.hasPicture) this.renderer.setSize(width, height, false);
     this.at = this.canvas.getBoundingClientRect();
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
