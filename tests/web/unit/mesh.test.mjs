@@ -8,6 +8,7 @@ import { bundled, sourceDir } from "../bundled.mjs";
 const { weld } = await bundled("mesh/weld.ts");
 const { readMesh } = await bundled("mesh/read_file.ts");
 const { decodeMesh } = await bundled("state.ts");
+const { smoothGeometry } = await bundled("scene3d/creases.ts");
 const { Objects } = await bundled("scene3d/objects.ts");
 const { Color, Matrix4, Ray, Vector3 } = await bundled("../node_modules/three/build/three.module.js");
 
@@ -206,4 +207,20 @@ test("an object whose display mesh has no triangles is never hit", () => {
   objects.setMesh(0, { positions: new Float32Array(0), triangles: new Uint32Array(0) });
   objects.update([stateOf(0, new Matrix4())], "stiffness");
   assert.equal(objects.distance(new Ray(new Vector3(0, 0, 5), new Vector3(0, 0, -1))), Infinity);
+});
+
+test("triangles without area or with an infinite corner share the vertices of their neighbours", () => {
+  // A fan of collinear triangles about vertex 0, one with an area, one that is not finite.
+  const fan = 2000;
+  const positions = new Float32Array(3 * (fan + 4));
+  for (let v = 1; v <= fan + 1; ++v) positions[3 * v] = v;
+  positions[3 * (fan + 2) + 1] = 1;
+  positions[3 * (fan + 3) + 1] = Infinity;
+  const triangles = [0, 1, fan + 2, 0, 1, fan + 3];
+  for (let v = 1; v <= fan; ++v) triangles.push(0, v, v + 1);
+  for (const list of [triangles, triangles.toReversed()]) {
+    const geometry = smoothGeometry({ positions, triangles: Uint32Array.from(list) });
+    assert.equal(geometry.index.count, list.length);
+    assert.ok(geometry.getAttribute("position").count <= fan + 4 + 3, `${geometry.getAttribute("position").count} vertices`);
+  }
 });

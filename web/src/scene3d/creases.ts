@@ -44,8 +44,10 @@ export function smoothGeometry({ positions, triangles }: DisplayMesh): BufferGeo
     for (let k = firstOf[v]!; k < firstOf[v + 1]!; ++k) {
       const corner = cornersOf[k]!;
       const face = Math.floor(corner / 3);
-      let group = leaders.findIndex((leader) => dot(leader, face) > CREASE_COS);
-      if (group < 0) {
+      // A face without a normal would join no group: each would begin one, and all would be compared with all. The normals of
+      // the others differ by more than the crease, so that a vertex has some tens of groups at most.
+      let group = dot(face, face) > CREASE_COS ? leaders.findIndex((leader) => dot(leader, face) > CREASE_COS) : 0;
+      if (group < 0 || leaders.length === 0) {
         group = leaders.length;
         leaders.push(face);
         ids.push(points.length / 3);
