@@ -141,7 +141,7 @@ export class DropMesh {
 
   private async send(name: string, mesh: FileMesh, placing: Placing, channel: Channel, device?: string): Promise<void> {
     const objects = this.context.objects();
-    const placement = placing.placement(this.targets.next(objects));
+    const placement = placing.placement(this.targets.next(objects), objects);
     const sent = this.targets.begin(placement.object, name, objects);
     this.sending = name;
     this.bar.value = 0;

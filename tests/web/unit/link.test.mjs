@@ -187,7 +187,7 @@ const placement = {
   object: 1,
   name: "part.stl",
   isNew: true,
-  T_world_mesh: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
+  matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
   surface: [],
 };
 

@@ -9,6 +9,7 @@ const { weld } = await bundled("mesh/weld.ts");
 const { readMesh } = await bundled("mesh/read_file.ts");
 const { decodeMesh } = await bundled("state.ts");
 const { smoothGeometry } = await bundled("scene3d/creases.ts");
+const { matrixPlacing } = await bundled("panels/pose.ts");
 const { Objects } = await bundled("scene3d/objects.ts");
 const { Color, Matrix4, Ray, Vector3 } = await bundled("../node_modules/three/build/three.module.js");
 
@@ -222,5 +223,36 @@ test("triangles without area or with an infinite corner share the vertices of th
     const geometry = smoothGeometry({ positions, triangles: Uint32Array.from(list) });
     assert.equal(geometry.index.count, list.length);
     assert.ok(geometry.getAttribute("position").count <= fan + 4 + 3, `${geometry.getAttribute("position").count} vertices`);
+  }
+});
+
+test("a mesh that replaces an object in metres, below a parent, appears where it was placed", () => {
+  const place = (x, y, z, scale) => new Matrix4().makeRotationY(0.7).scale(new Vector3(scale, scale, scale)).setPosition(x, y, z);
+  const state = (id, parent, units, T_world_object, T_object_mesh = new Matrix4()) => ({
+    id,
+    parent,
+    world_units: units,
+    T_world_object: T_world_object.toArray(),
+    T_object_mesh: T_object_mesh.toArray(),
+  });
+  // As the server: the translation in units of the object, which scale it last; then the part of the mesh.
+  const frameBy = (matrix, o) => {
+    const frame = matrix.clone();
+    return frame.setPosition(new Vector3().setFromMatrixPosition(matrix).multiplyScalar(o.world_units));
+  };
+  const inUnits = (o) => new Matrix4().makeScale(o.world_units, o.world_units, o.world_units);
+  const parentFrame = place(5, -7, 40, 2);
+  const wanted = place(10, 20, 30, 0.5);
+  for (const parentUnits of [1, 1000]) {
+    for (const units of [1, 1000]) {
+      const parent = state(0, -1, parentUnits, parentFrame.clone().multiply(inUnits({ world_units: parentUnits })));
+      const child = state(1, 0, units, new Matrix4(), place(1, 2, 3, 4));
+      const single = state(2, -1, units, new Matrix4());
+      for (const [o, above] of [[child, parentFrame], [single, new Matrix4()]]) {
+        const frame = above.clone().multiply(frameBy(matrixPlacing(wanted, o, [parent, child, single]), o));
+        const T_world_mesh = frame.multiply(inUnits(o)).multiply(new Matrix4().fromArray(o.T_object_mesh));
+        T_world_mesh.elements.forEach((x, i) => assert.ok(Math.abs(x - wanted.elements[i]) < 1e-9, `${T_world_mesh.elements}`));
+      }
+    }
   }
 });

@@ -13,6 +13,7 @@ import {
 } from "three";
 import type { DeviceState, ObjectState } from "../state_types";
 import { countText, el } from "../panels/dom";
+import { matrixPlacing } from "../panels/pose";
 import { SurfaceForm } from "../panels/surface";
 import type { View } from "../scene3d/view";
 import type { Placement } from "./upload";
@@ -91,12 +92,14 @@ export class Placing {
   }
 
   /** Where it goes; a new object is the next one at the time of sending. */
-  placement(next: { object: number; isNew: boolean }): Placement {
+  placement(next: { object: number; isNew: boolean }, objects: ObjectState[]): Placement {
     const to = this.target.value === NEW_OBJECT ? next : { object: Number(this.target.value), isNew: false };
+    const present = objects.find((o) => o.id === to.object);
+    const T_world_mesh = this.matrix();
     return {
       ...to,
       name: this.name,
-      T_world_mesh: this.matrix().toArray(),
+      matrix: (present ? matrixPlacing(T_world_mesh, present, objects) : T_world_mesh).toArray(),
       surface: this.surface.values(),
     };
   }

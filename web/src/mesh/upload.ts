@@ -11,7 +11,8 @@ export interface Placement {
   name: string;
   /** The object does not exist yet: the scene must first grow to hold it. */
   isNew: boolean;
-  T_world_mesh: number[];
+  /** As setTransformMatrix() takes it: below the parent, in units of the object. */
+  matrix: number[];
   surface: [wire.SurfaceProperty, number][];
 }
 
@@ -38,7 +39,7 @@ export async function upload(
   };
   send(wire.batchBegin(), ...(to.isNew ? [wire.setObjectNumber(object + 1)] : [wire.clearTrimesh(object)]));
   send(wire.setObjectName(object, to.name));
-  send(wire.setTransformMatrix(object, to.T_world_mesh), wire.setObjectIsTouchable(object, true));
+  send(wire.setTransformMatrix(object, to.matrix), wire.setObjectIsTouchable(object, true));
   for (const [property, value] of to.surface) send(wire.setHapticProperty(object, property, value));
   const step = 3 * wire.MOST_IN_ONE_MESSAGE;
   const all = mesh.positions.length + mesh.triangles.length;

@@ -10,9 +10,15 @@ const tidy = (x: number): string => String(Number(x.toPrecision(5)) + 0);
 export function localMatrix(T_world_object: Matrix4, parent: Matrix4 | undefined, worldUnits: number): Matrix4 {
   const local = parent ? parent.clone().invert().multiply(T_world_object) : T_world_object.clone();
   // The server's matrix takes object units to world units: a client sends it without this factor.
-  local.multiply(new Matrix4().makeScale(1 / worldUnits, 1 / worldUnits, 1 / worldUnits));
+  local.multiply(shrunk(worldUnits));
   const at = new Vector3().setFromMatrixPosition(local).divideScalar(worldUnits);
   return local.setPosition(at);
+}
+
+/** The matrix of an object of the scene that brings its mesh to this place in the world. */
+export function matrixPlacing(T_world_mesh: Matrix4, o: ObjectState, objects: ObjectState[]): Matrix4 {
+  const T_world_object = T_world_mesh.clone().multiply(new Matrix4().fromArray(o.T_object_mesh).invert());
+  return localMatrix(T_world_object, parentFrame(o, objects), o.world_units);
 }
 
 export class PoseForm {
@@ -43,10 +49,8 @@ export class PoseForm {
   /** Shows the placement, unless a field is being edited. */
   update(o: ObjectState, objects: ObjectState[]): void {
     if (this.root.contains(document.activeElement) && this.object) return;
-    const parent = objects.find((p) => p.id === o.parent);
     this.object = o;
-    // Below a parent, positions are in the parent's units of the world.
-    this.parent = parent && new Matrix4().fromArray(parent.T_world_object).multiply(shrunk(parent.world_units));
+    this.parent = parentFrame(o, objects);
     this.centre = this.centreOf(o.id).applyMatrix4(new Matrix4().fromArray(o.T_object_mesh));
     const T = new Matrix4().fromArray(o.T_world_object);
     const { rotation, size } = partsOf(T, o.world_units);
@@ -77,6 +81,12 @@ export class PoseForm {
 
 const shrunk = (worldUnits: number): Matrix4 =>
   new Matrix4().makeScale(1 / worldUnits, 1 / worldUnits, 1 / worldUnits);
+
+/** Below a parent, positions are in the parent's units of the world. */
+function parentFrame(o: ObjectState, objects: ObjectState[]): Matrix4 | undefined {
+  const parent = objects.find((p) => p.id === o.parent);
+  return parent && new Matrix4().fromArray(parent.T_world_object).multiply(shrunk(parent.world_units));
+}
 
 function partsOf(T: Matrix4, worldUnits: number): { rotation: Quaternion; stretch: Vector3; size: number } {
   const rotation = new Quaternion();
