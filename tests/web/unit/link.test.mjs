@@ -235,6 +235,18 @@ test("an upload goes to the device that was chosen when it began", async () => {
   assert.ok(socket.received.includes("Arm hapticd Batch_Commit"));
 });
 
+test("an upload first clears its object: another page may have sent a mesh to the same new one", async () => {
+  const small = { positions: new Float32Array(9), triangles: Uint32Array.of(0, 1, 2) };
+  for (const isNew of [true, false]) {
+    Socket.all = [];
+    const { link, socket } = connected();
+    await upload(link.channel(), small, { ...placement, isNew }, () => undefined);
+    const at = (name) => socket.received.findIndex((each) => each.endsWith(name));
+    assert.ok(at("Batch_Begin") < at("clearTrimesh"), `${socket.received}`);
+    assert.ok(at("setObjectNumber") < at("clearTrimesh") && at("clearTrimesh") < at("Mesh_Vertices"), `${socket.received}`);
+  }
+});
+
 test("a file with a long name leaves no open batch", async () => {
   const { link, socket } = connected();
   const small = { positions: new Float32Array(9), triangles: Uint32Array.of(0, 1, 2) };

@@ -37,7 +37,8 @@ export async function upload(
       await pause(every_ms);
     }
   };
-  send(wire.batchBegin(), ...(to.isNew ? [wire.setObjectNumber(object + 1)] : [wire.clearTrimesh(object)]));
+  // Another page may have sent a mesh to the same new object meanwhile: two meshes would become one.
+  send(wire.batchBegin(), ...(to.isNew ? [wire.setObjectNumber(object + 1)] : []), wire.clearTrimesh(object));
   send(wire.setObjectName(object, to.name));
   send(wire.setTransformMatrix(object, to.matrix), wire.setObjectIsTouchable(object, true));
   for (const [property, value] of to.surface) send(wire.setHapticProperty(object, property, value));
