@@ -3,6 +3,7 @@
 // the keyboard moves the HIP, too.
 import { Vector3 } from "three";
 import { routeAround, type Surroundings } from "./route";
+import { REFUSAL } from "./server_tables";
 import { holdHand, type Outgoing } from "./wire";
 import type { View } from "./scene3d/view";
 
@@ -26,6 +27,12 @@ const KEY_MM = 2;
 const REFRESH_MS = 200;
 const LEG_TIMEOUT_MS = 900;
 const IDLE_MS = 60_000;
+
+const REFUSALS: readonly number[] = [REFUSAL.handNotSimulated, REFUSAL.handHeldByOther, REFUSAL.handPoseInvalid];
+
+/** Whether a text of the server refuses the hand to this page. Every kind of command may be not permitted: the text names it. */
+export const refusesHand = (level: number, text: string): boolean =>
+  REFUSALS.includes(level) || (level === REFUSAL.notPermitted && text.includes("Hold_Hand refused"));
 
 export class Hand {
   mode: DragMode = "surface";

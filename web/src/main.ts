@@ -3,7 +3,7 @@ import { Box3, Matrix4, Ray, Vector3 } from "three";
 import "uplot/dist/uPlot.min.css";
 import "./viewer.css";
 import { DropMesh } from "./drop_mesh";
-import { type DragMode, Hand, type HandContext } from "./hand";
+import { type DragMode, Hand, type HandContext, refusesHand } from "./hand";
 import { Link } from "./link";
 import { LivePlots } from "./live_plots";
 import { showNotice, toast } from "./notice";
@@ -18,7 +18,7 @@ import { SourcesPanel } from "./panels/sources";
 import { css } from "./plots/plot";
 import { type Quantity, rampCss, rangeOf } from "./scene3d/colours";
 import { View } from "./scene3d/view";
-import { REFUSAL, TRIPS } from "./server_tables";
+import { TRIPS } from "./server_tables";
 import { pollServers } from "./servers";
 import { Meshes, pollState } from "./state";
 import type { DeviceState, ObjectState, SceneState, ServerState } from "./state_types";
@@ -28,13 +28,6 @@ import { bindToken, credentials } from "./token";
 import * as wire from "./wire";
 
 const REPORTS_HZ = 125;
-/** Refusals after which this page does not hold the simulated hand. */
-const HAND_REFUSALS: readonly number[] = [
-  REFUSAL.notPermitted,
-  REFUSAL.handNotSimulated,
-  REFUSAL.handHeldByOther,
-  REFUSAL.handPoseInvalid,
-];
 const READOUT_MS = 80;
 
 class Page {
@@ -368,7 +361,7 @@ class Page {
   }
 
   private onText({ severity, level, text }: wire.ServerText): void {
-    if (HAND_REFUSALS.includes(level)) this.hand.onLost();
+    if (refusesHand(level, text)) this.hand.onLost();
     toast(text, severity);
   }
 

@@ -4,6 +4,7 @@ import { afterEach, mock, test } from "node:test";
 import { bundled } from "../bundled.mjs";
 
 const { Link } = await bundled("link.ts");
+const { refusesHand } = await bundled("hand.ts");
 const { upload } = await bundled("mesh/upload.ts");
 const { credentials } = await bundled("token.ts");
 const { Endpoint, stopForces, startEffect } = await bundled("wire/index.ts");
@@ -265,4 +266,12 @@ test("a token that cannot be one keeps no page from connecting", () => {
   assert.equal(link.state, "open");
   stored.set("hapticd token", "0123456789abcdef");
   assert.deepEqual(credentials().map((m) => m.name), ["hapticd Identify"]);
+});
+
+test("only a refusal of the hand makes the page forget the hand it holds", () => {
+  assert.ok(refusesHand(1, "hapticd Hold_Hand refused: this client may only observe"));
+  assert.ok(refusesHand(3, "Hold_Hand refused: client 4 holds the hand"));
+  assert.ok(!refusesHand(1, "vrpn_ForceDevice setHapticProperty refused: this client may only observe"));
+  assert.ok(!refusesHand(7, "Rearm_Forces refused: client 4 stopped the forces; it may re-arm"));
+  assert.ok(!refusesHand(0, "recording to session.haptics"));
 });
