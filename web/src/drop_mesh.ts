@@ -25,8 +25,8 @@ export class DropMesh {
   private readonly bar = el("progress", { max: 1, value: 0, hidden: true });
   private placing: Placing | undefined;
   private readonly targets = new Targets();
-  /** The newest choice of a file: one that is still being read is given up for it. */
-  private choice = 0;
+  /** Of the newest choice of a file: one that is still being read is given up for it. */
+  private choice = new AbortController();
   /** Ends with the upload that was asked for last. */
   private uploads: Promise<void> = Promise.resolve();
   /** The mesh that is being sent; empty: none. */
@@ -73,19 +73,26 @@ export class DropMesh {
     this.panel.hidden = false;
     if (!device) return this.show("No device is connected yet: try again in a moment.", "bad");
     this.placing?.end();
-    const choice = ++this.choice;
+    const choice = this.choose();
     this.show(`Reading ${files[0]!.name} …`);
     await new Promise((resolve) => setTimeout(resolve, 30)); // lets the browser show the text first
+    if (choice.aborted) return;
     try {
-      const { name, mesh } = await readMeshBeside(files);
-      if (choice !== this.choice) return;
+      const { name, mesh } = await readMeshBeside(files, choice);
+      if (choice.aborted) return;
       this.place(name, mesh, device);
       const others = files.filter((f) => f.name !== name && isMeshFile(f.name));
       if (others.length > 0)
         this.show(`One file at a time: ${others.map((f) => f.name).join(", ")} not loaded.`, "bad");
     } catch (error) {
-      if (choice === this.choice) this.show((error as Error).message, "bad");
+      if (!choice.aborted) this.show((error as Error).message, "bad");
     }
+  }
+
+  private choose(): AbortSignal {
+    this.choice.abort();
+    this.choice = new AbortController();
+    return this.choice.signal;
   }
 
   /** The mesh that every server brings along, at its usual place. */
@@ -94,15 +101,15 @@ export class DropMesh {
     if (!device) return;
     this.panel.hidden = false;
     this.placing?.end();
-    const choice = ++this.choice;
+    const choice = this.choose();
     try {
       const response = await fetch("bunny.obj");
       if (!response.ok) throw new Error(`the server has no bunny (status ${response.status})`);
-      const { mesh } = await readMeshBeside([new File([await response.blob()], "bunny.obj")]);
-      if (choice !== this.choice) return;
+      const { mesh } = await readMeshBeside([new File([await response.blob()], "bunny.obj")], choice);
+      if (choice.aborted) return;
       this.load("bunny.obj", mesh, this.newPlacing("bunny.obj", mesh, device));
     } catch (error) {
-      if (choice === this.choice) this.show((error as Error).message, "bad");
+      if (!choice.aborted) this.show((error as Error).message, "bad");
     }
   }
 

@@ -9,6 +9,7 @@ const { weld } = await bundled("mesh/weld.ts");
 const { readMesh } = await bundled("mesh/read_file.ts");
 const { decodeMesh } = await bundled("state.ts");
 const { smoothGeometry } = await bundled("scene3d/creases.ts");
+const { readMeshBeside } = await bundled("mesh/read_beside.ts");
 const { matrixPlacing } = await bundled("panels/pose.ts");
 const { Objects } = await bundled("scene3d/objects.ts");
 const { Color, Matrix4, Ray, Vector3 } = await bundled("../node_modules/three/build/three.module.js");
@@ -255,4 +256,28 @@ test("a mesh that replaces an object in metres, below a parent, appears where it
       }
     }
   }
+});
+
+test("a PLY file with more entries than bytes is refused at once", { timeout: 20_000 }, async () => {
+  const ply = (format, element) =>
+    file("huge.ply", `ply\nformat ${format} 1.0\n${element}element face 0\nproperty list uchar int vertex_indices\nend_header\n`);
+  for (const format of ["ascii", "binary_little_endian"])
+    for (const element of ["element nothing 60000000\n", "element vertex 60000000\nproperty float x\n"])
+      await assert.rejects(readMesh([ply(format, element)]), /60000000 entries of "\w+" do not fit into \d+ bytes/);
+});
+
+test("a file that is given up ends its worker", async () => {
+  const ended = [];
+  globalThis.Worker = class {
+    postMessage() {}
+    terminate() {
+      ended.push(this);
+    }
+  };
+  const choice = new AbortController();
+  const reading = readMeshBeside([file("one.obj", "")], choice.signal);
+  assert.equal(ended.length, 0);
+  choice.abort();
+  await assert.rejects(reading, /another file was chosen/);
+  assert.equal(ended.length, 1);
 });

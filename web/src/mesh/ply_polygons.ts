@@ -20,11 +20,14 @@ interface Element {
   properties: Property[];
 }
 
-/** Number of faces with more than four corners. Throws RangeError where the file is too short. */
+/** Number of faces with more than four corners. Throws RangeError where the file is too short, Error for an impossible count. */
 export function largePolygons(file: ArrayBuffer): number {
   const bytes = new Uint8Array(file);
   const { format, elements, end } = headerOf(bytes);
   const next = format === "ascii" ? asciiReader(bytes, end) : binaryReader(file, end, format.includes("little"));
+  // Without properties, or beyond the end of the file, a loop over the entries would run for minutes, three's as well.
+  for (const { name, count } of elements)
+    if (count > bytes.length) throw new Error(`${count} entries of "${name}" do not fit into ${bytes.length} bytes`);
   let large = 0;
   for (const { name, count, properties } of elements) {
     for (let i = 0; i < count; ++i) {

@@ -41,12 +41,12 @@ async function cornersOf(file: File, files: File[]): Promise<Float32Array> {
     case "stl":
       return cornersIn(new Mesh(new STLLoader().parse(bytes)));
     case "ply": {
-      const geometry = new PLYLoader().parse(bytes);
-      const large = largePolygons(bytes);
+      const large = largePolygons(bytes); // first: it refuses counts that three's loader would count up to
       if (large > 0)
         throw new Error(
           `${large} of its faces have more than 4 corners: split them into triangles first, or load the file with 'hapticd touch'`,
         );
+      const geometry = new PLYLoader().parse(bytes);
       // Without faces it is a point cloud, not a list of corners.
       return geometry.index ? cornersIn(new Mesh(geometry)) : new Float32Array(0);
     }
