@@ -85,12 +85,16 @@ function gltf(uri) {
 test("OBJ, STL, PLY and glTF give the same square; images of a glTF are not fetched", async () => {
   const { text } = gltf();
   const beside = gltf("data/square.bin");
+  const percent = gltf("data/50%.bin");
+  const escaped = gltf("data/50%25.bin");
   const sets = [
     [file("a.obj", OBJ)],
     [file("a.STL", STL)],
     [file("a.ply", PLY)],
     [file("a.gltf", text)],
     [file("a.gltf", beside.text), file("square.bin", beside.bytes)],
+    [file("a.gltf", escaped.text), file("50%.bin", escaped.bytes)],
+    [file("a.gltf", percent.text), file("50%.bin", percent.bytes)],
   ];
   for (const files of sets) {
     const { mesh } = await readMesh(files);

@@ -70,10 +70,19 @@ async function bufferOf(
   }
   if (uri.startsWith("data:"))
     return Uint8Array.from(atob(uri.slice(uri.indexOf(",") + 1)), (c) => c.charCodeAt(0));
-  const name = decodeURIComponent(uri.split("/").at(-1)!);
+  const name = decoded(uri.split("/").at(-1)!);
   const file = beside(name);
   if (!file) throw new Error(`needs ${name}: drop both files together`);
   return new Uint8Array(await file);
+}
+
+/** Exporters leave a percent sign of a file name as it is, too: "50%.bin". */
+function decoded(name: string): string {
+  try {
+    return decodeURIComponent(name);
+  } catch {
+    return name;
+  }
 }
 
 const to4 = (bytes: number): number => (bytes + 3) & ~3;
