@@ -609,6 +609,23 @@ test("accessible on a phone, a laptop and a projector, light and dark", async ()
   await viewer.page.setViewportSize(size);
 });
 
+test("the picture is drawn anew after the graphics card was reset", async () => {
+  const dirty = await viewer.ask(`(async () => {
+    const { view } = viewer;
+    const event = (name) => new Promise((resolve) => view.canvas.addEventListener(name, resolve, { once: true }));
+    const context = view.renderer.getContext().getExtension("WEBGL_lose_context");
+    const lost = event("webglcontextlost");
+    context.loseContext();
+    await lost;
+    await new Promise((resolve) => setTimeout(resolve, 500));
+    const restored = new Promise((resolve) =>
+      view.canvas.addEventListener("webglcontextrestored", () => resolve(view.stillDirty), { once: true }));
+    context.restoreContext();
+    return restored;
+  })()`);
+  assert.equal(dirty, true);
+});
+
 test("without WebGL the page names the remedy, and STOP works", async () => {
   const page = await browser.context.newPage();
   await page.addInitScript(() => {

@@ -90,6 +90,8 @@ export class View {
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.addEventListener("change", () => this.moved());
     this.handOnLeft(true);
+    // After a reset of the graphics card; three restores the rest.
+    canvas.addEventListener("webglcontextrestored", () => this.invalidate());
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement!);
     document.addEventListener("scroll", () => (this.at = canvas.getBoundingClientRect()), {
       capture: true,
