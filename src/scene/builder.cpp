@@ -100,6 +100,7 @@ class SceneBuilder::State {
     description.revision = revision_;
     description.workspace = workspace_;
     description.faces = faces_;
+    description.contactVibrationUnit = config_.contactVibrationUnit;
     objects_.describe(description);
     forces_.describe(description);
     return description;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "geometry/triangle_mesh.h"
+#include "scene/config.h"
 #include "scene/effect.h"
 #include "scene/force_field.h"
 #include "scene/plane.h"
@@ -48,6 +49,7 @@ struct SceneDescription {
   std::uint64_t revision = 0;
   Workspace workspace;
   TouchableFaces faces = TouchableFaces::both;
+  VibrationUnit contactVibrationUnit = VibrationUnit::radPerSecond;  ///< in which clients send it
   std::vector<ObjectDescription> objects;  ///< by ascending id
   std::vector<EffectDescription> effects;  ///< by ascending index, also those that do not run
   std::vector<Plane> planes;

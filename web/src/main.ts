@@ -205,7 +205,7 @@ class Page {
     this.view.setDevice(device);
     this.guard.update(device, this.recentTrips());
     this.clients.update(state.clients);
-    this.effects.update(this.scene?.effects ?? []);
+    this.effects.update(this.scene?.effects ?? [], this.scene?.vibration_contact_unit ?? "rad/s");
     this.plots.state(device, performance.now() / 1000);
     this.sourcesPanel.update(this.scene, this.remote);
     if (this.view.sources.update(this.scene)) this.view.invalidate();

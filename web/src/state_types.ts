@@ -72,6 +72,8 @@ export interface ObjectState {
   mass_kg: number;
 }
 
+export type VibrationUnit = "rad/s" | "Hz";
+
 export interface EffectState {
   index: number;
   type: string;
@@ -129,6 +131,8 @@ export interface SceneState {
   devices: string[];
   revision: number;
   objects: ObjectState[];
+  /** In which setEffect() takes the frequency of a vibrationContact. */
+  vibration_contact_unit: VibrationUnit;
   effects: EffectState[];
   planes: PlaneState[];
   constraint: ConstraintState | null;

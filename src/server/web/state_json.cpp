@@ -189,6 +189,8 @@ Json json(const SceneReport& report, const std::vector<std::string>& devices) {
   return {{"devices", devices},
           {"revision", scene.revision},
           {"objects", std::move(objects)},
+          {"vibration_contact_unit",
+           scene.contactVibrationUnit == scene::VibrationUnit::hertz ? "Hz" : "rad/s"},
           {"effects", jsonList(scene.effects)},
           {"planes", jsonList(scene.planes)},
           {"constraint", json(scene.constraint)},

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "scene/builder.h"
 #include "server/web/state_report.h"
 
 namespace hapticd::server {
@@ -18,6 +19,27 @@ TEST(StateJson, NamesOfAnyBytesGiveValidJson) {
   const json state = json::parse(stateJson(report));
   EXPECT_EQ(state["devices"][0]["fault"], "\"\n");
   EXPECT_EQ(state["devices"][0]["name"], "\uFFFD\uFFFD \x01");
+}
+
+json emptySceneWith(const scene::SceneConfig& config) {
+  const auto description =
+      std::make_shared<const scene::SceneDescription>(scene::SceneBuilder(config).describe());
+  const std::size_t objects = description->objects.size();
+  StateReport report;
+  report.server.scenes = {{"Arm"}};
+  report.scenes = {
+      {std::make_shared<const ObservedScene>(ObservedScene{description, std::vector<std::uint64_t>(objects)}),
+       std::vector<std::size_t>(objects)}};
+  return json::parse(stateJson(report))["scenes"][0];
+}
+
+TEST(StateJson, NamesTheUnitInWhichAContactVibrationIsSent) {
+  for (const auto& [unit, name] :
+       {std::pair{scene::VibrationUnit::radPerSecond, "rad/s"}, {scene::VibrationUnit::hertz, "Hz"}}) {
+    scene::SceneConfig config;
+    config.contactVibrationUnit = unit;
+    EXPECT_EQ(emptySceneWith(config)["vibration_contact_unit"], name);
+  }
 }
 
 TEST(Faults, NameEveryDeviceThatDoesNotWork) {

@@ -156,6 +156,7 @@ TEST_F(Web, TheStateHasEveryFieldThePageReads) {
        {"damping_Ns_per_m", "static_friction", "dynamic_friction", "popthrough", "mass_kg"}) {
     EXPECT_EQ(object[name], 0) << name;
   }
+  EXPECT_EQ(scene["vibration_contact_unit"], "rad/s");
   const json& effect = scene["effects"].at(0);
   EXPECT_EQ(effect["index"], 3);
   EXPECT_EQ(effect["type"], "spring");

@@ -7,6 +7,8 @@ const { constraintForce, feltForces, fieldForce } = await bundled("sources.ts");
 const { coarse, smoothGeometry } = await bundled("scene3d/creases.ts");
 const { usualEnd, centres } = await bundled("plots/counts.ts");
 
+const { effectOf, onWire } = await bundled("panels/effects.ts");
+
 const near = (a, b) => a.every((x, i) => Math.abs(x - b[i]) < 1e-9);
 
 test("a field pushes inside its radius only", () => {
@@ -105,4 +107,14 @@ test("a single peak does not set the scale, a lasting one does", () => {
 
 test("bins are drawn at their centres", () => {
   assert.deepEqual(centres([1000, 1010, 4000]), [1005, (1010 + 1.125 * 1010) / 2, 4250]);
+});
+
+test("an effect that is edited keeps its frequency, in whichever unit the server takes it", () => {
+  const state = (type, frequency_Hz) => ({
+    type, index: 0, active: true, magnitude_N: 1, gain: 0, duration_ms: 0, frequency_Hz, position: [0, 0, 0], direction: [0, 1, 0],
+  });
+  const sent = (type, frequency_Hz, unit) => onWire(effectOf(state(type, frequency_Hz)), unit).frequency;
+  assert.ok(Math.abs(sent("vibrationContact", 400 / (2 * Math.PI), "rad/s") - 400) < 1e-9);
+  assert.equal(sent("vibrationContact", 60, "Hz"), 60);
+  assert.equal(sent("vibrationMotor", 60, "rad/s"), 60);
 });

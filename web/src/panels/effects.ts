@@ -1,19 +1,19 @@
 // Force effects: starts, stops and edits defined ones, defines new ones, hides stopped ones.
 import { type Effect, type Outgoing, setEffect, startEffect, stopEffect, type Vec3 } from "../wire";
-import type { EffectState } from "../state_types";
+import type { EffectState, VibrationUnit } from "../state_types";
 import { el, Rows, setText } from "./dom";
 import { Switch } from "./switch";
 
 type Send = (...messages: Outgoing[]) => void;
 
-/** Parameters of a new effect of each type; gains in N/mm and N per mm/s of the device. */
+/** Parameters of a new effect of each type; gains in N/mm and N per mm/s of the device, frequencies in Hz. */
 const NEW: Record<string, { label: string; effect: Partial<Effect> }> = {
   constant: { label: "Constant, 1 N up", effect: { magnitude_N: 1, direction: [0, 1, 0] } },
   spring: { label: "Spring to the origin", effect: { gain: 0.05, magnitude_N: 2 } },
   viscous: { label: "Viscous", effect: { gain: 0.003, magnitude_N: 2 } },
   friction: { label: "Friction", effect: { gain: 0.2, magnitude_N: 0.5 } },
   vibrationMotor: { label: "Vibration, 60 Hz", effect: { magnitude_N: 0.5, frequency: 60 } },
-  vibrationContact: { label: "Vibration in contact", effect: { magnitude_N: 0.5, frequency: 400 } },
+  vibrationContact: { label: "Vibration in contact", effect: { magnitude_N: 0.5, frequency: 64 } },
 };
 
 type Parameter = "magnitude_N" | "gain" | "frequency" | "duration_ms" | "position" | "direction";
@@ -34,7 +34,12 @@ const LABELS: Record<Parameter, string> = {
   direction: "Direction",
 };
 
-const effectOf = (e: EffectState): Effect => ({
+/** An effect with its frequency in Hz, as setEffect() takes it. */
+export const onWire = (effect: Effect, unit: VibrationUnit): Effect =>
+  effect.type === "vibrationContact" && unit === "rad/s" ? { ...effect, frequency: 2 * Math.PI * effect.frequency } : effect;
+
+/** With the frequency in Hz. */
+export const effectOf = (e: EffectState): Effect => ({
   type: e.type,
   index: e.index,
   gain: e.gain,
@@ -100,13 +105,14 @@ class EffectRow {
   constructor(
     private state: EffectState,
     send: Send,
+    define: (effect: Effect) => void,
     onRemove: () => void,
   ) {
     const { index } = state;
     this.active = new Switch("on", `Effect ${index} is on`, (on) =>
       send(on ? startEffect(index) : stopEffect(index)),
     );
-    this.form = new EffectForm(state, (effect) => send(setEffect(effect)));
+    this.form = new EffectForm(state, define);
     const remove = el("button", { type: "button", className: "small", ariaLabel: `Remove effect ${index}` }, "Remove");
     remove.addEventListener("click", onRemove);
     const summary = el("summary", {}, "Parameters");
@@ -130,6 +136,7 @@ export class EffectsPanel {
   private readonly list = el("ul", { className: "cards" });
   private readonly rows: Rows<EffectState, EffectRow>;
   private used: number[] = [];
+  private unit: VibrationUnit = "rad/s";
   /** The wire has no call that forgets an effect: a removed one is stopped, hidden, and its index used again. */
   private readonly removed = new Set<number>();
 
@@ -138,10 +145,15 @@ export class EffectsPanel {
       this.list,
       (e) => `${e.index} ${e.type}`,
       (e) =>
-        new EffectRow(e, send, () => {
-          send(stopEffect(e.index));
-          this.removed.add(e.index);
-        }),
+        new EffectRow(
+          e,
+          send,
+          (effect) => send(setEffect(onWire(effect, this.unit))),
+          () => {
+            send(stopEffect(e.index));
+            this.removed.add(e.index);
+          },
+        ),
     );
     const type = el(
       "select",
@@ -152,12 +164,13 @@ export class EffectsPanel {
     add.addEventListener("click", () => {
       const effect = this.newEffect(type.value);
       this.removed.delete(effect.index);
-      send(setEffect(effect), startEffect(effect.index));
+      send(setEffect(onWire(effect, this.unit)), startEffect(effect.index));
     });
     parent.append(this.list, el("div", { className: "row adder" }, type, add));
   }
 
-  update(effects: EffectState[]): void {
+  update(effects: EffectState[], unit: VibrationUnit): void {
+    this.unit = unit;
     for (const e of effects) if (e.active && !this.used.includes(e.index)) this.removed.delete(e.index);
     const shown = effects.filter((e) => e.active || !this.removed.has(e.index));
     this.used = shown.map((e) => e.index);
