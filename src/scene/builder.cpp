@@ -9,6 +9,7 @@
 #include "scene/held_commands.h"
 #include "scene/notice_board.h"
 #include "scene/object_table.h"
+#include "scene/surface_settings.h"
 #include "scene/workspace_fit.h"
 
 namespace hapticd::scene {
@@ -100,6 +101,7 @@ class SceneBuilder::State {
     description.revision = revision_;
     description.workspace = workspace_;
     description.faces = faces_;
+    description.surfaceAtOne = SurfaceSettings::atOne(config_);
     description.contactVibrationUnit = config_.contactVibrationUnit;
     objects_.describe(description);
     forces_.describe(description);

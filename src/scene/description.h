@@ -49,8 +49,9 @@ struct SceneDescription {
   std::uint64_t revision = 0;
   Workspace workspace;
   TouchableFaces faces = TouchableFaces::both;
+  Surface surfaceAtOne;  ///< at 1 of the properties of setHapticProperty
   VibrationUnit contactVibrationUnit = VibrationUnit::radPerSecond;  ///< in which clients send it
-  std::vector<ObjectDescription> objects;  ///< by ascending id
+  std::vector<ObjectDescription> objects;                            ///< by ascending id
   std::vector<EffectDescription> effects;  ///< by ascending index, also those that do not run
   std::vector<Plane> planes;
   std::optional<ConstraintDescription> constraint;

@@ -35,6 +35,16 @@ double clampStock(double value, double max, bool raw, std::string_view what, con
 
 }  // namespace
 
+Surface SurfaceSettings::atOne(const SceneConfig& config) {
+  const bool ofDevice = config.materialScale == MaterialScale::device;
+  return {.stiffness_N_per_m = ofDevice ? config.nominalStiffness_N_per_m : kReferenceStiffness_N_per_m,
+          .damping_Ns_per_m = kReferenceDamping_Ns_per_m,
+          .staticFriction = 1,
+          .dynamicFriction = 1,
+          .popthrough_N = ofDevice ? config.nominalForce_N : kReferenceForce_N,
+          .mass_kg = 1};
+}
+
 int SurfaceSettings::numberOf(std::string_view name) {
   constexpr std::string_view kNames[] = {"stiffness",        "damping",    "static friction",
                                          "dynamic friction", "popthrough", "mass"};
@@ -44,23 +54,20 @@ int SurfaceSettings::numberOf(std::string_view name) {
 
 bool SurfaceSettings::set(const SetSurfaceProperty& command, const SceneConfig& config, const Call& call) {
   constexpr std::string_view kName = "setHapticProperty";
-  const bool ofDevice = config.materialScale == MaterialScale::device;
   struct Row {
     std::string_view name;
     double Surface::*member;
-    double scale;
     double max;
   };
   const double infinity = std::numeric_limits<double>::infinity();
   const double one = config.raw ? infinity : 1.0;
   const Row rows[] = {
-      {"stiffness", &Surface::stiffness_N_per_m,
-       ofDevice ? config.nominalStiffness_N_per_m : kReferenceStiffness_N_per_m, one},
-      {"damping", &Surface::damping_Ns_per_m, kReferenceDamping_Ns_per_m, one},
-      {"static friction", &Surface::staticFriction, 1, one},
-      {"dynamic friction", &Surface::dynamicFriction, 1, one},
-      {"popthrough", &Surface::popthrough_N, ofDevice ? config.nominalForce_N : kReferenceForce_N, one},
-      {"mass", &Surface::mass_kg, 1, infinity},
+      {"stiffness", &Surface::stiffness_N_per_m, one},
+      {"damping", &Surface::damping_Ns_per_m, one},
+      {"static friction", &Surface::staticFriction, one},
+      {"dynamic friction", &Surface::dynamicFriction, one},
+      {"popthrough", &Surface::popthrough_N, one},
+      {"mass", &Surface::mass_kg, infinity},
   };
   const Row* row =
       std::find_if(std::begin(rows), std::end(rows), [&](const Row& r) { return r.name == command.name; });
@@ -83,7 +90,7 @@ bool SurfaceSettings::set(const SetSurfaceProperty& command, const SceneConfig& 
   }
   if (row->member == &Surface::staticFriction) staticGiven_ = true;
   const double before = asked_.*row->member;
-  asked_.*row->member = value * row->scale;
+  asked_.*row->member = value * (atOne(config).*row->member);
   return asked_.*row->member != before;
 }
 

@@ -17,6 +17,8 @@ namespace hapticd::scene {
 /// The requested values in SI, not yet limited against each other: properties arrive one by one in any order.
 class SurfaceSettings {
  public:
+  /// The values at 1 of the properties.
+  static Surface atOne(const SceneConfig& config);
   /// Of the property with this name; -1: there is none.
   static int numberOf(std::string_view name);
   /// One property by its name; answers by notices. False when nothing changed.

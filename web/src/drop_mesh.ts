@@ -9,13 +9,14 @@ import { upload } from "./mesh/upload";
 import type { FileMesh } from "./mesh/weld";
 import { toast } from "./notice";
 import type { View } from "./scene3d/view";
-import type { DeviceState, ObjectState } from "./state_types";
+import type { DeviceState, ObjectState, SurfaceState } from "./state_types";
 
 export interface DropContext {
   link: Link;
   view: View;
   device(): DeviceState | undefined;
   objects(): ObjectState[];
+  surfaceAtOne(): SurfaceState | null | undefined;
 }
 
 export class DropMesh {
@@ -116,7 +117,8 @@ export class DropMesh {
   private newPlacing(name: string, mesh: FileMesh, device: DeviceState): Placing {
     const objects = this.context.objects();
     const { object } = this.targets.next(objects);
-    return (this.placing = new Placing(name, mesh, this.context.view, device, objects, object));
+    const one = this.context.surfaceAtOne();
+    return (this.placing = new Placing(name, mesh, this.context.view, device, objects, object, one));
   }
 
   private place(name: string, mesh: FileMesh, device: DeviceState): void {

@@ -50,7 +50,16 @@ export interface ClientState {
   commands: boolean;
 }
 
-export interface ObjectState {
+/** SI; named as in the state. */
+export interface SurfaceState {
+  stiffness_N_per_m: number;
+  damping_Ns_per_m: number;
+  static_friction: number;
+  dynamic_friction: number;
+  popthrough: number;
+}
+
+export interface ObjectState extends SurfaceState {
   id: number;
   /** A file, as a rule; may be empty. */
   name: string;
@@ -64,11 +73,6 @@ export interface ObjectState {
   display_triangles: number;
   T_world_object: number[];
   T_object_mesh: number[];
-  stiffness_N_per_m: number;
-  damping_Ns_per_m: number;
-  static_friction: number;
-  dynamic_friction: number;
-  popthrough: number;
   mass_kg: number;
 }
 
@@ -131,6 +135,8 @@ export interface SceneState {
   devices: string[];
   revision: number;
   objects: ObjectState[];
+  /** At 1 of setHapticProperty(); null until the scene has replied. */
+  surface_at_1: SurfaceState | null;
   /** In which setEffect() takes the frequency of a vibrationContact. */
   vibration_contact_unit: VibrationUnit;
   effects: EffectState[];

@@ -178,6 +178,14 @@ Json jsonList(const List& list) {
   return out;
 }
 
+Json json(const scene::Surface& surface) {
+  return {{"stiffness_N_per_m", surface.stiffness_N_per_m},
+          {"damping_Ns_per_m", surface.damping_Ns_per_m},
+          {"static_friction", surface.staticFriction},
+          {"dynamic_friction", surface.dynamicFriction},
+          {"popthrough", surface.popthrough_N}};
+}
+
 // Empty until the scene has replied for the first time.
 Json json(const SceneReport& report, const std::vector<std::string>& devices) {
   static const scene::SceneDescription kNothing;
@@ -186,15 +194,16 @@ Json json(const SceneReport& report, const std::vector<std::string>& devices) {
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     objects.push_back(json(scene.objects[i], report.observed->geometry[i], report.displayTriangles[i]));
   }
-  return {{"devices", devices},
-          {"revision", scene.revision},
-          {"objects", std::move(objects)},
-          {"vibration_contact_unit",
-           scene.contactVibrationUnit == scene::VibrationUnit::hertz ? "Hz" : "rad/s"},
-          {"effects", jsonList(scene.effects)},
-          {"planes", jsonList(scene.planes)},
-          {"constraint", json(scene.constraint)},
-          {"fields", jsonList(scene.fields)}};
+  return {
+      {"devices", devices},
+      {"revision", scene.revision},
+      {"objects", std::move(objects)},
+      {"surface_at_1", report.observed ? json(scene.surfaceAtOne) : Json()},
+      {"vibration_contact_unit", scene.contactVibrationUnit == scene::VibrationUnit::hertz ? "Hz" : "rad/s"},
+      {"effects", jsonList(scene.effects)},
+      {"planes", jsonList(scene.planes)},
+      {"constraint", json(scene.constraint)},
+      {"fields", jsonList(scene.fields)}};
 }
 
 Json json(const std::vector<std::pair<double, std::string>>& moments) {

@@ -42,6 +42,21 @@ TEST(StateJson, NamesTheUnitInWhichAContactVibrationIsSent) {
   }
 }
 
+TEST(StateJson, HasTheSurfaceThatOneMeansOnThisDevice) {
+  const json reference = emptySceneWith({})["surface_at_1"];
+  EXPECT_EQ(reference["stiffness_N_per_m"], 500);
+  EXPECT_EQ(reference["popthrough"], 3.3);
+  scene::SceneConfig config;
+  config.materialScale = scene::MaterialScale::device;
+  config.nominalStiffness_N_per_m = 2000;
+  config.nominalForce_N = 8;
+  const json device = emptySceneWith(config)["surface_at_1"];
+  EXPECT_EQ(device["stiffness_N_per_m"], 2000);
+  EXPECT_EQ(device["damping_Ns_per_m"], 2);
+  EXPECT_EQ(device["static_friction"], 1);
+  EXPECT_EQ(device["popthrough"], 8);
+}
+
 TEST(Faults, NameEveryDeviceThatDoesNotWork) {
   ServerStatus status;
   status.devices.resize(3);

@@ -157,6 +157,7 @@ TEST_F(Web, TheStateHasEveryFieldThePageReads) {
     EXPECT_EQ(object[name], 0) << name;
   }
   EXPECT_EQ(scene["vibration_contact_unit"], "rad/s");
+  EXPECT_EQ(scene["surface_at_1"]["stiffness_N_per_m"], 500);
   const json& effect = scene["effects"].at(0);
   EXPECT_EQ(effect["index"], 3);
   EXPECT_EQ(effect["type"], "spring");

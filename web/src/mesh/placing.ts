@@ -11,7 +11,7 @@ import {
   Quaternion,
   Vector3,
 } from "three";
-import type { DeviceState, ObjectState } from "../state_types";
+import type { DeviceState, ObjectState, SurfaceState } from "../state_types";
 import { countText, el } from "../panels/dom";
 import { matrixPlacing } from "../panels/pose";
 import { SurfaceForm } from "../panels/surface";
@@ -46,6 +46,7 @@ export class Placing {
     device: DeviceState,
     objects: ObjectState[],
     next: number,
+    surfaceAtOne: SurfaceState | null | undefined,
   ) {
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new BufferAttribute(mesh.positions, 3));
@@ -71,7 +72,7 @@ export class Placing {
     this.size = numberInput("Largest extent", tidy(scale * this.extent), "0.001");
     this.position = centre.toArray().map((x, i) => numberInput(`Position ${"xyz"[i]!}`, tidy(x)));
     this.rotation = [0, 1, 2].map((i) => numberInput(`Rotation about ${"xyz"[i]!}, degrees`, 0));
-    this.surface.set(NEW_SURFACE);
+    this.surface.set(NEW_SURFACE, surfaceAtOne);
     this.fillTargets(objects, next);
     this.root.append(
       el(

@@ -2,13 +2,19 @@
 import type { Vector3 } from "three";
 import { clearTrimesh, type Outgoing, removeObject, setHapticProperty, setObjectIsTouchable } from "../wire";
 import { colourOfObject } from "../scene3d/colours";
-import type { ObjectState } from "../state_types";
+import type { ObjectState, SurfaceState } from "../state_types";
 import { countText, el, Rows, setText } from "./dom";
 import { PoseForm } from "./pose";
 import { SurfaceForm } from "./surface";
 import { Switch } from "./switch";
 
 type Send = (...messages: Outgoing[]) => void;
+
+interface Item {
+  o: ObjectState;
+  all: ObjectState[];
+  one: SurfaceState | null | undefined;
+}
 
 class ObjectRow {
   readonly root: HTMLElement;
@@ -36,7 +42,7 @@ class ObjectRow {
     const surface = el("summary", {}, "Surface");
     const placement = el("summary", {}, "Placement");
     // At the click, not at the later "toggle": by then a quick hand has begun to type.
-    surface.addEventListener("click", () => this.last && this.surface.update(this.last.o));
+    surface.addEventListener("click", () => this.last && this.surface.update(this.last.o, this.last.one));
     placement.addEventListener("click", () => this.last && this.pose.update(this.last.o, this.last.all));
     this.surfacePart.append(surface, this.surface.root);
     this.posePart.append(placement, this.pose.root, remove);
@@ -46,38 +52,36 @@ class ObjectRow {
     this.root = el("li", { data: { object: String(id) } }, head, this.surfacePart, this.posePart);
   }
 
-  private last: { o: ObjectState; all: ObjectState[] } | undefined;
+  private last: Item | undefined;
 
-  update(o: ObjectState, all: ObjectState[]): void {
-    this.last = { o, all };
+  update(item: Item): void {
+    const { o, all, one } = (this.last = item);
     const note = o.stiffness_N_per_m > 0 ? "" : ", no stiffness: cannot be felt";
     setText(this.name, o.name || `Object ${this.id}`);
     this.name.title = `Object ${this.id}`;
     setText(this.facts, o.triangles === 0 ? "no mesh" : `${countText(o.triangles)} triangles${note}`);
     this.touchable.update(o.touchable);
-    if (this.surfacePart.open) this.surface.update(o);
+    if (this.surfacePart.open) this.surface.update(o, one);
     if (this.posePart.open) this.pose.update(o, all);
   }
 }
 
 export class ObjectsPanel {
   private readonly list = el("ul", { className: "cards" });
-  private readonly rows: Rows<{ o: ObjectState; all: ObjectState[] }, { root: HTMLElement; update(item: { o: ObjectState; all: ObjectState[] }): void }>;
+  private readonly rows: Rows<Item, ObjectRow>;
 
   constructor(parent: HTMLElement, send: Send, centreOf: (id: number) => Vector3) {
     this.rows = new Rows(
       this.list,
       ({ o }) => String(o.id),
-      ({ o }) => {
-        const row = new ObjectRow(o.id, send, centreOf);
-        return { root: row.root, update: (item) => row.update(item.o, item.all) };
-      },
+      ({ o }) => new ObjectRow(o.id, send, centreOf),
     );
     parent.append(this.list);
   }
 
-  update(objects: ObjectState[], touched: number): void {
-    this.rows.update(objects.map((o) => ({ o, all: objects })));
+  /** `one`: the surface at 1 of each slider. */
+  update(objects: ObjectState[], touched: number, one: SurfaceState | null | undefined): void {
+    this.rows.update(objects.map((o) => ({ o, all: objects, one })));
     for (const item of this.list.children)
       (item as HTMLElement).dataset["touched"] = String(
         (item as HTMLElement).dataset["object"] === String(touched),
