@@ -26,6 +26,10 @@ HANDSHAKE_S: Final = 3.0
 RETRY_S: Final = 0.25
 PING_S: Final = 1.0
 HEARTBEAT_S: Final = 0.1
+#: How long a client that closes waits for the end of a server that has received everything.
+END_S: Final = 1.0
+#: How often it looks at what the server has not received yet.
+END_CHECK_S: Final = 0.05
 #: Bytes that accumulate before they are given to the system.
 BATCH_BYTES: Final = 64 * 1024
 #: A stop on the first connection waits behind no more than this; beyond it, it also takes a second connection.
@@ -82,6 +86,22 @@ class Subscription(Generic[Report]):
 
     def __exit__(self, *_: object) -> None:
         self.end()
+
+
+class Ending:
+    """How long a client that closes waits for the server; the send timeout in seconds."""
+
+    def __init__(self, send_timeout: float) -> None:
+        self._send_timeout = send_timeout
+        self._left = -1
+        self._progress = 0.0
+
+    def is_over(self, left: int) -> bool:
+        """Whether the wait is over, with so many bytes that the server has not received."""
+        at = time.monotonic()
+        if left != self._left:
+            self._left, self._progress = left, at
+        return at - self._progress > (self._send_timeout if left else END_S)
 
 
 Arrival = Tuple[int, int, int, float, bytes]  # kind, seconds, microseconds, time of arrival, payload

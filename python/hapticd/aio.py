@@ -28,9 +28,12 @@ from ._codec import Numbers
 from ._core import (
     BATCH_BYTES,
     CLOSED_BY_SERVER,
+    END_CHECK_S,
+    END_S,
     RETRY_S,
     STOP_BACKLOG_BYTES,
     Core,
+    Ending,
     Options,
     UploadProgress,
     as_corners,
@@ -49,6 +52,7 @@ class _Stream(asyncio.Protocol):
     def __init__(self, client: "weakref.ref[Client]", reverse: bool) -> None:
         self._client = client
         self._reverse = reverse
+        self.lost: "asyncio.Future[None]" = asyncio.get_running_loop().create_future()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
@@ -74,6 +78,7 @@ class _Stream(asyncio.Protocol):
             client._writable.set()
 
     def connection_lost(self, error: Optional[Exception]) -> None:
+        self.lost.set_result(None)
         client = self._client()
         if client is not None:
             client._gone(str(error) if error is not None else CLOSED_BY_SERVER)
@@ -122,7 +127,27 @@ def _turn_of(reference: "weakref.ref[Client]") -> None:
         client._turn()
 
 
-def _end(*what: Any) -> None:
+async def _end_stream(transport: asyncio.Transport, send_timeout: float) -> None:
+    """Ends a stream behind what was written, and discards what arrives until the server has ended its own; see
+    hapticd.Client.close()."""
+    protocol, sock = transport.get_protocol(), transport.get_extra_info("socket")
+    assert isinstance(protocol, _Stream)
+    end = Ending(send_timeout)
+    try:
+        with suppress(OSError):  # the server has ended it already
+            transport.write_eof()  # behind what waits in the transport
+        while not protocol.lost.done():
+            acknowledged = sock is None or sock.fileno() < 0
+            if end.is_over(transport.get_write_buffer_size() + (0 if acknowledged else unacknowledged(sock))):
+                break
+            await asyncio.wait([protocol.lost], timeout=END_CHECK_S)
+    finally:
+        transport.abort()
+
+
+def _end(stream: Optional[asyncio.Transport], send_timeout: float, *what: Any) -> None:
+    if stream is not None:
+        asyncio.get_running_loop().create_task(_end_stream(stream, send_timeout))
     for one in what:
         if isinstance(one, asyncio.BaseTransport):
             one.close()
@@ -162,9 +187,10 @@ class Client(Core):
                 raise
 
     async def close(self) -> None:
-        """Sends what is collected, and closes all sockets. From its first step on every command, and everything that
-        waits, raises ConnectionLost; `latest` is empty. Does nothing the second time. A client whose last name is gone
-        closes, too, as hapticd.Client."""
+        """Sends what is collected, waits until the server has read it, and closes all sockets, as
+        hapticd.Client.close(); cancelled, it closes them at once. From its first step on every command, and everything
+        that waits, raises ConnectionLost; `latest` is empty. Does nothing the second time. A client whose last name is
+        gone closes, too, as hapticd.Client, as long as the event loop runs."""
         if self._finished:
             return
         if self.connected:
@@ -172,7 +198,6 @@ class Client(Core):
         self._finished = True
         transport = self._transport
         if transport is not None:
-            transport.close()
             self._gone("closed")
         self._deliver_all()  # ends waits that began before the first connection
         if self._task is not None:
@@ -185,6 +210,7 @@ class Client(Core):
             if handle is not None:
                 handle.cancel()
         if transport is not None:
+            await _end_stream(transport, self.options.send_timeout)
             await asyncio.sleep(0)  # the transport closes its socket in the next turn
 
     async def __aenter__(self) -> "Client":
@@ -196,7 +222,9 @@ class Client(Core):
     def __del__(self) -> None:
         if hasattr(self, "_task") and not self._finished:
             with suppress(RuntimeError):  # the event loop has been closed, and its sockets with it
-                self._loop.call_soon_threadsafe(_end, self._transport, self._udp, self._timer, self._task)
+                self._loop.call_soon_threadsafe(
+                    _end, self._transport, self.options.send_timeout, self._udp, self._timer, self._task
+                )
 
     def _leave_to_parent(self) -> None:
         """The transports cannot close their sockets without the event loop, which is the parent's: other files take
@@ -611,7 +639,7 @@ class Client(Core):
 
     async def _stop_beside(self, backlog: int) -> None:
         timeout = max(self.options.connect_timeout, 1.0)
-        options = Options(connect_timeout=0, reconnect=False)
+        options = Options(connect_timeout=0, reconnect=False, send_timeout=END_S)
         deadline = self._loop.time() + timeout
         async with connect(f"{self.device}@tcp://{self._target[0]}:{self._target[1]}", options) as beside:
             sent = await beside._wait(lambda: beside.connected, timeout)

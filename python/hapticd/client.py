@@ -27,10 +27,13 @@ from ._codec import Numbers
 from ._core import (
     BATCH_BYTES,
     CLOSED_BY_SERVER,
+    END_CHECK_S,
+    END_S,
     MAX_WAITING_BYTES,
     RETRY_S,
     STOP_BACKLOG_BYTES,
     Core,
+    Ending,
     Options,
     UploadProgress,
     as_corners,
@@ -111,18 +114,47 @@ class Client(Core):
             raise
 
     def close(self) -> None:
-        """Sends what is collected as far as the system accepts it, and closes all sockets. The server ends the
-        client's forces. From then on every command, and everything that waits, raises ConnectionLost; `latest` and
-        statistics() stay. Does nothing the second time. A client whose last name is gone closes, too; a callback that
-        uses the client is such a name, until the garbage collector runs."""
+        """Sends what is collected, waits until the server has read it and ended the connection, and closes all sockets.
+        The server ends the client's forces. The wait ends, too, when a server that has received everything does not
+        answer for 1 s, or when none receives anything for Options.send_timeout: the rest is then lost. Reports that
+        arrive meanwhile are discarded. From then on every command, and everything that waits, raises ConnectionLost;
+        `latest` and statistics() stay. Does nothing the second time. A client whose last name is gone closes, too; a
+        callback that uses the client is such a name, until the garbage collector runs."""
         if self._finished:
             return
-        if self.connected:
+        was_connected = self.connected
+        if was_connected:
             self._push()
         self._finished = True
-        self._drop_sockets()
-        self._closed("closed")
-        self._selector.close()
+        try:
+            if was_connected and self._sock is not None:
+                with suppress(OSError):
+                    self._end_stream(self._sock)
+        finally:
+            self._drop_sockets()
+            self._closed("closed")
+            self._selector.close()
+
+    def _end_stream(self, sock: socket.socket) -> None:
+        """Ends the stream behind what is collected, and discards what arrives until the server has ended its own: the
+        system resets a connection that is closed with unread reports, and drops what it has not sent. Raises
+        OSError."""
+        end = Ending(self.options.send_timeout)
+        ended = False
+        with selectors.DefaultSelector() as waiting:
+            waiting.register(sock, selectors.EVENT_READ | selectors.EVENT_WRITE)
+            while True:
+                if not self._out and not ended:
+                    sock.shutdown(socket.SHUT_WR)
+                    waiting.modify(sock, selectors.EVENT_READ)
+                    ended = True
+                if end.is_over(self._out_bytes + unacknowledged(sock)):
+                    return
+                for _, events in waiting.select(END_CHECK_S):
+                    if events & selectors.EVENT_READ and not sock.recv(_RECEIVE_BYTES):
+                        return
+                    if events & selectors.EVENT_WRITE:
+                        self._write(sock)
 
     def __enter__(self) -> "Client":
         return self
@@ -280,6 +312,18 @@ class Client(Core):
             if sender[0] in (self._remote, target):
                 self._received_datagram(data)
 
+    def _write(self, sock: socket.socket) -> None:
+        """Raises OSError."""
+        with suppress(BlockingIOError):
+            while self._out:
+                sent = sock.send(self._out[0])
+                self._counts.tcp_bytes_out += sent
+                self._out_bytes -= sent
+                if sent == len(self._out[0]):
+                    self._out.popleft()
+                else:
+                    self._out[0] = self._out[0][sent:]
+
     def _push(self) -> None:
         """Gives collected bytes to the system, as far as it accepts them without waiting."""
         peer, sock = self._peer, self._sock
@@ -291,16 +335,7 @@ class Client(Core):
             self._out.append(data)
             self._out_bytes += len(data)
         try:
-            while self._out:
-                sent = sock.send(self._out[0])
-                self._counts.tcp_bytes_out += sent
-                self._out_bytes -= sent
-                if sent == len(self._out[0]):
-                    self._out.popleft()
-                else:
-                    self._out[0] = self._out[0][sent:]
-        except BlockingIOError:
-            pass
+            self._write(sock)
         except OSError as error:
             return self._fail(str(error))
         if self._udp is not None and self._udp_target is not None:
@@ -613,7 +648,7 @@ class Client(Core):
         """The server handles the messages of a connection in order, so the pong confirms the stop."""
         timeout = max(self.options.connect_timeout, 1.0)
         deadline = time.monotonic() + timeout
-        options = Options(connect_timeout=0, reconnect=False)
+        options = Options(connect_timeout=0, reconnect=False, send_timeout=END_S)
         with Client(f"{self.device}@tcp://{self._target[0]}:{self._target[1]}", options) as beside:
             sent = False
             while not (sent and beside._all_pongs) and time.monotonic() < deadline:

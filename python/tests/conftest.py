@@ -189,6 +189,7 @@ class ScriptedServer:
         self.device = device
         self.received: List[Tuple[str, bytes]] = []
         self.answer = b""  # sent behind each pong
+        self.chatter = b""  # sent before each read
         self.reads = threading.Event()  # clear: it takes nothing more
         self.reads.set()
         self.listener = socket.create_server(("127.0.0.1", 0))
@@ -228,10 +229,10 @@ class ScriptedServer:
             self.peer = Peer(self, [self.device], None)
             with connection:
                 while True:
-                    if self.peer.stream:
-                        connection.sendall(self.peer.take_stream())
-                    self.reads.wait()
                     try:
+                        if self.peer.stream or self.chatter:
+                            connection.sendall(self.peer.take_stream() + self.chatter)
+                        self.reads.wait()
                         data = connection.recv(1 << 16)
                     except OSError:
                         break
@@ -239,8 +240,8 @@ class ScriptedServer:
                         break
                     self.peer.feed(data)
 
-    def wait_for(self, name: str) -> None:
-        deadline = time.monotonic() + 60
+    def wait_for(self, name: str, seconds: float = 60) -> None:
+        deadline = time.monotonic() + seconds
         while all(received[0] != name for received in list(self.received)):
             assert time.monotonic() < deadline, f"no {name} in {[r[0] for r in self.received]}"
             time.sleep(0.005)

@@ -17,6 +17,9 @@ import pytest
 import hapticd
 from conftest import COMMANDS, ROOT, WAITS, ScriptedServer, Server
 from hapticd import Effect, Reports, Surface
+from hapticd import _messages as m
+from hapticd._codec import frame
+from hapticd._core import _NUMBERS
 
 
 def run(main: Coroutine[Any, Any, None]) -> None:
@@ -90,6 +93,47 @@ def test_a_client_ends_with_its_last_name(server: Server, way: str, caplog: pyte
     finally:
         gc.enable()
     assert caplog.records == []
+
+
+@pytest.mark.parametrize("closes", [True, False])
+def test_what_was_sent_arrives_although_the_client_ends(closes: bool) -> None:
+    """The system resets a connection that is closed with unread reports, and drops what it has not sent."""
+    scripted = ScriptedServer()
+
+    async def main() -> None:
+        hand = await hapticd.aio.connect(scripted.name)
+        await hand.wait_capabilities()
+        number, layout = _NUMBERS[m.TouchedObject]
+        scripted.chatter = frame(1, 0, 0, number, layout.encode(m.TouchedObject(1)))
+        await hand.upload_mesh(0, *hapticd.sphere(25, rings=300))
+        scripted.reads.clear()
+        hand.set_vertices(0, 0, np.zeros((500000, 3)))  # more than the system takes
+        hand.send_text("end")
+        hand.flush()
+        threading.Timer(1.5, scripted.reads.set).start()
+        if closes:
+            await hand.close()
+        del hand
+        await asyncio.get_running_loop().run_in_executor(None, scripted.wait_for, "vrpn_Base text_message", 10)
+
+    run(main())
+    scripted.close()
+
+
+def test_a_server_that_has_stopped_does_not_keep_a_client_that_closes() -> None:
+    async def main() -> None:
+        for vertices in (1, 1000000):  # the server's system takes all, or not
+            scripted = ScriptedServer()
+            async with hapticd.aio.connect(scripted.name, send_timeout=1.5) as hand:
+                await hand.wait_capabilities()
+                scripted.reads.clear()
+                hand.set_vertices(0, 0, np.zeros((vertices, 3)))
+                start = time.monotonic()
+            assert time.monotonic() - start < 5
+            scripted.reads.set()
+            scripted.close()
+
+    run(main())
 
 
 @pytest.mark.parametrize("way", ["tcp", "udp"])

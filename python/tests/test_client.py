@@ -558,6 +558,39 @@ def test_a_client_ends_with_its_last_name(server: Server, way: str) -> None:
             gc.enable()
 
 
+@pytest.mark.parametrize("closes", [True, False])
+def test_what_was_sent_arrives_although_the_client_ends(closes: bool) -> None:
+    """The system resets a connection that is closed with unread reports, and drops what it has not sent."""
+    scripted = ScriptedServer()
+    hand = hapticd.connect(scripted.name, queue_limit_bytes=1 << 30)
+    hand.wait_capabilities()
+    number, layout = _NUMBERS[m.TouchedObject]
+    scripted.chatter = frame(1, 0, 0, number, layout.encode(m.TouchedObject(1)))
+    hand.upload_mesh(0, *hapticd.sphere(25, rings=300))
+    scripted.reads.clear()
+    hand.set_vertices(0, 0, np.zeros((500000, 3)))  # more than the system takes
+    hand.send_text("end")
+    threading.Timer(1.5, scripted.reads.set).start()
+    if closes:
+        hand.close()
+    del hand
+    scripted.wait_for("vrpn_Base text_message", 10)
+    scripted.close()
+
+
+def test_a_server_that_has_stopped_does_not_keep_a_client_that_closes() -> None:
+    for vertices in (1, 1000000):  # the server's system takes all, or not
+        scripted = ScriptedServer()
+        with hapticd.connect(scripted.name, queue_limit_bytes=1 << 30, send_timeout=1.5) as hand:
+            hand.wait_capabilities()
+            scripted.reads.clear()
+            hand.set_vertices(0, 0, np.zeros((vertices, 3)))
+            start = time.monotonic()
+        assert time.monotonic() - start < 5
+        scripted.reads.set()
+        scripted.close()
+
+
 @pytest.mark.parametrize("way", ["tcp", "udp"])
 def test_a_forked_process_neither_uses_nor_keeps_a_connection(server: Server, way: str) -> None:
     """A worker that was forked, as multiprocessing does it, outlives the client of its parent."""
