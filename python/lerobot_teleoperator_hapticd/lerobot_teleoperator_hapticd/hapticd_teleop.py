@@ -31,7 +31,8 @@ class HapticdTeleop(Teleoperator):
     Feedback, any of: force_x, force_y, force_z (N, on the hand), held until the next call; contact_x, contact_y,
     contact_z (m, a point of a surface in the frame of the action), contact_nx, contact_ny, contact_nz (its normal,
     out of the surface), contact_stiffness (N/m at the device, 0: none), which the server renders at 1 kHz. A contact
-    is stiff and stable where a held force is not: prefer it. Feedback ends `feedback_hold_s` after the last call of
+    is stiff and stable where a held force is not: prefer it. A call ends what it does not name: a force without a key of
+    the force, a contact without contact_stiffness. Feedback ends `feedback_hold_s` after the last call of
     send_feedback(), with the next call of get_action(); when the program hangs, the server ends it after 500 ms.
     """
 
@@ -144,10 +145,9 @@ class HapticdTeleop(Teleoperator):
         if self._connections:  # nothing of what was felt through another one goes on
             self._connections.clear()
             self._force = self._contact = False
-        if any(name in feedback for name in _FORCE):
-            self._send_force(hand, np.array([float(feedback.get(name, 0.0)) for name in _FORCE]))
-        if "contact_stiffness" in feedback:
-            self._send_contact(hand, [float(feedback.get(name, 0.0)) for name in _CONTACT])
+        # What it does not name ends: the caller would otherwise renew it for ever by feedback of another kind.
+        self._send_force(hand, np.array([float(feedback.get(name, 0.0)) for name in _FORCE]))
+        self._send_contact(hand, [float(feedback.get(name, 0.0)) for name in _CONTACT])
         hand.flush()
 
     def _send_force(self, hand: hapticd.Client, force_N: "np.ndarray[Any, Any]") -> None:

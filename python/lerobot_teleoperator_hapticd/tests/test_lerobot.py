@@ -97,8 +97,8 @@ def make(server: Server, **fields: Any) -> Any:
     return getattr(module, type(config).__name__.removesuffix("Config"))(config)
 
 
-def until(condition: Any) -> None:
-    deadline = time.monotonic() + 60
+def until(condition: Any, seconds: float = 60) -> None:
+    deadline = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < deadline
         time.sleep(0.005)
@@ -206,6 +206,27 @@ def test_a_force_is_limited_and_ends(server: Server) -> None:
         assert max(force[0] for force in felt) < 1.01
         teleop.send_feedback({"force_x": 0.0})
         until(lambda: person.poll(0.01) is not None and felt[-1][0] == 0)
+
+
+@pytest.mark.parametrize("with_force", [True, False])
+def test_a_call_ends_what_it_does_not_name(server: Server, with_force: bool) -> None:
+    contact = dict(contact_y=0.004, contact_ny=1.0, contact_stiffness=400.0)
+    both = {"force_x": 1.0, **contact}
+    rest = {"force_x": 1.0} if with_force else contact
+    with make(server) as teleop, hapticd.connect(server.tcp) as person:
+        person.hold_hand((0, 0, 0))
+
+        def feel(feedback: Dict[str, float], forces: "tuple[bool, bool]") -> bool:
+            teleop.send_feedback(feedback)
+            teleop.get_action()
+            person.poll(0.01)
+            force_N = person.latest.force.force_N
+            return (force_N[0] > 0.5, force_N[1] > 0.3) == forces
+
+        until(lambda: feel(both, (True, True)))
+        until(lambda: feel(rest, (with_force, not with_force)), 2)
+        until(lambda: feel(both, (True, True)))
+        until(lambda: feel({}, (False, False)), 2)
 
 
 def test_feedback_is_felt_again_after_a_restart_of_the_server() -> None:
