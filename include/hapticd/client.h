@@ -78,6 +78,10 @@ class HAPTICD_EXPORT Client {
   /// port is 3883 unless given. Throws std::invalid_argument for another form, and ConnectError when there is
   /// no such server or device within ClientOptions::connectTimeout.
   explicit Client(std::string_view device, const ClientOptions& options = {});
+  /// Sends what is collected, and waits until the server has received it and ended the connection; reports
+  /// that arrive meanwhile are discarded. The wait ends, too, when a server that has received everything does
+  /// not answer for 1 s, or when none receives anything for ClientOptions::sendTimeout: the rest is then
+  /// lost.
   ~Client();
   Client(Client&&) noexcept;
   Client& operator=(Client&&) noexcept;

@@ -153,7 +153,7 @@ void Client::setObjectName(int object, std::string_view name) {
 // The stop on the first connection stays where it is: a re-arm, which follows it there, then ends both.
 void Client::Impl::stopBesideBacklog() {
   constexpr Duration kSlice = 5ms;
-  client::Link beside(link.resolvedServer(), {.reconnect = false});
+  client::Link beside(link.resolvedServer(), {.reconnect = false, .sendTimeout = client::Link::kEndTimeout});
   const wire::LocalSender target = beside.addSender(device);
   bool confirmed = false;
   bool sent = false;

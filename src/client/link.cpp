@@ -1,6 +1,8 @@
 // Connecting, and losing a connection.
 #include "client/link.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
@@ -22,6 +24,7 @@ net::ConnectionOptions connectionOptions(const LinkOptions& options) {
   result.hardLimitBytes = SIZE_MAX;  // the link bounds the queue itself, by waiting
   result.lossTimeout = options.sendTimeout;
   result.keepAlive = 5s;
+  result.closeTimeout = 24h;  // the destructor bounds it
   return result;
 }
 
@@ -41,7 +44,8 @@ std::chrono::system_clock::time_point wallTimePoint() {
   return std::chrono::system_clock::time_point(std::chrono::nanoseconds(base::wallNow()));
 }
 
-Link::Link(const ServerAddress& server, const LinkOptions& options) : server_(server), options_(options) {
+Link::Link(const ServerAddress& server, const LinkOptions& options)
+    : process_(::getpid()), server_(server), options_(options) {
   try {
     if (server_.socket.empty()) address_ = {net::resolve(server_.host), server_.port};
   } catch (const net::Error& error) {
@@ -49,6 +53,29 @@ Link::Link(const ServerAddress& server, const LinkOptions& options) : server_(se
   }
   loop_.setErrorHandler([this](std::string_view text) { lastFailure_ = text; });
   attempt();
+}
+
+// The system resets a connection that is closed with unread reports, and drops what it has not sent.
+Link::~Link() {
+  constexpr Duration kCheck = 50ms;
+  if (!connected() || process_ != ::getpid()) return;  // in a forked process, the connection is the parent's
+  try {
+    flush();
+    pingTimer_.cancel();
+    udp_.reset();  // onArrival may refer to what is gone
+    connection_.close("closed");
+    std::size_t left = SIZE_MAX;
+    base::Nanos lastProgress = 0;
+    while (connection_ && connection_.nativeHandle() >= 0) {
+      if (const std::size_t bytes = backlogBytes(); bytes != left) {
+        left = bytes;
+        lastProgress = base::now();
+      }
+      if (Duration(base::now() - lastProgress) > (left > 0 ? options_.sendTimeout : kEndTimeout)) break;
+      loop_.runOnce(kCheck);
+    }
+  } catch (const std::exception&) {  // called by a function of the event loop
+  }
 }
 
 wire::LocalSender Link::addDevice(std::string_view name) {

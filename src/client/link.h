@@ -56,8 +56,12 @@ class Link {
 
   /// Resolves the host, which may block, and starts to connect. Throws ConnectError for an unknown host.
   Link(const ServerAddress& server, const LinkOptions& options);
+  /// Sends what is collected and waits until the server has received it and ended the connection; up to
+  /// kEndTimeout for one that has received everything, and the send timeout while it receives nothing.
+  ~Link();
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
+  static constexpr std::chrono::milliseconds kEndTimeout{1000};
 
   /// Names a device to use; the link pings it every second until it answers.
   wire::LocalSender addDevice(std::string_view name);
@@ -190,6 +194,7 @@ class Link {
   std::shared_ptr<net::Buffer> takeBuffer();
   std::size_t dispatch(const Handler& handler);
 
+  const int process_;
   ServerAddress server_;
   LinkOptions options_;
   net::Endpoint address_;

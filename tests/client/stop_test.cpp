@@ -68,6 +68,7 @@ TEST(Stop, OvertakesAReverseConnectionToo) {
   client.stopForces();
   EXPECT_EQ(stops(server.waitReceived(2)), 1U);
   EXPECT_EQ(server.connections(), 2U);
+  server.startReading();  // the client waits for it at its end
 }
 
 TEST(Stop, WithoutAConfirmationItThrowsAndKeepsTheFirstStop) {

@@ -41,6 +41,42 @@ TEST_P(BothWays, AHundredThousandVerticesArriveInOrder) {
   }
 }
 
+// Reports that nobody has read make the system reset the connection and drop what it has not sent.
+TEST_P(BothWays, WhatWasSentArrivesAlthoughTheClientEnds) {
+  ScriptedServer server;
+  const std::vector<std::array<float, 3>> corners(kManyVertices);
+  std::thread resume;
+  {
+    Client client(name(server), {.queueLimit_bytes = std::size_t{1} << 30});
+    server.stopReading();
+    for (const auto& corner : corners) client.setVertex(0, 0, corner[0], corner[1], corner[2]);
+    client.setTouchable(0, true);  // collected, and not sent yet
+    server.send(wire::TouchedObject{1});
+    resume = std::thread([&] {
+      std::this_thread::sleep_for(1500ms);
+      server.send(wire::TouchedObject{2});
+      server.startReading();
+    });
+  }
+  resume.join();
+  EXPECT_EQ(server.waitVertices(corners.size()).size(), corners.size());
+  EXPECT_EQ(server.waitReceived(1).size(), 1U);
+}
+
+TEST(Client, AServerThatHasStoppedDoesNotKeepAClientThatEnds) {
+  for (const int vertices : {1, 200'000}) {  // the server's system takes all, or not
+    ScriptedServer server;
+    std::optional<Client> client;
+    client.emplace(server.tcpName(),
+                   ClientOptions{.sendTimeout = 1500ms, .queueLimit_bytes = std::size_t{1} << 30});
+    server.stopReading();
+    for (int i = 0; i < vertices; ++i) client->setVertex(0, i, 0, 0, 0);
+    const auto start = std::chrono::steady_clock::now();
+    client.reset();
+    EXPECT_LT(std::chrono::steady_clock::now() - start, 5s);
+  }
+}
+
 TEST(Client, MeshesAreSentCornerByCorner) {
   ScriptedServer server;
   Client client(server.tcpName());
