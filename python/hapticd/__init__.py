@@ -3,6 +3,7 @@
     import hapticd
     with hapticd.connect("Phantom@localhost") as hand:
         hand.upload_mesh(0, *hapticd.sphere(30))
+        hand.set_surface(0, hapticd.Surface(stiffness=0.8))
         ticks = hand.collect("pose", seconds=2)
 
 `hapticd.aio` is the same client for asyncio; `hapticd.Session` reads recordings.

@@ -2,6 +2,7 @@
 
     async with hapticd.aio.connect("Phantom@localhost") as hand:
         await hand.upload_mesh(0, *hapticd.sphere(30))
+        hand.set_surface(0, hapticd.Surface(stiffness=0.8))
         async for report in hand.reports("force", seconds=5):
             print(report.force_N)
 
