@@ -53,34 +53,41 @@ class _Stream(asyncio.Protocol):
     def __init__(self, client: "weakref.ref[Client]", reverse: bool) -> None:
         self._client = client
         self._reverse = reverse
+        self._transport: Optional[asyncio.Transport] = None
         self.lost: "asyncio.Future[None]" = asyncio.get_running_loop().create_future()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
+        self._transport = transport
         client = self._client()
         if client is None:
             transport.abort()
         else:
             client._adopt(transport, self._reverse)
 
-    def data_received(self, data: bytes) -> None:
+    def _owner(self) -> "Optional[Client]":
+        """The client whose connection this is; none for a surplus or a former one, whose end must not end another."""
         client = self._client()
+        return client if client is not None and client._transport is self._transport else None
+
+    def data_received(self, data: bytes) -> None:
+        client = self._owner()
         if client is not None:
             client._data(data)
 
     def pause_writing(self) -> None:
-        client = self._client()
+        client = self._owner()
         if client is not None:
             client._writable.clear()
 
     def resume_writing(self) -> None:
-        client = self._client()
+        client = self._owner()
         if client is not None:
             client._writable.set()
 
     def connection_lost(self, error: Optional[Exception]) -> None:
         self.lost.set_result(None)
-        client = self._client()
+        client = self._owner()
         if client is not None:
             client._gone(str(error) if error is not None else CLOSED_BY_SERVER)
 
@@ -281,7 +288,9 @@ class Client(Core):
         self._begin((local, self._udp.get_extra_info("sockname")[1]))
 
     def _adopt(self, transport: asyncio.Transport, reverse: bool) -> None:
-        if self._transport is not None or self._finished:
+        # A server that answers two requests connects twice.
+        awaited = not reverse or (self._adopted is not None and not self._adopted.done())
+        if self._transport is not None or self._finished or not awaited:
             transport.abort()
             return
         self._transport = transport
@@ -290,8 +299,8 @@ class Client(Core):
             self._begin(None)
         else:
             self._early = b""
-            if self._adopted is not None and not self._adopted.done():
-                self._adopted.set_result(None)
+            assert self._adopted is not None
+            self._adopted.set_result(None)
 
     def _begin(self, udp: Optional[Tuple[str, int]]) -> None:
         if self._transport is None:  # lost meanwhile

@@ -401,3 +401,40 @@ def test_a_server_that_speaks_at_once_loses_nothing() -> None:
     run(main())
     thread.join(60)
     request.close()
+
+
+def test_a_surplus_connection_of_a_server_does_not_end_the_first() -> None:
+    """A server answers two requests with two connections, when the event loop was busy meanwhile."""
+    recorded = (ROOT / "testdata/wire/udp.s2c.tcp.bin").read_bytes()
+    request = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    request.bind(("127.0.0.1", 0))
+    request.settimeout(60)
+
+    async def main() -> None:
+        hand = await hapticd.aio.connect(f"Phantom@127.0.0.1:{request.getsockname()[1]}", connect_timeout=0)
+        await asyncio.sleep(0.1)
+        host, _, listening = request.recv(1000).rstrip(b"\0").decode().partition(" ")
+        connections = [socket.create_connection((host, int(listening))) for _ in range(2)]
+        for connection in connections:
+            connection.sendall(recorded)
+        await until(hand, lambda: hand.connected)
+        await asyncio.sleep(0.5)
+        assert hand.connected and hand.statistics().connections == 1
+        ended = []
+        for connection in connections:
+            connection.settimeout(0.1)
+            try:
+                while connection.recv(1 << 16):
+                    pass
+                ended.append(True)
+            except socket.timeout:
+                ended.append(False)
+            except ConnectionResetError:
+                ended.append(True)
+        assert sorted(ended) == [False, True]
+        for connection in connections:
+            connection.close()
+        await hand.close()
+
+    run(main())
+    request.close()
