@@ -93,8 +93,8 @@ class _Stream(asyncio.Protocol):
 
 
 class _Datagrams(asyncio.DatagramProtocol):
-    def __init__(self, client: "Client") -> None:
-        self._client = weakref.ref(client)
+    def __init__(self, client: "weakref.ref[Client]") -> None:
+        self._client = client
 
     def datagram_received(self, data: bytes, sender: Tuple[Any, ...]) -> None:
         client = self._client()
@@ -103,8 +103,8 @@ class _Datagrams(asyncio.DatagramProtocol):
 
 
 class _Requests(asyncio.DatagramProtocol):
-    def __init__(self, client: "Client") -> None:
-        self._client = weakref.ref(client)
+    def __init__(self, client: "weakref.ref[Client]") -> None:
+        self._client = client
 
     def error_received(self, error: Exception) -> None:
         client = self._client()
@@ -113,13 +113,9 @@ class _Requests(asyncio.DatagramProtocol):
 
 
 async def _stay_connected(reference: "weakref.ref[Client]") -> None:
-    """Connects again and again, as long as the client has a name."""
+    """Connects again and again, as long as the client has a name. Whatever waits has only the reference."""
     while True:
-        client = reference()
-        if client is None:
-            return
-        lost = await client._attempt()
-        del client
+        lost = await _attempt(reference)
         if lost is not None:
             await lost.wait()
         client = reference()
@@ -127,6 +123,64 @@ async def _stay_connected(reference: "weakref.ref[Client]") -> None:
             return
         del client
         await asyncio.sleep(RETRY_S)
+
+
+async def _attempt(reference: "weakref.ref[Client]") -> Optional[asyncio.Event]:
+    """One attempt to connect; the result is set when the connection ends."""
+    client = reference()
+    if client is None:
+        return None
+    client._lost.clear()
+    lost, target, tcp_only = client._lost, client._target, client._address.tcp_only
+    del client
+    try:
+        if tcp_only:
+            attempt = asyncio.get_running_loop().create_connection(lambda: _Stream(reference, False), *target)
+            await asyncio.wait_for(attempt, 3.0)
+        else:
+            await _ask_for_connection(reference, target)
+        return lost
+    except asyncio.TimeoutError:
+        failure = "no answer to the connection attempt"
+    except ConnectionRefusedError:
+        failure = "Connection refused"
+    except OSError as error:
+        failure = str(error)
+    client = reference()
+    if client is not None:
+        client._last_failure = failure
+    return None
+
+
+async def _ask_for_connection(reference: "weakref.ref[Client]", target: Tuple[str, int]) -> None:
+    loop = asyncio.get_running_loop()
+    local = local_towards(target)
+    adopted = loop.create_future()
+    client = reference()
+    if client is None:
+        return
+    client._adopted = adopted
+    del client
+    server = await loop.create_server(lambda: _Stream(reference, True), local, 0)
+    request: Optional[asyncio.DatagramTransport] = None
+    try:
+        request, _ = await loop.create_datagram_endpoint(
+            lambda: _Requests(reference), local_addr=(local, 0), remote_addr=target
+        )
+        text = f"{local} {server.sockets[0].getsockname()[1]}\0".encode()
+        while not adopted.done():
+            request.sendto(text)
+            await asyncio.wait([adopted], timeout=1.0)
+    finally:
+        server.close()
+        if request is not None:
+            request.close()
+    udp, _ = await loop.create_datagram_endpoint(lambda: _Datagrams(reference), local_addr=(local, 0))
+    client = reference()
+    if client is None:
+        udp.close()
+    else:
+        client._begin(udp)
 
 
 def _turn_of(reference: "weakref.ref[Client]") -> None:
@@ -247,46 +301,6 @@ class Client(Core):
 
     # --- connecting
 
-    async def _attempt(self) -> Optional[asyncio.Event]:
-        """One attempt to connect; the result is set when the connection ends."""
-        self._lost.clear()
-        try:
-            if self._address.tcp_only:
-                reference = weakref.ref(self)
-                attempt = self._loop.create_connection(lambda: _Stream(reference, False), *self._target)
-                await asyncio.wait_for(attempt, 3.0)
-            else:
-                await self._ask_for_connection()
-            return self._lost
-        except asyncio.TimeoutError:
-            self._last_failure = "no answer to the connection attempt"
-        except ConnectionRefusedError:
-            self._last_failure = "Connection refused"
-        except OSError as error:
-            self._last_failure = str(error)
-        return None
-
-    async def _ask_for_connection(self) -> None:
-        local = local_towards(self._target)
-        self._adopted = self._loop.create_future()
-        reference = weakref.ref(self)  # the transport of an accepted connection keeps the call that makes its protocol
-        server = await self._loop.create_server(lambda: _Stream(reference, True), local, 0)
-        request: Optional[asyncio.DatagramTransport] = None
-        try:
-            request, _ = await self._loop.create_datagram_endpoint(
-                lambda: _Requests(self), local_addr=(local, 0), remote_addr=self._target
-            )
-            text = f"{local} {server.sockets[0].getsockname()[1]}\0".encode()
-            while not self._adopted.done():
-                request.sendto(text)
-                await asyncio.wait([self._adopted], timeout=1.0)
-        finally:
-            server.close()
-            if request is not None:
-                request.close()
-        self._udp, _ = await self._loop.create_datagram_endpoint(lambda: _Datagrams(self), local_addr=(local, 0))
-        self._begin((local, self._udp.get_extra_info("sockname")[1]))
-
     def _adopt(self, transport: asyncio.Transport, reverse: bool) -> None:
         # A server that answers two requests connects twice.
         awaited = not reverse or (self._adopted is not None and not self._adopted.done())
@@ -302,13 +316,13 @@ class Client(Core):
             assert self._adopted is not None
             self._adopted.set_result(None)
 
-    def _begin(self, udp: Optional[Tuple[str, int]]) -> None:
+    def _begin(self, udp: Optional[asyncio.DatagramTransport]) -> None:
         if self._transport is None:  # lost meanwhile
-            if self._udp is not None:
-                self._udp.close()
-                self._udp = None
+            if udp is not None:
+                udp.close()
             return
-        self._opened(udp)
+        self._udp = udp
+        self._opened(udp.get_extra_info("sockname")[:2] if udp is not None else None)
         self._push()
         early, self._early = self._early, b""
         if early:

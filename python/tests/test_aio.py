@@ -438,3 +438,30 @@ def test_a_surplus_connection_of_a_server_does_not_end_the_first() -> None:
 
     run(main())
     request.close()
+
+
+def test_a_client_ends_with_its_last_name_before_its_first_connection() -> None:
+    request = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    request.bind(("127.0.0.1", 0))
+    request.setblocking(False)
+
+    async def main() -> None:
+        hand = await hapticd.aio.connect(f"Phantom@127.0.0.1:{request.getsockname()[1]}", connect_timeout=0)
+        await asyncio.sleep(0.2)
+        assert request.recv(1000)
+        gone = weakref.ref(hand)
+        del hand
+        assert gone() is None
+        await asyncio.sleep(1.2)  # a request follows another after 1 s
+        with pytest.raises(BlockingIOError):
+            request.recv(1000)
+        tasks = asyncio.all_tasks() - {asyncio.current_task()}
+        assert [task for task in tasks if "stay_connected" in repr(task)] == []
+
+    gc.collect()
+    gc.disable()
+    try:
+        run(main())
+    finally:
+        gc.enable()
+    request.close()
