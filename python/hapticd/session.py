@@ -500,6 +500,9 @@ class Session:
         """Where each tick begins. Ticks vary in length, so all runs are walked at once: their first ticks, then their
         second ticks, and so on."""
         blocks = np.array([(s, s + n) for kind, s, n in self._blocks if kind == _TICKS], dtype=np.int64).reshape(-1, 2)
+        short = blocks[blocks[:, 1] - blocks[:, 0] < 4]
+        if len(short):
+            raise self._fail(int(short[0, 0]), "a block of ticks is truncated")
         blocks = blocks[self._gather(blocks[:, 0], np.dtype(">u4")) == device]
         at, end = blocks[:, 0] + 4, blocks[:, 1]
         found: List[npt.NDArray[np.int64]] = []

@@ -179,6 +179,14 @@ def test_a_block_with_another_layout_is_named(tmp_path: pathlib.Path) -> None:
     with hapticd.Session(file) as session:
         with pytest.raises(hapticd.RecordingError, match=f"block at byte {at}: a loss is truncated"):
             session.lost
+    for content in (b"", b"\0\0\0"):
+        write(4, content)
+        ends = tmp_path / "ends.haptics"
+        ends.write_bytes(written([*blocks, (4, content)]))
+        for damaged, place in ((file, at), (ends, len(written(blocks)))):
+            with hapticd.Session(damaged) as session:
+                with pytest.raises(hapticd.RecordingError, match=f"block at byte {place}: a block of ticks is truncated"):
+                    len(session.ticks)
     write(7, b"\0\0")
     with pytest.raises(hapticd.RecordingError, match=f"block at byte {at}: the force law is truncated"):
         hapticd.Session(file)
