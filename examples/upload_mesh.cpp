@@ -35,8 +35,11 @@ Mesh readObj(const char* path) {
       mesh.vertices.push_back(v);
     } else if (word == "f") {
       std::vector<std::uint32_t> corners;
-      while (words >> word)
-        corners.push_back(static_cast<std::uint32_t>(std::stoul(word)) - 1);  // "7/1/2" reads 7
+      while (words >> word) {
+        const long number = std::stol(word);  // "7/1/2" reads 7; -1 is the last vertex so far
+        const long vertices = static_cast<long>(mesh.vertices.size());
+        corners.push_back(static_cast<std::uint32_t>(number < 0 ? vertices + number : number - 1));
+      }
       for (std::size_t i = 2; i < corners.size(); ++i) {
         mesh.triangles.push_back({corners[0], corners[i - 1], corners[i]});
       }

@@ -23,7 +23,10 @@ check() {
       felt 0.1 ;;
     example_upload_mesh)
       "$example" "$source_dir/testdata/meshes/bunny.obj" "$device" >"$work/out"
-      grep -q '100 %' "$work/out" && grep -q '^3674 triangles sent' "$work/out" ;;
+      printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 0 0 1\nf -4/1 -1/2/3 2\n' >"$work/relative.obj"
+      "$example" "$work/relative.obj" "$device" >"$work/relative"
+      grep -q '^2 triangles sent' "$work/relative" && ! grep -q 'no area' "$work/relative" &&
+        grep -q '100 %' "$work/out" && grep -q '^3674 triangles sent' "$work/out" ;;
     example_follow_contact_point)
       "$example" "$device" 4 >"$work/out"
       grep -q '^contact$' "$work/out" && grep -qE '^surface .* -10\.00 .* mm   device .* mm$' "$work/out" ;;
