@@ -14,7 +14,12 @@
 using namespace std::chrono_literals;
 
 int main(int argc, char** argv) try {
-  if (argc < 2) throw std::runtime_error("which scene? peg_in_hole.xml, drawer.xml or stacked_blocks.xml");
+  if (argc < 2 || argv[1][0] == '-') {
+    std::fprintf(stderr,
+                 "usage: mujoco SCENE.xml [NAME@host] [seconds] [PICTURE.svg]\n"
+                 "scenes: peg_in_hole.xml, drawer.xml, stacked_blocks.xml\n");
+    return 1;
+  }
   mujoco_example::HandInScene scene(argv[1]);
   hapticd::Client client(argc > 2 ? argv[2] : "Phantom@localhost");
   const double seconds = argc > 3 ? std::atof(argv[3]) : scene.path().back().time_s;
@@ -38,9 +43,10 @@ int main(int argc, char** argv) try {
   std::string picture;
   const auto start = std::chrono::steady_clock::now();
   const int frames = static_cast<int>(seconds / kFrame_s);
+  const int framesOfPath = static_cast<int>(scene.path().back().time_s / kFrame_s);  // 0: the hand rests
   for (int frame = 0; frame < frames; ++frame) {
     lead(frame * kFrame_s);
-    if (frame % static_cast<int>(scene.path().back().time_s / kFrame_s) == 0) scene.reset();
+    if (framesOfPath > 0 ? frame % framesOfPath == 0 : frame == 0) scene.reset();
     const hapticd::HandReport& hand = client.latest().hand;
     scene.setHand(hand.position_m, hand.velocity_m_per_s);
     scene.setForces(hand.contacts);

@@ -54,6 +54,11 @@ check() {
       "$example" "$device" 6 >"$work/out"
       at_least 'the box moved' 5 && grep -qE '^touched in [1-9][0-9]+ ticks, at most [0-9.]+ N' "$work/out" ;;
     example_mujoco)
+      "$example" --help 2>"$work/help" && return 1
+      grep -q '^usage: mujoco SCENE.xml' "$work/help" || return 1
+      # A hand that rests: one place at time 0.
+      sed -Ez 's/(name="path" data="[^ ]+ [^ ]+ [^ ]+ [^ "]+)[^"]*/\1/' "$source_dir/examples/mujoco/$scene.xml" >"$work/rests.xml"
+      "$example" "$work/rests.xml" "$device" 0.2 | grep -q '^touched in [0-9]* of [1-9]' || return 1
       "$example" "$source_dir/examples/mujoco/$scene.xml" "$device" 5 "$work/picture.svg" >"$work/out"
       # The peg is in its hole: its middle is 16 mm above its end.
       { [ "$scene" != peg_in_hole ] || grep -q 'down to -[0-9]' "$work/out"; } &&
