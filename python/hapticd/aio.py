@@ -193,7 +193,8 @@ async def _end_stream(transport: asyncio.Transport, send_timeout: float) -> None
     """Ends a stream behind what was written, and discards what arrives until the server has ended its own; see
     hapticd.Client.close()."""
     protocol, sock = transport.get_protocol(), transport.get_extra_info("socket")
-    assert isinstance(protocol, _Stream)
+    if not isinstance(protocol, _Stream):  # the stream has ended, and its transport has let go of it
+        return
     end = Ending(send_timeout)
     try:
         with suppress(OSError):  # the server has ended it already
