@@ -21,8 +21,10 @@ void logAddresses(const server::Server& server, const server::ServerConfig& conf
     for (const std::string& name : device.names) spdlog::info("device {}@{} ({})", name, at, kind);
   }
   if (const auto web = server.webAddress()) {
-    const bool everywhere = web->address == net::kAnyAddress;
-    spdlog::info("viewer: http://{}:{}/", everywhere ? "127.0.0.1" : web->addressText(), web->port);
+    const bool here = web->address == net::kAnyAddress || net::isLoopback(web->address);
+    const bool secured = !server.fingerprint().empty() && (config.tlsLoopback || !here);
+    spdlog::info("viewer: {}://{}:{}/", secured ? "https" : "http",
+                 web->address == net::kAnyAddress ? "127.0.0.1" : web->addressText(), web->port);
   }
 }
 

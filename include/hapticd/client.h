@@ -336,7 +336,7 @@ class HAPTICD_EXPORT Client {
   void requestUnitToSensor();
   /// Asks for a WorkspaceReport.
   void requestWorkspace();
-  /// Sets the report rate of this client.
+  /// Sets the report rate of this client, also for every new connection.
   void setUpdateRate(double rate_Hz);
   /// Makes the present position of the proxy the origin of poses.
   void resetOrigin();

@@ -261,6 +261,7 @@ class Core(Commands):
         self._pings = self._pongs = 0  # of this connection
         self._server_devices: List[str] = []
         self._subscription: Optional[m.Subscribe] = None
+        self._update_rate: Optional[float] = None  # asked for after the subscription
         self._token = ""
         self._key = secrets.randbits(63) | 1  # by which the server knows the connections of this client
         self._heartbeats = False
@@ -362,6 +363,8 @@ class Core(Commands):
             self._put_now(self._identity())
         if self._subscription is not None:
             self._put_now(self._subscription)
+        if self._update_rate is not None:
+            self._put_now(m.TrackerSetUpdateRate(self._update_rate))
         if self._heartbeats:
             self._put_now(m.Heartbeat(1))
         self._peer.stream.extend(self._backlog)
@@ -628,8 +631,17 @@ class Core(Commands):
     def _set_subscription(self, kinds: Reports, rate_Hz: float) -> None:
         self._check_open()
         self._subscription = m.Subscribe(int(kinds), rate_Hz)
+        if rate_Hz > 0:
+            self._update_rate = None
         if self.connected:
             self._put_now(self._subscription)
+
+    def set_update_rate(self, rate_Hz: float) -> None:
+        """Sets the report rate of this client, also for every new connection."""
+        self._check_open()
+        if self.connected:
+            super().set_update_rate(rate_Hz)
+        self._update_rate = rate_Hz
 
     @staticmethod
     def _check_rate(rate_Hz: float) -> None:

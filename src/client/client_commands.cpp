@@ -177,7 +177,8 @@ void Client::requestWorkspace() {
   impl_->send(wire::TrackerRequestWorkspace{});
 }
 void Client::setUpdateRate(double rate_Hz) {
-  impl_->send(wire::TrackerSetUpdateRate{rate_Hz});
+  impl_->updateRate_Hz = rate_Hz;
+  if (connected()) impl_->send(wire::TrackerSetUpdateRate{rate_Hz});
 }
 void Client::resetOrigin() {
   impl_->send(wire::TrackerResetOrigin{});

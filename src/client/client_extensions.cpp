@@ -27,6 +27,7 @@ void Client::Impl::greet() {
   link.sendNow(sender, wire::QueryCapabilities{});
   if (!token.empty()) link.sendNow(sender, identity());
   if (subscription) link.sendNow(sender, *subscription);
+  if (updateRate_Hz) link.sendNow(sender, wire::TrackerSetUpdateRate{*updateRate_Hz});
   if (heartbeats) link.sendNow(sender, wire::Heartbeat{1});
 }
 
@@ -115,6 +116,7 @@ void Client::subscribe(Reports kinds, double rate_Hz) {
   }
   if (connected()) impl_->require(wire::kFeatureSubscribe, "choose reports");
   impl_->subscription = wire::Subscribe{static_cast<std::uint32_t>(kinds), rate_Hz};
+  if (rate_Hz > 0) impl_->updateRate_Hz.reset();
   if (connected()) impl_->link.sendNow(impl_->sender, *impl_->subscription);
 }
 

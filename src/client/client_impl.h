@@ -27,7 +27,7 @@ struct HAPTICD_HIDDEN Client::Impl {
 
   void waitConnected(Duration timeout);
   /// On a new connection, before anything else is sent: asks for the capabilities, and repeats the
-  /// subscription and the heartbeat, which belong to a connection.
+  /// subscription, the report rate and the heartbeat, which belong to a connection.
   void greet();
   /// What the server must know of this client before it stops or re-arms.
   wire::Identify identity() const { return {.token = std::string_view(token), .key = key}; }
@@ -75,8 +75,9 @@ struct HAPTICD_HIDDEN Client::Impl {
   std::optional<wire::Capabilities> offer;  // by the server of this connection
   bool answered = false;                    // the server has answered, or does not know the question
   std::optional<wire::Subscribe> subscription;
-  std::string token;        // for a role; empty: none
-  const std::uint64_t key;  // by which the server knows the connections of this client; not 0
+  std::optional<double> updateRate_Hz;  // asked for after the subscription
+  std::string token;                    // for a role; empty: none
+  const std::uint64_t key;              // by which the server knows the connections of this client; not 0
   bool heartbeats = false;
   net::Subscription heartbeatTimer;
   LatestReports latest;

@@ -128,7 +128,7 @@ void Client::Impl::uploadRuns(int object, Vertices vertices, Triangles triangles
                               const Callback<UploadProgress>& progress) {
   if (link.holding()) {
     send(wire::ClearTrimesh{object});
-    return sendRuns(object, 0, vertices, triangles, {});
+    return sendRuns(object, 0, vertices, triangles, [&] { link.runOnce(); });
   }
   const std::uint64_t bytes = kClearFrameBytes + runBytes<wire::MeshVertices>(vertices.size()) +
                               runBytes<wire::MeshTriangles>(triangles.size());
@@ -136,7 +136,7 @@ void Client::Impl::uploadRuns(int object, Vertices vertices, Triangles triangles
   if (has(wire::kFeatureBatch) && bytes <= client::Link::kMaxBatchBytes) {
     client::HeldBatch batch(link);
     send(wire::ClearTrimesh{object});
-    sendRuns(object, 0, vertices, triangles, {});
+    sendRuns(object, 0, vertices, triangles, [&] { link.runOnce(); });  // heartbeats
     upload.check();
     batch.commit(sender);
   } else {

@@ -221,6 +221,25 @@ TEST(Extensions, ASubscriptionIsRepeatedOnTheNextConnection) {
   }
 }
 
+TEST(Extensions, ARateIsRepeatedOnTheNextConnectionUnlessASubscriptionReplacesIt) {
+  ScriptedServer server(able());
+  Client client(server.tcpName());
+  client.setUpdateRate(20);
+  client.flushAll();
+  ASSERT_EQ(server.waitReceived(1).size(), 1U);
+  server.dropClients();
+  ASSERT_TRUE(waitReconnected(client, server, 2));
+  for (const Received& t : server.waitReceived(2)) EXPECT_TRUE(is(t, wire::TrackerSetUpdateRate{20}));
+  constexpr std::uint32_t kUsual = wire::kReportDefault | wire::kReportHip | wire::kReportContactPoint;
+  client.subscribe(Reports::usual, 500);
+  ASSERT_EQ(server.waitReceived(3).size(), 3U);
+  server.dropClients();
+  ASSERT_TRUE(waitReconnected(client, server, 3));
+  const auto received = server.waitReceived(4);
+  ASSERT_EQ(received.size(), 4U);
+  for (std::size_t i = 2; i < 4; ++i) EXPECT_TRUE(is(received[i], wire::Subscribe{kUsual, 500}));
+}
+
 TEST(Extensions, ASubscriptionMayPrecedeTheConnection) {
   ScriptedServer server(able());
   Client client(server.tcpName(), {.connectTimeout = 0ms});

@@ -205,9 +205,12 @@ TEST_P(Vrpn, ConstraintsAreForceFields) {
   device.enableConstraint(1);
   device.setConstraintMode(vrpn_ForceDevice::PLANE_CONSTRAINT);
   device.enableConstraint(0);
+  device.enableConstraint(1);
+  device.setConstraintMode(vrpn_ForceDevice::NO_CONSTRAINT);
   device.mainloop();
-  const auto received = server_.waitReceived(3);
-  ASSERT_EQ(received.size(), 3U);
+  const auto received = server_.waitReceived(5);
+  ASSERT_EQ(received.size(), 5U);
+  EXPECT_TRUE(is(received[4], wire::ForceField{})) << "no constraint";
   EXPECT_TRUE(
       is(received[0], wire::ForceField{{1, 2, 3}, {0, 0, 0}, {-100, 0, 0, 0, 0, 0, 0, 0, -100}, 100}));
   EXPECT_TRUE(is(received[1], wire::ForceField{{1, 2, 3}, {0, 0, 0}, {0, 0, 0, 0, -100, 0, 0, 0, 0}, 100}));

@@ -310,6 +310,7 @@ void vrpn_ForceDevice_Remote::updateConstraint() {
 
 void vrpn_ForceDevice_Remote::setConstraintMode(ConstraintGeometry mode) {
   constraintMode_ = mode;
+  if (constrained_ && mode == NO_CONSTRAINT) return stopForceField();
   updateConstraint();
 }
 void vrpn_ForceDevice_Remote::setConstraintPoint(vrpn_float32 point[3]) {
