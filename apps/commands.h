@@ -38,6 +38,8 @@ inline void keepFile(const std::string& file, bool force, const std::string& inp
   if (force || file.empty() || !std::filesystem::is_regular_file(file, none)) return;
   throw std::runtime_error("'" + file + "' exists: choose another name, or overwrite it by --force");
 }
+inline constexpr const char* kNotWritten =
+    "cannot write to standard output: the disk is full, or its reader has gone";
 inline constexpr const char* kForceText = "Overwrite an existing file";
 
 /// Largest duration that an option accepts, in seconds: 30 years.

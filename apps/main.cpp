@@ -13,12 +13,18 @@
 
 namespace {
 
-std::optional<std::string> nearestCommand(const CLI::App& app, const std::string& typed) {
+// " did you mean 'NAME'?", or nothing.
+std::string suggestion(const std::string& typed, const std::vector<std::string>& names) {
+  const std::optional<std::string> nearest = hapticd::base::nearestName(typed, names);
+  return nearest ? " did you mean '" + *nearest + "'?" : "";
+}
+
+std::vector<std::string> commandNames(const CLI::App& app) {
   std::vector<std::string> names;
   for (const CLI::App* command :
        app.get_subcommands([](const CLI::App* each) { return !each->get_group().empty(); }))
     names.push_back(command->get_name());
-  return hapticd::base::nearestName(typed, names);
+  return names;
 }
 
 // Names the option that was typed wrong, of the innermost command. False when there was none.
@@ -38,9 +44,8 @@ bool explainUnknownOption(const CLI::App& app) {
     for (const std::string& each : option->get_lnames()) names.push_back("--" + each);
   }
   const std::string option = typed->substr(0, typed->find('='));
-  const std::optional<std::string> nearest = hapticd::base::nearestName(option, names);
   std::fprintf(stderr, "%s: unknown option '%s';%s '%s --help' lists the options\n", name.c_str(),
-               option.c_str(), nearest ? (" did you mean '" + *nearest + "'?").c_str() : "", name.c_str());
+               option.c_str(), suggestion(option, names).c_str(), name.c_str());
   return true;
 }
 
@@ -85,9 +90,8 @@ int main(int argc, char** argv) {
   } catch (const CLI::RequiredError& error) {
     const std::vector<std::string> rest = app.remaining();
     if (app.get_subcommands().empty() && !rest.empty()) {
-      const std::optional<std::string> nearest = nearestCommand(app, rest[0]);
       std::fprintf(stderr, "hapticd: unknown command '%s';%s 'hapticd --help' lists the commands\n",
-                   rest[0].c_str(), nearest ? (" did you mean '" + *nearest + "'?").c_str() : "");
+                   rest[0].c_str(), suggestion(rest[0], commandNames(app)).c_str());
       return 2;
     }
     return app.exit(error) == 0 ? 0 : 2;
@@ -108,8 +112,7 @@ int main(int argc, char** argv) {
   }
   // What did not reach a full disk must not look like a success.
   if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
-    std::fprintf(stderr,
-                 "hapticd: cannot write to standard output: the disk is full, or its reader has gone\n");
+    std::fprintf(stderr, "hapticd: %s\n", kNotWritten);
     return exitCode == 0 ? 1 : exitCode;
   }
   return exitCode;

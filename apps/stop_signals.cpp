@@ -15,6 +15,7 @@ void request(int) {
 }  // namespace
 
 StopSignals::StopSignals() {
+  static_assert(std::tuple_size_v<decltype(before_)> == std::size(kHandled));
   for (std::size_t i = 0; i < before_.size(); ++i) {
     before_[i] = std::signal(kHandled[i], request);
     if (before_[i] == SIG_IGN) std::signal(kHandled[i], SIG_IGN);

@@ -111,8 +111,7 @@ void stream(Client& client, const WatchOptions& options) {
   const auto flush = [&] {
     if (!whole) print(sampleOf(client.device(), composed(client.latest())));
     std::fflush(stdout);
-    if (std::ferror(stdout) != 0)
-      throw Error("cannot write to standard output: the disk is full, or its reader has gone");
+    if (std::ferror(stdout) != 0) throw Error(kNotWritten);
   };
   pollUntilEnd(client, options.seconds, period, flush, [&](const std::string& line) {
     printError(line);

@@ -3,8 +3,11 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-grep -rhozE '\bTEST(_F|_P)?\([[:space:]]*[A-Za-z0-9_]+,[[:space:]]*[A-Za-z0-9_]+[[:space:]]*\)' tests --include='*.cpp' --include='*.h' |
-  tr -d '\n ' | tr '\0' '\n' | sed -E 's/^TEST(_F|_P)?\(//; s/\)$//; s/,/./' |
+{
+  grep -rhozE '\bTEST(_F|_P)?\([[:space:]]*[A-Za-z0-9_]+,[[:space:]]*[A-Za-z0-9_]+[[:space:]]*\)' tests --include='*.cpp' --include='*.h' |
+  tr -d '\n ' | tr '\0' '\n' | sed -E 's/^TEST(_F|_P)?\(//; s/\)$//; s/,/./'
+  ls tests/web/*_test.mjs tests/web/unit/*.test.mjs | sed -E 's!.*/!web.!; s![._]test.mjs$!!'  # as ctest names them
+} |
   awk '
     FNR == NR { test[$0] = 1; tests++; next }
     !/^\| / || /^\| hazard / { next }

@@ -200,8 +200,8 @@ async def _end_stream(transport: asyncio.Transport, send_timeout: float) -> None
         with suppress(OSError):  # the server has ended it already
             transport.write_eof()  # behind what waits in the transport
         while not protocol.lost.done():
-            acknowledged = sock is None or sock.fileno() < 0
-            if end.is_over(transport.get_write_buffer_size() + (0 if acknowledged else unacknowledged(sock))):
+            closed = sock is None or sock.fileno() < 0
+            if end.is_over(transport.get_write_buffer_size() + (0 if closed else unacknowledged(sock))):
                 break
             await asyncio.wait([protocol.lost], timeout=END_CHECK_S)
     finally:

@@ -26,6 +26,21 @@ def run(main: Coroutine[Any, Any, None]) -> None:
     asyncio.run(asyncio.wait_for(main, 120), debug=False)
 
 
+def run_without_collector(main: Coroutine[Any, Any, None]) -> None:
+    """What is gone with its last name needs no garbage collector."""
+    gc.collect()
+    gc.disable()
+    try:
+        run(main)
+    finally:
+        gc.enable()
+
+
+def no_client_is_left() -> None:
+    tasks = asyncio.all_tasks() - {asyncio.current_task()}
+    assert [task for task in tasks if "stay_connected" in repr(task)] == []
+
+
 async def until(hand: hapticd.aio.Client, condition: Callable[[], Any]) -> None:
     assert await wait(hand, condition, 60), f"never became true; latest tick {hand.latest.tick}"
 
@@ -83,15 +98,9 @@ def test_a_client_ends_with_its_last_name(server: Server, way: str, caplog: pyte
             await watching.poll(0.1)
             assert gone() is None
             await until(watching, lambda: watching.latest.force.force_N[0] == 0)
-        tasks = asyncio.all_tasks() - {asyncio.current_task()}
-        assert [task for task in tasks if "stay_connected" in repr(task)] == []
+        no_client_is_left()
 
-    gc.collect()
-    gc.disable()
-    try:
-        run(main())
-    finally:
-        gc.enable()
+    run_without_collector(main())
     assert caplog.records == []
 
 
@@ -129,7 +138,7 @@ def test_a_server_that_has_stopped_does_not_keep_a_client_that_closes() -> None:
                 scripted.reads.clear()
                 hand.set_vertices(0, 0, np.zeros((vertices, 3)))
                 start = time.monotonic()
-            assert time.monotonic() - start < 5
+            assert time.monotonic() - start < 60  # it would wait for ever
             scripted.reads.set()
             scripted.close()
 
@@ -455,13 +464,7 @@ def test_a_client_ends_with_its_last_name_before_its_first_connection() -> None:
         await asyncio.sleep(1.2)  # a request follows another after 1 s
         with pytest.raises(BlockingIOError):
             request.recv(1000)
-        tasks = asyncio.all_tasks() - {asyncio.current_task()}
-        assert [task for task in tasks if "stay_connected" in repr(task)] == []
+        no_client_is_left()
 
-    gc.collect()
-    gc.disable()
-    try:
-        run(main())
-    finally:
-        gc.enable()
+    run_without_collector(main())
     request.close()

@@ -586,7 +586,7 @@ def test_a_server_that_has_stopped_does_not_keep_a_client_that_closes() -> None:
             scripted.reads.clear()
             hand.set_vertices(0, 0, np.zeros((vertices, 3)))
             start = time.monotonic()
-        assert time.monotonic() - start < 5
+        assert time.monotonic() - start < 60  # it would wait for ever
         scripted.reads.set()
         scripted.close()
 

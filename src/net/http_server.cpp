@@ -55,13 +55,10 @@ class HttpServer::Impl {
     const auto mayStay = [&](const Client& c) {
       return c.connection->isAnswering() || held[c.address] < held[address];
     };
-    const auto goesLater = [&](const Client& a, const Client& b) {
-      const auto key = [&](const Client& c) {
-        return std::tuple(!mayStay(c), held[c.address], c.connection->isIdle());
-      };
-      return key(a) < key(b);
+    const auto rank = [&](const Client& c) {
+      return std::tuple(!mayStay(c), held[c.address], c.connection->isIdle());
     };
-    const auto first = std::max_element(clients_.begin(), clients_.end(), goesLater);
+    const auto first = std::ranges::max_element(clients_, {}, rank);
     if (first == clients_.end() || mayStay(*first)) return false;
     clients_.erase(first);
     return true;

@@ -92,8 +92,12 @@ std::vector<ForceField> FreeForces::passiveFields(double worldUnitsPerMetre) con
 }
 
 double FreeForces::load_Ns_per_m(double worldUnitsPerMetre) const {
+  return loadWith(passiveFields(worldUnitsPerMetre), worldUnitsPerMetre);
+}
+
+double FreeForces::loadWith(const std::vector<ForceField>& fields, double worldUnitsPerMetre) const {
   SpringSum sum = sumOfEffects();
-  for (const ForceField& field : passiveFields(worldUnitsPerMetre)) {
+  for (const ForceField& field : fields) {
     if (!field.releasing) sum.stiffness_N_per_m += stiffnessOf(field, worldUnitsPerMetre);
   }
   return bound_.loadOf(sum);
@@ -102,7 +106,7 @@ double FreeForces::load_Ns_per_m(double worldUnitsPerMetre) const {
 // Each alone is within the bound, together they may not be. A contact is one surface: between two it is no
 // stiffer than the stiffer one.
 void FreeForces::keepPassiveTogether(PublishedForces& forces, double worldUnitsPerMetre) const {
-  const double load = load_Ns_per_m(worldUnitsPerMetre);
+  const double load = loadWith(forces.fields, worldUnitsPerMetre);
   if (load == 0) return;
   double heaviest = heaviestSurface_Ns_per_m_;
   for (Plane& plane : forces.planes) {

@@ -124,6 +124,7 @@ class FreeForces {
   std::optional<ForceField> fieldOf(const Constraint& constraint) const;
   ForceField passive(ForceField field, double worldUnitsPerMetre) const;
   std::vector<ForceField> passiveFields(double worldUnitsPerMetre) const;
+  double loadWith(const std::vector<ForceField>& fields, double worldUnitsPerMetre) const;
   SpringSum sumOfEffects() const;
   void tellOfSum(const Call& call) const;
   void keepPassiveTogether(PublishedForces& forces, double worldUnitsPerMetre) const;

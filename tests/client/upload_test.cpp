@@ -73,7 +73,7 @@ TEST(Client, AServerThatHasStoppedDoesNotKeepAClientThatEnds) {
     for (int i = 0; i < vertices; ++i) client->setVertex(0, i, 0, 0, 0);
     const auto start = std::chrono::steady_clock::now();
     client.reset();
-    EXPECT_LT(std::chrono::steady_clock::now() - start, 5s);
+    EXPECT_LT(std::chrono::steady_clock::now() - start, kPatience) << "it would wait for ever";
   }
 }
 

@@ -296,6 +296,34 @@ TEST(HttpServer, SilentConnectionsGiveWayToNewOnes) {
   EXPECT_EQ(http.receiveAll(peers[1]), "");
 }
 
+// Whoever holds the most makes room, and nobody for one that holds more.
+TEST(HttpServer, OneAddressKeepsNoOtherOut) {
+  HttpOptions options;
+  options.connections = 3;
+  Http http(options);
+  const auto joinFrom = [&](int address, std::size_t connections) {
+    RawSocket peer = RawSocket::connectedFrom(address, http.server.local());
+    EXPECT_TRUE(pumpUntil(http.loop, [&] { return http.server.connections() == connections; }));
+    return peer;
+  };
+  RawSocket quiet = joinFrom(2, 1);  // the oldest, and idle
+  std::vector<RawSocket> crowd;
+  for (const std::size_t connections : {2, 3, 3}) crowd.push_back(joinFrom(3, connections));
+  EXPECT_EQ(http.receiveAll(crowd[0]), "") << "makes room for another of its own";
+  for (std::size_t i = 1; i < 3; ++i) {
+    ASSERT_TRUE(crowd[i].send("GET /later HTTP/1.1\r\nHost: here\r\n\r\n"));
+    ASSERT_TRUE(pumpUntil(http.loop, [&] { return http.later.size() == i; }));
+  }
+  RawSocket more = RawSocket::connectedFrom(3, http.server.local());
+  EXPECT_EQ(http.receiveAll(more), "") << "its own wait for answers, and the quiet one holds fewer";
+  for (const HttpReply& reply : http.later) reply(HttpResponse::of(200, "late"));
+  RawSocket other = RawSocket::connectedFrom(4, http.server.local());
+  for (RawSocket* kept : {&quiet, &other}) {
+    ASSERT_TRUE(kept->send(kGet));
+    EXPECT_EQ(http.receive(*kept, kAnswer.size()), kAnswer) << "the crowd makes room";
+  }
+}
+
 TEST(HttpServer, ThousandsOfRequestsLeaveNothingBehind) {
   Http http;
   const auto openFiles = [] {

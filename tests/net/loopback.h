@@ -83,10 +83,17 @@ class RawSocket {
     if (receiveBufferBytes > 0) {
       ::setsockopt(socket.fd_, SOL_SOCKET, SO_RCVBUF, &receiveBufferBytes, sizeof receiveBufferBytes);
     }
-    const sockaddr_in address = socketAddress(peer);
-    if (::connect(socket.fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-      throw std::runtime_error(std::string("connect: ") + std::strerror(errno));
-    }
+    socket.connect(peer);
+    return socket;
+  }
+
+  /// From another address of this machine, 127.0.0.`last`.
+  static RawSocket connectedFrom(int last, const Endpoint& peer) {
+    RawSocket socket;
+    const sockaddr_in own = socketAddress({kLoopbackAddress - 1 + static_cast<std::uint32_t>(last), 0});
+    if (::bind(socket.fd_, reinterpret_cast<const sockaddr*>(&own), sizeof own) != 0)
+      throw std::runtime_error(std::string("bind: ") + std::strerror(errno));
+    socket.connect(peer);
     return socket;
   }
 
@@ -153,6 +160,12 @@ class RawSocket {
   }
 
  private:
+  void connect(const Endpoint& peer) const {
+    const sockaddr_in address = socketAddress(peer);
+    if (::connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
+      throw std::runtime_error(std::string("connect: ") + std::strerror(errno));
+  }
+
   struct Taken {};
   RawSocket(Taken, int fd) : fd_(fd) {
     const timeval limit{30, 0};

@@ -618,13 +618,11 @@ void Proxy::fadeWhenOverworked(std::uint32_t& status) noexcept {
 void Proxy::releaseWhenDeep(bool wasFree, std::uint32_t& status) noexcept {
   if (contactSet_.count == 0) {
     released_ = false;
-    jumper_ = -1;
     return;
   }
   const double deepest = std::max(kJump_m, kFastestHip_m_per_s * std::min(period_s_, kLongestTick_s));
   if ((wasFree || carriedByJump_) && contactSet_.normal_m.norm() > deepest) released_ = true;
   if (released_) status |= kRenderReleased;
-  if (!released_) jumper_ = -1;
 }
 
 }  // namespace hapticd::realtime

@@ -182,7 +182,7 @@ class Proxy {
   bool isBelowOpen(int object, const Vec3& out, Vec3& lifted) noexcept;
   Vec3 pressOf(std::int32_t object) const noexcept;
   void releaseByJump(const PlacedObject& object, std::uint32_t& status) noexcept;
-  void takenByJump(const PlacedObject& object, const Vec3& place) noexcept;
+  void takenByJump(const PlacedObject& object) noexcept;
   bool returnFromJump() noexcept;
   static double missedMove(const PlacedObject& object) noexcept;
   void updateProxy(const Vec3& hip) noexcept;
@@ -248,9 +248,8 @@ class Proxy {
   int overworked_ = 0;  // ticks in a row whose work was spent
   bool commandChanged_ = false;
   double share_ = 1;
-  bool released_ = false;  // contact released until the HIP leaves the surface
-  std::int32_t jumper_ =
-      -1;  // id of the object that jumped and took the proxy along; -1: none since it was free
+  bool released_ = false;           // contact released until the HIP leaves the surface
+  std::int32_t jumper_ = -1;        // id of the object that jumped and released it; -1: none
   Vec3 beforeJump_ = Vec3::Zero();  // where that found the proxy
   bool carriedByJump_ = false;      // in this tick
   bool wasHeld_ = false;            // the contact is that of the tick before

@@ -180,7 +180,7 @@ void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
       const bool deformedFar = object.deformed && isJump(object, touchedTriangle_);
       carriedByJump_ = object.jumped || (carried != position_ && (isJump(object) || deformedFar));
       if (carriedByJump_) status |= kRenderGeometryJump;
-      if (carriedByJump_) takenByJump(object, position_);
+      if (carriedByJump_) takenByJump(object);
       if (!object.jumped || ((carried - position_).norm() <= kJump_m && !turnsAway(object))) {
         position_ = carried;
       } else {
@@ -416,13 +416,13 @@ bool Proxy::pushByObjects(const Vec3& from, Pushers& pushers, std::uint32_t& sta
 }
 
 void Proxy::releaseByJump(const PlacedObject& object, std::uint32_t& status) noexcept {
-  takenByJump(object, positionBefore_);
+  takenByJump(object);
   released_ = true;
   status |= kRenderGeometryJump;
 }
 
-void Proxy::takenByJump(const PlacedObject& object, const Vec3& place) noexcept {
-  if (jumper_ < 0) beforeJump_ = place;
+void Proxy::takenByJump(const PlacedObject& object) noexcept {
+  if (jumper_ < 0) beforeJump_ = positionBefore_;
   jumper_ = object.state->id;
 }
 
@@ -430,7 +430,8 @@ void Proxy::takenByJump(const PlacedObject& object, const Vec3& place) noexcept 
 // to where the jump found it. An open one may have risen over the hand, and keeps the proxy on the side where
 // it was. True when it returned.
 bool Proxy::returnFromJump() noexcept {
-  if (jumper_ < 0 || !released_) return false;
+  if (!released_) jumper_ = -1;
+  if (jumper_ < 0) return false;
   const int jumper = query_.addObject(jumper_);
   if (jumper < 0) return false;
   EnclosureBudget budget;

@@ -145,10 +145,8 @@ void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState
   if ((out.status & kRenderReleased) == 0)
     applySurfaceLaw(contactSet, out.proxy_m, device.velocity_m_per_s, radius, out);
   // A command that changes nothing that is felt, as of a surface elsewhere, is none here.
-  const auto steps = [&] {
-    return s.proxy.commandChanged() &&
-           s.last.stepsTo({out.contactForce_N, contactSet.spring.kappa_N_per_m, hip});
-  };
+  const auto felt = [&] { return LastForce{out.contactForce_N, contactSet.spring.kappa_N_per_m, hip}; };
+  const auto steps = [&] { return s.proxy.commandChanged() && s.last.stepsTo(felt()); };
   SpringState springs = restingSprings(contactSet, steps(), radius, out);
   const double share = s.proxy.feltShare() * s.rise.step(out.contactForce_N, springs.known, period_s);
   scaleContact(share, out);
@@ -160,7 +158,7 @@ void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState
     applyAdhesion(s.proxy.planes().adhesion(hip, radius), out);
   }
   if (steps()) out.status |= kRenderGeometryJump;
-  s.last = {out.contactForce_N, contactSet.spring.kappa_N_per_m, hip};
+  s.last = felt();
   out.force_N = out.contactForce_N + brake;
   out.force_N += s.effects.force(scene, device, out, (out.normalForce_N + brake).dot(out.normal), now);
   out.force_N += s.fields.force(scene, hip, now);
