@@ -247,8 +247,7 @@ TEST_F(OpenHapticsIsolatedFault, TheServerEndsWhileAHungDeviceIsReopened) {
 
 TEST_F(OpenHapticsIsolatedFault, TheServerEndsWhileADeviceHangsInItsOpening) {
   serve();
-  arm->fault = mock::kUnplugged;
-  expectWords("the device gives no force");
+  strike(mock::kUnplugged, 1);
   const int opened = arm->opened;
   arm->fault = mock::kOpeningHangs;
   EXPECT_TRUE(visitor->until([&] { return arm->opened > opened; })) << server->log();
@@ -270,8 +269,7 @@ TEST_F(OpenHapticsIsolatedFault, AnUnpluggedDeviceIsReopenedInANewProcessEachTim
 
 TEST_F(OpenHapticsIsolatedFault, ADeviceThatDoesNotOpenIsTriedUntilItDoes) {
   serve();
-  arm->fault = mock::kUnplugged;
-  expectWords("the device gives no force");  // the reason is that of the test of this fault
+  strike(mock::kUnplugged, 1);  // a text would not do: that of a stall before reads the same
   arm->fault = mock::kDoesNotOpen;
   expectWords("the device does not open: no OpenHaptics device opens");
   heal(true);
