@@ -29,6 +29,20 @@ inline CLI::Validator within(double least, double most) {
 inline CLI::Validator notEmpty() {
   return CLI::Validator([](std::string& text) { return text.empty() ? "is empty" : ""; }, "");
 }
+/// Accepts a file to read, also a pipe or device. CLI11's own check calls one missing that lies in a folder
+/// which may not be entered.
+inline CLI::Validator existingFile() {
+  return CLI::Validator(
+      [](const std::string& file) -> std::string {
+        std::error_code error;
+        const auto status = std::filesystem::status(file, error);
+        if (std::filesystem::is_directory(status)) return "'" + file + "' is a folder, not a file";
+        if (std::filesystem::exists(status)) return {};
+        if (status.type() == std::filesystem::file_type::not_found) return "there is no file '" + file + "'";
+        return "cannot read '" + file + "': " + error.message();
+      },
+      "FILE");
+}
 /// Throws std::runtime_error when the file exists and `force` is not given, or is `input`, which is still to
 /// be read. Pipes and devices may be written.
 inline void keepFile(const std::string& file, bool force, const std::string& input = {}) {

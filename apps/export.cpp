@@ -12,6 +12,7 @@
 #include "record/sidecar.h"
 #include "record/vrpn_log.h"
 #include "server/reports/reporter.h"
+#include "stop_signals.h"
 
 namespace hapticd::apps {
 namespace {
@@ -65,6 +66,7 @@ void exportVrpn(const ExportOptions& options, std::string& remark) {
     for (const std::string& name : device.names) devices.back().names.push_back(log.addSender(name));
   }
   for (record::RecordingEvent event; reader.next(event);) {
+    throwIfStopped();
     const auto* tick = std::get_if<record::TickEvent>(&event);
     if (tick == nullptr) continue;
     const realtime::TickReport& report = tick->tick.report;
@@ -75,6 +77,7 @@ void exportVrpn(const ExportOptions& options, std::string& remark) {
 }
 
 int run(const ExportOptions& options) {
+  const StopSignals signals;
   keepFile(options.out, options.force, options.recording);
   const std::string beside = options.to == "vrpn" ? "" : options.out + ".json";
   keepFile(beside, options.force, options.recording);
@@ -89,10 +92,10 @@ int run(const ExportOptions& options) {
     besideFile.flush();
     if (options.to == "csv") {
       record::CsvFile file(options.out, kDropped);
-      record::exportRecording(options.recording, file, remark);
+      record::exportRecording(options.recording, file, remark, throwIfStopped);
     } else {
       record::McapFile file(options.out, kDropped);
-      record::exportRecording(options.recording, file, remark);
+      record::exportRecording(options.recording, file, remark, throwIfStopped);
     }
     besideFile.close();
   }
@@ -116,7 +119,7 @@ void addExport(CLI::App& app) {
   CLI::App* command = app.add_subcommand("export", "Convert a recording to MCAP, CSV or a VRPN log");
   command->add_option("file", options->recording, "Recording of 'hapticd serve --record'")
       ->required()
-      ->check(CLI::ExistingFile);
+      ->check(existingFile());
   command->add_option("--to", options->to, "mcap, csv or vrpn")
       ->required()
       ->check(CLI::IsMember({"mcap", "csv", "vrpn"}));

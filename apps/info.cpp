@@ -141,7 +141,7 @@ void addInfo(CLI::App& app) {
       app.add_subcommand("info", "Show what a recording holds: devices, time, forces, commands");
   command->add_option("file", options->file, "Recording of 'hapticd serve --record'")
       ->required()
-      ->check(CLI::ExistingFile);
+      ->check(existingFile());
   command->add_flag("--config", options->config, "Also print the configuration of its server, as TOML");
   command->add_flag("--json", options->json,
                     "One JSON object for programs: devices, surfaces, markers, configuration");

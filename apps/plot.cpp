@@ -291,7 +291,7 @@ void addPlot(CLI::App& app) {
   CLI::App* command = app.add_subcommand("plot", "Draw a recording: force, depth, speed, events, stiffness");
   command->add_option("file", options->recording, "Recording of 'hapticd serve --record'")
       ->required()
-      ->check(CLI::ExistingFile);
+      ->check(existingFile());
   command->add_option("-o,--out", options->out, "*.svg or *.pdf")->required();
   command->add_option("--device", options->device, "Name of a device [the first]");
   command->add_option("--from", options->from_s, "First second")

@@ -20,7 +20,7 @@ struct RenderCommandOptions {
 };
 
 void addMeshOptions(CLI::App& command, MeshRenderOptions& options) {
-  command.add_option("--mesh", options.mesh, "OBJ, STL, PLY or glTF file")->check(CLI::ExistingFile);
+  command.add_option("--mesh", options.mesh, "OBJ, STL, PLY or glTF file")->check(existingFile());
   command.add_option("--mesh-unit", options.meshUnit, "Length unit of the file")
       ->check(CLI::IsMember({"mm", "m"}))
       ->capture_default_str();
@@ -33,11 +33,11 @@ void addMeshOptions(CLI::App& command, MeshRenderOptions& options) {
                   "CSV: t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons] in device metres, or any CSV that hapticd "
                   "wrote; or a "
                   ".traj file")
-      ->check(CLI::ExistingFile);
+      ->check(existingFile());
   command
       .add_option("--compare", options.compare,
                   ".traj file with measured forces: print how far the rendered ones are from them")
-      ->check(CLI::ExistingFile);
+      ->check(existingFile());
   command
       .add_option("--faces", options.faces,
                   "Sides that can be touched; seen from the front, corners run counter-clockwise")
@@ -157,7 +157,7 @@ void addRender(CLI::App& app) {
   addMeshOptions(*command, options->mesh);
   addTrajectoryOptions(*command, options->mesh.trajectory);
   command->add_option("--session", options->session, "Recording of 'hapticd serve --record' to re-render")
-      ->check(CLI::ExistingFile);
+      ->check(existingFile());
   command->add_option("--out", options->mesh.out, "CSV to write, one row for each tick");
   command->add_option("--report", options->report,
                       "With --session: HTML page with plots of force and depth, recorded and re-rendered");

@@ -20,6 +20,7 @@
 #include "realtime/servo/guard.h"
 #include "record/export.h"
 #include "scene/builder.h"
+#include "stop_signals.h"
 
 namespace hapticd::apps {
 namespace {
@@ -80,6 +81,7 @@ Summary follow(const MeshRenderOptions& options, const device::HandFile& hand,
   realtime::Rendering rendering;
   const Nanos last = hand.duration();
   for (Nanos t = hand.begin(); t <= last; t += kPeriod) {
+    throwIfStopped();
     const device::HandPose pose = hand.at(t);
     device::DeviceState state;
     state.time = t;
@@ -172,6 +174,7 @@ int renderMesh(const MeshRenderOptions& options) {
   const double build_s = base::toSeconds(base::now() - before);
 
   record::CsvFile out(options.out, record::Unfinished::dropped);
+  const StopSignals signals;
   Summary summary = follow(options, *hand, *snapshot, out);
   out.close();
   if (summary.touching == 0) {

@@ -54,7 +54,7 @@ void addReplay(CLI::App& app) {
   CLI::App* command = app.add_subcommand("replay", "Serve a recording to clients");
   command->add_option("file", options->replay.file, "Recording of 'hapticd serve --record'")
       ->required()
-      ->check(CLI::ExistingFile);
+      ->check(existingFile());
   command->add_option("--speed", options->replay.speed, "Factor: 2 is twice as fast, 0.1 ten times slower")
       ->check(within(0.001, 1000))
       ->capture_default_str();

@@ -38,6 +38,7 @@ ReportSummary::ReportSummary(Client& client) : client_(client) {
   client_.onForce([this](const ForceReport& r) { onForce(r); });
   client_.onDepth([this](const DepthReport& r) { deepest_m_ = std::max(deepest_m_, r.depth_m); });
   client_.onText([this](const TextReport& r) { onText(r); });
+  client_.onConnection([this](const ConnectionReport&) { touchingKnown_ = false; });
   restart();
 }
 

@@ -241,7 +241,7 @@ void addServe(CLI::App& app) {
   command
       ->add_option("--config", options->configFile,
                    "TOML file with all settings, or a vrpn.cfg; flags override it")
-      ->check(CLI::ExistingFile);
+      ->check(existingFile());
   command->add_flag("--check-config", options->checkConfig,
                     "Print the configuration in effect as TOML, or the error in it, and exit");
   command

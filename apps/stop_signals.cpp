@@ -1,6 +1,7 @@
 #include "stop_signals.h"
 
 #include <csignal>
+#include <stdexcept>
 
 namespace hapticd::apps {
 namespace {
@@ -28,6 +29,10 @@ StopSignals::~StopSignals() {
 
 bool stopRequested() {
   return requested != 0;
+}
+
+void throwIfStopped() {
+  if (stopRequested()) throw std::runtime_error("interrupted: nothing is written");
 }
 
 }  // namespace hapticd::apps

@@ -21,5 +21,7 @@ class StopSignals {
 
 /// Whether one of them arrived.
 bool stopRequested();
+/// Throws std::runtime_error when one did: for work that leaves nothing behind when it ends early.
+void throwIfStopped();
 
 }  // namespace hapticd::apps

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "client/server_address.h"
+#include "commands.h"
 #include "net/endpoint.h"
 #include "wire/messages/extension.h"
 
@@ -28,7 +29,7 @@ CLI::Option* addTokenFile(CLI::App& command, std::string& file) {
   return command
       .add_option("--token-file", file,
                   "File with your token, mode 0600; only for a server on this machine, or through a tunnel")
-      ->check(CLI::ExistingFile);
+      ->check(existingFile());
 }
 
 std::string tokenFor(const std::string& server, const std::string& file) {

@@ -178,7 +178,7 @@ void addTouch(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "touch", "Send a mesh (OBJ, STL, PLY, glTF) to a haptics server and show contact and force");
   const auto share = within(0, 1);
-  command->add_option("mesh", options->mesh, "Mesh file")->required()->check(CLI::ExistingFile);
+  command->add_option("mesh", options->mesh, "Mesh file")->required()->check(existingFile());
   command
       ->add_option("--server", options->server,
                    "NAME@host[:port], or NAME@tcp://host[:port] for a single TCP connection (firewalls)")

@@ -220,12 +220,12 @@ void addTunnel(CLI::App& app) {
       command->add_option("--fingerprint", options->fingerprint,
                           "SHA-256 of the server's certificate, which it prints at its start");
   command->add_option("--ca", options->authorities, "PEM file of the authority that signed the certificate")
-      ->check(CLI::ExistingFile)
+      ->check(existingFile())
       ->excludes(known);
   command
       ->add_option("--token-file", options->tokenFile,
                    "Present the token in this file, mode 0600, for each client")
-      ->check(CLI::ExistingFile);
+      ->check(existingFile());
   command->footer(
       "For clients that know neither TLS nor tokens, such as those of stock VRPN: they open\n"
       "NAME@tcp://127.0.0.1:3883. Everybody on this machine can use the tunnel while it runs. It ends with\n"

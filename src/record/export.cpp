@@ -140,10 +140,12 @@ void McapFile::addCommand(const SceneEvent& event, Nanos wall_ns) {
   writer_.add(commands_, wall_ns, text_);
 }
 
-void exportRecording(const std::filesystem::path& file, SampleFile& to, std::string& remark) {
+void exportRecording(const std::filesystem::path& file, SampleFile& to, std::string& remark,
+                     const std::function<void()>& beforeEach) {
   RecordingReader reader(file);
   const RecordingHeader& header = reader.header();
   for (RecordingEvent event; reader.next(event);) {
+    beforeEach();
     if (const auto* tick = std::get_if<TickEvent>(&event)) {
       to.add(sampleOf(header.devices[tick->device].names.front(), tick->tick.report, header.wallOffset));
     } else if (const auto* command = std::get_if<SceneEvent>(&event)) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -66,6 +67,8 @@ class McapFile final : public SampleFile {
 };
 
 /// Writes a whole recording and closes `to`. `remark` says why the recording ends early, if it does.
-void exportRecording(const std::filesystem::path& file, SampleFile& to, std::string& remark);
+/// `beforeEach` is called before each event; what it throws ends the export.
+void exportRecording(const std::filesystem::path& file, SampleFile& to, std::string& remark,
+                     const std::function<void()>& beforeEach);
 
 }  // namespace hapticd::record

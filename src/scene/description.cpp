@@ -6,6 +6,7 @@
 namespace hapticd::scene {
 
 void ObjectTable::describe(SceneDescription& out) const {
+  out.T_world_scene = T_world_scene_;
   for (const auto& object : objects_) {
     if (!object) continue;
     ObjectDescription& to = out.objects.emplace_back();

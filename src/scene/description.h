@@ -51,6 +51,7 @@ struct SceneDescription {
   TouchableFaces faces = TouchableFaces::both;
   Surface surfaceAtOne;  ///< at 1 of the properties of setHapticProperty
   VibrationUnit contactVibrationUnit = VibrationUnit::radPerSecond;  ///< in which clients send it
+  Affine T_world_scene = Affine::Identity();                         ///< of the objects below the scene
   std::vector<ObjectDescription> objects;                            ///< by ascending id
   std::vector<EffectDescription> effects;  ///< by ascending index, also those that do not run
   std::vector<Plane> planes;

@@ -30,6 +30,10 @@ refused 2 "--haply-host: is empty" "$hapticd" devices --haply-host ''
 for command in "demo" "replay $source_dir/testdata/recordings/all_commands_law2.haptics" "serve"; do
   refused 2 "is not an IPv4 address" "$hapticd" $command --listen x
 done
+ln -s loop "$work/loop"
+refused 2 "cannot read '$work/loop': Too many levels of symbolic links" "$hapticd" info "$work/loop"
+refused 2 "there is no file '$work/none'" "$hapticd" replay "$work/none"
+refused 2 "'$work' is a folder, not a file" "$hapticd" serve --config "$work"
 refused 2 "packages.txt has no section 'nosuch', but build" "$source_dir/scripts/install_packages.sh" nosuch
 printf '{"asset":%0200000d' 0 | tr 0 '[' >"$work/deep.gltf"  # overflows the stack of the reader
 refused 1 "deep.gltf': its reader crashed" "$hapticd" touch "$work/deep.gltf"
@@ -71,6 +75,18 @@ grep -q '^device      ' "$work/info" && grep -q '^  force     at most [0-9.]* N'
 status=0
 "$hapticd" info "$recording" >/dev/full 2>"$work/said" || status=$?
 [ "$status" = 1 ] && grep -q "cannot write to standard output" "$work/said" || { cat "$work/said"; echo "status $status"; exit 1; }
+
+# What is interrupted leaves no file behind.
+printf 't_s,x_m,y_m,z_m\n0,0.2,0,0\n100000,0.3,0,0\n' >"$work/long.csv"
+"$hapticd" render --mesh "$source_dir/testdata/meshes/bunny.obj" --hand "$work/long.csv" --out "$work/half.csv" >"$work/said" 2>&1 &
+rendering=$!
+for _ in $(seq 600); do [ ! -e "$work/half.csv.part" ] || break; sleep 0.05; done
+[ -e "$work/half.csv.part" ]
+kill "$rendering"
+status=0
+wait "$rendering" || status=$?
+[ "$status" = 1 ] && grep -q "interrupted: nothing is written" "$work/said" || { cat "$work/said"; echo "status $status"; exit 1; }
+[ ! -e "$work/half.csv" ] && [ ! -e "$work/half.csv.part" ]
 
 # What columns do not say stands beside them, for programs and people.
 grep -q '"program": "hapticd' "$work/out.csv.json" && grep -q '"stiffness_N_per_m"' "$work/out.csv.json" || { cat "$work/out.csv.json"; exit 1; }

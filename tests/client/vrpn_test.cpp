@@ -14,6 +14,7 @@
 
 #include <chrono>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/client_tests.h"
@@ -282,6 +283,24 @@ TEST_P(Vrpn, DevicesOfOneServerShareItsConnection) {
     EXPECT_EQ(server_.connections(), 1U);
   }
   // The connection was deleted with its last device: the next device opens another.
+  vrpn_Tracker_Remote again(name().c_str());
+  EXPECT_TRUE(runUntil(again, [&] { return server_.connections() == 2; }));
+}
+
+int VRPN_CALLBACK deleteTracker(void* tracker, vrpn_HANDLERPARAM) {
+  delete std::exchange(*static_cast<vrpn_Tracker_Remote**>(tracker), nullptr);
+  return 0;
+}
+
+TEST_P(Vrpn, TheConnectionOfADeviceThatAHandlerDeletesIsClosed) {
+  auto* tracker = new vrpn_Tracker_Remote(name().c_str());
+  vrpn_Connection* connection = tracker->connectionPtr();
+  ASSERT_TRUE(ready(*tracker));
+  connection->register_handler(connection->register_message_type("vrpn_Base text_message"), deleteTracker,
+                               &tracker);
+  server_.send(wire::Text{1, 2, "the end"});
+  ASSERT_TRUE(runUntil(*connection, [&] { return tracker == nullptr; }));
+  EXPECT_FALSE(connection->doing_okay());
   vrpn_Tracker_Remote again(name().c_str());
   EXPECT_TRUE(runUntil(again, [&] { return server_.connections() == 2; }));
 }

@@ -91,6 +91,7 @@ TEST_F(Objects, ChildrenFollowTheirParentsInTheirOwnUnits) {
   say(SetSceneOrigin{Vec3(0, 0, 1), Vec3::UnitZ(), 0});
   publish();
   EXPECT_TRUE(placed(2).isApprox(Vec3(1000, 2000, 1000)));
+  EXPECT_TRUE(builder_.describe().T_world_scene.translation().isApprox(Vec3(0, 0, 1000)));
   say(AddObjectExScene{2});
   publish();
   EXPECT_TRUE(placed(2).isApprox(Vec3(0, 1000, 0))) << "a root of its own does not move with the scene";

@@ -204,6 +204,7 @@ bool same(const std::shared_ptr<const std::vector<Vec3f>>& a,
 void checkSame(const SceneDescription& a, const SceneDescription& b) {
   RC_ASSERT(a.workspace.T_world_device.matrix() == b.workspace.T_world_device.matrix());
   RC_ASSERT(a.faces == b.faces);
+  RC_ASSERT(a.T_world_scene.matrix() == b.T_world_scene.matrix());
   RC_ASSERT(a.objects.size() == b.objects.size());
   for (std::size_t i = 0; i < a.objects.size(); ++i) {
     const ObjectDescription& x = a.objects[i];

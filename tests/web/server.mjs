@@ -45,6 +45,7 @@ export class Server {
 
   async stop() {
     this.process.kill("SIGTERM");
+    this.process.kill("SIGCONT"); // a test may have suspended it
     await this.ended;
   }
 

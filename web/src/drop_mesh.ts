@@ -9,14 +9,13 @@ import { upload } from "./mesh/upload";
 import type { FileMesh } from "./mesh/weld";
 import { toast } from "./notice";
 import type { View } from "./scene3d/view";
-import type { DeviceState, ObjectState, SurfaceState } from "./state_types";
+import type { DeviceState, ObjectState, SceneState } from "./state_types";
 
 export interface DropContext {
   link: Link;
   view: View;
   device(): DeviceState | undefined;
-  objects(): ObjectState[];
-  surfaceAtOne(): SurfaceState | null | undefined;
+  scene(): SceneState | undefined;
 }
 
 export class DropMesh {
@@ -115,10 +114,9 @@ export class DropMesh {
   }
 
   private newPlacing(name: string, mesh: FileMesh, device: DeviceState): Placing {
-    const objects = this.context.objects();
-    const { object } = this.targets.next(objects);
-    const one = this.context.surfaceAtOne();
-    return (this.placing = new Placing(name, mesh, this.context.view, device, objects, object, one));
+    const scene = this.context.scene();
+    const { object } = this.targets.next(scene?.objects ?? []);
+    return (this.placing = new Placing(name, mesh, this.context.view, device, scene, object));
   }
 
   private place(name: string, mesh: FileMesh, device: DeviceState): void {
@@ -149,8 +147,9 @@ export class DropMesh {
   }
 
   private async send(name: string, mesh: FileMesh, placing: Placing, channel: Channel, device?: string): Promise<void> {
-    const objects = this.context.objects();
-    const placement = placing.placement(this.targets.next(objects), objects);
+    const scene = this.context.scene();
+    const objects = scene?.objects ?? [];
+    const placement = placing.placement(this.targets.next(objects), scene);
     const sent = this.targets.begin(placement.object, name, objects);
     this.sending = name;
     this.bar.value = 0;

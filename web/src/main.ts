@@ -70,8 +70,7 @@ class Page {
     link: this.link,
     view: this.view,
     device: () => this.device,
-    objects: () => this.objects(),
-    surfaceAtOne: () => this.scene?.surface_at_1,
+    scene: () => this.scene,
   });
   private readonly guard = new GuardPanel(byId("guard"));
   private readonly clients = new ClientsPanel(byId("clients"));
@@ -236,7 +235,7 @@ class Page {
   private showObjects(): void {
     const quantity = this.quantity.value as Quantity;
     if (this.view.objects.update(this.objects(), quantity)) this.view.invalidate();
-    this.objectsPanel.update(this.objects(), this.tick?.object ?? -1, this.scene?.surface_at_1);
+    this.objectsPanel.update(this.scene, this.tick?.object ?? -1);
     byId("legend-scale").hidden = quantity === "object";
     setText(byId("legend-to"), quantity === "stiffness" ? `${rangeOf(this.objects(), quantity)} N/m` : "1");
   }

@@ -134,6 +134,8 @@ export interface ReplayState {
 export interface SceneState {
   devices: string[];
   revision: number;
+  /** Of the objects whose parent is -1. */
+  T_world_scene: number[];
   objects: ObjectState[];
   /** At 1 of setHapticProperty(); null until the scene has replied. */
   surface_at_1: SurfaceState | null;

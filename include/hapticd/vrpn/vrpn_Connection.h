@@ -139,6 +139,8 @@ class VRPN_API vrpn_Connection {
   const hapticd::wire::LocalNames* names() const;
   void dispatch(const hapticd::client::Arrival& arrival);
   void callControlHandlers(const char* type);
+  bool isUnused() const;
+  void close();
 
   std::string name_;
   std::unique_ptr<hapticd::client::Link> link_;          // of a client, or

@@ -37,6 +37,10 @@ std::map<std::string, vrpn_Connection*>& knownConnections() {
   return connections;
 }
 
+void forget(const vrpn_Connection* connection) {
+  std::erase_if(knownConnections(), [connection](const auto& k) { return k.second == connection; });
+}
+
 void refuseLogs(std::initializer_list<const char*> files) {
   for (const char* file : files) {
     if (file && *file) fprintf(stderr, "VRPN: log file %s is not written by this library\n", file);
@@ -79,10 +83,7 @@ int vrpn_Connection::servedPort() const {
 }
 
 vrpn_Connection::~vrpn_Connection() {
-  auto& known = knownConnections();
-  const auto self =
-      std::find_if(known.begin(), known.end(), [this](const auto& k) { return k.second == this; });
-  if (self != known.end()) known.erase(self);
+  forget(this);
 }
 
 vrpn_bool vrpn_Connection::doing_okay() const {
@@ -113,6 +114,7 @@ int vrpn_Connection::mainloop(const timeval* timeout) {
     fprintf(stderr, "VRPN: %s\n", error.what());
     return -1;
   }
+  if (calling_ == 0 && isUnused()) close();
   return 0;
 }
 
@@ -266,8 +268,20 @@ void vrpn_Connection::addReference() {
 }
 
 void vrpn_Connection::removeReference() {
-  // A running handler returns into the connection, so it must not be deleted then.
-  if (--references_ <= 0 && autoDelete_ && calling_ == 0) delete this;
+  --references_;
+  if (calling_ == 0 && isUnused()) delete this;
+}
+
+bool vrpn_Connection::isUnused() const {
+  return references_ <= 0 && autoDelete_;
+}
+
+// The last device was deleted by a handler, which returned into the connection and perhaps into that device:
+// the forces of this client end, and the rest of the connection stays.
+void vrpn_Connection::close() {
+  forget(this);
+  link_.reset();
+  served_.reset();
 }
 
 vrpn_Connection* vrpn_get_connection_by_name(const char* name, const char* local_in_logfile,

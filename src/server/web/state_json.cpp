@@ -197,6 +197,7 @@ Json json(const SceneReport& report, const std::vector<std::string>& devices) {
   return {
       {"devices", devices},
       {"revision", scene.revision},
+      {"T_world_scene", json(scene.T_world_scene)},
       {"objects", std::move(objects)},
       {"surface_at_1", report.observed ? json(scene.surfaceAtOne) : Json()},
       {"vibration_contact_unit", scene.contactVibrationUnit == scene::VibrationUnit::hertz ? "Hz" : "rad/s"},

@@ -57,6 +57,18 @@ TEST(StateJson, HasTheSurfaceThatOneMeansOnThisDevice) {
   EXPECT_EQ(device["popthrough"], 8);
 }
 
+TEST(StateJson, HasTheFrameOfTheScene) {
+  scene::SceneDescription description;
+  description.T_world_scene = Eigen::Translation3d(1, 2, 3);
+  StateReport report;
+  report.server.scenes = {{"Arm"}};
+  report.scenes = {{std::make_shared<const ObservedScene>(
+                        ObservedScene{std::make_shared<const scene::SceneDescription>(description), {}}),
+                    {}}};
+  const json scene = json::parse(stateJson(report))["scenes"][0];
+  EXPECT_EQ(scene["T_world_scene"], json({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, 2, 3, 1}));
+}
+
 TEST(Faults, NameEveryDeviceThatDoesNotWork) {
   ServerStatus status;
   status.devices.resize(3);

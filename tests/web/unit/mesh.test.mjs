@@ -231,7 +231,7 @@ test("triangles without area or with an infinite corner share the vertices of th
   }
 });
 
-test("a mesh that replaces an object in metres, below a parent, appears where it was placed", () => {
+test("a mesh appears where it was placed: in metres, below a parent, in a scene that was moved", () => {
   const place = (x, y, z, scale) => new Matrix4().makeRotationY(0.7).scale(new Vector3(scale, scale, scale)).setPosition(x, y, z);
   const state = (id, parent, units, T_world_object, T_object_mesh = new Matrix4()) => ({
     id,
@@ -248,18 +248,23 @@ test("a mesh that replaces an object in metres, below a parent, appears where it
   const inUnits = (o) => new Matrix4().makeScale(o.world_units, o.world_units, o.world_units);
   const parentFrame = place(5, -7, 40, 2);
   const wanted = place(10, 20, 30, 0.5);
+  const scene = place(-3, 11, 6, 1);
   for (const parentUnits of [1, 1000]) {
     for (const units of [1, 1000]) {
       const parent = state(0, -1, parentUnits, parentFrame.clone().multiply(inUnits({ world_units: parentUnits })));
       const child = state(1, 0, units, new Matrix4(), place(1, 2, 3, 4));
       const single = state(2, -1, units, new Matrix4());
-      for (const [o, above] of [[child, parentFrame], [single, new Matrix4()]]) {
-        const frame = above.clone().multiply(frameBy(matrixPlacing(wanted, o, [parent, child, single]), o));
+      const root = state(3, -2, units, new Matrix4());
+      const frames = { T_world_scene: scene.toArray(), objects: [parent, child, single, root] };
+      for (const [o, above] of [[child, parentFrame], [single, scene], [root, new Matrix4()]]) {
+        const frame = above.clone().multiply(frameBy(matrixPlacing(wanted, o, frames), o));
         const T_world_mesh = frame.multiply(inUnits(o)).multiply(new Matrix4().fromArray(o.T_object_mesh));
         T_world_mesh.elements.forEach((x, i) => assert.ok(Math.abs(x - wanted.elements[i]) < 1e-9, `${T_world_mesh.elements}`));
       }
     }
   }
+  const fresh = scene.clone().multiply(matrixPlacing(wanted, undefined, { T_world_scene: scene.toArray(), objects: [] }));
+  fresh.elements.forEach((x, i) => assert.ok(Math.abs(x - wanted.elements[i]) < 1e-9, `${fresh.elements}`));
 });
 
 test("a PLY file with more entries than bytes is refused at once", { timeout: 20_000 }, async () => {

@@ -11,7 +11,7 @@ import {
   Quaternion,
   Vector3,
 } from "three";
-import type { DeviceState, ObjectState, SurfaceState } from "../state_types";
+import type { DeviceState, ObjectState, SceneState } from "../state_types";
 import { countText, el } from "../panels/dom";
 import { matrixPlacing } from "../panels/pose";
 import { SurfaceForm } from "../panels/surface";
@@ -44,9 +44,8 @@ export class Placing {
     mesh: FileMesh,
     private readonly view: View,
     device: DeviceState,
-    objects: ObjectState[],
+    scene: SceneState | undefined,
     next: number,
-    surfaceAtOne: SurfaceState | null | undefined,
   ) {
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new BufferAttribute(mesh.positions, 3));
@@ -72,8 +71,8 @@ export class Placing {
     this.size = numberInput("Largest extent", tidy(scale * this.extent), "0.001");
     this.position = centre.toArray().map((x, i) => numberInput(`Position ${"xyz"[i]!}`, tidy(x)));
     this.rotation = [0, 1, 2].map((i) => numberInput(`Rotation about ${"xyz"[i]!}, degrees`, 0));
-    this.surface.set(NEW_SURFACE, surfaceAtOne);
-    this.fillTargets(objects, next);
+    this.surface.set(NEW_SURFACE, scene?.surface_at_1);
+    this.fillTargets(scene?.objects ?? [], next);
     this.root.append(
       el(
         "p",
@@ -93,14 +92,14 @@ export class Placing {
   }
 
   /** Where it goes; a new object is the next one at the time of sending. */
-  placement(next: { object: number; isNew: boolean }, objects: ObjectState[]): Placement {
+  placement(next: { object: number; isNew: boolean }, scene: SceneState | undefined): Placement {
     const to = this.target.value === NEW_OBJECT ? next : { object: Number(this.target.value), isNew: false };
-    const present = objects.find((o) => o.id === to.object);
+    const present = scene?.objects.find((o) => o.id === to.object);
     const T_world_mesh = this.matrix();
     return {
       ...to,
       name: this.name,
-      matrix: (present ? matrixPlacing(T_world_mesh, present, objects) : T_world_mesh).toArray(),
+      matrix: (scene ? matrixPlacing(T_world_mesh, present, scene) : T_world_mesh).toArray(),
       surface: this.surface.values(),
     };
   }

@@ -2,7 +2,7 @@
 import type { Vector3 } from "three";
 import { clearTrimesh, type Outgoing, removeObject, setHapticProperty, setObjectIsTouchable } from "../wire";
 import { colourOfObject } from "../scene3d/colours";
-import type { ObjectState, SurfaceState } from "../state_types";
+import type { ObjectState, SceneState } from "../state_types";
 import { countText, el, Rows, setText } from "./dom";
 import { PoseForm } from "./pose";
 import { SurfaceForm } from "./surface";
@@ -12,8 +12,7 @@ type Send = (...messages: Outgoing[]) => void;
 
 interface Item {
   o: ObjectState;
-  all: ObjectState[];
-  one: SurfaceState | null | undefined;
+  scene: SceneState;
 }
 
 class ObjectRow {
@@ -42,8 +41,8 @@ class ObjectRow {
     const surface = el("summary", {}, "Surface");
     const placement = el("summary", {}, "Placement");
     // At the click, not at the later "toggle": by then a quick hand has begun to type.
-    surface.addEventListener("click", () => this.last && this.surface.update(this.last.o, this.last.one));
-    placement.addEventListener("click", () => this.last && this.pose.update(this.last.o, this.last.all));
+    surface.addEventListener("click", () => this.last && this.surface.update(this.last.o, this.last.scene.surface_at_1));
+    placement.addEventListener("click", () => this.last && this.pose.update(this.last.o, this.last.scene));
     this.surfacePart.append(surface, this.surface.root);
     this.posePart.append(placement, this.pose.root, remove);
     const swatch = el("span", { className: "swatch", ariaHidden: "true" });
@@ -55,14 +54,14 @@ class ObjectRow {
   private last: Item | undefined;
 
   update(item: Item): void {
-    const { o, all, one } = (this.last = item);
+    const { o, scene } = (this.last = item);
     const note = o.stiffness_N_per_m > 0 ? "" : ", no stiffness: cannot be felt";
     setText(this.name, o.name || `Object ${this.id}`);
     this.name.title = `Object ${this.id}`;
     setText(this.facts, o.triangles === 0 ? "no mesh" : `${countText(o.triangles)} triangles${note}`);
     this.touchable.update(o.touchable);
-    if (this.surfacePart.open) this.surface.update(o, one);
-    if (this.posePart.open) this.pose.update(o, all);
+    if (this.surfacePart.open) this.surface.update(o, scene.surface_at_1);
+    if (this.posePart.open) this.pose.update(o, scene);
   }
 }
 
@@ -79,9 +78,8 @@ export class ObjectsPanel {
     parent.append(this.list);
   }
 
-  /** `one`: the surface at 1 of each slider. */
-  update(objects: ObjectState[], touched: number, one: SurfaceState | null | undefined): void {
-    this.rows.update(objects.map((o) => ({ o, all: objects, one })));
+  update(scene: SceneState | undefined, touched: number): void {
+    this.rows.update(scene ? scene.objects.map((o) => ({ o, scene })) : []);
     for (const item of this.list.children)
       (item as HTMLElement).dataset["touched"] = String(
         (item as HTMLElement).dataset["object"] === String(touched),

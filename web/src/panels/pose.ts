@@ -1,24 +1,31 @@
 // Position, rotation and scale of an object that is in the scene, about the centre of its mesh.
 import { Euler, MathUtils, Matrix4, Quaternion, Vector3 } from "three";
 import { type Outgoing, setTransformMatrix } from "../wire";
-import type { ObjectState } from "../state_types";
+import type { ObjectState, SceneState } from "../state_types";
 import { el } from "./dom";
+
+/** What placements below a parent depend on. */
+export type Frames = Pick<SceneState, "T_world_scene" | "objects">;
+
+/** The parent of objects that have none. */
+const SCENE = -1;
 
 const tidy = (x: number): string => String(Number(x.toPrecision(5)) + 0);
 
 /** The matrix below its parent in units of the object, for a placement of the object in the world. */
-export function localMatrix(T_world_object: Matrix4, parent: Matrix4 | undefined, worldUnits: number): Matrix4 {
-  const local = parent ? parent.clone().invert().multiply(T_world_object) : T_world_object.clone();
+function localMatrix(T_world_object: Matrix4, parent: Matrix4, worldUnits: number): Matrix4 {
+  const local = parent.clone().invert().multiply(T_world_object);
   // The server's matrix takes object units to world units: a client sends it without this factor.
   local.multiply(shrunk(worldUnits));
   const at = new Vector3().setFromMatrixPosition(local).divideScalar(worldUnits);
   return local.setPosition(at);
 }
 
-/** The matrix of an object of the scene that brings its mesh to this place in the world. */
-export function matrixPlacing(T_world_mesh: Matrix4, o: ObjectState, objects: ObjectState[]): Matrix4 {
+/** The matrix that brings the mesh of this object to this place in the world; undefined: of a new object, in world units. */
+export function matrixPlacing(T_world_mesh: Matrix4, o: ObjectState | undefined, frames: Frames): Matrix4 {
+  if (!o) return localMatrix(T_world_mesh, new Matrix4().fromArray(frames.T_world_scene), 1);
   const T_world_object = T_world_mesh.clone().multiply(new Matrix4().fromArray(o.T_object_mesh).invert());
-  return localMatrix(T_world_object, parentFrame(o, objects), o.world_units);
+  return localMatrix(T_world_object, parentFrame(o, frames), o.world_units);
 }
 
 export class PoseForm {
@@ -27,7 +34,7 @@ export class PoseForm {
   private readonly rotation: HTMLInputElement[];
   private readonly scale: HTMLInputElement;
   private object: ObjectState | undefined;
-  private parent: Matrix4 | undefined;
+  private parent = new Matrix4();
   private centre = new Vector3();
 
   constructor(
@@ -47,10 +54,10 @@ export class PoseForm {
   }
 
   /** Shows the placement, unless a field is being edited. */
-  update(o: ObjectState, objects: ObjectState[]): void {
+  update(o: ObjectState, frames: Frames): void {
     if (this.root.contains(document.activeElement) && this.object) return;
     this.object = o;
-    this.parent = parentFrame(o, objects);
+    this.parent = parentFrame(o, frames);
     this.centre = this.centreOf(o.id).applyMatrix4(new Matrix4().fromArray(o.T_object_mesh));
     const T = new Matrix4().fromArray(o.T_world_object);
     const { rotation, size } = partsOf(T, o.world_units);
@@ -83,9 +90,10 @@ const shrunk = (worldUnits: number): Matrix4 =>
   new Matrix4().makeScale(1 / worldUnits, 1 / worldUnits, 1 / worldUnits);
 
 /** Below a parent, positions are in the parent's units of the world. */
-function parentFrame(o: ObjectState, objects: ObjectState[]): Matrix4 | undefined {
-  const parent = objects.find((p) => p.id === o.parent);
-  return parent && new Matrix4().fromArray(parent.T_world_object).multiply(shrunk(parent.world_units));
+function parentFrame(o: ObjectState, frames: Frames): Matrix4 {
+  if (o.parent === SCENE) return new Matrix4().fromArray(frames.T_world_scene);
+  const parent = frames.objects.find((p) => p.id === o.parent);
+  return parent ? new Matrix4().fromArray(parent.T_world_object).multiply(shrunk(parent.world_units)) : new Matrix4();
 }
 
 function partsOf(T: Matrix4, worldUnits: number): { rotation: Quaternion; stretch: Vector3; size: number } {
