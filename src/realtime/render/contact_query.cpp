@@ -28,7 +28,8 @@ constexpr int kNoReserve = 50;              // ticks without one, after one that
 constexpr double kFanError_m = 1e-7;
 constexpr double kFanErrorShare = 5e-4;
 constexpr double kSmallestGather_m = 10e-6;
-constexpr int kReuseLimit = 32;  // reuse the cached facets up to this count instead of querying again
+constexpr double kHalfWay = 0.6;  // half of the way of a tick, and what it bends aside
+constexpr int kReuseLimit = 32;   // reuse the cached facets up to this count instead of querying again
 
 scene::Corners mapped(const Affine& t, const scene::Corners& c, bool mirrored) {
   scene::Corners out{t * c.a, t * c.b, t * c.c};
@@ -439,11 +440,14 @@ void ContactQuery::addToCache(const FacetCache::TriangleId& id, const Vec3& inOb
   cache_.add(id, distance / (kWiden * placed.stretch), placed.skin, placed.deformed);
 }
 
+// A fast tick gathers too many for the slow ticks after it.
+bool ContactQuery::isReusable(double radius) const noexcept {
+  return cache_.size() <= kReuseLimit || cache_.reach() <= 2 * radius;
+}
+
 bool ContactQuery::ensureGathered(const Vec3& centre, double radius) noexcept {
   const double reserve = keepsFacets_ ? 0 : kReserveShare * radius_;
-  // A fast tick gathers too many for the slow ticks after it.
-  const bool smallEnough = cache_.size() <= kReuseLimit || cache_.reach() <= 2 * std::max(radius, reserve);
-  if (smallEnough && cache_.covers(centre, radius)) return true;
+  if (isReusable(std::max(radius, reserve)) && cache_.covers(centre, radius)) return true;
   if (reserve > radius && noReserve_ == 0) {
     if (gather(centre, reserve)) return true;
     noReserve_ = kNoReserve;
@@ -459,6 +463,12 @@ void ContactQuery::gatherAround(const Vec3& centre, double radius) noexcept {
        smaller *= 0.25) {
     fits = gather(centre, smaller);
   }
+}
+
+void ContactQuery::gatherAhead(const Vec3& p, const Vec3& way, double margin) noexcept {
+  const double needed = kHalfWay * way.norm() + margin;
+  if (keepsFacets_ && isReusable(needed) && cache_.covers(p + 0.5 * way, needed)) return;
+  if (!keepsFacets_ || !gather(p + way, 2 * needed)) gatherAround(p, 2 * needed);
 }
 
 bool ContactQuery::sameObjects() const noexcept {

@@ -138,6 +138,9 @@ class ContactQuery {
   bool ensureGathered(const Vec3& centre, double radius) noexcept;
   /// The same, or a smaller ball where that does not fit: casts from there begin in it.
   void gatherAround(const Vec3& centre, double radius) noexcept;
+  /// Gathers what the tool may meet on its way from p to p + way in this tick, with a margin to all sides. A
+  /// point tool gathers the same way once more, for the next tick; a ball has its reserve.
+  void gatherAhead(const Vec3& p, const Vec3& way, double margin) noexcept;
   bool isGathered(const Vec3& p) const noexcept {
     return cache_.complete() && (p - cache_.centre()).squaredNorm() < 0.64 * cache_.reach() * cache_.reach();
   }
@@ -229,6 +232,7 @@ class ContactQuery {
   void dropStaleFacets() noexcept;
   bool place(const scene::ObjectState& state, PlacedObject& placed) const noexcept;
   bool sameObjects() const noexcept;
+  bool isReusable(double radius) const noexcept;
   bool isUnfit(const Vec3& centre, double radius) const noexcept;
   void compareWithBefore(PlacedObject& placed) const noexcept;
   bool viewJumped(const PlacedObject& placed) const noexcept;

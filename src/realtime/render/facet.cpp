@@ -198,8 +198,9 @@ bool castBall(const Facet& f, TouchableFaces faces, const Vec3& p, const Vec3& d
   Heights h;
   if (!touchableSide(f, faces, p, d, limit, h)) return false;
   const double fall = (h.start - h.end) / limit;
-  // A path that rises past the standoff may meet an edge before.
-  if (!(h.start < standoff) && !(h.start - latest * fall < standoff)) return false;
+  // A path that rises past the standoff may meet an edge before. With a margin, so that it does not depend on
+  // rounding, and thus on which facet comes first, whether one that stops the path as early is seen.
+  if (!(h.start < standoff) && !(h.start - latest * fall < standoff + 1e-3 * f.skin)) return false;
   if (beyondSide(f, p, latest * d, standoff)) return false;
   // Most paths end above the face itself.
   if (fall > 0 && h.end <= contact) {

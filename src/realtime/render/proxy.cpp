@@ -64,7 +64,10 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   expectedTravel_m_ = (hip - hipBefore_).norm() + (position_ - from).norm();
   push(from, status);
   wasHeld_ = contactSet_.count > 0;
-  if (contactSet_.count > 0) query_.gatherAround(position_, 1.5 * expectedTravel_m_ + kGatherMargin_m);
+  if (contactSet_.count > 0) {
+    const double carried = (position_ - from).norm();
+    query_.gatherAhead(position_, hip - hipBefore_, 1.5 * carried + kGatherMargin_m);
+  }
   updateProxy(hip);
   popThrough(hip, status);
   if (!wasFree && neighboursChangedByCommand(springBefore)) status |= kRenderGeometryJump;
