@@ -388,6 +388,16 @@ bool ContactQuery::isUnfit(const Vec3& centre, double radius) const noexcept {
       [&](const Ball& ball) { return (ball.centre - centre).norm() + kAround * ball.radius <= radius; });
 }
 
+// As if the facets lay on a surface with as many in each part of it. Only where they are many: at a vertex, a
+// smaller ball holds as many, and a larger one perhaps no more.
+void ContactQuery::estimateRoom(double radius) noexcept {
+  constexpr double kFew = 24;
+  constexpr int kMany = 64;
+  const int count = cache_.complete() ? std::max(cache_.size(), 1) : FacetCache::kMaxFacets;
+  const double few_m = std::max(radius * std::sqrt(kFew / count), kSmallestGather_m);
+  roomyReach_m_ = count > kMany ? few_m : std::max(roomyReach_m_, few_m);
+}
+
 bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
   cache_.restart(centre, radius);
   joinedFans_ = false;
@@ -417,6 +427,7 @@ bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
     });
     joinedFans_ = joinedFans_ || (fans && fans->any());
   }
+  estimateRoom(radius);
   gatheredCount_ = objectCount_;
   gatheredGeneration_ = reusable ? generation_ : 0;
   if (!cache_.complete() && !workSpent())
@@ -466,9 +477,14 @@ void ContactQuery::gatherAround(const Vec3& centre, double radius) noexcept {
 }
 
 void ContactQuery::gatherAhead(const Vec3& p, const Vec3& way, double margin) noexcept {
-  const double needed = kHalfWay * way.norm() + margin;
-  if (keepsFacets_ && isReusable(needed) && cache_.covers(p + 0.5 * way, needed)) return;
-  if (!keepsFacets_ || !gather(p + way, 2 * needed)) gatherAround(p, 2 * needed);
+  const double length = way.norm();
+  const double needed = kHalfWay * length + margin;
+  if (!keepsFacets_) return gatherAround(p, 2 * needed);
+  if (isReusable(needed) && cache_.covers(p + 0.5 * way, needed)) return;
+  // Where that would be too many facets: the beginning of the way.
+  const double reach = std::min(2 * needed, roomyReach());
+  const double lead = reach > needed ? 1 : std::min(1.0, kHalfWay * reach / length);
+  if (!gather(p + lead * way, reach)) gatherAround(p, reach);
 }
 
 bool ContactQuery::sameObjects() const noexcept {
@@ -663,7 +679,8 @@ bool ContactQuery::castInSteps(const Vec3& p, const Vec3& d, double begin, doubl
   const double length = d.norm();
   double step = keepsFacets_ ? 1.0 : std::min(1.0, std::max(0.125 * radius_ / length, kSmallestStep));
   while (begin < end) {
-    step = std::min({step, end - begin, std::max(longestStep_m_ / length, kSmallestStep)});
+    const double longest_m = std::min(longestStep_m_, 2 * roomyReach());
+    step = std::min({step, end - begin, std::max(longest_m / length, kSmallestStep)});
     const double middle = begin + 0.5 * step;
     const bool fits = ensureGathered(p + middle * d, 0.5 * step * length * kWiden);
     if (!fits && step > kSmallestStep && !workSpent()) {

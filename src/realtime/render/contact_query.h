@@ -10,6 +10,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "base/time.h"
 #include "geometry/gap_tolerance.h"
@@ -141,6 +142,11 @@ class ContactQuery {
   /// Gathers what the tool may meet on its way from p to p + way in this tick, with a margin to all sides. A
   /// point tool gathers the same way once more, for the next tick; a ball has its reserve.
   void gatherAhead(const Vec3& p, const Vec3& way, double margin) noexcept;
+  /// Of a ball that holds some dozens of facets, where the last one was gathered; a ball tool has room
+  /// enough.
+  double roomyReach() const noexcept {
+    return keepsFacets_ ? roomyReach_m_ : std::numeric_limits<double>::infinity();
+  }
   bool isGathered(const Vec3& p) const noexcept {
     return cache_.complete() && (p - cache_.centre()).squaredNorm() < 0.64 * cache_.reach() * cache_.reach();
   }
@@ -233,6 +239,7 @@ class ContactQuery {
   bool place(const scene::ObjectState& state, PlacedObject& placed) const noexcept;
   bool sameObjects() const noexcept;
   bool isReusable(double radius) const noexcept;
+  void estimateRoom(double radius) noexcept;
   bool isUnfit(const Vec3& centre, double radius) const noexcept;
   void compareWithBefore(PlacedObject& placed) const noexcept;
   bool viewJumped(const PlacedObject& placed) const noexcept;
@@ -278,6 +285,7 @@ class ContactQuery {
   std::array<Ball, kMaxUnfit> unfit_;
   int unfitCount_ = 0;
   double longestStep_m_ = 0;
+  double roomyReach_m_ = std::numeric_limits<double>::infinity();
   int noReserve_ = 0;    // ticks in which none is gathered: there were too many triangles for it
   int lastBlocker_ = 0;  // the gathered facet that blocked the last cast of a ball
   // Generation and objects of the last gather(); 0: not reusable in another tick.
