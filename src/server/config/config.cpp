@@ -72,8 +72,9 @@ class Reader {
   void listen(const std::string& key, std::string& address, std::uint16_t& port) {
     std::string text;
     field(key, text);
-    if (text.empty()) return;
+    if (find(key) == nullptr) return;
     try {
+      if (text.empty()) throw ConfigError("is empty; it is ADDR:PORT, e.g. 127.0.0.1:3883");
       parseListen(text, address, port);
     } catch (const ConfigError& error) {
       throw ConfigError(location(source_, *find(key)) + "listen: " + error.what());

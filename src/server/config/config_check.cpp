@@ -149,7 +149,8 @@ void checkHttp(const Checker& check, const ServerConfig& config) {
     const std::size_t colon = name.find(':');
     const std::string port = colon == std::string::npos ? "1" : name.substr(colon + 1);
     const bool digits = !port.empty() && port.size() <= 5 &&
-                        std::all_of(port.begin(), port.end(), [](char c) { return c >= '0' && c <= '9'; });
+                        std::all_of(port.begin(), port.end(), [](char c) { return c >= '0' && c <= '9'; }) &&
+                        std::stoul(port) <= 65535;
     const std::string host = name.substr(0, colon);
     const bool plain = !host.empty() && std::all_of(host.begin(), host.end(), [](unsigned char c) {
       return std::isalnum(c) != 0 || c == '-' || c == '.' || c == '_';
@@ -174,7 +175,7 @@ void checkAccess(const Checker& check, const ServerConfig& config) {
   checked("trusted_networks", [&] { parseSubnets(config.trustedNetworks); });
   checked("owner_users", [&] { usersNamed(config.ownerUsers, "owner_users"); });
   checked("operator_users", [&] { usersNamed(config.operatorUsers, "operator_users"); });
-  const bool path = config.socket.starts_with('/');
+  const bool path = config.socket.starts_with('/') && !config.socket.ends_with('/');
   if (!path && config.socket != kSocketAuto && config.socket != kSocketOff) {
     check.fail("socket", "socket: " + wire::inQuotes(config.socket) +
                              " is not an absolute path such as /run/hapticd/lab.sock, auto or off");

@@ -70,8 +70,11 @@ void SceneHost::clientGone(scene::ClientId client) {
   owners_->leaveForGood(client, base::now());
   push({client, ClientGone{}});
   const bool lastToCommand = commandingClients_.erase(client) == 1 && commandingClients_.empty();
-  if (lastToCommand && onDisconnect_ == SceneOnDisconnect::clear)
-    push({client, scene::SceneCommand{scene::ResetScene{}}});
+  if (!lastToCommand || onDisconnect_ != SceneOnDisconnect::clear) return;
+  // The next client finds the scene empty, however much the last one has still queued.
+  SceneParcel clear{.client = client, .tasks = {}, .bytes = 0, .beforeOthers = true};
+  clear.tasks.push_back({client, scene::SceneCommand{scene::ResetScene{}}});
+  thread_->push(std::move(clear));
 }
 
 void SceneHost::describe(std::function<void(std::shared_ptr<const scene::SceneDescription>)> reply) {

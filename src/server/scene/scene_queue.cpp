@@ -1,11 +1,14 @@
 #include "server/scene/scene_queue.h"
 
+#include <algorithm>
+
 namespace hapticd::server {
 
 void SceneQueue::push(SceneParcel&& parcel) {
   const std::lock_guard lock(mutex_);
   Account& account = charge(parcel);
   if (account.queued.empty()) turns_.push_back(parcel.client);
+  if (parcel.beforeOthers) before_.push_back(parcel.client);
   account.queued.push_back(std::move(parcel));
 }
 
@@ -51,13 +54,20 @@ std::optional<SceneParcel> SceneQueue::take() {
     return oldest;
   };
   if (!urgent_.empty()) return first(urgent_);
-  if (turns_.empty()) return std::nullopt;
-  const scene::ClientId client = turns_.front();
-  turns_.pop_front();
+  const auto turn =
+      std::find_if(turns_.begin(), turns_.end(), [this](scene::ClientId client) { return !waits(client); });
+  if (turn == turns_.end()) return std::nullopt;
+  const scene::ClientId client = *turn;
+  turns_.erase(turn);
   std::deque<SceneParcel>& queued = accounts_.at(client).queued;
   std::optional<SceneParcel> oldest = first(queued);
   if (!queued.empty()) turns_.push_back(client);
+  if (oldest->beforeOthers) before_.pop_front();
   return oldest;
+}
+
+bool SceneQueue::waits(scene::ClientId client) const {
+  return client != 0 && !before_.empty() && before_.front() != client;
 }
 
 bool SceneQueue::done(scene::ClientId client, std::size_t bytes, base::Nanos now) {

@@ -19,9 +19,11 @@ struct SceneParcel {
   scene::ClientId client = 0;
   std::vector<SceneTask> tasks;
   std::size_t bytes = 0;
+  bool beforeOthers = false;  ///< what other clients push later waits for it
 };
 
-/// In order for each client; clients take turns, so that one with much work does not delay the others.
+/// In order for each client; clients take turns, so that one with much work does not delay the others. What
+/// the server asks itself, as client 0, waits for nobody.
 /// Thread-safe; no call waits for the scene.
 class SceneQueue {
  public:
@@ -60,11 +62,13 @@ class SceneQueue {
   };
 
   Account& charge(const SceneParcel& parcel);
+  bool waits(scene::ClientId client) const;
 
   mutable std::mutex mutex_;
   std::deque<SceneParcel> urgent_;
   std::deque<scene::ClientId> turns_;            // clients with queued parcels, the next one first
   std::map<scene::ClientId, Account> accounts_;  // clients with unpublished commands
+  std::deque<scene::ClientId> before_;           // whose parcels the others wait for, the next one first
 };
 
 }  // namespace hapticd::server

@@ -78,9 +78,13 @@ void Admission::enter(Session& session) {
   // The newest ones may stop forces: those that hold on to this must not keep others from it.
   auto& reserve = reserves_[wayOf(session)];
   reserve.push_back(session.id());
-  if (reserve.size() <= kReserve) return;
-  if (Session* const oldest = find(reserve.front()))
-    oldest->close("the server is full, and others wait to stop forces");
+  // At once, without a last text: a flood must not take all descriptors. Those that ended wait to leave.
+  std::size_t open = 0;
+  for (auto id = reserve.rbegin(); id != reserve.rend(); ++id) {
+    Session* const other = *id == session.id() ? &session : find(*id);
+    if (other == nullptr || other->ending()) continue;
+    if (++open > kReserve) other->abort("the server is full, and others wait to stop forces");
+  }
 }
 
 void Admission::leave(const Session& session) {

@@ -157,6 +157,7 @@ void Session::onEnd(const std::string& reason) {
 
 void Session::peerIsGone(const std::string& reason) {
   peerGone_ = true;
+  heartbeats_.disable();  // what it sent before is still handled
   owner_.onPeerGone(*this, reason);
 }
 

@@ -17,12 +17,28 @@ using realtime::TickReport;
 
 constexpr std::string_view kExtension = ".csv";
 
+bool isPlain(unsigned char c) {
+  return std::isalnum(c) != 0 || c == '_' || c == '-';
+}
+
 // Replaces characters that are not safe in a file name.
 std::string plain(std::string text) {
   std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return std::isalnum(c) == 0 && c != '_' && c != '-'; },
-      '_');
+      text.begin(), text.end(), [](unsigned char c) { return !isPlain(c); }, '_');
   return text;
+}
+
+// The same as in an address: each device has a folder of its own.
+std::string folderOf(const std::string& device) {
+  std::string folder;
+  for (const unsigned char c : device) {
+    if (isPlain(c)) {
+      folder += static_cast<char>(c);
+    } else {
+      folder += fmt::format("%{:02X}", c);
+    }
+  }
+  return folder;
 }
 
 // Whether the name is one that nextFile() makes.
@@ -34,11 +50,14 @@ bool isBlackBox(const std::string& name) {
   });
 }
 
-// Names begin with the time, so the oldest sort first.
-void deleteOldest(const fs::path& directory, int keep, std::uint64_t bytes) {
+// Names begin with the time, so the oldest sort first. The newest stays, also where the clock was set back.
+void deleteOldest(const fs::path& newest, int keep, std::uint64_t bytes) {
   base::Files& files = base::world().files;
+  const fs::path directory = newest.parent_path();
   std::vector<std::string> names = files.list(directory);
-  std::erase_if(names, [](const std::string& name) { return !isBlackBox(name); });
+  std::erase_if(names,
+                [&](const std::string& name) { return !isBlackBox(name) || name == newest.filename(); });
+  names.push_back(newest.filename());
   std::uint64_t kept = 0;
   for (std::size_t i = names.size(); i-- > 0;) {
     const fs::path file = directory / names[i];
@@ -66,7 +85,7 @@ fs::path BlackBoxRecorder::nextFile(const std::string& fault) const {
   std::strftime(stamp, sizeof stamp, "%Y%m%dT%H%M%S", &utc);
   char fraction[8] = {};
   std::snprintf(fraction, sizeof fraction, ".%03dZ", static_cast<int>(now / 1'000'000 % 1000));
-  return files_.directory / plain(name_) /
+  return files_.directory / folderOf(name_) /
          (std::string(stamp) + fraction + "-" + plain(fault) + std::string(kExtension));
 }
 
@@ -90,7 +109,7 @@ void BlackBoxRecorder::poll() {
         try {
           base::world().files.createFolder(file.parent_path());
           writeBlackBox(file, name_, box);
-          deleteOldest(file.parent_path(), files_.keep, files_.bytes);
+          deleteOldest(file, files_.keep, files_.bytes);
         } catch (const std::exception& error) {
           spdlog::error("device '{}': {}; set black_box_dir to a directory that can be written", name_,
                         error.what());

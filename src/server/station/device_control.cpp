@@ -29,6 +29,7 @@ void DeviceControl::stopForces(const Order& order, const Sender& sender) {
   constexpr std::size_t kMostGone = 32;
   stop_ = order;
   guard_.stop(order.received);
+  ++stopsOfClients_;
   const auto own = std::find_if(stops_.begin(), stops_.end(), [&](const Stop& s) { return s.isOf(sender); });
   if (own != stops_.end()) {
     if (std::find(own->clients.begin(), own->clients.end(), sender.client) == own->clients.end())
@@ -71,11 +72,14 @@ bool DeviceControl::rearmForces(const Order& order, const Sender& sender, bool f
                    "an operator, or 'hapticd stop --rearm' by the server's user on its machine"};
     return false;
   }
-  if (!sender.mayCommand && (!undoes || faults)) {
+  const bool otherStop = stops - stopsBefore_ != stopsOfClients_;  // a signal, or a machine that slept
+  if (!sender.mayCommand && (!undoes || faults || otherStop)) {
     stops_ = before;
     refusal = {RefusalCode::notPermitted,
                "Rearm_Forces refused: this client may undo its own stop only, not " +
-                   std::string(faults ? "faults" : "others'")};
+                   std::string(faults                ? "faults"
+                               : otherStop && undoes ? "that of the server's machine"
+                                                     : "others'")};
     return false;
   }
   if (!guard_.rearm(stops)) {
@@ -83,6 +87,8 @@ bool DeviceControl::rearmForces(const Order& order, const Sender& sender, bool f
     refusal = later;
     return false;
   }
+  stopsBefore_ = stops;
+  stopsOfClients_ = 0;
   return true;
 }
 

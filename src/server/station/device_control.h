@@ -50,7 +50,8 @@ class DeviceControl {
   ///   the clock of that machine was set);
   /// - a stop of another program stands. Each program may undo its own; operators undo all; where there are
   ///   none, a page in a browser does, once all those programs are gone;
-  /// - the sender may not command, and there is more to re-arm than its own stop (`faults`: latched trips).
+  /// - the sender may not command, and there is more to re-arm than its own stop (`faults`: latched trips, or
+  /// a stop that no client sent).
   bool rearmForces(const Order& order, const Sender& sender, bool faults, Refusal& refusal);
 
   bool canBeHeld() const noexcept { return hand_ != nullptr; }
@@ -79,6 +80,9 @@ class DeviceControl {
   std::optional<scene::ClientId> holder_;
   Order stop_;               // the newest stop
   std::vector<Stop> stops_;  // oldest first
+  // What guard_.stops() counted at the last re-arm, and how many stops of clients came since.
+  std::uint32_t stopsBefore_ = guard_.stops();
+  std::uint32_t stopsOfClients_ = 0;
 };
 
 }  // namespace hapticd::server

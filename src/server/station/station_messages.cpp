@@ -185,8 +185,9 @@ void Station::Impl::rearm(Session& session, wire::LocalSender name, const Device
   session.logWarning(fmt::format("({}, {}) re-armed the forces of '{}'", session.description(),
                                  nameOf(session.identity().role), config.names.front()));
   // With `calibrate` the operator consented to motion of the arm; the re-arm is the moment that a person
-  // chose.
-  if (config.calibrate && (outbox.last().device.hold & device::kHoldNotCalibrated) != 0) keeper.calibrate();
+  // chose. Who may only undo its own stop moves no arm.
+  if (sender.mayCommand && config.calibrate && (outbox.last().device.hold & device::kHoldNotCalibrated) != 0)
+    keeper.calibrate();
 }
 
 void Station::Impl::on(const Request& request, const wire::ReleaseControl&) {

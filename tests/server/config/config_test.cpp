@@ -135,6 +135,7 @@ TEST(Config, ErrorsNameLineKeyValueAndRemedy) {
             "each min below its max");
   EXPECT_NE(errorOf("listen = ").find("test.toml:1: "), std::string::npos);
   EXPECT_NE(errorOf("listen = \"1.2.3.4:70000\"").find("70000"), std::string::npos);
+  EXPECT_EQ(errorOf("listen = \"\""), "test.toml:1: listen: is empty; it is ADDR:PORT, e.g. 127.0.0.1:3883");
 }
 
 TEST(Config, InvalidValuesAreNamed) {
@@ -146,6 +147,7 @@ TEST(Config, InvalidValuesAreNamed) {
   EXPECT_NE(errorOf("http = \"127.0.0.1:99999\"").find("127.0.0.1:99999"), std::string::npos);
   EXPECT_NE(errorOf("http_allow = [\"http://lab7/\"]").find("\"http://lab7/\""), std::string::npos);
   EXPECT_NE(errorOf("http_allow = [\"lab7:\"]").find("\"lab7:\""), std::string::npos);
+  EXPECT_NE(errorOf("http_allow = [\"lab7:99999\"]").find("\"lab7:99999\""), std::string::npos);
   EXPECT_NE(errorOf("[[device]]\nname=\"a\\nb\"").find("\"a\\x0ab\""), std::string::npos);
   EXPECT_NE(errorOf("[[device]]\nname=\"VRPN Control\"").find("'VRPN Control'"), std::string::npos);
   EXPECT_NE(errorOf("[[device]]\nworkspace=[-1e300,0,0,1,1,1]").find("-1e+300"), std::string::npos);
@@ -224,6 +226,7 @@ TEST(Config, RefusesMalformedAccess) {
       {"trusted_networks = [\"lab\"]\n", "is not a network"},
       {"owner_users = [\"no such user\"]\n", "there is no user"},
       {"socket = \"relative.sock\"\n", "is not an absolute path"},
+      {"socket = \"/run/hapticd/\"\n", "is not an absolute path"},
       {"http = \"\"\n", "test.toml:1: http: \"\" is not ADDR:PORT"},
       {"tls = \"on\"\n", "is not off, generated, or the absolute path"},
       {"tls = \"/c.pem\"\n", "needs its key"},

@@ -26,6 +26,25 @@ TEST(SceneQueueTest, ClientsTakeTurnsAndEachKeepsItsOrder) {
   EXPECT_TRUE(queue.empty());
 }
 
+TEST(SceneQueueTest, WhatComesLaterWaitsForAParcelBeforeOthers) {
+  SceneQueue queue;
+  const auto clear = [&](scene::ClientId client, std::size_t bytes) {
+    SceneParcel last = parcel(client, bytes);
+    last.beforeOthers = true;
+    queue.push(std::move(last));
+  };
+  queue.push(parcel(1, 1));
+  clear(1, 2);
+  queue.push(parcel(2, 5));
+  queue.push(parcel(0, 6));  // the server's own
+  clear(2, 7);
+  queue.push(parcel(3, 8));
+  queue.pushFront(parcel(3, 9));
+  for (const std::size_t bytes : {9U, 1U, 6U, 2U, 5U, 7U, 8U}) EXPECT_EQ(queue.take()->bytes, bytes);
+  EXPECT_FALSE(queue.take());
+  EXPECT_TRUE(queue.empty());
+}
+
 TEST(SceneQueueTest, AnUrgentParcelIsTakenFirst) {
   SceneQueue queue;
   queue.push(parcel(1, 10));

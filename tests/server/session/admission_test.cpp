@@ -106,6 +106,18 @@ TEST_F(AdmissionTest, TheOldestOfTheReserveEndsForTheNewest) {
   EXPECT_EQ(reason(3), "");
 }
 
+// Also those that do not let go of it.
+TEST_F(AdmissionTest, AFloodBeyondTheReserveEndsAtOnce) {
+  limits_.connections = 1;
+  connect(60);
+  std::size_t open = 0;
+  for (const auto& [id, session] : sessions_) open += session->ending() ? 0 : 1;
+  EXPECT_EQ(open, 17U);
+  EXPECT_EQ(ends_.reasons.size(), 43U);
+  EXPECT_EQ(reason(44).find("the server is full"), 0U) << reason(44);
+  EXPECT_EQ(reason(45), "");
+}
+
 TEST_F(AdmissionTest, TheOldestWithoutAGreetingEndsForTheNewest) {
   limits_.unfinishedConnections = 2;
   connect(2);

@@ -264,6 +264,29 @@ TEST_F(RearmTest, AnOlderOneDoesNotUndoAStopThatNoClientSent) {
   EXPECT_FALSE(guard_.stopped());
 }
 
+TEST_F(RearmTest, WhoMayNotCommandUndoesNoStopThatNoClientSent) {
+  Sender observer = client(1);
+  observer.mayCommand = false;
+  stop(observer);
+  EXPECT_TRUE(rearms(observer)) << "its own";
+  for (const bool machineFirst : {true, false}) {
+    if (machineFirst) guard_.stop(++time_);
+    stop(observer);
+    if (!machineFirst) guard_.stop(++time_);
+    EXPECT_FALSE(rearms(observer));
+    EXPECT_EQ(refusal_.code, RefusalCode::notPermitted);
+    EXPECT_NE(refusal_.text.find("not that of the server's machine"), std::string::npos) << refusal_.text;
+    EXPECT_TRUE(guard_.stopped());
+    EXPECT_FALSE(rearms(client(2))) << "the stop of the observer stands";
+    observer.mayCommand = true;
+    EXPECT_TRUE(rearms(observer));
+    observer.mayCommand = false;
+    EXPECT_FALSE(guard_.stopped());
+  }
+  stop(observer);
+  EXPECT_TRUE(rearms(observer)) << "its own again";
+}
+
 TEST(GuardControl, ARearmDoesNotUndoAStopThatItDoesNotKnow) {
   realtime::GuardControl control(true);
   control.stop(5);
@@ -361,7 +384,8 @@ class BlackBoxFilesTest : public ::testing::Test {
   }
   std::vector<fs::path> files() const {
     std::vector<fs::path> found;
-    for (const auto& entry : fs::directory_iterator(directory_ / "Phantom_1")) found.push_back(entry.path());
+    for (const auto& entry : fs::directory_iterator(directory_ / "Phantom%2F1"))
+      found.push_back(entry.path());
     return found;
   }
 
@@ -404,9 +428,9 @@ TEST_F(BlackBoxFilesTest, WritesAFaultWithTheTicksBeforeIt) {
 TEST_F(BlackBoxFilesTest, KeepsOnlyTheNewestFiles) {
   realtime::BlackBox box(5);
   BlackBoxRecorder recorder("Phantom/1", {directory_, 2}, box);
-  fs::create_directories(directory_ / "Phantom_1");
+  fs::create_directories(directory_ / "Phantom%2F1");
   for (const char* foreign : {"a.csv", "20200101T000000.000Z.csv", "20200101T000000x000Z-speed.csv"})
-    std::ofstream(directory_ / "Phantom_1" / foreign) << "a person's";
+    std::ofstream(directory_ / "Phantom%2F1" / foreign) << "a person's";
   for (int i = 0; i < 4; ++i) {
     fail(box, 2);
     recorder.poll();
@@ -414,6 +438,34 @@ TEST_F(BlackBoxFilesTest, KeepsOnlyTheNewestFiles) {
     std::this_thread::sleep_for(std::chrono::milliseconds(2));  // file names have a resolution of 1 ms
   }
   EXPECT_EQ(files().size(), 2U + 3U) << "files of others stay";
+}
+
+TEST_F(BlackBoxFilesTest, KeepsTheNewestAlsoAfterTheClockWasSetBack) {
+  realtime::BlackBox box(5);
+  BlackBoxRecorder recorder("Phantom/1", {directory_, 2}, box);
+  fs::create_directories(directory_ / "Phantom%2F1");
+  for (const char* ahead : {"20991231T000000.000Z-speed.csv", "20991231T000001.000Z-speed.csv"})
+    std::ofstream(directory_ / "Phantom%2F1" / ahead) << "ahead";
+  fail(box, 2);
+  recorder.poll();
+  recorder.finish();
+  const std::vector<fs::path> left = files();
+  ASSERT_EQ(left.size(), 2U);
+  EXPECT_EQ(std::count_if(left.begin(), left.end(),
+                          [](const fs::path& file) { return file.filename().string().starts_with("2099"); }),
+            1);
+}
+
+TEST_F(BlackBoxFilesTest, DevicesOfAnyNameHaveFoldersOfTheirOwn) {
+  realtime::BlackBox box(5);
+  for (const char* name : {"Left hand", "Left_hand", "\u5de6", "\u53f3"}) {
+    BlackBoxRecorder recorder(name, {directory_, 2}, box);
+    fail(box, 2);
+    recorder.poll();
+    recorder.finish();
+  }
+  EXPECT_EQ(std::distance(fs::directory_iterator(directory_), fs::directory_iterator()), 4);
+  EXPECT_TRUE(fs::exists(directory_ / "Left%20hand"));
 }
 
 TEST_F(BlackBoxFilesTest, KeepsTheNewestWithinTheirBytes) {
