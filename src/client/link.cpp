@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 #include "base/world.h"
 #include "hapticd/error.h"
@@ -83,7 +84,10 @@ wire::LocalSender Link::addDevice(std::string_view name) {
   if (std::find(devices_.begin(), devices_.end(), sender) == devices_.end()) {
     devices_.push_back(sender);
     heard_.resize(names_.senders().size());
-    if (connected()) peer_->send(wireNow(), sender, wire::Ping{});
+    if (connected()) {
+      peer_->send(wireNow(), sender, wire::Ping{});
+      pingTimer_ = loop_.every(1s, [this] { pingUnheard(); });
+    }
   }
   return sender;
 }
@@ -154,6 +158,7 @@ void Link::onConnected() {
   backlog_.clear();
   heard_.assign(names_.senders().size(), false);
   inbox_.push({.what = Arrival::What::connected, .arrived = wallTimePoint()});
+  announced_ = true;
   pingUnheard();
   pingTimer_ = loop_.every(1s, [this] { pingUnheard(); });
 }
@@ -170,7 +175,7 @@ void Link::pingUnheard() {
 }
 
 void Link::onClosed(const std::string& reason) {
-  const bool wasConnected = handshakeDone();
+  const bool wasConnected = std::exchange(announced_, false);
   lastFailure_ = reason;
   if (!wasConnected && server_.socket.empty() && reason.ends_with("by the peer"))
     lastFailure_ += " before it answered; a server that asks for TLS needs 'hapticd tunnel'";

@@ -84,6 +84,7 @@ class Link {
     if (connected()) {
       peer_->send(time, sender, message, reliability);
     } else if (connections_ == 0) {
+      needRoom();
       backlog_.add(time, sender, message);
     } else {
       ++statistics_.messagesDropped;
@@ -189,6 +190,7 @@ class Link {
   void onClosed(const std::string& reason);
   void addTraffic(LinkStatistics& statistics) const;
   void pingUnheard();
+  void needRoom() const;
   void sent(std::size_t bytes);
   void pushOut();
   std::shared_ptr<net::Buffer> takeBuffer();
@@ -218,6 +220,7 @@ class Link {
   std::uint64_t streamBytes_ = 0;
   std::size_t uncounted_ = 0;  // bytes collected since the last pushOut()
   bool paused_ = false;
+  bool announced_ = false;  // to the handler of poll()
 
   std::vector<wire::LocalSender> devices_;
   std::vector<bool> heard_;  // by sender

@@ -145,6 +145,7 @@ void Link::sendRaw(wire::Time time, wire::LocalSender sender, wire::LocalType ty
   if (connected()) {
     peer_->sendRaw(time, sender, type, payload, reliability);
   } else if (connections_ == 0) {
+    needRoom();
     backlog_.addRaw(time, sender.value, type.value, payload);
   } else {
     ++statistics_.messagesDropped;
@@ -153,16 +154,19 @@ void Link::sendRaw(wire::Time time, wire::LocalSender sender, wire::LocalType ty
   sent(wire::kHeaderBytes + wire::padded(payload.size()));
 }
 
+// Before the first connection: what does not fit is refused, and not sent later.
+void Link::needRoom() const {
+  if (backlog_.bytes().size() <= options_.queueLimit_bytes) return;
+  throw ConnectError(whyNotConnected() + "; " + std::to_string(backlog_.bytes().size()) +
+                     " bytes wait to be sent");
+}
+
 void Link::sent(std::size_t bytes) {
   ++statistics_.messagesOut;
   uncounted_ += bytes;
   if (uncounted_ < kBatchBytes) return;
   flush();
   if (!connected()) {
-    if (backlog_.bytes().size() > options_.queueLimit_bytes) {
-      throw ConnectError(whyNotConnected() + "; " + std::to_string(backlog_.bytes().size()) +
-                         " bytes wait to be sent");
-    }
     uncounted_ = 0;
   } else if (connection_.statistics().queuedBytes > options_.queueLimit_bytes) {
     drainTo(options_.queueLimit_bytes / 2);

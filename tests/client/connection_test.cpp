@@ -146,6 +146,28 @@ TEST(Client, CommandsBeforeTheFirstConnectionAreBounded) {
     for (int i = 0; i < 10000; ++i) client.setVertex(0, i, 0, 0, 0);
   };
   EXPECT_THAT(textOf<ConnectError>(fill), HasSubstr("bytes wait to be sent"));
+  const std::uint64_t kept = client.statistics().messagesOut;
+  for (int i = 0; i < 100; ++i) EXPECT_THROW(client.setVertex(0, i, 0, 0, 0), ConnectError);
+  EXPECT_EQ(client.statistics().messagesOut, kept) << "what is refused is not sent later";
+}
+
+TEST(Client, ALossByADamagedStreamIsReported) {
+  ScriptedServer server;
+  Client client(server.tcpName());
+  std::vector<bool> reports;
+  client.onConnection([&](const ConnectionReport& r) { reports.push_back(r.connected); });
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  const auto until = [&](std::size_t count) {
+    while (reports.size() < count && std::chrono::steady_clock::now() < end) client.poll(1ms);
+  };
+  client.waitConnected(kPatience);
+  client.poll(0ms);
+  const std::size_t before = reports.size();
+  server.sendRawBytes(std::string(100, '\xff'));
+  until(before + 2);
+  ASSERT_EQ(reports.size(), before + 2);
+  EXPECT_FALSE(reports[before]);
+  EXPECT_TRUE(reports[before + 1]);
 }
 
 }  // namespace

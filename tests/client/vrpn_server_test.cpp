@@ -28,6 +28,7 @@
 #include "client/client_tests.h"
 #include "client/vrpn_device.h"
 #include "server/scripted_peer.h"
+#include "wire/cookie.h"
 
 namespace hapticd {
 namespace {
@@ -221,6 +222,21 @@ TEST_F(VrpnServer, ADamagedStreamEndsOnlyItsConnection) {
     return !bad.open();
   }));
   ASSERT_TRUE(runUntil(good, [&] { return good.count<wire::ButtonStates>() > 0; }));
+}
+
+TEST_F(VrpnServer, AClientWhoseStreamIsDamagedIsReportedAsDropped) {
+  int dropped = 0;
+  connection_->register_handler(
+      connection_->register_message_type(vrpn_dropped_last_connection),
+      [](void* count, vrpn_HANDLERPARAM) { return ++*static_cast<int*>(count), 0; }, &dropped);
+  ScriptedPeer bad(address(), "Device0", ScriptedPeer::Mode::tcp, ScriptedPeer::Speech::raw);
+  const auto cookie = wire::encodeCookie(0);
+  std::vector<std::byte> bytes(cookie.begin(), cookie.end());
+  bytes.resize(bytes.size() + 100, std::byte{0xff});
+  bad.sendBytes(bytes);
+  ASSERT_TRUE(runUntil(bad, [&] { return !bad.open(); }));
+  ASSERT_TRUE(runUntil(bad, [&] { return dropped == 1; }));
+  EXPECT_FALSE(connection_->connected());
 }
 
 TEST_F(VrpnServer, APortThatIsTakenIsReported) {

@@ -13,6 +13,8 @@
 #include <vrpn_Tracker.h>
 
 #include <chrono>
+#include <memory>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -303,6 +305,51 @@ TEST_P(Vrpn, TheConnectionOfADeviceThatAHandlerDeletesIsClosed) {
   EXPECT_FALSE(connection->doing_okay());
   vrpn_Tracker_Remote again(name().c_str());
   EXPECT_TRUE(runUntil(again, [&] { return server_.connections() == 2; }));
+}
+
+int VRPN_CALLBACK throwTheirName(void*, vrpn_HANDLERPARAM) {
+  throw std::runtime_error("a handler");
+}
+
+TEST_P(Vrpn, TheConnectionOfADeletedDeviceIsClosedAlsoWhenAHandlerThrew) {
+  auto tracker = std::make_unique<vrpn_Tracker_Remote>(name().c_str());
+  ASSERT_TRUE(ready(*tracker));
+  vrpn_Connection* connection = tracker->connectionPtr();
+  connection->register_handler(connection->register_message_type("vrpn_Base text_message"), throwTheirName,
+                               nullptr);
+  server_.send(wire::Text{1, 2, "throw"});
+  EXPECT_THROW(runUntil(*tracker, [] { return false; }), std::runtime_error);
+  tracker.reset();
+  vrpn_Tracker_Remote again(name().c_str());
+  EXPECT_TRUE(runUntil(again, [&] { return server_.connections() == 2; }));
+}
+
+TEST(VrpnNames, ADeviceWhoseNameIsRefusedHearsNobody) {
+  vrpn_Connection* loopback = vrpn_create_server_connection("loopback:");
+  const std::string tooLong(200, 'x');
+  vrpn_Tracker_Remote nobody(tooLong.c_str(), loopback);
+  EXPECT_EQ(nobody.connectionPtr(), nullptr);
+  int poses = 0;
+  nobody.register_change_handler(&poses,
+                                 [](void* count, const vrpn_TRACKERCB) { ++*static_cast<int*>(count); });
+  vrpn_Tracker_Server tracker("Tracker", loopback);
+  const vrpn_float64 at[3] = {1, 2, 3};
+  const vrpn_float64 turned[4] = {0, 0, 0, 1};
+  tracker.report_pose(0, loopback->get_time(), at, turned);
+  nobody.mainloop();
+  EXPECT_EQ(poses, 0);
+  loopback->removeReference();
+}
+
+TEST(VrpnNames, ACustomEffectThatIsTooLongIsNotSent) {
+  vrpn_Connection* loopback = vrpn_create_server_connection("loopback:");
+  {
+    vrpn_ForceDevice_Remote device("Phantom", loopback);
+    std::vector<vrpn_float32> parameters(20000);
+    device.setCustomEffect(0, parameters.data(), static_cast<vrpn_uint32>(parameters.size()));
+    EXPECT_NO_THROW(device.startEffect());
+  }
+  loopback->removeReference();
 }
 
 TEST_P(Vrpn, DialsOfOtherServersAreReported) {

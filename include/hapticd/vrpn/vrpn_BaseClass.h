@@ -166,18 +166,25 @@ class VRPN_API vrpn_Callback_List {
     return -1;
   }
   void call_handlers(const Report& info) {
-    ++calling_;
+    const Call call(*this);
     for (size_t i = 0; i < entries_.size(); ++i) {
       const Entry entry = entries_[i];
       if (entry.handler != NULL) entry.handler(entry.userdata, info);
     }
-    if (--calling_ == 0) sweep();
   }
 
  private:
   struct Entry {
     void* userdata;
     HANDLER_TYPE handler;
+  };
+  // Also when a handler throws.
+  struct Call {
+    explicit Call(vrpn_Callback_List& list) : of(list) { ++of.calling_; }
+    ~Call() {
+      if (--of.calling_ == 0) of.sweep();
+    }
+    vrpn_Callback_List& of;
   };
   void sweep() {
     size_t kept = 0;

@@ -65,6 +65,10 @@ void vrpn_BaseClassUnique::open(const char* name, vrpn_Connection* connection) {
   if (!d_connection) return;
   silentSince_ = d_connection->get_time();
   d_sender_id = d_connection->registerDevice(d_servicename);
+  if (d_sender_id < 0) {  // a name that is refused is none: the number stands for all devices
+    std::exchange(d_connection, nullptr)->removeReference();
+    return;
+  }
   d_text_message_id = d_connection->register_message_type("vrpn_Base text_message");
   d_ping_message_id = d_connection->register_message_type("vrpn_Base ping_message");
   d_pong_message_id = d_connection->register_message_type("vrpn_Base pong_message");

@@ -32,8 +32,9 @@ const std::array<const char*, 4>& controlTypes() {
   return types;
 }
 
+// Never destroyed: a device may be in a variable that is destroyed later.
 std::map<std::string, vrpn_Connection*>& knownConnections() {
-  static std::map<std::string, vrpn_Connection*> connections;
+  static auto& connections = *new std::map<std::string, vrpn_Connection*>;
   return connections;
 }
 
@@ -140,14 +141,20 @@ void vrpn_Connection::callControlHandlers(const char* type) {
 }
 
 void vrpn_Connection::callHandlers(const vrpn_HANDLERPARAM& p) {
-  ++calling_;
+  // Also when one throws.
+  struct Call {
+    explicit Call(vrpn_Connection& connection) : of(connection) { ++of.calling_; }
+    ~Call() {
+      if (--of.calling_ == 0) std::erase_if(of.handlers_, [](const Handler& h) { return !h.function; });
+    }
+    vrpn_Connection& of;
+  } const call(*this);
   for (std::size_t i = 0; i < handlers_.size(); ++i) {
     const Handler h = handlers_[i];  // a copy: handlers may register others
     const bool wanted = h.function && (h.type == p.type || h.type == vrpn_ANY_TYPE) &&
                         (h.sender == p.sender || h.sender == vrpn_ANY_SENDER);
     if (wanted) h.function(h.userdata, p);
   }
-  if (--calling_ == 0) std::erase_if(handlers_, [](const Handler& h) { return !h.function; });
 }
 
 vrpn_int32 vrpn_Connection::register_sender(const char* name) {

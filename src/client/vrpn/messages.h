@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <exception>
 #include <vector>
 
 #include "client/link.h"
@@ -24,16 +25,18 @@ template <wire::WireMessage M>
 void sendMessage(vrpn_Connection* connection, vrpn_int32 sender, const M& message,
                  wire::Reliability reliability = M::kInfo.reliability, const timeval* time = nullptr) {
   if (!connection || !connection->doing_okay()) return;
-  if (connection->link() && !time) {
-    try {
+  std::vector<char> payload;
+  try {
+    if (connection->link() && !time) {
       connection->link()->send(wireNow(), {sender}, message, reliability);
-    } catch (const hapticd::Error& error) {
-      std::fprintf(stderr, "VRPN: %s\n", error.what());
+      return;
     }
+    payload.resize(wire::payloadSize(message));
+    writePayload(message, payload.data());
+  } catch (const std::exception& error) {  // of the network, or a message that is too long
+    std::fprintf(stderr, "VRPN: %s\n", error.what());
     return;
   }
-  std::vector<char> payload(wire::payloadSize(message));
-  writePayload(message, payload.data());
   connection->pack_message(
       static_cast<vrpn_uint32>(payload.size()), time ? *time : connection->get_time(),
       wire::kLocalType<M>.value, sender, payload.data(),

@@ -106,6 +106,7 @@ void ServerLink::add(net::Connection connection, bool datagrams) {
 void ServerLink::onEvent(Client& client, const wire::Event& event) {
   if (std::get_if<wire::Connected>(&event) != nullptr) {
     inbox_.push({.what = Arrival::What::connected, .arrived = wallTimePoint()});
+    client.announced = true;
   } else if (const auto* sender = std::get_if<wire::SenderDescribed>(&event)) {
     adoptSender(client, sender->name);
   } else if (const auto* type = std::get_if<wire::TypeDescribed>(&event)) {
@@ -149,7 +150,7 @@ void ServerLink::onUdpDescribed(Client& client, const wire::UdpAddress& address)
 }
 
 void ServerLink::onClosed(Client& client, const std::string& reason) {
-  if (client.peer->connected()) {
+  if (client.announced) {
     inbox_.push({.what = Arrival::What::lost, .arrived = wallTimePoint(), .bytes = wire::asBytes(reason)});
   }
   clients_.remove_if([&](const Client& entry) { return &entry == &client; });

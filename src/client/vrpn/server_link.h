@@ -44,6 +44,7 @@ class ServerLink {
     std::optional<net::Endpoint> udpPeer;
     std::optional<wire::Peer> peer;
     std::size_t adopted = 0;  // names that only it has described so far
+    bool announced = false;   // to the handler of poll()
   };
 
   void listen(const net::Endpoint& local);
