@@ -55,6 +55,11 @@ class SystemOutputFile final : public OutputFile {
     if (::fdatasync(file_.fd()) != 0) fail(errno, "cannot sync", file_.path());
   }
 
+  bool isGone() const noexcept override {
+    struct stat status {};
+    return ::fstat(file_.fd(), &status) == 0 && status.st_nlink == 0;
+  }
+
  private:
   Descriptor file_;
 };

@@ -162,15 +162,11 @@ void Recorder::drain() {
   reportLosses();
 }
 
-// A file that was removed can be written and is lost. Other errors say nothing about it.
+// A file that was removed can be written and is lost.
 void Recorder::lookForFile() {
   if (!file_ || base::now() < nextLook_) return;
   nextLook_ = base::now() + kBetweenLooks;
-  try {
-    base::world().files.open(path_);
-  } catch (const std::system_error& error) {
-    if (error.code() == std::errc::no_such_file_or_directory) fail(error.code());
-  }
+  if (file_->isGone()) fail(std::make_error_code(std::errc::no_such_file_or_directory));
 }
 
 void Recorder::reportLosses() {

@@ -199,6 +199,11 @@ class FakeFiles::FakeFile final : public OutputFile {
     ++content_->syncs;
   }
 
+  bool isGone() const noexcept override {
+    return std::none_of(files_.files_.begin(), files_.files_.end(),
+                        [this](const auto& entry) { return entry.second == content_; });
+  }
+
  private:
   FakeFiles& files_;
   const std::filesystem::path path_;

@@ -155,6 +155,34 @@ TEST(Recorder, AFileThatIsRemovedEndsTheRecording) {
   EXPECT_EQ(recorder.counts().ticks, 0U) << "lost ticks were not recorded";
 }
 
+TEST(Recorder, AFileThatIsRenamedIsRecordedOn) {
+  RecordingFile file;
+  const RecordingFile renamed;
+  base::SystemFiles files;
+  const std::unique_ptr<base::OutputFile> open = files.create(file.path(), base::Existing::refuse);
+  std::filesystem::rename(file.path(), renamed.path());
+  EXPECT_FALSE(open->isGone());
+  std::filesystem::remove(renamed.path());
+  EXPECT_TRUE(open->isGone());
+
+  base::FakeWorld world;
+  Problems problems;
+  Recorder recorder("/session.haptics", problems.listener());
+  recorder.addDevice(phantom());
+  recorder.start(0, "");
+  world.files.rename("/session.haptics", "/another.haptics");
+  for (std::uint64_t i = 1; i <= 5; ++i) {
+    realtime::TickRecord tick;
+    tick.report.tick = i;
+    recorder.ring(0).push(tick);
+    world.threads.runUntil(world.clock.now() + 1'000'000'000);
+  }
+  EXPECT_TRUE(recorder.writes());
+  recorder.finish();
+  EXPECT_EQ(recorder.counts().ticks, 5U);
+  EXPECT_EQ(problems.all(), "");
+}
+
 TEST(Recorder, AMachineOutOfDescriptorsDoesNotEndTheRecording) {
   base::FakeWorld world;
   Problems problems;
