@@ -29,31 +29,16 @@ bool isControl(std::string_view character) {
   return lead < 0x20 || lead == 0x7f || (lead == 0xc2 && static_cast<unsigned char>(character[1]) < 0xa0);
 }
 
-template <class Replaced>
-std::string replaced(std::string_view text, Replaced&& isReplaced) {
-  std::string out;
-  while (!text.empty()) {
-    const std::size_t bytes = characterBytes(text);
-    out += bytes == 0 || isReplaced(text) ? "\xef\xbf\xbd" : text.substr(0, bytes);
-    text.remove_prefix(std::max<std::size_t>(bytes, 1));
-  }
-  return out;
-}
-
 }  // namespace
 
 std::string printable(std::string_view text) {
-  return replaced(text, isControl);
-}
-
-std::string utf8(std::string_view text) {
-  return replaced(text, [](std::string_view) { return false; });
-}
-
-std::string_view beginning(std::string_view text, std::size_t most) noexcept {
-  if (text.size() <= most) return text;
-  while (most > 0 && (static_cast<unsigned char>(text[most]) & 0xc0U) == 0x80) --most;
-  return text.substr(0, most);
+  std::string line;
+  while (!text.empty()) {
+    const std::size_t bytes = characterBytes(text);
+    line += bytes == 0 || isControl(text) ? "\xef\xbf\xbd" : text.substr(0, bytes);
+    text.remove_prefix(std::max<std::size_t>(bytes, 1));
+  }
+  return line;
 }
 
 }  // namespace hapticd::base
