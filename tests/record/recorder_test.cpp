@@ -155,6 +155,16 @@ TEST(Recorder, AFileThatIsRemovedEndsTheRecording) {
   EXPECT_EQ(recorder.counts().ticks, 0U) << "lost ticks were not recorded";
 }
 
+// One tick in each.
+void recordSeconds(std::uint64_t count, Recorder& recorder, base::FakeWorld& world) {
+  for (std::uint64_t i = 1; i <= count; ++i) {
+    realtime::TickRecord tick;
+    tick.report.tick = i;
+    recorder.ring(0).push(tick);
+    world.threads.runUntil(world.clock.now() + 1'000'000'000);
+  }
+}
+
 TEST(Recorder, AFileThatIsRenamedIsRecordedOn) {
   RecordingFile file;
   const RecordingFile renamed;
@@ -171,12 +181,7 @@ TEST(Recorder, AFileThatIsRenamedIsRecordedOn) {
   recorder.addDevice(phantom());
   recorder.start(0, "");
   world.files.rename("/session.haptics", "/another.haptics");
-  for (std::uint64_t i = 1; i <= 5; ++i) {
-    realtime::TickRecord tick;
-    tick.report.tick = i;
-    recorder.ring(0).push(tick);
-    world.threads.runUntil(world.clock.now() + 1'000'000'000);
-  }
+  recordSeconds(5, recorder, world);
   EXPECT_TRUE(recorder.writes());
   recorder.finish();
   EXPECT_EQ(recorder.counts().ticks, 5U);
@@ -190,12 +195,7 @@ TEST(Recorder, AMachineOutOfDescriptorsDoesNotEndTheRecording) {
   recorder.addDevice(phantom());
   recorder.start(0, "");
   world.files.failures.open = EMFILE;
-  for (std::uint64_t i = 1; i <= 5; ++i) {
-    realtime::TickRecord tick;
-    tick.report.tick = i;
-    recorder.ring(0).push(tick);
-    world.threads.runUntil(world.clock.now() + 1'000'000'000);
-  }
+  recordSeconds(5, recorder, world);
   EXPECT_TRUE(recorder.writes());
   recorder.finish();
   EXPECT_EQ(recorder.counts().ticks, 5U);

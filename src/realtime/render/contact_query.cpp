@@ -427,7 +427,7 @@ bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
     });
     joinedFans_ = joinedFans_ || (fans && fans->any());
   }
-  estimateRoom(radius);
+  if (keepsFacets_) estimateRoom(radius);
   gatheredCount_ = objectCount_;
   gatheredGeneration_ = reusable ? generation_ : 0;
   if (!cache_.complete() && !workSpent())
@@ -482,7 +482,7 @@ void ContactQuery::gatherAhead(const Vec3& p, const Vec3& way, double margin) no
   if (!keepsFacets_) return gatherAround(p, 2 * needed);
   if (isReusable(needed) && cache_.covers(p + 0.5 * way, needed)) return;
   // Where that would be too many facets: the beginning of the way.
-  const double reach = std::min(2 * needed, roomyReach());
+  const double reach = std::min(2 * needed, roomyReach_m_);
   const double lead = reach > needed ? 1 : std::min(1.0, kHalfWay * reach / length);
   if (!gather(p + lead * way, reach)) gatherAround(p, reach);
 }
@@ -679,7 +679,7 @@ bool ContactQuery::castInSteps(const Vec3& p, const Vec3& d, double begin, doubl
   const double length = d.norm();
   double step = keepsFacets_ ? 1.0 : std::min(1.0, std::max(0.125 * radius_ / length, kSmallestStep));
   while (begin < end) {
-    const double longest_m = std::min(longestStep_m_, 2 * roomyReach());
+    const double longest_m = std::min(longestStep_m_, 2 * roomyReach_m_);
     step = std::min({step, end - begin, std::max(longest_m / length, kSmallestStep)});
     const double middle = begin + 0.5 * step;
     const bool fits = ensureGathered(p + middle * d, 0.5 * step * length * kWiden);

@@ -142,11 +142,9 @@ class ContactQuery {
   /// Gathers what the tool may meet on its way from p to p + way in this tick, with a margin to all sides. A
   /// point tool gathers the same way once more, for the next tick; a ball has its reserve.
   void gatherAhead(const Vec3& p, const Vec3& way, double margin) noexcept;
-  /// Of a ball that holds some dozens of facets, where the last one was gathered; a ball tool has room
-  /// enough.
-  double roomyReach() const noexcept {
-    return keepsFacets_ ? roomyReach_m_ : std::numeric_limits<double>::infinity();
-  }
+  /// Radius in which there are some dozens of facets, where the last ones were gathered. Infinite for a ball
+  /// tool, which has room enough.
+  double roomyReach() const noexcept { return roomyReach_m_; }
   bool isGathered(const Vec3& p) const noexcept {
     return cache_.complete() && (p - cache_.centre()).squaredNorm() < 0.64 * cache_.reach() * cache_.reach();
   }

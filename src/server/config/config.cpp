@@ -70,9 +70,9 @@ class Reader {
     field(key, out);
   }
   void listen(const std::string& key, std::string& address, std::uint16_t& port) {
+    if (find(key) == nullptr) return;
     std::string text;
     field(key, text);
-    if (find(key) == nullptr) return;
     try {
       if (text.empty()) throw ConfigError("is empty; it is ADDR:PORT, e.g. 127.0.0.1:3883");
       parseListen(text, address, port);

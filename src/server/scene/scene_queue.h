@@ -19,7 +19,7 @@ struct SceneParcel {
   scene::ClientId client = 0;
   std::vector<SceneTask> tasks;
   std::size_t bytes = 0;
-  bool beforeOthers = false;  ///< what other clients push later waits for it
+  bool beforeOthers = false;  ///< what other clients have queued waits for it
 };
 
 /// In order for each client; clients take turns, so that one with much work does not delay the others. What

@@ -79,9 +79,9 @@ void Admission::enter(Session& session) {
   auto& reserve = reserves_[wayOf(session)];
   reserve.push_back(session.id());
   // At once, without a last text: a flood must not take all descriptors. Those that ended wait to leave.
-  std::size_t open = 0;
+  std::size_t open = 1;  // the new one
   for (auto id = reserve.rbegin(); id != reserve.rend(); ++id) {
-    Session* const other = *id == session.id() ? &session : find(*id);
+    Session* const other = find(*id);
     if (other == nullptr || other->ending()) continue;
     if (++open > kReserve) other->abort("the server is full, and others wait to stop forces");
   }

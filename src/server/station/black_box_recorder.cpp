@@ -28,7 +28,7 @@ std::string plain(std::string text) {
   return text;
 }
 
-// The same as in an address: each device has a folder of its own.
+// Percent-encoded, so that each device has a folder of its own.
 std::string folderOf(const std::string& device) {
   std::string folder;
   for (const unsigned char c : device) {
