@@ -46,8 +46,9 @@ void print(const Difference& d) {
   std::printf("device      %s: %llu ticks, %llu touching in either\n", d.device().c_str(),
               static_cast<unsigned long long>(d.ticks()), static_cast<unsigned long long>(d.touching()));
   if (d.skipped() > 0)
-    std::printf("not compared %llu ticks: what held, ramped or was streamed before is not in the file\n",
-                static_cast<unsigned long long>(d.skipped()));
+    std::printf(
+        "not compared %llu ticks: what held, moved, ramped or was streamed before is not in the file\n",
+        static_cast<unsigned long long>(d.skipped()));
   if (d.lost() > 0)
     std::printf("not recorded %llu ticks: the ticks after them may differ\n",
                 static_cast<unsigned long long>(d.lost()));
@@ -67,7 +68,7 @@ std::string nothingComparedIn(const std::vector<Difference>& devices) {
     skipped += d.skipped();
   }
   if (skipped == 0) return "no tick could be compared: the recording has none; see 'hapticd info'";
-  return "no tick could be compared: there was none free of contact, of ramps and of streamed forces";
+  return "no tick could be compared: there was none free of contact, movement, ramps and streamed forces";
 }
 
 // Why the recording does not show that the forces are the same; empty when it does.

@@ -88,6 +88,7 @@ class SceneBuilder::State {
     snapshot->faces = faces_;
     snapshot->objects = objects_.published().objects;
     snapshot->objectIndex = objects_.published().index;
+    snapshot->settledAt = objects_.published().settledAt;
     PublishedForces published = forces_.publish(now, units, objects_.heaviestSurface_Ns_per_m(), board_, out);
     snapshot->effects = std::move(published.effects);
     snapshot->planes = std::move(published.planes);

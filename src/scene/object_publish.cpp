@@ -118,7 +118,16 @@ void ObjectTable::beginMorphs(const std::vector<Object*>& committed, Nanos begin
     Nanos& longest = travel[object->meshSetBy];
     longest = std::max(longest, object->mesh.travel(begin, shortest));
   }
-  for (Object* object : committed) object->mesh.begin(begin, travel[object->meshSetBy]);
+  for (Object* object : committed) {
+    object->mesh.begin(begin, travel[object->meshSetBy]);
+    unsettle(begin);
+  }
+}
+
+// Movements end sooner than the longest interval; twice that, because a snapshot follows its commands.
+void ObjectTable::unsettle(Nanos now) {
+  constexpr Nanos kSettling = 2 * std::max(PoseStream::kLongestGap, MeshDraft::kLongestGap);
+  published_.settledAt = std::max(published_.settledAt, now + kSettling);
 }
 
 double ObjectTable::metresPerUnit(const Object& object) const {
@@ -190,6 +199,7 @@ void ObjectTable::updateMotions(Nanos now) {
   for (const std::int32_t id : changed_) {
     Object* object = find(id);
     if (object == nullptr || !std::exchange(object->moved, false)) continue;
+    unsettle(now);
     std::optional<Move> move = moveOf(*object, now);
     if (!move) continue;
     move->leader = moves.size();

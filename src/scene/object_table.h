@@ -105,6 +105,8 @@ struct Object {
 struct PublishedObjects {
   std::vector<std::shared_ptr<const ObjectState>> objects;
   std::shared_ptr<const SpatialIndex> index;
+  /// Nothing moves or deforms any more, and earlier intervals do not count for the next movement.
+  Nanos settledAt = 0;
 };
 
 /// All objects by id. A command checks all of its values before it changes anything.
@@ -180,6 +182,7 @@ class ObjectTable {
   };
   std::optional<Move> moveOf(Object& object, Nanos now);
   void updateMotions(Nanos now);
+  void unsettle(Nanos now);
   void spreadFreeLoad(double load_Ns_per_m);
   void updateHeaviest();
   void updateSurface(Object& object, Nanos now, NoticeBoard& board, std::vector<Notice>& out);

@@ -34,6 +34,7 @@ struct SceneSnapshot {
   std::vector<std::shared_ptr<const ObjectState>> objects;
   /// Over positions in `objects`: boxes in world units around all that an object sweeps during its motion.
   std::shared_ptr<const SpatialIndex> objectIndex;
+  Nanos settledAt = 0;             ///< PublishedObjects::settledAt
   std::vector<Effect> effects;     ///< running ones, by ascending index
   std::vector<Plane> planes;       ///< at most kMaxPlanes, by ascending index
   std::vector<ForceField> fields;  ///< their forces add up; constraints are among them

@@ -14,8 +14,10 @@ namespace {
 using base::Nanos;
 using record::RecordingError;
 
-// Before the begin of a recording, so that meshes need not wait for further edits and motions are over.
+// Before the begin of a recording, the commands and their publication: so that meshes need not wait for
+// further edits, and movements are over and measure no interval from it.
 constexpr Nanos kSettled = 500'000'000;
+constexpr Nanos kPublished = 200'000'000;
 // Of recordings whose memory, 8 MB for each device, a tick may still use.
 constexpr std::size_t kMostEnded = 4;
 
@@ -147,7 +149,7 @@ bool Recordings::beginScene(SceneHost& scene) {
     for (std::uint32_t i = 0; i < stations_.size(); ++i) {
       if (&stations_[i]->scene() != &scene) continue;
       const std::uint64_t revision = builders[seat++]->revision();
-      recorder->recordPublish(i, now, revision);
+      recorder->recordPublish(i, now - kPublished, revision);
       stations_[i]->recordTo(recorder, i, revision);
     }
   });

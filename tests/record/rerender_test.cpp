@@ -381,6 +381,13 @@ class LateRecording {
     owners_->forget(client);
     changed_ = true;
   }
+  /// The box, by its placement and by its points.
+  void move(double y_m) { send(scene::SetObjectPosition{0, {0, y_m, 0}}); }
+  void raise(double y_m) {
+    std::vector<geometry::Vec3f> points = boxPoints();
+    for (geometry::Vec3f& point : points) point.y() += static_cast<float>(y_m);
+    send(scene::SetVertices{0, 0, std::move(points)});
+  }
   /// The same as far as the servo knows; leave() follows when the scene is less busy.
   void leaveBusyScene(scene::ClientId client) { owners_->leave(client, now_); }
   void stream(const realtime::RemoteInput& input) { tick_.remote().write(input); }
@@ -414,7 +421,7 @@ class LateRecording {
       const bool ofObjects = scene::targetOf(c.command) == scene::Target::objects;
       recorder->recordCommand(0, c.client, ofObjects ? now_ - 500 * kTick : now_, &c.command);
     }
-    recorder->recordPublish(0, now_, builder_.revision());
+    recorder->recordPublish(0, now_ - 200 * kTick, builder_.revision());
     tick_.recordTo({.ticks = &recorder->ring(0),
                     .streams = &recorder->streamRing(0),
                     .memories = &recorder->memoryRing(0),
@@ -720,6 +727,55 @@ TEST(RecordingBegunLate, HasTheTanksOfStreamedForces) {
   EXPECT_GT(rerender(file.path()).front().largest_N, 0.01) << "without it";
 }
 
+struct Movement {
+  const char* name;
+  bool deforms;
+  int every_ms;  // before the way, of at most 50 ms, is over, or after
+  bool before;   // the recording begins
+};
+
+void PrintTo(const Movement& movement, std::ostream* out) {
+  *out << movement.name;
+}
+
+const Movement kMovements[] = {
+    {"quicklyMoved", false, 20, true},        {"slowlyMoved", false, 70, true},
+    {"quicklyDeformed", true, 20, true},      {"slowlyDeformed", true, 70, true},
+    {"quicklyMovedThen", false, 20, false},   {"slowlyMovedThen", false, 70, false},
+    {"quicklyDeformedThen", true, 20, false}, {"slowlyDeformedThen", true, 70, false}};
+
+class RecordingOfMovements : public testing::TestWithParam<Movement> {};
+
+// A recording has its objects at the ends of their ways, and nothing of the intervals at which a client moved
+// them, which set the duration of the next way.
+TEST_P(RecordingOfMovements, GivesTheRecordedForcesOnceTheSceneHasSettled) {
+  const RecordingFile file;
+  LateRecording r;
+  const auto move = [&](const geometry::Vec3& hand_mm) {
+    for (int i = 0; i < 9; ++i) {
+      const double y_m = i % 2 == 0 ? 0.004 : 0;
+      GetParam().deforms ? r.raise(y_m) : r.move(y_m);
+      r.glide(hand_mm, GetParam().every_ms);
+    }
+  };
+  r.glide({1, 21, 2}, 700);
+  if (GetParam().before) {
+    r.glide(kAbove, 300);
+    move(kAbove);
+  }
+  r.record(file.path());
+  r.glide(kAbove, 5);
+  move({1, 19, 2});
+  r.glide({1, 35, 2}, 300);
+  move({1, 19, 2});
+  r.end();
+  const Compared compared = rerender(file.path()).front();
+  EXPECT_EQ(compared.same, compared.ticks) << compared.firstDifference;
+  EXPECT_EQ(compared.largest_N, 0);
+  EXPECT_GT(compared.ticks, 200U);
+  EXPECT_GT(compared.touching, 80U);
+}
+
 // Older versions wrote the same without the memory of the servo.
 TEST(RecordingBegunLateByAnOlderVersion, IsReadAndSaysWhatIsMissing) {
   const RecordingFile file;
@@ -777,6 +833,8 @@ TEST(Rerendering, WithoutMemoryForTheSceneSaysSo) {
 #endif
 
 INSTANTIATE_TEST_SUITE_P(All, RecordingBegunLate, testing::ValuesIn(kGoesOn),
+                         [](const auto& param) { return std::string(param.param.name); });
+INSTANTIATE_TEST_SUITE_P(All, RecordingOfMovements, testing::ValuesIn(kMovements),
                          [](const auto& param) { return std::string(param.param.name); });
 
 }  // namespace

@@ -105,6 +105,7 @@ const scene::SceneSnapshot& Tick::takeSnapshot() noexcept {
   const scene::SceneSnapshot& scene = newest != nullptr ? *newest : nothing_;
   report_.revision = scene.revision;
   report_.T_world_device = scene.workspace.T_world_device;
+  sceneSettledAt_ = scene.settledAt;
   return scene;
 }
 
@@ -221,6 +222,7 @@ void Tick::remember(MemoryRing* ring) noexcept {
   const bool guard = guard_.remember(memory_.guard);
   const bool remote = rememberRemote();
   memory_.whole = rendering && guard && remote && sight_.ever && sight_.time == report_.time &&
+                  report_.time > sceneSettledAt_ &&
                   report_.revision >= rememberFrom_.load(std::memory_order_acquire);
   if (first || memory_.whole) ring->push(memory_);
 }

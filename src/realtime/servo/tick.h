@@ -156,6 +156,7 @@ class Tick {
   BlackBox blackBox_;
   TickHistograms histograms_;
   TickReport report_;
+  Nanos sceneSettledAt_ = 0;  // of the snapshot of this tick
   std::atomic<RecordRing*> recordTo_{nullptr};
   std::atomic<StreamRing*> recordStreamTo_{nullptr};
   std::atomic<MemoryRing*> rememberTo_{nullptr};
