@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "base/printable.h"
 #include "base/time.h"
 #include "commands.h"
 #include "figure.h"
@@ -183,7 +184,7 @@ void addEvents(Figure& figure, const Data& data, const Axes& axes, double bottom
     const char* colour = moment.trip ? kRed : kBlue;
     figure.line({{x, axes.top - 4}, {x, bottom}}, colour, 0.8);
     if (x < freeFrom) continue;  // its text would cover the previous one
-    const std::string text = moment.text.substr(0, 40);
+    const std::string_view text = base::beginning(moment.text, 40);
     figure.text(x + 2, axes.top - 6, text, 8, colour);
     freeFrom = x + 4.6 * static_cast<double>(text.size()) + 6;
   }

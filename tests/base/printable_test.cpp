@@ -33,6 +33,19 @@ TEST(Printable, ReplacesWhatIsNoCharacter) {
   EXPECT_EQ(printable("\xe2\x82"), kOther + kOther) << "cut off";
   EXPECT_EQ(printable("\xed\xa0\x80"), kOther + kOther + kOther) << "a surrogate";
   EXPECT_EQ(printable("\xf4\x90\x80\x80").size(), 4 * kOther.size()) << "beyond Unicode";
+  EXPECT_EQ(printable("\xef\xbf\xbe"), kOther + kOther + kOther) << "U+FFFE is not in XML";
+}
+
+TEST(Utf8, KeepsControlCharactersAndReplacesWhatIsNoCharacter) {
+  EXPECT_EQ(utf8("a\n\xc2\xb5\xff"), "a\n\xc2\xb5" + kOther);
+}
+
+TEST(Beginning, CutsBetweenCharacters) {
+  EXPECT_EQ(beginning("abc", 3), "abc");
+  EXPECT_EQ(beginning("abc", 2), "ab");
+  EXPECT_EQ(beginning("a\xc2\xb5", 2), "a");
+  EXPECT_EQ(beginning("a\xf0\x9f\x98\x80z", 4), "a");
+  EXPECT_EQ(beginning("\x80\x80\x80", 2), "") << "no character at all";
 }
 
 }  // namespace

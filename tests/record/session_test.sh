@@ -15,6 +15,7 @@ rows=$!
 "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --server "Phantom@tcp://$address" --seconds 4 >"$work/touch.txt"
 wait "$heard"
 wait "$rows"
+"$hapticd" mark "n$(printf 'ä%.0s' $(seq 30))" --server "Phantom@tcp://$address" >/dev/null # a figure shows 40 bytes of it
 [ "$(wc -l <"$work/heard.csv")" -gt 50 ]
 cp "$work/my.haptics" "$work/live.haptics" # while it is written
 for type in 'vrpn_Button States' 'hapticd Guard_State' 'vrpn_Tracker Pos_Quat' 'vrpn_ForceDevice Force'; do
@@ -37,6 +38,12 @@ grep -qE 'cut|no end' "$work/live.err"
 grep -q 'changed     stiffness 100 N/m' "$work/soft.txt"
 awk '/^force/ { exit !($4 > 0) }' "$work/soft.txt"
 grep -q '<polyline class="now"' "$work/soft.html"
+
+# Figures are XML, whatever the names.
+cp "$work/my.haptics" "$work/"$'\xff.haptics'
+"$hapticd" plot "$work/"$'\xff.haptics' --out "$work/my.svg" >/dev/null
+iconv -f UTF-8 "$work/my.svg" >/dev/null
+grep -q '>nä*</text>' "$work/my.svg"
 
 # For other programs.
 "$hapticd" export "$work/my.haptics" --to csv -o "$work/my.csv"
