@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "base/printable.h"
 #include "commands.h"
 #include "fit_mesh.h"
 #include "geometry/crossings.h"
@@ -92,8 +93,8 @@ void send(Client& client, const TriangleMesh& mesh, const TouchOptions& options)
   client.clearMesh(options.object);
   client.setTransform(options.object, kIdentity);
   client.setTouchable(options.object, true);
-  client.setObjectName(options.object,
-                       std::filesystem::path(options.mesh).filename().string().substr(0, kLongestName));
+  const std::string name = std::filesystem::path(options.mesh).filename();
+  client.setObjectName(options.object, std::string(base::beginning(name, kLongestName)));
   client.setSurface(options.object, options.surface);
   ProgressBar bar("sending");
   const auto start = std::chrono::steady_clock::now();

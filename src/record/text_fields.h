@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <string>
 
+#include "base/printable.h"
 #include "hapticd/trips.h"
 #include "record/archive.h"
 
@@ -25,7 +26,7 @@ struct ExactNanos {
   std::int64_t value = 0;
 };
 
-/// Appends in quotes, for JSON; bytes that are not UTF-8 stay as they are.
+/// Appends text of UTF-8 in quotes, for JSON.
 inline void appendQuoted(std::string& out, std::string_view text) {
   out += '"';
   for (const char c : text) {
@@ -172,7 +173,7 @@ class JsonObject {
     appendNumber(out_, time.value);
     out_ += '"';
   }
-  void put(const std::string& text) { appendQuoted(out_, text); }
+  void put(const std::string& text) { appendQuoted(out_, base::utf8(text)); }
   template <IsEnum T>
   void put(T value) {
     appendNumber(out_, static_cast<int>(value));

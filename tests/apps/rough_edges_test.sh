@@ -118,13 +118,18 @@ touch_mesh "$work/one.obj" --true-size
 grep -q ' 1 triangle,' "$work/out"
 grep -q '^30 x 30 x 0 mm, centred' "$work/out"
 web=$(sed -nE 's#.*viewer: http://127.0.0.1:([0-9]+)/.*#\1#p' "$work/log")
-triangles() { # of objects 0 and 1
+objects() { # of the scene: what matches
   exec 3<>"/dev/tcp/127.0.0.1/$web"
   printf 'GET /api/state HTTP/1.1\r\nHost: localhost:%s\r\nConnection: close\r\n\r\n' "$web" >&3
-  grep -oaE '"triangles":[0-9]+' <&3 | tr '\n' ' '
+  grep -oaE "$1" <&3 | tr '\n' ' '
 }
-becomes() { for _ in $(seq 100); do [ "$(triangles)" = "$1" ] && return; sleep 0.1; done; echo "got $(triangles), not $1"; exit 1; }
+become() { for _ in $(seq 100); do [ "$(objects "$1")" = "$2" ] && return; sleep 0.1; done; echo "got $(objects "$1"), not $2"; exit 1; }
+becomes() { become '"triangles":[0-9]+' "$1"; }
 becomes '"triangles":1 "triangles":1 '
 touch_mesh "$source_dir/testdata/meshes/bunny.obj" --replace
 becomes '"triangles":3674 '
+# A long name is cut between its characters.
+cp "$work/one.obj" "$work/n$(printf 'ä%.0s' $(seq 40)).obj"
+touch_mesh "$work/"nä*.obj --replace
+become '"name":"nä[^"]*"' "\"name\":\"n$(printf 'ä%.0s' $(seq 31))\" "
 "$hapticd" serve --listen 127.0.0.1:0 --http off --port 0 --seconds 0.2 --verbose >"$work/second" 2>&1

@@ -113,6 +113,15 @@ TEST(ExportFile, AFullDiskKeepsTheFileThatWasToBeReplaced) {
   EXPECT_EQ(world.files.list("/"), std::vector<std::string>{"my.csv"});
 }
 
+TEST(Json, BytesThatAreNotUtf8AreReplaced) {
+  std::string text;
+  {
+    JsonObject object(text);
+    object("name", std::string("\xc3\xa4\xc3\xff"));
+  }
+  EXPECT_EQ(text, "{\"name\":\"\xc3\xa4\xef\xbf\xbd\xef\xbf\xbd\"}");
+}
+
 TEST(Json, NumbersThatAreNotFiniteAreNullAndLongListsAreTheirLength) {
   std::string text;
   {
