@@ -76,7 +76,7 @@ std::string failureOf(const std::vector<Difference>& devices) {
   for (const Difference& d : devices) {
     if (d.same() == d.ticks()) continue;
     std::string text = "nothing was changed, but ticks of " + d.device() + " differ: ";
-    if (d.lost() > 0) return text + "others were lost";
+    if (!d.complete()) return text + "the recorder lost some of what made them";
     if (!d.knowsPast()) {
       text +=
           "the recording began while the server ran, and the version that wrote it left out the effects, "

@@ -38,6 +38,11 @@ void Difference::add(const realtime::TickReport& then, const realtime::TickRepor
   largestDepth_m_ = std::max(largestDepth_m_, depth_m);
 }
 
+void Difference::add(const LostEvent& lost) {
+  complete_ = false;
+  if (lost.what == LostEvent::What::ticks) lost_ += lost.count;
+}
+
 double Difference::shareOf(double sum) const noexcept {
   const std::uint64_t count = touching_ > 0 ? touching_ : ticks();
   return count > 0 ? sum / static_cast<double>(count) : 0;
@@ -73,19 +78,15 @@ std::vector<Difference> compare(const std::filesystem::path& session, const Rere
         devices[device].skip();
       }
     }
-    const auto* lost = std::get_if<LostEvent>(&event);
-    if (lost != nullptr && lost->what == LostEvent::What::ticks) devices[lost->device].addLost(lost->count);
-    if (lost != nullptr && lost->what == LostEvent::What::streamed) {
-      remark = "the recorder lost " + std::to_string(lost->count) +
-               " streamed values: their remote contacts and forces are missing. ";
-    }
-    if (lost != nullptr && lost->what == LostEvent::What::sceneEvents) {
-      remark = "the recorder lost " + std::to_string(lost->count) +
-               " scene events: from there on the scene is another. ";
+    if (const auto* lost = std::get_if<LostEvent>(&event)) {
+      // Of scene events it is not known for which device.
+      for (std::uint32_t i = 0; i < devices.size(); ++i) {
+        if (lost->what == LostEvent::What::sceneEvents || lost->device == i) devices[i].add(*lost);
+      }
     }
   }
   for (std::uint32_t i = 0; i < devices.size(); ++i) devices[i].setKnowsPast(again.knowsPast(i));
-  remark += reader.remark();
+  remark = reader.remark();
   return devices;
 }
 

@@ -25,7 +25,7 @@ class Difference {
   explicit Difference(std::string device) : device_(std::move(device)) {}
 
   void add(const realtime::TickReport& then, const realtime::TickReport& now);
-  void addLost(std::uint64_t ticks) { lost_ += ticks; }
+  void add(const LostEvent& lost);
   /// A tick before the recording can be compared.
   void skip() { ++skipped_; }
   void setKnowsPast(bool known) { knowsPast_ = known; }
@@ -36,6 +36,8 @@ class Difference {
   std::uint64_t same() const noexcept { return same_; }
   /// Ticks that the recorder dropped; the ticks after them may differ.
   std::uint64_t lost() const noexcept { return lost_; }
+  /// False: ticks, scene events or streamed values are missing.
+  bool complete() const noexcept { return complete_; }
   /// Ticks before a recording that began while the server ran can be compared.
   std::uint64_t skipped() const noexcept { return skipped_; }
   /// False: the recording began while the server ran, without what its servo knew.
@@ -58,6 +60,7 @@ class Difference {
   Nanos begin_ = 0;
   std::uint64_t same_ = 0;
   std::uint64_t lost_ = 0;
+  bool complete_ = true;
   std::uint64_t skipped_ = 0;
   bool knowsPast_ = true;
   std::uint64_t touching_ = 0;
@@ -71,7 +74,7 @@ class Difference {
 /// "the recording has force law 1, this program law 15"; empty when they agree.
 std::string lawDifference(const RecordingHeader& header);
 
-/// Re-renders a whole recording. `remark` says why the file ends early, if it does. Throws RecordingError.
+/// Re-renders a whole recording. `remark` says what is missing, if anything is. Throws RecordingError.
 /// `law` is the lawDifference() of the recording.
 std::vector<Difference> compare(const std::filesystem::path& session, const RerenderChanges& changes,
                                 std::string& remark, std::string& law);

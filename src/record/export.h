@@ -66,7 +66,7 @@ class McapFile final : public SampleFile {
   std::string text_;
 };
 
-/// Writes a whole recording and closes `to`. `remark` says why the recording ends early, if it does.
+/// Writes a whole recording and closes `to`. `remark` says what is missing, if anything is.
 /// `beforeEach` is called before each event; what it throws ends the export.
 void exportRecording(const std::filesystem::path& file, SampleFile& to, std::string& remark,
                      const std::function<void()>& beforeEach);

@@ -153,10 +153,14 @@ bool RecordingReader::readBlock(RecordingEvent& event) {
       if (std::get<LeftEvent>(event).time < 0 || std::get<LeftEvent>(event).time > kLatest)
         fail("a client left at an impossible time");
       return true;
-    case BlockKind::lost:
+    case BlockKind::lost: {
       takeWhole<LostEvent>(event);
-      device = std::get<LostEvent>(event).device;
+      const LostEvent& lost = std::get<LostEvent>(event);
+      device = lost.device;
+      if (const auto kind = static_cast<std::size_t>(lost.what); kind < lost_.size())
+        lost_[kind] += lost.count;
       break;
+    }
     case BlockKind::marker:
       takeWhole<MarkerEvent>(event);
       std::get<MarkerEvent>(event).text = base::printable(std::get<MarkerEvent>(event).text);
@@ -172,10 +176,21 @@ bool RecordingReader::readBlock(RecordingEvent& event) {
   return !ticks_;
 }
 
-std::string RecordingReader::remark() const {
+std::string RecordingReader::ending() const {
   if (!blocks_.damage().empty()) return blocks_.damage() + "; everything before it was read";
   if (!ended_) return "the recording has no end: the server was killed or is still recording";
   return {};
+}
+
+std::string RecordingReader::remark() const {
+  constexpr std::array<const char*, 3> kKinds = {" ticks", " scene events", " streamed values"};
+  std::string lost;
+  for (std::size_t kind = 0; kind < kKinds.size(); ++kind) {
+    if (lost_[kind] > 0) lost += (lost.empty() ? "" : ", ") + std::to_string(lost_[kind]) + kKinds[kind];
+  }
+  if (lost.empty()) return ending();
+  lost = "the recorder lost " + lost + ": what follows them may differ";
+  return ending().empty() ? lost : lost + "; " + ending();
 }
 
 }  // namespace hapticd::record

@@ -2,6 +2,7 @@
 // them.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -24,7 +25,9 @@ class RecordingReader {
   /// impossible content.
   bool next(RecordingEvent& event);
 
-  /// After the last event: why the recording is incomplete; empty when it is complete.
+  /// After the last event: why the recording has no end; empty when it has one.
+  std::string ending() const;
+  /// The same, and what the recorder lost before.
   std::string remark() const;
 
  private:
@@ -44,6 +47,7 @@ class RecordingReader {
   std::optional<TickUnpacker> ticks_;  // of the present block
   std::uint32_t ticksOf_ = 0;
   std::map<std::uint32_t, realtime::ServoMemory> remote_;  // parts of memories that follow, by device
+  std::array<std::uint64_t, 3> lost_{};                    // of each kind
   bool ended_ = false;
 };
 

@@ -103,7 +103,7 @@ std::optional<Nanos> Player::step() {
       if (!reader_) reader_ = std::make_unique<record::RecordingReader>(options_.file);
       readAhead();
       if (buffer_.empty()) {
-        endPass(reader_->remark());
+        endPass(reader_->ending());
         continue;
       }
       const auto next = buffer_.begin();

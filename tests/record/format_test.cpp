@@ -528,5 +528,21 @@ TEST_F(SmallSession, UnknownKindsOfBlocksAreSkipped) {
   EXPECT_EQ(more, plain);
 }
 
+TEST_F(SmallSession, LossesAreAddedUpAndNamed) {
+  using What = LostEvent::What;
+  Bytes losses;
+  for (const LostEvent& lost : {LostEvent{What::sceneEvents, 0, 2},
+                                {What::ticks, 0, 12},
+                                {What::sceneEvents, 0, 3},
+                                {What::streamed, 0, 4}})
+    appendBlock(losses, BlockKind::lost, packed(lost));
+  const std::string all(reinterpret_cast<const char*>(losses.data()), losses.size());
+  EXPECT_EQ(read(bytes_ + all).second,
+            "the recorder lost 12 ticks, 5 scene events, 4 streamed values: what follows them may differ");
+  EXPECT_EQ(read(bytes_.substr(0, bytes_.size() - 20) + all.substr(0, all.size() / 4)).second,
+            "the recorder lost 2 scene events: what follows them may differ; the recording has no end: the "
+            "server was killed or is still recording");
+}
+
 }  // namespace
 }  // namespace hapticd::record
