@@ -9,6 +9,8 @@ namespace hapticd::record {
 namespace {
 
 constexpr std::size_t kFlushAt = 64 * 1024;
+constexpr int kMostLinks = 40;  // as the kernel follows
+constexpr int kMostNames = 100;
 
 }  // namespace
 
@@ -16,14 +18,26 @@ ExportFile::ExportFile(const std::filesystem::path& path, Unfinished unfinished)
     : path_(path), target_(path), written_(path) {
   namespace fs = std::filesystem;
   std::error_code none;
-  const fs::file_status status = fs::status(path, none);
-  if (unfinished == Unfinished::dropped && (fs::is_regular_file(status) || !fs::exists(status))) {
-    if (fs::is_symlink(path, none)) target_ = fs::weakly_canonical(path, none);
-    written_ = target_;
-    written_ += ".part";
+  const fs::file_type type = fs::status(path, none).type();
+  if (unfinished == Unfinished::kept ||
+      (type != fs::file_type::regular && type != fs::file_type::not_found)) {
+    create(base::Existing::replace);
+    return;
   }
+  for (int link = 0; link < kMostLinks && fs::is_symlink(target_, none); ++link)
+    target_ = target_.parent_path() / fs::read_symlink(target_, none);
+  // Of another program, or of one that was killed.
+  for (int number = 1; !file_; ++number) {
+    written_ = target_;
+    written_ += number == 1 ? ".part" : ".part" + std::to_string(number);
+    if (number < kMostNames && fs::exists(fs::symlink_status(written_, none))) continue;
+    create(base::Existing::refuse);
+  }
+}
+
+void ExportFile::create(base::Existing existing) {
   try {
-    file_ = base::world().files.create(written_, base::Existing::replace);
+    file_ = base::world().files.create(written_, existing);
   } catch (const std::system_error& error) {
     failToCreate(error.code());
   }

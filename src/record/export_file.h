@@ -34,11 +34,12 @@ class ExportFile {
   void close();
 
  private:
+  void create(base::Existing existing);
   [[noreturn]] void failToCreate(const std::error_code& why) const;
 
   const std::filesystem::path path_;
   std::filesystem::path target_;   // without a symbolic link, which a renaming would replace
-  std::filesystem::path written_;  // beside it until the file is whole, or the same
+  std::filesystem::path written_;  // a new one beside it until the file is whole, or the same
   std::unique_ptr<base::OutputFile> file_;
   Bytes pending_;
 };

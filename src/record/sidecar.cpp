@@ -100,7 +100,7 @@ Json devicesOf(const RecordingHeader& header) {
 
 }  // namespace
 
-std::string sidecarOf(const std::filesystem::path& recording) {
+std::string sidecarOf(const std::filesystem::path& recording, const std::function<void()>& beforeEach) {
   RecordingReader reader(recording);
   const RecordingHeader& header = reader.header();
   // One builder for each scene: those of its further devices see the same commands.
@@ -113,6 +113,7 @@ std::string sidecarOf(const std::filesystem::path& recording) {
   Json markers = Json::array();
   Nanos first = 0;
   for (RecordingEvent event; reader.next(event);) {
+    beforeEach();
     if (const auto* scene = std::get_if<SceneEvent>(&event)) {
       const auto list = scenes.find(scene->scene);
       if (list != scenes.end()) list->second.apply(*scene);

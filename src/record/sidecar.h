@@ -2,12 +2,15 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 
 namespace hapticd::record {
 
 /// A JSON object: program, force law, start, configuration, devices, surfaces that were in the scene with the
-/// time of their first tick, markers. Reads the whole recording. Throws RecordingError.
-std::string sidecarOf(const std::filesystem::path& recording);
+/// time of their first tick, markers. Reads the whole recording. Throws RecordingError, and what `beforeEach`
+/// throws, which is called before each event.
+std::string sidecarOf(
+    const std::filesystem::path& recording, const std::function<void()>& beforeEach = [] {});
 
 }  // namespace hapticd::record

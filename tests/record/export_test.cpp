@@ -8,6 +8,7 @@
 
 #include "base/fake_world.h"
 #include "record/recording_file.h"
+#include "record/sidecar.h"
 #include "record/text_fields.h"
 #include "record/vrpn_log.h"
 #include "wire/system.h"
@@ -101,6 +102,31 @@ TEST(ExportFile, ALinkStaysOne) {
   EXPECT_EQ(textOf(file.path()), "better");
 }
 
+TEST(ExportFile, ALinkToNothingStaysOneAndMakesTheFile) {
+  RecordingFile file;
+  RecordingFile link;
+  std::filesystem::create_symlink(file.path().filename(), link.path());
+  ExportFile whole(link.path(), Unfinished::dropped);
+  whole.write("good");
+  whole.close();
+  EXPECT_TRUE(std::filesystem::is_symlink(link.path()));
+  EXPECT_EQ(textOf(file.path()), "good");
+}
+
+TEST(ExportFile, AFileNamedAsAnUnfinishedOneStays) {
+  RecordingFile file;
+  const std::filesystem::path part = file.path().string() + ".part";
+  std::ofstream(part) << "of the user";
+  { ExportFile dropped(file.path(), Unfinished::dropped); }
+  EXPECT_EQ(textOf(part), "of the user");
+  ExportFile whole(file.path(), Unfinished::dropped);
+  whole.write("good");
+  whole.close();
+  EXPECT_EQ(textOf(file.path()), "good");
+  EXPECT_EQ(textOf(part), "of the user");
+  std::filesystem::remove(part);
+}
+
 TEST(ExportFile, AFullDiskKeepsTheFileThatWasToBeReplaced) {
   base::FakeWorld world;
   world.files.create("/my.csv", base::Existing::refuse)->write("good");
@@ -138,6 +164,13 @@ TEST(Json, NumbersThatAreNotFiniteAreNullAndLongListsAreTheirLength) {
   EXPECT_EQ(
       text,
       R"({"a\"b":"tab\u0009here","nan":null,"on":true,"list":[1,2],"long":100,"vector":[1,2,0.5],"there":0.5})");
+}
+
+TEST(Sidecar, CanBeStopped) {
+  const std::filesystem::path file = HAPTICD_TESTDATA "/recordings/all_commands_law2.haptics";
+  EXPECT_NE(sidecarOf(file), "");
+  struct Stopped {};
+  EXPECT_THROW(sidecarOf(file, [] { throw Stopped(); }), Stopped);
 }
 
 struct Entry {
