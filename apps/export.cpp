@@ -1,6 +1,8 @@
 // hapticd export: converts a recording for other programs.
 #include <cstdio>
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -11,6 +13,7 @@
 #include "record/recording_reader.h"
 #include "record/sidecar.h"
 #include "record/vrpn_log.h"
+#include "server/player.h"
 #include "server/reports/reporter.h"
 #include "stop_signals.h"
 
@@ -55,11 +58,11 @@ void addReports(ReportedDevice& device, const realtime::TickReport& tick, wire::
 void exportVrpn(const ExportOptions& options, std::string& remark) {
   record::RecordingReader reader(options.recording);
   const record::RecordingHeader& header = reader.header();
-  const server::ServerConfig config = server::parseRecordedConfig(header.config, options.recording);
+  const server::ServerConfig config = server::recordedConfig(header, options.recording);
   record::VrpnLog log(options.out, record::Unfinished::dropped);
   std::vector<ReportedDevice> devices;
   for (std::size_t i = 0; i < header.devices.size(); ++i) {
-    const server::DeviceConfig& device = config.devices.at(i);
+    const server::DeviceConfig& device = config.devices[i];
     devices.push_back(
         {.reporter = server::Reporter(device, header.devices[i].buttons, server::defaultChoice(device)),
          .names = {}});
@@ -79,17 +82,22 @@ void exportVrpn(const ExportOptions& options, std::string& remark) {
 int run(const ExportOptions& options) {
   const StopSignals signals;
   keepFile(options.out, options.force, options.recording);
-  const std::string beside = options.to == "vrpn" ? "" : options.out + ".json";
+  std::error_code none;
+  const auto out = std::filesystem::status(options.out, none);
+  const bool streams = std::filesystem::exists(out) && !std::filesystem::is_regular_file(out);
+  const std::string beside = options.to == "vrpn" || streams ? "" : options.out + ".json";
   keepFile(beside, options.force, options.recording);
   constexpr auto kDropped = record::Unfinished::dropped;
   std::string remark;
   if (options.to == "vrpn") {
     exportVrpn(options, remark);
   } else {
-    const std::string sidecar = record::sidecarOf(options.recording);
-    record::ExportFile besideFile(beside, kDropped);
-    besideFile.write(sidecar);
-    besideFile.flush();
+    std::optional<record::ExportFile> besideFile;
+    if (!beside.empty()) {
+      besideFile.emplace(beside, kDropped);
+      besideFile->write(record::sidecarOf(options.recording, throwIfStopped));
+      besideFile->flush();
+    }
     if (options.to == "csv") {
       record::CsvFile file(options.out, kDropped);
       record::exportRecording(options.recording, file, remark, throwIfStopped);
@@ -97,7 +105,7 @@ int run(const ExportOptions& options) {
       record::McapFile file(options.out, kDropped);
       record::exportRecording(options.recording, file, remark, throwIfStopped);
     }
-    besideFile.close();
+    if (besideFile) besideFile->close();
   }
   if (!remark.empty()) std::fprintf(stderr, "hapticd: %s\n", remark.c_str());
   if (options.json) {
@@ -107,7 +115,8 @@ int run(const ExportOptions& options) {
                {"beside", beside.empty() ? nlohmann::json() : nlohmann::json(beside)},
                {"remark", remark}});
   } else {
-    std::printf("wrote %s%s\n", options.out.c_str(), beside.empty() ? "" : (" and " + beside).c_str());
+    std::fprintf(streams ? stderr : stdout, "wrote %s%s\n", options.out.c_str(),
+                 beside.empty() ? "" : (" and " + beside).c_str());
   }
   return 0;
 }
@@ -131,7 +140,8 @@ void addExport(CLI::App& app) {
       "csv   one row for each tick of each device; --hand of 'hapticd serve' and 'hapticd render' reads it\n"
       "vrpn  the reports that a client would have received; VRPN clients open it as "
       "Phantom@file:///path/to/the.vrpn\n"
-      "mcap and csv come with OUT.json: program, devices, configuration, surfaces, markers.\n"
+      "mcap and csv come with OUT.json, where OUT is no pipe or device: program, devices, configuration, "
+      "surfaces, markers.\n"
       "Example: hapticd export my.haptics --to mcap -o my.mcap");
   command->callback([options] { exitCode = run(*options); });
 }

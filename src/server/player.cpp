@@ -44,15 +44,18 @@ Player::Player(ReplayOptions options)
   status_.loop = options_.loop;
 }
 
-ServerConfig Player::config() const {
-  ServerConfig config = parseRecordedConfig(header_.config, options_.file.string());
-  if (config.devices.size() != header_.devices.size()) {
-    throw std::runtime_error("'" + options_.file.string() + "' names " +
-                             std::to_string(config.devices.size()) +
+ServerConfig recordedConfig(const record::RecordingHeader& header, const std::string& file) {
+  ServerConfig config = parseRecordedConfig(header.config, file);
+  if (config.devices.size() != header.devices.size()) {
+    throw std::runtime_error("'" + file + "' names " + std::to_string(config.devices.size()) +
                              " devices in its configuration but contains " +
-                             std::to_string(header_.devices.size()) + "; the recording is damaged");
+                             std::to_string(header.devices.size()) + "; the recording is damaged");
   }
   return config;
+}
+
+ServerConfig Player::config() const {
+  return recordedConfig(header_, options_.file.string());
 }
 
 void Player::start(Callbacks callbacks) {

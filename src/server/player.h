@@ -32,6 +32,10 @@ struct ReplayOrder {
   std::optional<double> position_s;  ///< since the first event
 };
 
+/// The configuration of the server that wrote the recording `file`. Throws std::runtime_error when it has
+/// other devices.
+ServerConfig recordedConfig(const record::RecordingHeader& header, const std::string& file);
+
 /// Runs in its own thread between start() and stop(). Reads 0.2 s ahead and sorts by time, because a
 /// recording stores the ticks in blocks of one device each.
 class Player {

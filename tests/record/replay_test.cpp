@@ -100,6 +100,19 @@ TEST(ReplayConfig, NeedsNothingOfTheMachineThatRecorded) {
 
 // A client says which faces can be touched: first at once, then in a batch. A seek from the middle of the
 // batch to the beginning must not put what it sends first into that batch.
+TEST(ReplayConfig, OfOtherDevicesIsRefused) {
+  record::RecordingHeader header;
+  header.devices.resize(2);
+  try {
+    server::recordedConfig(header, "my.haptics");
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(
+        error.what(),
+        "'my.haptics' names 1 devices in its configuration but contains 2; the recording is damaged");
+  }
+}
+
 TEST(ReplaySeek, ABatchThatIsOpenDoesNotStayOpen) {
   constexpr base::Nanos kSecond = 1'000'000'000;
   const RecordingFile file;
