@@ -55,6 +55,7 @@ constexpr const char* kInk = "#15191f";
 constexpr const char* kGrid = "#e3e7ec";
 
 std::uint32_t deviceNamed(const record::RecordingHeader& header, const std::string& name) {
+  if (header.devices.empty()) throw std::runtime_error("the recording has no device");
   if (name.empty()) return 0;
   std::string known;
   for (std::uint32_t i = 0; i < header.devices.size(); ++i) {
@@ -70,7 +71,7 @@ Data read(const PlotOptions& options) {
   record::RecordingReader reader(options.recording);
   const std::uint32_t device = deviceNamed(reader.header(), options.device);
   Data data;
-  data.device = reader.header().devices.at(device).names.front();
+  data.device = reader.header().devices[device].names.front();
   data.title = options.recording.substr(options.recording.rfind('/') + 1) + ", " + data.device;
   base::Nanos first = 0;
   std::uint32_t trips = 0;
@@ -274,10 +275,10 @@ int run(const PlotOptions& options) {
   if (options.to_s > 0 && options.to_s <= options.from_s)
     throw std::runtime_error("--to must be greater than --from");
   keepFile(options.out, options.force);
+  record::ExportFile file(options.out, record::Unfinished::dropped);
   const Data data = read(options);
   const Figure figure = draw(data);
   const std::string text = pdf ? figure.pdf(data.title) : figure.svg(data.title);
-  record::ExportFile file(options.out, record::Unfinished::dropped);
   file.write(text);
   file.close();
   std::printf("%s: %zu ticks of '%s' from %.3f s to %.3f s\n", options.out.c_str(), data.rows.size(),

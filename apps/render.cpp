@@ -80,7 +80,9 @@ void addSurfaceOptions(CLI::App& command, MeshRenderOptions& options) {
   add("--stiffness-N-per-m,--stiffness", options.stiffness_N_per_m, "Stiffness K", 1e6);
   add("--damping-Ns-per-m,--damping", options.damping_Ns_per_m, "Damping B along the normal", 1e6);
   add("--static-friction", options.staticFriction, "Coulomb coefficient while sticking", 1e6);
-  add("--dynamic-friction", options.dynamicFriction, "Coulomb coefficient while sliding, at most the static",
+  add("--dynamic-friction", options.dynamicFriction,
+      "Coulomb coefficient while sliding, at most the static, which it raises when it changes a recording "
+      "alone",
       1e6);
   add("--tool-radius-mm,--tool-radius", options.toolRadius_mm, "Radius of the tip; 0 is a point", 50);
   command.add_flag("--raw", options.raw,
@@ -126,6 +128,9 @@ int run(const CLI::App& command, const RenderCommandOptions& options) {
     keepFile(options.report, options.force, input);
   }
   if (!options.session.empty()) {
+    const auto place = [](const std::string& file) { return std::filesystem::weakly_canonical(file); };
+    if (!options.report.empty() && place(options.report) == place(options.mesh.out))
+      throw std::runtime_error("--out and --report name one file: give each its own");
     for (const char* name :
          {"--mesh", "--hand", "--compare", "--mesh-unit", "--size-mm", "--faces", "--timing",
           "--traj-columns", "--traj-unit", "--traj-time-unit", "--traj-force"}) {

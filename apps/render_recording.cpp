@@ -1,6 +1,7 @@
 #include "render_recording.h"
 
 #include <cstdio>
+#include <optional>
 
 #include "record/difference.h"
 #include "record/export_file.h"
@@ -11,11 +12,20 @@ namespace {
 
 using record::Difference;
 
-void writeFile(const std::string& name, const std::string& text) {
-  record::ExportFile file(name, record::Unfinished::dropped);
-  file.write(text);
-  file.close();
-}
+// Created before the work, so that a name that cannot be written is refused at once.
+class ResultFile {
+ public:
+  explicit ResultFile(const std::string& name) {
+    if (!name.empty()) file_.emplace(name, record::Unfinished::dropped);
+  }
+  void write(const std::string& text) {
+    file_->write(text);
+    file_->close();
+  }
+
+ private:
+  std::optional<record::ExportFile> file_;
+};
 
 // One row of the CSV.
 struct DifferenceRow {
@@ -91,6 +101,8 @@ std::string failureOf(const std::vector<Difference>& devices) {
 }  // namespace
 
 int renderSession(const RecordingRenderOptions& options) {
+  ResultFile out(options.out);
+  ResultFile report(options.report);
   std::string remark;
   std::string law;
   const std::vector<Difference> devices = record::compare(options.session, options.changes, remark, law);
@@ -98,9 +110,9 @@ int renderSession(const RecordingRenderOptions& options) {
               record::describe(options.changes).c_str());
   if (!law.empty()) std::printf("force law   %s\n", law.c_str());
   for (const Difference& device : devices) print(device);
-  if (!options.out.empty()) writeFile(options.out, csv(devices));
+  if (!options.out.empty()) out.write(csv(devices));
   if (!options.report.empty()) {
-    writeFile(options.report, record::htmlReport(options.session, options.changes, devices, remark));
+    report.write(record::htmlReport(options.session, options.changes, devices, remark));
     std::printf("report      %s\n", options.report.c_str());
   }
   if (!remark.empty()) std::fprintf(stderr, "hapticd: %s\n", remark.c_str());

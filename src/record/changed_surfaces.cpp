@@ -9,8 +9,11 @@ namespace hapticd::record {
 void ChangedSurfaces::change(scene::Surface& surface) const {
   surface.stiffness_N_per_m = changes_.stiffness_N_per_m.value_or(surface.stiffness_N_per_m);
   surface.damping_Ns_per_m = changes_.damping_Ns_per_m.value_or(surface.damping_Ns_per_m);
-  surface.staticFriction = changes_.staticFriction.value_or(surface.staticFriction);
   surface.dynamicFriction = changes_.dynamicFriction.value_or(surface.dynamicFriction);
+  // A dynamic one alone raises the static one, which bounds it.
+  surface.staticFriction = changes_.staticFriction.value_or(
+      changes_.dynamicFriction ? std::max(surface.staticFriction, surface.dynamicFriction)
+                               : surface.staticFriction);
   surface.dynamicFriction = std::min(surface.dynamicFriction, surface.staticFriction);
   std::string remark;
   scene::keepPassive(surface, bound_, remark);

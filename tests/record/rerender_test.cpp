@@ -171,6 +171,13 @@ TEST_F(Rerender, ChangesChangeForces) {
   }
 }
 
+TEST_F(Rerender, ADynamicFrictionAloneRaisesTheStaticOne) {
+  const auto alone = rerender(file_->path(), RerenderChanges{.dynamicFriction = 0.8});
+  const auto both = rerender(file_->path(), RerenderChanges{.staticFriction = 0.8, .dynamicFriction = 0.8});
+  EXPECT_EQ(alone[0].largest_N, both[0].largest_N);
+  EXPECT_GT(alone[0].largest_N, 0.01);
+}
+
 TEST_F(Rerender, AllCommandsAreInTheFile) {
   std::map<std::string, int> commands;
   std::map<scene::ClientId, base::Nanos> left;
