@@ -1,6 +1,10 @@
 // hapticd: a haptics server that speaks VRPN, and the tools around it.
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <optional>
 #include <string>
@@ -49,10 +53,29 @@ bool explainUnknownOption(const CLI::App& app) {
   return true;
 }
 
+// The next file or socket would take the number of a standard stream that is closed, and its messages.
+void openStandardStreams() {
+  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(fd, F_GETFD) < 0 && ::open("/dev/null", O_RDWR) != fd) std::abort();
+  }
+}
+
+// The words in the order in which CLI11 takes them: the last first. "help COMMAND" is "COMMAND --help".
+std::vector<std::string> wordsOf(int argc, char** argv) {
+  std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+  if (!words.empty() && words[0] == "help") {
+    words.erase(words.begin());
+    words.emplace_back("--help");
+  }
+  std::reverse(words.begin(), words.end());
+  return words;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   using namespace hapticd::apps;
+  openStandardStreams();
   CLI::App app{
       "hapticd: a haptics server that speaks VRPN.\n"
       "One process owns a haptic device, takes a scene from any VRPN client, renders forces at 1 kHz\n"
@@ -86,10 +109,11 @@ int main(int argc, char** argv) {
   addManual(app);
   addDeviceHost(app);
   try {
-    app.parse(argc, argv);
+    app.parse(wordsOf(argc, argv));
   } catch (const CLI::RequiredError& error) {
     const std::vector<std::string> rest = app.remaining();
     if (app.get_subcommands().empty() && !rest.empty()) {
+      if (rest[0].starts_with("-") && explainUnknownOption(app)) return 2;
       std::fprintf(stderr, "hapticd: unknown command '%s';%s 'hapticd --help' lists the commands\n",
                    rest[0].c_str(), suggestion(rest[0], commandNames(app)).c_str());
       return 2;

@@ -234,15 +234,17 @@ void addRecord(CLI::App& app) {
   CLI::Option* const detach =
       command->add_flag("--detach", options->detach, "With --server: begin the recording and return")
           ->needs(onServer);
-  command->add_flag("--end", options->end, "With --server: end the recording at hand")
-      ->needs(onServer)
-      ->excludes(file)
-      ->excludes(detach);
+  CLI::Option* const end =
+      command->add_flag("--end", options->end, "With --server: end the recording at hand")
+          ->needs(onServer)
+          ->excludes(file)
+          ->excludes(detach);
   addTokenFile(*command, options->tokenFile)->needs(onServer);
   command->add_option("--seconds", options->seconds, "Duration; 0: until Ctrl-C")
       ->check(within(0, kLongest_s))
       ->capture_default_str()
-      ->excludes(detach);
+      ->excludes(detach)
+      ->excludes(end);
   command->add_option("--rate", options->rate_Hz, "At most this many ticks per second, for csv and mcap")
       ->check(within(0.1, 4000))
       ->capture_default_str()

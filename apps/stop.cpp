@@ -128,7 +128,8 @@ void addStop(CLI::App& app) {
       "token:\n"
       "  hapticd tunnel HOST --port 4000 --fingerprint ... --token-file FILE\n"
       "  hapticd stop NAME@tcp://127.0.0.1:4000\n"
-      "Exit status: 0 when the server has confirmed it, 1 when it cannot be reached or refuses.");
+      "Exit status: 0 when the server has confirmed it, 1 when it cannot be reached or refuses, or\n"
+      "when this cannot be printed.");
   command->callback([options] { exitCode = run(*options); });
 }
 

@@ -38,6 +38,10 @@ BlockReader::BlockReader(const std::filesystem::path& file) {
   const std::string name = "'" + file.string() + "'";
   std::array<std::byte, kMagicBytes> begin{};
   std::size_t got = 0;
+  std::error_code none;
+  const auto status = std::filesystem::status(file, none);
+  if (std::filesystem::is_fifo(status) || std::filesystem::is_socket(status))
+    throw RecordingError(name + " is a pipe: copy it to a file first");
   try {
     file_ = base::world().files.open(file);
     size_ = file_->size();

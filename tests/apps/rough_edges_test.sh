@@ -14,10 +14,14 @@ refused() { # refused STATUS TEXT COMMAND...: the status, and the text in what i
 }
 refused 2 "did you mean 'serve'?" "$hapticd" serv
 refused 2 "unknown command 'xyzzyx'; 'hapticd --help'" "$hapticd" xyzzyx
+refused 2 "hapticd: unknown option '--xyzzyx'; 'hapticd --help'" "$hapticd" --xyzzyx
+cmp <("$hapticd" help) <("$hapticd" --help)
+cmp <("$hapticd" help plot) <("$hapticd" plot --help)
 refused 2 "hapticd serve: unknown option '--recrod'; did you mean '--record'?" "$hapticd" serve --recrod x
 refused 2 "hapticd record: unknown option '--nothing-alike'; 'hapticd record --help'" "$hapticd" record Phantom@localhost --nothing-alike=3
 refused 2 "nothing to render" "$hapticd" render
 refused 2 "excludes" "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --true-size --size-mm 3
+refused 2 "excludes" "$hapticd" record Phantom@localhost --server --end --seconds 5
 refused 2 "not in range 0 to 2147483646" "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --object 2147483647
 refused 2 "not in range 1 to 65535" "$hapticd" doctor --port 70000
 refused 1 "--mesh does not go with --session" "$hapticd" render --mesh "$source_dir/testdata/meshes/bunny.obj" --session "$source_dir/testdata/recordings/all_commands_law2.haptics"
@@ -59,6 +63,13 @@ recording=$source_dir/testdata/recordings/all_commands_law2.haptics
 refused 1 "--force" "$hapticd" export "$recording" --to csv -o "$work/out.csv"
 "$hapticd" export "$recording" --to csv -o "$work/out.csv" --force
 
+# Into a pipe goes the file alone; what is closed is not taken for a file.
+"$hapticd" export "$recording" --to csv -o /dev/stdout 2>"$work/said" | cmp - "$work/out.csv"
+grep -qx "wrote /dev/stdout" "$work/said"
+"$hapticd" export "$recording" --to csv -o "$work/closed.csv" >&-
+cmp "$work/closed.csv" "$work/out.csv"
+refused 1 "is a pipe: copy it to a file first" "$hapticd" info <(cat "$recording")
+
 # Nor is what is still to be read, also with it.
 cp "$recording" "$work/kept.haptics"
 ln -s kept.haptics "$work/link"
@@ -67,6 +78,11 @@ for out in kept.haptics link; do
   refused 1 "is the file to read" "$hapticd" render --session "$work/kept.haptics" --out "$work/$out" --force
 done
 cmp "$recording" "$work/kept.haptics"
+refused 1 "--out and --report name one file" "$hapticd" render --session "$recording" --out "$work/both" --report "$work/./both"
+# A file that cannot be written is refused before the work.
+refused 1 "cannot write '$work/nowhere/x.csv'" "$hapticd" render --session "$recording" --out "$work/nowhere/x.csv"
+! grep session "$work/said" || exit 1
+refused 1 "cannot write '$work/nowhere/x.svg'" "$hapticd" plot "$recording" --from 1000 --out "$work/nowhere/x.svg"
 
 "$hapticd" info "$recording" >"$work/info"
 grep -q '^device      ' "$work/info" && grep -q '^  force     at most [0-9.]* N' "$work/info" && grep -q '^command     SetVertices, 4 times' "$work/info" ||
