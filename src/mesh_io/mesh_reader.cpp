@@ -154,6 +154,17 @@ void appendNode(TriangleMesh& all, const aiScene& scene, const aiNode& node, con
     appendNode(all, scene, *node.mChildren[i], T_file_node, depth + 1);
 }
 
+// Assimp names its own parts where a file has no triangles, or another format.
+std::string explained(const std::string& reason, const std::string& format) {
+  const auto names = [&](std::string_view text) { return reason.find(text) != std::string::npos; };
+  if (names("No meshes remaining") || names("OBJ-file is too small") || names("File is empty") ||
+      names("Mesh with invalid primitive type"))
+    return "it holds no triangles";
+  if (names("No suitable reader") || names("Failed to determine STL"))
+    return "it is not a ." + format + " file";
+  return reason.empty() ? "it cannot be read" : reason;
+}
+
 }  // namespace
 
 bool isSupported(const std::filesystem::path& file) {
@@ -181,7 +192,7 @@ TriangleMesh readMesh(const std::filesystem::path& file) {
   if (scene == nullptr || scene->mRootNode == nullptr) {
     const std::string reason = importer.GetErrorString();
     if (reason.find("bad_alloc") != std::string::npos) throw std::bad_alloc();
-    throw std::runtime_error(reason.empty() ? "it cannot be read" : reason);
+    throw std::runtime_error(explained(reason, format));
   }
 
   TriangleMesh mesh;

@@ -285,8 +285,15 @@ TEST_F(MeshFiles, ErrorsNameTheFileAndTheReason) {
               AllOf(HasSubstr("notes.txt"), HasSubstr("'.txt' is not supported: convert it to OBJ, STL")));
   EXPECT_THAT(errorOf(write("cube.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")), HasSubstr("'.off'"))
       << "a format of Assimp that the help does not name";
-  EXPECT_THAT(errorOf(write("points.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n")), HasSubstr("points.obj"));
-  EXPECT_THAT(errorOf(write("empty.stl", "")), HasSubstr("empty.stl"));
+  for (const auto& [name, content] :
+       std::map<std::string, std::string>{{"points.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n"},
+                                          {"empty.obj", ""},
+                                          {"empty.stl", ""},
+                                          {"solid.stl", "solid x\nendsolid x\n"}})
+    EXPECT_THAT(errorOf(write(name, content)), HasSubstr(name + "': it holds no triangles"));
+  for (const std::string format : {"stl", "gltf", "glb"})
+    EXPECT_THAT(errorOf(write("text." + format, "a text of another kind, as in any letter")),
+                HasSubstr("text." + format + "': it is not a ." + format + " file"));
   EXPECT_THAT(errorOf(write("cut.glb", glb(gltfJson("", R"([{"mesh":0}])")).substr(0, 300))),
               HasSubstr("cut.glb"));
   std::string far(80, ' ');
