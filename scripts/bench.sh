@@ -34,6 +34,6 @@ if [ "${#length[@]}" -gt 0 ] && [ "${#names[@]}" = 0 ]; then
     /<!-- figures: end -->/ { skip = 0 }
     !skip { print }' "$page" >"$page.new"
   mv "$page.new" "$page"
-  cp "$out"/*.svg docs/figures/
+  cp "$out"/figures/*.svg docs/figures/
   echo "written: $page"
 fi

@@ -72,6 +72,18 @@ TEST(Report, filesHaveTheFigures) {
             std::string::npos);
 }
 
+TEST(Report, markdownLinksTheFiguresWhereTheyAreWritten) {
+  const std::filesystem::path directory = std::filesystem::path(testing::TempDir()) / "bench_report";
+  Measured with = measured();
+  with.outcome.figures.push_back({"drawn", "A title", "us", 0, 100, {{"one", {}}}});
+  writeFigures(directory, {with});
+  const std::string text = asMarkdown({with}, {"a machine"});
+  const std::string begin = "![A title](";
+  const std::size_t at = text.find(begin) + begin.size();
+  EXPECT_FALSE(contentsOf(directory / text.substr(at, text.find(')', at) - at)).empty());
+  std::filesystem::remove_all(directory);
+}
+
 TEST(Report, unwritableFileIsNamed) {
   try {
     writeFile("/nowhere/results.csv", "x");
