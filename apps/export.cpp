@@ -73,7 +73,7 @@ void exportVrpn(const ExportOptions& options, std::string& remark) {
     const auto* tick = std::get_if<record::TickEvent>(&event);
     if (tick == nullptr) continue;
     const realtime::TickReport& report = tick->tick.report;
-    addReports(devices[tick->device], report, stamp(report.time + header.wallOffset), log);
+    addReports(devices[tick->device], report, stamp(report.time + reader.wallOffsetAt(report.time)), log);
   }
   log.close();
   remark = reader.remark();

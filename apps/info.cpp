@@ -114,8 +114,9 @@ int run(const std::string& file, bool config, bool json) {
   const RecordingFacts facts = factsOf(reader);
   std::printf("recording   %s\n", file.c_str());
   std::printf("written by  %s, force law %u\n", header.program.c_str(), header.law.number);
-  std::printf("began       %s\n",
-              facts.first == 0 ? "without a tick" : dateText(facts.first + header.wallOffset).c_str());
+  std::printf("began       %s\n", facts.first == 0
+                                      ? "without a tick"
+                                      : dateText(facts.first + reader.wallOffsetAt(facts.first)).c_str());
   std::printf("lasts       %.3f s\n", base::toSeconds(facts.last - facts.first));
   for (std::size_t i = 0; i < facts.devices.size(); ++i)
     print(facts.devices[i], header.devices[i], facts.first);

@@ -23,7 +23,7 @@ _HEAD: Final = struct.Struct(">III")
 _VERSION: Final = 2
 # Kinds of blocks.
 _HEADER, _SCENE, _PUBLISH, _TICKS, _LOST, _END, _LAW, _STREAM, _PASSIVITY, _MARKER, _MEMORY = range(1, 12)
-_REMOTE_MEMORY, _LEFT = 12, 13
+_REMOTE_MEMORY, _LEFT, _WALL_OFFSET = 12, 13, 14
 _MAX_CONTACTS: Final = 1024
 
 _FIXED: Final = np.dtype(
@@ -252,7 +252,7 @@ class Ticks:
     def _derive(self, column: str) -> "npt.NDArray[Any]":
         touching = self["touching"] if column in ("depth_m", "object", "normal", "contact_point_m") else None
         if column == "time_ns":
-            return np.asarray(self["servo_time_ns"] + self._session.wall_offset_ns)
+            return self._session._wall(self["servo_time_ns"])
         if column == "depth_m":
             return np.where(touching, self["proxy_depth_m"], 0.0)  # type: ignore[arg-type]
         if column == "object":
@@ -352,6 +352,7 @@ class Session:
             self._index(verify)
             self._read_header()
             self._read_law()
+            self._read_wall_offsets()
         except BaseException:
             self.close()
             raise
@@ -463,6 +464,25 @@ class Session:
                 raise self._fail(start, "the force law is truncated") from None
         self._ended = any(kind == _END for kind, _, _ in self._blocks[-4:])
 
+    def _read_wall_offsets(self) -> None:
+        """From which servo times on the offset is another, because the wall clock was set, and the offsets."""
+        found: Dict[int, int] = {}
+        for kind, start, length in self._blocks:
+            if kind != _WALL_OFFSET:
+                continue
+            unpack = self._content(start, length)
+            try:
+                time, found[time] = unpack.one("q"), unpack.one("q")
+            except _Cut:
+                raise self._fail(start, "a damaged wall offset") from None
+        times = sorted(found)
+        self._wall_set = np.array(times, dtype=np.int64)
+        self._wall_offsets = np.array([self.wall_offset_ns, *(found[time] for time in times)], dtype=np.int64)
+
+    def _wall(self, time: Any) -> "npt.NDArray[np.int64]":
+        """Wall times of servo times."""
+        return np.asarray(time + self._wall_offsets[np.searchsorted(self._wall_set, time, "right")])
+
     @property
     def remark(self) -> str:
         """Why the recording is not whole; empty when it is."""
@@ -555,7 +575,7 @@ class Session:
                 fields = {member: unpack.value(form) for member, form in members}
             except _Cut:
                 raise self._fail(start, "a scene event is truncated") from None
-            yield Command(time + self.wall_offset_ns, scene, client, name, fields)
+            yield Command(int(self._wall(time)), scene, client, name, fields)
 
     @property
     def markers(self) -> Tuple[Marker, ...]:
@@ -568,7 +588,7 @@ class Session:
                 continue
             unpack = self._content(start, length)
             try:
-                found.append(Marker(unpack.one("q") + self.wall_offset_ns, unpack.text()))
+                found.append(Marker(int(self._wall(unpack.one("q"))), unpack.text()))
             except _Cut:
                 raise self._fail(start, "a marker is truncated") from None
             if unpack.at != length:

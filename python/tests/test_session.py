@@ -203,11 +203,26 @@ def test_losses_are_told_apart(tmp_path: pathlib.Path) -> None:
         assert session.markers == () and session.remark == ""
 
 
+def test_a_wall_clock_that_is_set_is_followed(tmp_path: pathlib.Path) -> None:
+    blocks = blocks_of((RECORDINGS / "gripper_v2.haptics").read_bytes())
+    with hapticd.Session(RECORDINGS / "gripper_v2.haptics") as session:
+        servo, offset = session.ticks["servo_time_ns"], session.wall_offset_ns
+    middle = int(servo[len(servo) // 2])
+    blocks[-1:-1] = [(14, struct.pack(">qq", middle, offset + 5_000_000_000))]
+    blocks[-1:-1] = [(10, struct.pack(">qI", middle + 1, 1) + b"m")]
+    file = tmp_path / "set.haptics"
+    file.write_bytes(written(blocks))
+    with hapticd.Session(file) as session:
+        step = session.ticks["time_ns"] - servo - offset
+        assert np.array_equal(step, np.where(servo < middle, 0, 5_000_000_000))
+        assert session.markers[0].time_ns == middle + 1 + offset + 5_000_000_000
+
+
 def test_the_kinds_of_blocks_are_those_of_the_documents() -> None:
     text = (ROOT / "docs/recording-format.md").read_text()
     rows = re.findall(r"^\| (\d+) ([a-z ]+) \|", text, re.M)
     documented = {name.replace(" ", "_"): int(number) for number, name in rows}
-    assert len(documented) == 13
+    assert len(documented) == 14
     header = (ROOT / "src/record/block_file.h").read_text()
     listed = re.search(r"enum class BlockKind[^{]*\{([^}]*)\}", header)
     assert listed is not None

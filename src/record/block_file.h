@@ -25,7 +25,8 @@ enum class BlockKind : std::uint32_t {
   marker = 10,
   memory = 11,
   remoteMemory = 12,
-  left = 13
+  left = 13,
+  wallOffset = 14
 };
 
 inline constexpr std::size_t kMagicBytes = 8;

@@ -147,9 +147,10 @@ void exportRecording(const std::filesystem::path& file, SampleFile& to, std::str
   for (RecordingEvent event; reader.next(event);) {
     beforeEach();
     if (const auto* tick = std::get_if<TickEvent>(&event)) {
-      to.add(sampleOf(header.devices[tick->device].names.front(), tick->tick.report, header.wallOffset));
+      to.add(sampleOf(header.devices[tick->device].names.front(), tick->tick.report,
+                      reader.wallOffsetAt(tick->tick.report.time)));
     } else if (const auto* command = std::get_if<SceneEvent>(&event)) {
-      to.addCommand(*command, command->time + header.wallOffset);
+      to.addCommand(*command, command->time + reader.wallOffsetAt(command->time));
     }
   }
   remark = reader.remark();

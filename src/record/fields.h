@@ -164,6 +164,13 @@ void fields(T& event, V&& v) {
   v("text", text);
 }
 
+template <Is<WallOffsetRecord> T, class V>
+void fields(T& record, V&& v) {
+  auto& [time, offset] = record;
+  v("time_ns", time);
+  v("offset_ns", offset);
+}
+
 template <Is<EndEvent> T, class V>
 void fields(T& event, V&& v) {
   auto& [time] = event;

@@ -15,6 +15,7 @@ namespace {
 constexpr Nanos kPeriod = 20'000'000;  // a crash loses no more than this
 constexpr Nanos kBetweenLossReports = 1'000'000'000;
 constexpr Nanos kBetweenLooks = 1'000'000'000;
+constexpr Nanos kWallStep = 1'000'000;  // as in time stamps on the wire
 
 }  // namespace
 
@@ -43,6 +44,8 @@ std::function<Nanos()> Recorder::stopwatch(std::uint32_t device) {
 }
 
 void Recorder::start(Nanos wallOffset, std::string config) {
+  wallOffset_ = wallOffset;
+  measuredWall_ = base::wallNow() - base::now();
   Bytes content;
   Packer pack(content);
   pack.put(kFormatVersion);
@@ -132,9 +135,23 @@ void Recorder::appendEvent(BlockKind kind, Bytes&& content) {
   appendBlock(events_, kind, content);
 }
 
+void Recorder::followWallClock() {
+  const Nanos now = base::now();
+  const Nanos wall = base::wallNow();
+  if (base::now() - now > kWallStep / 2) return;  // interrupted between the two
+  const Nanos step = wall - now - measuredWall_;
+  if (std::abs(step) <= kWallStep) return;
+  measuredWall_ += step;
+  wallOffset_ += step;
+  Bytes content;
+  Packer(content).put(WallOffsetRecord{now, wallOffset_});
+  appendEvent(BlockKind::wallOffset, std::move(content));
+}
+
 // The rings before the events: the commands that a tick saw were recorded before it, so they are in this
 // batch, too.
 void Recorder::drain() {
+  followWallClock();
   for (const auto& device : devices_) {
     device->packer.restart();
     device->run.clear();

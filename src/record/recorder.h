@@ -117,6 +117,7 @@ class Recorder {
 
   std::optional<Nanos> step();
   void drain();
+  void followWallClock();
   void close();
   void appendEvent(BlockKind kind, Bytes&& content);
   void appendTicks(std::uint32_t number, Device& device);
@@ -140,6 +141,8 @@ class Recorder {
   std::uint64_t reportedLosses_ = 0;
   Nanos nextLossReport_ = 0;
   Nanos nextLook_ = 0;
+  Nanos wallOffset_ = 0;    // in the file
+  Nanos measuredWall_ = 0;  // of the machine when that was written
   std::atomic<bool> writes_{true};
   std::atomic<bool> ending_{false};
   std::atomic<bool> ended_{false};

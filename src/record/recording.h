@@ -121,6 +121,12 @@ struct LostEvent {
   std::uint64_t count = 0;   ///< since the previous such event
 };
 
+/// The wall clock was set.
+struct WallOffsetRecord {
+  Nanos time = 0;    ///< from here on
+  Nanos offset = 0;  ///< wall time minus servo time
+};
+
 /// The recording is complete.
 struct EndEvent {
   Nanos time = 0;

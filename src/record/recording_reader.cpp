@@ -18,6 +18,11 @@ RecordingReader::RecordingReader(const std::filesystem::path& file) : path_(file
   readHeader();
   readLaw();
   readPassivity();
+  wallOffsets_.emplace(std::numeric_limits<Nanos>::min(), header_.wallOffset);
+}
+
+Nanos RecordingReader::wallOffsetAt(Nanos time) const {
+  return std::prev(wallOffsets_.upper_bound(time))->second;
 }
 
 void RecordingReader::fail(const std::string& what) const {
@@ -160,6 +165,15 @@ bool RecordingReader::readBlock(RecordingEvent& event) {
       if (const auto kind = static_cast<std::size_t>(lost.what); kind < lost_.size())
         lost_[kind] += lost.count;
       break;
+    }
+    case BlockKind::wallOffset: {
+      WallOffsetRecord record;
+      Unpacker in(block_.content);
+      in.take(record);
+      if (!in.ok() || !in.rest().empty() || record.offset < -kLatest || record.offset > kLatest)
+        fail("a damaged wall offset");
+      wallOffsets_[record.time] = record.offset;
+      return false;
     }
     case BlockKind::marker:
       takeWhole<MarkerEvent>(event);

@@ -21,6 +21,9 @@ class RecordingReader {
 
   const RecordingHeader& header() const noexcept { return header_; }
 
+  /// Wall time minus servo time at a servo time, by what was read so far.
+  Nanos wallOffsetAt(Nanos time) const;
+
   /// The next event; false at the end. Throws RecordingError, naming the byte, for a whole block with
   /// impossible content.
   bool next(RecordingEvent& event);
@@ -42,6 +45,7 @@ class RecordingReader {
   std::filesystem::path path_;
   BlockReader blocks_;
   RecordingHeader header_;
+  std::map<Nanos, Nanos> wallOffsets_;  // by the time from which on they hold
   BlockReader::Block block_;
   bool pending_ = false;               // block_ was read and not used
   std::optional<TickUnpacker> ticks_;  // of the present block

@@ -119,11 +119,13 @@ std::string sidecarOf(const std::filesystem::path& recording, const std::functio
       if (list != scenes.end()) list->second.apply(*scene);
     } else if (const auto* publish = std::get_if<PublishEvent>(&event)) {
       const auto number = sceneOf.find(publish->device);
-      if (number != sceneOf.end()) scenes.at(number->second).publish(publish->time, header.wallOffset);
+      if (number != sceneOf.end())
+        scenes.at(number->second).publish(publish->time, reader.wallOffsetAt(publish->time));
     } else if (const auto* tick = std::get_if<TickEvent>(&event)) {
       if (first == 0) first = tick->tick.report.time;
     } else if (const auto* marker = std::get_if<MarkerEvent>(&event)) {
-      markers.push_back({{"time_ns", exactTime(marker->time + header.wallOffset)}, {"text", marker->text}});
+      markers.push_back(
+          {{"time_ns", exactTime(marker->time + reader.wallOffsetAt(marker->time))}, {"text", marker->text}});
     }
   }
   Json surfaces = Json::object();
@@ -131,7 +133,7 @@ std::string sidecarOf(const std::filesystem::path& recording, const std::functio
   const Json all = {{"recording", recording.filename().string()},
                     {"program", header.program},
                     {"force_law", header.law.number},
-                    {"began", first == 0 ? Json() : Json(dateOf(first + header.wallOffset))},
+                    {"began", first == 0 ? Json() : Json(dateOf(first + reader.wallOffsetAt(first)))},
                     {"devices", devicesOf(header)},
                     {"surfaces_of_scene", std::move(surfaces)},
                     {"markers", std::move(markers)},

@@ -165,6 +165,34 @@ void recordSeconds(std::uint64_t count, Recorder& recorder, base::FakeWorld& wor
   }
 }
 
+TEST(Recorder, AWallClockThatIsSetIsFollowed) {
+  constexpr Nanos kHour = 3'600'000'000'000;
+  base::FakeWorld world;
+  Problems problems;
+  Recorder recorder("/session.haptics", problems.listener());
+  recorder.addDevice(phantom());
+  recorder.start(1000, "");
+  for (const bool set : {false, true}) {
+    if (set) world.clock.setWall(world.clock.wallNow() + kHour);
+    world.threads.runUntil(world.clock.now() + 1'000'000'000);
+    realtime::TickRecord tick;
+    tick.report.time = world.clock.now();
+    recorder.ring(0).push(tick);
+    recorder.recordMarker(tick.report.time, "");
+  }
+  recorder.finish();
+  std::vector<Nanos> offsets;
+  RecordingReader reader("/session.haptics");
+  for (RecordingEvent event; reader.next(event);) {
+    if (const auto* marker = std::get_if<MarkerEvent>(&event))
+      offsets.push_back(reader.wallOffsetAt(marker->time));
+    if (const auto* tick = std::get_if<TickEvent>(&event))
+      offsets.push_back(reader.wallOffsetAt(tick->tick.report.time));
+  }
+  EXPECT_EQ(offsets, std::vector<Nanos>({1000, 1000, 1000 + kHour, 1000 + kHour}));
+  EXPECT_EQ(reader.wallOffsetAt(0), 1000);
+}
+
 TEST(Recorder, AFileThatIsRenamedIsRecordedOn) {
   RecordingFile file;
   const RecordingFile renamed;
