@@ -13,6 +13,7 @@
 #include <vrpn_Mutex.h>
 #include <vrpn_RedundantTransmission.h>
 #include <vrpn_SharedObject.h>
+#include <vrpn_Text.h>
 #include <vrpn_Tracker.h>
 
 #include <algorithm>
@@ -23,6 +24,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "client/client_tests.h"
@@ -602,6 +604,20 @@ TEST_F(VrpnFile, IsPlayedToADeviceThatOpensIt) {
   const auto end = std::chrono::steady_clock::now() + kPatience;
   while (!file->eof() && std::chrono::steady_clock::now() < end) button.mainloop();
   EXPECT_EQ(changes.size(), 9U);
+}
+
+// The names of one file differ, so that the threads do not share a connection.
+TEST_F(VrpnFile, ThreadsMayHaveAConnectionEach) {
+  const auto useRepeatedly = [&](const char* scheme) {
+    for (int i = 0; i < 5000; ++i) {
+      vrpn_Button_Remote button((std::string("Device@") + scheme + path_).c_str());
+      vrpn_Text_Sender device("Device", button.connectionPtr());
+      device.send_message("a text that is too harmless to be printed");
+    }
+  };
+  std::thread other([&] { useRepeatedly("file:"); });
+  useRepeatedly("file://");
+  other.join();
 }
 
 TEST_F(VrpnFile, ADamagedEndIsLeftOut) {

@@ -17,12 +17,12 @@ const unsigned vrpn_MAX_TEXT_LEN = 1024;
 class vrpn_BaseClass;
 class vrpn_BaseClassUnique;
 
-/// Prints the text messages of all devices to standard output.
+/// Prints the text messages of all devices to standard output, at first only warnings and errors.
 class VRPN_API vrpn_TextPrinter {
  public:
   void set_min_level_to_print(vrpn_TEXT_SEVERITY severity, vrpn_uint32 level = 0);
   /// NULL prints nothing.
-  void set_ostream_to_use(FILE* stream) { stream_ = stream; }
+  void set_ostream_to_use(FILE* stream);
   int add_object(vrpn_BaseClass* device);
   void remove_object(vrpn_BaseClass* device);
 

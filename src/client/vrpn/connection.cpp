@@ -4,6 +4,7 @@
 #include <array>
 #include <cstring>
 #include <map>
+#include <mutex>
 #include <string_view>
 #include <vector>
 
@@ -33,14 +34,38 @@ const std::array<const char*, 4>& controlTypes() {
   return types;
 }
 
-// Never destroyed: a device may be in a variable that is destroyed later.
-std::map<std::string, vrpn_Connection*>& knownConnections() {
-  static auto& connections = *new std::map<std::string, vrpn_Connection*>;
-  return connections;
-}
+// The open connections by the names of their servers. Each belongs to one thread, the table to all.
+class KnownConnections {
+ public:
+  vrpn_Connection* find(const std::string& server) const {
+    const std::lock_guard lock(mutex_);
+    const auto found = open_.find(server);
+    return found == open_.end() ? nullptr : found->second;
+  }
+  void add(const std::string& server, vrpn_Connection* connection) {
+    const std::lock_guard lock(mutex_);
+    open_[server] = connection;
+  }
+  void forget(const vrpn_Connection* connection) {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(open_, [connection](const auto& known) { return known.second == connection; });
+  }
+  /// For connections that are closed and never deleted, so that a checker of leaks finds them.
+  void keep(const vrpn_Connection* connection) {
+    const std::lock_guard lock(mutex_);
+    closed_.push_back(connection);
+  }
 
-void forget(const vrpn_Connection* connection) {
-  std::erase_if(knownConnections(), [connection](const auto& k) { return k.second == connection; });
+ private:
+  mutable std::mutex mutex_;
+  std::map<std::string, vrpn_Connection*> open_;
+  std::vector<const vrpn_Connection*> closed_;
+};
+
+// Never destroyed: a device may be in a variable that is destroyed later.
+KnownConnections& knownConnections() {
+  static auto& connections = *new KnownConnections;
+  return connections;
 }
 
 void refuseLogs(std::initializer_list<const char*> files) {
@@ -85,7 +110,7 @@ int vrpn_Connection::servedPort() const {
 }
 
 vrpn_Connection::~vrpn_Connection() {
-  forget(this);
+  knownConnections().forget(this);
 }
 
 vrpn_bool vrpn_Connection::doing_okay() const {
@@ -287,9 +312,8 @@ bool vrpn_Connection::isUnused() const {
 // The last device was deleted by a handler, which returned into the connection and perhaps into that device:
 // the forces of this client end, and the rest of the connection stays.
 void vrpn_Connection::close() {
-  static auto& closed = *new std::vector<const vrpn_Connection*>;  // so that a checker of leaks finds them
-  closed.push_back(this);
-  forget(this);
+  knownConnections().keep(this);
+  knownConnections().forget(this);
   link_.reset();
   served_.reset();
 }
@@ -301,14 +325,12 @@ vrpn_Connection* vrpn_get_connection_by_name(const char* name, const char* local
   refuseLogs({local_in_logfile, local_out_logfile, remote_in_logfile, remote_out_logfile});
   const char* at = std::strrchr(name, '@');
   const std::string server = at ? at + 1 : name;
-  auto& known = knownConnections();
-  const auto found = known.find(server);
-  vrpn_Connection* connection = found != known.end() && !force_reopen ? found->second : nullptr;
+  vrpn_Connection* connection = force_reopen ? nullptr : knownConnections().find(server);
   if (!connection) {
     const std::unique_ptr<char[]> file(vrpn_copy_file_name(name));
     connection = file ? new vrpn_File_Connection(name) : new vrpn_Connection(server.c_str());
     connection->setAutoDeleteStatus(true);
-    known[server] = connection;
+    knownConnections().add(server, connection);
   }
   connection->addReference();
   return connection;
@@ -346,8 +368,7 @@ vrpn_ConnectionManager& vrpn_ConnectionManager::instance() {
 }
 
 vrpn_Connection* vrpn_ConnectionManager::getByName(const char* name) {
-  const auto found = knownConnections().find(name);
-  return found == knownConnections().end() ? nullptr : found->second;
+  return knownConnections().find(name);
 }
 
 char* vrpn_copy_service_name(const char* name) {
