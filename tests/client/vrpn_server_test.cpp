@@ -245,6 +245,25 @@ TEST_F(VrpnServer, APortThatIsTakenIsReported) {
   EXPECT_EQ(vrpn_create_server_connection(connection_->servedPort(), nullptr, nullptr, "127.0.0.1"), nullptr);
 }
 
+TEST_F(VrpnServer, AHandlerOfAMessageOfTheProgramItselfMayEndTheConnection) {
+  const int port = connection_->servedPort();
+  vrpn_Connection* connection = connection_.get();
+  program_.reset();
+  const vrpn_int32 type = connection->register_message_type("the end");
+  connection->register_handler(
+      type,
+      [](void* reference, vrpn_HANDLERPARAM) {
+        static_cast<ServedConnection*>(reference)->reset();
+        return 0;
+      },
+      &connection_);
+  connection->pack_message(0, {}, type, connection->register_sender("program"), nullptr,
+                           vrpn_CONNECTION_RELIABLE);
+  EXPECT_FALSE(connection->doing_okay());
+  const ServedConnection again(vrpn_create_server_connection(port, nullptr, nullptr, "127.0.0.1"));
+  EXPECT_TRUE(again) << "the port is free again";
+}
+
 // One device of several classes, used by a remote in the same program.
 class Mixed : public vrpn_Tracker, public vrpn_Button_Filter, public vrpn_Analog {
  public:

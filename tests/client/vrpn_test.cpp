@@ -324,6 +324,18 @@ TEST_P(Vrpn, TheConnectionOfADeletedDeviceIsClosedAlsoWhenAHandlerThrew) {
   EXPECT_TRUE(runUntil(again, [&] { return server_.connections() == 2; }));
 }
 
+TEST_P(Vrpn, TheConnectionOfADeviceThatAHandlerDeletesIsClosedAlsoWhenAnotherThrows) {
+  auto* tracker = new vrpn_Tracker_Remote(name().c_str());
+  vrpn_Connection* connection = tracker->connectionPtr();
+  ASSERT_TRUE(ready(*tracker));
+  const vrpn_int32 text = connection->register_message_type("vrpn_Base text_message");
+  connection->register_handler(text, deleteTracker, &tracker);
+  connection->register_handler(text, throwTheirName, nullptr);
+  server_.send(wire::Text{1, 2, "the end"});
+  EXPECT_THROW(runUntil(*connection, [] { return false; }), std::runtime_error);
+  EXPECT_FALSE(connection->doing_okay());
+}
+
 TEST(VrpnNames, ADeviceWhoseNameIsRefusedHearsNobody) {
   vrpn_Connection* loopback = vrpn_create_server_connection("loopback:");
   const std::string tooLong(200, 'x');

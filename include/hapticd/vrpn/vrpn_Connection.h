@@ -137,6 +137,7 @@ class VRPN_API vrpn_Connection {
     vrpn_MESSAGEHANDLER function;  // NULL: unregistered while handlers are called
     void* userdata;
   };
+  struct Call;
   const hapticd::wire::LocalNames* names() const;
   void dispatch(const hapticd::client::Arrival& arrival);
   void callControlHandlers(const char* type);

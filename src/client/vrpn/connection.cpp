@@ -125,8 +125,23 @@ bool vrpn_Connection::heard(vrpn_int32 sender) const {
   return served_ || (sender >= 0 && link_ && link_->heard({sender}));
 }
 
+// While handlers may run. When the outermost one has returned or thrown, those that were unregistered are
+// removed, and the connection is closed if they deleted its last device.
+struct vrpn_Connection::Call {
+  explicit Call(vrpn_Connection& connection) : of(connection) { ++of.calling_; }
+  ~Call() {
+    if (--of.calling_ > 0) return;
+    std::erase_if(of.handlers_, [](const Handler& h) { return !h.function; });
+    if (of.isUnused()) of.close();
+  }
+  Call(const Call&) = delete;
+  Call& operator=(const Call&) = delete;
+  vrpn_Connection& of;
+};
+
 int vrpn_Connection::mainloop(const timeval* timeout) {
   if (!doing_okay()) return -1;
+  const Call call(*this);
   const auto wait = timeout
                         ? std::chrono::seconds(timeout->tv_sec) + std::chrono::microseconds(timeout->tv_usec)
                         : std::chrono::microseconds(0);
@@ -141,7 +156,6 @@ int vrpn_Connection::mainloop(const timeval* timeout) {
     fprintf(stderr, "VRPN: %s\n", error.what());
     return -1;
   }
-  if (calling_ == 0 && isUnused()) close();
   return 0;
 }
 
@@ -167,14 +181,7 @@ void vrpn_Connection::callControlHandlers(const char* type) {
 }
 
 void vrpn_Connection::callHandlers(const vrpn_HANDLERPARAM& p) {
-  // Also when one throws.
-  struct Call {
-    explicit Call(vrpn_Connection& connection) : of(connection) { ++of.calling_; }
-    ~Call() {
-      if (--of.calling_ == 0) std::erase_if(of.handlers_, [](const Handler& h) { return !h.function; });
-    }
-    vrpn_Connection& of;
-  } const call(*this);
+  const Call call(*this);
   for (std::size_t i = 0; i < handlers_.size(); ++i) {
     const Handler h = handlers_[i];  // a copy: handlers may register others
     const bool wanted = h.function && (h.type == p.type || h.type == vrpn_ANY_TYPE) &&
@@ -312,6 +319,7 @@ bool vrpn_Connection::isUnused() const {
 // The last device was deleted by a handler, which returned into the connection and perhaps into that device:
 // the forces of this client end, and the rest of the connection stays.
 void vrpn_Connection::close() {
+  if (!link_ && !served_) return;  // closed already
   knownConnections().keep(this);
   knownConnections().forget(this);
   link_.reset();
