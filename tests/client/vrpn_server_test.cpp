@@ -215,6 +215,29 @@ TEST_F(VrpnServer, ReportsConnectionsToItsHandlers) {
   EXPECT_FALSE(connection_->connected());
 }
 
+// Programs index arrays of vrpn_CONNECTION_MAX_TYPES by them.
+TEST_F(VrpnServer, NumbersOfTypesAreBelowTheirLimit) {
+  std::vector<vrpn_int32> types;
+  connection_->register_handler(
+      vrpn_ANY_TYPE,
+      [](void* list, vrpn_HANDLERPARAM p) {
+        static_cast<std::vector<vrpn_int32>*>(list)->push_back(p.type);
+        return 0;
+      },
+      &types, connection_->register_sender(vrpn_CONTROL));
+  ScriptedPeer client(address(), "Device0");
+  ASSERT_TRUE(runUntil(client, [&] { return connection_->connected(); }));
+  ASSERT_EQ(types.size(), 2U);
+  EXPECT_STREQ(connection_->message_type_name(types[0]), vrpn_got_first_connection);
+  EXPECT_STREQ(connection_->message_type_name(types[1]), vrpn_got_connection);
+  for (const vrpn_int32 type : types) EXPECT_LT(type, vrpn_CONNECTION_MAX_TYPES);
+  vrpn_int32 largest = 0;
+  for (int i = 0; i < vrpn_CONNECTION_MAX_TYPES; ++i) {
+    largest = std::max(largest, connection_->register_message_type(std::to_string(i).c_str()));
+  }
+  EXPECT_LT(largest, types[0]) << "no other type has the number";
+}
+
 TEST_F(VrpnServer, ADamagedStreamEndsOnlyItsConnection) {
   ScriptedPeer good(address(), "Device0");
   ScriptedPeer bad(address(), "Device0", ScriptedPeer::Mode::tcp, ScriptedPeer::Speech::raw);

@@ -418,7 +418,7 @@ TEST_P(Vrpn, ProgramsMayHandleMessagesThemselves) {
   vrpn_gettimeofday(&now, nullptr);
   const vrpn_int32 start = connection->register_message_type("vrpn_ForceDevice startEffect");
   EXPECT_EQ(connection->pack_message(4, now, start, sender, buffer, vrpn_CONNECTION_RELIABLE), 0);
-  EXPECT_EQ(connection->pack_message(4, now, 1999, sender, buffer, vrpn_CONNECTION_RELIABLE), -1);
+  EXPECT_EQ(connection->pack_message(4, now, 1900, sender, buffer, vrpn_CONNECTION_RELIABLE), -1);
   connection->send_pending_reports();
   const auto received = server_.waitReceived(1);
   ASSERT_EQ(received.size(), 1U);

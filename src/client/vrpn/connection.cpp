@@ -25,8 +25,9 @@ const char* vrpn_CONTROL = "VRPN Control";
 
 namespace {
 
-// These types are never sent, so their numbers start above all that are.
-constexpr vrpn_int32 kFirstControlType = 1000000;
+// These types are never sent. Their numbers are the last ones that programs expect, and no other type has
+// them.
+constexpr vrpn_int32 kFirstControlType = vrpn_CONNECTION_MAX_TYPES - 4;
 
 const std::array<const char*, 4>& controlTypes() {
   static const std::array<const char*, 4> types{vrpn_got_first_connection, vrpn_got_connection,
@@ -166,7 +167,7 @@ void vrpn_Connection::dispatch(const Arrival& arrival) {
   } else if (arrival.what == Arrival::What::lost) {
     callControlHandlers(vrpn_dropped_connection);
     if (--clients_ == 0) callControlHandlers(vrpn_dropped_last_connection);
-  } else if (arrival.type.value >= 0 && arrival.sender.value >= 0) {
+  } else if (arrival.type.value >= 0 && arrival.type.value < kFirstControlType && arrival.sender.value >= 0) {
     callHandlers(
         {arrival.type.value,
          arrival.sender.value,
@@ -209,7 +210,9 @@ vrpn_int32 vrpn_Connection::register_message_type(const char* name) {
     if (std::strcmp(name, controlTypes()[i]) == 0) return kFirstControlType + static_cast<vrpn_int32>(i);
   }
   try {
-    return served_ ? served_->addType(name).value : link_ ? link_->addType(name).value : -1;
+    const vrpn_int32 type = served_ ? served_->addType(name).value : link_ ? link_->addType(name).value : -1;
+    if (type >= kFirstControlType) throw std::length_error("too many types of messages");
+    return type;
   } catch (const std::logic_error& error) {
     fprintf(stderr, "VRPN: %s\n", error.what());
     return -1;
