@@ -32,6 +32,8 @@ struct LinkOptions {
   bool reconnect = true;
   std::chrono::milliseconds retryInterval{250};
   std::chrono::milliseconds sendTimeout{10000};
+  /// The same for what waits at the end of the link.
+  std::chrono::milliseconds endSendTimeout = sendTimeout;
   std::size_t queueLimit_bytes = 4 * 1024 * 1024;
   /// Adopt unknown names that the server describes, as stock VRPN does.
   bool adoptNames = false;
@@ -57,7 +59,7 @@ class Link {
   /// Resolves the host, which may block, and starts to connect. Throws ConnectError for an unknown host.
   Link(const ServerAddress& server, const LinkOptions& options);
   /// Sends what is collected and waits until the server has received it and ended the connection; up to
-  /// kEndTimeout for one that has received everything, and the send timeout while it receives nothing.
+  /// kEndTimeout for one that has received everything, and endSendTimeout while it receives nothing.
   ~Link();
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;

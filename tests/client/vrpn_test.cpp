@@ -336,6 +336,30 @@ TEST_P(Vrpn, TheConnectionOfADeviceThatAHandlerDeletesIsClosedAlsoWhenAnotherThr
   EXPECT_FALSE(connection->doing_okay());
 }
 
+constexpr int kManyVertices = 90000;  // 4 MiB: more than the system takes
+
+TEST_P(Vrpn, WhatADeviceSentArrivesAlthoughItEnds) {
+  {
+    vrpn_ForceDevice_Remote device(name().c_str());
+    ASSERT_TRUE(ready(device));
+    server_.stopReading();
+    for (int i = 0; i < kManyVertices; ++i) device.setVertex(i, 1, 2, 3);
+    server_.startReading();
+  }
+  EXPECT_EQ(server_.waitVertices(kManyVertices).size(), static_cast<std::size_t>(kManyVertices));
+}
+
+// Other clients wait longer for a server that receives nothing, see WhatWasSentArrivesAlthoughTheClientEnds.
+TEST_P(Vrpn, ADeviceDoesNotWaitLongForAServerThatIsStopped) {
+  auto device = std::make_unique<vrpn_ForceDevice_Remote>(name().c_str());
+  ASSERT_TRUE(ready(*device));
+  server_.stopReading();
+  for (int i = 0; i < kManyVertices; ++i) device->setVertex(i, 1, 2, 3);
+  const auto start = std::chrono::steady_clock::now();
+  device.reset();
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(8));
+}
+
 TEST(VrpnNames, ADeviceWhoseNameIsRefusedHearsNobody) {
   vrpn_Connection* loopback = vrpn_create_server_connection("loopback:");
   const std::string tooLong(200, 'x');

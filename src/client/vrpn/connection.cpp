@@ -86,8 +86,10 @@ char* copyOf(std::string_view text) {
 
 vrpn_Connection::vrpn_Connection(const char* server) : name_(server), opened_(get_time()) {
   try {
-    link_ = std::make_unique<Link>(hapticd::client::parseServer(server),
-                                   hapticd::client::LinkOptions{.adoptNames = true});
+    // Programs written for VRPN expect that a device ends at once.
+    link_ = std::make_unique<Link>(
+        hapticd::client::parseServer(server),
+        hapticd::client::LinkOptions{.endSendTimeout = Link::kEndTimeout, .adoptNames = true});
     link_->addSender(vrpn_CONTROL);
     link_->waitConnected(std::chrono::seconds(1));  // as stock VRPN; the link keeps trying afterwards
   } catch (const std::exception& error) {
