@@ -456,6 +456,20 @@ TEST_P(Vrpn, ProgramsMayHandleMessagesThemselves) {
   connection->removeReference();
 }
 
+TEST_P(Vrpn, ProgramsHearTheirOwnMessages) {
+  vrpn_Tracker_Remote device(name().c_str());
+  vrpn_Connection* connection = device.connectionPtr();
+  const vrpn_int32 type = connection->register_message_type("a type of the program");
+  const vrpn_int32 sender = connection->register_sender("Phantom");
+  int messages = 0;
+  connection->register_handler(type, countMessage, &messages);
+  EXPECT_EQ(connection->pack_message(0, {}, type, sender, nullptr, vrpn_CONNECTION_RELIABLE), 0);
+  EXPECT_EQ(messages, 1);
+  connection->register_handler(type, throwTheirName, nullptr);
+  EXPECT_THROW(connection->pack_message(0, {}, type, sender, nullptr, vrpn_CONNECTION_RELIABLE),
+               std::runtime_error);
+}
+
 struct Leaver {
   vrpn_ForceDevice_Remote* device;
   int calls = 0;

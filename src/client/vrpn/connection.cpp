@@ -258,8 +258,6 @@ int vrpn_Connection::pack_message(vrpn_uint32 len, timeval time, vrpn_int32 type
   try {
     if (served_) {
       served_->send(stamp, {sender}, {type}, payload, reliability);
-      // Remote devices in the server's own program hear it, too.
-      callHandlers({type, sender, time, static_cast<vrpn_int32>(len), buffer});
     } else {
       link_->sendRaw(stamp, {sender}, {type}, payload, reliability);
     }
@@ -267,6 +265,8 @@ int vrpn_Connection::pack_message(vrpn_uint32 len, timeval time, vrpn_int32 type
     fprintf(stderr, "VRPN: %s\n", error.what());
     return -1;
   }
+  // Handlers and devices in the program itself hear it, too.
+  callHandlers({type, sender, time, static_cast<vrpn_int32>(len), buffer});
   return 0;
 }
 
