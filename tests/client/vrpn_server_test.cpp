@@ -334,6 +334,39 @@ TEST(VrpnLoopback, ServesRemotesOfTheSameProgram) {
   EXPECT_EQ(channels[0].channel[0], 0.25);
 }
 
+// VRPN calls the handlers of a message in the order of their registration, those of any type first, and the
+// handlers of a device in the opposite order.
+TEST(VrpnLoopback, HandlersAreCalledInTheOrderOfVrpn) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  struct Call {
+    std::string* calls;
+    char name;
+    static int VRPN_CALLBACK message(void* self, vrpn_HANDLERPARAM) {
+      static_cast<Call*>(self)->calls->push_back(static_cast<Call*>(self)->name);
+      return 0;
+    }
+    static void VRPN_CALLBACK pose(void* self, const vrpn_TRACKERCB) { message(self, {}); }
+  };
+  std::string calls;
+  Call a{&calls, 'a'}, b{&calls, 'b'}, any{&calls, '*'};
+  const vrpn_int32 type = connection->register_message_type("type");
+  const vrpn_int32 sender = connection->register_sender("Device");
+  connection->register_handler(type, Call::message, &a);
+  connection->register_handler(type, Call::message, &b);
+  connection->register_handler(vrpn_ANY_TYPE, Call::message, &any, sender);
+  connection->pack_message(0, {}, type, sender, nullptr, vrpn_CONNECTION_RELIABLE);
+  EXPECT_EQ(calls, "*ab");
+  calls.clear();
+  vrpn_Tracker_Server tracker("Tracker", connection.get());
+  vrpn_Tracker_Remote remote("Tracker", connection.get());
+  remote.register_change_handler(&a, Call::pose);
+  remote.register_change_handler(&b, Call::pose);
+  const vrpn_float64 position[3] = {};
+  const vrpn_float64 turn[4] = {0, 0, 0, 1};
+  tracker.report_pose(0, {1, 0}, position, turn);
+  EXPECT_EQ(calls, "ba");
+}
+
 // The conversation of a lock, on both sides in one program.
 TEST(VrpnLoopback, ALockIsGrantedToOneAtATime) {
   const ServedConnection connection(vrpn_create_server_connection("loopback:"));

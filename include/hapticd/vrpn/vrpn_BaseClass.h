@@ -143,7 +143,8 @@ class VRPN_API vrpn_BaseClass : public virtual vrpn_BaseClassUnique {
   void listen(const char* type, vrpn_MESSAGEHANDLER handler, void* self);
 };
 
-/// Handlers of one kind of report. A running handler may unregister itself and others.
+/// Handlers of one kind of report; the last registered is called first, as in VRPN. A running handler may
+/// unregister itself and others.
 template <class Report>
 class VRPN_API vrpn_Callback_List {
  public:
@@ -167,7 +168,7 @@ class VRPN_API vrpn_Callback_List {
   }
   void call_handlers(const Report& info) {
     const Call call(*this);
-    for (size_t i = 0; i < entries_.size(); ++i) {
+    for (size_t i = entries_.size(); i-- > 0;) {
       const Entry entry = entries_[i];
       if (entry.handler != NULL) entry.handler(entry.userdata, info);
     }
