@@ -268,6 +268,16 @@ TEST_F(VrpnServer, APortThatIsTakenIsReported) {
   EXPECT_EQ(vrpn_create_server_connection(connection_->servedPort(), nullptr, nullptr, "127.0.0.1"), nullptr);
 }
 
+TEST_F(VrpnServer, ProgramsMayCreateTheirConnectionThemselves) {
+  vrpn_Connection_IP connection(0, nullptr, nullptr, "127.0.0.1");
+  EXPECT_TRUE(connection.doing_okay());
+  EXPECT_NE(connection.servedPort(), 0);
+  vrpn_Connection_IP second(static_cast<unsigned short>(connection.servedPort()), nullptr, nullptr,
+                            "127.0.0.1");
+  EXPECT_FALSE(second.doing_okay()) << "the port is taken";
+  EXPECT_EQ(second.mainloop(), -1);
+}
+
 TEST_F(VrpnServer, AHandlerOfAMessageOfTheProgramItselfMayEndTheConnection) {
   const int port = connection_->servedPort();
   vrpn_Connection* connection = connection_.get();

@@ -118,7 +118,7 @@ class VRPN_API vrpn_Connection {
   // Not in VRPN: for the devices of this library.
   hapticd::client::Link* link() { return link_.get(); }
   /// Serves at this address (NULL: every one of this machine); port 0 lets the system choose one, a negative
-  /// one serves this program only. Throws hapticd's errors of the network.
+  /// one serves this program only. Prints an error, and doing_okay() is false, when the port is taken.
   vrpn_Connection(const char* address, int port);
   /// The port that is served; 0 for the connection of a client.
   int servedPort() const;
@@ -165,8 +165,14 @@ VRPN_API vrpn_Connection* vrpn_create_server_connection(int port = vrpn_DEFAULT_
 VRPN_API vrpn_Connection* vrpn_create_server_connection(const char* name, const char* local_in_logfile = NULL,
                                                         const char* local_out_logfile = NULL);
 
-/// VRPN's names for connections of one kind; here all are vrpn_Connection.
-typedef vrpn_Connection vrpn_Connection_IP;
+/// For programs that create the connection that serves their devices themselves; the functions here return
+/// any vrpn_Connection. doing_okay() is false when the port is taken.
+class VRPN_API vrpn_Connection_IP : public vrpn_Connection {
+ public:
+  vrpn_Connection_IP(unsigned short port = vrpn_DEFAULT_LISTEN_PORT_NO, const char* local_in_logfile = NULL,
+                     const char* local_out_logfile = NULL, const char* NIC_address = NULL);
+};
+/// VRPN's name for a connection within one program.
 typedef vrpn_Connection vrpn_Connection_Loopback;
 
 /// The connections of this program.

@@ -98,14 +98,24 @@ vrpn_Connection::vrpn_Connection(const char* server) : name_(server), opened_(ge
 }
 
 vrpn_Connection::vrpn_Connection(const char* address, int port) : opened_(get_time()) {
-  std::optional<hapticd::net::Endpoint> local;
-  if (port >= 0) {
-    local.emplace();
-    if (address != nullptr && *address != '\0') local->address = hapticd::net::resolve(address);
-    local->port = static_cast<std::uint16_t>(port);
+  try {
+    std::optional<hapticd::net::Endpoint> local;
+    if (port >= 0) {
+      local.emplace();
+      if (address != nullptr && *address != '\0') local->address = hapticd::net::resolve(address);
+      local->port = static_cast<std::uint16_t>(port);
+    }
+    served_ = std::make_unique<ServerLink>(local);
+    served_->addSender(vrpn_CONTROL);
+  } catch (const std::exception& error) {
+    fprintf(stderr, "VRPN: %s\n", error.what());
   }
-  served_ = std::make_unique<ServerLink>(local);
-  served_->addSender(vrpn_CONTROL);
+}
+
+vrpn_Connection_IP::vrpn_Connection_IP(unsigned short port, const char* local_in_logfile,
+                                       const char* local_out_logfile, const char* NIC_address)
+    : vrpn_Connection(NIC_address, port) {
+  refuseLogs({local_in_logfile, local_out_logfile});
 }
 
 int vrpn_Connection::servedPort() const {
@@ -353,15 +363,11 @@ vrpn_Connection* vrpn_get_connection_by_name(const char* name, const char* local
 vrpn_Connection* vrpn_create_server_connection(int port, const char* local_in_logfile,
                                                const char* local_out_logfile, const char* NIC_address) {
   refuseLogs({local_in_logfile, local_out_logfile});
-  try {
-    auto* connection = new vrpn_Connection(NIC_address, port);
-    connection->setAutoDeleteStatus(true);
-    connection->addReference();
-    return connection;
-  } catch (const std::exception& error) {
-    fprintf(stderr, "VRPN: %s\n", error.what());
-    return nullptr;
-  }
+  auto connection = std::make_unique<vrpn_Connection>(NIC_address, port);
+  if (!connection->doing_okay()) return nullptr;
+  connection->setAutoDeleteStatus(true);
+  connection->addReference();
+  return connection.release();
 }
 
 vrpn_Connection* vrpn_create_server_connection(const char* name, const char* local_in_logfile,
