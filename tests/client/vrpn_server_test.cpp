@@ -19,6 +19,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -342,6 +343,34 @@ TEST(VrpnLoopback, ServesRemotesOfTheSameProgram) {
   EXPECT_EQ(device.buttonstate[1], vrpn_BUTTON_TOGGLE_ON);
   ASSERT_EQ(channels.size(), 1U);
   EXPECT_EQ(channels[0].channel[0], 0.25);
+}
+
+TEST(VrpnLoopback, ARemoteOfTheSameProgramGetsTheStatesOfButtons) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  vrpn_Button_Server server("Buttons", connection.get(), 2);
+  vrpn_Button_Remote remote("Buttons", connection.get());
+  std::vector<vrpn_int32> states;
+  remote.register_states_handler(&states, [](void* list, const vrpn_BUTTONSTATESCB report) {
+    static_cast<std::vector<vrpn_int32>*>(list)->push_back(report.num_buttons);
+  });
+  for (int i = 0; i < 3; ++i) {
+    server.mainloop();
+    remote.mainloop();
+  }
+  EXPECT_EQ(states, std::vector<vrpn_int32>{2});
+}
+
+TEST(VrpnLoopback, ATextThatIsTooLongIsNotSent) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  vrpn_Text_Sender sender("Device", connection.get());
+  vrpn_Text_Receiver receiver("Device", connection.get());
+  std::vector<std::size_t> lengths;
+  receiver.register_message_handler(&lengths, [](void* list, const vrpn_TEXTCB text) {
+    static_cast<std::vector<std::size_t>*>(list)->push_back(std::strlen(text.message));
+  });
+  EXPECT_EQ(sender.send_message(std::string(vrpn_MAX_TEXT_LEN - 1, 'x').c_str()), 0);
+  EXPECT_EQ(sender.send_message(std::string(vrpn_MAX_TEXT_LEN, 'x').c_str()), -1);
+  EXPECT_EQ(lengths, std::vector<std::size_t>{vrpn_MAX_TEXT_LEN - 1});
 }
 
 // VRPN calls the handlers of a message in the order of their registration, those of any type first, and the

@@ -71,6 +71,7 @@ class VRPN_API vrpn_BaseClassUnique {
 
   int register_autodeleted_handler(vrpn_int32 type, vrpn_MESSAGEHANDLER handler, void* userdata,
                                    vrpn_int32 sender = vrpn_ANY_SENDER);
+  /// -1 for a text of vrpn_MAX_TEXT_LEN characters or more, which is not sent.
   int send_text_message(const char* text, struct timeval time, vrpn_TEXT_SEVERITY severity = vrpn_TEXT_NORMAL,
                         vrpn_uint32 level = 0);
   SendTextMessageBoundCall send_text_message(vrpn_TEXT_SEVERITY severity = vrpn_TEXT_NORMAL) {
@@ -121,7 +122,7 @@ class VRPN_API vrpn_BaseClassUnique {
   std::vector<Registered> registered_;
   struct timeval silentSince_ = {};
   int warned_s_ = 0;
-  bool serves_ = false;
+  bool started_ = false;  // by its first mainloop
 };
 
 /// The base of each device class. A device made of several classes has one name and one connection.

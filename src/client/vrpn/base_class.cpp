@@ -1,6 +1,7 @@
 #include "hapticd/vrpn/vrpn_BaseClass.h"
 
 #include <algorithm>
+#include <cstring>
 #include <mutex>
 #include <utility>
 
@@ -125,18 +126,27 @@ int vrpn_BaseClassUnique::register_autodeleted_handler(vrpn_int32 type, vrpn_MES
 
 int vrpn_BaseClassUnique::send_text_message(const char* text, timeval time, vrpn_TEXT_SEVERITY severity,
                                             vrpn_uint32 level) {
+  if (std::strlen(text) >= vrpn_MAX_TEXT_LEN) {
+    fprintf(stderr, "VRPN: a text of %zu characters, at most %u: not sent\n", std::strlen(text),
+            vrpn_MAX_TEXT_LEN - 1);
+    return -1;
+  }
   sendMessage(d_connection, d_sender_id, wire::Text{static_cast<std::uint32_t>(severity), level, text},
               wire::Reliability::kReliable, &time);
   return d_connection ? 0 : -1;
 }
 
 void vrpn_BaseClassUnique::server_mainloop() {
-  if (std::exchange(serves_, true)) return;
+  if (std::exchange(started_, true)) return;
   register_autodeleted_handler(d_ping_message_id, handlePing, this, d_sender_id);
 }
 
 void vrpn_BaseClassUnique::client_mainloop() {
   if (!d_connection) return;
+  // A link pings the devices of its server; those of this program are asked for their state here.
+  if (!d_connection->link() && !std::exchange(started_, true)) {
+    sendMessage(d_connection, d_sender_id, wire::Ping{});
+  }
   d_connection->mainloop();
   const timeval now = d_connection->get_time();
   const bool heard = d_connection->heard(d_sender_id);
