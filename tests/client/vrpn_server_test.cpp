@@ -720,6 +720,39 @@ TEST_F(VrpnFile, IsPlayedToADeviceThatOpensIt) {
   EXPECT_EQ(changes.size(), 9U);
 }
 
+// However often mainloop() is called.
+TEST_F(VrpnFile, IsPlayedAtItsRate) {
+  class Timed : public vrpn_File_Connection {
+   public:
+    using vrpn_File_Connection::vrpn_File_Connection;
+    timeval get_time() override { return now; }
+    timeval now{1700000000, 0};
+  };
+  for (const float rate : {0.25F, 1.5F}) {
+    Timed file(("file:" + path_).c_str());
+    file.set_replay_rate(rate);
+    file.mainloop();
+    constexpr int kCalls = 100000;
+    for (file.now.tv_usec = 1; file.now.tv_usec < kCalls; ++file.now.tv_usec) file.mainloop();
+    timeval position{};
+    file.time_since_connection_open(&position);
+    EXPECT_NEAR(vrpn_TimevalMsecs(position), 1e-3 * kCalls * static_cast<double>(rate), 0.01);
+  }
+}
+
+TEST_F(VrpnFile, IsPlayedToItsEndByAVeryLargeTimeOrRate) {
+  vrpn_File_Connection file(("file:" + path_).c_str());
+  file.play_to_time(1e18);
+  EXPECT_TRUE(file.eof());
+  file.mainloop();
+  file.reset();
+  file.set_replay_rate(1e30F);
+  file.mainloop();
+  const timeval tenth{0, 100000};
+  file.mainloop(&tenth);
+  EXPECT_TRUE(file.eof());
+}
+
 // The names of one file differ, so that the threads do not share a connection.
 TEST_F(VrpnFile, ThreadsMayHaveAConnectionEach) {
   const auto useRepeatedly = [&](const char* scheme) {

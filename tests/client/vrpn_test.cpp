@@ -13,6 +13,8 @@
 #include <vrpn_Tracker.h>
 
 #include <chrono>
+#include <cmath>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -711,6 +713,19 @@ TEST(VrpnShared, TimevalArithmetic) {
   EXPECT_EQ(vrpn_TimevalMsecs(a), 2900);
   EXPECT_TRUE(vrpn_TimevalEqual(vrpn_MsecsTimeval(2900), a));
   EXPECT_TRUE(vrpn_TimevalEqual(vrpn_TimevalScale(b, 2), {2, 400000}));
+}
+
+TEST(VrpnShared, TimesThatDoNotFitAreVeryLong) {
+  const timeval most{std::numeric_limits<time_t>::max(), 0};
+  const timeval least{std::numeric_limits<time_t>::min(), 0};
+  const timeval second{1, 0};
+  EXPECT_TRUE(vrpn_TimevalGreater(vrpn_TimevalSum(most, most), second));
+  EXPECT_TRUE(vrpn_TimevalGreater(second, vrpn_TimevalSum(least, least)));
+  EXPECT_TRUE(vrpn_TimevalGreater(vrpn_TimevalDiff(most, least), second));
+  EXPECT_TRUE(vrpn_TimevalGreater(vrpn_TimevalScale(second, 1e30), second));
+  EXPECT_TRUE(vrpn_TimevalGreater(vrpn_MsecsTimeval(1e30), second));
+  EXPECT_TRUE(vrpn_TimevalGreater(second, vrpn_MsecsTimeval(-1e30)));
+  EXPECT_TRUE(vrpn_TimevalEqual(vrpn_MsecsTimeval(std::nan("")), {}));
 }
 
 TEST(VrpnShared, BuffersAreBigEndianAndBounded) {
