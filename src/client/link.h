@@ -65,7 +65,7 @@ class Link {
   Link& operator=(const Link&) = delete;
   static constexpr std::chrono::milliseconds kEndTimeout{1000};
 
-  /// Names a device to use; the link pings it every second until it answers.
+  /// Names a device to use; the link pings it every second until anything arrives from it on this connection.
   wire::LocalSender addDevice(std::string_view name);
   /// Other names, known or new. Throws std::invalid_argument and std::length_error as wire::LocalNames.
   wire::LocalSender addSender(std::string_view name) { return names_.addSender(name); }

@@ -19,6 +19,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -751,6 +752,16 @@ TEST_F(VrpnFile, IsPlayedToItsEndByAVeryLargeTimeOrRate) {
   const timeval tenth{0, 100000};
   file.mainloop(&tenth);
   EXPECT_TRUE(file.eof());
+}
+
+std::unique_ptr<vrpn_Button_Remote> ofTheProgram;
+
+TEST_F(VrpnFile, ADeviceInAGlobalVariableEndsWithTheProgram) {
+  const auto program = [&] {
+    ofTheProgram = std::make_unique<vrpn_Button_Remote>(("Device@file://" + path_).c_str());
+    std::exit(0);
+  };
+  EXPECT_EXIT(program(), ::testing::ExitedWithCode(0), "");
 }
 
 // The names of one file differ, so that the threads do not share a connection.

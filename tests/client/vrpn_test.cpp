@@ -338,6 +338,18 @@ TEST_P(Vrpn, TheConnectionOfADeviceThatAHandlerDeletesIsClosedAlsoWhenAnotherThr
   EXPECT_FALSE(connection->doing_okay());
 }
 
+// After all others have answered, the pings have ended.
+TEST_P(Vrpn, ADeviceThatIsOpenedLaterIsPingedUntilItAnswers) {
+  vrpn_Tracker_Remote tracker(name().c_str());
+  ASSERT_TRUE(ready(tracker));
+  const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(1500);
+  ASSERT_TRUE(runUntil(tracker, [&] { return std::chrono::steady_clock::now() > end; }));
+  const std::size_t before = server_.pings();
+  vrpn_Button_Remote button(("Other" + name().substr(name().find('@'))).c_str());
+  EXPECT_EQ(button.connectionPtr(), tracker.connectionPtr());
+  EXPECT_TRUE(runUntil(button, [&] { return server_.pings() >= before + 2; }));
+}
+
 constexpr int kManyVertices = 90000;  // 4 MiB: more than the system takes
 
 TEST_P(Vrpn, WhatADeviceSentArrivesAlthoughItEnds) {
