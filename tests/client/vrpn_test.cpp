@@ -12,6 +12,7 @@
 #include <vrpn_Text.h>
 #include <vrpn_Tracker.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -764,6 +765,19 @@ TEST(VrpnShared, CopiedTextEndsWithinItsBuffer) {
   EXPECT_STREQ(room, "Pha");
   vrpn_strcpy(room, "P");
   EXPECT_STREQ(room, "P");
+}
+
+TEST(VrpnConnection, CommandsThatDoNotFitBeforeTheFirstConnectionArePrintedOnce) {
+  vrpn_ForceDevice_Remote device("Phantom@tcp://127.0.0.1:1");
+  vrpn_Connection* connection = device.connectionPtr();
+  ::testing::internal::CaptureStderr();
+  for (int i = 0; i < 100000; ++i) device.setVertex(i, 1, 2, 3);  // 4.8 MB, more than the link keeps
+  EXPECT_EQ(connection->pack_message(0, {}, 0, connection->register_sender("Phantom"), nullptr,
+                                     vrpn_CONNECTION_RELIABLE),
+            -1);
+  const std::string printed = ::testing::internal::GetCapturedStderr();
+  EXPECT_EQ(std::count(printed.begin(), printed.end(), '\n'), 1) << printed.substr(0, 1000);
+  EXPECT_NE(printed.find("bytes wait to be sent"), std::string::npos);
 }
 
 TEST(VrpnConnection, AnUnknownHostIsNotOkay) {

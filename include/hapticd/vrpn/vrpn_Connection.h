@@ -8,6 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include <exception>
 #include <memory>
 #include <string>
 #include <vector>
@@ -125,6 +126,8 @@ class VRPN_API vrpn_Connection {
   vrpn_int32 registerDevice(const char* name);
   /// Whether anything arrived from this sender on the present connection.
   bool heard(vrpn_int32 sender) const;
+  /// Prints why a message was not sent; what did not fit before the first connection, only once.
+  void printRefusal(const std::exception& error);
 
  protected:
   /// Calls the handlers of a message.
@@ -153,6 +156,7 @@ class VRPN_API vrpn_Connection {
   int references_ = 0;
   int calling_ = 0;
   bool autoDelete_ = false;
+  bool refusalPrinted_ = false;
 };
 
 /// A connection that serves the devices of this program: on a port of this machine, or at [address][:port];

@@ -6,11 +6,13 @@
 #include <map>
 #include <mutex>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/world.h"
 #include "client/vrpn/messages.h"
 #include "client/vrpn/server_link.h"
+#include "hapticd/error.h"
 #include "hapticd/vrpn/vrpn_FileConnection.h"
 
 using hapticd::client::Arrival;
@@ -273,12 +275,18 @@ int vrpn_Connection::pack_message(vrpn_uint32 len, timeval time, vrpn_int32 type
       link_->sendRaw(stamp, {sender}, {type}, payload, reliability);
     }
   } catch (const std::exception& error) {
-    fprintf(stderr, "VRPN: %s\n", error.what());
+    printRefusal(error);
     return -1;
   }
   // Handlers and devices in the program itself hear it, too.
   callHandlers({type, sender, time, static_cast<vrpn_int32>(len), buffer});
   return 0;
+}
+
+void vrpn_Connection::printRefusal(const std::exception& error) {
+  const bool unconnected = dynamic_cast<const hapticd::ConnectError*>(&error) != nullptr;
+  if (unconnected && std::exchange(refusalPrinted_, true)) return;
+  fprintf(stderr, "VRPN: %s\n", error.what());
 }
 
 int vrpn_Connection::send_pending_reports() {
