@@ -721,6 +721,23 @@ TEST_F(VrpnFile, IsPlayedToADeviceThatOpensIt) {
   EXPECT_EQ(changes.size(), 9U);
 }
 
+TEST_F(VrpnFile, IsClosedWhenAHandlerDeletesItsLastDevice) {
+  const std::string name = "file:" + path_;
+  auto button = std::make_unique<vrpn_Button_Remote>(("Device@" + name).c_str());
+  vrpn_Connection* connection = button->connectionPtr();
+  EXPECT_EQ(vrpn_ConnectionManager::instance().getByName(name.c_str()), connection);
+  connection->register_handler(
+      vrpn_ANY_TYPE,
+      [](void* device, vrpn_HANDLERPARAM) {
+        static_cast<std::unique_ptr<vrpn_Button_Remote>*>(device)->reset();
+        return 0;
+      },
+      &button);
+  connection->mainloop();
+  EXPECT_EQ(button, nullptr);
+  EXPECT_EQ(vrpn_ConnectionManager::instance().getByName(name.c_str()), nullptr);
+}
+
 // However often mainloop() is called.
 TEST_F(VrpnFile, IsPlayedAtItsRate) {
   class Timed : public vrpn_File_Connection {

@@ -74,7 +74,8 @@ extern VRPN_API const char* vrpn_CONTROL;
 class vrpn_File_Connection;
 class vrpn_TranslationTable;  // VRPN's own, never used here
 
-/// Thread: that of the caller, always the same one. Several threads may have a connection each.
+/// Thread: that of the caller, always the same one. Several threads may have a connection each: to different
+/// servers, or opened with force_reopen.
 class VRPN_API vrpn_Connection {
  public:
   /// Opens a server: host, host:port or tcp://host:port. Prints an error and stays unconnected when that

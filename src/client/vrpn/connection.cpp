@@ -200,8 +200,9 @@ void vrpn_Connection::callHandlers(const vrpn_HANDLERPARAM& p) {
   for (const vrpn_int32 type : {vrpn_ANY_TYPE, p.type}) {  // VRPN's order
     for (std::size_t i = 0; i < handlers_.size(); ++i) {
       const Handler h = handlers_[i];  // a copy: handlers may register others
-      const bool fromIt = h.sender == p.sender || h.sender == vrpn_ANY_SENDER;
-      if (h.function && h.type == type && fromIt) h.function(h.userdata, p);
+      const bool wanted =
+          h.function && h.type == type && (h.sender == p.sender || h.sender == vrpn_ANY_SENDER);
+      if (wanted) h.function(h.userdata, p);
     }
   }
 }
