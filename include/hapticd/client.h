@@ -228,8 +228,9 @@ class HAPTICD_EXPORT Client {
   /// text that names who stopped, while a stop of another client stands, unless this one is an operator by a
   /// token or a user id.
   void rearmForces();
-  /// Presents a token for a role, on every connection from now on; 16 to 128 characters, or empty for none
-  /// (std::invalid_argument). Without TLS, everybody on the way can read it. A refusal arrives as a text.
+  /// Presents a token for a role, on every connection from now on; 16 to 128 characters
+  /// (std::invalid_argument). An empty one presents none on later connections; the present one keeps its
+  /// role. Without TLS, everybody on the way can read it. A refusal arrives as a text.
   void presentToken(std::string_view token);
   /// From now on the server disconnects this client and ends its effects when it receives no heartbeat for
   /// 500 ms. The client sends ten heartbeats per second while it polls or waits: a program that hangs, or

@@ -691,8 +691,9 @@ class Client(Core):
         self._send_at_once(m.Marker(0, text), "not marked")
 
     def present_token(self, token: str) -> None:
-        """Presents a token for a role, on every connection from now on: 16 to 128 characters, or empty for none. Without
-        TLS, everybody on the way can read it. A refusal arrives as a text. Raises ValueError for another length."""
+        """Presents a token for a role, on every connection from now on: 16 to 128 characters (ValueError).
+        An empty one presents none on later connections; the present one keeps its role. Without TLS, everybody on the
+        way can read it. A refusal arrives as a text."""
         self._set_token(token)
         self._push()
 

@@ -72,7 +72,7 @@ Link::~Link() {
         left = bytes;
         lastProgress = base::now();
       }
-      if (Duration(base::now() - lastProgress) > (left > 0 ? options_.sendTimeout : kEndTimeout)) break;
+      if (Duration(base::now() - lastProgress) > (left > 0 ? options_.endSendTimeout : kEndTimeout)) break;
       loop_.runOnce(kCheck);
     }
   } catch (const std::exception&) {  // called by a function of the event loop

@@ -32,6 +32,8 @@ struct LinkOptions {
   bool reconnect = true;
   std::chrono::milliseconds retryInterval{250};
   std::chrono::milliseconds sendTimeout{10000};
+  /// The same for what waits at the end of the link.
+  std::chrono::milliseconds endSendTimeout = sendTimeout;
   std::size_t queueLimit_bytes = 4 * 1024 * 1024;
   /// Adopt unknown names that the server describes, as stock VRPN does.
   bool adoptNames = false;
@@ -57,13 +59,13 @@ class Link {
   /// Resolves the host, which may block, and starts to connect. Throws ConnectError for an unknown host.
   Link(const ServerAddress& server, const LinkOptions& options);
   /// Sends what is collected and waits until the server has received it and ended the connection; up to
-  /// kEndTimeout for one that has received everything, and the send timeout while it receives nothing.
+  /// kEndTimeout for one that has received everything, and endSendTimeout while it receives nothing.
   ~Link();
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
   static constexpr std::chrono::milliseconds kEndTimeout{1000};
 
-  /// Names a device to use; the link pings it every second until it answers.
+  /// Names a device to use; the link pings it every second until anything arrives from it on this connection.
   wire::LocalSender addDevice(std::string_view name);
   /// Other names, known or new. Throws std::invalid_argument and std::length_error as wire::LocalNames.
   wire::LocalSender addSender(std::string_view name) { return names_.addSender(name); }

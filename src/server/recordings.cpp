@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <ctime>
+#include <optional>
+#include <system_error>
 #include <utility>
 
 #include "base/world.h"
@@ -61,29 +63,17 @@ Recordings::Recordings(const Scenes& scenes, const Stations& stations, Post post
 
 void Recordings::create(const std::string& name) {
   try {
-    createFile(withTime(name));
+    recorder_ = createFile(withTime(name));
   } catch (const record::RecordingExists& error) {
     throw RecordingError(std::string(error.what()) +
                          ", or put the time into the name: session-%Y%m%d-%H%M%S.haptics");
   }
 }
 
-// Several may begin in one second.
-void Recordings::createNamedByTime() {
-  const std::string stem = withTime((options_.folder / "session-%Y%m%d-%H%M%S").string());
-  for (int number = 1;; ++number) {
-    try {
-      return createFile(stem + (number > 1 ? "-" + std::to_string(number) : "") + ".haptics");
-    } catch (const record::RecordingExists&) {
-      if (number == kMostOfASecond) throw;
-    }
-  }
-}
-
-void Recordings::createFile(const std::filesystem::path& path) {
+std::unique_ptr<record::Recorder> Recordings::createFile(const std::filesystem::path& path) const {
   record::RecorderOptions options;
   options.fileBytes = options_.mostBytes;
-  recorder_ = std::make_unique<record::Recorder>(
+  return std::make_unique<record::Recorder>(
       path,
       [this](const std::string& text) {
         spdlog::error("{}", text);
@@ -92,17 +82,32 @@ void Recordings::createFile(const std::filesystem::path& path) {
       options);
 }
 
+// Several may begin in one second.
+std::unique_ptr<record::Recorder> Recordings::createNumberedFile(const std::filesystem::path& path) const {
+  for (int number = 1;; ++number) {
+    std::filesystem::path numbered = path;
+    if (number > 1) numbered.replace_filename(fmt::format("{}-{}.haptics", path.stem().string(), number));
+    try {
+      return createFile(numbered);
+    } catch (const record::RecordingExists&) {
+      if (number == kMostOfASecond) throw;
+    }
+  }
+}
+
+std::vector<record::RecordedDevice> Recordings::devices() const {
+  std::vector<record::RecordedDevice> devices;
+  for (const auto& station : stations_) devices.push_back(station->recorded());
+  return devices;
+}
+
 void Recordings::begin(Nanos wallOffset, std::string config) {
   recorderOf_.resize(scenes_.size(), nullptr);  // now: later the threads of the scenes read it
   owners_.resize(scenes_.size());
   if (!recorder_) return;
-  startRecorder(wallOffset, std::move(config));
-  attach();
-}
-
-void Recordings::startRecorder(Nanos wallOffset, std::string config) {
-  for (const auto& station : stations_) recorder_->addDevice(station->recorded());
+  for (record::RecordedDevice& device : devices()) recorder_->addDevice(std::move(device));
   recorder_->start(wallOffset, std::move(config));
+  attach();
 }
 
 void Recordings::attach() {
@@ -155,7 +160,8 @@ bool Recordings::beginScene(SceneHost& scene) {
   });
 }
 
-void Recordings::start(const std::string& name, Nanos wallOffset, std::string config) {
+void Recordings::start(const std::string& name, Nanos wallOffset, std::string config, Begun begun) {
+  if (beginning_) throw RecordingError("refused: another recording begins");
   if (!file().empty()) throw RecordingError("refused: this server records to " + file() + " already");
   if (!name.empty()) checkName(name);
   end({});  // one that could not be written further
@@ -163,26 +169,61 @@ void Recordings::start(const std::string& name, Nanos wallOffset, std::string co
     throw RecordingError(
         "refused: the last " + std::to_string(kMostEnded) +
         " recordings have not ended yet; try again in a second, or when the devices are back");
+  beginning_ = std::make_shared<Beginning>();
+  beginning_->numbered = name.empty();
+  beginning_->path =
+      withTime((options_.folder / (name.empty() ? "session-%Y%m%d-%H%M%S.haptics" : name)).string());
+  beginning_->devices = devices();
+  beginning_->wallOffset = wallOffset;
+  beginning_->config = std::move(config);
+  beginning_->begun = std::move(begun);
+  const auto step = [this, beginning = beginning_]() -> std::optional<Nanos> {
+    if (beginning->recorder || !beginning->refusal.empty()) return std::nullopt;  // woken by its end
+    beginIn(*beginning);
+    post_([this] { this->begun(); });
+    return std::nullopt;
+  };
   try {
-    if (name.empty()) {
-      createNamedByTime();
-    } else {
-      createFile(withTime((options_.folder / name).string()));
-    }
-    startRecorder(wallOffset, std::move(config));
-    if (!recorder_->writes())
-      throw RecordingError("refused: '" + recorder_->path().string() + "' cannot be written");
-  } catch (const RecordingError&) {
-    recorder_.reset();
-    throw;
-  } catch (const std::exception& error) {
-    recorder_.reset();
+    beginner_ = base::Thread({.name = "recording"}, step);
+  } catch (const std::system_error& error) {
+    beginning_.reset();
     throw RecordingError(std::string("refused: the recording cannot begin: ") + error.what());
   }
-  attach();
+}
+
+// In a thread of its own.
+void Recordings::beginIn(Beginning& beginning) const noexcept {
+  try {
+    auto recorder = beginning.numbered ? createNumberedFile(beginning.path) : createFile(beginning.path);
+    for (record::RecordedDevice& device : beginning.devices) recorder->addDevice(std::move(device));
+    recorder->start(beginning.wallOffset, std::move(beginning.config));
+    if (!recorder->writes())
+      throw RecordingError("refused: '" + recorder->path().string() + "' cannot be written");
+    beginning.recorder = std::move(recorder);
+  } catch (const RecordingError& error) {
+    beginning.refusal = error.what();
+  } catch (const std::exception& error) {
+    beginning.refusal = std::string("refused: the recording cannot begin: ") + error.what();
+  }
+}
+
+void Recordings::begun() {
+  beginner_.stop();
+  const std::shared_ptr<Beginning> beginning = std::exchange(beginning_, nullptr);
+  if (beginning->recorder) {
+    recorder_ = std::move(beginning->recorder);
+    attach();
+  }
+  beginning->begun(beginning->refusal);
+  if (beginning->ended && !end(beginning->ended)) beginning->ended("nothing is recorded");
 }
 
 bool Recordings::end(std::function<void(const std::string&)> ended) {
+  if (beginning_) {
+    if (beginning_->ended) return false;
+    beginning_->ended = std::move(ended);
+    return true;
+  }
   if (!recorder_) return false;
   record::Recorder* recorder = recorder_.get();
   auto entry = std::make_unique<Ended>();
@@ -242,6 +283,9 @@ void Recordings::poll() {
 }
 
 void Recordings::finish() {
+  beginner_.stop();
+  if (beginning_ && beginning_->recorder) recorder_ = std::move(beginning_->recorder);
+  beginning_.reset();
   for (const auto& owners : owners_) {
     if (owners) owners->watch(nullptr);  // clients leave the server that ends, too
   }

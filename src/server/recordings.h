@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/thread.h"
 #include "record/recorder.h"
 #include "server/scene/scene_host.h"
 #include "server/station/station.h"
@@ -37,12 +38,16 @@ class Recordings {
   /// Before the scenes start. Records to the file that was created, if there is one. The recording of a scene
   /// that runs begins with the commands that make it, and its ticks follow.
   void begin(base::Nanos wallOffset, std::string config);
-  /// The same for a client, which may name a file in the folder; empty: named by the time. Throws
-  /// record::RecordingError with a text for the client.
-  void start(const std::string& name, base::Nanos wallOffset, std::string config);
+  /// Gets a text for the client: why the recording was refused, or nothing when it records to file().
+  using Begun = std::function<void(const std::string& refusal)>;
+  /// The same for a client, which may name a file in the folder; empty: named by the time. A thread of its
+  /// own creates the file, because a disk may hang; `begun` is called later. Throws record::RecordingError
+  /// with a text for the client.
+  void start(const std::string& name, base::Nanos wallOffset, std::string config, Begun begun);
   /// Call once after begin(), when the scenes have started.
   void scenesStarted();
-  /// Ends the recording at hand; `ended` gets a text once the file is complete. False when there is none.
+  /// Ends the recording at hand, or the one that begins; `ended` gets a text once the file is complete. False
+  /// when there is none.
   bool end(std::function<void(const std::string&)> ended);
 
   /// The file of the recording at hand; empty when there is none, or it cannot be written further.
@@ -65,9 +70,24 @@ class Recordings {
     bool told = false;
   };
 
-  void createNamedByTime();
-  void createFile(const std::filesystem::path& path);
-  void startRecorder(base::Nanos wallOffset, std::string config);
+  // A recording that a client asked for, until its file is there. The thread writes the last two.
+  struct Beginning {
+    std::filesystem::path path;
+    bool numbered = false;  // a number may follow where the name exists
+    std::vector<record::RecordedDevice> devices;
+    base::Nanos wallOffset = 0;
+    std::string config;
+    Begun begun;
+    std::function<void(const std::string&)> ended;  // of a client that asked meanwhile that it ends
+    std::unique_ptr<record::Recorder> recorder;
+    std::string refusal;
+  };
+
+  std::unique_ptr<record::Recorder> createFile(const std::filesystem::path& path) const;
+  std::unique_ptr<record::Recorder> createNumberedFile(const std::filesystem::path& path) const;
+  std::vector<record::RecordedDevice> devices() const;
+  void beginIn(Beginning& beginning) const noexcept;
+  void begun();
   void attach();
   bool beginScene(SceneHost& scene);
   void watch(std::uint32_t scene, const scene::SceneBuilder& builder, record::Recorder* recorder);
@@ -78,6 +98,8 @@ class Recordings {
   const Post post_;
   const Options options_;
   std::unique_ptr<record::Recorder> recorder_;
+  std::shared_ptr<Beginning> beginning_;
+  base::Thread beginner_;
   std::vector<std::unique_ptr<Ended>> ended_;
   // Of each scene; touched by its thread once that runs.
   std::vector<record::Recorder*> recorderOf_;

@@ -145,9 +145,13 @@ void Server::onRecordingControl(Session& session, const wire::MessageReceived& m
   if (player_) return refuse("refused: this server replays a recording");
   if (wanted->record != 0) {
     try {
-      recordings_.start(std::string(wanted->name.view()), clock_.offset(), toToml(config_));
-      spdlog::info("client {} began it", session.id());
-      answer(wire::kTextNormal, "recording to " + recordings_.file());
+      recordings_.start(std::string(wanted->name.view()), clock_.offset(), toToml(config_),
+                        [this, answer, id = session.id()](const std::string& refusal) {
+                          if (!refusal.empty())
+                            return answer(wire::kTextError, "Recording_Control " + refusal);
+                          spdlog::info("client {} began it", id);
+                          answer(wire::kTextNormal, "recording to " + recordings_.file());
+                        });
     } catch (const record::RecordingError& error) {
       refuse(error.what());
     }

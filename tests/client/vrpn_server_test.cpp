@@ -13,16 +13,20 @@
 #include <vrpn_Mutex.h>
 #include <vrpn_RedundantTransmission.h>
 #include <vrpn_SharedObject.h>
+#include <vrpn_Text.h>
 #include <vrpn_Tracker.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <memory>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "client/client_tests.h"
@@ -213,6 +217,29 @@ TEST_F(VrpnServer, ReportsConnectionsToItsHandlers) {
   EXPECT_FALSE(connection_->connected());
 }
 
+// Programs index arrays of vrpn_CONNECTION_MAX_TYPES by them.
+TEST_F(VrpnServer, NumbersOfTypesAreBelowTheirLimit) {
+  std::vector<vrpn_int32> types;
+  connection_->register_handler(
+      vrpn_ANY_TYPE,
+      [](void* list, vrpn_HANDLERPARAM p) {
+        static_cast<std::vector<vrpn_int32>*>(list)->push_back(p.type);
+        return 0;
+      },
+      &types, connection_->register_sender(vrpn_CONTROL));
+  ScriptedPeer client(address(), "Device0");
+  ASSERT_TRUE(runUntil(client, [&] { return connection_->connected(); }));
+  ASSERT_EQ(types.size(), 2U);
+  EXPECT_STREQ(connection_->message_type_name(types[0]), vrpn_got_first_connection);
+  EXPECT_STREQ(connection_->message_type_name(types[1]), vrpn_got_connection);
+  for (const vrpn_int32 type : types) EXPECT_LT(type, vrpn_CONNECTION_MAX_TYPES);
+  vrpn_int32 largest = 0;
+  for (int i = 0; i < vrpn_CONNECTION_MAX_TYPES; ++i) {
+    largest = std::max(largest, connection_->register_message_type(std::to_string(i).c_str()));
+  }
+  EXPECT_LT(largest, types[0]) << "no other type has the number";
+}
+
 TEST_F(VrpnServer, ADamagedStreamEndsOnlyItsConnection) {
   ScriptedPeer good(address(), "Device0");
   ScriptedPeer bad(address(), "Device0", ScriptedPeer::Mode::tcp, ScriptedPeer::Speech::raw);
@@ -241,6 +268,35 @@ TEST_F(VrpnServer, AClientWhoseStreamIsDamagedIsReportedAsDropped) {
 
 TEST_F(VrpnServer, APortThatIsTakenIsReported) {
   EXPECT_EQ(vrpn_create_server_connection(connection_->servedPort(), nullptr, nullptr, "127.0.0.1"), nullptr);
+}
+
+TEST_F(VrpnServer, ProgramsMayCreateTheirConnectionThemselves) {
+  vrpn_Connection_IP connection(0, nullptr, nullptr, "127.0.0.1");
+  EXPECT_TRUE(connection.doing_okay());
+  EXPECT_NE(connection.servedPort(), 0);
+  vrpn_Connection_IP second(static_cast<unsigned short>(connection.servedPort()), nullptr, nullptr,
+                            "127.0.0.1");
+  EXPECT_FALSE(second.doing_okay()) << "the port is taken";
+  EXPECT_EQ(second.mainloop(), -1);
+}
+
+TEST_F(VrpnServer, AHandlerOfAMessageOfTheProgramItselfMayEndTheConnection) {
+  const int port = connection_->servedPort();
+  vrpn_Connection* connection = connection_.get();
+  program_.reset();
+  const vrpn_int32 type = connection->register_message_type("the end");
+  connection->register_handler(
+      type,
+      [](void* reference, vrpn_HANDLERPARAM) {
+        static_cast<ServedConnection*>(reference)->reset();
+        return 0;
+      },
+      &connection_);
+  connection->pack_message(0, {}, type, connection->register_sender("program"), nullptr,
+                           vrpn_CONNECTION_RELIABLE);
+  EXPECT_FALSE(connection->doing_okay());
+  const ServedConnection again(vrpn_create_server_connection(port, nullptr, nullptr, "127.0.0.1"));
+  EXPECT_TRUE(again) << "the port is free again";
 }
 
 // One device of several classes, used by a remote in the same program.
@@ -288,6 +344,67 @@ TEST(VrpnLoopback, ServesRemotesOfTheSameProgram) {
   EXPECT_EQ(device.buttonstate[1], vrpn_BUTTON_TOGGLE_ON);
   ASSERT_EQ(channels.size(), 1U);
   EXPECT_EQ(channels[0].channel[0], 0.25);
+}
+
+TEST(VrpnLoopback, ARemoteOfTheSameProgramGetsTheStatesOfButtons) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  vrpn_Button_Server server("Buttons", connection.get(), 2);
+  vrpn_Button_Remote remote("Buttons", connection.get());
+  std::vector<vrpn_int32> states;
+  remote.register_states_handler(&states, [](void* list, const vrpn_BUTTONSTATESCB report) {
+    static_cast<std::vector<vrpn_int32>*>(list)->push_back(report.num_buttons);
+  });
+  for (int i = 0; i < 3; ++i) {
+    server.mainloop();
+    remote.mainloop();
+  }
+  EXPECT_EQ(states, std::vector<vrpn_int32>{2});
+}
+
+TEST(VrpnLoopback, ATextThatIsTooLongIsNotSent) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  vrpn_Text_Sender sender("Device", connection.get());
+  vrpn_Text_Receiver receiver("Device", connection.get());
+  std::vector<std::size_t> lengths;
+  receiver.register_message_handler(&lengths, [](void* list, const vrpn_TEXTCB text) {
+    static_cast<std::vector<std::size_t>*>(list)->push_back(std::strlen(text.message));
+  });
+  EXPECT_EQ(sender.send_message(std::string(vrpn_MAX_TEXT_LEN - 1, 'x').c_str()), 0);
+  EXPECT_EQ(sender.send_message(std::string(vrpn_MAX_TEXT_LEN, 'x').c_str()), -1);
+  EXPECT_EQ(lengths, std::vector<std::size_t>{vrpn_MAX_TEXT_LEN - 1});
+}
+
+// VRPN calls the handlers of a message in the order of their registration, those of any type first, and the
+// handlers of a device in the opposite order.
+TEST(VrpnLoopback, HandlersAreCalledInTheOrderOfVrpn) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  struct Call {
+    std::string* calls;
+    char name;
+    static int VRPN_CALLBACK message(void* self, vrpn_HANDLERPARAM) {
+      static_cast<Call*>(self)->calls->push_back(static_cast<Call*>(self)->name);
+      return 0;
+    }
+    static void VRPN_CALLBACK pose(void* self, const vrpn_TRACKERCB) { message(self, {}); }
+  };
+  std::string calls;
+  Call a{&calls, 'a'}, b{&calls, 'b'}, any{&calls, '*'};
+  const vrpn_int32 type = connection->register_message_type("type");
+  const vrpn_int32 sender = connection->register_sender("Device");
+  connection->register_handler(type, Call::message, &a);
+  connection->register_handler(type, Call::message, &b);
+  connection->register_handler(vrpn_ANY_TYPE, Call::message, &any, sender);
+  connection->pack_message(0, {}, type, sender, nullptr, vrpn_CONNECTION_RELIABLE);
+  EXPECT_EQ(calls, "*ab");
+  calls.clear();
+  vrpn_Tracker_Server tracker("Tracker", connection.get());
+  vrpn_Tracker_Remote remote("Tracker", connection.get());
+  remote.register_change_handler(&a, Call::pose);
+  remote.register_change_handler(&b, Call::pose);
+  const vrpn_float64 position[3] = {};
+  const vrpn_float64 turn[4] = {0, 0, 0, 1};
+  tracker.report_pose(0, {1, 0}, position, turn);
+  EXPECT_EQ(calls, "ba");
 }
 
 // The conversation of a lock, on both sides in one program.
@@ -602,6 +719,80 @@ TEST_F(VrpnFile, IsPlayedToADeviceThatOpensIt) {
   const auto end = std::chrono::steady_clock::now() + kPatience;
   while (!file->eof() && std::chrono::steady_clock::now() < end) button.mainloop();
   EXPECT_EQ(changes.size(), 9U);
+}
+
+TEST_F(VrpnFile, IsClosedWhenAHandlerDeletesItsLastDevice) {
+  const std::string name = "file:" + path_;
+  auto button = std::make_unique<vrpn_Button_Remote>(("Device@" + name).c_str());
+  vrpn_Connection* connection = button->connectionPtr();
+  EXPECT_EQ(vrpn_ConnectionManager::instance().getByName(name.c_str()), connection);
+  connection->register_handler(
+      vrpn_ANY_TYPE,
+      [](void* device, vrpn_HANDLERPARAM) {
+        static_cast<std::unique_ptr<vrpn_Button_Remote>*>(device)->reset();
+        return 0;
+      },
+      &button);
+  connection->mainloop();
+  EXPECT_EQ(button, nullptr);
+  EXPECT_EQ(vrpn_ConnectionManager::instance().getByName(name.c_str()), nullptr);
+}
+
+// However often mainloop() is called.
+TEST_F(VrpnFile, IsPlayedAtItsRate) {
+  class Timed : public vrpn_File_Connection {
+   public:
+    using vrpn_File_Connection::vrpn_File_Connection;
+    timeval get_time() override { return now; }
+    timeval now{1700000000, 0};
+  };
+  for (const float rate : {0.25F, 1.5F}) {
+    Timed file(("file:" + path_).c_str());
+    file.set_replay_rate(rate);
+    file.mainloop();
+    constexpr int kCalls = 100000;
+    for (file.now.tv_usec = 1; file.now.tv_usec < kCalls; ++file.now.tv_usec) file.mainloop();
+    timeval position{};
+    file.time_since_connection_open(&position);
+    EXPECT_NEAR(vrpn_TimevalMsecs(position), 1e-3 * kCalls * static_cast<double>(rate), 0.01);
+  }
+}
+
+TEST_F(VrpnFile, IsPlayedToItsEndByAVeryLargeTimeOrRate) {
+  vrpn_File_Connection file(("file:" + path_).c_str());
+  file.play_to_time(1e18);
+  EXPECT_TRUE(file.eof());
+  file.mainloop();
+  file.reset();
+  file.set_replay_rate(1e30F);
+  file.mainloop();
+  const timeval tenth{0, 100000};
+  file.mainloop(&tenth);
+  EXPECT_TRUE(file.eof());
+}
+
+std::unique_ptr<vrpn_Button_Remote> ofTheProgram;
+
+TEST_F(VrpnFile, ADeviceInAGlobalVariableEndsWithTheProgram) {
+  const auto program = [&] {
+    ofTheProgram = std::make_unique<vrpn_Button_Remote>(("Device@file://" + path_).c_str());
+    std::exit(0);
+  };
+  EXPECT_EXIT(program(), ::testing::ExitedWithCode(0), "");
+}
+
+// The names of one file differ, so that the threads do not share a connection.
+TEST_F(VrpnFile, ThreadsMayHaveAConnectionEach) {
+  const auto useRepeatedly = [&](const char* scheme) {
+    for (int i = 0; i < 5000; ++i) {
+      vrpn_Button_Remote button((std::string("Device@") + scheme + path_).c_str());
+      vrpn_Text_Sender device("Device", button.connectionPtr());
+      device.send_message("a text that is too harmless to be printed");
+    }
+  };
+  std::thread other([&] { useRepeatedly("file:"); });
+  useRepeatedly("file://");
+  other.join();
 }
 
 TEST_F(VrpnFile, ADamagedEndIsLeftOut) {

@@ -56,6 +56,9 @@ void connections(vrpn_Connection* c) {
   vrpn_ConnectionManager::instance().getByName("x");
   vrpn_Connection_Loopback* l = 0;
   (void)l;
+  vrpn_Connection_IP p;
+  vrpn_Connection* q = new vrpn_Connection_IP(4000);
+  (void)q;
   vrpn_noint_block_write(1, "x", 1);
   vrpn_LOGFILTER h = 0;
   (void)h;

@@ -12,7 +12,10 @@
 #include <vrpn_Text.h>
 #include <vrpn_Tracker.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -324,6 +327,54 @@ TEST_P(Vrpn, TheConnectionOfADeletedDeviceIsClosedAlsoWhenAHandlerThrew) {
   EXPECT_TRUE(runUntil(again, [&] { return server_.connections() == 2; }));
 }
 
+TEST_P(Vrpn, TheConnectionOfADeviceThatAHandlerDeletesIsClosedAlsoWhenAnotherThrows) {
+  auto* tracker = new vrpn_Tracker_Remote(name().c_str());
+  vrpn_Connection* connection = tracker->connectionPtr();
+  ASSERT_TRUE(ready(*tracker));
+  const vrpn_int32 text = connection->register_message_type("vrpn_Base text_message");
+  connection->register_handler(text, deleteTracker, &tracker);
+  connection->register_handler(text, throwTheirName, nullptr);
+  server_.send(wire::Text{1, 2, "the end"});
+  EXPECT_THROW(runUntil(*connection, [] { return false; }), std::runtime_error);
+  EXPECT_FALSE(connection->doing_okay());
+}
+
+// After all others have answered, the pings have ended.
+TEST_P(Vrpn, ADeviceThatIsOpenedLaterIsPingedUntilItAnswers) {
+  vrpn_Tracker_Remote tracker(name().c_str());
+  ASSERT_TRUE(ready(tracker));
+  const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(1500);
+  ASSERT_TRUE(runUntil(tracker, [&] { return std::chrono::steady_clock::now() > end; }));
+  const std::size_t before = server_.pings();
+  vrpn_Button_Remote button(("Other" + name().substr(name().find('@'))).c_str());
+  EXPECT_EQ(button.connectionPtr(), tracker.connectionPtr());
+  EXPECT_TRUE(runUntil(button, [&] { return server_.pings() >= before + 2; }));
+}
+
+constexpr int kManyVertices = 90000;  // 4 MiB: more than the system takes
+
+TEST_P(Vrpn, WhatADeviceSentArrivesAlthoughItEnds) {
+  {
+    vrpn_ForceDevice_Remote device(name().c_str());
+    ASSERT_TRUE(ready(device));
+    server_.stopReading();
+    for (int i = 0; i < kManyVertices; ++i) device.setVertex(i, 1, 2, 3);
+    server_.startReading();
+  }
+  EXPECT_EQ(server_.waitVertices(kManyVertices).size(), static_cast<std::size_t>(kManyVertices));
+}
+
+// Other clients wait longer for a server that receives nothing, see WhatWasSentArrivesAlthoughTheClientEnds.
+TEST_P(Vrpn, ADeviceDoesNotWaitLongForAServerThatIsStopped) {
+  auto device = std::make_unique<vrpn_ForceDevice_Remote>(name().c_str());
+  ASSERT_TRUE(ready(*device));
+  server_.stopReading();
+  for (int i = 0; i < kManyVertices; ++i) device->setVertex(i, 1, 2, 3);
+  const auto start = std::chrono::steady_clock::now();
+  device.reset();
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(8));
+}
+
 TEST(VrpnNames, ADeviceWhoseNameIsRefusedHearsNobody) {
   vrpn_Connection* loopback = vrpn_create_server_connection("loopback:");
   const std::string tooLong(200, 'x');
@@ -406,7 +457,7 @@ TEST_P(Vrpn, ProgramsMayHandleMessagesThemselves) {
   vrpn_gettimeofday(&now, nullptr);
   const vrpn_int32 start = connection->register_message_type("vrpn_ForceDevice startEffect");
   EXPECT_EQ(connection->pack_message(4, now, start, sender, buffer, vrpn_CONNECTION_RELIABLE), 0);
-  EXPECT_EQ(connection->pack_message(4, now, 1999, sender, buffer, vrpn_CONNECTION_RELIABLE), -1);
+  EXPECT_EQ(connection->pack_message(4, now, 1900, sender, buffer, vrpn_CONNECTION_RELIABLE), -1);
   connection->send_pending_reports();
   const auto received = server_.waitReceived(1);
   ASSERT_EQ(received.size(), 1U);
@@ -418,6 +469,20 @@ TEST_P(Vrpn, ProgramsMayHandleMessagesThemselves) {
   server_.dropClients();
   ASSERT_TRUE(runUntil(*connection, [&] { return dropped == 1 && connections == 2; }));
   connection->removeReference();
+}
+
+TEST_P(Vrpn, ProgramsHearTheirOwnMessages) {
+  vrpn_Tracker_Remote device(name().c_str());
+  vrpn_Connection* connection = device.connectionPtr();
+  const vrpn_int32 type = connection->register_message_type("a type of the program");
+  const vrpn_int32 sender = connection->register_sender("Phantom");
+  int messages = 0;
+  connection->register_handler(type, countMessage, &messages);
+  EXPECT_EQ(connection->pack_message(0, {}, type, sender, nullptr, vrpn_CONNECTION_RELIABLE), 0);
+  EXPECT_EQ(messages, 1);
+  connection->register_handler(type, throwTheirName, nullptr);
+  EXPECT_THROW(connection->pack_message(0, {}, type, sender, nullptr, vrpn_CONNECTION_RELIABLE),
+               std::runtime_error);
 }
 
 struct Leaver {
@@ -663,6 +728,19 @@ TEST(VrpnShared, TimevalArithmetic) {
   EXPECT_TRUE(vrpn_TimevalEqual(vrpn_TimevalScale(b, 2), {2, 400000}));
 }
 
+TEST(VrpnShared, TimesThatDoNotFitAreVeryLong) {
+  const timeval most{std::numeric_limits<time_t>::max(), 0};
+  const timeval least{std::numeric_limits<time_t>::min(), 0};
+  const timeval second{1, 0};
+  EXPECT_TRUE(vrpn_TimevalGreater(vrpn_TimevalSum(most, most), second));
+  EXPECT_TRUE(vrpn_TimevalGreater(second, vrpn_TimevalSum(least, least)));
+  EXPECT_TRUE(vrpn_TimevalGreater(vrpn_TimevalDiff(most, least), second));
+  EXPECT_TRUE(vrpn_TimevalGreater(vrpn_TimevalScale(second, 1e30), second));
+  EXPECT_TRUE(vrpn_TimevalGreater(vrpn_MsecsTimeval(1e30), second));
+  EXPECT_TRUE(vrpn_TimevalGreater(second, vrpn_MsecsTimeval(-1e30)));
+  EXPECT_TRUE(vrpn_TimevalEqual(vrpn_MsecsTimeval(std::nan("")), {}));
+}
+
 TEST(VrpnShared, BuffersAreBigEndianAndBounded) {
   char buffer[12];
   char* insert = buffer;
@@ -687,6 +765,19 @@ TEST(VrpnShared, CopiedTextEndsWithinItsBuffer) {
   EXPECT_STREQ(room, "Pha");
   vrpn_strcpy(room, "P");
   EXPECT_STREQ(room, "P");
+}
+
+TEST(VrpnConnection, CommandsThatDoNotFitBeforeTheFirstConnectionArePrintedOnce) {
+  vrpn_ForceDevice_Remote device("Phantom@tcp://127.0.0.1:1");
+  vrpn_Connection* connection = device.connectionPtr();
+  ::testing::internal::CaptureStderr();
+  for (int i = 0; i < 100000; ++i) device.setVertex(i, 1, 2, 3);  // 4.8 MB, more than the link keeps
+  EXPECT_EQ(connection->pack_message(0, {}, 0, connection->register_sender("Phantom"), nullptr,
+                                     vrpn_CONNECTION_RELIABLE),
+            -1);
+  const std::string printed = ::testing::internal::GetCapturedStderr();
+  EXPECT_EQ(std::count(printed.begin(), printed.end(), '\n'), 1) << printed.substr(0, 1000);
+  EXPECT_NE(printed.find("bytes wait to be sent"), std::string::npos);
 }
 
 TEST(VrpnConnection, AnUnknownHostIsNotOkay) {

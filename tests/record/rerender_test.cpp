@@ -207,40 +207,6 @@ TEST_F(Rerender, AllCommandsAreInTheFile) {
   }
 }
 
-// A recording that has ended keeps its memory until a later tick has ended, too.
-TEST_F(Rerender, RecordingsWithoutPauseAreRefused) {
-  const RecordingFile first;
-  const std::filesystem::path folder = std::filesystem::path(first.path()).parent_path();
-  const std::string stem = std::filesystem::path(first.path()).stem().string() + "-burst-";
-  const Hand hand = Hand::stroking();
-  RunningServer server(recordingConfig(hand, first.path()));
-  ScriptedPeer peer(server.address());
-  ASSERT_TRUE(peer.untilConnected());
-  peer.send(wire::RecordingControl{.record = 0, .name = {}});
-  constexpr int kMany = 20;
-  for (int i = 0; i < kMany; ++i) {
-    peer.send(
-        wire::RecordingControl{.record = 1, .name = std::string_view(stem + std::to_string(i) + ".haptics")});
-    peer.send(wire::RecordingControl{.record = 0, .name = {}});
-  }
-  EXPECT_TRUE(peer.untilText("recordings have not ended yet"));
-  bool begun = false;
-  for (int i = 0; i < 200 && !begun; ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    peer.forget();
-    peer.send(wire::RecordingControl{
-        .record = 1, .name = std::string_view(stem + "last-" + std::to_string(i) + ".haptics")});
-    ASSERT_TRUE(peer.until([&] { return !peer.texts().empty(); }));
-    begun = std::any_of(peer.texts().begin(), peer.texts().end(), [](const wire::Text& text) {
-      return text.text.text.find("recording to") != std::string::npos;
-    });
-  }
-  EXPECT_TRUE(begun) << "soon after";
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    if (entry.path().filename().string().starts_with(stem)) std::filesystem::remove(entry.path());
-  }
-}
-
 // A client ends the recording of the start and begins another: while one hand is held in a touched cube, an
 // effect vibrates and a force field pulls.
 TEST_F(Rerender, RecordingBegunWhileTheServerRunsReplaysItsScene) {

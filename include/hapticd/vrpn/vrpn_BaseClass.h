@@ -17,12 +17,12 @@ const unsigned vrpn_MAX_TEXT_LEN = 1024;
 class vrpn_BaseClass;
 class vrpn_BaseClassUnique;
 
-/// Prints the text messages of all devices to standard output.
+/// Prints the text messages of all devices to standard output, at first only warnings and errors.
 class VRPN_API vrpn_TextPrinter {
  public:
   void set_min_level_to_print(vrpn_TEXT_SEVERITY severity, vrpn_uint32 level = 0);
   /// NULL prints nothing.
-  void set_ostream_to_use(FILE* stream) { stream_ = stream; }
+  void set_ostream_to_use(FILE* stream);
   int add_object(vrpn_BaseClass* device);
   void remove_object(vrpn_BaseClass* device);
 
@@ -71,6 +71,7 @@ class VRPN_API vrpn_BaseClassUnique {
 
   int register_autodeleted_handler(vrpn_int32 type, vrpn_MESSAGEHANDLER handler, void* userdata,
                                    vrpn_int32 sender = vrpn_ANY_SENDER);
+  /// -1 for a text of vrpn_MAX_TEXT_LEN characters or more, which is not sent.
   int send_text_message(const char* text, struct timeval time, vrpn_TEXT_SEVERITY severity = vrpn_TEXT_NORMAL,
                         vrpn_uint32 level = 0);
   SendTextMessageBoundCall send_text_message(vrpn_TEXT_SEVERITY severity = vrpn_TEXT_NORMAL) {
@@ -121,7 +122,7 @@ class VRPN_API vrpn_BaseClassUnique {
   std::vector<Registered> registered_;
   struct timeval silentSince_ = {};
   int warned_s_ = 0;
-  bool serves_ = false;
+  bool started_ = false;  // by its first mainloop
 };
 
 /// The base of each device class. A device made of several classes has one name and one connection.
@@ -143,7 +144,8 @@ class VRPN_API vrpn_BaseClass : public virtual vrpn_BaseClassUnique {
   void listen(const char* type, vrpn_MESSAGEHANDLER handler, void* self);
 };
 
-/// Handlers of one kind of report. A running handler may unregister itself and others.
+/// Handlers of one kind of report; the last registered is called first, as in VRPN. A running handler may
+/// unregister itself and others.
 template <class Report>
 class VRPN_API vrpn_Callback_List {
  public:
@@ -167,7 +169,7 @@ class VRPN_API vrpn_Callback_List {
   }
   void call_handlers(const Report& info) {
     const Call call(*this);
-    for (size_t i = 0; i < entries_.size(); ++i) {
+    for (size_t i = entries_.size(); i-- > 0;) {
       const Entry entry = entries_[i];
       if (entry.handler != NULL) entry.handler(entry.userdata, info);
     }

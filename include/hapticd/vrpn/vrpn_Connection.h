@@ -8,6 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include <exception>
 #include <memory>
 #include <string>
 #include <vector>
@@ -73,6 +74,8 @@ extern VRPN_API const char* vrpn_CONTROL;
 class vrpn_File_Connection;
 class vrpn_TranslationTable;  // VRPN's own, never used here
 
+/// Thread: that of the caller, always the same one. Several threads may have a connection each: to different
+/// servers, or opened with force_reopen.
 class VRPN_API vrpn_Connection {
  public:
   /// Opens a server: host, host:port or tcp://host:port. Prints an error and stays unconnected when that
@@ -117,13 +120,15 @@ class VRPN_API vrpn_Connection {
   // Not in VRPN: for the devices of this library.
   hapticd::client::Link* link() { return link_.get(); }
   /// Serves at this address (NULL: every one of this machine); port 0 lets the system choose one, a negative
-  /// one serves this program only. Throws hapticd's errors of the network.
+  /// one serves this program only. Prints an error, and doing_okay() is false, when the port is taken.
   vrpn_Connection(const char* address, int port);
   /// The port that is served; 0 for the connection of a client.
   int servedPort() const;
   vrpn_int32 registerDevice(const char* name);
   /// Whether anything arrived from this sender on the present connection.
   bool heard(vrpn_int32 sender) const;
+  /// Prints why a message was not sent; what did not fit before the first connection, only once.
+  void printRefusal(const std::exception& error);
 
  protected:
   /// Calls the handlers of a message.
@@ -136,6 +141,7 @@ class VRPN_API vrpn_Connection {
     vrpn_MESSAGEHANDLER function;  // NULL: unregistered while handlers are called
     void* userdata;
   };
+  struct Call;
   const hapticd::wire::LocalNames* names() const;
   void dispatch(const hapticd::client::Arrival& arrival);
   void callControlHandlers(const char* type);
@@ -151,6 +157,7 @@ class VRPN_API vrpn_Connection {
   int references_ = 0;
   int calling_ = 0;
   bool autoDelete_ = false;
+  bool refusalPrinted_ = false;
 };
 
 /// A connection that serves the devices of this program: on a port of this machine, or at [address][:port];
@@ -163,8 +170,14 @@ VRPN_API vrpn_Connection* vrpn_create_server_connection(int port = vrpn_DEFAULT_
 VRPN_API vrpn_Connection* vrpn_create_server_connection(const char* name, const char* local_in_logfile = NULL,
                                                         const char* local_out_logfile = NULL);
 
-/// VRPN's names for connections of one kind; here all are vrpn_Connection.
-typedef vrpn_Connection vrpn_Connection_IP;
+/// For programs that create the connection that serves their devices themselves; the functions here return
+/// any vrpn_Connection. doing_okay() is false when the port is taken.
+class VRPN_API vrpn_Connection_IP : public vrpn_Connection {
+ public:
+  vrpn_Connection_IP(unsigned short port = vrpn_DEFAULT_LISTEN_PORT_NO, const char* local_in_logfile = NULL,
+                     const char* local_out_logfile = NULL, const char* NIC_address = NULL);
+};
+/// VRPN's name for a connection within one program.
 typedef vrpn_Connection vrpn_Connection_Loopback;
 
 /// The connections of this program.

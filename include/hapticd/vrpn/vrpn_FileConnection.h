@@ -67,6 +67,7 @@ class VRPN_API vrpn_File_Connection : public vrpn_Connection {
 
   std::string file_;
   bool ok_ = false;
+  vrpn_float32 rest_us_ = 0;  // that is due beyond the position
   std::vector<Entry> entries_;
   size_t next_ = 0;
   struct timeval position_ = {};    // filetime

@@ -1,6 +1,8 @@
 #include "hapticd/vrpn/vrpn_BaseClass.h"
 
 #include <algorithm>
+#include <cstring>
+#include <mutex>
 #include <utility>
 
 #include "client/vrpn/messages.h"
@@ -12,10 +14,13 @@ using hapticd::client::sendMessage;
 
 namespace {
 
+// Never destroyed: a device may be in a variable that is destroyed later.
 vrpn_TextPrinter& systemPrinter() {
-  static vrpn_TextPrinter printer;
+  static auto& printer = *new vrpn_TextPrinter;
   return printer;
 }
+
+std::mutex printing;  // of the printers' fields: a device belongs to one thread, a printer to all
 
 constexpr int kSilenceWarning_s = 3;
 constexpr int kSilenceInterval_s = 10;
@@ -25,21 +30,30 @@ constexpr int kSilenceInterval_s = 10;
 vrpn_TextPrinter& vrpn_System_TextPrinter = systemPrinter();
 
 void vrpn_TextPrinter::set_min_level_to_print(vrpn_TEXT_SEVERITY severity, vrpn_uint32 level) {
+  const std::lock_guard lock(printing);
   severity_ = severity;
   level_ = level;
 }
 
+void vrpn_TextPrinter::set_ostream_to_use(FILE* stream) {
+  const std::lock_guard lock(printing);
+  stream_ = stream;
+}
+
 int vrpn_TextPrinter::add_object(vrpn_BaseClass* device) {
+  const std::lock_guard lock(printing);
   devices_.push_back(device);
   return 0;
 }
 
 void vrpn_TextPrinter::remove_object(vrpn_BaseClass* device) {
+  const std::lock_guard lock(printing);
   std::erase(devices_, device);
 }
 
 // Several devices of one name receive the same text: the first of them prints it.
 void vrpn_TextPrinter::print(const vrpn_BaseClassUnique* device, const vrpn_HANDLERPARAM& p) const {
+  const std::lock_guard lock(printing);
   const auto first = std::find_if(devices_.begin(), devices_.end(), [&](const vrpn_BaseClassUnique* d) {
     return d->d_connection == device->d_connection && d->d_sender_id == device->d_sender_id;
   });
@@ -72,12 +86,18 @@ void vrpn_BaseClassUnique::open(const char* name, vrpn_Connection* connection) {
   d_text_message_id = d_connection->register_message_type("vrpn_Base text_message");
   d_ping_message_id = d_connection->register_message_type("vrpn_Base ping_message");
   d_pong_message_id = d_connection->register_message_type("vrpn_Base pong_message");
-  systemPrinter().devices_.push_back(this);
+  {
+    const std::lock_guard lock(printing);
+    systemPrinter().devices_.push_back(this);
+  }
   register_autodeleted_handler(d_text_message_id, handleText, this, d_sender_id);
 }
 
 vrpn_BaseClassUnique::~vrpn_BaseClassUnique() {
-  std::erase(systemPrinter().devices_, this);
+  {
+    const std::lock_guard lock(printing);
+    std::erase(systemPrinter().devices_, this);
+  }
   if (d_connection) {
     for (const Registered& r : registered_)
       d_connection->unregister_handler(r.type, r.handler, r.userdata, r.sender);
@@ -106,18 +126,27 @@ int vrpn_BaseClassUnique::register_autodeleted_handler(vrpn_int32 type, vrpn_MES
 
 int vrpn_BaseClassUnique::send_text_message(const char* text, timeval time, vrpn_TEXT_SEVERITY severity,
                                             vrpn_uint32 level) {
+  if (std::strlen(text) >= vrpn_MAX_TEXT_LEN) {
+    fprintf(stderr, "VRPN: a text of %zu characters, at most %u: not sent\n", std::strlen(text),
+            vrpn_MAX_TEXT_LEN - 1);
+    return -1;
+  }
   sendMessage(d_connection, d_sender_id, wire::Text{static_cast<std::uint32_t>(severity), level, text},
               wire::Reliability::kReliable, &time);
   return d_connection ? 0 : -1;
 }
 
 void vrpn_BaseClassUnique::server_mainloop() {
-  if (std::exchange(serves_, true)) return;
+  if (std::exchange(started_, true)) return;
   register_autodeleted_handler(d_ping_message_id, handlePing, this, d_sender_id);
 }
 
 void vrpn_BaseClassUnique::client_mainloop() {
   if (!d_connection) return;
+  // A link pings the devices of its server; those of this program are asked for their state here.
+  if (!d_connection->link() && !std::exchange(started_, true)) {
+    sendMessage(d_connection, d_sender_id, wire::Ping{});
+  }
   d_connection->mainloop();
   const timeval now = d_connection->get_time();
   const bool heard = d_connection->heard(d_sender_id);

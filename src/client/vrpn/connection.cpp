@@ -4,12 +4,15 @@
 #include <array>
 #include <cstring>
 #include <map>
+#include <mutex>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/world.h"
 #include "client/vrpn/messages.h"
 #include "client/vrpn/server_link.h"
+#include "hapticd/error.h"
 #include "hapticd/vrpn/vrpn_FileConnection.h"
 
 using hapticd::client::Arrival;
@@ -24,8 +27,9 @@ const char* vrpn_CONTROL = "VRPN Control";
 
 namespace {
 
-// These types are never sent, so their numbers start above all that are.
-constexpr vrpn_int32 kFirstControlType = 1000000;
+// These types are never sent. Their numbers are the last ones that programs expect, and no other type has
+// them.
+constexpr vrpn_int32 kFirstControlType = vrpn_CONNECTION_MAX_TYPES - 4;
 
 const std::array<const char*, 4>& controlTypes() {
   static const std::array<const char*, 4> types{vrpn_got_first_connection, vrpn_got_connection,
@@ -33,14 +37,38 @@ const std::array<const char*, 4>& controlTypes() {
   return types;
 }
 
-// Never destroyed: a device may be in a variable that is destroyed later.
-std::map<std::string, vrpn_Connection*>& knownConnections() {
-  static auto& connections = *new std::map<std::string, vrpn_Connection*>;
-  return connections;
-}
+// The open connections by the names of their servers. Each belongs to one thread, the table to all.
+class KnownConnections {
+ public:
+  vrpn_Connection* find(const std::string& server) const {
+    const std::lock_guard lock(mutex_);
+    const auto found = open_.find(server);
+    return found == open_.end() ? nullptr : found->second;
+  }
+  void add(const std::string& server, vrpn_Connection* connection) {
+    const std::lock_guard lock(mutex_);
+    open_[server] = connection;
+  }
+  void forget(const vrpn_Connection* connection) {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(open_, [connection](const auto& known) { return known.second == connection; });
+  }
+  /// For connections that are closed and never deleted, so that a checker of leaks finds them.
+  void keep(const vrpn_Connection* connection) {
+    const std::lock_guard lock(mutex_);
+    closed_.push_back(connection);
+  }
 
-void forget(const vrpn_Connection* connection) {
-  std::erase_if(knownConnections(), [connection](const auto& k) { return k.second == connection; });
+ private:
+  mutable std::mutex mutex_;
+  std::map<std::string, vrpn_Connection*> open_;
+  std::vector<const vrpn_Connection*> closed_;
+};
+
+// Never destroyed: a device may be in a variable that is destroyed later.
+KnownConnections& knownConnections() {
+  static auto& connections = *new KnownConnections;
+  return connections;
 }
 
 void refuseLogs(std::initializer_list<const char*> files) {
@@ -60,8 +88,10 @@ char* copyOf(std::string_view text) {
 
 vrpn_Connection::vrpn_Connection(const char* server) : name_(server), opened_(get_time()) {
   try {
-    link_ = std::make_unique<Link>(hapticd::client::parseServer(server),
-                                   hapticd::client::LinkOptions{.adoptNames = true});
+    // Programs written for VRPN expect that a device ends at once.
+    link_ = std::make_unique<Link>(
+        hapticd::client::parseServer(server),
+        hapticd::client::LinkOptions{.endSendTimeout = Link::kEndTimeout, .adoptNames = true});
     link_->addSender(vrpn_CONTROL);
     link_->waitConnected(std::chrono::seconds(1));  // as stock VRPN; the link keeps trying afterwards
   } catch (const std::exception& error) {
@@ -70,14 +100,24 @@ vrpn_Connection::vrpn_Connection(const char* server) : name_(server), opened_(ge
 }
 
 vrpn_Connection::vrpn_Connection(const char* address, int port) : opened_(get_time()) {
-  std::optional<hapticd::net::Endpoint> local;
-  if (port >= 0) {
-    local.emplace();
-    if (address != nullptr && *address != '\0') local->address = hapticd::net::resolve(address);
-    local->port = static_cast<std::uint16_t>(port);
+  try {
+    std::optional<hapticd::net::Endpoint> local;
+    if (port >= 0) {
+      local.emplace();
+      if (address != nullptr && *address != '\0') local->address = hapticd::net::resolve(address);
+      local->port = static_cast<std::uint16_t>(port);
+    }
+    served_ = std::make_unique<ServerLink>(local);
+    served_->addSender(vrpn_CONTROL);
+  } catch (const std::exception& error) {
+    fprintf(stderr, "VRPN: %s\n", error.what());
   }
-  served_ = std::make_unique<ServerLink>(local);
-  served_->addSender(vrpn_CONTROL);
+}
+
+vrpn_Connection_IP::vrpn_Connection_IP(unsigned short port, const char* local_in_logfile,
+                                       const char* local_out_logfile, const char* NIC_address)
+    : vrpn_Connection(NIC_address, port) {
+  refuseLogs({local_in_logfile, local_out_logfile});
 }
 
 int vrpn_Connection::servedPort() const {
@@ -85,7 +125,7 @@ int vrpn_Connection::servedPort() const {
 }
 
 vrpn_Connection::~vrpn_Connection() {
-  forget(this);
+  knownConnections().forget(this);
 }
 
 vrpn_bool vrpn_Connection::doing_okay() const {
@@ -100,8 +140,23 @@ bool vrpn_Connection::heard(vrpn_int32 sender) const {
   return served_ || (sender >= 0 && link_ && link_->heard({sender}));
 }
 
+// While handlers may run. When the outermost one has returned or thrown, those that were unregistered are
+// removed, and the connection is closed if they deleted its last device.
+struct vrpn_Connection::Call {
+  explicit Call(vrpn_Connection& connection) : of(connection) { ++of.calling_; }
+  ~Call() {
+    if (--of.calling_ > 0) return;
+    std::erase_if(of.handlers_, [](const Handler& h) { return !h.function; });
+    if (of.isUnused()) of.close();
+  }
+  Call(const Call&) = delete;
+  Call& operator=(const Call&) = delete;
+  vrpn_Connection& of;
+};
+
 int vrpn_Connection::mainloop(const timeval* timeout) {
   if (!doing_okay()) return -1;
+  const Call call(*this);
   const auto wait = timeout
                         ? std::chrono::seconds(timeout->tv_sec) + std::chrono::microseconds(timeout->tv_usec)
                         : std::chrono::microseconds(0);
@@ -116,7 +171,6 @@ int vrpn_Connection::mainloop(const timeval* timeout) {
     fprintf(stderr, "VRPN: %s\n", error.what());
     return -1;
   }
-  if (calling_ == 0 && isUnused()) close();
   return 0;
 }
 
@@ -127,7 +181,7 @@ void vrpn_Connection::dispatch(const Arrival& arrival) {
   } else if (arrival.what == Arrival::What::lost) {
     callControlHandlers(vrpn_dropped_connection);
     if (--clients_ == 0) callControlHandlers(vrpn_dropped_last_connection);
-  } else if (arrival.type.value >= 0 && arrival.sender.value >= 0) {
+  } else if (arrival.type.value >= 0 && arrival.type.value < kFirstControlType && arrival.sender.value >= 0) {
     callHandlers(
         {arrival.type.value,
          arrival.sender.value,
@@ -142,19 +196,14 @@ void vrpn_Connection::callControlHandlers(const char* type) {
 }
 
 void vrpn_Connection::callHandlers(const vrpn_HANDLERPARAM& p) {
-  // Also when one throws.
-  struct Call {
-    explicit Call(vrpn_Connection& connection) : of(connection) { ++of.calling_; }
-    ~Call() {
-      if (--of.calling_ == 0) std::erase_if(of.handlers_, [](const Handler& h) { return !h.function; });
+  const Call call(*this);
+  for (const vrpn_int32 type : {vrpn_ANY_TYPE, p.type}) {  // VRPN's order
+    for (std::size_t i = 0; i < handlers_.size(); ++i) {
+      const Handler h = handlers_[i];  // a copy: handlers may register others
+      const bool wanted =
+          h.function && h.type == type && (h.sender == p.sender || h.sender == vrpn_ANY_SENDER);
+      if (wanted) h.function(h.userdata, p);
     }
-    vrpn_Connection& of;
-  } const call(*this);
-  for (std::size_t i = 0; i < handlers_.size(); ++i) {
-    const Handler h = handlers_[i];  // a copy: handlers may register others
-    const bool wanted = h.function && (h.type == p.type || h.type == vrpn_ANY_TYPE) &&
-                        (h.sender == p.sender || h.sender == vrpn_ANY_SENDER);
-    if (wanted) h.function(h.userdata, p);
   }
 }
 
@@ -177,7 +226,9 @@ vrpn_int32 vrpn_Connection::register_message_type(const char* name) {
     if (std::strcmp(name, controlTypes()[i]) == 0) return kFirstControlType + static_cast<vrpn_int32>(i);
   }
   try {
-    return served_ ? served_->addType(name).value : link_ ? link_->addType(name).value : -1;
+    const vrpn_int32 type = served_ ? served_->addType(name).value : link_ ? link_->addType(name).value : -1;
+    if (type >= kFirstControlType) throw std::length_error("too many types of messages");
+    return type;
   } catch (const std::logic_error& error) {
     fprintf(stderr, "VRPN: %s\n", error.what());
     return -1;
@@ -221,16 +272,22 @@ int vrpn_Connection::pack_message(vrpn_uint32 len, timeval time, vrpn_int32 type
   try {
     if (served_) {
       served_->send(stamp, {sender}, {type}, payload, reliability);
-      // Remote devices in the server's own program hear it, too.
-      callHandlers({type, sender, time, static_cast<vrpn_int32>(len), buffer});
     } else {
       link_->sendRaw(stamp, {sender}, {type}, payload, reliability);
     }
   } catch (const std::exception& error) {
-    fprintf(stderr, "VRPN: %s\n", error.what());
+    printRefusal(error);
     return -1;
   }
+  // Handlers and devices in the program itself hear it, too.
+  callHandlers({type, sender, time, static_cast<vrpn_int32>(len), buffer});
   return 0;
+}
+
+void vrpn_Connection::printRefusal(const std::exception& error) {
+  const bool unconnected = dynamic_cast<const hapticd::ConnectError*>(&error) != nullptr;
+  if (unconnected && std::exchange(refusalPrinted_, true)) return;
+  fprintf(stderr, "VRPN: %s\n", error.what());
 }
 
 int vrpn_Connection::send_pending_reports() {
@@ -287,9 +344,9 @@ bool vrpn_Connection::isUnused() const {
 // The last device was deleted by a handler, which returned into the connection and perhaps into that device:
 // the forces of this client end, and the rest of the connection stays.
 void vrpn_Connection::close() {
-  static auto& closed = *new std::vector<const vrpn_Connection*>;  // so that a checker of leaks finds them
-  closed.push_back(this);
-  forget(this);
+  if (!link_ && !served_) return;  // closed already
+  knownConnections().keep(this);
+  knownConnections().forget(this);
   link_.reset();
   served_.reset();
 }
@@ -301,14 +358,12 @@ vrpn_Connection* vrpn_get_connection_by_name(const char* name, const char* local
   refuseLogs({local_in_logfile, local_out_logfile, remote_in_logfile, remote_out_logfile});
   const char* at = std::strrchr(name, '@');
   const std::string server = at ? at + 1 : name;
-  auto& known = knownConnections();
-  const auto found = known.find(server);
-  vrpn_Connection* connection = found != known.end() && !force_reopen ? found->second : nullptr;
+  vrpn_Connection* connection = force_reopen ? nullptr : knownConnections().find(server);
   if (!connection) {
     const std::unique_ptr<char[]> file(vrpn_copy_file_name(name));
     connection = file ? new vrpn_File_Connection(name) : new vrpn_Connection(server.c_str());
     connection->setAutoDeleteStatus(true);
-    known[server] = connection;
+    knownConnections().add(server, connection);
   }
   connection->addReference();
   return connection;
@@ -317,15 +372,11 @@ vrpn_Connection* vrpn_get_connection_by_name(const char* name, const char* local
 vrpn_Connection* vrpn_create_server_connection(int port, const char* local_in_logfile,
                                                const char* local_out_logfile, const char* NIC_address) {
   refuseLogs({local_in_logfile, local_out_logfile});
-  try {
-    auto* connection = new vrpn_Connection(NIC_address, port);
-    connection->setAutoDeleteStatus(true);
-    connection->addReference();
-    return connection;
-  } catch (const std::exception& error) {
-    fprintf(stderr, "VRPN: %s\n", error.what());
-    return nullptr;
-  }
+  auto connection = std::make_unique<vrpn_Connection>(NIC_address, port);
+  if (!connection->doing_okay()) return nullptr;
+  connection->setAutoDeleteStatus(true);
+  connection->addReference();
+  return connection.release();
 }
 
 vrpn_Connection* vrpn_create_server_connection(const char* name, const char* local_in_logfile,
@@ -346,8 +397,7 @@ vrpn_ConnectionManager& vrpn_ConnectionManager::instance() {
 }
 
 vrpn_Connection* vrpn_ConnectionManager::getByName(const char* name) {
-  const auto found = knownConnections().find(name);
-  return found == knownConnections().end() ? nullptr : found->second;
+  return knownConnections().find(name);
 }
 
 char* vrpn_copy_service_name(const char* name) {

@@ -1,7 +1,9 @@
 #include "hapticd/vrpn/vrpn_FileConnection.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <limits>
 #include <map>
 #include <memory>
 
@@ -87,7 +89,10 @@ int vrpn_File_Connection::mainloop(const timeval* timeout) {
   if (lastPlayed_.tv_sec == 0) lastPlayed_ = now;
   const timeval passed = vrpn_TimevalDiff(now, lastPlayed_);
   lastPlayed_ = now;
-  const timeval until = vrpn_TimevalSum(position_, vrpn_TimevalScale(passed, static_cast<double>(rate_)));
+  const double due_us = 1000 * vrpn_TimevalMsecs(passed) * static_cast<double>(rate_) + rest_us_;
+  const double whole_us = std::floor(due_us);
+  rest_us_ = static_cast<float>(due_us - whole_us);
+  const timeval until = vrpn_TimevalSum(position_, vrpn_MsecsTimeval(whole_us / 1000));
   for (vrpn_uint32 played = 0; playone_to_filetime(until) == 0;) {
     if (++played == most_) return 0;
   }
@@ -144,7 +149,7 @@ int vrpn_File_Connection::jump_to_time(vrpn_float64 seconds) {
 }
 
 void vrpn_File_Connection::set_replay_rate(vrpn_float32 rate) {
-  rate_ = std::max(rate, 0.0F);
+  rate_ = std::fmin(std::fmax(rate, 0.0F), std::numeric_limits<float>::max());
 }
 
 int vrpn_File_Connection::reset() {

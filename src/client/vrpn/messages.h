@@ -2,12 +2,10 @@
 #pragma once
 
 #include <algorithm>
-#include <cstdio>
 #include <exception>
 #include <vector>
 
 #include "client/link.h"
-#include "hapticd/error.h"
 #include "hapticd/vrpn/vrpn_Connection.h"
 #include "wire/codec.h"
 
@@ -34,7 +32,7 @@ void sendMessage(vrpn_Connection* connection, vrpn_int32 sender, const M& messag
     payload.resize(wire::payloadSize(message));
     writePayload(message, payload.data());
   } catch (const std::exception& error) {  // of the network, or a message that is too long
-    std::fprintf(stderr, "VRPN: %s\n", error.what());
+    connection->printRefusal(error);
     return;
   }
   connection->pack_message(

@@ -1,8 +1,10 @@
 #include "hapticd/vrpn/vrpn_Shared.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 
 #include "base/world.h"
 
@@ -10,11 +12,20 @@ namespace {
 
 constexpr std::int64_t kMillion = 1000000;
 
+// Longer times are taken for this one, some 73,000 years, so that sums of two do not overflow.
+constexpr std::int64_t kMost_us = std::numeric_limits<std::int64_t>::max() / 4;
+
 std::int64_t microseconds(const timeval& t) {
-  return t.tv_sec * kMillion + t.tv_usec;
+  const auto limited = [](std::int64_t value, std::int64_t most) { return std::clamp(value, -most, most); };
+  return limited(t.tv_sec, kMost_us / kMillion) * kMillion + limited(t.tv_usec, kMost_us);
 }
 timeval fromMicroseconds(std::int64_t us) {
   return {us / kMillion, us % kMillion};
+}
+timeval fromMicroseconds(double us) {
+  constexpr auto kMost = static_cast<double>(kMost_us);
+  return std::isnan(us) ? timeval{}
+                        : fromMicroseconds(std::int64_t{std::llround(std::clamp(us, -kMost, kMost))});
 }
 
 }  // namespace
@@ -29,7 +40,7 @@ timeval vrpn_TimevalDiff(const timeval& a, const timeval& b) {
   return fromMicroseconds(microseconds(a) - microseconds(b));
 }
 timeval vrpn_TimevalScale(const timeval& t, double factor) {
-  return fromMicroseconds(std::llround(static_cast<double>(microseconds(t)) * factor));
+  return fromMicroseconds(static_cast<double>(microseconds(t)) * factor);
 }
 unsigned long vrpn_TimevalDuration(timeval end, timeval start) {
   return static_cast<unsigned long>(microseconds(end) - microseconds(start));
@@ -47,10 +58,10 @@ double vrpn_TimevalMsecs(const timeval& t) {
   return static_cast<double>(microseconds(t)) / 1000;
 }
 timeval vrpn_MsecsTimeval(const double ms) {
-  return fromMicroseconds(std::llround(ms * 1000));
+  return fromMicroseconds(ms * 1000);
 }
 void vrpn_SleepMsecs(double ms) {
-  hapticd::base::sleepFor(hapticd::base::toNanos(ms * 1e-3));
+  hapticd::base::sleepFor(hapticd::base::toNanos(std::fmin(std::fmax(ms * 1e-3, 0), 1e9)));
 }
 
 int vrpn_buffer(char** insert, vrpn_int32* left, const timeval t) {

@@ -26,8 +26,10 @@ constexpr double kLongestAge_s = 0.2;  // a surface moves on no longer than this
 constexpr double kLateral = 0.5;       // share of the stiffness that holds a sticking point
 constexpr double kStick = 0.9;         // of the dynamic bound: sliding ends below it
 constexpr double kUnlimited_J = 1e9;
-constexpr double kLent_J = 2e-4;        // to the springs of friction, at the first touch
-constexpr double kSlow_m_per_s = 0.01;  // below it the damping coefficient may change as at this speed
+constexpr double kLent_J = 2e-4;         // to the springs of friction, at the first touch
+constexpr double kSlow_m_per_s = 0.01;   // below it the damping coefficient may change as at this speed
+constexpr double kRests_m_per_s = 2e-3;  // a surface that is slower does no work to speak of
+constexpr double kSamePlace_m = 1e-12;   // rounding of a surface that is stated again
 
 // The shortest rotation between unit vectors; for opposite ones half a turn about any axis across.
 Vec3 rotationVector(const Vec3& from, const Vec3& to) noexcept {
@@ -87,6 +89,7 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
     hand_m_ = hand.position_m;
     frictionEnergy_J_ = kLent_J;
     force_N_.setZero();
+    rest_ = true;
     return force_N_;
   }
   fadeOut(now, step_s);
@@ -104,6 +107,7 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
     correcting = correcting || (!slot.fading && !isCorrected(slot));
   }
   const bool fading = resumed || leaving > 0;
+  rest_ = !fading && !correcting && hand.sceneForce_N.isZero(0);
   const double budget_N = (fading         ? kBesideFade_N_per_s
                            : changing > 1 ? kShared_N_per_s
                                           : kCorrection_N_per_s) *
@@ -124,7 +128,9 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
   hand_m_ = hand.position_m;
   frictionEnergy_J_ = frictionNow_J_;
   for (const Slot& slot : inUse()) {
-    if (!slot.used || slot.normal_N <= 0 || out.count == kMaxRemoteContacts) continue;
+    if (!slot.used || slot.normal_N <= 0) continue;
+    rest_ = rest_ && slot.velocity.norm() <= kRests_m_per_s;
+    if (out.count == kMaxRemoteContacts) continue;
     out.contacts[out.count++] = {
         slot.contact.id, (hand.position_m + slot.depth_m * slot.normal).cast<float>(),
         (slot.normal_N * slot.normal + slot.friction_N).cast<float>(), static_cast<float>(slot.depth_m)};
@@ -132,6 +138,29 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
   if (held_) out.status |= kRemoteCorrectionsHeld;
   out.contactForce_N = force - late_N_;
   return out.contactForce_N;
+}
+
+// Shared as the normal force is; what the shares store has that force as its gradient.
+RemoteSprings RemoteContacts::springs() const noexcept {
+  RemoteSprings out;
+  out.rest = rest_;
+  PressingContacts pressing;
+  for (const Slot& slot : slots_) {
+    if (!slot.used || slot.depth_m <= 0) continue;
+    const double stiffness = slot.contact.stiffness_N_per_m;
+    pressing.add(slot.normal, stiffness, slot.gain * stiffness * slot.depth_m, slot.normal_N);
+    out.stiffest_N_per_m = std::max(out.stiffest_N_per_m, stiffness);
+    if (slot.normal_N <= 0) continue;
+    out.force_N += slot.friction_N;
+    out.stored_J += 0.5 * slot.friction_N.dot(slot.anchor_m - hand_m_);
+  }
+  shareNormalForce(pressing);
+  for (std::size_t i = 0; i < pressing.count; ++i) {
+    out.normal_N += pressing.share_N[i] * Vec3(pressing.x[i], pressing.y[i], pressing.z[i]);
+    out.stored_J += 0.5 * pressing.share_N[i] * pressing.depth_m[i];
+  }
+  out.force_N += out.normal_N;
+  return out;
 }
 
 // Changes and solves.
@@ -278,6 +307,7 @@ void RemoteContacts::replace(Slot& slot, const RemoteContact& contact, const Rem
     slot.shift_m = std::min(0.0, -slot.depth_m);
   } else {
     slot.shift_m = spring_N / contact.stiffness_N_per_m - slot.depth_m;
+    if (std::abs(slot.shift_m) < kSamePlace_m) slot.shift_m = 0;
     // The same friction from a softer spring holds more energy.
     const double softer = stiffness / contact.stiffness_N_per_m;
     const Vec3 apart_m = slot.anchor_m - hand.position_m;

@@ -22,12 +22,23 @@ struct RemoteHand {
       Vec3::Zero();  ///< normal force of meshes and planes: remote contacts add what is missing
 };
 
+/// The springs of remote contacts in one tick, without their dampers. All zero while nothing is touched.
+struct RemoteSprings {
+  bool rest = true;  ///< no touched surface moves, changes or fades
+  Vec3 force_N = Vec3::Zero();
+  Vec3 normal_N = Vec3::Zero();  ///< the part without friction
+  double stored_J = 0;
+  double stiffest_N_per_m = 0;
+};
+
 /// One per servo, called in its thread: noexcept, no allocation.
 class RemoteContacts {
  public:
   /// One tick. Returns the force on the hand; `out` gets the contacts that exert it.
   Vec3 step(const RemoteContactSet& newest, const RemoteHand& hand, Nanos now, double step_s,
             RemoteRendering& out) noexcept;
+  /// Of the last tick.
+  RemoteSprings springs() const noexcept;
   /// Forgets all contacts at once.
   void reset() noexcept;
   /// The hand may be anywhere: the same, and what was stated up to the set `number` does not count any more.
@@ -117,6 +128,7 @@ class RemoteContacts {
   double frictionNow_J_ = 0;     // at this one
   EnergyTank corrections_{EnergyBudget{}};
   bool held_ = false;  // a correction waited for energy in this tick
+  bool rest_ = true;   // no touched surface moved or changed in this tick, and no mesh or plane was touched
 };
 
 }  // namespace hapticd::realtime

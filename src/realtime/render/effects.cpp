@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/time.h"
+#include "realtime/render/placed_planes.h"
 #include "realtime/render/release.h"
 
 namespace hapticd::realtime {
@@ -99,6 +100,17 @@ Effects::Running* Effects::running(const Effect& effect, Nanos now, const Vec3& 
   return &fresh;
 }
 
+// A surface that rubs belongs to the world; a view that jumps leaves it to the hand.
+void Effects::moveWithView(const scene::Workspace& view, const Vec3& proxy) noexcept {
+  const Affine T_world_before = std::exchange(T_world_device_, view.T_world_device);
+  if (T_world_before.matrix() == T_world_device_.matrix()) return;
+  if ((view.T_device_world * (T_world_before * proxy) - proxy).norm() > kLongestMotion_m) return;
+  for (int i = 0; i < count_; ++i) {
+    Vec3& anchor = running_[static_cast<std::size_t>(i)].anchor;
+    anchor = view.T_device_world * (T_world_before * anchor);
+  }
+}
+
 void Effects::forgetUnseen() noexcept {
   const auto last = running_.begin() + count_;
   const auto end = std::remove_if(running_.begin(), last, [](const Running& r) { return !r.seen; });
@@ -131,6 +143,7 @@ Vec3 Effects::forceOf(const Effect& effect, Running& r, const Affine& T_device_w
 
 Vec3 Effects::force(const scene::SceneSnapshot& scene, const device::DeviceState& device,
                     const Rendering& contact, double pressed_N, Nanos now) noexcept {
+  moveWithView(scene.workspace, contact.proxy_m);
   const bool anew = std::exchange(anew_, false);
   for (int i = 0; i < count_; ++i) {
     Running& running = running_[static_cast<std::size_t>(i)];

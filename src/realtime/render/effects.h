@@ -47,8 +47,8 @@ class Effects {
     std::int32_t index = 0;
     std::uint32_t start = 0;
     Nanos begin = 0;
-    Nanos releaseBegin = -1;  ///< -1: not releasing
-    Vec3 anchor = Vec3::Zero();
+    Nanos releaseBegin = -1;     ///< -1: not releasing
+    Vec3 anchor = Vec3::Zero();  ///< of a friction effect, device frame
     bool seen = false;
     Phase phase;
     double frictionGain = 0;  ///< of the last tick; 0: it did not rub
@@ -64,10 +64,12 @@ class Effects {
   static Vec3 forceOf(const scene::Effect& effect, Running& r, const Affine& T_device_world,
                       const device::DeviceState& device, const Rendering& contact, Nanos now) noexcept;
   Running* running(const scene::Effect& effect, Nanos now, const Vec3& proxy) noexcept;
+  void moveWithView(const scene::Workspace& view, const Vec3& proxy) noexcept;
   void forgetUnseen() noexcept;
 
   bool contactVibrationPulls_;
   bool anew_ = false;
+  Affine T_world_device_ = Affine::Identity();  // of the last tick
   std::array<Running, kMaxEffects> running_;
   int count_ = 0;
 };

@@ -7,8 +7,9 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr int kMostFaces = 1024;  // at a corner, in one tick
-constexpr double kSharp = 0.7;    // cosine of 45 degrees: sharper edges stay edges
+constexpr int kMostFaces = 1024;     // at a corner, in one tick
+constexpr double kSharp = 0.7;       // cosine of 45 degrees: sharper edges stay edges
+constexpr double kFades_rad = 0.39;  // half of that: between two faces of a sharp edge, the normal as it is
 
 // Mean normal of the faces that meet at a corner and continue smoothly from the touched one, whose normal is
 // `face`. Corners are identified by position, so that unwelded meshes work.
@@ -35,25 +36,99 @@ Vec3 cornerNormal(const PlacedObject& object, const Vec3& face, const Vec3& corn
   return sum;
 }
 
-}  // namespace
-
-Vec3 shadedNormal(const PlacedObject& object, std::uint32_t triangle, Nanos now, const Vec3& normal,
-                  const Vec3& at) noexcept {
+// The mean normal of the corners of a face, with the weights of a place on it.
+Vec3 interpolatedNormal(const PlacedObject& object, std::uint32_t triangle, const Vec3& face,
+                        const Vec3& place, Nanos now) {
   const scene::Corners k = object.state->mesh->corners(triangle, now);
-  Facet f;
-  if (!makeFacet(object.corners(triangle, now), object.skin, f)) return normal;
-  const double side = f.normal.dot(normal) < 0 ? -1 : 1;
   geometry::Mat3 frame;
   frame << k.b - k.a, k.c - k.a, (k.b - k.a).cross(k.c - k.a);
-  const Vec3 local = frame.inverse() * (object.T_object_device * nearestPointOf(f, at) - k.a);
+  const Vec3 local = frame.inverse() * (object.T_object_device * place - k.a);
   const double b = std::clamp(local.x(), 0.0, 1.0);
   const double c = std::clamp(local.y(), 0.0, 1.0 - b);
   const std::array<std::pair<Vec3, double>, 3> corners{{{k.a, 1 - b - c}, {k.b, b}, {k.c, c}}};
   Vec3 sum = Vec3::Zero();
   for (const auto& [corner, weight] : corners) {
-    sum += weight * cornerNormal(object, f.normal, corner, now).stableNormalized();
+    sum += weight * cornerNormal(object, face, corner, now).stableNormalized();
   }
-  const Vec3 shaded = side * sum.stableNormalized();
+  return sum.stableNormalized();
+}
+
+// The faces that meet at an edge or a corner.
+struct MeetingFaces {
+  static constexpr std::size_t kMost = 32;
+  std::array<Vec3, kMost> normals;
+  std::array<std::uint32_t, kMost> triangles{};
+  std::size_t count = 0;
+
+  MeetingFaces(const PlacedObject& object, const Vec3& place, Nanos now) {
+    const double near_m = 4 * object.skin;
+    int visits = 0;
+    object.state->mesh->index.visitNear(object.T_object_device * place,
+                                        near_m * object.T_object_device.linear().norm(),
+                                        [&](std::uint32_t t) noexcept -> bool {
+                                          if (++visits > kMostFaces || count == kMost) return false;
+                                          Facet f;
+                                          if (!makeFacet(object.corners(t, now), object.skin, f)) return true;
+                                          if ((nearestPointOf(f, place) - place).norm() > near_m) return true;
+                                          normals[count] = f.normal;
+                                          triangles[count++] = t;
+                                          return true;
+                                        });
+  }
+  // The one that lies most across this direction, seen from either side.
+  std::size_t across(const Vec3& direction) const {
+    const auto less = [&](const Vec3& a, const Vec3& b) {
+      return std::abs(a.dot(direction)) < std::abs(b.dot(direction));
+    };
+    const auto end = normals.begin() + static_cast<std::ptrdiff_t>(count);
+    return static_cast<std::size_t>(std::max_element(normals.begin(), end, less) - normals.begin());
+  }
+  // The direction nearest to `normal` that a mixture of the normals of this face and those that continue it
+  // smoothly has: least squares with weights that are not negative, one weight after the other.
+  Vec3 mixtureNearestTo(const Vec3& normal, std::size_t face) const {
+    constexpr int kSweeps = 32;
+    std::array<double, kMost> weights{};
+    Vec3 rest = normal;
+    for (int sweep = 0; sweep < kSweeps; ++sweep) {
+      for (std::size_t i = 0; i < count; ++i) {
+        if (normals[i].dot(normals[face]) < kSharp) continue;
+        const double weight = std::max(0.0, weights[i] + normals[i].dot(rest));
+        rest -= (weight - weights[i]) * normals[i];
+        weights[i] = weight;
+      }
+    }
+    return (normal - rest).stableNormalized();
+  }
+};
+
+// The normal of a ball at an edge or a corner is between those of the faces. At a smooth edge, the shaded
+// normal takes its place. At a sharp one it is turned by what shading turns the nearest of the smooth
+// normals, and by less the farther it is from them: in the middle of the edge, by nothing.
+Vec3 shadedAtEdge(const PlacedObject& object, const Vec3& normal, const Vec3& place, Nanos now) {
+  const MeetingFaces faces(object, place, now);
+  if (faces.count == 0) return normal;
+  const std::size_t face = faces.across(normal);
+  const double side = faces.normals[face].dot(normal) < 0 ? -1 : 1;
+  const Vec3 shaded =
+      side * interpolatedNormal(object, faces.triangles[face], faces.normals[face], place, now);
+  const Vec3 smooth = side * faces.mixtureNearestTo(side * normal, face);
+  const double apart_rad = std::acos(std::clamp(smooth.dot(normal), -1.0, 1.0));
+  const double share = std::max(0.0, 1 - apart_rad / kFades_rad);
+  return geometry::Quat::Identity().slerp(share, geometry::Quat::FromTwoVectors(smooth, shaded)) * normal;
+}
+
+}  // namespace
+
+Vec3 shadedNormal(const PlacedObject& object, std::uint32_t triangle, Nanos now, const Vec3& normal,
+                  const Vec3& at) noexcept {
+  Facet f;
+  if (!makeFacet(object.corners(triangle, now), object.skin, f)) return normal;
+  const Vec3 place = nearestPointOf(f, at);
+  const double along = f.normal.dot(normal);
+  const bool onFace = std::abs(along) > 1 - 1e-12;
+  const Vec3 shaded =
+      onFace ? Vec3(std::copysign(1, along) * interpolatedNormal(object, triangle, f.normal, place, now))
+             : shadedAtEdge(object, normal, place, now);
   return shaded.dot(normal) > 0 ? shaded : normal;
 }
 

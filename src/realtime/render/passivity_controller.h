@@ -42,6 +42,8 @@ class PassivityController {
   explicit PassivityController(double bareDamping_Ns_per_m) noexcept
       : bareDamping_Ns_per_m_(bareDamping_Ns_per_m) {}
 
+  /// False where step() has nothing to do.
+  bool helps() const noexcept { return std::isfinite(bareDamping_Ns_per_m_); }
   /// Ends the account.
   void reset() noexcept { open_ = false; }
   /// Begins one in free space.
@@ -53,7 +55,6 @@ class PassivityController {
   Vec3 step(const SpringState& spring, const Vec3& hip_m, double period_s) noexcept;
 
  private:
-  bool helps() const noexcept { return std::isfinite(bareDamping_Ns_per_m_); }
   void book(const SpringState& spring, const Vec3& move) noexcept;
   Vec3 brakeFor(const SpringState& spring, const Vec3& move) const noexcept;
 

@@ -48,16 +48,16 @@ PlacedPlanes::Memory& PlacedPlanes::memoryOf(const scene::Plane& plane, Nanos no
 }
 
 // Height of the surface above the plane itself, metres.
-double PlacedPlanes::heightOf(const scene::Plane& plane, const Memory& memory, Nanos now, const Vec3& normal,
-                              const Vec3& proxy, double metresPerUnit) noexcept {
+double PlacedPlanes::heightOf(const scene::Plane& plane, const Memory& memory, Nanos now,
+                              double metresPerUnit) const noexcept {
   const double age = base::toSeconds(now - memory.placed);
   const double recovery = std::max(base::toSeconds(plane.recovery), memory.depth_m / kFastest_m_per_s);
   double height = 0;
   if (age < recovery) height -= memory.depth_m * (1 - age / recovery);
   if (plane.textureWavelength > 0) {
     // The first contact becomes the centre of the texture, so the HIP always meets a crest.
-    const Vec3 offset = memory.touched ? Vec3(proxy - memory.firstContact) : Vec3(Vec3::Zero());
-    const double r = (offset - normal * normal.dot(offset)).norm() / metresPerUnit;
+    const Vec3 offset = memory.touched ? Vec3(proxy_ - memory.firstContact) : Vec3(Vec3::Zero());
+    const double r = (offset - plane.normal * plane.normal.dot(offset)).norm();
     height += metresPerUnit * plane.textureAmplitude * std::cos(kTau * r / plane.textureWavelength);
   }
   height += metresPerUnit * plane.buzzAmplitude * std::sin(plane.buzzAngularFrequency_rad_per_s * age);
@@ -91,9 +91,9 @@ bool PlacedPlanes::changes(const scene::SceneSnapshot& scene) const noexcept {
          std::any_of(memory_.begin(), end, isGone);
 }
 
-void PlacedPlanes::place(const scene::SceneSnapshot& scene, Nanos now, const Vec3& hip, const Vec3& proxy,
-                         double toolRadius_m, double radius_m, bool viewMoved) noexcept {
-  const geometry::Affine& T_world_device = scene.workspace.T_world_device;
+void PlacedPlanes::place(const scene::SceneSnapshot& scene, Nanos now, const Vec3& hip, double toolRadius_m,
+                         double radius_m, bool viewMoved) noexcept {
+  T_world_device_ = scene.workspace.T_world_device;
   changed_ = changes(scene);
   forgetAllExcept(scene);
   count_ = 0;
@@ -106,19 +106,18 @@ void PlacedPlanes::place(const scene::SceneSnapshot& scene, Nanos now, const Vec
     placed.state = &plane;
     placed.facet.object = -1 - count_;
     placed.facet.radius = radius_m;
-    if (placeOne(T_world_device, now, hip, proxy, toolRadius_m, placed)) ++count_;
+    if (placeOne(now, hip, toolRadius_m, placed)) ++count_;
   }
   anew_ = false;
 }
 
-bool PlacedPlanes::placeOne(const geometry::Affine& T_world_device, Nanos now, const Vec3& hip,
-                            const Vec3& proxy, double toolRadius_m, PlacedPlane& placed) noexcept {
+bool PlacedPlanes::placeOne(Nanos now, const Vec3& hip, double toolRadius_m, PlacedPlane& placed) noexcept {
   const scene::Plane& plane = *placed.state;
-  const Vec3 slope = T_world_device.linear().transpose() * plane.normal;  // world units per metre
+  const Vec3 slope = T_world_device_.linear().transpose() * plane.normal;  // world units per metre
   const double unitsPerMetre = slope.norm();
   if (!(unitsPerMetre > 0) || !std::isfinite(unitsPerMetre)) return false;
   const Vec3 normal = slope / unitsPerMetre;
-  const double hipHeight = (plane.normal.dot(T_world_device * hip) + plane.offset) / unitsPerMetre;
+  const double hipHeight = (plane.normal.dot(T_world_device_ * hip) + plane.offset) / unitsPerMetre;
   bool fresh = false;
   const double depth_m = toolRadius_m - hipHeight;
   Memory& memory = memoryOf(plane, now, depth_m, fresh);
@@ -138,11 +137,11 @@ bool PlacedPlanes::placeOne(const geometry::Affine& T_world_device, Nanos now, c
   if (left == 0 || memory.leftOut) return false;
   placed.share = left;
   placed.surface.damping_Ns_per_m *= left;
-  const double whole = heightOf(plane, memory, now, normal, proxy, 1 / unitsPerMetre);
+  const double whole = heightOf(plane, memory, now, 1 / unitsPerMetre);
   // It sinks instead of becoming softer, so that what is below it holds the hand in time.
   memory.under_m = left * std::max(0.0, depth_m + whole);
   const double raised = left == 1 ? whole : std::min(whole, memory.under_m - depth_m);
-  placed.rests = !fresh && left == 1 && raised == std::exchange(memory.raised_m, raised);
+  placed.rests = !fresh && !viewMoved_ && left == 1 && raised == std::exchange(memory.raised_m, raised);
   placed.facet.unbounded = true;
   placed.facet.normal = normal;
   placed.facet.a = hip - normal * (hipHeight - raised);
@@ -151,12 +150,13 @@ bool PlacedPlanes::placeOne(const geometry::Affine& T_world_device, Nanos now, c
 }
 
 void PlacedPlanes::remember(unsigned touched, const Vec3& proxy) noexcept {
+  proxy_ = T_world_device_ * proxy;
   for (int i = 0; i < count_; ++i) {
     for (int k = 0; k < memoryCount_; ++k) {
       Memory& memory = memory_[static_cast<std::size_t>(k)];
       if (memory.index != (*this)[i].state->index) continue;
       const bool now = (touched >> i & 1U) != 0;
-      if (now && !memory.touched) memory.firstContact = proxy;
+      if (now && !memory.touched) memory.firstContact = proxy_;
       memory.adheres = now || memory.adheres;
       // A hand that leaves a trough meets no crest in its place.
       memory.touched = now || memory.adheres || (memory.touched && memory.belowCrest);

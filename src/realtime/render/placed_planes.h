@@ -32,11 +32,11 @@ struct PlacedPlane {
 /// All planes, with their state from tick to tick. Servo thread: noexcept, no allocation.
 class PlacedPlanes {
  public:
-  /// Starts a tick: places the planes of `scene`. `hip` and `proxy` in device metres;
-  /// `radius_m` is that of the ball that touches the planes. `viewMoved`: the workspace changed.
-  void place(const scene::SceneSnapshot& scene, Nanos now, const Vec3& hip, const Vec3& proxy,
-             double toolRadius_m, double radius_m, bool viewMoved) noexcept;
-  /// Ends a tick: bit i of `touched` is set when plane i holds the proxy.
+  /// Starts a tick: places the planes of `scene`. `hip` in device metres; `radius_m` is that of the ball that
+  /// touches the planes. `viewMoved`: the workspace changed.
+  void place(const scene::SceneSnapshot& scene, Nanos now, const Vec3& hip, double toolRadius_m,
+             double radius_m, bool viewMoved) noexcept;
+  /// Ends a tick: bit i of `touched` is set when plane i holds the proxy, in device metres.
   void remember(unsigned touched, const Vec3& proxy) noexcept;
   /// The hand may be anywhere: planes that are above it in the next tick are left out until it has left them.
   void restart() noexcept { anew_ = true; }
@@ -76,17 +76,16 @@ class PlacedPlanes {
     bool belowCrest = false;         ///< the HIP is below the crests of the texture
     bool touched = false;            ///< and the tool has not left it since
     bool adheres = false;
-    bool leftOut = false;  ///< the hand was found below it, and did not leave it yet
-    Vec3 firstContact = Vec3::Zero();
+    bool leftOut = false;              ///< the hand was found below it, and did not leave it yet
+    Vec3 firstContact = Vec3::Zero();  ///< world frame
   };
 
   Memory& memoryOf(const scene::Plane& plane, Nanos now, double depth_m, bool& fresh) noexcept;
   void forgetAllExcept(const scene::SceneSnapshot& scene) noexcept;
   bool changes(const scene::SceneSnapshot& scene) const noexcept;
-  bool placeOne(const geometry::Affine& T_world_device, Nanos now, const Vec3& hip, const Vec3& proxy,
-                double toolRadius_m, PlacedPlane& placed) noexcept;
-  static double heightOf(const scene::Plane& plane, const Memory& memory, Nanos now, const Vec3& normal,
-                         const Vec3& proxy, double metresPerUnit) noexcept;
+  bool placeOne(Nanos now, const Vec3& hip, double toolRadius_m, PlacedPlane& placed) noexcept;
+  double heightOf(const scene::Plane& plane, const Memory& memory, Nanos now,
+                  double metresPerUnit) const noexcept;
 
   std::array<PlacedPlane, scene::kMaxPlanes> planes_;
   int count_ = 0;
@@ -95,6 +94,8 @@ class PlacedPlanes {
   bool changed_ = false;
   bool anew_ = false;
   bool viewMoved_ = false;
+  geometry::Affine T_world_device_ = geometry::Affine::Identity();
+  Vec3 proxy_ = Vec3::Zero();  // at the end of the last tick, world frame
   bool leavesOut_ = false;
 };
 

@@ -54,7 +54,7 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   casts_ = 0;
   search_.visits = 0;
   if (!started_) startAt(now, hip);
-  planes_.place(*now.scene, now.time, hip, position_, toolRadius_, query_.radius(), viewMoved());
+  planes_.place(*now.scene, now.time, hip, toolRadius_, query_.radius(), viewMoved());
   query_.beginTick(now, before_, position_, &planes_);
   const bool wasFree = contactSet_.count == 0;
   const BlendedSpring springBefore = contactSet_.spring;
@@ -171,19 +171,7 @@ void Proxy::advanceSlide(double slip_m) noexcept {
 // left. The slope of the stiffness pushes the proxy, too: what it holds, friction need not.
 void Proxy::updateProxy(const Vec3& hip) noexcept {
   ActiveSet active;
-  if (frictionless()) {
-    const bool turned = moveFrictionless(hip, active);
-    // The casts ended on the way, perhaps before any found a face at the place where the proxy is now.
-    if (casts_ >= kMaxCasts && !turned) {
-      Vec3 goal;
-      active.count = 0;
-      approach(hip, true, active, goal);
-    }
-    if (active.count == 0) restoreConstraints(hip, active);
-    updateContactSet(hip, position_, active);
-    slide_ = Slide{};
-    return;
-  }
+  if (frictionless()) return updateWithoutFriction(hip, active);
   const bool displaced = wasHeld_ && (position_ != positionBefore_ || surfacesInContactMove());
   findConstraints(hip, active);
   if (liftOut(active)) findConstraints(hip, active);
@@ -193,6 +181,8 @@ void Proxy::updateProxy(const Vec3& hip) noexcept {
     return;
   }
   if (displaced && slideInMovingGroove(hip, active)) return;
+  // Friction of what is near, and not touched, holds nothing.
+  if (frictionConeOf(contactSet_) == 0) return updateWithoutFriction(hip, active);
   const Vec3 held = heldBySlope();
   const Vec3 borne = contactSet_.lateral_m - held;
   const double lateral = borne.norm();
@@ -209,10 +199,44 @@ void Proxy::updateProxy(const Vec3& hip) noexcept {
   const bool wasSliding = std::exchange(slide_.active, true);
   contactSet_.staticShare = slidingShare();
   slide_.active = wasSliding;
-  moveFrictionless(hip + held + slide_.direction * frictionConeOf(contactSet_), active);
-  findConstraints(hip, active);
+  slideTo(hip + held + slide_.direction * frictionConeOf(contactSet_), hip, active);
   advanceSlide((position_ - start).norm());
   contactSet_.staticShare = slidingShare();
+}
+
+// Where the stiffness changes, the slope at the new place may be another one, and push the proxy back in the
+// next tick, and so on. A slide must not fill the spring: the way is halved until it does not.
+void Proxy::slideTo(const Vec3& target, const Vec3& hip, ActiveSet& active) noexcept {
+  constexpr double kShortest = 1.0 / 32;
+  const Vec3 start = position_;
+  const double stored_J = storedInSpring();
+  const bool even = contactSet_.spring.slope_N.isZero(0);
+  const Vec3 back = hip + contactSet_.lateral_m - target;
+  for (double share = 1; share >= kShortest; share *= 0.5) {
+    moveFrictionless(target + (1 - share) * back, active);
+    findConstraints(hip, active);
+    if ((even && contactSet_.spring.slope_N.isZero(0)) || storedInSpring() <= stored_J) return;
+    position_ = start;
+  }
+  findConstraints(hip, active);
+}
+
+double Proxy::storedInSpring() const noexcept {
+  return 0.5 * contactSet_.spring.kappa_N_per_m *
+         (contactSet_.normal_m + contactSet_.lateral_m).squaredNorm();
+}
+
+void Proxy::updateWithoutFriction(const Vec3& hip, ActiveSet& active) noexcept {
+  const bool turned = moveFrictionless(hip, active);
+  // The casts ended on the way, perhaps before any found a face at the place where the proxy is now.
+  if (casts_ >= kMaxCasts && !turned) {
+    Vec3 goal;
+    active.count = 0;
+    approach(hip, true, active, goal);
+  }
+  if (active.count == 0) restoreConstraints(hip, active);
+  updateContactSet(hip, position_, active);
+  slide_ = Slide{};
 }
 
 // Moves as near to the target as the surfaces allow. Each approach starts with an empty active set, so that
@@ -269,8 +293,7 @@ bool Proxy::moveFrictionless(const Vec3& target, ActiveSet& active) noexcept {
     nearest = distance;
     if (toolRadius_ > 0) step = position_ - from;
   }
-  // With friction, the faces are found again in any case.
-  if (casts_ < kMaxCasts || !climbed || !frictionless()) return false;
+  if (casts_ < kMaxCasts || !climbed) return false;
   position_ = turn;
   active = *turnHeld;
   return true;
@@ -422,6 +445,7 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
       const PlacedPlane& plane = planes_[-1 - hit.object];
       constraint.surface = plane.surface;
       constraint.rests = plane.rests;
+      constraint.creeps = creeps((carriedByView(positionBefore_) - positionBefore_) / period_s_, constraint);
       constraint.adhesion_N = plane.share * plane.state->adhesionLateral_N;
     } else {
       const PlacedObject& object = query_.object(hit.object);

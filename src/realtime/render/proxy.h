@@ -172,6 +172,7 @@ class Proxy {
   bool isJump(const PlacedObject& object) const noexcept;
   bool isJump(const PlacedObject& object, std::uint32_t triangle) const noexcept;
   bool viewMoved() const noexcept;
+  Vec3 carriedByView(const Vec3& p) const noexcept;
   bool contactChangedByCommand() const noexcept;
   bool neighboursChangedByCommand(const BlendedSpring& before) const noexcept;
   bool surfacesNearChanged() const noexcept;
@@ -179,13 +180,18 @@ class Proxy {
   void addTouchedWithNewTriangles() noexcept;
   bool liftOutOfNewTriangles() noexcept;
   bool liftOutOf(int object, std::uint64_t changed, EnclosureBudget& budget) noexcept;
+  bool liftOutOf(int object, std::uint64_t changed, const Vec3& way, bool pressed,
+                 EnclosureBudget& budget) noexcept;
   bool isBelowOpen(int object, const Vec3& out, Vec3& lifted) noexcept;
-  Vec3 pressOf(std::int32_t object) const noexcept;
+  Vec3 pressOf(const PlacedObject& object) const noexcept;
   void releaseByJump(const PlacedObject& object, std::uint32_t& status) noexcept;
   void takenByJump(const PlacedObject& object) noexcept;
   bool returnFromJump() noexcept;
   static double missedMove(const PlacedObject& object) noexcept;
   void updateProxy(const Vec3& hip) noexcept;
+  void updateWithoutFriction(const Vec3& hip, ActiveSet& active) noexcept;
+  void slideTo(const Vec3& target, const Vec3& hip, ActiveSet& active) noexcept;
+  double storedInSpring() const noexcept;
   bool moveFrictionless(const Vec3& target, ActiveSet& active) noexcept;
   bool approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Vec3& goal) noexcept;
   bool liftOut(const ActiveSet& active) noexcept;

@@ -57,6 +57,13 @@ bool Proxy::viewMoved() const noexcept {
          now_.scene->workspace.T_device_world.matrix() != before_.scene->workspace.T_device_world.matrix();
 }
 
+// Planes move with the view alone; one that jumps leaves them to the hand.
+Vec3 Proxy::carriedByView(const Vec3& p) const noexcept {
+  if (!viewMoved()) return p;
+  const Vec3 carried = now_.scene->workspace.T_device_world * (before_.scene->workspace.T_world_device * p);
+  return (carried - p).norm() <= kLongestMotion_m ? carried : p;
+}
+
 // The hand did not cause such a change of the force.
 bool Proxy::contactChangedByCommand() const noexcept {
   if (now_.scene == before_.scene) return false;
@@ -171,7 +178,7 @@ void Proxy::carry(const Vec3& hip, std::uint32_t& status) noexcept {
     chooseCarrier();
     const int touched = query_.addObject(touchedObject_);
     if (touchedObject_ < 0) {
-      // Planes do not move along themselves.
+      position_ = carriedByView(position_);
     } else if (touched < 0) {
       status |= kRenderGeometryJump;
     } else {
@@ -223,16 +230,17 @@ void Proxy::addTouchedWithNewTriangles() noexcept {
   }
 }
 
-// New triangles may rise a little above a proxy that was outside, also those beside the touched ones. True
-// when it moved.
+// New triangles may rise a little above a proxy that was outside, also those beside the touched ones, and
+// those of an object in the place of another one. True when it moved.
 bool Proxy::liftOutOfNewTriangles() noexcept {
   std::uint64_t changed = 0;
   for (int i = 0; i < query_.objectCount(); ++i) {
     const PlacedObject& object = query_.object(i);
-    if (!object.jumped || object.before == nullptr) continue;
-    const std::int32_t id = object.state->id;
-    const bool inPlace = object.before->motion.jumps() == object.state->motion.jumps();
-    if (!pressOf(id).isZero(0) || (inPlace && !query_.isLeftOut(id))) changed |= std::uint64_t{1} << i;
+    const bool appeared = object.before == nullptr;
+    if (!appeared && !object.jumped) continue;
+    const bool inPlace = !appeared && object.before->motion.jumps() == object.state->motion.jumps();
+    if (!pressOf(object).isZero(0) || (inPlace && !query_.isLeftOut(object.state->id)))
+      changed |= std::uint64_t{1} << i;
   }
   EnclosureBudget budget;
   bool lifted = false;
@@ -242,28 +250,41 @@ bool Proxy::liftOutOfNewTriangles() noexcept {
   return lifted;
 }
 
-// The direction in which an object pressed the tool, weighted by depths.
-Vec3 Proxy::pressOf(std::int32_t object) const noexcept {
+// The direction in which an object pressed the tool, weighted by depths. One that appears takes the place of
+// those that vanish.
+Vec3 Proxy::pressOf(const PlacedObject& object) const noexcept {
   Vec3 press = Vec3::Zero();
   for (int i = 0; i < contactSet_.count; ++i) {
     const ContactConstraint& constraint = contactSet_.constraints[static_cast<std::size_t>(i)];
-    if (constraint.object == object) press += constraint.depth_m * constraint.halfSpace.normal;
+    const bool replaced =
+        object.before == nullptr && constraint.object >= 0 && now_.scene->find(constraint.object) == nullptr;
+    if (constraint.object == object.state->id || replaced)
+      press += constraint.depth_m * constraint.halfSpace.normal;
   }
   return press;
 }
 
-// As far as needed: friction of others would keep the proxy where it is lifted to. What did not change stops
-// it.
+// As far as needed: friction of others would keep the proxy where it is lifted to. The shorter way first:
+// what lies below a thin shell is not what holds the tool.
 bool Proxy::liftOutOf(int i, std::uint64_t changed, EnclosureBudget& budget) noexcept {
-  constexpr double kLift_m = 0.5e-3;
   const PlacedObject& object = query_.object(i);
-  const Vec3 press = pressOf(object.state->id);
+  const Vec3 press = pressOf(object);
   const Vec3 out = (press.isZero(0) ? contactSet_.normal_m : press).normalized();
-  Vec3 lifted = position_ + kLift_m * out;
+  for (const double lift_m : {0.5e-3, 2e-3}) {
+    if (liftOutOf(i, changed, lift_m * out, !press.isZero(0), budget)) return true;
+  }
+  return false;
+}
+
+// What did not change stops it.
+bool Proxy::liftOutOf(int i, std::uint64_t changed, const Vec3& way, bool pressed,
+                      EnclosureBudget& budget) noexcept {
+  const PlacedObject& object = query_.object(i);
+  Vec3 lifted = position_ + way;
   ObjectHit hit;
   const bool inside = encloses(object, query_.faces(), now_.time, position_, toolRadius_, budget) &&
                       !encloses(object, query_.faces(), now_.time, lifted, toolRadius_, budget);
-  if (!inside && (press.isZero(0) || !isBelowOpen(i, out, lifted))) return false;
+  if (!inside && (!pressed || !isBelowOpen(i, way.normalized(), lifted))) return false;
   if (query_.castPast(changed, position_, lifted, hit)) return false;
   const double share = query_.castAtObject(i, lifted, position_, hit) ? hit.stop : 0;
   position_ = lifted + share * (position_ - lifted);

@@ -30,6 +30,7 @@ Tick::Tick(device::Device& device, base::Clock& clock, const TickOptions& option
       period_(servoPeriod(options.rate_Hz)),
       forceLife_(options.forceLife),
       renderer_(renderOptionsOf(options)),
+      remotePassivity_(renderOptionsOf(options).contactRise_N_per_s, options.render.bareDamping_Ns_per_m),
       control_(options.guard.armed),
       guard_(options.guard, control_, period_),
       reports_(options.reports),
@@ -154,6 +155,7 @@ void Tick::addRemote(Nanos period, bool foundAnew, double passedShare) noexcept 
   forceSeen_ = input.force.number;
   if (foundAnew) {
     remoteContacts_.restart(contactsSeen_);
+    remotePassivity_.reset();
     heldForce_.restart(report_.device.position_m);
   }
   RemoteRendering& out = report_.remote;
@@ -163,6 +165,7 @@ void Tick::addRemote(Nanos period, bool foundAnew, double passedShare) noexcept 
   Rendering& rendering = report_.rendering;
   if ((rendering.status & kRenderNotFinite) != 0) {
     remoteContacts_.reset();
+    remotePassivity_.reset();
     heldForce_.reset();
     out.contactForce_N.setZero();
     out.heldForce_N.setZero();
@@ -170,7 +173,9 @@ void Tick::addRemote(Nanos period, bool foundAnew, double passedShare) noexcept 
   }
   const double step_s = base::toSeconds(std::min(period, 2 * period_));  // a late tick changes no more
   const RemoteHand hand{report_.device.position_m, report_.device.velocity_m_per_s, rendering.normalForce_N};
-  rendering.force_N += remoteContacts_.step(input.contacts, hand, report_.time, step_s, out);
+  remoteContacts_.step(input.contacts, hand, report_.time, step_s, out);
+  remotePassivity_.step(remoteContacts_, hand.position_m, base::toSeconds(period), out);
+  rendering.force_N += out.contactForce_N;
   heldForce_.step(input.force, hand.position_m, hand.velocity_m_per_s, report_.time, step_s, passedShare,
                   out);
   rendering.force_N += out.heldForce_N;
@@ -209,6 +214,7 @@ void Tick::resume(const TickReport& last, const ServoMemory& memory) noexcept {
   ended.force.budget = memory.remote.budget;
   remoteInput_.write(ended);
   remoteContacts_.resume(memory.remote, last.device.position_m);
+  remotePassivity_.resume(last.device.position_m);
   heldForce_.resume(memory.remote, last.device.position_m);
 }
 
@@ -232,7 +238,7 @@ bool Tick::rememberRemote() noexcept {
   RemoteMemory& memory = memory_.remote;
   memory.contacts = contactsSeen_;
   memory.force = forceSeen_;
-  const bool contacts = remoteContacts_.remember(memory);
+  const bool contacts = remoteContacts_.remember(memory) && remotePassivity_.isEven();
   const bool force = heldForce_.remember(memory);
   if (contactsSeen_ == 0 && forceSeen_ == 0) return true;
   const RemoteInput& input = remoteInput_.read();

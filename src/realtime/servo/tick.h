@@ -18,6 +18,7 @@
 #include "realtime/servo/black_box.h"
 #include "realtime/servo/guard.h"
 #include "realtime/servo/pacer.h"
+#include "realtime/servo/remote_passivity.h"
 #include "realtime/servo/report.h"
 #include "realtime/servo/tick_record.h"
 #include "realtime/servo/wake.h"
@@ -145,6 +146,7 @@ class Tick {
   Renderer renderer_;
   handoff::LatestValue<RemoteInput> remoteInput_;
   RemoteContacts remoteContacts_;
+  RemotePassivity remotePassivity_;
   HeldForceLaw heldForce_;
   Sight sight_;
   std::uint64_t contactsSeen_ = 0;

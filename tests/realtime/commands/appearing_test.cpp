@@ -290,7 +290,7 @@ TEST_P(NewTriangles, of_any_touched_mesh_are_felt_at_once) {
   const double radius_mm = 1e3 * GetParam();
   for (const bool wallIsNew : {true, false}) {
     for (const bool wallIsHarder : {true, false}) {
-      for (const double step_mm : {0.0, 0.001, 0.02, 0.2, 0.45}) {
+      for (const double step_mm : {0.0, 0.001, 0.02, 0.2, 0.45, 1.2}) {
         loop.send(scene::ResetScene{});
         loop.send(scene::SetObjectNumber{2});
         loop.send(scene::SetTouchableFaces{0});
@@ -328,7 +328,7 @@ std::vector<Vec3f> sheet(double y_mm) {
 TEST_P(NewTriangles, of_open_surfaces_rise_and_sink_under_the_hand) {
   const double radius_mm = 1e3 * GetParam();
   for (const std::int32_t sides : {0, 2}) {  // front, both
-    for (const double step_mm : {0.0, 0.001, 0.01, 0.2, 0.45, -0.2}) {
+    for (const double step_mm : {0.0, 0.001, 0.01, 0.2, 0.45, 1.2, -0.2}) {
       loop.send(scene::ResetScene{});
       loop.send(scene::SetObjectNumber{1});
       loop.send(scene::SetTouchableFaces{sides});
@@ -342,6 +342,37 @@ TEST_P(NewTriangles, of_open_surfaces_rise_and_sink_under_the_hand) {
         EXPECT_NEAR((loop.out.force_N - 1e-3 * kStiffness_N_per_m * Vec3(0, 1.7 + k * step_mm, 0)).norm(), 0,
                     1e-3)
             << "sides " << sides << ", " << k << " x " << step_mm << " mm: " << loop.out.force_N.transpose();
+        EXPECT_EQ(loop.out.status, 0U);
+      }
+    }
+  }
+}
+
+// Two objects in turn, as of a program that prepares the next mesh while the last one is felt.
+TEST_P(NewTriangles, of_an_object_that_replaces_another_are_felt_at_once) {
+  const double radius_mm = 1e3 * GetParam();
+  const auto open = [](double y_mm) { return sheet(y_mm); };
+  const auto closed = [this](double y_mm) { return floorTriples(y_mm); };
+  for (const std::function<std::vector<Vec3f>(double)>& floor :
+       std::initializer_list<std::function<std::vector<Vec3f>(double)>>{open, closed}) {
+    for (const double step_mm : {0.0, 0.2, 1.2, -0.2}) {
+      loop.send(scene::ResetScene{});
+      loop.send(scene::SetObjectNumber{2});
+      loop.send(scene::SetTouchableFaces{0});
+      const Vec3 pressed = 1e-3 * Vec3(1, radius_mm - 1.7, 2);
+      loop.rest(pressed + Vec3(0, 0.010, 0), toNanos(0.5));
+      loop.add(0, floor(0));
+      loop.send(scene::SetSurfaceProperty{1, "stiffness", 1});
+      loop.to(pressed);
+      for (int k = 1; k <= 3; ++k) {
+        loop.send(scene::BeginBatch{});
+        loop.send(scene::SetTouchable{(k + 1) % 2, false});
+        upload(k % 2, floor(k * step_mm));
+        loop.send(scene::SetTouchable{k % 2, true});
+        loop.send(scene::CommitBatch{});
+        loop.rest(pressed, toNanos(0.1));
+        EXPECT_NEAR(loop.out.force_N.y(), 1e-3 * kStiffness_N_per_m * (1.7 + k * step_mm), 1e-3)
+            << k << " x " << step_mm << " mm";
         EXPECT_EQ(loop.out.status, 0U);
       }
     }

@@ -277,5 +277,49 @@ TEST_P(BallGroundTruth, shading_is_off_at_sharp_edges) {
   }
 }
 
+// Around a sharp edge, the ball is pushed away from the edge.
+TEST_P(BallGroundTruth, shading_turns_nothing_at_the_edge_of_a_box) {
+  add(box(Vec3(-0.02, -0.02, -0.02), Vec3(0.02, 0.02, 0)), surface());
+  start({0.024, 0.003, 0.004}, RenderOptions{.toolRadius_m = 0.003, .forceShading = true});
+  const auto outOf = [](double angle) -> Vec3 { return {std::cos(angle), 0, std::sin(angle)}; };
+  const auto around = [&](double angle) -> Vec3 { return Vec3(0.02, 0.003, 0) + 0.002 * outOf(angle); };
+  to(around(0.05));
+  for (double angle = 0.05; angle < 0.5 * M_PI - 0.05; angle += 0.01)
+    EXPECT_LT((at(around(angle)).force_N - outOf(angle)).norm(), 0.02) << angle;
+}
+
+// From the side of a round post over its rim to its top: the side is shaded, the rim is not, and the force
+// turns without a step. The angle of the sides around the post is one in the middle of none.
+TEST_P(BallGroundTruth, shading_ends_gradually_over_a_sharp_rim) {
+  constexpr int kSides = 24;
+  constexpr double kRadius = 0.02;
+  TriangleMesh post;
+  const auto onRim = [](double side, double r, double z) -> Vec3 {
+    const double angle = 2 * M_PI * side / kSides;
+    return {r * std::cos(angle), r * std::sin(angle), z};
+  };
+  post.vertices.push_back(Vec3f::Zero());
+  for (std::uint32_t i = 0; i < kSides; ++i) {
+    post.vertices.push_back(onRim(i, kRadius, 0).cast<float>());
+    post.vertices.push_back(onRim(i, kRadius, -0.03).cast<float>());
+    const std::uint32_t a = 1 + 2 * i;
+    const std::uint32_t b = 1 + 2 * ((i + 1) % kSides);
+    post.triangles.insert(post.triangles.end(), {{0, a, b}, {a + 1, b + 1, b}, {a + 1, b, a}});
+  }
+  for (const double side : {0.0, 0.02, 0.3, 0.5, 0.9}) {
+    clear();
+    add(post, surface());
+    start(onRim(side, 0.026, -0.01), RenderOptions{.toolRadius_m = 0.003, .forceShading = true});
+    to(onRim(side, 0.0215, -0.01));
+    to(onRim(side, 0.0215, 0), 0.01);
+    Vec3 last = hand->now().force_N;
+    for (double angle = 0; angle < 0.5 * M_PI; angle += 0.002) {
+      const Vec3 force = at(onRim(side, 0.02 + 0.0015 * std::cos(angle), 0.0015 * std::sin(angle))).force_N;
+      EXPECT_LT((force - last).norm(), 0.02) << side << " at " << angle;
+      last = force;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace hapticd::realtime::fixture

@@ -355,6 +355,45 @@ TEST_P(FreeForcesTest, texture_and_buzz_move_the_plane) {
   }
 }
 
+// A view that moves, streamed at 60 Hz, with a hand that moves with it: in the world nothing moves.
+TEST_P(FreeForcesTest, what_holds_the_hand_moves_with_the_view) {
+  for (const char* const what : {"friction", "adhesion", "texture", "friction effect"}) {
+    scene.planes.clear();
+    scene.effects.clear();
+    scene::Plane plane = floor(0);
+    if (what == std::string("friction")) plane.surface = surface(1000, 0.6, 0.5);
+    if (what == std::string("adhesion")) plane.adhesionLateral_N = 0.5;
+    if (what == std::string("texture")) {
+      plane.textureAmplitude = 0.0003 * units();
+      plane.textureWavelength = 0.003 * units();
+    }
+    if (what == std::string("friction effect")) {
+      run(effect(EffectType::friction));
+    } else {
+      scene.planes = {plane};
+    }
+    start({0.003, 0.002, 0.002});
+    const Vec3 place(0.0034, 0.0025, -0.001);
+    to(place);
+    const Vec3 force = at(place).force_N;
+    EXPECT_GT(force.norm(), 0.1) << what;
+    const scene::Workspace whole = scene.workspace;
+    Affine view = Affine::Identity();  // the way of the view in device metres
+    for (int i = 0; i < 300; ++i) {
+      if (i % 16 == 0) {
+        view = Eigen::Translation3d(offset()) * Eigen::AngleAxisd(1e-4 * i, Vec3(0.6, 0, 0.8)) *
+               Eigen::Translation3d(Vec3(3e-6 * i, 1e-5 * i, 0) - offset());
+        scene.workspace.T_world_device = whole.T_world_device * view;
+        scene.workspace.T_device_world = scene.workspace.T_world_device.inverse();
+        hand->show(scene.snapshot());
+      }
+      const Vec3 felt = view.linear() * hand->at(view.inverse() * (place + offset())).force_N;
+      ASSERT_LT((felt - force).norm(), 2e-3) << what << " " << i;
+    }
+    scene.workspace = whole;
+  }
+}
+
 TEST_P(FreeForcesTest, field_varies_from_its_origin_within_its_radius) {
   scene::ForceField field;
   field.origin = units() * offset();

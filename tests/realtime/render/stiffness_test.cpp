@@ -436,5 +436,61 @@ TEST_F(StiffnessTest, friction_on_a_seam_gives_no_energy) {
   }
 }
 
+// A dome beside a block of another stiffness: on round meshes the slope of the stiffness changes from face to
+// face. The hand sinks into the dome and rests.
+class UnequalDomeTest : public StiffnessTest {
+ protected:
+  struct Place {
+    double soft, hard, radius;
+    Vec3 above, rest;
+  };
+  Place anyPlace() {
+    const double hard = uniform(100, 500);
+    const Vec3 p(uniform(0.003, 0.008), uniform(-0.004, 0.004), 0);
+    Place place{std::max(25.0, hard / uniform(2, 10)), hard, uniform(0, 1) < 0.5 ? 0 : 0.002, p, p};
+    place.above.z() = 0.024;
+    place.rest.z() = std::sqrt(4e-4 - p.squaredNorm()) - uniform(0.001, 0.004);
+    return place;
+  }
+  void build(const Place& place, double mu) {
+    scene = SceneFixture();
+    scene.add(sphere(0.02, 16), surface(place.soft, mu, mu));
+    scene.add(box({0.008, -0.06, -0.03}, {0.06, 0.06, 0.017}), surface(place.hard, mu, mu));
+  }
+  Vec3 forceAt(const Place& place) {
+    Hand hand(scene.snapshot(), RenderOptions{.toolRadius_m = place.radius});
+    hand.at(place.above);
+    return hand.to(place.rest, 0.05).force_N;
+  }
+};
+
+TEST_F(UnequalDomeTest, hand_at_rest_feels_no_steps_with_little_friction) {
+  for (int i = 0; i < reduced(40, 8); ++i) {
+    const Place place = anyPlace();
+    for (const double mu : {0.02, 0.05, 0.1}) {
+      build(place, mu);
+      Hand hand(scene.snapshot(), RenderOptions{.toolRadius_m = place.radius});
+      hand.at(place.above);
+      hand.to(place.rest, 0.05);
+      for (int k = 0; k < 50; ++k) hand.at(place.rest);
+      const Vec3 force = hand.now().force_N;
+      double farthest = 0;
+      for (int k = 0; k < 50; ++k)
+        farthest = std::max(farthest, (hand.at(place.rest).force_N - force).norm());
+      EXPECT_LT(farthest, 1e-3) << i << " friction " << mu;
+    }
+  }
+}
+
+TEST_F(UnequalDomeTest, friction_of_what_is_near_and_not_touched_holds_nothing) {
+  for (int i = 0; i < reduced(40, 8); ++i) {
+    const Place place = anyPlace();
+    build(place, 0);
+    const Vec3 alone = forceAt(place);
+    scene.add(box({-0.04, -0.04, 0.025}, {0.04, 0.04, 0.03}), surface(place.soft, 0.5, 0.5));
+    EXPECT_LT((forceAt(place) - alone).norm(), 1e-3) << i;
+  }
+}
+
 }  // namespace
 }  // namespace hapticd::realtime::fixture

@@ -793,5 +793,104 @@ TEST(RemoteLoop, force_of_a_lost_client_is_zero_after_100_ms) {
   EXPECT_EQ(last, 0);
 }
 
+// An arm that nobody holds above a floor that a client states at 60 Hz.
+class ArmOnRemoteFloor {
+ public:
+  Vec3 x_m = Vec3(0.001, 0.004, 0.001);
+  Vec3 v_m_per_s = Vec3::Zero();
+  double mass_kg = 0.1;
+  double damping_Ns_per_m = 0.1;
+  double coulomb_N = 0;
+  double weight_N = 0;
+
+  ArmOnRemoteFloor(double stiffness_N_per_m, double bareDamping_Ns_per_m)
+      : stiffness_(stiffness_N_per_m), tick_(device_, clock_, options(bareDamping_Ns_per_m)) {}
+
+  void step() {
+    constexpr int kParts = 20;
+    constexpr double kPart_s = 1e-3 / kParts;
+    if (ms_ % 16 == 0) state();
+    ++ms_;
+    device_.state.position_m = x_m;
+    device_.state.velocity_m_per_s = v_m_per_s;
+    tick_(now());
+    tick_.reports().consume([](const TickReport&) {});
+    for (int i = 0; i < kParts; ++i) {
+      Vec3 force = tick_.last().force_N - Vec3(0, weight_N, 0) - damping_Ns_per_m * v_m_per_s;
+      const double speed = v_m_per_s.norm();
+      if (speed > 0) force -= std::min(coulomb_N, speed * mass_kg / kPart_s) / speed * v_m_per_s;
+      v_m_per_s += kPart_s / mass_kg * force;
+      x_m += kPart_s * v_m_per_s;
+    }
+  }
+
+ private:
+  TickOptions options(double bareDamping_Ns_per_m) const {
+    TickOptions options;
+    options.guard = GuardOptions::of(device_.profile());
+    options.guard.rampIn = 0;
+    options.guard.peakForce_N = options.guard.continuousForce_N = 20;
+    options.render.bareDamping_Ns_per_m = bareDamping_Ns_per_m;
+    return options;
+  }
+  Nanos now() const { return (1000 + ms_) * 1'000'000LL; }
+  void state() {
+    ++input_.contacts.number;
+    input_.contacts.received = input_.contacts.stated = now();
+    input_.contacts.count = 1;
+    input_.contacts.contacts[0].stiffness_N_per_m = stiffness_;
+    tick_.remote().write(input_);
+  }
+
+  double stiffness_;
+  FakeDevice device_;
+  FakeClock clock_;
+  Tick tick_;
+  RemoteInput input_;
+  long long ms_ = 0;
+};
+
+TEST(RemotePassivity, arm_that_is_let_go_comes_to_rest) {
+  for (const double stiffness : {300.0, 1000.0, 1766.0}) {
+    for (const double mass_kg : {0.05, 0.1, 0.2}) {
+      ArmOnRemoteFloor arm(stiffness, 0.1);
+      arm.mass_kg = mass_kg;
+      arm.weight_N = 0.5;
+      arm.coulomb_N = 0.02;
+      for (int ms = 0; ms < 5000; ++ms) arm.step();
+      double lowest = arm.x_m.y();
+      double highest = lowest;
+      for (int ms = 0; ms < 1000; ++ms) {
+        arm.step();
+        lowest = std::min(lowest, arm.x_m.y());
+        highest = std::max(highest, arm.x_m.y());
+      }
+      EXPECT_LT(highest - lowest, 1e-4) << stiffness << " N/m, " << mass_kg << " kg";
+      EXPECT_NEAR(highest, -0.5 / stiffness, 1e-4);
+    }
+  }
+}
+
+// The guard would let the force through late: little on the way in, all of it on the way out.
+TEST(RemotePassivity, hard_floor_does_not_throw_a_fast_arm_back_faster) {
+  for (const double stiffness : {1000.0, 3000.0, 5000.0}) {
+    for (const double speed : {0.3, 0.5, 0.8, 1.0}) {
+      ArmOnRemoteFloor arm(stiffness, std::numeric_limits<double>::infinity());
+      arm.damping_Ns_per_m = 0.3;
+      for (int ms = 0; ms < 50; ++ms) arm.step();
+      arm.x_m = Vec3(0.001, 0.020, 0.001);
+      arm.v_m_per_s = Vec3(0, -speed, 0);
+      double in_m_per_s = 0;
+      while (arm.x_m.y() > 0) {
+        in_m_per_s = -arm.v_m_per_s.y();
+        arm.step();
+      }
+      for (int ms = 0; ms < 300 && arm.x_m.y() <= 0; ++ms) arm.step();
+      EXPECT_GT(arm.v_m_per_s.y(), 0);
+      EXPECT_LT(arm.v_m_per_s.y(), 1.15 * in_m_per_s) << stiffness << " N/m, " << speed << " m/s";
+    }
+  }
+}
+
 }  // namespace
 }  // namespace hapticd::realtime

@@ -1,0 +1,108 @@
+// Recordings that clients begin and end, on a simulated disk.
+#include "server/recordings.h"
+
+#include <gtest/gtest.h>
+
+#include <cerrno>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/fake_world.h"
+
+namespace hapticd::server {
+namespace {
+
+class RecordingsTest : public testing::Test {
+ protected:
+  RecordingsTest() { recordings.begin(0, ""); }
+  ~RecordingsTest() override { recordings.finish(); }
+
+  void start(const std::string& name) {
+    recordings.start(name, 0, "", [this](const std::string& refusal) {
+      begun.push_back(refusal.empty() ? "recording to " + recordings.file() : refusal);
+    });
+  }
+  void end() {
+    ASSERT_TRUE(recordings.end([this](const std::string& text) { ended.push_back(text); }));
+  }
+  // The threads, and what they post to the net thread.
+  void run() {
+    for (int i = 0; i < 10; ++i) {
+      world.threads.runUntil(world.clock.now() + 20'000'000);
+      for (auto calls = std::exchange(posted, {}); auto& call : calls) call();
+      recordings.poll();
+    }
+  }
+
+  base::FakeWorld world;
+  Recordings::Scenes scenes;
+  Recordings::Stations stations;
+  std::vector<std::function<void()>> posted;
+  std::vector<std::string> begun;
+  std::vector<std::string> ended;
+  Recordings recordings{scenes,
+                        stations,
+                        [this](std::function<void()> call) { posted.push_back(std::move(call)); },
+                        {.folder = "/", .failed = {}}};
+};
+
+// A disk may hang; the net thread takes stops.
+TEST_F(RecordingsTest, TheFileIsCreatedByAnotherThread) {
+  start("a.haptics");
+  EXPECT_TRUE(begun.empty());
+  EXPECT_FALSE(world.files.exists("/a.haptics"));
+  EXPECT_THROW(start("b.haptics"), record::RecordingError);
+  run();
+  EXPECT_EQ(begun, std::vector<std::string>{"recording to /a.haptics"});
+  EXPECT_TRUE(world.files.exists("/a.haptics"));
+  EXPECT_THROW(start("b.haptics"), record::RecordingError);
+}
+
+TEST_F(RecordingsTest, AnEndThatComesBeforeTheFileEndsIt) {
+  start("a.haptics");
+  end();
+  EXPECT_FALSE(recordings.end({})) << "a second one";
+  run();
+  EXPECT_EQ(begun.size(), 1U);
+  EXPECT_EQ(recordings.file(), "");
+}
+
+TEST_F(RecordingsTest, ARefusalOfTheDiskIsToldToBoth) {
+  world.files.failures.open = EACCES;
+  start("a.haptics");
+  end();
+  run();
+  ASSERT_EQ(begun.size(), 1U);
+  EXPECT_NE(begun[0].find("cannot record to '/a.haptics': Permission denied"), std::string::npos);
+  EXPECT_EQ(ended, std::vector<std::string>{"nothing is recorded"});
+  world.files.failures = {};
+  start("");
+  run();
+  EXPECT_EQ(begun.size(), 2U);
+  EXPECT_TRUE(begun[1].starts_with("recording to /session-2020")) << begun[1];
+}
+
+// One that has ended keeps its memory until its scenes and servos have done with it.
+TEST_F(RecordingsTest, WithoutPauseAreRefused) {
+  const auto name = [](int i) { return std::to_string(i) + ".haptics"; };
+  constexpr int kMost = 4;
+  for (int i = 0; i < kMost; ++i) {
+    start(name(i));
+    end();
+    run();
+    EXPECT_EQ(begun.back(), "recording to /" + name(i));
+  }
+  EXPECT_THROW(start(name(kMost)), record::RecordingError);
+  EXPECT_FALSE(world.files.exists("/" + name(kMost)));
+}
+
+TEST_F(RecordingsTest, OneThatBeginsAsTheServerEndsIsCompleted) {
+  start("a.haptics");
+  recordings.finish();
+  EXPECT_TRUE(begun.empty());
+}
+
+}  // namespace
+}  // namespace hapticd::server
