@@ -29,7 +29,7 @@ constexpr double kUnlimited_J = 1e9;
 constexpr double kLent_J = 2e-4;         // to the springs of friction, at the first touch
 constexpr double kSlow_m_per_s = 0.01;   // below it the damping coefficient may change as at this speed
 constexpr double kRests_m_per_s = 2e-3;  // a surface that is slower does no work to speak of
-constexpr double kSamePlace_m = 1e-12;   // rounding of a surface that is stated again
+constexpr double kSameNormal = 1e-6;     // of a surface that is stated again in single precision
 
 // The shortest rotation between unit vectors; for opposite ones half a turn about any axis across.
 Vec3 rotationVector(const Vec3& from, const Vec3& to) noexcept {
@@ -107,7 +107,9 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
     correcting = correcting || (!slot.fading && !isCorrected(slot));
   }
   const bool fading = resumed || leaving > 0;
-  rest_ = !fading && !correcting && hand.sceneForce_N.isZero(0);
+  rest_ = !fading && hand.sceneForce_N.isZero(0);
+  for (const Slot& slot : inUse())
+    rest_ = rest_ && (!slot.used || slot.fading || slot.depth_m <= 0 || hardlyChanges(slot, step_s));
   const double budget_N = (fading         ? kBesideFade_N_per_s
                            : changing > 1 ? kShared_N_per_s
                                           : kCorrection_N_per_s) *
@@ -307,7 +309,6 @@ void RemoteContacts::replace(Slot& slot, const RemoteContact& contact, const Rem
     slot.shift_m = std::min(0.0, -slot.depth_m);
   } else {
     slot.shift_m = spring_N / contact.stiffness_N_per_m - slot.depth_m;
-    if (std::abs(slot.shift_m) < kSamePlace_m) slot.shift_m = 0;
     // The same friction from a softer spring holds more energy.
     const double softer = stiffness / contact.stiffness_N_per_m;
     const Vec3 apart_m = slot.anchor_m - hand.position_m;
@@ -365,6 +366,13 @@ bool RemoteContacts::isCorrected(const Slot& slot) noexcept {
   return slot.shift_m == 0 && slot.turn.isZero(0) && slot.drift_m_per_s.isZero(0) &&
          slot.stiffness_N_per_m == c.stiffness_N_per_m && slot.damping == c.damping_Ns_per_m &&
          slot.staticFriction == c.staticFriction && slot.dynamicFriction == c.dynamicFriction;
+}
+
+// What is left to take back is no more than a surface that rests may move in a tick.
+bool RemoteContacts::hardlyChanges(const Slot& slot, double step_s) noexcept {
+  return std::abs(slot.shift_m) <= kRests_m_per_s * step_s && slot.turn.norm() <= kSameNormal &&
+         slot.drift_m_per_s.norm() <= kRests_m_per_s &&
+         slot.stiffness_N_per_m == slot.contact.stiffness_N_per_m;
 }
 
 // Takes back shift and turn and lets velocity, stiffness, damping and friction follow, together within the

@@ -39,6 +39,8 @@ class RemoteContacts {
             RemoteRendering& out) noexcept;
   /// Of the last tick.
   RemoteSprings springs() const noexcept;
+  /// RemoteSprings::rest.
+  bool rest() const noexcept { return rest_; }
   /// Forgets all contacts at once.
   void reset() noexcept;
   /// The hand may be anywhere: the same, and what was stated up to the set `number` does not count any more.
@@ -106,6 +108,7 @@ class RemoteContacts {
   void fadeOut(Nanos now, double step_s) noexcept;
   static void locate(Slot& slot, const RemoteHand& hand, Nanos now) noexcept;
   static bool isCorrected(const Slot& slot) noexcept;
+  static bool hardlyChanges(const Slot& slot, double step_s) noexcept;
   void correct(Slot& slot, const RemoteHand& hand, double budget_N, double step_s) noexcept;
   double takeBackShift(Slot& slot, double budget_N, double step_s) noexcept;
   static void follow(Slot& slot, const RemoteContact& contact) noexcept;

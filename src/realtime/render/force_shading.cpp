@@ -84,18 +84,28 @@ struct MeetingFaces {
     return static_cast<std::size_t>(std::max_element(normals.begin(), end, less) - normals.begin());
   }
   // The direction nearest to `normal` that a mixture of the normals of this face and those that continue it
-  // smoothly has: least squares with weights that are not negative, one weight after the other.
+  // smoothly has. What is left of it is the nearest point to it in all half-spaces that they look away from.
   Vec3 mixtureNearestTo(const Vec3& normal, std::size_t face) const {
-    constexpr int kSweeps = 32;
-    std::array<double, kMost> weights{};
+    constexpr int kMostSteps = 16;
+    constexpr double kTolerance = 1e-12;
+    std::array<HalfSpace, kMaxHalfSpaces> held;
+    int heldCount = 0;
     Vec3 rest = normal;
-    for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    for (int step = 0; step < kMostSteps; ++step) {
+      const Vec3* most = nullptr;
       for (std::size_t i = 0; i < count; ++i) {
-        if (normals[i].dot(normals[face]) < kSharp) continue;
-        const double weight = std::max(0.0, weights[i] + normals[i].dot(rest));
-        rest -= (weight - weights[i]) * normals[i];
-        weights[i] = weight;
+        if (normals[i].dot(normals[face]) < kSharp || normals[i].dot(rest) <= kTolerance) continue;
+        if (most == nullptr || normals[i].dot(rest) > most->dot(rest)) most = &normals[i];
       }
+      if (most == nullptr) break;
+      held[static_cast<std::size_t>(heldCount++)] = {-*most, Vec3::Zero(), 0};
+      const Projection nearest =
+          projectOntoActiveSet(held.data(), heldCount, normal, Vec3::Zero(), 0.1 * kTolerance);
+      if (!nearest.found) break;
+      rest = nearest.point;
+      heldCount = nearest.count;
+      for (std::size_t i = 0; i < static_cast<std::size_t>(heldCount); ++i)
+        held[i] = held[static_cast<std::size_t>(nearest.active[i])];
     }
     return (normal - rest).stableNormalized();
   }
@@ -119,13 +129,15 @@ Vec3 shadedAtEdge(const PlacedObject& object, const Vec3& normal, const Vec3& pl
 
 }  // namespace
 
-Vec3 shadedNormal(const PlacedObject& object, std::uint32_t triangle, Nanos now, const Vec3& normal,
+Vec3 shadedNormal(const PlacedObject& object, std::uint32_t triangle, Nanos now, const HalfSpace& touched,
                   const Vec3& at) noexcept {
+  const Vec3& normal = touched.normal;
   Facet f;
   if (!makeFacet(object.corners(triangle, now), object.skin, f)) return normal;
-  const Vec3 place = nearestPointOf(f, at);
   const double along = f.normal.dot(normal);
   const bool onFace = std::abs(along) > 1 - 1e-12;
+  // The tool may be off the edge that it meets in this tick.
+  const Vec3 place = nearestPointOf(f, onFace ? at : touched.anchor);
   const Vec3 shaded =
       onFace ? Vec3(std::copysign(1, along) * interpolatedNormal(object, triangle, f.normal, place, now))
              : shadedAtEdge(object, normal, place, now);

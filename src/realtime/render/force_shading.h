@@ -8,8 +8,9 @@ namespace hapticd::realtime {
 
 /// Unit direction of the force at point `at` of a touched triangle, device frame: the corner normals with
 /// barycentric weights. A corner normal is the mean of the faces around it, weighted by their angles, without
-/// faces beyond a sharp edge. `normal` is the face's own, on the touched side. noexcept, no allocation.
-Vec3 shadedNormal(const PlacedObject& object, std::uint32_t triangle, Nanos now, const Vec3& normal,
+/// faces beyond a sharp edge. `touched` is what holds the tool: at an edge, its anchor is there. noexcept, no
+/// allocation.
+Vec3 shadedNormal(const PlacedObject& object, std::uint32_t triangle, Nanos now, const HalfSpace& touched,
                   const Vec3& at) noexcept;
 
 }  // namespace hapticd::realtime

@@ -91,10 +91,19 @@ bool PlacedPlanes::changes(const scene::SceneSnapshot& scene) const noexcept {
          std::any_of(memory_.begin(), end, isGone);
 }
 
+// A view that jumps leaves textures to the hand.
+void PlacedPlanes::followJump(const scene::Workspace& view) noexcept {
+  if ((view.T_device_world * proxy_ - proxyOnDevice_).norm() <= kLongestMotion_m) return;
+  const Vec3 jump = view.T_world_device * proxyOnDevice_ - proxy_;
+  for (Memory& memory : memory_) memory.firstContact += jump;
+  proxy_ += jump;
+}
+
 void PlacedPlanes::place(const scene::SceneSnapshot& scene, Nanos now, const Vec3& hip, double toolRadius_m,
                          double radius_m, bool viewMoved) noexcept {
   T_world_device_ = scene.workspace.T_world_device;
-  changed_ = changes(scene);
+  if (viewMoved) followJump(scene.workspace);
+  changed_ = changes(scene) || viewMoved_;
   forgetAllExcept(scene);
   count_ = 0;
   leavesOut_ = false;
@@ -141,7 +150,8 @@ bool PlacedPlanes::placeOne(Nanos now, const Vec3& hip, double toolRadius_m, Pla
   // It sinks instead of becoming softer, so that what is below it holds the hand in time.
   memory.under_m = left * std::max(0.0, depth_m + whole);
   const double raised = left == 1 ? whole : std::min(whole, memory.under_m - depth_m);
-  placed.rests = !fresh && !viewMoved_ && left == 1 && raised == std::exchange(memory.raised_m, raised);
+  placed.still = !fresh && left == 1 && raised == std::exchange(memory.raised_m, raised);
+  placed.rests = placed.still && !viewMoved_;
   placed.facet.unbounded = true;
   placed.facet.normal = normal;
   placed.facet.a = hip - normal * (hipHeight - raised);
@@ -150,6 +160,7 @@ bool PlacedPlanes::placeOne(Nanos now, const Vec3& hip, double toolRadius_m, Pla
 }
 
 void PlacedPlanes::remember(unsigned touched, const Vec3& proxy) noexcept {
+  proxyOnDevice_ = proxy;
   proxy_ = T_world_device_ * proxy;
   for (int i = 0; i < count_; ++i) {
     for (int k = 0; k < memoryCount_; ++k) {

@@ -24,7 +24,8 @@ struct PlacedPlane {
   const scene::Plane* state = nullptr;
   Facet facet;             ///< unbounded, device metres; facet.object is -1 - index
   scene::Surface surface;  ///< less damped while the plane ramps out
-  bool rests = false;      ///< its surface is where it was in the tick before
+  bool still = false;      ///< its surface is where it was in the world in the tick before
+  bool rests = false;      ///< and on the device
   /// What is left of its adhesion, and of its weight among unequal surfaces, while it ramps out: 1 … 0.
   double share = 1;
 };
@@ -47,7 +48,7 @@ class PlacedPlanes {
   /// Continues those of the planes that the memory has; nothing touches them.
   void resume(const RenderMemory& memory) noexcept;
   /// In this tick one was placed anew or got other details, or one that is touched vanished or got another
-  /// surface.
+  /// surface; or the view moved a tick ago, which textures follow.
   bool changed() const noexcept { return changed_; }
 
   const PlacedPlane* begin() const noexcept { return planes_.data(); }
@@ -83,6 +84,7 @@ class PlacedPlanes {
   Memory& memoryOf(const scene::Plane& plane, Nanos now, double depth_m, bool& fresh) noexcept;
   void forgetAllExcept(const scene::SceneSnapshot& scene) noexcept;
   bool changes(const scene::SceneSnapshot& scene) const noexcept;
+  void followJump(const scene::Workspace& view) noexcept;
   bool placeOne(Nanos now, const Vec3& hip, double toolRadius_m, PlacedPlane& placed) noexcept;
   double heightOf(const scene::Plane& plane, const Memory& memory, Nanos now,
                   double metresPerUnit) const noexcept;
@@ -95,7 +97,8 @@ class PlacedPlanes {
   bool anew_ = false;
   bool viewMoved_ = false;
   geometry::Affine T_world_device_ = geometry::Affine::Identity();
-  Vec3 proxy_ = Vec3::Zero();  // at the end of the last tick, world frame
+  Vec3 proxy_ = Vec3::Zero();          // at the end of the last tick, world frame
+  Vec3 proxyOnDevice_ = Vec3::Zero();  // the same in device metres
   bool leavesOut_ = false;
 };
 

@@ -182,6 +182,7 @@ void Proxy::updateProxy(const Vec3& hip) noexcept {
   }
   if (displaced && slideInMovingGroove(hip, active)) return;
   // Friction of what is near, and not touched, holds nothing.
+  contactSet_.staticShare = 1;  // also where the dynamic coefficient is 0
   if (frictionConeOf(contactSet_) == 0) return updateWithoutFriction(hip, active);
   const Vec3 held = heldBySlope();
   const Vec3 borne = contactSet_.lateral_m - held;
@@ -205,19 +206,29 @@ void Proxy::updateProxy(const Vec3& hip) noexcept {
 }
 
 // Where the stiffness changes, the slope at the new place may be another one, and push the proxy back in the
-// next tick, and so on. A slide must not fill the spring: the way is halved until it does not.
+// next tick, and so on. A slide must not fill the spring: where it does, it goes a share of its way, that of
+// the last ticks, or not at all. Where a move takes much of the work of a tick, there is one only.
 void Proxy::slideTo(const Vec3& target, const Vec3& hip, ActiveSet& active) noexcept {
   constexpr double kShortest = 1.0 / 32;
+  const auto spares = [this] { return casts_ < kMaxCasts / 4 && query_.visits() < kMaxVisits / 8; };
   const Vec3 start = position_;
   const double stored_J = storedInSpring();
   const bool even = contactSet_.spring.slope_N.isZero(0);
   const Vec3 back = hip + contactSet_.lateral_m - target;
-  for (double share = 1; share >= kShortest; share *= 0.5) {
+  const auto goes = [&](double share) {
+    position_ = start;
     moveFrictionless(target + (1 - share) * back, active);
     findConstraints(hip, active);
-    if ((even && contactSet_.spring.slope_N.isZero(0)) || storedInSpring() <= stored_J) return;
-    position_ = start;
+    return (even && contactSet_.spring.slope_N.isZero(0)) || storedInSpring() <= stored_J;
+  };
+  if (goes(1) || !spares()) return;
+  if (goes(slideShare_)) {
+    slideShare_ = std::min(0.5, 2 * slideShare_);
+    return;
   }
+  slideShare_ = std::max(kShortest, 0.25 * slideShare_);
+  if (!spares()) return;
+  position_ = start;
   findConstraints(hip, active);
 }
 
@@ -445,7 +456,8 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
       const PlacedPlane& plane = planes_[-1 - hit.object];
       constraint.surface = plane.surface;
       constraint.rests = plane.rests;
-      constraint.creeps = creeps((carriedByView(positionBefore_) - positionBefore_) / period_s_, constraint);
+      constraint.carried_m = carriedByView(positionBefore_) - positionBefore_;
+      constraint.creeps = plane.still && creeps(constraint.carried_m / period_s_, constraint);
       constraint.adhesion_N = plane.share * plane.state->adhesionLateral_N;
     } else {
       const PlacedObject& object = query_.object(hit.object);
@@ -455,6 +467,7 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
       if (!object.jumped) {
         const Vec3 velocity =
             (carriedBy(object, hit.triangle, positionBefore_) - positionBefore_) / period_s_;
+        constraint.carried_m = period_s_ * velocity;
         constraint.creeps = creeps(velocity, constraint);
         if (!viewMoved()) constraint.surfaceVelocity_m_per_s = velocity;
       }
@@ -626,7 +639,7 @@ void Proxy::applyForceShading() noexcept {
     if (constraint.source < 0) continue;
     const Vec3 at = position_ - query_.radius() * constraint.halfSpace.normal;
     constraint.forceDirection = shadedNormal(query_.object(constraint.source), constraint.triangle, now_.time,
-                                             constraint.halfSpace.normal, at);
+                                             constraint.halfSpace, at);
   }
 }
 

@@ -34,7 +34,8 @@ struct ContactConstraint {
   double adhesion_N = 0;               ///< tangential force that it bears besides friction
   HalfSpace halfSpace;
   double depth_m = 0;                           ///< of the HIP below the surface, along the normal, >= 0
-  Vec3 surfaceVelocity_m_per_s = Vec3::Zero();  ///< at the proxy
+  Vec3 surfaceVelocity_m_per_s = Vec3::Zero();  ///< at the proxy; of no view
+  Vec3 carried_m = Vec3::Zero();                ///< way of the surface there in this tick, with the view
   bool rests = true;                            ///< the surface neither moves nor deforms in this tick
   bool creeps = false;                          ///< or so slowly that its work is negligible
 };
@@ -182,6 +183,7 @@ class Proxy {
   bool liftOutOf(int object, std::uint64_t changed, EnclosureBudget& budget) noexcept;
   bool liftOutOf(int object, std::uint64_t changed, const Vec3& way, bool pressed,
                  EnclosureBudget& budget) noexcept;
+  Vec3 lowestLayer(int object, const Vec3& lifted) noexcept;
   bool isBelowOpen(int object, const Vec3& out, Vec3& lifted) noexcept;
   Vec3 pressOf(const PlacedObject& object) const noexcept;
   void releaseByJump(const PlacedObject& object, std::uint32_t& status) noexcept;
@@ -265,6 +267,7 @@ class Proxy {
   Vec3 positionBefore_ = Vec3::Zero();
   Vec3 hipBefore_ = Vec3::Zero();
   Slide slide_;
+  double slideShare_ = 0.5;  // see slideTo()
   Search search_;
   ContactSet contactSet_;
   std::array<LastConstraint, kMaxActive> lastConstraints_;

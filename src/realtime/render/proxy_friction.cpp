@@ -100,8 +100,7 @@ std::optional<Proxy::Groove> Proxy::movingGroove() noexcept {
   groove.along = walls[0].halfSpace.normal.cross(walls[1].halfSpace.normal).normalized();
   bool slipped = false;
   for (std::size_t i = 0; i < 2; ++i) {
-    groove.carried[i] =
-        groove.along.dot(positionBefore_ + period_s_ * walls[i].surfaceVelocity_m_per_s - position_);
+    groove.carried[i] = groove.along.dot(positionBefore_ + walls[i].carried_m - position_);
     groove.bound[i] = contactSet_.boundOf(walls[i]);
     slipped = slipped || (groove.bound[i] > 0 && std::abs(groove.carried[i]) > query_.minSkin());
   }

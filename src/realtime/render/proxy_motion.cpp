@@ -15,6 +15,7 @@ namespace {
 using geometry::Mat3;
 
 constexpr int kMaxPushes = 16;
+constexpr double kThickness_m = 20e-6;  // faces of one object that are nearer to each other count as one
 
 }  // namespace
 
@@ -66,9 +67,10 @@ Vec3 Proxy::carriedByView(const Vec3& p) const noexcept {
 
 // The hand did not cause such a change of the force.
 bool Proxy::contactChangedByCommand() const noexcept {
+  if (planes_.changed()) return true;
   if (now_.scene == before_.scene) return false;
   // A view may move into a hand that is free.
-  if (planes_.changed() || viewMoved()) return true;
+  if (viewMoved()) return true;
   if (contactSet_.count == 0) return false;
   const scene::SceneSnapshot& now = *now_.scene;
   const scene::SceneSnapshot& before = *before_.scene;
@@ -264,13 +266,13 @@ Vec3 Proxy::pressOf(const PlacedObject& object) const noexcept {
   return press;
 }
 
-// As far as needed: friction of others would keep the proxy where it is lifted to. The shorter way first:
-// what lies below a thin shell is not what holds the tool.
+// As far as needed: friction of others would keep the proxy where it is lifted to. In short steps, so that of
+// several layers the next one holds it.
 bool Proxy::liftOutOf(int i, std::uint64_t changed, EnclosureBudget& budget) noexcept {
   const PlacedObject& object = query_.object(i);
   const Vec3 press = pressOf(object);
   const Vec3 out = (press.isZero(0) ? contactSet_.normal_m : press).normalized();
-  for (const double lift_m : {0.5e-3, 2e-3}) {
+  for (const double lift_m : {0.5e-3, 1e-3, 1.5e-3, 2e-3}) {
     if (liftOutOf(i, changed, lift_m * out, !press.isZero(0), budget)) return true;
   }
   return false;
@@ -286,16 +288,29 @@ bool Proxy::liftOutOf(int i, std::uint64_t changed, const Vec3& way, bool presse
                       !encloses(object, query_.faces(), now_.time, lifted, toolRadius_, budget);
   if (!inside && (!pressed || !isBelowOpen(i, way.normalized(), lifted))) return false;
   if (query_.castPast(changed, position_, lifted, hit)) return false;
-  const double share = query_.castAtObject(i, lifted, position_, hit) ? hit.stop : 0;
-  position_ = lifted + share * (position_ - lifted);
+  position_ = lowestLayer(i, lifted);
   return true;
+}
+
+// On the way back down to the proxy. A ball fits between no layers that are so near.
+Vec3 Proxy::lowestLayer(int i, const Vec3& lifted) noexcept {
+  constexpr int kMost = 4;
+  const Vec3 down = (position_ - lifted).normalized();
+  Vec3 place = lifted;
+  Vec3 from = lifted;
+  ObjectHit hit;
+  for (int layer = 0; layer < kMost && query_.castAtObject(i, from, position_, hit); ++layer) {
+    place = from + hit.stop * (position_ - from);
+    from = place + kThickness_m * down;
+    if (toolRadius_ > 0 || down.dot(position_ - from) <= 0) break;
+  }
+  return place;
 }
 
 // An open surface is around nothing. Where it held the point and nothing of it does so now, but something of
 // it that looks the same way is above, it rose. `lifted` moves nearer when another face of it is between. A
 // ball overlaps what rose, and needs no lift.
 bool Proxy::isBelowOpen(int i, const Vec3& out, Vec3& lifted) noexcept {
-  constexpr double kThickness_m = 20e-6;  // faces of one object that are nearer to each other count as one
   if (toolRadius_ > 0) return false;
   const Vec3 up = lifted - position_;
   ObjectHit hit;

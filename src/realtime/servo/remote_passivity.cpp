@@ -34,7 +34,7 @@ void RemotePassivity::reset() noexcept {
 void RemotePassivity::step(const RemoteContacts& contacts, const Vec3& hip_m, double period_s,
                            RemoteRendering& out) noexcept {
   period_s = std::max(period_s, kShortestPeriod_s);
-  const double share = rise_.step(out.contactForce_N, true, period_s);
+  const double share = rise_.step(out.contactForce_N, contacts.rest(), period_s);
   if (controller_.helps()) {
     SpringState springs = stateOf(contacts.springs(), out.contactForce_N);
     springs.scale(share);

@@ -348,6 +348,30 @@ TEST_P(NewTriangles, of_open_surfaces_rise_and_sink_under_the_hand) {
   }
 }
 
+// A plate above the floor, of the same mesh: the hand stays between them.
+TEST_P(NewTriangles, lift_the_hand_through_no_layer_above) {
+  if (GetParam() > 0) return;  // a ball does not fit between
+  const auto layers = [this](double rise_mm) {
+    std::vector<Vec3f> mesh = floorTriples(rise_mm);
+    const std::vector<Vec3f> plate = boxTriples(Vec3(-20, rise_mm + 0.2, -20), Vec3(20, rise_mm + 0.4, 20));
+    mesh.insert(mesh.end(), plate.begin(), plate.end());
+    return mesh;
+  };
+  for (const double rise_mm : {0.1, 0.15, 0.6, 1.1}) {
+    loop.send(scene::ResetScene{});
+    loop.send(scene::SetObjectNumber{1});
+    loop.send(scene::SetTouchableFaces{0});
+    loop.add(0, layers(0));
+    loop.rest(1e-3 * Vec3(25, 5, 2), toNanos(0.5));
+    loop.to(1e-3 * Vec3(25, 0.1, 2));
+    loop.to(1e-3 * Vec3(1, 0.1, 2));
+    loop.to(1e-3 * Vec3(1, -1, 2));
+    upload(0, layers(rise_mm));
+    loop.rest(1e-3 * Vec3(1, -1, 2), toNanos(0.1));
+    EXPECT_NEAR(1e3 * loop.out.proxy_m.y(), rise_mm, 1e-3);
+  }
+}
+
 // Two objects in turn, as of a program that prepares the next mesh while the last one is felt.
 TEST_P(NewTriangles, of_an_object_that_replaces_another_are_felt_at_once) {
   const double radius_mm = 1e3 * GetParam();

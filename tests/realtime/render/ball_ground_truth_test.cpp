@@ -288,24 +288,48 @@ TEST_P(BallGroundTruth, shading_turns_nothing_at_the_edge_of_a_box) {
     EXPECT_LT((at(around(angle)).force_N - outOf(angle)).norm(), 0.02) << angle;
 }
 
+// A place beside a post around the z axis; `side` counts its sides.
+Vec3 onPost(double side, int sides, double r, double z) {
+  const double angle = 2 * M_PI * side / sides;
+  return {r * std::cos(angle), r * std::sin(angle), z};
+}
+
+TriangleMesh roundPost(int sides) {
+  constexpr double kRadius = 0.02;
+  TriangleMesh post;
+  post.vertices.push_back(Vec3f::Zero());
+  for (int i = 0; i < sides; ++i) {
+    post.vertices.push_back(onPost(i, sides, kRadius, 0).cast<float>());
+    post.vertices.push_back(onPost(i, sides, kRadius, -0.03).cast<float>());
+    const auto a = static_cast<std::uint32_t>(1 + 2 * i);
+    const auto b = static_cast<std::uint32_t>(1 + 2 * ((i + 1) % sides));
+    post.triangles.insert(post.triangles.end(), {{0, a, b}, {a + 1, b + 1, b}, {a + 1, b, a}});
+  }
+  return post;
+}
+
+// Around the post: from its faces to its edges and back, the direction goes on.
+TEST_P(BallGroundTruth, shading_turns_smoothly_around_a_post) {
+  for (const int sides : {9, 24, 100}) {
+    clear();
+    add(roundPost(sides), surface());
+    const auto at_m = [sides](double side) { return onPost(side, sides, 0.0225, -0.0113); };
+    start(1.5 * at_m(0), RenderOptions{.toolRadius_m = 0.004, .forceShading = true});
+    to(at_m(0));
+    Vec3 last = hand->now().force_N.normalized();
+    for (double side = 0; side < 3; side += 0.01) {
+      const Vec3 direction = at(at_m(side)).force_N.normalized();
+      EXPECT_LT((direction - last).norm(), 0.02) << sides << " sides, at " << side;
+      last = direction;
+    }
+  }
+}
+
 // From the side of a round post over its rim to its top: the side is shaded, the rim is not, and the force
 // turns without a step. The angle of the sides around the post is one in the middle of none.
 TEST_P(BallGroundTruth, shading_ends_gradually_over_a_sharp_rim) {
-  constexpr int kSides = 24;
-  constexpr double kRadius = 0.02;
-  TriangleMesh post;
-  const auto onRim = [](double side, double r, double z) -> Vec3 {
-    const double angle = 2 * M_PI * side / kSides;
-    return {r * std::cos(angle), r * std::sin(angle), z};
-  };
-  post.vertices.push_back(Vec3f::Zero());
-  for (std::uint32_t i = 0; i < kSides; ++i) {
-    post.vertices.push_back(onRim(i, kRadius, 0).cast<float>());
-    post.vertices.push_back(onRim(i, kRadius, -0.03).cast<float>());
-    const std::uint32_t a = 1 + 2 * i;
-    const std::uint32_t b = 1 + 2 * ((i + 1) % kSides);
-    post.triangles.insert(post.triangles.end(), {{0, a, b}, {a + 1, b + 1, b}, {a + 1, b, a}});
-  }
+  const TriangleMesh post = roundPost(24);
+  const auto onRim = [](double side, double r, double z) { return onPost(side, 24, r, z); };
   for (const double side : {0.0, 0.02, 0.3, 0.5, 0.9}) {
     clear();
     add(post, surface());

@@ -357,11 +357,14 @@ TEST_P(FreeForcesTest, texture_and_buzz_move_the_plane) {
 
 // A view that moves, streamed at 60 Hz, with a hand that moves with it: in the world nothing moves.
 TEST_P(FreeForcesTest, what_holds_the_hand_moves_with_the_view) {
-  for (const char* const what : {"friction", "adhesion", "texture", "friction effect"}) {
+  for (const char* const what : {"friction", "adhesion", "texture", "friction effect", "corner"}) {
     scene.planes.clear();
     scene.effects.clear();
     scene::Plane plane = floor(0);
-    if (what == std::string("friction")) plane.surface = surface(1000, 0.6, 0.5);
+    if (what == std::string("friction") || what == std::string("corner"))
+      plane.surface = surface(1000, 0.6, 0.5);
+    if (what == std::string("corner"))
+      add(box({0.003, -0.05, -0.05}, {0.05, 0.05, 0.05}), surface(1000, 0.5, 0.4));
     if (what == std::string("adhesion")) plane.adhesionLateral_N = 0.5;
     if (what == std::string("texture")) {
       plane.textureAmplitude = 0.0003 * units();
@@ -372,7 +375,7 @@ TEST_P(FreeForcesTest, what_holds_the_hand_moves_with_the_view) {
     } else {
       scene.planes = {plane};
     }
-    start({0.003, 0.002, 0.002});
+    start({0.0028, 0.002, 0.002});
     const Vec3 place(0.0034, 0.0025, -0.001);
     to(place);
     const Vec3 force = at(place).force_N;
@@ -392,6 +395,72 @@ TEST_P(FreeForcesTest, what_holds_the_hand_moves_with_the_view) {
     }
     scene.workspace = whole;
   }
+}
+
+// The hand stays where it is on the device.
+TEST_P(FreeForcesTest, view_that_jumps_leaves_textures_to_the_hand) {
+  scene::Plane plane = floor(0);
+  plane.textureAmplitude = 0.0005 * units();
+  plane.textureWavelength = 0.007 * units();
+  scene.planes = {plane};
+  start({0, 0, 0.002});
+  to({0.001, 0, -0.002});
+  const Vec3 force = at({0.001, 0, -0.002}).force_N;
+  scene.workspace.T_world_device = scene.workspace.T_world_device * Eigen::Translation3d(0.025, 0, 0);
+  scene.workspace.T_device_world = scene.workspace.T_world_device.inverse();
+  hand->show(scene.snapshot());
+  for (int i = 0; i < 5; ++i) EXPECT_LT((at({0.001, 0, -0.002}).force_N - force).norm(), 1e-3) << i;
+}
+
+// It is no kick of the hand, so the guard is told, and blends.
+TEST_P(FreeForcesTest, view_that_steps_below_a_texture_is_a_jump_of_the_geometry) {
+  scene::Plane plane = floor(0);
+  plane.textureAmplitude = 0.0005 * units();
+  plane.textureWavelength = 0.007 * units();
+  scene.planes = {plane};
+  start({0, 0, 0.002});
+  to({0, 0, -0.002});
+  Vec3 force = at({0, 0, -0.002}).force_N;
+  scene.workspace.T_world_device = scene.workspace.T_world_device * Eigen::Translation3d(0.0035, 0, 0);
+  scene.workspace.T_device_world = scene.workspace.T_world_device.inverse();
+  hand->show(scene.snapshot());
+  for (int i = 0; i < 5; ++i) {
+    const Rendering& r = at({0, 0, -0.002});
+    if ((r.force_N - force).norm() > 0.1) {
+      EXPECT_NE(r.status & kRenderGeometryJump, 0U) << i;
+    }
+    force = r.force_N;
+  }
+}
+
+TEST_P(FreeForcesTest, texture_does_not_brake_the_hand) {
+  scene::Plane plane = floor(0);
+  plane.textureAmplitude = 0.0003 * units();
+  plane.textureWavelength = 0.004 * units();
+  scene.planes = {plane};
+  start({0, 0, 0.001}, RenderOptions{.bareDamping_Ns_per_m = 0.1});
+  to({0, 0, -0.002});
+  to({0.04, 0, -0.002}, 0.2, [&](const Rendering& r) { EXPECT_EQ(r.force_N, r.contactForce_N); });
+}
+
+// Without dynamic friction a slide goes on without a force; it must not stick anew in each tick.
+TEST_P(FreeForcesTest, surface_that_moves_and_has_static_friction_alone_does_not_shake) {
+  scene.planes = {floor(0)};
+  scene.planes[0].surface = surface(1000, 0.5, 0);
+  start({0, 0, 0.001});
+  to({0, 0, -0.002});
+  const scene::Workspace whole = scene.workspace;
+  double most = 0;
+  for (int i = 1; i < 300; ++i) {
+    const Affine view(Eigen::Translation3d(0, 2e-5 * i, 0));
+    scene.workspace.T_world_device = whole.T_world_device * view;
+    scene.workspace.T_device_world = scene.workspace.T_world_device.inverse();
+    hand->show(scene.snapshot());
+    const Vec3 before = hand->now().force_N;
+    const Vec3 after = at({5e-5 * i, 0, -0.002}).force_N;
+    if (i > 100) most = std::max(most, (after - before).norm());
+  }
+  EXPECT_LT(most, 0.05);
 }
 
 TEST_P(FreeForcesTest, field_varies_from_its_origin_within_its_radius) {

@@ -492,5 +492,28 @@ TEST_F(UnequalDomeTest, friction_of_what_is_near_and_not_touched_holds_nothing) 
   }
 }
 
+// Three round organs that overlap, finely meshed: a slide that is tried again takes little of the work of a
+// tick, and the force does not fade.
+TEST_F(StiffnessTest, slides_beside_each_other_leave_the_work_of_a_tick) {
+  constexpr double kBall_m = 0.003;
+  for (int i = 0; i < 3; ++i) {
+    const double angle = 2 * M_PI * i / 3;
+    TriangleMesh organ = sphere(0.009, 64);
+    geometry::scaleAndMove(organ, 1, 0.007 * Vec3(std::cos(angle), std::sin(angle), 0));
+    scene.add(organ, surface(i == 0 ? 75 : i == 1 ? 450 : 200, 0.1, 0.08));
+  }
+  Hand hand(scene.snapshot(), RenderOptions{.toolRadius_m = kBall_m});
+  for (int k = 0; k < reduced(6000, 1500); ++k) {
+    const double t = 1e-3 * k;
+    const double above = 0.012 * std::max(0.0, 1 - t);
+    const Rendering& r = hand.at({0.008 * std::sin(1.1 * t), 0.008 * std::cos(1.7 * t),
+                                  0.004 + kBall_m + above + 0.002 * std::sin(2.3 * t)});
+    ASSERT_EQ(r.status & (kRenderWorkLimit | kRenderIterationLimit), 0U) << k;
+    if (r.depth_m > 0.002) {
+      ASSERT_GT(r.force_N.norm(), 0.02) << k;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace hapticd::realtime::fixture

@@ -802,14 +802,18 @@ class ArmOnRemoteFloor {
   double damping_Ns_per_m = 0.1;
   double coulomb_N = 0;
   double weight_N = 0;
+  int every_ms = 16;         // the client states the floor
+  bool beside = false;       // and another surface, which moves and which nobody touches
+  double rises_m_per_s = 0;  // the floor, from 1 s on
 
   ArmOnRemoteFloor(double stiffness_N_per_m, double bareDamping_Ns_per_m)
       : stiffness_(stiffness_N_per_m), tick_(device_, clock_, options(bareDamping_Ns_per_m)) {}
 
+  const TickReport& last() const { return tick_.last(); }
   void step() {
     constexpr int kParts = 20;
     constexpr double kPart_s = 1e-3 / kParts;
-    if (ms_ % 16 == 0) state();
+    if (ms_ % every_ms == 0) state();
     ++ms_;
     device_.state.position_m = x_m;
     device_.state.velocity_m_per_s = v_m_per_s;
@@ -837,8 +841,17 @@ class ArmOnRemoteFloor {
   void state() {
     ++input_.contacts.number;
     input_.contacts.received = input_.contacts.stated = now();
-    input_.contacts.count = 1;
-    input_.contacts.contacts[0].stiffness_N_per_m = stiffness_;
+    input_.contacts.count = beside ? 2 : 1;
+    const double risen_m = 1e-3 * rises_m_per_s * static_cast<double>(std::max(0LL, ms_ - 1000));
+    RemoteContact& floor = input_.contacts.contacts[0];
+    floor.stiffness_N_per_m = stiffness_;
+    floor.point_m.y() = static_cast<float>(risen_m + 6e-9 * (ms_ % 2));  // rounded as clients do
+    if (ms_ >= 1000) floor.velocity_m_per_s.y() = rises_m_per_s;
+    RemoteContact& wall = input_.contacts.contacts[1];
+    wall.id = 1;
+    wall.normal = Vec3::UnitX();
+    wall.point_m.x() = -0.03 + 1e-5 * static_cast<double>(ms_ % 100);
+    wall.stiffness_N_per_m = stiffness_;
     tick_.remote().write(input_);
   }
 
@@ -852,8 +865,10 @@ class ArmOnRemoteFloor {
 
 TEST(RemotePassivity, arm_that_is_let_go_comes_to_rest) {
   for (const double stiffness : {300.0, 1000.0, 1766.0}) {
-    for (const double mass_kg : {0.05, 0.1, 0.2}) {
+    for (const auto& [mass_kg, every_ms] : {std::pair{0.05, 16}, {0.1, 16}, {0.2, 16}, {0.1, 1}, {0.1, 4}}) {
       ArmOnRemoteFloor arm(stiffness, 0.1);
+      arm.every_ms = every_ms;
+      arm.beside = every_ms < 16;
       arm.mass_kg = mass_kg;
       arm.weight_N = 0.5;
       arm.coulomb_N = 0.02;
@@ -865,10 +880,25 @@ TEST(RemotePassivity, arm_that_is_let_go_comes_to_rest) {
         lowest = std::min(lowest, arm.x_m.y());
         highest = std::max(highest, arm.x_m.y());
       }
-      EXPECT_LT(highest - lowest, 1e-4) << stiffness << " N/m, " << mass_kg << " kg";
+      EXPECT_LT(highest - lowest, 1e-4)
+          << stiffness << " N/m, " << mass_kg << " kg, every " << every_ms << " ms";
       EXPECT_NEAR(highest, -0.5 / stiffness, 1e-4);
     }
   }
+}
+
+// What moves is not lowered.
+TEST(RemotePassivity, floor_that_rises_quickly_keeps_its_stiffness) {
+  ArmOnRemoteFloor arm(5000, std::numeric_limits<double>::infinity());
+  arm.mass_kg = 1e6;
+  arm.x_m.y() = -0.0005;
+  for (int ms = 0; ms < 900; ++ms) arm.step();
+  arm.rises_m_per_s = 0.3;
+  for (int ms = 0; ms < 112; ++ms) arm.step();
+  const RemoteRendering& remote = arm.last().remote;
+  ASSERT_EQ(remote.count, 1U);
+  EXPECT_GT(remote.contacts[0].depth_m, 0.001F);
+  EXPECT_NEAR(remote.contactForce_N.y(), 5000.0 * static_cast<double>(remote.contacts[0].depth_m), 1e-3);
 }
 
 // The guard would let the force through late: little on the way in, all of it on the way out.
