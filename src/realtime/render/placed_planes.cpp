@@ -91,6 +91,11 @@ bool PlacedPlanes::changes(const scene::SceneSnapshot& scene) const noexcept {
          std::any_of(memory_.begin(), end, isGone);
 }
 
+bool PlacedPlanes::isTouched() const noexcept {
+  return std::any_of(memory_.begin(), memory_.begin() + memoryCount_,
+                     [](const Memory& m) { return m.touched; });
+}
+
 // A view that jumps leaves textures to the hand.
 void PlacedPlanes::followJump(const scene::Workspace& view) noexcept {
   if ((view.T_device_world * proxy_ - proxyOnDevice_).norm() <= kLongestMotion_m) return;
@@ -103,7 +108,7 @@ void PlacedPlanes::place(const scene::SceneSnapshot& scene, Nanos now, const Vec
                          double radius_m, bool viewMoved) noexcept {
   T_world_device_ = scene.workspace.T_world_device;
   if (viewMoved) followJump(scene.workspace);
-  changed_ = changes(scene) || viewMoved_;
+  changed_ = changes(scene) || (viewMoved_ && isTouched());
   forgetAllExcept(scene);
   count_ = 0;
   leavesOut_ = false;

@@ -48,7 +48,7 @@ class PlacedPlanes {
   /// Continues those of the planes that the memory has; nothing touches them.
   void resume(const RenderMemory& memory) noexcept;
   /// In this tick one was placed anew or got other details, or one that is touched vanished or got another
-  /// surface; or the view moved a tick ago, which textures follow.
+  /// surface; or the view moved a tick ago below a hand that touches one, which textures follow.
   bool changed() const noexcept { return changed_; }
 
   const PlacedPlane* begin() const noexcept { return planes_.data(); }
@@ -85,6 +85,7 @@ class PlacedPlanes {
   void forgetAllExcept(const scene::SceneSnapshot& scene) noexcept;
   bool changes(const scene::SceneSnapshot& scene) const noexcept;
   void followJump(const scene::Workspace& view) noexcept;
+  bool isTouched() const noexcept;
   bool placeOne(Nanos now, const Vec3& hip, double toolRadius_m, PlacedPlane& placed) noexcept;
   double heightOf(const scene::Plane& plane, const Memory& memory, Nanos now,
                   double metresPerUnit) const noexcept;

@@ -222,11 +222,11 @@ void Proxy::slideTo(const Vec3& target, const Vec3& hip, ActiveSet& active) noex
     return (even && contactSet_.spring.slope_N.isZero(0)) || storedInSpring() <= stored_J;
   };
   if (goes(1) || !spares()) return;
-  if (goes(slideShare_)) {
-    slideShare_ = std::min(0.5, 2 * slideShare_);
+  if (goes(slide_.share)) {
+    slide_.share = std::min(0.5, 2 * slide_.share);
     return;
   }
-  slideShare_ = std::max(kShortest, 0.25 * slideShare_);
+  slide_.share = std::max(kShortest, 0.25 * slide_.share);
   if (!spares()) return;
   position_ = start;
   findConstraints(hip, active);

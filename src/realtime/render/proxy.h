@@ -137,6 +137,7 @@ class Proxy {
     Vec3 direction = Vec3::Zero();  // from the HIP to the proxy; also that of the last slide
     double speed_m_per_s = 0;       // mean over the last milliseconds
     double pause_s = 0;             // since the proxy last slipped
+    double share = 0.5;             // of its way, where all of it would fill the spring
   };
 
   // A groove whose walls moved differently along it in this tick. Lengths along the groove, from the proxy.
@@ -267,7 +268,6 @@ class Proxy {
   Vec3 positionBefore_ = Vec3::Zero();
   Vec3 hipBefore_ = Vec3::Zero();
   Slide slide_;
-  double slideShare_ = 0.5;  // see slideTo()
   Search search_;
   ContactSet contactSet_;
   std::array<LastConstraint, kMaxActive> lastConstraints_;
