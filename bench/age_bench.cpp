@@ -27,9 +27,8 @@ namespace hapticd::bench {
 namespace {
 
 constexpr double kSmallestLimit_ms = 20;
-constexpr double kWakeups = 3;  // the other limit, in wake-up errors of a bare thread
-constexpr std::size_t kReadClients =
-    16;  // about as many: whose reports are looked at; the others are only read
+constexpr double kWakeups = 3;            // the other limit, in wake-up errors of a bare thread
+constexpr std::size_t kReadClients = 16;  // at least: the reports of the others are received only
 
 // CLOCK_REALTIME less CLOCK_MONOTONIC, from the closest of some readings.
 std::int64_t wallOffsetNs() {

@@ -97,6 +97,7 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
   int changing = 0;
   int leaving = 0;
   bool correcting = false;
+  bool moving = false;
   const bool resumed = resumed_;
   resumed_ = false;
   for (Slot& slot : inUse()) {
@@ -105,11 +106,10 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
     changing += !slot.fading && (slot.demand_N > 0 || slot.depth_m > slot.shift_m);
     leaving += slot.fading && slot.demand_N > 0;
     correcting = correcting || (!slot.fading && !isCorrected(slot));
+    moving = moving || (!slot.fading && slot.depth_m > 0 && !hardlyChanges(slot, step_s));
   }
   const bool fading = resumed || leaving > 0;
-  rest_ = !fading && hand.sceneForce_N.isZero(0);
-  for (const Slot& slot : inUse())
-    rest_ = rest_ && (!slot.used || slot.fading || slot.depth_m <= 0 || hardlyChanges(slot, step_s));
+  rest_ = !fading && !moving && hand.sceneForce_N.isZero(0);
   const double budget_N = (fading         ? kBesideFade_N_per_s
                            : changing > 1 ? kShared_N_per_s
                                           : kCorrection_N_per_s) *
@@ -145,7 +145,6 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
 // Shared as the normal force is; what the shares store has that force as its gradient.
 RemoteSprings RemoteContacts::springs() const noexcept {
   RemoteSprings out;
-  out.rest = rest_;
   PressingContacts pressing;
   for (const Slot& slot : slots_) {
     if (!slot.used || slot.depth_m <= 0) continue;

@@ -24,7 +24,6 @@ struct RemoteHand {
 
 /// The springs of remote contacts in one tick, without their dampers. All zero while nothing is touched.
 struct RemoteSprings {
-  bool rest = true;  ///< no touched surface moves, changes or fades
   Vec3 force_N = Vec3::Zero();
   Vec3 normal_N = Vec3::Zero();  ///< the part without friction
   double stored_J = 0;
@@ -39,7 +38,7 @@ class RemoteContacts {
             RemoteRendering& out) noexcept;
   /// Of the last tick.
   RemoteSprings springs() const noexcept;
-  /// RemoteSprings::rest.
+  /// In the last tick, no touched surface moved, changed or faded, and no mesh or plane was touched.
   bool rest() const noexcept { return rest_; }
   /// Forgets all contacts at once.
   void reset() noexcept;
@@ -131,7 +130,7 @@ class RemoteContacts {
   double frictionNow_J_ = 0;     // at this one
   EnergyTank corrections_{EnergyBudget{}};
   bool held_ = false;  // a correction waited for energy in this tick
-  bool rest_ = true;   // no touched surface moved or changed in this tick, and no mesh or plane was touched
+  bool rest_ = true;
 };
 
 }  // namespace hapticd::realtime

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "base/time.h"
-#include "realtime/render/placed_planes.h"
 #include "realtime/render/release.h"
+#include "realtime/render/view_motion.h"
 
 namespace hapticd::realtime {
 namespace {
@@ -104,10 +104,11 @@ Effects::Running* Effects::running(const Effect& effect, Nanos now, const Vec3& 
 void Effects::moveWithView(const scene::Workspace& view, const Vec3& proxy) noexcept {
   const Affine T_world_before = std::exchange(T_world_device_, view.T_world_device);
   if (T_world_before.matrix() == T_world_device_.matrix()) return;
-  if ((view.T_device_world * (T_world_before * proxy) - proxy).norm() > kLongestMotion_m) return;
+  const ViewMotion motion{view.T_device_world, T_world_before};
+  if (motion.jumpsAt(proxy)) return;
   for (int i = 0; i < count_; ++i) {
     Vec3& anchor = running_[static_cast<std::size_t>(i)].anchor;
-    anchor = view.T_device_world * (T_world_before * anchor);
+    anchor = motion.of(anchor);
   }
 }
 

@@ -97,17 +97,17 @@ bool PlacedPlanes::isTouched() const noexcept {
 }
 
 // A view that jumps leaves textures to the hand.
-void PlacedPlanes::followJump(const scene::Workspace& view) noexcept {
-  if ((view.T_device_world * proxy_ - proxyOnDevice_).norm() <= kLongestMotion_m) return;
-  const Vec3 jump = view.T_world_device * proxyOnDevice_ - proxy_;
+void PlacedPlanes::followJump(const ViewMotion& view) noexcept {
+  if (!view.jumpsAt(proxyOnDevice_)) return;
+  const Vec3 jump = T_world_device_ * proxyOnDevice_ - proxy_;
   for (Memory& memory : memory_) memory.firstContact += jump;
   proxy_ += jump;
 }
 
 void PlacedPlanes::place(const scene::SceneSnapshot& scene, Nanos now, const Vec3& hip, double toolRadius_m,
                          double radius_m, bool viewMoved) noexcept {
-  T_world_device_ = scene.workspace.T_world_device;
-  if (viewMoved) followJump(scene.workspace);
+  const geometry::Affine T_world_before = std::exchange(T_world_device_, scene.workspace.T_world_device);
+  if (viewMoved) followJump({scene.workspace.T_device_world, T_world_before});
   changed_ = changes(scene) || (viewMoved_ && isTouched());
   forgetAllExcept(scene);
   count_ = 0;

@@ -10,12 +10,10 @@
 #include "base/time.h"
 #include "realtime/render/facet.h"
 #include "realtime/render/memory.h"
+#include "realtime/render/view_motion.h"
 #include "scene/snapshot.h"
 
 namespace hapticd::realtime {
-
-/// A command that moves a part near the proxy farther is a jump.
-inline constexpr double kLongestMotion_m = 0.020;
 
 using base::Nanos;
 
@@ -84,7 +82,7 @@ class PlacedPlanes {
   Memory& memoryOf(const scene::Plane& plane, Nanos now, double depth_m, bool& fresh) noexcept;
   void forgetAllExcept(const scene::SceneSnapshot& scene) noexcept;
   bool changes(const scene::SceneSnapshot& scene) const noexcept;
-  void followJump(const scene::Workspace& view) noexcept;
+  void followJump(const ViewMotion& view) noexcept;
   bool isTouched() const noexcept;
   bool placeOne(Nanos now, const Vec3& hip, double toolRadius_m, PlacedPlane& placed) noexcept;
   double heightOf(const scene::Plane& plane, const Memory& memory, Nanos now,

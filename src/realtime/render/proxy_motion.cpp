@@ -61,8 +61,8 @@ bool Proxy::viewMoved() const noexcept {
 // Planes move with the view alone; one that jumps leaves them to the hand.
 Vec3 Proxy::carriedByView(const Vec3& p) const noexcept {
   if (!viewMoved()) return p;
-  const Vec3 carried = now_.scene->workspace.T_device_world * (before_.scene->workspace.T_world_device * p);
-  return (carried - p).norm() <= kLongestMotion_m ? carried : p;
+  const ViewMotion view{now_.scene->workspace.T_device_world, before_.scene->workspace.T_world_device};
+  return view.jumpsAt(p) ? p : view.of(p);
 }
 
 // The hand did not cause such a change of the force.

@@ -13,12 +13,12 @@ void scale(double share, RemoteRendering& out) noexcept {
   for (std::uint32_t i = 0; i < out.count; ++i) out.contacts[i].force_N *= static_cast<float>(share);
 }
 
-SpringState stateOf(const RemoteSprings& springs, const Vec3& force_N) noexcept {
+SpringState stateOf(const RemoteContacts& contacts) noexcept {
+  const RemoteSprings springs = contacts.springs();
   SpringState state;
-  state.known = springs.rest;
+  state.known = contacts.rest();
   state.force_N = springs.force_N;
   state.normal = springs.normal_N.stableNormalized();
-  state.pressed_N = force_N.dot(state.normal);
   state.stored_J = springs.stored_J;
   state.stiffness_N_per_m = springs.stiffest_N_per_m;
   return state;
@@ -35,14 +35,13 @@ void RemotePassivity::step(const RemoteContacts& contacts, const Vec3& hip_m, do
                            RemoteRendering& out) noexcept {
   period_s = std::max(period_s, kShortestPeriod_s);
   const double share = rise_.step(out.contactForce_N, contacts.rest(), period_s);
+  scale(share, out);
   if (controller_.helps()) {
-    SpringState springs = stateOf(contacts.springs(), out.contactForce_N);
+    SpringState springs = stateOf(contacts);
     springs.scale(share);
+    springs.pressed_N = out.contactForce_N.dot(springs.normal);
     springs.most_N = rise_.most_N();
-    scale(share, out);
     out.contactForce_N += controller_.step(springs, hip_m, period_s);
-  } else {
-    scale(share, out);
   }
   rise_.acts(out.contactForce_N);
 }

@@ -23,6 +23,18 @@ class FreeForcesTest : public VariantTest {
     return e;
   }
   void run(const scene::Effect& e) { scene.effects = {e}; }
+  // Moves the view on the device, from that of the variant.
+  void showView(const scene::Workspace& whole, const Affine& view) {
+    scene.workspace.T_world_device = whole.T_world_device * view;
+    scene.workspace.T_device_world = scene.workspace.T_world_device.inverse();
+    hand->show(scene.snapshot());
+  }
+  void addTexture(double amplitude_m, double wavelength_m) {
+    scene::Plane plane = floor(0);
+    plane.textureAmplitude = units() * amplitude_m;
+    plane.textureWavelength = units() * wavelength_m;
+    scene.planes = {plane};
+  }
   scene::Plane floor(double z_m) const {
     scene::Plane p;
     p.normal = Vec3::UnitZ();
@@ -386,9 +398,7 @@ TEST_P(FreeForcesTest, what_holds_the_hand_moves_with_the_view) {
       if (i % 16 == 0) {
         view = Eigen::Translation3d(offset()) * Eigen::AngleAxisd(1e-4 * i, Vec3(0.6, 0, 0.8)) *
                Eigen::Translation3d(Vec3(3e-6 * i, 1e-5 * i, 0) - offset());
-        scene.workspace.T_world_device = whole.T_world_device * view;
-        scene.workspace.T_device_world = scene.workspace.T_world_device.inverse();
-        hand->show(scene.snapshot());
+        showView(whole, view);
       }
       const Vec3 felt = view.linear() * hand->at(view.inverse() * (place + offset())).force_N;
       ASSERT_LT((felt - force).norm(), 2e-3) << what << " " << i;
@@ -399,31 +409,21 @@ TEST_P(FreeForcesTest, what_holds_the_hand_moves_with_the_view) {
 
 // The hand stays where it is on the device.
 TEST_P(FreeForcesTest, view_that_jumps_leaves_textures_to_the_hand) {
-  scene::Plane plane = floor(0);
-  plane.textureAmplitude = 0.0005 * units();
-  plane.textureWavelength = 0.007 * units();
-  scene.planes = {plane};
+  addTexture(0.0005, 0.007);
   start({0, 0, 0.002});
   to({0.001, 0, -0.002});
   const Vec3 force = at({0.001, 0, -0.002}).force_N;
-  scene.workspace.T_world_device = scene.workspace.T_world_device * Eigen::Translation3d(0.025, 0, 0);
-  scene.workspace.T_device_world = scene.workspace.T_world_device.inverse();
-  hand->show(scene.snapshot());
+  showView(scene::Workspace(scene.workspace), Affine(Eigen::Translation3d(0.025, 0, 0)));
   for (int i = 0; i < 5; ++i) EXPECT_LT((at({0.001, 0, -0.002}).force_N - force).norm(), 1e-3) << i;
 }
 
 // It is no kick of the hand, so the guard is told, and blends.
 TEST_P(FreeForcesTest, view_that_steps_below_a_texture_is_a_jump_of_the_geometry) {
-  scene::Plane plane = floor(0);
-  plane.textureAmplitude = 0.0005 * units();
-  plane.textureWavelength = 0.007 * units();
-  scene.planes = {plane};
+  addTexture(0.0005, 0.007);
   start({0, 0, 0.002});
   to({0, 0, -0.002});
   Vec3 force = at({0, 0, -0.002}).force_N;
-  scene.workspace.T_world_device = scene.workspace.T_world_device * Eigen::Translation3d(0.0035, 0, 0);
-  scene.workspace.T_device_world = scene.workspace.T_world_device.inverse();
-  hand->show(scene.snapshot());
+  showView(scene::Workspace(scene.workspace), Affine(Eigen::Translation3d(0.0035, 0, 0)));
   for (int i = 0; i < 5; ++i) {
     const Rendering& r = at({0, 0, -0.002});
     if ((r.force_N - force).norm() > 0.1) {
@@ -434,10 +434,7 @@ TEST_P(FreeForcesTest, view_that_steps_below_a_texture_is_a_jump_of_the_geometry
 }
 
 TEST_P(FreeForcesTest, texture_does_not_brake_the_hand) {
-  scene::Plane plane = floor(0);
-  plane.textureAmplitude = 0.0003 * units();
-  plane.textureWavelength = 0.004 * units();
-  scene.planes = {plane};
+  addTexture(0.0003, 0.004);
   start({0, 0, 0.001}, RenderOptions{.bareDamping_Ns_per_m = 0.1});
   to({0, 0, -0.002});
   to({0.04, 0, -0.002}, 0.2, [&](const Rendering& r) { EXPECT_EQ(r.force_N, r.contactForce_N); });
@@ -452,10 +449,7 @@ TEST_P(FreeForcesTest, surface_that_moves_and_has_static_friction_alone_does_not
   const scene::Workspace whole = scene.workspace;
   double most = 0;
   for (int i = 1; i < 300; ++i) {
-    const Affine view(Eigen::Translation3d(0, 2e-5 * i, 0));
-    scene.workspace.T_world_device = whole.T_world_device * view;
-    scene.workspace.T_device_world = scene.workspace.T_world_device.inverse();
-    hand->show(scene.snapshot());
+    showView(whole, Affine(Eigen::Translation3d(0, 2e-5 * i, 0)));
     const Vec3 before = hand->now().force_N;
     const Vec3 after = at({5e-5 * i, 0, -0.002}).force_N;
     if (i > 100) most = std::max(most, (after - before).norm());
