@@ -216,17 +216,18 @@ class HAPTICD_EXPORT Client {
   /// there, waits for the server's confirmation, and closes it. Heartbeats of the first connection continue
   /// meanwhile.
   ///
-  /// Throws ConnectionLost without a connection. Throws ConnectError when the second connection is not
-  /// confirmed within ClientOptions::connectTimeout (at least 1 s); the stop on the first connection then
-  /// still takes effect when the server reads it.
+  /// Throws ConnectionLost without a connection, also when the server has ended it and nothing has been
+  /// polled since. Throws ConnectError when the second connection is not confirmed within
+  /// ClientOptions::connectTimeout (at least 1 s); the stop on the first connection then still takes effect
+  /// when the server reads it.
   void stopForces();
   /// Marks a moment, such as "trial 3 begins": the server records it and reports it to all clients. At most
-  /// 255 bytes (std::invalid_argument). Sends at once. Throws ConnectionLost without a connection.
+  /// 255 bytes (std::invalid_argument). Sends at once. Throws ConnectionLost as stopForces().
   void mark(std::string_view text);
   /// Ends a stop and clears latched trips; the force ramps in over half a second. It keeps its place behind
   /// the commands sent before it, and never undoes a stop that is sent after it. The server refuses it, by a
   /// text that names who stopped, while a stop of another client stands, unless this one is an operator by a
-  /// token or a user id.
+  /// token or a user id. Throws ConnectionLost as stopForces().
   void rearmForces();
   /// Presents a token for a role, on every connection from now on; 16 to 128 characters
   /// (std::invalid_argument). An empty one presents none on later connections; the present one keeps its

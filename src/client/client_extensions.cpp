@@ -126,12 +126,14 @@ void Client::subscribe(Reports kinds, double rate_Hz) {
 void Client::stopForces() {
   const bool behind = impl_->link.backlogBytes() > kStopBacklogBytes;
   const bool beside = behind && (!impl_->answered || impl_->has(wire::kFeatureStop));
-  // Both connections stop, and the first one may undo both.
-  if (beside) impl_->link.sendNow(impl_->sender, impl_->identity());
-  if (!impl_->link.sendNow(impl_->sender, wire::StopForces{})) {
-    throw ConnectionLost("forces not stopped: " + impl_->link.whyNotConnected());
+  if (beside) {
+    // Both connections stop, and the first one may undo both.
+    impl_->link.sendNow(impl_->sender, impl_->identity());
+    impl_->link.sendNow(impl_->sender, wire::StopForces{});
+    impl_->stopBesideBacklog();
+  } else {
+    impl_->sendAtOnce(wire::StopForces{}, "forces not stopped");
   }
-  if (beside) impl_->stopBesideBacklog();
   impl_->require(wire::kFeatureStop, "stop the forces");
 }
 
@@ -143,8 +145,7 @@ void Client::Impl::requireLength(std::string_view call, std::string_view text, s
 
 void Client::mark(std::string_view text) {
   Impl::requireLength("mark()", text, decltype(wire::Marker::text)::kMost);
-  if (!impl_->link.sendNow(impl_->sender, wire::Marker{.time = 0, .text = std::string(text)}))
-    throw ConnectionLost("not marked: " + impl_->link.whyNotConnected());
+  impl_->sendAtOnce(wire::Marker{.time = 0, .text = std::string(text)}, "not marked");
 }
 
 void Client::setObjectName(int object, std::string_view name) {
@@ -182,7 +183,7 @@ void Client::Impl::stopBesideBacklog() {
 
 void Client::rearmForces() {
   impl_->require(wire::kFeatureStop, "re-arm the forces");
-  impl_->link.sendNow(impl_->sender, wire::RearmForces{});
+  impl_->sendAtOnce(wire::RearmForces{}, "forces not re-armed");
 }
 
 void Client::presentToken(std::string_view token) {

@@ -19,6 +19,13 @@ struct HAPTICD_HIDDEN Client::Impl {
   void send(const M& message) {
     link.send(client::wireNow(), sender, message, wire::Reliability::kReliable);
   }
+  /// Sends a message at once, ahead of what is held. Throws ConnectionLost when nobody receives it; its text
+  /// begins with what has failed.
+  template <wire::WireMessage M>
+  void sendAtOnce(const M& message, std::string_view failure) {
+    link.sendNow(sender, message);
+    if (!link.reachesServer()) throw ConnectionLost(std::string(failure) + ": " + link.whyNotConnected());
+  }
   /// The same by datagram where there are any, for values that are sent repeatedly and worthless when late.
   template <wire::WireMessage M>
   void sendFast(const M& message) {

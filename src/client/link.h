@@ -111,6 +111,10 @@ class Link {
     pushOut();
     return true;
   }
+  /// After sending: false when nobody receives it, because the server has ended the connection. The system
+  /// takes the first bytes for a server that is gone, so only the socket tells. Then receives what came
+  /// before the end.
+  bool reachesServer();
   /// From now on send() keeps its messages until dropHeld() or sendHeld().
   void hold() { holding_ = true; }
   bool holding() const noexcept { return holding_; }

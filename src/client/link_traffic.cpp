@@ -4,6 +4,7 @@
 #include "base/world.h"
 #include "client/link.h"
 #include "hapticd/error.h"
+#include "net/socket_options.h"
 #include "wire/text.h"
 
 namespace hapticd::client {
@@ -224,6 +225,12 @@ std::shared_ptr<net::Buffer> Link::takeBuffer() {
   if (unused != buffers_.end()) return *unused;
   buffers_.push_back(std::make_shared<net::Buffer>());
   return buffers_.back();
+}
+
+bool Link::reachesServer() {
+  if (connected() && net::peerEnd(connection_.nativeHandle()) == net::PeerEnd::none) return true;
+  waitUntil([this] { return !announced_; }, kEndTimeout);  // the end has the reason
+  return false;
 }
 
 std::size_t Link::backlogBytes() const {

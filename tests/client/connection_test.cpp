@@ -55,6 +55,24 @@ TEST_P(BothWays, ReconnectsWhenTheServerIsBack) {
   EXPECT_EQ(client.statistics().connections, 2U);
 }
 
+TEST_P(BothWays, SafetyCallsThatReachNobodyThrowAlsoWithoutAPollBefore) {
+  const auto stop = [](Client& client) { client.stopForces(); };
+  const auto mark = [](Client& client) { client.mark("trial 3 begins"); };
+  const auto rearm = [](Client& client) { client.rearmForces(); };
+  const std::pair<const char*, void (*)(Client&)> calls[] = {
+      {"forces not stopped", stop}, {"not marked", mark}, {"forces not re-armed", rearm}};
+  for (const auto& [failure, call] : calls) {
+    ScriptedServer server({.capabilities = allCapabilities()});
+    Client client(name(server));
+    ASSERT_TRUE(client.waitCapabilities());
+    call(client);
+    server.dropClients();
+    const std::string text = textOf<ConnectionLost>([&] { call(client); });
+    EXPECT_THAT(text, HasSubstr(failure));
+    EXPECT_THAT(text, HasSubstr("by the peer"));
+  }
+}
+
 TEST(Client, DoesNotReconnectWhenDisabled) {
   ScriptedServer server;
   Client client(server.tcpName(), {.reconnect = false});
