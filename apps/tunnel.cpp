@@ -60,7 +60,9 @@ net::Buffer identification(const std::string& token) {
   return bytes;
 }
 
-// One client and its connection to the server. Each side is read as fast as the other one takes it.
+// One client and its connection to the server. Each side is read as fast as the other one takes it. The end
+// of the client travels to the server behind all that it sent, and it sees the end of its own connection only
+// then.
 class Carrier : public std::enable_shared_from_this<Carrier> {
  public:
   Carrier(net::Connection near, net::Connection far, net::Buffer afterCookie, std::function<void()> onGone)
@@ -70,23 +72,25 @@ class Carrier : public std::enable_shared_from_this<Carrier> {
         onGone_(std::move(onGone)) {}
 
   void start() {
-    join(near_, far_, true);
-    join(far_, near_, false);
+    net::ConnectionHandlers near = handlers(near_, far_, true);
+    near.onPeerEnded = [this, self = shared_from_this()] { far_.close("closed by the client"); };
+    near_.start(std::move(near));
+    net::ConnectionHandlers far = handlers(far_, near_, false);
+    far.onPeerGone = [this, self = shared_from_this()](const std::string& why) { end(why); };
+    far_.start(std::move(far));
   }
 
  private:
   static constexpr std::size_t kMostQueued = std::size_t{1} << 19;
 
-  void join(net::Connection& from, net::Connection& to, bool ofClient) {
-    from.start({.onConnected = {},
-                .onBytes =
-                    [this, self = shared_from_this(), &from, &to, ofClient](auto bytes) {
-                      carry(from, to, ofClient ? withToken(bytes) : net::Buffer(bytes.begin(), bytes.end()));
-                    },
-                // The queue of this connection is empty: its feeder may go on.
-                .onDrained = [self = shared_from_this(), &to] { to.resumeReading(); },
-                .onPeerGone = [this, self = shared_from_this()](const std::string& why) { end(why); },
-                .onClosed = [this, self = shared_from_this()](const std::string& why) { end(why); }});
+  net::ConnectionHandlers handlers(net::Connection& from, net::Connection& to, bool ofClient) {
+    return {.onBytes =
+                [this, self = shared_from_this(), &from, &to, ofClient](auto bytes) {
+                  carry(from, to, ofClient ? withToken(bytes) : net::Buffer(bytes.begin(), bytes.end()));
+                },
+            // The queue of this connection is empty: its feeder may go on.
+            .onDrained = [self = shared_from_this(), &to] { to.resumeReading(); },
+            .onClosed = [this, self = shared_from_this()](const std::string& why) { end(why); }};
   }
 
   net::Buffer withToken(std::span<const std::byte> bytes) {
@@ -166,6 +170,7 @@ int run(const TunnelOptions& options) {
   std::list<std::shared_ptr<Carrier>> carriers;
   net::ConnectionOptions link;
   link.keepAlive = 1s;
+  link.closeTimeout = 24h;  // as long as the peer takes what is queued: nobody waits for it
   const net::Endpoint local{net::kLoopbackAddress, static_cast<std::uint16_t>(options.port)};
   const Connect connect = [&] {
     return context ? tls::wrap(*context, net::Connection::connect(loop, address, 3s, link))

@@ -55,6 +55,9 @@ struct ConnectionHandlers {
   /// it, or resumeReading() to read the rest up to onClosed. An end that the peer sent behind more bytes than
   /// the system takes while nobody reads (about 3 MiB) arrives only after reading.
   std::function<void(const std::string& reason)> onPeerGone = {};
+  /// The peer has ended its direction, behind all that onBytes had. With this callback the connection stays
+  /// for what is still to be sent, until close() or abort(); without it, it ends. Of plain connections only.
+  std::function<void()> onPeerEnded = {};
   /// The connection has ended: called once, whichever side ended it, with the reason. No callback follows.
   std::function<void(const std::string&)> onClosed = {};
 };

@@ -223,6 +223,10 @@ void TcpConnection::peerEnded() {
   if (state_ == State::flushing) {
     return;  // the peer may have closed only its own direction: send it the rest
   }
+  if (state_ == State::open && failure_.empty() && handlers_ && handlers_->onPeerEnded) {
+    call(&ConnectionHandlers::onPeerEnded);
+    return;
+  }
   if (state_ == State::open) {
     flush();  // the answers to its last bytes
   }
@@ -319,6 +323,10 @@ void TcpConnection::queueEmptied(bool wasBlocked) {
 void TcpConnection::writeFailed(const ErrorCode& error) {
   if (state_ != State::open) {
     finish(reason_);
+    return;
+  }
+  if (peerEnded_) {
+    finish(endText(error));
     return;
   }
   failure_ = endText(error);

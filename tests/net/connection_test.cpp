@@ -149,6 +149,53 @@ TEST(Connection, AHalfClosedPeerGetsTheAnswerToItsLastBytes) {
   EXPECT_EQ(peer.receive(100), "last words");
 }
 
+// As a tunnel needs it: its client must not believe that all has arrived before the server says so.
+class HalfClosedPeer : public ::testing::Test {
+ protected:
+  HalfClosedPeer() {
+    server_.last().connection.start(
+        {.onBytes = [this](std::span<const std::byte> bytes) { server_.last().received += textOf(bytes); },
+         .onPeerEnded = [this] { ++ends_; },
+         .onClosed = [this](const std::string& reason) { server_.last().closed = reason; }});
+    EXPECT_TRUE(peer_.send("the end of an upload"));
+    peer_.shutdownSend();
+    EXPECT_TRUE(pumpUntil(loop_, [&] { return ends_ > 0; }));
+    for (int i = 0; i < 3; ++i) loop_.runOnce(milliseconds(1));
+    EXPECT_EQ(ends_, 1);
+    EXPECT_EQ(server_.last().received, "the end of an upload");
+    EXPECT_EQ(server_.last().closed, "");
+    EXPECT_TRUE(server_.last().connection.isOpen());
+  }
+  bool closed() {
+    return pumpUntil(loop_, [&] { return !server_.last().closed.empty(); });
+  }
+
+  Loop loop_;
+  Server server_{loop_};
+  RawSocket peer_ = server_.join();
+  int ends_ = 0;
+};
+
+TEST_F(HalfClosedPeer, KeepsItsConnectionUntilClose) {
+  server_.last().connection.send(bytesOf("an answer"));
+  server_.last().connection.close("all has arrived");
+  ASSERT_TRUE(closed());
+  EXPECT_EQ(server_.last().closed, "all has arrived");
+  EXPECT_EQ(peer_.receiveSome(), "an answer");
+  EXPECT_EQ(peer_.receiveSome(), "");
+}
+
+TEST_F(HalfClosedPeer, ThatIsGoneEndsItsConnectionByTheNextBytes) {
+  peer_.close();
+  ASSERT_TRUE(pumpUntil(loop_, [&] {
+    server_.last().connection.send(bytesOf("a report"));
+    server_.last().connection.flush();
+    loop_.runOnce(milliseconds(1));
+    return !server_.last().closed.empty();
+  }));
+  EXPECT_EQ(server_.last().closed, "connection reset by the peer");
+}
+
 TEST(Connection, AResetHasAReason) {
   Loop loop;
   Server server(loop);
