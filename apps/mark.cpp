@@ -26,12 +26,19 @@ int run(const MarkOptions& options) {
   const client::DeviceAddress address = client::parseDevice(options.server);
   client::Link link(address.server, {.reconnect = false, .adoptNames = true});
   const wire::LocalSender device = link.addDevice(address.device);
+  bool isHapticd = false;
+  // Answered ahead of the ping that waitHeard() waits for.
+  link.onUp = [&] { link.sendNow(device, wire::QueryCapabilities{}); };
+  link.onArrival = [&](wire::MessageKind kind, wire::LocalSender, wire::ByteView) {
+    isHapticd = isHapticd || kind == wire::kindOf<wire::Capabilities>;
+  };
   if (!link.waitConnected(kTimeout)) throw ConnectError(address.device + ": " + link.whyNotConnected());
   if (!link.waitHeard(device, kTimeout))
     throw ConnectError("no device '" + address.device + "' answers at " + address.server.text());
   link.sendNow(device, wire::Marker{.time = 0, .text = options.text});
   bool confirmed = false;
   std::string refusal;
+  std::string error;  // of something else, such as a fault of the device
   std::string remark;
   const auto hear = [&](const client::Arrival& arrival) {
     if (arrival.what != client::Arrival::What::message) return;
@@ -40,8 +47,11 @@ int run(const MarkOptions& options) {
       confirmed = confirmed || (marker && marker->text.text == options.text);
     } else if (arrival.kind == wire::kindOf<wire::Text>) {
       const auto text = wire::decode<wire::Text>(arrival.bytes);
-      if (text && text->severity == wire::kTextError) refusal = base::printable(text->text.text);
-      if (text && text->severity == wire::kTextNormal) remark = base::printable(text->text.text);
+      if (!text) return;
+      const std::string heard = base::printable(text->text.text);
+      if (text->severity == wire::kTextError)
+        (heard.find("Marker refused") != std::string::npos ? refusal : error) = heard;
+      if (text->severity == wire::kTextNormal) remark = heard;
     }
   };
   const auto end = std::chrono::steady_clock::now() + kTimeout;
@@ -49,9 +59,12 @@ int run(const MarkOptions& options) {
     link.poll(20ms, hear);
   if (!refusal.empty()) throw Error(options.server + " refused: " + refusal);
   if (!confirmed)
-    throw Error(options.server + " did not confirm the marker within 5 s; only a hapticd takes markers");
+    throw Error(options.server + " did not confirm the marker within 5 s" +
+                (isHapticd ? "" : "; only a hapticd takes markers") +
+                (error.empty() ? "" : "; it said: " + error));
   std::printf("%s: marked \"%s\"\n", options.server.c_str(), options.text.c_str());
   if (!remark.empty()) std::printf("%s: %s\n", options.server.c_str(), remark.c_str());
+  if (!error.empty()) std::fprintf(stderr, "hapticd: %s: %s\n", options.server.c_str(), error.c_str());
   return 0;
 }
 

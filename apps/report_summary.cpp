@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "wire/messages.h"
+
 namespace hapticd::apps {
 namespace {
 
@@ -70,7 +72,8 @@ void ReportSummary::onForce(const ForceReport& report) {
 }
 
 void ReportSummary::onText(const TextReport& report) {
-  if (report.severity == Severity::error && firstError_.empty()) firstError_ = report.text;
+  const bool fault = report.text.starts_with(wire::kNoForceText);
+  if (report.severity == Severity::error && !fault && firstError_.empty()) firstError_ = report.text;
   const std::string text = std::string(nameOf(report.severity)) + ": " + report.text;
   const auto known =
       std::find_if(texts_.begin(), texts_.end(), [&](const auto& t) { return t.first == text; });

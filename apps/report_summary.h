@@ -33,7 +33,7 @@ class ReportSummary {
   LatencyHistogram latency() const;
   /// Texts of the server with their counts, in order of first appearance.
   const std::vector<std::pair<std::string, std::uint64_t>>& texts() const { return texts_; }
-  /// The first text of an error, also from before restart(); empty: none.
+  /// The first text of an error other than a fault of the device, also from before restart(); empty: none.
   const std::string& firstError() const { return firstError_; }
   std::uint64_t forceErrors() const { return count(ReportKind::forceError); }
 

@@ -27,7 +27,7 @@
 #include "server_list.h"
 #include "stop_signals.h"
 #include "token_file.h"
-#include "wire/messages/extension.h"
+#include "wire/messages.h"
 
 namespace hapticd::apps {
 namespace {
@@ -109,19 +109,26 @@ void send(Client& client, const TriangleMesh& mesh, const TouchOptions& options)
 
 // A refusal of what was sent comes before the answer to this question, which other servers may not give. Then
 // there is nothing to touch; a token that is refused, or a device without a force, leaves the mesh there.
-void awaitAnswer(Client& client, const ReportSummary& summary) {
+void awaitAnswer(Client& client) {
   if (!client.waitCapabilities()) return;
   bool answered = false;
-  client.onToRoom([&](const ToRoomReport&) { answered = true; });
+  std::string refusal;
+  const ScopedSubscription answers = client.onToRoom([&](const ToRoomReport&) { answered = true; });
+  const ScopedSubscription texts = client.onText([&](const TextReport& report) {
+    if (report.severity != Severity::error) return;
+    const std::string& text = report.text;
+    if (refusal.empty() && text.find("refused") != std::string::npos && !text.starts_with("Identify") &&
+        !text.starts_with(wire::kNoForceText)) {
+      refusal = text;
+    } else {
+      std::fprintf(stderr, "hapticd touch: %s: %s\n", client.server().c_str(), text.c_str());
+    }
+  });
   client.requestToRoom();
   const auto end = std::chrono::steady_clock::now() + 3s;
   while (!answered && !stopRequested() && client.connected() && std::chrono::steady_clock::now() < end)
     client.poll(20ms);
-  client.onToRoom(nullptr);
-  const std::string& error = summary.firstError();
-  if (error.find("refused") != std::string::npos && !error.starts_with("Identify"))
-    throw Error(client.server() + ": " + error);
-  if (!error.empty()) std::fprintf(stderr, "hapticd touch: %s: %s\n", client.server().c_str(), error.c_str());
+  if (!refusal.empty()) throw Error(client.server() + ": " + refusal);
 }
 
 void watch(Client& client, ReportSummary& summary, double seconds) {
@@ -145,7 +152,6 @@ void watch(Client& client, ReportSummary& summary, double seconds) {
 }
 
 int run(const TouchOptions& options) {
-  const StopSignals signals;
   const TriangleMesh mesh = load(options);
   const std::string server = options.find ? onlyDeviceOfNetwork() : options.server;
   if (options.find) std::printf("found %s\n", server.c_str());
@@ -154,7 +160,8 @@ int run(const TouchOptions& options) {
   if (!token.empty()) client.presentToken(token);
   ReportSummary summary(client);
   send(client, mesh, options);
-  awaitAnswer(client, summary);
+  const StopSignals signals;  // which would not end the upload
+  awaitAnswer(client);
   std::string failure;
   try {
     watch(client, summary, options.seconds);
