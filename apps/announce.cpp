@@ -10,6 +10,11 @@
 
 namespace hapticd::apps {
 
+net::Endpoint reachedFromHere(net::Endpoint listening) {
+  if (listening.address == net::kAnyAddress) listening.address = net::kLoopbackAddress;
+  return listening;
+}
+
 void logAddresses(const server::Server& server, const server::ServerConfig& config, std::string_view driver) {
   const std::string at = server.address().text();
   spdlog::info("listening on {} (TCP and UDP)", at);
@@ -21,10 +26,10 @@ void logAddresses(const server::Server& server, const server::ServerConfig& conf
     for (const std::string& name : device.names) spdlog::info("device {}@{} ({})", name, at, kind);
   }
   if (const auto web = server.webAddress()) {
-    const bool here = web->address == net::kAnyAddress || net::isLoopback(web->address);
-    const bool secured = !server.fingerprint().empty() && (config.tlsLoopback || !here);
-    spdlog::info("viewer: {}://{}:{}/", secured ? "https" : "http",
-                 web->address == net::kAnyAddress ? "127.0.0.1" : web->addressText(), web->port);
+    const net::Endpoint page = reachedFromHere(*web);
+    const bool secured =
+        !server.fingerprint().empty() && (config.tlsLoopback || !net::isLoopback(page.address));
+    spdlog::info("viewer: {}://{}/", secured ? "https" : "http", page.text());
   }
 }
 

@@ -9,6 +9,9 @@
 
 namespace hapticd::apps {
 
+/// Where programs on this machine reach what listens there: pages do not answer to the name 0.0.0.0.
+net::Endpoint reachedFromHere(net::Endpoint listening);
+
 /// Logs addresses, device names and the viewer's URL. `driver` replaces the drivers of the configuration, if
 /// not empty.
 void logAddresses(const server::Server& server, const server::ServerConfig& config,

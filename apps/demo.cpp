@@ -98,10 +98,10 @@ int run(const DemoOptions& options) {
     std::fprintf(stderr,
                  "hapticd: everybody who reaches this machine may lead the demo; its hand hurts nobody\n");
   stopper.watch(*server);
-  const std::string page = web ? "http://" + web->text() + "/" : "(no page: --http off)";
+  const std::string page = web ? "http://" + reachedFromHere(*web).text() + "/" : "(no page: --http off)";
   std::atomic<bool> ending{false};
   std::exception_ptr failure;
-  std::thread presenter([&, address = server->address().text()] {
+  std::thread presenter([&, address = reachedFromHere(server->address()).text()] {
     try {
       present(address, page, ending);
     } catch (...) {

@@ -29,7 +29,8 @@ grep -q -- '--allow-no-rt' "$work/log"
 grep -q 'hapticd' "$work/log"
 without_rights serve --listen 127.0.0.1:0 --http off --device replay --hand "$work/hand.csv" --seconds 0.5 --allow-no-rt
 
-without_rights demo --listen 127.0.0.1:0 --http 127.0.0.1:0 >"$work/demo" 2>&1 &
+# As in a container; the addresses that it prints are those of this machine.
+without_rights demo --listen 127.0.0.1:0 --http 0.0.0.0:0 >"$work/demo" 2>&1 &
 demo=$!
 for _ in $(seq 600); do grep -q 'First contact' "$work/demo" && break; kill -0 "$demo" || break; sleep 0.1; done
 cat "$work/demo"
