@@ -22,6 +22,20 @@ fi
   -DCMAKE_CXX_COMPILER="$compiler" -DEXAMPLES="$source_dir/examples" >"$work/user.log" || { cat "$work/user.log"; exit 1; }
 "$cmake" --build "$work/user" --parallel 2
 
+# A project that adds the tree instead gets the same target; C++20 comes with it.
+mkdir "$work/adds"
+cp "$source_dir/tests/install/user/reads_force.cpp" "$work/adds"
+cat >"$work/adds/CMakeLists.txt" <<'CMAKE'
+cmake_minimum_required(VERSION 3.22)
+project(adds LANGUAGES CXX)
+add_subdirectory(${HAPTICD} hapticd EXCLUDE_FROM_ALL)
+add_executable(reads_force reads_force.cpp)
+target_link_libraries(reads_force PRIVATE hapticd::client)
+CMAKE
+"$cmake" -G Ninja -S "$work/adds" -B "$work/adds/build" -DCMAKE_CXX_COMPILER="$compiler" -DHAPTICD="$source_dir" -DHAPTICD_WEB=OFF >"$work/adds.log" ||
+  { cat "$work/adds.log"; exit 1; }
+"$cmake" --build "$work/adds/build" --target CMakeFiles/reads_force.dir/reads_force.cpp.o
+
 export PKG_CONFIG_PATH=$(echo "$prefix"/lib*/pkgconfig)
 [ "$(pkg-config --modversion hapticd)" = "$version" ]
 [ "$(pkg-config --modversion hapticd-vrpn)" = "$version" ]
