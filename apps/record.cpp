@@ -130,6 +130,11 @@ class ServerRecording {
         address_(client::parseDevice(server)),
         link_(address_.server, {.reconnect = false, .adoptNames = true}),
         device_(link_.addDevice(address_.device)) {
+    // Answered ahead of the ping that waitHeard() waits for.
+    link_.onUp = [this] { link_.sendNow(device_, wire::QueryCapabilities{}); };
+    link_.onArrival = [this](wire::MessageKind kind, wire::LocalSender, wire::ByteView) {
+      isHapticd_ = isHapticd_ || kind == wire::kindOf<wire::Capabilities>;
+    };
     if (!link_.waitConnected(kTimeout)) throw ConnectError(address_.device + ": " + link_.whyNotConnected());
     if (!link_.waitHeard(device_, kTimeout))
       throw ConnectError("no device '" + address_.device + "' answers at " + address_.server.text());
@@ -146,7 +151,9 @@ class ServerRecording {
       check();
       if (last_.starts_with(answer)) return last_;
     }
-    throw Error(server_ + " did not answer within 5 s; only a hapticd records by itself");
+    throw Error(server_ + " did not answer within 5 s; " +
+                (isHapticd_ ? "it is busy, or its disk is: its log tells whether it records"
+                            : "only a hapticd records by itself"));
   }
   /// Throws when the server refused, or could not write the recording further.
   void check() const {
@@ -175,6 +182,7 @@ class ServerRecording {
   const client::DeviceAddress address_;
   client::Link link_;
   const wire::LocalSender device_;
+  bool isHapticd_ = false;
   std::string last_;
   std::string refusal_;
 };

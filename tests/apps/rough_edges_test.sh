@@ -58,6 +58,21 @@ wait "$recorder"
 grep -q "^recorded [0-9]* ticks" "$work/closed.log" || { cat "$work/closed.log"; exit 1; }
 [ "$(tail -c 8 "$work/closed.mcap" | od -An -tx1 | tr -d ' \n')" = 894d434150300d0a ]
 
+# A hapticd that is slow is not taken for another server.
+(cd "$work" && exec "$hapticd" serve --listen 127.0.0.1:0 --http off --allow-no-rt) >"$work/slow.log" 2>&1 &
+slow=$!
+trap 'kill -KILL "$slow" 2>/dev/null || true; kill "$server" 2>/dev/null || true; rm -rf "$work"' EXIT
+for _ in $(seq 600); do grep -q 'listening on' "$work/slow.log" && break; sleep 0.05; done
+"$hapticd" record "Phantom@tcp://$(sed -nE 's/.*listening on ([0-9.:]+).*/\1/p' "$work/slow.log")" --server >"$work/said" 2>&1 &
+recorder=$!
+for _ in $(seq 600); do grep -q 'recording to' "$work/said" && break; sleep 0.05; done
+kill -STOP "$slow"
+kill -TERM "$recorder"
+status=0
+wait "$recorder" || status=$?
+[ "$status" = 1 ] && grep -q 'did not answer within 5 s; it is busy' "$work/said" || { cat "$work/said"; echo "status $status"; exit 1; }
+kill -KILL "$slow"
+
 recording=$source_dir/testdata/recordings/all_commands_law2.haptics
 "$hapticd" export "$recording" --to csv -o "$work/out.csv" | grep -qx "wrote $work/out.csv and $work/out.csv.json"
 refused 1 "--force" "$hapticd" export "$recording" --to csv -o "$work/out.csv"
