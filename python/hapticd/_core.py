@@ -308,7 +308,10 @@ class Core(Commands):
         self._last_failure = reason
         ended = reason == CLOSED_BY_SERVER or "reset by peer" in reason
         if ended and self._peer is not None and not was_connected:
-            self._last_failure += " before it answered; a server that asks for TLS needs 'hapticd tunnel'"
+            self._last_failure += (
+                " before it answered; a server that asks for TLS needs 'hapticd tunnel',"
+                " and a tunnel prints why it reaches no server"
+            )
         self._peer = None
         self._udp_target = None
         self._heard = self._answered = False

@@ -178,7 +178,9 @@ void Link::onClosed(const std::string& reason) {
   const bool wasConnected = std::exchange(announced_, false);
   lastFailure_ = reason;
   if (!wasConnected && server_.socket.empty() && reason.ends_with("by the peer"))
-    lastFailure_ += " before it answered; a server that asks for TLS needs 'hapticd tunnel'";
+    lastFailure_ +=
+        " before it answered; a server that asks for TLS needs 'hapticd tunnel', and a tunnel prints why it "
+        "reaches no server";
   addTraffic(statistics_);
   if (wasConnected) {
     inbox_.push({.what = Arrival::What::lost, .arrived = wallTimePoint(), .bytes = wire::asBytes(reason)});

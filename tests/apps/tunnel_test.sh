@@ -74,6 +74,17 @@ grep -q 'Recording_Control refused: ' "$work/out" || { cat "$work/out"; exit 1; 
 refused timeout 10 "$hapticd" stop "Phantom@$local"
 grep -q 'carries tcp:// only' "$work/tunnel" || { cat "$work/tunnel"; exit 1; }
 
+# Behind a tunnel that does not reach its server, the tunnel is not what is missing.
+"$hapticd" tunnel "unix:$work/server.sock" --port 0 >"$work/nowhere" 2>&1 &
+nowhere=$!
+trap 'kill $server $tunnel $observers $nowhere 2>/dev/null || true; rm -rf "$work"' EXIT
+behind=$(await "$work/nowhere" '(tcp:\/\/[0-9.]+:[0-9]+);')
+mv "$work/server.sock" "$work/moved.sock"
+refused "$hapticd" stop "Phantom@$behind"
+grep -q "needs 'hapticd tunnel', and a tunnel prints why it reaches no server" "$work/out" || { cat "$work/out"; exit 1; }
+grep -q 'server.sock: No such file' "$work/nowhere" || { cat "$work/nowhere"; exit 1; }
+mv "$work/moved.sock" "$work/server.sock"
+
 # Without the token, the Unix socket of this user is the owner's.
 "$hapticd" stop "Phantom@unix:$work/server.sock" | grep -q 'forces are off'
 "$hapticd" stop --rearm "Phantom@unix:$work/server.sock" | grep -q 'forces ramp in'
