@@ -101,10 +101,12 @@ int run(const StopOptions& options) {
     printJson({{"server", options.server}, {"stopped", guard->stopped}, {"armed", guard->armed}});
     return 0;
   }
-  std::printf(!options.rearm  ? "%s: forces are off; 'hapticd stop --rearm' re-arms\n"
-              : fault.empty() ? "%s: re-armed; forces ramp in over half a second\n"
-                              : "%s: re-armed; forces come back once the device gives them\n",
-              options.server.c_str());
+  std::printf(
+      !options.rearm
+          ? "%s: forces are off until an operator or the server's user re-arms: 'hapticd stop --rearm'\n"
+      : fault.empty() ? "%s: re-armed; forces ramp in over half a second\n"
+                      : "%s: re-armed; forces come back once the device gives them\n",
+      options.server.c_str());
   if (options.rearm && !guard->armed)
     std::printf("forces are not enabled on this device: start the server with --enable-forces\n");
   return 0;
@@ -116,14 +118,15 @@ void addStop(CLI::App& app) {
   auto options = std::make_shared<StopOptions>();
   CLI::App* command =
       app.add_subcommand("stop", "Bring the force of a device to zero immediately, until re-armed");
-  command->add_option("server", options->server, "NAME@host[:port] or NAME@tcp://host[:port]")
+  command->add_option("server", options->server, "NAME@host[:port], NAME@tcp://host[:port] or NAME@unix:PATH")
       ->capture_default_str();
   command->add_flag("--rearm", options->rearm, "End a stop and clear latched faults");
   addTokenFile(*command, options->tokenFile);
   command->add_flag("--json", options->json, kJsonText);
   command->footer(
       "Any client may stop a device. Re-arming after it takes the server's user or root on its machine, or\n"
-      "the token of an operator.\n"
+      "the token of an operator. Where the server's configuration names a socket, its user re-arms by\n"
+      "  hapticd stop --rearm NAME@unix:PATH\n"
       "A server on another machine that asks for TLS is reached through a tunnel, which can present the "
       "token:\n"
       "  hapticd tunnel HOST --port 4000 --fingerprint ... --token-file FILE\n"

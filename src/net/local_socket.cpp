@@ -61,7 +61,9 @@ fs::path defaultSocketPath(const Endpoint& listening) {
 
 std::optional<fs::path> findServerSocket(const Endpoint& server, bool anyUser) {
   const std::string name = socketName(server);
+  // The server may have been started with another environment: in a desktop session, or outside of it.
   std::vector<fs::path> candidates{defaultSocketPath(server), fs::path(kServiceFolder) / name,
+                                   fs::path("/run/user") / std::to_string(geteuid()) / "hapticd" / name,
                                    temporaryFolder(geteuid()) / name};
   if (anyUser && geteuid() == 0) {
     std::error_code none;

@@ -39,6 +39,22 @@ before=$(stops log)
 [ "$(stops log)" = $((before + 1)) ]
 [ "$(stops other.log)" = 1 ]
 
+# The user of a server whose socket is elsewhere names it, as the refusal says.
+printf 'socket = "%s/custom.sock"\n' "$work" >"$work/custom.toml"
+"$hapticd" serve --config "$work/custom.toml" --listen 127.0.0.5:0 --http off --allow-no-rt >"$work/custom.log" 2>&1 &
+custom=$!
+trap 'kill "$server" "$other" "$custom" 2>/dev/null || true; rm -rf "$work"' EXIT
+await 'listening on' custom.log
+address=$(sed -nE 's/.*listening on ([0-9.:]+).*/\1/p' "$work/custom.log")
+"$hapticd" stop "Phantom@$address" | grep -q "forces are off until an operator or the server's user re-arms"
+status=0
+"$hapticd" stop --rearm "Phantom@$address" >"$work/out" 2>&1 || status=$?
+[ "$status" = 1 ] && grep -q "or the server's user on its machine: 'hapticd stop --rearm NAME@host', or NAME@unix:PATH if its socket is elsewhere" "$work/out" ||
+  { cat "$work/out"; exit 1; }
+"$hapticd" stop --help | grep -q 'NAME@unix:PATH'
+"$hapticd" stop --rearm "Phantom@unix:$work/custom.sock" | grep -q 'forces ramp in'
+kill "$custom"
+
 # A replay has no force to stop. At this speed it does not reach the end of the recording, where the forces were stopped.
 "$hapticd" serve --listen 127.0.0.3:0 --http off --allow-no-rt --record "$work/own.haptics" --seconds 2 >"$work/recorded.log" 2>&1
 "$hapticd" replay "$work/own.haptics" --speed 0.05 --listen "127.0.0.3:$port" --http off >"$work/replay.log" 2>&1 &

@@ -50,6 +50,27 @@ TEST_F(LocalSocket, AFileAtItsPathStays) {
   EXPECT_EQ(std::filesystem::file_size(path_), 5U);
 }
 
+// A server of a desktop session, and a user from su, cron or a container, where the variable is not set.
+TEST_F(LocalSocket, IsFoundInTheFolderOfASessionThatTheEnvironmentDoesNotName) {
+  const Endpoint listening{kLoopbackAddress, 1};
+  const std::filesystem::path sessions = "/run/user";
+  const std::filesystem::path session = sessions / std::to_string(geteuid());
+  std::error_code error;
+  const bool madeBoth = std::filesystem::create_directory(sessions, error);
+  const bool made = std::filesystem::create_directory(session, error);
+  if (error) GTEST_SKIP() << session << ": " << error.message();
+  const char* const before = std::getenv("XDG_RUNTIME_DIR");
+  const std::string runtime = before != nullptr ? before : "";
+  ::setenv("XDG_RUNTIME_DIR", session.c_str(), 1);
+  {
+    const LocalListener listener(loop_, defaultSocketPath(listening), [](Connection) {});
+    ::unsetenv("XDG_RUNTIME_DIR");
+    EXPECT_EQ(findServerSocket(listening), listener.path());
+  }
+  if (before != nullptr) ::setenv("XDG_RUNTIME_DIR", runtime.c_str(), 1);
+  if (made) std::filesystem::remove_all(madeBoth ? sessions : session);
+}
+
 #ifndef HAPTICD_SANITIZED
 // Another listener takes each descriptor that becomes free.
 TEST_F(LocalSocket, OutOfDescriptorsItTellsAndAcceptsLater) {

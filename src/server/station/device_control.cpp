@@ -69,7 +69,8 @@ bool DeviceControl::rearmForces(const Order& order, const Sender& sender, bool f
     refusal = {RefusalCode::stoppedByOther,
                "Rearm_Forces refused: " + other.description + " stopped the forces" +
                    (gone(other) ? " and is gone" : "") + "; " + (gone(other) ? "" : "it may re-arm, or ") +
-                   "an operator, or 'hapticd stop --rearm' by the server's user on its machine"};
+                   "an operator, or the server's user on its machine: 'hapticd stop --rearm NAME@host', or "
+                   "NAME@unix:PATH if its socket is elsewhere"};
     return false;
   }
   const bool otherStop = stops - stopsBefore_ != stopsOfClients_;  // a signal, or a machine that slept
