@@ -555,6 +555,9 @@ class Core(Commands):
         if not self.connected and self._counts.connections and not self.options.reconnect:
             raise ConnectionLost(f"connection to {self.server} lost: {self._why_not_connected()}")
 
+    def _not_acknowledged(self) -> str:
+        return f"{self.server} acknowledged nothing for {self.options.send_timeout:g} s"
+
     def _why_not_connected(self) -> str:
         server, failure = self.server, self._last_failure
         if "refused" in failure.lower():

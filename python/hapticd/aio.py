@@ -42,7 +42,7 @@ from ._core import (
     as_vertices,
 )
 from ._peer import ProtocolError
-from .client import has_ended, unacknowledged
+from .client import LossWatch, has_ended, unacknowledged
 from .errors import ConnectError, ConnectionLost
 from .scene import Capabilities, RemoteContact, Reports
 
@@ -227,6 +227,7 @@ class Client(Core):
         self._loop = asyncio.get_running_loop()
         self._transport: Optional[asyncio.Transport] = None
         self._udp: Optional[asyncio.DatagramTransport] = None
+        self._loss: Optional[LossWatch] = None
         self._remote = ""
         self._early = b""  # of the stream, before the datagram socket exists
         self._lost = asyncio.Event()
@@ -309,6 +310,8 @@ class Client(Core):
             transport.abort()
             return
         self._transport = transport
+        with suppress(OSError):  # the server has ended it already
+            self._loss = LossWatch(transport.get_extra_info("socket"), self.options.send_timeout)
         self._remote = str(transport.get_extra_info("peername")[0])
         if not reverse:
             self._begin(None)
@@ -333,7 +336,7 @@ class Client(Core):
     def _gone(self, reason: str) -> None:
         if self._transport is None:
             return
-        self._transport = None
+        self._transport = self._loss = None
         if self._udp is not None:
             self._udp.close()
             self._udp = None
@@ -409,6 +412,8 @@ class Client(Core):
             return self._abort("it accepts connections, but does not answer as a VRPN server")
         if self._transport is None:
             return
+        if self._loss is not None and not self._transport.is_closing() and self._loss.is_lost():
+            return self._abort(self._not_acknowledged())
         at = self._run_timers()
         self._push()
         self._timer = self._loop.call_later(max(0.0, at - time.monotonic()), _turn_of, weakref.ref(self))

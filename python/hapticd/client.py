@@ -11,6 +11,7 @@ import os
 import select
 import selectors
 import socket
+import struct
 import sys
 import time
 from collections import deque
@@ -45,6 +46,12 @@ from .errors import ConnectError, ConnectionLost
 from .scene import Capabilities, RemoteContact, Reports
 
 _RECEIVE_BYTES = 1 << 20
+#: Options of the system's probes: macOS has another name for the first, and systems may lack some.
+_PROBES = ((("TCP_KEEPIDLE", "TCP_KEEPALIVE"), 5), (("TCP_KEEPINTVL",), 5), (("TCP_KEEPCNT",), 3))
+_LOSS_CHECK_S = 0.5
+#: Of Linux's tcp_info: tcpi_unacked, tcpi_last_data_recv and tcpi_last_ack_recv, and tcpi_snd_wnd (since Linux 5.4).
+_TCP_INFO = struct.Struct("=24xI24xII")
+_TCP_INFO_WINDOW = slice(228, 232)
 _CONNECT_PROGRESS = (10035, 36, 115, 11)  # WSAEWOULDBLOCK, EINPROGRESS (macOS, Linux), EAGAIN
 
 
@@ -67,6 +74,45 @@ def has_ended(sock: socket.socket) -> bool:
     waiting = select.poll()
     waiting.register(sock.fileno(), select.POLLRDHUP)  # errors are reported in any case
     return bool(waiting.poll(0))
+
+
+class LossWatch:
+    """Notices that the peer's machine is gone, or the way to it, as the C++ client does. The system probes an idle peer
+    after 5 s and ends the connection when three probes have no answer. While sent bytes wait for an acknowledgement it
+    does not probe, and itself waits for a quarter of an hour: where it says so (on Linux), the peer is lost when nothing
+    has come from it for the timeout. A peer whose program does not read still acknowledges, and is not lost; the timeout
+    of the system (TCP_USER_TIMEOUT) would end it."""
+
+    def __init__(self, sock: Any, timeout: float) -> None:
+        """Raises OSError."""
+        self._sock = sock
+        self._timeout = timeout
+        self._checked = time.monotonic()
+        self._waited: Optional[float] = None  # since an acknowledgement became due
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        for names, value in _PROBES:
+            option = next((getattr(socket, name) for name in names if hasattr(socket, name)), None)
+            if option is not None:
+                sock.setsockopt(socket.IPPROTO_TCP, option, value)
+
+    def is_lost(self) -> bool:
+        """To be called at least every second. After a stall of this machine the answers are still in its queues, so the
+        time between two checks counts for two seconds at most."""
+        at = time.monotonic()
+        gap = at - self._checked
+        if sys.platform != "linux" or self._timeout <= 0 or gap < _LOSS_CHECK_S:
+            return False
+        self._checked = at
+        info = self._sock.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TCP_INFO_WINDOW.stop)
+        in_flight, *heard_ms = _TCP_INFO.unpack_from(info)
+        closed = info[_TCP_INFO_WINDOW] == bytes(4)  # the peer takes no bytes at present
+        if not in_flight or closed:
+            self._waited = None
+        elif self._waited is None:
+            self._waited = 0.0
+        else:
+            self._waited = min(self._waited + min(gap, 2.0), min(heard_ms) / 1000)
+        return self._waited is not None and self._waited >= self._timeout
 
 
 class Client(Core):
@@ -99,6 +145,7 @@ class Client(Core):
         self._listener: Optional[socket.socket] = None
         self._request: Optional[socket.socket] = None
         self._request_text = b""
+        self._loss: Optional[LossWatch] = None
         self._remote = ""  # numeric address of the server's side of the TCP connection
         self._request_at = 0.0
         self._retry_at = 0.0
@@ -191,6 +238,7 @@ class Client(Core):
         for sock in (self._sock, self._udp, self._listener, self._request):
             self._unwatch(sock)
         self._sock = self._udp = self._listener = self._request = None
+        self._loss = None
         self._connecting = False
         self._out.clear()
         self._out_bytes = 0
@@ -261,7 +309,7 @@ class Client(Core):
         try:
             self._remote = str(self._sock.getpeername()[0])
             self._sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self._sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+            self._loss = LossWatch(self._sock, self.options.send_timeout)
         except OSError as error:  # the server has ended it already
             return self._fail(str(error))
         self._connecting = False
@@ -376,6 +424,8 @@ class Client(Core):
                 until = min(until, self._request_at)
         if self._handshake_expired():
             self._fail("it accepts connections, but does not answer as a VRPN server")
+        if self._loss is not None and self._loss.is_lost():
+            self._fail(self._not_acknowledged())
         if self._sock is not None and not self._connecting:
             until = min(until, self._run_timers())
         self._push()

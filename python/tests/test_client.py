@@ -5,6 +5,7 @@ import gc
 import os
 import pathlib
 import select
+import shutil
 import signal
 import socket
 import struct
@@ -26,6 +27,7 @@ from hapticd import _messages as m
 from hapticd._codec import frame
 from hapticd._core import _NUMBERS
 from hapticd._peer import COOKIE, TYPE_NAMES, Peer, _description
+from hapticd.client import LossWatch
 
 WIRE = pathlib.Path(__file__).resolve().parents[2] / "testdata/wire"
 
@@ -326,6 +328,106 @@ def test_texts_that_are_too_long_are_refused(server: Server) -> None:
         assert hand.statistics().messages_out == sent
         hand.mark("x" * 255)
         hand.send_text("ä" * 511)
+
+
+#: In a network of its own, which it breaks.
+BREAKS_THE_NETWORK = """
+import asyncio, subprocess, sys, time
+import hapticd
+from conftest import Server
+
+server = Server()
+
+
+def link(state):
+    subprocess.run(["ip", "link", "set", "lo", state], check=True)
+
+
+def connect():
+    reading = [hapticd.connect(server.tcp), hapticd.connect(server.udp)]
+    beating = hapticd.connect(server.tcp)
+    beating.enable_heartbeat()
+    return [*reading, beating]
+
+
+async def main():
+    hands = connect()
+    looping = [await hapticd.aio.connect(server.tcp), await hapticd.aio.connect(server.udp)]
+    beating = await hapticd.aio.connect(server.tcp)
+    await beating.enable_heartbeat()
+    looping.append(beating)
+
+    async def until(connected):
+        deadline = time.monotonic() + 120
+        while any(hand.connected != connected for hand in [*hands, *looping]):
+            assert time.monotonic() < deadline, [hand.connected for hand in [*hands, *looping]]
+            for hand in hands:
+                hand.poll()
+            await asyncio.sleep(0.02)
+
+    await until(True)
+    link("down")
+    await until(False)
+    link("up")
+    await until(True)
+    for hand in hands:
+        hand.close()
+    for hand in looping:
+        await hand.close()
+
+
+try:
+    asyncio.run(main())
+finally:
+    server.stop()
+"""
+
+
+def test_a_lost_network_is_noticed_and_the_client_reconnects() -> None:
+    """Nothing tells a client that only reads of the end of its server's machine."""
+    network = ["unshare", "--user", "--map-root-user", "--net", "sh", "-c", 'ip link set lo up && exec "$@"', "sh"]
+    if shutil.which("unshare") is None or subprocess.run([*network, "true"], capture_output=True).returncode != 0:
+        pytest.skip("no network of its own here")
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(pathlib.Path(__file__).parent), *sys.path])}
+    subprocess.run([*network, sys.executable, "-c", BREAKS_THE_NETWORK], check=True, env=environment, timeout=400)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not say what is acknowledged")
+def test_a_peer_that_does_not_read_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    seconds = 100.0
+    monkeypatch.setattr(time, "monotonic", lambda: seconds)
+
+    class Socket:
+        in_flight, data_ms, acknowledgement_ms, window = 0, 60000, 60000, 1
+
+        def setsockopt(self, *_: int) -> None: ...
+        def getsockopt(self, *_: int) -> bytes:
+            return struct.pack("=24xI24xII168xI", self.in_flight, self.data_ms, self.acknowledgement_ms, self.window)
+
+    def lost_within(sock: Socket, limit: float, step: float = 1.0, timeout: float = 10.0) -> bool:
+        nonlocal seconds
+        watch = LossWatch(sock, timeout)
+        for _ in range(int(limit / step)):
+            seconds += step
+            if watch.is_lost():
+                return True
+        return False
+
+    sock = Socket()
+    assert not lost_within(sock, 100), "nothing is awaited"
+    sock.in_flight = 1
+    assert not lost_within(sock, 10)
+    assert lost_within(sock, 12)
+    assert not lost_within(sock, 100, timeout=0)
+    assert not lost_within(sock, 100, step=50), "this machine stood still"
+    assert lost_within(sock, 12, step=0.1)
+    sock.window = 0
+    assert not lost_within(sock, 100), "its program does not read"
+    sock.window = 1
+    sock.data_ms = 100
+    assert not lost_within(sock, 100), "it sends reports"
+    sock.data_ms, sock.acknowledgement_ms = 60000, 100
+    assert not lost_within(sock, 100), "it acknowledges"
 
 
 def test_what_is_wrong_with_a_connection_is_named(server: Server) -> None:
