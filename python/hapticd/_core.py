@@ -623,25 +623,32 @@ class Core(Commands):
     def _identity(self) -> m.Identify:
         return m.Identify(self._token, self._key)
 
+    # What is sent again on every connection is encoded before it is kept: a value that its message cannot carry raises
+    # here, and not on the next connection.
+
     def _set_token(self, token: str) -> None:
         if token and not 16 <= len(token.encode()) <= 128:
             raise ValueError(f"present_token(): {len(token.encode())} characters; a token has 16 to 128")
         self._check_open()
+        self._frame(m.Identify(token, self._key))
         self._token = token
         if self.connected and token:
             self._put_now(self._identity())
 
     def _set_subscription(self, kinds: Reports, rate_Hz: float) -> None:
         self._check_open()
-        self._subscription = m.Subscribe(int(kinds), rate_Hz)
+        subscription = m.Subscribe(int(kinds), rate_Hz)
+        self._frame(subscription)
+        self._subscription = subscription
         if rate_Hz > 0:
             self._update_rate = None
         if self.connected:
-            self._put_now(self._subscription)
+            self._put_now(subscription)
 
     def set_update_rate(self, rate_Hz: float) -> None:
         """Sets the report rate of this client, also for every new connection."""
         self._check_open()
+        self._frame(m.TrackerSetUpdateRate(rate_Hz))
         if self.connected:
             super().set_update_rate(rate_Hz)
         self._update_rate = rate_Hz
@@ -653,10 +660,10 @@ class Core(Commands):
 
     def _set_heartbeats(self, enable: bool) -> None:
         self._check_open()
-        self._heartbeats = enable
+        self._heartbeats = bool(enable)
         if self.connected:
             self._heartbeat_at = time.monotonic() + HEARTBEAT_S
-            self._put_now(m.Heartbeat(int(enable)))
+            self._put_now(m.Heartbeat(int(self._heartbeats)))
 
     # --- streamed state
 

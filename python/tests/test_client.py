@@ -638,6 +638,39 @@ def test_ctrl_c_ends_a_wait_and_nothing_is_left(server: Server) -> None:
         until(hand, lambda: hand.latest.force.force_N[0] == 0)
 
 
+def test_a_value_that_was_refused_does_not_come_back_on_the_next_connection() -> None:
+    scripted = ScriptedServer()
+    right = "0123456789abcdef"
+    with hapticd.connect(scripted.name) as hand:
+        hand.wait_capabilities()
+        hand.subscribe(Reports.FORCE, 100)
+        hand.present_token(right)
+
+        def refuse() -> None:
+            for call, value in [(hand.subscribe, -1), (hand.present_token, right + "\0"), (hand.set_update_rate, "fast")]:
+                with pytest.raises(ValueError):
+                    call(value)
+
+        refuse()
+        hand.send_text("end")
+        hand.flush_all()
+        scripted.wait_for("vrpn_Base text_message")
+        hand._fail("lost")
+        hand.set_update_rate(50)
+        refuse()
+        scripted.received.clear()
+        until(hand, lambda: hand.connected)
+        hand.send_text("end")
+        hand.flush_all()
+        scripted.wait_for("vrpn_Base text_message")
+    names = [_NUMBERS[kind][1].name for kind in (m.Identify, m.Subscribe, m.TrackerSetUpdateRate)]
+    again = {name: payload for name, payload in scripted.received if name in names}
+    assert list(again) == names
+    assert _NUMBERS[m.Subscribe][1].decode(again[names[1]]) == m.Subscribe(int(Reports.FORCE), 100)
+    assert _NUMBERS[m.TrackerSetUpdateRate][1].decode(again[names[2]]) == m.TrackerSetUpdateRate(50)
+    scripted.close()
+
+
 @pytest.mark.parametrize("way", ["tcp", "udp"])
 def test_a_client_ends_with_its_last_name(server: Server, way: str) -> None:
     """Also where the garbage collector does not run: what is left of the client would go on pushing the hand."""
