@@ -89,10 +89,11 @@ class Subscription(Generic[Report]):
 
 
 class Ending:
-    """How long a client that closes waits for the server; the send timeout in seconds."""
+    """How long a client that closes waits for the server; times in seconds, `longest` in any case."""
 
-    def __init__(self, send_timeout: float) -> None:
+    def __init__(self, send_timeout: float, longest: float) -> None:
         self._send_timeout = send_timeout
+        self._end = time.monotonic() + longest
         self._left = -1
         self._progress = 0.0
 
@@ -101,7 +102,7 @@ class Ending:
         at = time.monotonic()
         if left != self._left:
             self._left, self._progress = left, at
-        return at - self._progress > (self._send_timeout if left else END_S)
+        return at > self._end or at - self._progress > (self._send_timeout if left else END_S)
 
 
 Arrival = Tuple[int, int, int, float, bytes]  # kind, seconds, microseconds, time of arrival, payload

@@ -17,7 +17,7 @@ import time
 import weakref
 from collections import deque
 from contextlib import asynccontextmanager, suppress
-from typing import Any, AsyncIterator, Callable, Deque, Generator, List, Optional, Sequence, Set, Tuple
+from typing import Any, AsyncIterator, Callable, Deque, Generator, List, Optional, Sequence, Set, Tuple, Type
 
 import numpy as np
 import numpy.typing as npt
@@ -189,13 +189,13 @@ def _turn_of(reference: "weakref.ref[Client]") -> None:
         client._turn()
 
 
-async def _end_stream(transport: asyncio.Transport, send_timeout: float) -> None:
+async def _end_stream(transport: asyncio.Transport, send_timeout: float, longest: float) -> None:
     """Ends a stream behind what was written, and discards what arrives until the server has ended its own; see
     hapticd.Client.close()."""
     protocol, sock = transport.get_protocol(), transport.get_extra_info("socket")
     if not isinstance(protocol, _Stream):  # the stream has ended, and its transport has let go of it
         return
-    end = Ending(send_timeout)
+    end = Ending(send_timeout, longest)
     try:
         with suppress(OSError):  # the server has ended it already
             transport.write_eof()  # behind what waits in the transport
@@ -210,7 +210,7 @@ async def _end_stream(transport: asyncio.Transport, send_timeout: float) -> None
 
 def _end(stream: Optional[asyncio.Transport], send_timeout: float, *what: Any) -> None:
     if stream is not None:
-        asyncio.get_running_loop().create_task(_end_stream(stream, send_timeout))
+        asyncio.get_running_loop().create_task(_end_stream(stream, send_timeout, float("inf")))
     for one in what:
         if isinstance(one, asyncio.BaseTransport):
             one.close()
@@ -252,9 +252,13 @@ class Client(Core):
 
     async def close(self) -> None:
         """Sends what is collected, waits until the server has read it, and closes all sockets, as
-        hapticd.Client.close(); cancelled, it closes them at once. From its first step on every command, and everything
-        that waits, raises ConnectionLost; `latest` is empty. Does nothing the second time. A client whose last name is
-        gone closes, too, as hapticd.Client, as long as the event loop runs."""
+        hapticd.Client.close(); cancelled, it closes them at once. An `async with` block that is cancelled, as by Ctrl-C, waits
+        no longer than 1 s. From its first step on every command, and everything that waits, raises ConnectionLost; `latest`
+        is empty. Does nothing the second time. A client whose last name is gone closes, too, as hapticd.Client, as long as
+        the event loop runs."""
+        await self._close(float("inf"))
+
+    async def _close(self, longest: float) -> None:
         if self._finished:
             return
         if self.connected:
@@ -274,14 +278,15 @@ class Client(Core):
             if handle is not None:
                 handle.cancel()
         if transport is not None:
-            await _end_stream(transport, self.options.send_timeout)
+            await _end_stream(transport, self.options.send_timeout, longest)
             await asyncio.sleep(0)  # the transport closes its socket in the next turn
 
     async def __aenter__(self) -> "Client":
         return self
 
-    async def __aexit__(self, *_: object) -> None:
-        await self.close()
+    async def __aexit__(self, kind: Optional[Type[BaseException]], *_: object) -> None:
+        interrupted = kind is not None and issubclass(kind, (asyncio.CancelledError, KeyboardInterrupt))
+        await self._close(END_S if interrupted else float("inf"))
 
     def __del__(self) -> None:
         if hasattr(self, "_task") and not self._finished:
@@ -770,9 +775,9 @@ class _Connecting:
         self._client = await self._open()
         return self._client
 
-    async def __aexit__(self, *_: object) -> None:
+    async def __aexit__(self, *reason: Any) -> None:
         assert self._client is not None
-        await self._client.close()
+        await self._client.__aexit__(*reason)
 
 
 def connect(device: str, options: Optional[Options] = None, **fields: Any) -> _Connecting:

@@ -16,7 +16,7 @@ import sys
 import time
 from collections import deque
 from contextlib import contextmanager, suppress
-from typing import Any, Callable, Deque, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Deque, Iterator, List, Optional, Sequence, Tuple, Type
 
 import numpy as np
 import numpy.typing as npt
@@ -52,6 +52,8 @@ _LOSS_CHECK_S = 0.5
 #: Of Linux's tcp_info: tcpi_unacked, tcpi_last_data_recv and tcpi_last_ack_recv, and tcpi_snd_wnd (since Linux 5.4).
 _TCP_INFO = struct.Struct("=24xI24xII")
 _TCP_INFO_WINDOW = slice(228, 232)
+#: Ctrl-C while bytes are moved: how many were is not known, and what follows would not begin with a frame.
+_INTERRUPTED = "interrupted in the middle of a message"
 _CONNECT_PROGRESS = (10035, 36, 115, 11)  # WSAEWOULDBLOCK, EINPROGRESS (macOS, Linux), EAGAIN
 
 
@@ -165,8 +167,12 @@ class Client(Core):
         The server ends the client's forces. The wait ends, too, when a server that has received everything does not
         answer for 1 s, or when none receives anything for Options.send_timeout: the rest is then lost. Reports that
         arrive meanwhile are discarded. From then on every command, and everything that waits, raises ConnectionLost;
-        `latest` and statistics() stay. Does nothing the second time. A client whose last name is gone closes, too; a
-        callback that uses the client is such a name, until the garbage collector runs."""
+        `latest` and statistics() stay. Does nothing the second time. A `with` block that Ctrl-C ends waits no longer than
+        1 s. A client whose last name is gone closes, too; a callback that uses the client is such a name, until the
+        garbage collector runs."""
+        self._close(float("inf"))
+
+    def _close(self, longest: float) -> None:
         if self._finished:
             return
         was_connected = self.connected
@@ -176,17 +182,17 @@ class Client(Core):
         try:
             if was_connected and self._sock is not None:
                 with suppress(OSError):
-                    self._end_stream(self._sock)
+                    self._end_stream(self._sock, longest)
         finally:
             self._drop_sockets()
             self._closed("closed")
             self._selector.close()
 
-    def _end_stream(self, sock: socket.socket) -> None:
+    def _end_stream(self, sock: socket.socket, longest: float) -> None:
         """Ends the stream behind what is collected, and discards what arrives until the server has ended its own: the
         system resets a connection that is closed with unread reports, and drops what it has not sent. Raises
         OSError."""
-        end = Ending(self.options.send_timeout)
+        end = Ending(self.options.send_timeout, longest)
         ended = False
         with selectors.DefaultSelector() as waiting:
             waiting.register(sock, selectors.EVENT_READ | selectors.EVENT_WRITE)
@@ -206,8 +212,9 @@ class Client(Core):
     def __enter__(self) -> "Client":
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(self, kind: Optional[Type[BaseException]], *_: object) -> None:
+        interrupted = kind is not None and issubclass(kind, KeyboardInterrupt)
+        self._close(END_S if interrupted else float("inf"))
 
     def __del__(self) -> None:
         if hasattr(self, "_selector"):
@@ -345,6 +352,9 @@ class Client(Core):
                 return self._fail(f"it broke the VRPN protocol: {error}")
             except OSError as error:
                 return self._fail(str(error))
+            except BaseException:
+                self._fail(_INTERRUPTED)
+                raise
         self._push()
 
     def _on_datagrams(self, _: int) -> None:
@@ -378,14 +388,17 @@ class Client(Core):
         if peer is None or sock is None or self._connecting:
             return
         self._uncounted = 0
-        if peer.stream:
-            data = memoryview(peer.take_stream())
-            self._out.append(data)
-            self._out_bytes += len(data)
         try:
+            if peer.stream:
+                data = memoryview(peer.take_stream())
+                self._out.append(data)
+                self._out_bytes += len(data)
             self._write(sock)
         except OSError as error:
             return self._fail(str(error))
+        except BaseException:
+            self._fail(_INTERRUPTED)
+            raise
         if self._udp is not None and self._udp_target is not None:
             for datagram in peer.take_datagrams():
                 try:
@@ -594,7 +607,8 @@ class Client(Core):
         bytes. A server of this project receives it in a batch, so that no tick renders part of the mesh; other
         servers receive three set_vertex() per triangle. Replaces the mesh that the object has; set_vertices()
         changes parts of it. Inside batch() it only collects. Raises ValueError for a wrong shape or a triangle with an
-        index outside the vertices, ConnectError and ConnectionLost."""
+        index outside the vertices, ConnectError and ConnectionLost. Ctrl-C, or an exception of `progress`, ends the upload
+        and the connection: the server then takes back what it has of the batch, and the client reconnects."""
         rows = as_vertices(vertices)
         self._upload(object, rows, as_triangles(triangles, len(rows)), progress)
 
@@ -621,10 +635,17 @@ class Client(Core):
         frames = self._batched(frames)
         total = sum(map(len, frames))
         self._counts.messages_out += messages
-        assert self._peer is not None
-        self._peer.stream.extend(frames)
+        peer = self._peer
+        assert peer is not None
         report = progress or (lambda _: None)
-        self._drain_to(0, lambda: report(UploadProgress(total - self._out_bytes, total)) if self._out_bytes else None)
+        try:
+            peer.stream.extend(frames)
+            self._drain_to(0, lambda: report(UploadProgress(total - self._out_bytes, total)) if self._out_bytes else None)
+        except BaseException:
+            # A server takes back what it has of a batch when the connection ends, and only then.
+            if peer is self._peer and (self._out or peer.stream):
+                self._fail("an upload was interrupted")
+            raise
         report(UploadProgress(total, total))
 
     @contextmanager

@@ -145,6 +145,35 @@ def test_a_server_that_has_stopped_does_not_keep_a_client_that_closes() -> None:
     run(main())
 
 
+def test_a_block_that_is_cancelled_does_not_wait_for_the_server() -> None:
+    scripted = ScriptedServer()
+
+    async def upload(steps: "List[hapticd.UploadProgress]") -> None:
+        async with hapticd.aio.connect(scripted.name, send_timeout=100) as hand:
+            await hand.wait_capabilities()
+            scripted.reads.clear()  # the system takes only a part of the mesh
+            await hand.upload_mesh(0, *hapticd.sphere(25, rings=600), steps.append)
+
+    async def main() -> None:
+        steps: List[hapticd.UploadProgress] = []
+        task = asyncio.ensure_future(upload(steps))
+        while not steps:
+            await asyncio.sleep(0.01)
+        start = time.monotonic()
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        assert time.monotonic() - start < 60
+        scripted.reads.set()
+        async with hapticd.aio.connect(scripted.name, connect_timeout=60):  # after the end of the first connection
+            pass
+
+    run(main())
+    edges = [name.rpartition("_")[2] for name, _ in scripted.received if name.startswith("hapticd Batch_")]
+    assert edges == ["Begin"]
+    scripted.close()
+
+
 @pytest.mark.parametrize("way", ["tcp", "udp"])
 def test_a_forked_process_does_not_keep_a_connection(server: Server, way: str) -> None:
     """As the workers of a ProcessPoolExecutor."""

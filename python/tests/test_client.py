@@ -671,6 +671,82 @@ def test_a_value_that_was_refused_does_not_come_back_on_the_next_connection() ->
     scripted.close()
 
 
+def test_an_upload_that_is_interrupted_does_not_appear() -> None:
+    vertices, triangles = hapticd.sphere(25, rings=600)
+    scripted = ScriptedServer()
+    with hapticd.connect(scripted.name, send_timeout=100) as hand:
+        hand.wait_capabilities()
+        events: List[bool] = []
+        hand.on_connection(lambda c: events.append(c.connected))
+        hand.poll()
+        scripted.reads.clear()  # the system takes only a part of the mesh
+        sent = hand._counts.tcp_bytes_out
+
+        def interrupt() -> None:
+            while hand._counts.tcp_bytes_out < sent + 100000:
+                time.sleep(0.01)
+            os.kill(os.getpid(), signal.SIGINT)
+
+        interrupter = threading.Thread(target=interrupt, daemon=True)
+        interrupter.start()
+        with pytest.raises(KeyboardInterrupt):
+            hand.upload_mesh(0, vertices, triangles)
+        interrupter.join()
+        scripted.reads.set()
+        until(hand, lambda: events[-2:] == [False, True], 20)
+        hand.send_text("end")
+        hand.flush_all()
+        scripted.wait_for("vrpn_Base text_message")
+        edges = [name.rpartition("_")[2] for name, _ in scripted.received if name.startswith("hapticd Batch_")]
+        assert edges == ["Begin"]
+        hand.upload_mesh(0, *hapticd.sphere(25))
+    edges = [name.rpartition("_")[2] for name, _ in scripted.received if name.startswith("hapticd Batch_")]
+    assert edges == ["Begin", "Begin", "Commit"]
+    scripted.close()
+
+
+def test_a_block_that_ctrl_c_ends_does_not_wait_for_the_server() -> None:
+    scripted = ScriptedServer()
+    with pytest.raises(KeyboardInterrupt):
+        with hapticd.connect(scripted.name, queue_limit_bytes=1 << 30, send_timeout=100) as hand:
+            hand.wait_capabilities()
+            scripted.reads.clear()
+            hand.set_vertices(0, 0, np.zeros((1000000, 3)))  # more than the system takes
+            start = time.monotonic()
+            raise KeyboardInterrupt
+    assert time.monotonic() - start < 60
+    scripted.reads.set()
+    scripted.close()
+
+
+@pytest.mark.parametrize("where", ["_write", "_received"])
+def test_ctrl_c_in_the_middle_of_a_message_does_not_garble_the_next(where: str) -> None:
+    scripted = ScriptedServer()
+    with hapticd.connect(scripted.name) as hand:
+        hand.wait_capabilities()
+        move = getattr(hand, where)
+
+        def half(bytes_or_socket: Any) -> None:
+            if where == "_received":
+                move(bytes_or_socket[: len(bytes_or_socket) // 2])
+            else:
+                bytes_or_socket.send(hand._out[0][:10])
+            raise KeyboardInterrupt
+
+        setattr(hand, where, half)
+        hand._ping()
+        with pytest.raises(KeyboardInterrupt):
+            hand.run_for(60)
+        setattr(hand, where, move)
+        events: List[bool] = []
+        hand.on_connection(lambda c: events.append(c.connected))
+        until(hand, lambda: events == [False, True] and hand._answered, 20)
+        hand.send_text("end")
+        hand.flush_all()
+        scripted.wait_for("vrpn_Base text_message")
+    scripted.close()
+
+
 @pytest.mark.parametrize("way", ["tcp", "udp"])
 def test_a_client_ends_with_its_last_name(server: Server, way: str) -> None:
     """Also where the garbage collector does not run: what is left of the client would go on pushing the hand."""
