@@ -129,6 +129,17 @@ def test_buttons_effects_planes_and_guard(server: Server) -> None:
         until(hand, lambda: hand.latest.force.force_N[1] == 0)
 
 
+def test_sets_of_trips_combine_to_sets_of_trips() -> None:
+    names = [trip[0] for trip in m.TRIPS]
+    first, both = hapticd.Trips(1), hapticd.Trips(1) | hapticd.Trips(2)
+    assert both.names == (names[0], names[1]) and names[1] in both and both.explain().count("\n") == 1
+    for trips in (both & first, both ^ hapticd.Trips(2), 1 & both, 0 | first, 2 ^ both):
+        assert isinstance(trips, hapticd.Trips) and trips.names == (names[0],)
+    trips = first
+    trips |= 2
+    assert trips.names == both.names
+
+
 def test_errors_have_the_servers_text(server: Server) -> None:
     with hapticd.connect(server.tcp, throw_on_error=True) as hand:
         texts: List[hapticd.TextReport] = []
