@@ -17,6 +17,7 @@ import time
 import weakref
 from collections import deque
 from contextlib import asynccontextmanager, suppress
+from contextvars import ContextVar
 from typing import Any, AsyncIterator, Callable, Deque, Generator, List, Optional, Sequence, Set, Tuple, Type
 
 import numpy as np
@@ -45,6 +46,10 @@ from ._peer import ProtocolError
 from .client import LossWatch, has_ended, unacknowledged
 from .errors import ConnectError, ConnectionLost
 from .scene import Capabilities, RemoteContact, Reports
+
+
+#: The batches that this task is in: its own, and those in which it was made.
+_BATCHES: "ContextVar[Tuple[object, ...]]" = ContextVar("hapticd_batches", default=())
 
 
 class _Stream(asyncio.Protocol):
@@ -234,7 +239,9 @@ class Client(Core):
         self._writable = asyncio.Event()
         self._writable.set()
         self._changed: Set["asyncio.Future[None]"] = set()
-        self._batches = asyncio.Lock()  # one after the other: they do not nest
+        self._collecting = asyncio.Lock()  # batches: one after the other, for they do not nest
+        self._batch: Optional[object] = None  # that is collected
+        self._sending = asyncio.Lock()  # batches and uploads
         self._timer: Optional[asyncio.TimerHandle] = None
         self._soon: Optional[asyncio.Handle] = None
         self._adopted: Optional["asyncio.Future[None]"] = None
@@ -268,18 +275,14 @@ class Client(Core):
         if transport is not None:
             self._gone("closed")
         self._deliver_all()  # ends waits that began before the first connection
-        if self._task is not None:
-            self._task.cancel()
-            try:
-                await self._task
-            except asyncio.CancelledError:
-                pass
-        for handle in (self._timer, self._soon):
-            if handle is not None:
-                handle.cancel()
+        for running in (self._timer, self._soon, self._task):
+            if running is not None:
+                running.cancel()
         if transport is not None:
             await _end_stream(transport, self.options.send_timeout, longest)
             await asyncio.sleep(0)  # the transport closes its socket in the next turn
+        if self._task is not None:
+            await asyncio.wait([self._task])
 
     async def __aenter__(self) -> "Client":
         return self
@@ -553,7 +556,7 @@ class Client(Core):
         progress: Optional[Callable[[UploadProgress], object]] = None,
     ) -> None:
         """Sends a mesh; see hapticd.Client.upload_mesh(). Cancelled before its first byte, it sends nothing; later,
-        the event loop sends the rest. Uploads and batches of several tasks follow each other."""
+        the event loop sends the rest. Uploads of several tasks follow each other; inside batch() it only collects."""
         rows = as_vertices(vertices)
         await self._upload(object, rows, as_triangles(triangles, len(rows)), progress)
 
@@ -577,7 +580,7 @@ class Client(Core):
             self._send_frames(frames, messages)
             return
         frames = self._batched(frames)
-        async with self._batches:
+        async with self._sending:
             await self._send_upload(frames, messages, progress)
 
     async def _send_upload(
@@ -607,22 +610,31 @@ class Client(Core):
 
     @asynccontextmanager
     async def batch(self) -> AsyncIterator[None]:
-        """async with hand.batch(): everything that the block commands takes effect in one tick. Other tasks must not
-        command meanwhile: what they send becomes part of the batch. See hapticd.Client.batch()."""
-        if self._held is None:
+        """async with hand.batch(): everything that the block commands takes effect in one tick. The batch of another task
+        begins when this one has ended; what else other tasks send meanwhile, uploads too, becomes part of it. See
+        hapticd.Client.batch()."""
+        if self._batch in _BATCHES.get():
+            self._begin_batch()  # raises RuntimeError
+        async with self._collecting:
             await self._require(m.FEATURE_BATCH, "make several changes visible at once")
-        self._begin_batch()
-        connection = self._counts.connections
-        try:
-            yield
-            await self._batches.acquire()
-        except BaseException:
-            self._end_batch(connection, send=False)
-            raise
-        try:
-            self._end_batch(connection, send=True)
-        finally:
-            self._batches.release()
+            self._begin_batch()
+            connection = self._counts.connections
+            self._batch = object()
+            within = _BATCHES.set((*_BATCHES.get(), self._batch))
+            try:
+                yield
+                await self._sending.acquire()
+            except BaseException:
+                self._end_batch(connection, send=False)
+                raise
+            finally:
+                self._batch = None
+                with suppress(ValueError):  # it ends in another task than it began
+                    _BATCHES.reset(within)
+            try:
+                self._end_batch(connection, send=True)
+            finally:
+                self._sending.release()
 
     # --- extensions; see hapticd.Client
 
