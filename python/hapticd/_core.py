@@ -89,10 +89,11 @@ class Subscription(Generic[Report]):
 
 
 class Ending:
-    """How long a client that closes waits for the server; the send timeout in seconds."""
+    """How long a client that closes waits for the server; times in seconds, `longest` in any case."""
 
-    def __init__(self, send_timeout: float) -> None:
+    def __init__(self, send_timeout: float, longest: float) -> None:
         self._send_timeout = send_timeout
+        self._end = time.monotonic() + longest
         self._left = -1
         self._progress = 0.0
 
@@ -101,7 +102,7 @@ class Ending:
         at = time.monotonic()
         if left != self._left:
             self._left, self._progress = left, at
-        return at - self._progress > (self._send_timeout if left else END_S)
+        return at > self._end or at - self._progress > (self._send_timeout if left else END_S)
 
 
 Arrival = Tuple[int, int, int, float, bytes]  # kind, seconds, microseconds, time of arrival, payload
@@ -558,6 +559,9 @@ class Core(Commands):
         if not self.connected and self._counts.connections and not self.options.reconnect:
             raise ConnectionLost(f"connection to {self.server} lost: {self._why_not_connected()}")
 
+    def _not_acknowledged(self) -> str:
+        return f"{self.server} acknowledged nothing for {self.options.send_timeout:g} s"
+
     def _why_not_connected(self) -> str:
         server, failure = self.server, self._last_failure
         if "refused" in failure.lower():
@@ -623,25 +627,32 @@ class Core(Commands):
     def _identity(self) -> m.Identify:
         return m.Identify(self._token, self._key)
 
+    # What is sent again on every connection is encoded before it is kept: a value that its message cannot carry raises
+    # here, and not on the next connection.
+
     def _set_token(self, token: str) -> None:
         if token and not 16 <= len(token.encode()) <= 128:
             raise ValueError(f"present_token(): {len(token.encode())} characters; a token has 16 to 128")
         self._check_open()
+        self._frame(m.Identify(token, self._key))
         self._token = token
         if self.connected and token:
             self._put_now(self._identity())
 
     def _set_subscription(self, kinds: Reports, rate_Hz: float) -> None:
         self._check_open()
-        self._subscription = m.Subscribe(int(kinds), rate_Hz)
+        subscription = m.Subscribe(int(kinds), rate_Hz)
+        self._frame(subscription)
+        self._subscription = subscription
         if rate_Hz > 0:
             self._update_rate = None
         if self.connected:
-            self._put_now(self._subscription)
+            self._put_now(subscription)
 
     def set_update_rate(self, rate_Hz: float) -> None:
         """Sets the report rate of this client, also for every new connection."""
         self._check_open()
+        self._frame(m.TrackerSetUpdateRate(rate_Hz))
         if self.connected:
             super().set_update_rate(rate_Hz)
         self._update_rate = rate_Hz
@@ -653,10 +664,10 @@ class Core(Commands):
 
     def _set_heartbeats(self, enable: bool) -> None:
         self._check_open()
-        self._heartbeats = enable
+        self._heartbeats = bool(enable)
         if self.connected:
             self._heartbeat_at = time.monotonic() + HEARTBEAT_S
-            self._put_now(m.Heartbeat(int(enable)))
+            self._put_now(m.Heartbeat(int(self._heartbeats)))
 
     # --- streamed state
 

@@ -17,7 +17,8 @@ import time
 import weakref
 from collections import deque
 from contextlib import asynccontextmanager, suppress
-from typing import Any, AsyncIterator, Callable, Deque, Generator, List, Optional, Sequence, Set, Tuple
+from contextvars import ContextVar
+from typing import Any, AsyncIterator, Callable, Deque, Generator, List, Optional, Sequence, Set, Tuple, Type
 
 import numpy as np
 import numpy.typing as npt
@@ -42,9 +43,13 @@ from ._core import (
     as_vertices,
 )
 from ._peer import ProtocolError
-from .client import has_ended, unacknowledged
+from .client import LossWatch, has_ended, unacknowledged
 from .errors import ConnectError, ConnectionLost
 from .scene import Capabilities, RemoteContact, Reports
+
+
+#: The batches that this task is in: its own, and those in which it was made.
+_BATCHES: "ContextVar[Tuple[object, ...]]" = ContextVar("hapticd_batches", default=())
 
 
 class _Stream(asyncio.Protocol):
@@ -189,13 +194,13 @@ def _turn_of(reference: "weakref.ref[Client]") -> None:
         client._turn()
 
 
-async def _end_stream(transport: asyncio.Transport, send_timeout: float) -> None:
+async def _end_stream(transport: asyncio.Transport, send_timeout: float, longest: float) -> None:
     """Ends a stream behind what was written, and discards what arrives until the server has ended its own; see
     hapticd.Client.close()."""
     protocol, sock = transport.get_protocol(), transport.get_extra_info("socket")
     if not isinstance(protocol, _Stream):  # the stream has ended, and its transport has let go of it
         return
-    end = Ending(send_timeout)
+    end = Ending(send_timeout, longest)
     try:
         with suppress(OSError):  # the server has ended it already
             transport.write_eof()  # behind what waits in the transport
@@ -210,7 +215,7 @@ async def _end_stream(transport: asyncio.Transport, send_timeout: float) -> None
 
 def _end(stream: Optional[asyncio.Transport], send_timeout: float, *what: Any) -> None:
     if stream is not None:
-        asyncio.get_running_loop().create_task(_end_stream(stream, send_timeout))
+        asyncio.get_running_loop().create_task(_end_stream(stream, send_timeout, float("inf")))
     for one in what:
         if isinstance(one, asyncio.BaseTransport):
             one.close()
@@ -227,13 +232,16 @@ class Client(Core):
         self._loop = asyncio.get_running_loop()
         self._transport: Optional[asyncio.Transport] = None
         self._udp: Optional[asyncio.DatagramTransport] = None
+        self._loss: Optional[LossWatch] = None
         self._remote = ""
         self._early = b""  # of the stream, before the datagram socket exists
         self._lost = asyncio.Event()
         self._writable = asyncio.Event()
         self._writable.set()
         self._changed: Set["asyncio.Future[None]"] = set()
-        self._batches = asyncio.Lock()  # one after the other: they do not nest
+        self._collecting = asyncio.Lock()  # batches: one after the other, for they do not nest
+        self._batch: Optional[object] = None  # that is collected
+        self._sending = asyncio.Lock()  # batches and uploads
         self._timer: Optional[asyncio.TimerHandle] = None
         self._soon: Optional[asyncio.Handle] = None
         self._adopted: Optional["asyncio.Future[None]"] = None
@@ -251,9 +259,13 @@ class Client(Core):
 
     async def close(self) -> None:
         """Sends what is collected, waits until the server has read it, and closes all sockets, as
-        hapticd.Client.close(); cancelled, it closes them at once. From its first step on every command, and everything
-        that waits, raises ConnectionLost; `latest` is empty. Does nothing the second time. A client whose last name is
-        gone closes, too, as hapticd.Client, as long as the event loop runs."""
+        hapticd.Client.close(); cancelled, it closes them at once. An `async with` block that is cancelled, as by Ctrl-C, waits
+        no longer than 1 s. From its first step on every command, and everything that waits, raises ConnectionLost; `latest`
+        is empty. Does nothing the second time. A client whose last name is gone closes, too, as hapticd.Client, as long as
+        the event loop runs."""
+        await self._close(float("inf"))
+
+    async def _close(self, longest: float) -> None:
         if self._finished:
             return
         if self.connected:
@@ -263,24 +275,21 @@ class Client(Core):
         if transport is not None:
             self._gone("closed")
         self._deliver_all()  # ends waits that began before the first connection
-        if self._task is not None:
-            self._task.cancel()
-            try:
-                await self._task
-            except asyncio.CancelledError:
-                pass
-        for handle in (self._timer, self._soon):
-            if handle is not None:
-                handle.cancel()
+        for running in (self._timer, self._soon, self._task):
+            if running is not None:
+                running.cancel()
         if transport is not None:
-            await _end_stream(transport, self.options.send_timeout)
+            await _end_stream(transport, self.options.send_timeout, longest)
             await asyncio.sleep(0)  # the transport closes its socket in the next turn
+        if self._task is not None:
+            await asyncio.wait([self._task])
 
     async def __aenter__(self) -> "Client":
         return self
 
-    async def __aexit__(self, *_: object) -> None:
-        await self.close()
+    async def __aexit__(self, kind: Optional[Type[BaseException]], *_: object) -> None:
+        interrupted = kind is not None and issubclass(kind, (asyncio.CancelledError, KeyboardInterrupt))
+        await self._close(END_S if interrupted else float("inf"))
 
     def __del__(self) -> None:
         if hasattr(self, "_task") and not self._finished:
@@ -309,6 +318,8 @@ class Client(Core):
             transport.abort()
             return
         self._transport = transport
+        with suppress(OSError):  # the server has ended it already
+            self._loss = LossWatch(transport.get_extra_info("socket"), self.options.send_timeout)
         self._remote = str(transport.get_extra_info("peername")[0])
         if not reverse:
             self._begin(None)
@@ -333,7 +344,7 @@ class Client(Core):
     def _gone(self, reason: str) -> None:
         if self._transport is None:
             return
-        self._transport = None
+        self._transport = self._loss = None
         if self._udp is not None:
             self._udp.close()
             self._udp = None
@@ -409,6 +420,8 @@ class Client(Core):
             return self._abort("it accepts connections, but does not answer as a VRPN server")
         if self._transport is None:
             return
+        if self._loss is not None and not self._transport.is_closing() and self._loss.is_lost():
+            return self._abort(self._not_acknowledged())
         at = self._run_timers()
         self._push()
         self._timer = self._loop.call_later(max(0.0, at - time.monotonic()), _turn_of, weakref.ref(self))
@@ -543,7 +556,7 @@ class Client(Core):
         progress: Optional[Callable[[UploadProgress], object]] = None,
     ) -> None:
         """Sends a mesh; see hapticd.Client.upload_mesh(). Cancelled before its first byte, it sends nothing; later,
-        the event loop sends the rest. Uploads and batches of several tasks follow each other."""
+        the event loop sends the rest. Uploads of several tasks follow each other; inside batch() it only collects."""
         rows = as_vertices(vertices)
         await self._upload(object, rows, as_triangles(triangles, len(rows)), progress)
 
@@ -567,7 +580,7 @@ class Client(Core):
             self._send_frames(frames, messages)
             return
         frames = self._batched(frames)
-        async with self._batches:
+        async with self._sending:
             await self._send_upload(frames, messages, progress)
 
     async def _send_upload(
@@ -597,22 +610,31 @@ class Client(Core):
 
     @asynccontextmanager
     async def batch(self) -> AsyncIterator[None]:
-        """async with hand.batch(): everything that the block commands takes effect in one tick. Other tasks must not
-        command meanwhile: what they send becomes part of the batch. See hapticd.Client.batch()."""
-        if self._held is None:
+        """async with hand.batch(): everything that the block commands takes effect in one tick. The batch of another task
+        begins when this one has ended; what else other tasks send meanwhile, uploads too, becomes part of it. See
+        hapticd.Client.batch()."""
+        if self._batch in _BATCHES.get():
+            self._begin_batch()  # raises RuntimeError
+        async with self._collecting:
             await self._require(m.FEATURE_BATCH, "make several changes visible at once")
-        self._begin_batch()
-        connection = self._counts.connections
-        try:
-            yield
-            await self._batches.acquire()
-        except BaseException:
-            self._end_batch(connection, send=False)
-            raise
-        try:
-            self._end_batch(connection, send=True)
-        finally:
-            self._batches.release()
+            self._begin_batch()
+            connection = self._counts.connections
+            self._batch = object()
+            within = _BATCHES.set((*_BATCHES.get(), self._batch))
+            try:
+                yield
+                await self._sending.acquire()
+            except BaseException:
+                self._end_batch(connection, send=False)
+                raise
+            finally:
+                self._batch = None
+                with suppress(ValueError):  # it ends in another task than it began
+                    _BATCHES.reset(within)
+            try:
+                self._end_batch(connection, send=True)
+            finally:
+                self._sending.release()
 
     # --- extensions; see hapticd.Client
 
@@ -765,9 +787,9 @@ class _Connecting:
         self._client = await self._open()
         return self._client
 
-    async def __aexit__(self, *_: object) -> None:
+    async def __aexit__(self, *reason: Any) -> None:
         assert self._client is not None
-        await self._client.close()
+        await self._client.__aexit__(*reason)
 
 
 def connect(device: str, options: Optional[Options] = None, **fields: Any) -> _Connecting:

@@ -11,11 +11,12 @@ import os
 import select
 import selectors
 import socket
+import struct
 import sys
 import time
 from collections import deque
 from contextlib import contextmanager, suppress
-from typing import Any, Callable, Deque, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Deque, Iterator, List, Optional, Sequence, Tuple, Type
 
 import numpy as np
 import numpy.typing as npt
@@ -45,6 +46,14 @@ from .errors import ConnectError, ConnectionLost
 from .scene import Capabilities, RemoteContact, Reports
 
 _RECEIVE_BYTES = 1 << 20
+#: Options of the system's probes: macOS has another name for the first, and systems may lack some.
+_PROBES = ((("TCP_KEEPIDLE", "TCP_KEEPALIVE"), 5), (("TCP_KEEPINTVL",), 5), (("TCP_KEEPCNT",), 3))
+_LOSS_CHECK_S = 0.5
+#: Of Linux's tcp_info: tcpi_unacked, tcpi_last_data_recv and tcpi_last_ack_recv, and tcpi_snd_wnd (since Linux 5.4).
+_TCP_INFO = struct.Struct("=24xI24xII")
+_TCP_INFO_WINDOW = slice(228, 232)
+#: Ctrl-C while bytes are moved: how many were is not known, and what follows would not begin with a frame.
+_INTERRUPTED = "interrupted in the middle of a message"
 _CONNECT_PROGRESS = (10035, 36, 115, 11)  # WSAEWOULDBLOCK, EINPROGRESS (macOS, Linux), EAGAIN
 
 
@@ -67,6 +76,45 @@ def has_ended(sock: socket.socket) -> bool:
     waiting = select.poll()
     waiting.register(sock.fileno(), select.POLLRDHUP)  # errors are reported in any case
     return bool(waiting.poll(0))
+
+
+class LossWatch:
+    """Notices that the peer's machine is gone, or the way to it, as the C++ client does. The system probes an idle peer
+    after 5 s and ends the connection when three probes have no answer. While sent bytes wait for an acknowledgement it
+    does not probe, and itself waits for a quarter of an hour: where it says so (on Linux), the peer is lost when nothing
+    has come from it for the timeout. A peer whose program does not read still acknowledges, and is not lost; the timeout
+    of the system (TCP_USER_TIMEOUT) would end it."""
+
+    def __init__(self, sock: Any, timeout: float) -> None:
+        """Raises OSError."""
+        self._sock = sock
+        self._timeout = timeout
+        self._checked = time.monotonic()
+        self._waited: Optional[float] = None  # since an acknowledgement became due
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        for names, value in _PROBES:
+            option = next((getattr(socket, name) for name in names if hasattr(socket, name)), None)
+            if option is not None:
+                sock.setsockopt(socket.IPPROTO_TCP, option, value)
+
+    def is_lost(self) -> bool:
+        """To be called at least every second. After a stall of this machine the answers are still in its queues, so the
+        time between two checks counts for two seconds at most."""
+        at = time.monotonic()
+        gap = at - self._checked
+        if sys.platform != "linux" or self._timeout <= 0 or gap < _LOSS_CHECK_S:
+            return False
+        self._checked = at
+        info = self._sock.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TCP_INFO_WINDOW.stop)
+        in_flight, *heard_ms = _TCP_INFO.unpack_from(info)
+        closed = info[_TCP_INFO_WINDOW] == bytes(4)  # the peer takes no bytes at present
+        if not in_flight or closed:
+            self._waited = None
+        elif self._waited is None:
+            self._waited = 0.0
+        else:
+            self._waited = min(self._waited + min(gap, 2.0), min(heard_ms) / 1000)
+        return self._waited is not None and self._waited >= self._timeout
 
 
 class Client(Core):
@@ -99,6 +147,7 @@ class Client(Core):
         self._listener: Optional[socket.socket] = None
         self._request: Optional[socket.socket] = None
         self._request_text = b""
+        self._loss: Optional[LossWatch] = None
         self._remote = ""  # numeric address of the server's side of the TCP connection
         self._request_at = 0.0
         self._retry_at = 0.0
@@ -118,8 +167,12 @@ class Client(Core):
         The server ends the client's forces. The wait ends, too, when a server that has received everything does not
         answer for 1 s, or when none receives anything for Options.send_timeout: the rest is then lost. Reports that
         arrive meanwhile are discarded. From then on every command, and everything that waits, raises ConnectionLost;
-        `latest` and statistics() stay. Does nothing the second time. A client whose last name is gone closes, too; a
-        callback that uses the client is such a name, until the garbage collector runs."""
+        `latest` and statistics() stay. Does nothing the second time. A `with` block that Ctrl-C ends waits no longer than
+        1 s. A client whose last name is gone closes, too; a callback that uses the client is such a name, until the
+        garbage collector runs."""
+        self._close(float("inf"))
+
+    def _close(self, longest: float) -> None:
         if self._finished:
             return
         was_connected = self.connected
@@ -129,17 +182,17 @@ class Client(Core):
         try:
             if was_connected and self._sock is not None:
                 with suppress(OSError):
-                    self._end_stream(self._sock)
+                    self._end_stream(self._sock, longest)
         finally:
             self._drop_sockets()
             self._closed("closed")
             self._selector.close()
 
-    def _end_stream(self, sock: socket.socket) -> None:
+    def _end_stream(self, sock: socket.socket, longest: float) -> None:
         """Ends the stream behind what is collected, and discards what arrives until the server has ended its own: the
         system resets a connection that is closed with unread reports, and drops what it has not sent. Raises
         OSError."""
-        end = Ending(self.options.send_timeout)
+        end = Ending(self.options.send_timeout, longest)
         ended = False
         with selectors.DefaultSelector() as waiting:
             waiting.register(sock, selectors.EVENT_READ | selectors.EVENT_WRITE)
@@ -159,8 +212,9 @@ class Client(Core):
     def __enter__(self) -> "Client":
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(self, kind: Optional[Type[BaseException]], *_: object) -> None:
+        interrupted = kind is not None and issubclass(kind, KeyboardInterrupt)
+        self._close(END_S if interrupted else float("inf"))
 
     def __del__(self) -> None:
         if hasattr(self, "_selector"):
@@ -191,6 +245,7 @@ class Client(Core):
         for sock in (self._sock, self._udp, self._listener, self._request):
             self._unwatch(sock)
         self._sock = self._udp = self._listener = self._request = None
+        self._loss = None
         self._connecting = False
         self._out.clear()
         self._out_bytes = 0
@@ -261,7 +316,7 @@ class Client(Core):
         try:
             self._remote = str(self._sock.getpeername()[0])
             self._sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self._sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+            self._loss = LossWatch(self._sock, self.options.send_timeout)
         except OSError as error:  # the server has ended it already
             return self._fail(str(error))
         self._connecting = False
@@ -297,6 +352,9 @@ class Client(Core):
                 return self._fail(f"it broke the VRPN protocol: {error}")
             except OSError as error:
                 return self._fail(str(error))
+            except BaseException:
+                self._fail(_INTERRUPTED)
+                raise
         self._push()
 
     def _on_datagrams(self, _: int) -> None:
@@ -330,14 +388,17 @@ class Client(Core):
         if peer is None or sock is None or self._connecting:
             return
         self._uncounted = 0
-        if peer.stream:
-            data = memoryview(peer.take_stream())
-            self._out.append(data)
-            self._out_bytes += len(data)
         try:
+            if peer.stream:
+                data = memoryview(peer.take_stream())
+                self._out.append(data)
+                self._out_bytes += len(data)
             self._write(sock)
         except OSError as error:
             return self._fail(str(error))
+        except BaseException:
+            self._fail(_INTERRUPTED)
+            raise
         if self._udp is not None and self._udp_target is not None:
             for datagram in peer.take_datagrams():
                 try:
@@ -376,6 +437,8 @@ class Client(Core):
                 until = min(until, self._request_at)
         if self._handshake_expired():
             self._fail("it accepts connections, but does not answer as a VRPN server")
+        if self._loss is not None and self._loss.is_lost():
+            self._fail(self._not_acknowledged())
         if self._sock is not None and not self._connecting:
             until = min(until, self._run_timers())
         self._push()
@@ -544,7 +607,8 @@ class Client(Core):
         bytes. A server of this project receives it in a batch, so that no tick renders part of the mesh; other
         servers receive three set_vertex() per triangle. Replaces the mesh that the object has; set_vertices()
         changes parts of it. Inside batch() it only collects. Raises ValueError for a wrong shape or a triangle with an
-        index outside the vertices, ConnectError and ConnectionLost."""
+        index outside the vertices, ConnectError and ConnectionLost. Ctrl-C, or an exception of `progress`, ends the upload
+        and the connection: the server then takes back what it has of the batch, and the client reconnects."""
         rows = as_vertices(vertices)
         self._upload(object, rows, as_triangles(triangles, len(rows)), progress)
 
@@ -571,10 +635,17 @@ class Client(Core):
         frames = self._batched(frames)
         total = sum(map(len, frames))
         self._counts.messages_out += messages
-        assert self._peer is not None
-        self._peer.stream.extend(frames)
+        peer = self._peer
+        assert peer is not None
         report = progress or (lambda _: None)
-        self._drain_to(0, lambda: report(UploadProgress(total - self._out_bytes, total)) if self._out_bytes else None)
+        try:
+            peer.stream.extend(frames)
+            self._drain_to(0, lambda: report(UploadProgress(total - self._out_bytes, total)) if self._out_bytes else None)
+        except BaseException:
+            # A server takes back what it has of a batch when the connection ends, and only then.
+            if peer is self._peer and (self._out or peer.stream):
+                self._fail("an upload was interrupted")
+            raise
         report(UploadProgress(total, total))
 
     @contextmanager

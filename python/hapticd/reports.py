@@ -33,6 +33,17 @@ class Trips(int):
     def __iter__(self) -> Iterator[str]:
         return iter(self.names)
 
+    def __or__(self, other: int) -> "Trips":
+        return Trips(int(self) | other)
+
+    def __and__(self, other: int) -> "Trips":
+        return Trips(int(self) & other)
+
+    def __xor__(self, other: int) -> "Trips":
+        return Trips(int(self) ^ other)
+
+    __ror__, __rand__, __rxor__ = __or__, __and__, __xor__
+
     def explain(self) -> str:
         """One line for each trip: its name, what happened, what to do."""
         return "\n".join(

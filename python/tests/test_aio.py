@@ -145,6 +145,35 @@ def test_a_server_that_has_stopped_does_not_keep_a_client_that_closes() -> None:
     run(main())
 
 
+def test_a_block_that_is_cancelled_does_not_wait_for_the_server() -> None:
+    scripted = ScriptedServer()
+
+    async def upload(steps: "List[hapticd.UploadProgress]") -> None:
+        async with hapticd.aio.connect(scripted.name, send_timeout=100) as hand:
+            await hand.wait_capabilities()
+            scripted.reads.clear()  # the system takes only a part of the mesh
+            await hand.upload_mesh(0, *hapticd.sphere(25, rings=600), steps.append)
+
+    async def main() -> None:
+        steps: List[hapticd.UploadProgress] = []
+        task = asyncio.ensure_future(upload(steps))
+        while not steps:
+            await asyncio.sleep(0.01)
+        start = time.monotonic()
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        assert time.monotonic() - start < 60
+        scripted.reads.set()
+        async with hapticd.aio.connect(scripted.name, connect_timeout=60):  # after the end of the first connection
+            pass
+
+    run(main())
+    edges = [name.rpartition("_")[2] for name, _ in scripted.received if name.startswith("hapticd Batch_")]
+    assert edges == ["Begin"]
+    scripted.close()
+
+
 @pytest.mark.parametrize("way", ["tcp", "udp"])
 def test_a_forked_process_does_not_keep_a_connection(server: Server, way: str) -> None:
     """As the workers of a ProcessPoolExecutor."""
@@ -202,6 +231,41 @@ def test_uploads_and_batches_of_several_tasks_follow_each_other() -> None:
     run(main())
     edges = [name.rpartition("_")[2] for name, _ in scripted.received if name.startswith("hapticd Batch_")]
     assert edges == ["Begin", "Commit"] * 4
+    scripted.close()
+
+
+def test_batches_of_several_tasks_follow_each_other() -> None:
+    scripted = ScriptedServer()
+
+    async def main() -> None:
+        async with hapticd.aio.connect(scripted.name) as hand:
+
+            async def name(object: int) -> None:
+                async with hand.batch():
+                    hand.set_object_name(object, "first")
+                    await asyncio.sleep(0.05)
+                    hand.set_object_name(object, "second")
+
+            await asyncio.gather(*(name(i) for i in range(3)))
+            async with hand.batch():
+                for nested in (name(4), asyncio.ensure_future(name(4))):
+                    with pytest.raises(RuntimeError, match="batches do not nest"):
+                        await nested
+                uploads = (hand.upload_mesh(i, np.eye(3), [[0, 1, 2]]) for i in range(2))
+                await asyncio.wait_for(asyncio.gather(*uploads), 60)
+            with pytest.raises(KeyError):
+                async with hand.batch():
+                    raise KeyError
+            await name(5)
+            hand.send_text("end")
+            await hand.flush_all()
+            await asyncio.get_running_loop().run_in_executor(None, scripted.wait_for, "vrpn_Base text_message")
+
+    run(main())
+    named = [(name.rpartition(" ")[2], payload[:4]) for name, payload in scripted.received if "Batch" in name or "Name" in name]
+    begin, commit = ("Batch_Begin", b""), ("Batch_Commit", b"")
+    own = [[begin, *[("Set_Object_Name", i.to_bytes(4, "big"))] * 2, commit] for i in (0, 1, 2, 5)]
+    assert named == [*own[0], *own[1], *own[2], begin, commit, *own[3]]
     scripted.close()
 
 
@@ -329,6 +393,28 @@ def test_a_closed_client_is_not_connected_and_every_command_raises(server: Serve
         assert hand.statistics().messages_dropped == 0
 
     run(main())
+
+
+def test_a_close_that_is_cancelled_is_cancelled() -> None:
+    scripted = ScriptedServer()
+
+    async def main() -> None:
+        hand = await hapticd.aio.connect(scripted.name)
+        await hand.wait_capabilities()
+        scripted.reads.clear()
+        hand.set_vertices(0, 0, np.zeros((1000000, 3)))  # more than the system takes
+        closing = asyncio.ensure_future(hand.close())
+        await asyncio.sleep(0)
+        closing.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await closing
+        scripted.reads.set()
+        async with hapticd.aio.connect(scripted.name, connect_timeout=60):  # after the end of the first connection
+            no_client = [task for task in asyncio.all_tasks() if "stay_connected" in repr(task)]
+            assert len(no_client) == 1
+
+    run(main())
+    scripted.close()
 
 
 def test_close_ends_a_wait_for_the_first_connection() -> None:

@@ -5,6 +5,7 @@ import gc
 import os
 import pathlib
 import select
+import shutil
 import signal
 import socket
 import struct
@@ -26,6 +27,7 @@ from hapticd import _messages as m
 from hapticd._codec import frame
 from hapticd._core import _NUMBERS
 from hapticd._peer import COOKIE, TYPE_NAMES, Peer, _description
+from hapticd.client import LossWatch
 
 WIRE = pathlib.Path(__file__).resolve().parents[2] / "testdata/wire"
 
@@ -125,6 +127,17 @@ def test_buttons_effects_planes_and_guard(server: Server) -> None:
         until(hand, lambda: hand.latest.force.force_N[1] > 0.5)
         hand.stop_plane()
         until(hand, lambda: hand.latest.force.force_N[1] == 0)
+
+
+def test_sets_of_trips_combine_to_sets_of_trips() -> None:
+    names = [trip[0] for trip in m.TRIPS]
+    first, both = hapticd.Trips(1), hapticd.Trips(1) | hapticd.Trips(2)
+    assert both.names == (names[0], names[1]) and names[1] in both and both.explain().count("\n") == 1
+    for trips in (both & first, both ^ hapticd.Trips(2), 1 & both, 0 | first, 2 ^ both):
+        assert isinstance(trips, hapticd.Trips) and trips.names == (names[0],)
+    trips = first
+    trips |= 2
+    assert trips.names == both.names
 
 
 def test_errors_have_the_servers_text(server: Server) -> None:
@@ -326,6 +339,106 @@ def test_texts_that_are_too_long_are_refused(server: Server) -> None:
         assert hand.statistics().messages_out == sent
         hand.mark("x" * 255)
         hand.send_text("ä" * 511)
+
+
+#: In a network of its own, which it breaks.
+BREAKS_THE_NETWORK = """
+import asyncio, subprocess, sys, time
+import hapticd
+from conftest import Server
+
+server = Server()
+
+
+def link(state):
+    subprocess.run(["ip", "link", "set", "lo", state], check=True)
+
+
+def connect():
+    reading = [hapticd.connect(server.tcp), hapticd.connect(server.udp)]
+    beating = hapticd.connect(server.tcp)
+    beating.enable_heartbeat()
+    return [*reading, beating]
+
+
+async def main():
+    hands = connect()
+    looping = [await hapticd.aio.connect(server.tcp), await hapticd.aio.connect(server.udp)]
+    beating = await hapticd.aio.connect(server.tcp)
+    await beating.enable_heartbeat()
+    looping.append(beating)
+
+    async def until(connected):
+        deadline = time.monotonic() + 120
+        while any(hand.connected != connected for hand in [*hands, *looping]):
+            assert time.monotonic() < deadline, [hand.connected for hand in [*hands, *looping]]
+            for hand in hands:
+                hand.poll()
+            await asyncio.sleep(0.02)
+
+    await until(True)
+    link("down")
+    await until(False)
+    link("up")
+    await until(True)
+    for hand in hands:
+        hand.close()
+    for hand in looping:
+        await hand.close()
+
+
+try:
+    asyncio.run(main())
+finally:
+    server.stop()
+"""
+
+
+def test_a_lost_network_is_noticed_and_the_client_reconnects() -> None:
+    """Nothing tells a client that only reads of the end of its server's machine."""
+    network = ["unshare", "--user", "--map-root-user", "--net", "sh", "-c", 'ip link set lo up && exec "$@"', "sh"]
+    if shutil.which("unshare") is None or subprocess.run([*network, "true"], capture_output=True).returncode != 0:
+        pytest.skip("no network of its own here")
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(pathlib.Path(__file__).parent), *sys.path])}
+    subprocess.run([*network, sys.executable, "-c", BREAKS_THE_NETWORK], check=True, env=environment, timeout=400)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not say what is acknowledged")
+def test_a_peer_that_does_not_read_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    seconds = 100.0
+    monkeypatch.setattr(time, "monotonic", lambda: seconds)
+
+    class Socket:
+        in_flight, data_ms, acknowledgement_ms, window = 0, 60000, 60000, 1
+
+        def setsockopt(self, *_: int) -> None: ...
+        def getsockopt(self, *_: int) -> bytes:
+            return struct.pack("=24xI24xII168xI", self.in_flight, self.data_ms, self.acknowledgement_ms, self.window)
+
+    def lost_within(sock: Socket, limit: float, step: float = 1.0, timeout: float = 10.0) -> bool:
+        nonlocal seconds
+        watch = LossWatch(sock, timeout)
+        for _ in range(int(limit / step)):
+            seconds += step
+            if watch.is_lost():
+                return True
+        return False
+
+    sock = Socket()
+    assert not lost_within(sock, 100), "nothing is awaited"
+    sock.in_flight = 1
+    assert not lost_within(sock, 10)
+    assert lost_within(sock, 12)
+    assert not lost_within(sock, 100, timeout=0)
+    assert not lost_within(sock, 100, step=50), "this machine stood still"
+    assert lost_within(sock, 12, step=0.1)
+    sock.window = 0
+    assert not lost_within(sock, 100), "its program does not read"
+    sock.window = 1
+    sock.data_ms = 100
+    assert not lost_within(sock, 100), "it sends reports"
+    sock.data_ms, sock.acknowledgement_ms = 60000, 100
+    assert not lost_within(sock, 100), "it acknowledges"
 
 
 def test_what_is_wrong_with_a_connection_is_named(server: Server) -> None:
@@ -534,6 +647,115 @@ def test_ctrl_c_ends_a_wait_and_nothing_is_left(server: Server) -> None:
         _, errors = child.communicate(timeout=60)
         assert child.returncode != 0 and errors.rstrip().endswith("KeyboardInterrupt")
         until(hand, lambda: hand.latest.force.force_N[0] == 0)
+
+
+def test_a_value_that_was_refused_does_not_come_back_on_the_next_connection() -> None:
+    scripted = ScriptedServer()
+    right = "0123456789abcdef"
+    with hapticd.connect(scripted.name) as hand:
+        hand.wait_capabilities()
+        hand.subscribe(Reports.FORCE, 100)
+        hand.present_token(right)
+
+        def refuse() -> None:
+            for call, value in [(hand.subscribe, -1), (hand.present_token, right + "\0"), (hand.set_update_rate, "fast")]:
+                with pytest.raises(ValueError):
+                    call(value)
+
+        refuse()
+        hand.send_text("end")
+        hand.flush_all()
+        scripted.wait_for("vrpn_Base text_message")
+        hand._fail("lost")
+        hand.set_update_rate(50)
+        refuse()
+        scripted.received.clear()
+        until(hand, lambda: hand.connected)
+        hand.send_text("end")
+        hand.flush_all()
+        scripted.wait_for("vrpn_Base text_message")
+    names = [_NUMBERS[kind][1].name for kind in (m.Identify, m.Subscribe, m.TrackerSetUpdateRate)]
+    again = {name: payload for name, payload in scripted.received if name in names}
+    assert list(again) == names
+    assert _NUMBERS[m.Subscribe][1].decode(again[names[1]]) == m.Subscribe(int(Reports.FORCE), 100)
+    assert _NUMBERS[m.TrackerSetUpdateRate][1].decode(again[names[2]]) == m.TrackerSetUpdateRate(50)
+    scripted.close()
+
+
+def test_an_upload_that_is_interrupted_does_not_appear() -> None:
+    vertices, triangles = hapticd.sphere(25, rings=600)
+    scripted = ScriptedServer()
+    with hapticd.connect(scripted.name, send_timeout=100) as hand:
+        hand.wait_capabilities()
+        events: List[bool] = []
+        hand.on_connection(lambda c: events.append(c.connected))
+        hand.poll()
+        scripted.reads.clear()  # the system takes only a part of the mesh
+        sent = hand._counts.tcp_bytes_out
+
+        def interrupt() -> None:
+            while hand._counts.tcp_bytes_out < sent + 100000:
+                time.sleep(0.01)
+            os.kill(os.getpid(), signal.SIGINT)
+
+        interrupter = threading.Thread(target=interrupt, daemon=True)
+        interrupter.start()
+        with pytest.raises(KeyboardInterrupt):
+            hand.upload_mesh(0, vertices, triangles)
+        interrupter.join()
+        scripted.reads.set()
+        until(hand, lambda: events[-2:] == [False, True], 20)
+        hand.send_text("end")
+        hand.flush_all()
+        scripted.wait_for("vrpn_Base text_message")
+        edges = [name.rpartition("_")[2] for name, _ in scripted.received if name.startswith("hapticd Batch_")]
+        assert edges == ["Begin"]
+        hand.upload_mesh(0, *hapticd.sphere(25))
+    edges = [name.rpartition("_")[2] for name, _ in scripted.received if name.startswith("hapticd Batch_")]
+    assert edges == ["Begin", "Begin", "Commit"]
+    scripted.close()
+
+
+def test_a_block_that_ctrl_c_ends_does_not_wait_for_the_server() -> None:
+    scripted = ScriptedServer()
+    with pytest.raises(KeyboardInterrupt):
+        with hapticd.connect(scripted.name, queue_limit_bytes=1 << 30, send_timeout=100) as hand:
+            hand.wait_capabilities()
+            scripted.reads.clear()
+            hand.set_vertices(0, 0, np.zeros((1000000, 3)))  # more than the system takes
+            start = time.monotonic()
+            raise KeyboardInterrupt
+    assert time.monotonic() - start < 60
+    scripted.reads.set()
+    scripted.close()
+
+
+@pytest.mark.parametrize("where", ["_write", "_received"])
+def test_ctrl_c_in_the_middle_of_a_message_does_not_garble_the_next(where: str) -> None:
+    scripted = ScriptedServer()
+    with hapticd.connect(scripted.name) as hand:
+        hand.wait_capabilities()
+        move = getattr(hand, where)
+
+        def half(bytes_or_socket: Any) -> None:
+            if where == "_received":
+                move(bytes_or_socket[: len(bytes_or_socket) // 2])
+            else:
+                bytes_or_socket.send(hand._out[0][:10])
+            raise KeyboardInterrupt
+
+        setattr(hand, where, half)
+        hand._ping()
+        with pytest.raises(KeyboardInterrupt):
+            hand.run_for(60)
+        setattr(hand, where, move)
+        events: List[bool] = []
+        hand.on_connection(lambda c: events.append(c.connected))
+        until(hand, lambda: events == [False, True] and hand._answered, 20)
+        hand.send_text("end")
+        hand.flush_all()
+        scripted.wait_for("vrpn_Base text_message")
+    scripted.close()
 
 
 @pytest.mark.parametrize("way", ["tcp", "udp"])

@@ -12,7 +12,7 @@ class HapticdTeleopConfig(TeleoperatorConfig):
 
     #: NAME@host, NAME@host:port or NAME@tcp://host:port.
     device: str = "Phantom@localhost"
-    #: How long connect() waits for the server, in seconds.
+    #: How long connect() waits for the server, and get_action() for one that was lost (at least 1 s), in seconds.
     connect_timeout: float = 3.0
     #: Reports per second that the server sends; the loop of LeRobot reads the newest one.
     rate_Hz: float = 250.0

@@ -33,7 +33,8 @@ class HapticdTeleop(Teleoperator):
     out of the surface), contact_stiffness (N/m at the device, 0: none), which the server renders at 1 kHz. A contact
     is stiff and stable where a held force is not: prefer it. A call ends what it does not name: a force without a key of
     the force, a contact without contact_stiffness. Feedback ends `feedback_hold_s` after the last call of
-    send_feedback(), with the next call of get_action(); when the program hangs, the server ends it after 500 ms.
+    send_feedback(), with the next call of get_action(); when the program hangs, the server ends it after 500 ms, with the
+    connection. The client reconnects by itself.
     """
 
     config_class = HapticdTeleopConfig
@@ -53,6 +54,7 @@ class HapticdTeleop(Teleoperator):
         self._connections: "Deque[hapticd.reports.ConnectionReport]" = deque(maxlen=1)
         self._force = False
         self._contact = False
+        self._beats = False
         self._reports_hand = False
 
     @property
@@ -77,11 +79,8 @@ class HapticdTeleop(Teleoperator):
         self._hand.on_connection(self._connections.append)
         try:
             self.configure()
-            deadline = time.monotonic() + max(self.config.connect_timeout, 1.0)
-            while not self._reported(self._hand.latest):
-                if time.monotonic() > deadline:
-                    raise ConnectionError(f"{self.config.device} reports no pose")
-                self._hand.poll(0.1)
+            if not self._wait_reported(self._hand):
+                raise ConnectionError(f"{self.config.device} reports no pose")
         except BaseException:
             self.disconnect()
             raise
@@ -101,12 +100,20 @@ class HapticdTeleop(Teleoperator):
             # channel depends on the subscription and on the server's configuration.
             kinds = hapticd.Reports.TRACKER | hapticd.Reports.BUTTON | hapticd.Reports.HAND
             hand.subscribe(kinds, self.config.rate_Hz)
-            hand.enable_heartbeat()
 
     def _reported(self, latest: hapticd.LatestReports) -> bool:
         """Whether an action is known. Without the first report of the hand, a closed gripper would be taken for none,
         and the robot's would open."""
         return _SENSORS[self.config.point] in latest.pose and (not self._reports_hand or latest.hand.time > 0)
+
+    def _wait_reported(self, hand: hapticd.Client) -> bool:
+        """Waits until an action is known; false after the timeout."""
+        deadline = time.monotonic() + max(self.config.connect_timeout, 1.0)
+        while not (hand.connected and self._reported(hand.latest)):
+            if time.monotonic() > deadline:
+                return False
+            hand.poll(0.1)
+        return True
 
     def _connected(self) -> hapticd.Client:
         if self._hand is None:
@@ -114,14 +121,16 @@ class HapticdTeleop(Teleoperator):
         return self._hand
 
     def get_action(self) -> Dict[str, float]:
+        """The newest one. Waits for a connection that was lost up to connect_timeout (at least 1 s), and raises
+        ConnectionError after it."""
         hand = self._connected()
         while hand.poll(0):
             pass
         if (self._force or self._contact) and time.monotonic() - self._feedback_at > self.config.feedback_hold_s:
             self._end_feedback(hand)
-        latest = hand.latest
-        if not hand.connected or not self._reported(latest):
+        if not self._wait_reported(hand):
             raise ConnectionError(f"{self}: connection to {self.config.device} lost")
+        latest = hand.latest
         pose = latest.pose[_SENSORS[self.config.point]]
         position = self.config.scale * pose.position_m + self._offset
         values = [*position, *pose.orientation, self._gripper(latest)]
@@ -148,7 +157,15 @@ class HapticdTeleop(Teleoperator):
         # What it does not name ends: the caller would otherwise renew it for ever by feedback of another kind.
         self._send_force(hand, np.array([float(feedback.get(name, 0.0)) for name in _FORCE]))
         self._send_contact(hand, [float(feedback.get(name, 0.0)) for name in _CONTACT])
+        self._beat(hand)
         hand.flush()
+
+    def _beat(self, hand: hapticd.Client) -> None:
+        """Heartbeats only while feedback acts: LeRobot pauses for seconds while it saves an episode."""
+        acts = self._force or self._contact
+        if self._reports_hand and acts != self._beats:
+            hand.enable_heartbeat(acts)
+            self._beats = acts
 
     def _send_force(self, hand: hapticd.Client, force_N: "np.ndarray[Any, Any]") -> None:
         size = float(np.linalg.norm(force_N))
@@ -186,10 +203,11 @@ class HapticdTeleop(Teleoperator):
         if self._contact:
             hand.stop_plane(_PLANE)
         self._force = self._contact = False
+        self._beat(hand)
         hand.flush()
 
     def disconnect(self) -> None:
         hand, self._hand = self._hand, None
-        self._force = self._contact = False
+        self._force = self._contact = self._beats = False
         if hand is not None:
             hand.close()

@@ -251,6 +251,35 @@ def test_feedback_is_felt_again_after_a_restart_of_the_server() -> None:
     restarted.stop()
 
 
+@pytest.mark.parametrize("with_feedback", [False, True])
+def test_a_pause_does_not_end_the_session(with_feedback: bool) -> None:
+    """LeRobot saves an episode between two actions. Felt feedback must not go on meanwhile, nor end the session."""
+    server = Server()
+    with make(server) as teleop, hapticd.connect(server.tcp) as person:
+        person.hold_hand((0, 0, 0))
+        person.flush()
+
+        def feel() -> bool:
+            teleop.get_action()
+            teleop.send_feedback({"force_x": 1.0})
+            person.poll(0.01)
+            return bool(person.latest.force.force_N[0] > 0.5)
+
+        until(feel)
+        if not with_feedback:
+            teleop.send_feedback({})
+        connections = teleop._hand.statistics().connections
+        if with_feedback:
+            until(lambda: person.poll(0.01) is not None and person.latest.force.force_N[0] == 0)
+        else:
+            time.sleep(1.5)
+        for _ in range(10):
+            teleop.get_action()
+        assert teleop._hand.statistics().connections == connections + with_feedback
+        until(feel)
+    server.stop()
+
+
 def test_what_is_wrong_is_named(server: Server) -> None:
     teleop = make(server, id="left")
     with pytest.raises(ConnectionError, match="left HapticdTeleop is not connected: call connect"):
