@@ -21,7 +21,6 @@ constexpr double kPadShare = 0x1p-22;       // of the object's size: a quarter o
 constexpr double kRoundingFloor = 1e-12;    // of the largest coordinate: a thousand times its rounding error
 constexpr double kSmallestObject_m = 1e-3;  // below this size the HIP's coordinates dominate the rounding
 constexpr double kWiden = 1 + 1e-6;         // covers the rounding of queries that change frames
-constexpr double kReserveShare = 0.2;       // share of the tool radius that is gathered in reserve
 constexpr int kNoReserve = 50;              // ticks without one, after one that did not fit
 // By how much joined triangles may be off (see geometry/fans.h), and more by a share of the tool radius: far
 // less than the gap tolerance, and than anybody feels.
@@ -29,6 +28,7 @@ constexpr double kFanError_m = 1e-7;
 constexpr double kFanErrorShare = 5e-4;
 constexpr double kSmallestGather_m = 10e-6;
 constexpr double kHalfWay = 0.6;  // half of the way of a tick, and what it bends aside
+constexpr double kBallWay = 0.8;  // the same for a ball, whose last steps may lead beyond its rest
 constexpr int kReuseLimit = 32;   // reuse the cached facets up to this count instead of querying again
 
 scene::Corners mapped(const Affine& t, const scene::Corners& c, bool mirrored) {
@@ -398,6 +398,25 @@ void ContactQuery::estimateRoom(double radius) noexcept {
   roomyReach_m_ = count > kMany ? few_m : std::max(roomyReach_m_, few_m);
 }
 
+// A ball that slides over a surface meets as many triangles with any reserve; with a small one, no tick
+// gathers many. In a hollow of about its own radius, a smaller one leaves out few.
+void ContactQuery::adaptReserve() noexcept {
+  constexpr int kMany = 1024;
+  constexpr double kFewer = 0.7;
+  constexpr int kTries = 32;  // gathers until a smaller one is tried again
+  const double most = kReserveShare * toolRadius_;
+  const int count = cache_.complete() ? cache_.size() : FacetCache::kMaxTriangles;
+  if (count < kMany / 4) {
+    reserve_m_ = std::min(2 * reserve_m_, most);
+  } else if (count > kMany && reserve_m_ < most && count > kFewer * countBefore_) {
+    reserve_m_ = most;
+    fullReserves_ = kTries;
+  } else if (count > kMany && --fullReserves_ < 0) {
+    reserve_m_ = std::max(0.5 * reserve_m_, kSmallestGather_m);
+  }
+  countBefore_ = count;
+}
+
 bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
   cache_.restart(centre, radius);
   joinedFans_ = false;
@@ -420,7 +439,7 @@ bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
       if (fans && !fans->join(id)) {
         ++work_;
       } else if (placed.deformed || id.level > 0 || mayReach(placed, triangle, inObject, reach)) {
-        addToCache(id, inObject);
+        addToCache(id);
       }
       if (workSpent()) cache_.invalidate();
       return cache_.complete();
@@ -428,6 +447,7 @@ bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
     joinedFans_ = joinedFans_ || (fans && fans->any());
   }
   if (keepsFacets_) estimateRoom(radius);
+  if (radius == reserve_m_) adaptReserve();
   gatheredCount_ = objectCount_;
   gatheredGeneration_ = reusable ? generation_ : 0;
   if (!cache_.complete() && !workSpent())
@@ -435,20 +455,15 @@ bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
   return cache_.complete();
 }
 
-// Deforming facets count at any distance: they may have come from farther away.
-void ContactQuery::addToCache(const FacetCache::TriangleId& id, const Vec3& inObject) noexcept {
+// Deforming facets of a point tool count at any distance: they may have come from farther away.
+void ContactQuery::addToCache(const FacetCache::TriangleId& id) noexcept {
   const PlacedObject& placed = object(id.object);
   work_ += kVisit;
   if (keepsFacets_) {
     if (const Facet* const facet = facetOf(id)) cache_.add(*facet, placed.deformed);
     return;
   }
-  const scene::MeshGeometry& mesh = *placed.state->mesh;
-  const scene::Corners corners = id.level == 0
-                                     ? mesh.corners(id.triangle, now_.time)
-                                     : mesh.corners(mesh.fans->joined(id.level, id.triangle), now_.time);
-  const double distance = distanceBound(corners, inObject);
-  cache_.add(id, distance / (kWiden * placed.stretch), placed.skin, placed.deformed);
+  cache_.add(id, discAround(cornersOf(id)), placed.skin);
 }
 
 // A fast tick gathers too many for the slow ticks after it.
@@ -457,7 +472,7 @@ bool ContactQuery::isReusable(double radius) const noexcept {
 }
 
 bool ContactQuery::ensureGathered(const Vec3& centre, double radius) noexcept {
-  const double reserve = keepsFacets_ ? 0 : kReserveShare * radius_;
+  const double reserve = reserve_m_;
   if (isReusable(std::max(radius, reserve)) && cache_.covers(centre, radius)) return true;
   if (reserve > radius && noReserve_ == 0) {
     if (gather(centre, reserve)) return true;
@@ -479,7 +494,11 @@ void ContactQuery::gatherAround(const Vec3& centre, double radius) noexcept {
 void ContactQuery::gatherAhead(const Vec3& p, const Vec3& way, double margin) noexcept {
   const double length = way.norm();
   const double needed = kHalfWay * length + margin;
-  if (!keepsFacets_) return gatherAround(p, 2 * needed);
+  if (!keepsFacets_) {
+    // Around the middle: the triangles that it reaches grow with the radius more than with the way.
+    if (!ensureGathered(p + 0.5 * way, kBallWay * length + margin)) gatherAround(p, needed);
+    return;
+  }
   if (isReusable(needed) && cache_.covers(p + 0.5 * way, needed)) return;
   // Where that would be too many facets: the beginning of the way.
   const double reach = std::min(2 * needed, roomyReach_m_);
@@ -611,17 +630,18 @@ bool ContactQuery::castAtTriangles(const Path& path, int only, ObjectHit& hit) n
   if (only < 0 && planes_ != nullptr) {
     for (const PlacedPlane& plane : *planes_) considerFacet(plane.facet, path, hit, found);
   }
-  // The facet that blocked the last cast often blocks this one: then farther ones need no exact test.
-  const int first = lastBlocker_;
-  if (first < cache_.size()) considerGathered(first, path, only, hit, found);
-  const double length = path.d.norm();
+  // What is nearest often blocks the path: then farther ones need no exact test.
   const double touching = radius_ + 2 * cache_.maxSkin();
-  for (int i = 0;; ++i) {
-    i = cache_.nextWithin(touching + ((found ? hit.stop : path.end) - path.begin) * length, i);
-    if (i == cache_.size()) return found;
+  const int first = lastBlocker_ < cache_.size() ? lastBlocker_ : -1;
+  if (first >= 0) considerGathered(first, path, only, hit, found);
+  const int nearest = found ? first : cache_.probablyNearest(touching);
+  if (nearest >= 0 && nearest != first) considerGathered(nearest, path, only, hit, found);
+  for (const int i : cache_.trianglesNear(((found ? hit.stop : path.end) - path.begin) * path.d, touching)) {
+    if (i == first || i == nearest) continue;
     if (workSpent()) return endUnexamined(path, hit);
-    if (i != first) considerGathered(i, path, only, hit, found);
+    considerGathered(i, path, only, hit, found);
   }
+  return found;
 }
 
 void ContactQuery::considerGathered(int i, const Path& path, int only, ObjectHit& best,

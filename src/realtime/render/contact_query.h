@@ -28,6 +28,8 @@ using geometry::Affine;
 inline constexpr double kNear_m = 0.050;
 /// Triangles that a tick examines. A count and not a time, so that the clock never changes a force.
 inline constexpr int kMaxVisits = 8192;
+/// Share of the tool radius that is gathered in reserve, at most.
+inline constexpr double kReserveShare = 0.2;
 using geometry::kGapTolerance_m;
 using geometry::kLargestGapTolerance_m;
 
@@ -86,7 +88,8 @@ class ContactQuery {
   explicit ContactQuery(double toolRadius_m) noexcept
       : toolRadius_(std::max(toolRadius_m, 0.5 * kGapTolerance_m)),
         keepsFacets_(toolRadius_m <= kLargestGapTolerance_m),
-        cache_(toolRadius_) {}
+        cache_(toolRadius_),
+        reserve_m_(keepsFacets_ ? 0 : kReserveShare * toolRadius_) {}
 
   /// Before a tick that does not follow the previous one: drops all that was kept from its scene.
   void restart() noexcept {
@@ -142,9 +145,9 @@ class ContactQuery {
   /// Gathers what the tool may meet on its way from p to p + way in this tick, with a margin to all sides. A
   /// point tool gathers the same way once more, for the next tick; a ball has its reserve.
   void gatherAhead(const Vec3& p, const Vec3& way, double margin) noexcept;
-  /// Radius in which there are some dozens of facets, where the last ones were gathered. Infinite for a ball
-  /// tool, which has room enough.
-  double roomyReach() const noexcept { return roomyReach_m_; }
+  /// Radius in which there are some dozens of facets, where the last ones were gathered. For a ball tool: its
+  /// reserve.
+  double roomyReach() const noexcept { return keepsFacets_ ? roomyReach_m_ : reserve_m_; }
   bool isGathered(const Vec3& p) const noexcept {
     return cache_.complete() && (p - cache_.centre()).squaredNorm() < 0.64 * cache_.reach() * cache_.reach();
   }
@@ -238,6 +241,7 @@ class ContactQuery {
   bool sameObjects() const noexcept;
   bool isReusable(double radius) const noexcept;
   void estimateRoom(double radius) noexcept;
+  void adaptReserve() noexcept;
   bool isUnfit(const Vec3& centre, double radius) const noexcept;
   void compareWithBefore(PlacedObject& placed) const noexcept;
   bool viewJumped(const PlacedObject& placed) const noexcept;
@@ -245,7 +249,7 @@ class ContactQuery {
                 double reach_m) noexcept;
   scene::Corners cornersOf(const FacetCache::TriangleId& id) const noexcept;
   const Facet* facetOf(const FacetCache::TriangleId& id) const noexcept;
-  void addToCache(const FacetCache::TriangleId& id, const Vec3& inObject) noexcept;
+  void addToCache(const FacetCache::TriangleId& id) noexcept;
   static bool endUnexamined(const Path& path, ObjectHit& hit) noexcept;
   bool castTool(const Facet& f, const Path& path, double latest, CastHit& hit) const noexcept;
   void considerFacet(const Facet& f, const Path& path, ObjectHit& best, bool& found) const noexcept;
@@ -284,8 +288,11 @@ class ContactQuery {
   int unfitCount_ = 0;
   double longestStep_m_ = 0;
   double roomyReach_m_ = std::numeric_limits<double>::infinity();
-  int noReserve_ = 0;    // ticks in which none is gathered: there were too many triangles for it
-  int lastBlocker_ = 0;  // the gathered facet that blocked the last cast of a ball
+  double reserve_m_ = 0;  // of a ball tool: what is near is gathered at least within this
+  int countBefore_ = 0;   // of the triangles in the last reserve
+  int fullReserves_ = 0;  // how many are still gathered before a smaller one is tried
+  int noReserve_ = 0;     // ticks in which none is gathered: there were too many triangles for it
+  int lastBlocker_ = 0;   // the gathered facet that blocked the last cast of a ball
   // Generation and objects of the last gather(); 0: not reusable in another tick.
   std::uint64_t gatheredGeneration_ = 0;
   int gatheredCount_ = 0;
@@ -307,7 +314,7 @@ void ContactQuery::forEachGathered(const Vec3& p, double distance, Visit&& visit
     return;
   }
   cache_.moveTo(p);
-  for (int i = 0; (i = cache_.nextWithin(distance, i)) < cache_.size(); ++i) {
+  for (const int i : cache_.trianglesNear(Vec3::Zero(), distance)) {
     const Facet* const f = facetOf(cache_.triangle(i));
     if (f != nullptr) visit(*f);
   }

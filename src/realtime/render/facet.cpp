@@ -144,18 +144,23 @@ bool makeFacet(const scene::Corners& corners, double skin, Facet& f) noexcept {
   return true;
 }
 
-double distanceBound(const scene::Corners& k, const Vec3& x) noexcept {
-  const Vec3 centre = (k.a + k.b + k.c) / 3;
-  const double radius2 =
-      std::max({(k.a - centre).squaredNorm(), (k.b - centre).squaredNorm(), (k.c - centre).squaredNorm()});
+Disc discAround(const scene::Corners& k) noexcept {
+  Disc disc;
+  disc.centre = (k.a + k.b + k.c) / 3;
+  const double radius2 = std::max({(k.a - disc.centre).squaredNorm(), (k.b - disc.centre).squaredNorm(),
+                                   (k.c - disc.centre).squaredNorm()});
+  disc.radius = std::sqrt(radius2);
   const Vec3 normal = (k.b - k.a).cross(k.c - k.a);
   const double normal2 = normal.squaredNorm();
-  const Vec3 offset = x - centre;
-  const double up = normal.dot(offset);
-  // The normal of a needle is not reliable.
-  const double up2 = normal2 > kThinness * kThinness * radius2 * radius2 ? up * up / normal2 : 0.0;
-  const double aside = std::sqrt(std::max(0.0, offset.squaredNorm() - up2)) - std::sqrt(radius2);
-  return aside > 0 ? std::sqrt(up2 + aside * aside) : std::sqrt(up2);
+  if (normal2 > kThinness * kThinness * radius2 * radius2) disc.normal = normal / std::sqrt(normal2);
+  return disc;
+}
+
+double distanceFrom(const Disc& disc, const Vec3& x) noexcept {
+  const Vec3 offset = x - disc.centre;
+  const double up = disc.normal.dot(offset);
+  const double aside = std::sqrt(std::max(0.0, offset.squaredNorm() - up * up)) - disc.radius;
+  return aside > 0 ? std::sqrt(up * up + aside * aside) : std::abs(up);
 }
 
 Vec3 nearestPointOf(const Facet& f, const Vec3& x) noexcept {

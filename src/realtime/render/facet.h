@@ -55,8 +55,16 @@ bool castBall(const Facet& f, scene::TouchableFaces faces, const Vec3& p, const 
 bool castPoint(const Facet& f, scene::TouchableFaces faces, const Vec3& p, const Vec3& d, double widening,
                double& stop) noexcept;
 
-/// A lower bound of the distance of x from a triangle: the distance from the disc around it.
-double distanceBound(const scene::Corners& corners, const Vec3& x) noexcept;
+/// The disc around a triangle.
+struct Disc {
+  Vec3 centre = Vec3::Zero();
+  double radius = 0;
+  Vec3 normal = Vec3::Zero();  ///< unit; zero for a needle, whose normal is not reliable: then it is a ball
+};
+Disc discAround(const scene::Corners& corners) noexcept;
+
+/// The distance of x from it: a lower bound of that from the triangle.
+double distanceFrom(const Disc& disc, const Vec3& x) noexcept;
 
 /// The point of the triangle nearest to x (Ericson 2005, 5.1.5).
 Vec3 nearestPointOf(const Facet& f, const Vec3& x) noexcept;

@@ -7,7 +7,8 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr double kClear = 2;  // in skins: beyond the radius, the ball is free of a face
+constexpr double kClear = 2;              // in skins: beyond the radius, the ball is free of a face
+constexpr float kSingleRounding = 1e-6F;  // relative; eight times that of one operation
 
 }  // namespace
 
@@ -19,6 +20,7 @@ void FacetCache::restart(const Vec3& centre, double reach) noexcept {
   maxSkin_ = 0;
   maxRadius_ = 0;
   travel_ = 0;
+  nearDistance_ = -1;
 }
 
 void FacetCache::add(const Facet& facet, bool deforming) noexcept {
@@ -45,14 +47,126 @@ void FacetCache::add(const Facet& facet, bool deforming) noexcept {
   maxRadius_ = std::max(maxRadius_, facet.radius);
 }
 
-void FacetCache::add(const TriangleId& id, double distance, double skin, bool deforming) noexcept {
-  if (distance > reach_ + toolRadius_ + 4 * skin && !deforming) return;
+void FacetCache::add(const TriangleId& id, const Disc& around, double skin) noexcept {
   if (count_ == kMaxTriangles) return invalidate();
   const auto i = static_cast<std::size_t>(count_++);
   triangles_[i] = id;
-  distances_[i] = distance;
   supportPlanes_[i] = {Vec3::Zero(), 0};
+  const Vec3f centre = (around.centre - centre_).cast<float>();
+  for (std::size_t k = 0; k < 3; ++k) discCentres_[k][i] = centre[static_cast<int>(k)];
+  discRadii_[i] = static_cast<float>(around.radius) + kSingleRounding * centre.cwiseAbs().maxCoeff();
+  discNormals_[i] = around.normal.cast<float>();
   maxSkin_ = std::max(maxSkin_, skin);
+}
+
+FacetCache::Reach FacetCache::reachOf(const Vec3& p, const Vec3& d, double distance) const noexcept {
+  Reach reach;
+  reach.from = (p - centre_).cast<float>();
+  reach.way = d.cast<float>();
+  reach.length2 = reach.way.squaredNorm();
+  reach.distance = static_cast<float>(distance) +
+                   kSingleRounding * (reach.from.cwiseAbs() + reach.way.cwiseAbs()).maxCoeff();
+  reach.distance2 = reach.distance * reach.distance;
+  return reach;
+}
+
+// Whether the path comes near the disc around triangle i. True where a number is not one.
+bool FacetCache::reaches(const Reach& reach, std::size_t i) const noexcept {
+  const Vec3f offset = reach.from - Vec3f(discCentres_[0][i], discCentres_[1][i], discCentres_[2][i]);
+  const float up = discNormals_[i].dot(offset);
+  const float rise = discNormals_[i].dot(reach.way);
+  const float lowest = up * (up + rise) > 0 ? std::min(std::abs(up), std::abs(up + rise)) : 0;
+  const float offset2 = offset.squaredNorm();
+  const float inPlane = offset.dot(reach.way) - up * rise;
+  const float wayInPlane2 = reach.length2 - rise * rise;
+  const float share = wayInPlane2 > 0 ? std::clamp(-inPlane / wayInPlane2, 0.0F, 1.0F) : 0.0F;
+  const float aside2 = offset2 - up * up + share * (2 * inPlane + share * wayInPlane2);
+  const float rounding = kSingleRounding * (offset2 + reach.length2 + reach.distance2);
+  const float room2 = reach.distance2 + rounding - lowest * lowest;
+  const float farthest = discRadii_[i] + std::sqrt(std::max(0.0F, room2));
+  return !(room2 < 0) && !(aside2 - farthest * farthest > rounding);
+}
+
+int FacetCache::findNear(const Reach& reach, std::uint16_t* found) noexcept {
+  const float perLength2 = reach.length2 > 0 ? 1 / reach.length2 : 0;
+  const auto count = static_cast<std::size_t>(count_);
+  const auto& [cx, cy, cz] = discCentres_;
+  // By how much the path misses the ball around a triangle (square metres).
+  for (std::size_t i = 0; i < count; ++i) {
+    const float x = cx[i] - reach.from.x();
+    const float y = cy[i] - reach.from.y();
+    const float z = cz[i] - reach.from.z();
+    const float along = (x * reach.way.x() + y * reach.way.y() + z * reach.way.z()) * perLength2;
+    const float share = std::min(std::max(along, 0.0F), 1.0F);
+    const float ax = x - share * reach.way.x();
+    const float ay = y - share * reach.way.y();
+    const float az = z - share * reach.way.z();
+    const float farthest = reach.distance + discRadii_[i];
+    misses_[i] = ax * ax + ay * ay + az * az - farthest * farthest;
+  }
+  int n = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!(misses_[i] > 0) && reaches(reach, i)) found[n++] = static_cast<std::uint16_t>(i);
+  }
+  return n;
+}
+
+float FacetCache::discDistance(std::size_t i, const Vec3f& p) const noexcept {
+  const Vec3f offset = p - Vec3f(discCentres_[0][i], discCentres_[1][i], discCentres_[2][i]);
+  const float up = discNormals_[i].dot(offset);
+  const float offset2 = offset.squaredNorm();
+  const float aside = std::sqrt(std::max(0.0F, offset2 - up * up)) - discRadii_[i];
+  const float distance = aside > 0 ? std::sqrt(up * up + aside * aside) : std::abs(up);
+  return distance - 4 * kSingleRounding * std::sqrt(offset2);
+}
+
+// Those within `distance` and a little more.
+void FacetCache::knowNear(double distance) noexcept {
+  constexpr double kMore = 0.05;  // of the tool radius
+  constexpr double kKeep = 0.1;   // of that
+  const bool known = (toolPosition_ - nearCentre_).norm() + distance <= nearDistance_;
+  if (known && (toolPosition_ - boundsFrom_).norm() <= kKeep * kMore * toolRadius_) return;
+  if (!known) {
+    nearCentre_ = toolPosition_;
+    nearDistance_ = distance + kMore * toolRadius_;
+    nearCount_ = findNear(reachOf(nearCentre_, Vec3::Zero(), nearDistance_), near_.data());
+  }
+  boundsFrom_ = toolPosition_;
+  const Vec3f from = (boundsFrom_ - centre_).cast<float>();
+  for (std::size_t k = 0; k < static_cast<std::size_t>(nearCount_); ++k)
+    nearBounds_[k] = discDistance(near_[k], from);
+}
+
+std::span<const std::uint16_t> FacetCache::trianglesNear(const Vec3& d, double distance) noexcept {
+  const Reach reach = reachOf(toolPosition_, d, distance);
+  int n = 0;
+  if ((toolPosition_ - nearCentre_).norm() + d.norm() + distance <= nearDistance_) {
+    const float limit =
+        std::nextafter(static_cast<float>((toolPosition_ - boundsFrom_).norm() + d.norm() + distance), 1.0F);
+    for (std::size_t k = 0; k < static_cast<std::size_t>(nearCount_); ++k) {
+      if (!(nearBounds_[k] > limit) && reaches(reach, near_[k]))
+        found_[static_cast<std::size_t>(n++)] = near_[k];
+    }
+  } else {
+    n = findNear(reach, found_.data());
+  }
+  return {found_.data(), static_cast<std::size_t>(n)};
+}
+
+int FacetCache::probablyNearest(double distance) noexcept {
+  knowNear(distance);
+  const Vec3f from = (toolPosition_ - centre_).cast<float>();
+  int nearest = -1;
+  float least = std::numeric_limits<float>::infinity();
+  for (int k = 0; k < nearCount_; ++k) {
+    const std::size_t i = near_[static_cast<std::size_t>(k)];
+    const Vec3f offset = Vec3f(discCentres_[0][i], discCentres_[1][i], discCentres_[2][i]) - from;
+    const float away = offset.squaredNorm();
+    if (away >= least) continue;
+    least = away;
+    nearest = static_cast<int>(i);
+  }
+  return nearest;
 }
 
 int FacetCache::facetsNearPath(const Vec3& p, const Vec3& d, std::uint16_t* found) const noexcept {
@@ -100,32 +214,22 @@ void FacetCache::moveTo(const Vec3& p) noexcept {
   toolPosition_ = p;
 }
 
-int FacetCache::nextWithin(double distance, int i) const noexcept {
-  const double limit = distance + travel_;
-  while (i < count_ && distances_[static_cast<std::size_t>(i)] > limit) ++i;
-  return i;
-}
-
 // The distance from a face is convex: its tangent is a lower bound.
 double FacetCache::lowerBound(int k, const Vec3& d) noexcept {
-  const auto i = static_cast<std::size_t>(k);
-  const double here = supportPlanes_[i].normal.dot(toolPosition_) - supportPlanes_[i].offset;
-  distances_[i] = std::max(distances_[i], here + travel_);
-  return here + std::min(0.0, supportPlanes_[i].normal.dot(d));
+  const SupportPlane& plane = supportPlanes_[static_cast<std::size_t>(k)];
+  return plane.normal.dot(toolPosition_) - plane.offset + std::min(0.0, plane.normal.dot(d));
 }
 
 double FacetCache::refine(int k, const Vec3& foot, const Vec3& d) noexcept {
-  const auto i = static_cast<std::size_t>(k);
   const Vec3 away = toolPosition_ - foot;
   const double distance = away.norm();
-  distances_[i] = distance + travel_;
   const Vec3 normal = distance > 0 ? Vec3(away / distance) : Vec3(Vec3::Zero());
-  supportPlanes_[i] = {normal, normal.dot(toolPosition_) - distance};
+  supportPlanes_[static_cast<std::size_t>(k)] = {normal, normal.dot(toolPosition_) - distance};
   return distance + std::min(0.0, normal.dot(d));
 }
 
-void FacetCache::exclude(int i) noexcept {
-  distances_[static_cast<std::size_t>(i)] = std::numeric_limits<double>::infinity();
+void FacetCache::exclude(int k) noexcept {
+  supportPlanes_[static_cast<std::size_t>(k)] = {Vec3::Zero(), -std::numeric_limits<double>::infinity()};
 }
 
 }  // namespace hapticd::realtime

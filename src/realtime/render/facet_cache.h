@@ -2,15 +2,19 @@
 //
 // Point tool: keeps the facets themselves. A path first discards the faces whose plane or whose ball it does
 // not come near, which leaves few. Ball tool: many triangles lie within its radius and few touch it. It keeps
-// their ids, with a lower bound of the distance and a supporting plane for each; exact facets are made only
-// for those that pass both tests.
+// their ids, with a disc around each and a supporting plane; exact facets are made only for those whose disc
+// the path comes near and that the plane does not rule out.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <span>
 
 #include "realtime/render/facet.h"
 
 namespace hapticd::realtime {
+
+using geometry::Vec3f;
 
 /// Servo thread: noexcept, no allocation.
 class FacetCache {
@@ -32,8 +36,8 @@ class FacetCache {
   void restart(const Vec3& centre, double reach) noexcept;
   /// Point tool: adds a facet. A `deforming` one is kept at any distance.
   void add(const Facet& facet, bool deforming) noexcept;
-  /// Ball tool: the same for a triangle. `distance`: lower bound of its distance from the centre.
-  void add(const TriangleId& id, double distance, double skin, bool deforming) noexcept;
+  /// Ball tool: adds a triangle by the disc around it.
+  void add(const TriangleId& id, const Disc& around, double skin) noexcept;
   /// Marks the cache as incomplete.
   void invalidate() noexcept { complete_ = false; }
 
@@ -54,9 +58,12 @@ class FacetCache {
   /// The present position of the tool.
   void moveTo(const Vec3& p) noexcept;
   const TriangleId& triangle(int i) const noexcept { return triangles_[static_cast<std::size_t>(i)]; }
-  /// The next triangle from i on whose lower bound is within `distance` of the tool; size() when there is
-  /// none.
-  int nextWithin(double distance, int i) const noexcept;
+  /// Ball tool: all triangles that may be within `distance` of the segment from the present position by d.
+  /// Valid until the next call.
+  std::span<const std::uint16_t> trianglesNear(const Vec3& d, double distance) noexcept;
+  /// Ball tool: the one of those within `distance` that is probably the nearest to the present position; -1
+  /// when there is none.
+  int probablyNearest(double distance) noexcept;
   /// Lower bound of the distance while the tool moves by d; refine() makes it exact for the present position.
   double lowerBound(int i, const Vec3& d) noexcept;
   /// Replaces the bound by the exact distance: `foot` is the nearest point. Returns the new lowerBound().
@@ -70,6 +77,17 @@ class FacetCache {
   int facetsNearPath(const Vec3& p, const Vec3& d, std::uint16_t* found) const noexcept;
 
  private:
+  // A path with what is within some distance of it, relative to centre_.
+  struct Reach {
+    Vec3f from, way;
+    float length2, distance, distance2;
+  };
+  Reach reachOf(const Vec3& p, const Vec3& d, double distance) const noexcept;
+  bool reaches(const Reach& reach, std::size_t i) const noexcept;
+  int findNear(const Reach& reach, std::uint16_t* found) noexcept;
+  float discDistance(std::size_t i, const Vec3f& p) const noexcept;
+  void knowNear(double distance) noexcept;
+
   // Ball tool. normal . x = offset: a plane with the face on its back.
   struct SupportPlane {
     Vec3 normal;
@@ -98,9 +116,25 @@ class FacetCache {
   Filter filter_;
   std::array<double, kMaxFacets> measured_;  // the travel when the distance was
   Vec3 toolPosition_ = Vec3::Zero();
-  double travel_ = 0;                            // of the tool since restart()
-  std::array<double, kMaxTriangles> distances_;  // lower bounds, plus the travel at that time
+  double travel_ = 0;                         // of the tool since restart()
+  std::array<double, kMaxFacets> distances_;  // lower bounds, plus the travel at that time
   std::array<TriangleId, kMaxTriangles> triangles_;
+  // The discs around them, relative to centre_, in single precision, for it is a first filter. One array for
+  // each number of the balls, so that the compiler computes several at once.
+  using TriangleColumn = std::array<float, kMaxTriangles>;
+  std::array<TriangleColumn, 3> discCentres_;
+  TriangleColumn discRadii_;
+  std::array<Vec3f, kMaxTriangles> discNormals_;
+  TriangleColumn misses_;
+  std::array<std::uint16_t, kMaxTriangles> found_;
+  // Those around a place where the tool is or was, with their distances from a place nearby: a cast that
+  // stays there looks at no others.
+  std::array<std::uint16_t, kMaxTriangles> near_;
+  std::array<float, kMaxTriangles> nearBounds_;
+  int nearCount_ = 0;
+  Vec3 nearCentre_ = Vec3::Zero();
+  Vec3 boundsFrom_ = Vec3::Zero();
+  double nearDistance_ = -1;  // up to which all are there
 };
 
 }  // namespace hapticd::realtime

@@ -64,7 +64,8 @@ double ObjectDistances::examine(const scene::ObjectState& state, const Query& qu
         nearest = 0;
         return -1.0;
       }
-      return nearest = std::min(nearest, distanceBound(mesh.corners(triangle, query.now), in.position));
+      return nearest =
+                 std::min(nearest, distanceFrom(discAround(mesh.corners(triangle, query.now)), in.position));
     });
   }
   const double distance_m = std::max(in.outside, nearest) / in.stretch;
