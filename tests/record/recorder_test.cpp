@@ -26,9 +26,9 @@ using test::RecordingFile;
 class Problems {
  public:
   Recorder::OnProblem listener() {
-    return [this](const std::string& text) {
+    return [this](RecorderProblem problem, const std::string& text) {
       const std::lock_guard lock(mutex_);
-      all_ += text + "\n";
+      all_ += (problem == RecorderProblem::losses ? "goes on: " : "stopped: ") + text + "\n";
     };
   }
   std::string all() {
@@ -57,7 +57,7 @@ RecordedDevice phantom() {
 
 std::string openError(const std::filesystem::path& path) {
   try {
-    Recorder recorder(path, [](const std::string&) {});
+    Recorder recorder(path, [](RecorderProblem, const std::string&) {});
   } catch (const RecordingError& error) {
     return error.what();
   }
@@ -87,7 +87,8 @@ TEST(Recorder, TicksOfAFullRingAreCountedInTheLogAndInTheFile) {
     recorder.ring(0).push(tick);
   }
   recorder.start(0, "");
-  EXPECT_TRUE(problems.until("12 ticks, 0 scene events and 0 streamed values lost so far"));
+  EXPECT_TRUE(problems.until("goes on: recording to '" + file.path().string() +
+                             "': 12 ticks, 0 scene events and 0 streamed values lost so far"));
   recorder.finish();
   EXPECT_EQ(recorder.counts().ticks, 8U);
   EXPECT_EQ(recorder.counts().lostTicks, 12U);
@@ -148,7 +149,8 @@ TEST(Recorder, AFileThatIsRemovedEndsTheRecording) {
   recorder.start(0, "");
   EXPECT_TRUE(recorder.writes());
   std::filesystem::remove(file.path());
-  EXPECT_TRUE(problems.until("has stopped: No such file"));
+  EXPECT_TRUE(
+      problems.until("stopped: recording to '" + file.path().string() + "' has stopped: No such file"));
   EXPECT_FALSE(recorder.writes());
   recorder.ring(0).push(realtime::TickRecord());
   recorder.finish();

@@ -86,7 +86,7 @@ TEST(ReplayConfig, NeedsNothingOfTheMachineThatRecorded) {
   there.limits.objects = 5;
   const RecordingFile file;
   {
-    record::Recorder recorder(file.path(), [](const std::string&) {});
+    record::Recorder recorder(file.path(), [](record::RecorderProblem, const std::string&) {});
     record::RecordedDevice device;
     device.names = {"Phantom"};
     recorder.addDevice(device);
@@ -117,7 +117,7 @@ TEST(ReplaySeek, ABatchThatIsOpenDoesNotStayOpen) {
   constexpr base::Nanos kSecond = 1'000'000'000;
   const RecordingFile file;
   {
-    record::Recorder recorder(file.path(), [](const std::string&) {});
+    record::Recorder recorder(file.path(), [](record::RecorderProblem, const std::string&) {});
     record::RecordedDevice device;
     device.names = {"Phantom"};
     recorder.addDevice(device);
@@ -175,7 +175,7 @@ TEST(ReplayOrder, TicksOfAllDevicesComeAtTheirTimesHoweverLateTheyWereWritten) {
   constexpr std::uint64_t kTicks = 3000;
   const RecordingFile file;
   {
-    record::Recorder recorder(file.path(), [](const std::string&) {});
+    record::Recorder recorder(file.path(), [](record::RecorderProblem, const std::string&) {});
     server::ServerConfig config;
     config.devices.resize(3, config.devices.front());
     for (const char* name : {"A", "B", "C"}) {
