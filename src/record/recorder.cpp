@@ -261,8 +261,19 @@ void Recorder::write() {
   }
 }
 
-void Recorder::fail(const std::error_code& error) {
+// One that has nothing in it is no recording, and would be in the way of the next one.
+void Recorder::closeFile() noexcept {
+  const bool isEmpty = file_ && counts_.bytes == 0 && !file_->isGone();
   file_.reset();
+  try {
+    if (isEmpty) base::world().files.remove(path_);
+  } catch (const std::system_error&) {
+    // It stays.
+  }
+}
+
+void Recorder::fail(const std::error_code& error) {
+  closeFile();
   writes_.store(false, std::memory_order_release);
   {
     const std::lock_guard lock(mutex_);
@@ -282,7 +293,7 @@ void Recorder::finish() {
     thread_.stop();  // its last step drains
     if (!ended()) close();
   }
-  file_.reset();
+  closeFile();
 }
 
 }  // namespace hapticd::record

@@ -131,6 +131,7 @@ class Recorder {
   void write();
   void lookForFile();
   void fail(const std::error_code& error);
+  void closeFile() noexcept;
   void reportLosses();
 
   const std::filesystem::path path_;

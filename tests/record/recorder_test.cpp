@@ -157,6 +157,30 @@ TEST(Recorder, AFileThatIsRemovedEndsTheRecording) {
   EXPECT_EQ(recorder.counts().ticks, 0U) << "lost ticks were not recorded";
 }
 
+// It would be in the way of the next start, and hide why the first one failed.
+TEST(Recorder, AFileWithoutAHeaderDoesNotStay) {
+  const std::filesystem::path file = "/session.haptics";
+  base::FakeWorld world;
+  Problems problems;
+  { const Recorder neverStarted(file, problems.listener()); }
+  EXPECT_FALSE(world.files.exists(file));
+  {
+    Recorder recorder(file, problems.listener());
+    recorder.addDevice(phantom());
+    world.files.freeBytes = 10;
+    recorder.start(0, "");
+  }
+  EXPECT_NE(problems.all().find("No space left"), std::string::npos);
+  EXPECT_FALSE(world.files.exists(file));
+  world.files.freeBytes.reset();
+  {
+    const Recorder removed(file, problems.listener());
+    world.files.remove(file);
+    world.files.create(file, base::Existing::refuse)->write("precious");
+  }
+  EXPECT_EQ(world.files.text(file), "precious");
+}
+
 // One tick in each.
 void recordSeconds(std::uint64_t count, Recorder& recorder, base::FakeWorld& world) {
   for (std::uint64_t i = 1; i <= count; ++i) {
