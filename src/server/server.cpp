@@ -289,6 +289,7 @@ void Server::run() {
         [this] { loop_.stop(); }));
   }
   startPlaying();
+  if (running_) running_();
   realtime::requestShortTimeSlice();  // reports must not wait for other processes
   loop_.run();
   if (player_) player_->stop();
