@@ -297,6 +297,7 @@ void Server::run() {
   for (const auto& station : stations_) station->stop();
   devicesClosed_.store(true, std::memory_order_release);
   for (const auto& scene : scenes_) scene->stop();
+  for (const auto& station : stations_) station->finishBlackBox();
   recordings_.finish();
 }
 
