@@ -25,6 +25,10 @@ namespace {
 
 using namespace std::chrono_literals;
 
+// What the server answers begins so.
+constexpr std::string_view kRecordingTo = "recording to ";
+constexpr std::string_view kRecorded = "recorded ";
+
 struct RecordOptions {
   bool onServer = false;
   bool detach = false;
@@ -44,16 +48,21 @@ std::unique_ptr<record::SampleFile> sampleFile(const std::string& file) {
   return std::make_unique<record::McapFile>(file);
 }
 
-// Calls poll(20 ms), short so that signals take effect, until the end; it returns whether still connected.
-void pollUntilEnd(const std::string& server, double seconds, const std::function<bool()>& poll) {
+// Calls poll(20 ms), short so that signals take effect, until the end, or until it returns false.
+void pollUntilEnd(double seconds, const std::function<bool()>& poll) {
   const auto start = std::chrono::steady_clock::now();
   const auto isOver = [&] {
     return seconds > 0 && std::chrono::steady_clock::now() - start >= std::chrono::duration<double>(seconds);
   };
-  while (!stopRequested() && !isOver()) {
-    if (!poll())
-      throw ConnectionLost("the connection to " + server + " was lost; the file holds everything before");
+  while (!stopRequested() && !isOver() && poll()) {
   }
+}
+
+// Of a recording that this program writes.
+bool demandConnected(bool connected, const std::string& server) {
+  if (!connected)
+    throw ConnectionLost("the connection to " + server + " was lost; the file holds everything before");
+  return true;
 }
 
 // Every message of the device as it came, also of types that this project does not know. Returns their
@@ -83,9 +92,9 @@ std::size_t recordMessages(const RecordOptions& options) {
     log->addRaw(arrival.time, sender, type, arrival.bytes);
     ++count;
   };
-  pollUntilEnd(address.server.text(), options.seconds, [&] {
+  pollUntilEnd(options.seconds, [&] {
     link.poll(20ms, add);
-    return link.connected();
+    return demandConnected(link.connected(), address.server.text());
   });
   if (log) log->close();
   return count;
@@ -109,9 +118,9 @@ std::size_t recordTicks(const RecordOptions& options) {
   });
   client.subscribe(Reports::tick, options.rate_Hz);
   try {
-    pollUntilEnd(client.server(), options.seconds, [&] {
+    pollUntilEnd(options.seconds, [&] {
       client.poll(20ms);
-      return client.connected();
+      return demandConnected(client.connected(), client.server());
     });
   } catch (const ConnectionLost&) {
     if (file) file->close();
@@ -148,8 +157,8 @@ class ServerRecording {
     const auto end = std::chrono::steady_clock::now() + kTimeout;
     while (link_.connected() && std::chrono::steady_clock::now() < end) {
       poll();
-      check();
       if (last_.starts_with(answer)) return last_;
+      check();
     }
     throw Error(server_ + " did not answer within 5 s; " +
                 (isHapticd_ ? "it is busy, or its disk is: its log tells whether it records"
@@ -159,13 +168,20 @@ class ServerRecording {
   void check() const {
     if (!refusal_.empty()) throw Error(server_ + ": " + refusal_);
   }
+  /// The recording that this client began is complete: another one ended it.
+  bool ended() const { return last_.starts_with(kRecorded); }
+  const std::string& last() const { return last_; }
   bool poll() {
     link_.poll(20ms, [this](const client::Arrival& arrival) {
       if (arrival.what != client::Arrival::What::message || arrival.kind != wire::kindOf<wire::Text>) return;
       const auto text = wire::decode<wire::Text>(arrival.bytes);
       if (!text) return;
       const std::string heard = base::printable(text->text.text);
-      (text->severity == wire::kTextError && isAboutRecording(heard) ? refusal_ : last_) = heard;
+      if (text->severity == wire::kTextError && isAboutRecording(heard)) refusal_ = heard;
+      if (text->severity == wire::kTextWarning && heard.starts_with(kRecordingTo))
+        std::fprintf(stderr, "hapticd record: %s\n", heard.c_str());
+      const bool answers = heard.starts_with(kRecordingTo) || heard.starts_with(kRecorded);
+      if (text->severity == wire::kTextNormal && answers) last_ = heard;
     });
     return link_.connected();
   }
@@ -190,18 +206,27 @@ class ServerRecording {
 int recordOnServer(const RecordOptions& options) {
   ServerRecording recording(options.server, tokenFor(options.server, options.tokenFile));
   const StopSignals signals;
+  std::string name;  // of the file; empty: end whichever is at hand
   if (!options.end) {
-    std::printf("%s: %s\n", options.server.c_str(),
-                recording.ask(true, options.file, "recording to").c_str());
+    const std::string answer = recording.ask(true, options.file, kRecordingTo);
+    std::printf("%s: %s\n", options.server.c_str(), answer.c_str());
     std::fflush(stdout);
     if (options.detach) return 0;
-    pollUntilEnd(options.server, options.seconds, [&] {
+    name = std::filesystem::path(answer.substr(kRecordingTo.size())).filename();
+    pollUntilEnd(options.seconds, [&] {
       const bool connected = recording.poll();
       recording.check();
-      return connected;
+      if (recording.ended()) return false;
+      if (connected) return true;
+      throw ConnectionLost("the connection was lost; the server records on until 'hapticd record " +
+                           options.server + " --server --end'");
     });
+    if (recording.ended()) {
+      std::printf("%s: another client ended it: %s\n", options.server.c_str(), recording.last().c_str());
+      return options.seconds > 0 ? 1 : 0;  // shorter than wanted
+    }
   }
-  std::printf("%s: %s\n", options.server.c_str(), recording.ask(false, "", "recorded").c_str());
+  std::printf("%s: %s\n", options.server.c_str(), recording.ask(false, name, kRecorded).c_str());
   return 0;
 }
 

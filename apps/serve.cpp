@@ -174,6 +174,9 @@ class CrashMark {
     if (folder == nullptr || *folder != '/') return;
     file_ = std::filesystem::path(folder) / "running";
     crashed_ = std::filesystem::exists(file_);
+  }
+  void set() const {
+    if (file_.empty()) return;
     const std::ofstream mark(file_);
   }
   bool crashed() const { return crashed_; }
@@ -226,7 +229,10 @@ int run(const ServeOptions& options) {
     spdlog::warn("the server did not end in order last time: forces are stopped until re-armed");
   }
   server->onAlive([] { notifyServiceManager("WATCHDOG=1"); });
-  notifyServiceManager("READY=1");
+  server->onRunning([&] {
+    mark.set();
+    notifyServiceManager("READY=1");
+  });
   server->run();
   notifyServiceManager("STOPPING=1");
   mark.endedInOrder();

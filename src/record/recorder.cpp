@@ -191,10 +191,11 @@ void Recorder::reportLosses() {
   if (losses == reportedLosses_ || base::now() < nextLossReport_ || !file_) return;
   reportedLosses_ = losses;
   nextLossReport_ = base::now() + kBetweenLossReports;
-  onProblem_("recording to '" + path_.string() + "': " + std::to_string(counts_.lostTicks) + " ticks, " +
-             std::to_string(counts_.lostSceneEvents) + " scene events and " +
-             std::to_string(counts_.lostStreamed) +
-             " streamed values lost so far: the disk is too slow, or the machine too busy");
+  onProblem_(RecorderProblem::losses,
+             "recording to '" + path_.string() + "': " + std::to_string(counts_.lostTicks) + " ticks, " +
+                 std::to_string(counts_.lostSceneEvents) + " scene events and " +
+                 std::to_string(counts_.lostStreamed) +
+                 " streamed values lost so far: the disk is too slow, or the machine too busy");
 }
 
 void Recorder::appendMemories(std::uint32_t number, Device& device) {
@@ -260,8 +261,19 @@ void Recorder::write() {
   }
 }
 
-void Recorder::fail(const std::error_code& error) {
+// One that has nothing in it is no recording, and would be in the way of the next one.
+void Recorder::closeFile() noexcept {
+  const bool isEmpty = file_ && counts_.bytes == 0 && !file_->isGone();
   file_.reset();
+  try {
+    if (isEmpty) base::world().files.remove(path_);
+  } catch (const std::system_error&) {
+    // It stays.
+  }
+}
+
+void Recorder::fail(const std::error_code& error) {
+  closeFile();
   writes_.store(false, std::memory_order_release);
   {
     const std::lock_guard lock(mutex_);
@@ -272,7 +284,8 @@ void Recorder::fail(const std::error_code& error) {
   if (error == std::errc::no_space_on_device) remedy = "; make room on the disk and start a new recording";
   if (error == std::errc::file_too_large) remedy = "; start a new one, or raise recording_MB in [limits]";
   const char* const kept = counts_.bytes > 0 ? "; what was written before stays readable" : "";
-  onProblem_("recording to '" + path_.string() + "' has stopped: " + error.message() + kept + remedy);
+  onProblem_(RecorderProblem::stopped,
+             "recording to '" + path_.string() + "' has stopped: " + error.message() + kept + remedy);
 }
 
 void Recorder::finish() {
@@ -280,7 +293,7 @@ void Recorder::finish() {
     thread_.stop();  // its last step drains
     if (!ended()) close();
   }
-  file_.reset();
+  closeFile();
 }
 
 }  // namespace hapticd::record

@@ -42,11 +42,15 @@ class RecordingExists : public RecordingError {
   using RecordingError::RecordingError;
 };
 
+enum class RecorderProblem {
+  losses,   ///< something was lost, and the recording goes on; at most once a second
+  stopped,  ///< the file cannot be written further
+};
+
 class Recorder {
  public:
-  /// Called in the recorder's thread with a text for the log: when the file cannot be written further, and at
-  /// most once a second when something was lost.
-  using OnProblem = std::function<void(const std::string&)>;
+  /// Called in the recorder's thread with a text for the log.
+  using OnProblem = std::function<void(RecorderProblem, const std::string&)>;
 
   /// Creates the file. Throws RecordingExists when it exists, and RecordingError when it cannot be created.
   Recorder(std::filesystem::path file, OnProblem onProblem, const RecorderOptions& options = {});
@@ -127,6 +131,7 @@ class Recorder {
   void write();
   void lookForFile();
   void fail(const std::error_code& error);
+  void closeFile() noexcept;
   void reportLosses();
 
   const std::filesystem::path path_;

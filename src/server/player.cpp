@@ -17,6 +17,8 @@ using record::RecordingEvent;
 using record::SceneEvent;
 using record::TickEvent;
 
+// Nobody sees a shorter one move, and its passes would take a core.
+constexpr Nanos kShortestLoop = 10'000'000;
 constexpr Nanos kReadAhead = 200'000'000;
 // After a stalled disk, a recording has the ticks of one device for seconds, then those of the next.
 constexpr Nanos kFarthestAhead = 10'000'000'000;
@@ -201,7 +203,7 @@ void Player::rewind() {
 
 // `remark`: why the file ended early; empty at its regular end.
 void Player::endPass(const std::string& remark) {
-  if (options_.loop && remark.empty() && started_) {
+  if (options_.loop && remark.empty() && started_ && position_ - begin_ >= kShortestLoop) {
     rewind();
     return;
   }

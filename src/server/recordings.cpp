@@ -56,6 +56,12 @@ std::string summary(const record::Recorder& recorder) {
                      recorder.failed() ? ", which is incomplete" : "");
 }
 
+// Each client once.
+void addTo(std::vector<Recordings::Listener>& listeners, Recordings::Listener listener) {
+  const auto isThere = [&](const auto& other) { return other.client == listener.client; };
+  if (std::none_of(listeners.begin(), listeners.end(), isThere)) listeners.push_back(std::move(listener));
+}
+
 }  // namespace
 
 Recordings::Recordings(const Scenes& scenes, const Stations& stations, Post post, Options options)
@@ -75,9 +81,10 @@ std::unique_ptr<record::Recorder> Recordings::createFile(const std::filesystem::
   options.fileBytes = options_.mostBytes;
   return std::make_unique<record::Recorder>(
       path,
-      [this](const std::string& text) {
-        spdlog::error("{}", text);
-        post_([this, text] { options_.failed(text); });
+      [this](record::RecorderProblem problem, const std::string& text) {
+        spdlog::log(problem == record::RecorderProblem::losses ? spdlog::level::warn : spdlog::level::err,
+                    "{}", text);
+        post_([this, problem, text] { options_.onProblem(problem, text); });
       },
       options);
 }
@@ -160,11 +167,12 @@ bool Recordings::beginScene(SceneHost& scene) {
   });
 }
 
-void Recordings::start(const std::string& name, Nanos wallOffset, std::string config, Begun begun) {
+void Recordings::start(const std::string& name, Nanos wallOffset, std::string config, Begun begun,
+                       Listener listener) {
   if (beginning_) throw RecordingError("refused: another recording begins");
   if (!file().empty()) throw RecordingError("refused: this server records to " + file() + " already");
   if (!name.empty()) checkName(name);
-  end({});  // one that could not be written further
+  endPresent({});  // one that could not be written further
   if (ended_.size() >= kMostEnded)
     throw RecordingError(
         "refused: the last " + std::to_string(kMostEnded) +
@@ -177,6 +185,7 @@ void Recordings::start(const std::string& name, Nanos wallOffset, std::string co
   beginning_->wallOffset = wallOffset;
   beginning_->config = std::move(config);
   beginning_->begun = std::move(begun);
+  beginning_->listener = std::move(listener);
   const auto step = [this, beginning = beginning_]() -> std::optional<Nanos> {
     if (beginning->recorder || !beginning->refusal.empty()) return std::nullopt;  // woken by its end
     beginIn(*beginning);
@@ -212,24 +221,43 @@ void Recordings::begun() {
   const std::shared_ptr<Beginning> beginning = std::exchange(beginning_, nullptr);
   if (beginning->recorder) {
     recorder_ = std::move(beginning->recorder);
+    beganBy_ = std::move(beginning->listener);
     attach();
   }
   beginning->begun(beginning->refusal);
-  if (beginning->ended && !end(beginning->ended)) beginning->ended("nothing is recorded");
+  if (!beginning->ended) return;
+  if (!recorder_) return beginning->ended->tell("nothing is recorded");
+  endPresent(std::move(beginning->ended));
 }
 
-bool Recordings::end(std::function<void(const std::string&)> ended) {
-  if (beginning_) {
-    if (beginning_->ended) return false;
-    beginning_->ended = std::move(ended);
-    return true;
+void Recordings::end(const std::string& name, Listener listener) {
+  std::filesystem::path present;
+  if (beginning_ && !beginning_->ended) present = beginning_->path;
+  if (recorder_) present = recorder_->path();
+  if (present.empty() || (!name.empty() && present.filename() != name)) {
+    for (const auto& entry : ended_) {  // another client was a little faster
+      if (!entry->told && entry->recorder->path().filename() == name)
+        return addTo(entry->listeners, std::move(listener));
+    }
+    throw RecordingError(present.empty() ? "refused: nothing is recorded"
+                                         : "refused: this server records to " + present.string() +
+                                               ", which has another name");
   }
-  if (!recorder_) return false;
+  if (beginning_) {
+    beginning_->ended = std::move(listener);
+  } else {
+    endPresent(std::move(listener));
+  }
+}
+
+void Recordings::endPresent(std::optional<Listener> listener) {
+  if (!recorder_) return;
   record::Recorder* recorder = recorder_.get();
   auto entry = std::make_unique<Ended>();
   entry->recorder = std::move(recorder_);
   entry->scenes = scenes_.size();
-  entry->reply = std::move(ended);
+  if (beganBy_) entry->listeners.push_back(*std::exchange(beganBy_, std::nullopt));
+  if (listener) addTo(entry->listeners, std::move(*listener));
   ended_.push_back(std::move(entry));
   for (const auto& scene : scenes_) {
     scene->inspect([this, host = scene.get(), recorder](const auto&) {
@@ -241,7 +269,6 @@ bool Recordings::end(std::function<void(const std::string&)> ended) {
       post_([this, recorder] { sceneEnded(recorder); });
     });
   }
-  return true;
 }
 
 void Recordings::sceneEnded(const record::Recorder* recorder) {
@@ -274,7 +301,7 @@ void Recordings::poll() {
     if (!std::exchange(entry->told, true)) {
       const std::string text = summary(*entry->recorder);
       spdlog::info("{}", text);
-      if (entry->reply) entry->reply(text);
+      for (const Listener& listener : entry->listeners) listener.tell(text);
     }
     constexpr Nanos kLongestTick = 100'000'000;
     return std::all_of(stations_.begin(), stations_.end(),

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,10 +24,9 @@ class Recordings {
   using Post = std::function<void(std::function<void()>)>;
 
   struct Options {
-    std::filesystem::path folder;          ///< takes recordings that clients begin
-    std::uint64_t mostBytes = UINT64_MAX;  ///< of one file
-    /// Net thread: a recording cannot be written further, for this reason.
-    std::function<void(const std::string&)> failed;
+    std::filesystem::path folder;           ///< takes recordings that clients begin
+    std::uint64_t mostBytes = UINT64_MAX;   ///< of one file
+    record::Recorder::OnProblem onProblem;  ///< net thread
   };
 
   /// Both must outlive this object; `post` calls in the net thread.
@@ -40,15 +40,21 @@ class Recordings {
   void begin(base::Nanos wallOffset, std::string config);
   /// Gets a text for the client: why the recording was refused, or nothing when it records to file().
   using Begun = std::function<void(const std::string& refusal)>;
+  /// Who gets a text once the file is complete.
+  struct Listener {
+    scene::ClientId client = 0;
+    std::function<void(const std::string&)> tell;
+  };
   /// The same for a client, which may name a file in the folder; empty: named by the time. A thread of its
-  /// own creates the file, because a disk may hang; `begun` is called later. Throws record::RecordingError
-  /// with a text for the client.
-  void start(const std::string& name, base::Nanos wallOffset, std::string config, Begun begun);
+  /// own creates the file, because a disk may hang; `begun` is called later, and the client is told of the
+  /// end, whoever ends it. Throws record::RecordingError with a text for the client.
+  void start(const std::string& name, base::Nanos wallOffset, std::string config, Begun begun,
+             Listener listener);
   /// Call once after begin(), when the scenes have started.
   void scenesStarted();
-  /// Ends the recording at hand, or the one that begins; `ended` gets a text once the file is complete. False
-  /// when there is none.
-  bool end(std::function<void(const std::string&)> ended);
+  /// Ends the recording at hand, or the one that begins, if its file has this name; empty: whatever its name.
+  /// Throws record::RecordingError with a text for the client when there is none, or another one.
+  void end(const std::string& name, Listener listener);
 
   /// The file of the recording at hand; empty when there is none, or it cannot be written further.
   std::string file() const;
@@ -66,7 +72,7 @@ class Recordings {
     std::unique_ptr<record::Recorder> recorder;
     std::size_t scenes = 0;  // that still write to it
     base::Nanos at = 0;      // when none did any more
-    std::function<void(const std::string&)> reply;
+    std::vector<Listener> listeners;
     bool told = false;
   };
 
@@ -78,7 +84,8 @@ class Recordings {
     base::Nanos wallOffset = 0;
     std::string config;
     Begun begun;
-    std::function<void(const std::string&)> ended;  // of a client that asked meanwhile that it ends
+    Listener listener;
+    std::optional<Listener> ended;  // a client that asked meanwhile that it ends
     std::unique_ptr<record::Recorder> recorder;
     std::string refusal;
   };
@@ -88,6 +95,7 @@ class Recordings {
   std::vector<record::RecordedDevice> devices() const;
   void beginIn(Beginning& beginning) const noexcept;
   void begun();
+  void endPresent(std::optional<Listener> listener);
   void attach();
   bool beginScene(SceneHost& scene);
   void watch(std::uint32_t scene, const scene::SceneBuilder& builder, record::Recorder* recorder);
@@ -98,6 +106,7 @@ class Recordings {
   const Post post_;
   const Options options_;
   std::unique_ptr<record::Recorder> recorder_;
+  std::optional<Listener> beganBy_;  // the client that began it
   std::shared_ptr<Beginning> beginning_;
   base::Thread beginner_;
   std::vector<std::unique_ptr<Ended>> ended_;

@@ -47,10 +47,12 @@ Server::Server(const ServerConfig& config, std::unique_ptr<Player> player)
                   [this](std::function<void()> function) { loop_.post(std::move(function)); },
                   {.folder = std::filesystem::path(config.record).parent_path(),
                    .mostBytes = static_cast<std::uint64_t>(config.limits.recording_MB) * 1'000'000,
-                   .failed = [this](const std::string& reason) {
-                     const std::string text = "Recording_Control ended: " + reason;
-                     for (const auto& station : stations_)
-                       sendText(*station, {.severity = wire::kTextError, .level = 0, .text = text});
+                   .onProblem = [this](record::RecorderProblem problem, const std::string& reason) {
+                     const bool goesOn = problem == record::RecorderProblem::losses;
+                     const wire::Text text{.severity = goesOn ? wire::kTextWarning : wire::kTextError,
+                                           .level = 0,
+                                           .text = goesOn ? reason : "Recording_Control ended: " + reason};
+                     for (const auto& station : stations_) sendText(*station, text);
                    }}) {
   loop_.setErrorHandler([](std::string_view text) { spdlog::error("{}", text); });
   names_.addSender("VRPN Control");  // must be sender 0, as in stock VRPN
@@ -287,6 +289,7 @@ void Server::run() {
         [this] { loop_.stop(); }));
   }
   startPlaying();
+  if (running_) running_();
   realtime::requestShortTimeSlice();  // reports must not wait for other processes
   loop_.run();
   if (player_) player_->stop();
@@ -294,6 +297,7 @@ void Server::run() {
   for (const auto& station : stations_) station->stop();
   devicesClosed_.store(true, std::memory_order_release);
   for (const auto& scene : scenes_) scene->stop();
+  for (const auto& station : stations_) station->finishBlackBox();
   recordings_.finish();
 }
 

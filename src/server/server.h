@@ -54,6 +54,8 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   bool stopForces() noexcept;
   /// From any thread: a person may feel a force of one of the devices.
   bool armed() const noexcept;
+  /// Called by run() once the loops of all devices run. Before run().
+  void onRunning(std::function<void()> function) { running_ = std::move(function); }
   /// Called in the net thread once per second from run() on: this process does not hang. Before run().
   void onAlive(std::function<void()> function) { alive_ = std::move(function); }
   /// Lets the page list the servers that `finder` finds. Before run().
@@ -153,6 +155,7 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   std::deque<scene::ClientId> describedNothing_;  ///< before the handshake was over
   base::Nanos checkedAt_ = base::now();           ///< the clients
   std::optional<scene::ClientId> checkedUpTo_;    ///< in the round at hand
+  std::function<void()> running_;
   std::function<void()> alive_;
   std::atomic<bool> devicesClosed_{false};
   const base::Nanos started_ = base::now();

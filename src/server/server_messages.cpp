@@ -143,22 +143,22 @@ void Server::onRecordingControl(Session& session, const wire::MessageReceived& m
   };
   const auto refuse = [&](const std::string& why) { answer(wire::kTextError, "Recording_Control " + why); };
   if (player_) return refuse("refused: this server replays a recording");
-  if (wanted->record != 0) {
-    try {
-      recordings_.start(std::string(wanted->name.view()), clock_.offset(), toToml(config_),
-                        [this, answer, id = session.id()](const std::string& refusal) {
-                          if (!refusal.empty())
-                            return answer(wire::kTextError, "Recording_Control " + refusal);
-                          spdlog::info("client {} began it", id);
-                          answer(wire::kTextNormal, "recording to " + recordings_.file());
-                        });
-    } catch (const record::RecordingError& error) {
-      refuse(error.what());
-    }
-    return;
+  const std::string name(wanted->name.view());
+  Recordings::Listener listener{session.id(),
+                                [answer](const std::string& text) { answer(wire::kTextNormal, text); }};
+  try {
+    if (wanted->record == 0) return recordings_.end(name, std::move(listener));
+    recordings_.start(
+        name, clock_.offset(), toToml(config_),
+        [this, answer, id = session.id()](const std::string& refusal) {
+          if (!refusal.empty()) return answer(wire::kTextError, "Recording_Control " + refusal);
+          spdlog::info("client {} began it", id);
+          answer(wire::kTextNormal, "recording to " + recordings_.file());
+        },
+        std::move(listener));
+  } catch (const record::RecordingError& error) {
+    refuse(error.what());
   }
-  if (!recordings_.end([answer](const std::string& text) { answer(wire::kTextNormal, text); }))
-    refuse("refused: nothing is recorded");
 }
 
 void Server::onSceneMessage(Session& session, Station& station, const wire::MessageReceived& message) {

@@ -6,7 +6,7 @@ command -v python3 >/dev/null || exit 77
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 python3 - "$hapticd" "$work" <<'PY'
-import os, socket, subprocess, sys
+import os, shutil, socket, subprocess, sys
 hapticd, work = sys.argv[1:]
 manager = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
 manager.bind(work + "/notify")
@@ -25,6 +25,25 @@ def await_state(state):
 
 def sockets():
     return [name for name in os.listdir(work) if name.endswith(".sock")]
+
+# A device whose loop does not start, here without realtime rights: not ready, and no crash.
+os.chmod(work, 0o777)
+os.chmod(work + "/notify", 0o777)
+shutil.copy(hapticd, work + "/hapticd")
+with open(work + "/hand.csv", "w") as hand:
+    hand.write("t_s,x_m,y_m,z_m\n0,0,0,0\n1,0,0,0\n")
+user = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"] if os.getuid() == 0 else []
+serve = [work + "/hapticd", "serve", "--port", "0", "--http", "off", "--device", "replay", "--hand", work + "/hand.csv"]
+refused = subprocess.run(["bash", "-c", 'ulimit -r 0; ulimit -l 64; exec "$@"', "-", *user, *serve], timeout=60, text=True,
+                         env={**os.environ, "NOTIFY_SOCKET": work + "/notify", "RUNTIME_DIRECTORY": work},
+                         stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+assert refused.returncode == 1 and "--allow-no-rt" in refused.stdout, refused.stdout
+manager.setblocking(False)
+try:
+    raise AssertionError(manager.recv(100))
+except BlockingIOError:
+    manager.settimeout(60)
+assert not os.path.exists(work + "/running")
 
 server = start()
 try:

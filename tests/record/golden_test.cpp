@@ -152,7 +152,7 @@ void writeRecording(const std::filesystem::path& file, bool gripper, int ticks, 
   device.driver = "simulated";
   device.tick.guard.armed = true;
   device.tick.guard.selfRecover = true;
-  Recorder recorder(file, [](const std::string& text) { ADD_FAILURE() << text; });
+  Recorder recorder(file, [](RecorderProblem, const std::string& text) { ADD_FAILURE() << text; });
   recorder.addDevice(device);
   scene::SceneConfig config = device.sceneConfig;
   config.stopwatch = recorder.stopwatch(0);

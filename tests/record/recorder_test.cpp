@@ -26,9 +26,9 @@ using test::RecordingFile;
 class Problems {
  public:
   Recorder::OnProblem listener() {
-    return [this](const std::string& text) {
+    return [this](RecorderProblem problem, const std::string& text) {
       const std::lock_guard lock(mutex_);
-      all_ += text + "\n";
+      all_ += (problem == RecorderProblem::losses ? "goes on: " : "stopped: ") + text + "\n";
     };
   }
   std::string all() {
@@ -57,7 +57,7 @@ RecordedDevice phantom() {
 
 std::string openError(const std::filesystem::path& path) {
   try {
-    Recorder recorder(path, [](const std::string&) {});
+    Recorder recorder(path, [](RecorderProblem, const std::string&) {});
   } catch (const RecordingError& error) {
     return error.what();
   }
@@ -87,7 +87,8 @@ TEST(Recorder, TicksOfAFullRingAreCountedInTheLogAndInTheFile) {
     recorder.ring(0).push(tick);
   }
   recorder.start(0, "");
-  EXPECT_TRUE(problems.until("12 ticks, 0 scene events and 0 streamed values lost so far"));
+  EXPECT_TRUE(problems.until("goes on: recording to '" + file.path().string() +
+                             "': 12 ticks, 0 scene events and 0 streamed values lost so far"));
   recorder.finish();
   EXPECT_EQ(recorder.counts().ticks, 8U);
   EXPECT_EQ(recorder.counts().lostTicks, 12U);
@@ -148,11 +149,36 @@ TEST(Recorder, AFileThatIsRemovedEndsTheRecording) {
   recorder.start(0, "");
   EXPECT_TRUE(recorder.writes());
   std::filesystem::remove(file.path());
-  EXPECT_TRUE(problems.until("has stopped: No such file"));
+  EXPECT_TRUE(
+      problems.until("stopped: recording to '" + file.path().string() + "' has stopped: No such file"));
   EXPECT_FALSE(recorder.writes());
   recorder.ring(0).push(realtime::TickRecord());
   recorder.finish();
   EXPECT_EQ(recorder.counts().ticks, 0U) << "lost ticks were not recorded";
+}
+
+// It would be in the way of the next start, and hide why the first one failed.
+TEST(Recorder, AFileWithoutAHeaderDoesNotStay) {
+  const std::filesystem::path file = "/session.haptics";
+  base::FakeWorld world;
+  Problems problems;
+  { const Recorder neverStarted(file, problems.listener()); }
+  EXPECT_FALSE(world.files.exists(file));
+  {
+    Recorder recorder(file, problems.listener());
+    recorder.addDevice(phantom());
+    world.files.freeBytes = 10;
+    recorder.start(0, "");
+  }
+  EXPECT_NE(problems.all().find("No space left"), std::string::npos);
+  EXPECT_FALSE(world.files.exists(file));
+  world.files.freeBytes.reset();
+  {
+    const Recorder removed(file, problems.listener());
+    world.files.remove(file);
+    world.files.create(file, base::Existing::refuse)->write("precious");
+  }
+  EXPECT_EQ(world.files.text(file), "precious");
 }
 
 // One tick in each.

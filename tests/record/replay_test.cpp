@@ -86,7 +86,7 @@ TEST(ReplayConfig, NeedsNothingOfTheMachineThatRecorded) {
   there.limits.objects = 5;
   const RecordingFile file;
   {
-    record::Recorder recorder(file.path(), [](const std::string&) {});
+    record::Recorder recorder(file.path(), [](record::RecorderProblem, const std::string&) {});
     record::RecordedDevice device;
     device.names = {"Phantom"};
     recorder.addDevice(device);
@@ -117,7 +117,7 @@ TEST(ReplaySeek, ABatchThatIsOpenDoesNotStayOpen) {
   constexpr base::Nanos kSecond = 1'000'000'000;
   const RecordingFile file;
   {
-    record::Recorder recorder(file.path(), [](const std::string&) {});
+    record::Recorder recorder(file.path(), [](record::RecorderProblem, const std::string&) {});
     record::RecordedDevice device;
     device.names = {"Phantom"};
     recorder.addDevice(device);
@@ -170,12 +170,40 @@ TEST(ReplaySeek, ABatchThatIsOpenDoesNotStayOpen) {
   EXPECT_TRUE(notices.empty()) << notices.front().text;
 }
 
+TEST(ReplayLoop, ARecordingThatTakesNoTimeIsPlayedOnce) {
+  const RecordingFile file;
+  {
+    record::Recorder recorder(file.path(), [](record::RecorderProblem, const std::string&) {});
+    record::RecordedDevice device;
+    device.names = {"Phantom"};
+    recorder.addDevice(device);
+    recorder.start(0, server::toToml(server::ServerConfig{}));
+    const scene::SceneCommand command = scene::SetObjectNumber{1};
+    recorder.recordCommand(0, 1, 7, &command);
+    recorder.finish();
+  }
+  std::atomic<int> passes{0};
+  std::atomic<bool> ended{false};
+  server::Player player({.file = file.path(), .loop = true});
+  player.start({.tick = [](std::uint32_t, const realtime::TickReport&) {},
+                .command =
+                    [&](std::uint32_t, scene::ClientId, const scene::SceneCommand* command) {
+                      if (command != nullptr) ++passes;
+                    },
+                .marker = nullptr,
+                .restart = [] {},
+                .ended = [&](const std::string&) { ended = true; }});
+  while (!ended && passes < 10) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  player.stop();
+  EXPECT_EQ(passes, 1);
+}
+
 // As after a disk that stood still for three seconds, while a third device gives no ticks.
 TEST(ReplayOrder, TicksOfAllDevicesComeAtTheirTimesHoweverLateTheyWereWritten) {
   constexpr std::uint64_t kTicks = 3000;
   const RecordingFile file;
   {
-    record::Recorder recorder(file.path(), [](const std::string&) {});
+    record::Recorder recorder(file.path(), [](record::RecorderProblem, const std::string&) {});
     server::ServerConfig config;
     config.devices.resize(3, config.devices.front());
     for (const char* name : {"A", "B", "C"}) {

@@ -241,6 +241,9 @@ TEST_F(Rerender, RecordingBegunWhileTheServerRunsReplaysItsScene) {
     ASSERT_TRUE(hold(18, true));
     peer.send(wire::RecordingControl{.record = 1, .name = std::string_view(name)});
     ASSERT_TRUE(peer.untilText("refused: this server records to"));
+    peer.forget();
+    peer.send(wire::RecordingControl{.record = 0, .name = std::string_view(name)});
+    ASSERT_TRUE(peer.untilText("refused: this server records to"));
     peer.send(wire::RecordingControl{.record = 0, .name = {}});
     ASSERT_TRUE(peer.untilText("recorded "));
     peer.send(wire::RecordingControl{.record = 0, .name = {}});
@@ -383,7 +386,7 @@ class LateRecording {
     record::RecorderOptions options;
     options.ticks = 1U << 13U;
     auto recorder = std::make_unique<record::Recorder>(
-        file, [](const std::string& text) { ADD_FAILURE() << text; }, options);
+        file, [](record::RecorderProblem, const std::string& text) { ADD_FAILURE() << text; }, options);
     recorder->addDevice(device_);
     recorder->start(0, "");
     stopwatch_ = recorder->stopwatch(0);

@@ -5,6 +5,7 @@
 
 #include <cerrno>
 #include <functional>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,13 +20,29 @@ class RecordingsTest : public testing::Test {
   RecordingsTest() { recordings.begin(0, ""); }
   ~RecordingsTest() override { recordings.finish(); }
 
-  void start(const std::string& name) {
-    recordings.start(name, 0, "", [this](const std::string& refusal) {
-      begun.push_back(refusal.empty() ? "recording to " + recordings.file() : refusal);
-    });
+  Recordings::Listener client(scene::ClientId id) {
+    return {id, [this, id](const std::string& text) {
+              ended.push_back("to " + std::to_string(id) + ": " + text);
+            }};
   }
-  void end() {
-    ASSERT_TRUE(recordings.end([this](const std::string& text) { ended.push_back(text); }));
+  void start(const std::string& name) {
+    recordings.start(
+        name, 0, "",
+        [this](const std::string& refusal) {
+          begun.push_back(refusal.empty() ? "recording to " + recordings.file() : refusal);
+        },
+        client(1));
+  }
+  void end() { recordings.end("", client(1)); }
+  // Only one that records a scene ends.
+  void startScene() {
+    scenes.push_back(std::make_unique<SceneHost>(0, "", SceneOnDisconnect::keep));
+    scenes.back()->add({.config = {}, .slot = &slot, .published = {}, .publishing = {}});
+    scenes.back()->start({.notices = {}, .relieved = {}, .applying = {}, .wasReset = {}}, post());
+    recordings.begin(0, "");
+  }
+  std::function<void(std::function<void()>)> post() {
+    return [this](std::function<void()> call) { posted.push_back(std::move(call)); };
   }
   // The threads, and what they post to the net thread.
   void run() {
@@ -37,15 +54,13 @@ class RecordingsTest : public testing::Test {
   }
 
   base::FakeWorld world;
+  scene::SnapshotSlot slot;
   Recordings::Scenes scenes;
   Recordings::Stations stations;
   std::vector<std::function<void()>> posted;
   std::vector<std::string> begun;
   std::vector<std::string> ended;
-  Recordings recordings{scenes,
-                        stations,
-                        [this](std::function<void()> call) { posted.push_back(std::move(call)); },
-                        {.folder = "/", .failed = {}}};
+  Recordings recordings{scenes, stations, post(), {.folder = "/", .onProblem = {}}};
 };
 
 // A disk may hang; the net thread takes stops.
@@ -63,7 +78,7 @@ TEST_F(RecordingsTest, TheFileIsCreatedByAnotherThread) {
 TEST_F(RecordingsTest, AnEndThatComesBeforeTheFileEndsIt) {
   start("a.haptics");
   end();
-  EXPECT_FALSE(recordings.end({})) << "a second one";
+  EXPECT_THROW(end(), record::RecordingError) << "a second one";
   run();
   EXPECT_EQ(begun.size(), 1U);
   EXPECT_EQ(recordings.file(), "");
@@ -76,12 +91,36 @@ TEST_F(RecordingsTest, ARefusalOfTheDiskIsToldToBoth) {
   run();
   ASSERT_EQ(begun.size(), 1U);
   EXPECT_NE(begun[0].find("cannot record to '/a.haptics': Permission denied"), std::string::npos);
-  EXPECT_EQ(ended, std::vector<std::string>{"nothing is recorded"});
+  EXPECT_EQ(ended, std::vector<std::string>{"to 1: nothing is recorded"});
   world.files.failures = {};
   start("");
   run();
   EXPECT_EQ(begun.size(), 2U);
   EXPECT_TRUE(begun[1].starts_with("recording to /session-2020")) << begun[1];
+}
+
+// Two operators: the first one's end must not be that of the second one's recording.
+TEST_F(RecordingsTest, AnEndWithANameEndsNoOther) {
+  EXPECT_THROW(recordings.end("a.haptics", client(1)), record::RecordingError) << "nothing is recorded";
+  start("b.haptics");
+  EXPECT_THROW(recordings.end("a.haptics", client(1)), record::RecordingError) << "before the file is there";
+  run();
+  EXPECT_THROW(recordings.end("a.haptics", client(1)), record::RecordingError);
+  run();
+  EXPECT_EQ(recordings.file(), "/b.haptics");
+  recordings.end("b.haptics", client(1));
+  EXPECT_EQ(recordings.file(), "");
+}
+
+TEST_F(RecordingsTest, TheClientThatBeganItIsToldOfTheEndToo) {
+  startScene();
+  start("a.haptics");
+  run();
+  recordings.end("", client(2));
+  for (int i = 0; i < 2; ++i) recordings.end("a.haptics", client(3));  // at the same time
+  run();
+  const std::string text = "recorded 0 ticks, 0.0 MB, in /a.haptics";
+  EXPECT_EQ(ended, (std::vector<std::string>{"to 1: " + text, "to 2: " + text, "to 3: " + text}));
 }
 
 // One that has ended keeps its memory until its scenes and servos have done with it.

@@ -5,11 +5,20 @@
 #include <spdlog/sinks/ringbuffer_sink.h>
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
-#include <deque>
-#include <random>
+#include <unistd.h>
 
+#include <algorithm>
+#include <chrono>
+#include <deque>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <random>
+#include <thread>
+
+#include "base/world.h"
 #include "feeling.h"
+#include "hanging_files.h"
 #include "running_server.h"
 #include "scripted_peer.h"
 
@@ -21,6 +30,41 @@ bool untilTouched(ScriptedPeer& peer) {
     const auto touched = peer.all<wire::TouchedObject>();
     return !touched.empty() && touched.back().object == 0;
   });
+}
+
+bool until(const std::function<bool()>& done) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  while (!done() && std::chrono::steady_clock::now() < end)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  return done();
+}
+
+// The black box of one device waits for the disk; the other device does not.
+TEST(Server, ADiskThatHangsLeavesNoDeviceOpen) {
+  HangingFiles files;
+  const base::World& world = base::world();
+  const base::ScopedWorld scoped({world.clock, world.threads, files, world.random});
+  const std::filesystem::path folder =
+      std::filesystem::path(testing::TempDir()) / ("hanging_" + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "fast.csv") << "t_s,x_m,y_m,z_m\n0,0,0,0\n0.01,0.1,0,0\n0.02,0,0,0\n";
+  {
+    server::ServerConfig config = RunningServer::anyPort();
+    config.devices.resize(2, config.devices.front());
+    config.devices.back().names = {"Other"};
+    server::DeviceConfig& fast = config.devices.front();
+    fast.driver = "replay";
+    fast.hand = (folder / "fast.csv").string();
+    fast.enableForces = true;
+    fast.blackBoxDir = folder.string();
+    fast.blackBoxKeep = 1;
+    RunningServer server(config);
+    EXPECT_TRUE(until([&] { return files.asked(); }));
+    server.server().stop();
+    EXPECT_TRUE(until([&] { return server.server().devicesClosed(); }));
+    files.answer();
+  }
+  std::filesystem::remove_all(folder);
 }
 
 TEST(Server, TcpClientReceivesReports) {

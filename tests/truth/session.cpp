@@ -90,8 +90,9 @@ record::RecordedDevice deviceOf(const Trial& trial) {
 bool writeSession(const Trial& trial, const std::filesystem::path& file) {
   if (!trial.isStatic() || !trial.planes.empty()) return false;
   std::filesystem::remove(file);
-  record::Recorder recorder(file, [](const std::string& problem) { throw std::runtime_error(problem); },
-                            {.ticks = trial.hips.size() + 1});
+  record::Recorder recorder(
+      file, [](record::RecorderProblem, const std::string& problem) { throw std::runtime_error(problem); },
+      {.ticks = trial.hips.size() + 1});
   record::RecordedDevice device = deviceOf(trial);
   recorder.addDevice(device);
   device.sceneConfig.stopwatch = recorder.stopwatch(0);

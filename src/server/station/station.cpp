@@ -204,7 +204,6 @@ void Station::stop() {
   impl.keeper.stop();
   impl.tick.finish();
   impl.device->close();
-  impl.recorder.finish();
   const auto wake = impl.tick.histograms().wakeupError.copy();
   const auto compute = impl.tick.histograms().compute.copy();
   const realtime::TickReport& end = impl.tick.last();
@@ -221,6 +220,10 @@ void Station::stop() {
     if (count > 0 && trip.trip != realtime::Trip::stopped)
       spdlog::info("  guard: {} {} times: {}", trip.name, count, trip.what);
   }
+}
+
+void Station::finishBlackBox() {
+  impl_->recorder.finish();
 }
 
 void Station::stopForces() noexcept {

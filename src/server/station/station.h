@@ -34,6 +34,8 @@ class Station {
   void start();
   /// Stops the force, ends the loop and closes the device. Idempotent.
   void stop();
+  /// After stop(): writes the ticks before a fault. A disk may hang, so close all devices first.
+  void finishBlackBox();
 
   /// Any thread: stops the forces until a re-arm.
   void stopForces() noexcept;

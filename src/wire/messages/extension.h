@@ -495,7 +495,9 @@ struct RecordingControl {
       "Begins or ends a recording on the server, in a file of this name; answered by a text.",
       Access::operate};
   Bool16 record = 0;
-  NameBuffer<128> name;  ///< *.haptics, without a folder; empty: named by the time
+  /// *.haptics, without a folder. Empty: a beginning is named by the time, and an end is that of whichever
+  /// recording is written; with a name, of no other.
+  NameBuffer<128> name;
 
   template <class M, class V>
   static constexpr void fields(M& m, V&& v) {

@@ -1,7 +1,6 @@
 // Small parts between clients and a device: buttons, roles, steering the hand, stop and re-arm, black boxes.
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <chrono>
 #include <fstream>
 #include <memory>
@@ -13,6 +12,7 @@
 #include "base/world.h"
 #include "device/simulated/simulated_device.h"
 #include "hapticd/trips.h"
+#include "server/hanging_files.h"
 #include "server/session/roles.h"
 #include "server/station/black_box_recorder.h"
 #include "server/station/button_modes.h"
@@ -480,31 +480,8 @@ TEST_F(BlackBoxFilesTest, KeepsTheNewestWithinTheirBytes) {
   }
 }
 
-// A disk that answers when the test says so.
-class HangingFiles final : public base::Files {
- public:
-  std::unique_ptr<base::OutputFile> create(const fs::path& path, base::Existing existing) override {
-    hangs_.wait(true);
-    return real_.create(path, existing);
-  }
-  std::unique_ptr<base::InputFile> open(const fs::path& path) override { return real_.open(path); }
-  std::vector<std::byte> read(const fs::path& path) override { return real_.read(path); }
-  void rename(const fs::path& from, const fs::path& to) override { real_.rename(from, to); }
-  void remove(const fs::path& path) override { real_.remove(path); }
-  void createFolder(const fs::path& path) override { real_.createFolder(path); }
-  std::vector<std::string> list(const fs::path& path) override { return real_.list(path); }
-  void answer() {
-    hangs_ = false;
-    hangs_.notify_all();
-  }
-
- private:
-  base::SystemFiles real_;
-  std::atomic<bool> hangs_{true};
-};
-
 TEST_F(BlackBoxFilesTest, ADiskThatHangsHoldsNobodyUp) {
-  HangingFiles files_;
+  test::HangingFiles files_;
   const base::World& world = base::world();
   const base::ScopedWorld scoped({world.clock, world.threads, files_, world.random});
   realtime::BlackBox box(5);
