@@ -349,9 +349,8 @@ void RemoteContacts::locate(Slot& slot, const RemoteHand& hand, Nanos now) noexc
   const double age_s = std::clamp(base::toSeconds(now - slot.statedAt), 0.0, kLongestAge_s);
   const SurfaceAt at = surfaceAt(slot.contact, age_s, hand.position_m);
   slot.depth_m = at.depth_m + slot.shift_m;
-  slot.velocity = slot.contact.velocity_m_per_s;
+  slot.velocity = at.velocity_m_per_s;
   if (!slot.contact.angularVelocity_rad_per_s.isZero(0)) {
-    slot.velocity += slot.contact.angularVelocity_rad_per_s.cross(hand.position_m - at.point_m);
     const double square = slot.velocity.squaredNorm();
     if (square > kRemoteSpeed_m_per_s * kRemoteSpeed_m_per_s)
       slot.velocity *= kRemoteSpeed_m_per_s / std::sqrt(square);

@@ -143,6 +143,63 @@ TEST(RemoteContacts, SurfacesMoveByTheirVelocities) {
   expectNear(other.force, 800 * -normal.dot(other.hand.position_m) * normal, 1e-6);
 }
 
+// A wheel, or a ball, that turns about its own axis is the same surface at all times.
+TEST(RemoteContacts, RoundSurfacesTurnAboutTheirCentre) {
+  for (const RemoteShape shape : {RemoteShape::cylinder, RemoteShape::sphere}) {
+    for (const double radius_m : {0.02, 0.05, -0.02}) {
+      const Vec3 centre_m(0, -radius_m, 0);
+      const Vec3 spin_rad_per_s(0, 0, -19);
+      Rig rig;
+      for (int ms = 0; ms < 2000; ++ms) {
+        rig.hand.position_m.y() = std::max(-0.001, 0.002 - 2e-5 * ms);
+        if (ms % 33 == 0) {
+          RemoteContact c = floorAt(0, 1000);
+          c.shape = shape;
+          c.radius_m = radius_m;
+          c.point_m = centre_m + radius_m * c.normal;
+          c.angularVelocity_rad_per_s = spin_rad_per_s;
+          c.velocity_m_per_s = spin_rad_per_s.cross(radius_m * c.normal);
+          rig.state({c});
+        }
+        rig.step();
+        const double depth_m = std::max(0.0, -rig.hand.position_m.y());
+        ASSERT_NEAR(rig.force.y(), 1000 * depth_m, 1e-6) << radius_m << " m, " << ms << " ms";
+        ASSERT_NEAR(rig.force.x(), 0, 1e-6);
+        ASSERT_EQ(rig.out.status & kRemoteCorrectionsHeld, 0U);
+      }
+    }
+  }
+}
+
+// A door that swings about a hinge, with the hand at one place of it: it does not matter which point the
+// client states.
+TEST(RemoteContacts, FlatSurfacesTurnAboutTheirHinge) {
+  constexpr double kHand_m = 0.1;  // from the hinge
+  constexpr double kSpeed_rad_per_s = 5;
+  for (const double stated_m : {0.1, 0.07, 0.13}) {
+    Rig rig;
+    const auto along = [](double angle) { return Vec3(std::cos(angle), std::sin(angle), 0); };
+    const auto normal = [](double angle) { return Vec3(-std::sin(angle), std::cos(angle), 0); };
+    for (int ms = 0; ms < 400; ++ms) {
+      const double angle = 1e-3 * kSpeed_rad_per_s * ms;
+      if (ms % 33 == 0) {
+        RemoteContact c = floorAt(0, 1000);
+        c.point_m = stated_m * along(angle);
+        c.normal = normal(angle);
+        c.angularVelocity_rad_per_s = {0, 0, kSpeed_rad_per_s};
+        c.velocity_m_per_s = c.angularVelocity_rad_per_s.cross(c.point_m);
+        rig.state({c});
+      }
+      const double next = angle + 1e-3 * kSpeed_rad_per_s;
+      const double depth_m = std::min(0.0015, 3e-5 * ms - 0.001);
+      rig.hand.position_m = kHand_m * along(next) - depth_m * normal(next);
+      rig.step();
+      ASSERT_LE((rig.force - 1000 * std::max(0.0, depth_m) * normal(next)).norm(), 1e-6)
+          << stated_m << " m, " << ms << " ms";
+    }
+  }
+}
+
 // Draws in the order of the calls, whatever the compiler.
 class Draw {
  public:
