@@ -58,6 +58,7 @@ double towards(double value, double goal, double force_N, double& budget_N) noex
 void RemoteContacts::reset() noexcept {
   for (Slot& slot : slots_) slot.used = false;
   top_ = 0;
+  lastTick_ = 0;
   pressed_N_ = 0;
   frictionEnergy_J_ = kLent_J;
   force_N_.setZero();
@@ -85,6 +86,8 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
   out.contactsTime = newest.clientTime;
   corrections_.refill(step_s);
   if (newest.number != taken_) take(newest, hand, now);
+  elapsed_s_ = lastTick_ > 0 ? std::clamp(base::toSeconds(now - lastTick_), 0.0, kLongestAge_s) : step_s;
+  lastTick_ = now;
   if (top_ == 0) {
     hand_m_ = hand.position_m;
     frictionEnergy_J_ = kLent_J;
@@ -182,8 +185,8 @@ Vec3 RemoteContacts::forceWith(const Change& change, const RemoteHand& hand, dou
   for (Slot& slot : inUse()) {
     if (!slot.used) continue;
     const Vec3 before_N = slot.friction_N;
-    slot.friction_N = friction(slot, hand, pressed_N_, step_s);
-    given_J -= 0.5 * (before_N + slot.friction_N).dot(moved_m - step_s * slot.velocity);
+    slot.friction_N = friction(slot, hand, pressed_N_, elapsed_s_);
+    given_J -= 0.5 * (before_N + slot.friction_N).dot(moved_m - elapsed_s_ * slot.velocity);
   }
   return normal_N + limitFriction(hand, given_J);
 }
@@ -497,9 +500,9 @@ Vec3 RemoteContacts::share(const RemoteHand& hand) noexcept {
 }
 
 // A spring to a point of the surface, which slides when the spring exceeds the bound.
-Vec3 RemoteContacts::friction(Slot& slot, const RemoteHand& hand, double ofAll, double step_s) noexcept {
+Vec3 RemoteContacts::friction(Slot& slot, const RemoteHand& hand, double ofAll, double elapsed_s) noexcept {
   if (slot.normal_N <= 0) return Vec3::Zero();
-  slot.anchor_m += step_s * slot.velocity;
+  slot.anchor_m += elapsed_s * slot.velocity;
   Vec3 apart = hand.position_m - slot.anchor_m;
   apart -= slot.normal.dot(apart) * slot.normal;
   const double stiffness = kLateral * slot.contact.stiffness_N_per_m * slot.normal_N / ofAll;

@@ -113,7 +113,7 @@ class RemoteContacts {
   static void follow(Slot& slot, const RemoteContact& contact) noexcept;
   static void demand(Slot& slot, const RemoteHand& hand) noexcept;
   Vec3 share(const RemoteHand& hand) noexcept;
-  static Vec3 friction(Slot& slot, const RemoteHand& hand, double ofAll, double step_s) noexcept;
+  static Vec3 friction(Slot& slot, const RemoteHand& hand, double ofAll, double elapsed_s) noexcept;
   Vec3 limitFriction(const RemoteHand& hand, double given_J) noexcept;
   static void takeHold(Slot& slot, const RemoteHand& hand, const Vec3& friction_N, double energy_J) noexcept;
 
@@ -129,7 +129,9 @@ class RemoteContacts {
   double frictionEnergy_J_ = 0;  // which the hand gave to the springs of friction, at the last tick
   double frictionNow_J_ = 0;     // at this one
   EnergyTank corrections_{EnergyBudget{}};
-  bool held_ = false;  // a correction waited for energy in this tick
+  Nanos lastTick_ = 0;    // 0: none
+  double elapsed_s_ = 0;  // since then: surfaces move on through a late tick
+  bool held_ = false;     // a correction waited for energy in this tick
   bool rest_ = true;
 };
 

@@ -41,10 +41,11 @@ struct Rig {
     set.count = static_cast<std::uint32_t>(contacts.size());
     std::copy(contacts.begin(), contacts.end(), set.contacts.begin());
   }
-  const Vec3& step() {
-    now += kMs;
+  // The servo counts a late tick for no more than two.
+  const Vec3& step(Nanos late = 0) {
+    now += kMs + late;
     out = {};
-    force = law.step(set, hand, now, 1e-3, out);
+    force = law.step(set, hand, now, base::toSeconds(kMs + std::min(late, kMs)), out);
     return force;
   }
   // States the same every 16 ms.
@@ -680,6 +681,30 @@ TEST(RemoteContacts, FrictionSticksAndSlides) {
   EXPECT_NEAR(largest, 0.5 * normal, 0.03);
   EXPECT_NEAR(rig.force.x(), -0.3 * normal, 1e-6);
   EXPECT_NEAR(rig.force.y(), normal, 1e-6);
+}
+
+// The hand goes along with a belt, so that nothing strains the friction; some ticks are late.
+TEST(RemoteContacts, FrictionOfAMovingSurfaceKeepsUpWithLateTicks) {
+  constexpr double kSpeed_m_per_s = 0.1;
+  for (const Nanos late : {2 * kMs, 5 * kMs, 14 * kMs}) {
+    Rig rig;
+    const Nanos began = rig.now;
+    const auto travelled = [&](Nanos at) { return kSpeed_m_per_s * base::toSeconds(at - began); };
+    for (int i = 0; i < 1500; ++i) {
+      if (i % 10 == 0) {
+        RemoteContact belt = floorAt(0, 1000);
+        belt.staticFriction = belt.dynamicFriction = 0.8;
+        belt.velocity_m_per_s.x() = kSpeed_m_per_s;
+        rig.state({belt});
+      }
+      const Nanos lateNow = i > 600 && i % 50 == 0 ? late : 0;
+      rig.hand.velocity_m_per_s.x() = kSpeed_m_per_s;
+      rig.hand.position_m = {travelled(rig.now + kMs + lateNow), std::max(-0.002, 0.002 - 2e-5 * i), 0};
+      rig.step(lateNow);
+      ASSERT_NEAR(rig.force.x(), 0, 1e-6) << "tick " << i << ", late by " << late / kMs << " ms";
+    }
+    EXPECT_NEAR(rig.force.y(), 2, 1e-6);
+  }
 }
 
 TEST(RemoteContacts, TheSlowestTurnIsNone) {
