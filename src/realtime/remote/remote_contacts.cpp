@@ -19,12 +19,14 @@ constexpr double kFade_N_per_s = 0.4 * kRemoteRate_N_per_s;
 constexpr double kBesideFade_N_per_s = 0.25 * kRemoteRate_N_per_s;
 constexpr double kOfAll_N_per_s = 0.75 * kRemoteRate_N_per_s;  // what corrections change in the sum
 constexpr int kTries = 4;
-constexpr double kFadeOfAll = 0.8;     // part of it that a fade may take
-constexpr double kLeast = 0.2;         // part of it for corrections, however much a fade takes
-constexpr double kEarly = 1.5;         // several contacts begin to fade earlier: their fade may be held up
-constexpr double kLongestAge_s = 0.2;  // a surface moves on no longer than this without an update
-constexpr double kLateral = 0.5;       // share of the stiffness that holds a sticking point
-constexpr double kStick = 0.9;         // of the dynamic bound: sliding ends below it
+constexpr double kFadeOfAll = 0.8;  // part of it that a fade may take
+constexpr double kLeast = 0.2;      // part of it for corrections, however much a fade takes
+constexpr double kEarly = 1.5;      // several contacts begin to fade earlier: their fade may be held up
+constexpr Nanos kFadePart = 3;      // the last third of a life: who repeats must not feel a fade
+constexpr double kQuickFade_N_per_s = 1000;  // unless the force would fall faster
+constexpr double kLongestAge_s = 0.2;        // a surface moves on no longer than this without an update
+constexpr double kLateral = 0.5;             // share of the stiffness that holds a sticking point
+constexpr double kStick = 0.9;               // of the dynamic bound: sliding ends below it
 constexpr double kUnlimited_J = 1e9;
 constexpr double kLent_J = 2e-4;         // to the springs of friction, at the first touch
 constexpr double kSlow_m_per_s = 0.01;   // below it the damping coefficient may change as at this speed
@@ -126,9 +128,9 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
   late_N_.setZero();
   Vec3 force = forceWith(change, hand, step_s);
   // In a corner the sum changes faster than what each face demands.
-  const double most_N = kOfAll_N_per_s * step_s;
+  const double most_N = std::max(kOfAll_N_per_s * step_s, due_N_ / kFadeOfAll);
   if (mayRetry && (force - force_N_).squaredNorm() > most_N * most_N)
-    force = forceWithin(change, hand, step_s);
+    force = forceWithin(change, most_N, hand, step_s);
   force_N_ = force;
   hand_m_ = hand.position_m;
   frictionEnergy_J_ = frictionNow_J_;
@@ -173,7 +175,9 @@ Vec3 RemoteContacts::forceWith(const Change& change, const RemoteHand& hand, dou
   for (Slot& slot : inUse()) {
     if (!slot.used) continue;
     if (slot.fading) {
-      slot.gain -= change.fade * slot.fadeStep;
+      const double falls = change.fade * slot.fadeStep;
+      giveBack(slot, 0.5 * falls * slot.contact.stiffness_N_per_m * slot.depth_m * slot.depth_m);
+      slot.gain -= falls;
     } else {
       correct(slot, hand, change.correction_N, step_s);
     }
@@ -226,8 +230,8 @@ Vec3 RemoteContacts::forceAgain(const Change& change, const RemoteHand& hand, do
 }
 
 // As large a part of the changes as the rate allows; the fade comes first, because it must end in time.
-Vec3 RemoteContacts::forceWithin(const Change& most, const RemoteHand& hand, double step_s) noexcept {
-  const double most_N = kOfAll_N_per_s * step_s;
+Vec3 RemoteContacts::forceWithin(const Change& most, double most_N, const RemoteHand& hand,
+                                 double step_s) noexcept {
   const Vec3 unchanged = forceAgain({}, hand, step_s);
   Change change{0, most.fade};
   Vec3 force = forceAgain(change, hand, step_s);
@@ -276,6 +280,11 @@ void RemoteContacts::take(const RemoteContactSet& set, const RemoteHand& hand, N
   }
 }
 
+// What a fade takes from the spring, the hand gave: it pays for the correction that brings the force back.
+void RemoteContacts::giveBack(const Slot& slot, double energy_J) noexcept {
+  if (slot.depth_m > 0 && !slot.contact.yields) corrections_.give(-energy_J);
+}
+
 // The surface jumps where the client says, and shift and turn keep spring force and normal of the moment.
 void RemoteContacts::replace(Slot& slot, const RemoteContact& contact, const RemoteContactSet& set,
                              const RemoteHand& hand, Nanos now) noexcept {
@@ -289,6 +298,7 @@ void RemoteContacts::replace(Slot& slot, const RemoteContact& contact, const Rem
     velocity = slot.velocity;
     resumed_ = resumed_ || slot.fading;
     spring_N = slot.gain * slot.contact.stiffness_N_per_m * std::max(0.0, slot.depth_m);
+    giveBack(slot, 0.5 * (1 - slot.gain) * spring_N * slot.depth_m);  // by the shift, which weakens it
     normal = slot.normal;
   } else {
     slot = Slot{};
@@ -325,15 +335,19 @@ void RemoteContacts::replace(Slot& slot, const RemoteContact& contact, const Rem
   }
 }
 
-// The fade of all contacts that end together takes the time in which their force may fall.
+// The fade of all contacts that end together takes the time in which their force may fall, but no more than a
+// part of their life.
 void RemoteContacts::fadeOut(Nanos now, double step_s) noexcept {
   const auto pressing =
       std::ranges::count_if(inUse(), [](const Slot& s) { return s.used && s.normal_N > 0; });
   const Nanos needed = base::toNanos((pressing > 1 ? kEarly : 1) * pressed_N_ / kFade_N_per_s + step_s);
+  const Nanos least = base::toNanos(pressed_N_ / kQuickFade_N_per_s + step_s);
   std::size_t top = 0;
+  due_N_ = 0;
   for (Slot& slot : inUse()) {
     if (!slot.used) continue;
-    if (!slot.fading && slot.end - now <= needed) {
+    const Nanos length = std::min(needed, std::max(least, slot.contact.lifetime / kFadePart));
+    if (!slot.fading && slot.end - now <= length) {
       slot.fading = true;
       slot.fadeEnd = slot.end;
     }
@@ -343,6 +357,7 @@ void RemoteContacts::fadeOut(Nanos now, double step_s) noexcept {
     }
     const double left_s = std::max(0.0, base::toSeconds(slot.fadeEnd - now));
     slot.fadeStep = slot.gain * step_s / (left_s + step_s);
+    if (slot.fading) due_N_ += slot.demand_N * step_s / (base::toSeconds(slot.end - now) + step_s);
     top = static_cast<std::size_t>(&slot - slots_.data()) + 1;
   }
   top_ = top;

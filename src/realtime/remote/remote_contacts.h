@@ -89,6 +89,7 @@ class RemoteContacts {
   void take(const RemoteContactSet& set, const RemoteHand& hand, Nanos now) noexcept;
   void replace(Slot& slot, const RemoteContact& contact, const RemoteContactSet& set, const RemoteHand& hand,
                Nanos now) noexcept;
+  void giveBack(const Slot& slot, double energy_J) noexcept;
   std::span<Slot> inUse() noexcept { return {slots_.data(), top_}; }
   Slot* slotFor(std::int32_t id) noexcept;
   // What a tick changes besides following the hand and the stated motion.
@@ -103,7 +104,7 @@ class RemoteContacts {
   };
   Vec3 forceWith(const Change& change, const RemoteHand& hand, double step_s) noexcept;
   Vec3 forceAgain(const Change& change, const RemoteHand& hand, double step_s) noexcept;
-  Vec3 forceWithin(const Change& most, const RemoteHand& hand, double step_s) noexcept;
+  Vec3 forceWithin(const Change& most, double most_N, const RemoteHand& hand, double step_s) noexcept;
   void fadeOut(Nanos now, double step_s) noexcept;
   static void locate(Slot& slot, const RemoteHand& hand, Nanos now) noexcept;
   static bool isCorrected(const Slot& slot) noexcept;
@@ -120,6 +121,7 @@ class RemoteContacts {
   std::array<Slot, kSlots> slots_;
   std::uint64_t taken_ = 0;
   std::size_t top_ = 0;          // slots from here on are unused
+  double due_N_ = 0;             // what fades must take in this tick to end in time
   bool resumed_ = false;         // an update came during a fade
   Tried before_;                 // before this tick's corrections, where there are some
   Vec3 force_N_ = Vec3::Zero();  // of the last tick, with what it left

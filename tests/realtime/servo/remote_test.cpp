@@ -444,6 +444,91 @@ TEST(RemoteContacts, LifeIncludesTheFade) {
   EXPECT_EQ(rig.out.count, 0U);
 }
 
+// Two walls of a groove, or a floor, pressed with a force that the client's updates find at rest.
+std::vector<RemoteContact> floorOrGroove(int walls, double stiffness, Nanos lifetime) {
+  RemoteContact c = floorAt(0, stiffness);
+  c.point_m.setZero();
+  c.lifetime = lifetime;
+  if (walls == 1) return {c};
+  c.normal = Vec3(1, 1, 0).normalized();
+  RemoteContact other = c;
+  other.id = 1;
+  other.normal.x() = -other.normal.x();
+  return {c, other};
+}
+
+// Within two thirds of their life.
+TEST(RemoteContacts, ThoseRepeatedInTimeDoNotFade) {
+  struct Client {
+    int every_ms;
+    int life_ms;
+  };
+  for (const Client client : {Client{33, 100}, {10, 40}, {33, 50}, {4, 10}, {10, 30}}) {
+    for (const int walls : {1, 2}) {
+      for (const double force_N : {2.0, 5.0, 11.0}) {
+        if (client.life_ms == 10 && force_N > 2) continue;  // which may not fall faster
+        const auto contacts = floorOrGroove(walls, 1000, client.life_ms * kMs);
+        Rig rig;
+        for (int ms = 0; ms < 4000; ++ms) {
+          rig.hand.position_m.y() = std::max(-1e-3 * force_N, 0.002 - 2e-5 * ms);
+          if (ms % client.every_ms == 0) rig.state(contacts);
+          rig.step();
+          ASSERT_NEAR(rig.force.y(), 1e3 * std::max(0.0, -rig.hand.position_m.y()), 1e-6)
+              << force_N << " N, every " << client.every_ms << " ms for " << client.life_ms << " ms, "
+              << walls;
+        }
+      }
+    }
+  }
+}
+
+// The hand gave what a fade took: it does not empty the tank of corrections.
+TEST(RemoteContacts, WhatAFadeTookComesBack) {
+  for (const int walls : {1, 2}) {
+    for (const double stiffness : {200.0, 1000.0}) {
+      const auto contacts = floorOrGroove(walls, stiffness, 100 * kMs);
+      Rig rig;
+      constexpr double kForce_N = 3;
+      int next_ms = 0;
+      for (int ms = 0; ms < 8000; ++ms) {
+        rig.hand.position_m.y() = std::max(-kForce_N / stiffness, 0.002 - 2e-5 * ms);
+        if (ms >= next_ms) {
+          const bool stall = ms > 2000 && ms % 300 < 10;
+          if (stall) {
+            ASSERT_NEAR(rig.force.y(), kForce_N, 1e-6) << "before the stall at " << ms;
+          }
+          rig.state(contacts);
+          next_ms = ms + (stall ? 90 : 10);
+        }
+        rig.step();
+        ASSERT_EQ(rig.out.status & kRemoteCorrectionsHeld, 0U) << ms;
+      }
+    }
+  }
+}
+
+TEST(RemoteContacts, AStrongForceOfALostClientEndsInTimeWithoutAStep) {
+  for (const int life_ms : {30, 50, 100}) {
+    for (const int walls : {1, 2}) {
+      const auto contacts = floorOrGroove(walls, 1500, life_ms * kMs);
+      Rig rig;
+      for (int ms = 0; ms < 500; ++ms) {
+        rig.hand.position_m.y() = std::max(-0.010, 0.002 - 4e-5 * ms);
+        if (ms % 4 == 0) rig.state(contacts);
+        rig.step();
+      }
+      ASSERT_NEAR(rig.force.y(), 15, 1e-6);
+      rig.state(contacts);
+      const Nanos received = rig.now;
+      while (rig.now < received + life_ms * kMs) {
+        const Vec3 last_N = rig.force;
+        EXPECT_LE((rig.step() - last_N).norm(), 1) << life_ms << " ms, " << walls << " walls";
+      }
+      EXPECT_EQ(rig.force, Vec3::Zero());
+    }
+  }
+}
+
 TEST(RemoteContacts, AbsentOnesFadeAtOnce) {
   Rig rig;
   RemoteContact side = floorAt(0);
