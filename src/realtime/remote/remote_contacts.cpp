@@ -114,12 +114,12 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
     moving = moving || (!slot.fading && slot.depth_m > 0 && !hardlyChanges(slot, step_s));
   }
   const bool fading = resumed || leaving > 0;
-  rest_ = !fading && !moving && hand.sceneForce_N.isZero(0);
+  rest_ = !fading && !moving && hand.scene.rest;
   const double budget_N = (fading         ? kBesideFade_N_per_s
                            : changing > 1 ? kShared_N_per_s
                                           : kCorrection_N_per_s) *
                           step_s / std::max(changing, 1);
-  const bool mayRetry = (correcting || fading) && changing + leaving > 1;
+  const bool mayRetry = (correcting || fading) && changing + leaving + (hand.scene.count > 0 ? 1 : 0) > 1;
   if (mayRetry) {
     std::copy_n(slots_.begin(), top_, before_.rendered.begin());
     before_.corrections = corrections_;
@@ -133,6 +133,7 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
     force = forceWithin(change, most_N, hand, step_s);
   force_N_ = force;
   hand_m_ = hand.position_m;
+  scene_ = hand.scene;
   frictionEnergy_J_ = frictionNow_J_;
   for (const Slot& slot : inUse()) {
     if (!slot.used || slot.normal_N <= 0) continue;
@@ -160,9 +161,16 @@ RemoteSprings RemoteContacts::springs() const noexcept {
     out.force_N += slot.friction_N;
     out.stored_J += 0.5 * slot.friction_N.dot(slot.anchor_m - hand_m_);
   }
+  out.beside = pressing.count > 0 && scene_.count > 0;
+  if (out.beside) {
+    pressing.add(scene_, 1);
+    const Vec3 way_m = scene_.way_m();
+    out.normal_N = -scene_.stiffness_N_per_m * way_m;
+    out.stored_J -= 0.5 * scene_.stiffness_N_per_m * way_m.squaredNorm();
+  }
   shareNormalForce(pressing);
   for (std::size_t i = 0; i < pressing.count; ++i) {
-    out.normal_N += pressing.share_N[i] * Vec3(pressing.x[i], pressing.y[i], pressing.z[i]);
+    out.normal_N += pressing.share_N[i] * pressing.normal(i);
     out.stored_J += 0.5 * pressing.share_N[i] * pressing.depth_m[i];
   }
   out.force_N += out.normal_N;
@@ -489,25 +497,31 @@ void RemoteContacts::demand(Slot& slot, const RemoteHand& hand) noexcept {
   slot.demand_N = slot.gain * (spring_N - damper_N);
 }
 
-// The normal force of all contacts together, beside that of meshes and planes.
+// The normal force of all contacts together, less that of which they relieve the scene. Meshes and planes
+// take part as further contacts, so that all forces have one potential.
 Vec3 RemoteContacts::share(const RemoteHand& hand) noexcept {
   PressingContacts pressing;
   std::array<Slot*, kSlots> slots;
   for (Slot& slot : inUse()) {
     if (slot.used && slot.demand_N > 0) {
       slots[pressing.count] = &slot;
-      const double scene_N = std::max(0.0, slot.normal.dot(hand.sceneForce_N));
-      pressing.add(slot.normal, slot.stiffness_N_per_m, slot.demand_N - scene_N, slot.normal_N);
+      pressing.add(slot.normal, slot.stiffness_N_per_m, slot.demand_N, slot.normal_N);
     } else {
       slot.normal_N = 0;
     }
   }
-  shareNormalForce(pressing);
   pressed_N_ = 0;
-  Vec3 force = Vec3::Zero();
-  for (std::size_t i = 0; i < pressing.count; ++i) {
+  if (pressing.count == 0) return Vec3::Zero();
+  const std::size_t count = pressing.count;
+  pressing.add(hand.scene, hand.scene.exerted);
+  shareNormalForce(pressing);
+  Vec3 ofScene = -hand.scene.exerted * hand.scene.stiffness_N_per_m * hand.scene.way_m();
+  for (std::size_t i = count; i < pressing.count; ++i) ofScene += pressing.share_N[i] * pressing.normal(i);
+  Vec3 force = ofScene;
+  for (std::size_t i = 0; i < count; ++i) {
     Slot& slot = *slots[i];
     slot.normal_N = pressing.share_N[i];
+    slot.grip_N = std::max(0.0, slot.normal_N + std::min(0.0, slot.normal.dot(ofScene)));
     force += slot.normal_N * slot.normal;
     pressed_N_ += slot.normal_N;
   }
@@ -522,8 +536,8 @@ Vec3 RemoteContacts::friction(Slot& slot, const RemoteHand& hand, double ofAll, 
   apart -= slot.normal.dot(apart) * slot.normal;
   const double stiffness = kLateral * slot.contact.stiffness_N_per_m * slot.normal_N / ofAll;
   const double pull = stiffness * apart.norm();
-  const double dynamic_N = slot.dynamicFriction * slot.normal_N;
-  if (pull > (slot.sliding ? dynamic_N : slot.staticFriction * slot.normal_N)) {
+  const double dynamic_N = slot.dynamicFriction * slot.grip_N;
+  if (pull > (slot.sliding ? dynamic_N : slot.staticFriction * slot.grip_N)) {
     slot.sliding = true;
     apart *= dynamic_N / pull;
     slot.anchor_m = hand.position_m - apart;

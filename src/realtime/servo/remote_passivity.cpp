@@ -21,6 +21,7 @@ SpringState stateOf(const RemoteContacts& contacts) noexcept {
   state.normal = springs.normal_N.stableNormalized();
   state.stored_J = springs.stored_J;
   state.stiffness_N_per_m = springs.stiffest_N_per_m;
+  state.beside = springs.beside;
   return state;
 }
 

@@ -161,7 +161,6 @@ void Tick::addRemote(Nanos period, bool foundAnew, double passedShare) noexcept 
   RemoteRendering& out = report_.remote;
   out.status = 0;
   out.count = 0;
-  if (contactsSeen_ == 0 && forceSeen_ == 0) return;
   Rendering& rendering = report_.rendering;
   if ((rendering.status & kRenderNotFinite) != 0) {
     remoteContacts_.reset();
@@ -172,7 +171,7 @@ void Tick::addRemote(Nanos period, bool foundAnew, double passedShare) noexcept 
     return;
   }
   const double step_s = base::toSeconds(std::min(period, 2 * period_));  // a late tick changes no more
-  const RemoteHand hand{report_.device.position_m, report_.device.velocity_m_per_s, rendering.normalForce_N};
+  const RemoteHand hand{report_.device.position_m, report_.device.velocity_m_per_s, renderer_.pressed()};
   remoteContacts_.step(input.contacts, hand, report_.time, step_s, out);
   remotePassivity_.step(remoteContacts_, hand.position_m, base::toSeconds(period), out);
   rendering.force_N += out.contactForce_N;

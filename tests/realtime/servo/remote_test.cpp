@@ -560,13 +560,19 @@ TEST(RemoteContacts, SurfacesOnTopOfEachOtherAreAsStiffAsOne) {
   rig.approach(contacts, {0, 0.001, 0}, {0, -0.002, 0});
   expectNear(rig.force, {0, 1.6, 0}, 1e-6);
 
-  // What the scene exerts already is not added again; across it, contacts add up.
-  rig.hand.sceneForce_N = {0, 1, 0};
-  rig.settle(contacts, 1);
-  expectNear(rig.force, {0, 0.6, 0}, 1e-6);
-  rig.hand.sceneForce_N = {1, 0, 0};
-  rig.settle(contacts, 1);
-  expectNear(rig.force, {0, 1.6, 0}, 1e-6);
+  // Of surfaces on top of each other, those of the scene included, the larger force is felt; across each
+  // other they add up. The remote force is what is added to that of the scene.
+  const auto besideScene = [&](const Vec3& normal, double depth_m, double stiffness_N_per_m) {
+    rig.hand.scene = {};
+    rig.hand.scene.add(normal, depth_m);
+    rig.hand.scene.stiffness_N_per_m = stiffness_N_per_m;
+    rig.settle(contacts, 1);
+    return rig.force;
+  };
+  expectNear(besideScene(Vec3::UnitY(), 0.002, 500), {0, 0.6, 0}, 1e-6);
+  expectNear(besideScene(Vec3::UnitY(), 0.002, 800), {0, 0, 0}, 1e-6);
+  expectNear(besideScene(Vec3::UnitY(), 0.001, 1200), {0, 0.4, 0}, 1e-6);
+  expectNear(besideScene(Vec3::UnitX(), 0.001, 1200), {0, 1.6, 0}, 1e-6);
 }
 
 // Whatever the contacts, each adds what the others do not exert, to the solver's last digits; a softer one is
