@@ -162,6 +162,10 @@ void Tick::addRemote(Nanos period, bool foundAnew, double passedShare) noexcept 
   out.status = 0;
   out.count = 0;
   Rendering& rendering = report_.rendering;
+  if (contactsSeen_ == 0 && forceSeen_ == 0) {
+    remotePassivity_.idle(rendering.contactForce_N);
+    return;
+  }
   if ((rendering.status & kRenderNotFinite) != 0) {
     remoteContacts_.reset();
     remotePassivity_.reset();
@@ -173,7 +177,8 @@ void Tick::addRemote(Nanos period, bool foundAnew, double passedShare) noexcept 
   const double step_s = base::toSeconds(std::min(period, 2 * period_));  // a late tick changes no more
   const RemoteHand hand{report_.device.position_m, report_.device.velocity_m_per_s, renderer_.pressed()};
   remoteContacts_.step(input.contacts, hand, report_.time, step_s, out);
-  remotePassivity_.step(remoteContacts_, hand.position_m, base::toSeconds(period), out);
+  remotePassivity_.step(remoteContacts_, rendering.contactForce_N, hand.position_m, base::toSeconds(period),
+                        out);
   rendering.force_N += out.contactForce_N;
   heldForce_.step(input.force, hand.position_m, hand.velocity_m_per_s, report_.time, step_s, passedShare,
                   out);

@@ -189,5 +189,27 @@ TEST(SceneAndRemote, friction_of_a_surface_that_both_know_is_felt_once) {
   }
 }
 
+// The guard lets the sum of both grow by its rate.
+TEST(SceneAndRemote, table_that_both_know_does_not_throw_a_fast_arm_back_faster) {
+  for (const double stiffness : {2000.0, 5000.0}) {
+    for (const double speed : {0.3, 0.5, 0.8, 1.0}) {
+      SharedPit pit;
+      pit.damping_Ns_per_m = 0.3;
+      pit.addToScene(Vec3::UnitY(), stiffness);
+      pit.addRemote(Vec3::UnitY(), stiffness);
+      for (int ms = 0; ms < 200; ++ms) pit.at({0.001, 0.03, 0.002});
+      pit.v_m_per_s = Vec3(0, -speed, 0);
+      double in_m_per_s = 0;
+      while (pit.x_m.y() > 0) {
+        in_m_per_s = -pit.v_m_per_s.y();
+        pit.letGo();
+      }
+      for (int ms = 0; ms < 300 && pit.x_m.y() <= 0; ++ms) pit.letGo();
+      EXPECT_GT(pit.v_m_per_s.y(), 0);
+      EXPECT_LT(pit.v_m_per_s.y(), 1.17 * in_m_per_s) << stiffness << " N/m, " << speed << " m/s";
+    }
+  }
+}
+
 }  // namespace
 }  // namespace hapticd::realtime
