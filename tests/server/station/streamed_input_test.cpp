@@ -113,6 +113,45 @@ TEST_F(StreamedInputTest, AYieldingContactPaysForTheRoundTrip) {
   EXPECT_NEAR(first().stiffness_N_per_m, 0.999 * 2.5 / 0.0005, 1e-6);
 }
 
+TEST_F(StreamedInputTest, OneLateMessageIsNoRoundTrip) {
+  std::vector<double> n = floorAt(0);
+  n[18] = 400;
+  n[23] = 1;
+  const auto sendAged = [&](int age_ms) {
+    now_ += 33 * kStreamMillisecond;
+    send(n, 1, 0, now_ - age_ms * kStreamMillisecond);
+    return first().stiffness_N_per_m;
+  };
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(sendAged(10), 400);
+  EXPECT_EQ(sendAged(100), 400);
+  for (int i = 0; i < 150; ++i) EXPECT_EQ(sendAged(10), 400);
+  sendAged(100);
+  EXPECT_NEAR(sendAged(100), 0.999 * 5 / 0.1005, 1e-6) << "a way that has become longer";
+  EXPECT_LT(sendAged(10), 70) << "it may become so again";
+  for (int i = 0; i < 90; ++i) sendAged(10);
+  EXPECT_EQ(sendAged(10), 400) << "after three seconds, whatever the rate of the client";
+}
+
+// Only what both press on the hand at once share the bound.
+TEST_F(StreamedInputTest, FacingSurfacesShareTheBoundWhereTheyMaySqueezeTheHand) {
+  const auto stiffnessOfFloorUnder = [&](double ceiling_m, double sinking_m_per_s = 0) {
+    std::vector<double> n = floorAt(0, 1);
+    std::vector<double> ceiling = floorAt(ceiling_m, 2);
+    n[18] = ceiling[18] = 1e5;
+    ceiling[7] = -1;
+    ceiling[13] = -sinking_m_per_s;
+    ceiling[3] = 0.05;  // any of its points
+    n.insert(n.end(), ceiling.begin(), ceiling.end());
+    send(n);
+    return first().stiffness_N_per_m;
+  };
+  const double whole = 0.999 * 5 / 0.0005;
+  EXPECT_NEAR(stiffnessOfFloorUnder(0.020), whole, 1e-6);
+  EXPECT_NEAR(stiffnessOfFloorUnder(0.002), whole / 2, 1e-6);
+  EXPECT_NEAR(stiffnessOfFloorUnder(-0.002), whole / 2, 1e-6);
+  EXPECT_NEAR(stiffnessOfFloorUnder(0.020, 0.5), whole / 2, 1e-6) << "they meet within their life";
+}
+
 TEST_F(StreamedInputTest, RefusesWhatCannotBeUsedAndKeepsTheRest) {
   std::vector<double> n = floorAt(0, 1);
   const std::vector<double> good = floorAt(0.02, 2);
