@@ -83,6 +83,22 @@ void RemoteContacts::resume(const RemoteMemory& memory, const Vec3& hip_m) noexc
   corrections_ = EnergyTank(EnergyBudget{}, memory.corrections_J);
 }
 
+void RemoteContacts::moveWithView(const geometry::Affine& motion) noexcept {
+  const geometry::Mat3 linear = motion.linear();
+  const double scale = std::cbrt(std::abs(linear.determinant()));
+  for (Slot& slot : inUse()) {
+    if (!slot.used) continue;
+    moveBy(motion, slot.contact);
+    slot.anchor_m = motion * slot.anchor_m;
+    slot.shift_m *= scale;
+    slot.turn = linear * slot.turn / scale;
+    slot.drift_m_per_s = linear * slot.drift_m_per_s;
+    slot.friction_N = linear * slot.friction_N / scale;
+  }
+  hand_m_ = motion * hand_m_;
+  viewMoved_ = true;
+}
+
 Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand, Nanos now, double step_s,
                           RemoteRendering& out) noexcept {
   out.contactsTime = newest.clientTime;
@@ -114,7 +130,8 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
     moving = moving || (!slot.fading && slot.depth_m > 0 && !hardlyChanges(slot, step_s));
   }
   const bool fading = resumed || leaving > 0;
-  rest_ = !fading && !moving && hand.scene.rest;
+  rest_ = !fading && !moving && !viewMoved_ && hand.scene.rest;
+  viewMoved_ = false;
   const double budget_N = (fading         ? kBesideFade_N_per_s
                            : changing > 1 ? kShared_N_per_s
                                           : kCorrection_N_per_s) *

@@ -38,6 +38,8 @@ class RemoteContacts {
   /// add to the force of the scene on the hand; `out` gets the contacts that exert it.
   Vec3 step(const RemoteContactSet& newest, const RemoteHand& hand, Nanos now, double step_s,
             RemoteRendering& out) noexcept;
+  /// Before step(): the view moved all that is stated, and the hand in the last tick, on the device.
+  void moveWithView(const geometry::Affine& motion) noexcept;
   /// Of the last tick.
   RemoteSprings springs() const noexcept;
   /// In the last tick, no touched surface moved, changed or faded, those of the scene included.
@@ -139,6 +141,7 @@ class RemoteContacts {
   double elapsed_s_ = 0;  // since then: surfaces move on through a late tick
   bool held_ = false;     // a correction waited for energy in this tick
   bool rest_ = true;
+  bool viewMoved_ = false;  // since the last tick
 };
 
 }  // namespace hapticd::realtime

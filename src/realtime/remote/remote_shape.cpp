@@ -50,6 +50,17 @@ Vec3 turnedBy(const Vec3& rotation, const Vec3& v) noexcept {
   return turnedBy(rotation, v, turnFactors(rotation.squaredNorm()));
 }
 
+void moveBy(const geometry::Affine& motion, RemoteContact& contact) noexcept {
+  const geometry::Mat3 linear = motion.linear();
+  const double scale = std::cbrt(std::abs(linear.determinant()));
+  contact.point_m = motion * contact.point_m;
+  contact.normal = (linear * contact.normal).normalized();
+  contact.axis = (linear * contact.axis).normalized();
+  contact.velocity_m_per_s = linear * contact.velocity_m_per_s;
+  contact.angularVelocity_rad_per_s = linear * contact.angularVelocity_rad_per_s / scale;
+  contact.radius_m *= scale;
+}
+
 SurfaceAt surfaceAt(const RemoteContact& contact, double age_s, const Vec3& hip_m) noexcept {
   const bool flat = contact.shape == RemoteShape::halfSpace;
   const Vec3& spin = contact.angularVelocity_rad_per_s;

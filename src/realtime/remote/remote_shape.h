@@ -15,6 +15,9 @@ struct SurfaceAt {
 /// `v` turned by a rotation vector, of at most some turns.
 Vec3 turnedBy(const Vec3& rotation, const Vec3& v) noexcept;
 
+/// The same surface in a frame that a similarity moved.
+void moveBy(const geometry::Affine& motion, RemoteContact& contact) noexcept;
+
 /// The surface `age_s` after it was stated, carried by its velocities: a round one turns about its centre,
 /// which goes straight on; a flat one keeps its twist, so that it does not matter which of its points was
 /// stated.

@@ -25,6 +25,7 @@ class SharedPit {
   Vec3 v_m_per_s = Vec3::Zero();
   double damping_Ns_per_m = 0.1;
   double weight_N = 0;
+  Affine T_world_device = Affine::Identity();
 
   explicit SharedPit(double bareDamping_Ns_per_m = std::numeric_limits<double>::infinity(),
                      bool guarded = true)
@@ -79,14 +80,20 @@ class SharedPit {
     return options;
   }
   const TickReport& step() {
-    if (ms_ == 0) publish();
+    const Affine T_device_world = (ms_ == 0 ? T_world_device : tick_.last().T_world_device).inverse();
+    if (ms_ == 0 || T_world_device.matrix() != published_.matrix()) publish();
     const Nanos now = (1000 + ms_) * 1'000'000LL;
     if (ms_ % 10 == 0) {
       RemoteContactSet& set = input_.contacts;
       ++set.number;
       set.received = set.stated = now;
       set.count = static_cast<std::uint32_t>(contacts.size());
-      std::copy(contacts.begin(), contacts.end(), set.contacts.begin());
+      // As the server states them, in the view of the last tick.
+      for (std::size_t i = 0; i < contacts.size(); ++i) {
+        RemoteContact& contact = set.contacts[i] = contacts[i];
+        contact.point_m = T_device_world * contact.point_m;
+        contact.normal = (T_device_world.linear() * contact.normal).normalized();
+      }
       tick_.remote().write(input_);
     }
     ++ms_;
@@ -98,8 +105,11 @@ class SharedPit {
   }
   void publish() {
     auto snapshot = std::make_shared<scene::SceneSnapshot>();
-    snapshot->revision = 1;
+    snapshot->revision = ++revision_;
     snapshot->planes = planes;
+    snapshot->workspace.T_world_device = published_ = T_world_device;
+    snapshot->workspace.T_device_world = T_world_device.inverse();
+    snapshot->workspace.worldUnitsPerMetre = 1;
     tick_.snapshots().publish(std::move(snapshot));
   }
 
@@ -107,6 +117,8 @@ class SharedPit {
   FakeClock clock_;
   Tick tick_;
   RemoteInput input_;
+  Affine published_ = Affine::Identity();
+  std::uint64_t revision_ = 0;
   long long ms_ = 0;
 };
 
@@ -208,6 +220,49 @@ TEST(SceneAndRemote, table_that_both_know_does_not_throw_a_fast_arm_back_faster)
       EXPECT_GT(pit.v_m_per_s.y(), 0);
       EXPECT_LT(pit.v_m_per_s.y(), 1.17 * in_m_per_s) << stiffness << " N/m, " << speed << " m/s";
     }
+  }
+}
+
+// A view that slides, sinks or turns, as at 60 Hz, and the hand with it: in the world nothing moves.
+TEST(RemoteContactsInAView, rest_in_the_world) {
+  for (const Vec3& speed_m_per_s : {Vec3(0.03, 0, 0), Vec3(0, -0.03, 0), Vec3(0.02, 0.02, -0.01)}) {
+    for (const double turning_rad_per_s : {0.0, 0.5}) {
+      SharedPit pit;
+      pit.addRemote(Vec3::UnitY(), 1000, 0.5);
+      double steepest_N = 0;
+      Vec3 before_N = Vec3::Zero();
+      for (int ms = 0; ms < 2000; ++ms) {
+        if (ms >= 500 && ms % 16 == 0) {
+          const double time_s = 1e-3 * (ms - 500);
+          pit.T_world_device = Eigen::Translation3d(time_s * speed_m_per_s) *
+                               Eigen::AngleAxisd(turning_rad_per_s * time_s, Vec3(1, 2, -1).normalized());
+        }
+        const Vec3 place_m(0, std::max(-0.002, 0.002 - 2e-5 * ms), 0);
+        const TickReport& tick = pit.at(pit.T_world_device.inverse() * place_m);
+        const Vec3 force_N = pit.T_world_device.linear() * tick.rendering.force_N;
+        if (ms >= 500) {
+          ASSERT_NEAR(force_N.y(), 2, 1e-6) << speed_m_per_s.transpose() << ", " << ms << " ms";
+          ASSERT_NEAR(std::hypot(force_N.x(), force_N.z()), 0, 1e-6) << ms << " ms";
+          ASSERT_EQ(tick.remote.status & kRemoteCorrectionsHeld, 0U);
+          steepest_N = std::max(steepest_N, (tick.force_N - before_N).norm());
+        }
+        before_N = tick.force_N;
+      }
+      EXPECT_LT(steepest_N, 0.1);
+    }
+  }
+}
+
+// A hand that rests on the device, and a view that takes it into a surface and out again.
+TEST(RemoteContactsInAView, press_as_deep_as_the_view_takes_the_hand) {
+  SharedPit pit;
+  pit.addRemote(Vec3::UnitY(), 800);
+  for (int ms = 0; ms < 3000; ++ms) {
+    const double dip_m = ms < 800 ? 0 : 0.00075 * (1 - std::cos(2 * M_PI * 1e-3 * (ms - 800) / 0.8));
+    if (ms % 16 == 0) pit.T_world_device = Eigen::Translation3d(0, -dip_m, 0) * Affine::Identity();
+    const TickReport& tick = pit.at({0, std::max(-0.001, 0.002 - 2e-5 * ms), 0});
+    const double depth_m = std::max(0.0, -(pit.T_world_device * pit.x_m).y());
+    ASSERT_NEAR(tick.rendering.force_N.y(), 800 * depth_m, 1e-6) << ms << " ms";
   }
 }
 
