@@ -101,8 +101,14 @@ std::string contactOf(const double* n, const ToDevice& toDevice, RemoteContact& 
     if (contact.axis.norm() < 1e-6) return "the axis of the cylinder is zero or along the normal";
     contact.axis.normalize();
   }
-  contact.velocity_m_per_s = atMost(toDevice.vector(n + 12), realtime::kRemoteSpeed_m_per_s);
-  contact.angularVelocity_rad_per_s = atMost(toDevice.direction(n + 15), realtime::kRemoteTurn_rad_per_s);
+  // A wheel whose rim is too fast still turns about its centre.
+  const Vec3 turning = toDevice.direction(n + 15);
+  const Vec3 fromCentre =
+      contact.shape == RemoteShape::halfSpace ? Vec3(Vec3::Zero()) : Vec3(contact.radius_m * contact.normal);
+  contact.angularVelocity_rad_per_s = atMost(turning, realtime::kRemoteTurn_rad_per_s);
+  contact.velocity_m_per_s =
+      atMost(toDevice.vector(n + 12) - turning.cross(fromCentre), realtime::kRemoteSpeed_m_per_s) +
+      contact.angularVelocity_rad_per_s.cross(fromCentre);
   contact.stiffness_N_per_m = n[18];
   contact.damping_Ns_per_m = std::max(n[19], 0.0);
   contact.staticFriction = std::clamp(n[20], 0.0, 1.0);

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -91,6 +92,22 @@ TEST_F(StreamedInputTest, LimitsWhatIsTooFastTooLongOrTooStiff) {
   EXPECT_EQ(first().staticFriction, 1);
   EXPECT_EQ(first().dynamicFriction, 1);
   EXPECT_EQ(first().lifetime, 100 * kStreamMillisecond);
+}
+
+TEST_F(StreamedInputTest, AWheelThatIsTooFastStillTurnsAboutItsCentre) {
+  for (const double turning : {15.0, 30.0}) {
+    std::vector<double> wheel = floorAt(0);
+    wheel[1] = 2;
+    wheel[2] = 0.1;
+    wheel[10] = 0;
+    wheel[11] = 1;
+    wheel[12] = -turning * 0.1 + 0.2;  // its centre moves at 0.2 m/s
+    wheel[17] = turning;
+    ASSERT_TRUE(send(wheel).taken);
+    const Vec3 rim = first().angularVelocity_rad_per_s.cross(first().radius_m * first().normal);
+    EXPECT_NEAR((first().velocity_m_per_s - rim - Vec3(0.2, 0, 0)).norm(), 0, 1e-9) << turning << " rad/s";
+    EXPECT_NEAR(first().angularVelocity_rad_per_s.norm(), std::min(turning, 20.0), 1e-9);
+  }
 }
 
 // Delay bounds the stiffness of what follows the hand, and of that alone.
