@@ -366,7 +366,7 @@ void RemoteContacts::fadeOut(Nanos now, double step_s) noexcept {
   const auto pressing =
       std::ranges::count_if(inUse(), [](const Slot& s) { return s.used && s.normal_N > 0; });
   const Nanos needed = base::toNanos((pressing > 1 ? kEarly : 1) * pressed_N_ / kFade_N_per_s + step_s);
-  const Nanos least = base::toNanos(pressed_N_ / kQuickFade_N_per_s + step_s);
+  const Nanos least = base::toNanos(force_N_.norm() / kQuickFade_N_per_s + step_s);
   std::size_t top = 0;
   due_N_ = 0;
   for (Slot& slot : inUse()) {
