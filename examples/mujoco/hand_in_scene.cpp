@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 namespace mujoco_example {
 namespace {
@@ -12,6 +13,8 @@ namespace {
 using Vec = std::array<double, 3>;
 
 constexpr std::size_t kMostSurfaces = 16;
+constexpr int kFacesOfGeom = 8;
+constexpr double kSameFace = 0.9;  // cosine between its normals in two calls, at least
 constexpr double kStiffness_N_per_m = 1000;
 constexpr double kDamping_Ns_per_m = 1;
 
@@ -23,6 +26,21 @@ Vec toServer(const Vec& v) {
 }
 Vec plus(const Vec& a, const Vec& b, double scale) {
   return {a[0] + scale * b[0], a[1] + scale * b[1], a[2] + scale * b[2]};
+}
+
+double dot(const Vec& a, const Vec& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+Vec toGeom(const mjData* data, int geom, const Vec& v) {
+  const double* m = data->geom_xmat + 9 * geom;  // its columns are the axes of the geom
+  return {dot({m[0], m[3], m[6]}, v), dot({m[1], m[4], m[7]}, v), dot({m[2], m[5], m[8]}, v)};
+}
+
+// Of a geom that is round, the surface does not tilt where it is touched when it turns.
+bool isRound(const mjModel* model, int geom) {
+  const int type = model->geom_type[geom];
+  return type == mjGEOM_SPHERE || type == mjGEOM_CAPSULE || type == mjGEOM_CYLINDER ||
+         type == mjGEOM_ELLIPSOID;
 }
 
 struct Velocity {
@@ -87,6 +105,7 @@ void HandInScene::reset() {
   mj_resetData(model_.get(), data_.get());
   pushes_.clear();
   touched_.clear();
+  faces_.clear();
 }
 
 void HandInScene::setHand(const Vec& position_m, const Vec& velocity_m_per_s) {
@@ -137,7 +156,7 @@ std::vector<hapticd::RemoteContact> HandInScene::surfaces() {
                    [&](int a, int b) { return data_->contact[a].dist < data_->contact[b].dist; });
   if (near.size() > kMostSurfaces) near.resize(kMostSurfaces);
   touched_.clear();
-  std::map<int, int> countOf;  // surfaces of a geom
+  std::map<int, Vec> faces;
   std::vector<hapticd::RemoteContact> surfaces;
   for (const int i : near) {
     const mjContact& contact = data_->contact[i];
@@ -149,12 +168,15 @@ std::vector<hapticd::RemoteContact> HandInScene::surfaces() {
     const Vec point{contact.pos[0], contact.pos[1], contact.pos[2]};
     const Velocity velocity = velocityAt(model_.get(), data_.get(), body, point);
     hapticd::RemoteContact surface;
-    surface.id = 8 * geom + countOf[geom]++;
+    const Vec face = toGeom(data_.get(), geom, normal);
+    surface.id = numberOf(geom, face, faces);
+    if (surface.id < 0) continue;
+    faces[surface.id] = face;
     // The server's hand is a point: the plane lies as far from it as the surface from the tool.
     surface.point_m = toServer(plus(hand_, normal, -contact.dist));
     surface.normal = toServer(normal);
     surface.velocity_m_per_s = toServer(velocity.moving);
-    surface.angularVelocity_rad_per_s = toServer(velocity.turning);
+    if (!isRound(model_.get(), geom)) surface.angularVelocity_rad_per_s = toServer(velocity.turning);
     surface.stiffness_N_per_m = kStiffness_N_per_m;
     surface.damping_Ns_per_m = kDamping_Ns_per_m;
     surface.staticFriction = std::min(1.0, contact.friction[0]);
@@ -163,7 +185,24 @@ std::vector<hapticd::RemoteContact> HandInScene::surfaces() {
     surfaces.push_back(surface);
     touched_[surface.id] = {body, point, {}};
   }
+  faces_ = std::move(faces);
   return surfaces;
+}
+
+// The same face keeps its number, in whatever order MuJoCo finds the contacts of a geom: that of the most
+// similar face of the last call, else one that is new. -1: the geom has no more.
+int HandInScene::numberOf(int geom, const Vec& face, const std::map<int, Vec>& taken) const {
+  int number = -1;
+  double mostSimilar = -1;
+  for (int id = kFacesOfGeom * geom; id < kFacesOfGeom * (geom + 1); ++id) {
+    if (taken.count(id) != 0) continue;
+    const auto before = faces_.find(id);
+    const double similar = before == faces_.end() ? kSameFace : dot(before->second, face);
+    if (number >= 0 && similar <= mostSimilar) continue;
+    number = id;
+    mostSimilar = similar;
+  }
+  return number;
 }
 
 }  // namespace mujoco_example

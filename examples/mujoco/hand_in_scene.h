@@ -54,13 +54,17 @@ class HandInScene {
     std::array<double, 3> force{};
   };
 
+  int numberOf(int geom, const std::array<double, 3>& face,
+               const std::map<int, std::array<double, 3>>& taken) const;
+
   std::unique_ptr<mjModel_, void (*)(mjModel_*)> model_;
   std::unique_ptr<mjData_, void (*)(mjData_*)> data_;
   int tool_ = -1;  ///< geom
   int handQpos_ = 0, handQvel_ = 0;
   std::array<double, 3> hand_{};  ///< MuJoCo's frame, as the next two
   std::array<double, 3> velocity_{};
-  std::map<int, Push> touched_;  ///< by id of a surface: where a force acts
+  std::map<int, Push> touched_;                 ///< by id of a surface: where a force acts
+  std::map<int, std::array<double, 3>> faces_;  ///< by id of a surface: its normal in the frame of its geom
   std::vector<Push> pushes_;
   std::vector<Waypoint> path_;
 };

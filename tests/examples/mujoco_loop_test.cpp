@@ -6,7 +6,10 @@
 #include <cmath>
 #include <cstdio>
 #include <deque>
+#include <map>
 #include <memory>
+#include <string>
+#include <utility>
 
 #include "base/clock.h"
 #include "device/simulated/simulated_device.h"
@@ -133,6 +136,37 @@ void expectPassive(const Felt& felt) {
   EXPECT_GT(felt.strongest_N, 0.3);
   std::printf("least %.3g J of %.3g J given, at most %.2f N, %.2f N/ms, touched in %d of %d ticks\n",
               felt.least_J, felt.given_J, felt.strongest_N, felt.steepest_N, felt.touchedTicks, felt.ticks);
+}
+
+// In whatever order MuJoCo finds the contacts of a geom: a number does not go from one of its faces to
+// another.
+TEST(HandInScene, SurfacesKeepTheirNumbers) {
+  for (const char* file : {"peg_in_hole.xml", "drawer.xml", "stacked_blocks.xml"}) {
+    mujoco_example::HandInScene scene(HAPTICD_EXAMPLES "/mujoco/" + std::string(file));
+    std::map<int, std::array<double, 3>> before;
+    int known = 0;
+    for (int ms = 0; ms < 20'000; ms += 4) {
+      // Around the path, so that now this and now that face is the nearest.
+      std::array<double, 3> place_m = scene.placeAt(1e-3 * ms);
+      place_m[0] += 0.006 * std::sin(0.011 * ms);
+      place_m[1] += 0.006 * std::sin(0.007 * ms);
+      place_m[2] += 0.006 * std::sin(0.013 * ms);
+      scene.setHand(place_m, {});
+      scene.step(4e-3);
+      std::map<int, std::array<double, 3>> now;
+      for (const RemoteContact& surface : scene.surfaces()) {
+        const auto& n = surface.normal;
+        ASSERT_TRUE(now.emplace(surface.id, n).second) << file << ": a number twice";
+        const auto last = before.find(surface.id);
+        if (last == before.end()) continue;
+        ++known;
+        const auto& m = last->second;
+        ASSERT_GT(n[0] * m[0] + n[1] * m[1] + n[2] * m[2], 0.5) << file << " at " << ms << " ms";
+      }
+      before = std::move(now);
+    }
+    EXPECT_GT(known, 1000) << file;
+  }
 }
 
 TEST(MujocoLoop, PegInHoleTakesEnergyOnly) {

@@ -16,10 +16,13 @@ constexpr int kSweeps = 40;
 constexpr double kConverged_N = 1e-6;
 
 // The depth of contact i that a newton of contact j takes over. Symmetric; of a contact with itself, its
-// compliance. Of two springs that push the same way the softer one is relieved as if it were the stiffer.
+// compliance. Of two springs that push the same way the softer one is relieved as if it were the stiffer. The
+// proxy lies on all faces of the scene: one that pushes against another is burdened by it.
 double overlap_m_per_N(const PressingContacts& c, std::size_t i, std::size_t j) noexcept {
   const double cosine = c.x[i] * c.x[j] + c.y[i] * c.y[j] + c.z[i] * c.z[j];
-  return std::max(0.0, cosine) * std::min(c.compliance_m_per_N[i], c.compliance_m_per_N[j]);
+  const bool scene = i >= c.scene && j >= c.scene;
+  return (scene ? cosine : std::max(0.0, cosine)) *
+         std::min(c.compliance_m_per_N[i], c.compliance_m_per_N[j]);
 }
 
 // The contacts that bear force, usually up to three of sixteen. Given these, their shares are the solution of

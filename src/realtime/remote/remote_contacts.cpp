@@ -19,12 +19,14 @@ constexpr double kFade_N_per_s = 0.4 * kRemoteRate_N_per_s;
 constexpr double kBesideFade_N_per_s = 0.25 * kRemoteRate_N_per_s;
 constexpr double kOfAll_N_per_s = 0.75 * kRemoteRate_N_per_s;  // what corrections change in the sum
 constexpr int kTries = 4;
-constexpr double kFadeOfAll = 0.8;     // part of it that a fade may take
-constexpr double kLeast = 0.2;         // part of it for corrections, however much a fade takes
-constexpr double kEarly = 1.5;         // several contacts begin to fade earlier: their fade may be held up
-constexpr double kLongestAge_s = 0.2;  // a surface moves on no longer than this without an update
-constexpr double kLateral = 0.5;       // share of the stiffness that holds a sticking point
-constexpr double kStick = 0.9;         // of the dynamic bound: sliding ends below it
+constexpr double kFadeOfAll = 0.8;  // part of it that a fade may take
+constexpr double kLeast = 0.2;      // part of it for corrections, however much a fade takes
+constexpr double kEarly = 1.5;      // several contacts begin to fade earlier: their fade may be held up
+constexpr Nanos kFadePart = 3;      // the last third of a life: who repeats must not feel a fade
+constexpr double kQuickFade_N_per_s = 1000;  // unless the force would fall faster
+constexpr double kLongestAge_s = 0.2;        // a surface moves on no longer than this without an update
+constexpr double kLateral = 0.5;             // share of the stiffness that holds a sticking point
+constexpr double kStick = 0.9;               // of the dynamic bound: sliding ends below it
 constexpr double kUnlimited_J = 1e9;
 constexpr double kLent_J = 2e-4;         // to the springs of friction, at the first touch
 constexpr double kSlow_m_per_s = 0.01;   // below it the damping coefficient may change as at this speed
@@ -58,6 +60,7 @@ double towards(double value, double goal, double force_N, double& budget_N) noex
 void RemoteContacts::reset() noexcept {
   for (Slot& slot : slots_) slot.used = false;
   top_ = 0;
+  lastTick_ = 0;
   pressed_N_ = 0;
   frictionEnergy_J_ = kLent_J;
   force_N_.setZero();
@@ -80,11 +83,29 @@ void RemoteContacts::resume(const RemoteMemory& memory, const Vec3& hip_m) noexc
   corrections_ = EnergyTank(EnergyBudget{}, memory.corrections_J);
 }
 
+void RemoteContacts::moveWithView(const geometry::Affine& motion) noexcept {
+  const geometry::Mat3 linear = motion.linear();
+  const double scale = std::cbrt(std::abs(linear.determinant()));
+  for (Slot& slot : inUse()) {
+    if (!slot.used) continue;
+    moveBy(motion, slot.contact);
+    slot.anchor_m = motion * slot.anchor_m;
+    slot.shift_m *= scale;
+    slot.turn = linear * slot.turn / scale;
+    slot.drift_m_per_s = linear * slot.drift_m_per_s;
+    slot.friction_N = linear * slot.friction_N / scale;
+  }
+  hand_m_ = motion * hand_m_;
+  viewMoved_ = true;
+}
+
 Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand, Nanos now, double step_s,
                           RemoteRendering& out) noexcept {
   out.contactsTime = newest.clientTime;
   corrections_.refill(step_s);
   if (newest.number != taken_) take(newest, hand, now);
+  elapsed_s_ = lastTick_ > 0 ? std::clamp(base::toSeconds(now - lastTick_), 0.0, kLongestAge_s) : step_s;
+  lastTick_ = now;
   if (top_ == 0) {
     hand_m_ = hand.position_m;
     frictionEnergy_J_ = kLent_J;
@@ -109,12 +130,13 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
     moving = moving || (!slot.fading && slot.depth_m > 0 && !hardlyChanges(slot, step_s));
   }
   const bool fading = resumed || leaving > 0;
-  rest_ = !fading && !moving && hand.sceneForce_N.isZero(0);
+  rest_ = !fading && !moving && !viewMoved_ && hand.scene.rest;
+  viewMoved_ = false;
   const double budget_N = (fading         ? kBesideFade_N_per_s
                            : changing > 1 ? kShared_N_per_s
                                           : kCorrection_N_per_s) *
                           step_s / std::max(changing, 1);
-  const bool mayRetry = (correcting || fading) && changing + leaving > 1;
+  const bool mayRetry = (correcting || fading) && changing + leaving + (hand.scene.count > 0 ? 1 : 0) > 1;
   if (mayRetry) {
     std::copy_n(slots_.begin(), top_, before_.rendered.begin());
     before_.corrections = corrections_;
@@ -123,11 +145,12 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
   late_N_.setZero();
   Vec3 force = forceWith(change, hand, step_s);
   // In a corner the sum changes faster than what each face demands.
-  const double most_N = kOfAll_N_per_s * step_s;
+  const double most_N = std::max(kOfAll_N_per_s * step_s, due_N_ / kFadeOfAll);
   if (mayRetry && (force - force_N_).squaredNorm() > most_N * most_N)
-    force = forceWithin(change, hand, step_s);
+    force = forceWithin(change, most_N, hand, step_s);
   force_N_ = force;
   hand_m_ = hand.position_m;
+  scene_ = hand.scene;
   frictionEnergy_J_ = frictionNow_J_;
   for (const Slot& slot : inUse()) {
     if (!slot.used || slot.normal_N <= 0) continue;
@@ -155,9 +178,16 @@ RemoteSprings RemoteContacts::springs() const noexcept {
     out.force_N += slot.friction_N;
     out.stored_J += 0.5 * slot.friction_N.dot(slot.anchor_m - hand_m_);
   }
+  out.beside = pressing.count > 0 && scene_.count > 0;
+  if (out.beside) {
+    pressing.add(scene_, 1);
+    const Vec3 way_m = scene_.way_m();
+    out.normal_N = -scene_.stiffness_N_per_m * way_m;
+    out.stored_J -= 0.5 * scene_.stiffness_N_per_m * way_m.squaredNorm();
+  }
   shareNormalForce(pressing);
   for (std::size_t i = 0; i < pressing.count; ++i) {
-    out.normal_N += pressing.share_N[i] * Vec3(pressing.x[i], pressing.y[i], pressing.z[i]);
+    out.normal_N += pressing.share_N[i] * pressing.normal(i);
     out.stored_J += 0.5 * pressing.share_N[i] * pressing.depth_m[i];
   }
   out.force_N += out.normal_N;
@@ -170,7 +200,9 @@ Vec3 RemoteContacts::forceWith(const Change& change, const RemoteHand& hand, dou
   for (Slot& slot : inUse()) {
     if (!slot.used) continue;
     if (slot.fading) {
-      slot.gain -= change.fade * slot.fadeStep;
+      const double falls = change.fade * slot.fadeStep;
+      giveBack(slot, 0.5 * falls * slot.contact.stiffness_N_per_m * slot.depth_m * slot.depth_m);
+      slot.gain -= falls;
     } else {
       correct(slot, hand, change.correction_N, step_s);
     }
@@ -182,8 +214,8 @@ Vec3 RemoteContacts::forceWith(const Change& change, const RemoteHand& hand, dou
   for (Slot& slot : inUse()) {
     if (!slot.used) continue;
     const Vec3 before_N = slot.friction_N;
-    slot.friction_N = friction(slot, hand, pressed_N_, step_s);
-    given_J -= 0.5 * (before_N + slot.friction_N).dot(moved_m - step_s * slot.velocity);
+    slot.friction_N = friction(slot, hand, pressed_N_, elapsed_s_);
+    given_J -= 0.5 * (before_N + slot.friction_N).dot(moved_m - elapsed_s_ * slot.velocity);
   }
   return normal_N + limitFriction(hand, given_J);
 }
@@ -223,8 +255,8 @@ Vec3 RemoteContacts::forceAgain(const Change& change, const RemoteHand& hand, do
 }
 
 // As large a part of the changes as the rate allows; the fade comes first, because it must end in time.
-Vec3 RemoteContacts::forceWithin(const Change& most, const RemoteHand& hand, double step_s) noexcept {
-  const double most_N = kOfAll_N_per_s * step_s;
+Vec3 RemoteContacts::forceWithin(const Change& most, double most_N, const RemoteHand& hand,
+                                 double step_s) noexcept {
   const Vec3 unchanged = forceAgain({}, hand, step_s);
   Change change{0, most.fade};
   Vec3 force = forceAgain(change, hand, step_s);
@@ -273,6 +305,11 @@ void RemoteContacts::take(const RemoteContactSet& set, const RemoteHand& hand, N
   }
 }
 
+// What a fade takes from the spring, the hand gave: it pays for the correction that brings the force back.
+void RemoteContacts::giveBack(const Slot& slot, double energy_J) noexcept {
+  if (slot.depth_m > 0 && !slot.contact.yields) corrections_.give(-energy_J);
+}
+
 // The surface jumps where the client says, and shift and turn keep spring force and normal of the moment.
 void RemoteContacts::replace(Slot& slot, const RemoteContact& contact, const RemoteContactSet& set,
                              const RemoteHand& hand, Nanos now) noexcept {
@@ -286,6 +323,7 @@ void RemoteContacts::replace(Slot& slot, const RemoteContact& contact, const Rem
     velocity = slot.velocity;
     resumed_ = resumed_ || slot.fading;
     spring_N = slot.gain * slot.contact.stiffness_N_per_m * std::max(0.0, slot.depth_m);
+    giveBack(slot, 0.5 * (1 - slot.gain) * spring_N * slot.depth_m);  // by the shift, which weakens it
     normal = slot.normal;
   } else {
     slot = Slot{};
@@ -322,15 +360,19 @@ void RemoteContacts::replace(Slot& slot, const RemoteContact& contact, const Rem
   }
 }
 
-// The fade of all contacts that end together takes the time in which their force may fall.
+// The fade of all contacts that end together takes the time in which their force may fall, but no more than a
+// part of their life.
 void RemoteContacts::fadeOut(Nanos now, double step_s) noexcept {
   const auto pressing =
       std::ranges::count_if(inUse(), [](const Slot& s) { return s.used && s.normal_N > 0; });
   const Nanos needed = base::toNanos((pressing > 1 ? kEarly : 1) * pressed_N_ / kFade_N_per_s + step_s);
+  const Nanos least = base::toNanos(force_N_.norm() / kQuickFade_N_per_s + step_s);
   std::size_t top = 0;
+  due_N_ = 0;
   for (Slot& slot : inUse()) {
     if (!slot.used) continue;
-    if (!slot.fading && slot.end - now <= needed) {
+    const Nanos length = std::min(needed, std::max(least, slot.contact.lifetime / kFadePart));
+    if (!slot.fading && slot.end - now <= length) {
       slot.fading = true;
       slot.fadeEnd = slot.end;
     }
@@ -340,6 +382,7 @@ void RemoteContacts::fadeOut(Nanos now, double step_s) noexcept {
     }
     const double left_s = std::max(0.0, base::toSeconds(slot.fadeEnd - now));
     slot.fadeStep = slot.gain * step_s / (left_s + step_s);
+    if (slot.fading) due_N_ += slot.demand_N * step_s / (base::toSeconds(slot.end - now) + step_s);
     top = static_cast<std::size_t>(&slot - slots_.data()) + 1;
   }
   top_ = top;
@@ -349,9 +392,8 @@ void RemoteContacts::locate(Slot& slot, const RemoteHand& hand, Nanos now) noexc
   const double age_s = std::clamp(base::toSeconds(now - slot.statedAt), 0.0, kLongestAge_s);
   const SurfaceAt at = surfaceAt(slot.contact, age_s, hand.position_m);
   slot.depth_m = at.depth_m + slot.shift_m;
-  slot.velocity = slot.contact.velocity_m_per_s;
+  slot.velocity = at.velocity_m_per_s;
   if (!slot.contact.angularVelocity_rad_per_s.isZero(0)) {
-    slot.velocity += slot.contact.angularVelocity_rad_per_s.cross(hand.position_m - at.point_m);
     const double square = slot.velocity.squaredNorm();
     if (square > kRemoteSpeed_m_per_s * kRemoteSpeed_m_per_s)
       slot.velocity *= kRemoteSpeed_m_per_s / std::sqrt(square);
@@ -472,25 +514,31 @@ void RemoteContacts::demand(Slot& slot, const RemoteHand& hand) noexcept {
   slot.demand_N = slot.gain * (spring_N - damper_N);
 }
 
-// The normal force of all contacts together, beside that of meshes and planes.
+// The normal force of all contacts together, less that of which they relieve the scene. Meshes and planes
+// take part as further contacts, so that all forces have one potential.
 Vec3 RemoteContacts::share(const RemoteHand& hand) noexcept {
   PressingContacts pressing;
   std::array<Slot*, kSlots> slots;
   for (Slot& slot : inUse()) {
     if (slot.used && slot.demand_N > 0) {
       slots[pressing.count] = &slot;
-      const double scene_N = std::max(0.0, slot.normal.dot(hand.sceneForce_N));
-      pressing.add(slot.normal, slot.stiffness_N_per_m, slot.demand_N - scene_N, slot.normal_N);
+      pressing.add(slot.normal, slot.stiffness_N_per_m, slot.demand_N, slot.normal_N);
     } else {
       slot.normal_N = 0;
     }
   }
-  shareNormalForce(pressing);
   pressed_N_ = 0;
-  Vec3 force = Vec3::Zero();
-  for (std::size_t i = 0; i < pressing.count; ++i) {
+  if (pressing.count == 0) return Vec3::Zero();
+  const std::size_t count = pressing.count;
+  pressing.add(hand.scene, hand.scene.exerted);
+  shareNormalForce(pressing);
+  Vec3 ofScene = -hand.scene.exerted * hand.scene.stiffness_N_per_m * hand.scene.way_m();
+  for (std::size_t i = count; i < pressing.count; ++i) ofScene += pressing.share_N[i] * pressing.normal(i);
+  Vec3 force = ofScene;
+  for (std::size_t i = 0; i < count; ++i) {
     Slot& slot = *slots[i];
     slot.normal_N = pressing.share_N[i];
+    slot.grip_N = std::max(0.0, slot.normal_N + std::min(0.0, slot.normal.dot(ofScene)));
     force += slot.normal_N * slot.normal;
     pressed_N_ += slot.normal_N;
   }
@@ -498,15 +546,15 @@ Vec3 RemoteContacts::share(const RemoteHand& hand) noexcept {
 }
 
 // A spring to a point of the surface, which slides when the spring exceeds the bound.
-Vec3 RemoteContacts::friction(Slot& slot, const RemoteHand& hand, double ofAll, double step_s) noexcept {
+Vec3 RemoteContacts::friction(Slot& slot, const RemoteHand& hand, double ofAll, double elapsed_s) noexcept {
   if (slot.normal_N <= 0) return Vec3::Zero();
-  slot.anchor_m += step_s * slot.velocity;
+  slot.anchor_m += elapsed_s * slot.velocity;
   Vec3 apart = hand.position_m - slot.anchor_m;
   apart -= slot.normal.dot(apart) * slot.normal;
   const double stiffness = kLateral * slot.contact.stiffness_N_per_m * slot.normal_N / ofAll;
   const double pull = stiffness * apart.norm();
-  const double dynamic_N = slot.dynamicFriction * slot.normal_N;
-  if (pull > (slot.sliding ? dynamic_N : slot.staticFriction * slot.normal_N)) {
+  const double dynamic_N = slot.dynamicFriction * slot.grip_N;
+  if (pull > (slot.sliding ? dynamic_N : slot.staticFriction * slot.grip_N)) {
     slot.sliding = true;
     apart *= dynamic_N / pull;
     slot.anchor_m = hand.position_m - apart;

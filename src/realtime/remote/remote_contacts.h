@@ -11,6 +11,7 @@
 #include "realtime/remote/remote_memory.h"
 #include "realtime/remote/remote_report.h"
 #include "realtime/remote/remote_shape.h"
+#include "realtime/render/pressed_faces.h"
 
 namespace hapticd::realtime {
 
@@ -18,8 +19,7 @@ namespace hapticd::realtime {
 struct RemoteHand {
   Vec3 position_m = Vec3::Zero();
   Vec3 velocity_m_per_s = Vec3::Zero();
-  Vec3 sceneForce_N =
-      Vec3::Zero();  ///< normal force of meshes and planes: remote contacts add what is missing
+  PressedFaces scene;  ///< meshes and planes, with which remote contacts share the normal force
 };
 
 /// The springs of remote contacts in one tick, without their dampers. All zero while nothing is touched.
@@ -28,17 +28,21 @@ struct RemoteSprings {
   Vec3 normal_N = Vec3::Zero();  ///< the part without friction
   double stored_J = 0;
   double stiffest_N_per_m = 0;
+  bool beside = false;  ///< the scene is touched, too: all is what they add to it
 };
 
 /// One per servo, called in its thread: noexcept, no allocation.
 class RemoteContacts {
  public:
-  /// One tick. Returns the force on the hand; `out` gets the contacts that exert it.
+  /// One tick; in `step_s`, which is no more than two periods, updates change the force. Returns what they
+  /// add to the force of the scene on the hand; `out` gets the contacts that exert it.
   Vec3 step(const RemoteContactSet& newest, const RemoteHand& hand, Nanos now, double step_s,
             RemoteRendering& out) noexcept;
+  /// Before step(): the view moved all that is stated, and the hand in the last tick, on the device.
+  void moveWithView(const geometry::Affine& motion) noexcept;
   /// Of the last tick.
   RemoteSprings springs() const noexcept;
-  /// In the last tick, no touched surface moved, changed or faded, and no mesh or plane was touched.
+  /// In the last tick, no touched surface moved, changed or faded, those of the scene included.
   bool rest() const noexcept { return rest_; }
   /// Forgets all contacts at once.
   void reset() noexcept;
@@ -72,6 +76,7 @@ class RemoteContacts {
     Vec3 normal = Vec3::UnitY();
     double demand_N = 0;  // normal force that this contact alone would exert
     double normal_N = 0;  // its share of the normal force of all
+    double grip_N = 0;    // of that, what the scene does not hold by friction already
     Vec3 friction_N = Vec3::Zero();
   };
 
@@ -89,6 +94,7 @@ class RemoteContacts {
   void take(const RemoteContactSet& set, const RemoteHand& hand, Nanos now) noexcept;
   void replace(Slot& slot, const RemoteContact& contact, const RemoteContactSet& set, const RemoteHand& hand,
                Nanos now) noexcept;
+  void giveBack(const Slot& slot, double energy_J) noexcept;
   std::span<Slot> inUse() noexcept { return {slots_.data(), top_}; }
   Slot* slotFor(std::int32_t id) noexcept;
   // What a tick changes besides following the hand and the stated motion.
@@ -103,7 +109,7 @@ class RemoteContacts {
   };
   Vec3 forceWith(const Change& change, const RemoteHand& hand, double step_s) noexcept;
   Vec3 forceAgain(const Change& change, const RemoteHand& hand, double step_s) noexcept;
-  Vec3 forceWithin(const Change& most, const RemoteHand& hand, double step_s) noexcept;
+  Vec3 forceWithin(const Change& most, double most_N, const RemoteHand& hand, double step_s) noexcept;
   void fadeOut(Nanos now, double step_s) noexcept;
   static void locate(Slot& slot, const RemoteHand& hand, Nanos now) noexcept;
   static bool isCorrected(const Slot& slot) noexcept;
@@ -113,24 +119,29 @@ class RemoteContacts {
   static void follow(Slot& slot, const RemoteContact& contact) noexcept;
   static void demand(Slot& slot, const RemoteHand& hand) noexcept;
   Vec3 share(const RemoteHand& hand) noexcept;
-  static Vec3 friction(Slot& slot, const RemoteHand& hand, double ofAll, double step_s) noexcept;
+  static Vec3 friction(Slot& slot, const RemoteHand& hand, double ofAll, double elapsed_s) noexcept;
   Vec3 limitFriction(const RemoteHand& hand, double given_J) noexcept;
   static void takeHold(Slot& slot, const RemoteHand& hand, const Vec3& friction_N, double energy_J) noexcept;
 
   std::array<Slot, kSlots> slots_;
   std::uint64_t taken_ = 0;
   std::size_t top_ = 0;          // slots from here on are unused
+  double due_N_ = 0;             // what fades must take in this tick to end in time
   bool resumed_ = false;         // an update came during a fade
   Tried before_;                 // before this tick's corrections, where there are some
   Vec3 force_N_ = Vec3::Zero();  // of the last tick, with what it left
   Vec3 late_N_ = Vec3::Zero();   // part of a jump that this tick leaves to the next
+  PressedFaces scene_;           // in the last tick
   double pressed_N_ = 0;         // sum of the normal forces in the last tick
   Vec3 hand_m_ = Vec3::Zero();   // in the last tick
   double frictionEnergy_J_ = 0;  // which the hand gave to the springs of friction, at the last tick
   double frictionNow_J_ = 0;     // at this one
   EnergyTank corrections_{EnergyBudget{}};
-  bool held_ = false;  // a correction waited for energy in this tick
+  Nanos lastTick_ = 0;    // 0: none
+  double elapsed_s_ = 0;  // since then: surfaces move on through a late tick
+  bool held_ = false;     // a correction waited for energy in this tick
   bool rest_ = true;
+  bool viewMoved_ = false;  // since the last tick
 };
 
 }  // namespace hapticd::realtime

@@ -22,7 +22,7 @@ enum RemoteStatus : std::uint32_t {
 
 /// Device frame. A copy takes the first `count` contacts only.
 struct RemoteRendering {
-  Vec3 contactForce_N = Vec3::Zero();  ///< of all remote contacts, before the guard
+  Vec3 contactForce_N = Vec3::Zero();  ///< what all remote contacts add to the scene, before the guard
   Vec3 heldForce_N = Vec3::Zero();     ///< before the guard
   double energy_J = 0;                 ///< left for the held force
   std::int64_t contactsTime = 0;       ///< the client's stamp of the newest set that this tick knows

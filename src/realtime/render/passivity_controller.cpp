@@ -46,7 +46,8 @@ void PassivityController::resume(const Vec3& hip_m) noexcept {
 void PassivityController::book(const SpringState& spring, const Vec3& move) noexcept {
   const double taken = -force_N_.dot(move) - (spring.stored_J - stored_J_);
   // What friction took long ago must not feed a later oscillation: the account holds no more than zero.
-  account_J_ = std::min(0.0, account_J_ + taken + bareDamping_Ns_per_m_ * move.squaredNorm() / elapsed_s_);
+  const double bare_J = spring.beside ? 0 : bareDamping_Ns_per_m_ * move.squaredNorm() / elapsed_s_;
+  account_J_ = std::min(0.0, account_J_ + taken + bare_J);
 }
 
 Vec3 PassivityController::brakeFor(const SpringState& spring, const Vec3& move) const noexcept {

@@ -59,6 +59,22 @@ SpringState restingSprings(const ContactSet& contactSet, bool changed, double to
   return state;
 }
 
+// `share` of the springs acts.
+PressedFaces pressedFaces(const ContactSet& contactSet, bool rest, double share, const Rendering& out) {
+  PressedFaces pressed;
+  pressed.rest = rest;
+  const double stiffness = share * contactSet.spring.stiffness_N_per_m;
+  const double springs_N = stiffness * contactSet.normal_m.norm();
+  if (!out.touching || !(springs_N > 0)) return pressed;
+  for (int i = 0; i < contactSet.count; ++i) {
+    const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
+    if (constraint.depth_m > 0) pressed.add(constraint.forceDirection, constraint.depth_m);
+  }
+  pressed.stiffness_N_per_m = stiffness;
+  pressed.exerted = out.normalForce_N.norm() / springs_N;
+  return pressed;
+}
+
 }  // namespace
 
 // The contact force of the tick before.
@@ -90,10 +106,15 @@ struct Renderer::State {
   RiseLimit rise;
   PassivityController passivity;
   LastForce last;
+  PressedFaces pressed;
 };
 
 Renderer::Renderer(const RenderOptions& options) : state_(std::make_unique<State>(options)) {}
 Renderer::~Renderer() = default;
+
+const PressedFaces& Renderer::pressed() const noexcept {
+  return state_->pressed;
+}
 
 void Renderer::reset() noexcept {
   restart();
@@ -135,6 +156,7 @@ void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState
   out = Rendering{};
   if (!hip.allFinite() || !device.velocity_m_per_s.allFinite() || !device.orientation.coeffs().allFinite()) {
     out.status = kRenderNotFinite;
+    s.pressed = {};
     restart();
     return;
   }
@@ -150,6 +172,7 @@ void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState
   SpringState springs = restingSprings(contactSet, steps(), radius, out);
   const double share = s.proxy.feltShare() * s.rise.step(out.contactForce_N, springs.known, period_s);
   scaleContact(share, out);
+  s.pressed = pressedFaces(contactSet, springs.known, share, out);
   springs.scale(share);
   springs.most_N = s.rise.most_N();
   const Vec3 brake = s.passivity.step(springs, hip, period_s);

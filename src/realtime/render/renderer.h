@@ -9,6 +9,7 @@
 #include "base/time.h"
 #include "device/device.h"
 #include "realtime/render/memory.h"
+#include "realtime/render/pressed_faces.h"
 #include "scene/snapshot.h"
 
 namespace hapticd::realtime {
@@ -88,6 +89,8 @@ class Renderer {
   /// step().
   void step(const scene::SceneSnapshot& scene, const device::DeviceState& device, Nanos now, Nanos period,
             Rendering& out) noexcept;
+  /// Of the last step().
+  const PressedFaces& pressed() const noexcept;
 
   /// For a hand that may be anywhere: the next step() starts without contact at the HIP. Effects go on.
   void restart() noexcept;

@@ -22,9 +22,10 @@ class RiseLimit {
   explicit RiseLimit(double rate_N_per_s) noexcept : rate_N_per_s_(rate_N_per_s) {}
 
   void reset() noexcept { *this = RiseLimit(rate_N_per_s_); }
-  /// The share of the contact force `force_N` that acts in this tick. What moves or changes (not `known`) is
-  /// not lowered, but a share that was lowered before goes on.
-  double step(const Vec3& force_N, bool known, double period_s) noexcept;
+  /// The share of the contact force `force_N` that acts in this tick, `beside_N` what other contacts, which
+  /// limit themselves. What moves or changes (not `known`) is not lowered, but a share that was lowered
+  /// before goes on.
+  double step(const Vec3& force_N, bool known, double period_s, const Vec3& beside_N = Vec3::Zero()) noexcept;
   /// The largest force that is in time in this tick, newtons.
   double most_N() const noexcept { return most_N_; }
   /// What acts in this tick: the contact force and all that is added to keep it passive.

@@ -21,6 +21,7 @@ SpringState stateOf(const RemoteContacts& contacts) noexcept {
   state.normal = springs.normal_N.stableNormalized();
   state.stored_J = springs.stored_J;
   state.stiffness_N_per_m = springs.stiffest_N_per_m;
+  state.beside = springs.beside;
   return state;
 }
 
@@ -31,10 +32,10 @@ void RemotePassivity::reset() noexcept {
   controller_.reset();
 }
 
-void RemotePassivity::step(const RemoteContacts& contacts, const Vec3& hip_m, double period_s,
-                           RemoteRendering& out) noexcept {
+void RemotePassivity::step(const RemoteContacts& contacts, const Vec3& scene_N, const Vec3& hip_m,
+                           double period_s, RemoteRendering& out) noexcept {
   period_s = std::max(period_s, kShortestPeriod_s);
-  const double share = rise_.step(out.contactForce_N, contacts.rest(), period_s);
+  const double share = rise_.step(out.contactForce_N, contacts.rest(), period_s, scene_N);
   scale(share, out);
   if (controller_.helps()) {
     SpringState springs = stateOf(contacts);
@@ -43,7 +44,7 @@ void RemotePassivity::step(const RemoteContacts& contacts, const Vec3& hip_m, do
     springs.most_N = rise_.most_N();
     out.contactForce_N += controller_.step(springs, hip_m, period_s);
   }
-  rise_.acts(out.contactForce_N);
+  rise_.acts(scene_N + out.contactForce_N);
 }
 
 }  // namespace hapticd::realtime

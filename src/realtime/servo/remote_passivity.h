@@ -20,9 +20,12 @@ class RemotePassivity {
   void resume(const Vec3& hip_m) noexcept { controller_.resume(hip_m); }
   /// Without contacts: the state is that after resume().
   bool isEven() const noexcept { return controller_.isEven(); }
-  /// One tick, after that of the contacts: lowers their forces in `out`, and adds the brake to their sum.
-  void step(const RemoteContacts& contacts, const Vec3& hip_m, double period_s,
+  /// One tick, after that of the contacts, beside a contact force of the scene: lowers their forces in `out`,
+  /// and adds the brake to their sum.
+  void step(const RemoteContacts& contacts, const Vec3& scene_N, const Vec3& hip_m, double period_s,
             RemoteRendering& out) noexcept;
+  /// A tick without any.
+  void idle(const Vec3& scene_N) noexcept { rise_.acts(scene_N); }
 
  private:
   RiseLimit rise_;

@@ -4,10 +4,14 @@
 #include <utility>
 
 #include "base/clock.h"
+#include "realtime/remote/remote_shape.h"
+#include "realtime/render/view_motion.h"
 #include "realtime/servo/flush_denormals.h"
 
 namespace hapticd::realtime {
 namespace {
+
+constexpr double kViewStep_N = 0.1;  // a larger one, of a view that moves, is blended in
 
 // How much of the force of a tick the guard let through.
 double passedShareOf(const TickReport& report) noexcept {
@@ -105,6 +109,7 @@ const scene::SceneSnapshot& Tick::takeSnapshot() noexcept {
   const scene::SceneSnapshot* newest = snapshots_.take();
   const scene::SceneSnapshot& scene = newest != nullptr ? *newest : nothing_;
   report_.revision = scene.revision;
+  T_world_before_ = report_.tick == 1 ? scene.workspace.T_world_device : report_.T_world_device;
   report_.T_world_device = scene.workspace.T_world_device;
   sceneSettledAt_ = scene.settledAt;
   return scene;
@@ -145,12 +150,28 @@ void Tick::feelNothing() noexcept {
   report_.remote = RemoteRendering{};
 }
 
+// What a client streams belongs to the world: a view that moves takes it along on the device. A view that
+// jumps leaves what is felt to the hand until it is stated anew. The net thread stated what is new in the
+// view of the last tick.
+const RemoteContactSet& Tick::inThisView(const RemoteContactSet& newest, bool fresh) noexcept {
+  if (T_world_before_.matrix() == report_.T_world_device.matrix()) return newest;
+  const Affine T_device_world = report_.T_world_device.inverse();
+  const ViewMotion view{T_device_world, T_world_before_};
+  const Affine motion = T_device_world * T_world_before_;
+  if (!view.jumpsAt(report_.device.position_m)) remoteContacts_.moveWithView(motion);
+  if (!fresh) return newest;
+  carried_ = newest;
+  for (std::uint32_t i = 0; i < carried_.count; ++i) moveBy(motion, carried_.contacts[i]);
+  return carried_;
+}
+
 // Nothing streamed so far, and nothing left of it, costs two comparisons.
 void Tick::addRemote(Nanos period, bool foundAnew, double passedShare) noexcept {
   const RemoteInput& input = remoteInput_.read();
   if (input.contacts.number != contactsSeen_ || input.force.number != forceSeen_) {
     if (StreamRing* ring = recordStreamTo_.load(std::memory_order_acquire)) ring->push({report_.tick, input});
   }
+  const bool fresh = input.contacts.number != contactsSeen_;
   contactsSeen_ = input.contacts.number;
   forceSeen_ = input.force.number;
   if (foundAnew) {
@@ -161,8 +182,11 @@ void Tick::addRemote(Nanos period, bool foundAnew, double passedShare) noexcept 
   RemoteRendering& out = report_.remote;
   out.status = 0;
   out.count = 0;
-  if (contactsSeen_ == 0 && forceSeen_ == 0) return;
   Rendering& rendering = report_.rendering;
+  if (contactsSeen_ == 0 && forceSeen_ == 0) {
+    remotePassivity_.idle(rendering.contactForce_N);
+    return;
+  }
   if ((rendering.status & kRenderNotFinite) != 0) {
     remoteContacts_.reset();
     remotePassivity_.reset();
@@ -172,9 +196,14 @@ void Tick::addRemote(Nanos period, bool foundAnew, double passedShare) noexcept 
     return;
   }
   const double step_s = base::toSeconds(std::min(period, 2 * period_));  // a late tick changes no more
-  const RemoteHand hand{report_.device.position_m, report_.device.velocity_m_per_s, rendering.normalForce_N};
-  remoteContacts_.step(input.contacts, hand, report_.time, step_s, out);
-  remotePassivity_.step(remoteContacts_, hand.position_m, base::toSeconds(period), out);
+  const RemoteHand hand{report_.device.position_m, report_.device.velocity_m_per_s, renderer_.pressed()};
+  const Vec3 before_N = out.contactForce_N;
+  const bool viewMoved = T_world_before_.matrix() != report_.T_world_device.matrix();
+  remoteContacts_.step(inThisView(input.contacts, fresh), hand, report_.time, step_s, out);
+  if (viewMoved && (out.contactForce_N - before_N).norm() > kViewStep_N)
+    rendering.status |= kRenderGeometryJump;
+  remotePassivity_.step(remoteContacts_, rendering.contactForce_N, hand.position_m, base::toSeconds(period),
+                        out);
   rendering.force_N += out.contactForce_N;
   heldForce_.step(input.force, hand.position_m, hand.velocity_m_per_s, report_.time, step_s, passedShare,
                   out);

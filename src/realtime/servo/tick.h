@@ -120,6 +120,7 @@ class Tick {
   bool lookForHand() noexcept;
   bool handIsLost() const noexcept;
   void feelNothing() noexcept;
+  const RemoteContactSet& inThisView(const RemoteContactSet& newest, bool fresh) noexcept;
   void addRemote(Nanos period, bool foundAnew, double passedShare) noexcept;
   GuardInput guardInput() const noexcept;
   bool forceOutlived() noexcept;
@@ -149,6 +150,8 @@ class Tick {
   RemotePassivity remotePassivity_;
   HeldForceLaw heldForce_;
   Sight sight_;
+  Affine T_world_before_ = Affine::Identity();  // the view of the last tick
+  RemoteContactSet carried_;                    // stated in it and taken in this one
   std::uint64_t contactsSeen_ = 0;
   std::uint64_t forceSeen_ = 0;
   GuardControl control_;

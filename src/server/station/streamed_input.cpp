@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/time.h"
+#include "realtime/remote/remote_shape.h"
 #include "scene/passivity.h"
 #include "scene/surface_settings.h"
 #include "scene/workspace.h"
@@ -25,8 +26,9 @@ constexpr Nanos kShortestLife = 10'000'000;
 constexpr Nanos kLongestJitter = 50'000'000;
 constexpr Nanos kUnknownRoundTrip = 100'000'000;  // of a client that does not measure it
 constexpr Nanos kLongestRoundTrip = 1'000'000'000;
-constexpr Nanos kDrift = 50'000;          // of the two clocks between two messages, at most
-constexpr double kRoundTripDecay = 0.99;  // of the largest one, with each message
+constexpr Nanos kDrift = 50'000;         // of the two clocks between two messages, at most
+constexpr double kRoundTripLasts_s = 1;  // in which it falls to 1/e, unless it comes again
+constexpr double kNarrow_m = 0.005;      // between surfaces that may squeeze the hand
 constexpr std::int64_t kLatestStamp = 4'000'000'000'000'000'000;  // 127 years
 constexpr double kSoftest_N_per_m = 1;                            // a softer contact is none
 constexpr double kThinnest_m = 1e-4;
@@ -99,8 +101,14 @@ std::string contactOf(const double* n, const ToDevice& toDevice, RemoteContact& 
     if (contact.axis.norm() < 1e-6) return "the axis of the cylinder is zero or along the normal";
     contact.axis.normalize();
   }
-  contact.velocity_m_per_s = atMost(toDevice.vector(n + 12), realtime::kRemoteSpeed_m_per_s);
-  contact.angularVelocity_rad_per_s = atMost(toDevice.direction(n + 15), realtime::kRemoteTurn_rad_per_s);
+  // A wheel whose rim is too fast still turns about its centre.
+  const Vec3 turning = toDevice.direction(n + 15);
+  const Vec3 fromCentre =
+      contact.shape == RemoteShape::halfSpace ? Vec3(Vec3::Zero()) : Vec3(contact.radius_m * contact.normal);
+  contact.angularVelocity_rad_per_s = atMost(turning, realtime::kRemoteTurn_rad_per_s);
+  contact.velocity_m_per_s =
+      atMost(toDevice.vector(n + 12) - turning.cross(fromCentre), realtime::kRemoteSpeed_m_per_s) +
+      contact.angularVelocity_rad_per_s.cross(fromCentre);
   contact.stiffness_N_per_m = n[18];
   contact.damping_Ns_per_m = std::max(n[19], 0.0);
   contact.staticFriction = std::clamp(n[20], 0.0, 1.0);
@@ -108,6 +116,15 @@ std::string contactOf(const double* n, const ToDevice& toDevice, RemoteContact& 
   contact.lifetime = lifetimeOf(n[22]);
   contact.yields = n[23] != 0;
   return {};
+}
+
+// Facing surfaces that the hand at `hand_m` may touch both within their life.
+bool maySqueeze(const RemoteContact& a, const RemoteContact& b, const Vec3& hand_m) {
+  if (a.normal.dot(b.normal) >= kOpposing) return false;
+  const double gap_m = -realtime::surfaceAt(a, 0, hand_m).depth_m - realtime::surfaceAt(b, 0, hand_m).depth_m;
+  const double closing_m_per_s = a.normal.dot(a.velocity_m_per_s) + b.normal.dot(b.velocity_m_per_s);
+  const double life_s = base::toSeconds(std::min(a.lifetime, b.lifetime));
+  return gap_m - std::max(0.0, closing_m_per_s) * life_s < kNarrow_m;
 }
 
 }  // namespace
@@ -155,17 +172,29 @@ StreamedInput::Answer StreamedInput::answer(scene::ClientId client, Kind kind, N
   return {taken, std::move(text)};
 }
 
+// The longest one of late that came twice: a single late message, as after a pause of the network, is none.
+void StreamedInput::measureRoundTrip(std::int64_t stateTime, Nanos received) {
+  const Nanos measured =
+      stateTime > 0 ? std::clamp<Nanos>(received - stateTime, 0, kLongestRoundTrip) : kUnknownRoundTrip;
+  const double left = std::exp(-base::toSeconds(received - contacts_.measuredAt) / kRoundTripLasts_s);
+  const auto ofLate = [left](Nanos longest) {
+    return static_cast<Nanos>(left * static_cast<double>(longest));
+  };
+  contacts_.roundTrip = std::max(ofLate(contacts_.roundTrip), std::min(measured, contacts_.longest));
+  contacts_.longest = std::max(ofLate(contacts_.longest), measured);
+  contacts_.measuredAt = received;
+}
+
 // As any surface: what the sampled and delayed loop can bear. Surfaces from two sides share it.
-std::string StreamedInput::keepWithinBounds(RemoteContactSet& set) const {
+std::string StreamedInput::keepWithinBounds(RemoteContactSet& set, const Vec3& hand_m) const {
   std::string remark;
   for (std::uint32_t i = 0; i < set.count; ++i) {
     RemoteContact& contact = set.contacts[i];
     scene::SceneConfig config = config_;
     if (contact.yields) config.transportDelay_s += base::toSeconds(contacts_.roundTrip);
     for (std::uint32_t j = 0; j < set.count; ++j) {
-      if (contact.normal.dot(set.contacts[j].normal) < kOpposing) {
+      if (maySqueeze(contact, set.contacts[j], hand_m))
         config.ownDamping_Ns_per_m = config_.ownDamping_Ns_per_m / 2;
-      }
     }
     scene::Surface surface;
     surface.stiffness_N_per_m = contact.stiffness_N_per_m;
@@ -195,11 +224,7 @@ StreamedInput::Answer StreamedInput::on(scene::ClientId client, const wire::Remo
         fmt::format("Remote_Contacts refused: {} numbers are no multiple of {}", numbers.size(), kNumbers)};
     return answer(client, Kind::contacts, received, false, std::move(text));
   }
-  const Nanos measured = message.stateTime > 0
-                             ? std::clamp<Nanos>(received - message.stateTime, 0, kLongestRoundTrip)
-                             : kUnknownRoundTrip;
-  contacts_.roundTrip =
-      std::max(measured, static_cast<Nanos>(kRoundTripDecay * static_cast<double>(contacts_.roundTrip)));
+  measureRoundTrip(message.stateTime, received);
 
   RemoteContactSet& set = input_.contacts;
   ++set.number;
@@ -228,7 +253,7 @@ StreamedInput::Answer StreamedInput::on(scene::ClientId client, const wire::Remo
     contacts_.until = std::max(contacts_.until, received + contact.lifetime);
     ++set.count;
   }
-  const std::string remark = keepWithinBounds(set);
+  const std::string remark = keepWithinBounds(set, last.device.position_m);
   if (text.text.empty() && !remark.empty()) text.text = "Remote_Contacts: " + remark;
   send();
   return answer(client, Kind::contacts, received, true, std::move(text));

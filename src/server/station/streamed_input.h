@@ -52,6 +52,8 @@ class StreamedInput {
     std::int64_t newest = 0;  // its newest stamp
     base::Nanos offset = 0;   // smallest difference between receipt and stamp
     base::Nanos roundTrip = 0;
+    base::Nanos longest = 1'000'000'000;  // way of a message of late
+    base::Nanos measuredAt = 0;
   };
 
   bool begin(Stream& stream, scene::ClientId client, std::int64_t time, base::Nanos received,
@@ -60,7 +62,8 @@ class StreamedInput {
   Answer answer(scene::ClientId client, Kind kind, base::Nanos now, bool taken, Refusal text);
   Answer hold(scene::ClientId client, std::int64_t time, const geometry::Vec3& force_N, base::Nanos lifetime,
               base::Nanos received, Refusal remark);
-  std::string keepWithinBounds(realtime::RemoteContactSet& set) const;
+  void measureRoundTrip(std::int64_t stateTime, base::Nanos received);
+  std::string keepWithinBounds(realtime::RemoteContactSet& set, const geometry::Vec3& hand_m) const;
   void send() { servo_.write(input_); }
 
   Slot& servo_;

@@ -41,10 +41,11 @@ struct Rig {
     set.count = static_cast<std::uint32_t>(contacts.size());
     std::copy(contacts.begin(), contacts.end(), set.contacts.begin());
   }
-  const Vec3& step() {
-    now += kMs;
+  // The servo counts a late tick for no more than two.
+  const Vec3& step(Nanos late = 0) {
+    now += kMs + late;
     out = {};
-    force = law.step(set, hand, now, 1e-3, out);
+    force = law.step(set, hand, now, base::toSeconds(kMs + std::min(late, kMs)), out);
     return force;
   }
   // States the same every 16 ms.
@@ -141,6 +142,63 @@ TEST(RemoteContacts, SurfacesMoveByTheirVelocities) {
   other.state({wheel});
   for (int ms = 1; ms <= 40; ++ms) other.step();
   expectNear(other.force, 800 * -normal.dot(other.hand.position_m) * normal, 1e-6);
+}
+
+// A wheel, or a ball, that turns about its own axis is the same surface at all times.
+TEST(RemoteContacts, RoundSurfacesTurnAboutTheirCentre) {
+  for (const RemoteShape shape : {RemoteShape::cylinder, RemoteShape::sphere}) {
+    for (const double radius_m : {0.02, 0.05, -0.02}) {
+      const Vec3 centre_m(0, -radius_m, 0);
+      const Vec3 spin_rad_per_s(0, 0, -19);
+      Rig rig;
+      for (int ms = 0; ms < 2000; ++ms) {
+        rig.hand.position_m.y() = std::max(-0.001, 0.002 - 2e-5 * ms);
+        if (ms % 33 == 0) {
+          RemoteContact c = floorAt(0, 1000);
+          c.shape = shape;
+          c.radius_m = radius_m;
+          c.point_m = centre_m + radius_m * c.normal;
+          c.angularVelocity_rad_per_s = spin_rad_per_s;
+          c.velocity_m_per_s = spin_rad_per_s.cross(radius_m * c.normal);
+          rig.state({c});
+        }
+        rig.step();
+        const double depth_m = std::max(0.0, -rig.hand.position_m.y());
+        ASSERT_NEAR(rig.force.y(), 1000 * depth_m, 1e-6) << radius_m << " m, " << ms << " ms";
+        ASSERT_NEAR(rig.force.x(), 0, 1e-6);
+        ASSERT_EQ(rig.out.status & kRemoteCorrectionsHeld, 0U);
+      }
+    }
+  }
+}
+
+// A door that swings about a hinge, with the hand at one place of it: it does not matter which point the
+// client states.
+TEST(RemoteContacts, FlatSurfacesTurnAboutTheirHinge) {
+  constexpr double kHand_m = 0.1;  // from the hinge
+  constexpr double kSpeed_rad_per_s = 5;
+  for (const double stated_m : {0.1, 0.07, 0.13}) {
+    Rig rig;
+    const auto along = [](double angle) { return Vec3(std::cos(angle), std::sin(angle), 0); };
+    const auto normal = [](double angle) { return Vec3(-std::sin(angle), std::cos(angle), 0); };
+    for (int ms = 0; ms < 400; ++ms) {
+      const double angle = 1e-3 * kSpeed_rad_per_s * ms;
+      if (ms % 33 == 0) {
+        RemoteContact c = floorAt(0, 1000);
+        c.point_m = stated_m * along(angle);
+        c.normal = normal(angle);
+        c.angularVelocity_rad_per_s = {0, 0, kSpeed_rad_per_s};
+        c.velocity_m_per_s = c.angularVelocity_rad_per_s.cross(c.point_m);
+        rig.state({c});
+      }
+      const double next = angle + 1e-3 * kSpeed_rad_per_s;
+      const double depth_m = std::min(0.0015, 3e-5 * ms - 0.001);
+      rig.hand.position_m = kHand_m * along(next) - depth_m * normal(next);
+      rig.step();
+      ASSERT_LE((rig.force - 1000 * std::max(0.0, depth_m) * normal(next)).norm(), 1e-6)
+          << stated_m << " m, " << ms << " ms";
+    }
+  }
 }
 
 // Draws in the order of the calls, whatever the compiler.
@@ -386,6 +444,91 @@ TEST(RemoteContacts, LifeIncludesTheFade) {
   EXPECT_EQ(rig.out.count, 0U);
 }
 
+// Two walls of a groove, or a floor, pressed with a force that the client's updates find at rest.
+std::vector<RemoteContact> floorOrGroove(int walls, double stiffness, Nanos lifetime) {
+  RemoteContact c = floorAt(0, stiffness);
+  c.point_m.setZero();
+  c.lifetime = lifetime;
+  if (walls == 1) return {c};
+  c.normal = Vec3(1, 1, 0).normalized();
+  RemoteContact other = c;
+  other.id = 1;
+  other.normal.x() = -other.normal.x();
+  return {c, other};
+}
+
+// Within two thirds of their life.
+TEST(RemoteContacts, ThoseRepeatedInTimeDoNotFade) {
+  struct Client {
+    int every_ms;
+    int life_ms;
+  };
+  for (const Client client : {Client{33, 100}, {10, 40}, {33, 50}, {1, 10}, {4, 10}, {10, 30}}) {
+    for (const int walls : {1, 2}) {
+      for (const double force_N : {2.0, 5.0, 11.0}) {
+        if (force_N > client.life_ms - client.every_ms - 2) continue;  // it may fall by 1 N/ms
+        const auto contacts = floorOrGroove(walls, 1000, client.life_ms * kMs);
+        Rig rig;
+        for (int ms = 0; ms < 4000; ++ms) {
+          rig.hand.position_m.y() = std::max(-1e-3 * force_N, 0.002 - 2e-5 * ms);
+          if (ms % client.every_ms == 0) rig.state(contacts);
+          rig.step();
+          ASSERT_NEAR(rig.force.y(), 1e3 * std::max(0.0, -rig.hand.position_m.y()), 1e-6)
+              << force_N << " N, every " << client.every_ms << " ms for " << client.life_ms << " ms, "
+              << walls;
+        }
+      }
+    }
+  }
+}
+
+// The hand gave what a fade took: it does not empty the tank of corrections.
+TEST(RemoteContacts, WhatAFadeTookComesBack) {
+  for (const int walls : {1, 2}) {
+    for (const double stiffness : {200.0, 1000.0}) {
+      const auto contacts = floorOrGroove(walls, stiffness, 100 * kMs);
+      Rig rig;
+      constexpr double kForce_N = 3;
+      int next_ms = 0;
+      for (int ms = 0; ms < 8000; ++ms) {
+        rig.hand.position_m.y() = std::max(-kForce_N / stiffness, 0.002 - 2e-5 * ms);
+        if (ms >= next_ms) {
+          const bool stall = ms > 2000 && ms % 300 < 10;
+          if (stall) {
+            ASSERT_NEAR(rig.force.y(), kForce_N, 1e-6) << "before the stall at " << ms;
+          }
+          rig.state(contacts);
+          next_ms = ms + (stall ? 90 : 10);
+        }
+        rig.step();
+        ASSERT_EQ(rig.out.status & kRemoteCorrectionsHeld, 0U) << ms;
+      }
+    }
+  }
+}
+
+TEST(RemoteContacts, AStrongForceOfALostClientEndsInTimeWithoutAStep) {
+  for (const int life_ms : {30, 50, 100}) {
+    for (const int walls : {1, 2}) {
+      const auto contacts = floorOrGroove(walls, 1500, life_ms * kMs);
+      Rig rig;
+      for (int ms = 0; ms < 500; ++ms) {
+        rig.hand.position_m.y() = std::max(-0.010, 0.002 - 4e-5 * ms);
+        if (ms % 4 == 0) rig.state(contacts);
+        rig.step();
+      }
+      ASSERT_NEAR(rig.force.y(), 15, 1e-6);
+      rig.state(contacts);
+      const Nanos received = rig.now;
+      while (rig.now < received + life_ms * kMs) {
+        const Vec3 last_N = rig.force;
+        EXPECT_LE((rig.step() - last_N).norm(), 1) << life_ms << " ms, " << walls << " walls";
+      }
+      EXPECT_EQ(rig.force, Vec3::Zero());
+    }
+  }
+}
+
 TEST(RemoteContacts, AbsentOnesFadeAtOnce) {
   Rig rig;
   RemoteContact side = floorAt(0);
@@ -417,13 +560,19 @@ TEST(RemoteContacts, SurfacesOnTopOfEachOtherAreAsStiffAsOne) {
   rig.approach(contacts, {0, 0.001, 0}, {0, -0.002, 0});
   expectNear(rig.force, {0, 1.6, 0}, 1e-6);
 
-  // What the scene exerts already is not added again; across it, contacts add up.
-  rig.hand.sceneForce_N = {0, 1, 0};
-  rig.settle(contacts, 1);
-  expectNear(rig.force, {0, 0.6, 0}, 1e-6);
-  rig.hand.sceneForce_N = {1, 0, 0};
-  rig.settle(contacts, 1);
-  expectNear(rig.force, {0, 1.6, 0}, 1e-6);
+  // Of surfaces on top of each other, those of the scene included, the larger force is felt; across each
+  // other they add up. The remote force is what is added to that of the scene.
+  const auto besideScene = [&](const Vec3& normal, double depth_m, double stiffness_N_per_m) {
+    rig.hand.scene = {};
+    rig.hand.scene.add(normal, depth_m);
+    rig.hand.scene.stiffness_N_per_m = stiffness_N_per_m;
+    rig.settle(contacts, 1);
+    return rig.force;
+  };
+  expectNear(besideScene(Vec3::UnitY(), 0.002, 500), {0, 0.6, 0}, 1e-6);
+  expectNear(besideScene(Vec3::UnitY(), 0.002, 800), {0, 0, 0}, 1e-6);
+  expectNear(besideScene(Vec3::UnitY(), 0.001, 1200), {0, 0.4, 0}, 1e-6);
+  expectNear(besideScene(Vec3::UnitX(), 0.001, 1200), {0, 1.6, 0}, 1e-6);
 }
 
 // Whatever the contacts, each adds what the others do not exert, to the solver's last digits; a softer one is
@@ -623,6 +772,30 @@ TEST(RemoteContacts, FrictionSticksAndSlides) {
   EXPECT_NEAR(largest, 0.5 * normal, 0.03);
   EXPECT_NEAR(rig.force.x(), -0.3 * normal, 1e-6);
   EXPECT_NEAR(rig.force.y(), normal, 1e-6);
+}
+
+// The hand goes along with a belt, so that nothing strains the friction; some ticks are late.
+TEST(RemoteContacts, FrictionOfAMovingSurfaceKeepsUpWithLateTicks) {
+  constexpr double kSpeed_m_per_s = 0.1;
+  for (const Nanos late : {2 * kMs, 5 * kMs, 14 * kMs}) {
+    Rig rig;
+    const Nanos began = rig.now;
+    const auto travelled = [&](Nanos at) { return kSpeed_m_per_s * base::toSeconds(at - began); };
+    for (int i = 0; i < 1500; ++i) {
+      if (i % 10 == 0) {
+        RemoteContact belt = floorAt(0, 1000);
+        belt.staticFriction = belt.dynamicFriction = 0.8;
+        belt.velocity_m_per_s.x() = kSpeed_m_per_s;
+        rig.state({belt});
+      }
+      const Nanos lateNow = i > 600 && i % 50 == 0 ? late : 0;
+      rig.hand.velocity_m_per_s.x() = kSpeed_m_per_s;
+      rig.hand.position_m = {travelled(rig.now + kMs + lateNow), std::max(-0.002, 0.002 - 2e-5 * i), 0};
+      rig.step(lateNow);
+      ASSERT_NEAR(rig.force.x(), 0, 1e-6) << "tick " << i << ", late by " << late / kMs << " ms";
+    }
+    EXPECT_NEAR(rig.force.y(), 2, 1e-6);
+  }
 }
 
 TEST(RemoteContacts, TheSlowestTurnIsNone) {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -93,6 +94,22 @@ TEST_F(StreamedInputTest, LimitsWhatIsTooFastTooLongOrTooStiff) {
   EXPECT_EQ(first().lifetime, 100 * kStreamMillisecond);
 }
 
+TEST_F(StreamedInputTest, AWheelThatIsTooFastStillTurnsAboutItsCentre) {
+  for (const double turning : {15.0, 30.0}) {
+    std::vector<double> wheel = floorAt(0);
+    wheel[1] = 2;
+    wheel[2] = 0.1;
+    wheel[10] = 0;
+    wheel[11] = 1;
+    wheel[12] = -turning * 0.1 + 0.2;  // its centre moves at 0.2 m/s
+    wheel[17] = turning;
+    ASSERT_TRUE(send(wheel).taken);
+    const Vec3 rim = first().angularVelocity_rad_per_s.cross(first().radius_m * first().normal);
+    EXPECT_NEAR((first().velocity_m_per_s - rim - Vec3(0.2, 0, 0)).norm(), 0, 1e-9) << turning << " rad/s";
+    EXPECT_NEAR(first().angularVelocity_rad_per_s.norm(), std::min(turning, 20.0), 1e-9);
+  }
+}
+
 // Delay bounds the stiffness of what follows the hand, and of that alone.
 TEST_F(StreamedInputTest, AYieldingContactPaysForTheRoundTrip) {
   std::vector<double> n = floorAt(0);
@@ -111,6 +128,45 @@ TEST_F(StreamedInputTest, AYieldingContactPaysForTheRoundTrip) {
   both.insert(both.end(), n.begin(), n.end());
   send(both);
   EXPECT_NEAR(first().stiffness_N_per_m, 0.999 * 2.5 / 0.0005, 1e-6);
+}
+
+TEST_F(StreamedInputTest, OneLateMessageIsNoRoundTrip) {
+  std::vector<double> n = floorAt(0);
+  n[18] = 400;
+  n[23] = 1;
+  const auto sendAged = [&](int age_ms) {
+    now_ += 33 * kStreamMillisecond;
+    send(n, 1, 0, now_ - age_ms * kStreamMillisecond);
+    return first().stiffness_N_per_m;
+  };
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(sendAged(10), 400);
+  EXPECT_EQ(sendAged(100), 400);
+  for (int i = 0; i < 150; ++i) EXPECT_EQ(sendAged(10), 400);
+  sendAged(100);
+  EXPECT_NEAR(sendAged(100), 0.999 * 5 / 0.1005, 1e-6) << "a way that has become longer";
+  EXPECT_LT(sendAged(10), 70) << "it may become so again";
+  for (int i = 0; i < 90; ++i) sendAged(10);
+  EXPECT_EQ(sendAged(10), 400) << "after three seconds, whatever the rate of the client";
+}
+
+// Only what both press on the hand at once share the bound.
+TEST_F(StreamedInputTest, FacingSurfacesShareTheBoundWhereTheyMaySqueezeTheHand) {
+  const auto stiffnessOfFloorUnder = [&](double ceiling_m, double sinking_m_per_s = 0) {
+    std::vector<double> n = floorAt(0, 1);
+    std::vector<double> ceiling = floorAt(ceiling_m, 2);
+    n[18] = ceiling[18] = 1e5;
+    ceiling[7] = -1;
+    ceiling[13] = -sinking_m_per_s;
+    ceiling[3] = 0.05;  // any of its points
+    n.insert(n.end(), ceiling.begin(), ceiling.end());
+    send(n);
+    return first().stiffness_N_per_m;
+  };
+  const double whole = 0.999 * 5 / 0.0005;
+  EXPECT_NEAR(stiffnessOfFloorUnder(0.020), whole, 1e-6);
+  EXPECT_NEAR(stiffnessOfFloorUnder(0.002), whole / 2, 1e-6);
+  EXPECT_NEAR(stiffnessOfFloorUnder(-0.002), whole / 2, 1e-6);
+  EXPECT_NEAR(stiffnessOfFloorUnder(0.020, 0.5), whole / 2, 1e-6) << "they meet within their life";
 }
 
 TEST_F(StreamedInputTest, RefusesWhatCannotBeUsedAndKeepsTheRest) {
