@@ -357,7 +357,7 @@ TEST(Crc32, IsThatOfZlib) {
 class SmallSession : public testing::Test {
  protected:
   void SetUp() override {
-    Recorder recorder(file_.path(), [](const std::string& text) { ADD_FAILURE() << text; });
+    Recorder recorder(file_.path(), [](RecorderProblem, const std::string& text) { ADD_FAILURE() << text; });
     RecordedDevice device;
     device.names = {"Phantom"};
     recorder.addDevice(device);
@@ -487,7 +487,8 @@ TEST_F(SmallSession, DevicesHaveAtMost32Buttons) {
   const auto readWith = [&](int buttons) {
     std::filesystem::remove(file_.path());
     {
-      Recorder recorder(file_.path(), [](const std::string& text) { ADD_FAILURE() << text; });
+      Recorder recorder(file_.path(),
+                        [](RecorderProblem, const std::string& text) { ADD_FAILURE() << text; });
       RecordedDevice device;
       device.names = {"Phantom"};
       device.buttons = buttons;
