@@ -69,7 +69,8 @@ void remote_input(Input input) {
                                0.01 * std::sin(2 * angle));
       realtime::RemoteRendering out;
       const geometry::Vec3 force = contacts.step(
-          newest.contacts, {.position_m = hip, .velocity_m_per_s = {0.1, -0.1, 0.05}}, now, 0.001, out);
+          newest.contacts, {.position_m = hip, .velocity_m_per_s = {0.1, -0.1, 0.05}, .scene = {}}, now,
+          0.001, out);
       require(force.allFinite(), "the force of contacts is finite");
       held.step(newest.force, hip, {0.1, -0.1, 0.05}, now, 0.001, 1, out);
       require(out.heldForce_N.allFinite() && std::isfinite(out.energy_J), "the held force is finite");
