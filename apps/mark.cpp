@@ -8,6 +8,7 @@
 #include "client/link.h"
 #include "commands.h"
 #include "hapticd/client.h"
+#include "reach_device.h"
 #include "wire/codec.h"
 
 namespace hapticd::apps {
@@ -22,19 +23,11 @@ struct MarkOptions {
 
 // The server sends every marker to all clients: its arrival confirms it.
 int run(const MarkOptions& options) {
-  constexpr auto kTimeout = 5s;
   const client::DeviceAddress address = client::parseDevice(options.server);
   client::Link link(address.server, {.reconnect = false, .adoptNames = true});
   const wire::LocalSender device = link.addDevice(address.device);
   bool isHapticd = false;
-  // Answered ahead of the ping that waitHeard() waits for.
-  link.onUp = [&] { link.sendNow(device, wire::QueryCapabilities{}); };
-  link.onArrival = [&](wire::MessageKind kind, wire::LocalSender, wire::ByteView) {
-    isHapticd = isHapticd || kind == wire::kindOf<wire::Capabilities>;
-  };
-  if (!link.waitConnected(kTimeout)) throw ConnectError(address.device + ": " + link.whyNotConnected());
-  if (!link.waitHeard(device, kTimeout))
-    throw ConnectError("no device '" + address.device + "' answers at " + address.server.text());
+  reachDevice(link, address, device, isHapticd);
   link.sendNow(device, wire::Marker{.time = 0, .text = options.text});
   bool confirmed = false;
   std::string refusal;
@@ -54,7 +47,7 @@ int run(const MarkOptions& options) {
       if (text->severity == wire::kTextNormal) remark = heard;
     }
   };
-  const auto end = std::chrono::steady_clock::now() + kTimeout;
+  const auto end = std::chrono::steady_clock::now() + kAnswerTime;
   while (!confirmed && refusal.empty() && link.connected() && std::chrono::steady_clock::now() < end)
     link.poll(20ms, hear);
   if (!refusal.empty()) throw Error(options.server + " refused: " + refusal);

@@ -14,6 +14,7 @@
 #include "commands.h"
 #include "hapticd/client.h"
 #include "missing_ticks.h"
+#include "reach_device.h"
 #include "record/export.h"
 #include "record/vrpn_log.h"
 #include "sample_of.h"
@@ -68,7 +69,6 @@ bool demandConnected(bool connected, const std::string& server) {
 // Every message of the device as it came, also of types that this project does not know. Returns their
 // number.
 std::size_t recordMessages(const RecordOptions& options) {
-  constexpr auto kTimeout = 5s;
   const client::DeviceAddress address = client::parseDevice(options.server);
   client::Link link(address.server, {.reconnect = false, .adoptNames = true});
   const wire::LocalSender device = link.addDevice(address.device);
@@ -76,10 +76,7 @@ std::size_t recordMessages(const RecordOptions& options) {
     constexpr std::uint32_t kKinds = wire::kReportDefault | wire::kReportHip | wire::kReportContactPoint;
     link.sendNow(device, wire::Subscribe{.kinds = kKinds, .rate = 0});
   };
-  if (!link.waitConnected(kTimeout)) throw ConnectError(address.device + ": " + link.whyNotConnected());
-  if (!link.waitHeard(device, kTimeout)) {
-    throw ConnectError("no device '" + address.device + "' answers at " + address.server.text());
-  }
+  reachDevice(link, address, device);
   std::optional<record::VrpnLog> log;
   wire::LocalSender sender;
   std::size_t count = 0;
@@ -139,14 +136,7 @@ class ServerRecording {
         address_(client::parseDevice(server)),
         link_(address_.server, {.reconnect = false, .adoptNames = true}),
         device_(link_.addDevice(address_.device)) {
-    // Answered ahead of the ping that waitHeard() waits for.
-    link_.onUp = [this] { link_.sendNow(device_, wire::QueryCapabilities{}); };
-    link_.onArrival = [this](wire::MessageKind kind, wire::LocalSender, wire::ByteView) {
-      isHapticd_ = isHapticd_ || kind == wire::kindOf<wire::Capabilities>;
-    };
-    if (!link_.waitConnected(kTimeout)) throw ConnectError(address_.device + ": " + link_.whyNotConnected());
-    if (!link_.waitHeard(device_, kTimeout))
-      throw ConnectError("no device '" + address_.device + "' answers at " + address_.server.text());
+    reachDevice(link_, address_, device_, isHapticd_);
     if (!token.empty()) link_.sendNow(device_, wire::Identify{.token = std::string_view(token)});
   }
 
@@ -154,7 +144,7 @@ class ServerRecording {
   std::string ask(bool record, const std::string& name, std::string_view answer) {
     link_.sendNow(device_, wire::RecordingControl{.record = static_cast<std::int16_t>(record),
                                                   .name = std::string_view(name)});
-    const auto end = std::chrono::steady_clock::now() + kTimeout;
+    const auto end = std::chrono::steady_clock::now() + kAnswerTime;
     while (link_.connected() && std::chrono::steady_clock::now() < end) {
       poll();
       if (last_.starts_with(answer)) return last_;
@@ -187,8 +177,6 @@ class ServerRecording {
   }
 
  private:
-  static constexpr auto kTimeout = 5s;
-
   // A refusal for the role of the client begins with the name of the message.
   static bool isAboutRecording(std::string_view text) {
     return text.starts_with("Recording_Control") || text.starts_with(wire::RecordingControl::kInfo.name);

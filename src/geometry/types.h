@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cmath>
 #include <limits>
 
 namespace hapticd::geometry {
@@ -16,6 +17,11 @@ using Mat4 = Eigen::Matrix4d;
 using Quat = Eigen::Quaterniond;
 /// Affine map: rotation, scale, shear and translation (a 3x4 matrix, 16 byte aligned).
 using Affine = Eigen::Transform<double, 3, Eigen::AffineCompact>;
+
+/// By how much a similarity scales; of another map, the mean.
+inline double scaleOf(const Mat3& linear) noexcept {
+  return std::cbrt(std::abs(linear.determinant()));
+}
 
 /// Axis-aligned box; empty until extended.
 struct Box {

@@ -119,7 +119,7 @@ Workspace workspaceFrom(const Affine& T_world_device) {
   Workspace w;
   w.T_world_device = T_world_device;
   w.T_device_world = T_world_device.inverse();
-  w.worldUnitsPerMetre = std::cbrt(std::abs(T_world_device.linear().determinant()));
+  w.worldUnitsPerMetre = geometry::scaleOf(T_world_device.linear());
   return w;
 }
 

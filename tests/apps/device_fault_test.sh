@@ -5,14 +5,6 @@ set -euo pipefail
 hapticd=$1
 source_dir=$2
 . "$(dirname "$0")/server.sh"
-await() {  # TEXT LOG: until the log has the text, at most 30 s
-  for _ in $(seq 300); do
-    if grep -q "$1" "$work/$2"; then return; fi
-    sleep 0.1
-  done
-  cat "$work/$2"
-  return 1
-}
 
 # On another address, the port of the server above is free.
 inverse3=127.0.0.9:${address##*:}

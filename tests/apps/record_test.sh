@@ -9,14 +9,6 @@ serve_options=(--http off --config "$work/server.toml")
 cd "$work" # where the server writes them
 . "$source_dir/tests/apps/server.sh"
 
-await() { # await FILE TEXT
-  for _ in $(seq 600); do
-    grep -qF -- "$2" "$1" && return
-    sleep 0.05
-  done
-  cat "$1"
-  exit 1
-}
 ends() { # ends STATUS PID FILE
   local status=0
   wait "$2" || status=$?
@@ -27,11 +19,11 @@ ends() { # ends STATUS PID FILE
 for seconds in 0 1000; do
   "$hapticd" record "Phantom@tcp://$address" --server "a$seconds.haptics" --seconds "$seconds" >first 2>&1 &
   first=$!
-  await first "recording to a$seconds.haptics"
+  await "recording to a$seconds.haptics" first
   "$hapticd" record "Phantom@tcp://$address" --server --end >second
   grep -q "recorded .* in a$seconds.haptics" second || { cat second; exit 1; }
   "$hapticd" record "Phantom@tcp://$address" --server "b$seconds.haptics" --detach >/dev/null
-  await first "another client ended it: recorded "
+  await 'another client ended it: recorded ' first
   ends $((seconds > 0)) "$first" first
   "$hapticd" record "Phantom@tcp://$address" --server --end >second
   grep -q "recorded .* in b$seconds.haptics" second || { cat second; exit 1; }
@@ -40,11 +32,11 @@ done
 # A connection that breaks does not end it, and the program says how to.
 "$hapticd" tunnel "unix:$work/server.sock" --port 0 >tunnel 2>&1 &
 tunnel=$!
-await tunnel 'tcp://'
+await 'tcp://' tunnel
 local=$(sed -nE 's/.*tcp:\/\/([0-9.]+:[0-9]+);.*/\1/p' tunnel)
 "$hapticd" record "Phantom@tcp://$local" --server c.haptics >lost 2>&1 &
 lost=$!
-await lost 'recording to c.haptics'
+await 'recording to c.haptics' lost
 kill "$tunnel"
 ends 1 "$lost" lost
 grep -q "the server records on .*'hapticd record Phantom@tcp://$local --server --end'" lost || { cat lost; exit 1; }

@@ -5,13 +5,6 @@ hapticd=$1
 source_dir=$2
 . "$(dirname "$0")/server.sh"
 
-await() {  # TEXT LOG: until the log has the text, at most 30 s
-  for _ in $(seq 300); do
-    if grep -q "$1" "$work/$2"; then return; fi
-    sleep 0.1
-  done
-}
-
 "$hapticd" stop "Phantom@$address" | grep -q 'forces are off'
 "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --server "Phantom@$address" --seconds 4 >"$work/stopped"
 awk '/peak force/ { if ($3 != 0) force = 1 } END { exit force }' "$work/stopped" || { cat "$work/stopped"; exit 1; }

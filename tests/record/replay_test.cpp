@@ -12,6 +12,13 @@
 namespace hapticd::test {
 namespace {
 
+void startWithPhantom(record::Recorder& recorder) {
+  record::RecordedDevice device;
+  device.names = {"Phantom"};
+  recorder.addDevice(device);
+  recorder.start(0, server::toToml(server::ServerConfig{}));
+}
+
 class Replay : public testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -118,10 +125,7 @@ TEST(ReplaySeek, ABatchThatIsOpenDoesNotStayOpen) {
   const RecordingFile file;
   {
     record::Recorder recorder(file.path(), [](record::RecorderProblem, const std::string&) {});
-    record::RecordedDevice device;
-    device.names = {"Phantom"};
-    recorder.addDevice(device);
-    recorder.start(0, server::toToml(server::ServerConfig{}));
+    startWithPhantom(recorder);
     const auto send = [&](base::Nanos at, const scene::SceneCommand& command) {
       recorder.recordCommand(0, 1, at, &command);
     };
@@ -174,10 +178,7 @@ TEST(ReplayLoop, ARecordingThatTakesNoTimeIsPlayedOnce) {
   const RecordingFile file;
   {
     record::Recorder recorder(file.path(), [](record::RecorderProblem, const std::string&) {});
-    record::RecordedDevice device;
-    device.names = {"Phantom"};
-    recorder.addDevice(device);
-    recorder.start(0, server::toToml(server::ServerConfig{}));
+    startWithPhantom(recorder);
     const scene::SceneCommand command = scene::SetObjectNumber{1};
     recorder.recordCommand(0, 1, 7, &command);
     recorder.finish();

@@ -6,6 +6,7 @@
 #include "base/time.h"
 #include "realtime/remote/at_most.h"
 #include "realtime/remote/normal_shares.h"
+#include "realtime/render/release.h"
 
 namespace hapticd::realtime {
 namespace {
@@ -85,7 +86,7 @@ void RemoteContacts::resume(const RemoteMemory& memory, const Vec3& hip_m) noexc
 
 void RemoteContacts::moveWithView(const geometry::Affine& motion) noexcept {
   const geometry::Mat3 linear = motion.linear();
-  const double scale = std::cbrt(std::abs(linear.determinant()));
+  const double scale = geometry::scaleOf(linear);
   for (Slot& slot : inUse()) {
     if (!slot.used) continue;
     moveBy(motion, slot.contact);
@@ -93,7 +94,7 @@ void RemoteContacts::moveWithView(const geometry::Affine& motion) noexcept {
     slot.shift_m *= scale;
     slot.turn = linear * slot.turn / scale;
     slot.drift_m_per_s = linear * slot.drift_m_per_s;
-    slot.friction_N = linear * slot.friction_N / scale;
+    slot.friction_N = rotated(motion, slot.friction_N);
   }
   hand_m_ = motion * hand_m_;
   viewMoved_ = true;
@@ -152,17 +153,24 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
   hand_m_ = hand.position_m;
   scene_ = hand.scene;
   frictionEnergy_J_ = frictionNow_J_;
+  const auto moves = [](const Slot& slot) {
+    return slot.used && slot.normal_N > 0 && slot.velocity.norm() > kRests_m_per_s;
+  };
+  rest_ = rest_ && std::ranges::none_of(inUse(), moves);
+  report(hand, out);
+  return out.contactForce_N;
+}
+
+void RemoteContacts::report(const RemoteHand& hand, RemoteRendering& out) noexcept {
   for (const Slot& slot : inUse()) {
     if (!slot.used || slot.normal_N <= 0) continue;
-    rest_ = rest_ && slot.velocity.norm() <= kRests_m_per_s;
     if (out.count == kMaxRemoteContacts) continue;
     out.contacts[out.count++] = {
         slot.contact.id, (hand.position_m + slot.depth_m * slot.normal).cast<float>(),
         (slot.normal_N * slot.normal + slot.friction_N).cast<float>(), static_cast<float>(slot.depth_m)};
   }
   if (held_) out.status |= kRemoteCorrectionsHeld;
-  out.contactForce_N = force - late_N_;
-  return out.contactForce_N;
+  out.contactForce_N = force_N_ - late_N_;
 }
 
 // Shared as the normal force is; what the shares store has that force as its gradient.

@@ -110,6 +110,7 @@ class RemoteContacts {
   Vec3 forceWith(const Change& change, const RemoteHand& hand, double step_s) noexcept;
   Vec3 forceAgain(const Change& change, const RemoteHand& hand, double step_s) noexcept;
   Vec3 forceWithin(const Change& most, double most_N, const RemoteHand& hand, double step_s) noexcept;
+  void report(const RemoteHand& hand, RemoteRendering& out) noexcept;
   void fadeOut(Nanos now, double step_s) noexcept;
   static void locate(Slot& slot, const RemoteHand& hand, Nanos now) noexcept;
   static bool isCorrected(const Slot& slot) noexcept;

@@ -52,7 +52,7 @@ Vec3 turnedBy(const Vec3& rotation, const Vec3& v) noexcept {
 
 void moveBy(const geometry::Affine& motion, RemoteContact& contact) noexcept {
   const geometry::Mat3 linear = motion.linear();
-  const double scale = std::cbrt(std::abs(linear.determinant()));
+  const double scale = geometry::scaleOf(linear);
   contact.point_m = motion * contact.point_m;
   contact.normal = (linear * contact.normal).normalized();
   contact.axis = (linear * contact.axis).normalized();

@@ -472,10 +472,9 @@ bool ContactQuery::isReusable(double radius) const noexcept {
 }
 
 bool ContactQuery::ensureGathered(const Vec3& centre, double radius) noexcept {
-  const double reserve = reserve_m_;
-  if (isReusable(std::max(radius, reserve)) && cache_.covers(centre, radius)) return true;
-  if (reserve > radius && noReserve_ == 0) {
-    if (gather(centre, reserve)) return true;
+  if (isReusable(std::max(radius, reserve_m_)) && cache_.covers(centre, radius)) return true;
+  if (reserve_m_ > radius && noReserve_ == 0) {
+    if (gather(centre, reserve_m_)) return true;
     noReserve_ = kNoReserve;
   }
   // Where fans are joined, a reserve saves the visits to their triangles in the next ticks.

@@ -28,8 +28,6 @@ using geometry::Affine;
 inline constexpr double kNear_m = 0.050;
 /// Triangles that a tick examines. A count and not a time, so that the clock never changes a force.
 inline constexpr int kMaxVisits = 8192;
-/// Share of the tool radius that is gathered in reserve, at most.
-inline constexpr double kReserveShare = 0.2;
 using geometry::kGapTolerance_m;
 using geometry::kLargestGapTolerance_m;
 
@@ -206,6 +204,7 @@ class ContactQuery {
   static constexpr int kVisit = 16;
   static constexpr int kBoxVisit = 4;
   static constexpr int kMaxUnfit = 8;
+  static constexpr double kReserveShare = 0.2;  // of the tool radius, that is gathered in reserve at most
 
   class JoinedFans;
 

@@ -7,8 +7,13 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr double kClear = 2;              // in skins: beyond the radius, the ball is free of a face
+constexpr double kClear = 2;  // in skins: beyond the radius, the ball is free of a face
+constexpr std::size_t kBlock = 16;
 constexpr float kSingleRounding = 1e-6F;  // relative; eight times that of one operation
+
+std::size_t blocksOf(std::size_t count) noexcept {
+  return (count + kBlock - 1) / kBlock;
+}
 
 }  // namespace
 
@@ -111,13 +116,11 @@ int FacetCache::findNear(const Reach& reach, std::uint16_t* found) noexcept {
   return n;
 }
 
+// Lower bound of the distance of triangle i, relative to centre_.
 float FacetCache::discDistance(std::size_t i, const Vec3f& p) const noexcept {
   const Vec3f offset = p - Vec3f(discCentres_[0][i], discCentres_[1][i], discCentres_[2][i]);
-  const float up = discNormals_[i].dot(offset);
-  const float offset2 = offset.squaredNorm();
-  const float aside = std::sqrt(std::max(0.0F, offset2 - up * up)) - discRadii_[i];
-  const float distance = aside > 0 ? std::sqrt(up * up + aside * aside) : std::abs(up);
-  return distance - 4 * kSingleRounding * std::sqrt(offset2);
+  return distanceFromDisc<float>(offset, discNormals_[i], discRadii_[i]) -
+         4 * kSingleRounding * offset.norm();
 }
 
 // Those within `distance` and a little more.
@@ -130,23 +133,41 @@ void FacetCache::knowNear(double distance) noexcept {
     nearCentre_ = toolPosition_;
     nearDistance_ = distance + kMore * toolRadius_;
     nearCount_ = findNear(reachOf(nearCentre_, Vec3::Zero(), nearDistance_), near_.data());
+    // In a hollow of about the tool's radius: farther away there are no others.
+    if (nearCount_ == count_) nearDistance_ = std::numeric_limits<double>::infinity();
   }
   boundsFrom_ = toolPosition_;
   const Vec3f from = (boundsFrom_ - centre_).cast<float>();
-  for (std::size_t k = 0; k < static_cast<std::size_t>(nearCount_); ++k)
-    nearBounds_[k] = discDistance(near_[k], from);
+  const auto count = static_cast<std::size_t>(nearCount_);
+  for (std::size_t k = 0; k < count; ++k) nearBounds_[k] = discDistance(near_[k], from);
+  std::fill(nearBounds_.begin() + nearCount_, nearBounds_.begin() + blocksOf(count) * kBlock,
+            std::numeric_limits<float>::infinity());
+}
+
+// Calls visit(triangle) for each of those near whose bound is within `distance`.
+template <class Visit>
+void FacetCache::visitNear(double distance, Visit&& visit) const noexcept {
+  const float limit =
+      std::nextafter(static_cast<float>((toolPosition_ - boundsFrom_).norm() + distance), 1.0F);
+  for (std::size_t block = 0; block < blocksOf(static_cast<std::size_t>(nearCount_)); ++block) {
+    const float* const bounds = &nearBounds_[block * kBlock];
+    float least = bounds[0];  // the compiler computes several at once
+    for (std::size_t k = 1; k < kBlock; ++k) least = std::min(least, bounds[k]);
+    if (least > limit) continue;
+    for (std::size_t k = 0; k < kBlock; ++k) {
+      if (bounds[k] <= limit) visit(near_[block * kBlock + k]);
+    }
+  }
 }
 
 std::span<const std::uint16_t> FacetCache::trianglesNear(const Vec3& d, double distance) noexcept {
   const Reach reach = reachOf(toolPosition_, d, distance);
+  const double farthest = d.norm() + distance;
   int n = 0;
-  if ((toolPosition_ - nearCentre_).norm() + d.norm() + distance <= nearDistance_) {
-    const float limit =
-        std::nextafter(static_cast<float>((toolPosition_ - boundsFrom_).norm() + d.norm() + distance), 1.0F);
-    for (std::size_t k = 0; k < static_cast<std::size_t>(nearCount_); ++k) {
-      if (!(nearBounds_[k] > limit) && reaches(reach, near_[k]))
-        found_[static_cast<std::size_t>(n++)] = near_[k];
-    }
+  if ((toolPosition_ - nearCentre_).norm() + farthest <= nearDistance_) {
+    visitNear(farthest, [&](std::uint16_t i) {
+      if (reaches(reach, i)) found_[static_cast<std::size_t>(n++)] = i;
+    });
   } else {
     n = findNear(reach, found_.data());
   }
@@ -158,14 +179,12 @@ int FacetCache::probablyNearest(double distance) noexcept {
   const Vec3f from = (toolPosition_ - centre_).cast<float>();
   int nearest = -1;
   float least = std::numeric_limits<float>::infinity();
-  for (int k = 0; k < nearCount_; ++k) {
-    const std::size_t i = near_[static_cast<std::size_t>(k)];
-    const Vec3f offset = Vec3f(discCentres_[0][i], discCentres_[1][i], discCentres_[2][i]) - from;
-    const float away = offset.squaredNorm();
-    if (away >= least) continue;
+  visitNear(distance, [&](std::uint16_t i) {
+    const float away = discDistance(i, from);
+    if (away >= least) return;
     least = away;
-    nearest = static_cast<int>(i);
-  }
+    nearest = i;
+  });
   return nearest;
 }
 
@@ -215,7 +234,7 @@ void FacetCache::moveTo(const Vec3& p) noexcept {
 }
 
 // The distance from a face is convex: its tangent is a lower bound.
-double FacetCache::lowerBound(int k, const Vec3& d) noexcept {
+double FacetCache::lowerBound(int k, const Vec3& d) const noexcept {
   const SupportPlane& plane = supportPlanes_[static_cast<std::size_t>(k)];
   return plane.normal.dot(toolPosition_) - plane.offset + std::min(0.0, plane.normal.dot(d));
 }

@@ -6,7 +6,6 @@
 // the path comes near and that the plane does not rule out.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <span>
 
@@ -65,7 +64,7 @@ class FacetCache {
   /// when there is none.
   int probablyNearest(double distance) noexcept;
   /// Lower bound of the distance while the tool moves by d; refine() makes it exact for the present position.
-  double lowerBound(int i, const Vec3& d) noexcept;
+  double lowerBound(int i, const Vec3& d) const noexcept;
   /// Replaces the bound by the exact distance: `foot` is the nearest point. Returns the new lowerBound().
   double refine(int i, const Vec3& foot, const Vec3& d) noexcept;
   /// Marks entry i as unreachable.
@@ -87,6 +86,8 @@ class FacetCache {
   int findNear(const Reach& reach, std::uint16_t* found) noexcept;
   float discDistance(std::size_t i, const Vec3f& p) const noexcept;
   void knowNear(double distance) noexcept;
+  template <class Visit>
+  void visitNear(double distance, Visit&& visit) const noexcept;
 
   // Ball tool. normal . x = offset: a plane with the face on its back.
   struct SupportPlane {

@@ -26,7 +26,7 @@ inline double remainingShare(base::Nanos begin, const scene::ForceOwner* owner, 
 
 /// A force in another frame: rotated, never scaled. `t` is a similarity.
 inline geometry::Vec3 rotated(const geometry::Affine& t, const geometry::Vec3& force) noexcept {
-  const double scale = std::cbrt(std::abs(t.linear().determinant()));
+  const double scale = geometry::scaleOf(t.linear());
   return scale > 0 ? geometry::Vec3(t.linear() * force / scale) : geometry::Vec3(geometry::Vec3::Zero());
 }
 

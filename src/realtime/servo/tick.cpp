@@ -150,11 +150,10 @@ void Tick::feelNothing() noexcept {
   report_.remote = RemoteRendering{};
 }
 
-// What a client streams belongs to the world: a view that moves takes it along on the device. A view that
+// What a client streams belongs to the world: a view that moved takes it along on the device. A view that
 // jumps leaves what is felt to the hand until it is stated anew. The net thread stated what is new in the
 // view of the last tick.
 const RemoteContactSet& Tick::inThisView(const RemoteContactSet& newest, bool fresh) noexcept {
-  if (T_world_before_.matrix() == report_.T_world_device.matrix()) return newest;
   const Affine T_device_world = report_.T_world_device.inverse();
   const ViewMotion view{T_device_world, T_world_before_};
   const Affine motion = T_device_world * T_world_before_;
@@ -199,7 +198,8 @@ void Tick::addRemote(Nanos period, bool foundAnew, double passedShare) noexcept 
   const RemoteHand hand{report_.device.position_m, report_.device.velocity_m_per_s, renderer_.pressed()};
   const Vec3 before_N = out.contactForce_N;
   const bool viewMoved = T_world_before_.matrix() != report_.T_world_device.matrix();
-  remoteContacts_.step(inThisView(input.contacts, fresh), hand, report_.time, step_s, out);
+  const RemoteContactSet& contacts = viewMoved ? inThisView(input.contacts, fresh) : input.contacts;
+  remoteContacts_.step(contacts, hand, report_.time, step_s, out);
   if (viewMoved && (out.contactForce_N - before_N).norm() > kViewStep_N)
     rendering.status |= kRenderGeometryJump;
   remotePassivity_.step(remoteContacts_, rendering.contactForce_N, hand.position_m, base::toSeconds(period),

@@ -5,17 +5,11 @@
 #include <numbers>
 
 namespace hapticd::server {
-namespace {
 
 using geometry::Mat3;
 using geometry::Quat;
+using geometry::scaleOf;
 using geometry::Vec3;
-
-double scaleOf(const Mat3& linear) {
-  return std::cbrt(std::abs(linear.determinant()));
-}
-
-}  // namespace
 
 Mat3 rotationOf(const realtime::TickReport& tick) {
   const Mat3 linear = tick.T_world_device.linear();

@@ -43,7 +43,7 @@ class ToDevice {
         last.tick == 0 ? scene::Workspace{}.T_world_device : last.T_world_device;
     T_device_world_ = T_world_device.inverse();
     const geometry::Mat3 linear = T_device_world_.linear();
-    scale_ = std::cbrt(std::abs(linear.determinant()));
+    scale_ = geometry::scaleOf(linear);
     rotation_ = linear / scale_;
   }
   Vec3 position(const double* n) const {

@@ -154,8 +154,8 @@ TEST(WorkLimitOfABall, is_not_spent_on_a_fine_flat_mesh) {
   EXPECT_NEAR(r.force_N.z(), 1.0, 1e-3);
 }
 
-// 0.1 mm cells at 1 m/s, to and fro: before force law 23, balls of 2 and 5 mm spent the work of every tick
-// and lost their force.
+// Cells of 0.1 mm at 1 m/s, to and fro: thousands of triangles are within the reach of a tick, but its path
+// comes near few.
 TEST(WorkLimitOfABall, is_not_spent_on_a_stroke_over_a_fine_mesh) {
   constexpr double kTurn_m = 0.008;
   constexpr double kStep_m = 1e-3;
