@@ -156,6 +156,13 @@ Disc discAround(const scene::Corners& k) noexcept {
   return disc;
 }
 
+double distanceFrom(const Disc& disc, const Vec3& x) noexcept {
+  const Vec3 offset = x - disc.centre;
+  const double up = disc.normal.dot(offset);
+  const double aside = std::sqrt(std::max(0.0, offset.squaredNorm() - up * up)) - disc.radius;
+  return aside > 0 ? std::sqrt(up * up + aside * aside) : std::abs(up);
+}
+
 Vec3 nearestPointOf(const Facet& f, const Vec3& x) noexcept {
   if (f.unbounded) return x - f.normal * f.normal.dot(x - f.a);
   const Vec3 ab = f.b - f.a;

@@ -5,9 +5,7 @@
 // error.
 #pragma once
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 
 #include "realtime/render/active_set.h"
@@ -65,15 +63,8 @@ struct Disc {
 };
 Disc discAround(const scene::Corners& corners) noexcept;
 
-/// The distance of a disc from the point that is `offset` from its centre; that of the disc around a triangle
-/// is a lower bound of that from the triangle.
-template <class Scalar>
-Scalar distanceFromDisc(const Eigen::Matrix<Scalar, 3, 1>& offset, const Eigen::Matrix<Scalar, 3, 1>& normal,
-                        Scalar radius) noexcept {
-  const Scalar up = normal.dot(offset);
-  const Scalar aside = std::sqrt(std::max(Scalar{0}, offset.squaredNorm() - up * up)) - radius;
-  return aside > 0 ? std::sqrt(up * up + aside * aside) : std::abs(up);
-}
+/// The distance of x from it: a lower bound of that from the triangle.
+double distanceFrom(const Disc& disc, const Vec3& x) noexcept;
 
 /// The point of the triangle nearest to x (Ericson 2005, 5.1.5).
 Vec3 nearestPointOf(const Facet& f, const Vec3& x) noexcept;

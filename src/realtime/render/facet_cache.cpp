@@ -7,13 +7,8 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr double kClear = 2;  // in skins: beyond the radius, the ball is free of a face
-constexpr std::size_t kBlock = 16;
+constexpr double kClear = 2;              // in skins: beyond the radius, the ball is free of a face
 constexpr float kSingleRounding = 1e-6F;  // relative; eight times that of one operation
-
-std::size_t blocksOf(std::size_t count) noexcept {
-  return (count + kBlock - 1) / kBlock;
-}
 
 }  // namespace
 
@@ -116,60 +111,62 @@ int FacetCache::findNear(const Reach& reach, std::uint16_t* found) noexcept {
   return n;
 }
 
-// Lower bound of the distance of triangle i, relative to centre_.
-float FacetCache::discDistance(std::size_t i, const Vec3f& p) const noexcept {
+// The plane through the point of disc i nearest to p, relative to centre_, with the disc on its back.
+FacetCache::NearPlane FacetCache::planeBefore(std::size_t i, const Vec3f& p) const noexcept {
   const Vec3f offset = p - Vec3f(discCentres_[0][i], discCentres_[1][i], discCentres_[2][i]);
-  return distanceFromDisc<float>(offset, discNormals_[i], discRadii_[i]) -
-         4 * kSingleRounding * offset.norm();
+  const Vec3f up = discNormals_[i].dot(offset) * discNormals_[i];
+  const Vec3f aside = offset - up;
+  const float length = aside.norm();
+  const Vec3f away = length > discRadii_[i] ? Vec3f(up + (1 - discRadii_[i] / length) * aside) : up;
+  const float distance = away.norm();
+  const Vec3f normal = distance > 0 ? Vec3f(away / distance) : Vec3f(Vec3f::Zero());
+  return {normal, distance - 4 * kSingleRounding * offset.norm()};
 }
 
-// Those within `distance` and a little more.
+// Those within `distance` and a little more. Not far from where the planes were made they tell nearly the
+// distance.
 void FacetCache::knowNear(double distance) noexcept {
   constexpr double kMore = 0.05;  // of the tool radius
-  constexpr double kKeep = 0.1;   // of that
-  const bool known = (toolPosition_ - nearCentre_).norm() + distance <= nearDistance_;
-  if (known && (toolPosition_ - boundsFrom_).norm() <= kKeep * kMore * toolRadius_) return;
-  if (!known) {
-    nearCentre_ = toolPosition_;
+  const double from_m = (toolPosition_ - nearCentre_).norm();
+  const bool known = from_m + distance <= nearDistance_;
+  if (known && from_m <= 0.5 * kMore * toolRadius_) return;
+  nearCentre_ = toolPosition_;
+  if (known) {
+    nearDistance_ -= from_m;
+  } else {
     nearDistance_ = distance + kMore * toolRadius_;
     nearCount_ = findNear(reachOf(nearCentre_, Vec3::Zero(), nearDistance_), near_.data());
     // In a hollow of about the tool's radius: farther away there are no others.
     if (nearCount_ == count_) nearDistance_ = std::numeric_limits<double>::infinity();
   }
-  boundsFrom_ = toolPosition_;
-  const Vec3f from = (boundsFrom_ - centre_).cast<float>();
-  const auto count = static_cast<std::size_t>(nearCount_);
-  for (std::size_t k = 0; k < count; ++k) nearBounds_[k] = discDistance(near_[k], from);
-  std::fill(nearBounds_.begin() + nearCount_, nearBounds_.begin() + blocksOf(count) * kBlock,
-            std::numeric_limits<float>::infinity());
-}
-
-// Calls visit(triangle) for each of those near whose bound is within `distance`.
-template <class Visit>
-void FacetCache::visitNear(double distance, Visit&& visit) const noexcept {
-  const float limit =
-      std::nextafter(static_cast<float>((toolPosition_ - boundsFrom_).norm() + distance), 1.0F);
-  for (std::size_t block = 0; block < blocksOf(static_cast<std::size_t>(nearCount_)); ++block) {
-    const float* const bounds = &nearBounds_[block * kBlock];
-    float least = bounds[0];  // the compiler computes several at once
-    for (std::size_t k = 1; k < kBlock; ++k) least = std::min(least, bounds[k]);
-    if (least > limit) continue;
-    for (std::size_t k = 0; k < kBlock; ++k) {
-      if (bounds[k] <= limit) visit(near_[block * kBlock + k]);
-    }
+  const Vec3f from = (nearCentre_ - centre_).cast<float>();
+  for (std::size_t k = 0; k < static_cast<std::size_t>(nearCount_); ++k) {
+    const NearPlane plane = planeBefore(near_[k], from);
+    for (std::size_t axis = 0; axis < 3; ++axis) nearNormals_[axis][k] = plane.normal[static_cast<int>(axis)];
+    nearBounds_[k] = plane.distance;
   }
 }
 
 std::span<const std::uint16_t> FacetCache::trianglesNear(const Vec3& d, double distance) noexcept {
-  const Reach reach = reachOf(toolPosition_, d, distance);
-  const double farthest = d.norm() + distance;
+  const Vec3f begin = (toolPosition_ - nearCentre_).cast<float>();
+  const Vec3f end = begin + d.cast<float>();
   int n = 0;
-  if ((toolPosition_ - nearCentre_).norm() + farthest <= nearDistance_) {
-    visitNear(farthest, [&](std::uint16_t i) {
-      if (reaches(reach, i)) found_[static_cast<std::size_t>(n++)] = i;
-    });
-  } else {
-    n = findNear(reach, found_.data());
+  if ((toolPosition_ - nearCentre_).norm() + d.norm() + distance > nearDistance_) {
+    n = findNear(reachOf(toolPosition_, d, distance), found_.data());
+    return {found_.data(), static_cast<std::size_t>(n)};
+  }
+  const float limit = static_cast<float>(distance) +
+                      kSingleRounding * (static_cast<float>(distance) + begin.norm() + end.norm());
+  const auto count = static_cast<std::size_t>(nearCount_);
+  const auto& [x, y, z] = nearNormals_;
+  // By how much the path misses the tool's reach of a disc, at least.
+  for (std::size_t k = 0; k < count; ++k) {
+    const float here = x[k] * begin.x() + y[k] * begin.y() + z[k] * begin.z();
+    const float there = x[k] * end.x() + y[k] * end.y() + z[k] * end.z();
+    misses_[k] = nearBounds_[k] + std::min(here, there) - limit;
+  }
+  for (std::size_t k = 0; k < count; ++k) {
+    if (!(misses_[k] > 0)) found_[static_cast<std::size_t>(n++)] = near_[k];
   }
   return {found_.data(), static_cast<std::size_t>(n)};
 }
@@ -179,12 +176,12 @@ int FacetCache::probablyNearest(double distance) noexcept {
   const Vec3f from = (toolPosition_ - centre_).cast<float>();
   int nearest = -1;
   float least = std::numeric_limits<float>::infinity();
-  visitNear(distance, [&](std::uint16_t i) {
-    const float away = discDistance(i, from);
-    if (away >= least) return;
+  for (const std::uint16_t i : trianglesNear(Vec3::Zero(), distance)) {
+    const float away = planeBefore(i, from).distance;
+    if (away >= least) continue;
     least = away;
     nearest = i;
-  });
+  }
   return nearest;
 }
 

@@ -81,13 +81,16 @@ class FacetCache {
     Vec3f from, way;
     float length2, distance, distance2;
   };
+  // Through the point of a disc nearest to some place, and how far that is at least.
+  struct NearPlane {
+    Vec3f normal;
+    float distance;
+  };
   Reach reachOf(const Vec3& p, const Vec3& d, double distance) const noexcept;
   bool reaches(const Reach& reach, std::size_t i) const noexcept;
   int findNear(const Reach& reach, std::uint16_t* found) noexcept;
-  float discDistance(std::size_t i, const Vec3f& p) const noexcept;
+  NearPlane planeBefore(std::size_t i, const Vec3f& p) const noexcept;
   void knowNear(double distance) noexcept;
-  template <class Visit>
-  void visitNear(double distance, Visit&& visit) const noexcept;
 
   // Ball tool. normal . x = offset: a plane with the face on its back.
   struct SupportPlane {
@@ -128,13 +131,13 @@ class FacetCache {
   std::array<Vec3f, kMaxTriangles> discNormals_;
   TriangleColumn misses_;
   std::array<std::uint16_t, kMaxTriangles> found_;
-  // Those around a place where the tool is or was, with their distances from a place nearby: a cast that
-  // stays there looks at no others.
+  // Those around a place where the tool is or was, with their planes from there: a cast that stays near looks
+  // at no others. One array for each number.
   std::array<std::uint16_t, kMaxTriangles> near_;
-  std::array<float, kMaxTriangles> nearBounds_;
+  std::array<TriangleColumn, 3> nearNormals_;
+  TriangleColumn nearBounds_;
   int nearCount_ = 0;
   Vec3 nearCentre_ = Vec3::Zero();
-  Vec3 boundsFrom_ = Vec3::Zero();
   double nearDistance_ = -1;  // up to which all are there
 };
 

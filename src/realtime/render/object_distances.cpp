@@ -64,9 +64,8 @@ double ObjectDistances::examine(const scene::ObjectState& state, const Query& qu
         nearest = 0;
         return -1.0;
       }
-      const Disc disc = discAround(mesh.corners(triangle, query.now));
-      return nearest = std::min(
-                 nearest, distanceFromDisc<double>(in.position - disc.centre, disc.normal, disc.radius));
+      return nearest =
+                 std::min(nearest, distanceFrom(discAround(mesh.corners(triangle, query.now)), in.position));
     });
   }
   const double distance_m = std::max(in.outside, nearest) / in.stretch;
