@@ -28,7 +28,6 @@ constexpr double kQuickFade_N_per_s = 1000;  // unless the force would fall fast
 constexpr double kLongestAge_s = 0.2;        // a surface moves on no longer than this without an update
 constexpr double kLateral = 0.5;             // share of the stiffness that holds a sticking point
 constexpr double kStick = 0.9;               // of the dynamic bound: sliding ends below it
-constexpr double kUnlimited_J = 1e9;
 constexpr double kLent_J = 2e-4;         // to the springs of friction, at the first touch
 constexpr double kSlow_m_per_s = 0.01;   // below it the damping coefficient may change as at this speed
 constexpr double kRests_m_per_s = 2e-3;  // a surface that is slower does no work to speak of
@@ -179,7 +178,7 @@ RemoteSprings RemoteContacts::springs() const noexcept {
   PressingContacts pressing;
   for (const Slot& slot : slots_) {
     if (!slot.used || slot.depth_m <= 0) continue;
-    const double stiffness = slot.contact.stiffness_N_per_m;
+    const double stiffness = slot.stiffness_N_per_m;
     pressing.add(slot.normal, stiffness, slot.gain * stiffness * slot.depth_m, slot.normal_N);
     out.stiffest_N_per_m = std::max(out.stiffest_N_per_m, stiffness);
     if (slot.normal_N <= 0) continue;
@@ -209,7 +208,7 @@ Vec3 RemoteContacts::forceWith(const Change& change, const RemoteHand& hand, dou
     if (!slot.used) continue;
     if (slot.fading) {
       const double falls = change.fade * slot.fadeStep;
-      giveBack(slot, 0.5 * falls * slot.contact.stiffness_N_per_m * slot.depth_m * slot.depth_m);
+      giveBack(slot, 0.5 * falls * slot.stiffness_N_per_m * slot.depth_m * slot.depth_m);
       slot.gain -= falls;
     } else {
       correct(slot, hand, change.correction_N, step_s);
@@ -322,7 +321,6 @@ void RemoteContacts::giveBack(const Slot& slot, double energy_J) noexcept {
 void RemoteContacts::replace(Slot& slot, const RemoteContact& contact, const RemoteContactSet& set,
                              const RemoteHand& hand, Nanos now) noexcept {
   const bool known = slot.used;
-  const double stiffness = slot.contact.stiffness_N_per_m;
   double spring_N = 0;
   Vec3 normal = contact.normal;
   Vec3 velocity = Vec3::Zero();
@@ -330,7 +328,7 @@ void RemoteContacts::replace(Slot& slot, const RemoteContact& contact, const Rem
     locate(slot, hand, now);
     velocity = slot.velocity;
     resumed_ = resumed_ || slot.fading;
-    spring_N = slot.gain * slot.contact.stiffness_N_per_m * std::max(0.0, slot.depth_m);
+    spring_N = slot.gain * slot.stiffness_N_per_m * std::max(0.0, slot.depth_m);
     giveBack(slot, 0.5 * (1 - slot.gain) * spring_N * slot.depth_m);  // by the shift, which weakens it
     normal = slot.normal;
   } else {
@@ -353,17 +351,7 @@ void RemoteContacts::replace(Slot& slot, const RemoteContact& contact, const Rem
   if (spring_N <= 0) {
     slot.shift_m = std::min(0.0, -slot.depth_m);
   } else {
-    slot.shift_m = spring_N / contact.stiffness_N_per_m - slot.depth_m;
-    // The same friction from a softer spring holds more energy.
-    const double softer = stiffness / contact.stiffness_N_per_m;
-    const Vec3 apart_m = slot.anchor_m - hand.position_m;
-    const double more_J = std::min(0.5 * (softer - 1) * slot.friction_N.dot(apart_m),
-                                   contact.yields ? kUnlimited_J : corrections_.energy_J());
-    if (more_J > 0) {
-      frictionEnergy_J_ += more_J;
-      if (!contact.yields) corrections_.give(more_J);
-    }
-    slot.anchor_m = hand.position_m + softer * apart_m;
+    slot.shift_m = spring_N / slot.stiffness_N_per_m - slot.depth_m;
     slot.turn = rotationVector(slot.normal, normal);
   }
 }
@@ -461,12 +449,7 @@ void RemoteContacts::correct(Slot& slot, const RemoteHand& hand, double budget_N
   } else {
     slot.drift_m_per_s.setZero();  // the norm of the smallest numbers is 0, although they are not
   }
-  if (slot.stiffness_N_per_m != c.stiffness_N_per_m) {
-    const double ratio = std::log(c.stiffness_N_per_m / slot.stiffness_N_per_m);
-    const double share = towards(0, 1, std::abs(ratio) * force_N, budget_N);
-    slot.stiffness_N_per_m =
-        share < 1 ? slot.stiffness_N_per_m * std::exp(share * ratio) : c.stiffness_N_per_m;
-  }
+  if (slot.stiffness_N_per_m != c.stiffness_N_per_m) changeStiffness(slot, budget_N);
   const double leaving = slot.normal.dot(hand.velocity_m_per_s - slot.velocity);
   slot.damping = towards(slot.damping, c.damping_Ns_per_m,
                          force_N > 0 ? std::max(std::abs(leaving), kSlow_m_per_s) : 0, budget_N);
@@ -483,11 +466,11 @@ void RemoteContacts::correct(Slot& slot, const RemoteHand& hand, double budget_N
 // yields, that work comes from the tank.
 double RemoteContacts::takeBackShift(Slot& slot, double budget_N, double step_s) noexcept {
   const RemoteContact& c = slot.contact;
-  const double before_N = c.stiffness_N_per_m * slot.depth_m;
-  double most_m =
-      std::min({std::abs(slot.shift_m), kRemoteSpeed_m_per_s * step_s, budget_N / c.stiffness_N_per_m});
+  const double stiffness = slot.stiffness_N_per_m;
+  const double before_N = stiffness * slot.depth_m;
+  double most_m = std::min({std::abs(slot.shift_m), kRemoteSpeed_m_per_s * step_s, budget_N / stiffness});
   const bool pays = slot.shift_m < 0 && !c.yields;
-  const double push_N = before_N + 0.5 * c.stiffness_N_per_m * most_m;
+  const double push_N = before_N + 0.5 * stiffness * most_m;
   if (pays && push_N * most_m > corrections_.energy_J()) {
     held_ = true;
     most_m = corrections_.energy_J() / push_N;
@@ -495,9 +478,26 @@ double RemoteContacts::takeBackShift(Slot& slot, double budget_N, double step_s)
   const double moved_m = std::clamp(-slot.shift_m, -most_m, most_m);
   slot.shift_m += moved_m;
   slot.depth_m += moved_m;
-  const double after_N = c.stiffness_N_per_m * std::max(0.0, slot.depth_m);
+  const double after_N = stiffness * std::max(0.0, slot.depth_m);
   if (!c.yields) corrections_.give(0.5 * (before_N + after_N) * moved_m);
   return std::max(0.0, budget_N - std::abs(after_N - before_N));
+}
+
+// A spring that becomes stiffer pushes against the hand: unless it yields, the tank pays.
+void RemoteContacts::changeStiffness(Slot& slot, double& budget_N) noexcept {
+  const RemoteContact& c = slot.contact;
+  const double depth_m = std::max(0.0, slot.depth_m);
+  const double half_m2 = 0.5 * depth_m * depth_m;
+  const double before = slot.stiffness_N_per_m;
+  double after = towards(before, c.stiffness_N_per_m, depth_m, budget_N);
+  if (!c.yields) {
+    if ((after - before) * half_m2 > corrections_.energy_J()) {
+      held_ = true;
+      after = before + corrections_.energy_J() / half_m2;
+    }
+    corrections_.give((after - before) * half_m2);
+  }
+  slot.stiffness_N_per_m = after;
 }
 
 // All at once: nothing is felt of it.
@@ -516,7 +516,7 @@ void RemoteContacts::demand(Slot& slot, const RemoteHand& hand) noexcept {
     slot.normal_N = 0;
     return;
   }
-  const double spring_N = slot.contact.stiffness_N_per_m * slot.depth_m;
+  const double spring_N = slot.stiffness_N_per_m * slot.depth_m;
   const double leaving = slot.normal.dot(hand.velocity_m_per_s - slot.velocity);
   const double damper_N = std::clamp(slot.damping * leaving, -spring_N, spring_N);
   slot.demand_N = slot.gain * (spring_N - damper_N);
@@ -559,7 +559,7 @@ Vec3 RemoteContacts::friction(Slot& slot, const RemoteHand& hand, double ofAll, 
   slot.anchor_m += elapsed_s * slot.velocity;
   Vec3 apart = hand.position_m - slot.anchor_m;
   apart -= slot.normal.dot(apart) * slot.normal;
-  const double stiffness = kLateral * slot.contact.stiffness_N_per_m * slot.normal_N / ofAll;
+  const double stiffness = kLateral * slot.stiffness_N_per_m * slot.normal_N / ofAll;
   const double pull = stiffness * apart.norm();
   const double dynamic_N = slot.dynamicFriction * slot.grip_N;
   if (pull > (slot.sliding ? dynamic_N : slot.staticFriction * slot.grip_N)) {
@@ -577,7 +577,7 @@ Vec3 RemoteContacts::friction(Slot& slot, const RemoteHand& hand, double ofAll, 
 // same.
 void RemoteContacts::takeHold(Slot& slot, const RemoteHand& hand, const Vec3& friction_N,
                               double energy_J) noexcept {
-  const double stiffness = kLateral * slot.contact.stiffness_N_per_m;
+  const double stiffness = kLateral * slot.stiffness_N_per_m;
   const double most_N = std::sqrt(2 * stiffness * std::max(0.0, energy_J));
   slot.anchor_m = hand.position_m + atMost(friction_N, most_N) / stiffness;
   slot.sliding = false;

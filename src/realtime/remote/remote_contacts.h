@@ -62,7 +62,7 @@ class RemoteContacts {
     double shift_m = 0;                 // of the rendered surface, out of the material
     Vec3 turn = Vec3::Zero();           // rotation vector from the stated to the rendered normal
     Vec3 drift_m_per_s = Vec3::Zero();  // rendered velocity of the surface less the stated one
-    double stiffness_N_per_m = 0;       // in its share beside the other contacts
+    double stiffness_N_per_m = 0;
     double damping = 0;
     double staticFriction = 0;
     double dynamicFriction = 0;
@@ -117,6 +117,7 @@ class RemoteContacts {
   static bool hardlyChanges(const Slot& slot, double step_s) noexcept;
   void correct(Slot& slot, const RemoteHand& hand, double budget_N, double step_s) noexcept;
   double takeBackShift(Slot& slot, double budget_N, double step_s) noexcept;
+  void changeStiffness(Slot& slot, double& budget_N) noexcept;
   static void follow(Slot& slot, const RemoteContact& contact) noexcept;
   static void demand(Slot& slot, const RemoteHand& hand) noexcept;
   Vec3 share(const RemoteHand& hand) noexcept;

@@ -422,6 +422,28 @@ TEST(RemoteContacts, NoUpdateOfACornerMakesAStep) {
   }
 }
 
+// The surface stays where it is stated: a hand that leaves it feels nothing outside, and gets no more than the
+// spring held.
+TEST(RemoteContacts, ASurfaceThatSoftensIsNotFeltOutside) {
+  for (const double softer : {300.0, 100.0, 20.0, 1.0}) {
+    Rig rig;
+    rig.approach({floorAt(0, 1000)}, {0, 0.001, 0}, {0, -0.003, 0});
+    rig.settle({floorAt(0, 1000)}, 16);
+    double work_J = 0;
+    for (int ms = 0; ms < 400; ++ms) {
+      if (ms % 16 == 0) rig.state({floorAt(0, softer)});
+      const Vec3 before_N = rig.force;
+      rig.hand.position_m.y() += 0.0002;
+      rig.step();
+      work_J += 0.5 * 0.0002 * (before_N + rig.force).y();
+      if (rig.hand.position_m.y() > 0) {
+        ASSERT_EQ(rig.force.norm(), 0) << softer << " N/m, " << ms << " ms";
+      }
+    }
+    EXPECT_LE(work_J, 0.5 * 3 * 0.003 + 1e-9) << softer << " N/m";
+  }
+}
+
 TEST(RemoteContacts, LifeIncludesTheFade) {
   Rig rig;
   RemoteContact c = floorAt(0);
