@@ -118,11 +118,14 @@ std::string contactOf(const double* n, const ToDevice& toDevice, RemoteContact& 
   return {};
 }
 
-// Facing surfaces that the hand at `hand_m` may touch both within their life.
+// Surfaces that face each other at the hand, which may touch both within their life.
 bool maySqueeze(const RemoteContact& a, const RemoteContact& b, const Vec3& hand_m) {
-  if (a.normal.dot(b.normal) >= kOpposing) return false;
-  const double gap_m = -realtime::surfaceAt(a, 0, hand_m).depth_m - realtime::surfaceAt(b, 0, hand_m).depth_m;
-  const double closing_m_per_s = a.normal.dot(a.velocity_m_per_s) + b.normal.dot(b.velocity_m_per_s);
+  const realtime::SurfaceAt atA = realtime::surfaceAt(a, 0, hand_m);
+  const realtime::SurfaceAt atB = realtime::surfaceAt(b, 0, hand_m);
+  if (atA.normal.dot(atB.normal) >= kOpposing) return false;
+  const double gap_m = -atA.depth_m - atB.depth_m;
+  const double closing_m_per_s =
+      atA.normal.dot(atA.velocity_m_per_s) + atB.normal.dot(atB.velocity_m_per_s);
   const double life_s = base::toSeconds(std::min(a.lifetime, b.lifetime));
   return gap_m - std::max(0.0, closing_m_per_s) * life_s < kNarrow_m;
 }

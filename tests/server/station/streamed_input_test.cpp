@@ -169,6 +169,47 @@ TEST_F(StreamedInputTest, FacingSurfacesShareTheBoundWhereTheyMaySqueezeTheHand)
   EXPECT_NEAR(stiffnessOfFloorUnder(0.020, 0.5), whole / 2, 1e-6) << "they meet within their life";
 }
 
+// What counts is how they face each other at the hand, whichever of their points the client names.
+TEST_F(StreamedInputTest, RoundAndTurningSurfacesShareTheBoundWhereTheyFaceTheHand) {
+  const double whole = 0.999 * 5 / 0.0005;
+  std::vector<double> left = floorAt(0.02, 1);  // named by the topmost point of each ball
+  left[1] = 1;
+  left[2] = 0.02;
+  left[18] = 1e5;
+  std::vector<double> right = left;
+  right[0] = 2;
+  const auto stiffnessWithGap = [&](double gap_m) {
+    left[3] = -0.02 - gap_m / 2;
+    right[3] = 0.02 + gap_m / 2;
+    std::vector<double> both = left;
+    both.insert(both.end(), right.begin(), right.end());
+    send(both);
+    return first().stiffness_N_per_m;
+  };
+  EXPECT_NEAR(stiffnessWithGap(0.002), whole / 2, 1e-6);
+  EXPECT_NEAR(stiffnessWithGap(0.020), whole, 1e-6);
+  last_.device.position_m = {0, 0.03, 0};
+  EXPECT_NEAR(stiffnessWithGap(0.002), whole, 1e-6) << "above both, they do not face each other";
+
+  // A lid that closes about a hinge, which the client names.
+  last_.device.position_m = {0, 0.005, 0};
+  std::vector<double> both = floorAt(0, 1);
+  std::vector<double> lid = floorAt(0.03, 2);
+  both[18] = lid[18] = 1e5;
+  lid[3] = -0.1;
+  lid[7] = -1;
+  const auto stiffnessUnderLid = [&](double turning_rad_per_s) {
+    lid[17] = turning_rad_per_s;
+    std::vector<double> numbers = both;
+    numbers.insert(numbers.end(), lid.begin(), lid.end());
+    send(numbers);
+    return first().stiffness_N_per_m;
+  };
+  EXPECT_NEAR(stiffnessUnderLid(0), whole, 1e-6);
+  EXPECT_NEAR(stiffnessUnderLid(-5), whole / 2, 1e-6);
+  EXPECT_NEAR(stiffnessUnderLid(5), whole, 1e-6) << "it opens";
+}
+
 TEST_F(StreamedInputTest, RefusesWhatCannotBeUsedAndKeepsTheRest) {
   std::vector<double> n = floorAt(0, 1);
   const std::vector<double> good = floorAt(0.02, 2);
