@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "base/time.h"
 #include "realtime/remote/remote_shape.h"
@@ -188,17 +189,23 @@ void StreamedInput::measureRoundTrip(std::int64_t stateTime, Nanos received) {
   contacts_.measuredAt = received;
 }
 
-// As any surface: what the sampled and delayed loop can bear. Surfaces from two sides share it.
-std::string StreamedInput::keepWithinBounds(RemoteContactSet& set, const Vec3& hand_m) const {
+// As any surface: what the sampled and delayed loop can bear. Surfaces from two sides share it, those of the
+// scene that the hand touches, too.
+std::string StreamedInput::keepWithinBounds(RemoteContactSet& set, const realtime::TickReport& last) const {
+  const Vec3& hand_m = last.device.position_m;
+  std::vector<RemoteContact> others(set.contacts.begin(), set.contacts.begin() + set.count);
+  for (std::uint32_t i = 0; i < last.rendering.contactCount; ++i) {
+    RemoteContact& face = others.emplace_back();
+    face.point_m = hand_m;
+    face.normal = last.rendering.contacts[i].normal;
+  }
   std::string remark;
   for (std::uint32_t i = 0; i < set.count; ++i) {
     RemoteContact& contact = set.contacts[i];
     scene::SceneConfig config = config_;
     if (contact.yields) config.transportDelay_s += base::toSeconds(contacts_.roundTrip);
-    for (std::uint32_t j = 0; j < set.count; ++j) {
-      if (maySqueeze(contact, set.contacts[j], hand_m))
-        config.ownDamping_Ns_per_m = config_.ownDamping_Ns_per_m / 2;
-    }
+    const auto squeezes = [&](const RemoteContact& other) { return maySqueeze(contact, other, hand_m); };
+    if (std::ranges::any_of(others, squeezes)) config.ownDamping_Ns_per_m /= 2;
     scene::Surface surface;
     surface.stiffness_N_per_m = contact.stiffness_N_per_m;
     surface.damping_Ns_per_m = contact.damping_Ns_per_m;
@@ -256,7 +263,7 @@ StreamedInput::Answer StreamedInput::on(scene::ClientId client, const wire::Remo
     contacts_.until = std::max(contacts_.until, received + contact.lifetime);
     ++set.count;
   }
-  const std::string remark = keepWithinBounds(set, last.device.position_m);
+  const std::string remark = keepWithinBounds(set, last);
   if (text.text.empty() && !remark.empty()) text.text = "Remote_Contacts: " + remark;
   send();
   return answer(client, Kind::contacts, received, true, std::move(text));

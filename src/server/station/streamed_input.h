@@ -63,7 +63,7 @@ class StreamedInput {
   Answer hold(scene::ClientId client, std::int64_t time, const geometry::Vec3& force_N, base::Nanos lifetime,
               base::Nanos received, Refusal remark);
   void measureRoundTrip(std::int64_t stateTime, base::Nanos received);
-  std::string keepWithinBounds(realtime::RemoteContactSet& set, const geometry::Vec3& hand_m) const;
+  std::string keepWithinBounds(realtime::RemoteContactSet& set, const realtime::TickReport& last) const;
   void send() { servo_.write(input_); }
 
   Slot& servo_;

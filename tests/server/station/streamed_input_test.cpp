@@ -210,6 +210,23 @@ TEST_F(StreamedInputTest, RoundAndTurningSurfacesShareTheBoundWhereTheyFaceTheHa
   EXPECT_NEAR(stiffnessUnderLid(5), whole, 1e-6) << "it opens";
 }
 
+TEST_F(StreamedInputTest, ASurfaceThatFacesTouchedOnesOfTheSceneHasHalfTheBound) {
+  const double whole = 0.999 * 5 / 0.0005;
+  const auto stiffnessOf = [&](double height_m, const Vec3& normal) {
+    std::vector<double> n = floorAt(height_m);
+    std::copy_n(normal.data(), 3, n.begin() + 6);
+    n[18] = 1e5;
+    send(n);
+    return first().stiffness_N_per_m;
+  };
+  EXPECT_NEAR(stiffnessOf(0.002, -Vec3::UnitY()), whole, 1e-6);
+  last_.rendering.contactCount = 1;
+  last_.rendering.contacts[0].normal = Vec3::UnitY();
+  EXPECT_NEAR(stiffnessOf(0.002, -Vec3::UnitY()), whole / 2, 1e-6);
+  EXPECT_NEAR(stiffnessOf(0.020, -Vec3::UnitY()), whole, 1e-6) << "far from the hand";
+  EXPECT_NEAR(stiffnessOf(0.002, Vec3::UnitX()), whole, 1e-6) << "across";
+}
+
 TEST_F(StreamedInputTest, RefusesWhatCannotBeUsedAndKeepsTheRest) {
   std::vector<double> n = floorAt(0, 1);
   const std::vector<double> good = floorAt(0.02, 2);
