@@ -111,6 +111,7 @@ Vec3 RemoteContacts::step(const RemoteContactSet& newest, const RemoteHand& hand
     frictionEnergy_J_ = kLent_J;
     force_N_.setZero();
     rest_ = true;
+    viewMoved_ = false;
     return force_N_;
   }
   fadeOut(now, step_s);

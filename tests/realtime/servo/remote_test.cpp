@@ -820,6 +820,16 @@ TEST(RemoteContacts, FrictionOfAMovingSurfaceKeepsUpWithLateTicks) {
   }
 }
 
+// A recording that begins between both does not know that the view moved: it must not matter.
+TEST(RemoteContacts, AViewThatMovedBeforeThemDoesNotMoveThem) {
+  Rig rig;
+  rig.hand.position_m = {0, 0.001, 0};
+  rig.law.moveWithView(geometry::Affine::Identity());
+  rig.step();
+  rig.settle({floorAt(0)}, 1);
+  EXPECT_TRUE(rig.law.rest());
+}
+
 TEST(RemoteContacts, TheSlowestTurnIsNone) {
   RemoteContact floor = floorAt(0);
   floor.angularVelocity_rad_per_s = {1e-321, 0, 1e-200};  // whose norm is 0 in double precision
