@@ -897,6 +897,33 @@ TEST(RemoteContacts, UnstatedMotionIsPaidFromTheTank) {
   EXPECT_LT(worked[0], 0.020 + 0.020 + 0.005) << "the start, the refill, and what the spring had stored";
 }
 
+// A client that states a surface soft while the hand presses and stiff while it leaves.
+TEST(RemoteContacts, AStifferSpringIsPaidFromTheTank) {
+  double worked_J[2] = {};
+  for (const bool yields : {false, true}) {
+    Rig rig;
+    RemoteContact soft = floorAt(0, 200);
+    soft.yields = yields;
+    RemoteContact stiff = floorAt(0, 1000);
+    stiff.yields = yields;
+    rig.approach({soft}, {0, 0.001, 0}, {0, -0.002, 0});
+    bool held = false;
+    for (int ms = 0; ms < 2000; ++ms) {
+      const bool leaves = ms % 50 >= 25;
+      if (ms % 5 == 0) rig.state({leaves ? stiff : soft});
+      const double moved_m = leaves ? 8e-5 : -8e-5;
+      const Vec3 before_N = rig.force;
+      rig.hand.position_m.y() += moved_m;
+      rig.step();
+      worked_J[yields] += 0.5 * (before_N + rig.force).y() * moved_m;
+      held = held || (rig.out.status & kRemoteCorrectionsHeld) != 0;
+    }
+    EXPECT_EQ(held, !yields);
+  }
+  EXPECT_GT(worked_J[1], 0.1);
+  EXPECT_LT(worked_J[0], 0.020 + 2.1 * 0.020 + 0.005) << "the start, the refill, and what the spring had stored";
+}
+
 struct Holding {
   HeldForceLaw law;
   HeldForce wanted;
