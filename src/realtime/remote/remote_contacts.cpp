@@ -28,10 +28,10 @@ constexpr double kQuickFade_N_per_s = 1000;  // unless the force would fall fast
 constexpr double kLongestAge_s = 0.2;        // a surface moves on no longer than this without an update
 constexpr double kLateral = 0.5;             // share of the stiffness that holds a sticking point
 constexpr double kStick = 0.9;               // of the dynamic bound: sliding ends below it
-constexpr double kLent_J = 2e-4;         // to the springs of friction, at the first touch
-constexpr double kSlow_m_per_s = 0.01;   // below it the damping coefficient may change as at this speed
-constexpr double kRests_m_per_s = 2e-3;  // a surface that is slower does no work to speak of
-constexpr double kSameNormal = 1e-6;     // of a surface that is stated again in single precision
+constexpr double kLent_J = 2e-4;             // to the springs of friction, at the first touch
+constexpr double kSlow_m_per_s = 0.01;       // below it the damping coefficient may change as at this speed
+constexpr double kRests_m_per_s = 2e-3;      // a surface that is slower does no work to speak of
+constexpr double kSameNormal = 1e-6;         // of a surface that is stated again in single precision
 
 // The shortest rotation between unit vectors; for opposite ones half a turn about any axis across.
 Vec3 rotationVector(const Vec3& from, const Vec3& to) noexcept {

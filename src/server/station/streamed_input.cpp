@@ -29,6 +29,7 @@ constexpr Nanos kUnknownRoundTrip = 100'000'000;  // of a client that does not m
 constexpr Nanos kLongestRoundTrip = 1'000'000'000;
 constexpr Nanos kDrift = 50'000;         // of the two clocks between two messages, at most
 constexpr double kRoundTripLasts_s = 1;  // in which it falls to 1/e, unless it comes again
+constexpr Nanos kTogether = 5'000'000;   // messages that waited for each other arrive within it
 constexpr double kNarrow_m = 0.005;      // between surfaces that may squeeze the hand
 constexpr std::int64_t kLatestStamp = 4'000'000'000'000'000'000;  // 127 years
 constexpr double kSoftest_N_per_m = 1;                            // a softer contact is none
@@ -125,8 +126,7 @@ bool maySqueeze(const RemoteContact& a, const RemoteContact& b, const Vec3& hand
   const realtime::SurfaceAt atB = realtime::surfaceAt(b, 0, hand_m);
   if (atA.normal.dot(atB.normal) >= kOpposing) return false;
   const double gap_m = -atA.depth_m - atB.depth_m;
-  const double closing_m_per_s =
-      atA.normal.dot(atA.velocity_m_per_s) + atB.normal.dot(atB.velocity_m_per_s);
+  const double closing_m_per_s = atA.normal.dot(atA.velocity_m_per_s) + atB.normal.dot(atB.velocity_m_per_s);
   const double life_s = base::toSeconds(std::min(a.lifetime, b.lifetime));
   return gap_m - std::max(0.0, closing_m_per_s) * life_s < kNarrow_m;
 }
@@ -177,16 +177,21 @@ StreamedInput::Answer StreamedInput::answer(scene::ClientId client, Kind kind, N
 }
 
 // The longest one of late that came twice: a single late message, as after a pause of the network, is none.
+// Of messages that arrive together, the servo feels the last.
 void StreamedInput::measureRoundTrip(std::int64_t stateTime, Nanos received) {
   const Nanos measured =
       stateTime > 0 ? std::clamp<Nanos>(received - stateTime, 0, kLongestRoundTrip) : kUnknownRoundTrip;
-  const double left = std::exp(-base::toSeconds(received - contacts_.measuredAt) / kRoundTripLasts_s);
+  if (received - contacts_.burst >= kTogether) {
+    contacts_.burst = received;
+    contacts_.wayBefore = contacts_.way;
+  }
+  const Way& before = contacts_.wayBefore;
+  const double left = std::exp(-base::toSeconds(received - before.measuredAt) / kRoundTripLasts_s);
   const auto ofLate = [left](Nanos longest) {
     return static_cast<Nanos>(left * static_cast<double>(longest));
   };
-  contacts_.roundTrip = std::max(ofLate(contacts_.roundTrip), std::min(measured, contacts_.longest));
-  contacts_.longest = std::max(ofLate(contacts_.longest), measured);
-  contacts_.measuredAt = received;
+  contacts_.way = {std::max(ofLate(before.roundTrip), std::min(measured, before.longest)),
+                   std::max(ofLate(before.longest), measured), received};
 }
 
 // As any surface: what the sampled and delayed loop can bear. Surfaces from two sides share it, those of the
@@ -203,7 +208,7 @@ std::string StreamedInput::keepWithinBounds(RemoteContactSet& set, const realtim
   for (std::uint32_t i = 0; i < set.count; ++i) {
     RemoteContact& contact = set.contacts[i];
     scene::SceneConfig config = config_;
-    if (contact.yields) config.transportDelay_s += base::toSeconds(contacts_.roundTrip);
+    if (contact.yields) config.transportDelay_s += base::toSeconds(contacts_.way.roundTrip);
     const auto squeezes = [&](const RemoteContact& other) { return maySqueeze(contact, other, hand_m); };
     if (std::ranges::any_of(others, squeezes)) config.ownDamping_Ns_per_m /= 2;
     scene::Surface surface;

@@ -45,15 +45,20 @@ class StreamedInput {
 
  private:
   enum class Kind { contacts, force };
+  // How long messages took of late.
+  struct Way {
+    base::Nanos roundTrip = 0;
+    base::Nanos longest = 1'000'000'000;  // of one message
+    base::Nanos measuredAt = 0;
+  };
   // The client whose values of a kind are felt.
   struct Stream {
     std::optional<scene::ClientId> client;
     base::Nanos until = 0;    // its last value expires
     std::int64_t newest = 0;  // its newest stamp
     base::Nanos offset = 0;   // smallest difference between receipt and stamp
-    base::Nanos roundTrip = 0;
-    base::Nanos longest = 1'000'000'000;  // way of a message of late
-    base::Nanos measuredAt = 0;
+    Way way, wayBefore;       // now, and before the messages that arrive together with the newest
+    base::Nanos burst = 0;    // the first of these arrived
   };
 
   bool begin(Stream& stream, scene::ClientId client, std::int64_t time, base::Nanos received,

@@ -422,8 +422,8 @@ TEST(RemoteContacts, NoUpdateOfACornerMakesAStep) {
   }
 }
 
-// The surface stays where it is stated: a hand that leaves it feels nothing outside, and gets no more than the
-// spring held.
+// The surface stays where it is stated: a hand that leaves it feels nothing outside, and gets no more than
+// the spring held.
 TEST(RemoteContacts, ASurfaceThatSoftensIsNotFeltOutside) {
   for (const double softer : {300.0, 100.0, 20.0, 1.0}) {
     Rig rig;
@@ -921,7 +921,8 @@ TEST(RemoteContacts, AStifferSpringIsPaidFromTheTank) {
     EXPECT_EQ(held, !yields);
   }
   EXPECT_GT(worked_J[1], 0.1);
-  EXPECT_LT(worked_J[0], 0.020 + 2.1 * 0.020 + 0.005) << "the start, the refill, and what the spring had stored";
+  EXPECT_LT(worked_J[0], 0.020 + 2.1 * 0.020 + 0.005)
+      << "the start, the refill, and what the spring had stored";
 }
 
 struct Holding {

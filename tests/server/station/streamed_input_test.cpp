@@ -150,6 +150,24 @@ TEST_F(StreamedInputTest, OneLateMessageIsNoRoundTrip) {
 }
 
 // Only what both press on the hand at once share the bound.
+// After a pause of the network, TCP delivers all that waited at once; the servo feels the last of it.
+TEST_F(StreamedInputTest, ABurstAfterAPauseIsOneMessage) {
+  std::vector<double> n = floorAt(0);
+  n[18] = 400;
+  n[23] = 1;
+  const base::Nanos start = now_;
+  const auto sendAll = [&](int from_ms, int until_ms, int arrived_ms) {
+    for (int ms = from_ms; ms < until_ms; ms += 16) {
+      now_ = start + std::max(ms + 5, arrived_ms) * kStreamMillisecond + ms * 1000;
+      send(n, 1, 0, start + (ms - 5) * kStreamMillisecond);
+    }
+    return first().stiffness_N_per_m;
+  };
+  EXPECT_EQ(sendAll(0, 400, 0), 400);
+  EXPECT_EQ(sendAll(400, 560, 555), 400);
+  EXPECT_EQ(sendAll(560, 800, 0), 400);
+}
+
 TEST_F(StreamedInputTest, FacingSurfacesShareTheBoundWhereTheyMaySqueezeTheHand) {
   const auto stiffnessOfFloorUnder = [&](double ceiling_m, double sinking_m_per_s = 0) {
     std::vector<double> n = floorAt(0, 1);
