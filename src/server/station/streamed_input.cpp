@@ -35,7 +35,6 @@ constexpr std::int64_t kLatestStamp = 4'000'000'000'000'000'000;  // 127 years
 constexpr double kSoftest_N_per_m = 1;                            // a softer contact is none
 constexpr double kThinnest_m = 1e-4;
 constexpr double kLargest = 1e9;
-constexpr double kOpposing = -0.5;  // cosine between normals of contacts that may squeeze the hand
 
 // From a client's frame and units to the device's.
 class ToDevice {
@@ -120,15 +119,16 @@ std::string contactOf(const double* n, const ToDevice& toDevice, RemoteContact& 
   return {};
 }
 
-// Surfaces that face each other at the hand, which may touch both within their life.
-bool maySqueeze(const RemoteContact& a, const RemoteContact& b, const Vec3& hand_m) {
+// By how much two surfaces that the hand may touch both within their life are stiffer, in the direction from
+// one to the other, than one: by nothing at a right angle, by all of it where they face each other.
+double opposition(const RemoteContact& a, const RemoteContact& b, const Vec3& hand_m) {
   const realtime::SurfaceAt atA = realtime::surfaceAt(a, 0, hand_m);
   const realtime::SurfaceAt atB = realtime::surfaceAt(b, 0, hand_m);
-  if (atA.normal.dot(atB.normal) >= kOpposing) return false;
   const double gap_m = -atA.depth_m - atB.depth_m;
   const double closing_m_per_s = atA.normal.dot(atA.velocity_m_per_s) + atB.normal.dot(atB.velocity_m_per_s);
   const double life_s = base::toSeconds(std::min(a.lifetime, b.lifetime));
-  return gap_m - std::max(0.0, closing_m_per_s) * life_s < kNarrow_m;
+  const bool mayTouch = gap_m - std::max(0.0, closing_m_per_s) * life_s < kNarrow_m;
+  return mayTouch ? std::max(0.0, -atA.normal.dot(atB.normal)) : 0;
 }
 
 }  // namespace
@@ -194,8 +194,8 @@ void StreamedInput::measureRoundTrip(std::int64_t stateTime, Nanos received) {
                    std::max(ofLate(before.longest), measured), received};
 }
 
-// As any surface: what the sampled and delayed loop can bear. Surfaces from two sides share it, those of the
-// scene that the hand touches, too.
+// As any surface: what the sampled and delayed loop can bear. Surfaces that push against each other share it,
+// those of the scene that the hand touches, too.
 std::string StreamedInput::keepWithinBounds(RemoteContactSet& set, const realtime::TickReport& last) const {
   const Vec3& hand_m = last.device.position_m;
   std::vector<RemoteContact> others(set.contacts.begin(), set.contacts.begin() + set.count);
@@ -209,8 +209,9 @@ std::string StreamedInput::keepWithinBounds(RemoteContactSet& set, const realtim
     RemoteContact& contact = set.contacts[i];
     scene::SceneConfig config = config_;
     if (contact.yields) config.transportDelay_s += base::toSeconds(contacts_.way.roundTrip);
-    const auto squeezes = [&](const RemoteContact& other) { return maySqueeze(contact, other, hand_m); };
-    if (std::ranges::any_of(others, squeezes)) config.ownDamping_Ns_per_m /= 2;
+    double most = 0;
+    for (const RemoteContact& other : others) most = std::max(most, opposition(contact, other, hand_m));
+    config.ownDamping_Ns_per_m /= 1 + most;
     scene::Surface surface;
     surface.stiffness_N_per_m = contact.stiffness_N_per_m;
     surface.damping_Ns_per_m = contact.damping_Ns_per_m;

@@ -245,6 +245,25 @@ TEST_F(StreamedInputTest, ASurfaceThatFacesTouchedOnesOfTheSceneHasHalfTheBound)
   EXPECT_NEAR(stiffnessOf(0.002, Vec3::UnitX()), whole, 1e-6) << "across";
 }
 
+// Across a groove both walls are stiffer than each by the cosine between their normals.
+TEST_F(StreamedInputTest, WallsOfAGrooveShareTheBound) {
+  const double whole = 0.999 * 5 / 0.0005;
+  for (const double degrees : {60.0, 90.0, 100.0, 119.0, 150.0, 180.0}) {
+    const double half = 0.5 * degrees * M_PI / 180;
+    std::vector<double> both;
+    for (const double side : {1.0, -1.0}) {
+      std::vector<double> wall = floorAt(0, side);
+      wall[6] = side * std::sin(half);
+      wall[7] = std::cos(half);
+      wall[18] = 1e5;
+      both.insert(both.end(), wall.begin(), wall.end());
+    }
+    send(both);
+    const double opposed = std::max(0.0, -std::cos(2 * half));
+    EXPECT_NEAR(first().stiffness_N_per_m, whole / (1 + opposed), 1e-6) << degrees << " degrees";
+  }
+}
+
 TEST_F(StreamedInputTest, RefusesWhatCannotBeUsedAndKeepsTheRest) {
   std::vector<double> n = floorAt(0, 1);
   const std::vector<double> good = floorAt(0.02, 2);
