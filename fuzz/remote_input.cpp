@@ -14,6 +14,7 @@ namespace hapticd::fuzz {
 namespace {
 
 constexpr base::Nanos kPeriod = 1'000'000;
+const geometry::Vec3 kHand_m = geometry::Vec3::Zero();  // in the last report
 
 void checkSet(const realtime::RemoteContactSet& set, base::Nanos now) {
   require(set.count <= realtime::kMaxRemoteContacts, "at most sixteen contacts");
@@ -22,7 +23,13 @@ void checkSet(const realtime::RemoteContactSet& set, base::Nanos now) {
     const realtime::RemoteContact& c = set.contacts[i];
     require(c.point_m.allFinite() && std::isfinite(c.radius_m), "places are finite");
     require(std::abs(c.normal.norm() - 1) < 1e-6, "normals are unit vectors");
-    require(c.velocity_m_per_s.norm() <= realtime::kRemoteSpeed_m_per_s * 1.000001, "speeds are bounded");
+    const geometry::Vec3 toLimited = c.shape == realtime::RemoteShape::halfSpace
+                                         ? geometry::Vec3(kHand_m - c.point_m)
+                                         : geometry::Vec3(-c.radius_m * c.normal);
+    const geometry::Vec3 limited_m_per_s = c.velocity_m_per_s + c.angularVelocity_rad_per_s.cross(toLimited);
+    const double rounding_m_per_s = 1e-14 * realtime::kRemoteTurn_rad_per_s * toLimited.norm();
+    require(limited_m_per_s.norm() <= realtime::kRemoteSpeed_m_per_s * 1.000001 + rounding_m_per_s,
+            "speeds are bounded");
     require(c.stiffness_N_per_m > 0 && c.stiffness_N_per_m < 1e5 && c.damping_Ns_per_m >= 0, "stiffness");
     require(c.lifetime > 0 && c.lifetime <= realtime::kLongestRemoteLife, "lifetimes are bounded");
     for (std::uint32_t j = 0; j < i; ++j) require(set.contacts[j].id != c.id, "ids differ");

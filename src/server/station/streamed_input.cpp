@@ -83,7 +83,7 @@ bool usable(const double* numbers, std::size_t count) {
 }
 
 // The numbers of one contact, see wire::RemoteContacts. Returns why they are none, or an empty text.
-std::string contactOf(const double* n, const ToDevice& toDevice, RemoteContact& contact) {
+std::string contactOf(const double* n, const ToDevice& toDevice, const Vec3& hand_m, RemoteContact& contact) {
   if (!usable(n, wire::RemoteContacts::kNumbers)) return "a number is not finite or too large";
   if (!(n[1] == 0 || n[1] == 1 || n[1] == 2))  // wire::RemoteShape
     return fmt::format("shape {} is unknown; use 0 (half-space), 1 (sphere) or 2 (cylinder)", n[1]);
@@ -102,14 +102,15 @@ std::string contactOf(const double* n, const ToDevice& toDevice, RemoteContact& 
     if (contact.axis.norm() < 1e-6) return "the axis of the cylinder is zero or along the normal";
     contact.axis.normalize();
   }
-  // A wheel whose rim is too fast still turns about its centre.
+  // A wheel whose rim is too fast still turns about its centre. A flat surface is limited where the hand is,
+  // however far away the client names it.
   const Vec3 turning = toDevice.direction(n + 15);
-  const Vec3 fromCentre =
-      contact.shape == RemoteShape::halfSpace ? Vec3(Vec3::Zero()) : Vec3(contact.radius_m * contact.normal);
+  const Vec3 fromLimited = contact.shape == RemoteShape::halfSpace ? Vec3(contact.point_m - hand_m)
+                                                                   : Vec3(contact.radius_m * contact.normal);
   contact.angularVelocity_rad_per_s = atMost(turning, realtime::kRemoteTurn_rad_per_s);
   contact.velocity_m_per_s =
-      atMost(toDevice.vector(n + 12) - turning.cross(fromCentre), realtime::kRemoteSpeed_m_per_s) +
-      contact.angularVelocity_rad_per_s.cross(fromCentre);
+      atMost(toDevice.vector(n + 12) - turning.cross(fromLimited), realtime::kRemoteSpeed_m_per_s) +
+      contact.angularVelocity_rad_per_s.cross(fromLimited);
   contact.stiffness_N_per_m = n[18];
   contact.damping_Ns_per_m = std::max(n[19], 0.0);
   contact.staticFriction = std::clamp(n[20], 0.0, 1.0);
@@ -252,7 +253,7 @@ StreamedInput::Answer StreamedInput::on(scene::ClientId client, const wire::Remo
   const ToDevice toDevice(last);
   for (std::size_t at = 0; at < numbers.size() && set.count < realtime::kMaxRemoteContacts; at += kNumbers) {
     RemoteContact& contact = set.contacts[set.count];
-    const std::string wrong = contactOf(numbers.data() + at, toDevice, contact);
+    const std::string wrong = contactOf(numbers.data() + at, toDevice, last.device.position_m, contact);
     if (!wrong.empty()) {
       text = {RefusalCode::streamInvalid,
               fmt::format("Remote_Contacts: contact {} ignored: {}", at / kNumbers, wrong)};

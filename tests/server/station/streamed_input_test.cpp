@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "base/time.h"
+#include "realtime/remote/remote_shape.h"
 
 namespace hapticd::server {
 namespace {
@@ -106,6 +107,23 @@ TEST_F(StreamedInputTest, AWheelThatIsTooFastStillTurnsAboutItsCentre) {
     ASSERT_TRUE(send(wheel).taken);
     const Vec3 rim = first().angularVelocity_rad_per_s.cross(first().radius_m * first().normal);
     EXPECT_NEAR((first().velocity_m_per_s - rim - Vec3(0.2, 0, 0)).norm(), 0, 1e-9) << turning << " rad/s";
+    EXPECT_NEAR(first().angularVelocity_rad_per_s.norm(), std::min(turning, 20.0), 1e-9);
+  }
+}
+
+TEST_F(StreamedInputTest, AFlatSurfaceIsLimitedWhereTheHandIs) {
+  last_.device.position_m = {0.01, 0.02, 0};
+  std::vector<double> floor = floorAt(0);
+  floor[3] = -0.1;  // a hinge, about which the floor rises under the hand at 0.55 m/s
+  floor[17] = 5;
+  ASSERT_TRUE(send(floor).taken);
+  EXPECT_NEAR(first().velocity_m_per_s.norm(), 0, 1e-12);
+  floor[3] = -100;
+  for (const double turning : {1.0, 5.0, 50.0}) {
+    floor[17] = turning;
+    ASSERT_TRUE(send(floor).taken);
+    const realtime::SurfaceAt at = realtime::surfaceAt(first(), 0, last_.device.position_m);
+    EXPECT_NEAR(at.velocity_m_per_s.norm(), 1, 1e-9) << turning << " rad/s";
     EXPECT_NEAR(first().angularVelocity_rad_per_s.norm(), std::min(turning, 20.0), 1e-9);
   }
 }
