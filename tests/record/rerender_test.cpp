@@ -260,7 +260,7 @@ TEST_F(Rerender, RecordingBegunWhileTheServerRunsReplaysItsScene) {
     ASSERT_TRUE(hold(40, false));
     ASSERT_TRUE(untilTicks(second, 300));
     ASSERT_TRUE(hold(18, true));
-    animate(peer, 20);
+    animate(peer, 40);
     second.send(wire::HoldHand{.hold = 0, .position = {}});
     peer.send(wire::RecordingControl{.record = 0, .name = {}});
     ASSERT_TRUE(peer.untilText("recorded "));

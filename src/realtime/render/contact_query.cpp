@@ -21,14 +21,13 @@ constexpr double kPadShare = 0x1p-22;       // of the object's size: a quarter o
 constexpr double kRoundingFloor = 1e-12;    // of the largest coordinate: a thousand times its rounding error
 constexpr double kSmallestObject_m = 1e-3;  // below this size the HIP's coordinates dominate the rounding
 constexpr double kWiden = 1 + 1e-6;         // covers the rounding of queries that change frames
-constexpr int kNoReserve = 50;              // ticks without one, after one that did not fit
 // By how much joined triangles may be off (see geometry/fans.h), and more by a share of the tool radius: far
 // less than the gap tolerance, and than anybody feels.
 constexpr double kFanError_m = 1e-7;
 constexpr double kFanErrorShare = 5e-4;
 constexpr double kSmallestGather_m = 10e-6;
 constexpr double kHalfWay = 0.6;  // half of the way of a tick, and what it bends aside
-constexpr double kBallWay = 0.8;  // the same for a ball, whose last steps may lead beyond its rest
+constexpr double kBallWay = 0.7;  // the same for a ball, whose last steps may lead beyond its rest
 constexpr int kReuseLimit = 32;   // reuse the cached facets up to this count instead of querying again
 
 scene::Corners mapped(const Affine& t, const scene::Corners& c, bool mirrored) {
@@ -83,7 +82,6 @@ void ContactQuery::beginTick(const SceneAtTime& now, const SceneAtTime& before, 
   work_ = 0;
   facetCasts_ = 0;
   longestStep_m_ = std::numeric_limits<double>::infinity();
-  noReserve_ = std::max(0, noReserve_ - 1);
   if (now.scene == before.scene) return;
   ++generation_;
   allAppeared_ = allAppeared_ || before.scene == nullptr || before.scene->faces != now.scene->faces;
@@ -398,6 +396,18 @@ void ContactQuery::estimateRoom(double radius) noexcept {
   roomyReach_m_ = count > kMany ? few_m : std::max(roomyReach_m_, few_m);
 }
 
+// How much a ball tool gathers at once, as far as is known.
+void ContactQuery::learnWhatFits(double radius) noexcept {
+  constexpr int kFew = FacetCache::kMaxTriangles / 3;
+  // Not where other gathers spent the work of the tick.
+  if (!cache_.complete() && 2 * cache_.size() > FacetCache::kMaxTriangles) {
+    fits_m_ = std::max(0.5 * radius, kSmallestGather_m);
+    countBefore_ = FacetCache::kMaxTriangles;  // tells nothing of how few a smaller one leaves out
+  } else if (cache_.complete() && cache_.size() < kFew && radius >= 0.5 * fits_m_) {
+    fits_m_ *= 1.5;
+  }
+}
+
 // A ball that slides over a surface meets as many triangles with any reserve; with a small one, no tick
 // gathers many. In a hollow of about its own radius, a smaller one leaves out few.
 void ContactQuery::adaptReserve() noexcept {
@@ -405,7 +415,7 @@ void ContactQuery::adaptReserve() noexcept {
   constexpr double kFewer = 0.7;
   constexpr int kTries = 32;  // gathers until a smaller one is tried again
   const double most = kReserveShare * toolRadius_;
-  const int count = cache_.complete() ? cache_.size() : FacetCache::kMaxTriangles;
+  const int count = cache_.size();
   if (count < kMany / 4) {
     reserve_m_ = std::min(2 * reserve_m_, most);
   } else if (count > kMany && reserve_m_ < most && count > kFewer * countBefore_) {
@@ -428,6 +438,7 @@ bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
   for (int i = 0; i < objectCount_ && cache_.complete(); ++i) {
     const PlacedObject& placed = object(i);
     gatheredFrom_[static_cast<std::size_t>(i)] = placed.state;
+    if (isPassable(i)) continue;
     reusable = reusable && placed.atRest && !placed.deformed;
     const scene::MeshGeometry& mesh = *placed.state->mesh;
     const Vec3 inObject = placed.T_object_device * centre;
@@ -447,7 +458,8 @@ bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
     joinedFans_ = joinedFans_ || (fans && fans->any());
   }
   if (keepsFacets_) estimateRoom(radius);
-  if (radius == reserve_m_) adaptReserve();
+  if (!keepsFacets_) learnWhatFits(radius);
+  if (radius == reserve_m_ && cache_.complete()) adaptReserve();
   gatheredCount_ = objectCount_;
   gatheredGeneration_ = reusable ? generation_ : 0;
   if (!cache_.complete() && !workSpent())
@@ -458,12 +470,20 @@ bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
 // Deforming facets of a point tool count at any distance: they may have come from farther away.
 void ContactQuery::addToCache(const FacetCache::TriangleId& id) noexcept {
   const PlacedObject& placed = object(id.object);
-  work_ += kVisit;
+  work_ += keepsFacets_ ? kVisit : kBallVisit;
   if (keepsFacets_) {
     if (const Facet* const facet = facetOf(id)) cache_.add(*facet, placed.deformed);
     return;
   }
-  cache_.add(id, discAround(cornersOf(id)), placed.skin);
+  // Of the three corners, only their middle is placed on the device.
+  const scene::MeshGeometry& mesh = *placed.state->mesh;
+  const scene::Corners k = id.level == 0 ? mesh.corners(id.triangle, now_.time)
+                                         : mesh.corners(mesh.fans->joined(id.level, id.triangle), now_.time);
+  const Vec3 middle = (k.a + k.b + k.c) * (1.0 / 3);
+  const double radius2 =
+      std::max({(k.a - middle).squaredNorm(), (k.b - middle).squaredNorm(), (k.c - middle).squaredNorm()});
+  cache_.add(id, placed.T_device_object * middle, kWiden * placed.metresPerUnit * std::sqrt(radius2),
+             placed.skin);
 }
 
 // A fast tick gathers too many for the slow ticks after it.
@@ -473,10 +493,8 @@ bool ContactQuery::isReusable(double radius) const noexcept {
 
 bool ContactQuery::ensureGathered(const Vec3& centre, double radius) noexcept {
   if (isReusable(std::max(radius, reserve_m_)) && cache_.covers(centre, radius)) return true;
-  if (reserve_m_ > radius && noReserve_ == 0) {
-    if (gather(centre, reserve_m_)) return true;
-    noReserve_ = kNoReserve;
-  }
+  const double reserve = std::min(reserve_m_, fits_m_);
+  if (reserve > radius && gather(centre, reserve)) return true;
   // Where fans are joined, a reserve saves the visits to their triangles in the next ticks.
   if (joinedFans_ && gather(centre, 2 * radius)) return true;
   return gather(centre, radius);
@@ -495,7 +513,9 @@ void ContactQuery::gatherAhead(const Vec3& p, const Vec3& way, double margin) no
   const double needed = kHalfWay * length + margin;
   if (!keepsFacets_) {
     // Around the middle: the triangles that it reaches grow with the radius more than with the way.
-    if (!ensureGathered(p + 0.5 * way, kBallWay * length + margin)) gatherAround(p, needed);
+    const double around = kBallWay * length + margin;
+    if (around > fits_m_ || !ensureGathered(p + 0.5 * way, around))
+      gatherAround(p, std::min(needed, fits_m_));
     return;
   }
   if (isReusable(needed) && cache_.covers(p + 0.5 * way, needed)) return;
@@ -554,7 +574,7 @@ bool ContactQuery::castAtFacet(const Facet& f, const Vec3& p, const Vec3& g, Obj
 // A total order on hits, so that the first one does not depend on the order of visits.
 void ContactQuery::considerFacet(const Facet& f, const Path& path, ObjectHit& best,
                                  bool& found) const noexcept {
-  if (f.object >= 0 && (passable_ >> static_cast<unsigned>(f.object) & 1U) != 0) return;
+  if (f.object >= 0 && isPassable(f.object)) return;
   ObjectHit hit;
   const double latest = found ? best.stop : path.end;
   if (!castTool(f, path, latest, hit) || hit.stop > latest) return;
@@ -625,26 +645,32 @@ double ContactQuery::freeOfFaces(const Vec3& p, const Vec3& g, bool closesGaps) 
 
 bool ContactQuery::castAtTriangles(const Path& path, int only, ObjectHit& hit) noexcept {
   cache_.moveTo(path.p + path.begin * path.d);
+  ++cast_;
   bool found = false;
   if (only < 0 && planes_ != nullptr) {
     for (const PlacedPlane& plane : *planes_) considerFacet(plane.facet, path, hit, found);
   }
-  // What is nearest often blocks the path: then farther ones need no exact test.
   const double touching = radius_ + 2 * cache_.maxSkin();
-  const int first = lastBlocker_ < cache_.size() ? lastBlocker_ : -1;
-  if (first >= 0) considerGathered(first, path, only, hit, found);
-  const int nearest = found ? first : cache_.probablyNearest(touching);
-  if (nearest >= 0 && nearest != first) considerGathered(nearest, path, only, hit, found);
-  for (const int i : cache_.trianglesNear(((found ? hit.stop : path.end) - path.begin) * path.d, touching)) {
-    if (i == first || i == nearest) continue;
-    if (workSpent()) return endUnexamined(path, hit);
-    considerGathered(i, path, only, hit, found);
-  }
+  const auto considerNear = [&](const Vec3& way) {
+    for (const int i : cache_.trianglesNear(way, touching, normals())) {
+      if (workSpent()) return false;
+      considerGathered(i, path, only, hit, found);
+    }
+    return true;
+  };
+  const auto way = [&] { return Vec3(((found ? hit.stop : path.end) - path.begin) * path.d); };
+  // What blocked the last path, or is touched, often blocks this one at once: then farther ones need no exact
+  // test.
+  constexpr double kAtOnce = 0.01;  // of the radius
+  if (lastBlocker_ < cache_.size()) considerGathered(lastBlocker_, path, only, hit, found);
+  if (way().norm() > kAtOnce * radius_ && !considerNear(Vec3::Zero())) return endUnexamined(path, hit);
+  if (!considerNear(way())) return endUnexamined(path, hit);
   return found;
 }
 
 void ContactQuery::considerGathered(int i, const Path& path, int only, ObjectHit& best,
                                     bool& found) noexcept {
+  if (std::exchange(considered_[static_cast<std::size_t>(i)], cast_) == cast_) return;
   const FacetCache::TriangleId& id = cache_.triangle(i);
   if (only >= 0 && id.object != only) return;
   const double touching = radius_ + 2 * cache_.maxSkin();
@@ -694,15 +720,15 @@ bool ContactQuery::castAtEach(const Path& path, int only, ObjectHit& hit) noexce
 // while the path is free and shrink when the storage overflows.
 bool ContactQuery::castInSteps(const Vec3& p, const Vec3& d, double begin, double end, int only,
                                ObjectHit& hit) noexcept {
-  constexpr double kSmallestStep = 1.0 / 64;
   const double length = d.norm();
-  double step = keepsFacets_ ? 1.0 : std::min(1.0, std::max(0.125 * radius_ / length, kSmallestStep));
+  const double smallestStep = std::min(1.0 / 64, 2 * fits_m_ / length);
+  double step = keepsFacets_ ? 1.0 : std::min(1.0, std::max(0.125 * radius_ / length, smallestStep));
   while (begin < end) {
-    const double longest_m = std::min(longestStep_m_, 2 * roomyReach_m_);
-    step = std::min({step, end - begin, std::max(longest_m / length, kSmallestStep)});
+    const double longest_m = std::min({longestStep_m_, 2 * roomyReach_m_, 2 * fits_m_});
+    step = std::min({step, end - begin, std::max(longest_m / length, smallestStep)});
     const double middle = begin + 0.5 * step;
     const bool fits = ensureGathered(p + middle * d, 0.5 * step * length * kWiden);
-    if (!fits && step > kSmallestStep && !workSpent()) {
+    if (!fits && step > smallestStep && !workSpent()) {
       step *= 0.25;
       longestStep_m_ = step * length;
       continue;
@@ -727,9 +753,12 @@ bool ContactQuery::castUpTo(double share, const Vec3& p, const Vec3& g, ObjectHi
 }
 
 bool ContactQuery::castPast(std::uint64_t passable, const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept {
+  // What it passes may have more triangles on its way than there is room for.
+  cache_.invalidate();
   passable_ = passable;
   const bool found = cast(p, g, hit);
   passable_ = 0;
+  cache_.invalidate();
   return found;
 }
 

@@ -202,6 +202,7 @@ class ContactQuery {
   static constexpr int kMaxObjects = 64;
   static constexpr int kMemoBits = 10;
   static constexpr int kVisit = 16;
+  static constexpr int kBallVisit = 8;
   static constexpr int kBoxVisit = 4;
   static constexpr int kMaxUnfit = 8;
   static constexpr double kReserveShare = 0.2;  // of the tool radius, that is gathered in reserve at most
@@ -239,7 +240,11 @@ class ContactQuery {
   bool place(const scene::ObjectState& state, PlacedObject& placed) const noexcept;
   bool sameObjects() const noexcept;
   bool isReusable(double radius) const noexcept;
+  bool isPassable(int object) const noexcept {
+    return (passable_ >> static_cast<unsigned>(object) & 1U) != 0;
+  }
   void estimateRoom(double radius) noexcept;
+  void learnWhatFits(double radius) noexcept;
   void adaptReserve() noexcept;
   bool isUnfit(const Vec3& centre, double radius) const noexcept;
   void compareWithBefore(PlacedObject& placed) const noexcept;
@@ -249,6 +254,9 @@ class ContactQuery {
   scene::Corners cornersOf(const FacetCache::TriangleId& id) const noexcept;
   const Facet* facetOf(const FacetCache::TriangleId& id) const noexcept;
   void addToCache(const FacetCache::TriangleId& id) noexcept;
+  auto normals() const noexcept {
+    return [this](const FacetCache::TriangleId& id) { return discAround(cornersOf(id)).normal; };
+  }
   static bool endUnexamined(const Path& path, ObjectHit& hit) noexcept;
   bool castTool(const Facet& f, const Path& path, double latest, CastHit& hit) const noexcept;
   void considerFacet(const Facet& f, const Path& path, ObjectHit& best, bool& found) const noexcept;
@@ -290,8 +298,10 @@ class ContactQuery {
   double reserve_m_ = 0;  // of a ball tool: what is near is gathered at least within this
   int countBefore_ = 0;   // of the triangles in the last reserve
   int fullReserves_ = 0;  // how many are still gathered before a smaller one is tried
-  int noReserve_ = 0;     // ticks in which none is gathered: there were too many triangles for it
-  int lastBlocker_ = 0;   // the gathered facet that blocked the last cast of a ball
+  double fits_m_ = std::numeric_limits<double>::infinity();  // what was not too much, of a ball tool
+  int lastBlocker_ = 0;     // the gathered facet that blocked the last cast of a ball
+  std::uint64_t cast_ = 0;  // of a ball: its number, and the last one that considered each gathered facet
+  std::array<std::uint64_t, FacetCache::kMaxTriangles> considered_{};
   // Generation and objects of the last gather(); 0: not reusable in another tick.
   std::uint64_t gatheredGeneration_ = 0;
   int gatheredCount_ = 0;
@@ -299,8 +309,9 @@ class ContactQuery {
   std::uint64_t generation_ = 1;  // of all that is kept from tick to tick
   mutable std::array<MemoFacet, 1U << kMemoBits> facetMemo_;
   bool overflowed_ = false;
-  int work_ = 0;  // of this tick, besides casts: kVisit for a triangle, kBoxVisit for one that its box rules
-                  // out, 1 for one that is joined to another
+  // Of this tick, besides casts: kVisit for a triangle, kBallVisit for one that a ball tool gathers,
+  // kBoxVisit for one that its box rules out, 1 for one that is joined to another.
+  int work_ = 0;
   mutable int facetCasts_ = 0;
   std::uint64_t passable_ = 0;  // objects that the present cast does not meet
   bool pointTool_ = false;      // casts move the centre of the tool
@@ -313,7 +324,7 @@ void ContactQuery::forEachGathered(const Vec3& p, double distance, Visit&& visit
     return;
   }
   cache_.moveTo(p);
-  for (const int i : cache_.trianglesNear(Vec3::Zero(), distance)) {
+  for (const int i : cache_.trianglesNear(Vec3::Zero(), distance, normals())) {
     const Facet* const f = facetOf(cache_.triangle(i));
     if (f != nullptr) visit(*f);
   }

@@ -47,15 +47,15 @@ void FacetCache::add(const Facet& facet, bool deforming) noexcept {
   maxRadius_ = std::max(maxRadius_, facet.radius);
 }
 
-void FacetCache::add(const TriangleId& id, const Disc& around, double skin) noexcept {
+void FacetCache::add(const TriangleId& id, const Vec3& middle, double radius, double skin) noexcept {
   if (count_ == kMaxTriangles) return invalidate();
   const auto i = static_cast<std::size_t>(count_++);
   triangles_[i] = id;
   supportPlanes_[i] = {Vec3::Zero(), 0};
-  const Vec3f centre = (around.centre - centre_).cast<float>();
+  const Vec3f centre = (middle - centre_).cast<float>();
   for (std::size_t k = 0; k < 3; ++k) discCentres_[k][i] = centre[static_cast<int>(k)];
-  discRadii_[i] = static_cast<float>(around.radius) + kSingleRounding * centre.cwiseAbs().maxCoeff();
-  discNormals_[i] = around.normal.cast<float>();
+  discRadii_[i] = static_cast<float>(radius) + kSingleRounding * centre.cwiseAbs().maxCoeff();
+  discNormals_[i].x() = std::numeric_limits<float>::quiet_NaN();
   maxSkin_ = std::max(maxSkin_, skin);
 }
 
@@ -87,11 +87,11 @@ bool FacetCache::reaches(const Reach& reach, std::size_t i) const noexcept {
   return !(room2 < 0) && !(aside2 - farthest * farthest > rounding);
 }
 
-int FacetCache::findNear(const Reach& reach, std::uint16_t* found) noexcept {
+// By how much the path misses the ball around each triangle (square metres).
+void FacetCache::missBalls(const Reach& reach) noexcept {
   const float perLength2 = reach.length2 > 0 ? 1 / reach.length2 : 0;
   const auto count = static_cast<std::size_t>(count_);
   const auto& [cx, cy, cz] = discCentres_;
-  // By how much the path misses the ball around a triangle (square metres).
   for (std::size_t i = 0; i < count; ++i) {
     const float x = cx[i] - reach.from.x();
     const float y = cy[i] - reach.from.y();
@@ -104,11 +104,6 @@ int FacetCache::findNear(const Reach& reach, std::uint16_t* found) noexcept {
     const float farthest = reach.distance + discRadii_[i];
     misses_[i] = ax * ax + ay * ay + az * az - farthest * farthest;
   }
-  int n = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    if (!(misses_[i] > 0) && reaches(reach, i)) found[n++] = static_cast<std::uint16_t>(i);
-  }
-  return n;
 }
 
 // The plane through the point of disc i nearest to p, relative to centre_, with the disc on its back.
@@ -123,22 +118,7 @@ FacetCache::NearPlane FacetCache::planeBefore(std::size_t i, const Vec3f& p) con
   return {normal, distance - 4 * kSingleRounding * offset.norm()};
 }
 
-// Those within `distance` and a little more. Not far from where the planes were made they tell nearly the
-// distance.
-void FacetCache::knowNear(double distance) noexcept {
-  constexpr double kMore = 0.05;  // of the tool radius
-  const double from_m = (toolPosition_ - nearCentre_).norm();
-  const bool known = from_m + distance <= nearDistance_;
-  if (known && from_m <= 0.5 * kMore * toolRadius_) return;
-  nearCentre_ = toolPosition_;
-  if (known) {
-    nearDistance_ -= from_m;
-  } else {
-    nearDistance_ = distance + kMore * toolRadius_;
-    nearCount_ = findNear(reachOf(nearCentre_, Vec3::Zero(), nearDistance_), near_.data());
-    // In a hollow of about the tool's radius: farther away there are no others.
-    if (nearCount_ == count_) nearDistance_ = std::numeric_limits<double>::infinity();
-  }
+void FacetCache::makeNearPlanes() noexcept {
   const Vec3f from = (nearCentre_ - centre_).cast<float>();
   for (std::size_t k = 0; k < static_cast<std::size_t>(nearCount_); ++k) {
     const NearPlane plane = planeBefore(near_[k], from);
@@ -147,14 +127,10 @@ void FacetCache::knowNear(double distance) noexcept {
   }
 }
 
-std::span<const std::uint16_t> FacetCache::trianglesNear(const Vec3& d, double distance) noexcept {
+// Of the near ones: those whose planes do not rule out the path.
+std::span<const std::uint16_t> FacetCache::nearPlanesMet(const Vec3& d, double distance) noexcept {
   const Vec3f begin = (toolPosition_ - nearCentre_).cast<float>();
   const Vec3f end = begin + d.cast<float>();
-  int n = 0;
-  if ((toolPosition_ - nearCentre_).norm() + d.norm() + distance > nearDistance_) {
-    n = findNear(reachOf(toolPosition_, d, distance), found_.data());
-    return {found_.data(), static_cast<std::size_t>(n)};
-  }
   const float limit = static_cast<float>(distance) +
                       kSingleRounding * (static_cast<float>(distance) + begin.norm() + end.norm());
   const auto count = static_cast<std::size_t>(nearCount_);
@@ -165,24 +141,11 @@ std::span<const std::uint16_t> FacetCache::trianglesNear(const Vec3& d, double d
     const float there = x[k] * end.x() + y[k] * end.y() + z[k] * end.z();
     misses_[k] = nearBounds_[k] + std::min(here, there) - limit;
   }
+  int n = 0;
   for (std::size_t k = 0; k < count; ++k) {
     if (!(misses_[k] > 0)) found_[static_cast<std::size_t>(n++)] = near_[k];
   }
   return {found_.data(), static_cast<std::size_t>(n)};
-}
-
-int FacetCache::probablyNearest(double distance) noexcept {
-  knowNear(distance);
-  const Vec3f from = (toolPosition_ - centre_).cast<float>();
-  int nearest = -1;
-  float least = std::numeric_limits<float>::infinity();
-  for (const std::uint16_t i : trianglesNear(Vec3::Zero(), distance)) {
-    const float away = planeBefore(i, from).distance;
-    if (away >= least) continue;
-    least = away;
-    nearest = i;
-  }
-  return nearest;
 }
 
 int FacetCache::facetsNearPath(const Vec3& p, const Vec3& d, std::uint16_t* found) const noexcept {

@@ -2,11 +2,13 @@
 //
 // Point tool: keeps the facets themselves. A path first discards the faces whose plane or whose ball it does
 // not come near, which leaves few. Ball tool: many triangles lie within its radius and few touch it. It keeps
-// their ids, with a disc around each and a supporting plane; exact facets are made only for those whose disc
-// the path comes near and that the plane does not rule out.
+// their ids, with a ball around each. Those whose ball a path comes near get a disc, and a supporting plane;
+// exact facets are made only for what neither rules out.
 #pragma once
 
 #include <array>
+#include <cmath>
+#include <limits>
 #include <span>
 
 #include "realtime/render/facet.h"
@@ -35,8 +37,8 @@ class FacetCache {
   void restart(const Vec3& centre, double reach) noexcept;
   /// Point tool: adds a facet. A `deforming` one is kept at any distance.
   void add(const Facet& facet, bool deforming) noexcept;
-  /// Ball tool: adds a triangle by the disc around it.
-  void add(const TriangleId& id, const Disc& around, double skin) noexcept;
+  /// Ball tool: adds a triangle by a ball around it; the centre is that of its disc.
+  void add(const TriangleId& id, const Vec3& centre, double radius, double skin) noexcept;
   /// Marks the cache as incomplete.
   void invalidate() noexcept { complete_ = false; }
 
@@ -58,11 +60,10 @@ class FacetCache {
   void moveTo(const Vec3& p) noexcept;
   const TriangleId& triangle(int i) const noexcept { return triangles_[static_cast<std::size_t>(i)]; }
   /// Ball tool: all triangles that may be within `distance` of the segment from the present position by d.
-  /// Valid until the next call.
-  std::span<const std::uint16_t> trianglesNear(const Vec3& d, double distance) noexcept;
-  /// Ball tool: the one of those within `distance` that is probably the nearest to the present position; -1
-  /// when there is none.
-  int probablyNearest(double distance) noexcept;
+  /// Valid until the next call. normalOf(id) is the normal of the disc around a triangle.
+  template <class NormalOf>
+  std::span<const std::uint16_t> trianglesNear(const Vec3& d, double distance,
+                                               const NormalOf& normalOf) noexcept;
   /// Lower bound of the distance while the tool moves by d; refine() makes it exact for the present position.
   double lowerBound(int i, const Vec3& d) const noexcept;
   /// Replaces the bound by the exact distance: `foot` is the nearest point. Returns the new lowerBound().
@@ -87,10 +88,15 @@ class FacetCache {
     float distance;
   };
   Reach reachOf(const Vec3& p, const Vec3& d, double distance) const noexcept;
+  void missBalls(const Reach& reach) noexcept;
   bool reaches(const Reach& reach, std::size_t i) const noexcept;
-  int findNear(const Reach& reach, std::uint16_t* found) noexcept;
+  template <class NormalOf>
+  int findNear(const Reach& reach, const NormalOf& normalOf, std::uint16_t* found) noexcept;
   NearPlane planeBefore(std::size_t i, const Vec3f& p) const noexcept;
-  void knowNear(double distance) noexcept;
+  template <class NormalOf>
+  void knowNear(double distance, const NormalOf& normalOf) noexcept;
+  void makeNearPlanes() noexcept;
+  std::span<const std::uint16_t> nearPlanesMet(const Vec3& d, double distance) noexcept;
 
   // Ball tool. normal . x = offset: a plane with the face on its back.
   struct SupportPlane {
@@ -123,8 +129,9 @@ class FacetCache {
   double travel_ = 0;                         // of the tool since restart()
   std::array<double, kMaxFacets> distances_;  // lower bounds, plus the travel at that time
   std::array<TriangleId, kMaxTriangles> triangles_;
-  // The discs around them, relative to centre_, in single precision, for it is a first filter. One array for
-  // each number of the balls, so that the compiler computes several at once.
+  // The balls around them, relative to centre_, in single precision, for it is a first filter. One array for
+  // each number, so that the compiler computes several at once. Of a disc with the same centre and radius,
+  // the normal; its x is not a number while it is not known.
   using TriangleColumn = std::array<float, kMaxTriangles>;
   std::array<TriangleColumn, 3> discCentres_;
   TriangleColumn discRadii_;
@@ -139,6 +146,60 @@ class FacetCache {
   int nearCount_ = 0;
   Vec3 nearCentre_ = Vec3::Zero();
   double nearDistance_ = -1;  // up to which all are there
+  int nearUses_ = 0;          // since then
+  // Of the tool radius: how much farther than asked they are sought. Little where the tool soon leaves them.
+  static constexpr double kLeastNearShare = 0.003;
+  static constexpr double kMostNearShare = 0.05;
+  double nearShare_ = kMostNearShare;
 };
+
+template <class NormalOf>
+int FacetCache::findNear(const Reach& reach, const NormalOf& normalOf, std::uint16_t* found) noexcept {
+  missBalls(reach);
+  int n = 0;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
+    if (misses_[i] > 0) continue;
+    Vec3f& normal = discNormals_[i];
+    if (std::isnan(normal.x())) normal = normalOf(triangles_[i]).template cast<float>();
+    if (reaches(reach, i)) found[n++] = static_cast<std::uint16_t>(i);
+  }
+  return n;
+}
+
+// Those within `distance` and a little more. Not far from where the planes were made they tell nearly the
+// distance.
+template <class NormalOf>
+void FacetCache::knowNear(double distance, const NormalOf& normalOf) noexcept {
+  constexpr int kFewUses = 4;
+  const double from_m = (toolPosition_ - nearCentre_).norm();
+  const bool known = from_m + distance <= nearDistance_;
+  if (known && from_m <= 0.5 * nearShare_ * toolRadius_) return;
+  nearCentre_ = toolPosition_;
+  if (known) {
+    nearDistance_ -= from_m;
+  } else {
+    if (nearUses_ < kFewUses) nearShare_ = std::max(0.5 * nearShare_, kLeastNearShare);
+    if (nearUses_ > 2 * kFewUses) nearShare_ = std::min(2 * nearShare_, kMostNearShare);
+    nearUses_ = 0;
+    nearDistance_ = distance + nearShare_ * toolRadius_;
+    nearCount_ = findNear(reachOf(nearCentre_, Vec3::Zero(), nearDistance_), normalOf, near_.data());
+    // In a hollow of about the tool's radius: farther away there are no others.
+    if (nearCount_ == count_) nearDistance_ = std::numeric_limits<double>::infinity();
+  }
+  makeNearPlanes();
+}
+
+template <class NormalOf>
+std::span<const std::uint16_t> FacetCache::trianglesNear(const Vec3& d, double distance,
+                                                         const NormalOf& normalOf) noexcept {
+  const double length = d.norm();
+  if (length <= kMostNearShare * toolRadius_) knowNear(distance + length, normalOf);
+  if ((toolPosition_ - nearCentre_).norm() + length + distance <= nearDistance_) {
+    ++nearUses_;
+    return nearPlanesMet(d, distance);
+  }
+  const int n = findNear(reachOf(toolPosition_, d, distance), normalOf, found_.data());
+  return {found_.data(), static_cast<std::size_t>(n)};
+}
 
 }  // namespace hapticd::realtime

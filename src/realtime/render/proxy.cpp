@@ -275,7 +275,7 @@ bool Proxy::moveFrictionless(const Vec3& target, ActiveSet& active) noexcept {
     std::optional<ActiveSet> held;
     if (!step.isZero(0)) {
       held = active;
-      extrapolateStep(step, target);
+      extrapolateStep(step, target, active);
     }
     active.count = 0;
     Vec3 goal;
@@ -624,7 +624,7 @@ bool Proxy::hasWay(std::uint64_t passable, const Vec3& place) noexcept {
   ObjectHit hit;
   ++casts_;
   if (query_.castPast(passable, position_, place, hit)) return false;
-  if (!query_.ensureGathered(place, query_.radius())) return true;
+  if (!query_.ensureGathered(place, kGatherMargin_m)) return false;
   bool overlaps = false;
   query_.forEachGathered(place, query_.radius(), [&](const Facet& f) {
     if (overlaps || f.object < 0 || (passable >> static_cast<unsigned>(f.object) & 1U) == 0) return;

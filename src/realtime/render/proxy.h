@@ -205,7 +205,7 @@ class Proxy {
   bool descendFrom(const Vec3& start, int first, int last, const Vec3& target, double enough,
                    DescentDirections& descent) noexcept;
   bool passVertex(const Vec3& target, double enough, DescentDirections& descent) noexcept;
-  void extrapolateStep(const Vec3& step, const Vec3& target) noexcept;
+  void extrapolateStep(const Vec3& step, const Vec3& target, const ActiveSet& active) noexcept;
   double cornerSlack() const noexcept;
   void collectTouchedFaces(DescentDirections& descent) noexcept;
   void findDescentDirections(const Vec3& pull, const ActiveSet& active,

@@ -338,11 +338,15 @@ bool Proxy::passVertex(const Vec3& target, double enough, DescentDirections& des
 
 // A ball converges on edges and corners in many small steps of one direction. Repeating the last step before
 // the next approach doubles them. The step is straight and the free space is round, so it may climb a little.
-void Proxy::extrapolateStep(const Vec3& step, const Vec3& target) noexcept {
+void Proxy::extrapolateStep(const Vec3& step, const Vec3& target, const ActiveSet& active) noexcept {
+  constexpr double kSideways = 1e-6;
   const Vec3 pull = target - position_;
   const double farthest = pull.norm() + kClimb * query_.radius();
   const double a = step.squaredNorm();
   const double b = step.dot(pull);
+  // On one face there is no nearer place.
+  const bool onFace = active.count == 1 && !active.hits[0].atEdge;
+  if (onFace && std::abs(b) <= kSideways * step.norm() * pull.norm()) return;
   const double c = pull.squaredNorm() - farthest * farthest;
   const Vec3 displacement = std::min((b + std::sqrt(b * b - a * c)) / a, 1.0) * step;
   ObjectHit hit;

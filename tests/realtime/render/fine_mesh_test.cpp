@@ -96,5 +96,55 @@ TEST_P(FineMeshTest, seams_of_a_flat_grid_are_not_felt) {
   }
 }
 
+// More triangles within a ball's radius than a tick can gather.
+//
+//    .-----.      pushed through a sheet: 1000 N/m up to 0.5 N, and through as soon as there is room behind
+//    it
+//   (       )
+//  --'-----'--
+TEST(FineSheet, lets_a_ball_through_at_its_force) {
+  constexpr double kRadius = 0.002;
+  constexpr double kLimit_N = 0.5;
+  for (const int cells : {80, 160}) {
+    SceneFixture scene;
+    scene::Surface s = surface(1000);
+    s.popthrough_N = kLimit_N;
+    scene.add(plane(0.008, cells), s);
+    Hand hand(scene.snapshot(), {.toolRadius_m = kRadius});
+    double depth = -0.001;
+    bool through = false;
+    for (; depth < 2.5 * kRadius && !through; depth += 20e-6) {
+      const Rendering& r = hand.at({1e-5, 2e-5, kRadius - depth});
+      ASSERT_EQ(r.status & kRenderWorkLimit, 0U) << depth;
+      through = (r.status & kRenderPopthrough) != 0;
+      const double spring_N = 1000 * std::max(0.0, depth);
+      if (!through) {
+        ASSERT_NEAR(r.force_N.norm(), std::min(spring_N, kLimit_N), 1e-3) << depth;
+      }
+    }
+    EXPECT_TRUE(through) << cells;
+    EXPECT_NEAR(depth, 2 * kRadius, 100e-6) << cells;
+  }
+}
+
+// Under a hand at rest: what a tick gathers in reserve is more than fits, and is gathered anew in every tick.
+TEST(FineSheet, that_moves_keeps_its_force) {
+  constexpr double kRadius = 0.01;
+  SceneFixture scene;
+  scene::ObjectState& object = scene.add(plane(0.008, reduced(160, 80)), surface(1000));
+  Affine lower = object.motion.destination();
+  lower.pretranslate(Vec3(0, 0, -0.0008));
+  object.motion = scene::Motion::between(object.motion.origin(), lower, toNanos(0.1), toNanos(0.6));
+  Hand hand(scene.snapshot(), {.toolRadius_m = kRadius});
+  hand.at({0, 0, kRadius + 0.001});
+  hand.to({0, 0, kRadius - 0.001}, 0.05);
+  while (hand.time() < toNanos(0.6)) {
+    const double moved_s = std::max(0.0, base::toSeconds(hand.time()) - 0.1);
+    const Rendering& r = hand.at({0, 0, kRadius - 0.001});
+    ASSERT_EQ(r.status, 0U) << moved_s;
+    ASSERT_NEAR(r.force_N.norm(), 1000 * (0.001 - 0.0016 * moved_s), 5e-3) << moved_s;
+  }
+}
+
 }  // namespace
 }  // namespace hapticd::realtime::fixture
