@@ -352,10 +352,13 @@ class ContactQuery::JoinedFans {
   std::bitset<FacetCache::kMaxTriangles> here_;  // by their places
 };
 
+geometry::Triangle ContactQuery::verticesOf(const FacetCache::TriangleId& id) const noexcept {
+  const scene::MeshGeometry& mesh = *object(id.object).state->mesh;
+  return id.level == 0 ? (*mesh.triangles)[id.triangle] : mesh.fans->joined(id.level, id.triangle);
+}
+
 scene::Corners ContactQuery::cornersOf(const FacetCache::TriangleId& id) const noexcept {
-  const PlacedObject& placed = object(id.object);
-  if (id.level == 0) return placed.corners(id.triangle, now_.time);
-  return placed.corners(placed.state->mesh->fans->joined(id.level, id.triangle), now_.time);
+  return object(id.object).corners(verticesOf(id), now_.time);
 }
 
 // Facets of objects at rest stay the same from tick to tick. Null for a degenerate triangle; valid until the
@@ -476,9 +479,7 @@ void ContactQuery::addToCache(const FacetCache::TriangleId& id) noexcept {
     return;
   }
   // Of the three corners, only their middle is placed on the device.
-  const scene::MeshGeometry& mesh = *placed.state->mesh;
-  const scene::Corners k = id.level == 0 ? mesh.corners(id.triangle, now_.time)
-                                         : mesh.corners(mesh.fans->joined(id.level, id.triangle), now_.time);
+  const scene::Corners k = placed.state->mesh->corners(verticesOf(id), now_.time);
   const Vec3 middle = (k.a + k.b + k.c) * (1.0 / 3);
   const double radius2 =
       std::max({(k.a - middle).squaredNorm(), (k.b - middle).squaredNorm(), (k.c - middle).squaredNorm()});

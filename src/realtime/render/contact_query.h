@@ -251,6 +251,7 @@ class ContactQuery {
   bool viewJumped(const PlacedObject& placed) const noexcept;
   bool mayReach(const PlacedObject& object, std::uint32_t triangle, const Vec3& inObject,
                 double reach_m) noexcept;
+  geometry::Triangle verticesOf(const FacetCache::TriangleId& id) const noexcept;
   scene::Corners cornersOf(const FacetCache::TriangleId& id) const noexcept;
   const Facet* facetOf(const FacetCache::TriangleId& id) const noexcept;
   void addToCache(const FacetCache::TriangleId& id) noexcept;
