@@ -269,10 +269,9 @@ def test_a_pause_does_not_end_the_session(with_feedback: bool) -> None:
         if not with_feedback:
             teleop.send_feedback({})
         connections = teleop._hand.statistics().connections
+        time.sleep(1.5)
         if with_feedback:
             until(lambda: person.poll(0.01) is not None and person.latest.force.force_N[0] == 0)
-        else:
-            time.sleep(1.5)
         for _ in range(10):
             teleop.get_action()
         assert teleop._hand.statistics().connections == connections + with_feedback
