@@ -81,6 +81,7 @@ void ContactQuery::beginTick(const SceneAtTime& now, const SceneAtTime& before, 
   overflowed_ = false;
   work_ = 0;
   facetCasts_ = 0;
+  gatheredBefore_ = false;
   longestStep_m_ = std::numeric_limits<double>::infinity();
   if (now.scene == before.scene) return;
   ++generation_;
@@ -405,6 +406,7 @@ void ContactQuery::learnWhatFits(double radius) noexcept {
   // Not where other gathers spent the work of the tick.
   if (!cache_.complete() && 2 * cache_.size() > FacetCache::kMaxTriangles) {
     fits_m_ = std::max(0.5 * radius, kSmallestGather_m);
+    reserve_m_ = std::min(reserve_m_, fits_m_);
     countBefore_ = FacetCache::kMaxTriangles;  // tells nothing of how few a smaller one leaves out
   } else if (cache_.complete() && cache_.size() < kFew && radius >= 0.5 * fits_m_) {
     fits_m_ *= 1.5;
@@ -417,7 +419,7 @@ void ContactQuery::adaptReserve() noexcept {
   constexpr int kMany = 1024;
   constexpr double kFewer = 0.7;
   constexpr int kTries = 32;  // gathers until a smaller one is tried again
-  const double most = kReserveShare * toolRadius_;
+  const double most = std::min(kReserveShare * toolRadius_, fits_m_);
   const int count = cache_.size();
   if (count < kMany / 4) {
     reserve_m_ = std::min(2 * reserve_m_, most);
@@ -432,6 +434,7 @@ void ContactQuery::adaptReserve() noexcept {
 
 bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
   cache_.restart(centre, radius);
+  gatheredBefore_ = true;
   joinedFans_ = false;
   if (isUnfit(centre, radius)) {
     cache_.invalidate();
@@ -494,9 +497,9 @@ bool ContactQuery::isReusable(double radius) const noexcept {
 
 bool ContactQuery::ensureGathered(const Vec3& centre, double radius) noexcept {
   if (isReusable(std::max(radius, reserve_m_)) && cache_.covers(centre, radius)) return true;
-  const double reserve = std::min(reserve_m_, fits_m_);
-  if (reserve > radius && gather(centre, reserve)) return true;
-  // Where fans are joined, a reserve saves the visits to their triangles in the next ticks.
+  // A tool that leaves what was gathered in the same tick would soon leave a reserve, too. But where fans are
+  // joined, it saves visits to their triangles.
+  if ((!gatheredBefore_ || joinedFans_) && reserve_m_ > radius && gather(centre, reserve_m_)) return true;
   if (joinedFans_ && gather(centre, 2 * radius)) return true;
   return gather(centre, radius);
 }

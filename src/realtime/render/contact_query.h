@@ -296,9 +296,10 @@ class ContactQuery {
   int unfitCount_ = 0;
   double longestStep_m_ = 0;
   double roomyReach_m_ = std::numeric_limits<double>::infinity();
-  double reserve_m_ = 0;  // of a ball tool: what is near is gathered at least within this
-  int countBefore_ = 0;   // of the triangles in the last reserve
-  int fullReserves_ = 0;  // how many are still gathered before a smaller one is tried
+  bool gatheredBefore_ = false;  // in this tick
+  double reserve_m_ = 0;         // of a ball tool: what is near is gathered at least within this
+  int countBefore_ = 0;          // of the triangles in the last reserve
+  int fullReserves_ = 0;         // how many are still gathered before a smaller one is tried
   double fits_m_ = std::numeric_limits<double>::infinity();  // what was not too much, of a ball tool
   int lastBlocker_ = 0;     // the gathered facet that blocked the last cast of a ball
   std::uint64_t cast_ = 0;  // of a ball: its number, and the last one that considered each gathered facet

@@ -124,15 +124,29 @@ void distribute(const Vec3& force, const ContactShares& shares, int count, Part&
   }
 }
 
+// Share of `added` with which it and `force` are together at most `most`, which `force` alone does not
+// exceed.
+double shareUpTo(double most, const Vec3& force, const Vec3& added) {
+  if ((force + added).norm() <= most) return 1;
+  const double a = added.squaredNorm();
+  const double b = force.dot(added);
+  const double c = std::min(0.0, force.squaredNorm() - most * most);
+  return std::clamp((std::sqrt(b * b - a * c) - b) / a, 0.0, 1.0);
+}
+
 // The slope of the stiffness pushes along the surfaces. Friction and adhesion bear what else the lateral part
 // of the spring exerts, each contact within its bound.
-void addTangentialForces(const ContactSet& contactSet, const ContactShares& shares, Rendering& out) {
+void addTangentialForces(const ContactSet& contactSet, const ContactShares& shares, double toolRadius_m,
+                         Rendering& out) {
   Vec3 spring = Vec3::Zero();
   double bound = 0;
+  bool yields = false;
   for (int i = 0; i < contactSet.count; ++i) {
     const ContactShare& share = shares[static_cast<std::size_t>(i)];
     spring += share.spring_N * contactSet.constraints[static_cast<std::size_t>(i)].halfSpace.normal;
     bound += share.friction_N;
+    yields = yields || isYielding(contactSet.constraints[static_cast<std::size_t>(i)],
+                                  contactSet.spring.stiffness_N_per_m, toolRadius_m);
   }
   if (!(out.depth_m > 0)) return;
   const Vec3 slope = contactSet.spring.slope_N + contactSet.spring.turn_N;
@@ -145,7 +159,12 @@ void addTangentialForces(const ContactSet& contactSet, const ContactShares& shar
   const Vec3 lateral = stiffness * contactSet.lateral_m - contactSet.spring.slope_N;
   const double force = lateral.norm();
   if (!(force > 0)) return;
-  const double share = std::min(1.0, bound / force);
+  double share = std::min(1.0, bound / force);
+  if (yields) {
+    // The springs may point elsewhere than the depths, which friction is across.
+    const Vec3 displacement = contactSet.normal_m + contactSet.lateral_m;
+    share *= shareUpTo(contactSet.spring.stiffness_N_per_m * displacement.norm(), spring, share * lateral);
+  }
   const Vec3 friction = share * lateral;
   out.contactForce_N += friction;
   if (contactSet.borneApart) {
@@ -173,7 +192,7 @@ void applySurfaceLaw(const ContactSet& contactSet, const Vec3& proxy_m, const Ve
   out.normal = (out.depth_m > 0 ? contactSet.normal_m : inward).normalized();
   out.scp_m = proxy_m - toolRadius_m * out.normal;
   out.contactForce_N = out.normalForce_N;
-  addTangentialForces(contactSet, shares, out);
+  addTangentialForces(contactSet, shares, toolRadius_m, out);
   const auto weaker = [](const Contact& a, const Contact& b) { return a.force_N.norm() < b.force_N.norm(); };
   const Contact* const first = out.contacts.data();
   out.touchedObject = std::max_element(first, first + out.contactCount, weaker)->object;
