@@ -15,9 +15,10 @@ namespace {
 // Float rounding of a coordinate is 2^-24 of its size; sixteen times that covers the box, the ray and the
 // traversal.
 constexpr double kRelativePad = 0x1p-20;
-// Largest coordinate in the tree, and a radius that reaches everything there.
+// Largest coordinate in the tree, of the centre of a query, and a radius that reaches everything from there.
 constexpr double kReach = 4;
-constexpr double kWholeTree = 16;
+constexpr double kFarCentre = 64;
+constexpr double kWholeTree = 256;
 // Of a point on a segment, relative to the segment's ends.
 constexpr double kDoubleRounding = 0x1p-50;
 // A segment shorter than this in the tree is a point within the pad; Embree does not take such directions.
@@ -193,6 +194,14 @@ struct SpatialIndex::Tree {
   double pad() const noexcept { return kRelativePad * kReach / scale; }
   Vec3f inTree(const Vec3& p) const noexcept { return ((p - origin) * scale).cast<float>(); }
 
+  // The nearest point that a query is centred on. The float error of a coordinate there, and of the distances
+  // that Embree computes from it, grows with the radius of whatever reaches the tree, and so does what
+  // pointQuery() adds to it. Farther away, the section of the ball with this cube is asked for.
+  Vec3 nearTree(const Vec3& p) const noexcept {
+    const Vec3 half = Vec3::Constant(kFarCentre / scale);
+    return p.cwiseMax(origin - half).cwiseMin(origin + half);
+  }
+
   RTCPointQuery pointQuery(const Vec3& centre, double radius) const noexcept {
     RTCPointQuery query{};
     const Vec3f at = inTree(centre);
@@ -317,12 +326,16 @@ void SpatialIndex::refit(const BoxedTriangles& all) {
   ++refits_;
 }
 
+// Whether any of the bounds is within `radius` of the centre.
+bool SpatialIndex::isWithin(double radius, const Vec3& centre) const noexcept {
+  return (centre.cwiseMax(bounds_.min).cwiseMin(bounds_.max) - centre).norm() <= radius + pad_;
+}
+
 void SpatialIndex::visitNearestImpl(const Vec3& centre, double radius, SegmentThunk thunk,
                                     void* visitor) const noexcept {
-  if (!tree_) return;
-  const Vec3 inside = centre.cwiseMax(bounds_.min).cwiseMin(bounds_.max);  // see visitNearImpl()
+  if (!tree_ || !isWithin(radius, centre)) return;
+  const Vec3 inside = tree_->nearTree(centre);
   const double beyond = (inside - centre).norm();
-  if (!(beyond <= radius + pad_)) return;
   RTCPointQuery point = tree_->pointQuery(inside, radiusInside(radius, beyond, pad_));
   NearestQuery query{thunk, visitor, tree_->scale, pad_, beyond, &point};
   NearQuery adapter{&NearestQuery::call, &query};
@@ -331,13 +344,9 @@ void SpatialIndex::visitNearestImpl(const Vec3& centre, double radius, SegmentTh
 
 void SpatialIndex::visitNearImpl(const Vec3& centre, double radius, NearThunk thunk,
                                  void* visitor) const noexcept {
-  if (!tree_) return;
-  // Outside the bounds the float error of the centre could exceed the pad, so the sphere is centred on its
-  // clamped point. Its radius is that of the part within the bounds: a ball of 10 mm on a flat mesh would
-  // otherwise visit a disc of 10 mm.
-  const Vec3 inside = centre.cwiseMax(bounds_.min).cwiseMin(bounds_.max);
+  if (!tree_ || !isWithin(radius, centre)) return;
+  const Vec3 inside = tree_->nearTree(centre);
   const double beyond = (inside - centre).norm();
-  if (!(beyond <= radius + pad_)) return;
   NearQuery query{thunk, visitor};
   RTCPointQuery point = tree_->pointQuery(inside, radiusInside(radius, beyond, pad_));
   runNear(tree_->scene, point, query);

@@ -108,6 +108,7 @@ class SpatialIndex {
  private:
   using NearThunk = bool (*)(void*, std::uint32_t) noexcept;
   using SegmentThunk = double (*)(void*, std::uint32_t) noexcept;
+  bool isWithin(double radius, const Vec3& centre) const noexcept;
   void visitNearImpl(const Vec3& centre, double radius, NearThunk thunk, void* visitor) const noexcept;
   void visitNearestImpl(const Vec3& centre, double radius, SegmentThunk thunk, void* visitor) const noexcept;
   void visitSegmentImpl(const Vec3& from, const Vec3& to, SegmentThunk thunk, void* visitor) const noexcept;

@@ -11,6 +11,8 @@
 #include <random>
 #include <set>
 
+#include "reduced.h"
+
 namespace hapticd::scene {
 namespace {
 
@@ -292,6 +294,29 @@ TEST(SpatialIndex, ABallOnASurfaceVisitsWhatItReaches) {
       return radius;
     });
     EXPECT_LE(asked, 4 * static_cast<int>(reached) + 64) << centre.transpose();
+  }
+}
+
+// From any distance, and with a radius that just reaches them.
+TEST(SpatialIndex, ACentreFarOffMissesNothing) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  const auto point = [&] { return Vec3(unit(random), unit(random), unit(random)); };
+  for (const double offset : {0.0, 3.0, 1000.0}) {
+    std::vector<Box> boxes;
+    for (int i = 0; i < 500; ++i) {
+      const Vec3 corner = Vec3::Constant(offset) + point();
+      boxes.push_back({corner, corner + 0.01 * point().cwiseAbs()});
+    }
+    const SpatialIndex index = indexOver(boxes);
+    for (int i = 0; i < reduced(3000); ++i) {
+      const double away = std::exp2(8 * unit(random) + 3);
+      const Vec3 centre = Vec3::Constant(offset) + away * point();
+      const double radius = distance(boxes[random() % boxes.size()], centre);
+      const std::set<std::uint32_t> visited = near(index, centre, radius);
+      for (std::uint32_t k = 0; k < boxes.size(); ++k)
+        ASSERT_TRUE(distance(boxes[k], centre) > radius || visited.contains(k)) << away << " away";
+    }
   }
 }
 

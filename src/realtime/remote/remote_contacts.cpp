@@ -315,7 +315,14 @@ void RemoteContacts::take(const RemoteContactSet& set, const RemoteHand& hand, N
 
 // What a fade takes from the spring, the hand gave: it pays for the correction that brings the force back.
 void RemoteContacts::giveBack(const Slot& slot, double energy_J) noexcept {
-  if (slot.depth_m > 0 && !slot.contact.yields) corrections_.give(-energy_J);
+  if (slot.depth_m > 0 && !slot.contact.yields) settle(slot, -energy_J);
+}
+
+// The work of a change. Of surfaces on top of each other each pays for its own, but gets back only what it
+// bears of it: together they take one spring from the hand.
+void RemoteContacts::settle(const Slot& slot, double work_J) noexcept {
+  const double borne = slot.demand_N > 0 ? std::min(1.0, slot.normal_N / slot.demand_N) : 0;
+  corrections_.give(work_J > 0 ? work_J : borne * work_J);
 }
 
 // The surface jumps where the client says, and shift and turn keep spring force and normal of the moment.
@@ -480,7 +487,7 @@ double RemoteContacts::takeBackShift(Slot& slot, double budget_N, double step_s)
   slot.shift_m += moved_m;
   slot.depth_m += moved_m;
   const double after_N = stiffness * std::max(0.0, slot.depth_m);
-  if (!c.yields) corrections_.give(0.5 * (before_N + after_N) * moved_m);
+  if (!c.yields) settle(slot, 0.5 * (before_N + after_N) * moved_m);
   return std::max(0.0, budget_N - std::abs(after_N - before_N));
 }
 
@@ -496,7 +503,7 @@ void RemoteContacts::changeStiffness(Slot& slot, double& budget_N) noexcept {
       held_ = true;
       after = before + corrections_.energy_J() / half_m2;
     }
-    corrections_.give((after - before) * half_m2);
+    settle(slot, (after - before) * half_m2);
   }
   slot.stiffness_N_per_m = after;
 }

@@ -95,6 +95,7 @@ class RemoteContacts {
   void replace(Slot& slot, const RemoteContact& contact, const RemoteContactSet& set, const RemoteHand& hand,
                Nanos now) noexcept;
   void giveBack(const Slot& slot, double energy_J) noexcept;
+  void settle(const Slot& slot, double work_J) noexcept;
   std::span<Slot> inUse() noexcept { return {slots_.data(), top_}; }
   Slot* slotFor(std::int32_t id) noexcept;
   // What a tick changes besides following the hand and the stated motion.

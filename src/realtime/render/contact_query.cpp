@@ -88,6 +88,15 @@ void ContactQuery::beginTick(const SceneAtTime& now, const SceneAtTime& before, 
   allAppeared_ = allAppeared_ || before.scene == nullptr || before.scene->faces != now.scene->faces;
 }
 
+void ContactQuery::forget() noexcept {
+  cache_.invalidate();
+  unfitCount_ = 0;
+  joinedFans_ = false;
+  roomyReach_m_ = fits_m_ = std::numeric_limits<double>::infinity();
+  reserve_m_ = keepsFacets_ ? 0 : kReserveShare * toolRadius_;
+  countBefore_ = fullReserves_ = 0;
+}
+
 void ContactQuery::addObjectsNear(const Vec3& centre, double reach, const Vec3& tool) noexcept {
   const scene::SceneSnapshot& scene = *now_.scene;
   if (!scene.objectIndex || scene.objects.size() <= 2) {
@@ -400,7 +409,7 @@ void ContactQuery::estimateRoom(double radius) noexcept {
   roomyReach_m_ = count > kMany ? few_m : std::max(roomyReach_m_, few_m);
 }
 
-// How much a ball tool gathers at once, as far as is known.
+// How much a ball tool gathers at once, as far as is known, also from the ticks before.
 void ContactQuery::learnWhatFits(double radius) noexcept {
   constexpr int kFew = FacetCache::kMaxTriangles / 3;
   // Not where other gathers spent the work of the tick.
@@ -464,8 +473,9 @@ bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
     joinedFans_ = joinedFans_ || (fans && fans->any());
   }
   if (keepsFacets_) estimateRoom(radius);
-  if (!keepsFacets_) learnWhatFits(radius);
-  if (radius == reserve_m_ && cache_.complete()) adaptReserve();
+  // Of what a ball is to pass nothing is here: that tells nothing of the next gathers.
+  if (!keepsFacets_ && passable_ == 0) learnWhatFits(radius);
+  if (radius == reserve_m_ && cache_.complete() && passable_ == 0) adaptReserve();
   gatheredCount_ = objectCount_;
   gatheredGeneration_ = reusable ? generation_ : 0;
   if (!cache_.complete() && !workSpent())
@@ -476,18 +486,29 @@ bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
 // Deforming facets of a point tool count at any distance: they may have come from farther away.
 void ContactQuery::addToCache(const FacetCache::TriangleId& id) noexcept {
   const PlacedObject& placed = object(id.object);
-  work_ += keepsFacets_ ? kVisit : kBallVisit;
   if (keepsFacets_) {
+    work_ += kVisit;
     if (const Facet* const facet = facetOf(id)) cache_.add(*facet, placed.deformed);
     return;
   }
-  // Of the three corners, only their middle is placed on the device.
+  const Ball ball = ballAround(id);
+  // The boxes of tilted triangles reach farther than they do. Deforming ones may have come from there.
+  if (!placed.deformed && !ball.isWithin(cache_.reach() + placed.radius + 4 * placed.skin, cache_.centre())) {
+    work_ += kBoxVisit;
+    return;
+  }
+  work_ += kBallVisit;
+  cache_.add(id, ball.centre, ball.radius, placed.skin);
+}
+
+// Of the three corners, only their middle is placed on the device.
+ContactQuery::Ball ContactQuery::ballAround(const FacetCache::TriangleId& id) const noexcept {
+  const PlacedObject& placed = object(id.object);
   const scene::Corners k = placed.state->mesh->corners(verticesOf(id), now_.time);
   const Vec3 middle = (k.a + k.b + k.c) * (1.0 / 3);
   const double radius2 =
       std::max({(k.a - middle).squaredNorm(), (k.b - middle).squaredNorm(), (k.c - middle).squaredNorm()});
-  cache_.add(id, placed.T_device_object * middle, kWiden * placed.metresPerUnit * std::sqrt(radius2),
-             placed.skin);
+  return {placed.T_device_object * middle, kWiden * placed.metresPerUnit * std::sqrt(radius2)};
 }
 
 // A fast tick gathers too many for the slow ticks after it.
@@ -578,7 +599,6 @@ bool ContactQuery::castAtFacet(const Facet& f, const Vec3& p, const Vec3& g, Obj
 // A total order on hits, so that the first one does not depend on the order of visits.
 void ContactQuery::considerFacet(const Facet& f, const Path& path, ObjectHit& best,
                                  bool& found) const noexcept {
-  if (f.object >= 0 && isPassable(f.object)) return;
   ObjectHit hit;
   const double latest = found ? best.stop : path.end;
   if (!castTool(f, path, latest, hit) || hit.stop > latest) return;
@@ -663,8 +683,8 @@ bool ContactQuery::castAtTriangles(const Path& path, int only, ObjectHit& hit) n
     return true;
   };
   const auto way = [&] { return Vec3(((found ? hit.stop : path.end) - path.begin) * path.d); };
-  // What blocked the last path, or is touched, often blocks this one at once: then farther ones need no exact
-  // test.
+  // What blocked the last path, or is nearly touched, often blocks this one at once: then farther ones need
+  // no exact test.
   constexpr double kAtOnce = 0.01;  // of the radius
   if (lastBlocker_ < cache_.size()) considerGathered(lastBlocker_, path, only, hit, found);
   if (way().norm() > kAtOnce * radius_ && !considerNear(Vec3::Zero())) return endUnexamined(path, hit);
@@ -700,7 +720,7 @@ bool ContactQuery::castAtEach(const Path& path, int only, ObjectHit& hit) noexce
   const Vec3 middle = path.p + 0.5 * (path.begin + path.end) * path.d;
   const double reach = 0.5 * (path.end - path.begin) * path.d.norm();
   for (int i = 0; i < objectCount_; ++i) {
-    if (only >= 0 && i != only) continue;
+    if ((only >= 0 && i != only) || isPassable(i)) continue;
     const PlacedObject& placed = object(i);
     const double reach_m = reach + placed.radius + 4 * placed.skin;
     const Vec3 inObject = placed.T_object_device * middle;
@@ -708,7 +728,12 @@ bool ContactQuery::castAtEach(const Path& path, int only, ObjectHit& hit) noexce
         inObject, reach_m * kWiden * placed.stretch, [&](std::uint32_t triangle) noexcept -> bool {
           if (workSpent()) return false;
           if (!mayReach(placed, triangle, inObject, reach_m)) return true;
-          const Facet* const f = facetOf({triangle, static_cast<std::int16_t>(i), 0});
+          const FacetCache::TriangleId id{triangle, static_cast<std::int16_t>(i), 0};
+          if (!keepsFacets_ && !ballAround(id).isWithin(reach_m, middle)) {
+            work_ += kBoxVisit;
+            return true;
+          }
+          const Facet* const f = facetOf(id);
           if (f == nullptr) {
             work_ += kVisit;
           } else {

@@ -97,6 +97,9 @@ class ContactQuery {
     crowd_ = 0;
     distances_.restart();
   }
+  /// Drops what earlier ticks learnt to save work. With it, the levels of fans may differ, and where the work
+  /// of a tick ends.
+  void forget() noexcept;
   /// The tool has left all that appeared around it.
   void leaveAll() noexcept { enclosingCount_ = 0; }
   /// Starts a tick without objects, with the tool where the tick before left it. `planes` take part in every
@@ -212,6 +215,9 @@ class ContactQuery {
   struct Ball {
     Vec3 centre;
     double radius;
+    bool isWithin(double distance, const Vec3& p) const noexcept {
+      return (centre - p).squaredNorm() <= (distance + radius) * (distance + radius);
+    }
   };
 
   // The result of makeFacet(); generation 0: not valid in the next tick.
@@ -254,6 +260,7 @@ class ContactQuery {
   geometry::Triangle verticesOf(const FacetCache::TriangleId& id) const noexcept;
   scene::Corners cornersOf(const FacetCache::TriangleId& id) const noexcept;
   const Facet* facetOf(const FacetCache::TriangleId& id) const noexcept;
+  Ball ballAround(const FacetCache::TriangleId& id) const noexcept;
   void addToCache(const FacetCache::TriangleId& id) noexcept;
   auto normals() const noexcept {
     return [this](const FacetCache::TriangleId& id) { return discAround(cornersOf(id)).normal; };
@@ -323,6 +330,12 @@ template <class Visit>
 void ContactQuery::forEachGathered(const Vec3& p, double distance, Visit&& visit) noexcept {
   if (keepsFacets_) {
     for (const Facet& f : cache_) visit(f);
+    return;
+  }
+  if (std::isinf(distance)) {
+    for (int i = 0; i < cache_.size(); ++i) {
+      if (const Facet* const f = facetOf(cache_.triangle(i))) visit(*f);
+    }
     return;
   }
   cache_.moveTo(p);

@@ -115,7 +115,7 @@ FacetCache::NearPlane FacetCache::planeBefore(std::size_t i, const Vec3f& p) con
   const Vec3f away = length > discRadii_[i] ? Vec3f(up + (1 - discRadii_[i] / length) * aside) : up;
   const float distance = away.norm();
   const Vec3f normal = distance > 0 ? Vec3f(away / distance) : Vec3f(Vec3f::Zero());
-  return {normal, distance - 4 * kSingleRounding * offset.norm()};
+  return {normal, distance - kSingleRounding * (4 * offset.norm() + p.norm())};
 }
 
 void FacetCache::makeNearPlanes() noexcept {

@@ -90,6 +90,7 @@ class Proxy {
   /// In this tick a command changed what is in contact: surfaces, planes, the workspace.
   bool commandChanged() const noexcept { return commandChanged_; }
   PlacedPlanes& planes() noexcept { return planes_; }
+  void forget() noexcept { query_.forget(); }
   /// What the last tick did: casts, how often they tried one facet, and triangles that it examined in all.
   int casts() const noexcept { return casts_; }
   int facetCasts() const noexcept { return query_.facetCasts(); }

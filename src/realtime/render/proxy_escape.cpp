@@ -344,7 +344,7 @@ void Proxy::extrapolateStep(const Vec3& step, const Vec3& target, const ActiveSe
   const double farthest = pull.norm() + kClimb * query_.radius();
   const double a = step.squaredNorm();
   const double b = step.dot(pull);
-  // On one face there is no nearer place.
+  // On one face there is no nearer place; where the slide ended at its edge, the next approach goes on.
   const bool onFace = active.count == 1 && !active.hits[0].atEdge;
   if (onFace && std::abs(b) <= kSideways * step.norm() * pull.norm()) return;
   const double c = pull.squaredNorm() - farthest * farthest;

@@ -533,7 +533,7 @@ bool Proxy::pushByDeformingFaces(const Vec3& from, Pushers& pushers, std::uint32
       reach = std::max(reach, (object.carried(from) - position_).norm() + missedMove(object));
   }
   if (reach < 0) return false;
-  if (!query_.ensureGathered(position_, reach + kGatherMargin_m)) status |= kRenderCandidateLimit;
+  if (!query_.gather(position_, reach + kGatherMargin_m)) status |= kRenderCandidateLimit;
   ObjectHit farthest;
   double height = 0;
   query_.forEachGathered(position_, std::numeric_limits<double>::infinity(), [&](const Facet& f) {

@@ -136,6 +136,10 @@ bool Renderer::remember(const Rendering& last, RenderMemory& out) const noexcept
   return effects && fields && planes && state_->passivity.isEven() && !last.touching && last.status == 0;
 }
 
+void Renderer::forget() noexcept {
+  state_->proxy.forget();
+}
+
 void Renderer::resume(const Rendering& last) noexcept {
   state_->proxy.resume(last.proxy_m);
   state_->last = {last.contactForce_N, 0, last.proxy_m};  // free: the proxy is at the HIP
@@ -144,6 +148,7 @@ void Renderer::resume(const Rendering& last) noexcept {
 }
 
 void Renderer::resume(const RenderMemory& memory) noexcept {
+  forget();
   state_->effects.resume(memory);
   state_->fields.resume(memory);
   state_->proxy.planes().resume(memory);

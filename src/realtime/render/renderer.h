@@ -99,6 +99,8 @@ class Renderer {
   /// What resume() needs after a step that had this result; false where more than that is needed: in contact,
   /// and while a force ramps out.
   bool remember(const Rendering& last, RenderMemory& out) const noexcept;
+  /// Drops what only saves work, and is not remembered: call it where a memory is taken, as resume() does.
+  void forget() noexcept;
   /// Continues after a step that had this result, free of contact, in the scene of the last step().
   void resume(const Rendering& last) noexcept;
   void resume(const RenderMemory& memory) noexcept;

@@ -260,6 +260,7 @@ void Tick::remember(MemoryRing* ring) noexcept {
                   report_.time > sceneSettledAt_ &&
                   report_.revision >= rememberFrom_.load(std::memory_order_acquire);
   if (first || memory_.whole) ring->push(memory_);
+  if (memory_.whole) renderer_.forget();
 }
 
 // False while something that was streamed acts, or may still fade.

@@ -178,11 +178,15 @@ StreamedInput::Answer StreamedInput::answer(scene::ClientId client, Kind kind, N
 }
 
 // The longest one of late that came twice: a single late message, as after a pause of the network, is none.
-// Of messages that arrive together, the servo feels the last.
+// Of messages that arrive together, faster than they were made, the servo feels the last.
 void StreamedInput::measureRoundTrip(std::int64_t stateTime, Nanos received) {
   const Nanos measured =
       stateTime > 0 ? std::clamp<Nanos>(received - stateTime, 0, kLongestRoundTrip) : kUnknownRoundTrip;
-  if (received - contacts_.burst >= kTogether) {
+  const Nanos gap = received - contacts_.way.measuredAt;
+  const bool together = received - contacts_.burst < kTogether ||
+                        (gap < kTogether && 2 * gap < stateTime - contacts_.stateTime);
+  contacts_.stateTime = stateTime;
+  if (!together) {
     contacts_.burst = received;
     contacts_.wayBefore = contacts_.way;
   }
@@ -211,8 +215,8 @@ std::string StreamedInput::keepWithinBounds(RemoteContactSet& set, const realtim
     scene::SceneConfig config = config_;
     if (contact.yields) config.transportDelay_s += base::toSeconds(contacts_.way.roundTrip);
     double most = 0;
-    for (const RemoteContact& other : others) most = std::max(most, opposition(contact, other, hand_m));
-    config.ownDamping_Ns_per_m /= 1 + most;
+    for (const RemoteContact& other : others) most += opposition(contact, other, hand_m);
+    config.ownDamping_Ns_per_m /= 1 + std::min(1.0, most);
     scene::Surface surface;
     surface.stiffness_N_per_m = contact.stiffness_N_per_m;
     surface.damping_Ns_per_m = contact.damping_Ns_per_m;

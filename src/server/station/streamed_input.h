@@ -54,11 +54,12 @@ class StreamedInput {
   // The client whose values of a kind are felt.
   struct Stream {
     std::optional<scene::ClientId> client;
-    base::Nanos until = 0;    // its last value expires
-    std::int64_t newest = 0;  // its newest stamp
-    base::Nanos offset = 0;   // smallest difference between receipt and stamp
-    Way way, wayBefore;       // now, and before the messages that arrive together with the newest
-    base::Nanos burst = 0;    // the first of these arrived
+    base::Nanos until = 0;      // its last value expires
+    std::int64_t newest = 0;    // its newest stamp
+    base::Nanos offset = 0;     // smallest difference between receipt and stamp
+    Way way, wayBefore;         // now, and before the messages that arrive together with the newest
+    base::Nanos burst = 0;      // the first of these arrived
+    base::Nanos stateTime = 0;  // of the newest
   };
 
   bool begin(Stream& stream, scene::ClientId client, std::int64_t time, base::Nanos received,

@@ -151,6 +151,29 @@ TEST(FineSheet, that_moves_keeps_its_force) {
   }
 }
 
+// A vertex that stands out elsewhere, and a boss: the ball's centre is outside the box of the mesh, and near
+// to what it touches.
+TEST(FineSheet, that_is_not_flat_is_felt) {
+  for (const double radius : {0.005, 0.02}) {
+    for (const bool boss : {false, true}) {
+      const double half = 0.4 * radius;
+      const int cells = reduced(140, 90);
+      TriangleMesh mesh = plane(half, cells);
+      for (Vec3f& v : mesh.vertices) {
+        const bool corner = v.x() < -0.97 * half && v.y() < -0.97 * half;
+        if (boss ? v.x() < -0.8 * half : corner) v.z() = static_cast<float>(0.1 * radius);
+      }
+      SceneFixture scene;
+      scene.add(mesh, surface(1000));
+      Hand hand(scene.snapshot(), {.toolRadius_m = radius});
+      const double x = 0.3 * half;
+      hand.at({x, 0, 1.2 * radius});
+      hand.to({x, 0, radius - 0.0005}, 0.05, [&](const Rendering& r) { ASSERT_EQ(r.status, 0U); });
+      EXPECT_NEAR(hand.now().force_N.z(), 0.5, 1e-6) << radius << (boss ? " boss" : " corner");
+    }
+  }
+}
+
 // The same: the reserve, too, is what fits.
 TEST(FineSheet, that_moves_is_examined_in_part) {
   constexpr double kRadius = 0.01;
@@ -170,6 +193,48 @@ TEST(FineSheet, that_moves_is_examined_in_part) {
   }
   std::nth_element(visits.begin(), visits.begin() + 100, visits.end());
   EXPECT_LT(visits[100], 1000);
+}
+
+// What was learnt elsewhere ends where a recording begins: from there, the same hand gives the same in every
+// bit. The levels of a fan depend on how far a tick gathers.
+TEST(FineSheet, leaves_nothing_behind_once_forgotten) {
+  constexpr double kRadius = 0.005;
+  constexpr int kMeridians = 600;
+  TriangleMesh cone;
+  cone.vertices.push_back(Vec3f::Zero());
+  for (int i = 0; i < kMeridians; ++i) {
+    const double a = 2 * M_PI * i / kMeridians;
+    const auto next = static_cast<std::uint32_t>(1 + (i + 1) % kMeridians);
+    cone.vertices.push_back(Vec3(0.008 * std::cos(a), 0.008 * std::sin(a), -0.0005).cast<float>());
+    cone.triangles.push_back({0, static_cast<std::uint32_t>(1 + i), next});
+  }
+  SceneFixture scene;
+  scene.add(cone, surface(1000));
+  scene.add(plane(0.008, 400), surface(1000), Affine(Eigen::Translation3d(0.1, 0, 0)));
+  const auto snapshot = scene.snapshot();
+  const auto feltOn = [&](bool sheetBefore) {
+    const auto proxy = std::make_unique<Proxy>(RenderOptions{.toolRadius_m = kRadius});
+    Nanos now = 0;
+    std::vector<std::pair<std::uint32_t, Vec3>> felt;
+    const auto at = [&](const Vec3& hip) {
+      std::uint32_t status = 0;
+      proxy->follow({snapshot.get(), now += kTick}, hip, 1e-3, status);
+      felt.emplace_back(status, proxy->position());
+    };
+    for (int i = 0; sheetBefore && i < 400; ++i)
+      at({0.1 + 0.003 * std::cos(0.1 * i), 0.003 * std::sin(0.1 * i),
+          kRadius + std::max(-0.0005, 0.001 - 5e-5 * i)});
+    for (int i = 0; i < 5; ++i) at({0, 0.0002, kRadius + 0.02});
+    proxy->forget();
+    felt.clear();
+    for (int i = 0; i < 2000; ++i) {
+      const double t = 0.001 * i;
+      at({0.001 * std::sin(7 * t), 0.0002 + 0.0007 * std::cos(5 * t),
+          kRadius + 0.002 - 0.003 * std::min(1.0, t)});
+    }
+    return felt;
+  };
+  EXPECT_TRUE(feltOn(true) == feltOn(false));
 }
 
 // What fits is known from the ticks before, but for the first one: all of it would be too much in every tick.

@@ -444,6 +444,45 @@ TEST(RemoteContacts, ASurfaceThatSoftensIsNotFeltOutside) {
   }
 }
 
+// Surfaces on top of each other take one spring from the hand, and give back no more when they fade or
+// soften: else the one that stays would push it out with what was never taken.
+TEST(RemoteContacts, CoincidentSurfacesGiveBackOneSpring) {
+  for (const bool soften : {false, true}) {
+    double worked_J[2] = {};
+    for (const int floors : {1, 16}) {
+      Rig rig;
+      const auto all = [&](double stiffness) {
+        std::vector<RemoteContact> set(static_cast<std::size_t>(floors), floorAt(0, stiffness));
+        for (int i = 0; i < floors; ++i) set[static_cast<std::size_t>(i)].id = i;
+        return set;
+      };
+      double& work_J = worked_J[floors > 1];
+      const auto follow = [&](const std::vector<RemoteContact>& set, double to_m, int ticks) {
+        const double from_m = rig.hand.position_m.y();
+        for (int i = 1; i <= ticks; ++i) {
+          if (i % 8 == 1) rig.state(set);
+          const double before_N = rig.force.y();
+          const double before_m = rig.hand.position_m.y();
+          rig.hand.position_m.y() = from_m + (to_m - from_m) * i / ticks;
+          rig.step();
+          work_J += 0.5 * (before_N + rig.force.y()) * (rig.hand.position_m.y() - before_m);
+        }
+      };
+      rig.hand.position_m = {0, 0.001, 0};
+      for (int round = 0; round < 10; ++round) {
+        follow(all(1000), 0.001, 20);
+        follow(all(1000), -0.0025, 20);
+        follow(soften ? all(1) : std::vector<RemoteContact>{floorAt(0, 1000)}, -0.0025, 460);
+        follow({floorAt(0.006, 1000)}, -0.0025, 60);  // rises, and does not say so
+        follow({floorAt(0.006, 1000)}, 0.0075, 60);
+        follow({}, 0.0075, 20);
+        follow({}, 0.001, 20);
+      }
+    }
+    EXPECT_NEAR(worked_J[1], worked_J[0], 0.005) << (soften ? "softened" : "faded");
+  }
+}
+
 TEST(RemoteContacts, LifeIncludesTheFade) {
   Rig rig;
   RemoteContact c = floorAt(0);

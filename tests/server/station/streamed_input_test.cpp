@@ -174,16 +174,20 @@ TEST_F(StreamedInputTest, ABurstAfterAPauseIsOneMessage) {
   n[18] = 400;
   n[23] = 1;
   const base::Nanos start = now_;
-  const auto sendAll = [&](int from_ms, int until_ms, int arrived_ms) {
+  const auto sendAll = [&](int from_ms, int until_ms, int arrived_ms, int apart_us = 16) {
     for (int ms = from_ms; ms < until_ms; ms += 16) {
-      now_ = start + std::max(ms + 5, arrived_ms) * kStreamMillisecond + ms * 1000;
+      now_ = start + std::max(ms + 5, arrived_ms) * kStreamMillisecond;
+      if (ms + 5 < arrived_ms) now_ += (ms - from_ms) / 16 * apart_us * 1000;
       send(n, 1, 0, start + (ms - 5) * kStreamMillisecond);
     }
     return first().stiffness_N_per_m;
   };
   EXPECT_EQ(sendAll(0, 400, 0), 400);
   EXPECT_EQ(sendAll(400, 560, 555), 400);
-  EXPECT_EQ(sendAll(560, 800, 0), 400);
+  EXPECT_EQ(sendAll(560, 20'000, 0), 400);
+  // A slow line spreads the burst.
+  EXPECT_EQ(sendAll(20'000, 20'160, 20'155, 1500), 400);
+  EXPECT_EQ(sendAll(20'176, 20'400, 0), 400);
 }
 
 TEST_F(StreamedInputTest, FacingSurfacesShareTheBoundWhereTheyMaySqueezeTheHand) {
@@ -280,6 +284,27 @@ TEST_F(StreamedInputTest, WallsOfAGrooveShareTheBound) {
     const double opposed = std::max(0.0, -std::cos(2 * half));
     EXPECT_NEAR(first().stiffness_N_per_m, whole / (1 + opposed), 1e-6) << degrees << " degrees";
   }
+}
+
+TEST_F(StreamedInputTest, AWallSharesTheBoundWithAllThatItFaces) {
+  const double whole = 0.999 * 5 / 0.0005;
+  const auto stiffnessAgainst = [&](const std::vector<double>& degrees) {
+    std::vector<double> all = floorAt(0, 1);
+    all[18] = 1e5;
+    double id = 2;
+    for (const double away : degrees) {
+      std::vector<double> wall = floorAt(0, id++);
+      wall[6] = std::sin(away * M_PI / 180);
+      wall[7] = -std::cos(away * M_PI / 180);
+      wall[18] = 1e5;
+      all.insert(all.end(), wall.begin(), wall.end());
+    }
+    send(all);
+    return first().stiffness_N_per_m;
+  };
+  EXPECT_NEAR(stiffnessAgainst({60}), whole / 1.5, 1e-6);
+  EXPECT_NEAR(stiffnessAgainst({60, -60}), whole / 2, 1e-6);
+  EXPECT_NEAR(stiffnessAgainst({0, 0, 0}), whole / 2, 1e-6) << "on top of each other they are one";
 }
 
 TEST_F(StreamedInputTest, RefusesWhatCannotBeUsedAndKeepsTheRest) {
