@@ -116,6 +116,7 @@ _COMMANDS: Final[Dict[int, Tuple[str, Tuple[Tuple[str, str], ...]]]] = {
     40: ("CommitBatch", ()),
     41: ("ReleaseForces", ()),
     42: ("SetObjectName", (("object", "i"), ("text", "text"))),
+    43: ("ContinueEffect", (("index", "i"), ("ran_ns", "q"))),
 }  # fmt: skip
 
 

@@ -48,8 +48,8 @@ class SceneBuilder {
   /// The scene as of the last publish(), for people to look at.
   SceneDescription describe() const;
 
-  /// Commands that make an empty scene this one, open batches included. Effects and the motions at hand begin
-  /// anew; forces whose client left are not among them.
+  /// Commands that make an empty scene this one, open batches included. Motions at hand begin anew; forces
+  /// whose client left are not among them.
   std::vector<ClientCommand> commands(Nanos now) const;
   /// Of the last snapshot.
   std::uint64_t revision() const noexcept;

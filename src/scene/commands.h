@@ -276,6 +276,13 @@ struct StopEffect {
   std::int32_t index = 0;
 };
 
+/// Starts an effect as if so long ago. Recordings that begin while the server runs have it.
+struct ContinueEffect {
+  static constexpr CommandInfo kInfo{"ContinueEffect", kNoMessage, Target::forces, "index", "ran_ns"};
+  std::int32_t index = 0;
+  std::int64_t ran_ns = 0;
+};
+
 /// a x + b y + c z + d = 0 with d in metres; a zero normal removes it. Stock units as in SetSurface.
 struct SetPlane {
   static constexpr CommandInfo kInfo{"SetPlane",        kNoMessage,      Target::forces, "index",
@@ -385,7 +392,7 @@ using CommandVariant =
                  SetHapticOrigin, SetHapticScale, SetSceneOrigin, DefineEffect, StartEffect, StopEffect,
                  SetPlane, SetPlaneDetail, SetForceField, SetConstraintEnabled, SetConstraintMode,
                  SetConstraintVector, SetConstraintStiffness, StartCustomEffect, StopCustomEffect, ResetScene,
-                 BeginBatch, CommitBatch, ReleaseForces, SetObjectName>;
+                 BeginBatch, CommitBatch, ReleaseForces, SetObjectName, ContinueEffect>;
 
 /// Any one command; std::visit, std::get and their like work on it. Copying, moving and destroying are
 /// compiled once, in commands.cpp: a variant of so many structs costs every file that holds one several

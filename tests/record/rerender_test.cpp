@@ -648,6 +648,88 @@ void removeBlocks(const std::filesystem::path& file, record::BlockKind kind) {
       .write(reinterpret_cast<const char*>(kept.data()), static_cast<std::streamsize>(kept.size()));
 }
 
+// As a version wrote the file that let effects start anew.
+void startEffectsAnew(const std::filesystem::path& file) {
+  record::Bytes changed(record::magic().begin(), record::magic().end());
+  record::BlockReader blocks(file);
+  for (record::BlockReader::Block block; blocks.next(block);) {
+    record::SceneEvent event;
+    std::string error;
+    const bool ofScene =
+        block.kind == record::BlockKind::scene && record::unpackSceneEvent(block.content, event, error);
+    const auto* goesOn =
+        ofScene && event.command ? std::get_if<scene::ContinueEffect>(&*event.command) : nullptr;
+    if (goesOn == nullptr) {
+      record::appendBlock(changed, block.kind, block.content);
+      continue;
+    }
+    const scene::SceneCommand start = scene::StartEffect{goesOn->index};
+    record::Bytes content;
+    record::packSceneEvent(content, event.scene, event.client, event.time, &start);
+    record::appendBlock(changed, block.kind, content);
+  }
+  std::ofstream(file, std::ios::binary)
+      .write(reinterpret_cast<const char*>(changed.data()), static_cast<std::streamsize>(changed.size()));
+}
+
+scene::DefineEffect pull(std::int32_t index, double duration_ms) {
+  return {"constant", index, 0, 0.4, duration_ms, 0, geometry::Vec3::Zero(), {1, 0, 0}};
+}
+
+// The force ramps in until the effect has ended: so no tick that is compared felt it.
+TEST(RecordingBegunLate, EndsATimedEffectWhenItEnded) {
+  const RecordingFile file;
+  LateRecording r;
+  r.send(pull(1, 1000));
+  r.send(scene::StartEffect{1});
+  r.glide(kAbove, 900);
+  r.control().rampIn();
+  r.record(file.path());
+  r.glide(kAbove, 1000);
+  EXPECT_EQ(r.last().rendering.force_N.norm(), 0);
+  r.end();
+  const Compared compared = rerender(file.path()).front();
+  EXPECT_GT(compared.ticks, 400U);
+  EXPECT_EQ(compared.same, compared.ticks) << compared.firstDifference;
+  startEffectsAnew(file.path());
+  EXPECT_EQ(rerender(file.path()).front().same, compared.ticks) << "of an older version";
+}
+
+// Its new definition has no duration, and nobody starts it.
+TEST(RecordingBegunLate, DefinesAnEffectThatEndedWithoutStartingIt) {
+  const RecordingFile file;
+  LateRecording r;
+  r.send(pull(1, 1000));
+  r.send(scene::StartEffect{1});
+  r.glide(kAbove, 800);
+  r.record(file.path());
+  r.glide(kAbove, 500);
+  r.send(pull(1, 0));
+  r.glide(kAbove, 500);
+  EXPECT_EQ(r.last().rendering.force_N.norm(), 0);
+  r.end();
+  const Compared compared = rerender(file.path()).front();
+  EXPECT_GT(compared.ticks, 900U);
+  EXPECT_EQ(compared.same, compared.ticks) << compared.firstDifference;
+}
+
+// A start waits for its definition for one second, also when the recording begins meanwhile.
+TEST(RecordingBegunLate, ForgetsAStartWithoutADefinitionWhenItWasForgotten) {
+  const RecordingFile file;
+  LateRecording r;
+  r.send(scene::StartEffect{5});
+  r.glide(kAbove, 600);
+  r.record(file.path());
+  r.glide(kAbove, 700);
+  r.send(pull(5, 0));
+  r.glide(kAbove, 300);
+  EXPECT_EQ(r.last().rendering.force_N.norm(), 0);
+  r.end();
+  const Compared compared = rerender(file.path()).front();
+  EXPECT_GT(compared.ticks, 900U);
+  EXPECT_EQ(compared.same, compared.ticks) << compared.firstDifference;
+}
+
 void pullAndPush(LateRecording& r, scene::ClientId client) {
   r.send(scene::DefineEffect{"constant", 1, 0, 0.4, 0, 0, geometry::Vec3::Zero(), {1, 0, 0}}, client);
   r.send(scene::StartEffect{1}, client);
