@@ -35,7 +35,8 @@ class SceneBuilder::State {
   void take(SceneCommand&& command, const Call& call) {
     const auto open = batches_.find(call.client);
     if (open == batches_.end() || std::holds_alternative<BeginBatch>(command) ||
-        std::holds_alternative<CommitBatch>(command) || std::holds_alternative<ReleaseForces>(command)) {
+        std::holds_alternative<CommitBatch>(command) || std::holds_alternative<RefuseBatch>(command) ||
+        std::holds_alternative<ReleaseForces>(command)) {
       dispatch(command, call);
       return;
     }
@@ -116,6 +117,7 @@ class SceneBuilder::State {
     forces_.appendCommands(now, commands);
     for (const auto& [client, batch] : batches_) {
       commands.push_back({client, BeginBatch{}});
+      if (batch.refused) commands.push_back({client, RefuseBatch{}});
       batch.commands.forEach([&](const SceneCommand& command) { commands.push_back({client, command}); });
     }
     return commands;
@@ -234,6 +236,10 @@ class SceneBuilder::State {
   void apply(BeginBatch&, const Call& call) {
     if (!batches_.try_emplace(call.client).second)
       call.warn("begin of batch", "ignored: the batch is open already");
+  }
+  void apply(RefuseBatch&, const Call& call) {
+    const auto open = batches_.find(call.client);
+    if (open != batches_.end()) refuse(open->second);
   }
   void apply(CommitBatch&, const Call& call) {
     auto batch = batches_.extract(call.client);

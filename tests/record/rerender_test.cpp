@@ -351,6 +351,7 @@ class LateRecording {
  public:
   using Vec3 = geometry::Vec3;
   static constexpr base::Nanos kTick = 1'000'000;
+  static constexpr std::size_t kBatch_bytes = 8192;
 
   LateRecording() {
     // A box from 0 to 20 mm; an object without a placement is in metres.
@@ -462,6 +463,7 @@ class LateRecording {
     record::RecordedDevice device;
     device.names = {"Phantom"};
     device.driver = "simulated";
+    device.sceneConfig.limits.batch_bytes = kBatch_bytes;
     device.tick.guard.armed = true;
     device.tick.guard.peakForce_N = 4;
     device.tick.guard.continuousForce_N = 1;
@@ -727,6 +729,30 @@ TEST(RecordingBegunLate, ForgetsAStartWithoutADefinitionWhenItWasForgotten) {
   r.end();
   const Compared compared = rerender(file.path()).front();
   EXPECT_GT(compared.ticks, 900U);
+  EXPECT_EQ(compared.same, compared.ticks) << compared.firstDifference;
+}
+
+TEST(RecordingBegunLate, LeavesABatchRefusedThatWasRefused) {
+  const RecordingFile file;
+  LateRecording r;
+  r.send(scene::BeginBatch{}, 2);
+  r.send(scene::SetVertices{1, 0, std::vector<geometry::Vec3f>(LateRecording::kBatch_bytes)}, 2);
+  r.glide(kAbove, 700);
+  r.record(file.path());
+  r.glide(kAbove, 50);
+  r.send(pull(1, 0), 2);
+  r.send(scene::StartEffect{1}, 2);
+  r.send(scene::CommitBatch{}, 2);
+  r.send(scene::SetTouchableFaces{0});  // for a publication
+  r.glide(kAbove, 100);
+  EXPECT_EQ(r.last().rendering.force_N.norm(), 0);
+  r.send(pull(1, 0), 2);
+  r.send(scene::StartEffect{1}, 2);
+  r.glide(kAbove, 100);
+  EXPECT_NEAR(r.last().rendering.force_N.norm(), 0.4, 1e-9) << "after the batch";
+  r.end();
+  const Compared compared = rerender(file.path()).front();
+  EXPECT_GT(compared.ticks, 200U);
   EXPECT_EQ(compared.same, compared.ticks) << compared.firstDifference;
 }
 
