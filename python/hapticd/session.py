@@ -116,6 +116,8 @@ _COMMANDS: Final[Dict[int, Tuple[str, Tuple[Tuple[str, str], ...]]]] = {
     40: ("CommitBatch", ()),
     41: ("ReleaseForces", ()),
     42: ("SetObjectName", (("object", "i"), ("text", "text"))),
+    43: ("ContinueEffect", (("index", "i"), ("ran_ns", "q"))),
+    44: ("RefuseBatch", ()),
 }  # fmt: skip
 
 

@@ -15,6 +15,10 @@
 namespace hapticd::scene {
 namespace {
 
+// Before a description by commands: so that its meshes need not wait for further edits, and its movements are
+// over and measure no interval from it.
+constexpr Nanos kSettled = 500'000'000;
+
 std::size_t bytesOf(const SceneCommand& command) {
   std::size_t bytes = sizeof(SceneCommand);
   if (const auto* run = std::get_if<SetVertices>(&command)) bytes += run->positions.size() * sizeof(Vec3f);
@@ -35,7 +39,8 @@ class SceneBuilder::State {
   void take(SceneCommand&& command, const Call& call) {
     const auto open = batches_.find(call.client);
     if (open == batches_.end() || std::holds_alternative<BeginBatch>(command) ||
-        std::holds_alternative<CommitBatch>(command) || std::holds_alternative<ReleaseForces>(command)) {
+        std::holds_alternative<CommitBatch>(command) || std::holds_alternative<RefuseBatch>(command) ||
+        std::holds_alternative<ReleaseForces>(command)) {
       dispatch(command, call);
       return;
     }
@@ -116,12 +121,25 @@ class SceneBuilder::State {
     forces_.appendCommands(now, commands);
     for (const auto& [client, batch] : batches_) {
       commands.push_back({client, BeginBatch{}});
-      batch.commands.forEach([&](const SceneCommand& command) { commands.push_back({client, command}); });
+      if (batch.refused) commands.push_back({client, RefuseBatch{}});
+      batch.commands.forEach([&](const SceneCommand& command) {
+        commands.push_back({client, command, now});
+      });
     }
+    for (ClientCommand& c : commands) {
+      const Nanos before = targetOf(c.command) == Target::objects ? now - kSettled : now;
+      c.at = std::max(c.at, before);
+    }
+    std::stable_sort(commands.begin(), commands.end(),
+                     [](const ClientCommand& a, const ClientCommand& b) { return a.at < b.at; });
     return commands;
   }
 
   std::uint64_t revision() const noexcept { return revision_; }
+  std::optional<std::uint64_t> revisionWith(Nanos edits) const noexcept {
+    const std::optional<Nanos> oldest = oldestEdit();
+    return !oldest || *oldest > edits ? std::optional(revision_) : std::nullopt;
+  }
   std::uint64_t resets() const noexcept { return resets_; }
   const std::shared_ptr<ForceOwners>& owners() const noexcept { return config_.owners; }
   NoticeBoard& board() { return board_; }
@@ -235,6 +253,10 @@ class SceneBuilder::State {
     if (!batches_.try_emplace(call.client).second)
       call.warn("begin of batch", "ignored: the batch is open already");
   }
+  void apply(RefuseBatch&, const Call& call) {
+    const auto open = batches_.find(call.client);
+    if (open != batches_.end()) refuse(open->second);
+  }
   void apply(CommitBatch&, const Call& call) {
     auto batch = batches_.extract(call.client);
     if (!batch) {
@@ -304,6 +326,10 @@ std::vector<ClientCommand> SceneBuilder::commands(Nanos now) const {
 
 std::uint64_t SceneBuilder::revision() const noexcept {
   return state_->revision();
+}
+
+std::optional<std::uint64_t> SceneBuilder::revisionWith(Nanos edits) const {
+  return state_->revisionWith(edits);
 }
 
 const std::shared_ptr<ForceOwners>& SceneBuilder::owners() const noexcept {

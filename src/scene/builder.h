@@ -48,11 +48,14 @@ class SceneBuilder {
   /// The scene as of the last publish(), for people to look at.
   SceneDescription describe() const;
 
-  /// Commands that make an empty scene this one, open batches included. Effects and the motions at hand begin
-  /// anew; forces whose client left are not among them.
+  /// Commands that make an empty scene this one, open batches included. Motions at hand begin anew; forces
+  /// whose client left are not among them. In the order of their times, which let meshes be published that
+  /// have been, and others when they are.
   std::vector<ClientCommand> commands(Nanos now) const;
   /// Of the last snapshot.
   std::uint64_t revision() const noexcept;
+  /// The same, if it shows all edits up to this time.
+  std::optional<std::uint64_t> revisionWith(Nanos edits) const;
   /// Those of its configuration; may be null.
   const std::shared_ptr<ForceOwners>& owners() const noexcept;
   /// How often the scene was reset; a reset in a batch counts when the batch is committed.

@@ -276,6 +276,13 @@ struct StopEffect {
   std::int32_t index = 0;
 };
 
+/// Starts an effect as if so long ago. Recordings that begin while the server runs have it.
+struct ContinueEffect {
+  static constexpr CommandInfo kInfo{"ContinueEffect", kNoMessage, Target::forces, "index", "ran_ns"};
+  std::int32_t index = 0;
+  std::int64_t ran_ns = 0;
+};
+
 /// a x + b y + c z + d = 0 with d in metres; a zero normal removes it. Stock units as in SetSurface.
 struct SetPlane {
   static constexpr CommandInfo kInfo{"SetPlane",        kNoMessage,      Target::forces, "index",
@@ -376,6 +383,12 @@ struct CommitBatch {
   static constexpr CommandInfo kInfo{"CommitBatch", "hapticd Batch_Commit", Target::scene};
 };
 
+/// The open batch of the client was refused as a whole: what follows until CommitBatch is dropped, too.
+/// Recordings that begin while the server runs have it.
+struct RefuseBatch {
+  static constexpr CommandInfo kInfo{"RefuseBatch", kNoMessage, Target::scene};
+};
+
 /// Recordings store the position in this list as the number of a command: append, never reorder or remove.
 using CommandVariant =
     std::variant<SetObjectNumber, SetVertices, SetTriangles, SetNormal, RemoveTriangle, ClearMesh,
@@ -385,7 +398,7 @@ using CommandVariant =
                  SetHapticOrigin, SetHapticScale, SetSceneOrigin, DefineEffect, StartEffect, StopEffect,
                  SetPlane, SetPlaneDetail, SetForceField, SetConstraintEnabled, SetConstraintMode,
                  SetConstraintVector, SetConstraintStiffness, StartCustomEffect, StopCustomEffect, ResetScene,
-                 BeginBatch, CommitBatch, ReleaseForces, SetObjectName>;
+                 BeginBatch, CommitBatch, ReleaseForces, SetObjectName, ContinueEffect, RefuseBatch>;
 
 /// Any one command; std::visit, std::get and their like work on it. Copying, moving and destroying are
 /// compiled once, in commands.cpp: a variant of so many structs costs every file that holds one several

@@ -161,19 +161,29 @@ void FreeForces::tellOfSum(const Call& call) const {
 }
 
 // The definition may travel by UDP and arrive after the start.
-template <>
-void FreeForces::handle(StartEffect& c, const Call& call) {
-  const auto known = effects_.find(c.index);
+void FreeForces::start(std::int32_t index, Nanos at, const Call& call) {
+  const auto known = effects_.find(index);
   if (known != effects_.end() && !known->second.value.effect.releasing) {
-    start(known->second, call.client, call.now);
+    start(known->second, call.client, at);
     tellOfSum(call);
     return;
   }
-  if (waitingStarts_.size() < config_.limits.effects || waitingStarts_.count(c.index) != 0) {
-    waitingStarts_[c.index] = {call.client, {}, call.now + kRemember};
+  if (waitingStarts_.size() < config_.limits.effects || waitingStarts_.count(index) != 0) {
+    waitingStarts_[index] = {call.client, {}, at + kRemember};
     return;
   }
-  call.refuse("startEffect", "refused: no such effect was defined; call setEffect first", " ", c.index);
+  call.refuse("startEffect", "refused: no such effect was defined; call setEffect first", " ", index);
+}
+
+template <>
+void FreeForces::handle(StartEffect& c, const Call& call) {
+  start(c.index, call.now, call);
+}
+
+template <>
+void FreeForces::handle(ContinueEffect& c, const Call& call) {
+  constexpr Nanos kLongestAgo = Nanos{1} << 60U;
+  start(c.index, call.now - std::clamp<Nanos>(c.ran_ns, 0, kLongestAgo), call);
 }
 
 template <>

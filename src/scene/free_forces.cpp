@@ -21,15 +21,15 @@ double stiffnessOf(const ForceField& field, double worldUnitsPerMetre) {
 
 FreeForces::FreeForces(const SceneConfig& config) : config_(config), bound_(config) {}
 
-void FreeForces::start(Owned<RunningEffect>& entry, ClientId client, Nanos now) {
+void FreeForces::start(Owned<RunningEffect>& entry, ClientId client, Nanos at) {
   entry.owner = client;
   entry.value.running = true;
-  entry.value.startedAt = now;
+  entry.value.startedAt = at;
   entry.value.effect.start = ++starts_;
   entry.value.effect.releasing = false;
   entry.value.effect.owner = ownerOf(client);
   const Nanos duration = entry.value.effect.duration;
-  entry.goneAt = duration > 0 ? now + duration + kAfterEnd : kNever;
+  entry.goneAt = duration > 0 ? at + duration + kAfterEnd : kNever;
   changed_ = true;
 }
 
@@ -183,9 +183,10 @@ void FreeForces::appendCommands(Nanos now, std::vector<ClientCommand>& out) cons
   for (const auto& [index, entry] : effects_) {
     if (entry.value.effect.releasing) continue;
     add(entry.owner, &entry.value.asked);
-    if (entry.value.running) out.push_back({entry.owner, StartEffect{index}});
+    if (entry.value.running) out.push_back({entry.owner, ContinueEffect{index, now - entry.value.startedAt}});
   }
-  for (const auto& [index, entry] : waitingStarts_) out.push_back({entry.owner, StartEffect{index}});
+  for (const auto& [index, entry] : waitingStarts_)
+    out.push_back({entry.owner, ContinueEffect{index, now - (entry.goneAt - kRemember)}});
   if (planeDetail_ && !planeDetail_->value.releasing) add(planeDetail_->owner, asked_.find<SetPlaneDetail>());
   for (const auto& [index, entry] : planes_) {
     if (!entry.value.releasing) add(entry.owner, asked_.find<SetPlane>(index));

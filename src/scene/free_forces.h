@@ -96,7 +96,7 @@ class FreeForces {
                           NoticeBoard& board, std::vector<Notice>& out);
   /// Appends all of them, running or not.
   void describe(SceneDescription& out) const;
-  /// Appends commands that set and start all but those that ramp out; effects start anew.
+  /// Appends commands that set and start all but those that ramp out; effects go on.
   void appendCommands(Nanos now, std::vector<ClientCommand>& out) const;
 
  private:
@@ -116,7 +116,8 @@ class FreeForces {
   std::shared_ptr<const ForceOwner> ownerOf(ClientId client) const {
     return config_.owners ? config_.owners->of(client) : nullptr;
   }
-  void start(Owned<RunningEffect>& entry, ClientId client, Nanos now);
+  void start(Owned<RunningEffect>& entry, ClientId client, Nanos at);
+  void start(std::int32_t index, Nanos at, const Call& call);
   template <class F>
   void release(const F& whose, Nanos now);
   template <class F>

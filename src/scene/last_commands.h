@@ -7,15 +7,19 @@
 #include <utility>
 #include <vector>
 
+#include "base/time.h"
 #include "scene/commands.h"
 #include "scene/notice.h"
 
 namespace hapticd::scene {
 
+using base::Nanos;
+
 /// A command and the client on whose behalf it is executed.
 struct ClientCommand {
   ClientId client = 0;
   SceneCommand command;
+  Nanos at = 0;  ///< when it is executed
 };
 
 /// Of each type and index the last command that was accepted. Each command replaces what an earlier one of

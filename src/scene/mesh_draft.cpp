@@ -139,8 +139,13 @@ void MeshDraft::appendCommands(std::int32_t object, ClientId client, bool inMetr
           std::vector(begin, begin + static_cast<std::ptrdiff_t>(std::min(kRun, items.size() - first))));
     }
   };
+  // Edits under way are due when they were: they have a first one, and a last one.
+  const bool edited = dirty_ && shapeChanged_ && !finished_;
+  const Nanos at = edited ? lastEdit_ : 0;
+  if (edited && vertexCount() > 0)
+    out.push_back({client, SetVertices{object, 0, {vertices_.read().front()}}, firstEdit_});
   runs(vertices_.read(), [&](std::int32_t first, std::vector<Vec3f>&& run) {
-    out.push_back({client, SetVertices{object, first, std::move(run)}});
+    out.push_back({client, SetVertices{object, first, std::move(run)}, at});
   });
   if (!indexed_) return;
   std::vector<std::int32_t> removed;
@@ -150,9 +155,9 @@ void MeshDraft::appendCommands(std::int32_t object, ClientId client, bool inMetr
       run[i] = Triangle{};
       removed.push_back(first + static_cast<std::int32_t>(i));
     }
-    out.push_back({client, SetTriangles{object, first, std::move(run), inMetres}});
+    out.push_back({client, SetTriangles{object, first, std::move(run), inMetres}, at});
   });
-  for (const std::int32_t triangle : removed) out.push_back({client, RemoveTriangle{object, triangle}});
+  for (const std::int32_t triangle : removed) out.push_back({client, RemoveTriangle{object, triangle}, at});
 }
 
 // Triples keep one list as long as their number stays; numbered triangles get a copy only when some lack a

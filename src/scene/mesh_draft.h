@@ -76,7 +76,7 @@ class MeshDraft {
   /// Does not publish the edits so far until the next edit.
   void giveUp() { dirty_ = false; }
 
-  /// Appends commands that make an empty draft this one.
+  /// Appends commands that make an empty draft this one. Those of edits under way have their times.
   void appendCommands(std::int32_t object, ClientId client, bool inMetres,
                       std::vector<ClientCommand>& out) const;
 

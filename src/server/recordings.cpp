@@ -16,9 +16,7 @@ namespace {
 using base::Nanos;
 using record::RecordingError;
 
-// Before the begin of a recording, the commands and their publication: so that meshes need not wait for
-// further edits, and movements are over and measure no interval from it.
-constexpr Nanos kSettled = 500'000'000;
+// Before the begin of a recording, the publication of the commands that make its scene.
 constexpr Nanos kPublished = 200'000'000;
 // Of recordings whose memory, 8 MB for each device, a tick may still use.
 constexpr std::size_t kMostEnded = 4;
@@ -152,17 +150,15 @@ bool Recordings::beginScene(SceneHost& scene) {
   return scene.inspect([this, &scene, recorder = recorder_.get()](const auto& builders) {
     const Nanos now = base::now();
     watch(scene.number(), *builders.front(), recorder);
-    for (const scene::ClientCommand& c : builders.front()->commands(now)) {
-      const bool ofObjects = scene::targetOf(c.command) == scene::Target::objects;
-      recorder->recordCommand(scene.number(), c.client, ofObjects ? now - kSettled : now, &c.command);
-    }
+    for (const scene::ClientCommand& c : builders.front()->commands(now))
+      recorder->recordCommand(scene.number(), c.client, c.at, &c.command);
     recorderOf_[scene.number()] = recorder;
     std::size_t seat = 0;
     for (std::uint32_t i = 0; i < stations_.size(); ++i) {
       if (&stations_[i]->scene() != &scene) continue;
-      const std::uint64_t revision = builders[seat++]->revision();
-      recorder->recordPublish(i, now - kPublished, revision);
-      stations_[i]->recordTo(recorder, i, revision);
+      const scene::SceneBuilder& builder = *builders[seat++];
+      recorder->recordPublish(i, now - kPublished, builder.revision());
+      stations_[i]->recordTo(recorder, i, &builder);
     }
   });
 }

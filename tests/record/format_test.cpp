@@ -144,6 +144,7 @@ class TypeLister {
   static std::string typeOf(double) { return "f64"; }
   static std::string typeOf(std::int32_t) { return "i32"; }
   static std::string typeOf(std::uint32_t) { return "u32"; }
+  static std::string typeOf(std::int64_t) { return "i64"; }
   static std::string typeOf(const std::string&) { return "text"; }
   template <IsEnum T>
   static std::string typeOf(T) {

@@ -290,6 +290,50 @@ TEST_F(Rerender, RecordingBegunWhileTheServerRunsReplaysItsScene) {
   EXPECT_EQ(devices[1].largest_N, 0);
 }
 
+// Corner by corner, until the recording begins, and for a while after that. The hand is within, leaves the
+// cube and comes back from above.
+TEST_F(Rerender, RecordingBegunDuringAnUploadShowsTheMeshWhenItWasShown) {
+  const RecordingFile first;
+  const std::filesystem::path folder = std::filesystem::path(first.path()).parent_path();
+  const std::string name = std::filesystem::path(first.path()).stem().string() + "-2.haptics";
+  {
+    const Hand hand = Hand::stroking();
+    RunningServer server(recordingConfig(hand, first.path()));
+    ScriptedPeer peer(server.address());
+    ScriptedPeer second(server.address(), "Second");
+    ASSERT_TRUE(peer.untilConnected() && second.untilConnected());
+    second.send(wire::HoldHand{.hold = 1, .position = {5, 5, 5}});
+    peer.send(wire::SetHapticProperty{0, "stiffness", 0.5F});
+    peer.send(wire::RecordingControl{.record = 0, .name = {}});
+    ASSERT_TRUE(peer.untilText("recorded "));
+    ASSERT_TRUE(untilFullGain(second));
+    peer.send(wire::RecordingControl{.record = 1, .name = std::string_view(name)});
+    const std::vector<geometry::Vec3f> corners = boxTriples({20, 20, 20});
+    const auto begun = [](const wire::Text& text) {
+      return text.text.text.find("recording to") != std::string::npos;
+    };
+    for (int sent = 0, after = 0; after < 20 && sent < 20'000; ++sent) {
+      const auto number = static_cast<std::size_t>(sent) % corners.size();
+      geometry::Vec3f corner = corners[number];
+      corner.x() += 0.01F * static_cast<float>(sent);
+      peer.send(wire::SetVertex{0, static_cast<std::int32_t>(number), {corner.x(), corner.y(), corner.z()}});
+      ASSERT_TRUE(untilTicks(peer, 1));
+      after += std::any_of(peer.texts().begin(), peer.texts().end(), begun) ? 1 : 0;
+    }
+    sendCube(peer);
+    second.send(wire::HoldHand{.hold = 1, .position = {5, 40, 5}});
+    ASSERT_TRUE(untilFullGain(second));
+    ASSERT_TRUE(pressFromAbove(second));
+    peer.send(wire::RecordingControl{.record = 0, .name = {}});
+    ASSERT_TRUE(peer.untilText("recorded "));
+  }
+  const auto devices = rerender(folder / name);
+  std::filesystem::remove(folder / name);
+  ASSERT_EQ(devices.size(), 2U);
+  for (const Compared& device : devices) EXPECT_EQ(device.same, device.ticks) << device.firstDifference;
+  EXPECT_GT(devices[1].touching, 40U);
+}
+
 // The time in the name is one of these seconds.
 TEST_F(Rerender, RecordingsThatBeginInOneSecondHaveNamesOfTheirOwn) {
   const RecordingFile first;
@@ -351,6 +395,7 @@ class LateRecording {
  public:
   using Vec3 = geometry::Vec3;
   static constexpr base::Nanos kTick = 1'000'000;
+  static constexpr std::size_t kBatch_bytes = 8192;
 
   LateRecording() {
     // A box from 0 to 20 mm; an object without a placement is in metres.
@@ -376,6 +421,22 @@ class LateRecording {
     std::vector<geometry::Vec3f> points = boxPoints();
     for (geometry::Vec3f& point : points) point.y() += static_cast<float>(y_m);
     send(scene::SetVertices{0, 0, std::move(points)});
+  }
+  /// Sends another box, with its floor at this height and without a batch, triangle by triangle. More than 12
+  /// repeat the first ones.
+  void upload(std::int32_t object, double y_m, int count, const std::function<void(int)>& beforeEach,
+              const std::function<void()>& afterEach) {
+    std::vector<geometry::Vec3f> points = boxPoints();
+    for (geometry::Vec3f& point : points) point.y() += static_cast<float>(y_m);
+    points.push_back(points.front());  // so that it is another mesh, not the same one deformed
+    send(scene::SetVertices{object, 0, std::move(points)});
+    const std::vector<geometry::Triangle> triangles = boxTriangles();
+    for (int i = 0; i < count; ++i) {
+      beforeEach(i);
+      const geometry::Triangle& t = triangles[static_cast<std::size_t>(i) % triangles.size()];
+      send(scene::SetTriangles{object, i, {{t[1], t[2], t[0]}}, true});  // what stays would be no edit
+      afterEach();
+    }
   }
   /// The same as far as the servo knows; leave() follows when the scene is less busy.
   void leaveBusyScene(scene::ClientId client) { owners_->leave(client, now_); }
@@ -406,16 +467,15 @@ class LateRecording {
     owners_->watch([r = recorder.get()](scene::ClientId client, std::optional<base::Nanos> left) {
       r->recordLeft(0, client, left.value_or(0));
     });
-    for (const scene::ClientCommand& c : builder_.commands(now_)) {
-      const bool ofObjects = scene::targetOf(c.command) == scene::Target::objects;
-      recorder->recordCommand(0, c.client, ofObjects ? now_ - 500 * kTick : now_, &c.command);
-    }
+    for (const scene::ClientCommand& c : builder_.commands(now_))
+      recorder->recordCommand(0, c.client, c.at, &c.command);
     recorder->recordPublish(0, now_ - 200 * kTick, builder_.revision());
     tick_.recordTo({.ticks = &recorder->ring(0),
                     .streams = &recorder->streamRing(0),
                     .memories = &recorder->memoryRing(0),
-                    .revision = builder_.revision()});
+                    .revision = builder_.revisionWith(now_).value_or(realtime::Tick::Rings::kUnknown)});
     recorder_ = std::move(recorder);
+    if (!builder_.revisionWith(now_)) unshown_ = now_;
   }
   void end() {
     tick_.recordTo({});
@@ -462,6 +522,7 @@ class LateRecording {
     record::RecordedDevice device;
     device.names = {"Phantom"};
     device.driver = "simulated";
+    device.sceneConfig.limits.batch_bytes = kBatch_bytes;
     device.tick.guard.armed = true;
     device.tick.guard.peakForce_N = 4;
     device.tick.guard.continuousForce_N = 1;
@@ -481,6 +542,10 @@ class LateRecording {
     if (std::exchange(changed_, false) || (due && *due <= now_)) {
       const auto snapshot = builder_.publish(now_, notices_);
       if (recorder_) recorder_->recordPublish(0, now_, snapshot ? snapshot->revision : 0);
+      if (const auto shown = unshown_ ? builder_.revisionWith(*unshown_) : std::nullopt) {
+        tick_.rememberFrom(*shown);
+        unshown_.reset();
+      }
       if (snapshot) tick_.snapshots().publish(snapshot);
     }
     clock_.sleepUntil(now_);
@@ -492,6 +557,7 @@ class LateRecording {
   std::function<base::Nanos()> stopwatch_;
   std::vector<scene::Notice> notices_;
   bool changed_ = false;
+  std::optional<base::Nanos> unshown_;  // the begin of a recording, until all edits before it are published
   const std::shared_ptr<scene::ForceOwners> owners_ = std::make_shared<scene::ForceOwners>();
   scene::SceneBuilder builder_{withStopwatch()};
   base::SimulatedClock clock_;
@@ -646,6 +712,166 @@ void removeBlocks(const std::filesystem::path& file, record::BlockKind kind) {
   }
   std::ofstream(file, std::ios::binary)
       .write(reinterpret_cast<const char*>(kept.data()), static_cast<std::streamsize>(kept.size()));
+}
+
+// As a version wrote the file that let effects start anew.
+void startEffectsAnew(const std::filesystem::path& file) {
+  record::Bytes changed(record::magic().begin(), record::magic().end());
+  record::BlockReader blocks(file);
+  for (record::BlockReader::Block block; blocks.next(block);) {
+    record::SceneEvent event;
+    std::string error;
+    const bool ofScene =
+        block.kind == record::BlockKind::scene && record::unpackSceneEvent(block.content, event, error);
+    const auto* goesOn =
+        ofScene && event.command ? std::get_if<scene::ContinueEffect>(&*event.command) : nullptr;
+    if (goesOn == nullptr) {
+      record::appendBlock(changed, block.kind, block.content);
+      continue;
+    }
+    const scene::SceneCommand start = scene::StartEffect{goesOn->index};
+    record::Bytes content;
+    record::packSceneEvent(content, event.scene, event.client, event.time, &start);
+    record::appendBlock(changed, block.kind, content);
+  }
+  std::ofstream(file, std::ios::binary)
+      .write(reinterpret_cast<const char*>(changed.data()), static_cast<std::streamsize>(changed.size()));
+}
+
+scene::DefineEffect pull(std::int32_t index, double duration_ms) {
+  return {"constant", index, 0, 0.4, duration_ms, 0, geometry::Vec3::Zero(), {1, 0, 0}};
+}
+
+// The force ramps in until the effect has ended: so no tick that is compared felt it.
+TEST(RecordingBegunLate, EndsATimedEffectWhenItEnded) {
+  const RecordingFile file;
+  LateRecording r;
+  r.send(pull(1, 1000));
+  r.send(scene::StartEffect{1});
+  r.glide(kAbove, 900);
+  r.control().rampIn();
+  r.record(file.path());
+  r.glide(kAbove, 1000);
+  EXPECT_EQ(r.last().rendering.force_N.norm(), 0);
+  r.end();
+  const Compared compared = rerender(file.path()).front();
+  EXPECT_GT(compared.ticks, 400U);
+  EXPECT_EQ(compared.same, compared.ticks) << compared.firstDifference;
+  startEffectsAnew(file.path());
+  EXPECT_EQ(rerender(file.path()).front().same, compared.ticks) << "of an older version";
+}
+
+// Its new definition has no duration, and nobody starts it.
+TEST(RecordingBegunLate, DefinesAnEffectThatEndedWithoutStartingIt) {
+  const RecordingFile file;
+  LateRecording r;
+  r.send(pull(1, 1000));
+  r.send(scene::StartEffect{1});
+  r.glide(kAbove, 800);
+  r.record(file.path());
+  r.glide(kAbove, 500);
+  r.send(pull(1, 0));
+  r.glide(kAbove, 500);
+  EXPECT_EQ(r.last().rendering.force_N.norm(), 0);
+  r.end();
+  const Compared compared = rerender(file.path()).front();
+  EXPECT_GT(compared.ticks, 900U);
+  EXPECT_EQ(compared.same, compared.ticks) << compared.firstDifference;
+}
+
+// A start waits for its definition for one second, also when the recording begins meanwhile.
+TEST(RecordingBegunLate, ForgetsAStartWithoutADefinitionWhenItWasForgotten) {
+  const RecordingFile file;
+  LateRecording r;
+  r.send(scene::StartEffect{5});
+  r.glide(kAbove, 600);
+  r.record(file.path());
+  r.glide(kAbove, 700);
+  r.send(pull(5, 0));
+  r.glide(kAbove, 300);
+  EXPECT_EQ(r.last().rendering.force_N.norm(), 0);
+  r.end();
+  const Compared compared = rerender(file.path()).front();
+  EXPECT_GT(compared.ticks, 900U);
+  EXPECT_EQ(compared.same, compared.ticks) << compared.firstDifference;
+}
+
+TEST(RecordingBegunLate, LeavesABatchRefusedThatWasRefused) {
+  const RecordingFile file;
+  LateRecording r;
+  r.send(scene::BeginBatch{}, 2);
+  r.send(scene::SetVertices{1, 0, std::vector<geometry::Vec3f>(LateRecording::kBatch_bytes)}, 2);
+  r.glide(kAbove, 700);
+  r.record(file.path());
+  r.glide(kAbove, 50);
+  r.send(pull(1, 0), 2);
+  r.send(scene::StartEffect{1}, 2);
+  r.send(scene::CommitBatch{}, 2);
+  r.send(scene::SetTouchableFaces{0});  // for a publication
+  r.glide(kAbove, 100);
+  EXPECT_EQ(r.last().rendering.force_N.norm(), 0);
+  r.send(pull(1, 0), 2);
+  r.send(scene::StartEffect{1}, 2);
+  r.glide(kAbove, 100);
+  EXPECT_NEAR(r.last().rendering.force_N.norm(), 0.4, 1e-9) << "after the batch";
+  r.end();
+  const Compared compared = rerender(file.path()).front();
+  EXPECT_GT(compared.ticks, 200U);
+  EXPECT_EQ(compared.same, compared.ticks) << compared.firstDifference;
+}
+
+struct Upload {
+  const char* name;
+  std::int32_t object;  // 0 has a mesh already
+  int every_ms;         // so long that a part is published before the rest has come, or not
+  int begin;            // of the recording: before this triangle
+  int triangles = 12;
+  double height_mm = 30;  // of the hand: in the box, or on the mesh that was there before
+};
+
+void PrintTo(const Upload& upload, std::ostream* out) {
+  *out << upload.name;
+}
+
+const Upload kUploads[] = {
+    {"first", 1, 3, 6},
+    {"firstAtItsBegin", 1, 3, 0},
+    {"firstAtItsEnd", 1, 3, 11},
+    {"slow", 1, 19, 6},
+    {"slowAfterAPart", 1, 25, 6},
+    // After 250 ms all is published, however soon it came.
+    {"longUntilShown", 1, 19, 6, 14},
+    {"another", 0, 3, 6},
+    {"anotherSlow", 0, 19, 6},
+    {"anotherLongUntilShown", 0, 19, 6, 14},
+    {"anotherOnTheFirst", 0, 19, 0, 14, 18},
+};
+
+class RecordingOfAnUpload : public testing::TestWithParam<Upload> {};
+
+// A mesh around the hand does not push it out: the hand leaves to the side and comes back from above.
+TEST_P(RecordingOfAnUpload, ShowsTheMeshWhenItWasShown) {
+  const RecordingFile file;
+  LateRecording r;
+  r.send(scene::AddObject{1, -1});
+  r.send(scene::SetSurface{1, 0.8, 0.001, 0.4, 0.3});
+  r.glide(kAbove, 700);
+  const auto begin = [&](int triangle) {
+    if (triangle == GetParam().begin) r.record(file.path());
+  };
+  r.upload(GetParam().object, 0.021, GetParam().triangles, begin, [&] {
+    r.glide({1, GetParam().height_mm, 2}, GetParam().every_ms);
+  });
+  r.glide({80, GetParam().height_mm, 2}, 600);
+  r.glide({80, 70, 2}, 300);
+  r.glide({1, 70, 2}, 400);
+  r.glide({2, 38, 1}, 400);
+  EXPECT_TRUE(r.last().rendering.touching);
+  r.end();
+  const Compared compared = rerender(file.path()).front();
+  EXPECT_EQ(compared.same, compared.ticks) << compared.firstDifference;
+  EXPECT_GT(compared.ticks, 900U);
+  EXPECT_GT(compared.touching, 200U);
 }
 
 void pullAndPush(LateRecording& r, scene::ClientId client) {
@@ -822,6 +1048,8 @@ TEST(Rerendering, WithoutMemoryForTheSceneSaysSo) {
 #endif
 
 INSTANTIATE_TEST_SUITE_P(All, RecordingBegunLate, testing::ValuesIn(kGoesOn),
+                         [](const auto& param) { return std::string(param.param.name); });
+INSTANTIATE_TEST_SUITE_P(All, RecordingOfAnUpload, testing::ValuesIn(kUploads),
                          [](const auto& param) { return std::string(param.param.name); });
 INSTANTIATE_TEST_SUITE_P(All, RecordingOfMovements, testing::ValuesIn(kMovements),
                          [](const auto& param) { return std::string(param.param.name); });

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "base/time.h"
@@ -66,14 +67,18 @@ bool Effects::remember(RenderMemory& out) const noexcept {
   return true;
 }
 
-// By the index: the numbers of the starts are those of this scene.
+// By the index: the numbers of the starts are those of this scene. One that the memory has not is over if it
+// has a duration: recordings of older versions start it anew.
 void Effects::resume(const RenderMemory& memory) noexcept {
   for (int i = 0; i < count_; ++i) {
     Running& r = running_[static_cast<std::size_t>(i)];
     const auto end = memory.effects.begin() + memory.effectCount;
     const auto known =
         std::find_if(memory.effects.begin(), end, [&](const EffectMemory& m) { return m.index == r.index; });
-    if (known == end) continue;
+    if (known == end) {
+      r.begin = std::numeric_limits<Nanos>::min() / 2;
+      continue;
+    }
     r.begin = known->begin;
     r.anchor = known->anchor;
     r.phase.resume(*known);

@@ -24,7 +24,7 @@ class Effects {
   void restart() noexcept { anew_ = true; }
   /// False while one ramps out: its share is not part of the memory.
   bool remember(RenderMemory& out) const noexcept;
-  /// Continues those of the running effects that the memory has.
+  /// Continues those of the running effects that the memory has; timed ones that it has not are over.
   void resume(const RenderMemory& memory) noexcept;
 
   /// The angle of a vibration whose frequency may change while it runs: the frequency over time, integrated.

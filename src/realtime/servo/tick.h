@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include "base/clock.h"
 #include "base/histogram.h"
@@ -72,7 +73,9 @@ class Tick {
     RecordRing* ticks = nullptr;  ///< null: nowhere
     StreamRing* streams = nullptr;
     MemoryRing* memories = nullptr;  ///< null: the recording begins with the first tick
-    std::uint64_t revision = 0;      ///< of the scene in the recording: a memory belongs to no older one
+    /// Of the scene in the recording: a memory belongs to no older one. kUnknown: rememberFrom() follows.
+    std::uint64_t revision = 0;
+    static constexpr std::uint64_t kUnknown = std::numeric_limits<std::uint64_t>::max();
   };
   /// From any thread: records every tick from the next one on, and what clients stream, to the rings as well.
   void recordTo(const Rings& rings) noexcept {
@@ -81,6 +84,10 @@ class Tick {
     rememberTo_.store(rings.memories, std::memory_order_release);
     rememberFrom_.store(rings.revision, std::memory_order_release);
     recordTo_.store(rings.ticks, std::memory_order_release);
+  }
+  /// From any thread, while it records: a memory belongs to no older revision.
+  void rememberFrom(std::uint64_t revision) noexcept {
+    rememberFrom_.store(revision, std::memory_order_release);
   }
   /// For a replay that begins between two ticks: the next one follows this one, which was the last and free
   /// of contact.

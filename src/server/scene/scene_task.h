@@ -33,8 +33,8 @@ struct WhenPublished {
   std::function<void()> reached;
 };
 
-/// Requests a call in the scene thread after the preceding tasks, with the builders in the order of the
-/// devices.
+/// Requests a call in the scene thread once the preceding tasks are published, as far as meshes do not wait
+/// for further edits, with the builders in the order of the devices.
 struct Inspect {
   std::function<void(const std::vector<const scene::SceneBuilder*>&)> call;
 };

@@ -67,6 +67,7 @@ std::optional<base::Nanos> SceneThread::step() {
   applySlice();
   publish();
   describeScene();
+  inspect();
   const std::optional<base::Nanos> oldestEdit = this->oldestEdit();
   queue_.published(oldestEdit);
   callPublishWaiters(oldestEdit);
@@ -122,10 +123,8 @@ void SceneThread::apply(SceneTask&& task) {
     publishWaiters_.push_back({base::now(), std::move(wanted->reached)});
     return;
   }
-  if (const auto* inspect = std::get_if<Inspect>(&task.what)) {
-    std::vector<const scene::SceneBuilder*> builders;
-    for (const Seat& seat : seats_) builders.push_back(&seat.builder);
-    inspect->call(builders);
+  if (auto* inspect = std::get_if<Inspect>(&task.what)) {
+    inspections_.push_back(std::move(*inspect));
     return;
   }
   const std::shared_ptr<scene::ForceOwners>& owners = seats_.front().device.config.owners;
@@ -194,6 +193,18 @@ void SceneThread::describeScene() {
     spdlog::error("the scene could not be described: {}", error.what());
   }
   for (const DescribeScene& request : std::exchange(descriptionRequests_, {})) request.reply(description);
+}
+
+void SceneThread::inspect() {
+  for (const Inspect& inspection : std::exchange(inspections_, {})) {
+    try {
+      std::vector<const scene::SceneBuilder*> builders;
+      for (const Seat& seat : seats_) builders.push_back(&seat.builder);
+      inspection.call(builders);
+    } catch (const std::exception& error) {
+      noteFailure(0, error.what());
+    }
+  }
 }
 
 void SceneThread::publishTo(Seat& seat) {

@@ -78,6 +78,7 @@ class SceneThread {
   void publish();
   void publishTo(Seat& seat);
   void describeScene();
+  void inspect();
   std::optional<base::Nanos> oldestEdit() const;
   void callPublishWaiters(std::optional<base::Nanos> oldestEdit);
   std::optional<base::Nanos> nextDeadline() const;
@@ -86,6 +87,7 @@ class SceneThread {
   Callbacks callbacks_;
   std::vector<scene::Notice> notices_;
   std::vector<DescribeScene> descriptionRequests_;
+  std::vector<Inspect> inspections_;
   std::vector<PublishWaiter> publishWaiters_;
   std::optional<base::Nanos> collectAt_;
 

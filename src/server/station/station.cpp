@@ -127,8 +127,9 @@ Station::Station(const DeviceConfig& config, std::vector<DeviceName> names, Scen
                               },
                           .publishing =
                               [&impl](base::Nanos now, std::uint64_t revision) {
-                                if (impl.recording != nullptr)
-                                  impl.recording->recordPublish(impl.recordedAs, now, revision);
+                                if (impl.recording == nullptr) return;
+                                impl.recording->recordPublish(impl.recordedAs, now, revision);
+                                impl.showEdits();
                               }};
   sceneDevice.config.limits = sceneLimits(scene.limits());
   impl.recordedScene = sceneDevice.config;
@@ -165,7 +166,7 @@ record::RecordedDevice Station::recorded() const {
 }
 
 void Station::recordTo(record::Recorder* recording, std::uint32_t number,
-                       std::optional<std::uint64_t> revision) {
+                       const scene::SceneBuilder* builder) {
   Impl& impl = *impl_;
   impl.recording = recording;
   impl.recordedAs = number;
@@ -174,10 +175,22 @@ void Station::recordTo(record::Recorder* recording, std::uint32_t number,
   if (recording != nullptr) {
     rings.ticks = &recording->ring(number);
     rings.streams = &recording->streamRing(number);
-    if (revision) rings.memories = &recording->memoryRing(number);
+    if (builder != nullptr) rings.memories = &recording->memoryRing(number);
   }
-  rings.revision = revision.value_or(0);
+  if (builder != nullptr) rings.revision = realtime::Tick::Rings::kUnknown;
   impl.tick.recordTo(rings);
+  impl.unshown = builder;
+  impl.begunAt = base::now();
+  impl.showEdits();
+}
+
+// In the scene's thread.
+void Station::Impl::showEdits() noexcept {
+  if (unshown == nullptr) return;
+  const auto revision = unshown->revisionWith(begunAt);
+  if (!revision) return;
+  tick.rememberFrom(*revision);
+  unshown = nullptr;
 }
 
 base::Nanos Station::finishedAt() const noexcept {

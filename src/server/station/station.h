@@ -56,9 +56,9 @@ class Station {
   record::RecordedDevice recorded() const;
   /// Scene thread, or before it starts: records the scene and the ticks as the device of this number; null:
   /// ends. The recorder must live until finishedAt() is later than the end, or the servo has ended.
-  /// `revision`: of the scene in a recording that begins while the servo runs.
+  /// `builder`: of the device, where the recording begins while the servo runs.
   void recordTo(record::Recorder* recording, std::uint32_t number,
-                std::optional<std::uint64_t> revision = {});
+                const scene::SceneBuilder* builder = nullptr);
   /// Any thread: when the last tick ended; 0 before the first.
   base::Nanos finishedAt() const noexcept;
 

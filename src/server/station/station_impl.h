@@ -33,6 +33,7 @@ struct Station::Impl {
        std::unique_ptr<device::Device> device_, bool allowNoRealtime);
 
   void onPublished(const std::shared_ptr<const scene::SceneSnapshot>& snapshot);
+  void showEdits() noexcept;
   bool takeTicks(const WallClock& wallClock);
   void serveFirst(const Sessions& clients);
   /// The rate that a client gets; none, with a text to it, when it asks for one that is no rate.
@@ -104,6 +105,9 @@ struct Station::Impl {
   // The recording at hand, null for none, and the number of this device in it. Scene thread.
   record::Recorder* recording = nullptr;
   std::uint32_t recordedAs = 0;
+  // Of a recording that began at this time, until the scene shows all edits up to it; null: it does.
+  const scene::SceneBuilder* unshown = nullptr;
+  base::Nanos begunAt = 0;
   std::function<base::Nanos()> stopwatch;  // of the recording; empty: the clock
 
   // Scene thread: object ids and topologies for which the scripted hand was planned.
