@@ -153,6 +153,14 @@ void Station::Impl::on(const Request& request, const wire::QueryCapabilities&) {
 }
 
 void Station::Impl::on(const Request& request, const wire::StopForces&) {
+  if (replayed) {
+    request.session.send(
+        request.name,
+        wire::Text{.severity = wire::kTextError,
+                   .level = static_cast<std::uint32_t>(RefusalCode::notPermitted),
+                   .text = "Stop_Forces refused: this server replays a recording, which has no force"});
+    return;
+  }
   request.session.logWarning(
       fmt::format("({}) stops the forces of '{}'", request.session.description(), config.names.front()));
   control.stopForces(request.order, request.sender);
