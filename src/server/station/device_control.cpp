@@ -141,8 +141,12 @@ bool DeviceControl::hold(scene::ClientId client, const wire::HoldHand& wanted,
   return true;
 }
 
-void DeviceControl::clientGone(scene::ClientId client) {
+void DeviceControl::letGo(scene::ClientId client) {
   if (holder_ == client) releaseHand();
+}
+
+void DeviceControl::clientGone(scene::ClientId client) {
+  letGo(client);
   for (Stop& stop : stops_) std::erase(stop.clients, client);
 }
 

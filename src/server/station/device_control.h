@@ -61,6 +61,8 @@ class DeviceControl {
   /// text.
   bool hold(scene::ClientId client, const wire::HoldHand& wanted, const realtime::TickReport& last,
             Refusal& refusal);
+  /// Releases the hand if the client holds it.
+  void letGo(scene::ClientId client);
   void clientGone(scene::ClientId client);
 
  private:

@@ -45,6 +45,12 @@ bool Station::mayCommand(const Commander& client, wire::MessageKind kind, std::s
   return false;
 }
 
+bool Station::letsGo(scene::ClientId client, const wire::MessageReceived& message) const {
+  if (message.kind != wire::kindOf<wire::HoldHand> || impl_->control.holder() != client) return false;
+  const auto decoded = wire::decode<wire::HoldHand>(message.payload);
+  return decoded && decoded->hold == 0;
+}
+
 Refusal Station::holdForce(scene::ClientId client, const geometry::Vec3& force_N, base::Nanos lifetime,
                            base::Nanos received) {
   return impl_->streamed.on(client, force_N, lifetime, received).text;
@@ -205,6 +211,7 @@ void Station::Impl::on(const Request& request, const wire::ReleaseControl&) {
              "Release_Control refused: a batch is open; commit it first");
     return;
   }
+  control.letGo(request.session.id());
   roles->release(request.session.id());
 }
 
