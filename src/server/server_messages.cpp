@@ -28,7 +28,7 @@ void Server::onMessage(Session& session, const wire::MessageReceived& message, N
       if (message.kind == wire::kindOf<wire::Marker>) return onMarker(session, message, received);
       if (message.kind == wire::kindOf<wire::ReplayControl>) return onReplayControl(session, message);
       if (message.kind == wire::kindOf<wire::RecordingControl>) return onRecordingControl(session, message);
-      station->onControl(session, message, received, credentials_.hasOperators());
+      station->onControl(session, message, received, credentials_.hasOperators(), localListener_ != nullptr);
       return;
     case wire::Role::scene:
       onSceneMessage(session, *station, message);

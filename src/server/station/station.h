@@ -79,9 +79,9 @@ class Station {
   Refusal holdForce(scene::ClientId client, const geometry::Vec3& force_N, base::Nanos lifetime,
                     base::Nanos received);
   /// Handles a control message. `received`: when the server read it, on the servo clock. `hasOperators`: see
-  /// Credentials.
+  /// Credentials. `hasSocket`: the server has its Unix socket.
   void onControl(Session& session, const wire::MessageReceived& message, base::Nanos received,
-                 bool hasOperators);
+                 bool hasOperators, bool hasSocket);
   /// The scene of this device was reset: trackers are reported in the device frame again.
   void onReset();
   /// The client is connected and has described no name yet.

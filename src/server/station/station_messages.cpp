@@ -57,7 +57,7 @@ Refusal Station::holdForce(scene::ClientId client, const geometry::Vec3& force_N
 }
 
 void Station::onControl(Session& session, const wire::MessageReceived& message, base::Nanos received,
-                        bool hasOperators) {
+                        bool hasOperators, bool hasSocket) {
   const base::Nanos sent =
       message.time.seconds * base::Nanos{1'000'000'000} + message.time.microseconds * base::Nanos{1000};
   const Identity& identity = session.identity();
@@ -73,7 +73,8 @@ void Station::onControl(Session& session, const wire::MessageReceived& message, 
            operates && (identity.proven || impl_->roles->couldCommand(session.id(), session.address())),
        .isOperator = operates && identity.proven,
        .isPage = operates && session.ofPage(),
-       .hasOperators = hasOperators}};
+       .hasOperators = hasOperators,
+       .hasSocket = hasSocket}};
   const auto handled = wire::dispatchControl(message.kind, message.payload,
                                              [&](const auto& control) { impl_->on(request, control); });
   if (!handled) session.refuse("malformed message: " + handled.error());
