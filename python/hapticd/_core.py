@@ -627,6 +627,12 @@ class Core(Commands):
     def _identity(self) -> m.Identify:
         return m.Identify(self._token, self._key)
 
+    def _put_key(self) -> None:
+        """Before a stop or a re-arm, so that the server knows this client again on its next connection. A token has told the key
+        already."""
+        if not self._token and self.connected:
+            self._put_now(self._identity())
+
     # What is sent again on every connection is encoded before it is kept: a value that its message cannot carry raises
     # here, and not on the next connection.
 

@@ -659,6 +659,8 @@ class Client(Core):
         behind = backlog > STOP_BACKLOG_BYTES and (not self._answered or self._has(m.FEATURE_STOP))
         if behind:  # both connections stop, and this one may undo both
             self._put_now(self._identity())
+        else:
+            self._put_key()
         if not self._put_now(m.StopForces()):
             raise ConnectionLost(f"forces not stopped: {self._why_not_connected()}")
         self._push()
@@ -706,6 +708,7 @@ class Client(Core):
         """Ends a stop and clears latched trips; the force ramps in over half a second. Raises as
         hapticd.Client.rearm_forces()."""
         await self._require(m.FEATURE_STOP, "re-arm the forces")
+        self._put_key()
         self._send_at_once(m.RearmForces(), "forces not re-armed")
 
     async def mark(self, text: str) -> None:

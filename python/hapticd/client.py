@@ -690,6 +690,8 @@ class Client(Core):
         behind = backlog > STOP_BACKLOG_BYTES and (not self._answered or self._has(m.FEATURE_STOP))
         if behind:  # both connections stop, and this one may undo both
             self._put_now(self._identity())
+        else:
+            self._put_key()
         if not self._put_now(m.StopForces()):
             raise ConnectionLost(f"forces not stopped: {self._why_not_connected()}")
         self._push()
@@ -739,6 +741,7 @@ class Client(Core):
         commands sent before it, and never undoes a stop that is sent after it. Waits for a connection up to
         Options.connect_timeout (ConnectError); raises ConnectionLost when the connection turns out to have ended."""
         self._require(m.FEATURE_STOP, "re-arm the forces")
+        self._put_key()
         self._send_at_once(m.RearmForces(), "forces not re-armed")
 
     def mark(self, text: str) -> None:

@@ -347,6 +347,19 @@ def test_a_stop_passes_a_large_upload(server: Server) -> None:
     run(main())
 
 
+def test_who_stopped_re_arms_on_its_next_connection(server: Server) -> None:
+    async def main() -> None:
+        async with hapticd.aio.connect(server.tcp) as hand, hapticd.aio.connect(server.tcp) as other:
+            await hand.stop_forces()
+            await until(other, lambda: other.latest.guard.stopped)
+            hand._abort("lost")
+            await until(hand, lambda: hand.connected)
+            await hand.rearm_forces()
+            await until(other, lambda: not other.latest.guard.stopped)
+
+    run(main())
+
+
 def test_a_lost_connection_comes_back(server: Server) -> None:
     async def main() -> None:
         async with hapticd.aio.connect(server.tcp) as hand:

@@ -206,6 +206,16 @@ def test_a_stop_passes_a_large_upload(server: Server) -> None:
         until(hand, lambda: not hand.latest.guard.stopped)
 
 
+def test_who_stopped_re_arms_on_its_next_connection(server: Server) -> None:
+    with hapticd.connect(server.tcp) as hand, hapticd.connect(server.tcp) as other:
+        hand.stop_forces()
+        until(other, lambda: other.latest.guard.stopped)
+        hand._fail("lost")
+        until(hand, lambda: hand.connected)
+        hand.rearm_forces()
+        until(other, lambda: not other.latest.guard.stopped)
+
+
 def test_heartbeats_stop_with_the_polling(server: Server) -> None:
     for _ in range(5):  # a busy machine may not run this process for 500 ms
         hand = hapticd.connect(server.tcp, reconnect=False)

@@ -132,6 +132,7 @@ void Client::stopForces() {
     impl_->link.sendNow(impl_->sender, wire::StopForces{});
     impl_->stopBesideBacklog();
   } else {
+    impl_->sendKey();
     impl_->sendAtOnce(wire::StopForces{}, "forces not stopped");
   }
   impl_->require(wire::kFeatureStop, "stop the forces");
@@ -183,6 +184,7 @@ void Client::Impl::stopBesideBacklog() {
 
 void Client::rearmForces() {
   impl_->require(wire::kFeatureStop, "re-arm the forces");
+  impl_->sendKey();
   impl_->sendAtOnce(wire::RearmForces{}, "forces not re-armed");
 }
 

@@ -38,6 +38,11 @@ struct HAPTICD_HIDDEN Client::Impl {
   void greet();
   /// What the server must know of this client before it stops or re-arms.
   wire::Identify identity() const { return {.token = std::string_view(token), .key = key}; }
+  /// Puts the key before a stop or a re-arm, so that the server knows this program again on its next
+  /// connection. A token has told the key already.
+  void sendKey() {
+    if (token.empty() && link.connected()) link.putBeforeHeld(sender, identity());
+  }
   /// Reads answers to greet() as they arrive.
   void onArrival(wire::MessageKind kind, wire::LocalSender from, wire::ByteView payload);
   /// Waits for the answer to the question for capabilities; false when the server does not answer.

@@ -102,13 +102,20 @@ class Link {
   template <wire::WireMessage M>
   bool sendNow(wire::LocalSender sender, const M& message,
                wire::Reliability reliability = wire::Reliability::kReliable) {
+    if (!putBeforeHeld(sender, message, reliability)) return false;
+    pushOut();
+    return true;
+  }
+  /// The same, but leaves with the next one that is sent.
+  template <wire::WireMessage M>
+  bool putBeforeHeld(wire::LocalSender sender, const M& message,
+                     wire::Reliability reliability = wire::Reliability::kReliable) {
     if (!connected()) {
       ++statistics_.messagesDropped;
       return false;
     }
     peer_->send(wireNow(), sender, message, reliability);
     ++statistics_.messagesOut;
-    pushOut();
     return true;
   }
   /// After sending: false when nobody receives it, because the server has ended the connection. The system

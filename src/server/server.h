@@ -122,7 +122,8 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   void checkClients();
   void checkNextClients(scene::ClientId last);
   void checkHeartbeat(Session& session, base::Nanos now);
-  bool isPermitted(Session& session, Station& station, wire::MessageKind kind, std::string& reason);
+  bool isPermitted(Session& session, Station& station, const wire::MessageReceived& message,
+                   std::string& reason);
   bool mayCommand(Session& session, Station& station, const wire::MessageReceived& message);
   Station* stationOf(wire::LocalSender name) noexcept;
   wire::LocalSender nameFor(const Session& session, const SceneHost& scene) const noexcept;

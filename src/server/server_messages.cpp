@@ -28,7 +28,7 @@ void Server::onMessage(Session& session, const wire::MessageReceived& message, N
       if (message.kind == wire::kindOf<wire::Marker>) return onMarker(session, message, received);
       if (message.kind == wire::kindOf<wire::ReplayControl>) return onReplayControl(session, message);
       if (message.kind == wire::kindOf<wire::RecordingControl>) return onRecordingControl(session, message);
-      station->onControl(session, message, received, credentials_.hasOperators());
+      station->onControl(session, message, received, credentials_.hasOperators(), localListener_ != nullptr);
       return;
     case wire::Role::scene:
       onSceneMessage(session, *station, message);
@@ -166,8 +166,10 @@ void Server::onSceneMessage(Session& session, Station& station, const wire::Mess
   if (!station.scene().take(session.id(), message, error)) session.refuse("malformed message: " + error);
 }
 
-bool Server::isPermitted(Session& session, Station& station, wire::MessageKind kind, std::string& reason) {
-  if (kind == wire::kindOf<wire::StopForces>) return true;
+bool Server::isPermitted(Session& session, Station& station, const wire::MessageReceived& message,
+                         std::string& reason) {
+  const wire::MessageKind kind = message.kind;
+  if (kind == wire::kindOf<wire::StopForces> || station.letsGo(session.id(), message)) return true;
   if (!admission_.mayOnlyStop(session))
     return !wire::needsControl(kind) || station.mayCommand(session.commander(), kind, reason);
   // A client library asks first whether the server knows a stop, and 'hapticd stop' whether it was carried
@@ -186,7 +188,7 @@ bool Server::mayCommand(Session& session, Station& station, const wire::MessageR
   std::string reason = "it belongs to a batch that was refused";
   const std::optional<bool> batch =
       wire::role(message.kind) == wire::Role::scene ? scene.batchOf(session.id()) : std::nullopt;
-  const bool permitted = batch ? *batch : isPermitted(session, station, message.kind, reason);
+  const bool permitted = batch ? *batch : isPermitted(session, station, message, reason);
   if (message.kind == wire::kindOf<wire::BatchBegin>) scene.beginBatch(session.id(), permitted);
   if (message.kind == wire::kindOf<wire::BatchCommit>) scene.endBatch(session.id());
   if (permitted) return true;

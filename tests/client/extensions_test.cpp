@@ -67,10 +67,11 @@ TEST(Extensions, ErrorsNameAServerWithoutExtensions) {
   refused([&] { client.stopForces(); });
   client.setObjectCount(1);
   client.flushAll();
-  const auto received = server.waitReceived(2);
-  ASSERT_EQ(received.size(), 2U);
-  EXPECT_TRUE(is(received[0], wire::StopForces{})) << "a stop does not wait for an answer";
-  EXPECT_TRUE(is(received[1], wire::SetObjectNumber{1}));
+  const auto received = server.waitReceived(3);
+  ASSERT_EQ(received.size(), 3U);
+  EXPECT_EQ(received[0].message.kind(), wire::kindOf<wire::Identify>);
+  EXPECT_TRUE(is(received[1], wire::StopForces{})) << "a stop does not wait for an answer";
+  EXPECT_TRUE(is(received[2], wire::SetObjectNumber{1}));
 }
 
 TEST(Extensions, ErrorsNameADeviceWithoutTheFeature) {
@@ -347,11 +348,11 @@ TEST(Extensions, AStopOvertakesABatchAndNeedsAConnection) {
     client.rearmForces();
   });
   client.flushAll();
-  const auto received = server.waitReceived(5);
-  ASSERT_EQ(received.size(), 5U);
-  EXPECT_TRUE(is(received[0], wire::StopForces{}));
-  EXPECT_TRUE(is(received[1], wire::RearmForces{}));
-  EXPECT_TRUE(is(received[2], wire::BatchBegin{}));
+  const auto received = server.waitReceived(7);
+  ASSERT_EQ(received.size(), 7U);
+  EXPECT_TRUE(is(received[1], wire::StopForces{})) << "after the key of the program";
+  EXPECT_TRUE(is(received[3], wire::RearmForces{}));
+  EXPECT_TRUE(is(received[4], wire::BatchBegin{}));
 
   Client nobody("Phantom@tcp://127.0.0.1:1", {.connectTimeout = 0ms});
   EXPECT_THAT(textOf<ConnectionLost>([&] { nobody.stopForces(); }), HasSubstr("forces not stopped"));

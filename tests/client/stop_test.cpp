@@ -46,10 +46,10 @@ TEST(Stop, OvertakesABackedUpStreamByASecondConnection) {
   client.rearmForces();
   server.startReading();
   client.flushAll();
-  const auto all = server.waitReceived(5);
-  ASSERT_EQ(all.size(), 5U);
+  const auto all = server.waitReceived(6);
+  ASSERT_EQ(all.size(), 6U);
   EXPECT_EQ(stops(all), 2U);
-  EXPECT_TRUE(is(all[4], wire::RearmForces{})) << "behind both stops";
+  EXPECT_TRUE(is(all[5], wire::RearmForces{})) << "behind both stops";
   EXPECT_EQ(server.openConnections(), 1U) << "the second one is closed";
 }
 
@@ -57,8 +57,29 @@ TEST(Stop, NeedsNoSecondConnectionWhileNothingWaits) {
   ScriptedServer server(ableServer());
   Client client(server.tcpName());
   client.stopForces();
-  EXPECT_EQ(server.waitReceived(1).size(), 1U);
+  EXPECT_EQ(stops(server.waitReceived(2)), 1U);
   EXPECT_EQ(server.connections(), 1U);
+}
+
+// The server knows a program by its key, and its next connection by nothing else.
+TEST(Stop, IsOfTheSameProgramOnItsNextConnection) {
+  ScriptedServer server(ableServer());
+  Client client(server.tcpName());
+  client.stopForces();
+  ASSERT_EQ(server.waitReceived(2).size(), 2U);
+  server.dropClients();
+  ASSERT_TRUE(pollUntil(client, [&] { return server.connections() == 2 && client.connected(); }));
+  client.rearmForces();
+  const auto received = server.waitReceived(4);
+  ASSERT_EQ(received.size(), 4U);
+  const auto keyOf = [](const Received& r) {
+    const auto* identify = r.message.as<wire::Identify>();
+    return identify != nullptr && identify->token.view().empty() ? identify->key : 0;
+  };
+  EXPECT_NE(keyOf(received[0]), 0U);
+  EXPECT_TRUE(is(received[1], wire::StopForces{}));
+  EXPECT_EQ(keyOf(received[2]), keyOf(received[0]));
+  EXPECT_TRUE(is(received[3], wire::RearmForces{}));
 }
 
 TEST(Stop, OvertakesAReverseConnectionToo) {

@@ -214,6 +214,56 @@ TEST_F(ControlTest, OnlyASceneCommandTakesControl) {
   EXPECT_TRUE(first->untilText("is in control"));
 }
 
+TEST_F(ControlTest, WhoGivesUpControlLetsGoOfTheHand) {
+  Config config = RunningServer::anyPort();
+  config.devices[0].control = server::Control::first;
+  serve(config);
+  const auto first = peer();
+  const auto second = peer();
+  second->send(wire::Subscribe{.kinds = wire::kReportHip, .rate = 0});
+  const auto isAt = [&](double x_m) {
+    const auto pose = second->last<wire::TrackerPosQuat>(
+        [](const wire::TrackerPosQuat& m) { return m.sensor == server::kSensorHip; });
+    return pose && std::abs(pose->position[0] - x_m) < 0.0015;
+  };
+  first->send(wire::SetObjectNumber{2});
+  hold(*first, 30, 0, 0);
+  ASSERT_TRUE(second->until([&] { return isAt(0.03); }));
+  first->send(wire::ReleaseControl{});
+  first->send(wire::Ping{});
+  ASSERT_TRUE(first->untilNext<wire::Pong>());
+  second->send(wire::SetObjectNumber{3});
+  hold(*second, -20, 0, 0);
+  EXPECT_TRUE(second->until([&] { return isAt(-0.02); }));
+  EXPECT_TRUE(second->texts().empty());
+}
+
+TEST_F(ControlTest, TheHolderAlwaysMayLetGoOfTheHand) {
+  Config config = RunningServer::anyPort();
+  config.devices[0].control = server::Control::first;
+  serve(config);
+  const auto holder = peer();
+  const auto owner = peer();
+  hold(*holder, 0, 0, 0);
+  holder->send(wire::Ping{});
+  ASSERT_TRUE(holder->untilNext<wire::Pong>());
+  owner->send(wire::SetObjectNumber{3});
+  hold(*owner, 10, 0, 0);
+  ASSERT_TRUE(owner->untilText("holds the hand"));
+  hold(*holder, 20, 0, 0);
+  ASSERT_TRUE(holder->untilText("is in control"));
+  holder->forget();
+  holder->send(wire::HoldHand{});
+  holder->send(wire::Ping{});
+  ASSERT_TRUE(holder->untilNext<wire::Pong>());
+  EXPECT_TRUE(holder->texts().empty()) << "refused";
+  owner->forget();
+  hold(*owner, 10, 0, 0);
+  owner->send(wire::Ping{});
+  ASSERT_TRUE(owner->untilNext<wire::Pong>());
+  EXPECT_TRUE(owner->texts().empty()) << "the hand is free";
+}
+
 TEST_F(ControlTest, DevicesOfOneSceneShareItsControl) {
   Config config = RunningServer::anyPort();
   config.devices.resize(2);

@@ -12,6 +12,19 @@ namespace {
 using geometry::Quat;
 using geometry::Vec3;
 
+// The end of a refusal because of a stop whose program is gone or not.
+std::string whoMayRearm(bool gone, const DeviceControl::Sender& sender) {
+  std::string text = gone ? " and is gone" : "; it may re-arm";
+  if (sender.hasSocket) {
+    return text + (gone ? "; an operator may re-arm" : ", or an operator") +
+           ", or the server's user on its machine: 'hapticd stop --rearm NAME@host', or NAME@unix:PATH if "
+           "its "
+           "socket is elsewhere";
+  }
+  if (sender.hasOperators) return text + (gone ? "; an operator may re-arm" : ", or an operator");
+  return text + (gone ? "; a page of the server in a browser may re-arm" : "");
+}
+
 bool finite(const wire::HoldHand& m) {
   const auto ok = [](double x) { return std::isfinite(x); };
   return std::all_of(m.position.begin(), m.position.end(), ok) &&
@@ -66,11 +79,8 @@ bool DeviceControl::rearmForces(const Order& order, const Sender& sender, bool f
   const bool undoes = std::erase_if(stops_, [&](const Stop& stop) { return stop.isOf(sender); }) > 0;
   if (!stops_.empty()) {
     const Stop& other = stops_.back();
-    refusal = {RefusalCode::stoppedByOther,
-               "Rearm_Forces refused: " + other.description + " stopped the forces" +
-                   (gone(other) ? " and is gone" : "") + "; " + (gone(other) ? "" : "it may re-arm, or ") +
-                   "an operator, or the server's user on its machine: 'hapticd stop --rearm NAME@host', or "
-                   "NAME@unix:PATH if its socket is elsewhere"};
+    refusal = {RefusalCode::stoppedByOther, "Rearm_Forces refused: " + other.description +
+                                                " stopped the forces" + whoMayRearm(gone(other), sender)};
     return false;
   }
   const bool otherStop = stops - stopsBefore_ != stopsOfClients_;  // a signal, or a machine that slept
@@ -141,8 +151,12 @@ bool DeviceControl::hold(scene::ClientId client, const wire::HoldHand& wanted,
   return true;
 }
 
-void DeviceControl::clientGone(scene::ClientId client) {
+void DeviceControl::letGo(scene::ClientId client) {
   if (holder_ == client) releaseHand();
+}
+
+void DeviceControl::clientGone(scene::ClientId client) {
+  letGo(client);
   for (Stop& stop : stops_) std::erase(stop.clients, client);
 }
 

@@ -40,6 +40,7 @@ class DeviceControl {
     bool isOperator = false;    ///< proven by a token or a user id
     bool isPage = false;        ///< a page in a browser
     bool hasOperators = false;  ///< the server knows somebody who could prove to be one
+    bool hasSocket = false;     ///< its user can prove it by the server's Unix socket
   };
   /// Zero force until a later re-arm. Any client may.
   void stopForces(const Order& order, const Sender& sender);
@@ -61,6 +62,8 @@ class DeviceControl {
   /// text.
   bool hold(scene::ClientId client, const wire::HoldHand& wanted, const realtime::TickReport& last,
             Refusal& refusal);
+  /// Releases the hand if the client holds it.
+  void letGo(scene::ClientId client);
   void clientGone(scene::ClientId client);
 
  private:

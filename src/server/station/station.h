@@ -72,14 +72,16 @@ class Station {
   /// Whether the client's role and the control of the scene permit this message; if not, `reason` is set.
   /// Scene commands take control where the first one to command gets it.
   bool mayCommand(const Commander& client, wire::MessageKind kind, std::string& reason);
+  /// Whether the message lets go of the hand that the client holds: it always may.
+  bool letsGo(scene::ClientId client, const wire::MessageReceived& message) const;
   /// Holds a force in the device frame for this client, within the budget of energy of all held forces.
   /// Returns why not, or an empty text; the same text at most once a second.
   Refusal holdForce(scene::ClientId client, const geometry::Vec3& force_N, base::Nanos lifetime,
                     base::Nanos received);
   /// Handles a control message. `received`: when the server read it, on the servo clock. `hasOperators`: see
-  /// Credentials.
+  /// Credentials. `hasSocket`: the server has its Unix socket.
   void onControl(Session& session, const wire::MessageReceived& message, base::Nanos received,
-                 bool hasOperators);
+                 bool hasOperators, bool hasSocket);
   /// The scene of this device was reset: trackers are reported in the device frame again.
   void onReset();
   /// The client is connected and has described no name yet.

@@ -45,13 +45,19 @@ bool Station::mayCommand(const Commander& client, wire::MessageKind kind, std::s
   return false;
 }
 
+bool Station::letsGo(scene::ClientId client, const wire::MessageReceived& message) const {
+  if (message.kind != wire::kindOf<wire::HoldHand> || impl_->control.holder() != client) return false;
+  const auto decoded = wire::decode<wire::HoldHand>(message.payload);
+  return decoded && decoded->hold == 0;
+}
+
 Refusal Station::holdForce(scene::ClientId client, const geometry::Vec3& force_N, base::Nanos lifetime,
                            base::Nanos received) {
   return impl_->streamed.on(client, force_N, lifetime, received).text;
 }
 
 void Station::onControl(Session& session, const wire::MessageReceived& message, base::Nanos received,
-                        bool hasOperators) {
+                        bool hasOperators, bool hasSocket) {
   const base::Nanos sent =
       message.time.seconds * base::Nanos{1'000'000'000} + message.time.microseconds * base::Nanos{1000};
   const Identity& identity = session.identity();
@@ -67,7 +73,8 @@ void Station::onControl(Session& session, const wire::MessageReceived& message, 
            operates && (identity.proven || impl_->roles->couldCommand(session.id(), session.address())),
        .isOperator = operates && identity.proven,
        .isPage = operates && session.ofPage(),
-       .hasOperators = hasOperators}};
+       .hasOperators = hasOperators,
+       .hasSocket = hasSocket}};
   const auto handled = wire::dispatchControl(message.kind, message.payload,
                                              [&](const auto& control) { impl_->on(request, control); });
   if (!handled) session.refuse("malformed message: " + handled.error());
@@ -153,6 +160,14 @@ void Station::Impl::on(const Request& request, const wire::QueryCapabilities&) {
 }
 
 void Station::Impl::on(const Request& request, const wire::StopForces&) {
+  if (replayed) {
+    request.session.send(
+        request.name,
+        wire::Text{.severity = wire::kTextError,
+                   .level = static_cast<std::uint32_t>(RefusalCode::notPermitted),
+                   .text = "Stop_Forces refused: this server replays a recording, which has no force"});
+    return;
+  }
   request.session.logWarning(
       fmt::format("({}) stops the forces of '{}'", request.session.description(), config.names.front()));
   control.stopForces(request.order, request.sender);
@@ -197,6 +212,7 @@ void Station::Impl::on(const Request& request, const wire::ReleaseControl&) {
              "Release_Control refused: a batch is open; commit it first");
     return;
   }
+  control.letGo(request.session.id());
   roles->release(request.session.id());
 }
 

@@ -187,6 +187,29 @@ TEST_F(RearmTest, AStopOfOnesOwnUndoesNoOther) {
   EXPECT_TRUE(guard_.stopped());
 }
 
+TEST_F(RearmTest, ARefusalTellsWhoMayRearm) {
+  const std::string stopped = "Rearm_Forces refused: client 1 stopped the forces";
+  const std::string user =
+      ", or the server's user on its machine: 'hapticd stop --rearm NAME@host', or NAME@unix:PATH if its "
+      "socket "
+      "is elsewhere";
+  Sender sender = client(2);
+  const auto refusal = [&](bool operators, bool socket) {
+    sender.hasOperators = operators;
+    sender.hasSocket = socket;
+    EXPECT_FALSE(rearms(sender));
+    return refusal_.text;
+  };
+  stop(client(1));
+  EXPECT_EQ(refusal(true, true), stopped + "; it may re-arm, or an operator" + user);
+  EXPECT_EQ(refusal(true, false), stopped + "; it may re-arm, or an operator");
+  EXPECT_EQ(refusal(false, false), stopped + "; it may re-arm");
+  control_.clientGone(1);
+  EXPECT_EQ(refusal(true, true), stopped + " and is gone; an operator may re-arm" + user);
+  EXPECT_EQ(refusal(true, false), stopped + " and is gone; an operator may re-arm");
+  EXPECT_EQ(refusal(false, false), stopped + " and is gone; a page of the server in a browser may re-arm");
+}
+
 TEST_F(RearmTest, AnOperatorUndoesAllStops) {
   for (scene::ClientId id = 1; id < 100; ++id) {
     stop(client(id));
