@@ -255,7 +255,7 @@ def test_the_list_of_commands_is_that_of_the_documents() -> None:
     documented = {}
     for number, name, members in re.findall(r"^\| (\d+) \| `(\w+)` \| (.*) \|$", text, re.M):
         documented[int(number)] = (name, tuple((m, t) for t, m in re.findall(r"([^,`]+) `(\w+)`", members)))
-    short = {"i32": "i", "u32": "I", "f32": "f", "f64": "d", "truth": "?", "text": "text"}
+    short = {"i32": "i", "i64": "q", "u32": "I", "f32": "f", "f64": "d", "truth": "?", "text": "text"}
 
     def form(type_: str) -> str:
         type_ = type_.strip()

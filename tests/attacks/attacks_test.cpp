@@ -150,18 +150,23 @@ class Attacks : public InContact {
     run();
     finish();
   }
-  // The attacker's part of the force, along z, must end after the fault. The contact's, along the normal of
-  // the floor, is smaller for a while after a late tick.
+  // The attacker's part of a force, along z: what is across the contact's, which is smaller for a while after
+  // a late tick.
+  double pulling_N(const Vec3& force) const {
+    const Vec3 contact = expected[static_cast<std::size_t>(deep)].normalized();
+    return (force - force.dot(contact) * contact).z();
+  }
+  // The attacker's part of the force must end after the fault.
   void attackThatEnds(const std::string& name, const std::function<void()>& prepare,
                       const std::function<void()>& fault, const std::function<bool()>& ended) {
     attack(name, [&] {
       prepare();
-      const double added_N = arm.left().z();
+      const double added_N = pulling_N(arm.left());
       const std::int64_t before = arm->ticks;
       const std::size_t logged = server->log().size();
       fault();
       EXPECT_TRUE(visitor->until(ended));
-      const auto remains = [&](const Vec3& force) { return force.z() / added_N >= 0.1; };
+      const auto remains = [&](const Vec3& force) { return pulling_N(force) / added_N >= 0.1; };
       if (const auto noticed = loggedAt("disconnected", logged)) {
         EXPECT_LE(ticksAfter(*noticed, remains), kRampOut_ticks);
       }
@@ -610,7 +615,7 @@ TEST_F(Attacks, OfMessages) {
 // The forces of the attacker's own effects must end with it.
 TEST_F(Attacks, OfClientsThatVanish) {
   const wire::ForceField field{.origin = {0, 0, 0}, .force = {0, 0, 1}, .jacobian = {}, .radius = 100};
-  const auto pulls = [&] { return std::abs(arm.left().z()) > 0.2; };
+  const auto pulls = [&] { return std::abs(pulling_N(arm.left())) > 0.2; };
   const auto begin = [&] {
     ScriptedPeer& attacker = peer();
     attacker.send(field);

@@ -18,8 +18,7 @@ std::string whoMayRearm(bool gone, const DeviceControl::Sender& sender) {
   if (sender.hasSocket) {
     return text + (gone ? "; an operator may re-arm" : ", or an operator") +
            ", or the server's user on its machine: 'hapticd stop --rearm NAME@host', or NAME@unix:PATH if "
-           "its "
-           "socket is elsewhere";
+           "its socket is elsewhere";
   }
   if (sender.hasOperators) return text + (gone ? "; an operator may re-arm" : ", or an operator");
   return text + (gone ? "; a page of the server in a browser may re-arm" : "");
