@@ -628,8 +628,8 @@ class Core(Commands):
         return m.Identify(self._token, self._key)
 
     def _put_key(self) -> None:
-        """Before a stop or a re-arm, so that the server knows this client again on its next connection. A token has told the key
-        already."""
+        """Before a stop or a re-arm, so that the server knows this client again on its other connections, and on its next one. A
+        token has told the key already."""
         if not self._token and self.connected:
             self._put_now(self._identity())
 

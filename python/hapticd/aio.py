@@ -657,10 +657,7 @@ class Client(Core):
             if sock is not None and not self._transport.is_closing():
                 backlog += unacknowledged(sock)
         behind = backlog > STOP_BACKLOG_BYTES and (not self._answered or self._has(m.FEATURE_STOP))
-        if behind:  # both connections stop, and this one may undo both
-            self._put_now(self._identity())
-        else:
-            self._put_key()
+        self._put_key()
         if not self._put_now(m.StopForces()):
             raise ConnectionLost(f"forces not stopped: {self._why_not_connected()}")
         self._push()

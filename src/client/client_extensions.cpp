@@ -126,13 +126,11 @@ void Client::subscribe(Reports kinds, double rate_Hz) {
 void Client::stopForces() {
   const bool behind = impl_->link.backlogBytes() > kStopBacklogBytes;
   const bool beside = behind && (!impl_->answered || impl_->has(wire::kFeatureStop));
+  impl_->sendKey();
   if (beside) {
-    // Both connections stop, and the first one may undo both.
-    impl_->link.sendNow(impl_->sender, impl_->identity());
     impl_->link.sendNow(impl_->sender, wire::StopForces{});
     impl_->stopBesideBacklog();
   } else {
-    impl_->sendKey();
     impl_->sendAtOnce(wire::StopForces{}, "forces not stopped");
   }
   impl_->require(wire::kFeatureStop, "stop the forces");

@@ -38,8 +38,8 @@ struct HAPTICD_HIDDEN Client::Impl {
   void greet();
   /// What the server must know of this client before it stops or re-arms.
   wire::Identify identity() const { return {.token = std::string_view(token), .key = key}; }
-  /// Puts the key before a stop or a re-arm, so that the server knows this program again on its next
-  /// connection. A token has told the key already.
+  /// Puts the key before a stop or a re-arm, so that the server knows this program again on its other
+  /// connections, and on its next one. A token has told the key already.
   void sendKey() {
     if (token.empty() && link.connected()) link.putBeforeHeld(sender, identity());
   }

@@ -703,43 +703,50 @@ TEST_P(RecordingBegunLate, GivesTheRecordedForcesBitForBit) {
   EXPECT_GT(compared.touching, 800U);
 }
 
-// As a version wrote the file that did not know this kind of block.
-void removeBlocks(const std::filesystem::path& file, record::BlockKind kind) {
-  record::Bytes kept(record::magic().begin(), record::magic().end());
-  record::BlockReader blocks(file);
-  for (record::BlockReader::Block block; blocks.next(block);) {
-    if (block.kind != kind) record::appendBlock(kept, block.kind, block.content);
-  }
-  std::ofstream(file, std::ios::binary)
-      .write(reinterpret_cast<const char*>(kept.data()), static_cast<std::streamsize>(kept.size()));
-}
-
-// As a version wrote the file that let effects start anew.
-void startEffectsAnew(const std::filesystem::path& file) {
+// Writes the file again, with the blocks as `change` leaves them, and without those that it refuses.
+template <class Change>
+void rewrite(const std::filesystem::path& file, const Change& change) {
   record::Bytes changed(record::magic().begin(), record::magic().end());
   record::BlockReader blocks(file);
   for (record::BlockReader::Block block; blocks.next(block);) {
-    record::SceneEvent event;
-    std::string error;
-    const bool ofScene =
-        block.kind == record::BlockKind::scene && record::unpackSceneEvent(block.content, event, error);
-    const auto* goesOn =
-        ofScene && event.command ? std::get_if<scene::ContinueEffect>(&*event.command) : nullptr;
-    if (goesOn == nullptr) {
-      record::appendBlock(changed, block.kind, block.content);
-      continue;
-    }
-    const scene::SceneCommand start = scene::StartEffect{goesOn->index};
-    record::Bytes content;
-    record::packSceneEvent(content, event.scene, event.client, event.time, &start);
-    record::appendBlock(changed, block.kind, content);
+    if (change(block)) record::appendBlock(changed, block.kind, block.content);
   }
   std::ofstream(file, std::ios::binary)
       .write(reinterpret_cast<const char*>(changed.data()), static_cast<std::streamsize>(changed.size()));
 }
 
+// As a version wrote the file that did not know this kind of block.
+void removeBlocks(const std::filesystem::path& file, record::BlockKind kind) {
+  rewrite(file, [kind](const record::BlockReader::Block& block) { return block.kind != kind; });
+}
+
+// As a version wrote the file that let effects start anew.
+void startEffectsAnew(const std::filesystem::path& file) {
+  rewrite(file, [](record::BlockReader::Block& block) {
+    record::SceneEvent event;
+    std::string error;
+    if (block.kind != record::BlockKind::scene || !record::unpackSceneEvent(block.content, event, error) ||
+        !event.command)
+      return true;
+    if (const auto* goesOn = std::get_if<scene::ContinueEffect>(&*event.command)) {
+      const scene::SceneCommand start = scene::StartEffect{goesOn->index};
+      block.content.clear();
+      record::packSceneEvent(block.content, event.scene, event.client, event.time, &start);
+    }
+    return true;
+  });
+}
+
 scene::DefineEffect pull(std::int32_t index, double duration_ms) {
   return {"constant", index, 0, 0.4, duration_ms, 0, geometry::Vec3::Zero(), {1, 0, 0}};
+}
+
+// More ticks than these are compared, and all of them are the same.
+void endTheSame(LateRecording& r, const RecordingFile& file, std::uint64_t ticks) {
+  r.end();
+  const Compared compared = rerender(file.path()).front();
+  EXPECT_GT(compared.ticks, ticks);
+  EXPECT_EQ(compared.same, compared.ticks) << compared.firstDifference;
 }
 
 // The force ramps in until the effect has ended: so no tick that is compared felt it.
@@ -773,10 +780,7 @@ TEST(RecordingBegunLate, DefinesAnEffectThatEndedWithoutStartingIt) {
   r.send(pull(1, 0));
   r.glide(kAbove, 500);
   EXPECT_EQ(r.last().rendering.force_N.norm(), 0);
-  r.end();
-  const Compared compared = rerender(file.path()).front();
-  EXPECT_GT(compared.ticks, 900U);
-  EXPECT_EQ(compared.same, compared.ticks) << compared.firstDifference;
+  endTheSame(r, file, 900);
 }
 
 // A start waits for its definition for one second, also when the recording begins meanwhile.
@@ -790,10 +794,7 @@ TEST(RecordingBegunLate, ForgetsAStartWithoutADefinitionWhenItWasForgotten) {
   r.send(pull(5, 0));
   r.glide(kAbove, 300);
   EXPECT_EQ(r.last().rendering.force_N.norm(), 0);
-  r.end();
-  const Compared compared = rerender(file.path()).front();
-  EXPECT_GT(compared.ticks, 900U);
-  EXPECT_EQ(compared.same, compared.ticks) << compared.firstDifference;
+  endTheSame(r, file, 900);
 }
 
 TEST(RecordingBegunLate, LeavesABatchRefusedThatWasRefused) {
@@ -814,10 +815,7 @@ TEST(RecordingBegunLate, LeavesABatchRefusedThatWasRefused) {
   r.send(scene::StartEffect{1}, 2);
   r.glide(kAbove, 100);
   EXPECT_NEAR(r.last().rendering.force_N.norm(), 0.4, 1e-9) << "after the batch";
-  r.end();
-  const Compared compared = rerender(file.path()).front();
-  EXPECT_GT(compared.ticks, 200U);
-  EXPECT_EQ(compared.same, compared.ticks) << compared.firstDifference;
+  endTheSame(r, file, 200);
 }
 
 struct Upload {

@@ -26,7 +26,8 @@ using geometry::Affine;
 
 /// Parts of an object this near to the tool decide whether its move is a jump.
 inline constexpr double kNear_m = 0.050;
-/// Triangles that a tick examines. A count and not a time, so that the clock never changes a force.
+/// Triangles that a tick examines: for a ball, two that it gathers count as one, and four that are out of
+/// reach. A count and not a time, so that the clock never changes a force.
 inline constexpr int kMaxVisits = 8192;
 using geometry::kGapTolerance_m;
 using geometry::kLargestGapTolerance_m;
