@@ -118,6 +118,7 @@ _COMMANDS: Final[Dict[int, Tuple[str, Tuple[Tuple[str, str], ...]]]] = {
     42: ("SetObjectName", (("object", "i"), ("text", "text"))),
     43: ("ContinueEffect", (("index", "i"), ("ran_ns", "q"))),
     44: ("RefuseBatch", ()),
+    45: ("ContinueMesh", (("object", "i"), ("hasDeformed", "i"), ("edited_ns", "q"))),
 }  # fmt: skip
 
 

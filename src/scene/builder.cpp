@@ -19,6 +19,11 @@ namespace {
 // over and measure no interval from it.
 constexpr Nanos kSettled = 500'000'000;
 
+void sortByTime(std::vector<ClientCommand>& commands) {
+  std::stable_sort(commands.begin(), commands.end(),
+                   [](const ClientCommand& a, const ClientCommand& b) { return a.at < b.at; });
+}
+
 std::size_t bytesOf(const SceneCommand& command) {
   std::size_t bytes = sizeof(SceneCommand);
   if (const auto* run = std::get_if<SetVertices>(&command)) bytes += run->positions.size() * sizeof(Vec3f);
@@ -130,8 +135,14 @@ class SceneBuilder::State {
       const Nanos before = targetOf(c.command) == Target::objects ? now - kSettled : now;
       c.at = std::max(c.at, before);
     }
-    std::stable_sort(commands.begin(), commands.end(),
-                     [](const ClientCommand& a, const ClientCommand& b) { return a.at < b.at; });
+    sortByTime(commands);
+    return commands;
+  }
+
+  std::vector<ClientCommand> editsUnderWay() const {
+    std::vector<ClientCommand> commands;
+    objects_.appendEditsUnderWay(commands);
+    sortByTime(commands);
     return commands;
   }
 
@@ -318,6 +329,10 @@ std::shared_ptr<const SceneSnapshot> SceneBuilder::publish(Nanos now, std::vecto
 
 SceneDescription SceneBuilder::describe() const {
   return state_->describe();
+}
+
+std::vector<ClientCommand> SceneBuilder::editsUnderWay() const {
+  return state_->editsUnderWay();
 }
 
 std::vector<ClientCommand> SceneBuilder::commands(Nanos now) const {

@@ -389,16 +389,24 @@ struct RefuseBatch {
   static constexpr CommandInfo kInfo{"RefuseBatch", kNoMessage, Target::scene};
 };
 
+/// What commands that set a mesh cannot say of it. Recordings that begin while the server runs have it.
+struct ContinueMesh {
+  static constexpr CommandInfo kInfo{"ContinueMesh", kNoMessage,    Target::objects,
+                                     "object",       "hasDeformed", "edited_ns"};
+  std::int32_t object = 0;
+  std::int32_t hasDeformed = 0;  ///< 1: vertices have moved since its triangles were set
+  std::int64_t edited_ns = -1;  ///< so long ago the first edit began that is not published; -1: there is none
+};
+
 /// Recordings store the position in this list as the number of a command: append, never reorder or remove.
-using CommandVariant =
-    std::variant<SetObjectNumber, SetVertices, SetTriangles, SetNormal, RemoveTriangle, ClearMesh,
-                 TransformMesh, SetTrimeshType, AddObject, AddObjectExScene, MoveToParent, RemoveObject,
-                 SetTransform, SetObjectPosition, SetObjectOrientation, SetObjectScale, SetTouchable,
-                 SetSurfaceProperty, SetSurface, SetTouchableFaces, SetWorkspaceProjection, SetWorkspaceBox,
-                 SetHapticOrigin, SetHapticScale, SetSceneOrigin, DefineEffect, StartEffect, StopEffect,
-                 SetPlane, SetPlaneDetail, SetForceField, SetConstraintEnabled, SetConstraintMode,
-                 SetConstraintVector, SetConstraintStiffness, StartCustomEffect, StopCustomEffect, ResetScene,
-                 BeginBatch, CommitBatch, ReleaseForces, SetObjectName, ContinueEffect, RefuseBatch>;
+using CommandVariant = std::variant<
+    SetObjectNumber, SetVertices, SetTriangles, SetNormal, RemoveTriangle, ClearMesh, TransformMesh,
+    SetTrimeshType, AddObject, AddObjectExScene, MoveToParent, RemoveObject, SetTransform, SetObjectPosition,
+    SetObjectOrientation, SetObjectScale, SetTouchable, SetSurfaceProperty, SetSurface, SetTouchableFaces,
+    SetWorkspaceProjection, SetWorkspaceBox, SetHapticOrigin, SetHapticScale, SetSceneOrigin, DefineEffect,
+    StartEffect, StopEffect, SetPlane, SetPlaneDetail, SetForceField, SetConstraintEnabled, SetConstraintMode,
+    SetConstraintVector, SetConstraintStiffness, StartCustomEffect, StopCustomEffect, ResetScene, BeginBatch,
+    CommitBatch, ReleaseForces, SetObjectName, ContinueEffect, RefuseBatch, ContinueMesh>;
 
 /// Any one command; std::visit, std::get and their like work on it. Copying, moving and destroying are
 /// compiled once, in commands.cpp: a variant of so many structs costs every file that holds one several

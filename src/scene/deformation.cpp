@@ -25,6 +25,22 @@ std::vector<std::uint32_t> loneOf(const std::vector<Triangle>& triangles, std::s
   return lone;
 }
 
+// Of the corners of triangles. `lone` ascends.
+Box boundsOf(const std::vector<Vec3f>& vertices, const std::vector<std::uint32_t>& lone) {
+  geometry::Vec3f lower = Vec3f::Constant(std::numeric_limits<float>::infinity());
+  geometry::Vec3f upper = -lower;
+  auto skip = lone.begin();
+  for (std::uint32_t i = 0; i < vertices.size(); ++i) {
+    if (skip != lone.end() && *skip == i) {
+      ++skip;
+      continue;
+    }
+    lower = lower.cwiseMin(vertices[i]);
+    upper = upper.cwiseMax(vertices[i]);
+  }
+  return {lower.cast<double>(), upper.cast<double>()};
+}
+
 // The coordinates of all vertices.
 const float* flat(const std::vector<Vec3f>& vertices) {
   return vertices.data()->data();
@@ -167,6 +183,9 @@ std::shared_ptr<MeshGeometry> Deformation::next(std::shared_ptr<MeshGeometry> ol
   way_ = longestMove();
   coverTrajectory(*old);
   mesh->index = indexOver(triangles);
+  mesh->bounds = boundsOf(*target, lone_);
+  mesh->boundsOnTheWay = old->boundsAfter(now);
+  mesh->boundsOnTheWay.extend(mesh->bounds);
   mesh->target = std::move(target);
   mesh->before = old->target ? old->target : old->vertices;
   mesh->vertices = mesh->before;

@@ -51,6 +51,12 @@ void MeshDraft::edited(Nanos now) {
   lastEdit_ = now;
 }
 
+void MeshDraft::shapeEdited(Nanos now) {
+  shapeChanged_ = true;
+  hasDeformed_ = false;
+  edited(now);
+}
+
 std::optional<Nanos> MeshDraft::due() const {
   if (!dirty_) return std::nullopt;
   if (finished_) return lastEdit_;
@@ -91,8 +97,11 @@ std::size_t MeshDraft::setVertices(std::uint32_t first, std::vector<Vec3f>&& run
       }
     }
   }
-  shapeChanged_ |= !inPlace || sparse_;
-  edited(now);
+  if (inPlace && !sparse_) {
+    edited(now);
+  } else {
+    shapeEdited(now);
+  }
   return refused;
 }
 
@@ -104,16 +113,14 @@ void MeshDraft::setTriangles(std::uint32_t first, const std::vector<Triangle>& r
   if (triangles.size() < end) triangles.resize(end, kNoTriangle);
   std::copy(run.begin(), run.end(), triangles.begin() + first);
   indexed_ = true;
-  shapeChanged_ = true;
-  edited(now);
+  shapeEdited(now);
 }
 
 bool MeshDraft::removeTriangle(std::uint32_t triangle, Nanos now) {
   if (!indexed_ || triangle >= triangles_.read().size() || triangles_.read()[triangle] == kNoTriangle)
     return false;
   triangles_.write(0)[triangle] = kNoTriangle;
-  shapeChanged_ = true;
-  edited(now);
+  shapeEdited(now);
   return true;
 }
 
@@ -122,42 +129,65 @@ void MeshDraft::clear(Nanos now) {
   triangles_ = {};
   indexed_ = false;
   sparse_ = false;
-  shapeChanged_ = true;
-  edited(now);
+  shapeEdited(now);
   finished_ = true;
 }
+
+namespace {
+
+// In runs, so that a command is no larger than a megabyte or so of memory.
+template <class Item, class Add>
+void inRuns(const std::vector<Item>& items, const Add& add) {
+  constexpr std::size_t kRun = 1U << 20U;
+  for (std::size_t first = 0; first < items.size(); first += kRun) {
+    const auto begin = items.begin() + static_cast<std::ptrdiff_t>(first);
+    add(static_cast<std::int32_t>(first),
+        std::vector(begin, begin + static_cast<std::ptrdiff_t>(std::min(kRun, items.size() - first))));
+  }
+}
+
+}  // namespace
 
 // Vertices that have not come are not numbers and stay so; triangles that were removed come with three equal
 // corners and are removed again.
 void MeshDraft::appendCommands(std::int32_t object, ClientId client, bool inMetres,
                                std::vector<ClientCommand>& out) const {
-  constexpr std::size_t kRun = 1U << 20U;
-  const auto runs = [&](const auto& items, const auto& add) {
-    for (std::size_t first = 0; first < items.size(); first += kRun) {
-      const auto begin = items.begin() + static_cast<std::ptrdiff_t>(first);
-      add(static_cast<std::int32_t>(first),
-          std::vector(begin, begin + static_cast<std::ptrdiff_t>(std::min(kRun, items.size() - first))));
-    }
-  };
-  // Edits under way are due when they were: they have a first one, and a last one.
   const bool edited = dirty_ && shapeChanged_ && !finished_;
   const Nanos at = edited ? lastEdit_ : 0;
-  if (edited && vertexCount() > 0)
-    out.push_back({client, SetVertices{object, 0, {vertices_.read().front()}}, firstEdit_});
-  runs(vertices_.read(), [&](std::int32_t first, std::vector<Vec3f>&& run) {
-    out.push_back({client, SetVertices{object, first, std::move(run)}, at});
+  const auto add = [&](SceneCommand command) { out.push_back({client, std::move(command), at}); };
+  const std::vector<Vec3f>& vertices = positionsAreUnderWay() ? current_->shapeVertices() : vertices_.read();
+  inRuns(vertices, [&](std::int32_t first, std::vector<Vec3f>&& run) {
+    add(SetVertices{object, first, std::move(run)});
   });
-  if (!indexed_) return;
-  std::vector<std::int32_t> removed;
-  runs(triangles_.read(), [&](std::int32_t first, std::vector<Triangle>&& run) {
-    for (std::size_t i = 0; i < run.size(); ++i) {
-      if (run[i] != kNoTriangle) continue;
-      run[i] = Triangle{};
-      removed.push_back(first + static_cast<std::int32_t>(i));
-    }
-    out.push_back({client, SetTriangles{object, first, std::move(run), inMetres}, at});
+  if (indexed_) {
+    std::vector<std::int32_t> removed;
+    inRuns(triangles_.read(), [&](std::int32_t first, std::vector<Triangle>&& run) {
+      for (std::size_t i = 0; i < run.size(); ++i) {
+        if (run[i] != kNoTriangle) continue;
+        run[i] = Triangle{};
+        removed.push_back(first + static_cast<std::int32_t>(i));
+      }
+      add(SetTriangles{object, first, std::move(run), inMetres});
+    });
+    for (const std::int32_t triangle : removed) add(RemoveTriangle{object, triangle});
+  }
+  if (edited || hasDeformed_) add(ContinueMesh{object, hasDeformed_, edited ? lastEdit_ - firstEdit_ : -1});
+}
+
+void MeshDraft::appendEditsUnderWay(std::int32_t object, ClientId client,
+                                    std::vector<ClientCommand>& out) const {
+  if (!positionsAreUnderWay()) return;
+  inRuns(vertices_.read(), [&](std::int32_t first, std::vector<Vec3f>&& run) {
+    out.push_back({client, SetVertices{object, first, std::move(run)}, lastEdit_});
   });
-  for (const std::int32_t triangle : removed) out.push_back({client, RemoveTriangle{object, triangle}, at});
+  out.push_back({client, ContinueMesh{object, hasDeformed_, lastEdit_ - firstEdit_}, lastEdit_});
+}
+
+void MeshDraft::continueFrom(bool hasDeformed, std::optional<Nanos> firstEdit, Nanos now) {
+  hasDeformed_ = hasDeformed;
+  if (!firstEdit) return;
+  edited(now);
+  firstEdit_ = *firstEdit;
 }
 
 // Triples keep one list as long as their number stays; numbered triangles get a copy only when some lack a
@@ -197,6 +227,8 @@ std::shared_ptr<MeshGeometry> MeshDraft::build(std::uint64_t topology) {
   mesh->index = SpatialIndex::build(static_cast<std::uint32_t>(triangles.size()), [&](std::uint32_t id) {
     return !repeated.empty() && repeated[id] ? Box{} : boxOfTriangle(triangles[id], vertices);
   });
+  mesh->bounds = mesh->boundsOnTheWay = mesh->index.bounds();
+  if (hasDeformed_) return mesh;
   auto fans = std::make_shared<const geometry::Fans>(vertices, triangles, repeated);
   if (!fans->empty()) mesh->fans = std::move(fans);
   return mesh;
@@ -209,6 +241,7 @@ std::shared_ptr<const MeshGeometry> MeshDraft::commit(Nanos now, std::uint64_t t
   } else {
     auto asSent = indexed_ ? triangles_.share() : current_->triangles;
     current_ = deformation_.next(current_, std::move(asSent), vertices_.share(), now);
+    hasDeformed_ = true;
   }
   dirty_ = false;
   shapeChanged_ = false;

@@ -76,9 +76,14 @@ class MeshDraft {
   /// Does not publish the edits so far until the next edit.
   void giveUp() { dirty_ = false; }
 
-  /// Appends commands that make an empty draft this one. Those of edits under way have their times.
+  /// Appends commands that make an empty draft this one, as it was published if only positions have changed
+  /// since. Those of other edits under way have their times.
   void appendCommands(std::int32_t object, ClientId client, bool inMetres,
                       std::vector<ClientCommand>& out) const;
+  /// Appends the commands, with their times, that make the published draft this one.
+  void appendEditsUnderWay(std::int32_t object, ClientId client, std::vector<ClientCommand>& out) const;
+  /// What ContinueMesh says.
+  void continueFrom(bool hasDeformed, std::optional<Nanos> firstEdit, Nanos now);
 
   bool finished() const { return finished_; }
   /// When edits should be published; nothing when there are none.
@@ -98,6 +103,8 @@ class MeshDraft {
 
  private:
   void edited(Nanos now);
+  void shapeEdited(Nanos now);
+  bool positionsAreUnderWay() const { return dirty_ && !shapeChanged_ && current_; }
   void grow(std::vector<Vec3f>& vertices, std::size_t size);
   std::shared_ptr<const std::vector<Triangle>> shareTriangles();
   std::shared_ptr<MeshGeometry> build(std::uint64_t topology);
@@ -109,6 +116,7 @@ class MeshDraft {
   bool dirty_ = false;
   bool shapeChanged_ = false;  // more than positions
   bool finished_ = false;
+  bool hasDeformed_ = false;  // since the triangles were set
   Nanos firstEdit_ = 0;
   Nanos lastEdit_ = 0;
   Nanos lastCommit_ = 0;

@@ -12,6 +12,7 @@
 namespace hapticd::scene {
 
 using base::Nanos;
+using geometry::Box;
 using geometry::Triangle;
 using geometry::Vec3f;
 
@@ -35,9 +36,14 @@ struct MeshGeometry {
   /// Upper bound of the way of a vertex during the shapes of the last 100 ms, object units. The index does
   /// not cover it: a late tick that missed a shape adds it to its reach.
   double recentMove = 0;
+  Box bounds;                                  ///< of the shape once it has arrived: its index may cover more
+  Box boundsOnTheWay;                          ///< of all shapes that it has while it deforms
   SpatialIndex index;                          ///< over triangle ids, in object units
   std::shared_ptr<const geometry::Fans> fans;  ///< null without any, and once a vertex has moved
 
+  /// All positions of vertices, as of the last publication.
+  const std::vector<Vec3f>& shapeVertices() const noexcept { return target ? *target : *vertices; }
+  const Box& boundsAfter(Nanos now) const noexcept { return deformingAfter(now) ? boundsOnTheWay : bounds; }
   bool deformingAfter(Nanos now) const noexcept { return target && now < morphEnd; }
 
   /// Corners of a triangle at `now`, object units. noexcept, allocation-free.

@@ -138,6 +138,16 @@ void ObjectTable::handle(SetNormal& c, const Call& call) {
 }
 
 template <>
+void ObjectTable::handle(ContinueMesh& c, const Call& call) {
+  Object* object = find(c.object, "mesh", call);
+  if (object == nullptr) return;
+  std::optional<Nanos> firstEdit;
+  if (c.edited_ns >= 0) firstEdit = call.now - std::min<Nanos>(c.edited_ns, MeshDraft::kLongest);
+  object->mesh.continueFrom(c.hasDeformed != 0, firstEdit, call.now);
+  if (firstEdit) meshEdited(*object, call);
+}
+
+template <>
 void ObjectTable::handle(RemoveTriangle& c, const Call& call) {
   constexpr std::string_view kName = "removeTriangle";
   Object* object = find(c.object, kName, call);

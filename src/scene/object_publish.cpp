@@ -179,7 +179,7 @@ std::optional<ObjectTable::Move> ObjectTable::moveOf(Object& object, Nanos now) 
     return {};
   }
   const Affine begin = object.motion.at(now);
-  const Box bounds = object.geometry ? object.geometry->index.bounds() : Box{};
+  const Box bounds = object.geometry ? object.geometry->boundsAfter(now) : Box{};
   const auto sweep = [&](const Affine& from, const Affine& to) {
     return bounds.empty() ? 0 : shortestSweep(longestMove(from, to, bounds) / worldUnitsPerMetre_);
   };

@@ -170,6 +170,13 @@ void ObjectTable::appendCommands(std::vector<ClientCommand>& out) const {
   asked_.appendTo(out);
 }
 
+void ObjectTable::appendEditsUnderWay(std::vector<ClientCommand>& out) const {
+  for (const std::int32_t id : edited_) {
+    const Object* object = find(id);
+    if (object != nullptr) object->mesh.appendEditsUnderWay(id, object->meshSetBy, out);
+  }
+}
+
 void ObjectTable::queue(Object& object) {
   if (object.queued) return;
   object.queued = true;

@@ -153,13 +153,16 @@ bool Recordings::beginScene(SceneHost& scene) {
     for (const scene::ClientCommand& c : builders.front()->commands(now))
       recorder->recordCommand(scene.number(), c.client, c.at, &c.command);
     recorderOf_[scene.number()] = recorder;
-    std::size_t seat = 0;
+    std::vector<std::uint32_t> seats;
     for (std::uint32_t i = 0; i < stations_.size(); ++i) {
-      if (&stations_[i]->scene() != &scene) continue;
-      const scene::SceneBuilder& builder = *builders[seat++];
-      recorder->recordPublish(i, now - kPublished, builder.revision());
-      stations_[i]->recordTo(recorder, i, &builder);
+      if (&stations_[i]->scene() == &scene) seats.push_back(i);
     }
+    for (std::size_t k = 0; k < seats.size(); ++k)
+      recorder->recordPublish(seats[k], now - kPublished, builders[k]->revision());
+    for (const scene::ClientCommand& c : builders.front()->editsUnderWay())
+      recorder->recordCommand(scene.number(), c.client, c.at, &c.command);
+    for (std::size_t k = 0; k < seats.size(); ++k)
+      stations_[seats[k]]->recordTo(recorder, seats[k], builders[k]);
   });
 }
 

@@ -470,6 +470,8 @@ class LateRecording {
     for (const scene::ClientCommand& c : builder_.commands(now_))
       recorder->recordCommand(0, c.client, c.at, &c.command);
     recorder->recordPublish(0, now_ - 200 * kTick, builder_.revision());
+    for (const scene::ClientCommand& c : builder_.editsUnderWay())
+      recorder->recordCommand(0, c.client, c.at, &c.command);
     tick_.recordTo({.ticks = &recorder->ring(0),
                     .streams = &recorder->streamRing(0),
                     .memories = &recorder->memoryRing(0),
@@ -816,6 +818,76 @@ TEST(RecordingBegunLate, LeavesABatchRefusedThatWasRefused) {
   r.glide(kAbove, 100);
   EXPECT_NEAR(r.last().rendering.force_N.norm(), 0.4, 1e-9) << "after the batch";
   endTheSame(r, file, 200);
+}
+
+// How far the proxy stays off a mesh depends on the size of its shape, not of the shapes before.
+TEST(RecordingBegunLate, HasAMeshThatHasDeformed) {
+  const RecordingFile file;
+  LateRecording r;
+  r.glide({1, 60, 2}, 400);
+  r.raise(0.03);
+  r.glide({1, 60, 2}, 100);
+  r.raise(0);
+  r.glide(kAbove, 700);
+  r.record(file.path());
+  r.glide(kAbove, 50);
+  r.glide({2, 19, 1}, 400);
+  EXPECT_TRUE(r.last().rendering.touching);
+  endTheSame(r, file, 400);
+}
+
+// Triangles around a vertex are joined until a vertex has moved.
+TEST(RecordingBegunLate, HasAFanThatHasDeformed) {
+  const RecordingFile file;
+  LateRecording r;
+  constexpr std::uint32_t kRim = 600;
+  const auto fan = [](float height_m) {
+    std::vector<geometry::Vec3f> points{{0, height_m, 0}};
+    for (std::uint32_t i = 0; i < kRim; ++i) {
+      const float angle = 6.2831853F * static_cast<float>(i) / kRim;
+      points.emplace_back(0.01F * std::cos(angle), 0.03F, -0.01F * std::sin(angle));
+    }
+    return points;
+  };
+  std::vector<geometry::Triangle> triangles;
+  for (std::uint32_t i = 0; i < kRim; ++i) triangles.push_back({0, 1 + i, 1 + (i + 1) % kRim});
+  r.glide({1, 40, 2}, 400);
+  r.send(scene::AddObject{1, -1});
+  r.send(scene::SetVertices{1, 0, fan(0.032F)});
+  r.send(scene::SetTriangles{1, 0, triangles, true});
+  r.send(scene::SetSurface{1, 0.8, 0.001, 0.4, 0.3});
+  r.glide({1, 40, 2}, 400);
+  r.send(scene::SetVertices{1, 0, fan(0.033F)});
+  r.glide({1, 40, 2}, 700);
+  r.record(file.path());
+  r.glide({1, 40, 2}, 50);
+  r.glide({2, 30.5, 1}, 400);
+  EXPECT_TRUE(r.last().rendering.touching);
+  r.glide({-2, 30.5, 1}, 400);
+  EXPECT_TRUE(r.last().rendering.touching);
+  endTheSame(r, file, 700);
+}
+
+// New positions alone are shown 4 ms after the last, and 20 ms after the first at the latest. What they
+// deform was there before.
+TEST(RecordingBegunLate, ShowsNewPositionsWhenTheyWereShown) {
+  for (const int at : {0, 1, 3, 7, 12, 19, 26}) {
+    for (const int every_ms : {1, 3, 5}) {
+      const RecordingFile file;
+      LateRecording r;
+      r.glide({1, 60, 2}, 700);
+      for (int i = 0; i < 30; ++i) {
+        r.raise(0.0001 * (30 - i));
+        if (i == at) r.record(file.path());
+        r.glide({1, 60, 2}, every_ms);
+      }
+      r.glide(kAbove, 500);
+      r.glide({2, 19, 1}, 400);
+      EXPECT_TRUE(r.last().rendering.touching);
+      SCOPED_TRACE(testing::Message() << "every " << every_ms << " ms, begun at " << at);
+      endTheSame(r, file, 400);
+    }
+  }
 }
 
 struct Upload {

@@ -248,7 +248,8 @@ void ContactQuery::add(const ObjectState& state) noexcept {
 bool ContactQuery::place(const ObjectState& state, PlacedObject& placed) const noexcept {
   placed = PlacedObject{};
   placed.state = &state;
-  const geometry::Box& box = state.mesh->index.bounds();
+  // Not those of the index, which remember the shapes before.
+  const geometry::Box& box = state.mesh->boundsAfter(now_.time);
   if (box.empty()) return false;
   placed.T_device_object = now_.scene->workspace.T_device_world * state.motion.at(now_.time);
   placed.atRest = !state.motion.movingAfter(now_.time) && !state.mesh->deformingAfter(now_.time);

@@ -52,6 +52,7 @@ inline std::shared_ptr<scene::MeshGeometry> geometryOf(const TriangleMesh& mesh,
     }
     return box;
   });
+  g->bounds = g->boundsOnTheWay = g->index.bounds();
   if (g->target) return g;
   auto fans = std::make_shared<const geometry::Fans>(*g->vertices, triangles, std::vector<bool>());
   if (!fans->empty()) g->fans = std::move(fans);

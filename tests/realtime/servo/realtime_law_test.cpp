@@ -119,6 +119,7 @@ std::shared_ptr<const scene::MeshGeometry> ball(int rings, double bump) {
         for (const auto corner : (*triangles)[id]) box.extend((*vertices)[corner].cast<double>());
         return box;
       });
+  mesh->bounds = mesh->index.bounds();
   return mesh;
 }
 
