@@ -119,6 +119,7 @@ _COMMANDS: Final[Dict[int, Tuple[str, Tuple[Tuple[str, str], ...]]]] = {
     43: ("ContinueEffect", (("index", "i"), ("ran_ns", "q"))),
     44: ("RefuseBatch", ()),
     45: ("ContinueMesh", (("object", "i"), ("hasDeformed", "i"), ("edited_ns", "q"))),
+    46: ("PauseRebuilds", (("pause_ns", "q"),)),
 }  # fmt: skip
 
 

@@ -139,9 +139,9 @@ class SceneBuilder::State {
     return commands;
   }
 
-  std::vector<ClientCommand> editsUnderWay() const {
+  std::vector<ClientCommand> editsUnderWay(Nanos now) const {
     std::vector<ClientCommand> commands;
-    objects_.appendEditsUnderWay(commands);
+    objects_.appendEditsUnderWay(now, commands);
     sortByTime(commands);
     return commands;
   }
@@ -331,8 +331,8 @@ SceneDescription SceneBuilder::describe() const {
   return state_->describe();
 }
 
-std::vector<ClientCommand> SceneBuilder::editsUnderWay() const {
-  return state_->editsUnderWay();
+std::vector<ClientCommand> SceneBuilder::editsUnderWay(Nanos now) const {
+  return state_->editsUnderWay(now);
 }
 
 std::vector<ClientCommand> SceneBuilder::commands(Nanos now) const {

@@ -52,9 +52,9 @@ class SceneBuilder {
   /// whose client left are not among them. In the order of their times, which let meshes be published that
   /// have been, and others when they are.
   std::vector<ClientCommand> commands(Nanos now) const;
-  /// New positions of vertices that are not published yet, with their times, to follow a publication of
-  /// commands().
-  std::vector<ClientCommand> editsUnderWay() const;
+  /// To follow a publication of commands(): new positions of vertices that are not published yet, with their
+  /// times, and when they may be at the earliest.
+  std::vector<ClientCommand> editsUnderWay(Nanos now) const;
   /// Of the last snapshot.
   std::uint64_t revision() const noexcept;
   /// The same, if it shows all edits up to this time.

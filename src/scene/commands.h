@@ -398,6 +398,13 @@ struct ContinueMesh {
   std::int64_t edited_ns = -1;  ///< so long ago the first edit began that is not published; -1: there is none
 };
 
+/// Meshes that were published are not built again for so long. Recordings that begin while the server runs
+/// have it.
+struct PauseRebuilds {
+  static constexpr CommandInfo kInfo{"PauseRebuilds", kNoMessage, Target::objects, "pause_ns"};
+  std::int64_t pause_ns = 0;
+};
+
 /// Recordings store the position in this list as the number of a command: append, never reorder or remove.
 using CommandVariant = std::variant<
     SetObjectNumber, SetVertices, SetTriangles, SetNormal, RemoveTriangle, ClearMesh, TransformMesh,
@@ -406,7 +413,7 @@ using CommandVariant = std::variant<
     SetWorkspaceProjection, SetWorkspaceBox, SetHapticOrigin, SetHapticScale, SetSceneOrigin, DefineEffect,
     StartEffect, StopEffect, SetPlane, SetPlaneDetail, SetForceField, SetConstraintEnabled, SetConstraintMode,
     SetConstraintVector, SetConstraintStiffness, StartCustomEffect, StopCustomEffect, ResetScene, BeginBatch,
-    CommitBatch, ReleaseForces, SetObjectName, ContinueEffect, RefuseBatch, ContinueMesh>;
+    CommitBatch, ReleaseForces, SetObjectName, ContinueEffect, RefuseBatch, ContinueMesh, PauseRebuilds>;
 
 /// Any one command; std::visit, std::get and their like work on it. Copying, moving and destroying are
 /// compiled once, in commands.cpp: a variant of so many structs costs every file that holds one several

@@ -14,6 +14,7 @@ constexpr std::string_view kBadMatrix =
 // closes.
 constexpr std::size_t kGap = 65'536;
 constexpr std::size_t kGapsInAll = 1'000'000;
+constexpr Nanos kLongestPause = 60'000'000'000;  // that a recording may state
 
 }  // namespace
 
@@ -145,6 +146,11 @@ void ObjectTable::handle(ContinueMesh& c, const Call& call) {
   if (c.edited_ns >= 0) firstEdit = call.now - std::min<Nanos>(c.edited_ns, MeshDraft::kLongest);
   object->mesh.continueFrom(c.hasDeformed != 0, firstEdit, call.now);
   if (firstEdit) meshEdited(*object, call);
+}
+
+template <>
+void ObjectTable::handle(PauseRebuilds& c, const Call& call) {
+  rebuildNotBefore_ = call.now + std::clamp<Nanos>(c.pause_ns, 0, kLongestPause);
 }
 
 template <>

@@ -170,11 +170,12 @@ void ObjectTable::appendCommands(std::vector<ClientCommand>& out) const {
   asked_.appendTo(out);
 }
 
-void ObjectTable::appendEditsUnderWay(std::vector<ClientCommand>& out) const {
+void ObjectTable::appendEditsUnderWay(Nanos now, std::vector<ClientCommand>& out) const {
   for (const std::int32_t id : edited_) {
     const Object* object = find(id);
     if (object != nullptr) object->mesh.appendEditsUnderWay(id, object->meshSetBy, out);
   }
+  if (rebuildNotBefore_ > now) out.push_back({0, PauseRebuilds{rebuildNotBefore_ - now}, now});
 }
 
 void ObjectTable::queue(Object& object) {

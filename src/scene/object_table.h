@@ -135,7 +135,7 @@ class ObjectTable {
   void describe(SceneDescription& out) const;
   /// Appends commands that make an empty table this one.
   void appendCommands(std::vector<ClientCommand>& out) const;
-  void appendEditsUnderWay(std::vector<ClientCommand>& out) const;
+  void appendEditsUnderWay(Nanos now, std::vector<ClientCommand>& out) const;
 
  private:
   // One specialisation for each command, in object_commands.cpp; a missing one does not link.

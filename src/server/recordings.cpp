@@ -159,7 +159,7 @@ bool Recordings::beginScene(SceneHost& scene) {
     }
     for (std::size_t k = 0; k < seats.size(); ++k)
       recorder->recordPublish(seats[k], now - kPublished, builders[k]->revision());
-    for (const scene::ClientCommand& c : builders.front()->editsUnderWay())
+    for (const scene::ClientCommand& c : builders.front()->editsUnderWay(now))
       recorder->recordCommand(scene.number(), c.client, c.at, &c.command);
     for (std::size_t k = 0; k < seats.size(); ++k)
       stations_[seats[k]]->recordTo(recorder, seats[k], builders[k]);

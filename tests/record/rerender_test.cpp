@@ -438,6 +438,8 @@ class LateRecording {
       afterEach();
     }
   }
+  /// Until a recording begins, the scene takes so long from one reading of its stopwatch to the next.
+  void slowDown(base::Nanos reading) { reading_ = reading; }
   /// The same as far as the servo knows; leave() follows when the scene is less busy.
   void leaveBusyScene(scene::ClientId client) { owners_->leave(client, now_); }
   void stream(const realtime::RemoteInput& input) { tick_.remote().write(input); }
@@ -470,7 +472,7 @@ class LateRecording {
     for (const scene::ClientCommand& c : builder_.commands(now_))
       recorder->recordCommand(0, c.client, c.at, &c.command);
     recorder->recordPublish(0, now_ - 200 * kTick, builder_.revision());
-    for (const scene::ClientCommand& c : builder_.editsUnderWay())
+    for (const scene::ClientCommand& c : builder_.editsUnderWay(now_))
       recorder->recordCommand(0, c.client, c.at, &c.command);
     tick_.recordTo({.ticks = &recorder->ring(0),
                     .streams = &recorder->streamRing(0),
@@ -533,7 +535,7 @@ class LateRecording {
 
   scene::SceneConfig withStopwatch() {
     scene::SceneConfig config = device_.sceneConfig;
-    config.stopwatch = [this] { return stopwatch_ ? stopwatch_() : base::now(); };
+    config.stopwatch = [this] { return stopwatch_ ? stopwatch_() : slow_ += reading_; };
     config.owners = owners_;
     return config;
   }
@@ -557,6 +559,8 @@ class LateRecording {
   const record::RecordedDevice device_ = describedDevice();
   base::Nanos now_ = 1'000'000'000;
   std::function<base::Nanos()> stopwatch_;
+  base::Nanos reading_ = 0;
+  base::Nanos slow_ = 0;
   std::vector<scene::Notice> notices_;
   bool changed_ = false;
   std::optional<base::Nanos> unshown_;  // the begin of a recording, until all edits before it are published
@@ -888,6 +892,28 @@ TEST(RecordingBegunLate, ShowsNewPositionsWhenTheyWereShown) {
       endTheSame(r, file, 400);
     }
   }
+}
+
+// Meshes that take long to build are built again after a pause.
+TEST(RecordingBegunLate, PausesBetweenBuildsAsLong) {
+  const RecordingFile file;
+  LateRecording r;
+  r.glide(kAbove, 400);
+  r.slowDown(100 * LateRecording::kTick);
+  r.raise(0.0001);
+  r.glide(kAbove, 400);
+  r.record(file.path());
+  r.glide(kAbove, 450);
+  r.glide({2, 19, 1}, 250);
+  EXPECT_TRUE(r.last().rendering.touching);
+  r.raise(0.002);
+  r.glide({2, 19, 1}, 50);
+  r.send(pull(1, 0));  // the scene is asked what is new, before the pause ends
+  r.glide({2, 19, 1}, 50);
+  EXPECT_LT(r.last().rendering.depth_m, 0.0015) << "the pause goes on";
+  r.glide({2, 19, 1}, 600);
+  EXPECT_GT(r.last().rendering.depth_m, 0.0025);
+  endTheSame(r, file, 700);
 }
 
 struct Upload {
