@@ -7,6 +7,7 @@
 #include <cmath>
 #include <latch>
 
+#include "feeling.h"
 #include "log_lines.h"
 #include "running_server.h"
 #include "scripted_peer.h"
@@ -168,6 +169,53 @@ TEST_F(HeldBackTest, ARearmActsWhenTheCommandsBeforeItArePublished) {
   EXPECT_TRUE(stopped());
   openScene();
   EXPECT_TRUE(watcher_->until([&] { return !stopped(); }));
+}
+
+// Nobody who asked for forces is there any more; nor may the re-arm vanish without a word.
+TEST_F(HeldBackTest, ARearmOfAClientThatLeftMeanwhileIsRefusedAloud) {
+  auto client = peer();
+  client->send(wire::StopForces{});
+  ASSERT_TRUE(untilStopped());
+  closeScene();
+  client->queue(wire::SetObjectNumber{2});
+  client->send(wire::RearmForces{});
+  ASSERT_TRUE(client->until([&] { return client->delivered(); }));
+  client->end();
+  EXPECT_TRUE(watcher_->untilText("before its scene commands were in place"));
+  openScene();
+  ASSERT_TRUE(untilTicks(*watcher_, 100));
+  EXPECT_TRUE(stopped());
+  EXPECT_EQ(lines_.count("does not re-arm 'Phantom'"), 1U) << lines_.text();
+}
+
+TEST_F(HeldBackTest, ARearmThatIsReadAfterItsClientLeftIsRefusedAloud) {
+  auto client = peer();
+  client->send(wire::StopForces{});
+  ASSERT_TRUE(untilStopped());
+  closeScene();
+  flood(*client, 11 * kMiB);  // the queue takes 8 MiB, the backlog the rest
+  client->send(wire::RearmForces{});
+  ASSERT_TRUE(client->until([&] { return client->delivered(); }, 60s));
+  client->end();
+  ASSERT_TRUE(pass(*client, 100));
+  openScene();
+  EXPECT_TRUE(watcher_->untilText("before its scene commands were in place"));
+  ASSERT_TRUE(untilTicks(*watcher_, 100));
+  EXPECT_TRUE(stopped());
+}
+
+// Where nothing is stopped or latched, nothing is lost.
+TEST_F(HeldBackTest, ARearmOfAClientThatLeftIsNoNewsWhereNothingIsStopped) {
+  auto client = peer();
+  closeScene();
+  client->queue(wire::SetObjectNumber{2});
+  client->send(wire::RearmForces{});
+  ASSERT_TRUE(client->until([&] { return client->delivered(); }));
+  client->end();
+  ASSERT_TRUE(client->untilClosed());
+  ASSERT_TRUE(watcher_->until([&] { return lines_.count("disconnected") == 1; }));
+  ASSERT_TRUE(untilTicks(*watcher_, 100));
+  EXPECT_TRUE(watcher_->texts().empty());
 }
 
 TEST_F(HeldBackTest, ARearmOfAClientWithoutCommandsActsAtOnce) {

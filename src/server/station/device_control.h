@@ -67,11 +67,6 @@ class DeviceControl {
   void clientGone(scene::ClientId client);
 
  private:
-  void releaseHand();
-
-  realtime::GuardControl& guard_;
-  device::SteeredHand* hand_;
-  geometry::Box workspace_m_;
   // A stop that stands. The program is its key or, without one, its connection.
   struct Stop {
     std::uint64_t key = 0;
@@ -80,6 +75,11 @@ class DeviceControl {
     bool isOf(const Sender& sender) const noexcept;
   };
 
+  void releaseHand();
+
+  realtime::GuardControl& guard_;
+  device::SteeredHand* hand_;
+  geometry::Box workspace_m_;
   std::optional<scene::ClientId> holder_;
   Order stop_;               // the newest stop
   std::vector<Stop> stops_;  // oldest first

@@ -321,8 +321,13 @@ void Station::clientGone(scene::ClientId client) {
   impl_->control.clientGone(client);
   impl_->streamed.clientGone(client);
   impl_->roles->release(client);
-  std::erase_if(impl_->pendingRearms, [client](const auto& entry) { return entry.second->id() == client; });
   impl_->outbox.clientGone(client);
+}
+
+std::optional<wire::Text> Station::sessionGone(Session& session) {
+  auto text = impl_->dropRearms(session);
+  clientGone(session.id());
+  return text;
 }
 
 int Station::wakeFd() const noexcept {

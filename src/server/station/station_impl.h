@@ -65,6 +65,7 @@ struct Station::Impl {
   void on(const Request&, const wire::ReplayControl&) {}     // the server handles it
   void on(const Request&, const wire::RecordingControl&) {}  // the server handles it
   void on(const Request& request, const wire::ReleaseControl&);
+  std::optional<wire::Text> dropRearms(Session& session);
   void rearm(Session& session, wire::LocalSender name, const DeviceControl::Order& order,
              const DeviceControl::Sender& sender);
 
@@ -98,7 +99,7 @@ struct Station::Impl {
   BlackBoxRecorder recorder;
   std::uint64_t droppedReports = 0;
   std::string fault;  // as last reported
-  // Clients whose re-arm waits for the scene, by the number of the re-arm; without those that are gone.
+  // Connections whose re-arm waits for the scene, by the number of the re-arm.
   std::map<std::uint64_t, Session*> pendingRearms;
   std::uint64_t rearms = 0;
 

@@ -178,9 +178,28 @@ void Station::Impl::on(const Request& request, const wire::RearmForces&) {
   pendingRearms.emplace(number, &request.session);
   scene.whenPublished(request.session.id(),
                       [this, number, name = request.name, order = request.order, sender = request.sender] {
-                        if (const auto pending = pendingRearms.extract(number))
-                          rearm(*pending.mapped(), name, order, sender);
+                        const auto pending = pendingRearms.find(number);
+                        if (pending == pendingRearms.end()) return;
+                        Session& session = *pending->second;
+                        if (session.peerGone() || session.ending()) return;  // clientGone() reports it
+                        pendingRearms.erase(pending);
+                        rearm(session, name, order, sender);
                       });
+}
+
+// Where forces are neither stopped nor latched, nothing is lost with it. A warning that does not name
+// Rearm_Forces: it refuses nothing that the other clients sent.
+std::optional<wire::Text> Station::Impl::dropRearms(Session& session) {
+  const std::size_t dropped =
+      std::erase_if(pendingRearms, [&](const auto& entry) { return entry.second == &session; });
+  if (dropped == 0 || (!tick.control().stopped() && outbox.last().guard.latched == 0)) return std::nullopt;
+  const std::string client = fmt::format("client {} ({})", session.id(), session.description());
+  constexpr std::string_view kWhy = "it disconnected before its scene commands were in place";
+  session.logWarning(
+      fmt::format("({}) does not re-arm '{}': {}", session.description(), config.names.front(), kWhy));
+  return wire::Text{.severity = wire::kTextWarning,
+                    .level = 0,
+                    .text = fmt::format("{} does not re-arm: {}", client, kWhy)};
 }
 
 // Called after the earlier commands of the client are published, so that they act from the first tick with
