@@ -231,6 +231,59 @@ TEST_F(HeldBackTest, ARearmOfAClientWithoutCommandsActsAtOnce) {
   }));
 }
 
+// Its place is one of the world that the client has commanded before.
+TEST_F(HeldBackTest, TheHandIsHeldWhereTheClientsWorkspaceHasIt) {
+  const auto client = peer();
+  watcher_->send(wire::Subscribe{.kinds = wire::kReportHip, .rate = 0});
+  const auto untilAt = [&](double x_m) {
+    return watcher_->until([&] {
+      const auto pose = watcher_->last<wire::TrackerPosQuat>(
+          [](const wire::TrackerPosQuat& m) { return m.sensor == server::kSensorHip; });
+      return pose && std::abs(pose->position[0] - x_m) < 0.001;
+    });
+  };
+  const auto commandAndHold = [&](const auto& command, double x_mm) {
+    closeScene();
+    client->queue(command);
+    client->send(wire::HoldHand{.hold = 1, .position = {x_mm, 0, 0}});
+    client->send(wire::Ping{});
+    ASSERT_TRUE(client->untilNext<wire::Pong>());
+    openScene();
+    gate_ = std::make_shared<std::latch>(1);
+    ASSERT_TRUE(client->until([&] {  // the command is published
+      client->send(wire::QueryCapabilities{});
+      return client->count<wire::Capabilities>() > 50;
+    }));
+  };
+  commandAndHold(wire::SetHapticOrigin{.position = {0.03F, 0, 0}, .axis = {0, 1, 0}}, 20);
+  watcher_->forget();
+  EXPECT_TRUE(untilAt(0.02)) << "at -10 mm of the device";
+  commandAndHold(wire::ResetScene{}, -15);
+  watcher_->forget();
+  EXPECT_TRUE(untilAt(-0.015));
+}
+
+// The newest order counts, although an older one still waits for the scene.
+TEST_F(HeldBackTest, AHandThatIsLetGoOfIsNotTakenByAnEarlierHold) {
+  const auto client = peer();
+  closeScene();
+  client->queue(wire::SetHapticScale{.scale = 2});
+  client->queue(wire::HoldHand{.hold = 1, .position = {10, 0, 0}});
+  client->queue(wire::HoldHand{});
+  client->queue(wire::HoldHand{.hold = 1, .position = {20, 0, 0}});
+  client->queue(wire::ReleaseControl{});
+  client->send(wire::Ping{});
+  ASSERT_TRUE(client->untilNext<wire::Pong>());
+  openScene();
+  const auto other = peer();
+  ASSERT_TRUE(untilTicks(*other, 100));
+  other->send(wire::HoldHand{.hold = 1, .position = {0, 0, 0}});
+  other->send(wire::Ping{});
+  ASSERT_TRUE(other->untilNext<wire::Pong>());
+  EXPECT_TRUE(other->texts().empty()) << "the hand is free";
+  EXPECT_TRUE(client->texts().empty());
+}
+
 TEST_F(HeldBackTest, APauseOfTheServerIsNotSilenceOfTheClient) {
   const auto client = peer();
   closeScene();

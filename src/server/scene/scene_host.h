@@ -61,6 +61,9 @@ class SceneHost {
   /// Calls `reached` in the net thread once all commands that the client sent so far are published; at once
   /// when they are already, so that a client never waits for the commands of others.
   void whenPublished(scene::ClientId client, std::function<void()> reached);
+  /// The same once they are applied, and published as far as meshes do not wait for further edits: what does
+  /// not concern meshes need not wait for them. Commands in an open batch are not applied.
+  void whenApplied(scene::ClientId client, std::function<void()> reached);
   /// Applies a command of a recorded client; null: it disconnected. Any thread, between start() and stop().
   void play(scene::ClientId client, const scene::SceneCommand* command);
   /// Ramps out the forces that the client owns, however busy the scene is. The client stays; what it commands

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "scene/workspace.h"
 #include "server/reports/client_tick.h"
 
 namespace hapticd::server {
@@ -103,7 +102,7 @@ bool DeviceControl::rearmForces(const Order& order, const Sender& sender, bool f
 }
 
 bool DeviceControl::hold(scene::ClientId client, const wire::HoldHand& wanted,
-                         const realtime::TickReport& last, Refusal& refusal) {
+                         const geometry::Affine& T_world_device, Refusal& refusal) {
   if (hand_ == nullptr) {
     refusal = {RefusalCode::handNotSimulated,
                "Hold_Hand refused: the device is real; only a simulated hand can be held"};
@@ -133,11 +132,8 @@ bool DeviceControl::hold(scene::ClientId client, const wire::HoldHand& wanted,
   }
   device::HandPose pose;
   const Vec3 world(wanted.position[0], wanted.position[1], wanted.position[2]);
-  // Before the first tick report, use the initial workspace of a scene.
-  const geometry::Affine T_world_device =
-      last.tick == 0 ? scene::Workspace{}.T_world_device : last.T_world_device;
   pose.position_m = (T_world_device.inverse() * world).cwiseMax(workspace_m_.min).cwiseMin(workspace_m_.max);
-  pose.orientation = (Quat(rotationOf(last)).conjugate() * orientation).normalized();
+  pose.orientation = (Quat(rotationOf(T_world_device)).conjugate() * orientation).normalized();
   pose.buttons = wanted.buttons;
   // The map to the device multiplies: finite numbers may leave it infinite or undefined.
   if (!pose.position_m.allFinite() || !pose.orientation.coeffs().allFinite()) {

@@ -7,7 +7,6 @@
 
 #include "device/simulated/steered_hand.h"
 #include "realtime/servo/guard_control.h"
-#include "realtime/servo/report.h"
 #include "scene/notice.h"
 #include "server/session/refusal_codes.h"
 #include "wire/messages.h"
@@ -58,9 +57,9 @@ class DeviceControl {
   bool canBeHeld() const noexcept { return hand_ != nullptr; }
   /// The client that holds the hand.
   const std::optional<scene::ClientId>& holder() const noexcept { return holder_; }
-  /// Sets the hand's target, or releases the hand. Returns false when refused; `refusal` then has code and
-  /// text.
-  bool hold(scene::ClientId client, const wire::HoldHand& wanted, const realtime::TickReport& last,
+  /// Sets the hand's target, a pose in the world, or releases the hand. Returns false when refused; `refusal`
+  /// then has code and text.
+  bool hold(scene::ClientId client, const wire::HoldHand& wanted, const geometry::Affine& T_world_device,
             Refusal& refusal);
   /// Releases the hand if the client holds it.
   void letGo(scene::ClientId client);

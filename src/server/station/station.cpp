@@ -122,6 +122,7 @@ Station::Station(const DeviceConfig& config, std::vector<DeviceName> names, Scen
                           .slot = &impl.tick.snapshots(),
                           .published =
                               [&impl](const auto& snapshot) {
+                                impl.placement.write({snapshot->workspace.T_world_device});
                                 impl.moving.published(*snapshot, base::now());
                                 impl.onPublished(snapshot);
                               },
@@ -321,6 +322,7 @@ void Station::clientGone(scene::ClientId client) {
   impl_->control.clientGone(client);
   impl_->streamed.clientGone(client);
   impl_->roles->release(client);
+  impl_->holding.erase(client);
   impl_->outbox.clientGone(client);
 }
 

@@ -231,16 +231,30 @@ void Station::Impl::on(const Request& request, const wire::ReleaseControl&) {
              "Release_Control refused: a batch is open; commit it first");
     return;
   }
+  holding[request.session.id()].last = ++holds;
   control.letGo(request.session.id());
   roles->release(request.session.id());
 }
 
+// The pose is one of the world as the client has commanded it before.
 void Station::Impl::on(const Request& request, const wire::HoldHand& wanted) {
+  const scene::ClientId client = request.session.id();
+  holding[client].session = &request.session;
+  scene.whenApplied(client, [this, client, number = ++holds, name = request.name, wanted] {
+    const auto known = holding.find(client);
+    if (known == holding.end() || known->second.last > number || known->second.session->ending()) return;
+    known->second.last = number;
+    hold(*known->second.session, name, wanted);
+  });
+}
+
+void Station::Impl::hold(Session& session, wire::LocalSender name, const wire::HoldHand& wanted) {
   Refusal refusal;
-  if (control.hold(request.session.id(), wanted, outbox.last(), refusal)) return;
-  request.session.send(request.name, wire::Text{.severity = wire::kTextError,
-                                                .level = static_cast<std::uint32_t>(refusal.code),
-                                                .text = refusal.text});
+  if (control.hold(session.id(), wanted, placement.read().T_world_device, refusal)) return;
+  session.send(name, wire::Text{.severity = wire::kTextError,
+                                .level = static_cast<std::uint32_t>(refusal.code),
+                                .text = refusal.text});
+  session.flush();
 }
 
 template <class M>
