@@ -36,6 +36,13 @@ bool DeviceControl::Stop::isOf(const Sender& sender) const noexcept {
   return sameKey || std::find(clients.begin(), clients.end(), sender.client) != clients.end();
 }
 
+// Another connection with the key may never have sent a stop.
+bool DeviceControl::isGone(const Stop& stop) const {
+  if (!stop.clients.empty()) return false;
+  return stop.key == 0 || std::none_of(keys_.begin(), keys_.end(),
+                                       [&](const auto& entry) { return entry.second == stop.key; });
+}
+
 void DeviceControl::stopForces(const Order& order, const Sender& sender) {
   constexpr std::size_t kMostGone = 32;
   stop_ = order;
@@ -68,7 +75,7 @@ bool DeviceControl::rearmForces(const Order& order, const Sender& sender, bool f
     refusal = later;
     return false;
   }
-  const auto gone = [](const Stop& stop) { return stop.clients.empty(); };
+  const auto gone = [this](const Stop& stop) { return isGone(stop); };
   const std::vector<Stop> before = stops_;
   if (sender.isOperator || (sender.isPage && sender.mayCommand && !sender.hasOperators &&
                             std::all_of(stops_.begin(), stops_.end(), gone))) {
@@ -152,6 +159,7 @@ void DeviceControl::letGo(scene::ClientId client) {
 
 void DeviceControl::clientGone(scene::ClientId client) {
   letGo(client);
+  keys_.erase(client);
   for (Stop& stop : stops_) std::erase(stop.clients, client);
 }
 

@@ -1,6 +1,7 @@
 // Commands of clients to the device itself: stop, re-arm, and steering the simulated hand.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -49,7 +50,7 @@ class DeviceControl {
   ///   it later on another connection (a stamp that is earlier by more than kLongestTravel proves nothing:
   ///   the clock of that machine was set);
   /// - a stop of another program stands. Each program may undo its own; operators undo all; where there are
-  ///   none, a page in a browser does, once all those programs are gone;
+  ///   none, a page in a browser does, once all connections of those programs are gone;
   /// - the sender may not command, and there is more to re-arm than its own stop (`faults`: latched trips, or
   /// a stop that no client sent).
   bool rearmForces(const Order& order, const Sender& sender, bool faults, Refusal& refusal);
@@ -64,6 +65,8 @@ class DeviceControl {
   /// Releases the hand if the client holds it.
   void letGo(scene::ClientId client);
   void clientGone(scene::ClientId client);
+  /// The client belongs to the program with this key.
+  void setKey(scene::ClientId client, std::uint64_t key) { keys_[client] = key; }
 
  private:
   // A stop that stands. The program is its key or, without one, its connection.
@@ -75,13 +78,15 @@ class DeviceControl {
   };
 
   void releaseHand();
+  bool isGone(const Stop& stop) const;
 
   realtime::GuardControl& guard_;
   device::SteeredHand* hand_;
   geometry::Box workspace_m_;
   std::optional<scene::ClientId> holder_;
-  Order stop_;               // the newest stop
-  std::vector<Stop> stops_;  // oldest first
+  Order stop_;                                     // the newest stop
+  std::vector<Stop> stops_;                        // oldest first
+  std::map<scene::ClientId, std::uint64_t> keys_;  // of the open connections that have one
   // What guard_.stops() counted at the last re-arm, and how many stops of clients came since.
   std::uint32_t stopsBefore_ = guard_.stops();
   std::uint32_t stopsOfClients_ = 0;

@@ -326,6 +326,10 @@ void Station::clientGone(scene::ClientId client) {
   impl_->outbox.clientGone(client);
 }
 
+void Station::setKey(scene::ClientId client, std::uint64_t key) {
+  impl_->control.setKey(client, key);
+}
+
 std::optional<wire::Text> Station::sessionGone(Session& session) {
   auto text = impl_->dropRearms(session);
   clientGone(session.id());

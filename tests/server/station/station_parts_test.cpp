@@ -244,6 +244,25 @@ TEST_F(RearmTest, TheConnectionsOfOneProgramAreOne) {
   EXPECT_TRUE(rearms(client(5, 77))) << "the program has connected again";
 }
 
+TEST_F(RearmTest, AProgramIsThereAsLongAsOneOfItsConnections) {
+  Sender page = client(9);
+  page.isPage = true;
+  control_.setKey(1, 77);
+  control_.setKey(2, 77);
+  stop(client(1, 77));
+  control_.clientGone(1);
+  EXPECT_FALSE(rearms(page)) << "its other connection is there";
+  EXPECT_EQ(refusal_.text, "Rearm_Forces refused: client 1 stopped the forces; it may re-arm");
+  control_.setKey(2, 78);
+  EXPECT_TRUE(rearms(page)) << "which is another program now";
+  stop(client(3, 77));
+  control_.clientGone(3);
+  control_.setKey(4, 77);
+  EXPECT_FALSE(rearms(page)) << "it has connected again";
+  control_.clientGone(4);
+  EXPECT_TRUE(rearms(page));
+}
+
 TEST_F(RearmTest, OneThatMayNotCommandUndoesItsStopButNoFault) {
   Sender observer = client(1);
   observer.mayCommand = false;
