@@ -174,6 +174,12 @@ void Station::Impl::on(const Request& request, const wire::StopForces&) {
 }
 
 void Station::Impl::on(const Request& request, const wire::RearmForces&) {
+  // It would act before the commands of the batch, with forces that the batch ends, say.
+  if (scene.batchOf(request.session.id()) == true) {
+    sendText(request.session, request.name, wire::kTextError,
+             "Rearm_Forces refused: a batch is open; commit it first");
+    return;
+  }
   const std::uint64_t number = ++rearms;
   pendingRearms.emplace(number, &request.session);
   scene.whenPublished(request.session.id(),
