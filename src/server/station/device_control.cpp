@@ -112,7 +112,9 @@ bool DeviceControl::hold(scene::ClientId client, const wire::HoldHand& wanted,
                          const geometry::Affine& T_world_device, Refusal& refusal) {
   if (hand_ == nullptr) {
     refusal = {RefusalCode::handNotSimulated,
-               "Hold_Hand refused: the device is real; only a simulated hand can be held"};
+               std::string("Hold_Hand refused: ") +
+                   (isReal_ ? "the device is real" : "this device follows a recorded hand") +
+                   "; only a simulated hand can be held"};
     return false;
   }
   if (holder_ && *holder_ != client) {

@@ -17,10 +17,11 @@ namespace hapticd::server {
 /// One device. Net thread; every call acts at the next tick.
 class DeviceControl {
  public:
-  /// `hand` is null for real devices. Both references must outlive this object. Targets are clamped to the
-  /// workspace.
-  DeviceControl(realtime::GuardControl& guard, device::SteeredHand* hand, const geometry::Box& workspace_m)
-      : guard_(guard), hand_(hand), workspace_m_(workspace_m) {}
+  /// `hand` is null for devices whose hand nobody steers: real ones and recorded ones. Both references must
+  /// outlive this object. Targets are clamped to the workspace.
+  DeviceControl(realtime::GuardControl& guard, device::SteeredHand* hand, const geometry::Box& workspace_m,
+                bool isReal = true)
+      : guard_(guard), hand_(hand), workspace_m_(workspace_m), isReal_(isReal) {}
 
   /// A stop or a re-arm with its times.
   struct Order {
@@ -83,6 +84,7 @@ class DeviceControl {
   realtime::GuardControl& guard_;
   device::SteeredHand* hand_;
   geometry::Box workspace_m_;
+  bool isReal_;
   std::optional<scene::ClientId> holder_;
   Order stop_;                                     // the newest stop
   std::vector<Stop> stops_;                        // oldest first

@@ -402,6 +402,11 @@ TEST_F(HoldTest, RefusesInvalidPosesAndRealDevices) {
   EXPECT_FALSE(real.hold(1, {.hold = 1}, T_world_device_, refusal_));
   EXPECT_EQ(refusal_.code, RefusalCode::handNotSimulated);
   EXPECT_NE(refusal_.text.find("the device is real"), std::string::npos);
+  DeviceControl recorded(guard_, nullptr, {}, false);
+  EXPECT_FALSE(recorded.hold(1, {.hold = 1}, T_world_device_, refusal_));
+  EXPECT_EQ(refusal_.code, RefusalCode::handNotSimulated);
+  EXPECT_EQ(refusal_.text,
+            "Hold_Hand refused: this device follows a recorded hand; only a simulated hand can be held");
 }
 
 class BlackBoxFilesTest : public ::testing::Test {
