@@ -80,6 +80,14 @@ TEST_F(Replay, ClientsReceiveTheRecordedTicks) {
   EXPECT_GT(touching, 50U);
 }
 
+TEST_F(Replay, OffersNoHandToHold) {
+  ScriptedPeer peer(server_->address());
+  ASSERT_TRUE(peer.untilConnected());
+  peer.send(wire::QueryCapabilities{});
+  ASSERT_TRUE(peer.untilNext<wire::Capabilities>());
+  EXPECT_EQ(peer.last<wire::Capabilities>()->features & wire::kFeatureHoldHand, 0U);
+}
+
 TEST(ReplayConfig, NeedsNothingOfTheMachineThatRecorded) {
   server::ServerConfig there;
   there.tokens = "/etc/hapticd/tokens";

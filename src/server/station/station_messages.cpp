@@ -155,7 +155,7 @@ void Station::Impl::on(const Request& request, const wire::ButtonAdmin& admin) {
 }
 
 void Station::Impl::on(const Request& request, const wire::QueryCapabilities&) {
-  request.session.send(request.name, capabilities(config, profile, control.canBeHeld()));
+  request.session.send(request.name, capabilities(config, profile, control.canBeHeld() && !replayed));
   outbox.extend(request.session);
 }
 
