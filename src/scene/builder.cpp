@@ -19,15 +19,6 @@ namespace {
 // over and measure no interval from it.
 constexpr Nanos kSettled = 500'000'000;
 
-std::size_t bytesOf(const SceneCommand& command) {
-  std::size_t bytes = sizeof(SceneCommand);
-  if (const auto* run = std::get_if<SetVertices>(&command)) bytes += run->positions.size() * sizeof(Vec3f);
-  if (const auto* run = std::get_if<SetTriangles>(&command))
-    bytes += run->triangles.size() * sizeof(Triangle);
-  if (const auto* effect = std::get_if<StartCustomEffect>(&command)) bytes += effect->parameters.size() * 4;
-  return bytes;
-}
-
 }  // namespace
 
 class SceneBuilder::State {

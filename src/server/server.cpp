@@ -215,6 +215,8 @@ void Server::startPlaying() {
            [this](std::uint32_t scene, scene::ClientId client, const auto* command) {
              if (scene < scenes_.size()) scenes_[scene]->play(client, command);
            },
+       .behind =
+           [this](std::uint32_t scene) { return scene < scenes_.size() && scenes_[scene]->behindReplay(); },
        .marker =
            [this](Nanos time, const std::string& text) {
              loop_.post([this, time, text] {
