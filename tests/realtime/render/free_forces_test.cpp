@@ -2,6 +2,7 @@
 #include <limits>
 
 #include "base/time.h"
+#include "realtime/render/effects.h"
 #include "variants.h"
 
 namespace hapticd::realtime::fixture {
@@ -194,6 +195,27 @@ TEST_P(FreeForcesTest, as_many_effects_as_there_may_be_are_felt_beside_as_many_t
     EXPECT_NEAR(now.force_N.x(), 0.64 * std::max(0.0, 1 - i / 250.0), 1e-9) << i;
     EXPECT_NEAR(now.force_N.y(), 0.64, 1e-9) << i;
   }
+}
+
+// A recording that begins keeps them in the memory of the servo.
+TEST(EffectsMemory, has_room_for_all_that_do_not_ramp_out) {
+  scene::SceneSnapshot scene;
+  for (std::uint32_t i = 0; i < 128; ++i) {
+    scene::Effect e;
+    e.index = static_cast<std::int32_t>(i);
+    e.start = i + 1;
+    e.releasing = i >= 64;
+    scene.effects.push_back(e);
+  }
+  Effects effects(false);
+  effects.force(scene, {}, {}, 0, 0);
+  RenderMemory memory;
+  EXPECT_FALSE(effects.remember(memory)) << "some ramp out";
+  EXPECT_LE(memory.effectCount, memory.effects.size());
+  scene.effects.resize(64);
+  effects.force(scene, {}, {}, 0, toNanos(0.001));
+  EXPECT_TRUE(effects.remember(memory));
+  EXPECT_EQ(memory.effectCount, 64U);
 }
 
 // The scene thread is busy: no snapshot shows that the owner is gone.
