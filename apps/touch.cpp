@@ -83,7 +83,8 @@ TriangleMesh load(const TouchOptions& options) {
   return mesh;
 }
 
-void send(Client& client, const TriangleMesh& mesh, const TouchOptions& options) {
+// Returns how long it took, in seconds.
+double send(Client& client, const TriangleMesh& mesh, const TouchOptions& options) {
   std::vector<std::array<float, 3>> vertices;
   vertices.reserve(mesh.vertices.size());
   for (const auto& v : mesh.vertices) vertices.push_back({v.x(), v.y(), v.z()});
@@ -101,7 +102,10 @@ void send(Client& client, const TriangleMesh& mesh, const TouchOptions& options)
   client.uploadMesh(options.object, {vertices, mesh.triangles},
                     [&](const UploadProgress& p) { bar.show(p.bytesSent, p.bytesTotal); });
   bar.finish();
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+void printSent(const Client& client, const TriangleMesh& mesh, const TouchOptions& options, double seconds) {
   std::printf("sent %zu %s in %.3f s to object %d of %s@%s\n", mesh.triangles.size(),
               mesh.triangles.size() == 1 ? "triangle" : "triangles", seconds, options.object,
               client.device().c_str(), client.server().c_str());
@@ -159,9 +163,10 @@ int run(const TouchOptions& options) {
   Client client(server, {.reconnect = false});
   if (!token.empty()) client.presentToken(token);
   ReportSummary summary(client);
-  send(client, mesh, options);
+  const double seconds = send(client, mesh, options);
   const StopSignals signals;  // which would not end the upload
   awaitAnswer(client);
+  printSent(client, mesh, options, seconds);
   std::string failure;
   try {
     watch(client, summary, options.seconds);

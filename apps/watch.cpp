@@ -30,38 +30,20 @@ struct WatchOptions {
   bool csv = false;
 };
 
-// A tick composed of separate reports, for servers without `hapticd Tick`.
-TickReport composed(const LatestReports& latest) {
-  TickReport tick;
-  tick.time = latest.touching.time;
-  if (const auto proxy = latest.pose.find(0); proxy != latest.pose.end()) {
-    tick.proxy_m = proxy->second.position_m;
-    tick.orientation = proxy->second.orientation;
-    tick.time = std::max(tick.time, proxy->second.time);
-  }
-  if (const auto hand = latest.pose.find(1); hand != latest.pose.end()) tick.hand_m = hand->second.position_m;
-  tick.force_N = latest.force.force_N;
-  tick.depth_m = latest.depth.depth_m;
-  tick.object = latest.touchedObject.object;
-  for (const auto& [button, pressed] : latest.pressed) {
-    if (pressed && button >= 0 && button < 32) tick.buttons |= 1U << button;
-  }
-  return tick;
-}
-
-void printJson(const record::Sample& sample) {
+void printJson(const PartOfSample& part) {
   std::string text;
   {
     record::JsonObject object(text);
-    fields(sample, object);
+    fields(part.sample, KnownFields(object, part.unknown));
   }
   std::printf("%s\n", text.c_str());
 }
 
-void printCsv(const record::Sample& sample) {
-  std::string row;
-  record::appendCsvRow(row, sample);
-  std::fputs(row.c_str(), stdout);
+void printCsv(const PartOfSample& part) {
+  std::string text;
+  record::CsvRow row(text);
+  fields(part.sample, KnownFields(row, part.unknown));
+  std::printf("%s\n", text.c_str());
 }
 
 void printError(const std::string& line) {
@@ -102,14 +84,14 @@ void stream(Client& client, const WatchOptions& options) {
   MissingTicks missing;
   if (whole) {
     client.onTick([&](const TickReport& tick) {
-      print(sampleOf(client.device(), tick));
+      print({sampleOf(client.device(), tick), {}});
       missing.add(tick.tick);
     });
     client.subscribe(Reports::tick, rate_Hz);
   }
   const auto period = std::chrono::nanoseconds(std::llround(1e9 / rate_Hz));
   const auto flush = [&] {
-    if (!whole) print(sampleOf(client.device(), composed(client.latest())));
+    if (!whole) print(sampleOf(client.device(), client.latest()));
     std::fflush(stdout);
     if (std::ferror(stdout) != 0) throw Error(kNotWritten);
   };

@@ -69,7 +69,13 @@ void Recorder::start(Nanos wallOffset, std::string config) {
     pack.put(passivity);
     appendBlock(out_, BlockKind::passivity, content);
   }
-  write();
+  if (const std::error_code error = tryWrite()) {
+    endFile();
+    throw RecordingError("cannot record to '" + path_.string() + "': " + error.message() +
+                         (error == std::errc::no_space_on_device ? "; make room on the disk"
+                          : error == std::errc::file_too_large   ? "; raise recording_MB in [limits]"
+                                                                 : "; name a file on another disk"));
+  }
   thread_ = base::Thread({.name = "recorder"}, [this] { return step(); });
 }
 
@@ -247,17 +253,22 @@ void Recorder::appendLost(LostEvent::What what, std::uint32_t device, std::uint6
 }
 
 void Recorder::write() {
+  if (const std::error_code error = tryWrite()) fail(error);
+}
+
+std::error_code Recorder::tryWrite() {
   const Bytes bytes = std::exchange(out_, {});
   const std::uint64_t ticks = std::exchange(unwrittenTicks_, 0);
-  if (!file_ || bytes.empty()) return;
+  if (!file_ || bytes.empty()) return {};
   if (counts_.bytes + bytes.size() > options_.fileBytes)
-    return fail(std::make_error_code(std::errc::file_too_large));
+    return std::make_error_code(std::errc::file_too_large);
   try {
     file_->write(bytes);
     counts_.bytes += bytes.size();
     counts_.ticks += ticks;
+    return {};
   } catch (const std::system_error& error) {
-    fail(error.code());
+    return error.code();
   }
 }
 
@@ -272,14 +283,16 @@ void Recorder::closeFile() noexcept {
   }
 }
 
-void Recorder::fail(const std::error_code& error) {
+void Recorder::endFile() {
   closeFile();
   writes_.store(false, std::memory_order_release);
-  {
-    const std::lock_guard lock(mutex_);
-    failed_ = true;
-    events_ = {};
-  }
+  const std::lock_guard lock(mutex_);
+  failed_ = true;
+  events_ = {};
+}
+
+void Recorder::fail(const std::error_code& error) {
+  endFile();
   const char* remedy = "";
   if (error == std::errc::no_space_on_device) remedy = "; make room on the disk and start a new recording";
   if (error == std::errc::file_too_large) remedy = "; start a new one, or raise recording_MB in [limits]";

@@ -73,7 +73,8 @@ class Recorder {
   /// For SceneConfig::stopwatch of a device: keeps its readings for the next recordPublish() of the device.
   /// The scene thread calls it.
   std::function<Nanos()> stopwatch(std::uint32_t device);
-  /// Writes the header and starts the thread.
+  /// Writes the header and starts the thread. Throws RecordingError, with the remedy, when the file does not
+  /// take the header; it is removed then.
   void start(Nanos wallOffset, std::string config);
 
   // From start() on, in the scene thread:
@@ -128,9 +129,11 @@ class Recorder {
   void appendMemories(std::uint32_t number, Device& device);
   void appendStreamed(std::uint32_t number, Device& device);
   void appendLost(LostEvent::What what, std::uint32_t device, std::uint64_t total, std::uint64_t& known);
+  std::error_code tryWrite();
   void write();
   void lookForFile();
   void fail(const std::error_code& error);
+  void endFile();
   void closeFile() noexcept;
   void reportLosses();
 

@@ -85,6 +85,7 @@ class CsvRow {
     for (int i = 0; i < columns(static_cast<const T*>(nullptr)); ++i) separate();
   }
   static constexpr int columns(const void*) { return 1; }
+  static constexpr int columns(const geometry::Quat*) { return 4; }
   template <class S, int R>
   static constexpr int columns(const Eigen::Matrix<S, R, 1>*) {
     return R;

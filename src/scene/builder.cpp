@@ -24,15 +24,6 @@ void sortByTime(std::vector<ClientCommand>& commands) {
                    [](const ClientCommand& a, const ClientCommand& b) { return a.at < b.at; });
 }
 
-std::size_t bytesOf(const SceneCommand& command) {
-  std::size_t bytes = sizeof(SceneCommand);
-  if (const auto* run = std::get_if<SetVertices>(&command)) bytes += run->positions.size() * sizeof(Vec3f);
-  if (const auto* run = std::get_if<SetTriangles>(&command))
-    bytes += run->triangles.size() * sizeof(Triangle);
-  if (const auto* effect = std::get_if<StartCustomEffect>(&command)) bytes += effect->parameters.size() * 4;
-  return bytes;
-}
-
 }  // namespace
 
 class SceneBuilder::State {

@@ -443,4 +443,7 @@ constexpr void forEachCommand(Visit&& visit) {
   }(static_cast<const CommandVariant*>(nullptr));
 }
 
+/// Approximate size of a command in memory.
+std::size_t bytesOf(const SceneCommand& command);
+
 }  // namespace hapticd::scene

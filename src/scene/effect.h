@@ -4,6 +4,7 @@
 // function in include/hapticd/scene.h.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string_view>
@@ -32,6 +33,11 @@ inline constexpr EffectKind kEffectKinds[] = {
     {"vibrationContact", EffectType::contactVibration, false, true, true, false, false},
     {"contactVibration", EffectType::contactVibration, false, true, true, false, false},
 };
+
+/// Of the effects that do not ramp out, and of those that ramp out while nothing has their index.
+inline constexpr std::size_t kMaxEffects = 64;
+/// Of those that ramp out after another one took their index.
+inline constexpr std::size_t kMostReplacedForces = 8;
 
 /// A running effect. The servo starts its clock and phase when it first sees a new `start` number.
 struct Effect {

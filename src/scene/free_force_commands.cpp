@@ -83,8 +83,7 @@ Effect effectFrom(const EffectKind& kind, const DefineEffect& c, const SceneConf
 // The oldest goes first: the servo follows 16 fields that ramp out.
 template <class Force>
 void addLeaving(OwnedForce<Force>&& force, std::vector<OwnedForce<Force>>& leaving) {
-  constexpr std::size_t kMost = 8;
-  if (leaving.size() == kMost) leaving.erase(leaving.begin());
+  if (leaving.size() == kMostReplacedForces) leaving.erase(leaving.begin());
   leaving.push_back(std::move(force));
 }
 
@@ -120,7 +119,8 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
     return;
   }
   const auto known = effects_.find(c.index);
-  if (c.index < 0 || (known == effects_.end() && effects_.size() >= config_.limits.effects)) {
+  const bool isNew = known == effects_.end() || known->second.value.effect.releasing;
+  if (c.index < 0 || (isNew && countEffects(false) >= config_.limits.effects)) {
     call.refuse("setEffect", "refused: not an index this server takes; use fewer indices, from 0 on", " ",
                 c.index, ", at most ", config_.limits.effects, " effects");
     return;

@@ -202,6 +202,24 @@ void FreeForces::appendCommands(Nanos now, std::vector<ClientCommand>& out) cons
   }
 }
 
+std::size_t FreeForces::countEffects(bool releasing) const {
+  return static_cast<std::size_t>(std::count_if(effects_.begin(), effects_.end(), [&](const auto& e) {
+    return e.second.value.effect.releasing == releasing;
+  }));
+}
+
+// Of clients that reset and start all anew, again and again within 300 ms. The oldest go first.
+void FreeForces::boundReleasingEffects() {
+  for (std::size_t count = countEffects(true); count > kMostReleasing; --count) {
+    auto oldest = effects_.end();
+    for (auto it = effects_.begin(); it != effects_.end(); ++it) {
+      if (!it->second.value.effect.releasing) continue;
+      if (oldest == effects_.end() || it->second.goneAt < oldest->second.goneAt) oldest = it;
+    }
+    effects_.erase(oldest);
+  }
+}
+
 template <class F>
 void FreeForces::release(const F& whose, Nanos now) {
   const auto letGo = [&](auto& owned, bool& releasing) {
@@ -213,6 +231,7 @@ void FreeForces::release(const F& whose, Nanos now) {
   std::erase_if(effects_, [&](const auto& e) { return whose(e.second.owner) && !e.second.value.running; });
   std::erase_if(waitingStarts_, [&](const auto& e) { return whose(e.second.owner); });
   for (auto& [index, entry] : effects_) letGo(entry, entry.value.effect.releasing);
+  boundReleasingEffects();
   for (auto& [index, entry] : planes_) letGo(entry, entry.value.releasing);
   if (planeDetail_) letGo(*planeDetail_, planeDetail_->value.releasing);
   if (field_) letGo(*field_, field_->value.releasing);

@@ -109,7 +109,8 @@ class FreeForces {
   using Constraint = ForceConstraint;
   static constexpr double kWorldUnitsPerStockMetre = 1000;
   static constexpr Nanos kNever = std::numeric_limits<Nanos>::max();
-  static constexpr Nanos kRelease = 300'000'000;     ///< ramping out takes 250 ms in the servo
+  static constexpr Nanos kRelease = 300'000'000;              ///< ramping out takes 250 ms in the servo
+  static constexpr std::size_t kMostReleasing = kMaxEffects;  ///< beside as many that do not ramp out
   static constexpr Nanos kAfterEnd = 50'000'000;     ///< the servo ends a timed force by its own clock
   static constexpr Nanos kRemember = 1'000'000'000;  ///< a start whose definition has not arrived yet
 
@@ -120,6 +121,8 @@ class FreeForces {
   void start(std::int32_t index, Nanos at, const Call& call);
   template <class F>
   void release(const F& whose, Nanos now);
+  std::size_t countEffects(bool releasing) const;
+  void boundReleasingEffects();
   template <class F>
   void forEachDeadline(const F& f) const;
   std::optional<ForceField> fieldOf(const Constraint& constraint) const;

@@ -23,6 +23,7 @@ constexpr Nanos kReadAhead = 200'000'000;
 // After a stalled disk, a recording has the ticks of one device for seconds, then those of the next.
 constexpr Nanos kFarthestAhead = 10'000'000'000;
 constexpr std::size_t kMostAhead = 32'768;
+constexpr Nanos kBetweenQuestions = 1'000'000;  // whether the scene is still behind
 // Offset that keeps the ids of recorded clients apart from those of connected clients.
 constexpr scene::ClientId kRecordedClients = 1U << 30U;
 
@@ -132,7 +133,10 @@ std::optional<Nanos> Player::step() {
         if (paused_ && !shows) return std::nullopt;
         if (const Nanos due = liveTime(next->first); !paused_ && base::now() < due) return due;
       }
-      if (!skips || std::holds_alternative<SceneEvent>(next->second)) play(next->second);
+      const auto* command = std::get_if<SceneEvent>(&next->second);
+      if (command != nullptr && callbacks_.behind && callbacks_.behind(command->scene))
+        return base::now() + kBetweenQuestions;
+      if (!skips || command != nullptr) play(next->second);
       const auto* tick = std::get_if<TickEvent>(&next->second);
       if (tick != nullptr && !skips && !toShow_.empty()) toShow_[tick->device] = 0;
       position_ = next->first;

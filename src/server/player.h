@@ -45,6 +45,8 @@ class Player {
     std::function<void(std::uint32_t device, const realtime::TickReport&)> tick;
     /// Null: the client disconnected.
     std::function<void(std::uint32_t scene, scene::ClientId, const scene::SceneCommand*)> command;
+    /// The scene is behind: further commands wait. May be empty.
+    std::function<bool(std::uint32_t scene)> behind{};
     std::function<void(base::Nanos time, const std::string& text)> marker;
     /// Called before the recording starts again, also to seek backwards.
     std::function<void()> restart;

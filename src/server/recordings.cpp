@@ -111,7 +111,13 @@ void Recordings::begin(Nanos wallOffset, std::string config) {
   owners_.resize(scenes_.size());
   if (!recorder_) return;
   for (record::RecordedDevice& device : devices()) recorder_->addDevice(std::move(device));
-  recorder_->start(wallOffset, std::move(config));
+  try {
+    recorder_->start(wallOffset, std::move(config));
+  } catch (const RecordingError& error) {
+    spdlog::error("{}; this server records nothing", error.what());
+    recorder_.reset();
+    return;
+  }
   attach();
 }
 
@@ -205,8 +211,6 @@ void Recordings::beginIn(Beginning& beginning) const noexcept {
     auto recorder = beginning.numbered ? createNumberedFile(beginning.path) : createFile(beginning.path);
     for (record::RecordedDevice& device : beginning.devices) recorder->addDevice(std::move(device));
     recorder->start(beginning.wallOffset, std::move(beginning.config));
-    if (!recorder->writes())
-      throw RecordingError("refused: '" + recorder->path().string() + "' cannot be written");
     beginning.recorder = std::move(recorder);
   } catch (const RecordingError& error) {
     beginning.refusal = error.what();

@@ -215,6 +215,8 @@ void Server::startPlaying() {
            [this](std::uint32_t scene, scene::ClientId client, const auto* command) {
              if (scene < scenes_.size()) scenes_[scene]->play(client, command);
            },
+       .behind =
+           [this](std::uint32_t scene) { return scene < scenes_.size() && scenes_[scene]->behindReplay(); },
        .marker =
            [this](Nanos time, const std::string& text) {
              loop_.post([this, time, text] {
@@ -456,12 +458,16 @@ void Server::onClosed(Session& session, const std::string& reason) {
   throttledLog_.log(
       spdlog::level::info, session.address(),
       fmt::format("client {} ({}) disconnected: {}", session.id(), session.description(), reason));
-  for (const auto& station : stations_) station->clientGone(session.id());
+  std::vector<std::pair<const Station*, wire::Text>> texts;
+  for (const auto& station : stations_) {
+    if (auto text = station->sessionGone(session)) texts.emplace_back(station.get(), std::move(*text));
+  }
   if (!session.ending()) {
     for (const auto& scene : scenes_) scene->clientGone(session.id());
   }
   admission_.leave(session);
   sessions_.erase(session.id());
+  for (const auto& [station, text] : texts) sendText(*station, text);
 }
 
 // Every 50 ms: heartbeats, memory and markers, of a few clients at a time, between which others have their

@@ -48,7 +48,10 @@ void Server::onIdentify(Session& session, const wire::MessageReceived& message) 
     session.refuse("malformed message: " + decoded.error());
     return;
   }
-  if (decoded->key != 0) session.setKey(decoded->key);
+  if (decoded->key != 0) {
+    session.setKey(decoded->key);
+    for (const auto& station : stations_) station->setKey(session.id(), decoded->key);
+  }
   const std::string_view token = decoded->token.view();
   if (!token.empty()) identify(session, token, message.local_sender);
 }

@@ -33,6 +33,8 @@ refused 1 "without TLS: leave out --fingerprint" "$hapticd" tunnel unix:/nowhere
 refused 2 "--haply-host: is empty" "$hapticd" devices --haply-host ''
 for command in "demo" "replay $source_dir/testdata/recordings/all_commands_law2.haptics" "serve"; do
   refused 2 "is not an IPv4 address" "$hapticd" $command --listen x
+  refused 2 "'::1' is an IPv6 address" "$hapticd" $command --listen ::1
+  refused 2 "'[::1]:4000' is an IPv6 address" "$hapticd" $command --listen '[::1]:4000'
 done
 ln -s loop "$work/loop"
 refused 2 "cannot read '$work/loop': Too many levels of symbolic links" "$hapticd" info "$work/loop"

@@ -19,6 +19,7 @@ refused() {  # ARGUMENT...
 }
 touch=(touch "$source_dir/testdata/meshes/bunny.obj" --server "Phantom@tcp://$address" --seconds 1)
 refused "${touch[@]}"
+! grep -q '^sent ' out || { echo 'it says that it sent what was refused'; cat out; exit 1; }
 ! grep -q '^summary' out || { echo 'it watches what it could not send'; cat out; exit 1; }
 "$hapticd" "${touch[@]}" --token-file token >out 2>&1 || { cat out; exit 1; }
 

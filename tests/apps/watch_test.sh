@@ -31,3 +31,30 @@ for frame in frames:
     assert len(lines) < 24 and max(map(len, lines)) < 80, frame
     assert all(any(word in line for line in lines) for word in ("force", "|F|", "depth", "touching")), frame
 EOF
+
+# A server without the extensions, with a tracker only: what it does not report is left empty, not zero.
+python3 - "$hapticd" <<'EOF'
+import socket, struct, subprocess, sys, threading
+def frame(sender, kind, payload):
+    pad = lambda data: data + bytes(-len(data) % 8)
+    return pad(struct.pack(">iiiii", 24 + len(payload), 1700000000, 0, sender, kind)) + pad(payload)
+def description(kind, number, name):
+    return frame(number, kind, struct.pack(">i", len(name) + 1) + name.encode() + b"\0")
+listener = socket.create_server(("127.0.0.1", 0))
+def serve():
+    while True:
+        link = listener.accept()[0]
+        link.sendall(b"vrpn: ver. 07.38  0".ljust(24, b"\0") + description(-1, 0, "Phantom")
+                     + description(-2, 0, "vrpn_Tracker Pos_Quat")
+                     + frame(0, 0, struct.pack(">ii7d", 0, 0, 0.01, 0.02, 0.03, 0, 0, 0, 1)))
+        threading.Thread(target=lambda: [None for _ in iter(lambda: link.recv(4096), b"")], daemon=True).start()
+threading.Thread(target=serve, daemon=True).start()
+name = f"Phantom@tcp://127.0.0.1:{listener.getsockname()[1]}"
+watch = lambda form: subprocess.run([sys.argv[1], "watch", name, form, "--seconds", "2"], capture_output=True, text=True, timeout=60, check=True).stdout.splitlines()
+head, *rows = watch("--csv")
+row = dict(zip(head.split(","), rows[-1].split(","), strict=True))
+known = {key for key, value in row.items() if value}
+assert known == {"device", "time_ns", "proxy_x_m", "proxy_y_m", "proxy_z_m", "qx", "qy", "qz", "qw"}, row
+assert row["proxy_y_m"] == "0.02" and row["time_ns"] == "1700000000000000000", row
+assert "force_N" not in watch("--json")[-1]
+EOF

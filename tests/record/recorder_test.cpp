@@ -168,9 +168,16 @@ TEST(Recorder, AFileWithoutAHeaderDoesNotStay) {
     Recorder recorder(file, problems.listener());
     recorder.addDevice(phantom());
     world.files.freeBytes = 10;
-    recorder.start(0, "");
+    try {
+      recorder.start(0, "");
+      ADD_FAILURE();
+    } catch (const RecordingError& error) {
+      EXPECT_STREQ(error.what(),
+                   "cannot record to '/session.haptics': No space left on device; make room on the disk");
+    }
+    EXPECT_FALSE(recorder.writes());
   }
-  EXPECT_NE(problems.all().find("No space left"), std::string::npos);
+  EXPECT_EQ(problems.all(), "") << "nothing has begun that could have stopped";
   EXPECT_FALSE(world.files.exists(file));
   world.files.freeBytes.reset();
   {

@@ -80,6 +80,14 @@ TEST_F(Replay, ClientsReceiveTheRecordedTicks) {
   EXPECT_GT(touching, 50U);
 }
 
+TEST_F(Replay, OffersNoHandToHold) {
+  ScriptedPeer peer(server_->address());
+  ASSERT_TRUE(peer.untilConnected());
+  peer.send(wire::QueryCapabilities{});
+  ASSERT_TRUE(peer.untilNext<wire::Capabilities>());
+  EXPECT_EQ(peer.last<wire::Capabilities>()->features & wire::kFeatureHoldHand, 0U);
+}
+
 TEST(ReplayConfig, NeedsNothingOfTheMachineThatRecorded) {
   server::ServerConfig there;
   there.tokens = "/etc/hapticd/tokens";
@@ -172,6 +180,44 @@ TEST(ReplaySeek, ABatchThatIsOpenDoesNotStayOpen) {
   EXPECT_EQ(facesAt(1.6), scene::TouchableFaces::back);
   player.stop();
   EXPECT_TRUE(notices.empty()) << notices.front().text;
+}
+
+// Anybody may seek, and each time all commands before the place are applied: they must not fill the memory.
+TEST(ReplaySeek, CommandsWaitWhileTheSceneIsBehind) {
+  constexpr int kCommands = 100;
+  const RecordingFile file;
+  {
+    record::Recorder recorder(file.path(), [](record::RecorderProblem, const std::string&) {});
+    startWithPhantom(recorder);
+    for (int i = 0; i < kCommands; ++i) {
+      const scene::SceneCommand command = scene::SetObjectNumber{i};
+      recorder.recordCommand(0, 1, 1'000'000 * (i + 1), &command);
+    }
+    recorder.finish();
+  }
+  constexpr int kTaken = 10;
+  std::atomic<int> taken{0};
+  std::atomic<int> asked{0};
+  std::atomic<bool> catchesUp{false};
+  std::atomic<bool> ended{false};
+  server::Player player({.file = file.path()});
+  player.start({.tick = [](std::uint32_t, const realtime::TickReport&) {},
+                .command = [&](std::uint32_t, scene::ClientId, const scene::SceneCommand*) { ++taken; },
+                .behind =
+                    [&](std::uint32_t) {
+                      if (catchesUp || taken < kTaken) return false;
+                      ++asked;
+                      return true;
+                    },
+                .marker = nullptr,
+                .restart = [] {},
+                .ended = [&](const std::string&) { ended = true; }});
+  while (asked < 3 && !ended) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_EQ(taken, kTaken);
+  catchesUp = true;
+  while (!ended) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  player.stop();
+  EXPECT_EQ(taken, kCommands) << "none is lost";
 }
 
 TEST(ReplayLoop, ARecordingThatTakesNoTimeIsPlayedOnce) {

@@ -347,6 +347,38 @@ TEST_F(Forces, AtMostAsManyEffectsAsTheLimit) {
   EXPECT_TRUE(notices_.empty());
 }
 
+// A client that resets the scene and starts its effects anew, whatever their numbers.
+TEST_F(Forces, WhatRampsOutTakesNoPlaceOfTheLimit) {
+  constexpr std::size_t kMost = kMaxEffects;
+  const auto startAll = [&](int first) {
+    for (int i = first; i < first + 64; ++i) {
+      say(constant(i));
+      say(StartEffect{i});
+    }
+  };
+  const auto releasing = [&] {
+    return static_cast<std::size_t>(
+        std::ranges::count_if(scene_->effects, [](const Effect& e) { return e.releasing; }));
+  };
+  startAll(0);
+  publish();
+  for (const int first : {100, 100, 200}) {  // the same indices, too
+    say(ResetScene{});
+    startAll(first);
+    ASSERT_TRUE(publish());
+    EXPECT_TRUE(notices_.empty()) << notices_.front().text;
+    EXPECT_EQ(scene_->effects.size() - releasing(), kMost);
+    EXPECT_GE(releasing(), kMostReplacedForces);
+    EXPECT_LE(releasing(), kMost + kMostReplacedForces) << "the oldest end";
+    for (const Effect& e : scene_->effects) EXPECT_TRUE(e.releasing || e.index >= first) << e.index;
+    wait(10 * kMillisecond);
+  }
+  say(constant(300));
+  EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("at most 64"));
+  run(400 * kMillisecond);
+  EXPECT_EQ(scene_->effects.size(), kMost);
+}
+
 TEST_F(Forces, ReleasedForcesRampOutAndAnOpenBatchStays) {
   say(SetPlane{.index = 1, .plane = {0, 1, 0, 0}, .stiffness = 0.5});
   say(BeginBatch{});

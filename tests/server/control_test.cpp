@@ -502,6 +502,25 @@ TEST_F(ControlTest, ABatchActsInOneTickOrNotAtAll) {
   EXPECT_TRUE(watcher->untilText("no batch was begun"));
 }
 
+// It would act before the commands that its client sent first.
+TEST_F(ControlTest, ARearmInAnOpenBatchIsRefused) {
+  serve();
+  const auto client = peer();
+  hold(*client, 0, 0, 0);
+  client->send(wire::StopForces{});
+  ASSERT_TRUE(client->until([&] { return lastGuard(*client).stopped == 1; }));
+  client->send(wire::BatchBegin{});
+  client->send(kUp);
+  client->send(wire::RearmForces{});
+  ASSERT_TRUE(client->untilText("Rearm_Forces refused: a batch is open; commit it first"));
+  EXPECT_EQ(client->texts().back().severity, wire::kTextError);
+  ASSERT_TRUE(untilTicks(*client, 50));
+  EXPECT_EQ(lastGuard(*client).stopped, 1);
+  client->send(wire::BatchCommit{});
+  client->send(wire::RearmForces{});
+  EXPECT_TRUE(untilForce(*client, 1));
+}
+
 // The force ramps in after a reset, but only if there is one.
 TEST_F(ControlTest, AResetInABatchActsWithItsCommit) {
   serve();

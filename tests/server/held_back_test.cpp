@@ -7,6 +7,7 @@
 #include <cmath>
 #include <latch>
 
+#include "feeling.h"
 #include "log_lines.h"
 #include "running_server.h"
 #include "scripted_peer.h"
@@ -170,6 +171,53 @@ TEST_F(HeldBackTest, ARearmActsWhenTheCommandsBeforeItArePublished) {
   EXPECT_TRUE(watcher_->until([&] { return !stopped(); }));
 }
 
+// Nobody who asked for forces is there any more; nor may the re-arm vanish without a word.
+TEST_F(HeldBackTest, ARearmOfAClientThatLeftMeanwhileIsRefusedAloud) {
+  auto client = peer();
+  client->send(wire::StopForces{});
+  ASSERT_TRUE(untilStopped());
+  closeScene();
+  client->queue(wire::SetObjectNumber{2});
+  client->send(wire::RearmForces{});
+  ASSERT_TRUE(client->until([&] { return client->delivered(); }));
+  client->end();
+  EXPECT_TRUE(watcher_->untilText("before its scene commands were in place"));
+  openScene();
+  ASSERT_TRUE(untilTicks(*watcher_, 100));
+  EXPECT_TRUE(stopped());
+  EXPECT_EQ(lines_.count("does not re-arm 'Phantom'"), 1U) << lines_.text();
+}
+
+TEST_F(HeldBackTest, ARearmThatIsReadAfterItsClientLeftIsRefusedAloud) {
+  auto client = peer();
+  client->send(wire::StopForces{});
+  ASSERT_TRUE(untilStopped());
+  closeScene();
+  flood(*client, 11 * kMiB);  // the queue takes 8 MiB, the backlog the rest
+  client->send(wire::RearmForces{});
+  ASSERT_TRUE(client->until([&] { return client->delivered(); }, 60s));
+  client->end();
+  ASSERT_TRUE(pass(*client, 100));
+  openScene();
+  EXPECT_TRUE(watcher_->untilText("before its scene commands were in place"));
+  ASSERT_TRUE(untilTicks(*watcher_, 100));
+  EXPECT_TRUE(stopped());
+}
+
+// Where nothing is stopped or latched, nothing is lost.
+TEST_F(HeldBackTest, ARearmOfAClientThatLeftIsNoNewsWhereNothingIsStopped) {
+  auto client = peer();
+  closeScene();
+  client->queue(wire::SetObjectNumber{2});
+  client->send(wire::RearmForces{});
+  ASSERT_TRUE(client->until([&] { return client->delivered(); }));
+  client->end();
+  ASSERT_TRUE(client->untilClosed());
+  ASSERT_TRUE(watcher_->until([&] { return lines_.count("disconnected") == 1; }));
+  ASSERT_TRUE(untilTicks(*watcher_, 100));
+  EXPECT_TRUE(watcher_->texts().empty());
+}
+
 TEST_F(HeldBackTest, ARearmOfAClientWithoutCommandsActsAtOnce) {
   const auto uploader = peer();
   watcher_->send(wire::StopForces{});
@@ -181,6 +229,59 @@ TEST_F(HeldBackTest, ARearmOfAClientWithoutCommandsActsAtOnce) {
     uploader->poll();
     return !stopped();
   }));
+}
+
+// Its place is one of the world that the client has commanded before.
+TEST_F(HeldBackTest, TheHandIsHeldWhereTheClientsWorkspaceHasIt) {
+  const auto client = peer();
+  watcher_->send(wire::Subscribe{.kinds = wire::kReportHip, .rate = 0});
+  const auto untilAt = [&](double x_m) {
+    return watcher_->until([&] {
+      const auto pose = watcher_->last<wire::TrackerPosQuat>(
+          [](const wire::TrackerPosQuat& m) { return m.sensor == server::kSensorHip; });
+      return pose && std::abs(pose->position[0] - x_m) < 0.001;
+    });
+  };
+  const auto commandAndHold = [&](const auto& command, double x_mm) {
+    closeScene();
+    client->queue(command);
+    client->send(wire::HoldHand{.hold = 1, .position = {x_mm, 0, 0}});
+    client->send(wire::Ping{});
+    ASSERT_TRUE(client->untilNext<wire::Pong>());
+    openScene();
+    gate_ = std::make_shared<std::latch>(1);
+    ASSERT_TRUE(client->until([&] {  // the command is published
+      client->send(wire::QueryCapabilities{});
+      return client->count<wire::Capabilities>() > 50;
+    }));
+  };
+  commandAndHold(wire::SetHapticOrigin{.position = {0.03F, 0, 0}, .axis = {0, 1, 0}}, 20);
+  watcher_->forget();
+  EXPECT_TRUE(untilAt(0.02)) << "at -10 mm of the device";
+  commandAndHold(wire::ResetScene{}, -15);
+  watcher_->forget();
+  EXPECT_TRUE(untilAt(-0.015));
+}
+
+// The newest order counts, although an older one still waits for the scene.
+TEST_F(HeldBackTest, AHandThatIsLetGoOfIsNotTakenByAnEarlierHold) {
+  const auto client = peer();
+  closeScene();
+  client->queue(wire::SetHapticScale{.scale = 2});
+  client->queue(wire::HoldHand{.hold = 1, .position = {10, 0, 0}});
+  client->queue(wire::HoldHand{});
+  client->queue(wire::HoldHand{.hold = 1, .position = {20, 0, 0}});
+  client->queue(wire::ReleaseControl{});
+  client->send(wire::Ping{});
+  ASSERT_TRUE(client->untilNext<wire::Pong>());
+  openScene();
+  const auto other = peer();
+  ASSERT_TRUE(untilTicks(*other, 100));
+  other->send(wire::HoldHand{.hold = 1, .position = {0, 0, 0}});
+  other->send(wire::Ping{});
+  ASSERT_TRUE(other->untilNext<wire::Pong>());
+  EXPECT_TRUE(other->texts().empty()) << "the hand is free";
+  EXPECT_TRUE(client->texts().empty());
 }
 
 TEST_F(HeldBackTest, APauseOfTheServerIsNotSilenceOfTheClient) {

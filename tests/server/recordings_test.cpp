@@ -60,7 +60,11 @@ class RecordingsTest : public testing::Test {
   std::vector<std::function<void()>> posted;
   std::vector<std::string> begun;
   std::vector<std::string> ended;
-  Recordings recordings{scenes, stations, post(), {.folder = "/", .onProblem = {}}};
+  std::vector<std::string> problems;
+  Recordings recordings{
+      scenes, stations, post(), {.folder = "/", .onProblem = [this](auto, const std::string& text) {
+                                   problems.push_back(text);
+                                 }}};
 };
 
 // A disk may hang; the net thread takes stops.
@@ -97,6 +101,27 @@ TEST_F(RecordingsTest, ARefusalOfTheDiskIsToldToBoth) {
   run();
   EXPECT_EQ(begun.size(), 2U);
   EXPECT_TRUE(begun[1].starts_with("recording to /session-2020")) << begun[1];
+}
+
+// Its header does not fit: nothing has begun, so nothing has ended either.
+TEST_F(RecordingsTest, AFileThatTakesNoHeaderIsRefusedOnce) {
+  for (const char* name : {"a.haptics", ""}) {
+    world.files.freeBytes = 10;
+    start(name);
+    run();
+    ASSERT_EQ(begun.size(), 1U);
+    EXPECT_TRUE(begun[0].starts_with("cannot record to '/")) << begun[0];
+    EXPECT_NE(begun[0].find(".haptics': No space left on device; make room on the disk"), std::string::npos)
+        << begun[0];
+    EXPECT_TRUE(problems.empty()) << problems.front();
+    EXPECT_EQ(recordings.file(), "");
+    EXPECT_FALSE(world.files.exists("/a.haptics"));
+    begun.clear();
+    world.files.freeBytes.reset();
+  }
+  start("a.haptics");
+  run();
+  EXPECT_EQ(begun, std::vector<std::string>{"recording to /a.haptics"});
 }
 
 // Two operators: the first one's end must not be that of the second one's recording.

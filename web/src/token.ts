@@ -1,9 +1,11 @@
-// The token that gives this page a role. It stays in this tab: no other tab, no cookie, nothing in the address.
+// What this page is to the server: a token that gives it a role, and the key by which the server knows that its connections are one
+// program, which may undo its own stop. Both stay in this tab: no other tab, no cookie, nothing in the address.
 import { toast } from "./notice";
 import { byId } from "./panels/dom";
 import { type Outgoing, identify } from "./wire";
 
 const KEY = "hapticd token";
+const PROGRAM_KEY = "hapticd key";
 
 /** As the server has them; a longer one does not fit into the message. */
 function isToken(text: string): boolean {
@@ -11,10 +13,31 @@ function isToken(text: string): boolean {
   return bytes >= 16 && bytes <= 128;
 }
 
-/** What a new connection sends first: the token, if one was entered. */
+/** A whole number from 1 to 2^53 - 1, which nobody guesses. */
+function randomKey(): number {
+  const [high = 0, low = 0] = crypto.getRandomValues(new Uint32Array(2));
+  return (high & 0x1fffff) * 2 ** 32 + low || 1;
+}
+
+let keyOfPage = 0;
+
+/** That of the tab: a page that was loaded again is the program that it was. */
+function programKey(): number {
+  if (keyOfPage !== 0) return keyOfPage;
+  const stored = Number(sessionStorage.getItem(PROGRAM_KEY));
+  keyOfPage = Number.isSafeInteger(stored) && stored > 0 ? stored : randomKey();
+  try {
+    sessionStorage.setItem(PROGRAM_KEY, String(keyOfPage));
+  } catch {
+    // The browser stores nothing: it is kept until the page is loaded again.
+  }
+  return keyOfPage;
+}
+
+/** What a new connection sends first. */
 export function credentials(): Outgoing[] {
   const token = sessionStorage.getItem(KEY) ?? "";
-  return isToken(token) ? [identify(token)] : [];
+  return [identify(isToken(token) ? token : "", programKey())];
 }
 
 /** Binds the form; an empty token forgets the present one, which ends with the connection. */

@@ -55,7 +55,8 @@ void Effects::Phase::resume(const EffectMemory& memory) noexcept {
 }
 
 bool Effects::remember(RenderMemory& out) const noexcept {
-  out.effectCount = static_cast<std::uint32_t>(count_);
+  // With more, some ramp out.
+  out.effectCount = std::min(static_cast<std::uint32_t>(count_), static_cast<std::uint32_t>(kMaxEffects));
   for (std::size_t i = 0; i < out.effectCount; ++i) {
     const Running& r = running_[i];
     if (r.releaseBegin >= 0) return false;
@@ -64,7 +65,7 @@ bool Effects::remember(RenderMemory& out) const noexcept {
     out.effects[i].anchor = r.anchor;
     r.phase.remember(out.effects[i]);
   }
-  return true;
+  return count_ <= static_cast<int>(kMaxEffects);
 }
 
 // By the index: the numbers of the starts are those of this scene. One that the memory has not is over if it
@@ -99,7 +100,7 @@ Effects::Running* Effects::running(const Effect& effect, Nanos now, const Vec3& 
     Running& r = running_[static_cast<std::size_t>(i)];
     if (r.index == effect.index && r.start == effect.start) return &r;
   }
-  if (count_ == kMaxEffects) return nullptr;
+  if (count_ == static_cast<int>(running_.size())) return nullptr;
   Running& fresh = running_[static_cast<std::size_t>(count_++)];
   fresh = {effect.index, effect.start, now, -1, proxy, true, {}, 0, 0};
   return &fresh;

@@ -7,6 +7,7 @@
 
 #include "base/time.h"
 #include "geometry/types.h"
+#include "scene/effect.h"
 #include "scene/plane.h"
 
 namespace hapticd::realtime {
@@ -14,7 +15,7 @@ namespace hapticd::realtime {
 using base::Nanos;
 using geometry::Vec3;
 
-inline constexpr int kMaxEffects = 64;
+using scene::kMaxEffects;
 
 /// A running effect.
 struct EffectMemory {

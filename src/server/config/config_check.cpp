@@ -323,6 +323,11 @@ void checkRecord(const Checker& check, const std::string& file) {
 }  // namespace
 
 void parseListen(const std::string& text, std::string& address, std::uint16_t& port) {
+  if (text.starts_with('[') || std::count(text.begin(), text.end(), ':') > 1) {
+    throw ConfigError("'" + text +
+                      "' is an IPv6 address, which this server does not support; use an IPv4 address, e.g. "
+                      "127.0.0.1:3883");
+  }
   const std::size_t colon = text.rfind(':');
   const std::string host = text.substr(0, colon);
   if (!host.empty()) address = host;

@@ -11,14 +11,14 @@ using geometry::Quat;
 using geometry::scaleOf;
 using geometry::Vec3;
 
-Mat3 rotationOf(const realtime::TickReport& tick) {
-  const Mat3 linear = tick.T_world_device.linear();
+Mat3 rotationOf(const geometry::Affine& T_world_device) {
+  const Mat3 linear = T_world_device.linear();
   return linear / scaleOf(linear);
 }
 
 ClientTick toClientTick(const realtime::TickReport& tick, ForceReport forceReport) {
   const Mat3 linear = tick.T_world_device.linear();
-  const Mat3 rotation = rotationOf(tick);
+  const Mat3 rotation = rotationOf(tick.T_world_device);
   const realtime::Rendering& rendering = tick.rendering;
 
   ClientTick clientTick;

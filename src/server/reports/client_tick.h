@@ -33,6 +33,6 @@ inline geometry::Vec3 reported(const realtime::TickReport& tick, const geometry:
 }
 
 /// The rotation part of the map from device to world.
-geometry::Mat3 rotationOf(const realtime::TickReport& tick);
+geometry::Mat3 rotationOf(const geometry::Affine& T_world_device);
 
 }  // namespace hapticd::server

@@ -46,7 +46,7 @@ wire::GuardState guardState(const realtime::GuardReport& guard) {
 
 wire::ContactList contactList(const TickReport& tick) {
   wire::ContactList list{.tick = tick.tick, .time = tick.time, .contacts = {}};
-  const geometry::Mat3 rotation = rotationOf(tick);
+  const geometry::Mat3 rotation = rotationOf(tick.T_world_device);
   for (std::uint32_t i = 0; i < tick.rendering.contactCount; ++i) {
     const realtime::Contact& contact = tick.rendering.contacts[i];
     auto& numbers = list.contacts.values;
@@ -61,7 +61,7 @@ wire::ContactList contactList(const TickReport& tick) {
 
 wire::HandState handState(const TickReport& tick, const ClientTick& clientTick, std::uint32_t buttons) {
   const realtime::RemoteRendering& remote = tick.remote;
-  const geometry::Mat3 rotation = rotationOf(tick);
+  const geometry::Mat3 rotation = rotationOf(tick.T_world_device);
   wire::HandState state{.tick = tick.tick,
                         .time = tick.time,
                         .contactsTime = remote.contactsTime,

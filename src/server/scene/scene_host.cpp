@@ -34,10 +34,23 @@ void SceneHost::whenPublished(scene::ClientId client, std::function<void()> reac
   push({client, WhenPublished{[post = post_, reached = std::move(reached)] { post(reached); }}});
 }
 
+void SceneHost::whenApplied(scene::ClientId client, std::function<void()> reached) {
+  flush(client);
+  if (!thread_ || !thread_->queue().pending(client)) {
+    reached();
+    return;
+  }
+  push({client, Inspect{[post = post_, reached = std::move(reached)](const auto&) { post(reached); }}});
+}
+
+bool SceneHost::behindReplay() const {
+  return full(kReplay);
+}
+
 // The queue is fair to clients and keeps the order of each. Of what is replayed it keeps the order of all.
 void SceneHost::play(scene::ClientId client, const scene::SceneCommand* command) {
-  constexpr scene::ClientId kReplay = 0;
-  pushAs(kReplay, command != nullptr ? SceneTask{client, *command} : SceneTask{client, ClientGone{}}, 0);
+  const std::size_t bytes = command != nullptr ? scene::bytesOf(*command) : 0;
+  pushAs(kReplay, command != nullptr ? SceneTask{client, *command} : SceneTask{client, ClientGone{}}, bytes);
 }
 
 void SceneHost::releaseForces(scene::ClientId client) {

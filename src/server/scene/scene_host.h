@@ -61,8 +61,13 @@ class SceneHost {
   /// Calls `reached` in the net thread once all commands that the client sent so far are published; at once
   /// when they are already, so that a client never waits for the commands of others.
   void whenPublished(scene::ClientId client, std::function<void()> reached);
+  /// The same once they are applied, and published as far as meshes do not wait for further edits: what does
+  /// not concern meshes need not wait for them. Commands in an open batch are not applied.
+  void whenApplied(scene::ClientId client, std::function<void()> reached);
   /// Applies a command of a recorded client; null: it disconnected. Any thread, between start() and stop().
   void play(scene::ClientId client, const scene::SceneCommand* command);
+  /// Whether the scene is too far behind what play() got: call it later. Any thread.
+  bool behindReplay() const;
   /// Ramps out the forces that the client owns, however busy the scene is. The client stays; what it commands
   /// before restoreForces() is not felt.
   void releaseForces(scene::ClientId client);
@@ -81,6 +86,8 @@ class SceneHost {
   bool inspect(std::function<void(const std::vector<const scene::SceneBuilder*>&)> call);
 
  private:
+  static constexpr scene::ClientId kReplay = 0;
+
   void releaseUrgently(scene::ClientId client);
   void push(SceneTask&& task, std::size_t bytes = sizeof(SceneTask));
   void pushAs(scene::ClientId client, SceneTask&& task, std::size_t bytes);

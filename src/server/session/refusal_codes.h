@@ -14,7 +14,7 @@ namespace hapticd::server {
 enum class RefusalCode : std::uint32_t {
   none = 0,              ///< not a refusal, or one without a code
   notPermitted = 1,      ///< the client's role, or a replayed recording, permits no commands
-  handNotSimulated = 2,  ///< Hold_Hand: the device is real
+  handNotSimulated = 2,  ///< Hold_Hand: the device is real, or follows a recorded hand
   handHeldByOther = 3,   ///< Hold_Hand: another client holds the simulated hand
   handPoseInvalid = 4,   ///< Hold_Hand: position or orientation is not finite, or the quaternion is zero
   streamedByOther = 5,   ///< Remote_Contacts, Held_Force: another client streams them

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "scene/workspace.h"
 #include "server/reports/client_tick.h"
 
 namespace hapticd::server {
@@ -35,6 +34,13 @@ bool finite(const wire::HoldHand& m) {
 bool DeviceControl::Stop::isOf(const Sender& sender) const noexcept {
   const bool sameKey = key != 0 && key == sender.key;
   return sameKey || std::find(clients.begin(), clients.end(), sender.client) != clients.end();
+}
+
+// Another connection with the key may never have sent a stop.
+bool DeviceControl::isGone(const Stop& stop) const {
+  if (!stop.clients.empty()) return false;
+  return stop.key == 0 || std::none_of(keys_.begin(), keys_.end(),
+                                       [&](const auto& entry) { return entry.second == stop.key; });
 }
 
 void DeviceControl::stopForces(const Order& order, const Sender& sender) {
@@ -69,7 +75,7 @@ bool DeviceControl::rearmForces(const Order& order, const Sender& sender, bool f
     refusal = later;
     return false;
   }
-  const auto gone = [](const Stop& stop) { return stop.clients.empty(); };
+  const auto gone = [this](const Stop& stop) { return isGone(stop); };
   const std::vector<Stop> before = stops_;
   if (sender.isOperator || (sender.isPage && sender.mayCommand && !sender.hasOperators &&
                             std::all_of(stops_.begin(), stops_.end(), gone))) {
@@ -103,10 +109,12 @@ bool DeviceControl::rearmForces(const Order& order, const Sender& sender, bool f
 }
 
 bool DeviceControl::hold(scene::ClientId client, const wire::HoldHand& wanted,
-                         const realtime::TickReport& last, Refusal& refusal) {
+                         const geometry::Affine& T_world_device, Refusal& refusal) {
   if (hand_ == nullptr) {
     refusal = {RefusalCode::handNotSimulated,
-               "Hold_Hand refused: the device is real; only a simulated hand can be held"};
+               std::string("Hold_Hand refused: ") +
+                   (isReal_ ? "the device is real" : "this device follows a recorded hand") +
+                   "; only a simulated hand can be held"};
     return false;
   }
   if (holder_ && *holder_ != client) {
@@ -133,11 +141,8 @@ bool DeviceControl::hold(scene::ClientId client, const wire::HoldHand& wanted,
   }
   device::HandPose pose;
   const Vec3 world(wanted.position[0], wanted.position[1], wanted.position[2]);
-  // Before the first tick report, use the initial workspace of a scene.
-  const geometry::Affine T_world_device =
-      last.tick == 0 ? scene::Workspace{}.T_world_device : last.T_world_device;
   pose.position_m = (T_world_device.inverse() * world).cwiseMax(workspace_m_.min).cwiseMin(workspace_m_.max);
-  pose.orientation = (Quat(rotationOf(last)).conjugate() * orientation).normalized();
+  pose.orientation = (Quat(rotationOf(T_world_device)).conjugate() * orientation).normalized();
   pose.buttons = wanted.buttons;
   // The map to the device multiplies: finite numbers may leave it infinite or undefined.
   if (!pose.position_m.allFinite() || !pose.orientation.coeffs().allFinite()) {
@@ -156,6 +161,7 @@ void DeviceControl::letGo(scene::ClientId client) {
 
 void DeviceControl::clientGone(scene::ClientId client) {
   letGo(client);
+  keys_.erase(client);
   for (Stop& stop : stops_) std::erase(stop.clients, client);
 }
 

@@ -1,13 +1,13 @@
 // Commands of clients to the device itself: stop, re-arm, and steering the simulated hand.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "device/simulated/steered_hand.h"
 #include "realtime/servo/guard_control.h"
-#include "realtime/servo/report.h"
 #include "scene/notice.h"
 #include "server/session/refusal_codes.h"
 #include "wire/messages.h"
@@ -17,10 +17,11 @@ namespace hapticd::server {
 /// One device. Net thread; every call acts at the next tick.
 class DeviceControl {
  public:
-  /// `hand` is null for real devices. Both references must outlive this object. Targets are clamped to the
-  /// workspace.
-  DeviceControl(realtime::GuardControl& guard, device::SteeredHand* hand, const geometry::Box& workspace_m)
-      : guard_(guard), hand_(hand), workspace_m_(workspace_m) {}
+  /// `hand` is null for devices whose hand nobody steers: real ones and recorded ones. Both references must
+  /// outlive this object. Targets are clamped to the workspace.
+  DeviceControl(realtime::GuardControl& guard, device::SteeredHand* hand, const geometry::Box& workspace_m,
+                bool isReal = true)
+      : guard_(guard), hand_(hand), workspace_m_(workspace_m), isReal_(isReal) {}
 
   /// A stop or a re-arm with its times.
   struct Order {
@@ -50,7 +51,7 @@ class DeviceControl {
   ///   it later on another connection (a stamp that is earlier by more than kLongestTravel proves nothing:
   ///   the clock of that machine was set);
   /// - a stop of another program stands. Each program may undo its own; operators undo all; where there are
-  ///   none, a page in a browser does, once all those programs are gone;
+  ///   none, a page in a browser does, once all connections of those programs are gone;
   /// - the sender may not command, and there is more to re-arm than its own stop (`faults`: latched trips, or
   /// a stop that no client sent).
   bool rearmForces(const Order& order, const Sender& sender, bool faults, Refusal& refusal);
@@ -58,20 +59,17 @@ class DeviceControl {
   bool canBeHeld() const noexcept { return hand_ != nullptr; }
   /// The client that holds the hand.
   const std::optional<scene::ClientId>& holder() const noexcept { return holder_; }
-  /// Sets the hand's target, or releases the hand. Returns false when refused; `refusal` then has code and
-  /// text.
-  bool hold(scene::ClientId client, const wire::HoldHand& wanted, const realtime::TickReport& last,
+  /// Sets the hand's target, a pose in the world, or releases the hand. Returns false when refused; `refusal`
+  /// then has code and text.
+  bool hold(scene::ClientId client, const wire::HoldHand& wanted, const geometry::Affine& T_world_device,
             Refusal& refusal);
   /// Releases the hand if the client holds it.
   void letGo(scene::ClientId client);
   void clientGone(scene::ClientId client);
+  /// The client belongs to the program with this key.
+  void setKey(scene::ClientId client, std::uint64_t key) { keys_[client] = key; }
 
  private:
-  void releaseHand();
-
-  realtime::GuardControl& guard_;
-  device::SteeredHand* hand_;
-  geometry::Box workspace_m_;
   // A stop that stands. The program is its key or, without one, its connection.
   struct Stop {
     std::uint64_t key = 0;
@@ -80,9 +78,17 @@ class DeviceControl {
     bool isOf(const Sender& sender) const noexcept;
   };
 
+  void releaseHand();
+  bool isGone(const Stop& stop) const;
+
+  realtime::GuardControl& guard_;
+  device::SteeredHand* hand_;
+  geometry::Box workspace_m_;
+  bool isReal_;
   std::optional<scene::ClientId> holder_;
-  Order stop_;               // the newest stop
-  std::vector<Stop> stops_;  // oldest first
+  Order stop_;                                     // the newest stop
+  std::vector<Stop> stops_;                        // oldest first
+  std::map<scene::ClientId, std::uint64_t> keys_;  // of the open connections that have one
   // What guard_.stops() counted at the last re-arm, and how many stops of clients came since.
   std::uint32_t stopsBefore_ = guard_.stops();
   std::uint32_t stopsOfClients_ = 0;

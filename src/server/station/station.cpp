@@ -4,6 +4,7 @@
 #include <iterator>
 
 #include "base/world.h"
+#include "device/drivers/drivers.h"
 #include "device/profiles.h"
 #include "device/simulated/simulated_device.h"
 #include "server/station/devices.h"
@@ -68,6 +69,12 @@ realtime::TickOptions tickOptions(const DeviceConfig& config, const device::Devi
   return options;
 }
 
+// A driver whose hand comes from a file, and which nobody steers.
+bool hasRecordedHand(const DeviceConfig& config) {
+  const device::Driver* const driver = device::findDriver(config.driver);
+  return driver != nullptr && driver->hasHand;
+}
+
 realtime::EnergyBudget energyBudget(const DeviceConfig& config) {
   realtime::EnergyBudget budget;
   budget.refill_W = config.heldForcePower_W;
@@ -104,7 +111,7 @@ Station::Impl::Impl(const DeviceConfig& config_, std::vector<DeviceName> names_,
               // A device without a person at it cannot hurt: realtime rights are wanted, not demanded.
               .requireRealtime = !allowNoRealtime && canHurt,
               .vendorThread = device->traits().ticksInVendorThread}),
-      control(tick.control(), hand, workspaceOf(config, profile)),
+      control(tick.control(), hand, workspaceOf(config, profile), !hasRecordedHand(config)),
       streamed(tick.remote(), sceneConfig(config, profile), energyBudget(config), profile.outputDof > 3),
       roles(std::make_shared<Roles>(config.control, config.controlList)),
       modes(profile.buttons),
@@ -122,6 +129,7 @@ Station::Station(const DeviceConfig& config, std::vector<DeviceName> names, Scen
                           .slot = &impl.tick.snapshots(),
                           .published =
                               [&impl](const auto& snapshot) {
+                                impl.placement.write({snapshot->workspace.T_world_device});
                                 impl.moving.published(*snapshot, base::now());
                                 impl.onPublished(snapshot);
                               },
@@ -321,8 +329,18 @@ void Station::clientGone(scene::ClientId client) {
   impl_->control.clientGone(client);
   impl_->streamed.clientGone(client);
   impl_->roles->release(client);
-  std::erase_if(impl_->pendingRearms, [client](const auto& entry) { return entry.second->id() == client; });
+  impl_->holding.erase(client);
   impl_->outbox.clientGone(client);
+}
+
+void Station::setKey(scene::ClientId client, std::uint64_t key) {
+  impl_->control.setKey(client, key);
+}
+
+std::optional<wire::Text> Station::sessionGone(Session& session) {
+  auto text = impl_->dropRearms(session);
+  clientGone(session.id());
+  return text;
 }
 
 int Station::wakeFd() const noexcept {
@@ -404,7 +422,7 @@ DeviceStatus Station::status() const {
   status.realtime = impl.keeper.realtime();
   status.heldBy = impl.control.holder();
   status.hand = impl.replayed                  ? "recorded"
-                : !status.simulated            ? "user"
+                : !status.simulated            ? hasRecordedHand(impl.config) ? "file" : "user"
                 : status.heldBy                ? "held"
                 : impl.config.hand == "script" ? "scripted"
                                                : "file";

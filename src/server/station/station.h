@@ -93,6 +93,11 @@ class Station {
   /// The client is gone: its remote contacts and its held force fade.
   void endStreams(scene::ClientId client);
   void clientGone(scene::ClientId client);
+  /// The client belongs to the program with this key.
+  void setKey(scene::ClientId client, std::uint64_t key);
+  /// As clientGone(), for a connection of VRPN. A re-arm of it that still waits for the scene does not act:
+  /// returns the text for the other clients.
+  std::optional<wire::Text> sessionGone(Session& session);
 
   /// The newest tick that the net thread has; its number is 0 before the first.
   const realtime::TickReport& lastTick() const noexcept;

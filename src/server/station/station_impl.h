@@ -6,6 +6,7 @@
 
 #include "base/world.h"
 #include "device/simulated/steered_hand.h"
+#include "handoff/latest_value.h"
 #include "realtime/servo/tick.h"
 #include "server/reports/fresh_ticks.h"
 #include "server/reports/moving_objects.h"
@@ -54,6 +55,7 @@ struct Station::Impl {
   void on(const Request& request, const wire::StopForces&);
   void on(const Request& request, const wire::RearmForces&);
   void on(const Request& request, const wire::HoldHand& wanted);
+  void hold(Session& session, wire::LocalSender name, const wire::HoldHand& wanted);
   void on(const Request& request, const wire::RemoteContacts& message) { onStreamed(request, message); }
   void on(const Request& request, const wire::HeldForce& message) { onStreamed(request, message); }
   template <class M>
@@ -65,6 +67,7 @@ struct Station::Impl {
   void on(const Request&, const wire::ReplayControl&) {}     // the server handles it
   void on(const Request&, const wire::RecordingControl&) {}  // the server handles it
   void on(const Request& request, const wire::ReleaseControl&);
+  std::optional<wire::Text> dropRearms(Session& session);
   void rearm(Session& session, wire::LocalSender name, const DeviceControl::Order& order,
              const DeviceControl::Sender& sender);
 
@@ -98,9 +101,21 @@ struct Station::Impl {
   BlackBoxRecorder recorder;
   std::uint64_t droppedReports = 0;
   std::string fault;  // as last reported
-  // Clients whose re-arm waits for the scene, by the number of the re-arm; without those that are gone.
+  // Connections whose re-arm waits for the scene, by the number of the re-arm.
   std::map<std::uint64_t, Session*> pendingRearms;
   std::uint64_t rearms = 0;
+  // Connections that held the hand or let go of it, and the number of the last such order that was carried
+  // out: earlier ones that waited longer for the scene are overtaken.
+  struct Holding {
+    Session* session = nullptr;
+    std::uint64_t last = 0;
+  };
+  std::map<scene::ClientId, Holding> holding;
+  std::uint64_t holds = 0;
+  struct Placement {
+    geometry::Affine T_world_device = scene::Workspace{}.T_world_device;
+  };
+  handoff::LatestValue<Placement> placement;  // of the newest snapshot; the scene thread writes it
 
   // The recording at hand, null for none, and the number of this device in it. Scene thread.
   record::Recorder* recording = nullptr;

@@ -155,7 +155,7 @@ void Station::Impl::on(const Request& request, const wire::ButtonAdmin& admin) {
 }
 
 void Station::Impl::on(const Request& request, const wire::QueryCapabilities&) {
-  request.session.send(request.name, capabilities(config, profile, control.canBeHeld()));
+  request.session.send(request.name, capabilities(config, profile, control.canBeHeld() && !replayed));
   outbox.extend(request.session);
 }
 
@@ -174,13 +174,38 @@ void Station::Impl::on(const Request& request, const wire::StopForces&) {
 }
 
 void Station::Impl::on(const Request& request, const wire::RearmForces&) {
+  // It would act before the commands of the batch, with forces that the batch ends, say.
+  if (scene.batchOf(request.session.id()) == true) {
+    sendText(request.session, request.name, wire::kTextError,
+             "Rearm_Forces refused: a batch is open; commit it first");
+    return;
+  }
   const std::uint64_t number = ++rearms;
   pendingRearms.emplace(number, &request.session);
   scene.whenPublished(request.session.id(),
                       [this, number, name = request.name, order = request.order, sender = request.sender] {
-                        if (const auto pending = pendingRearms.extract(number))
-                          rearm(*pending.mapped(), name, order, sender);
+                        const auto pending = pendingRearms.find(number);
+                        if (pending == pendingRearms.end()) return;
+                        Session& session = *pending->second;
+                        if (session.peerGone() || session.ending()) return;  // clientGone() reports it
+                        pendingRearms.erase(pending);
+                        rearm(session, name, order, sender);
                       });
+}
+
+// Where forces are neither stopped nor latched, nothing is lost with it. A warning that does not name
+// Rearm_Forces: it refuses nothing that the other clients sent.
+std::optional<wire::Text> Station::Impl::dropRearms(Session& session) {
+  const std::size_t dropped =
+      std::erase_if(pendingRearms, [&](const auto& entry) { return entry.second == &session; });
+  if (dropped == 0 || (!tick.control().stopped() && outbox.last().guard.latched == 0)) return std::nullopt;
+  const std::string client = fmt::format("client {} ({})", session.id(), session.description());
+  constexpr std::string_view kWhy = "it disconnected before its scene commands were in place";
+  session.logWarning(
+      fmt::format("({}) does not re-arm '{}': {}", session.description(), config.names.front(), kWhy));
+  return wire::Text{.severity = wire::kTextWarning,
+                    .level = 0,
+                    .text = fmt::format("{} does not re-arm: {}", client, kWhy)};
 }
 
 // Called after the earlier commands of the client are published, so that they act from the first tick with
@@ -212,16 +237,30 @@ void Station::Impl::on(const Request& request, const wire::ReleaseControl&) {
              "Release_Control refused: a batch is open; commit it first");
     return;
   }
+  holding[request.session.id()].last = ++holds;
   control.letGo(request.session.id());
   roles->release(request.session.id());
 }
 
+// The pose is one of the world as the client has commanded it before.
 void Station::Impl::on(const Request& request, const wire::HoldHand& wanted) {
+  const scene::ClientId client = request.session.id();
+  holding[client].session = &request.session;
+  scene.whenApplied(client, [this, client, number = ++holds, name = request.name, wanted] {
+    const auto known = holding.find(client);
+    if (known == holding.end() || known->second.last > number || known->second.session->ending()) return;
+    known->second.last = number;
+    hold(*known->second.session, name, wanted);
+  });
+}
+
+void Station::Impl::hold(Session& session, wire::LocalSender name, const wire::HoldHand& wanted) {
   Refusal refusal;
-  if (control.hold(request.session.id(), wanted, outbox.last(), refusal)) return;
-  request.session.send(request.name, wire::Text{.severity = wire::kTextError,
-                                                .level = static_cast<std::uint32_t>(refusal.code),
-                                                .text = refusal.text});
+  if (control.hold(session.id(), wanted, placement.read().T_world_device, refusal)) return;
+  session.send(name, wire::Text{.severity = wire::kTextError,
+                                .level = static_cast<std::uint32_t>(refusal.code),
+                                .text = refusal.text});
+  session.flush();
 }
 
 template <class M>

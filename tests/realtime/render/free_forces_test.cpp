@@ -2,6 +2,7 @@
 #include <limits>
 
 #include "base/time.h"
+#include "realtime/render/effects.h"
 #include "variants.h"
 
 namespace hapticd::realtime::fixture {
@@ -166,6 +167,55 @@ TEST_P(FreeForcesTest, effects_end_and_ramp_out) {
   hand->show(scene.snapshot());
   for (int i = 0; i < 300; ++i)
     EXPECT_NEAR(at({0, 0, 0}).force_N.x(), 1.5 * std::max(0.0, 1 - i / 250.0), 1e-9);
+}
+
+TEST_P(FreeForcesTest, as_many_effects_as_there_may_be_are_felt_beside_as_many_that_ramp_out) {
+  scene.effects.clear();
+  for (std::uint32_t i = 0; i < 64; ++i) {
+    scene::Effect e = effect(EffectType::constant);
+    e.index = static_cast<std::int32_t>(i);
+    e.start = i + 1;
+    e.magnitude_N = 0.01;
+    e.direction = Vec3::UnitX();
+    scene.effects.push_back(e);
+  }
+  start({0, 0, 0});
+  EXPECT_NEAR(at({0, 0, 0}).force_N.x(), 0.64, 1e-9);
+  for (scene::Effect& e : scene.effects) e.releasing = true;
+  for (std::uint32_t i = 0; i < 64; ++i) {
+    scene::Effect e = scene.effects[i];
+    e.start += 64;
+    e.direction = Vec3::UnitY();
+    e.releasing = false;
+    scene.effects.push_back(e);
+  }
+  hand->show(scene.snapshot());
+  for (int i = 0; i < 300; ++i) {
+    const Rendering& now = at({0, 0, 0});
+    EXPECT_NEAR(now.force_N.x(), 0.64 * std::max(0.0, 1 - i / 250.0), 1e-9) << i;
+    EXPECT_NEAR(now.force_N.y(), 0.64, 1e-9) << i;
+  }
+}
+
+// A recording that begins keeps them in the memory of the servo.
+TEST(EffectsMemory, has_room_for_all_that_do_not_ramp_out) {
+  scene::SceneSnapshot scene;
+  for (std::uint32_t i = 0; i < 128; ++i) {
+    scene::Effect e;
+    e.index = static_cast<std::int32_t>(i);
+    e.start = i + 1;
+    e.releasing = i >= 64;
+    scene.effects.push_back(e);
+  }
+  Effects effects(false);
+  effects.force(scene, {}, {}, 0, 0);
+  RenderMemory memory;
+  EXPECT_FALSE(effects.remember(memory)) << "some ramp out";
+  EXPECT_LE(memory.effectCount, memory.effects.size());
+  scene.effects.resize(64);
+  effects.force(scene, {}, {}, 0, toNanos(0.001));
+  EXPECT_TRUE(effects.remember(memory));
+  EXPECT_EQ(memory.effectCount, 64U);
 }
 
 // The scene thread is busy: no snapshot shows that the owner is gone.

@@ -480,6 +480,18 @@ TEST(Config, ListenAcceptsAddressPortOrBoth) {
   parseListen("0.0.0.0", address, port);
   EXPECT_EQ(address, "0.0.0.0");
   EXPECT_EQ(port, 4000);
+  for (const char* text : {"::1", "[::1]", "[::1]:4000", "fe80::1:2", "::", "1:2:3"}) {
+    try {
+      parseListen(text, address, port);
+      ADD_FAILURE() << text;
+    } catch (const ConfigError& error) {
+      EXPECT_NE(std::string(error.what()).find("'" + std::string(text) + "' is an IPv6 address"),
+                std::string::npos)
+          << error.what();
+    }
+  }
+  EXPECT_EQ(address, "0.0.0.0");
+  EXPECT_EQ(port, 4000);
   EXPECT_THROW(parseListen("host:", address, port), ConfigError);
   EXPECT_THROW(parseListen("host:12x", address, port), ConfigError);
 }

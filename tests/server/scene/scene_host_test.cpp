@@ -109,6 +109,18 @@ class SceneHostTest : public ::testing::Test {
   std::string error_;
 };
 
+TEST_F(SceneHostTest, WhatIsReplayedIsChargedToo) {
+  const scene::SceneCommand command =
+      scene::SetVertices{.object = 0, .first = 0, .positions = std::vector<scene::Vec3f>(5000)};
+  close();
+  std::size_t played = 0;
+  for (; played < 300 && !host_.behindReplay(); ++played) host_.play(1000, &command);
+  EXPECT_TRUE(host_.behindReplay());
+  EXPECT_NEAR(static_cast<double>(played), 8 * 1024 * 1024 / 60'000.0, 5);
+  open();
+  while (host_.behindReplay()) base::sleepFor(1'000'000);
+}
+
 TEST_F(SceneHostTest, OnlyTheClientThatFloodsIsFullUntilTheSceneCatchesUp) {
   close();
   flood(1);

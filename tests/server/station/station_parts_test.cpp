@@ -111,10 +111,7 @@ TEST(Roles, PermitsAnyTheFirstOrListedClients) {
 
 class HoldTest : public ::testing::Test {
  protected:
-  HoldTest() {
-    last_.tick = 1;
-    last_.T_world_device = Eigen::Translation3d(100, 0, 0) * Eigen::UniformScaling<double>(1000.0);
-  }
+  HoldTest() { T_world_device_ = Eigen::Translation3d(100, 0, 0) * Eigen::UniformScaling<double>(1000.0); }
   // The position of the hand after two seconds.
   Vec3 handLater() {
     device::DeviceState state;
@@ -128,7 +125,7 @@ class HoldTest : public ::testing::Test {
   device::SimulatedDevice hand_;
   realtime::GuardControl guard_{true};
   DeviceControl control_{guard_, &hand_, hand_.profile().workspace_m};
-  realtime::TickReport last_;
+  geometry::Affine T_world_device_;
   base::Nanos now_ = 0;
   Refusal refusal_;
 };
@@ -247,6 +244,25 @@ TEST_F(RearmTest, TheConnectionsOfOneProgramAreOne) {
   EXPECT_TRUE(rearms(client(5, 77))) << "the program has connected again";
 }
 
+TEST_F(RearmTest, AProgramIsThereAsLongAsOneOfItsConnections) {
+  Sender page = client(9);
+  page.isPage = true;
+  control_.setKey(1, 77);
+  control_.setKey(2, 77);
+  stop(client(1, 77));
+  control_.clientGone(1);
+  EXPECT_FALSE(rearms(page)) << "its other connection is there";
+  EXPECT_EQ(refusal_.text, "Rearm_Forces refused: client 1 stopped the forces; it may re-arm");
+  control_.setKey(2, 78);
+  EXPECT_TRUE(rearms(page)) << "which is another program now";
+  stop(client(3, 77));
+  control_.clientGone(3);
+  control_.setKey(4, 77);
+  EXPECT_FALSE(rearms(page)) << "it has connected again";
+  control_.clientGone(4);
+  EXPECT_TRUE(rearms(page));
+}
+
 TEST_F(RearmTest, OneThatMayNotCommandUndoesItsStopButNoFault) {
   Sender observer = client(1);
   observer.mayCommand = false;
@@ -352,41 +368,45 @@ TEST_F(RearmTest, AClockThatIsSetBackKeepsNobodyFromRearming) {
 
 TEST_F(HoldTest, TheHandFollowsItsHolderAndReturnsWhenReleased) {
   hand_.open();
-  ASSERT_TRUE(control_.hold(1, {.hold = 1, .position = {110, 20, 0}}, last_, refusal_)) << refusal_.text;
+  ASSERT_TRUE(control_.hold(1, {.hold = 1, .position = {110, 20, 0}}, T_world_device_, refusal_))
+      << refusal_.text;
   EXPECT_NEAR((handLater() - Vec3(0.01, 0.02, 0)).norm(), 0, 1e-4);
-  EXPECT_FALSE(control_.hold(2, {.hold = 1, .position = {0, 0, 0}}, last_, refusal_));
+  EXPECT_FALSE(control_.hold(2, {.hold = 1, .position = {0, 0, 0}}, T_world_device_, refusal_));
   EXPECT_EQ(refusal_.code, RefusalCode::handHeldByOther);
   EXPECT_NE(refusal_.text.find("client 1 holds the hand"), std::string::npos);
-  EXPECT_TRUE(control_.hold(2, {.hold = 0}, last_, refusal_));  // no effect
+  EXPECT_TRUE(control_.hold(2, {.hold = 0}, T_world_device_, refusal_));  // no effect
   EXPECT_NEAR((handLater() - Vec3(0.01, 0.02, 0)).norm(), 0, 1e-4);
   control_.clientGone(1);
   EXPECT_NEAR(handLater().norm(), 0, 1e-4);  // rests at the centre
-  EXPECT_TRUE(control_.hold(2, {.hold = 1, .position = {100, 0, 10}}, last_, refusal_));
+  EXPECT_TRUE(control_.hold(2, {.hold = 1, .position = {100, 0, 10}}, T_world_device_, refusal_));
   EXPECT_NEAR((handLater() - Vec3(0, 0, 0.01)).norm(), 0, 1e-4);
 }
 
 TEST_F(HoldTest, TargetsAreClampedToTheWorkspace) {
   hand_.open();
-  ASSERT_TRUE(control_.hold(1, {.hold = 1, .position = {100, 20000, 0}}, last_, refusal_));
+  ASSERT_TRUE(control_.hold(1, {.hold = 1, .position = {100, 20000, 0}}, T_world_device_, refusal_));
   EXPECT_NEAR((handLater() - Vec3(0, hand_.profile().workspace_m.max.y(), 0)).norm(), 0, 1e-4);
 }
 
 TEST_F(HoldTest, RefusesInvalidPosesAndRealDevices) {
-  EXPECT_FALSE(control_.hold(1, {.hold = 1, .position = {NAN, 0, 0}}, last_, refusal_));
+  EXPECT_FALSE(control_.hold(1, {.hold = 1, .position = {NAN, 0, 0}}, T_world_device_, refusal_));
   EXPECT_EQ(refusal_.code, RefusalCode::handPoseInvalid);
-  EXPECT_FALSE(control_.hold(1, {.hold = 1, .orientation = {0, 0, 0, 0}}, last_, refusal_));
+  EXPECT_FALSE(control_.hold(1, {.hold = 1, .orientation = {0, 0, 0, 0}}, T_world_device_, refusal_));
   EXPECT_NE(refusal_.text.find("zero quaternion"), std::string::npos);
   // A small turned map of the workspace makes infinite terms of finite numbers, and their sum undefined.
-  last_.tick = 1;
-  last_.T_world_device.linear() =
-      1e-3 * Eigen::AngleAxisd(M_PI / 4, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  EXPECT_FALSE(control_.hold(1, {.hold = 1, .position = {1.7e308, 1.7e308, 0}}, last_, refusal_));
+  T_world_device_.linear() = 1e-3 * Eigen::AngleAxisd(M_PI / 4, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  EXPECT_FALSE(control_.hold(1, {.hold = 1, .position = {1.7e308, 1.7e308, 0}}, T_world_device_, refusal_));
   EXPECT_EQ(refusal_.code, RefusalCode::handPoseInvalid);
   DeviceControl real(guard_, nullptr, {});
   EXPECT_FALSE(real.canBeHeld());
-  EXPECT_FALSE(real.hold(1, {.hold = 1}, last_, refusal_));
+  EXPECT_FALSE(real.hold(1, {.hold = 1}, T_world_device_, refusal_));
   EXPECT_EQ(refusal_.code, RefusalCode::handNotSimulated);
   EXPECT_NE(refusal_.text.find("the device is real"), std::string::npos);
+  DeviceControl recorded(guard_, nullptr, {}, false);
+  EXPECT_FALSE(recorded.hold(1, {.hold = 1}, T_world_device_, refusal_));
+  EXPECT_EQ(refusal_.code, RefusalCode::handNotSimulated);
+  EXPECT_EQ(refusal_.text,
+            "Hold_Hand refused: this device follows a recorded hand; only a simulated hand can be held");
 }
 
 class BlackBoxFilesTest : public ::testing::Test {

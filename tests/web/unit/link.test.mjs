@@ -268,6 +268,33 @@ test("a token that cannot be one keeps no page from connecting", () => {
   assert.deepEqual(credentials().map((m) => m.name), ["hapticd Identify"]);
 });
 
+test("every connection of a page begins with the same key, also after the page was loaded again", async () => {
+  const stored = new Map();
+  globalThis.sessionStorage = {
+    getItem: (name) => stored.get(name) ?? null,
+    setItem: (name, value) => stored.set(name, value),
+    removeItem: (name) => stored.delete(name),
+  };
+  const keyOf = ({ payload }) => new DataView(payload.buffer, payload.byteOffset + payload.byteLength - 8).getBigUint64(0);
+  const page = await bundled("token.ts");
+  const keyOfNow = () => {
+    const messages = page.credentials();
+    assert.deepEqual(messages.map((m) => m.name), ["hapticd Identify"]);
+    return keyOf(messages[0]);
+  };
+  const key = keyOfNow();
+  assert.notEqual(key, 0n);
+  assert.equal(keyOfNow(), key);
+  stored.set("hapticd token", "0123456789abcdef");
+  assert.equal(keyOfNow(), key);
+  const again = await bundled("token.ts");
+  assert.equal(keyOf(again.credentials()[0]), key);
+  stored.clear(); // another tab
+  assert.notEqual(keyOf((await bundled("token.ts")).credentials()[0]), key);
+  globalThis.sessionStorage = { getItem: () => null, setItem: () => { throw new Error("full"); } };
+  assert.equal(keyOfNow(), keyOfNow(), "in memory where the browser stores nothing");
+});
+
 test("only a refusal of the hand makes the page forget the hand it holds", () => {
   assert.ok(refusesHand(1, "hapticd Hold_Hand refused: this client may only observe"));
   assert.ok(refusesHand(3, "Hold_Hand refused: client 4 holds the hand"));

@@ -18,7 +18,8 @@ export const MARKER = m.Marker.name;
 const flag = (value: boolean): number => (value ? 1 : 0);
 
 export const ping = (): Outgoing => m.Ping.encode({});
-export const identify = (token: string): Outgoing => m.Identify.encode({ token, key: 0 });
+/** The key is that of the page, by which the server knows its connections. */
+export const identify = (token: string, key: number): Outgoing => m.Identify.encode({ token, key });
 export const stopForces = (): Outgoing => m.StopForces.encode({});
 export const rearmForces = (): Outgoing => m.RearmForces.encode({});
 export const batchBegin = (): Outgoing => m.BatchBegin.encode({});
