@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/time.h"
+#include "geometry/disc_tree.h"
 #include "geometry/fans.h"
 #include "geometry/triangle_mesh.h"
 #include "scene/spatial_index.h"
@@ -37,6 +38,8 @@ struct MeshGeometry {
   double recentMove = 0;
   SpatialIndex index;                          ///< over triangle ids, in object units
   std::shared_ptr<const geometry::Fans> fans;  ///< null without any, and once a vertex has moved
+  /// For a ball tool; null without one, and once a vertex has moved.
+  std::shared_ptr<const geometry::DiscTree> discs;
 
   bool deformingAfter(Nanos now) const noexcept { return target && now < morphEnd; }
 
