@@ -417,6 +417,7 @@ void ContactQuery::learnWhatFits(const Vec3& centre, double radius, bool overflo
   // Not where other gathers spent the work of the tick.
   if (overflowed || (!cache_.complete() && 2 * cache_.size() > FacetCache::kMaxTriangles)) {
     fits_m_ = std::max(0.5 * radius, kSmallestGather_m);
+    if (canGatherFansAlongWays()) fits_m_ = kSmallestGather_m;
     while (fits_m_ > kSmallestGather_m && !discsFit(centre, fits_m_))
       fits_m_ = std::max(0.5 * fits_m_, kSmallestGather_m);
     reserve_m_ = std::min(reserve_m_, fits_m_);
@@ -424,6 +425,14 @@ void ContactQuery::learnWhatFits(const Vec3& centre, double radius, bool overflo
   } else if (cache_.complete() && cache_.size() < kFew && radius >= 0.5 * fits_m_) {
     fits_m_ *= 1.5;
   }
+}
+
+// Balls that fit beside fans would have to be found by trying.
+bool ContactQuery::canGatherFansAlongWays() const noexcept {
+  const auto end = objects_.begin() + objectCount_;
+  return std::all_of(objects_.begin(), end, [this](const PlacedObject& o) { return hasDiscs(o); }) &&
+         std::any_of(objects_.begin(), end,
+                     [](const PlacedObject& o) { return o.state->mesh->fans != nullptr; });
 }
 
 // To find that out is far less work than to gather what then does not fit.
@@ -795,6 +804,7 @@ bool ContactQuery::castAtTriangles(const Path& path, int only, ObjectHit& hit) n
   }
   const double touching = radius_ + 2 * cache_.maxSkin();
   const auto considerNear = [&](const Vec3& way) {
+    if (workSpent()) return false;
     const auto near = cache_.trianglesNear(way, touching, discs());
     countScans();
     for (const int i : near) {

@@ -257,6 +257,7 @@ class ContactQuery {
   void estimateRoom(double radius) noexcept;
   void learnWhatFits(const Vec3& centre, double radius, bool overflowed) noexcept;
   bool discsFit(const Vec3& centre, double radius) noexcept;
+  bool canGatherFansAlongWays() const noexcept;
   void adaptReserve() noexcept;
   bool isUnfit(const Vec3& centre, double radius) const noexcept;
   void compareWithBefore(PlacedObject& placed) const noexcept;

@@ -129,9 +129,11 @@ TEST(WorkOfABall, lets_it_feel_a_fine_bowl_a_little_larger) {
       const double away_m = std::min(1.0, i / 50.0) * (kGap_m + kDeep_m);
       const Vec3 direction(std::sin(tilt) * std::cos(turn), std::sin(tilt) * std::sin(turn), -std::cos(tilt));
       const double felt = ball.at(away_m * direction);
+      const bool late = (ball.status() & kRenderWorkLimit) != 0;
+      spent += late ? 1 : 0;
       // The middles of the faces are nearer than the corners, by up to 15 um.
-      ASSERT_NEAR(felt, 1000 * std::max(0.0, away_m - kGap_m), 0.02) << c.meridians << ", tick " << i;
-      spent += (ball.status() & kRenderWorkLimit) != 0 ? 1 : 0;
+      ASSERT_NEAR(felt, 1000 * std::max(0.0, away_m - kGap_m), late ? 0.1 : 0.02)
+          << c.meridians << ", tick " << i;
     }
     EXPECT_LT(spent, ticks / 20) << c.meridians;
   }
